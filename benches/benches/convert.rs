@@ -1,0 +1,2 @@
+//! Benchmark of convert (being written).
+fn main() {}

@@ -1,0 +1,2 @@
+//! Benchmark of tsm (being written).
+fn main() {}

@@ -1,0 +1,70 @@
+//! Columns of a cloud, sized once and filled in parallel.
+
+use crate::{ConvertError, SplatParams};
+use bytemuck::Zeroable;
+use splat_core::{Cloud, SplatKind, glam::Vec3};
+
+/// Splats per parallel task; fixed, so that results do not depend on the thread count.
+pub(crate) const CHUNK: usize = 1 << 14;
+
+/// Which optional columns a conversion fills.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Wanted {
+    /// Unit normals.
+    pub(crate) normal: bool,
+    /// Physical values.
+    pub(crate) value: bool,
+}
+
+/// Gives every column `n` entries: constants are filled in, the rest is left for the conversion to write. Memory that
+/// `cloud` holds already is used again.
+pub(crate) fn size_columns(
+    cloud: &mut Cloud,
+    n: usize,
+    kind: SplatKind,
+    wanted: Wanted,
+    params: &SplatParams,
+) -> Result<(), ConvertError> {
+    let full = |_| ConvertError::TooMany {
+        object: params.object_name.clone(),
+        what: "splats in free memory",
+        needed: n as f64,
+        limit: params.max_splats,
+    };
+    sized(&mut cloud.position, n).map_err(full)?;
+    sized(&mut cloud.radius, n).map_err(full)?;
+    sized(&mut cloud.cross_section, n).map_err(full)?;
+    sized(&mut cloud.color, n).map_err(full)?;
+    sized(&mut cloud.normal, if wanted.normal { n } else { 0 }).map_err(full)?;
+    sized(&mut cloud.value, if wanted.value { n } else { 0 }).map_err(full)?;
+    constant(&mut cloud.kind, n, kind);
+    constant(&mut cloud.material, n, params.material);
+    constant(&mut cloud.footprint, n, params.footprint);
+    constant(&mut cloud.object, n, params.object);
+    cloud.tangent.clear();
+    cloud.shadow_coefficient.clear();
+    Ok(())
+}
+
+/// `n` entries of any content; fresh memory comes zeroed from the system, page by page, to whichever thread writes it.
+fn sized<T: Zeroable + Clone>(column: &mut Vec<T>, n: usize) -> Result<(), ()> {
+    if column.capacity() >= n {
+        column.resize(n, T::zeroed());
+    } else {
+        *column = bytemuck::try_zeroed_vec(n)?;
+    }
+    Ok(())
+}
+
+fn constant<T: Copy + PartialEq>(column: &mut Vec<T>, n: usize, value: T) {
+    if column.len() == n && column.iter().all(|v| *v == value) {
+        return;
+    }
+    // A fresh vector of zeros costs nothing until it is read.
+    *column = vec![value; n];
+}
+
+/// The unit vector along `v`, or zero where it has none.
+pub(crate) fn unit_or_zero(v: Vec3) -> Vec3 {
+    v.as_dvec3().try_normalize().map_or(Vec3::ZERO, |u| u.as_vec3())
+}

@@ -1,0 +1,51 @@
+//! Why a conversion was refused; every message names the object and says what would be accepted.
+
+use splat_core::glam::DVec3;
+
+/// What can go wrong between a mesh, a volume, raw points or a field and a cloud.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConvertError {
+    /// A parameter is outside its range.
+    #[error("object '{object}': {parameter} is {found}, expected {expected}")]
+    Parameter {
+        /// Name of the object.
+        object: String,
+        /// Name of the parameter.
+        parameter: &'static str,
+        /// The value, printed.
+        found: String,
+        /// The accepted range, in words.
+        expected: &'static str,
+    },
+    /// The conversion would make more elements than the budget allows.
+    #[error("object '{object}': {needed:.3e} {what} needed, the limit is {limit}; choose a larger spacing")]
+    TooMany {
+        /// Name of the object.
+        object: String,
+        /// What is counted: `splats` or `lattice points`.
+        what: &'static str,
+        /// Elements needed, rounded; may be infinite.
+        needed: f64,
+        /// Elements allowed.
+        limit: u64,
+    },
+    /// The input breaks a promise of its noun.
+    #[error("object '{object}': {source}")]
+    Input {
+        /// Name of the object.
+        object: String,
+        /// The promise that was broken.
+        source: splat_core::Error,
+    },
+    /// A field has no finite value where one is needed.
+    #[error("object '{object}': the field is {value} at {point}, expected a finite number; change the expression or the box")]
+    NonFinite {
+        /// Name of the object.
+        object: String,
+        /// Where, in the field's coordinates.
+        point: DVec3,
+        /// The value found.
+        value: f64,
+    },
+}

@@ -1,0 +1,139 @@
+//! Why a file was refused: whose fault it is, where, what was expected, what was found and what to do about it.
+
+use std::fmt;
+use std::path::Path;
+
+/// Whose fault a refused file is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fault {
+    /// The file system: missing, no permission, not a regular file.
+    FileSystem,
+    /// The content of the file.
+    Input,
+    /// The file asks for more memory than [`crate::read::ReadLimits`] allows.
+    Limit,
+}
+
+impl Fault {
+    /// The exit code of a command that stops with this fault: 4, 3 or 5.
+    pub fn exit_code(self) -> u8 {
+        match self {
+            Self::FileSystem => 4,
+            Self::Input => 3,
+            Self::Limit => 5,
+        }
+    }
+}
+
+/// Where in a file the fault lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// Nowhere in particular.
+    File,
+    /// A line of text, counted from 1.
+    Line {
+        /// The line, from 1.
+        line: u64,
+        /// The column in bytes, from 1; 0 for the whole line.
+        column: u64,
+    },
+    /// A byte offset, from 0; after decompression if the file is compressed with gzip.
+    Byte(u64),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File => Ok(()),
+            Self::Line { line, column: 0 } => write!(f, ":{line}"),
+            Self::Line { line, column } => write!(f, ":{line}:{column}"),
+            Self::Byte(byte) => write!(f, "@{byte}"),
+        }
+    }
+}
+
+/// A file that was refused. Prints as `FILE:LINE:COLUMN: expected …, found …` (or `FILE@BYTE: …`) and a line `hint: …`.
+///
+/// Names and pieces of the file are shown with control characters escaped.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{file}{place}: expected {expected}, found {found}\nhint: {hint}")]
+#[non_exhaustive]
+pub struct ReadError {
+    /// The file's name, escaped.
+    pub file: String,
+    /// Where in the file.
+    pub place: Place,
+    /// What would have been accepted, in words.
+    pub expected: String,
+    /// What was there instead.
+    pub found: String,
+    /// What to do about it.
+    pub hint: &'static str,
+    /// Whose fault it is.
+    pub fault: Fault,
+}
+
+impl ReadError {
+    /// The content is wrong; the file's name is added by [`ReadError::in_file`].
+    pub(crate) fn input(
+        place: Place,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+        hint: &'static str,
+    ) -> Self {
+        let (expected, found) = (expected.into(), found.into());
+        Self { file: String::new(), place, expected, found, hint, fault: Fault::Input }
+    }
+
+    /// More memory is needed than allowed.
+    pub(crate) fn limit(expected: impl Into<String>, found: impl Into<String>, hint: &'static str) -> Self {
+        Self { fault: Fault::Limit, ..Self::input(Place::File, expected, found, hint) }
+    }
+
+    /// The file system refused.
+    pub(crate) fn file_system(expected: &str, found: impl Into<String>, hint: &'static str) -> Self {
+        Self { fault: Fault::FileSystem, ..Self::input(Place::File, expected, found, hint) }
+    }
+
+    /// The same error with the name of the file, which must be escaped already.
+    pub(crate) fn in_file(self, file: &str) -> Self {
+        Self { file: file.to_owned(), ..self }
+    }
+}
+
+/// A path as it may be shown on a terminal: control and direction characters and bytes that are not UTF-8 are escaped.
+pub fn escaped_path(path: &Path) -> String {
+    escaped(path.as_os_str().as_encoded_bytes(), usize::MAX)
+}
+
+/// At most `limit` characters of `bytes`, escaped, `…` for the rest.
+pub(crate) fn escaped(bytes: &[u8], limit: usize) -> String {
+    let mut out = String::new();
+    let mut left = limit;
+    for chunk in bytes.utf8_chunks() {
+        for c in chunk.valid().chars() {
+            if left == 0 {
+                return out + "…";
+            }
+            left -= 1;
+            match c {
+                '\\' => out.push_str("\\\\"),
+                c if c.is_control() || is_direction(c) => out.extend(c.escape_default()),
+                c => out.push(c),
+            }
+        }
+        for byte in chunk.invalid() {
+            if left == 0 {
+                return out + "…";
+            }
+            left -= 1;
+            out.push_str(&format!("\\x{byte:02x}"));
+        }
+    }
+    out
+}
+
+/// Characters that reorder or hide the text around them.
+fn is_direction(c: char) -> bool {
+    matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
+}

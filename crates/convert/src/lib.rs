@@ -1,0 +1,53 @@
+//! Files and fields become clouds, meshes and grids.
+#![forbid(unsafe_code)]
+
+mod columns;
+mod convert_error;
+#[cfg(any(feature = "ply", feature = "nifti", feature = "las"))]
+mod error;
+#[cfg(feature = "expression")]
+mod expression;
+mod field_points;
+mod mesh_points;
+#[cfg(feature = "surfels")]
+mod neighbours;
+#[cfg(feature = "surfels")]
+mod orient;
+mod params;
+#[cfg(feature = "noise")]
+mod procedural;
+mod raw_points;
+#[cfg(any(feature = "ply", feature = "nifti", feature = "las"))]
+pub mod read;
+pub mod reference;
+mod resample;
+mod shapes;
+mod sobel;
+mod subdivide;
+mod surface_nets;
+#[cfg(feature = "surfels")]
+mod surfels;
+#[cfg(feature = "surfels")]
+mod tangent_plane;
+mod vertex_normals;
+mod volume_points;
+
+pub use convert_error::ConvertError;
+#[cfg(any(feature = "ply", feature = "nifti", feature = "las"))]
+pub use error::{Fault, Place, ReadError, escaped_path};
+#[cfg(feature = "expression")]
+pub use expression::{ExpressionError, ExpressionField};
+pub use field_points::{DensityParams, density_to_points, field_to_grid, field_to_mesh, surface_to_points};
+pub use mesh_points::{MeshParams, MeshReport, mesh_to_points, mesh_to_points_into, predicted_splats};
+#[cfg(feature = "surfels")]
+pub use orient::Orientation;
+pub use params::{Density, SplatParams};
+#[cfg(feature = "noise")]
+pub use procedural::{CloudShape, Ellipsoid, procedural_cloud};
+pub use raw_points::{PointLattice, RawPoints};
+pub use shapes::{medium_ball, medium_box, rectangle};
+pub use sobel::{sobel_gradient, sobel_gradient_into};
+#[cfg(feature = "surfels")]
+pub use surfels::{SurfelParams, SurfelReport, raw_to_surfels};
+pub use vertex_normals::vertex_normals;
+pub use volume_points::{VolumeParams, VolumeReport, volume_to_points};

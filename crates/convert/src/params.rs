@@ -1,0 +1,109 @@
+//! Parameters that all conversions share.
+
+use crate::ConvertError;
+use splat_core::{Footprint, Similarity};
+
+/// Smallest and largest splat spacing, world units: areas must stay normal f32 numbers.
+const SPACING_RANGE: std::ops::RangeInclusive<f64> = 1e-15..=1e15;
+
+/// The attributes that every splat of one object gets, and the limits of its conversion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SplatParams {
+    /// Name of the object in messages.
+    pub object_name: String,
+    /// Index into the object table.
+    pub object: u32,
+    /// Index into the material table.
+    pub material: u16,
+    /// Index into the footprint stack.
+    pub footprint: u8,
+    /// The profile that `footprint` stands for; it gives the ratio of cutoff radius to spacing.
+    pub profile: Footprint,
+    /// Object space → world space, applied in f64.
+    pub transform: Similarity,
+    /// Linear Rec.709 colour, each channel ≥ 0, where the input has none.
+    pub color: [f32; 3],
+    /// Most splats that this object may become, ≤ 2³² − 1.
+    pub max_splats: u64,
+}
+
+impl Default for SplatParams {
+    fn default() -> Self {
+        Self {
+            object_name: "object".to_owned(),
+            object: 0,
+            material: 0,
+            footprint: 0,
+            profile: Footprint::default(),
+            transform: Similarity::default(),
+            color: [1.0; 3],
+            max_splats: 100_000_000,
+        }
+    }
+}
+
+/// How far splats lie apart.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Density {
+    /// Each splat stands for at most this much length (lattices) or for its square in area (surfaces), world units.
+    Spacing(f64),
+    /// About this many splats; a surface whose triangles are finer keeps them.
+    Splats(u64),
+    /// From the size of the object and the fineness of its input, see each conversion.
+    #[default]
+    Auto,
+}
+
+impl SplatParams {
+    /// Checks the transform, the colour and the limit.
+    pub(crate) fn check(&self) -> Result<(), ConvertError> {
+        let t = &self.transform;
+        if !(t.scale.is_finite() && t.scale > 0.0) {
+            return Err(self.bad("scale", t.scale, "a finite number > 0"));
+        }
+        if !(t.rotation.is_normalized() && t.translation.is_finite()) {
+            return Err(self.bad("transform", t, "a unit quaternion and a finite translation"));
+        }
+        if !self.color.iter().all(|c| c.is_finite() && *c >= 0.0) {
+            return Err(self.bad("color", self.color, "three finite numbers ≥ 0"));
+        }
+        if self.max_splats > u64::from(u32::MAX) {
+            return Err(self.bad("max_splats", self.max_splats, "at most 4294967295"));
+        }
+        if !(1.0..=8.0).contains(&self.profile.cutoff) {
+            return Err(self.bad("cutoff", self.profile.cutoff, "1 to 8 standard deviations"));
+        }
+        Ok(())
+    }
+
+    /// Checks a spacing in world units.
+    pub(crate) fn check_spacing(&self, spacing: f64) -> Result<f64, ConvertError> {
+        if SPACING_RANGE.contains(&spacing) {
+            return Ok(spacing);
+        }
+        Err(self.bad("spacing", spacing, "a number from 1e-15 to 1e15 world units"))
+    }
+
+    /// A parameter error of this object.
+    pub(crate) fn bad(&self, parameter: &'static str, found: impl std::fmt::Debug, expected: &'static str) -> ConvertError {
+        ConvertError::Parameter { object: self.object_name.clone(), parameter, found: format!("{found:?}"), expected }
+    }
+
+    /// Turns a broken promise of an input into an error that names this object.
+    pub(crate) fn input(&self, source: splat_core::Error) -> ConvertError {
+        ConvertError::Input { object: self.object_name.clone(), source }
+    }
+
+    /// Refuses more splats than the limit.
+    pub(crate) fn check_count(&self, needed: f64) -> Result<(), ConvertError> {
+        if needed <= self.max_splats as f64 {
+            return Ok(());
+        }
+        Err(ConvertError::TooMany { object: self.object_name.clone(), what: "splats", needed, limit: self.max_splats })
+    }
+
+    /// Cutoff radius of splats that are `spacing` apart, world units.
+    pub(crate) fn radius(&self, spacing: f64) -> f64 {
+        f64::from(self.profile.cutoff) * f64::from(Footprint::SIGMA_OVER_SPACING) * spacing
+    }
+}

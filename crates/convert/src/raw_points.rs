@@ -1,0 +1,95 @@
+//! Points as a scanner or a file gives them: no radius, perhaps no normal.
+
+use splat_core::Error;
+use splat_core::glam::{DVec3, Vec3};
+
+/// Raw points as columns; all but the positions may be empty.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct RawPoints {
+    /// Position that every point is relative to, units of the file.
+    pub origin: DVec3,
+    /// Positions.
+    pub position: Vec<Vec3>,
+    /// Unit normals, zero for none.
+    pub normal: Vec<Vec3>,
+    /// Linear Rec.709 colours.
+    pub color: Vec<[f32; 3]>,
+    /// Physical values (intensity, temperature …), any finite number.
+    pub value: Vec<f32>,
+    /// Classes as the file numbers them (LAS: 2 is ground, 5 high vegetation …).
+    pub classification: Vec<u8>,
+    /// The integers that the positions were made from, where the file stores integers.
+    pub lattice: Option<PointLattice>,
+    /// Points of the file that were left out because a coordinate was not finite.
+    pub dropped: u64,
+}
+
+/// Coordinates as integers on a lattice: exact, whatever the offset. Position i is `offset + scale · steps[i]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointLattice {
+    /// Position of the integer coordinates (0, 0, 0), units of the file.
+    pub offset: DVec3,
+    /// Length of one step along each axis, > 0.
+    pub scale: DVec3,
+    /// Integer coordinates, one triple a point.
+    pub steps: Vec<[i32; 3]>,
+}
+
+impl RawPoints {
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.position.len()
+    }
+
+    /// True without points.
+    pub fn is_empty(&self) -> bool {
+        self.position.is_empty()
+    }
+
+    /// Position of point `i` in f64: from the file's integers where it has them, else from the f32 offset.
+    ///
+    /// # Panics
+    /// If `i` is out of range.
+    pub fn exact_position(&self, i: usize) -> DVec3 {
+        match &self.lattice {
+            Some(l) => l.offset + l.scale * DVec3::from_array(l.steps[i].map(f64::from)),
+            None => self.origin + self.position[i].as_dvec3(),
+        }
+    }
+
+    /// Checks column lengths and finite numbers.
+    ///
+    /// # Errors
+    /// [`Error::ColumnLength`] or [`Error::Invalid`] for the first that does not hold.
+    pub fn validate(&self) -> Result<(), Error> {
+        let expected = self.len();
+        let columns = [
+            ("normal", self.normal.len()),
+            ("color", self.color.len()),
+            ("value", self.value.len()),
+            ("classification", self.classification.len()),
+            ("lattice", self.lattice.as_ref().map_or(0, |l| l.steps.len())),
+        ];
+        for (attribute, found) in columns {
+            if found != 0 && found != expected {
+                return Err(Error::ColumnLength { attribute, found, expected });
+            }
+        }
+        if !self.origin.is_finite() {
+            return Err(Error::invalid("points", 0, "origin", self.origin, "finite numbers"));
+        }
+        if let Some(i) = self.position.iter().position(|p| !p.is_finite()) {
+            return Err(Error::invalid("point", i, "position", self.position[i], "finite numbers"));
+        }
+        if let Some(i) = self.normal.iter().position(|n| !n.is_finite()) {
+            return Err(Error::invalid("point", i, "normal", self.normal[i], "finite numbers"));
+        }
+        if let Some(i) = self.color.iter().position(|c| !c.iter().all(|v| v.is_finite() && *v >= 0.0)) {
+            return Err(Error::invalid("point", i, "color", self.color[i], "three finite numbers ≥ 0"));
+        }
+        if let Some(i) = self.value.iter().position(|v| !v.is_finite()) {
+            return Err(Error::invalid("point", i, "value", self.value[i], "a finite number"));
+        }
+        Ok(())
+    }
+}

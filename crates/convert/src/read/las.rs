@@ -1,0 +1,219 @@
+//! LAS 1.0 to 1.4 and LAZ → raw points with colours, intensity as value, classes and their exact integers.
+
+use super::{ReadLimits, color::linear_from_srgb, input, laz};
+use crate::error::{Place, ReadError};
+use crate::raw_points::{PointLattice, RawPoints};
+use ::las::point::Format;
+use ::las::{PointData, PointDataBuilder, raw};
+use splat_core::glam::{DVec3, Vec3};
+use std::borrow::Cow;
+
+/// Points decoded at once: the reader's working memory does not depend on the announced count.
+const BLOCK: usize = 1 << 16;
+/// Bytes that a point takes in the columns at most.
+const BYTES_PER_POINT: u64 = 12 + 12 + 6 + 12 + 4 + 1;
+const HINT: &str = "the file is truncated or damaged; fetch it again";
+
+/// What the checked header says.
+pub(super) struct Layout {
+    /// Point format without the compression bits, 0 to 10.
+    pub(super) format_id: u8,
+    pub(super) format: Format,
+    pub(super) count: u64,
+    /// Bytes of one uncompressed record.
+    pub(super) record: u64,
+    /// First byte of the points.
+    pub(super) points: usize,
+    /// First byte of the variable-length records, and their number.
+    pub(super) records: (usize, u32),
+    compressed: bool,
+    scale: DVec3,
+    offset: DVec3,
+}
+
+/// Reads a LAS or LAZ file.
+pub(super) fn read(content: &[u8], limits: &ReadLimits) -> Result<RawPoints, ReadError> {
+    let layout = layout(content)?;
+    let records = if layout.compressed {
+        Cow::Owned(laz::decompress(content, &layout, limits)?)
+    } else {
+        Cow::Borrowed(plain_records(content, &layout)?)
+    };
+    input::check_bytes("the points", layout.count.saturating_mul(BYTES_PER_POINT), limits)?;
+    let mut columns = Columns::new(&layout)?;
+    for block in records.chunks(BLOCK * layout.record as usize) {
+        let data = PointDataBuilder::new().with_format(layout.format).build_from_bytes(block.to_vec());
+        columns.append(&data.map_err(|e| damaged(layout.points, "whole point records", &e.to_string()))?);
+    }
+    columns.into_points(&layout)
+}
+
+fn damaged(byte: usize, expected: &str, found: &str) -> ReadError {
+    ReadError::input(Place::Byte(byte as u64), expected, found, HINT)
+}
+
+/// Parses the header and checks it against the file.
+fn layout(content: &[u8]) -> Result<Layout, ReadError> {
+    let header = raw::Header::read_from(content)
+        .map_err(|e| damaged(0, "'LASF' at byte 0 and a complete LAS header", &e.to_string()))?;
+    let version = header.version;
+    if version.major != 1 || version.minor > 4 {
+        return Err(damaged(24, "LAS version 1.0 to 1.4", &format!("{}.{}", version.major, version.minor)));
+    }
+    let points = header.offset_to_point_data as usize;
+    if header.header_size < version.header_size() || points < usize::from(header.header_size) || points > content.len() {
+        let found = format!("a header of {} bytes, points at {points}, {} bytes in all", header.header_size, content.len());
+        return Err(damaged(94, "points after the header, inside the file", &found));
+    }
+    let stored_id = header.point_data_record_format;
+    let format_id = stored_id & 0x3f;
+    let compressed = stored_id & 0xc0 != 0;
+    let mut format = match Format::new(format_id) {
+        Ok(format) if format_id <= 10 && stored_id & 0x40 == 0 => format,
+        _ => return Err(damaged(104, "point format 0 to 10, with bit 7 for LAZ", &stored_id.to_string())),
+    };
+    let record = header.point_data_record_length;
+    format.extra_bytes = record.checked_sub(format.len()).ok_or_else(|| {
+        damaged(105, &format!("records of at least {} bytes", format.len()), &record.to_string())
+    })?;
+    let (scale, offset) = transform(&header)?;
+    Ok(Layout {
+        format_id,
+        format,
+        count: count(&header)?,
+        record: record.into(),
+        points,
+        records: (header.header_size.into(), header.number_of_variable_length_records),
+        compressed,
+        scale,
+        offset,
+    })
+}
+
+/// The number of points; the legacy field of a 1.4 file is 0 or agrees.
+fn count(header: &raw::Header) -> Result<u64, ReadError> {
+    let legacy = u64::from(header.number_of_point_records);
+    match header.large_file {
+        Some(large) if legacy != 0 && legacy != large.number_of_point_records => {
+            let found = format!("{legacy} in the legacy field, {} in the 1.4 field", large.number_of_point_records);
+            Err(damaged(107, "one number of points", &found))
+        }
+        Some(large) => Ok(large.number_of_point_records),
+        None => Ok(legacy),
+    }
+}
+
+fn transform(header: &raw::Header) -> Result<(DVec3, DVec3), ReadError> {
+    let scale = DVec3::new(header.x_scale_factor, header.y_scale_factor, header.z_scale_factor);
+    let offset = DVec3::new(header.x_offset, header.y_offset, header.z_offset);
+    let reach = offset.abs() + scale * 2f64.powi(31);
+    if scale.cmpgt(DVec3::ZERO).all() && reach.is_finite() {
+        return Ok((scale, offset));
+    }
+    let expected = "scales > 0 and offsets, all finite";
+    Err(damaged(131, expected, &format!("scales {scale}, offsets {offset}")))
+}
+
+/// The records of an uncompressed file: all that are announced, and no more than that.
+fn plain_records<'a>(content: &'a [u8], layout: &Layout) -> Result<&'a [u8], ReadError> {
+    let needed = layout.count.checked_mul(layout.record);
+    let stored = &content[layout.points..];
+    match needed.and_then(|n| usize::try_from(n).ok()).and_then(|n| stored.get(..n)) {
+        Some(records) => {
+            let end = layout.points + records.len();
+            let spare = first_byte_after_points(content, end) - end;
+            if (spare as u64) < layout.record {
+                return Ok(records);
+            }
+            let found = format!("{spare} bytes more than that before the next part of the file");
+            Err(damaged(107, &format!("{} points, as the header says", layout.count), &found))
+        }
+        None => {
+            let whole = stored.len() as u64 / layout.record;
+            let found = format!("{whole} in the {} bytes left", stored.len());
+            Err(damaged(layout.points, &format!("{} points of {} bytes", layout.count, layout.record), &found))
+        }
+    }
+}
+
+/// Where extended records or waveforms begin behind the points, else the end of the file.
+fn first_byte_after_points(content: &[u8], end: usize) -> usize {
+    let Ok(header) = raw::Header::read_from(content) else { return content.len() };
+    let evlrs = header.evlr.filter(|e| e.number_of_evlrs > 0).map(|e| e.start_of_first_evlr);
+    let parts = [evlrs, header.start_of_waveform_data_packet_record];
+    let starts = parts.into_iter().flatten().filter_map(|start| usize::try_from(start).ok());
+    starts.filter(|start| (end..content.len()).contains(start)).min().unwrap_or(content.len())
+}
+
+/// Columns while they are filled.
+struct Columns {
+    steps: Vec<[i32; 3]>,
+    rgb: Vec<[u16; 3]>,
+    value: Vec<f32>,
+    classification: Vec<u8>,
+}
+
+impl Columns {
+    fn new(layout: &Layout) -> Result<Self, ReadError> {
+        let n = layout.count as usize;
+        let mut columns =
+            Self { steps: Vec::new(), rgb: Vec::new(), value: Vec::new(), classification: Vec::new() };
+        input::reserve(&mut columns.steps, n)?;
+        input::reserve(&mut columns.value, n)?;
+        input::reserve(&mut columns.classification, n)?;
+        if layout.format.has_color {
+            input::reserve(&mut columns.rgb, n)?;
+        }
+        Ok(columns)
+    }
+
+    fn append(&mut self, data: &PointData) {
+        self.steps.extend(data.x_raw().zip(data.y_raw()).zip(data.z_raw()).map(|((x, y), z)| [x, y, z]));
+        self.value.extend(data.intensity().map(f32::from));
+        self.classification.extend(data.classification());
+        if let Some(rgb) = data.rgb() {
+            self.rgb.extend(rgb.map(|(r, g, b)| [r, g, b]));
+        }
+    }
+
+    /// Positions relative to a lattice point in the middle, so that offsets are small multiples of the scale.
+    fn into_points(self, layout: &Layout) -> Result<RawPoints, ReadError> {
+        let Self { steps, rgb, value, classification } = self;
+        let middle = middle(&steps);
+        let origin = layout.offset + layout.scale * DVec3::from_array(middle.map(|m| m as f64));
+        let offset_of = |s: &[i32; 3]| {
+            let from_middle = [0, 1, 2].map(|a| (i64::from(s[a]) - middle[a]) as f64);
+            (layout.scale * DVec3::from_array(from_middle)).as_vec3()
+        };
+        let mut position: Vec<Vec3> = Vec::new();
+        input::reserve(&mut position, steps.len())?;
+        position.extend(steps.iter().map(offset_of));
+        if let Some(i) = position.iter().position(|p| !p.is_finite()) {
+            let found = format!("{} at point {i}", position[i]);
+            return Err(damaged(131, "offsets from the middle that fit 32-bit floats", &found));
+        }
+        let lattice = Some(PointLattice { offset: layout.offset, scale: layout.scale, steps });
+        let color = linear_colors(&rgb)?;
+        Ok(RawPoints { origin, position, color, value, classification, lattice, ..RawPoints::default() })
+    }
+}
+
+fn middle(steps: &[[i32; 3]]) -> [i64; 3] {
+    [0, 1, 2].map(|axis| {
+        let low = steps.iter().map(|s| i64::from(s[axis])).min().unwrap_or(0);
+        let high = steps.iter().map(|s| i64::from(s[axis])).max().unwrap_or(0);
+        (low + high).div_euclid(2)
+    })
+}
+
+/// sRGB components → linear. Many writers put 8-bit colours into the 16-bit fields: a file without any component above
+/// 255 is taken as such.
+fn linear_colors(rgb: &[[u16; 3]]) -> Result<Vec<[f32; 3]>, ReadError> {
+    let largest = rgb.iter().flatten().copied().max().unwrap_or(0);
+    let top = if largest <= 255 { 255.0 } else { 65_535.0 };
+    let table: Vec<f32> = (0..=largest).map(|c| linear_from_srgb(f64::from(c) / top)).collect();
+    let mut color = Vec::new();
+    input::reserve(&mut color, rgb.len())?;
+    color.extend(rgb.iter().map(|c| c.map(|v| table[usize::from(v)])));
+    Ok(color)
+}

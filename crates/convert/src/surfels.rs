@@ -1,0 +1,282 @@
+//! Raw points become surfels: radius from the distances of distinct neighbours, normals from their covariance.
+//!
+//! Gunjee 2007 takes points with all attributes; scanners give positions. Each distinct position gets the normal of its
+//! neighbours' plane, its Voronoi cell in that plane as area a (K = τ₁·a, or a when opaque) and the radius
+//! R = cutoff·0.8·h with h = √2 times the cell's farthest corner, between √a and 2√a: on a square lattice that is the
+//! lattice's spacing, among scattered points it bridges the gaps.
+//!
+//! Points at one place share the area of that place, so duplicates neither darken it nor shrink radii to 0.
+
+use crate::columns::{self, CHUNK, Wanted};
+use crate::neighbours::{MAX_NEIGHBOURS, Nearest, Tree};
+use crate::orient::{self, Orientation};
+use crate::params::SplatParams;
+use crate::tangent_plane::{self, Cell};
+use crate::{ConvertError, RawPoints};
+use rayon::prelude::*;
+use splat_core::{Cloud, SplatKind, glam::{DVec3, Vec3}, optics};
+use std::cmp::Ordering;
+
+/// How raw points become surfels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurfelParams {
+    /// Attributes and limits; `color` is for points without one.
+    pub splat: SplatParams,
+    /// Opacity of one crossing, in (0, 1\]; 1 makes the surface opaque.
+    pub opacity: f64,
+    /// Neighbours that normals and areas come from, 3 to 32.
+    pub neighbours: usize,
+    /// Which side computed normals point to. Normals of the input stay as they are.
+    pub orientation: Orientation,
+    /// Whether points at one place become one surfel.
+    pub merge_duplicates: bool,
+    /// Whether surfels keep the points' values.
+    pub values: bool,
+    /// Largest spacing over the median spacing: lone points do not become huge discs. At least 1.
+    pub largest_spacing: f64,
+    /// Spacing of a point without any neighbour, world units.
+    pub lone_spacing: f64,
+}
+
+impl Default for SurfelParams {
+    fn default() -> Self {
+        Self {
+            splat: SplatParams::default(),
+            opacity: 1.0,
+            neighbours: 10,
+            orientation: Orientation::default(),
+            merge_duplicates: false,
+            values: false,
+            largest_spacing: 4.0,
+            lone_spacing: 1.0,
+        }
+    }
+}
+
+/// What the conversion of raw points did.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SurfelReport {
+    /// Points given.
+    pub points: u64,
+    /// Points that lie where an earlier one lies.
+    pub duplicates: u64,
+    /// Surfels made.
+    pub splats: u64,
+    /// Places whose neighbours lie on a line, so that the normal is a guess.
+    pub without_plane: u64,
+    /// Places whose spacing was cut to the largest.
+    pub lone: u64,
+    /// Median spacing, world units; 0 without points.
+    pub median_spacing: f64,
+    /// Sum of the areas, world units².
+    pub area: f64,
+}
+
+/// What is known about one place.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    normal: DVec3,
+    /// False for a guess.
+    plane: bool,
+    area: f64,
+    spacing: f64,
+}
+
+/// Makes surfels of raw points.
+///
+/// ```
+/// use convert::{RawPoints, SurfelParams, raw_to_surfels};
+/// use splat_core::glam::Vec3;
+/// let position = (0..100).map(|i| Vec3::new((i % 10) as f32, 0.0, (i / 10) as f32)).collect();
+/// let points = RawPoints { position, ..RawPoints::default() };
+/// let (cloud, report) = raw_to_surfels(&points, &SurfelParams::default()).unwrap();
+/// assert!((report.median_spacing - 1.0).abs() < 1e-12);
+/// assert!(cloud.normal.iter().all(|n| *n == Vec3::Y));
+/// ```
+///
+/// # Errors
+/// [`ConvertError::Parameter`], [`ConvertError::Input`] or [`ConvertError::TooMany`].
+pub fn raw_to_surfels(points: &RawPoints, params: &SurfelParams) -> Result<(Cloud, SurfelReport), ConvertError> {
+    check(points, params)?;
+    let order = canonical_order(points);
+    let (distinct, starts) = distinct_places(points, &order);
+    let tree = Tree::new(&distinct);
+    let (mut places, nearest): (Vec<Place>, Vec<Nearest>) = if params.orientation == Orientation::Propagate {
+        (0..distinct.len()).into_par_iter().with_min_len(256).map(|i| place(&tree, &distinct, i, params)).unzip()
+    } else {
+        let places = (0..distinct.len()).into_par_iter().with_min_len(256).map(|i| place(&tree, &distinct, i, params).0);
+        (places.collect(), Vec::new())
+    };
+    let mut report = SurfelReport {
+        points: points.len() as u64,
+        duplicates: (points.len() - distinct.len()) as u64,
+        without_plane: places.iter().filter(|p| !p.plane).count() as u64,
+        ..SurfelReport::default()
+    };
+    cut_outliers(&mut places, params, &mut report);
+    let mut normals: Vec<DVec3> = places.iter().map(|p| p.normal).collect();
+    orient::orient(&mut normals, &distinct, points.origin, params.orientation, &nearest);
+    let cloud = emit(points, params, &Sorted { order, starts, places, normals }, &mut report)?;
+    Ok((cloud, report))
+}
+
+fn check(points: &RawPoints, params: &SurfelParams) -> Result<(), ConvertError> {
+    let p = &params.splat;
+    p.check()?;
+    points.validate().map_err(|e| p.input(e))?;
+    p.check_count(points.len() as f64)?;
+    if !(params.opacity > 0.0 && params.opacity <= 1.0) {
+        return Err(p.bad("opacity", params.opacity, "a number in (0, 1]"));
+    }
+    if !(3..=MAX_NEIGHBOURS).contains(&params.neighbours) {
+        return Err(p.bad("neighbours", params.neighbours, "3 to 32"));
+    }
+    if params.largest_spacing.is_nan() || params.largest_spacing < 1.0 {
+        return Err(p.bad("largest_spacing", params.largest_spacing, "a number ≥ 1"));
+    }
+    orient::check(params.orientation).map_err(|(found, expected)| p.bad("orientation", found, expected))?;
+    p.check_spacing(params.lone_spacing).map(|_| ())
+}
+
+/// Ids by place (along a Morton curve), then by attributes: the order of the file does not matter.
+fn canonical_order(points: &RawPoints) -> Vec<u32> {
+    let bounds = splat_core::Aabb::of_points(&points.position);
+    let extent = (bounds.max - bounds.min).max_element().max(f32::MIN_POSITIVE);
+    let mut keys: Vec<(u64, u32)> = points
+        .position
+        .par_iter()
+        .enumerate()
+        .with_min_len(CHUNK)
+        .map(|(i, p)| (morton((p.as_dvec3() - bounds.min.as_dvec3()) / f64::from(extent)), i as u32))
+        .collect();
+    keys.par_sort_unstable_by(|a, b| a.0.cmp(&b.0).then_with(|| compare(points, a.1 as usize, b.1 as usize)));
+    keys.into_iter().map(|k| k.1).collect()
+}
+
+fn compare(points: &RawPoints, a: usize, b: usize) -> Ordering {
+    let bits = |v: Vec3| v.to_array().map(f32::to_bits);
+    let place = |i: usize| points.position[i].to_array().map(|c| (c + 0.0).to_bits());
+    let attributes = |i: usize| {
+        let color = points.color.get(i).map(|c| c.map(f32::to_bits));
+        (points.normal.get(i).map(|n| bits(*n)), color, points.value.get(i).map(|v| v.to_bits()))
+    };
+    place(a).cmp(&place(b)).then_with(|| attributes(a).cmp(&attributes(b))).then(a.cmp(&b))
+}
+
+/// 21 bits an axis of a place in the unit cube.
+fn morton(p: DVec3) -> u64 {
+    let spread = |v: f64| {
+        let mut v = ((v * f64::from(1u32 << 21)) as u64).min((1 << 21) - 1);
+        v = (v | v << 32) & 0x001f_0000_0000_ffff;
+        v = (v | v << 16) & 0x001f_0000_ff00_00ff;
+        v = (v | v << 8) & 0x100f_00f0_0f00_f00f;
+        v = (v | v << 4) & 0x10c3_0c30_c30c_30c3;
+        (v | v << 2) & 0x1249_2492_4924_9249
+    };
+    spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2
+}
+
+/// The distinct places in order, and where the points of each begin in `order` (then the number of points).
+fn distinct_places(points: &RawPoints, order: &[u32]) -> (Vec<Vec3>, Vec<u32>) {
+    let (mut distinct, mut starts): (Vec<Vec3>, Vec<u32>) = (Vec::with_capacity(order.len()), Vec::new());
+    for (s, &i) in order.iter().enumerate() {
+        let p = points.position[i as usize];
+        if distinct.last() != Some(&p) {
+            distinct.push(p);
+            starts.push(s as u32);
+        }
+    }
+    starts.push(order.len() as u32);
+    (distinct, starts)
+}
+
+fn place(tree: &Tree<'_>, distinct: &[Vec3], i: usize, params: &SurfelParams) -> (Place, Nearest) {
+    let nearest = tree.nearest(i, params.neighbours);
+    let mut offsets = [DVec3::ZERO; MAX_NEIGHBOURS + 1];
+    let mut n = 1;
+    for id in nearest.ids() {
+        offsets[n] = distinct[id as usize].as_dvec3() - distinct[i].as_dvec3();
+        n += 1;
+    }
+    if n == 1 {
+        let spacing = params.lone_spacing / params.splat.transform.scale;
+        let lone = Place { normal: orient::guess(params.orientation, DVec3::ZERO), plane: false, area: spacing * spacing, spacing };
+        return (lone, nearest);
+    }
+    let fitted = tangent_plane::fit_normal(&offsets[..n]);
+    let normal = fitted.unwrap_or_else(|| orient::guess(params.orientation, offsets[n - 1]));
+    let Cell { area, reach } = tangent_plane::voronoi_cell(&offsets[1..n], normal);
+    let root = area.sqrt();
+    let spacing = (std::f64::consts::SQRT_2 * reach).clamp(root, 2.0 * root);
+    (Place { normal, plane: fitted.is_some(), area, spacing }, nearest)
+}
+
+/// Cuts spacings to a multiple of the median; sets the sums of the report.
+fn cut_outliers(places: &mut [Place], params: &SurfelParams, report: &mut SurfelReport) {
+    if places.is_empty() {
+        return;
+    }
+    let mut spacings: Vec<f64> = places.iter().map(|p| p.spacing).collect();
+    let middle = spacings.len() / 2;
+    let median = *spacings.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let largest = median * params.largest_spacing;
+    for p in places.iter_mut().filter(|p| p.spacing > largest) {
+        p.area = p.area.min(largest * largest);
+        p.spacing = largest;
+        report.lone += 1;
+    }
+    let scale = params.splat.transform.scale;
+    report.median_spacing = median * scale;
+    report.area = places.iter().map(|p| p.area).sum::<f64>() * scale * scale;
+}
+
+/// Points in canonical order and what is known about their places.
+struct Sorted {
+    order: Vec<u32>,
+    starts: Vec<u32>,
+    places: Vec<Place>,
+    normals: Vec<DVec3>,
+}
+
+impl Sorted {
+    /// Place, first point and number of sharers of each surfel.
+    fn surfels(&self, merge: bool) -> Vec<(u32, u32, u32)> {
+        let mut surfels = Vec::with_capacity(self.order.len());
+        for (place, range) in self.starts.windows(2).enumerate() {
+            let sharers = range[1] - range[0];
+            if merge {
+                surfels.push((place as u32, self.order[range[0] as usize], 1));
+            } else {
+                surfels.extend((range[0]..range[1]).map(|s| (place as u32, self.order[s as usize], sharers)));
+            }
+        }
+        surfels
+    }
+}
+
+fn emit(points: &RawPoints, params: &SurfelParams, sorted: &Sorted, report: &mut SurfelReport) -> Result<Cloud, ConvertError> {
+    let t = &params.splat.transform;
+    let surfels = sorted.surfels(params.merge_duplicates);
+    report.splats = surfels.len() as u64;
+    let opaque = params.opacity >= 1.0;
+    let tau = if opaque { 1.0 } else { optics::optical_depth(params.opacity) } * t.scale * t.scale;
+    let mut cloud = Cloud::new(t.apply(points.origin));
+    let wanted = Wanted { normal: true, value: params.values && !points.value.is_empty() };
+    let kind = if opaque { SplatKind::Opaque } else { SplatKind::Surface };
+    columns::size_columns(&mut cloud, surfels.len(), kind, wanted, &params.splat)?;
+    let columns = (&mut cloud.position, &mut cloud.normal, &mut cloud.radius, &mut cloud.cross_section, &mut cloud.color);
+    columns.into_par_iter().zip(&surfels).with_min_len(CHUNK).for_each(
+        |((position, normal, radius, cross_section, color), &(place, point, sharers))| {
+            let (known, i) = (&sorted.places[place as usize], point as usize);
+            *position = (t.rotation * (points.position[i].as_dvec3() * t.scale)).as_vec3();
+            let given = points.normal.get(i).map_or(Vec3::ZERO, |n| columns::unit_or_zero(*n));
+            let n = if given == Vec3::ZERO { sorted.normals[place as usize] } else { given.as_dvec3() };
+            *normal = t.rotate(n).as_vec3();
+            *radius = params.splat.radius(known.spacing * t.scale) as f32;
+            *cross_section = (tau * known.area / f64::from(sharers)) as f32;
+            *color = points.color.get(i).copied().unwrap_or(params.splat.color);
+        },
+    );
+    cloud.value.iter_mut().zip(&surfels).for_each(|(v, s)| *v = points.value[s.1 as usize]);
+    Ok(cloud)
+}

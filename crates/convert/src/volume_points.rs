@@ -1,0 +1,311 @@
+//! Volumes become medium splats: Gunjee 2007, section 4, "Converting the volume data".
+//!
+//! Each voxel of extinction σ_t > 0 becomes one isotropic kernel at its place with K = σ_t·(cell volume) and
+//! R = cutoff·0.8·h, h the spacing of the lattice (`resample.rs`), so that kernels of a homogeneous volume sum to
+//! σ_t. Colour and extinction come from a transfer function after interpolation (post-classification); normals are
+//! −∇v/|∇v| of the values by the Sobel operator.
+
+use crate::columns::{self, Wanted};
+use crate::params::SplatParams;
+use crate::sobel::{Rows, Sobel, normal_from_gradient};
+use crate::{ConvertError, resample};
+use rayon::prelude::*;
+use splat_core::{Cloud, Grid, SplatKind, TransferFunction, glam::{DVec3, Vec3}};
+
+/// How a volume becomes splats.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VolumeParams {
+    /// Attributes and limits; `color` is not used.
+    pub splat: SplatParams,
+    /// Each step of the lattice is split this often, ≥ 1, beyond what makes the steps alike.
+    pub refine: u32,
+    /// Whether to split long steps of the lattice so that kernels fit; without, they are as wide as the longest step.
+    pub even_steps: bool,
+    /// Whether splats get normals.
+    pub normals: bool,
+    /// Whether splats keep the value they were made from.
+    pub values: bool,
+    /// Optical depth that leaving out thin voxels may cost any straight ray, ≥ 0.
+    pub omitted_optical_depth: f64,
+    /// Lowest and highest corner of the part to keep, object space.
+    pub clip: Option<[DVec3; 2]>,
+}
+
+impl Default for VolumeParams {
+    fn default() -> Self {
+        Self {
+            splat: SplatParams::default(),
+            refine: 1,
+            even_steps: true,
+            normals: false,
+            values: false,
+            omitted_optical_depth: 0.0,
+            clip: None,
+        }
+    }
+}
+
+/// What the conversion of a volume did.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct VolumeReport {
+    /// Voxels of the grid.
+    pub voxels: u64,
+    /// Lattice points after long steps were split.
+    pub lattice_points: u64,
+    /// Splats made.
+    pub splats: u64,
+    /// Lattice points with some extinction that were left out as too thin.
+    pub omitted: u64,
+    /// Most optical depth that a straight ray lost by that; at most the parameter.
+    pub omitted_optical_depth: f64,
+    /// Splats without a normal although normals were asked for: no gradient there.
+    pub without_normal: u64,
+    /// Spacing h that the kernels follow, world units.
+    pub spacing: f64,
+    /// Cutoff radius of every splat, world units.
+    pub radius: f64,
+}
+
+/// Makes a cloud of medium splats from a volume; extinction of the transfer function is per world unit.
+///
+/// ```
+/// use convert::{VolumeParams, volume_to_points};
+/// use splat_core::{Grid, TransferFunction, TransferPoint, glam::{DMat3, DVec3}};
+/// let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [4, 4, 4], values: vec![1.0; 64] };
+/// let point = |value, extinction| TransferPoint { value, color: [1.0; 3], extinction };
+/// let tf = TransferFunction::new(vec![point(0.0, 0.0), point(1.0, 0.5)]).unwrap();
+/// let (cloud, report) = volume_to_points(&grid, &tf, &VolumeParams::default()).unwrap();
+/// assert_eq!(report.splats, 64);
+/// assert_eq!(cloud.cross_section.iter().sum::<f32>(), 32.0);
+/// ```
+///
+/// # Errors
+/// [`ConvertError::Parameter`], [`ConvertError::Input`], or [`ConvertError::TooMany`] before memory is taken.
+pub fn volume_to_points(
+    grid: &Grid,
+    tf: &TransferFunction,
+    params: &VolumeParams,
+) -> Result<(Cloud, VolumeReport), ConvertError> {
+    let p = &params.splat;
+    p.check()?;
+    grid.validate().map_err(|e| p.input(e))?;
+    if !(params.omitted_optical_depth.is_finite() && params.omitted_optical_depth >= 0.0) {
+        return Err(p.bad("omitted_optical_depth", params.omitted_optical_depth, "a finite number ≥ 0"));
+    }
+    let factors = if params.even_steps {
+        resample::factors(&grid.axes, params.refine)
+    } else {
+        [params.refine.max(1) as usize; 3]
+    };
+    check_lattice(p, [0, 1, 2].map(|a| grid.dims[a] as f64 * factors[a] as f64))?;
+    let fine = (factors != [1; 3]).then(|| resample::resample(grid, factors));
+    let lattice = fine.as_ref().unwrap_or(grid);
+    let spacing = p.check_spacing(resample::kernel_spacing(&lattice.axes) * p.transform.scale)?;
+    let report = VolumeReport {
+        voxels: grid.values.len() as u64,
+        lattice_points: lattice.values.len() as u64,
+        spacing,
+        radius: p.radius(spacing),
+        ..VolumeReport::default()
+    };
+    convert(lattice, tf, params, report)
+}
+
+/// Refuses lattices that no budget can mean: eight lattice points a splat.
+pub(crate) fn check_lattice(p: &SplatParams, dims: [f64; 3]) -> Result<(), ConvertError> {
+    let (needed, limit) = (dims[0] * dims[1] * dims[2], p.max_splats.saturating_mul(8).min(u64::from(u32::MAX)));
+    if needed <= limit as f64 {
+        return Ok(());
+    }
+    Err(ConvertError::TooMany { object: p.object_name.clone(), what: "lattice points", needed, limit })
+}
+
+fn convert(
+    lattice: &Grid,
+    tf: &TransferFunction,
+    params: &VolumeParams,
+    mut report: VolumeReport,
+) -> Result<(Cloud, VolumeReport), ConvertError> {
+    let p = &params.splat;
+    let scale = p.transform.scale;
+    let corner = lattice.axes * DVec3::from_array(lattice.dims.map(|n| n as f64));
+    let longest_path = diagonal(lattice).max(corner.length()) * scale;
+    let keep = Keep::new(tf, params.omitted_optical_depth / longest_path, params.clip);
+    let slabs: Vec<Slab> = (0..lattice.dims[2]).into_par_iter().map(|k| keep.slab(lattice, k)).collect();
+    let n: usize = slabs.iter().map(|s| s.kept.len()).sum();
+    p.check_count(n as f64)?;
+    report.splats = n as u64;
+    report.omitted = slabs.iter().map(|s| s.omitted).sum();
+    report.omitted_optical_depth = slabs.iter().fold(0.0f64, |m, s| m.max(f64::from(s.thickest))) * longest_path;
+    let mut cloud = Cloud::new(p.transform.apply(lattice.origin));
+    let wanted = Wanted { normal: params.normals, value: params.values };
+    columns::size_columns(&mut cloud, n, SplatKind::Medium, wanted, p)?;
+    cloud.radius.par_iter_mut().with_min_len(columns::CHUNK).for_each(|r| *r = report.radius as f32);
+    let emit = Emit { lattice, tf, params, sobel: Sobel::new(lattice), cell: lattice.cell_volume() * scale.powi(3) };
+    report.without_normal = emit.run(&slabs, &mut cloud);
+    Ok((cloud, report))
+}
+
+/// The longest straight line within the lattice's cells: the longest body diagonal.
+fn diagonal(lattice: &Grid) -> f64 {
+    let n = DVec3::from_array(lattice.dims.map(|n| n as f64));
+    [DVec3::ONE, DVec3::new(-1.0, 1.0, 1.0), DVec3::new(1.0, -1.0, 1.0), DVec3::new(1.0, 1.0, -1.0)]
+        .iter()
+        .fold(0.0, |longest, s| (lattice.axes * (n * *s)).length().max(longest))
+}
+
+/// Which lattice points become splats.
+struct Keep<'a> {
+    tf: &'a TransferFunction,
+    /// Extinction that is left out up to here.
+    threshold: f64,
+    /// Values outside have no extinction at all: two comparisons spare most look-ups.
+    support: [f32; 2],
+    clip: Option<[DVec3; 2]>,
+}
+
+/// The kept lattice points of one slab of constant k.
+struct Slab {
+    /// Index within the slab.
+    kept: Vec<u32>,
+    omitted: u64,
+    /// Largest extinction left out.
+    thickest: f32,
+}
+
+impl<'a> Keep<'a> {
+    fn new(tf: &'a TransferFunction, threshold: f64, clip: Option<[DVec3; 2]>) -> Self {
+        let points = tf.points();
+        let some = |p: &splat_core::TransferPoint| p.extinction > 0.0;
+        let support = match (points.iter().position(some), points.iter().rposition(some)) {
+            (Some(first), Some(last)) => [
+                if first == 0 { f32::NEG_INFINITY } else { points[first - 1].value },
+                points.get(last + 1).map_or(f32::INFINITY, |p| p.value),
+            ],
+            _ => [f32::INFINITY, f32::NEG_INFINITY],
+        };
+        Self { tf, threshold, support, clip }
+    }
+
+    fn slab(&self, lattice: &Grid, k: usize) -> Slab {
+        let [nx, ny, _] = lattice.dims;
+        let mut slab = Slab { kept: Vec::new(), omitted: 0, thickest: 0.0 };
+        for (n, &v) in lattice.values[k * nx * ny..][..nx * ny].iter().enumerate() {
+            if v < self.support[0] || v > self.support[1] {
+                continue;
+            }
+            let extinction = self.tf.at(v).extinction;
+            if extinction <= 0.0 || self.clipped(lattice, n, k) {
+                continue;
+            }
+            if f64::from(extinction) > self.threshold {
+                slab.kept.push(n as u32);
+            } else {
+                slab.omitted += 1;
+                slab.thickest = slab.thickest.max(extinction);
+            }
+        }
+        slab
+    }
+
+    fn clipped(&self, lattice: &Grid, n: usize, k: usize) -> bool {
+        self.clip.is_some_and(|[low, high]| {
+            let p = lattice.position(n % lattice.dims[0], n / lattice.dims[0], k);
+            !(p.cmpge(low).all() && p.cmple(high).all())
+        })
+    }
+}
+
+/// Writes the splats of the kept lattice points.
+struct Emit<'a> {
+    lattice: &'a Grid,
+    tf: &'a TransferFunction,
+    params: &'a VolumeParams,
+    sobel: Sobel<'a>,
+    /// Cell volume, world units³.
+    cell: f64,
+}
+
+/// The columns of one slab.
+struct Target<'a> {
+    position: &'a mut [Vec3],
+    cross_section: &'a mut [f32],
+    color: &'a mut [[f32; 3]],
+    normal: &'a mut [Vec3],
+    value: &'a mut [f32],
+}
+
+impl Emit<'_> {
+    /// Returns how many splats have no normal although they should.
+    fn run(&self, slabs: &[Slab], cloud: &mut Cloud) -> u64 {
+        let mut rest = Target {
+            position: &mut cloud.position,
+            cross_section: &mut cloud.cross_section,
+            color: &mut cloud.color,
+            normal: &mut cloud.normal,
+            value: &mut cloud.value,
+        };
+        let mut tasks = Vec::with_capacity(slabs.len());
+        for slab in slabs {
+            let (head, tail) = rest.split_at(slab.kept.len());
+            tasks.push(head);
+            rest = tail;
+        }
+        let slab_points = self.lattice.dims[0] * self.lattice.dims[1];
+        let scratch = || (Rows::default(), if self.params.normals { vec![Vec3::ZERO; slab_points] } else { Vec::new() });
+        tasks
+            .into_par_iter()
+            .zip(slabs)
+            .enumerate()
+            .map_init(scratch, |(rows, gradient), (k, (mut target, slab))| {
+                self.slab(k, slab, &mut target);
+                if !self.params.normals || slab.kept.is_empty() {
+                    return 0;
+                }
+                self.sobel.slab(k, rows, gradient);
+                self.normals(slab, gradient, target.normal)
+            })
+            .sum()
+    }
+
+    fn slab(&self, k: usize, slab: &Slab, target: &mut Target<'_>) {
+        let t = &self.params.splat.transform;
+        let nx = self.lattice.dims[0];
+        let axes = splat_core::glam::DMat3::from_quat(t.rotation) * self.lattice.axes * t.scale;
+        let base = axes.z_axis * k as f64;
+        let values = &self.lattice.values[k * nx * self.lattice.dims[1]..];
+        for (s, &n) in slab.kept.iter().enumerate() {
+            let (i, j) = (n as usize % nx, n as usize / nx);
+            let at = self.tf.at(values[n as usize]);
+            target.position[s] = (base + axes.y_axis * j as f64 + axes.x_axis * i as f64).as_vec3();
+            target.cross_section[s] = (f64::from(at.extinction) * self.cell) as f32;
+            target.color[s] = at.color;
+            if let Some(value) = target.value.get_mut(s) {
+                *value = values[n as usize];
+            }
+        }
+    }
+
+    fn normals(&self, slab: &Slab, gradient: &[Vec3], normal: &mut [Vec3]) -> u64 {
+        let mut without = 0;
+        for (out, &n) in normal.iter_mut().zip(&slab.kept) {
+            let unit = normal_from_gradient(gradient[n as usize]);
+            without += u64::from(unit == DVec3::ZERO);
+            *out = self.params.splat.transform.rotate(unit).as_vec3();
+        }
+        without
+    }
+}
+
+impl<'a> Target<'a> {
+    /// The first `n` splats and the rest; columns that are not wanted stay empty.
+    fn split_at(self, n: usize) -> (Self, Self) {
+        let (position, p) = self.position.split_at_mut(n);
+        let (cross_section, x) = self.cross_section.split_at_mut(n);
+        let (color, c) = self.color.split_at_mut(n);
+        let (normal, m) = self.normal.split_at_mut(n.min(self.normal.len()));
+        let (value, v) = self.value.split_at_mut(n.min(self.value.len()));
+        let head = Target { position, cross_section, color, normal, value };
+        (head, Target { position: p, cross_section: x, color: c, normal: m, value: v })
+    }
+}

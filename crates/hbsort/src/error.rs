@@ -1,0 +1,48 @@
+//! Errors of the sort: parameters out of range, depths that are no numbers, too many splats, no memory.
+
+/// Why a sort was refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The given slice thickness cannot be used.
+    #[error("slice thickness is {found}, expected a finite number of at least 1e-300")]
+    Thickness {
+        /// The thickness, world units.
+        found: f64,
+    },
+    /// [`crate::Thickness::Auto`] takes ε from splat radii, and depths alone have none.
+    #[error("depths alone have no splat radii to take the slice thickness from: give Thickness::World")]
+    NoRadii,
+    /// A ready depth is NaN or infinite.
+    #[error("depth {index} is {found}, expected a finite number")]
+    Depth {
+        /// Its place in the input.
+        index: usize,
+        /// The depth.
+        found: f32,
+    },
+    /// The subset of splats is not strictly ascending, or names a splat that the cloud does not have.
+    #[error("ids must ascend strictly and stay below {len}: entry {index} is {found}")]
+    Ids {
+        /// The first entry at fault.
+        index: usize,
+        /// The id there.
+        found: u32,
+        /// Splats in the cloud.
+        len: usize,
+    },
+    /// More splats than an order can name.
+    #[error("{needed} splats, the limit is {had}")]
+    TooMany {
+        /// Splats given.
+        needed: u64,
+        /// Splats allowed.
+        had: u64,
+    },
+    /// The system refused the memory for the buffers.
+    #[error("no memory for {bytes} bytes of sort buffers")]
+    Memory {
+        /// Size of the buffer that was refused, bytes.
+        bytes: u64,
+    },
+}

@@ -1,0 +1,67 @@
+//! The command line: arguments → library calls → text or JSON, with one exit code for each kind of error.
+
+mod args;
+mod bar;
+mod console;
+mod explain;
+mod info;
+mod memory;
+mod render;
+mod report;
+mod session;
+
+use args::{Arguments, Command};
+use clap::Parser;
+use organza::Error;
+use std::panic::{self, AssertUnwindSafe};
+use std::process::ExitCode;
+
+/// Runs the command of the process's arguments.
+pub(crate) fn main() -> ExitCode {
+    ExitCode::from(guard(|| {
+        let arguments = match Arguments::try_parse() {
+            Ok(arguments) => arguments,
+            // Help and version are not errors; a closed pipe is not worth a word.
+            Err(e) if e.exit_code() == 0 => return console::out(&e.render().to_string()).map_or(4, |()| 0),
+            Err(e) => {
+                console::note(&e.render().to_string());
+                return 2;
+            }
+        };
+        let wants_json = arguments.command.wants_json();
+        match run(arguments.command) {
+            Ok(()) => 0,
+            Err(error) => {
+                console::report_error(&error, wants_json);
+                error.exit_code()
+            }
+        }
+    }))
+}
+
+fn run(command: Command) -> Result<(), Error> {
+    match command {
+        Command::Render(arguments) => render::run(&arguments),
+        Command::Explain(arguments) => explain::run(&arguments),
+        Command::Info(arguments) => info::run(&arguments),
+        Command::Schema => console::out(&(organza::scene::schema() + "\n")),
+    }
+}
+
+/// Runs `work`; a panic is a bug of ours, says so and gives 1.
+fn guard(work: impl FnOnce() -> u8) -> u8 {
+    panic::set_hook(Box::new(|info| {
+        let version = env!("CARGO_PKG_VERSION");
+        console::note(&format!("error: bug in Organza {version}, please report it with the scene: {info}\n"));
+    }));
+    panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or(1)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn a_panic_is_exit_code_1() {
+        assert_eq!(super::guard(|| panic!("on purpose")), 1);
+        assert_eq!(super::guard(|| 3), 3);
+    }
+}

@@ -1,0 +1,41 @@
+//! stdout and stderr that survive a closed pipe.
+
+use organza::{Error, escape_controls};
+use serde_json::json;
+use std::io::{self, ErrorKind, Write};
+use std::path::Path;
+
+/// Writes to stdout. A reader that went away, as `head` does, is no error.
+pub(super) fn out(text: &str) -> Result<(), Error> {
+    let mut stdout = io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Error::io(Path::new("stdout"), "cannot write", e)),
+        _ => Ok(()),
+    }
+}
+
+/// Writes to stderr, as far as that is possible.
+pub(super) fn note(text: &str) {
+    let _ = io::stderr().lock().write_all(text.as_bytes());
+}
+
+/// Prints a warning of one line on stderr.
+pub(super) fn warn(text: &str) {
+    note(&format!("warning: {}\n", escape_controls(text)));
+}
+
+/// Prints an error and its hint on stderr, and as a document on stdout when JSON was asked for.
+pub(super) fn report_error(error: &Error, as_json: bool) {
+    let message = error.to_string();
+    note(&format!("error: {}\n", escape_controls(&message)));
+    if !error.hint().is_empty() {
+        note(&format!("hint: {}\n", escape_controls(error.hint())));
+    }
+    if as_json {
+        let document = json!({
+            "error": { "exit_code": error.exit_code(), "message": message, "hint": error.hint() }
+        });
+        // The exit code already tells of one error.
+        let _ = out(&format!("{document:#}\n"));
+    }
+}

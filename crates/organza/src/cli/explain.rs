@@ -1,0 +1,43 @@
+//! `organza explain`.
+
+use super::args::ExplainArguments;
+use super::bar::with_bar;
+use super::session::{load_scene, path_text, render_options, start_threads};
+use super::{console, report};
+use organza::Error;
+use serde_json::json;
+
+/// Prints the plan; with `--measure` renders too and prints what it cost.
+pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
+    let scene = load_scene(&arguments.scene)?;
+    start_threads(arguments.scene.threads)?;
+    let options = render_options(&arguments.scene);
+    let (plan, cost, memory, warnings) = with_bar(|progress| {
+        if arguments.measure {
+            let render = organza::render(&scene, &options, progress)?;
+            return Ok((render.plan, render.cost, None, render.warnings));
+        }
+        let explanation = organza::explain(&scene, &options, progress)?;
+        Ok((explanation.plan, explanation.cost, Some(explanation.memory), explanation.warnings))
+    })?;
+    for warning in &warnings {
+        console::warn(warning);
+    }
+    if arguments.scene.json {
+        let document = json!({
+            "scene": path_text(&scene.file),
+            "plan": report::plan_json(&plan),
+            "cost": report::cost_json(&cost),
+            "memory_bytes": memory,
+            "warnings": warnings,
+        });
+        return console::out(&format!("{document:#}\n"));
+    }
+    let mut text = report::plan_text(&plan);
+    text.push('\n');
+    text += &report::cost_text(&cost);
+    if let Some(memory) = memory {
+        text += &format!("rendering takes at most {memory} bytes\n");
+    }
+    console::out(&text)
+}

@@ -1,0 +1,119 @@
+//! `organza info`.
+
+use super::args::InfoArguments;
+use super::{console, memory};
+use super::session::path_text;
+use organza::scene::{self, LightSource, LoadOptions, Scene, SceneLight, Source};
+use organza::{Error, FileInfo, escape_controls};
+use serde_json::{Value, json};
+use splat_core::LightShape;
+
+/// Describes a scene (`.toml`, `.json`) or a data file.
+pub(super) fn run(arguments: &InfoArguments) -> Result<(), Error> {
+    let is_scene = arguments.file.extension().is_some_and(|e| {
+        e.eq_ignore_ascii_case("toml") || e.eq_ignore_ascii_case("json")
+    });
+    let document = if is_scene {
+        let options = LoadOptions { allow_path: arguments.allow_path, overrides: Vec::new() };
+        scene_document(&scene::load(&arguments.file, &options)?)
+    } else {
+        file_document(&organza::info(&arguments.file, memory::default_limit())?)
+    };
+    if arguments.json {
+        return console::out(&format!("{document:#}\n"));
+    }
+    let mut text = String::new();
+    lines(&document, "", &mut text);
+    console::out(&text)
+}
+
+fn scene_document(scene: &Scene) -> Value {
+    let objects = scene.objects.iter().map(|o| {
+        json!({
+            "name": o.name,
+            "source": source_name(&o.source),
+            "path": source_path(&o.source),
+            "material": scene.materials[o.material].name,
+            "visible": o.visible,
+        })
+    });
+    let lights = scene.lights.iter().map(|l| {
+        json!({ "kind": light_name(l), "intensity": l.intensity, "points": l.samples, "shadow": l.shadow })
+    });
+    json!({
+        "kind": "scene",
+        "sha256": scene.sha256,
+        "size": scene.camera.size,
+        "objects": objects.collect::<Value>(),
+        "lights": lights.collect::<Value>(),
+        "materials": scene.materials.iter().skip(1).map(|m| m.name.as_str()).collect::<Vec<_>>(),
+    })
+}
+
+fn source_name(source: &Source) -> &'static str {
+    match source {
+        Source::Mesh(_) => "mesh",
+        Source::Points(_) => "points",
+        Source::Volume(_) => "volume",
+        Source::Implicit(_) => "implicit",
+        Source::Density(_) => "density",
+        Source::Cloud(_) => "cloud",
+        Source::Rectangle(_) => "rectangle",
+        Source::Medium(_) => "medium",
+    }
+}
+
+fn source_path(source: &Source) -> Option<String> {
+    match source {
+        Source::Mesh(path) | Source::Points(path) => Some(path_text(path)),
+        Source::Volume(volume) => Some(path_text(&volume.path)),
+        _ => None,
+    }
+}
+
+fn light_name(light: &SceneLight) -> &'static str {
+    match light.source {
+        LightSource::Simple(simple) => match simple.shape {
+            LightShape::Directional { .. } => "directional",
+            LightShape::Spot { .. } => "spot",
+            _ => "point",
+        },
+        LightSource::Sphere { .. } => "sphere",
+        LightSource::Disk { .. } => "disk",
+        LightSource::Rect { .. } => "rect",
+    }
+}
+
+fn file_document(info: &FileInfo) -> Value {
+    json!({
+        "kind": info.kind,
+        "bytes": info.bytes,
+        "counts": info.counts.iter().map(|(name, n)| ((*name).to_owned(), json!(n))).collect::<Value>(),
+        "attributes": info.attributes,
+        "bounds": info.bounds.map(|b| b.map(|p| p.to_array())),
+        "range": info.range,
+    })
+}
+
+/// A document as indented lines; null and empty values are left out.
+fn lines(value: &Value, indent: &str, text: &mut String) {
+    let Value::Object(fields) = value else { return };
+    for (key, value) in fields {
+        match value {
+            Value::Null => {}
+            Value::Array(items) if items.is_empty() => {}
+            Value::Object(_) => {
+                *text += &format!("{indent}{key}:\n");
+                lines(value, &format!("{indent}  "), text);
+            }
+            Value::Array(items) if items.iter().all(Value::is_object) => {
+                for (i, item) in items.iter().enumerate() {
+                    *text += &format!("{indent}{key} {i}:\n");
+                    lines(item, &format!("{indent}  "), text);
+                }
+            }
+            Value::String(s) => *text += &format!("{indent}{key}: {}\n", escape_controls(s)),
+            other => *text += &format!("{indent}{key}: {other}\n"),
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! Plans and costs as tables and as JSON.
+
+use organza::CostRecord;
+use organza::plan::Plan;
+use serde_json::{Value, json};
+use std::fmt::Write;
+
+/// The cost record as JSON, a list of stages.
+pub(super) fn cost_json(cost: &CostRecord) -> Value {
+    let stage = |s: &splat_core::StageCost| {
+        json!({
+            "name": s.name, "seconds": s.seconds, "items_in": s.items_in, "items_out": s.items_out,
+            "fragments": s.fragments, "bytes": s.bytes, "passes": s.passes,
+        })
+    };
+    cost.stages.iter().map(stage).collect()
+}
+
+/// The plan as JSON.
+pub(super) fn plan_json(plan: &Plan) -> Value {
+    let effects = plan.effects.iter().map(|e| {
+        json!({ "name": e.name, "called_for": e.called_for, "reason": e.reason, "bound": e.bound })
+    });
+    let passes = plan.passes.iter().map(|p| json!({ "name": p.name, "reason": p.reason }));
+    json!({
+        "technique": plan.technique,
+        "effects": effects.collect::<Value>(),
+        "passes": passes.collect::<Value>(),
+        "optical_depth_planes": plan.optical_depth_planes,
+        "shadow_maps": plan.shadow_maps,
+    })
+}
+
+/// The plan as a table.
+pub(super) fn plan_text(plan: &Plan) -> String {
+    let effects = plan.effects.iter().map(|e| {
+        let called = if e.called_for { "yes" } else { "no" };
+        [e.name.clone(), called.to_owned(), format!("{:.3e}", e.bound), e.reason.clone()]
+    });
+    let mut text = format!("technique: {}\n\n", plan.technique);
+    text += &table(["effect", "called for", "bound", "why"], "lrrl", effects);
+    text.push('\n');
+    let passes = plan.passes.iter().map(|p| [p.name.clone(), p.reason.clone()]);
+    text + &table(["pass", "what for"], "ll", passes)
+}
+
+/// The cost record as a table, with the sum of times.
+pub(super) fn cost_text(cost: &CostRecord) -> String {
+    let rows = cost.stages.iter().map(|s| {
+        [
+            s.name.clone(),
+            format!("{:.3}", s.seconds),
+            s.items_in.to_string(),
+            s.items_out.to_string(),
+            s.fragments.to_string(),
+            s.bytes.to_string(),
+        ]
+    });
+    let mut text = table(["pass", "seconds", "in", "out", "fragments", "bytes"], "lrrrrr", rows);
+    let total = cost.stages.iter().fold(0.0, |sum, s| sum + s.seconds);
+    // Writing to a String cannot fail.
+    let _ = writeln!(text, "total {total:.3} s");
+    text
+}
+
+/// Columns as wide as they need to be; `align` has `l` or `r` for each.
+fn table<const N: usize>(head: [&str; N], align: &str, rows: impl Iterator<Item = [String; N]>) -> String {
+    let mut all = vec![head.map(str::to_owned)];
+    all.extend(rows.map(|row| row.map(|cell| organza::escape_controls(&cell).into_owned())));
+    let width = |column: usize| all.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let widths: [usize; N] = std::array::from_fn(width);
+    let mut text = String::new();
+    for row in &all {
+        let mut line = String::new();
+        for ((cell, width), side) in row.iter().zip(widths).zip(align.chars()) {
+            let padding = " ".repeat(width - cell.chars().count());
+            line += &if side == 'r' { padding + cell } else { cell.clone() + &padding };
+            line += "  ";
+        }
+        text += line.trim_end();
+        text.push('\n');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn columns_line_up() {
+        let rows = [["ä".to_owned(), "10".to_owned()], ["bcd".to_owned(), "9".to_owned()]];
+        assert_eq!(super::table(["x", "n"], "lr", rows.into_iter()), "x     n\nä    10\nbcd   9\n");
+    }
+}

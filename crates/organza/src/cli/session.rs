@@ -1,0 +1,86 @@
+//! What all commands on a scene do first: options become overrides, the scene is loaded, the threads start.
+
+use super::args::{Backend, SceneArguments};
+use super::memory;
+use organza::scene::{self, LoadOptions, Override, Scene, Source};
+use organza::{Error, RenderOptions, printable};
+use std::path::PathBuf;
+
+/// Loads the scene with the options of the command line.
+pub(super) fn load_scene(arguments: &SceneArguments) -> Result<Scene, Error> {
+    check_backend(arguments.backend)?;
+    let overrides = overrides(arguments)?;
+    scene::load(&arguments.scene, &LoadOptions { allow_path: arguments.allow_path, overrides })
+}
+
+/// What the render may take and how it treats doubtful input.
+pub(super) fn render_options(arguments: &SceneArguments) -> RenderOptions {
+    RenderOptions {
+        max_memory: arguments.max_memory.unwrap_or_else(memory::default_limit),
+        drop_invalid: arguments.drop_invalid,
+        merge_duplicates: arguments.merge_duplicates,
+    }
+}
+
+/// Starts the threads that all stages share.
+pub(super) fn start_threads(threads: u64) -> Result<(), Error> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build_global();
+    pool.map_err(|e| Error::usage(format!("--threads {threads}: {e}"), "use fewer threads"))
+}
+
+/// Every file that the scene is made from.
+pub(super) fn inputs(scene: &Scene) -> Vec<PathBuf> {
+    let of_object = |source: &Source| match source {
+        Source::Mesh(path) | Source::Points(path) => Some(path.clone()),
+        Source::Volume(volume) => Some(volume.path.clone()),
+        _ => None,
+    };
+    let data = scene.objects.iter().filter_map(|o| of_object(&o.source));
+    std::iter::once(scene.file.clone()).chain(data).collect()
+}
+
+fn check_backend(backend: Backend) -> Result<(), Error> {
+    let name = match backend {
+        Backend::Auto | Backend::Cpu => return Ok(()),
+        Backend::Wgpu => "wgpu",
+        Backend::Ash => "ash",
+    };
+    let message = format!("--backend {name}: GPU backends are not in this version");
+    Err(Error::Gpu { message, hint: "use --backend cpu".into() })
+}
+
+/// Options that stand for a value of the scene, then `--set` in order.
+fn overrides(a: &SceneArguments) -> Result<Vec<Override>, Error> {
+    let mut options: Vec<(String, &str, String)> = Vec::new();
+    if let Some(name) = &a.technique {
+        options.push((format!("--technique {name}"), "render.technique", quote(name)));
+    }
+    if let Some([w, h]) = a.size {
+        options.push((format!("--size {w}x{h}"), "camera.size", format!("[{w}, {h}]")));
+    }
+    if let Some(seed) = a.seed {
+        options.push((format!("--seed {seed}"), "render.seed", seed.to_string()));
+    }
+    if let Some(tolerance) = a.tolerance {
+        options.push((format!("--tolerance {tolerance}"), "render.tolerance", format!("{tolerance:?}")));
+    }
+    if let Some(exposure) = a.exposure {
+        options.push((format!("--exposure {exposure}"), "render.exposure", format!("{exposure:?}")));
+    }
+    if let Some(layers) = &a.layers {
+        let list = layers.iter().map(|l| quote(l)).collect::<Vec<_>>().join(", ");
+        options.push((format!("--layers {}", layers.join(",")), "render.layers", format!("[{list}]")));
+    }
+    let options = options.into_iter().map(|(flag, path, value)| Override::from_option(flag, path, &value));
+    options.chain(a.set.iter().map(|text| Override::parse(text))).collect()
+}
+
+/// A text as TOML, which takes JSON's quotes and escapes.
+fn quote(text: &str) -> String {
+    serde_json::Value::from(text).to_string()
+}
+
+/// A path as text for a JSON document.
+pub(super) fn path_text(path: &std::path::Path) -> String {
+    path.to_str().map_or_else(|| printable(path), str::to_owned)
+}

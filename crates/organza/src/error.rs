@@ -1,0 +1,222 @@
+//! Errors by whose fault they are; each has one exit code and says what to do.
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+/// Everything that can go wrong, from the command line to the finished file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The command line asks for something impossible. Exit code 2.
+    #[error("{message}")]
+    Usage {
+        /// What was found and what was expected.
+        message: String,
+        /// What to do; may be empty.
+        hint: String,
+    },
+    /// The scene file is wrong at one place. Exit code 3.
+    #[error("{}:{line}:{column}: {message}", printable(file))]
+    Scene {
+        /// The scene file.
+        file: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// Column in characters, from 1.
+        column: usize,
+        /// What was found and what was expected.
+        message: String,
+        /// What to do; may be empty.
+        hint: String,
+    },
+    /// An input file, or data made from it, is wrong. Exit code 3.
+    #[error("{what}: {message}")]
+    Input {
+        /// The file or the object.
+        what: String,
+        /// What was found and what was expected.
+        message: String,
+        /// What to do; may be empty.
+        hint: String,
+    },
+    /// A file could not be read or written. Exit code 4.
+    #[error("{}: {action}: {source}", printable(path))]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What was attempted, such as `cannot read`.
+        action: &'static str,
+        /// The system's answer.
+        source: std::io::Error,
+    },
+    /// An output may not be written where it was asked for. Exit code 4.
+    #[error("{}: {message}", printable(path))]
+    Output {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        message: String,
+        /// What to do; may be empty.
+        hint: String,
+    },
+    /// The work would take more than it may. Exit code 5.
+    #[error("{what} needs {needed} {unit}, the limit is {limit}")]
+    Limit {
+        /// What needs it.
+        what: String,
+        /// How much is needed.
+        needed: u64,
+        /// How much is allowed.
+        limit: u64,
+        /// What is counted: `bytes`, `splats` …
+        unit: &'static str,
+        /// The knob to turn; may be empty.
+        hint: String,
+    },
+    /// A file asks for more memory than it may. Exit code 5.
+    #[error("{what}: {message}")]
+    TooLarge {
+        /// The file and the place in it.
+        what: String,
+        /// What was found and what was expected.
+        message: String,
+        /// What to do; may be empty.
+        hint: String,
+    },
+    /// The backend cannot do it. Exit code 6.
+    #[error("{message}")]
+    Gpu {
+        /// Why not.
+        message: String,
+        /// What to do; may be empty.
+        hint: String,
+    },
+    /// A promise between stages was broken. Exit code 1.
+    #[error("{0}")]
+    Internal(String),
+    /// Interrupted. Exit code 130.
+    #[error("interrupted")]
+    Cancelled,
+}
+
+impl Error {
+    /// Shorthand for [`Error::Usage`].
+    pub fn usage(message: impl Into<String>, hint: impl Into<String>) -> Self {
+        Self::Usage { message: message.into(), hint: hint.into() }
+    }
+
+    /// Shorthand for [`Error::Input`].
+    pub fn input(what: impl Into<String>, message: impl Into<String>, hint: impl Into<String>) -> Self {
+        Self::Input { what: what.into(), message: message.into(), hint: hint.into() }
+    }
+
+    /// Shorthand for [`Error::Io`].
+    pub fn io(path: &Path, action: &'static str, source: std::io::Error) -> Self {
+        Self::Io { path: path.to_owned(), action, source }
+    }
+
+    /// An error of the nouns about the data of `what` (an object, a file): broken promises are bad input, overflows
+    /// are limits.
+    pub fn from_core(what: &str, error: splat_core::Error) -> Self {
+        match error {
+            splat_core::Error::Overflow { what: buffer, needed, had } => Self::Limit {
+                what: format!("{what}: {buffer}"),
+                needed,
+                limit: had,
+                unit: "elements",
+                hint: "use a larger `spacing` or a smaller image".into(),
+            },
+            splat_core::Error::Cancelled => Self::Cancelled,
+            other => Self::input(what, other.to_string(), ""),
+        }
+    }
+
+    /// An error of a reader.
+    pub fn from_read(path: &Path, error: &convert::ReadError) -> Self {
+        let what = format!("{}{}", error.file, error.place);
+        let message = format!("expected {}, found {}", error.expected, error.found);
+        match error.fault {
+            convert::Fault::FileSystem => Self::io(path, "cannot read", std::io::Error::other(message)),
+            convert::Fault::Limit => Self::TooLarge { what, message, hint: error.hint.into() },
+            _ => Self::input(what, message, error.hint),
+        }
+    }
+
+    /// The exit code of the command.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Internal(_) => 1,
+            Self::Usage { .. } => 2,
+            Self::Scene { .. } | Self::Input { .. } => 3,
+            Self::Io { .. } | Self::Output { .. } => 4,
+            Self::Limit { .. } | Self::TooLarge { .. } => 5,
+            Self::Gpu { .. } => 6,
+            Self::Cancelled => 130,
+        }
+    }
+
+    /// What to do about it; may be empty.
+    pub fn hint(&self) -> &str {
+        match self {
+            Self::Usage { hint, .. }
+            | Self::Scene { hint, .. }
+            | Self::Input { hint, .. }
+            | Self::Output { hint, .. }
+            | Self::Limit { hint, .. }
+            | Self::TooLarge { hint, .. }
+            | Self::Gpu { hint, .. } => hint,
+            Self::Io { source, .. } if source.kind() == std::io::ErrorKind::StorageFull => "free some space",
+            Self::Io { .. } | Self::Cancelled => "",
+            Self::Internal(_) => "this is a bug in Organza, please report it",
+        }
+    }
+}
+
+/// A path for a message: what is not UTF-8 or would steer a terminal is escaped.
+pub fn printable(path: &Path) -> String {
+    let bytes = path.as_os_str().as_encoded_bytes();
+    let mut text = String::with_capacity(bytes.len());
+    for chunk in bytes.utf8_chunks() {
+        text.push_str(&escape_controls(chunk.valid()));
+        for byte in chunk.invalid() {
+            text.push_str(&format!("\\x{byte:02x}"));
+        }
+    }
+    text
+}
+
+/// `text` with control characters and marks that change the direction of writing escaped, so that a name in a file can
+/// neither steer the terminal nor fake a line of output.
+pub fn escape_controls(text: &str) -> Cow<'_, str> {
+    let steers = |c: char| {
+        c.is_control() || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    if !text.contains(steers) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        if steers(c) { out.extend(c.escape_default()) } else { out.push(c) }
+    }
+    Cow::Owned(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_cannot_steer_the_terminal() {
+        assert_eq!(escape_controls("a\u{1b}[2Jb\nc"), "a\\u{1b}[2Jb\\nc");
+        assert_eq!(escape_controls("grün"), "grün");
+        assert_eq!(escape_controls("\u{202e}gnp.exe"), "\\u{202e}gnp.exe");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn bi34_paths_that_are_not_utf8_are_printed_escaped() {
+        use std::os::unix::ffi::OsStrExt;
+        let path = Path::new(std::ffi::OsStr::from_bytes(b"a\xff\nb.toml"));
+        assert_eq!(printable(path), "a\\xff\\nb.toml");
+    }
+}

@@ -1,0 +1,113 @@
+//! What is in a data file, without a scene.
+
+use crate::Error;
+use convert::RawPoints;
+use convert::read::{Loaded, ReadLimits};
+use glam::{DVec3, Vec3};
+use splat_core::{Aabb, Grid, Mesh};
+use std::path::Path;
+
+/// What a data file holds.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FileInfo {
+    /// `mesh`, `volume` or `points`.
+    pub kind: &'static str,
+    /// Length of the file.
+    pub bytes: u64,
+    /// How many there are of what: `vertices`, `triangles`, `points`, or `x`, `y`, `z` of a volume's lattice.
+    pub counts: Vec<(&'static str, u64)>,
+    /// Attributes beside positions: `normal`, `color`, `value`, `classification`.
+    pub attributes: Vec<&'static str>,
+    /// Lowest and highest corner in the file's own coordinates; `None` for an empty file.
+    pub bounds: Option<[DVec3; 2]>,
+    /// Lowest and highest value of a volume.
+    pub range: Option<[f32; 2]>,
+}
+
+/// Reads a data file of at most `max_bytes` and describes it.
+///
+/// # Errors
+/// [`Error::Io`] for the file system, [`Error::Input`] for a file that is not what its name says, [`Error::Limit`] for
+/// one that would take more than `max_bytes`.
+pub fn info(path: &Path, max_bytes: u64) -> Result<FileInfo, Error> {
+    let limits = ReadLimits { max_bytes, drop_invalid: false };
+    let data = convert::read::file(path, &limits).map_err(|e| Error::from_read(path, &e))?;
+    let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "cannot read", e))?.len();
+    let info = match data {
+        Loaded::Mesh(mesh) => of_mesh(&mesh),
+        Loaded::Points(points) => of_points(&points),
+        Loaded::Grid(grid) => of_grid(&grid),
+        _ => return Err(Error::Internal("a reader gave data of no known kind".into())),
+    };
+    Ok(FileInfo { bytes, ..info })
+}
+
+fn present(columns: &[(&'static str, bool)]) -> Vec<&'static str> {
+    columns.iter().filter(|(_, on)| *on).map(|(name, _)| *name).collect()
+}
+
+fn bounds_of(origin: DVec3, positions: &[Vec3]) -> Option<[DVec3; 2]> {
+    let bounds = Aabb::of_points(positions);
+    (!bounds.is_empty()).then(|| [origin + bounds.min.as_dvec3(), origin + bounds.max.as_dvec3()])
+}
+
+fn of_mesh(mesh: &Mesh) -> FileInfo {
+    FileInfo {
+        kind: "mesh",
+        counts: vec![("vertices", mesh.position.len() as u64), ("triangles", mesh.triangles.len() as u64)],
+        attributes: present(&[("normal", !mesh.normal.is_empty()), ("color", !mesh.color.is_empty())]),
+        bounds: bounds_of(mesh.origin, &mesh.position),
+        ..FileInfo::default()
+    }
+}
+
+fn of_points(points: &RawPoints) -> FileInfo {
+    FileInfo {
+        kind: "points",
+        counts: vec![("points", points.position.len() as u64)],
+        attributes: present(&[
+            ("normal", !points.normal.is_empty()),
+            ("color", !points.color.is_empty()),
+            ("value", !points.value.is_empty()),
+            ("classification", !points.classification.is_empty()),
+        ]),
+        bounds: bounds_of(points.origin, &points.position),
+        ..FileInfo::default()
+    }
+}
+
+fn of_grid(grid: &Grid) -> FileInfo {
+    let [x, y, z] = grid.dims;
+    // The corners of the lattice bound it, sheared or not.
+    let last = |bit: usize, n: usize| if bit == 0 { 0 } else { n.saturating_sub(1) };
+    let corners = (0..8).map(|c| grid.position(last(c & 1, x), last(c & 2, y), last(c & 4, z)));
+    let bounds = corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |b, p| [b[0].min(p), b[1].max(p)]);
+    let range = grid.values.iter().fold([f32::INFINITY, f32::NEG_INFINITY], |r, v| [r[0].min(*v), r[1].max(*v)]);
+    FileInfo {
+        kind: "volume",
+        counts: vec![("x", x as u64), ("y", y as u64), ("z", z as u64)],
+        bounds: Some(bounds),
+        range: (!grid.values.is_empty()).then_some(range),
+        ..FileInfo::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DMat3;
+
+    #[test]
+    fn a_mirrored_volume_has_ordered_bounds() {
+        let axes = DMat3::from_diagonal(DVec3::new(-1.0, 2.0, 3.0));
+        let grid = Grid { origin: DVec3::ONE, axes, dims: [2, 2, 1], values: vec![3.0, -1.0, 2.0, 0.0] };
+        let info = of_grid(&grid);
+        assert_eq!(info.bounds, Some([DVec3::new(0.0, 1.0, 1.0), DVec3::new(1.0, 3.0, 1.0)]));
+        assert_eq!(info.range, Some([-1.0, 3.0]));
+    }
+
+    #[test]
+    fn an_empty_mesh_has_no_bounds() {
+        assert_eq!(of_mesh(&Mesh::default()).bounds, None);
+    }
+}

@@ -1,0 +1,44 @@
+//! Organza renders mixed, translucent 3D data — meshes, volumes, raw point clouds, implicit surfaces — into one image.
+//!
+//! This crate joins the stages: it reads a scene, asks what the scene calls for, runs those passes and writes images.
+//!
+//! ```text
+//! scene.toml ─ scene ─► load (convert) ─► statistics ─► plan ─► points (tsm, hbsort, splat-core) ─► output
+//! ```
+//!
+//! ```
+//! use organza::{Progress, RenderOptions, render, scene};
+//! let text = br#"
+//!     version = 1
+//!     [camera]
+//!     position = [0, 0, 4]
+//!     target = [0, 0, 0]
+//!     size = [32, 32]
+//!     [[object]]
+//!     name = "fog"
+//!     medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 0.5, spacing = 0.1 }
+//! "#;
+//! let scene = scene::parse("fog.toml".as_ref(), text, &Default::default()).unwrap();
+//! let image = render(&scene, &RenderOptions::default(), &Progress::new()).unwrap();
+//! // The middle ray crosses two units of fog: alpha = 1 − e⁻¹.
+//! let alpha = image.layers.scalar("alpha").unwrap()[16 * 32 + 16];
+//! assert!((alpha - (1.0 - (-1.0f32).exp())).abs() < 1e-3);
+//! ```
+#![forbid(unsafe_code)]
+
+mod error;
+mod info;
+mod load;
+mod normalize;
+pub mod output;
+pub mod plan;
+mod points;
+mod render;
+pub mod scene;
+pub mod statistics;
+
+pub use error::{Error, escape_controls, printable};
+pub use info::{FileInfo, info};
+pub use load::{Loaded, load};
+pub use render::{Explanation, Render, RenderOptions, explain, render};
+pub use splat_core::{CostRecord, Layers, Progress};

@@ -1,0 +1,104 @@
+//! The objects of a scene become one cloud in canonical order, with its tables.
+
+mod object;
+
+use crate::scene::Scene;
+use crate::{Error, Progress, RenderOptions, normalize::normalize};
+use glam::DVec3;
+use splat_core::{Aabb, Camera, Cloud, FootprintStack, Light, Material, Object, Shading};
+
+/// A scene in memory, normalized by a power of two (see [`Loaded::exponent`]) and ready for a technique.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Loaded {
+    /// All splats in canonical order.
+    pub cloud: Cloud,
+    /// Materials by id.
+    pub materials: Vec<Material>,
+    /// Objects by id.
+    pub objects: Vec<Object>,
+    /// Footprints by id.
+    pub footprints: FootprintStack,
+    /// The camera.
+    pub camera: Camera,
+    /// Lights, extended ones as their points, in an order that does not depend on the file's.
+    pub lights: Vec<Light>,
+    /// For each light: whether it casts shadows.
+    pub casts: Vec<bool>,
+    /// Slice thickness asked for, in the scale of the cloud.
+    pub slice_thickness: Option<f64>,
+    /// Whether normals were computed where the data has none.
+    pub normals: bool,
+    /// Lengths were multiplied by 2^−exponent.
+    pub exponent: i32,
+    /// What a user should know of the input, one sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Reads and converts every visible object.
+///
+/// # Errors
+/// See [`crate::render`].
+pub fn load(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Loaded, Error> {
+    let mut warnings = Vec::new();
+    let normals = normals_needed(scene);
+    progress.add_total(scene.objects.len() as u64);
+    let mut clouds = Vec::new();
+    for (id, object) in scene.objects.iter().enumerate() {
+        progress.tick(1).map_err(|_| Error::Cancelled)?;
+        if object.visible {
+            let used: u64 = clouds.iter().map(Cloud::bytes).sum();
+            let context = object::Context { scene, options, id, normals, used };
+            clouds.push(object::convert(object, &context, &mut warnings)?);
+        }
+    }
+    let mut cloud = merge(clouds);
+    if cloud.is_empty() {
+        warnings.push("the scene has no splats: only the background is drawn".into());
+    }
+    let mut camera = scene.camera;
+    let (mut lights, casts) = lights(scene);
+    let exponent = normalize(&mut cloud, &mut camera, &mut lights);
+    cloud.canonicalize();
+    cloud.validate().map_err(|e| Error::Internal(e.to_string()))?;
+    Ok(Loaded {
+        cloud,
+        materials: scene.materials.iter().map(|m| m.material).collect(),
+        objects: scene.objects.iter().map(object::entry).collect(),
+        footprints: scene.footprints.clone(),
+        camera,
+        lights,
+        casts,
+        slice_thickness: scene.render.points.slice_thickness.map(|e| e * f64::from(-exponent).exp2()),
+        normals,
+        exponent,
+        warnings,
+    })
+}
+
+/// Whether a normal could change the picture: a lit Phong material somewhere, or a layer of normals.
+fn normals_needed(scene: &Scene) -> bool {
+    let lit = !scene.lights.is_empty();
+    let phong = |o: &crate::scene::SceneObject| scene.materials[o.material].material.shading == Shading::Phong;
+    scene.render.layers.set().normal || (lit && scene.objects.iter().any(|o| o.visible && phong(o)))
+}
+
+/// One cloud around the middle of all.
+fn merge(clouds: Vec<Cloud>) -> Cloud {
+    let corners = clouds.iter().filter(|c| !c.is_empty()).flat_map(|c| {
+        let Aabb { min, max } = c.bounds();
+        [c.origin + min.as_dvec3(), c.origin + max.as_dvec3()]
+    });
+    let (min, max) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
+    let mut all = Cloud::new(if min.is_finite() { (min + max) * 0.5 } else { DVec3::ZERO });
+    all.reserve(clouds.iter().map(Cloud::len).sum());
+    clouds.iter().for_each(|c| all.append(c));
+    all
+}
+
+/// All point lights, sorted by their bits so that the order of the file does not matter.
+fn lights(scene: &Scene) -> (Vec<Light>, Vec<bool>) {
+    let mut all: Vec<(Light, bool)> =
+        scene.lights.iter().flat_map(|l| l.points().into_iter().map(|p| (p, l.shadow))).collect();
+    all.sort_by_cached_key(|(light, casts)| (format!("{light:?}"), *casts));
+    all.into_iter().unzip()
+}

@@ -1,0 +1,38 @@
+//! Scenes of any size become scenes of size one, by a power of two, so that squares of lengths neither overflow nor vanish
+//! in f32 and a scene scaled by a power of two gives the same picture bit by bit.
+
+use glam::DVec3;
+use splat_core::{Camera, Cloud, Light, LightShape, Projection};
+
+/// Scales everything by 2^−e, where 2^e is the size of the splats' bounds, and returns e.
+///
+/// Lengths scale with 2^−e, cross-sections and point intensities with 2^−2e; directional irradiance stays.
+pub(crate) fn normalize(cloud: &mut Cloud, camera: &mut Camera, lights: &mut [Light]) -> i32 {
+    let diagonal = cloud.bounds().diagonal();
+    if !(diagonal.is_finite() && diagonal > 0.0) {
+        return 0;
+    }
+    let exponent = f64::from(diagonal).log2().floor() as i32;
+    let scale = f64::from(exponent).exp2().recip();
+    let (length, area) = (scale as f32, (scale * scale) as f32);
+    cloud.origin *= scale;
+    cloud.position.iter_mut().for_each(|p| *p *= length);
+    cloud.radius.iter_mut().for_each(|r| *r *= length);
+    cloud.tangent.iter_mut().for_each(|t| *t *= length);
+    cloud.cross_section.iter_mut().for_each(|k| *k *= area);
+    camera.position *= scale;
+    if let Projection::Orthographic { height } = &mut camera.projection {
+        *height *= scale;
+    }
+    for light in lights {
+        let position: Option<&mut DVec3> = match &mut light.shape {
+            LightShape::Point { position } | LightShape::Spot { position, .. } => Some(position),
+            _ => None,
+        };
+        if let Some(position) = position {
+            *position *= scale;
+            light.intensity.iter_mut().for_each(|i| *i *= area);
+        }
+    }
+    exponent
+}

@@ -1,0 +1,83 @@
+//! Finished images → files, whole or not at all.
+
+mod atomic;
+mod exr_file;
+mod png_file;
+
+pub use atomic::{check_target, write_atomically};
+
+use crate::Error;
+use splat_core::Layers;
+use std::path::Path;
+
+/// What a file says about how it was made.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Metadata {
+    /// SHA-256 of the scene, lower-case hex.
+    pub scene_sha256: String,
+    /// Name of the technique that drew it.
+    pub technique: String,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Name of the backend that drew it.
+    pub backend: String,
+    /// Exposure of the displayed picture in stops; only PNG applies it.
+    pub exposure: f64,
+}
+
+/// What had to be changed so that the file is valid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct WriteReport {
+    /// Bytes of the file.
+    pub bytes: u64,
+    /// Values too large for the format, cut to its largest.
+    pub clamped: u64,
+    /// Values that were not a number, written as 0.
+    pub not_a_number: u64,
+}
+
+/// File formats by extension.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// OpenEXR with all layers.
+    Exr,
+    /// PNG with the displayed picture.
+    Png,
+}
+
+impl Format {
+    /// The format of a path, by its extension.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for any other extension.
+    pub fn of_path(path: &Path) -> Result<Self, Error> {
+        let extension = path.extension().unwrap_or_default();
+        if extension.eq_ignore_ascii_case("exr") {
+            Ok(Self::Exr)
+        } else if extension.eq_ignore_ascii_case("png") {
+            Ok(Self::Png)
+        } else {
+            let message = format!("{}: expected a name that ends in .exr or .png", crate::printable(path));
+            Err(Error::usage(message, "the format follows from the extension"))
+        }
+    }
+}
+
+/// Writes layers to `path` in the format of its extension. `half` stores the colours of an EXR file in 16 bits.
+///
+/// The file appears whole or not at all: it is made in memory, written under another name in the same folder, and
+/// renamed. NaN is never written.
+///
+/// # Errors
+/// [`Error::Usage`] for an unknown extension, [`Error::Io`] and [`Error::Output`] for the file system; a file that was
+/// there before is then unchanged.
+pub fn write(layers: &Layers, metadata: &Metadata, path: &Path, half: bool) -> Result<WriteReport, Error> {
+    let mut report = WriteReport::default();
+    let bytes = match Format::of_path(path)? {
+        Format::Exr => exr_file::encode(layers, metadata, half, &mut report)?,
+        Format::Png => png_file::encode(layers, metadata, &mut report)?,
+    };
+    report.bytes = bytes.len() as u64;
+    write_atomically(path, &bytes)?;
+    Ok(report)
+}

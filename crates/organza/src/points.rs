@@ -1,0 +1,252 @@
+//! The `points` technique (Gunjee 2007): shadow maps, slices, attribute-driven shading, splatting.
+
+use crate::load::Loaded;
+use crate::plan::{Plan, pass};
+use crate::scene::{RenderSettings, ShadowMapping};
+use crate::{Error, Progress};
+use splat_core::raster::{self, Background, OpaqueImage, Projected, RasterCounts};
+use splat_core::shade::{ChannelLayout, LitBy, ShadeInput, shade};
+use splat_core::{Accumulator, Camera, CostRecord, LayerSet, Layers, SliceOrder, SplatKind, StageCost, Transmittance};
+use tsm::ShadowMap;
+
+/// What drawing reads.
+pub(crate) struct Drawing<'a> {
+    pub(crate) loaded: &'a Loaded,
+    pub(crate) settings: &'a RenderSettings,
+    pub(crate) background: [f32; 3],
+    pub(crate) ambient: [f32; 3],
+    pub(crate) layers: LayerSet,
+    pub(crate) plan: &'a Plan,
+    pub(crate) max_memory: u64,
+    pub(crate) progress: &'a Progress,
+}
+
+/// Runs the planned passes.
+pub(crate) fn draw(drawing: &Drawing<'_>, cost: &mut CostRecord) -> Result<Layers, Error> {
+    let maps = drawing.shadow_maps(cost)?;
+    let camera = drawing.sample_camera();
+    let order = drawing.sort(&camera, cost)?;
+    let lights: Vec<LitBy<'_>> = drawing
+        .loaded
+        .lights
+        .iter()
+        .zip(&maps)
+        .map(|(light, map)| LitBy { light: *light, shadow: map.as_ref().map(|m| m as &dyn Transmittance) })
+        .collect();
+    let input = ShadeInput {
+        cloud: &drawing.loaded.cloud,
+        materials: &drawing.loaded.materials,
+        objects: &drawing.loaded.objects,
+        lights: &lights,
+        ambient: drawing.ambient,
+        camera: &camera,
+    };
+    let layout = ChannelLayout::new(&drawing.layers);
+    let opaque = drawing.opaque(&input, &layout, cost)?;
+    let accumulator = drawing.translucent(&input, &layout, &opaque, order, cost)?;
+    let layers = cost.measure(pass::FINISH, |stage| {
+        let background = Background { color: drawing.background };
+        stage.items_in = u64::from(camera.size[0]) * u64::from(camera.size[1]);
+        let set = &drawing.layers;
+        drawing.tick()?;
+        Ok::<_, Error>(raster::finish(&accumulator, &opaque, &background, &layout, set, drawing.settings.antialias))
+    })?;
+    Ok(layers)
+}
+
+impl Drawing<'_> {
+    /// The camera with `antialias`² samples a pixel.
+    fn sample_camera(&self) -> Camera {
+        let mut camera = self.loaded.camera;
+        camera.size = camera.size.map(|s| s * self.settings.antialias);
+        camera
+    }
+
+    fn tick(&self) -> Result<(), Error> {
+        self.progress.tick(1).map_err(|_| Error::Cancelled)
+    }
+
+    fn raster_params(&self) -> raster::Params {
+        raster::Params {
+            resampling_sigma_px: if self.settings.points.resampling_filter {
+                raster::Params::default().resampling_sigma_px
+            } else {
+                0.0
+            },
+            transmittance_cutoff: self.settings.points.transmittance_cutoff as f32,
+        }
+    }
+
+    /// One map for each light that the plan gives one.
+    fn shadow_maps(&self, cost: &mut CostRecord) -> Result<Vec<Option<ShadowMap>>, Error> {
+        let shadow = &self.settings.points.shadow;
+        let defaults = tsm::Params::default();
+        let params = tsm::Params {
+            mapping: match shadow.mapping {
+                ShadowMapping::Auto => tsm::MappingChoice::Auto,
+                ShadowMapping::Octahedral => tsm::MappingChoice::Octahedral,
+                ShadowMapping::Polar => tsm::MappingChoice::PolarAzimuth,
+            },
+            resolution: shadow.cells.map_or(tsm::Resolution::Auto, tsm::Resolution::Cells),
+            tolerance: shadow.absorbance_cut.map_or(defaults.tolerance, |cut| (-cut).exp() as f32),
+            footprints: self.loaded.footprints.clone(),
+            max_bytes: self.max_memory,
+            ..defaults
+        };
+        let mut maps = Vec::new();
+        for (i, (light, wanted)) in self.loaded.lights.iter().zip(&self.plan.shadow_maps).enumerate() {
+            self.tick()?;
+            if !wanted {
+                maps.push(None);
+                continue;
+            }
+            let map = cost.measure(pass::SHADOW_MAP, |stage| {
+                let l = self.loaded;
+                let map = ShadowMap::build_with_progress(&l.cloud, &l.materials, &l.objects, light, &params, self.progress)
+                    .map_err(|e| shadow_error(i, &e))?;
+                stage.items_in = l.cloud.len() as u64;
+                stage.items_out = map.counts().kept;
+                stage.bytes = map.counts().bytes;
+                Ok::<_, Error>(map)
+            })?;
+            maps.push(Some(map));
+        }
+        Ok(maps)
+    }
+
+    /// Slices of the translucent splats; an empty order without any.
+    fn sort(&self, camera: &Camera, cost: &mut CostRecord) -> Result<SliceOrder, Error> {
+        let cloud = &self.loaded.cloud;
+        let translucent: Vec<u32> = self.ids(|kind| kind != SplatKind::Opaque);
+        if translucent.is_empty() {
+            return Ok(SliceOrder::default());
+        }
+        self.tick()?;
+        let points = &self.settings.points;
+        let params = hbsort::Params {
+            direction: points.direction,
+            thickness: self.loaded.slice_thickness.map_or(hbsort::Thickness::Auto, hbsort::Thickness::World),
+            exact: points.exact,
+            margin_px: 3.0,
+            ..hbsort::Params::default()
+        };
+        let order = cost.measure(pass::SORT, |stage| {
+            let mut scratch = hbsort::Scratch::default();
+            let order = hbsort::slice_cloud(cloud, Some(&translucent), camera, &params, &mut scratch)
+                .map_err(|e| Error::Internal(e.to_string()))?;
+            stage.items_in = translucent.len() as u64;
+            stage.items_out = order.input_from_sorted.len() as u64;
+            stage.bytes = 4 * (order.input_from_sorted.len() + order.slice_starts.len()) as u64;
+            Ok::<_, Error>(order)
+        })?;
+        Ok(match points.first_slices {
+            Some(n) => order.first_slices(usize::try_from(n).unwrap_or(usize::MAX)),
+            None => order,
+        })
+    }
+
+    fn ids(&self, keep: impl Fn(SplatKind) -> bool) -> Vec<u32> {
+        let kinds = &self.loaded.cloud.kind;
+        (0..kinds.len() as u32).filter(|&i| keep(kinds[i as usize])).collect()
+    }
+
+    fn project(&self, ids: &[u32], camera: &Camera) -> Projected {
+        let l = self.loaded;
+        raster::project(&l.cloud, ids, camera, &l.footprints, &l.materials, &self.raster_params())
+    }
+
+    fn opaque(
+        &self,
+        input: &ShadeInput<'_>,
+        layout: &ChannelLayout,
+        cost: &mut CostRecord,
+    ) -> Result<OpaqueImage, Error> {
+        let mut ids = self.ids(|kind| kind == SplatKind::Opaque);
+        if ids.is_empty() {
+            return Ok(OpaqueImage::default());
+        }
+        self.tick()?;
+        let total = ids.len() as u64;
+        let mut projected = self.project(&ids, input.camera);
+        projected.retain_visible(&mut ids);
+        let values = shade_ids(input, &ids, layout, cost);
+        cost.measure(pass::OPAQUE, |stage| {
+            stage.items_in = total;
+            let (image, counts) = raster::resolve_opaque(&projected, &values, layout.count(), self.layers.object);
+            record(stage, &counts);
+            Ok(image)
+        })
+    }
+
+    fn translucent(
+        &self,
+        input: &ShadeInput<'_>,
+        layout: &ChannelLayout,
+        opaque: &OpaqueImage,
+        order: SliceOrder,
+        cost: &mut CostRecord,
+    ) -> Result<Accumulator, Error> {
+        let set = &self.layers;
+        let (planes, size) = (self.plan.optical_depth_planes, input.camera.size);
+        let mut accumulator = Accumulator::new(size, planes, layout.count(), set.depth, set.object);
+        let ids = &order.input_from_sorted;
+        if ids.is_empty() {
+            return Ok(accumulator);
+        }
+        self.tick()?;
+        let values = shade_ids(input, ids, layout, cost);
+        self.tick()?;
+        cost.measure(pass::SPLAT, |stage| {
+            stage.items_in = ids.len() as u64;
+            let projected = self.project(ids, input.camera);
+            let params = self.raster_params();
+            let counts = raster::fold(
+                &projected,
+                &values,
+                &self.loaded.materials,
+                opaque,
+                order.direction,
+                &params,
+                &mut accumulator,
+            );
+            record(stage, &counts);
+            Ok::<_, Error>(())
+        })?;
+        Ok(accumulator)
+    }
+}
+
+fn shade_ids(input: &ShadeInput<'_>, ids: &[u32], layout: &ChannelLayout, cost: &mut CostRecord) -> Vec<f32> {
+    let shaded: Result<Vec<f32>, std::convert::Infallible> = cost.measure(pass::SHADE, |stage| {
+        let values = shade(input, ids, layout);
+        stage.items_in = ids.len() as u64;
+        stage.items_out = ids.len() as u64;
+        stage.bytes = 4 * values.len() as u64;
+        Ok(values)
+    });
+    match shaded {
+        Ok(values) => values,
+        Err(never) => match never {},
+    }
+}
+
+fn record(stage: &mut StageCost, counts: &RasterCounts) {
+    stage.items_out = counts.splats;
+    stage.fragments = counts.fragments;
+    stage.bytes = counts.bytes;
+}
+
+fn shadow_error(light: usize, error: &tsm::Error) -> Error {
+    let what = format!("the shadow map of light {light}");
+    match error {
+        tsm::Error::Memory { needed_bytes, limit_bytes, .. } => Error::Limit {
+            what,
+            needed: *needed_bytes,
+            limit: *limit_bytes,
+            unit: "bytes",
+            hint: "use fewer cells in render.points.shadow, or a larger --max-memory".into(),
+        },
+        tsm::Error::Core(splat_core::Error::Cancelled) => Error::Cancelled,
+        other => Error::input(what, other.to_string(), ""),
+    }
+}

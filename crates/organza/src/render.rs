@@ -1,0 +1,147 @@
+//! From a scene to images: load, plan, draw.
+
+use crate::load::{Loaded, load};
+use crate::plan::{Plan, pass, plan};
+use crate::points::{self, Drawing};
+use crate::scene::Scene;
+use crate::statistics::{LightStatistics, Statistics};
+use crate::{CostRecord, Error, Layers, Progress};
+use splat_core::{LayerData, LayerSet};
+
+/// What a render may take and how it treats doubtful input.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RenderOptions {
+    /// Bytes that all buffers together may take.
+    pub max_memory: u64,
+    /// Leave out records with values that are not finite instead of refusing the file.
+    pub drop_invalid: bool,
+    /// Make one point of points at the same place, for every object.
+    pub merge_duplicates: bool,
+}
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self { max_memory: 8 << 30, drop_invalid: false, merge_duplicates: false }
+    }
+}
+
+/// A finished render.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Render {
+    /// The images that were asked for, beauty and alpha always.
+    pub layers: Layers,
+    /// What each pass cost.
+    pub cost: CostRecord,
+    /// What was done and why.
+    pub plan: Plan,
+    /// What a user should know of the input, one sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// What a render would do, without doing it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Explanation {
+    /// Effects and passes with their reasons.
+    pub plan: Plan,
+    /// What loading cost.
+    pub cost: CostRecord,
+    /// Bytes that rendering will take at most, see [`Explanation::plan`] for the passes that take them.
+    pub memory: u64,
+    /// What a user should know of the input.
+    pub warnings: Vec<String>,
+}
+
+/// Renders a scene.
+///
+/// # Errors
+/// [`Error::Input`] and [`Error::Io`] for data, [`Error::Limit`] before more memory is taken than allowed,
+/// [`Error::Cancelled`] after `progress.cancel()`.
+pub fn render(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Render, Error> {
+    let (loaded, explanation) = prepare(scene, options, progress)?;
+    let Explanation { plan, mut cost, warnings, .. } = explanation;
+    progress.add_total(plan.passes.len() as u64);
+    let drawing = Drawing {
+        loaded: &loaded,
+        settings: &scene.render,
+        background: scene.background,
+        ambient: scene.ambient,
+        layers: scene.render.layers.set(),
+        plan: &plan,
+        max_memory: options.max_memory,
+        progress,
+    };
+    let mut layers = points::draw(&drawing, &mut cost)?;
+    restore_depths(&mut layers, loaded.exponent);
+    scene.render.layers.keep(&mut layers);
+    Ok(Render { layers, cost, plan, warnings })
+}
+
+/// Loads a scene and plans its render.
+///
+/// # Errors
+/// As [`render`].
+pub fn explain(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Explanation, Error> {
+    prepare(scene, options, progress).map(|(_, explanation)| explanation)
+}
+
+fn prepare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<(Loaded, Explanation), Error> {
+    let mut cost = CostRecord::default();
+    let image = image_bytes(scene);
+    check_memory("the image", image, options.max_memory)?;
+    let loaded = cost.measure(pass::CONVERT, |stage| {
+        let loaded = load(scene, options, progress)?;
+        stage.items_in = scene.objects.iter().filter(|o| o.visible).count() as u64;
+        stage.items_out = loaded.cloud.len() as u64;
+        stage.bytes = loaded.cloud.bytes();
+        Ok::<_, Error>(loaded)
+    })?;
+    let mut statistics =
+        Statistics::of_cloud(&loaded.cloud, &loaded.materials, &loaded.objects, &loaded.footprints);
+    statistics.lights =
+        loaded.lights.iter().zip(&loaded.casts).map(|(l, casts)| LightStatistics::of_light(l, *casts)).collect();
+    statistics.normals_needed = loaded.normals;
+    statistics.layers = scene.render.layers.names().map(str::to_owned).collect();
+    statistics.tolerance = scene.render.tolerance;
+    let memory = image + splat_bytes(&loaded, &scene.render.layers.set());
+    check_memory("rendering", memory, options.max_memory)?;
+    let warnings = loaded.warnings.clone();
+    Ok((loaded, Explanation { plan: plan(&statistics), cost, memory, warnings }))
+}
+
+/// Bytes of the accumulators and layers.
+fn image_bytes(scene: &Scene) -> u64 {
+    let pixels = scene.camera.size.iter().map(|s| u64::from(*s)).product::<u64>();
+    let samples = pixels * u64::from(scene.render.antialias).pow(2);
+    let channels = splat_core::shade::ChannelLayout::new(&scene.render.layers.set()).count() as u64;
+    // Accumulator and opaque image a sample: channels, up to three optical depths, four depths, ids.
+    4 * (samples * (2 * channels + 10) + pixels * (2 * channels + 10))
+}
+
+/// Bytes of what is made for each splat: its attributes, order, footprint, tile entries and values.
+fn splat_bytes(loaded: &Loaded, layers: &LayerSet) -> u64 {
+    let values = 4 * splat_core::shade::ChannelLayout::new(layers).count() as u64;
+    loaded.cloud.bytes() + loaded.cloud.len() as u64 * (8 + 64 + 8 + values)
+}
+
+fn check_memory(what: &str, needed: u64, limit: u64) -> Result<(), Error> {
+    if needed <= limit {
+        return Ok(());
+    }
+    Err(Error::Limit {
+        what: what.into(),
+        needed,
+        limit,
+        unit: "bytes",
+        hint: "use a larger spacing, a smaller image or render.antialias, or a larger --max-memory".into(),
+    })
+}
+
+/// Depths back into the scene's unit.
+fn restore_depths(layers: &mut Layers, exponent: i32) {
+    let scale = f64::from(exponent).exp2() as f32;
+    for (name, data) in &mut layers.images {
+        if let (true, LayerData::Scalar(depth)) = (name.starts_with("depth."), data) {
+            depth.iter_mut().for_each(|d| *d *= scale);
+        }
+    }
+}

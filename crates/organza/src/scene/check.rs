@@ -1,0 +1,237 @@
+//! Raw tables → checked scene: what the whole file shares, and the tools of the other `check_…` files.
+
+use super::check_light::check_light;
+use super::check_material::{check_materials, find_material};
+use super::check_object::{Named, check_object};
+use super::check_render::check_render;
+use super::paths::Paths;
+use super::raw::{RawCamera, RawColor, RawScene};
+use super::tree::{Document, Step};
+use super::{Scene, SceneObject};
+use crate::Error;
+use glam::DVec3;
+use splat_core::{Camera, Footprint, FootprintStack, Projection};
+use std::collections::HashMap;
+use std::ops::RangeInclusive;
+
+/// Largest number that a scene may state: its square still fits an f32.
+pub(super) const LARGEST: f64 = 1e18;
+/// Largest radiant intensity: it goes with the square of a length.
+const LARGEST_INTENSITY: f64 = 1e30;
+/// Smallest length that a scene may state.
+pub(super) const SMALLEST: f64 = 1e-18;
+/// Vertical angle of view of a camera that states none, degrees.
+const DEFAULT_FOV_Y: f64 = 35.0;
+/// Most samples along one side of a region.
+const MOST_SAMPLES: f64 = 65536.0;
+
+/// A place in the document, for error messages.
+#[derive(Debug, Clone)]
+pub(super) struct At<'a> {
+    pub(super) document: &'a Document<'a>,
+    path: Vec<Step<'a>>,
+}
+
+impl<'a> At<'a> {
+    pub(super) fn key(&self, key: &'a str) -> Self {
+        let mut path = self.path.clone();
+        path.push(Step::Key(key));
+        Self { document: self.document, path }
+    }
+
+    pub(super) fn index(&self, index: usize) -> Self {
+        let mut path = self.path.clone();
+        path.push(Step::Index(index));
+        Self { document: self.document, path }
+    }
+
+    pub(super) fn error(&self, message: impl Into<String>, hint: impl Into<String>) -> Error {
+        self.document.error(self.document.place_of(&self.path), message, hint)
+    }
+
+    /// The place in words.
+    pub(super) fn name(&self) -> String {
+        self.document.name_place(self.document.place_of(&self.path))
+    }
+
+    /// `value` if it lies in `range`.
+    pub(super) fn number(&self, key: &'a str, value: f64, range: RangeInclusive<f64>) -> Result<f64, Error> {
+        if range.contains(&value) {
+            return Ok(value);
+        }
+        let (low, high) = (range.start(), range.end());
+        let expected = match (*low, *high) {
+            (SMALLEST, LARGEST) => format!("a number above 0, from {SMALLEST:e} to {LARGEST:e}"),
+            (0.0, LARGEST) => format!("a number from 0 to {LARGEST:e}"),
+            _ => format!("a number from {low} to {high}"),
+        };
+        Err(self.key(key).error(format!("`{key}`: expected {expected}, found {value}"), ""))
+    }
+
+    /// A whole number in a range.
+    pub(super) fn whole(&self, key: &'a str, value: u32, range: RangeInclusive<u32>) -> Result<u32, Error> {
+        if range.contains(&value) {
+            return Ok(value);
+        }
+        let expected = format!("a whole number from {} to {}", range.start(), range.end());
+        Err(self.key(key).error(format!("`{key}`: expected {expected}, found {value}"), ""))
+    }
+
+    /// A length above 0.
+    pub(super) fn length(&self, key: &'a str, value: f64) -> Result<f64, Error> {
+        self.number(key, value, SMALLEST..=LARGEST)
+    }
+
+    /// Three numbers of any sign.
+    pub(super) fn vector(&self, key: &'a str, value: [f64; 3]) -> Result<DVec3, Error> {
+        for x in value {
+            if x.abs() > LARGEST {
+                let message = format!("`{key}`: expected numbers from -{LARGEST:e} to {LARGEST:e}, found {x}");
+                return Err(self.key(key).error(message, ""));
+            }
+        }
+        Ok(DVec3::from_array(value))
+    }
+
+    /// A direction of any length but 0, made a unit vector.
+    pub(super) fn direction(&self, key: &'a str, value: [f64; 3]) -> Result<DVec3, Error> {
+        let v = self.vector(key, value)?;
+        // Scaled first, so that small numbers do not vanish when squared.
+        let largest = v.abs().max_element();
+        if largest == 0.0 {
+            return Err(self.key(key).error(format!("`{key}`: expected a direction, found {value:?}"), ""));
+        }
+        Ok((v / largest).normalize())
+    }
+
+    /// Three numbers ≥ 0.
+    pub(super) fn color(&self, key: &'a str, value: [f64; 3]) -> Result<[f32; 3], Error> {
+        self.colors_up_to(key, value, LARGEST_INTENSITY)
+    }
+
+    /// Three numbers from 0 to `most`.
+    pub(super) fn colors_up_to(&self, key: &'a str, value: [f64; 3], most: f64) -> Result<[f32; 3], Error> {
+        for (i, x) in value.into_iter().enumerate() {
+            if !(0.0..=most).contains(&x) {
+                let message = format!("`{key}`: expected numbers from 0 to {most:e}, found {x}");
+                return Err(self.key(key).index(i).error(message, ""));
+            }
+        }
+        Ok(value.map(|x| x as f32))
+    }
+
+    /// The distance between samples of a region whose longest side is `longest`, from its own key.
+    pub(super) fn spacing(&self, key: &'a str, value: f64, longest: f64) -> Result<f64, Error> {
+        self.length(key, value)?;
+        if longest / value > MOST_SAMPLES {
+            let least = longest / MOST_SAMPLES;
+            let message = format!("`{key}`: expected at least {least} for a side of {longest}, found {value}");
+            return Err(self.key(key).error(message, format!("a side may have {MOST_SAMPLES} samples")));
+        }
+        Ok(value)
+    }
+}
+
+/// Checks everything.
+pub(super) fn scene(
+    document: &Document<'_>,
+    raw: RawScene,
+    allow_path: bool,
+    sha256: String,
+) -> Result<Scene, Error> {
+    let at = At { document, path: Vec::new() };
+    if raw.version != 1 {
+        let message = format!("`version`: expected 1, found {}", raw.version);
+        return Err(at.key("version").error(message, "this version of Organza reads scenes of version 1"));
+    }
+    let footprints = check_footprints(&at, raw.footprints)?;
+    let materials = check_materials(&at.key("material"), &raw.material)?;
+    let paths = Paths::new(document.file, allow_path)?;
+    let named = Named { materials: &materials, footprints: &footprints, paths: &paths };
+    let at_objects = at.key("object");
+    let mut objects: Vec<SceneObject> = Vec::with_capacity(raw.object.len());
+    let mut first_of: HashMap<String, usize> = HashMap::new();
+    for (i, object) in raw.object.into_iter().enumerate() {
+        let at = at_objects.index(i);
+        if let Some(first) = first_of.insert(object.name.clone(), i) {
+            let first = at_objects.index(first).key("name").name();
+            let message = format!("duplicate object name `{}`, first at {first}", object.name);
+            return Err(at.key("name").error(message, "each object needs a name of its own"));
+        }
+        let material = find_material(&at, &at_materials(&at_objects), object.material.as_deref(), &materials)?;
+        objects.push(check_object(&at, object, material, &named)?);
+    }
+    let at_lights = at.key("light");
+    let lights = raw.light.iter().enumerate().map(|(i, l)| check_light(&at_lights.index(i), l));
+    Ok(Scene {
+        file: document.file.to_owned(),
+        sha256,
+        camera: check_camera(&at.key("camera"), &raw.camera)?,
+        background: check_color(&at.key("background"), &raw.background)?,
+        ambient: check_color(&at.key("ambient"), &raw.ambient)?,
+        lights: lights.collect::<Result<_, _>>()?,
+        objects,
+        render: check_render(&at.key("render"), &raw.render)?,
+        materials,
+        footprints,
+    })
+}
+
+fn at_materials<'a>(at: &At<'a>) -> At<'a> {
+    At { document: at.document, path: vec![Step::Key("material")] }
+}
+
+fn check_footprints(at: &At<'_>, cutoffs: Option<Vec<f64>>) -> Result<FootprintStack, Error> {
+    let Some(cutoffs) = cutoffs else { return Ok(FootprintStack::default()) };
+    let at = at.key("footprints");
+    for (i, cutoff) in cutoffs.iter().enumerate() {
+        if !(1.0..=8.0).contains(cutoff) {
+            return Err(at.index(i).error(format!("expected a number from 1 to 8, found {cutoff}"), ""));
+        }
+    }
+    let layers = cutoffs.iter().map(|c| Footprint { cutoff: *c as f32 }).collect();
+    let found = cutoffs.len();
+    FootprintStack::new(layers).map_err(|_| at.error(format!("expected 1 to 256 footprints, found {found}"), ""))
+}
+
+fn check_color(at: &At<'_>, raw: &RawColor) -> Result<[f32; 3], Error> {
+    if raw.environment.is_some() {
+        let message = "environment maps are not in this version";
+        return Err(at.key("environment").error(message, "use `color`"));
+    }
+    at.color("color", raw.color)
+}
+
+fn check_camera(at: &At<'_>, raw: &RawCamera) -> Result<Camera, Error> {
+    let projection = match (raw.fov_y, raw.orthographic) {
+        (Some(fov_y), None) => {
+            if !(fov_y > 0.0 && fov_y < 180.0) {
+                let message = format!("`fov_y`: expected degrees between 0 and 180, found {fov_y}");
+                return Err(at.key("fov_y").error(message, ""));
+            }
+            Projection::Perspective { fov_y: fov_y.to_radians() }
+        }
+        (None, Some(height)) => Projection::Orthographic { height: at.length("orthographic", height)? },
+        (Some(_), Some(_)) => {
+            let message = "expected one of `fov_y` and `orthographic`, found both";
+            return Err(at.key("orthographic").error(message, ""));
+        }
+        (None, None) => Projection::Perspective { fov_y: DEFAULT_FOV_Y.to_radians() },
+    };
+    for (i, side) in raw.size.into_iter().enumerate() {
+        if !(1..=65536).contains(&side) {
+            let message = format!("`size`: expected 1 to 65536 pixels a side, found {side}");
+            return Err(at.key("size").index(i).error(message, ""));
+        }
+    }
+    let position = at.vector("position", raw.position)?;
+    let target = at.vector("target", raw.target)?;
+    let up = at.vector("up", raw.up)?;
+    Camera::look_at(position, target, up, projection, raw.size).map_err(|e| match e {
+        splat_core::Error::Invalid { attribute, found, expected, .. } => {
+            let key = if attribute == "target" { "target" } else { "position" };
+            at.key(key).error(format!("`{attribute}`: expected {expected}, found {found}"), "")
+        }
+        other => at.error(other.to_string(), ""),
+    })
+}

@@ -1,0 +1,101 @@
+//! Checks of lights.
+
+use super::check::{At, LARGEST};
+use super::raw::RawLight;
+use super::{LightSource, SceneLight};
+use crate::Error;
+use glam::DVec3;
+use splat_core::{Light, LightShape};
+
+/// Most points that an extended light may become.
+const MOST_LIGHT_SAMPLES: u32 = 1_000_000;
+
+/// Checks one light.
+pub(super) fn check_light(at: &At<'_>, raw: &RawLight) -> Result<SceneLight, Error> {
+    let samples_of = |samples| at.whole("samples", samples, 1..=MOST_LIGHT_SAMPLES);
+    let simple = |shape, intensity, shadow| SceneLight {
+        source: LightSource::Simple(Light { shape, intensity }),
+        intensity,
+        samples: 1,
+        shadow,
+    };
+    Ok(match *raw {
+        RawLight::Point { position, intensity, shadow } => {
+            let position = at.vector("position", position)?;
+            simple(LightShape::Point { position }, at.color("intensity", intensity)?, shadow)
+        }
+        RawLight::Directional { direction, irradiance, shadow } => {
+            let direction = at.direction("direction", direction)?;
+            simple(LightShape::Directional { direction }, at.color("irradiance", irradiance)?, shadow)
+        }
+        RawLight::Spot { intensity, shadow, .. } => {
+            simple(spot_shape(at, raw)?, at.color("intensity", intensity)?, shadow)
+        }
+        RawLight::Sphere { position, radius, intensity, samples, shadow } => SceneLight {
+            source: LightSource::Sphere {
+                position: at.vector("position", position)?,
+                radius: at.length("radius", radius)?,
+            },
+            intensity: at.color("intensity", intensity)?,
+            samples: samples_of(samples)?,
+            shadow,
+        },
+        RawLight::Disk { position, normal, radius, intensity, samples, shadow } => SceneLight {
+            source: LightSource::Disk {
+                position: at.vector("position", position)?,
+                normal: at.direction("normal", normal)?,
+                radius: at.length("radius", radius)?,
+            },
+            intensity: at.color("intensity", intensity)?,
+            samples: samples_of(samples)?,
+            shadow,
+        },
+        RawLight::Rect { position, u, v, intensity, samples, shadow } => {
+            let (u, v) = check_half_axes(at, u, v)?;
+            SceneLight {
+                source: LightSource::Rect { position: at.vector("position", position)?, u, v },
+                intensity: at.color("intensity", intensity)?,
+                samples: samples_of(samples)?,
+                shadow,
+            }
+        }
+    })
+}
+
+fn spot_shape(at: &At<'_>, raw: &RawLight) -> Result<LightShape, Error> {
+    let RawLight::Spot { position, target, direction, inner, outer, .. } = *raw else {
+        return Err(Error::Internal("a spot light was expected".into()));
+    };
+    let position = at.vector("position", position)?;
+    let direction = match (target, direction) {
+        (Some(target), None) => {
+            let target = at.vector("target", target)?;
+            at.direction("target", (target - position).to_array())?
+        }
+        (None, Some(direction)) => at.direction("direction", direction)?,
+        (Some(_), Some(_)) => {
+            return Err(at.key("direction").error("expected one of `target` and `direction`, found both", ""));
+        }
+        (None, None) => return Err(at.error("expected a key `target` or `direction` here, found neither", "")),
+    };
+    if !(outer > 0.0 && outer < 90.0) {
+        let message = format!("`outer`: expected degrees between 0 and 90, found {outer}");
+        return Err(at.key("outer").error(message, "it is half of the cone's angle"));
+    }
+    let inner = at.number("inner", inner, 0.0..=outer)?;
+    Ok(LightShape::Spot { position, direction, inner: inner.to_radians(), outer: outer.to_radians() })
+}
+
+/// Two half-axes that span a parallelogram.
+pub(super) fn check_half_axes(at: &At<'_>, u: [f64; 3], v: [f64; 3]) -> Result<(DVec3, DVec3), Error> {
+    let u_unit = at.direction("u", u)?;
+    let v_unit = at.direction("v", v)?;
+    if u_unit.cross(v_unit).length() < 1e-9 {
+        let message = format!("`v`: expected a direction that is not parallel to `u`, found {v:?}");
+        return Err(at.key("v").error(message, ""));
+    }
+    let (u, v) = (DVec3::from_array(u), DVec3::from_array(v));
+    at.number("u", u.length(), super::check::SMALLEST..=LARGEST)?;
+    at.number("v", v.length(), super::check::SMALLEST..=LARGEST)?;
+    Ok((u, v))
+}

@@ -1,0 +1,132 @@
+//! Checks of materials and of references to them.
+
+use super::SceneMaterial;
+use super::check::{At, LARGEST, SMALLEST};
+use super::de::suggest;
+use super::raw_object::{RawMaterial, RawShading, RawSurfaceOpacity};
+use crate::Error;
+use splat_core::optics::{SurfaceOpacity, absorption_coefficient};
+use splat_core::{Material, Shading};
+use std::collections::BTreeMap;
+
+/// The default material, then all of the file in order of name.
+pub(super) fn check_materials<'a>(
+    at: &At<'a>,
+    raw: &'a BTreeMap<String, RawMaterial>,
+) -> Result<Vec<SceneMaterial>, Error> {
+    if raw.len() > usize::from(u16::MAX) {
+        return Err(at.error(format!("expected at most {} materials, found {}", u16::MAX, raw.len()), ""));
+    }
+    let default = SceneMaterial {
+        name: String::new(),
+        material: Material::default(),
+        color: [1.0; 3],
+        opacity: 1.0,
+        extinction: None,
+    };
+    let mut materials = vec![default];
+    for (name, material) in raw {
+        materials.push(check_material(&at.key(name), name, material)?);
+    }
+    Ok(materials)
+}
+
+/// Index of the named material; 0 for none.
+pub(super) fn find_material(
+    at: &At<'_>,
+    at_materials: &At<'_>,
+    name: Option<&str>,
+    materials: &[SceneMaterial],
+) -> Result<usize, Error> {
+    let Some(name) = name else { return Ok(0) };
+    if let Some(i) = materials.iter().skip(1).position(|m| m.name == name) {
+        return Ok(i + 1);
+    }
+    let known: Vec<&str> = materials.iter().skip(1).map(|m| m.name.as_str()).collect();
+    let hint = match (known.is_empty(), suggest(name, &known)) {
+        (true, _) => format!("add a table [material.{name}]"),
+        (false, hint) => {
+            let near = known.iter().find(|k| hint == format!("did you mean `{k}`?"));
+            let place = near.map(|k| format!(" It is defined at {}.", at_materials.key(k).name()));
+            hint + &place.unwrap_or_default()
+        }
+    };
+    Err(at.key("material").error(format!("material `{name}` is not defined"), hint))
+}
+
+fn check_material(at: &At<'_>, name: &str, raw: &RawMaterial) -> Result<SceneMaterial, Error> {
+    if raw.ior.is_some() {
+        let message = "refraction needs the `surfels` technique, which this version does not have";
+        return Err(at.key("ior").error(message, "leave `ior` out"));
+    }
+    let unit = |key, value: Option<f64>, default: f64| at.number(key, value.unwrap_or(default), 0.0..=1.0);
+    let (extinction, extinction_rgb) = check_extinction(at, raw)?;
+    let medium = raw.medium.as_ref();
+    let at_medium = at.key("medium");
+    let albedo = medium.and_then(|m| m.albedo).unwrap_or(if raw.absorption.is_some() { 0.0 } else { 1.0 });
+    let asymmetry = medium.and_then(|m| m.asymmetry).unwrap_or(0.0);
+    if asymmetry.abs() >= 1.0 {
+        let message = format!("`asymmetry`: expected a number between -1 and 1, found {asymmetry}");
+        return Err(at_medium.key("asymmetry").error(message, ""));
+    }
+    let material = Material {
+        shading: match raw.shading {
+            Some(RawShading::Phong) => Shading::Phong,
+            Some(RawShading::Phase) => Shading::Phase,
+            Some(RawShading::Unlit) => Shading::Unlit,
+            None if medium.is_some() => Shading::Phase,
+            None => Shading::Phong,
+        },
+        ambient: at.number("ambient", raw.ambient.unwrap_or(1.0), 0.0..=LARGEST)? as f32,
+        diffuse: unit("diffuse", raw.diffuse, 1.0)? as f32,
+        specular: unit("specular", raw.specular, 0.0)? as f32,
+        shininess: at.number("shininess", raw.shininess.unwrap_or(32.0), 0.0..=1e6)? as f32,
+        transmission: unit("transmission", raw.transmission, 0.0)? as f32,
+        single_scattering_albedo: at_medium.number("albedo", albedo, 0.0..=1.0)? as f32,
+        asymmetry: asymmetry as f32,
+        emission: at.color("emission", raw.emission)?,
+        extinction_rgb,
+        surface_opacity: match raw.surface_opacity {
+            RawSurfaceOpacity::PerCrossing => SurfaceOpacity::PerCrossing,
+            RawSurfaceOpacity::ThinSlab => SurfaceOpacity::ThinSlab,
+        },
+    };
+    Ok(SceneMaterial {
+        name: name.to_owned(),
+        material,
+        color: at.color("color", raw.color.unwrap_or([1.0; 3]))?,
+        opacity: unit("opacity", raw.opacity, 1.0)?,
+        extinction,
+    })
+}
+
+/// Extinction of a medium, and its ratio per channel.
+fn check_extinction(at: &At<'_>, raw: &RawMaterial) -> Result<(Option<f64>, [f32; 3]), Error> {
+    let stated = raw.medium.as_ref().and_then(|m| m.extinction);
+    let Some(absorption) = &raw.absorption else {
+        let rgb = at.colors_up_to("extinction_rgb", raw.extinction_rgb.unwrap_or([1.0; 3]), 1e6)?;
+        let extinction = stated.map(|e| at.key("medium").number("extinction", e, 0.0..=LARGEST)).transpose()?;
+        return Ok((extinction, rgb));
+    };
+    if raw.extinction_rgb.is_some() {
+        let message = "expected one of `absorption` and `extinction_rgb`, found both";
+        return Err(at.key("extinction_rgb").error(message, "`absorption` gives the ratio of the channels"));
+    }
+    if stated.is_some() {
+        let message = "expected one of `absorption` and `medium.extinction`, found both";
+        return Err(at.key("medium").key("extinction").error(message, "`absorption` gives the extinction"));
+    }
+    let at = at.key("absorption");
+    let mut per_channel = [0.0; 3];
+    for (c, coefficient) in per_channel.iter_mut().enumerate() {
+        let kappa = at.number("kappa", absorption.kappa[c], 0.0..=LARGEST)?;
+        let wavelength = at.number("wavelength", absorption.wavelength[c], SMALLEST..=LARGEST)?;
+        *coefficient = absorption_coefficient(kappa, wavelength);
+    }
+    let largest = per_channel.iter().copied().fold(0.0, f64::max);
+    if !(SMALLEST..=LARGEST).contains(&largest) {
+        let message = format!("expected a largest 4πκ/λ from {SMALLEST:e} to {LARGEST:e}, found {largest}");
+        return Err(at.key("kappa").error(message, ""));
+    }
+    Ok((Some(largest), per_channel.map(|a| (a / largest) as f32)))
+}

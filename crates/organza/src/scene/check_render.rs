@@ -1,0 +1,107 @@
+//! Checks of the render settings.
+
+use super::check::{At, LARGEST, SMALLEST};
+use super::de::suggest;
+use super::raw::{Auto, RawDirection, RawMapping, RawPoints, RawRender, RawShadow};
+use super::{
+    LAYER_NAMES, LayerChoice, PointsSettings, RenderSettings, ShadowMapping, ShadowSettings, Technique,
+};
+use crate::Error;
+use splat_core::Direction;
+
+/// Techniques of the design that this version does not have.
+const LATER_TECHNIQUES: [&str; 4] = ["sheets", "particles", "surfels", "reference"];
+
+/// Checks `[render]`.
+pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSettings, Error> {
+    let tolerance = raw.tolerance.unwrap_or(1.0 / 255.0);
+    if !(tolerance > 0.0 && tolerance <= 1.0) {
+        let message = format!("`tolerance`: expected a number above 0, at most 1, found {tolerance}");
+        return Err(at.key("tolerance").error(message, "the default is 1/255"));
+    }
+    if raw.max_points == Some(0) {
+        return Err(at.key("max_points").error("`max_points`: expected a whole number above 0, found 0", ""));
+    }
+    Ok(RenderSettings {
+        technique: check_technique(at, raw.technique.as_deref().unwrap_or("auto"))?,
+        antialias: at.whole("antialias", raw.antialias.unwrap_or(2), 1..=8)?,
+        tolerance,
+        exposure: at.number("exposure", raw.exposure.unwrap_or(0.0), -60.0..=60.0)?,
+        layers: check_layers(&at.key("layers"), &raw.layers)?,
+        seed: raw.seed.unwrap_or(0),
+        max_points: raw.max_points,
+        points: check_points(&at.key("points"), &raw.points)?,
+    })
+}
+
+fn check_technique(at: &At<'_>, name: &str) -> Result<Technique, Error> {
+    match name {
+        "auto" => Ok(Technique::Auto),
+        "points" => Ok(Technique::Points),
+        _ => {
+            let message = if LATER_TECHNIQUES.contains(&name) {
+                format!("`technique`: this version does not have \"{name}\"")
+            } else {
+                format!("`technique`: expected \"auto\" or \"points\", found \"{name}\"")
+            };
+            Err(at.key("technique").error(message, "use \"auto\" or \"points\""))
+        }
+    }
+}
+
+fn check_layers(at: &At<'_>, names: &[String]) -> Result<LayerChoice, Error> {
+    let mut choice = LayerChoice::default();
+    for (i, name) in names.iter().enumerate() {
+        if !choice.add(name) {
+            return Err(at.index(i).error(format!("there is no layer `{name}`"), suggest(name, &LAYER_NAMES)));
+        }
+    }
+    Ok(choice)
+}
+
+fn check_points(at: &At<'_>, raw: &RawPoints) -> Result<PointsSettings, Error> {
+    let slice_thickness = match raw.slice_thickness {
+        None | Some(Auto::Auto) => None,
+        Some(Auto::Number(x)) => Some(at.length("slice_thickness", x)?),
+    };
+    if raw.first_slices == Some(0) {
+        return Err(at.key("first_slices").error("`first_slices`: expected a whole number above 0, found 0", ""));
+    }
+    let cutoff = raw.transmittance_cutoff.unwrap_or(1.0 / 1024.0);
+    if !(0.0..1.0).contains(&cutoff) {
+        let message = format!("`transmittance_cutoff`: expected a number from 0 to below 1, found {cutoff}");
+        return Err(at.key("transmittance_cutoff").error(message, "0 composites everything"));
+    }
+    Ok(PointsSettings {
+        slice_thickness,
+        exact: raw.exact,
+        direction: match raw.direction {
+            RawDirection::FrontToBack => Direction::FrontToBack,
+            RawDirection::BackToFront => Direction::BackToFront,
+        },
+        first_slices: raw.first_slices,
+        transmittance_cutoff: cutoff,
+        resampling_filter: raw.resampling_filter.unwrap_or(true),
+        shadow: check_shadow(&at.key("shadow"), &raw.shadow)?,
+    })
+}
+
+fn check_shadow(at: &At<'_>, raw: &RawShadow) -> Result<ShadowSettings, Error> {
+    let cells = match raw.cells {
+        None | Some(Auto::Auto) => None,
+        Some(Auto::Number(n)) if n.fract() == 0.0 && (1.0..=16384.0).contains(&n) => Some(n as u32),
+        Some(Auto::Number(n)) => {
+            let message = format!("`cells`: expected a whole number from 1 to 16384 or \"auto\", found {n}");
+            return Err(at.key("cells").error(message, ""));
+        }
+    };
+    Ok(ShadowSettings {
+        mapping: match raw.mapping {
+            RawMapping::Auto => ShadowMapping::Auto,
+            RawMapping::Octahedral => ShadowMapping::Octahedral,
+            RawMapping::Polar => ShadowMapping::Polar,
+        },
+        cells,
+        absorbance_cut: raw.absorbance_cut.map(|a| at.number("absorbance_cut", a, SMALLEST..=LARGEST)).transpose()?,
+    })
+}

@@ -1,0 +1,96 @@
+//! From a file, or its bytes, to a checked scene.
+
+use super::overrides::{self, Override};
+use super::raw::RawScene;
+use super::tree::{Document, error_at};
+use super::{Scene, check, de, read_json, read_toml};
+use crate::Error;
+use sha2::{Digest, Sha256};
+use std::io::Read;
+use std::path::Path;
+
+/// Largest scene file, bytes.
+pub const MAX_SCENE_BYTES: u64 = 16 << 20;
+
+/// Most levels of lists and tables inside each other.
+pub const MAX_SCENE_DEPTH: usize = 64;
+
+/// How a scene is loaded.
+#[derive(Debug, Clone, Default)]
+pub struct LoadOptions {
+    /// Allow data outside the scene's root folder: the folder above the scene's folder (or the scene's folder itself
+    /// where that would be the root of the file system).
+    pub allow_path: bool,
+    /// Changes from the command line, applied in order before anything is checked.
+    pub overrides: Vec<Override>,
+}
+
+/// Reads and checks a scene file; JSON if its name ends in `.json`, else TOML. Data files are not opened.
+///
+/// # Errors
+/// [`Error::Io`], [`Error::Limit`] for a file over [`MAX_SCENE_BYTES`], [`Error::Scene`] with line and column,
+/// [`Error::Usage`] when an override is at fault.
+pub fn load(file: &Path, options: &LoadOptions) -> Result<Scene, Error> {
+    parse(file, &read(file)?, options)
+}
+
+fn read(file: &Path) -> Result<Vec<u8>, Error> {
+    let fail = |e| Error::io(file, "cannot read the scene", e);
+    let meta = std::fs::metadata(file).map_err(fail)?;
+    if !meta.is_file() {
+        // A pipe or a device could block or never end.
+        return Err(fail(std::io::Error::other("not a regular file")));
+    }
+    let mut bytes = Vec::new();
+    let handle = std::fs::File::open(file).map_err(fail)?;
+    handle.take(MAX_SCENE_BYTES + 1).read_to_end(&mut bytes).map_err(fail)?;
+    Ok(bytes)
+}
+
+/// Checks the bytes of a scene file; `file` gives the format and the folder that paths are relative to.
+///
+/// # Errors
+/// As [`load`], without those of reading.
+pub fn parse(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Scene, Error> {
+    if bytes.len() as u64 > MAX_SCENE_BYTES {
+        return Err(Error::Limit {
+            what: format!("the scene file {}", crate::error::printable(file)),
+            needed: bytes.len() as u64,
+            limit: MAX_SCENE_BYTES,
+            unit: "bytes",
+            hint: "put data into files that the scene names".into(),
+        });
+    }
+    let text = decode(file, bytes)?;
+    let is_json = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    let root = if is_json { read_json::read_json(file, text)? } else { read_toml::read_toml(file, text)? };
+    let mut document = Document { file, text, flags: Vec::new(), root };
+    overrides::apply(&mut document, &options.overrides)?;
+    let raw: RawScene = de::from_document(&document)?;
+    check::scene(&document, raw, options.allow_path, hash(bytes, &options.overrides))
+}
+
+fn decode<'a>(file: &Path, bytes: &'a [u8]) -> Result<&'a str, Error> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    std::str::from_utf8(bytes).map_err(|e| {
+        let valid = std::str::from_utf8(&bytes[..e.valid_up_to()]).unwrap_or("");
+        let found = bytes.get(e.valid_up_to()).copied().unwrap_or(0);
+        error_at(file, valid, valid.len(), format!("expected UTF-8, found the byte 0x{found:02x}"), "")
+    })
+}
+
+fn hash(bytes: &[u8], overrides: &[Override]) -> String {
+    let mut hasher = Sha256::new();
+    hasher.update(bytes);
+    for change in overrides {
+        hasher.update(b"\n");
+        hasher.update(change.flag().as_bytes());
+    }
+    hasher.finalize().iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// The JSON Schema of scene files, as pretty-printed JSON.
+pub fn schema() -> String {
+    let schema = schemars::schema_for!(RawScene);
+    serde_json::to_string_pretty(&schema).expect("invariant: a schema is JSON")
+}

@@ -1,0 +1,156 @@
+//! A value tree in which everything knows its place, the same for TOML, JSON and overrides.
+
+use crate::Error;
+use std::path::Path;
+
+/// Where a value was written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Place {
+    /// Byte offset in the scene file.
+    Byte(usize),
+    /// Index into [`Document::flags`].
+    Flag(usize),
+}
+
+/// A value and its place.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Node {
+    pub(super) place: Place,
+    pub(super) value: Value,
+}
+
+/// What a scene file can say.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Value {
+    Null,
+    Bool(bool),
+    Int(i64),
+    Float(f64),
+    Text(String),
+    List(Vec<Node>),
+    Table(Vec<Entry>),
+}
+
+/// A key with its own place, and its value.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Entry {
+    pub(super) key: String,
+    pub(super) place: Place,
+    pub(super) node: Node,
+}
+
+/// One step of a path into the tree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Step<'a> {
+    Key(&'a str),
+    Index(usize),
+}
+
+/// A scene file's text as a tree.
+#[derive(Debug)]
+pub(super) struct Document<'a> {
+    pub(super) file: &'a Path,
+    pub(super) text: &'a str,
+    /// Overrides as they were written on the command line.
+    pub(super) flags: Vec<String>,
+    pub(super) root: Node,
+}
+
+impl Value {
+    /// What it is, for messages.
+    pub(super) fn describe(&self) -> String {
+        match self {
+            Self::Null => "null".into(),
+            Self::Bool(b) => b.to_string(),
+            Self::Int(i) => format!("the number {i}"),
+            Self::Float(x) => format!("the number {x}"),
+            Self::Text(t) => format!("the text \"{}\"", shorten(t)),
+            Self::List(items) if items.len() == 1 => "a list of 1 value".into(),
+            Self::List(items) => format!("a list of {} values", items.len()),
+            Self::Table(_) => "a table".into(),
+        }
+    }
+}
+
+/// The first 60 characters of a text.
+pub(super) fn shorten(text: &str) -> String {
+    match text.char_indices().nth(60) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
+    }
+}
+
+/// Line and column of a byte, both from 1; the column counts characters.
+pub(super) fn line_and_column(text: &str, byte: usize) -> (usize, usize) {
+    let byte = (0..=byte.min(text.len())).rev().find(|b| text.is_char_boundary(*b)).unwrap_or(0);
+    let before = &text[..byte];
+    let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+    (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
+}
+
+/// A scene error at a byte of a text.
+pub(super) fn error_at(
+    file: &Path,
+    text: &str,
+    byte: usize,
+    message: impl Into<String>,
+    hint: impl Into<String>,
+) -> Error {
+    let (line, column) = line_and_column(text, byte);
+    let message = crate::error::escape_controls(&message.into()).into_owned();
+    let hint = crate::error::escape_controls(&hint.into()).into_owned();
+    Error::Scene { file: file.to_owned(), line, column, message, hint }
+}
+
+impl Document<'_> {
+    /// An error at a place: of the scene file, or of the command line when an override is at fault.
+    pub(super) fn error(&self, place: Place, message: impl Into<String>, hint: impl Into<String>) -> Error {
+        match place {
+            Place::Byte(byte) => error_at(self.file, self.text, byte, message, hint),
+            Place::Flag(index) => {
+                let message = format!("{}: {}", self.flags[index], message.into());
+                let escape = |text: &str| crate::error::escape_controls(text).into_owned();
+                Error::usage(escape(&message), escape(&hint.into()))
+            }
+        }
+    }
+
+    /// A place in words, for messages that name a second place.
+    pub(super) fn name_place(&self, place: Place) -> String {
+        match place {
+            Place::Byte(byte) => {
+                let (line, column) = line_and_column(self.text, byte);
+                format!("line {line}, column {column}")
+            }
+            Place::Flag(index) => self.flags[index].clone(),
+        }
+    }
+
+    /// The place of the deepest value on a path that exists.
+    pub(super) fn place_of(&self, path: &[Step<'_>]) -> Place {
+        let mut node = &self.root;
+        for step in path {
+            let next = match (step, &node.value) {
+                (Step::Key(key), Value::Table(entries)) => entries.iter().find(|e| e.key == *key).map(|e| &e.node),
+                (Step::Index(index), Value::List(items)) => items.get(*index),
+                _ => None,
+            };
+            let Some(next) = next else { break };
+            node = next;
+        }
+        node.place
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_count_characters() {
+        assert_eq!(line_and_column("a = 'ü' x\nb", 8), (1, 8));
+        assert_eq!(line_and_column("a\nbc", 3), (2, 2));
+        assert_eq!(line_and_column("a\nbc", 99), (2, 3));
+        assert_eq!(line_and_column("ü", 1), (1, 1));
+    }
+}

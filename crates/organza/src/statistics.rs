@@ -1,0 +1,74 @@
+//! Statistics of a loaded scene, from which the plan is made.
+
+use splat_core::{Cloud, FootprintStack, Light, Material, Object, Shading, SplatKind};
+
+/// What the planner knows of one light.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LightStatistics {
+    /// Whether its shadows are wanted.
+    pub wants_shadow: bool,
+    /// Whether it has no intensity.
+    pub is_dark: bool,
+}
+
+/// What the planner knows of a scene.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Statistics {
+    /// Translucent splats: media and surfaces.
+    pub translucent: u64,
+    /// Opaque splats.
+    pub opaque: u64,
+    /// Splats that can receive a shadow: lit, with a shadow coefficient above 0.
+    pub receivers: u64,
+    /// Splats that can cast a shadow.
+    pub casters: u64,
+    /// Opaque ones among them.
+    pub opaque_casters: u64,
+    /// An optical depth that no light ray through all translucent casters can exceed.
+    pub caster_optical_depth: f64,
+    /// Whether a material absorbs the three channels unequally.
+    pub colored_extinction: bool,
+    /// Whether normals were computed for volumes.
+    pub normals_needed: bool,
+    /// Lights, extended ones as their points.
+    pub lights: Vec<LightStatistics>,
+    /// Layers asked for beside beauty and alpha.
+    pub layers: Vec<String>,
+    /// Largest change of a displayed pixel that may be left out.
+    pub tolerance: f64,
+}
+
+impl Statistics {
+    /// Counts over the splats and their tables; lights, layers and tolerance are the caller's.
+    pub fn of_cloud(cloud: &Cloud, materials: &[Material], objects: &[Object], footprints: &FootprintStack) -> Self {
+        let norms: Vec<f64> = footprints.layers().iter().map(|f| f.norm()).collect();
+        let mut s = Self::default();
+        for i in 0..cloud.len() {
+            let object = &objects[cloud.object[i] as usize];
+            let material = &materials[cloud.material[i] as usize];
+            let opaque = cloud.kind[i] == SplatKind::Opaque;
+            s.opaque += u64::from(opaque);
+            s.translucent += u64::from(!opaque);
+            let coefficient = object.shadow_coefficient * cloud.shadow_coefficient_of(i);
+            s.receivers += u64::from(material.shading != Shading::Unlit && coefficient > 0.0);
+            let largest = material.extinction_rgb.into_iter().fold(0.0, f32::max);
+            if object.casts_shadow && cloud.cross_section[i] > 0.0 && (opaque || largest > 0.0) {
+                s.casters += 1;
+                s.opaque_casters += u64::from(opaque);
+                let radius = f64::from(cloud.radius[i]);
+                let peak = f64::from(cloud.cross_section[i]) * norms[cloud.footprint[i] as usize] / (radius * radius);
+                s.caster_optical_depth += peak * f64::from(largest);
+            }
+            let [r, g, b] = material.extinction_rgb;
+            s.colored_extinction |= !opaque && (r != g || g != b);
+        }
+        s
+    }
+}
+
+impl LightStatistics {
+    /// Statistics of one light.
+    pub fn of_light(light: &Light, wants_shadow: bool) -> Self {
+        Self { wants_shadow, is_dark: light.intensity.iter().all(|i| *i == 0.0) }
+    }
+}

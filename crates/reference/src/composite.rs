@@ -1,0 +1,172 @@
+//! Exact compositing: all fragments of a pixel, sorted, one by one.
+
+use crate::footprint::{Splat, norms};
+use rayon::prelude::*;
+use splat_core::{Camera, Cloud, FootprintStack, Material, SplatKind};
+
+/// What the fragments of a pixel are sorted by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Order {
+    /// View depth of the splat's centre, then id: what a sort of splats can reach at best.
+    Centre,
+    /// View depth of the fragment itself, then id: the truth per pixel.
+    Fragment,
+}
+
+/// Splats with one list of values each, seen by a camera.
+pub struct Input<'a> {
+    /// The splats.
+    pub cloud: &'a Cloud,
+    /// The viewer.
+    pub camera: &'a Camera,
+    /// Footprints by id.
+    pub footprints: &'a FootprintStack,
+    /// Materials by id.
+    pub materials: &'a [Material],
+    /// `channels` numbers a splat, by splat id.
+    pub values: &'a [f32],
+    /// Numbers a splat; the first three are a colour.
+    pub channels: usize,
+    /// Standard deviation of the resampling filter, pixels.
+    pub resampling_sigma_px: f32,
+    /// Sort key.
+    pub order: Order,
+}
+
+/// An image in f64, row by row from the top left.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExactImage {
+    /// Σ weight·value per pixel and channel, opaque surfaces included, background not.
+    pub values: Vec<Vec<f64>>,
+    /// Transmittance to the background per channel.
+    pub transmittance: Vec<[f64; 3]>,
+}
+
+/// ε-z of opaque surfaces and the solid share of a disc, part of the definition of an opaque splat.
+const EPSILON_Z: f64 = 0.5;
+const CORE: f64 = 0.45 * 0.45;
+
+/// Composites all splats of the input exactly, in f64.
+pub fn composite(input: &Input<'_>) -> ExactImage {
+    let [width, height] = input.camera.size.map(|s| s as usize);
+    let norms = norms(input.footprints);
+    let splats: Vec<Option<Splat>> =
+        (0..input.cloud.len()).into_par_iter().map(|i| Splat::new(input, &norms, i)).collect();
+    let mut by_row: Vec<Vec<u32>> = vec![Vec::new(); height];
+    for (i, splat) in splats.iter().enumerate() {
+        if let Some(splat) = splat {
+            splat.range(1, height).for_each(|y| by_row[y].push(i as u32));
+        }
+    }
+    let pixels: Vec<Vec<Pixel>> = by_row
+        .par_iter()
+        .enumerate()
+        .map(|(y, ids)| {
+            let mut lists: Vec<Vec<u32>> = vec![Vec::new(); width];
+            for &i in ids {
+                let splat = splats[i as usize].as_ref().expect("invariant: listed splats exist");
+                splat.range(0, width).for_each(|x| lists[x].push(i));
+            }
+            lists.iter().enumerate().map(|(x, ids)| pixel(input, &splats, ids, x, y)).collect()
+        })
+        .collect();
+    let mut image = ExactImage { values: Vec::new(), transmittance: Vec::new() };
+    for p in pixels.into_iter().flatten() {
+        image.values.push(p.values);
+        image.transmittance.push(p.transmittance);
+    }
+    image
+}
+
+struct Pixel {
+    values: Vec<f64>,
+    transmittance: [f64; 3],
+}
+
+/// A translucent fragment to be sorted.
+struct Entry {
+    key: f64,
+    id: u32,
+    optical_depth: f64,
+}
+
+fn pixel(input: &Input<'_>, splats: &[Option<Splat>], ids: &[u32], x: usize, y: usize) -> Pixel {
+    let at = |i: u32| {
+        let splat = splats[i as usize].as_ref().expect("invariant: listed splats exist");
+        splat.fragment(input, x, y).map(|f| (splat, f))
+    };
+    let solid = opaque(input, ids, &at);
+    let surface_depth = solid.as_ref().map_or(f64::INFINITY, |s| s.0);
+    let mut entries: Vec<Entry> = Vec::new();
+    for &i in ids {
+        let Some((splat, f)) = at(i) else { continue };
+        let seen = match splat.kind {
+            SplatKind::Medium => share_in_front((surface_depth - f.depth) / splat.radius),
+            SplatKind::Surface => f64::from(f.depth < surface_depth),
+            SplatKind::Opaque => 0.0,
+        };
+        if seen > 0.0 {
+            let key = if input.order == Order::Centre { splat.depth } else { f.depth };
+            entries.push(Entry { key, id: i, optical_depth: f.amount * seen });
+        }
+    }
+    entries.sort_by(|a, b| a.key.total_cmp(&b.key).then(a.id.cmp(&b.id)));
+    let mut out = Pixel { values: vec![0.0; input.channels], transmittance: [1.0; 3] };
+    for e in &entries {
+        let material = input.cloud.material[e.id as usize] as usize;
+        let keep = input.materials[material].extinction_rgb.map(|k| (-e.optical_depth * f64::from(k)).exp());
+        for (c, value) in out.values.iter_mut().enumerate() {
+            let p = band(c, input.channels);
+            *value += out.transmittance[p] * (1.0 - keep[p]) * f64::from(input.values[e.id as usize * input.channels + c]);
+        }
+        (0..3).for_each(|c| out.transmittance[c] *= keep[c]);
+    }
+    if let Some((_, color)) = solid {
+        for (c, value) in out.values.iter_mut().enumerate() {
+            *value += out.transmittance[band(c, input.channels)] * color[c];
+        }
+        out.transmittance = [0.0; 3];
+    }
+    out
+}
+
+/// The wavelength that attenuates channel `c`: channels come in threes, a lone last one goes with green.
+fn band(c: usize, channels: usize) -> usize {
+    if channels - c > channels % 3 { c % 3 } else { 1 }
+}
+
+/// Nearest opaque surface: depth and blended values.
+fn opaque<'a>(
+    input: &Input<'_>,
+    ids: &[u32],
+    at: &impl Fn(u32) -> Option<(&'a Splat, crate::footprint::Fragment)>,
+) -> Option<(f64, Vec<f64>)> {
+    let solid = |i: u32| at(i).filter(|(splat, _)| splat.kind == SplatKind::Opaque);
+    let nearest = ids
+        .iter()
+        .filter_map(|&i| solid(i))
+        .filter(|(_, f)| f.s <= CORE)
+        .map(|(_, f)| f.depth)
+        .fold(f64::INFINITY, f64::min);
+    if nearest == f64::INFINITY {
+        return None;
+    }
+    let (mut weight, mut depth, mut values) = (0.0, 0.0, vec![0.0; input.channels]);
+    for &i in ids {
+        let Some((splat, f)) = solid(i) else { continue };
+        if f.depth <= nearest + EPSILON_Z * splat.radius {
+            weight += f.amount;
+            depth += f.amount * f.depth;
+            for (c, value) in values.iter_mut().enumerate() {
+                *value += f.amount * f64::from(input.values[i as usize * input.channels + c]);
+            }
+        }
+    }
+    (weight > 0.0).then(|| (depth / weight, values.iter().map(|v| v / weight).collect()))
+}
+
+/// Share of a medium kernel in front of a plane at t radii behind its centre: ∫ 35/32·(1 − u²)³ du from −1 to t.
+fn share_in_front(t: f64) -> f64 {
+    let t = t.clamp(-1.0, 1.0);
+    0.5 + 35.0 / 32.0 * (t - t.powi(3) + 0.6 * t.powi(5) - t.powi(7) / 7.0)
+}

@@ -1,0 +1,172 @@
+//! The definition of a splat's image in f64, from the geometry of one ray and one splat.
+//!
+//! Medium: τ = K·n/R'²·w(ρ²/R'²), ρ the distance of the centre from the ray, R'² = R² + (filter in world units)².
+//! Disc: the projection of the tangent disc by its Jacobian at the centre, widened by the resampling filter.
+//! w(s) = e^(−qs) − e^(−q)(1 + x + x²/2), x = q(1 − s), q = cutoff²/2.
+
+use crate::Input;
+use glam::{DMat2, DVec2, DVec3};
+use splat_core::optics::SurfaceOpacity;
+use splat_core::{FootprintStack, SplatKind};
+use std::f64::consts::PI;
+
+/// One splat seen by the camera, in f64.
+pub(crate) struct Splat {
+    pub(crate) kind: SplatKind,
+    pub(crate) depth: f64,
+    pub(crate) radius: f64,
+    pub(crate) material: usize,
+    center: DVec3,
+    center_px: DVec2,
+    cutoff_sq_half: f64,
+    /// K·n/R'², or area·n/R² for an opaque disc.
+    peak: f64,
+    shape: Shape,
+    /// Half the pixel extent to look at.
+    pub(crate) reach_px: DVec2,
+}
+
+enum Shape {
+    Ball { radius_sq: f64 },
+    Disc { metric: DMat2, depth_slope: DVec2 },
+}
+
+/// One splat at one pixel.
+pub(crate) struct Fragment {
+    /// s in [0, 1).
+    pub(crate) s: f64,
+    /// Optical depth, or weight of an opaque disc.
+    pub(crate) amount: f64,
+    pub(crate) depth: f64,
+}
+
+impl Splat {
+    /// Splat `i` of the input, or `None` when the camera cannot see it.
+    pub(crate) fn new(input: &Input<'_>, norms: &[f64], i: usize) -> Option<Self> {
+        let s = input.cloud.get(i);
+        let world = input.cloud.origin + s.position.as_dvec3();
+        let center = input.camera.view_from_world(world);
+        let radius = f64::from(s.radius);
+        let parallel = input.camera.is_orthographic();
+        if !parallel && center.z <= radius {
+            return None;
+        }
+        let px_per_world = input.camera.focal_px() / if parallel { 1.0 } else { center.z };
+        let size = input.camera.size.map(f64::from);
+        let center_px = DVec2::new(0.5 * size[0] + center.x * px_per_world, 0.5 * size[1] - center.y * px_per_world);
+        let cutoff = f64::from(input.footprints.layers()[s.footprint as usize].cutoff);
+        let q = 0.5 * cutoff * cutoff;
+        let n = norms[s.footprint as usize];
+        let filter_px = cutoff * f64::from(input.resampling_sigma_px);
+        let amount = f64::from(s.cross_section);
+        let mut out = Self {
+            kind: s.kind,
+            depth: center.z,
+            radius,
+            material: s.material as usize,
+            center,
+            center_px,
+            cutoff_sq_half: q,
+            peak: 0.0,
+            shape: Shape::Ball { radius_sq: 0.0 },
+            reach_px: DVec2::ZERO,
+        };
+        if s.kind == SplatKind::Medium {
+            let radius_sq = radius * radius + (filter_px / px_per_world).powi(2);
+            out.peak = amount * n / radius_sq;
+            out.shape = Shape::Ball { radius_sq };
+            // A ball's image is stretched away from the image centre by up to |d|².
+            let d = if parallel { 1.0 } else { (center / center.z).length_squared() };
+            out.reach_px = DVec2::splat(radius_sq.sqrt() * px_per_world * d * (1.0 + 2.0 * radius / center.z.abs()) + 1.0);
+        } else {
+            out.disc(input, &s, px_per_world, filter_px, amount * n);
+        }
+        Some(out)
+    }
+
+    fn disc(&mut self, input: &Input<'_>, s: &splat_core::Splat, px_per_world: f64, filter_px: f64, amount: f64) {
+        let axes = input.camera.axes;
+        let to_view = |v: DVec3| DVec3::new(axes[0].dot(v), axes[1].dot(v), axes[2].dot(v));
+        let normal = to_view(s.normal.as_dvec3());
+        let u = if s.tangent == splat_core::glam::Vec3::ZERO {
+            normal.any_orthonormal_vector() * self.radius
+        } else {
+            to_view(s.tangent.as_dvec3())
+        };
+        let v = normal.cross(u).normalize_or_zero() * self.radius;
+        let parallel = input.camera.is_orthographic();
+        let slope = if parallel { DVec3::ZERO } else { self.center / self.center.z };
+        let project =
+            |a: DVec3| DVec2::new((a.x - slope.x * a.z) * px_per_world, -(a.y - slope.y * a.z) * px_per_world);
+        let jacobian = DMat2::from_cols(project(u), project(v));
+        let covariance = jacobian * jacobian.transpose() + DMat2::from_diagonal(DVec2::splat(filter_px * filter_px));
+        if covariance.determinant() <= 0.0 {
+            return;
+        }
+        let spread = jacobian.determinant().abs() / covariance.determinant().sqrt();
+        let view_dir = if parallel { DVec3::Z } else { self.center.normalize() };
+        let grazing = match input.materials[self.material].surface_opacity {
+            SurfaceOpacity::ThinSlab if self.kind == SplatKind::Surface => 1.0 / normal.dot(view_dir).abs().max(1e-3),
+            _ => 1.0,
+        };
+        self.peak = amount / (u.length() * v.length()) * spread * grazing;
+        let along = if parallel { normal.z } else { normal.dot(self.center) / self.center.z };
+        let depth_slope = if along.abs() < 1e-4 {
+            DVec2::ZERO
+        } else {
+            DVec2::new(-normal.x, normal.y) / (along * px_per_world)
+        };
+        self.reach_px = DVec2::new(covariance.x_axis.x, covariance.y_axis.y).map(|c| c.sqrt() + 1.0);
+        self.shape = Shape::Disc { metric: covariance.inverse(), depth_slope };
+    }
+
+    /// Pixel range [low, high) to look at along one axis (0 = x, 1 = y) of `limit` pixels.
+    pub(crate) fn range(&self, axis: usize, limit: usize) -> std::ops::Range<usize> {
+        let clamp = |v: f64| v.clamp(0.0, limit as f64) as usize;
+        clamp(self.center_px[axis] - self.reach_px[axis])..clamp(self.center_px[axis] + self.reach_px[axis] + 1.0)
+    }
+
+    /// The fragment at pixel (x, y), if the footprint reaches its centre.
+    pub(crate) fn fragment(&self, input: &Input<'_>, x: usize, y: usize) -> Option<Fragment> {
+        let at = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+        let (s, offset) = match &self.shape {
+            Shape::Ball { radius_sq } => {
+                let (origin, d) = input.camera.view_ray(at.x, at.y);
+                let rho_sq = (self.center - origin).cross(d).length_squared() / d.length_squared();
+                (rho_sq / radius_sq, 0.0)
+            }
+            Shape::Disc { metric, depth_slope } => {
+                let d = at - self.center_px;
+                (d.dot(*metric * d), depth_slope.dot(d).clamp(-self.radius, self.radius))
+            }
+        };
+        (s < 1.0 && self.peak > 0.0).then(|| Fragment {
+            s,
+            amount: self.peak * profile(s, self.cutoff_sq_half),
+            depth: self.depth + offset,
+        })
+    }
+}
+
+fn profile(s: f64, q: f64) -> f64 {
+    let x = q * (1.0 - s);
+    (-q * s).exp() - (-q).exp() * (1.0 + x + 0.5 * x * x)
+}
+
+/// n = 1/∫w dA of each footprint for R = 1, by numerical integration: shares no closed form with the fast path.
+pub(crate) fn norms(footprints: &FootprintStack) -> Vec<f64> {
+    let sharpness = |cutoff: f32| 0.5 * f64::from(cutoff) * f64::from(cutoff);
+    footprints.layers().iter().map(|l| 1.0 / (PI * simpson(|s| profile(s, sharpness(l.cutoff))))).collect()
+}
+
+/// Simpson's rule over [0, 1].
+fn simpson(f: impl Fn(f64) -> f64) -> f64 {
+    const N: usize = 1024;
+    let h = 1.0 / N as f64;
+    (0..N)
+        .map(|i| {
+            let a = i as f64 * h;
+            (f(a) + 4.0 * f(a + 0.5 * h) + f(a + h)) * h / 6.0
+        })
+        .sum()
+}

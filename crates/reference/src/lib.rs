@@ -1,0 +1,26 @@
+//! Slow f64 truth that the fast stages are judged by.
+//!
+//! [`composite`] evaluates every splat's footprint at every pixel centre in f64, sorts the fragments of each pixel
+//! exactly and composites them one by one. It reads `splat-core`'s nouns as data and calls none of its optics,
+//! footprints or rasterization: what it shares with the fast path is the definition of a splat, not code.
+//!
+//! ```
+//! use reference::{composite, Input, Order};
+//! use splat_core::{Camera, Cloud, FootprintStack, Material, Projection, Splat, glam::DVec3};
+//! let mut cloud = Cloud::new(DVec3::ZERO);
+//! cloud.push(&Splat { radius: 0.5, cross_section: 0.1, ..Splat::default() });
+//! let camera = Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y,
+//!     Projection::Orthographic { height: 2.0 }, [9, 9]).unwrap();
+//! let image = composite(&Input {
+//!     cloud: &cloud, camera: &camera, footprints: &FootprintStack::default(), materials: &[Material::default()],
+//!     values: &[1.0, 0.5, 0.25], channels: 3, resampling_sigma_px: 0.0, order: Order::Centre,
+//! });
+//! // The middle pixel is covered, the corner is not.
+//! assert!(image.transmittance[40][0] < 1.0 && image.transmittance[0][0] == 1.0);
+//! ```
+#![forbid(unsafe_code)]
+
+mod composite;
+mod footprint;
+
+pub use composite::{ExactImage, Input, Order, composite};

@@ -1,0 +1,163 @@
+//! The rasterizer against the exact compositor, and the twin orders against each other, on mixed random scenes.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use reference::{Input, Order, composite};
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::raster::{OpaqueImage, Params, fold, project, resolve_opaque};
+use splat_core::{Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Projection, Splat, SplatKind, rng};
+
+const SIZE: [u32; 2] = [75, 50];
+
+fn camera(projection: Projection) -> Camera {
+    Camera::look_at(DVec3::new(0.3, 0.2, 4.0), DVec3::ZERO, DVec3::Y, projection, SIZE).unwrap()
+}
+
+fn random(item: u64, sample: u64) -> f32 {
+    rng::unit_f32(42, 7, item, sample)
+}
+
+/// Media, translucent discs (some elliptical) and opaque discs, mixed in a box.
+fn mixed_cloud(n: u64) -> Cloud {
+    let mut cloud = Cloud::new(DVec3::new(1e-3, 0.0, 0.0));
+    for i in 0..n {
+        let u = |k| random(i, k);
+        let normal = Vec3::new(u(3) - 0.5, u(4) - 0.5, u(5) - 0.5).normalize();
+        let kind = match i % 20 {
+            0..10 => SplatKind::Medium,
+            10..19 => SplatKind::Surface,
+            _ => SplatKind::Opaque,
+        };
+        let radius = 0.05 + 0.25 * u(6);
+        cloud.push(&Splat {
+            position: Vec3::new(3.0 * u(0) - 1.5, 2.0 * u(1) - 1.0, 2.0 * u(2) - 1.0),
+            radius,
+            cross_section: 0.2 * u(7) * radius * radius,
+            color: [u(8), u(9), u(10)],
+            kind,
+            material: (i % 2) as u16,
+            footprint: (i % 3) as u8,
+            normal: if kind == SplatKind::Medium { Vec3::ZERO } else { normal },
+            tangent: if i % 4 == 2 { normal.any_orthonormal_vector() * 0.5 * radius } else { Vec3::ZERO },
+            ..Splat::default()
+        });
+    }
+    cloud
+}
+
+struct Raster {
+    values: Vec<Vec<f32>>,
+    transmittance: Vec<Vec<f32>>,
+}
+
+fn rasterize(cloud: &Cloud, camera: &Camera, materials: &[Material], planes: usize, direction: Direction) -> Raster {
+    let view = camera.view_from_offset(cloud.origin);
+    let depth = |i: &u32| view.depth(cloud.position[*i as usize]);
+    let mut translucent: Vec<u32> =
+        (0..cloud.len() as u32).filter(|i| cloud.kind[*i as usize] != SplatKind::Opaque).collect();
+    translucent.sort_by(|a, b| depth(a).total_cmp(&depth(b)).then(a.cmp(b)));
+    if direction == Direction::BackToFront {
+        translucent.reverse();
+    }
+    let opaque: Vec<u32> = (0..cloud.len() as u32).filter(|i| cloud.kind[*i as usize] == SplatKind::Opaque).collect();
+    let (footprints, params) = (FootprintStack::default(), Params { transmittance_cutoff: 0.0, ..Params::default() });
+    let projected = |ids: &[u32]| project(cloud, ids, camera, &footprints, materials, &params);
+    let values = |ids: &[u32]| ids.iter().flat_map(|i| cloud.color[*i as usize]).collect::<Vec<f32>>();
+    let (solid, _) = resolve_opaque(&projected(&opaque), &values(&opaque), 3, false);
+    let mut acc = Accumulator::new(SIZE, planes, 3, false, false);
+    fold(&projected(&translucent), &values(&translucent), materials, &solid, direction, &params, &mut acc);
+    finish(acc, &solid)
+}
+
+fn finish(mut acc: Accumulator, solid: &OpaqueImage) -> Raster {
+    let mut transmittance: Vec<Vec<f32>> =
+        acc.optical_depth.iter().map(|p| p.iter().map(|a| (-a).exp()).collect()).collect();
+    for k in 0..solid.depth.len() {
+        if solid.depth[k].is_finite() {
+            for c in 0..3 {
+                let p = if transmittance.len() == 3 { c } else { 0 };
+                acc.channels[c][k] += transmittance[p][k] * solid.channels[c][k];
+            }
+            transmittance.iter_mut().for_each(|p| p[k] = 0.0);
+        }
+    }
+    Raster { values: acc.channels, transmittance }
+}
+
+fn largest_difference(raster: &Raster, cloud: &Cloud, camera: &Camera, materials: &[Material]) -> f64 {
+    let values: Vec<f32> = cloud.color.iter().flatten().copied().collect();
+    let exact = composite(&Input {
+        cloud,
+        camera,
+        footprints: &FootprintStack::default(),
+        materials,
+        values: &values,
+        channels: 3,
+        resampling_sigma_px: Params::default().resampling_sigma_px,
+        order: Order::Centre,
+    });
+    let mut largest: f64 = 0.0;
+    for k in 0..exact.values.len() {
+        for c in 0..3 {
+            let p = if raster.transmittance.len() == 3 { c } else { 0 };
+            largest = largest.max((f64::from(raster.values[c][k]) - exact.values[k][c]).abs());
+            largest = largest.max((f64::from(raster.transmittance[p][k]) - exact.transmittance[k][c]).abs());
+        }
+    }
+    largest
+}
+
+fn materials(rgb: bool) -> [Material; 2] {
+    let tinted = Material { extinction_rgb: [1.0, 0.5, 0.25], ..Material::default() };
+    [Material::default(), if rgb { tinted } else { Material::default() }]
+}
+
+#[test]
+fn the_exact_compositor_agrees_with_the_rasterizer() {
+    let cloud = mixed_cloud(3000);
+    for projection in [Projection::Perspective { fov_y: 0.7 }, Projection::Orthographic { height: 2.5 }] {
+        let camera = camera(projection);
+        for (rgb, planes) in [(false, 1), (true, 3)] {
+            let materials = materials(rgb);
+            let raster = rasterize(&cloud, &camera, &materials, planes, Direction::FrontToBack);
+            let difference = largest_difference(&raster, &cloud, &camera, &materials);
+            assert!(difference < 2e-5, "{projection:?} rgb {rgb}: {difference:e}");
+        }
+    }
+}
+
+#[test]
+fn a_wrong_order_is_seen_by_the_comparison() {
+    let cloud = mixed_cloud(3000);
+    let camera = camera(Projection::Perspective { fov_y: 0.7 });
+    let materials = materials(false);
+    let mut raster = rasterize(&cloud, &camera, &materials, 1, Direction::FrontToBack);
+    raster.values.swap(0, 1);
+    assert!(largest_difference(&raster, &cloud, &camera, &materials) > 1e-2);
+}
+
+#[test]
+fn back_to_front_is_the_twin_of_front_to_back() {
+    let cloud = mixed_cloud(3000);
+    let camera = camera(Projection::Perspective { fov_y: 0.7 });
+    for (rgb, planes) in [(false, 1), (true, 3)] {
+        let materials = materials(rgb);
+        let raster = rasterize(&cloud, &camera, &materials, planes, Direction::BackToFront);
+        let difference = largest_difference(&raster, &cloud, &camera, &materials);
+        assert!(difference < 2e-5, "rgb {rgb}: {difference:e}");
+    }
+}
+
+#[test]
+fn x1_any_number_of_threads_gives_the_same_bits() {
+    let cloud = mixed_cloud(40_000);
+    let camera = camera(Projection::Perspective { fov_y: 0.7 });
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let raster = pool.install(|| rasterize(&cloud, &camera, &materials(true), 3, Direction::FrontToBack));
+        raster.values.concat().iter().map(|v| v.to_bits()).collect::<Vec<u32>>()
+    };
+    let one = run(1);
+    for threads in [2, 3, 7] {
+        assert!(run(threads) == one, "{threads} threads");
+    }
+}

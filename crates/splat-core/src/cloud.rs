@@ -1,0 +1,277 @@
+//! Clouds of splats: an f64 origin and f32 columns with the rendering-oriented attributes of Gunjee 2007, section 3.
+
+use crate::{Aabb, Error};
+use glam::{DVec3, Vec3};
+
+/// What a splat is optically.
+#[repr(u8)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub enum SplatKind {
+    /// A piece of a participating medium: an isotropic kernel around the position.
+    #[default]
+    Medium = 0,
+    /// A piece of a translucent surface: a disc in the tangent plane.
+    Surface = 1,
+    /// A piece of an opaque surface: a disc that ends every ray.
+    Opaque = 2,
+}
+
+/// One splat with all its attributes, in row form; [`Cloud`] keeps them as columns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Splat {
+    /// Centre, world units, relative to the cloud's origin.
+    pub position: Vec3,
+    /// Cutoff radius of the kernel, world units, > 0: the kernel is zero from there on. For a disc with a
+    /// `tangent` it is the second principal radius.
+    pub radius: f32,
+    /// Extinction cross-section K, an area in world units², ≥ 0: the optical depth at u is K·w(u) with ∫w dA = 1.
+    /// For a surface it is the optical depth of one crossing times the area that the splat stands for; an opaque
+    /// splat stores that area alone.
+    pub cross_section: f32,
+    /// Linear Rec.709 colour, each channel ≥ 0: surface albedo, or the tint of a medium's scattering.
+    pub color: [f32; 3],
+    /// Medium, translucent surface or opaque surface.
+    pub kind: SplatKind,
+    /// Index into the [`crate::MaterialTable`].
+    pub material: u16,
+    /// Index into the [`crate::FootprintStack`] (the paper's texture id).
+    pub footprint: u8,
+    /// Index into the [`crate::ObjectTable`].
+    pub object: u32,
+    /// Unit normal, or zero for none.
+    pub normal: Vec3,
+    /// Semi-axis of the tangent disc along the first principal direction, or zero for a circular disc.
+    pub tangent: Vec3,
+    /// Share of the shadow that this splat receives, in \[0, 1\]; the paper's shadow coefficient.
+    pub shadow_coefficient: f32,
+    /// The physical value that the splat was made from (density, temperature, intensity …), any finite number.
+    pub value: f32,
+}
+
+impl Default for Splat {
+    fn default() -> Self {
+        Self {
+            position: Vec3::ZERO,
+            radius: 1.0,
+            cross_section: 1.0,
+            color: [1.0; 3],
+            kind: SplatKind::Medium,
+            material: 0,
+            footprint: 0,
+            object: 0,
+            normal: Vec3::ZERO,
+            tangent: Vec3::ZERO,
+            shadow_coefficient: 1.0,
+            value: 0.0,
+        }
+    }
+}
+
+macro_rules! columns {
+    (required: $($(#[$rm:meta])* $r:ident: $rt:ty,)* ; optional: $($(#[$om:meta])* $o:ident: $ot:ty = $od:expr,)*) => {
+        /// Splats as columns. The last four columns may be empty, which means their default for every splat.
+        ///
+        /// The id of a splat is its rank; [`Cloud::canonicalize`] makes that independent of the order of the input.
+        ///
+        /// ```
+        /// use splat_core::{Cloud, Splat, glam::{DVec3, Vec3}};
+        /// let mut cloud = Cloud::new(DVec3::new(6.4e5, 0.0, 8.5e5));
+        /// cloud.push(&Splat { position: Vec3::new(0.5, 0.0, 0.0), radius: 0.1, ..Splat::default() });
+        /// assert_eq!(cloud.len(), 1);
+        /// cloud.validate().unwrap();
+        /// ```
+        #[derive(Debug, Clone, Default, PartialEq)]
+        pub struct Cloud {
+            /// World position that every offset is relative to.
+            pub origin: DVec3,
+            $($(#[$rm])* pub $r: Vec<$rt>,)*
+            $($(#[$om])* pub $o: Vec<$ot>,)*
+        }
+
+        impl Cloud {
+            /// An empty cloud around `origin`.
+            pub fn new(origin: DVec3) -> Self {
+                Self { origin, ..Self::default() }
+            }
+
+            /// Room for `n` more splats in the required columns.
+            pub fn reserve(&mut self, n: usize) {
+                $(self.$r.reserve(n);)*
+            }
+
+            /// Appends one splat; an optional column comes into being with the first value that is not its default.
+            pub fn push(&mut self, splat: &Splat) {
+                let n = self.len();
+                $(self.$r.push(splat.$r);)*
+                $(if !self.$o.is_empty() || splat.$o != $od {
+                    self.$o.resize(n, $od);
+                    self.$o.push(splat.$o);
+                })*
+            }
+
+            /// Splat `i` in row form.
+            ///
+            /// # Panics
+            /// If `i` is out of range.
+            pub fn get(&self, i: usize) -> Splat {
+                Splat { $($r: self.$r[i],)* $($o: self.$o.get(i).copied().unwrap_or($od),)* }
+            }
+
+            /// Appends another cloud, rebased to this cloud's origin in f64.
+            pub fn append(&mut self, other: &Cloud) {
+                let n = self.len();
+                let shift = other.origin - self.origin;
+                $(self.$r.extend_from_slice(&other.$r);)*
+                if shift != DVec3::ZERO {
+                    for p in &mut self.position[n..] {
+                        *p = (p.as_dvec3() + shift).as_vec3();
+                    }
+                }
+                let total = self.len();
+                $(if !self.$o.is_empty() || !other.$o.is_empty() {
+                    self.$o.resize(n, $od);
+                    self.$o.extend_from_slice(&other.$o);
+                    self.$o.resize(total, $od);
+                })*
+            }
+
+            /// The splats `ids`, in that order.
+            pub fn gather(&self, ids: &[u32]) -> Cloud {
+                fn pick<T: Copy + Send + Sync>(column: &[T], ids: &[u32]) -> Vec<T> {
+                    use rayon::prelude::*;
+                    if column.is_empty() { return Vec::new(); }
+                    ids.par_iter().with_min_len(8192).map(|&i| column[i as usize]).collect()
+                }
+                Cloud { origin: self.origin, $($r: pick(&self.$r, ids),)* $($o: pick(&self.$o, ids),)* }
+            }
+
+            /// Bytes held by the columns.
+            pub fn bytes(&self) -> u64 {
+                let mut bytes = 0;
+                $(bytes += std::mem::size_of_val(self.$r.as_slice());)*
+                $(bytes += std::mem::size_of_val(self.$o.as_slice());)*
+                bytes as u64
+            }
+
+            fn check_lengths(&self) -> Result<(), Error> {
+                let expected = self.len();
+                $(if self.$r.len() != expected {
+                    return Err(Error::ColumnLength { attribute: stringify!($r), found: self.$r.len(), expected });
+                })*
+                $(if !self.$o.is_empty() && self.$o.len() != expected {
+                    return Err(Error::ColumnLength { attribute: stringify!($o), found: self.$o.len(), expected });
+                })*
+                Ok(())
+            }
+        }
+    };
+}
+
+columns! {
+    required:
+    /// Centres, see [`Splat::position`].
+    position: Vec3,
+    /// Cutoff radii, see [`Splat::radius`].
+    radius: f32,
+    /// Extinction cross-sections, see [`Splat::cross_section`].
+    cross_section: f32,
+    /// Colours, see [`Splat::color`].
+    color: [f32; 3],
+    /// Kinds, see [`Splat::kind`].
+    kind: SplatKind,
+    /// Material ids.
+    material: u16,
+    /// Footprint ids.
+    footprint: u8,
+    /// Object ids.
+    object: u32,
+    ;
+    optional:
+    /// Unit normals, zero for none; may be empty.
+    normal: Vec3 = Vec3::ZERO,
+    /// First semi-axes of elliptical tangent discs, zero for circular; may be empty.
+    tangent: Vec3 = Vec3::ZERO,
+    /// Shadow coefficients; may be empty, which means 1.
+    shadow_coefficient: f32 = 1.0,
+    /// Physical values; may be empty.
+    value: f32 = 0.0,
+}
+
+impl Cloud {
+    /// Number of splats.
+    pub fn len(&self) -> usize {
+        self.position.len()
+    }
+
+    /// True without splats.
+    pub fn is_empty(&self) -> bool {
+        self.position.is_empty()
+    }
+
+    /// Normal of splat `i`, zero for none.
+    pub fn normal_of(&self, i: usize) -> Vec3 {
+        self.normal.get(i).copied().unwrap_or(Vec3::ZERO)
+    }
+
+    /// First semi-axis of splat `i`'s disc, zero for circular.
+    pub fn tangent_of(&self, i: usize) -> Vec3 {
+        self.tangent.get(i).copied().unwrap_or(Vec3::ZERO)
+    }
+
+    /// Shadow coefficient of splat `i`.
+    pub fn shadow_coefficient_of(&self, i: usize) -> f32 {
+        self.shadow_coefficient.get(i).copied().unwrap_or(1.0)
+    }
+
+    /// Bounds of the centres, relative to the origin; empty bounds for an empty cloud.
+    pub fn bounds(&self) -> Aabb {
+        Aabb::of_points(&self.position)
+    }
+
+    /// Checks every promise that the stages rely on: equal column lengths, finite values, radii > 0, K ≥ 0, unit or
+    /// zero normals, coefficients in \[0, 1\].
+    ///
+    /// # Errors
+    /// [`Error::ColumnLength`], or [`Error::Invalid`] for the first splat that breaks a promise.
+    pub fn validate(&self) -> Result<(), Error> {
+        self.check_lengths()?;
+        let bad = |i, attribute, found: String, expected| {
+            Err(Error::Invalid { element: "splat", index: i, attribute, found, expected })
+        };
+        if !self.origin.is_finite() {
+            return Err(Error::invalid("cloud", 0, "origin", self.origin, "finite numbers"));
+        }
+        for i in 0..self.len() {
+            let s = self.get(i);
+            if !s.position.is_finite() {
+                return bad(i, "position", s.position.to_string(), "finite numbers");
+            }
+            if !(s.radius.is_finite() && s.radius > 0.0) {
+                return bad(i, "radius", s.radius.to_string(), "a finite number > 0");
+            }
+            if !(s.cross_section.is_finite() && s.cross_section >= 0.0) {
+                return bad(i, "cross_section", s.cross_section.to_string(), "a finite number ≥ 0");
+            }
+            if !s.color.iter().all(|c| c.is_finite() && *c >= 0.0) {
+                return bad(i, "color", format!("{:?}", s.color), "three finite numbers ≥ 0");
+            }
+            let length_sq = s.normal.length_squared();
+            if !(length_sq == 0.0 || (length_sq - 1.0).abs() < 1e-3) {
+                return bad(i, "normal", s.normal.to_string(), "a unit vector, or zero for none");
+            }
+            if s.kind != SplatKind::Medium && length_sq == 0.0 {
+                return bad(i, "normal", s.normal.to_string(), "a unit vector, as for every surface splat");
+            }
+            if !s.tangent.is_finite() {
+                return bad(i, "tangent", s.tangent.to_string(), "finite numbers");
+            }
+            if !(0.0..=1.0).contains(&s.shadow_coefficient) {
+                return bad(i, "shadow_coefficient", s.shadow_coefficient.to_string(), "a number in [0, 1]");
+            }
+            if !s.value.is_finite() {
+                return bad(i, "value", s.value.to_string(), "a finite number");
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,109 @@
+//! The accumulator that splats are folded into, and the named images that a render returns.
+
+use std::collections::BTreeMap;
+
+/// The additive effects, in the order of their sum: background + … = beauty.
+pub const ADDITIVE_LAYERS: [&str; 4] = ["background", "ambient", "emission", "direct"];
+
+/// Which images are kept. Beauty is always made.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct LayerSet {
+    /// Additive effects, each an image of its own.
+    pub effects: bool,
+    /// Transmittance of the shadow maps at what is seen, weighted by opacity.
+    pub shadow: bool,
+    /// Normal of what is seen, weighted by opacity, world space.
+    pub normal: bool,
+    /// The four depths: first, median, mean, sigma.
+    pub depth: bool,
+    /// Object id of the first splat that adds to a pixel; `u32::MAX` where none does.
+    pub object: bool,
+}
+
+/// Pixels of one layer, row by row from the top left.
+#[derive(Debug, Clone, PartialEq)]
+pub enum LayerData {
+    /// One number a pixel.
+    Scalar(Vec<f32>),
+    /// Linear Rec.709 radiance, or a vector.
+    Rgb(Vec<[f32; 3]>),
+    /// An id a pixel.
+    Id(Vec<u32>),
+}
+
+/// Everything that one render returns, by name: `beauty` and `alpha` always; `background`, `ambient`, `emission`,
+/// `direct`, `shadow`, `normal`, `depth.first`, `depth.median`, `depth.mean`, `depth.sigma`, `object` when asked for.
+///
+/// Depth is linear view depth and +∞ where it is undefined.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Layers {
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+    /// Images by name.
+    pub images: BTreeMap<&'static str, LayerData>,
+}
+
+impl Layers {
+    /// The pixels of an RGB layer.
+    pub fn rgb(&self, name: &str) -> Option<&[[f32; 3]]> {
+        match self.images.get(name)? {
+            LayerData::Rgb(pixels) => Some(pixels),
+            _ => None,
+        }
+    }
+
+    /// The pixels of a scalar layer.
+    pub fn scalar(&self, name: &str) -> Option<&[f32]> {
+        match self.images.get(name)? {
+            LayerData::Scalar(pixels) => Some(pixels),
+            _ => None,
+        }
+    }
+
+    /// Adds or replaces a layer.
+    pub fn insert(&mut self, name: &'static str, data: LayerData) {
+        self.images.insert(name, data);
+    }
+}
+
+/// What a technique folds into, per pixel: colours weighted by absorbed share, optical depth so far, depth moments.
+///
+/// Optical depth rather than transmittance is accumulated: T = e^−τ then comes from one sum, and the weights
+/// T_before − T_after telescope to 1 − T whatever the number of splats.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Accumulator {
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+    /// Optical depth so far: one plane when all absorb alike, else three.
+    pub optical_depth: Vec<Vec<f32>>,
+    /// Channel planes, each Σ weight·value, as many as the shading gives per splat.
+    pub channels: Vec<Vec<f32>>,
+    /// View depth where opacity passes 1/255, +∞ before; empty when not asked for.
+    pub depth_first: Vec<f32>,
+    /// View depth where transmittance passes 1/2, +∞ before; empty when not asked for.
+    pub depth_median: Vec<f32>,
+    /// Mean view depth of what was absorbed so far (Welford); empty when not asked for.
+    pub depth_mean: Vec<f32>,
+    /// Σ weight·(depth − mean)² (Welford); empty when not asked for.
+    pub depth_m2: Vec<f32>,
+    /// Object of the first contribution; empty when not asked for.
+    pub object: Vec<u32>,
+}
+
+impl Accumulator {
+    /// Nothing seen yet: zero colours, zero optical depth, undefined depths.
+    pub fn new(size: [u32; 2], optical_depth_planes: usize, channels: usize, depth: bool, object: bool) -> Self {
+        let n = size[0] as usize * size[1] as usize;
+        let plane = |on: bool, value: f32| if on { vec![value; n] } else { Vec::new() };
+        Self {
+            size,
+            optical_depth: vec![vec![0.0; n]; optical_depth_planes],
+            channels: vec![vec![0.0; n]; channels],
+            depth_first: plane(depth, f32::INFINITY),
+            depth_median: plane(depth, f32::INFINITY),
+            depth_mean: plane(depth, 0.0),
+            depth_m2: plane(depth, 0.0),
+            object: if object { vec![u32::MAX; n] } else { Vec::new() },
+        }
+    }
+}

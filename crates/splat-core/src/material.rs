@@ -1,0 +1,75 @@
+//! Lookup tables: materials and objects (Gunjee 2007, section 3: "for some attributes we define a separate table").
+
+/// How a splat turns light into radiance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Shading {
+    /// Diffuse and specular reflection at the normal; a splat without a normal falls back to `Phase`.
+    #[default]
+    Phong,
+    /// Single scattering by the phase function.
+    Phase,
+    /// The colour is shown as it is: radiance = colour.
+    Unlit,
+}
+
+/// Optical properties shared by many splats.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Material {
+    /// How light becomes radiance.
+    pub shading: Shading,
+    /// Share of the ambient radiance that is reflected, ≥ 0.
+    pub ambient: f32,
+    /// Diffuse reflectance factor, in \[0, 1\]; multiplied by the splat's colour.
+    pub diffuse: f32,
+    /// Specular reflectance, in \[0, 1\].
+    pub specular: f32,
+    /// Phong exponent, ≥ 0.
+    pub shininess: f32,
+    /// Share of the diffuse light that passes to the other side of a thin surface, in \[0, 1\].
+    pub transmission: f32,
+    /// Single-scattering albedo ω of a medium, in \[0, 1\]; multiplied by the splat's colour.
+    pub single_scattering_albedo: f32,
+    /// Asymmetry g of the phase function, in (−1, 1).
+    pub asymmetry: f32,
+    /// Emitted radiance per channel of a fully opaque column, W·m⁻²·sr⁻¹.
+    pub emission: [f32; 3],
+    /// Extinction per channel relative to the splat's cross-section, each ≥ 0; (1, 1, 1) absorbs all alike.
+    pub extinction_rgb: [f32; 3],
+    /// How the opacity of a translucent surface grows at grazing angles.
+    pub surface_opacity: crate::optics::SurfaceOpacity,
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Self {
+            shading: Shading::Phong,
+            ambient: 1.0,
+            diffuse: 1.0,
+            specular: 0.0,
+            shininess: 32.0,
+            transmission: 0.0,
+            single_scattering_albedo: 1.0,
+            asymmetry: 0.0,
+            emission: [0.0; 3],
+            extinction_rgb: [1.0; 3],
+            surface_opacity: crate::optics::SurfaceOpacity::PerCrossing,
+        }
+    }
+}
+
+/// Materials by [`crate::Splat::material`].
+pub type MaterialTable = Vec<Material>;
+
+/// What one object of the scene does with shadows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Object {
+    /// Name in the scene file.
+    pub name: String,
+    /// Whether its splats cast shadows.
+    pub casts_shadow: bool,
+    /// Factor on its splats' shadow coefficients, in \[0, 1\]; 0 receives no shadow.
+    pub shadow_coefficient: f32,
+}
+
+/// Objects by [`crate::Splat::object`].
+pub type ObjectTable = Vec<Object>;

@@ -1,0 +1,43 @@
+//! Progress of long work: ticks and a request to stop.
+
+use crate::Error;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+
+/// Shared between the thread that works and the one that shows a bar or catches an interrupt.
+#[derive(Debug, Default)]
+pub struct Progress {
+    done: AtomicU64,
+    total: AtomicU64,
+    cancelled: AtomicBool,
+}
+
+impl Progress {
+    /// No work yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Announces `n` more units of work.
+    pub fn add_total(&self, n: u64) {
+        self.total.fetch_add(n, Relaxed);
+    }
+
+    /// Reports `n` units done.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] after [`Progress::cancel`].
+    pub fn tick(&self, n: u64) -> Result<(), Error> {
+        self.done.fetch_add(n, Relaxed);
+        if self.cancelled.load(Relaxed) { Err(Error::Cancelled) } else { Ok(()) }
+    }
+
+    /// Asks the work to stop at its next tick.
+    pub fn cancel(&self) {
+        self.cancelled.store(true, Relaxed);
+    }
+
+    /// Units done and announced.
+    pub fn read(&self) -> (u64, u64) {
+        (self.done.load(Relaxed), self.total.load(Relaxed))
+    }
+}

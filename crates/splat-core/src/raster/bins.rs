@@ -1,0 +1,110 @@
+//! Tile lists: for each square of the image the splats that reach it, in list order.
+//!
+//! Splats are binned in chunks of fixed size, each with its own lists; a tile's list is the lists of all chunks one
+//! after the other. So chunks are binned in parallel without a shared buffer, and the order never depends on threads.
+
+use super::{Projected, ProjectedSplat};
+use rayon::prelude::*;
+
+/// Side of a tile, pixels.
+pub(crate) const TILE: usize = 32;
+
+/// Splats binned by one task.
+const CHUNK: usize = 1 << 15;
+
+/// Tile lists of all chunks.
+pub(crate) struct Bins {
+    pub(crate) columns: usize,
+    pub(crate) rows: usize,
+    chunks: Vec<ChunkLists>,
+}
+
+/// Tile lists of one chunk in CSR form.
+struct ChunkLists {
+    starts: Vec<u32>,
+    entries: Vec<u32>,
+}
+
+impl Bins {
+    /// The splats of tile `t` in list order, as indices into the projected list, a slice a chunk.
+    pub(crate) fn tile(&self, t: usize) -> impl Iterator<Item = &[u32]> {
+        self.chunks.iter().map(move |c| &c.entries[c.starts[t] as usize..c.starts[t + 1] as usize])
+    }
+
+    /// True when no splat reaches tile `t`.
+    pub(crate) fn is_empty(&self, t: usize) -> bool {
+        self.tile(t).all(<[u32]>::is_empty)
+    }
+
+    pub(crate) fn tiles(&self) -> usize {
+        self.columns * self.rows
+    }
+
+    pub(crate) fn entries(&self) -> u64 {
+        self.chunks.iter().map(|c| c.entries.len() as u64).sum()
+    }
+
+    pub(crate) fn bytes(&self) -> u64 {
+        self.chunks.iter().map(|c| 4 * (c.entries.len() + c.starts.len()) as u64).sum()
+    }
+}
+
+/// Bins the projected splats.
+pub(crate) fn bin(projected: &Projected) -> Bins {
+    let columns = (projected.size[0] as usize).div_ceil(TILE);
+    let rows = (projected.size[1] as usize).div_ceil(TILE);
+    let chunks = projected
+        .splats
+        .par_chunks(CHUNK)
+        .enumerate()
+        .map(|(k, chunk)| bin_chunk(chunk, (k * CHUNK) as u32, columns, columns * rows))
+        .collect();
+    Bins { columns, rows, chunks }
+}
+
+fn bin_chunk(chunk: &[ProjectedSplat], first: u32, columns: usize, tiles: usize) -> ChunkLists {
+    // starts[t + 1] first counts, then is the end of the tile before, then the running end of tile t.
+    let mut starts = vec![0u32; tiles + 2];
+    for splat in chunk {
+        for_each_tile(splat, columns, |t| starts[t + 2] += 1);
+    }
+    for t in 2..starts.len() {
+        starts[t] += starts[t - 1];
+    }
+    let mut entries = vec![0u32; starts[tiles + 1] as usize];
+    for (j, splat) in chunk.iter().enumerate() {
+        for_each_tile(splat, columns, |t| {
+            entries[starts[t + 1] as usize] = first + j as u32;
+            starts[t + 1] += 1;
+        });
+    }
+    starts.pop();
+    ChunkLists { starts, entries }
+}
+
+#[inline(always)]
+fn for_each_tile(splat: &ProjectedSplat, columns: usize, mut visit: impl FnMut(usize)) {
+    let [x0, x1, y0, y1] = splat.bounds.map(usize::from);
+    if x0 < x1 {
+        for row in y0 / TILE..=(y1 - 1) / TILE {
+            for column in x0 / TILE..=(x1 - 1) / TILE {
+                visit(row * columns + column);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_splat_is_listed_once_in_each_tile_that_it_touches() {
+        let splat = |bounds| ProjectedSplat { bounds, ..ProjectedSplat::default() };
+        let splats = vec![splat([0, 1, 0, 1]), splat([31, 33, 0, 1]), splat([0, 0, 0, 0]), splat([0, 64, 0, 64])];
+        let bins = bin(&Projected { splats, perspective: None, size: [64, 64] });
+        let lists: Vec<Vec<u32>> = (0..bins.tiles()).map(|t| bins.tile(t).flatten().copied().collect()).collect();
+        assert_eq!(lists, [vec![0, 1, 3], vec![1, 3], vec![3], vec![3]]);
+        assert_eq!(bins.entries(), 7);
+    }
+}

@@ -1,0 +1,205 @@
+//! The last step: opaque surface and background behind the translucent splats, samples averaged to pixels, named layers.
+
+use super::OpaqueImage;
+use super::lanes::exp_neg;
+use crate::shade::{ChannelLayout, MAX_CHANNELS};
+use crate::{Accumulator, LayerData, LayerSet, Layers};
+use rayon::prelude::*;
+
+/// Pixel rows handled by one task.
+const BAND: u32 = 16;
+
+/// What is seen where nothing else is.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Background {
+    /// Linear Rec.709 radiance.
+    pub color: [f32; 3],
+}
+
+/// One sample with everything behind it added.
+struct Sample {
+    transmittance: [f32; 3],
+    background: [f32; 3],
+    values: [f32; MAX_CHANNELS],
+    depth: [f32; 4],
+    object: u32,
+}
+
+/// Turns an accumulator with `antialias`² samples a pixel into layers of `accumulator.size / antialias`.
+///
+/// Colours, alpha, shadow and normal are box-filtered. `depth.first` is the least of the samples, the other depths are
+/// means over the samples where they are defined, and `object` is that of the first sample that has one.
+pub fn finish(
+    accumulator: &Accumulator,
+    opaque: &OpaqueImage,
+    background: &Background,
+    layout: &ChannelLayout,
+    layers: &LayerSet,
+    antialias: u32,
+) -> Layers {
+    let size = accumulator.size.map(|s| s / antialias);
+    let bands: Vec<Output> = (0..size[1].div_ceil(BAND))
+        .into_par_iter()
+        .map(|band| {
+            let rows = band * BAND..size[1].min((band + 1) * BAND);
+            let mut out = Output::new(rows.len() * size[0] as usize, layout.count());
+            let mut samples = Vec::with_capacity((antialias * antialias) as usize);
+            for (k, (y, x)) in rows.flat_map(|y| (0..size[0]).map(move |x| (y, x))).enumerate() {
+                samples.clear();
+                for sy in y * antialias..(y + 1) * antialias {
+                    for sx in x * antialias..(x + 1) * antialias {
+                        let at = sy as usize * accumulator.size[0] as usize + sx as usize;
+                        samples.push(sample(accumulator, opaque, background, at));
+                    }
+                }
+                out.pixel(k, &samples);
+            }
+            out
+        })
+        .collect();
+    let mut out = Output::new(0, layout.count());
+    bands.into_iter().for_each(|band| out.append(band));
+    out.into_layers(size, layout, layers)
+}
+
+fn sample(acc: &Accumulator, opaque: &OpaqueImage, background: &Background, k: usize) -> Sample {
+    let planes = acc.optical_depth.len();
+    let transmittance: [f32; 3] = std::array::from_fn(|c| exp_neg(acc.optical_depth[if planes == 3 { c } else { 0 }][k]));
+    let solid = opaque.depth.get(k).copied().filter(|d| d.is_finite());
+    let count = acc.channels.len();
+    let mut values = [0.0; MAX_CHANNELS];
+    for (c, (value, plane)) in values.iter_mut().zip(&acc.channels).enumerate() {
+        *value = plane[k];
+        if solid.is_some() {
+            let t = if count - c > count % 3 { transmittance[c % 3] } else { transmittance[1] };
+            *value += t * opaque.channels[c][k];
+        }
+    }
+    let through = if solid.is_some() { [0.0; 3] } else { transmittance };
+    let unseen = acc.object.get(k).is_none_or(|o| *o == u32::MAX);
+    Sample {
+        transmittance: through,
+        background: std::array::from_fn(|c| through[c] * background.color[c]),
+        values,
+        depth: depths(acc, transmittance[1], solid, k),
+        object: if unseen {
+            opaque.object.get(k).copied().unwrap_or(u32::MAX)
+        } else {
+            acc.object[k]
+        },
+    }
+}
+
+/// First, median, mean and sigma with the opaque surface as the last absorber.
+fn depths(acc: &Accumulator, transmittance: f32, solid: Option<f32>, k: usize) -> [f32; 4] {
+    if acc.depth_first.is_empty() {
+        return [f32::INFINITY; 4];
+    }
+    let mut first = acc.depth_first[k];
+    let mut median = acc.depth_median[k];
+    let (mut mean, mut m2, mut absorbed) = (acc.depth_mean[k], acc.depth_m2[k], 1.0 - transmittance);
+    if let Some(depth) = solid {
+        first = first.min(depth);
+        median = median.min(depth);
+        let delta = depth - mean;
+        absorbed += transmittance;
+        mean += delta * transmittance / absorbed;
+        m2 += transmittance * delta * (depth - mean);
+    }
+    if absorbed > 0.0 { [first, median, mean, (m2 / absorbed).max(0.0).sqrt()] } else { [f32::INFINITY; 4] }
+}
+
+/// Pixels being filled.
+struct Output {
+    alpha: Vec<f32>,
+    background: Vec<[f32; 3]>,
+    /// Channel planes.
+    values: Vec<Vec<f32>>,
+    depth: [Vec<f32>; 4],
+    object: Vec<u32>,
+}
+
+impl Output {
+    fn new(n: usize, channels: usize) -> Self {
+        Self {
+            alpha: vec![0.0; n],
+            background: vec![[0.0; 3]; n],
+            values: vec![vec![0.0; n]; channels],
+            depth: std::array::from_fn(|_| vec![f32::INFINITY; n]),
+            object: vec![u32::MAX; n],
+        }
+    }
+
+    /// Appends the pixels of the next band.
+    fn append(&mut self, band: Self) {
+        self.alpha.extend(band.alpha);
+        self.background.extend(band.background);
+        self.values.iter_mut().zip(band.values).for_each(|(to, from)| to.extend(from));
+        self.depth.iter_mut().zip(band.depth).for_each(|(to, from)| to.extend(from));
+        self.object.extend(band.object);
+    }
+
+    fn pixel(&mut self, k: usize, samples: &[Sample]) {
+        let share = 1.0 / samples.len() as f32;
+        for s in samples {
+            self.alpha[k] += share * (1.0 - (s.transmittance[0] + s.transmittance[1] + s.transmittance[2]) / 3.0);
+            for c in 0..3 {
+                self.background[k][c] += share * s.background[c];
+            }
+            for (plane, value) in self.values.iter_mut().zip(&s.values) {
+                plane[k] += share * value;
+            }
+            if self.object[k] == u32::MAX {
+                self.object[k] = s.object;
+            }
+            self.depth[0][k] = self.depth[0][k].min(s.depth[0]);
+        }
+        for (d, plane) in self.depth.iter_mut().enumerate().skip(1) {
+            let defined: Vec<f32> = samples.iter().map(|s| s.depth[d]).filter(|v| v.is_finite()).collect();
+            if !defined.is_empty() {
+                plane[k] = defined.iter().sum::<f32>() / defined.len() as f32;
+            }
+        }
+    }
+
+    fn into_layers(self, size: [u32; 2], layout: &ChannelLayout, set: &LayerSet) -> Layers {
+        let mut layers = Layers { size, ..Layers::default() };
+        let rgb = |at: usize| -> Vec<[f32; 3]> {
+            (0..self.alpha.len()).map(|k| std::array::from_fn(|c| self.values[at + c][k])).collect()
+        };
+        let mut beauty = self.background.clone();
+        for at in layout.effects() {
+            for (sum, part) in beauty.iter_mut().zip(rgb(at)) {
+                for c in 0..3 {
+                    sum[c] += part[c];
+                }
+            }
+        }
+        layers.insert("beauty", LayerData::Rgb(beauty));
+        if set.effects {
+            layers.insert("background", LayerData::Rgb(self.background.clone()));
+            for (name, at) in ["ambient", "emission", "direct"].into_iter().zip(layout.effects()) {
+                layers.insert(name, LayerData::Rgb(rgb(at)));
+            }
+        }
+        if let Some(at) = layout.normal() {
+            layers.insert("normal", LayerData::Rgb(rgb(at)));
+        }
+        if let Some(at) = layout.shadow() {
+            layers.insert("shadow", LayerData::Scalar(self.values[at].clone()));
+        }
+        if set.depth {
+            let [first, median, mean, sigma] = self.depth;
+            for (name, plane) in
+                [("depth.first", first), ("depth.median", median), ("depth.mean", mean), ("depth.sigma", sigma)]
+            {
+                layers.insert(name, LayerData::Scalar(plane));
+            }
+        }
+        if set.object {
+            layers.insert("object", LayerData::Id(self.object));
+        }
+        layers.insert("alpha", LayerData::Scalar(self.alpha));
+        layers
+    }
+}

@@ -1,0 +1,240 @@
+//! Attribute-driven shading: one radiance per splat from its attributes and the lookup tables (Gunjee 2007, section 4.3,
+//! Figure 11), before rasterization.
+//!
+//! Surfaces: L = ρ/π·E·⟨n·l⟩ + ρ_s·(m + 2)/2π·⟨r·v⟩^m·E·⟨n·l⟩ (energy-normalised Phong), the normal turned to the viewer;
+//! a thin translucent surface passes the share `transmission` of the diffuse light to its other side.
+//! Media: L = ω·c·p(θ)·E, single scattering, or the surface form when they have a normal and ask for Phong.
+//! E is the irradiance of a light times its transmittance; ambient radiance adds ρ·L_ambient.
+
+use crate::{
+    Camera, Cloud, LayerSet, Light, Material, Object, Receiver, Shading, SplatKind, Transmittance, henyey_greenstein,
+};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+use std::f32::consts::PI;
+
+/// The most channels that a splat can have: three effects, the normal and the shadow.
+pub const MAX_CHANNELS: usize = 13;
+
+/// Splats shaded by one task.
+const CHUNK: usize = 4096;
+
+/// Which numbers each splat carries through compositing, and where.
+///
+/// First the effects: one beauty colour, or ambient, emission and direct apart. Then the normal, then the shadow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ChannelLayout {
+    effects: bool,
+    normal: bool,
+    shadow: bool,
+}
+
+impl ChannelLayout {
+    /// The channels that `layers` need.
+    pub fn new(layers: &LayerSet) -> Self {
+        Self { effects: layers.effects, normal: layers.normal, shadow: layers.shadow }
+    }
+
+    /// Numbers a splat.
+    pub fn count(&self) -> usize {
+        (if self.effects { 9 } else { 3 }) + 3 * usize::from(self.normal) + usize::from(self.shadow)
+    }
+
+    /// First channel of each effect colour: ambient, emission, direct; or of beauty alone.
+    pub fn effects(&self) -> impl Iterator<Item = usize> + use<> {
+        (0..if self.effects { 3 } else { 1 }).map(|e| 3 * e)
+    }
+
+    /// First channel of the normal.
+    pub fn normal(&self) -> Option<usize> {
+        self.normal.then_some(if self.effects { 9 } else { 3 })
+    }
+
+    /// Channel of the shadow.
+    pub fn shadow(&self) -> Option<usize> {
+        self.shadow.then(|| self.count() - 1)
+    }
+}
+
+/// A light with its shadow map, if it has one.
+pub struct LitBy<'a> {
+    /// The light.
+    pub light: Light,
+    /// Its transmittance to any point; `None` when nothing casts or receives its shadow.
+    pub shadow: Option<&'a dyn Transmittance>,
+}
+
+/// What shading reads beside the splats.
+pub struct ShadeInput<'a> {
+    /// The splats.
+    pub cloud: &'a Cloud,
+    /// Materials by id.
+    pub materials: &'a [Material],
+    /// Objects by id.
+    pub objects: &'a [Object],
+    /// Lights with their shadows.
+    pub lights: &'a [LitBy<'a>],
+    /// Ambient radiance, the same from everywhere.
+    pub ambient: [f32; 3],
+    /// The viewer, for specular reflection and the phase function.
+    pub camera: &'a Camera,
+}
+
+/// Values of the splats `ids`, `layout.count()` numbers each, in the order of `ids`.
+///
+/// # Panics
+/// If an id, material or object of the cloud is out of range.
+pub fn shade(input: &ShadeInput<'_>, ids: &[u32], layout: &ChannelLayout) -> Vec<f32> {
+    let channels = layout.count();
+    let eye = (input.camera.position - input.cloud.origin).as_vec3();
+    let lights: Vec<LocalLight<'_>> = input.lights.iter().map(|l| LocalLight::new(l, input.cloud.origin)).collect();
+    let mut values = vec![0.0; ids.len() * channels];
+    values.par_chunks_mut(CHUNK * channels).zip(ids.par_chunks(CHUNK)).for_each(|(values, ids)| {
+        for (out, &i) in values.chunks_exact_mut(channels).zip(ids) {
+            let point = Point::new(input, i as usize, eye);
+            let shaded = point.shade(input, &lights);
+            shaded.write(out, layout, point.normal);
+        }
+    });
+    values
+}
+
+/// A light relative to the cloud's origin.
+struct LocalLight<'a> {
+    light: Light,
+    origin: DVec3,
+    shadow: Option<&'a dyn Transmittance>,
+}
+
+impl<'a> LocalLight<'a> {
+    fn new(lit: &LitBy<'a>, origin: DVec3) -> Self {
+        Self { light: lit.light, origin, shadow: lit.shadow }
+    }
+
+    fn irradiance(&self, receiver: &Receiver) -> (Vec3, [f32; 3]) {
+        let position = self.origin + receiver.position.as_dvec3();
+        // σ = R/3 at the default cutoff.
+        let (to_light, irradiance) = self.light.irradiance(position, f64::from(receiver.radius) / 3.0);
+        (to_light.as_vec3(), irradiance)
+    }
+}
+
+/// One splat being shaded.
+struct Point {
+    receiver: Receiver,
+    normal: Vec3,
+    to_eye: Vec3,
+    color: [f32; 3],
+    material: Material,
+    shadow_coefficient: f32,
+}
+
+/// Radiance by effect, and the mean transmittance of the shadows.
+struct Shaded {
+    ambient: [f32; 3],
+    emission: [f32; 3],
+    direct: [f32; 3],
+    shadow: f32,
+}
+
+impl Point {
+    fn new(input: &ShadeInput<'_>, i: usize, eye: Vec3) -> Self {
+        let cloud = input.cloud;
+        let position = cloud.position[i];
+        let to_eye = if input.camera.is_orthographic() {
+            -input.camera.axes[2].as_vec3()
+        } else {
+            (eye - position).normalize_or_zero()
+        };
+        let own = cloud.normal_of(i);
+        let kind = cloud.kind[i];
+        // A surface shows its viewer the side that faces him; the gradient of a medium has one outside.
+        let normal = if kind != SplatKind::Medium && own.dot(to_eye) < 0.0 { -own } else { own };
+        Self {
+            receiver: Receiver { position, normal: own, radius: cloud.radius[i], kind },
+            normal,
+            to_eye,
+            color: cloud.color[i],
+            material: input.materials[cloud.material[i] as usize],
+            shadow_coefficient: cloud.shadow_coefficient_of(i)
+                * input.objects[cloud.object[i] as usize].shadow_coefficient,
+        }
+    }
+
+    fn shade(&self, input: &ShadeInput<'_>, lights: &[LocalLight<'_>]) -> Shaded {
+        let m = &self.material;
+        let mut out = Shaded { ambient: [0.0; 3], emission: m.emission, direct: [0.0; 3], shadow: 1.0 };
+        if m.shading == Shading::Unlit {
+            (0..3).for_each(|c| out.emission[c] += self.color[c]);
+            return out;
+        }
+        let by_phase = m.shading == Shading::Phase || self.normal == Vec3::ZERO;
+        let reflectance = if by_phase { m.single_scattering_albedo } else { m.diffuse };
+        for c in 0..3 {
+            out.ambient[c] = input.ambient[c] * self.color[c] * reflectance * m.ambient;
+        }
+        let (mut received, mut arriving) = (0.0, 0.0);
+        for light in lights {
+            let (to_light, irradiance) = light.irradiance(&self.receiver);
+            let response = if by_phase { self.scatter(to_light) } else { self.reflect(to_light) };
+            let transmittance = match light.shadow {
+                // Nothing to attenuate: the map is not asked.
+                Some(shadow) if self.shadow_coefficient > 0.0 && irradiance != [0.0; 3] => {
+                    shadow.transmittance(&self.receiver).map(|t| 1.0 - self.shadow_coefficient * (1.0 - t))
+                }
+                _ => [1.0; 3],
+            };
+            for c in 0..3 {
+                out.direct[c] += irradiance[c] * transmittance[c] * (response.0[c] + response.1);
+            }
+            received += irradiance[1] * transmittance[1];
+            arriving += irradiance[1];
+        }
+        if arriving > 0.0 {
+            out.shadow = received / arriving;
+        }
+        out
+    }
+
+    /// Single scattering per unit irradiance: colour, and nothing specular.
+    fn scatter(&self, to_light: Vec3) -> ([f32; 3], f32) {
+        // Light travels along −to_light and leaves along to_eye.
+        let phase = henyey_greenstein(-to_light, self.to_eye, self.material.asymmetry);
+        let share = self.material.single_scattering_albedo * phase;
+        (self.color.map(|c| c * share), 0.0)
+    }
+
+    /// Reflection per unit irradiance on a facing plane: diffuse colour, and specular.
+    fn reflect(&self, to_light: Vec3) -> ([f32; 3], f32) {
+        let m = &self.material;
+        let cosine = self.normal.dot(to_light);
+        let diffuse = cosine.max(0.0) * (1.0 - m.transmission) + (-cosine).max(0.0) * m.transmission;
+        let mut specular = 0.0;
+        if m.specular > 0.0 && cosine > 0.0 {
+            let mirrored = 2.0 * cosine * self.normal - to_light;
+            let lobe = mirrored.dot(self.to_eye).max(0.0).powf(m.shininess);
+            specular = m.specular * (m.shininess + 2.0) / (2.0 * PI) * lobe * cosine;
+        }
+        (self.color.map(|c| c * m.diffuse / PI * diffuse), specular)
+    }
+}
+
+impl Shaded {
+    fn write(&self, out: &mut [f32], layout: &ChannelLayout, normal: Vec3) {
+        if layout.effects {
+            out[0..3].copy_from_slice(&self.ambient);
+            out[3..6].copy_from_slice(&self.emission);
+            out[6..9].copy_from_slice(&self.direct);
+        } else {
+            for c in 0..3 {
+                out[c] = self.ambient[c] + self.emission[c] + self.direct[c];
+            }
+        }
+        if let Some(at) = layout.normal() {
+            out[at..at + 3].copy_from_slice(&normal.to_array());
+        }
+        if let Some(at) = layout.shadow() {
+            out[at] = self.shadow;
+        }
+    }
+}

@@ -1,0 +1,23 @@
+//! How much light arrives: the noun between shadow maps and shading.
+
+use crate::SplatKind;
+use glam::Vec3;
+
+/// What receives light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Receiver {
+    /// Position relative to the origin of the cloud that casts the shadows, world units.
+    pub position: Vec3,
+    /// Unit normal, or zero for none.
+    pub normal: Vec3,
+    /// Cutoff radius of the receiving splat, world units; 0 for a bare point.
+    pub radius: f32,
+    /// A medium shadows itself, a surface does not.
+    pub kind: SplatKind,
+}
+
+/// Transmittance from one light to any point.
+pub trait Transmittance: Sync {
+    /// Share of the light that arrives at the receiver per channel, in \[0, 1\].
+    fn transmittance(&self, receiver: &Receiver) -> [f32; 3];
+}

@@ -1,0 +1,46 @@
+//! What a map costs: predicted before any work, counted afterwards.
+
+use crate::mapping::Octahedral;
+use crate::survey::{Appearance, Survey};
+use splat_core::SplatKind;
+
+/// Work and memory predicted from the casters' apparent sizes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prediction {
+    /// Cells of the table.
+    pub cells: f64,
+    /// Entries that translucent splats deposit; within a factor of 2 of the counted ones for kernels on a plane.
+    pub entries: f64,
+    /// Bytes that the build takes at its peak.
+    pub bytes: u64,
+}
+
+/// What a build did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counts {
+    /// Splats that throw shadows.
+    pub casters: u64,
+    /// Of them, translucent ones, which deposit entries.
+    pub translucent: u64,
+    /// Cells of the table.
+    pub cells: u64,
+    /// Entries deposited.
+    pub entries: u64,
+    /// Entries kept: equal distances are merged, and lists stop at the visible limit.
+    pub kept: u64,
+    /// Bytes of the finished map.
+    pub bytes: u64,
+}
+
+/// Entries and bytes for a table of `cells` cells of side `cell`.
+pub(crate) fn predict(look: &Appearance, survey: &Survey, cell: f64, cells: f64, octahedral: bool) -> Prediction {
+    let entries = look.entries(cell, cells);
+    let knot = if survey.coloured { 16.0 } else { 8.0 };
+    let kinds = survey.kinds;
+    let lists = u64::from(kinds[SplatKind::Medium as usize] > 0) + u64::from(kinds[SplatKind::Surface as usize] > 0);
+    let depth = 4.0 * u64::from(kinds[SplatKind::Opaque as usize] > 0) as f64;
+    let directions = if octahedral { Octahedral::bytes(cells.sqrt() as u32) as f64 } else { 0.0 };
+    // Entries stand once with their cell, parted by ranges, and once in the lists.
+    let bytes = cells * (8.0 * lists as f64 + depth) + directions + entries * (2.0 * knot + 4.0);
+    Prediction { cells, entries, bytes: bytes.min(u64::MAX as f64) as u64 }
+}

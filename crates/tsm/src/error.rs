@@ -1,0 +1,30 @@
+//! Errors of translucent shadow maps.
+
+/// What can go wrong.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A parameter is outside its range.
+    #[error("shadow map: {name} is {found}, expected {expected}")]
+    Parameter {
+        /// Name of the parameter.
+        name: &'static str,
+        /// Its value, printed.
+        found: String,
+        /// The accepted range, in words.
+        expected: &'static str,
+    },
+    /// The table would take more memory than it may.
+    #[error("shadow map: {what} needs {needed_bytes} bytes, the limit is {limit_bytes}; use a smaller resolution")]
+    Memory {
+        /// What would be too large.
+        what: &'static str,
+        /// Bytes needed.
+        needed_bytes: u64,
+        /// Bytes allowed.
+        limit_bytes: u64,
+    },
+    /// The light or the cloud breaks a promise, or the caller cancelled.
+    #[error(transparent)]
+    Core(#[from] splat_core::Error),
+}

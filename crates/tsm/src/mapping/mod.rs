@@ -1,0 +1,106 @@
+//! Mappings: from positions in the light's frame to cells of a table, and back to rays.
+
+mod octahedral;
+mod planar;
+mod polar;
+
+pub use octahedral::Octahedral;
+pub use planar::Planar;
+pub use polar::{PolarAzimuth, PolarRange};
+
+use glam::{Vec2, Vec3};
+
+/// A ray of light through the table, in the light's frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ray {
+    /// Where distance is zero.
+    pub base: Vec3,
+    /// Unit direction of travel.
+    pub direction: Vec3,
+}
+
+/// A position in table coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// Column and row, in cells; cell (i, j) covers \[i, i+1) × \[j, j+1).
+    pub at: Vec2,
+    /// Distance from the light, or along the light's direction; in the light's frame, > 0.
+    pub distance: f32,
+}
+
+/// From positions in the light's frame to cells, and back.
+///
+/// The frame's origin is the light (for parallel light: a plane before all casters, at z = 0).
+pub trait Mapping: Sync {
+    /// Columns and rows.
+    fn size(&self) -> [u32; 2];
+
+    /// Where `p` lies; `None` at the light itself and outside the table.
+    fn locate(&self, p: Vec3) -> Option<Place>;
+
+    /// Gradients of column and row with respect to the position, cells per length, at a `p` that has a place.
+    fn gradients(&self, p: Vec3) -> [Vec3; 2];
+
+    /// The cell at a column and row that may lie beyond an edge across which the table continues; `None` outside.
+    fn wrap(&self, column: i32, row: i32) -> Option<u32>;
+
+    /// The ray through table coordinates.
+    fn ray(&self, at: Vec2) -> Ray;
+
+    /// The ray through the centre of a cell.
+    fn cell_ray(&self, cell: u32) -> Ray;
+
+    /// Solid angle of a cell, sr; for parallel light its area.
+    fn measure(&self, cell: u32) -> f64;
+
+    /// 1/[`Mapping::measure`] in f32, cheap.
+    fn inverse_measure(&self, cell: u32) -> f32 {
+        (1.0 / self.measure(cell)) as f32
+    }
+
+    /// Whether all rays are parallel, so that footprints do not shrink with distance.
+    fn is_parallel(&self) -> bool {
+        false
+    }
+
+    /// Whether the gradients of a footprint's centre hold across its edges only up to an exchange of column and row.
+    fn is_folded(&self) -> bool {
+        false
+    }
+
+    /// Whether gradients change abruptly (a pole, an edge between octants) within `half` cells of `at`, so that those of
+    /// the centre do not describe a footprint.
+    fn is_creased(&self, _at: Vec2, _half: Vec2) -> bool {
+        false
+    }
+}
+
+/// ⌊x⌋ for |x| < 2³¹, in registers on every target.
+#[inline]
+pub(crate) fn floor(x: f32) -> i32 {
+    let truncated = x as i32;
+    truncated - i32::from((truncated as f32) > x)
+}
+
+/// Calls a generic function with the mapping that a [`Table`] holds.
+macro_rules! with_mapping {
+    ($table:expr, $m:ident => $body:expr) => {
+        match $table {
+            $crate::mapping::Table::Octahedral($m) => $body,
+            $crate::mapping::Table::PolarAzimuth($m) => $body,
+            $crate::mapping::Table::Planar($m) => $body,
+        }
+    };
+}
+pub(crate) use with_mapping;
+
+/// The mapping of one shadow map.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Table {
+    /// Equal-area octahedral, the whole sphere.
+    Octahedral(Octahedral),
+    /// Polar and azimuth angles.
+    PolarAzimuth(PolarAzimuth),
+    /// A plane.
+    Planar(Planar),
+}

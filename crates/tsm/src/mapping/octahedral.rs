@@ -1,0 +1,175 @@
+//! The equal-area octahedral map of the sphere.
+//!
+//! In the octant x, y, z ≥ 0, with polar angle θ and azimuth φ, p = 2φ/π and r = √(1 − cos θ):
+//!
+//! X = r(1 − p), Y = r·p, dX dY = r dr dp = sin θ dθ dφ/π = dω/π
+//!
+//! so the square \[−1, 1\]² of area 4 covers 4π and each of the n² cells has the solid angle 4π/n². z < 0 folds over
+//! the diagonals by (X, Y) → (1 − Y, 1 − X).
+//!
+//! Beyond the paper, whose polar rows differ in solid angle by 115:1 at 180 rows. 1 − cos θ is taken as
+//! sin²θ/(1 + cos θ), so that directions near the poles keep their digits.
+
+use super::{Mapping, Place, Ray};
+use glam::{Vec2, Vec3};
+
+/// 2/π·atan(√s)/√s on [0, 1], a Chebyshev fit; the product with √s errs by less than 5e-8.
+const ATAN: [f32; 8] = [
+    0.636_619_7,
+    -0.212_196_91,
+    0.127_113_63,
+    -0.089_147_71,
+    0.062_827_15,
+    -0.037_452_184,
+    0.015_139_148,
+    -0.002_902_853_7,
+];
+
+/// sin(π/2·p)/p in powers of p² on [0, 1]; errs by less than 1e-8.
+const SIN: [f32; 5] = [1.57079632, -0.64596376, 0.0796899183, -0.00467414384, 0.000151671704];
+
+/// Equal-area octahedral table of n × n cells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Octahedral {
+    n: u32,
+    inverse_measure: f32,
+    /// Directions of the cell centres with column and row ≥ n/2; the others are mirror images.
+    quarter: Vec<Vec3>,
+}
+
+impl Octahedral {
+    /// A table of `n` × `n` cells, 1 ≤ n ≤ 32768.
+    pub fn new(n: u32) -> Self {
+        let n = n.clamp(1, 1 << 15);
+        let half = n.div_ceil(2);
+        let centre = |i: u32| f64::from(2 * (i + n / 2) + 1) / f64::from(n) - 1.0;
+        let quarter =
+            (0..half * half).map(|k| direction([centre(k % half), centre(k / half)])).collect();
+        let inverse_measure = (f64::from(n).powi(2) / (4.0 * std::f64::consts::PI)) as f32;
+        Self { n, inverse_measure, quarter }
+    }
+
+    /// Bytes of the direction table.
+    pub fn bytes(n: u32) -> u64 {
+        u64::from(n.div_ceil(2)).pow(2) * size_of::<Vec3>() as u64
+    }
+}
+
+/// Unit direction at (X, Y) ∈ [0, 1]².
+fn direction([x, y]: [f64; 2]) -> Vec3 {
+    let upper = x + y <= 1.0;
+    let (x, y) = if upper { (x, y) } else { (1.0 - y, 1.0 - x) };
+    let r = x + y;
+    let phi = if r > 0.0 { std::f64::consts::FRAC_PI_2 * y / r } else { 0.0 };
+    let sin_theta = r * (2.0 - r * r).max(0.0).sqrt();
+    let z = if upper { 1.0 - r * r } else { r * r - 1.0 };
+    Vec3::new((sin_theta * phi.cos()) as f32, (sin_theta * phi.sin()) as f32, z as f32)
+}
+
+/// Azimuth in the first quadrant as a share of a right angle.
+fn quadrant_share(x: f32, y: f32) -> f32 {
+    let (low, high) = if x < y { (x, y) } else { (y, x) };
+    if high == 0.0 {
+        return 0.0;
+    }
+    let t = low / high;
+    let s = t * t;
+    let share = t * ATAN.iter().rev().fold(0.0, |sum, c| sum * s + c);
+    if x < y { 1.0 - share } else { share }
+}
+
+impl Mapping for Octahedral {
+    fn size(&self) -> [u32; 2] {
+        [self.n, self.n]
+    }
+
+    fn locate(&self, p: Vec3) -> Option<Place> {
+        let distance = p.length();
+        if distance <= 0.0 {
+            return None;
+        }
+        let d = p.abs() / distance;
+        let r = ((d.x * d.x + d.y * d.y) / (1.0 + d.z)).sqrt();
+        let share = quadrant_share(d.x, d.y);
+        let (mut x, mut y) = (r * (1.0 - share), r * share);
+        if p.z < 0.0 {
+            (x, y) = (1.0 - y, 1.0 - x);
+        }
+        let half = 0.5 * self.n as f32;
+        Some(Place { at: Vec2::new(half + half * x.copysign(p.x), half + half * y.copysign(p.y)), distance })
+    }
+
+    fn gradients(&self, p: Vec3) -> [Vec3; 2] {
+        let distance = p.length();
+        let d = p.abs() / distance;
+        let sin = (d.x * d.x + d.y * d.y).sqrt();
+        let (cos_phi, sin_phi) = if sin > 0.0 { (d.x / sin, d.y / sin) } else { (1.0, 0.0) };
+        let share = quadrant_share(d.x, d.y);
+        let root = (1.0 + d.z).sqrt();
+        let along_theta = Vec3::new(d.z * cos_phi, d.z * sin_phi, -sin) * (0.5 * root);
+        let along_phi = Vec3::new(-sin_phi, cos_phi, 0.0) * (std::f32::consts::FRAC_2_PI / root);
+        let gx = along_theta * (1.0 - share) - along_phi;
+        let gy = along_theta * share + along_phi;
+        let scale = 0.5 * self.n as f32 / distance;
+        let mirror = Vec3::ONE.copysign(p) * scale;
+        let (gx, gy) = if p.z < 0.0 { (-gy, -gx) } else { (gx, gy) };
+        [gx * mirror * 1f32.copysign(p.x), gy * mirror * 1f32.copysign(p.y)]
+    }
+
+    fn wrap(&self, mut column: i32, mut row: i32) -> Option<u32> {
+        let n = self.n as i32;
+        if !(0..n).contains(&column) {
+            column = if column < 0 { -1 - column } else { 2 * n - 1 - column };
+            row = n - 1 - row;
+        }
+        if !(0..n).contains(&row) {
+            row = if row < 0 { -1 - row } else { 2 * n - 1 - row };
+            column = n - 1 - column;
+        }
+        ((0..n).contains(&column) && (0..n).contains(&row)).then(|| row as u32 * self.n + column as u32)
+    }
+
+    fn ray(&self, at: Vec2) -> Ray {
+        let square = at * (2.0 / self.n as f32) - 1.0;
+        let q = square.abs().min(Vec2::ONE);
+        let upper = q.x + q.y <= 1.0;
+        let q = if upper { q } else { Vec2::new(1.0 - q.y, 1.0 - q.x) };
+        let r = q.x + q.y;
+        let share = if r > 0.0 { q.y / r } else { 0.0 };
+        let sin = |p: f32| p * SIN.iter().rev().fold(0.0, |sum, c| sum * (p * p) + c);
+        let sin_theta = r * (2.0 - r * r).max(0.0).sqrt();
+        let z = if upper { 1.0 - r * r } else { r * r - 1.0 };
+        let (x, y) = (sin_theta * sin(1.0 - share), sin_theta * sin(share));
+        Ray { base: Vec3::ZERO, direction: Vec3::new(x.copysign(square.x), y.copysign(square.y), z) }
+    }
+
+    fn cell_ray(&self, cell: u32) -> Ray {
+        let n = self.n;
+        let mirrored = |i: u32| if 2 * i + 1 >= n { (i - n / 2, 1.0) } else { ((n - 1) / 2 - i, -1.0) };
+        let (i, sign_x) = mirrored(cell % n);
+        let (j, sign_y) = mirrored(cell / n);
+        let d = self.quarter[(j * n.div_ceil(2) + i) as usize];
+        Ray { base: Vec3::ZERO, direction: Vec3::new(d.x * sign_x, d.y * sign_y, d.z) }
+    }
+
+    fn measure(&self, _cell: u32) -> f64 {
+        4.0 * std::f64::consts::PI / f64::from(self.n).powi(2)
+    }
+
+    fn inverse_measure(&self, _cell: u32) -> f32 {
+        self.inverse_measure
+    }
+
+    fn is_folded(&self) -> bool {
+        true
+    }
+
+    fn is_creased(&self, at: Vec2, half: Vec2) -> bool {
+        // Octants meet at the middle lines, at the sides and at the diagonals |X| + |Y| = 1.
+        let side = 0.5 * self.n as f32;
+        let to_line = (at - (at / side).round() * side).abs();
+        let square = (at - side).abs();
+        let to_diagonal = (square.x + square.y - side).abs();
+        to_line.cmplt(half).any() || to_diagonal < half.x + half.y
+    }
+}

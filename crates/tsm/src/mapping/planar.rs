@@ -1,0 +1,93 @@
+//! Planar tables: parallel light, and light from a point within a cone.
+//!
+//! Parallel: column = (x − min)/cell. Perspective: column = (x/z − min)/cell with z along the axis; a cell at (a, b) on
+//! the plane z = 1 has the solid angle cell²·cos³θ, cos θ = 1/√(1 + a² + b²), to second order in the cell.
+
+use super::{Mapping, Place, Ray};
+use glam::{Vec2, Vec3};
+
+/// A planar table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Planar {
+    /// Lower corner: lengths for parallel light, tangents otherwise.
+    pub min: Vec2,
+    /// Side of a cell, in the unit of `min`.
+    pub cell: f32,
+    /// Columns and rows.
+    pub size: [u32; 2],
+    /// Rays from the origin instead of parallel ones.
+    pub perspective: bool,
+}
+
+impl Planar {
+    fn coordinates(&self, p: Vec3) -> Vec2 {
+        let q = if self.perspective { p.truncate() / p.z } else { p.truncate() };
+        (q - self.min) / self.cell
+    }
+}
+
+impl Mapping for Planar {
+    fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    fn locate(&self, p: Vec3) -> Option<Place> {
+        let distance = if self.perspective { p.length() } else { p.z };
+        if self.perspective && (p.z <= 0.0 || distance <= 0.0) {
+            return None;
+        }
+        let at = self.coordinates(p);
+        let limit = Vec2::new(self.size[0] as f32, self.size[1] as f32);
+        let inside = at.cmpgt(Vec2::NEG_ONE).all() && at.cmplt(limit + 1.0).all();
+        inside.then_some(Place { at, distance })
+    }
+
+    fn gradients(&self, p: Vec3) -> [Vec3; 2] {
+        let scale = 1.0 / self.cell;
+        if !self.perspective {
+            return [Vec3::X * scale, Vec3::Y * scale];
+        }
+        let scale = scale / p.z;
+        [Vec3::new(scale, 0.0, -scale * p.x / p.z), Vec3::new(0.0, scale, -scale * p.y / p.z)]
+    }
+
+    fn wrap(&self, column: i32, row: i32) -> Option<u32> {
+        let [columns, rows] = self.size;
+        let inside = (0..columns as i32).contains(&column) && (0..rows as i32).contains(&row);
+        inside.then(|| row as u32 * columns + column as u32)
+    }
+
+    fn ray(&self, at: Vec2) -> Ray {
+        let q = self.min + at * self.cell;
+        if self.perspective {
+            Ray { base: Vec3::ZERO, direction: q.extend(1.0).normalize() }
+        } else {
+            Ray { base: q.extend(0.0), direction: Vec3::Z }
+        }
+    }
+
+    fn cell_ray(&self, cell: u32) -> Ray {
+        let [columns, _] = self.size;
+        self.ray(Vec2::new((cell % columns) as f32 + 0.5, (cell / columns) as f32 + 0.5))
+    }
+
+    fn measure(&self, cell: u32) -> f64 {
+        let area = f64::from(self.cell).powi(2);
+        if self.perspective { area * f64::from(self.cell_ray(cell).direction.z).powi(3) } else { area }
+    }
+
+    fn inverse_measure(&self, cell: u32) -> f32 {
+        let area = 1.0 / (self.cell * self.cell);
+        if !self.perspective {
+            return area;
+        }
+        let [columns, _] = self.size;
+        let at = Vec2::new((cell % columns) as f32 + 0.5, (cell / columns) as f32 + 0.5);
+        let stretch = 1.0 + (self.min + at * self.cell).length_squared();
+        area * stretch * stretch.sqrt()
+    }
+
+    fn is_parallel(&self) -> bool {
+        !self.perspective
+    }
+}

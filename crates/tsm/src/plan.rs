@@ -1,0 +1,234 @@
+//! From light and casters to a mapping: kind, frame, and number of cells; and the memory it will take.
+
+use crate::caster::Casters;
+use crate::cost::{self, Prediction};
+use crate::frame::{Frame, axes_along};
+use crate::mapping::{Mapping, Octahedral, Planar, PolarAzimuth, PolarRange, Table, with_mapping};
+use crate::survey::{Apparent, Appearance, SECTORS, Survey};
+use crate::{Error, MappingChoice, Resolution};
+use glam::{DVec3, Vec2};
+use splat_core::{Light, LightShape, glam};
+use std::f64::consts::PI;
+
+/// Sine of the half angle within which a point light is planar by default.
+const CONE: f64 = 0.87;
+/// Greatest cosine-wise opening of a planar table: tan 75°.
+const MAX_TANGENT: f32 = 3.732;
+/// Greatest side of a table that the automatic resolution takes.
+const MAX_SIDE: f64 = 8192.0;
+/// Entries that a small cloud may always have.
+const FREE_ENTRIES: f64 = (1u64 << 20) as f64;
+
+/// The chosen mapping.
+pub(crate) struct Plan {
+    pub(crate) frame: Frame,
+    pub(crate) table: Table,
+    pub(crate) prediction: Prediction,
+}
+
+enum Kind {
+    Octahedral,
+    Polar,
+    Perspective { tan_outer: Option<f32> },
+    Parallel,
+}
+
+/// Chooses frame, kind and size.
+pub(crate) fn plan(casters: &Casters<'_>, survey: &Survey, light: &Light) -> Result<Plan, Error> {
+    let (kind, frame) = frame_of(casters, survey, light)?;
+    let apparent = match kind {
+        Kind::Octahedral => Apparent::Angle,
+        Kind::Polar => Apparent::AngleAndSectors,
+        Kind::Perspective { .. } => Apparent::Tangent,
+        Kind::Parallel => Apparent::Length,
+    };
+    let look = Appearance::new(casters, &frame, apparent);
+    let shape = Shape::new(&kind, &look);
+    let cell = match casters.params.resolution {
+        Resolution::Auto => automatic_cell(casters, &look, &shape),
+        Resolution::Cells(n) => shape.side / f64::from(n),
+    };
+    let prediction = cost::predict(&look, survey, cell, shape.cells(cell), shape.is_octahedral());
+    let limit_bytes = casters.params.max_bytes;
+    if prediction.bytes > limit_bytes {
+        return Err(Error::Memory { what: "the table", needed_bytes: prediction.bytes, limit_bytes });
+    }
+    let table = shape.table(cell);
+    let cells = with_mapping!(&table, m => m.size()).map(u64::from);
+    if cells[0] * cells[1] > u64::from(i32::MAX as u32) || cells.iter().any(|n| *n > 1 << 22) {
+        let needed_bytes = cells[0].saturating_mul(cells[1]).saturating_mul(8);
+        return Err(Error::Memory { what: "the table", needed_bytes, limit_bytes });
+    }
+    Ok(Plan { frame, table, prediction })
+}
+
+fn frame_of(casters: &Casters<'_>, survey: &Survey, light: &Light) -> Result<(Kind, Frame), Error> {
+    let empty = survey.bounds.is_empty();
+    let centre = if empty { DVec3::ZERO } else { survey.bounds.center().as_dvec3() };
+    let reach = 0.5 * f64::from(survey.bounds.diagonal()) + f64::from(survey.max_radius);
+    let choice = casters.params.mapping;
+    let position = match light.shape {
+        LightShape::Directional { direction } => {
+            if matches!(choice, MappingChoice::Octahedral | MappingChoice::PolarAzimuth) {
+                let found = format!("{choice:?} for directional light");
+                return Err(Error::Parameter { name: "mapping", found, expected: "Auto or Planar" });
+            }
+            let origin = centre - direction * (reach * 1.001);
+            return Ok((Kind::Parallel, Frame::new(origin, axes_along(direction), 2.0 * reach)));
+        }
+        LightShape::Point { position } | LightShape::Spot { position, .. } => position - casters.cloud.origin,
+        _ => return Err(Error::Parameter {
+            name: "light",
+            found: format!("{:?}", light.shape),
+            expected: "a point, spot or directional light; extended lights are several points",
+        }),
+    };
+    let to_centre = centre - position;
+    let extent = to_centre.length() + reach;
+    let sphere = |kind| (kind, Frame::new(position, [DVec3::X, DVec3::Y, DVec3::Z], extent));
+    let planar = |axis: DVec3, tan_outer| (Kind::Perspective { tan_outer }, Frame::new(position, axes_along(axis), extent));
+    let narrow = to_centre.length() * CONE > reach;
+    let wide = to_centre.length() * 0.96 > reach;
+    Ok(match (choice, light.shape) {
+        (MappingChoice::Octahedral, _) => sphere(Kind::Octahedral),
+        (MappingChoice::PolarAzimuth, _) => sphere(Kind::Polar),
+        (_, LightShape::Spot { direction, outer, .. }) if outer < 1.2 => planar(direction, Some(outer.tan() as f32)),
+        (MappingChoice::Planar, _) if wide => planar(to_centre, None),
+        (MappingChoice::Planar, _) => return Err(Error::Parameter {
+            name: "mapping",
+            found: "Planar for a light within or near its casters".into(),
+            expected: "Auto, Octahedral or PolarAzimuth",
+        }),
+        (MappingChoice::Auto, _) if narrow && !empty => planar(to_centre, None),
+        (MappingChoice::Auto, _) => sphere(Kind::Octahedral),
+    })
+}
+
+/// What a table covers, before its cells are chosen.
+enum Shape {
+    Octahedral,
+    Polar(PolarRange),
+    Planar { window: [Vec2; 2], perspective: bool },
+}
+
+impl Shape {
+    fn is_octahedral(&self) -> bool {
+        matches!(self, Self::Octahedral)
+    }
+}
+
+/// A shape with the length of its longer side, in the unit of cells.
+struct Extent {
+    shape: Shape,
+    side: f64,
+}
+
+impl std::ops::Deref for Extent {
+    type Target = Shape;
+
+    fn deref(&self) -> &Shape {
+        &self.shape
+    }
+}
+
+impl Shape {
+    fn new(kind: &Kind, look: &Appearance) -> Extent {
+        let planar = |perspective, limit: Option<f32>| {
+            let limit = Vec2::splat(limit.map_or(MAX_TANGENT, |t| 1.05 * t));
+            let [mut low, mut high] = look.window;
+            if perspective {
+                (low, high) = (low.max(-limit), high.min(limit));
+            }
+            if !(low.cmplt(high).all() && low.is_finite() && high.is_finite()) {
+                (low, high) = (Vec2::NEG_ONE, Vec2::ONE);
+            }
+            let side = f64::from((high - low).max_element());
+            Extent { shape: Shape::Planar { window: [low, high], perspective }, side }
+        };
+        match kind {
+            // An n × n table has n² cells of 4π/n² sr.
+            Kind::Octahedral => Extent { shape: Shape::Octahedral, side: (4.0 * PI).sqrt() },
+            Kind::Polar => Extent { shape: Shape::Polar(fit(look)), side: PI },
+            Kind::Perspective { tan_outer } => planar(true, *tan_outer),
+            Kind::Parallel => planar(false, None),
+        }
+    }
+}
+
+impl Extent {
+    /// Columns and rows of cells of this side.
+    fn size(&self, cell: f64) -> [f64; 2] {
+        let count = |length: f64| (length / cell * (1.0 - 1e-9)).ceil().max(1.0);
+        match &self.shape {
+            Shape::Octahedral => [count(self.side); 2],
+            Shape::Polar(range) => [count(range.azimuth[1]), count(range.polar[1] - range.polar[0])],
+            // One more cell on each side, so that light beside the window fades into full light.
+            Shape::Planar { window: [low, high], .. } => {
+                let span = (*high - *low).as_dvec2();
+                [count(span.x) + 2.0, count(span.y) + 2.0]
+            }
+        }
+    }
+
+    fn cells(&self, cell: f64) -> f64 {
+        let [columns, rows] = self.size(cell);
+        columns * rows
+    }
+
+    fn table(&self, cell: f64) -> Table {
+        let [columns, rows] = self.size(cell).map(|n| n as u32);
+        match &self.shape {
+            Shape::Octahedral => Table::Octahedral(Octahedral::new(columns)),
+            Shape::Polar(range) => Table::PolarAzimuth(PolarAzimuth::new(columns, rows, *range)),
+            Shape::Planar { window, perspective } => {
+                let middle = (window[0] + window[1]) * 0.5;
+                let half = Vec2::new(columns as f32, rows as f32) * (0.5 * cell as f32);
+                let size = [columns, rows];
+                Table::Planar(Planar { min: middle - half, cell: cell as f32, size, perspective: *perspective })
+            }
+        }
+    }
+}
+
+/// The paper's pol_min, pol_max, az_min, az_max: the azimuth leaves out the widest gap between casters.
+fn fit(look: &Appearance) -> PolarRange {
+    let acos = |c: f32| f64::from(c.clamp(-1.0, 1.0)).acos();
+    let mut polar = [acos(look.cosine[1]), acos(look.cosine[0])];
+    if polar[0] >= polar[1] {
+        return PolarRange::SPHERE;
+    }
+    let margin = 0.02 * (polar[1] - polar[0]);
+    polar = [(polar[0] - margin).max(0.0), (polar[1] + margin).min(PI)];
+    let sector = 2.0 * PI / SECTORS as f64;
+    // (length, end) of the widest run of empty sectors, round the circle twice so that it may cross the seam.
+    let (mut run, mut widest) = (0, (0, 0));
+    for s in 0..2 * SECTORS {
+        run = if look.sectors[s % SECTORS] { 0 } else { run + 1 };
+        if run > widest.0 && run <= SECTORS {
+            widest = (run, s + 1);
+        }
+    }
+    // A narrow gap saves nothing, and a pole needs the whole circle.
+    let touches_pole = polar[0] <= 0.0 || polar[1] >= PI;
+    if touches_pole || widest.0 < SECTORS / 8 || widest.0 >= SECTORS {
+        return PolarRange { polar, azimuth: PolarRange::SPHERE.azimuth };
+    }
+    let start = (widest.1 % SECTORS) as f64 * sector;
+    PolarRange { polar, azimuth: [start, (SECTORS - widest.0) as f64 * sector] }
+}
+
+/// Cells of half a median spacing, made coarser by eighths of an octave until entries and cells fit.
+fn automatic_cell(casters: &Casters<'_>, look: &Appearance, extent: &Extent) -> f64 {
+    let Some(spacing) = look.median_spacing() else { return extent.side / 16.0 };
+    let mut cell = (0.5 * spacing).max(extent.side / MAX_SIDE);
+    let budget = FREE_ENTRIES.max(f64::from(casters.params.entries_per_splat) * look.casters() as f64);
+    let most_cells = (4.0 * casters.cloud.len() as f64).clamp(65_536.0, 16_777_216.0);
+    for _ in 0..256 {
+        let cells = extent.cells(cell);
+        if cells <= most_cells && look.covered(cell, cells) <= budget {
+            break;
+        }
+        cell *= 1.090_507_732_665_257_7;
+    }
+    cell.min(extent.side)
+}

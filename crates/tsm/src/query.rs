@@ -1,0 +1,182 @@
+//! Queries beside shadow: lists, first hit, collision with a sphere, isosurface points (Gunjee 2007, Figure 15a).
+
+use crate::ShadowMap;
+use crate::mapping::{Mapping, Ray, with_mapping};
+use crate::shadow_map::{Absorbances, Matter};
+use glam::Vec3;
+use rayon::prelude::*;
+use splat_core::glam;
+
+/// A point where the absorbance seen from the light first reaches a threshold.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfacePoint {
+    /// Position relative to the cloud's origin, world units.
+    pub position: Vec3,
+    /// Unit normal towards the light, from the neighbouring cells.
+    pub normal: Vec3,
+    /// Area that the cell covers at the surface, world units².
+    pub area: f32,
+}
+
+impl ShadowMap {
+    /// The cell that a position, relative to the cloud's origin, lies in; `None` at the light and outside the table.
+    pub fn cell_of(&self, position: Vec3) -> Option<u32> {
+        let p = self.frame.to_light(position);
+        with_mapping!(&self.table, m => {
+            let at = m.locate(p)?.at.floor();
+            m.wrap(at.x as i32, at.y as i32)
+        })
+    }
+
+    /// Entries of a cell by rising distance: (distance in world units, absorbance up to and with it per channel).
+    /// Media and surfaces are merged; an opaque disc is an infinite absorbance at its end. Empty for a cell out of
+    /// range.
+    pub fn list(&self, cell: u32) -> Vec<(f64, [f32; 3])> {
+        let mut entries: Vec<(f32, [f32; 3])> = match &self.absorbances {
+            Absorbances::Mono(matter) => own_absorbances(matter, cell, self.cells()),
+            Absorbances::Rgb(matter) => own_absorbances(matter, cell, self.cells()),
+        };
+        entries.sort_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some(d) = self.opaque.get(cell as usize).filter(|d| d.is_finite()) {
+            entries.push((*d, [f32::INFINITY; 3]));
+        }
+        let mut sum = [0.0f32; 3];
+        let running = entries.into_iter().map(|(distance, own)| {
+            (0..3).for_each(|c| sum[c] += own[c]);
+            (self.frame.world_length(distance), sum)
+        });
+        running.collect()
+    }
+
+    /// Cells of the table.
+    pub fn cells(&self) -> u32 {
+        let [columns, rows] = with_mapping!(&self.table, m => m.size());
+        columns * rows
+    }
+
+    /// Distance from the light, world units, at which the absorbance of a cell reaches `absorbance` in every channel;
+    /// for parallel light the distance from the plane where the table starts. `None` if it never does.
+    pub fn first_hit(&self, cell: u32, absorbance: f32) -> Option<f64> {
+        self.hit_in_frame(cell, absorbance).map(|d| self.frame.world_length(d))
+    }
+
+    /// The first hit towards a position relative to the cloud's origin, as an offset from that origin.
+    pub fn first_hit_towards(&self, position: Vec3, absorbance: f32) -> Option<Vec3> {
+        let cell = self.cell_of(position)?;
+        let distance = self.hit_in_frame(cell, absorbance)?;
+        let p = self.frame.to_light(position);
+        let hit = with_mapping!(&self.table, m => {
+            if m.is_parallel() { p.truncate().extend(distance) } else { p.normalize() * distance }
+        });
+        Some(self.frame.offset(hit))
+    }
+
+    fn hit_in_frame(&self, cell: u32, absorbance: f32) -> Option<f32> {
+        if cell >= self.cells() {
+            return None;
+        }
+        let solid = match &self.absorbances {
+            Absorbances::Mono(matter) => first(matter, cell, absorbance),
+            Absorbances::Rgb(matter) => first(matter, cell, absorbance),
+        };
+        let opaque = self.opaque.get(cell as usize).copied().filter(|d| d.is_finite());
+        match (solid, opaque) {
+            (Some(a), Some(b)) => Some(a.min(b)),
+            (a, b) => a.or(b),
+        }
+    }
+
+    /// Whether any entry lies within `radius` of `center` (relative to the cloud's origin), as seen from the light: on
+    /// the ray of some cell, between the distances at which that ray enters and leaves the sphere. Matter behind the
+    /// visible limit of its cell is not seen. Looks at every cell.
+    pub fn collides(&self, center: Vec3, radius: f32) -> bool {
+        let c = self.frame.to_light(center);
+        let r = self.frame.length(radius);
+        (0..self.cells()).into_par_iter().with_min_len(4096).any(|cell| {
+            let ray = with_mapping!(&self.table, m => m.cell_ray(cell));
+            let p = c - ray.base;
+            let along = p.dot(ray.direction);
+            let chord_sq = r * r - (p - ray.direction * along).length_squared();
+            if chord_sq < 0.0 {
+                return false;
+            }
+            let half = chord_sq.sqrt();
+            let span = along - half..=along + half;
+            let inside = match &self.absorbances {
+                Absorbances::Mono(matter) => any_between(matter, cell, *span.start(), *span.end()),
+                Absorbances::Rgb(matter) => any_between(matter, cell, *span.start(), *span.end()),
+            };
+            inside || self.opaque.get(cell as usize).is_some_and(|d| span.contains(d))
+        })
+    }
+
+    /// The surface that the light sees: for each cell whose absorbance reaches `absorbance`, the point where it first
+    /// does (Gunjee 2007, Figure 15a). Normals come from the points of neighbouring cells; a point whose neighbours
+    /// all miss faces the light.
+    pub fn first_surface(&self, absorbance: f32) -> Vec<SurfacePoint> {
+        with_mapping!(&self.table, m => {
+            let hit = |cell: u32| -> Option<Vec3> {
+                let Ray { base, direction } = m.cell_ray(cell);
+                Some(base + direction * self.hit_in_frame(cell, absorbance)?)
+            };
+            let point = |cell: u32| -> Option<SurfacePoint> {
+                let p = hit(cell)?;
+                let [columns, _] = m.size();
+                let (i, j) = ((cell % columns) as i32, (cell / columns) as i32);
+                let at = |i, j| m.wrap(i, j).and_then(&hit);
+                let along = |a: Option<Vec3>, b: Option<Vec3>| b.unwrap_or(p) - a.unwrap_or(p);
+                let (du, dv) = (along(at(i - 1, j), at(i + 1, j)), along(at(i, j - 1), at(i, j + 1)));
+                let light = -m.cell_ray(cell).direction;
+                let normal = du.cross(dv).try_normalize().unwrap_or(light);
+                let normal = if normal.dot(light) < 0.0 { -normal } else { normal };
+                let spread = if m.is_parallel() { 1.0 } else { p.length_squared() };
+                let facing = normal.dot(light).max(1e-3);
+                let area = self.frame.world_length(1.0).powi(2) * m.measure(cell) * f64::from(spread / facing);
+                Some(SurfacePoint {
+                    position: self.frame.offset(p),
+                    normal: self.frame.world_direction(normal),
+                    area: area as f32,
+                })
+            };
+            (0..self.cells()).into_par_iter().with_min_len(4096).filter_map(point).collect()
+        })
+    }
+}
+
+fn own_absorbances<const C: usize>(matter: &Matter<C>, cell: u32, cells: u32) -> Vec<(f32, [f32; 3])> {
+    let mut own = Vec::new();
+    if cell >= cells {
+        return own;
+    }
+    for lists in [&matter.media, &matter.surfaces].into_iter().flatten() {
+        let mut before = [0.0; C];
+        for knot in lists.list(cell) {
+            own.push((knot.distance, std::array::from_fn(|c| knot.total[c.min(C - 1)] - before[c.min(C - 1)])));
+            before = knot.total;
+        }
+    }
+    own
+}
+
+fn first<const C: usize>(matter: &Matter<C>, cell: u32, absorbance: f32) -> Option<f32> {
+    let lists: Vec<_> = [&matter.media, &matter.surfaces].into_iter().flatten().map(|l| l.list(cell)).collect();
+    let total = |distance: f32| -> f32 {
+        let sums = lists.iter().map(|list| {
+            let n = list.partition_point(|k| k.distance <= distance);
+            if n == 0 { 0.0 } else { list[n - 1].total.iter().copied().fold(f32::INFINITY, f32::min) }
+        });
+        sums.sum()
+    };
+    let candidate = |list: &&[crate::table::Knot<C>]| {
+        let n = list.partition_point(|k| total(k.distance) < absorbance);
+        list.get(n).map(|k| k.distance)
+    };
+    lists.iter().filter_map(candidate).min_by(f32::total_cmp)
+}
+
+fn any_between<const C: usize>(matter: &Matter<C>, cell: u32, from: f32, to: f32) -> bool {
+    [&matter.media, &matter.surfaces].into_iter().flatten().any(|lists| {
+        let list = lists.list(cell);
+        list.get(list.partition_point(|k| k.distance < from)).is_some_and(|k| k.distance <= to)
+    })
+}

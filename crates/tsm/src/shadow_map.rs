@@ -1,0 +1,239 @@
+//! Building a map: survey, plan, opaque discs, deposits, lists (Gunjee 2007, section 4.1, steps 1-3).
+
+use crate::caster::{Caster, Casters, Extinction, Kernel};
+use crate::cost::{Counts, Prediction};
+use crate::deposit::{Deposit, Scratch};
+use crate::frame::Frame;
+use crate::mapping::{Mapping, Table, with_mapping};
+use crate::opaque::OpaqueDepth;
+use crate::plan::{Plan, plan};
+use crate::survey::{CHUNK, Survey};
+use crate::table::{Entries, Lists, Parted, Ranges};
+use crate::{Error, Params};
+use rayon::prelude::*;
+use splat_core::optics::AbsorbanceModel;
+use splat_core::{Cloud, Light, Material, Object, Progress, SplatKind};
+
+/// Media, whose absorbance grows continuously, and surfaces, which are steps.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Matter<const C: usize> {
+    pub(crate) media: Option<Lists<C>>,
+    pub(crate) surfaces: Option<Lists<C>>,
+}
+
+/// Absorbance of one channel for all, or of three.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Absorbances {
+    Mono(Matter<1>),
+    Rgb(Matter<3>),
+}
+
+/// Transmittance from one light to any point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShadowMap {
+    pub(crate) frame: Frame,
+    pub(crate) table: Table,
+    /// Distance of the nearest opaque disc of each cell; empty without any.
+    pub(crate) opaque: Vec<f32>,
+    pub(crate) absorbances: Absorbances,
+    /// Half width of a medium's entry along the ray, in the frame.
+    pub(crate) ramp: f32,
+    /// Receiver's cutoff radius → distance by which it is lifted, as a factor.
+    pub(crate) bias: f32,
+    /// In the paper's model light ends at this absorbance.
+    pub(crate) dark_from: Option<f32>,
+    prediction: Prediction,
+    counts: Counts,
+}
+
+impl ShadowMap {
+    /// Builds the map of one light.
+    ///
+    /// `materials` and `objects` are the scene's tables; an id without an entry means the default material and an
+    /// object that casts shadows. Splats of objects that cast none, and splats of no cross-section, leave no trace.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for parameters out of range or a mapping that does not fit the light, [`Error::Memory`]
+    /// for a table beyond [`Params::max_bytes`], [`Error::Core`] for a light or splat that breaks a promise.
+    pub fn build(
+        cloud: &Cloud,
+        materials: &[Material],
+        objects: &[Object],
+        light: &Light,
+        params: &Params,
+    ) -> Result<Self, Error> {
+        Self::build_with_progress(cloud, materials, objects, light, params, &Progress::new())
+    }
+
+    /// As [`ShadowMap::build`], telling its progress in splats.
+    ///
+    /// # Errors
+    /// Those of [`ShadowMap::build`], and [`splat_core::Error::Cancelled`].
+    pub fn build_with_progress(
+        cloud: &Cloud,
+        materials: &[Material],
+        objects: &[Object],
+        light: &Light,
+        params: &Params,
+        progress: &Progress,
+    ) -> Result<Self, Error> {
+        params.validate()?;
+        light.validate(0)?;
+        let kernels = Kernel::of_stack(&params.footprints);
+        let extinctions = materials.iter().map(Extinction::of).collect();
+        let casters = Casters { cloud, extinctions, objects, kernels, params };
+        let survey = Survey::new(&casters);
+        let plan = plan(&casters, &survey, light)?;
+        progress.add_total(cloud.len() as u64);
+        with_mapping!(&plan.table, m => finish(&casters, &survey, &plan, m, progress))
+    }
+
+    /// 1 when all casters absorb every channel alike, else 3.
+    pub fn channels(&self) -> usize {
+        if matches!(self.absorbances, Absorbances::Mono(_)) { 1 } else { 3 }
+    }
+
+    /// What the build was expected to cost.
+    pub fn prediction(&self) -> Prediction {
+        self.prediction
+    }
+
+    /// What the build did.
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// The mapping from directions to cells.
+    pub fn table(&self) -> &Table {
+        &self.table
+    }
+}
+
+/// Whether the splat goes to the opaque depths rather than to a list.
+fn ends_lists(kind: SplatKind, params: &Params) -> bool {
+    kind == SplatKind::Opaque && params.absorbance == AbsorbanceModel::CrossSection
+}
+
+fn finish<M: Mapping>(
+    casters: &Casters<'_>,
+    survey: &Survey,
+    plan: &Plan,
+    mapping: &M,
+    progress: &Progress,
+) -> Result<ShadowMap, Error> {
+    let opaque = opaque_depths(casters, survey, plan, mapping);
+    let absorbances = if survey.coloured {
+        Absorbances::Rgb(deposit_all(casters, plan, mapping, &opaque, progress)?)
+    } else {
+        Absorbances::Mono(deposit_all(casters, plan, mapping, &opaque, progress)?)
+    };
+    let params = casters.params;
+    let cutoff = params.footprints.layers()[0].cutoff;
+    let [columns, rows] = mapping.size().map(u64::from);
+    let mut map = ShadowMap {
+        frame: plan.frame,
+        table: plan.table.clone(),
+        opaque,
+        absorbances,
+        ramp: 0.5 * plan.frame.length(survey.mean_medium_radius()),
+        bias: params.bias / (cutoff * splat_core::Footprint::SIGMA_OVER_SPACING),
+        dark_from: (params.absorbance == AbsorbanceModel::Paper).then(|| params.absorbance_limit()),
+        prediction: plan.prediction,
+        counts: Counts {
+            casters: survey.casters,
+            translucent: survey.kinds[SplatKind::Medium as usize] + survey.kinds[SplatKind::Surface as usize],
+            cells: columns * rows,
+            ..Counts::default()
+        },
+    };
+    map.count();
+    Ok(map)
+}
+
+impl ShadowMap {
+    fn count(&mut self) {
+        fn add<const C: usize>(matter: &Matter<C>, counts: &mut Counts) {
+            for lists in [&matter.media, &matter.surfaces].into_iter().flatten() {
+                counts.entries += lists.entries();
+                counts.kept += lists.knots();
+                counts.bytes += lists.bytes();
+            }
+        }
+        match &self.absorbances {
+            Absorbances::Mono(m) => add(m, &mut self.counts),
+            Absorbances::Rgb(m) => add(m, &mut self.counts),
+        }
+        self.counts.bytes += 4 * self.opaque.len() as u64;
+        if let Table::Octahedral(m) = &self.table {
+            self.counts.bytes += crate::mapping::Octahedral::bytes(m.size()[0]);
+        }
+    }
+}
+
+fn opaque_depths<M: Mapping>(casters: &Casters<'_>, survey: &Survey, plan: &Plan, mapping: &M) -> Vec<f32> {
+    if survey.kinds[SplatKind::Opaque as usize] == 0 || casters.params.absorbance == AbsorbanceModel::Paper {
+        return Vec::new();
+    }
+    let [columns, rows] = mapping.size();
+    let depth = OpaqueDepth::new(columns as usize * rows as usize);
+    let cloud = casters.cloud;
+    (0..cloud.len().div_ceil(CHUNK)).into_par_iter().for_each(|c| {
+        let chunk = c * CHUNK..cloud.len().min((c + 1) * CHUNK);
+        for i in chunk.filter(|&i| cloud.kind[i] == SplatKind::Opaque && casters.casts(i)) {
+            depth.add(mapping, &casters.get(i, &plan.frame, mapping.is_parallel()));
+        }
+    });
+    depth.into_distances()
+}
+
+type PartedPair<const C: usize> = (Parted<C>, Parted<C>);
+
+fn deposit_all<M: Mapping, const C: usize>(
+    casters: &Casters<'_>,
+    plan: &Plan,
+    mapping: &M,
+    opaque: &[f32],
+    progress: &Progress,
+) -> Result<Matter<C>, Error> {
+    let cloud = casters.cloud;
+    let [columns, rows] = mapping.size();
+    let ranges = Ranges::new(columns as usize * rows as usize);
+    let chunks: Vec<PartedPair<C>> = (0..cloud.len().div_ceil(CHUNK))
+        .into_par_iter()
+        .map_init(Scratch::default, |scratch, c| {
+            let chunk = c * CHUNK..cloud.len().min((c + 1) * CHUNK);
+            progress.tick(chunk.len() as u64)?;
+            let mut deposit = Deposit {
+                mapping,
+                opaque,
+                media: Entries::default(),
+                surfaces: Entries::default(),
+                scratch: std::mem::take(scratch),
+            };
+            for i in chunk.filter(|&i| casters.casts(i) && !ends_lists(cloud.kind[i], casters.params)) {
+                let caster: Caster = casters.get(i, &plan.frame, mapping.is_parallel());
+                deposit.add(&caster);
+            }
+            *scratch = deposit.scratch;
+            Ok((Parted::new(&deposit.media, ranges), Parted::new(&deposit.surfaces, ranges)))
+        })
+        .collect::<Result<_, Error>>()?;
+    let (media, surfaces): (Vec<_>, Vec<_>) = chunks.into_iter().unzip();
+    let limit = casters.params.absorbance_limit();
+    Ok(Matter { media: lists(&media, ranges, limit, casters)?, surfaces: lists(&surfaces, ranges, limit, casters)? })
+}
+
+fn lists<const C: usize>(
+    parted: &[Parted<C>],
+    ranges: Ranges,
+    limit: f32,
+    casters: &Casters<'_>,
+) -> Result<Option<Lists<C>>, Error> {
+    let entries: u64 = parted.iter().map(|p| p.len() as u64).sum();
+    let needed_bytes = entries * (2 * size_of::<crate::table::Knot<C>>() as u64 + 4);
+    let limit_bytes = casters.params.max_bytes;
+    if entries > u64::from(u32::MAX) || needed_bytes > limit_bytes {
+        return Err(Error::Memory { what: "the lists", needed_bytes, limit_bytes });
+    }
+    Ok((entries > 0).then(|| Lists::new(parted, ranges, limit)))
+}

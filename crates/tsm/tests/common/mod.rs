@@ -1,0 +1,97 @@
+//! Clouds and lights that the tests share.
+#![allow(dead_code, clippy::unwrap_used, reason = "each test file takes a part; a test fails by panicking")]
+
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::{Cloud, Footprint, Light, LightShape, Material, Receiver, Splat, SplatKind, Transmittance};
+use tsm::{Params, ShadowMap};
+
+pub(crate) fn point_light(position: DVec3) -> Light {
+    Light { shape: LightShape::Point { position }, intensity: [1.0; 3] }
+}
+
+pub(crate) fn directional(direction: DVec3) -> Light {
+    Light { shape: LightShape::Directional { direction: direction.normalize() }, intensity: [1.0; 3] }
+}
+
+pub(crate) fn build(cloud: &Cloud, light: &Light, params: &Params) -> ShadowMap {
+    ShadowMap::build(cloud, &[Material::default()], &[], light, params).unwrap()
+}
+
+/// A bare point that is no part of any medium.
+pub(crate) fn probe(position: Vec3) -> Receiver {
+    Receiver { position, normal: Vec3::ZERO, radius: 0.0, kind: SplatKind::Medium }
+}
+
+pub(crate) fn light_at(map: &ShadowMap, position: Vec3) -> f32 {
+    map.transmittance(&probe(position))[0]
+}
+
+/// Media splats on a lattice of spacing `h` wherever `inside` holds, of extinction `sigma_t`.
+pub(crate) fn medium(size: [i32; 3], h: f32, sigma_t: f32, inside: impl Fn(Vec3) -> bool) -> Cloud {
+    let mut cloud = Cloud::new(DVec3::ZERO);
+    let radius = Footprint::default().radius_for_spacing(h);
+    for z in -size[2]..=size[2] {
+        for y in -size[1]..=size[1] {
+            for x in -size[0]..=size[0] {
+                let position = Vec3::new(x as f32, y as f32, z as f32) * h;
+                if inside(position) {
+                    cloud.push(&Splat { position, radius, cross_section: sigma_t * h * h * h, ..Splat::default() });
+                }
+            }
+        }
+    }
+    cloud
+}
+
+/// A square lattice of discs in the plane through `centre` across `normal`, `n` a side.
+pub(crate) fn plane(centre: Vec3, normal: Vec3, n: i32, h: f32, kind: SplatKind, depth: f32) -> Cloud {
+    let mut cloud = Cloud::new(DVec3::ZERO);
+    let normal = normal.normalize();
+    let u = normal.any_orthonormal_vector();
+    let v = normal.cross(u);
+    let radius = Footprint::default().radius_for_spacing(h);
+    for j in -n..=n {
+        for i in -n..=n {
+            let position = centre + (u * i as f32 + v * j as f32) * h;
+            let cross_section = depth * h * h;
+            cloud.push(&Splat { position, radius, cross_section, kind, normal, ..Splat::default() });
+        }
+    }
+    cloud
+}
+
+pub(crate) fn receiver(cloud: &Cloud, i: usize) -> Receiver {
+    Receiver {
+        position: cloud.position[i],
+        normal: cloud.normal_of(i),
+        radius: cloud.radius[i],
+        kind: cloud.kind[i],
+    }
+}
+
+/// Random unit vector.
+pub(crate) fn direction(seed: u64, item: u64) -> Vec3 {
+    let z = 2.0 * splat_core::rng::unit(seed, 0, item, 0) - 1.0;
+    let phi = std::f64::consts::TAU * splat_core::rng::unit(seed, 0, item, 1);
+    let s = (1.0 - z * z).sqrt();
+    Vec3::new((s * phi.cos()) as f32, (s * phi.sin()) as f32, z as f32)
+}
+
+/// A cloud of media, surfaces and opaque discs at random places around `origin`.
+pub(crate) fn mixed(n: u64, origin: DVec3) -> Cloud {
+    let mut cloud = Cloud::new(origin);
+    let unit = |i, k| splat_core::rng::unit_f32(17, 3, i, k);
+    for i in 0..n {
+        // Multiples of 1/1024: exact at any origin up to 1e10 and at any power of two.
+        let grid = |k| (unit(i, k) * 2048.0).round() / 1024.0 - 1.0;
+        cloud.push(&Splat {
+            position: Vec3::new(grid(0), grid(1), grid(2)),
+            radius: 0.02 + 0.06 * unit(i, 3),
+            cross_section: 1e-3 * unit(i, 4),
+            kind: [SplatKind::Medium, SplatKind::Surface, SplatKind::Medium, SplatKind::Opaque][(i % 4) as usize],
+            normal: if i % 2 == 1 { direction(5, i) } else { Vec3::ZERO },
+            ..Splat::default()
+        });
+    }
+    cloud
+}

@@ -1,0 +1,227 @@
+//! X1-X4, TS12, TS14: threads, permutation, shift, scale, linearity, memory.
+
+use common::*;
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::{Cloud, Light, LightShape, SplatKind, Transmittance};
+use tsm::{Error, MappingChoice, Params, Resolution, ShadowMap};
+
+mod common;
+
+fn lights() -> [Light; 4] {
+    let position = DVec3::new(0.25, -0.5, 0.125);
+    let direction = DVec3::new(0.0, -0.6, 0.8);
+    [
+        point_light(position),
+        point_light(DVec3::new(0.5, 6.0, 1.0)),
+        directional(DVec3::new(1.0, -2.0, 0.5)),
+        Light { shape: LightShape::Spot { position: -direction * 3.0, direction, inner: 0.3, outer: 0.5 }, intensity: [1.0; 3] },
+    ]
+}
+
+fn shine(map: &ShadowMap, cloud: &Cloud) -> Vec<u32> {
+    (0..cloud.len()).map(|i| map.transmittance(&receiver(cloud, i))[0].to_bits()).collect()
+}
+
+#[test]
+fn x1_thread_counts_change_no_bit() {
+    let cloud = mixed(20_000, DVec3::ZERO);
+    for light in lights() {
+        let maps = [1, 2, 3, 7].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| build(&cloud, &light, &Params::default()))
+        });
+        assert!(maps.iter().all(|m| *m == maps[0]));
+    }
+}
+
+#[test]
+fn x4_shuffled_clouds_make_the_same_map() {
+    let mut forward = mixed(9000, DVec3::ZERO);
+    let ids: Vec<u32> = (0..forward.len() as u32).rev().collect();
+    let mut backward = forward.gather(&ids);
+    // Lists are order-free by themselves; only the mean radius of media needs the canonical order.
+    forward.canonicalize();
+    backward.canonicalize();
+    for light in lights() {
+        let [a, b] = [&forward, &backward].map(|c| build(c, &light, &Params::default()));
+        assert!(a == b);
+    }
+}
+
+#[test]
+fn x2_shift_by_1e7_changes_nothing() {
+    let shift = DVec3::new(1e7, -1e7, 1e7);
+    let [near, far] = [DVec3::ZERO, shift].map(|origin| mixed(9000, origin));
+    for light in lights() {
+        let mut moved = light;
+        match &mut moved.shape {
+            LightShape::Point { position } | LightShape::Spot { position, .. } => *position += shift,
+            _ => {}
+        }
+        let a = build(&near, &light, &Params::default());
+        let b = build(&far, &moved, &Params::default());
+        let worst = (0..near.len()).fold(0.0f32, |m, i| {
+            m.max((a.transmittance(&receiver(&near, i))[0] - b.transmittance(&receiver(&far, i))[0]).abs())
+        });
+        let exact = matches!(light.shape, LightShape::Point { .. } | LightShape::Directional { .. });
+        assert!(if exact { worst == 0.0 } else { worst < 0.05 }, "{:?}: {worst}", light.shape);
+    }
+}
+
+fn scaled(cloud: &Cloud, s: f32) -> Cloud {
+    let mut out = cloud.clone();
+    out.origin *= f64::from(s);
+    out.position.iter_mut().for_each(|p| *p *= s);
+    out.radius.iter_mut().for_each(|r| *r *= s);
+    out.cross_section.iter_mut().for_each(|k| *k *= s * s);
+    out
+}
+
+#[test]
+fn ts12_x3_scaling_by_powers_of_two_changes_no_bit() {
+    let cloud = mixed(9000, DVec3::ZERO);
+    for light in lights() {
+        let base = shine(&build(&cloud, &light, &Params::default()), &cloud);
+        for exponent in [-40, -10, 10, 40] {
+            let s = 2f32.powi(exponent);
+            let big = scaled(&cloud, s);
+            let mut moved = light;
+            match &mut moved.shape {
+                LightShape::Point { position } | LightShape::Spot { position, .. } => *position *= f64::from(s),
+                _ => {}
+            }
+            let map = build(&big, &moved, &Params::default());
+            assert!(base == shine(&map, &big), "2^{exponent}, {:?}", light.shape);
+        }
+    }
+}
+
+#[test]
+fn ts13_lights_add() {
+    // Each light has its own map: the order of lights cannot matter, and light A + light B is both.
+    let cloud = mixed(5000, DVec3::ZERO);
+    let [a, b] = [lights()[0], lights()[1]];
+    let irradiance = |lights: &[Light]| -> Vec<f32> {
+        let maps: Vec<ShadowMap> = lights.iter().map(|l| build(&cloud, l, &Params::default())).collect();
+        let at = |i: usize| {
+            let r = receiver(&cloud, i);
+            let arriving = maps.iter().zip(lights).map(|(map, light)| {
+                map.transmittance(&r)[0] * light.irradiance(cloud.position[i].as_dvec3(), 0.0).1[0]
+            });
+            arriving.sum()
+        };
+        (0..cloud.len()).map(at).collect()
+    };
+    let (both, swapped) = (irradiance(&[a, b]), irradiance(&[b, a]));
+    assert_eq!(both, swapped);
+    let (only_a, only_b) = (irradiance(&[a]), irradiance(&[b]));
+    for i in 0..cloud.len() {
+        assert!((both[i] - only_a[i] - only_b[i]).abs() <= 1e-6 * both[i].max(1.0));
+    }
+}
+
+#[test]
+fn ts14_one_cell_works_and_a_huge_table_is_refused_with_its_bytes() {
+    let cloud = mixed(1000, DVec3::ZERO);
+    let light = lights()[1];
+    for mapping in [MappingChoice::Octahedral, MappingChoice::PolarAzimuth, MappingChoice::Planar] {
+        let params = |n| Params { mapping, resolution: Resolution::Cells(n), ..Params::default() };
+        let map = build(&cloud, &light, &params(1));
+        assert!((0..cloud.len()).all(|i| (0.0..=1.0).contains(&map.transmittance(&receiver(&cloud, i))[0])));
+        let refused = ShadowMap::build(&cloud, &[], &[], &light, &params(65_536 * 4)).unwrap_err();
+        let Error::Memory { needed_bytes, limit_bytes, .. } = refused else { panic!("{refused}") };
+        assert!(needed_bytes > limit_bytes && refused.to_string().contains(&needed_bytes.to_string()));
+    }
+}
+
+#[test]
+fn bad_parameters_are_refused_by_name() {
+    let cloud = mixed(10, DVec3::ZERO);
+    let light = lights()[0];
+    for (params, name) in [
+        (Params { tolerance: 0.0, ..Params::default() }, "tolerance"),
+        (Params { tolerance: f32::NAN, ..Params::default() }, "tolerance"),
+        (Params { entries_per_splat: 0.5, ..Params::default() }, "entries_per_splat"),
+        (Params { opaque_dilation: f32::INFINITY, ..Params::default() }, "opaque_dilation"),
+        (Params { bias: -1.0, ..Params::default() }, "bias"),
+        (Params { resolution: Resolution::Cells(0), ..Params::default() }, "resolution"),
+        (Params { mapping: MappingChoice::Planar, ..Params::default() }, "mapping"),
+    ] {
+        let error = ShadowMap::build(&cloud, &[], &[], &light, &params).unwrap_err();
+        assert!(matches!(error, Error::Parameter { name: found, .. } if found == name), "{error}");
+    }
+    let broken = point_light(DVec3::new(f64::NAN, 0.0, 0.0));
+    assert!(matches!(ShadowMap::build(&cloud, &[], &[], &broken, &Params::default()), Err(Error::Core(_))));
+}
+
+#[test]
+fn empty_clouds_cast_no_shadow_and_cancelled_builds_stop() {
+    let empty = Cloud::new(DVec3::ZERO);
+    for light in lights() {
+        let map = build(&empty, &light, &Params::default());
+        assert_eq!(light_at(&map, Vec3::new(0.3, 0.2, 0.1)), 1.0);
+        assert_eq!(map.counts().entries, 0);
+    }
+    let progress = splat_core::Progress::new();
+    progress.cancel();
+    let cloud = mixed(100, DVec3::ZERO);
+    let stopped = ShadowMap::build_with_progress(&cloud, &[], &[], &lights()[0], &Params::default(), &progress);
+    assert_eq!(stopped.unwrap_err(), Error::Core(splat_core::Error::Cancelled));
+}
+
+#[test]
+fn predicted_work_is_near_the_counted() {
+    for light in lights() {
+        let cloud = medium([25; 3], 0.04, 1.0, |p| p.length() < 1.0);
+        for resolution in [Resolution::Auto, Resolution::Cells(64), Resolution::Cells(256)] {
+            let map = build(&cloud, &light, &Params { resolution, ..Params::default() });
+            let (p, c) = (map.prediction(), map.counts());
+            let ratio = p.entries / c.entries as f64;
+            println!("{:?} {resolution:?}: {p:?} {c:?} ratio {ratio:.2}", light.shape);
+            assert!((0.4..2.5).contains(&ratio) || matches!(light.shape, LightShape::Spot { .. }), "{ratio}");
+            assert!(c.bytes <= 2 * p.bytes);
+            assert!(c.kept <= c.entries && c.translucent == c.casters);
+        }
+    }
+}
+
+#[test]
+fn queries_find_what_the_light_meets() {
+    let mut cloud = plane(Vec3::Z * 3.0, Vec3::NEG_Z, 20, 0.05, SplatKind::Opaque, 1.0);
+    cloud.append(&plane(Vec3::Z * 2.0, Vec3::NEG_Z, 20, 0.05, SplatKind::Surface, 1.0));
+    let map = build(&cloud, &point_light(DVec3::ZERO), &Params::default());
+    let cell = map.cell_of(Vec3::new(0.01, 0.02, 1.0)).unwrap();
+    for (absorbance, distance) in [(0.5, 2.0), (1.5, 3.0)] {
+        assert!((map.first_hit(cell, absorbance).unwrap() - distance).abs() < 1e-2);
+        let hit = map.first_hit_towards(Vec3::new(0.1, 0.2, 1.0), absorbance).unwrap();
+        assert!((f64::from(hit.z) - distance).abs() < 2e-2, "{hit}");
+    }
+    let list = map.list(cell);
+    assert!(list.windows(2).all(|w| w[0].0 <= w[1].0));
+    assert!(list.last().unwrap().1[0].is_infinite());
+    for (z, radius, hits) in [(2.0, 0.1, true), (2.5, 0.3, false), (3.0, 0.2, true), (1.0, 0.5, false)] {
+        assert_eq!(map.collides(Vec3::new(0.05, 0.0, z), radius), hits, "sphere at {z}");
+    }
+    assert!(!map.collides(Vec3::new(3.0, 0.0, 2.0), 0.5));
+    assert!(map.list(u32::MAX).is_empty() && map.first_hit(u32::MAX, 0.1).is_none());
+}
+
+#[test]
+fn first_surface_is_the_isosurface_that_the_light_sees() {
+    let h = 0.04;
+    let cloud = medium([26; 3], h, 40.0, |p| p.length() < 1.0);
+    let map = build(&cloud, &point_light(DVec3::Z * 4.0), &Params::default());
+    let points = map.first_surface(0.5);
+    assert!(points.len() > 500);
+    let mut area = 0.0;
+    for p in &points {
+        let r = p.position.length();
+        if p.position.normalize().dot(Vec3::Z) > 0.5 {
+            assert!((r - 1.0).abs() < 2.0 * h, "{r}");
+            assert!(p.normal.dot(p.position.normalize()) > 0.7, "{p:?}");
+            area += p.area;
+        }
+    }
+    // The cap beyond 60° of the axis has π of area.
+    assert!((area / std::f32::consts::PI - 1.0).abs() < 0.1, "{area}");
+}

@@ -1,0 +1,315 @@
+//! TS1, TS3, TS8-TS13, TS16: how much light arrives.
+
+use common::*;
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::optics::AbsorbanceModel;
+use splat_core::{Cloud, Material, Object, Receiver, Splat, SplatKind, Transmittance};
+use tsm::{MappingChoice, Params, Resolution, ShadowMap};
+
+mod common;
+
+#[test]
+fn ts01_light_exactly_on_a_point() {
+    let mut cloud = Cloud::new(DVec3::ZERO);
+    cloud.push(&Splat { radius: 0.1, cross_section: 1e-3, ..Splat::default() });
+    for i in 0..500 {
+        let normal = -direction(1, i);
+        let kind = SplatKind::Surface;
+        cloud.push(&Splat { position: -normal, radius: 0.05, cross_section: 1e-3, kind, normal, ..Splat::default() });
+    }
+    for mapping in [MappingChoice::Auto, MappingChoice::PolarAzimuth] {
+        let map = build(&cloud, &point_light(DVec3::ZERO), &Params { mapping, ..Params::default() });
+        let lights: Vec<f32> = (1..501).map(|i| map.transmittance(&receiver(&cloud, i))[0]).collect();
+        // The splat around the light shadows all directions by half its chord through the middle.
+        let f = splat_core::Footprint::default();
+        let expected = (-0.5 * 1e-3 * f.norm() * f.profile(0.0) / 0.01).exp() as f32;
+        for light in &lights {
+            assert!((light - expected).abs() < 1e-6, "{light}, not {expected}");
+        }
+        assert_eq!(light_at(&map, Vec3::ZERO), 1.0, "the light itself is lit");
+    }
+}
+
+#[test]
+fn ts03_ring_of_equal_points_gets_equal_light() {
+    let n = 64;
+    let mut cloud = Cloud::new(DVec3::ZERO);
+    for k in 0..n {
+        let (s, c) = (std::f32::consts::TAU * k as f32 / n as f32).sin_cos();
+        for r in [1.0, 2.0] {
+            cloud.push(&Splat { position: Vec3::new(r * c, r * s, 0.0), radius: 0.04, cross_section: 1e-3, ..Splat::default() });
+        }
+    }
+    let resolution = Resolution::Cells(256);
+    let mapping = MappingChoice::PolarAzimuth;
+    let map = build(&cloud, &point_light(DVec3::ZERO), &Params { mapping, resolution, ..Params::default() });
+    let outer: Vec<f32> = (0..n).map(|k| map.transmittance(&receiver(&cloud, 2 * k + 1))[0]).collect();
+    let spread = outer.iter().fold(0.0f32, |m, t| m.max((t - outer[0]).abs()));
+    assert!(outer[0] < 0.95 && spread < 2e-4, "{} ± {spread}", outer[0]);
+}
+
+#[test]
+fn ts09_error_of_the_limit_is_bounded_by_it() {
+    let cloud = medium([12, 12, 30], 0.05, 12.0, |_| true);
+    let light = directional(DVec3::Z);
+    let exact = build(&cloud, &light, &Params { tolerance: 1e-30, ..Params::default() });
+    let mut last = f32::INFINITY;
+    for limit in [2.0f32, 4.0, 8.0, 16.0] {
+        let tolerance = (-limit).exp();
+        let map = build(&cloud, &light, &Params { tolerance, ..Params::default() });
+        let error = (0..200).map(|i| {
+            let p = Vec3::new(0.0, 0.0, -1.6 + 0.017 * i as f32);
+            (light_at(&map, p) - light_at(&exact, p)).abs()
+        });
+        let error = error.fold(0.0, f32::max);
+        assert!(error <= tolerance && error < 0.5 * last, "limit {limit}: {error}");
+        assert!(map.counts().kept <= exact.counts().kept);
+        last = error;
+    }
+}
+
+#[test]
+fn ts10_light_inside_a_ball() {
+    let (h, sigma, r) = (0.08, 1.5, 1.0);
+    let mut cloud = medium([14; 3], h, sigma, |p| p.length() < r + h);
+    // A splat stands for the part of its voxel that lies in the ball: without that the ball would be rough.
+    for i in 0..cloud.len() {
+        let part = |k: i32| (k as f32 - 3.5) * h / 8.0;
+        let inside = |k: &i32| {
+            let d = Vec3::new(part(k % 8), part(k / 8 % 8), part(k / 64));
+            (cloud.position[i] + d).length() < r
+        };
+        cloud.cross_section[i] *= (0..512).filter(inside).count() as f32 / 512.0;
+    }
+    for offset in [Vec3::ZERO, Vec3::new(0.37, 0.21, 0.11) * h] {
+        let map = build(&cloud, &point_light(offset.as_dvec3()), &Params::default());
+        let lights: Vec<f64> = (0..2000).map(|i| f64::from(light_at(&map, offset + direction(3, i) * 2.0))).collect();
+        let mean = lights.iter().sum::<f64>() / 2000.0;
+        let deviation = (lights.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / 2000.0).sqrt();
+        // The lattice ball is no perfect sphere: its own optical depth by brute force is the truth.
+        let truth: Vec<f64> = (0..2000)
+            .map(|i| {
+                let to = (offset + direction(3, i) * 2.0).as_dvec3();
+                (-tsm::reference::optical_depth(&cloud, &Params::default().footprints, offset.as_dvec3(), to)).exp()
+            })
+            .collect();
+        let true_mean = truth.iter().sum::<f64>() / 2000.0;
+        let worst = lights.iter().zip(&truth).fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
+        let rough = (truth.iter().map(|t| (t - true_mean).powi(2)).sum::<f64>() / 2000.0).sqrt();
+        println!("{:?} rough {rough} mean {mean} ({true_mean}, e^-σR {}) σ {deviation} worst {worst}", map.counts(), (-sigma * r).exp());
+        assert!((mean - true_mean).abs() < 1e-3, "mean {mean}, truth {true_mean}");
+        assert!((mean - f64::from((-sigma * r).exp())).abs() < 5e-3);
+        assert!(worst < 1.5e-2, "{worst}");
+    }
+}
+
+#[test]
+fn ts11_coincident_points_get_equal_light() {
+    let mut cloud = Cloud::new(DVec3::ZERO);
+    for color in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] {
+        cloud.push(&Splat { position: Vec3::Z, radius: 0.1, cross_section: 0.01, color, ..Splat::default() });
+    }
+    let map = build(&cloud, &point_light(DVec3::ZERO), &Params::default());
+    let [a, b] = [0, 1].map(|i| map.transmittance(&receiver(&cloud, i))[0]);
+    assert_eq!(a.to_bits(), b.to_bits());
+    // Half the absorbance of both, as the table sees it.
+    let behind = light_at(&map, Vec3::Z * 2.0);
+    assert!((a - behind.sqrt()).abs() < 0.02 && a < 0.8, "{a} and {behind}");
+}
+
+#[test]
+fn ts13_opaque_and_translucent_in_every_order() {
+    let sheet = |z: f32, kind, depth| plane(Vec3::Z * z, Vec3::NEG_Z, 30, 0.05, kind, depth);
+    let light = point_light(DVec3::ZERO);
+    let probe_at = |cloud: &Cloud, z: f32| light_at(&build(cloud, &light, &Params::default()), Vec3::Z * z);
+    let half = std::f32::consts::LN_2;
+    // Translucent, then opaque.
+    let mut cloud = sheet(2.0, SplatKind::Surface, half);
+    cloud.append(&sheet(3.0, SplatKind::Opaque, 1.0));
+    for (z, light) in [(1.0, 1.0), (2.5, 0.5), (3.5, 0.0)] {
+        assert!((probe_at(&cloud, z) - light).abs() < 2e-3, "{z}: {}", probe_at(&cloud, z));
+    }
+    // Opaque, then translucent.
+    let mut cloud = sheet(3.0, SplatKind::Surface, half);
+    cloud.append(&sheet(2.0, SplatKind::Opaque, 1.0));
+    for (z, light) in [(1.0, 1.0), (2.5, 0.0), (3.5, 0.0)] {
+        assert_eq!(probe_at(&cloud, z), light, "{z}");
+    }
+    // Two translucent ones.
+    let mut cloud = sheet(2.0, SplatKind::Surface, half);
+    cloud.append(&sheet(3.0, SplatKind::Surface, half));
+    for (z, light) in [(2.5, 0.5), (3.5, 0.25)] {
+        assert!((probe_at(&cloud, z) - light).abs() < 2e-3);
+    }
+}
+
+#[test]
+fn ts13_objects_that_cast_no_shadow_leave_no_trace() {
+    let cloud = plane(Vec3::Z * 2.0, Vec3::NEG_Z, 5, 0.05, SplatKind::Opaque, 1.0);
+    let objects = [Object { name: "ghost".into(), casts_shadow: false, shadow_coefficient: 1.0 }];
+    let map = ShadowMap::build(&cloud, &[], &objects, &point_light(DVec3::ZERO), &Params::default()).unwrap();
+    assert_eq!(map.counts().casters, 0);
+    assert_eq!(light_at(&map, Vec3::Z * 3.0), 1.0);
+}
+
+#[test]
+fn ts16_deposits_keep_the_cross_section_in_any_table() {
+    for (k, kind) in [SplatKind::Medium, SplatKind::Surface].into_iter().enumerate() {
+        for n in [1, 3, 64, 200, 513, 1024, 4096] {
+            for seed in 0..6 {
+                let p = direction(8, 10 * seed + k as u64) * 2.0;
+                let mut cloud = Cloud::new(DVec3::ZERO);
+                let normal = (direction(9, seed) - p).normalize();
+                cloud.push(&Splat { position: p, radius: 0.03, cross_section: 0.002, kind, normal, ..Splat::default() });
+                for mapping in [MappingChoice::Octahedral, MappingChoice::PolarAzimuth] {
+                    let params = Params { mapping, resolution: Resolution::Cells(n), ..Params::default() };
+                    let map = build(&cloud, &point_light(DVec3::ZERO), &params);
+                    let measured = cross_section(&map);
+                    let cosine = if kind == SplatKind::Medium { 1.0 } else { f64::from(p.normalize().dot(normal)).abs() };
+                    let ratio = measured / (0.002 * cosine);
+                    assert!((ratio - 1.0).abs() < 1e-4 + 1e-4 / cosine, "{kind:?} {mapping:?} {n} {seed}: {ratio}");
+                }
+            }
+        }
+    }
+}
+
+/// Σ A·Ω·d² of a map with one splat at distance 2.
+fn cross_section(map: &ShadowMap) -> f64 {
+    use tsm::mapping::{Mapping, Table};
+    let measure = |cell| match map.table() {
+        Table::Octahedral(m) => m.measure(cell),
+        Table::PolarAzimuth(m) => m.measure(cell),
+        Table::Planar(m) => m.measure(cell),
+    };
+    let own = |cell| map.list(cell).last().map_or(0.0, |e| f64::from(e.1[0])) * measure(cell) * 4.0;
+    (0..map.cells()).map(own).sum()
+}
+
+#[test]
+fn ts16_mean_transmittance_does_not_depend_on_the_table() {
+    // One layer of optical depth 1, so that 4096 rows fit.
+    let cloud = medium([10, 10, 0], 0.1, 10.0, |_| true);
+    for mapping in [MappingChoice::Octahedral, MappingChoice::PolarAzimuth, MappingChoice::Planar] {
+        let light = point_light(DVec3::new(0.05, 0.02, -3.0));
+        // A planar table spends all its cells on the casters.
+        let sizes = if mapping == MappingChoice::Planar { [16, 32, 64, 128, 256, 512] } else { [64, 128, 256, 512, 1024, 4096] };
+        let means: Vec<f64> = sizes
+            .into_iter()
+            .map(|n| {
+                let params = Params { mapping, resolution: Resolution::Cells(n), ..Params::default() };
+                let map = build(&cloud, &light, &params);
+                let sum: f64 = (0..4000)
+                    .map(|i| {
+                        let u = |k| (splat_core::rng::unit_f32(2, 0, i, k) - 0.5) * 0.8;
+                        f64::from(light_at(&map, Vec3::new(u(0), u(1), 0.6)))
+                    })
+                    .sum();
+                sum / 4000.0
+            })
+            .collect();
+        println!("{mapping:?} {means:?}");
+        for mean in &means[1..] {
+            assert!((mean - means[5]).abs() < 1e-3, "{mapping:?}: {means:?}");
+        }
+    }
+}
+
+#[test]
+fn slab_shadow_is_beers_law_with_little_ripple() {
+    for tau in [0.01f64, 1.0, 5.0] {
+        let h = 0.05;
+        let cloud = medium([40, 40, 5], h, (tau / (11.0 * f64::from(h))) as f32, |_| true);
+        let light = directional(DVec3::Z);
+        let mut ripples = Vec::new();
+        for resolution in [Resolution::Auto, Resolution::Cells(32), Resolution::Cells(64), Resolution::Cells(256)] {
+            let map = build(&cloud, &light, &Params { resolution, ..Params::default() });
+            let lights: Vec<f64> = (0..20_000)
+                .map(|i| {
+                    let u = |k| (splat_core::rng::unit_f32(3, 0, i, k) - 0.5) * 2.0;
+                    f64::from(light_at(&map, Vec3::new(u(0), u(1), 1.0)))
+                })
+                .collect();
+            let mean = lights.iter().sum::<f64>() / lights.len() as f64;
+            let ripple = lights.iter().fold(0.0f64, |m, t| m.max((t - mean).abs()));
+            println!("τ {tau} {resolution:?} {:?} mean error {:.2e} ripple {ripple:.2e}", map.counts(), mean - (-tau).exp());
+            assert!((mean - (-tau).exp()).abs() < 1e-4, "τ {tau} {resolution:?}: {mean}");
+            assert!(ripple < 1e-2, "τ {tau} {resolution:?}: ripple {ripple}");
+            ripples.push(ripple);
+        }
+        assert!(ripples[3] < ripples[1]);
+    }
+}
+
+#[test]
+fn inside_a_slab_light_falls_as_beers_law() {
+    let cloud = medium([30, 30, 30], 0.05, 1.0, |_| true);
+    let map = build(&cloud, &directional(DVec3::Z), &Params::default());
+    for k in -25..=25 {
+        let z = k as f32 * 0.05;
+        let light = f64::from(light_at(&map, Vec3::new(0.013, 0.007, z)));
+        let truth = (-f64::from(z + 30.5 * 0.05)).exp();
+        assert!((light - truth).abs() < 6e-3, "z {z}: {light}, not {truth}");
+    }
+}
+
+#[test]
+fn colours_are_absorbed_one_by_one() {
+    let cloud = plane(Vec3::Z * 2.0, Vec3::NEG_Z, 30, 0.05, SplatKind::Surface, 1.0);
+    let materials = [Material { extinction_rgb: [0.5, 1.0, 2.0], ..Material::default() }];
+    let map = ShadowMap::build(&cloud, &materials, &[], &point_light(DVec3::ZERO), &Params::default()).unwrap();
+    assert_eq!(map.channels(), 3);
+    let light = map.transmittance(&probe(Vec3::Z * 3.0));
+    for (c, depth) in [0.5f32, 1.0, 2.0].into_iter().enumerate() {
+        assert!((light[c] - (-depth).exp()).abs() < 2e-3, "{light:?}");
+    }
+    assert_eq!(build(&cloud, &point_light(DVec3::ZERO), &Params::default()).channels(), 1);
+}
+
+#[test]
+fn absorption_from_kappa_and_wavelength_is_equation_7() {
+    // Water at 700 nm: κ = 3.35e-8, so α = 4πκ/λ = 0.601 per metre; a slab of 2 m passes e^−1.2.
+    let alpha = splat_core::optics::absorption_coefficient(3.35e-8, 700e-9);
+    assert!((alpha - 0.6014).abs() < 1e-3);
+    let h = 0.1;
+    let cloud = medium([20, 20, 9], h, alpha as f32, |_| true);
+    let map = build(&cloud, &directional(DVec3::Z), &Params::default());
+    let light = f64::from(light_at(&map, Vec3::Z * 1.5));
+    assert!((light - (-alpha * 1.9).exp()).abs() < 1e-3, "{light}");
+}
+
+#[test]
+fn thin_slabs_absorb_more_at_an_angle_and_crossings_do_not() {
+    use splat_core::optics::SurfaceOpacity;
+    for (surface_opacity, factor) in [(SurfaceOpacity::PerCrossing, 1.0), (SurfaceOpacity::ThinSlab, 2.0)] {
+        for spacing in [0.1, 0.02] {
+            let cloud = plane(Vec3::ZERO, Vec3::new(0.0, 3f32.sqrt(), 1.0), 40, spacing, SplatKind::Surface, 0.4);
+            let materials = [Material { surface_opacity, ..Material::default() }];
+            let map = ShadowMap::build(&cloud, &materials, &[], &directional(DVec3::Z), &Params::default()).unwrap();
+            let light = map.transmittance(&probe(Vec3::Z * 3.0))[0];
+            assert!((light - (-0.4 * factor as f32).exp()).abs() < 3e-3, "{surface_opacity:?}: {light}");
+        }
+    }
+}
+
+#[test]
+fn papers_model_goes_dark_at_an_absorbance_of_two() {
+    // Discs on one ray, each of size 1 and opacity 1 − e^−1: A = 0.632 each; light ends after the fourth (2.53 > 2).
+    let mut cloud = Cloud::new(DVec3::ZERO);
+    for k in 1..=8 {
+        let position = Vec3::Z * (20.0 + k as f32);
+        let cross_section = (1.0f32 / 2.4).powi(2);
+        let normal = Vec3::NEG_Z;
+        let kind = SplatKind::Surface;
+        cloud.push(&Splat { position, radius: 1.0, cross_section, kind, normal, ..Splat::default() });
+    }
+    let params = Params { absorbance: AbsorbanceModel::Paper, resolution: Resolution::Cells(64), ..Params::default() };
+    let map = build(&cloud, &point_light(DVec3::ZERO), &params);
+    let own = 1.0 - (-1f32).exp();
+    for k in 0..8 {
+        let expected = if k as f32 * own > 2.0 { 0.0 } else { (-own * k as f32).exp() };
+        let target = Receiver { kind: SplatKind::Medium, ..receiver(&cloud, k) };
+        let light = map.transmittance(&target)[0];
+        assert!((light - expected).abs() < 1e-5, "behind {k}: {light}, not {expected}");
+    }
+}

@@ -1,0 +1,299 @@
+//! The real command: exit codes, refusals before work, closed pipes, odd names, interrupts.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::sync::OnceLock;
+use tempfile::TempDir;
+
+const SCENE: &str = r#"version = 1
+[camera]
+position = [0, 0, 4]
+target = [0, 0, 0]
+size = [24, 16]
+[background]
+color = [0.25, 0.5, 1.0]
+[[light]]
+kind = "point"
+position = [2, 4, 1]
+intensity = [20, 20, 20]
+[[object]]
+name = "fog"
+medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 0.5, spacing = 0.25 }
+"#;
+
+/// The command, built once with the profile of this test.
+fn organza() -> Command {
+    static BINARY: OnceLock<PathBuf> = OnceLock::new();
+    let binary = BINARY.get_or_init(|| {
+        let test = std::env::current_exe().unwrap();
+        let folder = test.parent().and_then(Path::parent).unwrap();
+        let mut build = Command::new(env!("CARGO"));
+        build.args(["build", "--quiet", "--package", "organza", "--bin", "organza"]);
+        if folder.file_name().unwrap() == "release" {
+            build.arg("--release");
+        }
+        build.arg("--target-dir").arg(folder.parent().unwrap()).current_dir(env!("CARGO_MANIFEST_DIR"));
+        assert!(build.status().unwrap().success());
+        folder.join(format!("organza{}", std::env::consts::EXE_SUFFIX))
+    });
+    Command::new(binary)
+}
+
+/// A folder with the scene `s.toml`, in which the command runs.
+struct Place {
+    folder: TempDir,
+}
+
+impl Place {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("s.toml"), SCENE).unwrap();
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        organza().args(arguments).current_dir(&self.folder).output().unwrap()
+    }
+
+    /// Asserts the exit code and part of stderr, and that nothing panicked.
+    #[track_caller]
+    fn expect(&self, code: i32, arguments: &[&str], stderr: &str) -> Output {
+        let out = self.run(arguments);
+        let text = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(code), "{arguments:?}: {text}");
+        assert!(text.contains(stderr), "{arguments:?}\n  expected: {stderr}\n  found:    {text}");
+        assert!(!text.contains("panicked") && !text.contains("bug in Organza"), "{text}");
+        out
+    }
+
+    /// Names of all files but the scene.
+    fn made(&self) -> Vec<String> {
+        let names = fs::read_dir(&self.folder).unwrap().map(|e| e.unwrap().file_name().to_string_lossy().into_owned());
+        let mut names: Vec<String> = names.filter(|n| n != "s.toml").collect();
+        names.sort();
+        names
+    }
+}
+
+fn json_of(out: &Output) -> Value {
+    serde_json::from_slice(&out.stdout).unwrap()
+}
+
+#[test]
+fn exit_0_render_writes_all_outputs_and_nothing_else() {
+    let place = Place::new();
+    let out = place.expect(0, &["render", "s.toml", "-o", "a.exr", "-o", "b.png", "--cost", "c.json", "--json"], "");
+    assert_eq!(place.made(), ["a.exr", "b.png", "c.json"]);
+    let document = json_of(&out);
+    assert_eq!(document["outputs"][0]["path"], "a.exr");
+    assert_eq!(document["outputs"][1]["bytes"], fs::metadata(place.path("b.png")).unwrap().len());
+    assert_eq!(document["size"], serde_json::json!([24, 16]));
+    let cost: Value = serde_json::from_slice(&fs::read(place.path("c.json")).unwrap()).unwrap();
+    assert_eq!(cost, document["cost"]);
+    assert!(cost.as_array().is_some_and(|stages| !stages.is_empty()));
+}
+
+#[test]
+fn exit_0_the_default_output_is_the_scenes_name() {
+    let place = Place::new();
+    place.expect(0, &["render", "s.toml"], "");
+    assert_eq!(place.made(), ["s.exr"]);
+}
+
+#[test]
+fn exit_0_explain_info_schema_print_documents() {
+    let place = Place::new();
+    let explained = json_of(&place.expect(0, &["explain", "s.toml", "--json"], ""));
+    assert!(explained["plan"]["effects"].as_array().is_some_and(|e| !e.is_empty()));
+    let info = json_of(&place.expect(0, &["info", "s.toml", "--json"], ""));
+    assert_eq!(info["objects"][0]["name"], "fog");
+    let schema = json_of(&place.expect(0, &["schema"], ""));
+    assert_eq!(schema["title"], "Organza scene");
+    assert_eq!(schema["$defs"]["Light"]["oneOf"].as_array().map(Vec::len), Some(6));
+    place.expect(0, &["--help"], "");
+    assert!(place.made().is_empty());
+}
+
+#[test]
+fn exit_2_is_for_the_command_line() {
+    let place = Place::new();
+    for (arguments, stderr) in [
+        (vec!["rendr"], "unrecognized subcommand"),
+        (vec!["render", "s.toml", "-o", "a.jpg"], "expected a name that ends in .exr or .png"),
+        (vec!["render", "s.toml", "-o", "a.exr", "-o", "a.exr"], "named twice"),
+        (vec!["render", "s.toml", "--set", "render.sed=1"], "--set render.sed=1: unknown key `sed`"),
+        (vec!["render", "s.toml", "--size", "0x9"], "--size 0x9: `size`: expected 1 to 65536 pixels a side, found 0"),
+        (vec!["render", "s.toml", "--size", "-1x9"], "unexpected argument"),
+        (vec!["render", "s.toml", "--size=-1x9"], "expected a whole number"),
+        (vec!["render", "s.toml", "--size", "2147483648x9"], "65536"),
+        (vec!["render", "s.toml", "--size", "1000000x1000000"], "65536"),
+        (vec!["render", "s.toml", "--size", "9"], "expected WIDTHxHEIGHT"),
+        (vec!["render", "s.toml", "--threads", "10000"], "10000 is not in 0..=1024"),
+        (vec!["render", "s.toml", "--threads", "-1"], "unexpected argument"),
+        (vec!["render", "s.toml", "--seed", "1.5"], "invalid value"),
+        (vec!["render", "s.toml", "--tolerance", "nan"], "expected a finite number"),
+        (vec!["render", "s.toml", "--tolerance", "-1"], "--tolerance -1: `tolerance`: expected a number above 0"),
+        (vec!["render", "s.toml", "--exposure", "1e9"], "`exposure`: expected a number from -60 to 60"),
+        (vec!["render", "s.toml", "--layers", "depth,norml"], "there is no layer `norml`"),
+        (vec!["render", "s.toml", "--technique", "surfels"], "this version does not have \"surfels\""),
+        (vec!["render", "s.toml", "--max-memory", "0"], "expected a number of bytes above 0"),
+    ] {
+        place.expect(2, &arguments, stderr);
+    }
+    assert!(place.made().is_empty());
+}
+
+#[test]
+fn exit_3_is_for_the_scene_and_its_data() {
+    let place = Place::new();
+    fs::write(place.path("bad.toml"), SCENE.replace("target", "taget")).unwrap();
+    let out = place.expect(3, &["render", "bad.toml", "--json"], "error: bad.toml:4:1: unknown key `taget`\nhint: did you mean `target`?");
+    assert_eq!(json_of(&out)["error"]["exit_code"], 3);
+    fs::write(place.path("empty.ply"), "").unwrap();
+    let mesh = SCENE.replace("medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 0.5, spacing = 0.25 }", "mesh = \"empty.ply\"");
+    fs::write(place.path("mesh.toml"), mesh).unwrap();
+    place.expect(3, &["render", "mesh.toml"], "empty.ply");
+    assert_eq!(place.made(), ["bad.toml", "empty.ply", "mesh.toml"]);
+}
+
+#[test]
+fn exit_4_bi1_bi31_refused_outputs_are_refused_before_any_work() {
+    let place = Place::new();
+    place.expect(4, &["render", "missing.toml"], "missing.toml: cannot read the scene");
+    fs::create_dir(place.path("folder.exr")).unwrap();
+    fs::write(place.path("old.exr"), "old").unwrap();
+    // The memory limit would be the next error: a refusal that names the output came before the work.
+    for (output, force, stderr) in [
+        ("old.exr", false, "old.exr: this file exists already"),
+        ("folder.exr", true, "folder.exr: this is a folder"),
+        ("nowhere/a.exr", true, "nowhere/a.exr: cannot write here"),
+    ] {
+        let mut arguments = vec!["render", "s.toml", "--max-memory", "1", "-o", output];
+        arguments.extend(force.then_some("--force"));
+        place.expect(4, &arguments, stderr);
+    }
+    place.expect(4, &["render", "s.toml", "-o", "a.exr", "--cost", "old.exr"], "old.exr: this file exists already");
+    assert_eq!(fs::read(place.path("old.exr")).unwrap(), b"old");
+    place.expect(0, &["render", "s.toml", "-o", "old.exr", "--force"], "");
+    assert_ne!(fs::read(place.path("old.exr")).unwrap(), b"old");
+    assert_eq!(place.made(), ["folder.exr", "old.exr"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn bi31_an_output_that_is_an_input_is_refused_even_with_force() {
+    let place = Place::new();
+    std::os::unix::fs::symlink("s.toml", place.path("link.png")).unwrap();
+    place.expect(4, &["render", "s.toml", "-o", "link.png", "--force"], "this output is also an input");
+    assert_eq!(fs::read_to_string(place.path("s.toml")).unwrap(), SCENE);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn bi31_a_folder_that_cannot_be_written_is_refused() {
+    // /proc takes no files, from root either.
+    Place::new().expect(4, &["render", "s.toml", "--max-memory", "1", "-o", "/proc/a.exr"], "cannot write here");
+}
+
+#[test]
+fn exit_5_bi26_limits_are_checked_before_the_work() {
+    let place = Place::new();
+    place.expect(5, &["render", "s.toml", "--max-memory", "10K"], "the limit is 10240");
+    place.expect(5, &["render", "s.toml", "--max-memory", "1G", "--size", "65536x65536"], "the limit is 1073741824");
+    assert!(place.made().is_empty());
+}
+
+#[test]
+fn exit_6_is_for_the_gpu() {
+    for backend in ["wgpu", "ash"] {
+        Place::new().expect(6, &["render", "s.toml", "--backend", backend], "GPU backends are not in this version");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn exit_130_an_interrupted_render_leaves_nothing() {
+    let place = Place::new();
+    let fog = SCENE.replace("spacing = 0.25", "spacing = 0.02");
+    fs::write(place.path("s.toml"), fog).unwrap();
+    let arguments = ["render", "s.toml", "--size", "1000x1000", "-o", "a.exr"];
+    // Earlier than its handler an interrupt kills; later than the render it comes too late. Somewhere between it is 130.
+    for wait in [100, 200, 50, 400, 25, 800, 1600] {
+        let mut command = organza();
+        command.args(arguments).current_dir(&place.folder).stdout(Stdio::null()).stderr(Stdio::null());
+        let mut child = command.spawn().unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(wait));
+        // The first interrupt stops the work at its next tick, the second at once.
+        while child.try_wait().unwrap().is_none() {
+            Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+            std::thread::sleep(std::time::Duration::from_millis(1000));
+        }
+        if child.wait().unwrap().code() == Some(130) {
+            assert!(place.made().is_empty(), "{:?}", place.made());
+            return;
+        }
+        let _ = fs::remove_file(place.path("a.exr"));
+    }
+    panic!("no interrupt fell into the render");
+}
+
+#[cfg(unix)]
+#[test]
+fn bi33_a_closed_pipe_is_no_panic() {
+    let place = Place::new();
+    for arguments in [vec!["schema"], vec!["--help"], vec!["info", "s.toml"], vec!["explain", "s.toml", "--json"]] {
+        let mut child = organza()
+            .args(&arguments)
+            .current_dir(&place.folder)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let out = child.wait_with_output().unwrap();
+        assert_eq!(out.status.code(), Some(0), "{arguments:?}");
+        assert_eq!(String::from_utf8_lossy(&out.stderr), "", "{arguments:?}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn bi34_odd_names_work_and_are_escaped() {
+    use std::os::unix::ffi::OsStrExt;
+    let place = Place::new();
+    let scene = place.folder.path().join(std::ffi::OsStr::from_bytes(b"s\xff\n\x1b[2J.toml"));
+    let picture = place.folder.path().join(std::ffi::OsStr::from_bytes(b"p\xfe.exr"));
+    fs::copy(place.path("s.toml"), &scene).unwrap();
+    let render = || {
+        organza().arg("render").arg(&scene).arg("-o").arg(&picture).current_dir(&place.folder).output().unwrap()
+    };
+    assert_eq!(render().status.code(), Some(0));
+    assert!(picture.is_file());
+    let second = render();
+    assert_eq!(second.status.code(), Some(4));
+    assert!(String::from_utf8_lossy(&second.stderr).contains("p\\xfe.exr: this file exists already"));
+    fs::write(&scene, "version = 2").unwrap();
+    let text = render().stderr;
+    assert!(String::from_utf8_lossy(&text).contains("s\\xff\\n\\u{1b}[2J.toml:1:"), "{}", String::from_utf8_lossy(&text));
+    // A path too long for the system is an error of the file system.
+    let long = format!("{}.exr", "n".repeat(4096));
+    place.expect(4, &["render", "s.toml", "-o", &long], "cannot write here");
+}
+
+#[test]
+fn bi30_threads_0_takes_all_cores_and_the_bytes_do_not_depend_on_it() {
+    let place = Place::new();
+    for threads in ["0", "1", "3"] {
+        place.expect(0, &["render", "s.toml", "--threads", threads, "-o", &format!("{threads}.exr")], "");
+    }
+    let bytes = |name: &str| fs::read(place.path(name)).unwrap();
+    assert_eq!(bytes("0.exr"), bytes("1.exr"));
+    assert_eq!(bytes("1.exr"), bytes("3.exr"));
+}

@@ -1,0 +1,47 @@
+//! `cargo xtask assets`: what lies under `assets/`, and where the larger inputs of the benchmarks come from.
+
+use crate::repo::{Outcome, Repo};
+use crate::tidy::{MAX_BYTES, credit_of, in_assets};
+
+/// Inputs that are too large or not free to copy. Nothing here is needed by a test or by a scene.
+const ELSEWHERE: &str = "\
+Larger inputs, to be fetched by hand where a benchmark is to run on them:
+  Stanford dragon, full size (dragon_vrip.ply, 437,645 vertices, the model of the paper's Table 1):
+      https://graphics.stanford.edu/data/3Dscanrep/ — free to use with credit; not for sale; read the terms there.
+  Engine block CT (256x256x128, 8 bit) and other volumes:
+      https://klacansky.com/open-scivis-datasets/ — terms beside each volume.
+  LiDAR tiles: https://www.usgs.gov/3d-elevation-program — public domain.
+Pass them by path: `convert` reads PLY, NIfTI, LAS and LAZ.";
+
+/// Lists the assets; fails where the tidy rules of assets fail.
+pub(crate) fn run(repo: &Repo) -> Outcome {
+    let mut said = Vec::new();
+    let mut missing = Vec::new();
+    for (path, bytes) in in_assets(repo) {
+        let credit = credit_of(repo, path).unwrap_or("no credit file");
+        said.push(format!("{bytes:>9}  {path}  ({credit})"));
+        if credit_of(repo, path).is_none() {
+            missing.push(path);
+        }
+    }
+    let total: u64 = in_assets(repo).map(|(_, bytes)| bytes).sum();
+    said.push(format!("{total:>9}  of at most {MAX_BYTES} bytes in {} files\n\n{ELSEWHERE}", said.len()));
+    let said = said.join("\n");
+    if !missing.is_empty() || total > MAX_BYTES {
+        return Err(format!("assets break a rule (cargo xtask tidy names it)\n{said}"));
+    }
+    Ok(said)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn assets_are_listed_with_their_credit() {
+        let bunny = ("assets/bunny/bunny.ply", "ply");
+        let said = run(&Repo::of(&[bunny, ("assets/bunny/ORIGIN.txt", "who")])).expect("credited");
+        assert!(said.contains("3  assets/bunny/bunny.ply  (assets/bunny/ORIGIN.txt)"), "{said}");
+        assert!(run(&Repo::of(&[bunny])).is_err());
+    }
+}

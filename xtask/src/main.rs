@@ -1,0 +1,53 @@
+//! The tasks of the repository: `cargo xtask help` lists them.
+
+mod assets;
+mod ci;
+mod papers;
+mod repo;
+mod source;
+mod tidy;
+mod toml_lines;
+
+use repo::Repo;
+use std::process::ExitCode;
+
+const HELP: &str = "\
+usage: cargo xtask COMMAND
+
+  ci               everything that must hold before a merge, step by step; stops at the first failure
+  tidy             the rules that the compiler does not know: heads, sizes, dependency direction, assets
+  papers           writes docs/papers.md from docs/papers/*.toml
+  papers --check   fails where docs/papers.md is stale or names code or a test that does not exist
+  assets           lists the files under assets/, their credit files, and where the larger inputs come from
+  help             this text
+";
+
+fn main() -> ExitCode {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    let outcome = match words.as_slice() {
+        ["ci"] => Repo::open().and_then(|repo| ci::run(&repo)),
+        ["tidy"] => Repo::open().and_then(|repo| tidy::run(&repo)),
+        ["papers"] => Repo::open().and_then(|repo| papers::write(&repo)),
+        ["papers", "--check"] => Repo::open().and_then(|repo| papers::check(&repo)),
+        ["assets"] => Repo::open().and_then(|repo| assets::run(&repo)),
+        [] | ["help" | "--help" | "-h"] => {
+            print!("{HELP}");
+            return ExitCode::SUCCESS;
+        }
+        _ => {
+            eprintln!("error: no such command: {}\n\n{HELP}", words.join(" "));
+            return ExitCode::from(2);
+        }
+    };
+    match outcome {
+        Ok(said) => {
+            println!("{said}");
+            ExitCode::SUCCESS
+        }
+        Err(why) => {
+            eprintln!("error: {why}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! Whether what the rows name exists: files, items in them, tests.
+
+use super::ledger::{Ledger, Row};
+use crate::repo::Repo;
+use crate::source::{code_only, functions, words};
+use std::collections::HashSet;
+
+/// One line per name that does not exist.
+pub(crate) fn missing(repo: &Repo, ledgers: &[Ledger]) -> Vec<String> {
+    let mut known = HashSet::new();
+    for (_, text) in repo.rust() {
+        known.extend(functions(&code_only(text)).iter().map(|f| f.name.to_owned()));
+    }
+    let rows = ledgers.iter().flat_map(|l| &l.rows);
+    rows.flat_map(|row| [code(repo, row), tests(&known, row)].concat()).collect()
+}
+
+fn code(repo: &Repo, row: &Row) -> Vec<String> {
+    let mut wrong = Vec::new();
+    for place in &row.code {
+        let (path, item) = place.split_once("::").unwrap_or((place, ""));
+        // `Type::method`: each part must stand in the file.
+        let mut parts = item.split("::").filter(|part| !part.is_empty());
+        match repo.text(path) {
+            None => wrong.push(format!("{}: no file {path}", row.id)),
+            Some(text) if !parts.all(|part| words(text, part).next().is_some()) => {
+                wrong.push(format!("{}: {path} has no {item}", row.id));
+            }
+            Some(_) => {}
+        }
+    }
+    wrong
+}
+
+fn tests(known: &HashSet<String>, row: &Row) -> Vec<String> {
+    // `ts06_*` stands for every test of one hard case.
+    let exists = |test: &str| match test.strip_suffix('*') {
+        Some(beginning) => known.iter().any(|name| name.starts_with(beginning)),
+        None => known.contains(test),
+    };
+    let unknown = row.tests.iter().filter(|test| !exists(test));
+    unknown.map(|test| format!("{}: no source has the test {test}", row.id)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::papers::ledger::Verdict;
+
+    fn found(code: &str, test: &str) -> Vec<String> {
+        let row = Row {
+            id: "Eq. 9".to_owned(),
+            claim: "c".to_owned(),
+            code: vec![code.to_owned()],
+            tests: vec![test.to_owned()],
+            ours: "—".to_owned(),
+            verdict: Verdict::Holds,
+            reason: "r".to_owned(),
+        };
+        let none = String::new;
+        let ledger = Ledger { title: none(), authors: none(), year: none(), note: none(), rows: vec![row] };
+        let source = "struct Map;\nimpl Map {\n    fn build() {}\n}\n// fn gone() {}\nfn ts01_holds() {}\n";
+        missing(&Repo::of(&[("src/map.rs", source)]), &[ledger])
+    }
+
+    #[test]
+    fn names_that_exist_pass() {
+        assert!(found("src/map.rs::Map::build", "ts01_holds").is_empty());
+        assert!(found("src/map.rs", "ts01_*").is_empty());
+    }
+
+    #[test]
+    fn names_that_do_not_exist_are_found() {
+        assert_eq!(found("src/mop.rs::Map", "ts01_holds"), ["Eq. 9: no file src/mop.rs"]);
+        assert_eq!(found("src/map.rs::Map::bui", "ts01_holds"), ["Eq. 9: src/map.rs has no Map::bui"]);
+        for test in ["gone", "ts01", "ts02_*"] {
+            assert_eq!(found("src/map.rs::Map", test), [format!("Eq. 9: no source has the test {test}")]);
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! Which crate may know which: no stage knows another stage, and everything meets in `organza`.
+
+use crate::repo::Repo;
+use crate::toml_lines::{lines, string};
+
+/// For each crate of the workspace, the crates of the workspace that it may depend on, tests and benches included.
+const MAY_KNOW: [(&str, &[&str]); 9] = [
+    ("splat-core", &[]),
+    ("convert", &["splat-core"]),
+    ("tsm", &["splat-core"]),
+    ("hbsort", &["splat-core"]),
+    ("reference", &["splat-core"]),
+    ("organza", &["splat-core", "convert", "tsm", "hbsort", "reference"]),
+    ("organza-tests", &["splat-core", "convert", "tsm", "hbsort", "reference", "organza"]),
+    ("organza-benches", &["splat-core", "convert", "tsm", "hbsort", "reference", "organza"]),
+    ("xtask", &[]),
+];
+
+/// Crates that only the orchestrator (and what drives it) may use: file formats of scenes and the command line stop there.
+const ONLY_ABOVE_STAGES: [&str; 4] = ["serde", "serde_json", "toml", "clap"];
+
+/// Dependencies point from the top of the design's figure downwards.
+pub(crate) fn direction(repo: &Repo) -> Vec<String> {
+    let manifests = repo.texts().filter(|(path, _)| path.ends_with("/Cargo.toml"));
+    manifests.flat_map(|(path, text)| manifest(path, text)).collect()
+}
+
+fn manifest(path: &str, text: &str) -> Vec<String> {
+    let lines = lines(text);
+    let named = lines.iter().find(|l| l.table == "package" && l.key == "name");
+    let Some(name) = named.and_then(|l| string(l.value).ok()) else {
+        return vec![format!("{path}: expected a package name")];
+    };
+    let Some((_, may_know)) = MAY_KNOW.iter().find(|(of, _)| *of == name) else {
+        return vec![format!("{path}: crate {name} has no row in the table of xtask/src/tidy/dependencies.rs")];
+    };
+    let mut found = Vec::new();
+    for line in &lines {
+        let Some(on) = dependency(line.table, line.key, line.value) else { continue };
+        let of_workspace = MAY_KNOW.iter().any(|(member, _)| *member == on);
+        // Who may know a stage stands above the stages.
+        let above = may_know.contains(&"tsm");
+        if (of_workspace && !may_know.contains(&on)) || (ONLY_ABOVE_STAGES.contains(&on) && !above) {
+            found.push(format!("{path}:{}: {name} may not depend on {on}", line.number));
+        }
+    }
+    found
+}
+
+/// The package that a line of a manifest depends on.
+fn dependency<'a>(table: &'a str, key: &'a str, value: &'a str) -> Option<&'a str> {
+    let (before, own_table) = table.rsplit_once("dependencies")?;
+    if !(before.is_empty() || before.ends_with(['.', '-'])) {
+        return None;
+    }
+    if let Some(name) = own_table.strip_prefix('.') {
+        return Some(if key == "package" { value.trim_matches('"') } else { name });
+    }
+    let renamed = value.split_once("package").and_then(|(_, rest)| rest.split('"').nth(1));
+    Some(renamed.unwrap_or(key.split('.').next().unwrap_or(key)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(name: &str, dependencies: &str) -> Vec<String> {
+        let text = format!("[package]\nname = \"{name}\"\n{dependencies}");
+        direction(&Repo::of(&[("crates/c/Cargo.toml", &text)]))
+    }
+
+    #[test]
+    fn stages_know_only_the_nouns() {
+        assert!(found("tsm", "[dependencies]\nsplat-core.workspace = true\nglam.workspace = true\n").is_empty());
+        let wrong = found("tsm", "[dependencies]\nhbsort.workspace = true\n");
+        assert_eq!(wrong, ["crates/c/Cargo.toml:4: tsm may not depend on hbsort"]);
+    }
+
+    #[test]
+    fn every_way_to_write_a_dependency_is_seen() {
+        for text in [
+            "[dev-dependencies]\norganza = { workspace = true }\n",
+            "[build-dependencies.organza]\npath = \"x\"\n",
+            "[target.'cfg(unix)'.dependencies]\norganza.workspace = true\n",
+            "[dependencies]\nother = { package = \"organza\", path = \"x\" }\n",
+            "[dependencies.other]\npackage = \"organza\"\n",
+        ] {
+            assert_eq!(found("hbsort", text).len(), 1, "{text}");
+        }
+    }
+
+    #[test]
+    fn nobody_depends_on_what_stands_above() {
+        for (name, on) in [("splat-core", "tsm"), ("reference", "tsm"), ("organza", "xtask"), ("xtask", "splat-core")] {
+            assert_eq!(found(name, &format!("[dependencies]\n{on}.workspace = true\n")).len(), 1, "{name} on {on}");
+        }
+        assert!(found("organza-tests", "[dev-dependencies]\norganza.workspace = true\n").is_empty());
+    }
+
+    #[test]
+    fn scene_formats_stop_at_the_orchestrator() {
+        assert_eq!(found("convert", "[dependencies]\nserde.workspace = true\n").len(), 1);
+        assert!(found("organza", "[dependencies]\nserde.workspace = true\n").is_empty());
+    }
+
+    #[test]
+    fn a_new_crate_needs_a_row() {
+        assert_eq!(found("novel", "").len(), 1);
+    }
+}

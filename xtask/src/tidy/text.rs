@@ -1,0 +1,116 @@
+//! What files must say, and must not.
+
+use crate::repo::Repo;
+use crate::source::{attributes, calls, code_only, line_of};
+
+/// Folders that only one machine has. In pieces, so that this file passes its own rule.
+const FOREIGN: [&str; 2] = [concat!("../sh", "ared"), concat!("/wo", "rk/")];
+
+/// The one registry that a stranger has.
+const REGISTRY: &str = "\"registry+https://github.com/rust-lang/crates.io-index\"";
+
+/// Every Rust file begins with what it is about.
+pub(crate) fn heads(repo: &Repo) -> Vec<String> {
+    let bare = repo.rust().filter(|(_, text)| !text.starts_with("//!"));
+    bare.map(|(path, _)| format!("{path}: expected //! on the first line")).collect()
+}
+
+/// No text names a folder of one machine, and no package comes from a private registry.
+pub(crate) fn foreign_paths(repo: &Repo) -> Vec<String> {
+    let mut found = Vec::new();
+    for (path, text) in repo.texts() {
+        for (at, line) in text.lines().enumerate() {
+            let foreign = FOREIGN.iter().copied().find(|f| line.contains(f));
+            let source = line.strip_prefix("source = ").filter(|s| path.ends_with("Cargo.lock") && *s != REGISTRY);
+            let replaced = (path.starts_with(".cargo/") && line.starts_with("[source")).then_some(line);
+            if let Some(what) = foreign.or(source).or(replaced) {
+                found.push(format!("{path}:{}: found {what}", at + 1));
+            }
+        }
+    }
+    found
+}
+
+/// A test that does not run proves nothing.
+pub(crate) fn ignored_tests(repo: &Repo) -> Vec<String> {
+    let says_ignore = |attribute: &str| attribute.starts_with("#[ignore");
+    attributes_where(repo, says_ignore, "found #[ignore]; let the test run, or remove it")
+}
+
+/// Whoever silences a lint says why.
+pub(crate) fn reasons(repo: &Repo) -> Vec<String> {
+    let silent = |attribute: &str| {
+        ["allow", "expect"].iter().any(|name| calls(attribute, name).any(|inside| !inside.contains("reason")))
+    };
+    attributes_where(repo, silent, "found a silenced lint without a reason")
+}
+
+fn attributes_where(repo: &Repo, bad: impl Fn(&str) -> bool, complaint: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    for (path, text) in repo.rust() {
+        let code = code_only(text);
+        let hits = attributes(&code).into_iter().filter(|range| bad(&code[range.clone()]));
+        found.extend(hits.map(|range| format!("{path}:{}: {complaint}", line_of(&code, range.start))));
+    }
+    found
+}
+
+/// Each crate has a page that says what it is.
+pub(crate) fn crate_pages(repo: &Repo) -> Vec<String> {
+    let pages = repo.crate_folders().into_iter().map(|folder| format!("{folder}/README.md"));
+    pages
+        .filter(|page| repo.text(page).is_none_or(|text| text.trim().is_empty()))
+        .map(|p| format!("{p} is missing"))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_without_a_head_is_found() {
+        let repo = Repo::of(&[("a.rs", "//! A.\n"), ("b.rs", "// B.\n"), ("c.md", "C\n")]);
+        assert_eq!(heads(&repo), ["b.rs: expected //! on the first line"]);
+    }
+
+    #[test]
+    fn a_foreign_path_is_found() {
+        for foreign in FOREIGN {
+            let repo = Repo::of(&[("notes.md", &format!("one\nsee {foreign}x\n"))]);
+            assert_eq!(foreign_paths(&repo), [format!("notes.md:2: found {foreign}")]);
+        }
+        assert!(foreign_paths(&Repo::of(&[("notes.md", "shared/x work/y ./home\n")])).is_empty());
+    }
+
+    #[test]
+    fn a_private_registry_is_found() {
+        let lock = format!("source = {REGISTRY}\nsource = \"registry+https://mirror.example\"\n");
+        let repo = Repo::of(&[("Cargo.lock", &lock), (".cargo/config.toml", "[source.crates-io]\n")]);
+        let found = foreign_paths(&repo);
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!(found[0].starts_with("Cargo.lock:2") && found[1].starts_with(".cargo/config.toml:1"), "{found:?}");
+    }
+
+    #[test]
+    fn an_ignored_test_is_found() {
+        let text = "//! T.\n// #[ignore]\nconst A: &str = \"#[ignore]\";\n#[test]\n#[ignore = \"slow\"]\nfn t() {}\n";
+        let found = ignored_tests(&Repo::of(&[("a.rs", text)]));
+        assert_eq!(found, ["a.rs:5: found #[ignore]; let the test run, or remove it"]);
+    }
+
+    #[test]
+    fn a_silenced_lint_without_a_reason_is_found() {
+        let text = "#[allow(dead_code)]\n#[allow(dead_code, reason = \"r\")]\n#[cfg_attr(x, expect(unused))]\n";
+        let found = reasons(&Repo::of(&[("a.rs", text)]));
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!(found[0].starts_with("a.rs:1:") && found[1].starts_with("a.rs:3:"), "{found:?}");
+    }
+
+    #[test]
+    fn a_crate_without_a_page_is_found() {
+        let repo =
+            Repo::of(&[("crates/a/Cargo.toml", ""), ("crates/b/Cargo.toml", ""), ("crates/a/README.md", "# a\n")]);
+        assert_eq!(crate_pages(&repo), ["crates/b/README.md is missing"]);
+    }
+}
