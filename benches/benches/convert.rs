@@ -1,2 +1,126 @@
-//! Benchmark of convert (being written).
-fn main() {}
+//! Benchmark of convert: files to nouns are not timed, nouns to splats are; splats (or points, voxels) per second.
+
+use convert::read::{self, Loaded, ReadLimits};
+use convert::{
+    CloudShape, Density, ExpressionField, MeshParams, RawPoints, SplatParams, SurfelParams, VolumeParams,
+    mesh_to_points, mesh_to_points_into, procedural_cloud, raw_to_surfels, sobel_gradient_into, surface_to_points,
+    volume_to_points,
+};
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use glam::{DMat3, DVec3, Vec3};
+use splat_core::{Cloud, Grid, Mesh, TransferFunction, TransferPoint};
+use std::path::Path;
+
+fn asset(name: &str) -> Loaded {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets").join(name);
+    read::file(&path, &ReadLimits::default()).expect("an asset of the repository")
+}
+
+fn bunny() -> Mesh {
+    match asset("stanford-bunny/bunny.ply.gz") {
+        Loaded::Mesh(mesh) => mesh,
+        _ => Mesh::default(),
+    }
+}
+
+fn terrain() -> RawPoints {
+    match asset("autzen/autzen_trim.laz") {
+        Loaded::Points(points) => points,
+        _ => RawPoints::default(),
+    }
+}
+
+fn head() -> Grid {
+    match asset("mni152/mni152_t1.nii.gz") {
+        Loaded::Grid(grid) => grid,
+        _ => Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [1; 3], values: vec![1.0] },
+    }
+}
+
+fn meshes(c: &mut Criterion) {
+    let mesh = bunny();
+    let mut group = c.benchmark_group("mesh_to_points");
+    for wanted in [440_000, 620_000, 1_840_000, 10_000_000] {
+        let params = MeshParams { density: Density::Splats(wanted), ..MeshParams::default() };
+        let mut cloud = Cloud::default();
+        let Ok(report) = mesh_to_points_into(&mesh, &params, &mut cloud) else { continue };
+        group.throughput(Throughput::Elements(report.splats));
+        group.bench_function(BenchmarkId::new("reused memory", report.splats), |b| {
+            b.iter(|| mesh_to_points_into(&mesh, &params, &mut cloud));
+        });
+        group.bench_function(BenchmarkId::new("fresh memory", report.splats), |b| {
+            b.iter(|| mesh_to_points(&mesh, &params));
+        });
+    }
+    group.finish();
+}
+
+fn volumes(c: &mut Criterion) {
+    let n = 256usize;
+    let wave = |i: usize| {
+        let [x, y, z] = [i % n, i / n % n, i / n / n].map(|c| c as f32);
+        (0.05 * x).sin() + (0.07 * y).cos() + (0.03 * z).sin()
+    };
+    let values = (0..n * n * n).map(wave).collect();
+    let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [n; 3], values };
+    let mut group = c.benchmark_group("sobel");
+    group.throughput(Throughput::Elements(grid.values.len() as u64));
+    let mut gradient = vec![Vec3::ZERO; grid.values.len()];
+    group.bench_function("256^3", |b| b.iter(|| sobel_gradient_into(&grid, &mut gradient)));
+    group.finish();
+
+    let head = head();
+    let top = head.values.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+    let point = |share: f32, extinction| TransferPoint { value: share * top, color: [1.0; 3], extinction };
+    let Ok(tf) = TransferFunction::new(vec![point(0.1, 0.0), point(1.0, 1.0)]) else { return };
+    let mut group = c.benchmark_group("volume_to_points");
+    for normals in [false, true] {
+        let params = VolumeParams { normals, ..VolumeParams::default() };
+        let Ok((_, report)) = volume_to_points(&head, &tf, &params) else { continue };
+        group.throughput(Throughput::Elements(report.splats));
+        let name = if normals { "head with normals" } else { "head" };
+        group.bench_function(BenchmarkId::new(name, report.splats), |b| {
+            b.iter(|| volume_to_points(&head, &tf, &params));
+        });
+    }
+    group.finish();
+}
+
+fn points(c: &mut Criterion) {
+    let terrain = terrain();
+    let mut group = c.benchmark_group("raw_to_surfels");
+    group.throughput(Throughput::Elements(terrain.len() as u64));
+    group.bench_function(BenchmarkId::new("terrain", terrain.len()), |b| {
+        b.iter(|| raw_to_surfels(&terrain, &SurfelParams::default()));
+    });
+    group.finish();
+}
+
+fn fields(c: &mut Criterion) {
+    let mut group = c.benchmark_group("fields");
+    let text = "sin(x)*cos(y) + sin(y)*cos(z) + sin(z)*cos(x)";
+    let Ok(gyroid) = ExpressionField::parse(text) else { return };
+    let bounds = [DVec3::ZERO, DVec3::splat(6.0)];
+    let params = MeshParams { density: Density::Spacing(0.03), ..MeshParams::default() };
+    if let Ok((_, report)) = surface_to_points(&gyroid, bounds, &params) {
+        group.throughput(Throughput::Elements(report.splats));
+        group.bench_function(BenchmarkId::new("gyroid surface", report.splats), |b| {
+            b.iter(|| surface_to_points(&gyroid, bounds, &params));
+        });
+    }
+    let (shape, splat) = (CloudShape::default(), SplatParams::default());
+    if let Ok(grid) = procedural_cloud(&shape, 0.05, &splat) {
+        group.throughput(Throughput::Elements(grid.values.len() as u64));
+        group.bench_function(BenchmarkId::new("procedural cloud", grid.values.len()), |b| {
+            b.iter(|| procedural_cloud(&shape, 0.05, &splat));
+        });
+    }
+    group.finish();
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(10);
+    targets = meshes, volumes, points, fields
+}
+criterion_main!(benches);

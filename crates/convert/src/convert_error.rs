@@ -39,7 +39,9 @@ pub enum ConvertError {
         source: splat_core::Error,
     },
     /// A field has no finite value where one is needed.
-    #[error("object '{object}': the field is {value} at {point}, expected a finite number; change the expression or the box")]
+    #[error(
+        "object '{object}': the field is {value} at {point}, expected a finite number; change the expression or the box"
+    )]
     NonFinite {
         /// Name of the object.
         object: String,

@@ -9,7 +9,10 @@ use crate::surface_nets::{Lattice, surface_nets};
 use crate::volume_points::check_lattice;
 use crate::{ConvertError, MeshParams, MeshReport, VolumeParams, VolumeReport, mesh_to_points, volume_to_points};
 use rayon::prelude::*;
-use splat_core::{Cloud, Grid, Mesh, ScalarField, TransferFunction, TransferPoint, glam::{DMat3, DVec3}};
+use splat_core::{
+    Cloud, Grid, Mesh, ScalarField, TransferFunction, TransferPoint,
+    glam::{DMat3, DVec3},
+};
 
 /// Cells of the lattice that a zero set is looked for on, over its splats' spacing.
 const CELL_OVER_SPACING: f64 = std::f64::consts::SQRT_2;

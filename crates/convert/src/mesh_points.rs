@@ -12,7 +12,11 @@ use crate::params::{Density, SplatParams};
 use crate::subdivide::{self, Measure, Run};
 use crate::{ConvertError, vertex_normals};
 use rayon::prelude::*;
-use splat_core::{Cloud, Mesh, SplatKind, glam::{DQuat, DVec3, Vec3}, optics};
+use splat_core::{
+    Cloud, Mesh, SplatKind,
+    glam::{DQuat, DVec3, Vec3},
+    optics,
+};
 
 /// How a mesh becomes splats.
 #[derive(Debug, Clone, PartialEq)]
@@ -123,7 +127,8 @@ fn spacing(mesh: &Mesh, params: &MeshParams, report: &MeshReport) -> f64 {
         Density::Spacing(h) => h,
         Density::Splats(n) => (report.area / n.max(1) as f64).sqrt(),
         Density::Auto => {
-            let diagonal = f64::from(splat_core::Aabb::of_points(&mesh.position).diagonal()) * params.splat.transform.scale;
+            let diagonal =
+                f64::from(splat_core::Aabb::of_points(&mesh.position).diagonal()) * params.splat.transform.scale;
             let triangle = (report.area / (report.triangles - report.degenerate) as f64).sqrt();
             let budget = (params.splat.max_splats as f64 / 2.0).clamp(1.0, AUTO_SPLATS);
             (diagonal / AUTO_STEPS).min(triangle).max((report.area / budget).sqrt())
@@ -185,7 +190,13 @@ struct Target<'a> {
 }
 
 impl<'a> Pieces<'a> {
-    fn new(mesh: &'a Mesh, params: &MeshParams, measures: &'a [Measure], starts: &'a [u64], report: &MeshReport) -> Self {
+    fn new(
+        mesh: &'a Mesh,
+        params: &MeshParams,
+        measures: &'a [Measure],
+        starts: &'a [u64],
+        report: &MeshReport,
+    ) -> Self {
         let t = &params.splat.transform;
         let place = |v: &Vec3| (t.rotation * (v.as_dvec3() * t.scale)).as_vec3();
         let turn = |n: &Vec3| columns::unit_or_zero(t.rotate(n.as_dvec3()).as_vec3());
@@ -209,15 +220,16 @@ impl<'a> Pieces<'a> {
     fn emit(&self, cloud: &mut Cloud) {
         let columns = (cloud.position.par_chunks_mut(CHUNK), cloud.normal.par_chunks_mut(CHUNK));
         let rest = (cloud.cross_section.par_chunks_mut(CHUNK), cloud.color.par_chunks_mut(CHUNK));
-        (columns.0, columns.1, rest.0, rest.1, cloud.radius.par_chunks_mut(CHUNK)).into_par_iter().enumerate().for_each(
-            |(chunk, (position, normal, cross_section, color, radius))| {
+        (columns.0, columns.1, rest.0, rest.1, cloud.radius.par_chunks_mut(CHUNK))
+            .into_par_iter()
+            .enumerate()
+            .for_each(|(chunk, (position, normal, cross_section, color, radius))| {
                 radius.fill(self.radius);
                 if self.mesh.color.is_empty() {
                     color.fill(self.color);
                 }
                 self.fill((chunk * CHUNK) as u64, &mut Target { position, normal, cross_section, color });
-            },
-        );
+            });
     }
 
     /// Writes the splats from number `first` on.

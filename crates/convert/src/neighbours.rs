@@ -187,10 +187,8 @@ mod tests {
             let points: Vec<Vec3> = (0..n).map(|i| Vec3::new(unit(i, 0), unit(i, 1), 0.1 * unit(i, 2))).collect();
             let tree = Tree::new(&points);
             for i in 0..n {
-                let mut all: Vec<u64> = (0..n)
-                    .filter(|j| *j != i)
-                    .map(|j| key(points[i].distance_squared(points[j]), j as u32))
-                    .collect();
+                let mut all: Vec<u64> =
+                    (0..n).filter(|j| *j != i).map(|j| key(points[i].distance_squared(points[j]), j as u32)).collect();
                 all.sort_unstable();
                 let expected: Vec<u32> = all.iter().take(10).map(|k| *k as u32).collect();
                 assert_eq!(tree.nearest(i, 10).ids().collect::<Vec<_>>(), expected);

@@ -30,7 +30,9 @@ impl Default for Orientation {
 /// Found and expected when the orientation makes no sense.
 pub(crate) fn check(orientation: Orientation) -> Result<(), (String, &'static str)> {
     match orientation {
-        Orientation::Toward(d) if d.try_normalize().is_none() => Err((d.to_string(), "a finite direction that is not 0")),
+        Orientation::Toward(d) if d.try_normalize().is_none() => {
+            Err((d.to_string(), "a finite direction that is not 0"))
+        }
         Orientation::Viewpoint(p) if !p.is_finite() => Err((p.to_string(), "a finite point")),
         _ => Ok(()),
     }

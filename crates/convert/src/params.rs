@@ -85,7 +85,12 @@ impl SplatParams {
     }
 
     /// A parameter error of this object.
-    pub(crate) fn bad(&self, parameter: &'static str, found: impl std::fmt::Debug, expected: &'static str) -> ConvertError {
+    pub(crate) fn bad(
+        &self,
+        parameter: &'static str,
+        found: impl std::fmt::Debug,
+        expected: &'static str,
+    ) -> ConvertError {
         ConvertError::Parameter { object: self.object_name.clone(), parameter, found: format!("{found:?}"), expected }
     }
 

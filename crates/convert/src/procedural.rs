@@ -10,12 +10,15 @@
 //! cauliflower of a cumulus. The gain 2^−0.9 keeps the small octaves visible. Ellipsoids merge by a smooth maximum, so
 //! no seam shows where two meet. A base below which nothing condenses flattens the underside.
 
+use crate::ConvertError;
 use crate::params::SplatParams;
 use crate::volume_points::check_lattice;
-use crate::ConvertError;
 use noise::{NoiseFn, Perlin};
 use rayon::prelude::*;
-use splat_core::{Grid, glam::{DMat3, DVec3}};
+use splat_core::{
+    Grid,
+    glam::{DMat3, DVec3},
+};
 
 /// An axis-aligned ellipsoid.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -139,9 +142,11 @@ impl CloudShape {
         if self.ellipsoids.is_empty() {
             return Err(p.bad("ellipsoids", 0, "at least one"));
         }
-        if let Some(e) = self.ellipsoids.iter().find(|e| {
-            !(e.center.is_finite() && e.radii.is_finite() && e.radii.min_element() > 0.0)
-        }) {
+        if let Some(e) = self
+            .ellipsoids
+            .iter()
+            .find(|e| !(e.center.is_finite() && e.radii.is_finite() && e.radii.min_element() > 0.0))
+        {
             return Err(p.bad("ellipsoid", e, "a finite centre and radii > 0"));
         }
         if !(1..=16).contains(&self.octaves) {
@@ -160,7 +165,11 @@ impl CloudShape {
             return Err(p.bad("frequency, edge", (self.frequency, self.edge), "finite numbers > 0"));
         }
         if !(self.extinction.is_finite() && self.extinction >= 0.0 && self.base.is_none_or(f64::is_finite)) {
-            return Err(p.bad("extinction, base", (self.extinction, self.base), "a finite number ≥ 0, a finite height"));
+            return Err(p.bad(
+                "extinction, base",
+                (self.extinction, self.base),
+                "a finite number ≥ 0, a finite height",
+            ));
         }
         Ok(())
     }

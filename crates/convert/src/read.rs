@@ -15,6 +15,9 @@ mod origin;
 #[cfg(feature = "ply")]
 mod ply;
 
+#[cfg(feature = "las")]
+pub use laz::panic_is_input_error;
+
 use crate::error::{Place, ReadError, escaped, escaped_path};
 use crate::raw_points::RawPoints;
 use splat_core::{Grid, Mesh};

@@ -6,7 +6,10 @@
 //! cell is covered once, so Σ K stays σ_t·V.
 
 use rayon::prelude::*;
-use splat_core::{Grid, glam::{DMat3, DVec3}};
+use splat_core::{
+    Grid,
+    glam::{DMat3, DVec3},
+};
 
 /// Factors per axis that make the steps of a lattice like the shortest one, times `refine`.
 pub(crate) fn factors(axes: &DMat3, refine: u32) -> [usize; 3] {

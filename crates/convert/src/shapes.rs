@@ -115,13 +115,7 @@ struct Lattice {
 }
 
 impl Lattice {
-    fn new(
-        min: DVec3,
-        max: DVec3,
-        extinction: f64,
-        spacing: f64,
-        params: &SplatParams,
-    ) -> Result<Self, ConvertError> {
+    fn new(min: DVec3, max: DVec3, extinction: f64, spacing: f64, params: &SplatParams) -> Result<Self, ConvertError> {
         params.check()?;
         params.check_spacing(spacing * params.transform.scale)?;
         let extent = max - min;

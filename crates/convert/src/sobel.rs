@@ -9,7 +9,10 @@
 //! exact gradient everywhere; the paper leaves the faces open.
 
 use rayon::prelude::*;
-use splat_core::{Grid, glam::{DVec3, Mat3, Vec3}};
+use splat_core::{
+    Grid,
+    glam::{DVec3, Mat3, Vec3},
+};
 
 /// Gradient at every lattice point, value per object-space unit.
 ///

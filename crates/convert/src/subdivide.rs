@@ -125,7 +125,13 @@ pub(crate) fn split(m: &Measure, spacing: f64) -> Split {
     let height = 2.0 * m.area / length;
     // A stub shorter than half a spacing is not worth pieces of its own; any foot tiles.
     let stub = 0.5 * spacing / length;
-    let foot = if m.foot < stub { 0.0 } else if m.foot > 1.0 - stub { 1.0 } else { m.foot };
+    let foot = if m.foot < stub {
+        0.0
+    } else if m.foot > 1.0 - stub {
+        1.0
+    } else {
+        m.foot
+    };
     let unit = |i: usize| DVec3::AXES[i % 3];
     let (p, q, apex) = (unit(m.apex + 1), unit(m.apex + 2), unit(m.apex));
     let corner = p * (1.0 - foot) + q * foot;
@@ -254,7 +260,8 @@ mod tests {
     fn cv02_sliver_areas_are_exact() {
         // Isosceles sliver with legs 1 and base 1e-4: area = 0.25·1e-4·√(4 − 1e-8).
         let half = 0.5e-4_f64;
-        let v = [DVec3::new(-half, 0.0, 0.0), DVec3::new(half, 0.0, 0.0), DVec3::new(0.0, (1.0 - half * half).sqrt(), 0.0)];
+        let v =
+            [DVec3::new(-half, 0.0, 0.0), DVec3::new(half, 0.0, 0.0), DVec3::new(0.0, (1.0 - half * half).sqrt(), 0.0)];
         let exact = 0.25e-4 * (4.0 - 1e-8_f64).sqrt();
         assert!((measure(v).area / exact - 1.0).abs() < 1e-12);
         // Nearly parallel edges of length 1e4: the products agree in 14 digits, so plain f64 would keep two.

@@ -7,7 +7,10 @@
 
 use crate::ConvertError;
 use rayon::prelude::*;
-use splat_core::{Mesh, ScalarField, glam::{DVec3, Vec3}};
+use splat_core::{
+    Mesh, ScalarField,
+    glam::{DVec3, Vec3},
+};
 
 /// Cells along an edge of a block.
 const BLOCK: usize = 16;

@@ -14,7 +14,11 @@ use crate::params::SplatParams;
 use crate::tangent_plane::{self, Cell};
 use crate::{ConvertError, RawPoints};
 use rayon::prelude::*;
-use splat_core::{Cloud, SplatKind, glam::{DVec3, Vec3}, optics};
+use splat_core::{
+    Cloud, SplatKind,
+    glam::{DVec3, Vec3},
+    optics,
+};
 use std::cmp::Ordering;
 
 /// How raw points become surfels.
@@ -104,7 +108,8 @@ pub fn raw_to_surfels(points: &RawPoints, params: &SurfelParams) -> Result<(Clou
     let (mut places, nearest): (Vec<Place>, Vec<Nearest>) = if params.orientation == Orientation::Propagate {
         (0..distinct.len()).into_par_iter().with_min_len(256).map(|i| place(&tree, &distinct, i, params)).unzip()
     } else {
-        let places = (0..distinct.len()).into_par_iter().with_min_len(256).map(|i| place(&tree, &distinct, i, params).0);
+        let places =
+            (0..distinct.len()).into_par_iter().with_min_len(256).map(|i| place(&tree, &distinct, i, params).0);
         (places.collect(), Vec::new())
     };
     let mut report = SurfelReport {
@@ -200,7 +205,12 @@ fn place(tree: &Tree<'_>, distinct: &[Vec3], i: usize, params: &SurfelParams) ->
     }
     if n == 1 {
         let spacing = params.lone_spacing / params.splat.transform.scale;
-        let lone = Place { normal: orient::guess(params.orientation, DVec3::ZERO), plane: false, area: spacing * spacing, spacing };
+        let lone = Place {
+            normal: orient::guess(params.orientation, DVec3::ZERO),
+            plane: false,
+            area: spacing * spacing,
+            spacing,
+        };
         return (lone, nearest);
     }
     let fitted = tangent_plane::fit_normal(&offsets[..n]);
@@ -254,7 +264,12 @@ impl Sorted {
     }
 }
 
-fn emit(points: &RawPoints, params: &SurfelParams, sorted: &Sorted, report: &mut SurfelReport) -> Result<Cloud, ConvertError> {
+fn emit(
+    points: &RawPoints,
+    params: &SurfelParams,
+    sorted: &Sorted,
+    report: &mut SurfelReport,
+) -> Result<Cloud, ConvertError> {
     let t = &params.splat.transform;
     let surfels = sorted.surfels(params.merge_duplicates);
     report.splats = surfels.len() as u64;
@@ -264,7 +279,8 @@ fn emit(points: &RawPoints, params: &SurfelParams, sorted: &Sorted, report: &mut
     let wanted = Wanted { normal: true, value: params.values && !points.value.is_empty() };
     let kind = if opaque { SplatKind::Opaque } else { SplatKind::Surface };
     columns::size_columns(&mut cloud, surfels.len(), kind, wanted, &params.splat)?;
-    let columns = (&mut cloud.position, &mut cloud.normal, &mut cloud.radius, &mut cloud.cross_section, &mut cloud.color);
+    let columns =
+        (&mut cloud.position, &mut cloud.normal, &mut cloud.radius, &mut cloud.cross_section, &mut cloud.color);
     columns.into_par_iter().zip(&surfels).with_min_len(CHUNK).for_each(
         |((position, normal, radius, cross_section, color), &(place, point, sharers))| {
             let (known, i) = (&sorted.places[place as usize], point as usize);

@@ -38,7 +38,8 @@ fn smallest_eigenvector(d: DVec3, m: DVec3) -> Option<DVec3> {
     if p <= 1e-12 {
         return None;
     }
-    let columns = |e: DVec3| DMat3::from_cols(DVec3::new(e.x, m.z, m.y), DVec3::new(m.z, e.y, m.x), DVec3::new(m.y, m.x, e.z));
+    let columns =
+        |e: DVec3| DMat3::from_cols(DVec3::new(e.x, m.z, m.y), DVec3::new(m.z, e.y, m.x), DVec3::new(m.y, m.x, e.z));
     let half_determinant = (columns(e).determinant() / (2.0 * p * p * p)).clamp(-1.0, 1.0);
     let angle = half_determinant.acos() / 3.0;
     let smallest = third + 2.0 * p * (angle + std::f64::consts::TAU / 3.0).cos();

@@ -7,7 +7,10 @@
 
 use crate::subdivide::robust_cross;
 use rayon::prelude::*;
-use splat_core::{Mesh, glam::{DVec3, Vec3}};
+use splat_core::{
+    Mesh,
+    glam::{DVec3, Vec3},
+};
 
 /// Triangles per parallel task.
 const CHUNK: usize = 4096;
@@ -25,8 +28,12 @@ const CHUNK: usize = 4096;
 /// # Panics
 /// If a vertex index is out of range, see [`Mesh::validate`].
 pub fn vertex_normals(mesh: &Mesh) -> Vec<Vec3> {
-    let corners: Vec<[DVec3; 3]> =
-        mesh.triangles.par_iter().with_min_len(CHUNK).map(|t| corner_normals(t.map(|v| mesh.position[v as usize]))).collect();
+    let corners: Vec<[DVec3; 3]> = mesh
+        .triangles
+        .par_iter()
+        .with_min_len(CHUNK)
+        .map(|t| corner_normals(t.map(|v| mesh.position[v as usize])))
+        .collect();
     // One thread adds in the order of the file, so that the sums do not depend on the thread count.
     let mut sum = vec![DVec3::ZERO; mesh.position.len()];
     for (triangle, corner) in mesh.triangles.iter().zip(&corners) {

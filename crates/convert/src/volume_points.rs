@@ -10,7 +10,10 @@ use crate::params::SplatParams;
 use crate::sobel::{Rows, Sobel, normal_from_gradient};
 use crate::{ConvertError, resample};
 use rayon::prelude::*;
-use splat_core::{Cloud, Grid, SplatKind, TransferFunction, glam::{DVec3, Vec3}};
+use splat_core::{
+    Cloud, Grid, SplatKind, TransferFunction,
+    glam::{DVec3, Vec3},
+};
 
 /// How a volume becomes splats.
 #[derive(Debug, Clone, PartialEq)]
@@ -252,7 +255,8 @@ impl Emit<'_> {
             rest = tail;
         }
         let slab_points = self.lattice.dims[0] * self.lattice.dims[1];
-        let scratch = || (Rows::default(), if self.params.normals { vec![Vec3::ZERO; slab_points] } else { Vec::new() });
+        let scratch =
+            || (Rows::default(), if self.params.normals { vec![Vec3::ZERO; slab_points] } else { Vec::new() });
         tasks
             .into_par_iter()
             .zip(slabs)

@@ -163,7 +163,10 @@ fn cv10_absurd_spacings_are_refused_by_name() {
         Err(ConvertError::TooMany { .. })
     ));
     let (cloud, _) = mesh_to_points(&quad(1.0), &with(Density::Splats(u64::MAX), 100_000)).map_or_else(
-        |e| { assert!(matches!(e, ConvertError::TooMany { .. } | ConvertError::Parameter { .. })); (Cloud::default(), 0) },
+        |e| {
+            assert!(matches!(e, ConvertError::TooMany { .. } | ConvertError::Parameter { .. }));
+            (Cloud::default(), 0)
+        },
         |r| (r.0, 1),
     );
     assert!(cloud.is_empty());

@@ -64,7 +64,10 @@ fn ba08_line_ends_byte_order_mark_tabs_and_blank_lines() {
 
 #[test]
 fn ba08_a_line_of_10_mb_is_refused_at_1_mib() {
-    let text = format!("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 {}3\n", " ".repeat(10 << 20));
+    let text = format!(
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 {}3\n",
+        " ".repeat(10 << 20)
+    );
     let error = load("long.ply", text.as_bytes()).unwrap_err().to_string();
     assert!(error.starts_with("long.ply:8: expected a line of at most 1 MiB"), "{error}");
 }

@@ -82,6 +82,8 @@ pub(crate) struct Caster {
     pub(crate) kind: SplatKind,
     /// Cutoff radius of the kernel; for an opaque disc its radius.
     pub(crate) radius: f32,
+    /// 1/R² of media.
+    pub(crate) inverse_radius_sq: f32,
     /// Cross-section K.
     pub(crate) cross_section: f32,
     /// Semi-axes of the disc, for surfaces.
@@ -146,6 +148,7 @@ impl Casters<'_> {
             distance: if parallel { position.z } else { position.length() },
             kind,
             radius: frame.length(cloud.radius[i]),
+            inverse_radius_sq: 1.0 / frame.length(cloud.radius[i]).powi(2),
             cross_section: frame.area(cloud.cross_section[i]),
             axes: [Vec3::ZERO; 2],
             normal: Vec3::ZERO,

@@ -31,6 +31,8 @@ pub(crate) const NEAR: f32 = 0.35;
 const BIWEIGHT: f32 = 2.645_751_3;
 /// Fractions of a row or column below this go to its neighbours.
 const NEGLIGIBLE: f32 = 1.0 / 1024.0;
+/// Most cells along one axis of a footprint that is integrated over cells.
+const LONGEST: usize = 16;
 /// Least half width of a footprint, cells.
 const LEAST_HALF: f32 = 1e-4;
 /// Footprints that lean by fewer cells than this over their height count as upright.
@@ -52,8 +54,6 @@ pub(crate) fn plane_distance(p: Vec3, n: Vec3, ray: &Ray) -> Option<f32> {
 /// Buffers of one worker, reused from splat to splat.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
-    share_u: Vec<(f32, f32)>,
-    share_v: Vec<(f32, f32)>,
     sampled: Vec<(u32, f32, f32)>,
 }
 
@@ -81,7 +81,8 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
         let size = Vec2::from(self.mapping.size().map(|n| n as f32));
         let least = half.min_element();
         let creased = least > CREASE && self.mapping.is_creased(place.at, half);
-        if least >= SAMPLES || creased || (2.0 * half).cmpge(size).any() {
+        let long = half.max_element() > 0.5 * LONGEST as f32 - 1.0;
+        if least >= SAMPLES || creased || long || (2.0 * half).cmpge(size).any() {
             self.sample(caster, place.at, half, (SAMPLES / least).ceil().clamp(1.0, 16.0) as u32);
         } else {
             let gauss = BIWEIGHT / caster.kernel.cutoff;
@@ -92,9 +93,8 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
     /// Exact overlap of a small footprint with each cell: row by row, and within a row by columns about the centre of
     /// the part of the footprint in that row, which follows its slant.
     fn overlap(&mut self, caster: &Caster, at: Vec2, spread: Spread, distance: f32) {
-        let mut scratch = std::mem::take(&mut self.scratch);
         let half_v = spread.vv.sqrt().max(LEAST_HALF);
-        let first_v = shares(at.y, half_v, &mut scratch.share_v);
+        let vs = Shares::new(at.y, half_v);
         let area = if self.mapping.is_parallel() { 1.0 } else { distance * distance };
         let total = caster.cross_section * angle_gain(caster) / area;
         let mut slant = spread.uv / (half_v * half_v);
@@ -105,19 +105,18 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
         let height = (2.0 * half_v).min(1.0);
         let half_u = (spread.uu - slant * spread.uv).max(0.0) + slant * slant * height * height * ROW_WIDTH;
         let half_u = half_u.sqrt().max(LEAST_HALF);
-        let mut first_u = shares(at.x, half_u, &mut scratch.share_u);
-        for (j, &(v, centre)) in scratch.share_v.iter().enumerate() {
+        let mut us = Shares::new(at.x, half_u);
+        for j in 0..vs.count {
             if slant != 0.0 {
-                first_u = shares(at.x + slant * (centre - at.y), half_u, &mut scratch.share_u);
+                us = Shares::new(at.x + slant * (vs.centre[j] - at.y), half_u);
             }
-            for (i, (u, _)) in scratch.share_u.iter().enumerate() {
-                if let Some(cell) = self.mapping.wrap(first_u + i as i32, first_v + j as i32) {
-                    let share = total * u * v * self.mapping.inverse_measure(cell);
+            for i in 0..us.count {
+                if let Some(cell) = self.mapping.wrap(us.first + i as i32, vs.first + j as i32) {
+                    let share = total * us.share[i] * vs.share[j] * self.mapping.inverse_measure(cell);
                     self.push(caster, cell, share, caster.distance);
                 }
             }
         }
-        self.scratch = scratch;
     }
 
     /// Samples a footprint at the rays of cells (`samples`² rays a cell) within `half` of its centre.
@@ -284,40 +283,56 @@ fn angle_gain(caster: &Caster) -> f32 {
     cosine * caster.extinction.opacity.optical_depth_factor(cosine)
 }
 
-/// Fractions of a biweight of half width `half` about `centre` in consecutive cells, of sum 1, each with the centre of
-/// its part; returns the first cell.
-#[inline]
-fn shares(centre: f32, half: f32, out: &mut Vec<(f32, f32)>) -> i32 {
-    out.clear();
-    let mut first = floor(centre - half);
-    let last = floor(centre + half);
-    if first == last {
-        out.push((1.0, centre));
-        return first;
-    }
-    let inv = 1.0 / half;
-    let (mut below, mut moment_below) = (0.0, 0.0);
-    for cell in first..=last {
-        // Past its last edge, the footprint is all below.
-        let x = if cell == last { 1.0 } else { (((cell + 1) as f32 - centre) * inv).clamp(-1.0, 1.0) };
-        let x2 = x * x;
-        let cdf = 0.5 + x * (0.9375 - x2 * (0.625 - 0.1875 * x2));
-        // ∫ x·(15/16)(1 − x²)² dx
-        let rest = 1.0 - x2;
-        let moment = -0.15625 * rest * rest * rest;
-        let share = cdf - below;
-        if share >= NEGLIGIBLE {
-            out.push((share, centre + half * (moment - moment_below) / share));
-            (below, moment_below) = (cdf, moment);
-        } else if out.is_empty() {
-            first += 1;
+/// Fractions of a footprint in consecutive cells of one axis, of sum 1.
+struct Shares {
+    first: i32,
+    count: usize,
+    share: [f32; LONGEST],
+    /// Centre of the part in each cell.
+    centre: [f32; LONGEST],
+}
+
+impl Shares {
+    /// A biweight of half width `half` < LONGEST/2 − 1 about `at`; fractions below [`NEGLIGIBLE`] at either end go to
+    /// the cell beside.
+    #[inline]
+    fn new(at: f32, half: f32) -> Self {
+        let first = floor(at - half);
+        let last = floor(at + half);
+        let mut shares = Self { first, count: 1, share: [1.0; LONGEST], centre: [at; LONGEST] };
+        if first == last {
+            return shares;
         }
+        let inv = 1.0 / half;
+        let (mut below, mut moment_below, mut n) = (0.0, 0.0, 0);
+        for cell in first..last {
+            let x = ((cell + 1) as f32 - at) * inv;
+            let x2 = (x * x).min(1.0);
+            let cdf = 0.5 + x * (0.9375 - x2 * (0.625 - 0.1875 * x2));
+            let share = cdf - below;
+            if n == 0 && share < NEGLIGIBLE {
+                shares.first = cell + 1;
+                continue;
+            }
+            // ∫ x·(15/16)(1 − x²)² dx
+            let rest = 1.0 - x2;
+            let moment = -0.15625 * rest * rest * rest;
+            shares.share[n] = share;
+            shares.centre[n] = at + half * (moment - moment_below) / share;
+            (below, moment_below) = (cdf, moment);
+            n += 1;
+        }
+        let share = 1.0 - below;
+        if share >= NEGLIGIBLE || n == 0 {
+            shares.share[n] = share;
+            shares.centre[n] = at - half * moment_below / share;
+            n += 1;
+        } else {
+            shares.share[n - 1] += share;
+        }
+        shares.count = n;
+        shares
     }
-    // What the negligible last cell would have had goes to the one before it.
-    if let Some(end) = out.last_mut() {
-        end.0 += 1.0 - below;
-    }
-    first
 }
 
 struct Sample {
@@ -341,7 +356,7 @@ fn sample(caster: &Caster, ray: &Ray, parallel: bool, near: bool) -> Option<Samp
 fn sample_medium(caster: &Caster, ray: &Ray, parallel: bool, near: bool) -> Option<Sample> {
     let p = caster.position - ray.base;
     let along = p.dot(ray.direction);
-    let s = (p - ray.direction * along).length_squared() / (caster.radius * caster.radius);
+    let s = (p - ray.direction * along).length_squared() * caster.inverse_radius_sq;
     if s >= 1.0 || (!near && along <= 0.0) {
         return None;
     }

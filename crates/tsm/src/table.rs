@@ -10,9 +10,9 @@ use rayon::prelude::*;
 /// Fixed point: 2⁴⁴ units an absorbance of 1.
 const FIXED: f64 = (1u64 << 44) as f64;
 /// Lists shorter than this are sorted by comparisons.
-const SHORT: usize = 512;
-/// Bits of one pass of the radix sort.
-const DIGIT: u32 = 11;
+const SHORT: usize = 128;
+/// Lists from this length on are sorted by eleven bits a pass, shorter ones by eight.
+const LONG: usize = 8192;
 
 /// One entry of a list: before sorting `total` is the entry's own absorbance, after it the sum up to and with it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -190,14 +190,25 @@ fn sort<const C: usize>(list: &mut [Knot<C>], spare: &mut Vec<Knot<C>>) {
     }
     let bits = |k: &Knot<C>| k.distance.to_bits();
     let (least, most) = list.iter().fold((u32::MAX, 0), |(a, b), k| (a.min(bits(k)), b.max(bits(k))));
-    // Distances of one cell differ in their low bits alone; those are sorted eleven at a time.
+    // Distances of one cell differ in their low bits alone.
     let significant = u32::BITS - (most - least).leading_zeros();
-    let passes = significant.div_ceil(DIGIT);
     spare.clear();
     spare.resize(list.len(), Knot::ZERO);
+    if list.len() < LONG { radix::<C, 256>(list, spare, least, significant) } else { radix::<C, 2048>(list, spare, least, significant) }
+}
+
+/// Radix sort of the `significant` low bits of the distances' bits above `least`, by digits of `RADIX` values.
+fn radix<const C: usize, const RADIX: usize>(
+    list: &mut [Knot<C>],
+    spare: &mut [Knot<C>],
+    least: u32,
+    significant: u32,
+) {
+    let width = RADIX.trailing_zeros();
+    let passes = significant.div_ceil(width);
     for pass in 0..passes {
-        let digit = |k: &Knot<C>| ((bits(k) - least) >> (pass * DIGIT)) as usize & ((1 << DIGIT) - 1);
-        if pass % 2 == 0 { scatter(list, spare, digit) } else { scatter(spare, list, digit) }
+        let digit = |k: &Knot<C>| ((k.distance.to_bits() - least) >> (pass * width)) as usize & (RADIX - 1);
+        if pass % 2 == 0 { scatter::<C, RADIX>(list, spare, digit) } else { scatter::<C, RADIX>(spare, list, digit) }
     }
     if passes % 2 == 1 {
         list.copy_from_slice(spare);
@@ -205,8 +216,12 @@ fn sort<const C: usize>(list: &mut [Knot<C>], spare: &mut Vec<Knot<C>>) {
 }
 
 /// One stable counting pass.
-fn scatter<const C: usize>(from: &[Knot<C>], to: &mut [Knot<C>], digit: impl Fn(&Knot<C>) -> usize) {
-    let mut next = [0u32; 1 << DIGIT];
+fn scatter<const C: usize, const RADIX: usize>(
+    from: &[Knot<C>],
+    to: &mut [Knot<C>],
+    digit: impl Fn(&Knot<C>) -> usize,
+) {
+    let mut next = [0u32; RADIX];
     from.iter().for_each(|k| next[digit(k)] += 1);
     let mut sum = 0;
     for slot in &mut next {

@@ -129,16 +129,26 @@ impl Number for Jet {
                 self.combine(other, [u, r, -u * r, 0.0, -r * r, 2.0 * u * r * r])
             }
             // ln a is not wanted where the exponent is constant: a may be negative or 0.
-            Binary::Pow if other.is_constant() => {
-                self.chain([u, b * a.powf(b - 1.0), b * (b - 1.0) * a.powf(b - 2.0)])
-            }
+            Binary::Pow if other.is_constant() => self.chain([u, b * a.powf(b - 1.0), b * (b - 1.0) * a.powf(b - 2.0)]),
             Binary::Pow => {
                 let (l, w) = (a.ln(), a.powf(b - 1.0));
                 let aa = b * (b - 1.0) * a.powf(b - 2.0);
                 self.combine(other, [u, b * w, u * l, aa, w * (1.0 + b * l), u * l * l])
             }
-            Binary::Min => if a <= b { self } else { other },
-            Binary::Max => if a >= b { self } else { other },
+            Binary::Min => {
+                if a <= b {
+                    self
+                } else {
+                    other
+                }
+            }
+            Binary::Max => {
+                if a >= b {
+                    self
+                } else {
+                    other
+                }
+            }
             Binary::Atan2 => {
                 let q = 1.0 / (a * a + b * b);
                 let (da, db) = (b * q, -a * q);

@@ -159,10 +159,7 @@ impl Parser<'_> {
     }
 
     /// Guards the call stack against text like ((((….
-    fn nested(
-        &mut self,
-        inner: impl FnOnce(&mut Self) -> Result<(), ExpressionError>,
-    ) -> Result<(), ExpressionError> {
+    fn nested(&mut self, inner: impl FnOnce(&mut Self) -> Result<(), ExpressionError>) -> Result<(), ExpressionError> {
         if self.nesting == 4 * MAX_NESTING {
             return Err(self.error("at most 256 nested signs, powers and brackets", "; split the formula"));
         }

@@ -159,8 +159,20 @@ impl Number for f64 {
             Binary::Div => self / other,
             Binary::Pow => self.powf(other),
             // f64::min and max hide NaN; a field must not.
-            Binary::Min => if self <= other || self.is_nan() { self } else { other },
-            Binary::Max => if self >= other || self.is_nan() { self } else { other },
+            Binary::Min => {
+                if self <= other || self.is_nan() {
+                    self
+                } else {
+                    other
+                }
+            }
+            Binary::Max => {
+                if self >= other || self.is_nan() {
+                    self
+                } else {
+                    other
+                }
+            }
             Binary::Atan2 => self.atan2(other),
         }
     }

@@ -61,8 +61,10 @@ fn layout(content: &[u8]) -> Result<Layout, ReadError> {
         return Err(damaged(24, "LAS version 1.0 to 1.4", &format!("{}.{}", version.major, version.minor)));
     }
     let points = header.offset_to_point_data as usize;
-    if header.header_size < version.header_size() || points < usize::from(header.header_size) || points > content.len() {
-        let found = format!("a header of {} bytes, points at {points}, {} bytes in all", header.header_size, content.len());
+    if header.header_size < version.header_size() || points < usize::from(header.header_size) || points > content.len()
+    {
+        let found =
+            format!("a header of {} bytes, points at {points}, {} bytes in all", header.header_size, content.len());
         return Err(damaged(94, "points after the header, inside the file", &found));
     }
     let stored_id = header.point_data_record_format;
@@ -73,9 +75,9 @@ fn layout(content: &[u8]) -> Result<Layout, ReadError> {
         _ => return Err(damaged(104, "point format 0 to 10, with bit 7 for LAZ", &stored_id.to_string())),
     };
     let record = header.point_data_record_length;
-    format.extra_bytes = record.checked_sub(format.len()).ok_or_else(|| {
-        damaged(105, &format!("records of at least {} bytes", format.len()), &record.to_string())
-    })?;
+    format.extra_bytes = record
+        .checked_sub(format.len())
+        .ok_or_else(|| damaged(105, &format!("records of at least {} bytes", format.len()), &record.to_string()))?;
     let (scale, offset) = transform(&header)?;
     Ok(Layout {
         format_id,
@@ -156,8 +158,7 @@ struct Columns {
 impl Columns {
     fn new(layout: &Layout) -> Result<Self, ReadError> {
         let n = layout.count as usize;
-        let mut columns =
-            Self { steps: Vec::new(), rgb: Vec::new(), value: Vec::new(), classification: Vec::new() };
+        let mut columns = Self { steps: Vec::new(), rgb: Vec::new(), value: Vec::new(), classification: Vec::new() };
         input::reserve(&mut columns.steps, n)?;
         input::reserve(&mut columns.value, n)?;
         input::reserve(&mut columns.classification, n)?;

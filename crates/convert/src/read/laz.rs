@@ -10,6 +10,7 @@ use crate::error::{Place, ReadError};
 use ::laz::laszip::{ChunkTable, ChunkTableEntry};
 use ::laz::{LasZipDecompressor, LazItem, LazItemRecordBuilder, LazItemType, LazVlr, LazVlrBuilder};
 use rayon::prelude::*;
+use std::cell::Cell;
 use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -62,7 +63,9 @@ fn damaged(byte: usize, expected: &str, found: impl Into<String>) -> ReadError {
 fn laszip_record(content: &[u8], layout: &Layout) -> Result<LazVlr, ReadError> {
     let (mut at, count) = layout.records;
     for _ in 0..count {
-        let (Some(head), true) = (content.get(at..at + RECORD_HEADER), at + RECORD_HEADER <= layout.points) else { break };
+        let (Some(head), true) = (content.get(at..at + RECORD_HEADER), at + RECORD_HEADER <= layout.points) else {
+            break;
+        };
         let length = usize::from(u16::from_le_bytes([head[20], head[21]]));
         let data = at + RECORD_HEADER..at + RECORD_HEADER + length;
         if data.end > layout.points {
@@ -108,8 +111,9 @@ fn chunks<'a>(content: &'a [u8], layout: &Layout, vlr: &LazVlr) -> Result<(Vec<C
         return Err(damaged(table + 4, &expected, announced.to_string()));
     }
     let variable = vlr.uses_variable_size_chunks();
-    let entries = guarded(|| ChunkTable::read(&mut Cursor::new(&content[table..]), variable).map_err(|e| e.to_string()))
-        .map_err(|e| damaged(table, "a chunk table", e))?;
+    let entries =
+        guarded(|| ChunkTable::read(&mut Cursor::new(&content[table..]), variable).map_err(|e| e.to_string()))
+            .map_err(|e| damaged(table, "a chunk table", e))?;
     let mut entries = entries.as_ref().to_vec();
     if !variable {
         let size = u64::from(vlr.chunk_size());
@@ -162,10 +166,9 @@ fn chunk(at: usize, bytes: &[u8], points: u64, items: &[LazItem], layout: &Layou
     guarded(|| {
         let mut decoder = LasZipDecompressor::new(Cursor::new(source), vlr).map_err(|e| e.to_string())?;
         decoder.decompress_many(&mut records).map_err(|e| e.to_string())?;
-        // Less than the whole coder register may be left over, and nothing of the table behind the chunk used.
-        let used = decoder.get().position();
-        eprintln!("USED {used} of {}", bytes.len() + 8);
-        if used <= bytes.len() as u64 + 8 { Ok(()) } else { Err("points beyond its end".to_owned()) }
+        // The coder writes exactly as many bytes as the decoder reads: anything else is damage, which no checksum tells.
+        let (used, stored) = (decoder.get().position(), bytes.len() as u64 + 8);
+        if used == stored { Ok(()) } else { Err(format!("{used} bytes used of {stored}")) }
     })
     .map_err(|e| damaged(at, &format!("a chunk of {points} points"), e))?;
     Ok(records)
@@ -184,7 +187,10 @@ fn check_layers(at: usize, bytes: &[u8], points: u64, items: &[LazItem], layout:
         .sum();
     let head = layout.record as usize;
     let word = |i: usize| {
-        bytes.get(head + 4 * i..head + 4 * i + 4).and_then(|b| b.try_into().ok()).map(|b| u64::from(u32::from_le_bytes(b)))
+        bytes
+            .get(head + 4 * i..head + 4 * i + 4)
+            .and_then(|b| b.try_into().ok())
+            .map(|b| u64::from(u32::from_le_bytes(b)))
     };
     let sizes = (1..=layers).try_fold(0u64, |sum, i| Some(sum + word(i)?));
     let needed = sizes.map(|s| s + (head + 4 * (layers + 1)) as u64);
@@ -195,11 +201,24 @@ fn check_layers(at: usize, bytes: &[u8], points: u64, items: &[LazItem], layout:
     Err(damaged(at, &expected, format!("{:?} points in {needed:?} bytes", word(0))))
 }
 
+thread_local! {
+    static GUARDED: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Whether this thread runs foreign decoding code whose panic becomes a [`ReadError`]; for a panic hook, which would
+/// otherwise report a damaged file as a bug.
+pub fn panic_is_input_error() -> bool {
+    GUARDED.get()
+}
+
 /// Runs the decoder and turns a panic into an error.
 ///
 /// Last resort: whether an arithmetic-coded stream is valid shows only while it is decoded, the stream has no checksum,
 /// and the decoder indexes tables, divides and adds with what it finds there. Sizes are checked before, so that the
 /// decoder cannot exhaust memory; that no unwinding could catch.
 fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| Err("a damaged compressed stream".to_owned()))
+    let before = GUARDED.replace(true);
+    let result = catch_unwind(AssertUnwindSafe(work));
+    GUARDED.set(before);
+    result.unwrap_or_else(|_| Err("a damaged compressed stream".to_owned()))
 }

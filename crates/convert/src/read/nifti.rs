@@ -59,7 +59,12 @@ fn header(content: &[u8]) -> Result<(NiftiHeader, bool), ReadError> {
     if &bytes[344..348] != b"n+1\0" {
         let hint = "pairs of .hdr and .img are not read; save the volume as one .nii file";
         let found = crate::error::escaped(&bytes[344..348], 4);
-        return Err(ReadError::input(Place::Byte(344), "'n+1', header and voxels in one file", format!("'{found}'"), hint));
+        return Err(ReadError::input(
+            Place::Byte(344),
+            "'n+1', header and voxels in one file",
+            format!("'{found}'"),
+            hint,
+        ));
     }
     let header = NiftiHeader::from_reader(bytes)
         .map_err(|e| ReadError::input(Place::Byte(0), "a NIfTI-1 header", e.to_string(), HINT))?;

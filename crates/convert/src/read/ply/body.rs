@@ -63,7 +63,11 @@ fn check_count<S: Source>(source: &S, element: &Element) -> Result<(), ReadError
     }
     Err(ReadError::input(
         at_line(element.line),
-        format!("at most {} records, what the {} bytes left can hold", source.remaining() / record.max(1), source.remaining()),
+        format!(
+            "at most {} records, what the {} bytes left can hold",
+            source.remaining() / record.max(1),
+            source.remaining()
+        ),
         format!("{} records of '{}'", element.count, escaped(&element.name, 40)),
         "the file is truncated, or its header is damaged",
     ))
