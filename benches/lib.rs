@@ -1,5 +1,9 @@
 //! What the benchmarks share: the splats of the outdoor scene, thinned or repeated to a given number.
-#![allow(clippy::missing_panics_doc, clippy::expect_used, reason = "a benchmark without its scene has nothing to measure")]
+#![allow(
+    clippy::missing_panics_doc,
+    clippy::expect_used,
+    reason = "a benchmark without its scene has nothing to measure"
+)]
 
 use organza::{Loaded, Progress, RenderOptions, load, scene};
 use splat_core::{Camera, Cloud, glam::Vec3, rng};

@@ -1,7 +1,75 @@
-//! What the end-to-end tests share: scenes drawn by the library or by the real command.
+//! What the end-to-end tests share: the real command, from a scene text to the channels of its EXR file.
 #![allow(clippy::unwrap_used, clippy::missing_panics_doc, reason = "a test fails by panicking")]
 
-use organza::{Layers, Progress, Render, RenderOptions, render, scene};
+use exr::prelude::{ReadChannels, ReadLayers, read};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+/// The command, built once with the profile of the running test.
+pub fn organza() -> Command {
+    static BINARY: OnceLock<PathBuf> = OnceLock::new();
+    let binary = BINARY.get_or_init(|| {
+        let test = std::env::current_exe().unwrap();
+        let folder = test.parent().and_then(Path::parent).unwrap();
+        let mut build = Command::new(env!("CARGO"));
+        build.args(["build", "--quiet", "--package", "organza", "--bin", "organza"]);
+        if folder.file_name().unwrap() == "release" {
+            build.arg("--release");
+        }
+        build.arg("--target-dir").arg(folder.parent().unwrap()).current_dir(env!("CARGO_MANIFEST_DIR"));
+        assert!(build.status().unwrap().success());
+        folder.join(format!("organza{}", std::env::consts::EXE_SUFFIX))
+    });
+    Command::new(binary)
+}
+
+/// The channels of an EXR file by name, such as `R`, `A`, `direct.G`, `depth.first.Z`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+    channels: BTreeMap<String, Vec<f32>>,
+}
+
+impl Picture {
+    /// Values of a channel, row by row from the top left.
+    pub fn channel(&self, name: &str) -> Vec<f64> {
+        let values =
+            self.channels.get(name).unwrap_or_else(|| panic!("no channel {name} in {:?}", self.channels.keys()));
+        values.iter().map(|v| f64::from(*v)).collect()
+    }
+
+    /// SHA-256 of all channels; depths are divided by `scale`, a power of two, first.
+    pub fn sha256(&self, scale: f64) -> String {
+        let mut hasher = Sha256::new();
+        for (name, values) in &self.channels {
+            let scale = if name.ends_with('Z') { scale } else { 1.0 };
+            values.iter().for_each(|v| hasher.update(((f64::from(*v) / scale) as f32).to_bits().to_le_bytes()));
+        }
+        hasher.finalize().iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
+    }
+}
+
+/// Runs `organza render` on a scene text and reads the EXR file.
+pub fn draw(scene: &str, arguments: &[&str]) -> Picture {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    let mut command = organza();
+    command.args(["render", "scene.toml", "-o", "out.exr"]).args(arguments).current_dir(&folder);
+    let out = command.output().unwrap();
+    assert!(out.status.success(), "{}\n{scene}", String::from_utf8_lossy(&out.stderr));
+    let reader = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
+    let image = reader.from_file(folder.path().join("out.exr")).unwrap();
+    let layer = image.layer_data;
+    let channels = layer.channel_data.list.iter();
+    Picture {
+        size: [layer.size.0 as u32, layer.size.1 as u32],
+        channels: channels.map(|c| (c.name.to_string(), c.sample_data.values_as_f32().collect())).collect(),
+    }
+}
 
 /// Head of a scene seen by parallel rays along −z: `height` world units in `size` pixels squared.
 pub fn parallel_view(height: f64, size: u32) -> String {
@@ -9,23 +77,6 @@ pub fn parallel_view(height: f64, size: u32) -> String {
         "version = 1\n[camera]\nposition = [0, 0, 5]\ntarget = [0, 0, 0]\northographic = {height:?}\n\
          size = [{size}, {size}]\n"
     )
-}
-
-/// Renders a scene text.
-pub fn draw(text: &str) -> Render {
-    let scene = scene::parse("test.toml".as_ref(), text.as_bytes(), &scene::LoadOptions::default())
-        .unwrap_or_else(|e| panic!("{e}\n{text}"));
-    render(&scene, &RenderOptions::default(), &Progress::new()).unwrap_or_else(|e| panic!("{e}"))
-}
-
-/// Values of a scalar layer, or of one channel of a colour layer written `name.c` with c from 0 to 2.
-pub fn channel(layers: &Layers, name: &str) -> Vec<f64> {
-    if let Some(values) = layers.scalar(name) {
-        return values.iter().map(|v| f64::from(*v)).collect();
-    }
-    let (name, c) = name.rsplit_once('.').unwrap();
-    let c: usize = c.parse().unwrap();
-    layers.rgb(name).unwrap().iter().map(|p| f64::from(p[c])).collect()
 }
 
 /// The values inside a rectangle of pixels, columns `x` and rows `y`.
@@ -37,4 +88,10 @@ pub fn window(values: &[f64], width: u32, x: std::ops::Range<u32>, y: std::ops::
 pub fn mean_and_ripple(values: &[f64]) -> (f64, f64) {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     (mean, values.iter().map(|v| (v - mean).abs()).fold(0.0, f64::max))
+}
+
+/// Largest difference between two channels.
+pub fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }

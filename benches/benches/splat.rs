@@ -4,7 +4,7 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use organza_benches::{TABLE_1, outdoor, outdoor_cloud};
 use splat_core::raster::{OpaqueImage, Params, fold, project};
-use splat_core::{Accumulator, Direction, SplatKind};
+use splat_core::{Accumulator, Direction, Progress, SplatKind};
 use std::hint::black_box;
 
 fn bench(c: &mut Criterion) {
@@ -31,7 +31,16 @@ fn bench(c: &mut Criterion) {
             b.iter(|| {
                 let mut acc = Accumulator::new(camera.size, 1, 3, false, false);
                 let opaque = OpaqueImage::default();
-                fold(&projected, &values, &scene.materials, &opaque, Direction::FrontToBack, &raster, &mut acc);
+                fold(
+                    &projected,
+                    &values,
+                    &scene.materials,
+                    &opaque,
+                    Direction::FrontToBack,
+                    &raster,
+                    &mut acc,
+                    &Progress::new(),
+                );
                 black_box(acc)
             });
         });

@@ -1,2 +1,84 @@
-//! Benchmark of tsm (being written).
-fn main() {}
+//! Shadow maps of the outdoor scene at the paper's three sizes, beside `rdst` sorting as many (cell, distance) keys as
+//! the map deposits; and the same number of points on one ray.
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use rdst::RadixSort;
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::{Cloud, Light, LightShape, Receiver, Transmittance, rng};
+use std::hint::black_box;
+use tsm::{Params, ShadowMap};
+
+/// Points of Gunjee 2007, Table 1.
+const SIZES: [usize; 3] = [437_645, 624_614, 1_841_320];
+
+fn lights(cloud: &Cloud) -> [(&'static str, Light); 3] {
+    let bounds = cloud.bounds();
+    let middle = cloud.origin + bounds.center().as_dvec3();
+    let above = middle + DVec3::Y * f64::from(bounds.diagonal());
+    let direction = DVec3::new(0.3, -1.0, 0.2).normalize();
+    let light = |shape| Light { shape, intensity: [1.0; 3] };
+    [
+        ("above", light(LightShape::Point { position: above })),
+        ("inside", light(LightShape::Point { position: middle })),
+        ("sun", light(LightShape::Directional { direction })),
+    ]
+}
+
+fn build(cloud: &Cloud, light: &Light) -> ShadowMap {
+    ShadowMap::build(cloud, &[], &[], light, &Params::default()).expect("invariant: the default table fits")
+}
+
+fn on_one_ray(cloud: &Cloud) -> Cloud {
+    let mut ray = cloud.clone();
+    let n = ray.len() as f32;
+    for i in 0..ray.len() {
+        ray.position[i] = Vec3::new(0.3, 1.0, 0.2) * (1.0 + i as f32 / n);
+    }
+    ray
+}
+
+fn keys(entries: u64, cells: u64) -> Vec<u64> {
+    let key =
+        |i: u64| (rng::bits(3, 0, i / 4, 0) % cells) << 32 | u64::from((1.0 + rng::unit_f32(3, 1, i, 0)).to_bits());
+    (0..entries).map(key).collect()
+}
+
+fn benches(c: &mut Criterion) {
+    for points in SIZES {
+        let (cloud, _) = organza_benches::outdoor_cloud(points);
+        let mut group = c.benchmark_group(format!("tsm/{points}"));
+        group.sample_size(10).throughput(Throughput::Elements(cloud.len() as u64));
+        for (name, light) in lights(&cloud) {
+            let map = build(&cloud, &light);
+            let counts = map.counts();
+            let per_splat = counts.entries as f64 / counts.translucent.max(1) as f64;
+            let per_entry = counts.bytes as f64 / counts.entries.max(1) as f64;
+            println!("{name}: {counts:?}, {per_splat:.2} entries a translucent splat, {per_entry:.1} bytes an entry");
+            group.bench_function(BenchmarkId::new("build", name), |b| b.iter(|| build(&cloud, &light)));
+            let unsorted = keys(counts.entries, counts.cells);
+            group.bench_function(BenchmarkId::new("rdst", name), |b| {
+                b.iter_batched_ref(|| unsorted.clone(), |k| k.radix_sort_unstable(), criterion::BatchSize::LargeInput);
+            });
+            group.bench_function(BenchmarkId::new("look up", name), |b| b.iter(|| black_box(look_up(&map, &cloud))));
+        }
+        let ray = on_one_ray(&cloud);
+        let light = lights(&cloud)[2].1;
+        group.bench_function("build/one ray", |b| b.iter(|| build(&ray, &light)));
+        group.finish();
+    }
+}
+
+fn look_up(map: &ShadowMap, cloud: &Cloud) -> f32 {
+    let at = |i: usize| {
+        map.transmittance(&Receiver {
+            position: cloud.position[i],
+            normal: cloud.normal_of(i),
+            radius: cloud.radius[i],
+            kind: cloud.kind[i],
+        })[0]
+    };
+    (0..cloud.len()).map(at).sum()
+}
+
+criterion_group!(tsm_benches, benches);
+criterion_main!(tsm_benches);

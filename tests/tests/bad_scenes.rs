@@ -62,7 +62,12 @@ fn bi23_unknown_keys_suggest_the_nearest() {
         ("mesh = ", "mehs = ", "12:1: unknown key `mehs`", "did you mean `mesh`?"),
         ("opacity = 0.3", "opactiy = 0.3", "19:1: unknown key `opactiy`", "did you mean `opacity`?"),
         ("slice_thickness", "slice", "21:12: unknown key `slice`", "did you mean `slice_thickness`?"),
-        ("position = [2", "radius = 1\nposition = [2", "8:1: unknown key `radius`", "known here: position, intensity, shadow"),
+        (
+            "position = [2",
+            "radius = 1\nposition = [2",
+            "8:1: unknown key `radius`",
+            "known here: position, intensity, shadow",
+        ),
         ("[render]", "[rendr]", "20:2: unknown key `rendr`", "did you mean `render`?"),
     ];
     for (from, to, message, hint) in cases {
@@ -157,7 +162,11 @@ fn bi28_names_and_references_name_both_places() {
 
 #[test]
 fn an_object_has_exactly_one_source() {
-    refused("mesh = \"a.ply\"", "mesh = \"a.ply\"\npoints = \"a.las\"", "10:1: object `a`: expected exactly one source, found mesh and points");
+    refused(
+        "mesh = \"a.ply\"",
+        "mesh = \"a.ply\"\npoints = \"a.las\"",
+        "10:1: object `a`: expected exactly one source, found mesh and points",
+    );
     refused("mesh = \"a.ply\"", "", "10:1: object `a`: expected exactly one source, found none");
     refused("volume = \"b.nii\"", "mesh = \"b.ply\"", "`transfer` belongs to a `volume`");
     refused("volume = \"b.nii\"", "volume = \"b.nii\"\nopacity = 0.5", "a medium has no `opacity`");

@@ -1,7 +1,7 @@
-//! Closed forms through scene files: slabs, shadows of slabs, crossed planes, a ball.
+//! Closed forms through the whole command, scene file in, EXR out: slabs, shadows of slabs, crossed planes, a ball.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use organza_tests::{channel, draw, mean_and_ripple, parallel_view, window};
+use organza_tests::{draw, mean_and_ripple, parallel_view, window};
 use splat_core::Footprint;
 
 /// A slab of thickness ½ and optical depth `tau` along z.
@@ -19,8 +19,8 @@ fn slab_has_the_transmittance_of_its_optical_depth() {
     // Ripple falls with the cutoff: footprint 0 ends at 3 σ, footprint 2 at 5 σ.
     for (footprint, most) in [(0, 1e-3), (2, 1e-5)] {
         for tau in [0.01f64, 1.0, 5.0] {
-            let layers = draw(&slab(tau, footprint)).layers;
-            let alpha = window(&channel(&layers, "alpha"), 96, 24..72, 24..72);
+            let picture = draw(&slab(tau, footprint), &[]);
+            let alpha = window(&picture.channel("A"), 96, 24..72, 24..72);
             let (mean, ripple) = mean_and_ripple(&alpha);
             let error = (1.0 - mean - (-tau).exp()).abs();
             assert!(error < 1e-5, "τ {tau}, footprint {footprint}: mean off by {error:e}");
@@ -32,8 +32,8 @@ fn slab_has_the_transmittance_of_its_optical_depth() {
 #[test]
 fn slab_in_perspective_follows_the_length_of_its_rays() {
     let text = slab(1.0, 0).replace("orthographic = 2.0", "fov_y = 30");
-    let layers = draw(&text).layers;
-    let alpha = channel(&layers, "alpha");
+    let picture = draw(&text, &[]);
+    let alpha = picture.channel("A");
     let focal = 48.0 / 15f64.to_radians().tan();
     for y in 10..86u32 {
         for x in 10..86u32 {
@@ -57,8 +57,8 @@ fn shadow(tau: f64, cells: &str) -> (f64, f64) {
         parallel_view(2.0, 96),
         tau / (0.4 * 2f64.sqrt())
     );
-    let layers = draw(&text).layers;
-    mean_and_ripple(&window(&channel(&layers, "shadow"), 96, 24..72, 24..72))
+    let picture = draw(&text, &[]);
+    mean_and_ripple(&window(&picture.channel("shadow.A"), 96, 24..72, 24..72))
 }
 
 #[test]
@@ -89,11 +89,10 @@ fn crossed_planes_show_four_regions_in_order() {
         )
     };
     let (a, b) = (0.6, 0.3);
-    let text = parallel_view(2.4, 120)
-        + &plane("red", 0.3, 0.5, "[1, 0, 0]", a)
-        + &plane("green", -0.3, -0.5, "[0, 1, 0]", b);
-    let layers = draw(&text).layers;
-    let (red, green) = (channel(&layers, "beauty.0"), channel(&layers, "beauty.1"));
+    let text =
+        parallel_view(2.4, 120) + &plane("red", 0.3, 0.5, "[1, 0, 0]", a) + &plane("green", -0.3, -0.5, "[0, 1, 0]", b);
+    let picture = draw(&text, &[]);
+    let (red, green) = (picture.channel("R"), picture.channel("G"));
     let region = |x: std::ops::Range<u32>, y: std::ops::Range<u32>| {
         (window(&red, 120, x.clone(), y.clone()), window(&green, 120, x, y))
     };
@@ -145,8 +144,8 @@ fn ball_has_the_chord_convolved_with_its_kernel() {
          medium_ball = {{ center = [0, 0, 0], radius = 1, extinction = {extinction:?}, spacing = {spacing:?} }}\n",
         parallel_view(2.6, 96)
     );
-    let layers = draw(&text).layers;
-    let alpha = channel(&layers, "alpha");
+    let picture = draw(&text, &[]);
+    let alpha = picture.channel("A");
     let reach = f64::from(Footprint::default().radius_for_spacing(spacing as f32));
     let (mut errors, mut inside, mut rim) = (Vec::new(), 0.0f64, 0.0f64);
     for y in 0..96u32 {

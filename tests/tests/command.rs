@@ -1,11 +1,11 @@
 //! The real command: exit codes, refusals before work, closed pipes, odd names, interrupts.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+use organza_tests::organza;
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use std::sync::OnceLock;
 use tempfile::TempDir;
 
 const SCENE: &str = r#"version = 1
@@ -23,24 +23,6 @@ intensity = [20, 20, 20]
 name = "fog"
 medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 0.5, spacing = 0.25 }
 "#;
-
-/// The command, built once with the profile of this test.
-fn organza() -> Command {
-    static BINARY: OnceLock<PathBuf> = OnceLock::new();
-    let binary = BINARY.get_or_init(|| {
-        let test = std::env::current_exe().unwrap();
-        let folder = test.parent().and_then(Path::parent).unwrap();
-        let mut build = Command::new(env!("CARGO"));
-        build.args(["build", "--quiet", "--package", "organza", "--bin", "organza"]);
-        if folder.file_name().unwrap() == "release" {
-            build.arg("--release");
-        }
-        build.arg("--target-dir").arg(folder.parent().unwrap()).current_dir(env!("CARGO_MANIFEST_DIR"));
-        assert!(build.status().unwrap().success());
-        folder.join(format!("organza{}", std::env::consts::EXE_SUFFIX))
-    });
-    Command::new(binary)
-}
 
 /// A folder with the scene `s.toml`, in which the command runs.
 struct Place {
@@ -154,10 +136,17 @@ fn exit_2_is_for_the_command_line() {
 fn exit_3_is_for_the_scene_and_its_data() {
     let place = Place::new();
     fs::write(place.path("bad.toml"), SCENE.replace("target", "taget")).unwrap();
-    let out = place.expect(3, &["render", "bad.toml", "--json"], "error: bad.toml:4:1: unknown key `taget`\nhint: did you mean `target`?");
+    let out = place.expect(
+        3,
+        &["render", "bad.toml", "--json"],
+        "error: bad.toml:4:1: unknown key `taget`\nhint: did you mean `target`?",
+    );
     assert_eq!(json_of(&out)["error"]["exit_code"], 3);
     fs::write(place.path("empty.ply"), "").unwrap();
-    let mesh = SCENE.replace("medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 0.5, spacing = 0.25 }", "mesh = \"empty.ply\"");
+    let mesh = SCENE.replace(
+        "medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 0.5, spacing = 0.25 }",
+        "mesh = \"empty.ply\"",
+    );
     fs::write(place.path("mesh.toml"), mesh).unwrap();
     place.expect(3, &["render", "mesh.toml"], "empty.ply");
     assert_eq!(place.made(), ["bad.toml", "empty.ply", "mesh.toml"]);
@@ -271,9 +260,8 @@ fn bi34_odd_names_work_and_are_escaped() {
     let scene = place.folder.path().join(std::ffi::OsStr::from_bytes(b"s\xff\n\x1b[2J.toml"));
     let picture = place.folder.path().join(std::ffi::OsStr::from_bytes(b"p\xfe.exr"));
     fs::copy(place.path("s.toml"), &scene).unwrap();
-    let render = || {
-        organza().arg("render").arg(&scene).arg("-o").arg(&picture).current_dir(&place.folder).output().unwrap()
-    };
+    let render =
+        || organza().arg("render").arg(&scene).arg("-o").arg(&picture).current_dir(&place.folder).output().unwrap();
     assert_eq!(render().status.code(), Some(0));
     assert!(picture.is_file());
     let second = render();
@@ -281,7 +269,11 @@ fn bi34_odd_names_work_and_are_escaped() {
     assert!(String::from_utf8_lossy(&second.stderr).contains("p\\xfe.exr: this file exists already"));
     fs::write(&scene, "version = 2").unwrap();
     let text = render().stderr;
-    assert!(String::from_utf8_lossy(&text).contains("s\\xff\\n\\u{1b}[2J.toml:1:"), "{}", String::from_utf8_lossy(&text));
+    assert!(
+        String::from_utf8_lossy(&text).contains("s\\xff\\n\\u{1b}[2J.toml:1:"),
+        "{}",
+        String::from_utf8_lossy(&text)
+    );
     // A path too long for the system is an error of the file system.
     let long = format!("{}.exr", "n".repeat(4096));
     place.expect(4, &["render", "s.toml", "-o", &long], "cannot write here");

@@ -34,7 +34,14 @@ fn metadata() -> Metadata {
 }
 
 fn read_exr(path: &Path) -> FlatImage {
-    read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes().from_file(path).unwrap()
+    read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .from_file(path)
+        .unwrap()
 }
 
 fn samples<'a>(image: &'a FlatImage, name: &str) -> &'a FlatSamples {

@@ -1,4 +1,18 @@
 //! Files and fields become clouds, meshes and grids.
+//!
+//! Readers give nouns ([`read`]); conversions give clouds of splats with one optical meaning (Gunjee 2007, section 4):
+//! [`mesh_to_points`], [`volume_to_points`], [`raw_to_surfels`], [`surface_to_points`], [`density_to_points`] and
+//! [`procedural_cloud`]. Each takes its parameters and returns a report of counts.
+//!
+//! ```
+//! use convert::{Density, ExpressionField, MeshParams, surface_to_points};
+//! use splat_core::glam::DVec3;
+//! let ball = ExpressionField::parse("x^2 + y^2 + z^2 - 1").unwrap();
+//! let glass = MeshParams { opacity: 0.3, density: Density::Spacing(0.05), ..MeshParams::default() };
+//! let bounds = [DVec3::splat(-1.2), DVec3::splat(1.2)];
+//! let (cloud, report) = surface_to_points(&ball, bounds, &glass).unwrap();
+//! assert_eq!(cloud.len() as u64, report.splats);
+//! ```
 #![forbid(unsafe_code)]
 
 mod columns;

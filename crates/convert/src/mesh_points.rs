@@ -24,8 +24,8 @@ pub struct MeshParams {
     /// Attributes and limits.
     pub splat: SplatParams,
     /// Largest spacing h, world units. [`Density::Auto`] takes 1/400 of the diagonal or the mean triangle's √area,
-    /// whichever is smaller, but not more than four million splats. With [`Density::Splats`] rounding to whole pieces
-    /// gives up to twice as many.
+    /// whichever is smaller, but not more than four million splats. With [`Density::Splats`] the count is met
+    /// within some percent where the triangles are not finer.
     pub density: Density,
     /// Opacity α of one crossing, in \[0, 1\]; 1 makes the surface opaque, 0 leaves nothing.
     pub opacity: f64,
@@ -108,7 +108,7 @@ pub fn mesh_to_points_into(mesh: &Mesh, params: &MeshParams, cloud: &mut Cloud) 
     if area == 0.0 || params.opacity == 0.0 {
         return columns::size_columns(cloud, 0, SplatKind::Surface, Wanted::default(), p).map(|()| report);
     }
-    let spacing = p.check_spacing(spacing(mesh, params, &report))?;
+    let spacing = p.check_spacing(spacing(mesh, &measures, params, &report))?;
     let starts = starts(&measures, spacing / scale, p)?;
     let splats = starts.last().copied().unwrap_or(0);
     report.spacing = spacing;
@@ -122,18 +122,40 @@ pub fn mesh_to_points_into(mesh: &Mesh, params: &MeshParams, cloud: &mut Cloud) 
 }
 
 /// The spacing in world units that the density asks for.
-fn spacing(mesh: &Mesh, params: &MeshParams, report: &MeshReport) -> f64 {
+fn spacing(mesh: &Mesh, measures: &[Measure], params: &MeshParams, report: &MeshReport) -> f64 {
+    let scale = params.splat.transform.scale;
     match params.density {
         Density::Spacing(h) => h,
-        Density::Splats(n) => (report.area / n.max(1) as f64).sqrt(),
+        Density::Splats(n) => spacing_for(measures, n.max(1), report, scale),
         Density::Auto => {
-            let diagonal =
-                f64::from(splat_core::Aabb::of_points(&mesh.position).diagonal()) * params.splat.transform.scale;
+            let diagonal = f64::from(splat_core::Aabb::of_points(&mesh.position).diagonal()) * scale;
             let triangle = (report.area / (report.triangles - report.degenerate) as f64).sqrt();
             let budget = (params.splat.max_splats as f64 / 2.0).clamp(1.0, AUTO_SPLATS);
             (diagonal / AUTO_STEPS).min(triangle).max((report.area / budget).sqrt())
         }
     }
+}
+
+/// The spacing that gives about `wanted` splats: whole pieces are up to four times too many at √(A/n), so the count is
+/// corrected a few times. Triangles that are finer already stay as they are.
+fn spacing_for(measures: &[Measure], wanted: u64, report: &MeshReport, scale: f64) -> f64 {
+    let first = (report.area / wanted as f64).sqrt();
+    let mut spacing = first;
+    for _ in 0..5 {
+        let h = spacing / scale;
+        let estimate: f64 = measures.iter().map(|m| m.longest_sq.sqrt() / h).sum();
+        // Needles whose length alone exceeds any sensible count are left for the limit to refuse.
+        if wanted > u64::from(u32::MAX) || estimate > 1e10 {
+            break;
+        }
+        let count: u64 = measures.par_iter().with_min_len(4096).map(|m| subdivide::split(m, h).pieces()).sum();
+        let ratio = count as f64 / wanted as f64;
+        if (0.97..=1.03).contains(&ratio) || count == report.triangles - report.degenerate {
+            break;
+        }
+        spacing = (spacing * ratio.sqrt()).clamp(first, 2.0 * first);
+    }
+    spacing
 }
 
 /// First splat of every triangle, then the number of all; `spacing` in the mesh's units.

@@ -20,6 +20,13 @@ use splat_core::{
     glam::{DMat3, DVec3},
 };
 
+/// |t| is at most this, |noise| being at most 1.
+const MOST_TURBULENCE: f64 = 1.5;
+/// Depth over which ellipsoids merge.
+const MERGE_WIDTH: f64 = 0.15;
+/// Share of the amplitude that moves the base.
+const BASE_WAVE: f64 = 0.3;
+
 /// An axis-aligned ellipsoid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ellipsoid {
@@ -87,28 +94,31 @@ impl CloudShape {
 
     fn density_with(&self, noise: &Perlin, p: DVec3) -> f64 {
         let depth = self.depth(p);
-        // |t| ≤ 3/2, so nothing can reach up here.
-        if depth + 1.5 * self.amplitude <= 0.0 {
+        // |t| ≤ MOST_TURBULENCE, so nothing can reach up here.
+        if depth + MOST_TURBULENCE * self.amplitude <= 0.0 {
             return 0.0;
         }
         let disturbed = depth + self.amplitude * self.turbulence(noise, p);
         let above = self.base.map_or(f64::INFINITY, |base| {
-            let mean = self.ellipsoids.iter().map(|e| e.radii.y).sum::<f64>() / self.ellipsoids.len() as f64;
-            // The base undulates a little less than the top billows.
-            (p.y - base) / mean + 0.15 * self.amplitude * self.turbulence(noise, p + DVec3::splat(37.5))
+            // The base undulates less than the top billows.
+            let wave = BASE_WAVE * self.amplitude * self.turbulence(noise, p + DVec3::splat(37.5));
+            (p.y - base) / self.mean_height() + wave
         });
         let t = (disturbed.min(above) / self.edge).clamp(0.0, 1.0);
         t * t * (3.0 - 2.0 * t)
     }
 
+    fn mean_height(&self) -> f64 {
+        self.ellipsoids.iter().map(|e| e.radii.y).sum::<f64>() / self.ellipsoids.len() as f64
+    }
+
     /// Smooth maximum of the depths below the ellipsoids' boundaries.
     fn depth(&self, p: DVec3) -> f64 {
-        const WIDTH: f64 = 0.15;
         let depth = |e: &Ellipsoid| 1.0 - ((p - e.center) / e.radii).length();
         let deepest = self.ellipsoids.iter().map(depth).fold(f64::NEG_INFINITY, f64::max);
-        let sum: f64 = self.ellipsoids.iter().map(|e| ((depth(e) - deepest) / WIDTH).exp()).sum();
+        let sum: f64 = self.ellipsoids.iter().map(|e| ((depth(e) - deepest) / MERGE_WIDTH).exp()).sum();
         // Bounded by the number of ellipsoids, so an empty place stays empty.
-        deepest + WIDTH * sum.ln()
+        deepest + MERGE_WIDTH * sum.ln()
     }
 
     fn turbulence(&self, noise: &Perlin, p: DVec3) -> f64 {
@@ -126,13 +136,16 @@ impl CloudShape {
 
     /// Corners of a box outside of which the density is 0, object units.
     pub fn bounds(&self) -> [DVec3; 2] {
-        // The smooth maximum adds at most WIDTH·ln n to the depth.
-        let reach = 1.0 + 1.5 * self.amplitude + 0.15 * (self.ellipsoids.len().max(1) as f64).ln();
+        // The smooth maximum adds at most MERGE_WIDTH·ln n to the depth.
+        let reach = 1.0 + MOST_TURBULENCE * self.amplitude + MERGE_WIDTH * (self.ellipsoids.len().max(1) as f64).ln();
         let mut low = DVec3::INFINITY;
         let mut high = DVec3::NEG_INFINITY;
         for e in &self.ellipsoids {
             low = low.min(e.center - e.radii * reach);
             high = high.max(e.center + e.radii * reach);
+        }
+        if let Some(base) = self.base.filter(|_| !self.ellipsoids.is_empty()) {
+            low.y = low.y.max(base - MOST_TURBULENCE * BASE_WAVE * self.amplitude * self.mean_height()).min(high.y);
         }
         [low, high]
     }

@@ -3,6 +3,7 @@
 //! No input makes a reader panic or take memory that the file does not stand for: sizes that a header announces are
 //! checked against the length of the file before anything is allocated.
 
+#[cfg(any(feature = "ply", feature = "las"))]
 mod color;
 mod input;
 #[cfg(feature = "las")]
@@ -11,6 +12,7 @@ mod las;
 mod laz;
 #[cfg(feature = "nifti")]
 mod nifti;
+#[cfg(feature = "ply")]
 mod origin;
 #[cfg(feature = "ply")]
 mod ply;
@@ -65,7 +67,7 @@ pub fn file(path: &Path, limits: &ReadLimits) -> Result<Loaded, ReadError> {
 /// Reads a file that is in memory already; `name` serves messages and tells the format where the content does not.
 ///
 /// # Errors
-/// [`ReadError`] as [`file`] gives it.
+/// [`ReadError`] as [`file()`] gives it.
 pub fn bytes(name: &str, content: &[u8], limits: &ReadLimits) -> Result<Loaded, ReadError> {
     parse(Path::new(name), content.to_vec(), limits).map_err(|e| e.in_file(&escaped(name.as_bytes(), usize::MAX)))
 }

@@ -40,7 +40,7 @@ pub fn medium_ball(
 ) -> Result<Cloud, ConvertError> {
     let reach = DVec3::splat(radius);
     let lattice = Lattice::new(center - reach, center + reach, extinction, spacing, params)?;
-    let mut cloud = lattice.fill(params, |p| share_in_ball(p - center, radius, lattice.step))?;
+    let mut cloud = lattice.fill(params, |offset| share_in_ball(offset, radius, lattice.step))?;
     let total: f64 = cloud.cross_section.iter().map(|k| f64::from(*k)).sum();
     let volume = 4.0 / 3.0 * std::f64::consts::PI * (radius * params.transform.scale).powi(3);
     let correction = (extinction * volume / total) as f32;
@@ -107,7 +107,6 @@ fn template(params: &SplatParams) -> Splat {
 
 /// Cells that tile a box.
 struct Lattice {
-    min: DVec3,
     step: DVec3,
     counts: [u64; 3],
     center: DVec3,
@@ -128,23 +127,25 @@ impl Lattice {
         let counts = (extent / spacing).to_array().map(|n| n.ceil().max(1.0));
         params.check_count(counts.iter().product())?;
         let step = extent / DVec3::from_array(counts);
-        Ok(Self { min, step, counts: counts.map(|n| n as u64), center: (min + max) * 0.5, extinction })
+        Ok(Self { step, counts: counts.map(|n| n as u64), center: (min + max) * 0.5, extinction })
     }
 
-    /// One splat a cell, its cross-section times `share(centre)`; cells without a share make none.
+    /// One splat a cell, its cross-section times `share(offset)`; cells without a share make none. Offsets are counted from
+    /// the middle of the box, so a box far from 0 has the same ones.
     fn fill(&self, params: &SplatParams, share: impl Fn(DVec3) -> f64) -> Result<Cloud, ConvertError> {
         let scale = params.transform.scale;
         let volume = self.step.element_product() * scale.powi(3);
         let splat = Splat { radius: params.radius(self.step.max_element() * scale) as f32, ..template(params) };
         let mut cloud = Cloud::new(params.transform.apply(self.center));
+        let middle = DVec3::from_array(self.counts.map(|n| 0.5 * n as f64));
         for k in 0..self.counts[2] {
             for j in 0..self.counts[1] {
                 for i in 0..self.counts[0] {
                     let cell = DVec3::new(i as f64 + 0.5, j as f64 + 0.5, k as f64 + 0.5);
-                    let p = self.min + cell * self.step;
-                    let cross_section = (self.extinction * volume * share(p)) as f32;
+                    let offset = (cell - middle) * self.step;
+                    let cross_section = (self.extinction * volume * share(offset)) as f32;
                     if cross_section > 0.0 {
-                        let position: Vec3 = params.transform.rotate((p - self.center) * scale).as_vec3();
+                        let position: Vec3 = params.transform.rotate(offset * scale).as_vec3();
                         cloud.push(&Splat { position, cross_section, ..splat });
                     }
                 }

@@ -261,6 +261,8 @@ impl Emit<'_> {
             .into_par_iter()
             .zip(slabs)
             .enumerate()
+            // Scratch is made once a run of slabs.
+            .with_min_len(8)
             .map_init(scratch, |(rows, gradient), (k, (mut target, slab))| {
                 self.slab(k, slab, &mut target);
                 if !self.params.normals || slab.kept.is_empty() {

@@ -57,21 +57,30 @@ fn weights(cloud: &Cloud, tau: f64, points: &[(DVec3, DVec3)]) -> Vec<f64> {
     points.iter().map(weight).collect()
 }
 
-#[test]
-fn the_bunny_is_covered_once_by_its_splats() {
-    let mesh = bunny();
-    let params = MeshParams { density: Density::Splats(300_000), opacity: 0.5, ..MeshParams::default() };
-    let (cloud, report) = mesh_to_points(&mesh, &params).unwrap();
+/// Mean weight and the 5 % and 95 % quantiles at about this many splats.
+fn coverage(mesh: &Mesh, wanted: u64) -> (f64, f64, f64) {
+    let params = MeshParams { density: Density::Splats(wanted), opacity: 0.5, ..MeshParams::default() };
+    let (cloud, report) = mesh_to_points(mesh, &params).unwrap();
     cloud.validate().unwrap();
     let tau = optics::optical_depth(0.5);
     let sum: f64 = cloud.cross_section.iter().map(|k| f64::from(*k)).sum();
     assert!((sum / (tau * report.area) - 1.0).abs() < 1e-6);
-    let mut weights = weights(&cloud, tau, &on_the_surface(&mesh, 4000));
+    let mut weights = weights(&cloud, tau, &on_the_surface(mesh, 4000));
     weights.sort_by(f64::total_cmp);
-    let mean = weights.iter().sum::<f64>() / weights.len() as f64;
-    let (low, high) = (weights[weights.len() / 20], weights[weights.len() * 19 / 20]);
-    println!("splats {} mean {mean} median {} 5 % {low} 95 % {high}", cloud.len(), weights[2000]);
-    assert!((weights[2000] - 1.0).abs() < 3e-3, "median {}", weights[2000]);
-    assert!((mean - 1.0).abs() < 3e-3, "mean {mean}");
-    assert!(low > 0.95 && high < 1.05, "{low} {high}");
+    (weights.iter().sum::<f64>() / 4000.0, weights[200], weights[3800])
+}
+
+/// Discs lie in tangent planes, so on a curved surface a ray meets its neighbours' planes a little further out: the
+/// mean weight is 1 − O(R²κ²), which falls with the square of the spacing.
+#[test]
+fn the_bunny_is_covered_once_by_its_splats() {
+    let mesh = bunny();
+    let coarse = coverage(&mesh, 300_000);
+    let fine = coverage(&mesh, 1_200_000);
+    println!("coarse {coarse:?} fine {fine:?}");
+    assert!((coarse.0 - 1.0).abs() < 5e-3 && (fine.0 - 1.0).abs() < 1e-3);
+    assert!((coarse.0 - 1.0).abs() > 2.5 * (fine.0 - 1.0).abs());
+    for (_, low, high) in [coarse, fine] {
+        assert!(low > 0.96 && high < 1.04, "{low} {high}");
+    }
 }

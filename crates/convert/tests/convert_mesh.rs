@@ -275,6 +275,15 @@ fn x1_any_number_of_threads_gives_the_same_bits() {
 }
 
 #[test]
+fn a_number_of_splats_is_met() {
+    for wanted in [2_000u64, 30_000, 400_000] {
+        let params = MeshParams { density: Density::Splats(wanted), ..MeshParams::default() };
+        let splats = mesh_to_points(&sphere(16), &params).unwrap().1.splats as f64;
+        assert!((splats / wanted as f64 - 1.0).abs() < 0.25, "{splats} of {wanted}");
+    }
+}
+
+#[test]
 fn memory_is_used_again() {
     let mut cloud = Cloud::default();
     let fine = params(0.01, 0.5);

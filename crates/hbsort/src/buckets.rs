@@ -6,6 +6,9 @@ use std::ops::Range;
 /// Set in the id of the first splat of a slice, until the slices are gathered.
 pub(crate) const MARK: u32 = 1 << 31;
 
+/// Ids that are searched for marks at once.
+const SCAN: usize = 16;
+
 /// Splats below which buckets are not shared with another thread.
 const GRAIN: usize = 1 << 15;
 
@@ -69,11 +72,7 @@ pub(crate) fn gather_marks(
     slice_starts: &mut [u32],
 ) {
     let Some(middle) = middle_of(&range, starts) else {
-        let marked = (starts[range.start]..).zip(out).filter(|(_, id)| **id & MARK != 0);
-        for ((place, id), start) in marked.zip(slice_starts) {
-            *id &= !MARK;
-            *start = place;
-        }
+        take_marks(starts[range.start], out, slice_starts);
         return;
     };
     let (out_a, out_b) = out.split_at_mut((starts[middle] - starts[range.start]) as usize);
@@ -84,4 +83,19 @@ pub(crate) fn gather_marks(
         || gather_marks(range.start..middle, starts, out_a, found_a, slice_starts_a),
         || gather_marks(middle..range.end, starts, out_b, found_b, slice_starts_b),
     );
+}
+
+/// Removes the marks of ids that begin at place `first`, and writes where they were.
+fn take_marks(first: u32, out: &mut [u32], slice_starts: &mut [u32]) {
+    let mut slice_starts = slice_starts.iter_mut();
+    for (place, ids) in (first..).step_by(SCAN).zip(out.chunks_mut(SCAN)) {
+        // Most slices are longer than this: no mark, and nothing to write.
+        if ids.iter().fold(0, |all, id| all | id) & MARK == 0 {
+            continue;
+        }
+        for ((place, id), start) in (place..).zip(ids).filter(|(_, id)| **id & MARK != 0).zip(&mut slice_starts) {
+            *id &= !MARK;
+            *start = place;
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! Predicted work and memory of a sort, from its size alone; tests hold them against what is measured.
 
-use crate::depth_bits::{MOST_SUB_RANGES, leaf_capacity};
+use crate::depth_bits::{DIGITS, MOST_PASSES, leaf_capacity};
 use crate::ranges::{BINS, SAMPLERS, bucket_count};
 use crate::scratch::{BucketSlices, CHUNK, Method};
 
@@ -14,7 +14,7 @@ pub fn scratch_bytes(method: Method, n: usize, buckets: usize, threads: usize) -
 pub fn bucket_bytes(method: Method, n: usize, buckets: usize, threads: usize) -> u64 {
     let rows = 4 * n.div_ceil(CHUNK) * (buckets + 1);
     let totals = 4 * (buckets + 1) + size_of::<BucketSlices>() * buckets;
-    let leaves = threads * (8 * leaf_capacity(n, buckets.max(1)) + 4 * MOST_SUB_RANGES);
+    let leaves = threads * (16 * leaf_capacity(n, buckets.max(1)) + 4 * MOST_PASSES * DIGITS);
     (match method {
         Method::None => 0,
         Method::TwoLevels => rows + totals,
@@ -22,7 +22,7 @@ pub fn bucket_bytes(method: Method, n: usize, buckets: usize, threads: usize) ->
     }) as u64
 }
 
-/// First-level buckets: N = ⌈√slices⌉ (Eq. 11), or ranges of about 8192 splats by depth bits.
+/// First-level buckets: N = ⌈√slices⌉ (Eq. 11), or ranges of about 4096 splats by depth bits.
 pub fn buckets(method: Method, n: usize, slices: u64) -> usize {
     match method {
         Method::None => 0,

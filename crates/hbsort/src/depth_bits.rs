@@ -1,22 +1,25 @@
 //! Second level of the order by depth bits: the splats of one range of keys in the order (depth, place), with the
 //! slices marked where ⌊(d − near)/ε⌋ changes.
 //!
-//! About as many equal sub-ranges as splats, one counting pass into a buffer in the cache, then insertion: nearly
-//! every sub-range holds one or two. A sub-range that many splats crowd into is sorted by comparison.
+//! The keys of a range differ in few bits, so one to three passes of a least-significant-digit radix sort order it
+//! inside the cache.
 
 use crate::buckets::MARK;
 use crate::first_level::Distributed;
-use crate::ranges::Ranges;
+use crate::ranges::{KeyRange, Ranges};
 use crate::scratch::{BucketSlices, Leaf};
 use crate::slicing::Slicing;
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
 
-/// Most sub-ranges of a range: their counts fit the first-level cache.
-pub(crate) const MOST_SUB_RANGES: usize = 1 << 13;
+/// Bits of the widest digit: its counts fit the first-level cache.
+const DIGIT_BITS: u32 = 11;
 
-/// Splats in one sub-range that insertion still sorts well.
-const CROWD: u32 = 24;
+/// Values of the widest digit.
+pub(crate) const DIGITS: usize = 1 << DIGIT_BITS;
+
+/// Digits of the widest range, 32 bits.
+pub(crate) const MOST_PASSES: usize = 3;
 
 /// Entries that a leaf holds for `n` splats: several times the average range.
 pub(crate) fn leaf_capacity(n: usize, buckets: usize) -> usize {
@@ -39,73 +42,77 @@ pub(crate) struct DepthBits<'a, D, I> {
 impl<D: Fn(usize) -> f32 + Sync, I: Fn(u32) -> u32 + Sync> DepthBits<'_, D, I> {
     /// Orders bucket `b` by (depth, place) into `out`.
     pub(crate) fn order_bucket(&self, b: usize, leaves: &[Mutex<Leaf>], out: &mut [u32]) -> BucketSlices {
-        let n = out.len();
-        let (first, bits) = self.ranges.keys_of(b);
-        let wanted = (usize::BITS + 1 - n.leading_zeros()).min(MOST_SUB_RANGES.trailing_zeros());
-        let sub = SubRanges { first, shift: bits.saturating_sub(wanted), count: 1 << wanted.min(bits) };
+        let keys = self.ranges.keys_of(b);
         // No leaf is held here: the parallel sort may run another bucket on this thread.
-        if sub.shift > 0 && n > self.leaf_capacity {
-            return self.order_large(b, out);
+        if out.len() > self.leaf_capacity {
+            return if keys.bits <= DIGIT_BITS { self.order_few_keys(b, keys, out) } else { self.order_large(b, out) };
         }
         // Each thread of the pool has its own leaf, so no lock waits.
         let own = rayon::current_thread_index().unwrap_or(0) % leaves.len();
         let mut leaf = leaves[own].lock().unwrap_or_else(PoisonError::into_inner);
-        self.order_in_leaf(b, sub, &mut leaf, out)
+        let sorted = self.order_in_leaf(b, keys, &mut leaf, out.len());
+        self.mark_slices(out, sorted)
     }
 
-    fn order_in_leaf(&self, b: usize, sub: SubRanges, leaf: &mut Leaf, out: &mut [u32]) -> BucketSlices {
-        let counts = &mut leaf.counts[..sub.count];
-        let crowded = self.count(b, sub, counts) > CROWD;
-        if sub.shift == 0 {
-            return self.place_directly(b, sub, counts, out);
+    /// The entries of bucket `b`, sorted in one half of the leaf.
+    fn order_in_leaf<'l>(&self, b: usize, keys: KeyRange, leaf: &'l mut Leaf, n: usize) -> &'l [u64] {
+        let passes = keys.bits.div_ceil(DIGIT_BITS).max(1);
+        let digits = Digits { first: keys.first, width: keys.bits.div_ceil(passes), passes };
+        let counts = &mut leaf.counts[..MOST_PASSES * DIGITS];
+        self.count(b, digits, counts);
+        let (from, to) = leaf.entries.split_at_mut(self.leaf_capacity);
+        let (mut from, mut to) = (&mut from[..n], &mut to[..n]);
+        let parts = self.distributed.parts(b).flat_map(|(_, part)| [part]);
+        scatter(parts, |e| digits.of(e, 0), &mut counts[..DIGITS], from);
+        for pass in 1..passes {
+            let cursors = &mut counts[pass as usize * DIGITS..][..DIGITS];
+            scatter([&*from], |e| digits.of(e, pass), cursors, to);
+            std::mem::swap(&mut from, &mut to);
         }
-        let entries = &mut leaf.entries[..out.len()];
+        from
+    }
+
+    /// Histograms and exclusive scans of all digits.
+    fn count(&self, b: usize, digits: Digits, counts: &mut [u32]) {
+        counts[..digits.passes as usize * DIGITS].fill(0);
+        let [low, middle, high] = [0, 1, 2].map(|pass| pass * DIGITS);
         for (_, part) in self.distributed.parts(b) {
-            for &entry in part {
-                let cursor = &mut counts[sub.of(entry)];
-                entries[*cursor as usize] = entry;
-                *cursor += 1;
+            match digits.passes {
+                1 => part.iter().for_each(|&e| counts[digits.of(e, 0)] += 1),
+                2 => part.iter().for_each(|&e| {
+                    counts[low + digits.of(e, 0)] += 1;
+                    counts[middle + digits.of(e, 1)] += 1;
+                }),
+                _ => part.iter().for_each(|&e| {
+                    counts[low + digits.of(e, 0)] += 1;
+                    counts[middle + digits.of(e, 1)] += 1;
+                    counts[high + digits.of(e, 2)] += 1;
+                }),
             }
         }
-        if crowded {
-            sort_crowds(entries, counts);
+        for counts in counts.chunks_exact_mut(DIGITS).take(digits.passes as usize) {
+            let mut start = 0;
+            counts[..1 << digits.width].iter_mut().for_each(|c| start += std::mem::replace(c, start));
         }
-        insertion_sort(entries);
-        self.mark_slices(out, entries.iter().map(|&e| ((e >> 32) as u32, e as u32)))
     }
 
-    /// Histogram and exclusive scan of the sub-ranges; the greatest count.
-    fn count(&self, b: usize, sub: SubRanges, counts: &mut [u32]) -> u32 {
-        counts.fill(0);
+    /// A range that outgrew the leaf, of so few keys that counting orders it at once.
+    fn order_few_keys(&self, b: usize, keys: KeyRange, out: &mut [u32]) -> BucketSlices {
+        let digits = Digits { first: keys.first, width: keys.bits, passes: 1 };
+        let mut cursors = [0; DIGITS];
+        self.count(b, digits, &mut cursors);
         for (_, part) in self.distributed.parts(b) {
             for &entry in part {
-                counts[sub.of(entry)] += 1;
-            }
-        }
-        let (mut start, mut greatest) = (0, 0);
-        for count in counts {
-            greatest = greatest.max(*count);
-            start += std::mem::replace(count, start);
-        }
-        greatest
-    }
-
-    /// Sub-ranges of a single key need no sort, however many splats they hold.
-    fn place_directly(&self, b: usize, sub: SubRanges, cursors: &mut [u32], out: &mut [u32]) -> BucketSlices {
-        for (_, part) in self.distributed.parts(b) {
-            for &entry in part {
-                let cursor = &mut cursors[sub.of(entry)];
+                let cursor = &mut cursors[digits.of(entry, 0)];
                 out[*cursor as usize] = (self.id_of)(entry as u32);
                 *cursor += 1;
             }
         }
         let mut found = Found::default();
-        let (mut begin, mut within) = (0, None);
-        for (key, &end) in (sub.first..).zip(cursors.iter()) {
-            if end > begin && within.is_none_or(|within| key > within) {
-                let slice = self.slice_of_key(key);
-                out[begin as usize] |= if found.is_new(slice) { MARK } else { 0 };
-                within = Some(self.slicing.surely_within(slice));
+        let mut begin = 0;
+        for (key, &end) in (keys.first..).zip(&cursors[..1 << keys.bits]) {
+            if end > begin && found.is_new(self.slice_of_key(key)) {
+                out[begin as usize] |= MARK;
             }
             begin = end;
         }
@@ -127,11 +134,13 @@ impl<D: Fn(usize) -> f32 + Sync, I: Fn(u32) -> u32 + Sync> DepthBits<'_, D, I> {
         found.slices
     }
 
-    fn mark_slices(&self, out: &mut [u32], sorted: impl Iterator<Item = (u32, u32)>) -> BucketSlices {
+    /// Writes the ids of sorted entries, and marks where slices begin.
+    fn mark_slices(&self, out: &mut [u32], sorted: &[u64]) -> BucketSlices {
         let mut found = Found::default();
         let mut within = None;
-        for (out, (key, place)) in out.iter_mut().zip(sorted) {
-            *out = (self.id_of)(place);
+        for (out, &entry) in out.iter_mut().zip(sorted) {
+            let key = (entry >> 32) as u32;
+            *out = (self.id_of)(entry as u32);
             if within.is_none_or(|within| key > within) {
                 let slice = self.slice_of_key(key);
                 *out |= if found.is_new(slice) { MARK } else { 0 };
@@ -147,18 +156,39 @@ impl<D: Fn(usize) -> f32 + Sync, I: Fn(u32) -> u32 + Sync> DepthBits<'_, D, I> {
     }
 }
 
-/// Equal parts of one range of keys.
+/// The digits of the keys of one range.
 #[derive(Clone, Copy)]
-struct SubRanges {
+struct Digits {
     first: u32,
-    shift: u32,
-    count: usize,
+    /// Bits of each digit.
+    width: u32,
+    passes: u32,
 }
 
-impl SubRanges {
+impl Digits {
+    /// Digit `pass` of an entry, the least significant first.
     #[inline(always)]
-    fn of(self, entry: u64) -> usize {
-        (((entry >> 32) as u32 - self.first) >> self.shift) as usize & (self.count - 1)
+    fn of(self, entry: u64, pass: u32) -> usize {
+        // A key of 32 bits is never shifted by more than 22.
+        let digit = ((entry >> 32) as u32 - self.first) >> (pass * self.width);
+        digit as usize & ((1 << self.width) - 1) & (DIGITS - 1)
+    }
+}
+
+/// One stable pass of counting sort.
+#[inline(always)]
+fn scatter<'e>(
+    parts: impl IntoIterator<Item = &'e [u64]>,
+    digit_of: impl Fn(u64) -> usize,
+    cursors: &mut [u32],
+    to: &mut [u64],
+) {
+    for part in parts {
+        for &entry in part {
+            let cursor = &mut cursors[digit_of(entry)];
+            to[*cursor as usize] = entry;
+            *cursor += 1;
+        }
     }
 }
 
@@ -180,29 +210,5 @@ impl Found {
         self.slices.ends[1] = slice;
         self.slices.count += u32::from(new);
         new
-    }
-}
-
-/// Sorts the sub-ranges that insertion would be slow for; `ends` are those of the sub-ranges.
-fn sort_crowds(entries: &mut [u64], ends: &[u32]) {
-    let mut begin = 0;
-    for &end in ends {
-        if end - begin > CROWD {
-            entries[begin as usize..end as usize].sort_unstable();
-        }
-        begin = end;
-    }
-}
-
-/// Finishes a nearly sorted sequence.
-fn insertion_sort(entries: &mut [u64]) {
-    for i in 1..entries.len() {
-        let entry = entries[i];
-        let mut to = i;
-        while to > 0 && entries[to - 1] > entry {
-            entries[to] = entries[to - 1];
-            to -= 1;
-        }
-        entries[to] = entry;
     }
 }

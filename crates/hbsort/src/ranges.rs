@@ -19,7 +19,7 @@ pub(crate) const SAMPLERS: usize = 4;
 const SAMPLE: usize = 8;
 
 /// Splats in a range on average.
-const TARGET: usize = 8192;
+const TARGET: usize = 4096;
 
 /// The monotone map from relative keys to first-level buckets.
 #[derive(Debug, Clone, Copy)]
@@ -28,6 +28,15 @@ pub(crate) struct Ranges<'a> {
     /// Bin = key >> shift.
     shift: u32,
     bucket_of_bin: &'a [u16],
+}
+
+/// Keys of one range.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct KeyRange {
+    /// The smallest that it may hold.
+    pub(crate) first: u32,
+    /// How many bits key − first takes.
+    pub(crate) bits: u32,
 }
 
 /// Number of ranges for `n` splats.
@@ -61,12 +70,12 @@ impl<'a> Ranges<'a> {
         Self { buckets, shift, bucket_of_bin }
     }
 
-    /// Smallest key of bucket `b`, and how many bits the keys of the bucket differ in.
-    pub(crate) fn keys_of(&self, b: usize) -> (u32, u32) {
+    /// The keys of bucket `b`.
+    pub(crate) fn keys_of(&self, b: usize) -> KeyRange {
         let first = self.bucket_of_bin.partition_point(|x| usize::from(*x) < b);
         let end = self.bucket_of_bin.partition_point(|x| usize::from(*x) <= b);
         let span = ((end - first).max(1) as u64) << self.shift;
-        ((first as u32) << self.shift, 64 - (span - 1).leading_zeros())
+        KeyRange { first: (first as u32) << self.shift, bits: 64 - (span - 1).leading_zeros() }
     }
 
     /// Distributes the depths into the ranges; an entry is the relative key in the upper and the place in the input in

@@ -1,7 +1,7 @@
 //! The steps of Figure 9 in a row: cull and project, choose ε, first level, second level, slices.
 
 use crate::buckets;
-use crate::depth_bits::{DepthBits, MOST_SUB_RANGES, leaf_capacity};
+use crate::depth_bits::{DIGITS, DepthBits, MOST_PASSES, leaf_capacity};
 use crate::first_level::{Distributed, distribute, scan_buckets};
 use crate::project::{Projector, extremes_of};
 use crate::ranges::{BINS, Ranges, SAMPLERS, bucket_count};
@@ -147,8 +147,8 @@ fn prepare(scratch: &mut Scratch, method: Method, n: usize, buckets: usize) -> R
         scratch.leaves.resize_with(scratch.leaves.len().max(rayon::current_num_threads()), Mutex::default);
         for leaf in &mut scratch.leaves {
             let leaf = leaf.get_mut().unwrap_or_else(PoisonError::into_inner);
-            resize(&mut leaf.entries, leaf_capacity(n, buckets))?;
-            resize(&mut leaf.counts, MOST_SUB_RANGES)?;
+            resize(&mut leaf.entries, 2 * leaf_capacity(n, buckets))?;
+            resize(&mut leaf.counts, MOST_PASSES * DIGITS)?;
         }
     }
     Ok(())

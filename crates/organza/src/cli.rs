@@ -51,6 +51,10 @@ fn run(command: Command) -> Result<(), Error> {
 /// Runs `work`; a panic is a bug of ours, says so and gives 1.
 fn guard(work: impl FnOnce() -> u8) -> u8 {
     panic::set_hook(Box::new(|info| {
+        // A decoder that gives up on a damaged file; the reader makes an error of it.
+        if convert::read::panic_is_input_error() {
+            return;
+        }
         let version = env!("CARGO_PKG_VERSION");
         console::note(&format!("error: bug in Organza {version}, please report it with the scene: {info}\n"));
     }));

@@ -5,7 +5,8 @@ mod object;
 use crate::scene::Scene;
 use crate::{Error, Progress, RenderOptions, normalize::normalize};
 use glam::DVec3;
-use splat_core::{Aabb, Camera, Cloud, FootprintStack, Light, Material, Object, Shading};
+use splat_core::{Camera, Cloud, FootprintStack, Light, Material, Object, Shading};
+use std::cmp::Ordering;
 
 /// A scene in memory, normalized by a power of two (see [`Loaded::exponent`]) and ready for a technique.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,14 +83,13 @@ fn normals_needed(scene: &Scene) -> bool {
     scene.render.layers.set().normal || (lit && scene.objects.iter().any(|o| o.visible && phong(o)))
 }
 
-/// One cloud around the middle of all.
+/// One cloud around the least of all origins: a place that does not depend on the order of objects, and that moves with
+/// the scene without being rounded.
 fn merge(clouds: Vec<Cloud>) -> Cloud {
-    let corners = clouds.iter().filter(|c| !c.is_empty()).flat_map(|c| {
-        let Aabb { min, max } = c.bounds();
-        [c.origin + min.as_dvec3(), c.origin + max.as_dvec3()]
-    });
-    let (min, max) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
-    let mut all = Cloud::new(if min.is_finite() { (min + max) * 0.5 } else { DVec3::ZERO });
+    let key = |o: &DVec3| o.to_array();
+    let origins = clouds.iter().filter(|c| !c.is_empty()).map(|c| c.origin);
+    let least = origins.min_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(Ordering::Equal));
+    let mut all = Cloud::new(least.unwrap_or(DVec3::ZERO));
     all.reserve(clouds.iter().map(Cloud::len).sum());
     clouds.iter().for_each(|c| all.append(c));
     all

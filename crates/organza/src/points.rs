@@ -102,8 +102,9 @@ impl Drawing<'_> {
             }
             let map = cost.measure(pass::SHADOW_MAP, |stage| {
                 let l = self.loaded;
-                let map = ShadowMap::build_with_progress(&l.cloud, &l.materials, &l.objects, light, &params, self.progress)
-                    .map_err(|e| shadow_error(i, &e))?;
+                let map =
+                    ShadowMap::build_with_progress(&l.cloud, &l.materials, &l.objects, light, &params, self.progress)
+                        .map_err(|e| shadow_error(i, &e))?;
                 stage.items_in = l.cloud.len() as u64;
                 stage.items_out = map.counts().kept;
                 stage.bytes = map.counts().bytes;
@@ -155,6 +156,24 @@ impl Drawing<'_> {
         raster::project(&l.cloud, ids, camera, &l.footprints, &l.materials, &self.raster_params())
     }
 
+    fn shade(
+        &self,
+        input: &ShadeInput<'_>,
+        ids: &[u32],
+        layout: &ChannelLayout,
+        cost: &mut CostRecord,
+    ) -> Result<Vec<f32>, Error> {
+        let values = cost.measure(pass::SHADE, |stage| {
+            let values = shade(input, ids, layout, self.progress);
+            stage.items_in = ids.len() as u64;
+            stage.items_out = ids.len() as u64;
+            stage.bytes = 4 * values.len() as u64;
+            Ok::<_, Error>(values)
+        })?;
+        self.tick()?;
+        Ok(values)
+    }
+
     fn opaque(
         &self,
         input: &ShadeInput<'_>,
@@ -169,10 +188,11 @@ impl Drawing<'_> {
         let total = ids.len() as u64;
         let mut projected = self.project(&ids, input.camera);
         projected.retain_visible(&mut ids);
-        let values = shade_ids(input, &ids, layout, cost);
+        let values = self.shade(input, &ids, layout, cost)?;
         cost.measure(pass::OPAQUE, |stage| {
             stage.items_in = total;
-            let (image, counts) = raster::resolve_opaque(&projected, &values, layout.count(), self.layers.object);
+            let (image, counts) =
+                raster::resolve_opaque(&projected, &values, layout.count(), self.layers.object, self.progress);
             record(stage, &counts);
             Ok(image)
         })
@@ -194,8 +214,7 @@ impl Drawing<'_> {
             return Ok(accumulator);
         }
         self.tick()?;
-        let values = shade_ids(input, ids, layout, cost);
-        self.tick()?;
+        let values = self.shade(input, ids, layout, cost)?;
         cost.measure(pass::SPLAT, |stage| {
             stage.items_in = ids.len() as u64;
             let projected = self.project(ids, input.camera);
@@ -208,25 +227,13 @@ impl Drawing<'_> {
                 order.direction,
                 &params,
                 &mut accumulator,
+                self.progress,
             );
             record(stage, &counts);
             Ok::<_, Error>(())
         })?;
+        self.tick()?;
         Ok(accumulator)
-    }
-}
-
-fn shade_ids(input: &ShadeInput<'_>, ids: &[u32], layout: &ChannelLayout, cost: &mut CostRecord) -> Vec<f32> {
-    let shaded: Result<Vec<f32>, std::convert::Infallible> = cost.measure(pass::SHADE, |stage| {
-        let values = shade(input, ids, layout);
-        stage.items_in = ids.len() as u64;
-        stage.items_out = ids.len() as u64;
-        stage.bytes = 4 * values.len() as u64;
-        Ok(values)
-    });
-    match shaded {
-        Ok(values) => values,
-        Err(never) => match never {},
     }
 }
 

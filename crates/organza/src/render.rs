@@ -95,17 +95,18 @@ fn prepare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Resul
         stage.bytes = loaded.cloud.bytes();
         Ok::<_, Error>(loaded)
     })?;
-    let mut statistics =
-        Statistics::of_cloud(&loaded.cloud, &loaded.materials, &loaded.objects, &loaded.footprints);
+    let mut statistics = Statistics::of_cloud(&loaded.cloud, &loaded.materials, &loaded.objects, &loaded.footprints);
     statistics.lights =
         loaded.lights.iter().zip(&loaded.casts).map(|(l, casts)| LightStatistics::of_light(l, *casts)).collect();
     statistics.normals_needed = loaded.normals;
     statistics.layers = scene.render.layers.names().map(str::to_owned).collect();
     statistics.tolerance = scene.render.tolerance;
-    let memory = image + splat_bytes(&loaded, &scene.render.layers.set());
+    let plan = plan(&statistics);
+    let maps = plan.shadow_maps.iter().filter(|on| **on).count() as u64;
+    let memory = image + splat_bytes(&loaded, &scene.render.layers.set()) + maps * map_bytes(statistics.casters);
     check_memory("rendering", memory, options.max_memory)?;
     let warnings = loaded.warnings.clone();
-    Ok((loaded, Explanation { plan: plan(&statistics), cost, memory, warnings }))
+    Ok((loaded, Explanation { plan, cost, memory, warnings }))
 }
 
 /// Bytes of the accumulators and layers.
@@ -123,6 +124,13 @@ fn splat_bytes(loaded: &Loaded, layers: &LayerSet) -> u64 {
     loaded.cloud.bytes() + loaded.cloud.len() as u64 * (8 + 64 + 8 + values)
 }
 
+/// Bytes of one shadow map: its table, and the entries that its casters leave in it.
+fn map_bytes(casters: u64) -> u64 {
+    const TABLE: u64 = 1 << 20;
+    const PER_CASTER: u64 = 40;
+    TABLE + PER_CASTER * casters
+}
+
 fn check_memory(what: &str, needed: u64, limit: u64) -> Result<(), Error> {
     if needed <= limit {
         return Ok(());
@@ -132,7 +140,8 @@ fn check_memory(what: &str, needed: u64, limit: u64) -> Result<(), Error> {
         needed,
         limit,
         unit: "bytes",
-        hint: "use a larger spacing, a smaller image or render.antialias, or a larger --max-memory".into(),
+        hint: "use fewer lights or samples of lights, a larger spacing, a smaller image, or a larger --max-memory"
+            .into(),
     })
 }
 

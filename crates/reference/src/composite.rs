@@ -117,7 +117,8 @@ fn pixel(input: &Input<'_>, splats: &[Option<Splat>], ids: &[u32], x: usize, y: 
         let keep = input.materials[material].extinction_rgb.map(|k| (-e.optical_depth * f64::from(k)).exp());
         for (c, value) in out.values.iter_mut().enumerate() {
             let p = band(c, input.channels);
-            *value += out.transmittance[p] * (1.0 - keep[p]) * f64::from(input.values[e.id as usize * input.channels + c]);
+            *value +=
+                out.transmittance[p] * (1.0 - keep[p]) * f64::from(input.values[e.id as usize * input.channels + c]);
         }
         (0..3).for_each(|c| out.transmittance[c] *= keep[c]);
     }

@@ -77,7 +77,8 @@ impl Splat {
             out.shape = Shape::Ball { radius_sq };
             // A ball's image is stretched away from the image centre by up to |d|².
             let d = if parallel { 1.0 } else { (center / center.z).length_squared() };
-            out.reach_px = DVec2::splat(radius_sq.sqrt() * px_per_world * d * (1.0 + 2.0 * radius / center.z.abs()) + 1.0);
+            out.reach_px =
+                DVec2::splat(radius_sq.sqrt() * px_per_world * d * (1.0 + 2.0 * radius / center.z.abs()) + 1.0);
         } else {
             out.disc(input, &s, px_per_world, filter_px, amount * n);
         }
@@ -111,11 +112,8 @@ impl Splat {
         };
         self.peak = amount / (u.length() * v.length()) * spread * grazing;
         let along = if parallel { normal.z } else { normal.dot(self.center) / self.center.z };
-        let depth_slope = if along.abs() < 1e-4 {
-            DVec2::ZERO
-        } else {
-            DVec2::new(-normal.x, normal.y) / (along * px_per_world)
-        };
+        let depth_slope =
+            if along.abs() < 1e-4 { DVec2::ZERO } else { DVec2::new(-normal.x, normal.y) / (along * px_per_world) };
         self.reach_px = DVec2::new(covariance.x_axis.x, covariance.y_axis.y).map(|c| c.sqrt() + 1.0);
         self.shape = Shape::Disc { metric: covariance.inverse(), depth_slope };
     }

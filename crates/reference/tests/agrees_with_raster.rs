@@ -4,7 +4,9 @@
 use reference::{Input, Order, composite};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::{OpaqueImage, Params, fold, project, resolve_opaque};
-use splat_core::{Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Projection, Splat, SplatKind, rng};
+use splat_core::{
+    Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Progress, Projection, Splat, SplatKind, rng,
+};
 
 const SIZE: [u32; 2] = [75, 50];
 
@@ -62,9 +64,18 @@ fn rasterize(cloud: &Cloud, camera: &Camera, materials: &[Material], planes: usi
     let (footprints, params) = (FootprintStack::default(), Params { transmittance_cutoff: 0.0, ..Params::default() });
     let projected = |ids: &[u32]| project(cloud, ids, camera, &footprints, materials, &params);
     let values = |ids: &[u32]| ids.iter().flat_map(|i| cloud.color[*i as usize]).collect::<Vec<f32>>();
-    let (solid, _) = resolve_opaque(&projected(&opaque), &values(&opaque), 3, false);
+    let (solid, _) = resolve_opaque(&projected(&opaque), &values(&opaque), 3, false, &Progress::new());
     let mut acc = Accumulator::new(SIZE, planes, 3, false, false);
-    fold(&projected(&translucent), &values(&translucent), materials, &solid, direction, &params, &mut acc);
+    fold(
+        &projected(&translucent),
+        &values(&translucent),
+        materials,
+        &solid,
+        direction,
+        &params,
+        &mut acc,
+        &Progress::new(),
+    );
     finish(acc, &solid)
 }
 

@@ -167,14 +167,8 @@ mod tests {
 
     #[test]
     fn ou2_up_along_the_view_picks_another_up() {
-        let camera = Camera::look_at(
-            DVec3::ZERO,
-            DVec3::Y,
-            DVec3::Y,
-            Projection::Orthographic { height: 1.0 },
-            [4, 4],
-        )
-        .unwrap();
+        let camera =
+            Camera::look_at(DVec3::ZERO, DVec3::Y, DVec3::Y, Projection::Orthographic { height: 1.0 }, [4, 4]).unwrap();
         assert!(camera.axes.iter().all(|a| (a.length() - 1.0).abs() < 1e-12));
     }
 

@@ -31,11 +31,7 @@ impl CostRecord {
     ///
     /// # Errors
     /// Those of `work`; a failed stage leaves no entry.
-    pub fn measure<T, E>(
-        &mut self,
-        name: &str,
-        work: impl FnOnce(&mut StageCost) -> Result<T, E>,
-    ) -> Result<T, E> {
+    pub fn measure<T, E>(&mut self, name: &str, work: impl FnOnce(&mut StageCost) -> Result<T, E>) -> Result<T, E> {
         let mut stage = StageCost { name: name.into(), passes: 1, ..StageCost::default() };
         let start = std::time::Instant::now();
         let out = work(&mut stage)?;

@@ -89,7 +89,8 @@ impl Light {
                 let (to_light, falloff) = from_point(position);
                 let (low, high) = (outer.cos(), inner.cos());
                 let cosine = -to_light.dot(direction);
-                let t = if high > low { ((cosine - low) / (high - low)).clamp(0.0, 1.0) } else { f64::from(cosine >= low) };
+                let t =
+                    if high > low { ((cosine - low) / (high - low)).clamp(0.0, 1.0) } else { f64::from(cosine >= low) };
                 (to_light, falloff * t * t * (3.0 - 2.0 * t))
             }
         };

@@ -36,6 +36,12 @@ impl Progress {
         self.cancelled.store(true, Relaxed);
     }
 
+    /// Whether [`Progress::cancel`] was called: a loop that cannot fail leaves its work undone and its caller asks with
+    /// [`Progress::tick`].
+    pub fn is_cancelled(&self) -> bool {
+        self.cancelled.load(Relaxed)
+    }
+
     /// Units done and announced.
     pub fn read(&self) -> (u64, u64) {
         (self.done.load(Relaxed), self.total.load(Relaxed))

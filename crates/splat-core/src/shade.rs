@@ -7,7 +7,8 @@
 //! E is the irradiance of a light times its transmittance; ambient radiance adds ρ·L_ambient.
 
 use crate::{
-    Camera, Cloud, LayerSet, Light, Material, Object, Receiver, Shading, SplatKind, Transmittance, henyey_greenstein,
+    Camera, Cloud, LayerSet, Light, Material, Object, Progress, Receiver, Shading, SplatKind, Transmittance,
+    henyey_greenstein,
 };
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -80,16 +81,20 @@ pub struct ShadeInput<'a> {
     pub camera: &'a Camera,
 }
 
-/// Values of the splats `ids`, `layout.count()` numbers each, in the order of `ids`.
+/// Values of the splats `ids`, `layout.count()` numbers each, in the order of `ids`. After
+/// `progress.cancel()` the rest stays 0.
 ///
 /// # Panics
 /// If an id, material or object of the cloud is out of range.
-pub fn shade(input: &ShadeInput<'_>, ids: &[u32], layout: &ChannelLayout) -> Vec<f32> {
+pub fn shade(input: &ShadeInput<'_>, ids: &[u32], layout: &ChannelLayout, progress: &Progress) -> Vec<f32> {
     let channels = layout.count();
     let eye = (input.camera.position - input.cloud.origin).as_vec3();
     let lights: Vec<LocalLight<'_>> = input.lights.iter().map(|l| LocalLight::new(l, input.cloud.origin)).collect();
     let mut values = vec![0.0; ids.len() * channels];
     values.par_chunks_mut(CHUNK * channels).zip(ids.par_chunks(CHUNK)).for_each(|(values, ids)| {
+        if progress.is_cancelled() {
+            return;
+        }
         for (out, &i) in values.chunks_exact_mut(channels).zip(ids) {
             let point = Point::new(input, i as usize, eye);
             let shaded = point.shade(input, &lights);

@@ -41,7 +41,7 @@ impl Kernel {
 }
 
 /// 2^f on [0, 1] in powers of f; errs by less than 3e-7 of its value.
-const EXP2: [f32; 6] = [0.999999898, 0.69315449, 0.240141818, 0.0558603371, 0.00894959042, 0.00189375406];
+const EXP2: [f32; 6] = [0.999_999_9, 0.693_154_5, 0.240_141_82, 0.055_860_337, 0.008_949_591, 0.001_893_754_1];
 
 /// e^−x for 0 ≤ x ≤ 64, in registers.
 #[inline]
@@ -142,7 +142,7 @@ impl Casters<'_> {
         let cloud = self.cloud;
         let extinction = self.extinction(i);
         let kind = cloud.kind[i];
-        let position = frame.to_light(cloud.position[i]);
+        let position = frame.position(cloud.position[i]);
         let mut caster = Caster {
             position,
             distance: if parallel { position.z } else { position.length() },

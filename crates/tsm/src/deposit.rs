@@ -18,8 +18,9 @@
 //! half-ray; within one radius only the part of the kernel ahead of the light counts.
 
 use crate::caster::Caster;
-use crate::mapping::{Mapping, Ray, floor};
+use crate::mapping::{Mapping, Ray};
 use crate::reference::erf;
+use crate::shares::{BIWEIGHT, LONGEST, Shares};
 use crate::table::{Entries, Knot};
 use glam::{Vec2, Vec3};
 use splat_core::optics::SurfaceOpacity;
@@ -27,18 +28,14 @@ use splat_core::{SplatKind, glam};
 
 /// Casters larger than this share of their distance are swept over the whole table.
 pub(crate) const NEAR: f32 = 0.35;
-/// Half width of a biweight (1 − x²)² over its standard deviation.
-const BIWEIGHT: f32 = 2.645_751_3;
-/// Fractions of a row or column below this go to its neighbours.
-const NEGLIGIBLE: f32 = 1.0 / 1024.0;
-/// Most cells along one axis of a footprint that is integrated over cells.
-const LONGEST: usize = 16;
 /// Least half width of a footprint, cells.
 const LEAST_HALF: f32 = 1e-4;
 /// Footprints that lean by fewer cells than this over their height count as upright.
 const UPRIGHT: f32 = 0.02;
 /// A uniform row of height 1 has a variance of 1/12; in squared half widths of a biweight that is 7/12.
 const ROW_WIDTH: f32 = 7.0 / 12.0;
+/// Most rays along a side of a cell.
+const FINEST: u32 = 16;
 /// Footprints that span fewer cells than this are not bent by a crease of the map to any effect.
 const CREASE: f32 = 1.0;
 /// Cells that a sampled footprint spans at least, from its centre to its rim.
@@ -83,7 +80,7 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
         let creased = least > CREASE && self.mapping.is_creased(place.at, half);
         let long = half.max_element() > 0.5 * LONGEST as f32 - 1.0;
         if least >= SAMPLES || creased || long || (2.0 * half).cmpge(size).any() {
-            self.sample(caster, place.at, half, (SAMPLES / least).ceil().clamp(1.0, 16.0) as u32);
+            self.sample(caster, place.at, half, (SAMPLES / least).ceil().clamp(1.0, FINEST as f32) as u32);
         } else {
             let gauss = BIWEIGHT / caster.kernel.cutoff;
             self.overlap(caster, place.at, spread.scaled(gauss * gauss), place.distance);
@@ -108,11 +105,11 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
         let mut us = Shares::new(at.x, half_u);
         for j in 0..vs.count {
             if slant != 0.0 {
-                us = Shares::new(at.x + slant * (vs.centre[j] - at.y), half_u);
+                us = Shares::new(at.x + slant * (vs.centre(j) - at.y), half_u);
             }
             for i in 0..us.count {
                 if let Some(cell) = self.mapping.wrap(us.first + i as i32, vs.first + j as i32) {
-                    let share = total * us.share[i] * vs.share[j] * self.mapping.inverse_measure(cell);
+                    let share = total * us.share(i) * vs.share(j) * self.mapping.inverse_measure(cell);
                     self.push(caster, cell, share, caster.distance);
                 }
             }
@@ -129,7 +126,7 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
         let (us, vs) = (span(at.x, reach.x, columns), span(at.y, reach.y, rows));
         let mut sampled = std::mem::take(&mut self.scratch.sampled);
         sampled.clear();
-        let mut norm = 0.0;
+        let mut norm = 0.0f64;
         let mut clipped = false;
         for row in vs.clone() {
             for column in us.clone() {
@@ -145,19 +142,28 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
                 }
                 let (weight, area, distance) = self.sample_cell(caster, cell, samples, false);
                 if weight > 0.0 {
-                    norm += area;
+                    norm += f64::from(area);
                     sampled.push((cell, weight, distance));
                 }
             }
         }
-        let exact = footprint_area(caster);
-        // Normalising by the samples keeps K to the last digit. Where they do not add up (a footprint clipped by the
-        // table, or across a corner of it) the true area keeps the optical depth of each ray instead.
-        if clipped || (norm / exact - 1.0).abs() > 2e-3 {
+        // Normalising by the samples keeps K to the last digit. Where they resolve the footprint and yet do not add up
+        // (it is clipped by the table, or lies across a corner of a folded one), its true area keeps the optical depth
+        // of each ray instead.
+        let exact = f64::from(footprint_area(caster));
+        let resolved = half.min_element() * samples as f32 >= 0.99 * SAMPLES;
+        let torn = self.mapping.is_folded() && (norm / exact - 1.0).abs() > 2e-3;
+        if torn && resolved && samples < FINEST {
+            self.scratch.sampled = sampled;
+            self.sample(caster, at, half, (4 * samples).min(FINEST));
+            return;
+        }
+        if norm <= 0.0 || resolved && (clipped || torn) {
             norm = exact;
         }
+        let scale = (f64::from(caster.cross_section) / norm) as f32;
         for &(cell, weight, distance) in &sampled {
-            self.push(caster, cell, caster.cross_section * weight / norm, distance);
+            self.push(caster, cell, scale * weight, distance);
         }
         self.scratch.sampled = sampled;
     }
@@ -182,7 +188,7 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
         let centre = self.mapping.cell_ray(cell);
         let [columns, _] = self.mapping.size();
         let corner = Vec2::new((cell % columns) as f32, (cell / columns) as f32);
-        let (mut weight, mut area, mut distance) = (0.0, 0.0, 0.0);
+        let (mut weight, mut area, mut distance, mut total) = (0.0, 0.0, 0.0, 0.0);
         for k in 0..samples * samples {
             let ray = if samples == 1 {
                 centre
@@ -190,14 +196,15 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
                 let step = Vec2::new((k % samples) as f32 + 0.5, (k / samples) as f32 + 0.5);
                 self.mapping.ray(corner + step / samples as f32)
             };
+            let density = if samples == 1 { 1.0 } else { self.mapping.density(&ray) };
+            total += density;
             let Some(s) = sample(caster, &ray, parallel, near) else { continue };
-            weight += s.weight * s.gain;
-            area += s.weight * s.jacobian;
-            distance += s.weight * s.gain * s.distance;
+            weight += density * s.weight * s.gain;
+            area += density * s.weight * s.jacobian;
+            distance += density * s.weight * s.gain * s.distance;
         }
-        let count = (samples * samples) as f32;
         let mean_distance = if weight > 0.0 { distance / weight } else { 0.0 };
-        (weight / count, area / count * self.mapping.measure(cell) as f32, mean_distance)
+        (weight / total, area / total * self.mapping.measure(cell) as f32, mean_distance)
     }
 
     #[inline]
@@ -283,58 +290,6 @@ fn angle_gain(caster: &Caster) -> f32 {
     cosine * caster.extinction.opacity.optical_depth_factor(cosine)
 }
 
-/// Fractions of a footprint in consecutive cells of one axis, of sum 1.
-struct Shares {
-    first: i32,
-    count: usize,
-    share: [f32; LONGEST],
-    /// Centre of the part in each cell.
-    centre: [f32; LONGEST],
-}
-
-impl Shares {
-    /// A biweight of half width `half` < LONGEST/2 − 1 about `at`; fractions below [`NEGLIGIBLE`] at either end go to
-    /// the cell beside.
-    #[inline]
-    fn new(at: f32, half: f32) -> Self {
-        let first = floor(at - half);
-        let last = floor(at + half);
-        let mut shares = Self { first, count: 1, share: [1.0; LONGEST], centre: [at; LONGEST] };
-        if first == last {
-            return shares;
-        }
-        let inv = 1.0 / half;
-        let (mut below, mut moment_below, mut n) = (0.0, 0.0, 0);
-        for cell in first..last {
-            let x = ((cell + 1) as f32 - at) * inv;
-            let x2 = (x * x).min(1.0);
-            let cdf = 0.5 + x * (0.9375 - x2 * (0.625 - 0.1875 * x2));
-            let share = cdf - below;
-            if n == 0 && share < NEGLIGIBLE {
-                shares.first = cell + 1;
-                continue;
-            }
-            // ∫ x·(15/16)(1 − x²)² dx
-            let rest = 1.0 - x2;
-            let moment = -0.15625 * rest * rest * rest;
-            shares.share[n] = share;
-            shares.centre[n] = at + half * (moment - moment_below) / share;
-            (below, moment_below) = (cdf, moment);
-            n += 1;
-        }
-        let share = 1.0 - below;
-        if share >= NEGLIGIBLE || n == 0 {
-            shares.share[n] = share;
-            shares.centre[n] = at - half * moment_below / share;
-            n += 1;
-        } else {
-            shares.share[n - 1] += share;
-        }
-        shares.count = n;
-        shares
-    }
-}
-
 struct Sample {
     weight: f32,
     /// Area of the footprint per measure of the table.
@@ -403,7 +358,11 @@ fn sample_disc(caster: &Caster, ray: &Ray, parallel: bool) -> Option<Sample> {
     let cosine = cosine.abs();
     let stretch = 1.0 / cosine;
     let jacobian = if parallel { stretch } else { t * t * stretch };
-    let gain = if caster.extinction.opacity == SurfaceOpacity::PerCrossing { 1.0 } else { caster.extinction.opacity.optical_depth_factor(cosine) };
+    let gain = if caster.extinction.opacity == SurfaceOpacity::PerCrossing {
+        1.0
+    } else {
+        caster.extinction.opacity.optical_depth_factor(cosine)
+    };
     Some(Sample { weight: caster.kernel.profile(s), jacobian, gain, distance: t })
 }
 

@@ -26,7 +26,7 @@ impl Frame {
 
     /// Position in the frame.
     #[inline]
-    pub(crate) fn to_light(&self, offset: Vec3) -> Vec3 {
+    pub(crate) fn position(&self, offset: Vec3) -> Vec3 {
         self.rotation * ((offset.as_dvec3() - self.origin) * self.unit).as_vec3()
     }
 
@@ -95,9 +95,9 @@ mod tests {
     }
 
     #[test]
-    fn offset_inverts_to_light() {
+    fn offset_inverts_position() {
         let frame = Frame::new(DVec3::new(1.0, 2.0, 3.0), axes_along(DVec3::new(1.0, 1.0, -0.3)), 700.0);
         let p = Vec3::new(10.0, -20.0, 30.0);
-        assert!((frame.offset(frame.to_light(p)) - p).length() < 1e-4);
+        assert!((frame.offset(frame.position(p)) - p).length() < 1e-4);
     }
 }

@@ -38,6 +38,7 @@ mod plan;
 mod query;
 pub mod reference;
 mod shadow_map;
+mod shares;
 mod survey;
 mod table;
 

@@ -19,7 +19,7 @@ const ROUNDING: f32 = 1.0 / 262_144.0;
 
 impl Transmittance for ShadowMap {
     fn transmittance(&self, receiver: &Receiver) -> [f32; 3] {
-        let p = self.frame.to_light(receiver.position);
+        let p = self.frame.position(receiver.position);
         with_mapping!(&self.table, m => match &self.absorbances {
             Absorbances::Mono(matter) => [self.look_up(m, matter, receiver, p)[0]; 3],
             Absorbances::Rgb(matter) => self.look_up(m, matter, receiver, p),
@@ -49,7 +49,8 @@ impl Target {
         let ray = mapping.cell_ray(cell);
         let plane = plane_distance(self.position, self.normal, &ray)?;
         // Far from the receiver its plane no longer stands for the surface that it is part of.
-        if !mapping.is_parallel() && !(plane > 0.5 * self.distance && plane < 2.0 * self.distance) {
+        let near = plane > 0.5 * self.distance && plane < 2.0 * self.distance;
+        if !near && !mapping.is_parallel() {
             return None;
         }
         Some([plane, plane - self.lift / ray.direction.dot(self.normal).abs()])
@@ -180,7 +181,8 @@ mod tests {
     fn media_absorb_continuously_and_by_half_at_their_own_distance() {
         let list = list(&[(1.0, 0.4), (2.0, 0.2), (9.0, 1.0)]);
         let at = |d: f32| continuous(&list, d, 1.0)[0];
-        for (d, a) in [(0.0, 0.0), (1.0, 0.2), (1.5, 0.4), (2.0, 0.5), (3.0, 0.6), (5.0, 0.6), (9.0, 1.1), (10.0, 1.6)] {
+        for (d, a) in [(0.0, 0.0), (1.0, 0.2), (1.5, 0.4), (2.0, 0.5), (3.0, 0.6), (5.0, 0.6), (9.0, 1.1), (10.0, 1.6)]
+        {
             assert!((at(d) - a).abs() < 1e-6, "A({d}) = {}, not {a}", at(d));
         }
         let mut last = 0.0;

@@ -89,7 +89,7 @@ impl Params {
             if ok { Ok(()) } else { Err(Error::Parameter { name, found, expected }) }
         };
         let t = self.tolerance;
-        check(t >= f32::MIN_POSITIVE && t < 1.0, "tolerance", t.to_string(), "a number in (0, 1)")?;
+        check((f32::MIN_POSITIVE..1.0).contains(&t), "tolerance", t.to_string(), "a number in (0, 1)")?;
         let e = self.entries_per_splat;
         check(e.is_finite() && e >= 1.0, "entries_per_splat", e.to_string(), "a finite number ≥ 1")?;
         let d = self.opaque_dilation;

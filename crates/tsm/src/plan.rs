@@ -43,7 +43,7 @@ pub(crate) fn plan(casters: &Casters<'_>, survey: &Survey, light: &Light) -> Res
         Kind::Parallel => Apparent::Length,
     };
     let look = Appearance::new(casters, &frame, apparent);
-    let shape = Shape::new(&kind, &look);
+    let shape = Extent::of(&kind, &look);
     let cell = match casters.params.resolution {
         Resolution::Auto => automatic_cell(casters, &look, &shape),
         Resolution::Cells(n) => shape.side / f64::from(n),
@@ -77,16 +77,19 @@ fn frame_of(casters: &Casters<'_>, survey: &Survey, light: &Light) -> Result<(Ki
             return Ok((Kind::Parallel, Frame::new(origin, axes_along(direction), 2.0 * reach)));
         }
         LightShape::Point { position } | LightShape::Spot { position, .. } => position - casters.cloud.origin,
-        _ => return Err(Error::Parameter {
-            name: "light",
-            found: format!("{:?}", light.shape),
-            expected: "a point, spot or directional light; extended lights are several points",
-        }),
+        _ => {
+            return Err(Error::Parameter {
+                name: "light",
+                found: format!("{:?}", light.shape),
+                expected: "a point, spot or directional light; extended lights are several points",
+            });
+        }
     };
     let to_centre = centre - position;
     let extent = to_centre.length() + reach;
     let sphere = |kind| (kind, Frame::new(position, [DVec3::X, DVec3::Y, DVec3::Z], extent));
-    let planar = |axis: DVec3, tan_outer| (Kind::Perspective { tan_outer }, Frame::new(position, axes_along(axis), extent));
+    let planar =
+        |axis: DVec3, tan_outer| (Kind::Perspective { tan_outer }, Frame::new(position, axes_along(axis), extent));
     let narrow = to_centre.length() * CONE > reach;
     let wide = to_centre.length() * 0.96 > reach;
     Ok(match (choice, light.shape) {
@@ -94,11 +97,13 @@ fn frame_of(casters: &Casters<'_>, survey: &Survey, light: &Light) -> Result<(Ki
         (MappingChoice::PolarAzimuth, _) => sphere(Kind::Polar),
         (_, LightShape::Spot { direction, outer, .. }) if outer < 1.2 => planar(direction, Some(outer.tan() as f32)),
         (MappingChoice::Planar, _) if wide => planar(to_centre, None),
-        (MappingChoice::Planar, _) => return Err(Error::Parameter {
-            name: "mapping",
-            found: "Planar for a light within or near its casters".into(),
-            expected: "Auto, Octahedral or PolarAzimuth",
-        }),
+        (MappingChoice::Planar, _) => {
+            return Err(Error::Parameter {
+                name: "mapping",
+                found: "Planar for a light within or near its casters".into(),
+                expected: "Auto, Octahedral or PolarAzimuth",
+            });
+        }
         (MappingChoice::Auto, _) if narrow && !empty => planar(to_centre, None),
         (MappingChoice::Auto, _) => sphere(Kind::Octahedral),
     })
@@ -131,8 +136,8 @@ impl std::ops::Deref for Extent {
     }
 }
 
-impl Shape {
-    fn new(kind: &Kind, look: &Appearance) -> Extent {
+impl Extent {
+    fn of(kind: &Kind, look: &Appearance) -> Self {
         let planar = |perspective, limit: Option<f32>| {
             let limit = Vec2::splat(limit.map_or(MAX_TANGENT, |t| 1.05 * t));
             let [mut low, mut high] = look.window;

@@ -21,7 +21,7 @@ pub struct SurfacePoint {
 impl ShadowMap {
     /// The cell that a position, relative to the cloud's origin, lies in; `None` at the light and outside the table.
     pub fn cell_of(&self, position: Vec3) -> Option<u32> {
-        let p = self.frame.to_light(position);
+        let p = self.frame.position(position);
         with_mapping!(&self.table, m => {
             let at = m.locate(p)?.at.floor();
             m.wrap(at.x as i32, at.y as i32)
@@ -64,7 +64,7 @@ impl ShadowMap {
     pub fn first_hit_towards(&self, position: Vec3, absorbance: f32) -> Option<Vec3> {
         let cell = self.cell_of(position)?;
         let distance = self.hit_in_frame(cell, absorbance)?;
-        let p = self.frame.to_light(position);
+        let p = self.frame.position(position);
         let hit = with_mapping!(&self.table, m => {
             if m.is_parallel() { p.truncate().extend(distance) } else { p.normalize() * distance }
         });
@@ -90,7 +90,7 @@ impl ShadowMap {
     /// the ray of some cell, between the distances at which that ray enters and leaves the sphere. Matter behind the
     /// visible limit of its cell is not seen. Looks at every cell.
     pub fn collides(&self, center: Vec3, radius: f32) -> bool {
-        let c = self.frame.to_light(center);
+        let c = self.frame.position(center);
         let r = self.frame.length(radius);
         (0..self.cells()).into_par_iter().with_min_len(4096).any(|cell| {
             let ray = with_mapping!(&self.table, m => m.cell_ray(cell));

@@ -68,8 +68,7 @@ impl Survey {
     fn join(mut self, other: Self) -> Self {
         self.casters += other.casters;
         (0..3).for_each(|k| self.kinds[k] += other.kinds[k]);
-        self.bounds =
-            Aabb { min: self.bounds.min.min(other.bounds.min), max: self.bounds.max.max(other.bounds.max) };
+        self.bounds = Aabb { min: self.bounds.min.min(other.bounds.min), max: self.bounds.max.max(other.bounds.max) };
         self.max_radius = self.max_radius.max(other.max_radius);
         self.medium_radius_sum += other.medium_radius_sum;
         self.coloured |= other.coloured;
@@ -158,7 +157,7 @@ impl Appearance {
 
     fn add(&mut self, casters: &Casters<'_>, i: usize, frame: &Frame, apparent: Apparent) {
         let cloud = casters.cloud;
-        let p = frame.to_light(cloud.position[i]);
+        let p = frame.position(cloud.position[i]);
         let far = match apparent {
             Apparent::Angle | Apparent::AngleAndSectors => p.length(),
             Apparent::Tangent => p.z,

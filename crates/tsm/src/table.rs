@@ -194,7 +194,11 @@ fn sort<const C: usize>(list: &mut [Knot<C>], spare: &mut Vec<Knot<C>>) {
     let significant = u32::BITS - (most - least).leading_zeros();
     spare.clear();
     spare.resize(list.len(), Knot::ZERO);
-    if list.len() < LONG { radix::<C, 256>(list, spare, least, significant) } else { radix::<C, 2048>(list, spare, least, significant) }
+    if list.len() < LONG {
+        radix::<C, 256>(list, spare, least, significant)
+    } else {
+        radix::<C, 2048>(list, spare, least, significant)
+    }
 }
 
 /// Radix sort of the `significant` low bits of the distances' bits above `least`, by digits of `RADIX` values.

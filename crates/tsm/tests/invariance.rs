@@ -14,7 +14,10 @@ fn lights() -> [Light; 4] {
         point_light(position),
         point_light(DVec3::new(0.5, 6.0, 1.0)),
         directional(DVec3::new(1.0, -2.0, 0.5)),
-        Light { shape: LightShape::Spot { position: -direction * 3.0, direction, inner: 0.3, outer: 0.5 }, intensity: [1.0; 3] },
+        Light {
+            shape: LightShape::Spot { position: -direction * 3.0, direction, inner: 0.3, outer: 0.5 },
+            intensity: [1.0; 3],
+        },
     ]
 }
 

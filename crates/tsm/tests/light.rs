@@ -37,7 +37,12 @@ fn ts03_ring_of_equal_points_gets_equal_light() {
     for k in 0..n {
         let (s, c) = (std::f32::consts::TAU * k as f32 / n as f32).sin_cos();
         for r in [1.0, 2.0] {
-            cloud.push(&Splat { position: Vec3::new(r * c, r * s, 0.0), radius: 0.04, cross_section: 1e-3, ..Splat::default() });
+            cloud.push(&Splat {
+                position: Vec3::new(r * c, r * s, 0.0),
+                radius: 0.04,
+                cross_section: 1e-3,
+                ..Splat::default()
+            });
         }
     }
     let resolution = Resolution::Cells(256);
@@ -96,7 +101,11 @@ fn ts10_light_inside_a_ball() {
         let true_mean = truth.iter().sum::<f64>() / 2000.0;
         let worst = lights.iter().zip(&truth).fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
         let rough = (truth.iter().map(|t| (t - true_mean).powi(2)).sum::<f64>() / 2000.0).sqrt();
-        println!("{:?} rough {rough} mean {mean} ({true_mean}, e^-σR {}) σ {deviation} worst {worst}", map.counts(), (-sigma * r).exp());
+        println!(
+            "{:?} rough {rough} mean {mean} ({true_mean}, e^-σR {}) σ {deviation} worst {worst}",
+            map.counts(),
+            (-sigma * r).exp()
+        );
         assert!((mean - true_mean).abs() < 1e-3, "mean {mean}, truth {true_mean}");
         assert!((mean - f64::from((-sigma * r).exp())).abs() < 5e-3);
         assert!(worst < 1.5e-2, "{worst}");
@@ -156,21 +165,41 @@ fn ts13_objects_that_cast_no_shadow_leave_no_trace() {
 fn ts16_deposits_keep_the_cross_section_in_any_table() {
     for (k, kind) in [SplatKind::Medium, SplatKind::Surface].into_iter().enumerate() {
         for n in [1, 3, 64, 200, 513, 1024, 4096] {
-            for seed in 0..6 {
-                let p = direction(8, 10 * seed + k as u64) * 2.0;
+            for seed in 0..10 {
+                let p = directions(10 * seed + k as u64) * 2.0;
                 let mut cloud = Cloud::new(DVec3::ZERO);
                 let normal = (direction(9, seed) - p).normalize();
-                cloud.push(&Splat { position: p, radius: 0.03, cross_section: 0.002, kind, normal, ..Splat::default() });
+                cloud.push(&Splat {
+                    position: p,
+                    radius: 0.03,
+                    cross_section: 0.002,
+                    kind,
+                    normal,
+                    ..Splat::default()
+                });
                 for mapping in [MappingChoice::Octahedral, MappingChoice::PolarAzimuth] {
                     let params = Params { mapping, resolution: Resolution::Cells(n), ..Params::default() };
                     let map = build(&cloud, &point_light(DVec3::ZERO), &params);
                     let measured = cross_section(&map);
-                    let cosine = if kind == SplatKind::Medium { 1.0 } else { f64::from(p.normalize().dot(normal)).abs() };
+                    let cosine =
+                        if kind == SplatKind::Medium { 1.0 } else { f64::from(p.normalize().dot(normal)).abs() };
                     let ratio = measured / (0.002 * cosine);
                     assert!((ratio - 1.0).abs() < 1e-4 + 1e-4 / cosine, "{kind:?} {mapping:?} {n} {seed}: {ratio}");
                 }
             }
         }
+    }
+}
+
+/// Random directions, and both poles with places beside them.
+fn directions(item: u64) -> Vec3 {
+    let beside = Vec3::new(0.004, 0.003, 0.0);
+    match item / 10 {
+        0 => Vec3::Z,
+        1 => Vec3::NEG_Z,
+        2 => (Vec3::Z + beside).normalize(),
+        3 => (Vec3::NEG_Z + beside).normalize(),
+        _ => direction(8, item),
     }
 }
 
@@ -188,31 +217,36 @@ fn cross_section(map: &ShadowMap) -> f64 {
 
 #[test]
 fn ts16_mean_transmittance_does_not_depend_on_the_table() {
-    // One layer of optical depth 1, so that 4096 rows fit.
+    // One layer of optical depth 1, so that 4096 rows fit; seen at an angle, and along an axis, where the octahedral
+    // table has a corner and the polar one its pole.
     let cloud = medium([10, 10, 0], 0.1, 10.0, |_| true);
-    for mapping in [MappingChoice::Octahedral, MappingChoice::PolarAzimuth, MappingChoice::Planar] {
-        let light = point_light(DVec3::new(0.05, 0.02, -3.0));
-        // A planar table spends all its cells on the casters.
-        let sizes = if mapping == MappingChoice::Planar { [16, 32, 64, 128, 256, 512] } else { [64, 128, 256, 512, 1024, 4096] };
-        let means: Vec<f64> = sizes
-            .into_iter()
-            .map(|n| {
+    for (position, tolerance) in [(DVec3::new(-1.3, 0.9, -2.6), 1e-3), (DVec3::new(0.05, 0.02, -3.0), 5e-3)] {
+        for mapping in [MappingChoice::Octahedral, MappingChoice::PolarAzimuth, MappingChoice::Planar] {
+            // A planar table spends all its cells on the casters.
+            let planar = mapping == MappingChoice::Planar;
+            let sizes = if planar { [16, 32, 64, 128, 256, 512] } else { [64, 128, 256, 512, 1024, 4096] };
+            let means = sizes.map(|n| {
                 let params = Params { mapping, resolution: Resolution::Cells(n), ..Params::default() };
-                let map = build(&cloud, &light, &params);
-                let sum: f64 = (0..4000)
-                    .map(|i| {
-                        let u = |k| (splat_core::rng::unit_f32(2, 0, i, k) - 0.5) * 0.8;
-                        f64::from(light_at(&map, Vec3::new(u(0), u(1), 0.6)))
-                    })
-                    .sum();
-                sum / 4000.0
-            })
-            .collect();
-        println!("{mapping:?} {means:?}");
-        for mean in &means[1..] {
-            assert!((mean - means[5]).abs() < 1e-3, "{mapping:?}: {means:?}");
+                mean_behind_layer(&build(&cloud, &point_light(position), &params), position)
+            });
+            println!("{mapping:?} {means:?}");
+            // The paper's cells are not of equal area; its coarsest table is allowed twice as much.
+            let slack = if mapping == MappingChoice::PolarAzimuth { 2.0 } else { 1.0 };
+            for mean in means {
+                assert!((mean - means[5]).abs() < slack * tolerance, "{mapping:?}: {means:?}");
+            }
         }
     }
+}
+
+/// Mean light at places whose rays cross the middle of the layer z = 0.
+fn mean_behind_layer(map: &ShadowMap, light: DVec3) -> f64 {
+    let at = |i: u64| {
+        let u = |k| (splat_core::rng::unit_f32(2, 0, i, k) - 0.5) * 0.7;
+        let crossing = Vec3::new(u(0), u(1), 0.0);
+        f64::from(light_at(map, crossing + (crossing - light.as_vec3()) * 0.25))
+    };
+    (0..4000).map(at).sum::<f64>() / 4000.0
 }
 
 #[test]
@@ -232,7 +266,11 @@ fn slab_shadow_is_beers_law_with_little_ripple() {
                 .collect();
             let mean = lights.iter().sum::<f64>() / lights.len() as f64;
             let ripple = lights.iter().fold(0.0f64, |m, t| m.max((t - mean).abs()));
-            println!("τ {tau} {resolution:?} {:?} mean error {:.2e} ripple {ripple:.2e}", map.counts(), mean - (-tau).exp());
+            println!(
+                "τ {tau} {resolution:?} {:?} mean error {:.2e} ripple {ripple:.2e}",
+                map.counts(),
+                mean - (-tau).exp()
+            );
             assert!((mean - (-tau).exp()).abs() < 1e-4, "τ {tau} {resolution:?}: {mean}");
             assert!(ripple < 1e-2, "τ {tau} {resolution:?}: ripple {ripple}");
             ripples.push(ripple);

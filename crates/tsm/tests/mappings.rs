@@ -73,8 +73,7 @@ fn gradients_are_the_derivatives_of_places() {
                 (at(1e-3) - at(-1e-3)) / 2e-3
             });
             let [gu, gv] = table.gradients(p);
-            let (nu, nv) =
-                (Vec3::from(steps.map(|s| s.x)), Vec3::from(steps.map(|s| s.y)));
+            let (nu, nv) = (Vec3::from(steps.map(|s| s.x)), Vec3::from(steps.map(|s| s.y)));
             let smooth = p.abs().min_element() > 5e-3 && p.x.hypot(p.y) > 0.1;
             if smooth && nu.length() < 1e3 {
                 let error = (gu - nu).length() / gu.length() + (gv - nv).length() / gv.length();

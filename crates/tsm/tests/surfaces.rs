@@ -61,7 +61,8 @@ fn ts15_contact_shadow_starts_within_a_splat_of_the_wall() {
     for light in [directional(DVec3::new(1.0, -1.0, 0.0)), point_light(DVec3::new(-6.0, 6.0, 0.0))] {
         let map = build(&cloud, &light, &Params::default());
         let light_on = |x: f32| {
-            map.transmittance(&Receiver { position: Vec3::new(x, 0.0, 0.013), normal: Vec3::Y, ..receiver(&cloud, 0) })[0]
+            map.transmittance(&Receiver { position: Vec3::new(x, 0.0, 0.013), normal: Vec3::Y, ..receiver(&cloud, 0) })
+                [0]
         };
         assert!(light_on(1.5 * h) < 0.05, "{} at the foot of the wall", light_on(1.5 * h));
         assert!(light_on(10.0 * h) < 1e-3 && light_on(-2.0 * h) > 0.99);

@@ -1,8 +1,8 @@
 //! `organza info`.
 
 use super::args::InfoArguments;
-use super::{console, memory};
 use super::session::path_text;
+use super::{console, memory};
 use organza::scene::{self, LightSource, LoadOptions, Scene, SceneLight, Source};
 use organza::{Error, FileInfo, escape_controls};
 use serde_json::{Value, json};
@@ -10,9 +10,8 @@ use splat_core::LightShape;
 
 /// Describes a scene (`.toml`, `.json`) or a data file.
 pub(super) fn run(arguments: &InfoArguments) -> Result<(), Error> {
-    let is_scene = arguments.file.extension().is_some_and(|e| {
-        e.eq_ignore_ascii_case("toml") || e.eq_ignore_ascii_case("json")
-    });
+    let is_scene =
+        arguments.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml") || e.eq_ignore_ascii_case("json"));
     let document = if is_scene {
         let options = LoadOptions { allow_path: arguments.allow_path, overrides: Vec::new() };
         scene_document(&scene::load(&arguments.file, &options)?)
@@ -37,9 +36,10 @@ fn scene_document(scene: &Scene) -> Value {
             "visible": o.visible,
         })
     });
-    let lights = scene.lights.iter().map(|l| {
-        json!({ "kind": light_name(l), "intensity": l.intensity, "points": l.samples, "shadow": l.shadow })
-    });
+    let lights = scene
+        .lights
+        .iter()
+        .map(|l| json!({ "kind": light_name(l), "intensity": l.intensity, "points": l.samples, "shadow": l.shadow }));
     json!({
         "kind": "scene",
         "sha256": scene.sha256,

@@ -18,9 +18,10 @@ pub(super) fn cost_json(cost: &CostRecord) -> Value {
 
 /// The plan as JSON.
 pub(super) fn plan_json(plan: &Plan) -> Value {
-    let effects = plan.effects.iter().map(|e| {
-        json!({ "name": e.name, "called_for": e.called_for, "reason": e.reason, "bound": e.bound })
-    });
+    let effects = plan
+        .effects
+        .iter()
+        .map(|e| json!({ "name": e.name, "called_for": e.called_for, "reason": e.reason, "bound": e.bound }));
     let passes = plan.passes.iter().map(|p| json!({ "name": p.name, "reason": p.reason }));
     json!({
         "technique": plan.technique,

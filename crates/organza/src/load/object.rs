@@ -101,7 +101,8 @@ fn raw_points(
     let (cloud, report) = convert::raw_to_surfels(&points, &params).map_err(|e| refuse(&e))?;
     if report.duplicates > 0 && !params.merge_duplicates {
         let n = report.duplicates;
-        warnings.push(format!("{}: {n} points lie where another one lies (--merge-duplicates)", crate::printable(path)));
+        warnings
+            .push(format!("{}: {n} points lie where another one lies (--merge-duplicates)", crate::printable(path)));
     }
     Ok(cloud)
 }

@@ -85,7 +85,11 @@ fn temporary_name(path: &Path) -> PathBuf {
     let mut name = OsString::from(".");
     let file_name = path.file_name().unwrap_or_default();
     // 255 bytes are common to file systems; a name of up to 200 is kept as it is.
-    if file_name.len() <= 200 { name.push(file_name) } else { name.push("organza") }
+    if file_name.len() <= 200 {
+        name.push(file_name)
+    } else {
+        name.push("organza")
+    }
     name.push(format!(".tmp-{}", std::process::id()));
     folder_of(path).join(name)
 }

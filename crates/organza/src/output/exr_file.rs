@@ -159,7 +159,8 @@ mod tests {
         let mut report = WriteReport::default();
         let bytes = encode(&tiny(), &Metadata::default(), true, &mut report).unwrap();
         assert_eq!((report.not_a_number, report.clamped), (1, 2));
-        let image = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
+        let image =
+            read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
         let image = image.from_buffered(std::io::Cursor::new(bytes)).unwrap();
         let names: Vec<String> = image.layer_data.channel_data.list.iter().map(|c| c.name.to_string()).collect();
         assert_eq!(names, ["A", "B", "G", "N.X", "N.Y", "N.Z", "R", "Z", "depth.first.Z", "object.id"]);

@@ -133,12 +133,7 @@ impl<'a> At<'a> {
 }
 
 /// Checks everything.
-pub(super) fn scene(
-    document: &Document<'_>,
-    raw: RawScene,
-    allow_path: bool,
-    sha256: String,
-) -> Result<Scene, Error> {
+pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sha256: String) -> Result<Scene, Error> {
     let at = At { document, path: Vec::new() };
     if raw.version != 1 {
         let message = format!("`version`: expected 1, found {}", raw.version);

@@ -129,8 +129,7 @@ fn check_source(at: &At<'_>, raw: &RawObject, fallback: Option<f64>, paths: &Pat
 
 /// A key that would silently do nothing is an error.
 fn refuse_what_does_not_apply(at: &At<'_>, raw: &RawObject, source: &Source) -> Result<(), Error> {
-    let is_medium =
-        matches!(source, Source::Volume(_) | Source::Density(_) | Source::Cloud(_) | Source::Medium(_));
+    let is_medium = matches!(source, Source::Volume(_) | Source::Density(_) | Source::Cloud(_) | Source::Medium(_));
     if is_medium && raw.opacity.is_some() {
         return Err(at.key("opacity").error("a medium has no `opacity`", "use its extinction"));
     }
@@ -184,7 +183,9 @@ fn point_extinction(at: &At<'_>, p: &RawTransferPoint, unit_length: Option<f64>)
             };
             at.number("opacity", optics::optical_depth(opacity) / unit_length, 0.0..=LARGEST)
         }
-        (Some(_), Some(_)) => Err(at.key("opacity").error("expected one of `extinction` and `opacity`, found both", "")),
+        (Some(_), Some(_)) => {
+            Err(at.key("opacity").error("expected one of `extinction` and `opacity`, found both", ""))
+        }
         (None, None) => Err(at.error("expected a key `extinction` or `opacity` here, found neither", "")),
     }
 }

@@ -3,9 +3,7 @@
 use super::check::{At, LARGEST, SMALLEST};
 use super::de::suggest;
 use super::raw::{Auto, RawDirection, RawMapping, RawPoints, RawRender, RawShadow};
-use super::{
-    LAYER_NAMES, LayerChoice, PointsSettings, RenderSettings, ShadowMapping, ShadowSettings, Technique,
-};
+use super::{LAYER_NAMES, LayerChoice, PointsSettings, RenderSettings, ShadowMapping, ShadowSettings, Technique};
 use crate::Error;
 use splat_core::Direction;
 

@@ -5,7 +5,7 @@ use glam::DVec3;
 use splat_core::{Camera, Direction, FootprintStack, Material, Similarity, TransferFunction};
 use std::path::PathBuf;
 
-/// A whole scene. Made by [`super::load`] or [`super::parse`] alone, so that every number in it is finite and in range.
+/// A whole scene. Made by [`super::load()`] or [`super::parse`] alone, so that every number in it is finite and in range.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
     /// The scene file, as it was named.

@@ -64,7 +64,8 @@ pub fn finish(
 
 fn sample(acc: &Accumulator, opaque: &OpaqueImage, background: &Background, k: usize) -> Sample {
     let planes = acc.optical_depth.len();
-    let transmittance: [f32; 3] = std::array::from_fn(|c| exp_neg(acc.optical_depth[if planes == 3 { c } else { 0 }][k]));
+    let transmittance: [f32; 3] =
+        std::array::from_fn(|c| exp_neg(acc.optical_depth[if planes == 3 { c } else { 0 }][k]));
     let solid = opaque.depth.get(k).copied().filter(|d| d.is_finite());
     let count = acc.channels.len();
     let mut values = [0.0; MAX_CHANNELS];
@@ -82,11 +83,7 @@ fn sample(acc: &Accumulator, opaque: &OpaqueImage, background: &Background, k: u
         background: std::array::from_fn(|c| through[c] * background.color[c]),
         values,
         depth: depths(acc, transmittance[1], solid, k),
-        object: if unseen {
-            opaque.object.get(k).copied().unwrap_or(u32::MAX)
-        } else {
-            acc.object[k]
-        },
+        object: if unseen { opaque.object.get(k).copied().unwrap_or(u32::MAX) } else { acc.object[k] },
     }
 }
 

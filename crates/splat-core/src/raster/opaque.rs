@@ -7,6 +7,7 @@ use super::bins::{Bins, TILE, bin};
 use super::lanes::Lanes;
 use super::tile::{AREA, BATCH, for_each_row, for_each_run};
 use super::{Projected, ProjectedSplat, RasterCounts};
+use crate::Progress;
 use pulp::Simd;
 use rayon::prelude::*;
 
@@ -41,12 +42,14 @@ struct OpaqueTile {
     fragments: u64,
 }
 
-/// Resolves the opaque splats of `projected`; `values` holds `channels` numbers a splat, in list order.
+/// Resolves the opaque splats of `projected`; `values` holds `channels` numbers a splat, in list order. Object ids are kept
+/// when `objects` asks for them. After `progress.cancel()` the remaining tiles stay empty.
 pub fn resolve_opaque(
     projected: &Projected,
     values: &[f32],
     channels: usize,
     objects: bool,
+    progress: &Progress,
 ) -> (OpaqueImage, RasterCounts) {
     if projected.splats.is_empty() {
         return (OpaqueImage::default(), RasterCounts::default());
@@ -54,7 +57,7 @@ pub fn resolve_opaque(
     let bins = bin(projected);
     let tiles: Vec<OpaqueTile> = (0..bins.tiles())
         .into_par_iter()
-        .filter(|&t| !bins.is_empty(t))
+        .filter(|&t| !bins.is_empty(t) && !progress.is_cancelled())
         .map(|t| {
             let mut tile = OpaqueTile::new(&bins, t, channels, objects);
             pulp::Arch::new().dispatch(ResolveTile { tile: &mut tile, bins: &bins, t, projected, values });

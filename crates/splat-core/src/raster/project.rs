@@ -194,7 +194,9 @@ impl Projector<'_> {
         };
         match kind {
             SplatKind::Medium => self.medium(&mut out, splat, center, px_per_world, filter_px, footprint.norm),
-            SplatKind::Surface | SplatKind::Opaque => self.disc(&mut out, splat, center, px_per_world, filter_px, footprint.norm),
+            SplatKind::Surface | SplatKind::Opaque => {
+                self.disc(&mut out, splat, center, px_per_world, filter_px, footprint.norm)
+            }
         }
         self.clip(&mut out, radius / center.z.abs().max(radius));
         out

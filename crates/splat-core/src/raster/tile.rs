@@ -27,11 +27,7 @@ pub(crate) struct Run<'a> {
 
 /// Visits the runs of `splat` in the tile whose first pixel is `origin`.
 #[inline(always)]
-pub(crate) fn for_each_run<'a, S: Simd>(
-    splat: &'a ProjectedSplat,
-    origin: [usize; 2],
-    mut visit: impl FnMut(Run<'a>),
-) {
+pub(crate) fn for_each_run<'a, S: Simd>(splat: &'a ProjectedSplat, origin: [usize; 2], mut visit: impl FnMut(Run<'a>)) {
     let [x0, x1, y0, y1] = splat.bounds.map(usize::from);
     let (x0, x1) = (x0.max(origin[0]), x1.min(origin[0] + TILE));
     for y in y0.max(origin[1])..y1.min(origin[1] + TILE) {

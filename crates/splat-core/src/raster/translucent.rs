@@ -11,7 +11,7 @@ use super::bins::{Bins, TILE, bin};
 use super::lanes::{Lanes, MAX_LANES, exp_neg};
 use super::tile::{AREA, BATCH, Run, STRIDE, for_each_row, for_each_run};
 use super::{OpaqueImage, Params, Projected, ProjectedSplat, RasterCounts};
-use crate::{Accumulator, Direction, Material, SplatKind};
+use crate::{Accumulator, Direction, Material, Progress, SplatKind};
 use pulp::Simd;
 use rayon::prelude::*;
 
@@ -47,7 +47,7 @@ struct Moments {
 /// extinction per channel; with one plane of optical depth, which is for materials that absorb all channels alike, the
 /// first channel's counts. Front to back can continue an
 /// accumulator that holds nearer splats; back to front can continue one that holds farther ones. First and median depth
-/// are defined front to back only.
+/// are defined front to back only. After `progress.cancel()` the remaining tiles are left as they are.
 ///
 /// # Panics
 /// If sizes of the image, the accumulator and `values` disagree.
@@ -59,13 +59,14 @@ pub fn fold(
     direction: Direction,
     params: &Params,
     accumulator: &mut Accumulator,
+    progress: &Progress,
 ) -> RasterCounts {
     assert_eq!(projected.size, accumulator.size, "invariant: one image size");
     assert_eq!(values.len(), projected.splats.len() * accumulator.channels.len(), "invariant: values for each splat");
     let bins = bin(projected);
     let finished: Vec<Tile> = (0..bins.tiles())
         .into_par_iter()
-        .filter(|&t| !bins.is_empty(t))
+        .filter(|&t| !bins.is_empty(t) && !progress.is_cancelled())
         .map(|t| {
             let mut tile = Tile::load(accumulator, projected, opaque, &bins, t);
             let tile_ref = &mut tile;
@@ -155,9 +156,8 @@ impl Tile {
             }
             out
         };
-        let slices = |planes: &'_ [Vec<f32>]| -> Vec<f32> {
-            copy(&planes.iter().map(Vec::as_slice).collect::<Vec<_>>(), 0.0)
-        };
+        let slices =
+            |planes: &'_ [Vec<f32>]| -> Vec<f32> { copy(&planes.iter().map(Vec::as_slice).collect::<Vec<_>>(), 0.0) };
         let optical_depth = slices(&acc.optical_depth);
         let mut opaque_depth = Vec::new();
         if !opaque.depth.is_empty() {

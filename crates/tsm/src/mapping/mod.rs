@@ -58,6 +58,11 @@ pub trait Mapping: Sync {
         (1.0 / self.measure(cell)) as f32
     }
 
+    /// Solid angle per area of the table at a ray, in any unit: how samples inside a cell are weighted.
+    fn density(&self, _ray: &Ray) -> f32 {
+        1.0
+    }
+
     /// Whether all rays are parallel, so that footprints do not shrink with distance.
     fn is_parallel(&self) -> bool {
         false

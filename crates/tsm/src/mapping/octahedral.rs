@@ -15,7 +15,7 @@ use glam::{Vec2, Vec3};
 
 /// 2/π·atan(√s)/√s on [0, 1], a Chebyshev fit; the product with √s errs by less than 5e-8.
 const ATAN: [f32; 8] = [
-    0.636_619_7,
+    std::f32::consts::FRAC_2_PI,
     -0.212_196_91,
     0.127_113_63,
     -0.089_147_71,
@@ -26,7 +26,7 @@ const ATAN: [f32; 8] = [
 ];
 
 /// sin(π/2·p)/p in powers of p² on [0, 1]; errs by less than 1e-8.
-const SIN: [f32; 5] = [1.57079632, -0.64596376, 0.0796899183, -0.00467414384, 0.000151671704];
+const SIN: [f32; 5] = [std::f32::consts::FRAC_PI_2, -0.645_963_8, 0.079_689_92, -0.004_674_143_6, 0.000_151_671_7];
 
 /// Equal-area octahedral table of n × n cells.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,8 +43,7 @@ impl Octahedral {
         let n = n.clamp(1, 1 << 15);
         let half = n.div_ceil(2);
         let centre = |i: u32| f64::from(2 * (i + n / 2) + 1) / f64::from(n) - 1.0;
-        let quarter =
-            (0..half * half).map(|k| direction([centre(k % half), centre(k / half)])).collect();
+        let quarter = (0..half * half).map(|k| direction([centre(k % half), centre(k / half)])).collect();
         let inverse_measure = (f64::from(n).powi(2) / (4.0 * std::f64::consts::PI)) as f32;
         Self { n, inverse_measure, quarter }
     }

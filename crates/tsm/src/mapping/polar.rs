@@ -126,6 +126,10 @@ impl Mapping for PolarAzimuth {
         2.0 * middle.sin() * (0.5 / per_polar).sin() / per_azimuth
     }
 
+    fn density(&self, ray: &Ray) -> f32 {
+        ray.direction.x.hypot(ray.direction.y)
+    }
+
     fn is_creased(&self, at: Vec2, half: Vec2) -> bool {
         let to_pole = |pole: f64| ((pole - self.range.polar[0]) * self.scale()[1]) as f32 - at.y;
         to_pole(0.0).abs().min(to_pole(PI).abs()) < 2.0 * half.y
