@@ -42,6 +42,11 @@ impl Picture {
         values.iter().map(|v| f64::from(*v)).collect()
     }
 
+    /// Names of all channels in alphabetical order.
+    pub fn names(&self) -> Vec<String> {
+        self.channels.keys().cloned().collect()
+    }
+
     /// SHA-256 of all channels; depths are divided by `scale`, a power of two, first.
     pub fn sha256(&self, scale: f64) -> String {
         let mut hasher = Sha256::new();

@@ -153,11 +153,6 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
         let exact = f64::from(footprint_area(caster));
         let resolved = half.min_element() * samples as f32 >= 0.99 * SAMPLES;
         let torn = self.mapping.is_folded() && (norm / exact - 1.0).abs() > 2e-3;
-        if torn && resolved && samples < FINEST {
-            self.scratch.sampled = sampled;
-            self.sample(caster, at, half, (4 * samples).min(FINEST));
-            return;
-        }
         if norm <= 0.0 || resolved && (clipped || torn) {
             norm = exact;
         }
