@@ -36,8 +36,8 @@ const UPRIGHT: f32 = 0.02;
 const ROW_WIDTH: f32 = 7.0 / 12.0;
 /// Most rays along a side of a cell.
 const FINEST: u32 = 16;
-/// Footprints that span fewer cells than this are not bent by a crease of the map to any effect.
-const CREASE: f32 = 1.0;
+/// Footprints that span fewer cells than this from centre to rim are not sampled for lying across a crease.
+const CREASE: f32 = 1.4;
 /// Cells that a sampled footprint spans at least, from its centre to its rim.
 const SAMPLES: f32 = 2.0;
 

@@ -165,7 +165,8 @@ impl Extent {
     fn size(&self, cell: f64) -> [f64; 2] {
         let count = |length: f64| (length / cell * (1.0 - 1e-9)).ceil().max(1.0);
         match &self.shape {
-            Shape::Octahedral => [count(self.side); 2],
+            // Even, so that no cell lies across the edge between two octants along an axis.
+            Shape::Octahedral => [2.0 * (0.5 * count(self.side)).ceil(); 2],
             Shape::Polar(range) => [count(range.azimuth[1]), count(range.polar[1] - range.polar[0])],
             // One more cell on each side, so that light beside the window fades into full light.
             Shape::Planar { window: [low, high], .. } => {
