@@ -136,8 +136,7 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
                 };
                 // Beside some corners of a folded table, what lies beyond an edge lies within reach on this side too.
                 let direct = (0..columns).contains(&column) && (0..rows).contains(&row);
-                let (i, j) = (cell as i32 % columns, cell as i32 / columns);
-                if !direct && us.contains(&i) && vs.contains(&j) {
+                if !direct && us.contains(&(cell as i32 % columns)) && vs.contains(&(cell as i32 / columns)) {
                     continue;
                 }
                 let (weight, area, distance) = self.sample_cell(caster, cell, samples, false);
@@ -180,26 +179,27 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
     /// Mean weight of a cell, the area of the footprint that it covers, and the distance of the entry.
     fn sample_cell(&self, caster: &Caster, cell: u32, samples: u32, near: bool) -> (f32, f32, f32) {
         let parallel = self.mapping.is_parallel();
-        let centre = self.mapping.cell_ray(cell);
+        if samples == 1 {
+            let Some(s) = sample(caster, &self.mapping.cell_ray(cell), parallel, near) else { return (0.0, 0.0, 0.0) };
+            return (s.weight * s.gain, s.weight * s.jacobian / self.mapping.inverse_measure(cell), s.distance);
+        }
         let [columns, _] = self.mapping.size();
         let corner = Vec2::new((cell % columns) as f32, (cell / columns) as f32);
         let (mut weight, mut area, mut distance, mut total) = (0.0, 0.0, 0.0, 0.0);
         for k in 0..samples * samples {
-            let ray = if samples == 1 {
-                centre
-            } else {
-                let step = Vec2::new((k % samples) as f32 + 0.5, (k / samples) as f32 + 0.5);
-                self.mapping.ray(corner + step / samples as f32)
-            };
-            let density = if samples == 1 { 1.0 } else { self.mapping.density(&ray) };
+            let step = Vec2::new((k % samples) as f32 + 0.5, (k / samples) as f32 + 0.5);
+            let ray = self.mapping.ray(corner + step / samples as f32);
+            let density = self.mapping.density(&ray);
             total += density;
             let Some(s) = sample(caster, &ray, parallel, near) else { continue };
             weight += density * s.weight * s.gain;
             area += density * s.weight * s.jacobian;
             distance += density * s.weight * s.gain * s.distance;
         }
-        let mean_distance = if weight > 0.0 { distance / weight } else { 0.0 };
-        (weight / total, area / total * self.mapping.measure(cell) as f32, mean_distance)
+        if weight <= 0.0 {
+            return (0.0, 0.0, 0.0);
+        }
+        (weight / total, area / (total * self.mapping.inverse_measure(cell)), distance / weight)
     }
 
     #[inline]
