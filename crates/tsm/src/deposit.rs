@@ -119,6 +119,7 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
     /// Samples a footprint at the rays of cells (`samples`² rays a cell) within `half` of its centre.
     fn sample(&mut self, caster: &Caster, at: Vec2, half: Vec2, samples: u32) {
         let [columns, rows] = self.mapping.size().map(|n| n as i32);
+        // Across a fold columns and rows may change places.
         let reach = if self.mapping.is_folded() { Vec2::splat(half.max_element()) } else { half } * 1.2 + 0.5;
         let span = |centre: f32, reach: f32, n: i32| {
             if 2.0 * reach >= n as f32 { 0..n } else { (centre - reach).floor() as i32..(centre + reach).ceil() as i32 }
@@ -151,7 +152,7 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
         // of each ray instead.
         let exact = f64::from(footprint_area(caster));
         let resolved = half.min_element() * samples as f32 >= 0.99 * SAMPLES;
-        let torn = self.mapping.is_folded() && (norm / exact - 1.0).abs() > 2e-3;
+        let torn = self.mapping.is_folded() && (norm / exact - 1.0).abs() > 5e-3;
         if norm <= 0.0 || resolved && (clipped || torn) {
             norm = exact;
         }

@@ -119,18 +119,13 @@ pub fn project(
         size: camera.size,
         filter_sigma_px: params.resampling_sigma_px,
     };
-    let mut splats = vec![ProjectedSplat::default(); ids.len()];
-    splats.par_chunks_mut(CHUNK).zip(ids.par_chunks(CHUNK)).for_each(|(out, ids)| {
-        for (out, ids) in out.chunks_mut(BATCH).zip(ids.chunks(BATCH)) {
-            projector.batch(ids, out);
-        }
-    });
+    let batches: Vec<[ProjectedSplat; BATCH]> =
+        ids.par_chunks(BATCH).with_min_len(16).map(|ids| projector.batch(ids)).collect();
+    let mut splats = batches.into_flattened();
+    splats.truncate(ids.len());
     let perspective = (!camera.is_orthographic()).then_some(projector.focal);
     Projected { splats, perspective, size: camera.size }
 }
-
-/// Splats projected by one task.
-const CHUNK: usize = 1 << 13;
 
 /// Splats whose attributes are gathered together: ids in view order are far apart in memory, and the misses of a batch
 /// overlap.
@@ -151,7 +146,8 @@ struct Attributes {
 }
 
 impl Projector<'_> {
-    fn batch(&self, ids: &[u32], out: &mut [ProjectedSplat]) {
+    /// Footprints of at most a batch of splats; the rest of the array is empty.
+    fn batch(&self, ids: &[u32]) -> [ProjectedSplat; BATCH] {
         let c = self.cloud;
         let mut splats = [Attributes::default(); BATCH];
         // One loop a column: nothing in it waits for the splat before.
@@ -167,7 +163,9 @@ impl Projector<'_> {
         if !c.tangent.is_empty() {
             gather!(tangent);
         }
-        out.iter_mut().zip(&splats).for_each(|(out, s)| *out = self.project(s));
+        let mut out = [ProjectedSplat::default(); BATCH];
+        out.iter_mut().zip(&splats[..ids.len()]).for_each(|(out, s)| *out = self.project(s));
+        out
     }
 
     fn project(&self, splat: &Attributes) -> ProjectedSplat {
