@@ -81,3 +81,16 @@ fn bs09_an_empty_scene_is_the_background_exactly() {
         assert!(picture.channel(channel).iter().all(|v| *v == value), "{channel}");
     }
 }
+
+#[test]
+fn x7_explain_names_the_passes_that_render_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    for text in [scene("", "", ""), scene("visible = false", "", ""), scene("", "visible = false", "shadow = false")] {
+        std::fs::write(folder.path().join("s.toml"), &text).unwrap();
+        let out = organza().args(["explain", "s.toml", "--json"]).current_dir(&folder).output().unwrap();
+        let document: Value = serde_json::from_slice(&out.stdout).unwrap();
+        let planned = document["plan"]["passes"].as_array().unwrap();
+        let planned: Vec<&str> = planned.iter().map(|p| p["name"].as_str().unwrap()).collect();
+        assert_eq!(planned, passes(&text));
+    }
+}

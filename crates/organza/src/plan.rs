@@ -160,14 +160,15 @@ fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<PlannedPass> {
     for (i, _) in shadow_maps.iter().enumerate().filter(|(_, on)| **on) {
         passes.push(pass(pass::SHADOW_MAP, format!("light {i}")));
     }
-    if statistics.translucent > 0 {
-        passes.push(pass(pass::SORT, format!("{} translucent splats", statistics.translucent)));
+    let (translucent, opaque) = (statistics.translucent, statistics.opaque);
+    if translucent > 0 {
+        passes.push(pass(pass::SORT, format!("{translucent} translucent splats")));
     }
-    if statistics.opaque > 0 {
-        passes.push(pass(pass::OPAQUE, format!("{} opaque splats", statistics.opaque)));
-    }
-    if statistics.translucent > 0 {
-        passes.push(pass(pass::SPLAT, format!("{} translucent splats", statistics.translucent)));
+    for (n, name, kind) in [(opaque, pass::OPAQUE, "opaque"), (translucent, pass::SPLAT, "translucent")] {
+        if n > 0 {
+            passes.push(pass(pass::SHADE, format!("the {kind} splats in view")));
+            passes.push(pass(name, format!("{n} {kind} splats")));
+        }
     }
     passes.push(pass(pass::FINISH, "samples become pixels".into()));
     passes

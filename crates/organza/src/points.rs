@@ -77,6 +77,12 @@ impl Drawing<'_> {
         }
     }
 
+    /// How far the resampling filter widens a footprint, pixels.
+    fn filter_reach_px(&self) -> f64 {
+        let widest = self.loaded.footprints.layers().iter().map(|f| f.cutoff).fold(0.0, f32::max);
+        f64::from(widest * self.raster_params().resampling_sigma_px)
+    }
+
     /// One map for each light that the plan gives one.
     fn shadow_maps(&self, cost: &mut CostRecord) -> Result<Vec<Option<ShadowMap>>, Error> {
         let shadow = &self.settings.points.shadow;
@@ -128,7 +134,7 @@ impl Drawing<'_> {
             direction: points.direction,
             thickness: self.loaded.slice_thickness.map_or(hbsort::Thickness::Auto, hbsort::Thickness::World),
             exact: points.exact,
-            margin_px: 3.0,
+            margin_px: self.filter_reach_px(),
             ..hbsort::Params::default()
         };
         let order = cost.measure(pass::SORT, |stage| {
