@@ -164,3 +164,16 @@ fn ball_has_the_chord_convolved_with_its_kernel() {
     assert!(inside < 1e-3, "largest error inside {inside:e}");
     assert!(rim < 1e-2, "largest error at the rim {rim:e}");
 }
+
+#[test]
+fn fig_10_the_first_slices_alone_are_the_farthest_part() {
+    // Ten lattice layers, ten slices; the first five from the back hold half of the optical depth.
+    let text = slab(1.0, 0)
+        + "[render]\npoints = { direction = 'back_to_front', slice_thickness = 0.0499, first_slices = 5 }\n";
+    let alpha = window(&draw(&text, &[]).channel("A"), 96, 24..72, 24..72);
+    let (mean, _) = mean_and_ripple(&alpha);
+    assert!((1.0 - mean - (-0.5f64).exp()).abs() < 1e-5, "mean {mean}");
+    let depth = draw(&(text.replace("'back_to_front'", "'front_to_back'")), &["--layers", "depth"]);
+    let (nearest, _) = mean_and_ripple(&window(&depth.channel("depth.mean.Z"), 96, 24..72, 24..72));
+    assert!((nearest - (5.0 - 0.125)).abs() < 0.02, "front to back the first slices are the near half: {nearest}");
+}

@@ -30,7 +30,7 @@ pub enum LightShape {
     },
 }
 
-/// One light. Extended lights are several points; see `organza::lights`.
+/// One light. An extended light is several points, see `organza::scene::SceneLight`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Light {
     /// Where it comes from.
