@@ -20,19 +20,20 @@ fn bench(c: &mut Criterion) {
         let order = hbsort::slice_cloud(&cloud, None, &camera, &params, &mut hbsort::Scratch::default())
             .expect("finite splats sort");
         let ids = order.input_from_sorted;
-        let values = vec![0.5; 3 * ids.len()];
+        let values = vec![0.5; 3 * cloud.len()];
         let raster = Params::default();
         group.throughput(Throughput::Elements(ids.len() as u64));
         group.bench_function(BenchmarkId::new("project", n), |b| {
-            b.iter(|| black_box(project(&cloud, &ids, &camera, &scene.footprints, &scene.materials, &raster)));
+            b.iter(|| black_box(project(&cloud, &camera, &scene.footprints, &scene.materials, &raster)));
         });
-        let projected = project(&cloud, &ids, &camera, &scene.footprints, &scene.materials, &raster);
+        let projected = project(&cloud, &camera, &scene.footprints, &scene.materials, &raster);
         group.bench_function(BenchmarkId::new("fold", n), |b| {
             b.iter(|| {
                 let mut acc = Accumulator::new(camera.size, 1, 3, false, false);
                 let opaque = OpaqueImage::default();
                 fold(
                     &projected,
+                    &ids,
                     &values,
                     &scene.materials,
                     &opaque,

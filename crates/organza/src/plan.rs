@@ -51,6 +51,8 @@ pub mod pass {
     pub const SHADOW_MAP: &str = "tsm build";
     /// Translucent splats are culled and sliced.
     pub const SORT: &str = "hbsort";
+    /// Splats get their footprints.
+    pub const PROJECT: &str = "project";
     /// Splats get their radiance.
     pub const SHADE: &str = "shade";
     /// Opaque splats are resolved.
@@ -164,9 +166,10 @@ fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<PlannedPass> {
     if translucent > 0 {
         passes.push(pass(pass::SORT, format!("{translucent} translucent splats")));
     }
+    passes.push(pass(pass::PROJECT, "all splats".into()));
+    passes.push(pass(pass::SHADE, "the splats in view".into()));
     for (n, name, kind) in [(opaque, pass::OPAQUE, "opaque"), (translucent, pass::SPLAT, "translucent")] {
         if n > 0 {
-            passes.push(pass(pass::SHADE, format!("the {kind} splats in view")));
             passes.push(pass(name, format!("{n} {kind} splats")));
         }
     }

@@ -42,8 +42,9 @@ pub(crate) fn draw(drawing: &Drawing<'_>, cost: &mut CostRecord) -> Result<Layer
         camera: &camera,
     };
     let layout = ChannelLayout::new(&drawing.layers);
-    let opaque = drawing.opaque(&input, &layout, cost)?;
-    let accumulator = drawing.translucent(&input, &layout, &opaque, order, cost)?;
+    let shaded = drawing.shade(&input, &layout, cost)?;
+    let opaque = drawing.opaque(&shaded, cost)?;
+    let accumulator = drawing.translucent(&shaded, &opaque, &order, cost)?;
     let layers = cost.measure(pass::FINISH, |stage| {
         let background = Background { color: drawing.background };
         stage.items_in = u64::from(camera.size[0]) * u64::from(camera.size[1]);
@@ -157,48 +158,39 @@ impl Drawing<'_> {
         (0..kinds.len() as u32).filter(|&i| keep(kinds[i as usize])).collect()
     }
 
-    fn project(&self, ids: &[u32], camera: &Camera) -> Projected {
+    /// Footprints of all splats, and the radiance of those in view.
+    fn shade(&self, input: &ShadeInput<'_>, layout: &ChannelLayout, cost: &mut CostRecord) -> Result<Shaded, Error> {
+        self.tick()?;
         let l = self.loaded;
-        raster::project(&l.cloud, ids, camera, &l.footprints, &l.materials, &self.raster_params())
-    }
-
-    fn shade(
-        &self,
-        input: &ShadeInput<'_>,
-        ids: &[u32],
-        layout: &ChannelLayout,
-        cost: &mut CostRecord,
-    ) -> Result<Vec<f32>, Error> {
+        let projected = cost.measure(pass::PROJECT, |stage| {
+            let projected = raster::project(&l.cloud, input.camera, &l.footprints, &l.materials, &self.raster_params());
+            stage.items_in = l.cloud.len() as u64;
+            stage.items_out = projected.splats.iter().filter(|s| s.is_visible()).count() as u64;
+            stage.bytes = std::mem::size_of_val(projected.splats.as_slice()) as u64;
+            Ok::<_, Error>(projected)
+        })?;
+        self.tick()?;
         let values = cost.measure(pass::SHADE, |stage| {
-            let values = shade(input, ids, layout, self.progress);
-            stage.items_in = ids.len() as u64;
-            stage.items_out = ids.len() as u64;
+            let values = shade(input, &projected, layout, self.progress);
+            stage.items_in = projected.splats.iter().filter(|s| s.is_visible()).count() as u64;
+            stage.items_out = stage.items_in;
             stage.bytes = 4 * values.len() as u64;
             Ok::<_, Error>(values)
         })?;
         self.tick()?;
-        Ok(values)
+        Ok(Shaded { projected, values, channels: layout.count() })
     }
 
-    fn opaque(
-        &self,
-        input: &ShadeInput<'_>,
-        layout: &ChannelLayout,
-        cost: &mut CostRecord,
-    ) -> Result<OpaqueImage, Error> {
-        let mut ids = self.ids(|kind| kind == SplatKind::Opaque);
+    fn opaque(&self, shaded: &Shaded, cost: &mut CostRecord) -> Result<OpaqueImage, Error> {
+        let ids = self.ids(|kind| kind == SplatKind::Opaque);
         if ids.is_empty() {
             return Ok(OpaqueImage::default());
         }
-        self.tick()?;
-        let total = ids.len() as u64;
-        let mut projected = self.project(&ids, input.camera);
-        projected.retain_visible(&mut ids);
-        let values = self.shade(input, &ids, layout, cost)?;
         cost.measure(pass::OPAQUE, |stage| {
-            stage.items_in = total;
-            let (image, counts) =
-                raster::resolve_opaque(&projected, &values, layout.count(), self.layers.object, self.progress);
+            stage.items_in = ids.len() as u64;
+            let Shaded { projected, values, channels } = shaded;
+            let objects = self.layers.object;
+            let (image, counts) = raster::resolve_opaque(projected, &ids, values, *channels, objects, self.progress);
             record(stage, &counts);
             Ok(image)
         })
@@ -206,29 +198,27 @@ impl Drawing<'_> {
 
     fn translucent(
         &self,
-        input: &ShadeInput<'_>,
-        layout: &ChannelLayout,
+        shaded: &Shaded,
         opaque: &OpaqueImage,
-        order: SliceOrder,
+        order: &SliceOrder,
         cost: &mut CostRecord,
     ) -> Result<Accumulator, Error> {
-        let set = &self.layers;
-        let (planes, size) = (self.plan.optical_depth_planes, input.camera.size);
-        let mut accumulator = Accumulator::new(size, planes, layout.count(), set.depth, set.object);
+        let Shaded { projected, values, channels } = shaded;
+        let (planes, set) = (self.plan.optical_depth_planes, &self.layers);
+        let mut accumulator = Accumulator::new(projected.size, planes, *channels, set.depth, set.object);
         let ids = &order.input_from_sorted;
         if ids.is_empty() {
             return Ok(accumulator);
         }
         self.tick()?;
-        let values = self.shade(input, ids, layout, cost)?;
         cost.measure(pass::SPLAT, |stage| {
             stage.items_in = ids.len() as u64;
-            let projected = self.project(ids, input.camera);
-            let params = self.raster_params();
+            let (materials, params) = (&self.loaded.materials, self.raster_params());
             let counts = raster::fold(
-                &projected,
-                &values,
-                &self.loaded.materials,
+                projected,
+                ids,
+                values,
+                materials,
                 opaque,
                 order.direction,
                 &params,
@@ -241,6 +231,13 @@ impl Drawing<'_> {
         self.tick()?;
         Ok(accumulator)
     }
+}
+
+/// Splats ready to be composited, by id.
+struct Shaded {
+    projected: Projected,
+    values: Vec<f32>,
+    channels: usize,
 }
 
 fn record(stage: &mut StageCost, counts: &RasterCounts) {

@@ -62,20 +62,12 @@ fn rasterize(cloud: &Cloud, camera: &Camera, materials: &[Material], planes: usi
     }
     let opaque: Vec<u32> = (0..cloud.len() as u32).filter(|i| cloud.kind[*i as usize] == SplatKind::Opaque).collect();
     let (footprints, params) = (FootprintStack::default(), Params { transmittance_cutoff: 0.0, ..Params::default() });
-    let projected = |ids: &[u32]| project(cloud, ids, camera, &footprints, materials, &params);
-    let values = |ids: &[u32]| ids.iter().flat_map(|i| cloud.color[*i as usize]).collect::<Vec<f32>>();
-    let (solid, _) = resolve_opaque(&projected(&opaque), &values(&opaque), 3, false, &Progress::new());
+    let projected = project(cloud, camera, &footprints, materials, &params);
+    let values: Vec<f32> = cloud.color.iter().flatten().copied().collect();
+    let progress = Progress::new();
+    let (solid, _) = resolve_opaque(&projected, &opaque, &values, 3, false, &progress);
     let mut acc = Accumulator::new(SIZE, planes, 3, false, false);
-    fold(
-        &projected(&translucent),
-        &values(&translucent),
-        materials,
-        &solid,
-        direction,
-        &params,
-        &mut acc,
-        &Progress::new(),
-    );
+    fold(&projected, &translucent, &values, materials, &solid, direction, &params, &mut acc, &progress);
     finish(acc, &solid)
 }
 

@@ -1,6 +1,6 @@
 //! CPU rasterization of footprints: tiled, parallel, bit-identical for any thread count.
 //!
-//! 1. [`project`] turns splats into image-space footprints: exact in perspective for media (the squared distance of a
+//! 1. [`project`] turns all splats into image-space footprints: exact in perspective for media (the squared distance of a
 //!    ray from a centre is a quadratic form in the pixel offset over |d|²), an affine conic for tangent discs.
 //! 2. [`resolve_opaque`] finds the nearest opaque surface of each pixel by ε-z and normalised weights Σwc/Σw.
 //! 3. [`fold`] composites translucent splats in a [`crate::SliceOrder`] in front of it.

@@ -6,6 +6,7 @@
 //! Media: L = ω·c·p(θ)·E, single scattering, or the surface form when they have a normal and ask for Phong.
 //! E is the irradiance of a light times its transmittance; ambient radiance adds ρ·L_ambient.
 
+use crate::raster::Projected;
 use crate::{
     Camera, Cloud, LayerSet, Light, Material, Object, Progress, Receiver, Shading, SplatKind, Transmittance,
     henyey_greenstein,
@@ -81,24 +82,27 @@ pub struct ShadeInput<'a> {
     pub camera: &'a Camera,
 }
 
-/// Values of the splats `ids`, `layout.count()` numbers each, in the order of `ids`. After
+/// Values of all splats that `projected` shows, `layout.count()` numbers each, by id; 0 for the others. After
 /// `progress.cancel()` the rest stays 0.
 ///
 /// # Panics
-/// If an id, material or object of the cloud is out of range.
-pub fn shade(input: &ShadeInput<'_>, ids: &[u32], layout: &ChannelLayout, progress: &Progress) -> Vec<f32> {
+/// If a material or object of the cloud is out of range, or `projected` is of another cloud.
+pub fn shade(input: &ShadeInput<'_>, projected: &Projected, layout: &ChannelLayout, progress: &Progress) -> Vec<f32> {
+    assert_eq!(projected.splats.len(), input.cloud.len(), "invariant: one footprint a splat");
     let channels = layout.count();
     let eye = (input.camera.position - input.cloud.origin).as_vec3();
     let lights: Vec<LocalLight<'_>> = input.lights.iter().map(|l| LocalLight::new(l, input.cloud.origin)).collect();
-    let mut values = vec![0.0; ids.len() * channels];
-    values.par_chunks_mut(CHUNK * channels).zip(ids.par_chunks(CHUNK)).for_each(|(values, ids)| {
+    let mut values = vec![0.0; input.cloud.len() * channels];
+    values.par_chunks_mut(CHUNK * channels).enumerate().for_each(|(chunk, values)| {
         if progress.is_cancelled() {
             return;
         }
-        for (out, &i) in values.chunks_exact_mut(channels).zip(ids) {
-            let point = Point::new(input, i as usize, eye);
-            let shaded = point.shade(input, &lights);
-            shaded.write(out, layout, point.normal);
+        for (k, out) in values.chunks_exact_mut(channels).enumerate() {
+            let i = chunk * CHUNK + k;
+            if projected.is_visible(i) {
+                let point = Point::new(input, i, eye);
+                point.shade(input, &lights).write(out, layout, point.normal);
+            }
         }
     });
     values

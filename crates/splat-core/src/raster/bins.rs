@@ -3,7 +3,7 @@
 //! Splats are binned in chunks of fixed size, each with its own lists; a tile's list is the lists of all chunks one
 //! after the other. So chunks are binned in parallel without a shared buffer, and the order never depends on threads.
 
-use super::{Projected, ProjectedSplat};
+use super::Projected;
 use rayon::prelude::*;
 
 /// Side of a tile, pixels.
@@ -26,7 +26,7 @@ struct ChunkLists {
 }
 
 impl Bins {
-    /// The splats of tile `t` in list order, as indices into the projected list, a slice a chunk.
+    /// The splats of tile `t` in list order, as ids, a slice a chunk.
     pub(crate) fn tile(&self, t: usize) -> impl Iterator<Item = &[u32]> {
         self.chunks.iter().map(move |c| &c.entries[c.starts[t] as usize..c.starts[t + 1] as usize])
     }
@@ -49,32 +49,29 @@ impl Bins {
     }
 }
 
-/// Bins the projected splats.
-pub(crate) fn bin(projected: &Projected) -> Bins {
+/// Bins the splats `ids`, in that order.
+pub(crate) fn bin(projected: &Projected, ids: &[u32]) -> Bins {
     let columns = (projected.size[0] as usize).div_ceil(TILE);
     let rows = (projected.size[1] as usize).div_ceil(TILE);
-    let chunks = projected
-        .splats
-        .par_chunks(CHUNK)
-        .enumerate()
-        .map(|(k, chunk)| bin_chunk(chunk, (k * CHUNK) as u32, columns, columns * rows))
-        .collect();
+    let chunks = ids.par_chunks(CHUNK).map(|ids| bin_chunk(projected, ids, columns, columns * rows)).collect();
     Bins { columns, rows, chunks }
 }
 
-fn bin_chunk(chunk: &[ProjectedSplat], first: u32, columns: usize, tiles: usize) -> ChunkLists {
+fn bin_chunk(projected: &Projected, ids: &[u32], columns: usize, tiles: usize) -> ChunkLists {
+    // One loop that waits for nothing but memory: the splats lie far apart.
+    let bounds: Vec<[u16; 4]> = ids.iter().map(|&i| projected.splats[i as usize].bounds).collect();
     // starts[t + 1] first counts, then is the end of the tile before, then the running end of tile t.
     let mut starts = vec![0u32; tiles + 2];
-    for splat in chunk {
-        for_each_tile(splat, columns, |t| starts[t + 2] += 1);
+    for bounds in &bounds {
+        for_each_tile(bounds, columns, |t| starts[t + 2] += 1);
     }
     for t in 2..starts.len() {
         starts[t] += starts[t - 1];
     }
     let mut entries = vec![0u32; starts[tiles + 1] as usize];
-    for (j, splat) in chunk.iter().enumerate() {
-        for_each_tile(splat, columns, |t| {
-            entries[starts[t + 1] as usize] = first + j as u32;
+    for (bounds, &id) in bounds.iter().zip(ids) {
+        for_each_tile(bounds, columns, |t| {
+            entries[starts[t + 1] as usize] = id;
             starts[t + 1] += 1;
         });
     }
@@ -83,8 +80,8 @@ fn bin_chunk(chunk: &[ProjectedSplat], first: u32, columns: usize, tiles: usize)
 }
 
 #[inline(always)]
-fn for_each_tile(splat: &ProjectedSplat, columns: usize, mut visit: impl FnMut(usize)) {
-    let [x0, x1, y0, y1] = splat.bounds.map(usize::from);
+fn for_each_tile(bounds: &[u16; 4], columns: usize, mut visit: impl FnMut(usize)) {
+    let [x0, x1, y0, y1] = bounds.map(usize::from);
     if x0 < x1 {
         for row in y0 / TILE..=(y1 - 1) / TILE {
             for column in x0 / TILE..=(x1 - 1) / TILE {
@@ -97,14 +94,16 @@ fn for_each_tile(splat: &ProjectedSplat, columns: usize, mut visit: impl FnMut(u
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::raster::ProjectedSplat;
 
     #[test]
     fn every_splat_is_listed_once_in_each_tile_that_it_touches() {
         let splat = |bounds| ProjectedSplat { bounds, ..ProjectedSplat::default() };
         let splats = vec![splat([0, 1, 0, 1]), splat([31, 33, 0, 1]), splat([0, 0, 0, 0]), splat([0, 64, 0, 64])];
-        let bins = bin(&Projected { splats, perspective: None, size: [64, 64] });
+        let projected = Projected { splats, perspective: None, size: [64, 64] };
+        let bins = bin(&projected, &[3, 0, 2, 1]);
         let lists: Vec<Vec<u32>> = (0..bins.tiles()).map(|t| bins.tile(t).flatten().copied().collect()).collect();
-        assert_eq!(lists, [vec![0, 1, 3], vec![1, 3], vec![3], vec![3]]);
+        assert_eq!(lists, [vec![3, 0, 1], vec![3, 1], vec![3], vec![3]]);
         assert_eq!(bins.entries(), 7);
     }
 }

@@ -42,19 +42,20 @@ struct OpaqueTile {
     fragments: u64,
 }
 
-/// Resolves the opaque splats of `projected`; `values` holds `channels` numbers a splat, in list order. Object ids are kept
+/// Resolves the opaque splats `ids`; `values` holds `channels` numbers a splat, by id. Object ids are kept
 /// when `objects` asks for them. After `progress.cancel()` the remaining tiles stay empty.
 pub fn resolve_opaque(
     projected: &Projected,
+    ids: &[u32],
     values: &[f32],
     channels: usize,
     objects: bool,
     progress: &Progress,
 ) -> (OpaqueImage, RasterCounts) {
-    if projected.splats.is_empty() {
+    if ids.is_empty() {
         return (OpaqueImage::default(), RasterCounts::default());
     }
-    let bins = bin(projected);
+    let bins = bin(projected, ids);
     let tiles: Vec<OpaqueTile> = (0..bins.tiles())
         .into_par_iter()
         .filter(|&t| !bins.is_empty(t) && !progress.is_cancelled())
@@ -82,7 +83,7 @@ pub fn resolve_opaque(
         });
     }
     let counts = RasterCounts {
-        splats: projected.splats.iter().filter(|s| s.bounds[0] < s.bounds[1]).count() as u64,
+        splats: ids.iter().filter(|i| projected.is_visible(**i as usize)).count() as u64,
         tile_entries: bins.entries(),
         fragments: tiles.iter().map(|t| t.fragments).sum(),
         bytes: bins.bytes() + (n * 4 * (channels + 2)) as u64,

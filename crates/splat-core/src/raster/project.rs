@@ -42,7 +42,7 @@ pub struct ProjectedSplat {
     pub kind: SplatKind,
 }
 
-/// Footprints of a list of splats, in the order of the list.
+/// Footprints of all splats of a cloud, by id; those that no pixel shows are empty.
 #[derive(Debug, Clone, Default)]
 pub struct Projected {
     /// The footprints.
@@ -54,15 +54,16 @@ pub struct Projected {
 }
 
 impl Projected {
-    /// Drops what has no pixel, in step with the list of ids that it was made from.
-    ///
-    /// # Panics
-    /// If `ids` is not as long as the list.
-    pub fn retain_visible(&mut self, ids: &mut Vec<u32>) {
-        assert_eq!(ids.len(), self.splats.len(), "invariant: one footprint an id");
-        let mut visible = self.splats.iter().map(|s| s.bounds[0] < s.bounds[1]);
-        ids.retain(|_| visible.next().unwrap_or(false));
-        self.splats.retain(|s| s.bounds[0] < s.bounds[1]);
+    /// Whether splat `i` covers a pixel's rectangle at all.
+    pub fn is_visible(&self, i: usize) -> bool {
+        self.splats[i].is_visible()
+    }
+}
+
+impl ProjectedSplat {
+    /// Whether the footprint has any pixel.
+    pub fn is_visible(&self) -> bool {
+        self.bounds[0] < self.bounds[1]
     }
 }
 
@@ -87,13 +88,15 @@ struct ProjectedFootprint {
     norm: f32,
 }
 
-/// Projects the splats `ids` of `cloud`.
+/// Projects all splats of `cloud`.
+///
+/// In the order of ids, which is that of memory: splats in view order lie far apart, and gathering their attributes one
+/// column at a time would cost more than projecting those that turn out to be hidden.
 ///
 /// # Panics
-/// If an id, a material or a footprint of the cloud is out of range; `Cloud::validate` and the tables promise it is not.
+/// If a material or a footprint of the cloud is out of range; `Cloud::validate` and the tables promise it is not.
 pub fn project(
     cloud: &Cloud,
-    ids: &[u32],
     camera: &Camera,
     footprints: &FootprintStack,
     materials: &[Material],
@@ -119,65 +122,23 @@ pub fn project(
         size: camera.size,
         filter_sigma_px: params.resampling_sigma_px,
     };
-    let batches: Vec<[ProjectedSplat; BATCH]> =
-        ids.par_chunks(BATCH).with_min_len(16).map(|ids| projector.batch(ids)).collect();
-    let mut splats = batches.into_flattened();
-    splats.truncate(ids.len());
+    let splats = (0..cloud.len()).into_par_iter().with_min_len(4096).map(|i| projector.project(i)).collect();
     let perspective = (!camera.is_orthographic()).then_some(projector.focal);
     Projected { splats, perspective, size: camera.size }
 }
 
-/// Splats whose attributes are gathered together: ids in view order are far apart in memory, and the misses of a batch
-/// overlap.
-const BATCH: usize = 64;
-
-/// What projection reads of one splat.
-#[derive(Clone, Copy, Default)]
-struct Attributes {
-    position: Vec3,
-    radius: f32,
-    cross_section: f32,
-    normal: Vec3,
-    tangent: Vec3,
-    kind: SplatKind,
-    material: u16,
-    footprint: u8,
-    object: u32,
-}
-
 impl Projector<'_> {
-    /// Footprints of at most a batch of splats; the rest of the array is empty.
-    fn batch(&self, ids: &[u32]) -> [ProjectedSplat; BATCH] {
-        let c = self.cloud;
-        let mut splats = [Attributes::default(); BATCH];
-        // One loop a column: nothing in it waits for the splat before.
-        macro_rules! gather {
-            ($($column:ident),*) => {$(
-                splats.iter_mut().zip(ids).for_each(|(s, &i)| s.$column = c.$column[i as usize]);
-            )*};
-        }
-        gather!(position, radius, cross_section, kind, material, footprint, object);
-        if !c.normal.is_empty() {
-            gather!(normal);
-        }
-        if !c.tangent.is_empty() {
-            gather!(tangent);
-        }
-        let mut out = [ProjectedSplat::default(); BATCH];
-        out.iter_mut().zip(&splats[..ids.len()]).for_each(|(out, s)| *out = self.project(s));
-        out
-    }
-
-    fn project(&self, splat: &Attributes) -> ProjectedSplat {
-        let center = self.view.apply(splat.position);
-        let radius = splat.radius;
+    fn project(&self, i: usize) -> ProjectedSplat {
+        let cloud = self.cloud;
+        let center = self.view.apply(cloud.position[i]);
+        let radius = cloud.radius[i];
         // A splat around the eye has no image; it is left out as a whole.
         if !self.orthographic && center.z <= radius {
             return ProjectedSplat::default();
         }
-        let kind = splat.kind;
+        let kind = cloud.kind[i];
         let px_per_world = if self.orthographic { self.focal } else { self.focal / center.z };
-        let footprint = &self.footprints[splat.footprint as usize];
+        let footprint = &self.footprints[cloud.footprint[i] as usize];
         let filter_px = footprint.cutoff * self.filter_sigma_px;
         let mut out = ProjectedSplat {
             center_px: self.image_position(center, px_per_world),
@@ -185,15 +146,15 @@ impl Projector<'_> {
             depth_extent: radius,
             sharpness: footprint.sharpness,
             rim: footprint.rim,
-            object: splat.object,
-            material: splat.material,
+            object: cloud.object[i],
+            material: cloud.material[i],
             kind,
             ..ProjectedSplat::default()
         };
         match kind {
-            SplatKind::Medium => self.medium(&mut out, splat, center, px_per_world, filter_px, footprint.norm),
+            SplatKind::Medium => self.medium(&mut out, i, center, px_per_world, filter_px, footprint.norm),
             SplatKind::Surface | SplatKind::Opaque => {
-                self.disc(&mut out, splat, center, px_per_world, filter_px, footprint.norm)
+                self.disc(&mut out, i, center, px_per_world, filter_px, footprint.norm)
             }
         }
         self.clip(&mut out, radius / center.z.abs().max(radius));
@@ -204,19 +165,19 @@ impl Projector<'_> {
         [self.half.x + center.x * px_per_world, self.half.y - center.y * px_per_world]
     }
 
-    fn medium(&self, out: &mut ProjectedSplat, s: &Attributes, c: Vec3, px_per_world: f32, filter_px: f32, norm: f32) {
+    fn medium(&self, out: &mut ProjectedSplat, i: usize, c: Vec3, px_per_world: f32, filter_px: f32, norm: f32) {
         let filter_world = filter_px / px_per_world;
-        let radius_sq = s.radius * s.radius + filter_world * filter_world;
+        let radius_sq = self.cloud.radius[i] * self.cloud.radius[i] + filter_world * filter_world;
         let scale = 1.0 / (px_per_world * px_per_world * radius_sq);
         let (u, v) = if self.orthographic { (0.0, 0.0) } else { (c.x / c.z, c.y / c.z) };
         // y runs down in the image, so the mixed term changes its sign.
         out.conic = [(1.0 + v * v) * scale, u * v * scale, (1.0 + u * u) * scale];
-        out.peak = s.cross_section * norm / radius_sq;
+        out.peak = self.cloud.cross_section[i] * norm / radius_sq;
     }
 
-    fn disc(&self, out: &mut ProjectedSplat, s: &Attributes, c: Vec3, px_per_world: f32, filter_px: f32, norm: f32) {
-        let normal = self.view.rotation * s.normal;
-        let (axis_u, axis_v) = self.disc_axes(s, normal);
+    fn disc(&self, out: &mut ProjectedSplat, i: usize, c: Vec3, px_per_world: f32, filter_px: f32, norm: f32) {
+        let normal = self.view.rotation * self.cloud.normal_of(i);
+        let (axis_u, axis_v) = self.disc_axes(i, normal);
         let to_image = |a: Vec3| {
             // d(x/z) = (dx − (x/z)·dz)/z; parallel rays have no dz term.
             let (u, v) = if self.orthographic { (0.0, 0.0) } else { (c.x / c.z, c.y / c.z) };
@@ -241,17 +202,17 @@ impl Projector<'_> {
         let view_dir = if self.orthographic { Vec3::Z } else { c / c.length() };
         let cosine = normal.dot(view_dir);
         let factor = if out.kind == SplatKind::Surface {
-            self.materials[s.material as usize].surface_opacity.optical_depth_factor(cosine)
+            self.materials[out.material as usize].surface_opacity.optical_depth_factor(cosine)
         } else {
             1.0
         };
-        out.peak = s.cross_section * norm / radius_sq * spread * factor;
+        out.peak = self.cloud.cross_section[i] * norm / radius_sq * spread * factor;
         out.depth_slope = self.plane_slope(normal, c, px_per_world);
     }
 
     /// Semi-axes of the disc in view space.
-    fn disc_axes(&self, s: &Attributes, normal: Vec3) -> (Vec3, Vec3) {
-        let (radius, tangent) = (s.radius, s.tangent);
+    fn disc_axes(&self, i: usize, normal: Vec3) -> (Vec3, Vec3) {
+        let (radius, tangent) = (self.cloud.radius[i], self.cloud.tangent_of(i));
         if tangent == Vec3::ZERO {
             let u = normal.any_orthonormal_vector();
             (u * radius, normal.cross(u) * radius)

@@ -41,9 +41,9 @@ struct Moments {
     m2: Vec<f32>,
 }
 
-/// Folds `projected`, already in compositing order, into `accumulator`.
+/// Folds the splats `order`, ids in compositing order, into `accumulator`.
 ///
-/// `values` holds as many numbers a splat as the accumulator has channels, in list order. `materials` gives the
+/// `values` holds as many numbers a splat as the accumulator has channels, by id. `materials` gives the
 /// extinction per channel; with one plane of optical depth, which is for materials that absorb all channels alike, the
 /// first channel's counts. Front to back can continue an
 /// accumulator that holds nearer splats; back to front can continue one that holds farther ones. First and median depth
@@ -53,6 +53,7 @@ struct Moments {
 /// If sizes of the image, the accumulator and `values` disagree.
 pub fn fold(
     projected: &Projected,
+    order: &[u32],
     values: &[f32],
     materials: &[Material],
     opaque: &OpaqueImage,
@@ -63,7 +64,7 @@ pub fn fold(
 ) -> RasterCounts {
     assert_eq!(projected.size, accumulator.size, "invariant: one image size");
     assert_eq!(values.len(), projected.splats.len() * accumulator.channels.len(), "invariant: values for each splat");
-    let bins = bin(projected);
+    let bins = bin(projected, order);
     let finished: Vec<Tile> = (0..bins.tiles())
         .into_par_iter()
         .filter(|&t| !bins.is_empty(t) && !progress.is_cancelled())
@@ -84,7 +85,7 @@ pub fn fold(
         })
         .collect();
     let mut counts = RasterCounts {
-        splats: projected.splats.iter().filter(|s| s.bounds[0] < s.bounds[1]).count() as u64,
+        splats: order.iter().filter(|i| projected.is_visible(**i as usize)).count() as u64,
         tile_entries: bins.entries(),
         bytes: bins.bytes() + std::mem::size_of_val(projected.splats.as_slice()) as u64,
         ..RasterCounts::default()
