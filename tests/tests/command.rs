@@ -196,6 +196,8 @@ fn exit_5_bi26_limits_are_checked_before_the_work() {
     let place = Place::new();
     place.expect(5, &["render", "s.toml", "--max-memory", "10K"], "the limit is 10240");
     place.expect(5, &["render", "s.toml", "--max-memory", "1G", "--size", "65536x65536"], "the limit is 1073741824");
+    // 2 x 2 samples a pixel.
+    place.expect(5, &["render", "s.toml", "--size", "40000x1"], "needs 80000 samples, the limit is 65535");
     assert!(place.made().is_empty());
 }
 

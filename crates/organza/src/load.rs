@@ -5,7 +5,7 @@ mod object;
 use crate::scene::Scene;
 use crate::{Error, Progress, RenderOptions, normalize::normalize};
 use glam::DVec3;
-use splat_core::{Camera, Cloud, FootprintStack, Light, Material, Object, Shading};
+use splat_core::{Camera, Cloud, FootprintStack, Light, Material, Object};
 use std::cmp::Ordering;
 
 /// A scene in memory, normalized by a power of two (see [`Loaded::exponent`]) and ready for a technique.
@@ -27,7 +27,7 @@ pub struct Loaded {
     pub casts: Vec<bool>,
     /// Slice thickness asked for, in the scale of the cloud.
     pub slice_thickness: Option<f64>,
-    /// Whether normals were computed where the data has none.
+    /// Whether normals were computed from the gradients of some volume.
     pub normals: bool,
     /// Lengths were multiplied by 2^−exponent.
     pub exponent: i32,
@@ -41,14 +41,13 @@ pub struct Loaded {
 /// See [`crate::render`].
 pub fn load(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Loaded, Error> {
     let mut warnings = Vec::new();
-    let normals = normals_needed(scene);
     progress.add_total(scene.objects.len() as u64);
     let mut clouds = Vec::new();
     for (id, object) in scene.objects.iter().enumerate() {
         progress.tick(1).map_err(|_| Error::Cancelled)?;
         if object.visible {
             let used: u64 = clouds.iter().map(Cloud::bytes).sum();
-            let context = object::Context { scene, options, id, normals, used };
+            let context = object::Context { scene, options, id, used };
             clouds.push(object::convert(object, &context, &mut warnings)?);
         }
     }
@@ -70,17 +69,10 @@ pub fn load(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Resu
         lights,
         casts,
         slice_thickness: scene.render.points.slice_thickness.map(|e| e * f64::from(-exponent).exp2()),
-        normals,
+        normals: scene.objects.iter().any(|o| o.visible && object::needs_gradients(o, scene)),
         exponent,
         warnings,
     })
-}
-
-/// Whether a normal could change the picture: a lit Phong material somewhere, or a layer of normals.
-fn normals_needed(scene: &Scene) -> bool {
-    let lit = !scene.lights.is_empty();
-    let phong = |o: &crate::scene::SceneObject| scene.materials[o.material].material.shading == Shading::Phong;
-    scene.render.layers.set().normal || (lit && scene.objects.iter().any(|o| o.visible && phong(o)))
 }
 
 /// One cloud around the least of all origins: a place that does not depend on the order of objects, and that moves with
@@ -99,6 +91,6 @@ fn merge(clouds: Vec<Cloud>) -> Cloud {
 fn lights(scene: &Scene) -> (Vec<Light>, Vec<bool>) {
     let mut all: Vec<(Light, bool)> =
         scene.lights.iter().flat_map(|l| l.points().into_iter().map(|p| (p, l.shadow))).collect();
-    all.sort_by_cached_key(|(light, casts)| (format!("{light:?}"), *casts));
+    all.sort_by_cached_key(|(light, casts)| (light.bits(), *casts));
     all.into_iter().unzip()
 }

@@ -124,9 +124,9 @@ fn colored_extinction(statistics: &Statistics) -> Effect {
 
 fn normals(statistics: &Statistics) -> Effect {
     if statistics.normals_needed {
-        effect("normals of volumes", true, "a light or ambient radiance shades them")
+        effect("normals of volumes", true, "a light shades a volume by its gradient, or the layer was asked for")
     } else {
-        effect("normals of volumes", false, "nothing that is lit uses a normal, and none is asked for")
+        effect("normals of volumes", false, "no volume is shaded by its gradient, and none is asked for")
     }
 }
 

@@ -88,6 +88,7 @@ fn prepare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Resul
     let mut cost = CostRecord::default();
     let image = image_bytes(scene);
     check_memory("the image", image, options.max_memory)?;
+    check_samples(scene)?;
     let loaded = cost.measure(pass::CONVERT, |stage| {
         let loaded = load(scene, options, progress)?;
         stage.items_in = scene.objects.iter().filter(|o| o.visible).count() as u64;
@@ -107,6 +108,22 @@ fn prepare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Resul
     check_memory("rendering", memory, options.max_memory)?;
     let warnings = loaded.warnings.clone();
     Ok((loaded, Explanation { plan, cost, memory, warnings }))
+}
+
+/// Footprints keep their pixel rectangles in 16 bits.
+fn check_samples(scene: &Scene) -> Result<(), Error> {
+    let longest = scene.camera.size[0].max(scene.camera.size[1]);
+    let (needed, limit) = (u64::from(longest) * u64::from(scene.render.antialias), u64::from(u16::MAX));
+    if needed <= limit {
+        return Ok(());
+    }
+    Err(Error::Limit {
+        what: "the longer side of the image".into(),
+        needed,
+        limit,
+        unit: "samples",
+        hint: "use a smaller camera.size or render.antialias".into(),
+    })
 }
 
 /// Bytes of the accumulators and layers.

@@ -39,9 +39,4 @@ impl CostRecord {
         self.stages.push(stage);
         Ok(out)
     }
-
-    /// How often stages of this name ran.
-    pub fn passes(&self, name: &str) -> u64 {
-        self.stages.iter().filter(|s| s.name == name).map(|s| s.passes).sum()
-    }
 }

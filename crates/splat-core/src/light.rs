@@ -70,6 +70,17 @@ impl Light {
         Ok(())
     }
 
+    /// Shape and intensity as bits, the same for equal lights alone: a key that puts lights in an order of their own.
+    pub fn bits(&self) -> (u8, [u64; 8], [u32; 3]) {
+        let (kind, p, d, angles) = match self.shape {
+            LightShape::Point { position } => (0, position, DVec3::ZERO, [0.0; 2]),
+            LightShape::Directional { direction } => (1, DVec3::ZERO, direction, [0.0; 2]),
+            LightShape::Spot { position, direction, inner, outer } => (2, position, direction, [inner, outer]),
+        };
+        let shape = [p.x, p.y, p.z, d.x, d.y, d.z, angles[0], angles[1]];
+        (kind, shape.map(f64::to_bits), self.intensity.map(f32::to_bits))
+    }
+
     /// Direction from `p` to the light, and the unshadowed irradiance per channel on a plane that faces it, W/m².
     ///
     /// `spread` is the standard deviation σ of the splat that receives the light, world units; 0 for a bare point. A

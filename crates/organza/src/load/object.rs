@@ -23,8 +23,6 @@ pub(super) struct Context<'a> {
     pub(super) options: &'a RenderOptions,
     /// Rank of the object.
     pub(super) id: usize,
-    /// Whether normals are computed where the data has none.
-    pub(super) normals: bool,
     /// Bytes that earlier objects take.
     pub(super) used: u64,
 }
@@ -36,6 +34,13 @@ pub(super) fn entry(object: &SceneObject) -> Object {
         casts_shadow: object.casts_shadow,
         shadow_coefficient: object.shadow_coefficient,
     }
+}
+
+/// Whether the gradients of the object's volume could change the picture: lit by Phong, or in a layer of normals.
+pub(super) fn needs_gradients(object: &SceneObject, scene: &Scene) -> bool {
+    let is_volume = matches!(object.source, Source::Volume(_) | Source::Density(_) | Source::Cloud(_));
+    let lit = !scene.lights.is_empty() && scene.materials[object.material].material.shading == Shading::Phong;
+    is_volume && (lit || scene.render.layers.set().normal)
 }
 
 /// Reads and converts one object.
@@ -217,8 +222,7 @@ impl Context<'_> {
 
     /// Parameters of a volume: normals only where they are used.
     fn volume_params(&self, splat: SplatParams) -> VolumeParams {
-        let material = &self.scene.materials[splat.material as usize].material;
-        let normals = self.normals && (material.shading == Shading::Phong || self.scene.render.layers.set().normal);
+        let normals = needs_gradients(&self.scene.objects[self.id], self.scene);
         VolumeParams { splat, normals, ..VolumeParams::default() }
     }
 
