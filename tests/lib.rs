@@ -60,14 +60,18 @@ impl Picture {
 
 /// Runs `organza render` on a scene text and reads the EXR file.
 pub fn draw(scene: &str, arguments: &[&str]) -> Picture {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    draw_in(tempfile::tempdir().unwrap().path(), scene, arguments)
+}
+
+/// [`draw`] in a folder that holds the scene's data.
+pub fn draw_in(folder: &Path, scene: &str, arguments: &[&str]) -> Picture {
+    std::fs::write(folder.join("scene.toml"), scene).unwrap();
     let mut command = organza();
-    command.args(["render", "scene.toml", "-o", "out.exr"]).args(arguments).current_dir(&folder);
+    command.args(["render", "scene.toml", "-o", "out.exr"]).args(arguments).current_dir(folder);
     let out = command.output().unwrap();
     assert!(out.status.success(), "{}\n{scene}", String::from_utf8_lossy(&out.stderr));
     let reader = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
-    let image = reader.from_file(folder.path().join("out.exr")).unwrap();
+    let image = reader.from_file(folder.join("out.exr")).unwrap();
     let layer = image.layer_data;
     let channels = layer.channel_data.list.iter();
     Picture {

@@ -93,7 +93,7 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
         let half_v = spread.vv.sqrt().max(LEAST_HALF);
         let vs = Shares::new(at.y, half_v);
         let area = if self.mapping.is_parallel() { 1.0 } else { distance * distance };
-        let total = caster.cross_section * angle_gain(caster) / area;
+        let total = caster.cross_section * angle_gain(caster, self.mapping.is_parallel()) / area;
         let mut slant = spread.uv / (half_v * half_v);
         if slant.abs() * half_v < UPRIGHT {
             slant = 0.0;
@@ -278,11 +278,16 @@ fn footprint_area(caster: &Caster) -> f32 {
 
 /// g: the area that the light sees per area of the disc, times the growth of opacity at that angle.
 #[inline]
-fn angle_gain(caster: &Caster) -> f32 {
+fn angle_gain(caster: &Caster, parallel: bool) -> f32 {
     if caster.kind == SplatKind::Medium {
         return 1.0;
     }
-    let cosine = (caster.position.dot(caster.normal) / caster.position.length()).abs();
+    // Parallel light travels along the frame's z.
+    let cosine = if parallel {
+        caster.normal.z.abs()
+    } else {
+        (caster.position.dot(caster.normal) / caster.position.length()).abs()
+    };
     cosine * caster.extinction.opacity.optical_depth_factor(cosine)
 }
 
