@@ -1,0 +1,196 @@
+//! The same object in many forms: mesh, implicit surface, raw points; grid, formula, lattice. Through the whole command,
+//! all forms of a shape show its transmittance and cast its shadow, and come together as their resolution rises.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+#[path = "many_forms/shape.rs"]
+mod shape;
+#[path = "many_forms/write.rs"]
+mod write;
+
+use organza_tests::{draw_in, parallel_view, window};
+use shape::{Rays, Shape};
+use std::path::Path;
+
+/// Height of the view, world units.
+const HEIGHT: f64 = 2.6;
+/// Extinction of solids, opacity of one crossing of shells.
+const EXTINCTION: f64 = 0.8;
+const OPACITY: f64 = 0.3;
+/// Where a shape stands whose shadow falls to the middle of the wall, along (0, −1, −1).
+const LIFT: f64 = 3.0;
+const WALL: f64 = -1.0;
+/// Sizes of the picture. Splats are as far apart as pixels, and cells of the shadow map grow finer with them.
+const SIZES: [u32; 3] = [32, 64, 128];
+
+/// How an object is given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Form {
+    Mesh,
+    Implicit,
+    Points,
+    Grid,
+    Density,
+    Lattice,
+}
+
+const SHELLS: [Form; 3] = [Form::Mesh, Form::Implicit, Form::Points];
+const SOLIDS: [Form; 2] = [Form::Grid, Form::Density];
+
+/// A shape given in some form, at the resolution of a picture of `size`² pixels.
+#[derive(Debug, Clone, Copy)]
+struct Object {
+    shape: Shape,
+    form: Form,
+    size: u32,
+}
+
+impl Object {
+    fn spacing(self) -> f64 {
+        HEIGHT / f64::from(self.size)
+    }
+
+    /// The object in a scene file with its middle at (0, `y`, `z`), its data written into `folder`.
+    fn source(self, folder: &Path, [y, z]: [f64; 2]) -> String {
+        let (shape, h) = (self.shape, self.spacing());
+        let bounds = format!("box = [[-1, -1, -1], [1, 1, 1]], spacing = {h:?}");
+        let place = format!("[[object]]\nname = 'it'\ntransform = {{ up = 'y', translate = [0, {y:?}, {z:?}] }}\n");
+        place
+            + &match self.form {
+                Form::Mesh => {
+                    std::fs::write(folder.join("mesh.ply"), write::mesh(&shape.triangles(h))).unwrap();
+                    format!("mesh = 'mesh.ply'\nopacity = {OPACITY}\nspacing = {h:?}\n")
+                }
+                Form::Points => {
+                    std::fs::write(folder.join("points.ply"), write::points(&shape.triangles(h))).unwrap();
+                    format!("points = 'points.ply'\nopacity = {OPACITY}\n")
+                }
+                Form::Implicit => {
+                    format!("implicit = {{ expression = '{}', {bounds} }}\nopacity = {OPACITY}\n", shape.formula())
+                }
+                Form::Grid => {
+                    std::fs::write(folder.join("grid.nii"), write::nifti(&shape.occupancy(h), h)).unwrap();
+                    format!(
+                        "volume = 'grid.nii'\nspacing = {h:?}\n\
+                         transfer = [{{ value = 0, color = [1, 1, 1], extinction = 0 }}, \
+                         {{ value = 1, color = [1, 1, 1], extinction = {EXTINCTION} }}]\n"
+                    )
+                }
+                Form::Density => format!(
+                    "density = {{ expression = 'max(0, min(1, 0.5 - ({})/{h:?}))', {bounds}, \
+                     extinction = {EXTINCTION} }}\n",
+                    shape.formula()
+                ),
+                Form::Lattice => format!(
+                    "medium_ball = {{ center = [0, 0, 0], radius = {:?}, extinction = {EXTINCTION}, \
+                     spacing = {h:?} }}\n",
+                    shape::RADIUS
+                ),
+            }
+    }
+
+    /// What the eye sees through the object: transmittance.
+    fn seen(self) -> Vec<f64> {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = parallel_view(HEIGHT, self.size) + &self.source(folder.path(), [0.0, 0.0]);
+        draw_in(folder.path(), &scene, &[]).channel("A").iter().map(|a| 1.0 - a).collect()
+    }
+
+    /// Share of light that arrives at a wall behind the object.
+    fn shaded(self) -> Vec<f64> {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = parallel_view(HEIGHT, self.size)
+            + &format!(
+                "[render]\nlayers = ['shadow']\npoints = {{ shadow = {{ cells = {} }} }}\n\
+                 [[light]]\nkind = 'directional'\ndirection = [0, -1, -1]\nirradiance = [1, 1, 1]\n\
+                 [[object]]\nname = 'wall'\nrectangle = {{ center = [0, 0, {WALL:?}], u = [1.5, 0, 0], \
+                 v = [0, 1.5, 0], spacing = {:?} }}\n",
+                2 * self.size,
+                self.spacing() / 2.0
+            )
+            + &self.source(folder.path(), [LIFT, LIFT + WALL]);
+        draw_in(folder.path(), &scene, &[]).channel("shadow.A")
+    }
+
+    fn image(self, rays: Rays) -> Vec<f64> {
+        if rays == Rays::View { self.seen() } else { self.shaded() }
+    }
+}
+
+fn rmse(a: &[f64], b: &[f64]) -> f64 {
+    (a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64).sqrt()
+}
+
+/// Means over the pixels of each square of the coarsest picture.
+fn squares(image: &[f64], size: u32) -> Vec<f64> {
+    let (n, side) = (SIZES[0], size / SIZES[0]);
+    let square = |k: u32| {
+        let (x, y) = (k % n * side, k / n * side);
+        window(image, size, x..x + side, y..y + side).iter().sum::<f64>() / f64::from(side * side)
+    };
+    (0..n * n).map(square).collect()
+}
+
+/// The forms of a shape agree where splats are a pixel apart, and come to the closed form as all resolutions double.
+///
+/// Pictures are compared by squares of fixed size: a single pixel at a silhouette is a step that no resolution resolves.
+fn compare(shape: Shape, forms: &[Form], solid: bool) {
+    for rays in [Rays::View, Rays::Light] {
+        let mut errors = vec![Vec::new(); forms.len()];
+        for size in SIZES {
+            let exact = squares(&shape.transmittance(solid, rays, size), size);
+            let image = |&form: &Form| squares(&Object { shape, form, size }.image(rays), size);
+            let images: Vec<Vec<f64>> = forms.iter().map(image).collect();
+            for (k, image) in images.iter().enumerate() {
+                errors[k].push(rmse(image, &exact));
+                for (j, other) in images[..k].iter().enumerate().filter(|_| size == SIZES[2]) {
+                    let apart = rmse(image, other);
+                    assert!(apart < 0.01, "{shape:?} {rays:?}: {:?} and {:?} differ by {apart}", forms[k], forms[j]);
+                }
+            }
+        }
+        for (form, e) in forms.iter().zip(errors) {
+            let order = 0.5 * (e[0] / e[2]).log2();
+            println!("{shape:?} {rays:?} {form:?}: RMSE {e:.5?}, order {order:.2}");
+            assert!(order >= 1.0, "{shape:?} {rays:?} {form:?}: RMSE {e:?}, order {order}");
+        }
+    }
+}
+
+#[test]
+fn shells_of_a_ball() {
+    compare(Shape::Ball, &SHELLS, false);
+}
+
+#[test]
+fn shells_of_a_torus() {
+    compare(Shape::Torus, &SHELLS, false);
+}
+
+#[test]
+fn shells_of_a_gyroid() {
+    compare(Shape::Gyroid, &SHELLS, false);
+}
+
+#[test]
+fn solid_balls() {
+    compare(Shape::Ball, &[Form::Grid, Form::Density, Form::Lattice], true);
+}
+
+#[test]
+fn solid_tori() {
+    compare(Shape::Torus, &SOLIDS, true);
+}
+
+#[test]
+fn solid_gyroids() {
+    compare(Shape::Gyroid, &SOLIDS, true);
+}
+
+#[test]
+fn another_object_is_told_apart() {
+    let image = |shape| squares(&Object { shape, form: Form::Density, size: SIZES[0] }.seen(), SIZES[0]);
+    let (ball, gyroid) = (image(Shape::Ball), image(Shape::Gyroid));
+    assert!(rmse(&ball, &gyroid) > 0.1);
+    let thinner: Vec<f64> = ball.iter().map(|t| t.powf(0.9)).collect();
+    assert!(rmse(&ball, &thinner) > 0.01, "a tenth less extinction is told apart");
+}
