@@ -21,6 +21,44 @@
 #![forbid(unsafe_code)]
 
 mod composite;
+mod density;
+mod dielectric;
+mod environment;
+mod estimate;
 mod footprint;
+mod implicit;
+mod lights;
+mod majorant;
+mod march;
+mod medium;
+mod path;
+mod phase;
+mod quadrature;
+mod random;
+mod ray;
+mod roots;
+mod scene;
+mod surface;
+mod tracking;
+mod triangle;
+mod visibility;
 
 pub use composite::{ExactImage, Input, Order, composite};
+pub use density::{Density, Lattice};
+pub use dielectric::{
+    CHANNEL_WAVELENGTHS_UM, Cauchy, Dielectric, fresnel_reflectance, reflect, refract, transmitted_cosine,
+};
+pub use environment::{Environment, LatLong};
+pub use estimate::{Estimate, PathSettings, PixelSampling, Statistics, path_trace};
+pub use implicit::{ImplicitSurface, SurfaceImage, SurfaceScene, composite_surfaces};
+pub use lights::LightSource;
+pub use march::{MarchedImage, MarchedRay, march, march_image, optical_depth};
+pub use medium::{ColorAt, Medium};
+pub use path::PathRules;
+pub use phase::{henyey_greenstein, sample_henyey_greenstein};
+pub use quadrature::{Integral, MarchParams};
+pub use ray::Ray;
+pub use roots::{Crossings, RootParams, crossings};
+pub use scene::Scene;
+pub use surface::{Surface, SurfaceKind, SurfaceMaterial};
+pub use visibility::{Hit, Visibility};

@@ -1,0 +1,265 @@
+//! Densities: how much of a medium there is at a point, where along a ray the density is smooth, and how large it can
+//! get inside a box.
+
+use crate::ray::Ray;
+use crate::roots::{RootParams, crossings};
+use glam::{DMat3, DVec3};
+use splat_core::{Error, Grid, ScalarField};
+
+/// Relative density over space, ≥ 0; the medium multiplies it by its extinction.
+#[derive(Clone, Copy)]
+#[non_exhaustive]
+pub enum Density<'a> {
+    /// 1 inside an axis-aligned box (lowest and highest corner), 0 outside.
+    Box([DVec3; 2]),
+    /// 1 inside a ball.
+    Ball {
+        /// Centre, world units.
+        center: DVec3,
+        /// Radius, world units, > 0.
+        radius: f64,
+    },
+    /// A volume, see [`Lattice`].
+    Grid(Lattice<'a>),
+    /// A field's value where it is positive, inside a box.
+    Field {
+        /// The field.
+        field: &'a dyn ScalarField,
+        /// Lowest and highest corner; 0 outside.
+        bounds: [DVec3; 2],
+        /// No value in the box exceeds this; the field's own `bound` makes it local.
+        majorant: f64,
+    },
+    /// 1 where a field is negative, inside a box: the solid that an implicit surface encloses.
+    Inside {
+        /// The field.
+        field: &'a dyn ScalarField,
+        /// Lowest and highest corner; 0 outside.
+        bounds: [DVec3; 2],
+    },
+    /// Any function, ≥ 0 inside a box.
+    Function {
+        /// The density.
+        function: &'a (dyn Fn(DVec3) -> f64 + Sync),
+        /// Lowest and highest corner; 0 outside.
+        bounds: [DVec3; 2],
+        /// No value in the box exceeds this.
+        majorant: f64,
+    },
+}
+
+/// A volume as a density: trilinear between lattice points, each of which stands in the middle of a cell; constant in
+/// the outer half cells, 0 beyond. Its integral is Σ values · cell volume.
+#[derive(Debug, Clone, Copy)]
+pub struct Lattice<'a> {
+    grid: &'a Grid,
+    index_from_world: DMat3,
+    last: DVec3,
+}
+
+impl<'a> Lattice<'a> {
+    /// Checks a volume.
+    ///
+    /// # Errors
+    /// As [`Grid::validate`], and [`Error::Invalid`] for a negative value.
+    pub fn new(grid: &'a Grid) -> Result<Self, Error> {
+        grid.validate()?;
+        if let Some(i) = grid.values.iter().position(|v| *v < 0.0) {
+            return Err(Error::invalid("voxel", i, "value", grid.values[i], "a density ≥ 0"));
+        }
+        let last = DVec3::from_array(grid.dims.map(|d| (d - 1) as f64));
+        Ok(Self { grid, index_from_world: grid.axes.inverse(), last })
+    }
+
+    fn index(&self, p: DVec3) -> DVec3 {
+        self.index_from_world * (p - self.grid.origin)
+    }
+
+    #[inline(always)]
+    fn value(&self, p: DVec3) -> f64 {
+        let q = self.index(p);
+        let half = DVec3::splat(0.5);
+        if q.cmplt(-half).any() || q.cmpgt(self.last + half).any() {
+            return 0.0;
+        }
+        let q = q.max(DVec3::ZERO).min(self.last);
+        let [nx, ny, nz] = self.grid.dims;
+        let (i, j, k) = (q.x as usize, q.y as usize, q.z as usize);
+        let (i, j, k) = (i.min(nx.saturating_sub(2)), j.min(ny.saturating_sub(2)), k.min(nz.saturating_sub(2)));
+        let (fx, fy, fz) = (q.x - i as f64, q.y - j as f64, q.z - k as f64);
+        let (dx, dy, dz) = (usize::from(nx > 1), usize::from(ny > 1) * nx, usize::from(nz > 1) * nx * ny);
+        let at = (k * ny + j) * nx + i;
+        let v = &self.grid.values;
+        let line = |b: usize| {
+            let a = f64::from(v[b]);
+            a + fx * (f64::from(v[b + dx]) - a)
+        };
+        let plane = |b: usize| {
+            let a = line(b);
+            a + fy * (line(b + dy) - a)
+        };
+        let a = plane(at);
+        // Rounding may leave the hull of the corners by an ulp below zero.
+        (a + fz * (plane(at + dz) - a)).max(0.0)
+    }
+
+    fn corners(&self) -> [DVec3; 8] {
+        std::array::from_fn(|c| {
+            let side = |bit: usize, last: f64| if c >> bit & 1 == 1 { last + 0.5 } else { -0.5 };
+            let q = DVec3::new(side(0, self.last.x), side(1, self.last.y), side(2, self.last.z));
+            self.grid.origin + self.grid.axes * q
+        })
+    }
+
+    fn upper(&self, bounds: &[DVec3; 2]) -> f64 {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for c in 0..8 {
+            let pick = |bit: usize| bounds[c >> bit & 1][bit];
+            let q = self.index(DVec3::new(pick(0), pick(1), pick(2)));
+            (low, high) = (low.min(q), high.max(q));
+        }
+        // A guard of 2⁻²⁰ cells: the box may be computed in other roundings than the points in it.
+        let guard = DVec3::splat(0.5 + 1.0 / 1_048_576.0);
+        if high.cmplt(-guard).any() || low.cmpgt(self.last + guard).any() {
+            return 0.0;
+        }
+        let range = |a: usize| {
+            let clamp = |v: f64| v.clamp(0.0, self.last[a]) as usize;
+            clamp((low[a] - 1e-6).floor())..=clamp((high[a] + 1e-6).ceil())
+        };
+        let [nx, ny, _] = self.grid.dims;
+        let rows = range(2).flat_map(|k| range(1).map(move |j| (k * ny + j) * nx));
+        rows.map(|row| {
+            let r = range(0);
+            self.grid.values[row + r.start()..=row + r.end()].iter().fold(0.0f32, |m, v| m.max(*v))
+        })
+        .fold(0.0, |m: f64, v| m.max(f64::from(v)))
+    }
+
+    fn breaks(&self, ray: &Ray, t0: f64, t1: f64, out: &mut Vec<f64>) {
+        // In index space the lattice is a box of unit cells; t stays the world distance.
+        let local = Ray { origin: self.index(ray.origin), direction: self.index_from_world * ray.direction };
+        let half = DVec3::splat(0.5);
+        let Some((enter, leave)) = local.clip(&[-half, self.last + half], t0, t1) else { return };
+        out.extend([enter, leave]);
+        for a in 0..3 {
+            let (o, d) = (local.origin[a], local.direction[a]);
+            if d == 0.0 {
+                continue;
+            }
+            let (p, q) = (o + enter * d, o + leave * d);
+            let first = p.min(q).ceil().max(0.0) as usize;
+            let last = p.max(q).floor().min(self.last[a]);
+            if last >= 0.0 {
+                out.extend((first..=last as usize).map(|i| (i as f64 - o) / d));
+            }
+        }
+    }
+}
+
+fn inside(bounds: &[DVec3; 2], p: DVec3) -> bool {
+    p.cmpge(bounds[0]).all() && p.cmple(bounds[1]).all()
+}
+
+impl Density<'_> {
+    /// Density at a world position.
+    #[inline]
+    pub fn value(&self, p: DVec3) -> f64 {
+        match self {
+            Self::Grid(lattice) => lattice.value(p),
+            Self::Box(bounds) => f64::from(inside(bounds, p)),
+            Self::Ball { center, radius } => f64::from((p - center).length() <= *radius),
+            Self::Field { field, bounds, .. } if inside(bounds, p) => field.value(p).max(0.0),
+            Self::Inside { field, bounds } if inside(bounds, p) => f64::from(field.value(p) < 0.0),
+            Self::Function { function, bounds, .. } if inside(bounds, p) => function(p).max(0.0),
+            _ => 0.0,
+        }
+    }
+
+    /// Lowest and highest corner of where the density can be positive, world axes.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        match self {
+            Self::Box(b) => *b,
+            Self::Field { bounds, .. } | Self::Inside { bounds, .. } | Self::Function { bounds, .. } => *bounds,
+            Self::Ball { center, radius } => [center - DVec3::splat(*radius), center + DVec3::splat(*radius)],
+            Self::Grid(lattice) => {
+                let corners = lattice.corners();
+                let fold = |f: fn(DVec3, DVec3) -> DVec3| corners.into_iter().reduce(f).unwrap_or(DVec3::ZERO);
+                [fold(DVec3::min), fold(DVec3::max)]
+            }
+        }
+    }
+
+    /// A number that no density inside the box (lowest and highest corner) exceeds.
+    pub fn upper(&self, bounds: &[DVec3; 2]) -> f64 {
+        let own = self.bounds();
+        if bounds[1].cmplt(own[0]).any() || bounds[0].cmpgt(own[1]).any() {
+            return 0.0;
+        }
+        let middle = bounds[0] + (bounds[1] - bounds[0]) * 0.5;
+        let reach = (bounds[1] - bounds[0]).length() * 0.5 * (1.0 + 1e-9);
+        match self {
+            Self::Box(_) => 1.0,
+            Self::Ball { center, radius } => {
+                let nearest = center.clamp(bounds[0], bounds[1]);
+                f64::from((nearest - center).length() <= radius * (1.0 + 1e-9))
+            }
+            Self::Grid(lattice) => lattice.upper(bounds),
+            Self::Field { field, majorant, .. } => {
+                field.bound(middle, reach).map_or(*majorant, |(_, high)| high.max(0.0).min(*majorant))
+            }
+            Self::Inside { field, .. } => f64::from(field.bound(middle, reach).is_none_or(|(low, _)| low < 0.0)),
+            Self::Function { majorant, .. } => *majorant,
+        }
+    }
+
+    /// Whether the density is a polynomial of degree ≤ 3 between neighbouring [`Density::breaks`].
+    pub(crate) fn is_piecewise_cubic(&self) -> bool {
+        !matches!(self, Self::Field { .. } | Self::Function { .. })
+    }
+
+    /// Appends the distances in (t0, t1) where the density along the ray is not smooth, in no order.
+    pub(crate) fn breaks(&self, ray: &Ray, t0: f64, t1: f64, out: &mut Vec<f64>) {
+        let mut push = |span: Option<(f64, f64)>| out.extend(span.into_iter().flat_map(|(a, b)| [a, b]));
+        match self {
+            Self::Box(bounds) => push(ray.clip(bounds, t0, t1)),
+            Self::Ball { center, radius } => push(ray.clip_ball(*center, *radius, t0, t1)),
+            Self::Field { bounds, .. } | Self::Function { bounds, .. } => push(ray.clip(bounds, t0, t1)),
+            Self::Grid(lattice) => lattice.breaks(ray, t0, t1, out),
+            Self::Inside { field, bounds } => {
+                if let Some((a, b)) = ray.clip(bounds, t0, t1) {
+                    out.extend([a, b]);
+                    out.extend(crossings(*field, ray, a, b, &RootParams::default()).roots);
+                }
+            }
+        }
+    }
+
+    /// Suggested number of majorant cells along each axis of its bounds.
+    pub(crate) fn detail(&self) -> [usize; 3] {
+        match self {
+            Self::Box(_) | Self::Function { .. } => [1; 3],
+            Self::Ball { .. } => [8; 3],
+            Self::Field { .. } | Self::Inside { .. } => [32; 3],
+            Self::Grid(lattice) => lattice.grid.dims.map(|d| d.div_ceil(4).min(64)),
+        }
+    }
+
+    pub(crate) fn validate(&self, index: usize) -> Result<(), Error> {
+        let bounds = self.bounds();
+        if !(bounds[0].is_finite() && bounds[1].is_finite() && bounds[0].cmplt(bounds[1]).all()) {
+            return Err(Error::invalid("medium", index, "bounds", bounds, "finite corners, the lowest first"));
+        }
+        match self {
+            Self::Ball { radius, .. } if *radius <= 0.0 || radius.is_nan() => {
+                Err(Error::invalid("medium", index, "radius", radius, "a number > 0"))
+            }
+            Self::Field { majorant, .. } | Self::Function { majorant, .. }
+                if !(majorant.is_finite() && *majorant >= 0.0) =>
+            {
+                Err(Error::invalid("medium", index, "majorant", majorant, "a finite number ≥ 0"))
+            }
+            _ => Ok(()),
+        }
+    }
+}

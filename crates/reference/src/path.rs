@@ -1,0 +1,439 @@
+//! One path: from the eye through media and surfaces, gathering light at every vertex.
+//!
+//! At a vertex one light (chosen evenly) and, if it is an image, the environment are sampled; rays that meet an area
+//! light or the environment on their own count too, weighted by the balance heuristic (Veach 1997). Lights without
+//! extent inside a medium would give 1/d² infinite variance at vertices; their single scattering is estimated along each
+//! segment instead, at a distance chosen by the angle that it subtends at the light (equiangular sampling, Kulla and
+//! Fajardo 2012). Russian roulette by the largest throughput.
+//!
+//! Straight crossings of translucent surfaces keep the ray, its vertex and its density. Reflection and refraction at a
+//! dielectric are no scattering events; beyond one, lights count in full, since shadow rays end there.
+
+use crate::dielectric::{Dielectric, fresnel_reflectance, reflect, refract};
+use crate::lights::{LightSample, LightSource};
+use crate::phase::{henyey_greenstein, sample_henyey_greenstein};
+use crate::random::Stream;
+use crate::ray::Ray;
+use crate::scene::Scene;
+use crate::surface::{Response, SurfaceKind};
+use crate::tracking::{Collision, Volume};
+use crate::visibility::{Filter, Hit, Visibility};
+use glam::DVec3;
+
+/// Which light paths count.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PathRules {
+    /// Most scattering events of a path: 0 shows emission and what lies behind, 1 is single scattering; `None` leaves the
+    /// end to Russian roulette.
+    pub max_bounces: Option<u32>,
+    /// Whether eye rays see area lights.
+    pub lights_visible: bool,
+    /// Whether emission of media and surfaces lights others; if not, only the eye sees it.
+    pub emission_illuminates: bool,
+}
+
+impl Default for PathRules {
+    fn default() -> Self {
+        Self { max_bounces: None, lights_visible: true, emission_illuminates: true }
+    }
+}
+
+/// Interface and scattering events after which roulette ends even a path that loses nothing.
+const PATIENCE: u32 = 256;
+const PATIENT_SURVIVAL: f64 = 0.99;
+
+/// A prepared scene.
+pub(crate) struct Tracer<'a> {
+    scene: &'a Scene<'a>,
+    pub(crate) visibility: Visibility,
+    pub(crate) volume: Volume<'a>,
+    /// Lights sampled at vertices, and those sampled along segments.
+    at_vertices: Vec<LightSource>,
+    along_segments: Vec<LightSource>,
+    areas: Vec<LightSource>,
+    rules: PathRules,
+}
+
+/// A path under way.
+struct Path {
+    ray: Ray,
+    /// Distance already travelled along the ray.
+    t: f64,
+    filter: Filter,
+    throughput: [f64; 3],
+    /// Density of the ray's direction, 1/sr; `None` from the eye and behind dielectrics.
+    density: Option<f64>,
+    bounces: u32,
+    events: u32,
+    radiance: [f64; 3],
+}
+
+impl Path {
+    fn add(&mut self, light: [f64; 3], factor: f64) {
+        (0..3).for_each(|c| self.radiance[c] += self.throughput[c] * light[c] * factor);
+    }
+
+    fn scale(&mut self, by: [f64; 3]) {
+        (0..3).for_each(|c| self.throughput[c] *= by[c]);
+    }
+
+    /// Goes on from `origin`, which may lie on triangle `skip`.
+    fn turn(&mut self, origin: DVec3, direction: DVec3, skip: u32) {
+        self.ray = Ray { origin, direction };
+        self.t = 0.0;
+        self.filter = Filter { skip, ..Filter::START };
+    }
+
+    /// Russian roulette; false when the path ends.
+    fn survives(&mut self, rng: &mut Stream) -> bool {
+        self.events += 1;
+        let largest = self.throughput.iter().fold(0.0, |m: f64, w| m.max(w.abs()));
+        let limit = if self.events > PATIENCE { PATIENT_SURVIVAL } else { 1.0 };
+        let chance = largest.min(limit);
+        if chance >= 1.0 {
+            return true;
+        }
+        if rng.unit() >= chance {
+            return false;
+        }
+        self.scale([1.0 / chance; 3]);
+        true
+    }
+}
+
+/// What scatters light at a vertex.
+enum Vertex {
+    Medium { travel: DVec3, asymmetry: f64 },
+    Surface(Response),
+}
+
+impl Vertex {
+    /// Share of the light from unit direction `to_light` per unit irradiance on a facing plane, and the density of
+    /// sampling that direction.
+    fn toward(&self, to_light: DVec3) -> ([f64; 3], f64) {
+        match self {
+            Self::Medium { travel, asymmetry } => {
+                let p = henyey_greenstein(*travel, to_light, *asymmetry);
+                ([p; 3], p)
+            }
+            Self::Surface(response) => response.toward(to_light),
+        }
+    }
+}
+
+impl<'a> Tracer<'a> {
+    pub(crate) fn new(scene: &'a Scene<'a>, rules: PathRules) -> Result<Self, splat_core::Error> {
+        scene.validate()?;
+        let meshes: Vec<_> = scene.surfaces.iter().map(|s| s.mesh).collect();
+        let volume = Volume::new(&scene.media);
+        let lit = |l: &&LightSource| l.intensity(DVec3::ZERO).iter().any(|i| *i > 0.0) || l.pole().is_some();
+        let lights: Vec<LightSource> = scene.lights.iter().filter(lit).copied().collect();
+        let inside = |l: &LightSource| match (l.pole(), volume.bounds()) {
+            (Some(p), Some(b)) => p.cmpge(b[0]).all() && p.cmple(b[1]).all(),
+            _ => false,
+        };
+        let (along_segments, at_vertices) = lights.iter().partition(|l| inside(l));
+        Ok(Self {
+            scene,
+            visibility: Visibility::new(&meshes)?,
+            volume,
+            at_vertices,
+            along_segments,
+            areas: lights.into_iter().filter(LightSource::is_area).collect(),
+            rules,
+        })
+    }
+
+    /// Radiance that arrives along a ray backwards: one sample.
+    pub(crate) fn radiance(&self, ray: Ray, rng: &mut Stream) -> [f64; 3] {
+        let mut path = Path {
+            ray,
+            t: 0.0,
+            filter: Filter::START,
+            throughput: [1.0; 3],
+            density: None,
+            bounces: 0,
+            events: 0,
+            radiance: [0.0; 3],
+        };
+        while self.segment(&mut path, rng) {}
+        path.radiance
+    }
+
+    fn may_scatter(&self, path: &Path) -> bool {
+        self.rules.max_bounces.is_none_or(|most| path.bounces < most)
+    }
+
+    /// Follows the path to its next event; false when it ends.
+    fn segment(&self, path: &mut Path, rng: &mut Stream) -> bool {
+        let hit = self.visibility.next(&path.ray, path.filter, f64::INFINITY);
+        let end = hit.map_or(f64::INFINITY, |h| h.t);
+        if !self.along_segments.is_empty() && self.may_scatter(path) {
+            self.gather_along(path, end, rng);
+        }
+        loop {
+            let (area, stop) = self.next_area(path, end);
+            if let Some(c) = self.volume.collide(&path.ray, path.t, stop, &mut path.throughput, rng) {
+                return self.scatter_in_medium(path, &c, rng);
+            }
+            path.t = stop;
+            match area {
+                Some(light) => self.meet_light(path, light),
+                None => break,
+            }
+        }
+        match hit {
+            Some(hit) => self.meet_surface(path, &hit, rng),
+            None => {
+                self.escape(path);
+                false
+            }
+        }
+    }
+
+    fn next_area(&self, path: &Path, end: f64) -> (Option<&LightSource>, f64) {
+        let mut nearest = (None, end);
+        for light in &self.areas {
+            if let Some(t) = light.hit(&path.ray, path.t)
+                && t < nearest.1
+            {
+                nearest = (Some(light), t);
+            }
+        }
+        nearest
+    }
+
+    /// The path crosses the shining side of an area light.
+    fn meet_light(&self, path: &mut Path, light: &LightSource) {
+        let factor = match path.density {
+            None if path.events == 0 && !self.rules.lights_visible => 0.0,
+            None => 1.0,
+            Some(density) => {
+                let other = light.density(path.ray.origin, path.ray.direction, path.t) / self.at_vertices.len() as f64;
+                density / (density + other)
+            }
+        };
+        path.add(light.intensity(path.ray.origin), factor);
+    }
+
+    fn escape(&self, path: &mut Path) {
+        let environment = &self.scene.environment;
+        match (path.density, self.scene.background) {
+            (None, Some(background)) if path.events == 0 => path.add(background, 1.0),
+            (Some(density), _) if environment.is_sampled() => {
+                let other = environment.density(path.ray.direction);
+                path.add(environment.radiance(path.ray.direction), density / (density + other));
+            }
+            _ => path.add(environment.radiance(path.ray.direction), 1.0),
+        }
+    }
+
+    fn scatter_in_medium(&self, path: &mut Path, c: &Collision, rng: &mut Stream) -> bool {
+        let medium = &self.scene.media[c.medium];
+        let (albedo, emitted) = medium.source(c.point);
+        if path.bounces == 0 || self.rules.emission_illuminates {
+            path.add(emitted, 1.0);
+        }
+        if !self.may_scatter(path) {
+            return false;
+        }
+        path.bounces += 1;
+        path.scale(albedo);
+        if !path.survives(rng) {
+            return false;
+        }
+        let travel = path.ray.direction;
+        let vertex = Vertex::Medium { travel, asymmetry: medium.asymmetry };
+        path.turn(c.point, travel, u32::MAX);
+        self.gather(path, &vertex, &self.at_vertices, u32::MAX, rng);
+        self.gather_environment(path, &vertex, u32::MAX, rng);
+        let direction = sample_henyey_greenstein(travel, medium.asymmetry, rng.pair());
+        path.turn(c.point, direction, u32::MAX);
+        path.density = Some(henyey_greenstein(travel, direction, medium.asymmetry));
+        true
+    }
+
+    fn meet_surface(&self, path: &mut Path, hit: &Hit, rng: &mut Stream) -> bool {
+        let surface = &self.scene.surfaces[hit.mesh as usize];
+        let travel = path.ray.direction;
+        let geometric = self.visibility.normal(hit.id);
+        if let SurfaceKind::Dielectric(glass) = &surface.material.kind {
+            return interface(path, hit, glass, surface.normal(hit.triangle, hit.uv, geometric), geometric, rng);
+        }
+        let opacity = surface.material.opacity(geometric.dot(travel));
+        if !meets(path, opacity, rng) {
+            path.t = hit.t;
+            path.filter.after = (hit.t, hit.id);
+            return path.throughput.iter().any(|w| *w != 0.0);
+        }
+        let color = surface.color(hit.triangle, hit.uv);
+        if path.bounces == 0 || self.rules.emission_illuminates {
+            path.add(surface.material.emitted(color), 1.0);
+        }
+        if !self.may_scatter(path) {
+            return false;
+        }
+        path.bounces += 1;
+        let response = surface.material.response(color, surface.normal(hit.triangle, hit.uv, geometric), -travel);
+        let point = path.ray.at(hit.t);
+        path.turn(point, travel, hit.id);
+        let vertex = Vertex::Surface(response);
+        self.gather(path, &vertex, &self.at_vertices, hit.id, rng);
+        self.gather(path, &vertex, &self.along_segments, hit.id, rng);
+        self.gather_environment(path, &vertex, hit.id, rng);
+        let Some((direction, weight, density)) = response.sample(rng) else { return false };
+        path.turn(point, direction, hit.id);
+        path.density = Some(density);
+        path.scale(weight);
+        path.survives(rng)
+    }
+
+    /// Light that one of some lights sends to a vertex.
+    fn gather(&self, path: &mut Path, vertex: &Vertex, lights: &[LightSource], skip: u32, rng: &mut Stream) {
+        let n = lights.len();
+        if n == 0 {
+            return;
+        }
+        let pick = if n == 1 { 0 } else { ((rng.unit() * n as f64) as usize).min(n - 1) };
+        let u = if lights[pick].is_area() { rng.pair() } else { [0.5; 2] };
+        if let Some(sample) = lights[pick].sample(path.ray.origin, u) {
+            self.add_sample(path, vertex, &sample, 1.0 / n as f64, skip, rng);
+        }
+    }
+
+    /// Light that a bright environment sends to a vertex.
+    fn gather_environment(&self, path: &mut Path, vertex: &Vertex, skip: u32, rng: &mut Stream) {
+        let environment = &self.scene.environment;
+        if !environment.is_sampled() {
+            return;
+        }
+        if let Some((direction, radiance, density)) = environment.sample(rng.pair()) {
+            let value = radiance.map(|l| l / density);
+            let sample = LightSample { direction, distance: f64::INFINITY, value, density };
+            self.add_sample(path, vertex, &sample, 1.0, skip, rng);
+        }
+    }
+
+    fn add_sample(&self, path: &mut Path, vertex: &Vertex, s: &LightSample, chosen: f64, skip: u32, rng: &mut Stream) {
+        let (share, density) = vertex.toward(s.direction);
+        if share.iter().all(|v| *v == 0.0) {
+            return;
+        }
+        let ray = Ray { origin: path.ray.origin, direction: s.direction };
+        let arrives = self.transmittance(&ray, s.distance, skip, rng);
+        let balance = if s.density > 0.0 { s.density * chosen / (s.density * chosen + density) } else { 1.0 };
+        path.add(std::array::from_fn(|c| share[c] * s.value[c] * arrives[c]), balance / chosen);
+    }
+
+    /// Single scattering from lights inside media, along the part of the segment that media fill.
+    fn gather_along(&self, path: &mut Path, end: f64, rng: &mut Stream) {
+        let Some((t0, t1)) = self.volume.bounds().and_then(|b| path.ray.clip(b, path.t, end)) else { return };
+        let n = self.along_segments.len();
+        let light = &self.along_segments[((rng.unit() * n as f64) as usize).min(n - 1)];
+        let Some(pole) = light.pole() else { return };
+        let middle = (pole - path.ray.origin).dot(path.ray.direction);
+        let apart = (pole - path.ray.at(middle)).length();
+        let (a, b) = ((t0 - middle).atan2(apart), (t1 - middle).atan2(apart));
+        let t = middle + apart * (a + (b - a) * rng.unit()).tan();
+        let point = path.ray.at(t);
+        let scattered = self.scattering(point, pole, path.ray.direction);
+        if !(t0..=t1).contains(&t) || scattered.iter().all(|s| *s == 0.0) {
+            return;
+        }
+        let seen = self.volume.transmittance(&path.ray, path.t, t, rng);
+        let to_light = pole - point;
+        let distance = to_light.length();
+        let shadow = Ray { origin: point, direction: to_light / distance };
+        let arrives = self.transmittance(&shadow, distance, u32::MAX, rng);
+        let intensity = light.intensity(point);
+        // 1/density · 1/d²: the squares cancel but for rounding, apart² + (t − middle)² = d².
+        let factor = n as f64 * (b - a) / apart;
+        path.add(std::array::from_fn(|c| scattered[c] * intensity[c] * seen[c] * arrives[c]), factor);
+    }
+
+    /// Σ over media of extinction · albedo · phase towards a light, per channel.
+    fn scattering(&self, p: DVec3, pole: DVec3, travel: DVec3) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        let to_light = (pole - p).normalize_or_zero();
+        for medium in &self.scene.media {
+            let density = medium.density.value(p);
+            if density > 0.0 {
+                let (albedo, _) = medium.source(p);
+                let phase = henyey_greenstein(travel, to_light, medium.asymmetry);
+                (0..3).for_each(|c| sum[c] += density * medium.extinction[c] * albedo[c] * phase);
+            }
+        }
+        sum
+    }
+
+    /// An unbiased estimate of the transmittance of a straight line; dielectrics block it.
+    pub(crate) fn transmittance(&self, ray: &Ray, distance: f64, skip: u32, rng: &mut Stream) -> [f64; 3] {
+        let mut left = [1.0; 3];
+        let mut filter = Filter { skip, ..Filter::START };
+        while let Some(hit) = self.visibility.next(ray, filter, distance) {
+            let material = &self.scene.surfaces[hit.mesh as usize].material;
+            let opacity = material.opacity(self.visibility.normal(hit.id).dot(ray.direction));
+            (0..3).for_each(|c| left[c] *= 1.0 - opacity[c]);
+            if left == [0.0; 3] {
+                return left;
+            }
+            filter.after = (hit.t, hit.id);
+        }
+        let media = self.volume.transmittance(ray, 0.0, distance, rng);
+        std::array::from_fn(|c| left[c] * media[c])
+    }
+}
+
+/// Whether a path meets a translucent surface or goes straight on, with weights that suit channels of other opacity.
+fn meets(path: &mut Path, opacity: [f64; 3], rng: &mut Stream) -> bool {
+    let w = path.throughput.map(f64::abs);
+    let stop: f64 = (0..3).map(|c| w[c] * opacity[c]).sum();
+    let pass: f64 = (0..3).map(|c| w[c] * (1.0 - opacity[c])).sum();
+    if pass <= 0.0 {
+        return true;
+    }
+    let met = rng.unit() * (stop + pass) < stop;
+    let chance = if met { stop } else { pass } / (stop + pass);
+    path.scale(opacity.map(|a| if met { a } else { 1.0 - a } / chance));
+    met
+}
+
+/// Reflection or refraction at a dielectric; false when the path ends.
+fn interface(
+    path: &mut Path,
+    hit: &Hit,
+    glass: &Dielectric,
+    shading: DVec3,
+    geometric: DVec3,
+    rng: &mut Stream,
+) -> bool {
+    let travel = path.ray.direction;
+    let leaving = geometric.dot(travel) > 0.0;
+    if leaving {
+        path.scale(glass.absorption.map(|a| (-a * hit.t).exp()));
+    }
+    let alive: [usize; 3] = std::array::from_fn(|c| usize::from(path.throughput[c] != 0.0));
+    let count = alive.iter().sum::<usize>();
+    let mut channel = alive.iter().position(|a| *a == 1).unwrap_or(0);
+    if count > 1 && !glass.is_achromatic() {
+        // Channels part here: one goes on for all.
+        let pick = ((rng.unit() * count as f64) as usize).min(count - 1);
+        channel = (0..3).filter(|c| alive[*c] == 1).nth(pick).unwrap_or(channel);
+        path.throughput = std::array::from_fn(|c| if c == channel { path.throughput[c] * count as f64 } else { 0.0 });
+    }
+    let eta = if leaving { 1.0 / glass.eta[channel] } else { glass.eta[channel] };
+    let toward = |n: DVec3| if n.dot(travel) > 0.0 { -n } else { n };
+    let (face, mut normal) = (toward(geometric), toward(shading));
+    if normal.dot(face) <= 0.0 {
+        normal = face;
+    }
+    let mirrored = rng.unit() < fresnel_reflectance(-normal.dot(travel), eta);
+    let turned = |n: DVec3| if mirrored { Some(reflect(travel, n)) } else { refract(travel, n, eta) };
+    // An interpolated normal may turn the ray to the wrong side of the triangle.
+    let right_side = |d: &DVec3| (d.dot(face) > 0.0) == mirrored;
+    let direction = turned(normal).filter(right_side).or_else(|| turned(face).filter(right_side));
+    let Some(direction) = direction else { return false };
+    path.turn(path.ray.at(hit.t), direction, hit.id);
+    path.density = None;
+    path.survives(rng)
+}
