@@ -36,6 +36,7 @@ mod points;
 mod render;
 pub mod scene;
 pub mod statistics;
+pub mod truth;
 
 pub use error::{Error, escape_controls, printable};
 pub use info::{FileInfo, info};

@@ -1,6 +1,6 @@
 //! The objects of a scene become one cloud in canonical order, with its tables.
 
-mod object;
+pub(crate) mod object;
 
 use crate::scene::Scene;
 use crate::{Error, Progress, RenderOptions, normalize::normalize};

@@ -121,7 +121,7 @@ fn grid(source: &VolumeSource, context: &Context<'_>, splat: SplatParams) -> Res
     Ok(cloud)
 }
 
-fn wrong_kind(path: &Path, expected: &str, hint: &str) -> Error {
+pub(crate) fn wrong_kind(path: &Path, expected: &str, hint: &str) -> Error {
     Error::input(crate::printable(path), format!("expected {expected}"), hint)
 }
 
@@ -156,15 +156,16 @@ fn medium_of_expression(
     Ok(cloud)
 }
 
-fn expression(text: &str, object: &SceneObject) -> Result<ExpressionField, Error> {
+pub(crate) fn expression(text: &str, object: &SceneObject) -> Result<ExpressionField, Error> {
     ExpressionField::parse(text).map_err(|e| {
         let what = format!("object '{}', expression", crate::escape_controls(&object.name));
         Error::input(what, e.to_string(), "variables are x, y and z")
     })
 }
 
-fn procedural(source: &CloudSource, context: &Context<'_>, splat: SplatParams) -> Result<Cloud, Error> {
-    let shape = CloudShape {
+/// The cloud that a scene describes.
+pub(crate) fn cloud_shape(source: &CloudSource) -> CloudShape {
+    CloudShape {
         ellipsoids: source.ellipsoids.iter().map(|&(center, radii)| Ellipsoid { center, radii }).collect(),
         octaves: source.octaves,
         frequency: source.frequency,
@@ -173,8 +174,11 @@ fn procedural(source: &CloudSource, context: &Context<'_>, splat: SplatParams) -
         extinction: source.extinction,
         base: None,
         ..CloudShape::default()
-    };
-    let lattice = convert::procedural_cloud(&shape, source.spacing, &splat).map_err(|e| refuse(&e))?;
+    }
+}
+
+fn procedural(source: &CloudSource, context: &Context<'_>, splat: SplatParams) -> Result<Cloud, Error> {
+    let lattice = convert::procedural_cloud(&cloud_shape(source), source.spacing, &splat).map_err(|e| refuse(&e))?;
     let point = |value: f32| TransferPoint { value, color: splat.color, extinction: value };
     let mut points = vec![point(0.0)];
     if source.extinction > 0.0 {
@@ -232,7 +236,7 @@ impl Context<'_> {
     }
 }
 
-fn refuse(error: &ConvertError) -> Error {
+pub(crate) fn refuse(error: &ConvertError) -> Error {
     match error {
         ConvertError::TooMany { object, what, needed, limit } => Error::Limit {
             what: format!("object '{}'", crate::escape_controls(object)),

@@ -1,0 +1,95 @@
+//! Physical truth of a scene: the same objects, materials and lights in the path tracer of `reference`, without splats.
+//!
+//! Light takes the paths that the `points` technique simulates: emission, one scattering or reflection, shadows that
+//! translucent things colour. What has no physical form is named instead of being guessed at: raw points (nothing lies
+//! between them), volumes shaded by their gradient, shadows turned off.
+
+mod object;
+
+use crate::scene::{LightSource, Scene, SceneLight};
+use crate::{Error, Progress, RenderOptions};
+use object::Body;
+use reference::{Environment, PathRules, PathSettings, PixelSampling, path_trace};
+use std::f64::consts::PI;
+
+/// A path-traced picture of a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Truth {
+    /// Radiance of each pixel, linear Rec.709, row by row from the top left.
+    pub radiance: Vec<[f64; 3]>,
+    /// Its standard error per channel.
+    pub standard_error: Vec<[f64; 3]>,
+    /// Samples a pixel.
+    pub samples: u32,
+}
+
+/// Path-traces a scene with so many samples a pixel; `Err` of the inner result says why the scene has no truth.
+///
+/// # Errors
+/// As [`crate::load`].
+pub fn truth(
+    scene: &Scene,
+    options: &RenderOptions,
+    samples: u32,
+    progress: &Progress,
+) -> Result<Result<Truth, String>, Error> {
+    let mut bodies = Vec::new();
+    for object in scene.objects.iter().filter(|o| o.visible) {
+        match object::body(scene, object, options)? {
+            Ok(body) => bodies.push(body),
+            Err(reason) => return Ok(Err(format!("object '{}': {reason}", crate::escape_controls(&object.name)))),
+        }
+    }
+    let mut lights = Vec::new();
+    for (i, light) in scene.lights.iter().enumerate() {
+        if !light.shadow {
+            return Ok(Err(format!("light {i}: shadow = false has no physical form")));
+        }
+        lights.push(source(light)?);
+    }
+    let fault = |e: splat_core::Error| match e {
+        splat_core::Error::Cancelled => Error::Cancelled,
+        other => Error::Internal(other.to_string()),
+    };
+    let traced = reference::Scene {
+        media: bodies.iter().filter_map(|b| b.medium().transpose()).collect::<Result<_, _>>().map_err(fault)?,
+        surfaces: bodies.iter().filter_map(Body::surface).collect(),
+        lights,
+        environment: Environment::default(),
+        background: Some(scene.background.map(f64::from)),
+    };
+    let settings = PathSettings {
+        seed: scene.render.seed,
+        samples: samples.max(2),
+        rules: PathRules { max_bounces: Some(1), lights_visible: false, emission_illuminates: false },
+        pixel: PixelSampling::Area,
+        ..PathSettings::default()
+    };
+    let estimate = path_trace(&traced, &scene.camera, &settings, progress).map_err(fault)?;
+    if estimate.majorant_violations > 0 {
+        return Ok(Err("a density exceeds every bound that could be found for it".into()));
+    }
+    Ok(Ok(Truth {
+        radiance: estimate.radiance.mean,
+        standard_error: estimate.radiance.standard_error,
+        samples: estimate.samples,
+    }))
+}
+
+/// The light with its extent; intensity I on the axis becomes radiance I over the area that is seen from there.
+fn source(light: &SceneLight) -> Result<reference::LightSource, Error> {
+    let over = |area: f64| light.intensity.map(|i| f64::from(i) / area);
+    Ok(match light.source {
+        LightSource::Simple(simple) => reference::LightSource::from_light(&simple)
+            .ok_or_else(|| Error::Internal(format!("the reference knows no light such as {simple:?}")))?,
+        LightSource::Sphere { position, radius } => {
+            reference::LightSource::Sphere { center: position, radius, radiance: over(PI * radius * radius) }
+        }
+        LightSource::Disk { position, normal, radius } => {
+            reference::LightSource::Disk { center: position, normal, radius, radiance: over(PI * radius * radius) }
+        }
+        LightSource::Rect { position, u, v } => {
+            reference::LightSource::Rect { center: position, u, v, radiance: over(4.0 * u.cross(v).length()) }
+        }
+    })
+}
