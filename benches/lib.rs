@@ -5,6 +5,10 @@
     reason = "a benchmark without its scene has nothing to measure"
 )]
 
+mod frame;
+
+pub use frame::Frame;
+
 use organza::{Loaded, Progress, RenderOptions, load, scene};
 use splat_core::{Camera, Cloud, glam::Vec3, rng};
 use std::path::Path;
@@ -44,4 +48,14 @@ pub fn outdoor_cloud(n: usize) -> (Cloud, Camera) {
     }
     cloud.canonicalize();
     (cloud, scene.camera)
+}
+
+/// Time that all threads of this process have spent on processors, milliseconds; 0 where the system does not tell.
+pub fn processor_ms() -> f64 {
+    let Ok(tasks) = std::fs::read_dir("/proc/self/task") else { return 0.0 };
+    let spent = |task: std::fs::DirEntry| -> Option<f64> {
+        let text = std::fs::read_to_string(task.path().join("schedstat")).ok()?;
+        text.split(' ').next()?.parse().ok()
+    };
+    tasks.flatten().filter_map(spent).sum::<f64>() * 1e-6
 }

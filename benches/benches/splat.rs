@@ -1,53 +1,43 @@
-//! Project, bin and composite translucent splats, and nothing else: sorted ids and shaded values are ready.
+//! Sort, project and fold translucent splats at 600x500: the outdoor camera, and random splats of 3x3 pixels.
+//!
+//! A plain table of minima: other work on the machine only ever adds time. The second number of each part is the time of
+//! all threads on processors, which other work adds less to. `-- N` runs one number of points.
 #![allow(missing_docs, clippy::expect_used, reason = "a benchmark")]
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use organza_benches::{TABLE_1, outdoor, outdoor_cloud};
-use splat_core::raster::{OpaqueImage, Params, fold, project};
-use splat_core::{Accumulator, Direction, Progress, SplatKind};
-use std::hint::black_box;
+use organza_benches::{Frame, TABLE_1, processor_ms};
+use std::time::Instant;
 
-fn bench(c: &mut Criterion) {
-    let mut group = c.benchmark_group("splat 600x500");
-    group.sample_size(10);
-    for n in TABLE_1 {
-        let (mut cloud, mut camera) = outdoor_cloud(n);
-        // All translucent, as in the table's middle row.
-        cloud.kind.iter_mut().filter(|k| **k == SplatKind::Opaque).for_each(|k| *k = SplatKind::Surface);
-        camera.size = [600, 500];
-        let scene = outdoor();
-        let params = hbsort::Params { direction: Direction::FrontToBack, ..hbsort::Params::default() };
-        let order = hbsort::slice_cloud(&cloud, None, &camera, &params, &mut hbsort::Scratch::default())
-            .expect("finite splats sort");
-        let ids = order.input_from_sorted;
-        let values = vec![0.5; 3 * cloud.len()];
-        let raster = Params::default();
-        group.throughput(Throughput::Elements(ids.len() as u64));
-        group.bench_function(BenchmarkId::new("project", n), |b| {
-            b.iter(|| black_box(project(&cloud, &camera, &scene.footprints, &scene.materials, &raster)));
-        });
-        let projected = project(&cloud, &camera, &scene.footprints, &scene.materials, &raster);
-        group.bench_function(BenchmarkId::new("fold", n), |b| {
-            b.iter(|| {
-                let mut acc = Accumulator::new(camera.size, 1, 3, false, false);
-                let opaque = OpaqueImage::default();
-                fold(
-                    &projected,
-                    &ids,
-                    &values,
-                    &scene.materials,
-                    &opaque,
-                    Direction::FrontToBack,
-                    &raster,
-                    &mut acc,
-                    &Progress::new(),
-                );
-                black_box(acc)
-            });
-        });
+/// Runs each part this often.
+const REPEATS: usize = 15;
+
+fn main() {
+    let only: Option<usize> = std::env::args().skip(1).find_map(|a| a.parse().ok());
+    println!(
+        "{:>24} {:>9} {:>9} {:>9} {:>9} {:>12} {:>12}",
+        "ms", "sort", "project", "fold", "sum", "fragments", "Mfragments/s"
+    );
+    for n in TABLE_1.into_iter().filter(|n| only.is_none_or(|only| only == *n)) {
+        row(&format!("outdoor {n}"), &mut Frame::outdoor(n));
+        row(&format!("3x3 pixels {n}"), &mut Frame::small_splats(n));
     }
-    group.finish();
 }
 
-criterion_group!(benches, bench);
-criterion_main!(benches);
+fn row(name: &str, frame: &mut Frame) {
+    let mut best = [[f64::INFINITY; 2]; 3];
+    let mut fragments = 0;
+    for _ in 0..REPEATS {
+        let steps: [&mut dyn FnMut(&mut Frame); 3] =
+            [&mut |f| f.sort(), &mut |f| f.project(), &mut |f| fragments = f.fold().fragments];
+        for (step, best) in steps.into_iter().zip(&mut best) {
+            let (start, busy) = (Instant::now(), processor_ms());
+            step(frame);
+            best[0] = best[0].min(start.elapsed().as_secs_f64() * 1e3);
+            best[1] = best[1].min(processor_ms() - busy);
+        }
+    }
+    let sum = [0, 1].map(|k| best.iter().map(|b| b[k]).sum::<f64>());
+    let rate = fragments as f64 / best[2][0] * 1e-3;
+    let cell = |b: [f64; 2]| format!("{:.1} {:.0}", b[0], b[1]);
+    let [sort, project, fold] = best.map(cell);
+    println!("{name:>24} {sort:>10} {project:>10} {fold:>10} {:>10} {fragments:12} {rate:9.0}", cell(sum));
+}

@@ -4,7 +4,7 @@ use crate::load::Loaded;
 use crate::plan::{Plan, pass};
 use crate::scene::{RenderSettings, ShadowMapping};
 use crate::{Error, Progress};
-use splat_core::raster::{self, Background, OpaqueImage, Projected, RasterCounts};
+use splat_core::raster::{self, Background, Detail, OpaqueImage, Projected, RasterCounts};
 use splat_core::shade::{ChannelLayout, LitBy, ShadeInput, shade};
 use splat_core::{Accumulator, Camera, CostRecord, LayerSet, Layers, SliceOrder, SplatKind, StageCost, Transmittance};
 use tsm::ShadowMap;
@@ -158,21 +158,29 @@ impl Drawing<'_> {
         (0..kinds.len() as u32).filter(|&i| keep(kinds[i as usize])).collect()
     }
 
+    /// Depths are for opaque splats and what they hide, for depth layers, and for telling objects apart.
+    fn detail(&self) -> Detail {
+        let opaque = self.loaded.cloud.kind.contains(&SplatKind::Opaque);
+        Detail { depth: opaque || self.layers.depth || self.layers.object, object: self.layers.object }
+    }
+
     /// Footprints of all splats, and the radiance of those in view.
     fn shade(&self, input: &ShadeInput<'_>, layout: &ChannelLayout, cost: &mut CostRecord) -> Result<Shaded, Error> {
         self.tick()?;
         let l = self.loaded;
         let projected = cost.measure(pass::PROJECT, |stage| {
-            let projected = raster::project(&l.cloud, input.camera, &l.footprints, &l.materials, &self.raster_params());
+            let mut projected = Projected::default();
+            let (params, detail) = (self.raster_params(), self.detail());
+            raster::project_into(&mut projected, &l.cloud, input.camera, &l.footprints, &l.materials, &params, detail);
             stage.items_in = l.cloud.len() as u64;
-            stage.items_out = projected.splats.iter().filter(|s| s.is_visible()).count() as u64;
-            stage.bytes = std::mem::size_of_val(projected.splats.as_slice()) as u64;
+            stage.items_out = projected.visible();
+            stage.bytes = projected.bytes();
             Ok::<_, Error>(projected)
         })?;
         self.tick()?;
         let values = cost.measure(pass::SHADE, |stage| {
             let values = shade(input, &projected, layout, self.progress);
-            stage.items_in = projected.splats.iter().filter(|s| s.is_visible()).count() as u64;
+            stage.items_in = projected.visible();
             stage.items_out = stage.items_in;
             stage.bytes = 4 * values.len() as u64;
             Ok::<_, Error>(values)

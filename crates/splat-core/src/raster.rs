@@ -10,15 +10,19 @@
 
 mod bins;
 mod finish;
+mod gather;
+mod kernel;
 mod lanes;
 mod opaque;
 mod project;
+mod projected;
 mod tile;
 mod translucent;
 
 pub use finish::{Background, finish};
 pub use opaque::{OpaqueImage, resolve_opaque};
-pub use project::{Projected, ProjectedSplat, project};
+pub use project::{project, project_into};
+pub use projected::{Detail, Projected, ProjectedDepth, ProjectedSplat};
 pub use translucent::fold;
 
 /// What rasterization may trade.

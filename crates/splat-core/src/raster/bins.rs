@@ -3,7 +3,7 @@
 //! Splats are binned in chunks of fixed size, each with its own lists; a tile's list is the lists of all chunks one
 //! after the other. So chunks are binned in parallel without a shared buffer, and the order never depends on threads.
 
-use super::Projected;
+use super::projected::{Coverage, Projected};
 use rayon::prelude::*;
 
 /// Side of a tile, pixels.
@@ -23,6 +23,8 @@ pub(crate) struct Bins {
 struct ChunkLists {
     starts: Vec<u32>,
     entries: Vec<u32>,
+    /// Splats that reach any tile.
+    splats: u64,
 }
 
 impl Bins {
@@ -44,6 +46,11 @@ impl Bins {
         self.chunks.iter().map(|c| c.entries.len() as u64).sum()
     }
 
+    /// Splats that reach any tile.
+    pub(crate) fn splats(&self) -> u64 {
+        self.chunks.iter().map(|c| c.splats).sum()
+    }
+
     pub(crate) fn bytes(&self) -> u64 {
         self.chunks.iter().map(|c| 4 * (c.entries.len() + c.starts.len()) as u64).sum()
     }
@@ -59,34 +66,37 @@ pub(crate) fn bin(projected: &Projected, ids: &[u32]) -> Bins {
 
 fn bin_chunk(projected: &Projected, ids: &[u32], columns: usize, tiles: usize) -> ChunkLists {
     // One loop that waits for nothing but memory: the splats lie far apart.
-    let bounds: Vec<[u16; 4]> = ids.iter().map(|&i| projected.splats[i as usize].bounds).collect();
+    let coverage: Vec<Coverage> = ids.iter().map(|&i| projected.coverage[i as usize]).collect();
     // starts[t + 1] first counts, then is the end of the tile before, then the running end of tile t.
     let mut starts = vec![0u32; tiles + 2];
-    for bounds in &bounds {
-        for_each_tile(bounds, columns, |t| starts[t + 2] += 1);
+    let mut splats = 0;
+    for (&coverage, &id) in coverage.iter().zip(ids) {
+        splats += u64::from(coverage != Coverage::NONE);
+        for_each_tile(projected, coverage, id, columns, |t| starts[t + 2] += 1);
     }
     for t in 2..starts.len() {
         starts[t] += starts[t - 1];
     }
     let mut entries = vec![0u32; starts[tiles + 1] as usize];
-    for (bounds, &id) in bounds.iter().zip(ids) {
-        for_each_tile(bounds, columns, |t| {
+    for (&coverage, &id) in coverage.iter().zip(ids) {
+        for_each_tile(projected, coverage, id, columns, |t| {
             entries[starts[t + 1] as usize] = id;
             starts[t + 1] += 1;
         });
     }
     starts.pop();
-    ChunkLists { starts, entries }
+    ChunkLists { starts, entries, splats }
 }
 
 #[inline(always)]
-fn for_each_tile(bounds: &[u16; 4], columns: usize, mut visit: impl FnMut(usize)) {
-    let [x0, x1, y0, y1] = bounds.map(usize::from);
-    if x0 < x1 {
-        for row in y0 / TILE..=(y1 - 1) / TILE {
-            for column in x0 / TILE..=(x1 - 1) / TILE {
-                visit(row * columns + column);
-            }
+fn for_each_tile(projected: &Projected, coverage: Coverage, id: u32, columns: usize, mut visit: impl FnMut(usize)) {
+    if coverage == Coverage::NONE {
+        return;
+    }
+    let [first, last] = coverage.tiles(|| projected.splats[id as usize].bounds(projected.size));
+    for row in first[1]..=last[1] {
+        for column in first[0]..=last[0] {
+            visit(row * columns + column);
         }
     }
 }
@@ -94,16 +104,15 @@ fn for_each_tile(bounds: &[u16; 4], columns: usize, mut visit: impl FnMut(usize)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::ProjectedSplat;
 
     #[test]
     fn every_splat_is_listed_once_in_each_tile_that_it_touches() {
-        let splat = |bounds| ProjectedSplat { bounds, ..ProjectedSplat::default() };
-        let splats = vec![splat([0, 1, 0, 1]), splat([31, 33, 0, 1]), splat([0, 0, 0, 0]), splat([0, 64, 0, 64])];
-        let projected = Projected { splats, perspective: None, size: [64, 64] };
+        let bounds = [[0, 1, 0, 1], [31, 33, 0, 1], [0, 0, 0, 0], [0, 64, 0, 64]];
+        let coverage = bounds.map(Coverage::of).to_vec();
+        let projected = Projected { coverage, size: [64, 64], ..Projected::default() };
         let bins = bin(&projected, &[3, 0, 2, 1]);
         let lists: Vec<Vec<u32>> = (0..bins.tiles()).map(|t| bins.tile(t).flatten().copied().collect()).collect();
         assert_eq!(lists, [vec![3, 0, 1], vec![3, 1], vec![3], vec![3]]);
-        assert_eq!(bins.entries(), 7);
+        assert_eq!((bins.entries(), bins.splats()), (7, 3));
     }
 }

@@ -3,10 +3,12 @@
 //! A disc hides what lies behind it within [`CORE`] of its radius, which leaves no hole between neighbours on a surface
 //! and keeps open borders sharp; its colour is blended over the whole radius: c = Σwc/Σw.
 
+use super::RasterCounts;
 use super::bins::{Bins, TILE, bin};
-use super::lanes::Lanes;
-use super::tile::{AREA, BATCH, for_each_row, for_each_run};
-use super::{Projected, ProjectedSplat, RasterCounts};
+use super::kernel::Kernel;
+use super::lanes::{Lanes, MAX_LANES};
+use super::projected::{Projected, ProjectedDepth, ProjectedSplat};
+use super::tile::{AREA, BATCH, for_each_run, for_each_span};
 use crate::Progress;
 use pulp::Simd;
 use rayon::prelude::*;
@@ -44,6 +46,9 @@ struct OpaqueTile {
 
 /// Resolves the opaque splats `ids`; `values` holds `channels` numbers a splat, by id. Object ids are kept
 /// when `objects` asks for them. After `progress.cancel()` the remaining tiles stay empty.
+///
+/// # Panics
+/// If `projected` lacks depths, or objects that are asked for.
 pub fn resolve_opaque(
     projected: &Projected,
     ids: &[u32],
@@ -55,6 +60,8 @@ pub fn resolve_opaque(
     if ids.is_empty() {
         return (OpaqueImage::default(), RasterCounts::default());
     }
+    assert_eq!(projected.depths.len(), projected.splats.len(), "invariant: opaque splats have depths");
+    assert!(!objects || projected.objects.len() == projected.splats.len(), "invariant: objects when asked for");
     let bins = bin(projected, ids);
     let tiles: Vec<OpaqueTile> = (0..bins.tiles())
         .into_par_iter()
@@ -72,7 +79,7 @@ pub fn resolve_opaque(
         object: if objects { vec![u32::MAX; n] } else { Vec::new() },
     };
     for tile in &tiles {
-        for_each_row(projected.size, tile.x, tile.y, |from, to| {
+        for_each_span(projected.size, tile.x, tile.y, |from, to| {
             image.depth[to.clone()].copy_from_slice(&tile.depth[from.clone()]);
             for (plane, tile) in image.channels.iter_mut().zip(tile.channels.chunks_exact(AREA)) {
                 plane[to.clone()].copy_from_slice(&tile[from.clone()]);
@@ -83,7 +90,7 @@ pub fn resolve_opaque(
         });
     }
     let counts = RasterCounts {
-        splats: ids.iter().filter(|i| projected.is_visible(**i as usize)).count() as u64,
+        splats: bins.splats(),
         tile_entries: bins.entries(),
         fragments: tiles.iter().map(|t| t.fragments).sum(),
         bytes: bins.bytes() + (n * 4 * (channels + 2)) as u64,
@@ -106,20 +113,31 @@ impl pulp::WithSimd for ResolveTile<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { tile, bins, t, projected, values } = self;
-        let channels = tile.channels.len() / AREA;
-        let mut records = [ProjectedSplat::default(); BATCH];
+        let (channels, size) = (tile.channels.len() / AREA, projected.size);
+        let mut records = [(ProjectedSplat::default(), ProjectedDepth::default()); BATCH];
         let batches = || bins.tile(t).flat_map(|list| list.chunks(BATCH));
+        let gather = |batch: &[u32], records: &mut [(ProjectedSplat, ProjectedDepth)]| {
+            for (&j, record) in batch.iter().zip(records) {
+                *record = (projected.splats[j as usize], projected.depths[j as usize]);
+            }
+        };
         for batch in batches() {
-            batch.iter().zip(&mut records).for_each(|(&j, record)| *record = projected.splats[j as usize]);
-            records[..batch.len()].iter().for_each(|splat| tile.nearest(simd, splat));
+            gather(batch, &mut records);
+            records[..batch.len()].iter().for_each(|(splat, depth)| tile.nearest(simd, size, splat, depth));
         }
         if !tile.object.is_empty() {
-            bins.tile(t).flatten().for_each(|&j| tile.name_nearest(simd, &projected.splats[j as usize]));
+            for batch in batches() {
+                gather(batch, &mut records);
+                for ((splat, depth), &j) in records.iter().zip(batch) {
+                    tile.name_nearest(simd, size, splat, depth, projected.objects[j as usize]);
+                }
+            }
         }
         for batch in batches() {
-            batch.iter().zip(&mut records).for_each(|(&j, record)| *record = projected.splats[j as usize]);
-            for (splat, &j) in records.iter().zip(batch) {
-                tile.blend(simd, splat, &values[j as usize * channels..][..channels]);
+            gather(batch, &mut records);
+            for ((splat, depth), &j) in records.iter().zip(batch) {
+                let kernel = &projected.kernels[splat.footprint as usize];
+                tile.blend(simd, size, splat, depth, kernel, &values[j as usize * channels..][..channels]);
             }
         }
         tile.normalize();
@@ -142,26 +160,34 @@ impl OpaqueTile {
 
     /// Step 1: the nearest depth.
     #[inline(always)]
-    fn nearest<S: Simd>(&mut self, simd: S, splat: &ProjectedSplat) {
-        for_each_run::<S>(splat, [self.x, self.y], |run| {
+    fn nearest<S: Simd>(&mut self, simd: S, size: [u32; 2], splat: &ProjectedSplat, depth: &ProjectedDepth) {
+        self.fragments += for_each_run(simd, splat, size, [self.x, self.y], |run| {
             let far = Lanes::splat(simd, f32::INFINITY);
-            let solid = run.depth(simd).where_less_or(run.distance_sq(simd), Lanes::splat(simd, CORE), far);
-            Lanes::load(simd, &self.depth[run.k..]).min(solid).store(&mut self.depth[run.k..]);
-            self.fragments += Lanes::<S>::COUNT as u64;
+            let core = Lanes::splat(simd, CORE);
+            let solid = run.depth(simd, depth).where_less_or(run.distance_sq(simd, splat), core, far);
+            let nearest = &mut self.depth[run.pixel()..];
+            Lanes::load(simd, nearest).min(solid).store(nearest);
         });
     }
 
     /// Whose the nearest depth is; of several at the same depth the first.
     #[inline(always)]
-    fn name_nearest<S: Simd>(&mut self, simd: S, splat: &ProjectedSplat) {
-        for_each_run::<S>(splat, [self.x, self.y], |run| {
-            let (mut s, mut depth) = ([0.0; super::lanes::MAX_LANES], [0.0; super::lanes::MAX_LANES]);
-            run.distance_sq(simd).store(&mut s);
-            run.depth(simd).store(&mut depth);
+    fn name_nearest<S: Simd>(
+        &mut self,
+        simd: S,
+        size: [u32; 2],
+        splat: &ProjectedSplat,
+        depth: &ProjectedDepth,
+        object: u32,
+    ) {
+        for_each_run(simd, splat, size, [self.x, self.y], |run| {
+            let (mut s, mut z) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
+            run.distance_sq(simd, splat).store(&mut s);
+            run.depth(simd, depth).store(&mut z);
             for i in 0..Lanes::<S>::COUNT {
-                let k = run.k + i;
-                if s[i] < CORE && depth[i] == self.depth[k] && self.object[k] == u32::MAX {
-                    self.object[k] = splat.object;
+                let k = run.pixel() + i;
+                if s[i] < CORE && z[i] == self.depth[k] && self.object[k] == u32::MAX {
+                    self.object[k] = object;
                 }
             }
         });
@@ -169,23 +195,32 @@ impl OpaqueTile {
 
     /// Step 2: weights of all fragments within ε-z of the nearest.
     #[inline(always)]
-    fn blend<S: Simd>(&mut self, simd: S, splat: &ProjectedSplat, values: &[f32]) {
-        for_each_run::<S>(splat, [self.x, self.y], |run| {
-            let of = |v: f32| Lanes::splat(simd, v);
-            let nearest = Lanes::load(simd, &self.depth[run.k..]);
+    fn blend<S: Simd>(
+        &mut self,
+        simd: S,
+        size: [u32; 2],
+        splat: &ProjectedSplat,
+        depth: &ProjectedDepth,
+        kernel: &Kernel,
+        values: &[f32],
+    ) {
+        let of = |v: f32| Lanes::splat(simd, v);
+        self.fragments += for_each_run(simd, splat, size, [self.x, self.y], |run| {
+            let k = run.pixel();
+            let nearest = Lanes::load(simd, &self.depth[k..]);
             // Behind by how much; where there is no surface −∞, and nothing counts.
-            let behind = run.depth(simd) - nearest;
-            let s = run.distance_sq(simd);
-            let near = run.amount(simd, s).where_less(behind, of(EPSILON_Z * splat.depth_extent));
+            let behind = run.depth(simd, depth) - nearest;
+            let t = (of(1.0) - run.distance_sq(simd, splat)).max(of(0.0));
+            let amount = of(splat.peak) * kernel.profile(simd, t);
+            let near = amount.where_less(behind, of(EPSILON_Z * depth.extent));
             let weight = near.where_less(nearest, of(f32::INFINITY));
             let add = |plane: &mut [f32], v: Lanes<S>| (Lanes::load(simd, plane) + v).store(plane);
-            add(&mut self.weight[run.k..], weight);
+            add(&mut self.weight[k..], weight);
             let finite = behind.where_less(nearest, of(f32::INFINITY));
-            add(&mut self.depth_sum[run.k..], weight * finite);
+            add(&mut self.depth_sum[k..], weight * finite);
             for (c, value) in values.iter().enumerate() {
-                add(&mut self.channels[c * AREA + run.k..], weight * of(*value));
+                add(&mut self.channels[c * AREA + k..], weight * of(*value));
             }
-            self.fragments += Lanes::<S>::COUNT as u64;
         });
     }
 

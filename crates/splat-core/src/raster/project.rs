@@ -1,77 +1,89 @@
-//! Projection of splats to image-space footprints.
+//! Projection of splats to image-space footprints, as many splats at once as the machine has lanes.
 //!
 //! **Medium.** For a centre c = z(u₀, v₀, 1) and a ray d = (u₀+du, v₀+dv, 1) the squared distance of the centre from the
 //! ray is ρ² = |c × d|²/|d|² = z²·(du² + dv² + (u₀dv − v₀du)²)/|d|²: a quadratic form in the pixel offset, exact in
-//! perspective, over a factor that depends on the pixel alone. Nothing cancels for far centres.
+//! perspective, over a factor that depends on the pixel alone. Nothing cancels for far centres. The form spans
+//! |dx| ≤ √((1 + u₀²)/scale) where |d|² is that of the centre; R/z widens it for the change of |d|² across the footprint.
 //!
-//! **Disc.** The tangent disc is projected by its Jacobian at the centre (Zwicker's EWA): conic = (J Jᵀ + filter)⁻¹.
+//! **Disc.** The tangent disc is projected by its Jacobian at the centre (Zwicker's EWA): conic = (J Jᵀ + filter)⁻¹, and
+//! the diagonal of J Jᵀ + filter is the square of the half extents.
 
 use super::Params;
-use super::lanes::exp_neg;
-use crate::{Camera, Cloud, FootprintStack, Material, SplatKind, ViewTransform};
-use glam::{Mat2, Vec2, Vec3};
+use super::gather::{Attributes, Column, Columns};
+use super::kernel::Kernel;
+use super::lanes::Lanes;
+use super::projected::{Coverage, Detail, Projected, ProjectedDepth, ProjectedSplat};
+use crate::{Camera, Cloud, FootprintStack, Material, ViewTransform};
+use glam::Vec2;
+use pulp::Simd;
 use rayon::prelude::*;
 
-/// The footprint of one splat in the image. Pixel centres lie at half-integers, y runs down.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-#[repr(align(64))] // one cache line
-pub struct ProjectedSplat {
-    /// Image position of the centre, pixels.
-    pub center_px: [f32; 2],
-    /// s = a·dx² + 2b·dx·dy + c·dy² in 1/pixel², s < 1 inside; for a medium in perspective times the pixel's 1/|d|².
-    pub conic: [f32; 3],
-    /// View depth of the centre.
-    pub depth: f32,
-    /// Change of view depth per pixel across a disc; 0 for a medium.
-    pub depth_slope: [f32; 2],
-    /// Largest distance in depth between a fragment and the centre: R.
-    pub depth_extent: f32,
-    /// Optical depth where the profile is 1: K·norm/R². For an opaque splat the weight there, area·norm/R².
-    pub peak: f32,
-    /// q of the footprint.
-    pub sharpness: f32,
-    /// e^−q.
-    pub rim: f32,
-    /// Pixel rectangle [x0, x1) × [y0, y1), clipped to the image; empty when nothing is visible.
-    pub bounds: [u16; 4],
-    /// Object id.
-    pub object: u32,
-    /// Material id.
-    pub material: u16,
-    /// Medium, surface or opaque.
-    pub kind: SplatKind,
+/// Splats projected by one task.
+const CHUNK: usize = 4096;
+
+/// Projects all splats of `cloud` into fresh memory, with every detail; see [`project_into`].
+///
+/// # Panics
+/// As [`project_into`].
+pub fn project(
+    cloud: &Cloud,
+    camera: &Camera,
+    footprints: &FootprintStack,
+    materials: &[Material],
+    params: &Params,
+) -> Projected {
+    let mut out = Projected::default();
+    project_into(&mut out, cloud, camera, footprints, materials, params, Detail::ALL);
+    out
 }
 
-/// Footprints of all splats of a cloud, by id; those that no pixel shows are empty.
-#[derive(Debug, Clone, Default)]
-pub struct Projected {
-    /// The footprints.
-    pub splats: Vec<ProjectedSplat>,
-    /// Focal length, pixels, and image centre for rays; `None` for parallel rays.
-    pub(crate) perspective: Option<f32>,
-    /// Image size, pixels.
-    pub size: [u32; 2],
-}
-
-impl Projected {
-    /// Whether splat `i` covers a pixel's rectangle at all.
-    pub fn is_visible(&self, i: usize) -> bool {
-        self.splats[i].is_visible()
+/// Projects all splats of `cloud`; `out` may hold another frame's projection, whose memory is used again.
+///
+/// In the order of ids, which is that of memory: splats in view order lie far apart, and gathering their attributes one
+/// column at a time would cost more than projecting those that turn out to be hidden. A splat around the eye has no
+/// image; it is left out as a whole.
+///
+/// # Panics
+/// If a material or a footprint of the cloud is out of range; `Cloud::validate` and the tables promise it is not.
+pub fn project_into(
+    out: &mut Projected,
+    cloud: &Cloud,
+    camera: &Camera,
+    footprints: &FootprintStack,
+    materials: &[Material],
+    params: &Params,
+    detail: Detail,
+) {
+    out.resize(cloud.len(), detail);
+    out.objects.clear();
+    if detail.object {
+        out.objects.extend_from_slice(&cloud.object);
     }
-}
-
-impl ProjectedSplat {
-    /// Whether the footprint has any pixel.
-    pub fn is_visible(&self) -> bool {
-        self.bounds[0] < self.bounds[1]
-    }
+    out.kernels.clear();
+    out.kernels.extend(footprints.layers().iter().map(Kernel::new));
+    out.size = camera.size;
+    out.perspective = (!camera.is_orthographic()).then_some(camera.focal_px() as f32);
+    let projector = Projector {
+        columns: Columns { cloud, kernels: &out.kernels, materials },
+        view: camera.view_from_offset(cloud.origin),
+        focal: camera.focal_px() as f32,
+        half: Vec2::new(camera.size[0] as f32, camera.size[1] as f32) * 0.5,
+        orthographic: camera.is_orthographic(),
+        size: camera.size,
+        filter_sigma_px: params.resampling_sigma_px,
+    };
+    let mut depths: Vec<&mut [ProjectedDepth]> = out.depths.chunks_mut(CHUNK).collect();
+    depths.resize_with(cloud.len().div_ceil(CHUNK), Default::default);
+    let chunks = out.splats.par_chunks_mut(CHUNK).zip(out.coverage.par_chunks_mut(CHUNK)).zip(depths);
+    chunks.enumerate().for_each(|(chunk, ((splats, coverage), depths))| {
+        let first = chunk * CHUNK;
+        pulp::Arch::new().dispatch(ProjectChunk { projector: &projector, first, splats, coverage, depths });
+    });
 }
 
 /// What all splats of a projection share.
 struct Projector<'a> {
-    cloud: &'a Cloud,
-    footprints: Vec<ProjectedFootprint>,
-    materials: &'a [Material],
+    columns: Columns<'a>,
     view: ViewTransform,
     focal: f32,
     half: Vec2,
@@ -80,182 +92,268 @@ struct Projector<'a> {
     filter_sigma_px: f32,
 }
 
-/// What projection needs of a footprint, computed once.
-struct ProjectedFootprint {
-    cutoff: f32,
-    sharpness: f32,
-    rim: f32,
-    norm: f32,
+/// One chunk's work, in the form that [`pulp`] compiles once per instruction set.
+struct ProjectChunk<'a> {
+    projector: &'a Projector<'a>,
+    first: usize,
+    splats: &'a mut [ProjectedSplat],
+    coverage: &'a mut [Coverage],
+    /// Empty when not asked for.
+    depths: &'a mut [ProjectedDepth],
 }
 
-/// Projects all splats of `cloud`.
-///
-/// In the order of ids, which is that of memory: splats in view order lie far apart, and gathering their attributes one
-/// column at a time would cost more than projecting those that turn out to be hidden.
-///
-/// # Panics
-/// If a material or a footprint of the cloud is out of range; `Cloud::validate` and the tables promise it is not.
-pub fn project(
-    cloud: &Cloud,
-    camera: &Camera,
-    footprints: &FootprintStack,
-    materials: &[Material],
-    params: &Params,
-) -> Projected {
-    let projector = Projector {
-        cloud,
-        footprints: footprints
-            .layers()
-            .iter()
-            .map(|f| ProjectedFootprint {
-                cutoff: f.cutoff,
-                sharpness: f.sharpness(),
-                rim: exp_neg(f.sharpness()),
-                norm: f.norm() as f32,
-            })
-            .collect(),
-        materials,
-        view: camera.view_from_offset(cloud.origin),
-        focal: camera.focal_px() as f32,
-        half: Vec2::new(camera.size[0] as f32, camera.size[1] as f32) * 0.5,
-        orthographic: camera.is_orthographic(),
-        size: camera.size,
-        filter_sigma_px: params.resampling_sigma_px,
-    };
-    let splats = (0..cloud.len()).into_par_iter().with_min_len(4096).map(|i| projector.project(i)).collect();
-    let perspective = (!camera.is_orthographic()).then_some(projector.focal);
-    Projected { splats, perspective, size: camera.size }
+impl pulp::WithSimd for ProjectChunk<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let (projector, lanes) = (self.projector, Lanes::<S>::COUNT);
+        let mut attributes = Attributes::default();
+        let mut image = Image::default();
+        for begin in (0..self.splats.len()).step_by(lanes) {
+            attributes.read(&projector.columns, self.first + begin, lanes);
+            projector.project(simd, &attributes, &mut image);
+            let end = self.splats.len().min(begin + lanes);
+            let splats = &mut self.splats[begin..end];
+            projector.write(self.first + begin, &image, splats, &mut self.coverage[begin..end]);
+            if !self.depths.is_empty() {
+                image.write_depths(&attributes, &mut self.depths[begin..end]);
+            }
+        }
+    }
+}
+
+/// Footprints of one group of lanes, on their way to memory.
+#[derive(Default)]
+struct Image {
+    center: [Column; 2],
+    depth: Column,
+    conic: [Column; 3],
+    /// Not positive for what has no image.
+    peak: Column,
+    half_extent: [Column; 2],
+    slope: [Column; 2],
+}
+
+/// Centres in view space.
+struct Centers<S: Simd> {
+    position: [Lanes<S>; 3],
+    px_per_world: Lanes<S>,
+    /// x/z and y/z; 0 for parallel rays.
+    u: Lanes<S>,
+    v: Lanes<S>,
+    filter_px: Lanes<S>,
+}
+
+/// What differs between media and discs.
+struct Shapes<S: Simd> {
+    conic: [Lanes<S>; 3],
+    peak: Lanes<S>,
+    half_extent: [Lanes<S>; 2],
+    slope: [Lanes<S>; 2],
 }
 
 impl Projector<'_> {
-    fn project(&self, i: usize) -> ProjectedSplat {
-        let cloud = self.cloud;
-        let center = self.view.apply(cloud.position[i]);
-        let radius = cloud.radius[i];
-        // A splat around the eye has no image; it is left out as a whole.
-        if !self.orthographic && center.z <= radius {
-            return ProjectedSplat::default();
-        }
-        let kind = cloud.kind[i];
-        let px_per_world = if self.orthographic { self.focal } else { self.focal / center.z };
-        let footprint = &self.footprints[cloud.footprint[i] as usize];
-        let filter_px = footprint.cutoff * self.filter_sigma_px;
-        let mut out = ProjectedSplat {
-            center_px: self.image_position(center, px_per_world),
-            depth: center.z,
-            depth_extent: radius,
-            sharpness: footprint.sharpness,
-            rim: footprint.rim,
-            object: cloud.object[i],
-            material: cloud.material[i],
-            kind,
-            ..ProjectedSplat::default()
-        };
-        match kind {
-            SplatKind::Medium => self.medium(&mut out, i, center, px_per_world, filter_px, footprint.norm),
-            SplatKind::Surface | SplatKind::Opaque => {
-                self.disc(&mut out, i, center, px_per_world, filter_px, footprint.norm)
+    #[inline(always)]
+    fn project<S: Simd>(&self, simd: S, attributes: &Attributes, image: &mut Image) {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let load = |column: &Column| Lanes::load(simd, column);
+        let centers = self.centers(simd, attributes);
+        let shapes = match (attributes.any_medium, attributes.any_disc) {
+            (_, false) => self.media(simd, attributes, &centers),
+            (false, true) => self.discs(simd, attributes, &centers),
+            (true, true) => {
+                let (media, discs) = (self.media(simd, attributes, &centers), self.discs(simd, attributes, &centers));
+                media.where_less(load(&attributes.disc), of(0.0), &discs)
             }
-        }
-        self.clip(&mut out, radius / center.z.abs().max(radius));
-        out
-    }
-
-    fn image_position(&self, center: Vec3, px_per_world: f32) -> [f32; 2] {
-        [self.half.x + center.x * px_per_world, self.half.y - center.y * px_per_world]
-    }
-
-    fn medium(&self, out: &mut ProjectedSplat, i: usize, c: Vec3, px_per_world: f32, filter_px: f32, norm: f32) {
-        let filter_world = filter_px / px_per_world;
-        let radius_sq = self.cloud.radius[i] * self.cloud.radius[i] + filter_world * filter_world;
-        let scale = 1.0 / (px_per_world * px_per_world * radius_sq);
-        let (u, v) = if self.orthographic { (0.0, 0.0) } else { (c.x / c.z, c.y / c.z) };
-        // y runs down in the image, so the mixed term changes its sign.
-        out.conic = [(1.0 + v * v) * scale, u * v * scale, (1.0 + u * u) * scale];
-        out.peak = self.cloud.cross_section[i] * norm / radius_sq;
-    }
-
-    fn disc(&self, out: &mut ProjectedSplat, i: usize, c: Vec3, px_per_world: f32, filter_px: f32, norm: f32) {
-        let normal = self.view.rotation * self.cloud.normal_of(i);
-        let (axis_u, axis_v) = self.disc_axes(i, normal);
-        let to_image = |a: Vec3| {
-            // d(x/z) = (dx − (x/z)·dz)/z; parallel rays have no dz term.
-            let (u, v) = if self.orthographic { (0.0, 0.0) } else { (c.x / c.z, c.y / c.z) };
-            Vec2::new((a.x - u * a.z) * px_per_world, -(a.y - v * a.z) * px_per_world)
         };
+        let [x, y, z] = centers.position;
+        (of(self.half.x) + x * centers.px_per_world).store(&mut image.center[0]);
+        (of(self.half.y) - y * centers.px_per_world).store(&mut image.center[1]);
+        z.store(&mut image.depth);
+        // A splat around the eye has no image; comparisons with NaN are false, so what is no number has none either.
+        let near = if self.orthographic { of(f32::NEG_INFINITY) } else { load(&attributes.radius) };
+        let peak = shapes.peak.where_less(near, z);
+        peak.where_less(of(0.0), shapes.peak).store(&mut image.peak);
+        for k in 0..3 {
+            shapes.conic[k].store(&mut image.conic[k]);
+        }
+        for k in 0..2 {
+            shapes.half_extent[k].store(&mut image.half_extent[k]);
+            shapes.slope[k].store(&mut image.slope[k]);
+        }
+    }
+
+    #[inline(always)]
+    fn centers<S: Simd>(&self, simd: S, attributes: &Attributes) -> Centers<S> {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let position = self.rotate(simd, &attributes.position);
+        let t = self.view.translation;
+        let position = [position[0] + of(t.x), position[1] + of(t.y), position[2] + of(t.z)];
+        let [x, y, z] = position;
+        let filter_px = Lanes::load(simd, &attributes.cutoff) * of(self.filter_sigma_px);
+        if self.orthographic {
+            return Centers { position, px_per_world: of(self.focal), u: of(0.0), v: of(0.0), filter_px };
+        }
+        Centers { position, px_per_world: of(self.focal) / z, u: x / z, v: y / z, filter_px }
+    }
+
+    /// Into view space, in the order of operations of [`ViewTransform::depth`].
+    #[inline(always)]
+    fn rotate<S: Simd>(&self, simd: S, v: &[Column; 3]) -> [Lanes<S>; 3] {
+        let m = &self.view.rotation;
+        let (x, y, z) = (Lanes::load(simd, &v[0]), Lanes::load(simd, &v[1]), Lanes::load(simd, &v[2]));
+        let row =
+            |a: f32, b: f32, c: f32| Lanes::splat(simd, a) * x + Lanes::splat(simd, b) * y + Lanes::splat(simd, c) * z;
+        [
+            row(m.x_axis.x, m.y_axis.x, m.z_axis.x),
+            row(m.x_axis.y, m.y_axis.y, m.z_axis.y),
+            row(m.x_axis.z, m.y_axis.z, m.z_axis.z),
+        ]
+    }
+
+    #[inline(always)]
+    fn media<S: Simd>(&self, simd: S, attributes: &Attributes, centers: &Centers<S>) -> Shapes<S> {
+        let (of, load) = (|v: f32| Lanes::splat(simd, v), |column: &Column| Lanes::load(simd, column));
+        let Centers { px_per_world, u, v, filter_px, .. } = *centers;
+        let radius = load(&attributes.radius);
+        let filter_world = filter_px / px_per_world;
+        let radius_sq = radius * radius + filter_world * filter_world;
+        let reach_sq = px_per_world * px_per_world * radius_sq;
+        let scale = of(1.0) / reach_sq;
+        let (x_sq, y_sq) = (of(1.0) + u * u, of(1.0) + v * v);
+        let depth = centers.position[2].abs().max(radius);
+        let widen = if self.orthographic { of(1.0) } else { of(1.0) + of(2.0) * (radius / depth) };
+        Shapes {
+            // y runs down in the image, so the mixed term changes its sign.
+            conic: [y_sq * scale, of(2.0) * (u * v * scale), x_sq * scale],
+            peak: load(&attributes.cross_section) * load(&attributes.norm) / radius_sq,
+            half_extent: [(x_sq * reach_sq).sqrt() * widen, (y_sq * reach_sq).sqrt() * widen],
+            slope: [of(0.0); 2],
+        }
+    }
+
+    #[inline(always)]
+    fn discs<S: Simd>(&self, simd: S, attributes: &Attributes, centers: &Centers<S>) -> Shapes<S> {
+        let (of, load) = (|v: f32| Lanes::splat(simd, v), |column: &Column| Lanes::load(simd, column));
+        let Centers { px_per_world, u, v, filter_px, .. } = *centers;
+        let normal = self.rotate(simd, &attributes.normal);
+        let (axis_u, axis_v) = self.disc_axes(simd, attributes, normal);
+        // d(x/z) = (dx − (x/z)·dz)/z; parallel rays have no dz term.
+        let to_image = |a: [Lanes<S>; 3]| [(a[0] - u * a[2]) * px_per_world, (v * a[2] - a[1]) * px_per_world];
         let (ju, jv) = (to_image(axis_u), to_image(axis_v));
         let filter_sq = filter_px * filter_px;
-        let area_sq = ju.perp_dot(jv).powi(2);
-        let m = Mat2::from_cols(
-            Vec2::new(ju.x * ju.x + jv.x * jv.x + filter_sq, ju.x * ju.y + jv.x * jv.y),
-            Vec2::new(ju.x * ju.y + jv.x * jv.y, ju.y * ju.y + jv.y * jv.y + filter_sq),
-        );
+        let area = ju[0] * jv[1] - ju[1] * jv[0];
+        let area_sq = area * area;
+        let (trace_x, trace_y) = (ju[0] * ju[0] + jv[0] * jv[0], ju[1] * ju[1] + jv[1] * jv[1]);
+        let (xx, mixed, yy) = (trace_x + filter_sq, ju[0] * ju[1] + jv[0] * jv[1], trace_y + filter_sq);
         // det = |J|² + filter²·trace(JJᵀ) + filter⁴, written so that an edge-on disc does not cancel.
-        let det = area_sq + filter_sq * (ju.length_squared() + jv.length_squared()) + filter_sq * filter_sq;
-        if det <= 0.0 {
-            return;
-        }
-        out.conic = [m.y_axis.y / det, -m.x_axis.y / det, m.x_axis.x / det];
-        let radius_sq = axis_u.length() * axis_v.length();
+        let det = area_sq + filter_sq * (trace_x + trace_y) + filter_sq * filter_sq;
+        let inverse = of(1.0) / det;
+        let radius_sq = dot(axis_u, axis_u).sqrt() * dot(axis_v, axis_v).sqrt();
         // The filter spreads the same optical depth over a larger image area.
-        let spread = (area_sq / det).sqrt();
-        let view_dir = if self.orthographic { Vec3::Z } else { c / c.length() };
-        let cosine = normal.dot(view_dir);
-        let factor = if out.kind == SplatKind::Surface {
-            self.materials[out.material as usize].surface_opacity.optical_depth_factor(cosine)
+        let spread = (area_sq * inverse).sqrt();
+        let mut peak = load(&attributes.cross_section) * load(&attributes.norm) / radius_sq * spread;
+        // A slab is thicker along a slanted ray; one over |cos| is cut as `SurfaceOpacity` cuts it.
+        let (along, length) = if self.orthographic {
+            (normal[2], of(1.0))
         } else {
-            1.0
+            (dot(normal, [u, v, of(1.0)]), (u * u + v * v + of(1.0)).sqrt())
         };
-        out.peak = self.cloud.cross_section[i] * norm / radius_sq * spread * factor;
-        out.depth_slope = self.plane_slope(normal, c, px_per_world);
-    }
-
-    /// Semi-axes of the disc in view space.
-    fn disc_axes(&self, i: usize, normal: Vec3) -> (Vec3, Vec3) {
-        let (radius, tangent) = (self.cloud.radius[i], self.cloud.tangent_of(i));
-        if tangent == Vec3::ZERO {
-            let u = normal.any_orthonormal_vector();
-            (u * radius, normal.cross(u) * radius)
-        } else {
-            let u = self.view.rotation * tangent;
-            (u, normal.cross(u).normalize_or_zero() * radius)
-        }
-    }
-
-    /// Change of view depth per pixel in x and y on the plane through `c`.
-    fn plane_slope(&self, normal: Vec3, c: Vec3, px_per_world: f32) -> [f32; 2] {
-        let along_ray = if self.orthographic { normal.z } else { normal.dot(c) / c.z };
+        let slab = peak / (along.abs() / length).max(of(1e-3));
+        peak = slab.where_less_or(load(&attributes.crossing), of(0.0), peak);
         // An edge-on plane has no slope that could be used; its fragments stay at the centre's depth.
-        if along_ray.abs() < 1e-4 {
-            return [0.0; 2];
+        let per_px = of(1.0) / (along * px_per_world);
+        let usable = |slope: Lanes<S>| slope.where_less(of(1e-4), along.abs());
+        Shapes {
+            conic: [yy * inverse, of(-2.0) * (mixed * inverse), xx * inverse],
+            peak,
+            half_extent: [xx.sqrt(), yy.sqrt()],
+            slope: [usable(of(0.0) - normal[0] * per_px), usable(normal[1] * per_px)],
         }
-        [-normal.x / along_ray / px_per_world, normal.y / along_ray / px_per_world]
     }
 
-    /// Pixel rectangle of s < 1; `relative_radius` = R/z widens it for the change of |d|² across a medium's footprint.
-    fn clip(&self, out: &mut ProjectedSplat, relative_radius: f32) {
-        let [a, b, c] = out.conic;
-        let det = a * c - b * b;
-        if det.is_nan() || det <= 0.0 || out.peak.is_nan() || out.peak <= 0.0 {
-            out.peak = 0.0;
-            return;
+    /// Semi-axes of the discs in view space.
+    #[inline(always)]
+    fn disc_axes<S: Simd>(
+        &self,
+        simd: S,
+        attributes: &Attributes,
+        normal: [Lanes<S>; 3],
+    ) -> ([Lanes<S>; 3], [Lanes<S>; 3]) {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let radius = Lanes::load(simd, &attributes.radius);
+        // Two vectors across the normal (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
+        let [x, y, z] = normal;
+        let sign = of(-1.0).where_less_or(z, of(0.0), of(1.0));
+        let a = of(-1.0) / (sign + z);
+        let b = x * y * a;
+        let mut axis_u = [b * radius, (sign + y * y * a) * radius, (of(0.0) - y) * radius];
+        if attributes.any_tangent {
+            let tangent = self.rotate(simd, &attributes.tangent);
+            let elliptical = tangent[0].abs().max(tangent[1].abs()).max(tangent[2].abs());
+            for k in 0..3 {
+                axis_u[k] = tangent[k].where_less_or(of(0.0), elliptical, axis_u[k]);
+            }
         }
-        let mut widen = 1.0;
-        if out.kind == SplatKind::Medium && !self.orthographic {
-            // |d|² at the centre: the conic holds ρ²·|d|².
-            let [x, y] = out.center_px;
-            let (u, v) = ((x - self.half.x) / self.focal, (y - self.half.y) / self.focal);
-            widen = (1.0 + u * u + v * v).sqrt() * (1.0 + 2.0 * relative_radius);
-        }
-        let range = |center: f32, extent: f32, limit: u32| {
-            // Pixel i is covered when |i + ½ − centre| < extent; casts round down, and on the rim itself w = 0.
-            let clamp = |v: f32| v.clamp(0.0, limit as f32) as u16;
-            (clamp(center - extent + 0.5), clamp(center + extent + 0.5))
-        };
-        let (x0, x1) = range(out.center_px[0], (c / det).sqrt() * widen, self.size[0]);
-        let (y0, y1) = range(out.center_px[1], (a / det).sqrt() * widen, self.size[1]);
-        if x0 < x1 && y0 < y1 {
-            out.bounds = [x0, x1, y0, y1];
+        let across = cross(normal, axis_u);
+        let length = dot(across, across).sqrt();
+        let scale = (radius / length).where_less(of(0.0), length);
+        (axis_u, [across[0] * scale, across[1] * scale, across[2] * scale])
+    }
+
+    /// Packs the footprints and finds their tiles.
+    #[inline(always)]
+    fn write(&self, first: usize, image: &Image, splats: &mut [ProjectedSplat], coverage: &mut [Coverage]) {
+        let cloud = self.columns.cloud;
+        for (l, (splat, coverage)) in splats.iter_mut().zip(coverage).enumerate() {
+            *splat = ProjectedSplat {
+                center_px: [image.center[0][l], image.center[1][l]],
+                conic: [image.conic[0][l], image.conic[1][l], image.conic[2][l]],
+                peak: image.peak[l],
+                material: cloud.material[first + l],
+                footprint: cloud.footprint[first + l],
+                kind: cloud.kind[first + l],
+                ..ProjectedSplat::default()
+            };
+            splat.set_half_extent([image.half_extent[0][l], image.half_extent[1][l]]);
+            let shown = splat.peak > 0.0;
+            *coverage = if shown { Coverage::of(splat.bounds(self.size)) } else { Coverage::NONE };
         }
     }
+}
+
+impl Image {
+    fn write_depths(&self, attributes: &Attributes, depths: &mut [ProjectedDepth]) {
+        for (l, depth) in depths.iter_mut().enumerate() {
+            let (center, slope, extent) = (self.depth[l], self.slope.map(|s| s[l]), attributes.radius[l]);
+            *depth = ProjectedDepth { center, slope, extent };
+        }
+    }
+}
+
+impl<S: Simd> Shapes<S> {
+    /// `self` where `a` < `b`, `other` elsewhere.
+    #[inline(always)]
+    fn where_less(&self, a: Lanes<S>, b: Lanes<S>, other: &Self) -> Self {
+        let choose = |one: Lanes<S>, other: Lanes<S>| one.where_less_or(a, b, other);
+        let pair = |one: [Lanes<S>; 2], other: [Lanes<S>; 2]| [choose(one[0], other[0]), choose(one[1], other[1])];
+        let ([a, b, c], [d, e, f]) = (self.conic, other.conic);
+        Self {
+            conic: [choose(a, d), choose(b, e), choose(c, f)],
+            peak: choose(self.peak, other.peak),
+            half_extent: pair(self.half_extent, other.half_extent),
+            slope: pair(self.slope, other.slope),
+        }
+    }
+}
+
+#[inline(always)]
+fn dot<S: Simd>(a: [Lanes<S>; 3], b: [Lanes<S>; 3]) -> Lanes<S> {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+fn cross<S: Simd>(a: [Lanes<S>; 3], b: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

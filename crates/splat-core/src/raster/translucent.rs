@@ -1,33 +1,37 @@
 //! Translucent splats in order, tile by tile.
 //!
-//! Front to back: A ← A + τ, weight = e^(−A_before) − e^(−A_after), C ← C + weight·c. The weights telescope, so
-//! Σ weights = 1 − T however many splats there are, and T = e^(−Στ) from one sum. Back to front is the twin:
-//! C ← C·e^(−τ) + (1 − e^(−τ))·c.
+//! Front to back: weight = T·(1 − e^−τ), T ← T − weight, A ← A + τ, C ← C + weight·c. The weights sum to 1 − T up to
+//! rounding however many splats there are, and 1 − e^−τ comes from a series, so tiny τ keep their digits. A = Στ is what
+//! leaves the tile; a fold that goes on begins with T = e^−A. Back to front is the twin: C ← C + (1 − e^−τ)·(c − C).
 //!
 //! A medium that straddles an opaque surface counts with the share of its kernel in front of it: no
 //! seam where a cloud meets the ground.
 
 use super::bins::{Bins, TILE, bin};
-use super::lanes::{Lanes, MAX_LANES, exp_neg};
-use super::tile::{AREA, BATCH, Run, STRIDE, for_each_row, for_each_run};
-use super::{OpaqueImage, Params, Projected, ProjectedSplat, RasterCounts};
+use super::kernel::Kernel;
+use super::lanes::{Lanes, MAX_LANES, SMALL, exp_neg};
+use super::projected::{Projected, ProjectedDepth, ProjectedSplat};
+use super::tile::{AREA, BATCH, BLOCKS, Line, PIXELS, Run, for_each_run, for_each_span, position};
+use super::{OpaqueImage, Params, RasterCounts};
 use crate::{Accumulator, Direction, Material, Progress, SplatKind};
 use pulp::Simd;
 use rayon::prelude::*;
 
-/// The state of one tile while splats are folded into it. Planes are `AREA` numbers each.
+/// The state of one tile while splats are folded into it.
 struct Tile {
     /// First pixel.
     x: usize,
     y: usize,
+    size: [u32; 2],
+    /// For each block the lines of its planes: optical depths, transmittances, channels.
+    lines: Vec<Line>,
+    /// Planes of optical depth, 1 or 3, and as many of transmittance.
+    planes: usize,
+    channels: usize,
     /// 1/|d|² of each pixel's ray, 1 for parallel rays.
     ray_factor: Vec<f32>,
     /// Depth of the opaque surface, +∞ without; empty when no pixel has one.
     opaque_depth: Vec<f32>,
-    /// One plane or three.
-    optical_depth: Vec<f32>,
-    transmittance: Vec<f32>,
-    channels: Vec<f32>,
     moments: Option<Moments>,
     object: Vec<u32>,
     fragments: u64,
@@ -50,7 +54,8 @@ struct Moments {
 /// are defined front to back only. After `progress.cancel()` the remaining tiles are left as they are.
 ///
 /// # Panics
-/// If sizes of the image, the accumulator and `values` disagree.
+/// If sizes of the image, the accumulator and `values` disagree, or `projected` lacks depths or objects that an opaque
+/// image, moments or an object plane call for.
 pub fn fold(
     projected: &Projected,
     order: &[u32],
@@ -64,34 +69,36 @@ pub fn fold(
 ) -> RasterCounts {
     assert_eq!(projected.size, accumulator.size, "invariant: one image size");
     assert_eq!(values.len(), projected.splats.len() * accumulator.channels.len(), "invariant: values for each splat");
+    let needs_object = !accumulator.object.is_empty();
+    let needs_depth = needs_object || !(opaque.depth.is_empty() && accumulator.depth_first.is_empty());
+    assert!(
+        !needs_depth || projected.depths.len() == projected.splats.len(),
+        "invariant: depths where they are needed"
+    );
+    assert!(
+        !needs_object || projected.objects.len() == projected.splats.len(),
+        "invariant: objects for an object plane"
+    );
     let bins = bin(projected, order);
     let finished: Vec<Tile> = (0..bins.tiles())
         .into_par_iter()
         .filter(|&t| !bins.is_empty(t) && !progress.is_cancelled())
         .map(|t| {
             let mut tile = Tile::load(accumulator, projected, opaque, &bins, t);
-            let tile_ref = &mut tile;
-            pulp::Arch::new().dispatch(FoldTile {
-                tile: tile_ref,
-                bins: &bins,
-                t,
-                projected,
-                values,
-                materials,
-                direction,
-                params,
-            });
+            let input = FoldTile { tile: &mut tile, bins: &bins, t, projected, values, materials, direction, params };
+            pulp::Arch::new().dispatch(input);
             tile
         })
         .collect();
     let mut counts = RasterCounts {
-        splats: order.iter().filter(|i| projected.is_visible(**i as usize)).count() as u64,
+        splats: bins.splats(),
         tile_entries: bins.entries(),
-        bytes: bins.bytes() + std::mem::size_of_val(projected.splats.as_slice()) as u64,
+        bytes: bins.bytes() + projected.bytes(),
         ..RasterCounts::default()
     };
     for tile in finished {
         counts.fragments += tile.fragments;
+        counts.bytes += size_of_val(&*tile.lines) as u64;
         tile.store(accumulator);
     }
     counts
@@ -114,30 +121,61 @@ impl pulp::WithSimd for FoldTile<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        match (self.direction, self.tile.optical_depth.len() / AREA) {
-            (Direction::FrontToBack, 1) => self.fold::<S, true, 1>(simd),
-            (Direction::FrontToBack, _) => self.fold::<S, true, 3>(simd),
-            (Direction::BackToFront, 1) => self.fold::<S, false, 1>(simd),
-            (Direction::BackToFront, _) => self.fold::<S, false, 3>(simd),
+        match (self.direction, self.tile.planes, self.tile.channels) {
+            (Direction::FrontToBack, 1, 3) => self.fold::<S, true, 1, 3>(simd),
+            (Direction::FrontToBack, 1, _) => self.fold::<S, true, 1, 0>(simd),
+            (Direction::FrontToBack, ..) => self.fold::<S, true, 3, 0>(simd),
+            (Direction::BackToFront, 1, _) => self.fold::<S, false, 1, 0>(simd),
+            (Direction::BackToFront, ..) => self.fold::<S, false, 3, 0>(simd),
         }
     }
 }
 
+/// One splat as the fold reads it.
+struct Source<'a> {
+    splat: &'a ProjectedSplat,
+    depth: ProjectedDepth,
+    object: u32,
+    kernel: &'a Kernel,
+    extinction: [f32; 3],
+    /// Whether every τ of it is small.
+    thin: bool,
+    value: &'a [f32],
+}
+
 impl FoldTile<'_> {
+    /// `CHANNELS` is their number, or 0 when it is only known at run time.
     #[inline(always)]
-    fn fold<S: Simd, const FRONT: bool, const PLANES: usize>(self, simd: S) {
-        let channels = self.tile.channels.len() / AREA;
+    fn fold<S: Simd, const FRONT: bool, const PLANES: usize, const CHANNELS: usize>(self, simd: S) {
+        let channels = if CHANNELS > 0 { CHANNELS } else { self.tile.channels };
+        let projected = self.projected;
+        let deep = self.tile.needs_depth();
         let mut records = [ProjectedSplat::default(); BATCH];
+        let mut depths = [ProjectedDepth::default(); BATCH];
         let mut values = vec![0.0; BATCH * channels];
         for list in self.bins.tile(self.t) {
             for batch in list.chunks(BATCH) {
                 for ((&j, record), value) in batch.iter().zip(&mut records).zip(values.chunks_exact_mut(channels)) {
-                    *record = self.projected.splats[j as usize];
+                    *record = projected.splats[j as usize];
                     value.copy_from_slice(&self.values[j as usize * channels..][..channels]);
                 }
-                for (splat, value) in records[..batch.len()].iter().zip(values.chunks_exact(channels)) {
+                if deep {
+                    batch.iter().zip(&mut depths).for_each(|(&j, depth)| *depth = projected.depths[j as usize]);
+                }
+                for (k, &j) in batch.iter().enumerate() {
+                    let splat = &records[k];
                     let extinction = self.materials[splat.material as usize].extinction_rgb;
-                    self.tile.splat::<S, FRONT, PLANES>(simd, splat, value, extinction);
+                    let most = extinction[0].max(extinction[1]).max(extinction[2]);
+                    let source = Source {
+                        splat,
+                        depth: depths[k],
+                        object: if deep { projected.object(j as usize) } else { u32::MAX },
+                        kernel: &projected.kernels[splat.footprint as usize],
+                        extinction,
+                        thin: splat.peak * most <= SMALL,
+                        value: &values[k * channels..][..channels],
+                    };
+                    self.tile.splat::<S, FRONT, PLANES, CHANNELS>(simd, &source);
                 }
                 if FRONT && self.tile.is_done(self.params.transmittance_cutoff) {
                     return;
@@ -150,19 +188,14 @@ impl FoldTile<'_> {
 impl Tile {
     fn load(acc: &Accumulator, projected: &Projected, opaque: &OpaqueImage, bins: &Bins, t: usize) -> Self {
         let (x, y) = ((t % bins.columns) * TILE, (t / bins.columns) * TILE);
-        let copy = |planes: &[&[f32]], fill: f32| {
-            let mut out = vec![fill; planes.len() * AREA];
-            for (plane, out) in planes.iter().zip(out.chunks_exact_mut(AREA)) {
-                for_each_row(acc.size, x, y, |tile, image| out[tile].copy_from_slice(&plane[image]));
-            }
+        let copy = |plane: &[f32], fill: f32| {
+            let mut out = vec![fill; AREA];
+            for_each_span(acc.size, x, y, |tile, image| out[tile].copy_from_slice(&plane[image]));
             out
         };
-        let slices =
-            |planes: &'_ [Vec<f32>]| -> Vec<f32> { copy(&planes.iter().map(Vec::as_slice).collect::<Vec<_>>(), 0.0) };
-        let optical_depth = slices(&acc.optical_depth);
         let mut opaque_depth = Vec::new();
         if !opaque.depth.is_empty() {
-            opaque_depth = copy(&[&opaque.depth], f32::INFINITY);
+            opaque_depth = copy(&opaque.depth, f32::INFINITY);
             if opaque_depth.iter().all(|d| *d == f32::INFINITY) {
                 opaque_depth.clear();
             }
@@ -170,34 +203,60 @@ impl Tile {
         let mut object = Vec::new();
         if !acc.object.is_empty() {
             object.resize(AREA, u32::MAX);
-            for_each_row(acc.size, x, y, |tile, image| object[tile].copy_from_slice(&acc.object[image]));
+            for_each_span(acc.size, x, y, |tile, image| object[tile].copy_from_slice(&acc.object[image]));
         }
-        Self {
+        let (planes, channels) = (acc.optical_depth.len(), acc.channels.len());
+        let mut tile = Self {
             x,
             y,
+            size: acc.size,
+            lines: vec![Line([0.0; PIXELS]); BLOCKS * (2 * planes + channels)],
+            planes,
+            channels,
             ray_factor: ray_factors(projected, x, y),
             opaque_depth,
-            transmittance: optical_depth.iter().map(|a| exp_neg(*a)).collect(),
-            optical_depth,
-            channels: slices(&acc.channels),
             moments: (!acc.depth_first.is_empty()).then(|| Moments {
-                first: copy(&[&acc.depth_first], f32::INFINITY),
-                median: copy(&[&acc.depth_median], f32::INFINITY),
-                mean: copy(&[&acc.depth_mean], 0.0),
-                m2: copy(&[&acc.depth_m2], 0.0),
+                first: copy(&acc.depth_first, f32::INFINITY),
+                median: copy(&acc.depth_median, f32::INFINITY),
+                mean: copy(&acc.depth_mean, 0.0),
+                m2: copy(&acc.depth_m2, 0.0),
             }),
             object,
             fragments: 0,
+        };
+        tile.load_lines(acc);
+        tile
+    }
+
+    /// Optical depths, transmittances and channels. T stays 0 outside the image, where nothing shall keep a tile busy.
+    fn load_lines(&mut self, acc: &Accumulator) {
+        let (planes, stride) = (self.planes, 2 * self.planes + self.channels);
+        for (p, plane) in acc.optical_depth.iter().chain(&acc.channels).enumerate() {
+            let line = if p < planes { p } else { p + planes };
+            for_each_span(self.size, self.x, self.y, |tile, image| {
+                let block = tile.start / PIXELS * stride;
+                for (k, v) in (tile.start % PIXELS..).zip(&plane[image]) {
+                    self.lines[block + line].0[k] = *v;
+                    if p < planes {
+                        self.lines[block + planes + p].0[k] = exp_neg(*v);
+                    }
+                }
+            });
         }
     }
 
     fn store(self, acc: &mut Accumulator) {
-        let size = acc.size;
+        let (size, planes, stride) = (acc.size, self.planes, 2 * self.planes + self.channels);
+        for (p, plane) in acc.optical_depth.iter_mut().chain(&mut acc.channels).enumerate() {
+            let line = if p < planes { p } else { p + planes };
+            for_each_span(size, self.x, self.y, |tile, image| {
+                let from = &self.lines[tile.start / PIXELS * stride + line].0[tile.start % PIXELS..];
+                plane[image.clone()].copy_from_slice(&from[..image.len()]);
+            });
+        }
         let put = |from: &[f32], to: &mut [f32]| {
-            for_each_row(size, self.x, self.y, |tile, image| to[image].copy_from_slice(&from[tile]));
+            for_each_span(size, self.x, self.y, |tile, image| to[image].copy_from_slice(&from[tile]));
         };
-        self.optical_depth.chunks_exact(AREA).zip(&mut acc.optical_depth).for_each(|(from, to)| put(from, to));
-        self.channels.chunks_exact(AREA).zip(&mut acc.channels).for_each(|(from, to)| put(from, to));
         if let Some(m) = &self.moments {
             put(&m.first, &mut acc.depth_first);
             put(&m.median, &mut acc.depth_median);
@@ -205,119 +264,114 @@ impl Tile {
             put(&m.m2, &mut acc.depth_m2);
         }
         if !self.object.is_empty() {
-            for_each_row(size, self.x, self.y, |tile, image| acc.object[image].copy_from_slice(&self.object[tile]));
+            for_each_span(size, self.x, self.y, |tile, image| acc.object[image].copy_from_slice(&self.object[tile]));
         }
     }
 
+    /// Whether splats need a depth, or an object, which are read from memory of their own.
+    fn needs_depth(&self) -> bool {
+        !(self.opaque_depth.is_empty() && self.moments.is_none() && self.object.is_empty())
+    }
+
     fn is_done(&self, cutoff: f32) -> bool {
-        // Padding may keep T = 1, so only the pixels of the tile are looked at.
-        self.transmittance.chunks_exact(STRIDE).all(|row| row[..TILE].iter().all(|t| *t < cutoff))
+        let blocks = self.lines.chunks_exact(2 * self.planes + self.channels);
+        blocks.flat_map(|lines| &lines[self.planes..2 * self.planes]).all(|t| t.0.iter().all(|t| *t < cutoff))
     }
 
     #[inline(always)]
-    fn splat<S: Simd, const FRONT: bool, const PLANES: usize>(
+    fn splat<S: Simd, const FRONT: bool, const PLANES: usize, const CHANNELS: usize>(
         &mut self,
         simd: S,
-        splat: &ProjectedSplat,
-        value: &[f32],
-        extinction: [f32; 3],
+        source: &Source<'_>,
     ) {
-        let origin = [self.x, self.y];
-        for_each_run::<S>(splat, origin, |run| {
-            let tau = self.optical_depth_lanes(simd, &run);
-            self.composite::<S, FRONT, PLANES>(simd, &run, value, extinction, tau);
-            self.fragments += Lanes::<S>::COUNT as u64;
+        let (size, origin) = (self.size, [self.x, self.y]);
+        self.fragments += for_each_run(simd, source.splat, size, origin, |run| {
+            let tau = self.optical_depth(simd, source, run);
+            self.composite::<S, FRONT, PLANES, CHANNELS>(simd, source, run, tau);
         });
     }
 
     /// τ of a run of pixels.
     #[inline(always)]
-    fn optical_depth_lanes<S: Simd>(&self, simd: S, run: &Run<'_>) -> Lanes<S> {
+    fn optical_depth<S: Simd>(&self, simd: S, source: &Source<'_>, run: Run<S>) -> Lanes<S> {
         let of = |v: f32| Lanes::splat(simd, v);
-        let splat = run.splat;
-        let medium = splat.kind == SplatKind::Medium;
-        let mut s = run.distance_sq(simd);
+        let medium = source.splat.kind == SplatKind::Medium;
+        let mut s = run.distance_sq(simd, source.splat);
         if medium {
-            s = s * Lanes::load(simd, &self.ray_factor[run.k..]);
+            s = s * Lanes::load(simd, &self.ray_factor[run.pixel()..]);
         }
-        let mut tau = run.amount(simd, s);
+        let t = (of(1.0) - s).max(of(0.0));
+        let mut tau = of(source.splat.peak) * source.kernel.profile(simd, t);
         if !self.opaque_depth.is_empty() {
-            let opaque = Lanes::load(simd, &self.opaque_depth[run.k..]);
+            let opaque = Lanes::load(simd, &self.opaque_depth[run.pixel()..]);
             tau = if medium {
-                tau * ((opaque - of(splat.depth)) * of(1.0 / splat.depth_extent)).share_in_front()
+                tau * ((opaque - of(source.depth.center)) * of(1.0 / source.depth.extent)).share_in_front()
             } else {
-                tau.where_less(run.depth(simd), opaque)
+                tau.where_less(run.depth(simd, &source.depth), opaque)
             };
         }
         tau
     }
 
     #[inline(always)]
-    fn composite<S: Simd, const FRONT: bool, const PLANES: usize>(
+    fn composite<S: Simd, const FRONT: bool, const PLANES: usize, const CHANNELS: usize>(
         &mut self,
         simd: S,
-        run: &Run<'_>,
-        value: &[f32],
-        extinction: [f32; 3],
+        source: &Source<'_>,
+        run: Run<S>,
         tau: Lanes<S>,
     ) {
-        let zero = Lanes::splat(simd, 0.0);
-        let (mut weight, mut keep) = ([zero; PLANES], [zero; PLANES]);
+        let channels = if CHANNELS > 0 { CHANNELS } else { self.channels };
+        let stride = 2 * PLANES + channels;
+        let lines = &mut self.lines[run.block * stride..][..stride];
+        let mut weight = [Lanes::splat(simd, 0.0); PLANES];
         for p in 0..PLANES {
-            let at = p * AREA + run.k;
-            let step = tau * Lanes::splat(simd, extinction[p]);
-            let sum = Lanes::load(simd, &self.optical_depth[at..]) + step;
-            sum.store(&mut self.optical_depth[at..]);
-            let after = sum.exp_neg();
-            if FRONT {
-                weight[p] = Lanes::load(simd, &self.transmittance[at..]) - after;
-            } else {
-                keep[p] = step.exp_neg();
-                weight[p] = Lanes::splat(simd, 1.0) - keep[p];
-            }
-            after.store(&mut self.transmittance[at..]);
+            let step = tau * Lanes::splat(simd, source.extinction[p]);
+            let sum = &mut lines[p].0[run.lane..];
+            (Lanes::load(simd, sum) + step).store(sum);
+            let opacity = if source.thin { step.opacity_of_small() } else { step.opacity() };
+            let transmittance = &mut lines[PLANES + p].0[run.lane..];
+            let before = Lanes::load(simd, transmittance);
+            opacity.negate_mul_add(before, before).store(transmittance);
+            weight[p] = if FRONT { before * opacity } else { opacity };
         }
-        let channels = value.len();
-        for (c, v) in value.iter().enumerate() {
+        for c in 0..channels {
             // Channels come in threes, red, green, blue; a lone last one takes the green weight.
             let p = if PLANES == 3 && channels - c > channels % 3 { c % 3 } else { PLANES / 2 };
-            let at = c * AREA + run.k;
-            let mut sum = Lanes::load(simd, &self.channels[at..]);
-            if !FRONT {
-                sum = sum * keep[p];
-            }
-            (sum + weight[p] * Lanes::splat(simd, *v)).store(&mut self.channels[at..]);
+            let value = Lanes::splat(simd, source.value[c]);
+            let sum = &mut lines[2 * PLANES + c].0[run.lane..];
+            let before = Lanes::load(simd, sum);
+            let added = if FRONT { value } else { value - before };
+            weight[p].mul_add(added, before).store(sum);
         }
         if self.moments.is_some() || !self.object.is_empty() {
-            let p = PLANES / 2;
-            self.extras::<S, FRONT>(run, weight[p], keep[p], run.depth(simd), p * AREA + run.k);
+            self.extras::<S, FRONT, PLANES>(simd, source, run, weight[PLANES / 2]);
         }
     }
 
     /// Depth moments and object ids, lane by lane.
     #[inline(always)]
-    fn extras<S: Simd, const FRONT: bool>(
+    fn extras<S: Simd, const FRONT: bool, const PLANES: usize>(
         &mut self,
-        run: &Run<'_>,
+        simd: S,
+        source: &Source<'_>,
+        run: Run<S>,
         weight: Lanes<S>,
-        keep: Lanes<S>,
-        depth: Lanes<S>,
-        at: usize,
     ) {
-        let (mut w, mut keeps, mut z) = ([0.0; MAX_LANES], [0.0; MAX_LANES], [0.0; MAX_LANES]);
+        let (mut w, mut z) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
         weight.store(&mut w);
-        keep.store(&mut keeps);
-        depth.store(&mut z);
+        run.depth(simd, &source.depth).store(&mut z);
+        let line = run.block * (2 * PLANES + self.channels) + PLANES + PLANES / 2;
         for i in (0..Lanes::<S>::COUNT).filter(|i| w[*i] > 0.0) {
-            let k = run.k + i;
+            let k = run.pixel() + i;
             if let Some(moments) = &mut self.moments {
                 if !FRONT {
-                    moments.m2[k] *= keeps[i];
+                    moments.m2[k] *= 1.0 - w[i];
                 }
-                moments.add(k, self.transmittance[at + i], w[i], z[i]);
+                moments.add(k, self.lines[line].0[run.lane + i], w[i], z[i]);
             }
             if let Some(object) = self.object.get_mut(k).filter(|o| !FRONT || **o == u32::MAX) {
-                *object = run.splat.object;
+                *object = source.object;
             }
         }
     }
@@ -339,17 +393,14 @@ impl Moments {
     }
 }
 
-/// 1/|d|² for the pixels of the tile, padding included.
+/// 1/|d|² for the pixels of the tile, those outside the image included.
 fn ray_factors(projected: &Projected, x: usize, y: usize) -> Vec<f32> {
     let Some(focal) = projected.perspective else { return vec![1.0; AREA] };
     let half = projected.size.map(|s| s as f32 * 0.5);
-    let mut out = Vec::with_capacity(AREA);
-    for row in 0..TILE {
-        let v = ((y + row) as f32 + 0.5 - half[1]) / focal;
-        for column in 0..STRIDE {
-            let u = ((x + column) as f32 + 0.5 - half[0]) / focal;
-            out.push(1.0 / (1.0 + u * u + v * v));
-        }
-    }
-    out
+    let factor = |k: usize| {
+        let [column, row] = position(k, x, y);
+        let (u, v) = ((column as f32 + 0.5 - half[0]) / focal, (row as f32 + 0.5 - half[1]) / focal);
+        1.0 / (1.0 + u * u + v * v)
+    };
+    (0..AREA).map(factor).collect()
 }

@@ -1,0 +1,206 @@
+//! Footprints in the image, packed: what a fragment reads takes half a cache line, what only some scenes need lies apart.
+
+use super::bins::TILE;
+use super::kernel::Kernel;
+use crate::SplatKind;
+use rayon::prelude::*;
+
+/// The footprint of one splat in the image. Pixel centres lie at half-integers, y runs down.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[repr(C, align(32))]
+pub struct ProjectedSplat {
+    /// Image position of the centre, pixels.
+    pub center_px: [f32; 2],
+    /// s = a·dx² + b·dx·dy + c·dy² in 1/pixel², s < 1 inside; for a medium in perspective times the pixel's 1/|d|².
+    pub conic: [f32; 3],
+    /// Optical depth where the profile is 1: K·norm/R². For an opaque splat the weight there, area·norm/R².
+    pub peak: f32,
+    /// Half the extent in x and y, pixels: the upper halves of f32s, rounded up.
+    pub(crate) half_extent: [u16; 2],
+    /// Material id.
+    pub material: u16,
+    /// Footprint id.
+    pub footprint: u8,
+    /// Medium, surface or opaque.
+    pub kind: SplatKind,
+}
+
+/// View depth across a footprint.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ProjectedDepth {
+    /// View depth of the centre.
+    pub center: f32,
+    /// Change per pixel across a disc; 0 for a medium.
+    pub slope: [f32; 2],
+    /// Largest distance in depth between a fragment and the centre: R.
+    pub extent: f32,
+}
+
+/// Which parts of a projection are made beside the footprints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Detail {
+    /// Depths: for opaque splats, what may lie behind them, and depth layers. 16 bytes a splat.
+    pub depth: bool,
+    /// Object ids, for object layers. 4 bytes a splat.
+    pub object: bool,
+}
+
+impl Detail {
+    /// Everything.
+    pub const ALL: Self = Self { depth: true, object: true };
+}
+
+/// Footprints of all splats of a cloud, by id. Kept from frame to frame, it allocates nothing.
+#[derive(Debug, Clone, Default)]
+pub struct Projected {
+    /// The footprints; those that no pixel shows are not defined.
+    pub splats: Vec<ProjectedSplat>,
+    /// Depths by id; empty when not asked for.
+    pub depths: Vec<ProjectedDepth>,
+    /// Objects by id; empty when not asked for.
+    pub objects: Vec<u32>,
+    /// Tiles that each footprint reaches.
+    pub(crate) coverage: Vec<Coverage>,
+    pub(crate) kernels: Vec<Kernel>,
+    /// Focal length, pixels, for rays; `None` for parallel rays.
+    pub(crate) perspective: Option<f32>,
+    /// Image size, pixels.
+    pub size: [u32; 2],
+}
+
+impl Projected {
+    /// Whether splat `i` covers a pixel's rectangle at all.
+    pub fn is_visible(&self, i: usize) -> bool {
+        self.coverage[i] != Coverage::NONE
+    }
+
+    /// Number of splats in view.
+    pub fn visible(&self) -> u64 {
+        self.coverage.par_iter().with_min_len(1 << 16).filter(|c| **c != Coverage::NONE).count() as u64
+    }
+
+    /// Bytes of all columns.
+    pub fn bytes(&self) -> u64 {
+        (size_of_val(&*self.splats)
+            + size_of_val(&*self.depths)
+            + size_of_val(&*self.objects)
+            + size_of_val(&*self.coverage)) as u64
+    }
+
+    /// Object of splat `i`; `u32::MAX` when not asked for.
+    #[inline(always)]
+    pub(crate) fn object(&self, i: usize) -> u32 {
+        self.objects.get(i).copied().unwrap_or(u32::MAX)
+    }
+
+    /// Makes the columns `n` long; what they hold is overwritten.
+    pub(crate) fn resize(&mut self, n: usize, detail: Detail) {
+        resize(&mut self.splats, n);
+        resize(&mut self.coverage, n);
+        resize(&mut self.depths, if detail.depth { n } else { 0 });
+    }
+}
+
+/// New memory is touched by all threads: clearing fresh pages costs more than the projection.
+fn resize<T: Default + Send>(column: &mut Vec<T>, n: usize) {
+    if column.len() != n {
+        (0..n).into_par_iter().with_min_len(1 << 14).map(|_| T::default()).collect_into_vec(column);
+    }
+}
+
+impl ProjectedSplat {
+    /// Sets the extent, at least as large as given.
+    #[inline(always)]
+    pub(crate) fn set_half_extent(&mut self, half_extent: [f32; 2]) {
+        let pack = |e: f32| (e.to_bits().saturating_add(0xffff) >> 16) as u16;
+        self.half_extent = [pack(half_extent[0]), pack(half_extent[1])];
+    }
+
+    /// Pixel rectangle [x0, x1, y0, y1) within an image of `size`; empty when x0 ≥ x1 or y0 ≥ y1.
+    #[inline(always)]
+    pub(crate) fn bounds(&self, size: [u32; 2]) -> [u32; 4] {
+        let range = |axis: usize| {
+            let extent = f32::from_bits(u32::from(self.half_extent[axis]) << 16);
+            // Pixel i is covered when |i + ½ − centre| < extent; casts round down, and on the rim itself w = 0.
+            let clamp = |v: f32| v.max(0.0).min(size[axis] as f32) as i32 as u32;
+            let (center, extent) = (self.center_px[axis] + 0.5, extent);
+            [clamp(center - extent), clamp(center + extent)]
+        };
+        let ([x0, x1], [y0, y1]) = (range(0), range(1));
+        [x0, x1, y0, y1]
+    }
+}
+
+/// The rectangle of tiles that a footprint reaches, in one word: 11 bits each for the first column and row, 5 each for
+/// the numbers of further ones. Lists of tiles are made from this column alone, which stays in the cache.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Coverage(u32);
+
+impl Default for Coverage {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
+impl Coverage {
+    /// No tile. As a rectangle it would begin in the last tile and reach beyond it.
+    pub(crate) const NONE: Self = Self(u32::MAX);
+
+    /// What stands for this many further tiles or more: the footprint itself has to be asked.
+    const MANY: u32 = 31;
+
+    /// Of the pixel rectangle [x0, x1, y0, y1).
+    #[inline(always)]
+    pub(crate) fn of(bounds: [u32; 4]) -> Self {
+        let [x0, x1, y0, y1] = bounds;
+        let tile = |v: u32| v / TILE as u32;
+        let word = tile(x0)
+            | tile(y0) << 11
+            | (tile(x1.wrapping_sub(1)).wrapping_sub(tile(x0))).min(Self::MANY) << 22
+            | (tile(y1.wrapping_sub(1)).wrapping_sub(tile(y0))).min(Self::MANY) << 27;
+        if (x0 < x1) & (y0 < y1) { Self(word) } else { Self::NONE }
+    }
+
+    /// First and last tile [column, row]; `splat` tells how far a large footprint reaches.
+    #[inline(always)]
+    pub(crate) fn tiles(self, splat: impl FnOnce() -> [u32; 4]) -> [[usize; 2]; 2] {
+        let first = [self.0 & 0x7ff, self.0 >> 11 & 0x7ff];
+        let further = [self.0 >> 22 & 0x1f, self.0 >> 27];
+        let mut last = [first[0] + further[0], first[1] + further[1]];
+        if further[0] == Self::MANY || further[1] == Self::MANY {
+            let [_, x1, _, y1] = splat();
+            last = [(x1 - 1) / TILE as u32, (y1 - 1) / TILE as u32];
+        }
+        [first, last].map(|t| t.map(|v| v as usize))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coverage_is_the_rectangle_of_tiles() {
+        for bounds in [[0, 1, 0, 1], [31, 33, 0, 32], [65_535, 65_536, 0, 3], [0, 65_536, 5, 6], [0, 1024, 0, 1000]] {
+            let t = TILE as u32;
+            let expected = [[bounds[0] / t, bounds[2] / t], [(bounds[1] - 1) / t, (bounds[3] - 1) / t]];
+            let coverage = Coverage::of(bounds);
+            assert_eq!(coverage.tiles(|| bounds), expected.map(|v| v.map(|v| v as usize)));
+            assert_ne!(coverage, Coverage::NONE);
+        }
+        assert_eq!(Coverage::of([3, 3, 0, 1]), Coverage::NONE);
+    }
+
+    #[test]
+    fn an_extent_is_never_packed_smaller() {
+        let mut splat = ProjectedSplat { center_px: [50.0, 50.0], ..ProjectedSplat::default() };
+        for i in 0..1000 {
+            let e = 0.05 * 1.007f32.powi(i);
+            splat.set_half_extent([e, 0.5 * e]);
+            let [x0, x1, y0, y1] = splat.bounds([1000, 1000]).map(|v| v as f32);
+            let covered = |v: f32| v.clamp(0.0, 1000.0).floor();
+            assert!(x0 <= covered(50.5 - e) && x1 >= covered(50.5 + e));
+            assert!(y0 <= covered(50.5 - 0.5 * e) && y1 >= covered(50.5 + 0.5 * e));
+        }
+    }
+}
