@@ -66,12 +66,19 @@ pub fn draw(scene: &str, arguments: &[&str]) -> Picture {
 /// [`draw`] in a folder that holds the scene's data.
 pub fn draw_in(folder: &Path, scene: &str, arguments: &[&str]) -> Picture {
     std::fs::write(folder.join("scene.toml"), scene).unwrap();
+    draw_file(&folder.join("scene.toml"), arguments)
+}
+
+/// [`draw`] of a scene file.
+pub fn draw_file(scene: &Path, arguments: &[&str]) -> Picture {
+    let folder = tempfile::tempdir().unwrap();
+    let image = folder.path().join("out.exr");
     let mut command = organza();
-    command.args(["render", "scene.toml", "-o", "out.exr"]).args(arguments).current_dir(folder);
+    command.arg("render").arg(scene).arg("-o").arg(&image).args(arguments);
     let out = command.output().unwrap();
-    assert!(out.status.success(), "{}\n{scene}", String::from_utf8_lossy(&out.stderr));
+    assert!(out.status.success(), "{}\n{}", String::from_utf8_lossy(&out.stderr), scene.display());
     let reader = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
-    let image = reader.from_file(folder.join("out.exr")).unwrap();
+    let image = reader.from_file(&image).unwrap();
     let layer = image.layer_data;
     let channels = layer.channel_data.list.iter();
     Picture {

@@ -6,7 +6,10 @@ use crate::scene::{RenderSettings, ShadowMapping};
 use crate::{Error, Progress};
 use splat_core::raster::{self, Background, Detail, OpaqueImage, Projected, RasterCounts};
 use splat_core::shade::{ChannelLayout, LitBy, ShadeInput, shade};
-use splat_core::{Accumulator, Camera, CostRecord, LayerSet, Layers, SliceOrder, SplatKind, StageCost, Transmittance};
+use splat_core::{
+    Accumulator, Camera, CostRecord, Direction, LayerSet, Layers, SliceOrder, SplatKind, StageCost, Transmittance,
+};
+use std::borrow::Cow;
 use tsm::ShadowMap;
 
 /// What drawing reads.
@@ -134,7 +137,8 @@ impl Drawing<'_> {
         let params = hbsort::Params {
             direction: points.direction,
             thickness: self.loaded.slice_thickness.map_or(hbsort::Thickness::Auto, hbsort::Thickness::World),
-            exact: points.exact,
+            // Depths are made from splats in order, not from slices.
+            exact: points.exact || self.layers.depth,
             margin_px: self.filter_reach_px(),
             ..hbsort::Params::default()
         };
@@ -214,9 +218,15 @@ impl Drawing<'_> {
         let Shaded { projected, values, channels } = shaded;
         let (planes, set) = (self.plan.optical_depth_planes, &self.layers);
         let mut accumulator = Accumulator::new(projected.size, planes, *channels, set.depth, set.object);
-        let ids = &order.input_from_sorted;
+        let mut ids = Cow::Borrowed(order.input_from_sorted.as_slice());
         if ids.is_empty() {
             return Ok(accumulator);
+        }
+        let mut direction = order.direction;
+        if set.depth && direction == Direction::BackToFront {
+            // Depths are made front to back. The picture is the same.
+            ids.to_mut().reverse();
+            direction = Direction::FrontToBack;
         }
         self.tick()?;
         cost.measure(pass::SPLAT, |stage| {
@@ -224,11 +234,11 @@ impl Drawing<'_> {
             let (materials, params) = (&self.loaded.materials, self.raster_params());
             let counts = raster::fold(
                 projected,
-                ids,
+                &ids,
                 values,
                 materials,
                 opaque,
-                order.direction,
+                direction,
                 &params,
                 &mut accumulator,
                 self.progress,

@@ -131,8 +131,8 @@ fn image_bytes(scene: &Scene) -> u64 {
     let pixels = scene.camera.size.iter().map(|s| u64::from(*s)).product::<u64>();
     let samples = pixels * u64::from(scene.render.antialias).pow(2);
     let channels = splat_core::shade::ChannelLayout::new(&scene.render.layers.set()).count() as u64;
-    // Accumulator and opaque image a sample: channels, up to three optical depths, four depths, ids.
-    4 * (samples * (2 * channels + 10) + pixels * (2 * channels + 10))
+    // Accumulator and opaque image a sample: channels, up to three optical depths, where light is absorbed, ids.
+    4 * (samples * (2 * channels + 16) + pixels * (2 * channels + 10))
 }
 
 /// Bytes of what is made for each splat: its attributes, order, footprint, tile entries and values.

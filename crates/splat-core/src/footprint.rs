@@ -35,6 +35,11 @@ impl Footprint {
         self.cutoff * Self::SIGMA_OVER_SPACING * spacing
     }
 
+    /// Distance of lattice points whose splats have the cutoff radius `radius`, see [`Footprint::radius_for_spacing`].
+    pub fn spacing_for_radius(&self, radius: f32) -> f32 {
+        radius / (self.cutoff * Self::SIGMA_OVER_SPACING)
+    }
+
     /// q = cutoff²/2.
     pub fn sharpness(&self) -> f32 {
         0.5 * self.cutoff * self.cutoff

@@ -1,5 +1,6 @@
 //! The accumulator that splats are folded into, and the named images that a render returns.
 
+use crate::DepthProfile;
 use std::collections::BTreeMap;
 
 /// The additive effects, in the order of their sum: background + … = beauty.
@@ -66,7 +67,7 @@ impl Layers {
     }
 }
 
-/// What a technique folds into, per pixel: colours weighted by absorbed share, optical depth so far, depth moments.
+/// What a technique folds into, per pixel: colours weighted by absorbed share, optical depth so far, depths.
 ///
 /// Optical depth rather than transmittance is accumulated: T = e^−τ then comes from one sum, and the weights
 /// T_before − T_after telescope to 1 − T whatever the number of splats.
@@ -78,14 +79,8 @@ pub struct Accumulator {
     pub optical_depth: Vec<Vec<f32>>,
     /// Channel planes, each Σ weight·value, as many as the shading gives per splat.
     pub channels: Vec<Vec<f32>>,
-    /// View depth where opacity passes 1/255, +∞ before; empty when not asked for.
-    pub depth_first: Vec<f32>,
-    /// View depth where transmittance passes 1/2, +∞ before; empty when not asked for.
-    pub depth_median: Vec<f32>,
-    /// Mean view depth of what was absorbed so far (Welford); empty when not asked for.
-    pub depth_mean: Vec<f32>,
-    /// Σ weight·(depth − mean)² (Welford); empty when not asked for.
-    pub depth_m2: Vec<f32>,
+    /// Where light is absorbed, so far; empty when not asked for.
+    pub depth: Vec<DepthProfile>,
     /// Object of the first contribution; empty when not asked for.
     pub object: Vec<u32>,
 }
@@ -94,15 +89,11 @@ impl Accumulator {
     /// Nothing seen yet: zero colours, zero optical depth, undefined depths.
     pub fn new(size: [u32; 2], optical_depth_planes: usize, channels: usize, depth: bool, object: bool) -> Self {
         let n = size[0] as usize * size[1] as usize;
-        let plane = |on: bool, value: f32| if on { vec![value; n] } else { Vec::new() };
         Self {
             size,
             optical_depth: vec![vec![0.0; n]; optical_depth_planes],
             channels: vec![vec![0.0; n]; channels],
-            depth_first: plane(depth, f32::INFINITY),
-            depth_median: plane(depth, f32::INFINITY),
-            depth_mean: plane(depth, 0.0),
-            depth_m2: plane(depth, 0.0),
+            depth: if depth { vec![DepthProfile::default(); n] } else { Vec::new() },
             object: if object { vec![u32::MAX; n] } else { Vec::new() },
         }
     }

@@ -20,7 +20,7 @@ const GUESS: f64 = 1.5;
 /// An object of the scene, with what the tracer borrows.
 pub(super) enum Body {
     /// A medium.
-    Medium(Box<MediumBody>),
+    Medium(MediumBody),
     /// A surface.
     Surface(Mesh, SurfaceMaterial),
 }
@@ -93,7 +93,7 @@ impl Body {
             Shape::Grid(grid) => Density::Grid(Lattice::new(grid)?),
             Shape::Field { field, bounds, majorant } => Density::Field { field, bounds: *bounds, majorant: *majorant },
         };
-        let MediumBody { extinction, albedo, asymmetry, emission, .. } = **body;
+        let MediumBody { extinction, albedo, asymmetry, emission, .. } = *body;
         Ok(Some(Medium { extinction, albedo, asymmetry, emission, ..Medium::new(density, 1.0, 0.0) }))
     }
 
@@ -121,7 +121,7 @@ fn medium(scene: &Scene, object: &SceneObject, shape: Shape, extinction: f64) ->
         (albedo, ambient(scene, material, albedo))
     };
     let extinction = m.extinction_rgb.map(|e| extinction * f64::from(e));
-    Body::Medium(Box::new(MediumBody { shape, extinction, albedo, asymmetry: f64::from(m.asymmetry), emission }))
+    Body::Medium(MediumBody { shape, extinction, albedo, asymmetry: f64::from(m.asymmetry), emission })
 }
 
 /// The density of a medium and the extinction where it is 1, or why there is none.

@@ -82,28 +82,9 @@ fn sample(acc: &Accumulator, opaque: &OpaqueImage, background: &Background, k: u
         transmittance: through,
         background: std::array::from_fn(|c| through[c] * background.color[c]),
         values,
-        depth: depths(acc, transmittance[1], solid, k),
+        depth: acc.depth.get(k).map_or([f32::INFINITY; 4], |d| d.depths(acc.optical_depth[planes / 2][k], solid)),
         object: if unseen { opaque.object.get(k).copied().unwrap_or(u32::MAX) } else { acc.object[k] },
     }
-}
-
-/// First, median, mean and sigma with the opaque surface as the last absorber.
-fn depths(acc: &Accumulator, transmittance: f32, solid: Option<f32>, k: usize) -> [f32; 4] {
-    if acc.depth_first.is_empty() {
-        return [f32::INFINITY; 4];
-    }
-    let mut first = acc.depth_first[k];
-    let mut median = acc.depth_median[k];
-    let (mut mean, mut m2, mut absorbed) = (acc.depth_mean[k], acc.depth_m2[k], 1.0 - transmittance);
-    if let Some(depth) = solid {
-        first = first.min(depth);
-        median = median.min(depth);
-        let delta = depth - mean;
-        absorbed += transmittance;
-        mean += delta * transmittance / absorbed;
-        m2 += transmittance * delta * (depth - mean);
-    }
-    if absorbed > 0.0 { [first, median, mean, (m2 / absorbed).max(0.0).sqrt()] } else { [f32::INFINITY; 4] }
 }
 
 /// Pixels being filled.

@@ -27,6 +27,8 @@ pub(crate) struct Kernel {
     pub(crate) cutoff: f32,
     /// 1/∫w dA for R = 1.
     pub(crate) norm: f32,
+    /// Spacing of the lattice that it is meant for, for R = 1.
+    pub(crate) spacing: f32,
     /// q.
     sharpness: f32,
     /// e^−q.
@@ -43,6 +45,7 @@ impl Kernel {
         Self {
             cutoff: footprint.cutoff,
             norm: footprint.norm() as f32,
+            spacing: footprint.spacing_for_radius(1.0),
             sharpness,
             rim: exp_neg(sharpness),
             g: if smooth { fit(f64::from(sharpness)) } else { [0.0; TERMS] },

@@ -13,7 +13,7 @@ use super::lanes::{Lanes, MAX_LANES, SMALL, exp_neg};
 use super::projected::{Projected, ProjectedDepth, ProjectedSplat};
 use super::tile::{AREA, BATCH, BLOCKS, Line, PIXELS, Run, for_each_run, for_each_span, position};
 use super::{OpaqueImage, Params, RasterCounts};
-use crate::{Accumulator, Direction, Material, Progress, SplatKind};
+use crate::{Accumulator, DepthProfile, Direction, Material, Progress, SplatKind};
 use pulp::Simd;
 use rayon::prelude::*;
 
@@ -32,17 +32,10 @@ struct Tile {
     ray_factor: Vec<f32>,
     /// Depth of the opaque surface, +∞ without; empty when no pixel has one.
     opaque_depth: Vec<f32>,
-    moments: Option<Moments>,
+    /// Empty when not asked for, as is the next.
+    depth: Vec<DepthProfile>,
     object: Vec<u32>,
     fragments: u64,
-}
-
-/// Depth moments of a tile.
-struct Moments {
-    first: Vec<f32>,
-    median: Vec<f32>,
-    mean: Vec<f32>,
-    m2: Vec<f32>,
 }
 
 /// Folds the splats `order`, ids in compositing order, into `accumulator`.
@@ -50,12 +43,12 @@ struct Moments {
 /// `values` holds as many numbers a splat as the accumulator has channels, by id. `materials` gives the
 /// extinction per channel; with one plane of optical depth, which is for materials that absorb all channels alike, the
 /// first channel's counts. Front to back can continue an
-/// accumulator that holds nearer splats; back to front can continue one that holds farther ones. First and median depth
-/// are defined front to back only. After `progress.cancel()` the remaining tiles are left as they are.
+/// accumulator that holds nearer splats; back to front can continue one that holds farther ones, but not one with depths,
+/// which are made front to back. After `progress.cancel()` the remaining tiles are left as they are.
 ///
 /// # Panics
 /// If sizes of the image, the accumulator and `values` disagree, or `projected` lacks depths or objects that an opaque
-/// image, moments or an object plane call for.
+/// image, depths or an object plane call for; for depths back to front.
 pub fn fold(
     projected: &Projected,
     order: &[u32],
@@ -70,7 +63,11 @@ pub fn fold(
     assert_eq!(projected.size, accumulator.size, "invariant: one image size");
     assert_eq!(values.len(), projected.splats.len() * accumulator.channels.len(), "invariant: values for each splat");
     let needs_object = !accumulator.object.is_empty();
-    let needs_depth = needs_object || !(opaque.depth.is_empty() && accumulator.depth_first.is_empty());
+    let needs_depth = needs_object || !(opaque.depth.is_empty() && accumulator.depth.is_empty());
+    assert!(
+        direction == Direction::FrontToBack || accumulator.depth.is_empty(),
+        "invariant: depths are made front to back"
+    );
     assert!(
         !needs_depth || projected.depths.len() == projected.splats.len(),
         "invariant: depths where they are needed"
@@ -188,23 +185,12 @@ impl FoldTile<'_> {
 impl Tile {
     fn load(acc: &Accumulator, projected: &Projected, opaque: &OpaqueImage, bins: &Bins, t: usize) -> Self {
         let (x, y) = ((t % bins.columns) * TILE, (t / bins.columns) * TILE);
-        let copy = |plane: &[f32], fill: f32| {
-            let mut out = vec![fill; AREA];
-            for_each_span(acc.size, x, y, |tile, image| out[tile].copy_from_slice(&plane[image]));
-            out
-        };
-        let mut opaque_depth = Vec::new();
-        if !opaque.depth.is_empty() {
-            opaque_depth = copy(&opaque.depth, f32::INFINITY);
-            if opaque_depth.iter().all(|d| *d == f32::INFINITY) {
-                opaque_depth.clear();
-            }
+        let mut opaque_depth = tile_of(&opaque.depth, acc.size, [x, y], f32::INFINITY);
+        if opaque_depth.iter().all(|d| *d == f32::INFINITY) {
+            opaque_depth.clear();
         }
-        let mut object = Vec::new();
-        if !acc.object.is_empty() {
-            object.resize(AREA, u32::MAX);
-            for_each_span(acc.size, x, y, |tile, image| object[tile].copy_from_slice(&acc.object[image]));
-        }
+        let depth = tile_of(&acc.depth, acc.size, [x, y], DepthProfile::default());
+        let object = tile_of(&acc.object, acc.size, [x, y], u32::MAX);
         let (planes, channels) = (acc.optical_depth.len(), acc.channels.len());
         let mut tile = Self {
             x,
@@ -215,12 +201,7 @@ impl Tile {
             channels,
             ray_factor: ray_factors(projected, x, y),
             opaque_depth,
-            moments: (!acc.depth_first.is_empty()).then(|| Moments {
-                first: copy(&acc.depth_first, f32::INFINITY),
-                median: copy(&acc.depth_median, f32::INFINITY),
-                mean: copy(&acc.depth_mean, 0.0),
-                m2: copy(&acc.depth_m2, 0.0),
-            }),
+            depth,
             object,
             fragments: 0,
         };
@@ -254,14 +235,8 @@ impl Tile {
                 plane[image.clone()].copy_from_slice(&from[..image.len()]);
             });
         }
-        let put = |from: &[f32], to: &mut [f32]| {
-            for_each_span(size, self.x, self.y, |tile, image| to[image].copy_from_slice(&from[tile]));
-        };
-        if let Some(m) = &self.moments {
-            put(&m.first, &mut acc.depth_first);
-            put(&m.median, &mut acc.depth_median);
-            put(&m.mean, &mut acc.depth_mean);
-            put(&m.m2, &mut acc.depth_m2);
+        if !self.depth.is_empty() {
+            for_each_span(size, self.x, self.y, |tile, image| acc.depth[image].copy_from_slice(&self.depth[tile]));
         }
         if !self.object.is_empty() {
             for_each_span(size, self.x, self.y, |tile, image| acc.object[image].copy_from_slice(&self.object[tile]));
@@ -270,7 +245,7 @@ impl Tile {
 
     /// Whether splats need a depth, or an object, which are read from memory of their own.
     fn needs_depth(&self) -> bool {
-        !(self.opaque_depth.is_empty() && self.moments.is_none() && self.object.is_empty())
+        !(self.opaque_depth.is_empty() && self.depth.is_empty() && self.object.is_empty())
     }
 
     fn is_done(&self, cutoff: f32) -> bool {
@@ -325,10 +300,15 @@ impl Tile {
         let stride = 2 * PLANES + channels;
         let lines = &mut self.lines[run.block * stride..][..stride];
         let mut weight = [Lanes::splat(simd, 0.0); PLANES];
+        let mut nearer = weight[0];
         for p in 0..PLANES {
             let step = tau * Lanes::splat(simd, source.extinction[p]);
             let sum = &mut lines[p].0[run.lane..];
-            (Lanes::load(simd, sum) + step).store(sum);
+            let before = Lanes::load(simd, sum);
+            (before + step).store(sum);
+            if p == PLANES / 2 {
+                nearer = before;
+            }
             let opacity = if source.thin { step.opacity_of_small() } else { step.opacity() };
             let transmittance = &mut lines[PLANES + p].0[run.lane..];
             let before = Lanes::load(simd, transmittance);
@@ -344,31 +324,33 @@ impl Tile {
             let added = if FRONT { value } else { value - before };
             weight[p].mul_add(added, before).store(sum);
         }
-        if self.moments.is_some() || !self.object.is_empty() {
-            self.extras::<S, FRONT, PLANES>(simd, source, run, weight[PLANES / 2]);
+        if !self.depth.is_empty() || !self.object.is_empty() {
+            self.extras::<S, FRONT, PLANES>(simd, source, run, nearer);
         }
     }
 
-    /// Depth moments and object ids, lane by lane.
+    /// Depths and object ids, lane by lane; `nearer` is the optical depth before this splat.
     #[inline(always)]
     fn extras<S: Simd, const FRONT: bool, const PLANES: usize>(
         &mut self,
         simd: S,
         source: &Source<'_>,
         run: Run<S>,
-        weight: Lanes<S>,
+        nearer: Lanes<S>,
     ) {
-        let (mut w, mut z) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
-        weight.store(&mut w);
+        let (mut before, mut z) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
+        nearer.store(&mut before);
         run.depth(simd, &source.depth).store(&mut z);
-        let line = run.block * (2 * PLANES + self.channels) + PLANES + PLANES / 2;
-        for i in (0..Lanes::<S>::COUNT).filter(|i| w[*i] > 0.0) {
-            let k = run.pixel() + i;
-            if let Some(moments) = &mut self.moments {
-                if !FRONT {
-                    moments.m2[k] *= 1.0 - w[i];
-                }
-                moments.add(k, self.lines[line].0[run.lane + i], w[i], z[i]);
+        let line = run.block * (2 * PLANES + self.channels) + PLANES / 2;
+        let medium = source.splat.kind == SplatKind::Medium;
+        let thickness = if medium { source.depth.extent * source.kernel.spacing } else { 0.0 };
+        for i in 0..Lanes::<S>::COUNT {
+            let (k, after) = (run.pixel() + i, self.lines[line].0[run.lane + i]);
+            if after <= before[i] {
+                continue;
+            }
+            if let Some(depth) = self.depth.get_mut(k) {
+                depth.add(z[i], thickness, [before[i], after]);
             }
             if let Some(object) = self.object.get_mut(k).filter(|o| !FRONT || **o == u32::MAX) {
                 *object = source.object;
@@ -377,20 +359,13 @@ impl Tile {
     }
 }
 
-impl Moments {
-    /// Adds a fragment of absorbed share `weight` at `depth`, after which transmittance is `after`.
-    #[inline(always)]
-    fn add(&mut self, k: usize, after: f32, weight: f32, depth: f32) {
-        if self.first[k] == f32::INFINITY && 1.0 - after >= 1.0 / 255.0 {
-            self.first[k] = depth;
-        }
-        if self.median[k] == f32::INFINITY && after <= 0.5 {
-            self.median[k] = depth;
-        }
-        let delta = depth - self.mean[k];
-        self.mean[k] += delta * (weight / (1.0 - after)).min(1.0);
-        self.m2[k] += weight * delta * (depth - self.mean[k]);
+/// The part of a plane of the image in the tile at `corner`, `fill` outside the image; nothing of an empty plane.
+fn tile_of<T: Copy>(plane: &[T], size: [u32; 2], [x, y]: [usize; 2], fill: T) -> Vec<T> {
+    let mut out = vec![fill; if plane.is_empty() { 0 } else { AREA }];
+    if !plane.is_empty() {
+        for_each_span(size, x, y, |tile, image| out[tile].copy_from_slice(&plane[image]));
     }
+    out
 }
 
 /// 1/|d|² for the pixels of the tile, those outside the image included.

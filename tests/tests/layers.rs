@@ -1,0 +1,144 @@
+//! Layers mean what they say: effects sum to beauty in every scene, and depth is one thing for every primitive.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+#[path = "many_forms/write.rs"]
+mod write;
+
+use organza_tests::{Picture, draw, draw_file, draw_in, largest_difference, mean_and_ripple, parallel_view, window};
+use std::path::Path;
+
+#[test]
+fn effects_sum_to_beauty_in_every_scene() {
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
+    let mut seen = 0;
+    for entry in std::fs::read_dir(scenes).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|e| e != "toml") {
+            continue;
+        }
+        let picture = draw_file(&path, &["--size", "120x68", "--layers", "effects"]);
+        for c in ["R", "G", "B"] {
+            let sum = ["background", "ambient", "emission", "direct"]
+                .iter()
+                .map(|name| picture.channel(&format!("{name}.{c}")))
+                .reduce(|a, b| a.iter().zip(b).map(|(a, b)| a + b).collect())
+                .unwrap();
+            let largest = largest_difference(&sum, &picture.channel(c));
+            assert!(largest < 1e-5, "{}, {c}: {largest:e}", path.display());
+        }
+        seen += 1;
+    }
+    assert!(seen >= 8, "{seen} scenes");
+}
+
+/// First, median, mean and standard deviation of depth, means over the middle of a picture; no pixel is farther from
+/// them than `ripple`.
+fn depths(picture: &Picture, ripple: f64) -> [f64; 4] {
+    ["first", "median", "mean", "sigma"].map(|name| {
+        let values = window(&picture.channel(&format!("depth.{name}.Z")), 32, 8..24, 8..24);
+        if values.iter().all(|v| *v == f64::INFINITY) {
+            return f64::INFINITY;
+        }
+        let (mean, largest) = mean_and_ripple(&values);
+        assert!(largest <= ripple, "{name}: {mean} ± {largest:e}");
+        mean
+    })
+}
+
+fn agree(found: [f64; 4], expected: [f64; 4], what: &str) {
+    for ((f, e), name) in found.into_iter().zip(expected).zip(["first", "median", "mean", "sigma"]) {
+        assert!((f - e).abs() < 1e-4 || f == e, "{what}, depth.{name}: {f}, expected {e}");
+    }
+}
+
+/// Depths of absorption in a homogeneous slab of optical depth `tau` from `z` on, `length` thick.
+fn slab(z: f64, length: f64, tau: f64) -> [f64; 4] {
+    let at = |level: f64| if level <= tau { z + length * level / tau } else { f64::INFINITY };
+    let mean = 1.0 / tau - 1.0 / tau.exp_m1();
+    let variance = 1.0 / (tau * tau) - tau.exp() / (tau.exp_m1() * tau.exp_m1());
+    [at(-(-1.0f64 / 255.0).ln_1p()), at(2f64.ln()), z + length * mean, length * variance.sqrt()]
+}
+
+#[test]
+fn depths_of_a_slab_are_its_closed_form_whatever_it_is_made_of() {
+    for tau in [0.1, 1.0, 4.0] {
+        let extinction = tau / 0.5;
+        let bounds = "box = [[-1, -1, -0.25], [1, 1, 0.25]]";
+        let folder = tempfile::tempdir().unwrap();
+        let cells: Vec<f32> = (0..40 * 40 * 40).map(|k| f32::from(u8::from((15..25).contains(&(k / 1600))))).collect();
+        std::fs::write(folder.path().join("grid.nii"), write::nifti(&cells, 0.05)).unwrap();
+        for object in [
+            format!(
+                "medium_box = {{ min = [-1, -1, -0.25], max = [1, 1, 0.25], extinction = {extinction:?}, spacing = 0.05 }}"
+            ),
+            format!("density = {{ expression = '1', {bounds}, spacing = 0.05, extinction = {extinction:?} }}"),
+            format!(
+                "volume = 'grid.nii'\ntransform = {{ up = 'y' }}\ntransfer = [{{ value = 0, color = [1, 1, 1], extinction = 0 }}, \
+                 {{ value = 1, color = [1, 1, 1], extinction = {extinction:?} }}]"
+            ),
+        ] {
+            let text = parallel_view(1.0, 32) + "[[object]]\nname = 'slab'\n" + &object + "\n";
+            let picture = draw_in(folder.path(), &text, &["--layers", "depth"]);
+            agree(depths(&picture, 1e-4), slab(4.75, 0.5, tau), &format!("τ {tau}, {object}"));
+        }
+    }
+}
+
+/// Two layers at depths 4.5 and 5.5 of opacities `a` and `b`, perhaps a wall at 7 behind.
+fn two_layers(a: f64, b: f64, wall: bool) -> [f64; 4] {
+    let weights = [a, (1.0 - a) * b, if wall { (1.0 - a) * (1.0 - b) } else { 0.0 }];
+    let at = [4.5, 5.5, 7.0];
+    let total: f64 = weights.iter().sum();
+    let mean = weights.iter().zip(at).map(|(w, z)| w * z).sum::<f64>() / total;
+    let variance = weights.iter().zip(at).map(|(w, z)| w * (z - mean).powi(2)).sum::<f64>() / total;
+    let opaque = weights.iter().scan(0.0, |sum, w| {
+        *sum += w;
+        Some(*sum)
+    });
+    let median = opaque.zip(at).find(|(sum, _)| *sum >= 0.5).map_or(f64::INFINITY, |(_, z)| z);
+    [4.5, median, mean, variance.sqrt()]
+}
+
+#[test]
+fn depths_of_two_layers_are_theirs_whatever_they_are_made_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let quad = |z: f64| {
+        let [a, b, c, d] = [[-1.0, -1.0, z], [1.0, -1.0, z], [1.0, 1.0, z], [-1.0, 1.0, z]];
+        vec![[a, b, c], [a, c, d]]
+    };
+    let mut lattice = Vec::new();
+    for k in 0..80 * 80 {
+        let at = |i: i32| -1.0 + 0.025 * (f64::from(i) + 0.5);
+        lattice.push([[at(k % 80), at(k / 80), 0.0]; 3]);
+    }
+    std::fs::write(folder.path().join("quad.ply"), write::mesh(&quad(0.0))).unwrap();
+    std::fs::write(folder.path().join("lattice.ply"), write::points(&lattice)).unwrap();
+    for source in [
+        "rectangle = { center = [0, 0, 0], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.025 }",
+        "mesh = 'quad.ply'\nspacing = 0.025",
+        "points = 'lattice.ply'",
+        "implicit = { expression = 'z', box = [[-1, -1, -0.2], [1, 1, 0.21]], spacing = 0.025 }",
+    ] {
+        for (a, b, wall) in [(0.3, 0.6, false), (0.6, 0.3, false), (0.1, 0.2, true)] {
+            let layer = |z: f64, opacity: f64| {
+                format!(
+                    "[[object]]\nname = 'at {z}'\ntransform = {{ up = 'y', translate = [0, 0, {z:?}] }}\nfootprint = 2\nopacity = {opacity}\n{source}\n"
+                )
+            };
+            let mut text = parallel_view(1.0, 32) + &layer(0.5, a) + &layer(-0.5, b);
+            if wall {
+                text += "[[object]]\nname = 'wall'\n\
+                         rectangle = { center = [0, 0, -2], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.025 }\n";
+            }
+            let picture = draw_in(folder.path(), &text, &["--layers", "depth"]);
+            let what = format!("{source}, {a}, {b}, wall {wall}");
+            agree(depths(&picture, 1e-3), two_layers(a, b, wall), &what);
+        }
+    }
+}
+
+#[test]
+fn nothing_has_no_depth() {
+    let picture = draw(&parallel_view(1.0, 32), &["--layers", "depth"]);
+    assert_eq!(depths(&picture, 0.0), [f64::INFINITY; 4]);
+}
