@@ -59,6 +59,20 @@ impl Frame {
         out
     }
 
+    /// Bytes a point of all that lives in a frame: cloud, values, order, sort scratch, footprints.
+    pub fn bytes_a_point(&self) -> f64 {
+        let cloud = &self.cloud;
+        let columns = 12 * (cloud.position.len() + cloud.color.len() + cloud.normal.len() + cloud.tangent.len())
+            + 4 * (cloud.radius.len() + cloud.cross_section.len() + cloud.object.len() + cloud.value.len())
+            + 4 * cloud.shadow_coefficient.len()
+            + 2 * cloud.material.len()
+            + cloud.kind.len()
+            + cloud.footprint.len();
+        let frame = 4 * (self.values.len() + self.order.input_from_sorted.len() + self.order.slice_starts.len());
+        let bytes = (columns + frame) as u64 + self.scratch.bytes() + self.projected.bytes();
+        bytes as f64 / cloud.len() as f64
+    }
+
     /// Slices front to back.
     pub fn sort(&mut self) {
         self.scratch.recycle(std::mem::take(&mut self.order));

@@ -20,9 +20,25 @@ fn main() {
         row(&format!("outdoor {n}"), &mut Frame::outdoor(n));
         row(&format!("3x3 pixels {n}"), &mut Frame::small_splats(n));
     }
+    if only.is_none() {
+        growth();
+    }
 }
 
-fn row(name: &str, frame: &mut Frame) {
+/// How the sum grows when the points double.
+fn growth() {
+    let mut before = None;
+    for n in [1_000_000, 2_000_000, 4_000_000, 8_000_000, 16_000_000] {
+        let mut frame = Frame::small_splats(n);
+        let [wall, busy] = row(&format!("3x3 pixels {n}"), &mut frame);
+        let ratio = before.replace([wall, busy]).map_or(String::new(), |b: [f64; 2]| {
+            format!("{:.2} of the half as many, {:.2} of their processor time", wall / b[0], busy / b[1])
+        });
+        println!("{:>24} {:.1} bytes a point. {ratio}", "", frame.bytes_a_point());
+    }
+}
+
+fn row(name: &str, frame: &mut Frame) -> [f64; 2] {
     let mut best = [[f64::INFINITY; 2]; 3];
     let mut fragments = 0;
     for _ in 0..REPEATS {
@@ -40,4 +56,5 @@ fn row(name: &str, frame: &mut Frame) {
     let cell = |b: [f64; 2]| format!("{:.1} {:.0}", b[0], b[1]);
     let [sort, project, fold] = best.map(cell);
     println!("{name:>24} {sort:>10} {project:>10} {fold:>10} {:>10} {fragments:12} {rate:9.0}", cell(sum));
+    sum
 }

@@ -40,6 +40,7 @@
 
 mod buckets;
 pub mod cost;
+mod crowd;
 mod depth_bits;
 mod error;
 mod first_level;

@@ -33,7 +33,8 @@ pub enum Method {
     None,
     /// Two levels of buckets (Gunjee 2007, Figure 9); inside a slice, by id.
     TwoLevels,
-    /// By the bits of the depth, then by id: exact mode, or more slices than [`crate::Params::max_slices`].
+    /// By the bits of the depth, then by id: exact mode, more slices than [`crate::Params::max_slices`], or most of very
+    /// many splats in one first-level bucket, which would be one thread's work.
     DepthBits,
 }
 

@@ -46,6 +46,11 @@ impl Slicing {
         Self { near, far, thickness, inverse, slices, buckets, reciprocal, direction }
     }
 
+    /// The same slices, to be found from the order by depth bits.
+    pub(crate) fn without_levels(&self) -> Self {
+        Self { buckets: 0, ..*self }
+    }
+
     /// Slice of a depth, counted from near, for any number of slices.
     pub(crate) fn slice_of(&self, depth: f32) -> u64 {
         (((f64::from(depth) - f64::from(self.near)) * self.inverse) as u64).min(self.slices - 1)

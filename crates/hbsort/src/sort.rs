@@ -1,6 +1,7 @@
 //! The steps of Figure 9 in a row: cull and project, choose ε, first level, second level, slices.
 
 use crate::buckets;
+use crate::crowd;
 use crate::depth_bits::{DIGITS, DepthBits, MOST_PASSES, leaf_capacity};
 use crate::first_level::{Distributed, distribute, scan_buckets};
 use crate::project::{Projector, extremes_of};
@@ -16,7 +17,8 @@ use std::sync::{Mutex, PoisonError};
 /// A splat is kept when its sphere of cutoff radius reaches into the view pyramid (or the box of parallel rays) and
 /// in front of the eye plane; so kept depths may be as small as −radius. `ids` restricts the sort to a subset, such as
 /// the translucent splats; strictly ascending. Splats of one slice stand in the order of their ids; with
-/// [`Params::exact`], or more slices than [`Params::max_slices`], in the order of their depths, then ids. The result
+/// [`Params::exact`], more slices than [`Params::max_slices`], or most of very many splats in one of the two levels'
+/// buckets, in the order of their depths, then ids. The result
 /// has the same bits for any number of threads. Scaling scene and camera by a power of two changes no id.
 ///
 /// # Errors
@@ -109,6 +111,9 @@ fn run<D: Fn(usize) -> f32 + Sync, I: Fn(u32) -> u32 + Sync>(
     scratch: &mut Scratch,
 ) -> Result<SliceOrder, Error> {
     let n = order.input_from_sorted.len();
+    let bits = |place: usize| depths.map_or_else(|| order.input_from_sorted[place], |d| d[place].to_bits());
+    let ranges = slicing.buckets > 0 && crowd::crowds(slicing, n, bits);
+    let slicing = if ranges { &slicing.without_levels() } else { slicing };
     let method = if slicing.buckets > 0 { Method::TwoLevels } else { Method::DepthBits };
     let buckets = if slicing.buckets > 0 { slicing.buckets as usize } else { bucket_count(n) };
     prepare(scratch, method, n, buckets)?;

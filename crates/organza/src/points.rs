@@ -78,6 +78,7 @@ impl Drawing<'_> {
                 0.0
             },
             transmittance_cutoff: self.settings.points.transmittance_cutoff as f32,
+            accumulation: self.settings.points.accumulation,
         }
     }
 

@@ -10,6 +10,9 @@ use splat_core::optics::SurfaceOpacity;
 use splat_core::{FootprintStack, SplatKind};
 use std::f64::consts::PI;
 
+/// Weight of an opaque disc that faces away, part of the definition of an opaque splat.
+const FACING_AWAY: f64 = 1.0 / 256.0;
+
 /// One splat seen by the camera, in f64.
 pub(crate) struct Splat {
     pub(crate) kind: SplatKind,
@@ -110,7 +113,9 @@ impl Splat {
             SurfaceOpacity::ThinSlab if self.kind == SplatKind::Surface => 1.0 / normal.dot(view_dir).abs().max(1e-3),
             _ => 1.0,
         };
-        self.peak = amount / (u.length() * v.length()) * spread * grazing;
+        // Beside discs of the same surface that face the viewer, opaque ones that face away hardly count.
+        let away = self.kind == SplatKind::Opaque && normal.dot(view_dir) > 0.0;
+        self.peak = amount / (u.length() * v.length()) * spread * grazing * if away { FACING_AWAY } else { 1.0 };
         let along = if parallel { normal.z } else { normal.dot(self.center) / self.center.z };
         let depth_slope =
             if along.abs() < 1e-4 { DVec2::ZERO } else { DVec2::new(-normal.x, normal.y) / (along * px_per_world) };

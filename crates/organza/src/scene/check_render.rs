@@ -2,10 +2,11 @@
 
 use super::check::{At, LARGEST, SMALLEST};
 use super::de::suggest;
-use super::raw::{Auto, RawDirection, RawMapping, RawPoints, RawRender, RawShadow};
+use super::raw::{Auto, RawAccumulation, RawDirection, RawMapping, RawPoints, RawRender, RawShadow};
 use super::{LAYER_NAMES, LayerChoice, PointsSettings, RenderSettings, ShadowMapping, ShadowSettings, Technique};
 use crate::Error;
 use splat_core::Direction;
+use splat_core::raster::Accumulation;
 
 /// Techniques of the design that this version does not have.
 const LATER_TECHNIQUES: [&str; 4] = ["sheets", "particles", "surfels", "reference"];
@@ -80,6 +81,10 @@ fn check_points(at: &At<'_>, raw: &RawPoints) -> Result<PointsSettings, Error> {
         first_slices: raw.first_slices,
         transmittance_cutoff: cutoff,
         resampling_filter: raw.resampling_filter.unwrap_or(true),
+        accumulation: match raw.accumulation {
+            RawAccumulation::F32 => Accumulation::F32,
+            RawAccumulation::F16 => Accumulation::F16,
+        },
         shadow: check_shadow(&at.key("shadow"), &raw.shadow)?,
     })
 }

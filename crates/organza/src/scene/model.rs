@@ -2,6 +2,7 @@
 
 use super::{LayerChoice, SceneLight};
 use glam::DVec3;
+use splat_core::raster::Accumulation;
 use splat_core::{Camera, Direction, FootprintStack, Material, Similarity, TransferFunction};
 use std::path::PathBuf;
 
@@ -234,6 +235,8 @@ pub struct PointsSettings {
     pub transmittance_cutoff: f64,
     /// Whether footprints are widened to a pixel so that small splats do not flicker.
     pub resampling_filter: bool,
+    /// Precision of the running sums of a pixel.
+    pub accumulation: Accumulation,
     /// Shadow maps.
     pub shadow: ShadowSettings,
 }

@@ -210,6 +210,8 @@ pub(super) struct RawPoints {
     pub(super) transmittance_cutoff: Option<f64>,
     /// Widen footprints to a pixel; default true.
     pub(super) resampling_filter: Option<bool>,
+    /// Precision of the running sums, "f32" (default) or "f16".
+    pub(super) accumulation: RawAccumulation,
     pub(super) shadow: RawShadow,
 }
 
@@ -221,6 +223,16 @@ pub(super) enum RawDirection {
     #[default]
     FrontToBack,
     BackToFront,
+}
+
+/// Precision of the running sums.
+#[derive(Debug, Default, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(rename = "Accumulation")]
+pub(super) enum RawAccumulation {
+    #[default]
+    F32,
+    F16,
 }
 
 /// Settings of the translucent shadow maps.

@@ -31,6 +31,8 @@ pub(crate) struct Attributes {
     pub(crate) disc: Column,
     /// −1 for a slab whose optical depth grows at grazing angles, else 1.
     pub(crate) crossing: Column,
+    /// −1 for an opaque disc, else 1.
+    pub(crate) opaque: Column,
     pub(crate) any_medium: bool,
     pub(crate) any_disc: bool,
     pub(crate) any_tangent: bool,
@@ -72,6 +74,7 @@ impl Attributes {
             let opacity = columns.materials[cloud.material[i] as usize].surface_opacity;
             let slab = cloud.kind[i] == SplatKind::Surface && opacity == SurfaceOpacity::ThinSlab;
             self.crossing[l] = if slab { -1.0 } else { 1.0 };
+            self.opaque[l] = if cloud.kind[i] == SplatKind::Opaque { -1.0 } else { 1.0 };
         }
     }
 }

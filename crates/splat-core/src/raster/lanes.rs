@@ -129,6 +129,17 @@ impl<S: Simd> Lanes<S> {
         small.where_less_or(self, of(SMALL), of(1.0) - self.exp_neg())
     }
 
+    /// Rounded to half precision (11 bits, least normal number 2⁻¹⁴), at most 65504.
+    #[inline(always)]
+    pub(crate) fn to_half(self) -> Self {
+        let of = |v| Self::splat(self.simd, v);
+        // Veltkamp's splitting keeps 11 of 24 bits; below 2⁻¹⁴ the unit is 2⁻²⁴, that of a float near 0.75.
+        let scaled = self * of(8193.0);
+        let normal = scaled - (scaled - self);
+        let tiny = (self + of(0.75)) - of(0.75);
+        tiny.where_less_or(self.abs(), of(1.0 / 16384.0), normal).min(of(65504.0)).max(of(-65504.0))
+    }
+
     /// Share of a medium kernel in front of a plane at t = distance/R from its centre: the distribution function of the
     /// triweight density 35/32·(1 − t²)³, whose deviation is R/3, as the footprint's at the default cutoff.
     #[inline(always)]
@@ -189,6 +200,7 @@ mod tests {
         ExpNeg,
         Opacity,
         ShareInFront,
+        ToHalf,
     }
 
     /// Runs a function on every lane of an instruction set.
@@ -204,6 +216,7 @@ mod tests {
                 Function::ExpNeg => lanes.exp_neg(),
                 Function::Opacity => lanes.opacity(),
                 Function::ShareInFront => lanes.share_in_front(),
+                Function::ToHalf => lanes.to_half(),
             }
             .store(&mut out);
             out[..Lanes::<S>::COUNT].to_vec()
@@ -223,6 +236,23 @@ mod tests {
                     assert_eq!(lane.to_bits(), scalar.to_bits(), "x {x}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn halves_have_eleven_bits() {
+        let half = |x: f32| pulp::Arch::new().dispatch(Apply(x, Function::ToHalf))[0];
+        let ulp = 1.0 / 1024.0;
+        for (x, rounded) in [
+            (0.1, 0.099_975_586),
+            (1.0 + 0.5 * ulp, 1.0),
+            (1.0 + 1.5 * ulp, 1.0 + 2.0 * ulp),
+            (-2.001, -2.001_953_1),
+            (6.0e-8, 5.960_464_5e-8),
+            (2e-8, 0.0),
+            (1e6, 65504.0),
+        ] {
+            assert_eq!(half(x), rounded, "{x}");
         }
     }
 

@@ -18,6 +18,12 @@ use glam::Vec2;
 use pulp::Simd;
 use rayon::prelude::*;
 
+/// Weight of an opaque disc that faces away beside one that faces the viewer. Behind the silhouette of a closed surface
+/// discs face away and stick out by R sin θ; lit on the side that they turn to the viewer, which is the inside, they would
+/// draw a dark rim. Where nothing of the same surface faces the viewer this weight cancels: a back is seen as it is. A
+/// power of two, which changes no bit of the quotient.
+const FACING_AWAY: f32 = 1.0 / 256.0;
+
 /// Splats projected by one task.
 const CHUNK: usize = 4096;
 
@@ -262,6 +268,8 @@ impl Projector<'_> {
         };
         let slab = peak / (along.abs() / length).max(of(1e-3));
         peak = slab.where_less_or(load(&attributes.crossing), of(0.0), peak);
+        let away = of(FACING_AWAY).where_less_or(of(0.0), along, of(1.0));
+        peak = peak * away.where_less_or(load(&attributes.opaque), of(0.0), of(1.0));
         // An edge-on plane has no slope that could be used; its fragments stay at the centre's depth.
         let per_px = of(1.0) / (along * px_per_world);
         let usable = |slope: Lanes<S>| slope.where_less(of(1e-4), along.abs());

@@ -12,7 +12,7 @@ use super::kernel::Kernel;
 use super::lanes::{Lanes, MAX_LANES, SMALL, exp_neg};
 use super::projected::{Projected, ProjectedDepth, ProjectedSplat};
 use super::tile::{AREA, BATCH, BLOCKS, Line, PIXELS, Run, for_each_run, for_each_span, position};
-use super::{OpaqueImage, Params, RasterCounts};
+use super::{Accumulation, OpaqueImage, Params, RasterCounts};
 use crate::{Accumulator, DepthProfile, Direction, Material, Progress, SplatKind};
 use pulp::Simd;
 use rayon::prelude::*;
@@ -35,6 +35,8 @@ struct Tile {
     /// Empty when not asked for, as is the next.
     depth: Vec<DepthProfile>,
     object: Vec<u32>,
+    /// Whether sums are kept in half precision.
+    half: bool,
     fragments: u64,
 }
 
@@ -82,6 +84,7 @@ pub fn fold(
         .filter(|&t| !bins.is_empty(t) && !progress.is_cancelled())
         .map(|t| {
             let mut tile = Tile::load(accumulator, projected, opaque, &bins, t);
+            tile.half = params.accumulation == Accumulation::F16;
             let input = FoldTile { tile: &mut tile, bins: &bins, t, projected, values, materials, direction, params };
             pulp::Arch::new().dispatch(input);
             tile
@@ -203,6 +206,7 @@ impl Tile {
             opaque_depth,
             depth,
             object,
+            half: false,
             fragments: 0,
         };
         tile.load_lines(acc);
@@ -299,21 +303,29 @@ impl Tile {
         let channels = if CHANNELS > 0 { CHANNELS } else { self.channels };
         let stride = 2 * PLANES + channels;
         let lines = &mut self.lines[run.block * stride..][..stride];
+        let half = self.half;
+        let rounded = |sum: Lanes<S>| if half { sum.to_half() } else { sum };
         let mut weight = [Lanes::splat(simd, 0.0); PLANES];
         let mut nearer = weight[0];
         for p in 0..PLANES {
             let step = tau * Lanes::splat(simd, source.extinction[p]);
-            let sum = &mut lines[p].0[run.lane..];
-            let before = Lanes::load(simd, sum);
-            (before + step).store(sum);
+            let plane = &mut lines[p].0[run.lane..];
+            let before = Lanes::load(simd, plane);
             if p == PLANES / 2 {
                 nearer = before;
             }
+            let sum = rounded(before + step);
+            sum.store(plane);
             let opacity = if source.thin { step.opacity_of_small() } else { step.opacity() };
-            let transmittance = &mut lines[PLANES + p].0[run.lane..];
-            let before = Lanes::load(simd, transmittance);
-            opacity.negate_mul_add(before, before).store(transmittance);
-            weight[p] = if FRONT { before * opacity } else { opacity };
+            let plane = &mut lines[PLANES + p].0[run.lane..];
+            let before = Lanes::load(simd, plane);
+            let after = if half { sum.exp_neg() } else { opacity.negate_mul_add(before, before) };
+            after.store(plane);
+            weight[p] = match (FRONT, half) {
+                (false, _) => opacity,
+                (true, false) => before * opacity,
+                (true, true) => before - after,
+            };
         }
         for c in 0..channels {
             // Channels come in threes, red, green, blue; a lone last one takes the green weight.
@@ -322,7 +334,7 @@ impl Tile {
             let sum = &mut lines[2 * PLANES + c].0[run.lane..];
             let before = Lanes::load(simd, sum);
             let added = if FRONT { value } else { value - before };
-            weight[p].mul_add(added, before).store(sum);
+            rounded(weight[p].mul_add(added, before)).store(sum);
         }
         if !self.depth.is_empty() || !self.object.is_empty() {
             self.extras::<S, FRONT, PLANES>(simd, source, run, nearer);
