@@ -90,9 +90,11 @@ impl<'a> Lattice<'a> {
         let (dx, dy, dz) = (usize::from(nx > 1), usize::from(ny > 1) * nx, usize::from(nz > 1) * nx * ny);
         let at = (k * ny + j) * nx + i;
         let v = &self.grid.values;
+        // One check of bounds a pair of neighbours.
         let line = |b: usize| {
-            let a = f64::from(v[b]);
-            a + fx * (f64::from(v[b + dx]) - a)
+            let pair = &v[b..=b + dx];
+            let a = f64::from(pair[0]);
+            a + fx * (f64::from(pair[dx]) - a)
         };
         let plane = |b: usize| {
             let a = line(b);

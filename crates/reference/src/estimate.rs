@@ -78,6 +78,8 @@ pub struct Estimate {
     pub transmittance: Option<Statistics>,
     /// Samples a pixel.
     pub samples: u32,
+    /// Scattering events of all paths.
+    pub bounces: u64,
     /// Density lookups above the promised majorant: no bias, but a broken promise.
     pub majorant_violations: u64,
 }
@@ -118,6 +120,7 @@ impl Running {
 
 #[derive(Clone, Copy, Default)]
 struct Pixel {
+    bounces: u64,
     radiance: Running,
     transmittance: Running,
 }
@@ -177,7 +180,9 @@ fn one_sample(
         PixelSampling::Center => [0.5; 2],
     };
     let ray = Ray::of_pixel(camera, x as f64 + dx, y as f64 + dy);
-    pixel.radiance.add(tracer.radiance(ray, &mut rng));
+    let (radiance, bounces) = tracer.radiance(ray, &mut rng);
+    pixel.radiance.add(radiance);
+    pixel.bounces += u64::from(bounces);
     if settings.transmittance {
         // Numbers of their own: asking for the transmittance leaves the radiance as it is.
         let mut rng = Stream::new(settings.seed, TRANSMITTANCE, item, u64::from(sample));
@@ -195,6 +200,7 @@ fn finish(camera: &Camera, settings: &PathSettings, pixels: &[Pixel], samples: u
         radiance: collect(|p| &p.radiance),
         transmittance: settings.transmittance.then(|| collect(|p| &p.transmittance)),
         samples,
+        bounces: pixels.iter().map(|p| p.bounces).sum(),
         majorant_violations: violations,
     }
 }

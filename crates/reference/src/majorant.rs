@@ -99,6 +99,25 @@ impl MajorantGrid {
         &self.bounds
     }
 
+    /// Where a ray enters and leaves the grid between two distances, and its steps from there: [`Ray::clip`] with the
+    /// reciprocals shared.
+    #[inline(always)]
+    fn enter(&self, ray: &Ray, t0: f64, t1: f64) -> Option<(f64, f64, Steps)> {
+        let (mut enter, mut leave) = (t0, t1);
+        let per = ray.direction.recip();
+        for a in 0..3 {
+            let (p, q) = (self.bounds[0][a] - ray.origin[a], self.bounds[1][a] - ray.origin[a]);
+            if ray.direction[a] != 0.0 {
+                let (p, q) = (p * per[a], q * per[a]);
+                enter = enter.max(p.min(q));
+                leave = leave.min(p.max(q));
+            } else if p > 0.0 || q < 0.0 {
+                return None;
+            }
+        }
+        (enter < leave).then(|| (enter, leave, Steps::new(self, ray, per, enter)))
+    }
+
     /// Calls `event` (distance, cell, majorant) at the tentative collisions between `t0` and `t1`, until it says stop.
     #[inline(always)]
     pub(crate) fn walk(
@@ -109,8 +128,7 @@ impl MajorantGrid {
         rng: &mut Stream,
         mut event: impl FnMut(f64, usize, f64, &mut Stream) -> bool,
     ) {
-        let Some((mut t, end)) = ray.clip(&self.bounds, t0, t1) else { return };
-        let mut steps = Steps::new(self, ray, t);
+        let Some((mut t, end, mut steps)) = self.enter(ray, t0, t1) else { return };
         let mut depth = rng.exponential();
         loop {
             let majorant = self.majorant[steps.cell];
@@ -150,7 +168,7 @@ struct Steps {
 
 impl Steps {
     #[inline(always)]
-    fn new(grid: &MajorantGrid, ray: &Ray, t: f64) -> Self {
+    fn new(grid: &MajorantGrid, ray: &Ray, per: DVec3, t: f64) -> Self {
         let q = (ray.at(t) - grid.bounds[0]) * grid.per_cell;
         let strides = [1, grid.dims[0], grid.dims[0] * grid.dims[1]];
         let mut out = Self { cell: 0, next: [f64::INFINITY; 3], delta: [0.0; 3], left: [0; 3], stride: [0; 3] };
@@ -160,10 +178,9 @@ impl Steps {
             out.cell += i * strides[a];
             let d = ray.direction[a];
             if d != 0.0 {
-                let per = 1.0 / d;
                 let edge = grid.bounds[0][a] + (i + usize::from(d > 0.0)) as f64 * grid.cell[a];
-                out.next[a] = (edge - ray.origin[a]) * per;
-                out.delta[a] = grid.cell[a] * per.abs();
+                out.next[a] = (edge - ray.origin[a]) * per[a];
+                out.delta[a] = grid.cell[a] * per[a].abs();
                 out.left[a] = if d > 0.0 { last - i } else { i };
                 out.stride[a] = if d > 0.0 { strides[a] as isize } else { -(strides[a] as isize) };
             }

@@ -144,8 +144,8 @@ impl<'a> Tracer<'a> {
         })
     }
 
-    /// Radiance that arrives along a ray backwards: one sample.
-    pub(crate) fn radiance(&self, ray: Ray, rng: &mut Stream) -> [f64; 3] {
+    /// Radiance that arrives along a ray backwards, one sample, and the path's scattering events.
+    pub(crate) fn radiance(&self, ray: Ray, rng: &mut Stream) -> ([f64; 3], u32) {
         let mut path = Path {
             ray,
             t: 0.0,
@@ -157,7 +157,7 @@ impl<'a> Tracer<'a> {
             radiance: [0.0; 3],
         };
         while self.segment(&mut path, rng) {}
-        path.radiance
+        (path.radiance, path.bounces)
     }
 
     fn may_scatter(&self, path: &Path) -> bool {

@@ -1,10 +1,11 @@
 //! All roots of a scalar field along a ray, isolated by interval bounds.
 //!
 //! A segment whose ball cannot hold a zero by `ScalarField::bound` is dropped; others are halved until they are
-//! `resolution` of the whole long. A leaf whose ends differ in sign holds a root, refined by bisection to neighbouring
-//! numbers (Illinois steps first). A leaf that the bound cannot clear and whose ends agree is counted as unresolved: a
-//! tangent contact, two roots closer than the resolution, or a loose bound. Exclusion is a proof, so no simple root that
-//! is farther than the resolution from its neighbours is ever missed (Moore, Interval Analysis, 1966).
+//! `resolution` of the whole long. Neighbouring leaves that the bound cannot clear are a cluster. A leaf whose ends differ
+//! in sign holds a root, refined to neighbouring numbers (Illinois steps, with bisection). A cluster of one change of sign
+//! along which the slope keeps its sign is a simple root; any other is counted as unresolved: a tangent contact, two roots
+//! closer than the resolution, or a loose bound. Exclusion is a proof, so outside clusters nothing is ever missed (Moore,
+//! Interval Analysis, 1966); within a cluster the slope is looked at, at the ends of its leaves.
 
 use crate::ray::Ray;
 use splat_core::ScalarField;
@@ -29,7 +30,7 @@ impl Default for RootParams {
 pub struct Crossings {
     /// Distances along the ray, rising.
     pub roots: Vec<f64>,
-    /// Leaves of the subdivision where neither a root nor its absence is proven.
+    /// Clusters of leaves that hold something else than one simple root, or nothing.
     pub unresolved: u32,
     /// Whether the field's bound covered the whole segment.
     pub proven: bool,
@@ -37,7 +38,8 @@ pub struct Crossings {
 
 /// Where the field changes sign along the ray between distances `t0` < `t1`, both finite.
 pub fn crossings(field: &dyn ScalarField, ray: &Ray, t0: f64, t1: f64, params: &RootParams) -> Crossings {
-    let mut search = Search { field, ray, found: Crossings { proven: true, ..Crossings::default() } };
+    let found = Crossings { proven: true, ..Crossings::default() };
+    let mut search = Search { field, ray, found, cluster: None };
     let depth = (-params.resolution.clamp(1e-12, 0.5).log2()).ceil() as u32;
     let value = |t: f64| field.value(ray.at(t));
     if !(t0 < t1 && t0.is_finite() && t1.is_finite()) {
@@ -47,6 +49,7 @@ pub fn crossings(field: &dyn ScalarField, ray: &Ray, t0: f64, t1: f64, params: &
         search.march(t0, t1, params.steps.max(1));
     } else {
         search.halve([t0, t1], [value(t0), value(t1)], depth, params);
+        search.close();
     }
     search.found
 }
@@ -55,6 +58,16 @@ struct Search<'a> {
     field: &'a dyn ScalarField,
     ray: &'a Ray,
     found: Crossings,
+    cluster: Option<Cluster>,
+}
+
+/// Neighbouring leaves that may hold roots.
+struct Cluster {
+    end: f64,
+    /// Sign of the slope at its first end.
+    rising: bool,
+    monotone: bool,
+    changes: u32,
 }
 
 /// One sign for zero, so that a root on a shared end belongs to one leaf.
@@ -87,11 +100,29 @@ impl Search<'_> {
     }
 
     fn leaf(&mut self, t: [f64; 2], v: [f64; 2]) {
-        if positive(v[0]) == positive(v[1]) {
-            self.found.unresolved += 1;
-        } else {
+        let rising = |t: f64| positive(self.field.gradient(self.ray.at(t)).dot(self.ray.direction));
+        if self.cluster.as_ref().is_none_or(|c| c.end < t[0]) {
+            let first = Cluster { end: t[0], rising: rising(t[0]), monotone: true, changes: 0 };
+            self.close();
+            self.cluster = Some(first);
+        }
+        let rises = rising(t[1]);
+        let changes = positive(v[0]) != positive(v[1]);
+        if let Some(c) = &mut self.cluster {
+            c.end = t[1];
+            c.monotone &= rises == c.rising;
+            c.changes += u32::from(changes);
+        }
+        if changes {
             let root = self.refine(t, v);
             self.found.roots.push(root);
+        }
+    }
+
+    /// Judges the cluster that has ended.
+    fn close(&mut self) {
+        if self.cluster.take().is_some_and(|c| c.changes != 1 || !c.monotone) {
+            self.found.unresolved += 1;
         }
     }
 
@@ -147,8 +178,10 @@ mod tests {
         fn value(&self, p: DVec3) -> f64 {
             self.0.iter().map(|r| p.x - r).product()
         }
-        fn gradient(&self, _: DVec3) -> DVec3 {
-            DVec3::X
+        fn gradient(&self, p: DVec3) -> DVec3 {
+            let without =
+                |i: usize| self.0.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, r)| p.x - r).product::<f64>();
+            DVec3::X * (0..self.0.len()).map(without).sum::<f64>()
         }
         fn hessian(&self, _: DVec3) -> DMat3 {
             DMat3::ZERO
