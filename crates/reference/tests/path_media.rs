@@ -102,6 +102,24 @@ fn light_at_the_centre_of_a_ball_sends_out_what_the_medium_scattered() {
 }
 
 #[test]
+fn sphere_light_in_a_ball_loses_nothing() {
+    // Power 4πr²·πL, albedo 1: the image of the ball, its light included, integrates to πr²L from every side.
+    let ball = Density::Ball { center: DVec3::ZERO, radius: 1.0 };
+    let medium = Medium { asymmetry: 0.5, ..Medium::new(ball, 2.0, 1.0) };
+    let light = LightSource::Sphere { center: DVec3::ZERO, radius: 0.3, radiance: [10.0; 3] };
+    let scene = Scene { media: vec![medium], lights: vec![light], ..Scene::default() };
+    let camera = parallel(DVec3::Z * 5.0, DVec3::ZERO, 2.0, [16, 16]);
+    let image = trace(&scene, &camera, &PathSettings { pixel: PixelSampling::Area, ..settings(1000, None) });
+    let sum = image.radiance.mean.iter().map(|m| m[0]).sum::<f64>();
+    let variance = image.radiance.standard_error.iter().map(|e| e[0] * e[0]).sum::<f64>();
+    let per = (2.0f64 / 16.0).powi(2);
+    let (found, error, exact) = (sum * per, variance.sqrt() * per, PI * 0.09 * 10.0);
+    // Two-sided 1e-3.
+    assert!((found - exact).abs() < 3.3 * error, "{found} ± {error}, exactly {exact}");
+    assert!(error < 0.01 * exact, "± {error} proves little");
+}
+
+#[test]
 fn light_in_a_ball_once_scattered_agrees_with_quadrature_and_the_marcher() {
     let (sigma, omega) = (1.5, 0.8);
     let medium = Medium::new(Density::Ball { center: DVec3::ZERO, radius: 1.0 }, sigma, omega);

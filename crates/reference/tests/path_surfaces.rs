@@ -123,6 +123,30 @@ fn penumbra_of_a_disk_light_is_as_wide_as_similar_triangles_say() {
 }
 
 #[test]
+fn environment_image_lights_a_plane_by_its_closed_form() {
+    // E = Σ L·Δφ·(sin²θ₂ − sin²θ₁)/2 over the pixels of the upper half; a small sun beside a dim sky.
+    let (width, height) = (16, 8);
+    let mut pixels = vec![[0.3, 0.2, 0.1]; width * height];
+    pixels[width + 5] = [300.0, 200.0, 50.0];
+    let ground = quad([(-9.0, -9.0), (-9.0, 9.0), (9.0, 9.0), (9.0, -9.0)].map(|(x, z)| Vec3::new(x, 0.0, z)));
+    let irradiance: [f64; 3] = std::array::from_fn(|c| {
+        let edge = |y: usize| (PI * y as f64 / height as f64).sin().powi(2);
+        let row = |y: usize| (0..width).map(|x| pixels[y * width + x][c]).sum::<f64>() * (edge(y + 1) - edge(y));
+        (0..height / 2).map(row).sum::<f64>() * PI / width as f64
+    });
+    let environment = Environment::Image(LatLong::new([width, height], pixels).unwrap());
+    let camera = parallel(DVec3::Y, DVec3::ZERO, 1.0, [6, 6]);
+    let shiny = SurfaceMaterial { specular: 0.4, shininess: 0.0, diffuse: [0.0; 3], ..white(SurfaceKind::Opaque) };
+    // Phong of exponent 0 is Lambert again: ρ_s·2/2π.
+    for (material, reflectance) in [(white(SurfaceKind::Opaque), 1.0), (shiny, 0.4)] {
+        let surfaces = vec![Surface { mesh: &ground, material }];
+        let scene = Scene { surfaces, environment: environment.clone(), ..Scene::default() };
+        let truth = irradiance.map(|e| e * reflectance / PI);
+        assert_mean(&trace(&scene, &camera, &settings(3000)), |_| truth, 4.5, "sun and sky");
+    }
+}
+
+#[test]
 fn translucent_shadow_passes_the_product_of_the_opacities() {
     let ground = quad([(-9.0, -9.0), (-9.0, 9.0), (9.0, 9.0), (9.0, -9.0)].map(|(x, z)| Vec3::new(x, 0.0, z)));
     let lid = box_mesh(Vec3::new(-8.0, 1.0, -8.0), Vec3::new(8.0, 2.0, 8.0));
