@@ -4,15 +4,16 @@ use crate::repo::Repo;
 use crate::toml_lines::{lines, string};
 
 /// For each crate of the workspace, the crates of the workspace that it may depend on, tests and benches included.
-const MAY_KNOW: [(&str, &[&str]); 9] = [
+const MAY_KNOW: [(&str, &[&str]); 10] = [
     ("splat-core", &[]),
     ("convert", &["splat-core"]),
     ("tsm", &["splat-core"]),
     ("hbsort", &["splat-core"]),
+    ("pbsr", &["splat-core"]),
     ("reference", &["splat-core"]),
-    ("organza", &["splat-core", "convert", "tsm", "hbsort", "reference"]),
-    ("organza-tests", &["splat-core", "convert", "tsm", "hbsort", "reference", "organza"]),
-    ("organza-benches", &["splat-core", "convert", "tsm", "hbsort", "reference", "organza"]),
+    ("organza", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference"]),
+    ("organza-tests", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza"]),
+    ("organza-benches", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza"]),
     ("xtask", &[]),
 ];
 

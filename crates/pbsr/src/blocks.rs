@@ -1,0 +1,140 @@
+//! Elements (triangles, cells, splats) of given rates, in blocks, each block with its own alias table (Walker; Vose).
+//!
+//! A Poisson process on many elements is the sum of one on each block; within a block, each arrival picks its element by
+//! rate. A block's tables and the data of its elements stay in the nearest cache, and no set ever visits an element that
+//! gets no particle. Rates are summed in f64; one look-up resolves shares of 2⁻³² of a block.
+
+use crate::stream::{Stage, Stream};
+use rayon::prelude::*;
+
+/// Elements of a block.
+const BLOCK: usize = 1024;
+
+/// The most particles of a chunk, in the mean: a block of more is worked on by several tasks.
+const CHUNK_MEAN: f64 = 8192.0;
+
+/// Alias tables of all elements.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Blocks {
+    elements: usize,
+    /// 32-bit share of the slot's own element, and the element that has the rest.
+    slots: Vec<(u32, u16)>,
+    /// (block, mean number of particles), none of mean 0.
+    chunks: Vec<(u32, f64)>,
+}
+
+impl Blocks {
+    /// Tables for `elements` elements, of which `rate` gives the mean number of particles in a set, finite and ≥ 0.
+    pub(crate) fn new(elements: usize, rate: impl Fn(usize) -> f64 + Sync) -> Self {
+        let mut slots = vec![(0u32, 0u16); elements];
+        let totals: Vec<f64> = slots
+            .par_chunks_mut(BLOCK)
+            .enumerate()
+            .map(|(b, slots)| {
+                let rates: Vec<f64> = (0..slots.len()).map(|i| rate(b * BLOCK + i)).collect();
+                fill(slots, &rates)
+            })
+            .collect();
+        let mut chunks = Vec::new();
+        for (b, &total) in totals.iter().enumerate().filter(|(_, t)| **t > 0.0) {
+            let parts = (total / CHUNK_MEAN).ceil().max(1.0);
+            // Sums of independent Poisson variables are Poisson: a block may be shared by any number of tasks.
+            chunks.extend((0..parts as u64).map(|_| (b as u32, total / parts)));
+        }
+        Self { elements, slots, chunks }
+    }
+
+    /// Number of chunks.
+    pub(crate) fn chunks(&self) -> usize {
+        self.chunks.len()
+    }
+
+    /// Mean number of arrivals in a chunk.
+    pub(crate) fn mean(&self, chunk: usize) -> f64 {
+        self.chunks[chunk].1
+    }
+
+    /// The arrivals of a chunk: `emit` gets the element of each, and the stream for whatever else it draws.
+    #[inline]
+    pub(crate) fn arrivals(
+        &self,
+        seed: u64,
+        stage: Stage,
+        set: u64,
+        chunk: usize,
+        mut emit: impl FnMut(usize, &mut Stream),
+    ) {
+        let (block, mean) = self.chunks[chunk];
+        let first = block as usize * BLOCK;
+        let slots = &self.slots[first..(first + BLOCK).min(self.elements)];
+        let mut stream = Stream::new(seed, stage, set, chunk as u64);
+        for _ in 0..stream.poisson(mean) {
+            let bits = stream.bits();
+            let slot = (((bits >> 32) * slots.len() as u64) >> 32) as usize;
+            let (share, other) = slots[slot];
+            let pick = if (bits as u32) < share { slot } else { usize::from(other) };
+            emit(first + pick, &mut stream);
+        }
+    }
+
+    /// Bytes of the tables.
+    pub(crate) fn bytes(&self) -> u64 {
+        (self.slots.len() * 8 + self.chunks.len() * 16) as u64
+    }
+}
+
+/// One alias table; returns the sum of the rates.
+fn fill(slots: &mut [(u32, u16)], rates: &[f64]) -> f64 {
+    let total: f64 = rates.iter().sum();
+    if total <= 0.0 {
+        return 0.0;
+    }
+    let scale = rates.len() as f64 / total;
+    let mut rest: Vec<f64> = rates.iter().map(|r| r * scale).collect();
+    let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..rates.len()).partition(|i| rest[*i] < 1.0);
+    while let (Some(s), Some(l)) = (small.pop(), large.last().copied()) {
+        slots[s] = ((rest[s] * 4_294_967_296.0) as u32, l as u16);
+        rest[l] -= 1.0 - rest[s];
+        if rest[l] < 1.0 {
+            large.pop();
+            small.push(l);
+        }
+    }
+    // Left over by rounding: all their own. A rate of 0 never is: it gave up its whole slot above.
+    large.into_iter().chain(small).for_each(|i| slots[i] = (u32::MAX, i as u16));
+    total
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn elements_are_picked_by_their_rates_and_never_at_rate_zero() {
+        let rate = |i: usize| [0.0, 1e-3, 1.0, 250.0, 7.0][i % 5] * (1.0 + (i / 1000) as f64);
+        const N: usize = 3000;
+        let blocks = Blocks::new(N, rate);
+        let mut count = vec![0u64; N];
+        for set in 0..20 {
+            for chunk in 0..blocks.chunks() {
+                blocks.arrivals(1, Stage::Mesh, set, chunk, |i, _| count[i] += 1);
+            }
+        }
+        let mut chi2 = 0.0;
+        let mut bins = 0.0;
+        for i in 0..N {
+            let expected = 20.0 * rate(i);
+            assert!(expected > 0.0 || count[i] == 0, "element {i} of rate 0 got {}", count[i]);
+            if expected >= 5.0 {
+                chi2 += (count[i] as f64 - expected).powi(2) / expected;
+                bins += 1.0;
+            }
+        }
+        let h: f64 = 2.0 / (9.0 * bins);
+        let limit = bins * (1.0 - h + 3.09 * h.sqrt()).powi(3);
+        assert!(chi2 < limit, "χ² {chi2} of {bins} bins, limit {limit}");
+        let rare: u64 = (0..N).filter(|i| i % 5 == 1).map(|i| count[i]).sum();
+        let expected: f64 = (0..N).filter(|i| i % 5 == 1).map(|i| 20.0 * rate(i)).sum();
+        assert!((rare as f64 - expected).abs() < 4.5 * expected.sqrt() + 1.0, "{rare} for {expected}");
+    }
+}

@@ -1,0 +1,32 @@
+//! Particle-based surface and volume rendering: translucency of anything, without sorting.
+#![forbid(unsafe_code)]
+
+mod bins;
+mod blocks;
+mod cost;
+mod ensemble;
+mod error;
+mod mesh;
+pub mod opacity;
+mod params;
+mod particles;
+mod project;
+mod render;
+mod sampler;
+mod shade;
+mod splats;
+mod stream;
+mod volume;
+
+pub use cost::{Counts, Prediction, predict};
+pub use ensemble::{Ensemble, EnsembleParams};
+pub use error::Error;
+pub use mesh::MeshSampler;
+pub use params::{Density, SurfaceParams};
+pub use particles::{PackedColor, PackedNormal, Particles};
+pub use project::{finest_pixel_area, pixel_area};
+pub use render::{FoldParams, Object, Occluder, Renderer, Scene};
+pub use sampler::{KeptSets, Sampler};
+pub use shade::{Appearance, LitBy};
+pub use splats::{SplatParams, SplatSampler};
+pub use volume::{GridSampler, VolumeParams};

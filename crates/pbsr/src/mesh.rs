@@ -1,0 +1,143 @@
+//! Polygon-by-polygon sampling (Tanaka 2012, section 5): uniform particles on triangles.
+//!
+//! A triangle of area A gets a Poisson number of particles of mean τ·A/s, by an alias table of all triangles with areas
+//! in f64; a particle lies at barycentric coordinates (u, v), folded into the triangle where u + v > 1.
+//!
+//! Deviation: a Poisson number in place of a fixed n. The opacity of a pixel is then 1 − e^(−τ/cos θ) exactly, and each
+//! part of the mesh is sampled on its own.
+
+use crate::blocks::Blocks;
+use crate::params::countable;
+use crate::stream::Stage;
+use crate::{Density, Error, PackedColor, PackedNormal, Particles, Sampler, SurfaceParams};
+use glam::{DVec3, Vec3};
+use splat_core::optics::SurfaceOpacity;
+use splat_core::{Mesh, glam};
+
+/// Particles on a mesh.
+pub struct MeshSampler<'a> {
+    mesh: &'a Mesh,
+    params: SurfaceParams,
+    density: Option<Density<'a>>,
+    blocks: Blocks,
+    area: f64,
+}
+
+impl<'a> MeshSampler<'a> {
+    /// Prepares the alias tables. Triangles without area get no particles.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for numbers out of range, [`Error::Core`] for a mesh that breaks a promise, [`Error::Empty`]
+    /// for one without area, [`Error::TooMuch`] for more than 4·10⁹ particles a set.
+    pub fn new(mesh: &'a Mesh, params: &SurfaceParams, density: Option<Density<'a>>) -> Result<Self, Error> {
+        params.validate()?;
+        mesh.validate()?;
+        density.as_ref().map_or(Ok(()), Density::validate)?;
+        let per_area = params.particles_per_area();
+        let rate = |t: usize| {
+            let [a, b, c] = corners(mesh, t).map(Vec3::as_dvec3);
+            let most = density.as_ref().map_or(1.0, |d| {
+                let middle = (a + b + c) / 3.0;
+                let radius = [a, b, c].map(|p| (p - middle).length()).into_iter().fold(0.0, f64::max);
+                d.bound(mesh.origin + middle, radius * (1.0 + 1e-12))
+            });
+            0.5 * (b - a).cross(c - a).length() * per_area * most
+        };
+        let area: f64 = (0..mesh.triangles.len()).map(|t| area(mesh, t)).sum();
+        if area.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
+            return Err(Error::Empty { what: "a mesh", reason: "no triangle has an area" });
+        }
+        countable(area * per_area * density.as_ref().map_or(1.0, |d| d.max))?;
+        let blocks = Blocks::new(mesh.triangles.len(), rate);
+        Ok(Self { mesh, params: *params, density, blocks, area })
+    }
+
+    /// Area of the mesh, world units².
+    pub fn area(&self) -> f64 {
+        self.area
+    }
+
+    /// Bytes of the tables.
+    pub fn bytes(&self) -> u64 {
+        self.blocks.bytes()
+    }
+
+    #[inline]
+    fn normal(&self, t: usize, [a, b, c]: [Vec3; 3], [u, v]: [f32; 2]) -> PackedNormal {
+        let normal = match &*self.mesh.normal {
+            [] => (b - a).cross(c - a),
+            normals => {
+                let [na, nb, nc] = self.mesh.triangles[t].map(|i| normals[i as usize]);
+                na * (1.0 - u - v) + nb * u + nc * v
+            }
+        };
+        let packed = PackedNormal::new(normal);
+        if self.params.surface_opacity == SurfaceOpacity::PerCrossing { packed.per_crossing() } else { packed }
+    }
+
+    #[inline]
+    fn color(&self, t: usize, [u, v]: [f32; 2], own: PackedColor) -> PackedColor {
+        match &*self.mesh.color {
+            [] => own,
+            colors => {
+                let [a, b, c] = self.mesh.triangles[t].map(|i| colors[i as usize]);
+                let at = |k: usize| (a[k] * (1.0 - u - v) + b[k] * u + c[k] * v) * self.params.color[k];
+                PackedColor::new([at(0), at(1), at(2)])
+            }
+        }
+    }
+}
+
+#[inline]
+fn corners(mesh: &Mesh, t: usize) -> [Vec3; 3] {
+    mesh.triangles[t].map(|i| mesh.position[i as usize])
+}
+
+fn area(mesh: &Mesh, t: usize) -> f64 {
+    let [a, b, c] = corners(mesh, t).map(Vec3::as_dvec3);
+    0.5 * (b - a).cross(c - a).length()
+}
+
+impl Sampler for MeshSampler<'_> {
+    fn origin(&self) -> DVec3 {
+        self.mesh.origin
+    }
+
+    fn cross_section(&self) -> f64 {
+        self.params.cross_section
+    }
+
+    fn chunks(&self) -> usize {
+        self.blocks.chunks()
+    }
+
+    fn expected(&self, chunk: usize) -> f64 {
+        self.blocks.mean(chunk)
+    }
+
+    fn chunk<'a>(&'a self, set: u64, chunk: usize, scratch: &'a mut Particles) -> &'a Particles {
+        scratch.clear();
+        scratch.reserve((self.expected(chunk) * 1.1) as usize + 64);
+        let own = PackedColor::new(self.params.color);
+        self.blocks.arrivals(self.params.seed, Stage::Mesh, set, chunk, |t, stream| {
+            let [mut u, mut v] = stream.pair();
+            if u + v > 1.0 {
+                (u, v) = (1.0 - u, 1.0 - v);
+            }
+            let triangle = corners(self.mesh, t);
+            let [a, b, c] = triangle;
+            let p = a + (b - a) * u + (c - a) * v;
+            if let Some(density) = &self.density {
+                let [a, b, c] = triangle.map(Vec3::as_dvec3);
+                let middle = (a + b + c) / 3.0;
+                let radius = [a, b, c].map(|p| (p - middle).length()).into_iter().fold(0.0, f64::max);
+                let most = density.bound(self.mesh.origin + middle, radius * (1.0 + 1e-12));
+                if stream.unit() * most >= density.at(self.mesh.origin + p.as_dvec3()) {
+                    return;
+                }
+            }
+            scratch.push(p, self.normal(t, triangle, [u, v]), self.color(t, [u, v], own));
+        });
+        scratch
+    }
+}

@@ -1,0 +1,224 @@
+//! STEP 2, first half: particles onto pixels (Tanaka 2012, section 3, "s is made dependent on view depth").
+//!
+//! A pixel at view position p = (x, y, z) covers the area s(p) = z³/(f²·|p|) across its ray (perspective, focal length f
+//! in pixels), or 1/f² (orthographic). A set has its opacity where s(p) is the cross-section s of its particles. Elsewhere
+//! it has s(p)/s times as many particles a pixel as it should have, so with k = s/s(p)
+//!
+//! - k ≤ 1: each particle is kept with probability k, by a number of its own. A binomial variable thinned is binomial: with
+//!   the share of particles that reach the pixel goes q to k·q = s/(S·cos θ), the same for all depths.
+//! - k > 1, nearer than the set was made for: the particle covers the pixels whose centres lie in a square of side √k
+//!   around it. Each pixel is then hit with k times the probability, each particle at most once: α is exact where the
+//!   surface is flat over √k pixels, and blurred by them elsewhere.
+//!
+//! Both make exactly one pixel, floor(x), floor(y), of k = 1. A surface of angle-independent opacity has k·|cos θ|.
+
+use crate::PackedNormal;
+use glam::{DMat3, DVec3, Mat3, Vec3};
+use splat_core::{Camera, Similarity, glam};
+
+/// The widest particle, pixels: nearer to the eye, where it would be wider, opacity is lost.
+const WIDEST_PX: f32 = 64.0;
+
+/// Area of one pixel across its ray at view position `view` (x right, y up, z depth > 0), world units².
+pub fn pixel_area(camera: &Camera, view: DVec3) -> f64 {
+    let f = camera.focal_px();
+    if camera.is_orthographic() { 1.0 / (f * f) } else { view.z / f * (view.z / f) * (view.z / view.length()) }
+}
+
+/// The smallest area of a pixel on what lies in a ball, world units²: a cross-section with which no particle needs to be
+/// widened. Depths nearer than `near` × radius to the eye, or behind it, count as that depth.
+pub fn finest_pixel_area(camera: &Camera, center: DVec3, radius: f64, near: f64) -> f64 {
+    let view = camera.view_from_world(center);
+    let z = (view.z - radius).max(near * radius);
+    let f = camera.focal_px();
+    // The farthest from the axis that the image reaches.
+    let corner = DVec3::new(0.5 * f64::from(camera.size[0]) / f, 0.5 * f64::from(camera.size[1]) / f, 1.0);
+    pixel_area(camera, if camera.is_orthographic() { DVec3::Z } else { corner * z })
+}
+
+/// From the offsets of one object's particles to pixels.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Projector {
+    linear: Mat3,
+    translation: Vec3,
+    /// Rotation alone, for normals.
+    rotation: Mat3,
+    focal: f32,
+    middle: [f32; 2],
+    size: [f32; 2],
+    orthographic: bool,
+    /// s·f² in view units: k is this times |p|/z³, or this.
+    share: f32,
+}
+
+/// Pixels that one particle reaches: `x0 .. x1` × `y0 .. y1`, never empty.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Footing {
+    pub(crate) x: [i32; 2],
+    pub(crate) y: [i32; 2],
+    /// Place in its pixel, 1/256.
+    pub(crate) within: [u8; 2],
+    pub(crate) depth: f32,
+}
+
+impl Projector {
+    pub(crate) fn new(camera: &Camera, origin: DVec3, transform: &Similarity, cross_section: f64) -> Self {
+        let view = DMat3::from_cols(camera.axes[0], camera.axes[1], camera.axes[2]).transpose();
+        let rotation = view * DMat3::from_quat(transform.rotation);
+        let f = camera.focal_px();
+        Self {
+            linear: (rotation * transform.scale).as_mat3(),
+            translation: camera.view_from_world(transform.apply(origin)).as_vec3(),
+            rotation: rotation.as_mat3(),
+            focal: f as f32,
+            middle: camera.size.map(|s| 0.5 * s as f32),
+            size: camera.size.map(|s| s as f32),
+            orthographic: camera.is_orthographic(),
+            share: (cross_section * transform.scale * transform.scale * f * f) as f32,
+        }
+    }
+
+    /// View-space normal, as the object is turned.
+    pub(crate) fn view_normal(&self, n: PackedNormal) -> Vec3 {
+        self.rotation * n.get()
+    }
+
+    /// The pixels of a particle, or `None` where it is out of view or thinned out; `random` is its own number in (0, 1).
+    #[inline(always)]
+    pub(crate) fn project(&self, offset: Vec3, n: PackedNormal, random: impl FnOnce() -> f32) -> Option<Footing> {
+        let p = self.linear * offset + self.translation;
+        if p.z.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
+            return None;
+        }
+        let inverse = if self.orthographic { 1.0 } else { 1.0 / p.z };
+        let x = self.middle[0] + self.focal * p.x * inverse;
+        let y = self.middle[1] - self.focal * p.y * inverse;
+        let k = if n.is_per_crossing() { self.per_crossing(p, n) } else { self.thin_slab(p, inverse) };
+        if k <= 1.0 {
+            // One range check for both ends; NaN fails it.
+            let inside = x >= 0.0 && x < self.size[0] && y >= 0.0 && y < self.size[1];
+            if !inside || (k < 1.0 && random() >= k) {
+                return None;
+            }
+            let (i, j) = (x as i32, y as i32);
+            let within = [((x - i as f32) * 256.0) as u8, ((y - j as f32) * 256.0) as u8];
+            return Some(Footing { x: [i, i + 1], y: [j, j + 1], within, depth: p.z });
+        }
+        self.widened(x, y, k, p.z)
+    }
+
+    /// k of a thin slab: opacity grows at grazing angles by itself.
+    #[inline(always)]
+    fn thin_slab(&self, p: Vec3, inverse: f32) -> f32 {
+        if self.orthographic { self.share } else { self.share * p.length() * inverse * inverse * inverse }
+    }
+
+    /// k·|cos θ|; a particle without a normal is a thin slab.
+    fn per_crossing(&self, p: Vec3, n: PackedNormal) -> f32 {
+        let normal = self.view_normal(n);
+        let slab = self.thin_slab(p, if self.orthographic { 1.0 } else { 1.0 / p.z });
+        if normal == Vec3::ZERO {
+            return slab;
+        }
+        let cosine = if self.orthographic { normal.z } else { normal.dot(p) / p.length() };
+        slab * cosine.abs()
+    }
+
+    #[cold]
+    fn widened(&self, x: f32, y: f32, k: f32, depth: f32) -> Option<Footing> {
+        let half = 0.5 * k.sqrt().min(WIDEST_PX);
+        let range = |v: f32, size: f32| {
+            // Centres i + 1/2 in (v − half, v + half].
+            let from = ((v - half - 0.5).floor() + 1.0).max(0.0);
+            let to = ((v + half - 0.5).floor() + 1.0).min(size);
+            [from as i32, to as i32]
+        };
+        let (x, y) = (range(x, self.size[0]), range(y, self.size[1]));
+        (x[0] < x[1] && y[0] < y[1]).then_some(Footing { x, y, within: [128; 2], depth })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splat_core::{Projection, rng};
+
+    fn camera(projection: Projection) -> Camera {
+        Camera::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, projection, [64, 48]).unwrap()
+    }
+
+    #[test]
+    fn pb17_a_particle_on_a_border_is_in_one_pixel() {
+        // Pixels of side 1/8: borders are exact in f32.
+        let camera = camera(Projection::Orthographic { height: 6.0 });
+        let area = pixel_area(&camera, DVec3::Z);
+        assert_eq!(area, 1.0 / 64.0);
+        let at = |share: f64| Projector::new(&camera, DVec3::ZERO, &Similarity::default(), area * share);
+        let mut seen = 0;
+        for i in -40i32..40 {
+            for j in -30i32..30 {
+                let p = Vec3::new(i as f32 / 8.0, j as f32 / 8.0, -1.0);
+                let foot = at(1.0).project(p, PackedNormal::default(), || 0.5);
+                let inside = (-32..32).contains(&i) && (-24..24).contains(&-j);
+                assert_eq!(foot.is_some(), inside, "{i} {j}");
+                if let Some(foot) = foot {
+                    assert_eq!((foot.x, foot.y), ([i + 32, i + 33], [24 - j, 25 - j]));
+                    seen += 1;
+                }
+            }
+        }
+        assert_eq!(seen, 64 * 48);
+    }
+
+    #[test]
+    fn pb17_hits_are_the_particles_in_view_times_k() {
+        for (projection, depth) in
+            [(Projection::Orthographic { height: 4.0 }, 3.0), (Projection::Perspective { fov_y: 0.8 }, 3.0)]
+        {
+            let camera = camera(projection);
+            let width = 8.0 * pixel_area(&camera, DVec3::Z * depth).sqrt() as f32;
+            for k in [0.3, 1.0, 2.7, 40.0] {
+                let s = k * pixel_area(&camera, DVec3::new(0.0, 0.0, depth));
+                let projector = Projector::new(&camera, DVec3::ZERO, &Similarity::default(), s);
+                let (mut hits, mut expected, mut variance) = (0.0, 0.0, 0.0);
+                for i in 0..100_000u64 {
+                    let u = |c| rng::unit_f32(5, 0, i, c);
+                    // Whole pixels around the axis, so that all phases are met, and no widened particle is cut.
+                    let p = Vec3::new((u(0) - 0.5) * width, (u(1) - 0.5) * width, -depth as f32);
+                    let own = s / pixel_area(&camera, p.as_dvec3() * DVec3::new(1.0, 1.0, -1.0));
+                    let foot = projector.project(p, PackedNormal::default(), || u(2));
+                    hits += foot.map_or(0.0, |f| f64::from((f.x[1] - f.x[0]) * (f.y[1] - f.y[0])));
+                    expected += own;
+                    variance += own;
+                }
+                assert!((hits - expected).abs() < 4.5 * f64::sqrt(variance), "k {k}: {hits} for {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn pixel_areas_add_up_to_the_sphere() {
+        // Solid angle of all pixels of a cube's face: 4π/6.
+        let camera = Camera::look_at(
+            DVec3::ZERO,
+            DVec3::NEG_Z,
+            DVec3::Y,
+            Projection::Perspective { fov_y: std::f64::consts::FRAC_PI_2 },
+            [256, 256],
+        )
+        .unwrap();
+        let mut sum = 0.0;
+        for i in 0..256 {
+            for j in 0..256 {
+                let (_, d) = camera.view_ray(f64::from(i) + 0.5, f64::from(j) + 0.5);
+                let on_sphere = d.normalize();
+                sum += pixel_area(&camera, on_sphere);
+            }
+        }
+        assert!((sum / (4.0 * std::f64::consts::PI / 6.0) - 1.0).abs() < 1e-5, "{sum}");
+        let finest = finest_pixel_area(&camera, DVec3::new(0.0, 0.0, -3.0), 1.0, 1e-3);
+        for d in [DVec3::new(0.0, 0.0, 2.0), DVec3::new(0.9, 0.3, 3.0), DVec3::new(2.0, 2.0, 2.0)] {
+            assert!(pixel_area(&camera, d) >= finest * (1.0 - 1e-12));
+        }
+    }
+}

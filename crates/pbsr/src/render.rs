@@ -1,0 +1,339 @@
+//! STEPS 1 to 3 for any number of sets: sample, project, keep the nearest of each pixel, add to the ensemble.
+//!
+//! Sets are folded in batches. First all (set, object, range of chunks) are sampled, projected and sorted by tile, each by
+//! one task; then each tile is taken by one task, which goes through the sets in order with a depth buffer of its own.
+//! Nothing is shared between tasks and every sum is in integers: the result has the same bits for any number of threads.
+//! Memory depends on the image and on the particles of one batch, never on the number of sets.
+
+use crate::bins::{AREA, Staging, TILE, Task, Tiling};
+use crate::cost::Counts;
+use crate::ensemble::{Ensemble, TileSums};
+use crate::error::check;
+use crate::project::Projector;
+use crate::shade::{Appearance, LitBy, MAX_CHANNELS, Seen, Shader};
+use crate::stream::Stage;
+use crate::{Error, Sampler};
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+use splat_core::{Camera, Progress, Similarity, glam, rng};
+
+/// Particles of a task, in the mean; at least one chunk.
+const TASK_PARTICLES: f64 = 16384.0;
+
+/// One object of the scene.
+#[derive(Clone, Copy)]
+pub struct Object<'a> {
+    /// Where its particles come from.
+    pub sampler: &'a dyn Sampler,
+    /// From the sampler's space to the world; moving an object needs no new particles.
+    pub transform: Similarity,
+    /// How they look.
+    pub look: Appearance,
+}
+
+/// Opaque surfaces drawn exactly, by any other means: particles behind them are hidden, and rays that pass all
+/// particles end on them. The way to have α = 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Occluder {
+    /// View depth per pixel, rows from the top left; +∞ where there is none.
+    pub depth: Vec<f32>,
+    /// Radiance per pixel.
+    pub color: Vec<[f32; 3]>,
+}
+
+impl Occluder {
+    /// Radiance at a pixel that has a surface.
+    pub(crate) fn at(&self, pixel: usize) -> Option<[f32; 3]> {
+        (*self.depth.get(pixel)? < f32::INFINITY).then(|| self.color[pixel])
+    }
+}
+
+/// Everything that is seen.
+#[derive(Clone, Copy)]
+pub struct Scene<'a> {
+    /// Objects; their order does not matter beyond noise.
+    pub objects: &'a [Object<'a>],
+    /// Lights with their shadows.
+    pub lights: &'a [LitBy<'a>],
+    /// Ambient radiance, the same from everywhere.
+    pub ambient: [f32; 3],
+    /// The viewer.
+    pub camera: &'a Camera,
+    /// Exact opaque surfaces.
+    pub occluder: Option<&'a Occluder>,
+}
+
+/// What folding may take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FoldParams {
+    /// Bytes of the particles of one batch: 40 a particle. A set that needs more is refused.
+    pub max_bytes: u64,
+    /// Particles of a batch that are worth a pass over the image; more only takes memory.
+    pub batch_particles: u64,
+}
+
+impl Default for FoldParams {
+    fn default() -> Self {
+        Self { max_bytes: 2 << 30, batch_particles: 4 << 20 }
+    }
+}
+
+/// Bytes of a particle in a batch: its record, with room to grow.
+pub(crate) const BYTES_IN_BATCH: u64 = 40;
+
+/// Folds sets into an ensemble; keeps its buffers between calls.
+#[derive(Debug, Default)]
+pub struct Renderer {
+    tasks: Vec<Task>,
+}
+
+impl Renderer {
+    /// Without buffers yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds `levels` sets to `ensemble`, from set `ensemble.levels()` on; ticks once a set. When it fails, the sets of
+    /// whole batches before are in, and the ensemble is valid.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] when the sizes of camera, ensemble and occluder differ, or levels overflow;
+    /// [`Error::TooMuch`] when one set needs more than `params.max_bytes`; [`Error::Core`] when cancelled.
+    pub fn fold(
+        &mut self,
+        scene: &Scene<'_>,
+        ensemble: &mut Ensemble,
+        levels: u32,
+        params: &FoldParams,
+        progress: &Progress,
+    ) -> Result<Counts, Error> {
+        let plan = Plan::new(scene, ensemble, levels, params)?;
+        progress.add_total(u64::from(levels));
+        let mut counts = Counts::default();
+        let mut left = levels;
+        while left > 0 {
+            let batch = left.min(plan.batch_levels);
+            self.sample(scene, &plan, u64::from(ensemble.levels), batch, progress);
+            // A cancelled batch is incomplete: it is dropped whole.
+            progress.tick(0)?;
+            self.resolve(scene, &plan, ensemble);
+            ensemble.levels += batch;
+            left -= batch;
+            counts.add(&self.tasks, batch);
+            progress.tick(u64::from(batch))?;
+        }
+        Ok(counts)
+    }
+
+    fn sample(&mut self, scene: &Scene<'_>, plan: &Plan, first: u64, batch: u32, progress: &Progress) {
+        self.tasks.resize_with(plan.ranges.len() * batch as usize, Task::default);
+        for (k, task) in self.tasks.iter_mut().enumerate() {
+            let (object, chunks) = plan.ranges[k % plan.ranges.len()].clone();
+            task.set = first + (k / plan.ranges.len()) as u64;
+            (task.object, task.chunks) = (object, chunks);
+        }
+        self.tasks.par_iter_mut().for_each_init(Staging::default, |staging, task| {
+            if !progress.is_cancelled() {
+                let object = task.object as usize;
+                task.run(scene.objects[object].sampler, &plan.projectors[object], &plan.tiling, staging);
+            }
+        });
+    }
+
+    fn resolve(&self, scene: &Scene<'_>, plan: &Plan, ensemble: &mut Ensemble) {
+        let channels = ensemble.params;
+        let shader = Shader { lights: scene.lights, ambient: scene.ambient, camera: scene.camera, channels };
+        let n = channels.channels();
+        // Without depths every tile gets an empty slice.
+        let mut none = vec![[]; if ensemble.depths.is_empty() { plan.tiling.tiles() } else { 0 }];
+        let with = ensemble.depths.par_chunks_mut(AREA).chain(none.par_iter_mut().map(|e: &mut [_; 0]| &mut e[..]));
+        let sums = ensemble.hits.par_chunks_mut(AREA).zip(ensemble.sums.par_chunks_mut(AREA * n));
+        let sums = sums.zip(ensemble.squares.par_chunks_mut(AREA)).zip(with).enumerate();
+        sums.for_each_init(Nearest::new, |nearest, (t, (((hits, sums), squares), depths))| {
+            let mut tile = TileSums { hits, sums, squares, depths };
+            nearest.begin(scene, &plan.tiling, t);
+            for of_set in self.tasks.chunks(plan.ranges.len().max(1)) {
+                nearest.collect(of_set, t);
+                nearest.add(of_set, scene, plan, &shader, t, &mut tile);
+            }
+        });
+    }
+}
+
+/// What is the same for all batches.
+struct Plan {
+    tiling: Tiling,
+    projectors: Vec<Projector>,
+    /// (object, chunks) of each task of a set.
+    ranges: Vec<(u32, std::ops::Range<usize>)>,
+    batch_levels: u32,
+    view_from_world: DMat3,
+    focal: f64,
+}
+
+impl Plan {
+    fn new(scene: &Scene<'_>, ensemble: &Ensemble, levels: u32, params: &FoldParams) -> Result<Self, Error> {
+        let size = ensemble.size();
+        check(scene.camera.size == size, "camera size", scene.camera.size, "the size of the ensemble")?;
+        if let Some(o) = scene.occluder {
+            let pixels = size[0] as usize * size[1] as usize;
+            let ok = o.depth.len() == pixels && o.color.len() == pixels;
+            check(ok, "occluder", o.depth.len(), "a depth and a colour for each pixel")?;
+        }
+        check(ensemble.levels.checked_add(levels).is_some(), "levels", levels, "at most 2³² − 1 in all")?;
+        let expected: f64 = scene.objects.iter().map(|o| o.sampler.expected_particles()).sum();
+        let needed = (expected * BYTES_IN_BATCH as f64) as u64;
+        if needed > params.max_bytes {
+            return Err(Error::TooMuch { what: "bytes of one set of particles", needed, had: params.max_bytes });
+        }
+        let budget = (params.max_bytes / BYTES_IN_BATCH).min(params.batch_particles) as f64;
+        let axes = scene.camera.axes;
+        let project = |o: &Object<'_>| {
+            Projector::new(scene.camera, o.sampler.origin(), &o.transform, o.sampler.cross_section())
+        };
+        Ok(Self {
+            tiling: ensemble.tiling,
+            projectors: scene.objects.iter().map(project).collect(),
+            ranges: ranges(scene.objects),
+            batch_levels: (budget / expected.max(1.0)).clamp(1.0, 4096.0) as u32,
+            view_from_world: DMat3::from_cols(axes[0], axes[1], axes[2]).transpose(),
+            focal: scene.camera.focal_px(),
+        })
+    }
+}
+
+/// Chunks of all objects, in runs of some thousand particles.
+fn ranges(objects: &[Object<'_>]) -> Vec<(u32, std::ops::Range<usize>)> {
+    let mut ranges = Vec::new();
+    for (o, object) in objects.iter().enumerate() {
+        let (mut first, mut sum) = (0, 0.0);
+        let chunks = object.sampler.chunks();
+        for c in 0..chunks {
+            sum += object.sampler.expected(c);
+            if sum >= TASK_PARTICLES || c + 1 == chunks {
+                ranges.push((o as u32, first..c + 1));
+                (first, sum) = (c + 1, 0.0);
+            }
+        }
+    }
+    ranges
+}
+
+/// The depth buffer of one tile.
+struct Nearest {
+    depth: Vec<f32>,
+    /// What depth starts with: the occluder's.
+    limit: Vec<f32>,
+    /// (task of the set, record), task `NONE` where no particle is.
+    winner: Vec<(u32, u32)>,
+    touched: Vec<u16>,
+    corner: [usize; 2],
+}
+
+const NONE: u32 = u32::MAX;
+
+impl Nearest {
+    fn new() -> Self {
+        Self {
+            depth: vec![f32::INFINITY; AREA],
+            limit: vec![f32::INFINITY; AREA],
+            winner: vec![(NONE, 0); AREA],
+            touched: Vec::with_capacity(AREA),
+            corner: [0; 2],
+        }
+    }
+
+    fn begin(&mut self, scene: &Scene<'_>, tiling: &Tiling, t: usize) {
+        self.corner = [t % tiling.columns * TILE, t / tiling.columns * TILE];
+        self.limit.fill(f32::INFINITY);
+        if let Some(occluder) = scene.occluder {
+            let [w, h] = tiling.size;
+            for y in self.corner[1]..(self.corner[1] + TILE).min(h) {
+                let row = self.corner[0]..(self.corner[0] + TILE).min(w);
+                let from = (y - self.corner[1]) * TILE;
+                let depths = &occluder.depth[y * w + row.start..y * w + row.end];
+                self.limit[from..from + depths.len()].copy_from_slice(depths);
+            }
+        }
+        self.depth.copy_from_slice(&self.limit);
+    }
+
+    /// The nearest particle of each pixel among all objects of one set.
+    #[inline]
+    fn collect(&mut self, tasks: &[Task], t: usize) {
+        for (k, task) in tasks.iter().enumerate() {
+            let first = task.first(t);
+            for (i, record) in task.tile(t).iter().enumerate() {
+                let pixel = record.pixel();
+                let nearest = self.depth[pixel];
+                if record.depth > nearest {
+                    continue;
+                }
+                let (other, at) = self.winner[pixel];
+                if other == NONE {
+                    // At the occluder's own depth the surface is seen.
+                    if record.depth == nearest {
+                        continue;
+                    }
+                    self.touched.push(pixel as u16);
+                } else if record.depth == nearest {
+                    let place = t * AREA + pixel;
+                    let rank = |task: &Task, id: u32| {
+                        let who = u64::from(task.object) << 48 ^ (task.chunks.start as u64) << 32 ^ u64::from(id);
+                        rng::bits(place as u64, Stage::Ties as u64, task.set, who)
+                    };
+                    let theirs = &tasks[other as usize];
+                    if rank(task, record.id) >= rank(theirs, theirs.record(at).id) {
+                        continue;
+                    }
+                }
+                self.depth[pixel] = record.depth;
+                self.winner[pixel] = (k as u32, first + i as u32);
+            }
+        }
+    }
+
+    /// Shades what is seen, adds it, and clears the buffer.
+    #[inline]
+    fn add(
+        &mut self,
+        tasks: &[Task],
+        scene: &Scene<'_>,
+        plan: &Plan,
+        shader: &Shader<'_>,
+        t: usize,
+        sums: &mut TileSums<'_>,
+    ) {
+        let channels = shader.channels.channels();
+        let mut values = [0.0; MAX_CHANNELS];
+        for &pixel in &self.touched {
+            let pixel = usize::from(pixel);
+            let (task, at) = self.winner[pixel];
+            let task = &tasks[task as usize];
+            let record = task.record(at);
+            let object = &scene.objects[task.object as usize];
+            let [wx, wy] = record.within().map(f64::from);
+            let at_px = [(self.corner[0] + pixel % TILE) as f64 + wx, (self.corner[1] + pixel / TILE) as f64 + wy];
+            let normal = object.transform.rotation.as_quat() * record.normal.get();
+            let from_eye = plan.from_eye(scene.camera, at_px, record.depth);
+            let seen = Seen { look: &object.look, from_eye, normal, color: record.color.get() };
+            shader.shade(&seen, &mut values);
+            sums.add(&shader.channels, pixel, &values[..channels], record.depth);
+            self.depth[pixel] = self.limit[pixel];
+            self.winner[pixel] = (NONE, 0);
+        }
+        debug_assert!(t < plan.tiling.tiles(), "invariant: a tile of the image");
+        self.touched.clear();
+    }
+}
+
+impl Plan {
+    /// World position relative to the eye of what is seen at an image position and depth.
+    fn from_eye(&self, camera: &Camera, at_px: [f64; 2], depth: f32) -> DVec3 {
+        let u = (at_px[0] - 0.5 * f64::from(camera.size[0])) / self.focal;
+        let v = (0.5 * f64::from(camera.size[1]) - at_px[1]) / self.focal;
+        let z = f64::from(depth);
+        let view = if camera.is_orthographic() { DVec3::new(u, v, z) } else { DVec3::new(u * z, v * z, z) };
+        self.view_from_world.transpose() * view
+    }
+}

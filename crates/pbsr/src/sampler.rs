@@ -1,0 +1,100 @@
+//! What every source of particles offers (Tanaka 2012, STEP 1): independent sets, in chunks, from a counter.
+
+use crate::Particles;
+use splat_core::glam::DVec3;
+
+/// A source of statistically independent particle sets.
+///
+/// Chunk `c` of set `r` depends on (seed, r, c) alone, so sets need not be kept: whoever needs one again makes it again,
+/// and any number of threads makes the same. In one set, the particles of a sampler lie independently of each other, and
+/// a region of projected area A that faces the ray holds τ·A / [`Sampler::cross_section`] of them in the mean, τ being
+/// the optical depth of the surface or medium.
+pub trait Sampler: Sync {
+    /// World position that all particle positions are relative to.
+    fn origin(&self) -> DVec3;
+
+    /// Cross-section s of every particle, world units²: the set has its opacity where a pixel covers this area.
+    /// Elsewhere the projection takes a share of the particles, or widens them, so that the opacity is the same.
+    fn cross_section(&self) -> f64;
+
+    /// Number of chunks of a set; at least their work is even.
+    fn chunks(&self) -> usize;
+
+    /// Mean number of particles of a chunk.
+    fn expected(&self, chunk: usize) -> f64;
+
+    /// The particles of chunk `chunk` of set `set`: made in `scratch`, which is cleared first, or kept elsewhere.
+    fn chunk<'a>(&'a self, set: u64, chunk: usize, scratch: &'a mut Particles) -> &'a Particles;
+
+    /// Mean number of particles of a set.
+    fn expected_particles(&self) -> f64 {
+        (0..self.chunks()).map(|c| self.expected(c)).sum()
+    }
+}
+
+/// Sets `first .. first + n` of another sampler, kept in memory: set r is kept set r mod n.
+///
+/// For objects that are seen from many places, or that move: nothing is sampled again. Asking for more sets than are
+/// kept repeats them, and the images of the same set are not independent.
+#[derive(Debug, Clone)]
+pub struct KeptSets {
+    origin: DVec3,
+    cross_section: f64,
+    expected: Vec<f64>,
+    sets: Vec<Vec<Particles>>,
+}
+
+impl KeptSets {
+    /// Samples `n` ≥ 1 sets from `first` on, in parallel.
+    pub fn new(sampler: &dyn Sampler, first: u64, n: usize) -> Self {
+        use rayon::prelude::*;
+        let chunks = sampler.chunks();
+        let kept = |set: u64| -> Vec<Particles> {
+            (0..chunks)
+                .into_par_iter()
+                .map(|c| {
+                    let mut scratch = Particles::default();
+                    sampler.chunk(set, c, &mut scratch).clone()
+                })
+                .collect()
+        };
+        Self {
+            origin: sampler.origin(),
+            cross_section: sampler.cross_section(),
+            expected: (0..chunks).map(|c| sampler.expected(c)).collect(),
+            sets: (0..n.max(1) as u64).map(|k| kept(first + k)).collect(),
+        }
+    }
+
+    /// Particles kept.
+    pub fn particles(&self) -> u64 {
+        self.sets.iter().flatten().map(|p| p.len() as u64).sum()
+    }
+
+    /// Bytes kept.
+    pub fn bytes(&self) -> u64 {
+        self.particles() * Particles::BYTES as u64
+    }
+}
+
+impl Sampler for KeptSets {
+    fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    fn cross_section(&self) -> f64 {
+        self.cross_section
+    }
+
+    fn chunks(&self) -> usize {
+        self.expected.len()
+    }
+
+    fn expected(&self, chunk: usize) -> f64 {
+        self.expected[chunk]
+    }
+
+    fn chunk<'a>(&'a self, set: u64, chunk: usize, _scratch: &'a mut Particles) -> &'a Particles {
+        &self.sets[(set % self.sets.len() as u64) as usize][chunk]
+    }
+}

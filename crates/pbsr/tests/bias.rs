@@ -1,0 +1,203 @@
+//! One-off checks at p = 0.001 against closed forms: opacity of planes, spheres, slabs and clouds of splats.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+
+use common::*;
+use pbsr::{GridSampler, MeshSampler, Particles, Sampler, SplatParams, SplatSampler, SurfaceParams, VolumeParams, pixel_area};
+use splat_core::glam::{DMat3, DVec3, Vec3};
+use splat_core::optics::SurfaceOpacity;
+use splat_core::{Cloud, Footprint, Grid, Projection, Splat, SplatKind, TransferFunction, TransferPoint};
+
+fn surface(opacity: f64, cross_section: f64, seed: u64) -> SurfaceParams {
+    SurfaceParams { opacity, cross_section, seed, ..SurfaceParams::default() }
+}
+
+#[test]
+fn a_stack_of_planes_has_the_product_of_their_transmittances() {
+    let camera = front(32);
+    let s = pixel_area(&camera, DVec3::Z);
+    let planes: Vec<_> =
+        [-0.5, 0.0, 0.5].map(|z| rectangle(Vec3::Z * z, Vec3::X * 1.5, Vec3::Y * 1.5, 3)).into_iter().collect();
+    let samplers: Vec<_> = planes
+        .iter()
+        .zip([0.3, 0.05, 0.6])
+        .zip(1..)
+        .map(|((mesh, alpha), seed)| MeshSampler::new(mesh, &surface(alpha, s, seed), None).unwrap())
+        .collect();
+    let all: Vec<&dyn Sampler> = samplers.iter().map(|s| s as &dyn Sampler).collect();
+    let ensemble = render(&camera, &all, 2000);
+    let alpha = 1.0 - 0.7 * 0.95 * 0.4;
+    let found = bias(&ensemble, &|_, _| Some(alpha));
+    assert!(found.none(), "{found:?}");
+    // The same picture against a wrong opacity.
+    assert!(!bias(&ensemble, &|_, _| Some(alpha * 1.005)).none());
+}
+
+/// The sets of another sampler, several numbers standing for one set.
+struct Correlated<'a>(&'a dyn Sampler);
+
+impl Sampler for Correlated<'_> {
+    fn origin(&self) -> DVec3 {
+        self.0.origin()
+    }
+    fn cross_section(&self) -> f64 {
+        self.0.cross_section()
+    }
+    fn chunks(&self) -> usize {
+        self.0.chunks()
+    }
+    fn expected(&self, chunk: usize) -> f64 {
+        self.0.expected(chunk)
+    }
+    fn chunk<'a>(&'a self, set: u64, chunk: usize, scratch: &'a mut Particles) -> &'a Particles {
+        self.0.chunk(set / 2, chunk, scratch)
+    }
+}
+
+#[test]
+fn planted_correlation_between_sets_is_caught() {
+    let camera = front(32);
+    let s = pixel_area(&camera, DVec3::Z);
+    let mesh = rectangle(Vec3::ZERO, Vec3::X * 1.5, Vec3::Y * 1.5, 1);
+    let sampler = MeshSampler::new(&mesh, &surface(0.4, s, 1), None).unwrap();
+    let good = bias(&render(&camera, &[&sampler], 500), &|_, _| Some(0.4));
+    assert!(good.none(), "{good:?}");
+    let bad = bias(&render(&camera, &[&Correlated(&sampler)], 500), &|_, _| Some(0.4));
+    assert!(!bad.none(), "{bad:?}");
+}
+
+#[test]
+fn two_intersecting_planes_have_four_regions() {
+    // Planes z = ±x/2 in two colours, seen from the front: left and right one of them is nearer.
+    let camera = front(32);
+    let s = pixel_area(&camera, DVec3::Z);
+    let tilted = |slope: f32| rectangle(Vec3::ZERO, Vec3::new(1.5, 0.0, 1.5 * slope), Vec3::Y * 0.5, 1);
+    let (a, b) = (tilted(0.5), tilted(-0.5));
+    let params = |color, seed| SurfaceParams { color, ..surface(0.5, s, seed) };
+    let first = MeshSampler::new(&a, &params([1.0, 0.0, 0.0], 1), None).unwrap();
+    let second = MeshSampler::new(&b, &params([0.0, 1.0, 0.0], 2), None).unwrap();
+    const LEVELS: u32 = 4000;
+    let ensemble = render(&camera, &[&first, &second], LEVELS);
+    let cosine = 1.0 / 1.25f64.sqrt();
+    let one = 1.0 - 0.5f64.powf(1.0 / cosine);
+    let found = bias(&ensemble, &|_, y| match y {
+        // Rows at the border: rounding of a corner may put a particle into the next.
+        7 | 24 => None,
+        8..24 => Some(1.0 - (1.0 - one).powi(2)),
+        _ => Some(0.0),
+    });
+    assert!(found.none(), "{found:?}");
+    let layers = ensemble.read(&|_, _| [0.0; 3], None);
+    let beauty = layers.rgb("beauty").unwrap();
+    for (side, nearer) in [(4..12, 1), (20..28, 0)] {
+        let pixels: Vec<[f32; 3]> =
+            (10..22).flat_map(|y| side.clone().map(move |x| y * 32 + x)).map(|k: usize| beauty[k]).collect();
+        let n = pixels.len() as f64;
+        for (channel, expected) in [(nearer, one), (1 - nearer, one * (1.0 - one))] {
+            let mean = pixels.iter().map(|p| f64::from(p[channel])).sum::<f64>() / n;
+            let sigma = (expected * (1.0 - expected) / (n * f64::from(LEVELS))).sqrt();
+            assert!((mean - expected).abs() < 4.0 * sigma, "{side:?} {channel}: {mean} for {expected} ± {sigma}");
+        }
+    }
+}
+
+#[test]
+fn in_perspective_a_wall_has_one_opacity_at_every_depth() {
+    // A floor that runs away from the camera, α facing 0.2: per crossing and as a thin slab.
+    let camera = camera(Projection::Perspective { fov_y: 1.0 }, 3.0, [48, 48]);
+    let mesh = rectangle(Vec3::new(0.0, -0.6, -5.0), Vec3::X * 8.0, Vec3::Z * 7.5, 8);
+    let f = camera.focal_px();
+    let row_of = |z: f64| 24.0 + f * 0.6 / z;
+    for (surface_opacity, s) in [
+        (SurfaceOpacity::ThinSlab, pixel_area(&camera, DVec3::new(0.0, -0.6, 1.2))),
+        (SurfaceOpacity::PerCrossing, pixel_area(&camera, DVec3::new(0.0, -0.6, 1.2))),
+        (SurfaceOpacity::ThinSlab, pixel_area(&camera, DVec3::new(0.0, -0.6, 2.0))),
+    ] {
+        let params = SurfaceParams { surface_opacity, ..surface(0.2, s, 3) };
+        let sampler = MeshSampler::new(&mesh, &params, None).unwrap();
+        let ensemble = render(&camera, &[&sampler], 400);
+        let found = bias(&ensemble, &|x, y| {
+            // The mean over the pixel of 1 − e^(−τ/cos) is not the opacity of its mean: τ/cos is smooth at these rows.
+            if f64::from(y) < row_of(10.0) || f64::from(y) + 1.0 > row_of(1.6) {
+                return None;
+            }
+            let n = 16;
+            let mut hits = 0.0;
+            for k in 0..n * n {
+                let at = |v: u32, k: u32| f64::from(v) + (f64::from(k) + 0.5) / f64::from(n);
+                let (_, d) = camera.view_ray(at(x, k % n), at(y, k / n));
+                let cosine = (d.y / d.length()).abs();
+                hits += if surface_opacity == SurfaceOpacity::ThinSlab { 1.0 / cosine } else { 1.0 };
+            }
+            Some(1.0 - 0.8f64.powf(hits / f64::from(n * n)))
+        });
+        assert!(found.none(), "{surface_opacity:?}: {found:?}");
+    }
+}
+
+#[test]
+fn volumes_obey_beers_law_in_any_projection() {
+    // Value rises along the ray; extinction by a transfer function with a peak inside cells.
+    let n = 5;
+    let values = (0..n * n * n).map(|i| (i / (n * n)) as f32).collect();
+    let grid = Grid { origin: DVec3::splat(-2.0), axes: DMat3::IDENTITY, dims: [n; 3], values };
+    let point = |value, extinction| TransferPoint { value, color: [0.5; 3], extinction };
+    let points = vec![point(0.0, 0.1), point(1.4, 0.9), point(2.0, 0.0), point(4.0, 0.4)];
+    let transfer = TransferFunction::new(points).unwrap();
+    let column: f64 = 0.5 * (0.1 + 0.9) * 1.4 + 0.5 * 0.9 * 0.6 + 0.5 * 0.4 * 2.0;
+    let camera_a = camera(Projection::Orthographic { height: 3.0 }, 6.0, [24, 24]);
+    let params = |s, seed| VolumeParams { cross_section: s, seed, normals: true, ..VolumeParams::default() };
+    let sampler =
+        GridSampler::new(&grid, &transfer, &params(pixel_area(&camera_a, DVec3::Z), 1), None).unwrap();
+    let found = bias(&render(&camera_a, &[&sampler], 600), &|_, _| Some(1.0 - (-column).exp()));
+    assert!(found.none(), "{found:?}");
+    // From outside in perspective, through both faces: the ray at a slope sees 1/cos times as much.
+    let camera_b = camera(Projection::Perspective { fov_y: 0.35 }, 6.0, [24, 24]);
+    let s = pixel_area(&camera_b, DVec3::new(0.0, 0.0, 5.0));
+    let sampler = GridSampler::new(&grid, &transfer, &params(s, 2), None).unwrap();
+    let found = bias(&render(&camera_b, &[&sampler], 600), &|x, y| {
+        let (_, d) = camera_b.view_ray(f64::from(x) + 0.5, f64::from(y) + 0.5);
+        Some(1.0 - (-column * d.length()).exp())
+    });
+    assert!(found.none(), "{found:?}");
+}
+
+#[test]
+fn splats_have_the_optical_depth_of_their_kernels() {
+    let camera = front(40);
+    let s = pixel_area(&camera, DVec3::Z);
+    let footprint = Footprint::default();
+    let radius = 0.9f32;
+    let cloud_of = |kind, normal| {
+        let mut cloud = Cloud::new(DVec3::ZERO);
+        cloud.push(&Splat { radius, cross_section: 0.8, kind, normal, ..Splat::default() });
+        cloud
+    };
+    // τ(ρ) averaged over the pixel; α of a pixel that falls off inside.
+    let facing = |cosine: f64| {
+        move |x: u32, y: u32| {
+            let n = 8;
+            let mut depth = 0.0;
+            for k in 0..n * n {
+                let at = |v: u32, k: u32| (f64::from(v) + (f64::from(k) + 0.5) / f64::from(n)) / 20.0 - 1.0;
+                // On the disc the first coordinate is stretched.
+                let (u, v) = (at(x, k % n) / cosine, at(y, k / n));
+                depth += footprint.profile((u * u + v * v) / f64::from(radius * radius));
+            }
+            let depth = 0.8 * footprint.norm() / f64::from(radius * radius) * depth / f64::from(n * n);
+            let alpha = 1.0 - (-depth).exp();
+            (alpha > 1e-3 || alpha == 0.0).then_some(alpha)
+        }
+    };
+    let tilted = Vec3::new(0.6, 0.0, 0.8);
+    for (kind, normal, cosine) in
+        [(SplatKind::Medium, Vec3::ZERO, 1.0), (SplatKind::Surface, Vec3::Z, 1.0), (SplatKind::Surface, tilted, 0.8)]
+    {
+        let cloud = cloud_of(kind, normal);
+        let params = SplatParams { cross_section: s, ..SplatParams::default() };
+        let sampler = SplatSampler::new(&cloud, &params).unwrap();
+        let found = bias(&render(&camera, &[&sampler], 4000), &facing(cosine));
+        assert!(found.none(), "{kind:?} {cosine}: {found:?}");
+    }
+}
