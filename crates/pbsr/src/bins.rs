@@ -158,7 +158,10 @@ fn stage(
                 let (x, y) = (x as u32, y as u32);
                 let tile = y / TILE as u32 * columns + x / TILE as u32;
                 let pixel = y % TILE as u32 * TILE as u32 + x % TILE as u32;
-                staged.push((tile, Record { place: pixel | within, depth: foot.depth, id: first + i as u32, normal, color }));
+                staged.push((
+                    tile,
+                    Record { place: pixel | within, depth: foot.depth, id: first + i as u32, normal, color },
+                ));
             }
         }
     }

@@ -15,7 +15,9 @@ pub enum Error {
         expected: &'static str,
     },
     /// More particles or more memory than allowed.
-    #[error("particles: {what} needs {needed}, the limit is {had}; use a larger particle cross-section or a smaller image")]
+    #[error(
+        "particles: {what} needs {needed}, the limit is {had}; use a larger particle cross-section or a smaller image"
+    )]
     TooMuch {
         /// What would be too large.
         what: &'static str,

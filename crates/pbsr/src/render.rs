@@ -188,9 +188,8 @@ impl Plan {
         }
         let budget = (params.max_bytes / BYTES_IN_BATCH).min(params.batch_particles) as f64;
         let axes = scene.camera.axes;
-        let project = |o: &Object<'_>| {
-            Projector::new(scene.camera, o.sampler.origin(), &o.transform, o.sampler.cross_section())
-        };
+        let project =
+            |o: &Object<'_>| Projector::new(scene.camera, o.sampler.origin(), &o.transform, o.sampler.cross_section());
         Ok(Self {
             tiling: ensemble.tiling,
             projectors: scene.objects.iter().map(project).collect(),

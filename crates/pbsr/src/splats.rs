@@ -69,7 +69,9 @@ impl<'a> SplatSampler<'a> {
         let layers = params.footprints.layers().len();
         if let Some(i) = cloud.footprint.iter().position(|f| usize::from(*f) >= layers) {
             let found = cloud.footprint[i];
-            return Err(splat_core::Error::invalid("splat", i, "footprint", found, "an id of the footprint stack").into());
+            return Err(
+                splat_core::Error::invalid("splat", i, "footprint", found, "an id of the footprint stack").into()
+            );
         }
         let rate = |i: usize| {
             let depth = if cloud.kind[i] == SplatKind::Opaque { cap } else { 1.0 };

@@ -138,8 +138,7 @@ impl<'a> GridSampler<'a> {
         let [xa, xb, xc, xd] = [a, b, c, d].map(|p| mix(p[0], p[1], fx));
         let [y0, y1] = [mix(xa, xb, fy), mix(xc, xd, fy)];
         let [da, db, dc, dd] = [a, b, c, d].map(|p| p[1] - p[0]);
-        let gradient =
-            Vec3::new(mix(mix(da, db, fy), mix(dc, dd, fy), fz), mix(xb - xa, xd - xc, fz), y1 - y0);
+        let gradient = Vec3::new(mix(mix(da, db, fy), mix(dc, dd, fy), fz), mix(xb - xa, xd - xc, fz), y1 - y0);
         (mix(y0, y1, fz), gradient)
     }
 

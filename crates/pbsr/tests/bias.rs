@@ -4,7 +4,9 @@
 mod common;
 
 use common::*;
-use pbsr::{GridSampler, MeshSampler, Particles, Sampler, SplatParams, SplatSampler, SurfaceParams, VolumeParams, pixel_area};
+use pbsr::{
+    GridSampler, MeshSampler, Particles, Sampler, SplatParams, SplatSampler, SurfaceParams, VolumeParams, pixel_area,
+};
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
 use splat_core::{Cloud, Footprint, Grid, Projection, Splat, SplatKind, TransferFunction, TransferPoint};
@@ -148,8 +150,7 @@ fn volumes_obey_beers_law_in_any_projection() {
     let column: f64 = 0.5 * (0.1 + 0.9) * 1.4 + 0.5 * 0.9 * 0.6 + 0.5 * 0.4 * 2.0;
     let camera_a = camera(Projection::Orthographic { height: 3.0 }, 6.0, [24, 24]);
     let params = |s, seed| VolumeParams { cross_section: s, seed, normals: true, ..VolumeParams::default() };
-    let sampler =
-        GridSampler::new(&grid, &transfer, &params(pixel_area(&camera_a, DVec3::Z), 1), None).unwrap();
+    let sampler = GridSampler::new(&grid, &transfer, &params(pixel_area(&camera_a, DVec3::Z), 1), None).unwrap();
     let found = bias(&render(&camera_a, &[&sampler], 600), &|_, _| Some(1.0 - (-column).exp()));
     assert!(found.none(), "{found:?}");
     // From outside in perspective, through both faces: the ray at a slope sees 1/cos times as much.

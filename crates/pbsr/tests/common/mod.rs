@@ -89,8 +89,16 @@ pub fn sidak(p: f64, n: usize) -> f64 {
 pub fn erfc(x: f64) -> f64 {
     let t = 1.0 / (1.0 + 0.5 * x.abs());
     let c = [
-        -1.265_512_23, 1.000_023_68, 0.374_091_96, 0.096_784_18, -0.186_288_06, 0.278_868_07, -1.135_203_98,
-        1.488_515_87, -0.822_152_23, 0.170_872_77,
+        -1.265_512_23,
+        1.000_023_68,
+        0.374_091_96,
+        0.096_784_18,
+        -0.186_288_06,
+        0.278_868_07,
+        -1.135_203_98,
+        1.488_515_87,
+        -0.822_152_23,
+        0.170_872_77,
     ];
     let sum = c.iter().rev().fold(0.0, |s, c| s * t + c);
     let v = t * (-x * x + sum).exp();
@@ -228,7 +236,13 @@ impl ScalarField for Field {
             Field::Ellipsoid { axes } => (p / axes).length_squared() - 1.0,
             Field::Sheets { gap } => p.z * p.z - gap * gap,
             Field::Nothing => 1.0 + p.length_squared(),
-            Field::Broken => if p.x > 0.0 { f64::NAN } else { p.length_squared() - 1.0 },
+            Field::Broken => {
+                if p.x > 0.0 {
+                    f64::NAN
+                } else {
+                    p.length_squared() - 1.0
+                }
+            }
             Field::Unbounded => p.length_squared() - 1.0,
             Field::Ramp => p.x,
         }

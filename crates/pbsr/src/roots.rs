@@ -1,0 +1,163 @@
+//! All roots of f − c on a piece of a line.
+//!
+//! A piece is dropped when the field's `bound` over the ball around it excludes c. Where the ends differ in sign and the
+//! slopes agree with that, there is one root, found by bracketing (Illinois). Otherwise slopes tell: where f runs towards
+//! c from both ends there is an extremum between, which is looked for; it either shows two roots, or a double root where
+//! it touches c, or none. What is left is halved, and after [`DEPTH`] halvings counted as unproven.
+
+use crate::implicit::ImplicitSurface;
+use glam::DVec3;
+use splat_core::glam;
+
+/// Halvings of a piece of which nothing is proven.
+const DEPTH: u32 = 4;
+
+/// An extremum whose value is this share of the values at the ends touches c: a double root.
+const TOUCH: f64 = 1e-10;
+
+/// A place on the line with f − c there.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct At {
+    pub(crate) t: f64,
+    pub(crate) f: f64,
+}
+
+/// f − c along o + t·d.
+pub(crate) struct Line<'a> {
+    pub(crate) surface: ImplicitSurface<'a>,
+    pub(crate) o: DVec3,
+    pub(crate) d: DVec3,
+}
+
+/// What the search along a piece found.
+#[derive(Debug, Default)]
+pub(crate) struct Found {
+    /// Roots, each with a place beside it where the gradient is not zero even if the root is a double one.
+    pub(crate) roots: Vec<(f64, f64)>,
+    /// Pieces that may hide a pair of roots.
+    pub(crate) unproven: u64,
+    /// A value that was not finite.
+    pub(crate) broken: u64,
+}
+
+impl Line<'_> {
+    pub(crate) fn at(&self, t: f64) -> At {
+        At { t, f: self.surface.value(self.o + self.d * t) }
+    }
+
+    pub(crate) fn slope(&self, t: f64) -> f64 {
+        self.surface.field.gradient(self.o + self.d * t).dot(self.d)
+    }
+
+    /// Appends all roots between `a` and `b`, both ends open against being counted twice: f = c counts as above c.
+    pub(crate) fn roots(&self, a: At, b: At, found: &mut Found) {
+        if a.f.is_finite() && b.f.is_finite() {
+            self.search(a, b, None, None, 0, found);
+        } else {
+            found.broken += 1;
+        }
+    }
+
+    fn search(&self, a: At, b: At, ga: Option<f64>, gb: Option<f64>, depth: u32, found: &mut Found) {
+        let crosses = (a.f < 0.0) != (b.f < 0.0);
+        if !crosses && self.excluded(a.t, b.t) {
+            return;
+        }
+        let (ga, gb) = (ga.unwrap_or_else(|| self.slope(a.t)), gb.unwrap_or_else(|| self.slope(b.t)));
+        let up = if b.f < 0.0 { -1.0 } else { 1.0 };
+        if crosses {
+            if (ga * up > 0.0 && gb * up > 0.0) || depth >= DEPTH {
+                found.unproven += u64::from(depth >= DEPTH);
+                let t = self.bracket(a, b);
+                found.roots.push((t, t));
+                return;
+            }
+        } else if ga * up < 0.0 && gb * up > 0.0 {
+            self.extremum(a, b, (ga, gb), up, depth, found);
+            return;
+        } else if depth >= DEPTH {
+            found.unproven += 1;
+            return;
+        }
+        let m = self.at(0.5 * (a.t + b.t));
+        if !m.f.is_finite() {
+            found.broken += 1;
+            return;
+        }
+        self.search(a, m, Some(ga), None, depth + 1, found);
+        self.search(m, b, None, Some(gb), depth + 1, found);
+    }
+
+    /// Whether the bound shows that f ≠ c between two places.
+    fn excluded(&self, a: f64, b: f64) -> bool {
+        let (middle, half) = (self.o + self.d * (0.5 * (a + b)), 0.5 * (b - a) * (1.0 + 1e-12));
+        let level = self.surface.level;
+        self.surface.field.bound(middle, half).is_some_and(|(low, high)| low > level || high < level)
+    }
+
+    /// f runs towards c from both ends, on the side `up` of it: looks for the place where it turns.
+    fn extremum(&self, a: At, b: At, slopes: (f64, f64), up: f64, depth: u32, found: &mut Found) {
+        let (mut low, mut high) = (a.t, b.t);
+        let (mut g_low, mut g_high) = slopes;
+        for step in 0..60 {
+            // The root of the slope's chord, and the middle now and then so that the piece surely shrinks.
+            let chord = low + (high - low) * (g_low / (g_low - g_high));
+            let t = if step % 3 == 2 || !chord.is_finite() { 0.5 * (low + high) } else { chord };
+            if !(t > low && t < high) {
+                break;
+            }
+            let m = self.at(t);
+            if m.f * up < 0.0 {
+                for (p, q) in [(a, m), (m, b)] {
+                    self.search(p, q, None, None, depth.max(DEPTH - 1), found);
+                }
+                return;
+            }
+            let g = self.slope(t);
+            if g * up < 0.0 {
+                (low, g_low) = (t, g)
+            } else {
+                (high, g_high) = (t, g)
+            }
+            if g == 0.0 {
+                (low, high) = (t, t);
+                break;
+            }
+        }
+        let turn = 0.5 * (low + high);
+        if self.at(turn).f.abs() <= TOUCH * a.f.abs().max(b.f.abs()) {
+            found.roots.push((turn, 0.5 * (turn + b.t)));
+        }
+    }
+
+    /// The root between two ends of different sign, to the last digits of t.
+    fn bracket(&self, a: At, b: At) -> f64 {
+        let (mut low, mut high) = (a, b);
+        let mut side = 0;
+        let small = 1e-12 * (b.t - a.t);
+        for step in 0..100 {
+            let chord = (low.t * high.f - high.t * low.f) / (high.f - low.f);
+            let t = if step % 16 == 15 || !(chord > low.t && chord < high.t) { 0.5 * (low.t + high.t) } else { chord };
+            let m = self.at(t);
+            if m.f == 0.0 || high.t - low.t <= small || !m.f.is_finite() {
+                return t;
+            }
+            if (m.f < 0.0) == (low.f < 0.0) {
+                if (t - low.t).abs() <= small {
+                    return t;
+                }
+                low = m;
+                high.f *= if side == -1 { 0.5 } else { 1.0 };
+                side = -1;
+            } else {
+                if (high.t - t).abs() <= small {
+                    return t;
+                }
+                high = m;
+                low.f *= if side == 1 { 0.5 } else { 1.0 };
+                side = 1;
+            }
+        }
+        0.5 * (low.t + high.t)
+    }
+}

@@ -1,0 +1,186 @@
+//! Random lines on implicit surfaces: uniform, exact in opacity, and clear about what they could not find.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+
+use common::*;
+use pbsr::{Density, Error, ImplicitSurface, LineSampler, Sampler, SurfaceParams, pixel_area};
+use splat_core::glam::DVec3;
+use std::f64::consts::PI;
+
+fn boxed(field: &Field, half: f64) -> ImplicitSurface<'_> {
+    ImplicitSurface { field, level: 0.0, min: DVec3::splat(-half), max: DVec3::splat(half), inside: None }
+}
+
+fn params(opacity: f64, cross_section: f64) -> SurfaceParams {
+    SurfaceParams { opacity, cross_section, ..SurfaceParams::default() }
+}
+
+#[test]
+fn pb13_lines_are_uniform_on_spheres_and_ellipsoids() {
+    // Equal heights cut equal areas from a sphere.
+    let sampler = LineSampler::new(&boxed(&Field::UNIT, 1.1), 32, &params(0.5, 1e-4), None).unwrap();
+    let all = positions(&sampler, 0);
+    for axis in 0..3 {
+        let mut bins = [0u64; 20];
+        all.iter().for_each(|p| bins[((p[axis] + 1.0) * 10.0).clamp(0.0, 19.0) as usize] += 1);
+        let chi2 = chi2_equal(&bins);
+        assert!(chi2 < chi2_limit(19.0), "axis {axis}: χ² {chi2}");
+    }
+    assert!(all.iter().all(|p| (p.length() - 1.0).abs() < 1e-6));
+    assert!((sampler.report().area / (4.0 * PI) - 1.0).abs() < 0.03, "{:?}", sampler.report());
+    // A prolate ellipsoid: area below height z by its closed form.
+    let field = Field::Ellipsoid { axes: DVec3::new(1.0, 1.0, 3.0) };
+    let surface =
+        ImplicitSurface { min: DVec3::new(-1.1, -1.1, -3.1), max: DVec3::new(1.1, 1.1, 3.1), ..boxed(&field, 1.0) };
+    let sampler = LineSampler::new(&surface, 48, &params(0.5, 1e-4), None).unwrap();
+    let below = |z: f64| {
+        // ∫ √(1 + (e·z)²…): with k² = 8/81, area element ∝ √(1 − k²z²).
+        let k = (8.0f64 / 81.0).sqrt();
+        let x = (k * z).clamp(-1.0, 1.0);
+        0.5 * (x * (1.0 - x * x).sqrt() + x.asin())
+    };
+    let (low, high) = (below(-3.0), below(3.0));
+    let mut bins = [0u64; 20];
+    let all = positions(&sampler, 1);
+    all.iter().for_each(|p| bins[((below(p.z) - low) / (high - low) * 20.0).clamp(0.0, 19.0) as usize] += 1);
+    let chi2 = chi2_equal(&bins);
+    assert!(chi2 < chi2_limit(19.0), "χ² {chi2} of {}", all.len());
+}
+
+#[test]
+fn opacity_of_a_sphere_grows_to_its_silhouette() {
+    let camera = front(64);
+    let s = pixel_area(&camera, DVec3::Z);
+    let field = Field::Sphere { middle: DVec3::ZERO, radius: 0.8, scale: 1.0 };
+    let sampler = LineSampler::new(&boxed(&field, 1.0), 24, &params(0.2, s), None).unwrap();
+    let ensemble = render(&camera, &[&sampler], 600);
+    let share = s / (2.0 * PI * 0.8 * 0.8);
+    let alpha = |x: u32, y: u32| {
+        // Mean over the pixel of the hits on both sides; pixels of the silhouette by their own sum.
+        let n = 64;
+        let mut hits = 0.0;
+        for k in 0..n * n {
+            let at = |v: u32, k: u32| (f64::from(v) + (f64::from(k) + 0.5) / f64::from(n)) / 32.0 - 1.0;
+            let rho = at(x, k % n).hypot(at(y, k / n)) / 0.8;
+            if rho < 1.0 {
+                hits += 2.0 / (1.0 - rho * rho).sqrt();
+            }
+        }
+        let hits = hits / f64::from(n * n);
+        if hits > 8.0 || (hits > 0.0 && (f64::from(x) - 31.5).hypot(f64::from(y) - 31.5) > 24.0) {
+            return None;
+        }
+        Some(1.0 - 0.8f64.powf(hits))
+    };
+    assert!(share < 1e-3);
+    let found = bias(&ensemble, &alpha);
+    assert!(found.none(), "{found:?}");
+    // PB5: the ring of the silhouette is nearly opaque, the middle is not.
+    let ring = ensemble.hits(31, 6);
+    assert!(f64::from(ring) > 0.65 * 600.0, "{ring}");
+}
+
+#[test]
+fn pb11_the_scale_of_the_field_changes_no_bit() {
+    let at = |scale: f64| {
+        let field = Field::Sphere { middle: DVec3::new(0.1, 0.2, -0.1), radius: 0.7, scale };
+        positions(&LineSampler::new(&boxed(&field, 1.0), 16, &params(0.5, 1e-3), None).unwrap(), 3)
+    };
+    let one = at(1.0);
+    assert!(one.len() > 1000);
+    for power in [60, -60, 200, -200] {
+        assert_eq!(at(2f64.powi(power)), one, "2^{power}");
+    }
+}
+
+#[test]
+fn pb09_double_roots_are_found_where_lines_touch_them() {
+    let sampler = LineSampler::new(&boxed(&Field::Double, 1.1), 24, &params(0.5, 1e-4), None).unwrap();
+    let all = positions(&sampler, 0);
+    assert!(all.iter().all(|p| (p.length() - 1.0).abs() < 1e-4), "all on the sphere");
+    let area = sampler.report().area;
+    assert!((area / (4.0 * PI) - 1.0).abs() < 0.03, "{:?}", sampler.report());
+}
+
+#[test]
+fn pb10_the_apex_of_a_cone_is_no_trouble() {
+    let sampler = LineSampler::new(&boxed(&Field::Cone, 1.0), 20, &params(0.5, 1e-3), None).unwrap();
+    let all = positions(&sampler, 0);
+    assert!(all.iter().all(|p| p.is_finite() && p.abs().max_element() <= 1.0));
+    // Two cones of height 1 and slope 1: 2·π·√2 within the box, as its corners are out of their reach.
+    assert!((sampler.report().area / (2.0 * PI * 2f64.sqrt()) - 1.0).abs() < 0.04, "{:?}", sampler.report());
+}
+
+#[test]
+fn pb12_components_get_particles_by_their_areas() {
+    let field = Field::Two { radius: [0.3, 0.6], apart: 0.7 };
+    let surface = ImplicitSurface { min: DVec3::splat(-1.4), max: DVec3::splat(1.4), ..boxed(&field, 1.0) };
+    let sampler = LineSampler::new(&surface, 32, &params(0.5, 1e-4), None).unwrap();
+    let all = positions(&sampler, 0);
+    let left = all.iter().filter(|p| p.x < -0.2).count() as f64;
+    let expected = all.len() as f64 * 0.2;
+    assert!((left - expected).abs() < 4.5 * (expected * 2.0).sqrt(), "{left} for {expected}");
+    // Two sheets far nearer to each other than a cell.
+    let field = Field::Sheets { gap: 5e-4 };
+    let sampler = LineSampler::new(&boxed(&field, 1.0), 20, &params(0.5, 1e-3), None).unwrap();
+    assert!((sampler.report().area / 8.0 - 1.0).abs() < 0.05, "{:?}", sampler.report());
+    assert!(sampler.report().missed() < 0.01, "{:?}", sampler.report());
+}
+
+#[test]
+fn pb14_sets_are_independent() {
+    let sampler = LineSampler::new(&boxed(&Field::UNIT, 1.1), 16, &params(0.5, 2e-3), None).unwrap();
+    // Counts of a cap in 600 sets: variance of a binomial, no correlation at any lag.
+    const SETS: u64 = 600;
+    let counts: Vec<f64> =
+        (0..SETS).map(|set| positions(&sampler, set).iter().filter(|p| p.z > 0.9).count() as f64).collect();
+    let mean = counts.iter().sum::<f64>() / SETS as f64;
+    let variance = counts.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / SETS as f64;
+    assert!((variance / mean - 1.0).abs() < 4.0 * (2.0 / SETS as f64).sqrt(), "variance {variance} of mean {mean}");
+    for lag in 1..=5 {
+        let sum: f64 = counts.windows(lag + 1).map(|w| (w[0] - mean) * (w[lag] - mean)).sum();
+        let r = sum / (variance * SETS as f64);
+        assert!(r.abs() < 3.5 / (SETS as f64).sqrt(), "lag {lag}: {r}");
+    }
+}
+
+#[test]
+fn open_surfaces_and_densities_take_their_share() {
+    let upper = |p: DVec3| p.z > 0.0;
+    let surface = ImplicitSurface { inside: Some(&upper), ..boxed(&Field::UNIT, 1.1) };
+    let sampler = LineSampler::new(&surface, 24, &params(0.5, 1e-4), None).unwrap();
+    let all = positions(&sampler, 0);
+    assert!(all.iter().all(|p| p.z > 0.0));
+    let expected = 2.0 * PI * 0.5f64.ln().abs() / 1e-4;
+    // Two crossings on a line widen the spread a little.
+    assert!((all.len() as f64 - expected).abs() < 6.0 * expected.sqrt(), "{} for {expected}", all.len());
+    // Density x, 0 for x < 0: the mean over the sphere is 1/4.
+    let density = Density { field: &Field::Ramp, max: 1.0 };
+    let sampler = LineSampler::new(&boxed(&Field::UNIT, 1.1), 24, &params(0.5, 1e-4), Some(density)).unwrap();
+    let all = positions(&sampler, 0);
+    let expected = 4.0 * PI * 0.25 * 0.5f64.ln().abs() / 1e-4;
+    assert!((all.len() as f64 - expected).abs() < 6.0 * expected.sqrt(), "{} for {expected}", all.len());
+    let mean = all.iter().map(|p| p.x).sum::<f64>() / all.len() as f64;
+    assert!((mean - 2.0 / 3.0).abs() < 0.01, "∫x²/∫x = 2/3, found {mean}");
+}
+
+#[test]
+fn what_cannot_be_sampled_says_why() {
+    let no = |field: &Field| LineSampler::new(&boxed(field, 1.1), 16, &params(0.5, 1e-3), None).err().unwrap();
+    assert!(matches!(no(&Field::Nothing), Error::Empty { .. }));
+    assert!(matches!(no(&Field::Broken), Error::Field { .. }));
+    let flat = ImplicitSurface { max: DVec3::splat(-1.1), ..boxed(&Field::UNIT, 1.1) };
+    assert!(matches!(LineSampler::new(&flat, 16, &params(0.5, 1e-3), None), Err(Error::Parameter { .. })));
+    assert!(matches!(
+        LineSampler::new(&boxed(&Field::UNIT, 1.1), 16, &params(0.5, 1e-30), None),
+        Err(Error::TooMuch { .. })
+    ));
+    // Without a bound everything is searched, and the report says so.
+    let sampler = LineSampler::new(&boxed(&Field::Unbounded, 1.1), 16, &params(0.5, 1e-3), None).unwrap();
+    let report = sampler.report();
+    assert_eq!(report.cells.unbounded, report.cells.active);
+    assert!(report.missed() < 0.01, "{report:?}");
+    assert!((report.area / (4.0 * PI) - 1.0).abs() < 0.05, "{report:?}");
+    assert!(sampler.expected_particles() > 1000.0);
+}
