@@ -19,7 +19,7 @@ use crate::error::check;
 use crate::implicit::{CellCounts, Cells, ImplicitSurface};
 use crate::opacity;
 use crate::params::countable;
-use crate::roots::{Found, Line};
+use crate::roots::{At, Found, Line};
 use crate::stream::{Stage, Stream, across, unit_or_zero};
 use crate::{Density, Error, PackedColor, PackedNormal, Particles, Sampler, SurfaceParams};
 use glam::DVec3;
@@ -33,6 +33,9 @@ const CHUNK_LINES: u64 = 4096;
 
 /// Lines of the survey.
 const SURVEY_LINES: u32 = 8192;
+
+/// Cells that are searched at once, along a line.
+const RUN: u32 = 4;
 
 /// What is known about the roots of a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -172,59 +175,93 @@ impl<'a> LineSampler<'a> {
         self.surface.contains(line.o + line.d * t)
     }
 
-    /// All roots of a line: from cell to cell, active cells in `parts` parts each.
+    /// All roots of a line: runs of active cells are searched in `parts` parts each, the rest is jumped over.
     fn follow(&self, line: &Line<'_>, parts: u32, found: &mut Found) {
         let (o, d) = ((line.o - self.cells.min) / self.cells.side, line.d / self.cells.side);
         let Some((enter, leave)) = clip(o, d, self.cells.dims) else { return };
+        let inverse = DVec3::select(d.cmpeq(DVec3::ZERO), DVec3::ZERO, d.recip());
+        let least = (leave - enter) * 1e-12;
         let mut t = enter;
-        let mut last = None;
+        let mut cell = cell_at(o, d, t, self.cells.dims);
+        // Where the run of active cells began, and how many it has.
+        let mut run: Option<(At, u32)> = None;
         // Each turn goes on by at least a cell's corner, so the number of turns is bounded by what a line can cross.
         for _ in 0..4 * (self.cells.dims.iter().sum::<i32>() + 3) {
             if t >= leave {
-                return;
+                break;
             }
-            let cell = cell_at(o, d, t, self.cells.dims);
             let distance = self.cells.distance(cell);
-            let exit = leave_cube(o, d, cell, i32::from(distance.max(1)) - 1).min(leave);
-            // Rounding may put the exit at or before t: a step on by the last digits.
-            let exit = exit.max(t + (leave - enter).abs() * 1e-12);
-            if distance == 0 {
-                let mut a = last.unwrap_or_else(|| line.at(t));
-                for k in 1..=parts {
-                    let b = line.at(if k == parts { exit } else { t + (exit - t) * f64::from(k) / f64::from(parts) });
-                    line.roots(a, b, found);
-                    a = b;
-                }
-                last = Some(a);
+            let more = i32::from(distance.max(1)) - 1;
+            let (mut exit, axis) = leave_cube(o, inverse, cell, more);
+            if exit > leave {
+                exit = leave;
+            } else if exit <= t {
+                // Rounding may put the exit at or before t: a step on by the last digits.
+                exit = t + least;
+            }
+            if more > 0 {
+                cell = cell_at(o, d, exit, self.cells.dims);
             } else {
-                last = None;
+                // The next cell; beyond the last one t has reached `leave`, up to rounding.
+                let next = cell[axis] + if d[axis] > 0.0 { 1 } else { -1 };
+                cell[axis] = next.clamp(0, self.cells.dims[axis] - 1);
+            }
+            if distance == 0 {
+                let (from, cells) = run.unwrap_or_else(|| (line.at(t), 0));
+                // A long run goes on from the place and value where its last part ended.
+                run = Some(if cells + 1 == RUN {
+                    (search(line, from, exit, parts, found), 0)
+                } else {
+                    (from, cells + 1)
+                });
+            } else if let Some((from, 1..)) = run.take() {
+                search(line, from, t, parts, found);
             }
             t = exit;
+        }
+        if let Some((from, 1..)) = run {
+            search(line, from, t, parts, found);
         }
     }
 }
 
+/// Searches from `from` to `to` in `parts` parts; returns the end.
+fn search(line: &Line<'_>, from: At, to: f64, parts: u32, found: &mut Found) -> At {
+    let mut a = from;
+    for k in 1..=parts {
+        let share = f64::from(k) / f64::from(parts);
+        let b = line.at(if k == parts { to } else { from.t + (to - from.t) * share });
+        line.roots(a, b, found);
+        a = b;
+    }
+    a
+}
+
 /// The cell in which the line is just behind `t`.
-#[inline]
+#[inline(always)]
 fn cell_at(o: DVec3, d: DVec3, t: f64, dims: [i32; 3]) -> [i32; 3] {
     let p = o + d * t;
     std::array::from_fn(|a| {
+        // Conversions cut towards zero, and nothing lies below it: cheaper than floor() without its instruction.
+        let v = p[a].max(0.0);
+        let near = (v + 0.5) as i32;
         // On a border the direction decides.
-        let v = p[a];
-        let near = v.round();
-        let floor = if (v - near).abs() < 1e-9 { if d[a] < 0.0 { near - 1.0 } else { near } } else { v.floor() };
-        (floor as i32).clamp(0, dims[a] - 1)
+        let on_border = (v - f64::from(near)).abs() < 1e-9;
+        let cell = if on_border { near - i32::from(d[a] < 0.0) } else { v as i32 };
+        cell.clamp(0, dims[a] - 1)
     })
 }
 
-/// Where the line leaves the cube of 2·`more` + 1 cells around `cell`.
-#[inline]
-fn leave_cube(o: DVec3, d: DVec3, cell: [i32; 3], more: i32) -> f64 {
-    let mut exit = f64::INFINITY;
+/// Where, and along which axis, the line leaves the cube of 2·`more` + 1 cells around `cell`; `inverse` is 1/d, 0 where
+/// d is 0.
+#[inline(always)]
+fn leave_cube(o: DVec3, inverse: DVec3, cell: [i32; 3], more: i32) -> (f64, usize) {
+    let mut exit = (f64::INFINITY, 0);
     for a in 0..3 {
-        if d[a] != 0.0 {
-            let border = if d[a] > 0.0 { cell[a] + more + 1 } else { cell[a] - more };
-            exit = exit.min((f64::from(border) - o[a]) / d[a]);
+        let border = if inverse[a] > 0.0 { cell[a] + more + 1 } else { cell[a] - more };
+        let t = (f64::from(border) - o[a]) * inverse[a];
+        if inverse[a] != 0.0 && t < exit.0 {
+            exit = (t, a);
         }
     }
     exit

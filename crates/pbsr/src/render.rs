@@ -116,7 +116,7 @@ impl Renderer {
             self.sample(scene, &plan, u64::from(ensemble.levels), batch, progress);
             // A cancelled batch is incomplete: it is dropped whole.
             progress.tick(0)?;
-            self.resolve(scene, &plan, ensemble);
+            self.resolve(scene, &plan, batch as usize, ensemble);
             ensemble.levels += batch;
             left -= batch;
             counts.add(&self.tasks, batch);
@@ -128,8 +128,9 @@ impl Renderer {
     fn sample(&mut self, scene: &Scene<'_>, plan: &Plan, first: u64, batch: u32, progress: &Progress) {
         self.tasks.resize_with(plan.ranges.len() * batch as usize, Task::default);
         for (k, task) in self.tasks.iter_mut().enumerate() {
-            let (object, chunks) = plan.ranges[k % plan.ranges.len()].clone();
-            task.set = first + (k / plan.ranges.len()) as u64;
+            // Sets of one range one after the other: its triangles or cells are then in the cache.
+            let (object, chunks) = plan.ranges[k / batch as usize].clone();
+            task.set = first + (k % batch as usize) as u64;
             (task.object, task.chunks) = (object, chunks);
         }
         self.tasks.par_iter_mut().for_each_init(Staging::default, |staging, task| {
@@ -140,7 +141,7 @@ impl Renderer {
         });
     }
 
-    fn resolve(&self, scene: &Scene<'_>, plan: &Plan, ensemble: &mut Ensemble) {
+    fn resolve(&self, scene: &Scene<'_>, plan: &Plan, batch: usize, ensemble: &mut Ensemble) {
         let channels = ensemble.params;
         let shader = Shader { lights: scene.lights, ambient: scene.ambient, camera: scene.camera, channels };
         let n = channels.channels();
@@ -152,9 +153,9 @@ impl Renderer {
         sums.for_each_init(Nearest::new, |nearest, (t, (((hits, sums), squares), depths))| {
             let mut tile = TileSums { hits, sums, squares, depths };
             nearest.begin(scene, &plan.tiling, t);
-            for of_set in self.tasks.chunks(plan.ranges.len().max(1)) {
-                nearest.collect(of_set, t);
-                nearest.add(of_set, scene, plan, &shader, t, &mut tile);
+            for set in 0..batch {
+                nearest.collect(&self.tasks, set, batch, t);
+                nearest.add(&self.tasks, scene, plan, &shader, &mut tile);
             }
         });
     }
@@ -223,7 +224,7 @@ struct Nearest {
     depth: Vec<f32>,
     /// What depth starts with: the occluder's.
     limit: Vec<f32>,
-    /// (task of the set, record), task `NONE` where no particle is.
+    /// (task, record), task `NONE` where no particle is.
     winner: Vec<(u32, u32)>,
     touched: Vec<u16>,
     corner: [usize; 2],
@@ -257,10 +258,10 @@ impl Nearest {
         self.depth.copy_from_slice(&self.limit);
     }
 
-    /// The nearest particle of each pixel among all objects of one set.
+    /// The nearest particle of each pixel among all objects of one set, whose tasks are `batch` apart.
     #[inline]
-    fn collect(&mut self, tasks: &[Task], t: usize) {
-        for (k, task) in tasks.iter().enumerate() {
+    fn collect(&mut self, tasks: &[Task], set: usize, batch: usize, t: usize) {
+        for (k, task) in tasks.iter().enumerate().skip(set).step_by(batch) {
             let first = task.first(t);
             for (i, record) in task.tile(t).iter().enumerate() {
                 let pixel = record.pixel();
@@ -294,15 +295,7 @@ impl Nearest {
 
     /// Shades what is seen, adds it, and clears the buffer.
     #[inline]
-    fn add(
-        &mut self,
-        tasks: &[Task],
-        scene: &Scene<'_>,
-        plan: &Plan,
-        shader: &Shader<'_>,
-        t: usize,
-        sums: &mut TileSums<'_>,
-    ) {
+    fn add(&mut self, tasks: &[Task], scene: &Scene<'_>, plan: &Plan, shader: &Shader<'_>, sums: &mut TileSums<'_>) {
         let channels = shader.channels.channels();
         let mut values = [0.0; MAX_CHANNELS];
         for &pixel in &self.touched {
@@ -321,7 +314,6 @@ impl Nearest {
             self.depth[pixel] = self.limit[pixel];
             self.winner[pixel] = (NONE, 0);
         }
-        debug_assert!(t < plan.tiling.tiles(), "invariant: a tile of the image");
         self.touched.clear();
     }
 }
