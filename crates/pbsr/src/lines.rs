@@ -161,6 +161,25 @@ impl<'a> LineSampler<'a> {
         }
     }
 
+    /// `n` uniform places of the surface, fewer only where lines hardly meet it: starts of walks.
+    pub(crate) fn some_places(&self, stream: &mut Stream, n: usize) -> Vec<DVec3> {
+        let mut places = Vec::with_capacity(n + 8);
+        let mut found = Found::default();
+        let most = (n as u64 + 64) * 64 * self.report.lines / self.report.roots.max(1);
+        for _ in 0..most {
+            if places.len() >= n {
+                break;
+            }
+            let line = self.line(stream);
+            found.roots.clear();
+            self.follow(&line, 1, &mut found);
+            let on = |t: &f64| self.counts(&line, *t);
+            places.extend(found.roots.iter().map(|(t, _)| *t).filter(on).map(|t| line.o + line.d * t));
+        }
+        places.truncate(n);
+        places
+    }
+
     /// A uniform line of the ball.
     #[inline]
     fn line(&self, stream: &mut Stream) -> Line<'a> {

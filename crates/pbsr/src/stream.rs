@@ -3,7 +3,7 @@
 //! Poisson variables of small mean by inversion; of mean ≥ 12 by W. Hörmann: *The transformed rejection method for
 //! generating Poisson random variables*, Insurance: Mathematics and Economics 12, 1993 (algorithm PTRS), which is exact.
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use splat_core::{glam, rng};
 
 /// The first word of each counter names the sampler, so that two samplers of one seed share no numbers.
@@ -159,11 +159,6 @@ pub(crate) fn across(d: DVec3) -> [DVec3; 2] {
 pub(crate) fn unit_or_zero(v: DVec3) -> DVec3 {
     let largest = v.abs().max_element();
     if largest > 0.0 && largest.is_finite() { (v / largest).normalize() } else { DVec3::ZERO }
-}
-
-/// `v` as f32 offsets.
-pub(crate) fn offset(v: DVec3) -> Vec3 {
-    v.as_vec3()
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
 //! What the tests share: small scenes, pictures, and tests of hypotheses with a stated level.
-#![allow(dead_code, reason = "each test file uses its part")]
+#![allow(dead_code, unreachable_pub, reason = "each test file uses its part")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use pbsr::{Appearance, Ensemble, EnsembleParams, FoldParams, LitBy, Object, Renderer, Sampler, Scene};

@@ -1,0 +1,99 @@
+//! Particles in a procedural medium: the extinction is a field over a box.
+//!
+//! As in `volume.rs`, ν = σ/s: each cell gets a Poisson number of mean σ_max·V/s, σ_max from the field's bound, and each
+//! particle is kept with probability σ(x)/σ_max.
+
+use crate::blocks::Blocks;
+use crate::error::check;
+use crate::params::{color, countable, positive};
+use crate::stream::Stage;
+use crate::{Density, Error, PackedColor, PackedNormal, Particles, Sampler};
+use glam::DVec3;
+use splat_core::glam;
+
+/// Particles in the box of a field of extinction, 1/world unit.
+pub struct FieldVolumeSampler<'a> {
+    extinction: Density<'a>,
+    min: DVec3,
+    /// Sides of a cell.
+    side: DVec3,
+    cells: usize,
+    cross_section: f64,
+    color: [f32; 3],
+    seed: u64,
+    blocks: Blocks,
+}
+
+impl<'a> FieldVolumeSampler<'a> {
+    /// `extinction` between the corners `min` and `max`, in `cells`³ cells (1 to 512 an axis). Where the field knows no
+    /// bound, `extinction.max` is taken, and values above it are cut.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for numbers out of range, [`Error::Empty`] when the extinction is bounded by 0 everywhere,
+    /// [`Error::TooMuch`] for more than 4·10⁹ particles a set.
+    pub fn new(
+        extinction: Density<'a>,
+        [min, max]: [DVec3; 2],
+        cells: u32,
+        cross_section: f64,
+        tint: [f32; 3],
+        seed: u64,
+    ) -> Result<Self, Error> {
+        extinction.validate()?;
+        positive(cross_section, "cross_section")?;
+        color(tint)?;
+        check((1..=512).contains(&cells), "cells", cells, "1 to 512")?;
+        let ok = min.is_finite() && max.is_finite() && (max - min).min_element() > 0.0;
+        check(ok, "box", (min, max), "two finite corners, the first less in all three")?;
+        let n = cells as usize;
+        let side = (max - min) / f64::from(cells);
+        let radius = 0.5 * side.length() * (1.0 + 1e-12);
+        let per_cell = side.element_product() / cross_section;
+        let middle = |c: usize| min + side * (corner(c, n) + 0.5);
+        let blocks = Blocks::new(n * n * n, |c| extinction.bound(middle(c), radius) * per_cell);
+        if blocks.chunks() == 0 {
+            return Err(Error::Empty { what: "a medium", reason: "its extinction is bounded by 0" });
+        }
+        countable((0..blocks.chunks()).map(|c| blocks.mean(c)).sum())?;
+        Ok(Self { extinction, min, side, cells: n, cross_section, color: tint, seed, blocks })
+    }
+}
+
+/// Lattice coordinates of a cell.
+fn corner(cell: usize, n: usize) -> DVec3 {
+    DVec3::new((cell % n) as f64, (cell / n % n) as f64, (cell / (n * n)) as f64)
+}
+
+impl Sampler for FieldVolumeSampler<'_> {
+    fn origin(&self) -> DVec3 {
+        self.min
+    }
+
+    fn cross_section(&self) -> f64 {
+        self.cross_section
+    }
+
+    fn chunks(&self) -> usize {
+        self.blocks.chunks()
+    }
+
+    fn expected(&self, chunk: usize) -> f64 {
+        self.blocks.mean(chunk)
+    }
+
+    fn chunk<'a>(&'a self, set: u64, chunk: usize, scratch: &'a mut Particles) -> &'a Particles {
+        scratch.clear();
+        let color = PackedColor::new(self.color);
+        let radius = 0.5 * self.side.length() * (1.0 + 1e-12);
+        self.blocks.arrivals(self.seed, Stage::Volume, set, chunk, |c, stream| {
+            let low = corner(c, self.cells);
+            let within = DVec3::from_array(stream.triple().map(f64::from));
+            let offset = self.side * (low + within);
+            let most = self.extinction.bound(self.min + self.side * (low + 0.5), radius);
+            if stream.unit() * most < self.extinction.at(self.min + offset) {
+                scratch.push(offset.as_vec3(), PackedNormal::default(), color);
+            }
+        });
+        scratch
+    }
+}

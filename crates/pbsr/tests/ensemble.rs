@@ -1,0 +1,301 @@
+//! The average over sets: its error, its integers, its determinism; ties, occluders, depths, checkpoints, cancelling.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+
+use common::*;
+use pbsr::{
+    Ensemble, EnsembleParams, Error, FoldParams, KeptSets, LitBy, MeshSampler, Object, Occluder, Renderer, Sampler,
+    Scene, SurfaceParams, pixel_area, predict,
+};
+use splat_core::glam::{DQuat, DVec3, Vec3};
+use splat_core::{Light, LightShape, Material, Mesh, Progress, Projection, Receiver, Similarity, Transmittance};
+
+fn wall(z: f32) -> Mesh {
+    rectangle(Vec3::Z * z, Vec3::X * 1.5, Vec3::Y * 1.5, 2)
+}
+
+fn params(opacity: f64, s: f64, color: [f32; 3], seed: u64) -> SurfaceParams {
+    SurfaceParams { opacity, cross_section: s, color, seed, ..SurfaceParams::default() }
+}
+
+fn rms(layers: &splat_core::Layers, expected: f64) -> f64 {
+    let pixels = layers.rgb("beauty").unwrap();
+    (pixels.iter().map(|p| (f64::from(p[1]) - expected).powi(2)).sum::<f64>() / pixels.len() as f64).sqrt()
+}
+
+#[test]
+fn pb06_the_error_falls_with_the_root_of_the_repeat_level() {
+    let camera = front(64);
+    let mesh = wall(0.0);
+    let sampler = MeshSampler::new(&mesh, &params(0.3, pixel_area(&camera, DVec3::Z), [1.0; 3], 4), None).unwrap();
+    let objects = objects(&[&sampler]);
+    let mut ensemble = Ensemble::new([64, 64], &EnsembleParams::default()).unwrap();
+    let mut points = Vec::new();
+    for levels in [16u32, 64, 256, 1024] {
+        let more = levels - ensemble.levels();
+        fold_into(&scene(&camera, &objects), &mut ensemble, more);
+        let layers = ensemble.read(&|_, _| [0.0; 3], None);
+        let error = rms(&layers, 0.3);
+        let theory = (0.3 * 0.7 / f64::from(levels)).sqrt();
+        assert!((error / theory - 1.0).abs() < 0.06, "L {levels}: {error} for {theory}");
+        // The picture's own estimate of its error.
+        let estimate = ensemble.rms_error(&|_, _| [0.0; 3], None);
+        assert!((estimate / theory - 1.0).abs() < 0.06, "L {levels}: says {estimate} for {theory}");
+        points.push((f64::from(levels).ln(), error.ln()));
+    }
+    let n = points.len() as f64;
+    let (mx, my) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
+    let slope = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>()
+        / points.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>();
+    assert!((slope + 0.5).abs() < 0.03, "slope {slope}");
+}
+
+#[test]
+fn pb07_ten_million_hits_are_counted_exactly() {
+    let camera = front(8);
+    let mesh = wall(0.0);
+    // 32 particles a pixel: each is hit in every set (e^−32).
+    let surface =
+        SurfaceParams { opaque_optical_depth: 32.0, ..params(1.0, pixel_area(&camera, DVec3::Z), [0.3; 3], 4) };
+    let sampler = MeshSampler::new(&mesh, &surface, None).unwrap();
+    let mut sum = render(&camera, &[&sampler], 1);
+    let one = sum.clone();
+    // 2²³ + 2²¹ = 10 485 760 sets, by doubling.
+    for _ in 0..21 {
+        let twin = sum.clone();
+        sum.merge(&twin).unwrap();
+    }
+    let quarter = sum.clone();
+    (0..2).for_each(|_| sum.merge(&sum.clone()).unwrap());
+    sum.merge(&quarter).unwrap();
+    assert_eq!(sum.levels(), 10_485_760);
+    assert!(all_hits(&sum).iter().all(|h| *h == 10_485_760));
+    let beauty = |e: &Ensemble| e.read(&|_, _| [9.0; 3], None).rgb("beauty").unwrap().to_vec();
+    assert_eq!(beauty(&sum), beauty(&one), "the mean of equal sets is the set");
+}
+
+#[test]
+fn pb02_opaque_surfaces_are_exact_as_occluders() {
+    let camera = front(16);
+    let mesh = wall(0.5);
+    let sampler = MeshSampler::new(&mesh, &params(0.4, pixel_area(&camera, DVec3::Z), [1.0; 3], 1), None).unwrap();
+    let objects = objects(&[&sampler]);
+    // The camera is at z = 4: the wall at depth 3.5. A solid left half in front of it, a solid row behind it.
+    let mut occluder = Occluder { depth: vec![f32::INFINITY; 256], color: vec![[0.0; 3]; 256] };
+    for k in 0..256 {
+        if k % 16 < 8 || k / 16 == 3 {
+            occluder.depth[k] = if k % 16 < 8 { 3.0 } else { 5.0 };
+            occluder.color[k] = [0.25, 0.5, 0.75];
+        }
+    }
+    let ensemble = fold(&Scene { occluder: Some(&occluder), ..scene(&camera, &objects) }, 400);
+    let layers = ensemble.read(&|_, _| [0.0; 3], Some(&occluder));
+    let (beauty, alpha) = (layers.rgb("beauty").unwrap(), layers.scalar("alpha").unwrap());
+    for k in 0..256 {
+        if k % 16 < 8 {
+            assert_eq!((beauty[k], alpha[k]), ([0.25, 0.5, 0.75], 1.0), "pixel {k}");
+        } else if k / 16 == 3 {
+            assert_eq!(alpha[k], 1.0);
+            assert!((beauty[k][1] - (0.4 + 0.6 * 0.5)).abs() < 0.06, "{:?}", beauty[k]);
+        } else {
+            assert!((alpha[k] - 0.4).abs() < 0.15, "{}", alpha[k]);
+        }
+    }
+    // α = 0: no particles, and the background exactly.
+    let clear = MeshSampler::new(&mesh, &params(0.0, 1e-3, [1.0; 3], 1), None).unwrap();
+    let layers = render(&camera, &[&clear], 5).read(&|x, y| [x as f32, y as f32, 0.1], None);
+    assert!(layers.rgb("beauty").unwrap().iter().zip(0..).all(|(p, k)| *p == [(k % 16) as f32, (k / 16) as f32, 0.1]));
+}
+
+#[test]
+fn pb16_coincident_surfaces_share_their_pixels_fairly() {
+    // Equal depths everywhere: the plane faces an orthographic camera.
+    let camera = front(32);
+    let s = pixel_area(&camera, DVec3::Z);
+    let mesh = wall(0.0);
+    let red = MeshSampler::new(&mesh, &params(0.9, s, [1.0, 0.0, 0.0], 1), None).unwrap();
+    let green = MeshSampler::new(&mesh, &params(0.9, s, [0.0, 1.0, 0.0], 2), None).unwrap();
+    let share = |samplers: [&dyn Sampler; 2]| {
+        let layers = render(&camera, &samplers, 200).read(&|_, _| [0.0; 3], None);
+        let sums = layers.rgb("beauty").unwrap().iter().fold([0.0; 2], |s, p| [s[0] + p[0], s[1] + p[1]]);
+        f64::from(sums[0] / (sums[0] + sums[1]))
+    };
+    // 1024 pixels × 200 sets: 4σ = 0.0045.
+    let (one, two) = (share([&red, &green]), share([&green, &red]));
+    assert!((one - 0.5).abs() < 0.006 && (two - 0.5).abs() < 0.006, "{one} {two}");
+}
+
+#[test]
+fn x1_any_number_of_threads_and_any_batches_give_the_same_bits() {
+    let camera = camera(Projection::Perspective { fov_y: 0.6 }, 4.0, [150, 100]);
+    let meshes = [wall(0.0), rectangle(Vec3::ZERO, Vec3::new(0.5, 0.3, 0.5), Vec3::Y, 5)];
+    let s = pixel_area(&camera, DVec3::new(0.0, 0.0, 3.0));
+    let samplers: Vec<_> =
+        meshes.iter().zip(1..).map(|(m, i)| MeshSampler::new(m, &params(0.4, s, [0.5; 3], i), None).unwrap()).collect();
+    let objects: Vec<Object<'_>> = samplers.iter().map(|s| object(s)).collect();
+    let full =
+        EnsembleParams { effects: true, normal: true, shadow: true, depth_range: Some([1.0, 9.0]), radiance_unit: 0.5 };
+    let run = |threads: usize, batch: u64, steps: &[u32]| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let mut ensemble = Ensemble::new(camera.size, &full).unwrap();
+        let fold = FoldParams { batch_particles: batch, ..FoldParams::default() };
+        for levels in steps {
+            let scene = scene(&camera, &objects);
+            pool.install(|| Renderer::new().fold(&scene, &mut ensemble, *levels, &fold, &Progress::new())).unwrap();
+            // Through a checkpoint each time.
+            ensemble = Ensemble::from_bytes(&ensemble.to_bytes(&[1; 32]), &[1; 32]).unwrap();
+        }
+        ensemble
+    };
+    let one = run(1, 1 << 22, &[30]);
+    for (threads, batch, steps) in [(2, 1 << 22, vec![30]), (4, 1, vec![30]), (3, 40_000, vec![1, 20, 9])] {
+        assert_eq!(run(threads, batch, &steps), one, "{threads} threads, batches of {batch}");
+    }
+    assert!(all_hits(&one).iter().sum::<u32>() > 10_000);
+}
+
+#[test]
+fn kept_sets_are_the_sets_and_moving_them_needs_no_sampling() {
+    let camera = front(32);
+    let mesh = wall(0.0);
+    let sampler = MeshSampler::new(&mesh, &params(0.4, pixel_area(&camera, DVec3::Z), [1.0; 3], 1), None).unwrap();
+    let kept = KeptSets::new(&sampler, 0, 12);
+    assert_eq!(render(&camera, &[&kept], 12), render(&camera, &[&sampler], 12));
+    assert_eq!(kept.bytes(), kept.particles() * 20);
+    // Twice as large: particles are widened, the opacity stays. Turned by 60°: 1 − 0.6².
+    let turned =
+        Similarity { scale: 2.0, rotation: DQuat::from_rotation_y(60f64.to_radians()), ..Similarity::default() };
+    let many = KeptSets::new(&sampler, 100, 1500);
+    let moved = Object { transform: turned, ..object(&many) };
+    let ensemble = fold(&scene(&camera, &[moved]), 1500);
+    let (mut sum, mut n) = (0.0, 0.0);
+    for y in 2..30 {
+        for x in 2..30 {
+            sum += f64::from(ensemble.hits(x, y));
+            n += 1500.0;
+        }
+    }
+    // Widened particles cover four pixels: 4 times the variance.
+    let sigma = (0.64 * 0.36 * 4.0 / n as f64).sqrt();
+    assert!((sum / n - 0.64).abs() < 4.0 * sigma, "{} ± {sigma}", sum / n);
+}
+
+#[test]
+fn x2_a_scene_at_1e7_has_the_same_hits() {
+    let at = |shift: DVec3| {
+        let p = Projection::Perspective { fov_y: 0.6 };
+        let eye = shift + DVec3::new(0.5, 0.25, 4.0);
+        let camera = splat_core::Camera::look_at(eye, shift, DVec3::Y, p, [48, 48]).unwrap();
+        let mesh = Mesh { origin: shift, ..wall(0.0) };
+        let sampler = MeshSampler::new(&mesh, &params(0.4, 3e-3, [1.0; 3], 1), None).unwrap();
+        all_hits(&render(&camera, &[&sampler], 8))
+    };
+    let (near, far) = (at(DVec3::ZERO), at(DVec3::splat(1e7)));
+    let differ = near.iter().zip(&far).filter(|(a, b)| a != b).count();
+    assert!(differ <= near.len() / 200, "{differ} of {}", near.len());
+}
+
+#[test]
+fn x3_scaling_by_powers_of_two_changes_no_hit() {
+    let at = |power: i32| {
+        let k = 2f64.powi(power);
+        let mut mesh = wall(0.0);
+        mesh.position.iter_mut().for_each(|p| *p *= k as f32);
+        let p = Projection::Perspective { fov_y: 0.6 };
+        let camera = splat_core::Camera::look_at(DVec3::Z * 4.0 * k, DVec3::ZERO, DVec3::Y, p, [48, 48]).unwrap();
+        let sampler = MeshSampler::new(&mesh, &params(0.4, 3e-3 * k * k, [1.0; 3], 1), None).unwrap();
+        all_hits(&render(&camera, &[&sampler], 4))
+    };
+    assert_eq!(at(10), at(0));
+    assert_eq!(at(-10), at(0));
+}
+
+#[test]
+fn depths_are_those_of_the_hits() {
+    let camera = front(16);
+    let s = pixel_area(&camera, DVec3::Z);
+    let (near, far) = (wall(1.0), wall(-1.0));
+    let a = MeshSampler::new(&near, &params(0.5, s, [1.0; 3], 1), None).unwrap();
+    let b = MeshSampler::new(&far, &params(0.999_999, s, [1.0; 3], 2), None).unwrap();
+    let kept = EnsembleParams { depth_range: Some([0.0, 8.0]), ..EnsembleParams::default() };
+    let mut ensemble = Ensemble::new([16, 16], &kept).unwrap();
+    fold_into(&scene(&camera, &objects(&[&a, &b])), &mut ensemble, 600);
+    let layers = ensemble.read(&|_, _| [0.0; 3], None);
+    // Depths 3 and 5, half each: mean 4, deviation 1.
+    assert!(layers.scalar("depth.first").unwrap().iter().all(|d| *d == 3.0));
+    assert!(layers.scalar("depth.mean").unwrap().iter().all(|d| (d - 4.0).abs() < 0.18));
+    assert!(layers.scalar("depth.sigma").unwrap().iter().all(|d| (d - 1.0).abs() < 0.03));
+}
+
+/// Half of the light arrives.
+struct Half;
+
+impl Transmittance for Half {
+    fn transmittance(&self, receiver: &Receiver) -> [f32; 3] {
+        assert!(receiver.position.is_finite());
+        [0.5; 3]
+    }
+}
+
+#[test]
+fn light_and_shadow_make_the_radiance_of_a_lambertian() {
+    let camera = front(16);
+    let mesh = wall(0.0);
+    let surface = params(1.0, pixel_area(&camera, DVec3::Z), [0.8, 0.4, 0.2], 1);
+    let sampler = MeshSampler::new(&mesh, &surface, None).unwrap();
+    let direction = DVec3::new(0.6, 0.0, -0.8);
+    let light = Light { shape: LightShape::Directional { direction }, intensity: [3.0; 3] };
+    let lights = [LitBy { light, shadow: Some((&Half, DVec3::ZERO)) }];
+    let look = pbsr::Appearance { material: Material::default(), ..unlit() };
+    let objects = [Object { look, ..object(&sampler) }];
+    let lit = Scene { lights: &lights, ambient: [0.1; 3], ..scene(&camera, &objects) };
+    let kept = EnsembleParams { effects: true, normal: true, shadow: true, ..EnsembleParams::default() };
+    let mut ensemble = Ensemble::new([16, 16], &kept).unwrap();
+    fold_into(&lit, &mut ensemble, 20);
+    let layers = ensemble.read(&|_, _| [0.0; 3], None);
+    for k in 0..256 {
+        let near = |name: &str, expected: [f32; 3]| {
+            let found = layers.rgb(name).unwrap()[k];
+            // Colours have nine bits.
+            assert!((0..3).all(|c| (found[c] - expected[c]).abs() < 3e-3), "{name} {k}: {found:?} for {expected:?}");
+        };
+        let e = 3.0 * 0.5 * 0.8 / std::f32::consts::PI;
+        near("direct", [0.8 * e, 0.4 * e, 0.2 * e]);
+        near("ambient", [0.08, 0.04, 0.02]);
+        near("normal", [0.0, 0.0, 1.0]);
+        assert_eq!(layers.scalar("shadow").unwrap()[k], 0.5);
+        let sum: f32 =
+            ["background", "ambient", "emission", "direct"].iter().map(|n| layers.rgb(n).unwrap()[k][0]).sum();
+        assert!((sum - layers.rgb("beauty").unwrap()[k][0]).abs() < 1e-5);
+    }
+}
+
+#[test]
+fn cost_is_predicted_and_work_can_be_cancelled() {
+    let camera = front(64);
+    let mesh = wall(0.0);
+    let sampler = MeshSampler::new(&mesh, &params(0.5, pixel_area(&camera, DVec3::Z), [1.0; 3], 1), None).unwrap();
+    let objects = objects(&[&sampler]);
+    let scene = scene(&camera, &objects);
+    let mut ensemble = Ensemble::new([64, 64], &EnsembleParams::default()).unwrap();
+    let fold = FoldParams { batch_particles: 20_000, ..FoldParams::default() };
+    let expected = predict(&scene, ensemble.params(), 50, &fold);
+    let counts = Renderer::new().fold(&scene, &mut ensemble, 50, &fold, &Progress::new()).unwrap();
+    assert!((counts.particles as f64 - expected.particles).abs() < 4.5 * expected.particles.sqrt(), "{counts:?}");
+    assert!(counts.bytes <= expected.batch_bytes, "{counts:?} {expected:?}");
+    assert_eq!(ensemble.bytes(), expected.ensemble_bytes);
+    assert_eq!(counts.levels, 50);
+    let progress = Progress::new();
+    progress.cancel();
+    let before = ensemble.clone();
+    let stopped = Renderer::new().fold(&scene, &mut ensemble, 50, &fold, &progress);
+    assert!(matches!(stopped, Err(Error::Core(splat_core::Error::Cancelled))));
+    assert_eq!(ensemble, before);
+    let small = FoldParams { max_bytes: 1000, ..fold };
+    let refused = Renderer::new().fold(&scene, &mut ensemble, 1, &small, &Progress::new());
+    assert!(matches!(refused, Err(Error::TooMuch { .. })));
+    let other = front(32);
+    let refused = Renderer::new().fold(&Scene { camera: &other, ..scene }, &mut ensemble, 1, &fold, &Progress::new());
+    assert!(matches!(refused, Err(Error::Parameter { .. })));
+}
