@@ -92,7 +92,8 @@ fn fill(slots: &mut [(u32, u16)], rates: &[f64]) -> f64 {
     let scale = rates.len() as f64 / total;
     let mut rest: Vec<f64> = rates.iter().map(|r| r * scale).collect();
     let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..rates.len()).partition(|i| rest[*i] < 1.0);
-    while let (Some(s), Some(l)) = (small.pop(), large.last().copied()) {
+    while let (Some(s), Some(l)) = (small.last().copied(), large.last().copied()) {
+        small.pop();
         slots[s] = ((rest[s] * 4_294_967_296.0) as u32, l as u16);
         rest[l] -= 1.0 - rest[s];
         if rest[l] < 1.0 {
@@ -108,6 +109,23 @@ fn fill(slots: &mut [(u32, u16)], rates: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn equal_rates_leave_nobody_out() {
+        // By rounding, all of them may be a little less than their mean.
+        for n in [1usize, 3, 7, 8, 49, 1023] {
+            for rate in [1.0 / 3.0, 49.906_597_000_315_7, 0.1, 1e-9, 1e9] {
+                let mut slots = vec![(0, 0); n];
+                fill(&mut slots, &vec![rate; n]);
+                for (i, (share, other)) in slots.iter().enumerate() {
+                    assert!(
+                        *share > u32::MAX - 65536 || usize::from(*other) == i,
+                        "{n} × {rate}: slot {i} has {share}"
+                    );
+                }
+            }
+        }
+    }
 
     #[test]
     fn elements_are_picked_by_their_rates_and_never_at_rate_zero() {

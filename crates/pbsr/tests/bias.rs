@@ -5,7 +5,8 @@ mod common;
 
 use common::*;
 use pbsr::{
-    GridSampler, MeshSampler, Particles, Sampler, SplatParams, SplatSampler, SurfaceParams, VolumeParams, pixel_area,
+    Density, FieldVolumeSampler, GridSampler, MeshSampler, MetropolisParams, MetropolisSampler, Particles, Sampler,
+    SplatParams, SplatSampler, SurfaceParams, VolumeParams, pixel_area,
 };
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
@@ -201,4 +202,50 @@ fn splats_have_the_optical_depth_of_their_kernels() {
         let found = bias(&render(&camera, &[&sampler], 4000), &facing(cosine));
         assert!(found.none(), "{kind:?} {cosine}: {found:?}");
     }
+}
+
+#[test]
+fn three_samplers_of_one_volume_agree() {
+    // Extinction x in the unit cube: τ = x along z.
+    let values = (0..4 * 4 * 4).map(|i| (i % 4) as f32 / 3.0).collect();
+    let grid = Grid {
+        origin: DVec3::new(0.0, -0.5, -0.5),
+        axes: DMat3::from_diagonal(DVec3::splat(1.0 / 3.0)),
+        dims: [4; 3],
+        values,
+    };
+    let point = |value| TransferPoint { value, color: [0.5; 3], extinction: value };
+    let transfer = TransferFunction::new(vec![point(0.0), point(1.0)]).unwrap();
+    let camera = front(32);
+    let s = pixel_area(&camera, DVec3::Z);
+    let params = VolumeParams { cross_section: s, ..VolumeParams::default() };
+    let cells = GridSampler::new(&grid, &transfer, &params, None).unwrap();
+    let chains = MetropolisParams { particles_per_chain: 4, ..MetropolisParams::default() };
+    let chains = MetropolisSampler::new(&grid, &transfer, &params, &chains).unwrap();
+    let ramp = Density { field: &Field::Ramp, max: 1.0 };
+    let [low, high] = [DVec3::new(0.0, -0.5, -0.5), DVec3::new(1.0, 0.5, 0.5)];
+    let field = FieldVolumeSampler::new(ramp, [low, high], 6, s, [1.0; 3], 3).unwrap();
+    let samplers: [&dyn Sampler; 3] = [&cells, &chains, &field];
+    for (name, sampler) in ["cells", "chains", "field"].iter().zip(samplers) {
+        let found = bias(&render(&camera, &[sampler], 1500), &|x, y| {
+            // The mean of e^−x over a pixel of width w is e^−x·sinh(w/2)/(w/2): 4·10⁻⁵ beside the middle's.
+            let at = |v: u32| (f64::from(v) + 0.5) / 16.0 - 1.0;
+            Some(if at(x) > 0.0 && at(y).abs() < 0.5 { 1.0 - (-at(x)).exp() } else { 0.0 })
+        });
+        assert!(found.none(), "{name}: {found:?}");
+    }
+}
+
+#[test]
+fn a_density_field_multiplies_the_optical_depth() {
+    let camera = front(32);
+    let s = pixel_area(&camera, DVec3::Z);
+    let mesh = rectangle(Vec3::ZERO, Vec3::X * 1.5, Vec3::Y * 1.5, 2);
+    let density = Density { field: &Field::Ramp, max: 2.0 };
+    let sampler = MeshSampler::new(&mesh, &surface(0.6, s, 1), Some(density)).unwrap();
+    let found = bias(&render(&camera, &[&sampler], 1500), &|x, _| {
+        let x = (f64::from(x) + 0.5) / 16.0 - 1.0;
+        Some(1.0 - 0.4f64.powf(x.max(0.0)))
+    });
+    assert!(found.none(), "{found:?}");
 }
