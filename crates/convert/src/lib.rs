@@ -28,6 +28,8 @@ mod neighbours;
 #[cfg(feature = "surfels")]
 mod orient;
 mod params;
+#[cfg(feature = "surfels")]
+mod places;
 #[cfg(feature = "noise")]
 mod procedural;
 mod raw_points;

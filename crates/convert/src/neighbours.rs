@@ -1,20 +1,25 @@
-//! The k nearest neighbours of every point: a tree of boxes over points in Morton order.
+//! The k nearest neighbours of every point: a tree of boxes over points in Morton order, asked by eight at a time.
 //!
 //! Eight points in Morton order make a leaf, eight boxes of one level a box of the next: no choice of splits, no
-//! pointers, built in O(n), and eight distances at a time. A query begins in the point's own leaf, so that its bound is
-//! tight at once, and climbs: at each level it looks into those of the seven siblings that are nearer than the k-th
-//! neighbour so far.
+//! pointers, built in O(n). The eight points of a leaf lie close together and so do their neighbours: they are asked
+//! for at once, one point a lane. A query begins in its own leaf, so that its bound is tight at once, and climbs: at
+//! each level it looks into those of the seven siblings whose box is nearer to the leaf's box than the farthest k-th
+//! neighbour so far. Each candidate is compared with eight queries; the k nearest of each are rows of lanes that a
+//! nearer candidate moves outwards.
 
 use rayon::prelude::*;
-use splat_core::glam::Vec3;
+use splat_core::{Aabb, glam::Vec3};
 
 /// Points in a leaf and boxes in a node.
-const WIDTH: usize = 8;
+pub(crate) const WIDTH: usize = 8;
 
 /// Largest number of neighbours.
 pub(crate) const MAX_NEIGHBOURS: usize = 32;
 
-/// Eight numbers, one for each point of a leaf or each box of a node.
+/// Boxes waiting to be looked into: at most seven siblings on each of eleven levels (8¹¹ > 2³²), and one node's eight.
+pub(crate) const MAX_WAITING: usize = 96;
+
+/// Eight numbers, one for each query, each point of a leaf or each box of a node.
 type Lanes = [f32; WIDTH];
 
 /// Points of one leaf by coordinate; places beyond the last point are infinitely far.
@@ -31,25 +36,24 @@ struct Node {
 }
 
 impl Leaf {
-    fn of(points: &[Vec3]) -> Self {
+    fn of(points: &[Vec3], factor: f32) -> Self {
         let mut leaf = Self { at: [[f32::INFINITY; WIDTH]; 3] };
         for (i, p) in points.iter().enumerate() {
-            (0..3).for_each(|a| leaf.at[a][i] = p[a]);
+            (0..3).for_each(|a| leaf.at[a][i] = p[a] * factor);
         }
         leaf
     }
 
-    fn distances_squared(&self, p: Vec3) -> Lanes {
-        std::array::from_fn(|i| {
-            let (x, y, z) = (self.at[0][i] - p.x, self.at[1][i] - p.y, self.at[2][i] - p.z);
-            x * x + y * y + z * z
-        })
-    }
-
+    #[inline(always)]
     fn bounds(&self) -> [Vec3; 2] {
-        let min = self.at.map(|c| c.into_iter().fold(f32::INFINITY, f32::min));
-        let finite = |c: Lanes| c.into_iter().filter(|v| v.is_finite()).fold(f32::NEG_INFINITY, f32::max);
-        [min.into(), self.at.map(finite).into()]
+        let [mut min, mut max] = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+        for axis in 0..3 {
+            for v in self.at[axis] {
+                min[axis] = min[axis].min(v);
+                max[axis] = max[axis].max(if v < f32::INFINITY { v } else { f32::NEG_INFINITY });
+            }
+        }
+        [min, max]
     }
 }
 
@@ -62,12 +66,17 @@ impl Node {
         node
     }
 
-    fn distances_squared(&self, p: Vec3) -> Lanes {
-        let outside = |a: usize, i: usize, p: f32| (self.min[a][i] - p).max(p - self.max[a][i]).max(0.0);
-        std::array::from_fn(|i| {
-            let (x, y, z) = (outside(0, i, p.x), outside(1, i, p.y), outside(2, i, p.z));
-            x * x + y * y + z * z
-        })
+    /// Squared distances of the eight boxes from another; never above those of points in them, rounding included.
+    #[inline(always)]
+    fn distances_squared(&self, [min, max]: [Vec3; 2]) -> Lanes {
+        let mut distances = [0.0; WIDTH];
+        for i in 0..WIDTH {
+            for a in 0..3 {
+                let gap = (self.min[a][i] - max[a]).max(min[a] - self.max[a][i]).max(0.0);
+                distances[i] += gap * gap;
+            }
+        }
+        distances
     }
 
     fn bounds(&self) -> [Vec3; 2] {
@@ -78,50 +87,61 @@ impl Node {
 }
 
 /// Leaves, and the nodes of all levels, finest first.
-pub(crate) struct Tree<'a> {
-    points: &'a [Vec3],
+pub(crate) struct Tree {
     leaves: Vec<Leaf>,
     levels: Vec<Vec<Node>>,
+    points: usize,
 }
 
-/// The nearest so far, as keys of squared distance (high bits; positive floats sort as integers) and point id (low
-/// bits), so that equal distances have one order.
+/// Scratch of a query.
+pub(crate) type Stack = [Waiting; MAX_WAITING];
+
+/// A box to look into: a leaf (level 0) or a node of `levels[level − 1]`.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Waiting {
+    distance_squared: f32,
+    level: u32,
+    index: u32,
+}
+
+/// The nearest so far of the eight points of a leaf: row j has each query's (j + 1)-th neighbour, as a key of squared
+/// distance (high bits; floats that are not negative sort as integers) and id (low bits).
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Nearest {
-    keys: [u64; MAX_NEIGHBOURS],
-    len: usize,
+    rows: [[i64; WIDTH]; MAX_NEIGHBOURS],
     k: usize,
+    query: [Lanes; 3],
+    bounds: [Vec3; 2],
+    /// Bits of the squared distances of the k-th neighbours, and the largest of them.
+    limits: [i32; WIDTH],
+    limit: f32,
 }
 
-impl Nearest {
-    /// Ids from near to far.
-    pub(crate) fn ids(&self) -> impl Iterator<Item = u32> + '_ {
-        self.keys[..self.len].iter().map(|&k| k as u32)
-    }
+/// No neighbour: as far as the places beyond the last point.
+const NONE: i64 = (f32::INFINITY.to_bits() as i64) << 32;
 
-    /// Squared distance beyond which nothing is of use.
-    fn limit(&self) -> f32 {
-        if self.len < self.k { f32::MAX } else { f32::from_bits((self.keys[self.k - 1] >> 32) as u32) }
-    }
-
-    fn offer(&mut self, key: u64) {
-        if self.len == self.k && key >= self.keys[self.k - 1] {
-            return;
+impl Default for Nearest {
+    fn default() -> Self {
+        Self {
+            rows: [[NONE; WIDTH]; MAX_NEIGHBOURS],
+            k: 0,
+            query: [[0.0; WIDTH]; 3],
+            bounds: [Vec3::ZERO; 2],
+            limits: [i32::MAX; WIDTH],
+            limit: f32::INFINITY,
         }
-        let mut at = self.len.min(self.k - 1);
-        self.len = (self.len + 1).min(self.k);
-        while at > 0 && self.keys[at - 1] > key {
-            self.keys[at] = self.keys[at - 1];
-            at -= 1;
-        }
-        self.keys[at] = key;
     }
 }
 
-impl<'a> Tree<'a> {
-    /// Builds over distinct points in Morton order.
-    pub(crate) fn new(points: &'a [Vec3]) -> Self {
-        let leaves: Vec<Leaf> = points.par_chunks(WIDTH).with_min_len(512).map(Leaf::of).collect();
+impl Tree {
+    /// A tree over points in Morton order. Coordinates are scaled by a power of two, so that squares of any extent are
+    /// ordinary numbers.
+    pub(crate) fn new(points: &[Vec3]) -> Self {
+        let bounds = Aabb::of_points(points);
+        let extent = (bounds.max.as_dvec3() - bounds.min.as_dvec3()).max_element();
+        let exponent = if extent > 0.0 { extent.log2().floor().clamp(-126.0, 126.0) } else { 0.0 };
+        let factor = (-exponent).exp2() as f32;
+        let leaves: Vec<Leaf> = points.par_chunks(WIDTH).with_min_len(512).map(|c| Leaf::of(c, factor)).collect();
         let mut boxes: Vec<[Vec3; 2]> = leaves.par_iter().with_min_len(512).map(Leaf::bounds).collect();
         let mut levels: Vec<Vec<Node>> = Vec::new();
         while boxes.len() > 1 {
@@ -129,50 +149,155 @@ impl<'a> Tree<'a> {
             boxes = nodes.par_iter().with_min_len(64).map(Node::bounds).collect();
             levels.push(nodes);
         }
-        Self { points, leaves, levels }
+        Self { leaves, levels, points: points.len() }
     }
 
-    /// The `k` ≤ [`MAX_NEIGHBOURS`] points nearest to point `i`, itself excluded.
-    pub(crate) fn nearest(&self, i: usize, k: usize) -> Nearest {
-        let mut nearest = Nearest { keys: [0; MAX_NEIGHBOURS], len: 0, k: k.clamp(1, MAX_NEIGHBOURS) };
-        let mut place = i / WIDTH;
-        self.scan(place, i, &mut nearest);
-        for level in 0..self.levels.len() {
-            self.visit(level, place / WIDTH, place % WIDTH, i, &mut nearest);
-            place /= WIDTH;
+    /// The points of leaf `leaf`.
+    pub(crate) fn points_of(&self, leaf: usize) -> std::ops::Range<usize> {
+        leaf * WIDTH..self.points.min((leaf + 1) * WIDTH)
+    }
+
+    /// Finds the `k` ≤ [`MAX_NEIGHBOURS`] points nearest to each point of a leaf, itself excluded.
+    // Loops instead of iterators' closures: those would not be compiled for the caller's instruction set.
+    #[inline(always)]
+    pub(crate) fn nearest(&self, leaf: usize, k: usize, nearest: &mut Nearest, stack: &mut Stack) {
+        nearest.ask(&self.leaves[leaf], self.points_of(leaf).len(), k);
+        for slot in 0..WIDTH {
+            let mut distances = nearest.distances_squared(&self.leaves[leaf], slot);
+            distances[slot] = f32::INFINITY;
+            nearest.offer(distances, (leaf * WIDTH + slot) as u32);
         }
-        nearest
+        nearest.tighten();
+        let mut place = leaf;
+        for (level, nodes) in self.levels.iter().enumerate() {
+            let (node, own) = (place / WIDTH, place % WIDTH);
+            let distances = nodes[node].distances_squared(nearest.bounds);
+            let waiting = |slot: usize| Waiting {
+                distance_squared: distances[slot],
+                level: level as u32,
+                index: (node * WIDTH + slot) as u32,
+            };
+            // In Morton order, siblings that differ in the last bits alone are nearest.
+            for bits in 1..WIDTH {
+                self.look(waiting(own ^ bits), nearest, stack);
+            }
+            place = node;
+        }
     }
 
-    /// Looks into the boxes of a node but for number `skip`.
-    fn visit(&self, level: usize, node: usize, skip: usize, i: usize, nearest: &mut Nearest) {
-        let distances = self.levels[level][node].distances_squared(self.points[i]);
-        for (slot, distance) in distances.into_iter().enumerate() {
-            if distance > nearest.limit() || slot == skip {
+    /// Looks into a box that does not hold the leaf.
+    #[inline(always)]
+    fn look(&self, first: Waiting, nearest: &mut Nearest, stack: &mut Stack) {
+        stack[0] = first;
+        let mut n = 1;
+        while n > 0 {
+            n -= 1;
+            let Waiting { distance_squared, level, index } = stack[n];
+            // Boxes beyond the last are infinitely far, and so is the limit while there are too few neighbours.
+            if distance_squared > nearest.limit || distance_squared == f32::INFINITY {
                 continue;
             }
-            let below = node * WIDTH + slot;
             if level == 0 {
-                self.scan(below, i, nearest);
-            } else {
-                self.visit(level - 1, below, WIDTH, i, nearest);
+                nearest.scan(&self.leaves[index as usize], index as usize);
+                continue;
             }
-        }
-    }
-
-    fn scan(&self, leaf: usize, i: usize, nearest: &mut Nearest) {
-        let first = leaf * WIDTH;
-        let distances = self.leaves[leaf].distances_squared(self.points[i]);
-        for (slot, distance) in distances.into_iter().enumerate() {
-            if distance <= nearest.limit() && first + slot != i {
-                nearest.offer(key(distance, (first + slot) as u32));
+            let distances = self.levels[level as usize - 1][index as usize].distances_squared(nearest.bounds);
+            for slot in 0..WIDTH {
+                if distances[slot] <= nearest.limit {
+                    let index = index * WIDTH as u32 + slot as u32;
+                    stack[n] = Waiting { distance_squared: distances[slot], level: level - 1, index };
+                    n += 1;
+                }
             }
         }
     }
 }
 
-fn key(distance_squared: f32, id: u32) -> u64 {
-    u64::from(distance_squared.to_bits()) << 32 | u64::from(id)
+impl Nearest {
+    #[inline(always)]
+    fn ask(&mut self, leaf: &Leaf, points: usize, k: usize) {
+        self.k = k.clamp(1, MAX_NEIGHBOURS);
+        for row in &mut self.rows[..self.k] {
+            *row = [NONE; WIDTH];
+        }
+        for axis in 0..3 {
+            // Lanes without a point ask for the first one again: infinities would give NaN.
+            for i in 0..WIDTH {
+                self.query[axis][i] = if i < points { leaf.at[axis][i] } else { leaf.at[axis][0] };
+            }
+        }
+        self.bounds = leaf.bounds();
+        self.tighten();
+    }
+
+    /// Ids of the neighbours of the leaf's point `slot`, from near to far.
+    pub(crate) fn ids(&self, slot: usize) -> impl Iterator<Item = u32> + '_ {
+        (0..self.k).map(move |j| self.rows[j][slot]).take_while(|key| *key < NONE).map(|key| key as u32)
+    }
+
+    /// From one point of a leaf to the eight queries.
+    #[inline(always)]
+    fn distances_squared(&self, leaf: &Leaf, slot: usize) -> Lanes {
+        let [px, py, pz] = leaf.at.map(|c| c[slot]);
+        let mut distances = [0.0; WIDTH];
+        for i in 0..WIDTH {
+            let (x, y, z) = (px - self.query[0][i], py - self.query[1][i], pz - self.query[2][i]);
+            distances[i] = x * x + y * y + z * z;
+        }
+        distances
+    }
+
+    #[inline(always)]
+    fn scan(&mut self, leaf: &Leaf, index: usize) {
+        for slot in 0..WIDTH {
+            self.offer(self.distances_squared(leaf, slot), (index * WIDTH + slot) as u32);
+        }
+        self.tighten();
+    }
+
+    #[inline(always)]
+    fn tighten(&mut self) {
+        let mut farthest = 0;
+        for i in 0..WIDTH {
+            self.limits[i] = (self.rows[self.k - 1][i] >> 32) as i32;
+            farthest = farthest.max(self.limits[i]);
+        }
+        self.limit = f32::from_bits(farthest as u32);
+    }
+
+    /// Offers one point to all queries.
+    // Integers, minima and signs instead of conditions: so it becomes vector instructions.
+    #[inline(always)]
+    fn offer(&mut self, distances: Lanes, id: u32) {
+        let mut keys = [0; WIDTH];
+        let mut signs = 0;
+        for i in 0..WIDTH {
+            let bits = distances[i].to_bits() as i32;
+            // Negative where the point is as near as the k-th or nearer.
+            signs |= bits - self.limits[i] - 1;
+            keys[i] = i64::from(bits) << 32 | i64::from(id);
+        }
+        if signs >= 0 {
+            return;
+        }
+        let mut j = self.k - 1;
+        while j > 0 {
+            let above = self.rows[j - 1];
+            let row = &mut self.rows[j];
+            let mut signs = 0;
+            for i in 0..WIDTH {
+                row[i] = row[i].min(keys[i]).max(above[i]);
+                signs |= keys[i] - above[i];
+            }
+            if signs >= 0 {
+                return;
+            }
+            j -= 1;
+        }
+        for i in 0..WIDTH {
+            self.rows[0][i] = self.rows[0][i].min(keys[i]);
+        }
+    }
 }
 
 #[cfg(test)]
@@ -180,19 +305,52 @@ mod tests {
     use super::*;
     use splat_core::rng;
 
+    fn check(points: &[Vec3], k: usize) {
+        let (tree, mut nearest) = (Tree::new(points), Nearest::default());
+        let mut stack = [Waiting::default(); MAX_WAITING];
+        for i in 0..points.len() {
+            let key = |j: usize| (points[i].distance_squared(points[j]).to_bits(), j as u32);
+            let mut all: Vec<(u32, u32)> = (0..points.len()).filter(|j| *j != i).map(key).collect();
+            all.sort_unstable();
+            let expected: Vec<u32> = all.iter().take(k).map(|k| k.1).collect();
+            tree.nearest(i / WIDTH, k, &mut nearest, &mut stack);
+            assert_eq!(nearest.ids(i % WIDTH).collect::<Vec<_>>(), expected);
+        }
+    }
+
     #[test]
     fn the_tree_finds_what_brute_force_finds() {
         for n in [1usize, 2, 9, 700] {
             let unit = |i: usize, a: u64| rng::unit_f32(3, 0, i as u64, a);
             let points: Vec<Vec3> = (0..n).map(|i| Vec3::new(unit(i, 0), unit(i, 1), 0.1 * unit(i, 2))).collect();
-            let tree = Tree::new(&points);
-            for i in 0..n {
-                let mut all: Vec<u64> =
-                    (0..n).filter(|j| *j != i).map(|j| key(points[i].distance_squared(points[j]), j as u32)).collect();
-                all.sort_unstable();
-                let expected: Vec<u32> = all.iter().take(10).map(|k| *k as u32).collect();
-                assert_eq!(tree.nearest(i, 10).ids().collect::<Vec<_>>(), expected);
-            }
+            [1, 10, 32].into_iter().for_each(|k| check(&points, k));
         }
+    }
+
+    #[test]
+    fn equal_distances_are_ordered_by_id() {
+        let mut lattice: Vec<Vec3> =
+            (0..343).map(|i| Vec3::new((i % 7) as f32, (i / 7 % 7) as f32, (i / 49) as f32)).collect();
+        // Any order is allowed, a bad one makes wide boxes.
+        lattice.sort_by_key(|p| rng::bits(5, 0, (p.x + 7.0 * p.y + 49.0 * p.z) as u64, 0));
+        [3, 10, 27].into_iter().for_each(|k| check(&lattice, k));
+    }
+
+    #[test]
+    fn squares_of_tiny_and_huge_distances_do_not_vanish() {
+        let points: Vec<Vec3> = (0..40).map(|i| Vec3::new(i as f32, 0.3 * (i * i % 7) as f32, 0.0)).collect();
+        let ids = |factor: f32| {
+            let scaled: Vec<Vec3> = points.iter().map(|p| *p * factor).collect();
+            let (tree, mut nearest) = (Tree::new(&scaled), Nearest::default());
+            let mut stack = [Waiting::default(); MAX_WAITING];
+            let mut ids = |i: usize| {
+                tree.nearest(i / WIDTH, 5, &mut nearest, &mut stack);
+                nearest.ids(i % WIDTH).collect()
+            };
+            (0..40).map(&mut ids).collect::<Vec<Vec<u32>>>()
+        };
+        assert_eq!(ids(1.0), ids(1e-10f32.log2().floor().exp2()));
+        assert_eq!(ids(1.0), ids((-100f32).exp2()));
+        assert_eq!(ids(1.0), ids(100f32.exp2()));
     }
 }

@@ -4,7 +4,7 @@
 //! either, the choice spreads from the highest point of each connected part along the pairs of neighbours whose planes
 //! agree best first (a minimum spanning tree over 1 − |n·m|; Hoppe et al. 1992).
 
-use crate::neighbours::Nearest;
+use crate::neighbours::{Nearest, WIDTH};
 use splat_core::glam::{DVec3, Vec3};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -49,7 +49,7 @@ pub(crate) fn guess(orientation: Orientation, line: DVec3) -> DVec3 {
     if across.length() > 1e-6 { across.normalize() } else { line.any_orthonormal_vector() }
 }
 
-/// Turns normals; `nearest` is read for [`Orientation::Propagate`] alone.
+/// Turns normals; `nearest`, by leaf, is read for [`Orientation::Propagate`] alone.
 pub(crate) fn orient(
     normals: &mut [DVec3],
     position: &[Vec3],
@@ -72,7 +72,7 @@ fn face(n: DVec3, side: DVec3) -> DVec3 {
 }
 
 fn propagate(normals: &mut [DVec3], position: &[Vec3], nearest: &[Nearest]) {
-    let both_ways = neighbour_lists(nearest);
+    let both_ways = neighbour_lists(nearest, normals.len());
     let mut highest: Vec<u32> = (0..position.len() as u32).collect();
     highest.sort_unstable_by(|a, b| position[*b as usize].y.total_cmp(&position[*a as usize].y).then(a.cmp(b)));
     let mut done = vec![false; normals.len()];
@@ -111,11 +111,11 @@ impl Lists {
     }
 }
 
-fn neighbour_lists(nearest: &[Nearest]) -> Lists {
-    let mut starts = vec![0u32; nearest.len() + 1];
+fn neighbour_lists(nearest: &[Nearest], points: usize) -> Lists {
+    let mut starts = vec![0u32; points + 1];
     let pairs = |add: &mut dyn FnMut(u32, u32)| {
-        for (i, list) in nearest.iter().enumerate() {
-            for j in list.ids() {
+        for i in 0..points {
+            for j in nearest[i / WIDTH].ids(i % WIDTH) {
                 add(i as u32, j);
                 add(j, i as u32);
             }

@@ -8,10 +8,10 @@
 //! Points at one place share the area of that place, so duplicates neither darken it nor shrink radii to 0.
 
 use crate::columns::{self, CHUNK, Wanted};
-use crate::neighbours::{MAX_NEIGHBOURS, Nearest, Tree};
+use crate::neighbours::MAX_NEIGHBOURS;
 use crate::orient::{self, Orientation};
 use crate::params::SplatParams;
-use crate::tangent_plane::{self, Cell};
+use crate::places::{Place, places};
 use crate::{ConvertError, RawPoints};
 use rayon::prelude::*;
 use splat_core::{
@@ -76,16 +76,6 @@ pub struct SurfelReport {
     pub area: f64,
 }
 
-/// What is known about one place.
-#[derive(Debug, Clone, Copy)]
-struct Place {
-    normal: DVec3,
-    /// False for a guess.
-    plane: bool,
-    area: f64,
-    spacing: f64,
-}
-
 /// Makes surfels of raw points.
 ///
 /// ```
@@ -104,14 +94,7 @@ pub fn raw_to_surfels(points: &RawPoints, params: &SurfelParams) -> Result<(Clou
     check(points, params)?;
     let order = canonical_order(points);
     let (distinct, starts) = distinct_places(points, &order);
-    let tree = Tree::new(&distinct);
-    let (mut places, nearest): (Vec<Place>, Vec<Nearest>) = if params.orientation == Orientation::Propagate {
-        (0..distinct.len()).into_par_iter().with_min_len(256).map(|i| place(&tree, &distinct, i, params)).unzip()
-    } else {
-        let places =
-            (0..distinct.len()).into_par_iter().with_min_len(256).map(|i| place(&tree, &distinct, i, params).0);
-        (places.collect(), Vec::new())
-    };
+    let (mut places, nearest) = places(&distinct, params, params.orientation == Orientation::Propagate);
     let mut report = SurfelReport {
         points: points.len() as u64,
         duplicates: (points.len() - distinct.len()) as u64,
@@ -193,32 +176,6 @@ fn distinct_places(points: &RawPoints, order: &[u32]) -> (Vec<Vec3>, Vec<u32>) {
     }
     starts.push(order.len() as u32);
     (distinct, starts)
-}
-
-fn place(tree: &Tree<'_>, distinct: &[Vec3], i: usize, params: &SurfelParams) -> (Place, Nearest) {
-    let nearest = tree.nearest(i, params.neighbours);
-    let mut offsets = [DVec3::ZERO; MAX_NEIGHBOURS + 1];
-    let mut n = 1;
-    for id in nearest.ids() {
-        offsets[n] = distinct[id as usize].as_dvec3() - distinct[i].as_dvec3();
-        n += 1;
-    }
-    if n == 1 {
-        let spacing = params.lone_spacing / params.splat.transform.scale;
-        let lone = Place {
-            normal: orient::guess(params.orientation, DVec3::ZERO),
-            plane: false,
-            area: spacing * spacing,
-            spacing,
-        };
-        return (lone, nearest);
-    }
-    let fitted = tangent_plane::fit_normal(&offsets[..n]);
-    let normal = fitted.unwrap_or_else(|| orient::guess(params.orientation, offsets[n - 1]));
-    let Cell { area, reach } = tangent_plane::voronoi_cell(&offsets[1..n], normal);
-    let root = area.sqrt();
-    let spacing = (std::f64::consts::SQRT_2 * reach).clamp(root, 2.0 * root);
-    (Place { normal, plane: fitted.is_some(), area, spacing }, nearest)
 }
 
 /// Cuts spacings to a multiple of the median; sets the sums of the report.

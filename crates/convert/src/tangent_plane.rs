@@ -14,6 +14,7 @@ const MAX_CORNERS: usize = 4 + super::neighbours::MAX_NEIGHBOURS;
 const CELL_LIMIT: f64 = 0.56;
 
 /// Unit vector across the plane that fits the points best, or `None` when they lie on a line or at one place.
+#[inline(always)]
 pub(crate) fn fit_normal(offsets: &[DVec3]) -> Option<DVec3> {
     let mean = offsets.iter().sum::<DVec3>() / offsets.len() as f64;
     let (mut diagonal, mut mixed) = (DVec3::ZERO, DVec3::ZERO);
@@ -31,6 +32,7 @@ pub(crate) fn fit_normal(offsets: &[DVec3]) -> Option<DVec3> {
 }
 
 /// Of the symmetric matrix with this diagonal and these entries yz, zx, xy, the largest entry being about 1.
+#[inline(always)]
 fn smallest_eigenvector(d: DVec3, m: DVec3) -> Option<DVec3> {
     let third = (d.x + d.y + d.z) / 3.0;
     let e = d - DVec3::splat(third);
@@ -58,50 +60,89 @@ pub(crate) struct Cell {
     pub(crate) reach: f64,
 }
 
+/// A convex polygon in the tangent plane, relative to its point.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Polygon {
+    corners: [DVec2; MAX_CORNERS],
+    n: usize,
+}
+
+impl Default for Polygon {
+    fn default() -> Self {
+        Self { corners: [DVec2::ZERO; MAX_CORNERS], n: 0 }
+    }
+}
+
 /// Voronoi cell of a point among neighbours at `offsets` (near to far), in the plane across `normal`, within a square
-/// of 0.7 times the farthest neighbour: at the rim of the points nothing else would end it.
-pub(crate) fn voronoi_cell(offsets: &[DVec3], normal: DVec3) -> Cell {
+/// of 0.56 times the farthest neighbour: at the rim of the points nothing else would end it.
+#[inline(always)]
+pub(crate) fn voronoi_cell(offsets: &[DVec3], normal: DVec3, scratch: &mut [Polygon; 2]) -> Cell {
     let (u, v) = normal.any_orthonormal_pair();
     let half = CELL_LIMIT * offsets.last().map_or(0.0, |o| o.length());
-    let mut corners = [DVec2::ZERO; MAX_CORNERS];
-    let mut clipped = corners;
+    let [mut cell, mut next] = scratch.each_mut();
     let square = [(-half, -half), (half, -half), (half, half), (-half, half)];
-    corners.iter_mut().zip(square).for_each(|(c, s)| *c = s.into());
-    let mut n = 4;
+    for i in 0..4 {
+        cell.corners[i] = square[i].into();
+    }
+    cell.n = 4;
     let mut reach_sq = 2.0 * half * half;
     for o in offsets {
         let q = DVec2::new(o.dot(u), o.dot(v));
         let limit = 0.5 * q.length_squared();
         // A bisector at half the distance cannot cut corners that are nearer.
-        if limit <= 0.0 || 0.5 * limit >= reach_sq || corners[..n].iter().all(|c| c.dot(q) <= limit) {
+        if limit <= 0.0 || 0.5 * limit >= reach_sq {
             continue;
         }
-        n = clip(&corners[..n], &mut clipped, q, limit);
-        std::mem::swap(&mut corners, &mut clipped);
-        reach_sq = corners[..n].iter().fold(0.0, |r, c| c.length_squared().max(r));
+        if clip(cell, next, q, limit) {
+            (cell, next) = (next, cell);
+            reach_sq = 0.0;
+            for c in &cell.corners[..cell.n] {
+                reach_sq = c.length_squared().max(reach_sq);
+            }
+        }
     }
-    let twice: f64 = (0..n).map(|i| corners[i].perp_dot(corners[(i + 1) % n])).sum();
+    let corners = &cell.corners[..cell.n];
+    let mut twice = 0.0;
+    let mut before = corners[cell.n - 1];
+    for c in corners {
+        twice += before.perp_dot(*c);
+        before = *c;
+    }
     Cell { area: 0.5 * twice, reach: reach_sq.sqrt() }
 }
 
-/// The part of a convex polygon with c·q ≤ limit; the origin is inside, so something is left.
-fn clip(polygon: &[DVec2], kept: &mut [DVec2; MAX_CORNERS], q: DVec2, limit: f64) -> usize {
-    let mut n = 0;
-    let mut a = polygon[polygon.len() - 1];
-    let mut da = a.dot(q) - limit;
-    for &b in polygon {
-        let db = b.dot(q) - limit;
-        if (da < 0.0 && db > 0.0) || (da > 0.0 && db < 0.0) {
-            kept[n] = a + (b - a) * (da / (da - db));
-            n += 1;
-        }
-        if db <= 0.0 {
-            kept[n] = b;
-            n += 1;
-        }
-        (a, da) = (b, db);
+/// Leaves the part of a convex polygon with c·q ≤ limit in `kept`; the origin is inside, so something is left. False
+/// where nothing was to be cut.
+#[inline(always)]
+fn clip(polygon: &Polygon, kept: &mut Polygon, q: DVec2, limit: f64) -> bool {
+    let (corners, n) = (&polygon.corners, polygon.n);
+    let mut outside = 0u64;
+    for (i, c) in corners[..n].iter().enumerate() {
+        outside |= u64::from(c.dot(q) > limit) << i;
     }
-    n
+    let all = (1u64 << n) - 1;
+    if outside == 0 || outside == all {
+        return false;
+    }
+    // The corners outside follow each other: `first` comes after the last one inside, `end` is the first inside again.
+    let after = (outside << 1 | outside >> (n - 1)) & all;
+    let first = (outside & !after).trailing_zeros() as usize;
+    let end = (!outside & after).trailing_zeros() as usize;
+    let previous = |i: usize| if i == 0 { n - 1 } else { i - 1 };
+    let cross = |inside: DVec2, beyond: DVec2| {
+        let (d, e) = (inside.dot(q) - limit, beyond.dot(q) - limit);
+        inside + (beyond - inside) * (d / (d - e))
+    };
+    kept.corners[0] = cross(corners[previous(first)], corners[first]);
+    kept.corners[1] = cross(corners[end], corners[previous(end)]);
+    kept.n = 2;
+    let mut i = end;
+    while i != first {
+        kept.corners[kept.n] = corners[i];
+        kept.n += 1;
+        i = if i + 1 == n { 0 } else { i + 1 };
+    }
+    true
 }
 
 #[cfg(test)]
@@ -117,7 +158,7 @@ mod tests {
         offsets.sort_by(|a, b| a.length().total_cmp(&b.length()));
         let normal = fit_normal(&offsets).map_or(DVec3::ZERO, DVec3::abs);
         assert!((normal - DVec3::Y).length() < 1e-12);
-        let cell = voronoi_cell(&offsets[..10], normal);
+        let cell = voronoi_cell(&offsets[..10], normal, &mut [Polygon::default(); 2]);
         assert!((cell.area - 1.0).abs() < 1e-12 && (cell.reach - 0.5f64.sqrt()).abs() < 1e-12, "{cell:?}");
     }
 
