@@ -48,6 +48,8 @@ pub(crate) struct Sobel<'a> {
     grid: &'a Grid,
     /// axes⁻ᵀ/32: Sobel weights sum to 16, interior differences span two steps.
     object_from_index: Mat3,
+    /// Whether that has zeros off its diagonal.
+    diagonal: bool,
 }
 
 /// Scratch rows of one task.
@@ -58,68 +60,108 @@ pub(crate) struct Rows {
     across: [Vec<f32>; 3],
     /// The three sums over j, with one entry of padding at both ends.
     sum: [Vec<f32>; 3],
+    /// The gradient in index space, by component.
+    gradient: [Vec<f32>; 3],
 }
 
 impl<'a> Sobel<'a> {
     pub(crate) fn new(grid: &'a Grid) -> Self {
         let object_from_index = (grid.axes.inverse().transpose() * (1.0 / 32.0)).as_mat3();
-        Self { grid, object_from_index }
+        let diagonal = object_from_index == Mat3::from_diagonal(object_from_index.diagonal());
+        Self { grid, object_from_index, diagonal }
     }
 
     /// Gradients of the slab of constant `k`, x fastest.
     pub(crate) fn slab(&self, k: usize, rows: &mut Rows, out: &mut [Vec3]) {
-        let [nx, ny, nz] = self.grid.dims;
-        let reference = self.grid.values[k * nx * ny + nx * ny / 2];
-        rows.resize(nx);
-        let load = |rows: &mut Rows, j: usize| {
-            let row = |k: usize| &self.grid.values[(k * ny + j) * nx..][..nx];
-            let (below, here, above) = (row(k.saturating_sub(1)), row(k), row((k + 1).min(nz - 1)));
-            let (smooth, across) = (&mut rows.smooth[j % 3][..nx], &mut rows.across[j % 3][..nx]);
-            for i in 0..nx {
-                let (b, h, a) = (below[i] - reference, here[i] - reference, above[i] - reference);
-                smooth[i] = b + a + (h + h);
-                across[i] = a - b;
-            }
-        };
-        load(rows, 0);
-        for j in 0..ny {
-            if j + 1 < ny {
-                load(rows, j + 1);
-            }
-            rows.sum_over_j(j, ny);
-            // One-sided differences span one step, not two.
-            let at_face = |i: usize, n: usize| if i == 0 || i + 1 == n { 2.0 } else { 1.0 };
-            self.finish(rows, at_face(j, ny), at_face(k, nz), &mut out[j * nx..][..nx]);
-        }
+        rows.resize(self.grid.dims[0]);
+        pulp::Arch::new().dispatch(Slab { sobel: self, k, rows, out });
     }
 
     /// The last direction, along the row.
-    fn finish(&self, rows: &Rows, factor_j: f32, factor_k: f32, out: &mut [Vec3]) {
+    #[inline(always)]
+    fn finish(&self, rows: &mut Rows, factor_j: f32, factor_k: f32, out: &mut [Vec3]) {
         let nx = out.len();
         let m = &self.object_from_index;
         let columns = [m.x_axis, m.y_axis * factor_j, m.z_axis * factor_k];
         let [x, y, z] = [&rows.sum[0][..nx + 2], &rows.sum[1][..nx + 2], &rows.sum[2][..nx + 2]];
-        let at = |i: usize, factor_i: f32| {
-            let dx = (x[i + 2] - x[i]) * factor_i;
+        let [gx, gy, gz] = &mut rows.gradient;
+        let (gx, gy, gz) = (&mut gx[..nx], &mut gy[..nx], &mut gz[..nx]);
+        for i in 0..nx {
+            let dx = x[i + 2] - x[i];
             let dy = y[i] + y[i + 2] + (y[i + 1] + y[i + 1]);
             let dz = z[i] + z[i + 2] + (z[i + 1] + z[i + 1]);
-            columns[0] * dx + columns[1] * dy + columns[2] * dz
-        };
-        for (i, g) in out.iter_mut().enumerate() {
-            *g = at(i, 1.0);
+            (gx[i], gy[i], gz[i]) = (dx, dy, dz);
         }
-        out[0] = at(0, 2.0);
-        out[nx - 1] = at(nx - 1, 2.0);
+        gx[0] *= 2.0;
+        if nx > 1 {
+            gx[nx - 1] *= 2.0;
+        }
+        // A lattice along the axes, as most are, needs no products of different directions.
+        if self.diagonal {
+            let scale = Vec3::new(columns[0].x, columns[1].y, columns[2].z);
+            for (i, g) in out.iter_mut().enumerate() {
+                *g = Vec3::new(gx[i] * scale.x, gy[i] * scale.y, gz[i] * scale.z);
+            }
+            return;
+        }
+        for (i, g) in out.iter_mut().enumerate() {
+            *g = columns[0] * gx[i] + columns[1] * gy[i] + columns[2] * gz[i];
+        }
+    }
+}
+
+/// One slab's work, in the form that [`pulp`] compiles once per instruction set.
+struct Slab<'a> {
+    sobel: &'a Sobel<'a>,
+    k: usize,
+    rows: &'a mut Rows,
+    out: &'a mut [Vec3],
+}
+
+impl pulp::NullaryFnOnce for Slab<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { sobel, k, rows, out } = self;
+        let [nx, ny, nz] = sobel.grid.dims;
+        let reference = sobel.grid.values[k * nx * ny + nx * ny / 2];
+        let mut loaded = 0;
+        for j in 0..ny {
+            while loaded < ny.min(j + 2) {
+                rows.load(sobel.grid, loaded, k, reference);
+                loaded += 1;
+            }
+            rows.sum_over_j(j, ny);
+            // One-sided differences span one step, not two.
+            let at_face = |i: usize, n: usize| if i == 0 || i + 1 == n { 2.0 } else { 1.0 };
+            sobel.finish(rows, at_face(j, ny), at_face(k, nz), &mut out[j * nx..][..nx]);
+        }
     }
 }
 
 impl Rows {
     fn resize(&mut self, nx: usize) {
-        self.smooth.iter_mut().chain(&mut self.across).for_each(|r| r.resize(nx, 0.0));
+        self.smooth.iter_mut().chain(&mut self.across).chain(&mut self.gradient).for_each(|r| r.resize(nx, 0.0));
         self.sum.iter_mut().for_each(|r| r.resize(nx + 2, 0.0));
     }
 
+    /// Row j of slab k and its neighbours across k.
+    #[inline(always)]
+    fn load(&mut self, grid: &Grid, j: usize, k: usize, reference: f32) {
+        let [nx, ny, nz] = grid.dims;
+        let row = |k: usize| &grid.values[(k * ny + j) * nx..][..nx];
+        let (below, here, above) = (row(k.saturating_sub(1)), row(k), row((k + 1).min(nz - 1)));
+        let (smooth, across) = (&mut self.smooth[j % 3][..nx], &mut self.across[j % 3][..nx]);
+        for i in 0..nx {
+            let (b, h, a) = (below[i] - reference, here[i] - reference, above[i] - reference);
+            smooth[i] = b + a + (h + h);
+            across[i] = a - b;
+        }
+    }
+
     /// Smooths and differences along j, repeating the rows at the faces.
+    #[inline(always)]
     fn sum_over_j(&mut self, j: usize, ny: usize) {
         let (below, above) = (j.saturating_sub(1) % 3, (j + 1).min(ny - 1) % 3);
         let nx = self.smooth[0].len();
