@@ -2,6 +2,7 @@
 
 use crate::{ConvertError, SplatParams};
 use bytemuck::Zeroable;
+use rayon::prelude::*;
 use splat_core::{Cloud, SplatKind, glam::Vec3};
 
 /// Splats per parallel task; fixed, so that results do not depend on the thread count.
@@ -56,8 +57,9 @@ fn sized<T: Zeroable + Clone>(column: &mut Vec<T>, n: usize) -> Result<(), ()> {
     Ok(())
 }
 
-fn constant<T: Copy + PartialEq>(column: &mut Vec<T>, n: usize, value: T) {
-    if column.len() == n && column.iter().all(|v| *v == value) {
+fn constant<T: Copy + PartialEq + Sync>(column: &mut Vec<T>, n: usize, value: T) {
+    let same = |chunk: &[T]| chunk.iter().fold(true, |same, v| same & (*v == value));
+    if column.len() == n && column.par_chunks(CHUNK).all(same) {
         return;
     }
     // A fresh vector of zeros costs nothing until it is read.

@@ -28,6 +28,7 @@ mod neighbours;
 #[cfg(feature = "surfels")]
 mod orient;
 mod params;
+mod pieces;
 #[cfg(feature = "surfels")]
 mod places;
 #[cfg(feature = "noise")]

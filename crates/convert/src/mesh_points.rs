@@ -7,15 +7,15 @@
 //!
 //! Deviation from the paper: it gives each piece the opacity of the surface, which multiplies where discs overlap.
 
-use crate::columns::{self, CHUNK, Wanted};
+use crate::columns::{self, Wanted};
+use crate::ConvertError;
 use crate::params::{Density, SplatParams};
-use crate::subdivide::{self, Measure, Run};
-use crate::{ConvertError, vertex_normals};
+use crate::pieces::Pieces;
+use crate::subdivide::{self, Measure};
 use rayon::prelude::*;
 use splat_core::{
     Cloud, Mesh, SplatKind,
-    glam::{DQuat, DVec3, Vec3},
-    optics,
+    glam::DVec3,
 };
 
 /// How a mesh becomes splats.
@@ -182,154 +182,8 @@ fn starts(measures: &[Measure], spacing: f64, p: &SplatParams) -> Result<Vec<u64
     Ok(starts)
 }
 
-fn corners(mesh: &Mesh, triangle: &[u32; 3]) -> [DVec3; 3] {
+pub(crate) fn corners(mesh: &Mesh, triangle: &[u32; 3]) -> [DVec3; 3] {
     triangle.map(|v| mesh.position[v as usize].as_dvec3())
-}
-
-/// Everything that the pieces are made from.
-struct Pieces<'a> {
-    mesh: &'a Mesh,
-    measures: &'a [Measure],
-    starts: &'a [u64],
-    /// Vertices relative to the cloud's origin.
-    position: Vec<Vec3>,
-    normal: Vec<Vec3>,
-    /// Spacing in the mesh's units.
-    spacing: f64,
-    /// Factor from a share of the mesh's area to K.
-    depth: f64,
-    radius: f32,
-    color: [f32; 3],
-    rotation: DQuat,
-}
-
-/// The columns that one task writes.
-struct Target<'a> {
-    position: &'a mut [Vec3],
-    normal: &'a mut [Vec3],
-    cross_section: &'a mut [f32],
-    color: &'a mut [[f32; 3]],
-}
-
-impl<'a> Pieces<'a> {
-    fn new(
-        mesh: &'a Mesh,
-        params: &MeshParams,
-        measures: &'a [Measure],
-        starts: &'a [u64],
-        report: &MeshReport,
-    ) -> Self {
-        let t = &params.splat.transform;
-        let place = |v: &Vec3| (t.rotation * (v.as_dvec3() * t.scale)).as_vec3();
-        let turn = |n: &Vec3| columns::unit_or_zero(t.rotate(n.as_dvec3()).as_vec3());
-        let normal = if report.normals_computed { vertex_normals(mesh) } else { mesh.normal.clone() };
-        let tau = if params.opacity < 1.0 { optics::optical_depth(params.opacity) } else { 1.0 };
-        Self {
-            mesh,
-            measures,
-            starts,
-            position: mesh.position.par_iter().with_min_len(CHUNK).map(place).collect(),
-            normal: normal.par_iter().with_min_len(CHUNK).map(turn).collect(),
-            spacing: report.spacing / t.scale,
-            depth: tau * t.scale * t.scale,
-            radius: report.radius as f32,
-            color: params.splat.color,
-            rotation: t.rotation,
-        }
-    }
-
-    /// Fills the columns in tasks of [`CHUNK`] splats, wherever triangles begin: one huge triangle is shared too.
-    fn emit(&self, cloud: &mut Cloud) {
-        let columns = (cloud.position.par_chunks_mut(CHUNK), cloud.normal.par_chunks_mut(CHUNK));
-        let rest = (cloud.cross_section.par_chunks_mut(CHUNK), cloud.color.par_chunks_mut(CHUNK));
-        (columns.0, columns.1, rest.0, rest.1, cloud.radius.par_chunks_mut(CHUNK))
-            .into_par_iter()
-            .enumerate()
-            .for_each(|(chunk, (position, normal, cross_section, color, radius))| {
-                radius.fill(self.radius);
-                if self.mesh.color.is_empty() {
-                    color.fill(self.color);
-                }
-                self.fill((chunk * CHUNK) as u64, &mut Target { position, normal, cross_section, color });
-            });
-    }
-
-    /// Writes the splats from number `first` on.
-    fn fill(&self, first: u64, target: &mut Target<'_>) {
-        let mut triangle = self.starts.partition_point(|&s| s <= first) - 1;
-        let mut skip = first - self.starts[triangle];
-        let mut written = 0;
-        while written < target.position.len() {
-            let split = subdivide::split(&self.measures[triangle], self.spacing);
-            let corner = Corners::new(self, triangle);
-            for i in 0..split.runs() {
-                let run = split.run(i);
-                if skip >= u64::from(run.count) {
-                    skip -= u64::from(run.count);
-                    continue;
-                }
-                let end = target.position.len().min(written + (u64::from(run.count) - skip) as usize);
-                corner.write(&run, skip as f32, written..end, target);
-                (written, skip) = (end, 0);
-                if written == target.position.len() {
-                    break;
-                }
-            }
-            triangle += 1;
-        }
-    }
-}
-
-/// One triangle as affine functions of its barycentric weights.
-struct Corners {
-    position: [Vec3; 3],
-    normal: [Vec3; 3],
-    color: Option<[Vec3; 3]>,
-    /// Normal of the plane, where interpolated normals cancel.
-    plane: Vec3,
-    /// K of the whole triangle.
-    depth: f64,
-}
-
-impl Corners {
-    fn new(pieces: &Pieces<'_>, triangle: usize) -> Self {
-        let ids = pieces.mesh.triangles[triangle].map(|v| v as usize);
-        let position = ids.map(|v| pieces.position[v]);
-        // From the mesh itself: a sliver may collapse when its turned corners are rounded.
-        let v = corners(pieces.mesh, &pieces.mesh.triangles[triangle]);
-        let plane = pieces.rotation * subdivide::robust_cross(v[1] - v[0], v[2] - v[0]).normalize_or(DVec3::Y);
-        let plane = plane.as_vec3();
-        let normal = ids.map(|v| if pieces.normal[v] == Vec3::ZERO { plane } else { pieces.normal[v] });
-        let color = (!pieces.mesh.color.is_empty()).then(|| ids.map(|v| Vec3::from(pieces.mesh.color[v])));
-        Self { position, normal, color, plane, depth: pieces.depth * pieces.measures[triangle].area }
-    }
-
-    /// Writes the pieces of a run from piece `skip` on into `range` of the columns.
-    fn write(&self, run: &Run, skip: f32, range: std::ops::Range<usize>, target: &mut Target<'_>) {
-        let (start, step) = (run.start.as_vec3(), run.step.as_vec3());
-        let line = |v: &[Vec3; 3]| {
-            let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
-            (v[0] + e1 * start.y + e2 * start.z, e1 * step.y + e2 * step.z)
-        };
-        let (from, along) = line(&self.position);
-        for (j, p) in target.position[range.clone()].iter_mut().enumerate() {
-            *p = from + along * (j as f32 + skip);
-        }
-        let (from, along) = line(&self.normal);
-        for (j, n) in target.normal[range.clone()].iter_mut().enumerate() {
-            let sum = from + along * (j as f32 + skip);
-            let length_sq = sum.length_squared();
-            // Opposite vertex normals cancel on the way from one to the other.
-            *n = if length_sq > 1e-6 { sum * (1.0 / length_sq.sqrt()) } else { self.plane };
-        }
-        if let Some(color) = &self.color {
-            let (from, along) = line(color);
-            for (j, c) in target.color[range.clone()].iter_mut().enumerate() {
-                *c = (from + along * (j as f32 + skip)).max(Vec3::ZERO).to_array();
-            }
-        }
-        target.cross_section[range].fill((self.depth * run.share) as f32);
-    }
 }
 
 /// Splats that [`mesh_to_points`] makes at this spacing (world units), for estimates of memory and time.
