@@ -17,6 +17,16 @@ pub(crate) struct Wanted {
     pub(crate) value: bool,
 }
 
+impl Wanted {
+    /// Bytes of one splat in all columns.
+    pub(crate) fn bytes_per_splat(self) -> u64 {
+        let required = size_of::<Vec3>() + 2 * size_of::<f32>() + size_of::<[f32; 3]>();
+        let ids = size_of::<SplatKind>() + size_of::<u16>() + size_of::<u8>() + size_of::<u32>();
+        let optional = usize::from(self.normal) * size_of::<Vec3>() + usize::from(self.value) * size_of::<f32>();
+        (required + ids + optional) as u64
+    }
+}
+
 /// Gives every column `n` entries: constants are filled in, the rest is left for the conversion to write. Memory that
 /// `cloud` holds already is used again.
 pub(crate) fn size_columns(

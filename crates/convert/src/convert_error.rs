@@ -1,6 +1,6 @@
 //! Why a conversion was refused; every message names the object and says what would be accepted.
 
-use splat_core::glam::DVec3;
+use splat_core::{Progress, glam::DVec3};
 
 /// What can go wrong between a mesh, a volume, raw points or a field and a cloud.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -50,4 +50,12 @@ pub enum ConvertError {
         /// The value found.
         value: f64,
     },
+    /// [`Progress::cancel`] was called; nothing of the result is of use.
+    #[error("interrupted")]
+    Cancelled,
+}
+
+/// What a parallel loop that left its work undone asks at its end.
+pub(crate) fn check_cancelled(progress: &Progress) -> Result<(), ConvertError> {
+    if progress.is_cancelled() { Err(ConvertError::Cancelled) } else { Ok(()) }
 }

@@ -4,13 +4,15 @@
 //! by surface nets with cells of √2·h and then goes the way of every mesh, so that its splats are as even as a
 //! mesh's; a density is sampled at the middles of lattice cells and goes the way of every volume.
 
+use crate::convert_error::check_cancelled;
+use crate::mesh_points::{corners, mesh_to_points_with_progress};
 use crate::params::{Density, SplatParams};
 use crate::surface_nets::{Lattice, surface_nets};
-use crate::volume_points::check_lattice;
-use crate::{ConvertError, MeshParams, MeshReport, VolumeParams, VolumeReport, mesh_to_points, volume_to_points};
+use crate::volume_points::{check_lattice, volume_to_points_with_progress};
+use crate::{ConvertError, MeshParams, MeshReport, VolumeParams, VolumeReport, subdivide};
 use rayon::prelude::*;
 use splat_core::{
-    Cloud, Grid, Mesh, ScalarField, TransferFunction, TransferPoint,
+    Cloud, Grid, Mesh, Progress, ScalarField, TransferFunction, TransferPoint,
     glam::{DMat3, DVec3},
 };
 
@@ -42,7 +44,7 @@ pub fn field_to_mesh<F: ScalarField + ?Sized>(
     splat: &SplatParams,
 ) -> Result<Mesh, ConvertError> {
     let lattice = lattice(bounds, cell, splat)?;
-    surface_nets(field, &lattice, &splat.object_name)
+    surface_nets(field, &lattice, &splat.object_name, &Progress::new())
 }
 
 /// Splats of the zero set of a field inside a box (object space); `params` as for a mesh, where [`Density::Auto`] is
@@ -55,24 +57,57 @@ pub fn surface_to_points<F: ScalarField + ?Sized>(
     bounds: [DVec3; 2],
     params: &MeshParams,
 ) -> Result<(Cloud, MeshReport), ConvertError> {
+    surface_to_points_with_progress(field, bounds, params, &Progress::new())
+}
+
+/// [`surface_to_points`] that reports blocks of the lattice and splats to `progress` and stops when that is cancelled.
+///
+/// # Errors
+/// As [`surface_to_points`], and [`ConvertError::Cancelled`].
+pub fn surface_to_points_with_progress<F: ScalarField + ?Sized>(
+    field: &F,
+    bounds: [DVec3; 2],
+    params: &MeshParams,
+    progress: &Progress,
+) -> Result<(Cloud, MeshReport), ConvertError> {
     let p = &params.splat;
     p.check()?;
+    let spacing = surface_spacing(field, bounds, params)?;
+    let lattice = lattice(bounds, spacing * CELL_OVER_SPACING, p)?;
+    let mesh = surface_nets(field, &lattice, &p.object_name, progress)?;
+    let density = Density::Spacing(spacing * p.transform.scale);
+    let mesh_params = MeshParams { density, ..params.clone() };
+    let mut cloud = Cloud::default();
+    let report = mesh_to_points_with_progress(&mesh, &mesh_params, &mut cloud, progress)?;
+    Ok((cloud, report))
+}
+
+/// Spacing of the splats of a zero set, object units.
+pub(crate) fn surface_spacing<F: ScalarField + ?Sized>(
+    field: &F,
+    bounds: [DVec3; 2],
+    params: &MeshParams,
+) -> Result<f64, ConvertError> {
+    let p = &params.splat;
     let longest = (bounds[1] - bounds[0]).max_element();
-    let scale = p.transform.scale;
-    let spacing = match params.density {
-        Density::Spacing(h) => p.check_spacing(h)? / scale,
+    Ok(match params.density {
+        Density::Spacing(h) => p.check_spacing(h)? / p.transform.scale,
         Density::Auto => longest / AUTO_CELLS,
         Density::Splats(n) => {
-            let coarse = field_to_mesh(field, bounds, longest / COARSE_CELLS, p)?;
-            let all = MeshParams { density: Density::Spacing(longest * scale), ..params.clone() };
-            let area = mesh_to_points(&coarse, &all)?.1.area / (scale * scale);
-            let fine = longest / AUTO_CELLS;
-            if area > 0.0 { (area / n.max(1) as f64).sqrt() } else { fine }
+            let area = coarse_area(field, bounds, p)?;
+            if area > 0.0 { (area / n.max(1) as f64).sqrt() } else { longest / AUTO_CELLS }
         }
-    };
-    let mesh = field_to_mesh(field, bounds, spacing * CELL_OVER_SPACING, p)?;
-    let mesh_params = MeshParams { density: Density::Spacing(spacing * scale), ..params.clone() };
-    mesh_to_points(&mesh, &mesh_params)
+    })
+}
+
+/// Area of a zero set by a first look, object units².
+pub(crate) fn coarse_area<F: ScalarField + ?Sized>(
+    field: &F,
+    bounds: [DVec3; 2],
+    splat: &SplatParams,
+) -> Result<f64, ConvertError> {
+    let coarse = field_to_mesh(field, bounds, (bounds[1] - bounds[0]).max_element() / COARSE_CELLS, splat)?;
+    Ok(coarse.triangles.iter().map(|t| subdivide::measure(corners(&coarse, t)).area).sum())
 }
 
 /// How a density field becomes a medium.
@@ -111,18 +146,27 @@ pub fn density_to_points<F: ScalarField + ?Sized>(
     bounds: [DVec3; 2],
     params: &DensityParams,
 ) -> Result<(Cloud, VolumeReport), ConvertError> {
+    density_to_points_with_progress(field, bounds, params, &Progress::new())
+}
+
+/// [`density_to_points`] that reports lattice points to `progress`, each thrice (sampled, chosen, written), and stops
+/// when that is cancelled.
+///
+/// # Errors
+/// As [`density_to_points`], and [`ConvertError::Cancelled`].
+pub fn density_to_points_with_progress<F: ScalarField + ?Sized>(
+    field: &F,
+    bounds: [DVec3; 2],
+    params: &DensityParams,
+    progress: &Progress,
+) -> Result<(Cloud, VolumeReport), ConvertError> {
     let p = &params.volume.splat;
     p.check()?;
     if !(params.extinction.is_finite() && params.extinction >= 0.0) {
         return Err(p.bad("extinction", params.extinction, "a finite number ≥ 0"));
     }
-    let sides = bounds[1] - bounds[0];
-    let spacing = match params.density {
-        Density::Spacing(h) => p.check_spacing(h)? / p.transform.scale,
-        Density::Splats(n) => (sides.x * sides.y * sides.z / n.max(1) as f64).cbrt(),
-        Density::Auto => sides.max_element() / 128.0,
-    };
-    let grid = field_to_grid(field, bounds, spacing, p)?;
+    let lattice = density_lattice(bounds, params)?;
+    let grid = sample(field, &lattice, p, progress)?;
     let thickest = grid.values.iter().copied().fold(0.0f32, f32::max);
     let extinction = (f64::from(thickest) * params.extinction) as f32;
     let mut points = vec![TransferPoint { value: 0.0, color: p.color, extinction: 0.0 }];
@@ -130,7 +174,19 @@ pub fn density_to_points<F: ScalarField + ?Sized>(
         points.push(TransferPoint { value: thickest, color: p.color, extinction });
     }
     let tf = TransferFunction::new(points).map_err(|e| p.input(e))?;
-    volume_to_points(&grid, &tf, &params.volume)
+    volume_to_points_with_progress(&grid, &tf, &params.volume, progress)
+}
+
+/// The lattice that a density is sampled on.
+pub(crate) fn density_lattice(bounds: [DVec3; 2], params: &DensityParams) -> Result<Lattice, ConvertError> {
+    let p = &params.volume.splat;
+    let sides = bounds[1] - bounds[0];
+    let spacing = match params.density {
+        Density::Spacing(h) => p.check_spacing(h)? / p.transform.scale,
+        Density::Splats(n) => (sides.x * sides.y * sides.z / n.max(1) as f64).cbrt(),
+        Density::Auto => sides.max_element() / 128.0,
+    };
+    lattice(bounds, spacing, p)
 }
 
 /// Samples a field at the middles of cells of about `spacing` (object units) that fill a box.
@@ -144,13 +200,27 @@ pub fn field_to_grid<F: ScalarField + ?Sized>(
     spacing: f64,
     splat: &SplatParams,
 ) -> Result<Grid, ConvertError> {
-    let Lattice { low, step, cells: dims } = lattice(bounds, spacing, splat)?;
+    sample(field, &lattice(bounds, spacing, splat)?, splat, &Progress::new())
+}
+
+/// The field at the middles of a lattice's cells.
+fn sample<F: ScalarField + ?Sized>(
+    field: &F,
+    lattice: &Lattice,
+    splat: &SplatParams,
+    progress: &Progress,
+) -> Result<Grid, ConvertError> {
+    let Lattice { low, step, cells: dims } = *lattice;
     let origin = low + step * 0.5;
     let mut values = vec![0.0f32; dims[0] * dims[1] * dims[2]];
+    progress.add_total(values.len() as u64);
     let failed = values
         .par_chunks_mut(dims[0])
         .enumerate()
         .map(|(row, out)| {
+            if progress.tick(out.len() as u64).is_err() {
+                return None;
+            }
             for (i, value) in out.iter_mut().enumerate() {
                 let index = DVec3::new(i as f64, (row % dims[1]) as f64, (row / dims[1]) as f64);
                 let point = origin + step * index;
@@ -167,6 +237,7 @@ pub fn field_to_grid<F: ScalarField + ?Sized>(
     if let Some((point, value)) = failed {
         return Err(ConvertError::NonFinite { object: splat.object_name.clone(), point, value });
     }
+    check_cancelled(progress)?;
     Ok(Grid { origin, axes: DMat3::from_diagonal(step), dims, values })
 }
 

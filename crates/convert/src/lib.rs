@@ -17,6 +17,7 @@
 
 mod columns;
 mod convert_error;
+pub mod cost;
 #[cfg(any(feature = "ply", feature = "nifti", feature = "las"))]
 mod error;
 #[cfg(feature = "expression")]
@@ -54,17 +55,22 @@ pub use convert_error::ConvertError;
 pub use error::{Fault, Place, ReadError, escaped_path};
 #[cfg(feature = "expression")]
 pub use expression::{ExpressionError, ExpressionField};
-pub use field_points::{DensityParams, density_to_points, field_to_grid, field_to_mesh, surface_to_points};
-pub use mesh_points::{MeshParams, MeshReport, mesh_to_points, mesh_to_points_into, predicted_splats};
+pub use field_points::{
+    DensityParams, density_to_points, density_to_points_with_progress, field_to_grid, field_to_mesh, surface_to_points,
+    surface_to_points_with_progress,
+};
+pub use mesh_points::{
+    MeshParams, MeshReport, mesh_to_points, mesh_to_points_into, mesh_to_points_with_progress,
+};
 #[cfg(feature = "surfels")]
 pub use orient::Orientation;
 pub use params::{Density, SplatParams};
 #[cfg(feature = "noise")]
-pub use procedural::{CloudShape, Ellipsoid, procedural_cloud};
+pub use procedural::{CloudShape, Ellipsoid, procedural_cloud, procedural_cloud_with_progress};
 pub use raw_points::{PointLattice, RawPoints};
 pub use shapes::{medium_ball, medium_box, rectangle};
 pub use sobel::{sobel_gradient, sobel_gradient_into};
 #[cfg(feature = "surfels")]
-pub use surfels::{SurfelParams, SurfelReport, raw_to_surfels};
+pub use surfels::{SurfelParams, SurfelReport, raw_to_surfels, raw_to_surfels_with_progress};
 pub use vertex_normals::vertex_normals;
-pub use volume_points::{VolumeParams, VolumeReport, volume_to_points};
+pub use volume_points::{VolumeParams, VolumeReport, volume_to_points, volume_to_points_with_progress};

@@ -14,7 +14,7 @@ use crate::pieces::Pieces;
 use crate::subdivide::{self, Measure};
 use rayon::prelude::*;
 use splat_core::{
-    Cloud, Mesh, SplatKind,
+    Cloud, Mesh, Progress, SplatKind,
     glam::DVec3,
 };
 
@@ -60,6 +60,9 @@ pub struct MeshReport {
 const AUTO_STEPS: f64 = 400.0;
 const AUTO_SPLATS: f64 = 4e6;
 
+/// Splats of a mesh have normals.
+pub(crate) const WANTED: Wanted = Wanted { normal: true, value: false };
+
 /// Makes a new cloud from a mesh, see [`mesh_to_points_into`].
 ///
 /// ```
@@ -88,6 +91,41 @@ pub fn mesh_to_points(mesh: &Mesh, params: &MeshParams) -> Result<(Cloud, MeshRe
 /// [`ConvertError::Parameter`] and [`ConvertError::Input`] for what breaks a promise, [`ConvertError::TooMany`] before
 /// any memory is taken.
 pub fn mesh_to_points_into(mesh: &Mesh, params: &MeshParams, cloud: &mut Cloud) -> Result<MeshReport, ConvertError> {
+    mesh_to_points_with_progress(mesh, params, cloud, &Progress::new())
+}
+
+/// [`mesh_to_points_into`] that reports splats to `progress` and stops when that is cancelled.
+///
+/// # Errors
+/// As [`mesh_to_points_into`], and [`ConvertError::Cancelled`]; the cloud is then of no use.
+pub fn mesh_to_points_with_progress(
+    mesh: &Mesh,
+    params: &MeshParams,
+    cloud: &mut Cloud,
+    progress: &Progress,
+) -> Result<MeshReport, ConvertError> {
+    let p = &params.splat;
+    let Plan { measures, starts, report } = plan(mesh, params)?;
+    cloud.origin = p.transform.apply(mesh.origin);
+    let kind = if params.opacity < 1.0 { SplatKind::Surface } else { SplatKind::Opaque };
+    columns::size_columns(cloud, report.splats as usize, kind, WANTED, p)?;
+    progress.add_total(report.splats);
+    if report.splats > 0 {
+        Pieces::new(mesh, params, &measures, &starts, &report).emit(cloud, progress)?;
+    }
+    Ok(report)
+}
+
+/// What is known before any splat is made.
+pub(crate) struct Plan {
+    measures: Vec<Measure>,
+    /// First splat of every triangle, then the number of all; empty where there is none.
+    starts: Vec<u64>,
+    pub(crate) report: MeshReport,
+}
+
+/// Checks everything and counts the splats.
+pub(crate) fn plan(mesh: &Mesh, params: &MeshParams) -> Result<Plan, ConvertError> {
     let p = &params.splat;
     p.check()?;
     mesh.validate().map_err(|e| p.input(e))?;
@@ -104,21 +142,16 @@ pub fn mesh_to_points_into(mesh: &Mesh, params: &MeshParams, cloud: &mut Cloud) 
         area,
         ..MeshReport::default()
     };
-    cloud.origin = p.transform.apply(mesh.origin);
     if area == 0.0 || params.opacity == 0.0 {
-        return columns::size_columns(cloud, 0, SplatKind::Surface, Wanted::default(), p).map(|()| report);
+        return Ok(Plan { measures, starts: Vec::new(), report });
     }
     let spacing = p.check_spacing(spacing(mesh, &measures, params, &report))?;
     let starts = starts(&measures, spacing / scale, p)?;
-    let splats = starts.last().copied().unwrap_or(0);
     report.spacing = spacing;
     report.radius = p.radius(spacing);
-    report.splats = splats;
+    report.splats = starts.last().copied().unwrap_or(0);
     report.normals_computed = mesh.normal.is_empty();
-    let kind = if params.opacity < 1.0 { SplatKind::Surface } else { SplatKind::Opaque };
-    columns::size_columns(cloud, splats as usize, kind, Wanted { normal: true, value: false }, p)?;
-    Pieces::new(mesh, params, &measures, &starts, &report).emit(cloud);
-    Ok(report)
+    Ok(Plan { measures, starts, report })
 }
 
 /// The spacing in world units that the density asks for.
@@ -184,10 +217,4 @@ fn starts(measures: &[Measure], spacing: f64, p: &SplatParams) -> Result<Vec<u64
 
 pub(crate) fn corners(mesh: &Mesh, triangle: &[u32; 3]) -> [DVec3; 3] {
     triangle.map(|v| mesh.position[v as usize].as_dvec3())
-}
-
-/// Splats that [`mesh_to_points`] makes at this spacing (world units), for estimates of memory and time.
-pub fn predicted_splats(mesh: &Mesh, params: &MeshParams, spacing: f64) -> f64 {
-    let h = spacing / params.splat.transform.scale;
-    mesh.triangles.iter().map(|t| subdivide::estimate(&subdivide::measure(corners(mesh, t)), h)).sum()
 }

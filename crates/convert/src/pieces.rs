@@ -1,12 +1,13 @@
 //! The pieces of a mesh's triangles, written into the columns of a cloud.
 
 use crate::columns::{self, CHUNK};
+use crate::convert_error::check_cancelled;
 use crate::mesh_points::corners;
 use crate::subdivide::{self, Measure, Run, Split};
-use crate::{MeshParams, MeshReport, vertex_normals};
+use crate::{ConvertError, MeshParams, MeshReport, vertex_normals};
 use rayon::prelude::*;
 use splat_core::{
-    Cloud, Mesh,
+    Cloud, Mesh, Progress,
     glam::{DQuat, DVec3, Vec3},
     optics,
 };
@@ -71,13 +72,16 @@ impl<'a> Pieces<'a> {
     }
 
     /// Fills the columns in tasks of [`CHUNK`] splats, wherever triangles begin: one huge triangle is shared too.
-    pub(crate) fn emit(&self, cloud: &mut Cloud) {
+    pub(crate) fn emit(&self, cloud: &mut Cloud, progress: &Progress) -> Result<(), ConvertError> {
         let columns = (cloud.position.par_chunks_mut(CHUNK), cloud.normal.par_chunks_mut(CHUNK));
         let rest = (cloud.cross_section.par_chunks_mut(CHUNK), cloud.color.par_chunks_mut(CHUNK));
         (columns.0, columns.1, rest.0, rest.1, cloud.radius.par_chunks_mut(CHUNK))
             .into_par_iter()
             .enumerate()
             .for_each(|(chunk, (position, normal, cross_section, color, radius))| {
+                if progress.tick(radius.len() as u64).is_err() {
+                    return;
+                }
                 radius.fill(self.radius);
                 if self.mesh.color.is_empty() {
                     color.fill(self.color);
@@ -85,6 +89,7 @@ impl<'a> Pieces<'a> {
                 let target = Target { position, normal, cross_section, color };
                 pulp::Arch::new().dispatch(Fill { pieces: self, first: (chunk * CHUNK) as u64, target });
             });
+        check_cancelled(progress)
     }
 }
 

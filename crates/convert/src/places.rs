@@ -1,10 +1,12 @@
 //! What is known about each distinct place of raw points: normal, area and spacing, from its neighbours.
 
-use crate::SurfelParams;
+use crate::convert_error::check_cancelled;
 use crate::neighbours::{MAX_NEIGHBOURS, MAX_WAITING, Nearest, Tree, WIDTH, Waiting};
-use crate::orient;
+use crate::orient::{self, Orientation};
 use crate::tangent_plane::{self, Cell, Polygon};
+use crate::{ConvertError, SurfelParams};
 use rayon::prelude::*;
+use splat_core::Progress;
 use splat_core::glam::{DVec3, Vec3};
 
 /// Leaves of the tree per parallel task; fixed, so that results do not depend on the thread count.
@@ -22,8 +24,14 @@ pub(crate) struct Place {
     pub(crate) spacing: f64,
 }
 
-/// The places of points in Morton order; and their neighbours by leaf of eight, if wanted.
-pub(crate) fn places(distinct: &[Vec3], params: &SurfelParams, keep_neighbours: bool) -> (Vec<Place>, Vec<Nearest>) {
+/// The places of points in Morton order; and their neighbours by leaf of eight, where normals are to be propagated.
+pub(crate) fn places(
+    distinct: &[Vec3],
+    params: &SurfelParams,
+    progress: &Progress,
+) -> Result<(Vec<Place>, Vec<Nearest>), ConvertError> {
+    progress.add_total(distinct.len() as u64);
+    let keep_neighbours = params.orientation == Orientation::Propagate;
     let tree = Tree::new(distinct);
     let mut places = vec![Place::default(); distinct.len()];
     let chunk = LEAVES * WIDTH;
@@ -31,11 +39,15 @@ pub(crate) fn places(distinct: &[Vec3], params: &SurfelParams, keep_neighbours: 
         .par_chunks_mut(chunk)
         .enumerate()
         .map(|(c, out)| {
+            if progress.tick(out.len() as u64).is_err() {
+                return Vec::new();
+            }
             let task = Task { tree: &tree, distinct, params, first: c * LEAVES, keep_neighbours, out };
             pulp::Arch::new().dispatch(task)
         })
         .collect();
-    (places, kept.concat())
+    check_cancelled(progress)?;
+    Ok((places, kept.concat()))
 }
 
 /// The places of some leaves, in the form that [`pulp`] compiles once per instruction set.

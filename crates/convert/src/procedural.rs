@@ -11,12 +11,13 @@
 //! no seam shows where two meet. A base below which nothing condenses flattens the underside.
 
 use crate::ConvertError;
+use crate::convert_error::check_cancelled;
 use crate::params::SplatParams;
 use crate::volume_points::check_lattice;
 use noise::{NoiseFn, Perlin};
 use rayon::prelude::*;
 use splat_core::{
-    Grid,
+    Grid, Progress,
     glam::{DMat3, DVec3},
 };
 
@@ -92,7 +93,7 @@ impl CloudShape {
         self.density_with(&Perlin::new(self.seed), p)
     }
 
-    fn density_with(&self, noise: &Perlin, p: DVec3) -> f64 {
+    pub(crate) fn density_with(&self, noise: &Perlin, p: DVec3) -> f64 {
         let depth = self.depth(p);
         // |t| ≤ MOST_TURBULENCE, so nothing can reach up here.
         if depth + MOST_TURBULENCE * self.amplitude <= 0.0 {
@@ -150,6 +151,15 @@ impl CloudShape {
         [low, high]
     }
 
+    /// Lattice points along x, y and z.
+    pub(crate) fn lattice(&self, spacing: f64, splat: &SplatParams) -> Result<[usize; 3], ConvertError> {
+        self.check(splat)?;
+        let [low, high] = self.bounds();
+        let counts = ((high - low) / splat.check_spacing(spacing)?).ceil().to_array();
+        check_lattice(splat, counts)?;
+        Ok(counts.map(|n| n.max(1.0) as usize))
+    }
+
     fn check(&self, p: &SplatParams) -> Result<(), ConvertError> {
         let positive = |v: f64| v.is_finite() && v > 0.0;
         if self.ellipsoids.is_empty() {
@@ -200,20 +210,34 @@ impl CloudShape {
 /// # Errors
 /// [`ConvertError::Parameter`], or [`ConvertError::TooMany`] before memory is taken.
 pub fn procedural_cloud(shape: &CloudShape, spacing: f64, splat: &SplatParams) -> Result<Grid, ConvertError> {
+    procedural_cloud_with_progress(shape, spacing, splat, &Progress::new())
+}
+
+/// [`procedural_cloud`] that reports lattice points to `progress` and stops when that is cancelled.
+///
+/// # Errors
+/// As [`procedural_cloud`], and [`ConvertError::Cancelled`].
+pub fn procedural_cloud_with_progress(
+    shape: &CloudShape,
+    spacing: f64,
+    splat: &SplatParams,
+    progress: &Progress,
+) -> Result<Grid, ConvertError> {
     splat.check()?;
-    shape.check(splat)?;
-    let spacing = splat.check_spacing(spacing)?;
-    let [low, high] = shape.bounds();
-    let counts = ((high - low) / spacing).ceil().to_array();
-    check_lattice(splat, counts)?;
-    let dims = counts.map(|n| n.max(1.0) as usize);
+    let dims = shape.lattice(spacing, splat)?;
+    let low = shape.bounds()[0];
     let noise = Perlin::new(shape.seed);
     let mut values = vec![0.0f32; dims[0] * dims[1] * dims[2]];
+    progress.add_total(values.len() as u64);
     values.par_chunks_mut(dims[0]).enumerate().for_each(|(row, out)| {
+        if progress.tick(out.len() as u64).is_err() {
+            return;
+        }
         for (i, value) in out.iter_mut().enumerate() {
             let index = DVec3::new(i as f64, (row % dims[1]) as f64, (row / dims[1]) as f64);
             *value = (shape.extinction * shape.density_with(&noise, low + index * spacing)) as f32;
         }
     });
+    check_cancelled(progress)?;
     Ok(Grid { origin: low, axes: DMat3::from_diagonal(DVec3::splat(spacing)), dims, values })
 }

@@ -71,8 +71,7 @@ pub fn rectangle(
     if !(0.0..=1.0).contains(&opacity) {
         return Err(params.bad("opacity", opacity, "a number in [0, 1]"));
     }
-    let count = |axis: DVec3| (2.0 * axis.length() / spacing).ceil().max(1.0);
-    let (nu, nv) = (count(u), count(v));
+    let [nu, nv] = rectangle_counts(u, v, spacing);
     params.check_count(nu * nv)?;
     let area = 4.0 * normal.length() * scale * scale / (nu * nv);
     let step = (2.0 * u.length() / nu).max(2.0 * v.length() / nv) * scale;
@@ -95,6 +94,11 @@ pub fn rectangle(
     Ok(cloud)
 }
 
+/// Splats along the two half-axes of a parallelogram.
+pub(crate) fn rectangle_counts(u: DVec3, v: DVec3, spacing: f64) -> [f64; 2] {
+    [u, v].map(|axis| (2.0 * axis.length() / spacing).ceil().max(1.0))
+}
+
 fn template(params: &SplatParams) -> Splat {
     Splat {
         color: params.color,
@@ -106,15 +110,21 @@ fn template(params: &SplatParams) -> Splat {
 }
 
 /// Cells that tile a box.
-struct Lattice {
+pub(crate) struct Lattice {
     step: DVec3,
-    counts: [u64; 3],
+    pub(crate) counts: [u64; 3],
     center: DVec3,
     extinction: f64,
 }
 
 impl Lattice {
-    fn new(min: DVec3, max: DVec3, extinction: f64, spacing: f64, params: &SplatParams) -> Result<Self, ConvertError> {
+    pub(crate) fn new(
+        min: DVec3,
+        max: DVec3,
+        extinction: f64,
+        spacing: f64,
+        params: &SplatParams,
+    ) -> Result<Self, ConvertError> {
         params.check()?;
         params.check_spacing(spacing * params.transform.scale)?;
         let extent = max - min;

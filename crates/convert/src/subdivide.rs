@@ -107,11 +107,6 @@ pub(crate) struct Run {
 /// More pieces than this in one direction are never made; the budget refuses such triangles before.
 const MOST_STEPS: f64 = 4e9;
 
-/// An upper estimate of the pieces, without loops, to refuse absurd spacings before any work.
-pub(crate) fn estimate(m: &Measure, spacing: f64) -> f64 {
-    if m.area == 0.0 { 0.0 } else { 1.0 + m.area / (spacing * spacing) }
-}
-
 /// Chooses the split of a triangle for pieces of at most `spacing`² area.
 pub(crate) fn split(m: &Measure, spacing: f64) -> Split {
     if m.area == 0.0 {

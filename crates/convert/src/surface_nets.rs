@@ -6,9 +6,10 @@
 //! through in blocks; a block whose interval bound excludes zero is not evaluated.
 
 use crate::ConvertError;
+use crate::convert_error::check_cancelled;
 use rayon::prelude::*;
 use splat_core::{
-    Mesh, ScalarField,
+    Mesh, Progress, ScalarField,
     glam::{DVec3, Vec3},
 };
 
@@ -50,15 +51,20 @@ pub(crate) fn surface_nets<F: ScalarField + ?Sized>(
     field: &F,
     lattice: &Lattice,
     object: &str,
+    progress: &Progress,
 ) -> Result<Mesh, ConvertError> {
     let blocks = lattice.cells.map(|n| n.div_ceil(BLOCK));
-    let parts: Vec<Result<Part, ConvertError>> = (0..blocks[0] * blocks[1] * blocks[2])
+    let count = blocks[0] * blocks[1] * blocks[2];
+    progress.add_total(count as u64);
+    let parts: Vec<Result<Part, ConvertError>> = (0..count)
         .into_par_iter()
         .map(|b| {
+            progress.tick(1).map_err(|_| ConvertError::Cancelled)?;
             let first = [b % blocks[0], b / blocks[0] % blocks[1], b / blocks[0] / blocks[1]].map(|i| i * BLOCK);
             Block::sample(field, lattice, first, object).map(|block| block.map_or(Part::default(), |b| b.part(field)))
         })
         .collect();
+    check_cancelled(progress)?;
     let parts = parts.into_iter().collect::<Result<Vec<_>, _>>()?;
     Ok(join(lattice, &parts))
 }

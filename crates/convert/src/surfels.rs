@@ -8,6 +8,7 @@
 //! Points at one place share the area of that place, so duplicates neither darken it nor shrink radii to 0.
 
 use crate::columns::{self, CHUNK, Wanted};
+use crate::convert_error::check_cancelled;
 use crate::neighbours::MAX_NEIGHBOURS;
 use crate::orient::{self, Orientation};
 use crate::params::SplatParams;
@@ -15,7 +16,7 @@ use crate::places::{Place, places};
 use crate::{ConvertError, RawPoints};
 use rayon::prelude::*;
 use splat_core::{
-    Cloud, SplatKind,
+    Cloud, Progress, SplatKind,
     glam::{DVec3, Vec3},
     optics,
 };
@@ -91,10 +92,22 @@ pub struct SurfelReport {
 /// # Errors
 /// [`ConvertError::Parameter`], [`ConvertError::Input`] or [`ConvertError::TooMany`].
 pub fn raw_to_surfels(points: &RawPoints, params: &SurfelParams) -> Result<(Cloud, SurfelReport), ConvertError> {
+    raw_to_surfels_with_progress(points, params, &Progress::new())
+}
+
+/// [`raw_to_surfels`] that reports places to `progress` and stops when that is cancelled.
+///
+/// # Errors
+/// As [`raw_to_surfels`], and [`ConvertError::Cancelled`].
+pub fn raw_to_surfels_with_progress(
+    points: &RawPoints,
+    params: &SurfelParams,
+    progress: &Progress,
+) -> Result<(Cloud, SurfelReport), ConvertError> {
     check(points, params)?;
     let order = canonical_order(points);
     let (distinct, starts) = distinct_places(points, &order);
-    let (mut places, nearest) = places(&distinct, params, params.orientation == Orientation::Propagate);
+    let (mut places, nearest) = places(&distinct, params, progress)?;
     let mut report = SurfelReport {
         points: points.len() as u64,
         duplicates: (points.len() - distinct.len()) as u64,
@@ -104,11 +117,12 @@ pub fn raw_to_surfels(points: &RawPoints, params: &SurfelParams) -> Result<(Clou
     cut_outliers(&mut places, params, &mut report);
     let mut normals: Vec<DVec3> = places.iter().map(|p| p.normal).collect();
     orient::orient(&mut normals, &distinct, points.origin, params.orientation, &nearest);
+    check_cancelled(progress)?;
     let cloud = emit(points, params, &Sorted { order, starts, places, normals }, &mut report)?;
     Ok((cloud, report))
 }
 
-fn check(points: &RawPoints, params: &SurfelParams) -> Result<(), ConvertError> {
+pub(crate) fn check(points: &RawPoints, params: &SurfelParams) -> Result<(), ConvertError> {
     let p = &params.splat;
     p.check()?;
     points.validate().map_err(|e| p.input(e))?;
@@ -221,6 +235,11 @@ impl Sorted {
     }
 }
 
+/// Which columns surfels fill.
+pub(crate) fn wanted(points: &RawPoints, params: &SurfelParams) -> Wanted {
+    Wanted { normal: true, value: params.values && !points.value.is_empty() }
+}
+
 fn emit(
     points: &RawPoints,
     params: &SurfelParams,
@@ -233,7 +252,7 @@ fn emit(
     let opaque = params.opacity >= 1.0;
     let tau = if opaque { 1.0 } else { optics::optical_depth(params.opacity) } * t.scale * t.scale;
     let mut cloud = Cloud::new(t.apply(points.origin));
-    let wanted = Wanted { normal: true, value: params.values && !points.value.is_empty() };
+    let wanted = wanted(points, params);
     let kind = if opaque { SplatKind::Opaque } else { SplatKind::Surface };
     columns::size_columns(&mut cloud, surfels.len(), kind, wanted, &params.splat)?;
     let columns =

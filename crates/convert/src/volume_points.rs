@@ -6,12 +6,13 @@
 //! −∇v/|∇v| of the values by the Sobel operator.
 
 use crate::columns::{self, Wanted};
+use crate::convert_error::check_cancelled;
 use crate::params::SplatParams;
 use crate::sobel::{Rows, Sobel, normal_from_gradient};
 use crate::{ConvertError, resample};
 use rayon::prelude::*;
 use splat_core::{
-    Cloud, Grid, SplatKind, TransferFunction,
+    Cloud, Grid, Progress, SplatKind, TransferFunction,
     glam::{DVec3, Vec3},
 };
 
@@ -45,6 +46,22 @@ impl Default for VolumeParams {
             omitted_optical_depth: 0.0,
             clip: None,
         }
+    }
+}
+
+impl VolumeParams {
+    /// Which columns the splats fill.
+    pub(crate) fn wanted(&self) -> Wanted {
+        Wanted { normal: self.normals, value: self.values }
+    }
+
+    /// Checks what does not depend on the volume.
+    pub(crate) fn check(&self) -> Result<(), ConvertError> {
+        self.splat.check()?;
+        if self.omitted_optical_depth.is_finite() && self.omitted_optical_depth >= 0.0 {
+            return Ok(());
+        }
+        Err(self.splat.bad("omitted_optical_depth", self.omitted_optical_depth, "a finite number ≥ 0"))
     }
 }
 
@@ -89,18 +106,24 @@ pub fn volume_to_points(
     tf: &TransferFunction,
     params: &VolumeParams,
 ) -> Result<(Cloud, VolumeReport), ConvertError> {
+    volume_to_points_with_progress(grid, tf, params, &Progress::new())
+}
+
+/// [`volume_to_points`] that reports lattice points to `progress`, each twice (chosen, written), and stops when that
+/// is cancelled.
+///
+/// # Errors
+/// As [`volume_to_points`], and [`ConvertError::Cancelled`].
+pub fn volume_to_points_with_progress(
+    grid: &Grid,
+    tf: &TransferFunction,
+    params: &VolumeParams,
+    progress: &Progress,
+) -> Result<(Cloud, VolumeReport), ConvertError> {
     let p = &params.splat;
-    p.check()?;
+    params.check()?;
     grid.validate().map_err(|e| p.input(e))?;
-    if !(params.omitted_optical_depth.is_finite() && params.omitted_optical_depth >= 0.0) {
-        return Err(p.bad("omitted_optical_depth", params.omitted_optical_depth, "a finite number ≥ 0"));
-    }
-    let factors = if params.even_steps {
-        resample::factors(&grid.axes, params.refine)
-    } else {
-        [params.refine.max(1) as usize; 3]
-    };
-    check_lattice(p, [0, 1, 2].map(|a| grid.dims[a] as f64 * factors[a] as f64))?;
+    let factors = lattice_factors(grid, params)?;
     let fine = (factors != [1; 3]).then(|| resample::resample(grid, factors));
     let lattice = fine.as_ref().unwrap_or(grid);
     let spacing = p.check_spacing(resample::kernel_spacing(&lattice.axes) * p.transform.scale)?;
@@ -111,7 +134,19 @@ pub fn volume_to_points(
         radius: p.radius(spacing),
         ..VolumeReport::default()
     };
-    convert(lattice, tf, params, report)
+    progress.add_total(2 * report.lattice_points);
+    convert(lattice, tf, params, report, progress)
+}
+
+/// How often each step of the grid is split.
+pub(crate) fn lattice_factors(grid: &Grid, params: &VolumeParams) -> Result<[usize; 3], ConvertError> {
+    let factors = if params.even_steps {
+        resample::factors(&grid.axes, params.refine)
+    } else {
+        [params.refine.max(1) as usize; 3]
+    };
+    check_lattice(&params.splat, [0, 1, 2].map(|a| grid.dims[a] as f64 * factors[a] as f64))?;
+    Ok(factors)
 }
 
 /// Refuses lattices that no budget can mean: eight lattice points a splat.
@@ -128,29 +163,29 @@ fn convert(
     tf: &TransferFunction,
     params: &VolumeParams,
     mut report: VolumeReport,
+    progress: &Progress,
 ) -> Result<(Cloud, VolumeReport), ConvertError> {
     let p = &params.splat;
     let scale = p.transform.scale;
-    let corner = lattice.axes * DVec3::from_array(lattice.dims.map(|n| n as f64));
-    let longest_path = diagonal(lattice).max(corner.length()) * scale;
+    let longest_path = longest_path(lattice) * scale;
     let keep = Keep::new(tf, params.omitted_optical_depth / longest_path, params.clip);
-    let slabs: Vec<Slab> = (0..lattice.dims[2]).into_par_iter().map(|k| keep.slab(lattice, k)).collect();
+    let slabs = keep.slabs(lattice, progress)?;
     let n: usize = slabs.iter().map(|s| s.kept.len()).sum();
     p.check_count(n as f64)?;
     report.splats = n as u64;
     report.omitted = slabs.iter().map(|s| s.omitted).sum();
     report.omitted_optical_depth = slabs.iter().fold(0.0f64, |m, s| m.max(f64::from(s.thickest))) * longest_path;
     let mut cloud = Cloud::new(p.transform.apply(lattice.origin));
-    let wanted = Wanted { normal: params.normals, value: params.values };
+    let wanted = params.wanted();
     columns::size_columns(&mut cloud, n, SplatKind::Medium, wanted, p)?;
     cloud.radius.par_iter_mut().with_min_len(columns::CHUNK).for_each(|r| *r = report.radius as f32);
     let emit = Emit { lattice, tf, params, sobel: Sobel::new(lattice), cell: lattice.cell_volume() * scale.powi(3) };
-    report.without_normal = emit.run(&slabs, &mut cloud);
+    report.without_normal = emit.run(&slabs, &mut cloud, progress)?;
     Ok((cloud, report))
 }
 
 /// The longest straight line within the lattice's cells: the longest body diagonal.
-fn diagonal(lattice: &Grid) -> f64 {
+pub(crate) fn longest_path(lattice: &Grid) -> f64 {
     let n = DVec3::from_array(lattice.dims.map(|n| n as f64));
     [DVec3::ONE, DVec3::new(-1.0, 1.0, 1.0), DVec3::new(1.0, -1.0, 1.0), DVec3::new(1.0, 1.0, -1.0)]
         .iter()
@@ -158,7 +193,7 @@ fn diagonal(lattice: &Grid) -> f64 {
 }
 
 /// Which lattice points become splats.
-struct Keep<'a> {
+pub(crate) struct Keep<'a> {
     tf: &'a TransferFunction,
     /// Extinction that is left out up to here.
     threshold: f64,
@@ -168,16 +203,16 @@ struct Keep<'a> {
 }
 
 /// The kept lattice points of one slab of constant k.
-struct Slab {
+pub(crate) struct Slab {
     /// Index within the slab.
-    kept: Vec<u32>,
+    pub(crate) kept: Vec<u32>,
     omitted: u64,
     /// Largest extinction left out.
     thickest: f32,
 }
 
 impl<'a> Keep<'a> {
-    fn new(tf: &'a TransferFunction, threshold: f64, clip: Option<[DVec3; 2]>) -> Self {
+    pub(crate) fn new(tf: &'a TransferFunction, threshold: f64, clip: Option<[DVec3; 2]>) -> Self {
         let points = tf.points();
         let some = |p: &splat_core::TransferPoint| p.extinction > 0.0;
         let support = match (points.iter().position(some), points.iter().rposition(some)) {
@@ -188,6 +223,18 @@ impl<'a> Keep<'a> {
             _ => [f32::INFINITY, f32::NEG_INFINITY],
         };
         Self { tf, threshold, support, clip }
+    }
+
+    /// All slabs, in order.
+    pub(crate) fn slabs(&self, lattice: &Grid, progress: &Progress) -> Result<Vec<Slab>, ConvertError> {
+        let points = (lattice.dims[0] * lattice.dims[1]) as u64;
+        let slab = |k| progress.tick(points).map(|()| self.slab(lattice, k)).map_err(|_| ConvertError::Cancelled);
+        (0..lattice.dims[2]).into_par_iter().map(slab).collect()
+    }
+
+    /// How many lattice points become splats.
+    pub(crate) fn count(&self, lattice: &Grid) -> u64 {
+        (0..lattice.dims[2]).into_par_iter().map(|k| self.slab(lattice, k).kept.len() as u64).sum()
     }
 
     fn slab(&self, lattice: &Grid, k: usize) -> Slab {
@@ -240,7 +287,7 @@ struct Target<'a> {
 
 impl Emit<'_> {
     /// Returns how many splats have no normal although they should.
-    fn run(&self, slabs: &[Slab], cloud: &mut Cloud) -> u64 {
+    fn run(&self, slabs: &[Slab], cloud: &mut Cloud, progress: &Progress) -> Result<u64, ConvertError> {
         let mut rest = Target {
             position: &mut cloud.position,
             cross_section: &mut cloud.cross_section,
@@ -257,13 +304,16 @@ impl Emit<'_> {
         let slab_points = self.lattice.dims[0] * self.lattice.dims[1];
         let scratch =
             || (Rows::default(), if self.params.normals { vec![Vec3::ZERO; slab_points] } else { Vec::new() });
-        tasks
+        let without_normal = tasks
             .into_par_iter()
             .zip(slabs)
             .enumerate()
             // Scratch is made once a run of slabs.
             .with_min_len(8)
             .map_init(scratch, |(rows, gradient), (k, (mut target, slab))| {
+                if progress.tick(slab_points as u64).is_err() {
+                    return 0;
+                }
                 self.slab(k, slab, &mut target);
                 if !self.params.normals || slab.kept.is_empty() {
                     return 0;
@@ -271,7 +321,8 @@ impl Emit<'_> {
                 self.sobel.slab(k, rows, gradient);
                 self.normals(slab, gradient, target.normal)
             })
-            .sum()
+            .sum();
+        check_cancelled(progress).map(|()| without_normal)
     }
 
     fn slab(&self, k: usize, slab: &Slab, target: &mut Target<'_>) {

@@ -1,0 +1,215 @@
+//! Splats and bytes of a conversion before it is done, from its parameters and its input.
+//!
+//! | input | splats | exact? |
+//! |---|---|---|
+//! | mesh | Σ pieces of its triangles' splits | yes |
+//! | raw points | one a point | yes; fewer where duplicates are merged |
+//! | volume | lattice points above zero extinction, times the factors that split its steps | where none is split |
+//! | zero set | 2·A/h², A from a mesh of 48 cells a side | within some ten percent |
+//! | density, procedural cloud | lattice points times the share of a coarse lattice that is above zero | within some percent |
+//! | box, ball, parallelogram | cells; of a ball π/6 of them | yes; a ball within some percent |
+//!
+//! `at_most` holds always: memory that is not to be exceeded is planned with it.
+
+use crate::columns::Wanted;
+use crate::field_points::{coarse_area, density_lattice, surface_spacing};
+#[cfg(feature = "noise")]
+use crate::procedural::CloudShape;
+use crate::shapes::{Lattice, rectangle_counts};
+use crate::volume_points::{Keep, lattice_factors, longest_path};
+use crate::{ConvertError, DensityParams, MeshParams, SplatParams, VolumeParams, mesh_points, resample};
+#[cfg(feature = "surfels")]
+use crate::{RawPoints, SurfelParams, surfels};
+use splat_core::{
+    Grid, Mesh, ScalarField, TransferFunction,
+    glam::{DMat3, DVec3},
+};
+
+/// Splats of a zero set over its area over h²: cells of √2·h make two triangles each, whose pieces are smaller than h².
+const ZERO_SET_EXCESS: f64 = 2.0;
+
+/// Points along the longest side of the lattice that a field is looked at on.
+const COARSE: f64 = 32.0;
+
+/// What a conversion will make.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Prediction {
+    /// Splats, see the table above.
+    pub splats: u64,
+    /// Never more splats than that; `None` where nothing but the limit of the parameters is known.
+    pub at_most: Option<u64>,
+    /// Bytes of the cloud with that many `splats`.
+    pub bytes: u64,
+}
+
+impl Prediction {
+    fn new(splats: f64, at_most: Option<f64>, wanted: Wanted) -> Self {
+        // Floats become the nearest integer in range.
+        let splats = splats.round() as u64;
+        Self { splats, at_most: at_most.map(|n| n as u64), bytes: splats.saturating_mul(wanted.bytes_per_splat()) }
+    }
+
+    fn exact(splats: f64, wanted: Wanted) -> Self {
+        Self::new(splats, Some(splats), wanted)
+    }
+}
+
+/// Of [`crate::mesh_to_points`].
+///
+/// ```
+/// use convert::{Density, MeshParams, cost, mesh_to_points};
+/// use splat_core::{Mesh, glam::Vec3};
+/// let mesh = Mesh { position: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]], ..Mesh::default() };
+/// let params = MeshParams { density: Density::Spacing(0.1), ..MeshParams::default() };
+/// let predicted = cost::mesh(&mesh, &params).unwrap();
+/// assert_eq!(predicted.bytes, mesh_to_points(&mesh, &params).unwrap().0.bytes());
+/// ```
+///
+/// # Errors
+/// As the conversion.
+pub fn mesh(mesh: &Mesh, params: &MeshParams) -> Result<Prediction, ConvertError> {
+    let splats = mesh_points::plan(mesh, params)?.report.splats as f64;
+    Ok(Prediction::exact(splats, mesh_points::WANTED))
+}
+
+/// Of [`crate::raw_to_surfels`]; with merged duplicates as if there were none.
+///
+/// # Errors
+/// As the conversion.
+#[cfg(feature = "surfels")]
+pub fn raw_points(points: &RawPoints, params: &SurfelParams) -> Result<Prediction, ConvertError> {
+    surfels::check(points, params)?;
+    Ok(Prediction::exact(points.len() as f64, surfels::wanted(points, params)))
+}
+
+/// Of [`crate::volume_to_points`].
+///
+/// # Errors
+/// As the conversion, but for too many splats.
+pub fn volume(grid: &Grid, tf: &TransferFunction, params: &VolumeParams) -> Result<Prediction, ConvertError> {
+    let p = &params.splat;
+    params.check()?;
+    grid.validate().map_err(|e| p.input(e))?;
+    let factors = lattice_factors(grid, params)?;
+    let threshold = params.omitted_optical_depth / (longest_path(grid) * p.transform.scale);
+    let kept = Keep::new(tf, threshold, params.clip).count(grid) as f64;
+    if factors == [1; 3] {
+        return Ok(Prediction::exact(kept, params.wanted()));
+    }
+    let finer = factors.iter().map(|f| *f as f64).product::<f64>();
+    Ok(Prediction::new(kept * finer, Some(grid.values.len() as f64 * finer), params.wanted()))
+}
+
+/// Of [`crate::surface_to_points`]; the field is looked at on a coarse lattice.
+///
+/// # Errors
+/// As the conversion, but for too many splats.
+pub fn surface<F: ScalarField + ?Sized>(
+    field: &F,
+    bounds: [DVec3; 2],
+    params: &MeshParams,
+) -> Result<Prediction, ConvertError> {
+    params.splat.check()?;
+    let area = if params.opacity > 0.0 { coarse_area(field, bounds, &params.splat)? } else { 0.0 };
+    let spacing = surface_spacing(field, bounds, params)?;
+    Ok(Prediction::new(ZERO_SET_EXCESS * area / (spacing * spacing), None, mesh_points::WANTED))
+}
+
+/// Of [`crate::density_to_points`]; the field is looked at on a coarse lattice.
+///
+/// # Errors
+/// As the conversion, but for too many splats.
+pub fn density<F: ScalarField + ?Sized>(
+    field: &F,
+    bounds: [DVec3; 2],
+    params: &DensityParams,
+) -> Result<Prediction, ConvertError> {
+    params.volume.check()?;
+    let lattice = density_lattice(bounds, params)?;
+    let low = lattice.low + 0.5 * lattice.step;
+    let positive = |p: DVec3| params.extinction > 0.0 && field.value(p) > 0.0;
+    Ok(sampled(positive, low, lattice.step, lattice.cells, &params.volume))
+}
+
+/// Of [`crate::procedural_cloud`] and [`crate::volume_to_points`] with extinction as it is.
+///
+/// # Errors
+/// As the conversions, but for too many splats.
+#[cfg(feature = "noise")]
+pub fn procedural(shape: &CloudShape, spacing: f64, params: &VolumeParams) -> Result<Prediction, ConvertError> {
+    params.check()?;
+    let dims = shape.lattice(spacing, &params.splat)?;
+    let noise = noise::Perlin::new(shape.seed);
+    let positive = |p: DVec3| shape.extinction * shape.density_with(&noise, p) > 0.0;
+    Ok(sampled(positive, shape.bounds()[0], DVec3::splat(spacing), dims, params))
+}
+
+/// Of [`crate::medium_box`].
+///
+/// # Errors
+/// As the conversion.
+pub fn medium_box(
+    min: DVec3,
+    max: DVec3,
+    extinction: f64,
+    spacing: f64,
+    params: &SplatParams,
+) -> Result<Prediction, ConvertError> {
+    let counts = Lattice::new(min, max, extinction, spacing, params)?.counts;
+    let cells = if extinction > 0.0 { counts.iter().product::<u64>() as f64 } else { 0.0 };
+    Ok(Prediction::exact(cells, Wanted::default()))
+}
+
+/// Of [`crate::medium_ball`].
+///
+/// # Errors
+/// As the conversion.
+pub fn medium_ball(
+    center: DVec3,
+    radius: f64,
+    extinction: f64,
+    spacing: f64,
+    params: &SplatParams,
+) -> Result<Prediction, ConvertError> {
+    let reach = DVec3::splat(radius);
+    let cells = medium_box(center - reach, center + reach, extinction, spacing, params)?.splats as f64;
+    // Cells that the surface cuts count whole: a shell of about half a cell.
+    let inside = std::f64::consts::PI / 6.0 * (cells.cbrt() + 1.0).powi(3);
+    Ok(Prediction::new(inside.min(cells), Some(cells), Wanted::default()))
+}
+
+/// Of [`crate::rectangle`].
+///
+/// # Errors
+/// As the conversion.
+pub fn rectangle(u: DVec3, v: DVec3, spacing: f64, params: &SplatParams) -> Result<Prediction, ConvertError> {
+    params.check()?;
+    params.check_spacing(spacing * params.transform.scale)?;
+    let splats = rectangle_counts(u, v, spacing).iter().product();
+    params.check_count(splats)?;
+    Ok(Prediction::exact(splats, mesh_points::WANTED))
+}
+
+/// Lattice points from `low` on, times the share of a coarser lattice in the same box that is `positive`.
+fn sampled(
+    positive: impl Fn(DVec3) -> bool,
+    low: DVec3,
+    step: DVec3,
+    dims: [usize; 3],
+    params: &VolumeParams,
+) -> Prediction {
+    let factors = resample::factors(&DMat3::from_diagonal(step), params.refine);
+    let n = DVec3::from_array([0, 1, 2].map(|a| dims[a] as f64));
+    let longest = n.max_element();
+    let coarse = n.to_array().map(|n| (n * (COARSE / longest).min(1.0)).ceil() as usize);
+    let stride = n / DVec3::from_array(coarse.map(|c| c as f64));
+    let at = |c: [usize; 3]| {
+        let index = DVec3::from_array(c.map(|i| i as f64 + 0.5)) * stride - 0.5;
+        low + step * index
+    };
+    let points = coarse[0] * coarse[1] * coarse[2];
+    let cell = |i: usize| at([i % coarse[0], i / coarse[0] % coarse[1], i / coarse[0] / coarse[1]]);
+    let hits = (0..points).filter(|i| positive(cell(*i))).count();
+    let lattice = [0, 1, 2].map(|a| dims[a] as f64 * factors[a] as f64).iter().product::<f64>();
+    Prediction::new(lattice * hits as f64 / points.max(1) as f64, Some(lattice), params.wanted())
+}

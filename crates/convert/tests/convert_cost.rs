@@ -1,0 +1,160 @@
+//! Predicted splats and bytes against the counters of the conversions, and conversions that are interrupted.
+#![cfg(all(feature = "surfels", feature = "expression", feature = "noise"))]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use convert::cost::{self, Prediction};
+use convert::*;
+use splat_core::glam::{DMat3, DVec3, Vec3};
+use splat_core::{Cloud, Grid, Mesh, Progress, Similarity, TransferFunction, TransferPoint, rng};
+
+fn mesh() -> Mesh {
+    let unit = |i: u64, a: u64| rng::unit_f32(8, 0, i, a);
+    let position = (0..300).map(|i| Vec3::new(unit(i, 0), unit(i, 1), unit(i, 2))).collect();
+    Mesh { position, triangles: (0..100).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(), ..Mesh::default() }
+}
+
+fn points(n: u64) -> RawPoints {
+    let position = (0..n).map(|i| Vec3::new(rng::unit_f32(9, 0, i, 0), 0.0, rng::unit_f32(9, 0, i, 1))).collect();
+    RawPoints { position, value: vec![1.0; n as usize], ..RawPoints::default() }
+}
+
+fn wave(dims: [usize; 3], axes: DVec3) -> Grid {
+    let n = dims[0] * dims[1] * dims[2];
+    let values = (0..n).map(|i| ((i % dims[0]) as f32 * 0.4).sin() + ((i / dims[0]) as f32 * 0.07).cos()).collect();
+    Grid { origin: DVec3::ZERO, axes: DMat3::from_diagonal(axes), dims, values }
+}
+
+fn transfer() -> TransferFunction {
+    let point = |value, extinction| TransferPoint { value, color: [1.0; 3], extinction };
+    TransferFunction::new(vec![point(0.3, 0.0), point(2.0, 1.0)]).unwrap()
+}
+
+fn exact(prediction: Prediction, cloud: &Cloud) {
+    assert_eq!(prediction.splats, cloud.len() as u64);
+    assert_eq!(prediction.at_most, Some(prediction.splats));
+    assert_eq!(prediction.bytes, cloud.bytes());
+}
+
+fn close(prediction: Prediction, cloud: &Cloud, tolerance: f64) {
+    let n = cloud.len() as f64;
+    assert!((prediction.splats as f64 / n - 1.0).abs() < tolerance, "{prediction:?} {n}");
+    assert!(prediction.at_most.is_none_or(|most| most >= cloud.len() as u64), "{prediction:?} {n}");
+    assert!((prediction.bytes as f64 / cloud.bytes() as f64 - 1.0).abs() < tolerance);
+}
+
+#[test]
+fn meshes_points_and_unsplit_volumes_are_counted_exactly() {
+    let transform = Similarity { scale: 3.0, ..Similarity::default() };
+    for density in [Density::Spacing(0.05), Density::Spacing(9.0), Density::Splats(5000), Density::Auto] {
+        for opacity in [0.0, 0.5, 1.0] {
+            let splat = SplatParams { transform, ..SplatParams::default() };
+            let params = MeshParams { splat, density, opacity };
+            exact(cost::mesh(&mesh(), &params).unwrap(), &mesh_to_points(&mesh(), &params).unwrap().0);
+        }
+    }
+    for values in [false, true] {
+        let params = SurfelParams { values, ..SurfelParams::default() };
+        exact(cost::raw_points(&points(500), &params).unwrap(), &raw_to_surfels(&points(500), &params).unwrap().0);
+        let params = VolumeParams {
+            normals: values,
+            values,
+            omitted_optical_depth: if values { 0.5 } else { 0.0 },
+            clip: values.then_some([DVec3::splat(2.0), DVec3::splat(7.5)]),
+            ..VolumeParams::default()
+        };
+        let grid = wave([12, 13, 14], DVec3::ONE);
+        let cloud = volume_to_points(&grid, &transfer(), &params).unwrap().0;
+        exact(cost::volume(&grid, &transfer(), &params).unwrap(), &cloud);
+        assert!(!cloud.is_empty());
+    }
+}
+
+#[test]
+fn split_volumes_fields_and_clouds_are_predicted_closely() {
+    let grid = wave([20, 20, 20], DVec3::new(1.0, 1.0, 3.0));
+    let params = VolumeParams { refine: 2, ..VolumeParams::default() };
+    let cloud = volume_to_points(&grid, &transfer(), &params).unwrap().0;
+    close(cost::volume(&grid, &transfer(), &params).unwrap(), &cloud, 0.05);
+
+    let bounds = [DVec3::splat(-1.3), DVec3::splat(1.3)];
+    for text in ["x^2 + y^2 + z^2 - 1", "y - 0.1*sin(7*x)*cos(5*z)", "(sqrt(x^2+z^2) - 0.8)^2 + y^2 - 0.06"] {
+        let field = ExpressionField::parse(text).unwrap();
+        for density in [Density::Spacing(0.03), Density::Splats(20_000), Density::Auto] {
+            let params = MeshParams { density, ..MeshParams::default() };
+            let cloud = surface_to_points(&field, bounds, &params).unwrap().0;
+            close(cost::surface(&field, bounds, &params).unwrap(), &cloud, 0.3);
+        }
+        let params = DensityParams { density: Density::Spacing(0.04), ..DensityParams::default() };
+        let cloud = density_to_points(&field, bounds, &params).unwrap().0;
+        close(cost::density(&field, bounds, &params).unwrap(), &cloud, 0.03);
+    }
+    let (shape, params) = (CloudShape::default(), VolumeParams::default());
+    let lattice = procedural_cloud(&shape, 0.06, &params.splat).unwrap();
+    let point = |value: f32| TransferPoint { value, color: [1.0; 3], extinction: value };
+    let tf = TransferFunction::new(vec![point(0.0), point(12.0)]).unwrap();
+    let cloud = volume_to_points(&lattice, &tf, &params).unwrap().0;
+    close(cost::procedural(&shape, 0.06, &params).unwrap(), &cloud, 0.05);
+}
+
+#[test]
+fn closed_shapes_are_counted() {
+    let p = SplatParams::default();
+    let (low, high) = (DVec3::ZERO, DVec3::new(2.0, 1.0, 0.3));
+    exact(cost::medium_box(low, high, 5.0, 0.07, &p).unwrap(), &medium_box(low, high, 5.0, 0.07, &p).unwrap());
+    exact(cost::medium_box(low, high, 0.0, 0.07, &p).unwrap(), &medium_box(low, high, 0.0, 0.07, &p).unwrap());
+    let (u, v) = (DVec3::X, DVec3::Z * 2.0);
+    exact(cost::rectangle(u, v, 0.05, &p).unwrap(), &rectangle(low, u, v, 0.75, 0.05, &p).unwrap());
+    for spacing in [0.03, 0.1] {
+        let ball = medium_ball(DVec3::ONE, 0.8, 2.0, spacing, &p).unwrap();
+        close(cost::medium_ball(DVec3::ONE, 0.8, 2.0, spacing, &p).unwrap(), &ball, 0.06);
+    }
+}
+
+#[test]
+fn cv10_predictions_refuse_what_conversions_refuse() {
+    let splat = SplatParams { max_splats: 1000, ..SplatParams::default() };
+    let params = MeshParams { splat: splat.clone(), density: Density::Spacing(1e-6), ..MeshParams::default() };
+    assert!(matches!(cost::mesh(&mesh(), &params), Err(ConvertError::TooMany { .. })));
+    let params = SurfelParams { splat, ..SurfelParams::default() };
+    assert!(matches!(cost::raw_points(&points(1001), &params), Err(ConvertError::TooMany { .. })));
+}
+
+/// Every conversion ticks what it announced, and stops when it is cancelled.
+fn interrupted(run: &dyn Fn(&Progress) -> Result<(), ConvertError>) {
+    let progress = Progress::new();
+    run(&progress).unwrap();
+    let (done, total) = progress.read();
+    assert!(done == total && total > 0, "{done} of {total}");
+    let progress = Progress::new();
+    progress.cancel();
+    assert_eq!(run(&progress), Err(ConvertError::Cancelled));
+    // Cancelled from outside while it runs: it ends either way, but never with half a cloud.
+    let progress = Progress::new();
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            while progress.read().0 == 0 {
+                std::thread::yield_now();
+            }
+            progress.cancel();
+        });
+        let result = run(&progress);
+        assert!(matches!(result, Ok(()) | Err(ConvertError::Cancelled)));
+        progress.cancel();
+    });
+}
+
+#[test]
+fn long_conversions_tick_and_stop() {
+    let field = ExpressionField::parse("x^2 + y^2 + z^2 - 1").unwrap();
+    let bounds = [DVec3::splat(-1.3), DVec3::splat(1.3)];
+    let fine = MeshParams { density: Density::Spacing(0.01), ..MeshParams::default() };
+    interrupted(&|p| mesh_to_points_with_progress(&mesh(), &fine, &mut Cloud::default(), p).map(|_| ()));
+    interrupted(&|p| raw_to_surfels_with_progress(&points(3000), &SurfelParams::default(), p).map(|_| ()));
+    let (grid, params) = (wave([20; 3], DVec3::ONE), VolumeParams { normals: true, ..VolumeParams::default() });
+    interrupted(&|p| volume_to_points_with_progress(&grid, &transfer(), &params, p).map(|_| ()));
+    interrupted(&|p| surface_to_points_with_progress(&field, bounds, &fine, p).map(|_| ()));
+    let density = DensityParams { density: Density::Spacing(0.1), ..DensityParams::default() };
+    interrupted(&|p| density_to_points_with_progress(&field, bounds, &density, p).map(|_| ()));
+    let (shape, splat) = (CloudShape::default(), SplatParams::default());
+    interrupted(&|p| procedural_cloud_with_progress(&shape, 0.2, &splat, p).map(|_| ()));
+}
