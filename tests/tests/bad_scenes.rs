@@ -153,6 +153,28 @@ fn bi29_impossible_resolutions_are_refused() {
 }
 
 #[test]
+fn bi24_expression_errors_name_line_and_column_of_the_scene() {
+    for (expression, expected) in [
+        ("2*sine(x)", "12:30: `expression`, column 3: expected a variable, a constant or a function, found"),
+        ("x + ", "12:32: `expression`, column 5: expected"),
+        ("x^2 + (y", "12:36: `expression`, column 9: expected"),
+        ("ü", "12:28: `expression`, column 1: expected"),
+        // Written with an escape: the value's own place.
+        ("x \\u002b", "12:27: `expression`, column 4: expected"),
+    ] {
+        for (kind, more) in [("implicit", ""), ("density ", ", extinction = 1")] {
+            let rest = format!("box = [[0,0,0],[1,1,1]], spacing = 0.1{more}");
+            let source = format!("{kind} = {{ expression = \"{expression}\", {rest} }}");
+            let (message, hint) = refusal("mesh = \"a.ply\"", &source);
+            assert!(message.starts_with(expected) && !hint.is_empty(), "{message} / {hint}");
+        }
+    }
+    let text = "implicit = { expression = \"\"\"\nx +\n* y\"\"\", box = [[0,0,0],[1,1,1]], spacing = 0.1 }";
+    let (message, _) = refusal("mesh = \"a.ply\"", text);
+    assert!(message.starts_with("14:1: `expression`, column 5: "), "{message}");
+}
+
+#[test]
 fn bi28_names_and_references_name_both_places() {
     refused("name = \"b\"", "name = \"a\"", "15:8: duplicate object name `a`, first at line 11, column 8");
     let (message, hint) = refusal("material = \"glass\"", "material = \"glas\"");

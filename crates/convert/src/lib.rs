@@ -59,9 +59,7 @@ pub use field_points::{
     DensityParams, density_to_points, density_to_points_with_progress, field_to_grid, field_to_mesh, surface_to_points,
     surface_to_points_with_progress,
 };
-pub use mesh_points::{
-    MeshParams, MeshReport, mesh_to_points, mesh_to_points_into, mesh_to_points_with_progress,
-};
+pub use mesh_points::{MeshParams, MeshReport, mesh_to_points, mesh_to_points_into, mesh_to_points_with_progress};
 #[cfg(feature = "surfels")]
 pub use orient::Orientation;
 pub use params::{Density, SplatParams};

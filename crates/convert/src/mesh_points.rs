@@ -7,16 +7,13 @@
 //!
 //! Deviation from the paper: it gives each piece the opacity of the surface, which multiplies where discs overlap.
 
-use crate::columns::{self, Wanted};
 use crate::ConvertError;
+use crate::columns::{self, Wanted};
 use crate::params::{Density, SplatParams};
 use crate::pieces::Pieces;
 use crate::subdivide::{self, Measure};
 use rayon::prelude::*;
-use splat_core::{
-    Cloud, Mesh, Progress, SplatKind,
-    glam::DVec3,
-};
+use splat_core::{Cloud, Mesh, Progress, SplatKind, glam::DVec3};
 
 /// How a mesh becomes splats.
 #[derive(Debug, Clone, PartialEq)]

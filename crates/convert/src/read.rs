@@ -16,6 +16,8 @@ mod nifti;
 mod origin;
 #[cfg(feature = "ply")]
 mod ply;
+#[cfg(any(feature = "ply", feature = "obj"))]
+mod polygon;
 
 #[cfg(feature = "las")]
 pub use laz::panic_is_input_error;

@@ -40,6 +40,6 @@ pub mod truth;
 
 pub use error::{Error, escape_controls, printable};
 pub use info::{FileInfo, info};
-pub use load::{Loaded, load};
+pub use load::{Loaded, SplatCount, load};
 pub use render::{Explanation, Render, RenderOptions, explain, render};
 pub use splat_core::{CostRecord, Layers, Progress};

@@ -1,6 +1,6 @@
 //! From a scene to images: load, plan, draw.
 
-use crate::load::{Loaded, load};
+use crate::load::{Loaded, SplatCount, load};
 use crate::plan::{Plan, pass, plan};
 use crate::points::{self, Drawing};
 use crate::scene::Scene;
@@ -47,6 +47,8 @@ pub struct Explanation {
     pub cost: CostRecord,
     /// Bytes that rendering will take at most, see [`Explanation::plan`] for the passes that take them.
     pub memory: u64,
+    /// Splats of every visible object, as predicted from its input and as made.
+    pub splats: Vec<SplatCount>,
     /// What a user should know of the input.
     pub warnings: Vec<String>,
 }
@@ -106,8 +108,8 @@ fn prepare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Resul
     let maps = plan.shadow_maps.iter().filter(|on| **on).count() as u64;
     let memory = image + splat_bytes(&loaded, &scene.render.layers.set()) + maps * map_bytes(statistics.casters);
     check_memory("rendering", memory, options.max_memory)?;
-    let warnings = loaded.warnings.clone();
-    Ok((loaded, Explanation { plan, cost, memory, warnings }))
+    let (splats, warnings) = (loaded.splats.clone(), loaded.warnings.clone());
+    Ok((loaded, Explanation { plan, cost, memory, splats, warnings }))
 }
 
 /// Footprints keep their pixel rectangles in 16 bits.

@@ -12,13 +12,14 @@ pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
     let scene = load_scene(&arguments.scene)?;
     start_threads(arguments.scene.threads)?;
     let options = render_options(&arguments.scene);
-    let (plan, cost, memory, warnings) = with_bar(|progress| {
+    let (plan, cost, prepared, warnings) = with_bar(|progress| {
         if arguments.measure {
             let render = organza::render(&scene, &options, progress)?;
             return Ok((render.plan, render.cost, None, render.warnings));
         }
         let explanation = organza::explain(&scene, &options, progress)?;
-        Ok((explanation.plan, explanation.cost, Some(explanation.memory), explanation.warnings))
+        let organza::Explanation { plan, cost, memory, splats, warnings } = explanation;
+        Ok((plan, cost, Some((memory, splats)), warnings))
     })?;
     for warning in &warnings {
         console::warn(warning);
@@ -28,7 +29,8 @@ pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
             "scene": path_text(&scene.file),
             "plan": report::plan_json(&plan),
             "cost": report::cost_json(&cost),
-            "memory_bytes": memory,
+            "memory_bytes": prepared.as_ref().map(|p| p.0),
+            "splats": prepared.as_ref().map(|p| report::splats_json(&p.1)),
             "warnings": warnings,
         });
         return console::out(&format!("{document:#}\n"));
@@ -36,7 +38,8 @@ pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
     let mut text = report::plan_text(&plan);
     text.push('\n');
     text += &report::cost_text(&cost);
-    if let Some(memory) = memory {
+    if let Some((memory, splats)) = prepared {
+        text += &format!("\n{}\n", report::splats_text(&splats));
         text += &format!("rendering takes at most {memory} bytes\n");
     }
     console::out(&text)

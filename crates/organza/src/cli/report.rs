@@ -1,7 +1,7 @@
 //! Plans and costs as tables and as JSON.
 
-use organza::CostRecord;
 use organza::plan::Plan;
+use organza::{CostRecord, SplatCount};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -14,6 +14,22 @@ pub(super) fn cost_json(cost: &CostRecord) -> Value {
         })
     };
     cost.stages.iter().map(stage).collect()
+}
+
+/// Splats by object as JSON.
+pub(super) fn splats_json(splats: &[SplatCount]) -> Value {
+    let object =
+        |s: &SplatCount| json!({ "object": s.object, "predicted": s.predicted, "exact": s.exact, "made": s.made });
+    splats.iter().map(object).collect()
+}
+
+/// Splats by object as a table.
+pub(super) fn splats_text(splats: &[SplatCount]) -> String {
+    let rows = splats.iter().map(|s| {
+        let about = if s.exact { "" } else { "about " };
+        [organza::escape_controls(&s.object).into_owned(), format!("{about}{}", s.predicted), s.made.to_string()]
+    });
+    table(["object", "splats predicted", "splats"], "lrr", rows)
 }
 
 /// The plan as JSON.

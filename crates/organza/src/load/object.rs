@@ -1,18 +1,21 @@
 //! One object → its cloud.
 
-use crate::scene::{CloudSource, DensitySource, ImplicitSource, MediumShape, Scene, SceneObject, Source, VolumeSource};
+use crate::scene::{
+    CloudSource, DensitySource, ImplicitSource, MediumShape, RectangleSource, Scene, SceneObject, Source, VolumeSource,
+};
 use crate::{Error, RenderOptions};
+use convert::cost::{self, Prediction};
 use convert::read::{Loaded as FileData, ReadLimits};
 use convert::{
-    CloudShape, ConvertError, Density, DensityParams, Ellipsoid, ExpressionField, MeshParams, Orientation, SplatParams,
-    SurfelParams, VolumeParams,
+    CloudShape, ConvertError, Density, DensityParams, Ellipsoid, ExpressionField, MeshParams, Orientation, RawPoints,
+    SplatParams, SurfelParams, VolumeParams,
 };
 use glam::DVec3;
-use splat_core::{Cloud, Object, Shading, TransferFunction, TransferPoint};
+use splat_core::{Cloud, Grid, Mesh, Object, Progress, Shading, TransferFunction, TransferPoint};
 use std::path::Path;
 
 /// Bytes that a splat takes from its conversion to the finished picture, at most.
-const BYTES_PER_SPLAT: u64 = 256;
+pub(super) const BYTES_PER_SPLAT: u64 = 256;
 
 /// Largest spacing of raw points over their median: above it, leaves and wires would become petals.
 const LARGEST_SPACING: f64 = 1.7;
@@ -21,10 +24,48 @@ const LARGEST_SPACING: f64 = 1.7;
 pub(super) struct Context<'a> {
     pub(super) scene: &'a Scene,
     pub(super) options: &'a RenderOptions,
+    pub(super) progress: &'a Progress,
     /// Rank of the object.
     pub(super) id: usize,
-    /// Bytes that earlier objects take.
+    /// Bytes and splats that earlier objects take.
     pub(super) used: u64,
+    pub(super) made: u64,
+}
+
+/// The input of one object with the parameters of its conversion, and what that will make.
+pub(super) struct Prepared<'a> {
+    input: Input<'a>,
+    pub(super) prediction: Prediction,
+}
+
+enum Input<'a> {
+    Mesh(&'a Path, Mesh, MeshParams),
+    Points(&'a Path, RawPoints, SurfelParams),
+    Volume(Grid, &'a TransferFunction, VolumeParams),
+    Implicit(ExpressionField, [DVec3; 2], MeshParams),
+    Density(ExpressionField, [DVec3; 2], DensityParams),
+    Procedural(CloudShape, f64, VolumeParams),
+    Medium(MediumShape, SplatParams),
+    Rectangle(RectangleSource, f64, SplatParams),
+}
+
+impl Prepared<'_> {
+    /// Bytes that the input holds.
+    pub(super) fn bytes(&self) -> u64 {
+        let bytes = match &self.input {
+            Input::Mesh(_, mesh, _) => {
+                size_of_val(mesh.position.as_slice())
+                    + size_of_val(mesh.normal.as_slice())
+                    + size_of_val(mesh.color.as_slice())
+                    + size_of_val(mesh.triangles.as_slice())
+            }
+            // Position, normal, colour, value, class and integers at most.
+            Input::Points(_, points, _) => 64 * points.len(),
+            Input::Volume(grid, ..) => size_of_val(grid.values.as_slice()),
+            _ => 0,
+        };
+        bytes as u64
+    }
 }
 
 /// The object's row of the object table.
@@ -43,67 +84,150 @@ pub(super) fn needs_gradients(object: &SceneObject, scene: &Scene) -> bool {
     is_volume && (lit || scene.render.layers.set().normal)
 }
 
-/// Reads and converts one object.
-pub(super) fn convert(object: &SceneObject, context: &Context<'_>, warnings: &mut Vec<String>) -> Result<Cloud, Error> {
-    let params = context.splat_params(object);
-    let cloud = match &object.source {
-        Source::Mesh(path) => mesh(path, object, context, params, warnings),
-        Source::Points(path) => raw_points(path, object, context, params, warnings),
-        Source::Volume(volume) => grid(volume, context, params),
-        Source::Implicit(implicit) => surface(implicit, object, context, params),
-        Source::Density(density) => medium_of_expression(density, object, context, params),
-        Source::Cloud(cloud) => procedural(cloud, context, params),
-        Source::Medium(shape) => medium(shape, &params),
-        Source::Rectangle(r) => {
-            convert::rectangle(r.center, r.u, r.v, context.opacity(object), r.spacing, &params).map_err(|e| refuse(&e))
+/// Reads one object and counts its splats.
+pub(super) fn prepare<'a>(object: &'a SceneObject, context: &Context<'_>) -> Result<Prepared<'a>, Error> {
+    let input = input(object, context)?;
+    let prediction = match &input {
+        Input::Mesh(_, mesh, params) => cost::mesh(mesh, params),
+        Input::Points(_, points, params) => cost::raw_points(points, params),
+        Input::Volume(grid, transfer, params) => cost::volume(grid, transfer, params),
+        Input::Implicit(field, bounds, params) => cost::surface(field, *bounds, params),
+        Input::Density(field, bounds, params) => cost::density(field, *bounds, params),
+        Input::Procedural(shape, spacing, params) => cost::procedural(shape, *spacing, params),
+        Input::Medium(MediumShape::Box { min, max, extinction, spacing }, params) => {
+            cost::medium_box(*min, *max, *extinction, *spacing, params)
         }
-    }?;
+        Input::Medium(MediumShape::Ball { center, radius, extinction, spacing }, params) => {
+            cost::medium_ball(*center, *radius, *extinction, *spacing, params)
+        }
+        Input::Rectangle(r, _, params) => cost::rectangle(r.u, r.v, r.spacing, params),
+    };
+    Ok(Prepared { input, prediction: prediction.map_err(|e| refuse(&e))? })
+}
+
+fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Result<Input<'a>, Error> {
+    let splat = context.splat_params(object);
+    let opacity = context.opacity(object);
+    Ok(match &object.source {
+        Source::Mesh(path) => {
+            let density = object.spacing.map_or(Density::Auto, Density::Spacing);
+            Input::Mesh(path, read_mesh(path, context)?, MeshParams { splat, density, opacity })
+        }
+        Source::Points(path) => Input::Points(path, read_points(path, context)?, context.surfel_params(object, splat)),
+        Source::Volume(VolumeSource { path, transfer }) => {
+            Input::Volume(read_grid(path, context)?, transfer, context.volume_params(splat))
+        }
+        Source::Implicit(ImplicitSource { expression, bounds, spacing }) => {
+            let spacing = object.spacing.unwrap_or(spacing * splat.transform.scale);
+            let params = MeshParams { splat, density: Density::Spacing(spacing), opacity };
+            Input::Implicit(field(expression, object)?, *bounds, params)
+        }
+        Source::Density(DensitySource { expression, bounds, spacing, extinction }) => {
+            let params = DensityParams {
+                density: Density::Spacing(spacing * splat.transform.scale),
+                extinction: *extinction,
+                volume: context.volume_params(splat),
+            };
+            Input::Density(field(expression, object)?, *bounds, params)
+        }
+        Source::Cloud(cloud) => Input::Procedural(cloud_shape(cloud), cloud.spacing, context.volume_params(splat)),
+        Source::Medium(shape) => Input::Medium(*shape, splat),
+        Source::Rectangle(r) => Input::Rectangle(*r, opacity, splat),
+    })
+}
+
+/// Converts one object.
+pub(super) fn convert(
+    prepared: Prepared<'_>,
+    object: &SceneObject,
+    context: &Context<'_>,
+    warnings: &mut Vec<String>,
+) -> Result<Cloud, Error> {
+    let cloud = match prepared.input {
+        Input::Mesh(path, mesh, mut params) => {
+            context.limit(&mut params.splat);
+            mesh_splats(path, &mesh, &params, context, warnings)
+        }
+        Input::Points(path, points, mut params) => {
+            context.limit(&mut params.splat);
+            surfels(path, &points, &params, context, warnings)
+        }
+        Input::Volume(grid, transfer, mut params) => {
+            context.limit(&mut params.splat);
+            convert::volume_to_points_with_progress(&grid, transfer, &params, context.progress).map(|c| c.0)
+        }
+        Input::Implicit(field, bounds, mut params) => {
+            context.limit(&mut params.splat);
+            convert::surface_to_points_with_progress(&field, bounds, &params, context.progress).map(|c| c.0)
+        }
+        Input::Density(field, bounds, mut params) => {
+            context.limit(&mut params.volume.splat);
+            convert::density_to_points_with_progress(&field, bounds, &params, context.progress).map(|c| c.0)
+        }
+        Input::Procedural(shape, spacing, mut params) => {
+            context.limit(&mut params.splat);
+            procedural(&shape, spacing, &params, context)
+        }
+        Input::Medium(shape, mut params) => {
+            context.limit(&mut params);
+            medium(&shape, &params)
+        }
+        Input::Rectangle(r, opacity, mut params) => {
+            context.limit(&mut params);
+            convert::rectangle(r.center, r.u, r.v, opacity, r.spacing, &params)
+        }
+    }
+    .map_err(|e| refuse(&e))?;
     if cloud.is_empty() {
         warnings.push(format!("object '{}' has no splats", crate::escape_controls(&object.name)));
     }
     Ok(cloud)
 }
 
-fn mesh(
+fn read_mesh(path: &Path, context: &Context<'_>) -> Result<Mesh, Error> {
+    match context.read(path)? {
+        FileData::Mesh(mesh) => Ok(mesh),
+        _ => Err(wrong_kind(path, "a mesh with faces", "use `points = ` or `volume = ` for this file")),
+    }
+}
+
+fn read_points(path: &Path, context: &Context<'_>) -> Result<RawPoints, Error> {
+    match context.read(path)? {
+        FileData::Points(points) => Ok(points),
+        _ => Err(wrong_kind(path, "points without faces", "use `mesh = ` or `volume = ` for this file")),
+    }
+}
+
+fn read_grid(path: &Path, context: &Context<'_>) -> Result<Grid, Error> {
+    match context.read(path)? {
+        FileData::Grid(grid) => Ok(grid),
+        _ => Err(wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file")),
+    }
+}
+
+fn mesh_splats(
     path: &Path,
-    object: &SceneObject,
+    mesh: &Mesh,
+    params: &MeshParams,
     context: &Context<'_>,
-    splat: SplatParams,
     warnings: &mut Vec<String>,
-) -> Result<Cloud, Error> {
-    let FileData::Mesh(mesh) = context.read(path)? else {
-        return Err(wrong_kind(path, "a mesh with faces", "use `points = ` or `volume = ` for this file"));
-    };
-    let density = object.spacing.map_or(Density::Auto, Density::Spacing);
-    let params = MeshParams { splat, density, opacity: context.opacity(object) };
-    let (cloud, report) = convert::mesh_to_points(&mesh, &params).map_err(|e| refuse(&e))?;
+) -> Result<Cloud, ConvertError> {
+    let mut cloud = Cloud::default();
+    let report = convert::mesh_to_points_with_progress(mesh, params, &mut cloud, context.progress)?;
     if report.degenerate > 0 {
         warnings.push(format!("{}: {} faces have no area", crate::printable(path), report.degenerate));
     }
     Ok(cloud)
 }
 
-fn raw_points(
+fn surfels(
     path: &Path,
-    object: &SceneObject,
+    points: &RawPoints,
+    params: &SurfelParams,
     context: &Context<'_>,
-    splat: SplatParams,
     warnings: &mut Vec<String>,
-) -> Result<Cloud, Error> {
-    let FileData::Points(points) = context.read(path)? else {
-        return Err(wrong_kind(path, "points without faces", "use `mesh = ` or `volume = ` for this file"));
-    };
-    // The side that faces the sky.
-    let up = splat.transform.rotation.inverse() * DVec3::Y;
-    let params = SurfelParams {
-        splat,
-        orientation: Orientation::Toward(up),
-        opacity: context.opacity(object),
-        largest_spacing: LARGEST_SPACING,
-        merge_duplicates: object.merge_duplicates || context.options.merge_duplicates,
-        ..SurfelParams::default()
-    };
-    let (cloud, report) = convert::raw_to_surfels(&points, &params).map_err(|e| refuse(&e))?;
+) -> Result<Cloud, ConvertError> {
+    let (cloud, report) = convert::raw_to_surfels_with_progress(points, params, context.progress)?;
     if report.duplicates > 0 && !params.merge_duplicates {
         let n = report.duplicates;
         warnings
@@ -112,58 +236,18 @@ fn raw_points(
     Ok(cloud)
 }
 
-fn grid(source: &VolumeSource, context: &Context<'_>, splat: SplatParams) -> Result<Cloud, Error> {
-    let FileData::Grid(grid) = context.read(&source.path)? else {
-        return Err(wrong_kind(&source.path, "a volume", "use `mesh = ` or `points = ` for this file"));
-    };
-    let params = context.volume_params(splat);
-    let (cloud, _) = convert::volume_to_points(&grid, &source.transfer, &params).map_err(|e| refuse(&e))?;
-    Ok(cloud)
-}
-
 pub(crate) fn wrong_kind(path: &Path, expected: &str, hint: &str) -> Error {
     Error::input(crate::printable(path), format!("expected {expected}"), hint)
 }
 
-fn surface(
-    implicit: &ImplicitSource,
-    object: &SceneObject,
-    context: &Context<'_>,
-    splat: SplatParams,
-) -> Result<Cloud, Error> {
-    let field = expression(&implicit.expression, object)?;
-    let spacing = implicit.spacing * splat.transform.scale;
-    let density = Density::Spacing(object.spacing.unwrap_or(spacing));
-    let params = MeshParams { splat, density, opacity: context.opacity(object) };
-    let (cloud, _) = convert::surface_to_points(&field, implicit.bounds, &params).map_err(|e| refuse(&e))?;
-    Ok(cloud)
-}
-
-fn medium_of_expression(
-    source: &DensitySource,
-    object: &SceneObject,
-    context: &Context<'_>,
-    splat: SplatParams,
-) -> Result<Cloud, Error> {
-    let field = expression(&source.expression, object)?;
-    let spacing = source.spacing * splat.transform.scale;
-    let params = DensityParams {
-        density: Density::Spacing(spacing),
-        extinction: source.extinction,
-        volume: context.volume_params(splat),
-    };
-    let (cloud, _) = convert::density_to_points(&field, source.bounds, &params).map_err(|e| refuse(&e))?;
-    Ok(cloud)
-}
-
-pub(crate) fn expression(text: &str, object: &SceneObject) -> Result<ExpressionField, Error> {
+pub(crate) fn field(text: &str, object: &SceneObject) -> Result<ExpressionField, Error> {
+    // The scene's check has parsed it already.
     ExpressionField::parse(text).map_err(|e| {
         let what = format!("object '{}', expression", crate::escape_controls(&object.name));
         Error::input(what, e.to_string(), "variables are x, y and z")
     })
 }
 
-/// The cloud that a scene describes.
 pub(crate) fn cloud_shape(source: &CloudSource) -> CloudShape {
     CloudShape {
         ellipsoids: source.ellipsoids.iter().map(|&(center, radii)| Ellipsoid { center, radii }).collect(),
@@ -177,20 +261,24 @@ pub(crate) fn cloud_shape(source: &CloudSource) -> CloudShape {
     }
 }
 
-fn procedural(source: &CloudSource, context: &Context<'_>, splat: SplatParams) -> Result<Cloud, Error> {
-    let lattice = convert::procedural_cloud(&cloud_shape(source), source.spacing, &splat).map_err(|e| refuse(&e))?;
-    let point = |value: f32| TransferPoint { value, color: splat.color, extinction: value };
+fn procedural(
+    shape: &CloudShape,
+    spacing: f64,
+    params: &VolumeParams,
+    context: &Context<'_>,
+) -> Result<Cloud, ConvertError> {
+    let lattice = convert::procedural_cloud_with_progress(shape, spacing, &params.splat, context.progress)?;
+    let point = |value: f32| TransferPoint { value, color: params.splat.color, extinction: value };
     let mut points = vec![point(0.0)];
-    if source.extinction > 0.0 {
-        points.push(point(source.extinction as f32));
+    if shape.extinction > 0.0 {
+        points.push(point(shape.extinction as f32));
     }
-    let transfer = TransferFunction::new(points).map_err(|e| Error::Internal(e.to_string()))?;
-    let (cloud, _) =
-        convert::volume_to_points(&lattice, &transfer, &context.volume_params(splat)).map_err(|e| refuse(&e))?;
-    Ok(cloud)
+    let transfer = TransferFunction::new(points)
+        .map_err(|source| ConvertError::Input { object: params.splat.object_name.clone(), source })?;
+    convert::volume_to_points_with_progress(&lattice, &transfer, params, context.progress).map(|c| c.0)
 }
 
-fn medium(shape: &MediumShape, params: &SplatParams) -> Result<Cloud, Error> {
+fn medium(shape: &MediumShape, params: &SplatParams) -> Result<Cloud, ConvertError> {
     match *shape {
         MediumShape::Box { min, max, extinction, spacing } => {
             convert::medium_box(min, max, extinction, spacing, params)
@@ -199,15 +287,12 @@ fn medium(shape: &MediumShape, params: &SplatParams) -> Result<Cloud, Error> {
             convert::medium_ball(center, radius, extinction, spacing, params)
         }
     }
-    .map_err(|e| refuse(&e))
 }
 
 impl Context<'_> {
     fn splat_params(&self, object: &SceneObject) -> SplatParams {
         let material = &self.scene.materials[object.material];
-        let fits = self.options.max_memory.saturating_sub(self.used) / BYTES_PER_SPLAT;
-        let asked = self.scene.render.max_points.unwrap_or(u64::MAX);
-        SplatParams {
+        let mut params = SplatParams {
             object_name: object.name.clone(),
             object: self.id as u32,
             material: object.material as u16,
@@ -215,7 +300,30 @@ impl Context<'_> {
             profile: self.scene.footprints.layers()[object.footprint as usize],
             transform: object.transform,
             color: object.color.unwrap_or(material.color),
-            max_splats: fits.min(asked).min(u64::from(u32::MAX)),
+            max_splats: 0,
+        };
+        self.limit(&mut params);
+        params
+    }
+
+    /// What earlier objects have left of memory and of the scene's own limit.
+    fn limit(&self, params: &mut SplatParams) {
+        let fits = self.options.max_memory.saturating_sub(self.used) / BYTES_PER_SPLAT;
+        let asked = self.scene.render.max_points.map_or(u64::MAX, |most| most.saturating_sub(self.made));
+        params.max_splats = fits.min(asked).min(u64::from(u32::MAX));
+    }
+
+    /// Parameters of raw points.
+    fn surfel_params(&self, object: &SceneObject, splat: SplatParams) -> SurfelParams {
+        // The side that faces the sky.
+        let up = splat.transform.rotation.inverse() * DVec3::Y;
+        SurfelParams {
+            splat,
+            orientation: Orientation::Toward(up),
+            opacity: self.opacity(object),
+            largest_spacing: LARGEST_SPACING,
+            merge_duplicates: object.merge_duplicates || self.options.merge_duplicates,
+            ..SurfelParams::default()
         }
     }
 
@@ -245,6 +353,7 @@ pub(crate) fn refuse(error: &ConvertError) -> Error {
             unit: what,
             hint: "use a larger spacing, or a larger --max-memory or render.max_points".into(),
         },
+        ConvertError::Cancelled => Error::Cancelled,
         other => Error::input("scene", other.to_string(), ""),
     }
 }

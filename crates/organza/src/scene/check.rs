@@ -49,6 +49,12 @@ impl<'a> At<'a> {
         self.document.error(self.document.place_of(&self.path), message, hint)
     }
 
+    /// An error at a column (from 1) of the text `value` that is written here.
+    pub(super) fn error_in_text(&self, value: &str, column: usize, message: String, hint: &str) -> Error {
+        let place = self.document.place_in_text(self.document.place_of(&self.path), value, column);
+        self.document.error(place, message, hint)
+    }
+
     /// The place in words.
     pub(super) fn name(&self) -> String {
         self.document.name_place(self.document.place_of(&self.path))

@@ -9,6 +9,7 @@ use super::{
     VolumeSource,
 };
 use crate::Error;
+use convert::ExpressionField;
 use glam::{DQuat, DVec3, EulerRot};
 use splat_core::{FootprintStack, Similarity, TransferFunction, TransferPoint, optics};
 
@@ -220,6 +221,11 @@ fn check_region(
         );
         return Err(at.key("expression").error(message, ""));
     }
+    ExpressionField::parse(expression).map_err(|e| {
+        let message = format!("`expression`, column {}: expected {}, found {}", e.column, e.expected, e.found);
+        let hint = e.hint.strip_prefix("; ").unwrap_or("variables are x, y and z");
+        at.key("expression").error_in_text(expression, e.column, message, hint)
+    })?;
     let (low, high) = check_box(at, "box", "box", bounds[0], bounds[1])?;
     let longest = (high - low).max_element();
     let spacing = match (resolution, spacing) {

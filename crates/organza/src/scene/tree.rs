@@ -126,6 +126,18 @@ impl Document<'_> {
         }
     }
 
+    /// The place of character `column` (from 1) of a text value that begins at `place`; the value's own place where it is
+    /// not written letter by letter (escapes, overrides).
+    pub(super) fn place_in_text(&self, place: Place, value: &str, column: usize) -> Place {
+        let Place::Byte(start) = place else { return place };
+        let written = self.text.get(start..).unwrap_or("");
+        // Longest first; a line end right after three quotes does not belong to the value.
+        let quotes = ["\"\"\"\r\n", "'''\r\n", "\"\"\"\n", "'''\n", "\"\"\"", "'''", "\"", "'"];
+        let opening = quotes.iter().find(|q| written.strip_prefix(**q).is_some_and(|rest| rest.starts_with(value)));
+        let offset = value.char_indices().nth(column.saturating_sub(1)).map_or(value.len(), |(byte, _)| byte);
+        opening.map_or(place, |q| Place::Byte(start + q.len() + offset))
+    }
+
     /// The place of the deepest value on a path that exists.
     pub(super) fn place_of(&self, path: &[Step<'_>]) -> Place {
         let mut node = &self.root;
@@ -145,6 +157,20 @@ impl Document<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn places_inside_texts_are_found_where_they_are_written_letter_by_letter() {
+        let root = Node { place: Place::Byte(0), value: Value::Null };
+        let text = "a = \"xü+\"\nb = '''\nx + y'''\nc = \"x\\u002by\"";
+        let document = Document { file: Path::new("s"), text, flags: Vec::new(), root };
+        let byte = |needle: &str| text.find(needle).unwrap_or(0);
+        assert_eq!(document.place_in_text(Place::Byte(4), "xü+", 3), Place::Byte(byte("+\"")));
+        assert_eq!(document.place_in_text(Place::Byte(4), "xü+", 4), Place::Byte(byte("+\"") + 1));
+        assert_eq!(document.place_in_text(Place::Byte(byte("'''")), "x + y", 5), Place::Byte(byte("y'''")));
+        let escaped = Place::Byte(byte("\"x\\u"));
+        assert_eq!(document.place_in_text(escaped, "x+y", 2), escaped);
+        assert_eq!(document.place_in_text(Place::Flag(0), "x", 1), Place::Flag(0));
+    }
 
     #[test]
     fn columns_count_characters() {

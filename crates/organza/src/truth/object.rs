@@ -1,6 +1,6 @@
 //! One object as the path tracer takes it: a density or a mesh in the world.
 
-use crate::load::object::{cloud_shape, expression, refuse, wrong_kind};
+use crate::load::object::{cloud_shape, field, refuse, wrong_kind};
 use crate::scene::{MediumShape, Scene, SceneMaterial, SceneObject, Source};
 use crate::{Error, RenderOptions};
 use convert::read::{Loaded as FileData, ReadLimits};
@@ -62,7 +62,7 @@ pub(super) fn body(
         Source::Volume(_) => return no("classified volumes are not path-traced"),
         Source::Mesh(path) => file(path, options)?,
         Source::Implicit(i) => {
-            let field = expression(&i.expression, object)?;
+            let field = field(&i.expression, object)?;
             let params = SplatParams { object_name: object.name.clone(), ..SplatParams::default() };
             convert::field_to_mesh(&field, i.bounds, i.spacing * FINER, &params).map_err(|e| refuse(&e))?
         }
@@ -145,7 +145,7 @@ fn shape(object: &SceneObject) -> Result<Result<(Shape, f64), String>, Error> {
             Ok((Shape::Box([t.apply(*min), t.apply(*max)]), *extinction))
         }
         Source::Density(d) => {
-            let field = Placed { field: expression(&d.expression, object)?, transform: t };
+            let field = Placed { field: field(&d.expression, object)?, transform: t };
             let bounds = d.bounds.map(|p| t.apply(p));
             let majorant = majorant(&field, bounds);
             Ok((Shape::Field { field, bounds, majorant }, d.extinction))

@@ -3,6 +3,7 @@
 use super::columns::Columns;
 use super::header::{Element, Header, Property, Shape, Type, at_line};
 use crate::error::{Place, ReadError, escaped};
+use crate::read::polygon::{self, Polygon};
 use crate::read::{Loaded, ReadLimits, input};
 
 /// Where numbers come from.
@@ -38,17 +39,26 @@ pub(super) fn read<S: Source>(mut source: S, header: &Header, limits: &ReadLimit
     };
     let mesh = named(b"face").is_some();
     let mut columns = Columns::new(vertices, limits.drop_invalid && !mesh)?;
-    let mut triangles = Vec::new();
+    let mut faces = Faces::default();
     for element in &header.elements {
         check_count(&source, element)?;
         match element.name.as_slice() {
             b"vertex" => read_vertices(&mut source, element, &mut columns, limits)?,
-            b"face" => read_faces(&mut source, element, vertices.count, &mut triangles, limits)?,
+            b"face" => read_faces(&mut source, element, vertices.count, &mut faces, limits)?,
             _ => skip_element(&mut source, element)?,
         }
     }
     source.finish()?;
-    if mesh { columns.into_mesh(triangles).map(Loaded::Mesh) } else { columns.into_points().map(Loaded::Points) }
+    if !mesh {
+        return columns.into_points().map(Loaded::Points);
+    }
+    let mut mesh = columns.into_mesh(faces.triangles)?;
+    polygon::triangulate(&mut mesh, &faces.polygons).map_err(|p| {
+        let found = format!("face {} of {} corners that crosses itself", p.face, p.count + 2);
+        let hint = "split the face into triangles, or put its corners in order";
+        ReadError::input(at_line(faces.line), "faces whose edges do not cross", found, hint)
+    })?;
+    Ok(Loaded::Mesh(mesh))
 }
 
 /// Refuses a count that the rest of the file cannot hold.
@@ -99,11 +109,21 @@ fn read_vertices<S: Source>(
     Ok(())
 }
 
+/// The faces so far.
+#[derive(Default)]
+struct Faces {
+    triangles: Vec<[u32; 3]>,
+    /// Faces of more than three corners; fans among the triangles until all vertices are known.
+    polygons: Vec<Polygon>,
+    /// Line of the header that announces them.
+    line: u64,
+}
+
 fn read_faces<S: Source>(
     source: &mut S,
     element: &Element,
     vertices: u64,
-    triangles: &mut Vec<[u32; 3]>,
+    faces: &mut Faces,
     limits: &ReadLimits,
 ) -> Result<(), ReadError> {
     let is_index = |p: &Property| p.name == b"vertex_indices" || p.name == b"vertex_index";
@@ -116,7 +136,8 @@ fn read_faces<S: Source>(
         return Err(ReadError::input(at_line(indices.line), "a list of integers", "another type", hint));
     }
     input::check_bytes("the faces", element.count.saturating_mul(12), limits)?;
-    input::reserve(triangles, element.count as usize)?;
+    input::reserve(&mut faces.triangles, element.count as usize)?;
+    faces.line = element.line;
     for face in 0..element.count {
         source.begin_record()?;
         for property in &element.properties {
@@ -125,7 +146,7 @@ fn read_faces<S: Source>(
                     source.number(kind)?;
                 }
                 Shape::List { count, item } if is_index(property) => {
-                    read_polygon(source, face, (count, item), vertices, triangles, limits)?;
+                    read_polygon(source, face, (count, item), vertices, faces, limits)?;
                 }
                 Shape::List { count, item } => skip_list(source, count, item)?,
             }
@@ -135,13 +156,13 @@ fn read_faces<S: Source>(
     Ok(())
 }
 
-/// One polygon → a fan around its first vertex, exact for convex polygons.
+/// One polygon → a fan around its first vertex, for now.
 fn read_polygon<S: Source>(
     source: &mut S,
     face: u64,
     (count, item): (Type, Type),
     vertices: u64,
-    triangles: &mut Vec<[u32; 3]>,
+    faces: &mut Faces,
     limits: &ReadLimits,
 ) -> Result<(), ReadError> {
     let corners = list_length(source, count, item)?;
@@ -149,9 +170,16 @@ fn read_polygon<S: Source>(
         let expected = format!("3 or more corners of face {face}");
         return Err(ReadError::input(source.place(), expected, corners.to_string(), "remove degenerate faces"));
     }
+    let Faces { triangles, polygons, .. } = faces;
     let total = triangles.len() as u64 + corners - 2;
-    input::check_bytes("the triangles", total.saturating_mul(12), limits)?;
-    input::reserve(triangles, corners as usize - 2)?;
+    let bytes = total.saturating_mul(12).saturating_add((polygons.len() * size_of::<Polygon>()) as u64);
+    input::check_bytes("the triangles", bytes, limits)?;
+    let count = corners as usize - 2;
+    input::reserve(triangles, count)?;
+    if count > 1 {
+        input::reserve(polygons, 1)?;
+        polygons.push(Polygon { face, first: triangles.len(), count });
+    }
     let mut corner = || {
         let index = source.number(item)?;
         if (0.0..vertices as f64).contains(&index) {
