@@ -18,7 +18,15 @@
 mod columns;
 mod convert_error;
 pub mod cost;
-#[cfg(any(feature = "ply", feature = "nifti", feature = "las"))]
+#[cfg(any(
+    feature = "ply",
+    feature = "stl",
+    feature = "obj",
+    feature = "xyz",
+    feature = "nrrd",
+    feature = "nifti",
+    feature = "las"
+))]
 mod error;
 #[cfg(feature = "expression")]
 mod expression;
@@ -35,7 +43,15 @@ mod places;
 #[cfg(feature = "noise")]
 mod procedural;
 mod raw_points;
-#[cfg(any(feature = "ply", feature = "nifti", feature = "las"))]
+#[cfg(any(
+    feature = "ply",
+    feature = "stl",
+    feature = "obj",
+    feature = "xyz",
+    feature = "nrrd",
+    feature = "nifti",
+    feature = "las"
+))]
 pub mod read;
 pub mod reference;
 mod resample;
@@ -51,7 +67,15 @@ mod vertex_normals;
 mod volume_points;
 
 pub use convert_error::ConvertError;
-#[cfg(any(feature = "ply", feature = "nifti", feature = "las"))]
+#[cfg(any(
+    feature = "ply",
+    feature = "stl",
+    feature = "obj",
+    feature = "xyz",
+    feature = "nrrd",
+    feature = "nifti",
+    feature = "las"
+))]
 pub use error::{Fault, Place, ReadError, escaped_path};
 #[cfg(feature = "expression")]
 pub use expression::{ExpressionError, ExpressionField};

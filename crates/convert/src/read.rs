@@ -1,9 +1,10 @@
-//! Reading files: meshes and point clouds (PLY, LAS, LAZ) and volumes (NIfTI), each also inside gzip.
+//! Reading files: meshes (PLY, STL, OBJ), point clouds (PLY, OBJ, XYZ, CSV, LAS, LAZ) and volumes (NIfTI, NRRD), each also
+//! inside gzip.
 //!
 //! No input makes a reader panic or take memory that the file does not stand for: sizes that a header announces are
 //! checked against the length of the file before anything is allocated.
 
-#[cfg(any(feature = "ply", feature = "las"))]
+#[cfg(any(feature = "ply", feature = "las", feature = "xyz"))]
 mod color;
 mod input;
 #[cfg(feature = "las")]
@@ -12,12 +13,22 @@ mod las;
 mod laz;
 #[cfg(feature = "nifti")]
 mod nifti;
-#[cfg(feature = "ply")]
+#[cfg(feature = "nrrd")]
+mod nrrd;
+#[cfg(feature = "obj")]
+mod obj;
+#[cfg(any(feature = "ply", feature = "stl", feature = "obj", feature = "xyz"))]
 mod origin;
 #[cfg(feature = "ply")]
 mod ply;
 #[cfg(any(feature = "ply", feature = "obj"))]
 mod polygon;
+#[cfg(feature = "stl")]
+mod stl;
+#[cfg(any(feature = "stl", feature = "obj", feature = "xyz", feature = "nrrd"))]
+mod text;
+#[cfg(feature = "xyz")]
+mod xyz;
 
 #[cfg(feature = "las")]
 pub use laz::panic_is_input_error;
@@ -63,7 +74,7 @@ pub enum Loaded {
 pub fn file(path: &Path, limits: &ReadLimits) -> Result<Loaded, ReadError> {
     let name = escaped_path(path);
     let content = input::regular_file(path, limits).map_err(|e| e.in_file(&name))?;
-    parse(path, content, limits).map_err(|e| e.in_file(&name))
+    parse(path, content, Some(path), limits).map_err(|e| e.in_file(&name))
 }
 
 /// Reads a file that is in memory already; `name` serves messages and tells the format where the content does not.
@@ -71,14 +82,25 @@ pub fn file(path: &Path, limits: &ReadLimits) -> Result<Loaded, ReadError> {
 /// # Errors
 /// [`ReadError`] as [`file()`] gives it.
 pub fn bytes(name: &str, content: &[u8], limits: &ReadLimits) -> Result<Loaded, ReadError> {
-    parse(Path::new(name), content.to_vec(), limits).map_err(|e| e.in_file(&escaped(name.as_bytes(), usize::MAX)))
+    let parsed = parse(Path::new(name), content.to_vec(), None, limits);
+    parsed.map_err(|e| e.in_file(&escaped(name.as_bytes(), usize::MAX)))
 }
 
-fn parse(path: &Path, content: Vec<u8>, limits: &ReadLimits) -> Result<Loaded, ReadError> {
+/// `place` is where the file lies, for headers that name another one.
+#[cfg_attr(not(feature = "nrrd"), allow(unused_variables, reason = "no other format has detached headers"))]
+fn parse(path: &Path, content: Vec<u8>, place: Option<&Path>, limits: &ReadLimits) -> Result<Loaded, ReadError> {
     let content = if content.starts_with(&[0x1f, 0x8b]) { input::gunzip(&content, limits)? } else { content };
     match format_of(path, &content) {
         #[cfg(feature = "ply")]
         Some(Format::Ply) => ply::read(&content, limits),
+        #[cfg(feature = "stl")]
+        Some(Format::Stl) => stl::read(&content, limits).map(Loaded::Mesh),
+        #[cfg(feature = "obj")]
+        Some(Format::Obj) => obj::read(&content, limits),
+        #[cfg(feature = "xyz")]
+        Some(Format::Xyz) => xyz::read(&content, limits).map(Loaded::Points),
+        #[cfg(feature = "nrrd")]
+        Some(Format::Nrrd) => nrrd::read(&content, place, limits).map(Loaded::Grid),
         #[cfg(feature = "las")]
         Some(Format::Las) => las::read(&content, limits).map(Loaded::Points),
         #[cfg(feature = "nifti")]
@@ -92,9 +114,9 @@ fn parse(path: &Path, content: Vec<u8>, limits: &ReadLimits) -> Result<Loaded, R
         )),
         None => Err(ReadError::input(
             Place::Byte(0),
-            "'ply', 'LASF' or a NIfTI-1 header",
+            "'ply', 'LASF', 'NRRD', a NIfTI-1 header, or the extension of a format without a mark",
             format!("'{}' ({} bytes)", escaped(&content[..content.len().min(16)], 16), content.len()),
-            "PLY, LAS, LAZ and NIfTI files are read, each also inside gzip",
+            "PLY, STL, OBJ, XYZ, CSV, LAS, LAZ, NIfTI and NRRD files are read, each also inside gzip",
         )),
     }
 }
@@ -102,6 +124,10 @@ fn parse(path: &Path, content: Vec<u8>, limits: &ReadLimits) -> Result<Loaded, R
 #[derive(Debug, Clone, Copy)]
 enum Format {
     Ply,
+    Stl,
+    Obj,
+    Xyz,
+    Nrrd,
     Las,
     Nifti,
 }
@@ -114,6 +140,9 @@ fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
     if content.starts_with(b"LASF") {
         return Some(Format::Las);
     }
+    if content.starts_with(b"NRRD000") {
+        return Some(Format::Nrrd);
+    }
     if content.get(344..347).is_some_and(|magic| magic == b"n+1" || magic == b"ni1") {
         return Some(Format::Nifti);
     }
@@ -121,6 +150,10 @@ fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
     let name = name.strip_suffix(".gz").unwrap_or(&name);
     match name.rsplit_once('.')?.1 {
         "ply" => Some(Format::Ply),
+        "stl" => Some(Format::Stl),
+        "obj" => Some(Format::Obj),
+        "xyz" | "csv" | "txt" | "pts" | "asc" => Some(Format::Xyz),
+        "nrrd" | "nhdr" => Some(Format::Nrrd),
         "las" | "laz" => Some(Format::Las),
         "nii" | "hdr" => Some(Format::Nifti),
         _ => None,

@@ -1,0 +1,249 @@
+//! The header of an NRRD file: lines `field: value` up to an empty line.
+
+use crate::error::{Place, ReadError, escaped};
+use crate::read::text::{Line, Lines};
+use splat_core::glam::{DMat3, DVec3};
+
+/// Type of one stored voxel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    I64,
+    U64,
+    F32,
+    F64,
+}
+
+impl Kind {
+    fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "signed char" | "int8" | "int8_t" => Self::I8,
+            "uchar" | "unsigned char" | "uint8" | "uint8_t" => Self::U8,
+            "short" | "short int" | "signed short" | "signed short int" | "int16" | "int16_t" => Self::I16,
+            "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => Self::U16,
+            "int" | "signed int" | "int32" | "int32_t" => Self::I32,
+            "uint" | "unsigned int" | "uint32" | "uint32_t" => Self::U32,
+            "longlong" | "long long" | "long long int" | "signed long long" | "int64" | "int64_t" => Self::I64,
+            "ulonglong" | "unsigned long long" | "unsigned long long int" | "uint64" | "uint64_t" => Self::U64,
+            "float" => Self::F32,
+            "double" => Self::F64,
+            _ => return None,
+        })
+    }
+
+    /// Bytes of a voxel.
+    pub(super) fn size(self) -> u64 {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::I64 | Self::U64 | Self::F64 => 8,
+        }
+    }
+}
+
+/// How voxels are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Encoding {
+    Raw,
+    Gzip,
+    Text,
+}
+
+/// What the header says.
+#[derive(Debug, Clone)]
+pub(super) struct Header {
+    pub(super) kind: Kind,
+    pub(super) sizes: [u64; 3],
+    pub(super) place_of_sizes: Place,
+    pub(super) encoding: Encoding,
+    pub(super) big_endian: bool,
+    pub(super) origin: DVec3,
+    pub(super) axes: DMat3,
+    pub(super) line_skip: u64,
+    pub(super) byte_skip: i64,
+    /// Name of the file with the voxels, and where the header names it.
+    pub(super) data_file: Option<(String, Place)>,
+    /// Byte offset of what follows the header.
+    pub(super) end: usize,
+}
+
+/// The fields as they are written, with their lines.
+#[derive(Default)]
+struct Fields<'a> {
+    found: Vec<(String, String, Line<'a>)>,
+}
+
+const KNOWN: [&str; 12] = [
+    "type",
+    "dimension",
+    "sizes",
+    "encoding",
+    "endian",
+    "spacings",
+    "space directions",
+    "space origin",
+    "data file",
+    "line skip",
+    "byte skip",
+    "axis mins",
+];
+
+/// Parses the header.
+pub(super) fn parse(content: &[u8]) -> Result<Header, ReadError> {
+    let mut lines = Lines::new(content);
+    let magic = lines.next()?.filter(|l| {
+        l.text.strip_prefix(b"NRRD000").is_some_and(|version| matches!(version.trim_ascii_end(), [b'1'..=b'5']))
+    });
+    if magic.is_none() {
+        let found = format!("'{}'", escaped(&content[..content.len().min(16)], 16));
+        return Err(ReadError::input(Place::Byte(0), "'NRRD0001' to 'NRRD0005'", found, "is this an NRRD file?"));
+    }
+    let mut fields = Fields::default();
+    while let Some(line) = lines.next()?.filter(|l| !l.text.is_empty()) {
+        fields.take(line)?;
+    }
+    let end = lines.offset();
+    let last = lines.end();
+    let (dimension, at) = fields.required("dimension", last)?;
+    if dimension != "3" {
+        let hint = "extract one volume of scalars first";
+        return Err(ReadError::input(at, "dimension: 3", escaped(dimension.as_bytes(), 20), hint));
+    }
+    let (name, at) = fields.required("type", last)?;
+    let kind = Kind::named(name).ok_or_else(|| {
+        let expected = "a type of real scalars: 8- to 64-bit integers, float or double";
+        ReadError::input(at, expected, format!("'{}'", escaped(name.as_bytes(), 40)), "convert the volume first")
+    })?;
+    let (sizes, place_of_sizes) = fields.required("sizes", last)?;
+    let sizes = sizes_of(sizes, place_of_sizes)?;
+    let encoding = fields.encoding(last)?;
+    let big_endian = fields.big_endian(kind, encoding, last)?;
+    let (origin, axes) = fields.affine()?;
+    let line_skip = fields.whole("line skip")?.unwrap_or(0).max(0) as u64;
+    let byte_skip = fields.whole("byte skip")?.unwrap_or(0);
+    let data_file = fields.find("data file").map(|(name, place)| (name.to_owned(), place));
+    Ok(Header { kind, sizes, place_of_sizes, encoding, big_endian, origin, axes, line_skip, byte_skip, data_file, end })
+}
+
+fn wrong(place: Place, expected: &str, found: &str) -> ReadError {
+    let hint = "the header is damaged, or a field is not of this kind of volume";
+    ReadError::input(place, expected, format!("'{}'", escaped(found.as_bytes(), 60)), hint)
+}
+
+fn sizes_of(text: &str, place: Place) -> Result<[u64; 3], ReadError> {
+    let sizes: Vec<u64> = text.split_ascii_whitespace().map_while(|w| w.parse().ok()).filter(|n| *n > 0).collect();
+    match sizes.as_slice() {
+        [x, y, z] if text.split_ascii_whitespace().count() == 3 => Ok([*x, *y, *z]),
+        _ => Err(wrong(place, "three sizes above 0", text)),
+    }
+}
+
+/// Three numbers as `(x,y,z)`.
+fn vector(text: &str) -> Option<DVec3> {
+    let inner = text.strip_prefix('(')?.strip_suffix(')')?;
+    let mut parts = inner.split(',').map(|c| c.trim().parse::<f64>().ok().filter(|v| v.is_finite()));
+    let v = DVec3::new(parts.next()??, parts.next()??, parts.next()??);
+    parts.next().is_none().then_some(v)
+}
+
+impl<'a> Fields<'a> {
+    fn take(&mut self, line: Line<'a>) -> Result<(), ReadError> {
+        let text = std::str::from_utf8(line.text).map_err(|_| {
+            let found = format!("'{}'", escaped(line.text, 60));
+            ReadError::input(line.place(), "a line of UTF-8 text, or an empty line before the data", found, super::HINT)
+        })?;
+        // Comments and pairs of keys and values.
+        if text.starts_with('#') || text.contains(":=") {
+            return Ok(());
+        }
+        let Some((field, value)) = text.split_once(": ").or_else(|| text.split_once(':')) else {
+            return Err(wrong(line.place(), "field: value", text));
+        };
+        let field = match field {
+            "datafile" => "data file",
+            "lineskip" => "line skip",
+            "byteskip" => "byte skip",
+            "axismins" => "axis mins",
+            other => other,
+        };
+        if !KNOWN.contains(&field) {
+            return Ok(());
+        }
+        if self.find(field).is_some() {
+            return Err(wrong(line.place(), "each field once", text));
+        }
+        self.found.push((field.to_owned(), value.trim().to_owned(), line));
+        Ok(())
+    }
+
+    fn find(&self, field: &str) -> Option<(&str, Place)> {
+        self.found.iter().find(|f| f.0 == field).map(|f| (f.1.as_str(), f.2.place()))
+    }
+
+    fn required(&self, field: &str, end: Place) -> Result<(&str, Place), ReadError> {
+        let missing = || ReadError::input(end, format!("a field '{field}'"), "none before the data", super::HINT);
+        self.find(field).ok_or_else(missing)
+    }
+
+    fn encoding(&self, end: Place) -> Result<Encoding, ReadError> {
+        let (name, place) = self.required("encoding", end)?;
+        match name.to_ascii_lowercase().as_str() {
+            "raw" => Ok(Encoding::Raw),
+            "gzip" | "gz" => Ok(Encoding::Gzip),
+            "txt" | "text" | "ascii" => Ok(Encoding::Text),
+            _ => Err(wrong(place, "encoding raw, gzip or text", name)),
+        }
+    }
+
+    fn big_endian(&self, kind: Kind, encoding: Encoding, end: Place) -> Result<bool, ReadError> {
+        if kind.size() == 1 || encoding == Encoding::Text {
+            return Ok(false);
+        }
+        let (name, place) = self.required("endian", end)?;
+        match name {
+            "little" => Ok(false),
+            "big" => Ok(true),
+            _ => Err(wrong(place, "endian little or big", name)),
+        }
+    }
+
+    fn whole(&self, field: &str) -> Result<Option<i64>, ReadError> {
+        let Some((text, place)) = self.find(field) else { return Ok(None) };
+        let number = text.parse().ok().filter(|n: &i64| *n >= -1);
+        number.map(Some).ok_or_else(|| wrong(place, "a whole number from 0, or -1", text))
+    }
+
+    /// Place of voxel (0, 0, 0) and the steps of the lattice.
+    fn affine(&self) -> Result<(DVec3, DMat3), ReadError> {
+        let mut axes = DMat3::IDENTITY;
+        let mut place = Place::File;
+        if let Some((text, at)) = self.find("space directions") {
+            let columns: Option<Vec<DVec3>> = text.split_ascii_whitespace().map(vector).collect();
+            let Some([x, y, z]) = columns.as_deref() else {
+                return Err(wrong(at, "three vectors such as (1,0,0) (0,1,0) (0,0,1)", text));
+            };
+            (axes, place) = (DMat3::from_cols(*x, *y, *z), at);
+        } else if let Some((text, at)) = self.find("spacings") {
+            // A step that is not known is NaN.
+            let steps: Option<Vec<f64>> = text.split_ascii_whitespace().map(|w| w.parse::<f64>().ok()).collect();
+            let Some([x, y, z]) = steps.as_deref() else { return Err(wrong(at, "three spacings", text)) };
+            let known = |s: f64| if s.is_nan() { 1.0 } else { s };
+            (axes, place) = (DMat3::from_diagonal(DVec3::new(known(*x), known(*y), known(*z))), at);
+        }
+        let volume = axes.determinant();
+        if !(volume.is_finite() && volume != 0.0) {
+            return Err(ReadError::input(place, "three independent finite steps", format!("{axes}"), super::HINT));
+        }
+        let origin = match self.find("space origin") {
+            None => DVec3::ZERO,
+            Some((text, at)) => vector(text).ok_or_else(|| wrong(at, "an origin such as (0,0,0)", text))?,
+        };
+        Ok((origin, axes))
+    }
+}

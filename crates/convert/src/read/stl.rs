@@ -1,0 +1,148 @@
+//! STL, binary and text → a mesh of separate facets.
+//!
+//! A binary file has 84 + 50·n bytes; that decides, as many binary files begin with `solid` like a text. The parser is our
+//! own, for lines and columns. Corners are not joined: STL says facets, so each keeps its own plane. Its
+//! stored normals and attribute bytes are read over: normals follow from the order of the corners.
+
+use super::text::{Line, Lines, Word};
+use super::{ReadLimits, input, origin};
+use crate::error::{Place, ReadError};
+use splat_core::Mesh;
+use splat_core::glam::DVec3;
+
+const HEADER: usize = 84;
+const FACET: usize = 50;
+/// Bytes that a facet takes while it is read and converted.
+const BYTES_PER_FACET: u64 = 3 * (24 + 12) + 12;
+
+/// Reads an STL file.
+pub(super) fn read(content: &[u8], limits: &ReadLimits) -> Result<Mesh, ReadError> {
+    let announced = content.get(80..HEADER).map(|b| u64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])));
+    let is_binary = announced.is_some_and(|n| content.len() as u64 == HEADER as u64 + FACET as u64 * n);
+    if is_binary {
+        return binary(content, limits);
+    }
+    if content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(content).trim_ascii_start().starts_with(b"solid") {
+        return text(content, limits);
+    }
+    let expected = match announced {
+        Some(n) => format!("84 + 50 x {n} = {} bytes of a binary STL, or a text that begins with 'solid'", 84 + 50 * n),
+        None => "a binary STL of at least 84 bytes, or a text that begins with 'solid'".to_owned(),
+    };
+    let found = format!("{} bytes", content.len());
+    Err(ReadError::input(Place::Byte(80), expected, found, "the file is truncated, damaged or not STL"))
+}
+
+fn binary(content: &[u8], limits: &ReadLimits) -> Result<Mesh, ReadError> {
+    let facets = content[HEADER..].as_chunks::<FACET>().0;
+    let mut corners = reserved(facets.len(), limits)?;
+    for (n, facet) in facets.iter().enumerate() {
+        let numbers = facet[12..48].as_chunks::<4>().0;
+        for (i, c) in numbers.as_chunks::<3>().0.iter().enumerate() {
+            let corner = DVec3::from_array(c.map(|b| f64::from(f32::from_le_bytes(b))));
+            if !corner.is_finite() {
+                let place = Place::Byte((HEADER + n * FACET + 12 + 12 * i) as u64);
+                let found = format!("{corner} in facet {n}");
+                return Err(ReadError::input(place, "finite coordinates", found, "remove the facet"));
+            }
+            corners.push(corner);
+        }
+    }
+    mesh(&corners)
+}
+
+fn reserved(facets: usize, limits: &ReadLimits) -> Result<Vec<DVec3>, ReadError> {
+    input::check_bytes("the facets", facets as u64 * BYTES_PER_FACET, limits)?;
+    let mut corners = Vec::new();
+    input::reserve(&mut corners, 3 * facets)?;
+    Ok(corners)
+}
+
+fn mesh(corners: &[DVec3]) -> Result<Mesh, ReadError> {
+    let (origin, position) = origin::split(corners).map_err(|i| {
+        let found = format!("{} in facet {}", corners[i], i / 3);
+        let expected = "coordinates that fit 32-bit floats once the middle is subtracted";
+        ReadError::input(Place::File, expected, found, "scale the data, or remove outliers")
+    })?;
+    let triangles = (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    Ok(Mesh { origin, position, triangles, ..Mesh::default() })
+}
+
+/// Lines that have something on them.
+struct Text<'a> {
+    lines: Lines<'a>,
+}
+
+impl<'a> Text<'a> {
+    fn next(&mut self, expected: &str) -> Result<(Line<'a>, Vec<Word<'a>>), ReadError> {
+        while let Some(line) = self.lines.next()? {
+            let words: Vec<Word<'a>> = line.words(false).collect();
+            if !words.is_empty() {
+                return Ok((line, words));
+            }
+        }
+        Err(ReadError::input(self.lines.end(), expected, "the end of the file", "the file is truncated"))
+    }
+
+    /// A line that says exactly `keywords`.
+    fn expect(&mut self, keywords: &[&str]) -> Result<(), ReadError> {
+        let (line, words) = self.next(&format!("'{}'", keywords.join(" ")))?;
+        if words.len() == keywords.len() && words.iter().zip(keywords).all(|(w, k)| is(*w, k)) {
+            return Ok(());
+        }
+        Err(wrong(line, &keywords.join(" ")))
+    }
+}
+
+fn is(word: Word<'_>, keyword: &str) -> bool {
+    word.text.eq_ignore_ascii_case(keyword.as_bytes())
+}
+
+fn wrong(line: Line<'_>, expected: &str) -> ReadError {
+    let found = format!("'{}'", crate::error::escaped(line.text.trim_ascii(), 60));
+    ReadError::input(line.place(), format!("'{expected}'"), found, "one statement a line, as STL writers do")
+}
+
+/// One or several solids of facets.
+fn text(content: &[u8], limits: &ReadLimits) -> Result<Mesh, ReadError> {
+    let mut text = Text { lines: Lines::new(content) };
+    let mut corners: Vec<DVec3> = Vec::new();
+    let mut inside = false;
+    loop {
+        let (line, words) = match text.next("'endsolid'") {
+            Ok(found) => found,
+            Err(_) if !inside => return mesh(&corners),
+            Err(error) => return Err(error),
+        };
+        match words.as_slice() {
+            [first, ..] if !inside && is(*first, "solid") => inside = true,
+            [first, ..] if inside && is(*first, "endsolid") => inside = false,
+            [facet, normal, numbers @ ..] if inside && is(*facet, "facet") && is(*normal, "normal") => {
+                // Read over, but a number it must be: some writers store nan for facets without area.
+                if numbers.len() != 3 {
+                    return Err(wrong(line, "facet normal X Y Z"));
+                }
+                input::check_bytes("the facets", (corners.len() as u64 / 3 + 1) * BYTES_PER_FACET, limits)?;
+                input::reserve(&mut corners, 3)?;
+                facet_corners(&mut text, &mut corners)?;
+            }
+            _ if inside => return Err(wrong(line, "facet normal X Y Z' or 'endsolid")),
+            _ => return Err(wrong(line, "solid")),
+        }
+    }
+}
+
+fn facet_corners(text: &mut Text<'_>, corners: &mut Vec<DVec3>) -> Result<(), ReadError> {
+    text.expect(&["outer", "loop"])?;
+    for _ in 0..3 {
+        let (line, words) = text.next("'vertex X Y Z'")?;
+        match words.as_slice() {
+            [vertex, x, y, z] if is(*vertex, "vertex") => {
+                corners.push(DVec3::new(x.number()?, y.number()?, z.number()?));
+            }
+            _ => return Err(wrong(line, "vertex X Y Z")),
+        }
+    }
+    text.expect(&["endloop"])?;
+    text.expect(&["endfacet"])
+}

@@ -1,0 +1,107 @@
+//! Text files as lines of words with places.
+
+use crate::error::{Place, ReadError, escaped};
+
+/// Longest line accepted, bytes.
+const MAX_LINE: usize = 1 << 20;
+
+/// The lines of a text; line ends of every system, a byte order mark is skipped.
+pub(super) struct Lines<'a> {
+    content: &'a [u8],
+    at: usize,
+    number: u64,
+}
+
+/// One line.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Line<'a> {
+    pub(super) text: &'a [u8],
+    /// From 1.
+    pub(super) number: u64,
+}
+
+/// A word of a line.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Word<'a> {
+    pub(super) text: &'a [u8],
+    line: u64,
+    /// From 1, bytes.
+    column: u64,
+}
+
+impl<'a> Lines<'a> {
+    pub(super) fn new(content: &'a [u8]) -> Self {
+        let at = if content.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
+        Self { content, at, number: 0 }
+    }
+
+    /// The next line, or `None` at the end.
+    pub(super) fn next(&mut self) -> Result<Option<Line<'a>>, ReadError> {
+        if self.at >= self.content.len() {
+            return Ok(None);
+        }
+        self.number += 1;
+        let rest = &self.content[self.at..];
+        let length = rest.iter().take(MAX_LINE + 1).position(|b| matches!(b, b'\n' | b'\r')).unwrap_or(rest.len());
+        if length > MAX_LINE {
+            let place = Place::Line { line: self.number, column: 0 };
+            return Err(ReadError::input(place, "a line of at most 1 MiB", "a longer one", "is this a text file?"));
+        }
+        let end = if rest[length..].starts_with(b"\r\n") { 2 } else { 1 };
+        self.at += length + end;
+        Ok(Some(Line { text: &rest[..length], number: self.number }))
+    }
+
+    /// Bytes read.
+    #[cfg(feature = "nrrd")]
+    pub(super) fn offset(&self) -> usize {
+        self.at.min(self.content.len())
+    }
+
+    /// The place after the last line.
+    #[cfg(any(feature = "stl", feature = "nrrd"))]
+    pub(super) fn end(&self) -> Place {
+        Place::Line { line: self.number + 1, column: 0 }
+    }
+}
+
+impl<'a> Line<'a> {
+    /// Words between blanks and, if `separators`, between single commas or semicolons.
+    pub(super) fn words(self, separators: bool) -> impl Iterator<Item = Word<'a>> {
+        let parts = move |b: &u8| b.is_ascii_whitespace() || *b == 0x0b || separators && matches!(b, b',' | b';');
+        let mut at = 0;
+        self.text.split(parts).filter_map(move |text| {
+            let column = at as u64 + 1;
+            at += text.len() + 1;
+            (!text.is_empty()).then_some(Word { text, line: self.number, column })
+        })
+    }
+
+    /// The place of the whole line.
+    pub(super) fn place(self) -> Place {
+        Place::Line { line: self.number, column: 0 }
+    }
+}
+
+impl Word<'_> {
+    pub(super) fn place(self) -> Place {
+        Place::Line { line: self.line, column: self.column }
+    }
+
+    /// The word as it may be shown.
+    pub(super) fn shown(self) -> String {
+        format!("'{}'", escaped(self.text, 40))
+    }
+
+    /// A finite decimal number, whatever the system's language.
+    pub(super) fn number(self) -> Result<f64, ReadError> {
+        let value = std::str::from_utf8(self.text).ok().and_then(|t| t.parse::<f64>().ok());
+        match value {
+            Some(value) if value.is_finite() => Ok(value),
+            _ => {
+                let hint = "numbers are written with a point; NaN and infinity are not coordinates";
+                Err(ReadError::input(self.place(), "a finite decimal number", self.shown(), hint))
+            }
+        }
+    }
+}

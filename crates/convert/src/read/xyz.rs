@@ -1,0 +1,188 @@
+//! Points as text: `.xyz`, `.csv`, `.txt`, `.pts` → raw points.
+//!
+//! One point a line, columns between blanks, commas, semicolons or tabs. A first line of names says what the columns
+//! are; without names there are three (x y z), four (and a value), six (and a normal if the first one has length 1, else
+//! colours from 0 to 255) or seven (value before colours, as .pts files have it). `#` and `//` begin comments. A line with
+//! nothing but a whole number before the first point is a count, which is checked.
+
+use super::text::{Line, Lines, Word};
+use super::{ReadLimits, color::linear_from_srgb, input, origin};
+use crate::error::{Place, ReadError};
+use crate::raw_points::RawPoints;
+use splat_core::glam::{DVec3, Vec3};
+
+/// Roles of columns: x y z, normal, colour, value; and their names, lower case.
+const ROLES: [&[&str]; 10] = [
+    &["x", "x_coordinate", "easting"],
+    &["y", "y_coordinate", "northing"],
+    &["z", "z_coordinate", "height", "elevation"],
+    &["nx", "normal_x"],
+    &["ny", "normal_y"],
+    &["nz", "normal_z"],
+    &["r", "red"],
+    &["g", "green"],
+    &["b", "blue"],
+    &["value", "intensity", "scalar", "i"],
+];
+const NORMAL: usize = 3;
+const COLOR: usize = 6;
+const VALUE: usize = 9;
+
+/// Bytes that a point takes while it is read and converted.
+const BYTES_PER_POINT: u64 = 24 + 12 + 12 + 12 + 4;
+
+/// Reads points.
+pub(super) fn read(content: &[u8], limits: &ReadLimits) -> Result<RawPoints, ReadError> {
+    let mut lines = Lines::new(content);
+    let mut columns: Option<Vec<Option<usize>>> = None;
+    let (mut count, mut positions, mut points) = (None, Vec::new(), RawPoints::default());
+    while let Some(line) = lines.next()? {
+        let comment = |w: &Word<'_>| w.text.starts_with(b"#") || w.text.starts_with(b"//");
+        let words: Vec<Word<'_>> = line.words(true).take_while(|w| !comment(w)).collect();
+        let [first, rest @ ..] = words.as_slice() else { continue };
+        if columns.is_none() {
+            if rest.is_empty() && count.is_none() {
+                count = Some((whole(*first)?, line.place()));
+                continue;
+            }
+            if first.number().is_err() {
+                columns = Some(named(line, &words)?);
+                continue;
+            }
+        }
+        let columns = match &mut columns {
+            Some(columns) => columns,
+            unknown => unknown.insert(guessed(line, &words)?),
+        };
+        if words.len() != columns.len() {
+            let (expected, found) = (format!("{} columns", columns.len()), format!("{}", words.len()));
+            return Err(ReadError::input(line.place(), expected, found, "every line has the same columns"));
+        }
+        let bytes = (positions.len() as u64 + 1) * BYTES_PER_POINT;
+        input::check_bytes("the points", bytes, limits)?;
+        input::reserve(&mut positions, 1)?;
+        point(&words, columns, limits, &mut positions, &mut points)?;
+    }
+    if let Some((announced, place)) = count
+        && announced != positions.len() as u64 + points.dropped
+    {
+        let found = format!("{} points", positions.len() as u64 + points.dropped);
+        return Err(ReadError::input(
+            place,
+            format!("{announced} points, as announced"),
+            found,
+            "the file is truncated",
+        ));
+    }
+    let (origin, position) = origin::split(&positions).map_err(|i| {
+        let found = format!("{} at point {i}", positions[i]);
+        let expected = "coordinates that fit 32-bit floats once the middle is subtracted";
+        ReadError::input(Place::File, expected, found, "scale the data, or remove outliers")
+    })?;
+    Ok(RawPoints { origin, position, ..points })
+}
+
+fn whole(word: Word<'_>) -> Result<u64, ReadError> {
+    std::str::from_utf8(word.text).ok().and_then(|t| t.parse().ok()).ok_or_else(|| {
+        let hint = "points need three columns at least";
+        ReadError::input(word.place(), "x, y and z, names of columns, or a number of points", word.shown(), hint)
+    })
+}
+
+/// Roles of columns with names; others are read over.
+fn named(line: Line<'_>, words: &[Word<'_>]) -> Result<Vec<Option<usize>>, ReadError> {
+    let role = |w: &Word<'_>| {
+        let name = w.text.strip_prefix(b"\"").and_then(|n| n.strip_suffix(b"\"")).unwrap_or(w.text);
+        ROLES.iter().position(|names| names.iter().any(|n| name.eq_ignore_ascii_case(n.as_bytes())))
+    };
+    let mut columns: Vec<Option<usize>> = words.iter().map(role).collect();
+    let found: Vec<usize> = columns.iter().flatten().copied().collect();
+    if let Some(twice) = (0..ROLES.len()).find(|r| found.iter().filter(|f| *f == r).count() > 1) {
+        let expected = format!("one column '{}'", ROLES[twice][0]);
+        return Err(ReadError::input(line.place(), expected, "several", "rename all but one"));
+    }
+    if let Some(missing) = (0..NORMAL).find(|r| !found.contains(r)) {
+        let expected = format!("columns x, y and z; '{}' is missing", ROLES[missing][0]);
+        let text = format!("'{}'", crate::error::escaped(line.text.trim_ascii(), 60));
+        return Err(ReadError::input(
+            line.place(),
+            expected,
+            text,
+            "name the columns in the first line, or leave it out",
+        ));
+    }
+    // A normal or colour with a missing component is none.
+    for group in [NORMAL..COLOR, COLOR..VALUE] {
+        if !group.clone().all(|r| found.contains(&r)) {
+            columns.iter_mut().filter(|c| c.is_some_and(|r| group.contains(&r))).for_each(|c| *c = None);
+        }
+    }
+    Ok(columns)
+}
+
+/// Roles of columns without names.
+fn guessed(line: Line<'_>, words: &[Word<'_>]) -> Result<Vec<Option<usize>>, ReadError> {
+    let numbers: Vec<f64> = words.iter().map(|w| w.number()).collect::<Result<_, _>>()?;
+    let roles = match numbers.as_slice() {
+        [_, _, _] => vec![0, 1, 2],
+        [_, _, _, _] => vec![0, 1, 2, VALUE],
+        [_, _, _, x, y, z] if (DVec3::new(*x, *y, *z).length() - 1.0).abs() < 0.01 => vec![0, 1, 2, 3, 4, 5],
+        [_, _, _, color @ ..] if color.len() == 3 && color.iter().all(|c| (0.0..=255.0).contains(c)) => {
+            vec![0, 1, 2, 6, 7, 8]
+        }
+        [_, _, _, _, ..] if numbers.len() == 7 => vec![0, 1, 2, VALUE, 6, 7, 8],
+        _ => {
+            let expected = "3, 4, 6 or 7 columns, or a first line with their names";
+            let found = format!("{} columns", words.len());
+            return Err(ReadError::input(line.place(), expected, found, "begin with a line such as: x y z nx ny nz"));
+        }
+    };
+    Ok(roles.into_iter().map(Some).collect())
+}
+
+fn point(
+    words: &[Word<'_>],
+    columns: &[Option<usize>],
+    limits: &ReadLimits,
+    positions: &mut Vec<DVec3>,
+    points: &mut RawPoints,
+) -> Result<(), ReadError> {
+    let mut values = [0.0; 10];
+    let mut has = [false; 10];
+    for (word, role) in words.iter().zip(columns).filter_map(|(w, c)| c.map(|role| (w, role))) {
+        match word.number() {
+            Ok(value) => values[role] = value,
+            // Only what is a number, but not a finite one, may be dropped.
+            Err(_) if limits.drop_invalid && is_float(*word) => {
+                points.dropped += 1;
+                return Ok(());
+            }
+            Err(error) => return Err(error),
+        }
+        if (COLOR..VALUE).contains(&role) && !(0.0..=255.0).contains(&values[role]) {
+            return Err(ReadError::input(word.place(), "a colour from 0 to 255", word.shown(), "colours are 0 to 255"));
+        }
+        if role == VALUE && !(values[role] as f32).is_finite() {
+            let expected = "a value that fits a 32-bit float";
+            return Err(ReadError::input(word.place(), expected, word.shown(), "scale the values"));
+        }
+        has[role] = true;
+    }
+    positions.push(DVec3::new(values[0], values[1], values[2]));
+    if has[NORMAL] {
+        let n = DVec3::new(values[3], values[4], values[5]);
+        let largest = n.abs().max_element();
+        points.normal.push(if largest > 0.0 { (n / largest).normalize().as_vec3() } else { Vec3::ZERO });
+    }
+    if has[COLOR] {
+        points.color.push([6, 7, 8].map(|i| linear_from_srgb(values[i] / 255.0)));
+    }
+    if has[VALUE] {
+        points.value.push(values[VALUE] as f32);
+    }
+    Ok(())
+}
+
+fn is_float(word: Word<'_>) -> bool {
+    std::str::from_utf8(word.text).is_ok_and(|t| t.parse::<f64>().is_ok())
+}
