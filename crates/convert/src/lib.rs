@@ -31,6 +31,7 @@ mod error;
 #[cfg(feature = "expression")]
 mod expression;
 mod field_points;
+mod grid_field;
 mod mesh_points;
 #[cfg(feature = "surfels")]
 mod neighbours;
@@ -84,6 +85,7 @@ pub use field_points::{
     surface_to_points_with_progress,
 };
 pub use mesh_points::{MeshParams, MeshReport, mesh_to_points, mesh_to_points_into, mesh_to_points_with_progress};
+pub use grid_field::{GridField, Inside, Interpolation};
 #[cfg(feature = "surfels")]
 pub use orient::Orientation;
 pub use params::{Density, SplatParams};

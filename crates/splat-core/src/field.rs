@@ -10,9 +10,20 @@ pub trait ScalarField: Sync {
     /// Gradient at `p`.
     fn gradient(&self, p: DVec3) -> DVec3;
 
+    /// Value and gradient at `p` together, for fields that know both for little more than one.
+    fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
+        (self.value(p), self.gradient(p))
+    }
+
     /// Hessian at `p`, symmetric.
     fn hessian(&self, p: DVec3) -> DMat3;
 
     /// An interval that contains every value within `radius` of `p`, or `None` where no bound is known.
     fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)>;
+
+    /// Whether a zero at `p` belongs to the surface: false beyond the border of an open surface. The field itself has
+    /// values there too.
+    fn in_domain(&self, _p: DVec3) -> bool {
+        true
+    }
 }

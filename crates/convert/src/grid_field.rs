@@ -1,0 +1,239 @@
+//! Isosurfaces of volumes as scalar fields, trilinear or Catmull-Rom (Tanaka 2012, section 4; Catmull and Rom 1974).
+//!
+//! f(p) = ±(v(u) − c) with u = A⁻¹(p − o): o the lattice's origin, A its steps, c the isovalue. ∇f = A⁻ᵀ∇ᵤv and
+//! Hf = A⁻ᵀ(Hᵤv)A⁻¹, so sheared and mirrored lattices have exact derivatives. The surface exists between the lattice
+//! points only ([`ScalarField::in_domain`], [`GridField::bounds`]); elsewhere the field has the value of the nearest place
+//! of the lattice (in lattice coordinates), so that it is bounded and no zero appears out there.
+//!
+//! A bound comes from control points: the interpolation of a cell stays between the least and the greatest of its
+//! corners (trilinear) or Bernstein control points (Catmull-Rom). Balls of at most two cells along each axis use the
+//! control points of the very box around the ball, which shrink onto the field with the square of the radius.
+
+mod jet;
+mod ranges;
+mod stencil;
+
+use jet::{Jet, control_range, jet};
+use ranges::{Ranges, widen};
+use splat_core::glam::{DMat3, DVec3};
+use splat_core::{Error, Grid, ScalarField};
+use std::sync::Arc;
+use stencil::{Control, Stencil};
+
+/// How values between lattice points come about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Interpolation {
+    /// From the eight corners of the cell; creases at the faces of cells.
+    #[default]
+    Trilinear,
+    /// From 64 lattice points by cubics; continuous gradients, values may overshoot.
+    CatmullRom,
+}
+
+/// Which side of an isosurface is inside, where the field is negative.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Inside {
+    /// Where values are above the isovalue: bone in a scan, matter in a density.
+    #[default]
+    Above,
+    /// Where values are below the isovalue: distances.
+    Below,
+}
+
+impl Inside {
+    /// The sign that makes the inside negative.
+    pub(crate) fn sign(self) -> f64 {
+        match self {
+            Self::Above => -1.0,
+            Self::Below => 1.0,
+        }
+    }
+}
+
+/// What does not depend on the isovalue.
+#[derive(Debug)]
+struct Volume {
+    grid: Arc<Grid>,
+    ranges: Ranges,
+}
+
+/// An isosurface of a volume as a field.
+///
+/// ```
+/// use convert::{GridField, Inside, Interpolation};
+/// use splat_core::{Grid, ScalarField, glam::{DMat3, DVec3}};
+/// let values = (0..64).map(|i| (i % 4) as f32).collect();
+/// let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [4; 3], values };
+/// let field = GridField::new(grid.into(), Interpolation::CatmullRom, 1.5, Inside::Below).unwrap();
+/// assert_eq!(field.value(DVec3::new(1.75, 2.0, 0.5)), 0.25);
+/// assert_eq!(field.gradient(DVec3::new(1.75, 2.0, 0.5)), DVec3::X);
+/// ```
+#[derive(Debug, Clone)]
+pub struct GridField {
+    volume: Arc<Volume>,
+    interpolation: Interpolation,
+    isovalue: f64,
+    sign: f64,
+    /// Lattice coordinates from positions, see [`Grid::axes`].
+    lattice_from_object: DMat3,
+    /// Lengths of its rows: how far a lattice coordinate moves on a way of length 1.
+    reach: DVec3,
+    /// The last lattice point along each axis.
+    last: DVec3,
+}
+
+impl GridField {
+    /// The isosurface of `grid` at `isovalue` (units of its values).
+    ///
+    /// Takes O(voxels) once, also where several isovalues are asked for: see [`GridField::with_isovalue`].
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] or [`Error::ColumnLength`] for a grid that does not validate, steps that have no inverse in
+    /// f64, or an isovalue that is not finite.
+    pub fn new(grid: Arc<Grid>, interpolation: Interpolation, isovalue: f64, inside: Inside) -> Result<Self, Error> {
+        grid.validate()?;
+        let lattice_from_object = grid.axes.inverse();
+        let rows = lattice_from_object.transpose();
+        let reach = DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
+        if !(reach.is_finite() && lattice_from_object.is_finite()) {
+            return Err(Error::invalid("grid", 0, "axes", grid.axes, "steps that have an inverse"));
+        }
+        let last = DVec3::from_array(grid.dims.map(|n| (n - 1) as f64));
+        let ranges = Ranges::new(&grid, interpolation);
+        let volume = Arc::new(Volume { grid, ranges });
+        Self { volume, interpolation, isovalue: 0.0, sign: 1.0, lattice_from_object, reach, last }
+            .with_isovalue(isovalue, inside)
+    }
+
+    /// Another isosurface of the same volume, which is shared.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the isovalue is not finite.
+    pub fn with_isovalue(&self, isovalue: f64, inside: Inside) -> Result<Self, Error> {
+        if !isovalue.is_finite() {
+            return Err(Error::invalid("isosurface", 0, "isovalue", isovalue, "a finite number"));
+        }
+        Ok(Self { isovalue, sign: inside.sign(), ..self.clone() })
+    }
+
+    /// The volume.
+    pub fn grid(&self) -> &Grid {
+        &self.volume.grid
+    }
+
+    /// Opposite corners of the box around the lattice; a sheared lattice fills it in part.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        let far = self.grid().axes * DMat3::from_diagonal(self.last);
+        let (zero, origin) = (DVec3::ZERO, self.grid().origin);
+        let low = far.x_axis.min(zero) + far.y_axis.min(zero) + far.z_axis.min(zero);
+        let high = far.x_axis.max(zero) + far.y_axis.max(zero) + far.z_axis.max(zero);
+        [origin + low, origin + high]
+    }
+
+    fn lattice_coordinate(&self, p: DVec3) -> DVec3 {
+        self.lattice_from_object * (p - self.grid().origin)
+    }
+
+    /// Derivatives up to order `D` with respect to lattice coordinates; none along axes on which `p` lies outside.
+    fn jet<const D: usize>(&self, p: DVec3) -> Jet {
+        let u = self.lattice_coordinate(p);
+        let (grid, inside) = (self.grid(), u.clamp(DVec3::ZERO, self.last));
+        let mut jet = match self.interpolation {
+            Interpolation::Trilinear => {
+                jet::<2, D>(grid, &[0, 1, 2].map(|a| Stencil::<2>::linear(inside[a], grid.dims[a])))
+            }
+            Interpolation::CatmullRom => {
+                jet::<4, D>(grid, &[0, 1, 2].map(|a| Stencil::<4>::catmull_rom(inside[a], grid.dims[a])))
+            }
+        };
+        if D > 0 && u != inside {
+            let kept = DVec3::select(u.cmpeq(inside), DVec3::ONE, DVec3::ZERO);
+            jet.gradient *= kept;
+            let keep = DMat3::from_diagonal(kept);
+            jet.hessian = keep * jet.hessian * keep;
+        }
+        jet
+    }
+
+    fn field_value(&self, jet: &Jet) -> f64 {
+        self.sign * (jet.value - self.isovalue)
+    }
+
+    fn field_gradient(&self, jet: &Jet) -> DVec3 {
+        self.lattice_from_object.transpose() * (jet.gradient * self.sign)
+    }
+
+    /// Range of the volume over a box of lattice coordinates that lies in the lattice.
+    fn range(&self, low: DVec3, high: DVec3) -> [f64; 2] {
+        let dims = self.grid().dims;
+        let cells = |u: DVec3| [0, 1, 2].map(|a| (u[a] as usize).min(dims[a].saturating_sub(2)));
+        let (first, last) = (cells(low), cells(high));
+        let coarse = self.volume.ranges.over(first, last).map(f64::from);
+        let across = (coarse[0] - self.isovalue) * (coarse[1] - self.isovalue) <= 0.0;
+        if !across || (0..3).any(|a| last[a] - first[a] > 1) {
+            return coarse;
+        }
+        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+        for corner in 0..8usize {
+            let cell: [usize; 3] = std::array::from_fn(|a| if corner >> a & 1 == 0 { first[a] } else { last[a] });
+            if (0..3).any(|a| corner >> a & 1 == 1 && first[a] == last[a]) {
+                continue;
+            }
+            let part = widen(self.cell_range(cell, low, high));
+            range = [range[0].min(part[0]), range[1].max(part[1])];
+        }
+        range
+    }
+
+    /// Range over the part of one cell that lies in a box.
+    fn cell_range(&self, cell: [usize; 3], low: DVec3, high: DVec3) -> [f64; 2] {
+        let grid = self.grid();
+        let stretch = |a: usize| [low[a], high[a]].map(|u| (u - cell[a] as f64).clamp(0.0, 1.0));
+        match self.interpolation {
+            Interpolation::Trilinear => {
+                control_range(grid, &[0, 1, 2].map(|a| Control::<2>::linear(cell[a], stretch(a), grid.dims[a])))
+            }
+            Interpolation::CatmullRom => {
+                control_range(grid, &[0, 1, 2].map(|a| Control::<4>::catmull_rom(cell[a], stretch(a), grid.dims[a])))
+            }
+        }
+    }
+}
+
+impl ScalarField for GridField {
+    fn value(&self, p: DVec3) -> f64 {
+        self.field_value(&self.jet::<0>(p))
+    }
+
+    fn gradient(&self, p: DVec3) -> DVec3 {
+        self.field_gradient(&self.jet::<1>(p))
+    }
+
+    fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
+        let jet = self.jet::<1>(p);
+        (self.field_value(&jet), self.field_gradient(&jet))
+    }
+
+    fn hessian(&self, p: DVec3) -> DMat3 {
+        let inverse = self.lattice_from_object;
+        inverse.transpose() * (self.jet::<2>(p).hessian * self.sign) * inverse
+    }
+
+    fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> {
+        let u = self.lattice_coordinate(p);
+        // The last term covers the rounding of positions and of lattice coordinates.
+        let far = p.abs().max_element() + self.grid().origin.abs().max_element() + radius;
+        let half = self.reach * (radius + 8.0 * f64::EPSILON * far);
+        if !(u.is_finite() && half.is_finite() && radius >= 0.0) {
+            return None;
+        }
+        let clamp = |u: DVec3| u.clamp(DVec3::ZERO, self.last);
+        let [low, high] = self.range(clamp(u - half), clamp(u + half)).map(|v| self.sign * (v - self.isovalue));
+        Some((low.min(high), low.max(high)))
+    }
+
+    fn in_domain(&self, p: DVec3) -> bool {
+        let u = self.lattice_coordinate(p);
+        u.cmpge(DVec3::ZERO).all() && u.cmple(self.last).all()
+    }
+}
