@@ -34,6 +34,8 @@ mod field_points;
 mod grid_field;
 mod mesh_points;
 #[cfg(feature = "surfels")]
+mod mpu;
+#[cfg(feature = "surfels")]
 mod neighbours;
 #[cfg(feature = "surfels")]
 mod orient;
@@ -86,6 +88,8 @@ pub use field_points::{
 };
 pub use mesh_points::{MeshParams, MeshReport, mesh_to_points, mesh_to_points_into, mesh_to_points_with_progress};
 pub use grid_field::{GridField, Inside, Interpolation};
+#[cfg(feature = "surfels")]
+pub use mpu::{MpuField, MpuParams, MpuReport, points_to_field};
 #[cfg(feature = "surfels")]
 pub use orient::Orientation;
 pub use params::{Density, SplatParams};

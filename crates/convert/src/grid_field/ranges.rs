@@ -1,4 +1,4 @@
-//! Ranges of an interpolated volume over boxes of cells: a pyramid of least and greatest control points.
+//! Ranges of an interpolated volume over boxes of cells: a pyramid of bounds of its control points.
 //!
 //! A node of the finest level covers 2×2×2 cells, a node of the next 2×2×2 nodes. A box is answered from the level where
 //! it meets at most three nodes along each axis: 27 look-ups however large it is, 1.15 bytes a voxel.
@@ -48,15 +48,10 @@ impl Ranges {
     pub(super) fn new(grid: &Grid, interpolation: Interpolation) -> Self {
         let dims = grid.dims.map(|n| n.saturating_sub(1).div_ceil(2).max(1));
         let mut nodes = vec![EMPTY; dims[0] * dims[1] * dims[2]];
-        nodes.par_chunks_mut(dims[0]).enumerate().for_each(|(row, out)| {
-            let (j, k) = (row % dims[1], row / dims[1]);
-            for (i, node) in out.iter_mut().enumerate() {
-                *node = outward(match interpolation {
-                    Interpolation::Trilinear => linear_brick(grid, [i, j, k]),
-                    Interpolation::CatmullRom => cubic_brick(grid, [i, j, k]),
-                });
-            }
-        });
+        nodes
+            .par_chunks_mut(dims[0] * dims[1])
+            .enumerate()
+            .for_each(|(k, out)| layer(grid, interpolation, k, out, [dims[0], dims[1]]));
         let mut levels = vec![Level { dims, nodes }];
         while let Some(next) = levels.last().and_then(Level::coarser) {
             levels.push(next);
@@ -98,78 +93,93 @@ impl Level {
     }
 }
 
-fn fold_range(range: [f64; 2], v: f64) -> [f64; 2] {
-    [range[0].min(v), range[1].max(v)]
+/// Ranges of the control points around the lattice points of one row.
+///
+/// Trilinear: the value itself. Catmull-Rom: around each lattice point lie v ± mₓ/3 ± mᵧ/3 ± m_z/3 ± mₓᵧ/9 … in all
+/// combinations of its slopes; the sum of their magnitudes bounds them all, whichever cell they belong to.
+struct Row {
+    /// Values and their parts of slope along y, z and both, thirds folded in; one entry of padding at both ends.
+    parts: [Vec<f64>; 4],
+    low: Vec<f64>,
+    high: Vec<f64>,
 }
 
-/// Trilinear extremes lie at lattice points.
-fn linear_brick(grid: &Grid, brick: [usize; 3]) -> [f64; 2] {
-    let span = |a: usize| 2 * brick[a]..=(2 * brick[a] + 2).min(grid.dims[a] - 1);
-    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
-    for k in span(2) {
-        for j in span(1) {
-            let row = &grid.values[(k * grid.dims[1] + j) * grid.dims[0]..][span(0)];
-            range = row.iter().fold(range, |r, v| fold_range(r, f64::from(*v)));
+/// Neighbours of lattice point `i` on an axis and a third of one over their distance: m/3 = (v[hi] − v[lo])·scale.
+fn slope(i: usize, n: usize) -> (usize, usize, f64) {
+    let (lo, hi) = (i.saturating_sub(1), (i + 1).min(n - 1));
+    (lo, hi, 1.0 / (3 * (hi - lo).max(1)) as f64)
+}
+
+impl Row {
+    fn new(n: usize) -> Self {
+        Self { parts: std::array::from_fn(|_| vec![0.0; n + 2]), low: vec![0.0; n], high: vec![0.0; n] }
+    }
+
+    fn fill(&mut self, grid: &Grid, interpolation: Interpolation, j: usize, k: usize) {
+        let [nx, ny, nz] = grid.dims;
+        let row = |j: usize, k: usize| &grid.values[(k * ny + j) * nx..][..nx];
+        let value = row(j, k);
+        if interpolation == Interpolation::Trilinear {
+            value.iter().zip(&mut self.low).for_each(|(v, l)| *l = f64::from(*v));
+            self.high.copy_from_slice(&self.low);
+            return;
+        }
+        let ((j0, j1, y), (k0, k1, z)) = (slope(j, ny), slope(k, nz));
+        let (below, above, front, back) = (row(j0, k), row(j1, k), row(j, k0), row(j, k1));
+        let corners = [row(j0, k0), row(j1, k0), row(j0, k1), row(j1, k1)];
+        let difference = |a: f32, b: f32| f64::from(a) - f64::from(b);
+        let [v, vy, vz, vyz] = &mut self.parts;
+        for i in 0..nx {
+            v[i + 1] = f64::from(value[i]);
+            vy[i + 1] = difference(above[i], below[i]) * y;
+            vz[i + 1] = difference(back[i], front[i]) * z;
+            let across = difference(corners[3][i], corners[2][i]) - difference(corners[1][i], corners[0][i]);
+            vyz[i + 1] = across * (y * z);
+        }
+        self.spread(nx);
+    }
+
+    /// From the parts to the ranges.
+    fn spread(&mut self, nx: usize) {
+        for part in &mut self.parts {
+            // The border's slope is one-sided over one step: doubled, as the loop halves it.
+            (part[0], part[nx + 1]) = (2.0 * part[1] - part[2.min(nx)], 2.0 * part[nx] - part[nx.max(2) - 1]);
+        }
+        let [v, vy, vz, vyz] = &self.parts;
+        let along = |p: &[f64], i: usize| (p[i + 2] - p[i]).abs() * (1.0 / 6.0);
+        for i in 0..nx {
+            let across = vy[i + 1].abs() + vz[i + 1].abs() + vyz[i + 1].abs();
+            let reach = across + along(v, i) + along(vy, i) + along(vz, i) + along(vyz, i);
+            (self.low[i], self.high[i]) = (v[i + 1] - reach, v[i + 1] + reach);
         }
     }
-    range
-}
 
-/// Along one axis of a brick: the five lattice points from the one before to the one after, clamped, and a third of one
-/// over the distance between each inner point's neighbours, ahead of it and behind it, 0 where no cell lies there.
-struct Span {
-    index: [usize; 5],
-    ahead: [f64; 3],
-    behind: [f64; 3],
-}
-
-impl Span {
-    fn new(brick: usize, n: usize) -> Self {
-        let first = 2 * brick;
-        let third = |i: usize| 1.0 / (3.0 * (i + 1).min(n - 1).saturating_sub(i.saturating_sub(1)).max(1) as f64);
-        let exists = |cell: usize| if cell + 1 < n { 1.0 } else { 0.0 };
-        Self {
-            index: std::array::from_fn(|p| (first + p).saturating_sub(1).min(n - 1)),
-            ahead: [third(first) * exists(first), third(first + 1) * exists(first + 1), 0.0],
-            behind: [0.0, third(first + 1) * exists(first), third(first + 2) * exists(first + 1)],
+    /// Joins the ranges to those of a row of nodes.
+    fn join(&self, nodes: &mut [[f64; 2]]) {
+        let last = self.low.len() - 1;
+        for (i, node) in nodes.iter_mut().enumerate() {
+            for p in 2 * i..=(2 * i + 2).min(last) {
+                *node = [node[0].min(self.low[p]), node[1].max(self.high[p])];
+            }
         }
     }
-
-    /// Control points of the two cells, the shared end once.
-    fn control(&self, v: [f64; 5]) -> [f64; 7] {
-        let slope = [v[2] - v[0], v[3] - v[1], v[4] - v[2]];
-        [
-            v[1],
-            v[1] + self.ahead[0] * slope[0],
-            v[2] - self.behind[1] * slope[1],
-            v[2],
-            v[2] + self.ahead[1] * slope[1],
-            v[3] - self.behind[2] * slope[2],
-            v[3],
-        ]
-    }
 }
 
-/// Extremes of the 343 control points of 2×2×2 cells.
-fn cubic_brick(grid: &Grid, brick: [usize; 3]) -> [f64; 2] {
-    let [x, y, z] = [0, 1, 2].map(|a| Span::new(brick[a], grid.dims[a]));
-    let [nx, ny, _] = grid.dims;
-    let planes: [[[f64; 7]; 7]; 5] = std::array::from_fn(|k| {
-        let rows: [[f64; 7]; 5] = std::array::from_fn(|j| {
-            let row = &grid.values[(z.index[k] * ny + y.index[j]) * nx..][..nx];
-            x.control(x.index.map(|i| f64::from(row[i])))
-        });
-        transposed(std::array::from_fn(|i| y.control(rows.map(|row| row[i]))))
-    });
-    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
-    for j in 0..7 {
-        for i in 0..7 {
-            range = z.control(planes.map(|p| p[j][i])).into_iter().fold(range, fold_range);
+/// The finest nodes of one layer.
+fn layer(grid: &Grid, interpolation: Interpolation, k: usize, out: &mut [Range], [nx, ny]: [usize; 2]) {
+    let [points_x, points_y, points_z] = grid.dims;
+    let mut row = Row::new(points_x);
+    let mut nodes = vec![[f64::INFINITY, f64::NEG_INFINITY]; nx * ny];
+    for plane in 2 * k..=(2 * k + 2).min(points_z - 1) {
+        for j in 0..points_y {
+            row.fill(grid, interpolation, j, plane);
+            // An even row of points closes one row of nodes and begins the next.
+            let begun = (j / 2 < ny).then_some(j / 2);
+            let closed = (j % 2 == 0).then(|| (j / 2).checked_sub(1)).flatten();
+            for node_row in [begun, closed].into_iter().flatten() {
+                row.join(&mut nodes[node_row * nx..][..nx]);
+            }
         }
     }
-    range
-}
-
-fn transposed(columns: [[f64; 7]; 7]) -> [[f64; 7]; 7] {
-    std::array::from_fn(|j| std::array::from_fn(|i| columns[i][j]))
+    out.iter_mut().zip(nodes).for_each(|(o, n)| *o = outward(n));
 }

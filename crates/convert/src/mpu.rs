@@ -1,0 +1,230 @@
+//! Level sets of scattered points: multi-level partition of unity implicits (Ohtake, Belyaev, Alexa, Turk, Seidel 2003).
+//!
+//! f(x) = Σ wᵢ(x)Qᵢ(x) / Σ wᵢ(x), negative inside. Qᵢ is a local shape fitted to the points of one cell of an octree
+//! ([`mod@fit`], [`mod@sharp`]), about the signed distance to them; wᵢ is a quadratic B-spline of the distance to the cell's
+//! middle with support radius α times the diagonal of the cell ([`mod@weight`]). Cells divide until the shape is within the
+//! tolerance ε₀ of its points ([`mod@octree`]). The paper descends the tree for each value; here a cell lists the functions
+//! that reach it ([`mod@blend`]).
+//!
+//! | symbol | name | meaning |
+//! |---|---|---|
+//! | ε₀ | `tolerance` | Taubin's distance of points from a shape, over the diagonal of the points' box |
+//! | α | `support` | support radius over the diagonal of a cell |
+//! | N_min | `samples` | fewest points a shape is fitted to |
+
+mod blend;
+mod fit;
+mod octree;
+mod quadric;
+mod samples;
+mod sharp;
+mod solve;
+mod weight;
+
+use crate::{ConvertError, Orientation, RawPoints};
+use octree::Octree;
+use samples::{SampleTree, box_of, samples_of};
+use splat_core::ScalarField;
+use splat_core::glam::{DMat3, DVec3};
+
+/// Half the side of the cube over half the longest side of the points' box: closed surfaces end before the cube does.
+const MARGIN: f64 = 1.25;
+
+/// How scattered points become a field.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MpuParams {
+    /// Name of the object in messages.
+    pub object_name: String,
+    /// ε₀: how far points may lie from the local shape, over the diagonal of their box; above 0, up to 1.
+    pub tolerance: f64,
+    /// Most levels below the root, 0 to 24.
+    pub max_depth: u32,
+    /// N_min: fewest points that a shape is fitted to, 6 to 64.
+    pub samples: usize,
+    /// α: support radius over the diagonal of a cell, 0.6 to 2.
+    pub support: f64,
+    /// Whether shapes may have edges and corners.
+    pub sharp: bool,
+    /// Which side estimated normals point to, where the points lack some.
+    pub orientation: Orientation,
+}
+
+impl Default for MpuParams {
+    fn default() -> Self {
+        Self {
+            object_name: "object".to_owned(),
+            tolerance: 1e-3,
+            max_depth: 16,
+            samples: 15,
+            support: 0.75,
+            sharp: true,
+            orientation: Orientation::Propagate,
+        }
+    }
+}
+
+/// What the construction of a field from points did.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MpuReport {
+    /// Points given.
+    pub points: u64,
+    /// Points that count: exact copies do not.
+    pub samples: u64,
+    /// Leaves of the octree, each with one local shape.
+    pub leaves: u64,
+    /// Leaves with an edge or a corner.
+    pub sharp: u64,
+    /// Levels below the root.
+    pub depth: u32,
+    /// Entries in the lists of leaves; over `leaves` the functions looked at for one value.
+    pub listed: u64,
+    /// ε₀ as a length, units of the points.
+    pub tolerance: f64,
+    /// Leaves that miss the tolerance because they had too few points or the tree was deep enough.
+    pub missed: u64,
+    /// Largest distance of a point from the shape of a leaf whose ball it lies in, by Taubin's measure.
+    pub largest_error: f64,
+}
+
+/// What cells are built to.
+#[derive(Debug, Clone, Copy)]
+struct Tolerances {
+    /// ε₀ as a length.
+    error: f64,
+    depth: u32,
+    samples: usize,
+    support: f64,
+    sharp: bool,
+}
+
+/// A field whose zero set passes by scattered points; see [`points_to_field`].
+///
+/// It is defined by the points in a cube around them ([`MpuField::bounds`]); elsewhere it has the value of the nearest
+/// place of the cube, and no surface ([`ScalarField::in_domain`]).
+#[derive(Debug)]
+pub struct MpuField {
+    origin: DVec3,
+    octree: Octree,
+}
+
+/// Makes a field whose zero set passes by the points; normals point to where it is positive.
+///
+/// Missing normals are estimated as [`crate::raw_to_surfels`] does it.
+///
+/// ```
+/// use convert::{MpuParams, RawPoints, points_to_field};
+/// use splat_core::{ScalarField, glam::{DVec3, Vec3}};
+/// let turn = |i: i32| {
+///     let (y, a) = (1.0 - 2.0 * (i as f32 + 0.5) / 2000.0, i as f32 * 2.399_963);
+///     Vec3::new(a.cos() * (1.0 - y * y).sqrt(), y, a.sin() * (1.0 - y * y).sqrt())
+/// };
+/// let ball: Vec<Vec3> = (0..2000).map(turn).collect();
+/// let points = RawPoints { position: ball.clone(), normal: ball, ..RawPoints::default() };
+/// let (field, report) = points_to_field(&points, &MpuParams::default()).unwrap();
+/// assert!(field.value(DVec3::new(0.6, 0.0, 0.8)).abs() < report.tolerance);
+/// assert!(field.value(DVec3::ZERO) < 0.0);
+/// ```
+///
+/// # Errors
+/// [`ConvertError::Parameter`] for parameters outside their ranges, fewer than N_min distinct points or points at one
+/// place; [`ConvertError::Input`] for points that do not validate.
+pub fn points_to_field(points: &RawPoints, params: &MpuParams) -> Result<(MpuField, MpuReport), ConvertError> {
+    check(params)?;
+    let (origin, samples) = samples_of(points, params)?;
+    if samples.len() < params.samples {
+        return Err(bad(params, "points", samples.len(), "at least as many different points as `samples` asks for"));
+    }
+    let [low, high] = box_of(&samples);
+    let side = (high - low).max_element();
+    // The square of the smallest cell must be a normal number.
+    if !(1e-140..1e140).contains(&side) {
+        return Err(bad(params, "extent of the points", side, "points at different places, 1e-140 to 1e140 apart"));
+    }
+    let asked = Tolerances {
+        error: params.tolerance * (high - low).length(),
+        depth: params.max_depth,
+        samples: params.samples,
+        support: params.support,
+        sharp: params.sharp,
+    };
+    let tree = SampleTree::new(samples);
+    let (octree, report) = Octree::new(&tree, low + 0.5 * (high - low), 0.5 * MARGIN * side, &asked);
+    Ok((MpuField { origin, octree }, MpuReport { points: points.len() as u64, ..report }))
+}
+
+fn bad(
+    params: &MpuParams,
+    parameter: &'static str,
+    found: impl std::fmt::Debug,
+    expected: &'static str,
+) -> ConvertError {
+    ConvertError::Parameter { object: params.object_name.clone(), parameter, found: format!("{found:?}"), expected }
+}
+
+fn check(params: &MpuParams) -> Result<(), ConvertError> {
+    if !(params.tolerance > 0.0 && params.tolerance <= 1.0) {
+        return Err(bad(params, "tolerance", params.tolerance, "a number above 0, up to 1"));
+    }
+    if params.max_depth > 24 {
+        return Err(bad(params, "max_depth", params.max_depth, "0 to 24"));
+    }
+    if !(6..=64).contains(&params.samples) {
+        return Err(bad(params, "samples", params.samples, "6 to 64"));
+    }
+    if !(0.6..=2.0).contains(&params.support) {
+        return Err(bad(params, "support", params.support, "0.6 to 2"));
+    }
+    Ok(())
+}
+
+impl MpuField {
+    /// Opposite corners of the cube.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        let (center, half) = (self.origin + self.octree.center, self.octree.half);
+        [center - half, center + half]
+    }
+
+    /// The place of the cube that stands for `p`, relative to the origin, and 1 for each axis on which it is `p`.
+    fn local(&self, p: DVec3) -> (DVec3, DVec3) {
+        let (p, center, half) = (p - self.origin, self.octree.center, self.octree.half);
+        let inside = p.clamp(center - half, center + half);
+        (inside, DVec3::select(p.cmpeq(inside), DVec3::ONE, DVec3::ZERO))
+    }
+}
+
+impl ScalarField for MpuField {
+    fn value(&self, p: DVec3) -> f64 {
+        self.octree.blend::<0>(self.local(p).0).value
+    }
+
+    fn gradient(&self, p: DVec3) -> DVec3 {
+        self.value_gradient(p).1
+    }
+
+    fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
+        let (p, kept) = self.local(p);
+        let blend = self.octree.blend::<1>(p);
+        (blend.value, blend.gradient * kept)
+    }
+
+    fn hessian(&self, p: DVec3) -> DMat3 {
+        let (p, kept) = self.local(p);
+        let keep = DMat3::from_diagonal(kept);
+        keep * self.octree.blend::<2>(p).hessian * keep
+    }
+
+    fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> {
+        // The last term covers the rounding of positions.
+        let far = p.abs().max_element() + self.origin.abs().max_element() + radius;
+        let reach = radius + 8.0 * f64::EPSILON * far;
+        if !(p.is_finite() && reach.is_finite() && radius >= 0.0) {
+            return None;
+        }
+        let [low, high] = self.octree.over_ball(self.local(p).0, reach);
+        Some((low, high))
+    }
+
+    fn in_domain(&self, p: DVec3) -> bool {
+        self.local(p).1 == DVec3::ONE
+    }
+}

@@ -1,0 +1,210 @@
+//! Local fits (Ohtake et al. 2003, section 4): which shape suits the samples of a ball.
+//!
+//! Samples are taken in the local coordinates y = (p − center)/R with the B-spline weights of the blend, normalised to
+//! the sum 1. The usual shape is a height field over the plane across the mean normal n, the minimum of
+//! Σ wᵢ(n·yᵢ − h(uᵢ, vᵢ))²; a general quadric, where normals turn by 90° or more, is the minimum of
+//! Σ wᵢQ(yᵢ)² + Σ(Q(qⱼ) − dⱼ)²/m over auxiliary places qⱼ (corners and middle of the cell) whose six nearest samples
+//! agree on the side; d is the mean of their distances n·(q − p).
+//!
+//! [`RIDGE`] is added to the squares of second-order coefficients: it closes directions that few samples leave open in
+//! favour of the flattest shape. Where even a plane stays open the fit is the plane through the mean, across the mean
+//! normal.
+//!
+//! Deviations: the height field is tried first wherever it can be, edges and corners and quadrics only where it misses
+//! the tolerance, and the best of them is kept; a cell without samples of its own gets a plane.
+
+use super::quadric::{Quadric, Shape, active_piece};
+use super::samples::{Sample, SampleTree};
+use super::solve::{add_equation, solve};
+use super::weight::weight;
+use super::{Tolerances, sharp};
+use splat_core::glam::DVec3;
+
+/// See the head of the file; in units of the support radius.
+const RIDGE: f64 = 1e-7;
+/// Samples that decide on the side of an auxiliary place.
+const JUDGES: usize = 6;
+/// Fewer samples than this get a plane.
+const FEWEST_FOR_CURVES: usize = 8;
+
+/// A ball of samples in its local coordinates.
+pub(super) struct Ball {
+    pub(super) center: DVec3,
+    pub(super) radius: f64,
+    /// Samples within the ball, y and normal.
+    pub(super) samples: Vec<Sample>,
+    /// Weights, summing to 1.
+    pub(super) weights: Vec<f64>,
+    /// Samples whose error counts: those within the ball before it was enlarged, |y|² ≤ this.
+    pub(super) counted: f64,
+}
+
+/// A shape and its largest error, a length in local coordinates.
+#[derive(Debug, Clone)]
+pub(super) struct Fit {
+    pub(super) shape: Shape,
+    pub(super) error: f64,
+}
+
+/// Scratch of one task.
+#[derive(Default)]
+pub(super) struct Scratch {
+    pub(super) ids: Vec<u32>,
+    pub(super) nearest: Vec<(f64, u32)>,
+}
+
+impl Ball {
+    pub(super) fn new(tree: &SampleTree, ids: &[u32], center: DVec3, radius: f64, before: f64) -> Self {
+        let inverse = 1.0 / radius;
+        let local = |id: &u32| {
+            let s = tree.samples[*id as usize];
+            Sample { position: (s.position - center) * inverse, normal: s.normal }
+        };
+        let samples: Vec<Sample> = ids.iter().map(local).collect();
+        let mut weights: Vec<f64> = samples.iter().map(|s| weight(s.position.length_squared())).collect();
+        let sum: f64 = weights.iter().sum();
+        let even = 1.0 / weights.len() as f64;
+        weights.iter_mut().for_each(|w| *w = if sum > 0.0 { *w / sum } else { even });
+        let counted = (before * inverse) * (before * inverse);
+        Self { center, radius, samples, weights, counted }
+    }
+
+    /// Taubin's distance |Q|/|∇Q|, the largest over the samples that count; stops above `enough`.
+    pub(super) fn error(&self, shape: &Shape, enough: f64) -> f64 {
+        let mut worst = 0.0f64;
+        for s in self.samples.iter().filter(|s| s.position.length_squared() <= self.counted) {
+            let (value, gradient) = active_piece(&shape.pieces, shape.joint, s.position).value_gradient(s.position);
+            let error = if value == 0.0 { 0.0 } else { value.abs() / gradient.length() };
+            worst = worst.max(error);
+            if worst > enough {
+                break;
+            }
+        }
+        worst
+    }
+
+    fn fit(&self, shape: Shape, enough: f64) -> Fit {
+        let error = self.error(&shape, enough);
+        Fit { shape, error }
+    }
+
+    /// Weighted mean of normals, or the first sample's where they cancel.
+    fn mean_normal(&self, chosen: &[usize]) -> DVec3 {
+        let sum: DVec3 = chosen.iter().map(|&i| self.samples[i].normal * self.weights[i]).sum();
+        sum.try_normalize().unwrap_or(self.samples[chosen[0]].normal)
+    }
+
+    /// The height field of some samples, at least one.
+    pub(super) fn height(&self, chosen: &[usize], curved: bool) -> Quadric {
+        let n = self.mean_normal(chosen);
+        let (u, v) = n.any_orthonormal_pair();
+        let frame = [u, v, n];
+        let local = chosen.iter().map(|&i| {
+            let y = self.samples[i].position;
+            (y.dot(u), y.dot(v), y.dot(n), self.weights[i])
+        });
+        let total: f64 = local.clone().map(|s| s.3).sum();
+        // Weights of a part may all be 0 at the rim of the ball.
+        let weigh = |w: f64| if total > 0.0 { w / total } else { 1.0 / chosen.len() as f64 };
+        let curves = || {
+            let (mut a, mut b) = ([[0.0; 6]; 6], [0.0; 6]);
+            for (u, v, h, w) in local.clone() {
+                add_equation(&mut a, &mut b, &[u * u, u * v, v * v, u, v, 1.0], h, weigh(w));
+            }
+            (0..3).for_each(|i| a[i][i] += RIDGE);
+            solve(a, b)
+        };
+        let plane = || {
+            let (mut a, mut b) = ([[0.0; 3]; 3], [0.0; 3]);
+            for (u, v, h, w) in local.clone() {
+                add_equation(&mut a, &mut b, &[u, v, 1.0], h, weigh(w));
+            }
+            solve(a, b).map(|[d, e, f]| [0.0, 0.0, 0.0, d, e, f])
+        };
+        let across = || [0.0, 0.0, 0.0, 0.0, 0.0, local.clone().map(|s| weigh(s.3) * s.2).sum()];
+        let curved = curved && chosen.len() >= FEWEST_FOR_CURVES;
+        let solution = if curved { curves() } else { None };
+        Quadric::height(frame, solution.or_else(plane).unwrap_or_else(across))
+    }
+
+    /// The general quadric, or `None` where no auxiliary place is reliable or the system leaves a direction open.
+    fn quadric(&self, tree: &SampleTree, half: f64, nearest: &mut Vec<(f64, u32)>) -> Option<Quadric> {
+        let (mut a, mut b) = ([[0.0; 10]; 10], [0.0; 10]);
+        let phi = |y: DVec3| [y.x * y.x, y.y * y.y, y.z * y.z, y.y * y.z, y.z * y.x, y.x * y.y, y.x, y.y, y.z, 1.0];
+        for (s, w) in self.samples.iter().zip(&self.weights) {
+            add_equation(&mut a, &mut b, &phi(s.position), 0.0, *w);
+        }
+        let places: Vec<(DVec3, f64)> = (0..9).filter_map(|q| self.auxiliary(tree, half, q, nearest)).collect();
+        for (y, distance) in &places {
+            add_equation(&mut a, &mut b, &phi(*y), *distance, 1.0 / places.len() as f64);
+        }
+        (0..6).for_each(|i| a[i][i] += RIDGE);
+        let q = if places.is_empty() { None } else { solve(a, b) }?;
+        Some(Quadric {
+            constant: q[9],
+            linear: DVec3::new(q[6], q[7], q[8]),
+            diagonal: DVec3::new(q[0], q[1], q[2]),
+            mixed: 0.5 * DVec3::new(q[3], q[4], q[5]),
+        })
+    }
+
+    /// Corner 0 to 7 or middle of the cell in local coordinates and its distance, if the samples agree on its side.
+    fn auxiliary(&self, tree: &SampleTree, half: f64, q: usize, nearest: &mut Vec<(f64, u32)>) -> Option<(DVec3, f64)> {
+        let sign = |a: usize| if q >> a & 1 == 0 { -half } else { half };
+        let at = self.center + if q == 8 { DVec3::ZERO } else { DVec3::new(sign(0), sign(1), sign(2)) };
+        tree.nearest(at, JUDGES, nearest);
+        let distance = |e: &(f64, u32)| {
+            let s = &tree.samples[e.1 as usize];
+            s.normal.dot(at - s.position)
+        };
+        let outside = nearest.iter().filter(|e| distance(e) > 0.0).count();
+        let inside = nearest.iter().filter(|e| distance(e) < 0.0).count();
+        let mean = nearest.iter().map(distance).sum::<f64>() / nearest.len() as f64;
+        let agreed = outside == nearest.len() || inside == nearest.len();
+        agreed.then(|| ((at - self.center) / self.radius, mean / self.radius))
+    }
+
+    /// Whether a normal turns from the mean one by 90° or more.
+    fn turns_over(&self, mean: DVec3) -> bool {
+        self.samples.iter().any(|s| s.normal.dot(mean) <= 0.0)
+    }
+
+    /// The best shape for this ball; `None` where a large part shows nothing that a smaller cell could not show better.
+    pub(super) fn best(
+        &self,
+        tree: &SampleTree,
+        half: f64,
+        asked: &Tolerances,
+        last: bool,
+        scratch: &mut Scratch,
+    ) -> Option<Fit> {
+        let all: Vec<usize> = (0..self.samples.len()).collect();
+        let tolerance = asked.error / self.radius;
+        let few = all.len() <= 2 * asked.samples;
+        // A cell that can be divided needs no error beyond the tolerance.
+        let enough = if few || last { f64::INFINITY } else { tolerance };
+        let over = self.turns_over(self.mean_normal(&all));
+        let mut best: Option<Fit> = None;
+        let mut offer = |fit: Fit| {
+            if best.as_ref().is_none_or(|b| fit.error < b.error) {
+                best = Some(fit);
+            }
+            best.as_ref().is_some_and(|b| b.error <= tolerance)
+        };
+        let mut done = false;
+        if !over || few || last {
+            done = offer(self.fit(Shape::smooth(self.height(&all, true)), enough));
+        }
+        if !done && over {
+            if let Some(q) = self.quadric(tree, half, &mut scratch.nearest) {
+                done = offer(self.fit(Shape::smooth(q), enough));
+            }
+        }
+        if !done && few && asked.sharp {
+            sharp::shapes(self).into_iter().for_each(|shape| {
+                offer(self.fit(shape, enough));
+            });
+        }
+        best
+    }
+}

@@ -1,0 +1,324 @@
+//! Fields of scattered points: accuracy, derivatives, bounds, sameness, and inputs that are hardly surfaces.
+#![cfg(all(feature = "surfels", feature = "ply"))]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use convert::read::{self, Loaded, ReadLimits};
+use convert::{
+    MpuField, MpuParams, MpuReport, Orientation, RawPoints, SplatParams, field_to_mesh, points_to_field, vertex_normals,
+};
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::{ScalarField, rng};
+use std::f64::consts::TAU;
+use std::path::Path;
+
+fn unit(i: u64, a: u64) -> f64 {
+    rng::unit(21, 0, i, a)
+}
+
+fn signed(i: u64) -> DVec3 {
+    DVec3::from_array([0, 1, 2].map(|a| 2.0 * unit(i, a) - 1.0))
+}
+
+fn on_sphere(i: u64) -> (DVec3, DVec3) {
+    let n = DVec3::from_array([0, 2, 4].map(|a| (-2.0 * unit(i, a).ln()).sqrt() * (TAU * unit(i, a + 1)).cos()))
+        .normalize();
+    (n, n)
+}
+
+fn on_torus(i: u64) -> (DVec3, DVec3) {
+    let (a, b) = (TAU * unit(i, 0), TAU * unit(i, 1));
+    let out = DVec3::new(a.cos(), a.sin(), 0.0);
+    let n = out * b.cos() + DVec3::Z * b.sin();
+    (out + n * 0.4, n)
+}
+
+fn on_box(i: u64) -> (DVec3, DVec3) {
+    let face = (6.0 * unit(i, 3)) as usize % 6;
+    let n = DVec3::AXES[face % 3] * if face < 3 { 1.0 } else { -1.0 };
+    let p = signed(i) * DVec3::new(1.0, 0.75, 0.5);
+    (p * (DVec3::ONE - n.abs()) + n * DVec3::new(1.0, 0.75, 0.5), n)
+}
+
+fn cloud(of: fn(u64) -> (DVec3, DVec3), count: u64) -> RawPoints {
+    let (position, normal) = (0..count).map(|i| (of(i).0.as_vec3(), of(i).1.as_vec3())).unzip();
+    RawPoints { position, normal, ..RawPoints::default() }
+}
+
+fn field(points: &RawPoints, tolerance: f64) -> (MpuField, MpuReport) {
+    points_to_field(points, &MpuParams { tolerance, ..MpuParams::default() }).unwrap()
+}
+
+/// Mean and largest distance from the zero set, to first order, at places of the true surface, over the tolerance.
+fn misses(of: fn(u64) -> (DVec3, DVec3), field: &MpuField, report: &MpuReport) -> (f64, f64) {
+    let distance = |i: u64| {
+        let (v, g) = field.value_gradient(of(i).0);
+        v.abs() / g.length() / report.tolerance
+    };
+    let all: Vec<f64> = (1_000_000..1_003_000).map(distance).collect();
+    (all.iter().sum::<f64>() / all.len() as f64, all.iter().copied().fold(0.0, f64::max))
+}
+
+#[test]
+fn spheres_and_tori_are_met_within_the_tolerance() {
+    for (of, count, tolerance) in
+        [(on_sphere as fn(u64) -> _, 4000, 1e-3), (on_torus, 12_000, 1e-3), (on_torus, 30_000, 2e-4)]
+    {
+        let (f, report) = field(&cloud(of, count), tolerance);
+        let (mean, most) = misses(of, &f, &report);
+        println!("{mean:.3} {most:.3} {report:?}");
+        assert!(report.missed == 0 && report.largest_error <= report.tolerance);
+        assert!(mean < 0.2 && most < 1.0, "{mean} {most} {report:?}");
+        for i in 0..1000 {
+            let (p, n) = of(2_000_000 + i);
+            assert!(f.gradient(p).normalize().dot(n) > 0.99, "{p}");
+            assert!(f.value(p + n * 0.05) > 0.0 && f.value(p - n * 0.05) < 0.0);
+        }
+    }
+}
+
+#[test]
+fn a_box_keeps_its_edges_where_shapes_may_be_sharp() {
+    let points = cloud(on_box, 20_000);
+    let (sharp, report) = field(&points, 1e-3);
+    let rounded =
+        points_to_field(&points, &MpuParams { tolerance: 1e-3, sharp: false, ..MpuParams::default() }).unwrap();
+    let (a, b) = (misses(on_box, &sharp, &report), misses(on_box, &rounded.0, &rounded.1));
+    println!("sharp {a:?} {report:?}\nrounded {b:?} {:?}", rounded.1);
+    assert!(report.sharp > 0 && rounded.1.sharp == 0);
+    assert!(a.0 < 0.1 && a.0 < b.0 && report.missed < rounded.1.missed, "{a:?} {b:?}");
+    // Just outside and inside of an edge and of a corner.
+    for edge in [DVec3::new(1.0, 0.75, 0.1), DVec3::new(1.0, 0.75, 0.5)] {
+        assert!(sharp.value(edge * 1.02) > 0.0 && sharp.value(edge * 0.98) < 0.0);
+    }
+}
+
+#[test]
+fn derivatives_agree_with_finite_differences() {
+    for (points, h) in [(cloud(on_torus, 3000), 1e-6), (cloud(on_box, 3000), 1e-6)] {
+        let (f, report) = field(&points, 1e-3);
+        let (mut checked, mut off) = (0, 0);
+        for i in 0..500 {
+            let p = signed(i) * 1.5;
+            let (gradient, hessian) = (f.gradient(p), f.hessian(p));
+            for a in 0..3 {
+                let d = DVec3::AXES[a] * h;
+                let slope = (f.value(p + d) - f.value(p - d)) / (2.0 * h);
+                let bend = (f.gradient(p + d) - f.gradient(p - d)) / (2.0 * h);
+                checked += 1;
+                let wrong = (slope - gradient[a]).abs() > 1e-6 * (1.0 + gradient.length())
+                    || (bend - hessian.col(a)).length() > 1e-5 * (1.0 + bend.length());
+                off += u32::from(wrong);
+            }
+        }
+        // Hessians jump where B-splines join, gradients at edges: a step may cross that.
+        assert!(off * 200 <= checked && (report.sharp > 0 || off == 0), "{off} of {checked}");
+    }
+}
+
+/// Checks that bounds hold; returns their mean width over the mean spread of values.
+fn check_bounds(f: &MpuField, radius: f64, balls: u64) -> f64 {
+    let (mut width, mut spread) = (0.0, 0.0);
+    for i in 0..balls {
+        let center = signed(i) * 1.4;
+        let (low, high) = f.bound(center, radius).unwrap();
+        let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+        for j in 0..100 {
+            let v = f.value(center + signed(1000 * i + j).normalize() * (radius * unit(j, 9).cbrt()));
+            assert!(low <= v && v <= high, "{v} outside {low}..{high} at {center}, {radius}");
+            (least, most) = (least.min(v), most.max(v));
+        }
+        (width, spread) = (width + (high - low), spread + (most - least));
+    }
+    width / spread
+}
+
+#[test]
+fn bounds_contain_every_value_and_close_onto_it() {
+    for points in [cloud(on_torus, 3000), cloud(on_box, 3000)] {
+        let (f, _) = field(&points, 1e-3);
+        let ratios = [1e-6, 1e-3, 0.02, 0.2, 1.0].map(|r| check_bounds(&f, r, 150));
+        println!("bounds over spreads {ratios:?}");
+        assert!(ratios.iter().all(|r| *r < 7.0), "{ratios:?}");
+    }
+}
+
+#[test]
+fn threads_order_and_copies_do_not_matter() {
+    let points = cloud(on_torus, 5000);
+    let mut other = points.clone();
+    other.position.reverse();
+    other.normal.reverse();
+    let (p, n) = (other.position[17], other.normal[17]);
+    other.position.push(p);
+    other.normal.push(n);
+    let build = |threads: usize, points: &RawPoints| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| field(points, 5e-4))
+    };
+    let (one, report) = build(1, &points);
+    for threads in [1, 2, 7] {
+        let (many, again) = build(threads, &other);
+        assert_eq!(again, MpuReport { points: 5001, ..report });
+        for i in 0..300 {
+            let p = signed(i) * 1.5;
+            assert_eq!(one.value_gradient(p), many.value_gradient(p));
+            assert_eq!(one.bound(p, 0.1), many.bound(p, 0.1));
+        }
+    }
+}
+
+#[test]
+fn scaling_by_two_scales_exactly_and_far_away_is_like_here() {
+    let points = cloud(on_box, 3000);
+    let (f, report) = field(&points, 1e-3);
+    let mut large = points.clone();
+    large.position.iter_mut().for_each(|p| *p *= 1024.0);
+    let (scaled, _) = field(&large, 1e-3);
+    let shift = DVec3::new(1e7, -2e7, 1e7);
+    let (far, same) = field(&RawPoints { origin: shift, ..points }, 1e-3);
+    assert_eq!(report, same);
+    for i in 0..300 {
+        let p = (signed(i) * 1.5 * 4096.0).round() / 4096.0;
+        assert_eq!(f.value(p) * 1024.0, scaled.value(p * 1024.0));
+        assert_eq!(f.gradient(p), scaled.gradient(p * 1024.0));
+        assert_eq!(f.hessian(p), scaled.hessian(p * 1024.0) * 1024.0);
+        assert_eq!(f.value_gradient(p), far.value_gradient(p + shift));
+        let (here, there) = (f.bound(p, 0.01).unwrap(), far.bound(p + shift, 0.01).unwrap());
+        // The radius grows by the rounding of positions out there.
+        assert!((here.0 - there.0).abs() < 1e-5 && (here.1 - there.1).abs() < 1e-5, "{here:?} {there:?}");
+    }
+}
+
+#[test]
+fn beyond_the_cube_the_value_stays_and_there_is_no_surface() {
+    let (f, _) = field(&cloud(on_sphere, 2000), 1e-3);
+    let [_, high] = f.bounds();
+    let (edge, out) = (DVec3::new(high.x, 0.1, 0.2), DVec3::new(high.x + 5.0, 0.1, 0.2));
+    assert!(f.in_domain(edge - DVec3::X * 1e-9) && !f.in_domain(out));
+    assert!((f.value(edge) - f.value(out)).abs() < 1e-12 && f.gradient(out).x == 0.0);
+    let (low, high) = f.bound(out, 0.1).unwrap();
+    assert!(low <= f.value(out) && f.value(out) <= high);
+    assert!(f.bound(DVec3::NAN, 1.0).is_none());
+}
+
+/// A field of these points, all finite within the cube.
+fn survives(name: &str, points: &RawPoints) -> (MpuField, MpuReport) {
+    let (f, report) = field(points, 1e-3);
+    let [low, high] = f.bounds();
+    for i in 0..200 {
+        let p = low + (high - low) * DVec3::new(unit(i, 0), unit(i, 1), unit(i, 2));
+        let (v, g) = f.value_gradient(p);
+        assert!(v.is_finite() && g.is_finite() && !f.hessian(p).is_nan(), "{name} at {p}: {v} {g}");
+        let (a, b) = f.bound(p, 0.1 * (high - low).x).unwrap();
+        assert!(a <= v && v <= b, "{name}");
+    }
+    println!("{name}: {report:?}");
+    (f, report)
+}
+
+#[test]
+fn points_that_are_hardly_a_surface_give_a_field_all_the_same() {
+    let with = |count: u64, f: &dyn Fn(u64) -> (DVec3, DVec3)| {
+        let (position, normal) = (0..count).map(|i| (f(i).0.as_vec3(), f(i).1.as_vec3())).unzip();
+        RawPoints { position, normal, ..RawPoints::default() }
+    };
+    survives("a line", &with(500, &|i| (DVec3::X * unit(i, 0), DVec3::Y)));
+    let plane = survives("a plane", &with(500, &|i| (signed(i) * DVec3::new(1.0, 1.0, 0.0), DVec3::Z))).0;
+    assert!((plane.value(DVec3::new(0.3, 0.2, 0.125)) - 0.125).abs() < 1e-9);
+    survives(
+        "a lattice",
+        &with(4096, &|i| (DVec3::new((i % 16) as f64, (i / 16 % 16) as f64, (i / 256) as f64), DVec3::Z)),
+    );
+    survives("two places", &with(40, &|i| (DVec3::X * (i % 2) as f64, on_sphere(i).0)));
+    survives("a heap of copies", &with(2000, &|i| if i < 1000 { (DVec3::ONE, on_sphere(i).0) } else { on_sphere(i) }));
+    survives("normals at random", &with(2000, &|i| (on_sphere(i).0, on_sphere(i + 9000).0)));
+    survives("just enough", &with(15, &|i| on_sphere(i)));
+    let noisy = survives(
+        "noise",
+        &with(20_000, &|i| {
+            let (p, n) = on_sphere(i);
+            (p * (1.0 + 0.01 * signed(i).x), (n + 0.3 * signed(i + 50_000)).normalize())
+        }),
+    );
+    for i in 0..500 {
+        let (p, n) = on_sphere(700_000 + i);
+        assert!(noisy.0.value(p + 0.05 * n) > 0.0 && noisy.0.value(p - 0.05 * n) < 0.0);
+    }
+}
+
+#[test]
+fn missing_normals_are_estimated() {
+    let mut points = cloud(on_sphere, 4000);
+    points.normal.clear();
+    let (f, report) = field(&points, 2e-3);
+    let (mean, most) = misses(on_sphere, &f, &report);
+    assert!(mean < 0.3 && most < 1.5, "{mean} {most}");
+    assert!(f.value(DVec3::ZERO) < 0.0 && f.value(DVec3::splat(0.7)) > 0.0);
+    // Towards the middle: inside out.
+    let params = MpuParams { orientation: Orientation::Viewpoint(DVec3::ZERO), ..MpuParams::default() };
+    assert!(points_to_field(&points, &params).unwrap().0.value(DVec3::ZERO) > 0.0);
+}
+
+#[test]
+fn what_is_no_surface_is_refused() {
+    let says = |points: &RawPoints, params: &MpuParams, needle: &str| {
+        let error = points_to_field(points, params).unwrap_err().to_string();
+        assert!(error.contains(needle), "{error}");
+    };
+    let (good, default) = (cloud(on_sphere, 100), MpuParams::default());
+    says(&cloud(on_sphere, 14), &default, "points is 14");
+    says(&RawPoints::default(), &default, "points is 0");
+    says(
+        &RawPoints { position: vec![Vec3::ONE; 50], normal: vec![Vec3::X; 50], ..RawPoints::default() },
+        &default,
+        "points is 1",
+    );
+    let heap = RawPoints { position: vec![Vec3::ONE; 100], ..good.clone() };
+    says(&heap, &default, "different places");
+    let mut nan = good.clone();
+    nan.position[3].y = f32::NAN;
+    says(&nan, &default, "point 3");
+    let mut nan = good.clone();
+    nan.normal[4].y = f32::INFINITY;
+    says(&nan, &default, "point 4");
+    for (params, needle) in [
+        (MpuParams { tolerance: 0.0, ..default.clone() }, "tolerance"),
+        (MpuParams { tolerance: f64::NAN, ..default.clone() }, "tolerance"),
+        (MpuParams { max_depth: 25, ..default.clone() }, "max_depth"),
+        (MpuParams { samples: 5, ..default.clone() }, "samples"),
+        (MpuParams { support: 0.5, ..default }, "support"),
+    ] {
+        says(&good, &params, needle);
+    }
+}
+
+/// The scanned bunny: its vertices lie on the zero set, and the zero set by its vertices.
+#[test]
+fn the_bunny_is_met_within_the_tolerance_and_has_no_other_sheets() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/stanford-bunny/bunny.ply.gz");
+    let Loaded::Mesh(mesh) = read::file(&path, &ReadLimits::default()).unwrap() else { panic!("not a mesh") };
+    let normal = vertex_normals(&mesh);
+    let points = RawPoints { origin: mesh.origin, position: mesh.position, normal, ..RawPoints::default() };
+    let (f, report) = field(&points, 1e-3);
+    let mut distance: Vec<f64> = (0..points.len())
+        .map(|i| {
+            let (v, g) = f.value_gradient(points.exact_position(i));
+            v.abs() / g.length() / report.tolerance
+        })
+        .collect();
+    distance.sort_by(f64::total_cmp);
+    let n = distance.len();
+    assert!(distance[n / 2] < 0.05 && distance[n * 99 / 100] < 0.25 && distance[n - 1] < 1.0, "{}", distance[n - 1]);
+    let [low, high] = f.bounds();
+    let side = (high - low).x;
+    let zero_set = field_to_mesh(&f, [low, high], side / 150.0, &SplatParams::default()).unwrap();
+    let nearest = |p: DVec3| {
+        let squared = points.position.iter().map(|q| (q.as_dvec3() + points.origin - p).length_squared());
+        squared.fold(f64::INFINITY, f64::min).sqrt()
+    };
+    // The scan has holes in its base, which the field closes; elsewhere every sheet is one of the scan.
+    let places: Vec<DVec3> = zero_set.position.iter().step_by(23).map(|p| p.as_dvec3() + zero_set.origin).collect();
+    let base = points.position.iter().map(|p| f64::from(p.z)).fold(f64::INFINITY, f64::min) + points.origin.z;
+    let far = places.iter().filter(|p| nearest(**p) > 0.02 * side).collect::<Vec<_>>();
+    assert!(far.iter().all(|p| p.z < base + 0.04 * side) && far.len() * 50 < places.len(), "{far:?}");
+}
