@@ -13,8 +13,10 @@ pub(crate) struct Kernel {
     rim: f32,
     /// 1/∫w dA for R = 1.
     pub(crate) norm: f32,
-    /// R/σ.
+    /// R/σ of the Gaussian that is cut.
     pub(crate) cutoff: f32,
+    /// Standard deviation along one axis, for R = 1.
+    pub(crate) deviation: f32,
 }
 
 impl Kernel {
@@ -25,6 +27,7 @@ impl Kernel {
             rim: (-f.sharpness()).exp(),
             norm: f.norm() as f32,
             cutoff: f.cutoff,
+            deviation: deviation(f),
         };
         stack.layers().iter().map(kernel).collect()
     }
@@ -38,6 +41,14 @@ impl Kernel {
         let x = self.sharpness * (1.0 - s);
         exp_negative(self.sharpness * s) - self.rim * (1.0 + x + 0.5 * x * x)
     }
+}
+
+/// √(½·∫s·w dA/∫w dA) with s and w of [`splat_core::Footprint::profile`], in closed form.
+fn deviation(f: &Footprint) -> f32 {
+    let q = 0.5 * f64::from(f.cutoff).powi(2);
+    let rim = (-q).exp();
+    let moment = (1.0 - rim * (1.0 + q)) / (q * q) - rim * (0.5 + q / 6.0 + q * q / 24.0);
+    (0.5 * std::f64::consts::PI * f.norm() * moment).sqrt() as f32
 }
 
 /// 2^f on [0, 1] in powers of f; errs by less than 3e-7 of its value.

@@ -10,7 +10,7 @@ use crate::ShadowMap;
 use crate::deposit::plane_distance;
 use crate::mapping::{Mapping, floor, with_mapping};
 use crate::shadow_map::{Absorbances, Matter};
-use crate::table::Knot;
+use crate::table::List;
 use glam::Vec3;
 use splat_core::{Receiver, SplatKind, Transmittance, glam};
 
@@ -128,38 +128,30 @@ impl ShadowMap {
 
 /// Sum of the entries nearer than `distance`.
 #[inline]
-pub(crate) fn steps<const C: usize>(list: &[Knot<C>], distance: f32) -> [f32; C] {
-    let before = list.partition_point(|k| k.distance < distance);
-    if before == 0 { [0.0; C] } else { list[before - 1].total }
+pub(crate) fn steps<const C: usize>(list: List<'_, C>, distance: f32) -> [f32; C] {
+    let before = list.distance.partition_point(|d| *d < distance);
+    if before == 0 { [0.0; C] } else { list.total[before - 1] }
 }
 
 /// Absorbance at `distance`, half of each entry before it and half behind, spread over at most `ramp` to either side.
 #[inline]
-pub(crate) fn continuous<const C: usize>(list: &[Knot<C>], distance: f32, ramp: f32) -> [f32; C] {
-    let after = list.partition_point(|k| k.distance <= distance);
-    let total = |i: usize| if i == 0 { [0.0; C] } else { list[i - 1].total };
+pub(crate) fn continuous<const C: usize>(list: List<'_, C>, distance: f32, ramp: f32) -> [f32; C] {
+    let after = list.distance.partition_point(|d| *d <= distance);
+    let total = |i: usize| if i == 0 { [0.0; C] } else { list.total[i - 1] };
     let half = |i: usize| -> [f32; C] { std::array::from_fn(|c| 0.5 * (total(i)[c] + total(i + 1)[c])) };
     let mix = |a: [f32; C], b: [f32; C], t: f32| -> [f32; C] { std::array::from_fn(|c| a[c] + (b[c] - a[c]) * t) };
     let flat = total(after);
-    let gap = match (after > 0, list.get(after)) {
-        (true, Some(next)) => next.distance - list[after - 1].distance,
-        _ => f32::INFINITY,
-    };
-    let reach = ramp.min(0.5 * gap);
+    let last = if after > 0 { list.distance[after - 1] } else { f32::NEG_INFINITY };
+    let next = list.distance.get(after).copied().unwrap_or(f32::INFINITY);
+    let reach = ramp.min(0.5 * (next - last));
     if reach <= 0.0 {
-        return if after > 0 && list[after - 1].distance == distance { half(after - 1) } else { flat };
+        return if last == distance { half(after - 1) } else { flat };
     }
-    if after > 0 {
-        let passed = (distance - list[after - 1].distance) / reach;
-        if passed < 1.0 {
-            return mix(half(after - 1), flat, passed);
-        }
+    if distance - last < reach {
+        return mix(half(after - 1), flat, (distance - last) / reach);
     }
-    if let Some(next) = list.get(after) {
-        let left = (next.distance - distance) / reach;
-        if left < 1.0 {
-            return mix(half(after), flat, left);
-        }
+    if next - distance < reach {
+        return mix(half(after), flat, (next - distance) / reach);
     }
     flat
 }
@@ -168,19 +160,21 @@ pub(crate) fn continuous<const C: usize>(list: &[Knot<C>], distance: f32, ramp: 
 mod tests {
     use super::*;
 
-    fn list(entries: &[(f32, f32)]) -> Vec<Knot<1>> {
+    /// Distances and running sums.
+    fn sums(entries: &[(f32, f32)]) -> (Vec<f32>, Vec<[f32; 1]>) {
         let mut sum = 0.0;
         let sums = entries.iter().map(|&(distance, a)| {
             sum += a;
-            Knot { distance, total: [sum] }
+            (distance, [sum])
         });
-        sums.collect()
+        sums.unzip()
     }
 
     #[test]
     fn media_absorb_continuously_and_by_half_at_their_own_distance() {
-        let list = list(&[(1.0, 0.4), (2.0, 0.2), (9.0, 1.0)]);
-        let at = |d: f32| continuous(&list, d, 1.0)[0];
+        let (distance, total) = sums(&[(1.0, 0.4), (2.0, 0.2), (9.0, 1.0)]);
+        let list = List { distance: &distance, total: &total };
+        let at = |d: f32| continuous(list, d, 1.0)[0];
         for (d, a) in [(0.0, 0.0), (1.0, 0.2), (1.5, 0.4), (2.0, 0.5), (3.0, 0.6), (5.0, 0.6), (9.0, 1.1), (10.0, 1.6)]
         {
             assert!((at(d) - a).abs() < 1e-6, "A({d}) = {}, not {a}", at(d));
@@ -195,9 +189,10 @@ mod tests {
 
     #[test]
     fn surfaces_are_steps_behind_their_distance() {
-        let list = list(&[(1.0, 0.4), (2.0, 0.2)]);
+        let (distance, total) = sums(&[(1.0, 0.4), (2.0, 0.2)]);
+        let list = List { distance: &distance, total: &total };
         for (d, a) in [(0.5, 0.0), (1.0, 0.0), (1.001, 0.4), (2.0, 0.4), (7.0, 0.6)] {
-            assert!((steps(&list, d)[0] - a).abs() < 1e-6);
+            assert!((steps(list, d)[0] - a).abs() < 1e-6);
         }
     }
 }

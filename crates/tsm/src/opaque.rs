@@ -4,8 +4,9 @@
 //! the cell's centre at the distance of its tangent plane. The least distance does not depend on the order of writing.
 
 use crate::caster::Caster;
-use crate::deposit::{NEAR, Spread, disc_coordinate};
 use crate::mapping::{Mapping, floor};
+use crate::overlap::Spread;
+use crate::sampling::{NEAR, disc_coordinate};
 use glam::Vec2;
 use splat_core::glam;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};

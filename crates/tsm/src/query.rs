@@ -3,6 +3,7 @@
 use crate::ShadowMap;
 use crate::mapping::{Mapping, Ray, with_mapping};
 use crate::shadow_map::{Absorbances, Matter};
+use crate::table::List;
 use glam::Vec3;
 use rayon::prelude::*;
 use splat_core::glam;
@@ -150,9 +151,10 @@ fn own_absorbances<const C: usize>(matter: &Matter<C>, cell: u32, cells: u32) ->
     }
     for lists in [&matter.media, &matter.surfaces].into_iter().flatten() {
         let mut before = [0.0; C];
-        for knot in lists.list(cell) {
-            own.push((knot.distance, std::array::from_fn(|c| knot.total[c.min(C - 1)] - before[c.min(C - 1)])));
-            before = knot.total;
+        let list = lists.list(cell);
+        for (distance, total) in list.distance.iter().zip(list.total) {
+            own.push((*distance, std::array::from_fn(|c| total[c.min(C - 1)] - before[c.min(C - 1)])));
+            before = *total;
         }
     }
     own
@@ -162,21 +164,21 @@ fn first<const C: usize>(matter: &Matter<C>, cell: u32, absorbance: f32) -> Opti
     let lists: Vec<_> = [&matter.media, &matter.surfaces].into_iter().flatten().map(|l| l.list(cell)).collect();
     let total = |distance: f32| -> f32 {
         let sums = lists.iter().map(|list| {
-            let n = list.partition_point(|k| k.distance <= distance);
-            if n == 0 { 0.0 } else { list[n - 1].total.iter().copied().fold(f32::INFINITY, f32::min) }
+            let n = list.distance.partition_point(|d| *d <= distance);
+            if n == 0 { 0.0 } else { list.total[n - 1].iter().copied().fold(f32::INFINITY, f32::min) }
         });
         sums.sum()
     };
-    let candidate = |list: &&[crate::table::Knot<C>]| {
-        let n = list.partition_point(|k| total(k.distance) < absorbance);
-        list.get(n).map(|k| k.distance)
+    let candidate = |list: &List<'_, C>| {
+        let n = list.distance.partition_point(|d| total(*d) < absorbance);
+        list.distance.get(n).copied()
     };
     lists.iter().filter_map(candidate).min_by(f32::total_cmp)
 }
 
 fn any_between<const C: usize>(matter: &Matter<C>, cell: u32, from: f32, to: f32) -> bool {
     [&matter.media, &matter.surfaces].into_iter().flatten().any(|lists| {
-        let list = lists.list(cell);
-        list.get(list.partition_point(|k| k.distance < from)).is_some_and(|k| k.distance <= to)
+        let list = lists.list(cell).distance;
+        list.get(list.partition_point(|d| *d < from)).is_some_and(|d| *d <= to)
     })
 }

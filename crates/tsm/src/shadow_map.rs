@@ -1,6 +1,6 @@
 //! Building a map: survey, plan, opaque discs, deposits, lists (Gunjee 2007, section 4.1, steps 1-3).
 
-use crate::caster::{Caster, Casters, Extinction, Kernel};
+use crate::caster::{Casters, Extinction, Kernel};
 use crate::cost::{Counts, Prediction};
 use crate::deposit::{Deposit, Scratch};
 use crate::frame::Frame;
@@ -8,11 +8,12 @@ use crate::mapping::{Mapping, Table, with_mapping};
 use crate::opaque::OpaqueDepth;
 use crate::plan::{Plan, plan};
 use crate::survey::{CHUNK, Survey};
-use crate::table::{Entries, Lists, Parted, Ranges};
+use crate::table::{Lists, Parted, Ranges};
 use crate::{Error, Params};
 use rayon::prelude::*;
 use splat_core::optics::AbsorbanceModel;
 use splat_core::{Cloud, Light, Material, Object, Progress, SplatKind};
+use std::ops::Range;
 
 /// Media, whose absorbance grows continuously, and surfaces, which are steps.
 #[derive(Debug, Clone, PartialEq)]
@@ -155,7 +156,7 @@ impl ShadowMap {
         fn add<const C: usize>(matter: &Matter<C>, counts: &mut Counts) {
             for lists in [&matter.media, &matter.surfaces].into_iter().flatten() {
                 counts.entries += lists.entries();
-                counts.kept += lists.knots();
+                counts.kept += lists.kept();
                 counts.bytes += lists.bytes();
             }
         }
@@ -203,24 +204,35 @@ fn deposit_all<M: Mapping, const C: usize>(
         .map_init(Scratch::default, |scratch, c| {
             let chunk = c * CHUNK..cloud.len().min((c + 1) * CHUNK);
             progress.tick(chunk.len() as u64)?;
-            let mut deposit = Deposit {
-                mapping,
-                opaque,
-                media: Entries::default(),
-                surfaces: Entries::default(),
-                scratch: std::mem::take(scratch),
-            };
-            for i in chunk.filter(|&i| casters.casts(i) && !ends_lists(cloud.kind[i], casters.params)) {
-                let caster: Caster = casters.get(i, &plan.frame, mapping.is_parallel());
-                deposit.add(&caster);
-            }
-            *scratch = deposit.scratch;
-            Ok((Parted::new(&deposit.media, ranges), Parted::new(&deposit.surfaces, ranges)))
+            scratch.media.clear();
+            scratch.surfaces.clear();
+            pulp::Arch::new().dispatch(FillChunk { casters, plan, deposit: Deposit { mapping, opaque, scratch }, chunk });
+            Ok((Parted::new(&scratch.media, ranges), Parted::new(&scratch.surfaces, ranges)))
         })
         .collect::<Result<_, Error>>()?;
     let (media, surfaces): (Vec<_>, Vec<_>) = chunks.into_iter().unzip();
     let limit = casters.params.absorbance_limit();
     Ok(Matter { media: lists(&media, ranges, limit, casters)?, surfaces: lists(&surfaces, ranges, limit, casters)? })
+}
+
+/// Deposits of one chunk of splats, in the form that [`pulp`] compiles once per instruction set.
+struct FillChunk<'a, M: Mapping, const C: usize> {
+    casters: &'a Casters<'a>,
+    plan: &'a Plan,
+    deposit: Deposit<'a, M, C>,
+    chunk: Range<usize>,
+}
+
+impl<M: Mapping, const C: usize> pulp::NullaryFnOnce for FillChunk<'_, M, C> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(mut self) {
+        let (casters, cloud) = (self.casters, self.casters.cloud);
+        for i in self.chunk.filter(|&i| casters.casts(i) && !ends_lists(cloud.kind[i], casters.params)) {
+            self.deposit.add(&casters.get(i, &self.plan.frame, self.deposit.mapping.is_parallel()));
+        }
+    }
 }
 
 fn lists<const C: usize>(
@@ -230,7 +242,7 @@ fn lists<const C: usize>(
     casters: &Casters<'_>,
 ) -> Result<Option<Lists<C>>, Error> {
     let entries: u64 = parted.iter().map(|p| p.len() as u64).sum();
-    let needed_bytes = entries * (2 * size_of::<crate::table::Knot<C>>() as u64 + 4);
+    let needed_bytes = entries * (2 * size_of::<[f32; C]>() as u64 + 12);
     let limit_bytes = casters.params.max_bytes;
     if entries > u64::from(u32::MAX) || needed_bytes > limit_bytes {
         return Err(Error::Memory { what: "the lists", needed_bytes, limit_bytes });

@@ -1,95 +1,99 @@
 //! Shares: how much of a footprint lies in each of consecutive cells along one axis of the table.
 //!
-//! The footprint is a biweight (15/16)(1 − x²)² of the splat's variance, whose sums over cells have the closed forms
+//! The footprint is a triweight (35/32)(1 − x²)³ of the splat's variance, whose sums over cells have the closed forms
 //!
-//! F(x) = 1/2 + 15x/16 − 5x³/8 + 3x⁵/16, M(x) = ∫ x·(15/16)(1 − x²)² dx = −(5/32)(1 − x²)³
+//! F(x) = 1/2 + (35/32)(x − x³ + 3x⁵/5 − x⁷/7), M(x) = ∫ x·(35/32)(1 − x²)³ dx = −(35/256)(1 − x²)⁴
 //!
-//! so the shares of all cells sum to 1 at any place and width, and M gives the centre of each part.
+//! so the shares of all cells sum to 1 at any place and width, and M gives the centre of each part. Tails, which would
+//! cost entries that nobody sees, are cut where |x| > e: (F(x) − F(−e))/(1 − 2F(−e)). A footprint of many cells is cut
+//! less, so that sums over a lattice of splats stay smooth.
 
 use crate::mapping::floor;
 
-/// Half width of a biweight (1 − x²)² over its standard deviation.
-pub(crate) const BIWEIGHT: f32 = 2.645_751_3;
-/// Most cells along one axis of a footprint that is integrated over cells.
-pub(crate) const LONGEST: usize = 8;
-/// Fractions at either end below this go to the cell beside.
-const NEGLIGIBLE: f32 = 1.0 / 1024.0;
-/// Cells that are computed without a loop.
-const USUAL: usize = 4;
+/// Half width of a cut triweight over its standard deviation, within half a percent for every cut.
+pub(crate) const HALF_WIDTH: f32 = 3.01;
+/// Where small and large footprints are cut, in half widths.
+const CUT: [f32; 2] = [0.83, 0.92];
+/// Half width in cells up to which footprints are small.
+const SMALL: f32 = 1.0;
+/// Growth of the cut with half width.
+const GROWTH: f32 = 0.06;
+/// Cells that are computed at once.
+pub(crate) const BLOCK: usize = 8;
 
-/// Fractions of a footprint in consecutive cells of one axis, of sum 1.
-pub(crate) struct Shares {
-    pub(crate) first: i32,
-    pub(crate) count: usize,
-    at: f32,
-    half: f32,
-    share: [f32; LONGEST],
-    moment: [f32; LONGEST],
+/// F(x).
+#[inline(always)]
+fn cumulative(x: f32) -> f32 {
+    let x2 = x * x;
+    0.5 + x * (1.093_75 - x2 * (1.093_75 - x2 * (0.656_25 - 0.156_25 * x2)))
 }
 
-impl Shares {
-    /// A biweight of half width `half` < LONGEST/2 − 1 about `at`.
-    #[inline]
+/// A footprint along one axis: a cut triweight about `at`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Axis {
+    at: f32,
+    half: f32,
+    inverse: f32,
+    /// Where tails are cut, in half widths, what is cut of each, and by what the rest grows.
+    cut: f32,
+    tail: f32,
+    scale: f32,
+    /// First and last cell.
+    pub(crate) first: i32,
+    pub(crate) last: i32,
+}
+
+impl Axis {
+    /// A triweight of half width `half` > 0 about `at`, in cells.
+    #[inline(always)]
     pub(crate) fn new(at: f32, half: f32) -> Self {
-        let first = floor(at - half);
-        let count = (floor(at + half) - first + 1).clamp(1, LONGEST as i32) as usize;
-        let mut shares = Self { first, count, at, half, share: [0.0; LONGEST], moment: [0.0; LONGEST] };
-        if count <= USUAL {
-            shares.fill::<USUAL>()
-        } else {
-            shares.fill::<LONGEST>()
-        }
-        shares.trim();
-        shares
+        let cut = (CUT[0] + GROWTH * (half - SMALL)).clamp(CUT[0], CUT[1]);
+        let tail = cumulative(-cut);
+        let [first, last] = [at - cut * half, at + cut * half].map(floor);
+        Self { at, half, inverse: 1.0 / half, cut, tail, scale: 1.0 / (1.0 - 2.0 * tail), first, last }
     }
 
-    /// The share of a cell, counted from the first.
-    #[inline]
-    pub(crate) fn share(&self, i: usize) -> f32 {
-        self.share[i]
+    /// The same about another place.
+    #[inline(always)]
+    pub(crate) fn moved(self, at: f32) -> Self {
+        let [first, last] = [at - self.cut * self.half, at + self.cut * self.half].map(floor);
+        Self { at, first, last, ..self }
     }
 
-    /// The centre of the part in a cell, counted from the first.
-    #[inline]
-    pub(crate) fn centre(&self, i: usize) -> f32 {
-        self.at + self.half * self.moment[i] / self.share[i].max(f32::MIN_POSITIVE)
+    /// Fraction below an edge between cells, relative to the centre.
+    #[inline(always)]
+    fn below(&self, edge: f32) -> f32 {
+        let x = (edge * self.inverse).clamp(-1.0, 1.0);
+        ((cumulative(x) - self.tail) * self.scale).clamp(0.0, 1.0)
     }
 
-    #[inline]
-    fn fill<const N: usize>(&mut self) {
-        let inv = 1.0 / self.half;
-        let start = (self.first + 1) as f32 - self.at;
-        let (mut cdf, mut moment) = ([0.0; N], [0.0; N]);
-        for i in 0..N {
-            let x = ((start + i as f32) * inv).clamp(-1.0, 1.0);
-            let x2 = x * x;
-            let rest = 1.0 - x2;
-            cdf[i] = 0.5 + x * (0.9375 - x2 * (0.625 - 0.1875 * x2));
-            moment[i] = -0.15625 * rest * rest * rest;
-        }
-        // Rounding at the far edge must not lose the last share.
-        cdf[self.count.min(N) - 1] = 1.0;
-        self.share[0] = cdf[0];
-        self.moment[0] = moment[0];
-        for i in 1..N {
-            self.share[i] = cdf[i] - cdf[i - 1];
-            self.moment[i] = moment[i] - moment[i - 1];
-        }
+    /// Shares of `BLOCK` cells from `first` on.
+    #[inline(always)]
+    pub(crate) fn shares(&self, first: i32) -> [f32; BLOCK] {
+        let start = first as f32 - self.at;
+        let upper: [f32; BLOCK] = std::array::from_fn(|k| self.below(start + (k + 1) as f32));
+        let mut lower = [self.below(start); BLOCK];
+        lower[1..].copy_from_slice(&upper[..BLOCK - 1]);
+        std::array::from_fn(|k| upper[k] - lower[k])
     }
 
-    #[inline]
-    fn trim(&mut self) {
-        if self.count > 1 && self.share[self.count - 1] < NEGLIGIBLE {
-            self.count -= 1;
-            self.share[self.count - 1] += self.share[self.count];
-        }
-        if self.count > 1 && self.share[0] < NEGLIGIBLE {
-            self.share[1] += self.share[0];
-            self.share.copy_within(1.., 0);
-            self.moment.copy_within(1.., 0);
-            self.first += 1;
-            self.count -= 1;
-        }
+    /// First moment below an edge, in half widths.
+    #[inline(always)]
+    fn moment_below(&self, edge: f32) -> f32 {
+        let x = (edge * self.inverse).clamp(-self.cut, self.cut);
+        let rest = (1.0 - x * x) * (1.0 - x * x);
+        -0.136_718_75 * self.scale * (rest * rest)
+    }
+
+    /// Share and centre of the part in a cell.
+    #[inline(always)]
+    pub(crate) fn part(&self, cell: i32) -> (f32, f32) {
+        let start = cell as f32 - self.at;
+        let share = self.below(start + 1.0) - self.below(start);
+        let moment = self.moment_below(start + 1.0) - self.moment_below(start);
+        // Rounding of a tiny share must not throw its centre out of the cell.
+        let centre = if share > 1e-6 { (self.half * moment / share).clamp(start, start + 1.0) } else { start + 0.5 };
+        (share, self.at + centre)
     }
 }
 
@@ -102,17 +106,32 @@ mod tests {
         for k in 0..4000 {
             let at = 5.0 + splat_core::rng::unit_f32(1, 1, k, 0);
             let half = 1e-4 + 2.9 * splat_core::rng::unit_f32(1, 1, k, 1).powi(3);
-            let shares = Shares::new(at, half);
-            let n = shares.count;
-            let sum: f32 = (0..n).map(|i| shares.share(i)).sum();
-            let mean: f32 = (0..n).map(|i| shares.share(i) * shares.centre(i)).sum();
+            let axis = Axis::new(at, half);
+            let parts: Vec<(f32, f32)> = (axis.first..=axis.last).map(|cell| axis.part(cell)).collect();
+            let sum: f32 = parts.iter().map(|p| p.0).sum();
+            let mean: f32 = parts.iter().map(|p| p.0 * p.1).sum();
             assert!((sum - 1.0).abs() < 1e-6, "{at} ± {half}: Σ {sum}");
             assert!((mean - at).abs() < 1e-3 * (1.0 + half), "{at} ± {half}: mean {mean}");
-            for i in 0..n {
-                let cell = (shares.first + i as i32) as f32;
-                assert!(shares.share(i) > 0.0);
-                assert!((cell - 0.01..cell + 1.01).contains(&shares.centre(i)) || shares.share(i) < 0.01);
+            for (cell, (share, centre)) in (axis.first..).zip(&parts) {
+                let cell = cell as f32;
+                assert!(*share >= 0.0);
+                assert!((cell - 0.01..cell + 1.01).contains(centre) || *share < 0.01);
             }
+            let block = axis.shares(axis.first);
+            assert!(parts.len() <= BLOCK && parts.iter().zip(block).all(|(p, share)| p.0 == share));
+        }
+    }
+
+    #[test]
+    fn cut_triweights_have_about_their_deviation() {
+        for half in [0.5f32, 1.5, 3.0, 100.0] {
+            let axis = Axis::new(0.0, half);
+            let n = 2000;
+            let edge = |i: i32| axis.cut * half * i as f32 / n as f32;
+            let variance = |i: i32| (axis.below(edge(i + 1)) - axis.below(edge(i))) * (edge(i) + 0.5 * edge(1)).powi(2);
+            let deviation = (-n..n).map(variance).sum::<f32>().sqrt();
+            assert!((deviation * HALF_WIDTH / half - 1.0).abs() < 7e-3, "{half}: {deviation}");
+            assert!(axis.below(edge(-n)) < 1e-6 && axis.below(edge(n)) > 1.0 - 1e-6);
         }
     }
 }

@@ -5,31 +5,62 @@
 //! insertion lists are O(n²). Sums are 64-bit fixed point, so that neither the order of equal distances nor the thread
 //! count changes a bit, and 10⁶ absorbances of 10⁻⁶ add up to 1.
 
+use crate::shares::BLOCK;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Fixed point: 2⁴⁴ units an absorbance of 1.
 const FIXED: f64 = (1u64 << 44) as f64;
-/// Lists shorter than this are sorted by comparisons.
-const SHORT: usize = 128;
-/// Lists from this length on are sorted by eleven bits a pass, shorter ones by eight.
-const LONG: usize = 8192;
+/// Lists from this length on are sorted by digits.
+const LONG: usize = 1024;
 
-/// One entry of a list: before sorting `total` is the entry's own absorbance, after it the sum up to and with it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Knot<const C: usize> {
-    pub(crate) distance: f32,
-    pub(crate) total: [f32; C],
-}
-
-impl<const C: usize> Knot<C> {
-    const ZERO: Self = Self { distance: 0.0, total: [0.0; C] };
-}
-
-/// Entries in the order in which splats made them.
+/// Entries in the order in which splats made them; what lies behind `len` is left over.
 #[derive(Debug, Default)]
 pub(crate) struct Entries<const C: usize> {
-    pub(crate) cell: Vec<u32>,
-    pub(crate) knot: Vec<Knot<C>>,
+    len: usize,
+    cell: Vec<u32>,
+    distance: Vec<f32>,
+    own: Vec<[f32; C]>,
+}
+
+impl<const C: usize> Entries<C> {
+    pub(crate) fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    #[inline(always)]
+    fn grow(&mut self) {
+        if self.len + BLOCK > self.cell.len() {
+            let room = (2 * self.len).max(16_384);
+            self.cell.resize(room, 0);
+            self.distance.resize(room, 0.0);
+            self.own.resize(room, [0.0; C]);
+        }
+    }
+
+    /// Adds one entry of absorbance `own`·`rgb`.
+    #[inline(always)]
+    pub(crate) fn push(&mut self, cell: u32, distance: f32, own: f32, rgb: &[f32; 3]) {
+        self.grow();
+        let i = self.len;
+        self.cell[i] = cell;
+        self.distance[i] = distance.max(f32::MIN_POSITIVE);
+        self.own[i] = std::array::from_fn(|c| own * rgb[c]);
+        self.len += 1;
+    }
+
+    /// Adds entries at one distance in the `used` ≤ `BLOCK` cells from `cell` on.
+    #[inline(always)]
+    pub(crate) fn extend(&mut self, cell: u32, distance: f32, used: usize, own: &[f32; BLOCK], rgb: &[f32; 3]) {
+        self.grow();
+        // Whole blocks, without a loop: what is not used is written over.
+        let range = self.len..self.len + BLOCK;
+        self.cell[range.clone()].copy_from_slice(&std::array::from_fn::<_, BLOCK, _>(|k| cell + k as u32));
+        self.distance[range.clone()].copy_from_slice(&[distance.max(f32::MIN_POSITIVE); BLOCK]);
+        let own: [[f32; C]; BLOCK] = own.map(|a| std::array::from_fn(|c| a * rgb[c]));
+        self.own[range].copy_from_slice(&own);
+        self.len += used;
+    }
 }
 
 /// Ranges of cells that are gathered together.
@@ -53,31 +84,40 @@ impl Ranges {
 pub(crate) struct Parted<const C: usize> {
     start: Vec<u32>,
     cell: Vec<u32>,
-    knot: Vec<Knot<C>>,
+    distance: Vec<f32>,
+    own: Vec<[f32; C]>,
 }
 
 impl<const C: usize> Parted<C> {
-    /// Parts one chunk, keeping the order inside each range.
+    /// Parts one chunk.
     pub(crate) fn new(entries: &Entries<C>, ranges: Ranges) -> Self {
+        let n = entries.len;
+        let cells = &entries.cell[..n];
         let mut start = vec![0u32; ranges.count + 1];
-        for &c in &entries.cell {
-            start[(c >> ranges.shift) as usize + 1] += 1;
+        for &c in cells {
+            start[(c >> ranges.shift) as usize] += 1;
         }
-        (1..start.len()).for_each(|r| start[r] += start[r - 1]);
-        let mut next = start.clone();
-        let mut cell = vec![0u32; entries.cell.len()];
-        let mut knot = vec![Knot::ZERO; entries.cell.len()];
-        for (&c, k) in entries.cell.iter().zip(&entries.knot) {
-            let slot = &mut next[(c >> ranges.shift) as usize];
-            cell[*slot as usize] = c;
-            knot[*slot as usize] = *k;
+        let mut sum = 0;
+        for s in &mut start {
+            sum += std::mem::replace(s, sum);
+        }
+        let (mut cell, mut distance, mut own) = (vec![0u32; n], vec![0f32; n], vec![[0f32; C]; n]);
+        for ((&c, d), a) in cells.iter().zip(&entries.distance).zip(&entries.own) {
+            let slot = &mut start[(c >> ranges.shift) as usize];
+            let i = *slot as usize;
+            cell[i] = c;
+            distance[i] = *d;
+            own[i] = *a;
             *slot += 1;
         }
-        Self { start, cell, knot }
+        // Now every slot holds where its range ends.
+        Self { start, cell, distance, own }
     }
 
-    fn range(&self, r: usize) -> std::ops::Range<usize> {
-        self.start[r] as usize..self.start[r + 1] as usize
+    #[inline]
+    fn range(&self, r: usize) -> Range<usize> {
+        let begin = if r == 0 { 0 } else { self.start[r - 1] };
+        begin as usize..self.start[r] as usize
     }
 
     /// Number of entries.
@@ -86,185 +126,198 @@ impl<const C: usize> Parted<C> {
     }
 }
 
+/// The sorted entries of one cell: equal distances are one, and nothing follows the visible limit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct List<'a, const C: usize> {
+    pub(crate) distance: &'a [f32],
+    /// Absorbance up to and with each.
+    pub(crate) total: &'a [[f32; C]],
+}
+
 /// Sorted lists of every cell.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Lists<const C: usize> {
-    /// First knot of each cell.
-    start: Vec<u32>,
-    /// Knots kept of each cell: equal distances are one, and nothing follows the visible limit.
-    kept: Vec<u32>,
-    knot: Vec<Knot<C>>,
+    /// First entry of each cell, and number of entries kept.
+    span: Vec<[u32; 2]>,
+    distance: Vec<f32>,
+    total: Vec<[f32; C]>,
+    kept: u64,
 }
 
 impl<const C: usize> Lists<C> {
-    /// Gathers, sorts and sums; a list stops when its least absorbed channel reaches `limit`. There are at most 2³²
+    /// Gathers, sorts and sums; a list stops when its least absorbed channel reaches `limit`. There are fewer than 2³²
     /// entries.
     pub(crate) fn new(parted: &[Parted<C>], ranges: Ranges, limit: f32) -> Self {
-        let total: usize = parted.iter().map(Parted::len).sum();
-        let mut lists =
-            Self { start: vec![0; ranges.cells], kept: vec![0; ranges.cells], knot: vec![Knot::ZERO; total] };
+        let all: usize = parted.iter().map(Parted::len).sum();
+        let mut span = vec![[0u32; 2]; ranges.cells];
+        let (mut distance, mut total) = (vec![0f32; all], vec![[0f32; C]; all]);
         let mut tasks = Vec::with_capacity(ranges.count);
-        let width = 1usize << ranges.shift;
-        let mut knots = lists.knot.as_mut_slice();
+        let (mut distances, mut totals) = (distance.as_mut_slice(), total.as_mut_slice());
         let mut first = 0u32;
-        let cells = lists.start.chunks_mut(width).zip(lists.kept.chunks_mut(width));
-        for (r, (start, kept)) in cells.enumerate() {
-            let n: usize = parted.iter().map(|p| p.range(r).len()).sum();
-            let (mine, rest) = knots.split_at_mut(n);
-            knots = rest;
-            tasks.push(Task { range: r, first, start, kept, knot: mine });
+        for (range, span) in span.chunks_mut(1 << ranges.shift).enumerate() {
+            let n: usize = parted.iter().map(|p| p.range(range).len()).sum();
+            let (distance, total);
+            (distance, distances) = distances.split_at_mut(n);
+            (total, totals) = totals.split_at_mut(n);
+            tasks.push(Task { range, first, span, distance, total });
             first = first.wrapping_add(n as u32);
         }
-        tasks.into_par_iter().for_each(|task| task.run(parted, ranges.shift, limit));
-        lists
+        // The limit is taken 2⁻²⁰ low: f32 parts of a sum may each be rounded down, and the verdict must not depend on
+        // their number.
+        let stop = (f64::from(limit) * (1.0 - 2f64.powi(-20)) * FIXED) as i64;
+        let run = |gathered: &mut Gathered<C>, task: Task<'_, C>| task.run(parted, ranges.shift, stop, gathered);
+        let kept = tasks.into_par_iter().map_init(Gathered::default, run).sum();
+        Self { span, distance, total, kept }
     }
 
-    /// The sorted knots of a cell.
+    /// The sorted entries of a cell.
     #[inline]
-    pub(crate) fn list(&self, cell: u32) -> &[Knot<C>] {
-        let start = self.start[cell as usize] as usize;
-        &self.knot[start..start + self.kept[cell as usize] as usize]
+    pub(crate) fn list(&self, cell: u32) -> List<'_, C> {
+        let [start, kept] = self.span[cell as usize].map(|n| n as usize);
+        List { distance: &self.distance[start..start + kept], total: &self.total[start..start + kept] }
     }
 
     /// Entries before equal distances were merged and lists were cut.
     pub(crate) fn entries(&self) -> u64 {
-        self.knot.len() as u64
+        self.distance.len() as u64
     }
 
     /// Entries after that.
-    pub(crate) fn knots(&self) -> u64 {
-        self.kept.iter().map(|k| u64::from(*k)).sum()
+    pub(crate) fn kept(&self) -> u64 {
+        self.kept
     }
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        (self.knot.len() * size_of::<Knot<C>>() + 8 * self.start.len()) as u64
+        (self.distance.len() * (size_of::<f32>() + size_of::<[f32; C]>()) + size_of_val(&*self.span)) as u64
     }
+}
+
+/// Entries of one range by cells; buffers of one worker.
+#[derive(Debug, Default)]
+struct Gathered<const C: usize> {
+    /// Distance in the upper half, index of the entry in the lower.
+    key: Vec<u64>,
+    own: Vec<[f32; C]>,
+    spare: Vec<u64>,
 }
 
 /// One range of cells on its way from parts to lists.
 struct Task<'a, const C: usize> {
     range: usize,
     first: u32,
-    start: &'a mut [u32],
-    kept: &'a mut [u32],
-    knot: &'a mut [Knot<C>],
+    span: &'a mut [[u32; 2]],
+    distance: &'a mut [f32],
+    total: &'a mut [[f32; C]],
 }
 
 impl<const C: usize> Task<'_, C> {
-    fn run(self, parted: &[Parted<C>], shift: u32, limit: f32) {
+    /// Fills the lists and returns how many entries they keep.
+    fn run(self, parted: &[Parted<C>], shift: u32, stop: i64, gathered: &mut Gathered<C>) -> u64 {
         let base = (self.range << shift) as u32;
-        let mut spare = Vec::new();
         for part in parted {
-            part.cell[part.range(self.range)].iter().for_each(|c| self.kept[(c - base) as usize] += 1);
+            part.cell[part.range(self.range)].iter().for_each(|c| self.span[(c - base) as usize][1] += 1);
         }
-        // Exclusive sums; `start` counts up while knots are scattered and is put back afterwards.
         let mut sum = 0;
-        for (start, count) in self.start.iter_mut().zip(self.kept.iter()) {
-            *start = sum;
-            sum += count;
+        for span in self.span.iter_mut() {
+            span[0] = sum;
+            sum += span[1];
         }
+        let Gathered { key, own, spare } = gathered;
+        key.resize(sum as usize, 0);
+        own.resize(sum as usize, [0.0; C]);
         for part in parted {
             let range = part.range(self.range);
-            for (c, k) in part.cell[range.clone()].iter().zip(&part.knot[range]) {
-                let slot = &mut self.start[(c - base) as usize];
-                self.knot[*slot as usize] = *k;
+            let entries = part.cell[range.clone()].iter().zip(&part.distance[range.clone()]).zip(&part.own[range]);
+            for ((c, d), a) in entries {
+                let slot = &mut self.span[(c - base) as usize][0];
+                key[*slot as usize] = u64::from(d.to_bits()) << 32 | u64::from(*slot);
+                own[*slot as usize] = *a;
                 *slot += 1;
             }
         }
-        for (start, kept) in self.start.iter_mut().zip(self.kept.iter_mut()) {
-            let begin = *start - *kept;
-            let list = &mut self.knot[begin as usize..*start as usize];
-            sort(list, &mut spare);
-            *kept = accumulate(list, limit);
-            *start = begin.wrapping_add(self.first);
+        let mut all = 0;
+        for [start, kept] in self.span {
+            let end = *start as usize;
+            let begin = end - *kept as usize;
+            sort(&mut key[begin..end], spare);
+            *kept = sum_up(&key[begin..end], own, stop, &mut self.distance[begin..end], &mut self.total[begin..end]);
+            *start = (begin as u32).wrapping_add(self.first);
+            all += u64::from(*kept);
         }
+        all
     }
 }
 
 /// Sorts by distance. The order of equal distances is free: they are merged by exact sums.
-fn sort<const C: usize>(list: &mut [Knot<C>], spare: &mut Vec<Knot<C>>) {
-    if list.len() < SHORT {
-        list.sort_unstable_by_key(|k| k.distance.to_bits());
+fn sort(list: &mut [u64], spare: &mut Vec<u64>) {
+    if list.len() < LONG {
+        list.sort_unstable();
         return;
     }
-    let bits = |k: &Knot<C>| k.distance.to_bits();
-    let (least, most) = list.iter().fold((u32::MAX, 0), |(a, b), k| (a.min(bits(k)), b.max(bits(k))));
     // Distances of one cell differ in their low bits alone.
-    let significant = u32::BITS - (most - least).leading_zeros();
+    let (least, most) = list.iter().fold((u64::MAX, 0), |(a, b), k| (a.min(*k), b.max(*k)));
+    let least = least >> 32;
+    let significant = u64::BITS - ((most >> 32) - least).leading_zeros();
     spare.clear();
-    spare.resize(list.len(), Knot::ZERO);
-    if list.len() < LONG {
-        radix::<C, 256>(list, spare, least, significant)
-    } else {
-        radix::<C, 2048>(list, spare, least, significant)
-    }
-}
-
-/// Radix sort of the `significant` low bits of the distances' bits above `least`, by digits of `RADIX` values.
-fn radix<const C: usize, const RADIX: usize>(
-    list: &mut [Knot<C>],
-    spare: &mut [Knot<C>],
-    least: u32,
-    significant: u32,
-) {
-    let width = RADIX.trailing_zeros();
-    let passes = significant.div_ceil(width);
+    spare.resize(list.len(), 0);
+    let passes = significant.div_ceil(DIGIT);
     for pass in 0..passes {
-        let digit = |k: &Knot<C>| ((k.distance.to_bits() - least) >> (pass * width)) as usize & (RADIX - 1);
-        if pass % 2 == 0 { scatter::<C, RADIX>(list, spare, digit) } else { scatter::<C, RADIX>(spare, list, digit) }
+        let digit = |k: u64| (((k >> 32) - least) >> (pass * DIGIT)) as usize & ((1 << DIGIT) - 1);
+        if pass % 2 == 0 { scatter(list, spare, digit) } else { scatter(spare, list, digit) }
     }
     if passes % 2 == 1 {
         list.copy_from_slice(spare);
     }
 }
 
+/// Bits of a digit.
+const DIGIT: u32 = 11;
+
 /// One stable counting pass.
-fn scatter<const C: usize, const RADIX: usize>(
-    from: &[Knot<C>],
-    to: &mut [Knot<C>],
-    digit: impl Fn(&Knot<C>) -> usize,
-) {
-    let mut next = [0u32; RADIX];
-    from.iter().for_each(|k| next[digit(k)] += 1);
+fn scatter(from: &[u64], to: &mut [u64], digit: impl Fn(u64) -> usize) {
+    let mut next = [0u32; 1 << DIGIT];
+    from.iter().for_each(|k| next[digit(*k)] += 1);
     let mut sum = 0;
     for slot in &mut next {
         sum += std::mem::replace(slot, sum);
     }
-    for knot in from {
-        let slot = &mut next[digit(knot)];
-        to[*slot as usize] = *knot;
+    for &key in from {
+        let slot = &mut next[digit(key)];
+        to[*slot as usize] = key;
         *slot += 1;
     }
 }
 
-/// Merges equal distances and replaces absorbances by their running sums; returns the number of knots kept.
-///
-/// The limit is taken 2⁻²⁰ low: f32 parts of a sum may each be rounded down, and the verdict must not depend on their
-/// number.
-fn accumulate<const C: usize>(list: &mut [Knot<C>], limit: f32) -> u32 {
-    let stop = (f64::from(limit) * (1.0 - 2f64.powi(-20)) * FIXED) as i64;
+/// Merges equal distances and writes running sums; returns the number of entries kept.
+fn sum_up<const C: usize>(
+    list: &[u64],
+    own: &[[f32; C]],
+    stop: i64,
+    distance: &mut [f32],
+    total: &mut [[f32; C]],
+) -> u32 {
     let mut sum = [0i64; C];
     let mut kept = 0;
     let mut i = 0;
     while i < list.len() {
-        let distance = list[i].distance;
-        while i < list.len() && list[i].distance == distance {
+        let bits = (list[i] >> 32) as u32;
+        while i < list.len() && (list[i] >> 32) as u32 == bits {
             // One entry is held below 2¹⁷, so that the sum of a list that has not stopped cannot overflow.
-            (0..C).for_each(|c| sum[c] += (f64::from(list[i].total[c]).min(131_072.0) * FIXED) as i64);
+            let own = own[list[i] as u32 as usize];
+            (0..C).for_each(|c| sum[c] += (f64::from(own[c]).min(131_072.0) * FIXED) as i64);
             i += 1;
             if sum.iter().any(|s| *s > i64::MAX / 4) {
                 sum = sum.map(|s| s.min(i64::MAX / 4));
             }
         }
-        list[kept] = Knot { distance, total: sum.map(|s| (s as f64 / FIXED) as f32) };
+        distance[kept] = f32::from_bits(bits);
+        total[kept] = sum.map(|s| (s as f64 / FIXED) as f32);
         kept += 1;
         if sum.iter().all(|s| *s >= stop) {
             break;
         }
     }
-    // What is left over must not tell in which order entries came.
-    list[kept..].fill(Knot::ZERO);
     kept as u32
 }
 
@@ -278,10 +331,6 @@ mod tests {
         Lists::new(&[Parted::new(entries, ranges)], ranges, limit)
     }
 
-    fn knot(distance: f32, a: f32) -> Knot<1> {
-        Knot { distance, total: [a] }
-    }
-
     #[test]
     fn ts06_all_points_in_one_cell() {
         for n in [1000u64, 2000] {
@@ -289,12 +338,11 @@ mod tests {
             let mut paper = InsertionLists::new(1, 1e9);
             for i in 0..n {
                 let distance = splat_core::rng::unit_f32(6, 0, i, 0);
-                entries.cell.push(0);
-                entries.knot.push(knot(distance, 1e-3));
+                entries.push(0, distance, 1e-3, &[1.0; 3]);
                 paper.insert(0, distance, 1e-3);
             }
             let lists = build(&entries, 1, 1e9);
-            let ours: Vec<f32> = lists.list(0).iter().map(|k| k.distance).collect();
+            let ours: Vec<f32> = lists.list(0).distance.to_vec();
             let theirs: Vec<f32> = paper.list(0).iter().map(|e| e.0).collect();
             assert_eq!(ours, theirs);
             // The paper's insertion steps over n²/4 elements on average; sorting needs n log₂ n comparisons.
@@ -308,12 +356,10 @@ mod tests {
         for n in 1..=400u32 {
             let mut entries = Entries::<1>::default();
             for i in 0..n {
-                entries.cell.push(0);
-                entries.knot.push(knot(1.0 + i as f32, 2.0 / n as f32));
+                entries.push(0, 1.0 + i as f32, 2.0 / n as f32, &[1.0; 3]);
             }
-            entries.cell.push(0);
-            entries.knot.push(knot(1e6, 1.0));
-            assert_eq!(build(&entries, 1, 2.0).list(0).len() as u32, n, "{n} parts of 2.0 reach the limit of 2.0");
+            entries.push(0, 1e6, 1.0, &[1.0; 3]);
+            assert_eq!(build(&entries, 1, 2.0).list(0).distance.len() as u32, n, "{n} parts of 2.0 reach the limit of 2.0");
         }
     }
 
@@ -322,23 +368,25 @@ mod tests {
         let n = 1_000_000;
         let mut entries = Entries::<1>::default();
         for i in 0..n {
-            entries.cell.push(3);
-            entries.knot.push(knot(1.0 + i as f32, 1e-6));
+            entries.push(3, 1.0 + i as f32, 1e-6, &[1.0; 3]);
         }
         let lists = build(&entries, 5, 1e9);
-        let total = lists.list(3).last().unwrap().total[0];
+        let total = lists.list(3).total.last().unwrap()[0];
         let expected = f64::from(1e-6f32) * f64::from(n);
         assert!((f64::from(total) / expected - 1.0).abs() < 1e-6, "{total}");
-        assert_eq!(lists.list(2).len() + lists.list(4).len(), 0);
+        assert_eq!(lists.list(2).distance.len() + lists.list(4).distance.len(), 0);
     }
 
     #[test]
     fn ts11_equal_distances_are_one_knot_in_any_order() {
-        let a = [knot(1.0, 0.1), knot(2.0, 0.3), knot(1.0, 0.7), knot(1.0, 0.2)];
-        let mut forward = Entries::<1> { cell: vec![0; 4], knot: a.to_vec() };
-        let sorted = build(&forward, 1, 9.0);
-        forward.knot.reverse();
-        assert_eq!(sorted, build(&forward, 1, 9.0));
-        assert_eq!(sorted.list(0).len(), 2);
+        let parts = [(1.0, 0.1), (2.0, 0.3), (1.0, 0.7), (1.0, 0.2)];
+        let build = |order: [usize; 4]| {
+            let mut entries = Entries::<1>::default();
+            order.into_iter().for_each(|i| entries.push(0, parts[i].0, parts[i].1, &[1.0; 3]));
+            build(&entries, 1, 9.0)
+        };
+        let sorted = build([0, 1, 2, 3]);
+        assert_eq!(sorted, build([3, 2, 1, 0]));
+        assert_eq!(sorted.list(0).distance, [1.0, 2.0]);
     }
 }

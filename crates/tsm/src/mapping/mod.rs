@@ -53,9 +53,9 @@ pub trait Mapping: Sync {
     /// Solid angle of a cell, sr; for parallel light its area.
     fn measure(&self, cell: u32) -> f64;
 
-    /// 1/[`Mapping::measure`] in f32, cheap.
-    fn inverse_measure(&self, cell: u32) -> f32 {
-        (1.0 / self.measure(cell)) as f32
+    /// 1/[`Mapping::measure`] of the cell at a column and row inside the table, in f32, cheap.
+    fn inverse_measure(&self, column: u32, row: u32) -> f32 {
+        (1.0 / self.measure(row * self.size()[0] + column)) as f32
     }
 
     /// Solid angle per area of the table at a ray, in any unit: how samples inside a cell are weighted.
@@ -73,10 +73,35 @@ pub trait Mapping: Sync {
         false
     }
 
-    /// Whether gradients change abruptly (a pole, an edge between octants) within `half` cells of `at`, so that those of
-    /// the centre do not describe a footprint.
-    fn is_creased(&self, _at: Vec2, _half: Vec2) -> bool {
-        false
+    /// The edge within `half` cells of `at` across which gradients change abruptly, the nearest if there are several.
+    fn crease(&self, _at: Vec2, _half: Vec2) -> Option<Crease> {
+        None
+    }
+
+    /// Distance from `at` to the nearest point (a pole, a corner of octants) where the table has no gradients at all, in
+    /// half extents of a footprint.
+    fn clearance(&self, _at: Vec2, _half: Vec2) -> f32 {
+        f32::INFINITY
+    }
+}
+
+/// An edge of the table across which gradients change abruptly, as seen from a place beside it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crease {
+    /// The place in the coordinates of the far side, continued to the near one.
+    pub at: Vec2,
+    /// Derivatives of the far side's column and row with respect to the near side's.
+    pub jacobian: [Vec2; 2],
+    /// (a, b, c): a·x + b·y + c is positive on the side of the place.
+    pub line: [f32; 3],
+}
+
+impl Crease {
+    /// Positive where the centre of a cell is on the near side, 0 where the edge halves the cell.
+    #[inline]
+    pub(crate) fn side(&self, column: i32, row: i32) -> f32 {
+        let [a, b, c] = self.line;
+        a * (column as f32 + 0.5) + b * (row as f32 + 0.5) + c
     }
 }
 

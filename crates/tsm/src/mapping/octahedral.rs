@@ -10,7 +10,7 @@
 //! Beyond the paper, whose polar rows differ in solid angle by 115:1 at 180 rows. 1 − cos θ is taken as
 //! sin²θ/(1 + cos θ), so that directions near the poles keep their digits.
 
-use super::{Mapping, Place, Ray};
+use super::{Crease, Mapping, Place, Ray};
 use glam::{Vec2, Vec3};
 
 /// 2/π·atan(√s)/√s on [0, 1], a Chebyshev fit; the product with √s errs by less than 5e-8.
@@ -155,7 +155,7 @@ impl Mapping for Octahedral {
         4.0 * std::f64::consts::PI / f64::from(self.n).powi(2)
     }
 
-    fn inverse_measure(&self, _cell: u32) -> f32 {
+    fn inverse_measure(&self, _column: u32, _row: u32) -> f32 {
         self.inverse_measure
     }
 
@@ -163,12 +163,64 @@ impl Mapping for Octahedral {
         true
     }
 
-    fn is_creased(&self, at: Vec2, half: Vec2) -> bool {
-        // Octants meet at the middle lines, at the sides and at the diagonals |X| + |Y| = 1.
+    fn crease(&self, at: Vec2, half: Vec2) -> Option<Crease> {
         let side = 0.5 * self.n as f32;
-        let to_line = (at - (at / side).round() * side).abs();
-        let square = (at - side).abs();
-        let to_diagonal = (square.x + square.y - side).abs();
-        to_line.cmplt(half).any() || to_diagonal < half.x + half.y
+        let mirror = Vec2::ONE.copysign(at - side);
+        let q = (at - side).abs();
+        let upper = q.x + q.y <= side;
+        let to_line = if upper { q } else { side - q } - half;
+        let to_diagonal = (q.x + q.y - side).abs() - (half.x + half.y);
+        let nearest = to_line.min_element().min(to_diagonal);
+        if nearest >= 0.0 {
+            return None;
+        }
+        let (there, jacobian, line) = if to_diagonal == nearest {
+            across_diagonal(q, side, upper)
+        } else {
+            across_line(q, side, upper, to_line.x > to_line.y)
+        };
+        // Back from the mirrored quadrant.
+        let signs = mirror.x * mirror.y;
+        let [a, b, c] = line;
+        Some(Crease {
+            at: there * mirror + side,
+            jacobian: [Vec2::new(jacobian[0].x, signs * jacobian[0].y), Vec2::new(signs * jacobian[1].x, jacobian[1].y)],
+            line: [a * mirror.x, b * mirror.y, c - (a * mirror.x + b * mirror.y) * side],
+        })
     }
+
+    fn clearance(&self, at: Vec2, half: Vec2) -> f32 {
+        // The middle, the middles of the sides and the corners of the table: all at multiples of half a side.
+        let side = 0.5 * self.n as f32;
+        (at - (at / side).round() * side).length() / half.max_element()
+    }
+}
+
+/// Where a place lies in the continued coordinates of the octant beyond an edge, their derivatives, and the line.
+type Across = (Vec2, [Vec2; 2], [f32; 3]);
+
+/// Across a middle line or a side of the table: with e the distance to it, X = r − e on both sides, so that the octant
+/// beyond, continued, has X + 2e in place of X. `rows` where the edge runs along rows.
+fn across_line(q: Vec2, side: f32, upper: bool, rows: bool) -> Across {
+    let shear = |along: f32, across: f32| if upper { along + 2.0 * across } else { along + 2.0 * (across - side) };
+    let (sign, c) = if upper { (1.0, 0.0) } else { (-1.0, side) };
+    if rows {
+        (Vec2::new(shear(q.x, q.y), q.y), [Vec2::new(1.0, 2.0), Vec2::Y], [0.0, sign, c])
+    } else {
+        (Vec2::new(q.x, shear(q.y, q.x)), [Vec2::X, Vec2::new(2.0, 1.0)], [sign, 0.0, c])
+    }
+}
+
+/// Across a diagonal: with S = X + Y and D = X − Y in units of the half side, D/S on the upper side and D/(2 − S) on
+/// the lower are the same function of azimuth.
+fn across_diagonal(q: Vec2, side: f32, upper: bool) -> Across {
+    let (sum, difference) = ((q.x + q.y) / side, (q.x - q.y) / side);
+    let (sign, own) = if upper { (1.0, sum) } else { (-1.0, 2.0 - sum) };
+    let ratio = (2.0 - own) / own;
+    let lean = -sign * 2.0 * difference / (own * own);
+    let there = Vec2::new(sum + difference * ratio, sum - difference * ratio) * (0.5 * side);
+    // d(S, D′)/d(X, Y) with dD′ = ratio·dD + lean·dS.
+    let [dx, dy] = [lean + ratio, lean - ratio];
+    let jacobian = [Vec2::new(1.0 + dx, 1.0 + dy) * 0.5, Vec2::new(1.0 - dx, 1.0 - dy) * 0.5];
+    (there, jacobian, [-sign, -sign, sign * side])
 }

@@ -76,13 +76,13 @@ impl Mapping for Planar {
         if self.perspective { area * f64::from(self.cell_ray(cell).direction.z).powi(3) } else { area }
     }
 
-    fn inverse_measure(&self, cell: u32) -> f32 {
+    #[inline]
+    fn inverse_measure(&self, column: u32, row: u32) -> f32 {
         let area = 1.0 / (self.cell * self.cell);
         if !self.perspective {
             return area;
         }
-        let [columns, _] = self.size;
-        let at = Vec2::new((cell % columns) as f32 + 0.5, (cell / columns) as f32 + 0.5);
+        let at = Vec2::new(column as f32 + 0.5, row as f32 + 0.5);
         let stretch = 1.0 + (self.min + at * self.cell).length_squared();
         area * stretch * stretch.sqrt()
     }

@@ -130,8 +130,8 @@ impl Mapping for PolarAzimuth {
         ray.direction.x.hypot(ray.direction.y)
     }
 
-    fn is_creased(&self, at: Vec2, half: Vec2) -> bool {
+    fn clearance(&self, at: Vec2, half: Vec2) -> f32 {
         let to_pole = |pole: f64| ((pole - self.range.polar[0]) * self.scale()[1]) as f32 - at.y;
-        to_pole(0.0).abs().min(to_pole(PI).abs()) < 2.0 * half.y
+        to_pole(0.0).abs().min(to_pole(PI).abs()) / half.y
     }
 }

@@ -1,0 +1,143 @@
+//! Overlap of a footprint with cells in closed form, row by row.
+//!
+//! To first order the map takes a footprint to an ellipse in table coordinates. Along v it is a triweight of the ellipse's
+//! variance, whose share and centre in each row are exact ([`crate::shares`]); within a row it is a triweight about the
+//! ellipse's slant line at that centre, of the variance that is left:
+//!
+//! u(v) = u₀ + (C_uv/C_vv)(v − v₀), C_uu|v = C_uu − C_uv²/C_vv + (C_uv/C_vv)²·h²/12 with a row of height h
+//!
+//! An edge between octants of a folded table bends the ellipse. There each side of the edge has an ellipse of its own,
+//! by the derivatives of its own octant, and takes the cells on its side; the shares are then scaled to sum to 1. A
+//! footprint that only touches an edge is the same with and without it.
+
+use crate::caster::Caster;
+use crate::mapping::Crease;
+use crate::shares::{Axis, BLOCK, HALF_WIDTH};
+use glam::{Vec2, Vec3};
+use splat_core::{SplatKind, glam};
+
+/// Least half width of a footprint, cells.
+const LEAST_HALF: f32 = 1e-4;
+/// Footprints that lean by fewer cells than this over their height count as upright, by twice as many as leaning.
+const UPRIGHT: f32 = 0.02;
+/// A uniform row of height 1 has a variance of 1/12; in squared half widths of a triweight that is 9/12.
+const ROW_WIDTH: f32 = 9.0 / 12.0;
+
+/// Squared extents of a footprint in table coordinates: along columns, rows, and their product.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Spread {
+    uu: f32,
+    vv: f32,
+    uv: f32,
+}
+
+impl Spread {
+    /// From the centre to where the kernel ends.
+    #[inline(always)]
+    pub(crate) fn new(caster: &Caster, [gu, gv]: [Vec3; 2]) -> Self {
+        if caster.kind == SplatKind::Medium {
+            return Self::of_ball(caster.radius, [gu, gv]);
+        }
+        let u = caster.axes.map(|a| gu.dot(a));
+        let v = caster.axes.map(|a| gv.dot(a));
+        Self { uu: u[0] * u[0] + u[1] * u[1], vv: v[0] * v[0] + v[1] * v[1], uv: u[0] * v[0] + u[1] * v[1] }
+    }
+
+    #[inline(always)]
+    fn of_ball(radius: f32, [gu, gv]: [Vec3; 2]) -> Self {
+        let square = radius * radius;
+        Self { uu: gu.length_squared() * square, vv: gv.length_squared() * square, uv: gu.dot(gv) * square }
+    }
+
+    /// Half the width and half the height.
+    #[inline(always)]
+    pub(crate) fn half_extents(self) -> Vec2 {
+        Vec2::new(self.uu.sqrt(), self.vv.sqrt())
+    }
+
+    /// No wider and no higher than a table of this size.
+    #[inline(always)]
+    pub(crate) fn within(self, size: [u32; 2]) -> Self {
+        let [u, v] = size.map(|n| n as f32);
+        let [fu, fv] = [(u * u / self.uu).min(1.0), (v * v / self.vv).min(1.0)];
+        Self { uu: self.uu * fu, vv: self.vv * fv, uv: self.uv * (fu * fv).sqrt() }
+    }
+
+    /// The ellipse under a linear map of the table, given by its rows.
+    fn mapped(self, [a, b]: [Vec2; 2]) -> Self {
+        let product = |a: Vec2, b: Vec2| {
+            a.x * b.x * self.uu + (a.x * b.y + a.y * b.x) * self.uv + a.y * b.y * self.vv
+        };
+        Self { uu: product(a, a), vv: product(b, b), uv: product(a, b) }
+    }
+}
+
+/// An ellipse in table coordinates whose overlap with cells is wanted.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ellipse {
+    pub(crate) at: Vec2,
+    /// From the centre to where the kernel ends.
+    pub(crate) spread: Spread,
+    /// Standard deviation of the kernel over its radius.
+    pub(crate) deviation: f32,
+}
+
+impl Ellipse {
+    /// Calls `row` with the row, the first column and the shares of `BLOCK` columns, of which the number of used ones
+    /// follows.
+    #[inline(always)]
+    pub(crate) fn overlap(&self, mut row: impl FnMut(i32, i32, usize, &[f32; BLOCK])) {
+        let Spread { uu, vv, uv } = self.spread;
+        let square = (HALF_WIDTH * self.deviation) * (HALF_WIDTH * self.deviation);
+        let half_v = (vv * square).sqrt().max(LEAST_HALF);
+        let mut slant = uv * square / (half_v * half_v);
+        slant *= (slant.abs() * half_v * (1.0 / UPRIGHT) - 1.0).clamp(0.0, 1.0);
+        // What is left of the width within a row: off the slant, and along it over the row's height.
+        let height = (2.0 * half_v).min(1.0);
+        let off = (uu * square - slant * (uv * square)).max(0.0);
+        let half_u = (off + slant * slant * height * height * ROW_WIDTH).sqrt().max(LEAST_HALF);
+        let rows = Axis::new(self.at.y, half_v);
+        let mut columns = Axis::new(self.at.x, half_u);
+        let mut block = columns.shares(columns.first);
+        for j in rows.first..=rows.last {
+            let (share, centre) = rows.part(j);
+            if slant != 0.0 {
+                columns = columns.moved(self.at.x + slant * (centre - self.at.y));
+                block = columns.shares(columns.first);
+            }
+            let mut first = columns.first;
+            loop {
+                let used = (columns.last - first + 1).min(BLOCK as i32);
+                row(j, first, used as usize, &block.map(|s| s * share));
+                first += BLOCK as i32;
+                if first > columns.last {
+                    break;
+                }
+                block = columns.shares(first);
+            }
+            if columns.last - columns.first >= BLOCK as i32 {
+                block = columns.shares(columns.first);
+            }
+        }
+    }
+
+    /// Shares of cells, given by column and row, on both sides of an edge between octants.
+    pub(crate) fn overlap_creased(&self, crease: &Crease, mut cell: impl FnMut(i32, i32, f32)) {
+        let mut side = |ellipse: &Self, sign: f32| {
+            ellipse.overlap(|row, first, used, shares| {
+                for (column, share) in (first..).zip(&shares[..used]) {
+                    let part = match sign * crease.side(column, row) {
+                        s if s > 0.0 => 1.0,
+                        s if s < 0.0 => continue,
+                        _ => 0.5,
+                    };
+                    if *share > 0.0 {
+                        cell(column, row, part * share);
+                    }
+                }
+            });
+        };
+        side(self, 1.0);
+        side(&Self { at: crease.at, spread: self.spread.mapped(crease.jacobian), ..*self }, -1.0);
+    }
+}
