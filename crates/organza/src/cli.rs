@@ -1,11 +1,13 @@
 //! The command line: arguments → library calls → text or JSON, with one exit code for each kind of error.
 
+mod accuracy;
 mod args;
 mod bar;
 mod console;
 mod explain;
 mod info;
 mod memory;
+mod orders;
 mod render;
 mod report;
 mod session;
@@ -43,6 +45,8 @@ fn run(command: Command) -> Result<(), Error> {
     match command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
+        Command::Accuracy(arguments) => accuracy::run(&arguments),
+        Command::Orders(arguments) => orders::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Schema => console::out(&(organza::scene::schema() + "\n")),
     }

@@ -83,6 +83,14 @@ pub enum Error {
         /// What to do; may be empty.
         hint: String,
     },
+    /// A measurement is not good enough to be shown, and would be with more work. Exit code 5.
+    #[error("{message}")]
+    Unresolved {
+        /// What was measured, and what it was measured against.
+        message: String,
+        /// What it would take.
+        hint: String,
+    },
     /// The backend cannot do it. Exit code 6.
     #[error("{message}")]
     Gpu {
@@ -149,7 +157,7 @@ impl Error {
             Self::Usage { .. } => 2,
             Self::Scene { .. } | Self::Input { .. } => 3,
             Self::Io { .. } | Self::Output { .. } => 4,
-            Self::Limit { .. } | Self::TooLarge { .. } => 5,
+            Self::Limit { .. } | Self::TooLarge { .. } | Self::Unresolved { .. } => 5,
             Self::Gpu { .. } => 6,
             Self::Cancelled => 130,
         }
@@ -164,6 +172,7 @@ impl Error {
             | Self::Output { hint, .. }
             | Self::Limit { hint, .. }
             | Self::TooLarge { hint, .. }
+            | Self::Unresolved { hint, .. }
             | Self::Gpu { hint, .. } => hint,
             Self::Io { source, .. } if source.kind() == std::io::ErrorKind::StorageFull => "free some space",
             Self::Io { .. } | Self::Cancelled => "",

@@ -26,10 +26,12 @@
 //! ```
 #![forbid(unsafe_code)]
 
+pub mod accuracy;
 mod error;
 mod info;
 mod load;
 mod normalize;
+pub mod orders;
 pub mod output;
 pub mod plan;
 mod points;

@@ -58,6 +58,18 @@ impl SplatCount {
     }
 }
 
+impl Loaded {
+    /// Takes the size of the picture and the slice thickness from a scene whose splats are these.
+    pub(crate) fn retarget(&mut self, scene: &Scene) {
+        self.camera.size = scene.camera.size;
+        self.slice_thickness = scaled_thickness(scene, self.exponent);
+    }
+}
+
+fn scaled_thickness(scene: &Scene, exponent: i32) -> Option<f64> {
+    scene.render.points.slice_thickness.map(|e| e * f64::from(-exponent).exp2())
+}
+
 /// Reads and converts every visible object.
 ///
 /// # Errors
@@ -82,7 +94,7 @@ pub fn load(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Resu
         camera,
         lights,
         casts,
-        slice_thickness: scene.render.points.slice_thickness.map(|e| e * f64::from(-exponent).exp2()),
+        slice_thickness: scaled_thickness(scene, exponent),
         normals: scene.objects.iter().any(|o| o.visible && object::needs_gradients(o, scene)),
         exponent,
         splats,

@@ -29,38 +29,49 @@ pub(crate) fn draw(drawing: &Drawing<'_>, cost: &mut CostRecord) -> Result<Layer
     let maps = drawing.shadow_maps(cost)?;
     let camera = drawing.sample_camera();
     let order = drawing.sort(&camera, cost)?;
-    let lights: Vec<LitBy<'_>> = drawing
-        .loaded
-        .lights
-        .iter()
-        .zip(&maps)
-        .map(|(light, map)| LitBy { light: *light, shadow: map.as_ref().map(|m| m as &dyn Transmittance) })
-        .collect();
-    let input = ShadeInput {
-        cloud: &drawing.loaded.cloud,
-        materials: &drawing.loaded.materials,
-        objects: &drawing.loaded.objects,
-        lights: &lights,
-        ambient: drawing.ambient,
-        camera: &camera,
-    };
-    let layout = ChannelLayout::new(&drawing.layers);
-    let shaded = drawing.shade(&input, &layout, cost)?;
-    let opaque = drawing.opaque(&shaded, cost)?;
-    let accumulator = drawing.translucent(&shaded, &opaque, &order, cost)?;
-    let layers = cost.measure(pass::FINISH, |stage| {
-        let background = Background { color: drawing.background };
-        stage.items_in = u64::from(camera.size[0]) * u64::from(camera.size[1]);
-        let set = &drawing.layers;
-        drawing.tick()?;
-        Ok::<_, Error>(raster::finish(&accumulator, &opaque, &background, &layout, set, drawing.settings.antialias))
-    })?;
-    Ok(layers)
+    let shaded = drawing.light(&maps, &camera, cost)?;
+    drawing.compose(&shaded, &order, cost)
 }
 
 impl Drawing<'_> {
+    /// Footprints and radiance of the splats in view.
+    pub(crate) fn light(
+        &self,
+        maps: &[Option<ShadowMap>],
+        camera: &Camera,
+        cost: &mut CostRecord,
+    ) -> Result<Shaded, Error> {
+        let with_map = self.loaded.lights.iter().zip(maps);
+        let lights: Vec<LitBy<'_>> = with_map
+            .map(|(light, map)| LitBy { light: *light, shadow: map.as_ref().map(|m| m as &dyn Transmittance) })
+            .collect();
+        let input = ShadeInput {
+            cloud: &self.loaded.cloud,
+            materials: &self.loaded.materials,
+            objects: &self.loaded.objects,
+            lights: &lights,
+            ambient: self.ambient,
+            camera,
+        };
+        self.shade(&input, &ChannelLayout::new(&self.layers), cost)
+    }
+
+    /// Splats in this order in front of the opaque ones, as layers.
+    pub(crate) fn compose(&self, shaded: &Shaded, order: &SliceOrder, cost: &mut CostRecord) -> Result<Layers, Error> {
+        let opaque = self.opaque(shaded, cost)?;
+        let accumulator = self.translucent(shaded, &opaque, order, cost)?;
+        cost.measure(pass::FINISH, |stage| {
+            let background = Background { color: self.background };
+            let [width, height] = shaded.projected.size;
+            stage.items_in = u64::from(width) * u64::from(height);
+            let (set, layout) = (&self.layers, ChannelLayout::new(&self.layers));
+            self.tick()?;
+            Ok::<_, Error>(raster::finish(&accumulator, &opaque, &background, &layout, set, self.settings.antialias))
+        })
+    }
+
     /// The camera with `antialias`² samples a pixel.
-    fn sample_camera(&self) -> Camera {
+    pub(crate) fn sample_camera(&self) -> Camera {
         let mut camera = self.loaded.camera;
         camera.size = camera.size.map(|s| s * self.settings.antialias);
         camera
@@ -70,7 +81,7 @@ impl Drawing<'_> {
         self.progress.tick(1).map_err(|_| Error::Cancelled)
     }
 
-    fn raster_params(&self) -> raster::Params {
+    pub(crate) fn raster_params(&self) -> raster::Params {
         raster::Params {
             resampling_sigma_px: if self.settings.points.resampling_filter {
                 raster::Params::default().resampling_sigma_px
@@ -83,13 +94,13 @@ impl Drawing<'_> {
     }
 
     /// How far the resampling filter widens a footprint, pixels.
-    fn filter_reach_px(&self) -> f64 {
+    pub(crate) fn filter_reach_px(&self) -> f64 {
         let widest = self.loaded.footprints.layers().iter().map(|f| f.cutoff).fold(0.0, f32::max);
         f64::from(widest * self.raster_params().resampling_sigma_px)
     }
 
     /// One map for each light that the plan gives one.
-    fn shadow_maps(&self, cost: &mut CostRecord) -> Result<Vec<Option<ShadowMap>>, Error> {
+    pub(crate) fn shadow_maps(&self, cost: &mut CostRecord) -> Result<Vec<Option<ShadowMap>>, Error> {
         let shadow = &self.settings.points.shadow;
         let defaults = tsm::Params::default();
         let params = tsm::Params {
@@ -127,7 +138,7 @@ impl Drawing<'_> {
     }
 
     /// Slices of the translucent splats; an empty order without any.
-    fn sort(&self, camera: &Camera, cost: &mut CostRecord) -> Result<SliceOrder, Error> {
+    pub(crate) fn sort(&self, camera: &Camera, cost: &mut CostRecord) -> Result<SliceOrder, Error> {
         let cloud = &self.loaded.cloud;
         let translucent: Vec<u32> = self.ids(|kind| kind != SplatKind::Opaque);
         if translucent.is_empty() {
@@ -158,7 +169,7 @@ impl Drawing<'_> {
         })
     }
 
-    fn ids(&self, keep: impl Fn(SplatKind) -> bool) -> Vec<u32> {
+    pub(crate) fn ids(&self, keep: impl Fn(SplatKind) -> bool) -> Vec<u32> {
         let kinds = &self.loaded.cloud.kind;
         (0..kinds.len() as u32).filter(|&i| keep(kinds[i as usize])).collect()
     }
@@ -253,10 +264,10 @@ impl Drawing<'_> {
 }
 
 /// Splats ready to be composited, by id.
-struct Shaded {
-    projected: Projected,
-    values: Vec<f32>,
-    channels: usize,
+pub(crate) struct Shaded {
+    pub(crate) projected: Projected,
+    pub(crate) values: Vec<f32>,
+    pub(crate) channels: usize,
 }
 
 fn record(stage: &mut StageCost, counts: &RasterCounts) {

@@ -61,21 +61,44 @@ pub struct Explanation {
 pub fn render(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Render, Error> {
     let (loaded, explanation) = prepare(scene, options, progress)?;
     let Explanation { plan, mut cost, warnings, .. } = explanation;
+    let layers = draw_loaded(scene, &loaded, &plan, options, progress, &mut cost)?;
+    Ok(Render { layers, cost, plan, warnings })
+}
+
+/// Runs the planned passes on a loaded scene and keeps the layers that it asks for.
+pub(crate) fn draw_loaded(
+    scene: &Scene,
+    loaded: &Loaded,
+    plan: &Plan,
+    options: &RenderOptions,
+    progress: &Progress,
+    cost: &mut CostRecord,
+) -> Result<Layers, Error> {
     progress.add_total(plan.passes.len() as u64);
-    let drawing = Drawing {
-        loaded: &loaded,
+    let mut layers = points::draw(&drawing(scene, loaded, plan, options, progress), cost)?;
+    restore_depths(&mut layers, loaded.exponent);
+    scene.render.layers.keep(&mut layers);
+    Ok(layers)
+}
+
+/// What drawing a loaded scene reads.
+pub(crate) fn drawing<'a>(
+    scene: &'a Scene,
+    loaded: &'a Loaded,
+    plan: &'a Plan,
+    options: &RenderOptions,
+    progress: &'a Progress,
+) -> Drawing<'a> {
+    Drawing {
+        loaded,
         settings: &scene.render,
         background: scene.background,
         ambient: scene.ambient,
         layers: scene.render.layers.set(),
-        plan: &plan,
+        plan,
         max_memory: options.max_memory,
         progress,
-    };
-    let mut layers = points::draw(&drawing, &mut cost)?;
-    restore_depths(&mut layers, loaded.exponent);
-    scene.render.layers.keep(&mut layers);
-    Ok(Render { layers, cost, plan, warnings })
+    }
 }
 
 /// Loads a scene and plans its render.
@@ -88,8 +111,7 @@ pub fn explain(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
 
 fn prepare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<(Loaded, Explanation), Error> {
     let mut cost = CostRecord::default();
-    let image = image_bytes(scene);
-    check_memory("the image", image, options.max_memory)?;
+    check_memory("the image", image_bytes(scene), options.max_memory)?;
     check_samples(scene)?;
     let loaded = cost.measure(pass::CONVERT, |stage| {
         let loaded = load(scene, options, progress)?;
@@ -98,6 +120,14 @@ fn prepare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Resul
         stage.bytes = loaded.cloud.bytes();
         Ok::<_, Error>(loaded)
     })?;
+    let (plan, memory) = plan_loaded(scene, &loaded, options)?;
+    let (splats, warnings) = (loaded.splats.clone(), loaded.warnings.clone());
+    Ok((loaded, Explanation { plan, cost, memory, splats, warnings }))
+}
+
+/// The plan of a loaded scene, and the bytes that it takes.
+pub(crate) fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Result<(Plan, u64), Error> {
+    check_samples(scene)?;
     let mut statistics = Statistics::of_cloud(&loaded.cloud, &loaded.materials, &loaded.objects, &loaded.footprints);
     statistics.lights =
         loaded.lights.iter().zip(&loaded.casts).map(|(l, casts)| LightStatistics::of_light(l, *casts)).collect();
@@ -106,10 +136,10 @@ fn prepare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Resul
     statistics.tolerance = scene.render.tolerance;
     let plan = plan(&statistics);
     let maps = plan.shadow_maps.iter().filter(|on| **on).count() as u64;
-    let memory = image + splat_bytes(&loaded, &scene.render.layers.set()) + maps * map_bytes(statistics.casters);
+    let splats = splat_bytes(loaded, &scene.render.layers.set());
+    let memory = image_bytes(scene) + splats + maps * map_bytes(statistics.casters);
     check_memory("rendering", memory, options.max_memory)?;
-    let (splats, warnings) = (loaded.splats.clone(), loaded.warnings.clone());
-    Ok((loaded, Explanation { plan, cost, memory, splats, warnings }))
+    Ok((plan, memory))
 }
 
 /// Footprints keep their pixel rectangles in 16 bits.

@@ -20,6 +20,10 @@ pub(super) enum Command {
     Render(RenderArguments),
     /// Says what a render would simulate, what not, and why.
     Explain(ExplainArguments),
+    /// Measures what each approximation costs in accuracy and saves in time; writes a report.
+    Accuracy(AccuracyArguments),
+    /// Draws a scene by every ordering there is; writes a comparison.
+    Orders(OrdersArguments),
     /// Describes a data file or a scene.
     Info(InfoArguments),
     /// Prints the JSON Schema of scene files.
@@ -32,6 +36,8 @@ impl Command {
         match self {
             Self::Render(a) => a.scene.json,
             Self::Explain(a) => a.scene.json,
+            Self::Accuracy(a) => a.scene.json,
+            Self::Orders(a) => a.scene.json,
             Self::Info(a) => a.json,
             Self::Schema => false,
         }
@@ -112,6 +118,36 @@ pub(super) struct ExplainArguments {
     /// Render too, and say what each pass cost
     #[arg(long)]
     pub(super) measure: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct AccuracyArguments {
+    #[command(flatten)]
+    pub(super) scene: SceneArguments,
+    /// Folder for accuracy.json, accuracy.csv and accuracy.html; made if it is not there
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub(super) out: PathBuf,
+    /// A small picture, few steps and repeats
+    #[arg(long)]
+    pub(super) quick: bool,
+    /// Double the end of every knob so many times, for a better reference
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=4))]
+    pub(super) finer: u32,
+    /// Replace outputs that exist
+    #[arg(long)]
+    pub(super) force: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct OrdersArguments {
+    #[command(flatten)]
+    pub(super) scene: SceneArguments,
+    /// Folder for orders.json, orders.csv, orders.html and orders.png; made if it is not there
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub(super) out: PathBuf,
+    /// Replace outputs that exist
+    #[arg(long)]
+    pub(super) force: bool,
 }
 
 #[derive(Debug, Args)]

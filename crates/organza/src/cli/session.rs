@@ -4,7 +4,7 @@ use super::args::{Backend, SceneArguments};
 use super::memory;
 use organza::scene::{self, LoadOptions, Override, Scene, Source};
 use organza::{Error, RenderOptions, printable};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Loads the scene with the options of the command line.
 pub(super) fn load_scene(arguments: &SceneArguments) -> Result<Scene, Error> {
@@ -37,6 +37,18 @@ pub(super) fn inputs(scene: &Scene) -> Vec<PathBuf> {
     };
     let data = scene.objects.iter().filter_map(|o| of_object(&o.source));
     std::iter::once(scene.file.clone()).chain(data).collect()
+}
+
+/// A folder for outputs, made if it is not there; an empty one that was made is gone again when the work fails.
+pub(super) fn in_folder<T>(folder: &Path, work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
+    let made = !folder.exists();
+    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "cannot make this folder", e))?;
+    let out = work();
+    if made && out.is_err() {
+        // A folder that holds something stays.
+        let _ = std::fs::remove_dir(folder);
+    }
+    out
 }
 
 fn check_backend(backend: Backend) -> Result<(), Error> {
@@ -81,6 +93,6 @@ fn quote(text: &str) -> String {
 }
 
 /// A path as text for a JSON document.
-pub(super) fn path_text(path: &std::path::Path) -> String {
+pub(super) fn path_text(path: &Path) -> String {
     path.to_str().map_or_else(|| printable(path), str::to_owned)
 }

@@ -1,0 +1,76 @@
+//! What accuracy costs in time: each approximation's knob is swept, and every picture is judged by its error and its time.
+//!
+//! ```text
+//! Sweep (a technique's knobs) ─► settings ─► curves ─► limit ─► repeats, shuffled ─► Study ─► json, csv, html
+//! ```
+//! A technique joins by a [`Sweep`] of its own and a function that draws a [`Request`]; nothing else knows it.
+//!
+//! Two errors are kept apart. A knob's **own error** compares a picture with the one whose knob alone is at its end: it
+//! shows the order of convergence, undisturbed by the other knobs. The **error against the limit** compares with the
+//! picture whose knobs are all at their ends. Each reference states its own error (Richardson, from the fitted order),
+//! and no error below ten times that is drawn.
+
+mod frontier;
+mod knob;
+mod measure;
+mod plot;
+mod points;
+mod report;
+mod report_html;
+mod report_pictures;
+mod report_tables;
+mod resolve;
+mod settings;
+mod study;
+
+pub use frontier::{Candidate, frontier, significant_ratio};
+pub use knob::{Knob, Request, Skipped, Step, Sweep, Theory};
+pub use measure::{Distance, Frame, Renderer, Timed, Truth};
+pub use points::{Facts, points};
+pub use report::{Machine, Report, write};
+pub use report_html::verdict;
+pub use resolve::{Curve, CurvePoint, Settled, settle};
+pub use settings::Setting;
+pub use study::{Draw, Limit, Outcome, Study, median_seconds, study};
+
+pub(crate) use plot::escaped;
+pub(crate) use report_pictures::{data_uri, difference, png};
+
+use crate::scene::Scene;
+
+/// How much work a report may take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Options {
+    /// A smaller picture, fewer steps, fewer repeats.
+    pub quick: bool,
+    /// How often each knob's end is doubled beyond the default, for a reference with a smaller error of its own.
+    pub finer: u32,
+    /// Seed of the order in which repeats are drawn.
+    pub seed: u64,
+}
+
+impl Options {
+    /// Timed repeats of each setting.
+    pub fn repeats(&self) -> usize {
+        if self.quick { 2 } else { 5 }
+    }
+
+    /// Bytes that a study takes at most unless the user allows more: ends of knobs would fill any memory.
+    pub fn memory(&self) -> u64 {
+        if self.quick { 3 << 30 } else { 6 << 30 }
+    }
+
+    /// Longest side of the picture, pixels, unless the user asked for a size.
+    pub fn longest_side(&self) -> u32 {
+        if self.quick { 192 } else { 320 }
+    }
+}
+
+/// Makes the picture of `scene` small enough that many of it can be drawn; its shape stays.
+pub fn shrink(scene: &mut Scene, longest_side: u32) {
+    let longest = scene.camera.size[0].max(scene.camera.size[1]);
+    if longest > longest_side {
+        let side = |s: u32| (u64::from(s) * u64::from(longest_side)).div_ceil(u64::from(longest)) as u32;
+        scene.camera.size = scene.camera.size.map(side);
+    }
+}

@@ -1,0 +1,89 @@
+//! What a technique can trade: its knobs, their steps from coarse to fine, and their ends.
+
+use crate::scene::Scene;
+
+/// What is to be drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Request {
+    /// The scene with its settings.
+    pub scene: Scene,
+    /// The picture is drawn so many times larger and averaged down: samples beyond `render.antialias`.
+    pub oversample: u32,
+}
+
+/// One position of a knob.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Step {
+    /// Value as the report shows it.
+    pub label: String,
+    /// What goes to 0 as the knob becomes finer, such as a thickness; `None` for a choice.
+    pub size: Option<f64>,
+    /// What [`Knob::set`] is called with.
+    pub value: f64,
+}
+
+/// The order of convergence that theory predicts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Theory {
+    /// Lowest order that is no surprise.
+    pub low: f64,
+    /// Highest order that is no surprise.
+    pub high: f64,
+    /// Why, in one sentence.
+    pub why: &'static str,
+}
+
+/// One approximation that can be made finer.
+#[derive(Debug, Clone)]
+pub struct Knob {
+    /// Name in reports.
+    pub name: &'static str,
+    /// What [`Step::size`] is, with its unit.
+    pub size_meaning: &'static str,
+    /// Turns the knob.
+    pub set: fn(&mut Request, f64),
+    /// Positions from coarse to fine.
+    pub steps: Vec<Step>,
+    /// The finest position, which the others are judged by, and what stands in for it where it takes more memory than there
+    /// is; empty for a choice.
+    pub ends: Vec<Step>,
+    /// Whether nothing is left of the approximation at its end.
+    pub end_is_exact: bool,
+    /// Expected order, where there is one.
+    pub theory: Option<Theory>,
+    /// Whether the knob takes part in settings that turn all knobs together.
+    pub joint: bool,
+}
+
+/// A knob that is not turned, and why.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Skipped {
+    /// The knob's name.
+    pub knob: &'static str,
+    /// Why it cannot matter, or does not exist.
+    pub reason: String,
+}
+
+/// All that a technique can trade in one scene.
+#[derive(Debug, Clone)]
+pub struct Sweep {
+    /// Name of the technique.
+    pub technique: &'static str,
+    /// The scene as it stands.
+    pub base: Request,
+    /// Knobs that may matter.
+    pub knobs: Vec<Knob>,
+    /// Knobs that cannot.
+    pub skipped: Vec<Skipped>,
+    /// Settings that turn all joint knobs together, from coarse to fine.
+    pub joint_levels: usize,
+}
+
+impl Sweep {
+    /// The base with one knob turned.
+    pub fn turned(&self, knob: &Knob, step: &Step) -> Request {
+        let mut request = self.base.clone();
+        (knob.set)(&mut request, step.value);
+        request
+    }
+}

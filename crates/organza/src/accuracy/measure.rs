@@ -1,0 +1,208 @@
+//! Drawing with a clock, and the distance of a picture from a reference.
+
+use super::{Facts, Request};
+use crate::load::{Loaded, load};
+use crate::render::{draw_loaded, drawing, plan_loaded};
+use crate::scene::Scene;
+use crate::{CostRecord, Error, Progress, RenderOptions};
+use reference::metrics::{Display, Errors, Image, Linear, Viewing, compare, epsilon_8_bit, flip, psnr};
+use splat_core::SplatKind;
+use std::time::Instant;
+use tsm::mapping::{Mapping, Table};
+
+/// One drawn picture and what it took.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// The beauty layer.
+    pub image: Image<Linear>,
+    /// Seconds of all passes but loading and conversion.
+    pub seconds: f64,
+    /// Seconds of loading and conversion; `None` when splats of an earlier frame served again.
+    pub convert_seconds: Option<f64>,
+    /// Footprint fragments evaluated.
+    pub fragments: u64,
+    /// Bytes of the buffers that the passes made.
+    pub bytes: u64,
+}
+
+/// Physical truth for a scene: an unbiased estimate with its error.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Truth {
+    /// What it was computed by.
+    pub method: String,
+    /// The estimate.
+    pub image: Image<Linear>,
+    /// Standard error of each pixel and channel.
+    pub standard_error: Vec<[f64; 3]>,
+}
+
+impl Truth {
+    /// Root of the mean squared standard error: the RMSE that a perfect picture would show.
+    pub fn rms_standard_error(&self) -> f64 {
+        let n = (3 * self.standard_error.len()).max(1) as f64;
+        (self.standard_error.iter().flatten().map(|s| s * s).sum::<f64>() / n).sqrt()
+    }
+}
+
+/// How far a picture is from a reference.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Distance {
+    /// Errors of linear radiance.
+    pub linear: Errors,
+    /// Errors of the displayed picture, 0 to 1.
+    pub display: Errors,
+    /// Peak signal-to-noise ratio of the displayed picture, dB; infinite for equal pictures.
+    pub psnr: f64,
+    /// Mean LDR-FLIP of the displayed picture.
+    pub flip: f64,
+    /// ε of Zhang and Pajarola 2007, 8-bit units.
+    pub epsilon: f64,
+}
+
+impl Distance {
+    /// Compares two pictures; `exposure` is that of the displayed picture.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] for unequal sizes.
+    pub fn between(image: &Image<Linear>, reference: &Image<Linear>, exposure: f64) -> Result<Self, Error> {
+        let shown: [Image<Display>; 2] = [image.display(exposure), reference.display(exposure)];
+        let [a, b] = &shown;
+        let measure = || {
+            Ok::<_, reference::metrics::MetricError>(Self {
+                linear: compare(image, reference)?,
+                display: compare(a, b)?,
+                psnr: psnr(a, b)?,
+                flip: flip(a, b, &Viewing::default())?.mean,
+                epsilon: epsilon_8_bit(a, b)?,
+            })
+        };
+        measure().map_err(|e| Error::Internal(e.to_string()))
+    }
+}
+
+/// Repeats of one setting.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Timed {
+    /// The picture of the first repeat; `None` if it could not be drawn.
+    pub image: Option<Image<Linear>>,
+    /// Seconds of each repeat, loading and conversion left out.
+    pub seconds: Vec<f64>,
+    /// Seconds of loading and conversion, of the repeats that needed it.
+    pub convert_seconds: Vec<f64>,
+    /// Fragments of one repeat.
+    pub fragments: Option<u64>,
+    /// Bytes of one repeat.
+    pub bytes: Option<u64>,
+    /// Why it could not be drawn.
+    pub failure: Option<String>,
+}
+
+impl Timed {
+    pub(super) fn add(&mut self, frame: Frame, with_clock: bool) {
+        self.seconds.extend(with_clock.then_some(frame.seconds));
+        self.convert_seconds.extend(frame.convert_seconds);
+        self.fragments = Some(frame.fragments);
+        self.bytes = Some(frame.bytes);
+        self.image.get_or_insert(frame.image);
+    }
+}
+
+/// Draws requests on the CPU; splats are kept while requests differ in size and render settings alone.
+pub struct Renderer<'a> {
+    options: &'a RenderOptions,
+    progress: &'a Progress,
+    /// Those of the first scene stay, beside those of the latest.
+    loaded: Vec<(Scene, Loaded)>,
+}
+
+impl<'a> Renderer<'a> {
+    /// Nothing loaded yet.
+    pub fn new(options: &'a RenderOptions, progress: &'a Progress) -> Self {
+        Self { options, progress, loaded: Vec::new() }
+    }
+
+    /// Draws.
+    ///
+    /// # Errors
+    /// As [`crate::render`].
+    pub fn draw(&mut self, request: &Request) -> Result<Frame, Error> {
+        let mut scene = request.scene.clone();
+        scene.camera.size = scene.camera.size.map(|s| s.saturating_mul(request.oversample));
+        let (options, progress) = (self.options, self.progress);
+        let (loaded, convert_seconds) = self.load(&scene)?;
+        let (plan, _) = plan_loaded(&scene, loaded, options)?;
+        let mut cost = CostRecord::default();
+        let layers = draw_loaded(&scene, loaded, &plan, options, progress, &mut cost)?;
+        let beauty = layers.rgb("beauty").ok_or_else(|| Error::Internal("a render has no beauty layer".into()))?;
+        let image = Image::from_layer(layers.size, beauty).map_err(|e| Error::Internal(e.to_string()))?;
+        Ok(Frame {
+            image: if request.oversample > 1 { image.box_downsampled(request.oversample as usize) } else { image },
+            seconds: cost.stages.iter().map(|s| s.seconds).sum(),
+            convert_seconds,
+            fragments: cost.stages.iter().map(|s| s.fragments).sum(),
+            bytes: cost.stages.iter().map(|s| s.bytes).sum(),
+        })
+    }
+
+    /// What the knobs of `points` need to know of a scene.
+    ///
+    /// # Errors
+    /// As [`Renderer::draw`].
+    pub fn facts(&mut self, scene: &Scene) -> Result<Facts, Error> {
+        let (options, progress) = (self.options, self.progress);
+        let (loaded, _) = self.load(scene)?;
+        let (plan, _) = plan_loaded(scene, loaded, options)?;
+        let translucent: Vec<u32> =
+            (0u32..).zip(&loaded.cloud.kind).filter(|(_, k)| **k != SplatKind::Opaque).map(|(i, _)| i).collect();
+        let thickness = loaded.slice_thickness.map_or(hbsort::Thickness::Auto, hbsort::Thickness::World);
+        let params = hbsort::Params { thickness, ..hbsort::Params::default() };
+        let mut scratch = hbsort::Scratch::default();
+        let order = hbsort::slice_cloud(&loaded.cloud, Some(&translucent), &loaded.camera, &params, &mut scratch)
+            .map_err(|e| Error::Internal(e.to_string()))?;
+        let visible = !order.input_from_sorted.is_empty();
+        let drawing = drawing(scene, loaded, &plan, options, progress);
+        let maps = drawing.shadow_maps(&mut CostRecord::default())?;
+        Ok(Facts {
+            slice_thickness: visible.then(|| order.thickness * f64::from(loaded.exponent).exp2()),
+            cells: maps.iter().flatten().map(|m| longest_side(m.table())).max(),
+        })
+    }
+
+    /// The splats of a scene, converted now unless those at hand are the same; with the seconds that took.
+    fn load(&mut self, scene: &Scene) -> Result<(&Loaded, Option<f64>), Error> {
+        let mut seconds = None;
+        let at = self.loaded.iter().position(|(of, _)| same_splats(of, scene));
+        let at = match at {
+            Some(at) => at,
+            None => {
+                self.loaded.truncate(1);
+                let start = Instant::now();
+                let loaded = load(scene, self.options, self.progress)?;
+                seconds = Some(start.elapsed().as_secs_f64());
+                self.loaded.push((scene.clone(), loaded));
+                self.loaded.len() - 1
+            }
+        };
+        let loaded = &mut self.loaded[at].1;
+        loaded.retarget(scene);
+        Ok((loaded, seconds))
+    }
+}
+
+fn longest_side(table: &Table) -> u32 {
+    let [columns, rows] = match table {
+        Table::Octahedral(m) => m.size(),
+        Table::PolarAzimuth(m) => m.size(),
+        Table::Planar(m) => m.size(),
+    };
+    columns.max(rows)
+}
+
+/// Whether two scenes differ in the size of the picture and in render settings alone.
+fn same_splats(a: &Scene, b: &Scene) -> bool {
+    let mut other = b.clone();
+    other.camera.size = a.camera.size;
+    other.render = a.render.clone();
+    // Layers decide whether volumes get normals; `max_points` whether a scene is refused.
+    *a == other && a.render.layers == b.render.layers && a.render.max_points == b.render.max_points
+}

@@ -1,0 +1,255 @@
+//! The knobs of the technique `points` (Gunjee 2007).
+
+use super::{Knob, Options, Request, Skipped, Step, Sweep, Theory};
+use crate::scene::{LightSource, MediumShape, Scene, SceneObject, ShadowMapping, Source};
+use splat_core::LightShape;
+
+/// What has to be known of a loaded scene to choose the steps.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Facts {
+    /// Thickness of the slices that the scene's own setting gives, world units; `None` without translucent splats.
+    pub slice_thickness: Option<f64>,
+    /// Most cells along a side of a shadow table as the scene's own setting gives them; `None` where no light gets one.
+    pub cells: Option<u32>,
+}
+
+/// Most cells along a side of a shadow table.
+const MOST_CELLS: f64 = 16384.0;
+
+/// Largest `render.antialias`; beyond it the picture itself is drawn larger.
+const MOST_ANTIALIAS: f64 = 8.0;
+
+/// Knobs of `points` in this scene.
+pub fn points(scene: &Scene, facts: &Facts, options: &Options) -> Sweep {
+    let base = Request { scene: scene.clone(), oversample: 1 };
+    let joint_levels = if options.quick { 2 } else { 5 };
+    let mut sweep = Sweep { technique: "points", base, knobs: Vec::new(), skipped: Vec::new(), joint_levels };
+    // One line a knob; a technique with others has a list of its own.
+    let knobs = [
+        ("slice thickness", slices(facts, options)),
+        ("shadow table cells", cells(facts, options)),
+        ("shadow table mapping", mapping(scene, facts)),
+        ("absorbance cut", absorbance_cut(facts, options)),
+        ("transmittance cut", transmittance_cut(facts, options)),
+        ("samples", samples(options)),
+        ("resampling filter", Ok(resampling_filter())),
+        ("splat spacing", spacing(scene, options)),
+    ];
+    for (name, knob) in knobs {
+        match knob {
+            Ok(knob) => sweep.knobs.push(knob),
+            Err(reason) => sweep.skipped.push(Skipped { knob: name, reason }),
+        }
+    }
+    let formula = "not applicable: footprints are evaluated by formula, there is no table";
+    sweep.skipped.push(Skipped { knob: "footprint table size", reason: formula.into() });
+    sweep
+}
+
+fn step(label: impl Into<String>, size: f64, value: f64) -> Step {
+    Step { label: label.into(), size: Some(size), value }
+}
+
+fn choice(label: &str, value: f64) -> Step {
+    Step { label: label.into(), size: None, value }
+}
+
+/// How much finer ends are than by default.
+fn finer(options: &Options) -> f64 {
+    f64::from(options.finer).exp2()
+}
+
+const NO_TRANSLUCENT: &str = "no splat is translucent";
+const NO_MAP: &str = "no light gets a shadow map";
+
+fn slices(facts: &Facts, options: &Options) -> Result<Knob, String> {
+    let own = facts.slice_thickness.ok_or(NO_TRANSLUCENT)?;
+    let factors: &[f64] = if options.quick { &[64.0, 32.0, 16.0] } else { &[128.0, 64.0, 32.0, 16.0, 8.0, 4.0, 2.0] };
+    let mut steps: Vec<Step> =
+        factors.iter().map(|f| step(format!("{:.3} ({f} x)", f * own), f * own, f * own)).collect();
+    steps.push(Step { label: "exact".into(), size: None, value: 0.0 });
+    Ok(Knob {
+        name: "slice thickness",
+        size_meaning: "ε, world units",
+        set: |request, value| {
+            let points = &mut request.scene.render.points;
+            points.exact = value == 0.0;
+            points.slice_thickness = (value > 0.0).then_some(value);
+        },
+        ends: steps.last().cloned().into_iter().collect(),
+        steps,
+        end_is_exact: true,
+        theory: Some(Theory {
+            low: 0.5,
+            high: 2.0,
+            why: "pairs in wrong order grow with ε and so does their difference in colour: 2 where colour is smooth; \
+                  1 where it is not; 1/2 where few pixels, whose number grows with ε, are wrong altogether",
+        }),
+        joint: true,
+    })
+}
+
+fn cells(facts: &Facts, options: &Options) -> Result<Knob, String> {
+    let own = f64::from(facts.cells.ok_or(NO_MAP)?);
+    let parts: &[f64] = if options.quick { &[16.0, 8.0, 4.0] } else { &[32.0, 16.0, 8.0, 4.0, 2.0] };
+    let count = move |part: f64| (own / part).round().clamp(1.0, MOST_CELLS);
+    let label = |n: f64| format!("{n} a side");
+    let at = |part: &f64| step(label(count(*part)), count(*part).recip(), count(*part));
+    let end = 0.5 / finer(options);
+    Ok(Knob {
+        name: "shadow table cells",
+        size_meaning: "1 / cells along a side",
+        set: |request, value| request.scene.render.points.shadow.cells = Some(value as u32),
+        steps: parts.iter().map(at).collect(),
+        ends: [end, 2.0 * end].iter().map(at).collect(),
+        end_is_exact: false,
+        theory: Some(Theory {
+            low: 0.5,
+            high: 2.0,
+            why: "2 where shadows are smooth (linear interpolation); 1/2 where they have hard borders, whose share of \
+                  the picture shrinks like the cells",
+        }),
+        joint: true,
+    })
+}
+
+fn mapping(scene: &Scene, facts: &Facts) -> Result<Knob, String> {
+    facts.cells.ok_or(NO_MAP)?;
+    let directional = |l: &LightSource| matches!(l, LightSource::Simple(light) if matches!(light.shape, LightShape::Directional { .. }));
+    if scene.lights.iter().any(|l| l.shadow && directional(&l.source)) {
+        return Err("a directional light takes the planar table alone".into());
+    }
+    Ok(Knob {
+        name: "shadow table mapping",
+        size_meaning: "",
+        set: |request, value| {
+            request.scene.render.points.shadow.mapping =
+                if value == 0.0 { ShadowMapping::Octahedral } else { ShadowMapping::Polar };
+        },
+        steps: vec![choice("octahedral", 0.0), choice("polar", 1.0)],
+        ends: Vec::new(),
+        end_is_exact: false,
+        theory: None,
+        joint: false,
+    })
+}
+
+fn absorbance_cut(facts: &Facts, options: &Options) -> Result<Knob, String> {
+    facts.cells.ok_or(NO_MAP)?;
+    let cuts: &[f64] = if options.quick { &[1.0, 2.0, 4.0] } else { &[0.5, 1.0, 2.0, 3.0, 4.0, 6.0] };
+    Ok(Knob {
+        name: "absorbance cut",
+        size_meaning: "e^-A_cut",
+        set: |request, value| request.scene.render.points.shadow.absorbance_cut = Some(value),
+        steps: cuts.iter().map(|a| step(format!("A_cut {a}"), (-a).exp(), *a)).collect(),
+        ends: vec![step("A_cut 40", 0.0, 40.0)],
+        end_is_exact: true,
+        theory: Some(Theory {
+            low: 1.0,
+            high: 1.0,
+            why: "light behind the cut is at most e^-A_cut, and is lost or kept whole",
+        }),
+        joint: true,
+    })
+}
+
+fn transmittance_cut(facts: &Facts, options: &Options) -> Result<Knob, String> {
+    facts.slice_thickness.ok_or(NO_TRANSLUCENT)?;
+    let cuts: &[f64] = if options.quick { &[0.1, 0.03, 0.01] } else { &[0.3, 0.1, 0.03, 0.01, 0.003, 0.001] };
+    let mut steps: Vec<Step> = cuts.iter().map(|t| step(format!("T {t}"), *t, *t)).collect();
+    steps.push(Step { label: "T 0".into(), size: None, value: 0.0 });
+    Ok(Knob {
+        name: "transmittance cut",
+        size_meaning: "T_cut",
+        set: |request, value| request.scene.render.points.transmittance_cutoff = value,
+        ends: steps.last().cloned().into_iter().collect(),
+        steps,
+        end_is_exact: true,
+        theory: Some(Theory { low: 1.0, high: 1.0, why: "what lies behind the cut is seen through at most T_cut" }),
+        joint: true,
+    })
+}
+
+fn samples(options: &Options) -> Result<Knob, String> {
+    let sides: &[f64] = if options.quick { &[1.0, 2.0, 4.0] } else { &[1.0, 2.0, 4.0, 8.0] };
+    let label = |n: f64| format!("{n} x {n} a pixel");
+    let end = 32.0 * finer(options);
+    Ok(Knob {
+        name: "samples",
+        size_meaning: "1 / samples along a side of a pixel",
+        set: |request, value| {
+            request.scene.render.antialias = value.min(MOST_ANTIALIAS) as u32;
+            request.oversample = (value / MOST_ANTIALIAS).max(1.0) as u32;
+        },
+        steps: sides.iter().map(|n| step(label(*n), 1.0 / n, *n)).collect(),
+        ends: vec![step(label(end), 1.0 / end, end)],
+        end_is_exact: false,
+        theory: Some(Theory {
+            low: 1.0,
+            high: 2.0,
+            why: "2 where the picture is smooth inside a pixel; 1 to 3/2 at edges, by their direction",
+        }),
+        joint: true,
+    })
+}
+
+/// On or off; it vanishes by itself as samples become finer.
+fn resampling_filter() -> Knob {
+    Knob {
+        name: "resampling filter",
+        size_meaning: "",
+        set: |request, value| request.scene.render.points.resampling_filter = value > 0.0,
+        steps: vec![choice("off", 0.0), choice("on", 1.0)],
+        ends: Vec::new(),
+        end_is_exact: false,
+        theory: None,
+        joint: false,
+    }
+}
+
+fn spacing(scene: &Scene, options: &Options) -> Result<Knob, String> {
+    let mut probe = scene.clone();
+    scale_spacings(&mut probe, 2.0);
+    if probe.objects == scene.objects {
+        return Err("no visible object has a spacing of its own: data keeps its resolution".into());
+    }
+    let label = |f: f64| format!("{f:.3} x the scene's");
+    let end = if options.quick { 0.75 } else { 0.5 } / finer(options);
+    let factors: &[f64] = if options.quick { &[2.0, 1.5, 1.0] } else { &[2.0, 1.5, 1.25, 1.0] };
+    Ok(Knob {
+        name: "splat spacing",
+        size_meaning: "spacing over the scene's",
+        set: |request, value| scale_spacings(&mut request.scene, value),
+        steps: factors.iter().map(|f| step(label(*f), *f, *f)).collect(),
+        ends: vec![step(label(end), end, end)],
+        end_is_exact: false,
+        theory: Some(Theory {
+            low: 1.0,
+            high: 2.0,
+            why: "2 for smooth fields; less where a field has detail below the spacing, or surfaces end",
+        }),
+        joint: false,
+    })
+}
+
+/// Scales the spacing of every object that states one; raw points, volumes and meshes that are taken as they are stay.
+fn scale_spacings(scene: &mut Scene, factor: f64) {
+    for object in scene.objects.iter_mut().filter(|o| o.visible) {
+        if let Some(spacing) = spacing_of(object) {
+            *spacing *= factor;
+        }
+    }
+}
+
+fn spacing_of(object: &mut SceneObject) -> Option<&mut f64> {
+    match &mut object.source {
+        Source::Mesh(_) => object.spacing.as_mut(),
+        // The spacing of its samples decides what an implicit surface is, that of the object how it is splatted.
+        Source::Implicit(implicit) => Some(object.spacing.as_mut().unwrap_or(&mut implicit.spacing)),
+        Source::Density(density) => Some(&mut density.spacing),
+        Source::Cloud(cloud) => Some(&mut cloud.spacing),
+        Source::Rectangle(rectangle) => Some(&mut rectangle.spacing),
+        Source::Medium(MediumShape::Box { spacing, .. } | MediumShape::Ball { spacing, .. }) => Some(spacing),
+        Source::Points(_) | Source::Volume(_) => None,
+    }
+}

@@ -1,0 +1,110 @@
+//! The files of a report.
+
+use super::{Options, Study, report_html, report_tables};
+use crate::output::{check_target, write_atomically};
+use crate::scene::Scene;
+use crate::{Error, printable};
+use std::path::{Path, PathBuf};
+
+/// What computed.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Machine {
+    /// Name of the processor, if the system tells it.
+    pub cpu: Option<String>,
+    /// Operating system and architecture.
+    pub system: String,
+    /// Threads that the stages share.
+    pub threads: usize,
+}
+
+impl Machine {
+    /// This machine and the threads of the current pool.
+    pub fn this() -> Self {
+        let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+        let model = info.lines().find_map(|l| l.strip_prefix("model name")?.split_once(':').map(|(_, name)| name));
+        Self {
+            cpu: model.map(|name| crate::escape_controls(name.trim()).into_owned()),
+            system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+            threads: rayon::current_num_threads(),
+        }
+    }
+}
+
+/// Everything that a report says.
+#[derive(Debug, Clone)]
+pub struct Report {
+    /// Name of the scene's file.
+    pub scene: String,
+    /// SHA-256 of the scene and the changes to it.
+    pub scene_sha256: String,
+    /// Size of the picture.
+    pub size: [u32; 2],
+    /// Exposure of the displayed pictures, stops.
+    pub exposure: f64,
+    /// How much work it took.
+    pub options: Options,
+    /// What computed.
+    pub machine: Machine,
+    /// One for each technique.
+    pub studies: Vec<Study>,
+}
+
+impl Report {
+    /// A report of studies of a scene on this machine.
+    pub fn new(scene: &Scene, options: Options, studies: Vec<Study>) -> Self {
+        Self {
+            scene: printable(Path::new(scene.file.file_name().unwrap_or_default())),
+            scene_sha256: scene.sha256.clone(),
+            size: scene.camera.size,
+            exposure: scene.render.exposure,
+            options,
+            machine: Machine::this(),
+            studies,
+        }
+    }
+
+    /// The report as a JSON document.
+    pub fn json(&self) -> String {
+        format!("{:#}\n", report_tables::json(self))
+    }
+
+    /// The report as a table with one line a setting.
+    pub fn csv(&self) -> String {
+        report_tables::csv(self)
+    }
+
+    /// The report as a page that needs no other file.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] if a picture cannot be encoded.
+    pub fn html(&self) -> Result<String, Error> {
+        report_html::page(self)
+    }
+
+    /// The files that [`write`] makes in a folder.
+    pub fn files(folder: &Path) -> [PathBuf; 3] {
+        ["accuracy.json", "accuracy.csv", "accuracy.html"].map(|name| folder.join(name))
+    }
+
+    /// Checks before any work that the files can be written.
+    ///
+    /// # Errors
+    /// As [`check_target`].
+    pub fn check(folder: &Path, force: bool, inputs: &[PathBuf]) -> Result<(), Error> {
+        Self::files(folder).iter().try_for_each(|path| check_target(path, force, inputs))
+    }
+}
+
+/// Writes `accuracy.json`, `accuracy.csv` and `accuracy.html`; each appears whole or not at all, and none before all three
+/// are made.
+///
+/// # Errors
+/// [`Error::Io`], and [`Error::Internal`] if a picture cannot be encoded.
+pub fn write(report: &Report, folder: &Path) -> Result<[PathBuf; 3], Error> {
+    let contents = [report.json(), report.csv(), report.html()?];
+    let files = Report::files(folder);
+    for (path, text) in files.iter().zip(contents) {
+        write_atomically(path, text.as_bytes())?;
+    }
+    Ok(files)
+}

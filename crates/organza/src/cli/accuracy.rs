@@ -1,0 +1,76 @@
+//! `organza accuracy`.
+
+use super::args::AccuracyArguments;
+use super::bar::with_bar;
+use super::console;
+use super::session::{in_folder, inputs, load_scene, path_text, render_options, start_threads};
+use organza::accuracy::{self, Options, Outcome, Renderer, Report, Study};
+use organza::{Error, printable};
+use serde_json::json;
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// Sweeps the knobs, judges, writes the report. Whatever can be refused is refused before any work.
+pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
+    let mut scene = load_scene(&arguments.scene)?;
+    let options = Options { quick: arguments.quick, finer: arguments.finer, seed: scene.render.seed };
+    if arguments.scene.size.is_none() {
+        accuracy::shrink(&mut scene, options.longest_side());
+    }
+    in_folder(&arguments.out, || {
+        Report::check(&arguments.out, arguments.force, &inputs(&scene))?;
+        start_threads(arguments.scene.threads)?;
+        let mut render = render_options(&arguments.scene);
+        if arguments.scene.max_memory.is_none() {
+            render.max_memory = render.max_memory.min(options.memory());
+        }
+        let study = with_bar(|progress| {
+            let mut renderer = Renderer::new(&render, progress);
+            let facts = renderer.facts(&scene)?;
+            let sweep = accuracy::points(&scene, &facts, &options);
+            accuracy::study(&sweep, None, &options, progress, &mut |request| renderer.draw(request))
+        })?;
+        let report = Report::new(&scene, options, vec![study]);
+        let files = accuracy::write(&report, &arguments.out)?;
+        console::out(&summary(&report, &files, arguments.scene.json))
+    })
+}
+
+fn summary(report: &Report, files: &[PathBuf], as_json: bool) -> String {
+    if as_json {
+        let files: Vec<String> = files.iter().map(|f| path_text(f)).collect();
+        let report: serde_json::Value = serde_json::from_str(&report.json()).unwrap_or_default();
+        return format!("{:#}\n", json!({ "outputs": files, "report": report }));
+    }
+    let mut text = String::new();
+    for study in &report.studies {
+        text += &study_text(study);
+    }
+    for file in files {
+        let _ = writeln!(text, "wrote {}", printable(file));
+    }
+    text
+}
+
+fn study_text(study: &Study) -> String {
+    let mut text = format!("technique: {}\n\nfrontier, from the most accurate to the fastest\n", study.technique);
+    for i in &study.frontier {
+        let _ = writeln!(text, "  {}", outcome_text(&study.outcomes[*i]));
+    }
+    let _ = writeln!(text, "the scene's own setting\n  {}\nconvergence", outcome_text(&study.outcomes[0]));
+    for curve in &study.curves {
+        let _ = writeln!(text, "  {}: {}", curve.knob, accuracy::verdict(study, curve));
+    }
+    for skipped in study.limit.held.iter().chain(&study.skipped) {
+        let _ = writeln!(text, "  {}: {}", skipped.knob, skipped.reason);
+    }
+    let _ = writeln!(text, "the limit's own error: {:.1e}", study.limit.own_error);
+    text
+}
+
+fn outcome_text(o: &Outcome) -> String {
+    let time = organza::accuracy::median_seconds(o).map_or_else(|| "-".into(), |s| format!("{:.1} ms", 1e3 * s));
+    let error = o.from_limit.as_ref().filter(|_| o.drawn);
+    let error = error.map_or_else(|| "-".into(), |d| format!("RMSE {:.2e}  FLIP {:.4}", d.linear.rmse, d.flip));
+    format!("{time:>10}  {error}  {}", o.setting.label)
+}

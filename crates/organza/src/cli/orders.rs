@@ -1,0 +1,33 @@
+//! `organza orders`.
+
+use super::args::OrdersArguments;
+use super::bar::with_bar;
+use super::console;
+use super::session::{in_folder, inputs, load_scene, path_text, render_options, start_threads};
+use organza::orders::{self, OrdersReport};
+use organza::{Error, accuracy, printable};
+use serde_json::json;
+
+/// Draws by every ordering and writes the comparison. Whatever can be refused is refused before any work.
+pub(super) fn run(arguments: &OrdersArguments) -> Result<(), Error> {
+    let mut scene = load_scene(&arguments.scene)?;
+    if arguments.scene.size.is_none() {
+        accuracy::shrink(&mut scene, orders::LONGEST_SIDE);
+    }
+    in_folder(&arguments.out, || {
+        OrdersReport::check(&arguments.out, arguments.force, &inputs(&scene))?;
+        start_threads(arguments.scene.threads)?;
+        let options = render_options(&arguments.scene);
+        let comparison = with_bar(|progress| orders::compare(&scene, &options, progress))?;
+        let report = OrdersReport::new(&scene, comparison)?;
+        let files = orders::write(&report, &arguments.out)?;
+        if arguments.scene.json {
+            let files: Vec<String> = files.iter().map(|f| path_text(f)).collect();
+            let report: serde_json::Value = serde_json::from_str(&report.json()).unwrap_or_default();
+            return console::out(&format!("{:#}\n", json!({ "outputs": files, "report": report })));
+        }
+        let mut text = report.text();
+        files.iter().for_each(|f| text += &format!("wrote {}\n", printable(f)));
+        console::out(&text)
+    })
+}

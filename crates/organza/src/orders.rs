@@ -1,0 +1,266 @@
+//! One scene by every ordering there is, against the truth of each pixel.
+//!
+//! Splats are lit once; then the translucent ones are composited in each order, with nothing cut off, and compared with the
+//! picture in which the fragments of every pixel are sorted by their own depth, in f64. Opaque surfaces enter as in any
+//! render. So the order is all that differs.
+
+mod report;
+
+pub use report::{OrdersReport, write};
+
+use crate::load::{Loaded, load};
+use crate::points::Shaded;
+use crate::render::{drawing, plan_loaded};
+use crate::scene::Scene;
+use crate::{CostRecord, Error, Progress, RenderOptions};
+use hbsort::{Params, Scratch, Thickness, slice_cloud};
+use reference::metrics::{Disorder, Image, Linear, Rays};
+use reference::statistics::{Spread, median_with_spread};
+use reference::{Input, Order, composite};
+use splat_core::{Camera, Direction, SliceOrder, SplatKind};
+use std::time::Instant;
+
+/// Longest side of the picture, pixels, unless the user asked for a size.
+pub const LONGEST_SIDE: u32 = 240;
+
+/// Timed repeats of each ordering.
+const REPEATS: usize = 5;
+
+/// About as many rays are looked at for wrong pairs.
+const RAYS: f64 = 20_000.0;
+
+/// Slices so many times thicker than the scene's own.
+const THICKER: [f64; 4] = [1.0, 8.0, 64.0, 512.0];
+
+/// How splats are put in order.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Ordering {
+    /// Slices with exact order inside.
+    Exact,
+    /// Slices of a thickness, in the scale of the cloud.
+    Slices(f64),
+    /// One comparison sort by the view depth of centres.
+    Centre,
+    /// One comparison sort by the distance of centres from the camera.
+    Distance,
+    /// As the splats lie in memory.
+    Unsorted,
+}
+
+/// What one ordering is worth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ordered {
+    /// Name of the ordering.
+    pub name: String,
+    /// Slice thickness, world units, for those that have one.
+    pub thickness: Option<f64>,
+    /// The picture.
+    pub image: Image<Linear>,
+    /// Wrong pairs and backtracks; lengths in world units.
+    pub disorder: Disorder,
+    /// Seconds that putting the splats in order took.
+    pub seconds: Option<Spread>,
+    /// Bytes of the order and of what making it took.
+    pub bytes: u64,
+}
+
+/// Pictures by every ordering, and the truth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Comparison {
+    /// All orderings.
+    pub orderings: Vec<Ordered>,
+    /// Fragments sorted per pixel, in f64.
+    pub truth: Image<Linear>,
+    /// Seconds that the truth took.
+    pub truth_seconds: f64,
+    /// Translucent splats that were ordered.
+    pub splats: u64,
+}
+
+/// Draws a scene by every ordering. `scene.render` counts but for what concerns order, cut-offs and layers.
+///
+/// # Errors
+/// As [`crate::render`]; [`Error::Input`] for a scene without translucent splats.
+pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Comparison, Error> {
+    let mut scene = scene.clone();
+    let points = &mut scene.render.points;
+    (points.transmittance_cutoff, points.first_slices) = (0.0, None);
+    (points.exact, points.direction) = (false, Direction::FrontToBack);
+    scene.render.layers = crate::scene::LayerChoice::default();
+    let loaded = load(&scene, options, progress)?;
+    let (plan, _) = plan_loaded(&scene, &loaded, options)?;
+    let drawing = drawing(&scene, &loaded, &plan, options, progress);
+    let mut cost = CostRecord::default();
+    let maps = drawing.shadow_maps(&mut cost)?;
+    let camera = drawing.sample_camera();
+    let shaded = drawing.light(&maps, &camera, &mut cost)?;
+    let sorter = Sorter {
+        loaded: &loaded,
+        camera,
+        translucent: drawing.ids(|kind| kind != SplatKind::Opaque),
+        margin_px: drawing.filter_reach_px(),
+    };
+    let auto = sorter.slices(Thickness::Auto, false)?.thickness;
+    if sorter.translucent.is_empty() {
+        return Err(Error::input("scene", "expected translucent splats, found none: there is nothing to order", ""));
+    }
+    let input = exact_input(&loaded, &camera, &shaded, drawing.raster_params().resampling_sigma_px);
+    let pixels = f64::from(camera.size[0]) * f64::from(camera.size[1]);
+    let rays = Rays::new(&input, (pixels / RAYS).sqrt().ceil() as usize);
+    let world = f64::from(loaded.exponent).exp2();
+    let mut orderings = Vec::new();
+    let sliced = THICKER.map(|f| Ordering::Slices(f * auto));
+    let all = [&[Ordering::Exact][..], &sliced, &[Ordering::Centre, Ordering::Distance, Ordering::Unsorted]].concat();
+    progress.add_total(all.len() as u64 + 1);
+    for ordering in all {
+        let (order, seconds, bytes) = sorter.timed(ordering)?;
+        let layers = drawing.compose(&shaded, &order, &mut cost)?;
+        let beauty = layers.rgb("beauty").ok_or_else(|| Error::Internal("a render has no beauty layer".into()))?;
+        let mut disorder = rays.disorder(&ranks(&order, loaded.cloud.len()));
+        disorder.worst_backtrack *= world;
+        orderings.push(Ordered {
+            name: ordering.name(auto),
+            thickness: ordering.thickness().map(|t| t * world),
+            image: Image::from_layer(layers.size, beauty).map_err(|e| Error::Internal(e.to_string()))?,
+            disorder,
+            seconds,
+            bytes,
+        });
+        progress.tick(1).map_err(|_| Error::Cancelled)?;
+    }
+    let start = Instant::now();
+    let truth = truth(&input, &scene)?;
+    Ok(Comparison {
+        orderings,
+        truth,
+        truth_seconds: start.elapsed().as_secs_f64(),
+        splats: sorter.translucent.len() as u64,
+    })
+}
+
+impl Ordering {
+    fn name(self, auto: f64) -> String {
+        match self {
+            Self::Exact => "slices, exact inside".into(),
+            Self::Slices(t) => format!("slices, {} x thickness", (t / auto).round()),
+            Self::Centre => "comparison sort by view depth".into(),
+            Self::Distance => "comparison sort by camera distance".into(),
+            Self::Unsorted => "unsorted".into(),
+        }
+    }
+
+    fn thickness(self) -> Option<f64> {
+        match self {
+            Self::Slices(t) => Some(t),
+            _ => None,
+        }
+    }
+}
+
+fn exact_input<'a>(loaded: &'a Loaded, camera: &'a Camera, shaded: &'a Shaded, sigma_px: f32) -> Input<'a> {
+    Input {
+        cloud: &loaded.cloud,
+        camera,
+        footprints: &loaded.footprints,
+        materials: &loaded.materials,
+        values: &shaded.values,
+        channels: shaded.channels,
+        resampling_sigma_px: sigma_px,
+        order: Order::Fragment,
+    }
+}
+
+/// Fragments sorted per pixel, the background behind them, samples averaged.
+fn truth(input: &Input<'_>, scene: &Scene) -> Result<Image<Linear>, Error> {
+    let exact = composite(input);
+    let behind = scene.background.map(f64::from);
+    let pixel = |(v, t): (&Vec<f64>, &[f64; 3])| std::array::from_fn(|c| v[c] + t[c] * behind[c]);
+    let pixels = exact.values.iter().zip(&exact.transmittance).map(pixel).collect();
+    let image = Image::from_radiance(input.camera.size.map(|s| s as usize), pixels);
+    image.map(|i| i.box_downsampled(scene.render.antialias as usize)).map_err(|e| Error::Internal(e.to_string()))
+}
+
+/// Splat → place, `u32::MAX` for those that are left out.
+fn ranks(order: &SliceOrder, splats: usize) -> Vec<u32> {
+    let mut rank = vec![u32::MAX; splats];
+    for (place, id) in (0u32..).zip(&order.input_from_sorted) {
+        rank[*id as usize] = place;
+    }
+    rank
+}
+
+/// Puts the translucent splats of a scene in order.
+struct Sorter<'a> {
+    loaded: &'a Loaded,
+    camera: Camera,
+    translucent: Vec<u32>,
+    margin_px: f64,
+}
+
+impl Sorter<'_> {
+    /// The order, seconds of the repeats, and bytes.
+    fn timed(&self, ordering: Ordering) -> Result<(SliceOrder, Option<Spread>, u64), Error> {
+        let mut seconds = Vec::new();
+        let mut order = SliceOrder::default();
+        for _ in 0..REPEATS {
+            let start = Instant::now();
+            order = match ordering {
+                Ordering::Exact => self.slices(Thickness::Auto, true)?,
+                Ordering::Slices(t) => self.slices(Thickness::World(t), false)?,
+                Ordering::Centre => self.sorted(|view| f64::from(view.z)),
+                Ordering::Distance => self.sorted(|view| view.as_dvec3().length_squared()),
+                Ordering::Unsorted => self.in_order(self.translucent.clone()),
+            };
+            seconds.push(start.elapsed().as_secs_f64());
+        }
+        let n = self.translucent.len() as u64;
+        let bytes = match ordering {
+            // The result, and a key of eight bytes beside each id while it is sorted.
+            Ordering::Centre | Ordering::Distance => 4 * n + 16 * n,
+            Ordering::Unsorted => 4 * n,
+            _ => {
+                4 * (order.input_from_sorted.len() + order.slice_starts.len()) as u64 + self.scratch_bytes(ordering)?
+            }
+        };
+        Ok((order, median_with_spread(&seconds), bytes))
+    }
+
+    fn params(&self, thickness: Thickness, exact: bool) -> Params {
+        Params { direction: Direction::FrontToBack, thickness, exact, margin_px: self.margin_px, ..Params::default() }
+    }
+
+    fn slices(&self, thickness: Thickness, exact: bool) -> Result<SliceOrder, Error> {
+        let params = self.params(thickness, exact);
+        let mut scratch = Scratch::default();
+        slice_cloud(&self.loaded.cloud, Some(&self.translucent), &self.camera, &params, &mut scratch)
+            .map_err(|e| Error::Internal(e.to_string()))
+    }
+
+    fn scratch_bytes(&self, ordering: Ordering) -> Result<u64, Error> {
+        let thickness = ordering.thickness().map_or(Thickness::Auto, Thickness::World);
+        let params = self.params(thickness, ordering == Ordering::Exact);
+        let mut scratch = Scratch::default();
+        slice_cloud(&self.loaded.cloud, Some(&self.translucent), &self.camera, &params, &mut scratch)
+            .map_err(|e| Error::Internal(e.to_string()))?;
+        Ok(scratch.info().bytes)
+    }
+
+    /// A comparison sort of all splats by a key of the centre's place in the view; culling is left to the rasterizer.
+    fn sorted(&self, key: impl Fn(splat_core::glam::Vec3) -> f64) -> SliceOrder {
+        let cloud = &self.loaded.cloud;
+        let view = self.camera.view_from_offset(cloud.origin);
+        let keyed = self.translucent.iter().map(|&i| (key(view.apply(cloud.position[i as usize])), i));
+        let mut keyed: Vec<(f64, u32)> = keyed.collect();
+        keyed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        self.in_order(keyed.into_iter().map(|k| k.1).collect())
+    }
+
+    fn in_order(&self, ids: Vec<u32>) -> SliceOrder {
+        SliceOrder {
+            slice_starts: vec![0, ids.len() as u32],
+            input_from_sorted: ids,
+            slices: 1,
+            ..SliceOrder::default()
+        }
+    }
+}

@@ -1,0 +1,240 @@
+//! The files of a comparison of orderings: JSON, CSV, a contact sheet, and a page.
+
+use super::{Comparison, Ordered};
+use crate::accuracy::{Distance, Machine};
+use crate::accuracy::{data_uri, difference, escaped, png};
+use crate::output::{check_target, write_atomically};
+use crate::scene::Scene;
+use crate::{Error, printable};
+use reference::metrics::{Display, Image};
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// Everything that the files say.
+#[derive(Debug, Clone)]
+pub struct OrdersReport {
+    scene: String,
+    scene_sha256: String,
+    exposure: f64,
+    machine: Machine,
+    comparison: Comparison,
+    /// Of each ordering from the truth.
+    distances: Vec<Distance>,
+}
+
+impl OrdersReport {
+    /// Measures every ordering against the truth.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] for pictures of unequal sizes.
+    pub fn new(scene: &Scene, comparison: Comparison) -> Result<Self, Error> {
+        let exposure = scene.render.exposure;
+        let distance = |o: &Ordered| Distance::between(&o.image, &comparison.truth, exposure);
+        let distances = comparison.orderings.iter().map(distance).collect::<Result<_, _>>()?;
+        Ok(Self {
+            scene: printable(Path::new(scene.file.file_name().unwrap_or_default())),
+            scene_sha256: scene.sha256.clone(),
+            exposure,
+            machine: Machine::this(),
+            comparison,
+            distances,
+        })
+    }
+
+    /// The files that [`write`] makes in a folder.
+    pub fn files(folder: &Path) -> [PathBuf; 4] {
+        ["orders.json", "orders.csv", "orders.html", "orders.png"].map(|name| folder.join(name))
+    }
+
+    /// Checks before any work that the files can be written.
+    ///
+    /// # Errors
+    /// As [`check_target`].
+    pub fn check(folder: &Path, force: bool, inputs: &[PathBuf]) -> Result<(), Error> {
+        Self::files(folder).iter().try_for_each(|path| check_target(path, force, inputs))
+    }
+
+    fn rows(&self) -> impl Iterator<Item = (&Ordered, &Distance)> {
+        self.comparison.orderings.iter().zip(&self.distances)
+    }
+
+    /// The comparison as a JSON document.
+    pub fn json(&self) -> String {
+        let row = |(o, d): (&Ordered, &Distance)| {
+            json!({
+                "ordering": o.name,
+                "slice_thickness": o.thickness,
+                "wrong_pairs_per_ray": o.disorder.wrong_pairs_per_ray,
+                "pairs_per_ray": o.disorder.pairs_per_ray,
+                "worst_backtrack": o.disorder.worst_backtrack,
+                "rmse": d.linear.rmse,
+                "max": d.linear.max,
+                "flip": d.flip,
+                "epsilon_8_bit": d.epsilon,
+                "sort_seconds": o.seconds.map(|s| json!({ "median": s.median, "min": s.min, "max": s.max })),
+                "bytes": o.bytes,
+            })
+        };
+        let document = json!({
+            "scene": self.scene,
+            "scene_sha256": self.scene_sha256,
+            "version": env!("CARGO_PKG_VERSION"),
+            "size": self.comparison.truth.size(),
+            "machine": { "cpu": self.machine.cpu, "system": self.machine.system, "threads": self.machine.threads },
+            "translucent_splats": self.comparison.splats,
+            "rays": self.comparison.orderings.first().map(|o| o.disorder.rays),
+            "truth": { "method": "fragments sorted per pixel, f64", "seconds": self.comparison.truth_seconds },
+            "orderings": self.rows().map(row).collect::<Value>(),
+        });
+        format!("{document:#}\n")
+    }
+
+    /// One line an ordering.
+    pub fn csv(&self) -> String {
+        let mut text = String::from(
+            "ordering,slice_thickness,wrong_pairs_per_ray,pairs_per_ray,worst_backtrack,rmse,max,flip,sort_ms,bytes\n",
+        );
+        let cell = |v: Option<f64>| v.map_or_else(String::new, |v| format!("{v:.6e}"));
+        for (o, d) in self.rows() {
+            let _ = writeln!(
+                text,
+                "\"{}\",{},{:.6e},{:.6e},{:.6e},{:.6e},{:.6e},{:.6e},{},{}",
+                o.name,
+                cell(o.thickness),
+                o.disorder.wrong_pairs_per_ray,
+                o.disorder.pairs_per_ray,
+                o.disorder.worst_backtrack,
+                d.linear.rmse,
+                d.linear.max,
+                d.flip,
+                cell(o.seconds.map(|s| 1e3 * s.median)),
+                o.bytes
+            );
+        }
+        text
+    }
+
+    /// The comparison as lines of text.
+    pub fn text(&self) -> String {
+        let mut text = format!(
+            "{:>12} {:>12} {:>10} {:>10} {:>9} {:>11}  ordering\n",
+            "wrong pairs", "backtrack", "RMSE", "max", "ms", "bytes"
+        );
+        for (o, d) in self.rows() {
+            let ms = o.seconds.map_or_else(|| "-".into(), |s| format!("{:.2}", 1e3 * s.median));
+            let _ = writeln!(
+                text,
+                "{:>12.3} {:>12.4} {:>10.2e} {:>10.2e} {ms:>9} {:>11}  {}",
+                o.disorder.wrong_pairs_per_ray,
+                o.disorder.worst_backtrack,
+                d.linear.rmse,
+                d.linear.max,
+                o.bytes,
+                o.name
+            );
+        }
+        text
+    }
+
+    fn shown(&self, o: &Ordered) -> Image<Display> {
+        o.image.display(self.exposure)
+    }
+
+    /// Pictures in a row, their differences from the truth below; the truth comes first.
+    fn contact_sheet(&self) -> Result<Vec<u8>, Error> {
+        let truth = self.comparison.truth.display(self.exposure);
+        let mut columns = vec![(truth.clone(), difference(&truth, &truth)?.0)];
+        for o in &self.comparison.orderings {
+            let shown = self.shown(o);
+            let apart = difference(&shown, &truth)?.0;
+            columns.push((shown, apart));
+        }
+        let [width, height] = truth.size();
+        let per_row = 3;
+        let blocks = columns.len().div_ceil(per_row);
+        let size = [per_row * width, 2 * blocks * height];
+        let mut bytes = vec![0; 3 * size[0] * size[1]];
+        for (k, (picture, apart)) in columns.iter().enumerate() {
+            for (part, image) in [picture, apart].into_iter().enumerate() {
+                let at = [k % per_row * width, (2 * (k / per_row) + part) * height];
+                for (y, row) in image.bytes().chunks_exact(3 * width).enumerate() {
+                    let from = 3 * ((at[1] + y) * size[0] + at[0]);
+                    bytes[from..from + 3 * width].copy_from_slice(row);
+                }
+            }
+        }
+        png(&bytes, size)
+    }
+
+    fn html(&self) -> Result<String, Error> {
+        let truth = self.comparison.truth.display(self.exposure);
+        let mut html = format!(
+            "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" \
+             content=\"width=device-width\"><title>Orders: {0}</title>\n<style>\n{1}</style></head>\n<body><main>\n<h1>Orders: \
+             {0}</h1>\n<p class=\"soft\">{2} translucent splats; truth: fragments sorted per pixel in f64 ({3:.1} s). {4} \
+             threads on {5}.<br>Scene SHA-256 <code>{6}</code></p>\n<div class=\"wide\"><table><tr><th>ordering</th>\
+             <th>wrong pairs a ray</th><th>worst backtrack</th><th>RMSE</th><th>max</th><th>FLIP</th><th>sort ms</th>\
+             <th>bytes</th></tr>\n",
+            escaped(&self.scene),
+            include_str!("../accuracy/report.css"),
+            self.comparison.splats,
+            self.comparison.truth_seconds,
+            self.machine.threads,
+            escaped(self.machine.cpu.as_deref().unwrap_or("an unnamed processor")),
+            self.scene_sha256
+        );
+        for (o, d) in self.rows() {
+            let ms = o.seconds.map_or_else(|| "–".into(), |s| format!("{:.2}", 1e3 * s.median));
+            let _ = writeln!(
+                html,
+                "<tr><td>{}</td><td>{:.3} of {:.0}</td><td>{:.4}</td><td>{:.2e}</td><td>{:.2e}</td><td>{:.4}</td><td>{ms}</td>\
+                 <td>{}</td></tr>",
+                o.name,
+                o.disorder.wrong_pairs_per_ray,
+                o.disorder.pairs_per_ray,
+                o.disorder.worst_backtrack,
+                d.linear.rmse,
+                d.linear.max,
+                d.flip,
+                o.bytes
+            );
+        }
+        let _ = writeln!(
+            html,
+            "</table></div>\n<h2>Pictures</h2>\n<p>Click a picture to flip between the ordering, the truth and their \
+             difference.</p>\n<img hidden id=\"truth\" alt=\"\" src=\"{}\"><div class=\"grid\">",
+            data_uri(&truth)?
+        );
+        for (k, o) in self.comparison.orderings.iter().enumerate() {
+            let shown = self.shown(o);
+            let (apart, gain) = difference(&shown, &truth)?;
+            let (a, d, name) = (data_uri(&shown)?, data_uri(&apart)?, &o.name);
+            let _ = writeln!(
+                html,
+                "<figure class=\"flip\"><img src=\"{a}\" alt=\"{name}\"><h3>{name}</h3><button data-of=\"a{k}\" \
+                 aria-pressed=\"true\">ordering</button><button data-of=\"truth\" aria-pressed=\"false\">truth</button><button \
+                 data-of=\"d{k}\" aria-pressed=\"false\">difference x {gain}</button><img hidden id=\"a{k}\" alt=\"\" \
+                 src=\"{a}\"><img hidden id=\"d{k}\" alt=\"\" src=\"{d}\"></figure>"
+            );
+        }
+        let _ =
+            write!(html, "</div></main>\n<script>\n{}</script></body></html>\n", include_str!("../accuracy/report.js"));
+        Ok(html)
+    }
+}
+
+/// Writes `orders.json`, `orders.csv`, `orders.html` and `orders.png`; each appears whole or not at all, and none before all
+/// are made.
+///
+/// # Errors
+/// [`Error::Io`], and [`Error::Internal`] if a picture cannot be encoded.
+pub fn write(report: &OrdersReport, folder: &Path) -> Result<[PathBuf; 4], Error> {
+    let contents =
+        [report.json().into_bytes(), report.csv().into_bytes(), report.html()?.into_bytes(), report.contact_sheet()?];
+    let files = OrdersReport::files(folder);
+    for (path, bytes) in files.iter().zip(contents) {
+        write_atomically(path, &bytes)?;
+    }
+    Ok(files)
+}
