@@ -135,7 +135,7 @@ fn draw(svg: &mut String, series: &Series, x: &Axis, y: &Axis) {
         for (i, ([px, py], _)) in placed.iter().enumerate() {
             let _ = match (i, step) {
                 (0, _) => write!(d, "M{px:.1} {py:.1}"),
-                (_, true) => write!(d, "V{py:.1}H{px:.1}"),
+                (_, true) => write!(d, "H{px:.1}V{py:.1}"),
                 (_, false) => write!(d, "L{px:.1} {py:.1}"),
             };
         }
@@ -191,7 +191,7 @@ fn text(svg: &mut String, at: [f64; 2], anchor: &str, words: &str) {
 /// A number as short as it can be read.
 pub(super) fn number(value: f64) -> String {
     match value.abs() {
-        v if v == 0.0 || (0.01..10_000.0).contains(&v) => format!("{}", (value * 1e4).round() / 1e4),
+        v if v == 0.0 || (0.01..100_000.0).contains(&v) => format!("{}", (value * 1e4).round() / 1e4),
         _ => format!("{value:.0e}"),
     }
 }

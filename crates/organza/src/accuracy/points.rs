@@ -34,6 +34,7 @@ pub fn points(scene: &Scene, facts: &Facts, options: &Options) -> Sweep {
         ("samples", samples(options)),
         ("resampling filter", Ok(resampling_filter())),
         ("splat spacing", spacing(scene, options)),
+        // `render.points.accumulation` ("f16", "f32") joins here as a choice, as `resampling_filter` is one.
     ];
     for (name, knob) in knobs {
         match knob {
@@ -146,8 +147,8 @@ fn absorbance_cut(facts: &Facts, options: &Options) -> Result<Knob, String> {
         end_is_exact: true,
         theory: Some(Theory {
             low: 1.0,
-            high: 1.0,
-            why: "light behind the cut is at most e^-A_cut, and is lost or kept whole",
+            high: 2.0,
+            why: "light behind the cut is at most e^-A_cut: 1 where every shadow is that deep, more where deep ones are rare",
         }),
         joint: true,
     })
@@ -165,7 +166,11 @@ fn transmittance_cut(facts: &Facts, options: &Options) -> Result<Knob, String> {
         ends: steps.last().cloned().into_iter().collect(),
         steps,
         end_is_exact: true,
-        theory: Some(Theory { low: 1.0, high: 1.0, why: "what lies behind the cut is seen through at most T_cut" }),
+        theory: Some(Theory {
+            low: 1.0,
+            high: 2.0,
+            why: "what lies behind the cut is seen through at most T_cut: 1 where every pixel reaches it, more where few do",
+        }),
         joint: true,
     })
 }

@@ -81,7 +81,7 @@ pub fn settle(points: &[[f64; 2]], end: Option<f64>, floor: f64) -> Settled {
     let drawn: Vec<[f64; 2]> = drawn.collect();
     // As long as a finer step changes nothing, the knob is so coarse that its error cannot grow any more.
     let saturated = drawn.windows(2).take_while(|w| w[1][1] > SATURATED * w[0][1]).count();
-    Settled { own_error, fit: fit_order(&drawn[saturated.min(drawn.len().saturating_sub(2))..]), careful_order }
+    Settled { own_error, fit: fit_order(&drawn[saturated..]), careful_order }
 }
 
 /// Own error of the end, and the order that it follows from.

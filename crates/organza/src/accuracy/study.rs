@@ -298,8 +298,9 @@ fn refuse_unless_resolved(outcomes: &[Outcome], limit: &Limit, curves: &[Curve])
                 |f| format!("{knob}: an end {f:.1} times finer"),
             ))
         });
-    let blame: Vec<String> = blame.collect();
-    let hint = format!("{}; --finer N doubles every end N times", blame.join(", "));
+    let held = limit.held.iter().map(|h| format!("{}: {}", h.knob, h.reason));
+    let blame: Vec<String> = blame.chain(held).collect();
+    let hint = format!("{}; --finer N doubles every end N times", blame.join("; "));
     let message = format!(
         "the limit's own error is {:.1e}, the scene's own setting is {own:.1e} from it, and {drawn} of {} settings are at \
          least ten times as far: expected the scene's own and two more",

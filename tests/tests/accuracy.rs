@@ -1,0 +1,239 @@
+//! `organza accuracy`: a technique of known order, the same one broken, one that does not converge, and the command.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use organza::accuracy::{
+    Facts, Frame, Knob, Options, Report, Request, Step, Study, Sweep, Theory, Truth, points, study, verdict,
+};
+use organza::scene::{self, Scene};
+use organza::{Error, Progress};
+use organza_tests::organza;
+use reference::metrics::Image;
+use serde_json::Value;
+use std::fs;
+
+const SIZE: [usize; 2] = [24, 16];
+
+const OPTIONS: Options = Options { quick: true, finer: 0, seed: 1 };
+
+const SCENE: &str = r#"version = 1
+[camera]
+position = [0, 0.5, 4]
+target = [0, 0, 0]
+size = [24, 16]
+[background]
+color = [0.25, 0.5, 1.0]
+[[light]]
+kind = "point"
+position = [2, 4, 1]
+intensity = [20, 20, 20]
+[[object]]
+name = "fog"
+medium_ball = { center = [0, 0.2, 0], radius = 0.8, extinction = 3, spacing = 0.2 }
+[[object]]
+name = "ground"
+rectangle = { center = [0, -0.8, 0], u = [1.5, 0, 0], v = [0, 0, -1.5], spacing = 0.1 }
+"#;
+
+fn scene() -> Scene {
+    scene::parse("s.toml".as_ref(), SCENE.as_bytes(), &Default::default()).unwrap()
+}
+
+/// Extinction along the ray of pixel k.
+fn extinction(k: usize, x: f64) -> f64 {
+    let slope = 0.5 + (k % SIZE[0]) as f64 / 12.0;
+    0.3 + slope * x * x + 0.02 * (k / SIZE[0]) as f64 * x
+}
+
+/// e^−∫₀¹ extinction dx by `slabs` slabs, each sampled `offset` of its width behind its front. In the middle it is of second
+/// order.
+fn slab_image(slabs: f64, offset: f64, cut: f64) -> Image<reference::metrics::Linear> {
+    let pixel = |k: usize| {
+        let depth: f64 = (0..slabs as usize).map(|i| extinction(k, (i as f64 + offset) / slabs) / slabs).sum();
+        // What is cut off at the far end is of first order.
+        [(-depth).exp() + cut * (1.0 + 0.1 * (k % 5) as f64); 3]
+    };
+    Image::from_radiance(SIZE, (0..SIZE[0] * SIZE[1]).map(pixel).collect()).unwrap()
+}
+
+fn exact_image() -> Image<reference::metrics::Linear> {
+    let integral = |k: usize| 0.3 + (0.5 + (k % SIZE[0]) as f64 / 12.0) / 3.0 + 0.01 * (k / SIZE[0]) as f64;
+    Image::from_radiance(SIZE, (0..SIZE[0] * SIZE[1]).map(|k| [(-integral(k)).exp(); 3]).collect()).unwrap()
+}
+
+/// Two knobs in the places of other settings: slabs as `oversample`, the cut as `transmittance_cutoff`.
+fn sweep() -> Sweep {
+    let step = |size: f64, value: f64| Step { label: format!("{value}"), size: Some(size), value };
+    let theory = |order| Some(Theory { low: order, high: order, why: "closed form" });
+    let mut scene = scene();
+    scene.render.points.transmittance_cutoff = 0.01;
+    let slabs = |n: f64| step(1.0 / n, n);
+    Sweep {
+        technique: "slabs",
+        base: Request { scene, oversample: 8 },
+        knobs: vec![
+            Knob {
+                name: "slabs",
+                size_meaning: "width",
+                set: |request, value| request.oversample = value as u32,
+                steps: [2.0, 4.0, 8.0, 16.0].map(slabs).to_vec(),
+                ends: vec![slabs(256.0)],
+                end_is_exact: false,
+                theory: theory(2.0),
+                joint: true,
+            },
+            Knob {
+                name: "cut",
+                size_meaning: "cut",
+                set: |request, value| request.scene.render.points.transmittance_cutoff = value,
+                steps: [0.1, 0.03, 0.01].map(|t| step(t, t)).to_vec(),
+                ends: vec![step(0.0, 0.0)],
+                end_is_exact: true,
+                theory: theory(1.0),
+                joint: true,
+            },
+        ],
+        skipped: Vec::new(),
+        joint_levels: 3,
+    }
+}
+
+fn frame(image: Image<reference::metrics::Linear>, seconds: f64) -> Frame {
+    Frame { image, seconds, convert_seconds: None, fragments: 1, bytes: 1 }
+}
+
+/// The technique with its samples `offset` behind the front of each slab; finer is slower.
+fn run(offset: f64) -> Result<Study, Error> {
+    let mut draw = |request: &Request| {
+        let (n, cut) = (f64::from(request.oversample), request.scene.render.points.transmittance_cutoff);
+        Ok(frame(slab_image(n, offset, cut), 1e-3 * n * (2.0 - cut)))
+    };
+    let standard_error = vec![[1e-7; 3]; SIZE[0] * SIZE[1]];
+    let truth = Truth { method: "closed form".into(), image: exact_image(), standard_error };
+    study(&sweep(), Some(truth), &OPTIONS, &Progress::new(), &mut draw)
+}
+
+fn order_of(study: &Study, knob: &str) -> (f64, f64) {
+    let curve = study.curves.iter().find(|c| c.knob == knob).unwrap();
+    let fit = curve.settled.fit.unwrap();
+    (fit.order, fit.half_width.unwrap())
+}
+
+#[test]
+fn a_technique_of_known_order_is_measured_as_such() {
+    let study = run(0.5).unwrap();
+    let (slabs, cut) = (order_of(&study, "slabs"), order_of(&study, "cut"));
+    assert!((slabs.0 - 2.0).abs() < 0.05 && (cut.0 - 1.0).abs() < 1e-6, "{slabs:?} {cut:?}");
+    assert!(study.curves.iter().all(|c| verdict(&study, c).contains("as theory says")));
+    // The limit says how wrong it is: about (1/256)² of what one slab leaves.
+    let own = study.limit.own_error;
+    let left = reference::metrics::compare(&study.limit.image, &exact_image()).unwrap().rmse;
+    assert!(left < 1.5 * own && own < 3.0 * left, "{own:e} {left:e}");
+    let least = study.outcomes.iter().filter(|o| o.drawn).map(|o| o.from_limit.as_ref().unwrap().linear.rmse);
+    assert!(least.fold(f64::INFINITY, f64::min) >= 10.0 * own);
+    assert!(study.frontier.len() >= 3);
+}
+
+#[test]
+fn a_flipped_sign_shows_up_in_the_report() {
+    let (healthy, broken) = (run(0.5).unwrap(), run(-0.5).unwrap());
+    let curve = broken.curves.iter().find(|c| c.knob == "slabs").unwrap();
+    assert!(verdict(&broken, curve).contains("theory says otherwise"), "{}", verdict(&broken, curve));
+    let (order, half_width) = order_of(&broken, "slabs");
+    assert!(order + half_width < 1.9, "{order} {half_width}");
+    // Against the truth every setting of the broken one is farther off.
+    let of_truth = |s: &Study| s.outcomes[0].from_truth.as_ref().unwrap().linear.rmse;
+    assert!(of_truth(&broken) > 2.0 * of_truth(&healthy), "{} {}", of_truth(&broken), of_truth(&healthy));
+    let report = Report::new(&scene(), OPTIONS, vec![broken]);
+    assert!(report.html().unwrap().contains("theory says otherwise"));
+}
+
+#[test]
+fn what_does_not_converge_is_refused_with_what_it_would_take() {
+    let mut draw = |request: &Request| {
+        let n = u64::from(request.oversample);
+        let noise = |k: usize| [0.5 + 0.1 * splat_core::rng::unit(n, 0, k as u64, 0); 3];
+        let image = Image::from_radiance(SIZE, (0..SIZE[0] * SIZE[1]).map(noise).collect()).unwrap();
+        Ok(frame(image, 1e-3))
+    };
+    let error = study(&sweep(), None, &OPTIONS, &Progress::new(), &mut draw).unwrap_err();
+    assert_eq!(error.exit_code(), 5);
+    assert!(error.to_string().contains("own error") && error.hint().contains("--finer"), "{error} {}", error.hint());
+}
+
+#[test]
+fn what_was_not_measured_is_null() {
+    let mut draw = |request: &Request| {
+        let (n, cut) = (f64::from(request.oversample), request.scene.render.points.transmittance_cutoff);
+        if n == 16.0 {
+            let what = "the table".into();
+            return Err(Error::Limit { what, needed: 9, limit: 1, unit: "bytes", hint: String::new() });
+        }
+        Ok(frame(slab_image(n, 0.5, cut), 1e-3 * n))
+    };
+    let study = study(&sweep(), None, &OPTIONS, &Progress::new(), &mut draw).unwrap();
+    let report = Report::new(&scene(), OPTIONS, vec![study]);
+    let document: Value = serde_json::from_str(&report.json()).unwrap();
+    let settings = document["techniques"][0]["settings"].as_array().unwrap();
+    let failed = settings.iter().find(|s| s["setting"] == "slabs: 16").unwrap();
+    assert!(failed["seconds"].is_null() && failed["from_limit"].is_null() && failed["from_truth"].is_null());
+    assert_eq!(failed["failure"], "the table needs 9 bytes, the limit is 1");
+    assert!(report.csv().lines().any(|l| l.starts_with("\"slabs\",\"slabs: 16\",\"slabs\",false,false,,,")));
+    assert!(report.html().unwrap().contains("Not drawn: slabs: 16"));
+    // Two repeats of everything else.
+    assert!(
+        settings
+            .iter()
+            .filter(|s| s["failure"].is_null())
+            .all(|s| s["seconds_of_repeats"].as_array().unwrap().len() == 2)
+    );
+}
+
+#[test]
+fn the_command_writes_three_files_or_none() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("s.toml"), SCENE).unwrap();
+    let run = |arguments: &[&str]| {
+        let out = organza().args(arguments).current_dir(&folder).output().unwrap();
+        (out.status.code().unwrap(), String::from_utf8_lossy(&out.stdout).into_owned(), out.stderr)
+    };
+    let (code, stdout, stderr) = run(&["accuracy", "s.toml", "--quick", "--out", "r", "--json"]);
+    assert_eq!(code, 0, "{}", String::from_utf8_lossy(&stderr));
+    let document: Value = serde_json::from_str(&stdout).unwrap();
+    let written: Value = serde_json::from_slice(&fs::read(folder.path().join("r/accuracy.json")).unwrap()).unwrap();
+    assert_eq!(document["report"], written);
+    let technique = &written["techniques"][0];
+    let curves: Vec<&str> =
+        technique["curves"].as_array().unwrap().iter().map(|c| c["knob"].as_str().unwrap()).collect();
+    assert!(curves.contains(&"slice thickness") && curves.contains(&"samples"), "{curves:?}");
+    let skipped = technique["skipped"].as_array().unwrap();
+    assert!(skipped.iter().any(|s| s["knob"] == "footprint table size"));
+    let html = fs::read_to_string(folder.path().join("r/accuracy.html")).unwrap();
+    let foreign = |text: &str| text.replace("http://www.w3.org/2000/svg", "").contains("http");
+    assert!(!foreign(&html) && html.contains("data:image/png;base64,") && html.matches("<svg").count() >= 3);
+    let mut names: Vec<_> = fs::read_dir(folder.path().join("r")).unwrap().map(|e| e.unwrap().file_name()).collect();
+    names.sort();
+    assert_eq!(names, ["accuracy.csv", "accuracy.html", "accuracy.json"]);
+    // Nothing is replaced, and nothing is made for a scene that cannot be read.
+    assert_eq!(run(&["accuracy", "s.toml", "--quick", "--out", "r"]).0, 4);
+    assert_eq!(run(&["accuracy", "none.toml", "--out", "new"]).0, 4);
+    assert_eq!(run(&["accuracy", "s.toml", "--out", "new", "--set", "object.fog.visible=7"]).0, 2);
+    assert!(!folder.path().join("new").exists());
+}
+
+#[test]
+fn knobs_that_cannot_matter_are_left_alone() {
+    let sweep = points(&scene(), &Facts::default(), &OPTIONS);
+    let skipped: Vec<&str> = sweep.skipped.iter().map(|s| s.knob).collect();
+    let expected = [
+        "slice thickness",
+        "shadow table cells",
+        "shadow table mapping",
+        "absorbance cut",
+        "transmittance cut",
+        "footprint table size",
+    ];
+    assert_eq!(skipped, expected);
+    let all = points(&scene(), &Facts { slice_thickness: Some(0.1), cells: Some(64) }, &OPTIONS);
+    assert_eq!(all.skipped.len(), 1);
+    assert_eq!(all.knobs.len(), 8);
+}

@@ -1,0 +1,78 @@
+//! `organza orders`: every ordering against the truth of each pixel.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use organza::orders::compare;
+use organza::{Progress, RenderOptions, scene};
+use organza_tests::organza;
+use serde_json::Value;
+use std::fs;
+
+/// Two media of different colour inside each other, above an opaque ground.
+const SCENE: &str = r#"version = 1
+[camera]
+position = [0.3, 0.5, 4]
+target = [0, 0, 0]
+size = [32, 24]
+[background]
+color = [0.25, 0.5, 1.0]
+[ambient]
+color = [1, 1, 1]
+[material.red]
+color = [1, 0.1, 0.1]
+[material.blue]
+color = [0.1, 0.1, 1]
+[[object]]
+name = "outer"
+medium_ball = { center = [0, 0.2, 0], radius = 0.9, extinction = 2, spacing = 0.1 }
+material = "red"
+[[object]]
+name = "inner"
+medium_ball = { center = [0.3, 0.2, 0.1], radius = 0.5, extinction = 4, spacing = 0.07 }
+material = "blue"
+[[object]]
+name = "ground"
+rectangle = { center = [0, -0.3, 0], u = [1.5, 0, 0], v = [0, 0, -1.5], spacing = 0.1 }
+"#;
+
+fn row<'a>(document: &'a Value, name: &str) -> &'a Value {
+    document["orderings"].as_array().unwrap().iter().find(|o| o["ordering"] == name).unwrap()
+}
+
+#[test]
+fn exact_order_is_the_truth_and_disorder_costs_accuracy() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("s.toml"), SCENE).unwrap();
+    let out = organza().args(["orders", "s.toml", "--out", "o", "--json"]).current_dir(&folder).output().unwrap();
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let document: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let report = &document["report"];
+    let value = |name: &str, key: &str| row(report, name)[key].as_f64().unwrap();
+    let exact = "slices, exact inside";
+    assert!(value(exact, "rmse") < 1e-5, "{}", value(exact, "rmse"));
+    assert!((value("comparison sort by view depth", "rmse") - value(exact, "rmse")).abs() < 1e-6);
+    assert!(value("unsorted", "rmse") > 100.0 * value(exact, "rmse"));
+    let thin = "slices, 1 x thickness";
+    assert!(value(thin, "rmse") < value("unsorted", "rmse"));
+    assert!(value(exact, "wrong_pairs_per_ray") < 0.1 * value(thin, "wrong_pairs_per_ray"));
+    assert!(value(thin, "wrong_pairs_per_ray") < value("unsorted", "wrong_pairs_per_ray"));
+    // Inside a slice a splat can stand in front of an earlier one by no more than the slice is thick.
+    assert!(value(thin, "worst_backtrack") <= 1.001 * value(thin, "slice_thickness"));
+    assert!(value("unsorted", "worst_backtrack") > 10.0 * value(thin, "slice_thickness"));
+    assert!(value("unsorted", "bytes") < value("comparison sort by view depth", "bytes"));
+    let mut names: Vec<_> = fs::read_dir(folder.path().join("o")).unwrap().map(|e| e.unwrap().file_name()).collect();
+    names.sort();
+    assert_eq!(names, ["orders.csv", "orders.html", "orders.json", "orders.png"]);
+    let png = fs::read(folder.path().join("o/orders.png")).unwrap();
+    assert_eq!(png[..8], *b"\x89PNG\r\n\x1a\n");
+    let again = organza().args(["orders", "s.toml", "--out", "o"]).current_dir(&folder).output().unwrap();
+    assert_eq!(again.status.code(), Some(4));
+}
+
+#[test]
+fn a_scene_without_translucent_splats_has_no_order() {
+    let opaque = SCENE.replace("[[object]]\nname = \"inner\"", "[[object]]\nvisible = false\nname = \"inner\"");
+    let opaque = opaque.replace("[[object]]\nname = \"outer\"", "[[object]]\nvisible = false\nname = \"outer\"");
+    let scene = scene::parse("s.toml".as_ref(), opaque.as_bytes(), &Default::default()).unwrap();
+    let error = compare(&scene, &RenderOptions::default(), &Progress::new()).unwrap_err();
+    assert_eq!(error.exit_code(), 3);
+}
