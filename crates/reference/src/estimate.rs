@@ -85,13 +85,12 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Root mean square of the standard errors over the mean radiance, both over all pixels and channels; 0 for a dark
-    /// image without error.
+    /// Expected relative error of the image: root mean square of the standard errors over that of the radiance, over all
+    /// pixels and channels; 0 for a dark image without error.
     pub fn relative_error(&self) -> f64 {
-        let n = (3 * self.radiance.mean.len()).max(1) as f64;
-        let mean = self.radiance.mean.iter().flatten().sum::<f64>() / n;
-        let square = self.radiance.standard_error.iter().flatten().map(|e| e * e).sum::<f64>() / n;
-        if square == 0.0 { 0.0 } else { square.sqrt() / mean.abs() }
+        let squares = |v: &[[f64; 3]]| v.iter().flatten().map(|e| e * e).sum::<f64>();
+        let (error, light) = (squares(&self.radiance.standard_error), squares(&self.radiance.mean));
+        if error == 0.0 { 0.0 } else { (error / light).sqrt() }
     }
 }
 
