@@ -127,7 +127,7 @@ struct Pixel {
 /// Path-traces a scene.
 ///
 /// # Errors
-/// As [`Scene::validate`]; [`Error::Invalid`] for fewer than two samples; [`Error::Cancelled`].
+/// As [`Scene::validate`]; [`Error::Invalid`] for fewer than two samples or no pixels; [`Error::Cancelled`].
 pub fn path_trace(
     scene: &Scene<'_>,
     camera: &Camera,
@@ -137,6 +137,9 @@ pub fn path_trace(
     if settings.samples < 2 || settings.batch < 1 {
         let found = [settings.samples, settings.batch];
         return Err(Error::invalid("path settings", 0, "samples, batch", found, "at least 2 samples, batches of 1"));
+    }
+    if camera.size.contains(&0) {
+        return Err(Error::invalid("camera", 0, "size", camera.size, "at least one pixel"));
     }
     let tracer = Tracer::new(scene, settings.rules)?;
     let [width, height] = camera.size.map(|s| s as usize);

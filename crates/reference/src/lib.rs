@@ -18,6 +18,22 @@
 //! // The middle pixel is covered, the corner is not.
 //! assert!(image.transmittance[40][0] < 1.0 && image.transmittance[0][0] == 1.0);
 //! ```
+//!
+//! What splats stand for is rendered without them: [`march_image`] (media, single scattering, with an error bound),
+//! [`composite_surfaces`] (implicit surfaces and meshes in exact order) and [`path_trace`] (everything, with a standard
+//! error a pixel).
+//!
+//! ```
+//! use reference::{Density, Medium, PathSettings, Scene, path_trace};
+//! use splat_core::{Camera, Progress, Projection, glam::DVec3};
+//! let fog = Medium::new(Density::Box([DVec3::splat(-1.0), DVec3::splat(1.0)]), 0.5, 0.0);
+//! let scene = Scene { media: vec![fog], background: Some([1.0; 3]), ..Scene::default() };
+//! let camera = Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y,
+//!     Projection::Orthographic { height: 1.0 }, [4, 4]).unwrap();
+//! let image = path_trace(&scene, &camera, &PathSettings::default(), &Progress::new()).unwrap();
+//! let (mean, error) = (image.radiance.mean[0][0], image.radiance.standard_error[0][0]);
+//! assert!((mean - (-1.0f64).exp()).abs() < 5.0 * error);
+//! ```
 #![forbid(unsafe_code)]
 
 mod composite;

@@ -86,6 +86,9 @@ impl Visibility {
             }
         }
         let center = if total == 0 { DVec3::ZERO } else { low + (high - low) * 0.5 };
+        if total > 0 && !(high - low).is_finite() {
+            return Err(Error::invalid("mesh", 0, "origin", [low, high], "finite positions"));
+        }
         let mut triangles = Vec::with_capacity(total as usize);
         let mut owner = Vec::with_capacity(total as usize);
         for (m, mesh) in meshes.iter().enumerate() {
@@ -121,9 +124,9 @@ impl Visibility {
     }
 
     /// Geometric normal of a triangle, its vertices counter-clockwise seen from the side that it points to; zero for a
-    /// degenerate triangle.
+    /// degenerate triangle and an id that is none.
     pub fn normal(&self, id: u32) -> DVec3 {
-        let [a, b, c] = self.triangles[id as usize];
+        let Some(&[a, b, c]) = self.triangles.get(id as usize) else { return DVec3::ZERO };
         // Scaled so that tiny triangles do not underflow.
         ((b - a) * self.scale).cross((c - a) * self.scale).normalize_or_zero()
     }
@@ -193,6 +196,9 @@ impl Visibility {
 
     /// The ray in the space of the hierarchy, or `None` when it passes the scene.
     fn local(&self, ray: &Ray, t1: f64) -> Option<Local> {
+        if !(ray.origin.is_finite() && ray.direction.is_finite()) {
+            return None;
+        }
         let origin = ray.origin - self.center;
         let grown = self.half + DVec3::splat(f64::from(PAD) / self.scale);
         let (enter, leave) = Ray { origin, ..*ray }.clip(&[-grown, grown], 0.0, t1)?;
