@@ -84,7 +84,8 @@ impl<'a> Lattice<'a> {
         }
         let q = q.max(DVec3::ZERO).min(self.last);
         let [nx, ny, nz] = self.grid.dims;
-        let (i, j, k) = (q.x as usize, q.y as usize, q.z as usize);
+        // By way of i32, which converts in one instruction; a longer axis than that does not fit memory.
+        let (i, j, k) = (q.x as i32 as usize, q.y as i32 as usize, q.z as i32 as usize);
         let (i, j, k) = (i.min(nx.saturating_sub(2)), j.min(ny.saturating_sub(2)), k.min(nz.saturating_sub(2)));
         let (fx, fy, fz) = (q.x - i as f64, q.y - j as f64, q.z - k as f64);
         let (dx, dy, dz) = (usize::from(nx > 1), usize::from(ny > 1) * nx, usize::from(nz > 1) * nx * ny);

@@ -174,7 +174,7 @@ impl Steps {
         let mut out = Self { cell: 0, next: [f64::INFINITY; 3], delta: [0.0; 3], left: [0; 3], stride: [0; 3] };
         for a in 0..3 {
             let last = grid.dims[a] - 1;
-            let i = (q[a].max(0.0) as usize).min(last);
+            let i = (q[a].max(0.0) as i32 as usize).min(last);
             out.cell += i * strides[a];
             let d = ray.direction[a];
             if d != 0.0 {
