@@ -33,6 +33,7 @@ mod load;
 mod normalize;
 pub mod orders;
 pub mod output;
+mod particles;
 pub mod plan;
 mod points;
 mod render;

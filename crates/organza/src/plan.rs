@@ -59,13 +59,16 @@ pub mod pass {
     pub const OPAQUE: &str = "opaque";
     /// Translucent splats are composited.
     pub const SPLAT: &str = "splat";
+    /// Translucent splats become particles, which are projected and averaged.
+    pub const PARTICLES: &str = "particles";
     /// Samples become pixels and layers.
     pub const FINISH: &str = "finish";
 }
 
 /// Chooses effects and passes.
 pub fn plan(statistics: &Statistics) -> Plan {
-    let mut plan = Plan { technique: "points", ..Plan::default() };
+    let technique = if statistics.particles { "particles" } else { "points" };
+    let mut plan = Plan { technique, ..Plan::default() };
     let mut skipped = 0.0;
     for (i, light) in statistics.lights.iter().enumerate() {
         let effect = shadow_effect(i, light, statistics, statistics.tolerance - skipped);
@@ -133,7 +136,8 @@ fn normals(statistics: &Statistics) -> Effect {
 fn translucency(statistics: &Statistics) -> Effect {
     let n = statistics.translucent;
     if n > 0 {
-        effect("translucency", true, format!("{n} translucent splats are composited in order"))
+        let how = if statistics.particles { "become particles" } else { "are composited in order" };
+        effect("translucency", true, format!("{n} translucent splats {how}"))
     } else {
         effect("translucency", false, "no splat is translucent: nothing to sort")
     }
@@ -157,6 +161,9 @@ fn kept_layers(statistics: &Statistics) -> Effect {
 }
 
 fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<PlannedPass> {
+    if statistics.particles {
+        return particle_passes(statistics, shadow_maps);
+    }
     let pass = |name: &str, reason: String| PlannedPass { name: name.into(), reason };
     let mut passes = vec![pass(pass::CONVERT, format!("{} splats", statistics.translucent + statistics.opaque))];
     for (i, _) in shadow_maps.iter().enumerate().filter(|(_, on)| **on) {
@@ -172,6 +179,25 @@ fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<PlannedPass> {
         if n > 0 {
             passes.push(pass(name, format!("{n} {kind} splats")));
         }
+    }
+    passes.push(pass(pass::FINISH, "samples become pixels".into()));
+    passes
+}
+
+fn particle_passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<PlannedPass> {
+    let pass = |name: &str, reason: String| PlannedPass { name: name.into(), reason };
+    let (translucent, opaque) = (statistics.translucent, statistics.opaque);
+    let mut passes = vec![pass(pass::CONVERT, format!("{} splats", translucent + opaque))];
+    for (i, _) in shadow_maps.iter().enumerate().filter(|(_, on)| **on) {
+        passes.push(pass(pass::SHADOW_MAP, format!("light {i}")));
+    }
+    if opaque > 0 {
+        passes.push(pass(pass::PROJECT, "opaque splats".into()));
+        passes.push(pass(pass::SHADE, "the opaque splats in view".into()));
+        passes.push(pass(pass::OPAQUE, format!("{opaque} opaque splats")));
+    }
+    if translucent > 0 {
+        passes.push(pass(pass::PARTICLES, format!("{translucent} translucent splats, nothing to sort")));
     }
     passes.push(pass(pass::FINISH, "samples become pixels".into()));
     passes

@@ -205,7 +205,7 @@ impl Drawing<'_> {
         Ok(Shaded { projected, values, channels: layout.count() })
     }
 
-    fn opaque(&self, shaded: &Shaded, cost: &mut CostRecord) -> Result<OpaqueImage, Error> {
+    pub(crate) fn opaque(&self, shaded: &Shaded, cost: &mut CostRecord) -> Result<OpaqueImage, Error> {
         let ids = self.ids(|kind| kind == SplatKind::Opaque);
         if ids.is_empty() {
             return Ok(OpaqueImage::default());

@@ -1,9 +1,10 @@
 //! From a scene to images: load, plan, draw.
 
 use crate::load::{Loaded, SplatCount, load};
+use crate::particles;
 use crate::plan::{Plan, pass, plan};
 use crate::points::{self, Drawing};
-use crate::scene::Scene;
+use crate::scene::{Scene, Technique};
 use crate::statistics::{LightStatistics, Statistics};
 use crate::{CostRecord, Error, Layers, Progress};
 use splat_core::{LayerData, LayerSet};
@@ -75,7 +76,11 @@ pub(crate) fn draw_loaded(
     cost: &mut CostRecord,
 ) -> Result<Layers, Error> {
     progress.add_total(plan.passes.len() as u64);
-    let mut layers = points::draw(&drawing(scene, loaded, plan, options, progress), cost)?;
+    let drawing = drawing(scene, loaded, plan, options, progress);
+    let mut layers = match scene.render.technique {
+        Technique::Auto | Technique::Points => points::draw(&drawing, cost)?,
+        Technique::Particles => particles::draw(&drawing, options, cost)?,
+    };
     restore_depths(&mut layers, loaded.exponent);
     scene.render.layers.keep(&mut layers);
     Ok(layers)
@@ -134,6 +139,11 @@ pub(crate) fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOption
     statistics.normals_needed = loaded.normals;
     statistics.layers = scene.render.layers.names().map(str::to_owned).collect();
     statistics.tolerance = scene.render.tolerance;
+    statistics.particles = scene.render.technique == Technique::Particles;
+    if statistics.particles && statistics.colored_extinction {
+        let what = "particles hide all colours alike: a material absorbs red, green and blue unequally";
+        return Err(Error::input(crate::printable(&scene.file), what, "use technique = \"points\""));
+    }
     let plan = plan(&statistics);
     let maps = plan.shadow_maps.iter().filter(|on| **on).count() as u64;
     let splats = splat_bytes(loaded, &scene.render.layers.set());

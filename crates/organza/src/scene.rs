@@ -30,7 +30,7 @@ pub use layer_choice::{LAYER_NAMES, LayerChoice};
 pub use lights::{LightSource, SceneLight};
 pub use load::{LoadOptions, MAX_SCENE_BYTES, MAX_SCENE_DEPTH, load, parse, schema};
 pub use model::{
-    CloudSource, DensitySource, ImplicitSource, MediumShape, PointsSettings, RectangleSource, RenderSettings, Scene,
-    SceneMaterial, SceneObject, ShadowMapping, ShadowSettings, Source, Technique, VolumeSource,
+    CloudSource, DensitySource, ImplicitSource, MediumShape, ParticlesSettings, PointsSettings, RectangleSource,
+    RenderSettings, Scene, SceneMaterial, SceneObject, ShadowMapping, ShadowSettings, Source, Technique, VolumeSource,
 };
 pub use overrides::Override;

@@ -36,6 +36,8 @@ pub struct Statistics {
     pub layers: Vec<String>,
     /// Largest change of a displayed pixel that may be left out.
     pub tolerance: f64,
+    /// Whether the technique is `particles`.
+    pub particles: bool,
 }
 
 impl Statistics {

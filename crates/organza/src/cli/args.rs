@@ -52,7 +52,7 @@ pub(super) struct SceneArguments {
     /// Change a value of the scene before it is checked, such as render.points.exact=true or object.cloud.visible=false
     #[arg(long = "set", value_name = "PATH=VALUE")]
     pub(super) set: Vec<String>,
-    /// Technique: auto or points
+    /// Technique: auto, points or particles
     #[arg(long, value_name = "NAME")]
     pub(super) technique: Option<String>,
     /// What computes

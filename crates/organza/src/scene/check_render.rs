@@ -2,14 +2,20 @@
 
 use super::check::{At, LARGEST, SMALLEST};
 use super::de::suggest;
-use super::raw::{Auto, RawAccumulation, RawDirection, RawMapping, RawPoints, RawRender, RawShadow};
-use super::{LAYER_NAMES, LayerChoice, PointsSettings, RenderSettings, ShadowMapping, ShadowSettings, Technique};
+use super::raw::{Auto, RawAccumulation, RawDirection, RawMapping, RawParticles, RawPoints, RawRender, RawShadow};
+use super::{
+    LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, RenderSettings, ShadowMapping, ShadowSettings,
+    Technique,
+};
 use crate::Error;
 use splat_core::Direction;
 use splat_core::raster::Accumulation;
 
 /// Techniques of the design that this version does not have.
-const LATER_TECHNIQUES: [&str; 4] = ["sheets", "particles", "surfels", "reference"];
+const LATER_TECHNIQUES: [&str; 3] = ["sheets", "surfels", "reference"];
+
+/// Layers that particles do not have.
+const NOT_OF_PARTICLES: [&str; 5] = ["depth.first", "depth.median", "depth.mean", "depth.sigma", "object"];
 
 /// Checks `[render]`.
 pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSettings, Error> {
@@ -21,15 +27,17 @@ pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSetting
     if raw.max_points == Some(0) {
         return Err(at.key("max_points").error("`max_points`: expected a whole number above 0, found 0", ""));
     }
+    let technique = check_technique(at, raw.technique.as_deref().unwrap_or("auto"))?;
     Ok(RenderSettings {
-        technique: check_technique(at, raw.technique.as_deref().unwrap_or("auto"))?,
+        technique,
         antialias: at.whole("antialias", raw.antialias.unwrap_or(2), 1..=8)?,
         tolerance,
         exposure: at.number("exposure", raw.exposure.unwrap_or(0.0), -60.0..=60.0)?,
-        layers: check_layers(&at.key("layers"), &raw.layers)?,
+        layers: check_layers(&at.key("layers"), &raw.layers, technique)?,
         seed: raw.seed.unwrap_or(0),
         max_points: raw.max_points,
         points: check_points(&at.key("points"), &raw.points)?,
+        particles: check_particles(&at.key("particles"), &raw.particles)?,
     })
 }
 
@@ -37,25 +45,40 @@ fn check_technique(at: &At<'_>, name: &str) -> Result<Technique, Error> {
     match name {
         "auto" => Ok(Technique::Auto),
         "points" => Ok(Technique::Points),
+        "particles" => Ok(Technique::Particles),
         _ => {
             let message = if LATER_TECHNIQUES.contains(&name) {
                 format!("`technique`: this version does not have \"{name}\"")
             } else {
-                format!("`technique`: expected \"auto\" or \"points\", found \"{name}\"")
+                format!("`technique`: expected \"auto\", \"points\" or \"particles\", found \"{name}\"")
             };
-            Err(at.key("technique").error(message, "use \"auto\" or \"points\""))
+            Err(at.key("technique").error(message, "use \"auto\", \"points\" or \"particles\""))
         }
     }
 }
 
-fn check_layers(at: &At<'_>, names: &[String]) -> Result<LayerChoice, Error> {
+fn check_layers(at: &At<'_>, names: &[String], technique: Technique) -> Result<LayerChoice, Error> {
     let mut choice = LayerChoice::default();
     for (i, name) in names.iter().enumerate() {
         if !choice.add(name) {
             return Err(at.index(i).error(format!("there is no layer `{name}`"), suggest(name, &LAYER_NAMES)));
         }
     }
+    let particles = technique == Technique::Particles;
+    let missing = |name: &&str| if particles { NOT_OF_PARTICLES.contains(name) } else { *name == "std_error" };
+    if let Some(name) = choice.names().find(missing) {
+        let (whose, hint) = if particles { ("particles", "points") } else { ("points", "particles") };
+        let message = format!("the technique `{whose}` has no layer `{name}`");
+        return Err(at.error(message, format!("use technique = \"{hint}\"")));
+    }
     Ok(choice)
+}
+
+fn check_particles(at: &At<'_>, raw: &RawParticles) -> Result<ParticlesSettings, Error> {
+    Ok(ParticlesSettings {
+        repeat_level: at.whole("repeat_level", raw.repeat_level.unwrap_or(100), 2..=1_000_000)?,
+        target_error: raw.target_error.map(|e| at.number("target_error", e, SMALLEST..=LARGEST)).transpose()?,
+    })
 }
 
 fn check_points(at: &At<'_>, raw: &RawPoints) -> Result<PointsSettings, Error> {

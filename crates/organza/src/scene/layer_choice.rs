@@ -4,7 +4,7 @@ use splat_core::{ADDITIVE_LAYERS, LayerSet, Layers};
 use std::collections::BTreeSet;
 
 /// Every name that `layers` accepts. `effects` and `depth` stand for several; `beauty` and `alpha` are always kept.
-pub const LAYER_NAMES: [&str; 15] = [
+pub const LAYER_NAMES: [&str; 16] = [
     "beauty",
     "alpha",
     "effects",
@@ -20,6 +20,7 @@ pub const LAYER_NAMES: [&str; 15] = [
     "depth.mean",
     "depth.sigma",
     "object",
+    "std_error",
 ];
 
 const DEPTHS: [&str; 4] = ["depth.first", "depth.median", "depth.mean", "depth.sigma"];

@@ -206,8 +206,10 @@ pub struct RenderSettings {
     pub seed: u64,
     /// Most splats that the scene may become; more is a resource error.
     pub max_points: Option<u64>,
-    /// Settings of the `points` technique.
+    /// Settings of the `points` technique; its shadow maps serve the others too.
     pub points: PointsSettings,
+    /// Settings of the `particles` technique.
+    pub particles: ParticlesSettings,
 }
 
 /// What draws the picture.
@@ -218,6 +220,17 @@ pub enum Technique {
     Auto,
     /// Rendering-oriented points (Gunjee 2007).
     Points,
+    /// Opaque particles, averaged over many sets (Tanaka 2012).
+    Particles,
+}
+
+/// Settings of the `particles` technique.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ParticlesSettings {
+    /// Most sets of particles that are averaged, ≥ 2 (Tanaka 2012: repeat level L_R).
+    pub repeat_level: u32,
+    /// Root mean square of the pixels' standard errors of luminance at which enough sets are averaged, > 0.
+    pub target_error: Option<f64>,
 }
 
 /// Settings of the `points` technique.

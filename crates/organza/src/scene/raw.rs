@@ -176,7 +176,7 @@ pub(super) enum RawLight {
 #[serde(deny_unknown_fields, default, expecting = "a table")]
 #[schemars(rename = "Render")]
 pub(super) struct RawRender {
-    /// "auto" or "points"; default "auto".
+    /// "auto", "points" or "particles"; default "auto", which is "points".
     pub(super) technique: Option<String>,
     /// Samples along each side of a pixel, 1 to 8; default 2.
     pub(super) antialias: Option<u32>,
@@ -191,6 +191,18 @@ pub(super) struct RawRender {
     /// Most splats that the scene may become.
     pub(super) max_points: Option<u64>,
     pub(super) points: RawPoints,
+    pub(super) particles: RawParticles,
+}
+
+/// Settings of the `particles` technique.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default, expecting = "a table")]
+#[schemars(rename = "Particles")]
+pub(super) struct RawParticles {
+    /// Most sets of particles that are averaged, 2 to 1000000; default 100.
+    pub(super) repeat_level: Option<u32>,
+    /// Standard error of luminance, root mean square over the pixels, at which enough sets are averaged; default none.
+    pub(super) target_error: Option<f64>,
 }
 
 /// Settings of the `points` technique.
