@@ -110,7 +110,7 @@ impl Task {
         self.particles = 0;
         for chunk in self.chunks.clone() {
             let particles = sampler.chunk(self.set, chunk, scratch);
-            let key = rng::bits(u64::from(self.object), Stage::Thinning as u64, self.set, chunk as u64);
+            let key = thinning_key(self.object, self.set, chunk);
             stage(particles, projector, tiling, key, self.particles as u32, staged);
             self.particles += particles.len() as u64;
         }
@@ -136,6 +136,18 @@ impl Task {
     }
 }
 
+/// Counter of the numbers that thin out the particles of one chunk.
+pub(crate) fn thinning_key(object: u32, set: u64, chunk: usize) -> u64 {
+    rng::bits(u64::from(object), Stage::Thinning as u64, set, chunk as u64)
+}
+
+/// The number in (0, 1) of particle `i` of a chunk.
+#[inline(always)]
+pub(crate) fn thinning(key: u64, i: usize) -> f32 {
+    let bits = scramble(key.wrapping_add((i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)));
+    ((bits >> 41) as f32 + 0.5) * (1.0 / (1u32 << 23) as f32)
+}
+
 fn stage(
     particles: &Particles,
     projector: &Projector,
@@ -147,10 +159,7 @@ fn stage(
     let columns = tiling.columns as u32;
     let each = particles.position.iter().zip(&particles.normal).zip(&particles.color).enumerate();
     for (i, ((&position, &normal), &color)) in each {
-        let own = || {
-            let bits = scramble(key.wrapping_add((i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)));
-            ((bits >> 41) as f32 + 0.5) * (1.0 / (1u32 << 23) as f32)
-        };
+        let own = || thinning(key, i);
         let Some(foot) = projector.project(position, normal, own) else { continue };
         let within = u32::from(foot.within[0]) << 12 | u32::from(foot.within[1]) << 20;
         for y in foot.y[0]..foot.y[1] {

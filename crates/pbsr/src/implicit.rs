@@ -118,10 +118,8 @@ impl Cells {
         let middle = self.min + DVec3::from_array(corner.map(f64::from)) * self.side + DVec3::splat(half);
         // √3 rounded up: the ball must hold the cube.
         let bound = surface.field.bound(middle, half * 1.732_050_807_568_878);
-        if let Some((low, high)) = bound {
-            if low > surface.level || high < surface.level {
-                return;
-            }
+        if bound.is_some_and(|(low, high)| low > surface.level || high < surface.level) {
+            return;
         }
         if size == 1 {
             active.push((self.index(corner), bound.is_none()));

@@ -71,7 +71,7 @@ impl<'a> MetropolisSampler<'a> {
         check(chains.particles_per_chain >= 1, "particles_per_chain", chains.particles_per_chain, "at least 1")?;
         check(chains.stride >= 1, "stride", chains.stride, "at least 1")?;
         let cells = GridSampler::new(grid, transfer, params, None)?;
-        const POINTS: [f32; 2] = [0.211_324_87, 0.788_675_13];
+        const POINTS: [f32; 2] = [0.211_324_87, 0.788_675_1];
         let of_cell = |&(at, _): &(u32, f32)| {
             let at_point = |k: usize| {
                 let f = [POINTS[k & 1], POINTS[k >> 1 & 1], POINTS[k >> 2]];
@@ -96,7 +96,7 @@ impl<'a> MetropolisSampler<'a> {
 
     /// A uniform place of all cells with extinction.
     fn anywhere(&self, stream: &mut Stream) -> Place {
-        let cell = ((stream.bits() >> 32) * self.cells.cells.len() as u64 >> 32) as usize;
+        let cell = (((stream.bits() >> 32) * self.cells.cells.len() as u64) >> 32) as usize;
         self.place(cell, stream.triple())
     }
 
@@ -118,7 +118,7 @@ impl<'a> MetropolisSampler<'a> {
     }
 
     fn step(&self, place: &mut Place, number: u32, stream: &mut Stream) {
-        let offer = if number % 2 == 0 { Some(self.anywhere(stream)) } else { self.nearby(place, stream) };
+        let offer = if number.is_multiple_of(2) { Some(self.anywhere(stream)) } else { self.nearby(place, stream) };
         let u = stream.pair()[0];
         if let Some(to) = offer.filter(|to| u * place.point.extinction < to.point.extinction) {
             *place = to;

@@ -101,7 +101,7 @@ mod tests {
             let n = count(alpha, q);
             let hit = |set| {
                 let k = whole_count(n, q, rng::unit(1, 2, set, 0));
-                1.0 - (1.0 - q as f64).powi(k as i32)
+                1.0 - f64::powi(1.0 - q, k as i32)
             };
             let values: Vec<f64> = (0..SETS).map(hit).collect();
             let mean = values.iter().sum::<f64>() / SETS as f64;

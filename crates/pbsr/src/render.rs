@@ -307,7 +307,7 @@ impl Nearest {
             let [wx, wy] = record.within().map(f64::from);
             let at_px = [(self.corner[0] + pixel % TILE) as f64 + wx, (self.corner[1] + pixel / TILE) as f64 + wy];
             let normal = object.transform.rotation.as_quat() * record.normal.get();
-            let from_eye = plan.from_eye(scene.camera, at_px, record.depth);
+            let from_eye = plan.behind_pixel(scene.camera, at_px, record.depth);
             let seen = Seen { look: &object.look, from_eye, normal, color: record.color.get() };
             shader.shade(&seen, &mut values);
             sums.add(&shader.channels, pixel, &values[..channels], record.depth);
@@ -320,7 +320,7 @@ impl Nearest {
 
 impl Plan {
     /// World position relative to the eye of what is seen at an image position and depth.
-    fn from_eye(&self, camera: &Camera, at_px: [f64; 2], depth: f32) -> DVec3 {
+    fn behind_pixel(&self, camera: &Camera, at_px: [f64; 2], depth: f32) -> DVec3 {
         let u = (at_px[0] - 0.5 * f64::from(camera.size[0])) / self.focal;
         let v = (0.5 * f64::from(camera.size[1]) - at_px[1]) / self.focal;
         let z = f64::from(depth);

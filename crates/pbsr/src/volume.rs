@@ -215,10 +215,9 @@ impl Sampler for GridSampler<'_> {
                 return;
             }
             let offset = self.offset(at, f);
-            if let Some(density) = &self.density {
-                if stream.unit() * density.max >= density.at(self.grid.origin + offset.as_dvec3()) {
-                    return;
-                }
+            let thinned = |d: &Density<'_>, u: f64| u * d.max >= d.at(self.grid.origin + offset.as_dvec3());
+            if self.density.as_ref().is_some_and(|d| thinned(d, stream.unit())) {
+                return;
             }
             let (normal, color) = self.attributes(point.color, gradient);
             scratch.push(offset, normal, color);

@@ -177,7 +177,7 @@ fn kept_sets_are_the_sets_and_moving_them_needs_no_sampling() {
         }
     }
     // Widened particles cover four pixels: 4 times the variance.
-    let sigma = (0.64 * 0.36 * 4.0 / n as f64).sqrt();
+    let sigma = f64::sqrt(0.64 * 0.36 * 4.0 / n);
     assert!((sum / n - 0.64).abs() < 4.0 * sigma, "{} ± {sigma}", sum / n);
 }
 
@@ -299,4 +299,29 @@ fn cost_is_predicted_and_work_can_be_cancelled() {
     let other = front(32);
     let refused = Renderer::new().fold(&Scene { camera: &other, ..scene }, &mut ensemble, 1, &fold, &Progress::new());
     assert!(matches!(refused, Err(Error::Parameter { .. })));
+}
+
+#[test]
+fn the_fast_path_sees_what_the_slow_one_sees() {
+    use splat_core::optics::SurfaceOpacity::{PerCrossing, ThinSlab};
+    let camera = camera(Projection::Perspective { fov_y: 0.7 }, 3.0, [70, 60]);
+    let mesh = rectangle(Vec3::ZERO, Vec3::new(0.8, 0.2, 0.9), Vec3::Y, 3);
+    // Thinned out, and widened.
+    for (s, surface_opacity) in [(2e-4, ThinSlab), (6e-3, ThinSlab), (2e-3, PerCrossing)] {
+        let own = SurfaceParams { surface_opacity, ..params(0.6, s, [0.25, 0.5, 1.0], 7) };
+        let sampler = MeshSampler::new(&mesh, &own, None).unwrap();
+        let objects = objects(&[&sampler]);
+        let scene = scene(&camera, &objects);
+        let mut slow = vec![0u32; 70 * 60];
+        for set in 0..20 {
+            let nearest = pbsr::reference::nearest(&scene, set);
+            slow.iter_mut().zip(&nearest).for_each(|(n, hit)| *n += u32::from(hit.is_some()));
+        }
+        let fast = all_hits(&fold(&scene, 20));
+        let differ = fast.iter().zip(&slow).filter(|(a, b)| a != b).count();
+        assert!(slow.iter().sum::<u32>() > 2000);
+        assert!(differ <= 4, "s {s}: {differ} pixels differ");
+    }
+    assert!((pbsr::reference::equation_1(0.01, 1.0, 100) - pbsr::opacity::opacity(100.0, 0.01)).abs() < 1e-12);
+    assert!((pbsr::reference::layers(&[0.5, 0.2]) - 0.6).abs() < 1e-15);
 }

@@ -1,0 +1,157 @@
+//! Particles: sampling of meshes, volumes and implicit surfaces, and the projection of kept sets at the sizes of Tanaka 2012
+//! (1024²) and of a volume of 256³ at 512² with 16 repeat levels.
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use pbsr::{
+    Appearance, BrownianParams, BrownianSampler, Ensemble, EnsembleParams, FoldParams, GridSampler, ImplicitSurface,
+    KeptSets, LineSampler, MeshSampler, MetropolisParams, MetropolisSampler, Object, Particles, Renderer, Sampler,
+    Scene, SurfaceParams, VolumeParams, pixel_area,
+};
+use rayon::prelude::*;
+use splat_core::glam::{DMat3, DVec3, Vec3};
+use splat_core::{
+    Camera, Grid, Material, Mesh, Progress, Projection, ScalarField, Shading, Similarity, TransferFunction,
+    TransferPoint,
+};
+
+/// (√(x² + y²) − 0.7)² + z² − 0.09.
+struct Torus;
+
+impl ScalarField for Torus {
+    fn value(&self, p: DVec3) -> f64 {
+        let r = (p.x * p.x + p.y * p.y).sqrt() - 0.7;
+        r * r + p.z * p.z - 0.09
+    }
+
+    fn gradient(&self, p: DVec3) -> DVec3 {
+        let k = 2.0 - 1.4 / (p.x * p.x + p.y * p.y).sqrt();
+        DVec3::new(k * p.x, k * p.y, 2.0 * p.z)
+    }
+
+    fn hessian(&self, p: DVec3) -> DMat3 {
+        let r = (p.x * p.x + p.y * p.y).sqrt();
+        let (c, s, turn) = (p.x / r, p.y / r, 2.0 - 1.4 / r);
+        let xy = (2.0 - turn) * c * s;
+        let x = DVec3::new(2.0 * c * c + turn * s * s, xy, 0.0);
+        DMat3::from_cols(x, DVec3::new(xy, 2.0 * s * s + turn * c * c, 0.0), DVec3::new(0.0, 0.0, 2.0))
+    }
+
+    fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> {
+        let d = ((p.x * p.x + p.y * p.y).sqrt() - 0.7).hypot(p.z);
+        let near = (d - radius).max(0.0);
+        Some((near * near - 0.09, (d + radius) * (d + radius) - 0.09))
+    }
+}
+
+/// A wavy sheet of 70 688 triangles.
+fn sheet() -> Mesh {
+    let n = 188u32;
+    let mut mesh = Mesh::default();
+    for k in 0..(n + 1) * (n + 1) {
+        let at = |i: u32| 2.0 * i as f32 / n as f32 - 1.0;
+        let (x, y) = (at(k % (n + 1)), at(k / (n + 1)));
+        mesh.position.push(Vec3::new(x, y, 0.2 * (9.0 * x.hypot(y)).cos()));
+        mesh.normal.push(Vec3::new(x, y, 4.0).normalize());
+    }
+    for k in (0..(n + 1) * n).filter(|k| k % (n + 1) < n) {
+        mesh.triangles.extend([[k, k + 1, k + n + 2], [k, k + n + 2, k + n + 1]]);
+    }
+    mesh
+}
+
+/// 256³ values that fall with the distance from the middle.
+fn ball() -> (Grid, TransferFunction) {
+    let n = 256usize;
+    let value = |i: usize| {
+        let p = Vec3::new((i % n) as f32, (i / n % n) as f32, (i / n / n) as f32) / n as f32 - 0.5;
+        (1.0 - 2.0 * p.length()).max(0.0)
+    };
+    let axes = DMat3::from_diagonal(DVec3::splat(2.0 / n as f64));
+    let grid = Grid { origin: DVec3::splat(-1.0), axes, dims: [n; 3], values: (0..n * n * n).map(value).collect() };
+    let point = |value, extinction| TransferPoint { value, color: [value, 0.5, 1.0 - value], extinction };
+    let points = vec![point(0.2, 0.0), point(0.4, 2.0), point(0.7, 0.5), point(1.0, 6.0)];
+    (grid, TransferFunction::new(points).expect("invariant: rising values"))
+}
+
+fn camera(n: u32) -> Camera {
+    let view = Projection::Orthographic { height: 2.0 };
+    Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y, view, [n, n]).expect("invariant: a camera")
+}
+
+/// `sets` sets, those of one chunk one after the other.
+fn sample(sampler: &dyn Sampler, sets: u64) -> usize {
+    let of_chunk = |particles: &mut Particles, c: usize| -> usize {
+        (0..sets).map(|set| sampler.chunk(set, c, particles).len()).sum()
+    };
+    (0..sampler.chunks()).into_par_iter().map_init(Particles::default, of_chunk).sum()
+}
+
+fn sampling(c: &mut Criterion) {
+    let s = pixel_area(&camera(1024), DVec3::Z);
+    let mesh = sheet();
+    let flat = Mesh { normal: Vec::new(), ..mesh.clone() };
+    let (grid, transfer) = ball();
+    let surface = |opacity| SurfaceParams { opacity, cross_section: s, ..SurfaceParams::default() };
+    let volume = VolumeParams { cross_section: s, ..VolumeParams::default() };
+    let lit = VolumeParams { normals: true, ..volume };
+    let (min, max) = (DVec3::new(-1.1, -1.1, -0.4), DVec3::new(1.1, 1.1, 0.4));
+    let torus = ImplicitSurface { field: &Torus, level: 0.0, min, max, inside: None };
+    let why = "invariant: the benchmark's scene";
+    let walk = BrownianParams::for_width(2.0);
+    let samplers: [(&str, u64, Box<dyn Sampler>); 7] = [
+        ("mesh, flat", 8, Box::new(MeshSampler::new(&flat, &surface(0.5), None).expect(why))),
+        ("mesh, smooth", 8, Box::new(MeshSampler::new(&mesh, &surface(0.5), None).expect(why))),
+        ("volume", 16, Box::new(GridSampler::new(&grid, &transfer, &volume, None).expect(why))),
+        ("volume, normals", 16, Box::new(GridSampler::new(&grid, &transfer, &lit, None).expect(why))),
+        (
+            "volume, Metropolis",
+            1,
+            Box::new(MetropolisSampler::new(&grid, &transfer, &volume, &MetropolisParams::default()).expect(why)),
+        ),
+        ("torus, lines", 2, Box::new(LineSampler::new(&torus, 32, &surface(0.1), None).expect(why))),
+        ("torus, Brownian", 2, Box::new(BrownianSampler::new(&torus, &walk, &surface(0.1)).expect(why))),
+    ];
+    let mut group = c.benchmark_group("pbsr/sample");
+    group.sample_size(10);
+    for (name, sets, sampler) in &samplers {
+        group.throughput(Throughput::Elements(sample(&**sampler, *sets) as u64));
+        group.bench_function(*name, |b| b.iter(|| sample(&**sampler, *sets)));
+    }
+    group.finish();
+}
+
+fn projection(c: &mut Criterion) {
+    let mut group = c.benchmark_group("pbsr/project");
+    group.sample_size(10);
+    let why = "invariant: the benchmark's scene";
+    let (grid, transfer) = ball();
+    let mesh = sheet();
+    for (name, size, levels) in [("volume 512, 16 levels", 512, 16), ("surface 1024, 64 levels", 1024, 64)] {
+        let camera = camera(size);
+        let s = pixel_area(&camera, DVec3::Z);
+        let kept = if size == 512 {
+            let volume = VolumeParams { cross_section: s, normals: true, ..VolumeParams::default() };
+            KeptSets::new(&GridSampler::new(&grid, &transfer, &volume, None).expect(why), 0, levels as usize)
+        } else {
+            let surface = SurfaceParams { opacity: 0.1, cross_section: s, ..SurfaceParams::default() };
+            KeptSets::new(&MeshSampler::new(&mesh, &surface, None).expect(why), 0, levels as usize)
+        };
+        let material = Material { shading: Shading::Unlit, ..Material::default() };
+        let look = Appearance { material, ..Appearance::default() };
+        let objects = [Object { sampler: &kept, transform: Similarity::default(), look }];
+        let scene = Scene { objects: &objects, lights: &[], ambient: [0.0; 3], camera: &camera, occluder: None };
+        let mut renderer = Renderer::new();
+        group.throughput(Throughput::Elements(kept.particles()));
+        group.bench_function(name, |b| {
+            b.iter(|| {
+                let mut ensemble = Ensemble::new(camera.size, &EnsembleParams::default()).expect(why);
+                renderer.fold(&scene, &mut ensemble, levels, &FoldParams::default(), &Progress::new()).expect(why);
+                ensemble
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, sampling, projection);
+criterion_main!(benches);

@@ -1,0 +1,75 @@
+//! Slow and obvious: one set on one image in f64, particle by particle; and opacities in closed form.
+
+use crate::bins::{thinning, thinning_key};
+use crate::{Particles, Scene, opacity, pixel_area};
+use splat_core::glam::DVec3;
+
+/// The nearest particle of a pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Nearest {
+    /// View depth.
+    pub depth: f64,
+    /// Index of the object.
+    pub object: usize,
+    /// Colour of the particle.
+    pub color: [f32; 3],
+}
+
+/// The nearest particle of each pixel in set `set`, rows from the top left; of equal depths the first.
+pub fn nearest(scene: &Scene<'_>, set: u64) -> Vec<Option<Nearest>> {
+    let [w, h] = scene.camera.size.map(|s| s as usize);
+    let mut image: Vec<Option<Nearest>> = vec![None; w * h];
+    let mut scratch = Particles::default();
+    for (o, object) in scene.objects.iter().enumerate() {
+        let s = object.sampler.cross_section() * object.transform.scale.powi(2);
+        for chunk in 0..object.sampler.chunks() {
+            let key = thinning_key(o as u32, set, chunk);
+            let particles = object.sampler.chunk(set, chunk, &mut scratch);
+            for i in 0..particles.len() {
+                let world = object.transform.apply(object.sampler.origin() + particles.position[i].as_dvec3());
+                let view = scene.camera.view_from_world(world);
+                let mut k = s / pixel_area(scene.camera, view);
+                let normal = object.transform.rotate(particles.normal[i].get().as_dvec3());
+                if particles.normal[i].is_per_crossing() && normal != DVec3::ZERO {
+                    let ray = if scene.camera.is_orthographic() {
+                        scene.camera.axes[2]
+                    } else {
+                        world - scene.camera.position
+                    };
+                    k *= (normal.dot(ray) / ray.length()).abs();
+                }
+                if view.z <= 0.0 || (k < 1.0 && f64::from(thinning(key, i)) >= k) {
+                    continue;
+                }
+                let scale = scene.camera.focal_px() / if scene.camera.is_orthographic() { 1.0 } else { view.z };
+                let at = [0.5 * w as f64 + view.x * scale, 0.5 * h as f64 - view.y * scale];
+                let color = particles.color[i].get();
+                for pixel in pixels(at, k, [w, h]) {
+                    let hidden = scene.occluder.is_some_and(|c| f64::from(c.depth[pixel]) <= view.z);
+                    if !hidden && image[pixel].is_none_or(|n| view.z < n.depth) {
+                        image[pixel] = Some(Nearest { depth: view.z, object: o, color });
+                    }
+                }
+            }
+        }
+    }
+    image
+}
+
+/// Pixels whose centres lie in the square of side √max(k, 1) around `at`, upper ends included.
+fn pixels(at: [f64; 2], k: f64, size: [usize; 2]) -> Vec<usize> {
+    let half = 0.5 * k.max(1.0).sqrt().min(64.0);
+    let inside = |v: usize, a: usize| v as f64 + 0.5 > at[a] - half && v as f64 + 0.5 <= at[a] + half;
+    let rows = (0..size[1]).filter(|y| inside(*y, 1));
+    rows.flat_map(|y| (0..size[0]).filter(|x| inside(*x, 0)).map(move |x| y * size[0] + x)).collect()
+}
+
+/// Opacity of layers of these opacities, one behind the other: 1 − Π(1 − α).
+pub fn layers(alphas: &[f64]) -> f64 {
+    1.0 - alphas.iter().map(|a| 1.0 - a).product::<f64>()
+}
+
+/// Tanaka 2012, Eq. 1, as printed for a facing surface: 1 − (1 − s/S)^n.
+pub fn equation_1(s: f64, area: f64, n: u32) -> f64 {
+    1.0 - (1.0 - opacity::hit_probability(s, area, 1.0)).powf(f64::from(n))
+}
