@@ -99,26 +99,25 @@ pub(crate) struct TileSums<'a> {
     pub(crate) sums: &'a mut [i64],
     pub(crate) squares: &'a mut [u64],
     pub(crate) depths: &'a mut [DepthSum],
+    pub(crate) inverse_unit: f32,
 }
 
 impl TileSums<'_> {
     /// One hit of pixel `k` of the tile.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn add(&mut self, params: &EnsembleParams, k: usize, values: &[f32], depth: f32) {
         self.hits[k] = self.hits[k].saturating_add(1);
-        let inverse = 1.0 / params.unit();
-        let light = params.light_channels();
+        let (light, other) = values.split_at(params.light_channels());
+        let (light_sums, other_sums) = self.sums[k * values.len()..].split_at_mut(light.len());
         let mut luminance = 0.0;
-        for (c, (sum, v)) in self.sums[k * values.len()..].iter_mut().zip(values).enumerate() {
-            let scaled = if c < light {
-                let v = (v * inverse).clamp(-65536.0, 65536.0);
-                luminance += v * LUMINANCE[c % 3];
-                v
-            } else {
-                *v
-            };
-            *sum = sum.saturating_add(fixed(scaled));
+        for (sums, color) in light_sums.chunks_exact_mut(3).zip(light.chunks_exact(3)) {
+            for c in 0..3 {
+                let v = (color[c] * self.inverse_unit).clamp(-65536.0, 65536.0);
+                luminance += v * LUMINANCE[c];
+                sums[c] = sums[c].saturating_add(fixed(v));
+            }
         }
+        other_sums.iter_mut().zip(other).for_each(|(sum, v)| *sum = sum.saturating_add(fixed(*v)));
         let square = &mut self.squares[k];
         *square = square.saturating_add((luminance * luminance * FRACTION) as u64);
         if let ([_, ..], Some([near, far])) = (&*self.depths, params.depth_range) {

@@ -198,7 +198,8 @@ impl<'a> LineSampler<'a> {
     fn follow(&self, line: &Line<'_>, parts: u32, found: &mut Found) {
         let (o, d) = ((line.o - self.cells.min) / self.cells.side, line.d / self.cells.side);
         let Some((enter, leave)) = clip(o, d, self.cells.dims) else { return };
-        let inverse = DVec3::select(d.cmpeq(DVec3::ZERO), DVec3::ZERO, d.recip());
+        let inverse = DVec3::select(d.cmpeq(DVec3::ZERO), DVec3::INFINITY, d.recip());
+        let ahead: [i32; 3] = std::array::from_fn(|a| i32::from(d[a] >= 0.0));
         let least = (leave - enter) * 1e-12;
         let mut t = enter;
         let mut cell = cell_at(o, d, t, self.cells.dims);
@@ -211,7 +212,7 @@ impl<'a> LineSampler<'a> {
             }
             let distance = self.cells.distance(cell);
             let more = i32::from(distance.max(1)) - 1;
-            let (mut exit, axis) = leave_cube(o, inverse, cell, more);
+            let (mut exit, axis) = leave_cube(o, inverse, ahead, cell, more);
             if exit > leave {
                 exit = leave;
             } else if exit <= t {
@@ -222,7 +223,7 @@ impl<'a> LineSampler<'a> {
                 cell = cell_at(o, d, exit, self.cells.dims);
             } else {
                 // The next cell; beyond the last one t has reached `leave`, up to rounding.
-                let next = cell[axis] + if d[axis] > 0.0 { 1 } else { -1 };
+                let next = cell[axis] + 2 * ahead[axis] - 1;
                 cell[axis] = next.clamp(0, self.cells.dims[axis] - 1);
             }
             if distance == 0 {
@@ -271,19 +272,15 @@ fn cell_at(o: DVec3, d: DVec3, t: f64, dims: [i32; 3]) -> [i32; 3] {
     })
 }
 
-/// Where, and along which axis, the line leaves the cube of 2·`more` + 1 cells around `cell`; `inverse` is 1/d, 0 where
-/// d is 0.
+/// Where, and along which axis, the line leaves the cube of 2·`more` + 1 cells around `cell`. `inverse` is 1/d, +∞ where
+/// d is 0; `ahead` is 1 for axes along which the line does not fall.
 #[inline(always)]
-fn leave_cube(o: DVec3, inverse: DVec3, cell: [i32; 3], more: i32) -> (f64, usize) {
-    let mut exit = (f64::INFINITY, 0);
-    for a in 0..3 {
-        let border = if inverse[a] > 0.0 { cell[a] + more + 1 } else { cell[a] - more };
-        let t = (f64::from(border) - o[a]) * inverse[a];
-        if inverse[a] != 0.0 && t < exit.0 {
-            exit = (t, a);
-        }
-    }
-    exit
+fn leave_cube(o: DVec3, inverse: DVec3, ahead: [i32; 3], cell: [i32; 3], more: i32) -> (f64, usize) {
+    let t = |a: usize| (f64::from(cell[a] - more + ahead[a] * (2 * more + 1)) - o[a]) * inverse[a];
+    let (x, y, z) = (t(0), t(1), t(2));
+    // Selections, not branches: which face comes next cannot be foreseen.
+    let (first, axis) = if y < x { (y, 1) } else { (x, 0) };
+    if z < first { (z, 2) } else { (first, axis) }
 }
 
 /// The piece of the line in the box, or `None`.

@@ -131,6 +131,13 @@ impl Particles {
         self.color.reserve(n);
     }
 
+    /// Appends all of another.
+    pub fn append(&mut self, other: &Self) {
+        self.position.extend_from_slice(&other.position);
+        self.normal.extend_from_slice(&other.normal);
+        self.color.extend_from_slice(&other.color);
+    }
+
     /// Appends one.
     #[inline]
     pub fn push(&mut self, position: Vec3, normal: PackedNormal, color: PackedColor) {

@@ -13,9 +13,9 @@ use crate::project::Projector;
 use crate::shade::{Appearance, LitBy, MAX_CHANNELS, Seen, Shader};
 use crate::stream::Stage;
 use crate::{Error, Sampler};
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Mat3};
 use rayon::prelude::*;
-use splat_core::{Camera, Progress, Similarity, glam, rng};
+use splat_core::{Camera, Progress, Shading, Similarity, glam, rng};
 
 /// Particles of a task, in the mean; at least one chunk.
 const TASK_PARTICLES: f64 = 16384.0;
@@ -151,7 +151,7 @@ impl Renderer {
         let sums = ensemble.hits.par_chunks_mut(AREA).zip(ensemble.sums.par_chunks_mut(AREA * n));
         let sums = sums.zip(ensemble.squares.par_chunks_mut(AREA)).zip(with).enumerate();
         sums.for_each_init(Nearest::new, |nearest, (t, (((hits, sums), squares), depths))| {
-            let mut tile = TileSums { hits, sums, squares, depths };
+            let mut tile = TileSums { hits, sums, squares, depths, inverse_unit: 1.0 / channels.unit() };
             nearest.begin(scene, &plan.tiling, t);
             for set in 0..batch {
                 nearest.collect(&self.tasks, set, batch, t);
@@ -168,7 +168,9 @@ struct Plan {
     /// (object, chunks) of each task of a set.
     ranges: Vec<(u32, std::ops::Range<usize>)>,
     batch_levels: u32,
-    view_from_world: DMat3,
+    world_from_view: DMat3,
+    /// Turn of each object's normals.
+    turns: Vec<Mat3>,
     focal: f64,
 }
 
@@ -196,7 +198,8 @@ impl Plan {
             projectors: scene.objects.iter().map(project).collect(),
             ranges: ranges(scene.objects),
             batch_levels: (budget / expected.max(1.0)).clamp(1.0, 4096.0) as u32,
-            view_from_world: DMat3::from_cols(axes[0], axes[1], axes[2]).transpose(),
+            world_from_view: DMat3::from_cols(axes[0], axes[1], axes[2]),
+            turns: scene.objects.iter().map(|o| DMat3::from_quat(o.transform.rotation).as_mat3()).collect(),
             focal: scene.camera.focal_px(),
         })
     }
@@ -298,18 +301,25 @@ impl Nearest {
     fn add(&mut self, tasks: &[Task], scene: &Scene<'_>, plan: &Plan, shader: &Shader<'_>, sums: &mut TileSums<'_>) {
         let channels = shader.channels.channels();
         let mut values = [0.0; MAX_CHANNELS];
+        // Beauty alone of what is shown as it is needs neither place nor normal.
+        let plain = channels == 3;
         for &pixel in &self.touched {
             let pixel = usize::from(pixel);
             let (task, at) = self.winner[pixel];
             let task = &tasks[task as usize];
             let record = task.record(at);
             let object = &scene.objects[task.object as usize];
-            let [wx, wy] = record.within().map(f64::from);
-            let at_px = [(self.corner[0] + pixel % TILE) as f64 + wx, (self.corner[1] + pixel / TILE) as f64 + wy];
-            let normal = object.transform.rotation.as_quat() * record.normal.get();
-            let from_eye = plan.behind_pixel(scene.camera, at_px, record.depth);
-            let seen = Seen { look: &object.look, from_eye, normal, color: record.color.get() };
-            shader.shade(&seen, &mut values);
+            if plain && object.look.material.shading == Shading::Unlit {
+                let (color, emission) = (record.color.get(), object.look.material.emission);
+                (0..3).for_each(|c| values[c] = color[c] + emission[c]);
+            } else {
+                let [wx, wy] = record.within().map(f64::from);
+                let at_px = [(self.corner[0] + pixel % TILE) as f64 + wx, (self.corner[1] + pixel / TILE) as f64 + wy];
+                let normal = plan.turns[task.object as usize] * record.normal.get();
+                let from_eye = plan.behind_pixel(scene.camera, at_px, record.depth);
+                let seen = Seen { look: &object.look, from_eye, normal, color: record.color.get() };
+                shader.shade(&seen, &mut values);
+            }
             sums.add(&shader.channels, pixel, &values[..channels], record.depth);
             self.depth[pixel] = self.limit[pixel];
             self.winner[pixel] = (NONE, 0);
@@ -325,6 +335,6 @@ impl Plan {
         let v = (0.5 * f64::from(camera.size[1]) - at_px[1]) / self.focal;
         let z = f64::from(depth);
         let view = if camera.is_orthographic() { DVec3::new(u, v, z) } else { DVec3::new(u * z, v * z, z) };
-        self.view_from_world.transpose() * view
+        self.world_from_view * view
     }
 }

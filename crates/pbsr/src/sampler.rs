@@ -1,6 +1,7 @@
 //! What every source of particles offers (Tanaka 2012, STEP 1): independent sets, in chunks, from a counter.
 
 use crate::Particles;
+use rayon::prelude::*;
 use splat_core::glam::DVec3;
 
 /// A source of statistically independent particle sets.
@@ -32,6 +33,9 @@ pub trait Sampler: Sync {
     }
 }
 
+/// Particles of a kept chunk, in the mean, unless one chunk of the sampler has more.
+const KEPT_CHUNK: f64 = 16384.0;
+
 /// Sets `first .. first + n` of another sampler, kept in memory: set r is kept set r mod n.
 ///
 /// For objects that are seen from many places, or that move: nothing is sampled again. Asking for more sets than are
@@ -45,23 +49,27 @@ pub struct KeptSets {
 }
 
 impl KeptSets {
-    /// Samples `n` ≥ 1 sets from `first` on, in parallel.
+    /// Samples `n` ≥ 1 sets from `first` on, in parallel. Small chunks are joined.
     pub fn new(sampler: &dyn Sampler, first: u64, n: usize) -> Self {
-        use rayon::prelude::*;
-        let chunks = sampler.chunks();
-        let kept = |set: u64| -> Vec<Particles> {
-            (0..chunks)
-                .into_par_iter()
-                .map(|c| {
-                    let mut scratch = Particles::default();
-                    sampler.chunk(set, c, &mut scratch).clone()
-                })
-                .collect()
+        let mut runs: Vec<(std::ops::Range<usize>, f64)> = Vec::new();
+        for c in 0..sampler.chunks() {
+            let more = sampler.expected(c);
+            match runs.last_mut() {
+                Some((run, sum)) if *sum + more <= KEPT_CHUNK => (run.end, *sum) = (c + 1, *sum + more),
+                _ => runs.push((c..c + 1, more)),
+            }
+        }
+        let one = |set: u64, run: &std::ops::Range<usize>, sum: f64| {
+            let (mut all, mut scratch) = (Particles::default(), Particles::default());
+            all.reserve((sum * 1.1) as usize + 64);
+            run.clone().for_each(|c| all.append(sampler.chunk(set, c, &mut scratch)));
+            all
         };
+        let kept = |set: u64| runs.par_iter().map(|(run, sum)| one(set, run, *sum)).collect();
         Self {
             origin: sampler.origin(),
             cross_section: sampler.cross_section(),
-            expected: (0..chunks).map(|c| sampler.expected(c)).collect(),
+            expected: runs.iter().map(|(_, sum)| *sum).collect(),
             sets: (0..n.max(1) as u64).map(|k| kept(first + k)).collect(),
         }
     }
