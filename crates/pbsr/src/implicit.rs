@@ -141,8 +141,7 @@ impl Cells {
         self.distance[self.index(c)]
     }
 
-    /// Chebyshev distances: the largest difference of coordinates is found one axis after the other, as the minimum over
-    /// a line of max(along, so far); two sweeps a line do, because distances differ by at most one between neighbours.
+    /// Chebyshev distances to the active cells, by two sweeps over each cell's earlier neighbours.
     fn spread(&mut self) {
         let [nx, ny, nz] = self.dims;
         // Sweeps over all 13 earlier neighbours, forwards and backwards, are exact for this metric.

@@ -18,7 +18,7 @@ pub trait Sampler: Sync {
     /// Elsewhere the projection takes a share of the particles, or widens them, so that the opacity is the same.
     fn cross_section(&self) -> f64;
 
-    /// Number of chunks of a set; at least their work is even.
+    /// Number of chunks of a set.
     fn chunks(&self) -> usize;
 
     /// Mean number of particles of a chunk.
