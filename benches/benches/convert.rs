@@ -8,7 +8,7 @@ use convert::{
 };
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::{DMat3, DVec3, Vec3};
-use splat_core::{Cloud, Grid, Mesh, TransferFunction, TransferPoint};
+use splat_core::{Cloud, Grid, Mesh, TransferFunction, TransferPoint, rng};
 use std::path::Path;
 
 fn asset(name: &str) -> Loaded {
@@ -118,9 +118,40 @@ fn fields(c: &mut Criterion) {
     group.finish();
 }
 
+/// Time from one to sixteen million of each: it should grow with the number, at most 2.3 times a doubling.
+fn growth(c: &mut Criterion) {
+    let mut group = c.benchmark_group("growth");
+    let mesh = bunny();
+    for millions in [1u64, 2, 4, 8, 16] {
+        let n = millions << 20;
+        group.throughput(Throughput::Elements(n));
+        let params = MeshParams { density: Density::Splats(n), ..MeshParams::default() };
+        let mut cloud = Cloud::default();
+        let Ok(_) = mesh_to_points_into(&mesh, &params, &mut cloud) else { continue };
+        group.bench_function(BenchmarkId::new("mesh", millions), |b| {
+            b.iter(|| mesh_to_points_into(&mesh, &params, &mut cloud));
+        });
+        let hills = hills(n);
+        group.bench_function(BenchmarkId::new("raw points", millions), |b| {
+            b.iter(|| raw_to_surfels(&hills, &SurfelParams::default()));
+        });
+    }
+    group.finish();
+}
+
+/// `n` points scattered over rolling ground of one point a unit².
+fn hills(n: u64) -> RawPoints {
+    let side = (n as f32).sqrt();
+    let point = |i: u64| {
+        let (x, z) = (side * rng::unit_f32(1, 0, i, 0), side * rng::unit_f32(1, 0, i, 1));
+        Vec3::new(x, 9.0 * (x * 0.02).sin() * (z * 0.03).cos(), z)
+    };
+    RawPoints { position: (0..n).map(point).collect(), ..RawPoints::default() }
+}
+
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(10);
-    targets = meshes, volumes, points, fields
+    targets = meshes, volumes, points, fields, growth
 }
 criterion_main!(benches);

@@ -90,7 +90,12 @@ pub fn bytes(name: &str, content: &[u8], limits: &ReadLimits) -> Result<Loaded, 
 #[cfg_attr(not(feature = "nrrd"), allow(unused_variables, reason = "no other format has detached headers"))]
 fn parse(path: &Path, content: Vec<u8>, place: Option<&Path>, limits: &ReadLimits) -> Result<Loaded, ReadError> {
     let content = if content.starts_with(&[0x1f, 0x8b]) { input::gunzip(&content, limits)? } else { content };
-    match format_of(path, &content) {
+    let format = format_of(path, &content);
+    if content.is_empty() && matches!(format, Some(Format::Obj | Format::Xyz)) {
+        let hint = "the file is truncated, or was never written";
+        return Err(ReadError::input(Place::Byte(0), "vertices or points", "an empty file", hint));
+    }
+    match format {
         #[cfg(feature = "ply")]
         Some(Format::Ply) => ply::read(&content, limits),
         #[cfg(feature = "stl")]
@@ -146,6 +151,20 @@ fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
     if content.get(344..347).is_some_and(|magic| magic == b"n+1" || magic == b"ni1") {
         return Some(Format::Nifti);
     }
+    by_name(path).or_else(|| is_stl_text(content).then_some(Format::Stl))
+}
+
+#[cfg(feature = "stl")]
+fn is_stl_text(content: &[u8]) -> bool {
+    stl::is_text(content)
+}
+
+#[cfg(not(feature = "stl"))]
+fn is_stl_text(_content: &[u8]) -> bool {
+    false
+}
+
+fn by_name(path: &Path) -> Option<Format> {
     let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
     let name = name.strip_suffix(".gz").unwrap_or(&name);
     match name.rsplit_once('.')?.1 {

@@ -22,7 +22,7 @@ pub(super) fn read(content: &[u8], limits: &ReadLimits) -> Result<Mesh, ReadErro
     if is_binary {
         return binary(content, limits);
     }
-    if content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(content).trim_ascii_start().starts_with(b"solid") {
+    if is_text(content) {
         return text(content, limits);
     }
     let expected = match announced {
@@ -31,6 +31,12 @@ pub(super) fn read(content: &[u8], limits: &ReadLimits) -> Result<Mesh, ReadErro
     };
     let found = format!("{} bytes", content.len());
     Err(ReadError::input(Place::Byte(80), expected, found, "the file is truncated, damaged or not STL"))
+}
+
+/// Whether a file begins like a text.
+pub(super) fn is_text(content: &[u8]) -> bool {
+    let content = content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(content).trim_ascii_start();
+    content.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
 }
 
 fn binary(content: &[u8], limits: &ReadLimits) -> Result<Mesh, ReadError> {
