@@ -3,7 +3,7 @@
 //! `cargo run --release -p convert --example implicit`. Times are the least of several runs on one thread.
 
 use convert::read::{self, Loaded, ReadLimits};
-use convert::{GridField, Inside, Interpolation, MpuParams, RawPoints, points_to_field};
+use convert::{GridField, Inside, Interpolation, MpuParams, RawPoints, isosurface_to_mesh, points_to_field};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::{Grid, Mesh, ScalarField, rng};
 use std::hint::black_box;
@@ -29,6 +29,12 @@ fn gyroid(n: usize) -> Grid {
     let at = |i: usize| DVec3::from_array([i % n, i / n % n, i / n / n].map(|c| c as f64)) * (12.0 / n as f64);
     let values = (0..n * n * n).map(|i| wave(at(i)) as f32).collect();
     Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [n; 3], values }
+}
+
+fn ball(n: usize) -> Grid {
+    let grid = gyroid(n);
+    let at = |i: usize| DVec3::from_array([i % n, i / n % n, i / n / n].map(|c| c as f64)) / n as f64 - 0.5;
+    Grid { values: (0..n * n * n).map(|i| at(i).length() as f32).collect(), ..grid }
 }
 
 /// Places in a box, or near given ones.
@@ -69,6 +75,20 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let field = GridField::new(grid.clone(), interpolation, 0.1, Inside::Below)?;
         println!("{interpolation:?} built in {:.0} ms", 1e3 * (cpu() - start));
         rates(&format!("{interpolation:?}, 256³"), &field, &places(field.bounds(), 200_000), &[0.01, 0.5, 4.0, 40.0]);
+    }
+    for (name, grid, isovalue) in [("gyroid", &*grid, 0.1), ("ball", &ball(256), 0.4)] {
+        let mut triangles = 0;
+        let all = least(|| {
+            triangles = isosurface_to_mesh(grid, isovalue, Inside::Below).map_or(0, |m| m.triangles.len());
+        });
+        let none = least(|| {
+            black_box(isosurface_to_mesh(grid, 100.0, Inside::Below).is_ok());
+        });
+        println!(
+            "marching cubes, {name} 256³: {:.1} ms, {triangles} triangles; no surface {:.1} ms",
+            1e3 * all,
+            1e3 * none
+        );
     }
     let mesh = bunny()?;
     let normal = convert::vertex_normals(&mesh);

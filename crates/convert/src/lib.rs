@@ -32,6 +32,7 @@ mod error;
 mod expression;
 mod field_points;
 mod grid_field;
+mod marching_cubes;
 mod mesh_points;
 #[cfg(feature = "surfels")]
 mod mpu;
@@ -86,8 +87,9 @@ pub use field_points::{
     DensityParams, density_to_points, density_to_points_with_progress, field_to_grid, field_to_mesh, surface_to_points,
     surface_to_points_with_progress,
 };
-pub use mesh_points::{MeshParams, MeshReport, mesh_to_points, mesh_to_points_into, mesh_to_points_with_progress};
 pub use grid_field::{GridField, Inside, Interpolation};
+pub use marching_cubes::isosurface_to_mesh;
+pub use mesh_points::{MeshParams, MeshReport, mesh_to_points, mesh_to_points_into, mesh_to_points_with_progress};
 #[cfg(feature = "surfels")]
 pub use mpu::{MpuField, MpuParams, MpuReport, points_to_field};
 #[cfg(feature = "surfels")]

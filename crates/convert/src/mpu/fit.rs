@@ -195,10 +195,11 @@ impl Ball {
         if !over || few || last {
             done = offer(self.fit(Shape::smooth(self.height(&all, true)), enough));
         }
-        if !done && over {
-            if let Some(q) = self.quadric(tree, half, &mut scratch.nearest) {
-                done = offer(self.fit(Shape::smooth(q), enough));
-            }
+        if !done
+            && over
+            && let Some(q) = self.quadric(tree, half, &mut scratch.nearest)
+        {
+            done = offer(self.fit(Shape::smooth(q), enough));
         }
         if !done && few && asked.sharp {
             sharp::shapes(self).into_iter().for_each(|shape| {
