@@ -16,6 +16,7 @@
 #![forbid(unsafe_code)]
 
 mod columns;
+mod combine;
 mod convert_error;
 pub mod cost;
 #[cfg(any(
@@ -70,6 +71,7 @@ mod tangent_plane;
 mod vertex_normals;
 mod volume_points;
 
+pub use combine::{Clip, ClippedField, CombinedField, SharedField};
 pub use convert_error::ConvertError;
 #[cfg(any(
     feature = "ply",
