@@ -1,6 +1,7 @@
 //! Implicit surfaces of a volume and of scattered points: what they cost.
 //!
-//! `cargo run --release -p convert --example implicit`. Times are the least of several runs on one thread.
+//! `cargo run --release -p convert --example implicit`. Times are the least of several runs on one
+//! thread.
 
 use convert::read::{self, Loaded, ReadLimits};
 use convert::{GridField, Inside, Interpolation, MpuParams, RawPoints, isosurface_to_mesh, points_to_field};
@@ -8,18 +9,14 @@ use splat_core::glam::{DMat3, DVec3};
 use splat_core::{Grid, Mesh, ScalarField, rng};
 use std::hint::black_box;
 use std::path::Path;
-
-fn cpu() -> f64 {
-    let s = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap();
-    s.split(' ').next().unwrap().parse::<f64>().unwrap() * 1e-9
-}
+use std::time::Instant;
 
 /// Least seconds of five runs.
 fn least(mut run: impl FnMut()) -> f64 {
     let once = |()| {
-        let start = cpu();
+        let start = Instant::now();
         run();
-        cpu() - start
+        start.elapsed().as_secs_f64()
     };
     [(); 5].map(once).into_iter().fold(f64::INFINITY, f64::min)
 }
@@ -71,9 +68,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global()?;
     let grid = std::sync::Arc::new(gyroid(256));
     for interpolation in [Interpolation::Trilinear, Interpolation::CatmullRom] {
-        let start = cpu();
+        let start = Instant::now();
         let field = GridField::new(grid.clone(), interpolation, 0.1, Inside::Below)?;
-        println!("{interpolation:?} built in {:.0} ms", 1e3 * (cpu() - start));
+        println!("{interpolation:?} built in {:.0} ms", 1e3 * start.elapsed().as_secs_f64());
         rates(&format!("{interpolation:?}, 256³"), &field, &places(field.bounds(), 200_000), &[0.01, 0.5, 4.0, 40.0]);
     }
     for (name, grid, isovalue) in [("gyroid", &*grid, 0.1), ("ball", &ball(256), 0.4)] {
@@ -95,9 +92,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let points = RawPoints { origin: mesh.origin, position: mesh.position, normal, ..RawPoints::default() };
     for tolerance in [1e-3, 3e-4, 1e-4] {
         let params = MpuParams { tolerance, ..MpuParams::default() };
-        let start = cpu();
+        let start = Instant::now();
         let (field, report) = points_to_field(&points, &params)?;
-        println!("bunny within {tolerance}: {:.0} ms, {report:?}", 1e3 * (cpu() - start));
+        println!("bunny within {tolerance}: {:.0} ms, {report:?}", 1e3 * start.elapsed().as_secs_f64());
         let mut distance: Vec<f64> = Vec::new();
         for i in 0..points.len() {
             let (v, g) = field.value_gradient(points.exact_position(i));

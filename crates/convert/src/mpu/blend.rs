@@ -122,17 +122,18 @@ impl Octree {
         for &id in self.listed(leaf) {
             let support = &self.supports[id as usize];
             let (y, reach) = ((p - support.center) * support.inverse, radius * support.inverse);
-            let r = y.length();
-            if r - reach >= 1.0 {
+            let r2 = y.length_squared();
+            if r2 >= (1.0 + reach) * (1.0 + reach) {
                 continue;
             }
+            let r = r2.sqrt();
             let (pieces, joint) = self.function(id);
             let (range, slope) = shape_over_ball(pieces, joint, y, reach);
             hull = union(hull, &range);
             steepest_shape = steepest_shape.max(slope * support.inverse);
             slope_total += steepest(r - reach, r + reach) * support.inverse;
             least_total += weight((r + reach) * (r + reach));
-            let w = weight(y.length_squared());
+            let w = weight(r2);
             sum += w * active_piece(pieces, joint, y).value(y);
             total += w;
         }
