@@ -118,21 +118,21 @@ pub(crate) struct Casters<'a> {
 
 impl Casters<'_> {
     /// Whether splat `i` throws a shadow at all.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn casts(&self, i: usize) -> bool {
         let object = self.objects.get(self.cloud.object[i] as usize);
         self.cloud.cross_section[i] > 0.0 && object.is_none_or(|o| o.casts_shadow)
     }
 
     /// The kernel of splat `i`; an unknown footprint id means the first.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn kernel(&self, i: usize) -> Kernel {
         let id = self.cloud.footprint[i] as usize;
         self.kernels[if id < self.kernels.len() { id } else { 0 }]
     }
 
     /// How the material of splat `i` absorbs; an unknown id means the default.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn extinction(&self, i: usize) -> Extinction {
         self.extinctions.get(self.cloud.material[i] as usize).copied().unwrap_or_default()
     }
@@ -148,7 +148,7 @@ impl Casters<'_> {
     }
 
     /// Splat `i` in the light's frame.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn get(&self, i: usize, frame: &Frame, parallel: bool) -> Caster {
         let cloud = self.cloud;
         let extinction = self.extinction(i);
@@ -177,6 +177,7 @@ impl Casters<'_> {
     }
 
     /// Gunjee 2007, Eq. 6: the size l is the splat's radius, the opacity c that of its centre or of one crossing.
+    #[inline(never)]
     fn paper_absorbance(&self, i: usize) -> f32 {
         let kernel = self.kernel(i);
         let [radius, k] = [self.cloud.radius[i], self.cloud.cross_section[i]].map(f64::from);

@@ -18,9 +18,9 @@
 
 use crate::caster::Caster;
 use crate::mapping::{Mapping, Ray};
-use crate::overlap::{Ellipse, Spread};
+use crate::overlap::{Ellipse, Sink, Spread};
 use crate::sampling::{NEAR, Sampled};
-use crate::shares::BLOCK;
+use crate::shares::{BLOCK, between};
 use crate::table::Entries;
 use glam::{Vec2, Vec3};
 use splat_core::{SplatKind, glam};
@@ -43,7 +43,7 @@ const FINE: u32 = 4;
 /// How far `x` has gone through a band, from 0 to 1.
 #[inline(always)]
 fn through(band: Band, x: f32) -> f32 {
-    ((x - band[0]) / (band[1] - band[0])).clamp(0.0, 1.0)
+    between((x - band[0]) * (1.0 / (band[1] - band[0])), 0.0, 1.0)
 }
 
 /// Distance along `ray` to the plane through `p` with normal `n`; `None` where the ray never meets it.
@@ -118,21 +118,8 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
             self.overlap_creased(caster, ellipse, &crease, total);
             return;
         }
-        let [columns, rows] = self.mapping.size().map(|n| n as i32);
         let is_plain = caster.kind == SplatKind::Medium && caster.paper_absorbance.is_none();
-        ellipse.overlap(|row, first, used, shares| {
-            let inside = (0..rows).contains(&row) && first >= 0 && first + BLOCK as i32 <= columns;
-            if inside && is_plain {
-                self.put_row(caster, total, row as u32, first as u32, used, shares);
-                return;
-            }
-            for (column, share) in (first..).zip(&shares[..used]) {
-                if let Some(cell) = self.mapping.wrap(column, row) {
-                    let absorbance = total * share * self.inverse_measure(cell);
-                    self.push(caster, cell, absorbance, caster.distance);
-                }
-            }
-        });
+        ellipse.overlap(&mut Put { deposit: self, caster, total, is_plain });
     }
 
     /// Entries of a medium in neighbouring cells of a row, at its own distance.
@@ -143,13 +130,16 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
         let own: [f32; BLOCK] =
             std::array::from_fn(|k| total * shares[k] * self.mapping.inverse_measure(first + k as u32, row));
         let media = &mut self.scratch.media;
-        let hidden = |k: usize| self.opaque.get(cell as usize + k).is_some_and(|d| *d < caster.distance);
-        if self.opaque.is_empty() || !(0..used).any(hidden) {
+        let window = self.opaque.get(cell as usize..).and_then(|from| from.first_chunk::<BLOCK>());
+        let is_clear = window.is_some_and(|w| w.iter().fold(true, |all, d| all & (*d >= caster.distance)));
+        if is_clear || self.opaque.is_empty() {
             media.extend(cell, caster.distance, used, &own, &caster.extinction.rgb);
             return;
         }
-        for k in (0..used).filter(|&k| !hidden(k)) {
-            media.push(cell + k as u32, caster.distance, own[k], &caster.extinction.rgb);
+        for k in 0..used {
+            if self.opaque.get(cell as usize + k).is_none_or(|d| *d >= caster.distance) {
+                media.push(cell + k as u32, caster.distance, own[k], &caster.extinction.rgb);
+            }
         }
     }
 
@@ -245,4 +235,39 @@ fn angle_gain(caster: &Caster, parallel: bool) -> f32 {
         (caster.position.dot(caster.normal) / caster.position.length()).abs()
     };
     cosine * caster.extinction.opacity.optical_depth_factor(cosine)
+}
+
+/// Where the closed form goes.
+struct Put<'a, 'b, M: Mapping, const C: usize> {
+    deposit: &'a mut Deposit<'b, M, C>,
+    caster: &'a Caster,
+    total: f32,
+    /// Whether all entries lie at the caster's distance.
+    is_plain: bool,
+}
+
+impl<M: Mapping, const C: usize> Sink for Put<'_, '_, M, C> {
+    #[inline(always)]
+    fn row(&mut self, row: i32, first: i32, used: usize, shares: &[f32; BLOCK]) {
+        let mapping = self.deposit.mapping;
+        let [columns, rows] = mapping.size().map(|n| n as i32);
+        let is_inside = (0..rows).contains(&row) && first >= 0 && first + BLOCK as i32 <= columns;
+        if is_inside && self.is_plain {
+            self.deposit.put_row(self.caster, self.total, row as u32, first as u32, used, shares);
+        } else {
+            self.each(row, first, &shares[..used]);
+        }
+    }
+}
+
+impl<M: Mapping, const C: usize> Put<'_, '_, M, C> {
+    #[inline(never)]
+    fn each(&mut self, row: i32, first: i32, shares: &[f32]) {
+        for (column, share) in (first..).zip(shares) {
+            if let Some(cell) = self.deposit.mapping.wrap(column, row) {
+                let absorbance = self.total * share * self.deposit.inverse_measure(cell);
+                self.deposit.push(self.caster, cell, absorbance, self.caster.distance);
+            }
+        }
+    }
 }

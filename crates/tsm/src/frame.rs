@@ -25,31 +25,31 @@ impl Frame {
     }
 
     /// Position in the frame.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn position(&self, offset: Vec3) -> Vec3 {
         self.rotation * ((offset.as_dvec3() - self.origin) * self.unit).as_vec3()
     }
 
     /// Direction in the frame.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn turn(&self, direction: Vec3) -> Vec3 {
         self.rotation * direction
     }
 
     /// A displacement in the frame.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn displacement(&self, d: Vec3) -> Vec3 {
         self.rotation * (d.as_dvec3() * self.unit).as_vec3()
     }
 
     /// A length in the frame.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn length(&self, world: f32) -> f32 {
         (f64::from(world) * self.unit) as f32
     }
 
     /// An area in the frame.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn area(&self, world: f32) -> f32 {
         (f64::from(world) * self.unit * self.unit) as f32
     }

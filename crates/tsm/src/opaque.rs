@@ -29,6 +29,7 @@ impl OpaqueDepth {
     }
 
     /// Enters one disc.
+    #[inline(always)]
     pub(crate) fn add<M: Mapping>(&self, mapping: &M, caster: &Caster) {
         let [columns, rows] = mapping.size().map(|n| n as i32);
         if !mapping.is_parallel() && caster.radius > NEAR * caster.distance {
@@ -57,7 +58,7 @@ impl OpaqueDepth {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn meet<M: Mapping>(&self, mapping: &M, caster: &Caster, cell: u32) {
         let ray = mapping.cell_ray(cell);
         let t = (caster.position - ray.base).dot(caster.normal) / ray.direction.dot(caster.normal);

@@ -65,9 +65,7 @@ impl Spread {
 
     /// The ellipse under a linear map of the table, given by its rows.
     fn mapped(self, [a, b]: [Vec2; 2]) -> Self {
-        let product = |a: Vec2, b: Vec2| {
-            a.x * b.x * self.uu + (a.x * b.y + a.y * b.x) * self.uv + a.y * b.y * self.vv
-        };
+        let product = |a: Vec2, b: Vec2| a.x * b.x * self.uu + (a.x * b.y + a.y * b.x) * self.uv + a.y * b.y * self.vv;
         Self { uu: product(a, a), vv: product(b, b), uv: product(a, b) }
     }
 }
@@ -83,10 +81,9 @@ pub(crate) struct Ellipse {
 }
 
 impl Ellipse {
-    /// Calls `row` with the row, the first column and the shares of `BLOCK` columns, of which the number of used ones
-    /// follows.
+    /// Gives all rows to `sink`.
     #[inline(always)]
-    pub(crate) fn overlap(&self, mut row: impl FnMut(i32, i32, usize, &[f32; BLOCK])) {
+    pub(crate) fn overlap(&self, sink: &mut impl Sink) {
         let Spread { uu, vv, uv } = self.spread;
         let square = (HALF_WIDTH * self.deviation) * (HALF_WIDTH * self.deviation);
         let half_v = (vv * square).sqrt().max(LEAST_HALF);
@@ -99,45 +96,57 @@ impl Ellipse {
         let rows = Axis::new(self.at.y, half_v);
         let mut columns = Axis::new(self.at.x, half_u);
         let mut block = columns.shares(columns.first);
-        for j in rows.first..=rows.last {
-            let (share, centre) = rows.part(j);
-            if slant != 0.0 {
-                columns = columns.moved(self.at.x + slant * (centre - self.at.y));
-                block = columns.shares(columns.first);
-            }
-            let mut first = columns.first;
-            loop {
-                let used = (columns.last - first + 1).min(BLOCK as i32);
-                row(j, first, used as usize, &block.map(|s| s * share));
-                first += BLOCK as i32;
-                if first > columns.last {
-                    break;
+        let mut begin = rows.first;
+        while begin <= rows.last {
+            let heights = rows.shares(begin);
+            let centres = if slant == 0.0 { [0.0; BLOCK] } else { rows.centres(begin, &heights) };
+            let count = (rows.last - begin + 1).min(BLOCK as i32) as usize;
+            for ((j, height), centre) in (begin..).zip(&heights[..count]).zip(&centres) {
+                if slant != 0.0 {
+                    columns = columns.moved(self.at.x + slant * centre);
+                    block = columns.shares(columns.first);
                 }
-                block = columns.shares(first);
+                let used = columns.last - columns.first + 1;
+                sink.row(j, columns.first, (used as usize).min(BLOCK), &block.map(|s| s * height));
+                for first in (columns.first..=columns.last).skip(BLOCK).step_by(BLOCK) {
+                    let used = (columns.last - first + 1) as usize;
+                    sink.row(j, first, used.min(BLOCK), &columns.shares(first).map(|s| s * height));
+                }
             }
-            if columns.last - columns.first >= BLOCK as i32 {
-                block = columns.shares(columns.first);
-            }
+            begin += BLOCK as i32;
         }
     }
 
-    /// Shares of cells, given by column and row, on both sides of an edge between octants.
+    /// Gives the cells on both sides of an edge between octants to `cell`, by column, row and share.
     pub(crate) fn overlap_creased(&self, crease: &Crease, mut cell: impl FnMut(i32, i32, f32)) {
-        let mut side = |ellipse: &Self, sign: f32| {
-            ellipse.overlap(|row, first, used, shares| {
-                for (column, share) in (first..).zip(&shares[..used]) {
-                    let part = match sign * crease.side(column, row) {
-                        s if s > 0.0 => 1.0,
-                        s if s < 0.0 => continue,
-                        _ => 0.5,
-                    };
-                    if *share > 0.0 {
-                        cell(column, row, part * share);
-                    }
-                }
-            });
-        };
-        side(self, 1.0);
-        side(&Self { at: crease.at, spread: self.spread.mapped(crease.jacobian), ..*self }, -1.0);
+        let cell: &mut dyn FnMut(i32, i32, f32) = &mut cell;
+        self.overlap(&mut OneSide { crease, is_near: true, cell });
+        let far = Self { at: crease.at, spread: self.spread.mapped(crease.jacobian), ..*self };
+        far.overlap(&mut OneSide { crease, is_near: false, cell });
+    }
+}
+
+/// Takes shares row by row.
+pub(crate) trait Sink {
+    /// Shares of `BLOCK` columns from `first` on, of which `used` ≤ `BLOCK` may differ from 0.
+    fn row(&mut self, row: i32, first: i32, used: usize, shares: &[f32; BLOCK]);
+}
+
+/// Keeps the cells on one side of an edge.
+struct OneSide<'a> {
+    crease: &'a Crease,
+    is_near: bool,
+    cell: &'a mut dyn FnMut(i32, i32, f32),
+}
+
+impl Sink for OneSide<'_> {
+    fn row(&mut self, row: i32, first: i32, used: usize, shares: &[f32; BLOCK]) {
+        for (column, share) in (first..).zip(&shares[..used]) {
+            let near = self.crease.near(column, row);
+            let part = if self.is_near { near } else { 1.0 - near };
+            if part * share > 0.0 {
+                (self.cell)(column, row, part * share);
+            }
+        }
     }
 }

@@ -81,13 +81,7 @@ impl Sampled {
 }
 
 /// Mean weight of a cell, the area of the footprint that it covers, and the distance of the entry.
-fn sample_cell<M: Mapping>(
-    mapping: &M,
-    caster: &Caster,
-    cell: u32,
-    samples: u32,
-    near: bool,
-) -> (f32, f32, f32) {
+fn sample_cell<M: Mapping>(mapping: &M, caster: &Caster, cell: u32, samples: u32, near: bool) -> (f32, f32, f32) {
     let parallel = mapping.is_parallel();
     let [columns, _] = mapping.size();
     let inverse_measure = mapping.inverse_measure(cell % columns, cell / columns);

@@ -180,9 +180,7 @@ fn opaque_depths<M: Mapping>(casters: &Casters<'_>, survey: &Survey, plan: &Plan
     let cloud = casters.cloud;
     (0..cloud.len().div_ceil(CHUNK)).into_par_iter().for_each(|c| {
         let chunk = c * CHUNK..cloud.len().min((c + 1) * CHUNK);
-        for i in chunk.filter(|&i| cloud.kind[i] == SplatKind::Opaque && casters.casts(i)) {
-            depth.add(mapping, &casters.get(i, &plan.frame, mapping.is_parallel()));
-        }
+        pulp::Arch::new().dispatch(OpaqueChunk { casters, plan, mapping, depth: &depth, chunk });
     });
     depth.into_distances()
 }
@@ -206,13 +204,39 @@ fn deposit_all<M: Mapping, const C: usize>(
             progress.tick(chunk.len() as u64)?;
             scratch.media.clear();
             scratch.surfaces.clear();
-            pulp::Arch::new().dispatch(FillChunk { casters, plan, deposit: Deposit { mapping, opaque, scratch }, chunk });
+            pulp::Arch::new().dispatch(FillChunk {
+                casters,
+                plan,
+                deposit: Deposit { mapping, opaque, scratch },
+                chunk,
+            });
             Ok((Parted::new(&scratch.media, ranges), Parted::new(&scratch.surfaces, ranges)))
         })
         .collect::<Result<_, Error>>()?;
     let (media, surfaces): (Vec<_>, Vec<_>) = chunks.into_iter().unzip();
     let limit = casters.params.absorbance_limit();
     Ok(Matter { media: lists(&media, ranges, limit, casters)?, surfaces: lists(&surfaces, ranges, limit, casters)? })
+}
+
+/// Opaque discs of one chunk of splats, in the form that [`pulp`] compiles once per instruction set.
+struct OpaqueChunk<'a, M: Mapping> {
+    casters: &'a Casters<'a>,
+    plan: &'a Plan,
+    mapping: &'a M,
+    depth: &'a OpaqueDepth,
+    chunk: Range<usize>,
+}
+
+impl<M: Mapping> pulp::NullaryFnOnce for OpaqueChunk<'_, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let casters = self.casters;
+        for i in self.chunk.filter(|&i| casters.cloud.kind[i] == SplatKind::Opaque && casters.casts(i)) {
+            self.depth.add(self.mapping, &casters.get(i, &self.plan.frame, self.mapping.is_parallel()));
+        }
+    }
 }
 
 /// Deposits of one chunk of splats, in the form that [`pulp`] compiles once per instruction set.

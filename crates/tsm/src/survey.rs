@@ -100,6 +100,10 @@ pub(crate) struct Appearance {
 }
 
 const BINS: usize = 1024;
+/// Clouds of this size and more are counted by a sample; their window is that of all.
+const MANY: usize = 1 << 18;
+/// One splat in so many is counted then.
+const SAMPLE: usize = 8;
 pub(crate) const SECTORS: usize = 1024;
 
 /// How a second look measures apparent size.
@@ -140,14 +144,15 @@ impl Appearance {
     pub(crate) fn new(casters: &Casters<'_>, frame: &Frame, apparent: Apparent) -> Self {
         let sectors = apparent == Apparent::AngleAndSectors;
         let n = casters.cloud.len();
-        // Few large parts: each carries two histograms.
+        let every = if n < MANY { 1 } else { SAMPLE };
+        // Few large parts: each carries three histograms.
         let part = CHUNK.max(n.div_ceil(64));
         let parts: Vec<Self> = (0..n.div_ceil(part.max(1)))
             .into_par_iter()
             .map(|c| {
                 let mut look = Self::empty(sectors);
                 for i in (c * part..n.min((c + 1) * part)).filter(|&i| casters.casts(i)) {
-                    look.add(casters, i, frame, apparent);
+                    look.add(casters, i, frame, apparent, every);
                 }
                 look
             })
@@ -155,7 +160,7 @@ impl Appearance {
         parts.into_iter().fold(Self::empty(sectors), Self::join)
     }
 
-    fn add(&mut self, casters: &Casters<'_>, i: usize, frame: &Frame, apparent: Apparent) {
+    fn add(&mut self, casters: &Casters<'_>, i: usize, frame: &Frame, apparent: Apparent, every: usize) {
         let cloud = casters.cloud;
         let p = frame.position(cloud.position[i]);
         let far = match apparent {
@@ -163,24 +168,32 @@ impl Appearance {
             Apparent::Tangent => p.z,
             Apparent::Length => 1.0,
         };
-        let radius = frame.length(casters.shadow_radius(i).max(cloud.tangent_of(i).length()));
         if far <= 0.0 {
             return;
         }
-        let apparent_radius = radius / far;
-        let spacing = if cloud.kind[i] == SplatKind::Opaque {
-            self.disc[bin(apparent_radius)] += 1;
-            frame.length(cloud.cross_section[i].sqrt()) / far
-        } else {
-            self.radius[bin(apparent_radius)] += 1;
-            frame.length(cloud.radius[i]) / (casters.kernel(i).cutoff * 0.8 * far)
-        };
-        self.spacing[bin(spacing)] += 1;
+        let tangent = cloud.tangent.get(i).map_or(0.0, |t| t.length());
+        let radius = frame.length(casters.shadow_radius(i).max(tangent));
+        if i.is_multiple_of(every) {
+            self.count(casters, i, [frame.length(1.0) / far, radius / far], every as u64);
+        }
         if matches!(apparent, Apparent::Tangent | Apparent::Length) {
             self.widen_window(p, radius, apparent);
         } else {
-            self.widen_angles(p, apparent_radius);
+            self.widen_angles(p, radius / far);
         }
+    }
+
+    /// Counts a splat, given the apparent size of a world unit and of its radius, for `every`.
+    fn count(&mut self, casters: &Casters<'_>, i: usize, [unit, radius]: [f32; 2], every: u64) {
+        let cloud = casters.cloud;
+        let spacing = if cloud.kind[i] == SplatKind::Opaque {
+            self.disc[bin(radius)] += every;
+            cloud.cross_section[i].sqrt() * unit
+        } else {
+            self.radius[bin(radius)] += every;
+            cloud.radius[i] / (casters.kernel(i).cutoff * 0.8) * unit
+        };
+        self.spacing[bin(spacing)] += every;
     }
 
     fn widen_window(&mut self, p: Vec3, radius: f32, apparent: Apparent) {

@@ -44,7 +44,7 @@ impl<const C: usize> Entries<C> {
         self.grow();
         let i = self.len;
         self.cell[i] = cell;
-        self.distance[i] = distance.max(f32::MIN_POSITIVE);
+        self.distance[i] = distance;
         self.own[i] = std::array::from_fn(|c| own * rgb[c]);
         self.len += 1;
     }
@@ -56,7 +56,7 @@ impl<const C: usize> Entries<C> {
         // Whole blocks, without a loop: what is not used is written over.
         let range = self.len..self.len + BLOCK;
         self.cell[range.clone()].copy_from_slice(&std::array::from_fn::<_, BLOCK, _>(|k| cell + k as u32));
-        self.distance[range.clone()].copy_from_slice(&[distance.max(f32::MIN_POSITIVE); BLOCK]);
+        self.distance[range.clone()].copy_from_slice(&[distance; BLOCK]);
         let own: [[f32; C]; BLOCK] = own.map(|a| std::array::from_fn(|c| a * rgb[c]));
         self.own[range].copy_from_slice(&own);
         self.len += used;
@@ -231,7 +231,7 @@ impl<const C: usize> Task<'_, C> {
             let entries = part.cell[range.clone()].iter().zip(&part.distance[range.clone()]).zip(&part.own[range]);
             for ((c, d), a) in entries {
                 let slot = &mut self.span[(c - base) as usize][0];
-                key[*slot as usize] = u64::from(d.to_bits()) << 32 | u64::from(*slot);
+                key[*slot as usize] = u64::from(d.max(f32::MIN_POSITIVE).to_bits()) << 32 | u64::from(*slot);
                 own[*slot as usize] = *a;
                 *slot += 1;
             }
@@ -359,7 +359,11 @@ mod tests {
                 entries.push(0, 1.0 + i as f32, 2.0 / n as f32, &[1.0; 3]);
             }
             entries.push(0, 1e6, 1.0, &[1.0; 3]);
-            assert_eq!(build(&entries, 1, 2.0).list(0).distance.len() as u32, n, "{n} parts of 2.0 reach the limit of 2.0");
+            assert_eq!(
+                build(&entries, 1, 2.0).list(0).distance.len() as u32,
+                n,
+                "{n} parts of 2.0 reach the limit of 2.0"
+            );
         }
     }
 

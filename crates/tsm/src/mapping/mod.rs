@@ -94,14 +94,21 @@ pub struct Crease {
     pub jacobian: [Vec2; 2],
     /// (a, b, c): a·x + b·y + c is positive on the side of the place.
     pub line: [f32; 3],
+    /// Share of the far side in cells that the edge halves: from 0 where the footprint only touches it to 1/2 where its
+    /// centre lies on it.
+    pub far: f32,
 }
 
 impl Crease {
-    /// Positive where the centre of a cell is on the near side, 0 where the edge halves the cell.
+    /// Part of a cell on the near side.
     #[inline]
-    pub(crate) fn side(&self, column: i32, row: i32) -> f32 {
+    pub(crate) fn near(&self, column: i32, row: i32) -> f32 {
         let [a, b, c] = self.line;
-        a * (column as f32 + 0.5) + b * (row as f32 + 0.5) + c
+        match a * (column as f32 + 0.5) + b * (row as f32 + 0.5) + c {
+            side if side > 0.0 => 1.0,
+            side if side < 0.0 => 0.0,
+            _ => 1.0 - self.far,
+        }
     }
 }
 

@@ -66,6 +66,7 @@ fn direction([x, y]: [f64; 2]) -> Vec3 {
 }
 
 /// Azimuth in the first quadrant as a share of a right angle.
+#[inline(always)]
 fn quadrant_share(x: f32, y: f32) -> f32 {
     let (low, high) = if x < y { (x, y) } else { (y, x) };
     if high == 0.0 {
@@ -78,10 +79,12 @@ fn quadrant_share(x: f32, y: f32) -> f32 {
 }
 
 impl Mapping for Octahedral {
+    #[inline(always)]
     fn size(&self) -> [u32; 2] {
         [self.n, self.n]
     }
 
+    #[inline(always)]
     fn locate(&self, p: Vec3) -> Option<Place> {
         let distance = p.length();
         if distance <= 0.0 {
@@ -98,6 +101,7 @@ impl Mapping for Octahedral {
         Some(Place { at: Vec2::new(half + half * x.copysign(p.x), half + half * y.copysign(p.y)), distance })
     }
 
+    #[inline(always)]
     fn gradients(&self, p: Vec3) -> [Vec3; 2] {
         let distance = p.length();
         let d = p.abs() / distance;
@@ -115,6 +119,7 @@ impl Mapping for Octahedral {
         [gx * mirror * 1f32.copysign(p.x), gy * mirror * 1f32.copysign(p.y)]
     }
 
+    #[inline(always)]
     fn wrap(&self, mut column: i32, mut row: i32) -> Option<u32> {
         let n = self.n as i32;
         if !(0..n).contains(&column) {
@@ -142,6 +147,7 @@ impl Mapping for Octahedral {
         Ray { base: Vec3::ZERO, direction: Vec3::new(x.copysign(square.x), y.copysign(square.y), z) }
     }
 
+    #[inline(always)]
     fn cell_ray(&self, cell: u32) -> Ray {
         let n = self.n;
         let mirrored = |i: u32| if 2 * i + 1 >= n { (i - n / 2, 1.0) } else { ((n - 1) / 2 - i, -1.0) };
@@ -155,17 +161,19 @@ impl Mapping for Octahedral {
         4.0 * std::f64::consts::PI / f64::from(self.n).powi(2)
     }
 
+    #[inline(always)]
     fn inverse_measure(&self, _column: u32, _row: u32) -> f32 {
         self.inverse_measure
     }
 
+    #[inline(always)]
     fn is_folded(&self) -> bool {
         true
     }
 
+    #[inline(always)]
     fn crease(&self, at: Vec2, half: Vec2) -> Option<Crease> {
         let side = 0.5 * self.n as f32;
-        let mirror = Vec2::ONE.copysign(at - side);
         let q = (at - side).abs();
         let upper = q.x + q.y <= side;
         let to_line = if upper { q } else { side - q } - half;
@@ -180,15 +188,21 @@ impl Mapping for Octahedral {
             across_line(q, side, upper, to_line.x > to_line.y)
         };
         // Back from the mirrored quadrant.
+        let mirror = Vec2::ONE.copysign(at - side);
         let signs = mirror.x * mirror.y;
         let [a, b, c] = line;
         Some(Crease {
             at: there * mirror + side,
-            jacobian: [Vec2::new(jacobian[0].x, signs * jacobian[0].y), Vec2::new(signs * jacobian[1].x, jacobian[1].y)],
+            jacobian: [
+                Vec2::new(jacobian[0].x, signs * jacobian[0].y),
+                Vec2::new(signs * jacobian[1].x, jacobian[1].y),
+            ],
             line: [a * mirror.x, b * mirror.y, c - (a * mirror.x + b * mirror.y) * side],
+            far: (-0.5 * to_diagonal / (half.x + half.y)).clamp(0.0, 0.5),
         })
     }
 
+    #[inline(always)]
     fn clearance(&self, at: Vec2, half: Vec2) -> f32 {
         // The middle, the middles of the sides and the corners of the table: all at multiples of half a side.
         let side = 0.5 * self.n as f32;

@@ -20,6 +20,7 @@ pub struct Planar {
 }
 
 impl Planar {
+    #[inline(always)]
     fn coordinates(&self, p: Vec3) -> Vec2 {
         let q = if self.perspective { p.truncate() / p.z } else { p.truncate() };
         (q - self.min) / self.cell
@@ -27,10 +28,12 @@ impl Planar {
 }
 
 impl Mapping for Planar {
+    #[inline(always)]
     fn size(&self) -> [u32; 2] {
         self.size
     }
 
+    #[inline(always)]
     fn locate(&self, p: Vec3) -> Option<Place> {
         let distance = if self.perspective { p.length() } else { p.z };
         if self.perspective && (p.z <= 0.0 || distance <= 0.0) {
@@ -42,6 +45,7 @@ impl Mapping for Planar {
         inside.then_some(Place { at, distance })
     }
 
+    #[inline(always)]
     fn gradients(&self, p: Vec3) -> [Vec3; 2] {
         let scale = 1.0 / self.cell;
         if !self.perspective {
@@ -51,12 +55,14 @@ impl Mapping for Planar {
         [Vec3::new(scale, 0.0, -scale * p.x / p.z), Vec3::new(0.0, scale, -scale * p.y / p.z)]
     }
 
+    #[inline(always)]
     fn wrap(&self, column: i32, row: i32) -> Option<u32> {
         let [columns, rows] = self.size;
         let inside = (0..columns as i32).contains(&column) && (0..rows as i32).contains(&row);
         inside.then(|| row as u32 * columns + column as u32)
     }
 
+    #[inline(always)]
     fn ray(&self, at: Vec2) -> Ray {
         let q = self.min + at * self.cell;
         if self.perspective {
@@ -66,6 +72,7 @@ impl Mapping for Planar {
         }
     }
 
+    #[inline(always)]
     fn cell_ray(&self, cell: u32) -> Ray {
         let [columns, _] = self.size;
         self.ray(Vec2::new((cell % columns) as f32 + 0.5, (cell / columns) as f32 + 0.5))
@@ -76,7 +83,7 @@ impl Mapping for Planar {
         if self.perspective { area * f64::from(self.cell_ray(cell).direction.z).powi(3) } else { area }
     }
 
-    #[inline]
+    #[inline(always)]
     fn inverse_measure(&self, column: u32, row: u32) -> f32 {
         let area = 1.0 / (self.cell * self.cell);
         if !self.perspective {
@@ -87,6 +94,7 @@ impl Mapping for Planar {
         area * stretch * stretch.sqrt()
     }
 
+    #[inline(always)]
     fn is_parallel(&self) -> bool {
         !self.perspective
     }
