@@ -175,8 +175,9 @@ mod tests {
         // A wall hides what lies behind it.
         let (normal, kind) = (Vec3::Z, SplatKind::Opaque);
         let position = Vec3::new(0.0, 0.0, -0.5);
-        cloud.push(&Noun { position, radius: 2.0, cross_section: 1.0, kind, normal, ..Noun::default() });
-        let input = Input { cloud: &cloud, values: &[0.0; 12], ..input };
+        let mut walled = cloud.clone();
+        walled.push(&Noun { position, radius: 2.0, cross_section: 1.0, kind, normal, ..Noun::default() });
+        let input = Input { cloud: &walled, values: &[0.0; 12], ..input };
         assert_eq!(Rays::new(&input, 4).disorder(&[0, 1, 2, u32::MAX]).pairs_per_ray, 0.0);
     }
 }
