@@ -65,7 +65,8 @@ const NO_MAP: &str = "no light gets a shadow map";
 
 fn slices(facts: &Facts, options: &Options) -> Result<Knob, String> {
     let own = facts.slice_thickness.ok_or(NO_TRANSLUCENT)?;
-    let factors: &[f64] = if options.quick { &[64.0, 32.0, 16.0] } else { &[128.0, 64.0, 32.0, 16.0, 8.0, 4.0, 2.0] };
+    let factors: &[f64] =
+        if options.quick { &[16.0, 4.0, 2.0, 1.0] } else { &[64.0, 32.0, 16.0, 8.0, 4.0, 2.0, 1.0, 0.5] };
     let mut steps: Vec<Step> =
         factors.iter().map(|f| step(format!("{:.3} ({f} x)", f * own), f * own, f * own)).collect();
     steps.push(Step { label: "exact".into(), size: None, value: 0.0 });
