@@ -8,7 +8,7 @@ use super::bins::{Bins, TILE, bin};
 use super::kernel::Kernel;
 use super::lanes::{Lanes, MAX_LANES};
 use super::projected::{Projected, ProjectedDepth, ProjectedSplat};
-use super::tile::{AREA, BATCH, for_each_run, for_each_span};
+use super::tile::{AREA, BATCH, Runs, for_each_span};
 use crate::Progress;
 use pulp::Simd;
 use rayon::prelude::*;
@@ -161,13 +161,15 @@ impl OpaqueTile {
     /// Step 1: the nearest depth.
     #[inline(always)]
     fn nearest<S: Simd>(&mut self, simd: S, size: [u32; 2], splat: &ProjectedSplat, depth: &ProjectedDepth) {
-        self.fragments += for_each_run(simd, splat, size, [self.x, self.y], |run| {
+        let runs = Runs::new(simd, splat, size, [self.x, self.y]);
+        self.fragments += runs.pixels();
+        for run in runs {
             let far = Lanes::splat(simd, f32::INFINITY);
             let core = Lanes::splat(simd, CORE);
             let solid = run.depth(simd, depth).where_less_or(run.distance_sq(simd, splat), core, far);
             let nearest = &mut self.depth[run.pixel()..];
             Lanes::load(simd, nearest).min(solid).store(nearest);
-        });
+        }
     }
 
     /// Whose the nearest depth is; of several at the same depth the first.
@@ -180,7 +182,7 @@ impl OpaqueTile {
         depth: &ProjectedDepth,
         object: u32,
     ) {
-        for_each_run(simd, splat, size, [self.x, self.y], |run| {
+        for run in Runs::new(simd, splat, size, [self.x, self.y]) {
             let (mut s, mut z) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
             run.distance_sq(simd, splat).store(&mut s);
             run.depth(simd, depth).store(&mut z);
@@ -190,7 +192,7 @@ impl OpaqueTile {
                     self.object[k] = object;
                 }
             }
-        });
+        }
     }
 
     /// Step 2: weights of all fragments within ε-z of the nearest.
@@ -205,7 +207,9 @@ impl OpaqueTile {
         values: &[f32],
     ) {
         let of = |v: f32| Lanes::splat(simd, v);
-        self.fragments += for_each_run(simd, splat, size, [self.x, self.y], |run| {
+        let runs = Runs::new(simd, splat, size, [self.x, self.y]);
+        self.fragments += runs.pixels();
+        for run in runs {
             let k = run.pixel();
             let nearest = Lanes::load(simd, &self.depth[k..]);
             // Behind by how much; where there is no surface −∞, and nothing counts.
@@ -221,7 +225,7 @@ impl OpaqueTile {
             for (c, value) in values.iter().enumerate() {
                 add(&mut self.channels[c * AREA + k..], weight * of(*value));
             }
-        });
+        }
     }
 
     /// Σwc/Σw and Σwz/Σw.

@@ -50,36 +50,77 @@ pub(crate) struct Run<S: Simd> {
     dy: Lanes<S>,
 }
 
-/// Visits the runs of `splat` in the tile whose first pixel is `origin`; how many pixels they are.
-#[inline(always)]
-pub(crate) fn for_each_run<S: Simd>(
+/// The runs of one splat in one tile. An iterator and no function that calls back: only what is surely inlined is
+/// compiled for the instruction set.
+pub(crate) struct Runs<S: Simd> {
     simd: S,
-    splat: &ProjectedSplat,
-    size: [u32; 2],
-    origin: [usize; 2],
-    mut visit: impl FnMut(Run<S>),
-) -> u64 {
-    let [x0, x1, y0, y1] = splat.bounds(size);
-    let range = |low: u32, high: u32, origin: usize| {
-        let (low, high) = ((low as usize).saturating_sub(origin), (high as usize).saturating_sub(origin).min(TILE));
-        (low / BLOCK, high.div_ceil(BLOCK))
-    };
-    let ((x0, x1), (y0, y1)) = (range(x0, x1, origin[0]), range(y0, y1, origin[1]));
-    let blocks = x1.saturating_sub(x0) * y1.saturating_sub(y0);
-    let center = [origin[0] as f32 + 0.5 - splat.center_px[0], origin[1] as f32 + 0.5 - splat.center_px[1]];
-    // One loop over the rectangle: two nested ones would be left at a guess twice.
-    let (mut x, mut y) = (x0, y0);
-    for _ in 0..blocks {
-        let corner = [(BLOCK * x) as f32, (BLOCK * y) as f32];
-        for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
-            let dx = Lanes::splat(simd, center[0]) + (Lanes::splat(simd, corner[0]) + Lanes::load(simd, &X[lane..]));
-            let dy = Lanes::splat(simd, center[1]) + (Lanes::splat(simd, corner[1]) + Lanes::load(simd, &Y[lane..]));
-            visit(Run { block: y * COLUMNS + x, lane, dx, dy });
+    /// Blocks left, and the lane of the next run.
+    blocks: usize,
+    lane: usize,
+    /// Columns of blocks under the footprint.
+    x0: usize,
+    x1: usize,
+    x: usize,
+    y: usize,
+    /// Offset of the tile's first pixel from the splat's centre.
+    origin: [f32; 2],
+}
+
+impl<S: Simd> Runs<S> {
+    /// The runs of `splat` in the tile whose first pixel is `origin`.
+    #[inline(always)]
+    pub(crate) fn new(simd: S, splat: &ProjectedSplat, size: [u32; 2], origin: [usize; 2]) -> Self {
+        let [x0, x1, y0, y1] = splat.bounds(size);
+        let ((x0, x1), (y0, y1)) = (block_range(x0, x1, origin[0]), block_range(y0, y1, origin[1]));
+        let [cx, cy] = splat.center_px;
+        Self {
+            simd,
+            blocks: x1.saturating_sub(x0) * y1.saturating_sub(y0),
+            lane: 0,
+            x0,
+            x1,
+            x: x0,
+            y: y0,
+            origin: [origin[0] as f32 + 0.5 - cx, origin[1] as f32 + 0.5 - cy],
         }
-        let wrapped = x + 1 == x1;
-        (x, y) = if wrapped { (x0, y + 1) } else { (x + 1, y) };
     }
-    (blocks * PIXELS) as u64
+
+    /// Pixels of all runs.
+    #[inline(always)]
+    pub(crate) fn pixels(&self) -> u64 {
+        (self.blocks * PIXELS) as u64
+    }
+}
+
+impl<S: Simd> Iterator for Runs<S> {
+    type Item = Run<S>;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<Run<S>> {
+        if self.blocks == 0 {
+            return None;
+        }
+        let (simd, lane) = (self.simd, self.lane);
+        let x = Lanes::splat(simd, (BLOCK * self.x) as f32) + Lanes::load(simd, &X[lane..]);
+        let y = Lanes::splat(simd, (BLOCK * self.y) as f32) + Lanes::load(simd, &Y[lane..]);
+        let (dx, dy) = (Lanes::splat(simd, self.origin[0]) + x, Lanes::splat(simd, self.origin[1]) + y);
+        let run = Run { block: self.y * COLUMNS + self.x, lane, dx, dy };
+        self.lane = (lane + Lanes::<S>::COUNT) % PIXELS;
+        if self.lane == 0 {
+            self.blocks -= 1;
+            // One count for the rectangle: two nested loops would be left at a guess twice.
+            let wrapped = self.x + 1 == self.x1;
+            (self.x, self.y) = if wrapped { (self.x0, self.y + 1) } else { (self.x + 1, self.y) };
+        }
+        Some(run)
+    }
+}
+
+/// Blocks of the tile from pixel `origin` on that the pixels `low..high` lie in.
+#[inline(always)]
+fn block_range(low: u32, high: u32, origin: usize) -> (usize, usize) {
+    let (low, high) = ((low as usize).saturating_sub(origin), (high as usize).saturating_sub(origin).min(TILE));
+    (low / BLOCK, high.div_ceil(BLOCK))
 }
 
 impl<S: Simd> Run<S> {

@@ -11,7 +11,7 @@ use super::bins::{Bins, TILE, bin};
 use super::kernel::Kernel;
 use super::lanes::{Lanes, MAX_LANES, SMALL, exp_neg};
 use super::projected::{Projected, ProjectedDepth, ProjectedSplat};
-use super::tile::{AREA, BATCH, BLOCKS, Line, PIXELS, Run, for_each_run, for_each_span, position};
+use super::tile::{AREA, BATCH, BLOCKS, Line, PIXELS, Run, Runs, for_each_span, position};
 use super::{Accumulation, OpaqueImage, Params, RasterCounts};
 use crate::{Accumulator, DepthProfile, Direction, Material, Progress, SplatKind};
 use pulp::Simd;
@@ -35,8 +35,6 @@ struct Tile {
     /// Empty when not asked for, as is the next.
     depth: Vec<DepthProfile>,
     object: Vec<u32>,
-    /// Whether sums are kept in half precision.
-    half: bool,
     fragments: u64,
 }
 
@@ -84,7 +82,6 @@ pub fn fold(
         .filter(|&t| !bins.is_empty(t) && !progress.is_cancelled())
         .map(|t| {
             let mut tile = Tile::load(accumulator, projected, opaque, &bins, t);
-            tile.half = params.accumulation == Accumulation::F16;
             let input = FoldTile { tile: &mut tile, bins: &bins, t, projected, values, materials, direction, params };
             pulp::Arch::new().dispatch(input);
             tile
@@ -121,12 +118,17 @@ impl pulp::WithSimd for FoldTile<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        match (self.direction, self.tile.planes, self.tile.channels) {
-            (Direction::FrontToBack, 1, 3) => self.fold::<S, true, 1, 3>(simd),
-            (Direction::FrontToBack, 1, _) => self.fold::<S, true, 1, 0>(simd),
-            (Direction::FrontToBack, ..) => self.fold::<S, true, 3, 0>(simd),
-            (Direction::BackToFront, 1, _) => self.fold::<S, false, 1, 0>(simd),
-            (Direction::BackToFront, ..) => self.fold::<S, false, 3, 0>(simd),
+        let half = self.params.accumulation == Accumulation::F16;
+        match (self.direction, half, self.tile.planes, self.tile.channels) {
+            (Direction::FrontToBack, false, 1, 3) => self.fold::<S, true, false, 1, 3>(simd),
+            (Direction::FrontToBack, false, 1, _) => self.fold::<S, true, false, 1, 0>(simd),
+            (Direction::FrontToBack, false, ..) => self.fold::<S, true, false, 3, 0>(simd),
+            (Direction::BackToFront, false, 1, _) => self.fold::<S, false, false, 1, 0>(simd),
+            (Direction::BackToFront, false, ..) => self.fold::<S, false, false, 3, 0>(simd),
+            (Direction::FrontToBack, true, 1, _) => self.fold::<S, true, true, 1, 0>(simd),
+            (Direction::FrontToBack, true, ..) => self.fold::<S, true, true, 3, 0>(simd),
+            (Direction::BackToFront, true, 1, _) => self.fold::<S, false, true, 1, 0>(simd),
+            (Direction::BackToFront, true, ..) => self.fold::<S, false, true, 3, 0>(simd),
         }
     }
 }
@@ -146,7 +148,7 @@ struct Source<'a> {
 impl FoldTile<'_> {
     /// `CHANNELS` is their number, or 0 when it is only known at run time.
     #[inline(always)]
-    fn fold<S: Simd, const FRONT: bool, const PLANES: usize, const CHANNELS: usize>(self, simd: S) {
+    fn fold<S: Simd, const FRONT: bool, const HALF: bool, const PLANES: usize, const CHANNELS: usize>(self, simd: S) {
         let channels = if CHANNELS > 0 { CHANNELS } else { self.tile.channels };
         let projected = self.projected;
         let deep = self.tile.needs_depth();
@@ -175,7 +177,7 @@ impl FoldTile<'_> {
                         thin: splat.peak * most <= SMALL,
                         value: &values[k * channels..][..channels],
                     };
-                    self.tile.splat::<S, FRONT, PLANES, CHANNELS>(simd, &source);
+                    self.tile.splat::<S, FRONT, HALF, PLANES, CHANNELS>(simd, &source);
                 }
                 if FRONT && self.tile.is_done(self.params.transmittance_cutoff) {
                     return;
@@ -206,7 +208,6 @@ impl Tile {
             opaque_depth,
             depth,
             object,
-            half: false,
             fragments: 0,
         };
         tile.load_lines(acc);
@@ -258,16 +259,17 @@ impl Tile {
     }
 
     #[inline(always)]
-    fn splat<S: Simd, const FRONT: bool, const PLANES: usize, const CHANNELS: usize>(
+    fn splat<S: Simd, const FRONT: bool, const HALF: bool, const PLANES: usize, const CHANNELS: usize>(
         &mut self,
         simd: S,
         source: &Source<'_>,
     ) {
-        let (size, origin) = (self.size, [self.x, self.y]);
-        self.fragments += for_each_run(simd, source.splat, size, origin, |run| {
+        let runs = Runs::new(simd, source.splat, self.size, [self.x, self.y]);
+        self.fragments += runs.pixels();
+        for run in runs {
             let tau = self.optical_depth(simd, source, run);
-            self.composite::<S, FRONT, PLANES, CHANNELS>(simd, source, run, tau);
-        });
+            self.composite::<S, FRONT, HALF, PLANES, CHANNELS>(simd, source, run, tau);
+        }
     }
 
     /// τ of a run of pixels.
@@ -293,7 +295,7 @@ impl Tile {
     }
 
     #[inline(always)]
-    fn composite<S: Simd, const FRONT: bool, const PLANES: usize, const CHANNELS: usize>(
+    fn composite<S: Simd, const FRONT: bool, const HALF: bool, const PLANES: usize, const CHANNELS: usize>(
         &mut self,
         simd: S,
         source: &Source<'_>,
@@ -303,8 +305,6 @@ impl Tile {
         let channels = if CHANNELS > 0 { CHANNELS } else { self.channels };
         let stride = 2 * PLANES + channels;
         let lines = &mut self.lines[run.block * stride..][..stride];
-        let half = self.half;
-        let rounded = |sum: Lanes<S>| if half { sum.to_half() } else { sum };
         let mut weight = [Lanes::splat(simd, 0.0); PLANES];
         let mut nearer = weight[0];
         for p in 0..PLANES {
@@ -314,14 +314,14 @@ impl Tile {
             if p == PLANES / 2 {
                 nearer = before;
             }
-            let sum = rounded(before + step);
+            let sum = rounded::<S, HALF>(before + step);
             sum.store(plane);
             let opacity = if source.thin { step.opacity_of_small() } else { step.opacity() };
             let plane = &mut lines[PLANES + p].0[run.lane..];
             let before = Lanes::load(simd, plane);
-            let after = if half { sum.exp_neg() } else { opacity.negate_mul_add(before, before) };
+            let after = if HALF { sum.exp_neg() } else { opacity.negate_mul_add(before, before) };
             after.store(plane);
-            weight[p] = match (FRONT, half) {
+            weight[p] = match (FRONT, HALF) {
                 (false, _) => opacity,
                 (true, false) => before * opacity,
                 (true, true) => before - after,
@@ -334,7 +334,7 @@ impl Tile {
             let sum = &mut lines[2 * PLANES + c].0[run.lane..];
             let before = Lanes::load(simd, sum);
             let added = if FRONT { value } else { value - before };
-            rounded(weight[p].mul_add(added, before)).store(sum);
+            rounded::<S, HALF>(weight[p].mul_add(added, before)).store(sum);
         }
         if !self.depth.is_empty() || !self.object.is_empty() {
             self.extras::<S, FRONT, PLANES>(simd, source, run, nearer);
@@ -369,6 +369,12 @@ impl Tile {
             }
         }
     }
+}
+
+/// A running sum in the precision that was asked for.
+#[inline(always)]
+fn rounded<S: Simd, const HALF: bool>(sum: Lanes<S>) -> Lanes<S> {
+    if HALF { sum.to_half() } else { sum }
 }
 
 /// The part of a plane of the image in the tile at `corner`, `fill` outside the image; nothing of an empty plane.
