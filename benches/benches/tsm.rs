@@ -80,5 +80,23 @@ fn look_up(map: &ShadowMap, cloud: &Cloud) -> f32 {
     (0..cloud.len()).map(at).sum()
 }
 
-criterion_group!(tsm_benches, benches);
+/// Growth: light from inside and the sun, 1 to 16 million splats.
+fn growth(c: &mut Criterion) {
+    for millions in [1, 2, 4, 8, 16] {
+        let (cloud, _) = organza_benches::outdoor_cloud(millions << 20);
+        let mut group = c.benchmark_group(format!("tsm/growth/{millions} M"));
+        group.sample_size(10).throughput(Throughput::Elements(cloud.len() as u64));
+        for (name, light) in lights(&cloud).into_iter().skip(1) {
+            let params = Params { max_bytes: 8 << 30, ..Params::default() };
+            let build = || ShadowMap::build(&cloud, &[], &[], &light, &params).expect("invariant: 8 GiB are enough");
+            let counts = build().counts();
+            let per_entry = counts.bytes as f64 / counts.entries.max(1) as f64;
+            println!("{name}: {counts:?}, {per_entry:.1} bytes an entry");
+            group.bench_function(name, |b| b.iter(build));
+        }
+        group.finish();
+    }
+}
+
+criterion_group!(tsm_benches, benches, growth);
 criterion_main!(tsm_benches);

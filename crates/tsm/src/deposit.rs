@@ -38,7 +38,7 @@ const SMALL: Band = [0.3, 0.5];
 /// Angular radius from which on casters are swept over the whole table.
 const CLOSE: Band = [0.3, NEAR];
 /// Rays along a side of a cell where several are taken.
-const FINE: u32 = 4;
+const FINE: u32 = 8;
 
 /// How far `x` has gone through a band, from 0 to 1.
 #[inline(always)]

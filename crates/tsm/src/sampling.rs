@@ -59,8 +59,10 @@ impl Sampled {
         // each ray instead.
         let exact = f64::from(footprint_area(caster));
         let unresolved = f64::from(RESOLVED / (half.min_element() * samples as f32)).max(1.0);
-        let slack = (TORN * unresolved.powi(16)).min(0.999);
-        let norm = norm.max((1.0 - slack) * exact).min((1.0 + slack) * exact);
+        // Rays about a pole do not add up either, but miss nothing.
+        let pole = if mapping.is_folded() { 1.0 } else { (1.5 / mapping.clearance(at, half)).max(1.0) };
+        let slack = TORN * (unresolved * f64::from(pole)).powi(16);
+        let norm = norm.max((1.0 - slack).max(1e-3) * exact).min((1.0 + slack) * exact);
         self.scale = (f64::from(caster.cross_section) / norm) as f32;
     }
 

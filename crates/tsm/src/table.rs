@@ -11,6 +11,10 @@ use std::ops::Range;
 
 /// Fixed point: 2⁴⁴ units an absorbance of 1.
 const FIXED: f64 = (1u64 << 44) as f64;
+/// Lists up to this length are sorted by counting.
+const SHORT: usize = 64;
+/// Keys that are counted at once.
+const LANES: usize = 8;
 /// Lists from this length on are sorted by digits.
 const LONG: usize = 1024;
 
@@ -165,7 +169,9 @@ impl<const C: usize> Lists<C> {
         // The limit is taken 2⁻²⁰ low: f32 parts of a sum may each be rounded down, and the verdict must not depend on
         // their number.
         let stop = (f64::from(limit) * (1.0 - 2f64.powi(-20)) * FIXED) as i64;
-        let run = |gathered: &mut Gathered<C>, task: Task<'_, C>| task.run(parted, ranges.shift, stop, gathered);
+        let run = |gathered: &mut Gathered<C>, task: Task<'_, C>| {
+            pulp::Arch::new().dispatch(Run { task, parted, shift: ranges.shift, stop, gathered })
+        };
         let kept = tasks.into_par_iter().map_init(Gathered::default, run).sum();
         Self { span, distance, total, kept }
     }
@@ -211,8 +217,27 @@ struct Task<'a, const C: usize> {
     total: &'a mut [[f32; C]],
 }
 
+/// The work on one range, in the form that [`pulp`] compiles once per instruction set.
+struct Run<'a, 'b, const C: usize> {
+    task: Task<'a, C>,
+    parted: &'b [Parted<C>],
+    shift: u32,
+    stop: i64,
+    gathered: &'b mut Gathered<C>,
+}
+
+impl<const C: usize> pulp::NullaryFnOnce for Run<'_, '_, C> {
+    type Output = u64;
+
+    #[inline(always)]
+    fn call(self) -> u64 {
+        self.task.run(self.parted, self.shift, self.stop, self.gathered)
+    }
+}
+
 impl<const C: usize> Task<'_, C> {
     /// Fills the lists and returns how many entries they keep.
+    #[inline(always)]
     fn run(self, parted: &[Parted<C>], shift: u32, stop: i64, gathered: &mut Gathered<C>) -> u64 {
         let base = (self.range << shift) as u32;
         for part in parted {
@@ -250,11 +275,44 @@ impl<const C: usize> Task<'_, C> {
 }
 
 /// Sorts by distance. The order of equal distances is free: they are merged by exact sums.
+#[inline(always)]
 fn sort(list: &mut [u64], spare: &mut Vec<u64>) {
-    if list.len() < LONG {
-        list.sort_unstable();
-        return;
+    match list.len() {
+        0..=1 => {}
+        2..=SHORT => sort_short(list),
+        n if n < LONG => list.sort_unstable(),
+        _ => sort_long(list, spare),
     }
+}
+
+/// Counts for each key how many are less, eight at a time and without a branch.
+#[inline(always)]
+fn sort_short(list: &mut [u64]) {
+    let n = list.len();
+    let mut distance = [i32::MAX; SHORT];
+    // Positive floats are ordered as integers.
+    distance.iter_mut().zip(&*list).for_each(|(d, key)| *d = (key >> 32) as i32);
+    let mut sorted = [0u64; SHORT];
+    for (own, keys) in distance.chunks_exact(LANES).zip(list.chunks(LANES)) {
+        let mut less = [0i32; LANES];
+        for other in &distance[..n] {
+            (0..LANES).for_each(|l| less[l] += i32::from(*other < own[l]));
+        }
+        for (key, less) in keys.iter().zip(less) {
+            let mut rank = less as usize;
+            // Equal distances take one place after the other.
+            while sorted[rank] != 0 {
+                rank += 1;
+            }
+            sorted[rank] = *key;
+        }
+    }
+    list.copy_from_slice(&sorted[..n]);
+}
+
+/// By digits, from the lowest.
+#[inline(never)]
+fn sort_long(list: &mut [u64], spare: &mut Vec<u64>) {
     // Distances of one cell differ in their low bits alone.
     let (least, most) = list.iter().fold((u64::MAX, 0), |(a, b), k| (a.min(*k), b.max(*k)));
     let least = least >> 32;
@@ -290,6 +348,7 @@ fn scatter(from: &[u64], to: &mut [u64], digit: impl Fn(u64) -> usize) {
 }
 
 /// Merges equal distances and writes running sums; returns the number of entries kept.
+#[inline(always)]
 fn sum_up<const C: usize>(
     list: &[u64],
     own: &[[f32; C]],
