@@ -77,7 +77,7 @@ fn depths_of_a_slab_are_its_closed_form_whatever_it_is_made_of() {
                  {{ value = 1, color = [1, 1, 1], extinction = {extinction:?} }}]"
             ),
         ] {
-            let text = parallel_view(1.0, 32) + "[[object]]\nname = 'slab'\n" + &object + "\n";
+            let text = parallel_view(1.0, 32) + "[[object]]\nname = 'slab'\nfootprint = 2\n" + &object + "\n";
             let picture = draw_in(folder.path(), &text, &["--layers", "depth"]);
             agree(depths(&picture, 1e-4), slab(4.75, 0.5, tau), &format!("τ {tau}, {object}"));
         }
