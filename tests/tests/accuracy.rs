@@ -109,7 +109,7 @@ fn run(offset: f64) -> Result<Study, Error> {
     };
     let standard_error = vec![[1e-7; 3]; SIZE[0] * SIZE[1]];
     let truth = Truth { method: "closed form".into(), image: exact_image(), standard_error };
-    study(&sweep(), Some(truth), &OPTIONS, &Progress::new(), &mut draw)
+    study(&sweep(), Ok(truth), &OPTIONS, &Progress::new(), &mut draw)
 }
 
 fn order_of(study: &Study, knob: &str) -> (f64, f64) {
@@ -155,7 +155,7 @@ fn what_does_not_converge_is_refused_with_what_it_would_take() {
         let image = Image::from_radiance(SIZE, (0..SIZE[0] * SIZE[1]).map(noise).collect()).unwrap();
         Ok(frame(image, 1e-3))
     };
-    let error = study(&sweep(), None, &OPTIONS, &Progress::new(), &mut draw).unwrap_err();
+    let error = study(&sweep(), Err("a test".into()), &OPTIONS, &Progress::new(), &mut draw).unwrap_err();
     assert_eq!(error.exit_code(), 5);
     assert!(error.to_string().contains("own error") && error.hint().contains("--finer"), "{error} {}", error.hint());
 }
@@ -170,7 +170,7 @@ fn what_was_not_measured_is_null() {
         }
         Ok(frame(slab_image(n, 0.5, cut), 1e-3 * n))
     };
-    let study = study(&sweep(), None, &OPTIONS, &Progress::new(), &mut draw).unwrap();
+    let study = study(&sweep(), Err("a test".into()), &OPTIONS, &Progress::new(), &mut draw).unwrap();
     let report = Report::new(&scene(), OPTIONS, vec![study]);
     let document: Value = serde_json::from_str(&report.json()).unwrap();
     let settings = document["techniques"][0]["settings"].as_array().unwrap();

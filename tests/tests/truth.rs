@@ -47,7 +47,7 @@ fn points_agree_with_path_tracing_of_meshes_media_and_translucent_surfaces() {
     let size = [160, 88];
     let scene = scene(size);
     let truth = traced(&scene).unwrap();
-    let exact = squares(&truth.radiance, size);
+    let exact = squares(truth.image.pixels(), size);
     let image = drawn(&scene);
     let error = rmse(&squares(&image, size), &exact);
     // The truth's own error: a square holds 64 pixels.

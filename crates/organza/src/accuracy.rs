@@ -25,7 +25,7 @@ mod study;
 
 pub use frontier::{Candidate, frontier, significant_ratio};
 pub use knob::{Knob, Request, Skipped, Step, Sweep, Theory};
-pub use measure::{Distance, Frame, Renderer, Timed, Truth};
+pub use measure::{Distance, Frame, Renderer, Timed};
 pub use points::{Facts, points};
 pub use report::{Machine, Report, write};
 pub use report_html::verdict;
@@ -35,6 +35,8 @@ pub use study::{Draw, Limit, Outcome, Study, median_seconds, study};
 
 pub(crate) use plot::escaped;
 pub(crate) use report_pictures::{data_uri, difference, png};
+
+pub use crate::truth::Truth;
 
 use crate::scene::Scene;
 
@@ -58,6 +60,11 @@ impl Options {
     /// Bytes that a study takes at most unless the user allows more: ends of knobs would fill any memory.
     pub fn memory(&self) -> u64 {
         if self.quick { 3 << 30 } else { 6 << 30 }
+    }
+
+    /// Samples a pixel of the physical truth.
+    pub fn truth_samples(&self) -> u32 {
+        if self.quick { 64 } else { 1024 }
     }
 
     /// Longest side of the picture, pixels, unless the user asked for a size.

@@ -9,18 +9,27 @@ mod object;
 use crate::scene::{LightSource, Scene, SceneLight};
 use crate::{Error, Progress, RenderOptions};
 use object::Body;
+use reference::metrics::{Image, Linear};
 use reference::{Environment, PathRules, PathSettings, PixelSampling, path_trace};
 use std::f64::consts::PI;
 
-/// A path-traced picture of a scene.
+/// An unbiased estimate of what is seen, with its error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Truth {
-    /// Radiance of each pixel, linear Rec.709, row by row from the top left.
-    pub radiance: Vec<[f64; 3]>,
-    /// Its standard error per channel.
+    /// What it was computed by.
+    pub method: String,
+    /// The estimate.
+    pub image: Image<Linear>,
+    /// Standard error of each pixel and channel, row by row from the top left.
     pub standard_error: Vec<[f64; 3]>,
-    /// Samples a pixel.
-    pub samples: u32,
+}
+
+impl Truth {
+    /// Root of the mean squared standard error: the RMSE that a perfect picture would show.
+    pub fn rms_standard_error(&self) -> f64 {
+        let n = (3 * self.standard_error.len()).max(1) as f64;
+        (self.standard_error.iter().flatten().map(|s| s * s).sum::<f64>() / n).sqrt()
+    }
 }
 
 /// Path-traces a scene with so many samples a pixel; `Err` of the inner result says why the scene has no truth.
@@ -69,11 +78,10 @@ pub fn truth(
     if estimate.majorant_violations > 0 {
         return Ok(Err("a density exceeds every bound that could be found for it".into()));
     }
-    Ok(Ok(Truth {
-        radiance: estimate.radiance.mean,
-        standard_error: estimate.radiance.standard_error,
-        samples: estimate.samples,
-    }))
+    let size = estimate.size.map(|s| s as usize);
+    let image = Image::from_radiance(size, estimate.radiance.mean).map_err(|e| Error::Internal(e.to_string()))?;
+    let method = format!("path tracing without splats, single scattering, {} samples a pixel", estimate.samples);
+    Ok(Ok(Truth { method, image, standard_error: estimate.radiance.standard_error }))
 }
 
 /// The light with its extent; intensity I on the axis becomes radiance I over the area that is seen from there.

@@ -37,8 +37,10 @@ const CLEAR: Band = [2.5, 3.5];
 const SMALL: Band = [0.3, 0.5];
 /// Angular radius from which on casters are swept over the whole table.
 const CLOSE: Band = [0.3, NEAR];
-/// Rays along a side of a cell where several are taken.
-const FINE: u32 = 8;
+/// Rays along a half extent where several rays a cell are taken: more than one a deviation of the kernel.
+const RAYS: f32 = 4.0;
+/// Most rays along a side of a cell.
+const FINE: f32 = 8.0;
 
 /// How far `x` has gone through a band, from 0 to 1.
 #[inline(always)]
@@ -91,7 +93,11 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
         let corner = (1.0 - through(CLEAR, self.mapping.clearance(at, half))) * through(SMALL, least);
         let bent = self.weight(caster, through(BENT, most * angle).max(corner)) * (1.0 - wide);
         let mut rest = 1.0 - wide - bent;
-        for (weight, samples) in [(wide, 1), (bent, FINE)] {
+        // Between two powers of two, both numbers of rays are taken in part.
+        let octave = between(RAYS / least, 1.0, FINE).log2();
+        let finer = self.weight(caster, octave.fract());
+        let rays = 1 << octave as u32;
+        for (weight, samples) in [(wide, 1), (bent * (1.0 - finer), rays), (bent * finer, 2 * rays)] {
             // A footprint that slips through between the rays overlaps cells all the same.
             if weight > 0.0 && !self.sample(caster, at, half, samples, (1.0 - close) * weight) {
                 rest += weight;

@@ -25,25 +25,6 @@ pub struct Frame {
     pub bytes: u64,
 }
 
-/// Physical truth for a scene: an unbiased estimate with its error.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Truth {
-    /// What it was computed by.
-    pub method: String,
-    /// The estimate.
-    pub image: Image<Linear>,
-    /// Standard error of each pixel and channel.
-    pub standard_error: Vec<[f64; 3]>,
-}
-
-impl Truth {
-    /// Root of the mean squared standard error: the RMSE that a perfect picture would show.
-    pub fn rms_standard_error(&self) -> f64 {
-        let n = (3 * self.standard_error.len()).max(1) as f64;
-        (self.standard_error.iter().flatten().map(|s| s * s).sum::<f64>() / n).sqrt()
-    }
-}
-
 /// How far a picture is from a reference.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Distance {

@@ -259,8 +259,12 @@ fn notes(html: &mut String, study: &Study) {
         note(format!("Not drawn: {}: {}.", o.setting.label, o.timed.failure.as_deref().unwrap_or_default()));
     }
     match &study.truth {
-        Some(t) => note(format!("Truth: {}; its RMS standard error is {:.1e}.", t.method, t.rms_standard_error())),
-        None => note("No physical truth was computed for this scene.".into()),
+        Ok(t) => note(format!(
+            "Truth: {}. Its RMS standard error is {:.1e}; no RMSE against it is smaller.",
+            t.method,
+            t.rms_standard_error()
+        )),
+        Err(reason) => note(format!("No physical truth: {reason}.")),
     }
     *html += "</ul>\n";
 }

@@ -31,7 +31,10 @@ fn study(study: &Study) -> Value {
             "held": limit.held.iter().map(|h| json!({ "knob": h.knob, "reason": h.reason })).collect::<Value>(),
             "seconds": limit.seconds,
         },
-        "truth": study.truth.as_ref().map(|t| json!({ "method": t.method, "rms_standard_error": t.rms_standard_error() })),
+        "truth": match &study.truth {
+            Ok(t) => json!({ "method": t.method, "rms_standard_error": t.rms_standard_error() }),
+            Err(reason) => json!({ "missing": reason }),
+        },
         "curves": study.curves.iter().map(|c| curve(study, c)).collect::<Value>(),
         "frontier": study.frontier.iter().map(|i| study.outcomes[*i].setting.label.as_str()).collect::<Value>(),
         "significant_ratio_of_times": study.significant_ratio,

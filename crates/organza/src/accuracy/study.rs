@@ -62,8 +62,8 @@ pub struct Study {
     pub skipped: Vec<Skipped>,
     /// The limit.
     pub limit: Limit,
-    /// Physical truth, where there is one.
-    pub truth: Option<Truth>,
+    /// Physical truth, or why the scene has none.
+    pub truth: Result<Truth, String>,
     /// Settings of the frontier, from the most accurate to the fastest.
     pub frontier: Vec<usize>,
     /// Ratio of times that counts as different.
@@ -82,7 +82,7 @@ pub type Draw<'a> = dyn FnMut(&Request) -> Result<Frame, Error> + 'a;
 /// than three settings to draw; those of `draw`, but a setting that exceeds a limit of resources is noted and left out.
 pub fn study(
     sweep: &Sweep,
-    truth: Option<Truth>,
+    truth: Result<Truth, String>,
     options: &Options,
     progress: &Progress,
     draw: &mut Draw<'_>,

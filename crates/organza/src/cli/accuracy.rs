@@ -28,7 +28,8 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
             let mut renderer = Renderer::new(&render, progress);
             let facts = renderer.facts(&scene)?;
             let sweep = accuracy::points(&scene, &facts, &options);
-            accuracy::study(&sweep, None, &options, progress, &mut |request| renderer.draw(request))
+            let truth = organza::truth::truth(&scene, &render, options.truth_samples(), progress)?;
+            accuracy::study(&sweep, truth, &options, progress, &mut |request| renderer.draw(request))
         })?;
         let report = Report::new(&scene, options, vec![study]);
         let files = accuracy::write(&report, &arguments.out)?;
@@ -65,6 +66,16 @@ fn study_text(study: &Study) -> String {
         let _ = writeln!(text, "  {}: {}", skipped.knob, skipped.reason);
     }
     let _ = writeln!(text, "the limit's own error: {:.1e}", study.limit.own_error);
+    let _ = match (&study.truth, &study.outcomes[0].from_truth) {
+        (Ok(truth), Some(distance)) => writeln!(
+            text,
+            "the scene's own setting against physical truth: RMSE {:.2e}, of which the truth's standard error {:.1e}",
+            distance.linear.rmse,
+            truth.rms_standard_error()
+        ),
+        (Ok(_), None) => Ok(()),
+        (Err(reason), _) => writeln!(text, "no physical truth: {reason}"),
+    };
     text
 }
 
