@@ -51,7 +51,7 @@ pub fn field_to_mesh<F: ScalarField + ?Sized>(
 /// 1/256 of the longest side of the box.
 ///
 /// # Errors
-/// As [`field_to_mesh`] and [`mesh_to_points`].
+/// As [`field_to_mesh`] and [`crate::mesh_to_points`].
 pub fn surface_to_points<F: ScalarField + ?Sized>(
     field: &F,
     bounds: [DVec3; 2],
@@ -140,7 +140,7 @@ impl Default for DensityParams {
 /// ```
 ///
 /// # Errors
-/// [`ConvertError::NonFinite`] with the point, and as [`volume_to_points`].
+/// [`ConvertError::NonFinite`] with the point, and as [`crate::volume_to_points`].
 pub fn density_to_points<F: ScalarField + ?Sized>(
     field: &F,
     bounds: [DVec3; 2],

@@ -158,11 +158,9 @@ fn fold(
         objects.push(Object { sampler, transform: Similarity::default(), look: part.look });
     }
     let origin = drawing.loaded.cloud.origin;
-    let lit =
-        drawing.loaded.lights.iter().zip(maps).map(|(light, map)| LitBy {
-            light: *light,
-            shadow: map.as_ref().map(|m| (m as &dyn Transmittance, origin)),
-        });
+    let shining = drawing.loaded.lights.iter().zip(maps).filter(|(light, _)| light.intensity != [0.0; 3]);
+    let lit = shining
+        .map(|(light, map)| LitBy { light: *light, shadow: map.as_ref().map(|m| (m as &dyn Transmittance, origin)) });
     let lights: Vec<LitBy<'_>> = lit.collect();
     let scene = Scene { objects: &objects, lights: &lights, ambient: drawing.ambient, camera, occluder };
     let set = &drawing.layers;

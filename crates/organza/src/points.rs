@@ -41,7 +41,7 @@ impl Drawing<'_> {
         camera: &Camera,
         cost: &mut CostRecord,
     ) -> Result<Shaded, Error> {
-        let with_map = self.loaded.lights.iter().zip(maps);
+        let with_map = self.loaded.lights.iter().zip(maps).filter(|(light, _)| light.intensity != [0.0; 3]);
         let lights: Vec<LitBy<'_>> = with_map
             .map(|(light, map)| LitBy { light: *light, shadow: map.as_ref().map(|m| m as &dyn Transmittance) })
             .collect();

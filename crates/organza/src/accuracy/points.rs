@@ -2,7 +2,7 @@
 
 use super::{Knob, Options, Request, Skipped, Step, Sweep, Theory};
 use crate::scene::{LightSource, MediumShape, Scene, SceneObject, ShadowMapping, Source};
-use splat_core::LightShape;
+use splat_core::{LightShape, raster::Accumulation};
 
 /// What has to be known of a loaded scene to choose the steps.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -34,7 +34,7 @@ pub fn points(scene: &Scene, facts: &Facts, options: &Options) -> Sweep {
         ("samples", samples(options)),
         ("resampling filter", Ok(resampling_filter())),
         ("splat spacing", spacing(scene, options)),
-        // `render.points.accumulation` ("f16", "f32") joins here as a choice, as `resampling_filter` is one.
+        ("accumulation", accumulation(facts)),
     ];
     for (name, knob) in knobs {
         match knob {
@@ -211,6 +211,22 @@ fn resampling_filter() -> Knob {
         theory: None,
         joint: false,
     }
+}
+
+fn accumulation(facts: &Facts) -> Result<Knob, String> {
+    facts.slice_thickness.ok_or(NO_TRANSLUCENT)?;
+    Ok(Knob {
+        name: "accumulation",
+        size_meaning: "",
+        set: |request, value| {
+            request.scene.render.points.accumulation = if value > 0.0 { Accumulation::F32 } else { Accumulation::F16 };
+        },
+        steps: vec![choice("f16", 0.0), choice("f32", 1.0)],
+        ends: Vec::new(),
+        end_is_exact: false,
+        theory: None,
+        joint: false,
+    })
 }
 
 fn spacing(scene: &Scene, options: &Options) -> Result<Knob, String> {

@@ -81,7 +81,7 @@ impl Report {
         report_html::page(self)
     }
 
-    /// The files that [`write`] makes in a folder.
+    /// The files that [`write()`] makes in a folder.
     pub fn files(folder: &Path) -> [PathBuf; 3] {
         ["accuracy.json", "accuracy.csv", "accuracy.html"].map(|name| folder.join(name))
     }

@@ -42,7 +42,7 @@ impl OrdersReport {
         })
     }
 
-    /// The files that [`write`] makes in a folder.
+    /// The files that [`write()`] makes in a folder.
     pub fn files(folder: &Path) -> [PathBuf; 4] {
         ["orders.json", "orders.csv", "orders.html", "orders.png"].map(|name| folder.join(name))
     }

@@ -96,7 +96,7 @@ fn check_points(at: &At<'_>, raw: &RawPoints) -> Result<PointsSettings, Error> {
     }
     Ok(PointsSettings {
         slice_thickness,
-        exact: raw.exact,
+        exact: raw.exact.unwrap_or(true),
         direction: match raw.direction {
             RawDirection::FrontToBack => Direction::FrontToBack,
             RawDirection::BackToFront => Direction::BackToFront,

@@ -212,8 +212,8 @@ pub(super) struct RawParticles {
 pub(super) struct RawPoints {
     /// Thickness of a slice in world units, or "auto" (the default).
     pub(super) slice_thickness: Option<Auto>,
-    /// Exact order inside slices too; default false.
-    pub(super) exact: bool,
+    /// Exact order inside slices too; default true.
+    pub(super) exact: Option<bool>,
     /// "front_to_back" (default) or "back_to_front".
     pub(super) direction: RawDirection,
     /// Composite only so many non-empty slices.
