@@ -230,10 +230,11 @@ fn knobs_that_cannot_matter_are_left_alone() {
         "shadow table mapping",
         "absorbance cut",
         "transmittance cut",
+        "accumulation",
         "footprint table size",
     ];
     assert_eq!(skipped, expected);
     let all = points(&scene(), &Facts { slice_thickness: Some(0.1), cells: Some(64) }, &OPTIONS);
     assert_eq!(all.skipped.len(), 1);
-    assert_eq!(all.knobs.len(), 8);
+    assert_eq!(all.knobs.len(), 9);
 }

@@ -285,7 +285,8 @@ fn finer_by(settled: &Settled, target: f64) -> Option<f64> {
 fn refuse_unless_resolved(outcomes: &[Outcome], limit: &Limit, curves: &[Curve]) -> Result<(), Error> {
     let own = outcomes[0].from_limit.as_ref().map_or(0.0, |d| d.linear.rmse);
     let drawn = outcomes.iter().filter(|o| o.drawn).count();
-    if outcomes[0].drawn && drawn >= 3 {
+    // A scene whose own setting is the limit has no error to draw.
+    if (outcomes[0].drawn || own <= limit.own_error) && drawn >= 3 {
         return Ok(());
     }
     let target = own / MARGIN / limit.parts.len().max(1) as f64;
@@ -303,7 +304,7 @@ fn refuse_unless_resolved(outcomes: &[Outcome], limit: &Limit, curves: &[Curve])
     let hint = format!("{}; --finer N doubles every end N times", blame.join("; "));
     let message = format!(
         "the limit's own error is {:.1e}, the scene's own setting is {own:.1e} from it, and {drawn} of {} settings are at \
-         least ten times as far: expected the scene's own and two more",
+         least ten times as far: expected three, and the scene's own among them unless it is the limit",
         limit.own_error,
         outcomes.len(),
     );
