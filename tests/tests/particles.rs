@@ -131,3 +131,17 @@ fn what_particles_cannot_do_is_said() {
     let coloured = text.replace("shading = 'phase'", "shading = 'phase'\nextinction_rgb = [1, 2, 3]");
     refused(&coloured, &[], "particles hide all colours alike");
 }
+
+#[test]
+fn bs09_an_empty_scene_is_the_background_and_opaque_things_have_no_noise() {
+    let empty = parallel_view(2.0, 8) + "[background]\ncolor = [0.25, 0.5, 1.5]\n";
+    let picture = particles(&empty, 4, 1, "std_error");
+    for (channel, value) in [("R", 0.25), ("G", 0.5), ("B", 1.5), ("A", 0.0), ("std_error.A", 0.0)] {
+        assert!(picture.channel(channel).iter().all(|v| *v == value), "{channel}");
+    }
+    let wall = scene([2, 2, 2]).replacen("'wall'", "'a'", 1).replacen("'wall'", "'b'", 1);
+    let (solid, points) = (draw(&wall, &["--technique", "particles"]), draw(&wall, &[]));
+    // Nobody asked for the error.
+    assert_eq!(solid.names(), ["A", "B", "G", "R"]);
+    assert_eq!(solid, points);
+}

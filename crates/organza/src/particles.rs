@@ -16,9 +16,8 @@ use pbsr::{
 };
 use splat_core::raster::{self, Background, OpaqueImage};
 use splat_core::shade::ChannelLayout;
-use splat_core::{
-    Accumulator, Camera, Cloud, CostRecord, LayerData, Layers, Similarity, SplatKind, Transmittance, rng,
-};
+use splat_core::{Accumulator, Camera, Cloud, CostRecord, LayerData, Layers, Similarity, SplatKind, rng};
+use std::collections::BTreeMap;
 use tsm::ShadowMap;
 
 /// Stage of the random numbers that seed the objects.
@@ -47,7 +46,8 @@ pub(crate) fn draw(drawing: &Drawing<'_>, options: &RenderOptions, cost: &mut Co
     let opaque = opaque(drawing, &maps, &camera, cost)?;
     let parts = parts(drawing, &camera);
     let mut accumulator = Accumulator::new(camera.size, 1, layout.count(), false, false);
-    let mut std_error = None;
+    let wanted = drawing.settings.layers.names().any(|name| name == "std_error");
+    let mut std_error = Vec::new();
     if !parts.is_empty() {
         let occluder = occluder(&opaque, &layout);
         let ensemble = cost.measure(pass::PARTICLES, |stage| {
@@ -58,15 +58,20 @@ pub(crate) fn draw(drawing: &Drawing<'_>, options: &RenderOptions, cost: &mut Co
             Ok::<_, Error>(ensemble)
         })?;
         accumulate(&ensemble, &layout, &mut accumulator);
-        std_error = Some(error_layer(&ensemble, drawing, occluder.as_ref()));
+        if wanted {
+            std_error = error_layer(&ensemble, drawing, occluder.as_ref());
+        }
     }
     cost.measure(pass::FINISH, |stage| {
         stage.items_in = u64::from(camera.size[0]) * u64::from(camera.size[1]);
         let background = Background { color: drawing.background };
         let (set, antialias) = (&drawing.layers, drawing.settings.antialias);
         let mut layers = raster::finish(&accumulator, &opaque, &background, &layout, set, antialias);
-        let pixels = layers.size.iter().map(|s| *s as usize).product();
-        layers.insert("std_error", LayerData::Scalar(std_error.unwrap_or_else(|| vec![0.0; pixels])));
+        if wanted {
+            // Without particles there is no noise.
+            std_error.resize(layers.size.iter().map(|s| *s as usize).product(), 0.0);
+            layers.insert("std_error", LayerData::Scalar(std_error));
+        }
         Ok(layers)
     })
 }
@@ -112,34 +117,34 @@ fn occluder(opaque: &OpaqueImage, layout: &ChannelLayout) -> Option<Occluder> {
 /// Translucent splats by object; an object has one material and one kind of translucent splats.
 fn parts(drawing: &Drawing<'_>, camera: &Camera) -> Vec<Part> {
     let Loaded { cloud, objects, materials, footprints, .. } = drawing.loaded;
-    let mut parts = Vec::new();
-    for object in 0..objects.len() as u32 {
-        for kind in [SplatKind::Medium, SplatKind::Surface] {
-            let ids: Vec<u32> = (0..cloud.len() as u32)
-                .filter(|&i| cloud.object[i as usize] == object && cloud.kind[i as usize] == kind)
-                .filter(|&i| cloud.cross_section[i as usize] > 0.0)
-                .collect();
-            let Some(&first) = ids.first() else { continue };
-            let own = cloud.gather(&ids);
-            let material = materials[cloud.material[first as usize] as usize];
-            let radius = own.radius.iter().map(|r| f64::from(*r)).sum::<f64>() / own.len() as f64;
-            let bounds = own.bounds();
-            let center = own.origin + bounds.center().as_dvec3();
-            let reach = 0.5 * f64::from(bounds.diagonal()) + radius;
-            let params = SplatParams {
-                cross_section: pbsr::finest_pixel_area(camera, center, reach, NEAR),
-                surface_opacity: material.surface_opacity,
-                footprints: footprints.clone(),
-                seed: rng::bits(drawing.settings.seed, SEEDS, u64::from(object), kind as u64),
-                ..SplatParams::default()
-            };
-            let shadow_coefficient =
-                objects[object as usize].shadow_coefficient * cloud.shadow_coefficient_of(first as usize);
-            let look = Appearance { material, kind, radius: radius as f32, shadow_coefficient };
-            parts.push(Part { cloud: own, look, params });
+    let mut of_object: BTreeMap<(u32, bool), Vec<u32>> = BTreeMap::new();
+    for i in drawing.ids(|kind| kind != SplatKind::Opaque) {
+        let k = i as usize;
+        if cloud.cross_section[k] > 0.0 {
+            of_object.entry((cloud.object[k], cloud.kind[k] == SplatKind::Surface)).or_default().push(i);
         }
     }
-    parts
+    let part = |((object, _), ids): ((u32, bool), Vec<u32>)| {
+        let first = ids[0] as usize;
+        let kind = cloud.kind[first];
+        let own = cloud.gather(&ids);
+        let material = materials[cloud.material[first] as usize];
+        let radius = own.radius.iter().map(|r| f64::from(*r)).sum::<f64>() / own.len() as f64;
+        let bounds = own.bounds();
+        let center = own.origin + bounds.center().as_dvec3();
+        let reach = 0.5 * f64::from(bounds.diagonal()) + radius;
+        let params = SplatParams {
+            cross_section: pbsr::finest_pixel_area(camera, center, reach, NEAR),
+            surface_opacity: material.surface_opacity,
+            footprints: footprints.clone(),
+            seed: rng::bits(drawing.settings.seed, SEEDS, u64::from(object), kind as u64),
+            ..SplatParams::default()
+        };
+        let shadow_coefficient = objects[object as usize].shadow_coefficient * cloud.shadow_coefficient_of(first);
+        let look = Appearance { material, kind, radius: radius as f32, shadow_coefficient };
+        Part { cloud: own, look, params }
+    };
+    of_object.into_iter().map(part).collect()
 }
 
 /// Folds sets until there are as many as asked for, or the error is small enough.
@@ -158,9 +163,7 @@ fn fold(
         objects.push(Object { sampler, transform: Similarity::default(), look: part.look });
     }
     let origin = drawing.loaded.cloud.origin;
-    let shining = drawing.loaded.lights.iter().zip(maps).filter(|(light, _)| light.intensity != [0.0; 3]);
-    let lit = shining
-        .map(|(light, map)| LitBy { light: *light, shadow: map.as_ref().map(|m| (m as &dyn Transmittance, origin)) });
+    let lit = drawing.shining(maps).map(|(light, map)| LitBy { light, shadow: map.map(|m| (m, origin)) });
     let lights: Vec<LitBy<'_>> = lit.collect();
     let scene = Scene { objects: &objects, lights: &lights, ambient: drawing.ambient, camera, occluder };
     let set = &drawing.layers;

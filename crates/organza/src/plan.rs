@@ -161,45 +161,29 @@ fn kept_layers(statistics: &Statistics) -> Effect {
 }
 
 fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<PlannedPass> {
-    if statistics.particles {
-        return particle_passes(statistics, shadow_maps);
-    }
-    let pass = |name: &str, reason: String| PlannedPass { name: name.into(), reason };
-    let mut passes = vec![pass(pass::CONVERT, format!("{} splats", statistics.translucent + statistics.opaque))];
+    let (translucent, opaque, particles) = (statistics.translucent, statistics.opaque, statistics.particles);
+    let mut passes = Vec::new();
+    let mut pass = |name: &str, reason: String| passes.push(PlannedPass { name: name.into(), reason });
+    pass(pass::CONVERT, format!("{} splats", translucent + opaque));
     for (i, _) in shadow_maps.iter().enumerate().filter(|(_, on)| **on) {
-        passes.push(pass(pass::SHADOW_MAP, format!("light {i}")));
+        pass(pass::SHADOW_MAP, format!("light {i}"));
     }
-    let (translucent, opaque) = (statistics.translucent, statistics.opaque);
-    if translucent > 0 {
-        passes.push(pass(pass::SORT, format!("{translucent} translucent splats")));
+    if translucent > 0 && !particles {
+        pass(pass::SORT, format!("{translucent} translucent splats"));
     }
-    passes.push(pass(pass::PROJECT, "all splats".into()));
-    passes.push(pass(pass::SHADE, "the splats in view".into()));
-    for (n, name, kind) in [(opaque, pass::OPAQUE, "opaque"), (translucent, pass::SPLAT, "translucent")] {
-        if n > 0 {
-            passes.push(pass(name, format!("{n} {kind} splats")));
-        }
-    }
-    passes.push(pass(pass::FINISH, "samples become pixels".into()));
-    passes
-}
-
-fn particle_passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<PlannedPass> {
-    let pass = |name: &str, reason: String| PlannedPass { name: name.into(), reason };
-    let (translucent, opaque) = (statistics.translucent, statistics.opaque);
-    let mut passes = vec![pass(pass::CONVERT, format!("{} splats", translucent + opaque))];
-    for (i, _) in shadow_maps.iter().enumerate().filter(|(_, on)| **on) {
-        passes.push(pass(pass::SHADOW_MAP, format!("light {i}")));
+    // Particles are projected and shaded one by one in their own pass.
+    let which = if particles { "opaque" } else { "all" };
+    if !particles || opaque > 0 {
+        pass(pass::PROJECT, format!("{which} splats"));
+        pass(pass::SHADE, format!("{which} splats in view"));
     }
     if opaque > 0 {
-        passes.push(pass(pass::PROJECT, "opaque splats".into()));
-        passes.push(pass(pass::SHADE, "the opaque splats in view".into()));
-        passes.push(pass(pass::OPAQUE, format!("{opaque} opaque splats")));
+        pass(pass::OPAQUE, format!("{opaque} opaque splats"));
     }
     if translucent > 0 {
-        passes.push(pass(pass::PARTICLES, format!("{translucent} translucent splats, nothing to sort")));
+        pass(if particles { pass::PARTICLES } else { pass::SPLAT }, format!("{translucent} translucent splats"));
     }
-    passes.push(pass(pass::FINISH, "samples become pixels".into()));
+    pass(pass::FINISH, "samples become pixels".into());
     passes
 }
 
@@ -266,5 +250,8 @@ mod tests {
         assert_eq!(plan(&s).optical_depth_planes, 1);
         s.colored_extinction = true;
         assert_eq!(plan(&s).optical_depth_planes, 3);
+        s.particles = true;
+        let only = plan(&s);
+        assert!(has(&only, pass::PARTICLES) && ![pass::SORT, pass::PROJECT, pass::SPLAT].iter().any(|p| has(&only, p)));
     }
 }

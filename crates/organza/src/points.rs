@@ -7,7 +7,8 @@ use crate::{Error, Progress};
 use splat_core::raster::{self, Background, Detail, OpaqueImage, Projected, RasterCounts};
 use splat_core::shade::{ChannelLayout, LitBy, ShadeInput, shade};
 use splat_core::{
-    Accumulator, Camera, CostRecord, Direction, LayerSet, Layers, SliceOrder, SplatKind, StageCost, Transmittance,
+    Accumulator, Camera, CostRecord, Direction, LayerSet, Layers, Light, SliceOrder, SplatKind, StageCost,
+    Transmittance,
 };
 use std::borrow::Cow;
 use tsm::ShadowMap;
@@ -41,10 +42,7 @@ impl Drawing<'_> {
         camera: &Camera,
         cost: &mut CostRecord,
     ) -> Result<Shaded, Error> {
-        let with_map = self.loaded.lights.iter().zip(maps).filter(|(light, _)| light.intensity != [0.0; 3]);
-        let lights: Vec<LitBy<'_>> = with_map
-            .map(|(light, map)| LitBy { light: *light, shadow: map.as_ref().map(|m| m as &dyn Transmittance) })
-            .collect();
+        let lights: Vec<LitBy<'_>> = self.shining(maps).map(|(light, shadow)| LitBy { light, shadow }).collect();
         let input = ShadeInput {
             cloud: &self.loaded.cloud,
             materials: &self.loaded.materials,
@@ -54,6 +52,15 @@ impl Drawing<'_> {
             camera,
         };
         self.shade(&input, &ChannelLayout::new(&self.layers), cost)
+    }
+
+    /// The lights that have an intensity, with their shadow maps.
+    pub(crate) fn shining<'b>(
+        &'b self,
+        maps: &'b [Option<ShadowMap>],
+    ) -> impl Iterator<Item = (Light, Option<&'b dyn Transmittance>)> {
+        let with_map = self.loaded.lights.iter().zip(maps).filter(|(light, _)| light.intensity != [0.0; 3]);
+        with_map.map(|(light, map)| (*light, map.as_ref().map(|m| m as &dyn Transmittance)))
     }
 
     /// Splats in this order in front of the opaque ones, as layers.

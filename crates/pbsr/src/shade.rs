@@ -8,7 +8,6 @@
 use crate::EnsembleParams;
 use glam::{DVec3, Vec3};
 use splat_core::{Camera, Light, Material, Receiver, Shading, SplatKind, Transmittance, glam, henyey_greenstein};
-use std::f32::consts::PI;
 
 /// The most numbers that a hit brings.
 pub(crate) const MAX_CHANNELS: usize = 13;
@@ -110,7 +109,7 @@ impl Shader<'_> {
                 let phase = henyey_greenstein(-to_light, to_eye, m.asymmetry);
                 (m.single_scattering_albedo * phase, 0.0)
             } else {
-                reflect(m, normal, to_light, to_eye)
+                m.reflect(normal, to_light, to_eye)
             };
             let share = seen.look.shadow_coefficient;
             let transmittance = match lit.shadow {
@@ -133,17 +132,4 @@ impl Shader<'_> {
         }
         (direct, if arriving > 0.0 { received / arriving } else { 1.0 })
     }
-}
-
-/// Reflection per unit irradiance on a facing plane: factor on the colour, and specular.
-fn reflect(m: &Material, normal: Vec3, to_light: Vec3, to_eye: Vec3) -> (f32, f32) {
-    let cosine = normal.dot(to_light);
-    let diffuse = cosine.max(0.0) * (1.0 - m.transmission) + (-cosine).max(0.0) * m.transmission;
-    let mut specular = 0.0;
-    if m.specular > 0.0 && cosine > 0.0 {
-        let mirrored = 2.0 * cosine * normal - to_light;
-        let lobe = mirrored.dot(to_eye).max(0.0).powf(m.shininess);
-        specular = m.specular * (m.shininess + 2.0) / (2.0 * PI) * lobe * cosine;
-    }
-    (m.diffuse / PI * diffuse, specular)
 }

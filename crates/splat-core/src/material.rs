@@ -1,5 +1,8 @@
 //! Lookup tables: materials and objects (Gunjee 2007, section 3: "for some attributes we define a separate table").
 
+use glam::Vec3;
+use std::f32::consts::PI;
+
 /// How a splat turns light into radiance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Shading {
@@ -54,6 +57,26 @@ impl Default for Material {
             extinction_rgb: [1.0; 3],
             surface_opacity: crate::optics::SurfaceOpacity::PerCrossing,
         }
+    }
+}
+
+impl Material {
+    /// Reflection of a surface per unit irradiance on a plane that faces the light: the factor on its colour, and what is
+    /// specular; 1/sr, unit vectors away from the surface, the normal on the viewer's side.
+    ///
+    /// Lambert ρ/π·⟨n·l⟩, of which the share `transmission` goes to the other side, and energy-normalised Phong
+    /// ρ_s·(m + 2)/2π·⟨r·v⟩^m·⟨n·l⟩ (Gunjee 2007, section 4.3).
+    #[inline]
+    pub fn reflect(&self, normal: Vec3, to_light: Vec3, to_eye: Vec3) -> (f32, f32) {
+        let cosine = normal.dot(to_light);
+        let diffuse = cosine.max(0.0) * (1.0 - self.transmission) + (-cosine).max(0.0) * self.transmission;
+        let mut specular = 0.0;
+        if self.specular > 0.0 && cosine > 0.0 {
+            let mirrored = 2.0 * cosine * normal - to_light;
+            let lobe = mirrored.dot(to_eye).max(0.0).powf(self.shininess);
+            specular = self.specular * (self.shininess + 2.0) / (2.0 * PI) * lobe * cosine;
+        }
+        (self.diffuse / PI * diffuse, specular)
     }
 }
 

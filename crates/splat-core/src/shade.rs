@@ -13,7 +13,6 @@ use crate::{
 };
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use std::f32::consts::PI;
 
 /// The most channels that a splat can have: three effects, the normal and the shadow.
 pub const MAX_CHANNELS: usize = 13;
@@ -185,7 +184,8 @@ impl Point {
         let (mut received, mut arriving) = (0.0, 0.0);
         for light in lights {
             let (to_light, irradiance) = light.irradiance(&self.receiver);
-            let response = if by_phase { self.scatter(to_light) } else { self.reflect(to_light) };
+            let (diffuse, specular) =
+                if by_phase { (self.scatter(to_light), 0.0) } else { m.reflect(self.normal, to_light, self.to_eye) };
             let transmittance = match light.shadow {
                 // Nothing to attenuate: the map is not asked.
                 Some(shadow) if self.shadow_coefficient > 0.0 && irradiance != [0.0; 3] => {
@@ -194,7 +194,7 @@ impl Point {
                 _ => [1.0; 3],
             };
             for c in 0..3 {
-                out.direct[c] += irradiance[c] * transmittance[c] * (response.0[c] + response.1);
+                out.direct[c] += irradiance[c] * transmittance[c] * (self.color[c] * diffuse + specular);
             }
             received += irradiance[1] * transmittance[1];
             arriving += irradiance[1];
@@ -205,26 +205,11 @@ impl Point {
         out
     }
 
-    /// Single scattering per unit irradiance: colour, and nothing specular.
-    fn scatter(&self, to_light: Vec3) -> ([f32; 3], f32) {
+    /// Single scattering per unit irradiance: the factor on the colour.
+    fn scatter(&self, to_light: Vec3) -> f32 {
         // Light travels along −to_light and leaves along to_eye.
         let phase = henyey_greenstein(-to_light, self.to_eye, self.material.asymmetry);
-        let share = self.material.single_scattering_albedo * phase;
-        (self.color.map(|c| c * share), 0.0)
-    }
-
-    /// Reflection per unit irradiance on a facing plane: diffuse colour, and specular.
-    fn reflect(&self, to_light: Vec3) -> ([f32; 3], f32) {
-        let m = &self.material;
-        let cosine = self.normal.dot(to_light);
-        let diffuse = cosine.max(0.0) * (1.0 - m.transmission) + (-cosine).max(0.0) * m.transmission;
-        let mut specular = 0.0;
-        if m.specular > 0.0 && cosine > 0.0 {
-            let mirrored = 2.0 * cosine * self.normal - to_light;
-            let lobe = mirrored.dot(self.to_eye).max(0.0).powf(m.shininess);
-            specular = m.specular * (m.shininess + 2.0) / (2.0 * PI) * lobe * cosine;
-        }
-        (self.color.map(|c| c * m.diffuse / PI * diffuse), specular)
+        self.material.single_scattering_albedo * phase
     }
 }
 

@@ -171,9 +171,10 @@ fn draw(svg: &mut String, series: &Series, x: &Axis, y: &Axis) {
 }
 
 fn line(svg: &mut String, a: [f64; 2], b: [f64; 2], color: &str, dash: &str) {
+    let dash = if dash.is_empty() { String::new() } else { format!(" stroke-dasharray=\"{dash}\"") };
     let _ = writeln!(
         svg,
-        "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" stroke=\"{color}\" stroke-dasharray=\"{dash}\"/>",
+        "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" stroke=\"{color}\"{dash}/>",
         a[0], a[1], b[0], b[1]
     );
 }
