@@ -3,7 +3,7 @@
 //! Surfaces: L = ρ/π·E·⟨n·l⟩ + ρ_s·(m + 2)/2π·⟨r·v⟩^m·E·⟨n·l⟩, the normal turned to the viewer; the share `transmission` of
 //! the diffuse light passes to the other side. Media: L = ω·c·p(θ)·E. Ambient radiance adds ρ·L_ambient.
 //!
-//! A particle is a point: it has no radius that would soften a light near to it.
+//! Near a light a particle receives what the splats of its object receive: 1/(d² + σ²), σ a third of their radius.
 
 use crate::EnsembleParams;
 use glam::{DVec3, Vec3};
@@ -28,7 +28,7 @@ pub struct Appearance {
     pub material: Material,
     /// What casts and receives shadows: a medium attenuates its own light, a surface does not.
     pub kind: SplatKind,
-    /// Radius of the object's splats in the shadow map, world units; 0 for none.
+    /// Radius of the object's splats, world units, in the shadow map and near lights; 0 for bare points.
     pub radius: f32,
     /// Share of the shadow that is received, in \[0, 1\].
     pub shadow_coefficient: f32,
@@ -103,7 +103,7 @@ impl Shader<'_> {
         let (mut received, mut arriving) = (0.0, 0.0);
         let position = self.camera.position + seen.from_eye;
         for lit in self.lights {
-            let (to_light, irradiance) = lit.light.irradiance(position, 0.0);
+            let (to_light, irradiance) = lit.light.irradiance(position, f64::from(seen.look.radius) / 3.0);
             let to_light = to_light.as_vec3();
             let (diffuse, specular) = if by_phase {
                 let phase = henyey_greenstein(-to_light, to_eye, m.asymmetry);
