@@ -29,6 +29,7 @@ fn metadata() -> Metadata {
         technique: "points".into(),
         seed: u64::MAX,
         backend: "cpu".into(),
+        sets: Some(12),
         exposure: 1.0,
     }
 }
@@ -84,6 +85,7 @@ fn an_exr_file_says_how_it_was_made() {
     assert_eq!(attribute("organza:technique"), "points");
     assert_eq!(attribute("organza:seed"), u64::MAX.to_string());
     assert_eq!(attribute("organza:backend"), "cpu");
+    assert_eq!(attribute("organza:sets"), "12");
 }
 
 #[test]

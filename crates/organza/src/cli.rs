@@ -32,7 +32,7 @@ pub(crate) fn main() -> ExitCode {
         };
         let wants_json = arguments.command.wants_json();
         match run(arguments.command) {
-            Ok(()) => 0,
+            Ok(code) => code,
             Err(error) => {
                 console::report_error(&error, wants_json);
                 error.exit_code()
@@ -41,15 +41,17 @@ pub(crate) fn main() -> ExitCode {
     }))
 }
 
-fn run(command: Command) -> Result<(), Error> {
+/// The exit code of a command that has said what it had to say.
+fn run(command: Command) -> Result<u8, Error> {
     match command {
-        Command::Render(arguments) => render::run(&arguments),
+        Command::Render(arguments) => return render::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
         Command::Accuracy(arguments) => accuracy::run(&arguments),
         Command::Orders(arguments) => orders::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Schema => console::out(&(organza::scene::schema() + "\n")),
     }
+    .map(|()| 0)
 }
 
 /// Runs `work`; a panic is a bug of ours, says so and gives 1.

@@ -44,5 +44,5 @@ pub mod truth;
 pub use error::{Error, escape_controls, printable};
 pub use info::{FileInfo, info};
 pub use load::{Loaded, SplatCount, load};
-pub use render::{Explanation, Render, RenderOptions, explain, render};
+pub use render::{Explanation, Render, RenderOptions, Sets, explain, render};
 pub use splat_core::{CostRecord, Layers, Progress};

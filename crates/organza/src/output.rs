@@ -21,6 +21,8 @@ pub struct Metadata {
     pub seed: u64,
     /// Name of the backend that drew it.
     pub backend: String,
+    /// Sets that were averaged, of a technique that averages.
+    pub sets: Option<u32>,
     /// Exposure of the displayed picture in stops; only PNG applies it.
     pub exposure: f64,
 }

@@ -5,13 +5,15 @@
 //! kernel, so that its optical depth is that of the `points` technique. Opaque surfaces are drawn exactly and hide particles
 //! behind them. Light comes from the same shadow maps.
 
+mod checkpoint;
 mod ensemble;
 mod parts;
 
 use crate::load::Loaded;
 use crate::plan::pass;
 use crate::points::Drawing;
-use crate::{Error, RenderOptions};
+use crate::{Error, RenderOptions, Sets};
+pub(crate) use checkpoint::Checkpoint;
 use ensemble::{accumulate, error_layer, fold};
 use parts::parts;
 use pbsr::Occluder;
@@ -20,8 +22,13 @@ use splat_core::shade::ChannelLayout;
 use splat_core::{Accumulator, Camera, CostRecord, LayerData, Layers, SplatKind};
 use tsm::ShadowMap;
 
-/// Runs the planned passes.
-pub(crate) fn draw(drawing: &Drawing<'_>, options: &RenderOptions, cost: &mut CostRecord) -> Result<Layers, Error> {
+/// Runs the planned passes. An interrupt after two sets leaves the picture of the sets so far.
+pub(crate) fn draw(
+    drawing: &Drawing<'_>,
+    options: &RenderOptions,
+    checkpoint: Option<&mut Checkpoint>,
+    cost: &mut CostRecord,
+) -> Result<(Layers, Option<Sets>), Error> {
     let maps = drawing.shadow_maps(cost)?;
     let camera = drawing.sample_camera();
     let layout = ChannelLayout::new(&drawing.layers);
@@ -29,20 +36,22 @@ pub(crate) fn draw(drawing: &Drawing<'_>, options: &RenderOptions, cost: &mut Co
     let parts = parts(drawing, &camera);
     let mut accumulator = Accumulator::new(camera.size, 1, layout.count(), false, false);
     let wanted = drawing.settings.layers.names().any(|name| name == "std_error");
-    let mut std_error = Vec::new();
+    let (mut std_error, mut sets) = (Vec::new(), None);
     if !parts.is_empty() {
         let occluder = occluder(&opaque, &layout);
-        let ensemble = cost.measure(pass::PARTICLES, |stage| {
-            let (ensemble, particles) = fold(drawing, &parts, &maps, &camera, occluder.as_ref(), options)?;
+        let average = cost.measure(pass::PARTICLES, |stage| {
+            let average = fold(drawing, &parts, &maps, &camera, occluder.as_ref(), options, checkpoint)?;
             stage.items_in = parts.iter().map(|p| p.cloud.len() as u64).sum();
-            stage.items_out = particles;
-            stage.bytes = ensemble.bytes();
-            Ok::<_, Error>(ensemble)
+            stage.items_out = average.particles;
+            stage.bytes = average.ensemble.bytes();
+            Ok::<_, Error>(average)
         })?;
-        accumulate(&ensemble, &layout, &mut accumulator);
+        accumulate(&average.ensemble, &layout, &mut accumulator);
         if wanted {
-            std_error = error_layer(&ensemble, drawing, occluder.as_ref());
+            std_error = error_layer(&average.ensemble, drawing, occluder.as_ref());
         }
+        let asked = drawing.settings.particles.repeat_level;
+        sets = Some(Sets { averaged: average.ensemble.levels(), asked, interrupted: average.interrupted });
     }
     cost.measure(pass::FINISH, |stage| {
         stage.items_in = u64::from(camera.size[0]) * u64::from(camera.size[1]);
@@ -54,7 +63,7 @@ pub(crate) fn draw(drawing: &Drawing<'_>, options: &RenderOptions, cost: &mut Co
             std_error.resize(layers.size.iter().map(|s| *s as usize).product(), 0.0);
             layers.insert("std_error", LayerData::Scalar(std_error));
         }
-        Ok(layers)
+        Ok((layers, sets))
     })
 }
 

@@ -1,13 +1,14 @@
 //! From a scene to images: load, plan, draw.
 
 use crate::load::{Loaded, SplatCount, load};
-use crate::particles;
+use crate::particles::{self, Checkpoint};
 use crate::plan::{Plan, pass, plan};
 use crate::points::{self, Drawing};
 use crate::scene::{Scene, Technique};
 use crate::statistics::{LightStatistics, Statistics};
 use crate::{CostRecord, Error, Layers, Progress};
 use splat_core::{LayerData, LayerSet};
+use std::path::PathBuf;
 
 /// What a render may take and how it treats doubtful input.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,11 +19,14 @@ pub struct RenderOptions {
     pub drop_invalid: bool,
     /// Make one point of points at the same place, for every object.
     pub merge_duplicates: bool,
+    /// File of the sums of the technique `particles`: read before, if it is there, and written every few seconds, at the
+    /// end and at an interrupt. A render that is stopped at any moment goes on from it and ends in the same bits.
+    pub checkpoint: Option<PathBuf>,
 }
 
 impl Default for RenderOptions {
     fn default() -> Self {
-        Self { max_memory: 8 << 30, drop_invalid: false, merge_duplicates: false }
+        Self { max_memory: 8 << 30, drop_invalid: false, merge_duplicates: false, checkpoint: None }
     }
 }
 
@@ -35,8 +39,21 @@ pub struct Render {
     pub cost: CostRecord,
     /// What was done and why.
     pub plan: Plan,
+    /// Sets that were averaged; `None` when the picture is not an average.
+    pub sets: Option<Sets>,
     /// What a user should know of the input, one sentence each.
     pub warnings: Vec<String>,
+}
+
+/// Sets of particles in a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sets {
+    /// Sets that were averaged.
+    pub averaged: u32,
+    /// Most sets that were asked for.
+    pub asked: u32,
+    /// Whether it was cancelled before there were enough.
+    pub interrupted: bool,
 }
 
 /// What a render would do, without doing it.
@@ -54,19 +71,23 @@ pub struct Explanation {
     pub warnings: Vec<String>,
 }
 
-/// Renders a scene.
+/// Renders a scene. The technique `particles` has a picture at any time: cancelled after two sets, it is that of the sets
+/// so far, and [`Render::sets`] says so.
 ///
 /// # Errors
 /// [`Error::Input`] and [`Error::Io`] for data, [`Error::Limit`] before more memory is taken than allowed,
 /// [`Error::Cancelled`] after `progress.cancel()`.
 pub fn render(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Render, Error> {
+    let open = |path: &PathBuf| Checkpoint::open(path, scene, options);
+    let mut checkpoint = options.checkpoint.as_ref().map(open).transpose()?;
     let (loaded, explanation) = prepare(scene, options, progress)?;
     let Explanation { plan, mut cost, warnings, .. } = explanation;
-    let layers = draw_loaded(scene, &loaded, &plan, options, progress, &mut cost)?;
-    Ok(Render { layers, cost, plan, warnings })
+    let drawing = drawing(scene, &loaded, &plan, options, progress);
+    let (layers, sets) = draw(scene, &drawing, options, checkpoint.as_mut(), &mut cost)?;
+    Ok(Render { layers, cost, plan, sets, warnings })
 }
 
-/// Runs the planned passes on a loaded scene and keeps the layers that it asks for.
+/// Runs the planned passes on a loaded scene to their end and keeps the layers that it asks for.
 pub(crate) fn draw_loaded(
     scene: &Scene,
     loaded: &Loaded,
@@ -75,15 +96,28 @@ pub(crate) fn draw_loaded(
     progress: &Progress,
     cost: &mut CostRecord,
 ) -> Result<Layers, Error> {
-    progress.add_total(plan.passes.len() as u64);
     let drawing = drawing(scene, loaded, plan, options, progress);
-    let mut layers = match scene.render.technique {
-        Technique::Auto | Technique::Points => points::draw(&drawing, cost)?,
-        Technique::Particles => particles::draw(&drawing, options, cost)?,
+    match draw(scene, &drawing, options, None, cost)? {
+        (_, Some(Sets { interrupted: true, .. })) => Err(Error::Cancelled),
+        (layers, _) => Ok(layers),
+    }
+}
+
+fn draw(
+    scene: &Scene,
+    drawing: &Drawing<'_>,
+    options: &RenderOptions,
+    checkpoint: Option<&mut Checkpoint>,
+    cost: &mut CostRecord,
+) -> Result<(Layers, Option<Sets>), Error> {
+    drawing.progress.add_total(drawing.plan.passes.len() as u64);
+    let (mut layers, sets) = match scene.render.technique {
+        Technique::Auto | Technique::Points => (points::draw(drawing, cost)?, None),
+        Technique::Particles => particles::draw(drawing, options, checkpoint, cost)?,
     };
-    restore_depths(&mut layers, loaded.exponent);
+    restore_depths(&mut layers, drawing.loaded.exponent);
     scene.render.layers.keep(&mut layers);
-    Ok(layers)
+    Ok((layers, sets))
 }
 
 /// What drawing a loaded scene reads.

@@ -93,7 +93,8 @@ impl Renderer {
         Self::default()
     }
 
-    /// Adds `levels` sets to `ensemble`, from set `ensemble.levels()` on; ticks once a set. When it fails, the sets of
+    /// Adds `levels` sets to `ensemble`, from set `ensemble.levels()` on; ticks once a set (the caller announces
+    /// them). When it fails, the sets of
     /// whole batches before are in, and the ensemble is valid.
     ///
     /// # Errors
@@ -108,7 +109,6 @@ impl Renderer {
         progress: &Progress,
     ) -> Result<Counts, Error> {
         let plan = Plan::new(scene, ensemble, levels, params)?;
-        progress.add_total(u64::from(levels));
         let mut counts = Counts::default();
         let mut left = levels;
         while left > 0 {

@@ -3,7 +3,7 @@
 use super::args::AccuracyArguments;
 use super::bar::with_bar;
 use super::console;
-use super::session::{in_folder, inputs, load_scene, path_text, render_options, start_threads};
+use super::session::{in_folder, load_scene, path_text, render_options, start_threads};
 use organza::accuracy::{self, Options, Outcome, Renderer, Report, Study};
 use organza::{Error, printable};
 use serde_json::json;
@@ -18,7 +18,7 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
         accuracy::shrink(&mut scene, options.longest_side());
     }
     in_folder(&arguments.out, || {
-        Report::check(&arguments.out, arguments.force, &inputs(&scene))?;
+        Report::check(&arguments.out, arguments.force, &scene.files())?;
         start_threads(arguments.scene.threads)?;
         let mut render = render_options(&arguments.scene);
         if arguments.scene.max_memory.is_none() {

@@ -70,6 +70,12 @@ pub(super) struct SceneArguments {
     /// Largest change of a displayed pixel (0 to 1) by what is not simulated
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = parse_finite)]
     pub(super) tolerance: Option<f64>,
+    /// Standard error of luminance at which the technique `particles` has averaged enough sets
+    #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = parse_finite)]
+    pub(super) target_error: Option<f64>,
+    /// Most sets that the technique `particles` averages
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(i64).range(0..))]
+    pub(super) repeat_level: Option<i64>,
     /// Exposure of the displayed picture, stops
     #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = parse_finite)]
     pub(super) exposure: Option<f64>,
@@ -100,6 +106,9 @@ pub(super) struct RenderArguments {
     /// Output, .exr or .png; several are allowed [default: the scene's name with .exr, in this folder]
     #[arg(short, long = "output", value_name = "FILE")]
     pub(super) output: Vec<PathBuf>,
+    /// Keep the sums of the technique `particles` in a file, and go on from it if it is there
+    #[arg(long, value_name = "FILE")]
+    pub(super) checkpoint: Option<PathBuf>,
     /// Store the colours of EXR files in 16 bits
     #[arg(long)]
     pub(super) half: bool,

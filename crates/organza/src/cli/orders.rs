@@ -3,7 +3,7 @@
 use super::args::OrdersArguments;
 use super::bar::with_bar;
 use super::console;
-use super::session::{in_folder, inputs, load_scene, path_text, render_options, start_threads};
+use super::session::{in_folder, load_scene, path_text, render_options, start_threads};
 use organza::orders::{self, OrdersReport};
 use organza::{Error, accuracy, printable};
 use serde_json::json;
@@ -15,7 +15,7 @@ pub(super) fn run(arguments: &OrdersArguments) -> Result<(), Error> {
         accuracy::shrink(&mut scene, orders::LONGEST_SIDE);
     }
     in_folder(&arguments.out, || {
-        OrdersReport::check(&arguments.out, arguments.force, &inputs(&scene))?;
+        OrdersReport::check(&arguments.out, arguments.force, &scene.files())?;
         start_threads(arguments.scene.threads)?;
         let options = render_options(&arguments.scene);
         let comparison = with_bar(|progress| orders::compare(&scene, &options, progress))?;

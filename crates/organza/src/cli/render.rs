@@ -2,27 +2,31 @@
 
 use super::args::RenderArguments;
 use super::bar::with_bar;
-use super::session::{inputs, load_scene, path_text, render_options, start_threads};
+use super::session::{load_scene, path_text, render_options, start_threads};
 use super::{console, report};
 use organza::output::{self, Format, Metadata, WriteReport, check_target, write_atomically};
 use organza::scene::Scene;
-use organza::{Error, Render, printable};
+use organza::{Error, Render, RenderOptions, Sets, printable};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// The backend of this version, as metadata and reports name it.
 const BACKEND: &str = "cpu";
 
-/// Renders and writes. Whatever can be refused is refused before any work.
-pub(super) fn run(arguments: &RenderArguments) -> Result<(), Error> {
+/// Renders and writes, and gives the exit code. Whatever can be refused is refused before any work.
+pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
     let outputs = outputs(arguments)?;
     let scene = load_scene(&arguments.scene)?;
-    let inputs = inputs(&scene);
+    let inputs = scene.files();
     for path in outputs.iter().chain(&arguments.cost) {
         check_target(path, arguments.force, &inputs)?;
     }
+    if let Some(path) = &arguments.checkpoint {
+        // One that is there is gone on from; the library refuses a file that is something else.
+        check_target(path, true, &inputs)?;
+    }
     start_threads(arguments.scene.threads)?;
-    let options = render_options(&arguments.scene);
+    let options = RenderOptions { checkpoint: arguments.checkpoint.clone(), ..render_options(&arguments.scene) };
     let render = with_bar(|progress| organza::render(&scene, &options, progress))?;
     for warning in &render.warnings {
         console::warn(warning);
@@ -31,7 +35,14 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Error> {
     if let Some(path) = &arguments.cost {
         write_atomically(path, format!("{:#}\n", report::cost_json(&render.cost)).as_bytes())?;
     }
-    console::out(&summary(&scene, &render, &written, arguments.scene.json))
+    console::out(&summary(&scene, &render, &written, arguments.scene.json))?;
+    Ok(match render.sets {
+        Some(Sets { averaged, asked, interrupted: true }) => {
+            console::warn(&format!("interrupted: the picture is the average of {averaged} of {asked} sets"));
+            Error::Cancelled.exit_code()
+        }
+        _ => 0,
+    })
 }
 
 fn metadata(scene: &Scene, render: &Render) -> Metadata {
@@ -40,6 +51,7 @@ fn metadata(scene: &Scene, render: &Render) -> Metadata {
         technique: render.plan.technique.to_owned(),
         seed: scene.render.seed,
         backend: BACKEND.into(),
+        sets: render.sets.map(|s| s.averaged),
         exposure: scene.render.exposure,
     }
 }
@@ -53,7 +65,8 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Error> {
     }
     for (i, path) in outputs.iter().enumerate() {
         Format::of_path(path)?;
-        if outputs[..i].contains(path) || arguments.cost.as_ref() == Some(path) {
+        let others = [&arguments.cost, &arguments.checkpoint];
+        if outputs[..i].contains(path) || others.iter().any(|other| other.as_ref() == Some(path)) {
             return Err(Error::usage(format!("{}: this output is named twice", printable(path)), ""));
         }
     }
@@ -84,6 +97,9 @@ fn write_outputs(
 fn summary(scene: &Scene, render: &Render, written: &[(PathBuf, WriteReport)], as_json: bool) -> String {
     if !as_json {
         let mut text = report::cost_text(&render.cost);
+        if let Some(Sets { averaged, asked, .. }) = render.sets {
+            text += &format!("averaged {averaged} of {asked} sets\n");
+        }
         for (path, report) in written {
             text += &format!("wrote {} ({} bytes)\n", printable(path), report.bytes);
         }
@@ -103,6 +119,7 @@ fn summary(scene: &Scene, render: &Render, written: &[(PathBuf, WriteReport)], a
         "outputs": outputs.collect::<serde_json::Value>(),
         "plan": report::plan_json(&render.plan),
         "cost": report::cost_json(&render.cost),
+        "sets": render.sets.map(|s| json!({ "averaged": s.averaged, "asked": s.asked, "interrupted": s.interrupted })),
         "warnings": render.warnings,
     });
     format!("{document:#}\n")

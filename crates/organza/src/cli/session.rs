@@ -2,9 +2,9 @@
 
 use super::args::{Backend, SceneArguments};
 use super::memory;
-use organza::scene::{self, LoadOptions, Override, Scene, Source};
+use organza::scene::{self, LoadOptions, Override, Scene};
 use organza::{Error, RenderOptions, printable};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Loads the scene with the options of the command line.
 pub(super) fn load_scene(arguments: &SceneArguments) -> Result<Scene, Error> {
@@ -19,6 +19,7 @@ pub(super) fn render_options(arguments: &SceneArguments) -> RenderOptions {
         max_memory: arguments.max_memory.unwrap_or_else(memory::default_limit),
         drop_invalid: arguments.drop_invalid,
         merge_duplicates: arguments.merge_duplicates,
+        checkpoint: None,
     }
 }
 
@@ -26,17 +27,6 @@ pub(super) fn render_options(arguments: &SceneArguments) -> RenderOptions {
 pub(super) fn start_threads(threads: u64) -> Result<(), Error> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build_global();
     pool.map_err(|e| Error::usage(format!("--threads {threads}: {e}"), "use fewer threads"))
-}
-
-/// Every file that the scene is made from.
-pub(super) fn inputs(scene: &Scene) -> Vec<PathBuf> {
-    let of_object = |source: &Source| match source {
-        Source::Mesh(path) | Source::Points(path) => Some(path.clone()),
-        Source::Volume(volume) => Some(volume.path.clone()),
-        _ => None,
-    };
-    let data = scene.objects.iter().filter_map(|o| of_object(&o.source));
-    std::iter::once(scene.file.clone()).chain(data).collect()
 }
 
 /// A folder for outputs, made if it is not there; an empty one that was made is gone again when the work fails.
@@ -75,6 +65,12 @@ fn overrides(a: &SceneArguments) -> Result<Vec<Override>, Error> {
     }
     if let Some(tolerance) = a.tolerance {
         options.push((format!("--tolerance {tolerance}"), "render.tolerance", format!("{tolerance:?}")));
+    }
+    if let Some(error) = a.target_error {
+        options.push((format!("--target-error {error}"), "render.particles.target_error", format!("{error:?}")));
+    }
+    if let Some(levels) = a.repeat_level {
+        options.push((format!("--repeat-level {levels}"), "render.particles.repeat_level", levels.to_string()));
     }
     if let Some(exposure) = a.exposure {
         options.push((format!("--exposure {exposure}"), "render.exposure", format!("{exposure:?}")));

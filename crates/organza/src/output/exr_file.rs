@@ -43,18 +43,20 @@ pub(super) fn encode(
 }
 
 /// Metadata as attributes; the encoder takes Latin text of limited length alone.
-fn texts(metadata: &Metadata) -> [(&'static str, String); 5] {
+fn texts(metadata: &Metadata) -> Vec<(&'static str, String)> {
     let ascii = |text: &str| -> String {
         let visible = |c: char| if c.is_ascii_graphic() || c == ' ' { c } else { '?' };
         text.chars().take(LONGEST_TEXT).map(visible).collect()
     };
-    [
+    let mut texts = vec![
         ("organza:version", ascii(env!("CARGO_PKG_VERSION"))),
         ("organza:scene_sha256", ascii(&metadata.scene_sha256)),
         ("organza:technique", ascii(&metadata.technique)),
         ("organza:seed", metadata.seed.to_string()),
         ("organza:backend", ascii(&metadata.backend)),
-    ]
+    ];
+    texts.extend(metadata.sets.map(|sets| ("organza:sets", sets.to_string())));
+    texts
 }
 
 type Channels = SmallVec<[AnyChannel<FlatSamples>; 4]>;

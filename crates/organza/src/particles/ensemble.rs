@@ -1,5 +1,6 @@
 //! Sets of particles → means of the pixels, and their error.
 
+use super::checkpoint::Checkpoint;
 use super::fault;
 use super::parts::Part;
 use crate::points::Drawing;
@@ -12,6 +13,8 @@ use tsm::ShadowMap;
 
 /// Sets between two looks at the error.
 const BATCH: u32 = 8;
+/// Without a wanted error, a step is the number of sets so far over this.
+const GROWTH: u32 = 16;
 /// Optical depth of a pixel that particles hide in every set.
 const HIDDEN: f32 = 64.0;
 /// Share of the allowed memory that the particles of one batch may take.
@@ -25,7 +28,8 @@ pub(super) fn fold(
     camera: &Camera,
     occluder: Option<&Occluder>,
     options: &RenderOptions,
-) -> Result<(Ensemble, u64), Error> {
+    mut checkpoint: Option<&mut Checkpoint>,
+) -> Result<Average, Error> {
     let samplers =
         parts.iter().map(|p| SplatSampler::new(&p.cloud, &p.params)).collect::<Result<Vec<_>, _>>().map_err(fault)?;
     let mut objects = Vec::with_capacity(parts.len());
@@ -44,24 +48,57 @@ pub(super) fn fold(
         depth_range: None,
         radiance_unit: 0.0,
     };
-    let mut ensemble = Ensemble::new(camera.size, &kept).map_err(fault)?;
+    let ensemble = match checkpoint.as_deref_mut().and_then(Checkpoint::take) {
+        Some(found) => found,
+        None => Ensemble::new(camera.size, &kept).map_err(fault)?,
+    };
+    let mut average = Average { ensemble, particles: 0, interrupted: false };
     let params = FoldParams { max_bytes: options.max_memory / BATCH_SHARE, ..FoldParams::default() };
-    let ParticlesSettings { repeat_level, target_error } = drawing.settings.particles;
+    let settings = &drawing.settings.particles;
     let background = |_, _| drawing.background;
     let mut renderer = Renderer::new();
-    let mut particles = 0;
-    while ensemble.levels() < repeat_level {
-        let step = if target_error.is_some() { BATCH } else { repeat_level };
-        let levels = step.min(repeat_level - ensemble.levels());
-        let counts = renderer.fold(&scene, &mut ensemble, levels, &params, drawing.progress).map_err(fault)?;
-        particles += counts.particles;
-        let reached =
-            |target: f64| ensemble.rms_error(&background, occluder) / f64::from(drawing.settings.antialias) <= target;
-        if target_error.is_some_and(reached) {
+    drawing.progress.add_total(u64::from(settings.repeat_level.saturating_sub(average.ensemble.levels())));
+    while let Some(levels) = average.next_step(settings) {
+        let counts = renderer.fold(&scene, &mut average.ensemble, levels, &params, drawing.progress);
+        match counts.map_err(fault) {
+            Ok(counts) => average.particles += counts.particles,
+            // Two sets are a picture, with its error.
+            Err(Error::Cancelled) if average.ensemble.levels() >= 2 => average.interrupted = true,
+            Err(error) => return Err(error),
+        }
+        if let Some(checkpoint) = checkpoint.as_deref_mut() {
+            checkpoint.write_if_due(&average.ensemble)?;
+        }
+        let reached = |target: f64| {
+            average.ensemble.rms_error(&background, occluder) / f64::from(drawing.settings.antialias) <= target
+        };
+        if average.interrupted || settings.target_error.is_some_and(reached) {
             break;
         }
     }
-    Ok((ensemble, particles))
+    if let Some(checkpoint) = checkpoint {
+        checkpoint.write(&average.ensemble)?;
+    }
+    Ok(average)
+}
+
+/// Sets that were folded.
+pub(super) struct Average {
+    pub(super) ensemble: Ensemble,
+    /// Particles of the sets that this run made.
+    pub(super) particles: u64,
+    /// Whether it was stopped before there were enough.
+    pub(super) interrupted: bool,
+}
+
+impl Average {
+    /// Sets until the next look at error and clock; `None` when there are enough.
+    fn next_step(&self, settings: &ParticlesSettings) -> Option<u32> {
+        let left = settings.repeat_level.checked_sub(self.ensemble.levels()).filter(|left| *left > 0)?;
+        // Where the error decides, the looks depend on nothing else.
+        let grown = if settings.target_error.is_some() { 0 } else { self.ensemble.levels() / GROWTH };
+        Some((BATCH + grown).min(left))
+    }
 }
 
 /// Means over the sets as what translucent splats leave in an accumulator.

@@ -31,6 +31,19 @@ pub struct Scene {
     pub footprints: FootprintStack,
 }
 
+impl Scene {
+    /// Every file that the scene is made of, its own first.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let of_object = |source: &Source| match source {
+            Source::Mesh(path) | Source::Points(path) => Some(path.clone()),
+            Source::Volume(volume) => Some(volume.path.clone()),
+            _ => None,
+        };
+        let data = self.objects.iter().filter_map(|o| of_object(&o.source));
+        std::iter::once(self.file.clone()).chain(data).collect()
+    }
+}
+
 /// One object of the scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneObject {

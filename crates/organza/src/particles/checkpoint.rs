@@ -1,0 +1,96 @@
+//! The sums of a render on disk, so that a render that was stopped goes on in the same bits.
+//!
+//! The file's tag is a hash of everything that its sums depend on: the version of the program, the checked scene without
+//! its count of sets, error and exposure, how doubtful input is treated, and the bytes of every file that the scene is
+//! made of. The count of sets may therefore be raised later.
+
+use crate::output::write_atomically;
+use crate::scene::{RenderSettings, Scene, Technique};
+use crate::{Error, RenderOptions, printable};
+use pbsr::Ensemble;
+use sha2::{Digest, Sha256};
+use std::fs::File;
+use std::io::{self, BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Least time between two writes.
+const INTERVAL: Duration = Duration::from_secs(2);
+/// Time between two writes, in times that the last one took: writing costs no more than a hundredth.
+const PATIENCE: u32 = 100;
+
+/// Where sums are kept, and those that were found there.
+#[derive(Debug)]
+pub(crate) struct Checkpoint {
+    path: PathBuf,
+    tag: [u8; 32],
+    found: Option<Ensemble>,
+    written: Instant,
+    pause: Duration,
+}
+
+impl Checkpoint {
+    /// Reads the file if there is one.
+    pub(crate) fn open(path: &Path, scene: &Scene, options: &RenderOptions) -> Result<Self, Error> {
+        if scene.render.technique != Technique::Particles {
+            let message = "only the technique `particles` is drawn in sets that a checkpoint can keep";
+            return Err(Error::usage(message, "use --technique particles, or no --checkpoint"));
+        }
+        let tag = tag(scene, options)?;
+        let found = match std::fs::read(path) {
+            Ok(bytes) => Some(Ensemble::from_bytes(&bytes, &tag).map_err(|e| foreign(path, &e))?),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => None,
+            Err(e) => return Err(Error::io(path, "cannot read the checkpoint", e)),
+        };
+        Ok(Self { path: path.to_owned(), tag, found, written: Instant::now(), pause: INTERVAL })
+    }
+
+    /// The sums that were found, once.
+    pub(super) fn take(&mut self) -> Option<Ensemble> {
+        self.found.take()
+    }
+
+    /// Writes the sums if the last writing was long enough ago.
+    pub(super) fn write_if_due(&mut self, ensemble: &Ensemble) -> Result<(), Error> {
+        if self.written.elapsed() < self.pause { Ok(()) } else { self.write(ensemble) }
+    }
+
+    /// Writes the sums, whole or not at all.
+    pub(super) fn write(&mut self, ensemble: &Ensemble) -> Result<(), Error> {
+        let start = Instant::now();
+        write_atomically(&self.path, &ensemble.to_bytes(&self.tag))?;
+        self.written = Instant::now();
+        self.pause = INTERVAL.max(PATIENCE * start.elapsed());
+        Ok(())
+    }
+}
+
+fn foreign(path: &Path, error: &pbsr::Error) -> Error {
+    let hint = "name another --checkpoint, or remove this file to begin anew";
+    Error::input(printable(path), error.to_string(), hint)
+}
+
+fn tag(scene: &Scene, options: &RenderOptions) -> Result<[u8; 32], Error> {
+    let mut same = scene.clone();
+    (same.file, same.sha256) = (PathBuf::new(), String::new());
+    let RenderSettings { particles, exposure, .. } = &mut same.render;
+    (particles.repeat_level, particles.target_error, *exposure) = (0, None, 0.0);
+    let mut hasher = Sha256::new();
+    hasher.update(env!("CARGO_PKG_VERSION"));
+    // Every number is written so that it reads back the same.
+    hasher.update(format!("{same:?} {} {}", options.drop_invalid, options.merge_duplicates));
+    for path in scene.files().iter().skip(1) {
+        let fail = |e| Error::io(path, "cannot read", e);
+        let mut file = BufReader::with_capacity(1 << 20, File::open(path).map_err(fail)?);
+        loop {
+            let bytes = file.fill_buf().map_err(fail)?;
+            if bytes.is_empty() {
+                break;
+            }
+            hasher.update(bytes);
+            let n = bytes.len();
+            file.consume(n);
+        }
+    }
+    Ok(hasher.finalize().into())
+}

@@ -1,0 +1,186 @@
+//! Renders by particles that stop in the middle: checkpoints, the picture at an interrupt, and the same bits at the end.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use organza_tests::organza;
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
+use tempfile::TempDir;
+
+const SCENE: &str = r#"version = 1
+[camera]
+position = [0, 0, 4]
+target = [0, 0, 0]
+size = [96, 64]
+[background]
+color = [0.25, 0.5, 1.0]
+[[light]]
+kind = "point"
+position = [2, 4, 1]
+intensity = [20, 20, 20]
+[[object]]
+name = "fog"
+medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 1.5, spacing = 0.25 }
+[[object]]
+name = "sheet"
+mesh = "sheet.ply"
+material = "thin"
+[material.thin]
+opacity = 0.5
+color = [0.9, 0.4, 0.1]
+[render]
+technique = "particles"
+antialias = 1
+layers = ["std_error", "shadow"]
+"#;
+
+const SHEET: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+                     element face 1\nproperty list uchar int vertex_indices\nend_header\n-1 -1 0.2\n1 -1 0\n0 1 0.4\n\
+                     3 0 1 2\n";
+
+struct Place {
+    folder: TempDir,
+}
+
+impl Place {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("s.toml"), SCENE).unwrap();
+        fs::write(folder.path().join("sheet.ply"), SHEET).unwrap();
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = organza();
+        command.args(["render", "s.toml", "--force"]).args(arguments).current_dir(&self.folder);
+        command
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        self.command(arguments).output().unwrap()
+    }
+
+    #[track_caller]
+    fn expect(&self, code: i32, arguments: &[&str], stderr: &str) {
+        let out = self.run(arguments);
+        let text = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(code), "{text}");
+        assert!(text.contains(stderr), "{text}");
+    }
+
+    fn spawn(&self, arguments: &[&str]) -> Child {
+        self.command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+    }
+
+    /// Waits until the file is there, or the command has ended.
+    fn wait_for(&self, name: &str, child: &mut Child) {
+        while !self.path(name).exists() && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    fn bytes(&self, name: &str) -> Vec<u8> {
+        fs::read(self.path(name)).unwrap()
+    }
+}
+
+#[test]
+fn a_checkpoint_goes_on_to_more_sets_in_the_same_bits() {
+    let place = Place::new();
+    place.expect(0, &["-o", "whole.exr", "--repeat-level", "60"], "");
+    place.expect(0, &["-o", "part.exr", "--repeat-level", "17", "--checkpoint", "sums"], "");
+    // Neither the path of the scene nor the displayed picture belongs to the sums.
+    place.expect(0, &["-o", "part.exr", "--repeat-level", "60", "--checkpoint", "sums", "--threads", "3"], "");
+    let without_hash = |bytes: Vec<u8>| {
+        let at = bytes.windows(20).position(|w| w == b"organza:scene_sha256").unwrap();
+        [&bytes[..at], &bytes[at + 100..]].concat()
+    };
+    assert_eq!(without_hash(place.bytes("whole.exr")), without_hash(place.bytes("part.exr")));
+    // More sets than are asked for are not thrown away.
+    let json = place.run(&["-o", "part.exr", "--repeat-level", "20", "--checkpoint", "sums", "--json"]);
+    let document: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+    assert_eq!(document["sets"], serde_json::json!({ "averaged": 60, "asked": 20, "interrupted": false }));
+}
+
+#[test]
+fn a_killed_render_resumes_to_the_same_bits() {
+    let place = Place::new();
+    let arguments = ["-o", "a.exr", "--repeat-level", "1200", "--checkpoint", "sums"];
+    place.expect(0, &arguments, "");
+    let whole = place.bytes("a.exr");
+    fs::remove_file(place.path("sums")).unwrap();
+    for more in [0, 150] {
+        let mut child = place.spawn(&arguments);
+        place.wait_for("sums", &mut child);
+        std::thread::sleep(Duration::from_millis(more));
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+    place.expect(0, &arguments, "");
+    assert_eq!(place.bytes("a.exr"), whole);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_leaves_the_picture_so_far_and_a_checkpoint() {
+    let place = Place::new();
+    let many = ["-o", "a.exr", "--repeat-level", "1000000", "--checkpoint", "sums", "--json"];
+    let mut child = place.spawn(&many);
+    place.wait_for("sums", &mut child);
+    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let out = child.wait_with_output().unwrap();
+    assert_eq!(out.status.code(), Some(130));
+    let document: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(document["sets"]["interrupted"], true);
+    let averaged = document["sets"]["averaged"].as_u64().unwrap();
+    assert!((2..1_000_000).contains(&averaged));
+    assert!(String::from_utf8_lossy(&out.stderr).contains(&format!("average of {averaged} of 1000000 sets")));
+    // It is the picture of so many sets.
+    let level = averaged.to_string();
+    place.expect(0, &["-o", "b.exr", "--repeat-level", &level, "--checkpoint", "sums"], "");
+    let pixels = |name: &str| {
+        let image = exr::prelude::read_first_rgba_layer_from_file(
+            place.path(name),
+            |size, _| vec![[0.0f32; 4]; size.area()],
+            |pixels: &mut Vec<[f32; 4]>, at, rgba: (f32, f32, f32, f32)| {
+                pixels[at.y() * 96 + at.x()] = [rgba.0, rgba.1, rgba.2, rgba.3];
+            },
+        );
+        image.unwrap().layer_data.channel_data.pixels
+    };
+    assert_eq!(pixels("a.exr"), pixels("b.exr"));
+}
+
+#[test]
+fn a_checkpoint_of_something_else_is_refused() {
+    let place = Place::new();
+    let small = ["-o", "a.exr", "--repeat-level", "2", "--checkpoint", "sums"];
+    place.expect(0, &small, "");
+    let kept = place.bytes("sums");
+    let with = |more: &[&'static str]| [&small[..], more].concat();
+    place.expect(3, &with(&["--seed", "7"]), "sums: ");
+    place.expect(3, &with(&["--size", "8x8"]), "of another scene or other parameters");
+    place.expect(3, &with(&["--set", "object.fog.visible=false"]), "hint: name another --checkpoint");
+    fs::write(place.path("sheet.ply"), SHEET.replace("0.4", "0.5")).unwrap();
+    place.expect(3, &small, "of another scene or other parameters");
+    fs::write(place.path("sheet.ply"), SHEET).unwrap();
+    place.expect(0, &small, "");
+    for (bytes, why) in [(&kept[..kept.len() - 9], "damaged"), (b"hello", "not a checkpoint"), (b"", "cut short")] {
+        fs::write(place.path("sums"), bytes).unwrap();
+        place.expect(3, &small, why);
+        assert_eq!(place.bytes("sums"), bytes, "a file that is refused is not touched");
+    }
+    place.expect(
+        2,
+        &["-o", "a.exr", "--technique", "points", "--layers", "shadow", "--checkpoint", "c"],
+        "only the technique `particles`",
+    );
+    place.expect(2, &["-o", "a.exr", "--checkpoint", "a.exr"], "named twice");
+    place.expect(4, &["-o", "a.exr", "--checkpoint", "s.toml"], "also an input");
+    place.expect(2, &["-o", "a.exr", "--repeat-level", "1"], "--repeat-level 1: ");
+}
