@@ -8,6 +8,7 @@
 //! Serde stops here: a [`Scene`] has radians, f64 world units, resolved paths and nothing left to check.
 //! The schema is described in `docs/scene.md` and printed by `organza schema`.
 
+mod animation;
 mod check;
 mod check_light;
 mod check_material;

@@ -109,6 +109,10 @@ pub(super) struct RenderArguments {
     /// Keep the sums of the technique `particles` in a file, and go on from it if it is there
     #[arg(long, value_name = "FILE")]
     pub(super) checkpoint: Option<PathBuf>,
+    /// Draw frames of the scene's animation, all or FIRST-LAST, to numbered files such as picture.0007.exr
+    #[arg(long, value_name = "FIRST-LAST", num_args = 0..=1, require_equals = true, default_missing_value = "all",
+          value_parser = parse_frames)]
+    pub(super) frames: Option<Frames>,
     /// Store the colours of EXR files in 16 bits
     #[arg(long)]
     pub(super) half: bool,
@@ -184,6 +188,26 @@ pub(super) enum Backend {
     Ash,
 }
 
+/// Frames to draw.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Frames {
+    /// All that the scene has.
+    All,
+    /// From the first to the last, which is one of them.
+    Range(u32, u32),
+}
+
+fn parse_frames(text: &str) -> Result<Frames, String> {
+    if text == "all" {
+        return Ok(Frames::All);
+    }
+    let (first, last) = text.split_once('-').unwrap_or((text, text));
+    match (first.parse(), last.parse()) {
+        (Ok(first), Ok(last)) if first <= last => Ok(Frames::Range(first, last)),
+        _ => Err("expected FIRST-LAST, such as 0-47, or one frame".into()),
+    }
+}
+
 fn parse_size(text: &str) -> Result<[i64; 2], String> {
     let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     sides.ok_or_else(|| "expected WIDTHxHEIGHT, such as 960x540".into())
@@ -221,6 +245,9 @@ mod tests {
         assert_eq!(parse_size("960x540"), Ok([960, 540]));
         assert!(["", "960", "x", "9x9x9", "1e3x2", " 9x9"].iter().all(|t| parse_size(t).is_err()));
         assert_eq!(parse_bytes("8G"), Ok(8 << 30));
+        assert_eq!(parse_frames("all"), Ok(Frames::All));
+        assert_eq!([parse_frames("0-47"), parse_frames("9")], [Ok(Frames::Range(0, 47)), Ok(Frames::Range(9, 9))]);
+        assert!(["", "-", "5-", "-1", "5-4", "1..4", "a"].iter().all(|t| parse_frames(t).is_err()));
         assert_eq!(parse_bytes("123"), Ok(123));
         assert!(["", "0", "-1", "G", "1.5G", "99999999999T", "1ü"].iter().all(|t| parse_bytes(t).is_err()));
     }

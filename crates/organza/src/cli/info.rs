@@ -13,7 +13,7 @@ pub(super) fn run(arguments: &InfoArguments) -> Result<(), Error> {
     let is_scene =
         arguments.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml") || e.eq_ignore_ascii_case("json"));
     let document = if is_scene {
-        let options = LoadOptions { allow_path: arguments.allow_path, overrides: Vec::new() };
+        let options = LoadOptions { allow_path: arguments.allow_path, ..LoadOptions::default() };
         scene_document(&scene::load(&arguments.file, &options)?)
     } else {
         file_document(&organza::info(&arguments.file, memory::default_limit())?)

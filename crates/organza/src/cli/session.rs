@@ -8,9 +8,14 @@ use std::path::Path;
 
 /// Loads the scene with the options of the command line.
 pub(super) fn load_scene(arguments: &SceneArguments) -> Result<Scene, Error> {
+    load_frame(arguments, None)
+}
+
+/// [`load_scene`] at a frame of its animation.
+pub(super) fn load_frame(arguments: &SceneArguments, frame: Option<u32>) -> Result<Scene, Error> {
     check_backend(arguments.backend)?;
     let overrides = overrides(arguments)?;
-    scene::load(&arguments.scene, &LoadOptions { allow_path: arguments.allow_path, overrides })
+    scene::load(&arguments.scene, &LoadOptions { allow_path: arguments.allow_path, overrides, frame })
 }
 
 /// What the render may take and how it treats doubtful input.

@@ -1,5 +1,6 @@
 //! Raw tables → checked scene: what the whole file shares, and the tools of the other `check_…` files.
 
+use super::animation::check_animation;
 use super::check_light::check_light;
 use super::check_material::{check_materials, find_material};
 use super::check_object::{Named, check_object};
@@ -33,6 +34,11 @@ pub(super) struct At<'a> {
 }
 
 impl<'a> At<'a> {
+    /// The whole document.
+    pub(super) fn of(document: &'a Document<'a>) -> Self {
+        Self { document, path: Vec::new() }
+    }
+
     pub(super) fn key(&self, key: &'a str) -> Self {
         let mut path = self.path.clone();
         path.push(Step::Key(key));
@@ -140,7 +146,7 @@ impl<'a> At<'a> {
 
 /// Checks everything.
 pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sha256: String) -> Result<Scene, Error> {
-    let at = At { document, path: Vec::new() };
+    let at = At::of(document);
     if raw.version != 1 {
         let message = format!("`version`: expected 1, found {}", raw.version);
         return Err(at.key("version").error(message, "this version of Organza reads scenes of version 1"));
@@ -167,6 +173,7 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
     Ok(Scene {
         file: document.file.to_owned(),
         sha256,
+        frames: raw.animation.as_ref().map(|a| check_animation(&at.key("animation"), a)).transpose()?,
         camera: check_camera(&at.key("camera"), &raw.camera)?,
         background: check_color(&at.key("background"), &raw.background)?,
         ambient: check_color(&at.key("ambient"), &raw.ambient)?,

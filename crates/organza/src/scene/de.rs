@@ -10,8 +10,12 @@ use std::fmt::{self, Display};
 
 /// Deserializes the whole document.
 pub(super) fn from_document<T: de::DeserializeOwned>(document: &Document<'_>) -> Result<T, Error> {
-    T::deserialize(&document.root)
-        .map_err(|e| document.error(e.place.unwrap_or(document.root.place), e.message, e.hint))
+    from_node(document, &document.root)
+}
+
+/// Deserializes a value of the document.
+pub(super) fn from_node<T: de::DeserializeOwned>(document: &Document<'_>, node: &Node) -> Result<T, Error> {
+    T::deserialize(node).map_err(|e| document.error(e.place.unwrap_or(node.place), e.message, e.hint))
 }
 
 /// An error and, once known, its place.

@@ -3,7 +3,7 @@
 use super::overrides::{self, Override};
 use super::raw::RawScene;
 use super::tree::{Document, error_at};
-use super::{Scene, check, de, read_json, read_toml};
+use super::{Scene, animation, check, de, read_json, read_toml};
 use crate::Error;
 use sha2::{Digest, Sha256};
 use std::io::Read;
@@ -23,6 +23,8 @@ pub struct LoadOptions {
     pub allow_path: bool,
     /// Changes from the command line, applied in order before anything is checked.
     pub overrides: Vec<Override>,
+    /// The frame of the scene's animation; `None` loads the scene as it is written.
+    pub frame: Option<u32>,
 }
 
 /// Reads and checks a scene file; JSON if its name ends in `.json`, else TOML. Data files are not opened.
@@ -66,8 +68,11 @@ pub fn parse(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Scene, 
     let root = if is_json { read_json::read_json(file, text)? } else { read_toml::read_toml(file, text)? };
     let mut document = Document { file, text, flags: Vec::new(), root };
     overrides::apply(&mut document, &options.overrides)?;
+    if let Some(frame) = options.frame {
+        animation::apply(&mut document, frame)?;
+    }
     let raw: RawScene = de::from_document(&document)?;
-    check::scene(&document, raw, options.allow_path, hash(bytes, &options.overrides))
+    check::scene(&document, raw, options.allow_path, hash(bytes, options))
 }
 
 fn decode<'a>(file: &Path, bytes: &'a [u8]) -> Result<&'a str, Error> {
@@ -79,12 +84,15 @@ fn decode<'a>(file: &Path, bytes: &'a [u8]) -> Result<&'a str, Error> {
     })
 }
 
-fn hash(bytes: &[u8], overrides: &[Override]) -> String {
+fn hash(bytes: &[u8], options: &LoadOptions) -> String {
     let mut hasher = Sha256::new();
     hasher.update(bytes);
-    for change in overrides {
+    for change in &options.overrides {
         hasher.update(b"\n");
         hasher.update(change.flag().as_bytes());
+    }
+    if let Some(frame) = options.frame {
+        hasher.update(format!("\n--frames {frame}"));
     }
     hasher.finalize().iter().map(|b| format!("{b:02x}")).collect()
 }

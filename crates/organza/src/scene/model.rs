@@ -11,8 +11,10 @@ use std::path::PathBuf;
 pub struct Scene {
     /// The scene file, as it was named.
     pub file: PathBuf,
-    /// SHA-256 of the scene file's bytes and of the overrides from the command line, lower-case hex.
+    /// SHA-256 of the scene file's bytes, of the overrides from the command line and of the frame, lower-case hex.
     pub sha256: String,
+    /// Number of frames of its animation, if it has one.
+    pub frames: Option<u32>,
     /// The camera with the image size.
     pub camera: Camera,
     /// Radiance behind everything, linear Rec.709.

@@ -33,10 +33,7 @@ impl Override {
             Error::usage(message, "write PATH=VALUE, such as --set render.points.exact=true")
         };
         let (path, value) = text.split_once('=').ok_or_else(|| bad("expected PATH=VALUE, found no `=`".into()))?;
-        let path: Vec<String> = path.trim().split('.').map(str::to_owned).collect();
-        if path.iter().any(String::is_empty) || path.len() > MAX_SCENE_DEPTH {
-            return Err(bad(format!("expected 1 to {MAX_SCENE_DEPTH} keys with dots between them")));
-        }
+        let path = split_path(path).map_err(bad)?;
         let value = value.trim();
         let is_word = |c: char| c.is_alphanumeric() || "_-./".contains(c);
         let parsed = match read_toml_value(value) {
@@ -63,6 +60,15 @@ impl Override {
     pub fn flag(&self) -> &str {
         &self.flag
     }
+}
+
+/// Keys with dots between them; the error is a message alone.
+pub(super) fn split_path(text: &str) -> Result<Vec<String>, String> {
+    let path: Vec<String> = text.trim().split('.').map(str::to_owned).collect();
+    if path.iter().any(String::is_empty) || path.len() > MAX_SCENE_DEPTH {
+        return Err(format!("expected 1 to {MAX_SCENE_DEPTH} keys with dots between them"));
+    }
+    Ok(path)
 }
 
 fn is_not_finite(word: &str) -> bool {
@@ -103,7 +109,7 @@ fn set_places(value: &mut Value, place: Place) {
 }
 
 /// Walks to the path's end, makes tables that are missing, and puts the value there.
-fn set(root: &mut Node, path: &[String], value: Value, place: Place) -> Result<(), (String, String)> {
+pub(super) fn set(root: &mut Node, path: &[String], value: Value, place: Place) -> Result<(), (String, String)> {
     let mut node = root;
     for key in path {
         let found = node.value.describe();

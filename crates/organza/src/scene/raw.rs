@@ -27,8 +27,61 @@ pub(super) struct RawScene {
     pub(super) material: BTreeMap<String, RawMaterial>,
     #[serde(default)]
     pub(super) render: RawRender,
+    /// What changes from frame to frame.
+    pub(super) animation: Option<RawAnimation>,
     /// Where each Gaussian footprint is cut, in standard deviations, 1 to 8. Objects name them by index.
     pub(super) footprints: Option<Vec<f64>>,
+}
+
+/// What changes from frame to frame.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(rename = "Animation")]
+pub(super) struct RawAnimation {
+    /// Number of frames, counted from 0.
+    pub(super) frames: u32,
+    /// One value of the scene each, in the order in which they are set.
+    #[serde(default)]
+    pub(super) track: Vec<RawTrack>,
+}
+
+/// One value of the scene by frame.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(rename = "Track")]
+pub(super) struct RawTrack {
+    /// Path of the value as for `--set`, such as `object.bunny.transform.rotate`.
+    pub(super) set: String,
+    /// Its values, by increasing frame.
+    pub(super) keys: Vec<RawKey>,
+    /// What lies between keys; default linear.
+    #[serde(default)]
+    pub(super) interpolation: Blend,
+}
+
+/// A value at a frame.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(rename = "Key")]
+pub(super) struct RawKey {
+    /// The frame.
+    pub(super) frame: u32,
+    /// The value; it stays in the value tree.
+    #[serde(rename = "value")]
+    #[schemars(with = "serde_json::Value")]
+    pub(super) _value: serde::de::IgnoredAny,
+}
+
+/// What lies between two keys.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(rename = "Interpolation")]
+pub(super) enum Blend {
+    /// A straight line.
+    #[default]
+    Linear,
+    /// A cubic without corners at the keys.
+    Smooth,
 }
 
 /// The camera.
