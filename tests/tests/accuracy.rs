@@ -2,7 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza::accuracy::{
-    Facts, Frame, Knob, Options, Report, Request, Step, Study, Sweep, Theory, Truth, points, study, verdict,
+    Absent, Facts, Frame, Knob, Options, Report, Request, Step, Study, Sweep, Theory, Truth, median_seconds, particles,
+    points, random_study, study, verdict,
 };
 use organza::scene::{self, Scene};
 use organza::{Error, Progress};
@@ -70,6 +71,7 @@ fn sweep() -> Sweep {
     Sweep {
         technique: "slabs",
         base: Request { scene, oversample: 8 },
+        base_label: "the scene's own".into(),
         knobs: vec![
             Knob {
                 name: "slabs",
@@ -143,7 +145,7 @@ fn a_flipped_sign_shows_up_in_the_report() {
     // Against the truth every setting of the broken one is farther off.
     let of_truth = |s: &Study| s.outcomes[0].from_truth.as_ref().unwrap().linear.rmse;
     assert!(of_truth(&broken) > 2.0 * of_truth(&healthy), "{} {}", of_truth(&broken), of_truth(&healthy));
-    let report = Report::new(&scene(), OPTIONS, vec![broken]);
+    let report = Report::new(&scene(), OPTIONS, vec![broken], Vec::new());
     assert!(report.html().unwrap().contains("theory says otherwise"));
 }
 
@@ -171,7 +173,7 @@ fn what_was_not_measured_is_null() {
         Ok(frame(slab_image(n, 0.5, cut), 1e-3 * n))
     };
     let study = study(&sweep(), Err("a test".into()), &OPTIONS, &Progress::new(), &mut draw).unwrap();
-    let report = Report::new(&scene(), OPTIONS, vec![study]);
+    let report = Report::new(&scene(), OPTIONS, vec![study], Vec::new());
     let document: Value = serde_json::from_str(&report.json()).unwrap();
     let settings = document["techniques"][0]["settings"].as_array().unwrap();
     let failed = settings.iter().find(|s| s["setting"] == "slabs: 16").unwrap();
@@ -186,6 +188,93 @@ fn what_was_not_measured_is_null() {
             .filter(|s| s["failure"].is_null())
             .all(|s| s["seconds_of_repeats"].as_array().unwrap().len() == 2)
     );
+}
+
+/// A sweep of repeat levels from `sweep`'s scene.
+fn repeats() -> Sweep {
+    let facts = Facts { slice_thickness: Some(0.1), cells: None };
+    particles(&scene(), &facts, &OPTIONS).unwrap()
+}
+
+/// The exact picture with noise of variance 0.01/`repeat level`, which `seed_of` chooses; `bias` is added everywhere.
+fn noisy(seed_of: fn(u64, u32) -> u64, bias: f64) -> Study {
+    let limit = run(0.5).unwrap().limit;
+    let mut draw = |request: &Request| {
+        let (render, level) = (&request.scene.render, request.scene.render.particles.repeat_level);
+        let seed = seed_of(render.seed, level);
+        let deviation = 0.1 / f64::from(level).sqrt();
+        let value =
+            |k: usize, c: u64| 12f64.sqrt() * (splat_core::rng::unit(seed, 1, k as u64, c) - 0.5) * deviation + bias;
+        let pixel = |(k, p): (usize, &[f64; 3])| [p[0] + value(k, 0), p[1] + value(k, 1), p[2] + value(k, 2)];
+        let pixels = exact_image().pixels().iter().enumerate().map(pixel).collect();
+        Ok(frame(Image::from_radiance(SIZE, pixels).unwrap(), 1e-3 * f64::from(level)))
+    };
+    random_study(&repeats(), &limit, Err("a test".into()), &OPTIONS, &Progress::new(), &mut draw).unwrap()
+}
+
+#[test]
+fn a_random_technique_has_intervals_and_its_noise_falls_with_the_root_of_the_repeat_level() {
+    let study = noisy(|seed, level| seed + 1000 * u64::from(level), 0.0);
+    let (order, half) = order_of(&study, "repeat level");
+    assert!((order - 0.5).abs() < 0.03 && half < 0.06, "{order} ± {half}");
+    assert!(verdict(&study, &study.curves[0]).contains("as theory says: 0.47 to 0.53"));
+    // Nothing is refused, and the intervals hold what is known.
+    assert!(study.outcomes.iter().all(|o| o.drawn));
+    for o in &study.outcomes {
+        let (sampled, level) = (o.sampled.unwrap(), o.setting.request.scene.render.particles.repeat_level);
+        let deviation = 0.1 / f64::from(level).sqrt();
+        assert!((sampled.noise / deviation - 1.0).abs() < 0.05, "{level}: {sampled:?}");
+        assert!((sampled.from_limit.mean - deviation).abs() <= sampled.from_limit.half_width, "{level}: {sampled:?}");
+        // 1152 numbers in five pictures: four standard errors.
+        assert!(sampled.bias.is_none_or(|b| b < 0.19 * deviation), "{level}: {sampled:?}");
+        assert_eq!((sampled.seeds, o.timed.seconds.len()), (5, 5));
+    }
+    let bias = noisy(|seed, level| seed + 1000 * u64::from(level), 0.05);
+    assert!(bias.outcomes.iter().all(|o| (o.sampled.unwrap().bias.unwrap() / 0.05 - 1.0).abs() < 0.1));
+    assert!((order_of(&bias, "repeat level").0 - 0.5).abs() < 0.03, "bias is no noise");
+}
+
+#[test]
+fn sets_that_are_not_independent_show_up_in_the_report() {
+    // Twice the level adds nothing: what is drawn is that of level 2, but the noise that comes with it.
+    let limit = run(0.5).unwrap().limit;
+    let mut draw = |request: &Request| {
+        let seed = request.scene.render.seed;
+        let value = |k: usize| [0.5 + 0.1 * splat_core::rng::unit(seed, 1, k as u64, 0); 3];
+        let image = Image::from_radiance(SIZE, (0..SIZE[0] * SIZE[1]).map(value).collect()).unwrap();
+        Ok(frame(image, 1e-3))
+    };
+    let study = random_study(&repeats(), &limit, Err("a test".into()), &OPTIONS, &Progress::new(), &mut draw).unwrap();
+    assert!(verdict(&study, &study.curves[0]).contains("theory says otherwise"));
+}
+
+#[test]
+fn techniques_share_one_frontier_and_what_is_absent_is_named() {
+    let (points, random) = (run(0.5).unwrap(), noisy(|seed, level| seed + 1000 * u64::from(level), 0.0));
+    let report = Report::new(&scene(), OPTIONS, vec![points, random], Vec::new());
+    let error = |[s, o]: &[usize; 2]| report.studies[*s].outcomes[*o].from_limit.as_ref().unwrap().linear.rmse;
+    let seconds = |[s, o]: &[usize; 2]| median_seconds(&report.studies[*s].outcomes[*o]).unwrap();
+    assert!(report.frontier.len() >= 3);
+    let ordered = report.frontier.windows(2).all(|w| error(&w[0]) < error(&w[1]) && seconds(&w[0]) > seconds(&w[1]));
+    assert!(ordered, "{:?}", report.frontier);
+    let document: Value = serde_json::from_str(&report.json()).unwrap();
+    assert_eq!(document["frontier"].as_array().unwrap().len(), report.frontier.len());
+    let setting = &document["techniques"][1]["settings"][0];
+    assert_eq!(setting["sampled"]["seeds"], 5);
+    assert!(setting["sampled"]["rmse_from_truth"].is_null() && setting["from_truth"].is_null());
+    assert!(document["techniques"][0]["settings"][0]["sampled"].is_null());
+    let columns = |line: &str| line.matches(',').count();
+    let csv = report.csv();
+    let header = csv.lines().next().unwrap();
+    assert!(csv.lines().filter(|l| !l.contains('×')).all(|l| columns(l) >= columns(header)));
+    let html = report.html().unwrap();
+    assert!(html.contains("All techniques") && html.contains("95 % interval"));
+    let reason = || "it <b>cannot</b>".to_owned();
+    let absent = vec![Absent { technique: "particles", reason: reason() }];
+    let report = Report::new(&scene(), OPTIONS, vec![run(0.5).unwrap()], absent);
+    let document: Value = serde_json::from_str(&report.json()).unwrap();
+    assert_eq!(document["absent"][0]["reason"], reason());
+    assert!(report.html().unwrap().contains("No technique particles: it &lt;b&gt;cannot&lt;/b&gt;."));
 }
 
 #[test]
@@ -205,6 +294,16 @@ fn the_command_writes_three_files_or_none() {
     let curves: Vec<&str> =
         technique["curves"].as_array().unwrap().iter().map(|c| c["knob"].as_str().unwrap()).collect();
     assert!(curves.contains(&"slice thickness") && curves.contains(&"samples"), "{curves:?}");
+    // Particles have one knob, five seeds, the same limit and the slope of independent sets.
+    let particles = &written["techniques"][1];
+    assert_eq!((&particles["technique"], &particles["limit"]), (&Value::from("particles"), &technique["limit"]));
+    let order = particles["curves"][0]["order"].as_f64().unwrap();
+    let half_width = particles["curves"][0]["order_half_width_95"].as_f64().unwrap();
+    assert!((order - 0.5).abs() <= 0.03f64.max(half_width) && half_width < 0.2, "{order} ± {half_width}");
+    let settings = particles["settings"].as_array().unwrap();
+    assert!(
+        settings.iter().all(|s| s["sampled"]["seeds"] == 5 && s["seconds_of_repeats"].as_array().unwrap().len() == 5)
+    );
     let skipped = technique["skipped"].as_array().unwrap();
     assert!(skipped.iter().any(|s| s["knob"] == "footprint table size"));
     let html = fs::read_to_string(folder.path().join("r/accuracy.html")).unwrap();

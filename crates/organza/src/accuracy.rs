@@ -8,28 +8,36 @@
 //! Two errors are kept apart. A knob's **own error** compares a picture with the one whose knob alone is at its end: it
 //! shows the order of convergence, undisturbed by the other knobs. The **error against the limit** compares with the
 //! picture whose knobs are all at their ends. Each reference states its own error (Richardson, from the fitted order),
-//! and no error below ten times that is drawn.
+//! and no error below ten times that is drawn. A random technique without bias takes the limit of another, is drawn with
+//! several seeds, and shows intervals instead.
 
 mod frontier;
 mod knob;
 mod measure;
+mod particles;
 mod plot;
 mod points;
+mod random;
 mod report;
 mod report_html;
+mod report_joint;
 mod report_pictures;
 mod report_tables;
 mod resolve;
+mod sampled;
 mod settings;
 mod study;
 
 pub use frontier::{Candidate, frontier, significant_ratio};
 pub use knob::{Knob, Request, Skipped, Step, Sweep, Theory};
 pub use measure::{Distance, Frame, Renderer, Timed};
+pub use particles::particles;
 pub use points::{Facts, points};
-pub use report::{Machine, Report, write};
+pub use random::{SEEDS, random_study};
+pub use report::{Absent, Machine, Report, write};
 pub use report_html::verdict;
 pub use resolve::{Curve, CurvePoint, Settled, settle};
+pub use sampled::Sampled;
 pub use settings::Setting;
 pub use study::{Draw, Limit, Outcome, Study, median_seconds, study};
 

@@ -71,6 +71,8 @@ pub struct Sweep {
     pub technique: &'static str,
     /// The scene as it stands.
     pub base: Request,
+    /// What the base is called in reports.
+    pub base_label: String,
     /// Knobs that may matter.
     pub knobs: Vec<Knob>,
     /// Knobs that cannot.

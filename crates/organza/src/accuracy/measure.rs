@@ -3,7 +3,7 @@
 use super::{Facts, Request};
 use crate::load::{Loaded, load};
 use crate::render::{draw_loaded, drawing, plan_loaded};
-use crate::scene::Scene;
+use crate::scene::{Scene, Technique};
 use crate::{CostRecord, Error, Progress, RenderOptions};
 use reference::metrics::{Display, Errors, Image, Linear, Viewing, compare, epsilon_8_bit, flip, psnr};
 use splat_core::SplatKind;
@@ -64,8 +64,8 @@ impl Distance {
 /// Repeats of one setting.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Timed {
-    /// The picture of the first repeat; `None` if it could not be drawn.
-    pub image: Option<Image<Linear>>,
+    /// The picture of the first draw; where repeats have seeds, one picture each; none if it could not be drawn.
+    pub images: Vec<Image<Linear>>,
     /// Seconds of each repeat, loading and conversion left out.
     pub seconds: Vec<f64>,
     /// Seconds of loading and conversion, of the repeats that needed it.
@@ -79,12 +79,20 @@ pub struct Timed {
 }
 
 impl Timed {
-    pub(super) fn add(&mut self, frame: Frame, with_clock: bool) {
+    /// The first picture, if there is one.
+    pub fn image(&self) -> Option<&Image<Linear>> {
+        self.images.first()
+    }
+
+    /// `keep` says whether the picture may differ from those that are there.
+    pub(super) fn add(&mut self, frame: Frame, with_clock: bool, keep: bool) {
         self.seconds.extend(with_clock.then_some(frame.seconds));
         self.convert_seconds.extend(frame.convert_seconds);
         self.fragments = Some(frame.fragments);
         self.bytes = Some(frame.bytes);
-        self.image.get_or_insert(frame.image);
+        if keep || self.images.is_empty() {
+            self.images.push(frame.image);
+        }
     }
 }
 
@@ -149,6 +157,19 @@ impl<'a> Renderer<'a> {
         })
     }
 
+    /// Why a scene cannot be drawn as its settings say, if it cannot.
+    ///
+    /// # Errors
+    /// As [`Renderer::draw`], but what the planner refuses is no error.
+    pub fn refused(&mut self, scene: &Scene) -> Result<Option<String>, Error> {
+        let options = self.options;
+        let (loaded, _) = self.load(scene)?;
+        match plan_loaded(scene, loaded, options) {
+            Err(e @ (Error::Input { .. } | Error::Limit { .. } | Error::TooLarge { .. })) => Ok(Some(e.to_string())),
+            other => other.map(|_| None),
+        }
+    }
+
     /// The splats of a scene, converted now unless those at hand are the same; with the seconds that took.
     fn load(&mut self, scene: &Scene) -> Result<(&Loaded, Option<f64>), Error> {
         let mut seconds = None;
@@ -184,6 +205,10 @@ fn same_splats(a: &Scene, b: &Scene) -> bool {
     let mut other = b.clone();
     other.camera.size = a.camera.size;
     other.render = a.render.clone();
-    // Layers decide whether volumes get normals; `max_points` whether a scene is refused.
-    *a == other && a.render.layers == b.render.layers && a.render.max_points == b.render.max_points
+    let particles = |s: &Scene| s.render.technique == Technique::Particles;
+    // The technique may decide what is made of an object. Layers decide whether volumes get normals; `max_points` whether a scene is refused.
+    *a == other
+        && particles(a) == particles(b)
+        && a.render.layers == b.render.layers
+        && a.render.max_points == b.render.max_points
 }

@@ -15,6 +15,8 @@ pub(super) enum Mark {
     Dashed,
     /// A broad pale line that goes down in steps.
     Steps,
+    /// A line from each even point to the next one, with a cap at both ends.
+    Bars,
 }
 
 /// Points of one colour.
@@ -155,6 +157,14 @@ fn draw(svg: &mut String, series: &Series, x: &Axis, y: &Axis) {
                 svg,
                 "<path d=\"{d}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"1.2\" stroke-dasharray=\"5 4\"/>"
             )
+        }
+        Mark::Bars => {
+            for pair in placed.chunks_exact(2) {
+                let ([x, low], [_, high]) = (pair[0].0, pair[1].0);
+                line(svg, [x, low], [x, high], color, "");
+                [low, high].iter().for_each(|y| line(svg, [x - 4.0, *y], [x + 4.0, *y], color, ""));
+            }
+            Ok(())
         }
         Mark::Dots => {
             for ([px, py], title) in &placed {

@@ -1,7 +1,7 @@
 //! The knobs of the technique `points` (Gunjee 2007).
 
 use super::{Knob, Options, Request, Skipped, Step, Sweep, Theory};
-use crate::scene::{LightSource, MediumShape, Scene, SceneObject, ShadowMapping, Source};
+use crate::scene::{LightSource, MediumShape, Scene, SceneObject, ShadowMapping, Source, Technique};
 use splat_core::{LightShape, raster::Accumulation};
 
 /// What has to be known of a loaded scene to choose the steps.
@@ -21,9 +21,17 @@ const MOST_ANTIALIAS: f64 = 8.0;
 
 /// Knobs of `points` in this scene.
 pub fn points(scene: &Scene, facts: &Facts, options: &Options) -> Sweep {
-    let base = Request { scene: scene.clone(), oversample: 1 };
+    let mut base = Request { scene: scene.clone(), oversample: 1 };
+    base.scene.render.technique = Technique::Points;
     let joint_levels = if options.quick { 2 } else { 5 };
-    let mut sweep = Sweep { technique: "points", base, knobs: Vec::new(), skipped: Vec::new(), joint_levels };
+    let mut sweep = Sweep {
+        technique: "points",
+        base,
+        base_label: "the scene's own".into(),
+        knobs: Vec::new(),
+        skipped: Vec::new(),
+        joint_levels,
+    };
     // One line a knob; a technique with others has a list of its own.
     let knobs = [
         ("slice thickness", slices(facts, options)),

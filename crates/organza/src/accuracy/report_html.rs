@@ -1,8 +1,9 @@
 //! The report as one page without any other file: curves, frontier, convergence, pictures to flip, table, notes.
 
 use super::plot::{COLORS, Mark, Plot, Series, escaped};
+use super::report_joint::{bar_of, joint};
 use super::report_pictures::{data_uri, difference};
-use super::{Curve, Outcome, Report, Study, median_seconds};
+use super::{Curve, Outcome, Report, SEEDS, Study, median_seconds};
 use crate::Error;
 use reference::statistics::median_with_spread;
 use std::fmt::Write;
@@ -20,6 +21,7 @@ pub(super) fn page(report: &Report) -> Result<String, Error> {
         include_str!("report.css")
     );
     html += &head(report);
+    joint(&mut html, report);
     for (at, study) in report.studies.iter().enumerate() {
         summary(&mut html, study);
         time_plot(&mut html, study);
@@ -59,11 +61,22 @@ fn summary(html: &mut String, study: &Study) {
         let _ = write!(html, "<div class=\"card\"><b>{}</b><span>{what}</span></div>", escaped(&value));
     };
     let shown = |v: Option<f64>, text: fn(f64) -> String| v.map_or_else(|| "not measured".into(), text);
-    card(shown(median_seconds(own), |s| format!("{:.0} ms", 1e3 * s)), "the scene's own setting, without loading");
+    card(
+        shown(median_seconds(own), |s| format!("{:.0} ms", 1e3 * s)),
+        &format!("{}, without loading", own.setting.label),
+    );
     card(shown(rmse(own), |e| format!("{e:.2e}")), "its RMSE against the limit, linear radiance");
     card(shown(own.from_limit.as_ref().map(|d| d.flip), |f| format!("{f:.4}")), "its mean FLIP");
-    card(shown(own.from_limit.as_ref().map(|d| d.psnr), |p| format!("{p:.1} dB")), "its PSNR as displayed");
-    card(format!("{:.1e}", study.limit.own_error), "the limit's own error; nothing below ten times that is drawn");
+    if study.is_random() {
+        let sampled = own.sampled;
+        card(shown(sampled.map(|s| s.from_limit.half_width), |h| format!("± {h:.1e}")), "95 % interval of the RMSE");
+        card(shown(sampled.map(|s| s.noise), |n| format!("{n:.2e}")), "standard deviation of one picture");
+        let bias = sampled.map(|s| s.bias.map_or_else(|| "none at 95 %".into(), |b| format!("{b:.1e}")));
+        card(bias.unwrap_or_else(|| "not measured".into()), "RMS distance of the expectation from the limit");
+    } else {
+        card(shown(own.from_limit.as_ref().map(|d| d.psnr), |p| format!("{p:.1} dB")), "its PSNR as displayed");
+        card(format!("{:.1e}", study.limit.own_error), "the limit's own error; nothing below ten times that is drawn");
+    }
     *html += "</div>\n";
 }
 
@@ -81,17 +94,17 @@ fn time_plot(html: &mut String, study: &Study) {
     };
     let frontier = study.frontier.iter().rev().filter_map(|i| place(*i)).collect();
     let mut series = vec![Series { color: "var(--accent)".into(), mark: Mark::Steps, points: frontier }];
-    for i in 0..study.outcomes.len() {
-        let color =
-            if i == 0 { "var(--ink)".to_owned() } else { color(study, study.outcomes[i].setting.knob).to_owned() };
+    for (i, outcome) in study.outcomes.iter().enumerate() {
+        let color = if i == 0 { "var(--ink)".to_owned() } else { color(study, outcome.setting.knob).to_owned() };
+        series.extend(bar_of(outcome, &color));
         series.push(Series { color, mark: Mark::Dots, points: place(i).into_iter().collect() });
     }
-    let floor = Some((10.0 * study.limit.own_error, "ten times the limit's own error".to_owned()));
+    let floor = (10.0 * study.limit.own_error, "ten times the limit's own error".to_owned());
     let plot = Plot {
         size: [1000.0, 460.0],
         x_label: "median time of a frame, loading left out, ms".into(),
         y_label: "RMSE against the limit, linear radiance".into(),
-        floor,
+        floor: (!study.is_random()).then_some(floor),
         series,
     };
     *html += "<h2>Error and time</h2>\n<p>Each dot is one setting. The pale line is the frontier: whatever lies on it is \
@@ -101,15 +114,25 @@ fn time_plot(html: &mut String, study: &Study) {
     let mut key = |color: &str, name: &str| {
         let _ = write!(html, "<span><i style=\"background:{color}\"></i>{name}</span>");
     };
-    key("var(--ink)", "the scene's own setting");
-    key(color(study, None), "all knobs together");
+    key("var(--ink)", &escaped(&study.outcomes[0].setting.label));
+    if study.outcomes.iter().skip(1).any(|o| o.setting.knob.is_none()) {
+        key(color(study, None), "all knobs together");
+    }
     study.knobs.iter().for_each(|k| key(color(study, Some(k.name)), k.name));
     *html += "</div></figure>\n";
 }
 
 fn knob_plots(html: &mut String, study: &Study) {
-    *html += "<h2>Convergence of each knob</h2>\n<p>One knob is turned, the others stay as in the scene; the error is against \
-              the picture with this knob alone at its end. The dashed line is the fitted order.</p>\n<div class=\"grid\">\n";
+    let error = if study.is_random() {
+        "the error is the standard deviation of one picture over seeds, which needs no reference"
+    } else {
+        "the error is against the picture with this knob alone at its end"
+    };
+    let _ = write!(
+        html,
+        "<h2>Convergence of each knob</h2>\n<p>One knob is turned, the others stay as in the scene; {error}. The dashed line is \
+         the fitted order.</p>\n<div class=\"grid\">\n"
+    );
     for curve in study.curves.iter().filter(|c| c.points.iter().any(|p| p.size.is_some())) {
         let knob = study.knobs.iter().find(|k| k.name == curve.knob);
         let _ = write!(html, "<figure><h3>{}</h3>", curve.knob);
@@ -124,11 +147,12 @@ fn knob_plots(html: &mut String, study: &Study) {
 }
 
 fn knob_plot(study: &Study, curve: &Curve, meaning: &str) -> Option<Plot> {
+    let y_label = if study.is_random() { "standard deviation" } else { "RMSE" };
     let drawn = curve.points.iter().filter(|p| p.drawn);
     let points: Vec<([f64; 2], String)> = drawn
         .filter_map(|p| {
             let (x, y) = (p.size?, p.error?);
-            Some(([x, y], format!("{}: RMSE {y:.2e}", study.outcomes[p.setting].setting.label)))
+            Some(([x, y], format!("{}: {y_label} {y:.2e}", study.outcomes[p.setting].setting.label)))
         })
         .collect();
     let (first, last) = (points.first()?.0[0], points.last()?.0[0]);
@@ -140,7 +164,7 @@ fn knob_plot(study: &Study, curve: &Curve, meaning: &str) -> Option<Plot> {
         series.push(Series { color: "var(--soft)".into(), mark: Mark::Dashed, points: line.collect() });
     }
     series.push(Series { color: color(study, Some(curve.knob)).into(), mark: Mark::Dots, points });
-    Some(Plot { size: [320.0, 230.0], x_label: meaning.into(), y_label: "RMSE".into(), floor: None, series })
+    Some(Plot { size: [320.0, 230.0], x_label: meaning.into(), y_label: y_label.into(), floor: None, series })
 }
 
 /// What was found of a knob's order of convergence, what theory says, and what its end is worth.
@@ -161,7 +185,11 @@ pub fn verdict(study: &Study, curve: &Curve) -> String {
         let agrees = if inside { "as theory says" } else { "theory says otherwise" };
         let _ = write!(text, "; {agrees}: {range} ({})", t.why);
     }
-    let _ = write!(text, ". End: {}, own error {:.1e}.", curve.end.label, curve.settled.own_error);
+    if study.is_random() {
+        text += ". From the spread over seeds, which needs no reference.";
+    } else {
+        let _ = write!(text, ". End: {}, own error {:.1e}.", curve.end.label, curve.settled.own_error);
+    }
     text
 }
 
@@ -171,7 +199,7 @@ fn shown_settings(study: &Study) -> Vec<usize> {
     let together = |i: &usize| *i > 0 && study.outcomes[*i].setting.knob.is_none();
     shown.extend((0..study.outcomes.len()).find(together));
     shown.extend(study.curves.iter().filter_map(|c| c.points.iter().find(|p| p.drawn).map(|p| p.setting)));
-    shown.retain(|i| study.outcomes[*i].timed.image.is_some());
+    shown.retain(|i| study.outcomes[*i].timed.image().is_some());
     let mut seen = Vec::new();
     shown.retain(|i| {
         !seen.contains(i) && {
@@ -189,7 +217,7 @@ fn pictures(html: &mut String, study: &Study, exposure: f64, at: usize) -> Resul
     let _ = writeln!(html, "<img hidden id=\"limit{at}\" alt=\"\" src=\"{}\"><div class=\"grid\">", data_uri(&limit)?);
     for i in shown_settings(study) {
         let o = &study.outcomes[i];
-        let Some(image) = &o.timed.image else { continue };
+        let Some(image) = o.timed.image() else { continue };
         let shown = image.display(exposure);
         let (apart, gain) = difference(&shown, &limit)?;
         let label = escaped(&o.setting.label);
@@ -219,17 +247,20 @@ fn table(html: &mut String, study: &Study) {
         // An error that the limit cannot show is not shown.
         let d = o.from_limit.as_ref().filter(|_| o.drawn);
         let cell = |v: Option<String>| v.unwrap_or_else(|| "–".into());
+        let half = |h: f64| if h > 0.0 { format!(" ± {h:.0e}") } else { String::new() };
+        let limit_half = half(o.sampled.map_or(0.0, |s| s.from_limit.half_width));
+        let truth_half = half(o.sampled.and_then(|s| s.from_truth).map_or(0.0, |m| m.half_width));
         let cells = [
             escaped(&o.setting.label),
             cell(time.map(|t| format!("{:.1}", 1e3 * t.median))),
             cell(time.map(|t| format!("{:.1} to {:.1}", 1e3 * t.min, 1e3 * t.max))),
-            cell(d.map(|d| format!("{:.2e}", d.linear.rmse))),
+            cell(d.map(|d| format!("{:.2e}{limit_half}", d.linear.rmse))),
             cell(d.map(|d| format!("{:+.1e}", d.linear.bias))),
             cell(d.map(|d| format!("{:.2e}", d.linear.max))),
             cell(d.map(|d| format!("{:.1}", d.psnr))),
             cell(d.map(|d| format!("{:.4}", d.flip))),
             cell(d.map(|d| format!("{:.3}", d.epsilon))),
-            cell(o.from_truth.as_ref().map(|d| format!("{:.2e}", d.linear.rmse))),
+            cell(o.from_truth.as_ref().map(|d| format!("{:.2e}{truth_half}", d.linear.rmse))),
             cell(convert.map(|t| format!("{:.0}", 1e3 * t.median))),
             cell(o.timed.fragments.map(|n| n.to_string())),
         ];
@@ -244,16 +275,26 @@ fn notes(html: &mut String, study: &Study) {
         let _ = writeln!(html, "<li>{}</li>", escaped(&text));
     };
     let hidden = study.outcomes.iter().filter(|o| !o.drawn).count();
-    note(format!(
-        "The limit is the picture with all knobs at their ends ({:.0} ms). Its own error is the sum of those of its ends: {}. \
+    if study.is_random() {
+        note(format!(
+            "Errors are means over {SEEDS} seeds. The limit is that of points, whose own error {:.1e} is part of every interval; \
+             what differs from it at any repeat level is bias: the settings that both techniques share, and particles that are \
+             sampled at pixels where points are averaged over them.",
+            study.limit.own_error
+        ));
+    } else {
+        note(format!(
+            "The limit is the picture with all knobs at their ends ({:.0} ms). Its own error is the sum of those of its ends: {}. \
          {hidden} of {} settings are nearer to it than ten times that, or cannot be compared with it, and show no error.",
-        1e3 * study.limit.seconds,
-        study.limit.parts.iter().map(|(k, e)| format!("{k} {e:.1e}")).collect::<Vec<_>>().join(", "),
-        study.outcomes.len()
-    ));
+            1e3 * study.limit.seconds,
+            study.limit.parts.iter().map(|(k, e)| format!("{k} {e:.1e}")).collect::<Vec<_>>().join(", "),
+            study.outcomes.len()
+        ));
+    }
     let ratio = 100.0 * (study.significant_ratio - 1.0);
     note(format!("Times that differ by less than {ratio:.0} % count as equal on the frontier, as the repeats spread."));
-    study.limit.held.iter().for_each(|h| note(format!("The limit leaves {} as in the scene: {}.", h.knob, h.reason)));
+    let held = study.limit.held.iter().filter(|_| !study.is_random());
+    held.for_each(|h| note(format!("The limit leaves {} as in the scene: {}.", h.knob, h.reason)));
     study.skipped.iter().for_each(|s| note(format!("Not turned: {}: {}.", s.knob, s.reason)));
     for o in study.outcomes.iter().filter(|o| o.timed.failure.is_some()) {
         note(format!("Not drawn: {}: {}.", o.setting.label, o.timed.failure.as_deref().unwrap_or_default()));

@@ -2,7 +2,7 @@
 
 use super::{Curve, Distance, Outcome, Report, Study};
 use reference::metrics::Errors;
-use reference::statistics::{Spread, median_with_spread};
+use reference::statistics::{Mean, Spread, median_with_spread};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -17,7 +17,13 @@ pub(super) fn json(report: &Report) -> Value {
         "finer": report.options.finer,
         "repeats": report.options.repeats(),
         "machine": { "cpu": report.machine.cpu, "system": report.machine.system, "threads": report.machine.threads },
+        "frontier": report.frontier.iter().map(|[s, o]| {
+            let study = &report.studies[*s];
+            json!({ "technique": study.technique, "setting": study.outcomes[*o].setting.label })
+        }).collect::<Value>(),
+        "significant_ratio_of_times": report.significant_ratio,
         "techniques": report.studies.iter().map(study).collect::<Value>(),
+        "absent": report.absent.iter().map(|a| json!({ "technique": a.technique, "reason": a.reason })).collect::<Value>(),
     })
 }
 
@@ -79,8 +85,19 @@ fn setting(study: &Study, index: usize, o: &Outcome) -> Value {
         "bytes": o.timed.bytes,
         "from_limit": o.from_limit.as_ref().map(distance),
         "from_truth": o.from_truth.as_ref().map(distance),
+        "sampled": o.sampled.map(|s| json!({
+            "seeds": s.seeds,
+            "rmse_from_limit": mean(&s.from_limit),
+            "rmse_from_truth": s.from_truth.as_ref().map(mean),
+            "standard_deviation": s.noise,
+            "rms_bias_from_limit": s.bias,
+        })),
         "failure": o.timed.failure,
     })
+}
+
+fn mean(m: &Mean) -> Value {
+    json!({ "mean": m.mean, "half_width_95": m.half_width })
 }
 
 fn spread(s: Option<Spread>) -> Value {
@@ -104,9 +121,10 @@ fn finite(value: f64) -> Option<f64> {
 pub(super) fn csv(report: &Report) -> String {
     let mut text = String::from(
         "technique,setting,knob,drawn,on_frontier,rmse,bias,mean_absolute,max,display_rmse,psnr_db,flip,epsilon_8_bit,\
-         truth_rmse,median_ms,min_ms,max_ms,convert_ms,fragments,bytes\n",
+         truth_rmse,median_ms,min_ms,max_ms,convert_ms,fragments,bytes,on_joint_frontier,rmse_half_width_95,\
+         truth_rmse_half_width_95,standard_deviation,rms_bias\n",
     );
-    for study in &report.studies {
+    for (at, study) in report.studies.iter().enumerate() {
         for (i, o) in study.outcomes.iter().enumerate() {
             let d = o.from_limit.as_ref();
             let time = median_with_spread(&o.timed.seconds);
@@ -133,6 +151,11 @@ pub(super) fn csv(report: &Report) -> String {
                 ms(convert.map(|t| t.median)),
                 o.timed.fragments.map_or_else(String::new, |n| n.to_string()),
                 o.timed.bytes.map_or_else(String::new, |n| n.to_string()),
+                report.frontier.contains(&[at, i]).to_string(),
+                cell(o.sampled.map(|s| s.from_limit.half_width)),
+                cell(o.sampled.and_then(|s| s.from_truth).map(|m| m.half_width)),
+                cell(o.sampled.map(|s| s.noise)),
+                cell(o.sampled.and_then(|s| s.bias)),
             ];
             let _ = writeln!(text, "{}", cells.join(","));
         }

@@ -24,7 +24,7 @@ pub(super) struct Settings {
 
 impl Settings {
     pub(super) fn of(sweep: &Sweep) -> Self {
-        let own = Setting { label: "the scene's own".into(), knob: None, request: sweep.base.clone() };
+        let own = Setting { label: sweep.base_label.clone(), knob: None, request: sweep.base.clone() };
         let mut settings = Self { list: vec![own], of_step: Vec::new() };
         for knob in &sweep.knobs {
             let add = |step: &Step| {

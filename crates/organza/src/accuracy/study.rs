@@ -3,8 +3,8 @@
 use super::resolve::MARGIN;
 use super::settings::Settings;
 use super::{
-    Candidate, Curve, CurvePoint, Distance, Frame, Knob, Options, Request, Setting, Settled, Skipped, Step, Sweep,
-    Timed, Truth, frontier, settle, significant_ratio,
+    Candidate, Curve, CurvePoint, Distance, Frame, Knob, Options, Request, Sampled, Setting, Settled, Skipped, Step,
+    Sweep, Timed, Truth, frontier, settle, significant_ratio,
 };
 use crate::{Error, Progress};
 use reference::metrics::{Image, Linear, compare};
@@ -36,11 +36,14 @@ pub struct Outcome {
     pub setting: Setting,
     /// Its repeats.
     pub timed: Timed,
-    /// Distance from the limit; `None` where the setting was not drawn or turns a knob that the limit holds.
+    /// Distance from the limit, the mean over seeds of a random setting; `None` where the setting was not drawn or turns a
+    /// knob that the limit holds.
     pub from_limit: Option<Distance>,
     /// Distance from physical truth, where there is one.
     pub from_truth: Option<Distance>,
-    /// Whether the error against the limit is large enough to be drawn.
+    /// What its seeds say together; `None` of what is not random.
+    pub sampled: Option<Sampled>,
+    /// Whether the error against the limit is large enough to be drawn; a random setting has an interval instead.
     pub drawn: bool,
 }
 
@@ -72,6 +75,13 @@ pub struct Study {
     pub knobs: Vec<Knob>,
 }
 
+impl Study {
+    /// Whether its settings are random: they have intervals, and no error is too small to be shown.
+    pub fn is_random(&self) -> bool {
+        self.outcomes.iter().any(|o| o.sampled.is_some())
+    }
+}
+
 /// A function that draws: the technique's renderer, or a test's.
 pub type Draw<'a> = dyn FnMut(&Request) -> Result<Frame, Error> + 'a;
 
@@ -91,9 +101,9 @@ pub fn study(
     let mut timed = vec![Timed::default(); settings.list.len()];
     for (setting, timed) in settings.list.iter().zip(&mut timed) {
         // Not timed: it pays for loading and for cold caches.
-        attempt(&setting.request, timed, false, draw)?;
+        attempt(&setting.request, timed, false, false, draw)?;
     }
-    let own = timed[0].image.as_ref().ok_or_else(|| unresolved(timed[0].failure.clone().unwrap_or_default(), ""))?;
+    let own = timed[0].image().ok_or_else(|| unresolved(timed[0].failure.clone().unwrap_or_default(), ""))?;
     let floor = ROUNDING * root_mean_square(own);
     let mut curves = Vec::new();
     for (knob, of_step) in sweep.knobs.iter().zip(&settings.of_step) {
@@ -103,20 +113,20 @@ pub fn study(
     let resolved: Vec<&str> = limit.parts.iter().map(|p| p.0).collect();
     settings.join(sweep, &resolved);
     timed.resize(settings.list.len(), Timed::default());
-    repeat_all(&settings, &mut timed, options, progress, draw)?;
+    let repeats = Repeats { times: options.repeats(), seeded: false, order: options.seed };
+    repeat_all(&settings, &mut timed, &repeats, progress, draw)?;
     let exposure = sweep.base.scene.render.exposure;
     let mut outcomes = Vec::new();
     for (setting, timed) in settings.list.into_iter().zip(timed) {
         let held = limit.held.iter().any(|h| Some(h.knob) == setting.knob);
-        let distance =
-            |to: &Image<Linear>| timed.image.as_ref().map(|i| Distance::between(i, to, exposure)).transpose();
+        let distance = |to: &Image<Linear>| timed.image().map(|i| Distance::between(i, to, exposure)).transpose();
         let from_limit = if held { None } else { distance(&limit.image)? };
         let from_truth = truth.as_ref().map_or(Ok(None), |t| distance(&t.image))?;
         let drawn = from_limit.as_ref().is_some_and(|d| d.linear.rmse >= MARGIN * limit.own_error);
-        outcomes.push(Outcome { setting, timed, from_limit, from_truth, drawn });
+        outcomes.push(Outcome { setting, timed, from_limit, from_truth, sampled: None, drawn });
     }
     refuse_unless_resolved(&outcomes, &limit, &curves)?;
-    let (ratio, frontier) = frontier_of(&outcomes);
+    let (ratio, frontier) = frontier_of(&outcomes.iter().collect::<Vec<_>>());
     Ok(Study {
         technique: sweep.technique,
         outcomes,
@@ -130,34 +140,54 @@ pub fn study(
     })
 }
 
+/// How often and in which order settings are timed.
+pub(super) struct Repeats {
+    pub(super) times: usize,
+    /// Every repeat has a seed of its own, and its picture is kept.
+    pub(super) seeded: bool,
+    /// Seed of the order.
+    pub(super) order: u64,
+}
+
 /// Every repeat of every setting, in an order that neither warms nor cools one of them by its place.
-fn repeat_all(
+pub(super) fn repeat_all(
     settings: &Settings,
     timed: &mut [Timed],
-    options: &Options,
+    repeats: &Repeats,
     progress: &Progress,
     draw: &mut Draw<'_>,
 ) -> Result<(), Error> {
     let n = settings.list.len();
-    let mut jobs: Vec<usize> = (0..n * options.repeats()).map(|job| job % n).collect();
+    let mut jobs: Vec<usize> = (0..n * repeats.times).collect();
     for i in (1..jobs.len()).rev() {
-        jobs.swap(i, (rng::unit(options.seed, 0, i as u64, 0) * (i + 1) as f64) as usize);
+        jobs.swap(i, (rng::unit(repeats.order, 0, i as u64, 0) * (i + 1) as f64) as usize);
     }
     progress.add_total(jobs.len() as u64);
     for job in jobs {
         progress.tick(1).map_err(|_| Error::Cancelled)?;
-        attempt(&settings.list[job].request, &mut timed[job], true, draw)?;
+        let (setting, repeat) = (job % n, job / n);
+        let mut request = settings.list[setting].request.clone();
+        if repeats.seeded {
+            request.scene.render.seed = request.scene.render.seed.wrapping_add(repeat as u64);
+        }
+        attempt(&request, &mut timed[setting], true, repeats.seeded, draw)?;
     }
     Ok(())
 }
 
 /// Draws once more, unless it could not be drawn before.
-fn attempt(request: &Request, timed: &mut Timed, with_clock: bool, draw: &mut Draw<'_>) -> Result<(), Error> {
+fn attempt(
+    request: &Request,
+    timed: &mut Timed,
+    with_clock: bool,
+    keep: bool,
+    draw: &mut Draw<'_>,
+) -> Result<(), Error> {
     if timed.failure.is_some() {
         return Ok(());
     }
     match draw(request) {
-        Ok(frame) => timed.add(frame, with_clock),
+        Ok(frame) => timed.add(frame, with_clock, keep),
         Err(e) if is_resource_limit(&e) => timed.failure = Some(e.to_string()),
         Err(e) => return Err(e),
     }
@@ -184,7 +214,7 @@ fn curve(
     };
     let mut points = Vec::new();
     for (step, &setting) in knob.steps.iter().zip(of_step) {
-        let image = timed[setting].image.as_ref();
+        let image = timed[setting].image();
         let error = image.map(|i| compare(i, &reference)).transpose().map_err(|e| Error::Internal(e.to_string()))?;
         points.push(CurvePoint { setting, size: step.size, error: error.map(|e| e.rmse), drawn: false });
     }
@@ -194,7 +224,7 @@ fn curve(
     for p in &mut points {
         p.drawn = p.size.is_some() && p.error.is_some_and(|e| e >= settled.least_drawn());
     }
-    let own = timed[0].image.as_ref().map(|i| compare(i, &reference)).transpose();
+    let own = timed[0].image().map(|i| compare(i, &reference)).transpose();
     let own_setting = own.map_err(|e| Error::Internal(e.to_string()))?.map_or(0.0, |e| e.rmse);
     Ok(Some(Curve { knob: knob.name, end, end_size, points, own_setting, settled, end_seconds }))
 }
@@ -218,7 +248,7 @@ fn end(
     let mut refused = None;
     for step in &knob.ends {
         let request = sweep.turned(knob, step);
-        let known = settings.list.iter().position(|s| s.request == request).and_then(|s| timed[s].image.clone());
+        let known = settings.list.iter().position(|s| s.request == request).and_then(|s| timed[s].image().cloned());
         if let Some(image) = known {
             return Ok(Some(End { step: step.clone(), image, seconds: None }));
         }
@@ -315,9 +345,10 @@ fn unresolved(message: impl Into<String>, hint: impl Into<String>) -> Error {
     Error::Unresolved { message: message.into(), hint: hint.into() }
 }
 
-fn frontier_of(outcomes: &[Outcome]) -> (f64, Vec<usize>) {
+/// Ratio of times that counts as different, and the places of those on the frontier, the most accurate first.
+pub(super) fn frontier_of(outcomes: &[&Outcome]) -> (f64, Vec<usize>) {
     let repeats: Vec<Vec<f64>> = outcomes.iter().map(|o| o.timed.seconds.clone()).collect();
-    let candidate = |(id, o): (usize, &Outcome)| {
+    let candidate = |(id, o): (usize, &&Outcome)| {
         let error = o.from_limit.as_ref().filter(|_| o.drawn)?.linear.rmse;
         Some(Candidate { id, error, seconds: median_seconds(o)? })
     };

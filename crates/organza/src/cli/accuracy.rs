@@ -4,8 +4,9 @@ use super::args::AccuracyArguments;
 use super::bar::with_bar;
 use super::console;
 use super::session::{in_folder, load_scene, path_text, render_options, start_threads};
-use organza::accuracy::{self, Options, Outcome, Renderer, Report, Study};
-use organza::{Error, printable};
+use organza::accuracy::{self, Absent, Facts, Options, Outcome, Renderer, Report, Request, Study};
+use organza::scene::Scene;
+use organza::{Error, Progress, printable};
 use serde_json::json;
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -24,17 +25,43 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
         if arguments.scene.max_memory.is_none() {
             render.max_memory = render.max_memory.min(options.memory());
         }
-        let study = with_bar(|progress| {
+        let (studies, absent) = with_bar(|progress| {
             let mut renderer = Renderer::new(&render, progress);
             let facts = renderer.facts(&scene)?;
             let sweep = accuracy::points(&scene, &facts, &options);
             let truth = organza::truth::truth(&scene, &render, options.truth_samples(), progress)?;
-            accuracy::study(&sweep, truth, &options, progress, &mut |request| renderer.draw(request))
+            let points = accuracy::study(&sweep, truth, &options, progress, &mut |request| renderer.draw(request))?;
+            let particles = particles(&scene, &facts, &options, &points, &mut renderer, progress)?;
+            Ok(match particles {
+                Ok(particles) => (vec![points, particles], Vec::new()),
+                Err(absent) => (vec![points], vec![absent]),
+            })
         })?;
-        let report = Report::new(&scene, options, vec![study]);
+        let report = Report::new(&scene, options, studies, absent);
         let files = accuracy::write(&report, &arguments.out)?;
         console::out(&summary(&report, &files, arguments.scene.json))
     })
+}
+
+/// The study of `particles`, by the limit and the truth of `points`; or why there is none.
+fn particles(
+    scene: &Scene,
+    facts: &Facts,
+    options: &Options,
+    points: &Study,
+    renderer: &mut Renderer<'_>,
+    progress: &Progress,
+) -> Result<Result<Study, Absent>, Error> {
+    let absent = |reason| Ok(Err(Absent { technique: "particles", reason }));
+    let sweep = match accuracy::particles(scene, facts, options) {
+        Ok(sweep) => sweep,
+        Err(reason) => return absent(reason),
+    };
+    if let Some(reason) = renderer.refused(&sweep.base.scene)? {
+        return absent(reason);
+    }
+    let mut draw = |request: &Request| renderer.draw(request);
+    accuracy::random_study(&sweep, &points.limit, points.truth.clone(), options, progress, &mut draw).map(Ok)
 }
 
 fn summary(report: &Report, files: &[PathBuf], as_json: bool) -> String {
@@ -46,6 +73,17 @@ fn summary(report: &Report, files: &[PathBuf], as_json: bool) -> String {
     let mut text = String::new();
     for study in &report.studies {
         text += &study_text(study);
+        text += "\n";
+    }
+    for absent in &report.absent {
+        let _ = writeln!(text, "no technique {}: {}\n", absent.technique, absent.reason);
+    }
+    if report.studies.len() > 1 {
+        text += "frontier over all techniques, from the most accurate to the fastest\n";
+        for [study, setting] in &report.frontier {
+            let study = &report.studies[*study];
+            let _ = writeln!(text, "  {:>9}  {}", study.technique, outcome_text(&study.outcomes[*setting]));
+        }
     }
     for file in files {
         let _ = writeln!(text, "wrote {}", printable(file));
@@ -58,9 +96,13 @@ fn study_text(study: &Study) -> String {
     for i in &study.frontier {
         let _ = writeln!(text, "  {}", outcome_text(&study.outcomes[*i]));
     }
-    let _ = writeln!(text, "the scene's own setting\n  {}\nconvergence", outcome_text(&study.outcomes[0]));
+    let _ = writeln!(text, "the base\n  {}\nconvergence", outcome_text(&study.outcomes[0]));
     for curve in &study.curves {
         let _ = writeln!(text, "  {}: {}", curve.knob, accuracy::verdict(study, curve));
+    }
+    if study.is_random() {
+        // The limit and the truth are those of another technique, which says it all.
+        return text;
     }
     for skipped in study.limit.held.iter().chain(&study.skipped) {
         let _ = writeln!(text, "  {}: {}", skipped.knob, skipped.reason);
@@ -82,6 +124,7 @@ fn study_text(study: &Study) -> String {
 fn outcome_text(o: &Outcome) -> String {
     let time = organza::accuracy::median_seconds(o).map_or_else(|| "-".into(), |s| format!("{:.1} ms", 1e3 * s));
     let error = o.from_limit.as_ref().filter(|_| o.drawn);
-    let error = error.map_or_else(|| "-".into(), |d| format!("RMSE {:.2e}  FLIP {:.4}", d.linear.rmse, d.flip));
+    let half = o.sampled.map_or_else(String::new, |s| format!(" ± {:.0e}", s.from_limit.half_width));
+    let error = error.map_or_else(|| "-".into(), |d| format!("RMSE {:.2e}{half}  FLIP {:.4}", d.linear.rmse, d.flip));
     format!("{time:>10}  {error}  {}", o.setting.label)
 }

@@ -1,0 +1,90 @@
+//! The study of an unbiased random technique: every setting is drawn with several seeds, and means are given with intervals.
+//!
+//! The limit is another technique's: an expectation has no end that could be drawn. How the error falls with the repeats is
+//! read from the spread over seeds, which needs no reference; so no error is too small to be shown, and none is refused.
+
+use super::settings::Settings;
+use super::study::{Repeats, frontier_of, repeat_all};
+use super::{
+    Curve, CurvePoint, Distance, Draw, Limit, Options, Outcome, Sampled, Setting, Settled, Step, Study, Sweep, Timed,
+    Truth,
+};
+use crate::{Error, Progress};
+use reference::metrics::{Image, Linear};
+use reference::statistics::fit_order;
+
+/// Seeds of every setting; each is one timed repeat too.
+pub const SEEDS: usize = 5;
+
+/// Draws and judges by `limit`, that of a technique whose expectation is the same.
+///
+/// # Errors
+/// Those of `draw`, but a setting that exceeds a limit of resources is noted and left out.
+pub fn random_study(
+    sweep: &Sweep,
+    limit: &Limit,
+    truth: Result<Truth, String>,
+    options: &Options,
+    progress: &Progress,
+    draw: &mut Draw<'_>,
+) -> Result<Study, Error> {
+    let settings = Settings::of(sweep);
+    let mut timed = vec![Timed::default(); settings.list.len()];
+    repeat_all(&settings, &mut timed, &Repeats { times: SEEDS, seeded: true, order: options.seed }, progress, draw)?;
+    let exposure = sweep.base.scene.render.exposure;
+    let of_truth = truth.as_ref().ok().map(|t| &t.image);
+    let mut outcomes = Vec::new();
+    for (setting, timed) in settings.list.into_iter().zip(timed) {
+        outcomes.push(judge(setting, timed, limit, of_truth, exposure)?);
+    }
+    let curves = sweep.knobs.iter().zip(&settings.of_step).map(|(knob, steps)| {
+        let points: Vec<CurvePoint> = knob.steps.iter().zip(steps).map(|(s, k)| point(s, *k, &outcomes[*k])).collect();
+        let sized: Vec<[f64; 2]> = points.iter().filter_map(|p| Some([p.size?, p.error?])).collect();
+        Curve {
+            knob: knob.name,
+            end: Step { label: "the expectation: spread over seeds".into(), size: None, value: f64::INFINITY },
+            end_size: None,
+            points,
+            own_setting: outcomes[0].sampled.map_or(0.0, |s| s.noise),
+            settled: Settled { own_error: 0.0, fit: fit_order(&sized), careful_order: None },
+            end_seconds: None,
+        }
+    });
+    let curves = curves.collect();
+    let (ratio, frontier) = frontier_of(&outcomes.iter().collect::<Vec<_>>());
+    Ok(Study {
+        technique: sweep.technique,
+        outcomes,
+        curves,
+        skipped: sweep.skipped.clone(),
+        limit: limit.clone(),
+        truth,
+        frontier,
+        significant_ratio: ratio,
+        knobs: sweep.knobs.clone(),
+    })
+}
+
+fn point(step: &Step, setting: usize, outcome: &Outcome) -> CurvePoint {
+    let error = outcome.sampled.map(|s| s.noise);
+    CurvePoint { setting, size: step.size, error, drawn: error.is_some_and(|e| e > 0.0) }
+}
+
+/// One setting by the pictures of its seeds.
+fn judge(
+    setting: Setting,
+    timed: Timed,
+    limit: &Limit,
+    truth: Option<&Image<Linear>>,
+    exposure: f64,
+) -> Result<Outcome, Error> {
+    let distance = |to: &Image<Linear>| -> Result<Option<Distance>, Error> {
+        let all: Result<Vec<Distance>, Error> =
+            timed.images.iter().map(|i| Distance::between(i, to, exposure)).collect();
+        Ok(Distance::mean(&all?))
+    };
+    let from_limit = distance(&limit.image)?;
+    let from_truth = truth.map(distance).transpose()?.flatten();
+    let sampled = Sampled::of(&timed.images, &limit.image, limit.own_error, truth)?;
+    Ok(Outcome { setting, drawn: from_limit.is_some(), timed, from_limit, from_truth, sampled })
+}
