@@ -1,6 +1,10 @@
 //! What the end-to-end tests share: the real command, from a scene text to the channels of its EXR file.
 #![allow(clippy::unwrap_used, clippy::missing_panics_doc, reason = "a test fails by panicking")]
 
+mod place;
+
+pub use place::Place;
+
 use exr::prelude::{ReadChannels, ReadLayers, read};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -94,6 +98,20 @@ pub fn parallel_view(height: f64, size: u32) -> String {
          size = [{size}, {size}]\n"
     )
 }
+
+/// Head of a scene for the command: a small picture with a point light.
+pub const SMALL_SCENE: &str = r#"version = 1
+[camera]
+position = [0, 0, 4]
+target = [0, 0, 0]
+size = [24, 16]
+[background]
+color = [0.25, 0.5, 1.0]
+[[light]]
+kind = "point"
+position = [2, 4, 1]
+intensity = [20, 20, 20]
+"#;
 
 /// The values inside a rectangle of pixels, columns `x` and rows `y`.
 pub fn window(values: &[f64], width: u32, x: std::ops::Range<u32>, y: std::ops::Range<u32>) -> Vec<f64> {

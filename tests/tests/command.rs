@@ -1,67 +1,22 @@
 //! The real command: exit codes, refusals before work, closed pipes, odd names, interrupts.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use organza_tests::organza;
+use organza_tests::{Place, SMALL_SCENE, organza};
 use serde_json::Value;
 use std::fs;
-use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
-use tempfile::TempDir;
 
-const SCENE: &str = r#"version = 1
-[camera]
-position = [0, 0, 4]
-target = [0, 0, 0]
-size = [24, 16]
-[background]
-color = [0.25, 0.5, 1.0]
-[[light]]
-kind = "point"
-position = [2, 4, 1]
-intensity = [20, 20, 20]
-[[object]]
+const FOG: &str = r#"[[object]]
 name = "fog"
 medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 0.5, spacing = 0.25 }
 "#;
 
-/// A folder with the scene `s.toml`, in which the command runs.
-struct Place {
-    folder: TempDir,
+fn scene() -> String {
+    format!("{SMALL_SCENE}{FOG}")
 }
 
-impl Place {
-    fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("s.toml"), SCENE).unwrap();
-        Self { folder }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn run(&self, arguments: &[&str]) -> Output {
-        organza().args(arguments).current_dir(&self.folder).output().unwrap()
-    }
-
-    /// Asserts the exit code and part of stderr, and that nothing panicked.
-    #[track_caller]
-    fn expect(&self, code: i32, arguments: &[&str], stderr: &str) -> Output {
-        let out = self.run(arguments);
-        let text = String::from_utf8_lossy(&out.stderr);
-        assert_eq!(out.status.code(), Some(code), "{arguments:?}: {text}");
-        assert!(text.contains(stderr), "{arguments:?}\n  expected: {stderr}\n  found:    {text}");
-        assert!(!text.contains("panicked") && !text.contains("bug in Organza"), "{text}");
-        out
-    }
-
-    /// Names of all files but the scene.
-    fn made(&self) -> Vec<String> {
-        let names = fs::read_dir(&self.folder).unwrap().map(|e| e.unwrap().file_name().to_string_lossy().into_owned());
-        let mut names: Vec<String> = names.filter(|n| n != "s.toml").collect();
-        names.sort();
-        names
-    }
+fn place() -> Place {
+    Place::new(&scene())
 }
 
 fn json_of(out: &Output) -> Value {
@@ -70,7 +25,7 @@ fn json_of(out: &Output) -> Value {
 
 #[test]
 fn exit_0_render_writes_all_outputs_and_nothing_else() {
-    let place = Place::new();
+    let place = place();
     let out = place.expect(0, &["render", "s.toml", "-o", "a.exr", "-o", "b.png", "--cost", "c.json", "--json"], "");
     assert_eq!(place.made(), ["a.exr", "b.png", "c.json"]);
     let document = json_of(&out);
@@ -84,14 +39,14 @@ fn exit_0_render_writes_all_outputs_and_nothing_else() {
 
 #[test]
 fn exit_0_the_default_output_is_the_scenes_name() {
-    let place = Place::new();
+    let place = place();
     place.expect(0, &["render", "s.toml"], "");
     assert_eq!(place.made(), ["s.exr"]);
 }
 
 #[test]
 fn exit_0_explain_info_schema_print_documents() {
-    let place = Place::new();
+    let place = place();
     let explained = json_of(&place.expect(0, &["explain", "s.toml", "--json"], ""));
     assert!(explained["plan"]["effects"].as_array().is_some_and(|e| !e.is_empty()));
     let info = json_of(&place.expect(0, &["info", "s.toml", "--json"], ""));
@@ -105,7 +60,7 @@ fn exit_0_explain_info_schema_print_documents() {
 
 #[test]
 fn exit_2_is_for_the_command_line() {
-    let place = Place::new();
+    let place = place();
     for (arguments, stderr) in [
         (vec!["rendr"], "unrecognized subcommand"),
         (vec!["render", "s.toml", "-o", "a.jpg"], "expected a name that ends in .exr or .png"),
@@ -134,8 +89,8 @@ fn exit_2_is_for_the_command_line() {
 
 #[test]
 fn exit_3_is_for_the_scene_and_its_data() {
-    let place = Place::new();
-    fs::write(place.path("bad.toml"), SCENE.replace("target", "taget")).unwrap();
+    let place = place();
+    fs::write(place.path("bad.toml"), scene().replace("target", "taget")).unwrap();
     let out = place.expect(
         3,
         &["render", "bad.toml", "--json"],
@@ -143,7 +98,7 @@ fn exit_3_is_for_the_scene_and_its_data() {
     );
     assert_eq!(json_of(&out)["error"]["exit_code"], 3);
     fs::write(place.path("empty.ply"), "").unwrap();
-    let mesh = SCENE.replace(
+    let mesh = scene().replace(
         "medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 0.5, spacing = 0.25 }",
         "mesh = \"empty.ply\"",
     );
@@ -154,7 +109,7 @@ fn exit_3_is_for_the_scene_and_its_data() {
 
 #[test]
 fn exit_4_bi1_bi31_refused_outputs_are_refused_before_any_work() {
-    let place = Place::new();
+    let place = place();
     place.expect(4, &["render", "missing.toml"], "missing.toml: cannot read the scene");
     fs::create_dir(place.path("folder.exr")).unwrap();
     fs::write(place.path("old.exr"), "old").unwrap();
@@ -178,22 +133,22 @@ fn exit_4_bi1_bi31_refused_outputs_are_refused_before_any_work() {
 #[cfg(unix)]
 #[test]
 fn bi31_an_output_that_is_an_input_is_refused_even_with_force() {
-    let place = Place::new();
+    let place = place();
     std::os::unix::fs::symlink("s.toml", place.path("link.png")).unwrap();
     place.expect(4, &["render", "s.toml", "-o", "link.png", "--force"], "this output is also an input");
-    assert_eq!(fs::read_to_string(place.path("s.toml")).unwrap(), SCENE);
+    assert_eq!(fs::read_to_string(place.path("s.toml")).unwrap(), scene());
 }
 
 #[cfg(target_os = "linux")]
 #[test]
 fn bi31_a_folder_that_cannot_be_written_is_refused() {
     // /proc takes no files, from root either.
-    Place::new().expect(4, &["render", "s.toml", "--max-memory", "1", "-o", "/proc/a.exr"], "cannot write here");
+    place().expect(4, &["render", "s.toml", "--max-memory", "1", "-o", "/proc/a.exr"], "cannot write here");
 }
 
 #[test]
 fn exit_5_bi26_limits_are_checked_before_the_work() {
-    let place = Place::new();
+    let place = place();
     place.expect(5, &["render", "s.toml", "--max-memory", "10K"], "the limit is 10240");
     place.expect(5, &["render", "s.toml", "--max-memory", "1G", "--size", "65536x65536"], "the limit is 1073741824");
     // 2 x 2 samples a pixel.
@@ -204,21 +159,21 @@ fn exit_5_bi26_limits_are_checked_before_the_work() {
 #[test]
 fn exit_6_is_for_the_gpu() {
     for backend in ["wgpu", "ash"] {
-        Place::new().expect(6, &["render", "s.toml", "--backend", backend], "GPU backends are not in this version");
+        place().expect(6, &["render", "s.toml", "--backend", backend], "GPU backends are not in this version");
     }
 }
 
 #[cfg(unix)]
 #[test]
 fn exit_130_an_interrupted_render_leaves_nothing() {
-    let place = Place::new();
-    let fog = SCENE.replace("spacing = 0.25", "spacing = 0.02");
+    let place = place();
+    let fog = scene().replace("spacing = 0.25", "spacing = 0.02");
     fs::write(place.path("s.toml"), fog).unwrap();
     let arguments = ["render", "s.toml", "--size", "1000x1000", "-o", "a.exr"];
     // Earlier than its handler an interrupt kills; later than the render it comes too late. Somewhere between it is 130.
     for wait in [100, 200, 50, 400, 25, 800, 1600] {
         let mut command = organza();
-        command.args(arguments).current_dir(&place.folder).stdout(Stdio::null()).stderr(Stdio::null());
+        command.args(arguments).current_dir(place.folder()).stdout(Stdio::null()).stderr(Stdio::null());
         let mut child = command.spawn().unwrap();
         std::thread::sleep(std::time::Duration::from_millis(wait));
         // The first interrupt stops the work at its next tick, the second at once.
@@ -238,11 +193,11 @@ fn exit_130_an_interrupted_render_leaves_nothing() {
 #[cfg(unix)]
 #[test]
 fn bi33_a_closed_pipe_is_no_panic() {
-    let place = Place::new();
+    let place = place();
     for arguments in [vec!["schema"], vec!["--help"], vec!["info", "s.toml"], vec!["explain", "s.toml", "--json"]] {
         let mut child = organza()
             .args(&arguments)
-            .current_dir(&place.folder)
+            .current_dir(place.folder())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
@@ -258,12 +213,12 @@ fn bi33_a_closed_pipe_is_no_panic() {
 #[test]
 fn bi34_odd_names_work_and_are_escaped() {
     use std::os::unix::ffi::OsStrExt;
-    let place = Place::new();
-    let scene = place.folder.path().join(std::ffi::OsStr::from_bytes(b"s\xff\n\x1b[2J.toml"));
-    let picture = place.folder.path().join(std::ffi::OsStr::from_bytes(b"p\xfe.exr"));
+    let place = place();
+    let scene = place.folder().join(std::ffi::OsStr::from_bytes(b"s\xff\n\x1b[2J.toml"));
+    let picture = place.folder().join(std::ffi::OsStr::from_bytes(b"p\xfe.exr"));
     fs::copy(place.path("s.toml"), &scene).unwrap();
     let render =
-        || organza().arg("render").arg(&scene).arg("-o").arg(&picture).current_dir(&place.folder).output().unwrap();
+        || organza().arg("render").arg(&scene).arg("-o").arg(&picture).current_dir(place.folder()).output().unwrap();
     assert_eq!(render().status.code(), Some(0));
     assert!(picture.is_file());
     let second = render();
@@ -283,7 +238,7 @@ fn bi34_odd_names_work_and_are_escaped() {
 
 #[test]
 fn bi30_threads_0_takes_all_cores_and_the_bytes_do_not_depend_on_it() {
-    let place = Place::new();
+    let place = place();
     for threads in ["0", "1", "3"] {
         place.expect(0, &["render", "s.toml", "--threads", threads, "-o", &format!("{threads}.exr")], "");
     }

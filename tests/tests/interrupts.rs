@@ -1,25 +1,12 @@
 //! Renders by particles that stop in the middle: checkpoints, the picture at an interrupt, and the same bits at the end.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use organza_tests::organza;
+use organza_tests::{Place, SMALL_SCENE, organza};
 use std::fs;
-use std::path::PathBuf;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::Duration;
-use tempfile::TempDir;
 
-const SCENE: &str = r#"version = 1
-[camera]
-position = [0, 0, 4]
-target = [0, 0, 0]
-size = [96, 64]
-[background]
-color = [0.25, 0.5, 1.0]
-[[light]]
-kind = "point"
-position = [2, 4, 1]
-intensity = [20, 20, 20]
-[[object]]
+const OBJECTS: &str = r#"[[object]]
 name = "fog"
 medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 1.5, spacing = 0.25 }
 [[object]]
@@ -39,99 +26,73 @@ const SHEET: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n
                      element face 1\nproperty list uchar int vertex_indices\nend_header\n-1 -1 0.2\n1 -1 0\n0 1 0.4\n\
                      3 0 1 2\n";
 
-struct Place {
-    folder: TempDir,
+fn place() -> Place {
+    let place = Place::new(&format!("{SMALL_SCENE}{OBJECTS}").replace("[24, 16]", "[96, 64]"));
+    place.write("sheet.ply", SHEET);
+    place
 }
 
-impl Place {
-    fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("s.toml"), SCENE).unwrap();
-        fs::write(folder.path().join("sheet.ply"), SHEET).unwrap();
-        Self { folder }
-    }
+/// `organza render` of the scene with more arguments.
+fn render<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
+    [&["render", "s.toml", "--force"], arguments].concat()
+}
 
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
+fn spawn(place: &Place, arguments: &[&str]) -> Child {
+    let mut command = organza();
+    command.args(render(arguments)).current_dir(place.folder());
+    command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
 
-    fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = organza();
-        command.args(["render", "s.toml", "--force"]).args(arguments).current_dir(&self.folder);
-        command
-    }
-
-    fn run(&self, arguments: &[&str]) -> Output {
-        self.command(arguments).output().unwrap()
-    }
-
-    #[track_caller]
-    fn expect(&self, code: i32, arguments: &[&str], stderr: &str) {
-        let out = self.run(arguments);
-        let text = String::from_utf8_lossy(&out.stderr);
-        assert_eq!(out.status.code(), Some(code), "{text}");
-        assert!(text.contains(stderr), "{text}");
-    }
-
-    fn spawn(&self, arguments: &[&str]) -> Child {
-        self.command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
-    }
-
-    /// Waits until the file is there, or the command has ended.
-    fn wait_for(&self, name: &str, child: &mut Child) {
-        while !self.path(name).exists() && child.try_wait().unwrap().is_none() {
-            std::thread::sleep(Duration::from_millis(20));
-        }
-    }
-
-    fn bytes(&self, name: &str) -> Vec<u8> {
-        fs::read(self.path(name)).unwrap()
+/// Waits until the file is there, or the command has ended.
+fn wait_for(place: &Place, name: &str, child: &mut Child) {
+    while !place.path(name).exists() && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(20));
     }
 }
 
 #[test]
 fn a_checkpoint_goes_on_to_more_sets_in_the_same_bits() {
-    let place = Place::new();
-    place.expect(0, &["-o", "whole.exr", "--repeat-level", "60"], "");
-    place.expect(0, &["-o", "part.exr", "--repeat-level", "17", "--checkpoint", "sums"], "");
+    let place = place();
+    place.expect(0, &render(&["-o", "whole.exr", "--repeat-level", "60"]), "");
+    place.expect(0, &render(&["-o", "part.exr", "--repeat-level", "17", "--checkpoint", "sums"]), "");
     // Neither the path of the scene nor the displayed picture belongs to the sums.
-    place.expect(0, &["-o", "part.exr", "--repeat-level", "60", "--checkpoint", "sums", "--threads", "3"], "");
+    place.expect(0, &render(&["-o", "part.exr", "--repeat-level", "60", "--checkpoint", "sums", "--threads", "3"]), "");
     let without_hash = |bytes: Vec<u8>| {
         let at = bytes.windows(20).position(|w| w == b"organza:scene_sha256").unwrap();
         [&bytes[..at], &bytes[at + 100..]].concat()
     };
     assert_eq!(without_hash(place.bytes("whole.exr")), without_hash(place.bytes("part.exr")));
     // More sets than are asked for are not thrown away.
-    let json = place.run(&["-o", "part.exr", "--repeat-level", "20", "--checkpoint", "sums", "--json"]);
+    let json = place.run(&render(&["-o", "part.exr", "--repeat-level", "20", "--checkpoint", "sums", "--json"]));
     let document: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
     assert_eq!(document["sets"], serde_json::json!({ "averaged": 60, "asked": 20, "interrupted": false }));
 }
 
 #[test]
 fn a_killed_render_resumes_to_the_same_bits() {
-    let place = Place::new();
+    let place = place();
     let arguments = ["-o", "a.exr", "--repeat-level", "1200", "--checkpoint", "sums"];
-    place.expect(0, &arguments, "");
+    place.expect(0, &render(&arguments), "");
     let whole = place.bytes("a.exr");
     fs::remove_file(place.path("sums")).unwrap();
     for more in [0, 150] {
-        let mut child = place.spawn(&arguments);
-        place.wait_for("sums", &mut child);
+        let mut child = spawn(&place, &arguments);
+        wait_for(&place, "sums", &mut child);
         std::thread::sleep(Duration::from_millis(more));
         child.kill().unwrap();
         child.wait().unwrap();
     }
-    place.expect(0, &arguments, "");
+    place.expect(0, &render(&arguments), "");
     assert_eq!(place.bytes("a.exr"), whole);
 }
 
 #[cfg(unix)]
 #[test]
 fn an_interrupt_leaves_the_picture_so_far_and_a_checkpoint() {
-    let place = Place::new();
+    let place = place();
     let many = ["-o", "a.exr", "--repeat-level", "1000000", "--checkpoint", "sums", "--json"];
-    let mut child = place.spawn(&many);
-    place.wait_for("sums", &mut child);
+    let mut child = spawn(&place, &many);
+    wait_for(&place, "sums", &mut child);
     Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     let out = child.wait_with_output().unwrap();
     assert_eq!(out.status.code(), Some(130));
@@ -142,7 +103,7 @@ fn an_interrupt_leaves_the_picture_so_far_and_a_checkpoint() {
     assert!(String::from_utf8_lossy(&out.stderr).contains(&format!("average of {averaged} of 1000000 sets")));
     // It is the picture of so many sets.
     let level = averaged.to_string();
-    place.expect(0, &["-o", "b.exr", "--repeat-level", &level, "--checkpoint", "sums"], "");
+    place.expect(0, &render(&["-o", "b.exr", "--repeat-level", &level, "--checkpoint", "sums"]), "");
     let pixels = |name: &str| {
         let image = exr::prelude::read_first_rgba_layer_from_file(
             place.path(name),
@@ -158,21 +119,21 @@ fn an_interrupt_leaves_the_picture_so_far_and_a_checkpoint() {
 
 #[test]
 fn a_checkpoint_of_something_else_is_refused() {
-    let place = Place::new();
+    let place = place();
     let small = ["-o", "a.exr", "--repeat-level", "2", "--checkpoint", "sums"];
-    place.expect(0, &small, "");
+    place.expect(0, &render(&small), "");
     let kept = place.bytes("sums");
-    let with = |more: &[&'static str]| [&small[..], more].concat();
+    let with = |more: &[&'static str]| render(&[&small[..], more].concat());
     place.expect(3, &with(&["--seed", "7"]), "sums: ");
     place.expect(3, &with(&["--size", "8x8"]), "of another scene or other parameters");
     place.expect(3, &with(&["--set", "object.fog.visible=false"]), "hint: name another --checkpoint");
-    fs::write(place.path("sheet.ply"), SHEET.replace("0.4", "0.5")).unwrap();
-    place.expect(3, &small, "of another scene or other parameters");
-    fs::write(place.path("sheet.ply"), SHEET).unwrap();
-    place.expect(0, &small, "");
+    place.write("sheet.ply", SHEET.replace("0.4", "0.5"));
+    place.expect(3, &render(&small), "of another scene or other parameters");
+    place.write("sheet.ply", SHEET);
+    place.expect(0, &render(&small), "");
     for (bytes, why) in [(&kept[..kept.len() - 9], "damaged"), (b"hello", "not a checkpoint"), (b"", "cut short")] {
-        fs::write(place.path("sums"), bytes).unwrap();
-        place.expect(3, &small, why);
+        place.write("sums", bytes);
+        place.expect(3, &render(&small), why);
         assert_eq!(place.bytes("sums"), bytes, "a file that is refused is not touched");
     }
     place.expect(
@@ -180,7 +141,7 @@ fn a_checkpoint_of_something_else_is_refused() {
         &["-o", "a.exr", "--technique", "points", "--layers", "shadow", "--checkpoint", "c"],
         "only the technique `particles`",
     );
-    place.expect(2, &["-o", "a.exr", "--checkpoint", "a.exr"], "named twice");
-    place.expect(4, &["-o", "a.exr", "--checkpoint", "s.toml"], "also an input");
-    place.expect(2, &["-o", "a.exr", "--repeat-level", "1"], "--repeat-level 1: ");
+    place.expect(2, &render(&["-o", "a.exr", "--checkpoint", "a.exr"]), "named twice");
+    place.expect(4, &render(&["-o", "a.exr", "--checkpoint", "s.toml"]), "also an input");
+    place.expect(2, &render(&["-o", "a.exr", "--repeat-level", "1"]), "--repeat-level 1: ");
 }

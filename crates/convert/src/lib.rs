@@ -19,15 +19,7 @@ mod columns;
 mod combine;
 mod convert_error;
 pub mod cost;
-#[cfg(any(
-    feature = "ply",
-    feature = "stl",
-    feature = "obj",
-    feature = "xyz",
-    feature = "nrrd",
-    feature = "nifti",
-    feature = "las"
-))]
+#[cfg(feature = "read")]
 mod error;
 #[cfg(feature = "expression")]
 mod expression;
@@ -48,15 +40,7 @@ mod places;
 #[cfg(feature = "noise")]
 mod procedural;
 mod raw_points;
-#[cfg(any(
-    feature = "ply",
-    feature = "stl",
-    feature = "obj",
-    feature = "xyz",
-    feature = "nrrd",
-    feature = "nifti",
-    feature = "las"
-))]
+#[cfg(feature = "read")]
 pub mod read;
 pub mod reference;
 mod resample;
@@ -73,15 +57,7 @@ mod volume_points;
 
 pub use combine::{Clip, ClippedField, CombinedField, SharedField};
 pub use convert_error::ConvertError;
-#[cfg(any(
-    feature = "ply",
-    feature = "stl",
-    feature = "obj",
-    feature = "xyz",
-    feature = "nrrd",
-    feature = "nifti",
-    feature = "las"
-))]
+#[cfg(feature = "read")]
 pub use error::{Fault, Place, ReadError, escaped_path};
 #[cfg(feature = "expression")]
 pub use expression::{ExpressionError, ExpressionField};
