@@ -1,6 +1,10 @@
 //! The points technique against physical truth: the same scene path-traced without splats.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+#[path = "many_forms/write.rs"]
+#[allow(dead_code, reason = "volumes alone are written here")]
+mod write;
+
 use organza::scene::{self, Scene};
 use organza::truth::{Truth, truth};
 use organza::{Progress, RenderOptions, render};
@@ -63,12 +67,113 @@ fn points_agree_with_path_tracing_of_meshes_media_and_translucent_surfaces() {
     assert!(rmse(&squares(&drawn(&dimmer), size), &exact) > 3.0 * error);
 }
 
+/// A turned box, a turned formula, a classified volume and a ground, with one sun, and no border in view; `volume.nii` lies in the scene's folder.
+fn mixed(folder: &Path, changes: &[[&str; 2]]) -> Scene {
+    let cell = |k: usize| {
+        let at = |a: usize| (a as f64 + 0.5) / 16.0 - 1.0;
+        let p = [at(k % 32), at(k / 32 % 32), at(k / 1024)];
+        (1.2 - p.iter().map(|c| c * c).sum::<f64>()).max(0.0) as f32
+    };
+    let cells: Vec<f32> = (0..32768).map(cell).collect();
+    std::fs::write(folder.join("volume.nii"), write::nifti(&cells, 0.0625)).unwrap();
+    let mut text = MIXED.to_owned();
+    for [from, to] in changes {
+        assert!(text.contains(from), "{from}");
+        text = text.replace(from, to);
+    }
+    let path = folder.join("scene.toml");
+    std::fs::write(&path, &text).unwrap();
+    scene::parse(&path, text.as_bytes(), &Default::default()).unwrap()
+}
+
+const MIXED: &str = r#"version = 1
+[camera]
+position = [0, 3, 5]
+target = [0, 0.3, 0]
+fov_y = 32
+size = [96, 64]
+[background]
+color = [0.1, 0.2, 0.4]
+[ambient]
+color = [0.1, 0.1, 0.1]
+[[light]]
+kind = "directional"
+direction = [0.3, -1, -0.4]
+irradiance = [3, 3, 3]
+shadow = true
+[material.fog]
+color = [0.9, 0.8, 0.7]
+medium = { extinction = 2, albedo = 0.9, asymmetry = 0.1 }
+[[object]]
+name = "box"
+transform = { rotate = [20, 35, 10], translate = [-1.0, 0.7, 0] }
+medium_box = { min = [-0.5, -0.4, -0.4], max = [0.5, 0.4, 0.4], extinction = 2.5, spacing = 0.03 }
+material = "fog"
+[[object]]
+name = "formula"
+transform = { rotate = [0, 50, 0], translate = [0.2, 0.5, -0.9] }
+density = { expression = "1 + x", box = [[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]], spacing = 0.03, extinction = 2 }
+material = "fog"
+[[object]]
+name = "volume"
+volume = "volume.nii"
+transform = { up = "z", scale = 0.55, rotate = [0, 25, 0], translate = [1.0, 0.7, 0.1] }
+transfer = [
+  { value = 0.2, color = [1.0, 0.3, 0.2], extinction = 0 },
+  { value = 0.7, color = [0.4, 0.9, 0.3], extinction = 2.5 },
+  { value = 1.2, color = [0.2, 0.3, 1.0], extinction = 4 },
+]
+material = "fog"
+[[object]]
+name = "ground"
+rectangle = { center = [0, 0, -3], u = [0, 0, 8], v = [9, 0, 0], spacing = 0.05 }
+color = [0.7, 0.7, 0.7]
+"#;
+
+/// Pairs of texts: what a scene asks otherwise than nature.
+const LIBERTIES: [(&str, [&str; 2]); 5] = [
+    ("as nature has it", ["shadow = true", "shadow = true"]),
+    ("a light without shadows", ["shadow = true", "shadow = false"]),
+    ("a box without shadow", ["name = \"box\"", "name = \"box\"\ncasts_shadow = false"]),
+    ("half of the shadow", ["name = \"ground\"", "name = \"ground\"\nshadow_coefficient = 0.5"]),
+    ("too bright a colour", ["color = [0.4, 0.9, 0.3]", "color = [0.4, 3.0, 0.3]"]),
+];
+
 #[test]
-fn what_has_no_physical_form_is_named() {
-    let mut unshadowed = scene([16, 9]);
-    unshadowed.lights[0].shadow = false;
-    assert!(traced(&unshadowed).unwrap_err().contains("light 0"));
-    let mut thin = scene([16, 9]);
-    thin.objects[1].casts_shadow = false;
-    assert!(traced(&thin).unwrap_err().contains("'bunny'"));
+fn points_agree_with_path_tracing_of_turned_media_classified_volumes_and_unnatural_shadows() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut natural = Vec::new();
+    for (what, change) in LIBERTIES {
+        let scene = mixed(folder.path(), &[change]);
+        let size = scene.camera.size;
+        let truth = traced(&scene).unwrap();
+        let exact = squares(truth.image.pixels(), size);
+        let error = rmse(&squares(&drawn(&scene), size), &exact);
+        let noise = truth.rms_standard_error() / SIDE as f64;
+        println!("{what}: RMSE {error:.5}, truth's standard error {noise:.5}");
+        assert!(error < 0.005 && noise < 0.002, "{what}: RMSE {error}, truth's standard error {noise}");
+        if natural.is_empty() {
+            natural = exact;
+            continue;
+        }
+        // The comparison can fail: the picture of another scene is told apart.
+        let apart = rmse(&exact, &natural);
+        assert!(apart > 2.0 * error, "{what}: {apart} apart, RMSE {error}");
+        assert_eq!(truth.method.contains("scatter more light"), what == "too bright a colour", "{}", truth.method);
+        assert_eq!(truth.method.contains("left out or weakened"), what != "too bright a colour", "{}", truth.method);
+    }
+}
+
+#[test]
+fn what_has_no_truth_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let phong = mixed(folder.path(), &[["color = [0.9, 0.8, 0.7]", "shading = \"phong\""]]);
+    let reason = traced(&phong).unwrap_err();
+    assert!(reason.contains("'formula'") && reason.contains("gradient"), "{reason}");
+    let scattering = mixed(folder.path(), &[["color = [0.7, 0.7, 0.7]", "material = \"fog\""]]);
+    assert!(traced(&scattering).unwrap_err().contains("phase function"));
+    std::fs::write(folder.path().join("raw.xyz"), "0 0 0\n1 0 0\n0 1 0\n").unwrap();
+    let ground = "rectangle = { center = [0, 0, -3], u = [0, 0, 8], v = [9, 0, 0], spacing = 0.05 }";
+    let raw = mixed(folder.path(), &[[ground, "points = \"raw.xyz\""]]);
+    assert!(traced(&raw).unwrap_err().contains("no truth by nature"));
 }

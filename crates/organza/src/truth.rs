@@ -1,16 +1,20 @@
 //! Physical truth of a scene: the same objects, materials and lights in the path tracer of `reference`, without splats.
 //!
 //! Light takes the paths that the `points` technique simulates: emission, one scattering or reflection, shadows that
-//! translucent things colour. What has no physical form is named instead of being guessed at: raw points (nothing lies
-//! between them), volumes shaded by their gradient, shadows turned off.
+//! translucent things colour. What the scene asks otherwise than nature a path tracer can follow too (`reference::Liberty`):
+//! shadows that are turned off or weakened, and colours above 1, which scatter more light than arrives; the truth says so.
+//! What has no truth is named instead of being guessed at: raw points (nobody knows the surface that they sample), volumes
+//! shaded by their gradient, surfaces that scatter by a phase function.
 
 mod object;
+mod placed;
+mod volume;
 
 use crate::scene::{LightSource, Scene, SceneLight};
 use crate::{Error, Progress, RenderOptions};
 use object::Body;
 use reference::metrics::{Image, Linear};
-use reference::{Environment, PathRules, PathSettings, PixelSampling, path_trace};
+use reference::{Environment, Liberty, PathRules, PathSettings, PixelSampling, path_trace};
 use std::f64::consts::PI;
 
 /// An unbiased estimate of what is seen, with its error.
@@ -50,10 +54,7 @@ pub fn truth(
         }
     }
     let mut lights = Vec::new();
-    for (i, light) in scene.lights.iter().enumerate() {
-        if !light.shadow {
-            return Ok(Err(format!("light {i}: shadow = false has no physical form")));
-        }
+    for light in &scene.lights {
         lights.push(source(light)?);
     }
     let fault = |e: splat_core::Error| match e {
@@ -64,6 +65,7 @@ pub fn truth(
         media: bodies.iter().filter_map(|b| b.medium().transpose()).collect::<Result<_, _>>().map_err(fault)?,
         surfaces: bodies.iter().filter_map(Body::surface).collect(),
         lights,
+        unshadowed: scene.lights.iter().map(|l| !l.shadow).collect(),
         environment: Environment::default(),
         background: Some(scene.background.map(f64::from)),
     };
@@ -80,8 +82,27 @@ pub fn truth(
     }
     let size = estimate.size.map(|s| s as usize);
     let image = Image::from_radiance(size, estimate.radiance.mean).map_err(|e| Error::Internal(e.to_string()))?;
-    let method = format!("path tracing without splats, single scattering, {} samples a pixel", estimate.samples);
+    let method = format!(
+        "path tracing without splats, single scattering, {} samples a pixel{}",
+        estimate.samples,
+        liberties(scene, &traced)
+    );
     Ok(Ok(Truth { method, image, standard_error: estimate.radiance.standard_error }))
+}
+
+/// What the scene asks otherwise than nature, in words.
+fn liberties(scene: &Scene, traced: &reference::Scene<'_>) -> String {
+    let surfaces = traced.surfaces.iter().map(|s| s.material.liberty);
+    let all: Vec<Liberty> = traced.media.iter().map(|m| m.liberty).chain(surfaces).collect();
+    let mut text = String::new();
+    if all.iter().any(|l| l.gain > 1.0) {
+        text += "; colours above 1 scatter more light than arrives, as the scene asks";
+    }
+    let weakened = all.iter().any(|l| !l.casts_shadow || l.shadow_coefficient != 1.0);
+    if weakened || scene.lights.iter().any(|l| !l.shadow) {
+        text += "; shadows are left out or weakened, as the scene asks";
+    }
+    text
 }
 
 /// The light with its extent; intensity I on the axis becomes radiance I over the area that is seen from there.

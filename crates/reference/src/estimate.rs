@@ -159,7 +159,7 @@ pub fn path_trace(
         };
         pixels.par_chunks_mut(width).enumerate().try_for_each(row)?;
         done = until;
-        let estimate = finish(camera, settings, &pixels, done, tracer.volume.violations());
+        let estimate = finish(camera, settings, &pixels, done, tracer.violations());
         let reached = settings.target_relative_error.is_some_and(|target| estimate.relative_error() <= target);
         if reached || done >= settings.samples {
             return Ok(estimate);

@@ -125,6 +125,7 @@ impl<'a> Renderer<'a> {
     fn new(scene: &'a SurfaceScene<'a>) -> Result<Self, Error> {
         for (i, s) in scene.implicits.iter().enumerate() {
             s.material.validate(i)?;
+            s.material.liberty.refuse("surface", i)?;
             let ordered = s.bounds[0].is_finite() && s.bounds[1].is_finite() && s.bounds[0].cmplt(s.bounds[1]).all();
             if !ordered || !s.color.iter().all(|c| c.is_finite() && *c >= 0.0) {
                 let found = (s.bounds, s.color);
@@ -139,6 +140,7 @@ impl<'a> Renderer<'a> {
         }
         for (i, s) in scene.meshes.iter().enumerate() {
             s.material.validate(scene.implicits.len() + i)?;
+            s.material.liberty.refuse("surface", scene.implicits.len() + i)?;
         }
         for (i, light) in scene.lights.iter().enumerate() {
             light.validate(i)?;

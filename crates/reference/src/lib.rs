@@ -43,6 +43,7 @@ mod environment;
 mod estimate;
 mod footprint;
 mod implicit;
+mod liberty;
 mod lights;
 mod majorant;
 mod march;
@@ -69,6 +70,7 @@ pub use dielectric::{
 pub use environment::{Environment, LatLong};
 pub use estimate::{Estimate, PathSettings, PixelSampling, Statistics, path_trace};
 pub use implicit::{ImplicitSurface, SurfaceImage, SurfaceScene, composite_surfaces};
+pub use liberty::Liberty;
 pub use lights::LightSource;
 pub use march::{MarchedImage, MarchedRay, march, march_image, optical_depth};
 pub use medium::{ColorAt, Medium};

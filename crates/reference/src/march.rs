@@ -46,7 +46,8 @@ pub fn optical_depth(media: &[Medium<'_>], ray: &Ray, t0: f64, t1: f64, params: 
 /// Radiance and transmittance of media lit by points, spots and parallel light; `t1` may be infinite.
 ///
 /// # Errors
-/// [`Error::Invalid`] for an area light: its shadows are soft, ask the path tracer.
+/// [`Error::Invalid`] for an area light, whose shadows are soft, and for a medium with a [`crate::Liberty`]: ask the path
+/// tracer.
 pub fn march(
     media: &[Medium<'_>],
     lights: &[LightSource],
@@ -57,6 +58,7 @@ pub fn march(
     if let Some(i) = lights.iter().position(LightSource::is_area) {
         return Err(Error::invalid("light", i, "shape", lights[i], "a point, spot or parallel light"));
     }
+    media.iter().enumerate().try_for_each(|(i, m)| m.liberty.refuse("medium", i))?;
     // Inner integrals are ten times more exact, so that the outer one sees a smooth function.
     let inner = MarchParams { relative_tolerance: params.relative_tolerance * 0.1, ..*params };
     let line = Line::new(media, *ray, t0, t1, &inner);
@@ -90,6 +92,7 @@ pub fn march_image(
     progress: &Progress,
 ) -> Result<MarchedImage, Error> {
     scene.validate()?;
+    scene.refuse_liberties()?;
     if !scene.surfaces.is_empty() {
         return Err(Error::invalid("surface", 0, "technique", "ray marching", "media alone; ask the path tracer"));
     }

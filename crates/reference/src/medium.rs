@@ -1,6 +1,7 @@
 //! Participating media: a density with optical properties.
 
 use crate::density::Density;
+use crate::liberty::Liberty;
 use glam::DVec3;
 use splat_core::Error;
 
@@ -27,6 +28,8 @@ pub struct Medium<'a> {
     pub glow: [f64; 3],
     /// Colour by world position, each channel in \[0, 1\] (larger values count as 1 in the albedo).
     pub color: Option<ColorAt<'a>>,
+    /// What it does otherwise than nature.
+    pub liberty: Liberty,
 }
 
 impl<'a> Medium<'a> {
@@ -40,6 +43,7 @@ impl<'a> Medium<'a> {
             emission: [0.0; 3],
             glow: [0.0; 3],
             color: None,
+            liberty: Liberty::default(),
         }
     }
 
@@ -69,6 +73,7 @@ impl<'a> Medium<'a> {
     /// [`Error::Invalid`] naming the medium by `index`.
     pub fn validate(&self, index: usize) -> Result<(), Error> {
         self.density.validate(index)?;
+        self.liberty.validate("medium", index)?;
         for (attribute, values) in [("extinction", self.extinction), ("emission", self.emission), ("glow", self.glow)] {
             if !values.iter().all(|v| v.is_finite() && *v >= 0.0) {
                 return Err(Error::invalid("medium", index, attribute, values, "three finite numbers ≥ 0"));

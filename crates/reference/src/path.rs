@@ -9,8 +9,10 @@
 //! Straight crossings of translucent surfaces keep the ray, its vertex and its density. Reflection and refraction at a
 //! dielectric are no scattering events; beyond one, lights count in full, since shadow rays end there.
 
+mod direct;
+
 use crate::dielectric::{Dielectric, fresnel_reflectance, reflect, refract};
-use crate::lights::{LightSample, LightSource};
+use crate::lights::LightSource;
 use crate::phase::{henyey_greenstein, sample_henyey_greenstein};
 use crate::random::Stream;
 use crate::ray::Ray;
@@ -47,11 +49,22 @@ pub(crate) struct Tracer<'a> {
     scene: &'a Scene<'a>,
     pub(crate) visibility: Visibility,
     pub(crate) volume: Volume<'a>,
+    /// Media that cast shadows, where some do not.
+    casters: Option<Volume<'a>>,
     /// Lights sampled at vertices, and those sampled along segments.
-    at_vertices: Vec<LightSource>,
-    along_segments: Vec<LightSource>,
+    at_vertices: Vec<Lamp>,
+    along_segments: Vec<Lamp>,
     areas: Vec<LightSource>,
     rules: PathRules,
+    /// Some shadow is not that of nature: only shadow rays know it, so rays that meet a light on their own do not count.
+    free: bool,
+}
+
+/// A light, and whether anything dims it.
+#[derive(Clone, Copy)]
+struct Lamp {
+    source: LightSource,
+    shadowed: bool,
 }
 
 /// A path under way.
@@ -101,8 +114,13 @@ impl Path {
     }
 }
 
-/// What scatters light at a vertex.
-enum Vertex {
+/// What scatters light at a vertex, and the share of shadow that it receives.
+struct Vertex {
+    scatter: Scatter,
+    shadow_coefficient: f64,
+}
+
+enum Scatter {
     Medium { travel: DVec3, asymmetry: f64 },
     Surface(Response),
 }
@@ -111,12 +129,12 @@ impl Vertex {
     /// Share of the light from unit direction `to_light` per unit irradiance on a facing plane, and the density of
     /// sampling that direction.
     fn toward(&self, to_light: DVec3) -> ([f64; 3], f64) {
-        match self {
-            Self::Medium { travel, asymmetry } => {
+        match &self.scatter {
+            Scatter::Medium { travel, asymmetry } => {
                 let p = henyey_greenstein(*travel, to_light, *asymmetry);
                 ([p; 3], p)
             }
-            Self::Surface(response) => response.toward(to_light),
+            Scatter::Surface(response) => response.toward(to_light),
         }
     }
 }
@@ -124,11 +142,19 @@ impl Vertex {
 impl<'a> Tracer<'a> {
     pub(crate) fn new(scene: &'a Scene<'a>, rules: PathRules) -> Result<Self, splat_core::Error> {
         scene.validate()?;
+        check_gains(scene, rules)?;
         let meshes: Vec<_> = scene.surfaces.iter().map(|s| s.mesh).collect();
-        let volume = Volume::new(&scene.media);
-        let lit = |l: &&LightSource| l.intensity(DVec3::ZERO).iter().any(|i| *i > 0.0) || l.pole().is_some();
-        let lights: Vec<LightSource> = scene.lights.iter().filter(lit).copied().collect();
-        let inside = |l: &LightSource| match (l.pole(), volume.bounds()) {
+        let volume = Volume::new(scene.media.clone());
+        let casting: Vec<_> = scene.media.iter().filter(|m| m.liberty.casts_shadow).copied().collect();
+        let casters = (casting.len() < scene.media.len()).then(|| Volume::new(casting));
+        let lit = |l: &LightSource| l.intensity(DVec3::ZERO).iter().any(|i| *i > 0.0) || l.pole().is_some();
+        let lamp = |(i, source): (usize, &LightSource)| Lamp {
+            source: *source,
+            shadowed: !scene.unshadowed.get(i).copied().unwrap_or(false),
+        };
+        let lamps = scene.lights.iter().enumerate().filter(|(_, l)| lit(l)).map(lamp);
+        let lights: Vec<Lamp> = lamps.collect();
+        let inside = |l: &Lamp| match (l.source.pole(), volume.bounds()) {
             (Some(p), Some(b)) => p.cmpge(b[0]).all() && p.cmple(b[1]).all(),
             _ => false,
         };
@@ -137,11 +163,18 @@ impl<'a> Tracer<'a> {
             scene,
             visibility: Visibility::new(&meshes)?,
             volume,
+            casters,
             at_vertices,
             along_segments,
-            areas: lights.into_iter().filter(LightSource::is_area).collect(),
+            areas: lights.into_iter().map(|l| l.source).filter(LightSource::is_area).collect(),
             rules,
+            free: scene.frees_shadows(),
         })
+    }
+
+    /// Lookups so far that exceeded their majorant.
+    pub(crate) fn violations(&self) -> u64 {
+        self.volume.violations() + self.casters.as_ref().map_or(0, Volume::violations)
     }
 
     /// Radiance that arrives along a ray backwards, one sample, and the path's scattering events.
@@ -208,6 +241,7 @@ impl<'a> Tracer<'a> {
         let factor = match path.density {
             None if path.events == 0 && !self.rules.lights_visible => 0.0,
             None => 1.0,
+            Some(_) if self.free => 0.0,
             Some(density) => {
                 let other = light.density(path.ray.origin, path.ray.direction, path.t) / self.at_vertices.len() as f64;
                 density / (density + other)
@@ -238,12 +272,13 @@ impl<'a> Tracer<'a> {
             return false;
         }
         path.bounces += 1;
-        path.scale(albedo);
+        path.scale(albedo.map(|a| a * medium.liberty.gain));
         if !path.survives(rng) {
             return false;
         }
         let travel = path.ray.direction;
-        let vertex = Vertex::Medium { travel, asymmetry: medium.asymmetry };
+        let scatter = Scatter::Medium { travel, asymmetry: medium.asymmetry };
+        let vertex = Vertex { scatter, shadow_coefficient: medium.liberty.shadow_coefficient };
         path.turn(c.point, travel, u32::MAX);
         self.gather(path, &vertex, &self.at_vertices, u32::MAX, rng);
         self.gather_environment(path, &vertex, u32::MAX, rng);
@@ -277,7 +312,9 @@ impl<'a> Tracer<'a> {
         let response = surface.material.response(color, surface.normal(hit.triangle, hit.uv, geometric), -travel);
         let point = path.ray.at(hit.t);
         path.turn(point, travel, hit.id);
-        let vertex = Vertex::Surface(response);
+        let liberty = &surface.material.liberty;
+        path.scale([liberty.gain; 3]);
+        let vertex = Vertex { scatter: Scatter::Surface(response), shadow_coefficient: liberty.shadow_coefficient };
         self.gather(path, &vertex, &self.at_vertices, hit.id, rng);
         self.gather(path, &vertex, &self.along_segments, hit.id, rng);
         self.gather_environment(path, &vertex, hit.id, rng);
@@ -287,100 +324,17 @@ impl<'a> Tracer<'a> {
         path.scale(weight);
         path.survives(rng)
     }
+}
 
-    /// Light that one of some lights sends to a vertex.
-    fn gather(&self, path: &mut Path, vertex: &Vertex, lights: &[LightSource], skip: u32, rng: &mut Stream) {
-        let n = lights.len();
-        if n == 0 {
-            return;
+/// What makes light must not go on for ever.
+fn check_gains(scene: &Scene<'_>, rules: PathRules) -> Result<(), splat_core::Error> {
+    let media = scene.media.iter().map(|m| ("medium", m.liberty.gain)).enumerate();
+    let surfaces = scene.surfaces.iter().map(|s| ("surface", s.material.liberty.gain)).enumerate();
+    match media.chain(surfaces).find(|(_, (_, gain))| *gain > 1.0) {
+        Some((i, (element, gain))) if rules.max_bounces.is_none() => {
+            Err(splat_core::Error::invalid(element, i, "gain", gain, "at most 1, or a number of bounces"))
         }
-        let pick = if n == 1 { 0 } else { ((rng.unit() * n as f64) as usize).min(n - 1) };
-        let u = if lights[pick].is_area() { rng.pair() } else { [0.5; 2] };
-        if let Some(sample) = lights[pick].sample(path.ray.origin, u) {
-            self.add_sample(path, vertex, &sample, 1.0 / n as f64, skip, rng);
-        }
-    }
-
-    /// Light that a bright environment sends to a vertex.
-    fn gather_environment(&self, path: &mut Path, vertex: &Vertex, skip: u32, rng: &mut Stream) {
-        let environment = &self.scene.environment;
-        if !environment.is_sampled() {
-            return;
-        }
-        if let Some((direction, radiance, density)) = environment.sample(rng.pair()) {
-            let value = radiance.map(|l| l / density);
-            let sample = LightSample { direction, distance: f64::INFINITY, value, density };
-            self.add_sample(path, vertex, &sample, 1.0, skip, rng);
-        }
-    }
-
-    fn add_sample(&self, path: &mut Path, vertex: &Vertex, s: &LightSample, chosen: f64, skip: u32, rng: &mut Stream) {
-        let (share, density) = vertex.toward(s.direction);
-        if share.iter().all(|v| *v == 0.0) {
-            return;
-        }
-        let ray = Ray { origin: path.ray.origin, direction: s.direction };
-        let arrives = self.transmittance(&ray, s.distance, skip, rng);
-        let balance = if s.density > 0.0 { s.density * chosen / (s.density * chosen + density) } else { 1.0 };
-        path.add(std::array::from_fn(|c| share[c] * s.value[c] * arrives[c]), balance / chosen);
-    }
-
-    /// Single scattering from lights inside media, along the part of the segment that media fill.
-    fn gather_along(&self, path: &mut Path, end: f64, rng: &mut Stream) {
-        let Some((t0, t1)) = self.volume.bounds().and_then(|b| path.ray.clip(b, path.t, end)) else { return };
-        let n = self.along_segments.len();
-        let light = &self.along_segments[((rng.unit() * n as f64) as usize).min(n - 1)];
-        let Some(pole) = light.pole() else { return };
-        let middle = (pole - path.ray.origin).dot(path.ray.direction);
-        let apart = (pole - path.ray.at(middle)).length();
-        let (a, b) = ((t0 - middle).atan2(apart), (t1 - middle).atan2(apart));
-        let t = middle + apart * (a + (b - a) * rng.unit()).tan();
-        let point = path.ray.at(t);
-        let scattered = self.scattering(point, pole, path.ray.direction);
-        if !(t0..=t1).contains(&t) || scattered.iter().all(|s| *s == 0.0) {
-            return;
-        }
-        let seen = self.volume.transmittance(&path.ray, path.t, t, rng);
-        let to_light = pole - point;
-        let distance = to_light.length();
-        let shadow = Ray { origin: point, direction: to_light / distance };
-        let arrives = self.transmittance(&shadow, distance, u32::MAX, rng);
-        let intensity = light.intensity(point);
-        // 1/density · 1/d²: the squares cancel but for rounding, apart² + (t − middle)² = d².
-        let factor = n as f64 * (b - a) / apart;
-        path.add(std::array::from_fn(|c| scattered[c] * intensity[c] * seen[c] * arrives[c]), factor);
-    }
-
-    /// Σ over media of extinction · albedo · phase towards a light, per channel.
-    fn scattering(&self, p: DVec3, pole: DVec3, travel: DVec3) -> [f64; 3] {
-        let mut sum = [0.0; 3];
-        let to_light = (pole - p).normalize_or_zero();
-        for medium in &self.scene.media {
-            let density = medium.density.value(p);
-            if density > 0.0 {
-                let (albedo, _) = medium.source(p);
-                let phase = henyey_greenstein(travel, to_light, medium.asymmetry);
-                (0..3).for_each(|c| sum[c] += density * medium.extinction[c] * albedo[c] * phase);
-            }
-        }
-        sum
-    }
-
-    /// An unbiased estimate of the transmittance of a straight line; dielectrics block it.
-    pub(crate) fn transmittance(&self, ray: &Ray, distance: f64, skip: u32, rng: &mut Stream) -> [f64; 3] {
-        let mut left = [1.0; 3];
-        let mut filter = Filter { skip, ..Filter::START };
-        while let Some(hit) = self.visibility.next(ray, filter, distance) {
-            let material = &self.scene.surfaces[hit.mesh as usize].material;
-            let opacity = material.opacity(self.visibility.normal(hit.id).dot(ray.direction));
-            (0..3).for_each(|c| left[c] *= 1.0 - opacity[c]);
-            if left == [0.0; 3] {
-                return left;
-            }
-            filter.after = (hit.t, hit.id);
-        }
-        let media = self.volume.transmittance(ray, 0.0, distance, rng);
-        std::array::from_fn(|c| left[c] * media[c])
+        _ => Ok(()),
     }
 }
 

@@ -15,6 +15,8 @@ pub struct Scene<'a> {
     pub surfaces: Vec<Surface<'a>>,
     /// Lights.
     pub lights: Vec<LightSource>,
+    /// For each light whether nothing dims it; empty where all lights cast shadows.
+    pub unshadowed: Vec<bool>,
     /// Light from beyond the scene.
     pub environment: Environment,
     /// What an eye ray that meets nothing sees; `None` for the environment.
@@ -22,6 +24,22 @@ pub struct Scene<'a> {
 }
 
 impl Scene<'_> {
+    /// Whether some light has other shadows than those of nature.
+    pub(crate) fn frees_shadows(&self) -> bool {
+        self.unshadowed.contains(&true)
+            || self.media.iter().any(|m| m.liberty.touches_shadows())
+            || self.surfaces.iter().any(|s| s.material.liberty.touches_shadows())
+    }
+
+    /// Refuses what only the path tracer follows.
+    pub(crate) fn refuse_liberties(&self) -> Result<(), Error> {
+        if let Some(i) = self.unshadowed.iter().position(|u| *u) {
+            return Err(Error::invalid("light", i, "unshadowed", true, "shadows; ask the path tracer"));
+        }
+        self.media.iter().enumerate().try_for_each(|(i, m)| m.liberty.refuse("medium", i))?;
+        self.surfaces.iter().enumerate().try_for_each(|(i, s)| s.material.liberty.refuse("surface", i))
+    }
+
     /// Checks every number.
     ///
     /// # Errors
@@ -33,6 +51,10 @@ impl Scene<'_> {
         for (i, surface) in self.surfaces.iter().enumerate() {
             surface.mesh.validate()?;
             surface.material.validate(i)?;
+        }
+        if !self.unshadowed.is_empty() && self.unshadowed.len() != self.lights.len() {
+            let found = self.unshadowed.len();
+            return Err(Error::invalid("scene", 0, "unshadowed", found, "none, or as many as there are lights"));
         }
         for (i, light) in self.lights.iter().enumerate() {
             light.validate(i)?;

@@ -4,6 +4,7 @@
 //! energy-normalised Phong lobe), ρ_d = `diffuse`·colour.
 
 use crate::dielectric::Dielectric;
+use crate::liberty::Liberty;
 use crate::phase::{around, cosine_hemisphere};
 use crate::random::Stream;
 use glam::DVec3;
@@ -46,6 +47,8 @@ pub struct SurfaceMaterial {
     pub glow: [f64; 3],
     /// Whether vertex normals, where the mesh has them, shade instead of the triangle's.
     pub smooth: bool,
+    /// What it does otherwise than nature.
+    pub liberty: Liberty,
 }
 
 impl Default for SurfaceMaterial {
@@ -60,6 +63,7 @@ impl Default for SurfaceMaterial {
             emission: [0.0; 3],
             glow: [0.0; 3],
             smooth: false,
+            liberty: Liberty::default(),
         }
     }
 }
@@ -133,6 +137,7 @@ impl SurfaceMaterial {
         if !self.emission.iter().chain(&self.glow).chain([&self.shininess]).all(|e| e.is_finite() && *e >= 0.0) {
             return bad("emission", format!("{self:?}"), "emission, glow and shininess finite and ≥ 0");
         }
+        self.liberty.validate("surface", index)?;
         match self.kind {
             SurfaceKind::Translucent { opacity, .. } if !opacity.iter().all(unit) => {
                 bad("opacity", format!("{opacity:?}"), "three numbers in [0, 1]")

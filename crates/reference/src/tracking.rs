@@ -25,7 +25,7 @@ pub(crate) struct Collision {
 
 /// Media with their majorants.
 pub(crate) struct Volume<'a> {
-    media: &'a [Medium<'a>],
+    media: Vec<Medium<'a>>,
     grid: Option<MajorantGrid>,
     /// Every medium attenuates all channels alike.
     grey: bool,
@@ -33,9 +33,9 @@ pub(crate) struct Volume<'a> {
 }
 
 impl<'a> Volume<'a> {
-    pub(crate) fn new(media: &'a [Medium<'a>]) -> Self {
+    pub(crate) fn new(media: Vec<Medium<'a>>) -> Self {
         let grey = media.iter().all(|m| m.extinction[0] == m.extinction[1] && m.extinction[1] == m.extinction[2]);
-        Self { media, grid: MajorantGrid::new(media), grey, violations: AtomicU64::new(0) }
+        Self { grid: MajorantGrid::new(&media), media, grey, violations: AtomicU64::new(0) }
     }
 
     /// Bounds of everything that can collide.
@@ -51,7 +51,7 @@ impl<'a> Volume<'a> {
     /// Extinction at `p` from the media of a cell.
     #[inline(always)]
     fn grey_extinction(&self, grid: &MajorantGrid, cell: usize, p: DVec3) -> f64 {
-        if let [medium] = self.media {
+        if let [medium] = self.media.as_slice() {
             return medium.extinction[0] * medium.density.value(p);
         }
         grid.members(cell).iter().map(|m| &self.media[*m as usize]).map(|m| m.extinction[0] * m.density.value(p)).sum()

@@ -1,14 +1,17 @@
 //! One object as the path tracer takes it: a density or a mesh in the world.
 
+use super::placed::{Placed, TurnedBox};
+use super::volume::Classified;
 use crate::load::object::{cloud_shape, field, refuse, wrong_kind};
-use crate::scene::{MediumShape, Scene, SceneMaterial, SceneObject, Source};
+use crate::scene::{MediumShape, Scene, SceneMaterial, SceneObject, Source, VolumeSource};
 use crate::{Error, RenderOptions};
+use convert::SplatParams;
 use convert::read::{Loaded as FileData, ReadLimits};
-use convert::{ExpressionField, SplatParams};
 use glam::{DMat3, DQuat, DVec3, Vec3};
-use reference::{Density, Lattice, Medium, Surface, SurfaceKind, SurfaceMaterial};
+use reference::{ColorAt, Density, Lattice, Liberty, Medium, Surface, SurfaceKind, SurfaceMaterial};
 use splat_core::{Grid, Mesh, ScalarField, Shading, Similarity, optics};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Steps of the truth to one step of the splats.
 const FINER: f64 = 0.5;
@@ -33,6 +36,9 @@ pub(super) struct MediumBody {
     albedo: [f64; 3],
     asymmetry: f64,
     emission: [f64; 3],
+    glow: [f64; 3],
+    color: Option<Box<dyn Fn(DVec3) -> [f64; 3] + Send + Sync>>,
+    liberty: Liberty,
 }
 
 /// A density in the world.
@@ -41,6 +47,8 @@ enum Shape {
     Ball { center: DVec3, radius: f64 },
     Grid(Grid),
     Field { field: Placed, bounds: [DVec3; 2], majorant: f64 },
+    Turned { field: TurnedBox, bounds: [DVec3; 2] },
+    Volume(Arc<Classified>),
 }
 
 /// The object, or why it has no physical form.
@@ -50,34 +58,34 @@ pub(super) fn body(
     options: &RenderOptions,
 ) -> Result<Result<Body, String>, Error> {
     let no = |reason: &str| Ok(Err(reason.to_owned()));
-    if !object.casts_shadow || object.shadow_coefficient != 1.0 {
-        return no("its shadows are turned off or scaled");
-    }
-    let material = &scene.materials[object.material];
-    if object.color.unwrap_or(material.color).iter().any(|c| *c > 1.0) && material.material.shading != Shading::Unlit {
-        return no("a colour above 1 scatters more light than arrives");
-    }
+    let shading = scene.materials[object.material].material.shading;
     let mesh = match &object.source {
-        Source::Points(_) => return no("raw points have nothing between them"),
-        Source::Volume(_) => return no("classified volumes are not path-traced"),
-        Source::Mesh(path) => file(path, options)?,
+        Source::Points(_) => {
+            return no(
+                "raw points have no truth by nature: they are samples of a surface that nobody knows, and what lies \
+                       between them is the technique's own guess",
+            );
+        }
+        Source::Mesh(path) => match read(path, options)? {
+            FileData::Mesh(mesh) => mesh,
+            _ => return Err(wrong_kind(path, "a mesh with faces", "use `points = ` or `volume = ` for this file")),
+        },
         Source::Implicit(i) => {
             let field = field(&i.expression, object)?;
             let params = SplatParams { object_name: object.name.clone(), ..SplatParams::default() };
             convert::field_to_mesh(&field, i.bounds, i.spacing * FINER, &params).map_err(|e| refuse(&e))?
         }
         Source::Rectangle(r) => rectangle(r.center, r.u, r.v),
-        Source::Density(_) | Source::Cloud(_) | Source::Medium(_) => {
-            if material.material.shading == Shading::Phong {
-                return no("a medium shaded by its gradient is no scattering medium");
+        Source::Medium(_) => return medium(scene, object, options).map(Ok),
+        Source::Volume(_) | Source::Density(_) | Source::Cloud(_) => {
+            // Without lights nothing is shaded by its gradient.
+            if shading == Shading::Phong && !scene.lights.is_empty() {
+                return no("a medium shaded by its gradient is no scattering medium; `shading = \"phase\"` is one");
             }
-            return Ok(match shape(object)? {
-                Ok((shape, extinction)) => Ok(medium(scene, object, shape, extinction)),
-                Err(reason) => Err(reason),
-            });
+            return medium(scene, object, options).map(Ok);
         }
     };
-    if material.material.shading == Shading::Phase {
+    if shading == Shading::Phase {
         return no("a surface that scatters by a phase function reflects nothing");
     }
     Ok(Ok(surface(scene, object, mesh)))
@@ -92,9 +100,12 @@ impl Body {
             Shape::Ball { center, radius } => Density::Ball { center: *center, radius: *radius },
             Shape::Grid(grid) => Density::Grid(Lattice::new(grid)?),
             Shape::Field { field, bounds, majorant } => Density::Field { field, bounds: *bounds, majorant: *majorant },
+            Shape::Turned { field, bounds } => Density::Inside { field, bounds: *bounds },
+            Shape::Volume(v) => Density::Field { field: &**v, bounds: v.bounds(), majorant: v.most() },
         };
-        let MediumBody { extinction, albedo, asymmetry, emission, .. } = *body;
-        Ok(Some(Medium { extinction, albedo, asymmetry, emission, ..Medium::new(density, 1.0, 0.0) }))
+        let MediumBody { extinction, albedo, asymmetry, emission, glow, liberty, .. } = *body;
+        let color = body.color.as_ref().map(|c| &**c as ColorAt<'_>);
+        Ok(Some(Medium { density, extinction, albedo, asymmetry, emission, glow, color, liberty }))
     }
 
     /// The surface for the tracer, if it is one.
@@ -110,27 +121,61 @@ fn ambient(scene: &Scene, material: &SceneMaterial, reflectance: [f64; 3]) -> [f
     std::array::from_fn(|c| f64::from(m.emission[c]) + f64::from(scene.ambient[c] * m.ambient) * reflectance[c])
 }
 
-fn medium(scene: &Scene, object: &SceneObject, shape: Shape, extinction: f64) -> Body {
-    let material = &scene.materials[object.material];
-    let m = &material.material;
-    let color = object.color.unwrap_or(material.color).map(f64::from);
-    let albedo = color.map(|c| c * f64::from(m.single_scattering_albedo));
-    let (albedo, emission) = if m.shading == Shading::Unlit {
-        ([0.0; 3], std::array::from_fn(|c| f64::from(m.emission[c]) + color[c]))
-    } else {
-        (albedo, ambient(scene, material, albedo))
-    };
-    let extinction = m.extinction_rgb.map(|e| extinction * f64::from(e));
-    Body::Medium(MediumBody { shape, extinction, albedo, asymmetry: f64::from(m.asymmetry), emission })
+/// Shadows as the object asks for; scattering colours above 1 become a gain, which the rest is divided by.
+fn liberty(object: &SceneObject, shading: Shading, brightest: f64) -> Liberty {
+    let brightest = if shading == Shading::Unlit { 1.0 } else { brightest };
+    Liberty {
+        casts_shadow: object.casts_shadow,
+        shadow_coefficient: f64::from(object.shadow_coefficient),
+        gain: brightest.max(1.0),
+    }
 }
 
-/// The density of a medium and the extinction where it is 1, or why there is none.
-fn shape(object: &SceneObject) -> Result<Result<(Shape, f64), String>, Error> {
+fn medium(scene: &Scene, object: &SceneObject, options: &RenderOptions) -> Result<Body, Error> {
+    let material = &scene.materials[object.material];
+    let m = &material.material;
+    let (shape, extinction) = shape(object, options)?;
+    let asymmetry = f64::from(m.asymmetry);
+    let per_channel = m.extinction_rgb.map(|e| extinction * f64::from(e));
+    let unlit = m.shading == Shading::Unlit;
+    let own = m.emission.map(f64::from);
+    let albedo = if unlit { 0.0 } else { f64::from(m.single_scattering_albedo) };
+    if let Shape::Volume(volume) = &shape {
+        // Colour by place; ambient radiance follows it.
+        let liberty = liberty(object, m.shading, volume.brightest());
+        let lit = ambient(scene, material, [albedo; 3]);
+        let per_color = if unlit { [1.0; 3] } else { std::array::from_fn(|c| lit[c] - own[c]) };
+        let (source, gain) = (Arc::clone(volume), liberty.gain);
+        let color = Some(Box::new(move |p: DVec3| source.color(p).map(|c| c / gain)) as Box<_>);
+        let glow = per_color.map(|g| g * gain);
+        let (albedo, emission) = ([albedo; 3], own);
+        let body = MediumBody { shape, extinction: per_channel, albedo, asymmetry, emission, glow, color, liberty };
+        return Ok(Body::Medium(body));
+    }
+    let color = object.color.unwrap_or(material.color).map(f64::from);
+    let liberty = liberty(object, m.shading, color.into_iter().fold(0.0, f64::max));
+    let scattered = color.map(|c| c * albedo);
+    let emission = if unlit { std::array::from_fn(|c| own[c] + color[c]) } else { ambient(scene, material, scattered) };
+    let albedo = scattered.map(|s| s / liberty.gain);
+    let (glow, color) = ([0.0; 3], None);
+    Ok(Body::Medium(MediumBody { shape, extinction: per_channel, albedo, asymmetry, emission, glow, color, liberty }))
+}
+
+/// The density of a medium and the extinction where it is 1.
+fn shape(object: &SceneObject, options: &RenderOptions) -> Result<(Shape, f64), Error> {
     let t = object.transform;
-    let turned = t.rotation != DQuat::IDENTITY;
     Ok(match &object.source {
         Source::Medium(MediumShape::Ball { center, radius, extinction, .. }) => {
-            Ok((Shape::Ball { center: t.apply(*center), radius: radius * t.scale }, *extinction))
+            (Shape::Ball { center: t.apply(*center), radius: radius * t.scale }, *extinction)
+        }
+        Source::Medium(MediumShape::Box { min, max, extinction, .. }) => {
+            let bounds = around(|p| t.apply(p), [*min, *max]);
+            let shape = if t.rotation == DQuat::IDENTITY {
+                Shape::Box(bounds)
+            } else {
+                Shape::Turned { field: TurnedBox::new([*min, *max], t), bounds }
+            };
+            (shape, *extinction)
         }
         Source::Cloud(cloud) => {
             let params = SplatParams { object_name: object.name.clone(), ..SplatParams::default() };
@@ -138,20 +183,33 @@ fn shape(object: &SceneObject) -> Result<Result<(Shape, f64), String>, Error> {
             let mut grid = grid.map_err(|e| refuse(&e))?;
             grid.origin = t.apply(grid.origin);
             grid.axes = DMat3::from_quat(t.rotation) * grid.axes * t.scale;
-            Ok((Shape::Grid(grid), 1.0))
-        }
-        _ if turned => Err("a rotated box of a medium is not path-traced".into()),
-        Source::Medium(MediumShape::Box { min, max, extinction, .. }) => {
-            Ok((Shape::Box([t.apply(*min), t.apply(*max)]), *extinction))
+            (Shape::Grid(grid), 1.0)
         }
         Source::Density(d) => {
-            let field = Placed { field: field(&d.expression, object)?, transform: t };
-            let bounds = d.bounds.map(|p| t.apply(p));
+            let field = Placed::new(field(&d.expression, object)?, t, d.bounds);
+            let bounds = around(|p| t.apply(p), d.bounds);
             let majorant = majorant(&field, bounds);
-            Ok((Shape::Field { field, bounds, majorant }, d.extinction))
+            (Shape::Field { field, bounds, majorant }, d.extinction)
         }
-        _ => Err("it is no medium".into()),
+        Source::Volume(VolumeSource { path, transfer }) => {
+            let FileData::Grid(grid) = read(path, options)? else {
+                return Err(wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file"));
+            };
+            grid.validate().map_err(|e| Error::input(crate::printable(path), e.to_string(), ""))?;
+            (Shape::Volume(Arc::new(Classified::new(grid, transfer.clone(), &t))), 1.0)
+        }
+        _ => return Err(Error::Internal("a surface is no medium".into())),
     })
+}
+
+/// The box along the world's axes around a box that is moved.
+pub(super) fn around(place: impl Fn(DVec3) -> DVec3, [low, high]: [DVec3; 2]) -> [DVec3; 2] {
+    let corner = |k: usize| {
+        let pick = |bit: usize| if k >> bit & 1 == 1 { high[bit] } else { low[bit] };
+        place(DVec3::new(pick(0), pick(1), pick(2)))
+    };
+    let both = |[a, b]: [DVec3; 2], p: DVec3| [a.min(p), b.max(p)];
+    (0..8).map(corner).fold([DVec3::INFINITY, DVec3::NEG_INFINITY], both)
 }
 
 /// A number that a field does not exceed in a box: the largest upper bound over balls around its cells, or where there is
@@ -191,6 +249,10 @@ fn surface(scene: &Scene, object: &SceneObject, mut mesh: Mesh) -> Body {
     } else {
         mesh.color.iter_mut().for_each(|c| (0..3).for_each(|k| c[k] *= tint[k]));
     }
+    let brightest = mesh.color.iter().flatten().fold(0.0, |most, c| f32::max(most, *c));
+    let liberty = liberty(object, m.shading, f64::from(brightest));
+    let scale = liberty.gain.recip();
+    mesh.color.iter_mut().for_each(|c| *c = c.map(|v| (f64::from(v) * scale) as f32));
     let opacity = object.opacity.unwrap_or(material.opacity);
     let kind = if opacity < 1.0 {
         let tau = optics::optical_depth(opacity);
@@ -203,26 +265,25 @@ fn surface(scene: &Scene, object: &SceneObject, mut mesh: Mesh) -> Body {
     let diffuse = [if unlit { 0.0 } else { f64::from(m.diffuse) }; 3];
     let lit = ambient(scene, material, diffuse);
     let emission = m.emission.map(f64::from);
-    let glow = if unlit { [1.0; 3] } else { std::array::from_fn(|c| lit[c] - emission[c]) };
+    let per_color = if unlit { [1.0; 3] } else { std::array::from_fn(|c| lit[c] - emission[c]) };
     let material = SurfaceMaterial {
         kind,
         diffuse,
         transmission: f64::from(m.transmission),
-        specular: if unlit { 0.0 } else { f64::from(m.specular) },
+        // Not of the colour, so it has no part in the gain.
+        specular: if unlit { 0.0 } else { f64::from(m.specular) * scale },
         shininess: f64::from(m.shininess),
         emission,
-        glow,
+        glow: per_color.map(|g| g * liberty.gain),
         smooth: true,
+        liberty,
     };
     Body::Surface(mesh, material)
 }
 
-fn file(path: &Path, options: &RenderOptions) -> Result<Mesh, Error> {
+fn read(path: &Path, options: &RenderOptions) -> Result<FileData, Error> {
     let limits = ReadLimits { max_bytes: options.max_memory, drop_invalid: options.drop_invalid };
-    match convert::read::file(path, &limits).map_err(|e| Error::from_read(path, &e))? {
-        FileData::Mesh(mesh) => Ok(mesh),
-        _ => Err(wrong_kind(path, "a mesh with faces", "use `points = ` or `volume = ` for this file")),
-    }
+    convert::read::file(path, &limits).map_err(|e| Error::from_read(path, &e))
 }
 
 fn rectangle(center: DVec3, u: DVec3, v: DVec3) -> Mesh {
@@ -244,36 +305,4 @@ fn place(mesh: &mut Mesh, t: &Similarity) {
     let (turn, scale) = (t.rotation.as_quat(), t.scale as f32);
     mesh.position.iter_mut().for_each(|p: &mut Vec3| *p = turn * (*p * scale));
     mesh.normal.iter_mut().for_each(|n| *n = turn * *n);
-}
-
-/// A field of an object's own space, in the world.
-pub(super) struct Placed {
-    field: ExpressionField,
-    transform: Similarity,
-}
-
-impl Placed {
-    fn local(&self, p: DVec3) -> DVec3 {
-        self.transform.rotation.inverse() * (p - self.transform.translation) / self.transform.scale
-    }
-}
-
-impl ScalarField for Placed {
-    fn value(&self, p: DVec3) -> f64 {
-        self.field.value(self.local(p))
-    }
-
-    fn gradient(&self, p: DVec3) -> DVec3 {
-        self.transform.rotate(self.field.gradient(self.local(p))) / self.transform.scale
-    }
-
-    fn hessian(&self, p: DVec3) -> DMat3 {
-        let turn = DMat3::from_quat(self.transform.rotation);
-        let scale = self.transform.scale * self.transform.scale;
-        turn * self.field.hessian(self.local(p)) * turn.transpose() * (1.0 / scale)
-    }
-
-    fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> {
-        self.field.bound(self.local(p), radius / self.transform.scale)
-    }
 }
