@@ -45,9 +45,18 @@ impl ImplicitSurface<'_> {
         Ok(())
     }
 
-    /// Whether `p` lies in the box and in the part of it that counts.
+    /// Whether `p` lies in the box, in the part of it that counts, and in the field's own domain.
     pub(crate) fn contains(&self, p: DVec3) -> bool {
-        p.cmpge(self.min).all() && p.cmple(self.max).all() && self.inside.is_none_or(|inside| inside(p))
+        let in_box = p.cmpge(self.min).all() && p.cmple(self.max).all();
+        in_box && self.field.in_domain(p) && self.inside.is_none_or(|inside| inside(p))
+    }
+
+    /// Whether the field's bound shows that a cube holds no piece of the surface, and whether there is a bound.
+    pub(crate) fn excludes(&self, corner: DVec3, side: f64) -> (bool, bool) {
+        let half = 0.5 * side;
+        // √3 rounded up: the ball must hold the cube.
+        let bound = self.field.bound(corner + half, half * 1.732_050_807_568_878);
+        (bound.is_some_and(|(low, high)| low > self.level || high < self.level), bound.is_some())
     }
 
     /// f − c.
@@ -68,122 +77,79 @@ pub struct CellCounts {
     pub unbounded: u64,
 }
 
-/// The cubes of the box, and how far each is from the surface.
+/// Where the lattice of cubes begins, in cubes before the box: planes of round coordinates must not lie on the faces of
+/// cubes, where rounding would give them to both sides or to none.
+const SHIFT: DVec3 = DVec3::new(0.273_9, 0.412_7, 0.161_8);
+
+/// The cubes of the box that may hold a piece of the surface.
 #[derive(Debug, Clone)]
 pub(crate) struct Cells {
-    pub(crate) min: DVec3,
     /// Side of a cube.
     pub(crate) side: f64,
-    pub(crate) dims: [i32; 3],
-    /// Chebyshev distance to the nearest active cell, in cells, at most 255; 0 for an active one.
-    distance: Vec<u8>,
+    /// Lowest corners.
+    pub(crate) active: Vec<DVec3>,
     pub(crate) counts: CellCounts,
 }
 
 impl Cells {
-    /// Cells of which the longest side of the box has `resolution`.
+    /// Cubes of which the longest side of the box has `resolution`.
     pub(crate) fn new(surface: &ImplicitSurface<'_>, resolution: u32) -> Self {
         let extent = surface.max - surface.min;
         let side = extent.max_element() / f64::from(resolution);
-        let dims = (extent / side).to_array().map(|n| (n - 1e-9).ceil().clamp(1.0, f64::from(resolution)) as i32);
-        let mut cells = Self { min: surface.min, side, dims, distance: Vec::new(), counts: CellCounts::default() };
+        let dims = (extent / side + SHIFT).to_array().map(|n| (n - 1e-9).ceil().max(1.0) as i32);
+        let search = Search { surface, min: surface.min - side * SHIFT, side, dims };
         let blocks = dims.map(|n| (n + 7) / 8);
-        let found: Vec<(usize, bool)> = (0..blocks[0] * blocks[1] * blocks[2])
+        let found: Vec<(DVec3, bool)> = (0..blocks[0] * blocks[1] * blocks[2])
             .into_par_iter()
             .flat_map_iter(|b| {
                 let corner = [b % blocks[0], b / blocks[0] % blocks[1], b / (blocks[0] * blocks[1])].map(|i| i * 8);
                 let mut active = Vec::new();
-                cells.search(surface, corner, 8, &mut active);
+                search.cube(corner, 8, &mut active);
                 active
             })
             .collect();
-        let n = dims.iter().map(|n| *n as usize).product();
-        cells.distance = vec![u8::MAX; n];
-        found.iter().for_each(|(i, _)| cells.distance[*i] = 0);
-        cells.counts = CellCounts {
-            cells: n as u64,
+        let counts = CellCounts {
+            cells: dims.iter().map(|n| *n as u64).product(),
             active: found.len() as u64,
             unbounded: found.iter().filter(|(_, unbounded)| *unbounded).count() as u64,
         };
-        cells.spread();
-        cells
+        Self { side, active: found.into_iter().map(|(corner, _)| corner).collect(), counts }
     }
 
-    /// Active cells of the cube of `size` cells at `corner`.
-    fn search(&self, surface: &ImplicitSurface<'_>, corner: [i32; 3], size: i32, active: &mut Vec<(usize, bool)>) {
-        if (0..3).any(|a| corner[a] >= self.dims[a]) {
+    /// The middle of the box around all active cubes, or `None` without any.
+    pub(crate) fn middle(&self) -> Option<DVec3> {
+        let low = self.active.iter().copied().reduce(DVec3::min)?;
+        let high = self.active.iter().copied().reduce(DVec3::max)?;
+        Some(0.5 * (low + high + self.side))
+    }
+}
+
+/// The octree over the cubes.
+struct Search<'a> {
+    surface: &'a ImplicitSurface<'a>,
+    min: DVec3,
+    side: f64,
+    dims: [i32; 3],
+}
+
+impl Search<'_> {
+    /// Active cubes among the `size`³ at `at`, each with whether it has no bound.
+    fn cube(&self, at: [i32; 3], size: i32, active: &mut Vec<(DVec3, bool)>) {
+        if (0..3).any(|a| at[a] >= self.dims[a]) {
             return;
         }
-        let half = 0.5 * f64::from(size) * self.side;
-        let middle = self.min + DVec3::from_array(corner.map(f64::from)) * self.side + DVec3::splat(half);
-        // √3 rounded up: the ball must hold the cube.
-        let bound = surface.field.bound(middle, half * 1.732_050_807_568_878);
-        if bound.is_some_and(|(low, high)| low > surface.level || high < surface.level) {
+        let corner = self.min + DVec3::from_array(at.map(f64::from)) * self.side;
+        let (excluded, bounded) = self.surface.excludes(corner, f64::from(size) * self.side);
+        if excluded {
             return;
         }
         if size == 1 {
-            active.push((self.index(corner), bound.is_none()));
+            active.push((corner, !bounded));
             return;
         }
         let half = size / 2;
         for k in 0..8 {
-            let part = std::array::from_fn(|a| corner[a] + if k >> a & 1 == 1 { half } else { 0 });
-            self.search(surface, part, half, active);
+            self.cube(std::array::from_fn(|a| at[a] + if k >> a & 1 == 1 { half } else { 0 }), half, active);
         }
-    }
-
-    pub(crate) fn index(&self, c: [i32; 3]) -> usize {
-        (c[2] as usize * self.dims[1] as usize + c[1] as usize) * self.dims[0] as usize + c[0] as usize
-    }
-
-    #[inline]
-    pub(crate) fn distance(&self, c: [i32; 3]) -> u8 {
-        self.distance[self.index(c)]
-    }
-
-    /// Chebyshev distances to the active cells, by two sweeps over each cell's earlier neighbours.
-    fn spread(&mut self) {
-        let [nx, ny, nz] = self.dims;
-        // Sweeps over all 13 earlier neighbours, forwards and backwards, are exact for this metric.
-        let earlier: Vec<[i32; 3]> = (0..13).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]).collect();
-        for sign in [1, -1] {
-            for k in 0..nz {
-                for j in 0..ny {
-                    for i in 0..nx {
-                        let c = if sign == 1 { [i, j, k] } else { [nx - 1 - i, ny - 1 - j, nz - 1 - k] };
-                        let mut best = self.distance(c);
-                        for step in &earlier {
-                            let o: [i32; 3] = std::array::from_fn(|a| c[a] + sign * step[a]);
-                            if (0..3).all(|a| o[a] >= 0 && o[a] < self.dims[a]) {
-                                best = best.min(self.distance(o).saturating_add(1));
-                            }
-                        }
-                        let at = self.index(c);
-                        self.distance[at] = best;
-                    }
-                }
-            }
-        }
-    }
-
-    /// Centre and radius of a ball that holds all active cells, or `None` without any.
-    pub(crate) fn ball(&self) -> Option<(DVec3, f64)> {
-        let corners = || self.active().map(|c| DVec3::from_array(c.map(f64::from)));
-        let low = corners().reduce(DVec3::min)?;
-        let high = corners().reduce(DVec3::max)? + 1.0;
-        let middle = 0.5 * (low + high);
-        let far = corners().map(|c| (c + 0.5 - middle).abs() + 0.5).map(DVec3::length).fold(0.0, f64::max);
-        Some((self.min + middle * self.side, far * self.side * (1.0 + 1e-12)))
-    }
-
-    /// All active cells.
-    pub(crate) fn active(&self) -> impl Iterator<Item = [i32; 3]> {
-        let [nx, ny, _] = self.dims.map(|n| n as usize);
-        let zero = self.distance.iter().enumerate().filter(|(_, d)| **d == 0);
-        zero.map(move |(i, _)| [i % nx, i / nx % ny, i / (nx * ny)].map(|v| v as i32))
-    }
-
-    pub(crate) fn bytes(&self) -> u64 {
-        self.distance.len() as u64
     }
 }

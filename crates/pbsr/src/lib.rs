@@ -51,6 +51,7 @@ mod cost;
 mod ensemble;
 mod error;
 mod implicit;
+mod leaves;
 mod lines;
 mod mesh;
 mod metropolis;

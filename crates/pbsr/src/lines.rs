@@ -1,25 +1,32 @@
 //! Sampling of implicit surfaces by random lines (Cauchy and Crofton): hundreds of times faster than a walk on them.
 //!
-//! Lines are uniform in a ball of radius R around the surface: a uniform direction, and a uniform point of the disc of
-//! radius R across it. A flat piece of area A is met by such a line with probability A/(2πR²), whatever its place and
-//! direction (the mean of |cos| over directions is 1/2, and the disc has the area πR²). So crossings are uniform on the
-//! surface, M lines put M/(2πR²) of them on an area of 1, and no line meets the flat piece of surface behind one pixel
-//! twice. With s the pixel's area, that piece has the area s/cos θ, and
+//! Each cube of the box that may hold a piece of the surface has lines of its own, a Poisson number of them, as many as
+//! the wanted number of crossings on a unit of area, λ = τ/s, asks for.
 //!
-//! α(θ) = 1 − (1 − q)^M, q = s/(2πR²·cos θ)
+//! - Where the surface is the graph of a function over one face of the cube (`leaves.rs`), lines are parallel to an axis k
+//!   and uniform on the face a²: w·λ·a² of them. They meet a piece of area A and normal n in w·λ·A·|n_k| places, of which
+//!   the share 1/(w·|n_k|) is kept, with w the largest 1/|n_k| of the cube: λ·A, whatever its place and direction. Each
+//!   line has one crossing, so crossings are independent.
+//! - In other cubes lines are uniform in the ball of radius r around the cube: a uniform direction, and a uniform point of
+//!   the disc across it. A flat piece of area A is met with probability A/(2πr²) (the mean of |cos| over directions is 1/2),
+//!   so 2πr²·λ lines put λ·A crossings on it; all roots in the cube are isolated (`roots.rs`) and all count.
 //!
-//! which is Tanaka 2012, Eq. 1, with S = 2πR² and n = M. M is fixed from α at θ = 0; the number of crossings is left as it
-//! comes. To cut it to a wanted n would make sets with many crossings thinner: α would depend on the rest of the surface.
+//! Crossings of a flat piece are Poisson with mean λ·s/cos θ behind a pixel of area s, so
 //!
-//! Lines are followed through the cells of [`crate::ImplicitSurface`]'s box. Cells far from the surface are jumped over;
-//! in the others all roots are isolated, see `roots.rs`. Where the field has no bound a pair of roots within one cell may be
-//! missed; [`LineReport`] says how many of a sample of lines gain roots when they are looked at 16 times as finely.
+//! α(θ) = 1 − e^(−τ/cos θ), τ = −ln(1 − α)
+//!
+//! which is Tanaka 2012, Eq. 1, for n → ∞ at fixed n·s/S. The number of crossings is left as it comes: to cut it to a wanted
+//! n would make sets with many crossings thinner, and α depend on the rest of the surface.
+//!
+//! Where the field has no bound, pieces may be missed; [`LineReport`] says how many of a sample of lines gain roots when
+//! they are looked at 16 times as finely.
 
+use crate::blocks::Blocks;
 use crate::error::check;
 use crate::implicit::{CellCounts, Cells, ImplicitSurface};
-use crate::opacity;
+use crate::leaves::{Graph, Leaf};
 use crate::params::countable;
-use crate::roots::{At, Found, Line};
+use crate::roots::{Found, Line};
 use crate::stream::{Stage, Stream, across, unit_or_zero};
 use crate::{Density, Error, PackedColor, PackedNormal, Particles, Sampler, SurfaceParams};
 use glam::DVec3;
@@ -28,20 +35,21 @@ use splat_core::glam;
 use splat_core::optics::SurfaceOpacity;
 use std::f64::consts::TAU;
 
-/// Lines of one chunk.
-const CHUNK_LINES: u64 = 4096;
-
 /// Lines of the survey.
 const SURVEY_LINES: u32 = 8192;
 
-/// Cells that are searched at once, along a line.
-const RUN: u32 = 4;
+/// Crossings that are evaluated at once.
+const BATCH: usize = 128;
 
 /// What is known about the roots of a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LineReport {
     /// Cells of the box.
     pub cells: CellCounts,
+    /// Cubes after the division of cells.
+    pub leaves: u64,
+    /// Of them, those in which the surface is a graph over a face.
+    pub graphs: u64,
     /// Lines of the survey, and the roots on them.
     pub lines: u64,
     /// Roots on the lines of the survey.
@@ -68,17 +76,17 @@ pub struct LineSampler<'a> {
     surface: ImplicitSurface<'a>,
     params: SurfaceParams,
     density: Option<Density<'a>>,
-    cells: Cells,
-    center: DVec3,
-    radius: f64,
-    /// M, a fraction included, at the density's largest factor.
-    lines: f64,
+    leaves: Vec<Leaf>,
+    /// Sums of [`Leaf::reach`] up to each leaf.
+    reaches: Vec<f64>,
+    blocks: Blocks,
+    origin: DVec3,
     report: LineReport,
 }
 
 impl<'a> LineSampler<'a> {
-    /// Finds the cells that hold the surface, `resolution` (1 to 1024) along the longest side of the box, and surveys its
-    /// roots.
+    /// Finds the cells that hold the surface, `resolution` (1 to 1024) along the longest side of the box, divides those in
+    /// which it bends much, and surveys its roots.
     ///
     /// # Errors
     /// [`Error::Parameter`] for numbers out of range, [`Error::Field`] where the field is not finite, [`Error::Empty`] when
@@ -95,24 +103,22 @@ impl<'a> LineSampler<'a> {
         check((1..=1024).contains(&resolution), "resolution", resolution, "1 to 1024 cells")?;
         let cells = Cells::new(surface, resolution);
         let empty = |reason| Error::Empty { what: "an implicit surface", reason };
-        let (center, radius) = cells.ball().ok_or(empty("the field's bound excludes the level in the whole box"))?;
-        let most = density.as_ref().map_or(1.0, |d| d.max);
-        let share = opacity::hit_probability(params.cross_section, TAU * radius * radius, 1.0);
+        let origin = cells.middle().ok_or(empty("the field's bound excludes the level in the whole box"))?;
+        let leaves = Leaf::all(surface, &cells);
         // A density factor multiplies optical depth.
-        let alpha = splat_core::optics::opacity(params.optical_depth() * most);
-        let lines = opacity::count(alpha, share);
-        countable(lines)?;
-        let mut sampler = Self {
-            surface: *surface,
-            params: *params,
-            density,
-            cells,
-            center,
-            radius,
-            lines,
-            report: LineReport::default(),
+        let per_area = params.particles_per_area() * density.as_ref().map_or(1.0, |d| d.max);
+        let mut sum = 0.0;
+        let reaches: Vec<f64> = leaves.iter().map(|l| (sum += l.reach(), sum).1).collect();
+        countable(sum * per_area)?;
+        let blocks = Blocks::new(leaves.len(), |l| leaves[l].reach() * per_area);
+        let report = LineReport {
+            cells: cells.counts,
+            leaves: leaves.len() as u64,
+            graphs: leaves.iter().filter(|l| l.graph.is_some()).count() as u64,
+            ..LineReport::default()
         };
-        sampler.report = sampler.survey();
+        let mut sampler = Self { surface: *surface, params: *params, density, leaves, reaches, blocks, origin, report };
+        sampler.survey();
         if sampler.report.roots == 0 {
             let broken = sampler.report.broken > 0;
             let reason = if broken { "the field is not finite there" } else { "no line of the survey meets it" };
@@ -128,37 +134,77 @@ impl<'a> LineSampler<'a> {
 
     /// Mean number of lines of a set, M.
     pub fn lines(&self) -> f64 {
-        self.lines
+        (0..self.blocks.chunks()).map(|c| self.blocks.mean(c)).sum()
     }
 
-    /// Bytes of the cells.
+    /// Bytes of the tables.
     pub fn bytes(&self) -> u64 {
-        self.cells.bytes()
+        (self.leaves.len() * (size_of::<Leaf>() + 8)) as u64 + self.blocks.bytes()
     }
 
-    fn survey(&self) -> LineReport {
+    /// The sum of all leaves' reaches.
+    fn reach(&self) -> f64 {
+        self.reaches.last().copied().unwrap_or(0.0)
+    }
+
+    /// The leaf at a share of all lines in (0, 1).
+    fn leaf_at(&self, share: f64) -> &Leaf {
+        let at = self.reaches.partition_point(|r| *r < share * self.reach());
+        &self.leaves[at.min(self.leaves.len() - 1)]
+    }
+
+    /// Fills the report: lines at even shares of all, so that each part of the surface has its own.
+    fn survey(&mut self) {
         let one = |i: u32| {
             let mut stream = Stream::new(self.params.seed, Stage::Survey, 0, u64::from(i));
-            let line = self.line(&mut stream);
-            let (mut found, mut fine) = (Found::default(), Found::default());
-            self.follow(&line, 1, &mut found);
-            self.follow(&line, 16, &mut fine);
-            let inside = |f: &Found| f.roots.iter().filter(|(t, _)| self.counts(&line, *t)).count() as u64;
-            [inside(&found), inside(&fine), found.unproven, found.broken + fine.broken]
+            let leaf = self.leaf_at((f64::from(i) + stream.unit()) / f64::from(SURVEY_LINES));
+            let mut fine = Found::default();
+            let (line, roots, area) = match &leaf.graph {
+                Some(graph) => {
+                    let [u, v, _] = stream.triple();
+                    let root = leaf.start(graph, [u, v]).and_then(|p| self.root(leaf, graph, p));
+                    let root = root.filter(|(p, _)| self.surface.contains(*p));
+                    let [a, b] = leaf.ends(graph, [u, v]);
+                    let line = Line { surface: self.surface, o: a, d: (b - a) / leaf.side };
+                    let area = root.map_or(0.0, |(_, g)| g.length() / f64::from(graph.weight));
+                    (line, u64::from(root.is_some()), area)
+                }
+                None => {
+                    let line = self.line(leaf, &mut stream);
+                    self.search(leaf, &line, 1, &mut fine);
+                    let roots = self.inside(&line, &fine);
+                    (line, roots, roots as f64)
+                }
+            };
+            let unproven = fine.unproven;
+            fine.roots.clear();
+            self.search(leaf, &line, 16, &mut fine);
+            ([roots, self.inside(&line, &fine), unproven, fine.broken], area)
         };
-        let add = |a: [u64; 4], b: [u64; 4]| std::array::from_fn(|k| a[k] + b[k]);
-        let [roots, fine_roots, unproven, broken] =
-            (0..SURVEY_LINES).into_par_iter().with_min_len(64).map(one).reduce(|| [0; 4], add);
-        let area = fine_roots.max(roots) as f64 / f64::from(SURVEY_LINES) * TAU * self.radius * self.radius;
-        LineReport {
-            cells: self.cells.counts,
+        let all: Vec<([u64; 4], f64)> = (0..SURVEY_LINES).into_par_iter().with_min_len(64).map(one).collect();
+        let count = |k: usize| all.iter().map(|(n, _)| n[k]).sum();
+        self.report = LineReport {
             lines: u64::from(SURVEY_LINES),
-            roots,
-            fine_roots,
-            unproven,
-            broken,
-            area,
-        }
+            roots: count(0),
+            fine_roots: count(1),
+            unproven: count(2),
+            broken: count(3),
+            area: all.iter().map(|(_, area)| area).sum::<f64>() / f64::from(SURVEY_LINES) * self.reach(),
+            ..self.report
+        };
+        // What is missed has an area too.
+        self.report.area *= self.report.fine_roots.max(self.report.roots) as f64 / self.report.roots.max(1) as f64;
+    }
+
+    /// Roots of a line that count.
+    fn inside(&self, line: &Line<'_>, found: &Found) -> u64 {
+        found.roots.iter().filter(|(t, _)| self.surface.contains(line.o + line.d * *t)).count() as u64
+    }
+
+    /// The root on the line of a graph that begins at `p`, and ∇f/|f_k| there.
+    fn root(&self, leaf: &Leaf, graph: &Graph, p: DVec3) -> Option<(DVec3, DVec3)> {
+        let (f, gradient) = self.surface.field.value_gradient(p);
+        leaf.refine(&self.surface, graph, p, (f - self.surface.level, gradient))
     }
 
     /// `n` uniform places of the surface, fewer only where lines hardly meet it: starts of walks.
@@ -170,130 +216,132 @@ impl<'a> LineSampler<'a> {
             if places.len() >= n {
                 break;
             }
-            let line = self.line(stream);
-            found.roots.clear();
-            self.follow(&line, 1, &mut found);
-            let on = |t: &f64| self.counts(&line, *t);
-            places.extend(found.roots.iter().map(|(t, _)| *t).filter(on).map(|t| line.o + line.d * t));
+            let leaf = self.leaf_at(stream.unit());
+            if let Some(graph) = &leaf.graph {
+                let [u, v, lot] = stream.triple();
+                let root = leaf.start(graph, [u, v]).and_then(|p| self.root(leaf, graph, p));
+                let kept = root.filter(|(p, g)| keeps(graph, lot, *g) && self.surface.contains(*p));
+                places.extend(kept.map(|(p, _)| p));
+            } else {
+                let line = self.line(leaf, stream);
+                found.roots.clear();
+                self.search(leaf, &line, 1, &mut found);
+                let on = found.roots.iter().map(|(t, _)| line.o + line.d * *t);
+                places.extend(on.filter(|p| self.surface.contains(*p)));
+            }
         }
         places.truncate(n);
         places
     }
 
-    /// A uniform line of the ball.
-    #[inline]
-    fn line(&self, stream: &mut Stream) -> Line<'a> {
+    /// A uniform line of the ball around a leaf.
+    fn line(&self, leaf: &Leaf, stream: &mut Stream) -> Line<'a> {
         let d = stream.direction();
         let [a, b] = across(d);
-        let r = self.radius * stream.unit().sqrt();
+        let r = 0.75f64.sqrt() * leaf.side * stream.unit().sqrt();
         let (sin, cos) = (TAU * stream.unit()).sin_cos();
-        Line { surface: self.surface, o: self.center + (a * cos + b * sin) * r, d }
+        Line { surface: self.surface, o: leaf.corner + 0.5 * leaf.side + (a * cos + b * sin) * r, d }
     }
 
-    fn counts(&self, line: &Line<'_>, t: f64) -> bool {
-        self.surface.contains(line.o + line.d * t)
-    }
-
-    /// All roots of a line: runs of active cells are searched in `parts` parts each, the rest is jumped over.
-    fn follow(&self, line: &Line<'_>, parts: u32, found: &mut Found) {
-        let (o, d) = ((line.o - self.cells.min) / self.cells.side, line.d / self.cells.side);
-        let Some((enter, leave)) = clip(o, d, self.cells.dims) else { return };
-        let inverse = DVec3::select(d.cmpeq(DVec3::ZERO), DVec3::INFINITY, d.recip());
-        let ahead: [i32; 3] = std::array::from_fn(|a| i32::from(d[a] >= 0.0));
-        let least = (leave - enter) * 1e-12;
-        let mut t = enter;
-        let mut cell = cell_at(o, d, t, self.cells.dims);
-        // Where the run of active cells began, and how many it has.
-        let mut run: Option<(At, u32)> = None;
-        // Each turn goes on by at least a cell's corner, so the number of turns is bounded by what a line can cross.
-        for _ in 0..4 * (self.cells.dims.iter().sum::<i32>() + 3) {
-            if t >= leave {
-                break;
-            }
-            let distance = self.cells.distance(cell);
-            let more = i32::from(distance.max(1)) - 1;
-            let (mut exit, axis) = leave_cube(o, inverse, ahead, cell, more);
-            if exit > leave {
-                exit = leave;
-            } else if exit <= t {
-                // Rounding may put the exit at or before t: a step on by the last digits.
-                exit = t + least;
-            }
-            if more > 0 {
-                cell = cell_at(o, d, exit, self.cells.dims);
-            } else {
-                // The next cell; beyond the last one t has reached `leave`, up to rounding.
-                let next = cell[axis] + 2 * ahead[axis] - 1;
-                cell[axis] = next.clamp(0, self.cells.dims[axis] - 1);
-            }
-            if distance == 0 {
-                let (from, cells) = run.unwrap_or_else(|| (line.at(t), 0));
-                // A long run goes on from the place and value where its last part ended.
-                run = Some(if cells + 1 == RUN {
-                    (search(line, from, exit, parts, found), 0)
-                } else {
-                    (from, cells + 1)
-                });
-            } else if let Some((from, 1..)) = run.take() {
-                search(line, from, t, parts, found);
-            }
-            t = exit;
-        }
-        if let Some((from, 1..)) = run {
-            search(line, from, t, parts, found);
+    /// All roots of a line in a leaf and in the box, searched in `parts` parts.
+    fn search(&self, leaf: &Leaf, line: &Line<'_>, parts: u32, found: &mut Found) {
+        let low = leaf.corner.max(self.surface.min);
+        let high = (leaf.corner + leaf.side).min(self.surface.max);
+        let Some((enter, leave)) = clip(line, low, high) else { return };
+        let mut a = line.at(enter);
+        for k in 1..=parts {
+            let share = f64::from(k) / f64::from(parts);
+            let b = line.at(if k == parts { leave } else { enter + (leave - enter) * share });
+            line.roots(a, b, found);
+            a = b;
         }
     }
-}
 
-/// Searches from `from` to `to` in `parts` parts; returns the end.
-fn search(line: &Line<'_>, from: At, to: f64, parts: u32, found: &mut Found) -> At {
-    let mut a = from;
-    for k in 1..=parts {
-        let share = f64::from(k) / f64::from(parts);
-        let b = line.at(if k == parts { to } else { from.t + (to - from.t) * share });
-        line.roots(a, b, found);
-        a = b;
+    /// Particles from places with their gradients.
+    #[inline(always)]
+    fn push(&self, p: DVec3, normal: DVec3, color: PackedColor, particles: &mut Particles) {
+        let normal = PackedNormal::new(normal.as_vec3());
+        let per_crossing = self.params.surface_opacity == SurfaceOpacity::PerCrossing;
+        let normal = if per_crossing { normal.per_crossing() } else { normal };
+        particles.push((p - self.origin).as_vec3(), normal, color);
     }
-    a
+
+    /// The crossings of an open leaf's line.
+    #[cold]
+    fn open(&self, leaf: &Leaf, stream: &mut Stream, color: PackedColor, found: &mut Found, particles: &mut Particles) {
+        let line = self.line(leaf, stream);
+        found.roots.clear();
+        self.search(leaf, &line, 1, found);
+        for &(t, beside) in &found.roots {
+            let p = line.o + line.d * t;
+            let thinned = self.density.as_ref().is_some_and(|d| stream.unit() * d.max >= d.at(p));
+            if !thinned && self.surface.contains(p) {
+                let gradient = self.surface.field.gradient(line.o + line.d * beside);
+                self.push(p, unit_or_zero(gradient), color, particles);
+            }
+        }
+    }
+
+    /// The crossings of a batch of graphs' lines.
+    #[inline]
+    fn flush(&self, batch: &mut Batch, color: PackedColor, particles: &mut Particles) {
+        let n = std::mem::take(&mut batch.len);
+        self.surface.field.value_gradients(&batch.at[..n], &mut batch.found[..n]);
+        for i in 0..n {
+            let (leaf, lot) = (&self.leaves[batch.leaf[i] as usize], batch.lot[i]);
+            let Some(graph) = &leaf.graph else { continue };
+            let (f, gradient) = batch.found[i];
+            let found = (f - self.surface.level, gradient);
+            let Some((p, gradient)) = leaf.refine(&self.surface, graph, batch.at[i], found) else { continue };
+            let thinned = self.density.as_ref().is_some_and(|d| batch.thinning[i] * d.max >= d.at(p));
+            if !keeps(graph, lot, gradient) || thinned || !self.surface.contains(p) {
+                continue;
+            }
+            self.push(p, gradient, color, particles);
+        }
+    }
 }
 
-/// The cell in which the line is just behind `t`.
+/// Whether the thinning of a graph keeps a place with ∇f/|f_k|.
 #[inline(always)]
-fn cell_at(o: DVec3, d: DVec3, t: f64, dims: [i32; 3]) -> [i32; 3] {
-    let p = o + d * t;
-    std::array::from_fn(|a| {
-        // Conversions cut towards zero, and nothing lies below it: cheaper than floor() without its instruction.
-        let v = p[a].max(0.0);
-        let near = (v + 0.5) as i32;
-        // On a border the direction decides.
-        let on_border = (v - f64::from(near)).abs() < 1e-9;
-        let cell = if on_border { near - i32::from(d[a] < 0.0) } else { v as i32 };
-        cell.clamp(0, dims[a] - 1)
-    })
+fn keeps(graph: &Graph, lot: f32, gradient: DVec3) -> bool {
+    let bound = f64::from(lot * graph.weight);
+    bound * bound < gradient.length_squared()
 }
 
-/// Where, and along which axis, the line leaves the cube of 2·`more` + 1 cells around `cell`. `inverse` is 1/d, +∞ where
-/// d is 0; `ahead` is 1 for axes along which the line does not fall.
-#[inline(always)]
-fn leave_cube(o: DVec3, inverse: DVec3, ahead: [i32; 3], cell: [i32; 3], more: i32) -> (f64, usize) {
-    let t = |a: usize| (f64::from(cell[a] - more + ahead[a] * (2 * more + 1)) - o[a]) * inverse[a];
-    let (x, y, z) = (t(0), t(1), t(2));
-    // Selections, not branches: which face comes next cannot be foreseen.
-    let (first, axis) = if y < x { (y, 1) } else { (x, 0) };
-    if z < first { (z, 2) } else { (first, axis) }
+/// Places on the lines of graphs that wait to be evaluated.
+struct Batch {
+    at: [DVec3; BATCH],
+    found: [(f64, DVec3); BATCH],
+    leaf: [u32; BATCH],
+    lot: [f32; BATCH],
+    /// For the density.
+    thinning: [f64; BATCH],
+    len: usize,
 }
 
-/// The piece of the line in the box, or `None`.
-fn clip(o: DVec3, d: DVec3, dims: [i32; 3]) -> Option<(f64, f64)> {
+impl Batch {
+    const EMPTY: Self = Self {
+        at: [DVec3::ZERO; BATCH],
+        found: [(0.0, DVec3::ZERO); BATCH],
+        leaf: [0; BATCH],
+        lot: [0.0; BATCH],
+        thinning: [0.0; BATCH],
+        len: 0,
+    };
+}
+
+/// The piece of a line in a box, or `None`.
+fn clip(line: &Line<'_>, low: DVec3, high: DVec3) -> Option<(f64, f64)> {
     let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
     for a in 0..3 {
-        let high = f64::from(dims[a]);
-        if d[a] == 0.0 {
-            if !(0.0..=high).contains(&o[a]) {
+        let (o, d) = (line.o[a], line.d[a]);
+        if d == 0.0 {
+            if !(low[a]..=high[a]).contains(&o) {
                 return None;
             }
         } else {
-            let (p, q) = (-o[a] / d[a], (high - o[a]) / d[a]);
+            let (p, q) = ((low[a] - o) / d, (high[a] - o) / d);
             enter = enter.max(p.min(q));
             leave = leave.min(p.max(q));
         }
@@ -303,7 +351,7 @@ fn clip(o: DVec3, d: DVec3, dims: [i32; 3]) -> Option<(f64, f64)> {
 
 impl Sampler for LineSampler<'_> {
     fn origin(&self) -> DVec3 {
-        self.center
+        self.origin
     }
 
     fn cross_section(&self) -> f64 {
@@ -311,41 +359,33 @@ impl Sampler for LineSampler<'_> {
     }
 
     fn chunks(&self) -> usize {
-        (self.lines.ceil() as u64).div_ceil(CHUNK_LINES) as usize
+        self.blocks.chunks()
     }
 
     fn expected(&self, chunk: usize) -> f64 {
-        let lines = (self.lines - (chunk as u64 * CHUNK_LINES) as f64).clamp(0.0, CHUNK_LINES as f64);
-        lines * self.report.roots as f64 / self.report.lines as f64
+        self.blocks.mean(chunk) * self.report.area / self.reach()
     }
 
     fn chunk<'a>(&'a self, set: u64, chunk: usize, scratch: &'a mut Particles) -> &'a Particles {
         scratch.clear();
         scratch.reserve((self.expected(chunk) * 1.2) as usize + 64);
-        let share = opacity::hit_probability(self.params.cross_section, TAU * self.radius * self.radius, 1.0);
-        let rounding = Stream::new(self.params.seed, Stage::Lines, set, u64::MAX).unit();
-        let all = opacity::whole_count(self.lines, share, rounding);
-        let first = chunk as u64 * CHUNK_LINES;
         let color = PackedColor::new(self.params.color);
-        let mut stream = Stream::new(self.params.seed, Stage::Lines, set, chunk as u64);
         let mut found = Found::default();
-        for _ in first..all.min(first + CHUNK_LINES) {
-            let line = self.line(&mut stream);
-            found.roots.clear();
-            self.follow(&line, 1, &mut found);
-            for &(t, beside) in &found.roots {
-                let p = line.o + line.d * t;
-                let thinned = self.density.as_ref().is_some_and(|d| stream.unit() * d.max >= d.at(p));
-                if thinned || !self.surface.contains(p) {
-                    continue;
-                }
-                let gradient = self.surface.field.gradient(line.o + line.d * beside);
-                let normal = PackedNormal::new(unit_or_zero(gradient).as_vec3());
-                let per_crossing = self.params.surface_opacity == SurfaceOpacity::PerCrossing;
-                let normal = if per_crossing { normal.per_crossing() } else { normal };
-                scratch.push((p - self.center).as_vec3(), normal, color);
+        let mut batch = Batch::EMPTY;
+        self.blocks.arrivals(self.params.seed, Stage::Lines, set, chunk, |l, stream| {
+            let leaf = &self.leaves[l];
+            let Some(graph) = &leaf.graph else { return self.open(leaf, stream, color, &mut found, scratch) };
+            let [u, v, lot] = stream.triple();
+            let Some(p) = leaf.start(graph, [u, v]) else { return };
+            let k = batch.len;
+            (batch.at[k], batch.leaf[k], batch.lot[k]) = (p, l as u32, lot);
+            batch.thinning[k] = if self.density.is_some() { stream.unit() } else { 0.0 };
+            batch.len = k + 1;
+            if batch.len == BATCH {
+                self.flush(&mut batch, color, scratch);
             }
-        }
+        });
+        self.flush(&mut batch, color, scratch);
         scratch
     }
 }

@@ -49,6 +49,60 @@ fn pb13_lines_are_uniform_on_spheres_and_ellipsoids() {
 }
 
 #[test]
+fn pb13_lines_are_uniform_on_tori_and_across_edges() {
+    // The area of a torus below angle φ around its tube: φ + r/R·sin φ.
+    let field = Field::Torus { large: 0.7, small: 0.3 };
+    let sampler = LineSampler::new(&boxed(&field, 1.1), 32, &params(0.5, 4e-5), None).unwrap();
+    let all = positions(&sampler, 0);
+    let (mut tube, mut ring) = ([0u64; 40], [0u64; 40]);
+    for p in &all {
+        let phi = p.z.atan2(p.x.hypot(p.y) - 0.7);
+        let share = 0.5 + (phi + 3.0 / 7.0 * phi.sin()) / (2.0 * PI);
+        tube[((share * 40.0) as usize).min(39)] += 1;
+        ring[(((p.y.atan2(p.x) / (2.0 * PI) + 0.5) * 40.0) as usize).min(39)] += 1;
+    }
+    for (name, bins) in [("tube", tube), ("ring", ring)] {
+        let chi2 = chi2_equal(&bins);
+        assert!(chi2 < chi2_limit(39.0), "{name}: χ² {chi2}");
+    }
+    let expected = 4.0 * PI * PI * 0.7 * 0.3 * 2f64.ln() / 4e-5;
+    assert!((all.len() as f64 - expected).abs() < 4.5 * expected.sqrt(), "{} for {expected}", all.len());
+    let report = sampler.report();
+    assert_eq!((report.graphs, report.missed()), (report.leaves, 0.0), "{report:?}");
+    // The six faces of a cube, in rings of equal area around their middles: edges are where graphs end.
+    let sampler = LineSampler::new(&boxed(&Field::Cube, 0.8), 20, &params(0.5, 4e-5), None).unwrap();
+    let all = positions(&sampler, 0);
+    let mut bins = [0u64; 60];
+    for p in &all {
+        let axis = (0..3).max_by(|a, b| p[*a].abs().total_cmp(&p[*b].abs())).unwrap();
+        let across = (0..3).filter(|a| *a != axis).map(|a| p[a].abs()).fold(0.0, f64::max);
+        let ring = ((across * across * 40.0) as usize).min(9);
+        bins[(2 * axis + usize::from(p[axis] > 0.0)) * 10 + ring] += 1;
+    }
+    let chi2 = chi2_equal(&bins);
+    // Up to three crossings of a line near an edge come together.
+    assert!(chi2 < 1.1 * chi2_limit(59.0), "χ² {chi2}: {bins:?}");
+    let expected = 6.0 * 2f64.ln() / 4e-5;
+    assert!((all.len() as f64 - expected).abs() < 4.5 * expected.sqrt(), "{} for {expected}", all.len());
+}
+
+#[test]
+fn planes_on_round_coordinates_are_counted_once() {
+    for distance in [0.0, 0.25, 0.5, -0.75] {
+        let field = Field::Plane { normal: DVec3::Z, distance };
+        for resolution in [1, 8, 32] {
+            let sampler = LineSampler::new(&boxed(&field, 1.0), resolution, &params(0.5, 4e-5), None).unwrap();
+            let found = positions(&sampler, 0).len() as f64;
+            let expected = 4.0 * 2f64.ln() / 4e-5;
+            assert!(
+                (found - expected).abs() < 4.5 * expected.sqrt(),
+                "{distance} {resolution}: {found} for {expected}"
+            );
+        }
+    }
+}
+
+#[test]
 fn opacity_of_a_sphere_grows_to_its_silhouette() {
     let camera = front(64);
     let s = pixel_area(&camera, DVec3::Z);

@@ -15,6 +15,11 @@ pub trait ScalarField: Sync {
         (self.value(p), self.gradient(p))
     }
 
+    /// Value and gradient at each of some places, for fields that do several at once for less; `out` is as long as `at`.
+    fn value_gradients(&self, at: &[DVec3], out: &mut [(f64, DVec3)]) {
+        at.iter().zip(out).for_each(|(p, out)| *out = self.value_gradient(*p));
+    }
+
     /// Hessian at `p`, symmetric.
     fn hessian(&self, p: DVec3) -> DMat3;
 

@@ -209,6 +209,8 @@ pub enum Field {
     Unbounded,
     /// x: a ramp.
     Ramp,
+    /// max(|x|, |y|, |z|) − 1/2: faces that meet in edges.
+    Cube,
 }
 
 impl Field {
@@ -245,6 +247,7 @@ impl ScalarField for Field {
             }
             Field::Unbounded => p.length_squared() - 1.0,
             Field::Ramp => p.x,
+            Field::Cube => p.abs().max_element() - 0.5,
         }
     }
 
@@ -264,13 +267,17 @@ impl ScalarField for Field {
             Field::Sheets { .. } => DVec3::Z * 2.0 * p.z,
             Field::Nothing | Field::Broken | Field::Unbounded => 2.0 * p,
             Field::Ramp => DVec3::X,
+            Field::Cube => {
+                let axis = (0..3).max_by(|a, b| p[*a].abs().total_cmp(&p[*b].abs())).unwrap();
+                DVec3::AXES[axis] * p[axis].signum()
+            }
         }
     }
 
     fn hessian(&self, p: DVec3) -> DMat3 {
         match self {
             Field::Sphere { scale, .. } => DMat3::from_diagonal(DVec3::splat(2.0 * scale)),
-            Field::Plane { .. } | Field::Ramp => DMat3::ZERO,
+            Field::Plane { .. } | Field::Ramp | Field::Cube => DMat3::ZERO,
             Field::Torus { large, .. } => {
                 let r = p.x.hypot(p.y);
                 let (c, s) = (p.x / r, p.y / r);
@@ -348,6 +355,7 @@ impl ScalarField for Field {
             Field::Nothing => Some((1.0, f64::INFINITY)),
             Field::Broken | Field::Unbounded => None,
             Field::Ramp => Some((p.x - radius, p.x + radius)),
+            Field::Cube => pad((self.value(p) - radius, self.value(p) + radius)),
         }
     }
 }
