@@ -4,6 +4,7 @@ mod assets;
 mod ci;
 mod papers;
 mod repo;
+mod shaders;
 mod source;
 mod tidy;
 mod toml_lines;
@@ -19,6 +20,8 @@ usage: cargo xtask COMMAND
   papers           writes docs/papers.md from docs/papers/*.toml
   papers --check   fails where docs/papers.md is stale or names code or a test that does not exist
   assets           lists the files under assets/, their credit files, and where the larger inputs come from
+  shaders          compiles shaders/glsl to shaders/spirv and writes the manifest; builds glslang first (C++, minutes)
+  shaders --check  fails where the committed modules are not what their sources compile to
   help             this text
 ";
 
@@ -31,6 +34,8 @@ fn main() -> ExitCode {
         ["papers"] => Repo::open().and_then(|repo| papers::write(&repo)),
         ["papers", "--check"] => Repo::open().and_then(|repo| papers::check(&repo)),
         ["assets"] => Repo::open().and_then(|repo| assets::run(&repo)),
+        ["shaders"] => Repo::open().and_then(|repo| shaders::run(&repo, false)),
+        ["shaders", "--check"] => Repo::open().and_then(|repo| shaders::run(&repo, true)),
         [] | ["help" | "--help" | "-h"] => {
             print!("{HELP}");
             return ExitCode::SUCCESS;

@@ -4,13 +4,15 @@ use crate::repo::Repo;
 use crate::toml_lines::{lines, string};
 
 /// For each crate of the workspace, the crates of the workspace that it may depend on, tests and benches included.
-const MAY_KNOW: [(&str, &[&str]); 10] = [
+const MAY_KNOW: [(&str, &[&str]); 12] = [
     ("splat-core", &[]),
     ("convert", &["splat-core"]),
     ("tsm", &["splat-core"]),
-    ("hbsort", &["splat-core"]),
+    ("hbsort", &["splat-core", "splat-shaders"]),
     ("pbsr", &["splat-core"]),
     ("reference", &["splat-core"]),
+    ("splat-shaders", &[]),
+    ("gpu-ash", &["splat-shaders"]),
     ("organza", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference"]),
     ("organza-tests", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza"]),
     ("organza-benches", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza"]),

@@ -1,0 +1,117 @@
+//! An opened device and what it keeps between recordings.
+
+use crate::adapters::{Found, find};
+use crate::failure;
+use crate::instance::Instance;
+use crate::memory::Memory;
+use crate::pipeline::Pipeline;
+use crate::prepared::Prepared;
+use ash::vk;
+use splat_shaders::{Adapter, Choice, DeviceError, Inputs, Kernel, Recording, Run, Validation};
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex};
+
+/// The logical device and its one queue; everything made from it holds it.
+pub(crate) struct Logical {
+    pub(crate) raw: ash::Device,
+    pub(crate) instance: Instance,
+    pub(crate) found: Found,
+    /// Only one thread at a time may submit.
+    pub(crate) queue: Mutex<vk::Queue>,
+}
+
+impl Drop for Logical {
+    fn drop(&mut self) {
+        // SAFETY: whatever was made from the device holds it, so nothing is left.
+        unsafe { self.raw.destroy_device(None) }
+    }
+}
+
+/// A device that runs recordings. Everything it made lives as long as somebody holds it.
+pub struct Device {
+    logical: Arc<Logical>,
+    memory: Arc<Memory>,
+    pipelines: HashMap<&'static str, Arc<Pipeline>>,
+}
+
+impl Device {
+    /// Opens the chosen adapter.
+    ///
+    /// # Errors
+    /// [`DeviceError::NoDevice`] when there is none, or no validation layer where one is asked for;
+    /// [`DeviceError::Driver`] when the driver refuses.
+    pub fn open(choice: &Choice, validation: Validation) -> Result<Self, DeviceError> {
+        let instance = Instance::new(validation)?;
+        let mut found = find(&instance)?;
+        let adapters: Vec<Adapter> = found.iter().map(|f| f.adapter.clone()).collect();
+        let Some(at) = choice.pick(&adapters) else {
+            let names: Vec<&str> = adapters.iter().map(|a| a.name.as_str()).collect();
+            return Err(DeviceError::NoDevice { why: format!("{choice:?} of [{}]", names.join(", ")) });
+        };
+        let found = found.swap_remove(at);
+        let priorities = [1.0];
+        let queues =
+            [vk::DeviceQueueCreateInfo::default().queue_family_index(found.family).queue_priorities(&priorities)];
+        // What a kernel reads beyond its buffers is defined then. GPU-assisted validation is to see it instead.
+        let robust = vk::PhysicalDeviceFeatures::default().robust_buffer_access(validation != Validation::GpuAssisted);
+        let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_features(&robust);
+        // SAFETY: the adapter belongs to the instance; every device has the feature asked for.
+        let raw = unsafe { instance.raw.create_device(found.physical, &info, None) };
+        let raw = raw.map_err(failure::of("vkCreateDevice"))?;
+        // SAFETY: the device was made with one queue of this family.
+        let queue = Mutex::new(unsafe { raw.get_device_queue(found.family, 0) });
+        let logical = Arc::new(Logical { raw, instance, found, queue });
+        let memory = Arc::new(Memory::new(&logical)?);
+        Ok(Self { logical, memory, pipelines: HashMap::new() })
+    }
+
+    /// The adapter that was opened.
+    pub fn adapter(&self) -> &Adapter {
+        &self.logical.found.adapter
+    }
+
+    /// What validation said since the last call; empty when it is off, and when all is well.
+    pub fn take_messages(&self) -> Vec<String> {
+        self.logical.instance.take_messages()
+    }
+
+    /// Takes the memory of a recording, compiles its kernels and writes its commands.
+    ///
+    /// # Errors
+    /// [`DeviceError::Recording`] for a recording at fault, [`DeviceError::TooLarge`], [`DeviceError::Memory`],
+    /// [`DeviceError::Driver`].
+    pub fn prepare(&mut self, recording: &Recording) -> Result<Prepared, DeviceError> {
+        recording.check()?;
+        let had = self.adapter().binding_bytes;
+        if let Some(b) = recording.buffers().iter().find(|b| b.bytes > had) {
+            return Err(DeviceError::TooLarge { name: b.name, needed: b.bytes, had });
+        }
+        Prepared::new(self, recording)
+    }
+
+    /// Prepares a recording and runs it once.
+    ///
+    /// # Errors
+    /// As [`Device::prepare`] and [`Prepared::run`].
+    pub fn run(&mut self, recording: &Recording, inputs: &Inputs<'_>) -> Result<Run, DeviceError> {
+        self.prepare(recording)?.run(inputs)
+    }
+
+    pub(crate) fn logical(&self) -> &Arc<Logical> {
+        &self.logical
+    }
+
+    pub(crate) fn memory(&self) -> &Arc<Memory> {
+        &self.memory
+    }
+
+    /// The kernel, compiled once.
+    pub(crate) fn pipeline(&mut self, kernel: &'static Kernel) -> Result<Arc<Pipeline>, DeviceError> {
+        if let Some(known) = self.pipelines.get(kernel.name) {
+            return Ok(known.clone());
+        }
+        let made = Arc::new(Pipeline::new(&self.logical, kernel)?);
+        self.pipelines.insert(kernel.name, made.clone());
+        Ok(made)
+    }
+}

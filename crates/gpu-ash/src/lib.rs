@@ -1,0 +1,42 @@
+//! Runs recordings of GPU work on Vulkan 1.1.
+//!
+//! A [`Device`] is opened by [`Choice`], which never means a software driver unless it says so. [`Device::prepare`]
+//! takes a recording's memory, compiles its kernels and writes its commands once; [`Prepared::run`] uploads, runs, and
+//! reads back, as often as one likes. Barriers come from what the recording declares to read and write.
+//!
+//! ```
+//! use gpu_ash::{Choice, Device, DeviceError, Validation};
+//! use splat_shaders::{Groups, Recording, kernels};
+//!
+//! let mut recording = Recording::default();
+//! let scan = recording.input("scan", 8);
+//! let numbers = recording.input("numbers", 12);
+//! let sums = recording.scratch("sums", 4);
+//! recording.dispatch(&kernels::SCAN_REDUCE, Groups::cover(1), &[scan, numbers, sums], &[]);
+//! recording.read(sums);
+//!
+//! let bytes = |words: &[u32]| words.iter().flat_map(|w| w.to_ne_bytes()).collect::<Vec<u8>>();
+//! match Device::open(&Choice::Gpu, Validation::Off) {
+//!     Ok(mut device) => {
+//!         let inputs = [(scan, &bytes(&[3, 0])[..]), (numbers, &bytes(&[20, 30, 50])[..])];
+//!         let run = device.prepare(&recording).unwrap().run(&inputs).unwrap();
+//!         assert_eq!(run.bytes(sums), bytes(&[100]));
+//!     }
+//!     Err(DeviceError::NoDevice { why }) => println!("no GPU here: {why}"),
+//!     Err(e) => panic!("{e}"),
+//! }
+//! ```
+
+mod adapters;
+mod commands;
+mod device;
+mod failure;
+mod instance;
+mod memory;
+mod pipeline;
+mod prepared;
+
+pub use adapters::adapters;
+pub use device::Device;
+pub use prepared::Prepared;
+pub use splat_shaders::{Adapter, AdapterKind, Choice, DeviceError, Inputs, PassTime, Run, Validation};

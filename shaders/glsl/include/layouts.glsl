@@ -1,0 +1,33 @@
+// Written by `cargo xtask shaders` from src/layouts.rs.
+
+struct SortView {
+    vec4 axis_x;
+    vec4 axis_y;
+    vec4 axis_z;
+    vec4 translation;
+    vec2 plane_cos;
+    vec2 plane_sin;
+    vec2 half_extent;
+    uint splats;
+    uint back_to_front;
+};
+
+struct Scan {
+    uint count;
+    uint total;
+};
+
+struct SortState {
+    uint kept;
+    uint sorted;
+    uint blocks;
+    uint near_key;
+    uint far_key;
+    uint radius_key;
+    uint sort_groups_x;
+    uint sort_groups_y;
+    uint sort_groups_z;
+    uint scan_groups_x;
+    uint scan_groups_y;
+    uint scan_groups_z;
+};

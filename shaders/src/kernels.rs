@@ -1,0 +1,74 @@
+//! The kernels: for each the words of its module and what it does with its buffers. `tests/reflection.rs` holds this
+//! table against the modules themselves.
+
+/// What a kernel does with a buffer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Access {
+    /// It reads.
+    Read,
+    /// It writes, and may read what it or a step before it wrote.
+    Write,
+}
+
+/// A compute shader of this package; nobody else makes one, so executors may trust its words.
+#[derive(Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Kernel {
+    /// Its file's name without the extension.
+    pub name: &'static str,
+    /// SPIR-V 1.3, little endian.
+    pub spirv: &'static [u8],
+    /// Storage buffers of set 0, binding 0 onwards.
+    pub bindings: &'static [Access],
+    /// Size of its push constants, bytes.
+    pub push_bytes: u32,
+}
+
+impl Kernel {
+    /// The module's words.
+    pub fn words(&self) -> Vec<u32> {
+        let (words, _) = self.spirv.as_chunks::<4>();
+        words.iter().map(|w| u32::from_le_bytes(*w)).collect()
+    }
+}
+
+macro_rules! kernels {
+    ($($(#[$about:meta])* $constant:ident = $file:literal [$($access:ident),*] $(push $push:literal)?;)*) => {
+        $(
+            $(#[$about])*
+            pub static $constant: Kernel = Kernel {
+                name: $file,
+                spirv: include_bytes!(concat!("../spirv/", $file, ".spv")),
+                bindings: &[$(Access::$access),*],
+                push_bytes: 0 $(+ $push)?,
+            };
+        )*
+
+        /// Every kernel.
+        pub static ALL: &[&Kernel] = &[$(&$constant),*];
+    };
+}
+
+kernels! {
+    /// Sums of blocks of 1024 numbers: scan, numbers → sums.
+    SCAN_REDUCE = "scan_reduce" [Read, Read, Write];
+    /// The exclusive scan of the sums, by one workgroup, and the total: scan, sums.
+    SCAN_SPINE = "scan_spine" [Write, Write];
+    /// The exclusive scan of the numbers, in place, begun at their block's sum: scan, numbers, sums.
+    SCAN_APPLY = "scan_apply" [Read, Write, Read];
+
+    /// Sets the state of a sort to nothing found: view → state, scan of blocks.
+    HBSORT_BEGIN = "hbsort_begin" [Read, Write, Write];
+    /// View depths as keys, culling, extremes, and how many of each block of 1024 are kept:
+    /// view, positions, radii → keys, kept counts, state.
+    HBSORT_PROJECT = "hbsort_project" [Read, Read, Read, Write, Write, Write];
+    /// Moves the kept splats together in their order: view, keys, places of blocks → kept keys, kept places. Push: room.
+    HBSORT_COMPACT = "hbsort_compact" [Read, Read, Read, Write, Write] push 4;
+    /// Sizes of what follows: scan of blocks → state, scan of digits. Push: room.
+    HBSORT_PREPARE = "hbsort_prepare" [Read, Write, Write] push 4;
+    /// How often each digit occurs in each block of 2048: state, keys → counts. Push: shift.
+    HBSORT_HISTOGRAM = "hbsort_histogram" [Read, Read, Write] push 4;
+    /// Moves every splat to its digit's place, equal digits in their order:
+    /// state, keys, places, scanned counts → keys, places. Push: shift.
+    HBSORT_SCATTER = "hbsort_scatter" [Read, Read, Read, Read, Write, Write] push 4;
+}

@@ -1,0 +1,63 @@
+//! The shared structs. Vectors of four and pairs come first, so that std430 and C lay them out alike.
+
+use crate::layout::layouts;
+
+layouts! {
+    /// The view of one cloud, with which splats are culled and projected.
+    pub struct SortView {
+        /// First column of the rotation from world offsets to view space; the fourth number is unused.
+        pub axis_x: [f32; 4],
+        /// Second column.
+        pub axis_y: [f32; 4],
+        /// Third column.
+        pub axis_z: [f32; 4],
+        /// View position of the cloud's origin.
+        pub translation: [f32; 4],
+        /// cos φ of the half angles across and down; 1 for parallel rays.
+        pub plane_cos: [f32; 2],
+        /// sin φ; 0 for parallel rays.
+        pub plane_sin: [f32; 2],
+        /// Half extent of the image, world units; 0 for a pinhole.
+        pub half_extent: [f32; 2],
+        /// Splats to look at.
+        pub splats: u32,
+        /// 1 where the farthest comes first.
+        pub back_to_front: u32,
+    }
+
+    /// A scan: how many numbers it runs over, and what they add up to.
+    pub struct Scan {
+        /// Numbers.
+        pub count: u32,
+        /// Their sum.
+        pub total: u32,
+    }
+
+    /// What a sort found, and the sizes of its indirect dispatches.
+    pub struct SortState {
+        /// Splats in the view, whether there was room for them or not.
+        pub kept: u32,
+        /// Splats that are sorted: `kept`, or the room.
+        pub sorted: u32,
+        /// Workgroups' blocks of sorted splats.
+        pub blocks: u32,
+        /// Key of the nearest kept depth.
+        pub near_key: u32,
+        /// Key of the farthest kept depth.
+        pub far_key: u32,
+        /// Key of the smallest radius, culled splats included.
+        pub radius_key: u32,
+        /// Workgroups across, down and deep over the blocks of sorted splats.
+        pub sort_groups_x: u32,
+        /// Down.
+        pub sort_groups_y: u32,
+        /// Deep.
+        pub sort_groups_z: u32,
+        /// Workgroups across, down and deep of the scan of digit counts.
+        pub scan_groups_x: u32,
+        /// Down.
+        pub scan_groups_y: u32,
+        /// Deep.
+        pub scan_groups_z: u32,
+    }
+}
