@@ -44,6 +44,8 @@ mod crowd;
 mod depth_bits;
 mod error;
 mod first_level;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 mod params;
 mod project;
 mod radix;

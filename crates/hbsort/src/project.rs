@@ -18,14 +18,14 @@ pub(crate) const CULLED: f32 = f32::NAN;
 
 /// The side planes of the view, as two slopes by symmetry.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Frustum {
-    cos: [f32; 2],
-    sin: [f32; 2],
-    half: [f32; 2],
+pub(crate) struct Frustum {
+    pub(crate) cos: [f32; 2],
+    pub(crate) sin: [f32; 2],
+    pub(crate) half: [f32; 2],
 }
 
 impl Frustum {
-    fn new(camera: &Camera, margin_px: f64) -> Self {
+    pub(crate) fn new(camera: &Camera, margin_px: f64) -> Self {
         let extent = camera.size.map(|s| (0.5 * f64::from(s) + margin_px.max(0.0)) / camera.focal_px());
         if camera.is_orthographic() {
             return Self { cos: [1.0; 2], sin: [0.0; 2], half: extent.map(|e| e as f32) };

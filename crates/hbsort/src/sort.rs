@@ -68,11 +68,11 @@ pub fn slice_depths(depth: &[f32], params: &Params, scratch: &mut Scratch) -> Re
     run(&slicing, Some(depth), |i| depth[i], |place| place, params, ThicknessRule::Given, order, scratch)
 }
 
-fn check_count(n: usize) -> Result<(), Error> {
+pub(crate) fn check_count(n: usize) -> Result<(), Error> {
     if n as u64 > MOST_SPLATS { Err(Error::TooMany { needed: n as u64, had: MOST_SPLATS }) } else { Ok(()) }
 }
 
-fn check_ids(ids: &[u32], len: usize) -> Result<(), Error> {
+pub(crate) fn check_ids(ids: &[u32], len: usize) -> Result<(), Error> {
     let sorted = ids.windows(2).all(|w| w[0] < w[1]);
     if sorted && ids.last().is_none_or(|&last| (last as usize) < len) {
         return Ok(());

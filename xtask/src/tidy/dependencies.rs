@@ -4,7 +4,7 @@ use crate::repo::Repo;
 use crate::toml_lines::{lines, string};
 
 /// For each crate of the workspace, the crates of the workspace that it may depend on, tests and benches included.
-const MAY_KNOW: [(&str, &[&str]); 12] = [
+const MAY_KNOW: [(&str, &[&str]); 13] = [
     ("splat-core", &[]),
     ("convert", &["splat-core"]),
     ("tsm", &["splat-core"]),
@@ -16,6 +16,7 @@ const MAY_KNOW: [(&str, &[&str]); 12] = [
     ("organza", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference"]),
     ("organza-tests", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza"]),
     ("organza-benches", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza"]),
+    ("gpu-conformance", &["splat-core", "hbsort", "splat-shaders", "gpu-ash"]),
     ("xtask", &[]),
 ];
 

@@ -1,0 +1,273 @@
+//! The sort as a recording: cull and project, move the kept together, four passes of a stable radix sort.
+//!
+//! The order is that of [`crate::slice_cloud`] with [`Params::exact`], bit for bit: (slice, depth, id) is (depth, id),
+//! for the slice is a monotone function of the depth; depths come from the same products and sums, each rounded by
+//! itself; and every pass of the radix sort keeps equal digits in their order. Each pass counts digits per block of
+//! 2048 splats, scans the counts (reduce, spine, apply) and scatters; no workgroup waits for another.
+//!
+//! Deviation from Gunjee 2007, section 4.2: no buckets of slices. A radix sort moves the same bytes for any ε, and the
+//! slices are cut from the sorted depths when they are read back.
+//!
+//! ```
+//! use hbsort::gpu::{Capacities, record};
+//!
+//! let recorded = record(Capacities { splats: 1_000_000, kept: 400_000 });
+//! recorded.recording.check().unwrap();
+//! // 20 bytes a splat come in; an entry takes 8 bytes, twice.
+//! assert_eq!(recorded.recording.bytes() / 1_000_000, 31);
+//! ```
+
+use crate::project::{Frustum, bounding_radius};
+use crate::radix::depth_of_key;
+use crate::slicing::Slicing;
+use crate::sort::{check_count, check_ids};
+use crate::{Error, Params, ThicknessRule, thickness};
+use splat_core::{Camera, Cloud, Direction, SliceOrder};
+use splat_shaders::kernels;
+use splat_shaders::layouts::{Scan, SortState, SortView};
+use splat_shaders::{BufferId, Groups, Recording};
+use std::mem::offset_of;
+
+/// Splats that a workgroup projects.
+const PROJECT_BLOCK: u32 = 1024;
+/// Splats that a workgroup sorts.
+const SORT_BLOCK: u32 = 2048;
+/// Numbers that a workgroup scans.
+const SCAN_BLOCK: u32 = 1024;
+
+/// What a recording makes room for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Capacities {
+    /// Splats that are looked at.
+    pub splats: u32,
+    /// Splats that may be in the view at once, at most `splats`; a view of more is [`Error::Overflow`].
+    pub kept: u32,
+}
+
+/// The recorded sort and the buffers that the caller meets.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recorded {
+    /// What the device is to do.
+    pub recording: Recording,
+    /// The room it has.
+    pub capacities: Capacities,
+    /// Input: one [`SortView`].
+    pub view: BufferId,
+    /// Input: three f32 a splat, world offsets.
+    pub positions: BufferId,
+    /// Input: two f32 a splat, the radius of its kernel and of the sphere that holds it.
+    pub radii: BufferId,
+    /// Read back: one [`SortState`].
+    pub state: BufferId,
+    /// Read back: keys of the depths in order.
+    pub keys: BufferId,
+    /// Read back: places of the splats in order.
+    pub places: BufferId,
+}
+
+/// The bytes of a view and its splats.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Uploads {
+    view: Vec<u8>,
+    positions: Vec<u8>,
+    radii: Vec<u8>,
+}
+
+/// The digit counts of a pass and what scans them.
+struct Digits {
+    scan: BufferId,
+    counts: BufferId,
+    sums: BufferId,
+}
+
+/// Records a sort with this room.
+pub fn record(capacities: Capacities) -> Recorded {
+    let Capacities { splats, kept } = capacities;
+    let mut recording = Recording::default();
+    let r = &mut recording;
+    let words = |n: u32| 4 * u64::from(n);
+    let view = r.input("view", size_of::<SortView>() as u64);
+    let positions = r.input("positions", 3 * words(splats));
+    let radii = r.input("radii", 2 * words(splats));
+    let state = r.scratch("state", size_of::<SortState>() as u64);
+    let blocks = splats.div_ceil(PROJECT_BLOCK);
+    let block_scan = r.scratch("block scan", size_of::<Scan>() as u64);
+    let block_places = r.scratch("block places", words(blocks));
+    let block_sums = r.scratch("block sums", words(blocks.div_ceil(SCAN_BLOCK)));
+    let all_keys = r.scratch("all keys", words(splats));
+    let keys = [r.scratch("keys", words(kept)), r.scratch("keys'", words(kept))];
+    let places = [r.scratch("places", words(kept)), r.scratch("places'", words(kept))];
+    let counts = 256 * kept.div_ceil(SORT_BLOCK);
+    let digits = Digits {
+        scan: r.scratch("digit scan", size_of::<Scan>() as u64),
+        counts: r.scratch("digit counts", words(counts)),
+        sums: r.scratch("digit sums", words(counts.div_ceil(SCAN_BLOCK))),
+    };
+
+    r.dispatch(&kernels::HBSORT_BEGIN, Groups::cover(1), &[view, state, block_scan], &[]);
+    let projected = [view, positions, radii, all_keys, block_places, state];
+    r.dispatch(&kernels::HBSORT_PROJECT, Groups::cover(blocks), &projected, &[]);
+    scan(r, Groups::cover(blocks.div_ceil(SCAN_BLOCK)), block_scan, block_places, block_sums);
+    let compacted = [view, all_keys, block_places, keys[0], places[0]];
+    r.dispatch(&kernels::HBSORT_COMPACT, Groups::cover(blocks), &compacted, &[kept]);
+    r.dispatch(&kernels::HBSORT_PREPARE, Groups::cover(1), &[block_scan, state, digits.scan], &[kept]);
+    for pass in 0..4 {
+        let (from, to) = (pass % 2, 1 - pass % 2);
+        sort_pass(r, 8 * pass as u32, state, [keys[from], places[from]], [keys[to], places[to]], &digits);
+    }
+    r.read(state);
+    r.read(keys[0]);
+    r.read(places[0]);
+    Recorded { recording, capacities, view, positions, radii, state, keys: keys[0], places: places[0] }
+}
+
+/// Exclusive scan of `numbers` in place.
+fn scan(r: &mut Recording, groups: Groups, scan: BufferId, numbers: BufferId, sums: BufferId) {
+    r.dispatch(&kernels::SCAN_REDUCE, groups, &[scan, numbers, sums], &[]);
+    r.dispatch(&kernels::SCAN_SPINE, Groups::cover(1), &[scan, sums], &[]);
+    r.dispatch(&kernels::SCAN_APPLY, groups, &[scan, numbers, sums], &[]);
+}
+
+/// Sorts keys and places by the eight bits from `shift` on.
+fn sort_pass(
+    r: &mut Recording,
+    shift: u32,
+    state: BufferId,
+    [keys, places]: [BufferId; 2],
+    [sorted_keys, sorted_places]: [BufferId; 2],
+    digits: &Digits,
+) {
+    let at = |offset| Groups::Indirect { buffer: state, offset: offset as u64 };
+    let sort_groups = at(offset_of!(SortState, sort_groups_x));
+    r.dispatch(&kernels::HBSORT_HISTOGRAM, sort_groups, &[state, keys, digits.counts], &[shift]);
+    scan(r, at(offset_of!(SortState, scan_groups_x)), digits.scan, digits.counts, digits.sums);
+    let scattered = [state, keys, places, digits.counts, sorted_keys, sorted_places];
+    r.dispatch(&kernels::HBSORT_SCATTER, sort_groups, &scattered, &[shift]);
+}
+
+impl Recorded {
+    /// The bytes that the recording takes for this view of a cloud, or of the splats `ids` of it.
+    ///
+    /// # Errors
+    /// [`Error::Overflow`] for more splats than there is room for, [`Error::Ids`], [`Error::TooMany`].
+    pub fn uploads(
+        &self,
+        cloud: &Cloud,
+        ids: Option<&[u32]>,
+        camera: &Camera,
+        params: &Params,
+    ) -> Result<Uploads, Error> {
+        let len = cloud.len().min(cloud.radius.len());
+        check_count(len)?;
+        ids.map_or(Ok(()), |ids| check_ids(ids, len))?;
+        let (needed, had) = (ids.map_or(len, <[u32]>::len) as u64, u64::from(self.capacities.splats));
+        if needed > had {
+            return Err(Error::Overflow { what: "splats", needed, had });
+        }
+        let id = |place: usize| ids.map_or(place, |ids| ids[place] as usize);
+        let places = || (0..needed as usize).map(id);
+        let positions: Vec<f32> = places().flat_map(|i| cloud.position[i].to_array()).collect();
+        let radii: Vec<f32> = places().flat_map(|i| [cloud.radius[i], bounding_radius(cloud, i)]).collect();
+        let (view, frustum) = (camera.view_from_offset(cloud.origin), Frustum::new(camera, params.margin_px));
+        let view = SortView {
+            axis_x: view.rotation.x_axis.extend(0.0).to_array(),
+            axis_y: view.rotation.y_axis.extend(0.0).to_array(),
+            axis_z: view.rotation.z_axis.extend(0.0).to_array(),
+            translation: view.translation.extend(0.0).to_array(),
+            plane_cos: frustum.cos,
+            plane_sin: frustum.sin,
+            half_extent: frustum.half,
+            splats: needed as u32,
+            back_to_front: u32::from(params.direction == Direction::BackToFront),
+        };
+        let bytes = |floats: &[f32]| bytemuck::cast_slice(floats).to_vec();
+        Ok(Uploads { view: bytemuck::bytes_of(&view).to_vec(), positions: bytes(&positions), radii: bytes(&radii) })
+    }
+
+    /// The uploads with the buffers that they go to.
+    pub fn inputs<'a>(&self, uploads: &'a Uploads) -> [(BufferId, &'a [u8]); 3] {
+        [(self.view, &uploads.view), (self.positions, &uploads.positions), (self.radii, &uploads.radii)]
+    }
+
+    /// The order, from the bytes that were read back of [`Recorded::state`], [`Recorded::keys`] and
+    /// [`Recorded::places`] after a run with the uploads of the same arguments.
+    ///
+    /// # Errors
+    /// [`Error::Overflow`] when the view holds more splats than there is room for, [`Error::Thickness`],
+    /// [`Error::ReadBack`] for bytes that no run gave.
+    pub fn order(
+        &self,
+        [state, keys, places]: [&[u8]; 3],
+        cloud: &Cloud,
+        ids: Option<&[u32]>,
+        params: &Params,
+    ) -> Result<SliceOrder, Error> {
+        let given = params.given_thickness()?;
+        let short = |what, expected: usize, found: usize| Error::ReadBack {
+            what,
+            expected: expected as u64,
+            found: found as u64,
+        };
+        let state_bytes = state.get(..size_of::<SortState>());
+        let state: SortState =
+            bytemuck::pod_read_unaligned(state_bytes.ok_or(short("state", size_of::<SortState>(), state.len()))?);
+        if state.kept > self.capacities.kept {
+            let (needed, had) = (state.kept.into(), self.capacities.kept.into());
+            return Err(Error::Overflow { what: "splats in the view", needed, had });
+        }
+        let n = ids.map_or(cloud.len().min(cloud.radius.len()), <[u32]>::len);
+        let kept = (state.kept as usize).min(n);
+        let words = |what, bytes: &[u8]| -> Result<Vec<u32>, Error> {
+            let used = bytes.get(..4 * kept).ok_or(short(what, 4 * kept, bytes.len()))?;
+            let (words, _) = used.as_chunks::<4>();
+            Ok(words.iter().map(|w| u32::from_ne_bytes(*w)).collect())
+        };
+        let (keys, places) = (words("keys", keys)?, words("places", places)?);
+        if kept == 0 {
+            return Ok(SliceOrder { direction: params.direction, culled: n as u64, ..SliceOrder::default() });
+        }
+        if let Some(&wrong) = places.iter().find(|&&p| p as usize >= n) {
+            return Err(short("places", n, wrong as usize));
+        }
+        let id_of = |place: u32| ids.map_or(place, |ids| ids[place as usize]);
+        let (near, far) = (depth_of_key(state.near_key), depth_of_key(state.far_key));
+        let radius_at = |place: usize| cloud.radius[id_of(place as u32) as usize];
+        let chosen = || {
+            let span = f64::from(far) - f64::from(near);
+            thickness::choose(span, depth_of_key(state.radius_key), n, &radius_at)
+        };
+        let (thickness, _) = given.map_or_else(chosen, |t| (t, ThicknessRule::Given));
+        let slicing = Slicing::new(near, far, thickness, params.direction, 0);
+        Ok(SliceOrder {
+            slice_starts: slice_starts(&slicing, &keys),
+            input_from_sorted: places.into_iter().map(id_of).collect(),
+            direction: params.direction,
+            near,
+            far,
+            thickness,
+            slices: slicing.slices,
+            culled: (n - kept) as u64,
+        })
+    }
+}
+
+/// Where each slice begins among the sorted keys, then their number.
+fn slice_starts(slicing: &Slicing, keys: &[u32]) -> Vec<u32> {
+    let mut starts = Vec::new();
+    // The slice of the last key that was asked for its slice, and the keys that surely share it.
+    let mut current: Option<(u64, u32)> = None;
+    for (at, &key) in (0u32..).zip(keys) {
+        let depth = depth_of_key(if slicing.direction == Direction::BackToFront { !key } else { key });
+        let relative = slicing.relative_key(depth);
+        if current.is_some_and(|(_, surely)| relative <= surely) {
+            continue;
+        }
+        let slice = slicing.slice_of(depth);
+        if current.is_none_or(|(of, _)| of != slice) {
+            starts.push(at);
+            current = Some((slice, slicing.surely_within(slice)));
+        }
+    }
+    starts.push(keys.len() as u32);
+    starts
+}
