@@ -136,11 +136,8 @@ fn a_checkpoint_of_something_else_is_refused() {
         place.expect(3, &render(&small), why);
         assert_eq!(place.bytes("sums"), bytes, "a file that is refused is not touched");
     }
-    place.expect(
-        2,
-        &["-o", "a.exr", "--technique", "points", "--layers", "shadow", "--checkpoint", "c"],
-        "only the technique `particles`",
-    );
+    let points = ["--technique", "points", "--layers", "shadow", "--checkpoint", "c"];
+    place.expect(2, &render(&points), "only the technique `particles`");
     place.expect(2, &render(&["-o", "a.exr", "--checkpoint", "a.exr"]), "named twice");
     place.expect(4, &render(&["-o", "a.exr", "--checkpoint", "s.toml"]), "also an input");
     place.expect(2, &render(&["-o", "a.exr", "--repeat-level", "1"]), "--repeat-level 1: ");
