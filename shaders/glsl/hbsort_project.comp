@@ -45,7 +45,7 @@ void project(uint i) {
         atomicAdd(block_kept, 1u);
         key = view.back_to_front != 0u ? ~key : key;
     }
-    if (radius < uintBitsToFloat(0x7f800000u)) {
+    if (radius <= 3.402823466e38) {
         atomicMin(block_radius, key_of(radius));
     }
     keys[i] = key;

@@ -16,21 +16,24 @@ pub struct Fault {
 impl Recording {
     /// Finds the first fault: a buffer of another recording, bindings or push constants that the kernel does not have, a
     /// buffer that one dispatch both writes and uses otherwise, a size read from where there is none, memory that is
-    /// read before anything was written to it.
+    /// read before anything was written to it, an upload after a dispatch.
     ///
     /// # Errors
     /// [`Fault`] names the step.
     pub fn check(&self) -> Result<(), Fault> {
         let mut written = vec![false; self.buffers().len()];
         for (at, step) in self.steps().iter().enumerate() {
-            self.check_step(step, &mut written).map_err(|what| Fault { step: at, what })?;
+            self.check_step(&self.steps()[..at], step, &mut written).map_err(|what| Fault { step: at, what })?;
         }
         Ok(())
     }
 
-    fn check_step(&self, step: &Step, written: &mut [bool]) -> Result<(), String> {
+    fn check_step(&self, before: &[Step], step: &Step, written: &mut [bool]) -> Result<(), String> {
         if let Step::Dispatch(dispatch) = step {
             self.check_dispatch(dispatch)?;
+        }
+        if let (Step::Upload(_), Some(_)) = (step, before.iter().find(|s| matches!(s, Step::Dispatch(_)))) {
+            return Err("an upload after a dispatch: executors upload before all else".into());
         }
         let uses = uses(step);
         for (at, (buffer, use_)) in uses.iter().enumerate() {
@@ -120,6 +123,14 @@ mod tests {
                     r.dispatch(&SCAN_SPINE, Groups::Indirect { buffer: a, offset: 0 }, &[a, b], &[]);
                 }),
                 "step 2: scan_spine: no size of a dispatch at byte 0 of 8",
+            ),
+            (
+                fault(|r| {
+                    let [a, b] = [r.input("a", 8), r.input("b", 8)];
+                    r.dispatch(&SCAN_SPINE, one, &[a, b], &[]);
+                    r.input("late", 4);
+                }),
+                "step 3: an upload after a dispatch: executors upload before all else",
             ),
             (
                 fault(|r| {

@@ -71,4 +71,15 @@ kernels! {
     /// Moves every splat to its digit's place, equal digits in their order:
     /// state, keys, places, scanned counts → keys, places. Push: shift.
     HBSORT_SCATTER = "hbsort_scatter" [Read, Read, Read, Read, Write, Write] push 4;
+
+    /// Sets the sums of pixels to nothing: view → sums.
+    PBSR_BEGIN = "pbsr_begin" [Read, Write];
+    /// Sets depths to the limits, and winners to none: view, limits → nearest, winners.
+    PBSR_CLEAR = "pbsr_clear" [Read, Read, Write, Write];
+    /// Particles onto pixels, nearest depths: view, objects, sets, particles → footings, nearest. Push: level.
+    PBSR_PROJECT = "pbsr_project" [Read, Read, Read, Read, Write, Write] push 4;
+    /// Who is seen among equals: view, sets, limits, footings, nearest → winners. Push: level.
+    PBSR_RANK = "pbsr_rank" [Read, Read, Read, Read, Read, Write] push 4;
+    /// Adds who is seen: view, objects, sets, particles, footings, nearest, winners → sums. Push: level.
+    PBSR_ADD = "pbsr_add" [Read, Read, Read, Read, Read, Read, Read, Write] push 4;
 }

@@ -60,4 +60,46 @@ layouts! {
         /// Deep.
         pub scan_groups_z: u32,
     }
+
+    /// One object of a set of particles.
+    pub struct ParticleObject {
+        /// First column of the map from its offsets to view space; the fourth number is unused.
+        pub linear_x: [f32; 4],
+        /// Second column.
+        pub linear_y: [f32; 4],
+        /// Third column.
+        pub linear_z: [f32; 4],
+        /// View position of its origin.
+        pub translation: [f32; 4],
+        /// First column of the rotation of its normals.
+        pub rotation_x: [f32; 4],
+        /// Second column.
+        pub rotation_y: [f32; 4],
+        /// Third column.
+        pub rotation_z: [f32; 4],
+        /// Radiance that it emits.
+        pub emission: [f32; 4],
+        /// s·f² in view units, first number.
+        pub share: [f32; 4],
+    }
+
+    /// The image that particles are projected on.
+    pub struct ParticleView {
+        /// Half the size, pixels.
+        pub middle: [f32; 2],
+        /// Width and height, pixels.
+        pub size: [f32; 2],
+        /// Focal length, pixels; pixels a world unit for parallel rays.
+        pub focal: f32,
+        /// 1 over the unit of radiance.
+        pub inverse_unit: f32,
+        /// 1 for parallel rays.
+        pub orthographic: u32,
+        /// Tiles across.
+        pub columns: u32,
+        /// Pixels of all tiles.
+        pub pixels: u32,
+        /// Nothing.
+        pub unused: u32,
+    }
 }

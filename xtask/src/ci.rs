@@ -5,7 +5,7 @@
 
 use crate::repo::{Outcome, Repo};
 use crate::toml_lines::lines;
-use crate::{papers, tidy};
+use crate::{papers, shaders, tidy, vulkan};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
@@ -81,10 +81,17 @@ fn steps(repo: &Repo) -> Vec<Step> {
         step("tidy", Work::Task(tidy::run)),
         step("papers", Work::Task(papers::check)),
         // All targets: examples, tests and benches compile here too.
-        step("clippy", one("clippy --workspace --all-targets -- -D warnings")),
+        step(
+            "clippy",
+            one(
+                "clippy --workspace --all-targets --features gpu-conformance/driver,hbsort/gpu,pbsr/gpu -- -D warnings",
+            ),
+        ),
         step("docs", docs),
         step("alone", Work::Cargo(alone(repo), &[])),
-        step("tests", one("test --workspace")),
+        step("shaders", Work::Task(|repo| shaders::run(repo, true))),
+        step("vulkan", Work::Task(vulkan::run)),
+        step("tests", one("test --workspace --features hbsort/gpu,pbsr/gpu")),
     ]
 }
 
@@ -129,7 +136,7 @@ mod tests {
     fn warnings_fail_and_tests_come_last() {
         let steps = steps(&Repo::of(&[]));
         let names: Vec<_> = steps.iter().map(|s| s.name).collect();
-        assert_eq!(names, ["fmt", "tidy", "papers", "clippy", "docs", "alone", "tests"]);
+        assert_eq!(names, ["fmt", "tidy", "papers", "clippy", "docs", "alone", "shaders", "vulkan", "tests"]);
         let Work::Cargo(_, environment) = &steps[4].work else { panic!("docs are built by cargo") };
         assert_eq!(*environment, [("RUSTDOCFLAGS", "-D warnings")]);
     }

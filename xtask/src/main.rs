@@ -8,6 +8,7 @@ mod shaders;
 mod source;
 mod tidy;
 mod toml_lines;
+mod vulkan;
 
 use repo::Repo;
 use std::process::ExitCode;
@@ -22,6 +23,7 @@ usage: cargo xtask COMMAND
   assets           lists the files under assets/, their credit files, and where the larger inputs come from
   shaders          compiles shaders/glsl to shaders/spirv and writes the manifest; builds glslang first (C++, minutes)
   shaders --check  fails where the committed modules are not what their sources compile to
+  vulkan           runs every kernel and recording on Mesa's lavapipe under validation; installs it as root with apt
   help             this text
 ";
 
@@ -36,6 +38,7 @@ fn main() -> ExitCode {
         ["assets"] => Repo::open().and_then(|repo| assets::run(&repo)),
         ["shaders"] => Repo::open().and_then(|repo| shaders::run(&repo, false)),
         ["shaders", "--check"] => Repo::open().and_then(|repo| shaders::run(&repo, true)),
+        ["vulkan"] => Repo::open().and_then(|repo| vulkan::run(&repo)),
         [] | ["help" | "--help" | "-h"] => {
             print!("{HELP}");
             return ExitCode::SUCCESS;

@@ -7,7 +7,7 @@ use crate::memory::Memory;
 use crate::pipeline::Pipeline;
 use crate::prepared::Prepared;
 use ash::vk;
-use splat_shaders::{Adapter, Choice, DeviceError, Inputs, Kernel, Recording, Run, Validation};
+use splat_shaders::{Adapter, Barrier, Choice, DeviceError, Inputs, Kernel, Recording, Run, Validation, barriers};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
@@ -81,12 +81,25 @@ impl Device {
     /// [`DeviceError::Recording`] for a recording at fault, [`DeviceError::TooLarge`], [`DeviceError::Memory`],
     /// [`DeviceError::Driver`].
     pub fn prepare(&mut self, recording: &Recording) -> Result<Prepared, DeviceError> {
+        self.prepare_with(recording, &barriers(recording))
+    }
+
+    /// The same with no barrier at all, so that a test can hear validation complain: never run what this gives.
+    ///
+    /// # Errors
+    /// As [`Device::prepare`].
+    #[cfg(feature = "unsynchronized")]
+    pub fn prepare_without_barriers(&mut self, recording: &Recording) -> Result<Prepared, DeviceError> {
+        self.prepare_with(recording, &vec![Vec::new(); recording.steps().len()])
+    }
+
+    fn prepare_with(&mut self, recording: &Recording, waits: &[Vec<Barrier>]) -> Result<Prepared, DeviceError> {
         recording.check()?;
         let had = self.adapter().binding_bytes;
         if let Some(b) = recording.buffers().iter().find(|b| b.bytes > had) {
             return Err(DeviceError::TooLarge { name: b.name, needed: b.bytes, had });
         }
-        Prepared::new(self, recording)
+        Prepared::new(self, recording, waits)
     }
 
     /// Prepares a recording and runs it once.

@@ -7,7 +7,7 @@ use crate::memory::Buffer;
 use crate::pipeline::Pipeline;
 use ash::vk;
 use gpu_allocator::MemoryLocation;
-use splat_shaders::{BufferId, DeviceError, Dispatch, Inputs, PassTime, Recording, Run, Step, barriers};
+use splat_shaders::{Barrier, BufferId, DeviceError, Dispatch, Inputs, PassTime, Recording, Run, Step};
 use std::sync::{Arc, PoisonError};
 
 /// A buffer that the processor sees, beside one of the recording.
@@ -36,7 +36,7 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    pub(crate) fn new(device: &mut Device, recording: &Recording) -> Result<Self, DeviceError> {
+    pub(crate) fn new(device: &mut Device, recording: &Recording, waits: &[Vec<Barrier>]) -> Result<Self, DeviceError> {
         let mut made = Self {
             uploads: Vec::new(),
             reads: Vec::new(),
@@ -59,7 +59,7 @@ impl Prepared {
                 made.pipelines.push(device.pipeline(dispatch.kernel)?);
             }
         }
-        made.write(recording)?;
+        made.write(recording, waits)?;
         Ok(made)
     }
 
@@ -113,7 +113,7 @@ impl Prepared {
         Ok(())
     }
 
-    fn write(&self, recording: &Recording) -> Result<(), DeviceError> {
+    fn write(&self, recording: &Recording, waits: &[Vec<Barrier>]) -> Result<(), DeviceError> {
         let device = &self.logical.raw;
         let begin = vk::CommandBufferBeginInfo::default();
         // SAFETY: the command buffer is new and nobody else has it.
@@ -126,8 +126,8 @@ impl Prepared {
         }
         commands.tick(0);
         let (mut uploads, mut reads, mut pipelines) = (self.uploads.iter(), self.reads.iter(), self.pipelines.iter());
-        for (at, (step, waits)) in recording.steps().iter().zip(barriers(recording)).enumerate() {
-            commands.barrier(&waits);
+        for (at, (step, waits)) in recording.steps().iter().zip(waits).enumerate() {
+            commands.barrier(waits);
             match step {
                 Step::Upload(id) => {
                     let beside = uploads.next().expect("invariant: one for each upload");

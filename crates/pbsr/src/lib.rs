@@ -50,6 +50,8 @@ mod checkpoint;
 mod cost;
 mod ensemble;
 mod error;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 mod implicit;
 mod leaves;
 mod lines;

@@ -45,6 +45,12 @@ impl PackedNormal {
         self.0 & PER_CROSSING != 0
     }
 
+    /// The bits, as kernels read them.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn bits(self) -> u32 {
+        self.0
+    }
+
     /// The unit normal, or zero for none.
     #[inline]
     pub fn get(self) -> Vec3 {
@@ -82,6 +88,12 @@ impl PackedColor {
         let s = scale(exponent);
         let [r, g, b] = c.map(|v| (v * s + 0.5) as u32);
         Self(r | g << 9 | b << 18 | ((exponent + 15) as u32) << 27)
+    }
+
+    /// The bits, as kernels read them.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn bits(self) -> u32 {
+        self.0
     }
 
     /// The colour.

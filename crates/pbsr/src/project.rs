@@ -39,16 +39,16 @@ pub fn finest_pixel_area(camera: &Camera, center: DVec3, radius: f64, near: f64)
 /// From the offsets of one object's particles to pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Projector {
-    linear: Mat3,
-    translation: Vec3,
+    pub(crate) linear: Mat3,
+    pub(crate) translation: Vec3,
     /// Rotation alone, for normals.
-    rotation: Mat3,
+    pub(crate) rotation: Mat3,
     focal: f32,
     middle: [f32; 2],
     size: [f32; 2],
     orthographic: bool,
     /// s·f² in view units: k is this times |p|/z³, or this.
-    share: f32,
+    pub(crate) share: f32,
 }
 
 /// Pixels that one particle reaches: `x0 .. x1` × `y0 .. y1`, never empty.

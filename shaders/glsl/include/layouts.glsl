@@ -31,3 +31,26 @@ struct SortState {
     uint scan_groups_y;
     uint scan_groups_z;
 };
+
+struct ParticleObject {
+    vec4 linear_x;
+    vec4 linear_y;
+    vec4 linear_z;
+    vec4 translation;
+    vec4 rotation_x;
+    vec4 rotation_y;
+    vec4 rotation_z;
+    vec4 emission;
+    vec4 share;
+};
+
+struct ParticleView {
+    vec2 middle;
+    vec2 size;
+    float focal;
+    float inverse_unit;
+    uint orthographic;
+    uint columns;
+    uint pixels;
+    uint unused;
+};

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use gpu_ash::{AdapterKind, Choice, Device, DeviceError, Validation, adapters};
-use gpu_conformance::{bytes, open};
+use gpu_conformance::{bytes, open_ash as open};
 use splat_shaders::{Groups, Recording, kernels};
 
 #[test]
@@ -31,6 +31,17 @@ fn the_canary_sings() {
     drop(device.prepare(&r).unwrap());
     let said = device.take_messages();
     assert!(said.iter().any(|m| m.contains("VUID-vkCmdDispatch-groupCountX-00386")), "{said:?}");
+}
+
+#[test]
+fn a_missing_barrier_is_heard() {
+    let mut device = open().unwrap();
+    let recording = hbsort::gpu::record(hbsort::gpu::Capacities { splats: 100, kept: 100 }).recording;
+    drop(device.prepare(&recording).unwrap());
+    assert_eq!(device.take_messages(), [""; 0]);
+    drop(device.prepare_without_barriers(&recording).unwrap());
+    let said = device.take_messages();
+    assert!(said.iter().any(|m| m.contains("SYNC-HAZARD-READ-AFTER-WRITE")), "{said:?}");
 }
 
 #[test]

@@ -1,8 +1,7 @@
 //! The sort on a device: the CPU's exact order, bit for bit.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use gpu_ash::Device;
-use gpu_conformance::open;
+use gpu_conformance::{Device, open};
 use hbsort::gpu::{Capacities, record};
 use hbsort::{Direction, Error, Params, Scratch, SliceOrder, Thickness, slice_cloud};
 use splat_core::glam::{DVec3, Vec3};

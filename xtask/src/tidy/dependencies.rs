@@ -4,19 +4,20 @@ use crate::repo::Repo;
 use crate::toml_lines::{lines, string};
 
 /// For each crate of the workspace, the crates of the workspace that it may depend on, tests and benches included.
-const MAY_KNOW: [(&str, &[&str]); 13] = [
+const MAY_KNOW: [(&str, &[&str]); 14] = [
     ("splat-core", &[]),
     ("convert", &["splat-core"]),
     ("tsm", &["splat-core"]),
     ("hbsort", &["splat-core", "splat-shaders"]),
-    ("pbsr", &["splat-core"]),
+    ("pbsr", &["splat-core", "splat-shaders"]),
     ("reference", &["splat-core"]),
     ("splat-shaders", &[]),
     ("gpu-ash", &["splat-shaders"]),
+    ("gpu-wgpu", &["splat-shaders"]),
     ("organza", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference"]),
     ("organza-tests", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza"]),
     ("organza-benches", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza"]),
-    ("gpu-conformance", &["splat-core", "hbsort", "splat-shaders", "gpu-ash"]),
+    ("gpu-conformance", &["splat-core", "hbsort", "pbsr", "splat-shaders", "gpu-ash", "gpu-wgpu"]),
     ("xtask", &[]),
 ];
 

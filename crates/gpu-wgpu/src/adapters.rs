@@ -1,0 +1,60 @@
+//! The adapters that wgpu finds.
+
+use splat_shaders::{Adapter, AdapterKind, DeviceError, Validation};
+
+/// Features without which no recording runs.
+const NEEDED: wgpu::Features = wgpu::Features::IMMEDIATES;
+
+/// Every adapter of this machine that wgpu reaches by Vulkan and that runs recordings, software drivers included.
+///
+/// # Errors
+/// None today; a driver that fails offers no adapter.
+pub fn adapters() -> Result<Vec<Adapter>, DeviceError> {
+    Ok(find(&instance(Validation::Off)).iter().map(describe).collect())
+}
+
+pub(crate) fn instance(validation: Validation) -> wgpu::Instance {
+    use wgpu::InstanceFlags as Flags;
+    // Not `DEBUG`: what naga writes for debuggers is no valid module to older layers.
+    let flags = match validation {
+        Validation::Off => Flags::empty(),
+        Validation::Synchronization => Flags::VALIDATION,
+        Validation::GpuAssisted => Flags::VALIDATION | Flags::GPU_BASED_VALIDATION,
+    };
+    let backends = wgpu::Backends::VULKAN;
+    wgpu::Instance::new(wgpu::InstanceDescriptor {
+        backends,
+        flags,
+        ..wgpu::InstanceDescriptor::new_without_display_handle()
+    })
+}
+
+pub(crate) fn find(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
+    let mut found = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::VULKAN));
+    found.retain(|adapter| adapter.features().contains(NEEDED));
+    found
+}
+
+/// What is asked of an adapter: the needed features, clocks where it has them.
+pub(crate) fn features(adapter: &wgpu::Adapter) -> wgpu::Features {
+    NEEDED | (adapter.features() & wgpu::Features::TIMESTAMP_QUERY)
+}
+
+pub(crate) fn describe(adapter: &wgpu::Adapter) -> Adapter {
+    let (info, limits) = (adapter.get_info(), adapter.limits());
+    Adapter {
+        name: info.name,
+        driver: format!("{} {} through wgpu", info.driver, info.driver_info),
+        kind: match info.device_type {
+            wgpu::DeviceType::DiscreteGpu => AdapterKind::Discrete,
+            wgpu::DeviceType::IntegratedGpu => AdapterKind::Integrated,
+            wgpu::DeviceType::VirtualGpu => AdapterKind::Virtual,
+            wgpu::DeviceType::Cpu => AdapterKind::Software,
+            wgpu::DeviceType::Other => AdapterKind::Other,
+        },
+        // wgpu does not say.
+        memory_bytes: 0,
+        binding_bytes: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
+        subgroup: info.subgroup_min_size,
+    }
+}

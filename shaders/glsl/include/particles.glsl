@@ -1,0 +1,25 @@
+// What the kernels of particles share: records, footings and the order of equals.
+
+// Words of an uploaded particle: position (3 f32), normal, colour, thinning number (f32), object. Words of a set:
+// first particle, particles, seed of the order of equals.
+const uint PARTICLE_WORDS = 7u;
+
+// A permutation of 32 bits.
+uint scramble(uint v) {
+    v ^= v >> 16;
+    v *= 0x21f0aaadu;
+    v ^= v >> 15;
+    v *= 0x735a2d97u;
+    return v ^ (v >> 15);
+}
+
+// Place of a particle among those of the same depth on a pixel: a permutation of the particles, another one for each
+// pixel and set, so that nobody is first by its place in the list.
+uint rank_of(uint particle, uint pixel, uint seed) {
+    return scramble(particle ^ scramble(pixel ^ scramble(seed)));
+}
+
+// Where a pixel stands: tiles of 64 by 64 one after the other, as `pbsr::bins::Tiling` has it.
+uint place_of(uint x, uint y, uint columns) {
+    return ((y >> 6) * columns + (x >> 6)) * 4096u + (y & 63u) * 64u + (x & 63u);
+}

@@ -1,0 +1,174 @@
+//! `cargo xtask vulkan`: every module through `spirv-val`, every kernel and recording on lavapipe under validation.
+//!
+//! Lavapipe is Mesa's Vulkan on the processor: it needs no GPU, so that every machine can run the tests. It says nothing
+//! about speed. What is missing is installed where that is possible (root, apt), printed where it is not.
+
+use crate::repo::{Outcome, Repo};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Where drivers and layers announce themselves.
+const ROOTS: [&str; 4] = ["/usr/share/vulkan", "/usr/local/share/vulkan", "/etc/vulkan", "/usr/local/etc/vulkan"];
+
+/// Debian's and Ubuntu's names of what is needed.
+const PACKAGES: [&str; 4] = ["libvulkan1", "mesa-vulkan-drivers", "vulkan-validationlayers", "spirv-tools"];
+
+/// What the conformance tests run with.
+#[derive(Debug, PartialEq)]
+struct Parts {
+    /// The file that announces lavapipe.
+    driver: PathBuf,
+    /// The file that announces the validation layer.
+    layer: PathBuf,
+    /// The checker of modules.
+    spirv_val: PathBuf,
+}
+
+/// Finds or installs the parts, then checks modules and runs the conformance tests: by `gpu-ash` under synchronization
+/// and under GPU-assisted validation, by `gpu-wgpu` under synchronization validation.
+pub(crate) fn run(repo: &Repo) -> Outcome {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
+    let look = || find(&ROOTS.map(PathBuf::from), &folders);
+    let parts = match look() {
+        Ok(parts) => parts,
+        Err(missing) if install(&folders, &missing)? => look()?,
+        Err(missing) => return without(&missing, std::env::var("CI").as_deref() == Ok("true")),
+    };
+    println!("lavapipe: {}\nvalidation: {}", parts.driver.display(), parts.layer.display());
+    let modules = check_modules(repo, &parts.spirv_val)?;
+    for (executor, validation) in [("ash", "synchronization"), ("ash", "gpu-assisted"), ("wgpu", "synchronization")] {
+        conformance(repo, &parts.driver, executor, validation)?;
+    }
+    Ok(format!("vulkan: {modules} modules valid, recordings conform on lavapipe without a message"))
+}
+
+/// The parts, or the names of what is missing.
+fn find(roots: &[PathBuf], folders: &[PathBuf]) -> Result<Parts, String> {
+    let announced = |folder: &str, name: &str| {
+        let files = roots.iter().filter_map(|root| std::fs::read_dir(root.join(folder)).ok()).flatten().flatten();
+        let mut fits: Vec<PathBuf> = files
+            .map(|f| f.path())
+            .filter(|p| p.file_name().is_some_and(|n| n.to_string_lossy().contains(name)))
+            .collect();
+        fits.sort();
+        fits.into_iter().next()
+    };
+    let driver = announced("icd.d", "lvp_icd");
+    let layer = announced("explicit_layer.d", "VkLayer_khronos_validation");
+    let spirv_val = on_path(folders, "spirv-val");
+    match (driver, layer, spirv_val) {
+        (Some(driver), Some(layer), Some(spirv_val)) => Ok(Parts { driver, layer, spirv_val }),
+        (driver, layer, spirv_val) => {
+            let missing = [
+                driver.is_none().then_some("lavapipe"),
+                layer.is_none().then_some("the validation layer"),
+                spirv_val.is_none().then_some("spirv-val"),
+            ];
+            Err(missing.into_iter().flatten().collect::<Vec<_>>().join(", "))
+        }
+    }
+}
+
+fn on_path(folders: &[PathBuf], program: &str) -> Option<PathBuf> {
+    folders.iter().map(|folder| folder.join(program)).find(|file| file.is_file())
+}
+
+/// Installs the packages where that needs no question: as root, with apt. Says whether it did.
+fn install(folders: &[PathBuf], missing: &str) -> Result<bool, String> {
+    let root = Command::new("id").arg("-u").output().is_ok_and(|o| o.stdout.trim_ascii() == b"0");
+    let Some(apt) = on_path(folders, "apt-get").filter(|_| root) else { return Ok(false) };
+    println!("missing: {missing}\n$ {}", command());
+    let steps: [&[&str]; 2] = [&["update", "-qq"], &["install", "-qq", "-y", "--no-install-recommends"]];
+    for (step, packages) in steps.into_iter().zip([&[][..], &PACKAGES]) {
+        let mut command = Command::new(&apt);
+        let ran = command.args(step).args(packages).env("DEBIAN_FRONTEND", "noninteractive").status();
+        if !ran.is_ok_and(|status| status.success()) {
+            eprintln!("apt-get {} failed", step[0]);
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+fn command() -> String {
+    format!("apt-get update && apt-get install -y --no-install-recommends {}", PACKAGES.join(" "))
+}
+
+/// Without the parts nothing is tested: said by name, and no success where everything must be.
+fn without(missing: &str, ci: bool) -> Outcome {
+    let said = format!("missing: {missing}; install with `{}`", command());
+    if ci { Err(said) } else { Ok(format!("vulkan: SKIPPED, {said}")) }
+}
+
+fn check_modules(repo: &Repo, spirv_val: &Path) -> Result<usize, String> {
+    let modules: Vec<&str> = repo.files.iter().map(|f| f.path.as_str()).filter(|p| p.ends_with(".spv")).collect();
+    for module in &modules {
+        let ran = Command::new(spirv_val).args(["--target-env", "vulkan1.1"]).arg(repo.root.join(module)).output();
+        let ran = ran.map_err(|e| format!("spirv-val: {e}"))?;
+        if !ran.status.success() {
+            return Err(format!("{module}: {}", String::from_utf8_lossy(&ran.stderr)));
+        }
+    }
+    if modules.is_empty() { Err("no modules under shaders/spirv".to_owned()) } else { Ok(modules.len()) }
+}
+
+fn conformance(repo: &Repo, driver: &Path, executor: &str, validation: &str) -> Result<(), String> {
+    let line = "test --package gpu-conformance --features driver";
+    println!("$ cargo {line} (gpu-{executor}, {validation} validation)");
+    let program = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let runtime = std::env::var_os("XDG_RUNTIME_DIR").unwrap_or_else(|| std::env::temp_dir().into());
+    let ran = Command::new(program)
+        .args(line.split(' '))
+        .current_dir(&repo.root)
+        // Two names for the one variable: loaders before 1.3.207 know the second alone.
+        .env("VK_DRIVER_FILES", driver)
+        .env("VK_ICD_FILENAMES", driver)
+        .env("XDG_RUNTIME_DIR", runtime)
+        .env("ORGANZA_EXECUTOR", executor)
+        .env("ORGANZA_ADAPTER", "llvmpipe")
+        .env("ORGANZA_VALIDATION", validation)
+        .status();
+    match ran {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => Err(format!("`cargo {line}` by gpu-{executor} under {validation} validation: {status}")),
+        Err(e) => Err(format!("`cargo {line}` did not start: {e}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_missing_is_named() {
+        let missing = find(&["no/such/root".into()], &["no/such/folder".into()]);
+        assert_eq!(missing, Err("lavapipe, the validation layer, spirv-val".to_owned()));
+    }
+
+    #[test]
+    fn a_missing_part_is_a_failure_only_where_everything_must_run() {
+        let said = without("lavapipe", false).expect("a skip is no failure");
+        assert!(said.starts_with("vulkan: SKIPPED, missing: lavapipe; install with `apt-get update"), "{said}");
+        assert!(without("lavapipe", true).is_err());
+    }
+
+    #[test]
+    fn parts_are_found_where_they_announce_themselves() {
+        let root = std::env::temp_dir().join(format!("organza-vulkan-{}", std::process::id()));
+        let write = |path: &str| {
+            let file = root.join(path);
+            std::fs::create_dir_all(file.parent().expect("invariant: below the root")).expect("a folder");
+            std::fs::write(file, "").expect("a file");
+        };
+        ["icd.d/intel_icd.json", "icd.d/lvp_icd.x86_64.json", "explicit_layer.d/VkLayer_khronos_validation.json"]
+            .into_iter()
+            .for_each(write);
+        let roots = [root.clone()];
+        assert_eq!(find(&roots, &roots), Err("spirv-val".to_owned()));
+        write("spirv-val");
+        let parts = find(&roots, &roots).expect("all there");
+        assert_eq!(parts.driver, root.join("icd.d/lvp_icd.x86_64.json"));
+        std::fs::remove_dir_all(&root).expect("made above");
+    }
+}
