@@ -119,6 +119,53 @@ fn bi24_x5_numbers_that_are_not_finite_are_refused_everywhere() {
 }
 
 #[test]
+fn sources_of_fields_are_checked_at_their_place() {
+    let b = "volume = \"b.nii\"\ntransfer = [{ value = 0, color = [1, 1, 1], extinction = 0 }, \
+             { value = 9, color = [1, 0, 0], extinction = 2.5 }]";
+    let cases = [
+        ("isosurface = { volume = \"b.nii\", levle = 3 }", "16:34: unknown key `levle`"),
+        ("isosurface = { volume = \"b.nii\" }", "expected a key `level` here"),
+        (
+            "isosurface = { volume = \"b.nii\", level = 1, interpolation = \"cubic\" }",
+            "expected one of \"trilinear\", \"catmull-rom\"",
+        ),
+        ("isosurface = { volume = \"b.nii\", level = 1, inside = \"up\" }", "expected one of \"above\", \"below\""),
+        ("isosurface = { volume = \"../../b.nii\", level = 1 }", "lies outside the scene's root folder"),
+        ("level_set = { points = \"b.ply\", tolerance = 0 }", "16:43: `tolerance`: expected a number above 0, up to 1"),
+        ("slice = { volume = \"b.nii\", center = [0, 0, 0], normal = [0, 0, 1] }", "a slice needs a key `transfer`"),
+        (
+            "slice = { volume = \"b.nii\", center = [0, 0, 0], normal = [0, 0, 0] }\ntransfer = [{ value = 0, color = [1, 1, 1] }]",
+            "16:60: `normal`: expected a direction",
+        ),
+        (
+            "slice = { volume = \"b.nii\", center = [0, 0, 0], normal = [0, 0, 1] }\n\
+             transfer = [{ value = 0, color = [1, 1, 1], extinction = 1 }]",
+            "a slice has no extinction",
+        ),
+        ("mesh = \"b.ply\"\nclip = [{ box = [[0, 0, 0], [1, 1, 1]] }]", "17:8: `clip` belongs to an `implicit`"),
+        (
+            "isosurface = { volume = \"b.nii\", level = 1 }\nclip = [{ normal = [0, 1, 0] }]",
+            "17:9: expected either `normal` and `point`, or `box`",
+        ),
+        (
+            "isosurface = { volume = \"b.nii\", level = 1 }\nclip = [{ box = [[0, 0, 0], [1, 0, 1]] }]",
+            "expected a highest corner above the lowest",
+        ),
+        (
+            "cloud = { ellipsoids = [{ center = [0, 0, 0], radii = [1, 1, 1] }], octaves = 0, spacing = 0.1, extinction = 1 }",
+            "`octaves`: expected a whole number from 1 to 16, found 0",
+        ),
+        (
+            "cloud = { ellipsoids = [{ center = [0, 0, 0], radii = [1, 1, 1] }], frequency = 0, spacing = 0.1, extinction = 1 }",
+            "`frequency`: expected a number above 0",
+        ),
+    ];
+    for (source, expected) in cases {
+        refused(b, source, expected);
+    }
+}
+
+#[test]
 fn bi22_numbers_out_of_range_name_the_range() {
     refused("opacity = 0.3", "opacity = 1.0001", "19:11: `opacity`: expected a number from 0 to 1, found 1.0001");
     refused("opacity = 0.3", "color = [-1, 0, 0]", "19:10: `color`: expected numbers from 0 to 1e30, found -1");

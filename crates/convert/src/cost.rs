@@ -26,7 +26,7 @@ use splat_core::{
 };
 
 /// Splats of a zero set over its area over h²: cells of √2·h make two triangles each, whose pieces are smaller than h².
-const ZERO_SET_EXCESS: f64 = 2.0;
+pub const ZERO_SET_EXCESS: f64 = 2.0;
 
 /// Points along the longest side of the lattice that a field is looked at on.
 const COARSE: f64 = 32.0;

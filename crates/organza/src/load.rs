@@ -1,19 +1,33 @@
 //! The objects of a scene become one cloud in canonical order, with its tables.
 
+pub(crate) mod bounded;
+mod context;
+pub(crate) mod input;
 pub(crate) mod object;
+pub(crate) mod own;
+mod slice;
 
-use crate::scene::Scene;
-use crate::{Error, Progress, RenderOptions, normalize::normalize};
+use crate::plan::{ParticleSource, PlannedSampler, pass, samplers};
+use crate::scene::{Scene, SceneObject, Technique};
+use crate::statistics::{LightStatistics, ObjectStatistics};
+use crate::{CostRecord, Error, Progress, RenderOptions, normalize::normalize};
+use context::Context;
 use convert::cost::Prediction;
 use glam::DVec3;
+use object::Prepared;
+use own::Own;
 use splat_core::{Camera, Cloud, FootprintStack, Light, Material, Object};
 use std::cmp::Ordering;
 
 /// A scene in memory, normalized by a power of two (see [`Loaded::exponent`]) and ready for a technique.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub struct Loaded {
-    /// All splats in canonical order.
+    /// All splats in canonical order; also of translucent objects in `own`, which are not drawn, if they may cast shadows.
     pub cloud: Cloud,
+    /// Translucent objects that particles are sampled from as they are; none for the technique `points`.
+    pub(crate) own: Vec<Own>,
+    /// What the planner was told of every visible object.
+    pub(crate) statistics: Vec<ObjectStatistics>,
     /// Materials by id.
     pub materials: Vec<Material>,
     /// Objects by id.
@@ -75,19 +89,52 @@ fn scaled_thickness(scene: &Scene, exponent: i32) -> Option<f64> {
 /// # Errors
 /// See [`crate::render`].
 pub fn load(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Loaded, Error> {
+    load_measured(scene, options, progress, &mut CostRecord::default())
+}
+
+/// [`load`] with entries in the cost record: reading, and conversion where something is converted.
+pub(crate) fn load_measured(
+    scene: &Scene,
+    options: &RenderOptions,
+    progress: &Progress,
+    cost: &mut CostRecord,
+) -> Result<Loaded, Error> {
+    let loading = Loading { scene, options, progress };
     let mut warnings = Vec::new();
-    let (clouds, splats) = clouds(scene, options, progress, &mut warnings)?;
-    let mut cloud = merge(clouds);
-    if cloud.is_empty() {
+    let mut prepared = cost.measure(pass::READ, |stage| {
+        let prepared = loading.prepare()?;
+        stage.items_in = prepared.len() as u64;
+        stage.items_out = stage.items_in;
+        stage.bytes = prepared.iter().map(|p| p.input.bytes()).sum();
+        Ok::<_, Error>(prepared)
+    })?;
+    let (mut lights, casts) = lights(scene);
+    let statistics: Vec<ObjectStatistics> = loading.statistics(&prepared);
+    let planned = loading.samplers(&statistics, &light_statistics(&lights, &casts));
+    let mut splats = loading.counts(&prepared, &planned)?;
+    let mut own = loading.own(&mut prepared, &planned, &mut warnings)?;
+    let converted = planned.iter().filter(|p| p.splats.is_some()).count();
+    let mut cloud = Cloud::default();
+    if converted > 0 || own.is_empty() {
+        cloud = cost.measure(pass::CONVERT, |stage| {
+            let cloud = merge(loading.clouds(prepared, &planned, &own, &mut splats, &mut warnings)?);
+            stage.items_in = converted as u64;
+            stage.items_out = cloud.len() as u64;
+            stage.bytes = cloud.bytes();
+            Ok::<_, Error>(cloud)
+        })?;
+    }
+    if cloud.is_empty() && own.is_empty() {
         warnings.push("the scene has no splats: only the background is drawn".into());
     }
     let mut camera = scene.camera;
-    let (mut lights, casts) = lights(scene);
-    let exponent = normalize(&mut cloud, &mut camera, &mut lights);
+    let exponent = normalize(&mut cloud, &mut own, &mut camera, &mut lights);
     cloud.canonicalize();
     cloud.validate().map_err(|e| Error::Internal(e.to_string()))?;
     Ok(Loaded {
         cloud,
+        own,
+        statistics,
         materials: scene.materials.iter().map(|m| m.material).collect(),
         objects: scene.objects.iter().map(object::entry).collect(),
         footprints: scene.footprints.clone(),
@@ -95,50 +142,135 @@ pub fn load(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Resu
         lights,
         casts,
         slice_thickness: scaled_thickness(scene, exponent),
-        normals: scene.objects.iter().any(|o| o.visible && object::needs_gradients(o, scene)),
+        normals: scene.objects.iter().any(|o| o.visible && context::needs_gradients(o, scene)),
         exponent,
         splats,
         warnings,
     })
 }
 
-/// The clouds of all visible objects. First every object is read and its splats are counted, so that a scene that does
-/// not fit is refused before anything is converted.
-fn clouds(
-    scene: &Scene,
-    options: &RenderOptions,
-    progress: &Progress,
-    warnings: &mut Vec<String>,
-) -> Result<(Vec<Cloud>, Vec<SplatCount>), Error> {
-    let context = |id, used, made| object::Context { scene, options, progress, id, used, made };
-    let visible = || scene.objects.iter().enumerate().filter(|(_, object)| object.visible);
-    progress.add_total(visible().count() as u64);
-    let mut prepared = Vec::new();
-    let (mut splats, mut held) = (Vec::new(), 0);
-    for (id, object) in visible() {
-        progress.tick(1).map_err(|_| Error::Cancelled)?;
-        let one = object::prepare(object, &context(id, 0, 0))?;
-        splats.push(SplatCount::predicted(&object.name, &one.prediction));
-        held += one.bytes();
-        check_total(scene, options, held, &splats)?;
-        prepared.push((id, object, one));
+/// What the planner asks of all lights.
+pub(crate) fn light_statistics(lights: &[Light], casts: &[bool]) -> Vec<LightStatistics> {
+    lights.iter().zip(casts).map(|(l, casts)| LightStatistics::of_light(l, *casts)).collect()
+}
+
+/// What loading reads.
+struct Loading<'a> {
+    scene: &'a Scene,
+    options: &'a RenderOptions,
+    progress: &'a Progress,
+}
+
+impl<'a> Loading<'a> {
+    fn visible(&self) -> impl Iterator<Item = (usize, &'a SceneObject)> + use<'a> {
+        self.scene.objects.iter().enumerate().filter(|(_, object)| object.visible)
     }
-    let mut clouds: Vec<Cloud> = Vec::new();
-    for ((id, object, one), count) in prepared.into_iter().zip(&mut splats) {
-        let used = clouds.iter().map(Cloud::bytes).sum();
-        let made = clouds.iter().map(|c| c.len() as u64).sum();
-        let cloud = object::convert(one, object, &context(id, used, made), warnings)?;
-        count.made = cloud.len() as u64;
-        clouds.push(cloud);
+
+    fn context(&self, id: usize, used: u64, made: u64) -> Context<'a> {
+        Context { scene: self.scene, options: self.options, progress: self.progress, id, used, made }
     }
-    Ok((clouds, splats))
+
+    fn particles(&self) -> bool {
+        self.scene.render.technique == Technique::Particles
+    }
+
+    /// Reads every object and counts its splats, so that a scene that does not fit is refused before anything is
+    /// converted.
+    fn prepare(&self) -> Result<Vec<Prepared<'a>>, Error> {
+        self.progress.add_total(self.visible().count() as u64);
+        let one = |(id, object): (usize, &'a SceneObject)| {
+            self.progress.tick(1).map_err(|_| Error::Cancelled)?;
+            object::prepare(object, &self.context(id, 0, 0), self.particles())
+        };
+        self.visible().map(one).collect()
+    }
+
+    fn statistics(&self, prepared: &[Prepared<'_>]) -> Vec<ObjectStatistics> {
+        let one =
+            |((id, object), p): ((usize, &SceneObject), &Prepared<'_>)| p.statistics(object, &self.context(id, 0, 0));
+        self.visible().zip(prepared).map(one).collect()
+    }
+
+    /// For the technique `points`, everything becomes splats.
+    fn samplers(&self, objects: &[ObjectStatistics], lights: &[LightStatistics]) -> Vec<PlannedSampler> {
+        let mut planned = samplers(objects, lights);
+        if !self.particles() {
+            planned.iter_mut().for_each(|p| (p.source, p.splats) = (ParticleSource::Splats, Some("they are drawn")));
+        }
+        planned
+    }
+
+    /// Splats to be made; refuses those that do not fit.
+    fn counts(&self, prepared: &[Prepared<'_>], planned: &[PlannedSampler]) -> Result<Vec<SplatCount>, Error> {
+        let (mut splats, mut held): (Vec<SplatCount>, u64) = (Vec::new(), 0);
+        for ((object, p), plan) in self.visible().map(|v| v.1).zip(prepared).zip(planned) {
+            let mut count = SplatCount::predicted(&object.name, &p.prediction);
+            if plan.splats.is_none() {
+                (count.predicted, count.exact) = (0, true);
+            }
+            splats.push(count);
+            held += p.input.bytes();
+            check_total(self.scene, self.options, held, &splats)?;
+        }
+        Ok(splats)
+    }
+
+    /// The objects that are sampled from their own data.
+    fn own(
+        &self,
+        prepared: &mut [Prepared<'_>],
+        planned: &[PlannedSampler],
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<Own>, Error> {
+        let mut all = Vec::new();
+        for (((id, _), p), plan) in self.visible().zip(prepared).zip(planned) {
+            if !plan.source.is_own() {
+                continue;
+            }
+            let own = Own::new(p, plan.source, &self.context(id, 0, 0))?;
+            if own.is_none() {
+                let name = crate::escape_controls(&self.scene.objects[id].name);
+                warnings.push(format!("object '{name}' has no particles: nothing of it was found"));
+            }
+            all.extend(own);
+        }
+        Ok(all)
+    }
+
+    /// The clouds of all objects that become splats.
+    fn clouds(
+        &self,
+        prepared: Vec<Prepared<'_>>,
+        planned: &[PlannedSampler],
+        own: &[Own],
+        splats: &mut [SplatCount],
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<Cloud>, Error> {
+        let mut clouds: Vec<Cloud> = Vec::new();
+        let held: u64 = own.iter().map(Own::bytes).sum();
+        for ((((id, object), p), plan), count) in self.visible().zip(prepared).zip(planned).zip(splats) {
+            if plan.splats.is_none() {
+                continue;
+            }
+            let used = held + clouds.iter().map(Cloud::bytes).sum::<u64>();
+            let made = clouds.iter().map(|c| c.len() as u64).sum();
+            let of = own.iter().find(|o| o.object == id);
+            let cloud = object::convert(&p, of, &self.context(id, used, made), warnings)?;
+            if cloud.is_empty() {
+                warnings.push(format!("object '{}' has no splats", crate::escape_controls(&object.name)));
+            }
+            count.made = cloud.len() as u64;
+            clouds.push(cloud);
+        }
+        Ok(clouds)
+    }
 }
 
 /// Refuses a scene whose objects together make too many splats for the memory beside the inputs, of `held` bytes, or for
 /// the scene's own limit. Estimates count half, so that nothing is refused that would fit.
 fn check_total(scene: &Scene, options: &RenderOptions, held: u64, splats: &[SplatCount]) -> Result<(), Error> {
     let needed: u64 = splats.iter().map(|s| if s.exact { s.predicted } else { s.predicted / 2 }).sum();
-    let fits = options.max_memory.saturating_sub(held) / object::BYTES_PER_SPLAT;
+    let fits = options.max_memory.saturating_sub(held) / context::BYTES_PER_SPLAT;
     let limit = scene.render.max_points.map_or(fits, |asked| asked.min(fits));
     if needed <= limit {
         return Ok(());

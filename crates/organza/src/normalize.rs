@@ -1,18 +1,19 @@
 //! Scenes of any size become scenes of size one, by a power of two, so that squares of lengths neither overflow nor vanish
 //! in f32 and a scene scaled by a power of two gives the same picture bit by bit.
 
+use crate::load::own::Own;
 use glam::DVec3;
 use splat_core::{Camera, Cloud, Light, LightShape, Projection};
 
-/// Scales everything by 2^−e, where 2^e is the size of the splats' bounds, and returns e.
+/// Scales everything by 2^−e, where 2^e is the size of the bounds of all splats and objects, and returns e.
 ///
 /// Lengths scale with 2^−e, cross-sections and point intensities with 2^−2e; directional irradiance stays.
-pub(crate) fn normalize(cloud: &mut Cloud, camera: &mut Camera, lights: &mut [Light]) -> i32 {
-    let diagonal = cloud.bounds().diagonal();
+pub(crate) fn normalize(cloud: &mut Cloud, own: &mut [Own], camera: &mut Camera, lights: &mut [Light]) -> i32 {
+    let diagonal = diagonal(cloud, own);
     if !(diagonal.is_finite() && diagonal > 0.0) {
         return 0;
     }
-    let exponent = f64::from(diagonal).log2().floor() as i32;
+    let exponent = diagonal.log2().floor() as i32;
     let scale = f64::from(exponent).exp2().recip();
     let (length, area) = (scale as f32, (scale * scale) as f32);
     cloud.origin *= scale;
@@ -20,6 +21,7 @@ pub(crate) fn normalize(cloud: &mut Cloud, camera: &mut Camera, lights: &mut [Li
     cloud.radius.iter_mut().for_each(|r| *r *= length);
     cloud.tangent.iter_mut().for_each(|t| *t *= length);
     cloud.cross_section.iter_mut().for_each(|k| *k *= area);
+    own.iter_mut().for_each(|o| o.scale_world(scale));
     camera.position *= scale;
     if let Projection::Orthographic { height } = &mut camera.projection {
         *height *= scale;
@@ -35,4 +37,16 @@ pub(crate) fn normalize(cloud: &mut Cloud, camera: &mut Camera, lights: &mut [Li
         }
     }
     exponent
+}
+
+/// Of the bounds of all splats and objects.
+fn diagonal(cloud: &Cloud, own: &[Own]) -> f64 {
+    let bounds = cloud.bounds();
+    if own.is_empty() {
+        return f64::from(bounds.diagonal());
+    }
+    let splats = (!bounds.is_empty()).then(|| [bounds.min, bounds.max].map(|p| cloud.origin + p.as_dvec3()));
+    let boxes = own.iter().map(Own::world_box).chain(splats);
+    let all = boxes.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]);
+    all.map_or(0.0, |[low, high]| (high - low).length())
 }

@@ -15,7 +15,7 @@ use crate::points::Drawing;
 use crate::{Error, RenderOptions, Sets};
 pub(crate) use checkpoint::Checkpoint;
 use ensemble::{accumulate, error_layer, fold};
-use parts::parts;
+use parts::{parts, sources};
 use pbsr::Occluder;
 use splat_core::raster::{self, Background, OpaqueImage};
 use splat_core::shade::ChannelLayout;
@@ -28,12 +28,14 @@ pub(crate) fn draw(
     options: &RenderOptions,
     checkpoint: Option<&mut Checkpoint>,
     cost: &mut CostRecord,
+    warnings: &mut Vec<String>,
 ) -> Result<(Layers, Option<Sets>), Error> {
     let maps = drawing.shadow_maps(cost)?;
     let camera = drawing.sample_camera();
     let layout = ChannelLayout::new(&drawing.layers);
     let opaque = opaque(drawing, &maps, &camera, cost)?;
-    let parts = parts(drawing, &camera);
+    let sources = sources(drawing, &camera);
+    let parts = parts(&sources, warnings)?;
     let mut accumulator = Accumulator::new(camera.size, 1, layout.count(), false, false);
     let wanted = drawing.settings.layers.names().any(|name| name == "std_error");
     let (mut std_error, mut sets) = (Vec::new(), None);
@@ -41,7 +43,7 @@ pub(crate) fn draw(
         let occluder = occluder(&opaque, &layout);
         let average = cost.measure(pass::PARTICLES, |stage| {
             let average = fold(drawing, &parts, &maps, &camera, occluder.as_ref(), options, checkpoint)?;
-            stage.items_in = parts.iter().map(|p| p.cloud.len() as u64).sum();
+            stage.items_in = parts.len() as u64;
             stage.items_out = average.particles;
             stage.bytes = average.ensemble.bytes();
             Ok::<_, Error>(average)
@@ -86,6 +88,8 @@ fn opaque(
         footprints: all.footprints.clone(),
         lights: all.lights.clone(),
         casts: all.casts.clone(),
+        own: Vec::new(),
+        statistics: Vec::new(),
         splats: Vec::new(),
         warnings: Vec::new(),
         ..*all

@@ -4,6 +4,10 @@
 //! could differ with it; their sum stays below the tolerance. A pass that is not in the plan does not run, and its buffers
 //! are not allocated: the cost record shows it.
 
+mod samplers;
+
+pub use samplers::{ParticleSource, PlannedSampler, samplers};
+
 use crate::statistics::{LightStatistics, Statistics};
 
 /// One effect of the scene: simulated or not, and why.
@@ -41,10 +45,14 @@ pub struct Plan {
     pub optical_depth_planes: usize,
     /// For each light: whether it gets a shadow map.
     pub shadow_maps: Vec<bool>,
+    /// Where the particles of each visible object come from; empty for the technique `points`.
+    pub samplers: Vec<PlannedSampler>,
 }
 
 /// Names of the passes, shared by the plan and the cost record.
 pub mod pass {
+    /// Files are read, and what they will become is counted.
+    pub const READ: &str = "read";
     /// Files and fields become splats.
     pub const CONVERT: &str = "convert";
     /// A shadow map is built.
@@ -59,7 +67,7 @@ pub mod pass {
     pub const OPAQUE: &str = "opaque";
     /// Translucent splats are composited.
     pub const SPLAT: &str = "splat";
-    /// Translucent splats become particles, which are projected and averaged.
+    /// Translucent objects become particles, which are projected and averaged.
     pub const PARTICLES: &str = "particles";
     /// Samples become pixels and layers.
     pub const FINISH: &str = "finish";
@@ -83,6 +91,9 @@ pub fn plan(statistics: &Statistics) -> Plan {
     plan.effects.push(translucency(statistics));
     plan.effects.push(opaque_surfaces(statistics));
     plan.effects.push(kept_layers(statistics));
+    if statistics.particles {
+        plan.samplers = samplers(&statistics.objects, &statistics.lights);
+    }
     plan.optical_depth_planes = if statistics.colored_extinction { 3 } else { 1 };
     plan.passes = passes(statistics, &plan.shadow_maps);
     plan
@@ -134,12 +145,21 @@ fn normals(statistics: &Statistics) -> Effect {
 }
 
 fn translucency(statistics: &Statistics) -> Effect {
-    let n = statistics.translucent;
-    if n > 0 {
-        let how = if statistics.particles { "become particles" } else { "are composited in order" };
-        effect("translucency", true, format!("{n} translucent splats {how}"))
-    } else {
-        effect("translucency", false, "no splat is translucent: nothing to sort")
+    let how = if statistics.particles { "become particles" } else { "are composited in order" };
+    match translucent(statistics) {
+        Some(what) => effect("translucency", true, format!("{what} {how}")),
+        None => effect("translucency", false, "nothing is translucent: nothing to sort"),
+    }
+}
+
+/// What is translucent, in words.
+fn translucent(statistics: &Statistics) -> Option<String> {
+    let own = statistics.own();
+    match (statistics.translucent, own) {
+        (0, 0) => None,
+        (n, 0) => Some(format!("{n} translucent splats")),
+        (0, own) => Some(format!("{own} translucent objects by their own data")),
+        (n, own) => Some(format!("{n} translucent splats and {own} translucent objects by their own data")),
     }
 }
 
@@ -161,15 +181,19 @@ fn kept_layers(statistics: &Statistics) -> Effect {
 }
 
 fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<PlannedPass> {
-    let (translucent, opaque, particles) = (statistics.translucent, statistics.opaque, statistics.particles);
+    let (opaque, particles) = (statistics.opaque, statistics.particles);
+    let translucent = translucent(statistics);
     let mut passes = Vec::new();
     let mut pass = |name: &str, reason: String| passes.push(PlannedPass { name: name.into(), reason });
-    pass(pass::CONVERT, format!("{} splats", translucent + opaque));
+    pass(pass::READ, "the objects' data".into());
+    if statistics.splats > 0 || statistics.own() == 0 {
+        pass(pass::CONVERT, format!("{} splats", statistics.splats));
+    }
     for (i, _) in shadow_maps.iter().enumerate().filter(|(_, on)| **on) {
         pass(pass::SHADOW_MAP, format!("light {i}"));
     }
-    if translucent > 0 && !particles {
-        pass(pass::SORT, format!("{translucent} translucent splats"));
+    if let (Some(what), false) = (&translucent, particles) {
+        pass(pass::SORT, what.clone());
     }
     // Particles are projected and shaded one by one in their own pass.
     let which = if particles { "opaque" } else { "all" };
@@ -180,8 +204,8 @@ fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<PlannedPass> {
     if opaque > 0 {
         pass(pass::OPAQUE, format!("{opaque} opaque splats"));
     }
-    if translucent > 0 {
-        pass(if particles { pass::PARTICLES } else { pass::SPLAT }, format!("{translucent} translucent splats"));
+    if let Some(what) = translucent {
+        pass(if particles { pass::PARTICLES } else { pass::SPLAT }, what);
     }
     pass(pass::FINISH, "samples become pixels".into());
     passes

@@ -1,13 +1,13 @@
 //! From a scene to images: load, plan, draw.
 
-use crate::load::{Loaded, SplatCount, load};
+use crate::load::{Loaded, SplatCount, light_statistics, load_measured};
 use crate::particles::{self, Checkpoint};
-use crate::plan::{Plan, pass, plan};
+use crate::plan::{Plan, plan};
 use crate::points::{self, Drawing};
 use crate::scene::{Scene, Technique};
-use crate::statistics::{LightStatistics, Statistics};
+use crate::statistics::Statistics;
 use crate::{CostRecord, Error, Layers, Progress};
-use splat_core::{LayerData, LayerSet};
+use splat_core::{LayerData, LayerSet, Material};
 use std::path::PathBuf;
 
 /// What a render may take and how it treats doubtful input.
@@ -81,9 +81,9 @@ pub fn render(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Re
     let open = |path: &PathBuf| Checkpoint::open(path, scene, options);
     let mut checkpoint = options.checkpoint.as_ref().map(open).transpose()?;
     let (loaded, explanation) = prepare(scene, options, progress)?;
-    let Explanation { plan, mut cost, warnings, .. } = explanation;
+    let Explanation { plan, mut cost, mut warnings, .. } = explanation;
     let drawing = drawing(scene, &loaded, &plan, options, progress);
-    let (layers, sets) = draw(scene, &drawing, options, checkpoint.as_mut(), &mut cost)?;
+    let (layers, sets) = draw(scene, &drawing, options, checkpoint.as_mut(), &mut cost, &mut warnings)?;
     Ok(Render { layers, cost, plan, sets, warnings })
 }
 
@@ -97,7 +97,7 @@ pub(crate) fn draw_loaded(
     cost: &mut CostRecord,
 ) -> Result<Layers, Error> {
     let drawing = drawing(scene, loaded, plan, options, progress);
-    match draw(scene, &drawing, options, None, cost)? {
+    match draw(scene, &drawing, options, None, cost, &mut Vec::new())? {
         (_, Some(Sets { interrupted: true, .. })) => Err(Error::Cancelled),
         (layers, _) => Ok(layers),
     }
@@ -109,11 +109,12 @@ fn draw(
     options: &RenderOptions,
     checkpoint: Option<&mut Checkpoint>,
     cost: &mut CostRecord,
+    warnings: &mut Vec<String>,
 ) -> Result<(Layers, Option<Sets>), Error> {
     drawing.progress.add_total(drawing.plan.passes.len() as u64);
     let (mut layers, sets) = match scene.render.technique {
         Technique::Auto | Technique::Points => (points::draw(drawing, cost)?, None),
-        Technique::Particles => particles::draw(drawing, options, checkpoint, cost)?,
+        Technique::Particles => particles::draw(drawing, options, checkpoint, cost, warnings)?,
     };
     restore_depths(&mut layers, drawing.loaded.exponent);
     scene.render.layers.keep(&mut layers);
@@ -152,13 +153,7 @@ fn prepare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Resul
     let mut cost = CostRecord::default();
     check_memory("the image", image_bytes(scene), options.max_memory)?;
     check_samples(scene)?;
-    let loaded = cost.measure(pass::CONVERT, |stage| {
-        let loaded = load(scene, options, progress)?;
-        stage.items_in = scene.objects.iter().filter(|o| o.visible).count() as u64;
-        stage.items_out = loaded.cloud.len() as u64;
-        stage.bytes = loaded.cloud.bytes();
-        Ok::<_, Error>(loaded)
-    })?;
+    let loaded = load_measured(scene, options, progress, &mut cost)?;
     let (plan, memory) = plan_loaded(scene, &loaded, options)?;
     let (splats, warnings) = (loaded.splats.clone(), loaded.warnings.clone());
     Ok((loaded, Explanation { plan, cost, memory, splats, warnings }))
@@ -168,12 +163,18 @@ fn prepare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Resul
 pub(crate) fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Result<(Plan, u64), Error> {
     check_samples(scene)?;
     let mut statistics = Statistics::of_cloud(&loaded.cloud, &loaded.materials, &loaded.objects, &loaded.footprints);
-    statistics.lights =
-        loaded.lights.iter().zip(&loaded.casts).map(|(l, casts)| LightStatistics::of_light(l, *casts)).collect();
+    statistics.lights = light_statistics(&loaded.lights, &loaded.casts);
     statistics.normals_needed = loaded.normals;
     statistics.layers = scene.render.layers.names().map(str::to_owned).collect();
     statistics.tolerance = scene.render.tolerance;
     statistics.particles = scene.render.technique == Technique::Particles;
+    if statistics.particles {
+        let made: Vec<u64> = loaded.splats.iter().map(|s| s.made).collect();
+        statistics = statistics.with_objects(loaded.statistics.clone(), &made);
+        let materials = loaded.own.iter().map(|o| &loaded.materials[scene.objects[o.object].material]);
+        let unequal = |m: &Material| m.extinction_rgb.iter().any(|e| *e != m.extinction_rgb[0]);
+        statistics.colored_extinction |= materials.into_iter().any(unequal);
+    }
     if statistics.particles && statistics.colored_extinction {
         let what = "particles hide all colours alike: a material absorbs red, green and blue unequally";
         return Err(Error::input(crate::printable(&scene.file), what, "use technique = \"points\""));

@@ -10,6 +10,7 @@
 
 mod animation;
 mod check;
+mod check_field;
 mod check_light;
 mod check_material;
 mod check_object;
@@ -31,7 +32,8 @@ pub use layer_choice::{LAYER_NAMES, LayerChoice};
 pub use lights::{LightSource, SceneLight};
 pub use load::{LoadOptions, MAX_SCENE_BYTES, MAX_SCENE_DEPTH, load, parse, schema};
 pub use model::{
-    CloudSource, DensitySource, ImplicitSource, MediumShape, ParticlesSettings, PointsSettings, RectangleSource,
-    RenderSettings, Scene, SceneMaterial, SceneObject, ShadowMapping, ShadowSettings, Source, Technique, VolumeSource,
+    CloudSource, DensitySource, ImplicitSource, IsosurfaceSource, LevelSetSource, MediumShape, ParticlesSettings,
+    PointsSettings, RectangleSource, RenderSettings, Scene, SceneMaterial, SceneObject, ShadowMapping, ShadowSettings,
+    SliceSource, Source, Technique, VolumeSource,
 };
 pub use overrides::Override;

@@ -1,5 +1,6 @@
 //! Statistics of a loaded scene, from which the plan is made.
 
+use crate::plan::{PlannedSampler, samplers};
 use splat_core::{Cloud, FootprintStack, Light, Material, Object, Shading, SplatKind};
 
 /// What the planner knows of one light.
@@ -11,10 +12,55 @@ pub struct LightStatistics {
     pub is_dark: bool,
 }
 
+/// What an object is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ObjectData {
+    /// Raw points.
+    Points,
+    /// Triangles.
+    Triangles,
+    /// The zero set of a field.
+    Surface {
+        /// Cells of a lattice that may hold the surface by the field's bound, over its area in cells: 2 to 3 for a tight
+        /// bound; infinite without a bound, 0 where a first look finds no surface.
+        looseness: f64,
+    },
+    /// Extinction on a lattice.
+    Volume,
+    /// A field of extinction.
+    Density {
+        /// Whether it has a bound everywhere.
+        bounded: bool,
+    },
+}
+
+/// What the planner knows of one visible object before anything is converted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ObjectStatistics {
+    /// Its name.
+    pub name: String,
+    /// What it is made of.
+    pub data: ObjectData,
+    /// Whether it is an opaque surface.
+    pub opaque: bool,
+    /// Whether the gradients of its values shade it or fill a layer.
+    pub by_gradient: bool,
+    /// Whether it could cast a shadow.
+    pub casts: bool,
+    /// Whether it could receive a shadow.
+    pub receives: bool,
+    /// Splats that it would become, as predicted.
+    pub splats: u64,
+}
+
 /// What the planner knows of a scene.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Statistics {
-    /// Translucent splats: media and surfaces.
+    /// Visible objects, where the technique asks how each is sampled.
+    pub objects: Vec<ObjectStatistics>,
+    /// All splats.
+    pub splats: u64,
+    /// Translucent splats that are drawn: media and surfaces.
     pub translucent: u64,
     /// Opaque splats.
     pub opaque: u64,
@@ -44,7 +90,7 @@ impl Statistics {
     /// Counts over the splats and their tables; lights, layers and tolerance are the caller's.
     pub fn of_cloud(cloud: &Cloud, materials: &[Material], objects: &[Object], footprints: &FootprintStack) -> Self {
         let norms: Vec<f64> = footprints.layers().iter().map(|f| f.norm()).collect();
-        let mut s = Self::default();
+        let mut s = Self { splats: cloud.len() as u64, ..Self::default() };
         for i in 0..cloud.len() {
             let object = &objects[cloud.object[i] as usize];
             let material = &materials[cloud.material[i] as usize];
@@ -65,6 +111,26 @@ impl Statistics {
             s.colored_extinction |= !opaque && (r != g || g != b);
         }
         s
+    }
+
+    /// Objects that are sampled from their own data.
+    pub fn own(&self) -> u64 {
+        let own = |o: &&PlannedSampler| o.source.is_own();
+        samplers(&self.objects, &self.lights).iter().filter(own).count() as u64
+    }
+
+    /// Takes objects in that are sampled from their own data: the `made` splats of each are not drawn, and those that
+    /// became none may receive shadows all the same.
+    pub fn with_objects(mut self, objects: Vec<ObjectStatistics>, made: &[u64]) -> Self {
+        self.objects = objects;
+        let planned = samplers(&self.objects, &self.lights);
+        for ((object, sampler), made) in self.objects.iter().zip(&planned).zip(made) {
+            if sampler.source.is_own() {
+                self.translucent = self.translucent.saturating_sub(*made);
+                self.receivers += if *made == 0 && object.receives { object.splats } else { 0 };
+            }
+        }
+        self
     }
 }
 

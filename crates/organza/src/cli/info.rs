@@ -56,6 +56,9 @@ fn source_name(source: &Source) -> &'static str {
         Source::Points(_) => "points",
         Source::Volume(_) => "volume",
         Source::Implicit(_) => "implicit",
+        Source::Isosurface(_) => "isosurface",
+        Source::LevelSet(_) => "level_set",
+        Source::Slice(_) => "slice",
         Source::Density(_) => "density",
         Source::Cloud(_) => "cloud",
         Source::Rectangle(_) => "rectangle",
@@ -64,11 +67,7 @@ fn source_name(source: &Source) -> &'static str {
 }
 
 fn source_path(source: &Source) -> Option<String> {
-    match source {
-        Source::Mesh(path) | Source::Points(path) => Some(path_text(path)),
-        Source::Volume(volume) => Some(path_text(&volume.path)),
-        _ => None,
-    }
+    source.path().map(path_text)
 }
 
 fn light_name(light: &SceneLight) -> &'static str {

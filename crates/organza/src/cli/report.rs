@@ -1,6 +1,6 @@
 //! Plans and costs as tables and as JSON.
 
-use organza::plan::Plan;
+use organza::plan::{Plan, PlannedSampler};
 use organza::{CostRecord, SplatCount};
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -45,7 +45,12 @@ pub(super) fn plan_json(plan: &Plan) -> Value {
         "passes": passes.collect::<Value>(),
         "optical_depth_planes": plan.optical_depth_planes,
         "shadow_maps": plan.shadow_maps,
+        "samplers": plan.samplers.iter().map(sampler_json).collect::<Value>(),
     })
+}
+
+fn sampler_json(s: &PlannedSampler) -> Value {
+    json!({ "object": s.object, "source": s.source.name(), "reason": s.reason, "becomes_splats": s.splats })
 }
 
 /// The plan as a table.
@@ -58,7 +63,16 @@ pub(super) fn plan_text(plan: &Plan) -> String {
     text += &table(["effect", "called for", "bound", "why"], "lrrl", effects);
     text.push('\n');
     let passes = plan.passes.iter().map(|p| [p.name.clone(), p.reason.clone()]);
-    text + &table(["pass", "what for"], "ll", passes)
+    text += &table(["pass", "what for"], "ll", passes);
+    if !plan.samplers.is_empty() {
+        let samplers = plan.samplers.iter().map(|s| {
+            let splats = s.splats.map_or("no".to_owned(), |why| format!("yes: {why}"));
+            [s.object.clone(), s.source.name().to_owned(), s.reason.to_owned(), splats]
+        });
+        text.push('\n');
+        text += &table(["object", "particles from", "why", "becomes splats"], "llll", samplers);
+    }
+    text
 }
 
 /// The cost record as a table, with the sum of times.

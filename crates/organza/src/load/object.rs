@@ -1,71 +1,31 @@
 //! One object → its cloud.
 
-use crate::scene::{
-    CloudSource, DensitySource, ImplicitSource, MediumShape, RectangleSource, Scene, SceneObject, Source, VolumeSource,
-};
-use crate::{Error, RenderOptions};
+use super::bounded::BoundedExtinction;
+use super::context::Context;
+use super::input::{Input, input};
+use super::own::{Body, Own, Search};
+use crate::Error;
+use crate::scene::{MediumShape, SceneObject};
+use crate::statistics::ObjectStatistics;
 use convert::cost::{self, Prediction};
-use convert::read::{Loaded as FileData, ReadLimits};
 use convert::{
-    CloudShape, ConvertError, Density, DensityParams, Ellipsoid, ExpressionField, MeshParams, Orientation, RawPoints,
-    SplatParams, SurfelParams, VolumeParams,
+    CloudShape, ConvertError, Density, DensityParams, MeshParams, RawPoints, SharedField, SplatParams, SurfelParams,
+    VolumeParams,
 };
 use glam::DVec3;
-use splat_core::{Cloud, Grid, Mesh, Object, Progress, Shading, TransferFunction, TransferPoint};
+use splat_core::{Cloud, Grid, Mesh, Object, Shading, Similarity, TransferFunction, TransferPoint};
 use std::path::Path;
 
-/// Bytes that a splat takes from its conversion to the finished picture, at most.
-pub(super) const BYTES_PER_SPLAT: u64 = 256;
-
-/// Largest spacing of raw points over their median: above it, leaves and wires would become petals.
-const LARGEST_SPACING: f64 = 1.7;
-
-/// What the conversion of an object reads beside it.
-pub(super) struct Context<'a> {
-    pub(super) scene: &'a Scene,
-    pub(super) options: &'a RenderOptions,
-    pub(super) progress: &'a Progress,
-    /// Rank of the object.
-    pub(super) id: usize,
-    /// Bytes and splats that earlier objects take.
-    pub(super) used: u64,
-    pub(super) made: u64,
-}
-
-/// The input of one object with the parameters of its conversion, and what that will make.
+/// The data of one object, and what its conversion would make.
 pub(super) struct Prepared<'a> {
-    input: Input<'a>,
+    pub(super) input: Input<'a>,
     pub(super) prediction: Prediction,
-}
-
-enum Input<'a> {
-    Mesh(&'a Path, Mesh, MeshParams),
-    Points(&'a Path, RawPoints, SurfelParams),
-    Volume(Grid, &'a TransferFunction, VolumeParams),
-    Implicit(ExpressionField, [DVec3; 2], MeshParams),
-    Density(ExpressionField, [DVec3; 2], DensityParams),
-    Procedural(CloudShape, f64, VolumeParams),
-    Medium(MediumShape, SplatParams),
-    Rectangle(RectangleSource, f64, SplatParams),
-}
-
-impl Prepared<'_> {
-    /// Bytes that the input holds.
-    pub(super) fn bytes(&self) -> u64 {
-        let bytes = match &self.input {
-            Input::Mesh(_, mesh, _) => {
-                size_of_val(mesh.position.as_slice())
-                    + size_of_val(mesh.normal.as_slice())
-                    + size_of_val(mesh.color.as_slice())
-                    + size_of_val(mesh.triangles.as_slice())
-            }
-            // Position, normal, colour, value, class and integers at most.
-            Input::Points(_, points, _) => 64 * points.len(),
-            Input::Volume(grid, ..) => size_of_val(grid.values.as_slice()),
-            _ => 0,
-        };
-        bytes as u64
-    }
+    /// The refusal of a conversion that would make too many splats.
+    pub(super) too_many: Option<ConvertError>,
+    /// Extinction, where particles could be sampled from a field of it.
+    pub(super) bounded: Option<BoundedExtinction>,
+    /// Where a surface may lie, where particles could be sampled from it.
+    pub(super) search: Option<Search>,
 }
 
 /// The object's row of the object table.
@@ -77,22 +37,36 @@ pub(super) fn entry(object: &SceneObject) -> Object {
     }
 }
 
-/// Whether the gradients of the object's volume could change the picture: lit by Phong, or in a layer of normals.
-pub(super) fn needs_gradients(object: &SceneObject, scene: &Scene) -> bool {
-    let is_volume = matches!(object.source, Source::Volume(_) | Source::Density(_) | Source::Cloud(_));
-    let lit = !scene.lights.is_empty() && scene.materials[object.material].material.shading == Shading::Phong;
-    is_volume && (lit || scene.render.layers.set().normal)
+/// Reads one object and counts its splats; `sampled` where particles may come from its own data.
+pub(super) fn prepare<'a>(
+    object: &'a SceneObject,
+    context: &Context<'_>,
+    sampled: bool,
+) -> Result<Prepared<'a>, Error> {
+    let input = input(object, context)?;
+    let bounded = if sampled { input.bounded(context.extinction_factor(object)) } else { None };
+    let search = match &input {
+        Input::Surface(field, bounds, _) if sampled => Some(Search::new(field, *bounds)),
+        _ => None,
+    };
+    match predict(&input) {
+        Ok(prediction) => Ok(Prepared { input, prediction, too_many: None, bounded, search }),
+        Err(ConvertError::TooMany { object, what, needed, limit }) => {
+            let prediction = Prediction { splats: needed as u64, ..Prediction::default() };
+            let too_many = Some(ConvertError::TooMany { object, what, needed, limit });
+            Ok(Prepared { input, prediction, too_many, bounded, search })
+        }
+        Err(e) => Err(refuse(&e)),
+    }
 }
 
-/// Reads one object and counts its splats.
-pub(super) fn prepare<'a>(object: &'a SceneObject, context: &Context<'_>) -> Result<Prepared<'a>, Error> {
-    let input = input(object, context)?;
-    let prediction = match &input {
+fn predict(input: &Input<'_>) -> Result<Prediction, ConvertError> {
+    match input {
         Input::Mesh(_, mesh, params) => cost::mesh(mesh, params),
         Input::Points(_, points, params) => cost::raw_points(points, params),
         Input::Volume(grid, transfer, params) => cost::volume(grid, transfer, params),
-        Input::Implicit(field, bounds, params) => cost::surface(field, *bounds, params),
-        Input::Density(field, bounds, params) => cost::density(field, *bounds, params),
+        Input::Surface(field, bounds, params) => cost::surface(field.as_ref(), *bounds, params),
+        Input::Density(field, bounds, params) => cost::density(field.as_ref(), *bounds, params),
         Input::Procedural(shape, spacing, params) => cost::procedural(shape, *spacing, params),
         Input::Medium(MediumShape::Box { min, max, extinction, spacing }, params) => {
             cost::medium_box(*min, *max, *extinction, *spacing, params)
@@ -101,112 +75,99 @@ pub(super) fn prepare<'a>(object: &'a SceneObject, context: &Context<'_>) -> Res
             cost::medium_ball(*center, *radius, *extinction, *spacing, params)
         }
         Input::Rectangle(r, _, params) => cost::rectangle(r.u, r.v, r.spacing, params),
-    };
-    Ok(Prepared { input, prediction: prediction.map_err(|e| refuse(&e))? })
+    }
 }
 
-fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Result<Input<'a>, Error> {
-    let splat = context.splat_params(object);
-    let opacity = context.opacity(object);
-    Ok(match &object.source {
-        Source::Mesh(path) => {
-            let density = object.spacing.map_or(Density::Auto, Density::Spacing);
-            Input::Mesh(path, read_mesh(path, context)?, MeshParams { splat, density, opacity })
+impl Prepared<'_> {
+    /// See [`crate::statistics::ObjectData::Surface`].
+    fn looseness(&self) -> f64 {
+        let (Some(search), Input::Surface(_, _, params)) = (&self.search, &self.input) else { return f64::INFINITY };
+        let Density::Spacing(spacing) = params.density else { return f64::INFINITY };
+        let area =
+            self.prediction.splats as f64 / cost::ZERO_SET_EXCESS * (spacing / params.splat.transform.scale).powi(2);
+        // A surface that touches its level without crossing it has no triangles: lines may find it.
+        if area > 0.0 { search.area / area } else { 0.0 }
+    }
+
+    /// What the planner asks of the object.
+    pub(super) fn statistics(&self, object: &SceneObject, context: &Context<'_>) -> ObjectStatistics {
+        let material = &context.scene.materials[object.material].material;
+        let extinct = material.extinction_rgb.iter().any(|e| *e > 0.0) || self.input.opacity() == Some(1.0);
+        ObjectStatistics {
+            name: object.name.clone(),
+            data: self.input.data(self.bounded.is_some(), self.looseness()),
+            opaque: self.input.opacity() == Some(1.0),
+            by_gradient: self.input.by_gradient(),
+            casts: object.casts_shadow && extinct,
+            receives: material.shading != Shading::Unlit && object.shadow_coefficient > 0.0,
+            splats: self.prediction.splats,
         }
-        Source::Points(path) => Input::Points(path, read_points(path, context)?, context.surfel_params(object, splat)),
-        Source::Volume(VolumeSource { path, transfer }) => {
-            Input::Volume(read_grid(path, context)?, transfer, context.volume_params(splat))
-        }
-        Source::Implicit(ImplicitSource { expression, bounds, spacing }) => {
-            let spacing = object.spacing.unwrap_or(spacing * splat.transform.scale);
-            let params = MeshParams { splat, density: Density::Spacing(spacing), opacity };
-            Input::Implicit(field(expression, object)?, *bounds, params)
-        }
-        Source::Density(DensitySource { expression, bounds, spacing, extinction }) => {
-            let params = DensityParams {
-                density: Density::Spacing(spacing * splat.transform.scale),
-                extinction: *extinction,
-                volume: context.volume_params(splat),
-            };
-            Input::Density(field(expression, object)?, *bounds, params)
-        }
-        Source::Cloud(cloud) => Input::Procedural(cloud_shape(cloud), cloud.spacing, context.volume_params(splat)),
-        Source::Medium(shape) => Input::Medium(*shape, splat),
-        Source::Rectangle(r) => Input::Rectangle(*r, opacity, splat),
-    })
+    }
 }
 
-/// Converts one object.
+/// Converts one object; a lattice that `own` has already is not made again.
 pub(super) fn convert(
-    prepared: Prepared<'_>,
-    object: &SceneObject,
+    prepared: &Prepared<'_>,
+    own: Option<&Own>,
     context: &Context<'_>,
     warnings: &mut Vec<String>,
 ) -> Result<Cloud, Error> {
-    let cloud = match prepared.input {
-        Input::Mesh(path, mesh, mut params) => {
-            context.limit(&mut params.splat);
-            mesh_splats(path, &mesh, &params, context, warnings)
-        }
-        Input::Points(path, points, mut params) => {
-            context.limit(&mut params.splat);
-            surfels(path, &points, &params, context, warnings)
-        }
-        Input::Volume(grid, transfer, mut params) => {
-            context.limit(&mut params.splat);
-            convert::volume_to_points_with_progress(&grid, transfer, &params, context.progress).map(|c| c.0)
-        }
-        Input::Implicit(field, bounds, mut params) => {
-            context.limit(&mut params.splat);
-            convert::surface_to_points_with_progress(&field, bounds, &params, context.progress).map(|c| c.0)
-        }
-        Input::Density(field, bounds, mut params) => {
-            context.limit(&mut params.volume.splat);
-            convert::density_to_points_with_progress(&field, bounds, &params, context.progress).map(|c| c.0)
-        }
-        Input::Procedural(shape, spacing, mut params) => {
-            context.limit(&mut params.splat);
-            procedural(&shape, spacing, &params, context)
-        }
-        Input::Medium(shape, mut params) => {
-            context.limit(&mut params);
-            medium(&shape, &params)
-        }
-        Input::Rectangle(r, opacity, mut params) => {
-            context.limit(&mut params);
-            convert::rectangle(r.center, r.u, r.v, opacity, r.spacing, &params)
-        }
+    if let Some(too_many) = &prepared.too_many {
+        return Err(refuse(too_many));
     }
-    .map_err(|e| refuse(&e))?;
-    if cloud.is_empty() {
-        warnings.push(format!("object '{}' has no splats", crate::escape_controls(&object.name)));
-    }
-    Ok(cloud)
+    let progress = context.progress;
+    let cloud = match &prepared.input {
+        Input::Mesh(name, mesh, params) => {
+            let params = MeshParams { splat: context.limited(&params.splat), ..params.clone() };
+            mesh_splats(name, mesh, &params, context, warnings)
+        }
+        Input::Points(path, points, params) => {
+            let params = SurfelParams { splat: context.limited(&params.splat), ..params.clone() };
+            surfels(path, points, &params, context, warnings)
+        }
+        Input::Volume(grid, transfer, params) => {
+            let params = VolumeParams { splat: context.limited(&params.splat), ..params.clone() };
+            convert::volume_to_points_with_progress(grid, transfer, &params, progress).map(|c| c.0)
+        }
+        Input::Surface(field, bounds, params) => {
+            let params = MeshParams { splat: context.limited(&params.splat), ..params.clone() };
+            convert::surface_to_points_with_progress(field.as_ref(), *bounds, &params, progress)
+                .map(|(cloud, _)| in_domain(cloud, field, &params.splat.transform))
+        }
+        Input::Density(field, bounds, params) => {
+            let splat = context.limited(&params.volume.splat);
+            let volume = VolumeParams { splat, ..params.volume.clone() };
+            let params = DensityParams { volume, ..params.clone() };
+            convert::density_to_points_with_progress(field.as_ref(), *bounds, &params, progress).map(|c| c.0)
+        }
+        Input::Procedural(shape, spacing, params) => {
+            let params = VolumeParams { splat: context.limited(&params.splat), ..params.clone() };
+            let convert = |grid: &Grid, transfer: &TransferFunction| {
+                convert::volume_to_points_with_progress(grid, transfer, &params, progress).map(|c| c.0)
+            };
+            match own.map(|o| &o.body) {
+                Some(Body::Cells { grid, transfer, .. }) => convert(grid, transfer),
+                _ => procedural(shape, *spacing, &params.splat, context).and_then(|(grid, tf)| convert(&grid, &tf)),
+            }
+        }
+        Input::Medium(shape, params) => medium(shape, &context.limited(params)),
+        Input::Rectangle(r, opacity, params) => {
+            convert::rectangle(r.center, r.u, r.v, *opacity, r.spacing, &context.limited(params))
+        }
+    };
+    cloud.map_err(|e| refuse(&e))
 }
 
-fn read_mesh(path: &Path, context: &Context<'_>) -> Result<Mesh, Error> {
-    match context.read(path)? {
-        FileData::Mesh(mesh) => Ok(mesh),
-        _ => Err(wrong_kind(path, "a mesh with faces", "use `points = ` or `volume = ` for this file")),
-    }
-}
-
-fn read_points(path: &Path, context: &Context<'_>) -> Result<RawPoints, Error> {
-    match context.read(path)? {
-        FileData::Points(points) => Ok(points),
-        _ => Err(wrong_kind(path, "points without faces", "use `mesh = ` or `volume = ` for this file")),
-    }
-}
-
-fn read_grid(path: &Path, context: &Context<'_>) -> Result<Grid, Error> {
-    match context.read(path)? {
-        FileData::Grid(grid) => Ok(grid),
-        _ => Err(wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file")),
-    }
+/// Without the splats beyond the border of an open surface.
+fn in_domain(cloud: Cloud, field: &SharedField, transform: &Similarity) -> Cloud {
+    let local = |p: DVec3| transform.rotation.inverse() * (p - transform.translation) / transform.scale;
+    let belongs = |i: &u32| field.in_domain(local(cloud.origin + cloud.position[*i as usize].as_dvec3()));
+    let kept: Vec<u32> = (0..cloud.len() as u32).filter(belongs).collect();
+    if kept.len() == cloud.len() { cloud } else { cloud.gather(&kept) }
 }
 
 fn mesh_splats(
-    path: &Path,
+    name: &str,
     mesh: &Mesh,
     params: &MeshParams,
     context: &Context<'_>,
@@ -215,7 +176,7 @@ fn mesh_splats(
     let mut cloud = Cloud::default();
     let report = convert::mesh_to_points_with_progress(mesh, params, &mut cloud, context.progress)?;
     if report.degenerate > 0 {
-        warnings.push(format!("{}: {} faces have no area", crate::printable(path), report.degenerate));
+        warnings.push(format!("{name}: {} faces have no area", report.degenerate));
     }
     Ok(cloud)
 }
@@ -236,46 +197,25 @@ fn surfels(
     Ok(cloud)
 }
 
-pub(crate) fn wrong_kind(path: &Path, expected: &str, hint: &str) -> Error {
-    Error::input(crate::printable(path), format!("expected {expected}"), hint)
-}
-
-pub(crate) fn field(text: &str, object: &SceneObject) -> Result<ExpressionField, Error> {
-    // The scene's check has parsed it already.
-    ExpressionField::parse(text).map_err(|e| {
-        let what = format!("object '{}', expression", crate::escape_controls(&object.name));
-        Error::input(what, e.to_string(), "variables are x, y and z")
-    })
-}
-
-pub(crate) fn cloud_shape(source: &CloudSource) -> CloudShape {
-    CloudShape {
-        ellipsoids: source.ellipsoids.iter().map(|&(center, radii)| Ellipsoid { center, radii }).collect(),
-        octaves: source.octaves,
-        frequency: source.frequency,
-        amplitude: source.amplitude,
-        seed: source.seed,
-        extinction: source.extinction,
-        base: None,
-        ..CloudShape::default()
-    }
-}
-
-fn procedural(
+/// The extinction of a cloud on its lattice, and the transfer function that takes it as it is.
+pub(super) fn procedural(
     shape: &CloudShape,
     spacing: f64,
-    params: &VolumeParams,
+    params: &SplatParams,
     context: &Context<'_>,
-) -> Result<Cloud, ConvertError> {
-    let lattice = convert::procedural_cloud_with_progress(shape, spacing, &params.splat, context.progress)?;
-    let point = |value: f32| TransferPoint { value, color: params.splat.color, extinction: value };
+) -> Result<(Grid, TransferFunction), ConvertError> {
+    let lattice = convert::procedural_cloud_with_progress(shape, spacing, params, context.progress)?;
+    Ok((lattice, as_it_is(shape.extinction, params)?))
+}
+
+/// Values up to `most` as extinction, 1/world unit.
+pub(super) fn as_it_is(most: f64, params: &SplatParams) -> Result<TransferFunction, ConvertError> {
+    let point = |value: f32| TransferPoint { value, color: params.color, extinction: value };
     let mut points = vec![point(0.0)];
-    if shape.extinction > 0.0 {
-        points.push(point(shape.extinction as f32));
+    if most as f32 > 0.0 {
+        points.push(point(most as f32));
     }
-    let transfer = TransferFunction::new(points)
-        .map_err(|source| ConvertError::Input { object: params.splat.object_name.clone(), source })?;
-    convert::volume_to_points_with_progress(&lattice, &transfer, params, context.progress).map(|c| c.0)
+    TransferFunction::new(points).map_err(|source| ConvertError::Input { object: params.object_name.clone(), source })
 }
 
 fn medium(shape: &MediumShape, params: &SplatParams) -> Result<Cloud, ConvertError> {
@@ -286,61 +226,6 @@ fn medium(shape: &MediumShape, params: &SplatParams) -> Result<Cloud, ConvertErr
         MediumShape::Ball { center, radius, extinction, spacing } => {
             convert::medium_ball(center, radius, extinction, spacing, params)
         }
-    }
-}
-
-impl Context<'_> {
-    fn splat_params(&self, object: &SceneObject) -> SplatParams {
-        let material = &self.scene.materials[object.material];
-        let mut params = SplatParams {
-            object_name: object.name.clone(),
-            object: self.id as u32,
-            material: object.material as u16,
-            footprint: object.footprint,
-            profile: self.scene.footprints.layers()[object.footprint as usize],
-            transform: object.transform,
-            color: object.color.unwrap_or(material.color),
-            max_splats: 0,
-        };
-        self.limit(&mut params);
-        params
-    }
-
-    /// What earlier objects have left of memory and of the scene's own limit.
-    fn limit(&self, params: &mut SplatParams) {
-        let fits = self.options.max_memory.saturating_sub(self.used) / BYTES_PER_SPLAT;
-        let asked = self.scene.render.max_points.map_or(u64::MAX, |most| most.saturating_sub(self.made));
-        params.max_splats = fits.min(asked).min(u64::from(u32::MAX));
-    }
-
-    /// Parameters of raw points.
-    fn surfel_params(&self, object: &SceneObject, splat: SplatParams) -> SurfelParams {
-        // The side that faces the sky.
-        let up = splat.transform.rotation.inverse() * DVec3::Y;
-        SurfelParams {
-            splat,
-            orientation: Orientation::Toward(up),
-            opacity: self.opacity(object),
-            largest_spacing: LARGEST_SPACING,
-            merge_duplicates: object.merge_duplicates || self.options.merge_duplicates,
-            ..SurfelParams::default()
-        }
-    }
-
-    fn read(&self, path: &Path) -> Result<FileData, Error> {
-        let limits = ReadLimits { max_bytes: self.options.max_memory, drop_invalid: self.options.drop_invalid };
-        convert::read::file(path, &limits).map_err(|e| Error::from_read(path, &e))
-    }
-
-    /// Parameters of a volume: normals only where they are used.
-    fn volume_params(&self, splat: SplatParams) -> VolumeParams {
-        let normals = needs_gradients(&self.scene.objects[self.id], self.scene);
-        VolumeParams { splat, normals, ..VolumeParams::default() }
-    }
-
-    /// Opacity of one crossing of the object's surfaces.
-    fn opacity(&self, object: &SceneObject) -> f64 {
-        object.opacity.unwrap_or(self.scene.materials[object.material].opacity)
     }
 }
 

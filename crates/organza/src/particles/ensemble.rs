@@ -6,9 +6,9 @@ use super::parts::Part;
 use crate::points::Drawing;
 use crate::scene::ParticlesSettings;
 use crate::{Error, RenderOptions};
-use pbsr::{Ensemble, EnsembleParams, FoldParams, LitBy, Object, Occluder, Renderer, Scene, SplatSampler};
+use pbsr::{Ensemble, EnsembleParams, FoldParams, LitBy, Object, Occluder, Renderer, Scene};
 use splat_core::shade::ChannelLayout;
-use splat_core::{Accumulator, Camera, Similarity};
+use splat_core::{Accumulator, Camera};
 use tsm::ShadowMap;
 
 /// Sets between two looks at the error.
@@ -23,19 +23,14 @@ const BATCH_SHARE: u64 = 4;
 /// Folds sets until there are as many as asked for, or the error is small enough.
 pub(super) fn fold(
     drawing: &Drawing<'_>,
-    parts: &[Part],
+    parts: &[Part<'_>],
     maps: &[Option<ShadowMap>],
     camera: &Camera,
     occluder: Option<&Occluder>,
     options: &RenderOptions,
     mut checkpoint: Option<&mut Checkpoint>,
 ) -> Result<Average, Error> {
-    let samplers =
-        parts.iter().map(|p| SplatSampler::new(&p.cloud, &p.params)).collect::<Result<Vec<_>, _>>().map_err(fault)?;
-    let mut objects = Vec::with_capacity(parts.len());
-    for (part, sampler) in parts.iter().zip(&samplers) {
-        objects.push(Object { sampler, transform: Similarity::default(), look: part.look });
-    }
+    let objects: Vec<Object<'_>> = parts.iter().map(Part::object).collect();
     let origin = drawing.loaded.cloud.origin;
     let lit = drawing.shining(maps).map(|(light, map)| LitBy { light, shadow: map.map(|m| (m, origin)) });
     let lights: Vec<LitBy<'_>> = lit.collect();

@@ -1,52 +1,220 @@
 //! Objects of the scene → what their particles are sampled from.
+//!
+//! A set of particles has its opacity where a pixel covers the particles' cross-section; elsewhere they are thinned out or
+//! widened. So each object gets the area of the smallest pixel on it.
 
+use super::fault;
+use crate::Error;
 use crate::load::Loaded;
+use crate::load::bounded::BoundedExtinction;
+use crate::load::own::{Body, Own};
 use crate::points::Drawing;
-use pbsr::{Appearance, SplatParams};
-use splat_core::{Camera, Cloud, SplatKind, rng};
+use pbsr::{
+    Appearance, Density, FieldVolumeSampler, GridSampler, ImplicitSurface, LineReport, LineSampler, MeshSampler,
+    Object, Sampler, SplatParams, SplatSampler, SurfaceParams, VolumeParams,
+};
+use splat_core::{Camera, Cloud, Similarity, SplatKind, rng};
 use std::collections::BTreeMap;
 
 /// Stage of the random numbers that seed the objects.
 const SEEDS: u64 = 0x7061_7274;
 /// Depth, in radii of an object, nearer than which particles are widened rather than made finer.
 const NEAR: f64 = 0.5;
+/// Cells along an object in which lines look for roots.
+const LINE_CELLS: std::ops::RangeInclusive<f64> = 16.0..=96.0;
+/// Optical depth of a surface that is not quite opaque, at most.
+const DEEPEST: f64 = 64.0;
 
-/// The translucent splats of one object.
-pub(super) struct Part {
-    pub(super) cloud: Cloud,
-    pub(super) look: Appearance,
-    pub(super) params: SplatParams,
+/// What to do about a field that is not finite.
+const BROKEN_FIELD: &str = "use a smaller box, or an expression that is finite everywhere in it";
+/// Share of the roots of a surface that may be missed without a word.
+const MISSED: f64 = 1e-3;
+
+/// One object that particles come from.
+pub(super) struct Source<'a> {
+    name: String,
+    data: Data<'a>,
+    transform: Similarity,
+    look: Appearance,
+    /// Cross-section of the particles, units² of the data.
+    cross_section: f64,
+    seed: u64,
 }
 
-/// Translucent splats by object; an object has one material and one kind of translucent splats.
-pub(super) fn parts(drawing: &Drawing<'_>, camera: &Camera) -> Vec<Part> {
-    let Loaded { cloud, objects, materials, footprints, .. } = drawing.loaded;
+enum Data<'a> {
+    Splats(Box<(Cloud, SplatParams)>),
+    Own(&'a Own),
+}
+
+/// One object, ready to be drawn.
+pub(super) struct Part<'a> {
+    pub(super) sampler: Box<dyn Sampler + 'a>,
+    pub(super) transform: Similarity,
+    pub(super) look: Appearance,
+}
+
+impl Part<'_> {
+    /// The object for the renderer.
+    pub(super) fn object(&self) -> Object<'_> {
+        Object { sampler: self.sampler.as_ref(), transform: self.transform, look: self.look }
+    }
+}
+
+/// Everything translucent in view: objects by their own data, the splats of the others by object.
+pub(super) fn sources<'a>(drawing: &Drawing<'a>, camera: &Camera) -> Vec<Source<'a>> {
+    let loaded = drawing.loaded;
+    let own = loaded.own.iter().map(|o| of_own(o, drawing, camera));
+    own.chain(of_splats(drawing, camera)).collect()
+}
+
+/// The samplers of all sources; those in which nothing is found are left out with a warning.
+pub(super) fn parts<'a>(sources: &'a [Source<'_>], warnings: &mut Vec<String>) -> Result<Vec<Part<'a>>, Error> {
+    let mut parts = Vec::with_capacity(sources.len());
+    for source in sources {
+        let name = || format!("object '{}'", crate::escape_controls(&source.name));
+        match source.sampler(warnings) {
+            Ok(sampler) => parts.push(Part { sampler, transform: source.transform, look: source.look }),
+            Err(pbsr::Error::Empty { reason, .. }) => warnings.push(format!("{} has no particles: {reason}", name())),
+            Err(e @ pbsr::Error::Field { .. }) => return Err(Error::input(name(), e.to_string(), BROKEN_FIELD)),
+            Err(e) => return Err(fault(e)),
+        }
+    }
+    Ok(parts)
+}
+
+fn seed(drawing: &Drawing<'_>, object: u32, kind: SplatKind) -> u64 {
+    rng::bits(drawing.settings.seed, SEEDS, u64::from(object), kind as u64)
+}
+
+fn of_own<'a>(own: &'a Own, drawing: &Drawing<'a>, camera: &Camera) -> Source<'a> {
+    let Loaded { objects, materials, cloud, .. } = drawing.loaded;
+    let material = materials[own.material];
+    let [low, high] = own.bounds;
+    let center = own.transform.apply(0.5 * (low + high));
+    let reach = 0.5 * (high - low).length() * own.transform.scale;
+    // As its splats have it, where it has some.
+    let splats = |k: &usize| cloud.object[*k] as usize == own.object;
+    let (n, sum) =
+        (0..cloud.len()).filter(splats).fold((0, 0.0), |(n, sum), k| (n + 1, sum + f64::from(cloud.radius[k])));
+    let radius = if n > 0 { sum / f64::from(n) } else { own.radius };
+    Source {
+        name: objects[own.object].name.clone(),
+        data: Data::Own(own),
+        transform: own.transform,
+        look: Appearance {
+            material,
+            kind: own.kind(),
+            radius: radius as f32,
+            shadow_coefficient: objects[own.object].shadow_coefficient,
+        },
+        cross_section: pbsr::finest_pixel_area(camera, center, reach, NEAR) / own.transform.scale.powi(2),
+        seed: seed(drawing, own.object as u32, own.kind()),
+    }
+}
+
+/// Translucent splats of the objects without data of their own; an object has one material and one kind of them.
+fn of_splats<'a>(drawing: &Drawing<'a>, camera: &Camera) -> Vec<Source<'a>> {
+    let Loaded { cloud, objects, materials, footprints, own, .. } = drawing.loaded;
     let mut of_object: BTreeMap<(u32, bool), Vec<u32>> = BTreeMap::new();
     for i in drawing.ids(|kind| kind != SplatKind::Opaque) {
         let k = i as usize;
-        if cloud.cross_section[k] > 0.0 {
+        if cloud.cross_section[k] > 0.0 && own.iter().all(|o| o.object != cloud.object[k] as usize) {
             of_object.entry((cloud.object[k], cloud.kind[k] == SplatKind::Surface)).or_default().push(i);
         }
     }
     let part = |((object, _), ids): ((u32, bool), Vec<u32>)| {
         let first = ids[0] as usize;
         let kind = cloud.kind[first];
-        let own = cloud.gather(&ids);
+        let mut splats = cloud.gather(&ids);
         let material = materials[cloud.material[first] as usize];
-        let radius = own.radius.iter().map(|r| f64::from(*r)).sum::<f64>() / own.len() as f64;
-        let bounds = own.bounds();
-        let center = own.origin + bounds.center().as_dvec3();
+        let most = material.extinction_rgb.into_iter().fold(0.0, f32::max);
+        splats.cross_section.iter_mut().for_each(|k| *k *= most);
+        let radius = splats.radius.iter().map(|r| f64::from(*r)).sum::<f64>() / splats.len() as f64;
+        let bounds = splats.bounds();
+        let center = splats.origin + bounds.center().as_dvec3();
         let reach = 0.5 * f64::from(bounds.diagonal()) + radius;
+        let cross_section = pbsr::finest_pixel_area(camera, center, reach, NEAR);
+        let seed = seed(drawing, object, kind);
         let params = SplatParams {
-            cross_section: pbsr::finest_pixel_area(camera, center, reach, NEAR),
+            cross_section,
             surface_opacity: material.surface_opacity,
             footprints: footprints.clone(),
-            seed: rng::bits(drawing.settings.seed, SEEDS, u64::from(object), kind as u64),
+            seed,
             ..SplatParams::default()
         };
         let shadow_coefficient = objects[object as usize].shadow_coefficient * cloud.shadow_coefficient_of(first);
         let look = Appearance { material, kind, radius: radius as f32, shadow_coefficient };
-        Part { cloud: own, look, params }
+        let data = Data::Splats(Box::new((splats, params)));
+        let name = objects[object as usize].name.clone();
+        Source { name, data, transform: Similarity::default(), look, cross_section, seed }
     };
     of_object.into_iter().map(part).collect()
+}
+
+impl Source<'_> {
+    fn sampler(&self, warnings: &mut Vec<String>) -> Result<Box<dyn Sampler + '_>, pbsr::Error> {
+        let own = match &self.data {
+            Data::Splats(splats) => return Ok(Box::new(SplatSampler::new(&splats.0, &splats.1)?)),
+            Data::Own(own) => own,
+        };
+        Ok(match &own.body {
+            Body::Surface { field, inside, spacing } => {
+                let [min, max] = own.bounds;
+                let surface = ImplicitSurface { field: field.as_ref(), level: 0.0, min, max, inside: Some(inside) };
+                let cells = 0.5 * (max - min).max_element() / spacing;
+                let cells = cells.clamp(*LINE_CELLS.start(), *LINE_CELLS.end()).ceil() as u32;
+                let sampler = LineSampler::new(&surface, cells, &self.surface(own), None)?;
+                warnings.extend(self.doubts(sampler.report()));
+                Box::new(sampler)
+            }
+            Body::Triangles(mesh) => Box::new(MeshSampler::new(mesh, &self.surface(own), None)?),
+            Body::Cells { grid, transfer, normals } => {
+                let params = VolumeParams {
+                    cross_section: self.cross_section,
+                    extinction_scale: own.extinction_scale,
+                    normals: *normals,
+                    seed: self.seed,
+                };
+                Box::new(GridSampler::new(grid, transfer, &params, None)?)
+            }
+            Body::Field(field) => self.field(own, field)?,
+        })
+    }
+
+    /// What a survey of the surface could not settle.
+    fn doubts(&self, report: &LineReport) -> Vec<String> {
+        let name = crate::escape_controls(&self.name);
+        let mut doubts = Vec::new();
+        if report.broken > 0 {
+            let what = format!(
+                "object '{name}': its field is not finite on {} pieces of {} lines",
+                report.broken, report.lines
+            );
+            doubts.push(what);
+        }
+        if report.missed() > MISSED {
+            let percent = 100.0 * report.missed();
+            doubts.push(format!(
+                "object '{name}': lines miss {percent:.2} % of its surface, which has no bound or a fine fold"
+            ));
+        }
+        doubts
+    }
+
+    fn field<'b>(&self, own: &Own, field: &'b BoundedExtinction) -> Result<Box<dyn Sampler + 'b>, pbsr::Error> {
+        let extinction = Density { field, max: field.max };
+        let (bounds, cells, color) = (field.bounds, field.cells, own.color);
+        Ok(Box::new(FieldVolumeSampler::new(extinction, bounds, cells, self.cross_section, color, self.seed)?))
+    }
+
+    fn surface(&self, own: &Own) -> SurfaceParams {
+        SurfaceParams {
+            opacity: own.opacity,
+            cross_section: self.cross_section,
+            surface_opacity: self.look.material.surface_opacity,
+            color: own.color,
+            opaque_optical_depth: DEEPEST,
+            seed: self.seed,
+        }
+    }
 }

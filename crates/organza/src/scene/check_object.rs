@@ -1,6 +1,7 @@
 //! Checks of objects and their sources.
 
-use super::check::{At, LARGEST};
+use super::check::{At, LARGEST, SMALLEST};
+use super::check_field::{check_clip, check_isosurface, check_level_set, check_slice};
 use super::check_light::check_half_axes;
 use super::paths::Paths;
 use super::raw_object::{RawCloud, RawDensity, RawImplicit, RawObject, RawTransferPoint, RawTransform, RawUp};
@@ -14,8 +15,20 @@ use glam::{DQuat, DVec3, EulerRot};
 use splat_core::{FootprintStack, Similarity, TransferFunction, TransferPoint, optics};
 
 /// The keys that name a source.
-const SOURCES: [&str; 9] =
-    ["mesh", "volume", "points", "implicit", "density", "cloud", "rectangle", "medium_box", "medium_ball"];
+const SOURCES: [&str; 12] = [
+    "mesh",
+    "volume",
+    "points",
+    "implicit",
+    "isosurface",
+    "level_set",
+    "slice",
+    "density",
+    "cloud",
+    "rectangle",
+    "medium_box",
+    "medium_ball",
+];
 
 /// Longest expression, bytes.
 const LONGEST_EXPRESSION: usize = 4096;
@@ -52,6 +65,12 @@ pub(super) fn check_object(
         material,
         color: raw.color.map(|c| at.color("color", c)).transpose()?,
         opacity: raw.opacity.map(|a| at.number("opacity", a, 0.0..=1.0)).transpose()?,
+        clip: raw
+            .clip
+            .iter()
+            .enumerate()
+            .map(|(i, c)| check_clip(&at.key("clip").index(i), c))
+            .collect::<Result<_, _>>()?,
         spacing: raw.spacing.map(|s| at.length("spacing", s)).transpose()?,
         shadow_coefficient: at.number("shadow_coefficient", raw.shadow_coefficient.unwrap_or(1.0), 0.0..=1.0)? as f32,
         casts_shadow: raw.casts_shadow.unwrap_or(true),
@@ -62,12 +81,15 @@ pub(super) fn check_object(
     })
 }
 
-fn present(raw: &RawObject) -> [bool; 9] {
+fn present(raw: &RawObject) -> [bool; 12] {
     [
         raw.mesh.is_some(),
         raw.volume.is_some(),
         raw.points.is_some(),
         raw.implicit.is_some(),
+        raw.isosurface.is_some(),
+        raw.level_set.is_some(),
+        raw.slice.is_some(),
         raw.density.is_some(),
         raw.cloud.is_some(),
         raw.rectangle.is_some(),
@@ -97,10 +119,19 @@ fn check_source(at: &At<'_>, raw: &RawObject, fallback: Option<f64>, paths: &Pat
     }
     if let Some(path) = &raw.volume {
         let path = paths.resolve(&at_source, path)?;
-        return Ok(Source::Volume(VolumeSource { path, transfer: check_transfer(at, raw)? }));
+        return Ok(Source::Volume(VolumeSource { path, transfer: check_transfer(at, raw, false)? }));
     }
     if let Some(implicit) = &raw.implicit {
         return check_implicit(&at_source, implicit).map(Source::Implicit);
+    }
+    if let Some(isosurface) = &raw.isosurface {
+        return check_isosurface(&at_source, isosurface, paths).map(Source::Isosurface);
+    }
+    if let Some(level_set) = &raw.level_set {
+        return check_level_set(&at_source, level_set, paths).map(Source::LevelSet);
+    }
+    if let Some(slice) = &raw.slice {
+        return check_slice(&at_source, slice, check_transfer(at, raw, true)?, paths).map(Source::Slice);
     }
     if let Some(density) = &raw.density {
         return check_density(&at_source, density, extinction(density.extinction)?).map(Source::Density);
@@ -139,18 +170,33 @@ fn refuse_what_does_not_apply(at: &At<'_>, raw: &RawObject, source: &Source) -> 
     if has_own_spacing && raw.spacing.is_some() {
         return Err(at.key("spacing").error("this source states its own spacing", "move `spacing` into the source"));
     }
-    if raw.volume.is_none() {
+    let of_field = matches!(source, Source::Implicit(_) | Source::Isosurface(_) | Source::LevelSet(_));
+    if !of_field && !raw.clip.is_empty() {
+        return Err(at.key("clip").error("`clip` belongs to an `implicit`, `isosurface` or `level_set`", ""));
+    }
+    if raw.slice.is_some() && raw.unit_length.is_some() {
+        return Err(at.key("unit_length").error("a slice has no extinction", "its `opacity` is that of one crossing"));
+    }
+    if raw.slice.is_some() && raw.color.is_some() {
+        return Err(at.key("color").error("the colours of a slice are those of its `transfer`", ""));
+    }
+    if raw.volume.is_none() && raw.slice.is_none() {
         for (key, on) in [("transfer", raw.transfer.is_some()), ("unit_length", raw.unit_length.is_some())] {
             if on {
-                return Err(at.key(key).error(format!("`{key}` belongs to a `volume`"), ""));
+                return Err(at.key(key).error(format!("`{key}` belongs to a `volume` or `slice`"), ""));
             }
         }
     }
     Ok(())
 }
 
-fn check_transfer(at: &At<'_>, raw: &RawObject) -> Result<TransferFunction, Error> {
+/// A slice has colours alone.
+fn check_transfer(at: &At<'_>, raw: &RawObject, colors_alone: bool) -> Result<TransferFunction, Error> {
     let Some(points) = &raw.transfer else {
+        if colors_alone {
+            let hint = "such as transfer = [{ value = 0, color = [0, 0, 0] }, { value = 1, color = [1, 1, 1] }]";
+            return Err(at.error("a slice needs a key `transfer`, found none", hint));
+        }
         let hint = "such as transfer = [{ value = 0, color = [1, 1, 1], extinction = 0 }, …]";
         return Err(at.error("a volume needs a key `transfer`, found none", hint));
     };
@@ -164,10 +210,23 @@ fn check_transfer(at: &At<'_>, raw: &RawObject) -> Result<TransferFunction, Erro
             let message = format!("`value`: expected more than that of the point before, found {}", p.value);
             return Err(at.key("value").error(message, "list the points by rising value"));
         }
-        let extinction = point_extinction(&at, p, unit_length)? as f32;
+        let extinction = if colors_alone {
+            no_extinction(&at, p).map(|()| 0.0)?
+        } else {
+            point_extinction(&at, p, unit_length)? as f32
+        };
         checked.push(TransferPoint { value, color: at.color("color", p.color)?, extinction });
     }
     TransferFunction::new(checked).map_err(|e| at.error(e.to_string(), ""))
+}
+
+fn no_extinction(at: &At<'_>, p: &RawTransferPoint) -> Result<(), Error> {
+    for (key, on) in [("extinction", p.extinction.is_some()), ("opacity", p.opacity.is_some())] {
+        if on {
+            return Err(at.key(key).error("a slice has no extinction", "its `opacity` is that of one crossing"));
+        }
+    }
+    Ok(())
 }
 
 fn point_extinction(at: &At<'_>, p: &RawTransferPoint, unit_length: Option<f64>) -> Result<f64, Error> {
@@ -264,8 +323,8 @@ fn check_cloud(at: &At<'_>, raw: &RawCloud, extinction: f64) -> Result<CloudSour
     let longest = ellipsoids.iter().map(|(_, radii)| 2.0 * radii.max_element()).fold(0.0, f64::max);
     Ok(CloudSource {
         ellipsoids,
-        octaves: at.whole("octaves", raw.octaves.unwrap_or(5), 0..=16)?,
-        frequency: at.number("frequency", raw.frequency.unwrap_or(1.0), 0.0..=LARGEST)?,
+        octaves: at.whole("octaves", raw.octaves.unwrap_or(5), 1..=16)?,
+        frequency: at.number("frequency", raw.frequency.unwrap_or(1.0), SMALLEST..=LARGEST)?,
         amplitude: at.number("amplitude", raw.amplitude.unwrap_or(0.5), 0.0..=100.0)?,
         seed: raw.seed,
         spacing: at.spacing("spacing", raw.spacing, longest)?,

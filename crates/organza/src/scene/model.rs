@@ -1,10 +1,11 @@
 //! The checked scene: everything a render needs, in radians and f64 world units.
 
 use super::{LayerChoice, SceneLight};
+use convert::{Clip, Inside, Interpolation};
 use glam::DVec3;
 use splat_core::raster::Accumulation;
 use splat_core::{Camera, Direction, FootprintStack, Material, Similarity, TransferFunction};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A whole scene. Made by [`super::load()`] or [`super::parse`] alone, so that every number in it is finite and in range.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,12 +37,7 @@ pub struct Scene {
 impl Scene {
     /// Every file that the scene is made of, its own first.
     pub fn files(&self) -> Vec<PathBuf> {
-        let of_object = |source: &Source| match source {
-            Source::Mesh(path) | Source::Points(path) => Some(path.clone()),
-            Source::Volume(volume) => Some(volume.path.clone()),
-            _ => None,
-        };
-        let data = self.objects.iter().filter_map(|o| of_object(&o.source));
+        let data = self.objects.iter().filter_map(|o| o.source.path().map(Path::to_owned));
         std::iter::once(self.file.clone()).chain(data).collect()
     }
 }
@@ -61,6 +57,8 @@ pub struct SceneObject {
     pub color: Option<[f32; 3]>,
     /// Opacity of one crossing that replaces the material's, in \[0, 1\]; surfaces and raw points.
     pub opacity: Option<f64>,
+    /// Regions outside of which a surface of a field ends, before the object's transform.
+    pub clip: Vec<Clip>,
     /// Distance between splats, world units; `None` means that it is chosen from the data and the camera.
     pub spacing: Option<f64>,
     /// Share of the shadow that it receives, in \[0, 1\].
@@ -86,6 +84,12 @@ pub enum Source {
     Volume(VolumeSource),
     /// The zero set of an expression.
     Implicit(ImplicitSource),
+    /// An isosurface of a volume.
+    Isosurface(IsosurfaceSource),
+    /// The surface through scattered points.
+    LevelSet(LevelSetSource),
+    /// A plane through a volume.
+    Slice(SliceSource),
     /// An expression as a density.
     Density(DensitySource),
     /// A procedural cloud.
@@ -94,6 +98,20 @@ pub enum Source {
     Rectangle(RectangleSource),
     /// A homogeneous medium.
     Medium(MediumShape),
+}
+
+impl Source {
+    /// The file that it reads.
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Mesh(path) | Self::Points(path) => Some(path),
+            Self::Volume(source) => Some(&source.path),
+            Self::Isosurface(source) => Some(&source.path),
+            Self::LevelSet(source) => Some(&source.path),
+            Self::Slice(source) => Some(&source.path),
+            _ => None,
+        }
+    }
 }
 
 /// A volume file and how its values become colour and extinction.
@@ -114,6 +132,41 @@ pub struct ImplicitSource {
     pub bounds: [DVec3; 2],
     /// Distance between samples.
     pub spacing: f64,
+}
+
+/// A volume file, and the surface on which its value is a given one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IsosurfaceSource {
+    /// The file.
+    pub path: PathBuf,
+    /// Physical value.
+    pub level: f64,
+    /// Values between lattice points.
+    pub interpolation: Interpolation,
+    /// Which side the normals do not point to.
+    pub inside: Inside,
+}
+
+/// Scattered points through which a surface is laid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LevelSetSource {
+    /// The file.
+    pub path: PathBuf,
+    /// How far points may lie from the surface, over the diagonal of their box.
+    pub tolerance: f64,
+}
+
+/// A plane through a volume. Lengths are before the object's transform.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SliceSource {
+    /// The file.
+    pub path: PathBuf,
+    /// Value → colour; the extinctions are 0.
+    pub transfer: TransferFunction,
+    /// A point of the plane.
+    pub center: DVec3,
+    /// Unit normal.
+    pub normal: DVec3,
 }
 
 /// A medium whose density is an expression in x, y, z, negative values counting as 0. Lengths are before the object's
@@ -187,6 +240,15 @@ pub enum MediumShape {
         /// Distance between splats.
         spacing: f64,
     },
+}
+
+impl MediumShape {
+    /// Distance between splats.
+    pub fn spacing(&self) -> f64 {
+        match self {
+            Self::Box { spacing, .. } | Self::Ball { spacing, .. } => *spacing,
+        }
+    }
 }
 
 /// A named material.

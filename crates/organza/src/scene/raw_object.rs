@@ -3,8 +3,8 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// An object: a name, exactly one source (`mesh`, `volume`, `points`, `implicit`, `density`, `cloud`, `rectangle`,
-/// `medium_box` or `medium_ball`), and how it looks.
+/// An object: a name, exactly one source (`mesh`, `volume`, `points`, `implicit`, `isosurface`, `level_set`, `slice`,
+/// `density`, `cloud`, `rectangle`, `medium_box` or `medium_ball`), and how it looks.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 #[schemars(rename = "Object")]
@@ -19,6 +19,12 @@ pub(super) struct RawObject {
     pub(super) points: Option<String>,
     /// The zero set of an expression.
     pub(super) implicit: Option<RawImplicit>,
+    /// The surface in a volume on which its value is a given one.
+    pub(super) isosurface: Option<RawIsosurface>,
+    /// The surface through scattered points.
+    pub(super) level_set: Option<RawLevelSet>,
+    /// A plane through a volume, coloured by `transfer`.
+    pub(super) slice: Option<RawSlice>,
     /// An expression as the density of a medium.
     pub(super) density: Option<RawDensity>,
     /// A procedural cloud.
@@ -29,7 +35,10 @@ pub(super) struct RawObject {
     pub(super) medium_box: Option<RawMediumBox>,
     /// A homogeneous ball.
     pub(super) medium_ball: Option<RawMediumBall>,
-    /// Control points of the transfer function of a `volume`, by rising value.
+    /// Regions that an `implicit`, `isosurface` or `level_set` is kept in; it ends open at their borders.
+    #[serde(default)]
+    pub(super) clip: Vec<RawClip>,
+    /// Control points of the transfer function of a `volume` or `slice`, by rising value.
     pub(super) transfer: Option<Vec<RawTransferPoint>>,
     /// World length that opacities of `transfer` refer to.
     pub(super) unit_length: Option<f64>,
@@ -73,6 +82,81 @@ pub(super) struct RawImplicit {
     pub(super) spacing: Option<f64>,
 }
 
+/// The surface in a volume on which its value is `level`.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(rename = "Isosurface")]
+pub(super) struct RawIsosurface {
+    /// Path of a regular volume.
+    pub(super) volume: String,
+    /// Physical value.
+    pub(super) level: f64,
+    /// Values between lattice points; default "trilinear".
+    #[serde(default)]
+    pub(super) interpolation: RawInterpolation,
+    /// Where the inside is, to which normals do not point; default "above".
+    #[serde(default)]
+    pub(super) inside: RawInside,
+}
+
+/// Values between lattice points.
+#[derive(Debug, Default, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[schemars(rename = "Interpolation")]
+pub(super) enum RawInterpolation {
+    #[default]
+    Trilinear,
+    CatmullRom,
+}
+
+/// Where the inside of an isosurface is.
+#[derive(Debug, Default, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(rename = "Inside")]
+pub(super) enum RawInside {
+    #[default]
+    Above,
+    Below,
+}
+
+/// The surface through scattered points, by multi-level partition of unity.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(rename = "LevelSet")]
+pub(super) struct RawLevelSet {
+    /// Path of a raw point cloud, or of a mesh, whose vertices count.
+    pub(super) points: String,
+    /// How far points may lie from the surface, over the diagonal of their box, above 0 and up to 1; default 0.001.
+    pub(super) tolerance: Option<f64>,
+}
+
+/// A plane through a volume.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(rename = "Slice")]
+pub(super) struct RawSlice {
+    /// Path of a regular volume.
+    pub(super) volume: String,
+    /// A point of the plane, in the volume's own coordinates.
+    pub(super) center: [f64; 3],
+    /// Across the plane, any length.
+    pub(super) normal: [f64; 3],
+}
+
+/// A half-space or a box; exactly one of them.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(rename = "Clip")]
+pub(super) struct RawClip {
+    /// Leads out of the half-space, any length.
+    pub(super) normal: Option<[f64; 3]>,
+    /// A point of the half-space's border.
+    pub(super) point: Option<[f64; 3]>,
+    /// Lowest and highest corner.
+    #[serde(rename = "box")]
+    pub(super) bounds: Option<[[f64; 3]; 2]>,
+}
+
 /// An expression in x, y, z as a density.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
@@ -97,9 +181,9 @@ pub(super) struct RawDensity {
 #[schemars(rename = "Cloud")]
 pub(super) struct RawCloud {
     pub(super) ellipsoids: Vec<RawEllipsoid>,
-    /// Octaves of turbulence, 0 to 16; default 5.
+    /// Octaves of turbulence, 1 to 16; default 5.
     pub(super) octaves: Option<u32>,
-    /// Frequency of the first octave, 1/unit of length; default 1.
+    /// Frequency of the first octave, 1/unit of length, above 0; default 1.
     pub(super) frequency: Option<f64>,
     /// Strength of the disturbance in ellipsoid radii, from 0; default 0.5.
     pub(super) amplitude: Option<f64>,
@@ -172,7 +256,7 @@ pub(super) struct RawTransferPoint {
     pub(super) value: f64,
     /// Linear Rec.709.
     pub(super) color: [f64; 3],
-    /// Extinction, 1/world unit; or `opacity`.
+    /// Extinction, 1/world unit; or `opacity`. Not for a `slice`.
     pub(super) extinction: Option<f64>,
     /// Opacity over `unit_length`, from 0 to below 1; or `extinction`.
     pub(super) opacity: Option<f64>,

@@ -2,7 +2,8 @@
 
 use super::placed::{Placed, TurnedBox};
 use super::volume::Classified;
-use crate::load::object::{cloud_shape, field, refuse, wrong_kind};
+use crate::load::input::{cloud_shape, field, wrong_kind};
+use crate::load::object::refuse;
 use crate::scene::{MediumShape, Scene, SceneMaterial, SceneObject, Source, VolumeSource};
 use crate::{Error, RenderOptions};
 use convert::SplatParams;
@@ -66,6 +67,10 @@ pub(super) fn body(
                        between them is the technique's own guess",
             );
         }
+        Source::Isosurface(_) | Source::LevelSet(_) | Source::Slice(_) => {
+            return no("surfaces of measured fields are not path-traced");
+        }
+        Source::Implicit(_) if !object.clip.is_empty() => return no("open surfaces are not path-traced"),
         Source::Mesh(path) => match read(path, options)? {
             FileData::Mesh(mesh) => mesh,
             _ => return Err(wrong_kind(path, "a mesh with faces", "use `points = ` or `volume = ` for this file")),

@@ -1,0 +1,144 @@
+//! A density as a field of extinction that is never negative and whose bounds are known, cell by cell, beforehand.
+//!
+//! Particles are thinned out by value over bound, and ask for the bound of their cell each time: it is looked up.
+
+use convert::SharedField;
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+use splat_core::ScalarField;
+
+/// Cells along each side of the box.
+pub(crate) const CELLS: u32 = 64;
+
+/// What has an extinction.
+pub(crate) enum Matter {
+    /// A homogeneous box: all of it.
+    Everywhere,
+    /// A homogeneous ball.
+    Ball { center: DVec3, radius: f64 },
+    /// Where the field is 1, extinction is whole; negative values count as 0.
+    Density(SharedField),
+}
+
+/// Extinction in a box, 1/object unit.
+pub(crate) struct BoundedExtinction {
+    matter: Matter,
+    /// Where the density is 1.
+    extinction: f64,
+    pub(crate) bounds: [DVec3; 2],
+    /// Cells along each side.
+    pub(crate) cells: u32,
+    /// Largest extinction in each cell, x fastest.
+    most: Vec<f64>,
+    /// Largest of all.
+    pub(crate) max: f64,
+}
+
+impl BoundedExtinction {
+    /// Bounds `matter` in a box; `None` where a density has no bound.
+    pub(crate) fn new(matter: Matter, extinction: f64, bounds: [DVec3; 2]) -> Option<Self> {
+        let cells = if matches!(matter, Matter::Everywhere) { 1 } else { CELLS };
+        let n = cells as usize;
+        let mut field = Self { matter, extinction, bounds, cells, most: Vec::new(), max: 0.0 };
+        let side = (bounds[1] - bounds[0]) / f64::from(cells);
+        let radius = 0.5 * side.length() * (1.0 + 1e-12);
+        let index = |c: usize| DVec3::new((c % n) as f64, (c / n % n) as f64, (c / (n * n)) as f64);
+        let bound = |c: usize| field.bound_in(bounds[0] + side * (index(c) + 0.5), radius);
+        let most: Option<Vec<f64>> = (0..n.pow(3)).into_par_iter().with_min_len(256).map(bound).collect();
+        field.most = most?;
+        field.max = field.most.iter().copied().fold(0.0, f64::max);
+        field.max.is_finite().then_some(field)
+    }
+
+    /// Upper bound of the extinction around a place.
+    fn bound_in(&self, p: DVec3, radius: f64) -> Option<f64> {
+        let density = match &self.matter {
+            Matter::Everywhere => 1.0,
+            Matter::Ball { center, radius: ball } => f64::from(u8::from((p - *center).length() - radius < *ball)),
+            Matter::Density(field) => field.bound(p, radius)?.1.max(0.0),
+        };
+        Some(density * self.extinction)
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(self.most.as_slice())
+    }
+
+    /// Middles of the cells that may have an extinction, and their sides.
+    pub(super) fn seen(&self) -> (impl Iterator<Item = DVec3> + '_, DVec3) {
+        let (n, side) = (self.cells as usize, (self.bounds[1] - self.bounds[0]) / f64::from(self.cells));
+        let index = move |c: usize| DVec3::new((c % n) as f64, (c / n % n) as f64, (c / (n * n)) as f64);
+        let some = self.most.iter().enumerate().filter(|(_, most)| **most > 0.0);
+        (some.map(move |(c, _)| self.bounds[0] + side * (index(c) + 0.5)), side)
+    }
+}
+
+impl ScalarField for BoundedExtinction {
+    fn value(&self, p: DVec3) -> f64 {
+        let density = match &self.matter {
+            Matter::Everywhere => 1.0,
+            Matter::Ball { center, radius } => f64::from(u8::from((p - *center).length_squared() < radius * radius)),
+            Matter::Density(field) => field.value(p),
+        };
+        (density * self.extinction).max(0.0)
+    }
+
+    fn gradient(&self, p: DVec3) -> DVec3 {
+        match &self.matter {
+            Matter::Density(field) if field.value(p) > 0.0 => field.gradient(p) * self.extinction,
+            _ => DVec3::ZERO,
+        }
+    }
+
+    fn hessian(&self, p: DVec3) -> DMat3 {
+        match &self.matter {
+            Matter::Density(field) if field.value(p) > 0.0 => field.hessian(p) * self.extinction,
+            _ => DMat3::ZERO,
+        }
+    }
+
+    /// That of a whole cell where the ball is one around the middle of a cell.
+    fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> {
+        let side = (self.bounds[1] - self.bounds[0]) / f64::from(self.cells);
+        let at = ((p - self.bounds[0]) / side).clamp(DVec3::ZERO, DVec3::splat(f64::from(self.cells - 1)));
+        let index = at.floor();
+        let off_middle = ((at - index - 0.5) * side).length();
+        if radius + off_middle > 0.5 * side.length() * (1.0 + 1e-6) {
+            return self.bound_in(p, radius).map(|most| (0.0, most));
+        }
+        let ([i, j, k], n) = (index.to_array().map(|v| v as usize), self.cells as usize);
+        Some((0.0, self.most[(k * n + j) * n + i]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use convert::ExpressionField;
+    use splat_core::rng;
+    use std::sync::Arc;
+
+    #[test]
+    fn values_stay_below_the_bound_of_their_cell() {
+        let hill: SharedField = Arc::new(ExpressionField::parse("exp(-x^2 - y^2) * (1 + sin(9*z)) - 0.5").unwrap());
+        let field = BoundedExtinction::new(Matter::Density(hill), 3.0, [DVec3::splat(-1.0), DVec3::ONE]).unwrap();
+        let radius = (2.0 / f64::from(CELLS)) * 0.75f64.sqrt();
+        let mut positive = 0;
+        for i in 0..10_000 {
+            let p = DVec3::from_array([0, 1, 2].map(|a| rng::unit(1, 2, i, a) * 2.0 - 1.0));
+            let cell = ((p + 1.0) * 32.0).floor() / 32.0 - 1.0 + 1.0 / 64.0;
+            let (low, high) = field.bound(cell, radius).unwrap();
+            assert_eq!(field.bound(cell, radius).unwrap().1, field.bound_in(cell, radius).unwrap());
+            let value = field.value(p);
+            assert!(low <= value && value <= high && high <= field.max, "{p}: {value} in {low} … {high}");
+            positive += u32::from(value > 0.0);
+        }
+        assert!((1000..9000).contains(&positive), "{positive}");
+    }
+
+    #[test]
+    fn a_density_without_a_bound_is_none() {
+        let pole: SharedField = Arc::new(ExpressionField::parse("1/x").unwrap());
+        assert!(BoundedExtinction::new(Matter::Density(pole), 1.0, [DVec3::splat(-1.0), DVec3::ONE]).is_none());
+    }
+}

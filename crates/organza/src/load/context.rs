@@ -1,0 +1,102 @@
+//! What reading and converting an object need to know of the scene around it.
+
+use crate::scene::{Scene, SceneObject, Source};
+use crate::{Error, RenderOptions};
+use convert::read::{Loaded as FileData, ReadLimits};
+use convert::{Orientation, SplatParams, SurfelParams, VolumeParams};
+use glam::DVec3;
+use splat_core::{Progress, Shading};
+use std::path::Path;
+
+/// Bytes that a splat takes from its conversion to the finished picture, at most.
+pub(super) const BYTES_PER_SPLAT: u64 = 256;
+
+/// Largest spacing of raw points over their median: above it, leaves and wires would become petals.
+const LARGEST_SPACING: f64 = 1.7;
+
+/// What the conversion of an object reads beside it.
+pub(super) struct Context<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) options: &'a RenderOptions,
+    pub(super) progress: &'a Progress,
+    /// Rank of the object.
+    pub(super) id: usize,
+    /// Bytes and splats that earlier objects take.
+    pub(super) used: u64,
+    pub(super) made: u64,
+}
+
+/// Whether the gradients of the object's volume could change the picture: lit by Phong, or in a layer of normals.
+pub(super) fn needs_gradients(object: &SceneObject, scene: &Scene) -> bool {
+    let is_volume = matches!(object.source, Source::Volume(_) | Source::Density(_) | Source::Cloud(_));
+    let lit = !scene.lights.is_empty() && scene.materials[object.material].material.shading == Shading::Phong;
+    is_volume && (lit || scene.render.layers.set().normal)
+}
+
+impl Context<'_> {
+    pub(super) fn splat_params(&self, object: &SceneObject) -> SplatParams {
+        let material = &self.scene.materials[object.material];
+        let mut params = SplatParams {
+            object_name: object.name.clone(),
+            object: self.id as u32,
+            material: object.material as u16,
+            footprint: object.footprint,
+            profile: self.scene.footprints.layers()[object.footprint as usize],
+            transform: object.transform,
+            color: object.color.unwrap_or(material.color),
+            max_splats: 0,
+        };
+        self.limit(&mut params);
+        params
+    }
+
+    /// What earlier objects have left of memory and of the scene's own limit.
+    fn limit(&self, params: &mut SplatParams) {
+        let fits = self.options.max_memory.saturating_sub(self.used) / BYTES_PER_SPLAT;
+        let asked = self.scene.render.max_points.map_or(u64::MAX, |most| most.saturating_sub(self.made));
+        params.max_splats = fits.min(asked).min(u64::from(u32::MAX));
+    }
+
+    /// The same attributes within what is left now.
+    pub(super) fn limited(&self, params: &SplatParams) -> SplatParams {
+        let mut params = params.clone();
+        self.limit(&mut params);
+        params
+    }
+
+    /// The largest of the material's factors on extinction.
+    pub(super) fn extinction_factor(&self, object: &SceneObject) -> f64 {
+        let factors = self.scene.materials[object.material].material.extinction_rgb;
+        f64::from(factors.into_iter().fold(0.0, f32::max))
+    }
+
+    /// Parameters of raw points.
+    pub(super) fn surfel_params(&self, object: &SceneObject, splat: SplatParams) -> SurfelParams {
+        // The side that faces the sky.
+        let up = splat.transform.rotation.inverse() * DVec3::Y;
+        SurfelParams {
+            splat,
+            orientation: Orientation::Toward(up),
+            opacity: self.opacity(object),
+            largest_spacing: LARGEST_SPACING,
+            merge_duplicates: object.merge_duplicates || self.options.merge_duplicates,
+            ..SurfelParams::default()
+        }
+    }
+
+    pub(super) fn read(&self, path: &Path) -> Result<FileData, Error> {
+        let limits = ReadLimits { max_bytes: self.options.max_memory, drop_invalid: self.options.drop_invalid };
+        convert::read::file(path, &limits).map_err(|e| Error::from_read(path, &e))
+    }
+
+    /// Parameters of a volume: normals only where they are used.
+    pub(super) fn volume_params(&self, splat: SplatParams) -> VolumeParams {
+        let normals = needs_gradients(&self.scene.objects[self.id], self.scene);
+        VolumeParams { splat, normals, ..VolumeParams::default() }
+    }
+
+    /// Opacity of one crossing of the object's surfaces.
+    pub(super) fn opacity(&self, object: &SceneObject) -> f64 {
+        object.opacity.unwrap_or(self.scene.materials[object.material].opacity)
+    }
+}

@@ -1,0 +1,270 @@
+//! What an object is made from: files read, formulas parsed, with the parameters of the conversion.
+
+use super::bounded::{BoundedExtinction, Matter};
+use super::context::Context;
+use super::object::refuse;
+use super::slice::slice;
+use crate::Error;
+use crate::scene::{
+    CloudSource, DensitySource, ImplicitSource, MediumShape, RectangleSource, SceneObject, Source, VolumeSource,
+};
+use crate::statistics::ObjectData;
+use convert::read::Loaded as FileData;
+use convert::{
+    ClippedField, CloudShape, Density, DensityParams, Ellipsoid, ExpressionField, GridField, MeshParams, MpuParams,
+    RawPoints, SharedField, SplatParams, SurfelParams, VolumeParams,
+};
+use glam::DVec3;
+use splat_core::{Grid, Mesh, TransferFunction};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Steps along a box around scattered points, one for each splat of the surface.
+const LEVEL_SET_STEPS: f64 = 192.0;
+
+/// The data of one object with the parameters of its conversion.
+pub(super) enum Input<'a> {
+    /// With the name of its source.
+    Mesh(String, Mesh, MeshParams),
+    Points(&'a Path, RawPoints, SurfelParams),
+    Volume(Arc<Grid>, &'a TransferFunction, VolumeParams),
+    /// The zero set of a field in a box.
+    Surface(SharedField, [DVec3; 2], MeshParams),
+    Density(SharedField, [DVec3; 2], DensityParams),
+    Procedural(CloudShape, f64, VolumeParams),
+    Medium(MediumShape, SplatParams),
+    Rectangle(RectangleSource, f64, SplatParams),
+}
+
+impl Input<'_> {
+    /// Bytes that it holds.
+    pub(super) fn bytes(&self) -> u64 {
+        let bytes = match self {
+            Self::Mesh(_, mesh, _) => mesh_bytes(mesh),
+            // Position, normal, colour, value, class and integers at most.
+            Self::Points(_, points, _) => 64 * points.len(),
+            Self::Volume(grid, ..) => size_of_val(grid.values.as_slice()),
+            _ => 0,
+        };
+        bytes as u64
+    }
+
+    /// Its attributes and limits.
+    pub(super) fn splat(&self) -> &SplatParams {
+        match self {
+            Self::Mesh(_, _, params) | Self::Surface(_, _, params) => &params.splat,
+            Self::Points(_, _, params) => &params.splat,
+            Self::Volume(_, _, params) | Self::Procedural(_, _, params) => &params.splat,
+            Self::Density(_, _, params) => &params.volume.splat,
+            Self::Medium(_, params) | Self::Rectangle(_, _, params) => params,
+        }
+    }
+
+    /// Opacity of one crossing; `None` for a medium.
+    pub(super) fn opacity(&self) -> Option<f64> {
+        match self {
+            Self::Mesh(_, _, params) | Self::Surface(_, _, params) => Some(params.opacity),
+            Self::Points(_, _, params) => Some(params.opacity),
+            Self::Rectangle(_, opacity, _) => Some(*opacity),
+            Self::Volume(..) | Self::Procedural(..) | Self::Density(..) | Self::Medium(..) => None,
+        }
+    }
+
+    /// Whether particles or splats get the gradient as normal.
+    pub(super) fn by_gradient(&self) -> bool {
+        match self {
+            Self::Volume(_, _, params) | Self::Procedural(_, _, params) => params.normals,
+            Self::Density(_, _, params) => params.volume.normals,
+            _ => false,
+        }
+    }
+
+    /// Extinction with its bounds, where it is a field and has some; `factor` is the material's.
+    pub(super) fn bounded(&self, factor: f64) -> Option<BoundedExtinction> {
+        let scale = self.splat().transform.scale * factor;
+        match self {
+            Self::Density(field, bounds, params) if !params.volume.normals => {
+                BoundedExtinction::new(Matter::Density(field.clone()), params.extinction * scale, *bounds)
+            }
+            Self::Medium(MediumShape::Box { min, max, extinction, .. }, _) => {
+                BoundedExtinction::new(Matter::Everywhere, extinction * scale, [*min, *max])
+            }
+            Self::Medium(MediumShape::Ball { center, radius, extinction, .. }, _) => {
+                let matter = Matter::Ball { center: *center, radius: *radius };
+                let reach = DVec3::splat(*radius);
+                BoundedExtinction::new(matter, extinction * scale, [*center - reach, *center + reach])
+            }
+            _ => None,
+        }
+    }
+
+    /// What it is made of, as far as the data and its field tell.
+    pub(super) fn data(&self, bounded: bool, looseness: f64) -> ObjectData {
+        match self {
+            Self::Points(..) => ObjectData::Points,
+            Self::Mesh(..) | Self::Rectangle(..) => ObjectData::Triangles,
+            Self::Surface(..) => ObjectData::Surface { looseness },
+            Self::Volume(..) | Self::Procedural(..) => ObjectData::Volume,
+            Self::Density(..) | Self::Medium(..) => ObjectData::Density { bounded },
+        }
+    }
+}
+
+/// Bytes of a mesh.
+pub(super) fn mesh_bytes(mesh: &Mesh) -> usize {
+    size_of_val(mesh.position.as_slice())
+        + size_of_val(mesh.normal.as_slice())
+        + size_of_val(mesh.color.as_slice())
+        + size_of_val(mesh.triangles.as_slice())
+}
+
+/// Reads one object.
+pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Result<Input<'a>, Error> {
+    let splat = context.splat_params(object);
+    let opacity = context.opacity(object);
+    Ok(match &object.source {
+        Source::Mesh(path) => {
+            let density = object.spacing.map_or(Density::Auto, Density::Spacing);
+            let mut mesh = read_mesh(path, context)?;
+            if object.color.is_some() {
+                mesh.color.clear();
+            }
+            Input::Mesh(crate::printable(path).to_string(), mesh, MeshParams { splat, density, opacity })
+        }
+        Source::Points(path) => Input::Points(path, read_points(path, context)?, context.surfel_params(object, splat)),
+        Source::Volume(VolumeSource { path, transfer }) => {
+            Input::Volume(read_grid(path, context)?.into(), transfer, context.volume_params(splat))
+        }
+        Source::Implicit(ImplicitSource { expression, bounds, spacing }) => {
+            surface(Arc::new(field(expression, object)?), *bounds, *spacing, object, splat, opacity)?
+        }
+        Source::Isosurface(source) => {
+            let grid: Arc<Grid> = read_grid(&source.path, context)?.into();
+            let step = shortest_step(&grid);
+            let field = GridField::new(grid, source.interpolation, source.level, source.inside)
+                .map_err(|e| refuse_data(&source.path, &e))?;
+            let bounds = field.bounds();
+            surface(Arc::new(field), bounds, step, object, splat, opacity)?
+        }
+        Source::LevelSet(source) => {
+            let params =
+                MpuParams { object_name: object.name.clone(), tolerance: source.tolerance, ..MpuParams::default() };
+            let points = read_scattered(&source.path, context)?;
+            let (field, _) = convert::points_to_field(&points, &params).map_err(|e| refuse(&e))?;
+            let bounds = field.bounds();
+            let step = (bounds[1] - bounds[0]).max_element() / LEVEL_SET_STEPS;
+            surface(Arc::new(field), bounds, step, object, splat, opacity)?
+        }
+        Source::Slice(source) => {
+            let grid = read_grid(&source.path, context)?;
+            let spacing = object.spacing.map_or_else(|| shortest_step(&grid), |s| s / splat.transform.scale);
+            let mesh = slice(grid.into(), source, spacing, &splat).map_err(|e| refuse(&e))?;
+            let density = Density::Spacing(spacing * splat.transform.scale);
+            Input::Mesh(crate::printable(&source.path), mesh, MeshParams { splat, density, opacity })
+        }
+        Source::Density(DensitySource { expression, bounds, spacing, extinction }) => {
+            let params = DensityParams {
+                density: Density::Spacing(spacing * splat.transform.scale),
+                extinction: *extinction,
+                volume: context.volume_params(splat),
+            };
+            Input::Density(Arc::new(field(expression, object)?), *bounds, params)
+        }
+        Source::Cloud(cloud) => Input::Procedural(cloud_shape(cloud), cloud.spacing, context.volume_params(splat)),
+        Source::Medium(shape) => Input::Medium(*shape, splat),
+        Source::Rectangle(r) => Input::Rectangle(*r, opacity, splat),
+    })
+}
+
+/// A surface of a field; `step` is the distance of its splats where the object states none, object units.
+fn surface<'a>(
+    field: SharedField,
+    bounds: [DVec3; 2],
+    step: f64,
+    object: &SceneObject,
+    splat: SplatParams,
+    opacity: f64,
+) -> Result<Input<'a>, Error> {
+    let density = Density::Spacing(object.spacing.unwrap_or(step * splat.transform.scale));
+    let field = if object.clip.is_empty() {
+        field
+    } else {
+        let clipped = ClippedField::new(field, object.clip.clone());
+        Arc::new(clipped.map_err(|e| Error::Internal(e.to_string()))?)
+    };
+    Ok(Input::Surface(field, bounds, MeshParams { splat, density, opacity }))
+}
+
+pub(super) fn shortest_step(grid: &Grid) -> f64 {
+    [grid.axes.x_axis, grid.axes.y_axis, grid.axes.z_axis].iter().fold(f64::INFINITY, |s, a| s.min(a.length()))
+}
+
+fn refuse_data(path: &Path, error: &splat_core::Error) -> Error {
+    Error::input(crate::printable(path), error.to_string(), "")
+}
+
+/// Scattered points with normals where the file has some; of a mesh its vertices.
+fn read_scattered(path: &Path, context: &Context<'_>) -> Result<RawPoints, Error> {
+    match context.read(path)? {
+        FileData::Points(points) => Ok(points),
+        FileData::Mesh(mesh) => {
+            mesh.validate().map_err(|e| refuse_data(path, &e))?;
+            let normal = if mesh.normal.is_empty() { convert::vertex_normals(&mesh) } else { mesh.normal };
+            // A vertex without a triangle has no normal, and says nothing of the surface.
+            let known: Vec<usize> = (0..normal.len()).filter(|i| normal[*i] != glam::Vec3::ZERO).collect();
+            Ok(RawPoints {
+                origin: mesh.origin,
+                position: known.iter().map(|i| mesh.position[*i]).collect(),
+                normal: known.iter().map(|i| normal[*i]).collect(),
+                ..RawPoints::default()
+            })
+        }
+        _ => Err(wrong_kind(path, "points", "use `volume = ` or `isosurface = ` for this file")),
+    }
+}
+
+fn read_mesh(path: &Path, context: &Context<'_>) -> Result<Mesh, Error> {
+    match context.read(path)? {
+        FileData::Mesh(mesh) => Ok(mesh),
+        _ => Err(wrong_kind(path, "a mesh with faces", "use `points = ` or `volume = ` for this file")),
+    }
+}
+
+fn read_points(path: &Path, context: &Context<'_>) -> Result<RawPoints, Error> {
+    match context.read(path)? {
+        FileData::Points(points) => Ok(points),
+        _ => Err(wrong_kind(path, "points without faces", "use `mesh = ` or `volume = ` for this file")),
+    }
+}
+
+fn read_grid(path: &Path, context: &Context<'_>) -> Result<Grid, Error> {
+    match context.read(path)? {
+        FileData::Grid(grid) => Ok(grid),
+        _ => Err(wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file")),
+    }
+}
+
+pub(crate) fn wrong_kind(path: &Path, expected: &str, hint: &str) -> Error {
+    Error::input(crate::printable(path), format!("expected {expected}"), hint)
+}
+
+pub(crate) fn field(text: &str, object: &SceneObject) -> Result<ExpressionField, Error> {
+    // The scene's check has parsed it already.
+    ExpressionField::parse(text).map_err(|e| {
+        let what = format!("object '{}', expression", crate::escape_controls(&object.name));
+        Error::input(what, e.to_string(), "variables are x, y and z")
+    })
+}
+
+pub(crate) fn cloud_shape(source: &CloudSource) -> CloudShape {
+    CloudShape {
+        ellipsoids: source.ellipsoids.iter().map(|&(center, radii)| Ellipsoid { center, radii }).collect(),
+        octaves: source.octaves,
+        frequency: source.frequency,
+        amplitude: source.amplitude,
+        seed: source.seed,
+        extinction: source.extinction,
+        base: None,
+        ..CloudShape::default()
+    }
+}

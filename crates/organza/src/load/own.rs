@@ -1,0 +1,329 @@
+//! Translucent objects in the form that particles are sampled from: a field, triangles, or a volume.
+//!
+//! Lengths and places are the object's own, so nothing is rounded where it lies far away; a transform leads to the world.
+
+use super::bounded::BoundedExtinction;
+use super::context::Context;
+use super::input::{Input, mesh_bytes, shortest_step};
+use super::object::{Prepared, as_it_is, procedural, refuse};
+use crate::Error;
+use crate::plan::ParticleSource;
+use crate::scene::RectangleSource;
+use convert::{DensityParams, SharedField, SplatParams};
+use glam::DVec3;
+use splat_core::{Footprint, Grid, Mesh, Similarity, SplatKind, TransferFunction, optics};
+use std::sync::Arc;
+
+/// Cells along the longest side of a box, in which an implicit surface is looked for.
+const SURFACE_CELLS: f64 = 32.0;
+
+/// Which zeros belong to a surface.
+pub(crate) type Inside = Box<dyn Fn(DVec3) -> bool + Send + Sync>;
+
+/// A translucent object that is sampled from its own data.
+pub(crate) struct Own {
+    /// Rank of the object in the scene.
+    pub(crate) object: usize,
+    /// Its data.
+    pub(crate) body: Body,
+    /// Its material.
+    pub(crate) material: usize,
+    /// Opacity of one crossing in the channel that absorbs most; surfaces alone.
+    pub(crate) opacity: f64,
+    /// From extinction in 1/world unit to that of the same channel in 1/object unit, for cells.
+    pub(crate) extinction_scale: f64,
+    /// Colour where the data has none.
+    pub(crate) color: [f32; 3],
+    /// From the object to the normalized world.
+    pub(crate) transform: Similarity,
+    /// Bounds of what can be seen, object units.
+    pub(crate) bounds: [DVec3; 2],
+    /// Radius that its splats have or would have, normalized world units.
+    pub(crate) radius: f64,
+}
+
+/// The data of an object.
+pub(crate) enum Body {
+    /// The zero set of a field.
+    Surface {
+        field: SharedField,
+        /// Beyond this the surface ends.
+        inside: Inside,
+        /// Distance of samples that were asked for, object units.
+        spacing: f64,
+    },
+    /// Triangles with normals.
+    Triangles(Mesh),
+    /// Extinction by a transfer function, 1/world unit before normalization.
+    Cells {
+        grid: Arc<Grid>,
+        transfer: TransferFunction,
+        /// Whether particles get normals.
+        normals: bool,
+    },
+    /// A field of extinction.
+    Field(BoundedExtinction),
+}
+
+impl std::fmt::Debug for Own {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Own").field("object", &self.object).field("bounds", &self.bounds).finish_non_exhaustive()
+    }
+}
+
+impl Own {
+    /// Takes the data of an object; its splats, if it has any, are made from the same. `None` for raw points, and where
+    /// there is nothing to sample.
+    pub(super) fn new(
+        prepared: &mut Prepared<'_>,
+        source: ParticleSource,
+        context: &Context<'_>,
+    ) -> Result<Option<Self>, Error> {
+        let splat = prepared.input.splat().clone();
+        let factor = context.extinction_factor(&context.scene.objects[context.id]);
+        let depth = factor * optics::optical_depth(prepared.input.opacity().unwrap_or(0.0));
+        let bounded = prepared.bounded.take();
+        let Some((body, bounds, spacing)) = data(prepared, bounded, source, context)? else { return Ok(None) };
+        let radius = f64::from(splat.profile.cutoff) * f64::from(Footprint::SIGMA_OVER_SPACING) * spacing;
+        Ok(Some(Self {
+            object: context.id,
+            body,
+            material: usize::from(splat.material),
+            opacity: optics::opacity(depth),
+            extinction_scale: factor * splat.transform.scale,
+            color: splat.color,
+            transform: splat.transform,
+            bounds,
+            radius: radius * splat.transform.scale,
+        }))
+    }
+
+    /// Surface or medium.
+    pub(crate) fn kind(&self) -> SplatKind {
+        match self.body {
+            Body::Surface { .. } | Body::Triangles(_) => SplatKind::Surface,
+            Body::Cells { .. } | Body::Field(_) => SplatKind::Medium,
+        }
+    }
+
+    /// Bytes of the data.
+    pub(crate) fn bytes(&self) -> u64 {
+        let bytes = match &self.body {
+            Body::Triangles(mesh) => mesh_bytes(mesh),
+            Body::Cells { grid, .. } => size_of_val(grid.values.as_slice()),
+            Body::Field(field) => field.bytes(),
+            Body::Surface { .. } => 0,
+        };
+        bytes as u64
+    }
+
+    /// Opposite corners of a box in the world that holds the object.
+    pub(crate) fn world_box(&self) -> [DVec3; 2] {
+        let corner = |k: u32| {
+            let at = |axis: usize| self.bounds[(k >> axis & 1) as usize][axis];
+            self.transform.apply(DVec3::new(at(0), at(1), at(2)))
+        };
+        let all = (0..8).map(corner);
+        all.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)])
+    }
+
+    /// Scales the world, not the object.
+    pub(crate) fn scale_world(&mut self, scale: f64) {
+        self.transform.scale *= scale;
+        self.transform.translation *= scale;
+        self.radius *= scale;
+    }
+}
+
+/// Data, bounds and the distance of splats, object units.
+type Data = (Body, [DVec3; 2], f64);
+
+fn data(
+    prepared: &Prepared<'_>,
+    bounded: Option<BoundedExtinction>,
+    source: ParticleSource,
+    context: &Context<'_>,
+) -> Result<Option<Data>, Error> {
+    if let Some(field) = bounded {
+        let spacing = match &prepared.input {
+            Input::Density(_, _, params) => world_spacing(&params.density) / params.volume.splat.transform.scale,
+            Input::Medium(shape, _) => shape.spacing(),
+            _ => 0.0,
+        };
+        let (seen, side) = field.seen();
+        let around = |[low, high]: [DVec3; 2], p: DVec3| [low.min(p - 0.5 * side), high.max(p + 0.5 * side)];
+        let bounds = seen.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], around);
+        let some = field.max > 0.0;
+        return Ok(some.then_some((Body::Field(field), bounds, spacing)));
+    }
+    let cells = |grid: Arc<Grid>, transfer: TransferFunction, normals: bool| {
+        let (bounds, spacing) = (cell_bounds(&grid, &transfer), shortest_step(&grid));
+        Some((Body::Cells { grid, transfer, normals }, bounds, spacing))
+    };
+    Ok(match &prepared.input {
+        Input::Points(..) => None,
+        Input::Mesh(_, mesh, _) => triangles(mesh.clone(), prepared.prediction.splats),
+        Input::Rectangle(r, ..) => triangles(rectangle(r), prepared.prediction.splats),
+        Input::Surface(field, bounds, params) => {
+            let spacing = world_spacing(&params.density) / params.splat.transform.scale;
+            if source == ParticleSource::Triangles {
+                return Ok(triangles(net(field, *bounds, spacing, &params.splat)?, prepared.prediction.splats));
+            }
+            let domain = field.clone();
+            let inside: Inside = Box::new(move |p| domain.in_domain(p));
+            let bounds = prepared.search.as_ref().map_or(*bounds, |s| s.bounds);
+            Some((Body::Surface { field: field.clone(), inside, spacing }, bounds, spacing))
+        }
+        Input::Volume(grid, transfer, params) => cells(grid.clone(), (*transfer).clone(), params.normals),
+        Input::Procedural(shape, spacing, params) => {
+            let (grid, transfer) = procedural(shape, *spacing, &params.splat, context).map_err(|e| refuse(&e))?;
+            cells(grid.into(), transfer, params.normals)
+        }
+        Input::Density(field, bounds, params) => {
+            let (grid, transfer) = density_lattice(field, *bounds, params)?;
+            cells(grid.into(), transfer, params.volume.normals)
+        }
+        Input::Medium(..) => None,
+    })
+}
+
+fn world_spacing(density: &convert::Density) -> f64 {
+    match density {
+        convert::Density::Spacing(h) => *h,
+        _ => 0.0,
+    }
+}
+
+/// A density on a lattice whose outer points lie on the sides of its box, values as extinction in 1/world unit.
+fn density_lattice(
+    field: &SharedField,
+    [low, high]: [DVec3; 2],
+    params: &DensityParams,
+) -> Result<(Grid, TransferFunction), Error> {
+    let splat = &params.volume.splat;
+    let spacing = world_spacing(&params.density) / splat.transform.scale;
+    let sides = high - low;
+    let step = sides / (sides / spacing).ceil().max(DVec3::ONE);
+    // Samples lie at the middles of cells.
+    let around = [low - 0.5 * step, high + 0.5 * step];
+    let mut grid = convert::field_to_grid(field.as_ref(), around, step.max_element(), splat).map_err(|e| refuse(&e))?;
+    let extinction = params.extinction as f32;
+    grid.values.iter_mut().for_each(|v| *v = (*v * extinction).max(0.0));
+    let most = grid.values.iter().copied().fold(0.0, f32::max);
+    let transfer = as_it_is(f64::from(most), splat).map_err(|e| refuse(&e))?;
+    Ok((grid, transfer))
+}
+
+/// A mesh with normals; smooth ones where the file has none, as its splats have.
+fn triangles(mut mesh: Mesh, splats: u64) -> Option<Data> {
+    if mesh.normal.is_empty() {
+        mesh.normal = convert::vertex_normals(&mesh);
+    }
+    let corner = |v: u32| mesh.position[v as usize].as_dvec3();
+    let area = |t: &[u32; 3]| 0.5 * (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).length();
+    let area: f64 = mesh.triangles.iter().map(area).sum();
+    let used = || mesh.triangles.iter().flatten().map(|v| corner(*v));
+    let (low, high) = (used().reduce(DVec3::min)?, used().reduce(DVec3::max)?);
+    let bounds = [mesh.origin + low, mesh.origin + high];
+    (area > 0.0).then_some((Body::Triangles(mesh), bounds, (area / splats.max(1) as f64).sqrt()))
+}
+
+/// A surface as triangles whose vertices and normals are those of the field, as fine as its splats.
+fn net(field: &SharedField, bounds: [DVec3; 2], spacing: f64, splat: &SplatParams) -> Result<Mesh, Error> {
+    let cell = std::f64::consts::SQRT_2 * spacing;
+    let mut mesh = convert::field_to_mesh(field.as_ref(), bounds, cell, splat).map_err(|e| refuse(&e))?;
+    let corner = |v: u32| mesh.position[v as usize].as_dvec3();
+    let middle = |t: &[u32; 3]| mesh.origin + (corner(t[0]) + corner(t[1]) + corner(t[2])) / 3.0;
+    mesh.triangles = mesh.triangles.iter().copied().filter(|t| field.in_domain(middle(t))).collect();
+    Ok(mesh)
+}
+
+fn rectangle(r: &RectangleSource) -> Mesh {
+    let corner = |s: f64, t: f64| (r.u * s + r.v * t).as_vec3();
+    Mesh {
+        origin: r.center,
+        position: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
+        normal: vec![r.u.cross(r.v).normalize().as_vec3(); 4],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
+    }
+}
+
+/// Where in a box a field may be zero.
+pub(super) struct Search {
+    /// The part of the box; the whole box where the field knows no bound.
+    bounds: [DVec3; 2],
+    /// Cells that may hold a zero times the area of a cell's side; infinite where the field knows no bound.
+    pub(super) area: f64,
+}
+
+impl Search {
+    pub(super) fn new(field: &SharedField, [low, high]: [DVec3; 2]) -> Self {
+        let cells = Cells::new([low, high], SURFACE_CELLS);
+        let (mut found, mut n) = ([DVec3::INFINITY, DVec3::NEG_INFINITY], 0.0);
+        for k in 0..cells.count() {
+            let (middle, radius) = cells.ball(k);
+            let Some((least, most)) = field.bound(middle, radius) else {
+                return Self { bounds: [low, high], area: f64::INFINITY };
+            };
+            if least <= 0.0 && most >= 0.0 {
+                found = [found[0].min(middle - 0.5 * cells.step), found[1].max(middle + 0.5 * cells.step)];
+                n += 1.0;
+            }
+        }
+        let some = found[0].cmplt(found[1]).all();
+        let bounds = if some { found.map(|p| p.clamp(low, high)) } else { [low, high] };
+        Self { bounds, area: n * cells.step.element_product().powf(2.0 / 3.0) }
+    }
+}
+
+/// Bounds of the lattice points with extinction and one cell around them; those of the lattice where there are none.
+pub(super) fn cell_bounds(grid: &Grid, transfer: &TransferFunction) -> [DVec3; 2] {
+    let [nx, ny, _] = grid.dims;
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for (row, values) in grid.values.chunks(nx).enumerate() {
+        let seen = |v: &f32| transfer.at(*v).extinction > 0.0;
+        if let (Some(first), Some(last)) = (values.iter().position(seen), values.iter().rposition(seen)) {
+            let at = |i: usize| DVec3::new(i as f64, (row % ny) as f64, (row / ny) as f64);
+            (low, high) = (low.min(at(first)), high.max(at(last)));
+        }
+    }
+    let last = DVec3::from_array(grid.dims.map(|n| (n - 1) as f64));
+    let (low, high) = if low.cmple(high).all() {
+        ((low - 1.0).max(DVec3::ZERO), (high + 1.0).min(last))
+    } else {
+        (DVec3::ZERO, last)
+    };
+    let corner = |k: u32| {
+        let index = DVec3::select(glam::BVec3::new(k & 1 == 1, k >> 1 & 1 == 1, k >> 2 & 1 == 1), high, low);
+        grid.origin + grid.axes * index
+    };
+    (0..8).map(corner).fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[l, h], p| [l.min(p), h.max(p)])
+}
+
+/// Cells that fill a box.
+pub(super) struct Cells {
+    pub(super) low: DVec3,
+    pub(super) step: DVec3,
+    pub(super) counts: [usize; 3],
+}
+
+impl Cells {
+    /// About `longest` cells along the longest side.
+    pub(super) fn new([low, high]: [DVec3; 2], longest: f64) -> Self {
+        let sides = high - low;
+        let counts = (sides / sides.max_element() * longest).ceil().max(DVec3::ONE);
+        Self { low, step: sides / counts, counts: counts.to_array().map(|n| n as usize) }
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.counts.iter().product()
+    }
+
+    /// A ball around cell `k`: its middle and radius.
+    pub(super) fn ball(&self, k: usize) -> (DVec3, f64) {
+        let [nx, ny, _] = self.counts;
+        let index = DVec3::new((k % nx) as f64, (k / nx % ny) as f64, (k / (nx * ny)) as f64);
+        (self.low + self.step * (index + 0.5), 0.5 * self.step.length() * (1.0 + 1e-12))
+    }
+}

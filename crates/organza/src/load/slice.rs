@@ -1,0 +1,103 @@
+//! A plane through a volume as triangles, coloured by the volume's values.
+
+use crate::scene::SliceSource;
+use convert::{ConvertError, GridField, Inside, Interpolation, SplatParams};
+use glam::DVec3;
+use splat_core::{Grid, Mesh, ScalarField};
+use std::sync::Arc;
+
+/// Most squares along one side of the plane.
+const MOST_SQUARES: f64 = 4096.0;
+
+/// The part of the plane within the lattice, in squares of about `spacing` (object units) that are cut off at its border.
+/// Colours are those of the interpolated values at their corners.
+pub(super) fn slice(
+    grid: Arc<Grid>,
+    source: &SliceSource,
+    spacing: f64,
+    splat: &SplatParams,
+) -> Result<Mesh, ConvertError> {
+    let wrong = |source| ConvertError::Input { object: splat.object_name.clone(), source };
+    let field = GridField::new(grid.clone(), Interpolation::Trilinear, 0.0, Inside::Below).map_err(wrong)?;
+    let [low, high] = field.bounds();
+    let reach = 0.5 * (high - low).length();
+    // The place of the plane nearest to the middle of the volume, so that it does not matter which point was given.
+    let middle = 0.5 * (low + high);
+    let center = middle - source.normal * source.normal.dot(middle - source.center);
+    let (u, v) = source.normal.any_orthonormal_pair();
+    let n = (2.0 * reach / spacing).ceil().clamp(1.0, MOST_SQUARES);
+    let step = 2.0 * reach / n;
+    let index = grid.axes.inverse();
+    let last = DVec3::from_array(grid.dims.map(|n| (n - 1) as f64));
+    let mut mesh = Mesh { origin: center, ..Mesh::default() };
+    for k in 0..(n * n) as u64 {
+        let at = |i: f64, j: f64| center + u * (i * step - reach) + v * (j * step - reach);
+        let (i, j) = ((k % n as u64) as f64, (k / n as u64) as f64);
+        let square = [at(i, j), at(i + 1.0, j), at(i + 1.0, j + 1.0), at(i, j + 1.0)];
+        let polygon = within(square.to_vec(), |p| index * (p - grid.origin), last);
+        let first = mesh.position.len() as u32;
+        for p in &polygon {
+            mesh.position.push((*p - center).as_vec3());
+            mesh.normal.push(source.normal.as_vec3());
+            mesh.color.push(source.transfer.at(field.value(*p) as f32).color);
+        }
+        mesh.triangles.extend((2..polygon.len() as u32).map(|c| [first, first + c - 1, first + c]));
+    }
+    Ok(mesh)
+}
+
+/// A convex polygon cut off where its lattice coordinates leave 0 … `last` (Sutherland and Hodgman 1974).
+fn within(mut polygon: Vec<DVec3>, coordinates: impl Fn(DVec3) -> DVec3, last: DVec3) -> Vec<DVec3> {
+    for side in 0..6 {
+        let axis = side / 2;
+        let inside = |p: DVec3| {
+            let c = coordinates(p)[axis];
+            if side % 2 == 0 { c } else { last[axis] - c }
+        };
+        if polygon.iter().all(|p| inside(*p) >= 0.0) {
+            continue;
+        }
+        let mut cut = Vec::with_capacity(polygon.len() + 1);
+        for (k, &p) in polygon.iter().enumerate() {
+            let next = polygon[(k + 1) % polygon.len()];
+            let (a, b) = (inside(p), inside(next));
+            if a >= 0.0 {
+                cut.push(p);
+            }
+            if (a >= 0.0) != (b >= 0.0) {
+                cut.push(p + (next - p) * (a / (a - b)));
+            }
+        }
+        polygon = cut;
+    }
+    polygon
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DMat3;
+    use splat_core::{TransferFunction, TransferPoint};
+
+    #[test]
+    fn a_slice_ends_where_the_volume_does_and_has_its_colours() {
+        let values: Vec<f32> = (0..64).map(|i| (i % 4) as f32).collect();
+        let grid = Grid { origin: DVec3::ONE, axes: DMat3::from_diagonal(DVec3::splat(0.5)), dims: [4; 3], values };
+        let point = |value, red| TransferPoint { value, color: [red, 0.0, 1.0], extinction: 0.0 };
+        let source = SliceSource {
+            path: "v".into(),
+            transfer: TransferFunction::new(vec![point(0.0, 0.0), point(3.0, 3.0)]).unwrap(),
+            center: DVec3::splat(1.75),
+            normal: DVec3::new(0.0, 1.0, 1.0).normalize(),
+        };
+        let mesh = slice(grid.into(), &source, 0.2, &SplatParams::default()).unwrap();
+        let corner = |v: u32| mesh.position[v as usize].as_dvec3();
+        let area = |t: &[u32; 3]| 0.5 * (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).length();
+        let total: f64 = mesh.triangles.iter().map(area).sum();
+        assert!((total - 1.5 * 1.5 * 2f64.sqrt()).abs() < 1e-5, "{total}");
+        for (p, color) in mesh.position.iter().zip(&mesh.color) {
+            let p = mesh.origin + p.as_dvec3();
+            assert!((f64::from(color[0]) - (p.x - 1.0) * 2.0).abs() < 1e-5 && color[2] == 1.0, "{p}: {color:?}");
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! Checks of the surfaces of fields: isosurfaces, level sets, slices, and where they end.
+
+use super::check::{At, LARGEST};
+use super::paths::Paths;
+use super::raw_object::{RawClip, RawInside, RawInterpolation, RawIsosurface, RawLevelSet, RawSlice};
+use super::{IsosurfaceSource, LevelSetSource, SliceSource};
+use crate::Error;
+use convert::{Clip, Inside, Interpolation, MpuParams};
+use splat_core::TransferFunction;
+
+pub(super) fn check_isosurface(at: &At<'_>, raw: &RawIsosurface, paths: &Paths) -> Result<IsosurfaceSource, Error> {
+    Ok(IsosurfaceSource {
+        path: paths.resolve(&at.key("volume"), &raw.volume)?,
+        level: at.number("level", raw.level, -LARGEST..=LARGEST)?,
+        interpolation: match raw.interpolation {
+            RawInterpolation::Trilinear => Interpolation::Trilinear,
+            RawInterpolation::CatmullRom => Interpolation::CatmullRom,
+        },
+        inside: match raw.inside {
+            RawInside::Above => Inside::Above,
+            RawInside::Below => Inside::Below,
+        },
+    })
+}
+
+pub(super) fn check_level_set(at: &At<'_>, raw: &RawLevelSet, paths: &Paths) -> Result<LevelSetSource, Error> {
+    let tolerance = raw.tolerance.unwrap_or(MpuParams::default().tolerance);
+    if !(tolerance > 0.0 && tolerance <= 1.0) {
+        let message = format!("`tolerance`: expected a number above 0, up to 1, found {tolerance}");
+        return Err(at.key("tolerance").error(message, "it is a share of the diagonal of the points' box"));
+    }
+    Ok(LevelSetSource { path: paths.resolve(&at.key("points"), &raw.points)?, tolerance })
+}
+
+pub(super) fn check_slice(
+    at: &At<'_>,
+    raw: &RawSlice,
+    transfer: TransferFunction,
+    paths: &Paths,
+) -> Result<SliceSource, Error> {
+    Ok(SliceSource {
+        path: paths.resolve(&at.key("volume"), &raw.volume)?,
+        transfer,
+        center: at.vector("center", raw.center)?,
+        normal: at.direction("normal", raw.normal)?,
+    })
+}
+
+pub(super) fn check_clip(at: &At<'_>, raw: &RawClip) -> Result<Clip, Error> {
+    match (raw.normal, raw.point, raw.bounds) {
+        (Some(normal), Some(point), None) => {
+            let normal = at.direction("normal", normal)?;
+            Ok(Clip::HalfSpace { normal, offset: normal.dot(at.vector("point", point)?) })
+        }
+        (None, None, Some([low, high])) => {
+            let (from, to) = (at.vector("box", low)?, at.vector("box", high)?);
+            if !from.cmplt(to).all() {
+                let message =
+                    format!("expected a highest corner above the lowest in all axes, found {low:?} and {high:?}");
+                return Err(at.key("box").error(message, ""));
+            }
+            Ok(Clip::Box([from, to]))
+        }
+        _ => {
+            let hint = "such as { normal = [0, 1, 0], point = [0, 0.5, 0] } or { box = [[-1, -1, -1], [1, 1, 1]] }";
+            Err(at.error("expected either `normal` and `point`, or `box`", hint))
+        }
+    }
+}
