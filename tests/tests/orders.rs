@@ -60,6 +60,16 @@ fn exact_order_is_the_truth_and_disorder_costs_accuracy() {
     assert!(value(thin, "worst_backtrack") <= 1.001 * value(thin, "slice_thickness"));
     assert!(value("unsorted", "worst_backtrack") > 10.0 * value(thin, "slice_thickness"));
     assert!(value("unsorted", "bytes") < value("comparison sort by view depth", "bytes"));
+    // Particles need no order: their expectation is near the truth, and seeds spread around it.
+    let particles = report["orderings"].as_array().unwrap().iter().find(|o| !o["sampled"].is_null()).unwrap();
+    assert!(particles["wrong_pairs_per_ray"].is_null() && particles["sort_seconds"].is_null());
+    assert!(report["without_particles"].is_null());
+    let sampled = |key: &str| particles["sampled"][key].as_f64();
+    assert_eq!(particles["sampled"]["seeds"], 5);
+    let bias = sampled("rms_bias").unwrap_or(0.0);
+    println!("standard deviation {:?}, bias {bias}", sampled("standard_deviation"));
+    assert!(bias < 0.25 * value("unsorted", "rmse"), "bias {bias}");
+    assert!(sampled("standard_deviation").unwrap() > 0.0);
     let mut names: Vec<_> = fs::read_dir(folder.path().join("o")).unwrap().map(|e| e.unwrap().file_name()).collect();
     names.sort();
     assert_eq!(names, ["orders.csv", "orders.html", "orders.json", "orders.png"]);

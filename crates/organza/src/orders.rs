@@ -2,21 +2,23 @@
 //!
 //! Splats are lit once; then the translucent ones are composited in each order, with nothing cut off, and compared with the
 //! picture in which the fragments of every pixel are sorted by their own depth, in f64. Opaque surfaces enter as in any
-//! render. So the order is all that differs.
+//! render. So the order is all that differs. The technique `particles` stands beside them: it orders nothing, and its
+//! pictures of several seeds are judged by the same truth.
 
 mod report;
 
 pub use report::{OrdersReport, write};
 
+use crate::accuracy::{Renderer, Request, SEEDS, Sampled};
 use crate::load::{Loaded, load};
 use crate::points::Shaded;
 use crate::render::{drawing, plan_loaded};
-use crate::scene::Scene;
+use crate::scene::{ParticlesSettings, Scene, Technique};
 use crate::{CostRecord, Error, Progress, RenderOptions};
 use hbsort::{Params, Scratch, Thickness, slice_cloud};
 use reference::metrics::{Disorder, Image, Linear, Rays};
 use reference::statistics::{Spread, median_with_spread};
-use reference::{Input, Order, composite};
+use reference::{Input, Order, composite_with_progress};
 use splat_core::{Camera, Direction, SliceOrder, SplatKind};
 use std::time::Instant;
 
@@ -28,6 +30,9 @@ const REPEATS: usize = 5;
 
 /// About as many rays are looked at for wrong pairs.
 const RAYS: f64 = 20_000.0;
+
+/// Sets of particles that are averaged.
+const SETS: u32 = 32;
 
 /// Slices so many times thicker than the scene's own.
 const THICKER: [f64; 4] = [1.0, 8.0, 64.0, 512.0];
@@ -56,12 +61,14 @@ pub struct Ordered {
     pub thickness: Option<f64>,
     /// The picture.
     pub image: Image<Linear>,
-    /// Wrong pairs and backtracks; lengths in world units.
-    pub disorder: Disorder,
+    /// Wrong pairs and backtracks, lengths in world units; `None` where nothing is ordered.
+    pub disorder: Option<Disorder>,
     /// Seconds that putting the splats in order took.
     pub seconds: Option<Spread>,
     /// Bytes of the order and of what making it took.
     pub bytes: u64,
+    /// What the seeds of a random technique say together, by the truth as limit.
+    pub sampled: Option<Sampled>,
 }
 
 /// Pictures by every ordering, and the truth.
@@ -75,6 +82,8 @@ pub struct Comparison {
     pub truth_seconds: f64,
     /// Translucent splats that were ordered.
     pub splats: u64,
+    /// Why `particles`, which need no order, cannot show the scene; `None` where they do.
+    pub without_particles: Option<String>,
 }
 
 /// Draws a scene by every ordering. `scene.render` counts but for what concerns order, cut-offs and layers.
@@ -83,6 +92,7 @@ pub struct Comparison {
 /// As [`crate::render`]; [`Error::Input`] for a scene without translucent splats.
 pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Comparison, Error> {
     let mut scene = scene.clone();
+    scene.render.technique = Technique::Points;
     let points = &mut scene.render.points;
     (points.transmittance_cutoff, points.first_slices) = (0.0, None);
     (points.exact, points.direction) = (false, Direction::FrontToBack);
@@ -111,7 +121,7 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
     let mut orderings = Vec::new();
     let sliced = THICKER.map(|f| Ordering::Slices(f * auto));
     let all = [&[Ordering::Exact][..], &sliced, &[Ordering::Centre, Ordering::Distance, Ordering::Unsorted]].concat();
-    progress.add_total(all.len() as u64 + 1);
+    progress.add_total(all.len() as u64 + u64::from(scene.camera.size[1] * scene.render.antialias));
     for ordering in all {
         let (order, seconds, bytes) = sorter.timed(ordering)?;
         let layers = drawing.compose(&shaded, &order, &mut cost)?;
@@ -122,20 +132,21 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
             name: ordering.name(auto),
             thickness: ordering.thickness().map(|t| t * world),
             image: Image::from_layer(layers.size, beauty).map_err(|e| Error::Internal(e.to_string()))?,
-            disorder,
+            disorder: Some(disorder),
             seconds,
             bytes,
+            sampled: None,
         });
         progress.tick(1).map_err(|_| Error::Cancelled)?;
     }
     let start = Instant::now();
-    let truth = truth(&input, &scene)?;
-    Ok(Comparison {
-        orderings,
-        truth,
-        truth_seconds: start.elapsed().as_secs_f64(),
-        splats: sorter.translucent.len() as u64,
-    })
+    let truth = truth(&input, &scene, progress)?;
+    let truth_seconds = start.elapsed().as_secs_f64();
+    let unordered = particles(&scene, &truth, options, progress)?;
+    let without_particles = unordered.as_ref().err().cloned();
+    orderings.extend(unordered);
+    let splats = sorter.translucent.len() as u64;
+    Ok(Comparison { orderings, truth, truth_seconds, splats, without_particles })
 }
 
 impl Ordering {
@@ -171,13 +182,39 @@ fn exact_input<'a>(loaded: &'a Loaded, camera: &'a Camera, shaded: &'a Shaded, s
 }
 
 /// Fragments sorted per pixel, the background behind them, samples averaged.
-fn truth(input: &Input<'_>, scene: &Scene) -> Result<Image<Linear>, Error> {
-    let exact = composite(input);
+fn truth(input: &Input<'_>, scene: &Scene, progress: &Progress) -> Result<Image<Linear>, Error> {
+    let exact = composite_with_progress(input, progress).map_err(|_| Error::Cancelled)?;
     let behind = scene.background.map(f64::from);
     let pixel = |(v, t): (&Vec<f64>, &[f64; 3])| std::array::from_fn(|c| v[c] + t[c] * behind[c]);
     let pixels = exact.values.iter().zip(&exact.transmittance).map(pixel).collect();
     let image = Image::from_radiance(input.camera.size.map(|s| s as usize), pixels);
     image.map(|i| i.box_downsampled(scene.render.antialias as usize)).map_err(|e| Error::Internal(e.to_string()))
+}
+
+/// Particles, which are drawn by depth in any order, with several seeds; or why they cannot show the scene.
+fn particles(
+    scene: &Scene,
+    truth: &Image<Linear>,
+    options: &RenderOptions,
+    progress: &Progress,
+) -> Result<Result<Ordered, String>, Error> {
+    let mut scene = scene.clone();
+    scene.render.technique = Technique::Particles;
+    scene.render.particles = ParticlesSettings { repeat_level: SETS, target_error: None };
+    let mut renderer = Renderer::new(options, progress);
+    if let Some(reason) = renderer.refused(&scene)? {
+        return Ok(Err(reason));
+    }
+    let mut images = Vec::new();
+    let mut request = Request { scene, oversample: 1 };
+    for _ in 0..SEEDS {
+        images.push(renderer.draw(&request)?.image);
+        request.scene.render.seed = request.scene.render.seed.wrapping_add(1);
+    }
+    let sampled = Sampled::of(&images, truth, 0.0, None)?;
+    let name = format!("particles, {SETS} sets: none needed");
+    let image = images.swap_remove(0);
+    Ok(Ok(Ordered { name, thickness: None, image, disorder: None, seconds: None, bytes: 0, sampled }))
 }
 
 /// Splat → place, `u32::MAX` for those that are left out.

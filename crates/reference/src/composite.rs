@@ -2,7 +2,7 @@
 
 use crate::footprint::{Splat, norms};
 use rayon::prelude::*;
-use splat_core::{Camera, Cloud, FootprintStack, Material, SplatKind};
+use splat_core::{Camera, Cloud, Error, FootprintStack, Material, Progress, SplatKind};
 
 /// What the fragments of a pixel are sorted by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,6 +48,15 @@ const CORE: f64 = 0.45 * 0.45;
 
 /// Composites all splats of the input exactly, in f64.
 pub fn composite(input: &Input<'_>) -> ExactImage {
+    composite_with_progress(input, &Progress::new()).expect("invariant: nobody cancels")
+}
+
+/// [`composite`] that reports rows of pixels to `progress` and stops when that is cancelled; the caller adds the rows to the
+/// total.
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub fn composite_with_progress(input: &Input<'_>, progress: &Progress) -> Result<ExactImage, Error> {
     let [width, height] = input.camera.size.map(|s| s as usize);
     let norms = norms(input.footprints);
     let splats: Vec<Option<Splat>> =
@@ -58,24 +67,25 @@ pub fn composite(input: &Input<'_>) -> ExactImage {
             splat.range(1, height).for_each(|y| by_row[y].push(i as u32));
         }
     }
-    let pixels: Vec<Vec<Pixel>> = by_row
+    let pixels: Result<Vec<Vec<Pixel>>, Error> = by_row
         .par_iter()
         .enumerate()
         .map(|(y, ids)| {
+            progress.tick(1)?;
             let mut lists: Vec<Vec<u32>> = vec![Vec::new(); width];
             for &i in ids {
                 let splat = splats[i as usize].as_ref().expect("invariant: listed splats exist");
                 splat.range(0, width).for_each(|x| lists[x].push(i));
             }
-            lists.iter().enumerate().map(|(x, ids)| pixel(input, &splats, ids, x, y)).collect()
+            Ok(lists.iter().enumerate().map(|(x, ids)| pixel(input, &splats, ids, x, y)).collect())
         })
         .collect();
     let mut image = ExactImage { values: Vec::new(), transmittance: Vec::new() };
-    for p in pixels.into_iter().flatten() {
+    for p in pixels?.into_iter().flatten() {
         image.values.push(p.values);
         image.transmittance.push(p.transmittance);
     }
-    image
+    Ok(image)
 }
 
 struct Pixel {

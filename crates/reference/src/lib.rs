@@ -62,7 +62,7 @@ mod tracking;
 mod triangle;
 mod visibility;
 
-pub use composite::{ExactImage, Input, Order, composite};
+pub use composite::{ExactImage, Input, Order, composite, composite_with_progress};
 pub use density::{Density, Lattice};
 pub use dielectric::{
     CHANNEL_WAVELENGTHS_UM, Cauchy, Dielectric, fresnel_reflectance, reflect, refract, transmitted_cosine,

@@ -13,7 +13,7 @@ pub(super) enum Mark {
     Dots,
     /// A thin dashed line without dots.
     Dashed,
-    /// A broad pale line that goes down in steps.
+    /// A broad pale line that comes from above, goes down in steps and on to the right.
     Steps,
     /// A line from each even point to the next one, with a cap at both ends.
     Bars,
@@ -70,7 +70,7 @@ impl Axis {
         let decades = (self.high / self.low).log10();
         let first = self.low.log10().floor() as i32;
         let all = (first..=first + decades.ceil() as i32 + 1).flat_map(|d| (1..10).map(move |m| (d, m)));
-        let lettered = |m: i32| m == 1 || decades < 2.2 && matches!(m, 2 | 5) || decades < 0.5;
+        let lettered = |m: i32| m == 1 || decades < 2.2 && matches!(m, 2 | 5) || decades < 0.7;
         all.map(|(d, m)| (f64::from(m) * 10f64.powi(d), lettered(m)))
             .filter(|(v, lettered)| (self.low..=self.high).contains(v) && (*lettered || decades < 4.0))
             .collect()
@@ -136,7 +136,8 @@ fn draw(svg: &mut String, series: &Series, x: &Axis, y: &Axis) {
         let mut d = String::new();
         for (i, ([px, py], _)) in placed.iter().enumerate() {
             let _ = match (i, step) {
-                (0, _) => write!(d, "M{px:.1} {py:.1}"),
+                (0, true) => write!(d, "M{px:.1} {:.1}V{py:.1}", y.to),
+                (0, false) => write!(d, "M{px:.1} {py:.1}"),
                 (_, true) => write!(d, "H{px:.1}V{py:.1}"),
                 (_, false) => write!(d, "L{px:.1} {py:.1}"),
             };
@@ -145,7 +146,8 @@ fn draw(svg: &mut String, series: &Series, x: &Axis, y: &Axis) {
     };
     let _ = match series.mark {
         Mark::Steps => {
-            let d = path(true);
+            // What lies above and to the right of the line is no better than what lies on it.
+            let d = if placed.is_empty() { String::new() } else { format!("{}H{:.1}", path(true), x.to) };
             writeln!(
                 svg,
                 "<path d=\"{d}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"5\" stroke-opacity=\"0.28\"/>"

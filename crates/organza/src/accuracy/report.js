@@ -1,7 +1,7 @@
 for (const figure of document.querySelectorAll(".flip")) {
-  const picture = figure.querySelector("img"), buttons = [...figure.querySelectorAll("button")];
+  const picture = figure.querySelector("img"), own = picture.src, buttons = [...figure.querySelectorAll("button")];
   const show = (k) => {
-    picture.src = document.getElementById(buttons[k].dataset.of).src;
+    picture.src = buttons[k].dataset.of ? document.getElementById(buttons[k].dataset.of).src : own;
     buttons.forEach((b, i) => b.setAttribute("aria-pressed", i === k));
   };
   buttons.forEach((b, k) => b.addEventListener("click", () => show(k)));

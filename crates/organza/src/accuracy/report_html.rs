@@ -56,7 +56,7 @@ fn rmse(o: &Outcome) -> Option<f64> {
 
 fn summary(html: &mut String, study: &Study) {
     let own = &study.outcomes[0];
-    let _ = write!(html, "<h2>Technique: {}</h2>\n<div class=\"cards\">", study.technique);
+    let _ = write!(html, "<h2 class=\"technique\">Technique: {}</h2>\n<div class=\"cards\">", study.technique);
     let mut card = |value: String, what: &str| {
         let _ = write!(html, "<div class=\"card\"><b>{}</b><span>{what}</span></div>", escaped(&value));
     };
@@ -139,7 +139,7 @@ fn knob_plots(html: &mut String, study: &Study) {
         let meaning = knob.map_or("", |k| k.size_meaning);
         match knob_plot(study, curve, meaning) {
             Some(plot) => *html += &plot.svg(),
-            None => *html += "<p>No step differs from the end by more than can be shown.</p>",
+            None => *html += "<p>No step is ten times farther from the end than the end's own error.</p>",
         }
         let _ = writeln!(html, "<p>{}</p></figure>", escaped(&verdict(study, curve)));
     }
@@ -226,9 +226,9 @@ fn pictures(html: &mut String, study: &Study, exposure: f64, at: usize) -> Resul
         let _ = writeln!(
             html,
             "<figure class=\"flip\"><img src=\"{a}\" alt=\"{label}\"><h3>{label}</h3>\
-             <button data-of=\"a{at}-{i}\" aria-pressed=\"true\">setting</button><button data-of=\"limit{at}\" \
+             <button aria-pressed=\"true\">setting</button><button data-of=\"limit{at}\" \
              aria-pressed=\"false\">limit</button><button data-of=\"d{at}-{i}\" aria-pressed=\"false\">difference x {gain}\
-             </button><span class=\"soft\">{flip}</span><img hidden id=\"a{at}-{i}\" alt=\"\" src=\"{a}\"><img hidden \
+             </button><span class=\"soft\">{flip}</span><img hidden \
              id=\"d{at}-{i}\" alt=\"\" src=\"{d}\"></figure>"
         );
     }

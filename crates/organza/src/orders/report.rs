@@ -65,15 +65,21 @@ impl OrdersReport {
             json!({
                 "ordering": o.name,
                 "slice_thickness": o.thickness,
-                "wrong_pairs_per_ray": o.disorder.wrong_pairs_per_ray,
-                "pairs_per_ray": o.disorder.pairs_per_ray,
-                "worst_backtrack": o.disorder.worst_backtrack,
+                "wrong_pairs_per_ray": o.disorder.map(|d| d.wrong_pairs_per_ray),
+                "pairs_per_ray": o.disorder.map(|d| d.pairs_per_ray),
+                "worst_backtrack": o.disorder.map(|d| d.worst_backtrack),
                 "rmse": d.linear.rmse,
                 "max": d.linear.max,
                 "flip": d.flip,
                 "epsilon_8_bit": d.epsilon,
                 "sort_seconds": o.seconds.map(|s| json!({ "median": s.median, "min": s.min, "max": s.max })),
                 "bytes": o.bytes,
+                "sampled": o.sampled.map(|s| json!({
+                    "seeds": s.seeds,
+                    "rmse": { "mean": s.from_limit.mean, "half_width_95": s.from_limit.half_width },
+                    "standard_deviation": s.noise,
+                    "rms_bias": s.bias,
+                })),
             })
         };
         let document = json!({
@@ -83,7 +89,8 @@ impl OrdersReport {
             "size": self.comparison.truth.size(),
             "machine": { "cpu": self.machine.cpu, "system": self.machine.system, "threads": self.machine.threads },
             "translucent_splats": self.comparison.splats,
-            "rays": self.comparison.orderings.first().map(|o| o.disorder.rays),
+            "rays": self.comparison.orderings.iter().find_map(|o| o.disorder).map(|d| d.rays),
+            "without_particles": self.comparison.without_particles,
             "truth": { "method": "fragments sorted per pixel, f64", "seconds": self.comparison.truth_seconds },
             "orderings": self.rows().map(row).collect::<Value>(),
         });
@@ -93,23 +100,26 @@ impl OrdersReport {
     /// One line an ordering.
     pub fn csv(&self) -> String {
         let mut text = String::from(
-            "ordering,slice_thickness,wrong_pairs_per_ray,pairs_per_ray,worst_backtrack,rmse,max,flip,sort_ms,bytes\n",
+            "ordering,slice_thickness,wrong_pairs_per_ray,pairs_per_ray,worst_backtrack,rmse,max,flip,sort_ms,bytes,\
+             rmse_half_width_95,rms_bias\n",
         );
         let cell = |v: Option<f64>| v.map_or_else(String::new, |v| format!("{v:.6e}"));
         for (o, d) in self.rows() {
             let _ = writeln!(
                 text,
-                "\"{}\",{},{:.6e},{:.6e},{:.6e},{:.6e},{:.6e},{:.6e},{},{}",
+                "\"{}\",{},{},{},{},{:.6e},{:.6e},{:.6e},{},{},{},{}",
                 o.name,
                 cell(o.thickness),
-                o.disorder.wrong_pairs_per_ray,
-                o.disorder.pairs_per_ray,
-                o.disorder.worst_backtrack,
+                cell(o.disorder.map(|d| d.wrong_pairs_per_ray)),
+                cell(o.disorder.map(|d| d.pairs_per_ray)),
+                cell(o.disorder.map(|d| d.worst_backtrack)),
                 d.linear.rmse,
                 d.linear.max,
                 d.flip,
                 cell(o.seconds.map(|s| 1e3 * s.median)),
-                o.bytes
+                o.bytes,
+                cell(o.sampled.map(|s| s.from_limit.half_width)),
+                cell(o.sampled.and_then(|s| s.bias)),
             );
         }
         text
@@ -125,14 +135,18 @@ impl OrdersReport {
             let ms = o.seconds.map_or_else(|| "-".into(), |s| format!("{:.2}", 1e3 * s.median));
             let _ = writeln!(
                 text,
-                "{:>12.3} {:>12.4} {:>10.2e} {:>10.2e} {ms:>9} {:>11}  {}",
-                o.disorder.wrong_pairs_per_ray,
-                o.disorder.worst_backtrack,
+                "{:>12} {:>12} {:>10.2e} {:>10.2e} {ms:>9} {:>11}  {}{}",
+                o.disorder.map_or_else(|| "-".into(), |d| format!("{:.3}", d.wrong_pairs_per_ray)),
+                o.disorder.map_or_else(|| "-".into(), |d| format!("{:.4}", d.worst_backtrack)),
                 d.linear.rmse,
                 d.linear.max,
                 o.bytes,
-                o.name
+                o.name,
+                seeds(o)
             );
+        }
+        if let Some(reason) = &self.comparison.without_particles {
+            let _ = writeln!(text, "no particles: {reason}");
         }
         text
     }
@@ -185,15 +199,17 @@ impl OrdersReport {
             self.scene_sha256
         );
         for (o, d) in self.rows() {
+            let pairs = o
+                .disorder
+                .map_or_else(|| "–".into(), |d| format!("{:.3} of {:.0}", d.wrong_pairs_per_ray, d.pairs_per_ray));
             let ms = o.seconds.map_or_else(|| "–".into(), |s| format!("{:.2}", 1e3 * s.median));
             let _ = writeln!(
                 html,
-                "<tr><td>{}</td><td>{:.3} of {:.0}</td><td>{:.4}</td><td>{:.2e}</td><td>{:.2e}</td><td>{:.4}</td><td>{ms}</td>\
+                "<tr><td>{}{}</td><td>{pairs}</td><td>{}</td><td>{:.2e}</td><td>{:.2e}</td><td>{:.4}</td><td>{ms}</td>\
                  <td>{}</td></tr>",
                 o.name,
-                o.disorder.wrong_pairs_per_ray,
-                o.disorder.pairs_per_ray,
-                o.disorder.worst_backtrack,
+                seeds(o),
+                o.disorder.map_or_else(|| "–".into(), |d| format!("{:.4}", d.worst_backtrack)),
                 d.linear.rmse,
                 d.linear.max,
                 d.flip,
@@ -212,16 +228,23 @@ impl OrdersReport {
             let (a, d, name) = (data_uri(&shown)?, data_uri(&apart)?, &o.name);
             let _ = writeln!(
                 html,
-                "<figure class=\"flip\"><img src=\"{a}\" alt=\"{name}\"><h3>{name}</h3><button data-of=\"a{k}\" \
+                "<figure class=\"flip\"><img src=\"{a}\" alt=\"{name}\"><h3>{name}</h3><button \
                  aria-pressed=\"true\">ordering</button><button data-of=\"truth\" aria-pressed=\"false\">truth</button><button \
-                 data-of=\"d{k}\" aria-pressed=\"false\">difference x {gain}</button><img hidden id=\"a{k}\" alt=\"\" \
-                 src=\"{a}\"><img hidden id=\"d{k}\" alt=\"\" src=\"{d}\"></figure>"
+                 data-of=\"d{k}\" aria-pressed=\"false\">difference x {gain}</button><img hidden id=\"d{k}\" alt=\"\" src=\"{d}\"></figure>"
             );
         }
         let _ =
             write!(html, "</div></main>\n<script>\n{}</script></body></html>\n", include_str!("../accuracy/report.js"));
         Ok(html)
     }
+}
+
+/// What the seeds of a random technique say, beside its name: the picture and its measures are those of the first one.
+fn seeds(o: &Ordered) -> String {
+    let Some(s) = &o.sampled else { return String::new() };
+    let bias = s.bias.map_or_else(|| "none at 95 %".into(), |b| format!("{b:.1e}"));
+    let (mean, half) = (s.from_limit.mean, s.from_limit.half_width);
+    format!(" ({} seeds: RMSE {mean:.2e} ± {half:.0e}, bias {bias})", s.seeds)
 }
 
 /// Writes `orders.json`, `orders.csv`, `orders.html` and `orders.png`; each appears whole or not at all, and none before all
