@@ -2,6 +2,7 @@
 
 use crate::Params;
 use crate::frame::Frame;
+use crate::mapping::floor;
 use glam::Vec3;
 use splat_core::optics::{self, AbsorbanceModel, SurfaceOpacity};
 use splat_core::{Cloud, Footprint, FootprintStack, Material, Object, SplatKind, glam};
@@ -33,13 +34,11 @@ impl Kernel {
     }
 
     /// Profile at s = ρ²/R², see [`splat_core::Footprint::profile`].
-    #[inline]
+    #[inline(always)]
     pub(crate) fn profile(&self, s: f32) -> f32 {
-        if s >= 1.0 {
-            return 0.0;
-        }
         let x = self.sharpness * (1.0 - s);
-        exp_negative(self.sharpness * s) - self.rim * (1.0 + x + 0.5 * x * x)
+        let inside = exp_negative(self.sharpness * s) - self.rim * (1.0 + x + 0.5 * x * x);
+        if s < 1.0 { inside } else { 0.0 }
     }
 }
 
@@ -55,10 +54,10 @@ fn deviation(f: &Footprint) -> f32 {
 const EXP2: [f32; 6] = [0.999_999_9, 0.693_154_5, 0.240_141_82, 0.055_860_337, 0.008_949_591, 0.001_893_754_1];
 
 /// e^−x for 0 ≤ x ≤ 64, in registers.
-#[inline]
+#[inline(always)]
 fn exp_negative(x: f32) -> f32 {
     let y = x * std::f32::consts::LOG2_E;
-    let whole = y as i32 + 1;
+    let whole = floor(y) + 1;
     let part = whole as f32 - y;
     let mantissa = EXP2.iter().rev().fold(0.0, |sum, c| sum * part + c);
     f32::from_bits(((127 - whole) << 23) as u32) * mantissa
@@ -114,14 +113,45 @@ pub(crate) struct Casters<'a> {
     pub(crate) objects: &'a [Object],
     pub(crate) kernels: Vec<Kernel>,
     pub(crate) params: &'a Params,
+    /// Whether some object may throw no shadow, and whether some material may absorb channels differently.
+    pub(crate) may_spare: bool,
+    pub(crate) may_colour: bool,
+}
+
+impl<'a> Casters<'a> {
+    pub(crate) fn new(cloud: &'a Cloud, materials: &[Material], objects: &'a [Object], params: &'a Params) -> Self {
+        let extinctions: Vec<_> = materials.iter().map(Extinction::of).collect();
+        let is_coloured = |e: &Extinction| e.rgb[0] != e.rgb[1] || e.rgb[1] != e.rgb[2];
+        Self {
+            cloud,
+            objects,
+            kernels: Kernel::of_stack(&params.footprints),
+            params,
+            may_spare: objects.iter().any(|o| !o.casts_shadow),
+            may_colour: extinctions.iter().any(is_coloured) || is_coloured(&Extinction::default()),
+            extinctions,
+        }
+    }
 }
 
 impl Casters<'_> {
     /// Whether splat `i` throws a shadow at all.
     #[inline(always)]
     pub(crate) fn casts(&self, i: usize) -> bool {
-        let object = self.objects.get(self.cloud.object[i] as usize);
-        self.cloud.cross_section[i] > 0.0 && object.is_none_or(|o| o.casts_shadow)
+        let casts = |object: u32| self.objects.get(object as usize).is_none_or(|o| o.casts_shadow);
+        self.cloud.cross_section[i] > 0.0 && (!self.may_spare || casts(self.cloud.object[i]))
+    }
+
+    /// Whether splat `i` throws its shadow as a disc of its area.
+    #[inline(always)]
+    pub(crate) fn is_opaque_disc(&self, i: usize) -> bool {
+        self.cloud.kind[i] == SplatKind::Opaque && self.has_opaque_discs()
+    }
+
+    /// Whether opaque splats throw their shadows as discs.
+    #[inline(always)]
+    pub(crate) fn has_opaque_discs(&self) -> bool {
+        self.params.absorbance == AbsorbanceModel::CrossSection
     }
 
     /// The kernel of splat `i`; an unknown footprint id means the first.
@@ -140,11 +170,17 @@ impl Casters<'_> {
     /// Radius of the part that throws the shadow, world units: the kernel's, or the dilated disc's.
     #[inline]
     pub(crate) fn shadow_radius(&self, i: usize) -> f32 {
-        if self.cloud.kind[i] == SplatKind::Opaque && self.params.absorbance == AbsorbanceModel::CrossSection {
-            self.params.opaque_dilation * (self.cloud.cross_section[i] * std::f32::consts::FRAC_1_PI).sqrt()
+        if self.is_opaque_disc(i) {
+            self.shadow_radius_of_area(self.cloud.cross_section[i])
         } else {
             self.cloud.radius[i]
         }
+    }
+
+    /// Radius of the dilated disc of an opaque splat that stands for an area.
+    #[inline(always)]
+    pub(crate) fn shadow_radius_of_area(&self, area: f32) -> f32 {
+        self.params.opaque_dilation * (area * std::f32::consts::FRAC_1_PI).sqrt()
     }
 
     /// Splat `i` in the light's frame.
@@ -191,27 +227,28 @@ impl Casters<'_> {
     }
 
     fn add_disc(&self, i: usize, frame: &Frame, caster: &mut Caster) {
+        let is_opaque = caster.kind == SplatKind::Opaque && caster.paper_absorbance.is_none();
+        let shadow = is_opaque.then(|| frame.length(self.shadow_radius(i)));
+        let tangent = frame.displacement(self.cloud.tangent_of(i));
         let normal = frame.turn(self.cloud.normal_of(i));
-        let mut first = frame.displacement(self.cloud.tangent_of(i));
-        first -= normal * normal.dot(first);
-        let mut length = first.length();
-        if length <= 0.0 {
-            first = normal.any_orthonormal_vector() * caster.radius;
-            length = caster.radius;
-        }
-        let second = normal.cross(first / length) * caster.radius;
-        let mut scale = 1.0;
-        if caster.kind == SplatKind::Opaque && caster.paper_absorbance.is_none() {
-            // The disc keeps its aspect and has the area that the splat stands for, dilated.
-            let disc = frame.length(self.shadow_radius(i));
-            scale = disc / (length * caster.radius).sqrt();
-            caster.radius = disc.max(scale * length.max(caster.radius));
-        } else {
-            caster.radius = caster.radius.max(length);
-        }
-        caster.axes = [first * scale, second * scale];
-        caster.normal = normal;
+        (caster.axes, caster.normal, caster.radius) = disc(normal, tangent, caster.radius, shadow);
     }
+}
+
+/// Semi-axes, normal and longer semi-axis of a disc; with `shadow` in the size that throws the shadow: it keeps its
+/// aspect and has the area that the splat stands for, dilated.
+#[inline(always)]
+pub(crate) fn disc(normal: Vec3, tangent: Vec3, radius: f32, shadow: Option<f32>) -> ([Vec3; 2], Vec3, f32) {
+    let first = tangent - normal * normal.dot(tangent);
+    let length = first.length();
+    let is_circle = length <= 0.0;
+    let first = if is_circle { normal.any_orthonormal_vector() * radius } else { first };
+    let length = if is_circle { radius } else { length };
+    let second = normal.cross(first / length) * radius;
+    let longer = length.max(radius);
+    let Some(shadow) = shadow else { return ([first, second], normal, longer) };
+    let scale = shadow / (length * radius).sqrt();
+    ([first * scale, second * scale], normal, shadow.max(scale * longer))
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! What a map costs: predicted before any work, counted afterwards.
 
+use crate::appearance::Appearance;
 use crate::mapping::Octahedral;
-use crate::survey::{Appearance, Survey};
+use crate::survey::Survey;
 use splat_core::SplatKind;
 
 /// Work and memory predicted from the casters' apparent sizes.

@@ -17,11 +17,12 @@
 //! the table; `AbsorbanceModel::Paper` does that.
 
 use crate::caster::Caster;
+use crate::entries::Entries;
 use crate::mapping::{Mapping, Ray};
+use crate::media::MediaBatches;
 use crate::overlap::{Ellipse, Sink, Spread};
 use crate::sampling::{NEAR, Sampled};
 use crate::shares::{BLOCK, between};
-use crate::table::Entries;
 use glam::{Vec2, Vec3};
 use splat_core::{SplatKind, glam};
 
@@ -48,6 +49,18 @@ fn through(band: Band, x: f32) -> f32 {
     between((x - band[0]) * (1.0 / (band[1] - band[0])), 0.0, 1.0)
 }
 
+/// Whether a medium of this footprint and angular radius takes the closed form alone, away from edges between octants:
+/// what [`Deposit::add`] would decide, without a branch.
+#[inline(always)]
+pub(crate) fn is_plain<M: Mapping>(mapping: &M, at: Vec2, spread: Spread, angle: f32) -> bool {
+    let half = spread.half_extents();
+    let [least, most] = [half.min_element(), half.max_element()];
+    let is_small = (angle <= CLOSE[0]) & (least <= WIDE[0]) & (most * angle <= BENT[0]);
+    let is_clear = (mapping.clearance(at, half) >= CLEAR[1]) | (least <= SMALL[0]);
+    let is_whole = mapping.is_folded() | spread.is_within(mapping.size());
+    is_small & is_clear & is_whole & !mapping.is_creased(at, half)
+}
+
 /// Distance along `ray` to the plane through `p` with normal `n`; `None` where the ray never meets it.
 #[inline]
 pub(crate) fn plane_distance(p: Vec3, n: Vec3, ray: &Ray) -> Option<f32> {
@@ -60,6 +73,9 @@ pub(crate) fn plane_distance(p: Vec3, n: Vec3, ray: &Ray) -> Option<f32> {
 pub(crate) struct Scratch<const C: usize> {
     pub(crate) media: Entries<C>,
     pub(crate) surfaces: Entries<C>,
+    pub(crate) batches: MediaBatches,
+    /// Splats of a chunk that go side by side, and those that go one by one.
+    pub(crate) ids: [Vec<u32>; 2],
     sampled: Sampled,
     shares: Vec<(u32, f32)>,
 }
@@ -94,7 +110,7 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
         let bent = self.weight(caster, through(BENT, most * angle).max(corner)) * (1.0 - wide);
         let mut rest = 1.0 - wide - bent;
         // Between two powers of two, both numbers of rays are taken in part.
-        let octave = between(RAYS / least, 1.0, FINE).log2();
+        let octave = if bent > 0.0 { between(RAYS / least, 1.0, FINE).log2() } else { 0.0 };
         let finer = self.weight(caster, octave.fract());
         let rays = 1 << octave as u32;
         for (weight, samples) in [(wide, 1), (bent * (1.0 - finer), rays), (bent * finer, 2 * rays)] {

@@ -25,22 +25,29 @@
 //! 8 bytes a cell. See `README.md` for symbols, deviations from the paper, and measured speed.
 #![forbid(unsafe_code)]
 
+mod appearance;
 mod caster;
 mod cost;
 mod deposit;
+mod discs;
+mod entries;
 mod error;
 mod frame;
+mod lanes;
 mod lookup;
 pub mod mapping;
+mod media;
 mod opaque;
 mod overlap;
 mod params;
 mod plan;
 mod query;
+mod rays;
 pub mod reference;
 mod sampling;
 mod shadow_map;
 mod shares;
+mod sort;
 mod survey;
 mod table;
 

@@ -38,13 +38,18 @@ impl Spread {
         if caster.kind == SplatKind::Medium {
             return Self::of_ball(caster.radius, [gu, gv]);
         }
-        let u = caster.axes.map(|a| gu.dot(a));
-        let v = caster.axes.map(|a| gv.dot(a));
+        Self::of_disc(caster.axes, [gu, gv])
+    }
+
+    #[inline(always)]
+    pub(crate) fn of_disc(axes: [Vec3; 2], [gu, gv]: [Vec3; 2]) -> Self {
+        let u = axes.map(|a| gu.dot(a));
+        let v = axes.map(|a| gv.dot(a));
         Self { uu: u[0] * u[0] + u[1] * u[1], vv: v[0] * v[0] + v[1] * v[1], uv: u[0] * v[0] + u[1] * v[1] }
     }
 
     #[inline(always)]
-    fn of_ball(radius: f32, [gu, gv]: [Vec3; 2]) -> Self {
+    pub(crate) fn of_ball(radius: f32, [gu, gv]: [Vec3; 2]) -> Self {
         let square = radius * radius;
         Self { uu: gu.length_squared() * square, vv: gv.length_squared() * square, uv: gu.dot(gv) * square }
     }
@@ -53,6 +58,13 @@ impl Spread {
     #[inline(always)]
     pub(crate) fn half_extents(self) -> Vec2 {
         Vec2::new(self.uu.sqrt(), self.vv.sqrt())
+    }
+
+    /// Whether it is no wider and no higher than a table of this size.
+    #[inline(always)]
+    pub(crate) fn is_within(self, size: [u32; 2]) -> bool {
+        let [u, v] = size.map(|n| n as f32);
+        (self.uu <= u * u) & (self.vv <= v * v)
     }
 
     /// No wider and no higher than a table of this size.
@@ -70,6 +82,15 @@ impl Spread {
     }
 }
 
+/// Two triweights, one along the rows' axis and one within a row, about a slant line.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Widths {
+    /// Half widths within a row and across rows, in cells.
+    pub(crate) half: [f32; 2],
+    /// Columns by which the middle moves from a row to the next.
+    pub(crate) slant: f32,
+}
+
 /// An ellipse in table coordinates whose overlap with cells is wanted.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Ellipse {
@@ -81,9 +102,9 @@ pub(crate) struct Ellipse {
 }
 
 impl Ellipse {
-    /// Gives all rows to `sink`.
+    /// The triweights whose product it becomes.
     #[inline(always)]
-    pub(crate) fn overlap(&self, sink: &mut impl Sink) {
+    pub(crate) fn widths(&self) -> Widths {
         let Spread { uu, vv, uv } = self.spread;
         let square = (HALF_WIDTH * self.deviation) * (HALF_WIDTH * self.deviation);
         let half_v = (vv * square).sqrt().max(LEAST_HALF);
@@ -93,6 +114,13 @@ impl Ellipse {
         let height = (2.0 * half_v).min(1.0);
         let off = (uu * square - slant * (uv * square)).max(0.0);
         let half_u = (off + slant * slant * height * height * ROW_WIDTH).sqrt().max(LEAST_HALF);
+        Widths { half: [half_u, half_v], slant }
+    }
+
+    /// Gives all rows to `sink`.
+    #[inline(always)]
+    pub(crate) fn overlap(&self, sink: &mut impl Sink) {
+        let Widths { half: [half_u, half_v], slant } = self.widths();
         let rows = Axis::new(self.at.y, half_v);
         let mut columns = Axis::new(self.at.x, half_u);
         let mut block = columns.shares(columns.first);

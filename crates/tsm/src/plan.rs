@@ -1,10 +1,11 @@
 //! From light and casters to a mapping: kind, frame, and number of cells; and the memory it will take.
 
+use crate::appearance::{Apparent, Appearance, SECTORS};
 use crate::caster::Casters;
 use crate::cost::{self, Prediction};
 use crate::frame::{Frame, axes_along};
 use crate::mapping::{Mapping, Octahedral, Planar, PolarAzimuth, PolarRange, Table, with_mapping};
-use crate::survey::{Apparent, Appearance, SECTORS, Survey};
+use crate::survey::Survey;
 use crate::{Error, MappingChoice, Resolution};
 use glam::{DVec3, Vec2};
 use splat_core::{Light, LightShape, glam};

@@ -6,6 +6,7 @@
 
 use crate::caster::Caster;
 use crate::mapping::{Mapping, Ray};
+use crate::rays::Rays;
 use crate::reference::erf;
 use glam::{Vec2, Vec3};
 use splat_core::optics::SurfaceOpacity;
@@ -21,6 +22,8 @@ const TORN: f64 = 1e-3;
 /// A footprint on the rays of cells.
 #[derive(Debug, Default)]
 pub(crate) struct Sampled {
+    /// Cells to be sampled, by cell, column and row.
+    window: Vec<[u32; 3]>,
     /// Cell, weight, and distance of the entry.
     pub(crate) cells: Vec<(u32, f32, f32)>,
     /// Absorbance per weight.
@@ -30,30 +33,10 @@ pub(crate) struct Sampled {
 impl Sampled {
     /// Samples `samples`² rays of each cell within about `half` of `at`.
     pub(crate) fn fill<M: Mapping>(&mut self, mapping: &M, caster: &Caster, at: Vec2, half: Vec2, samples: u32) {
-        let [columns, rows] = mapping.size().map(|n| n as i32);
-        // Across a fold columns and rows may change places.
-        let reach = if mapping.is_folded() { Vec2::splat(half.max_element()) } else { half } * 1.2 + 0.5;
-        let span = |centre: f32, reach: f32, n: i32| {
-            if 2.0 * reach >= n as f32 { 0..n } else { (centre - reach).floor() as i32..(centre + reach).ceil() as i32 }
-        };
-        let (us, vs) = (span(at.x, reach.x, columns), span(at.y, reach.y, rows));
+        self.open_window(mapping, at, half);
         self.cells.clear();
-        let mut norm = 0.0f64;
-        for row in vs.clone() {
-            for column in us.clone() {
-                let Some(cell) = mapping.wrap(column, row) else { continue };
-                // Beside some corners of a folded table, what lies beyond an edge lies within reach on this side too.
-                let direct = (0..columns).contains(&column) && (0..rows).contains(&row);
-                if !direct && us.contains(&(cell as i32 % columns)) && vs.contains(&(cell as i32 / columns)) {
-                    continue;
-                }
-                let (weight, area, distance) = sample_cell(mapping, caster, cell, samples, false);
-                if weight > 0.0 {
-                    norm += f64::from(area);
-                    self.cells.push((cell, weight, distance));
-                }
-            }
-        }
+        let work = Rays { mapping, caster, samples, near: false, window: &self.window, cells: &mut self.cells };
+        let norm = pulp::Arch::new().dispatch(work);
         // Normalising by the samples keeps K to the last digit. Where they resolve the footprint and yet do not add up
         // (it is clipped by the table, or torn by a corner of a folded one), its true area keeps the optical depth of
         // each ray instead.
@@ -66,29 +49,51 @@ impl Sampled {
         self.scale = (f64::from(caster.cross_section) / norm) as f32;
     }
 
+    /// Finds the cells within about `half` of `at`.
+    fn open_window<M: Mapping>(&mut self, mapping: &M, at: Vec2, half: Vec2) {
+        let [columns, rows] = mapping.size().map(|n| n as i32);
+        // Across a fold columns and rows may change places.
+        let reach = if mapping.is_folded() { Vec2::splat(half.max_element()) } else { half } * 1.2 + 0.5;
+        let span = |centre: f32, reach: f32, n: i32| {
+            if 2.0 * reach >= n as f32 { 0..n } else { (centre - reach).floor() as i32..(centre + reach).ceil() as i32 }
+        };
+        let (us, vs) = (span(at.x, reach.x, columns), span(at.y, reach.y, rows));
+        self.window.clear();
+        for row in vs.clone() {
+            for column in us.clone() {
+                let Some(cell) = mapping.wrap(column, row) else { continue };
+                let (u, v) = (cell % columns as u32, cell / columns as u32);
+                // Beside some corners of a folded table, what lies beyond an edge lies within reach on this side too.
+                let direct = (0..columns).contains(&column) && (0..rows).contains(&row);
+                if direct || !(us.contains(&(u as i32)) && vs.contains(&(v as i32))) {
+                    self.window.push([cell, u, v]);
+                }
+            }
+        }
+    }
+
     /// Samples every cell along half-rays, for a caster near or around the light.
     pub(crate) fn sweep<M: Mapping>(&mut self, mapping: &M, caster: &Caster) {
         let [columns, rows] = mapping.size();
         let side = (mapping.measure((rows / 2) * columns + columns / 2).max(0.0) as f32).sqrt();
         let samples = (RESOLVED * side / NEAR).ceil().clamp(1.0, 32.0) as u32;
+        self.window.clear();
+        self.window.extend((0..columns * rows).map(|cell| [cell, cell % columns, cell / columns]));
         self.cells.clear();
+        let window = &self.window;
+        let work = Rays { mapping, caster, samples, near: true, window, cells: &mut self.cells };
+        pulp::Arch::new().dispatch(work);
         self.scale = caster.cross_section / footprint_area(caster);
-        for cell in 0..columns * rows {
-            let (weight, _, distance) = sample_cell(mapping, caster, cell, samples, true);
-            if weight > 0.0 {
-                self.cells.push((cell, weight, distance));
-            }
-        }
     }
 }
 
-/// Mean weight of a cell, the area of the footprint that it covers, and the distance of the entry.
-fn sample_cell<M: Mapping>(mapping: &M, caster: &Caster, cell: u32, samples: u32, near: bool) -> (f32, f32, f32) {
+/// Mean weight of a disc in a cell, the area of it that the cell covers, and the distance of the entry.
+pub(crate) fn sample_disc<M: Mapping>(mapping: &M, caster: &Caster, cell: u32, samples: u32) -> (f32, f32, f32) {
     let parallel = mapping.is_parallel();
     let [columns, _] = mapping.size();
     let inverse_measure = mapping.inverse_measure(cell % columns, cell / columns);
     if samples == 1 {
-        let Some(s) = sample(caster, &mapping.cell_ray(cell), parallel, near) else { return (0.0, 0.0, 0.0) };
+        let Some(s) = meet_disc(caster, &mapping.cell_ray(cell), parallel) else { return (0.0, 0.0, 0.0) };
         return (s.weight * s.gain, s.weight * s.jacobian / inverse_measure, s.distance);
     }
     let corner = Vec2::new((cell % columns) as f32, (cell / columns) as f32);
@@ -98,7 +103,7 @@ fn sample_cell<M: Mapping>(mapping: &M, caster: &Caster, cell: u32, samples: u32
         let ray = mapping.ray(corner + step / samples as f32);
         let density = mapping.density(&ray);
         total += density;
-        let Some(s) = sample(caster, &ray, parallel, near) else { continue };
+        let Some(s) = meet_disc(caster, &ray, parallel) else { continue };
         weight += density * s.weight * s.gain;
         area += density * s.weight * s.jacobian;
         distance += density * s.weight * s.gain * s.distance;
@@ -119,6 +124,7 @@ fn footprint_area(caster: &Caster) -> f32 {
     radii / caster.kernel.norm
 }
 
+/// A disc on one ray.
 struct Sample {
     weight: f32,
     /// Area of the footprint per measure of the table.
@@ -127,35 +133,9 @@ struct Sample {
     distance: f32,
 }
 
-#[inline]
-fn sample(caster: &Caster, ray: &Ray, parallel: bool, near: bool) -> Option<Sample> {
-    if caster.kind == SplatKind::Medium {
-        sample_medium(caster, ray, parallel, near)
-    } else {
-        sample_disc(caster, ray, parallel)
-    }
-}
-
-#[inline]
-fn sample_medium(caster: &Caster, ray: &Ray, parallel: bool, near: bool) -> Option<Sample> {
-    let p = caster.position - ray.base;
-    let along = p.dot(ray.direction);
-    let s = (p - ray.direction * along).length_squared() * caster.inverse_radius_sq;
-    if s >= 1.0 || (!near && along <= 0.0) {
-        return None;
-    }
-    let weight = caster.kernel.profile(s);
-    if near {
-        let (share, distance) = ahead(caster, along, s)?;
-        return Some(Sample { weight: weight * share, jacobian: 1.0, gain: 1.0, distance });
-    }
-    let jacobian = if parallel { 1.0 } else { along * caster.distance };
-    Some(Sample { weight, jacobian, gain: 1.0, distance: caster.distance })
-}
-
 /// Share of the kernel's chord that lies ahead of the light, and its mean distance; the kernel along the chord is a
 /// Gaussian cut where the kernel ends.
-fn ahead(caster: &Caster, along: f32, s: f32) -> Option<(f32, f32)> {
+pub(crate) fn ahead(caster: &Caster, along: f32, s: f32) -> Option<(f32, f32)> {
     let half = caster.radius * (1.0 - s).sqrt();
     if along >= half {
         return Some((1.0, along));
@@ -174,13 +154,13 @@ fn ahead(caster: &Caster, along: f32, s: f32) -> Option<(f32, f32)> {
 }
 
 #[inline]
-fn sample_disc(caster: &Caster, ray: &Ray, parallel: bool) -> Option<Sample> {
+fn meet_disc(caster: &Caster, ray: &Ray, parallel: bool) -> Option<Sample> {
     let cosine = ray.direction.dot(caster.normal);
     let t = (caster.position - ray.base).dot(caster.normal) / cosine;
     if !(t > 0.0 && t.is_finite()) {
         return None;
     }
-    let s = disc_coordinate(caster, ray.base + ray.direction * t - caster.position);
+    let s = disc_coordinate(caster.axes, ray.base + ray.direction * t - caster.position);
     if s >= 1.0 {
         return None;
     }
@@ -196,8 +176,7 @@ fn sample_disc(caster: &Caster, ray: &Ray, parallel: bool) -> Option<Sample> {
 }
 
 /// Squared distance of a point of the disc's plane from its centre, in semi-axes.
-#[inline]
-pub(crate) fn disc_coordinate(caster: &Caster, hit: Vec3) -> f32 {
-    let [a, b] = caster.axes;
+#[inline(always)]
+pub(crate) fn disc_coordinate([a, b]: [Vec3; 2], hit: Vec3) -> f32 {
     (hit.dot(a) / a.length_squared()).powi(2) + (hit.dot(b) / b.length_squared()).powi(2)
 }

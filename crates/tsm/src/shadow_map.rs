@@ -1,11 +1,12 @@
 //! Building a map: survey, plan, opaque discs, deposits, lists (Gunjee 2007, section 4.1, steps 1-3).
 
-use crate::caster::{Casters, Extinction, Kernel};
+use crate::caster::Casters;
 use crate::cost::{Counts, Prediction};
 use crate::deposit::{Deposit, Scratch};
 use crate::frame::Frame;
 use crate::mapping::{Mapping, Table, with_mapping};
-use crate::opaque::OpaqueDepth;
+use crate::media::Target;
+use crate::opaque::{DiscBatches, OpaqueDepth};
 use crate::plan::{Plan, plan};
 use crate::survey::{CHUNK, Survey};
 use crate::table::{Lists, Parted, Ranges};
@@ -80,9 +81,7 @@ impl ShadowMap {
     ) -> Result<Self, Error> {
         params.validate()?;
         light.validate(0)?;
-        let kernels = Kernel::of_stack(&params.footprints);
-        let extinctions = materials.iter().map(Extinction::of).collect();
-        let casters = Casters { cloud, extinctions, objects, kernels, params };
+        let casters = Casters::new(cloud, materials, objects, params);
         let survey = Survey::new(&casters);
         let plan = plan(&casters, &survey, light)?;
         progress.add_total(cloud.len() as u64);
@@ -108,11 +107,6 @@ impl ShadowMap {
     pub fn table(&self) -> &Table {
         &self.table
     }
-}
-
-/// Whether the splat goes to the opaque depths rather than to a list.
-fn ends_lists(kind: SplatKind, params: &Params) -> bool {
-    kind == SplatKind::Opaque && params.absorbance == AbsorbanceModel::CrossSection
 }
 
 fn finish<M: Mapping>(
@@ -178,9 +172,9 @@ fn opaque_depths<M: Mapping>(casters: &Casters<'_>, survey: &Survey, plan: &Plan
     let [columns, rows] = mapping.size();
     let depth = OpaqueDepth::new(columns as usize * rows as usize);
     let cloud = casters.cloud;
-    (0..cloud.len().div_ceil(CHUNK)).into_par_iter().for_each(|c| {
+    (0..cloud.len().div_ceil(CHUNK)).into_par_iter().for_each_init(DiscBatches::default, |work, c| {
         let chunk = c * CHUNK..cloud.len().min((c + 1) * CHUNK);
-        pulp::Arch::new().dispatch(OpaqueChunk { casters, plan, mapping, depth: &depth, chunk });
+        pulp::Arch::new().dispatch(OpaqueChunk { casters, plan, mapping, depth: &depth, chunk, work });
     });
     depth.into_distances()
 }
@@ -196,7 +190,7 @@ fn deposit_all<M: Mapping, const C: usize>(
 ) -> Result<Matter<C>, Error> {
     let cloud = casters.cloud;
     let [columns, rows] = mapping.size();
-    let ranges = Ranges::new(columns as usize * rows as usize);
+    let ranges = Ranges::new(columns as usize * rows as usize, plan.prediction.entries);
     let chunks: Vec<PartedPair<C>> = (0..cloud.len().div_ceil(CHUNK))
         .into_par_iter()
         .map_init(Scratch::default, |scratch, c| {
@@ -225,6 +219,7 @@ struct OpaqueChunk<'a, M: Mapping> {
     mapping: &'a M,
     depth: &'a OpaqueDepth,
     chunk: Range<usize>,
+    work: &'a mut DiscBatches,
 }
 
 impl<M: Mapping> pulp::NullaryFnOnce for OpaqueChunk<'_, M> {
@@ -233,9 +228,9 @@ impl<M: Mapping> pulp::NullaryFnOnce for OpaqueChunk<'_, M> {
     #[inline(always)]
     fn call(self) {
         let casters = self.casters;
-        for i in self.chunk.filter(|&i| casters.cloud.kind[i] == SplatKind::Opaque && casters.casts(i)) {
-            self.depth.add(self.mapping, &casters.get(i, &self.plan.frame, self.mapping.is_parallel()));
-        }
+        let is_wanted = |&i: &usize| casters.cloud.kind[i] == SplatKind::Opaque && casters.casts(i);
+        let splats = self.chunk.filter(is_wanted).map(|i| i as u32);
+        self.depth.add_all(self.mapping, casters, &self.plan.frame, splats, self.work);
     }
 }
 
@@ -253,9 +248,26 @@ impl<M: Mapping, const C: usize> pulp::NullaryFnOnce for FillChunk<'_, M, C> {
     #[inline(always)]
     fn call(mut self) {
         let (casters, cloud) = (self.casters, self.casters.cloud);
-        for i in self.chunk.filter(|&i| casters.casts(i) && !ends_lists(cloud.kind[i], casters.params)) {
-            self.deposit.add(&casters.get(i, &self.plan.frame, self.deposit.mapping.is_parallel()));
+        let Scratch { media, batches, ids: [plain, others], .. } = &mut *self.deposit.scratch;
+        let mut others = std::mem::take(others);
+        plain.clear();
+        others.clear();
+        if casters.params.absorbance == AbsorbanceModel::CrossSection {
+            let of_kind = |kind| {
+                let is_wanted = move |&i: &usize| cloud.kind[i] == kind && casters.casts(i);
+                self.chunk.clone().filter(is_wanted).map(|i| i as u32)
+            };
+            plain.extend(of_kind(SplatKind::Medium));
+            others.extend(of_kind(SplatKind::Surface));
+            let mut target = Target { mapping: self.deposit.mapping, opaque: self.deposit.opaque, entries: media };
+            target.add(casters, &self.plan.frame, plain, batches, &mut others);
+        } else {
+            others.extend(self.chunk.filter(|&i| casters.casts(i)).map(|i| i as u32));
         }
+        for &i in &others {
+            self.deposit.add(&casters.get(i as usize, &self.plan.frame, self.deposit.mapping.is_parallel()));
+        }
+        self.deposit.scratch.ids[1] = others;
     }
 }
 

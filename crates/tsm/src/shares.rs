@@ -38,13 +38,13 @@ fn cumulative(x: f32) -> f32 {
 /// A footprint along one axis: a cut triweight about `at`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Axis {
-    at: f32,
-    half: f32,
-    inverse: f32,
+    pub(crate) at: f32,
+    pub(crate) half: f32,
+    pub(crate) inverse: f32,
     /// Where tails are cut, in half widths, what is cut of each, and by what the rest grows.
-    cut: f32,
-    tail: f32,
-    scale: f32,
+    pub(crate) cut: f32,
+    pub(crate) tail: f32,
+    pub(crate) scale: f32,
     /// First and last cell.
     pub(crate) first: i32,
     pub(crate) last: i32,
@@ -67,9 +67,21 @@ impl Axis {
         Self { at, first, last, ..self }
     }
 
+    /// Lower edge of the first cell, relative to the centre.
+    #[inline(always)]
+    pub(crate) fn start(&self) -> f32 {
+        self.first as f32 - self.at
+    }
+
+    /// Cells that it may overlap wherever it lies, at most.
+    #[inline(always)]
+    pub(crate) fn most_cells(&self) -> i32 {
+        floor(2.0 * self.cut * self.half) + 2
+    }
+
     /// Fraction below an edge between cells, relative to the centre.
     #[inline(always)]
-    fn below(&self, edge: f32) -> f32 {
+    pub(crate) fn below(&self, edge: f32) -> f32 {
         let x = between(edge * self.inverse, -1.0, 1.0);
         between((cumulative(x) - self.tail) * self.scale, 0.0, 1.0)
     }
@@ -91,17 +103,19 @@ impl Axis {
         -0.136_718_75 * self.scale * (rest * rest)
     }
 
+    /// Centre of the part in a cell of lower edge `edge`, which holds `share`; both relative to the centre of the whole.
+    #[inline(always)]
+    pub(crate) fn centre(&self, edge: f32, share: f32) -> f32 {
+        let moment = self.moment_below(edge + 1.0) - self.moment_below(edge);
+        // Rounding of a tiny share must not throw its centre out of the cell.
+        between(self.half * moment / (share + 1e-6), edge, edge + 1.0)
+    }
+
     /// Centres of the parts in `BLOCK` cells from `first` on, relative to the centre of the whole.
     #[inline(always)]
     pub(crate) fn centres(&self, first: i32, shares: &[f32; BLOCK]) -> [f32; BLOCK] {
         let start = first as f32 - self.at;
-        std::array::from_fn(|k| {
-            let edge = start + k as f32;
-            let moment = self.moment_below(edge + 1.0) - self.moment_below(edge);
-            // Rounding of a tiny share must not throw its centre out of the cell.
-            let centre = self.half * moment / (shares[k] + 1e-6);
-            between(centre, edge, edge + 1.0)
-        })
+        std::array::from_fn(|k| self.centre(start + k as f32, shares[k]))
     }
 }
 

@@ -5,67 +5,17 @@
 //! insertion lists are O(n²). Sums are 64-bit fixed point, so that neither the order of equal distances nor the thread
 //! count changes a bit, and 10⁶ absorbances of 10⁻⁶ add up to 1.
 
-use crate::shares::BLOCK;
+use crate::entries::Entries;
+use crate::sort::sort;
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Fixed point: 2⁴⁴ units an absorbance of 1.
 const FIXED: f64 = (1u64 << 44) as f64;
-/// Lists up to this length are sorted by counting.
-const SHORT: usize = 64;
-/// Keys that are counted at once.
-const LANES: usize = 8;
-/// Lists from this length on are sorted by digits.
-const LONG: usize = 1024;
-
-/// Entries in the order in which splats made them; what lies behind `len` is left over.
-#[derive(Debug, Default)]
-pub(crate) struct Entries<const C: usize> {
-    len: usize,
-    cell: Vec<u32>,
-    distance: Vec<f32>,
-    own: Vec<[f32; C]>,
-}
-
-impl<const C: usize> Entries<C> {
-    pub(crate) fn clear(&mut self) {
-        self.len = 0;
-    }
-
-    #[inline(always)]
-    fn grow(&mut self) {
-        if self.len + BLOCK > self.cell.len() {
-            let room = (2 * self.len).max(16_384);
-            self.cell.resize(room, 0);
-            self.distance.resize(room, 0.0);
-            self.own.resize(room, [0.0; C]);
-        }
-    }
-
-    /// Adds one entry of absorbance `own`·`rgb`.
-    #[inline(always)]
-    pub(crate) fn push(&mut self, cell: u32, distance: f32, own: f32, rgb: &[f32; 3]) {
-        self.grow();
-        let i = self.len;
-        self.cell[i] = cell;
-        self.distance[i] = distance;
-        self.own[i] = std::array::from_fn(|c| own * rgb[c]);
-        self.len += 1;
-    }
-
-    /// Adds entries at one distance in the `used` ≤ `BLOCK` cells from `cell` on.
-    #[inline(always)]
-    pub(crate) fn extend(&mut self, cell: u32, distance: f32, used: usize, own: &[f32; BLOCK], rgb: &[f32; 3]) {
-        self.grow();
-        // Whole blocks, without a loop: what is not used is written over.
-        let range = self.len..self.len + BLOCK;
-        self.cell[range.clone()].copy_from_slice(&std::array::from_fn::<_, BLOCK, _>(|k| cell + k as u32));
-        self.distance[range.clone()].copy_from_slice(&[distance; BLOCK]);
-        let own: [[f32; C]; BLOCK] = own.map(|a| std::array::from_fn(|c| a * rgb[c]));
-        self.own[range].copy_from_slice(&own);
-        self.len += used;
-    }
-}
+/// Entries of a range that a core's cache holds while they are sorted.
+const RANGE_ENTRIES: f64 = 32_768.0;
+/// Least and greatest number of ranges.
+const RANGES: [f64; 2] = [64.0, 1024.0];
 
 /// Ranges of cells that are gathered together.
 #[derive(Debug, Clone, Copy)]
@@ -76,9 +26,10 @@ pub(crate) struct Ranges {
 }
 
 impl Ranges {
-    /// At most 1024 ranges of a power of two of cells.
-    pub(crate) fn new(cells: usize) -> Self {
-        let shift = usize::BITS - (cells.saturating_sub(1) >> 10).leading_zeros();
+    /// Ranges of a power of two of cells, as many as `entries` in all call for.
+    pub(crate) fn new(cells: usize, entries: f64) -> Self {
+        let wanted = (entries / RANGE_ENTRIES).clamp(RANGES[0], RANGES[1]) as usize;
+        let shift = cells.div_ceil(wanted).next_power_of_two().ilog2();
         Self { shift, count: (cells.max(1)).div_ceil(1 << shift), cells }
     }
 }
@@ -202,8 +153,9 @@ impl<const C: usize> Lists<C> {
 /// Entries of one range by cells; buffers of one worker.
 #[derive(Debug, Default)]
 struct Gathered<const C: usize> {
-    /// Distance in the upper half, index of the entry in the lower.
+    /// As [`pack`] makes them.
     key: Vec<u64>,
+    /// By slot; unused for one channel.
     own: Vec<[f32; C]>,
     spare: Vec<u64>,
 }
@@ -250,14 +202,18 @@ impl<const C: usize> Task<'_, C> {
         }
         let Gathered { key, own, spare } = gathered;
         key.resize(sum as usize, 0);
-        own.resize(sum as usize, [0.0; C]);
+        if C > 1 {
+            own.resize(sum as usize, [0.0; C]);
+        }
         for part in parted {
             let range = part.range(self.range);
             let entries = part.cell[range.clone()].iter().zip(&part.distance[range.clone()]).zip(&part.own[range]);
             for ((c, d), a) in entries {
                 let slot = &mut self.span[(c - base) as usize][0];
-                key[*slot as usize] = u64::from(d.max(f32::MIN_POSITIVE).to_bits()) << 32 | u64::from(*slot);
-                own[*slot as usize] = *a;
+                key[*slot as usize] = pack(*d, a, *slot);
+                if C > 1 {
+                    own[*slot as usize] = *a;
+                }
                 *slot += 1;
             }
         }
@@ -274,79 +230,6 @@ impl<const C: usize> Task<'_, C> {
     }
 }
 
-/// Sorts by distance. The order of equal distances is free: they are merged by exact sums.
-#[inline(always)]
-fn sort(list: &mut [u64], spare: &mut Vec<u64>) {
-    match list.len() {
-        0..=1 => {}
-        2..=SHORT => sort_short(list),
-        n if n < LONG => list.sort_unstable(),
-        _ => sort_long(list, spare),
-    }
-}
-
-/// Counts for each key how many are less, eight at a time and without a branch.
-#[inline(always)]
-fn sort_short(list: &mut [u64]) {
-    let n = list.len();
-    let mut distance = [i32::MAX; SHORT];
-    // Positive floats are ordered as integers.
-    distance.iter_mut().zip(&*list).for_each(|(d, key)| *d = (key >> 32) as i32);
-    let mut sorted = [0u64; SHORT];
-    for (own, keys) in distance.chunks_exact(LANES).zip(list.chunks(LANES)) {
-        let mut less = [0i32; LANES];
-        for other in &distance[..n] {
-            (0..LANES).for_each(|l| less[l] += i32::from(*other < own[l]));
-        }
-        for (key, less) in keys.iter().zip(less) {
-            let mut rank = less as usize;
-            // Equal distances take one place after the other.
-            while sorted[rank] != 0 {
-                rank += 1;
-            }
-            sorted[rank] = *key;
-        }
-    }
-    list.copy_from_slice(&sorted[..n]);
-}
-
-/// By digits, from the lowest.
-#[inline(never)]
-fn sort_long(list: &mut [u64], spare: &mut Vec<u64>) {
-    // Distances of one cell differ in their low bits alone.
-    let (least, most) = list.iter().fold((u64::MAX, 0), |(a, b), k| (a.min(*k), b.max(*k)));
-    let least = least >> 32;
-    let significant = u64::BITS - ((most >> 32) - least).leading_zeros();
-    spare.clear();
-    spare.resize(list.len(), 0);
-    let passes = significant.div_ceil(DIGIT);
-    for pass in 0..passes {
-        let digit = |k: u64| (((k >> 32) - least) >> (pass * DIGIT)) as usize & ((1 << DIGIT) - 1);
-        if pass % 2 == 0 { scatter(list, spare, digit) } else { scatter(spare, list, digit) }
-    }
-    if passes % 2 == 1 {
-        list.copy_from_slice(spare);
-    }
-}
-
-/// Bits of a digit.
-const DIGIT: u32 = 11;
-
-/// One stable counting pass.
-fn scatter(from: &[u64], to: &mut [u64], digit: impl Fn(u64) -> usize) {
-    let mut next = [0u32; 1 << DIGIT];
-    from.iter().for_each(|k| next[digit(*k)] += 1);
-    let mut sum = 0;
-    for slot in &mut next {
-        sum += std::mem::replace(slot, sum);
-    }
-    for &key in from {
-        let slot = &mut next[digit(key)];
-        to[*slot as usize] = key;
-        *slot += 1;
-    }
-}
-
 /// Merges equal distances and writes running sums; returns the number of entries kept.
 #[inline(always)]
 fn sum_up<const C: usize>(
@@ -358,26 +241,33 @@ fn sum_up<const C: usize>(
 ) -> u32 {
     let mut sum = [0i64; C];
     let mut kept = 0;
-    let mut i = 0;
-    while i < list.len() {
-        let bits = (list[i] >> 32) as u32;
-        while i < list.len() && (list[i] >> 32) as u32 == bits {
-            // One entry is held below 2¹⁷, so that the sum of a list that has not stopped cannot overflow.
-            let own = own[list[i] as u32 as usize];
-            (0..C).for_each(|c| sum[c] += (f64::from(own[c]).min(131_072.0) * FIXED) as i64);
-            i += 1;
-            if sum.iter().any(|s| *s > i64::MAX / 4) {
-                sum = sum.map(|s| s.min(i64::MAX / 4));
-            }
-        }
-        distance[kept] = f32::from_bits(bits);
-        total[kept] = sum.map(|s| (s as f64 / FIXED) as f32);
-        kept += 1;
-        if sum.iter().all(|s| *s >= stop) {
+    for (i, &key) in list.iter().enumerate() {
+        let part = unpack(key, own);
+        // One entry is held below 2¹⁷ and a sum below 2¹⁸, so that none overflows.
+        (0..C).for_each(|c| sum[c] = (sum[c] + (f64::from(part[c]).min(131_072.0) * FIXED) as i64).min(i64::MAX / 4));
+        distance[kept] = f32::from_bits((key >> 32) as u32);
+        total[kept] = sum.map(|s| (s as f64 * (1.0 / FIXED)) as f32);
+        // The next one at the same distance writes over this one.
+        let is_last = list.get(i + 1).is_none_or(|next| (next ^ key) >> 32 != 0);
+        kept += usize::from(is_last);
+        if is_last && sum.iter().all(|s| *s >= stop) {
             break;
         }
     }
     kept as u32
+}
+
+/// A key to sort by: the distance in the upper half; in the lower half the absorbance if there is one, else its slot.
+#[inline(always)]
+fn pack<const C: usize>(distance: f32, own: &[f32; C], slot: u32) -> u64 {
+    let rest = if C == 1 { own[0].to_bits() } else { slot };
+    u64::from(distance.max(f32::MIN_POSITIVE).to_bits()) << 32 | u64::from(rest)
+}
+
+/// The absorbance of a key.
+#[inline(always)]
+fn unpack<const C: usize>(key: u64, own: &[[f32; C]]) -> [f32; C] {
+    if C == 1 { [f32::from_bits(key as u32); C] } else { own[key as u32 as usize] }
 }
 
 #[cfg(test)]
@@ -386,7 +276,7 @@ mod tests {
     use crate::reference::InsertionLists;
 
     fn build(entries: &Entries<1>, cells: usize, limit: f32) -> Lists<1> {
-        let ranges = Ranges::new(cells);
+        let ranges = Ranges::new(cells, entries.len as f64);
         Lists::new(&[Parted::new(entries, ranges)], ranges, limit)
     }
 

@@ -10,7 +10,7 @@
 //! Beyond the paper, whose polar rows differ in solid angle by 115:1 at 180 rows. 1 − cos θ is taken as
 //! sin²θ/(1 + cos θ), so that directions near the poles keep their digits.
 
-use super::{Crease, Mapping, Place, Ray};
+use super::{Crease, Mapping, Place, Ray, View};
 use glam::{Vec2, Vec3};
 
 /// 2/π·atan(√s)/√s on [0, 1], a Chebyshev fit; the product with √s errs by less than 5e-8.
@@ -54,6 +54,29 @@ impl Octahedral {
     }
 }
 
+/// A place among the edges of its octant, in cells.
+struct Edges {
+    /// From the middle of the table, mirrored to the first quadrant.
+    q: Vec2,
+    /// Whether z ≥ 0.
+    upper: bool,
+    /// From the rim of a footprint to the edges along rows and columns, and to the diagonal; negative across them.
+    to_line: Vec2,
+    to_diagonal: f32,
+}
+
+impl Octahedral {
+    #[inline(always)]
+    fn edges(&self, at: Vec2, half: Vec2) -> Edges {
+        let side = 0.5 * self.n as f32;
+        let q = (at - side).abs();
+        let upper = q.x + q.y <= side;
+        let to_line = if upper { q } else { side - q } - half;
+        let to_diagonal = (q.x + q.y - side).abs() - (half.x + half.y);
+        Edges { q, upper, to_line, to_diagonal }
+    }
+}
+
 /// Unit direction at (X, Y) ∈ [0, 1]².
 fn direction([x, y]: [f64; 2]) -> Vec3 {
     let upper = x + y <= 1.0;
@@ -69,10 +92,7 @@ fn direction([x, y]: [f64; 2]) -> Vec3 {
 #[inline(always)]
 fn quadrant_share(x: f32, y: f32) -> f32 {
     let (low, high) = if x < y { (x, y) } else { (y, x) };
-    if high == 0.0 {
-        return 0.0;
-    }
-    let t = low / high;
+    let t = if high > 0.0 { low / high } else { 0.0 };
     let s = t * t;
     let share = t * ATAN.iter().rev().fold(0.0, |sum, c| sum * s + c);
     if x < y { 1.0 - share } else { share }
@@ -86,37 +106,39 @@ impl Mapping for Octahedral {
 
     #[inline(always)]
     fn locate(&self, p: Vec3) -> Option<Place> {
-        let distance = p.length();
-        if distance <= 0.0 {
-            return None;
-        }
-        let d = p.abs() / distance;
-        let r = ((d.x * d.x + d.y * d.y) / (1.0 + d.z)).sqrt();
-        let share = quadrant_share(d.x, d.y);
-        let (mut x, mut y) = (r * (1.0 - share), r * share);
-        if p.z < 0.0 {
-            (x, y) = (1.0 - y, 1.0 - x);
-        }
-        let half = 0.5 * self.n as f32;
-        Some(Place { at: Vec2::new(half + half * x.copysign(p.x), half + half * y.copysign(p.y)), distance })
+        let view = self.view(p);
+        view.is_seen.then_some(view.place)
     }
 
     #[inline(always)]
     fn gradients(&self, p: Vec3) -> [Vec3; 2] {
+        self.view(p).gradients
+    }
+
+    #[inline(always)]
+    fn view(&self, p: Vec3) -> View {
         let distance = p.length();
         let d = p.abs() / distance;
-        let sin = (d.x * d.x + d.y * d.y).sqrt();
-        let (cos_phi, sin_phi) = if sin > 0.0 { (d.x / sin, d.y / sin) } else { (1.0, 0.0) };
+        let half = 0.5 * self.n as f32;
+        let mirror = Vec3::ONE.copysign(p);
+        let is_lower = p.z < 0.0;
+        let sin_sq = d.x * d.x + d.y * d.y;
+        let r = (sin_sq / (1.0 + d.z)).sqrt();
         let share = quadrant_share(d.x, d.y);
+        let (x, y) = (r * (1.0 - share), r * share);
+        let (x, y) = if is_lower { (1.0 - y, 1.0 - x) } else { (x, y) };
+        let at = Vec2::new(half + half * x.copysign(p.x), half + half * y.copysign(p.y));
+        let sin = sin_sq.sqrt();
+        let (cos_phi, sin_phi) = if sin > 0.0 { (d.x / sin, d.y / sin) } else { (1.0, 0.0) };
         let root = (1.0 + d.z).sqrt();
         let along_theta = Vec3::new(d.z * cos_phi, d.z * sin_phi, -sin) * (0.5 * root);
         let along_phi = Vec3::new(-sin_phi, cos_phi, 0.0) * (std::f32::consts::FRAC_2_PI / root);
         let gx = along_theta * (1.0 - share) - along_phi;
         let gy = along_theta * share + along_phi;
-        let scale = 0.5 * self.n as f32 / distance;
-        let mirror = Vec3::ONE.copysign(p) * scale;
-        let (gx, gy) = if p.z < 0.0 { (-gy, -gx) } else { (gx, gy) };
-        [gx * mirror * 1f32.copysign(p.x), gy * mirror * 1f32.copysign(p.y)]
+        let signs = mirror * (half / distance);
+        let (gx, gy) = if is_lower { (-gy, -gx) } else { (gx, gy) };
+        let place = Place { at, distance };
+        View { place, gradients: [gx * signs * mirror.x, gy * signs * mirror.y], is_seen: distance > 0.0 }
     }
 
     #[inline(always)]
@@ -133,6 +155,7 @@ impl Mapping for Octahedral {
         ((0..n).contains(&column) && (0..n).contains(&row)).then(|| row as u32 * self.n + column as u32)
     }
 
+    #[inline(always)]
     fn ray(&self, at: Vec2) -> Ray {
         let square = at * (2.0 / self.n as f32) - 1.0;
         let q = square.abs().min(Vec2::ONE);
@@ -149,11 +172,17 @@ impl Mapping for Octahedral {
 
     #[inline(always)]
     fn cell_ray(&self, cell: u32) -> Ray {
+        self.ray_of(cell % self.n, cell / self.n)
+    }
+
+    #[inline(always)]
+    fn ray_of(&self, column: u32, row: u32) -> Ray {
         let n = self.n;
         let mirrored = |i: u32| if 2 * i + 1 >= n { (i - n / 2, 1.0) } else { ((n - 1) / 2 - i, -1.0) };
-        let (i, sign_x) = mirrored(cell % n);
-        let (j, sign_y) = mirrored(cell / n);
-        let d = self.quarter[(j * n.div_ceil(2) + i) as usize];
+        let (i, sign_x) = mirrored(column);
+        let (j, sign_y) = mirrored(row);
+        // Beyond the table any ray does.
+        let d = self.quarter.get((j * n.div_ceil(2) + i) as usize).copied().unwrap_or(Vec3::Z);
         Ray { base: Vec3::ZERO, direction: Vec3::new(d.x * sign_x, d.y * sign_y, d.z) }
     }
 
@@ -172,12 +201,15 @@ impl Mapping for Octahedral {
     }
 
     #[inline(always)]
+    fn is_creased(&self, at: Vec2, half: Vec2) -> bool {
+        let edges = self.edges(at, half);
+        edges.to_line.min_element().min(edges.to_diagonal) < 0.0
+    }
+
+    #[inline(always)]
     fn crease(&self, at: Vec2, half: Vec2) -> Option<Crease> {
         let side = 0.5 * self.n as f32;
-        let q = (at - side).abs();
-        let upper = q.x + q.y <= side;
-        let to_line = if upper { q } else { side - q } - half;
-        let to_diagonal = (q.x + q.y - side).abs() - (half.x + half.y);
+        let Edges { q, upper, to_line, to_diagonal } = self.edges(at, half);
         let nearest = to_line.min_element().min(to_diagonal);
         if nearest >= 0.0 {
             return None;

@@ -3,7 +3,7 @@
 //! Parallel: column = (x − min)/cell. Perspective: column = (x/z − min)/cell with z along the axis; a cell at (a, b) on
 //! the plane z = 1 has the solid angle cell²·cos³θ, cos θ = 1/√(1 + a² + b²), to second order in the cell.
 
-use super::{Mapping, Place, Ray};
+use super::{Mapping, Place, Ray, View};
 use glam::{Vec2, Vec3};
 
 /// A planar table.
@@ -35,14 +35,19 @@ impl Mapping for Planar {
 
     #[inline(always)]
     fn locate(&self, p: Vec3) -> Option<Place> {
+        let view = self.view(p);
+        view.is_seen.then_some(view.place)
+    }
+
+    #[inline(always)]
+    fn view(&self, p: Vec3) -> View {
         let distance = if self.perspective { p.length() } else { p.z };
-        if self.perspective && (p.z <= 0.0 || distance <= 0.0) {
-            return None;
-        }
         let at = self.coordinates(p);
-        let limit = Vec2::new(self.size[0] as f32, self.size[1] as f32);
-        let inside = at.cmpgt(Vec2::NEG_ONE).all() && at.cmplt(limit + 1.0).all();
-        inside.then_some(Place { at, distance })
+        let limit = Vec2::new(self.size[0] as f32, self.size[1] as f32) + 1.0;
+        // Without short circuits: branches would keep a loop of this from being vectors.
+        let is_inside = (at.x > -1.0) & (at.y > -1.0) & (at.x < limit.x) & (at.y < limit.y);
+        let is_ahead = !self.perspective | ((p.z > 0.0) & (distance > 0.0));
+        View { place: Place { at, distance }, gradients: self.gradients(p), is_seen: is_inside & is_ahead }
     }
 
     #[inline(always)]
@@ -75,7 +80,12 @@ impl Mapping for Planar {
     #[inline(always)]
     fn cell_ray(&self, cell: u32) -> Ray {
         let [columns, _] = self.size;
-        self.ray(Vec2::new((cell % columns) as f32 + 0.5, (cell / columns) as f32 + 0.5))
+        self.ray_of(cell % columns, cell / columns)
+    }
+
+    #[inline(always)]
+    fn ray_of(&self, column: u32, row: u32) -> Ray {
+        self.ray(Vec2::new(column as f32 + 0.5, row as f32 + 0.5))
     }
 
     fn measure(&self, cell: u32) -> f64 {

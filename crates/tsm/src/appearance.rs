@@ -1,0 +1,249 @@
+//! What the casters look like from the light, before any work: where a table has to look, and angular sizes.
+
+use crate::caster::Casters;
+use crate::frame::Frame;
+use crate::lanes::{LANES, Lane};
+use crate::survey::{Block, CHUNK, greater, greatest, least, lesser};
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use splat_core::{SplatKind, glam};
+use std::ops::Range;
+
+/// Angles at which a table has to look, and how large casters appear: quarter-octave histograms, integers, so that the
+/// order of summing does not matter.
+#[derive(Debug, Clone)]
+pub(crate) struct Appearance {
+    /// Casters by apparent spacing.
+    spacing: Vec<u64>,
+    /// Translucent casters by apparent cutoff radius.
+    radius: Vec<u64>,
+    /// Opaque casters by apparent radius of their dilated disc.
+    disc: Vec<u64>,
+    /// Bounds on the plane of a planar table, footprints included.
+    pub(crate) window: [Vec2; 2],
+    /// Least and greatest z/distance.
+    pub(crate) cosine: [f32; 2],
+    /// Which of 1024 sectors of azimuth hold casters; empty unless asked for.
+    pub(crate) sectors: Vec<bool>,
+}
+
+const BINS: usize = 1024;
+/// Clouds of this size and more are counted by a sample; their window is that of all.
+const MANY: usize = 1 << 18;
+/// One splat in so many is counted then.
+const SAMPLE: usize = 8;
+pub(crate) const SECTORS: usize = 1024;
+
+/// How a second look measures apparent size.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Apparent {
+    /// By angle, from the light.
+    Angle,
+    /// By angle, and sectors of azimuth too.
+    AngleAndSectors,
+    /// By tangent, on the plane z = 1; casters beside or behind the light have no place.
+    Tangent,
+    /// By length, for parallel light.
+    Length,
+}
+
+/// Exponent and two bits of the mantissa: four bins an octave, monotone.
+fn bin(x: f32) -> usize {
+    ((x.max(0.0).to_bits() >> 21) as usize).min(BINS - 1)
+}
+
+fn bin_value(bin: usize) -> f64 {
+    f64::from(f32::from_bits(((bin as u32) << 21) | 1 << 20))
+}
+
+impl Appearance {
+    fn empty(sectors: bool) -> Self {
+        Self {
+            spacing: vec![0; BINS],
+            radius: vec![0; BINS],
+            disc: vec![0; BINS],
+            window: [Vec2::INFINITY, Vec2::NEG_INFINITY],
+            cosine: [1.0, -1.0],
+            sectors: vec![false; if sectors { SECTORS } else { 0 }],
+        }
+    }
+
+    /// Looks at every caster from the light.
+    pub(crate) fn new(casters: &Casters<'_>, frame: &Frame, apparent: Apparent) -> Self {
+        let sectors = apparent == Apparent::AngleAndSectors;
+        let n = casters.cloud.len();
+        // Few large parts: each carries three histograms.
+        let part = CHUNK.max(n.div_ceil(64));
+        let parts: Vec<Self> = (0..n.div_ceil(part.max(1)))
+            .into_par_iter()
+            .map(|c| {
+                let splats = c * part..n.min((c + 1) * part);
+                let look = Self::empty(sectors);
+                pulp::Arch::new().dispatch(SecondLook { casters, frame, apparent, splats, look })
+            })
+            .collect();
+        parts.into_iter().fold(Self::empty(sectors), Self::join)
+    }
+
+    /// Counts a splat, given the apparent size of a world unit and of its radius, for `every`.
+    fn count(&mut self, casters: &Casters<'_>, i: usize, [unit, radius]: [f32; 2], every: u64) {
+        let cloud = casters.cloud;
+        let spacing = if cloud.kind[i] == SplatKind::Opaque {
+            self.disc[bin(radius)] += every;
+            cloud.cross_section[i].sqrt() * unit
+        } else {
+            self.radius[bin(radius)] += every;
+            cloud.radius[i] / (casters.kernel(i).cutoff * 0.8) * unit
+        };
+        self.spacing[bin(spacing)] += every;
+    }
+
+    /// Marks the sectors of azimuth that a splat spans, given its place and its angular radius.
+    fn mark_sectors(&mut self, p: Vec3, reach: f32) {
+        let cosine = p.z / p.length();
+        let sin = (1.0 - cosine * cosine).max(0.0).sqrt();
+        let turn = |angle: f64| angle / std::f64::consts::TAU * SECTORS as f64;
+        let centre = turn(f64::from(p.y + 0.0).atan2(f64::from(p.x)));
+        let half = if sin > 2.0 * reach { turn(1.2 * f64::from(reach / sin)) + 1.0 } else { SECTORS as f64 };
+        let first = (centre - half).floor() as i64;
+        let count = ((2.0 * half) as i64 + 2).min(SECTORS as i64);
+        (first..first + count).for_each(|s| self.sectors[s.rem_euclid(SECTORS as i64) as usize] = true);
+    }
+
+    fn join(mut self, other: Self) -> Self {
+        (0..BINS).for_each(|b| self.spacing[b] += other.spacing[b]);
+        (0..BINS).for_each(|b| self.radius[b] += other.radius[b]);
+        (0..BINS).for_each(|b| self.disc[b] += other.disc[b]);
+        self.window = [self.window[0].min(other.window[0]), self.window[1].max(other.window[1])];
+        self.cosine = [self.cosine[0].min(other.cosine[0]), self.cosine[1].max(other.cosine[1])];
+        self.sectors.iter_mut().zip(other.sectors).for_each(|(a, b)| *a |= b);
+        self
+    }
+
+    /// Apparent spacing that half of the casters are below; `None` without casters.
+    pub(crate) fn median_spacing(&self) -> Option<f64> {
+        let total: u64 = self.spacing.iter().sum();
+        let mut seen = 0;
+        let found = self.spacing.iter().position(|&count| {
+            seen += count;
+            2 * seen >= total && total > 0
+        });
+        found.map(bin_value)
+    }
+
+    /// Entries that translucent casters make in a table of `cells` cells of side `cell` (angle, tangent or length): a
+    /// kernel of radius r overlaps (1 + 1.8 r/cell)² cells on average, and no more than there are.
+    pub(crate) fn entries(&self, cell: f64, cells: f64) -> f64 {
+        overlaps(&self.radius, cell, cells)
+    }
+
+    /// Cells that casters of all kinds overlap.
+    pub(crate) fn covered(&self, cell: f64, cells: f64) -> f64 {
+        self.entries(cell, cells) + overlaps(&self.disc, cell, cells)
+    }
+
+    /// Casters that have a place.
+    pub(crate) fn casters(&self) -> u64 {
+        self.spacing.iter().sum()
+    }
+}
+
+/// The second look at one part of the splats, in the form that [`pulp`] compiles once per instruction set.
+struct SecondLook<'a> {
+    casters: &'a Casters<'a>,
+    frame: &'a Frame,
+    apparent: Apparent,
+    splats: Range<usize>,
+    look: Appearance,
+}
+
+/// [`LANES`] splats as seen from the light.
+struct Seen {
+    position: [Lane; 3],
+    /// Distance that apparent sizes are relative to, and radius over it; 0 for what has no place.
+    far: Lane,
+    radius: Lane,
+    /// What the table has to hold: along two axes of a plane, or once the cosine.
+    span: [[Lane; 2]; 2],
+}
+
+impl Seen {
+    #[inline(always)]
+    fn new(block: &Block, frame: &Frame, apparent: Apparent) -> Self {
+        let nought = [0.0; LANES];
+        let mut seen = Self { position: block.position, far: nought, radius: nought, span: [[nought; 2]; 2] };
+        let [x, y, z] = &mut seen.position;
+        for l in 0..LANES {
+            let p = frame.position(Vec3::new(x[l], y[l], z[l]));
+            (x[l], y[l], z[l]) = (p.x, p.y, p.z);
+            seen.radius[l] = frame.length(block.radius[l]);
+        }
+        for l in 0..LANES {
+            let p = Vec3::new(x[l], y[l], z[l]);
+            let distance = p.length();
+            let far = match apparent {
+                Apparent::Angle | Apparent::AngleAndSectors => distance,
+                Apparent::Tangent => p.z,
+                Apparent::Length => 1.0,
+            };
+            let is_seen = (far > 0.0) & (block.radius[l] >= 0.0);
+            let radius = seen.radius[l] / far;
+            let q = if apparent == Apparent::Length { p.truncate() } else { p.truncate() / p.z };
+            // Seen at the tangent t, a ball spans about radius·(1 + t²)/z across the plane z = 1.
+            let stretch = if apparent == Apparent::Length { 1.0 } else { 1.0 + q.length_squared() };
+            let is_flat = matches!(apparent, Apparent::Tangent | Apparent::Length);
+            let middle = if is_flat { [q.x, q.y] } else { [p.z / distance; 2] };
+            let reach = if is_flat { radius * stretch } else { radius };
+            for k in 0..2 {
+                seen.span[k][0][l] = if is_seen { middle[k] - reach } else { f32::INFINITY };
+                seen.span[k][1][l] = if is_seen { middle[k] + reach } else { f32::NEG_INFINITY };
+            }
+            seen.far[l] = if is_seen { far } else { 0.0 };
+            seen.radius[l] = radius;
+        }
+        seen
+    }
+}
+
+impl pulp::NullaryFnOnce for SecondLook<'_> {
+    type Output = Appearance;
+
+    #[inline(always)]
+    fn call(self) -> Appearance {
+        let Self { casters, frame, apparent, splats, mut look } = self;
+        let every = if casters.cloud.len() < MANY { 1 } else { SAMPLE };
+        let mut low = [[f32::INFINITY; LANES]; 2];
+        let mut high = [[f32::NEG_INFINITY; LANES]; 2];
+        let unit = frame.length(1.0);
+        for begin in splats.clone().step_by(LANES) {
+            let ids = begin..splats.end.min(begin + LANES);
+            let seen = Seen::new(&Block::new(casters, ids.clone()), frame, apparent);
+            for l in 0..LANES {
+                for k in 0..2 {
+                    low[k][l] = lesser(low[k][l], seen.span[k][0][l]);
+                    high[k][l] = greater(high[k][l], seen.span[k][1][l]);
+                }
+            }
+            for (l, i) in ids.enumerate().filter(|(l, _)| seen.far[*l] > 0.0) {
+                if i.is_multiple_of(every) {
+                    look.count(casters, i, [unit / seen.far[l], seen.radius[l]], every as u64);
+                }
+                if !look.sectors.is_empty() {
+                    look.mark_sectors(Vec3::from_array([0, 1, 2].map(|k| seen.position[k][l])), seen.radius[l]);
+                }
+            }
+        }
+        let (low, high) = (low.map(least), high.map(greatest));
+        if matches!(apparent, Apparent::Tangent | Apparent::Length) {
+            look.window = [Vec2::from_array(low), Vec2::from_array(high)];
+        } else {
+            look.cosine = [lesser(1.0, low[0]), greater(-1.0, high[0])];
+        }
+        look
+    }
+}
+
+fn overlaps(histogram: &[u64], cell: f64, cells: f64) -> f64 {
+    let overlap = |b: usize| (1.0 + 1.8 * bin_value(b) / cell).powi(2).min(cells);
+    histogram.iter().enumerate().filter(|(_, n)| **n > 0).map(|(b, n)| *n as f64 * overlap(b)).sum()
+}

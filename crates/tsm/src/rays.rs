@@ -1,0 +1,176 @@
+//! Sampling side by side: a footprint on the rays of many cells.
+//!
+//! w(s), s = |p − (p·r)r|²/R² for a medium at p and a ray of direction r; in front of the light all of it counts, around
+//! the light the share that lies ahead.
+//!
+//! The rays of a footprint's cells stand in one row, those of a cell next to each other. Each block of [`LANES`] is taken
+//! in loops without branches; then each cell sums its own, in their order. Discs are sampled ray by ray.
+
+use crate::caster::Caster;
+use crate::lanes::{LANES, Lane};
+use crate::mapping::{Mapping, Ray};
+use crate::sampling::{ahead, sample_disc};
+use glam::{Vec2, Vec3};
+use splat_core::{SplatKind, glam};
+
+/// The sampling of one footprint, in the form that [`pulp`] compiles once per instruction set; returns the area of the
+/// footprint that the rays find.
+pub(crate) struct Rays<'a, M: Mapping> {
+    pub(crate) mapping: &'a M,
+    pub(crate) caster: &'a Caster,
+    /// Rays along a side of a cell.
+    pub(crate) samples: u32,
+    /// Whether only what lies ahead of the light counts.
+    pub(crate) near: bool,
+    /// Cell, column and row.
+    pub(crate) window: &'a [[u32; 3]],
+    /// Receives cell, weight, and distance of the entry, where the footprint is met.
+    pub(crate) cells: &'a mut Vec<(u32, f32, f32)>,
+}
+
+/// Rays by component: base, then direction.
+type RayLanes = [Lane; 6];
+
+#[inline(always)]
+fn put(rays: &mut RayLanes, l: usize, ray: &Ray) {
+    let [base, direction] = [ray.base, ray.direction].map(|v| v.to_array());
+    (0..3).for_each(|k| (rays[k][l], rays[k + 3][l]) = (base[k], direction[k]));
+}
+
+#[inline(always)]
+fn get(rays: &RayLanes, l: usize) -> Ray {
+    let vector = |first: usize| Vec3::from_array([0, 1, 2].map(|k| rays[first + k][l]));
+    Ray { base: vector(0), direction: vector(3) }
+}
+
+/// What each ray finds.
+struct Found {
+    density: Lane,
+    /// Profile of the kernel, times the density.
+    weight: Lane,
+    area: Lane,
+    distance: Lane,
+}
+
+impl<M: Mapping> pulp::NullaryFnOnce for Rays<'_, M> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn call(self) -> f64 {
+        if self.caster.kind == SplatKind::Medium { self.sample_medium() } else { self.sample_disc() }
+    }
+}
+
+impl<M: Mapping> Rays<'_, M> {
+    fn sample_disc(self) -> f64 {
+        let mut norm = 0.0;
+        for &[cell, ..] in self.window {
+            let (weight, area, distance) = sample_disc(self.mapping, self.caster, cell, self.samples);
+            if weight > 0.0 {
+                norm += f64::from(area);
+                self.cells.push((cell, weight, distance));
+            }
+        }
+        norm
+    }
+
+    #[inline(always)]
+    fn sample_medium(self) -> f64 {
+        let mut norm = 0.0;
+        let per_cell = (self.samples * self.samples) as usize;
+        let total = self.window.len() * per_cell;
+        let mut window = self.window.iter();
+        // Density, weight, area and weighted distance of the cell that is being summed, and how many rays it has so far.
+        let (mut sums, mut count) = ([0.0f32; 4], 0);
+        for begin in (0..total).step_by(LANES) {
+            let rays = if self.samples == 1 {
+                self.rays_of_centres(begin)
+            } else {
+                self.rays_within(begin / per_cell, begin % per_cell)
+            };
+            let found = self.look(&rays);
+            for l in 0..LANES.min(total - begin) {
+                let weight = found.weight[l];
+                let next = [found.density[l], weight, found.area[l], weight * found.distance[l]];
+                (0..4).for_each(|k| sums[k] += next[k]);
+                count += 1;
+                if count < per_cell {
+                    continue;
+                }
+                count = 0;
+                let [density, weight, area, distance] = std::mem::take(&mut sums);
+                if let Some(&[cell, column, row]) = window.next().filter(|_| weight > 0.0) {
+                    norm += f64::from(area / (density * self.mapping.inverse_measure(column, row)));
+                    let is_one = per_cell == 1 || !self.near;
+                    self.cells.push((
+                        cell,
+                        weight / density,
+                        if is_one { found.distance[l] } else { distance / weight },
+                    ));
+                }
+            }
+        }
+        norm
+    }
+
+    /// One ray through the centre of each cell.
+    #[inline(always)]
+    fn rays_of_centres(&self, begin: usize) -> RayLanes {
+        let mut rays = [[0.0; LANES]; 6];
+        for (l, [_, column, row]) in self.window[begin..].iter().enumerate().take(LANES) {
+            put(&mut rays, l, &self.mapping.ray_of(*column, *row));
+        }
+        rays
+    }
+
+    /// Rays on a lattice within each cell, from a ray of a cell of the window on.
+    #[inline(always)]
+    fn rays_within(&self, mut cell: usize, ray: usize) -> RayLanes {
+        let samples = self.samples as usize;
+        let (mut i, mut j) = (ray % samples, ray / samples);
+        let mut corner = [[0.0; LANES]; 2];
+        let mut step = [[0.0; LANES]; 2];
+        for l in 0..LANES {
+            let [_, column, row] = self.window[cell.min(self.window.len() - 1)];
+            (corner[0][l], corner[1][l]) = (column as f32, row as f32);
+            (step[0][l], step[1][l]) = (i as f32, j as f32);
+            i += 1;
+            (i, j) = if i == samples { (0, j + 1) } else { (i, j) };
+            (j, cell) = if j == samples { (0, cell + 1) } else { (j, cell) };
+        }
+        let mut rays = [[0.0; LANES]; 6];
+        for l in 0..LANES {
+            let step = Vec2::new(step[0][l] + 0.5, step[1][l] + 0.5) / self.samples as f32;
+            put(&mut rays, l, &self.mapping.ray(Vec2::new(corner[0][l], corner[1][l]) + step));
+        }
+        rays
+    }
+
+    #[inline(always)]
+    fn look(&self, rays: &RayLanes) -> Found {
+        let (caster, parallel) = (self.caster, self.mapping.is_parallel());
+        let nought = [0.0; LANES];
+        let (mut s, mut along) = (nought, nought);
+        let mut found = Found { density: nought, weight: nought, area: nought, distance: [caster.distance; LANES] };
+        for l in 0..LANES {
+            let ray = get(rays, l);
+            let p = caster.position - ray.base;
+            along[l] = p.dot(ray.direction);
+            s[l] = (p - ray.direction * along[l]).length_squared() * caster.inverse_radius_sq;
+            found.density[l] = if self.samples == 1 { 1.0 } else { self.mapping.density(&ray) };
+            let is_met = (s[l] < 1.0) & (self.near | (along[l] > 0.0));
+            let weight = found.density[l] * caster.kernel.profile(s[l]);
+            found.weight[l] = if is_met { weight } else { 0.0 };
+            let jacobian = if parallel | self.near { 1.0 } else { along[l] * caster.distance };
+            found.area[l] = found.weight[l] * jacobian;
+        }
+        if self.near {
+            for l in (0..LANES).filter(|&l| s[l] < 1.0) {
+                let (share, distance) = ahead(caster, along[l], s[l]).unwrap_or((0.0, 0.0));
+                found.weight[l] *= share;
+                found.distance[l] = distance;
+            }
+        }
+        found
+    }
+}
