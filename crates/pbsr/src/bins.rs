@@ -1,6 +1,6 @@
 //! Projected particles of one task, sorted by tile: a counting sort of a few thousand records in the nearest cache.
 
-use crate::project::Projector;
+use crate::project::{BLOCK, Footing, Projector, View};
 use crate::stream::{Stage, scramble};
 use crate::{PackedColor, PackedNormal, Particles, Sampler};
 use splat_core::rng;
@@ -17,8 +17,6 @@ pub(crate) struct Record {
     /// Pixel of the tile (12 bits), place within the pixel (two of 8 bits).
     place: u32,
     pub(crate) depth: f32,
-    /// Counts the particles of the task.
-    pub(crate) id: u32,
     pub(crate) normal: PackedNormal,
     pub(crate) color: PackedColor,
 }
@@ -27,6 +25,13 @@ impl Record {
     #[inline(always)]
     pub(crate) fn pixel(&self) -> usize {
         (self.place & 0xfff) as usize
+    }
+
+    /// Sorts by depth, bits of positive numbers do; at equal depths by chance, which is the place in the pixel. Of two
+    /// particles with the same key the first is seen.
+    #[inline(always)]
+    pub(crate) fn key(&self) -> u64 {
+        u64::from(self.depth.to_bits()) << 32 | u64::from(self.place.wrapping_mul(0x9e37_79b1))
     }
 
     /// Place in the pixel, (0, 1).
@@ -73,10 +78,19 @@ pub(crate) struct Task {
 }
 
 /// What a task needs beside its own: kept by each thread.
-#[derive(Default)]
 pub(crate) struct Staging {
     particles: Particles,
-    staged: Vec<(u32, Record)>,
+    view: View,
+    /// Tiles and records, of which the first `len` count.
+    tiles: Vec<u32>,
+    records: Vec<Record>,
+    len: usize,
+}
+
+impl Default for Staging {
+    fn default() -> Self {
+        Self { particles: Particles::default(), view: View::EMPTY, tiles: Vec::new(), records: Vec::new(), len: 0 }
+    }
 }
 
 impl Task {
@@ -84,15 +98,6 @@ impl Task {
     #[inline]
     pub(crate) fn tile(&self, t: usize) -> &[Record] {
         &self.records[self.starts[t] as usize..self.starts[t + 1] as usize]
-    }
-
-    pub(crate) fn record(&self, i: u32) -> &Record {
-        &self.records[i as usize]
-    }
-
-    /// Index of the first record of a tile.
-    pub(crate) fn first(&self, t: usize) -> u32 {
-        self.starts[t]
     }
 
     pub(crate) fn records(&self) -> u64 {
@@ -105,27 +110,29 @@ impl Task {
 
     /// Samples the chunks, projects and sorts.
     pub(crate) fn run(&mut self, sampler: &dyn Sampler, projector: &Projector, tiling: &Tiling, staging: &mut Staging) {
-        let Staging { particles: scratch, staged } = staging;
-        staged.clear();
+        staging.len = 0;
         self.particles = 0;
+        self.starts.clear();
+        self.starts.resize(tiling.tiles() + 1, 0);
+        let mut scratch = std::mem::take(&mut staging.particles);
         for chunk in self.chunks.clone() {
-            let particles = sampler.chunk(self.set, chunk, scratch);
+            let particles = sampler.chunk(self.set, chunk, &mut scratch);
             let key = thinning_key(self.object, self.set, chunk);
-            stage(particles, projector, tiling, key, self.particles as u32, staged);
+            staging.stage(particles, projector, tiling, key, &mut self.starts);
             self.particles += particles.len() as u64;
         }
-        self.sort(staged, tiling.tiles());
+        staging.particles = scratch;
+        self.sort(&staging.tiles[..staging.len], &staging.records[..staging.len]);
     }
 
-    fn sort(&mut self, staged: &[(u32, Record)], tiles: usize) {
-        self.starts.clear();
-        self.starts.resize(tiles + 1, 0);
-        staged.iter().for_each(|(tile, _)| self.starts[*tile as usize + 1] += 1);
-        for t in 0..tiles {
-            self.starts[t + 1] += self.starts[t];
+    /// Sorts by tile; `starts` holds the number of each tile's records, one place on.
+    fn sort(&mut self, of_tile: &[u32], staged: &[Record]) {
+        self.starts[0] = 0;
+        for t in 1..self.starts.len() {
+            self.starts[t] += self.starts[t - 1];
         }
         self.records.resize(staged.len(), Record::default());
-        for (tile, record) in staged {
+        for (tile, record) in of_tile.iter().zip(staged) {
             let at = &mut self.starts[*tile as usize];
             self.records[*at as usize] = *record;
             *at += 1;
@@ -148,30 +155,76 @@ pub(crate) fn thinning(key: u64, i: usize) -> f32 {
     ((bits >> 41) as f32 + 0.5) * (1.0 / (1u32 << 23) as f32)
 }
 
-fn stage(
-    particles: &Particles,
-    projector: &Projector,
-    tiling: &Tiling,
-    key: u64,
-    first: u32,
-    staged: &mut Vec<(u32, Record)>,
-) {
-    let columns = tiling.columns as u32;
-    let each = particles.position.iter().zip(&particles.normal).zip(&particles.color).enumerate();
-    for (i, ((&position, &normal), &color)) in each {
-        let own = || thinning(key, i);
-        let Some(foot) = projector.project(position, normal, own) else { continue };
-        let within = u32::from(foot.within[0]) << 12 | u32::from(foot.within[1]) << 20;
+impl Staging {
+    /// Room for `n` records and a block more.
+    fn grow(&mut self, n: usize) {
+        if self.records.len() < n + BLOCK {
+            self.tiles.resize((n + BLOCK).next_power_of_two(), 0);
+            self.records.resize(self.tiles.len(), Record::default());
+        }
+    }
+
+    /// Projects the particles of a chunk; counts those of each tile, one place on in `counts`.
+    fn stage(&mut self, particles: &Particles, projector: &Projector, tiling: &Tiling, key: u64, counts: &mut [u32]) {
+        let columns = tiling.columns as u32;
+        let mut n = self.len;
+        for (block, offsets) in particles.position.chunks(BLOCK).enumerate() {
+            let first = block * BLOCK;
+            projector.view(offsets, &mut self.view);
+            self.grow(n);
+            let attributes = particles.normal[first..].iter().zip(&particles.color[first..]);
+            for (j, (&normal, &color)) in attributes.enumerate().take(offsets.len()) {
+                let (x, y, depth, mut k) = (self.view.x[j], self.view.y[j], self.view.z[j], self.view.k[j]);
+                if normal.is_per_crossing() {
+                    k *= projector.cosine(offsets[j], normal);
+                }
+                let record = Record { place: 0, depth, normal, color };
+                if k > 1.0 {
+                    self.len = n;
+                    self.widened(
+                        &projector.widened(x, y, k),
+                        record,
+                        key.wrapping_add((first + j) as u64),
+                        columns,
+                        counts,
+                    );
+                    n = self.len;
+                    continue;
+                }
+                let seen = self.view.seen[j] & ((k >= 1.0) || thinning(key, first + j) < k);
+                let [px, py] = [0, 1].map(|a| self.view.pixel[a][j]);
+                let (tile, place) = place(px, py, self.view.within[j], columns);
+                self.tiles[n] = tile;
+                self.records[n] = Record { place, ..record };
+                counts[if seen { tile as usize + 1 } else { 0 }] += 1;
+                n += usize::from(seen);
+            }
+        }
+        self.len = n;
+    }
+
+    /// A particle on several pixels; its places in them are random.
+    fn widened(&mut self, foot: &Footing, record: Record, key: u64, columns: u32, counts: &mut [u32]) {
         for y in foot.y[0]..foot.y[1] {
             for x in foot.x[0]..foot.x[1] {
                 let (x, y) = (x as u32, y as u32);
-                let tile = y / TILE as u32 * columns + x / TILE as u32;
-                let pixel = y % TILE as u32 * TILE as u32 + x % TILE as u32;
-                staged.push((
-                    tile,
-                    Record { place: pixel | within, depth: foot.depth, id: first + i as u32, normal, color },
-                ));
+                let within = scramble(key ^ u64::from(x) << 48 ^ u64::from(y) << 32) as u32 & 0xffff;
+                let (tile, place) = place(x, y, within, columns);
+                self.tiles[self.len] = tile;
+                self.records[self.len] = Record { place, ..record };
+                counts[tile as usize + 1] += 1;
+                self.len += 1;
+                // A place for the next, and for what remains of the block.
+                self.grow(self.len);
             }
         }
     }
+}
+
+/// Tile of a pixel, and the place in the tile as a record has it; `within` are two of 8 bits.
+#[inline(always)]
+fn place(x: u32, y: u32, within: u32, columns: u32) -> (u32, u32) {
+    const SIDE: u32 = TILE as u32;
+    let tile = (y / SIDE).wrapping_mul(columns).wrapping_add(x / SIDE);
+    (tile, y % SIDE * SIDE + x % SIDE | (within & 0xffff) << 12)
 }

@@ -12,7 +12,10 @@ use crate::{Error, Occluder};
 use splat_core::{LayerData, Layers};
 
 /// Bits behind the point of a channel's sum.
-const FRACTION: f32 = 16_777_216.0;
+pub(crate) const FRACTION: f32 = 16_777_216.0;
+
+/// Where radiance is cut, in its unit.
+pub(crate) const BRIGHTEST: f32 = 65536.0;
 
 /// Steps of a depth between the two ends of the range.
 const DEPTH_STEPS: f32 = 1_048_576.0;
@@ -45,6 +48,11 @@ impl EnsembleParams {
 
     pub(crate) fn light_channels(&self) -> usize {
         if self.effects { 9 } else { 3 }
+    }
+
+    /// Whether a hit brings nothing but its radiance.
+    pub(crate) fn only_beauty(&self) -> bool {
+        self.channels() == 3 && self.depth_range.is_none()
     }
 
     pub(crate) fn unit(&self) -> f32 {
@@ -112,14 +120,14 @@ impl TileSums<'_> {
         let mut luminance = 0.0;
         for (sums, color) in light_sums.chunks_exact_mut(3).zip(light.chunks_exact(3)) {
             for c in 0..3 {
-                let v = (color[c] * self.inverse_unit).clamp(-65536.0, 65536.0);
+                let v = (color[c] * self.inverse_unit).clamp(-BRIGHTEST, BRIGHTEST);
                 luminance += v * LUMINANCE[c];
-                sums[c] = sums[c].saturating_add(fixed(v));
+                raise(&mut sums[c], fixed(v));
             }
         }
-        other_sums.iter_mut().zip(other).for_each(|(sum, v)| *sum = sum.saturating_add(fixed(*v)));
+        other_sums.iter_mut().zip(other).for_each(|(sum, v)| raise(sum, fixed(*v)));
         let square = &mut self.squares[k];
-        *square = square.saturating_add((luminance * luminance * FRACTION) as u64);
+        *square = square.saturating_add(fixed_square(luminance * luminance * FRACTION));
         if let ([_, ..], Some([near, far])) = (&*self.depths, params.depth_range) {
             let d = &mut self.depths[k];
             let steps = ((depth - near) / (far - near) * DEPTH_STEPS + 0.5).clamp(0.0, DEPTH_STEPS) as u64;
@@ -130,11 +138,30 @@ impl TileSums<'_> {
     }
 }
 
-/// Nearest multiple of 2⁻²⁴; a value that is not a number counts as 0.
+/// Adds, and stays at the ends of the range.
 #[inline(always)]
-fn fixed(v: f32) -> i64 {
-    let scaled = v * FRACTION;
-    (scaled + 0.5f32.copysign(scaled)) as i64
+pub(crate) fn raise(sum: &mut i64, by: i64) {
+    // A branch that is never taken: selections are slower, above all when they are put into lanes.
+    *sum = match sum.checked_add(by) {
+        Some(sum) => sum,
+        None => sum.saturating_add(by),
+    };
+}
+
+/// A square as a multiple of 2⁻²⁴, from what it is times 2²⁴; a value that is not a number counts as 0.
+#[inline(always)]
+pub(crate) fn fixed_square(scaled: f32) -> u64 {
+    // Below 2⁶³, where the signed conversion is the cheaper one.
+    scaled as i64 as u64
+}
+
+/// Nearest multiple of 2⁻²⁴, for |v| < 2²⁷; a value that is not a number counts as 0.
+#[inline(always)]
+pub(crate) fn fixed(v: f32) -> i64 {
+    // Where the last bit of the sum is 1, the sum's bits count. Cheaper than a conversion that minds every input.
+    const ONES: f64 = 6_755_399_441_055_744.0;
+    let v = if v.is_nan() { 0.0 } else { v };
+    (f64::from(v) * f64::from(FRACTION) + ONES).to_bits() as i64 - ONES.to_bits() as i64
 }
 
 impl Ensemble {

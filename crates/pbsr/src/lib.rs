@@ -50,6 +50,7 @@ mod checkpoint;
 mod cost;
 mod ensemble;
 mod error;
+mod flat;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 mod implicit;

@@ -51,14 +51,43 @@ pub(crate) struct Projector {
     pub(crate) share: f32,
 }
 
-/// Pixels that one particle reaches: `x0 .. x1` × `y0 .. y1`, never empty.
+/// Particles that are projected at once.
+pub(crate) const BLOCK: usize = 128;
+
+/// Particles in view.
+pub(crate) struct View {
+    /// Image position, pixels.
+    pub(crate) x: [f32; BLOCK],
+    pub(crate) y: [f32; BLOCK],
+    /// View depth.
+    pub(crate) z: [f32; BLOCK],
+    /// k of a thin slab; 0 for what is behind the eye.
+    pub(crate) k: [f32; BLOCK],
+    /// The pixel; of what is out of the image, any.
+    pub(crate) pixel: [[u32; BLOCK]; 2],
+    /// Place in the pixel, two of 8 bits.
+    pub(crate) within: [u32; BLOCK],
+    /// Whether the place is in the image.
+    pub(crate) seen: [bool; BLOCK],
+}
+
+impl View {
+    pub(crate) const EMPTY: Self = Self {
+        x: [0.0; BLOCK],
+        y: [0.0; BLOCK],
+        z: [0.0; BLOCK],
+        k: [0.0; BLOCK],
+        pixel: [[0; BLOCK]; 2],
+        within: [0; BLOCK],
+        seen: [false; BLOCK],
+    };
+}
+
+/// Pixels that a widened particle reaches: `x[0] .. x[1]` × `y[0] .. y[1]`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Footing {
     pub(crate) x: [i32; 2],
     pub(crate) y: [i32; 2],
-    /// Place in its pixel, 1/256.
-    pub(crate) within: [u8; 2],
-    pub(crate) depth: f32,
 }
 
 impl Projector {
@@ -83,49 +112,25 @@ impl Projector {
         self.rotation * n.get()
     }
 
-    /// The pixels of a particle, or `None` where it is out of view or thinned out; `random` is its own number in (0, 1).
-    #[inline(always)]
-    pub(crate) fn project(&self, offset: Vec3, n: PackedNormal, random: impl FnOnce() -> f32) -> Option<Footing> {
-        let p = self.linear * offset + self.translation;
-        if p.z.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
-            return None;
-        }
-        let inverse = if self.orthographic { 1.0 } else { 1.0 / p.z };
-        let x = self.middle[0] + self.focal * p.x * inverse;
-        let y = self.middle[1] - self.focal * p.y * inverse;
-        let k = if n.is_per_crossing() { self.per_crossing(p, n) } else { self.thin_slab(p, inverse) };
-        if k <= 1.0 {
-            // One range check for both ends; NaN fails it.
-            let inside = x >= 0.0 && x < self.size[0] && y >= 0.0 && y < self.size[1];
-            if !inside || (k < 1.0 && random() >= k) {
-                return None;
-            }
-            let (i, j) = (x as i32, y as i32);
-            let within = [((x - i as f32) * 256.0) as u8, ((y - j as f32) * 256.0) as u8];
-            return Some(Footing { x: [i, i + 1], y: [j, j + 1], within, depth: p.z });
-        }
-        self.widened(x, y, k, p.z)
+    /// Brings at most [`BLOCK`] particles into view.
+    pub(crate) fn view(&self, offsets: &[Vec3], view: &mut View) {
+        pulp::Arch::new().dispatch(Lanes { projector: self, offsets, view });
     }
 
-    /// k of a thin slab: opacity grows at grazing angles by itself.
-    #[inline(always)]
-    fn thin_slab(&self, p: Vec3, inverse: f32) -> f32 {
-        if self.orthographic { self.share } else { self.share * p.length() * inverse * inverse * inverse }
-    }
-
-    /// k·|cos θ|; a particle without a normal is a thin slab.
-    fn per_crossing(&self, p: Vec3, n: PackedNormal) -> f32 {
+    /// |cos θ| at an offset with a normal; a particle without one is a thin slab.
+    pub(crate) fn cosine(&self, offset: Vec3, n: PackedNormal) -> f32 {
         let normal = self.view_normal(n);
-        let slab = self.thin_slab(p, if self.orthographic { 1.0 } else { 1.0 / p.z });
         if normal == Vec3::ZERO {
-            return slab;
+            return 1.0;
         }
+        let p = self.linear * offset + self.translation;
         let cosine = if self.orthographic { normal.z } else { normal.dot(p) / p.length() };
-        slab * cosine.abs()
+        cosine.abs()
     }
 
-    #[cold]
-    fn widened(&self, x: f32, y: f32, k: f32, depth: f32) -> Option<Footing> {
+    /// The pixels of a particle with k > 1.
+    #[inline]
+    pub(crate) fn widened(&self, x: f32, y: f32, k: f32) -> Footing {
         let half = 0.5 * k.sqrt().min(WIDEST_PX);
         let range = |v: f32, size: f32| {
             // Centres i + 1/2 in (v − half, v + half].
@@ -133,8 +138,46 @@ impl Projector {
             let to = ((v + half - 0.5).floor() + 1.0).min(size);
             [from as i32, to as i32]
         };
-        let (x, y) = (range(x, self.size[0]), range(y, self.size[1]));
-        (x[0] < x[1] && y[0] < y[1]).then_some(Footing { x, y, within: [128; 2], depth })
+        Footing { x: range(x, self.size[0]), y: range(y, self.size[1]) }
+    }
+}
+
+/// One block, in the form that [`pulp`] compiles once per instruction set.
+struct Lanes<'a> {
+    projector: &'a Projector,
+    offsets: &'a [Vec3],
+    view: &'a mut View,
+}
+
+impl pulp::NullaryFnOnce for Lanes<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        if self.projector.orthographic { self.run::<true>() } else { self.run::<false>() }
+    }
+}
+
+impl Lanes<'_> {
+    #[inline(always)]
+    fn run<const ORTHOGRAPHIC: bool>(self) {
+        let Self { projector: &Projector { linear, translation, focal, middle, share, size, .. }, offsets, view } =
+            self;
+        for (i, offset) in offsets.iter().enumerate().take(BLOCK) {
+            let p = linear * *offset + translation;
+            let inverse = if ORTHOGRAPHIC { 1.0 } else { 1.0 / p.z };
+            let at = [middle[0] + focal * p.x * inverse, middle[1] - focal * p.y * inverse];
+            (view.x[i], view.y[i]) = (at[0], at[1]);
+            // NaN is out of the image; in the image nothing is cut.
+            view.seen[i] = (at[0] >= 0.0) & (at[0] < size[0]) & (at[1] >= 0.0) & (at[1] < size[1]);
+            let cut = [0, 1].map(|a| at[a].max(0.0).min(65535.0) as i32);
+            (view.pixel[0][i], view.pixel[1][i]) = (cut[0] as u32, cut[1] as u32);
+            let within = [0, 1].map(|a| ((at[a] - cut[a] as f32) * 256.0) as i32 as u32 & 255);
+            view.within[i] = within[0] | within[1] << 8;
+            view.z[i] = p.z;
+            let k = if ORTHOGRAPHIC { share } else { share * p.length() * inverse * inverse * inverse };
+            view.k[i] = if p.z > 0.0 { k } else { 0.0 };
+        }
     }
 }
 
@@ -142,6 +185,19 @@ impl Projector {
 mod tests {
     use super::*;
     use splat_core::{Projection, rng};
+
+    /// The pixels of one particle, none of k ≤ 1 that is thinned out by `random`.
+    fn project(projector: &Projector, offset: Vec3, random: f32) -> Option<Footing> {
+        let mut view = View::EMPTY;
+        projector.view(&[offset], &mut view);
+        let (x, y, k) = (view.x[0], view.y[0], view.k[0]);
+        if k > 1.0 {
+            let foot = projector.widened(x, y, k);
+            return (foot.x[0] < foot.x[1] && foot.y[0] < foot.y[1]).then_some(foot);
+        }
+        let one = |v: f32| [v as i32, v as i32 + 1];
+        (view.seen[0] && (k >= 1.0 || random < k)).then(|| Footing { x: one(x), y: one(y) })
+    }
 
     fn camera(projection: Projection) -> Camera {
         Camera::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, projection, [64, 48]).unwrap()
@@ -158,7 +214,7 @@ mod tests {
         for i in -40i32..40 {
             for j in -30i32..30 {
                 let p = Vec3::new(i as f32 / 8.0, j as f32 / 8.0, -1.0);
-                let foot = at(1.0).project(p, PackedNormal::default(), || 0.5);
+                let foot = project(&at(1.0), p, 0.5);
                 let inside = (-32..32).contains(&i) && (-24..24).contains(&-j);
                 assert_eq!(foot.is_some(), inside, "{i} {j}");
                 if let Some(foot) = foot {
@@ -186,7 +242,7 @@ mod tests {
                     // Whole pixels around the axis, so that all phases are met, and no widened particle is cut.
                     let p = Vec3::new((u(0) - 0.5) * width, (u(1) - 0.5) * width, -depth as f32);
                     let own = s / pixel_area(&camera, p.as_dvec3() * DVec3::new(1.0, 1.0, -1.0));
-                    let foot = projector.project(p, PackedNormal::default(), || u(2));
+                    let foot = project(&projector, p, u(2));
                     hits += foot.map_or(0.0, |f| f64::from((f.x[1] - f.x[0]) * (f.y[1] - f.y[0])));
                     expected += own;
                     variance += own;

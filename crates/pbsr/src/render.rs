@@ -5,17 +5,16 @@
 //! Nothing is shared between tasks and every sum is in integers: the result has the same bits for any number of threads.
 //! Memory depends on the image and on the particles of one batch, never on the number of sets.
 
-use crate::bins::{AREA, Staging, TILE, Task, Tiling};
+use crate::bins::{AREA, Record, Staging, TILE, Task, Tiling};
 use crate::cost::Counts;
 use crate::ensemble::{Ensemble, TileSums};
 use crate::error::check;
 use crate::project::Projector;
 use crate::shade::{Appearance, LitBy, MAX_CHANNELS, Seen, Shader};
-use crate::stream::Stage;
-use crate::{Error, Sampler};
+use crate::{Error, PackedColor, Sampler, flat};
 use glam::{DMat3, DVec3, Mat3};
 use rayon::prelude::*;
-use splat_core::{Camera, Progress, Shading, Similarity, glam, rng};
+use splat_core::{Camera, Progress, Shading, Similarity, glam};
 
 /// Particles of a task, in the mean; at least one chunk.
 const TASK_PARTICLES: f64 = 16384.0;
@@ -155,7 +154,7 @@ impl Renderer {
             nearest.begin(scene, &plan.tiling, t);
             for set in 0..batch {
                 nearest.collect(&self.tasks, set, batch, t);
-                nearest.add(&self.tasks, scene, plan, &shader, &mut tile);
+                nearest.add(&self.tasks, [set, batch, t], scene, plan, &shader, &mut tile);
             }
         });
     }
@@ -224,107 +223,122 @@ fn ranges(objects: &[Object<'_>]) -> Vec<(u32, std::ops::Range<usize>)> {
 
 /// The depth buffer of one tile.
 struct Nearest {
-    depth: Vec<f32>,
-    /// What depth starts with: the occluder's.
-    limit: Vec<f32>,
-    /// (task, record), task `NONE` where no particle is.
-    winner: Vec<(u32, u32)>,
-    touched: Vec<u16>,
+    /// [`Record::key`] of the nearest particle, or `limit` where none is.
+    nearest: Vec<u64>,
+    /// What a pixel starts with: the occluder's depth, and nothing is behind it or at it.
+    limit: Vec<u64>,
+    /// Records of one task that are seen: their numbers, or their pixels and colours.
+    seen: Vec<(u32, PackedColor)>,
     corner: [usize; 2],
 }
 
-const NONE: u32 = u32::MAX;
+/// The key of a depth that hides all that is at it or behind it.
+fn solid(depth: f32) -> u64 {
+    u64::from(depth.to_bits()) << 32
+}
 
 impl Nearest {
     fn new() -> Self {
-        Self {
-            depth: vec![f32::INFINITY; AREA],
-            limit: vec![f32::INFINITY; AREA],
-            winner: vec![(NONE, 0); AREA],
-            touched: Vec::with_capacity(AREA),
-            corner: [0; 2],
-        }
+        let open = vec![solid(f32::INFINITY); AREA];
+        Self { nearest: open.clone(), limit: open, seen: Vec::new(), corner: [0; 2] }
     }
 
     fn begin(&mut self, scene: &Scene<'_>, tiling: &Tiling, t: usize) {
         self.corner = [t % tiling.columns * TILE, t / tiling.columns * TILE];
-        self.limit.fill(f32::INFINITY);
+        self.limit.fill(solid(f32::INFINITY));
         if let Some(occluder) = scene.occluder {
             let [w, h] = tiling.size;
             for y in self.corner[1]..(self.corner[1] + TILE).min(h) {
                 let row = self.corner[0]..(self.corner[0] + TILE).min(w);
                 let from = (y - self.corner[1]) * TILE;
                 let depths = &occluder.depth[y * w + row.start..y * w + row.end];
-                self.limit[from..from + depths.len()].copy_from_slice(depths);
+                self.limit[from..].iter_mut().zip(depths).for_each(|(limit, depth)| {
+                    // A depth that is not a number is none.
+                    *limit = solid(if *depth < f32::INFINITY { depth.max(0.0) } else { f32::INFINITY });
+                });
             }
         }
-        self.depth.copy_from_slice(&self.limit);
+        self.nearest.copy_from_slice(&self.limit);
     }
 
     /// The nearest particle of each pixel among all objects of one set, whose tasks are `batch` apart.
     #[inline]
     fn collect(&mut self, tasks: &[Task], set: usize, batch: usize, t: usize) {
-        for (k, task) in tasks.iter().enumerate().skip(set).step_by(batch) {
-            let first = task.first(t);
-            for (i, record) in task.tile(t).iter().enumerate() {
-                let pixel = record.pixel();
-                let nearest = self.depth[pixel];
-                if record.depth > nearest {
-                    continue;
-                }
-                let (other, at) = self.winner[pixel];
-                if other == NONE {
-                    // At the occluder's own depth the surface is seen.
-                    if record.depth == nearest {
-                        continue;
-                    }
-                    self.touched.push(pixel as u16);
-                } else if record.depth == nearest {
-                    let place = t * AREA + pixel;
-                    let rank = |task: &Task, id: u32| {
-                        let who = u64::from(task.object) << 48 ^ (task.chunks.start as u64) << 32 ^ u64::from(id);
-                        rng::bits(place as u64, Stage::Ties as u64, task.set, who)
-                    };
-                    let theirs = &tasks[other as usize];
-                    if rank(task, record.id) >= rank(theirs, theirs.record(at).id) {
-                        continue;
-                    }
-                }
-                self.depth[pixel] = record.depth;
-                self.winner[pixel] = (k as u32, first + i as u32);
+        for task in tasks.iter().skip(set).step_by(batch) {
+            for record in task.tile(t) {
+                let nearest = &mut self.nearest[record.pixel()];
+                *nearest = record.key().min(*nearest);
             }
         }
     }
 
-    /// Shades what is seen, adds it, and clears the buffer.
+    /// Shades what is seen of that set, adds it, and clears the buffer.
     #[inline]
-    fn add(&mut self, tasks: &[Task], scene: &Scene<'_>, plan: &Plan, shader: &Shader<'_>, sums: &mut TileSums<'_>) {
+    fn add(
+        &mut self,
+        tasks: &[Task],
+        [set, batch, t]: [usize; 3],
+        scene: &Scene<'_>,
+        plan: &Plan,
+        shader: &Shader<'_>,
+        sums: &mut TileSums<'_>,
+    ) {
+        for task in tasks.iter().skip(set).step_by(batch) {
+            let records = task.tile(t);
+            let object = &scene.objects[task.object as usize];
+            // Beauty alone of what is shown as it is needs neither place nor normal.
+            if shader.channels.only_beauty() && object.look.material.shading == Shading::Unlit {
+                let n = self.see(records, |seen, _, record| *seen = (record.pixel() as u32, record.color));
+                flat::add(sums, &self.seen[..n], object.look.material.emission);
+            } else {
+                let n = self.see(records, |seen, i, _| seen.0 = i as u32);
+                self.shade(n, records, task.object as usize, object, scene, plan, shader, sums);
+            }
+        }
+    }
+
+    /// Lists the records that are the nearest of their pixels, and makes their pixels empty; returns their number.
+    #[inline]
+    fn see(&mut self, records: &[Record], note: impl Fn(&mut (u32, PackedColor), usize, &Record)) -> usize {
+        if self.seen.len() < records.len() {
+            self.seen.resize(records.len().next_power_of_two(), Default::default());
+        }
+        // Written always, kept when seen: whether a particle is seen cannot be foreseen.
+        let mut n = 0;
+        for (i, record) in records.iter().enumerate() {
+            let pixel = record.pixel();
+            let is_seen = self.nearest[pixel] == record.key();
+            self.nearest[pixel] = if is_seen { self.limit[pixel] } else { self.nearest[pixel] };
+            note(&mut self.seen[n], i, record);
+            n += usize::from(is_seen);
+        }
+        n
+    }
+
+    fn shade(
+        &self,
+        n: usize,
+        records: &[Record],
+        o: usize,
+        object: &Object<'_>,
+        scene: &Scene<'_>,
+        plan: &Plan,
+        shader: &Shader<'_>,
+        sums: &mut TileSums<'_>,
+    ) {
         let channels = shader.channels.channels();
         let mut values = [0.0; MAX_CHANNELS];
-        // Beauty alone of what is shown as it is needs neither place nor normal.
-        let plain = channels == 3;
-        for &pixel in &self.touched {
-            let pixel = usize::from(pixel);
-            let (task, at) = self.winner[pixel];
-            let task = &tasks[task as usize];
-            let record = task.record(at);
-            let object = &scene.objects[task.object as usize];
-            if plain && object.look.material.shading == Shading::Unlit {
-                let (color, emission) = (record.color.get(), object.look.material.emission);
-                (0..3).for_each(|c| values[c] = color[c] + emission[c]);
-            } else {
-                let [wx, wy] = record.within().map(f64::from);
-                let at_px = [(self.corner[0] + pixel % TILE) as f64 + wx, (self.corner[1] + pixel / TILE) as f64 + wy];
-                let normal = plan.turns[task.object as usize] * record.normal.get();
-                let from_eye = plan.behind_pixel(scene.camera, at_px, record.depth);
-                let seen = Seen { look: &object.look, from_eye, normal, color: record.color.get() };
-                shader.shade(&seen, &mut values);
-            }
+        for &(i, _) in &self.seen[..n] {
+            let record = &records[i as usize];
+            let pixel = record.pixel();
+            let [wx, wy] = record.within().map(f64::from);
+            let at_px = [(self.corner[0] + pixel % TILE) as f64 + wx, (self.corner[1] + pixel / TILE) as f64 + wy];
+            let normal = plan.turns[o] * record.normal.get();
+            let from_eye = plan.behind_pixel(scene.camera, at_px, record.depth);
+            let seen = Seen { look: &object.look, from_eye, normal, color: record.color.get() };
+            shader.shade(&seen, &mut values);
             sums.add(&shader.channels, pixel, &values[..channels], record.depth);
-            self.depth[pixel] = self.limit[pixel];
-            self.winner[pixel] = (NONE, 0);
         }
-        self.touched.clear();
     }
 }
 

@@ -17,7 +17,6 @@ pub(crate) enum Stage {
     Brownian,
     Metropolis,
     Thinning,
-    Ties,
     Survey,
 }
 
