@@ -25,7 +25,7 @@ const COARSE_CELLS: f64 = 48.0;
 /// Meshes the zero set of a field inside a box, cells of about `cell` (object units).
 ///
 /// Normals point to where the field is positive. Parts thinner than a cell are lost, and the surface ends within one
-/// cell of the box.
+/// cell of the box, and at the border of the field's own domain ([`ScalarField::in_domain`]).
 ///
 /// ```
 /// use convert::{ExpressionField, SplatParams, field_to_mesh};

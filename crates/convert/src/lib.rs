@@ -19,6 +19,7 @@ mod columns;
 mod combine;
 mod convert_error;
 pub mod cost;
+mod domain;
 #[cfg(feature = "read")]
 mod error;
 #[cfg(feature = "expression")]

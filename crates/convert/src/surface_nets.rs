@@ -3,10 +3,12 @@
 //! Every cell of a lattice that the surface crosses gets one vertex, every lattice edge that it crosses one
 //! quadrilateral. The vertex begins at the mean of the crossings of the cell's edges and follows p ← p − f·∇f/|∇f|²,
 //! so positions and normals are those of the field, not of the lattice; only the topology is. The lattice is worked
-//! through in blocks; a block whose interval bound excludes zero is not evaluated.
+//! through in blocks; a block whose interval bound excludes zero is not evaluated. The mesh is cut where the field's domain
+//! ends.
 
 use crate::ConvertError;
 use crate::convert_error::check_cancelled;
+use crate::domain::cut;
 use rayon::prelude::*;
 use splat_core::{
     Mesh, Progress, ScalarField,
@@ -46,7 +48,7 @@ struct Part {
     quads: Vec<[u64; 4]>,
 }
 
-/// Meshes the zero set; normals point to where the field is positive. `origin` is the middle of the lattice.
+/// Meshes the zero set in the field's domain; normals point to where the field is positive. `origin` is the middle of the lattice.
 pub(crate) fn surface_nets<F: ScalarField + ?Sized>(
     field: &F,
     lattice: &Lattice,
@@ -66,7 +68,7 @@ pub(crate) fn surface_nets<F: ScalarField + ?Sized>(
         .collect();
     check_cancelled(progress)?;
     let parts = parts.into_iter().collect::<Result<Vec<_>, _>>()?;
-    Ok(join(lattice, &parts))
+    Ok(cut(field, join(lattice, &parts)))
 }
 
 fn join(lattice: &Lattice, parts: &[Part]) -> Mesh {

@@ -1,7 +1,9 @@
 //! Unions, intersections, differences, complements and clipped surfaces.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use convert::{Clip, ClippedField, CombinedField, SharedField, SplatParams, field_to_mesh};
+use convert::{
+    Clip, ClippedField, CombinedField, Density, MeshParams, SharedField, SplatParams, field_to_mesh, surface_to_points,
+};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::{ScalarField, rng};
 use std::sync::Arc;
@@ -148,4 +150,38 @@ fn what_makes_no_sense_is_refused() {
     ] {
         assert!(ClippedField::new(a.clone(), vec![clip]).is_err(), "{clip:?}");
     }
+}
+
+#[test]
+fn meshes_and_splats_end_at_the_border_of_the_domain() {
+    let (a, _) = balls();
+    let bounds = [DVec3::splat(-1.2), DVec3::splat(1.2)];
+    let area = |field: &dyn ScalarField| {
+        let mesh = field_to_mesh(field, bounds, 0.05, &SplatParams::default()).unwrap();
+        mesh.validate().unwrap();
+        let at = |i: u32| mesh.origin + mesh.position[i as usize].as_dvec3();
+        let highest = (0..mesh.position.len() as u32).map(|i| at(i).z).fold(f64::MIN, f64::max);
+        let of = |t: &[u32; 3]| 0.5 * (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).length();
+        (mesh.triangles.iter().map(of).sum::<f64>(), highest, mesh)
+    };
+    let (whole, top, uncut) = area(&*a);
+    assert!((top - 1.0).abs() < 1e-3);
+    // The part of a sphere below z = 1/4 has 5/8 of its area.
+    let half = ClippedField::new(a.clone(), vec![Clip::HalfSpace { normal: DVec3::Z, offset: 0.25 }]).unwrap();
+    let (part, top, _) = area(&half);
+    assert!((part / whole - 0.625).abs() < 1e-3, "{part} of {whole}");
+    assert!((0.25 - 1e-6..=0.25 + 1e-6).contains(&top), "{top}");
+    let params = MeshParams { density: Density::Spacing(0.05), ..MeshParams::default() };
+    let (cloud, _) = surface_to_points(&half, bounds, &params).unwrap();
+    let sum: f64 = cloud.cross_section.iter().map(|k| f64::from(*k)).sum();
+    let (all, _) = surface_to_points(&*a, bounds, &params).unwrap();
+    let total: f64 = all.cross_section.iter().map(|k| f64::from(*k)).sum();
+    assert!((sum / total - 0.625).abs() < 2e-3, "{sum} of {total}");
+    assert!(cloud.position.iter().all(|p| cloud.origin.z + f64::from(p.z) < 0.26));
+    // A domain that holds all of the surface changes no bit; one that holds nothing leaves nothing.
+    let (.., same) =
+        area(&ClippedField::new(a.clone(), vec![Clip::Box([DVec3::splat(-2.0), DVec3::splat(2.0)])]).unwrap());
+    assert_eq!((same.position, same.triangles), (uncut.position, uncut.triangles));
+    let none = ClippedField::new(a, vec![Clip::Box([DVec3::splat(-0.1), DVec3::splat(0.1)])]).unwrap();
+    assert!(field_to_mesh(&none, bounds, 0.05, &SplatParams::default()).unwrap().triangles.is_empty());
 }
