@@ -226,5 +226,5 @@ impl Staging {
 fn place(x: u32, y: u32, within: u32, columns: u32) -> (u32, u32) {
     const SIDE: u32 = TILE as u32;
     let tile = (y / SIDE).wrapping_mul(columns).wrapping_add(x / SIDE);
-    (tile, y % SIDE * SIDE + x % SIDE | (within & 0xffff) << 12)
+    (tile, (y % SIDE * SIDE + x % SIDE) | ((within & 0xffff) << 12))
 }

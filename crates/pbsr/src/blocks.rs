@@ -54,6 +54,11 @@ impl Blocks {
         self.chunks[chunk].1
     }
 
+    /// Mean number of arrivals in a set.
+    pub(crate) fn total(&self) -> f64 {
+        self.chunks.iter().map(|(_, mean)| mean).sum()
+    }
+
     /// The arrivals of a chunk: `emit` gets the element of each, and the stream for whatever else it draws.
     #[inline]
     pub(crate) fn arrivals(
@@ -72,7 +77,9 @@ impl Blocks {
             let bits = stream.bits();
             let slot = (((bits >> 32) * slots.len() as u64) >> 32) as usize;
             let (share, other) = slots[slot];
-            let pick = if (bits as u32) < share { slot } else { usize::from(other) };
+            // A selection, not a branch: which it is cannot be foreseen.
+            let own = 0usize.wrapping_sub(usize::from((bits as u32) < share));
+            let pick = slot & own | usize::from(other) & !own;
             emit(first + pick, &mut stream);
         }
     }

@@ -61,6 +61,7 @@ mod metropolis;
 pub mod opacity;
 mod params;
 mod particles;
+mod pieces;
 mod project;
 pub mod reference;
 mod render;

@@ -27,8 +27,9 @@ use crate::implicit::{CellCounts, Cells, ImplicitSurface};
 use crate::leaves::{Graph, Leaf};
 use crate::params::countable;
 use crate::roots::{Found, Line};
+use crate::sampler::{Poisson, PoissonSets};
 use crate::stream::{Stage, Stream, across, unit_or_zero};
-use crate::{Density, Error, PackedColor, PackedNormal, Particles, Sampler, SurfaceParams};
+use crate::{Density, Error, PackedColor, PackedNormal, Particles, SurfaceParams};
 use glam::DVec3;
 use rayon::prelude::*;
 use splat_core::glam;
@@ -79,8 +80,7 @@ pub struct LineSampler<'a> {
     leaves: Vec<Leaf>,
     /// Sums of [`Leaf::reach`] up to each leaf.
     reaches: Vec<f64>,
-    blocks: Blocks,
-    origin: DVec3,
+    sets: PoissonSets,
     report: LineReport,
 }
 
@@ -111,19 +111,21 @@ impl<'a> LineSampler<'a> {
         let reaches: Vec<f64> = leaves.iter().map(|l| (sum += l.reach(), sum).1).collect();
         countable(sum * per_area)?;
         let blocks = Blocks::new(leaves.len(), |l| leaves[l].reach() * per_area);
+        let sets = PoissonSets::new(origin, params.cross_section, blocks);
         let report = LineReport {
             cells: cells.counts,
             leaves: leaves.len() as u64,
             graphs: leaves.iter().filter(|l| l.graph.is_some()).count() as u64,
             ..LineReport::default()
         };
-        let mut sampler = Self { surface: *surface, params: *params, density, leaves, reaches, blocks, origin, report };
+        let mut sampler = Self { surface: *surface, params: *params, density, leaves, reaches, sets, report };
         sampler.survey();
         if sampler.report.roots == 0 {
             let broken = sampler.report.broken > 0;
             let reason = if broken { "the field is not finite there" } else { "no line of the survey meets it" };
             return Err(empty(reason));
         }
+        sampler.sets.share = sampler.report.area / sampler.reach();
         Ok(sampler)
     }
 
@@ -134,12 +136,12 @@ impl<'a> LineSampler<'a> {
 
     /// Mean number of lines of a set, M.
     pub fn lines(&self) -> f64 {
-        (0..self.blocks.chunks()).map(|c| self.blocks.mean(c)).sum()
+        self.sets.blocks.total()
     }
 
     /// Bytes of the tables.
     pub fn bytes(&self) -> u64 {
-        (self.leaves.len() * (size_of::<Leaf>() + 8)) as u64 + self.blocks.bytes()
+        (self.leaves.len() * (size_of::<Leaf>() + 8)) as u64 + self.sets.blocks.bytes()
     }
 
     /// The sum of all leaves' reaches.
@@ -263,7 +265,7 @@ impl<'a> LineSampler<'a> {
         let normal = PackedNormal::new(normal.as_vec3());
         let per_crossing = self.params.surface_opacity == SurfaceOpacity::PerCrossing;
         let normal = if per_crossing { normal.per_crossing() } else { normal };
-        particles.push((p - self.origin).as_vec3(), normal, color);
+        particles.push((p - self.sets.origin).as_vec3(), normal, color);
     }
 
     /// The crossings of an open leaf's line.
@@ -349,32 +351,18 @@ fn clip(line: &Line<'_>, low: DVec3, high: DVec3) -> Option<(f64, f64)> {
     (enter < leave).then_some((enter, leave))
 }
 
-impl Sampler for LineSampler<'_> {
-    fn origin(&self) -> DVec3 {
-        self.origin
+impl Poisson for LineSampler<'_> {
+    fn sets(&self) -> &PoissonSets {
+        &self.sets
     }
 
-    fn cross_section(&self) -> f64 {
-        self.params.cross_section
-    }
-
-    fn chunks(&self) -> usize {
-        self.blocks.chunks()
-    }
-
-    fn expected(&self, chunk: usize) -> f64 {
-        self.blocks.mean(chunk) * self.report.area / self.reach()
-    }
-
-    fn chunk<'a>(&'a self, set: u64, chunk: usize, scratch: &'a mut Particles) -> &'a Particles {
-        scratch.clear();
-        scratch.reserve((self.expected(chunk) * 1.2) as usize + 64);
+    fn fill(&self, set: u64, chunk: usize, particles: &mut Particles) {
         let color = PackedColor::new(self.params.color);
         let mut found = Found::default();
         let mut batch = Batch::EMPTY;
-        self.blocks.arrivals(self.params.seed, Stage::Lines, set, chunk, |l, stream| {
+        self.sets.blocks.arrivals(self.params.seed, Stage::Lines, set, chunk, |l, stream| {
             let leaf = &self.leaves[l];
-            let Some(graph) = &leaf.graph else { return self.open(leaf, stream, color, &mut found, scratch) };
+            let Some(graph) = &leaf.graph else { return self.open(leaf, stream, color, &mut found, particles) };
             let [u, v, lot] = stream.triple();
             let Some(p) = leaf.start(graph, [u, v]) else { return };
             let k = batch.len;
@@ -382,10 +370,9 @@ impl Sampler for LineSampler<'_> {
             batch.thinning[k] = if self.density.is_some() { stream.unit() } else { 0.0 };
             batch.len = k + 1;
             if batch.len == BATCH {
-                self.flush(&mut batch, color, scratch);
+                self.flush(&mut batch, color, particles);
             }
         });
-        self.flush(&mut batch, color, scratch);
-        scratch
+        self.flush(&mut batch, color, particles);
     }
 }

@@ -8,9 +8,10 @@
 
 use crate::blocks::Blocks;
 use crate::params::countable;
+use crate::sampler::{Poisson, PoissonSets};
 use crate::stream::Stage;
-use crate::{Density, Error, PackedColor, PackedNormal, Particles, Sampler, SurfaceParams};
-use glam::{DVec3, Vec3};
+use crate::{Density, Error, PackedColor, PackedNormal, Particles, SurfaceParams};
+use glam::Vec3;
 use splat_core::optics::SurfaceOpacity;
 use splat_core::{Mesh, glam};
 
@@ -19,7 +20,7 @@ pub struct MeshSampler<'a> {
     mesh: &'a Mesh,
     params: SurfaceParams,
     density: Option<Density<'a>>,
-    blocks: Blocks,
+    sets: PoissonSets,
     area: f64,
 }
 
@@ -49,7 +50,8 @@ impl<'a> MeshSampler<'a> {
         }
         countable(area * per_area * density.as_ref().map_or(1.0, |d| d.max))?;
         let blocks = Blocks::new(mesh.triangles.len(), rate);
-        Ok(Self { mesh, params: *params, density, blocks, area })
+        let sets = PoissonSets::new(mesh.origin, params.cross_section, blocks);
+        Ok(Self { mesh, params: *params, density, sets, area })
     }
 
     /// Area of the mesh, world units².
@@ -59,7 +61,7 @@ impl<'a> MeshSampler<'a> {
 
     /// Bytes of the tables.
     pub fn bytes(&self) -> u64 {
-        self.blocks.bytes()
+        self.sets.blocks.bytes()
     }
 
     #[inline]
@@ -98,28 +100,14 @@ fn area(mesh: &Mesh, t: usize) -> f64 {
     0.5 * (b - a).cross(c - a).length()
 }
 
-impl Sampler for MeshSampler<'_> {
-    fn origin(&self) -> DVec3 {
-        self.mesh.origin
+impl Poisson for MeshSampler<'_> {
+    fn sets(&self) -> &PoissonSets {
+        &self.sets
     }
 
-    fn cross_section(&self) -> f64 {
-        self.params.cross_section
-    }
-
-    fn chunks(&self) -> usize {
-        self.blocks.chunks()
-    }
-
-    fn expected(&self, chunk: usize) -> f64 {
-        self.blocks.mean(chunk)
-    }
-
-    fn chunk<'a>(&'a self, set: u64, chunk: usize, scratch: &'a mut Particles) -> &'a Particles {
-        scratch.clear();
-        scratch.reserve((self.expected(chunk) * 1.1) as usize + 64);
+    fn fill(&self, set: u64, chunk: usize, particles: &mut Particles) {
         let own = PackedColor::new(self.params.color);
-        self.blocks.arrivals(self.params.seed, Stage::Mesh, set, chunk, |t, stream| {
+        self.sets.blocks.arrivals(self.params.seed, Stage::Mesh, set, chunk, |t, stream| {
             let [mut u, mut v] = stream.pair();
             if u + v > 1.0 {
                 (u, v) = (1.0 - u, 1.0 - v);
@@ -136,8 +124,7 @@ impl Sampler for MeshSampler<'_> {
                     return;
                 }
             }
-            scratch.push(p, self.normal(t, triangle, [u, v]), self.color(t, [u, v], own));
+            particles.push(p, self.normal(t, triangle, [u, v]), self.color(t, [u, v], own));
         });
-        scratch
     }
 }

@@ -12,7 +12,7 @@
 use crate::error::check;
 use crate::params::countable;
 use crate::stream::{Stage, Stream};
-use crate::volume::VolumeParams;
+use crate::volume::{Cell, VolumeParams};
 use crate::{Error, GridSampler, Particles, Sampler};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -72,7 +72,7 @@ impl<'a> MetropolisSampler<'a> {
         check(chains.stride >= 1, "stride", chains.stride, "at least 1")?;
         let cells = GridSampler::new(grid, transfer, params, None)?;
         const POINTS: [f32; 2] = [0.211_324_87, 0.788_675_1];
-        let of_cell = |&(at, _): &(u32, f32)| {
+        let of_cell = |&Cell { at, .. }: &Cell| {
             let at_point = |k: usize| {
                 let f = [POINTS[k & 1], POINTS[k >> 1 & 1], POINTS[k >> 2]];
                 f64::from(transfer.at(cells.interpolate(at, f).0).extinction)
@@ -85,12 +85,12 @@ impl<'a> MetropolisSampler<'a> {
         let mean = sums.iter().sum::<f64>() * volume / params.cross_section;
         countable(mean)?;
         let mut cell_at = vec![u32::MAX; grid.values.len()];
-        cells.cells.iter().zip(0..).for_each(|((at, _), c)| cell_at[*at as usize] = c);
+        cells.cells.iter().zip(0..).for_each(|(cell, c)| cell_at[cell.at as usize] = c);
         Ok(Self { cells, chains: *chains, mean, cell_at })
     }
 
     fn place(&self, cell: usize, within: [f32; 3]) -> Place {
-        let (value, gradient) = self.cells.interpolate(self.cells.cells[cell].0, within);
+        let (value, gradient) = self.cells.interpolate(self.cells.cells[cell].at, within);
         Place { cell, within, gradient, point: self.cells.transfer.at(value) }
     }
 
@@ -102,7 +102,7 @@ impl<'a> MetropolisSampler<'a> {
 
     /// A place within a cell's length of `from`, or `None` out of all cells with extinction.
     fn nearby(&self, from: &Place, stream: &mut Stream) -> Option<Place> {
-        let corner = self.cells.corner(self.cells.cells[from.cell].0);
+        let corner = self.cells.corner(self.cells.cells[from.cell].at);
         let step = stream.triple();
         let to: [f32; 3] = std::array::from_fn(|a| from.within[a] + 2.0 * step[a] - 1.0);
         let floor = to.map(f32::floor);
@@ -153,7 +153,7 @@ impl Sampler for MetropolisSampler<'_> {
             (0..self.chains.burn_in).for_each(|n| self.step(&mut place, n, &mut stream));
             for _ in 0..self.chains.particles_per_chain.min((wanted - scratch.len()) as u32) {
                 (0..self.chains.stride).for_each(|n| self.step(&mut place, n, &mut stream));
-                let offset = self.cells.offset(self.cells.cells[place.cell].0, place.within);
+                let offset = self.cells.offset(self.cells.cells[place.cell].at, place.within);
                 let (normal, color) = self.cells.attributes(place.point.color, place.gradient);
                 scratch.push(offset, normal, color);
             }

@@ -170,7 +170,7 @@ impl Lanes<'_> {
             (view.x[i], view.y[i]) = (at[0], at[1]);
             // NaN is out of the image; in the image nothing is cut.
             view.seen[i] = (at[0] >= 0.0) & (at[0] < size[0]) & (at[1] >= 0.0) & (at[1] < size[1]);
-            let cut = [0, 1].map(|a| at[a].max(0.0).min(65535.0) as i32);
+            let cut = [0, 1].map(|a| at[a].clamp(0.0, 65535.0) as i32);
             (view.pixel[0][i], view.pixel[1][i]) = (cut[0] as u32, cut[1] as u32);
             let within = [0, 1].map(|a| ((at[a] - cut[a] as f32) * 256.0) as i32 as u32 & 255);
             view.within[i] = within[0] | within[1] << 8;

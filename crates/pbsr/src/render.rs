@@ -65,7 +65,7 @@ pub struct Scene<'a> {
 /// What folding may take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FoldParams {
-    /// Bytes of the particles of one batch: 40 a particle. A set that needs more is refused.
+    /// Bytes of the particles of one batch: 32 a particle. A set that needs more is refused.
     pub max_bytes: u64,
     /// Particles of a batch that are worth a pass over the image; more only takes memory.
     pub batch_particles: u64,
@@ -78,7 +78,7 @@ impl Default for FoldParams {
 }
 
 /// Bytes of a particle in a batch: its record, with room to grow.
-pub(crate) const BYTES_IN_BATCH: u64 = 40;
+pub(crate) const BYTES_IN_BATCH: u64 = 32;
 
 /// Folds sets into an ensemble; keeps its buffers between calls.
 #[derive(Debug, Default)]

@@ -1,6 +1,7 @@
 //! What every source of particles offers (Tanaka 2012, STEP 1): independent sets, in chunks, from a counter.
 
 use crate::Particles;
+use crate::blocks::Blocks;
 use rayon::prelude::*;
 use splat_core::glam::DVec3;
 
@@ -30,6 +31,57 @@ pub trait Sampler: Sync {
     /// Mean number of particles of a set.
     fn expected_particles(&self) -> f64 {
         (0..self.chunks()).map(|c| self.expected(c)).sum()
+    }
+}
+
+/// What samplers of a Poisson number of particles share: elements with rates, in blocks.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct PoissonSets {
+    pub(crate) origin: DVec3,
+    pub(crate) cross_section: f64,
+    pub(crate) blocks: Blocks,
+    /// Share of the blocks' arrivals that become particles, in the mean, where it is known.
+    pub(crate) share: f64,
+}
+
+impl PoissonSets {
+    /// Where every arrival becomes a particle.
+    pub(crate) fn new(origin: DVec3, cross_section: f64, blocks: Blocks) -> Self {
+        Self { origin, cross_section, blocks, share: 1.0 }
+    }
+}
+
+/// A sampler whose sets are Poisson processes on blocks of elements.
+pub(crate) trait Poisson: Sync {
+    /// Rates, and where they are.
+    fn sets(&self) -> &PoissonSets;
+
+    /// Appends the particles of chunk `chunk` of set `set`.
+    fn fill(&self, set: u64, chunk: usize, particles: &mut Particles);
+}
+
+impl<T: Poisson> Sampler for T {
+    fn origin(&self) -> DVec3 {
+        self.sets().origin
+    }
+
+    fn cross_section(&self) -> f64 {
+        self.sets().cross_section
+    }
+
+    fn chunks(&self) -> usize {
+        self.sets().blocks.chunks()
+    }
+
+    fn expected(&self, chunk: usize) -> f64 {
+        self.sets().blocks.mean(chunk) * self.sets().share
+    }
+
+    fn chunk<'a>(&'a self, set: u64, chunk: usize, scratch: &'a mut Particles) -> &'a Particles {
+        scratch.clear();
+        scratch.reserve((self.expected(chunk) * 1.1) as usize + 64);
+        self.fill(set, chunk, scratch);
+        scratch
     }
 }
 

@@ -13,9 +13,10 @@
 
 use crate::blocks::Blocks;
 use crate::params::{countable, positive};
+use crate::sampler::{Poisson, PoissonSets};
 use crate::stream::{Stage, Stream};
-use crate::{Error, PackedColor, PackedNormal, Particles, Sampler};
-use glam::{DVec3, Vec3};
+use crate::{Error, PackedColor, PackedNormal, Particles};
+use glam::Vec3;
 use splat_core::optics::SurfaceOpacity;
 use splat_core::{Cloud, Footprint, FootprintStack, SplatKind, glam};
 
@@ -51,7 +52,7 @@ impl Default for SplatParams {
 pub struct SplatSampler<'a> {
     cloud: &'a Cloud,
     params: SplatParams,
-    blocks: Blocks,
+    sets: PoissonSets,
 }
 
 impl<'a> SplatSampler<'a> {
@@ -81,13 +82,14 @@ impl<'a> SplatSampler<'a> {
         if blocks.chunks() == 0 {
             return Err(Error::Empty { what: "a cloud", reason: "no splat has a cross-section" });
         }
-        countable((0..blocks.chunks()).map(|c| blocks.mean(c)).sum())?;
-        Ok(Self { cloud, params: params.clone(), blocks })
+        countable(blocks.total())?;
+        let sets = PoissonSets::new(cloud.origin, params.cross_section, blocks);
+        Ok(Self { cloud, params: params.clone(), sets })
     }
 
     /// Bytes of the tables.
     pub fn bytes(&self) -> u64 {
-        self.blocks.bytes()
+        self.sets.blocks.bytes()
     }
 }
 
@@ -128,28 +130,14 @@ fn on_disc(n: i32, stream: &mut Stream) -> [f64; 2] {
     [radius * cos, radius * sin]
 }
 
-impl Sampler for SplatSampler<'_> {
-    fn origin(&self) -> DVec3 {
-        self.cloud.origin
+impl Poisson for SplatSampler<'_> {
+    fn sets(&self) -> &PoissonSets {
+        &self.sets
     }
 
-    fn cross_section(&self) -> f64 {
-        self.params.cross_section
-    }
-
-    fn chunks(&self) -> usize {
-        self.blocks.chunks()
-    }
-
-    fn expected(&self, chunk: usize) -> f64 {
-        self.blocks.mean(chunk)
-    }
-
-    fn chunk<'a>(&'a self, set: u64, chunk: usize, scratch: &'a mut Particles) -> &'a Particles {
-        scratch.clear();
-        scratch.reserve((self.expected(chunk) * 1.1) as usize + 64);
+    fn fill(&self, set: u64, chunk: usize, particles: &mut Particles) {
         let layers = self.params.footprints.layers();
-        self.blocks.arrivals(self.params.seed, Stage::Splats, set, chunk, |i, stream| {
+        self.sets.blocks.arrivals(self.params.seed, Stage::Splats, set, chunk, |i, stream| {
             let n = term(&layers[usize::from(self.cloud.footprint[i])], stream);
             let (normal, radius) = (self.cloud.normal_of(i), self.cloud.radius[i]);
             let mut packed = PackedNormal::new(normal);
@@ -166,8 +154,7 @@ impl Sampler for SplatSampler<'_> {
                 };
                 tangent * u + normal.cross(tangent.normalize_or_zero()) * (radius * v)
             };
-            scratch.push(self.cloud.position[i] + offset, packed, PackedColor::new(self.cloud.color[i]));
+            particles.push(self.cloud.position[i] + offset, packed, PackedColor::new(self.cloud.color[i]));
         });
-        scratch
     }
 }

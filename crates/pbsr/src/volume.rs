@@ -19,9 +19,11 @@
 use crate::blocks::Blocks;
 use crate::error::check;
 use crate::params::{countable, positive};
+use crate::pieces::{Pieces, SEVERAL};
+use crate::sampler::{Poisson, PoissonSets};
 use crate::stream::Stage;
-use crate::{Density, Error, PackedColor, PackedNormal, Particles, Sampler};
-use glam::{DVec3, Mat3, Vec3};
+use crate::{Density, Error, PackedColor, PackedNormal, Particles};
+use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 use splat_core::{Grid, TransferFunction, glam};
 
@@ -56,22 +58,36 @@ impl VolumeParams {
     }
 }
 
+/// A cell with extinction.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Cell {
+    /// Lattice index of the first corner.
+    pub(crate) at: u32,
+    /// σ_max.
+    most: f32,
+    /// The piece of the transfer function in which all values of the cell lie, or [`SEVERAL`].
+    piece: u32,
+}
+
 /// Particles in a regular volume.
 pub struct GridSampler<'a> {
     pub(crate) grid: &'a Grid,
     pub(crate) transfer: &'a TransferFunction,
     pub(crate) params: VolumeParams,
     density: Option<Density<'a>>,
-    /// Lattice index of the first corner, and σ_max, of each cell with extinction.
-    pub(crate) cells: Vec<(u32, f32)>,
-    pub(crate) blocks: Blocks,
+    /// Each cell with extinction.
+    pub(crate) cells: Vec<Cell>,
+    pieces: Pieces,
+    pub(crate) sets: PoissonSets,
     axes: Mat3,
+    /// 1 over the lattice points along x and y.
+    inverse_dims: [f64; 2],
     /// World gradient from the gradient in lattice steps.
     gradient: Mat3,
 }
 
 impl<'a> GridSampler<'a> {
-    /// Finds the cells with extinction and prepares their tables: 14 bytes a cell.
+    /// Finds the cells with extinction and prepares their tables: 20 bytes a cell.
     ///
     /// # Errors
     /// [`Error::Parameter`] for numbers out of range, [`Error::Core`] for a grid that breaks a promise, [`Error::Empty`]
@@ -90,23 +106,26 @@ impl<'a> GridSampler<'a> {
             return Err(Error::TooMuch { what: "a volume's lattice", needed, had: u64::from(u32::MAX) });
         }
         let [nx, ny, nz] = grid.dims;
-        let cells: Vec<(u32, f32)> = (0..ny.saturating_sub(1) * nz.saturating_sub(1))
+        let pieces = Pieces::new(transfer);
+        let cells: Vec<Cell> = (0..ny.saturating_sub(1) * nz.saturating_sub(1))
             .into_par_iter()
             .with_min_len(16)
             .flat_map_iter(|row| {
                 let (j, k) = (row % (ny - 1), row / (ny - 1));
-                row_of_cells(grid, transfer, (k * ny + j) * nx)
+                row_of_cells(grid, transfer, &pieces, (k * ny + j) * nx)
             })
             .collect();
         let most = density.as_ref().map_or(1.0, |d| d.max);
         let per_cell = grid.cell_volume() / params.cross_section * params.extinction_scale * most;
-        let blocks = Blocks::new(cells.len(), |c| f64::from(cells[c].1) * per_cell);
+        let blocks = Blocks::new(cells.len(), |c| f64::from(cells[c].most) * per_cell);
         if blocks.chunks() == 0 {
             return Err(Error::Empty { what: "a volume", reason: "no cell has an extinction" });
         }
-        countable((0..blocks.chunks()).map(|c| blocks.mean(c)).sum())?;
+        countable(blocks.total())?;
+        let sets = PoissonSets::new(grid.origin, params.cross_section, blocks);
         let (axes, gradient) = (grid.axes.as_mat3(), grid.axes.inverse().transpose().as_mat3());
-        Ok(Self { grid, transfer, params: *params, density, cells, blocks, axes, gradient })
+        let inverse_dims = [1.0 / nx as f64, 1.0 / ny as f64];
+        Ok(Self { grid, transfer, params: *params, density, cells, pieces, sets, axes, inverse_dims, gradient })
     }
 
     /// Cells with extinction.
@@ -116,15 +135,18 @@ impl<'a> GridSampler<'a> {
 
     /// Bytes of the tables.
     pub fn bytes(&self) -> u64 {
-        self.blocks.bytes() + (self.cells.len() * 8) as u64
+        self.sets.blocks.bytes() + (self.cells.len() * size_of::<Cell>()) as u64
     }
 
     /// The lattice indices of the cell's first corner.
     #[inline]
     pub(crate) fn corner(&self, at: u32) -> [u32; 3] {
-        let (nx, ny) = (self.grid.dims[0] as u32, self.grid.dims[1] as u32);
-        let row = at / nx;
-        [at - row * nx, row % ny, row / ny]
+        let [nx, ny, _] = self.grid.dims.map(|n| n as u32);
+        // 32-bit numbers and a half are further from a whole quotient than f64 rounds: the quotients are exact.
+        let over = |v: u32, inverse: f64| ((f64::from(v) + 0.5) * inverse) as i64 as u32;
+        let row = over(at, self.inverse_dims[0]);
+        let layer = over(row, self.inverse_dims[1]);
+        [at.wrapping_sub(row.wrapping_mul(nx)), row.wrapping_sub(layer.wrapping_mul(ny)), layer]
     }
 
     /// Value and lattice gradient at `f` in \[0, 1\]³ of a cell.
@@ -159,7 +181,7 @@ impl<'a> GridSampler<'a> {
 }
 
 /// The active cells of one row of the lattice that begins at index `first`.
-fn row_of_cells(grid: &Grid, transfer: &TransferFunction, first: usize) -> Vec<(u32, f32)> {
+fn row_of_cells(grid: &Grid, transfer: &TransferFunction, pieces: &Pieces, first: usize) -> Vec<Cell> {
     let (nx, layer) = (grid.dims[0], grid.dims[0] * grid.dims[1]);
     let range = |i: usize| {
         let v = [i, i + nx, i + layer, i + layer + nx].map(|i| grid.values[i]);
@@ -169,9 +191,10 @@ fn row_of_cells(grid: &Grid, transfer: &TransferFunction, first: usize) -> Vec<(
     let mut left = range(first);
     for i in first..first + nx - 1 {
         let right = range(i + 1);
-        let most = largest_extinction(transfer, left.0.min(right.0), left.1.max(right.1));
+        let (low, high) = (left.0.min(right.0), left.1.max(right.1));
+        let most = largest_extinction(transfer, low, high);
         if most > 0.0 {
-            cells.push((i as u32, most));
+            cells.push(Cell { at: i as u32, most, piece: pieces.of(low, high) });
         }
         left = right;
     }
@@ -186,31 +209,17 @@ pub(crate) fn largest_extinction(transfer: &TransferFunction, low: f32, high: f3
     points[from..].iter().take_while(|p| p.value < high).fold(ends, |m, p| m.max(p.extinction))
 }
 
-impl Sampler for GridSampler<'_> {
-    fn origin(&self) -> DVec3 {
-        self.grid.origin
+impl Poisson for GridSampler<'_> {
+    fn sets(&self) -> &PoissonSets {
+        &self.sets
     }
 
-    fn cross_section(&self) -> f64 {
-        self.params.cross_section
-    }
-
-    fn chunks(&self) -> usize {
-        self.blocks.chunks()
-    }
-
-    fn expected(&self, chunk: usize) -> f64 {
-        self.blocks.mean(chunk)
-    }
-
-    fn chunk<'a>(&'a self, set: u64, chunk: usize, scratch: &'a mut Particles) -> &'a Particles {
-        scratch.clear();
-        scratch.reserve((self.expected(chunk) * 1.1) as usize + 64);
-        self.blocks.arrivals(self.params.seed, Stage::Volume, set, chunk, |c, stream| {
-            let (at, most) = self.cells[c];
+    fn fill(&self, set: u64, chunk: usize, particles: &mut Particles) {
+        self.sets.blocks.arrivals(self.params.seed, Stage::Volume, set, chunk, |c, stream| {
+            let Cell { at, most, piece } = self.cells[c];
             let f = stream.triple();
             let (value, gradient) = self.interpolate(at, f);
-            let point = self.transfer.at(value);
+            let point = if piece == SEVERAL { self.transfer.at(value) } else { self.pieces.at(piece, value) };
             if stream.pair()[0] * most >= point.extinction {
                 return;
             }
@@ -220,8 +229,7 @@ impl Sampler for GridSampler<'_> {
                 return;
             }
             let (normal, color) = self.attributes(point.color, gradient);
-            scratch.push(offset, normal, color);
+            particles.push(offset, normal, color);
         });
-        scratch
     }
 }

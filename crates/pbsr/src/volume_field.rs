@@ -6,8 +6,9 @@
 use crate::blocks::Blocks;
 use crate::error::check;
 use crate::params::{color, countable, positive};
+use crate::sampler::{Poisson, PoissonSets};
 use crate::stream::Stage;
-use crate::{Density, Error, PackedColor, PackedNormal, Particles, Sampler};
+use crate::{Density, Error, PackedColor, PackedNormal, Particles};
 use glam::DVec3;
 use splat_core::glam;
 
@@ -18,10 +19,9 @@ pub struct FieldVolumeSampler<'a> {
     /// Sides of a cell.
     side: DVec3,
     cells: usize,
-    cross_section: f64,
     color: [f32; 3],
     seed: u64,
-    blocks: Blocks,
+    sets: PoissonSets,
 }
 
 impl<'a> FieldVolumeSampler<'a> {
@@ -54,8 +54,9 @@ impl<'a> FieldVolumeSampler<'a> {
         if blocks.chunks() == 0 {
             return Err(Error::Empty { what: "a medium", reason: "its extinction is bounded by 0" });
         }
-        countable((0..blocks.chunks()).map(|c| blocks.mean(c)).sum())?;
-        Ok(Self { extinction, min, side, cells: n, cross_section, color: tint, seed, blocks })
+        countable(blocks.total())?;
+        let sets = PoissonSets::new(min, cross_section, blocks);
+        Ok(Self { extinction, min, side, cells: n, color: tint, seed, sets })
     }
 }
 
@@ -64,36 +65,22 @@ fn corner(cell: usize, n: usize) -> DVec3 {
     DVec3::new((cell % n) as f64, (cell / n % n) as f64, (cell / (n * n)) as f64)
 }
 
-impl Sampler for FieldVolumeSampler<'_> {
-    fn origin(&self) -> DVec3 {
-        self.min
+impl Poisson for FieldVolumeSampler<'_> {
+    fn sets(&self) -> &PoissonSets {
+        &self.sets
     }
 
-    fn cross_section(&self) -> f64 {
-        self.cross_section
-    }
-
-    fn chunks(&self) -> usize {
-        self.blocks.chunks()
-    }
-
-    fn expected(&self, chunk: usize) -> f64 {
-        self.blocks.mean(chunk)
-    }
-
-    fn chunk<'a>(&'a self, set: u64, chunk: usize, scratch: &'a mut Particles) -> &'a Particles {
-        scratch.clear();
+    fn fill(&self, set: u64, chunk: usize, particles: &mut Particles) {
         let color = PackedColor::new(self.color);
         let radius = 0.5 * self.side.length() * (1.0 + 1e-12);
-        self.blocks.arrivals(self.seed, Stage::Volume, set, chunk, |c, stream| {
+        self.sets.blocks.arrivals(self.seed, Stage::Volume, set, chunk, |c, stream| {
             let low = corner(c, self.cells);
             let within = DVec3::from_array(stream.triple().map(f64::from));
             let offset = self.side * (low + within);
             let most = self.extinction.bound(self.min + self.side * (low + 0.5), radius);
             if stream.unit() * most < self.extinction.at(self.min + offset) {
-                scratch.push(offset.as_vec3(), PackedNormal::default(), color);
+                particles.push(offset.as_vec3(), PackedNormal::default(), color);
             }
         });
-        scratch
     }
 }
