@@ -115,3 +115,52 @@ fn wrong_frames_and_tracks_are_refused_with_their_place() {
     let far = with("set = \"object.fog.visible\"", "set = \"object.fog.spacing\"");
     refused(&far.replace("value = true", "value = 0.25").replace("value = false", "value = -1"), &["--frames"], 3, "");
 }
+
+const SAMPLED: &str = r#"[[object]]
+name = "ball"
+implicit = { expression = "x^2 + y^2 + z^2 - 0.25", min = [-0.6, -0.6, -0.6], max = [0.6, 0.6, 0.6], spacing = 0.05 }
+opacity = 0.5
+[[object]]
+name = "fog"
+medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 0.5, spacing = 0.25 }
+[render]
+technique = "particles"
+antialias = 1
+particles = { repeat_level = 20 }
+[animation]
+frames = 4
+[[animation.track]]
+set = "object.fog.visible"
+keys = [{ frame = 0, value = true }, { frame = 1, value = false }, { frame = 2, value = true }]
+[[animation.track]]
+set = "object.ball.transform.translate"
+keys = [{ frame = 2, value = [0, 0, 0] }, { frame = 3, value = [0.25, 0, -0.5] }]
+"#;
+
+/// Particles sampled for a frame, if any were.
+fn sampled(frame: &Value) -> Option<u64> {
+    let stages = frame["cost"].as_array().unwrap();
+    stages.iter().find(|s| s["name"] == "sample").map(|s| s["items_out"].as_u64().unwrap())
+}
+
+#[test]
+fn what_moves_or_hides_is_not_sampled_again() {
+    let place = Place::new(&format!("{SMALL_SCENE}{SAMPLED}"));
+    let out = place.expect(0, &["render", "s.toml", "-o", "p.png", "--frames", "--json"], "");
+    let document: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let frames = document["frames"].as_array().unwrap();
+    assert!(sampled(&frames[0]).is_some_and(|n| n > 1000), "{}", frames[0]["cost"]);
+    assert!(frames[1..].iter().all(|f| sampled(f).is_none()), "{document:#}");
+    let drawn = |frame: u32| place.bytes(&format!("p.{frame:04}.png"));
+    assert_eq!(drawn(0), drawn(2));
+    assert!(drawn(0) != drawn(1) && drawn(2) != drawn(3));
+    // The ball is nearest before it moves: these frames are as fine as a still picture, and the same.
+    place.expect(0, &["render", "s.toml", "-o", "still.png"], "");
+    assert_eq!(drawn(0), place.bytes("still.png"));
+    // Without room every frame samples as it draws.
+    let little = ["render", "s.toml", "-o", "little.png", "--frames", "--json", "--max-memory", "60M"];
+    let out = place.expect(0, &little, "");
+    let document: Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert!(document["frames"].as_array().unwrap().iter().all(|f| sampled(f).is_none()));
+    assert_eq!(place.bytes("little.0003.png"), drawn(3));
+}

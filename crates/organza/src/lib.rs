@@ -38,6 +38,7 @@ pub mod plan;
 mod points;
 mod render;
 pub mod scene;
+mod sequence;
 pub mod statistics;
 pub mod truth;
 
@@ -45,4 +46,5 @@ pub use error::{Error, escape_controls, printable};
 pub use info::{FileInfo, info};
 pub use load::{Loaded, SplatCount, load};
 pub use render::{Explanation, Render, RenderOptions, Sets, explain, render};
+pub use sequence::Sequence;
 pub use splat_core::{CostRecord, Layers, Progress};

@@ -7,15 +7,18 @@
 
 mod checkpoint;
 mod ensemble;
+mod kept;
 mod parts;
 
 use crate::load::Loaded;
 use crate::plan::pass;
 use crate::points::Drawing;
+use crate::scene::Scene;
 use crate::{Error, RenderOptions, Sets};
 pub(crate) use checkpoint::Checkpoint;
 use ensemble::{accumulate, error_layer, fold};
-use parts::{parts, sources};
+pub(crate) use kept::Kept;
+use parts::sources;
 use pbsr::Occluder;
 use splat_core::raster::{self, Background, OpaqueImage};
 use splat_core::shade::ChannelLayout;
@@ -25,8 +28,10 @@ use tsm::ShadowMap;
 /// Runs the planned passes. An interrupt after two sets leaves the picture of the sets so far.
 pub(crate) fn draw(
     drawing: &Drawing<'_>,
+    scene: &Scene,
     options: &RenderOptions,
     checkpoint: Option<&mut Checkpoint>,
+    mut kept: Option<&mut Kept>,
     cost: &mut CostRecord,
     warnings: &mut Vec<String>,
 ) -> Result<(Layers, Option<Sets>), Error> {
@@ -34,8 +39,14 @@ pub(crate) fn draw(
     let camera = drawing.sample_camera();
     let layout = ChannelLayout::new(&drawing.layers);
     let opaque = opaque(drawing, &maps, &camera, cost)?;
-    let sources = sources(drawing, &camera);
-    let parts = parts(&sources, warnings)?;
+    let mut sources = sources(drawing, &camera);
+    if let Some(kept) = kept.as_deref_mut() {
+        kept.sample(&mut sources, drawing, scene, cost, warnings)?;
+    }
+    let parts = match kept {
+        Some(kept) => kept.parts(&sources, warnings)?,
+        None => sources.iter().filter_map(|s| s.part(warnings).transpose()).collect::<Result<_, _>>()?,
+    };
     let mut accumulator = Accumulator::new(camera.size, 1, layout.count(), false, false);
     let wanted = drawing.settings.layers.names().any(|name| name == "std_error");
     let (mut std_error, mut sets) = (Vec::new(), None);

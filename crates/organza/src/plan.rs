@@ -67,6 +67,8 @@ pub mod pass {
     pub const OPAQUE: &str = "opaque";
     /// Translucent splats are composited.
     pub const SPLAT: &str = "splat";
+    /// Sets of particles are made that serve many frames.
+    pub const SAMPLE: &str = "sample";
     /// Translucent objects become particles, which are projected and averaged.
     pub const PARTICLES: &str = "particles";
     /// Samples become pixels and layers.

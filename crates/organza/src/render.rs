@@ -1,7 +1,7 @@
 //! From a scene to images: load, plan, draw.
 
 use crate::load::{Loaded, SplatCount, light_statistics, load_measured};
-use crate::particles::{self, Checkpoint};
+use crate::particles::{self, Checkpoint, Kept};
 use crate::plan::{Plan, plan};
 use crate::points::{self, Drawing};
 use crate::scene::{Scene, Technique};
@@ -78,12 +78,22 @@ pub struct Explanation {
 /// [`Error::Input`] and [`Error::Io`] for data, [`Error::Limit`] before more memory is taken than allowed,
 /// [`Error::Cancelled`] after `progress.cancel()`.
 pub fn render(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Render, Error> {
-    let open = |path: &PathBuf| Checkpoint::open(path, scene, options);
+    render_keeping(scene, options, progress, None)
+}
+
+/// [`render`] with what other frames of the scene have left.
+pub(crate) fn render_keeping(
+    scene: &Scene,
+    options: &RenderOptions,
+    progress: &Progress,
+    kept: Option<&mut Kept>,
+) -> Result<Render, Error> {
+    let open = |path: &PathBuf| Checkpoint::open(path, scene, options, kept.as_deref());
     let mut checkpoint = options.checkpoint.as_ref().map(open).transpose()?;
     let (loaded, explanation) = prepare(scene, options, progress)?;
     let Explanation { plan, mut cost, mut warnings, .. } = explanation;
     let drawing = drawing(scene, &loaded, &plan, options, progress);
-    let (layers, sets) = draw(scene, &drawing, options, checkpoint.as_mut(), &mut cost, &mut warnings)?;
+    let (layers, sets) = draw(scene, &drawing, options, checkpoint.as_mut(), kept, &mut cost, &mut warnings)?;
     Ok(Render { layers, cost, plan, sets, warnings })
 }
 
@@ -97,7 +107,7 @@ pub(crate) fn draw_loaded(
     cost: &mut CostRecord,
 ) -> Result<Layers, Error> {
     let drawing = drawing(scene, loaded, plan, options, progress);
-    match draw(scene, &drawing, options, None, cost, &mut Vec::new())? {
+    match draw(scene, &drawing, options, None, None, cost, &mut Vec::new())? {
         (_, Some(Sets { interrupted: true, .. })) => Err(Error::Cancelled),
         (layers, _) => Ok(layers),
     }
@@ -108,13 +118,14 @@ fn draw(
     drawing: &Drawing<'_>,
     options: &RenderOptions,
     checkpoint: Option<&mut Checkpoint>,
+    kept: Option<&mut Kept>,
     cost: &mut CostRecord,
     warnings: &mut Vec<String>,
 ) -> Result<(Layers, Option<Sets>), Error> {
     drawing.progress.add_total(drawing.plan.passes.len() as u64);
     let (mut layers, sets) = match scene.render.technique {
         Technique::Auto | Technique::Points => (points::draw(drawing, cost)?, None),
-        Technique::Particles => particles::draw(drawing, options, checkpoint, cost, warnings)?,
+        Technique::Particles => particles::draw(drawing, scene, options, checkpoint, kept, cost, warnings)?,
     };
     restore_depths(&mut layers, drawing.loaded.exponent);
     scene.render.layers.keep(&mut layers);

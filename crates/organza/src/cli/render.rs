@@ -6,7 +6,7 @@ use super::session::{load_frame, load_scene, path_text, render_options, start_th
 use super::{console, report};
 use organza::output::{self, Format, Metadata, WriteReport, check_target, write_atomically};
 use organza::scene::Scene;
-use organza::{Error, Progress, Render, RenderOptions, Sets, printable};
+use organza::{Error, Progress, Render, RenderOptions, Sequence, Sets, printable};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -40,9 +40,11 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
     }
     start_threads(arguments.scene.threads)?;
     let mut done: Vec<Done> = Vec::new();
+    let scenes: Vec<Scene> = jobs.iter().map(|job| job.scene.clone()).collect();
+    let mut sequence = arguments.frames.map(|_| Sequence::new(&scenes));
     let outcome = with_bar(|progress| {
         for job in &jobs {
-            let one = job.run(arguments, progress)?;
+            let one = job.run(arguments, sequence.as_mut(), progress)?;
             let interrupted = one.sets.is_some_and(|s| s.interrupted);
             done.push(one);
             if interrupted {
@@ -144,9 +146,17 @@ impl Job {
         }
     }
 
-    fn run(&self, arguments: &RenderArguments, progress: &Progress) -> Result<Done, Error> {
+    fn run(
+        &self,
+        arguments: &RenderArguments,
+        sequence: Option<&mut Sequence>,
+        progress: &Progress,
+    ) -> Result<Done, Error> {
         let options = RenderOptions { checkpoint: self.checkpoint.clone(), ..render_options(&arguments.scene) };
-        let render = organza::render(&self.scene, &options, progress)?;
+        let render = match sequence {
+            Some(sequence) => sequence.render(&self.scene, &options, progress)?,
+            None => organza::render(&self.scene, &options, progress)?,
+        };
         let mut warnings = render.warnings.clone();
         let written = self.write_outputs(&render, arguments.half, &mut warnings)?;
         if let Some(path) = &self.cost {

@@ -1,9 +1,10 @@
 //! The sums of a render on disk, so that a render that was stopped goes on in the same bits.
 //!
 //! The file's tag is a hash of everything that its sums depend on: the version of the program, the checked scene without
-//! its count of sets, error and exposure, how doubtful input is treated, and the bytes of every file that the scene is
+//! its count of sets, error and exposure, the views that kept sets serve, how doubtful input is treated, and the bytes of every file that the scene is
 //! made of. The count of sets may therefore be raised later.
 
+use super::Kept;
 use crate::output::write_atomically;
 use crate::scene::{RenderSettings, Scene, Technique};
 use crate::{Error, RenderOptions, printable};
@@ -31,12 +32,17 @@ pub(crate) struct Checkpoint {
 
 impl Checkpoint {
     /// Reads the file if there is one.
-    pub(crate) fn open(path: &Path, scene: &Scene, options: &RenderOptions) -> Result<Self, Error> {
+    pub(crate) fn open(
+        path: &Path,
+        scene: &Scene,
+        options: &RenderOptions,
+        kept: Option<&Kept>,
+    ) -> Result<Self, Error> {
         if scene.render.technique != Technique::Particles {
             let message = "only the technique `particles` is drawn in sets that a checkpoint can keep";
             return Err(Error::usage(message, "use --technique particles, or no --checkpoint"));
         }
-        let tag = tag(scene, options)?;
+        let tag = tag(scene, options, kept)?;
         let found = match std::fs::read(path) {
             Ok(bytes) => Some(Ensemble::from_bytes(&bytes, &tag).map_err(|e| foreign(path, &e))?),
             Err(e) if e.kind() == io::ErrorKind::NotFound => None,
@@ -70,7 +76,7 @@ fn foreign(path: &Path, error: &pbsr::Error) -> Error {
     Error::input(printable(path), error.to_string(), hint)
 }
 
-fn tag(scene: &Scene, options: &RenderOptions) -> Result<[u8; 32], Error> {
+fn tag(scene: &Scene, options: &RenderOptions, kept: Option<&Kept>) -> Result<[u8; 32], Error> {
     let mut same = scene.clone();
     (same.file, same.sha256) = (PathBuf::new(), String::new());
     let RenderSettings { particles, exposure, .. } = &mut same.render;
@@ -79,6 +85,8 @@ fn tag(scene: &Scene, options: &RenderOptions) -> Result<[u8; 32], Error> {
     hasher.update(env!("CARGO_PKG_VERSION"));
     // Every number is written so that it reads back the same.
     hasher.update(format!("{same:?} {} {}", options.drop_invalid, options.merge_duplicates));
+    // Particles that serve many frames are as fine as the finest needs them.
+    hasher.update(kept.map(Kept::views).unwrap_or_default());
     for path in scene.files().iter().skip(1) {
         let fail = |e| Error::io(path, "cannot read", e);
         let mut file = BufReader::with_capacity(1 << 20, File::open(path).map_err(fail)?);

@@ -9,9 +9,10 @@ use crate::load::Loaded;
 use crate::load::bounded::BoundedExtinction;
 use crate::load::own::{Body, Own};
 use crate::points::Drawing;
+use glam::DVec3;
 use pbsr::{
-    Appearance, Density, FieldVolumeSampler, GridSampler, ImplicitSurface, LineReport, LineSampler, MeshSampler,
-    Object, Sampler, SplatParams, SplatSampler, SurfaceParams, VolumeParams,
+    Appearance, Density, FieldVolumeSampler, GridSampler, ImplicitSurface, KeptSets, LineReport, LineSampler,
+    MeshSampler, Object, Sampler, SplatParams, SplatSampler, SurfaceParams, VolumeParams,
 };
 use splat_core::{Camera, Cloud, Similarity, SplatKind, rng};
 use std::collections::BTreeMap;
@@ -48,15 +49,25 @@ enum Data<'a> {
 
 /// One object, ready to be drawn.
 pub(super) struct Part<'a> {
-    pub(super) sampler: Box<dyn Sampler + 'a>,
-    pub(super) transform: Similarity,
-    pub(super) look: Appearance,
+    pub(super) particles: Particles<'a>,
+    transform: Similarity,
+    look: Appearance,
+}
+
+/// Where the particles of an object come from.
+pub(super) enum Particles<'a> {
+    Sampled(Box<dyn Sampler + 'a>),
+    Kept(&'a KeptSets),
 }
 
 impl Part<'_> {
     /// The object for the renderer.
     pub(super) fn object(&self) -> Object<'_> {
-        Object { sampler: self.sampler.as_ref(), transform: self.transform, look: self.look }
+        let sampler: &dyn Sampler = match &self.particles {
+            Particles::Sampled(sampler) => sampler.as_ref(),
+            Particles::Kept(sets) => *sets,
+        };
+        Object { sampler, transform: self.transform, look: self.look }
     }
 }
 
@@ -67,19 +78,11 @@ pub(super) fn sources<'a>(drawing: &Drawing<'a>, camera: &Camera) -> Vec<Source<
     own.chain(of_splats(drawing, camera)).collect()
 }
 
-/// The samplers of all sources; those in which nothing is found are left out with a warning.
-pub(super) fn parts<'a>(sources: &'a [Source<'_>], warnings: &mut Vec<String>) -> Result<Vec<Part<'a>>, Error> {
-    let mut parts = Vec::with_capacity(sources.len());
-    for source in sources {
-        let name = || format!("object '{}'", crate::escape_controls(&source.name));
-        match source.sampler(warnings) {
-            Ok(sampler) => parts.push(Part { sampler, transform: source.transform, look: source.look }),
-            Err(pbsr::Error::Empty { reason, .. }) => warnings.push(format!("{} has no particles: {reason}", name())),
-            Err(e @ pbsr::Error::Field { .. }) => return Err(Error::input(name(), e.to_string(), BROKEN_FIELD)),
-            Err(e) => return Err(fault(e)),
-        }
-    }
-    Ok(parts)
+/// The finest cross-section that a camera needs of an object, units² of the object.
+fn finest_area(camera: &Camera, transform: &Similarity, [low, high]: [DVec3; 2]) -> f64 {
+    let center = transform.apply(0.5 * (low + high));
+    let reach = 0.5 * (high - low).length() * transform.scale;
+    pbsr::finest_pixel_area(camera, center, reach, NEAR) / transform.scale.powi(2)
 }
 
 fn seed(drawing: &Drawing<'_>, object: u32, kind: SplatKind) -> u64 {
@@ -89,9 +92,6 @@ fn seed(drawing: &Drawing<'_>, object: u32, kind: SplatKind) -> u64 {
 fn of_own<'a>(own: &'a Own, drawing: &Drawing<'a>, camera: &Camera) -> Source<'a> {
     let Loaded { objects, materials, cloud, .. } = drawing.loaded;
     let material = materials[own.material];
-    let [low, high] = own.bounds;
-    let center = own.transform.apply(0.5 * (low + high));
-    let reach = 0.5 * (high - low).length() * own.transform.scale;
     // As its splats have it, where it has some.
     let splats = |k: &usize| cloud.object[*k] as usize == own.object;
     let (n, sum) =
@@ -107,7 +107,7 @@ fn of_own<'a>(own: &'a Own, drawing: &Drawing<'a>, camera: &Camera) -> Source<'a
             radius: radius as f32,
             shadow_coefficient: objects[own.object].shadow_coefficient,
         },
-        cross_section: pbsr::finest_pixel_area(camera, center, reach, NEAR) / own.transform.scale.powi(2),
+        cross_section: finest_area(camera, &own.transform, own.bounds),
         seed: seed(drawing, own.object as u32, own.kind()),
     }
 }
@@ -152,6 +152,45 @@ fn of_splats<'a>(drawing: &Drawing<'a>, camera: &Camera) -> Vec<Source<'a>> {
 }
 
 impl Source<'_> {
+    /// The object with data of its own, by its rank.
+    pub(super) fn own_object(&self) -> Option<usize> {
+        match &self.data {
+            Data::Own(own) => Some(own.object),
+            Data::Splats(_) => None,
+        }
+    }
+
+    /// Cross-section of the particles, units² of the data.
+    pub(super) fn cross_section(&self) -> f64 {
+        self.cross_section
+    }
+
+    /// Makes particles fine enough for another view of an object with data of its own.
+    pub(super) fn refine(&mut self, camera: &Camera, transform: &Similarity) {
+        if let Data::Own(own) = &self.data {
+            self.cross_section = self.cross_section.min(finest_area(camera, transform, own.bounds));
+        }
+    }
+
+    /// The object, ready to be drawn; `None`, with a warning, when nothing of it is found.
+    pub(super) fn part(&self, warnings: &mut Vec<String>) -> Result<Option<Part<'_>>, Error> {
+        let name = || format!("object '{}'", crate::escape_controls(&self.name));
+        match self.sampler(warnings) {
+            Ok(sampler) => Ok(Some(self.part_of(Particles::Sampled(sampler)))),
+            Err(pbsr::Error::Empty { reason, .. }) => {
+                warnings.push(format!("{} has no particles: {reason}", name()));
+                Ok(None)
+            }
+            Err(e @ pbsr::Error::Field { .. }) => Err(Error::input(name(), e.to_string(), BROKEN_FIELD)),
+            Err(e) => Err(fault(e)),
+        }
+    }
+
+    /// The object with these particles.
+    pub(super) fn part_of<'b>(&self, particles: Particles<'b>) -> Part<'b> {
+        Part { particles, transform: self.transform, look: self.look }
+    }
+
     fn sampler(&self, warnings: &mut Vec<String>) -> Result<Box<dyn Sampler + '_>, pbsr::Error> {
         let own = match &self.data {
             Data::Splats(splats) => return Ok(Box::new(SplatSampler::new(&splats.0, &splats.1)?)),

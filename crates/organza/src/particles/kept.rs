@@ -1,0 +1,118 @@
+//! Sets of particles that serve all frames of an animation.
+
+use super::parts::{Part, Particles, Source};
+use crate::plan::pass;
+use crate::points::Drawing;
+use crate::scene::{Scene, SceneObject};
+use crate::{CostRecord, Error};
+use pbsr::KeptSets;
+use splat_core::{Camera, Similarity};
+use std::collections::BTreeMap;
+
+/// Share of the allowed memory that kept sets may take.
+const SHARE: u64 = 4;
+
+/// One frame's view of the objects, in the scene's unit.
+#[derive(Debug)]
+struct View {
+    /// With one pixel a sample.
+    camera: Camera,
+    /// From each visible object to the world.
+    transforms: Vec<Option<Similarity>>,
+}
+
+/// Kept sets of objects, and the frames that they are for.
+pub(crate) struct Kept {
+    views: Vec<View>,
+    of_object: BTreeMap<usize, Entry>,
+}
+
+struct Entry {
+    /// All that the sets depend on.
+    made_from: String,
+    sets: KeptSets,
+}
+
+impl Kept {
+    /// Nothing kept yet.
+    pub(crate) fn new(frames: &[Scene]) -> Self {
+        let view = |scene: &Scene| {
+            let mut camera = scene.camera;
+            camera.size = camera.size.map(|s| s.saturating_mul(scene.render.antialias));
+            let transforms = scene.objects.iter().map(|o| o.visible.then_some(o.transform)).collect();
+            View { camera, transforms }
+        };
+        Self { views: frames.iter().map(view).collect(), of_object: BTreeMap::new() }
+    }
+
+    /// What cross-sections follow from, in words that differ where it does.
+    pub(crate) fn views(&self) -> String {
+        format!("{:?}", self.views)
+    }
+
+    /// Takes the finest cross-section that any frame needs, and samples the objects that are not kept and may be.
+    pub(super) fn sample(
+        &mut self,
+        sources: &mut [Source<'_>],
+        drawing: &Drawing<'_>,
+        scene: &Scene,
+        cost: &mut CostRecord,
+        warnings: &mut Vec<String>,
+    ) -> Result<(), Error> {
+        let levels = drawing.settings.particles.repeat_level;
+        let budget = drawing.max_memory / SHARE;
+        for source in sources.iter_mut() {
+            let Some(object) = source.own_object() else { continue };
+            for view in &self.views {
+                if let Some(Some(transform)) = view.transforms.get(object) {
+                    source.refine(&view.camera, transform);
+                }
+            }
+            let made_from = made_from(&scene.objects[object], scene, source.cross_section());
+            if self.of_object.get(&object).is_some_and(|entry| entry.made_from == made_from) {
+                continue;
+            }
+            self.of_object.remove(&object);
+            let held: u64 = self.of_object.values().map(|entry| entry.sets.bytes()).sum();
+            let Some(part) = source.part(warnings)? else { continue };
+            let sampler = part.object().sampler;
+            let needed = sampler.expected_particles() * f64::from(levels) * pbsr::Particles::BYTES as f64;
+            if needed <= budget.saturating_sub(held) as f64 {
+                let sets = cost.measure(pass::SAMPLE, |stage| {
+                    let sets = KeptSets::new(sampler, 0, levels as usize);
+                    (stage.items_in, stage.items_out, stage.bytes) = (1, sets.particles(), sets.bytes());
+                    Ok::<_, Error>(sets)
+                })?;
+                self.of_object.insert(object, Entry { made_from, sets });
+            }
+            drawing.progress.tick(0).map_err(|_| Error::Cancelled)?;
+        }
+        Ok(())
+    }
+
+    /// What is drawn: kept sets where there are some.
+    pub(super) fn parts<'a>(
+        &'a self,
+        sources: &'a [Source<'_>],
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<Part<'a>>, Error> {
+        let mut parts = Vec::with_capacity(sources.len());
+        for source in sources {
+            match source.own_object().and_then(|object| self.of_object.get(&object)) {
+                Some(entry) => parts.push(source.part_of(Particles::Kept(&entry.sets))),
+                None => parts.extend(source.part(warnings)?),
+            }
+        }
+        Ok(parts)
+    }
+}
+
+/// An object without its place and visibility, its material and what random numbers come from. Every number is written so
+/// that it reads back the same.
+fn made_from(object: &SceneObject, scene: &Scene, cross_section: f64) -> String {
+    let (scale, material) = (object.transform.scale, &scene.materials[object.material]);
+    let object = SceneObject { transform: Similarity::default(), visible: true, ..object.clone() };
+    let settings = (scene.render.seed, scene.render.particles.repeat_level, cross_section, scale);
+    // Where nothing is lit and no layer shows them, volumes have no normals.
+    format!("{object:?} {material:?} {settings:?} {:?} {}", scene.render.layers, scene.lights.is_empty())
+}

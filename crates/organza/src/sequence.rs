@@ -1,0 +1,62 @@
+//! Frames of one scene, one after the other: what was sampled for one serves the next.
+
+use crate::particles::Kept;
+use crate::render::render_keeping;
+use crate::scene::Scene;
+use crate::{Error, Progress, Render, RenderOptions};
+
+/// Draws the frames of an animation.
+///
+/// The technique `particles` samples an object once, as finely as any frame needs it, and keeps the sets while they fit in a
+/// quarter of [`RenderOptions::max_memory`]: an object whose transform or visibility changes, or that is seen from another
+/// place, is not sampled again. The cost record of a frame has a pass `sample` where something was.
+///
+/// ```
+/// use organza::{Progress, RenderOptions, Sequence, scene};
+/// let text = br#"
+///     version = 1
+///     [camera]
+///     position = [0, 0, 4]
+///     target = [0, 0, 0]
+///     size = [16, 16]
+///     [[object]]
+///     name = "ball"
+///     implicit = { expression = "x^2 + y^2 + z^2 - 1", min = [-1.1, -1.1, -1.1], max = [1.1, 1.1, 1.1], spacing = 0.1 }
+///     opacity = 0.5
+///     [render]
+///     technique = "particles"
+///     [animation]
+///     frames = 2
+///     [[animation.track]]
+///     set = "object.ball.transform.translate"
+///     keys = [{ frame = 0, value = [0, 0, 0] }, { frame = 1, value = [0.5, 0, 0] }]
+/// "#;
+/// let frame = |k| {
+///     let options = scene::LoadOptions { frame: Some(k), ..Default::default() };
+///     scene::parse("ball.toml".as_ref(), text, &options).unwrap()
+/// };
+/// let scenes = [frame(0), frame(1)];
+/// let mut sequence = Sequence::new(&scenes);
+/// let (options, progress) = (RenderOptions::default(), Progress::new());
+/// let [first, second] = scenes.each_ref().map(|s| sequence.render(s, &options, &progress).unwrap());
+/// let sampled = |r: &organza::Render| r.cost.stages.iter().any(|s| s.name == "sample");
+/// assert!(sampled(&first) && !sampled(&second));
+/// ```
+pub struct Sequence {
+    kept: Kept,
+}
+
+impl Sequence {
+    /// Nothing drawn yet; `frames` are all that will be drawn.
+    pub fn new(frames: &[Scene]) -> Self {
+        Self { kept: Kept::new(frames) }
+    }
+
+    /// Draws one of the frames.
+    ///
+    /// # Errors
+    /// As [`crate::render`].
+    pub fn render(&mut self, frame: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Render, Error> {
+        render_keeping(frame, options, progress, Some(&mut self.kept))
+    }
+}
