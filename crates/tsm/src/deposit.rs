@@ -23,7 +23,9 @@ use crate::media::MediaBatches;
 use crate::overlap::{Ellipse, Sink, Spread};
 use crate::sampling::{NEAR, Sampled};
 use crate::shares::{BLOCK, between};
+use crate::surfaces::SurfaceBatches;
 use glam::{Vec2, Vec3};
+use splat_core::optics::SurfaceOpacity;
 use splat_core::{SplatKind, glam};
 
 /// Where a band begins and where it ends.
@@ -68,14 +70,24 @@ pub(crate) fn plane_distance(p: Vec3, n: Vec3, ray: &Ray) -> Option<f32> {
     (t > 0.0 && t.is_finite()).then_some(t)
 }
 
+/// Distance of the entry of a disc at `distance` on a cell's ray.
+#[inline(always)]
+pub(crate) fn distance_on_plane(p: Vec3, n: Vec3, distance: f32, ray: &Ray, parallel: bool) -> f32 {
+    let t = (p - ray.base).dot(n) / ray.direction.dot(n);
+    let on_plane = if (t > 0.0) & (t < f32::INFINITY) { t } else { distance };
+    // Where the plane comes far nearer than the splat, it is no longer that splat's.
+    if parallel | (on_plane > 0.5 * distance) { on_plane } else { 0.5 * distance }
+}
+
 /// Buffers of one worker, reused from chunk to chunk.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch<const C: usize> {
     pub(crate) media: Entries<C>,
     pub(crate) surfaces: Entries<C>,
-    pub(crate) batches: MediaBatches,
-    /// Splats of a chunk that go side by side, and those that go one by one.
-    pub(crate) ids: [Vec<u32>; 2],
+    pub(crate) media_batches: MediaBatches,
+    pub(crate) surface_batches: SurfaceBatches,
+    /// Splats of a chunk: media, surfaces, and those that go one by one.
+    pub(crate) ids: [Vec<u32>; 3],
     sampled: Sampled,
     shares: Vec<(u32, f32)>,
 }
@@ -135,7 +147,11 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
     #[inline(always)]
     fn overlap(&mut self, caster: &Caster, ellipse: &Ellipse, half: Vec2, weight: f32) {
         let area = if self.mapping.is_parallel() { 1.0 } else { caster.distance * caster.distance };
-        let total = weight * caster.cross_section * angle_gain(caster, self.mapping.is_parallel()) / area;
+        let gain = match caster.kind {
+            SplatKind::Medium => 1.0,
+            _ => angle_gain(caster.position, caster.normal, caster.extinction.opacity, self.mapping.is_parallel()),
+        };
+        let total = weight * caster.cross_section * gain / area;
         if let Some(crease) = self.mapping.crease(ellipse.at, half) {
             self.overlap_creased(caster, ellipse, &crease, total);
             return;
@@ -226,11 +242,8 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
             distance = caster.distance;
         } else if caster.kind != SplatKind::Medium {
             let ray = self.mapping.cell_ray(cell);
-            distance = plane_distance(caster.position, caster.normal, &ray).unwrap_or(caster.distance);
-            if !self.mapping.is_parallel() {
-                // Where the plane comes far nearer than the splat, it is no longer that splat's.
-                distance = distance.max(0.5 * caster.distance);
-            }
+            let parallel = self.mapping.is_parallel();
+            distance = distance_on_plane(caster.position, caster.normal, caster.distance, &ray, parallel);
         }
         if self.opaque.get(cell as usize).is_some_and(|d| *d < distance) {
             return;
@@ -244,19 +257,12 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
     }
 }
 
-/// g: the area that the light sees per area of the disc, times the growth of opacity at that angle.
+/// g of a disc: the area that the light sees per area of the disc, times the growth of opacity at that angle.
 #[inline(always)]
-fn angle_gain(caster: &Caster, parallel: bool) -> f32 {
-    if caster.kind == SplatKind::Medium {
-        return 1.0;
-    }
+pub(crate) fn angle_gain(position: Vec3, normal: Vec3, opacity: SurfaceOpacity, parallel: bool) -> f32 {
     // Parallel light travels along the frame's z.
-    let cosine = if parallel {
-        caster.normal.z.abs()
-    } else {
-        (caster.position.dot(caster.normal) / caster.position.length()).abs()
-    };
-    cosine * caster.extinction.opacity.optical_depth_factor(cosine)
+    let cosine = if parallel { normal.z.abs() } else { (position.dot(normal) / position.length()).abs() };
+    cosine * opacity.optical_depth_factor(cosine)
 }
 
 /// Where the closed form goes.

@@ -48,6 +48,7 @@ mod sampling;
 mod shadow_map;
 mod shares;
 mod sort;
+mod surfaces;
 mod survey;
 mod table;
 

@@ -11,9 +11,10 @@ use crate::deposit::is_plain;
 use crate::entries::{Cells, Entries};
 use crate::frame::Frame;
 use crate::lanes::{Columns, LANES, Lane, MOST, Queue, Queues, batches};
-use crate::mapping::Mapping;
+use crate::mapping::{Mapping, View};
 use crate::overlap::{Ellipse, Spread, Widths};
 use crate::shares::Axis;
+use crate::surfaces::plane_distances;
 use glam::{Vec2, Vec3};
 use splat_core::glam;
 
@@ -25,13 +26,13 @@ const DEVIATION: usize = 5;
 const SPLAT: usize = 6;
 
 /// Columns of a footprint: column and row, half widths, columns from a row to the next, K/d², d, colour.
-const AT: usize = 0;
+pub(crate) const AT: usize = 0;
 const HALF: usize = 2;
 const SLANT: usize = 4;
-const TOTAL: usize = 5;
-const DISTANCE: usize = 6;
-const RGB: usize = 7;
-const FOOTPRINT: usize = 10;
+pub(crate) const TOTAL: usize = 5;
+pub(crate) const DISTANCE: usize = 6;
+pub(crate) const RGB: usize = 7;
+pub(crate) const FOOTPRINT: usize = 10;
 
 /// One axis of all footprints, as in [`Axis`].
 #[derive(Debug)]
@@ -128,7 +129,7 @@ pub(crate) struct Target<'a, M: Mapping, const C: usize> {
 impl<M: Mapping, const C: usize> Target<'_, M, C> {
     /// Adds media; those that are not plain go to `others`.
     #[inline(always)]
-    pub(crate) fn add(
+    pub(crate) fn add_media(
         &mut self,
         casters: &Casters<'_>,
         frame: &Frame,
@@ -151,9 +152,9 @@ impl<M: Mapping, const C: usize> Target<'_, M, C> {
         }
     }
 
-    /// Entries of the first footprints of a queue.
+    /// Entries of the first footprints of a queue; those with the columns of a plane lie on it.
     #[inline(always)]
-    fn overlap(&mut self, queue: &Queue<FOOTPRINT>) {
+    pub(crate) fn overlap<const F: usize>(&mut self, queue: &Queue<F>) {
         let n = queue.lanes();
         let [at, slant, distance] = [AT, SLANT, DISTANCE].map(|f| queue.column(f));
         let mut rows = Axes::new(queue.column(AT + 1), queue.column(HALF + 1));
@@ -175,6 +176,13 @@ impl<M: Mapping, const C: usize> Target<'_, M, C> {
             for k in 0..columns.most_cells(n) {
                 let mut cells = self.cells(queue.column(TOTAL), (&rows, &height), &mut columns, [j, k]);
                 cells.is_kept[n..].fill(false);
+                let on_plane;
+                let distance = if F > FOOTPRINT {
+                    on_plane = plane_distances(self.mapping, queue, &cells, distance);
+                    &on_plane
+                } else {
+                    distance
+                };
                 self.hide(&mut cells, distance);
                 self.entries.extend_kept(&cells, distance, [0, 1, 2].map(|c| queue.column(RGB + c)));
             }
@@ -233,26 +241,40 @@ fn load(splats: &mut Columns<SPLAT>, casters: &Casters<'_>, ids: &[u32], frame: 
 #[inline(always)]
 fn fill<M: Mapping>(footprints: &mut Columns<FOOTPRINT>, mapping: &M, splats: &Columns<SPLAT>) {
     let parallel = mapping.is_parallel();
-    let [columns, rows] = mapping.size().map(|n| n as f32);
     let [x, y, z] = [0, 1, 2].map(|k| &splats.column[POSITION + k]);
     let [radius, cross_section, deviation] = [RADIUS, CROSS_SECTION, DEVIATION].map(|f| &splats.column[f]);
     for l in 0..LANES {
         let view = mapping.view(Vec3::new(x[l], y[l], z[l]));
-        let (at, distance) = (view.place.at, view.place.distance);
+        let distance = view.place.distance;
         let spread = Spread::of_ball(radius[l], view.gradients);
         let angle = if parallel { 0.0 } else { radius[l] / distance };
-        let Widths { half, slant } = Ellipse { at, spread, deviation: deviation[l] }.widths();
-        let reach = Vec2::new(half[0] + slant.abs() * half[1], half[1]);
-        let (low, high) = (at - reach, at + reach);
-        let is_inside = (low.x >= 1.0) & (low.y >= 1.0) & (high.x <= columns - 1.0) & (high.y <= rows - 1.0);
-        let is_plain = view.is_seen & is_inside & is_plain(mapping, at, spread, angle);
-        // Numbers of any size, which the others may have, count no cells.
-        let (at, half) = if is_plain { (at, half) } else { (Vec2::ZERO, [1.0; 2]) };
-        let [across, along] = [Axis::new(at.x, half[0]), Axis::new(at.y, half[1])];
-        let width = if slant == 0.0 { across.last - across.first + 1 } else { across.most_cells() };
-        let side = width.max(along.last - along.first + 1);
-        let total = cross_section[l] / if parallel { 1.0 } else { distance * distance };
-        footprints.set(AT, l, [at.x, at.y, half[0], half[1], slant, total, distance]);
-        footprints.side[l] = if is_plain & (side <= MOST) { side } else { -1 };
+        let (shape, side) = plain_footprint(mapping, &view, spread, angle, deviation[l]);
+        footprints.set(AT, l, shape);
+        footprints.set(TOTAL, l, [cross_section[l] / if parallel { 1.0 } else { distance * distance }, distance]);
+        footprints.side[l] = side;
     }
+}
+
+/// Columns from [`AT`] to [`SLANT`], and the greatest number of cells along a side, negative for what is not plain.
+#[inline(always)]
+pub(crate) fn plain_footprint<M: Mapping>(
+    mapping: &M,
+    view: &View,
+    spread: Spread,
+    angle: f32,
+    deviation: f32,
+) -> ([f32; 5], i32) {
+    let at = view.place.at;
+    let [columns, rows] = mapping.size().map(|n| n as f32);
+    let Widths { half, slant } = Ellipse { at, spread, deviation }.widths();
+    let reach = Vec2::new(half[0] + slant.abs() * half[1], half[1]);
+    let (low, high) = (at - reach, at + reach);
+    let is_inside = (low.x >= 1.0) & (low.y >= 1.0) & (high.x <= columns - 1.0) & (high.y <= rows - 1.0);
+    let is_plain = view.is_seen & is_inside & is_plain(mapping, at, spread, angle);
+    // Numbers of any size, which the others may have, count no cells.
+    let (at, half) = if is_plain { (at, half) } else { (Vec2::ZERO, [1.0; 2]) };
+    let [across, along] = [Axis::new(at.x, half[0]), Axis::new(at.y, half[1])];
+    let width = if slant == 0.0 { across.last - across.first + 1 } else { across.most_cells() };
+    let side = width.max(along.last - along.first + 1);
+    ([at.x, at.y, half[0], half[1], slant], if is_plain & (side <= MOST) { side } else { -1 })
 }

@@ -248,26 +248,30 @@ impl<M: Mapping, const C: usize> pulp::NullaryFnOnce for FillChunk<'_, M, C> {
     #[inline(always)]
     fn call(mut self) {
         let (casters, cloud) = (self.casters, self.casters.cloud);
-        let Scratch { media, batches, ids: [plain, others], .. } = &mut *self.deposit.scratch;
+        let Scratch { media, surfaces, media_batches, surface_batches, ids, .. } = &mut *self.deposit.scratch;
+        let [medium_ids, surface_ids, others] = ids;
         let mut others = std::mem::take(others);
-        plain.clear();
         others.clear();
-        if casters.params.absorbance == AbsorbanceModel::CrossSection {
-            let of_kind = |kind| {
-                let is_wanted = move |&i: &usize| cloud.kind[i] == kind && casters.casts(i);
-                self.chunk.clone().filter(is_wanted).map(|i| i as u32)
+        if casters.has_opaque_discs() {
+            let (frame, mapping, opaque) = (&self.plan.frame, self.deposit.mapping, self.deposit.opaque);
+            let select = |kind, ids: &mut Vec<u32>| {
+                ids.clear();
+                let is_wanted = |&i: &usize| cloud.kind[i] == kind && casters.casts(i);
+                ids.extend(self.chunk.clone().filter(is_wanted).map(|i| i as u32));
             };
-            plain.extend(of_kind(SplatKind::Medium));
-            others.extend(of_kind(SplatKind::Surface));
-            let mut target = Target { mapping: self.deposit.mapping, opaque: self.deposit.opaque, entries: media };
-            target.add(casters, &self.plan.frame, plain, batches, &mut others);
+            select(SplatKind::Medium, medium_ids);
+            select(SplatKind::Surface, surface_ids);
+            let mut target = Target { mapping, opaque, entries: media };
+            target.add_media(casters, frame, medium_ids, media_batches, &mut others);
+            let mut target = Target { mapping, opaque, entries: surfaces };
+            target.add_surfaces(casters, frame, surface_ids, surface_batches, &mut others);
         } else {
             others.extend(self.chunk.filter(|&i| casters.casts(i)).map(|i| i as u32));
         }
         for &i in &others {
             self.deposit.add(&casters.get(i as usize, &self.plan.frame, self.deposit.mapping.is_parallel()));
         }
-        self.deposit.scratch.ids[1] = others;
+        self.deposit.scratch.ids[2] = others;
     }
 }
 
