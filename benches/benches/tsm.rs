@@ -43,6 +43,18 @@ fn keys(entries: u64, cells: u64) -> Vec<u64> {
     (0..entries).map(key).collect()
 }
 
+/// Processor time of all threads, milliseconds, least of several runs on what `prepare` makes: on a busy machine it
+/// tells more than the time on the clock.
+fn processor_ms<T>(prepare: impl Fn() -> T, run: impl Fn(T)) -> f64 {
+    let once = |_| {
+        let input = prepare();
+        let before = organza_benches::processor_ms();
+        run(input);
+        organza_benches::processor_ms() - before
+    };
+    (0..8).map(once).fold(f64::INFINITY, f64::min)
+}
+
 fn benches(c: &mut Criterion) {
     for points in SIZES {
         let (cloud, _) = organza_benches::outdoor_cloud(points);
@@ -56,6 +68,10 @@ fn benches(c: &mut Criterion) {
             println!("{name}: {counts:?}, {per_splat:.2} entries a translucent splat, {per_entry:.1} bytes an entry");
             group.bench_function(BenchmarkId::new("build", name), |b| b.iter(|| build(&cloud, &light)));
             let unsorted = keys(counts.entries, counts.cells);
+            let build_ms = processor_ms(|| (), |()| drop(black_box(build(&cloud, &light))));
+            let rdst_ms = processor_ms(|| unsorted.clone(), |mut k| k.radix_sort_unstable());
+            let ratio = build_ms / rdst_ms;
+            println!("{name}: processor time: build {build_ms:.1} ms, rdst {rdst_ms:.1} ms, ratio {ratio:.2}");
             group.bench_function(BenchmarkId::new("rdst", name), |b| {
                 b.iter_batched_ref(|| unsorted.clone(), |k| k.radix_sort_unstable(), criterion::BatchSize::LargeInput);
             });
