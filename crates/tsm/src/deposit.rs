@@ -299,3 +299,87 @@ impl<M: Mapping, const C: usize> Put<'_, '_, M, C> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Params;
+    use crate::caster::Casters;
+    use crate::frame::Frame;
+    use crate::mapping::{Octahedral, Planar};
+    use crate::media::Target;
+    use splat_core::glam::DVec3;
+    use splat_core::{Cloud, Splat, rng};
+
+    fn cloud(kind: SplatKind) -> Cloud {
+        let mut cloud = Cloud::new(DVec3::ZERO);
+        for i in 0..1000 {
+            let number = |k| rng::unit_f32(21, 0, i, k);
+            let position = Vec3::new(number(0) - 0.5, number(1) - 0.5, 0.2 + 0.6 * number(2));
+            let normal = Vec3::new(number(3) - 0.5, number(4) - 0.5, number(5) - 0.5).normalize();
+            let normal = if kind == SplatKind::Medium { Vec3::ZERO } else { normal };
+            cloud.push(&Splat { position, radius: 0.005 + 0.06 * number(6), kind, normal, ..Splat::default() });
+        }
+        cloud
+    }
+
+    fn sorted(entries: &Entries<1>) -> Vec<[u32; 3]> {
+        let entry = |i: usize| [entries.cell[i], entries.distance[i].to_bits(), entries.own[i][0].to_bits()];
+        let mut all: Vec<_> = (0..entries.len).map(entry).collect();
+        all.sort_unstable();
+        all
+    }
+
+    /// Checks entries of both ways, and returns how many splats went side by side.
+    fn compare<M: Mapping>(mapping: &M, kind: SplatKind) -> usize {
+        let (cloud, params) = (cloud(kind), Params::default());
+        let casters = Casters::new(&cloud, &[], &[], &params);
+        let frame = Frame::new(DVec3::ZERO, [DVec3::X, DVec3::Y, DVec3::Z], 1.0);
+        let ids: Vec<u32> = (0..1000).collect();
+        let mut others = Vec::new();
+        let mut scratch = Scratch::<1>::default();
+        let Scratch { media, surfaces, media_batches, surface_batches, .. } = &mut scratch;
+        if kind == SplatKind::Medium {
+            Target { mapping, opaque: &[], entries: media }.add_media(
+                &casters,
+                &frame,
+                &ids,
+                media_batches,
+                &mut others,
+            );
+        } else {
+            Target { mapping, opaque: &[], entries: surfaces }.add_surfaces(
+                &casters,
+                &frame,
+                &ids,
+                surface_batches,
+                &mut others,
+            );
+        }
+        let mut single = Scratch::<1>::default();
+        for i in ids.iter().filter(|i| !others.contains(i)) {
+            Deposit { mapping, opaque: &[], scratch: &mut single }.add(&casters.get(
+                *i as usize,
+                &frame,
+                mapping.is_parallel(),
+            ));
+        }
+        assert_eq!(sorted(&scratch.media), sorted(&single.media));
+        assert_eq!(sorted(&scratch.surfaces), sorted(&single.surfaces));
+        ids.len() - others.len()
+    }
+
+    #[test]
+    fn splats_leave_the_same_bits_side_by_side_and_one_by_one() {
+        let planar = |perspective| Planar { min: Vec2::NEG_ONE * 1.5, cell: 0.05, size: [60, 60], perspective };
+        for kind in [SplatKind::Medium, SplatKind::Surface] {
+            let plain = [
+                compare(&Octahedral::new(48), kind),
+                compare(&planar(true), kind),
+                compare(&planar(false), kind),
+                compare(&crate::mapping::PolarAzimuth::new(60, 40, crate::mapping::PolarRange::SPHERE), kind),
+            ];
+            assert!(plain.iter().all(|n| (200..=1000).contains(n)), "{plain:?} side by side");
+        }
+    }
+}

@@ -200,3 +200,52 @@ fn fill<M: Mapping>(windows: &mut Columns<COUNT>, mapping: &M, discs: &Discs) {
         windows.set(FIRST, l, [u[0] as f32, v[0] as f32, nu as f32, nv as f32]);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Params;
+    use crate::mapping::{Octahedral, Planar};
+    use splat_core::glam::DVec3;
+    use splat_core::{Cloud, Splat, SplatKind, rng};
+
+    fn compare<M: Mapping>(mapping: &M) {
+        let mut cloud = Cloud::new(DVec3::ZERO);
+        for i in 0..1000 {
+            let number = |k| rng::unit_f32(22, 0, i, k);
+            let position = Vec3::new(number(0) - 0.5, number(1) - 0.5, number(2) - 0.1);
+            let normal = Vec3::new(number(3) - 0.5, number(4) - 0.5, number(5) - 0.5).normalize();
+            let tangent = normal.any_orthonormal_vector() * if i % 2 == 0 { 0.0 } else { 0.02 * number(6) };
+            let (radius, cross_section) = (0.005 + 0.05 * number(7), 0.003 * number(8));
+            cloud.push(&Splat {
+                position,
+                radius,
+                cross_section,
+                kind: SplatKind::Opaque,
+                normal,
+                tangent,
+                ..Splat::default()
+            });
+        }
+        let params = Params::default();
+        let casters = Casters::new(&cloud, &[], &[], &params);
+        let frame = Frame::new(DVec3::ZERO, [DVec3::X, DVec3::Y, DVec3::Z], 1.0);
+        let cells = mapping.size()[0] as usize * mapping.size()[1] as usize;
+        let [together, single] = [(); 2].map(|()| OpaqueDepth::new(cells));
+        let mut work = DiscBatches::default();
+        together.add_all(mapping, &casters, &frame, 0..1000, &mut work);
+        let alone = work.ids[1].len();
+        (0..1000).for_each(|i| single.add(mapping, &casters.get(i, &frame, mapping.is_parallel())));
+        let [together, single] = [together, single].map(OpaqueDepth::into_distances);
+        assert!(single.iter().filter(|d| d.is_finite()).count() > 100);
+        assert!(together == single && alone < 800, "{alone} alone");
+    }
+
+    #[test]
+    fn discs_leave_the_same_bits_side_by_side_and_one_by_one() {
+        let planar = |perspective| Planar { min: Vec2::NEG_ONE * 1.5, cell: 0.05, size: [60, 60], perspective };
+        compare(&Octahedral::new(48));
+        compare(&planar(true));
+        compare(&planar(false));
+    }
+}
