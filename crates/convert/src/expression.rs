@@ -8,12 +8,14 @@ pub(crate) mod interval;
 pub(crate) mod jet;
 mod parse;
 mod program;
+mod slope;
 
 use glam::{DMat3, DVec3};
 use interval::Interval;
 use jet::Jet;
 pub use parse::ExpressionError;
 use program::Program;
+use slope::{LANES, Run, Slopes};
 use splat_core::ScalarField;
 
 /// A formula as a scalar field.
@@ -55,6 +57,15 @@ impl ExpressionField {
     }
 }
 
+impl ExpressionField {
+    /// Value and gradient in one lane; where the gradient is no number, whether it truly is none takes second derivatives
+    /// to tell (√ of a constant 0).
+    fn checked<const N: usize>(&self, found: &Slopes<N>, i: usize, p: DVec3) -> (f64, DVec3) {
+        let (value, gradient) = found.get(i);
+        (value, if gradient.is_finite() { gradient } else { self.gradient(p) })
+    }
+}
+
 impl ScalarField for ExpressionField {
     fn value(&self, p: DVec3) -> f64 {
         self.program.run([p.x, p.y, p.z])
@@ -62,6 +73,21 @@ impl ScalarField for ExpressionField {
 
     fn gradient(&self, p: DVec3) -> DVec3 {
         self.program.run(Jet::variables(p)).gradient
+    }
+
+    fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
+        let run = Run { program: &self.program, small: Run::is_small(&self.program), at: [p] };
+        self.checked(&pulp::NullaryFnOnce::call(run), 0, p)
+    }
+
+    fn value_gradients(&self, at: &[DVec3], out: &mut [(f64, DVec3)]) {
+        let small = Run::is_small(&self.program);
+        for (at, out) in at.chunks(LANES).zip(out.chunks_mut(LANES)) {
+            // Lanes without a place of their own take the first.
+            let all = std::array::from_fn(|i| at.get(i).copied().unwrap_or(at[0]));
+            let found: Slopes<LANES> = pulp::Arch::new().dispatch(Run { program: &self.program, small, at: all });
+            out.iter_mut().zip(at).enumerate().for_each(|(i, (out, p))| *out = self.checked(&found, i, *p));
+        }
     }
 
     fn hessian(&self, p: DVec3) -> DMat3 {

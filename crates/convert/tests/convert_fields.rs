@@ -283,3 +283,35 @@ fn impossible_clouds_are_refused() {
     }
     assert!(matches!(procedural_cloud(&base(), 1e-6, &splat), Err(ConvertError::TooMany { .. })));
 }
+
+#[test]
+fn values_and_gradients_of_many_places_are_those_of_each() {
+    let formulas = [
+        "(sqrt(x^2 + y^2) - 0.7)^2 + z^2 - 0.09",
+        "sin(3*x)*cos(y) + tan(z/2) + sinh(x*y) - cosh(z) + tanh(x - y)",
+        "asin(x/2) + acos(y/2) + atan(z) + atan2(x, 2 + y) + exp(-z^2) + abs(x)",
+        "ln(2 + x) + log10(3 + y) + log2(3 + z) + (2 + x)^y + (2 + x)^1.5 + x^-3",
+        "min(x, max(y, z)) - (x + y)/(3 - z) + x^3 - y^5 + 2",
+        "x + sqrt(0*y) + sqrt(z)",
+        "((((((x + 1)*(y + (x*(y + z*(x - (y - (z*(x + y*(z - x)))))))))))))",
+    ];
+    for text in formulas {
+        let field = ExpressionField::parse(text).unwrap();
+        let at: Vec<DVec3> = (0..203u64)
+            .map(|i| DVec3::from_array([0, 1, 2].map(|a| 1.9 * rng::unit(8, 0, i, a) - 0.95)))
+            .chain([DVec3::ZERO, DVec3::NAN, DVec3::splat(1e200)])
+            .collect();
+        for n in [0, 1, 7, 8, 9, at.len()] {
+            let mut found = vec![(0.0, DVec3::ZERO); n];
+            field.value_gradients(&at[at.len() - n..], &mut found);
+            for (p, (value, gradient)) in at[at.len() - n..].iter().zip(found) {
+                let (v, g) = (field.value(*p), field.gradient(*p));
+                let same = |a: f64, b: f64| a == b || (a.is_nan() && b.is_nan()) || (a - b).abs() <= 1e-13 * b.abs();
+                assert!(same(value, v), "{text} at {p}: {value} for {v}");
+                assert!((0..3).all(|a| same(gradient[a], g[a])), "{text} at {p}: {gradient} for {g}");
+                let (one_value, one_gradient) = field.value_gradient(*p);
+                assert!(same(one_value, v) && (0..3).all(|a| same(one_gradient[a], g[a])), "{text} at {p}");
+            }
+        }
+    }
+}

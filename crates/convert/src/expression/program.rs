@@ -101,7 +101,13 @@ impl Program {
 
     /// Runs with these values of x, y and z.
     pub(crate) fn run<T: Number>(&self, variables: [T; 3]) -> T {
-        let mut stack = [T::constant(0.0); MAX_STACK];
+        self.run_on::<T, MAX_STACK>(variables)
+    }
+
+    /// Runs on a stack of `STACK` operands, no fewer than [`Program::depth`].
+    #[inline(always)]
+    pub(crate) fn run_on<T: Number, const STACK: usize>(&self, variables: [T; 3]) -> T {
+        let mut stack = [T::constant(0.0); STACK];
         let mut top = 0;
         for op in &self.ops {
             match *op {
