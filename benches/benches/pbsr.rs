@@ -1,6 +1,7 @@
 //! Particles: sampling of meshes, volumes and implicit surfaces, and the projection of kept sets at the sizes of Tanaka 2012
 //! (1024²) and of a volume of 256³ at 512² with 16 repeat levels.
 
+use convert::{ExpressionField, MpuParams, RawPoints, points_to_field};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use pbsr::{
     Appearance, BrownianParams, BrownianSampler, Ensemble, EnsembleParams, FoldParams, GridSampler, ImplicitSurface,
@@ -11,8 +12,9 @@ use rayon::prelude::*;
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::{
     Camera, Grid, Material, Mesh, Progress, Projection, ScalarField, Shading, Similarity, TransferFunction,
-    TransferPoint,
+    TransferPoint, rng,
 };
+use std::f64::consts::TAU;
 
 /// (√(x² + y²) − 0.7)² + z² − 0.09.
 struct Torus;
@@ -59,6 +61,20 @@ fn sheet() -> Mesh {
     mesh
 }
 
+/// 40 000 points with normals around a torus with bumps.
+fn torus_points() -> RawPoints {
+    let mut points = RawPoints::default();
+    for i in 0..40_000 {
+        let angle = |k| TAU * rng::unit(3, 1, i, k);
+        let ((sin, cos), b) = (angle(0).sin_cos(), angle(1));
+        let normal = DVec3::new(cos * b.cos(), sin * b.cos(), b.sin());
+        let tube = 0.3 + 0.05 * (7.0 * angle(0)).sin() * (5.0 * b).cos();
+        points.position.push((DVec3::new(0.7 * cos, 0.7 * sin, 0.0) + normal * tube).as_vec3());
+        points.normal.push(normal.as_vec3());
+    }
+    points
+}
+
 /// 256³ values that fall with the distance from the middle.
 fn ball() -> (Grid, TransferFunction) {
     let n = 256usize;
@@ -98,7 +114,13 @@ fn sampling(c: &mut Criterion) {
     let torus = ImplicitSurface { field: &Torus, level: 0.0, min, max, inside: None };
     let why = "invariant: the benchmark's scene";
     let walk = BrownianParams::for_width(2.0);
-    let samplers: [(&str, u64, Box<dyn Sampler>); 7] = [
+    let formula = ExpressionField::parse("z - 0.2*cos(9*sqrt(x^2 + y^2))").expect(why);
+    let [low, high] = [-1.0, 1.0].map(DVec3::splat);
+    let wave = ImplicitSurface { field: &formula, level: 0.0, min: low, max: high, inside: None };
+    let (blend, _) = points_to_field(&torus_points(), &MpuParams::default()).expect(why);
+    let [low, high] = blend.bounds();
+    let scattered = ImplicitSurface { field: &blend, level: 0.0, min: low, max: high, inside: None };
+    let samplers: [(&str, u64, Box<dyn Sampler>); 9] = [
         ("mesh, flat", 8, Box::new(MeshSampler::new(&flat, &surface(0.5), None).expect(why))),
         ("mesh, smooth", 8, Box::new(MeshSampler::new(&mesh, &surface(0.5), None).expect(why))),
         ("volume", 16, Box::new(GridSampler::new(&grid, &transfer, &volume, None).expect(why))),
@@ -109,6 +131,8 @@ fn sampling(c: &mut Criterion) {
             Box::new(MetropolisSampler::new(&grid, &transfer, &volume, &MetropolisParams::default()).expect(why)),
         ),
         ("torus, lines", 2, Box::new(LineSampler::new(&torus, 32, &surface(0.1), None).expect(why))),
+        ("cosine wave, lines", 2, Box::new(LineSampler::new(&wave, 48, &surface(0.1), None).expect(why))),
+        ("scattered points, lines", 1, Box::new(LineSampler::new(&scattered, 48, &surface(0.1), None).expect(why))),
         ("torus, Brownian", 2, Box::new(BrownianSampler::new(&torus, &walk, &surface(0.1)).expect(why))),
     ];
     let mut group = c.benchmark_group("pbsr/sample");
