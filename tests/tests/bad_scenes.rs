@@ -131,21 +131,21 @@ fn sources_of_fields_are_checked_at_their_place() {
         ),
         ("isosurface = { volume = \"b.nii\", level = 1, inside = \"up\" }", "expected one of \"above\", \"below\""),
         ("isosurface = { volume = \"../../b.nii\", level = 1 }", "lies outside the scene's root folder"),
-        ("level_set = { points = \"b.ply\", tolerance = 0 }", "16:43: `tolerance`: expected a number above 0, up to 1"),
+        ("level_set = { points = \"b.ply\", tolerance = 0 }", "`tolerance`: expected a number above 0, up to 1"),
         ("slice = { volume = \"b.nii\", center = [0, 0, 0], normal = [0, 0, 1] }", "a slice needs a key `transfer`"),
         (
             "slice = { volume = \"b.nii\", center = [0, 0, 0], normal = [0, 0, 0] }\ntransfer = [{ value = 0, color = [1, 1, 1] }]",
-            "16:60: `normal`: expected a direction",
+            "`normal`: expected a direction",
         ),
         (
             "slice = { volume = \"b.nii\", center = [0, 0, 0], normal = [0, 0, 1] }\n\
              transfer = [{ value = 0, color = [1, 1, 1], extinction = 1 }]",
             "a slice has no extinction",
         ),
-        ("mesh = \"b.ply\"\nclip = [{ box = [[0, 0, 0], [1, 1, 1]] }]", "17:8: `clip` belongs to an `implicit`"),
+        ("mesh = \"b.ply\"\nclip = [{ box = [[0, 0, 0], [1, 1, 1]] }]", "`clip` belongs to an `implicit`"),
         (
             "isosurface = { volume = \"b.nii\", level = 1 }\nclip = [{ normal = [0, 1, 0] }]",
-            "17:9: expected either `normal` and `point`, or `box`",
+            "expected either `normal` and `point`, or `box`",
         ),
         (
             "isosurface = { volume = \"b.nii\", level = 1 }\nclip = [{ box = [[0, 0, 0], [1, 0, 1]] }]",

@@ -90,8 +90,8 @@ const OWN: [(&str, &str, &str); 12] = [
     (
         "lines",
         "a",
-        "implicit = { expression = 'max(min(x^2 + y^2 + z^2 - 0.2, abs(x) + y^2 - 0.5), z^2 - 0.1)', \
-         box = [[-1, -1, -1], [1, 1, 1]], spacing = 0.02 }",
+        "implicit = { expression = 'max(x^2 + y^2 + z^2 - 0.36, -(x + z))', \
+         box = [[-1, -1, -1], [1, 1, 1]], spacing = 0.01 }",
     ),
     (
         "lines",

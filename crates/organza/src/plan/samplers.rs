@@ -6,7 +6,7 @@
 use crate::statistics::{LightStatistics, ObjectData, ObjectStatistics};
 
 /// Looseness of a field's bound above which triangles are faster than lines.
-const LOOSEST: f64 = 3.5;
+const LOOSEST: f64 = 4.2;
 
 /// Where particles come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
