@@ -22,7 +22,8 @@ pub enum ObjectData {
     /// The zero set of a field.
     Surface {
         /// Cells of a lattice that may hold the surface by the field's bound, over its area in cells: 2 to 3 for a tight
-        /// bound; infinite without a bound, 0 where a first look finds no surface.
+        /// bound; infinite without a bound, 0 where a first look finds no
+        /// surface, and for measured data, whose fields have tight bounds.
         looseness: f64,
     },
     /// Extinction on a lattice.

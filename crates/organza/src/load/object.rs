@@ -5,7 +5,7 @@ use super::context::Context;
 use super::input::{Input, input};
 use super::own::{Body, Own, Search};
 use crate::Error;
-use crate::scene::{MediumShape, SceneObject};
+use crate::scene::{MediumShape, SceneObject, Source};
 use crate::statistics::ObjectStatistics;
 use convert::cost::{self, Prediction};
 use convert::{
@@ -92,10 +92,12 @@ impl Prepared<'_> {
     /// What the planner asks of the object.
     pub(super) fn statistics(&self, object: &SceneObject, context: &Context<'_>) -> ObjectStatistics {
         let material = &context.scene.materials[object.material].material;
+        // Fields of measured data have tight bounds.
+        let looseness = if matches!(object.source, Source::Implicit(_)) { self.looseness() } else { 0.0 };
         let extinct = material.extinction_rgb.iter().any(|e| *e > 0.0) || self.input.opacity() == Some(1.0);
         ObjectStatistics {
             name: object.name.clone(),
-            data: self.input.data(self.bounded.is_some(), self.looseness()),
+            data: self.input.data(self.bounded.is_some(), looseness),
             opaque: self.input.opacity() == Some(1.0),
             by_gradient: self.input.by_gradient(),
             casts: object.casts_shadow && extinct,
