@@ -158,9 +158,13 @@ fn exit_5_bi26_limits_are_checked_before_the_work() {
 
 #[test]
 fn exit_6_is_for_the_gpu() {
-    for backend in ["wgpu", "ash"] {
-        place().expect(6, &["render", "s.toml", "--backend", backend], "GPU backends are not in this version");
-    }
+    let place = place();
+    place.expect(6, &["render", "s.toml", "--backend", "wgpu"], "--backend wgpu is not in this version");
+    let missing = ["render", "s.toml", "--backend", "ash", "--device", "no such device"];
+    place.expect(6, &missing, "--backend ash: no such device");
+    place.expect(2, &["render", "s.toml", "--device", "x"], "--device names a GPU, and the processor was asked for");
+    place.expect(2, &["explain", "s.toml", "--backend", "ash"], "--backend ash is for `organza render`");
+    assert!(place.made().is_empty());
 }
 
 #[cfg(unix)]

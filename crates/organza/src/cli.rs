@@ -4,6 +4,7 @@ mod accuracy;
 mod args;
 mod bar;
 mod console;
+mod devices;
 mod explain;
 mod info;
 mod memory;
@@ -49,6 +50,7 @@ fn run(command: Command) -> Result<u8, Error> {
         Command::Accuracy(arguments) => accuracy::run(&arguments),
         Command::Orders(arguments) => orders::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
+        Command::Devices(arguments) => devices::run(&arguments),
         Command::Schema => console::out(&(organza::scene::schema() + "\n")),
     }
     .map(|()| 0)

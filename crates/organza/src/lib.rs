@@ -27,6 +27,7 @@
 #![forbid(unsafe_code)]
 
 pub mod accuracy;
+mod device;
 mod error;
 mod info;
 mod load;
@@ -42,9 +43,11 @@ mod sequence;
 pub mod statistics;
 pub mod truth;
 
+pub use device::devices;
 pub use error::{Error, escape_controls, printable};
 pub use info::{FileInfo, info};
 pub use load::{Loaded, SplatCount, load};
 pub use render::{Explanation, Render, RenderOptions, Sets, explain, render};
 pub use sequence::Sequence;
 pub use splat_core::{CostRecord, Layers, Progress};
+pub use splat_shaders::{Adapter, AdapterKind, Choice};

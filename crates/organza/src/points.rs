@@ -1,5 +1,6 @@
 //! The `points` technique (Gunjee 2007): shadow maps, slices, attribute-driven shading, splatting.
 
+use crate::device::Helper;
 use crate::load::Loaded;
 use crate::plan::{Plan, pass};
 use crate::scene::{RenderSettings, ShadowMapping};
@@ -22,6 +23,8 @@ pub(crate) struct Drawing<'a> {
     pub(crate) layers: LayerSet,
     pub(crate) plan: &'a Plan,
     pub(crate) max_memory: u64,
+    /// A device that helps.
+    pub(crate) helper: Option<&'a Helper>,
     pub(crate) progress: &'a Progress,
 }
 
@@ -162,9 +165,12 @@ impl Drawing<'_> {
             ..hbsort::Params::default()
         };
         let order = cost.measure(pass::SORT, |stage| {
-            let mut scratch = hbsort::Scratch::default();
-            let order = hbsort::slice_cloud(cloud, Some(&translucent), camera, &params, &mut scratch)
-                .map_err(|e| Error::Internal(e.to_string()))?;
+            let helped = self.helper.and_then(|helper| helper.order(cloud, &translucent, camera, &params));
+            let order = helped.map_or_else(
+                || hbsort::slice_cloud(cloud, Some(&translucent), camera, &params, &mut hbsort::Scratch::default()),
+                Ok,
+            );
+            let order = order.map_err(|e| Error::Internal(e.to_string()))?;
             stage.items_in = translucent.len() as u64;
             stage.items_out = order.input_from_sorted.len() as u64;
             stage.bytes = 4 * (order.input_from_sorted.len() + order.slice_starts.len()) as u64;

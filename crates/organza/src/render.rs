@@ -1,5 +1,6 @@
 //! From a scene to images: load, plan, draw.
 
+use crate::device::Helper;
 use crate::load::{Loaded, SplatCount, light_statistics, load_measured};
 use crate::particles::{self, Checkpoint, Kept};
 use crate::plan::{Plan, plan};
@@ -8,6 +9,7 @@ use crate::scene::{Scene, Technique};
 use crate::statistics::Statistics;
 use crate::{CostRecord, Error, Layers, Progress};
 use splat_core::{LayerData, LayerSet, Material};
+use splat_shaders::Choice;
 use std::path::PathBuf;
 
 /// What a render may take and how it treats doubtful input.
@@ -22,11 +24,13 @@ pub struct RenderOptions {
     /// File of the sums of the technique `particles`: read before, if it is there, and written every few seconds, at the
     /// end and at an interrupt. A render that is stopped at any moment goes on from it and ends in the same bits.
     pub checkpoint: Option<PathBuf>,
+    /// The device on which the passes run that can; `None`: the processor alone. Whoever names one gets it or an error.
+    pub device: Option<Choice>,
 }
 
 impl Default for RenderOptions {
     fn default() -> Self {
-        Self { max_memory: 8 << 30, drop_invalid: false, merge_duplicates: false, checkpoint: None }
+        Self { max_memory: 8 << 30, drop_invalid: false, merge_duplicates: false, checkpoint: None, device: None }
     }
 }
 
@@ -43,6 +47,8 @@ pub struct Render {
     pub sets: Option<Sets>,
     /// What a user should know of the input, one sentence each.
     pub warnings: Vec<String>,
+    /// What drew it: `cpu`, or the interface and the device that helped.
+    pub backend: String,
 }
 
 /// Sets of particles in a picture.
@@ -76,7 +82,7 @@ pub struct Explanation {
 ///
 /// # Errors
 /// [`Error::Input`] and [`Error::Io`] for data, [`Error::Limit`] before more memory is taken than allowed,
-/// [`Error::Cancelled`] after `progress.cancel()`.
+/// [`Error::Cancelled`] after `progress.cancel()`, [`Error::Gpu`] when there is no device as asked for.
 pub fn render(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Render, Error> {
     render_keeping(scene, options, progress, None)
 }
@@ -90,14 +96,17 @@ pub(crate) fn render_keeping(
 ) -> Result<Render, Error> {
     let open = |path: &PathBuf| Checkpoint::open(path, scene, options, kept.as_deref());
     let mut checkpoint = options.checkpoint.as_ref().map(open).transpose()?;
+    let helper = options.device.as_ref().map(Helper::open).transpose()?;
     let (loaded, explanation) = prepare(scene, options, progress)?;
     let Explanation { plan, mut cost, mut warnings, .. } = explanation;
-    let drawing = drawing(scene, &loaded, &plan, options, progress);
+    let drawing = Drawing { helper: helper.as_ref(), ..drawing(scene, &loaded, &plan, options, progress) };
     let (layers, sets) = draw(scene, &drawing, options, checkpoint.as_mut(), kept, &mut cost, &mut warnings)?;
-    Ok(Render { layers, cost, plan, sets, warnings })
+    let backend = helper.as_ref().map_or_else(|| "cpu".to_owned(), Helper::name);
+    warnings.extend(helper.map(Helper::said).unwrap_or_default());
+    Ok(Render { layers, cost, plan, sets, warnings, backend })
 }
 
-/// Runs the planned passes on a loaded scene to their end and keeps the layers that it asks for.
+/// Runs the planned passes on a loaded scene to their end, by the processor alone, and keeps the layers that it asks for.
 pub(crate) fn draw_loaded(
     scene: &Scene,
     loaded: &Loaded,
@@ -148,6 +157,7 @@ pub(crate) fn drawing<'a>(
         layers: scene.render.layers.set(),
         plan,
         max_memory: options.max_memory,
+        helper: None,
         progress,
     }
 }

@@ -3,7 +3,7 @@
 use super::args::AccuracyArguments;
 use super::bar::with_bar;
 use super::console;
-use super::session::{in_folder, load_scene, path_text, render_options, start_threads};
+use super::session::{in_folder, load_scene, path_text, processor_only, render_options, start_threads};
 use organza::accuracy::{self, Absent, Facts, Options, Outcome, Renderer, Report, Request, Study};
 use organza::scene::Scene;
 use organza::{Error, Progress, printable};
@@ -13,6 +13,7 @@ use std::path::PathBuf;
 
 /// Sweeps the knobs, judges, writes the report. Whatever can be refused is refused before any work.
 pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
+    processor_only(&arguments.scene)?;
     let mut scene = load_scene(&arguments.scene)?;
     let options = Options { quick: arguments.quick, finer: arguments.finer, seed: scene.render.seed };
     if arguments.scene.size.is_none() {

@@ -26,6 +26,8 @@ pub(super) enum Command {
     Orders(OrdersArguments),
     /// Describes a data file or a scene.
     Info(InfoArguments),
+    /// Lists the GPUs that --backend ash can use, and the drivers that play one.
+    Devices(DevicesArguments),
     /// Prints the JSON Schema of scene files.
     Schema,
 }
@@ -39,6 +41,7 @@ impl Command {
             Self::Accuracy(a) => a.scene.json,
             Self::Orders(a) => a.scene.json,
             Self::Info(a) => a.json,
+            Self::Devices(a) => a.json,
             Self::Schema => false,
         }
     }
@@ -58,6 +61,9 @@ pub(super) struct SceneArguments {
     /// What computes
     #[arg(long, value_enum, default_value_t = Backend::Auto)]
     pub(super) backend: Backend,
+    /// Part of the name of the device for --backend ash [default: the best GPU, never a software driver]
+    #[arg(long, value_name = "NAME")]
+    pub(super) device: Option<String>,
     /// Size of the picture, pixels
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub(super) size: Option<[i64; 2]>,
@@ -175,16 +181,23 @@ pub(super) struct InfoArguments {
     pub(super) json: bool,
 }
 
+#[derive(Debug, Args)]
+pub(super) struct DevicesArguments {
+    /// Print one JSON document on stdout
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
 /// What computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Backend {
-    /// The best that there is
+    /// The processor, until a GPU has been measured to be faster
     Auto,
     /// The processor
     Cpu,
     /// A GPU by wgpu; not in this version
     Wgpu,
-    /// A GPU by Vulkan; not in this version
+    /// A GPU by Vulkan orders the translucent splats, the processor does the rest
     Ash,
 }
 

@@ -2,13 +2,14 @@
 
 use super::args::ExplainArguments;
 use super::bar::with_bar;
-use super::session::{load_scene, path_text, render_options, start_threads};
+use super::session::{load_scene, path_text, processor_only, render_options, start_threads};
 use super::{console, report};
 use organza::Error;
 use serde_json::json;
 
 /// Prints the plan; with `--measure` renders too and prints what it cost.
 pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
+    processor_only(&arguments.scene)?;
     let scene = load_scene(&arguments.scene)?;
     start_threads(arguments.scene.threads)?;
     let options = render_options(&arguments.scene);

@@ -3,13 +3,14 @@
 use super::args::OrdersArguments;
 use super::bar::with_bar;
 use super::console;
-use super::session::{in_folder, load_scene, path_text, render_options, start_threads};
+use super::session::{in_folder, load_scene, path_text, processor_only, render_options, start_threads};
 use organza::orders::{self, OrdersReport};
 use organza::{Error, accuracy, printable};
 use serde_json::json;
 
 /// Draws by every ordering and writes the comparison. Whatever can be refused is refused before any work.
 pub(super) fn run(arguments: &OrdersArguments) -> Result<(), Error> {
+    processor_only(&arguments.scene)?;
     let mut scene = load_scene(&arguments.scene)?;
     if arguments.scene.size.is_none() {
         accuracy::shrink(&mut scene, orders::LONGEST_SIDE);

@@ -10,8 +10,6 @@ use organza::{Error, Progress, Render, RenderOptions, Sequence, Sets, printable}
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// The backend of this version, as metadata and reports name it.
-const BACKEND: &str = "cpu";
 /// Least digits of a frame's number in a file name.
 const DIGITS: usize = 4;
 
@@ -171,7 +169,7 @@ impl Job {
             scene_sha256: self.scene.sha256.clone(),
             technique: render.plan.technique.to_owned(),
             seed: self.scene.render.seed,
-            backend: BACKEND.into(),
+            backend: render.backend.clone(),
             sets: render.sets.map(|s| s.averaged),
             exposure: self.scene.render.exposure,
         }
@@ -227,7 +225,7 @@ impl Job {
             "scene_sha256": self.scene.sha256,
             "size": self.scene.camera.size,
             "seed": self.scene.render.seed,
-            "backend": BACKEND,
+            "backend": render.backend,
             "outputs": outputs.collect::<Value>(),
             "plan": report::plan_json(&render.plan),
             "cost": report::cost_json(&render.cost),

@@ -3,7 +3,7 @@
 use super::args::{Backend, SceneArguments};
 use super::memory;
 use organza::scene::{self, LoadOptions, Override, Scene};
-use organza::{Error, RenderOptions, printable};
+use organza::{Choice, Error, RenderOptions, printable};
 use std::path::Path;
 
 /// Loads the scene with the options of the command line.
@@ -13,7 +13,7 @@ pub(super) fn load_scene(arguments: &SceneArguments) -> Result<Scene, Error> {
 
 /// [`load_scene`] at a frame of its animation.
 pub(super) fn load_frame(arguments: &SceneArguments, frame: Option<u32>) -> Result<Scene, Error> {
-    check_backend(arguments.backend)?;
+    check_backend(arguments)?;
     let overrides = overrides(arguments)?;
     scene::load(&arguments.scene, &LoadOptions { allow_path: arguments.allow_path, overrides, frame })
 }
@@ -25,6 +25,10 @@ pub(super) fn render_options(arguments: &SceneArguments) -> RenderOptions {
         drop_invalid: arguments.drop_invalid,
         merge_duplicates: arguments.merge_duplicates,
         checkpoint: None,
+        device: (arguments.backend == Backend::Ash).then(|| match &arguments.device {
+            Some(name) => Choice::Named(name.clone()),
+            None => Choice::Gpu,
+        }),
     }
 }
 
@@ -46,14 +50,25 @@ pub(super) fn in_folder<T>(folder: &Path, work: impl FnOnce() -> Result<T, Error
     out
 }
 
-fn check_backend(backend: Backend) -> Result<(), Error> {
-    let name = match backend {
-        Backend::Auto | Backend::Cpu => return Ok(()),
-        Backend::Wgpu => "wgpu",
-        Backend::Ash => "ash",
-    };
-    let message = format!("--backend {name}: GPU backends are not in this version");
-    Err(Error::Gpu { message, hint: "use --backend cpu".into() })
+fn check_backend(arguments: &SceneArguments) -> Result<(), Error> {
+    match (arguments.backend, &arguments.device) {
+        (Backend::Ash, _) | (Backend::Auto | Backend::Cpu, None) => Ok(()),
+        (Backend::Auto | Backend::Cpu, Some(_)) => {
+            Err(Error::usage("--device names a GPU, and the processor was asked for", "add --backend ash"))
+        }
+        (Backend::Wgpu, _) => {
+            let message = "--backend wgpu is not in this version".into();
+            Err(Error::Gpu { message, hint: "use --backend ash or --backend cpu".into() })
+        }
+    }
+}
+
+/// For the commands that measure what the processor does.
+pub(super) fn processor_only(arguments: &SceneArguments) -> Result<(), Error> {
+    match arguments.backend {
+        Backend::Ash => Err(Error::usage("--backend ash is for `organza render`", "use --backend cpu")),
+        _ => Ok(()),
+    }
 }
 
 /// Options that stand for a value of the scene, then `--set` in order.
