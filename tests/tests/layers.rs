@@ -16,7 +16,8 @@ fn effects_sum_to_beauty_in_every_scene() {
         if path.extension().is_none_or(|e| e != "toml") {
             continue;
         }
-        let picture = draw_file(&path, &["--size", "120x68", "--layers", "effects"]);
+        let picture =
+            draw_file(&path, &["--size", "120x68", "--layers", "effects", "--set", "render.particles.repeat_level=2"]);
         for c in ["R", "G", "B"] {
             let sum = ["background", "ambient", "emission", "direct"]
                 .iter()
