@@ -118,7 +118,7 @@ fn wrong_frames_and_tracks_are_refused_with_their_place() {
 
 const SAMPLED: &str = r#"[[object]]
 name = "ball"
-implicit = { expression = "x^2 + y^2 + z^2 - 0.25", min = [-0.6, -0.6, -0.6], max = [0.6, 0.6, 0.6], spacing = 0.05 }
+implicit = { expression = "x^2 + y^2 + z^2 - 0.25", box = [[-0.6, -0.6, -0.6], [0.6, 0.6, 0.6]], spacing = 0.05 }
 opacity = 0.5
 [[object]]
 name = "fog"
@@ -126,7 +126,7 @@ medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 0.5, spacing = 
 [render]
 technique = "particles"
 antialias = 1
-particles = { repeat_level = 20 }
+particles = { repeat_level = 2000 }
 [animation]
 frames = 4
 [[animation.track]]
@@ -158,7 +158,7 @@ fn what_moves_or_hides_is_not_sampled_again() {
     place.expect(0, &["render", "s.toml", "-o", "still.png"], "");
     assert_eq!(drawn(0), place.bytes("still.png"));
     // Without room every frame samples as it draws.
-    let little = ["render", "s.toml", "-o", "little.png", "--frames", "--json", "--max-memory", "60M"];
+    let little = ["render", "s.toml", "-o", "little.png", "--frames", "--json", "--max-memory", "20M"];
     let out = place.expect(0, &little, "");
     let document: Value = serde_json::from_slice(&out.stdout).unwrap();
     assert!(document["frames"].as_array().unwrap().iter().all(|f| sampled(f).is_none()));

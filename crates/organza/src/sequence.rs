@@ -21,7 +21,7 @@ use crate::{Error, Progress, Render, RenderOptions};
 ///     size = [16, 16]
 ///     [[object]]
 ///     name = "ball"
-///     implicit = { expression = "x^2 + y^2 + z^2 - 1", min = [-1.1, -1.1, -1.1], max = [1.1, 1.1, 1.1], spacing = 0.1 }
+///     implicit = { expression = "x^2 + y^2 + z^2 - 1", box = [[-1.1, -1.1, -1.1], [1.1, 1.1, 1.1]], spacing = 0.1 }
 ///     opacity = 0.5
 ///     [render]
 ///     technique = "particles"

@@ -65,11 +65,13 @@ impl Tiling {
     }
 }
 
-/// Work of one task: some chunks of one set of one object.
+/// Work of one task: a run of chunks of one set of one object.
 #[derive(Debug, Default)]
 pub(crate) struct Task {
     pub(crate) set: u64,
     pub(crate) object: u32,
+    /// Rank of the run among those of the object.
+    pub(crate) run: usize,
     pub(crate) chunks: std::ops::Range<usize>,
     records: Vec<Record>,
     /// First record of each tile, and the end.
@@ -109,16 +111,22 @@ impl Task {
     }
 
     /// Samples the chunks, projects and sorts.
-    pub(crate) fn run(&mut self, sampler: &dyn Sampler, projector: &Projector, tiling: &Tiling, staging: &mut Staging) {
+    pub(crate) fn fill(
+        &mut self,
+        sampler: &dyn Sampler,
+        projector: &Projector,
+        tiling: &Tiling,
+        staging: &mut Staging,
+    ) {
         staging.len = 0;
         self.particles = 0;
         self.starts.clear();
         self.starts.resize(tiling.tiles() + 1, 0);
         let mut scratch = std::mem::take(&mut staging.particles);
+        let key = thinning_key(self.object, self.set, self.run);
         for chunk in self.chunks.clone() {
             let particles = sampler.chunk(self.set, chunk, &mut scratch);
-            let key = thinning_key(self.object, self.set, chunk);
-            staging.stage(particles, projector, tiling, key, &mut self.starts);
+            staging.stage(particles, projector, tiling, (key, self.particles), &mut self.starts);
             self.particles += particles.len() as u64;
         }
         staging.particles = scratch;
@@ -143,15 +151,15 @@ impl Task {
     }
 }
 
-/// Counter of the numbers that thin out the particles of one chunk.
-pub(crate) fn thinning_key(object: u32, set: u64, chunk: usize) -> u64 {
-    rng::bits(u64::from(object), Stage::Thinning as u64, set, chunk as u64)
+/// Counter of the numbers that thin out the particles of one run of chunks.
+pub(crate) fn thinning_key(object: u32, set: u64, run: usize) -> u64 {
+    rng::bits(u64::from(object), Stage::Thinning as u64, set, run as u64)
 }
 
-/// The number in (0, 1) of particle `i` of a chunk.
+/// The number in (0, 1) of particle `i` of a run.
 #[inline(always)]
-pub(crate) fn thinning(key: u64, i: usize) -> f32 {
-    let bits = scramble(key.wrapping_add((i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)));
+pub(crate) fn thinning(key: u64, i: u64) -> f32 {
+    let bits = scramble(key.wrapping_add(i.wrapping_mul(0x9e37_79b9_7f4a_7c15)));
     ((bits >> 41) as f32 + 0.5) * (1.0 / (1u32 << 23) as f32)
 }
 
@@ -164,12 +172,21 @@ impl Staging {
         }
     }
 
-    /// Projects the particles of a chunk; counts those of each tile, one place on in `counts`.
-    fn stage(&mut self, particles: &Particles, projector: &Projector, tiling: &Tiling, key: u64, counts: &mut [u32]) {
+    /// Projects the particles of a chunk, of which the first has the number `before` in its run; counts those of each
+    /// tile, one place on in `counts`.
+    fn stage(
+        &mut self,
+        particles: &Particles,
+        projector: &Projector,
+        tiling: &Tiling,
+        (key, before): (u64, u64),
+        counts: &mut [u32],
+    ) {
         let columns = tiling.columns as u32;
         let mut n = self.len;
         for (block, offsets) in particles.position.chunks(BLOCK).enumerate() {
             let first = block * BLOCK;
+            let number = before + first as u64;
             projector.view(offsets, &mut self.view);
             self.grow(n);
             let attributes = particles.normal[first..].iter().zip(&particles.color[first..]);
@@ -184,14 +201,14 @@ impl Staging {
                     self.widened(
                         &projector.widened(x, y, k),
                         record,
-                        key.wrapping_add((first + j) as u64),
+                        key.wrapping_add(number + j as u64),
                         columns,
                         counts,
                     );
                     n = self.len;
                     continue;
                 }
-                let seen = self.view.seen[j] & ((k >= 1.0) || thinning(key, first + j) < k);
+                let seen = self.view.seen[j] & ((k >= 1.0) || thinning(key, number + j as u64) < k);
                 let [px, py] = [0, 1].map(|a| self.view.pixel[a][j]);
                 let (tile, place) = place(px, py, self.view.within[j], columns);
                 self.tiles[n] = tile;

@@ -12,7 +12,7 @@
 use crate::bins::{AREA, Tiling, thinning, thinning_key};
 use crate::error::check;
 use crate::project::Projector;
-use crate::{Ensemble, Error, Object, Particles, Scene};
+use crate::{Ensemble, Error, KeptSets, Object, Particles, Sampler, Scene};
 use splat_core::{Shading, glam, rng};
 use splat_shaders::layouts::{ParticleObject, ParticleView};
 use splat_shaders::{BufferId, Groups, Recording, kernels};
@@ -160,11 +160,12 @@ fn room(what: &'static str, needed: usize, had: u32) -> Result<(), Error> {
 /// The particles of one object in a set, with the numbers that thin them out on the CPU.
 fn sample(object: &Object<'_>, at: u32, set: u64, out: &mut Vec<[u32; PARTICLE_WORDS]>) {
     let mut scratch = Particles::default();
-    for chunk in 0..object.sampler.chunks() {
-        let key = thinning_key(at, set, chunk);
-        let particles = object.sampler.chunk(set, chunk, &mut scratch);
-        let each = particles.position.iter().zip(&particles.normal).zip(&particles.color).enumerate();
-        out.extend(each.map(|(i, ((position, normal), color))| {
+    let kept = KeptSets::new(object.sampler, set, 1);
+    for run in 0..kept.chunks() {
+        let key = thinning_key(at, set, run);
+        let particles = kept.chunk(set, run, &mut scratch);
+        let each = particles.position.iter().zip(&particles.normal).zip(&particles.color);
+        out.extend(each.zip(0..).map(|(((position, normal), color), i)| {
             let [x, y, z] = position.to_array().map(f32::to_bits);
             [x, y, z, normal.bits(), color.bits(), thinning(key, i).to_bits(), at]
         }));

@@ -1,7 +1,7 @@
 //! Slow and obvious: one set on one image in f64, particle by particle; and opacities in closed form.
 
 use crate::bins::{thinning, thinning_key};
-use crate::{Particles, Scene, opacity, pixel_area};
+use crate::{KeptSets, Particles, Sampler, Scene, opacity, pixel_area};
 use splat_core::glam::DVec3;
 
 /// The nearest particle of a pixel.
@@ -22,9 +22,10 @@ pub fn nearest(scene: &Scene<'_>, set: u64) -> Vec<Option<Nearest>> {
     let mut scratch = Particles::default();
     for (o, object) in scene.objects.iter().enumerate() {
         let s = object.sampler.cross_section() * object.transform.scale.powi(2);
-        for chunk in 0..object.sampler.chunks() {
-            let key = thinning_key(o as u32, set, chunk);
-            let particles = object.sampler.chunk(set, chunk, &mut scratch);
+        let kept = KeptSets::new(object.sampler, set, 1);
+        for run in 0..kept.chunks() {
+            let key = thinning_key(o as u32, set, run);
+            let particles = kept.chunk(set, run, &mut scratch);
             for i in 0..particles.len() {
                 let world = object.transform.apply(object.sampler.origin() + particles.position[i].as_dvec3());
                 let view = scene.camera.view_from_world(world);
@@ -38,7 +39,7 @@ pub fn nearest(scene: &Scene<'_>, set: u64) -> Vec<Option<Nearest>> {
                     };
                     k *= (normal.dot(ray) / ray.length()).abs();
                 }
-                if view.z <= 0.0 || (k < 1.0 && f64::from(thinning(key, i)) >= k) {
+                if view.z <= 0.0 || (k < 1.0 && f64::from(thinning(key, i as u64)) >= k) {
                     continue;
                 }
                 let scale = scene.camera.focal_px() / if scene.camera.is_orthographic() { 1.0 } else { view.z };

@@ -1,6 +1,6 @@
 //! STEPS 1 to 3 for any number of sets: sample, project, keep the nearest of each pixel, add to the ensemble.
 //!
-//! Sets are folded in batches. First all (set, object, range of chunks) are sampled, projected and sorted by tile, each by
+//! Sets are folded in batches. First all (set, object, run of chunks) are sampled, projected and sorted by tile, each by
 //! one task; then each tile is taken by one task, which goes through the sets in order with a depth buffer of its own.
 //! Nothing is shared between tasks and every sum is in integers: the result has the same bits for any number of threads.
 //! Memory depends on the image and on the particles of one batch, never on the number of sets.
@@ -10,14 +10,12 @@ use crate::cost::Counts;
 use crate::ensemble::{Ensemble, TileSums};
 use crate::error::check;
 use crate::project::Projector;
+use crate::sampler::{Run, runs};
 use crate::shade::{Appearance, LitBy, MAX_CHANNELS, Seen, Shader};
 use crate::{Error, PackedColor, Sampler, flat};
 use glam::{DMat3, DVec3, Mat3};
 use rayon::prelude::*;
 use splat_core::{Camera, Progress, Shading, Similarity, glam};
-
-/// Particles of a task, in the mean; at least one chunk.
-const TASK_PARTICLES: f64 = 16384.0;
 
 /// One object of the scene.
 #[derive(Clone, Copy)]
@@ -125,17 +123,17 @@ impl Renderer {
     }
 
     fn sample(&mut self, scene: &Scene<'_>, plan: &Plan, first: u64, batch: u32, progress: &Progress) {
-        self.tasks.resize_with(plan.ranges.len() * batch as usize, Task::default);
+        self.tasks.resize_with(plan.runs.len() * batch as usize, Task::default);
         for (k, task) in self.tasks.iter_mut().enumerate() {
-            // Sets of one range one after the other: its triangles or cells are then in the cache.
-            let (object, chunks) = plan.ranges[k / batch as usize].clone();
+            // Sets of one run one after the other: its triangles or cells are then in the cache.
+            let (object, rank, run) = &plan.runs[k / batch as usize];
             task.set = first + (k % batch as usize) as u64;
-            (task.object, task.chunks) = (object, chunks);
+            (task.object, task.run, task.chunks) = (*object, *rank, run.chunks.clone());
         }
         self.tasks.par_iter_mut().for_each_init(Staging::default, |staging, task| {
             if !progress.is_cancelled() {
                 let object = task.object as usize;
-                task.run(scene.objects[object].sampler, &plan.projectors[object], &plan.tiling, staging);
+                task.fill(scene.objects[object].sampler, &plan.projectors[object], &plan.tiling, staging);
             }
         });
     }
@@ -164,8 +162,8 @@ impl Renderer {
 struct Plan {
     tiling: Tiling,
     projectors: Vec<Projector>,
-    /// (object, chunks) of each task of a set.
-    ranges: Vec<(u32, std::ops::Range<usize>)>,
+    /// Of each task of a set: the object, the rank of the run among those of the object, and the run.
+    runs: Vec<(u32, usize, Run)>,
     batch_levels: u32,
     world_from_view: DMat3,
     /// Turn of each object's normals.
@@ -190,35 +188,22 @@ impl Plan {
         }
         let budget = (params.max_bytes / BYTES_IN_BATCH).min(params.batch_particles) as f64;
         let axes = scene.camera.axes;
+        let of_object = |(o, object): (usize, &Object<'_>)| {
+            runs(object.sampler).into_iter().enumerate().map(move |(rank, run)| (o as u32, rank, run))
+        };
+        let of_objects = scene.objects.iter().enumerate().flat_map(of_object);
         let project =
             |o: &Object<'_>| Projector::new(scene.camera, o.sampler.origin(), &o.transform, o.sampler.cross_section());
         Ok(Self {
             tiling: ensemble.tiling,
             projectors: scene.objects.iter().map(project).collect(),
-            ranges: ranges(scene.objects),
+            runs: of_objects.collect(),
             batch_levels: (budget / expected.max(1.0)).clamp(1.0, 4096.0) as u32,
             world_from_view: DMat3::from_cols(axes[0], axes[1], axes[2]),
             turns: scene.objects.iter().map(|o| DMat3::from_quat(o.transform.rotation).as_mat3()).collect(),
             focal: scene.camera.focal_px(),
         })
     }
-}
-
-/// Chunks of all objects, in runs of some thousand particles.
-fn ranges(objects: &[Object<'_>]) -> Vec<(u32, std::ops::Range<usize>)> {
-    let mut ranges = Vec::new();
-    for (o, object) in objects.iter().enumerate() {
-        let (mut first, mut sum) = (0, 0.0);
-        let chunks = object.sampler.chunks();
-        for c in 0..chunks {
-            sum += object.sampler.expected(c);
-            if sum >= TASK_PARTICLES || c + 1 == chunks {
-                ranges.push((o as u32, first..c + 1));
-                (first, sum) = (c + 1, 0.0);
-            }
-        }
-    }
-    ranges
 }
 
 /// The depth buffer of one tile.

@@ -4,6 +4,7 @@ use crate::Particles;
 use crate::blocks::Blocks;
 use rayon::prelude::*;
 use splat_core::glam::DVec3;
+use std::ops::Range;
 
 /// A source of statistically independent particle sets.
 ///
@@ -85,8 +86,33 @@ impl<T: Poisson> Sampler for T {
     }
 }
 
-/// Particles of a kept chunk, in the mean, unless one chunk of the sampler has more.
-const KEPT_CHUNK: f64 = 16384.0;
+/// Particles of a run, in the mean, at least; the last has what is left.
+const RUN_PARTICLES: f64 = 16384.0;
+
+/// Chunks of a sampler that are projected one after the other. Their particles are numbered through, so that one kept
+/// chunk in place of a run is thinned out by the same random numbers.
+#[derive(Debug, Clone)]
+pub(crate) struct Run {
+    pub(crate) chunks: Range<usize>,
+    /// Mean number of particles.
+    pub(crate) expected: f64,
+}
+
+/// The runs of a sampler: each ends with the first chunk that makes it long enough.
+pub(crate) fn runs(sampler: &dyn Sampler) -> Vec<Run> {
+    let chunks = sampler.chunks();
+    let mut runs = Vec::new();
+    let mut run = Run { chunks: 0..0, expected: 0.0 };
+    for c in 0..chunks {
+        run.chunks.end = c + 1;
+        run.expected += sampler.expected(c);
+        if run.expected >= RUN_PARTICLES || run.chunks.end == chunks {
+            let next = Run { chunks: c + 1..c + 1, expected: 0.0 };
+            runs.push(std::mem::replace(&mut run, next));
+        }
+    }
+    runs
+}
 
 /// Sets `first .. first + n` of another sampler, kept in memory: set r is kept set r mod n.
 ///
@@ -101,27 +127,20 @@ pub struct KeptSets {
 }
 
 impl KeptSets {
-    /// Samples `n` ≥ 1 sets from `first` on, in parallel. Small chunks are joined.
+    /// Samples `n` ≥ 1 sets from `first` on, in parallel. Each run of chunks is joined to one.
     pub fn new(sampler: &dyn Sampler, first: u64, n: usize) -> Self {
-        let mut runs: Vec<(std::ops::Range<usize>, f64)> = Vec::new();
-        for c in 0..sampler.chunks() {
-            let more = sampler.expected(c);
-            match runs.last_mut() {
-                Some((run, sum)) if *sum + more <= KEPT_CHUNK => (run.end, *sum) = (c + 1, *sum + more),
-                _ => runs.push((c..c + 1, more)),
-            }
-        }
-        let one = |set: u64, run: &std::ops::Range<usize>, sum: f64| {
+        let runs = runs(sampler);
+        let one = |set: u64, run: &Run| {
             let (mut all, mut scratch) = (Particles::default(), Particles::default());
-            all.reserve((sum * 1.1) as usize + 64);
-            run.clone().for_each(|c| all.append(sampler.chunk(set, c, &mut scratch)));
+            all.reserve((run.expected * 1.1) as usize + 64);
+            run.chunks.clone().for_each(|c| all.append(sampler.chunk(set, c, &mut scratch)));
             all
         };
-        let kept = |set: u64| runs.par_iter().map(|(run, sum)| one(set, run, *sum)).collect();
+        let kept = |set: u64| runs.par_iter().map(|run| one(set, run)).collect();
         Self {
             origin: sampler.origin(),
             cross_section: sampler.cross_section(),
-            expected: runs.iter().map(|(_, sum)| *sum).collect(),
+            expected: runs.iter().map(|run| run.expected).collect(),
             sets: (0..n.max(1) as u64).map(|k| kept(first + k)).collect(),
         }
     }

@@ -163,6 +163,13 @@ fn kept_sets_are_the_sets_and_moving_them_needs_no_sampling() {
     let kept = KeptSets::new(&sampler, 0, 12);
     assert_eq!(render(&camera, &[&kept], 12), render(&camera, &[&sampler], 12));
     assert_eq!(kept.bytes(), kept.particles() * 20);
+    // Particles of a hundredth of a pixel are thinned out by the same numbers, though their chunks are joined.
+    let fine = params(0.4, 0.01 * pixel_area(&camera, DVec3::Z), [1.0; 3], 1);
+    let wall = rectangle(Vec3::ZERO, Vec3::X * 1.5, Vec3::Y * 1.5, 64);
+    let sampler = MeshSampler::new(&wall, &fine, None).unwrap();
+    let kept = KeptSets::new(&sampler, 0, 3);
+    assert!(1 < kept.chunks() && kept.chunks() < sampler.chunks(), "{} of {}", kept.chunks(), sampler.chunks());
+    assert_eq!(render(&camera, &[&kept], 3), render(&camera, &[&sampler], 3));
     // Twice as large: particles are widened, the opacity stays. Turned by 60°: 1 − 0.6².
     let turned =
         Similarity { scale: 2.0, rotation: DQuat::from_rotation_y(60f64.to_radians()), ..Similarity::default() };
