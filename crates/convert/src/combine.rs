@@ -156,6 +156,14 @@ impl Clip {
         }
     }
 
+    /// Whether something within `radius` of `p` may be kept.
+    fn may_keep(&self, p: DVec3, radius: f64) -> bool {
+        match *self {
+            Self::HalfSpace { normal, offset } => normal.dot(p) - offset <= radius * normal.length(),
+            Self::Box([low, high]) => (p - p.clamp(low, high)).length() <= radius,
+        }
+    }
+
     fn check(&self, index: usize) -> Result<(), Error> {
         match *self {
             Self::HalfSpace { normal, offset } => {
@@ -232,5 +240,9 @@ impl ScalarField for ClippedField {
 
     fn in_domain(&self, p: DVec3) -> bool {
         self.clips.iter().all(|c| c.keeps(p)) && self.field.in_domain(p)
+    }
+
+    fn may_be_in_domain(&self, p: DVec3, radius: f64) -> bool {
+        self.clips.iter().all(|c| c.may_keep(p, radius)) && self.field.may_be_in_domain(p, radius)
     }
 }

@@ -51,11 +51,16 @@ impl ImplicitSurface<'_> {
         in_box && self.field.in_domain(p) && self.inside.is_none_or(|inside| inside(p))
     }
 
-    /// Whether the field's bound shows that a cube holds no piece of the surface, and whether there is a bound.
+    /// Whether the field's bound or domain shows that a cube holds no piece of the surface, and whether it does or there is
+    /// a bound.
     pub(crate) fn excludes(&self, corner: DVec3, side: f64) -> (bool, bool) {
         let half = 0.5 * side;
         // √3 rounded up: the ball must hold the cube.
-        let bound = self.field.bound(corner + half, half * 1.732_050_807_568_878);
+        let radius = half * 1.732_050_807_568_878;
+        if !self.field.may_be_in_domain(corner + half, radius) {
+            return (true, true);
+        }
+        let bound = self.field.bound(corner + half, radius);
         (bound.is_some_and(|(low, high)| low > self.level || high < self.level), bound.is_some())
     }
 

@@ -113,9 +113,10 @@ fn along(axis: u8, p: DVec3) -> f64 {
 }
 
 impl Leaf {
-    /// All leaves of some cells: level by level, those of larger cubes first.
-    pub(crate) fn all(surface: &ImplicitSurface<'_>, cells: &Cells) -> Vec<Self> {
-        let mut leaves = Vec::new();
+    /// All leaves of some cells, level by level, those of larger cubes first; and the cubes, as open leaves, that were
+    /// taken for empty though no bound says so.
+    pub(crate) fn all(surface: &ImplicitSurface<'_>, cells: &Cells) -> (Vec<Self>, Vec<Self>) {
+        let (mut leaves, mut empty) = (Vec::new(), Vec::new());
         let (mut cubes, mut side) = (cells.active.clone(), cells.side);
         for level in 0..=LEVELS {
             let looks: Vec<Look> = cubes.par_iter().map(|corner| look(surface, *corner, side)).collect();
@@ -126,6 +127,8 @@ impl Leaf {
             let all = || cubes.iter().zip(&looks).map(|(corner, look)| (*corner, look));
             let kept = all().filter(|(_, look)| !(divide && look.is_poor(error)));
             leaves.extend(kept.filter_map(|(corner, look)| look.leaf(corner, side)));
+            let nothing = all().filter(|(_, look)| matches!(look, Look::Empty));
+            empty.extend(nothing.map(|(corner, _)| Self { corner, side, graph: None }));
             if !divide || poor == 0 {
                 break;
             }
@@ -137,7 +140,7 @@ impl Leaf {
             };
             cubes = large.into_par_iter().flat_map_iter(parts).collect();
         }
-        leaves
+        (leaves, empty)
     }
 
     /// Lines times area over the surface's density: a line of the leaf meets a flat piece of area A with probability

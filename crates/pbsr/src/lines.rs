@@ -18,8 +18,9 @@
 //! which is Tanaka 2012, Eq. 1, for n → ∞ at fixed n·s/S. The number of crossings is left as it comes: to cut it to a wanted
 //! n would make sets with many crossings thinner, and α depend on the rest of the surface.
 //!
-//! Where the field has no bound, pieces may be missed; [`LineReport`] says how many of a sample of lines gain roots when
-//! they are looked at 16 times as finely.
+//! Where the field has no bound, or a fold finer than the places where a cube was looked at, pieces may be missed;
+//! [`LineReport`] says how many of a sample of lines gain roots when they are looked at 16 times as finely, and how much of
+//! the surface a sample of lines meets in cubes that were taken for empty.
 
 use crate::blocks::Blocks;
 use crate::error::check;
@@ -36,8 +37,9 @@ use splat_core::glam;
 use splat_core::optics::SurfaceOpacity;
 use std::f64::consts::TAU;
 
-/// Lines of the survey.
+/// Lines of the survey, and of that of cubes taken for empty.
 const SURVEY_LINES: u32 = 8192;
+const STRAY_LINES: u32 = 4096;
 
 /// Crossings that are evaluated at once.
 const BATCH: usize = 128;
@@ -63,12 +65,15 @@ pub struct LineReport {
     pub broken: u64,
     /// Area of the surface, world units², estimated from the roots.
     pub area: f64,
+    /// Area of its pieces in cubes that were taken for empty, where a survey of those met some.
+    pub stray_area: f64,
 }
 
 impl LineReport {
     /// Share of roots that are missed, as far as the survey can tell: the relative bias of the optical depth.
     pub fn missed(&self) -> f64 {
-        self.fine_roots.saturating_sub(self.roots) as f64 / self.fine_roots.max(1) as f64
+        let unseen = self.fine_roots.saturating_sub(self.roots) as f64 / self.fine_roots.max(1) as f64;
+        unseen + self.stray_area / (self.area + self.stray_area).max(f64::MIN_POSITIVE)
     }
 }
 
@@ -104,7 +109,7 @@ impl<'a> LineSampler<'a> {
         let cells = Cells::new(surface, resolution);
         let empty = |reason| Error::Empty { what: "an implicit surface", reason };
         let origin = cells.middle().ok_or(empty("the field's bound excludes the level in the whole box"))?;
-        let leaves = Leaf::all(surface, &cells);
+        let (leaves, empty_cubes) = Leaf::all(surface, &cells);
         // A density factor multiplies optical depth.
         let per_area = params.particles_per_area() * density.as_ref().map_or(1.0, |d| d.max);
         let mut sum = 0.0;
@@ -120,6 +125,7 @@ impl<'a> LineSampler<'a> {
         };
         let mut sampler = Self { surface: *surface, params: *params, density, leaves, reaches, sets, report };
         sampler.survey();
+        sampler.report.stray_area = sampler.strays(&empty_cubes);
         if sampler.report.roots == 0 {
             let broken = sampler.report.broken > 0;
             let reason = if broken { "the field is not finite there" } else { "no line of the survey meets it" };
@@ -196,6 +202,23 @@ impl<'a> LineSampler<'a> {
         };
         // What is missed has an area too.
         self.report.area *= self.report.fine_roots.max(self.report.roots) as f64 / self.report.roots.max(1) as f64;
+    }
+
+    /// Area in cubes that were taken for empty, as lines meet it that are spread evenly over them.
+    fn strays(&self, empty: &[Leaf]) -> f64 {
+        let mut sum = 0.0;
+        let reaches: Vec<f64> = empty.iter().map(|l| (sum += l.reach(), sum).1).collect();
+        let one = |i: u32| {
+            let mut stream = Stream::new(self.params.seed, Stage::Survey, 1, u64::from(i));
+            let share = sum * (f64::from(i) + stream.unit()) / f64::from(STRAY_LINES);
+            let leaf = &empty[reaches.partition_point(|r| *r < share).min(empty.len() - 1)];
+            let (line, mut found) = (self.line(leaf, &mut stream), Found::default());
+            self.search(leaf, &line, 16, &mut found);
+            self.inside(&line, &found)
+        };
+        let lines = if empty.is_empty() { 0 } else { STRAY_LINES };
+        let roots: u64 = (0..lines).into_par_iter().with_min_len(64).map(one).sum();
+        roots as f64 / f64::from(STRAY_LINES) * sum
     }
 
     /// Roots of a line that count.

@@ -5,7 +5,8 @@ mod common;
 
 use common::*;
 use pbsr::{Density, Error, ImplicitSurface, LineSampler, Sampler, SurfaceParams, pixel_area};
-use splat_core::glam::DVec3;
+use splat_core::ScalarField;
+use splat_core::glam::{DMat3, DVec3};
 use std::f64::consts::PI;
 
 fn boxed(field: &Field, half: f64) -> ImplicitSurface<'_> {
@@ -237,4 +238,48 @@ fn what_cannot_be_sampled_says_why() {
     assert!(report.missed() < 0.01, "{report:?}");
     assert!((report.area / (4.0 * PI) - 1.0).abs() < 0.05, "{report:?}");
     assert!(sampler.expected_particles() > 1000.0);
+}
+
+/// The plane z = 0.8 with a needle down to z = −1, thinner than a cube is looked at.
+struct Needle;
+
+impl Needle {
+    fn hill(p: DVec3) -> f64 {
+        let [x, y] = [p.x - 0.019, p.y - 0.0093];
+        1.8 * (-30000.0 * (x * x + y * y)).exp()
+    }
+}
+
+impl ScalarField for Needle {
+    fn value(&self, p: DVec3) -> f64 {
+        p.z - 0.8 + Self::hill(p)
+    }
+
+    fn gradient(&self, p: DVec3) -> DVec3 {
+        DVec3::new((p.x - 0.019) * -60000.0 * Self::hill(p), (p.y - 0.0093) * -60000.0 * Self::hill(p), 1.0)
+    }
+
+    fn hessian(&self, p: DVec3) -> DMat3 {
+        let (d, hill) = (DVec3::new(p.x - 0.019, p.y - 0.0093, 0.0), Self::hill(p));
+        let second = |a: f64, b: f64, same: f64| (60000.0 * 60000.0 * a * b - 60000.0 * same) * hill;
+        let cross = second(d.x, d.y, 0.0);
+        DMat3::from_cols(
+            DVec3::new(second(d.x, d.x, 1.0), cross, 0.0),
+            DVec3::new(cross, second(d.y, d.y, 1.0), 0.0),
+            DVec3::ZERO,
+        )
+    }
+
+    fn bound(&self, _: DVec3, _: f64) -> Option<(f64, f64)> {
+        None
+    }
+}
+
+#[test]
+fn pieces_in_cubes_that_were_taken_for_empty_are_reported() {
+    let needle = ImplicitSurface { field: &Needle, ..boxed(&Field::UNIT, 1.0) };
+    let sampler = LineSampler::new(&needle, 8, &params(0.5, 1e-3), None).unwrap();
+    let report = sampler.report();
+    // Where the needle has the radius r = √(ln(1.8/(0.8 − z))/3000); its lateral area is near 0.13.
+    assert!(report.missed() > 0.003 && (0.01..0.1).contains(&report.stray_area), "{report:?}");
 }

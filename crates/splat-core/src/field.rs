@@ -31,4 +31,9 @@ pub trait ScalarField: Sync {
     fn in_domain(&self, _p: DVec3) -> bool {
         true
     }
+
+    /// Whether some place within `radius` of `p` may be in the domain; false only where surely none is.
+    fn may_be_in_domain(&self, _p: DVec3, _radius: f64) -> bool {
+        true
+    }
 }

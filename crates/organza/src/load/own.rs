@@ -266,7 +266,7 @@ impl Search {
             let Some((least, most)) = field.bound(middle, radius) else {
                 return Self { bounds: [low, high], area: f64::INFINITY };
             };
-            if least <= 0.0 && most >= 0.0 {
+            if least <= 0.0 && most >= 0.0 && field.may_be_in_domain(middle, radius) {
                 found = [found[0].min(middle - 0.5 * cells.step), found[1].max(middle + 0.5 * cells.step)];
                 n += 1.0;
             }
