@@ -2,24 +2,24 @@
 //!
 //! Splats are lit once; then the translucent ones are composited in each order, with nothing cut off, and compared with the
 //! picture in which the fragments of every pixel are sorted by their own depth, in f64. Opaque surfaces enter as in any
-//! render. So the order is all that differs. The technique `particles` stands beside them: it orders nothing, and its
-//! pictures of several seeds are judged by the same truth.
+//! render. So the order is all that differs. The technique `particles` stands beside them: it orders nothing; here its
+//! particles are sampled from the same splats, and its pictures of several seeds are judged by the same truth.
 
 mod report;
 
 pub use report::{OrdersReport, write};
 
-use crate::accuracy::{Renderer, Request, SEEDS, Sampled};
+use crate::accuracy::{SEEDS, Sampled};
 use crate::load::{Loaded, load};
 use crate::points::Shaded;
-use crate::render::{drawing, plan_loaded};
+use crate::render::{draw_loaded, drawing, plan_loaded};
 use crate::scene::{ParticlesSettings, Scene, Technique};
 use crate::{CostRecord, Error, Progress, RenderOptions};
 use hbsort::{Params, Scratch, Thickness, slice_cloud};
 use reference::metrics::{Disorder, Image, Linear, Rays};
 use reference::statistics::{Spread, median_with_spread};
 use reference::{Input, Order, composite_with_progress};
-use splat_core::{Camera, Direction, SliceOrder, SplatKind};
+use splat_core::{Camera, Direction, Layers, SliceOrder, SplatKind};
 use std::time::Instant;
 
 /// Longest side of the picture, pixels, unless the user asked for a size.
@@ -125,13 +125,12 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
     for ordering in all {
         let (order, seconds, bytes) = sorter.timed(ordering)?;
         let layers = drawing.compose(&shaded, &order, &mut cost)?;
-        let beauty = layers.rgb("beauty").ok_or_else(|| Error::Internal("a render has no beauty layer".into()))?;
         let mut disorder = rays.disorder(&ranks(&order, loaded.cloud.len()));
         disorder.worst_backtrack *= world;
         orderings.push(Ordered {
             name: ordering.name(auto),
             thickness: ordering.thickness().map(|t| t * world),
-            image: Image::from_layer(layers.size, beauty).map_err(|e| Error::Internal(e.to_string()))?,
+            image: image(&layers)?,
             disorder: Some(disorder),
             seconds,
             bytes,
@@ -142,7 +141,7 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
     let start = Instant::now();
     let truth = truth(&input, &scene, progress)?;
     let truth_seconds = start.elapsed().as_secs_f64();
-    let unordered = particles(&scene, &truth, options, progress)?;
+    let unordered = particles(&scene, &loaded, &truth, options, progress)?;
     let without_particles = unordered.as_ref().err().cloned();
     orderings.extend(unordered);
     let splats = sorter.translucent.len() as u64;
@@ -191,9 +190,11 @@ fn truth(input: &Input<'_>, scene: &Scene, progress: &Progress) -> Result<Image<
     image.map(|i| i.box_downsampled(scene.render.antialias as usize)).map_err(|e| Error::Internal(e.to_string()))
 }
 
-/// Particles, which are drawn by depth in any order, with several seeds; or why they cannot show the scene.
+/// Particles of the same splats, which are drawn by depth in any order, with several seeds; or why they cannot show the
+/// scene.
 fn particles(
     scene: &Scene,
+    loaded: &Loaded,
     truth: &Image<Linear>,
     options: &RenderOptions,
     progress: &Progress,
@@ -201,20 +202,24 @@ fn particles(
     let mut scene = scene.clone();
     scene.render.technique = Technique::Particles;
     scene.render.particles = ParticlesSettings { repeat_level: SETS, target_error: None };
-    let mut renderer = Renderer::new(options, progress);
-    if let Some(reason) = renderer.refused(&scene)? {
-        return Ok(Err(reason));
-    }
+    let plan = match plan_loaded(&scene, loaded, options) {
+        Err(e @ (Error::Input { .. } | Error::Limit { .. } | Error::TooLarge { .. })) => return Ok(Err(e.to_string())),
+        planned => planned?.0,
+    };
     let mut images = Vec::new();
-    let mut request = Request { scene, oversample: 1 };
     for _ in 0..SEEDS {
-        images.push(renderer.draw(&request)?.image);
-        request.scene.render.seed = request.scene.render.seed.wrapping_add(1);
+        images.push(image(&draw_loaded(&scene, loaded, &plan, options, progress, &mut CostRecord::default())?)?);
+        scene.render.seed = scene.render.seed.wrapping_add(1);
     }
     let sampled = Sampled::of(&images, truth, 0.0, None)?;
     let name = format!("particles, {SETS} sets: none needed");
     let image = images.swap_remove(0);
     Ok(Ok(Ordered { name, thickness: None, image, disorder: None, seconds: None, bytes: 0, sampled }))
+}
+
+fn image(layers: &Layers) -> Result<Image<Linear>, Error> {
+    let beauty = layers.rgb("beauty").ok_or_else(|| Error::Internal("a render has no beauty layer".into()))?;
+    Image::from_layer(layers.size, beauty).map_err(|e| Error::Internal(e.to_string()))
 }
 
 /// Splat → place, `u32::MAX` for those that are left out.
