@@ -200,8 +200,7 @@ fn compare_particles(shape: Shape, forms: &[Form], solid: bool) {
             let noisy: Vec<usize> = (0..variance.len()).filter(|&k| variance[k] > 1e-10).collect();
             let seeds = chi_square(&noisy, |k| (particles[k] - other[k]).powi(2), |k| 2.0 * variance[k]);
             let closed = chi_square(&noisy, |k| (particles[k] - exact[k]).powi(2), |k| variance[k]);
-            let apart = |from: &[f64]| (rmse(&particles, from).powi(2) - noise).max(0.0).sqrt();
-            let from_points = apart(&points);
+            let from_points = (rmse(&particles, &points).powi(2) - noise).max(0.0).sqrt();
             println!(
                 "{shape:?} {form:?} {size}: {} squares, z² between seeds {:.3}, from the closed form {:.3}, \
                  RMS without noise from points {from_points:.5}",
@@ -212,11 +211,14 @@ fn compare_particles(shape: Shape, forms: &[Form], solid: bool) {
             assert!(noisy.len() > 300 && seeds.1, "{shape:?} {form:?} {size}: seeds {seeds:?}");
             assert!(form != Form::Lattice || closed.1, "{shape:?} {form:?} {size}: from the closed form {closed:?}");
             assert!(size < SIZES[2] || from_points < 0.01, "{shape:?} {form:?} {size}: {from_points} from points");
-            errors.push(apart(&exact));
+            // Mean square without noise, which may come out below 0, and four deviations of it.
+            let spread = 4.0 * noise * (2.0 / variance.len() as f64).sqrt();
+            errors.push((rmse(&particles, &exact).powi(2) - noise, spread));
         }
-        let order = 0.5 * (errors[0] / errors[2]).log2();
-        println!("{shape:?} {form:?} as particles: RMSE without noise {errors:.5?}, order {order:.2}");
-        assert!(form == Form::Lattice || order >= 1.0, "{shape:?} {form:?}: RMSE {errors:?}, order {order}");
+        println!("{shape:?} {form:?} as particles: mean square error without noise, and its spread {errors:.7?}");
+        // Four times the resolution: a quarter of the error, a sixteenth of its square, but for noise.
+        let [(coarse, around), _, (fine, spread)] = errors[..] else { unreachable!() };
+        assert!(fine - spread <= (coarse + around).max(0.0) / 16.0, "{shape:?} {form:?}: {errors:?}");
     }
 }
 
