@@ -1,7 +1,7 @@
 //! Particles: sampling of meshes, volumes and implicit surfaces, and the projection of kept sets at the sizes of Tanaka 2012
 //! (1024²) and of a volume of 256³ at 512² with 16 repeat levels.
 
-use convert::{ExpressionField, MpuParams, RawPoints, points_to_field};
+use convert::{ExpressionField, GridField, Inside, Interpolation, MpuParams, RawPoints, points_to_field};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use pbsr::{
     Appearance, BrownianParams, BrownianSampler, Ensemble, EnsembleParams, FoldParams, GridSampler, ImplicitSurface,
@@ -89,6 +89,19 @@ fn ball() -> (Grid, TransferFunction) {
     (grid, TransferFunction::new(points).expect("invariant: rising values"))
 }
 
+/// 64³ values of a gyroid.
+fn gyroid(interpolation: Interpolation) -> GridField {
+    let n = 64usize;
+    let at = |i: usize| TAU * (i as f64 / (n - 1) as f64 * 2.0 - 1.0);
+    let value = |i: usize| {
+        let [x, y, z] = [at(i % n), at(i / n % n), at(i / n / n)];
+        (x.sin() * y.cos() + y.sin() * z.cos() + z.sin() * x.cos()) as f32
+    };
+    let axes = DMat3::from_diagonal(DVec3::splat(2.0 / (n - 1) as f64));
+    let grid = Grid { origin: DVec3::splat(-1.0), axes, dims: [n; 3], values: (0..n * n * n).map(value).collect() };
+    GridField::new(grid.into(), interpolation, 0.0, Inside::Below).expect("invariant: a grid")
+}
+
 fn camera(n: u32) -> Camera {
     let view = Projection::Orthographic { height: 2.0 };
     Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y, view, [n, n]).expect("invariant: a camera")
@@ -117,10 +130,13 @@ fn sampling(c: &mut Criterion) {
     let formula = ExpressionField::parse("z - 0.2*cos(9*sqrt(x^2 + y^2))").expect(why);
     let [low, high] = [-1.0, 1.0].map(DVec3::splat);
     let wave = ImplicitSurface { field: &formula, level: 0.0, min: low, max: high, inside: None };
+    let volumes = [Interpolation::Trilinear, Interpolation::CatmullRom].map(gyroid);
+    let levels =
+        volumes.each_ref().map(|field| ImplicitSurface { field, level: 0.0, min: low, max: high, inside: None });
     let (blend, _) = points_to_field(&torus_points(), &MpuParams::default()).expect(why);
     let [low, high] = blend.bounds();
     let scattered = ImplicitSurface { field: &blend, level: 0.0, min: low, max: high, inside: None };
-    let samplers: [(&str, u64, Box<dyn Sampler>); 9] = [
+    let samplers: [(&str, u64, Box<dyn Sampler>); 11] = [
         ("mesh, flat", 8, Box::new(MeshSampler::new(&flat, &surface(0.5), None).expect(why))),
         ("mesh, smooth", 8, Box::new(MeshSampler::new(&mesh, &surface(0.5), None).expect(why))),
         ("volume", 16, Box::new(GridSampler::new(&grid, &transfer, &volume, None).expect(why))),
@@ -132,6 +148,8 @@ fn sampling(c: &mut Criterion) {
         ),
         ("torus, lines", 2, Box::new(LineSampler::new(&torus, 32, &surface(0.1), None).expect(why))),
         ("cosine wave, lines", 2, Box::new(LineSampler::new(&wave, 48, &surface(0.1), None).expect(why))),
+        ("trilinear volume, lines", 1, Box::new(LineSampler::new(&levels[0], 64, &surface(0.1), None).expect(why))),
+        ("Catmull-Rom volume, lines", 1, Box::new(LineSampler::new(&levels[1], 64, &surface(0.1), None).expect(why))),
         ("scattered points, lines", 1, Box::new(LineSampler::new(&scattered, 48, &surface(0.1), None).expect(why))),
         ("torus, Brownian", 2, Box::new(BrownianSampler::new(&torus, &walk, &surface(0.1)).expect(why))),
     ];

@@ -14,9 +14,9 @@ mod jet;
 mod ranges;
 mod stencil;
 
-use jet::{Jet, control_range, jet};
+use jet::{Slope, control_range, hessian, slope};
 use ranges::{Ranges, widen};
-use splat_core::glam::{DMat3, DVec3};
+use splat_core::glam::{BVec3, DMat3, DVec3};
 use splat_core::{Error, Grid, ScalarField};
 use std::sync::Arc;
 use stencil::{Control, Stencil};
@@ -81,6 +81,8 @@ pub struct GridField {
     reach: DVec3,
     /// The last lattice point along each axis.
     last: DVec3,
+    /// How far lattice coordinates of places on the border may be off by rounding.
+    rounding: DVec3,
 }
 
 impl GridField {
@@ -100,9 +102,11 @@ impl GridField {
             return Err(Error::invalid("grid", 0, "axes", grid.axes, "steps that have an inverse"));
         }
         let last = DVec3::from_array(grid.dims.map(|n| (n - 1) as f64));
+        let far = grid.origin.abs().max_element() + (grid.axes * last).abs().max_element();
+        let rounding = reach * (8.0 * f64::EPSILON * far);
         let ranges = Ranges::new(&grid, interpolation);
         let volume = Arc::new(Volume { grid, ranges });
-        Self { volume, interpolation, isovalue: 0.0, sign: 1.0, lattice_from_object, reach, last }
+        Self { volume, interpolation, isovalue: 0.0, sign: 1.0, lattice_from_object, reach, last, rounding }
             .with_isovalue(isovalue, inside)
     }
 
@@ -131,37 +135,37 @@ impl GridField {
         [origin + low, origin + high]
     }
 
+    #[inline(always)]
     fn lattice_coordinate(&self, p: DVec3) -> DVec3 {
         self.lattice_from_object * (p - self.grid().origin)
     }
 
-    /// Derivatives up to order `D` with respect to lattice coordinates; none along axes on which `p` lies outside.
-    fn jet<const D: usize>(&self, p: DVec3) -> Jet {
-        let u = self.lattice_coordinate(p);
+    /// Value and gradient of the volume with respect to lattice coordinates; constant along axes on which `u` lies outside.
+    #[inline(always)]
+    fn lattice_slope(&self, u: DVec3) -> Slope {
         let (grid, inside) = (self.grid(), u.clamp(DVec3::ZERO, self.last));
-        let mut jet = match self.interpolation {
+        let ([x, y, z], [nx, ny, nz]) = (inside.to_array(), grid.dims);
+        let (value, gradient) = match self.interpolation {
             Interpolation::Trilinear => {
-                jet::<2, D>(grid, &[0, 1, 2].map(|a| Stencil::<2>::linear(inside[a], grid.dims[a])))
+                slope(grid, &[Stencil::linear(x, nx), Stencil::linear(y, ny), Stencil::linear(z, nz)])
             }
             Interpolation::CatmullRom => {
-                jet::<4, D>(grid, &[0, 1, 2].map(|a| Stencil::<4>::catmull_rom(inside[a], grid.dims[a])))
+                slope(grid, &[Stencil::catmull_rom(x, nx), Stencil::catmull_rom(y, ny), Stencil::catmull_rom(z, nz)])
             }
         };
-        if D > 0 && u != inside {
-            let kept = DVec3::select(u.cmpeq(inside), DVec3::ONE, DVec3::ZERO);
-            jet.gradient *= kept;
-            let keep = DMat3::from_diagonal(kept);
-            jet.hessian = keep * jet.hessian * keep;
-        }
-        jet
+        (value, DVec3::select(self.is_between(u, inside), gradient, DVec3::ZERO))
     }
 
-    fn field_value(&self, jet: &Jet) -> f64 {
-        self.sign * (jet.value - self.isovalue)
+    /// Along which axes `u` lies between lattice points, the border included; `inside` is the nearest place that does.
+    #[inline(always)]
+    fn is_between(&self, u: DVec3, inside: DVec3) -> BVec3 {
+        (u - inside).abs().cmple(self.rounding)
     }
 
-    fn field_gradient(&self, jet: &Jet) -> DVec3 {
-        self.lattice_from_object.transpose() * (jet.gradient * self.sign)
+    #[inline(always)]
+    fn slope(&self, p: DVec3) -> Slope {
+        let (value, gradient) = self.lattice_slope(self.lattice_coordinate(p));
+        (self.sign * (value - self.isovalue), self.lattice_from_object.transpose() * (gradient * self.sign))
     }
 
     /// Range of the volume over a box of lattice coordinates that lies in the lattice.
@@ -201,23 +205,51 @@ impl GridField {
     }
 }
 
+/// Many places, in the form that [`pulp`] compiles once per instruction set.
+struct Slopes<'a> {
+    field: &'a GridField,
+    at: &'a [DVec3],
+    out: &'a mut [(f64, DVec3)],
+}
+
+impl pulp::NullaryFnOnce for Slopes<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.at.iter().zip(self.out).for_each(|(p, out)| *out = self.field.slope(*p));
+    }
+}
+
 impl ScalarField for GridField {
     fn value(&self, p: DVec3) -> f64 {
-        self.field_value(&self.jet::<0>(p))
+        self.slope(p).0
     }
 
     fn gradient(&self, p: DVec3) -> DVec3 {
-        self.field_gradient(&self.jet::<1>(p))
+        self.slope(p).1
     }
 
     fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
-        let jet = self.jet::<1>(p);
-        (self.field_value(&jet), self.field_gradient(&jet))
+        self.slope(p)
+    }
+
+    fn value_gradients(&self, at: &[DVec3], out: &mut [(f64, DVec3)]) {
+        pulp::Arch::new().dispatch(Slopes { field: self, at, out });
     }
 
     fn hessian(&self, p: DVec3) -> DMat3 {
+        let u = self.lattice_coordinate(p);
+        let (grid, inside) = (self.grid(), u.clamp(DVec3::ZERO, self.last));
+        let lattice = match self.interpolation {
+            Interpolation::Trilinear => hessian(grid, &[0, 1, 2].map(|a| Stencil::linear(inside[a], grid.dims[a]))),
+            Interpolation::CatmullRom => {
+                hessian(grid, &[0, 1, 2].map(|a| Stencil::catmull_rom(inside[a], grid.dims[a])))
+            }
+        };
+        let keep = DMat3::from_diagonal(DVec3::select(self.is_between(u, inside), DVec3::ONE, DVec3::ZERO));
         let inverse = self.lattice_from_object;
-        inverse.transpose() * (self.jet::<2>(p).hessian * self.sign) * inverse
+        inverse.transpose() * (keep * lattice * keep * self.sign) * inverse
     }
 
     fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> {

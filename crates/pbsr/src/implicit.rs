@@ -51,13 +51,14 @@ impl ImplicitSurface<'_> {
         in_box && self.field.in_domain(p) && self.inside.is_none_or(|inside| inside(p))
     }
 
-    /// Whether the field's bound or domain shows that a cube holds no piece of the surface, and whether it does or there is
-    /// a bound.
+    /// Whether box, domain or the field's bound show that a cube holds no piece of the surface, and whether they do or there
+    /// is a bound.
     pub(crate) fn excludes(&self, corner: DVec3, side: f64) -> (bool, bool) {
         let half = 0.5 * side;
         // √3 rounded up: the ball must hold the cube.
         let radius = half * 1.732_050_807_568_878;
-        if !self.field.may_be_in_domain(corner + half, radius) {
+        let beside = corner.cmpgt(self.max).any() || (corner + side).cmplt(self.min).any();
+        if beside || !self.field.may_be_in_domain(corner + half, radius) {
             return (true, true);
         }
         let bound = self.field.bound(corner + half, radius);

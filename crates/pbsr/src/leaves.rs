@@ -44,7 +44,7 @@ const STEEPEST: f64 = 2.5;
 /// none is.
 const LEVELS: u32 = 5;
 const GRAPH_LEVELS: u32 = 2;
-const LEAVES: usize = 1 << 17;
+const LEAVES: usize = 1 << 18;
 
 /// Places in a cube where the gradient is looked at beside its corners, on no lattice.
 const INSIDE: [DVec3; 4] = [
@@ -120,10 +120,16 @@ impl Leaf {
         let (mut cubes, mut side) = (cells.active.clone(), cells.side);
         for level in 0..=LEVELS {
             let looks: Vec<Look> = cubes.par_iter().map(|corner| look(surface, *corner, side)).collect();
-            let error = if level < GRAPH_LEVELS { GOOD } else { USABLE };
-            let poor = looks.iter().filter(|l| l.is_poor(error)).count();
+            let poor = |error: f64| looks.iter().filter(|l| l.is_poor(error)).count();
+            let some = looks.iter().filter(|l| !matches!(l, Look::Empty)).count();
             // A surface meets four in eight cubes or so.
-            let divide = level < LEVELS && leaves.len() + 4 * poor <= LEAVES;
+            let room = |error: f64| if error == GOOD { LEAVES / 2 } else { LEAVES };
+            let fits = |error: &f64| level < LEVELS && leaves.len() + some + 3 * poor(*error) <= room(*error);
+            // Where graphs would become too many, open leaves alone are divided: their lines cost the most.
+            let wanted = [GOOD, USABLE].into_iter().skip(usize::from(level >= GRAPH_LEVELS));
+            let error = wanted.into_iter().find(fits).unwrap_or(f64::INFINITY);
+            let divide = error < f64::INFINITY;
+            let poor = poor(error);
             let all = || cubes.iter().zip(&looks).map(|(corner, look)| (*corner, look));
             let kept = all().filter(|(_, look)| !(divide && look.is_poor(error)));
             leaves.extend(kept.filter_map(|(corner, look)| look.leaf(corner, side)));
@@ -253,7 +259,8 @@ fn look(surface: &ImplicitSurface<'_>, corner: DVec3, side: f64) -> Look {
     if above || below {
         return Look::Empty;
     }
-    let foot = foot(surface, corner + 0.5 * side, side).filter(|(_, gradient)| steady(*gradient));
+    let foot = foot(surface, (corner + 0.5 * side).clamp(surface.min, surface.max), side)
+        .filter(|(_, gradient)| steady(*gradient));
     let graph = foot.and_then(|(foot, gradient)| Graph::new(surface, corner, side, foot, gradient, &steady));
     graph.map_or(Look::Unknown, |(graph, error)| Look::Graph(graph, error))
 }

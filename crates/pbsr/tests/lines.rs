@@ -154,8 +154,12 @@ fn pb09_double_roots_are_found_where_lines_touch_them() {
     let sampler = LineSampler::new(&boxed(&Field::Double, 1.1), 24, &params(0.5, 1e-4), None).unwrap();
     let all = positions(&sampler, 0);
     assert!(all.iter().all(|p| (p.length() - 1.0).abs() < 1e-4), "all on the sphere");
-    let area = sampler.report().area;
-    assert!((area / (4.0 * PI) - 1.0).abs() < 0.03, "{:?}", sampler.report());
+    let expected = 4.0 * PI * 0.5f64.ln().abs() / 1e-4;
+    assert!((all.len() as f64 - expected).abs() < 6.0 * expected.sqrt(), "{} for {expected}", all.len());
+    let report = sampler.report();
+    // The survey's roots are few.
+    let spread = 4.0 / (report.roots as f64).sqrt();
+    assert!((report.area / (4.0 * PI) - 1.0).abs() < spread, "{report:?}");
 }
 
 #[test]

@@ -4,25 +4,39 @@ use super::stencil::{Control, Stencil};
 use splat_core::Grid;
 use splat_core::glam::{DMat3, DVec3};
 
-/// Value and derivatives with respect to lattice coordinates; those above the order asked for are 0.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Jet {
-    pub(super) value: f64,
-    pub(super) gradient: DVec3,
-    pub(super) hessian: DMat3,
-}
+/// Value and gradient with respect to lattice coordinates.
+pub(super) type Slope = (f64, DVec3);
 
 /// The values that three lists of indices choose, [k][j][i].
+#[inline(always)]
 fn gather<const N: usize>(grid: &Grid, index: [&[usize; N]; 3]) -> [[[f64; N]; N]; N] {
     let [nx, ny, _] = grid.dims;
-    std::array::from_fn(|k| {
-        std::array::from_fn(|j| {
+    let first = index[0][0];
+    // Off the border values lie side by side.
+    let whole = index[0][N - 1] == first + N - 1;
+    let mut block = [[[0.0; N]; N]; N];
+    // Loops: what closures do would not be compiled for the instruction set at hand.
+    for k in 0..N {
+        for j in 0..N {
             let row = &grid.values[(index[2][k] * ny + index[1][j]) * nx..][..nx];
-            std::array::from_fn(|i| f64::from(row[index[0][i]]))
-        })
-    })
+            match row[first..].first_chunk::<N>() {
+                Some(values) if whole => {
+                    for i in 0..N {
+                        block[k][j][i] = f64::from(values[i]);
+                    }
+                }
+                _ => {
+                    for i in 0..N {
+                        block[k][j][i] = f64::from(row[index[0][i]]);
+                    }
+                }
+            }
+        }
+    }
+    block
 }
 
+#[inline(always)]
 fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     let mut sum = a[0] * b[0];
     for i in 1..N {
@@ -31,39 +45,44 @@ fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     sum
 }
 
-/// Sums `block` against the stencils of the three axes, derivatives up to order `D` ≤ 2 in all.
-pub(super) fn jet<const N: usize, const D: usize>(grid: &Grid, at: &[Stencil<N>; 3]) -> Jet {
+/// Value and gradient. Rows along x stay whole to the end: their `N` sums are made side by side.
+#[inline(always)]
+pub(super) fn slope<const N: usize>(grid: &Grid, at: &[Stencil<N>; 3]) -> Slope {
     let block = gather(grid, [&at[0].index, &at[1].index, &at[2].index]);
-    // Entry [a][b][c]: derived a times along x, b along y, c along z.
-    let mut sum = [[[0.0; 3]; 3]; 3];
+    let [along, y, z] = at.each_ref().map(|a| &a.weight);
+    let (mut value, mut by_y, mut by_z) = ([0.0; N], [0.0; N], [0.0; N]);
     for k in 0..N {
-        let mut plane = [[0.0; 3]; 3];
+        let (mut plane, mut derived) = ([0.0; N], [0.0; N]);
         for j in 0..N {
-            for a in 0..=D {
-                let row = dot(&block[k][j], &at[0].weight[a]);
-                for b in 0..=D - a {
-                    plane[a][b] += row * at[1].weight[b][j];
-                }
+            for i in 0..N {
+                plane[i] += block[k][j][i] * y[0][j];
+                derived[i] += block[k][j][i] * y[1][j];
             }
         }
-        for a in 0..=D {
-            for b in 0..=D - a {
-                for c in 0..=D - a - b {
-                    sum[a][b][c] += plane[a][b] * at[2].weight[c][k];
-                }
-            }
+        for i in 0..N {
+            value[i] += plane[i] * z[0][k];
+            by_y[i] += derived[i] * z[0][k];
+            by_z[i] += plane[i] * z[1][k];
         }
     }
-    let (xy, yz, zx) = (sum[1][1][0], sum[0][1][1], sum[1][0][1]);
-    Jet {
-        value: sum[0][0][0],
-        gradient: DVec3::new(sum[1][0][0], sum[0][1][0], sum[0][0][1]),
-        hessian: DMat3::from_cols(
-            DVec3::new(sum[2][0][0], xy, zx),
-            DVec3::new(xy, sum[0][2][0], yz),
-            DVec3::new(zx, yz, sum[0][0][2]),
-        ),
-    }
+    let [x, derived] = [&along[0], &along[1]];
+    (dot(&value, x), DVec3::new(dot(&value, derived), dot(&by_y, x), dot(&by_z, x)))
+}
+
+/// Second derivatives with respect to lattice coordinates.
+pub(super) fn hessian<const N: usize>(grid: &Grid, at: &[Stencil<N>; 3]) -> DMat3 {
+    let block = gather(grid, [&at[0].index, &at[1].index, &at[2].index]);
+    let sum = |times: [usize; 3]| {
+        let [x, y, z] = [0, 1, 2].map(|a| &at[a].weight[times[a]]);
+        let row = |k: usize, j: usize| dot(&block[k][j], x) * y[j] * z[k];
+        (0..N).map(|k| (0..N).map(|j| row(k, j)).sum::<f64>()).sum::<f64>()
+    };
+    let (xy, yz, zx) = (sum([1, 1, 0]), sum([0, 1, 1]), sum([1, 0, 1]));
+    DMat3::from_cols(
+        DVec3::new(sum([2, 0, 0]), xy, zx),
+        DVec3::new(xy, sum([0, 2, 0]), yz),
+        DVec3::new(zx, yz, sum([0, 0, 2])),
+    )
 }
 
 /// Least and greatest control point on a stretch of one cell; the interpolation stays between them.

@@ -24,6 +24,7 @@ pub(super) struct Control<const N: usize> {
 }
 
 /// The cell of a coordinate in 0 ..= n − 1 and the place within it, 0 to 1.
+#[inline(always)]
 fn cell_of(u: f64, n: usize) -> (usize, f64) {
     if n < 2 {
         return (0, 0.0);
@@ -34,6 +35,7 @@ fn cell_of(u: f64, n: usize) -> (usize, f64) {
 
 impl Stencil<2> {
     /// Linear interpolation at lattice coordinate `u`, which lies in 0 ..= n − 1.
+    #[inline(always)]
     pub(super) fn linear(u: f64, n: usize) -> Self {
         let (cell, t) = cell_of(u, n);
         let slope = if n < 2 { [0.0; 2] } else { [-1.0, 1.0] };
@@ -43,6 +45,7 @@ impl Stencil<2> {
 
 impl Stencil<4> {
     /// Catmull-Rom interpolation at lattice coordinate `u`, which lies in 0 ..= n − 1.
+    #[inline(always)]
     pub(super) fn catmull_rom(u: f64, n: usize) -> Self {
         let (cell, t) = cell_of(u, n);
         if n < 2 {
@@ -61,7 +64,7 @@ impl Stencil<4> {
             0.5 * t * (3.0 * t - 2.0),
         ];
         let second = [2.0 - 3.0 * t, 9.0 * t - 5.0, 4.0 - 9.0 * t, 3.0 * t - 1.0];
-        Self { index: indices(cell, n), weight: [value, first, second].map(|w| fold(w, cell, n)) }
+        Self { index: indices(cell, n), weight: [fold(value, cell, n), fold(first, cell, n), fold(second, cell, n)] }
     }
 }
 
@@ -92,11 +95,13 @@ fn blossom(r: f64, s: f64, t: f64) -> [f64; 4] {
 }
 
 /// The four values around a cell, none outside the lattice.
+#[inline(always)]
 fn indices(cell: usize, n: usize) -> [usize; 4] {
     [cell.saturating_sub(1), cell, cell + 1, (cell + 2).min(n - 1)]
 }
 
 /// Gives the weights of ghosts to the two values that extrapolate to them.
+#[inline(always)]
 fn fold(mut w: [f64; 4], cell: usize, n: usize) -> [f64; 4] {
     if cell == 0 {
         w = [0.0, w[1] + 2.0 * w[0], w[2] - w[0], w[3]];
