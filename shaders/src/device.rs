@@ -1,6 +1,7 @@
 //! What an executor takes and gives: the same words whichever interface it drives.
 
-use crate::{BufferId, Fault};
+use crate::{BufferId, Fault, Recording};
+use std::fmt::Debug;
 
 /// What stands behind an adapter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,6 +52,8 @@ pub enum Choice {
     Software,
     /// The first adapter whose name contains this, whatever it is.
     Named(String),
+    /// The adapter in this place of the list that a backend gives, whatever it is.
+    Place(usize),
 }
 
 impl Choice {
@@ -66,6 +69,7 @@ impl Choice {
             Self::Gpu => (0..adapters.len()).filter_map(|i| Some((rank(adapters[i].kind)?, i))).min().map(|(_, i)| i),
             Self::Software => adapters.iter().position(|a| a.kind == AdapterKind::Software),
             Self::Named(part) => adapters.iter().position(|a| a.name.contains(part)),
+            Self::Place(at) => Some(*at).filter(|at| *at < adapters.len()),
         }
     }
 }
@@ -108,6 +112,60 @@ impl Run {
     pub fn bytes(&self, buffer: BufferId) -> &[u8] {
         self.reads.iter().find(|(of, _)| *of == buffer).map_or(&[], |(_, bytes)| bytes)
     }
+}
+
+/// A way to devices: lists them and opens one. Each executor has one; whoever renders takes any.
+pub trait Backend: Debug + Send + Sync {
+    /// Its name, as users write it.
+    fn name(&self) -> &'static str;
+
+    /// Every adapter that it reaches, software drivers included.
+    ///
+    /// # Errors
+    /// [`DeviceError::NoDevice`] where there is no such interface, [`DeviceError::Driver`] when a driver fails.
+    fn adapters(&self) -> Result<Vec<Adapter>, DeviceError>;
+
+    /// Opens the chosen adapter.
+    ///
+    /// # Errors
+    /// [`DeviceError::NoDevice`] when there is none, [`DeviceError::Driver`] when the driver refuses.
+    fn open(&self, choice: &Choice, validation: Validation) -> Result<Box<dyn Executor>, DeviceError>;
+}
+
+/// An opened device.
+pub trait Executor: Send {
+    /// The adapter that was opened.
+    fn adapter(&self) -> &Adapter;
+
+    /// Makes a recording ready to run.
+    ///
+    /// # Errors
+    /// [`DeviceError::Recording`] for a recording at fault, [`DeviceError::TooLarge`], [`DeviceError::Memory`],
+    /// [`DeviceError::Lost`], [`DeviceError::Driver`].
+    fn prepare(&mut self, recording: &Recording) -> Result<Box<dyn Ready>, DeviceError>;
+
+    /// Prepares a recording and runs it once.
+    ///
+    /// # Errors
+    /// As [`Executor::prepare`] and [`Ready::run`].
+    fn run(&mut self, recording: &Recording, inputs: &Inputs<'_>) -> Result<Run, DeviceError> {
+        self.prepare(recording)?.run(inputs)
+    }
+
+    /// What validation said to this device since the last call; nothing where it speaks elsewhere.
+    fn take_messages(&self) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+/// A recording that is ready to run, as often as one likes.
+pub trait Ready: Send {
+    /// Uploads the inputs, runs the steps, waits, and gives what they read back. An input that is not given keeps its
+    /// bytes of the run before, zeros at first; so does what lies beyond a shorter one.
+    ///
+    /// # Errors
+    /// [`DeviceError::Input`] for bytes that do not fit, [`DeviceError::Lost`], [`DeviceError::Driver`].
+    fn run(&mut self, inputs: &Inputs<'_>) -> Result<Run, DeviceError>;
 }
 
 /// Why a device could not do it.
@@ -185,5 +243,6 @@ mod tests {
         assert_eq!(Choice::Gpu.pick(&all[..3]), Some(1));
         assert_eq!(Choice::Software.pick(&all), Some(0));
         assert_eq!(Choice::Named("mal".to_owned()).pick(&all), Some(1));
+        assert_eq!([Choice::Place(3).pick(&all), Choice::Place(4).pick(&all)], [Some(3), None]);
     }
 }

@@ -33,7 +33,9 @@ mod snapshot;
 
 pub use barriers::{Barrier, Use, barriers};
 pub use check::Fault;
-pub use device::{Adapter, AdapterKind, Choice, DeviceError, Inputs, PassTime, Run, Validation};
+pub use device::{
+    Adapter, AdapterKind, Backend, Choice, DeviceError, Executor, Inputs, PassTime, Ready, Run, Validation,
+};
 pub use kernels::{Access, Kernel};
 pub use layout::{Field, GlslType, Layout};
 pub use recording::{Buffer, BufferId, Dispatch, Groups, Recording, Step};

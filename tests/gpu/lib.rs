@@ -6,35 +6,41 @@
 
 mod listen;
 
-use splat_shaders::{Choice, DeviceError, Inputs, Recording, Run, Validation};
+use splat_shaders::{Backend, Choice, DeviceError, Executor, Inputs, Ready, Recording, Run, Validation};
+use std::sync::Arc;
 
-/// A device by one of the executors.
-pub enum Device {
-    /// By `gpu-ash`.
-    Ash(Box<gpu_ash::Device>),
-    /// By `gpu-wgpu`.
-    Wgpu(Box<gpu_wgpu::Device>),
-}
-
-/// A prepared recording of one of the executors.
-pub enum Prepared {
-    /// By `gpu-ash`.
-    Ash(Box<gpu_ash::Prepared>),
-    /// By `gpu-wgpu`.
-    Wgpu(Box<gpu_wgpu::Prepared>),
+/// A device by the executor that the environment names.
+pub struct Device {
+    executor: Box<dyn Executor>,
 }
 
 fn unknown(word: &str) -> DeviceError {
     DeviceError::NoDevice { why: format!("unknown word {word}") }
 }
 
-fn environment() -> Result<(Choice, Validation), DeviceError> {
-    let choice = std::env::var("ORGANZA_ADAPTER").map_or(Choice::Software, Choice::Named);
+fn validation() -> Result<Validation, DeviceError> {
     match std::env::var("ORGANZA_VALIDATION").as_deref() {
-        Err(_) | Ok("synchronization") => Ok((choice, Validation::Synchronization)),
-        Ok("gpu-assisted") => Ok((choice, Validation::GpuAssisted)),
+        Err(_) | Ok("synchronization") => Ok(Validation::Synchronization),
+        Ok("gpu-assisted") => Ok(Validation::GpuAssisted),
         Ok(word) => Err(unknown(word)),
     }
+}
+
+/// The way to devices that the environment names.
+///
+/// # Errors
+/// [`DeviceError::NoDevice`] for an unknown word.
+pub fn backend() -> Result<Arc<dyn Backend>, DeviceError> {
+    match std::env::var("ORGANZA_EXECUTOR").as_deref() {
+        Err(_) | Ok("ash") => Ok(gpu_ash::backend()),
+        Ok("wgpu") => Ok(gpu_wgpu::backend()),
+        Ok(word) => Err(unknown(word)),
+    }
+}
+
+/// The adapter that the environment names.
+pub fn adapter() -> Choice {
+    std::env::var("ORGANZA_ADAPTER").map_or(Choice::Software, Choice::Named)
 }
 
 /// Opens the adapter that the environment names by the executor that it names, watched as it says.
@@ -42,15 +48,8 @@ fn environment() -> Result<(Choice, Validation), DeviceError> {
 /// # Errors
 /// Those of the executor; [`DeviceError::NoDevice`] for an unknown word.
 pub fn open() -> Result<Device, DeviceError> {
-    match std::env::var("ORGANZA_EXECUTOR").as_deref() {
-        Err(_) | Ok("ash") => Ok(Device::Ash(Box::new(open_ash()?))),
-        Ok("wgpu") => {
-            listen::begin();
-            let (choice, validation) = environment()?;
-            Ok(Device::Wgpu(Box::new(gpu_wgpu::Device::open(&choice, validation)?)))
-        }
-        Ok(word) => Err(unknown(word)),
-    }
+    listen::begin();
+    Ok(Device { executor: backend()?.open(&adapter(), validation()?)? })
 }
 
 /// The same by `gpu-ash`, whatever executor is named.
@@ -58,8 +57,7 @@ pub fn open() -> Result<Device, DeviceError> {
 /// # Errors
 /// As [`open`].
 pub fn open_ash() -> Result<gpu_ash::Device, DeviceError> {
-    let (choice, validation) = environment()?;
-    gpu_ash::Device::open(&choice, validation)
+    gpu_ash::Device::open(&adapter(), validation()?)
 }
 
 impl Device {
@@ -67,11 +65,8 @@ impl Device {
     ///
     /// # Errors
     /// As the executor's.
-    pub fn prepare(&mut self, recording: &Recording) -> Result<Prepared, DeviceError> {
-        Ok(match self {
-            Self::Ash(device) => Prepared::Ash(Box::new(device.prepare(recording)?)),
-            Self::Wgpu(device) => Prepared::Wgpu(Box::new(device.prepare(recording)?)),
-        })
+    pub fn prepare(&mut self, recording: &Recording) -> Result<Box<dyn Ready>, DeviceError> {
+        self.executor.prepare(recording)
     }
 
     /// As the executor's.
@@ -79,28 +74,14 @@ impl Device {
     /// # Errors
     /// As the executor's.
     pub fn run(&mut self, recording: &Recording, inputs: &Inputs<'_>) -> Result<Run, DeviceError> {
-        self.prepare(recording)?.run(inputs)
+        self.executor.run(recording, inputs)
     }
 
     /// What validation said since the last call, to this device or, by wgpu, to any.
     pub fn take_messages(&self) -> Vec<String> {
-        match self {
-            Self::Ash(device) => device.take_messages(),
-            Self::Wgpu(_) => listen::take(),
-        }
-    }
-}
-
-impl Prepared {
-    /// As the executor's.
-    ///
-    /// # Errors
-    /// As the executor's.
-    pub fn run(&mut self, inputs: &Inputs<'_>) -> Result<Run, DeviceError> {
-        match self {
-            Self::Ash(prepared) => prepared.run(inputs),
-            Self::Wgpu(prepared) => prepared.run(inputs),
-        }
+        let mut messages = self.executor.take_messages();
+        messages.extend(listen::take());
+        messages
     }
 }
 

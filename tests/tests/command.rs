@@ -159,12 +159,28 @@ fn exit_5_bi26_limits_are_checked_before_the_work() {
 #[test]
 fn exit_6_is_for_the_gpu() {
     let place = place();
-    place.expect(6, &["render", "s.toml", "--backend", "wgpu"], "--backend wgpu is not in this version");
-    let missing = ["render", "s.toml", "--backend", "ash", "--device", "no such device"];
-    place.expect(6, &missing, "--backend ash: no such device");
+    for backend in ["ash", "wgpu", "auto"] {
+        let missing = ["render", "s.toml", "--backend", backend, "--device", "no such device"];
+        place.expect(6, &missing, &format!("error: --backend {backend}: "));
+        let elsewhere = format!("--backend {backend} is for `organza render`");
+        place.expect(2, &["explain", "s.toml", "--backend", backend], &elsewhere);
+    }
     place.expect(2, &["render", "s.toml", "--device", "x"], "--device names a GPU, and the processor was asked for");
-    place.expect(2, &["explain", "s.toml", "--backend", "ash"], "--backend ash is for `organza render`");
     assert!(place.made().is_empty());
+}
+
+#[test]
+fn exit_0_any_gpu_there_is_or_none_gives_the_processor_s_picture() {
+    let place = place();
+    place.expect(0, &["render", "s.toml", "-o", "cpu.png"], "");
+    let out = place.expect(0, &["render", "s.toml", "--backend", "auto", "-o", "auto.png", "--json"], "");
+    let bytes = |name: &str| fs::read(place.path(name)).unwrap();
+    assert_eq!(bytes("cpu.png"), bytes("auto.png"));
+    // Nobody is left in doubt who drew.
+    let document = json_of(&out);
+    let alone = document["backend"] == "cpu";
+    assert_eq!(alone, String::from_utf8_lossy(&out.stderr).contains("warning: no GPU helps"));
+    assert_eq!(alone, document["warnings"][0].as_str().is_some_and(|w| w.ends_with("the processor draws alone")));
 }
 
 #[cfg(unix)]

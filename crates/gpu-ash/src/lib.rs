@@ -28,6 +28,7 @@
 //! ```
 
 mod adapters;
+mod backend;
 mod commands;
 mod device;
 mod failure;
@@ -37,6 +38,7 @@ mod pipeline;
 mod prepared;
 
 pub use adapters::adapters;
+pub use backend::backend;
 pub use device::Device;
 pub use prepared::Prepared;
 pub use splat_shaders::{Adapter, AdapterKind, Choice, DeviceError, Inputs, PassTime, Run, Validation};

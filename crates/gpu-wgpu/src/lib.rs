@@ -16,10 +16,12 @@
 #![forbid(unsafe_code)]
 
 mod adapters;
+mod backend;
 mod device;
 mod prepared;
 
 pub use adapters::adapters;
+pub use backend::backend;
 pub use device::Device;
 pub use prepared::Prepared;
 pub use splat_shaders::{Adapter, AdapterKind, Choice, DeviceError, Inputs, PassTime, Run, Validation};

@@ -1,137 +1,115 @@
 //! The GPU beside the processor: the passes that have a recording run there when the user asks for it.
 //!
 //! Today that is the order of translucent splats (`hbsort::gpu`), in exact mode. Whatever the device cannot do the
-//! processor does, with one line said: the picture is the same, bit for bit.
+//! processor does, with one line said: the picture is the same, bit for bit. A device that would round otherwise than
+//! the processor is found out by a trial before it is used.
+
+mod helper;
+mod order;
+mod trial;
 
 use crate::Error;
-use hbsort::gpu::{Capacities, record};
-use hbsort::{Params, SliceOrder};
-use splat_core::{Camera, Cloud};
-use splat_shaders::{Adapter, Choice, DeviceError};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+pub(crate) use helper::Helper;
+use splat_shaders::{Adapter, Backend, Choice, DeviceError};
+use std::sync::Arc;
 
-/// What can be asked to compute beside the processor, software drivers included. No driver at all is no error.
+/// Which device helps the processor.
+#[derive(Debug, Clone)]
+pub struct DeviceChoice {
+    /// The ways to devices; the first that opens one which keeps the picture is taken.
+    pub backends: Vec<Arc<dyn Backend>>,
+    /// Which of a backend's devices.
+    pub choice: Choice,
+    /// Without such a device the processor draws alone, with one line said; else that is [`Error::Gpu`].
+    pub or_processor: bool,
+}
+
+impl DeviceChoice {
+    /// A device by Vulkan, through `gpu-ash`.
+    pub fn ash(choice: Choice) -> Self {
+        Self { backends: vec![gpu_ash::backend()], choice, or_processor: false }
+    }
+
+    /// A device by wgpu, through `gpu-wgpu`.
+    pub fn wgpu(choice: Choice) -> Self {
+        Self { backends: vec![gpu_wgpu::backend()], choice, or_processor: false }
+    }
+
+    /// A device by either, Vulkan first. Without a name it is a real GPU, and where there is none, the processor.
+    pub fn auto(name: Option<String>) -> Self {
+        let or_processor = name.is_none();
+        Self { backends: backends(), choice: name.map_or(Choice::Gpu, Choice::Named), or_processor }
+    }
+
+    /// The names of the backends, as users write them.
+    fn names(&self) -> String {
+        match &self.backends[..] {
+            [one] => one.name().to_owned(),
+            _ => "auto".to_owned(),
+        }
+    }
+}
+
+/// What can be asked to compute beside the processor.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ListedDevice {
+    /// The backend that reaches it: `ash` or `wgpu`.
+    pub backend: &'static str,
+    /// The device.
+    pub adapter: Adapter,
+}
+
+/// Every device by every backend, software drivers included. No driver at all is no error.
 ///
 /// # Errors
 /// [`Error::Gpu`] when a driver fails.
-pub fn devices() -> Result<Vec<Adapter>, Error> {
-    match gpu_ash::adapters() {
-        Ok(adapters) => Ok(adapters),
-        Err(DeviceError::NoDevice { .. }) => Ok(Vec::new()),
-        Err(e) => Err(fault(&e)),
+pub fn devices() -> Result<Vec<ListedDevice>, Error> {
+    let mut all = Vec::new();
+    for backend in backends() {
+        let name = backend.name();
+        let found = match backend.adapters() {
+            Err(DeviceError::NoDevice { .. }) => Vec::new(),
+            found => found.map_err(|e| fault(name, &e.to_string()))?,
+        };
+        all.extend(found.into_iter().map(|adapter| ListedDevice { backend: name, adapter }));
     }
+    Ok(all)
 }
 
-fn fault(e: &DeviceError) -> Error {
+/// Every backend of this version, the preferred first.
+fn backends() -> Vec<Arc<dyn Backend>> {
+    vec![gpu_ash::backend(), gpu_wgpu::backend()]
+}
+
+fn fault(name: &str, why: &str) -> Error {
     let hint = "`organza devices` lists what there is; --backend cpu needs none".into();
-    Error::Gpu { message: format!("--backend ash: {e}"), hint }
+    Error::Gpu { message: format!("--backend {name}: {why}"), hint }
 }
 
-/// An opened device and what was said about it.
-pub(crate) struct Helper {
-    choice: Choice,
-    /// `None` once it was given up.
-    device: Mutex<Option<gpu_ash::Device>>,
-    said: Mutex<Vec<String>>,
-    name: String,
-}
-
-fn held<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-impl Helper {
-    /// Opens the device that was asked for; whoever asks for one gets it or an error.
-    pub(crate) fn open(choice: &Choice) -> Result<Self, Error> {
-        let device = gpu_ash::Device::open(choice, gpu_ash::Validation::Off).map_err(|e| fault(&e))?;
-        let name = device.adapter().name.clone();
-        Ok(Self { choice: choice.clone(), device: Mutex::new(Some(device)), said: Mutex::default(), name })
-    }
-
-    /// The backend that drew, as metadata and reports name it.
-    pub(crate) fn name(&self) -> String {
-        if held(&self.device).is_some() { format!("ash, {}", self.name) } else { "cpu".to_owned() }
-    }
-
-    /// What a user should know, one sentence each.
-    pub(crate) fn said(self) -> Vec<String> {
-        self.said.into_inner().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// The exact order of some splats, or `None` for the processor to find it. A lost device is opened once more.
-    pub(crate) fn order(&self, cloud: &Cloud, ids: &[u32], camera: &Camera, params: &Params) -> Option<SliceOrder> {
-        if !params.exact {
-            self.say("slices without order inside (render.points.exact = false) are made by the processor");
-            return None;
-        }
-        let mut device = held(&self.device);
-        for attempt in 0..2 {
-            match order_on(device.as_mut()?, cloud, ids, camera, params) {
-                Ok(order) => return Some(order),
-                Err(Failure::Device(DeviceError::Lost)) if attempt == 0 => {
-                    *device = gpu_ash::Device::open(&self.choice, gpu_ash::Validation::Off).ok();
-                }
-                Err(why) => {
-                    self.say(&format!("{}: {why}; the processor goes on", self.name));
-                    break;
-                }
-            }
-        }
-        *device = None;
-        None
-    }
-
-    fn say(&self, what: &str) {
-        held(&self.said).push(what.to_owned());
-    }
-}
-
-/// Why the device did not give an order.
+/// Why a device did not do it.
 #[derive(Debug, thiserror::Error)]
 enum Failure {
     #[error(transparent)]
     Device(#[from] DeviceError),
     #[error(transparent)]
     Sort(#[from] hbsort::Error),
-}
-
-fn order_on(
-    device: &mut gpu_ash::Device,
-    cloud: &Cloud,
-    ids: &[u32],
-    camera: &Camera,
-    params: &Params,
-) -> Result<SliceOrder, Failure> {
-    let splats = ids.len() as u32;
-    let recorded = record(Capacities { splats, kept: splats });
-    let uploads = recorded.uploads(cloud, Some(ids), camera, params)?;
-    let run = device.run(&recorded.recording, &recorded.inputs(&uploads))?;
-    let reads = [recorded.state, recorded.keys, recorded.places].map(|buffer| run.bytes(buffer));
-    Ok(recorded.order(reads, cloud, Some(ids), params)?)
+    #[error("it rounds otherwise than the processor, so the picture would be another")]
+    Rounds,
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use splat_core::Projection;
-    use splat_core::glam::DVec3;
-
-    #[test]
-    fn where_no_device_is_left_the_processor_is_asked() {
-        let (device, said) = (Mutex::new(None), Mutex::default());
-        let helper = Helper { choice: Choice::Gpu, device, said, name: "gone".to_owned() };
-        let view = Projection::Perspective { fov_y: 1.0 };
-        let camera = Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, view, [8, 8]).expect("a camera");
-        let params = |exact| Params { exact, ..Params::default() };
-        assert_eq!(helper.order(&Cloud::new(DVec3::ZERO), &[], &camera, &params(true)), None);
-        assert_eq!(helper.order(&Cloud::new(DVec3::ZERO), &[], &camera, &params(false)), None);
-        assert_eq!(helper.name(), "cpu");
-        assert_eq!(helper.said().len(), 1);
-    }
 
     #[test]
     fn a_device_that_is_not_there_is_an_error_for_who_asked() {
-        let Err(error) = Helper::open(&Choice::Named("no such device".to_owned())) else { panic!("opened") };
-        assert_eq!(error.exit_code(), 6);
+        let name = || "no such device".to_owned();
+        let named = || Choice::Named(name());
+        let asked = [DeviceChoice::ash(named()), DeviceChoice::wgpu(named()), DeviceChoice::auto(Some(name()))];
+        for choice in asked {
+            let Err(error) = Helper::open(&choice) else { panic!("opened") };
+            assert_eq!(error.exit_code(), 6);
+            assert!(error.to_string().starts_with(&format!("--backend {}: ", choice.names())), "{error}");
+        }
     }
 }

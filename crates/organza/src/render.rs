@@ -1,6 +1,6 @@
 //! From a scene to images: load, plan, draw.
 
-use crate::device::Helper;
+use crate::device::{DeviceChoice, Helper};
 use crate::load::{Loaded, SplatCount, light_statistics, load_measured};
 use crate::particles::{self, Checkpoint, Kept};
 use crate::plan::{Plan, plan};
@@ -9,11 +9,10 @@ use crate::scene::{Scene, Technique};
 use crate::statistics::Statistics;
 use crate::{CostRecord, Error, Layers, Progress};
 use splat_core::{LayerData, LayerSet, Material};
-use splat_shaders::Choice;
 use std::path::PathBuf;
 
 /// What a render may take and how it treats doubtful input.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct RenderOptions {
     /// Bytes that all buffers together may take.
     pub max_memory: u64,
@@ -24,8 +23,8 @@ pub struct RenderOptions {
     /// File of the sums of the technique `particles`: read before, if it is there, and written every few seconds, at the
     /// end and at an interrupt. A render that is stopped at any moment goes on from it and ends in the same bits.
     pub checkpoint: Option<PathBuf>,
-    /// The device on which the passes run that can; `None`: the processor alone. Whoever names one gets it or an error.
-    pub device: Option<Choice>,
+    /// The device on which the passes run that can; `None`: the processor alone.
+    pub device: Option<DeviceChoice>,
 }
 
 impl Default for RenderOptions {

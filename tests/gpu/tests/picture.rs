@@ -1,7 +1,8 @@
 //! A whole picture with a device that helps: the processor's, bit for bit.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use organza::{Choice, Progress, Render, RenderOptions, render, scene};
+use gpu_conformance::adapter;
+use organza::{DeviceChoice, Progress, Render, RenderOptions, render, scene};
 
 const SCENE: &str = r#"
     version = 1
@@ -22,11 +23,12 @@ const SCENE: &str = r#"
     opacity = 0.5
 "#;
 
-fn adapter() -> Choice {
-    std::env::var("ORGANZA_ADAPTER").map_or(Choice::Software, Choice::Named)
+/// The device of the environment, by each executor.
+fn devices() -> [(&'static str, DeviceChoice); 2] {
+    [("ash, ", DeviceChoice::ash(adapter())), ("wgpu, ", DeviceChoice::wgpu(adapter()))]
 }
 
-fn picture(exact: bool, device: Option<Choice>) -> Render {
+fn picture(exact: bool, device: Option<DeviceChoice>) -> Render {
     let text = format!("{SCENE}\n[render.points]\nexact = {exact}\n");
     let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
     render(&scene, &RenderOptions { device, ..RenderOptions::default() }, &Progress::new()).unwrap()
@@ -34,11 +36,14 @@ fn picture(exact: bool, device: Option<Choice>) -> Render {
 
 #[test]
 fn a_picture_with_a_device_is_the_processor_s() {
-    let (alone, helped) = (picture(true, None), picture(true, Some(adapter())));
-    assert_eq!(alone.layers, helped.layers);
+    let alone = picture(true, None);
     assert_eq!(alone.backend, "cpu");
-    assert!(helped.backend.starts_with("ash, "), "{}", helped.backend);
-    assert_eq!(alone.warnings, helped.warnings);
+    for (name, device) in devices() {
+        let helped = picture(true, Some(device));
+        assert_eq!(alone.layers, helped.layers);
+        assert!(helped.backend.starts_with(name), "{}", helped.backend);
+        assert_eq!(alone.warnings, helped.warnings);
+    }
     // It is a picture of something.
     let alpha = alone.layers.scalar("alpha").unwrap();
     assert!(alpha.iter().any(|a| *a > 0.5) && alpha.contains(&0.0));
@@ -46,7 +51,30 @@ fn a_picture_with_a_device_is_the_processor_s() {
 
 #[test]
 fn what_a_device_cannot_do_is_said_and_done_by_the_processor() {
-    let (alone, helped) = (picture(false, None), picture(false, Some(adapter())));
-    assert_eq!(alone.layers, helped.layers);
-    assert!(helped.warnings.iter().any(|w| w.contains("made by the processor")), "{:?}", helped.warnings);
+    let alone = picture(false, None);
+    for (_, device) in devices() {
+        let helped = picture(false, Some(device));
+        assert_eq!(alone.layers, helped.layers);
+        assert!(helped.warnings.iter().any(|w| w.contains("made by the processor")), "{:?}", helped.warnings);
+    }
+}
+
+#[test]
+fn a_driver_that_plays_a_gpu_is_never_taken_silently() {
+    let drivers = organza::devices().unwrap();
+    assert!(drivers.iter().any(|d| d.backend == "ash") && drivers.iter().any(|d| d.backend == "wgpu"));
+    if drivers.iter().any(|d| d.adapter.kind.is_gpu()) {
+        return;
+    }
+    let helped = picture(true, Some(DeviceChoice::auto(None)));
+    assert_eq!(helped.backend, "cpu");
+    assert!(
+        helped.warnings.iter().any(|w| w.starts_with("no GPU helps (ash: no such device")),
+        "{:?}",
+        helped.warnings
+    );
+    assert_eq!(helped.layers, picture(true, None).layers);
+    // By name it is.
+    let named = picture(true, Some(DeviceChoice::auto(Some(drivers[0].adapter.name.clone()))));
+    assert!(named.backend.starts_with("ash, "), "{}", named.backend);
 }

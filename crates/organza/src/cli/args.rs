@@ -26,7 +26,7 @@ pub(super) enum Command {
     Orders(OrdersArguments),
     /// Describes a data file or a scene.
     Info(InfoArguments),
-    /// Lists the GPUs that --backend ash can use, and the drivers that play one.
+    /// Lists the GPUs that --backend can use, and the drivers that play one.
     Devices(DevicesArguments),
     /// Prints the JSON Schema of scene files.
     Schema,
@@ -59,9 +59,9 @@ pub(super) struct SceneArguments {
     #[arg(long, value_name = "NAME")]
     pub(super) technique: Option<String>,
     /// What computes
-    #[arg(long, value_enum, default_value_t = Backend::Auto)]
+    #[arg(long, value_enum, default_value_t = Backend::Cpu)]
     pub(super) backend: Backend,
-    /// Part of the name of the device for --backend ash [default: the best GPU, never a software driver]
+    /// Part of the name of the GPU for --backend auto, ash or wgpu [default: the best, never a software driver]
     #[arg(long, value_name = "NAME")]
     pub(super) device: Option<String>,
     /// Size of the picture, pixels
@@ -191,14 +191,26 @@ pub(super) struct DevicesArguments {
 /// What computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Backend {
-    /// The processor, until a GPU has been measured to be faster
+    /// A real GPU, where there is one, helps as by `ash` or `wgpu`; else the processor draws alone
     Auto,
     /// The processor
     Cpu,
-    /// A GPU by wgpu; not in this version
+    /// A GPU by wgpu helps as by `ash`
     Wgpu,
     /// A GPU by Vulkan orders the translucent splats, the processor does the rest
     Ash,
+}
+
+impl Backend {
+    /// As the user writes it.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Cpu => "cpu",
+            Self::Wgpu => "wgpu",
+            Self::Ash => "ash",
+        }
+    }
 }
 
 /// Frames to draw.

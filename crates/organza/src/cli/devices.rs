@@ -2,10 +2,10 @@
 
 use super::args::DevicesArguments;
 use super::console;
-use organza::{Adapter, AdapterKind, Error, escape_controls};
+use organza::{Adapter, AdapterKind, Error, ListedDevice, escape_controls};
 use serde_json::json;
 
-/// Lists the devices that `--backend ash` can use.
+/// Lists the devices that `--backend` can use.
 pub(super) fn run(arguments: &DevicesArguments) -> Result<(), Error> {
     let devices = organza::devices()?;
     console::out(&if arguments.json { document(&devices) } else { text(&devices) })
@@ -21,30 +21,35 @@ fn kind(adapter: &Adapter) -> &'static str {
     }
 }
 
-fn text(devices: &[Adapter]) -> String {
+fn text(devices: &[ListedDevice]) -> String {
     if devices.is_empty() {
         return "no GPU: no Vulkan driver was found; the processor computes\n".to_owned();
     }
-    let line = |adapter: &Adapter| {
+    let line = |device: &ListedDevice| {
+        let ListedDevice { backend, adapter } = device;
         let use_ = if adapter.kind.is_gpu() { "" } else { ", used only with --device" };
-        let mib = adapter.memory_bytes >> 20;
-        let Adapter { name, driver, .. } = adapter;
-        let line = format!("{name}: {}, {mib} MiB, {driver}{use_}", kind(adapter));
+        let memory = match adapter.memory_bytes >> 20 {
+            0 => String::new(),
+            mib => format!("{mib} MiB, "),
+        };
+        let line = format!("{backend}: {}: {}, {memory}{}{use_}", adapter.name, kind(adapter), adapter.driver);
         format!("{}\n", escape_controls(&line))
     };
     devices.iter().map(line).collect()
 }
 
-fn document(devices: &[Adapter]) -> String {
-    let each = devices.iter().map(|adapter| {
+fn document(devices: &[ListedDevice]) -> String {
+    let each = devices.iter().map(|ListedDevice { backend, adapter }| {
         json!({
+            "backend": backend,
             "name": adapter.name,
             "kind": kind(adapter),
             "gpu": adapter.kind.is_gpu(),
             "driver": adapter.driver,
-            "memory_bytes": adapter.memory_bytes,
+            // What a backend does not say is null.
+            "memory_bytes": Some(adapter.memory_bytes).filter(|bytes| *bytes > 0),
             "binding_bytes": adapter.binding_bytes,
-            "subgroup": adapter.subgroup,
+            "subgroup": Some(adapter.subgroup).filter(|threads| *threads > 0),
         })
     });
     format!("{:#}\n", json!({ "devices": each.collect::<serde_json::Value>() }))
@@ -56,20 +61,19 @@ mod tests {
 
     #[test]
     fn a_software_driver_is_named_as_one() {
-        let adapter = |name: &str, kind| Adapter {
-            name: name.to_owned(),
-            driver: "Vulkan 1.3.0".to_owned(),
-            kind,
-            memory_bytes: 2 << 30,
-            binding_bytes: 1 << 27,
-            subgroup: 8,
+        let listed = |backend, name: &str, kind, memory_bytes| {
+            let (name, driver) = (name.to_owned(), "Vulkan 1.3.0".to_owned());
+            let adapter = Adapter { name, driver, kind, memory_bytes, binding_bytes: 1 << 27, subgroup: 8 };
+            ListedDevice { backend, adapter }
         };
-        let both = [adapter("X", AdapterKind::Discrete), adapter("llvm", AdapterKind::Software)];
-        let expected = "X: discrete GPU, 2048 MiB, Vulkan 1.3.0\n\
-                        llvm: software, 2048 MiB, Vulkan 1.3.0, used only with --device\n";
+        let both =
+            [listed("ash", "X", AdapterKind::Discrete, 2 << 30), listed("wgpu", "llvm", AdapterKind::Software, 0)];
+        let expected = "ash: X: discrete GPU, 2048 MiB, Vulkan 1.3.0\n\
+                        wgpu: llvm: software, Vulkan 1.3.0, used only with --device\n";
         assert_eq!(text(&both), expected);
         assert!(text(&[]).starts_with("no GPU"));
         let parsed: serde_json::Value = serde_json::from_str(&document(&both)).expect("JSON");
         assert_eq!((&parsed["devices"][0]["gpu"], &parsed["devices"][1]["gpu"]), (&json!(true), &json!(false)));
+        assert_eq!(parsed["devices"][1]["memory_bytes"], serde_json::Value::Null);
     }
 }

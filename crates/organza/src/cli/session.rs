@@ -3,7 +3,7 @@
 use super::args::{Backend, SceneArguments};
 use super::memory;
 use organza::scene::{self, LoadOptions, Override, Scene};
-use organza::{Choice, Error, RenderOptions, printable};
+use organza::{Choice, DeviceChoice, Error, RenderOptions, printable};
 use std::path::Path;
 
 /// Loads the scene with the options of the command line.
@@ -25,10 +25,7 @@ pub(super) fn render_options(arguments: &SceneArguments) -> RenderOptions {
         drop_invalid: arguments.drop_invalid,
         merge_duplicates: arguments.merge_duplicates,
         checkpoint: None,
-        device: (arguments.backend == Backend::Ash).then(|| match &arguments.device {
-            Some(name) => Choice::Named(name.clone()),
-            None => Choice::Gpu,
-        }),
+        device: device(arguments),
     }
 }
 
@@ -50,24 +47,35 @@ pub(super) fn in_folder<T>(folder: &Path, work: impl FnOnce() -> Result<T, Error
     out
 }
 
+/// The device that was asked for.
+fn device(arguments: &SceneArguments) -> Option<DeviceChoice> {
+    let name = arguments.device.clone();
+    let choice = || name.clone().map_or(Choice::Gpu, Choice::Named);
+    match arguments.backend {
+        Backend::Cpu => None,
+        Backend::Auto => Some(DeviceChoice::auto(name)),
+        Backend::Ash => Some(DeviceChoice::ash(choice())),
+        Backend::Wgpu => Some(DeviceChoice::wgpu(choice())),
+    }
+}
+
 fn check_backend(arguments: &SceneArguments) -> Result<(), Error> {
     match (arguments.backend, &arguments.device) {
-        (Backend::Ash, _) | (Backend::Auto | Backend::Cpu, None) => Ok(()),
-        (Backend::Auto | Backend::Cpu, Some(_)) => {
-            Err(Error::usage("--device names a GPU, and the processor was asked for", "add --backend ash"))
+        (Backend::Cpu, Some(_)) => {
+            Err(Error::usage("--device names a GPU, and the processor was asked for", "add --backend auto"))
         }
-        (Backend::Wgpu, _) => {
-            let message = "--backend wgpu is not in this version".into();
-            Err(Error::Gpu { message, hint: "use --backend ash or --backend cpu".into() })
-        }
+        _ => Ok(()),
     }
 }
 
 /// For the commands that measure what the processor does.
 pub(super) fn processor_only(arguments: &SceneArguments) -> Result<(), Error> {
-    match arguments.backend {
-        Backend::Ash => Err(Error::usage("--backend ash is for `organza render`", "use --backend cpu")),
-        _ => Ok(()),
+    match device(arguments) {
+        Some(_) => {
+            let name = arguments.backend.name();
+            Err(Error::usage(format!("--backend {name} is for `organza render`"), "use --backend cpu"))
+        }
+        None => Ok(()),
     }
 }
 

@@ -1,0 +1,58 @@
+//! Does a device give the processor's bits? Generated input, ordered by both.
+//!
+//! Half of the splats lie in a plane across the view, so that their depths differ by the rounding of products and sums
+//! alone: a driver that fuses what the processor rounds apart orders them otherwise.
+
+use super::Failure;
+use super::order::order_on;
+use hbsort::{Params, Scratch, SliceOrder, slice_cloud};
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::{Camera, Cloud, Projection, Splat, rng};
+use splat_shaders::Executor;
+
+/// Splats of the trial before a device is used.
+const SPLATS: u32 = 4096;
+/// The key of its random numbers.
+const SEED: u64 = 0x5452_4941;
+
+/// Whether a device finds the processor's order of generated splats.
+pub(super) fn order_trial(device: &mut dyn Executor) -> Result<bool, Failure> {
+    let input = OrderInput::new(SPLATS);
+    Ok(input.on(device)? == input.by_processor()?)
+}
+
+/// Generated splats and a view of them.
+pub(super) struct OrderInput {
+    cloud: Cloud,
+    camera: Camera,
+    ids: Vec<u32>,
+    params: Params,
+}
+
+impl OrderInput {
+    pub(super) fn new(splats: u32) -> Self {
+        let (eye, target) = (DVec3::new(3.1, 2.3, 4.7), DVec3::new(0.1, -0.2, 0.3));
+        let view = Projection::Perspective { fov_y: 0.7 };
+        let camera = Camera::look_at(eye, target, DVec3::Y, view, [640, 480]).expect("invariant: a view of its target");
+        let forward = (target - eye).normalize();
+        let right = forward.cross(DVec3::Y).normalize();
+        let up = right.cross(forward);
+        let mut cloud = Cloud::new(DVec3::ZERO);
+        for i in 0..u64::from(splats) {
+            let u = |k| 2.0 * f64::from(rng::unit_f32(SEED, 0, i, k)) - 1.0;
+            let across = target + 2.5 * u(0) * right + 2.0 * u(1) * up;
+            let position = if i % 2 == 0 { across } else { across + 3.0 * u(2) * forward };
+            let radius = 0.02 + 0.01 * u(3) as f32;
+            cloud.push(&Splat { position: position.as_vec3(), radius, normal: Vec3::Z, ..Splat::default() });
+        }
+        Self { cloud, camera, ids: (0..splats).collect(), params: Params { exact: true, ..Params::default() } }
+    }
+
+    pub(super) fn on(&self, device: &mut dyn Executor) -> Result<SliceOrder, Failure> {
+        order_on(device, &self.cloud, &self.ids, &self.camera, &self.params)
+    }
+
+    pub(super) fn by_processor(&self) -> Result<SliceOrder, Failure> {
+        Ok(slice_cloud(&self.cloud, Some(&self.ids), &self.camera, &self.params, &mut Scratch::new())?)
+    }
+}
