@@ -5,6 +5,9 @@
 #![forbid(unsafe_code)]
 
 mod listen;
+mod wrapped;
+
+pub use wrapped::{Loss, Wrapped};
 
 use splat_shaders::{Backend, Choice, DeviceError, Executor, Inputs, Ready, Recording, Run, Validation};
 use std::sync::Arc;

@@ -8,6 +8,9 @@
 //! Deviation from Gunjee 2007, section 4.2: no buckets of slices. A radix sort moves the same bytes for any ε, and the
 //! slices are cut from the sorted depths when they are read back.
 //!
+//! A device's kernels see so many bytes of a buffer and no more ([`Capacities::most_splats`]). Beyond, parts are sorted
+//! one after the other ([`Recorded::sorted`]) and joined on the host ([`join`]): the same order, bit for bit.
+//!
 //! ```
 //! use hbsort::gpu::{Capacities, record};
 //!
@@ -17,16 +20,20 @@
 //! assert_eq!(recorded.recording.bytes() / 1_000_000, 30);
 //! ```
 
+mod parts;
+
 use crate::project::{Frustum, bounding_radius};
 use crate::radix::depth_of_key;
 use crate::slicing::Slicing;
 use crate::sort::{check_count, check_ids};
-use crate::{Error, Params, ThicknessRule, thickness};
+use crate::{Error, Params};
 use splat_core::{Camera, Cloud, Direction, SliceOrder};
 use splat_shaders::kernels;
 use splat_shaders::layouts::{Scan, SortState, SortView};
 use splat_shaders::{BufferId, Groups, Recording};
 use std::mem::offset_of;
+
+pub use parts::{Sorted, join};
 
 /// Splats that a workgroup projects.
 const PROJECT_BLOCK: u32 = 1024;
@@ -202,61 +209,17 @@ impl Recorded {
         ids: Option<&[u32]>,
         params: &Params,
     ) -> Result<SliceOrder, Error> {
-        let given = params.given_thickness()?;
-        let short = |what, expected: usize, found: usize| Error::ReadBack {
-            what,
-            expected: expected as u64,
-            found: found as u64,
-        };
-        let state_bytes = state.get(..size_of::<SortState>());
-        let state: SortState =
-            bytemuck::pod_read_unaligned(state_bytes.ok_or(short("state", size_of::<SortState>(), state.len()))?);
-        if state.kept > self.capacities.kept {
-            let (needed, had) = (state.kept.into(), self.capacities.kept.into());
-            return Err(Error::Overflow { what: "splats in the view", needed, had });
-        }
-        let n = ids.map_or(cloud.len().min(cloud.radius.len()), <[u32]>::len);
-        let kept = (state.kept as usize).min(n);
-        let words = |what, bytes: &[u8]| -> Result<Vec<u32>, Error> {
-            let used = bytes.get(..4 * kept).ok_or(short(what, 4 * kept, bytes.len()))?;
-            let (words, _) = used.as_chunks::<4>();
-            Ok(words.iter().map(|w| u32::from_ne_bytes(*w)).collect())
-        };
-        let (keys, places) = (words("keys", keys)?, words("places", places)?);
-        if kept == 0 {
-            return Ok(SliceOrder { direction: params.direction, culled: n as u64, ..SliceOrder::default() });
-        }
-        if let Some(&wrong) = places.iter().find(|&&p| p as usize >= n) {
-            return Err(short("places", n, wrong as usize));
-        }
-        let id_of = |place: u32| ids.map_or(place, |ids| ids[place as usize]);
-        let (near, far) = (depth_of_key(state.near_key), depth_of_key(state.far_key));
-        let radius_at = |place: usize| cloud.radius[id_of(place as u32) as usize];
-        let chosen = || {
-            let span = f64::from(far) - f64::from(near);
-            thickness::choose(span, depth_of_key(state.radius_key), n, &radius_at)
-        };
-        let (thickness, _) = given.map_or_else(chosen, |t| (t, ThicknessRule::Given));
-        let slicing = Slicing::new(near, far, thickness, params.direction, 0);
-        Ok(SliceOrder {
-            slice_starts: slice_starts(&slicing, &keys),
-            input_from_sorted: places.into_iter().map(id_of).collect(),
-            direction: params.direction,
-            near,
-            far,
-            thickness,
-            slices: slicing.slices,
-            culled: (n - kept) as u64,
-        })
+        join(&[self.sorted([state, keys, places], cloud, ids)?], cloud, ids, params)
     }
 }
 
 /// Where each slice begins among the sorted keys, then their number.
-fn slice_starts(slicing: &Slicing, keys: &[u32]) -> Vec<u32> {
+fn slice_starts(slicing: &Slicing, keys: impl ExactSizeIterator<Item = u32>) -> Vec<u32> {
+    let end = keys.len() as u32;
     let mut starts = Vec::new();
     // The slice of the last key that was asked for its slice, and the keys that surely share it.
     let mut current: Option<(u64, u32)> = None;
-    for (at, &key) in (0u32..).zip(keys) {
+    for (at, key) in (0u32..).zip(keys) {
         let depth = depth_of_key(if slicing.direction == Direction::BackToFront { !key } else { key });
         let relative = slicing.relative_key(depth);
         if current.is_some_and(|(_, surely)| relative <= surely) {
@@ -268,6 +231,6 @@ fn slice_starts(slicing: &Slicing, keys: &[u32]) -> Vec<u32> {
             current = Some((slice, slicing.surely_within(slice)));
         }
     }
-    starts.push(keys.len() as u32);
+    starts.push(end);
     starts
 }

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use gpu_conformance::{Device, open};
-use hbsort::gpu::{Capacities, record};
+use hbsort::gpu::{Capacities, join, record};
 use hbsort::{Direction, Error, Params, Scratch, SliceOrder, Thickness, slice_cloud};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Camera, Cloud, Projection, Splat, rng};
@@ -108,6 +108,35 @@ fn too_little_room_is_found_and_recording_again_cures_it() {
         assert_eq!((needed, had), (expected.input_from_sorted.len() as u64, u64::from(kept)));
         let room = Capacities { kept: needed as u32, ..room };
         assert_eq!(on_device(&mut device, room, &cloud, None, &camera, &params).unwrap(), expected);
+    }
+    assert_eq!(device.take_messages(), [""; 0]);
+}
+
+#[test]
+fn parts_joined_are_the_order_of_all() {
+    let mut device = open().unwrap();
+    let cloud = cloud(20_000, DVec3::new(1e7, -3e6, 5e6));
+    let camera = camera(cloud.origin, VIEWS[0]);
+    let ids: Vec<u32> = (0..20_000).filter(|i| i % 7 > 0).collect();
+    for (direction, limit) in [(Direction::BackToFront, 4096), (Direction::FrontToBack, 1 << 16)] {
+        let params = Params { direction, exact: true, ..Params::default() };
+        let expected = slice_cloud(&cloud, Some(&ids), &camera, &params, &mut Scratch::new()).unwrap();
+        let most = Capacities::most_splats(limit);
+        let recorded = record(Capacities { splats: most, kept: most });
+        assert!(recorded.recording.buffers().iter().all(|b| b.bytes <= limit));
+        let mut prepared = device.prepare(&recorded.recording).unwrap();
+        let mut sort = |part: &[u32]| {
+            let uploads = recorded.uploads(&cloud, Some(part), &camera, &params).unwrap();
+            let run = prepared.run(&recorded.inputs(&uploads)).unwrap();
+            let reads = [recorded.state, recorded.keys, recorded.places].map(|b| run.bytes(b));
+            recorded.sorted(reads, &cloud, Some(part)).unwrap()
+        };
+        let parts: Vec<_> = ids.chunks(most as usize).map(&mut sort).collect();
+        assert!(parts.len() > 3, "{}", parts.len());
+        assert_eq!(join(&parts, &cloud, Some(&ids), &params).unwrap(), expected);
+        // A part that is missing is missed.
+        let missing = join(&parts[1..], &cloud, Some(&ids), &params);
+        assert!(matches!(missing, Err(Error::ReadBack { what: "parts of splats", .. })), "{missing:?}");
     }
     assert_eq!(device.take_messages(), [""; 0]);
 }

@@ -1,8 +1,9 @@
 //! A whole picture with a device that helps: the processor's, bit for bit.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use gpu_conformance::adapter;
+use gpu_conformance::{Loss, Wrapped, adapter};
 use organza::{DeviceChoice, Progress, Render, RenderOptions, render, scene};
+use std::sync::Arc;
 
 const SCENE: &str = r#"
     version = 1
@@ -22,6 +23,13 @@ const SCENE: &str = r#"
     rectangle = { center = [0, 0, 1.2], u = [0.8, 0, 0.2], v = [0, 0.8, 0], spacing = 0.05 }
     opacity = 0.5
 "#;
+
+/// A device that is lost, and its count of submissions.
+fn losing(loss: Loss, binding_bytes: u64) -> (Arc<Wrapped>, DeviceChoice) {
+    let backend = Arc::new(Wrapped::new(gpu_ash::backend(), loss, binding_bytes));
+    let choice = DeviceChoice { backends: vec![backend.clone()], choice: adapter(), or_processor: false };
+    (backend, choice)
+}
 
 /// The device of the environment, by each executor.
 fn devices() -> [(&'static str, DeviceChoice); 2] {
@@ -77,4 +85,25 @@ fn a_driver_that_plays_a_gpu_is_never_taken_silently() {
     // By name it is.
     let named = picture(true, Some(DeviceChoice::auto(Some(drivers[0].adapter.name.clone()))));
     assert!(named.backend.starts_with("ash, "), "{}", named.backend);
+}
+
+#[test]
+fn a_device_with_small_buffers_sorts_in_parts() {
+    let alone = picture(true, None);
+    // 5461 splats a part: the box alone has more, so the order takes two submissions after the trial.
+    let (device, choice) = losing(Loss::Never, 1 << 16);
+    let helped = picture(true, Some(choice));
+    assert_eq!((&alone.layers, &alone.warnings), (&helped.layers, &helped.warnings));
+    assert_eq!(device.submissions(), 1 + 2);
+    // Lost at the second part.
+    let (device, choice) = losing(Loss::Once(3), 1 << 16);
+    assert_eq!(alone.layers, picture(true, Some(choice)).layers);
+    assert_eq!(device.submissions(), 3 + 2);
+    // Too small for anything: refused at the trial.
+    let (_, choice) = losing(Loss::Never, 512);
+    let text = SCENE.as_bytes();
+    let scene = scene::parse("scene.toml".as_ref(), text, &Default::default()).unwrap();
+    let options = RenderOptions { device: Some(choice), ..RenderOptions::default() };
+    let error = render(&scene, &options, &Progress::new()).unwrap_err();
+    assert!(error.exit_code() == 6 && error.to_string().contains("kernels see at most 512"), "{error}");
 }

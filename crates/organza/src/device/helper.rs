@@ -83,7 +83,8 @@ impl Helper {
         if !params.exact {
             return None;
         }
-        self.with(|device| order_on(device, cloud, ids, camera, params))
+        let (order, _) = self.with(|device| order_on(device, cloud, ids, camera, params))?;
+        Some(order)
     }
 
     /// Does some work on the device, once more on a fresh one if it is lost meanwhile for the first time. `None` when

@@ -1,23 +1,36 @@
-//! The exact order of splats by a device.
+//! The exact order of splats by a device, in parts where its kernels do not see all of them at once.
 
 use super::Failure;
-use hbsort::gpu::{Capacities, record};
+use hbsort::gpu::{Capacities, Sorted, join, record};
 use hbsort::{Params, SliceOrder};
 use splat_core::{Camera, Cloud};
-use splat_shaders::Executor;
+use splat_shaders::{Executor, PassTime};
 
-/// [`hbsort::slice_cloud`] of the splats `ids` by a device.
+/// [`hbsort::slice_cloud`] of the splats `ids` by a device, and the dispatches of all parts.
 pub(super) fn order_on(
     device: &mut dyn Executor,
     cloud: &Cloud,
     ids: &[u32],
     camera: &Camera,
     params: &Params,
-) -> Result<SliceOrder, Failure> {
-    let splats = ids.len() as u32;
+) -> Result<(SliceOrder, Vec<PassTime>), Failure> {
+    let all = ids.len().max(1) as u32;
+    let splats = match Capacities::most_splats(device.adapter().binding_bytes) {
+        // The device refuses, and says why.
+        0 => all,
+        most => most.min(all),
+    };
     let recorded = record(Capacities { splats, kept: splats });
-    let uploads = recorded.uploads(cloud, Some(ids), camera, params)?;
-    let run = device.run(&recorded.recording, &recorded.inputs(&uploads))?;
-    let reads = [recorded.state, recorded.keys, recorded.places].map(|buffer| run.bytes(buffer));
-    Ok(recorded.order(reads, cloud, Some(ids), params)?)
+    let mut ready = device.prepare(&recorded.recording)?;
+    let mut passes = Vec::new();
+    let mut sort = |ids: &[u32]| -> Result<Sorted, Failure> {
+        let uploads = recorded.uploads(cloud, Some(ids), camera, params)?;
+        let run = ready.run(&recorded.inputs(&uploads))?;
+        let reads = [recorded.state, recorded.keys, recorded.places].map(|buffer| run.bytes(buffer));
+        let sorted = recorded.sorted(reads, cloud, Some(ids))?;
+        passes.extend(run.passes);
+        Ok(sorted)
+    };
+    let parts = ids.chunks(splats as usize).map(&mut sort).collect::<Result<Vec<_>, _>>()?;
+    Ok((join(&parts, cloud, Some(ids), params)?, passes))
 }

@@ -8,7 +8,7 @@ use super::order::order_on;
 use hbsort::{Params, Scratch, SliceOrder, slice_cloud};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Camera, Cloud, Projection, Splat, rng};
-use splat_shaders::Executor;
+use splat_shaders::{Executor, PassTime};
 
 /// Splats of the trial before a device is used.
 const SPLATS: u32 = 4096;
@@ -18,7 +18,8 @@ const SEED: u64 = 0x5452_4941;
 /// Whether a device finds the processor's order of generated splats.
 pub(super) fn order_trial(device: &mut dyn Executor) -> Result<bool, Failure> {
     let input = OrderInput::new(SPLATS);
-    Ok(input.on(device)? == input.by_processor()?)
+    let (found, _) = input.on(device)?;
+    Ok(found == input.by_processor()?)
 }
 
 /// Generated splats and a view of them.
@@ -48,7 +49,7 @@ impl OrderInput {
         Self { cloud, camera, ids: (0..splats).collect(), params: Params { exact: true, ..Params::default() } }
     }
 
-    pub(super) fn on(&self, device: &mut dyn Executor) -> Result<SliceOrder, Failure> {
+    pub(super) fn on(&self, device: &mut dyn Executor) -> Result<(SliceOrder, Vec<PassTime>), Failure> {
         order_on(device, &self.cloud, &self.ids, &self.camera, &self.params)
     }
 

@@ -1,0 +1,111 @@
+//! A backend with its devices made worse: one that is lost at a submission, or whose kernels see small buffers alone.
+
+use splat_shaders::{Adapter, Backend, Choice, DeviceError, Executor, Inputs, Ready, Recording, Run, Validation};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// When devices are lost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Loss {
+    /// Never.
+    Never,
+    /// At this submission, counted from 1 over all devices of the backend.
+    Once(u64),
+    /// At this submission and each after it.
+    Always(u64),
+}
+
+/// A backend whose devices fail.
+#[derive(Debug)]
+pub struct Wrapped {
+    inner: Arc<dyn Backend>,
+    loss: Loss,
+    binding_bytes: u64,
+    submissions: Arc<AtomicU64>,
+}
+
+impl Wrapped {
+    /// Devices of `inner` that are lost, and whose kernels see at most so many bytes of a buffer.
+    pub fn new(inner: Arc<dyn Backend>, loss: Loss, binding_bytes: u64) -> Self {
+        Self { inner, loss, binding_bytes, submissions: Arc::default() }
+    }
+
+    /// Runs that were asked for so far.
+    pub fn submissions(&self) -> u64 {
+        self.submissions.load(Ordering::Relaxed)
+    }
+
+    fn describe(&self, adapter: &Adapter) -> Adapter {
+        Adapter { binding_bytes: adapter.binding_bytes.min(self.binding_bytes), ..adapter.clone() }
+    }
+}
+
+impl Backend for Wrapped {
+    fn name(&self) -> &'static str {
+        self.inner.name()
+    }
+
+    fn adapters(&self) -> Result<Vec<Adapter>, DeviceError> {
+        Ok(self.inner.adapters()?.iter().map(|adapter| self.describe(adapter)).collect())
+    }
+
+    fn open(&self, choice: &Choice, validation: Validation) -> Result<Box<dyn Executor>, DeviceError> {
+        let inner = self.inner.open(choice, validation)?;
+        let adapter = self.describe(inner.adapter());
+        let fate = Fate { loss: self.loss, submissions: self.submissions.clone(), lost: Arc::default() };
+        Ok(Box::new(WrappedDevice { inner, adapter, fate }))
+    }
+}
+
+/// What becomes of a device; once it is lost it stays so.
+#[derive(Clone)]
+struct Fate {
+    loss: Loss,
+    submissions: Arc<AtomicU64>,
+    lost: Arc<AtomicBool>,
+}
+
+impl Fate {
+    fn submit(&self) -> Result<(), DeviceError> {
+        let count = self.submissions.fetch_add(1, Ordering::Relaxed) + 1;
+        let strikes = match self.loss {
+            Loss::Never => false,
+            Loss::Once(at) => count == at,
+            Loss::Always(at) => count >= at,
+        };
+        self.lost.fetch_or(strikes, Ordering::Relaxed);
+        if self.lost.load(Ordering::Relaxed) { Err(DeviceError::Lost) } else { Ok(()) }
+    }
+}
+
+struct WrappedDevice {
+    inner: Box<dyn Executor>,
+    adapter: Adapter,
+    fate: Fate,
+}
+
+impl Executor for WrappedDevice {
+    fn adapter(&self) -> &Adapter {
+        &self.adapter
+    }
+
+    fn prepare(&mut self, recording: &Recording) -> Result<Box<dyn Ready>, DeviceError> {
+        let had = self.adapter.binding_bytes;
+        if let Some(b) = recording.buffers().iter().find(|b| b.bytes > had) {
+            return Err(DeviceError::TooLarge { name: b.name, needed: b.bytes, had });
+        }
+        Ok(Box::new(WrappedReady { inner: self.inner.prepare(recording)?, fate: self.fate.clone() }))
+    }
+}
+
+struct WrappedReady {
+    inner: Box<dyn Ready>,
+    fate: Fate,
+}
+
+impl Ready for WrappedReady {
+    fn run(&mut self, inputs: &Inputs<'_>) -> Result<Run, DeviceError> {
+        self.fate.submit()?;
+        self.inner.run(inputs)
+    }
+}
