@@ -88,6 +88,23 @@ fn a_driver_that_plays_a_gpu_is_never_taken_silently() {
 }
 
 #[test]
+fn killing_the_device_in_the_middle_of_a_render_still_yields_the_picture() {
+    let alone = picture(true, None);
+    // The trial is the first submission, the order the second.
+    for (loss, submissions, backend, said) in [
+        (Loss::Once(2), 3, "ash, ", "was lost and opened once more"),
+        (Loss::Always(2), 3, "cpu", "was lost; the processor goes on"),
+    ] {
+        let (device, choice) = losing(loss, u64::MAX);
+        let helped = picture(true, Some(choice));
+        assert_eq!(alone.layers, helped.layers, "{loss:?}");
+        assert_eq!(device.submissions(), submissions, "{loss:?}");
+        assert!(helped.backend.starts_with(backend), "{loss:?}: {}", helped.backend);
+        assert!(helped.warnings.iter().any(|w| w.contains(said)), "{loss:?}: {:?}", helped.warnings);
+    }
+}
+
+#[test]
 fn a_device_with_small_buffers_sorts_in_parts() {
     let alone = picture(true, None);
     // 5461 splats a part: the box alone has more, so the order takes two submissions after the trial.

@@ -126,3 +126,118 @@ fn open_one(backend: &Arc<dyn Backend>, choice: &Choice) -> Result<Box<dyn Execu
     let mut executor = backend.open(choice, Validation::Off)?;
     if order_trial(&mut *executor)? { Ok(executor) } else { Err(Failure::Rounds) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splat_core::Projection;
+    use splat_core::glam::DVec3;
+    use splat_shaders::{Adapter, AdapterKind, Ready, Recording};
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    /// Devices that can be opened so many times, and do nothing.
+    #[derive(Debug, Default)]
+    struct Openings(AtomicU32);
+
+    struct Nothing(Adapter);
+
+    impl Backend for Openings {
+        fn name(&self) -> &'static str {
+            "test"
+        }
+
+        fn adapters(&self) -> Result<Vec<Adapter>, DeviceError> {
+            Ok(Vec::new())
+        }
+
+        fn open(&self, _: &Choice, _: Validation) -> Result<Box<dyn Executor>, DeviceError> {
+            let left = self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1));
+            left.map_err(|_| DeviceError::NoDevice { why: "gone".to_owned() })?;
+            let (name, driver) = ("X".to_owned(), String::new());
+            let kind = AdapterKind::Discrete;
+            Ok(Box::new(Nothing(Adapter { name, driver, kind, memory_bytes: 0, binding_bytes: 0, subgroup: 0 })))
+        }
+    }
+
+    impl Executor for Nothing {
+        fn adapter(&self) -> &Adapter {
+            &self.0
+        }
+
+        fn prepare(&mut self, _: &Recording) -> Result<Box<dyn Ready>, DeviceError> {
+            Err(DeviceError::Lost)
+        }
+    }
+
+    /// A helper whose device was opened, and can be so many times more.
+    fn helper(openings: u32) -> Helper {
+        let backend: Arc<dyn Backend> = Arc::new(Openings(AtomicU32::new(openings + 1)));
+        let executor = backend.open(&Choice::Gpu, Validation::Off).expect("the first opening");
+        let opened = Mutex::new(Some(Opened { backend, choice: Choice::Gpu, executor }));
+        Helper { opened, history: Mutex::default(), name: "test, X".to_owned() }
+    }
+
+    /// Works on the device, which is lost at these attempts.
+    fn attempt(helper: &Helper, lost: &[u32]) -> Option<u32> {
+        let mut attempts = 0;
+        helper.with(|_| {
+            attempts += 1;
+            if lost.contains(&attempts) { Err(DeviceError::Lost.into()) } else { Ok(attempts) }
+        })
+    }
+
+    #[test]
+    fn a_lost_device_is_opened_once_more_in_a_render() {
+        let helper = helper(9);
+        assert_eq!(attempt(&helper, &[]), Some(1));
+        assert_eq!(attempt(&helper, &[1]), Some(2));
+        assert_eq!((helper.name(), attempt(&helper, &[])), ("test, X".to_owned(), Some(1)));
+        // The second loss is the last, and nobody asks a third device.
+        assert_eq!([attempt(&helper, &[1]), attempt(&helper, &[])], [None, None]);
+        assert_eq!(helper.name(), "test, X, then cpu");
+        let said = helper.said();
+        assert_eq!(said.len(), 2, "{said:?}");
+        assert!(said[0].contains("opened once more") && said[1].ends_with("the processor goes on"), "{said:?}");
+    }
+
+    #[test]
+    fn a_device_that_is_lost_at_once_and_again_leaves_the_processor() {
+        let helper = helper(9);
+        assert_eq!(attempt(&helper, &[1, 2]), None);
+        assert_eq!((helper.name(), helper.said().len()), ("cpu".to_owned(), 2));
+    }
+
+    #[test]
+    fn what_cannot_be_opened_again_or_fails_otherwise_is_given_up() {
+        let lost = helper(0);
+        assert_eq!((attempt(&lost, &[1]), lost.said().len()), (None, 1));
+        let refused = helper(9);
+        let none: Option<()> = refused.with(|_| Err(DeviceError::Memory { bytes: 7 }.into()));
+        assert_eq!(
+            (none, refused.said()),
+            (None, vec!["test, X: the device has no memory for 7 bytes; the processor goes on".to_owned()])
+        );
+    }
+
+    #[test]
+    fn where_no_device_is_left_the_processor_is_asked_without_a_word() {
+        let helper = helper(0);
+        assert_eq!(attempt(&helper, &[1]), None);
+        let view = Projection::Perspective { fov_y: 1.0 };
+        let camera = Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, view, [8, 8]).expect("a camera");
+        let params = |exact| Params { exact, ..Params::default() };
+        assert_eq!(helper.order(&Cloud::new(DVec3::ZERO), &[], &camera, &params(true)), None);
+        assert_eq!(helper.order(&Cloud::new(DVec3::ZERO), &[], &camera, &params(false)), None);
+        assert_eq!(helper.said().len(), 1);
+    }
+
+    #[test]
+    fn a_device_that_fails_its_trial_is_not_taken() {
+        let backends: Vec<Arc<dyn Backend>> = vec![Arc::new(Openings(AtomicU32::new(9)))];
+        let required = DeviceChoice { backends, choice: Choice::Gpu, or_processor: false };
+        assert_eq!(Helper::open(&required).map(|h| h.name()).map_err(|e| e.exit_code()), Err(6));
+        let helper = Helper::open(&DeviceChoice { or_processor: true, ..required }).expect("the processor");
+        assert_eq!(helper.name(), "cpu");
+        assert_eq!(helper.said(), ["no GPU helps (the device was lost): the processor draws alone"]);
+    }
+}
