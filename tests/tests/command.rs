@@ -170,6 +170,20 @@ fn exit_6_is_for_the_gpu() {
 }
 
 #[test]
+fn passport_names_every_device_and_conforms_or_is_exit_6() {
+    let place = place();
+    place.expect(6, &["passport", "--device", "no such device"], "--device no such device: there is no such device");
+    let devices = json_of(&place.expect(0, &["devices", "--json"], ""));
+    let out = place.run(&["passport", "--json"]);
+    let passports = json_of(&out)["passports"].as_array().unwrap().clone();
+    let names = |list: &[Value]| list.iter().map(|d| [d["backend"].clone(), d["name"].clone()]).collect::<Vec<_>>();
+    assert_eq!(names(&passports), names(devices["devices"].as_array().unwrap()));
+    let valid = passports.iter().all(|p| p["valid"] == true);
+    assert_eq!(out.status.code(), Some(if valid { 0 } else { 6 }));
+    assert!(passports.iter().all(|p| p["recordings"].as_array().is_some_and(|r| r.len() == 2)));
+}
+
+#[test]
 fn exit_0_any_gpu_there_is_or_none_gives_the_processor_s_picture() {
     let place = place();
     place.expect(0, &["render", "s.toml", "-o", "cpu.png"], "");

@@ -9,6 +9,7 @@ mod explain;
 mod info;
 mod memory;
 mod orders;
+mod passport;
 mod render;
 mod report;
 mod session;
@@ -51,6 +52,7 @@ fn run(command: Command) -> Result<u8, Error> {
         Command::Orders(arguments) => orders::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
+        Command::Passport(arguments) => return passport::run(&arguments),
         Command::Schema => console::out(&(organza::scene::schema() + "\n")),
     }
     .map(|()| 0)

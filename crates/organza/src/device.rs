@@ -1,15 +1,19 @@
 //! The GPU beside the processor: the passes that have a recording run there when the user asks for it.
 //!
-//! Today that is the order of translucent splats (`hbsort::gpu`), in exact mode. Whatever the device cannot do the
-//! processor does, with one line said: the picture is the same, bit for bit. A device that would round otherwise than
-//! the processor is found out by a trial before it is used.
+//! Today that is the order of translucent splats (`hbsort::gpu`), in exact mode, and the projection and average of
+//! particles that are shown as they are (`pbsr::gpu`). Whatever the device cannot do the processor does, with one line
+//! said. The order is the processor's bit for bit: a device that would round otherwise is found out by a trial before it
+//! is used. Sets of particles are the processor's too, up to a pixel in a thousand (see `pbsr::gpu`).
 
 mod helper;
 mod order;
+mod particles;
+mod passport;
 mod trial;
 
 use crate::Error;
 pub(crate) use helper::Helper;
+pub use passport::{Agreement, Checked, KernelTime, Passport, passport};
 use splat_shaders::{Adapter, Backend, Choice, DeviceError};
 use std::sync::Arc;
 
@@ -66,14 +70,18 @@ pub struct ListedDevice {
 pub fn devices() -> Result<Vec<ListedDevice>, Error> {
     let mut all = Vec::new();
     for backend in backends() {
-        let name = backend.name();
-        let found = match backend.adapters() {
-            Err(DeviceError::NoDevice { .. }) => Vec::new(),
-            found => found.map_err(|e| fault(name, &e.to_string()))?,
-        };
-        all.extend(found.into_iter().map(|adapter| ListedDevice { backend: name, adapter }));
+        let found = listed(&*backend)?;
+        all.extend(found.into_iter().map(|adapter| ListedDevice { backend: backend.name(), adapter }));
     }
     Ok(all)
+}
+
+/// What one backend reaches.
+fn listed(backend: &dyn Backend) -> Result<Vec<Adapter>, Error> {
+    match backend.adapters() {
+        Err(DeviceError::NoDevice { .. }) => Ok(Vec::new()),
+        found => found.map_err(|e| fault(backend.name(), &e.to_string())),
+    }
 }
 
 /// Every backend of this version, the preferred first.
@@ -93,6 +101,8 @@ enum Failure {
     Device(#[from] DeviceError),
     #[error(transparent)]
     Sort(#[from] hbsort::Error),
+    #[error(transparent)]
+    Particles(#[from] pbsr::Error),
     #[error("it rounds otherwise than the processor, so the picture would be another")]
     Rounds,
 }

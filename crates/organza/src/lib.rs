@@ -43,7 +43,7 @@ mod sequence;
 pub mod statistics;
 pub mod truth;
 
-pub use device::{DeviceChoice, ListedDevice, devices};
+pub use device::{Agreement, Checked, DeviceChoice, KernelTime, ListedDevice, Passport, devices, passport};
 pub use error::{Error, escape_controls, printable};
 pub use info::{FileInfo, info};
 pub use load::{Loaded, SplatCount, load};

@@ -104,6 +104,113 @@ fn killing_the_device_in_the_middle_of_a_render_still_yields_the_picture() {
     }
 }
 
+/// A picture by particles that are shown as they are.
+fn particles(device: Option<DeviceChoice>, more: &str) -> Render {
+    let text = format!(
+        r#"
+        version = 1
+        [camera]
+        position = [0.4, 0.3, 4]
+        target = [0, 0, 0]
+        size = [96, 64]
+        [material.plain]
+        shading = "unlit"
+        [[object]]
+        name = "pane"
+        material = "plain"
+        rectangle = {{ center = [0, 0, 1.2], u = [0.8, 0, 0.2], v = [0, 0.8, 0], spacing = 0.05 }}
+        color = [0.9, 0.5, 0.2]
+        opacity = 0.5
+        [[object]]
+        name = "behind"
+        material = "plain"
+        rectangle = {{ center = [0.3, 0, 0], u = [0.9, 0, 0], v = [0, 0.9, 0], spacing = 0.05 }}
+        color = [0.1, 0.4, 0.9]
+        opacity = 0.7
+        [render]
+        technique = "particles"
+        {more}
+        [render.particles]
+        repeat_level = 40
+        "#
+    );
+    let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
+    render(&scene, &RenderOptions { device, ..RenderOptions::default() }, &Progress::new()).unwrap()
+}
+
+/// Share of pixels of equal opacity, which are those of equal hits.
+fn agreement(a: &Render, b: &Render) -> f64 {
+    let [a, b] = [a, b].map(|r| r.layers.scalar("alpha").unwrap());
+    assert!(a.iter().filter(|a| **a > 0.2).count() > 500);
+    a.iter().zip(b).filter(|(a, b)| a == b).count() as f64 / a.len() as f64
+}
+
+#[test]
+fn particles_by_a_device_are_the_processor_s_in_almost_every_pixel() {
+    let alone = particles(None, "");
+    for (name, device) in devices() {
+        let helped = particles(Some(device), "");
+        assert!(helped.backend.starts_with(name), "{}", helped.backend);
+        assert_eq!((helped.sets, &helped.warnings), (alone.sets, &alone.warnings));
+        assert!(agreement(&alone, &helped) >= 0.999, "{}", agreement(&alone, &helped));
+    }
+}
+
+#[test]
+fn killing_the_device_between_sets_goes_on_from_there() {
+    let alone = particles(None, "");
+    // 40 sets are five batches of eight, after the trial.
+    let whole = losing(Loss::Never, u64::MAX);
+    let helped = particles(Some(whole.1), "");
+    assert_eq!(whole.0.submissions(), 1 + 5);
+    let (device, choice) = losing(Loss::Once(4), u64::MAX);
+    let again = particles(Some(choice), "");
+    // What was folded before the loss is not folded again, and the fresh device gives the same sums.
+    assert_eq!((device.submissions(), &again.layers), (1 + 5 + 1, &helped.layers));
+    assert!(again.warnings.iter().any(|w| w.contains("opened once more")), "{:?}", again.warnings);
+    let (device, choice) = losing(Loss::Always(4), u64::MAX);
+    let rest = particles(Some(choice), "");
+    assert_eq!((device.submissions(), rest.sets), (5, alone.sets));
+    assert!(rest.backend.ends_with("then cpu") && agreement(&alone, &rest) >= 0.999, "{}", rest.backend);
+    // Small buffers take fewer sets at once, and less than one set is the processor's.
+    let (device, choice) = losing(Loss::Never, 2 << 20);
+    let slowly = particles(Some(choice), "");
+    assert!(device.submissions() > 6 && slowly.warnings.is_empty(), "{} {:?}", device.submissions(), slowly.warnings);
+    assert_eq!(slowly.layers, helped.layers);
+    let (_, choice) = losing(Loss::Never, 1 << 16);
+    let refused = particles(Some(choice), "");
+    assert_eq!(refused.layers, alone.layers);
+    assert!(refused.warnings.iter().any(|w| w.contains("kernels see at most")), "{:?}", refused.warnings);
+}
+
+#[test]
+fn particles_that_a_device_cannot_fold_are_the_processor_s() {
+    let layers = "layers = [\"effects\"]";
+    let (device, choice) = losing(Loss::Never, u64::MAX);
+    let helped = particles(Some(choice), layers);
+    assert!(helped.warnings.iter().any(|w| w.contains("layers besides beauty")), "{:?}", helped.warnings);
+    assert_eq!((helped.layers, helped.backend.as_str()), (particles(None, layers).layers, "cpu"));
+    assert_eq!(device.submissions(), 1);
+}
+
+#[test]
+fn every_device_has_a_passport() {
+    let passports = organza::passport("").unwrap();
+    assert_eq!(passports.len(), organza::devices().unwrap().len());
+    for passport in &passports {
+        assert!(passport.valid(), "{passport:?}");
+        let [order, particles] = &passport.recordings[..] else { panic!("{passport:?}") };
+        assert_eq!((order.recording, order.items), ("order", 1 << 17));
+        assert_eq!(order.outcome.as_ref().map(|a| (a.equal_share, a.mean, a.max)), Ok((1.0, 0.0, 0.0)));
+        assert!(particles.items > 100_000 && particles.outcome.as_ref().is_ok_and(|a| a.mean < 1e-3));
+        // Of each kernel one row: four passes of the sort are one.
+        let scatter = order.passes.iter().filter(|k| k.kernel.ends_with("scatter")).map(|k| k.dispatches);
+        assert!(order.passes.is_empty() || scatter.sum::<u32>() == 4, "{:?}", order.passes);
+        assert_eq!(passport.missing.contains(&"timestamps"), order.passes.is_empty());
+    }
+    assert!(organza::passport("no such device").unwrap().is_empty());
+}
+
 #[test]
 fn a_device_with_small_buffers_sorts_in_parts() {
     let alone = picture(true, None);

@@ -28,6 +28,8 @@ pub(super) enum Command {
     Info(InfoArguments),
     /// Lists the GPUs that --backend can use, and the drivers that play one.
     Devices(DevicesArguments),
+    /// Runs every GPU recording on every device and compares with the processor.
+    Passport(PassportArguments),
     /// Prints the JSON Schema of scene files.
     Schema,
 }
@@ -42,6 +44,7 @@ impl Command {
             Self::Orders(a) => a.scene.json,
             Self::Info(a) => a.json,
             Self::Devices(a) => a.json,
+            Self::Passport(a) => a.json,
             Self::Schema => false,
         }
     }
@@ -188,6 +191,16 @@ pub(super) struct DevicesArguments {
     pub(super) json: bool,
 }
 
+#[derive(Debug, Args)]
+pub(super) struct PassportArguments {
+    /// Part of the names of the devices [default: all, software drivers too]
+    #[arg(long, value_name = "NAME")]
+    pub(super) device: Option<String>,
+    /// Print one JSON document on stdout
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
 /// What computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Backend {
@@ -197,7 +210,7 @@ pub(super) enum Backend {
     Cpu,
     /// A GPU by wgpu helps as by `ash`
     Wgpu,
-    /// A GPU by Vulkan orders the translucent splats, the processor does the rest
+    /// A GPU by Vulkan orders the translucent splats or averages unlit particles, the processor does the rest
     Ash,
 }
 

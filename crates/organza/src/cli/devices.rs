@@ -11,7 +11,8 @@ pub(super) fn run(arguments: &DevicesArguments) -> Result<(), Error> {
     console::out(&if arguments.json { document(&devices) } else { text(&devices) })
 }
 
-fn kind(adapter: &Adapter) -> &'static str {
+/// What stands behind an adapter, for people.
+pub(super) fn kind(adapter: &Adapter) -> &'static str {
     match adapter.kind {
         AdapterKind::Discrete => "discrete GPU",
         AdapterKind::Integrated => "integrated GPU",

@@ -1,11 +1,13 @@
 //! An opened device: one that is lost is opened once more, one that fails is given up and the processor goes on.
 
 use super::order::order_on;
+use super::particles::{Folded, fold_on, why_not};
 use super::trial::order_trial;
 use super::{DeviceChoice, Failure, fault};
 use crate::Error;
 use hbsort::{Params, SliceOrder};
-use splat_core::{Camera, Cloud};
+use pbsr::{Ensemble, Scene};
+use splat_core::{Camera, Cloud, Progress};
 use splat_shaders::{Backend, Choice, DeviceError, Executor, Validation};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -63,10 +65,10 @@ impl Helper {
 
     /// What drew, as metadata and reports name it.
     pub(crate) fn name(&self) -> String {
-        match (held(&self.opened).is_some(), held(&self.history).helped) {
-            (true, _) => self.name.clone(),
-            (false, true) => format!("{}, then cpu", self.name),
-            (false, false) => "cpu".to_owned(),
+        match (held(&self.history).helped, held(&self.opened).is_some()) {
+            (true, true) => self.name.clone(),
+            (true, false) => format!("{}, then cpu", self.name),
+            (false, _) => "cpu".to_owned(),
         }
     }
 
@@ -77,14 +79,42 @@ impl Helper {
 
     /// The exact order of some splats, or `None` for the processor to find it.
     pub(crate) fn order(&self, cloud: &Cloud, ids: &[u32], camera: &Camera, params: &Params) -> Option<SliceOrder> {
-        if !params.exact && held(&self.opened).is_some() {
-            self.say("slices without order inside (render.points.exact = false) are made by the processor".to_owned());
-        }
         if !params.exact {
+            self.leave("slices without order inside (render.points.exact = false) are made by the processor");
             return None;
         }
         let (order, _) = self.with(|device| order_on(device, cloud, ids, camera, params))?;
         Some(order)
+    }
+
+    /// Folds sets of particles until the ensemble has `until` of them, or as many as the device can; the rest is the
+    /// processor's. Gives the number of particles.
+    pub(crate) fn fold(
+        &self,
+        scene: &Scene<'_>,
+        ensemble: &mut Ensemble,
+        until: u32,
+        max_bytes: u64,
+        progress: &Progress,
+    ) -> Result<u64, pbsr::Error> {
+        if let Some(why) = why_not(scene, ensemble) {
+            self.leave(why);
+            return Ok(0);
+        }
+        let mut folded = Folded::default();
+        let cancelled =
+            self.with(|device| match fold_on(device, scene, ensemble, until, max_bytes, progress, &mut folded) {
+                Err(Failure::Particles(e @ pbsr::Error::Core(splat_core::Error::Cancelled))) => Ok(Some(e)),
+                done => done.map(|()| None),
+            });
+        cancelled.flatten().map_or(Ok(folded.particles), Err)
+    }
+
+    /// Says why something is the processor's, where somebody could have expected the device to do it.
+    pub(crate) fn leave(&self, why: &str) {
+        if held(&self.opened).is_some() {
+            self.say(why.to_owned());
+        }
     }
 
     /// Does some work on the device, once more on a fresh one if it is lost meanwhile for the first time. `None` when
@@ -117,7 +147,11 @@ impl Helper {
     }
 
     fn say(&self, what: String) {
-        held(&self.history).said.push(what);
+        let said = &mut held(&self.history).said;
+        // Of many batches one line.
+        if !said.contains(&what) {
+            said.push(what);
+        }
     }
 }
 

@@ -3,9 +3,10 @@
 use super::checkpoint::Checkpoint;
 use super::fault;
 use super::parts::Part;
+use crate::device::Helper;
 use crate::points::Drawing;
 use crate::scene::ParticlesSettings;
-use crate::{Error, RenderOptions};
+use crate::{Error, Progress, RenderOptions};
 use pbsr::{Ensemble, EnsembleParams, FoldParams, LitBy, Object, Occluder, Renderer, Scene};
 use splat_core::shade::ChannelLayout;
 use splat_core::{Accumulator, Camera};
@@ -52,11 +53,13 @@ pub(super) fn fold(
     let settings = &drawing.settings.particles;
     let background = |_, _| drawing.background;
     let mut renderer = Renderer::new();
+    let helper = helper(drawing, checkpoint.is_some());
     drawing.progress.add_total(u64::from(settings.repeat_level.saturating_sub(average.ensemble.levels())));
     while let Some(levels) = average.next_step(settings) {
-        let counts = renderer.fold(&scene, &mut average.ensemble, levels, &params, drawing.progress);
-        match counts.map_err(fault) {
-            Ok(counts) => average.particles += counts.particles,
+        let step = Step { until: average.ensemble.levels() + levels, helper, params, progress: drawing.progress };
+        let folded = step.fold(&mut renderer, &scene, &mut average.ensemble);
+        match folded.map_err(fault) {
+            Ok(particles) => average.particles += particles,
             // Two sets are a picture, with its error.
             Err(Error::Cancelled) if average.ensemble.levels() >= 2 => average.interrupted = true,
             Err(error) => return Err(error),
@@ -75,6 +78,37 @@ pub(super) fn fold(
         checkpoint.write(&average.ensemble)?;
     }
     Ok(average)
+}
+
+/// The device that folds, if there is one and it may.
+fn helper<'a>(drawing: &Drawing<'a>, checkpoint: bool) -> Option<&'a Helper> {
+    let helper = drawing.helper?;
+    if checkpoint {
+        helper.leave("particles with a checkpoint are the processor's, whose bits do not depend on where it went on");
+    }
+    (!checkpoint).then_some(helper)
+}
+
+/// Sets between two looks.
+struct Step<'a> {
+    until: u32,
+    helper: Option<&'a Helper>,
+    params: FoldParams,
+    progress: &'a Progress,
+}
+
+impl Step<'_> {
+    /// Folds by the device, and what that did not do by the processor, from where it was. Gives the number of particles.
+    fn fold(&self, renderer: &mut Renderer, scene: &Scene<'_>, ensemble: &mut Ensemble) -> Result<u64, pbsr::Error> {
+        let by_device = match self.helper {
+            Some(helper) => helper.fold(scene, ensemble, self.until, self.params.max_bytes, self.progress)?,
+            None => 0,
+        };
+        match self.until - ensemble.levels() {
+            0 => Ok(by_device),
+            left => Ok(by_device + renderer.fold(scene, ensemble, left, &self.params, self.progress)?.particles),
+        }
+    }
 }
 
 /// Sets that were folded.

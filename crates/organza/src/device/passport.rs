@@ -1,0 +1,247 @@
+//! `organza passport`: every recording on every device by every backend, against its twin on the processor.
+
+use super::particles::{Folded, fold_on};
+use super::trial::OrderInput;
+use super::{Failure, backends, listed};
+use crate::Error;
+use pbsr::{
+    Appearance, Ensemble, EnsembleParams, FoldParams, MeshSampler, Object, Renderer, Scene, SurfaceParams, pixel_area,
+};
+use splat_core::glam::{DQuat, DVec3, Vec3};
+use splat_core::{Camera, Material, Mesh, Progress, Projection, Shading, Similarity, SliceOrder};
+use splat_shaders::{Adapter, Backend, Choice, DeviceError, Executor, PassTime, Validation};
+
+/// Splats that are ordered.
+const SPLATS: u32 = 1 << 17;
+/// Sets of particles that are folded.
+const SETS: u32 = 3;
+/// Their picture.
+const SIZE: [u32; 2] = [320, 200];
+/// Share of pixels whose hits must agree: a GPU may round the square root and the division in k otherwise.
+const LEAST_SHARE: f64 = 0.999;
+
+/// One device by one backend.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Passport {
+    /// The backend: `ash` or `wgpu`.
+    pub backend: &'static str,
+    /// The device. Of a software driver the timings are the processor's.
+    pub adapter: Adapter,
+    /// What it does not have, one phrase each.
+    pub missing: Vec<&'static str>,
+    /// Every recording.
+    pub recordings: Vec<Checked>,
+}
+
+impl Passport {
+    /// Whether every recording ran and agrees with its twin.
+    pub fn valid(&self) -> bool {
+        self.recordings.iter().all(|r| r.outcome.as_ref().is_ok_and(|a| a.within))
+    }
+}
+
+/// One recording on one device.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Checked {
+    /// `order` or `particles`.
+    pub recording: &'static str,
+    /// Splats or particles that went in.
+    pub items: u64,
+    /// How it agrees with the processor, or why it did not run.
+    pub outcome: Result<Agreement, String>,
+    /// Its kernels with their times on the device; empty where it has no clock.
+    pub passes: Vec<KernelTime>,
+}
+
+/// What a device found against what the processor found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Agreement {
+    /// Whether that is enough: equal bits for the order, 99.9 % of the pixels' hits for particles.
+    pub within: bool,
+    /// Share of places or pixels that are equal in bits.
+    pub equal_share: f64,
+    /// Mean difference, in the unit.
+    pub mean: f64,
+    /// Largest difference, in the unit.
+    pub max: f64,
+    /// What differences are of: `places` or `radiance`.
+    pub unit: &'static str,
+}
+
+/// A kernel's dispatches of one run together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KernelTime {
+    /// The kernel.
+    pub kernel: &'static str,
+    /// How often it was started.
+    pub dispatches: u32,
+    /// Their time, nanoseconds.
+    pub nanoseconds: f64,
+}
+
+/// Runs every recording on generated input on every device whose name contains `name`, software drivers included.
+///
+/// # Errors
+/// [`Error::Gpu`] when a driver fails to say what there is.
+pub fn passport(name: &str) -> Result<Vec<Passport>, Error> {
+    let (order, particles) = (OrderInput::new(SPLATS), ParticlesInput::new());
+    let mut passports = Vec::new();
+    for backend in backends() {
+        for (place, adapter) in listed(&*backend)?.into_iter().enumerate().filter(|(_, a)| a.name.contains(name)) {
+            passports.push(inspect(&*backend, place, adapter, &order, &particles));
+        }
+    }
+    Ok(passports)
+}
+
+fn inspect(
+    backend: &dyn Backend,
+    place: usize,
+    adapter: Adapter,
+    order: &OrderInput,
+    particles: &ParticlesInput,
+) -> Passport {
+    let mut device = backend.open(&Choice::Place(place), Validation::Off);
+    if let Ok(other) = device.as_ref().map(|d| d.adapter().name.clone())
+        && other != adapter.name
+    {
+        device = Err(DeviceError::NoDevice { why: format!("{other} took its place") });
+    }
+    let mut check = |recording, work: &mut dyn FnMut(&mut dyn Executor) -> Result<Found, Failure>| {
+        let found = device.as_mut().map_err(|e| Failure::from(e.clone())).and_then(|device| {
+            // The first run pays for what drivers put off.
+            work(&mut **device)?;
+            work(&mut **device)
+        });
+        match found {
+            Ok(Found { items, agreement, passes }) => {
+                Checked { recording, items, outcome: Ok(agreement), passes: by_kernel(&passes) }
+            }
+            Err(why) => Checked { recording, items: 0, outcome: Err(why.to_string()), passes: Vec::new() },
+        }
+    };
+    let recordings = vec![
+        check("order", &mut |device| check_order(device, order)),
+        check("particles", &mut |device| particles.check(device)),
+    ];
+    let clockless = recordings.iter().all(|r| r.outcome.is_ok() && r.passes.is_empty());
+    let missing = [(clockless, "timestamps"), (adapter.subgroup == 0, "the size of a subgroup")];
+    let missing = missing.into_iter().filter(|(lacks, _)| *lacks).map(|(_, what)| what).collect();
+    Passport { backend: backend.name(), adapter, missing, recordings }
+}
+
+/// What a recording gave.
+struct Found {
+    items: u64,
+    agreement: Agreement,
+    passes: Vec<PassTime>,
+}
+
+fn by_kernel(passes: &[PassTime]) -> Vec<KernelTime> {
+    let mut kernels: Vec<KernelTime> = Vec::new();
+    for PassTime { kernel, nanoseconds } in passes {
+        match kernels.iter_mut().find(|k| k.kernel == *kernel) {
+            Some(known) => {
+                known.dispatches += 1;
+                known.nanoseconds += nanoseconds;
+            }
+            None => kernels.push(KernelTime { kernel, dispatches: 1, nanoseconds: *nanoseconds }),
+        }
+    }
+    kernels
+}
+
+fn check_order(device: &mut dyn Executor, input: &OrderInput) -> Result<Found, Failure> {
+    let (found, passes) = input.on(device)?;
+    let agreement = order_agreement(&found, &input.by_processor()?);
+    Ok(Found { items: SPLATS.into(), agreement, passes })
+}
+
+/// How far splats are from their places; one that a side culled alone is as far away as there are places.
+fn order_agreement(found: &SliceOrder, expected: &SliceOrder) -> Agreement {
+    let places = |order: &SliceOrder| {
+        let mut place = vec![None; SPLATS as usize];
+        (0u32..).zip(&order.input_from_sorted).for_each(|(at, &id)| place[id as usize] = Some(at));
+        place
+    };
+    let distance = |pair: (Option<u32>, Option<u32>)| match pair {
+        (Some(a), Some(b)) => f64::from(a.abs_diff(b)),
+        (None, None) => 0.0,
+        _ => f64::from(SPLATS),
+    };
+    let apart: Vec<f64> = places(found).into_iter().zip(places(expected)).map(distance).collect();
+    let n = apart.len() as f64;
+    Agreement {
+        within: found == expected,
+        equal_share: apart.iter().filter(|d| **d == 0.0).count() as f64 / n,
+        mean: apart.iter().sum::<f64>() / n,
+        max: apart.iter().copied().fold(0.0, f64::max),
+        unit: "places",
+    }
+}
+
+/// Two walls, one before the other, in particles; the nearer ones are widened, the farther thinned out.
+struct ParticlesInput {
+    walls: [Mesh; 2],
+    camera: Camera,
+}
+
+impl ParticlesInput {
+    fn new() -> Self {
+        let wall = |side: f32, z: f32| {
+            let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+            let position = corners.map(|(x, y)| Vec3::new(side * x, side * y, z)).to_vec();
+            Mesh { position, triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() }
+        };
+        let (eye, view) = (DVec3::new(0.3, 0.2, 4.0), Projection::Perspective { fov_y: 0.7 });
+        let camera = Camera::look_at(eye, DVec3::ZERO, DVec3::Y, view, SIZE).expect("invariant: a view of its target");
+        Self { walls: [wall(0.7, 0.8), wall(1.5, -0.5)], camera }
+    }
+
+    fn check(&self, device: &mut dyn Executor) -> Result<Found, Failure> {
+        let middle = pixel_area(&self.camera, DVec3::new(0.0, 0.0, 4.0));
+        let params = |s: f64, seed, color| SurfaceParams {
+            opacity: 0.4,
+            cross_section: s * middle,
+            color,
+            seed,
+            ..SurfaceParams::default()
+        };
+        let near = MeshSampler::new(&self.walls[0], &params(3.0, 1, [0.9, 0.4, 0.1]), None)?;
+        let far = MeshSampler::new(&self.walls[1], &params(0.5, 2, [0.1, 0.5, 2.0]), None)?;
+        let material = Material { shading: Shading::Unlit, ..Material::default() };
+        let object = |sampler, turn| {
+            let transform = Similarity { rotation: DQuat::from_rotation_y(turn), ..Similarity::default() };
+            Object { sampler, transform, look: Appearance { material, ..Appearance::default() } }
+        };
+        let objects = [object(&near, 0.5), object(&far, -0.3)];
+        let scene = Scene { objects: &objects, lights: &[], ambient: [0.0; 3], camera: &self.camera, occluder: None };
+        let empty = Ensemble::new(SIZE, &EnsembleParams { radiance_unit: 0.5, ..EnsembleParams::default() })?;
+        let (mut expected, mut found, progress) = (empty.clone(), empty, Progress::default());
+        Renderer::new().fold(&scene, &mut expected, SETS, &FoldParams::default(), &progress)?;
+        let mut folded = Folded::default();
+        fold_on(device, &scene, &mut found, SETS, u64::MAX, &progress, &mut folded)?;
+        let Folded { particles, passes } = folded;
+        Ok(Found { items: particles, agreement: particles_agreement(&found, &expected), passes })
+    }
+}
+
+fn particles_agreement(found: &Ensemble, expected: &Ensemble) -> Agreement {
+    let pixels = || (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| (x, y)));
+    let same = pixels().filter(|&(x, y)| found.hits(x, y) == expected.hits(x, y)).count();
+    let radiance = |ensemble: &Ensemble| {
+        let layers = ensemble.read(&|_, _| [0.0; 3], None);
+        layers.rgb("beauty").map(<[[f32; 3]]>::to_vec).unwrap_or_default()
+    };
+    let (a, b) = (radiance(found), radiance(expected));
+    let apart: Vec<f64> =
+        a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| f64::from((a - b).abs())).collect();
+    let equal_share = same as f64 / pixels().count() as f64;
+    Agreement {
+        within: equal_share >= LEAST_SHARE,
+        equal_share,
+        mean: apart.iter().sum::<f64>() / apart.len().max(1) as f64,
+        max: apart.iter().copied().fold(0.0, f64::max),
+        unit: "radiance",
+    }
+}
