@@ -3,16 +3,12 @@
 
 #include "blocks.glsl"
 #include "layouts.glsl"
+#include "cover.glsl"
 
 layout(set = 0, binding = 0, std430) readonly buffer Bound0 { Scan blocks; };
 layout(set = 0, binding = 1, std430) buffer Bound1 { SortState state; };
 layout(set = 0, binding = 2, std430) buffer Bound2 { Scan digits; };
 layout(push_constant) uniform Push { uint room; } push;
-
-// As `Groups::cover`.
-uvec2 cover(uint blocks) {
-    return uvec2(min(blocks, 32768u), ceil_div(blocks, 32768u));
-}
 
 void main() {
     if (gl_LocalInvocationIndex != 0u || block_index() != 0u) {

@@ -57,6 +57,30 @@ kernels! {
     /// The exclusive scan of the numbers, in place, begun at their block's sum: scan, numbers, sums.
     SCAN_APPLY = "scan_apply" [Read, Write, Read];
 
+    /// How often each digit occurs in each block of 2048: state, keys → counts. Push: shift.
+    RADIX_HISTOGRAM = "radix_histogram" [Read, Read, Write] push 4;
+    /// Moves every key and its companion to their digit's place, equal digits in their order:
+    /// state, keys, companions, scanned counts → keys, companions. Push: shift.
+    RADIX_SCATTER = "radix_scatter" [Read, Read, Read, Read, Write, Write] push 4;
+
+    /// Nothing counted yet: view → state, scan of places.
+    SPLAT_BEGIN = "splat_begin" [Read, Write, Write];
+    /// How many tiles each splat of an order reaches: view, order, splats → counts, state.
+    SPLAT_COUNT = "splat_count" [Read, Read, Read, Write, Write];
+    /// Sizes of the sort by tiles, or nothing to sort where there is too little room: state → sort, scan of digits.
+    /// Push: room.
+    SPLAT_PREPARE = "splat_prepare" [Read, Write, Write] push 4;
+    /// An entry for each tile of each splat, in the order of splats:
+    /// view, order, splats, scanned counts, scan of places, sort → tiles, ids.
+    SPLAT_EMIT = "splat_emit" [Read, Read, Read, Read, Read, Read, Write, Write];
+    /// Where each tile begins among the sorted entries: view, sort, tiles → starts.
+    SPLAT_RANGES = "splat_ranges" [Read, Read, Read, Write];
+    /// Composites the entries of each tile, one plane of optical depth and three channels:
+    /// view, starts, ids, splats, values, tables, opaque depth → planes.
+    SPLAT_COMPOSITE_BEAUTY = "splat_composite_beauty" [Read, Read, Read, Read, Read, Read, Read, Write];
+    /// The same for any number of planes and channels.
+    SPLAT_COMPOSITE = "splat_composite" [Read, Read, Read, Read, Read, Read, Read, Write];
+
     /// Sets the state of a sort to nothing found: view → state, scan of blocks.
     HBSORT_BEGIN = "hbsort_begin" [Read, Write, Write];
     /// View depths as keys, culling, extremes, and how many of each block of 1024 are kept:
@@ -66,11 +90,6 @@ kernels! {
     HBSORT_COMPACT = "hbsort_compact" [Read, Read, Read, Write, Write] push 4;
     /// Sizes of what follows: scan of blocks → state, scan of digits. Push: room.
     HBSORT_PREPARE = "hbsort_prepare" [Read, Write, Write] push 4;
-    /// How often each digit occurs in each block of 2048: state, keys → counts. Push: shift.
-    HBSORT_HISTOGRAM = "hbsort_histogram" [Read, Read, Write] push 4;
-    /// Moves every splat to its digit's place, equal digits in their order:
-    /// state, keys, places, scanned counts → keys, places. Push: shift.
-    HBSORT_SCATTER = "hbsort_scatter" [Read, Read, Read, Read, Write, Write] push 4;
 
     /// Sets the sums of pixels to nothing: view → sums.
     PBSR_BEGIN = "pbsr_begin" [Read, Write];

@@ -61,6 +61,48 @@ layouts! {
         pub scan_groups_z: u32,
     }
 
+    /// The image that splats are composited into, and what is given of them.
+    pub struct SplatView {
+        /// Half the size, pixels.
+        pub middle: [f32; 2],
+        /// Width and height, pixels.
+        pub size: [f32; 2],
+        /// Focal length, pixels; 0 for parallel rays.
+        pub focal: f32,
+        /// A tile is done when all its transmittances are below this.
+        pub cutoff: f32,
+        /// Tiles across.
+        pub columns: u32,
+        /// Tiles.
+        pub tiles: u32,
+        /// Splats of the order.
+        pub ordered: u32,
+        /// Words of a splat: 8, or 12 with depths.
+        pub splat_words: u32,
+        /// Footprints of the table; the extinctions of materials come behind them.
+        pub footprints: u32,
+        /// Planes of optical depth, 1 or 3.
+        pub planes: u32,
+        /// Channels.
+        pub channels: u32,
+        /// 1 where an opaque surface may hide splats.
+        pub opaque: u32,
+        /// 1 where the farthest comes first.
+        pub back_to_front: u32,
+        /// 1 where the planes hold nothing yet.
+        pub fresh: u32,
+    }
+
+    /// What the counting of tiles found.
+    pub struct SplatState {
+        /// Entries, whether there is room for them or not: the lower 32 bits.
+        pub entries_low: u32,
+        /// The upper ones.
+        pub entries_high: u32,
+        /// Splats that reach a tile.
+        pub splats: u32,
+    }
+
     /// One object of a set of particles.
     pub struct ParticleObject {
         /// First column of the map from its offsets to view space; the fourth number is unused.

@@ -146,10 +146,10 @@ fn sort_pass(
 ) {
     let at = |offset| Groups::Indirect { buffer: state, offset: offset as u64 };
     let sort_groups = at(offset_of!(SortState, sort_groups_x));
-    r.dispatch(&kernels::HBSORT_HISTOGRAM, sort_groups, &[state, keys, digits.counts], &[shift]);
+    r.dispatch(&kernels::RADIX_HISTOGRAM, sort_groups, &[state, keys, digits.counts], &[shift]);
     scan(r, at(offset_of!(SortState, scan_groups_x)), digits.scan, digits.counts, digits.sums);
     let scattered = [state, keys, places, digits.counts, sorted_keys, sorted_places];
-    r.dispatch(&kernels::HBSORT_SCATTER, sort_groups, &scattered, &[shift]);
+    r.dispatch(&kernels::RADIX_SCATTER, sort_groups, &scattered, &[shift]);
 }
 
 impl Recorded {

@@ -11,6 +11,8 @@
 mod bins;
 mod finish;
 mod gather;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 mod kernel;
 mod lanes;
 mod opaque;

@@ -32,6 +32,29 @@ struct SortState {
     uint scan_groups_z;
 };
 
+struct SplatView {
+    vec2 middle;
+    vec2 size;
+    float focal;
+    float cutoff;
+    uint columns;
+    uint tiles;
+    uint ordered;
+    uint splat_words;
+    uint footprints;
+    uint planes;
+    uint channels;
+    uint opaque;
+    uint back_to_front;
+    uint fresh;
+};
+
+struct SplatState {
+    uint entries_low;
+    uint entries_high;
+    uint splats;
+};
+
 struct ParticleObject {
     vec4 linear_x;
     vec4 linear_y;

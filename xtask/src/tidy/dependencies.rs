@@ -5,7 +5,7 @@ use crate::toml_lines::{lines, string};
 
 /// For each crate of the workspace, the crates of the workspace that it may depend on, tests and benches included.
 const MAY_KNOW: [(&str, &[&str]); 14] = [
-    ("splat-core", &[]),
+    ("splat-core", &["splat-shaders"]),
     ("convert", &["splat-core"]),
     ("tsm", &["splat-core"]),
     ("hbsort", &["splat-core", "splat-shaders"]),

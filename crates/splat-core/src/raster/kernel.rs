@@ -53,6 +53,15 @@ impl Kernel {
         }
     }
 
+    /// The numbers that [`Kernel::profile`] computes with: G, q, e^−q, 1 where G holds.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn table(&self) -> [f32; 12] {
+        let mut table = [0.0; 12];
+        table[..TERMS].copy_from_slice(&self.g);
+        table[TERMS..TERMS + 3].copy_from_slice(&[self.sharpness, self.rim, f32::from(u8::from(self.smooth))]);
+        table
+    }
+
     /// w at t = max(1 − s, 0).
     #[inline(always)]
     pub(crate) fn profile<S: Simd>(&self, simd: S, t: Lanes<S>) -> Lanes<S> {

@@ -1,5 +1,5 @@
 #version 450
-// Moves every splat to its digit's place; equal digits keep their order.
+// Moves every key and its companion to their digit's place; equal digits keep their order.
 //
 // A round of 256 neighbours at a time: each thread sets its bit in the word of its digit, and the bits below it are the
 // equal digits before it. The order of the atomics does not matter, and no subgroup is needed.

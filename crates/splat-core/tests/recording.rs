@@ -1,0 +1,123 @@
+//! The recorded compositing, without a device: what it is, and what it refuses.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use glam::{DVec3, Vec3};
+use splat_core::raster::gpu::{Capacities, Input, record};
+use splat_core::raster::{Accumulation, OpaqueImage, Params, Projected, project};
+use splat_core::{Accumulator, Camera, Cloud, Direction, Error, FootprintStack, Material, Projection, Splat};
+
+const ROOM: Capacities = Capacities {
+    size: [640, 360],
+    planes: 1,
+    channels: 3,
+    splats: 100_000,
+    ordered: 80_000,
+    entries: 300_000,
+    footprints: 3,
+    materials: 2,
+    opaque: true,
+};
+
+#[test]
+fn it_is_as_kept_in_text() {
+    let found = record(ROOM).unwrap().recording.to_string();
+    assert_eq!(found, include_str!("recording.txt"), "now:\n{found}");
+}
+
+#[test]
+fn it_is_without_fault_for_any_room() {
+    for size in [[1, 1], [16, 16], [17, 16], [4096, 16], [4097, 16], [16_384, 16_384]] {
+        for (ordered, entries) in [(0, 0), (1, 1), (1025, 2048), (50_000_000, 200_000_000)] {
+            for (planes, channels) in [(1, 1), (1, 3), (3, 13)] {
+                let room = Capacities { size, planes, channels, ordered, entries, opaque: false, ..ROOM };
+                record(room).unwrap().recording.check().unwrap();
+            }
+        }
+    }
+}
+
+#[test]
+fn what_no_kernel_does_is_refused() {
+    for room in [
+        Capacities { size: [0, 5], ..ROOM },
+        Capacities { size: [5, 16_385], ..ROOM },
+        Capacities { planes: 2, ..ROOM },
+        Capacities { channels: 0, ..ROOM },
+        Capacities { channels: 14, ..ROOM },
+    ] {
+        assert!(matches!(record(room), Err(Error::Invalid { .. })), "{room:?}");
+    }
+}
+
+fn projected() -> Projected {
+    let mut cloud = Cloud::new(DVec3::ZERO);
+    for i in 0..10 {
+        cloud.push(&Splat { position: Vec3::X * 0.1 * i as f32, radius: 0.2, cross_section: 1.0, ..Splat::default() });
+    }
+    let view = Projection::Orthographic { height: 2.0 };
+    let camera = Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y, view, ROOM.size).unwrap();
+    project(&cloud, &camera, &FootprintStack::default(), &[Material::default()], &Params::default())
+}
+
+fn input<'a>(projected: &'a Projected, params: &'a Params, opaque: &'a OpaqueImage) -> Input<'a> {
+    static MATERIALS: std::sync::LazyLock<[Material; 1]> = std::sync::LazyLock::new(|| [Material::default()]);
+    let direction = Direction::FrontToBack;
+    Input { projected, order: &[3, 1, 9], values: &[0.5; 30], materials: &*MATERIALS, opaque, direction, params }
+}
+
+#[test]
+fn what_does_not_fit_the_room_or_the_device_is_refused() {
+    let (projected, params, opaque) = (projected(), Params::default(), OpaqueImage::default());
+    let plain = Accumulator::new(ROOM.size, 1, 3, false, false);
+    let input = input(&projected, &params, &opaque);
+    let uploads = |room: Capacities, input: &Input<'_>, acc: &Accumulator| record(room).unwrap().uploads(input, acc);
+    uploads(ROOM, &input, &plain).unwrap();
+    assert_eq!(
+        input.capacities(&plain, 7),
+        Capacities { splats: 10, ordered: 3, entries: 7, materials: 1, opaque: false, ..ROOM }
+    );
+    for room in [
+        Capacities { splats: 9, ..ROOM },
+        Capacities { ordered: 2, ..ROOM },
+        Capacities { footprints: 2, ..ROOM },
+        Capacities { materials: 0, ..ROOM },
+    ] {
+        assert!(matches!(uploads(room, &input, &plain), Err(Error::Overflow { .. })), "{room:?}");
+    }
+    let wall = OpaqueImage { depth: vec![1.0; 640 * 360], ..OpaqueImage::default() };
+    let hidden = Input { opaque: &wall, ..input };
+    let refused = uploads(Capacities { opaque: false, ..ROOM }, &hidden, &plain);
+    assert_eq!(refused, Err(Error::Overflow { what: "opaque images", needed: 1, had: 0 }));
+    let short = OpaqueImage { depth: vec![1.0; 5], ..OpaqueImage::default() };
+    for input in [Input { values: &[0.5; 29], ..input }, Input { opaque: &short, ..input }] {
+        assert!(matches!(uploads(ROOM, &input, &plain), Err(Error::ColumnLength { .. })));
+    }
+    let half = Params { accumulation: Accumulation::F16, ..params };
+    for input in [Input { order: &[10], ..input }, Input { params: &half, ..input }] {
+        assert!(matches!(uploads(ROOM, &input, &plain), Err(Error::Invalid { .. })));
+    }
+    for (depth, object) in [(true, false), (false, true)] {
+        let acc = Accumulator::new(ROOM.size, 1, 3, depth, object);
+        assert!(matches!(uploads(ROOM, &input, &acc), Err(Error::Invalid { .. })));
+    }
+    assert!(matches!(
+        uploads(ROOM, &input, &Accumulator::new([9, 9], 1, 3, false, false)),
+        Err(Error::ColumnLength { .. })
+    ));
+}
+
+#[test]
+fn what_is_read_back_is_put_in_or_refused() {
+    let recorded = record(Capacities { size: [2, 1], channels: 1, ..ROOM }).unwrap();
+    let mut acc = Accumulator::new([2, 1], 1, 1, false, false);
+    let state = |low: u32, high: u32| [low, high, 5].map(u32::to_ne_bytes).concat();
+    let planes = [0.5f32, 1.5, 2.5, 3.5].map(f32::to_ne_bytes).concat();
+    let counts = recorded.finish([&state(12, 0), &planes], &mut acc).unwrap();
+    assert_eq!((counts.splats, counts.entries), (5, 12));
+    assert_eq!((&acc.optical_depth, &acc.channels), (&vec![vec![0.5, 1.5]], &vec![vec![2.5, 3.5]]));
+    let overflow = |needed| Err(Error::Overflow { what: "tile entries", needed, had: 300_000 });
+    assert_eq!(recorded.finish([&state(300_001, 0), &planes], &mut acc), overflow(300_001));
+    assert_eq!(recorded.finish([&state(1, 1), &planes], &mut acc), overflow((1 << 32) + 1));
+    assert!(matches!(recorded.finish([&[], &planes], &mut acc), Err(Error::ColumnLength { .. })));
+    assert!(matches!(recorded.finish([&state(1, 0), &planes[4..]], &mut acc), Err(Error::ColumnLength { .. })));
+}
