@@ -159,6 +159,7 @@ fn exit_5_bi26_limits_are_checked_before_the_work() {
 #[test]
 fn exit_6_is_for_the_gpu() {
     let place = place();
+    place.expect(2, &["render", "s.toml", "--device-composites"], "--device-composites is for a GPU");
     for backend in ["ash", "wgpu", "auto"] {
         let missing = ["render", "s.toml", "--backend", backend, "--device", "no such device"];
         place.expect(6, &missing, &format!("error: --backend {backend}: "));

@@ -5,6 +5,7 @@ use crate::load::Loaded;
 use crate::plan::{Plan, pass};
 use crate::scene::{RenderSettings, ShadowMapping};
 use crate::{Error, Progress};
+use splat_core::raster::gpu::Input;
 use splat_core::raster::{self, Background, Detail, OpaqueImage, Projected, RasterCounts};
 use splat_core::shade::{ChannelLayout, LitBy, ShadeInput, shade};
 use splat_core::{
@@ -25,6 +26,8 @@ pub(crate) struct Drawing<'a> {
     pub(crate) max_memory: u64,
     /// A device that helps.
     pub(crate) helper: Option<&'a Helper>,
+    /// Whether it composites splats, which changes the last bits.
+    pub(crate) device_composites: bool,
     pub(crate) progress: &'a Progress,
 }
 
@@ -257,17 +260,21 @@ impl Drawing<'_> {
         cost.measure(pass::SPLAT, |stage| {
             stage.items_in = ids.len() as u64;
             let (materials, params) = (&self.loaded.materials, self.raster_params());
-            let counts = raster::fold(
-                projected,
-                &ids,
-                values,
-                materials,
-                opaque,
-                direction,
-                &params,
-                &mut accumulator,
-                self.progress,
-            );
+            let input = Input { projected, order: &ids, values, materials, opaque, direction, params: &params };
+            let device = self.helper.filter(|_| self.device_composites);
+            let counts = device.and_then(|device| device.composite(&input, &mut accumulator)).unwrap_or_else(|| {
+                raster::fold(
+                    projected,
+                    &ids,
+                    values,
+                    materials,
+                    opaque,
+                    direction,
+                    &params,
+                    &mut accumulator,
+                    self.progress,
+                )
+            });
             record(stage, &counts);
             Ok::<_, Error>(())
         })?;

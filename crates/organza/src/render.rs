@@ -25,11 +25,21 @@ pub struct RenderOptions {
     pub checkpoint: Option<PathBuf>,
     /// The device on which the passes run that can; `None`: the processor alone.
     pub device: Option<DeviceChoice>,
+    /// Whether the device composites the splats too: beauty then differs from the processor's by rounding, up to 10⁻⁵ of
+    /// the brightest splat.
+    pub device_composites: bool,
 }
 
 impl Default for RenderOptions {
     fn default() -> Self {
-        Self { max_memory: 8 << 30, drop_invalid: false, merge_duplicates: false, checkpoint: None, device: None }
+        Self {
+            max_memory: 8 << 30,
+            drop_invalid: false,
+            merge_duplicates: false,
+            checkpoint: None,
+            device: None,
+            device_composites: false,
+        }
     }
 }
 
@@ -157,6 +167,7 @@ pub(crate) fn drawing<'a>(
         plan,
         max_memory: options.max_memory,
         helper: None,
+        device_composites: options.device_composites,
         progress,
     }
 }

@@ -67,6 +67,9 @@ pub(super) struct SceneArguments {
     /// Part of the name of the GPU for --backend auto, ash or wgpu [default: the best, never a software driver]
     #[arg(long, value_name = "NAME")]
     pub(super) device: Option<String>,
+    /// The GPU composites the splats too; beauty then differs from the processor's by rounding, up to 1e-5
+    #[arg(long)]
+    pub(super) device_composites: bool,
     /// Size of the picture, pixels
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub(super) size: Option<[i64; 2]>,

@@ -26,6 +26,7 @@ pub(super) fn render_options(arguments: &SceneArguments) -> RenderOptions {
         merge_duplicates: arguments.merge_duplicates,
         checkpoint: None,
         device: device(arguments),
+        device_composites: arguments.device_composites,
     }
 }
 
@@ -63,6 +64,9 @@ fn check_backend(arguments: &SceneArguments) -> Result<(), Error> {
     match (arguments.backend, &arguments.device) {
         (Backend::Cpu, Some(_)) => {
             Err(Error::usage("--device names a GPU, and the processor was asked for", "add --backend auto"))
+        }
+        (Backend::Cpu, None) if arguments.device_composites => {
+            Err(Error::usage("--device-composites is for a GPU, and the processor was asked for", "add --backend auto"))
         }
         _ => Ok(()),
     }

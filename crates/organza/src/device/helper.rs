@@ -2,12 +2,15 @@
 
 use super::order::order_on;
 use super::particles::{Folded, fold_on, why_not};
+use super::splats::{composite_on, why_not_composite};
 use super::trial::order_trial;
 use super::{DeviceChoice, Failure, fault};
 use crate::Error;
 use hbsort::{Params, SliceOrder};
 use pbsr::{Ensemble, Scene};
-use splat_core::{Camera, Cloud, Progress};
+use splat_core::raster::RasterCounts;
+use splat_core::raster::gpu::Input;
+use splat_core::{Accumulator, Camera, Cloud, Progress};
 use splat_shaders::{Backend, Choice, DeviceError, Executor, Validation};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -85,6 +88,15 @@ impl Helper {
         }
         let (order, _) = self.with(|device| order_on(device, cloud, ids, camera, params))?;
         Some(order)
+    }
+
+    /// Composites splats in order, or leaves them to the processor.
+    pub(crate) fn composite(&self, input: &Input<'_>, accumulator: &mut Accumulator) -> Option<RasterCounts> {
+        if let Some(why) = why_not_composite(input, accumulator) {
+            self.leave(why);
+            return None;
+        }
+        self.with(|device| composite_on(device, input, accumulator))
     }
 
     /// Folds sets of particles until the ensemble has `until` of them, or as many as the device can; the rest is the
