@@ -14,7 +14,10 @@ const MAY_KNOW: [(&str, &[&str]); 14] = [
     ("splat-shaders", &[]),
     ("gpu-ash", &["splat-shaders"]),
     ("gpu-wgpu", &["splat-shaders"]),
-    ("organza", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "splat-shaders", "gpu-ash", "gpu-wgpu"]),
+    (
+        "organza",
+        &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "splat-shaders", "gpu-ash", "gpu-wgpu"],
+    ),
     ("organza-tests", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza"]),
     ("organza-benches", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza"]),
     ("gpu-conformance", &["splat-core", "hbsort", "pbsr", "splat-shaders", "gpu-ash", "gpu-wgpu", "organza"]),
