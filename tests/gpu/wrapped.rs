@@ -1,4 +1,5 @@
-//! A backend with its devices made worse: one that is lost at a submission, or whose kernels see small buffers alone.
+//! A backend with its devices made worse: lost at a submission, short of memory, or with kernels that see small buffers
+//! alone.
 
 use splat_shaders::{Adapter, Backend, Choice, DeviceError, Executor, Inputs, Ready, Recording, Run, Validation};
 use std::sync::Arc;
@@ -21,13 +22,19 @@ pub struct Wrapped {
     inner: Arc<dyn Backend>,
     loss: Loss,
     binding_bytes: u64,
+    memory_bytes: u64,
     submissions: Arc<AtomicU64>,
 }
 
 impl Wrapped {
     /// Devices of `inner` that are lost, and whose kernels see at most so many bytes of a buffer.
     pub fn new(inner: Arc<dyn Backend>, loss: Loss, binding_bytes: u64) -> Self {
-        Self { inner, loss, binding_bytes, submissions: Arc::default() }
+        Self { inner, loss, binding_bytes, memory_bytes: u64::MAX, submissions: Arc::default() }
+    }
+
+    /// The same with memory for one recording of so many bytes.
+    pub fn with_memory(self, memory_bytes: u64) -> Self {
+        Self { memory_bytes, ..self }
     }
 
     /// Runs that were asked for so far.
@@ -53,7 +60,7 @@ impl Backend for Wrapped {
         let inner = self.inner.open(choice, validation)?;
         let adapter = self.describe(inner.adapter());
         let fate = Fate { loss: self.loss, submissions: self.submissions.clone(), lost: Arc::default() };
-        Ok(Box::new(WrappedDevice { inner, adapter, fate }))
+        Ok(Box::new(WrappedDevice { inner, adapter, memory_bytes: self.memory_bytes, fate }))
     }
 }
 
@@ -81,6 +88,7 @@ impl Fate {
 struct WrappedDevice {
     inner: Box<dyn Executor>,
     adapter: Adapter,
+    memory_bytes: u64,
     fate: Fate,
 }
 
@@ -93,6 +101,10 @@ impl Executor for WrappedDevice {
         let had = self.adapter.binding_bytes;
         if let Some(b) = recording.buffers().iter().find(|b| b.bytes > had) {
             return Err(DeviceError::TooLarge { name: b.name, needed: b.bytes, had });
+        }
+        let bytes = recording.bytes();
+        if bytes > self.memory_bytes {
+            return Err(DeviceError::Memory { bytes });
         }
         Ok(Box::new(WrappedReady { inner: self.inner.prepare(recording)?, fate: self.fate.clone() }))
     }

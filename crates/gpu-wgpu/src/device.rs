@@ -106,6 +106,12 @@ impl Device {
         self.prepare(recording)?.run(inputs)
     }
 
+    /// Throws the device away, as a driver does that loses it: what runs on it from now on is [`DeviceError::Lost`].
+    #[cfg(feature = "losing")]
+    pub fn lose(&self) {
+        self.raw.destroy();
+    }
+
     pub(crate) fn parts(&self) -> (&wgpu::Device, &wgpu::Queue, &Arc<Faults>) {
         (&self.raw, &self.queue, &self.faults)
     }

@@ -1,9 +1,9 @@
 //! Each kernel that stands by itself against a few lines of plain code.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use gpu_conformance::{bytes, open, words};
+use gpu_conformance::{adapter, bytes, open, words};
 use splat_core::rng;
-use splat_shaders::{Groups, Recording, kernels};
+use splat_shaders::{DeviceError, Groups, Recording, Validation, kernels};
 
 #[test]
 fn a_scan_is_the_sum_of_what_comes_before() {
@@ -49,4 +49,22 @@ fn a_prepared_recording_runs_again() {
     assert_eq!(words(run.bytes(sums)), [0, 8]);
     assert!(prepared.run(&[(sums, &[0; 12])]).is_err() && prepared.run(&[(sums, &[0; 3])]).is_err());
     assert_eq!(device.take_messages(), [""; 0]);
+}
+
+#[test]
+fn a_device_that_is_lost_says_so_and_another_can_be_opened() {
+    let mut r = Recording::default();
+    let [scan, sums] = [r.input("scan", 8), r.input("sums", 8)];
+    r.dispatch(&kernels::SCAN_SPINE, Groups::cover(1), &[scan, sums], &[]);
+    r.read(sums);
+    let inputs = [(scan, &bytes(&[2000, 0])[..]), (sums, &bytes(&[5, 6])[..])];
+    // Only wgpu can throw a device away that works.
+    let mut device = gpu_wgpu::Device::open(&adapter(), Validation::Off).unwrap();
+    let mut prepared = device.prepare(&r).unwrap();
+    assert_eq!(words(prepared.run(&inputs).unwrap().bytes(sums)), [0, 5]);
+    device.lose();
+    assert_eq!(prepared.run(&inputs), Err(DeviceError::Lost));
+    assert_eq!(device.run(&r, &inputs), Err(DeviceError::Lost));
+    let mut fresh = gpu_wgpu::Device::open(&adapter(), Validation::Off).unwrap();
+    assert_eq!(words(fresh.run(&r, &inputs).unwrap().bytes(sums)), [0, 5]);
 }

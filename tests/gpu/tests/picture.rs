@@ -26,7 +26,11 @@ const SCENE: &str = r#"
 
 /// A device that is lost, and its count of submissions.
 fn losing(loss: Loss, binding_bytes: u64) -> (Arc<Wrapped>, DeviceChoice) {
-    let backend = Arc::new(Wrapped::new(gpu_ash::backend(), loss, binding_bytes));
+    chosen(Wrapped::new(gpu_ash::backend(), loss, binding_bytes))
+}
+
+fn chosen(backend: Wrapped) -> (Arc<Wrapped>, DeviceChoice) {
+    let backend = Arc::new(backend);
     let choice = DeviceChoice { backends: vec![backend.clone()], choice: adapter(), or_processor: false };
     (backend, choice)
 }
@@ -223,6 +227,11 @@ fn a_device_with_small_buffers_sorts_in_parts() {
     let (device, choice) = losing(Loss::Once(3), 1 << 16);
     assert_eq!(alone.layers, picture(true, Some(choice)).layers);
     assert_eq!(device.submissions(), 3 + 2);
+    // As many parts where the memory is too small for all: 30 bytes a splat.
+    let (device, choice) = chosen(Wrapped::new(gpu_ash::backend(), Loss::Never, u64::MAX).with_memory(200_000));
+    let short = picture(true, Some(choice));
+    assert_eq!((&alone.layers, &alone.warnings), (&short.layers, &short.warnings));
+    assert_eq!(device.submissions(), 1 + 2);
     // Too small for anything: refused at the trial.
     let (_, choice) = losing(Loss::Never, 512);
     let text = SCENE.as_bytes();

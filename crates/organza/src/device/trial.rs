@@ -57,3 +57,35 @@ impl OrderInput {
         Ok(slice_cloud(&self.cloud, Some(&self.ids), &self.camera, &self.params, &mut Scratch::new())?)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_driver_that_fuses_products_and_sums_is_found_out() {
+        let input = OrderInput::new(SPLATS);
+        let view = input.camera.view_from_offset(input.cloud.origin);
+        let [a, b, c] = [view.rotation.x_axis.z, view.rotation.y_axis.z, view.rotation.z_axis.z];
+        let t = view.translation.z;
+        let order = |depth: &dyn Fn(Vec3) -> f32| {
+            let mut ids = input.ids.clone();
+            ids.sort_by(|i, j| {
+                let [p, q] = [i, j].map(|k| depth(input.cloud.position[*k as usize]));
+                p.total_cmp(&q).then(i.cmp(j))
+            });
+            ids
+        };
+        let apart = order(&|p| p.x * a + p.y * b + p.z * c + t);
+        let all = order(&|p| p.z.mul_add(c, p.y.mul_add(b, p.x * a)) + t);
+        let last = order(&|p| p.z.mul_add(c, p.x * a + p.y * b) + t);
+        let first = order(&|p| p.y.mul_add(b, p.x * a) + p.z * c + t);
+        for fused in [all, last, first] {
+            let moved = apart.iter().zip(&fused).filter(|(i, j)| i != j).count();
+            assert!(moved > 50, "{moved}");
+        }
+        // And something is in the view to be ordered.
+        let kept = input.by_processor().expect("an order").input_from_sorted.len();
+        assert!(kept > SPLATS as usize / 4, "{kept}");
+    }
+}
