@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use gpu_conformance::{Loss, Wrapped, adapter};
-use organza::{DeviceChoice, Progress, Render, RenderOptions, render, scene};
+use organza::{Agreement, DeviceChoice, Progress, Render, RenderOptions, render, scene};
 use std::sync::Arc;
 
 const SCENE: &str = r#"
@@ -203,9 +203,11 @@ fn every_device_has_a_passport() {
     assert_eq!(passports.len(), organza::devices().unwrap().len());
     for passport in &passports {
         assert!(passport.valid(), "{passport:?}");
-        let [order, particles] = &passport.recordings[..] else { panic!("{passport:?}") };
+        let [order, composite, particles] = &passport.recordings[..] else { panic!("{passport:?}") };
         assert_eq!((order.recording, order.items), ("order", 1 << 17));
         assert_eq!(order.outcome.as_ref().map(|a| (a.equal_share, a.mean, a.max)), Ok((1.0, 0.0, 0.0)));
+        let composited = |a: &Agreement| a.within && a.mean < 1e-6 && a.max <= 1e-5;
+        assert!(composite.outcome.as_ref().is_ok_and(composited), "{composite:?}");
         assert!(particles.items > 100_000 && particles.outcome.as_ref().is_ok_and(|a| a.mean < 1e-3));
         // Of each kernel one row: four passes of the sort are one.
         let scatter = order.passes.iter().filter(|k| k.kernel.ends_with("scatter")).map(|k| k.dispatches);

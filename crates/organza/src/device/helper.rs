@@ -96,7 +96,8 @@ impl Helper {
             self.leave(why);
             return None;
         }
-        self.with(|device| composite_on(device, input, accumulator))
+        let (counts, _) = self.with(|device| composite_on(device, input, accumulator))?;
+        Some(counts)
     }
 
     /// Folds sets of particles until the ensemble has `until` of them, or as many as the device can; the rest is the

@@ -1,9 +1,12 @@
 //! `organza passport`: every recording on every device by every backend, against its twin on the processor.
 
+mod composite;
+
 use super::particles::{Folded, fold_on};
 use super::trial::OrderInput;
 use super::{Failure, backends, listed};
 use crate::Error;
+use composite::CompositeInput;
 use pbsr::{
     Appearance, Ensemble, EnsembleParams, FoldParams, MeshSampler, Object, Renderer, Scene, SurfaceParams, pixel_area,
 };
@@ -15,7 +18,7 @@ use splat_shaders::{Adapter, Backend, Choice, DeviceError, Executor, PassTime, V
 const SPLATS: u32 = 1 << 17;
 /// Sets of particles that are folded.
 const SETS: u32 = 3;
-/// Their picture.
+/// Pictures of particles and of splats.
 const SIZE: [u32; 2] = [320, 200];
 /// Share of pixels whose hits must agree: a GPU may round the square root and the division in k otherwise.
 const LEAST_SHARE: f64 = 0.999;
@@ -43,7 +46,7 @@ impl Passport {
 /// One recording on one device.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Checked {
-    /// `order` or `particles`.
+    /// `order`, `composite` or `particles`.
     pub recording: &'static str,
     /// Splats or particles that went in.
     pub items: u64,
@@ -56,7 +59,8 @@ pub struct Checked {
 /// What a device found against what the processor found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreement {
-    /// Whether that is enough: equal bits for the order, 99.9 % of the pixels' hits for particles.
+    /// Whether that is enough: equal bits for the order, 10⁻⁵ for composited splats, 99.9 % of the pixels' hits for
+    /// particles.
     pub within: bool,
     /// Share of places or pixels that are equal in bits.
     pub equal_share: f64,
@@ -84,23 +88,25 @@ pub struct KernelTime {
 /// # Errors
 /// [`Error::Gpu`] when a driver fails to say what there is.
 pub fn passport(name: &str) -> Result<Vec<Passport>, Error> {
-    let (order, particles) = (OrderInput::new(SPLATS), ParticlesInput::new());
+    let input =
+        Inputs { order: OrderInput::new(SPLATS), composite: CompositeInput::new(), particles: ParticlesInput::new() };
     let mut passports = Vec::new();
     for backend in backends() {
         for (place, adapter) in listed(&*backend)?.into_iter().enumerate().filter(|(_, a)| a.name.contains(name)) {
-            passports.push(inspect(&*backend, place, adapter, &order, &particles));
+            passports.push(inspect(&*backend, place, adapter, &input));
         }
     }
     Ok(passports)
 }
 
-fn inspect(
-    backend: &dyn Backend,
-    place: usize,
-    adapter: Adapter,
-    order: &OrderInput,
-    particles: &ParticlesInput,
-) -> Passport {
+/// What all devices are tried with.
+struct Inputs {
+    order: OrderInput,
+    composite: CompositeInput,
+    particles: ParticlesInput,
+}
+
+fn inspect(backend: &dyn Backend, place: usize, adapter: Adapter, input: &Inputs) -> Passport {
     let mut device = backend.open(&Choice::Place(place), Validation::Off);
     if let Ok(other) = device.as_ref().map(|d| d.adapter().name.clone())
         && other != adapter.name
@@ -121,8 +127,9 @@ fn inspect(
         }
     };
     let recordings = vec![
-        check("order", &mut |device| check_order(device, order)),
-        check("particles", &mut |device| particles.check(device)),
+        check("order", &mut |device| check_order(device, &input.order)),
+        check("composite", &mut |device| input.composite.check(device)),
+        check("particles", &mut |device| input.particles.check(device)),
     ];
     let clockless = recordings.iter().all(|r| r.outcome.is_ok() && r.passes.is_empty());
     let missing = [(clockless, "timestamps"), (adapter.subgroup == 0, "the size of a subgroup")];

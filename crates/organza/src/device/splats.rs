@@ -4,7 +4,7 @@ use super::Failure;
 use splat_core::raster::gpu::{Input, TILE, record};
 use splat_core::raster::{Accumulation, RasterCounts};
 use splat_core::{Accumulator, Error};
-use splat_shaders::Executor;
+use splat_shaders::{Executor, PassTime};
 
 /// Room for tile entries before their number is known: so many a splat, and these.
 const ENTRIES_OF_SPLAT: usize = 4;
@@ -20,12 +20,12 @@ pub(super) fn why_not_composite(input: &Input<'_>, accumulator: &Accumulator) ->
     }
 }
 
-/// [`splat_core::raster::fold`] by a device; the accumulator changes only when all is done.
+/// [`splat_core::raster::fold`] by a device, with the times of its passes; the accumulator changes only when all is done.
 pub(super) fn composite_on(
     device: &mut dyn Executor,
     input: &Input<'_>,
     accumulator: &mut Accumulator,
-) -> Result<RasterCounts, Failure> {
+) -> Result<(RasterCounts, Vec<PassTime>), Failure> {
     let guess = ENTRIES_OF_SPLAT.saturating_mul(input.order.len()).saturating_add(MORE_ENTRIES);
     let mut room = u32::try_from(guess).unwrap_or(u32::MAX);
     loop {
@@ -39,13 +39,14 @@ pub(super) fn composite_on(
             }
             counts => {
                 let counts = counts?;
-                return Ok(RasterCounts {
+                let counts = RasterCounts {
                     splats: counts.splats,
                     tile_entries: counts.entries,
                     // At most: tiles that are done are left.
                     fragments: counts.entries * u64::from(TILE * TILE),
                     bytes: recorded.recording.bytes(),
-                });
+                };
+                return Ok((counts, run.passes));
             }
         }
     }
