@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza::accuracy::{
-    Absent, Facts, Frame, Knob, Options, Report, Request, Step, Study, Sweep, Theory, Truth, median_seconds, particles,
+    Absent, Facts, Frame, Knob, Options, Report, Request, Step, Study, Sweep, Theory, Truth, least_seconds, particles,
     points, random_study, study, verdict,
 };
 use organza::scene::{self, Scene};
@@ -181,12 +181,12 @@ fn what_was_not_measured_is_null() {
     assert_eq!(failed["failure"], "the table needs 9 bytes, the limit is 1");
     assert!(report.csv().lines().any(|l| l.starts_with("\"slabs\",\"slabs: 16\",\"slabs\",false,false,,,")));
     assert!(report.html().unwrap().contains("Not drawn: slabs: 16"));
-    // Two repeats of everything else.
+    // Two repeats of everything else, and more of what the frontier hangs on.
     assert!(
         settings
             .iter()
             .filter(|s| s["failure"].is_null())
-            .all(|s| s["seconds_of_repeats"].as_array().unwrap().len() == 2)
+            .all(|s| s["seconds_of_repeats"].as_array().unwrap().len() >= 2)
     );
 }
 
@@ -227,7 +227,7 @@ fn a_random_technique_has_intervals_and_its_noise_falls_with_the_root_of_the_rep
         assert!((sampled.from_limit.mean - deviation).abs() <= sampled.from_limit.half_width, "{level}: {sampled:?}");
         // 1152 numbers in five pictures: four standard errors.
         assert!(sampled.bias.is_none_or(|b| b < 0.19 * deviation), "{level}: {sampled:?}");
-        assert_eq!((sampled.seeds, o.timed.seconds.len()), (5, 5));
+        assert_eq!((sampled.seeds, o.timed.seconds.len()), (5, 7), "five seeds, and two rounds that the frontier held");
     }
     let bias = noisy(|seed, level| seed + 1000 * u64::from(level), 0.05);
     assert!(bias.outcomes.iter().all(|o| (o.sampled.unwrap().bias.unwrap() / 0.05 - 1.0).abs() < 0.1));
@@ -253,7 +253,7 @@ fn techniques_share_one_frontier_and_what_is_absent_is_named() {
     let (points, random) = (run(0.5).unwrap(), noisy(|seed, level| seed + 1000 * u64::from(level), 0.0));
     let report = Report::new(&scene(), OPTIONS, vec![points, random], Vec::new());
     let error = |[s, o]: &[usize; 2]| report.studies[*s].outcomes[*o].from_limit.as_ref().unwrap().linear.rmse;
-    let seconds = |[s, o]: &[usize; 2]| median_seconds(&report.studies[*s].outcomes[*o]).unwrap();
+    let seconds = |[s, o]: &[usize; 2]| least_seconds(&report.studies[*s].outcomes[*o]).unwrap();
     assert!(report.frontier.len() >= 3);
     let ordered = report.frontier.windows(2).all(|w| error(&w[0]) < error(&w[1]) && seconds(&w[0]) > seconds(&w[1]));
     assert!(ordered, "{:?}", report.frontier);
@@ -302,7 +302,7 @@ fn the_command_writes_three_files_or_none() {
     assert!((order - 0.5).abs() <= 0.03f64.max(half_width) && half_width < 0.2, "{order} ± {half_width}");
     let settings = particles["settings"].as_array().unwrap();
     assert!(
-        settings.iter().all(|s| s["sampled"]["seeds"] == 5 && s["seconds_of_repeats"].as_array().unwrap().len() == 5)
+        settings.iter().all(|s| s["sampled"]["seeds"] == 5 && s["seconds_of_repeats"].as_array().unwrap().len() >= 5)
     );
     let skipped = technique["skipped"].as_array().unwrap();
     assert!(skipped.iter().any(|s| s["knob"] == "footprint table size"));

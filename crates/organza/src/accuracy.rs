@@ -28,7 +28,7 @@ mod sampled;
 mod settings;
 mod study;
 
-pub use frontier::{Candidate, frontier, significant_ratio};
+pub use frontier::{Candidate, Hold, TOLD_APART, frontier, hold};
 pub use knob::{Knob, Request, Skipped, Step, Sweep, Theory};
 pub use measure::{Distance, Frame, Renderer, Timed};
 pub use particles::particles;
@@ -39,7 +39,7 @@ pub use report_html::verdict;
 pub use resolve::{Curve, CurvePoint, Settled, settle};
 pub use sampled::Sampled;
 pub use settings::Setting;
-pub use study::{Draw, Limit, Outcome, Study, median_seconds, study};
+pub use study::{Draw, Limit, Outcome, Study, least_seconds, study};
 
 pub(crate) use plot::escaped;
 pub(crate) use report_pictures::{data_uri, difference, png};
@@ -63,6 +63,11 @@ impl Options {
     /// Timed repeats of each setting.
     pub fn repeats(&self) -> usize {
         if self.quick { 2 } else { 5 }
+    }
+
+    /// Further repeats of what the frontier hangs on.
+    pub fn hold(&self) -> Hold {
+        if self.quick { Hold { calm: 2, most: 4 } } else { Hold { calm: 8, most: 20 } }
     }
 
     /// Bytes that a study takes at most unless the user allows more: ends of knobs would fill any memory.

@@ -1,13 +1,17 @@
 //! The frontier: settings that nothing more accurate comes near in time.
 //!
 //! From the most accurate on, a setting is on the frontier if it is faster than the last one on it by more than times can
-//! be told apart. That ratio follows from the spread of the repeats, rounded up to one of a few values: so noise neither
-//! adds points that are only luckily faster, nor moves the ratio between two runs.
+//! be told apart. Errors that are equal to two digits count as one, and the first setting in the report's order stands for
+//! those that are nearly as fast; so the scene's own does for knobs that change nothing. A setting's time is the least of its repeats: other work of the machine adds to a repeat and never takes
+//! from it. Errors are the same in every run, so a frontier changes with the times alone: what it hangs on is repeated until it has
+//! held for some rounds.
 
-use reference::statistics::median_with_spread;
+/// Ratio of times that counts as different.
+pub const TOLD_APART: f64 = 1.1;
 
-/// Ratios of times that a report may call different.
-const RATIOS: [f64; 4] = [1.1, 1.25, 1.5, 2.0];
+/// Ratio of times within which more repeats may change which is the faster. What is slower than something more accurate by
+/// this is not repeated; what is slower than the fastest of equal errors by this does not stand for them.
+const NEAR: f64 = 1.25;
 
 /// A setting that may be on the frontier.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,43 +20,92 @@ pub struct Candidate {
     pub id: usize,
     /// Its error, > 0.
     pub error: f64,
-    /// Median of its times, seconds.
+    /// Least of its times, seconds.
     pub seconds: f64,
 }
 
-/// The least of a few ratios by which two medians must differ to be called different: 1 plus six times the median over
-/// all settings of the relative median deviation of their repeats. That is about four standard deviations of one repeat;
-/// a repeat that something disturbed does not move it.
-pub fn significant_ratio(repeats: &[Vec<f64>]) -> f64 {
-    let noise = |times: &Vec<f64>| {
-        let middle = median_with_spread(times).filter(|s| times.len() > 1 && s.median > 0.0)?.median;
-        let deviations: Vec<f64> = times.iter().map(|t| (t - middle).abs() / middle).collect();
-        median_with_spread(&deviations).map(|s| s.median)
-    };
-    let all: Vec<f64> = repeats.iter().filter_map(noise).collect();
-    let wanted = 1.0 + 6.0 * median_with_spread(&all).map_or(0.0, |s| s.median);
-    RATIOS.into_iter().find(|r| *r >= wanted).unwrap_or(RATIOS[RATIOS.len() - 1])
-}
-
 /// Ids of the frontier, from the most accurate to the fastest.
-pub fn frontier(candidates: &[Candidate], ratio: f64) -> Vec<usize> {
-    let mut sorted: Vec<&Candidate> = candidates.iter().filter(|c| c.seconds > 0.0 && c.error.is_finite()).collect();
-    sorted.sort_by(|a, b| a.error.total_cmp(&b.error).then(a.seconds.total_cmp(&b.seconds)).then(a.id.cmp(&b.id)));
-    let mut fastest = f64::INFINITY;
+pub fn frontier(candidates: &[Candidate]) -> Vec<usize> {
+    let mut last = f64::INFINITY;
     let mut on_it = Vec::new();
-    for c in sorted {
-        if c.seconds * ratio < fastest || on_it.is_empty() {
-            fastest = c.seconds;
-            on_it.push(c.id);
+    for equal in sorted(candidates).chunk_by(|a, b| two_digits(a.error) == two_digits(b.error)) {
+        let fastest = equal.iter().map(|c| c.seconds).fold(f64::INFINITY, f64::min);
+        if fastest * TOLD_APART < last || on_it.is_empty() {
+            last = fastest;
+            on_it.extend(equal.iter().find(|c| c.seconds <= fastest * NEAR).map(|c| c.id));
         }
     }
     on_it
+}
+
+/// Exponent and two digits of an error > 0.
+fn two_digits(error: f64) -> (i32, i64) {
+    let exponent = error.log10().floor() as i32;
+    (exponent, (error / 10f64.powi(exponent - 1)).round() as i64)
+}
+
+/// How long the frontier's settings are repeated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Hold {
+    /// Rounds for which it has to stay the same.
+    pub calm: usize,
+    /// Most rounds.
+    pub most: usize,
+}
+
+/// Repeats the settings that may be on the frontier, one round after the other, until it has held.
+///
+/// `again` draws the setting of an id once more and gives the seconds that took.
+///
+/// # Errors
+/// Those of `again`.
+pub fn hold<E>(
+    candidates: &mut [Candidate],
+    rounds: Hold,
+    mut again: impl FnMut(usize) -> Result<f64, E>,
+) -> Result<Vec<usize>, E> {
+    let mut on_it = frontier(candidates);
+    let mut calm = 0;
+    for _ in 0..rounds.most {
+        if calm == rounds.calm || on_it.is_empty() {
+            break;
+        }
+        for id in contenders(candidates) {
+            let seconds = again(id)?;
+            candidates.iter_mut().filter(|c| c.id == id).for_each(|c| c.seconds = c.seconds.min(seconds));
+        }
+        let now = frontier(candidates);
+        calm = if now == on_it { calm + 1 } else { 0 };
+        on_it = now;
+    }
+    Ok(on_it)
+}
+
+/// Ids of those that something more accurate is not faster than by far.
+fn contenders(candidates: &[Candidate]) -> Vec<usize> {
+    let mut fastest = f64::INFINITY;
+    let mut ids = Vec::new();
+    for c in sorted(candidates) {
+        if c.seconds < NEAR * fastest {
+            ids.push(c.id);
+        }
+        fastest = fastest.min(c.seconds);
+    }
+    ids
+}
+
+fn sorted(candidates: &[Candidate]) -> Vec<Candidate> {
+    let usable = candidates.iter().filter(|c| c.seconds > 0.0 && c.error > 0.0 && c.error.is_finite());
+    let mut sorted: Vec<Candidate> = usable.copied().collect();
+    sorted.sort_by_key(|c| (two_digits(c.error), c.id));
+    sorted
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use splat_core::rng::unit;
+    use std::convert::Infallible;
 
     fn candidate(id: usize, error: f64, seconds: f64) -> Candidate {
         Candidate { id, error, seconds }
@@ -62,56 +115,75 @@ mod tests {
     fn only_what_is_faster_than_all_that_is_better() {
         let all = [
             candidate(0, 1e-4, 10.0),
-            candidate(1, 2e-4, 9.8),
+            candidate(1, 2e-4, 9.5),
             candidate(2, 1e-3, 4.0),
             candidate(3, 2e-3, 5.0),
             candidate(4, 1e-2, 1.0),
         ];
-        assert_eq!(frontier(&all, 1.05), [0, 2, 4]);
-        assert_eq!(frontier(&all, 1.01), [0, 1, 2, 4]);
-        assert_eq!(frontier(&[], 1.05), [0usize; 0]);
+        assert_eq!(frontier(&all), [0, 2, 4]);
+        assert_eq!(contenders(&all), [0, 1, 2, 4], "5 s are hopeless beside 4 s, 9.5 s beside 10 s are not");
+        assert_eq!(frontier(&[]), [0usize; 0]);
+        assert_eq!(frontier(&[candidate(7, 0.0, 1.0)]), [0usize; 0], "nothing can be said of an error of 0");
+        assert_eq!(frontier(&[candidate(7, f64::NAN, 1.0)]), [0usize; 0]);
     }
 
     #[test]
-    fn the_ratio_follows_the_noise_in_steps() {
-        assert_eq!(significant_ratio(&[vec![1.0, 1.0, 1.0]]), 1.1);
-        // Median 1.02, median deviation 0.03.
-        assert_eq!(significant_ratio(&[vec![1.0, 1.1, 1.05, 1.02, 0.98]]), 1.25);
-        assert_eq!(significant_ratio(&[vec![1.0, 9.0]]), 2.0);
-        assert_eq!(significant_ratio(&[vec![1.0]]), 1.1);
+    fn of_equal_errors_the_first_stands_for_those_nearly_as_fast() {
+        let slow = candidate(0, 1e-4, 10.0);
+        let equal = [candidate(1, 2.01e-3, 5.2), candidate(2, 2.04e-3, 5.0), candidate(3, 1.98e-3, 4.9)];
+        assert_eq!(frontier(&[slow, equal[0], equal[1], equal[2]]), [0, 1]);
+        assert_eq!(frontier(&[slow, candidate(1, 2.01e-3, 6.5), equal[1], equal[2]]), [0, 2]);
+        // What follows has to be faster than the fastest of them.
+        assert_eq!(frontier(&[slow, equal[0], equal[2], candidate(4, 1e-2, 4.5)]), [0, 1]);
+        assert_eq!([9.94e-3, 9.96e-3, 0.01, 1.0].map(two_digits), [(-3, 99), (-3, 100), (-2, 10), (0, 10)]);
     }
 
-    /// Forty settings like those of a report: many near one time (their knob is cheap), the rest spread over a decade.
-    fn rerun(run: u64) -> (Vec<Candidate>, Vec<Vec<f64>>) {
-        let mut repeats = Vec::new();
-        let of = |id: usize| {
-            let u = |k| unit(11, 0, id as u64, k);
-            let error = 10f64.powf(-4.0 + 2.5 * u(0));
-            let seconds = if id.is_multiple_of(2) { 1.0 } else { 10f64.powf(-0.5 + u(1)) };
-            let time = |r: u64| {
-                // Sums of four uniform numbers: a deviation of 3 %, and now and then a repeat that was disturbed.
-                let noise: f64 = (0..4).map(|j| unit(run, r, id as u64, j) - 0.5).sum();
-                let disturbed = if unit(run, r, id as u64, 9) < 0.05 { 1.5 } else { 1.0 };
-                seconds * disturbed * (1.0 + 0.052 * noise)
-            };
-            let times: Vec<f64> = (0..5).map(time).collect();
-            let median = median_with_spread(&times).unwrap().median;
-            repeats.push(times);
-            candidate(id, error, median)
+    #[test]
+    fn repeats_end_when_the_frontier_held() {
+        let all = || vec![candidate(0, 1e-4, 2.0), candidate(1, 1e-3, 1.9), candidate(2, 1e-2, 3.0)];
+        let rounds = Hold { calm: 3, most: 9 };
+        let mut calls = Vec::new();
+        let same = hold(&mut all(), rounds, |id| {
+            calls.push(id);
+            Ok::<_, Infallible>(2.0)
+        });
+        assert_eq!((same, calls), (Ok(vec![0]), vec![0, 1, 0, 1, 0, 1]), "the third is hopeless");
+        // A time that was disturbed is found out, and the count begins anew.
+        let mut round = 0;
+        let found = hold(&mut all(), rounds, |id| {
+            round += usize::from(id == 0);
+            Ok::<_, Infallible>(if id == 1 && round == 2 { 1.0 } else { 2.0 })
+        });
+        assert_eq!((found, round), (Ok(vec![0, 1]), 5));
+        assert_eq!(hold(&mut [], rounds, |_| Ok::<_, Infallible>(1.0)), Ok(vec![]));
+    }
+
+    /// One repeat of one of forty settings like those of a report: many near one time (their knob is cheap), the rest spread
+    /// over a decade. A third of the repeats is disturbed.
+    fn seconds(run: u64, id: usize, repeat: u64) -> f64 {
+        let undisturbed = if id.is_multiple_of(2) { 1.0 } else { 10f64.powf(-0.5 + unit(11, 0, id as u64, 1)) };
+        let u = |k| unit(run, repeat, id as u64, k);
+        let disturbed = if u(0) < 0.33 { 1.0 + 0.35 * u(1) } else { 1.0 };
+        undisturbed * disturbed * (1.0 + 0.04 * u(2))
+    }
+
+    fn rerun(run: u64) -> Vec<usize> {
+        let least = |id| (0..5).map(|r| seconds(run, id, r)).fold(f64::INFINITY, f64::min);
+        let error = |id| 10f64.powf(-4.0 + 2.5 * unit(11, 0, id as u64, 0));
+        let mut candidates: Vec<_> = (0..40).map(|id| candidate(id, error(id), least(id))).collect();
+        let mut repeat = 5;
+        let again = |id| {
+            repeat += 1;
+            Ok::<_, Infallible>(seconds(run, id, repeat))
         };
-        let candidates = (0..40).map(of).collect();
-        (candidates, repeats)
+        hold(&mut candidates, Hold { calm: 8, most: 20 }, again).unwrap()
     }
 
     #[test]
     fn a_rerun_gives_the_same_frontier_in_nine_of_ten_points() {
-        let run = |seed| {
-            let (candidates, repeats) = rerun(seed);
-            frontier(&candidates, significant_ratio(&repeats))
-        };
         let (mut same, mut all, mut thin) = (0, 0, usize::MAX);
         for pair in 0..100 {
-            let (a, b) = (run(2 * pair), run(2 * pair + 1));
+            let (a, b) = (rerun(2 * pair), rerun(2 * pair + 1));
             same += a.iter().filter(|id| b.contains(id)).count();
             all += a.len().max(b.len());
             thin = thin.min(a.len());

@@ -4,7 +4,7 @@
 //! read from the spread over seeds, which needs no reference; so no error is too small to be shown, and none is refused.
 
 use super::settings::Settings;
-use super::study::{Repeats, frontier_of, repeat_all};
+use super::study::{Repeats, hold_frontier, repeat_all};
 use super::{
     Curve, CurvePoint, Distance, Draw, Limit, Options, Outcome, Sampled, Setting, Settled, Step, Study, Sweep, Timed,
     Truth,
@@ -51,7 +51,7 @@ pub fn random_study(
         }
     });
     let curves = curves.collect();
-    let (ratio, frontier) = frontier_of(&outcomes.iter().collect::<Vec<_>>());
+    let frontier = hold_frontier(&mut outcomes, options, progress, draw)?;
     Ok(Study {
         technique: sweep.technique,
         outcomes,
@@ -60,7 +60,6 @@ pub fn random_study(
         limit: limit.clone(),
         truth,
         frontier,
-        significant_ratio: ratio,
         knobs: sweep.knobs.clone(),
     })
 }

@@ -1,7 +1,7 @@
 //! The files of a report.
 
-use super::study::frontier_of;
-use super::{Options, Study, report_html, report_tables};
+use super::study::candidates;
+use super::{Options, Study, frontier, report_html, report_tables};
 use crate::output::{check_target, write_atomically};
 use crate::scene::Scene;
 use crate::{Error, printable};
@@ -52,8 +52,6 @@ pub struct Report {
     pub absent: Vec<Absent>,
     /// The frontier over all techniques, from the most accurate to the fastest: study, setting.
     pub frontier: Vec<[usize; 2]>,
-    /// Ratio of times that counts as different on it.
-    pub significant_ratio: f64,
 }
 
 /// A technique that cannot show the scene, and why.
@@ -70,11 +68,9 @@ impl Report {
     pub fn new(scene: &Scene, options: Options, studies: Vec<Study>, absent: Vec<Absent>) -> Self {
         let places: Vec<[usize; 2]> =
             studies.iter().enumerate().flat_map(|(s, study)| (0..study.outcomes.len()).map(move |o| [s, o])).collect();
-        let outcomes: Vec<_> = places.iter().map(|[s, o]| &studies[*s].outcomes[*o]).collect();
-        let (significant_ratio, on_it) = frontier_of(&outcomes);
+        let on_it = frontier(&candidates(studies.iter().flat_map(|s| &s.outcomes)));
         Self {
             frontier: on_it.into_iter().map(|k| places[k]).collect(),
-            significant_ratio,
             absent,
             scene: printable(Path::new(scene.file.file_name().unwrap_or_default())),
             scene_sha256: scene.sha256.clone(),

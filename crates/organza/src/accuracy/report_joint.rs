@@ -1,7 +1,7 @@
 //! The part of the page that shows all techniques together: their settings in one plot, and one frontier.
 
 use super::plot::{COLORS, Mark, Plot, Series, escaped};
-use super::{Outcome, Report, median_seconds};
+use super::{Outcome, Report, least_seconds};
 use std::fmt::Write;
 
 /// A bar that reaches below zero ends at this share of the mean.
@@ -69,14 +69,14 @@ pub(super) fn bar_of(o: &Outcome, color: &str) -> Option<Series> {
 }
 
 fn bar(o: &Outcome, against: Against, color: &str) -> Option<Series> {
-    let ((mean, half), seconds) = (error(o, against).filter(|e| e.1 > 0.0)?, median_seconds(o)?);
+    let ((mean, half), seconds) = (error(o, against).filter(|e| e.1 > 0.0)?, least_seconds(o)?);
     let ends = [-half, half].map(|h| ([1e3 * seconds, (mean + h).max(LEAST * mean)], String::new()));
     Some(Series { color: color.into(), mark: Mark::Bars, points: ends.to_vec() })
 }
 
 fn plot(report: &Report, against: Against, y_label: &str, floor: Option<(f64, String)>) -> Plot {
     let place = |o: &Outcome| {
-        let (s, (e, half)) = (median_seconds(o)?, error(o, against)?);
+        let (s, (e, half)) = (least_seconds(o)?, error(o, against)?);
         let interval = if half > 0.0 { format!(" ± {half:.1e}") } else { String::new() };
         Some(([1e3 * s, e], format!("{}: {:.1} ms, RMSE {e:.2e}{interval}", o.setting.label, 1e3 * s)))
     };
@@ -92,6 +92,6 @@ fn plot(report: &Report, against: Against, y_label: &str, floor: Option<(f64, St
         let named = dots.map(|(at, text)| (at, format!("{}, {text}", study.technique)));
         series.push(Series { color: color.into(), mark: Mark::Dots, points: named.collect() });
     }
-    let x_label = "median time of a frame, loading left out, ms".into();
+    let x_label = "least time of a frame, loading left out, ms".into();
     Plot { size: [1000.0, 420.0], x_label, y_label: y_label.into(), floor, series }
 }

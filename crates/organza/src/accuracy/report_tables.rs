@@ -1,6 +1,6 @@
 //! The report as JSON and as CSV. A number that was not measured is null, or an empty cell; never 0.
 
-use super::{Curve, Distance, Outcome, Report, Study};
+use super::{Curve, Distance, Outcome, Report, Study, TOLD_APART};
 use reference::metrics::Errors;
 use reference::statistics::{Mean, Spread, median_with_spread};
 use serde_json::{Value, json};
@@ -21,7 +21,7 @@ pub(super) fn json(report: &Report) -> Value {
             let study = &report.studies[*s];
             json!({ "technique": study.technique, "setting": study.outcomes[*o].setting.label })
         }).collect::<Value>(),
-        "significant_ratio_of_times": report.significant_ratio,
+        "significant_ratio_of_times": TOLD_APART,
         "techniques": report.studies.iter().map(study).collect::<Value>(),
         "absent": report.absent.iter().map(|a| json!({ "technique": a.technique, "reason": a.reason })).collect::<Value>(),
     })
@@ -43,7 +43,6 @@ fn study(study: &Study) -> Value {
         },
         "curves": study.curves.iter().map(|c| curve(study, c)).collect::<Value>(),
         "frontier": study.frontier.iter().map(|i| study.outcomes[*i].setting.label.as_str()).collect::<Value>(),
-        "significant_ratio_of_times": study.significant_ratio,
         "skipped": study.skipped.iter().map(|s| json!({ "knob": s.knob, "reason": s.reason })).collect::<Value>(),
         "settings": study.outcomes.iter().enumerate().map(|(i, o)| setting(study, i, o)).collect::<Value>(),
     })

@@ -4,11 +4,10 @@ use super::resolve::MARGIN;
 use super::settings::Settings;
 use super::{
     Candidate, Curve, CurvePoint, Distance, Frame, Knob, Options, Request, Sampled, Setting, Settled, Skipped, Step,
-    Sweep, Timed, Truth, frontier, settle, significant_ratio,
+    Sweep, Timed, Truth, hold, settle,
 };
 use crate::{Error, Progress};
 use reference::metrics::{Image, Linear, compare};
-use reference::statistics::median_with_spread;
 use splat_core::rng;
 
 /// Relative size of what f32 rounding leaves in a picture.
@@ -47,9 +46,10 @@ pub struct Outcome {
     pub drawn: bool,
 }
 
-/// Median seconds of a setting, loading and conversion left out; `None` if it was not drawn.
-pub fn median_seconds(outcome: &Outcome) -> Option<f64> {
-    median_with_spread(&outcome.timed.seconds).map(|s| s.median)
+/// Least seconds of a setting's repeats, loading and conversion left out; `None` if it was not drawn. Other work of the machine
+/// only ever adds to a repeat.
+pub fn least_seconds(outcome: &Outcome) -> Option<f64> {
+    outcome.timed.seconds.iter().copied().min_by(f64::total_cmp)
 }
 
 /// A judged sweep.
@@ -69,8 +69,6 @@ pub struct Study {
     pub truth: Result<Truth, String>,
     /// Settings of the frontier, from the most accurate to the fastest.
     pub frontier: Vec<usize>,
-    /// Ratio of times that counts as different.
-    pub significant_ratio: f64,
     /// The knobs.
     pub knobs: Vec<Knob>,
 }
@@ -126,7 +124,7 @@ pub fn study(
         outcomes.push(Outcome { setting, timed, from_limit, from_truth, sampled: None, drawn });
     }
     refuse_unless_resolved(&outcomes, &limit, &curves)?;
-    let (ratio, frontier) = frontier_of(&outcomes.iter().collect::<Vec<_>>());
+    let frontier = hold_frontier(&mut outcomes, options, progress, draw)?;
     Ok(Study {
         technique: sweep.technique,
         outcomes,
@@ -135,7 +133,6 @@ pub fn study(
         limit,
         truth,
         frontier,
-        significant_ratio: ratio,
         knobs: sweep.knobs.clone(),
     })
 }
@@ -345,16 +342,29 @@ fn unresolved(message: impl Into<String>, hint: impl Into<String>) -> Error {
     Error::Unresolved { message: message.into(), hint: hint.into() }
 }
 
-/// Ratio of times that counts as different, and the places of those on the frontier, the most accurate first.
-pub(super) fn frontier_of(outcomes: &[&Outcome]) -> (f64, Vec<usize>) {
-    let repeats: Vec<Vec<f64>> = outcomes.iter().map(|o| o.timed.seconds.clone()).collect();
-    let candidate = |(id, o): (usize, &&Outcome)| {
+/// What may be on a frontier; ids are places in `outcomes`.
+pub(super) fn candidates<'a>(outcomes: impl Iterator<Item = &'a Outcome>) -> Vec<Candidate> {
+    let candidate = |(id, o): (usize, &Outcome)| {
         let error = o.from_limit.as_ref().filter(|_| o.drawn)?.linear.rmse;
-        Some(Candidate { id, error, seconds: median_seconds(o)? })
+        Some(Candidate { id, error, seconds: least_seconds(o)? })
     };
-    let candidates: Vec<Candidate> = outcomes.iter().enumerate().filter_map(candidate).collect();
-    let ratio = significant_ratio(&repeats);
-    (ratio, frontier(&candidates, ratio))
+    outcomes.enumerate().filter_map(candidate).collect()
+}
+
+/// Places of those on the frontier, the most accurate first, after repeats of those that it hangs on.
+pub(super) fn hold_frontier(
+    outcomes: &mut [Outcome],
+    options: &Options,
+    progress: &Progress,
+    draw: &mut Draw<'_>,
+) -> Result<Vec<usize>, Error> {
+    hold(&mut candidates(outcomes.iter()), options.hold(), |id| {
+        progress.add_total(1);
+        progress.tick(1).map_err(|_| Error::Cancelled)?;
+        let frame = draw(&outcomes[id].setting.request)?;
+        outcomes[id].timed.seconds.push(frame.seconds);
+        Ok(frame.seconds)
+    })
 }
 
 fn root_mean_square(image: &Image<Linear>) -> f64 {

@@ -123,7 +123,7 @@ fn study_text(study: &Study) -> String {
 }
 
 fn outcome_text(o: &Outcome) -> String {
-    let time = organza::accuracy::median_seconds(o).map_or_else(|| "-".into(), |s| format!("{:.1} ms", 1e3 * s));
+    let time = organza::accuracy::least_seconds(o).map_or_else(|| "-".into(), |s| format!("{:.1} ms", 1e3 * s));
     let error = o.from_limit.as_ref().filter(|_| o.drawn);
     let half = o.sampled.map_or_else(String::new, |s| format!(" ± {:.0e}", s.from_limit.half_width));
     let error = error.map_or_else(|| "-".into(), |d| format!("RMSE {:.2e}{half}  FLIP {:.4}", d.linear.rmse, d.flip));
