@@ -67,7 +67,7 @@ impl Options {
 
     /// Further repeats of what the frontier hangs on.
     pub fn hold(&self) -> Hold {
-        if self.quick { Hold { calm: 2, most: 4 } } else { Hold { calm: 8, most: 20 } }
+        if self.quick { Hold { calm: 1, most: 3 } } else { Hold { calm: 8, most: 20 } }
     }
 
     /// Bytes that a study takes at most unless the user allows more: ends of knobs would fill any memory.
