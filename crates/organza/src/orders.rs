@@ -110,10 +110,12 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
         translucent: drawing.ids(|kind| kind != SplatKind::Opaque),
         margin_px: drawing.filter_reach_px(),
     };
-    let auto = sorter.slices(Thickness::Auto, false)?.thickness;
-    if sorter.translucent.is_empty() {
-        return Err(Error::input("scene", "expected translucent splats, found none: there is nothing to order", ""));
+    let auto = sorter.slices(Thickness::Auto, false)?;
+    if auto.input_from_sorted.is_empty() {
+        let message = "expected translucent splats in view, found none: there is nothing to order";
+        return Err(Error::input("scene", message, ""));
     }
+    let auto = auto.thickness;
     let input = exact_input(&loaded, &camera, &shaded, drawing.raster_params().resampling_sigma_px);
     let pixels = f64::from(camera.size[0]) * f64::from(camera.size[1]);
     let rays = Rays::new(&input, (pixels / RAYS).sqrt().ceil() as usize);
