@@ -329,10 +329,7 @@ fn what_particles_cannot_do_is_said() {
         assert!(!out.status.success() && message.contains(expected), "{message}");
     };
     let text = scene([0, 1, 2]);
-    refused(&text, &["--layers", "depth"], "has no layer `depth.first`");
     refused(&text, &["--set", "render.particles.repeat_level=0"], "repeat_level");
-    let coloured = text.replace("shading = 'phase'", "shading = 'phase'\nextinction_rgb = [1, 2, 3]");
-    refused(&coloured, &[], "particles hide all colours alike");
 }
 
 #[test]

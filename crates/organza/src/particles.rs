@@ -8,6 +8,7 @@
 mod checkpoint;
 mod ensemble;
 mod kept;
+mod layers;
 mod parts;
 
 use crate::load::Loaded;
@@ -16,8 +17,10 @@ use crate::points::Drawing;
 use crate::scene::Scene;
 use crate::{Error, RenderOptions, Sets};
 pub(crate) use checkpoint::Checkpoint;
-use ensemble::{accumulate, error_layer, fold};
+pub(crate) use ensemble::average_bytes;
+use ensemble::fold;
 pub(crate) use kept::Kept;
+use layers::{OfHits, accumulate};
 use parts::sources;
 use pbsr::Occluder;
 use splat_core::raster::{self, Background, OpaqueImage};
@@ -47,10 +50,19 @@ pub(crate) fn draw(
         Some(kept) => kept.parts(&sources, warnings)?,
         None => sources.iter().filter_map(|s| s.part(warnings).transpose()).collect::<Result<_, _>>()?,
     };
-    let mut accumulator = Accumulator::new(camera.size, 1, layout.count(), false, false);
+    let set = &drawing.layers;
     let wanted = drawing.settings.layers.names().any(|name| name == "std_error");
-    let (mut std_error, mut sets) = (Vec::new(), None);
-    if !parts.is_empty() {
+    // Where there are particles, their hits say where light is absorbed and by whom.
+    let by_splats = parts.is_empty();
+    let mut accumulator = Accumulator::new(
+        camera.size,
+        drawing.plan.optical_depth_planes,
+        layout.count(),
+        set.depth && by_splats,
+        set.object && by_splats,
+    );
+    let (mut of_hits, mut sets) = (Vec::new(), None);
+    if !by_splats {
         let occluder = occluder(&opaque, &layout);
         let average = cost.measure(pass::PARTICLES, |stage| {
             let average = fold(drawing, &parts, &maps, &camera, occluder.as_ref(), options, checkpoint)?;
@@ -60,8 +72,9 @@ pub(crate) fn draw(
             Ok::<_, Error>(average)
         })?;
         accumulate(&average.ensemble, &layout, &mut accumulator);
-        if wanted {
-            std_error = error_layer(&average.ensemble, drawing, occluder.as_ref());
+        if wanted || set.depth || set.object {
+            let (ensemble, occluder) = (&average.ensemble, occluder.as_ref());
+            of_hits = OfHits { ensemble, parts: &parts, occluder, opaque: &opaque }.layers(drawing);
         }
         let asked = drawing.settings.particles.repeat_level;
         sets = Some(Sets { averaged: average.ensemble.levels(), asked, interrupted: average.interrupted });
@@ -69,13 +82,13 @@ pub(crate) fn draw(
     cost.measure(pass::FINISH, |stage| {
         stage.items_in = u64::from(camera.size[0]) * u64::from(camera.size[1]);
         let background = Background { color: drawing.background };
-        let (set, antialias) = (&drawing.layers, drawing.settings.antialias);
-        let mut layers = raster::finish(&accumulator, &opaque, &background, &layout, set, antialias);
+        let mut layers = raster::finish(&accumulator, &opaque, &background, &layout, set, drawing.settings.antialias);
         if wanted {
             // Without particles there is no noise.
-            std_error.resize(layers.size.iter().map(|s| *s as usize).product(), 0.0);
-            layers.insert("std_error", LayerData::Scalar(std_error));
+            let none = vec![0.0; layers.size.iter().map(|s| *s as usize).product()];
+            layers.insert("std_error", LayerData::Scalar(none));
         }
+        of_hits.into_iter().for_each(|(name, data)| layers.insert(name, data));
         Ok((layers, sets))
     })
 }

@@ -41,7 +41,7 @@ pub struct Plan {
     pub effects: Vec<Effect>,
     /// Passes in the order of running.
     pub passes: Vec<PlannedPass>,
-    /// Planes of optical depth: 1 when all materials absorb red, green and blue alike, else 3.
+    /// Planes of optical depth, or depth buffers of particles: 1 when all materials absorb red, green and blue alike, else 3.
     pub optical_depth_planes: usize,
     /// For each light: whether it gets a shadow map.
     pub shadow_maps: Vec<bool>,
@@ -131,8 +131,10 @@ fn shadow_effect(i: usize, light: &LightStatistics, statistics: &Statistics, all
 }
 
 fn colored_extinction(statistics: &Statistics) -> Effect {
+    const UNEQUAL: &str = "some material absorbs red, green and blue unequally";
     if statistics.colored_extinction {
-        effect("transmittance per channel", true, "some material absorbs red, green and blue unequally")
+        let how = if statistics.particles { ": a particle hides each channel by chance" } else { "" };
+        effect("transmittance per channel", true, format!("{UNEQUAL}{how}"))
     } else {
         effect("transmittance per channel", false, "all materials absorb red, green and blue alike")
     }

@@ -2,8 +2,8 @@
 
 use crate::device::{DeviceChoice, Helper};
 use crate::load::{Loaded, SplatCount, light_statistics, load_measured};
-use crate::particles::{self, Checkpoint, Kept};
-use crate::plan::{Plan, plan};
+use crate::particles::{self, Checkpoint, Kept, average_bytes};
+use crate::plan::{Plan, pass, plan};
 use crate::points::{self, Drawing};
 use crate::scene::{Scene, Technique};
 use crate::statistics::Statistics;
@@ -101,13 +101,16 @@ pub(crate) fn render_keeping(
     scene: &Scene,
     options: &RenderOptions,
     progress: &Progress,
-    kept: Option<&mut Kept>,
+    mut kept: Option<&mut Kept>,
 ) -> Result<Render, Error> {
     let open = |path: &PathBuf| Checkpoint::open(path, scene, options, kept.as_deref());
     let mut checkpoint = options.checkpoint.as_ref().map(open).transpose()?;
     let helper = options.device.as_ref().map(Helper::open).transpose()?;
     let (loaded, explanation) = prepare(scene, options, progress)?;
-    let Explanation { plan, mut cost, mut warnings, .. } = explanation;
+    let Explanation { plan, mut cost, mut warnings, memory, .. } = explanation;
+    if let Some(kept) = kept.as_deref_mut() {
+        kept.allow(options.max_memory, memory);
+    }
     let drawing = Drawing { helper: helper.as_ref(), ..drawing(scene, &loaded, &plan, options, progress) };
     let (layers, sets) = draw(scene, &drawing, options, checkpoint.as_mut(), kept, &mut cost, &mut warnings)?;
     let backend = helper.as_ref().map_or_else(|| "cpu".to_owned(), Helper::name);
@@ -206,14 +209,14 @@ pub(crate) fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOption
         let unequal = |m: &Material| m.extinction_rgb.iter().any(|e| *e != m.extinction_rgb[0]);
         statistics.colored_extinction |= materials.into_iter().any(unequal);
     }
-    if statistics.particles && statistics.colored_extinction {
-        let what = "particles hide all colours alike: a material absorbs red, green and blue unequally";
-        return Err(Error::input(crate::printable(&scene.file), what, "use technique = \"points\""));
-    }
     let plan = plan(&statistics);
     let maps = plan.shadow_maps.iter().filter(|on| **on).count() as u64;
     let splats = splat_bytes(loaded, &scene.render.layers.set());
-    let memory = image_bytes(scene) + splats + maps * map_bytes(statistics.casters);
+    let mut memory = image_bytes(scene) + splats + maps * map_bytes(statistics.casters);
+    if plan.passes.iter().any(|p| p.name == pass::PARTICLES) {
+        let size = scene.camera.size.map(|s| u64::from(s) * u64::from(scene.render.antialias));
+        memory += average_bytes(size, &scene.render.layers.set(), statistics.colored_extinction, options);
+    }
     check_memory("rendering", memory, options.max_memory)?;
     Ok((plan, memory))
 }

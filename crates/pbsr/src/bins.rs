@@ -11,10 +11,13 @@ pub(crate) const TILE: usize = 64;
 /// Pixels of a tile.
 pub(crate) const AREA: usize = TILE * TILE;
 
+/// Where the bits of the channels begin that a particle does not hide.
+const CLEAR: u32 = 28;
+
 /// One particle on one pixel.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Record {
-    /// Pixel of the tile (12 bits), place within the pixel (two of 8 bits).
+    /// Pixel of the tile (12 bits), place within the pixel (two of 8 bits), channels that it does not hide (3 bits).
     place: u32,
     pub(crate) depth: f32,
     pub(crate) normal: PackedNormal,
@@ -32,6 +35,12 @@ impl Record {
     #[inline(always)]
     pub(crate) fn key(&self) -> u64 {
         u64::from(self.depth.to_bits()) << 32 | u64::from(self.place.wrapping_mul(0x9e37_79b1))
+    }
+
+    /// Channels that it hides, bit c for channel c.
+    #[inline(always)]
+    pub(crate) fn channels(&self) -> u32 {
+        !self.place >> CLEAR & 7
     }
 
     /// Place in the pixel, (0, 1).
@@ -110,12 +119,14 @@ impl Task {
         (self.records.capacity() * size_of::<Record>() + self.starts.capacity() * 4) as u64
     }
 
-    /// Samples the chunks, projects and sorts.
+    /// Samples the chunks, projects and sorts. Each particle hides a channel with the probability in `shares`, if there are
+    /// some, else it hides all.
     pub(crate) fn fill(
         &mut self,
         sampler: &dyn Sampler,
         projector: &Projector,
         tiling: &Tiling,
+        shares: Option<[f32; 3]>,
         staging: &mut Staging,
     ) {
         staging.len = 0;
@@ -124,9 +135,17 @@ impl Task {
         self.starts.resize(tiling.tiles() + 1, 0);
         let mut scratch = std::mem::take(&mut staging.particles);
         let key = thinning_key(self.object, self.set, self.run);
+        let channels = rng::bits(u64::from(self.object), Stage::Channels as u64, self.set, self.run as u64);
         for chunk in self.chunks.clone() {
             let particles = sampler.chunk(self.set, chunk, &mut scratch);
-            staging.stage(particles, projector, tiling, (key, self.particles), &mut self.starts);
+            let numbers = (key, self.particles);
+            match shares {
+                None => staging.stage(particles, projector, tiling, numbers, |_| 0, &mut self.starts),
+                Some(shares) => {
+                    let clear = |i| clear(thinning(channels, i), shares);
+                    staging.stage(particles, projector, tiling, numbers, clear, &mut self.starts);
+                }
+            }
             self.particles += particles.len() as u64;
         }
         staging.particles = scratch;
@@ -163,6 +182,13 @@ pub(crate) fn thinning(key: u64, i: u64) -> f32 {
     ((bits >> 41) as f32 + 0.5) * (1.0 / (1u32 << 23) as f32)
 }
 
+/// The bits of the channels that a particle of this number in (0, 1) does not hide. One number for all three: what one
+/// channel hides, another that absorbs more hides too, so pictures have no more colour noise than they must.
+#[inline(always)]
+fn clear(random: f32, shares: [f32; 3]) -> u32 {
+    (0..3).fold(0, |bits, c| bits | u32::from(random >= shares[c]) << (CLEAR + c as u32))
+}
+
 impl Staging {
     /// Room for `n` records and a block more.
     fn grow(&mut self, n: usize) {
@@ -173,13 +199,14 @@ impl Staging {
     }
 
     /// Projects the particles of a chunk, of which the first has the number `before` in its run; counts those of each
-    /// tile, one place on in `counts`.
+    /// tile, one place on in `counts`. `clear` gives the bits of what a particle does not hide, by its number.
     fn stage(
         &mut self,
         particles: &Particles,
         projector: &Projector,
         tiling: &Tiling,
         (key, before): (u64, u64),
+        clear: impl Fn(u64) -> u32,
         counts: &mut [u32],
     ) {
         let columns = tiling.columns as u32;
@@ -195,7 +222,7 @@ impl Staging {
                 if normal.is_per_crossing() {
                     k *= projector.cosine(offsets[j], normal);
                 }
-                let record = Record { place: 0, depth, normal, color };
+                let record = Record { place: clear(number + j as u64), depth, normal, color };
                 if k > 1.0 {
                     self.len = n;
                     self.widened(
@@ -212,7 +239,7 @@ impl Staging {
                 let [px, py] = [0, 1].map(|a| self.view.pixel[a][j]);
                 let (tile, place) = place(px, py, self.view.within[j], columns);
                 self.tiles[n] = tile;
-                self.records[n] = Record { place, ..record };
+                self.records[n] = Record { place: place | record.place, ..record };
                 counts[if seen { tile as usize + 1 } else { 0 }] += 1;
                 n += usize::from(seen);
             }
@@ -228,7 +255,7 @@ impl Staging {
                 let within = scramble(key ^ u64::from(x) << 48 ^ u64::from(y) << 32) as u32 & 0xffff;
                 let (tile, place) = place(x, y, within, columns);
                 self.tiles[self.len] = tile;
-                self.records[self.len] = Record { place, ..record };
+                self.records[self.len] = Record { place: place | record.place, ..record };
                 counts[tile as usize + 1] += 1;
                 self.len += 1;
                 // A place for the next, and for what remains of the block.

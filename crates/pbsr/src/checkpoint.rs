@@ -1,13 +1,15 @@
 //! An ensemble as bytes and back, exactly: a resumed render ends in the same bits as one that never stopped.
 //!
 //! Layout, little endian: `PBSR`, version, tag (32 bytes, the caller's: a hash of scene and parameters), width, height,
-//! flags, radiance unit, depth range, levels, hits, sums, squares, depths, CRC-32 of all before.
+//! flags, radiance unit, depth range, levels, hits, sums, squares, depths, objects, what tells channels apart, CRC-32 of all
+//! before.
 
-use crate::ensemble::{DepthSum, Ensemble, EnsembleParams};
+use crate::depths::DepthSum;
+use crate::ensemble::{Apart, Ensemble, EnsembleParams, NearestObject};
 use crate::error::Error;
 
 const MAGIC: [u8; 4] = *b"PBSR";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const HEADER: usize = 4 + 4 + 32 + 8 + 4 + 4 + 8 + 4;
 
 impl Ensemble {
@@ -19,7 +21,7 @@ impl Ensemble {
         out.extend_from_slice(tag);
         self.size().iter().for_each(|s| out.extend_from_slice(&s.to_le_bytes()));
         let p = &self.params;
-        let bits = [p.effects, p.normal, p.shadow, p.depth_range.is_some()];
+        let bits = [p.effects, p.normal, p.shadow, p.depth_range.is_some(), p.object, p.colored_extinction];
         let flags = bits.iter().enumerate().fold(0u32, |f, (i, on)| f | u32::from(*on) << i);
         out.extend_from_slice(&flags.to_le_bytes());
         out.extend_from_slice(&p.radiance_unit.to_le_bytes());
@@ -28,10 +30,12 @@ impl Ensemble {
         self.hits.iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes()));
         self.sums.iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes()));
         self.squares.iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes()));
-        for d in &self.depths {
-            out.extend_from_slice(&d.nearest.to_le_bytes());
-            out.extend_from_slice(&d.sum.to_le_bytes());
-            out.extend_from_slice(&d.square.to_le_bytes());
+        let mut put = |word: u32| out.extend_from_slice(&word.to_le_bytes());
+        self.depths.iter().flat_map(DepthSum::words).for_each(&mut put);
+        self.objects.iter().flat_map(|o| [o.depth.to_bits(), o.object]).for_each(&mut put);
+        for apart in &self.apart {
+            apart.beside.iter().flat_map(|v| [*v as u32, (*v as u64 >> 32) as u32]).for_each(&mut put);
+            apart.either.iter().copied().for_each(&mut put);
         }
         let crc = crc32(&out);
         out.extend_from_slice(&crc.to_le_bytes());
@@ -64,13 +68,14 @@ impl Ensemble {
         let range = [f32::from_bits(read.u32()?), f32::from_bits(read.u32()?)];
         let on = |bit: u32| flags >> bit & 1 == 1;
         let depth_range = on(3).then_some(range);
-        let params = EnsembleParams { effects: on(0), normal: on(1), shadow: on(2), depth_range, radiance_unit };
+        let (effects, normal, shadow) = (on(0), on(1), on(2));
+        let (object, colored_extinction) = (on(4), on(5));
+        let params = EnsembleParams { effects, normal, shadow, depth_range, object, colored_extinction, radiance_unit };
         let levels = read.u32()?;
         params.validate().map_err(|e| bad(&e.to_string()))?;
         // The length is checked before anything of that length is made.
         let pixels = size.iter().map(|s| u64::from(s.div_ceil(64)) * 64).product::<u64>();
-        let each = 12 + 8 * params.channels() as u64 + if on(3) { 20 } else { 0 };
-        if pixels.checked_mul(each) != Some(read.0.len() as u64) {
+        if pixels.checked_mul(bytes_of_pixel(&params)) != Some(read.0.len() as u64) {
             return Err(bad("its length does not fit its image"));
         }
         let mut ensemble = Self::new(size, &params).map_err(|e| bad(&e.to_string()))?;
@@ -84,12 +89,29 @@ impl Ensemble {
         for v in &mut ensemble.squares {
             *v = u64::from_le_bytes(read.take()?);
         }
-        for d in &mut ensemble.depths {
-            let nearest = read.u32()?;
-            *d = DepthSum { nearest, sum: u64::from_le_bytes(read.take()?), square: u64::from_le_bytes(read.take()?) };
+        for depth in &mut ensemble.depths {
+            *depth = DepthSum::from_words(&read.words()?);
+        }
+        for nearest in &mut ensemble.objects {
+            *nearest = NearestObject { depth: f32::from_bits(read.u32()?), object: read.u32()? };
+        }
+        for apart in &mut ensemble.apart {
+            let beside = [read.take()?, read.take()?, read.take()?].map(i64::from_le_bytes);
+            *apart = Apart { beside, either: read.words()? };
         }
         Ok(ensemble)
     }
+}
+
+/// Bytes of a pixel in the file, where nothing is padded.
+fn bytes_of_pixel(params: &EnsembleParams) -> u64 {
+    let planes = |on: bool, words: usize| if on { 4 * words } else { 0 };
+    let bytes = 4 * params.hit_channels()
+        + 8 * (params.channels() + 1)
+        + planes(params.depth_range.is_some(), DepthSum::WORDS)
+        + planes(params.object, 2)
+        + planes(params.colored_extinction, 9);
+    bytes as u64
 }
 
 struct Reader<'a>(&'a [u8]);
@@ -103,6 +125,14 @@ impl Reader<'_> {
 
     fn u32(&mut self) -> Result<u32, Error> {
         Ok(u32::from_le_bytes(self.take()?))
+    }
+
+    fn words<const N: usize>(&mut self) -> Result<[u32; N], Error> {
+        let mut words = [0; N];
+        for word in &mut words {
+            *word = self.u32()?;
+        }
+        Ok(words)
     }
 }
 
@@ -160,7 +190,13 @@ mod tests {
 
     #[test]
     fn damaged_and_foreign_checkpoints_are_refused() {
-        let params = EnsembleParams { depth_range: Some([1.0, 2.0]), normal: true, ..EnsembleParams::default() };
+        let params = EnsembleParams {
+            depth_range: Some([1.0, 2.0]),
+            normal: true,
+            object: true,
+            colored_extinction: true,
+            ..EnsembleParams::default()
+        };
         let ensemble = Ensemble::new([3, 5], &params).unwrap();
         let bytes = ensemble.to_bytes(&[7; 32]);
         assert_eq!(Ensemble::from_bytes(&bytes, &[7; 32]).unwrap(), ensemble);

@@ -43,10 +43,9 @@ pub fn predict(scene: &Scene<'_>, ensemble: &EnsembleParams, levels: u32, params
     let particles = of_set * f64::from(levels);
     let in_batch = (params.batch_particles as f64).min(particles).max(of_set);
     let pixels: u64 = scene.camera.size.iter().map(|s| u64::from(s.div_ceil(64)) * 64).product();
-    let depth = if ensemble.depth_range.is_some() { 24 } else { 0 };
     Prediction {
         particles,
         batch_bytes: ((in_batch * BYTES_IN_BATCH as f64) as u64).min(params.max_bytes),
-        ensemble_bytes: pixels * (12 + 8 * ensemble.channels() as u64 + depth),
+        ensemble_bytes: pixels * ensemble.bytes_per_pixel(),
     }
 }

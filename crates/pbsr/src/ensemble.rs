@@ -2,23 +2,20 @@
 //!
 //! Each set adds at most one hit a pixel: 1 to a u32, each channel to an i64 as a multiple of unit·2⁻²⁴, its square to a
 //! u64. Integer sums depend on no order, so any number of threads, any split into batches and any resumed run gives the
-//! same bits. The value of a pixel in one set is a random variable; its mean is the picture, and
+//! same bits; what does depend on the order of the sets ([`crate::depths`]) gets them in order.
 //!
-//! standard error = √((Σy²/L − (Σy/L)²)/(L − 1)), y the luminance with what lies behind.
+//! Where extinction differs by channel, a set has at most one hit a pixel and channel, and hits are counted by channel.
 
+use crate::Error;
 use crate::bins::{AREA, Tiling};
+use crate::depths::DepthSum;
 use crate::error::check;
-use crate::{Error, Occluder};
-use splat_core::{LayerData, Layers};
 
 /// Bits behind the point of a channel's sum.
 pub(crate) const FRACTION: f32 = 16_777_216.0;
 
 /// Where radiance is cut, in its unit.
 pub(crate) const BRIGHTEST: f32 = 65536.0;
-
-/// Steps of a depth between the two ends of the range.
-const DEPTH_STEPS: f32 = 1_048_576.0;
 
 /// Weights of luminance, Rec.709.
 pub(crate) const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
@@ -32,9 +29,14 @@ pub struct EnsembleParams {
     pub normal: bool,
     /// Transmittance of the shadows at what is seen.
     pub shadow: bool,
-    /// Nearest and farthest view depth, for the distribution of depths; depths outside count as the ends. `None`: no
-    /// depths are kept.
+    /// Nearest and farthest view depth, for the distribution of depths; mean and deviation count depths outside as the
+    /// ends. `None`: no depths are kept.
     pub depth_range: Option<[f32; 2]>,
+    /// The object of the nearest hit.
+    pub object: bool,
+    /// Whether red, green and blue are hidden apart, by [`splat_core::Material::extinction_rgb`] of each object, to whose
+    /// largest channel its particles belong. Else a particle hides all alike.
+    pub colored_extinction: bool,
     /// A power of two times which radiances are near 1; 0 stands for 1. Radiance is summed in steps of 2⁻²⁴ of it, and
     /// cut at 2¹⁶ times it.
     pub radiance_unit: f32,
@@ -52,7 +54,24 @@ impl EnsembleParams {
 
     /// Whether a hit brings nothing but its radiance.
     pub(crate) fn only_beauty(&self) -> bool {
-        self.channels() == 3 && self.depth_range.is_none()
+        self.channels() == 3 && self.depth_range.is_none() && !self.object && !self.colored_extinction
+    }
+
+    /// Hits that a set can have in one pixel.
+    pub(crate) fn hit_channels(&self) -> usize {
+        if self.colored_extinction { 3 } else { 1 }
+    }
+
+    /// Bytes of the sums of one pixel: 36 for beauty, 8 more a further channel, 184 with depths, 8 with objects, 48 more
+    /// where extinction differs by channel.
+    pub fn bytes_per_pixel(&self) -> u64 {
+        let planes = |on: bool, size: usize| if on { size } else { 0 };
+        let bytes = 4 * self.hit_channels()
+            + 8 * (self.channels() + 1)
+            + planes(self.depth_range.is_some(), size_of::<DepthSum>())
+            + planes(self.object, size_of::<NearestObject>())
+            + planes(self.colored_extinction, size_of::<Apart>());
+        bytes as u64
     }
 
     pub(crate) fn unit(&self) -> f32 {
@@ -80,40 +99,62 @@ pub struct Ensemble {
     pub(crate) params: EnsembleParams,
     pub(crate) tiling: Tiling,
     pub(crate) levels: u32,
+    /// One a pixel, or three.
     pub(crate) hits: Vec<u32>,
     pub(crate) sums: Vec<i64>,
     /// Σ luminance².
     pub(crate) squares: Vec<u64>,
-    /// Nearest depth as bits, Σ steps, Σ steps²; empty when no depths are kept.
+    /// Empty when no depths are kept.
     pub(crate) depths: Vec<DepthSum>,
+    /// Empty when no objects are kept.
+    pub(crate) objects: Vec<NearestObject>,
+    /// Empty when a particle hides all channels.
+    pub(crate) apart: Vec<Apart>,
 }
 
-/// Distribution of the depths of one pixel's hits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct DepthSum {
-    /// Bits of a positive f32, which sort as numbers.
-    pub(crate) nearest: u32,
-    pub(crate) sum: u64,
-    pub(crate) square: u64,
+/// The nearest hit of all sets, and whose it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct NearestObject {
+    pub(crate) depth: f32,
+    pub(crate) object: u32,
 }
 
-impl DepthSum {
-    const NONE: Self = Self { nearest: f32::INFINITY.to_bits(), sum: 0, square: 0 };
+impl NearestObject {
+    const NONE: Self = Self { depth: f32::INFINITY, object: u32::MAX };
+
+    /// The nearer of two; at equal depths the object that comes first.
+    pub(crate) fn meet(&mut self, other: Self) {
+        if other.depth < self.depth || (other.depth == self.depth && other.object < self.object) {
+            *self = other;
+        }
+    }
+}
+
+/// What the error of the luminance needs where a set may hit a pixel in some channels alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Apart {
+    /// Σ luminance of the hits of the sets that leave a channel open.
+    pub(crate) beside: [i64; 3],
+    /// Sets that hit at least one of red and green, green and blue, blue and red.
+    pub(crate) either: [u32; 3],
 }
 
 /// Sums of one tile, to be added to.
+#[derive(Default)]
 pub(crate) struct TileSums<'a> {
     pub(crate) hits: &'a mut [u32],
     pub(crate) sums: &'a mut [i64],
     pub(crate) squares: &'a mut [u64],
-    pub(crate) depths: &'a mut [DepthSum],
+    depths: &'a mut [DepthSum],
+    objects: &'a mut [NearestObject],
+    apart: &'a mut [Apart],
     pub(crate) inverse_unit: f32,
 }
 
 impl TileSums<'_> {
-    /// One hit of pixel `k` of the tile.
+    /// One hit of pixel `k` of the tile in all channels.
     #[inline(always)]
-    pub(crate) fn add(&mut self, params: &EnsembleParams, k: usize, values: &[f32], depth: f32) {
+    pub(crate) fn add(&mut self, params: &EnsembleParams, k: usize, values: &[f32]) {
         self.hits[k] = self.hits[k].saturating_add(1);
         let (light, other) = values.split_at(params.light_channels());
         let (light_sums, other_sums) = self.sums[k * values.len()..].split_at_mut(light.len());
@@ -128,13 +169,59 @@ impl TileSums<'_> {
         other_sums.iter_mut().zip(other).for_each(|(sum, v)| raise(sum, fixed(*v)));
         let square = &mut self.squares[k];
         *square = square.saturating_add(fixed_square(luminance * luminance * FRACTION));
-        if let ([_, ..], Some([near, far])) = (&*self.depths, params.depth_range) {
-            let d = &mut self.depths[k];
-            let steps = ((depth - near) / (far - near) * DEPTH_STEPS + 0.5).clamp(0.0, DEPTH_STEPS) as u64;
-            d.nearest = d.nearest.min(depth.to_bits());
-            d.sum = d.sum.saturating_add(steps);
-            d.square = d.square.saturating_add(steps * steps);
+    }
+
+    /// The depth of that hit of set `set`, where depths are kept.
+    #[inline(always)]
+    pub(crate) fn locate(&mut self, params: &EnsembleParams, k: usize, set: u64, depth: f32) {
+        if let (Some(sum), Some(range)) = (self.depths.get_mut(k), params.depth_range) {
+            sum.add(set, depth, range);
         }
+    }
+
+    /// Whose that hit is, where objects are kept.
+    #[inline(always)]
+    pub(crate) fn name(&mut self, k: usize, depth: f32, object: u32) {
+        if let Some(nearest) = self.objects.get_mut(k) {
+            nearest.meet(NearestObject { depth, object });
+        }
+    }
+
+    /// A hit of pixel `k` in some channels (bit c for channel c); returns their luminance. A normal goes by component, as
+    /// compositing by channel has it, and the shadow by green.
+    pub(crate) fn add_channels(&mut self, params: &EnsembleParams, k: usize, values: &[f32], mask: u32) -> f32 {
+        let mut luminance = 0.0;
+        let light = params.light_channels();
+        for (at, value) in values.iter().enumerate() {
+            let triple = at < light || (params.normal && at < light + 3);
+            let channel = if triple { at % 3 } else { 1 };
+            if mask >> channel & 1 == 0 {
+                continue;
+            }
+            let mut v = *value;
+            if at < light {
+                v = (v * self.inverse_unit).clamp(-BRIGHTEST, BRIGHTEST);
+                luminance += v * LUMINANCE[channel];
+            }
+            raise(&mut self.sums[k * values.len() + at], fixed(v));
+        }
+        luminance
+    }
+
+    /// What pixel `k` shows of a set that hit it in some channels.
+    pub(crate) fn add_set(&mut self, k: usize, mask: u32, luminance: f32) {
+        let apart = &mut self.apart[k];
+        for c in 0..3 {
+            let hit = mask >> c & 1;
+            self.hits[3 * k + c] = self.hits[3 * k + c].saturating_add(hit);
+            if hit == 0 {
+                raise(&mut apart.beside[c], fixed(luminance));
+            }
+            let either = hit | mask >> ((c + 1) % 3) & 1;
+            apart.either[c] = apart.either[c].saturating_add(either);
+        }
+        let square = &mut self.squares[k];
+        *square = square.saturating_add(fixed_square(luminance * luminance * FRACTION));
     }
 }
 
@@ -174,14 +261,17 @@ impl Ensemble {
         check(size.iter().all(|s| (1..=65536).contains(s)), "size", size, "1 to 65536 pixels a side")?;
         let tiling = Tiling::new(size);
         let n = tiling.tiles() * AREA;
+        let pixels = |on: bool| if on { n } else { 0 };
         Ok(Self {
             params: *params,
             tiling,
             levels: 0,
-            hits: vec![0; n],
+            hits: vec![0; n * params.hit_channels()],
             sums: vec![0; n * params.channels()],
             squares: vec![0; n],
-            depths: if params.depth_range.is_some() { vec![DepthSum::NONE; n] } else { Vec::new() },
+            depths: vec![DepthSum::NONE; pixels(params.depth_range.is_some())],
+            objects: vec![NearestObject::NONE; pixels(params.object)],
+            apart: vec![Apart::default(); pixels(params.colored_extinction)],
         })
     }
 
@@ -200,34 +290,59 @@ impl Ensemble {
         &self.params
     }
 
-    /// Sets in which pixel (x, y) was hit; 0 out of the image.
+    /// Sets in which pixel (x, y) was hit; 0 out of the image. Where extinction differs by channel, in green.
     pub fn hits(&self, x: u32, y: u32) -> u32 {
         let inside = (x as usize) < self.tiling.size[0] && (y as usize) < self.tiling.size[1];
-        if inside { self.hits[self.tiling.index(x as usize, y as usize)] } else { 0 }
+        if inside { self.hits_in(self.tiling.index(x as usize, y as usize), 1) } else { 0 }
     }
 
-    /// Bytes of the sums: 36 a pixel for beauty, 8 more a further channel, 24 with depths.
+    /// Sets in which a pixel in tile order was hit in a channel.
+    pub(crate) fn hits_in(&self, at: usize, channel: usize) -> u32 {
+        if self.params.colored_extinction { self.hits[3 * at + channel] } else { self.hits[at] }
+    }
+
+    /// Bytes of the sums, see [`EnsembleParams::bytes_per_pixel`].
     pub fn bytes(&self) -> u64 {
-        let of = |n: usize, size: usize| (n * size) as u64;
-        of(self.hits.len(), 4) + of(self.sums.len(), 8) + of(self.squares.len(), 8) + of(self.depths.len(), 24)
+        self.squares.len() as u64 * self.params.bytes_per_pixel()
+    }
+
+    /// The sums by tile.
+    pub(crate) fn tiles(&mut self) -> Vec<TileSums<'_>> {
+        let (hits, sums) = (AREA * self.params.hit_channels(), AREA * self.params.channels());
+        let inverse_unit = 1.0 / self.params.unit();
+        let (mut depths, mut objects) = (self.depths.chunks_mut(AREA), self.objects.chunks_mut(AREA));
+        let mut apart = self.apart.chunks_mut(AREA);
+        let planes = self.hits.chunks_mut(hits).zip(self.sums.chunks_mut(sums)).zip(self.squares.chunks_mut(AREA));
+        let tile = |((hits, sums), squares)| TileSums {
+            hits,
+            sums,
+            squares,
+            depths: depths.next().unwrap_or_default(),
+            objects: objects.next().unwrap_or_default(),
+            apart: apart.next().unwrap_or_default(),
+            inverse_unit,
+        };
+        planes.map(tile).collect()
     }
 
     /// Adds the sums of other sets of the same scene.
     ///
     /// # Errors
-    /// [`Error::Parameter`] when size or kept channels differ, or the levels sum to more than 2³² − 1.
+    /// [`Error::Parameter`] when size or kept channels differ, when depths are kept (they depend on the order of the sets),
+    /// or the levels sum to more than 2³² − 1.
     pub fn merge(&mut self, other: &Self) -> Result<(), Error> {
         let same = self.tiling == other.tiling && self.params == other.params;
         check(same, "ensemble", other.size(), "an ensemble of the same size and channels")?;
+        check(self.depths.is_empty(), "ensemble", self.params, "an ensemble without depths")?;
         let levels = self.levels.checked_add(other.levels);
         self.levels = levels.ok_or_else(|| Error::parameter("levels", other.levels, "at most 2³² − 1 in all"))?;
         self.hits.iter_mut().zip(&other.hits).for_each(|(a, b)| *a = a.saturating_add(*b));
         self.sums.iter_mut().zip(&other.sums).for_each(|(a, b)| *a = a.saturating_add(*b));
         self.squares.iter_mut().zip(&other.squares).for_each(|(a, b)| *a = a.saturating_add(*b));
-        for (a, b) in self.depths.iter_mut().zip(&other.depths) {
-            a.nearest = a.nearest.min(b.nearest);
-            a.sum = a.sum.saturating_add(b.sum);
-            a.square = a.square.saturating_add(b.square);
+        self.objects.iter_mut().zip(&other.objects).for_each(|(a, b)| a.meet(*b));
+        for (a, b) in self.apart.iter_mut().zip(&other.apart) {
+            (0..3).for_each(|c| a.beside[c] = a.beside[c].saturating_add(b.beside[c]));
+            (0..3).for_each(|c| a.either[c] = a.either[c].saturating_add(b.either[c]));
         }
         Ok(())
     }
@@ -242,130 +357,4 @@ impl Ensemble {
     pub(crate) fn square(&self, at: usize) -> f64 {
         self.squares[at] as f64 / f64::from(FRACTION) * f64::from(self.params.unit()).powi(2)
     }
-
-    /// Mean and deviation of the depths of a pixel in tile order.
-    fn depth_moments(&self, at: usize, [near, far]: [f32; 2]) -> [f64; 2] {
-        let (n, d) = (f64::from(self.hits[at]), &self.depths[at]);
-        let step = f64::from(far - near) / f64::from(DEPTH_STEPS);
-        let mean = d.sum as f64 / n;
-        [f64::from(near) + mean * step, (d.square as f64 / n - mean * mean).max(0.0).sqrt() * step]
-    }
-
-    /// The picture so far, valid after any number of sets: `beauty`, `alpha` and `std_error` (of the luminance of beauty),
-    /// and what else was kept: `background`, `ambient`, `emission`, `direct`, `normal`, `shadow`, `depth.first` (the
-    /// nearest hit), `depth.mean`, `depth.sigma`.
-    ///
-    /// `background` gives the radiance behind pixel (x, y); `occluder` must be the one that the sets were made with.
-    pub fn read(&self, background: &dyn Fn(u32, u32) -> [f32; 3], occluder: Option<&Occluder>) -> Layers {
-        let mut layers = Layers { size: self.size(), ..Layers::default() };
-        let pixels: Vec<Pixel> = (0..self.tiling.size[1])
-            .flat_map(|y| (0..self.tiling.size[0]).map(move |x| (x, y)))
-            .map(|(x, y)| self.pixel(x, y, background, occluder))
-            .collect();
-        let rgb = |f: &dyn Fn(&Pixel) -> [f32; 3]| LayerData::Rgb(pixels.iter().map(f).collect());
-        let scalar = |f: &dyn Fn(&Pixel) -> f32| LayerData::Scalar(pixels.iter().map(f).collect());
-        layers.insert("beauty", rgb(&|p| p.beauty));
-        layers.insert("alpha", scalar(&|p| p.alpha));
-        layers.insert("std_error", scalar(&|p| p.std_error));
-        if self.params.effects {
-            layers.insert("background", rgb(&|p| p.behind));
-            for (name, e) in ["ambient", "emission", "direct"].into_iter().zip(0..) {
-                layers.insert(name, rgb(&|p| p.effects[e]));
-            }
-        }
-        if self.params.normal {
-            layers.insert("normal", rgb(&|p| p.normal));
-        }
-        if self.params.shadow {
-            layers.insert("shadow", scalar(&|p| p.shadow));
-        }
-        if self.params.depth_range.is_some() {
-            for (name, d) in ["depth.first", "depth.mean", "depth.sigma"].into_iter().zip(0..) {
-                layers.insert(name, scalar(&|p| p.depth[d]));
-            }
-        }
-        layers
-    }
-
-    fn pixel(
-        &self,
-        x: usize,
-        y: usize,
-        background: &dyn Fn(u32, u32) -> [f32; 3],
-        occluder: Option<&Occluder>,
-    ) -> Pixel {
-        let at = self.tiling.index(x, y);
-        let levels = f64::from(self.levels.max(1));
-        let hits = f64::from(self.hits[at]);
-        let solid = occluder.and_then(|o| o.at(y * self.tiling.size[0] + x));
-        let behind = solid.unwrap_or_else(|| background(x as u32, y as u32)).map(f64::from);
-        let open = (levels - hits) / levels;
-        let mean = |c: usize| self.sum(at, c) / levels;
-        let mut pixel = Pixel { behind: behind.map(|b| (b * open) as f32), ..Pixel::default() };
-        let effects = self.params.light_channels() / 3;
-        for c in 0..3 {
-            (0..effects).for_each(|e| pixel.effects[e][c] = mean(3 * e + c) as f32);
-            pixel.beauty[c] = ((0..effects).map(|e| mean(3 * e + c)).sum::<f64>() + behind[c] * open) as f32;
-        }
-        pixel.alpha = if solid.is_some() { 1.0 } else { (hits / levels) as f32 };
-        pixel.std_error = self.std_error(at, behind) as f32;
-        let seen = hits.max(1.0);
-        if self.params.normal {
-            let first = self.params.light_channels();
-            pixel.normal = std::array::from_fn(|c| (self.sum(at, first + c) / seen) as f32);
-        }
-        pixel.shadow = 1.0;
-        if self.params.shadow && hits > 0.0 {
-            pixel.shadow = (self.sum(at, self.params.channels() - 1) / seen) as f32;
-        }
-        pixel.depth = [f32::INFINITY; 3];
-        if let (Some(range), true) = (self.params.depth_range, hits > 0.0) {
-            let [mean, sigma] = self.depth_moments(at, range);
-            pixel.depth = [f32::from_bits(self.depths[at].nearest), mean as f32, sigma as f32];
-        }
-        pixel
-    }
-
-    /// Standard error of the luminance of one pixel in tile order; infinite below two sets.
-    fn std_error(&self, at: usize, behind: [f64; 3]) -> f64 {
-        if self.levels < 2 {
-            return f64::INFINITY;
-        }
-        let levels = f64::from(self.levels);
-        let open = levels - f64::from(self.hits[at]);
-        let luminance = |f: &dyn Fn(usize) -> f64| (0..3).map(|c| f64::from(LUMINANCE[c]) * f(c)).sum::<f64>();
-        let back = luminance(&|c| behind[c]);
-        let effects = self.params.light_channels() / 3;
-        let hit = luminance(&|c| (0..effects).map(|e| self.sum(at, 3 * e + c)).sum());
-        let mean = (hit + back * open) / levels;
-        let square = (self.square(at) + back * back * open) / levels;
-        ((square - mean * mean).max(0.0) / (levels - 1.0)).sqrt()
-    }
-
-    /// Root mean square of the standard error over all pixels, for a stop at a wanted error; infinite below two sets.
-    pub fn rms_error(&self, background: &dyn Fn(u32, u32) -> [f32; 3], occluder: Option<&Occluder>) -> f64 {
-        let [w, h] = self.tiling.size;
-        let mut sum = 0.0;
-        for y in 0..h {
-            for x in 0..w {
-                let solid = occluder.and_then(|o| o.at(y * w + x));
-                let behind = solid.unwrap_or_else(|| background(x as u32, y as u32)).map(f64::from);
-                sum += self.std_error(self.tiling.index(x, y), behind).powi(2);
-            }
-        }
-        (sum / (w * h) as f64).sqrt()
-    }
-}
-
-/// One pixel of the picture.
-#[derive(Default)]
-struct Pixel {
-    beauty: [f32; 3],
-    behind: [f32; 3],
-    effects: [[f32; 3]; 3],
-    alpha: f32,
-    std_error: f32,
-    normal: [f32; 3],
-    shadow: f32,
-    depth: [f32; 3],
 }

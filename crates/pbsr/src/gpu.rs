@@ -103,8 +103,7 @@ impl Recorded {
         let Capacities { size, levels, .. } = self.capacities;
         check(scene.camera.size == size, "camera size", scene.camera.size, "the size of the recording")?;
         check(ensemble.size() == size, "ensemble size", ensemble.size(), "the size of the recording")?;
-        let plain = ensemble.params.channels() == 3 && ensemble.params.depth_range.is_none();
-        check(plain, "ensemble", ensemble.params, "beauty alone")?;
+        check(ensemble.params.only_beauty(), "ensemble", ensemble.params, "beauty alone")?;
         let unlit = scene.objects.iter().all(|o| o.look.material.shading == Shading::Unlit);
         check(unlit, "objects", "a lit one", "unlit ones")?;
         room("objects", scene.objects.len(), self.capacities.objects)?;

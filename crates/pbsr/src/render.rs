@@ -5,17 +5,19 @@
 //! Nothing is shared between tasks and every sum is in integers: the result has the same bits for any number of threads.
 //! Memory depends on the image and on the particles of one batch, never on the number of sets.
 
-use crate::bins::{AREA, Record, Staging, TILE, Task, Tiling};
+use crate::bins::{Record, Staging, TILE, Task, Tiling};
+use crate::colored::Colored;
 use crate::cost::Counts;
-use crate::ensemble::{Ensemble, TileSums};
+use crate::ensemble::Ensemble;
 use crate::error::check;
+use crate::nearest::Nearest;
 use crate::project::Projector;
 use crate::sampler::{Run, runs};
 use crate::shade::{Appearance, LitBy, MAX_CHANNELS, Seen, Shader};
-use crate::{Error, PackedColor, Sampler, flat};
+use crate::{Error, Sampler};
 use glam::{DMat3, DVec3, Mat3};
 use rayon::prelude::*;
-use splat_core::{Camera, Progress, Shading, Similarity, glam};
+use splat_core::{Camera, Progress, Similarity, glam};
 
 /// One object of the scene.
 #[derive(Clone, Copy)]
@@ -67,6 +69,13 @@ pub struct FoldParams {
     pub max_bytes: u64,
     /// Particles of a batch that are worth a pass over the image; more only takes memory.
     pub batch_particles: u64,
+}
+
+impl FoldParams {
+    /// Bytes of a batch of sets of few particles; a single set of more takes more.
+    pub fn batch_bytes(&self) -> u64 {
+        self.batch_particles.saturating_mul(BYTES_IN_BATCH).min(self.max_bytes)
+    }
 }
 
 impl Default for FoldParams {
@@ -133,7 +142,8 @@ impl Renderer {
         self.tasks.par_iter_mut().for_each_init(Staging::default, |staging, task| {
             if !progress.is_cancelled() {
                 let object = task.object as usize;
-                task.fill(scene.objects[object].sampler, &plan.projectors[object], &plan.tiling, staging);
+                let (sampler, projector) = (scene.objects[object].sampler, &plan.projectors[object]);
+                task.fill(sampler, projector, &plan.tiling, plan.shares[object], staging);
             }
         });
     }
@@ -141,27 +151,75 @@ impl Renderer {
     fn resolve(&self, scene: &Scene<'_>, plan: &Plan, batch: usize, ensemble: &mut Ensemble) {
         let channels = ensemble.params;
         let shader = Shader { lights: scene.lights, ambient: scene.ambient, camera: scene.camera, channels };
-        let n = channels.channels();
-        // Without depths every tile gets an empty slice.
-        let mut none = vec![[]; if ensemble.depths.is_empty() { plan.tiling.tiles() } else { 0 }];
-        let with = ensemble.depths.par_chunks_mut(AREA).chain(none.par_iter_mut().map(|e: &mut [_; 0]| &mut e[..]));
-        let sums = ensemble.hits.par_chunks_mut(AREA).zip(ensemble.sums.par_chunks_mut(AREA * n));
-        let sums = sums.zip(ensemble.squares.par_chunks_mut(AREA)).zip(with).enumerate();
-        sums.for_each_init(Nearest::new, |nearest, (t, (((hits, sums), squares), depths))| {
-            let mut tile = TileSums { hits, sums, squares, depths, inverse_unit: 1.0 / channels.unit() };
-            nearest.begin(scene, &plan.tiling, t);
-            for set in 0..batch {
-                nearest.collect(&self.tasks, set, batch, t);
-                nearest.add(&self.tasks, [set, batch, t], scene, plan, &shader, &mut tile);
-            }
-        });
+        let all = Resolve { scene, plan, shader: &shader, tasks: &self.tasks, batch };
+        let mut tiles = ensemble.tiles();
+        let tiles = tiles.par_iter_mut().enumerate();
+        if channels.colored_extinction {
+            tiles.for_each_init(Colored::new, |nearest, (t, sums)| nearest.fold(&all, t, sums));
+        } else {
+            tiles.for_each_init(Nearest::new, |nearest, (t, sums)| nearest.fold(&all, t, sums));
+        }
     }
 }
 
+/// What every tile reads.
+pub(crate) struct Resolve<'a> {
+    pub(crate) scene: &'a Scene<'a>,
+    pub(crate) plan: &'a Plan,
+    pub(crate) shader: &'a Shader<'a>,
+    pub(crate) tasks: &'a [Task],
+    /// Sets.
+    pub(crate) batch: usize,
+}
+
+impl<'a> Resolve<'a> {
+    /// The tasks of one set.
+    #[inline]
+    pub(crate) fn of_set(&self, set: usize) -> impl Iterator<Item = &'a Task> + use<'a> {
+        self.tasks.iter().skip(set).step_by(self.batch)
+    }
+
+    /// The channels of what is seen, in the tile with this corner.
+    #[inline]
+    pub(crate) fn shade(&self, record: &Record, object: u32, corner: [usize; 2], values: &mut [f32; MAX_CHANNELS]) {
+        let (o, pixel) = (object as usize, record.pixel());
+        let [wx, wy] = record.within().map(f64::from);
+        let at_px = [(corner[0] + pixel % TILE) as f64 + wx, (corner[1] + pixel / TILE) as f64 + wy];
+        let normal = self.plan.turns[o] * record.normal.get();
+        let from_eye = self.plan.behind_pixel(self.scene.camera, at_px, record.depth);
+        let look = &self.scene.objects[o].look;
+        let seen = Seen { look, from_eye, normal, color: record.color.get() };
+        self.shader.shade(&seen, values);
+    }
+
+    /// Depths of the occluder in a tile as keys; what lies at one or behind it is hidden.
+    pub(crate) fn limits(&self, corner: [usize; 2], limit: &mut [u64]) {
+        limit.fill(solid(f32::INFINITY));
+        let Some(occluder) = self.scene.occluder else { return };
+        let [w, h] = self.plan.tiling.size;
+        for y in corner[1]..(corner[1] + TILE).min(h) {
+            let row = corner[0]..(corner[0] + TILE).min(w);
+            let from = (y - corner[1]) * TILE;
+            let depths = &occluder.depth[y * w + row.start..y * w + row.end];
+            limit[from..].iter_mut().zip(depths).for_each(|(limit, depth)| {
+                // A depth that is not a number is none.
+                *limit = solid(if *depth < f32::INFINITY { depth.max(0.0) } else { f32::INFINITY });
+            });
+        }
+    }
+}
+
+/// The key of a depth that hides all that is at it or behind it.
+pub(crate) fn solid(depth: f32) -> u64 {
+    u64::from(depth.to_bits()) << 32
+}
+
 /// What is the same for all batches.
-struct Plan {
-    tiling: Tiling,
+pub(crate) struct Plan {
+    pub(crate) tiling: Tiling,
     projectors: Vec<Projector>,
+    /// Probabilities with which a particle of each object hides a channel; `None` where it hides all.
+    shares: Vec<Option<[f32; 3]>>,
     /// Of each task of a set: the object, the rank of the run among those of the object, and the run.
     runs: Vec<(u32, usize, Run)>,
     batch_levels: u32,
@@ -197,6 +255,7 @@ impl Plan {
         Ok(Self {
             tiling: ensemble.tiling,
             projectors: scene.objects.iter().map(project).collect(),
+            shares: scene.objects.iter().map(|o| shares(o).filter(|_| ensemble.params.colored_extinction)).collect(),
             runs: of_objects.collect(),
             batch_levels: (budget / expected.max(1.0)).clamp(1.0, 4096.0) as u32,
             world_from_view: DMat3::from_cols(axes[0], axes[1], axes[2]),
@@ -206,125 +265,12 @@ impl Plan {
     }
 }
 
-/// The depth buffer of one tile.
-struct Nearest {
-    /// [`Record::key`] of the nearest particle, or `limit` where none is.
-    nearest: Vec<u64>,
-    /// What a pixel starts with: the occluder's depth, and nothing is behind it or at it.
-    limit: Vec<u64>,
-    /// Records of one task that are seen: their numbers, or their pixels and colours.
-    seen: Vec<(u32, PackedColor)>,
-    corner: [usize; 2],
-}
-
-/// The key of a depth that hides all that is at it or behind it.
-fn solid(depth: f32) -> u64 {
-    u64::from(depth.to_bits()) << 32
-}
-
-impl Nearest {
-    fn new() -> Self {
-        let open = vec![solid(f32::INFINITY); AREA];
-        Self { nearest: open.clone(), limit: open, seen: Vec::new(), corner: [0; 2] }
-    }
-
-    fn begin(&mut self, scene: &Scene<'_>, tiling: &Tiling, t: usize) {
-        self.corner = [t % tiling.columns * TILE, t / tiling.columns * TILE];
-        self.limit.fill(solid(f32::INFINITY));
-        if let Some(occluder) = scene.occluder {
-            let [w, h] = tiling.size;
-            for y in self.corner[1]..(self.corner[1] + TILE).min(h) {
-                let row = self.corner[0]..(self.corner[0] + TILE).min(w);
-                let from = (y - self.corner[1]) * TILE;
-                let depths = &occluder.depth[y * w + row.start..y * w + row.end];
-                self.limit[from..].iter_mut().zip(depths).for_each(|(limit, depth)| {
-                    // A depth that is not a number is none.
-                    *limit = solid(if *depth < f32::INFINITY { depth.max(0.0) } else { f32::INFINITY });
-                });
-            }
-        }
-        self.nearest.copy_from_slice(&self.limit);
-    }
-
-    /// The nearest particle of each pixel among all objects of one set, whose tasks are `batch` apart.
-    #[inline]
-    fn collect(&mut self, tasks: &[Task], set: usize, batch: usize, t: usize) {
-        for task in tasks.iter().skip(set).step_by(batch) {
-            for record in task.tile(t) {
-                let nearest = &mut self.nearest[record.pixel()];
-                *nearest = record.key().min(*nearest);
-            }
-        }
-    }
-
-    /// Shades what is seen of that set, adds it, and clears the buffer.
-    #[inline]
-    fn add(
-        &mut self,
-        tasks: &[Task],
-        [set, batch, t]: [usize; 3],
-        scene: &Scene<'_>,
-        plan: &Plan,
-        shader: &Shader<'_>,
-        sums: &mut TileSums<'_>,
-    ) {
-        for task in tasks.iter().skip(set).step_by(batch) {
-            let records = task.tile(t);
-            let object = &scene.objects[task.object as usize];
-            // Beauty alone of what is shown as it is needs neither place nor normal.
-            if shader.channels.only_beauty() && object.look.material.shading == Shading::Unlit {
-                let n = self.see(records, |seen, _, record| *seen = (record.pixel() as u32, record.color));
-                flat::add(sums, &self.seen[..n], object.look.material.emission);
-            } else {
-                let n = self.see(records, |seen, i, _| seen.0 = i as u32);
-                self.shade(n, records, task.object as usize, object, scene, plan, shader, sums);
-            }
-        }
-    }
-
-    /// Lists the records that are the nearest of their pixels, and makes their pixels empty; returns their number.
-    #[inline]
-    fn see(&mut self, records: &[Record], note: impl Fn(&mut (u32, PackedColor), usize, &Record)) -> usize {
-        if self.seen.len() < records.len() {
-            self.seen.resize(records.len().next_power_of_two(), Default::default());
-        }
-        // Written always, kept when seen: whether a particle is seen cannot be foreseen.
-        let mut n = 0;
-        for (i, record) in records.iter().enumerate() {
-            let pixel = record.pixel();
-            let is_seen = self.nearest[pixel] == record.key();
-            self.nearest[pixel] = if is_seen { self.limit[pixel] } else { self.nearest[pixel] };
-            note(&mut self.seen[n], i, record);
-            n += usize::from(is_seen);
-        }
-        n
-    }
-
-    fn shade(
-        &self,
-        n: usize,
-        records: &[Record],
-        o: usize,
-        object: &Object<'_>,
-        scene: &Scene<'_>,
-        plan: &Plan,
-        shader: &Shader<'_>,
-        sums: &mut TileSums<'_>,
-    ) {
-        let channels = shader.channels.channels();
-        let mut values = [0.0; MAX_CHANNELS];
-        for &(i, _) in &self.seen[..n] {
-            let record = &records[i as usize];
-            let pixel = record.pixel();
-            let [wx, wy] = record.within().map(f64::from);
-            let at_px = [(self.corner[0] + pixel % TILE) as f64 + wx, (self.corner[1] + pixel / TILE) as f64 + wy];
-            let normal = plan.turns[o] * record.normal.get();
-            let from_eye = plan.behind_pixel(scene.camera, at_px, record.depth);
-            let seen = Seen { look: &object.look, from_eye, normal, color: record.color.get() };
-            shader.shade(&seen, &mut values);
-            sums.add(&shader.channels, pixel, &values[..channels], record.depth);
-        }
-    }
+/// Extinction of each channel over the largest, to which an object's particles belong; `None` where all are alike. A
+/// Poisson process that is thinned out with these probabilities is that of the channel.
+fn shares(object: &Object<'_>) -> Option<[f32; 3]> {
+    let rgb = object.look.material.extinction_rgb;
+    let most = rgb.into_iter().fold(0.0, f32::max);
+    rgb.iter().any(|e| *e != most).then(|| rgb.map(|e| e / most))
 }
 
 impl Plan {

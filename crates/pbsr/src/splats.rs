@@ -48,7 +48,7 @@ impl Default for SplatParams {
     }
 }
 
-/// Particles from splats. Differences of extinction between channels are left out: a particle hides all colours.
+/// Particles from splats, by their cross-sections; these are to be those of the channel that absorbs most.
 pub struct SplatSampler<'a> {
     cloud: &'a Cloud,
     params: SplatParams,

@@ -18,6 +18,7 @@ pub(crate) enum Stage {
     Metropolis,
     Thinning,
     Survey,
+    Channels,
 }
 
 /// The numbers of one chunk, in order.

@@ -133,15 +133,29 @@ fn x1_any_number_of_threads_and_any_batches_give_the_same_bits() {
     let s = pixel_area(&camera, DVec3::new(0.0, 0.0, 3.0));
     let samplers: Vec<_> =
         meshes.iter().zip(1..).map(|(m, i)| MeshSampler::new(m, &params(0.4, s, [0.5; 3], i), None).unwrap()).collect();
-    let objects: Vec<Object<'_>> = samplers.iter().map(|s| object(s)).collect();
-    let full =
-        EnsembleParams { effects: true, normal: true, shadow: true, depth_range: Some([1.0, 9.0]), radiance_unit: 0.5 };
+    let grey = EnsembleParams {
+        effects: true,
+        normal: true,
+        shadow: true,
+        depth_range: Some([1.0, 9.0]),
+        object: true,
+        colored_extinction: false,
+        radiance_unit: 0.5,
+    };
+    for full in [grey, EnsembleParams { colored_extinction: true, ..grey }] {
+        same_bits(&camera, &samplers, &full);
+    }
+}
+
+fn same_bits(camera: &splat_core::Camera, samplers: &[MeshSampler<'_>], full: &EnsembleParams) {
+    let mut objects: Vec<Object<'_>> = samplers.iter().map(|s| object(s)).collect();
+    objects[0].look.material.extinction_rgb = [0.5, 1.0, 2.0];
     let run = |threads: usize, batch: u64, steps: &[u32]| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let mut ensemble = Ensemble::new(camera.size, &full).unwrap();
+        let mut ensemble = Ensemble::new(camera.size, full).unwrap();
         let fold = FoldParams { batch_particles: batch, ..FoldParams::default() };
         for levels in steps {
-            let scene = scene(&camera, &objects);
+            let scene = scene(camera, &objects);
             pool.install(|| Renderer::new().fold(&scene, &mut ensemble, *levels, &fold, &Progress::new())).unwrap();
             // Through a checkpoint each time.
             ensemble = Ensemble::from_bytes(&ensemble.to_bytes(&[1; 32]), &[1; 32]).unwrap();

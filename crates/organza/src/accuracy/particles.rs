@@ -15,7 +15,7 @@ pub fn particles(scene: &Scene, facts: &Facts, options: &Options) -> Result<Swee
     let finest = levels[levels.len() - 1];
     let mut scene = scene.clone();
     scene.render.technique = Technique::Particles;
-    // Particles lack some of the layers that `points` have, and the report looks at beauty alone.
+    // The report looks at beauty alone.
     scene.render.layers = LayerChoice::default();
     let own = scene.render.particles.repeat_level;
     let cut = options.quick && own > finest;

@@ -26,8 +26,11 @@ pub(super) struct Folded {
 /// Why a scene's particles are the processor's; `None` when a device can fold them.
 pub(super) fn why_not(scene: &Scene<'_>, ensemble: &Ensemble) -> Option<&'static str> {
     let params = ensemble.params();
-    if params.channels() != 3 || params.depth_range.is_some() {
+    if params.channels() != 3 || params.depth_range.is_some() || params.object {
         return Some("particles with layers besides beauty are the processor's");
+    }
+    if params.colored_extinction {
+        return Some("particles that hide red, green and blue apart are the processor's");
     }
     let lit = scene.objects.iter().any(|o| o.look.material.shading != Shading::Unlit);
     lit.then_some("particles that are lit are the processor's (a device does material.shading = \"unlit\")")

@@ -8,16 +8,13 @@ use crate::points::Drawing;
 use crate::scene::ParticlesSettings;
 use crate::{Error, Progress, RenderOptions};
 use pbsr::{Ensemble, EnsembleParams, FoldParams, LitBy, Object, Occluder, Renderer, Scene};
-use splat_core::shade::ChannelLayout;
-use splat_core::{Accumulator, Camera};
+use splat_core::{Camera, LayerSet};
 use tsm::ShadowMap;
 
 /// Sets between two looks at the error.
 const BATCH: u32 = 8;
 /// Without a wanted error, a step is the number of sets so far over this.
 const GROWTH: u32 = 16;
-/// Optical depth of a pixel that particles hide in every set.
-const HIDDEN: f32 = 64.0;
 /// Share of the allowed memory that the particles of one batch may take.
 const BATCH_SHARE: u64 = 4;
 
@@ -36,20 +33,14 @@ pub(super) fn fold(
     let lit = drawing.shining(maps).map(|(light, map)| LitBy { light, shadow: map.map(|m| (m, origin)) });
     let lights: Vec<LitBy<'_>> = lit.collect();
     let scene = Scene { objects: &objects, lights: &lights, ambient: drawing.ambient, camera, occluder };
-    let set = &drawing.layers;
-    let kept = EnsembleParams {
-        effects: set.effects,
-        normal: set.normal,
-        shadow: set.shadow,
-        depth_range: None,
-        radiance_unit: 0.0,
-    };
+    let colored = drawing.plan.optical_depth_planes == 3;
+    let kept = kept_numbers(&drawing.layers, colored, || depth_range(parts, camera));
     let ensemble = match checkpoint.as_deref_mut().and_then(Checkpoint::take) {
         Some(found) => found,
         None => Ensemble::new(camera.size, &kept).map_err(fault)?,
     };
     let mut average = Average { ensemble, particles: 0, interrupted: false };
-    let params = FoldParams { max_bytes: options.max_memory / BATCH_SHARE, ..FoldParams::default() };
+    let params = fold_params(options);
     let settings = &drawing.settings.particles;
     let background = |_, _| drawing.background;
     let mut renderer = Renderer::new();
@@ -78,6 +69,43 @@ pub(super) fn fold(
         checkpoint.write(&average.ensemble)?;
     }
     Ok(average)
+}
+
+fn fold_params(options: &RenderOptions) -> FoldParams {
+    FoldParams { max_bytes: options.max_memory / BATCH_SHARE, ..FoldParams::default() }
+}
+
+/// What an ensemble keeps for these layers.
+fn kept_numbers(set: &LayerSet, colored_extinction: bool, range: impl Fn() -> [f32; 2]) -> EnsembleParams {
+    EnsembleParams {
+        effects: set.effects,
+        normal: set.normal,
+        shadow: set.shadow,
+        depth_range: set.depth.then(range),
+        object: set.object,
+        colored_extinction,
+        radiance_unit: 0.0,
+    }
+}
+
+/// Bytes of averaging an image of so many samples: its sums (twice, where they are written), a batch of particles, and the
+/// samples when they are read. A set of more than four million particles takes more, up to a quarter of what is allowed.
+pub(crate) fn average_bytes(size: [u64; 2], set: &LayerSet, colored_extinction: bool, options: &RenderOptions) -> u64 {
+    let kept = kept_numbers(set, colored_extinction, || [0.0, 1.0]);
+    let [samples, padded] = [1, 64].map(|tile| size.iter().map(|s| s.div_ceil(tile) * tile).product::<u64>());
+    let copies = 1 + u64::from(options.checkpoint.is_some());
+    // Batches are over when the picture is read.
+    copies * padded * kept.bytes_per_pixel()
+        + fold_params(options).batch_bytes().max(samples * kept.bytes_to_read_pixel())
+}
+
+/// View depths that all particles lie between.
+fn depth_range(parts: &[Part<'_>], camera: &Camera) -> [f32; 2] {
+    let depths = parts.iter().flat_map(Part::corners).map(|p| camera.view_from_world(p).z.max(0.0) as f32);
+    let [near, far] = depths.fold([f32::INFINITY, 0.0], |[near, far], z| [near.min(z), far.max(z)]);
+    // A plane that faces the eye has one depth, which lies inside.
+    let margin = far * f32::EPSILON * 1024.0;
+    if near < far + margin { [(near - margin).max(0.0), far + margin] } else { [0.0, 1.0] }
 }
 
 /// The device that folds, if there is one and it may.
@@ -128,51 +156,4 @@ impl Average {
         let grown = if settings.target_error.is_some() { 0 } else { self.ensemble.levels() / GROWTH };
         Some((BATCH + grown).min(left))
     }
-}
-
-/// Means over the sets as what translucent splats leave in an accumulator.
-pub(super) fn accumulate(ensemble: &Ensemble, layout: &ChannelLayout, accumulator: &mut Accumulator) {
-    let layers = ensemble.read(&|_, _| [0.0; 3], None);
-    let alpha = layers.scalar("alpha").expect("invariant: an ensemble has an opacity");
-    for (to, a) in accumulator.optical_depth[0].iter_mut().zip(alpha) {
-        *to = (-(-a).ln_1p()).min(HIDDEN);
-    }
-    let mut put = |first: usize, name: &str, weighted: bool| {
-        let image = layers.rgb(name).expect("invariant: an ensemble keeps the layers of its channels");
-        for c in 0..3 {
-            for (k, to) in accumulator.channels[first + c].iter_mut().enumerate() {
-                *to = image[k][c] * if weighted { alpha[k] } else { 1.0 };
-            }
-        }
-    };
-    let effects: Vec<usize> = layout.effects().collect();
-    if let [beauty] = effects[..] {
-        put(beauty, "beauty", false);
-    } else {
-        effects.iter().zip(["ambient", "emission", "direct"]).for_each(|(first, name)| put(*first, name, false));
-    }
-    if let Some(first) = layout.normal() {
-        put(first, "normal", true);
-    }
-    if let Some(at) = layout.shadow() {
-        let shadow = layers.scalar("shadow").expect("invariant: an ensemble keeps the layers of its channels");
-        accumulator.channels[at].iter_mut().enumerate().for_each(|(k, to)| *to = shadow[k] * alpha[k]);
-    }
-}
-
-/// Standard error of each pixel's luminance: that of the mean of its independent samples.
-pub(super) fn error_layer(ensemble: &Ensemble, drawing: &Drawing<'_>, occluder: Option<&Occluder>) -> Vec<f32> {
-    let layers = ensemble.read(&|_, _| drawing.background, occluder);
-    let samples = layers.scalar("std_error").expect("invariant: an ensemble has an error");
-    let antialias = drawing.settings.antialias as usize;
-    let [width, height] = ensemble.size().map(|s| s as usize / antialias);
-    let pixel = |k: usize| {
-        let (x, y) = (k % width * antialias, k / width * antialias);
-        let square = |s: usize| {
-            let at = (y + s / antialias) * width * antialias + x + s % antialias;
-            samples[at] * samples[at]
-        };
-        (0..antialias * antialias).map(square).sum::<f32>().sqrt() / (antialias * antialias) as f32
-    };
-    (0..width * height).map(pixel).collect()
 }

@@ -24,6 +24,8 @@ struct View {
 /// Kept sets of objects, and the frames that they are for.
 pub(crate) struct Kept {
     views: Vec<View>,
+    /// Bytes that the sets may take.
+    allowed: u64,
     of_object: BTreeMap<usize, Entry>,
 }
 
@@ -42,7 +44,12 @@ impl Kept {
             let transforms = scene.objects.iter().map(|o| o.visible.then_some(o.transform)).collect();
             View { camera, transforms }
         };
-        Self { views: frames.iter().map(view).collect(), of_object: BTreeMap::new() }
+        Self { views: frames.iter().map(view).collect(), allowed: 0, of_object: BTreeMap::new() }
+    }
+
+    /// Allows a share of the memory, no more than is left beside `other` bytes.
+    pub(crate) fn allow(&mut self, max_memory: u64, other: u64) {
+        self.allowed = (max_memory / SHARE).min(max_memory.saturating_sub(other));
     }
 
     /// What cross-sections follow from, in words that differ where it does.
@@ -60,7 +67,6 @@ impl Kept {
         warnings: &mut Vec<String>,
     ) -> Result<(), Error> {
         let levels = drawing.settings.particles.repeat_level;
-        let budget = drawing.max_memory / SHARE;
         for source in sources.iter_mut() {
             let Some(object) = source.own_object() else { continue };
             for view in &self.views {
@@ -77,7 +83,7 @@ impl Kept {
             let Some(part) = source.part(warnings)? else { continue };
             let sampler = part.object().sampler;
             let needed = sampler.expected_particles() * f64::from(levels) * pbsr::Particles::BYTES as f64;
-            if needed <= budget.saturating_sub(held) as f64 {
+            if needed <= self.allowed.saturating_sub(held) as f64 {
                 let sets = cost.measure(pass::SAMPLE, |stage| {
                     let sets = KeptSets::new(sampler, 0, levels as usize);
                     (stage.items_in, stage.items_out, stage.bytes) = (1, sets.particles(), sets.bytes());

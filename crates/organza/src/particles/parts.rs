@@ -40,6 +40,10 @@ pub(super) struct Source<'a> {
     /// Cross-section of the particles, units² of the data.
     cross_section: f64,
     seed: u64,
+    /// Rank of the object in the scene.
+    of: u32,
+    /// Opposite corners of a box in the world that holds it.
+    bounds: [DVec3; 2],
 }
 
 enum Data<'a> {
@@ -52,6 +56,9 @@ pub(super) struct Part<'a> {
     pub(super) particles: Particles<'a>,
     transform: Similarity,
     look: Appearance,
+    /// Rank of the object in the scene.
+    pub(super) of: u32,
+    bounds: [DVec3; 2],
 }
 
 /// Where the particles of an object come from.
@@ -68,6 +75,15 @@ impl Part<'_> {
             Particles::Kept(sets) => *sets,
         };
         Object { sampler, transform: self.transform, look: self.look }
+    }
+
+    /// Corners of a box in the world that holds the object.
+    pub(super) fn corners(&self) -> impl Iterator<Item = DVec3> + use<> {
+        let [low, high] = self.bounds;
+        (0..8).map(move |k: u32| {
+            let mask = glam::BVec3::new(k & 1 == 1, k >> 1 & 1 == 1, k >> 2 & 1 == 1);
+            DVec3::select(mask, high, low)
+        })
     }
 }
 
@@ -109,6 +125,8 @@ fn of_own<'a>(own: &'a Own, drawing: &Drawing<'a>, camera: &Camera) -> Source<'a
         },
         cross_section: finest_area(camera, &own.transform, own.bounds),
         seed: seed(drawing, own.object as u32, own.kind()),
+        of: own.object as u32,
+        bounds: own.world_box(),
     }
 }
 
@@ -133,6 +151,9 @@ fn of_splats<'a>(drawing: &Drawing<'a>, camera: &Camera) -> Vec<Source<'a>> {
         let bounds = splats.bounds();
         let center = splats.origin + bounds.center().as_dvec3();
         let reach = 0.5 * f64::from(bounds.diagonal()) + radius;
+        let widest = DVec3::splat(f64::from(splats.radius.iter().copied().fold(0.0, f32::max)));
+        let corner = |v: glam::Vec3| splats.origin + v.as_dvec3();
+        let bounds = [corner(bounds.min) - widest, corner(bounds.max) + widest];
         let cross_section = pbsr::finest_pixel_area(camera, center, reach, NEAR);
         let seed = seed(drawing, object, kind);
         let params = SplatParams {
@@ -146,7 +167,7 @@ fn of_splats<'a>(drawing: &Drawing<'a>, camera: &Camera) -> Vec<Source<'a>> {
         let look = Appearance { material, kind, radius: radius as f32, shadow_coefficient };
         let data = Data::Splats(Box::new((splats, params)));
         let name = objects[object as usize].name.clone();
-        Source { name, data, transform: Similarity::default(), look, cross_section, seed }
+        Source { name, data, transform: Similarity::default(), look, cross_section, seed, of: object, bounds }
     };
     of_object.into_iter().map(part).collect()
 }
@@ -188,7 +209,7 @@ impl Source<'_> {
 
     /// The object with these particles.
     pub(super) fn part_of<'b>(&self, particles: Particles<'b>) -> Part<'b> {
-        Part { particles, transform: self.transform, look: self.look }
+        Part { particles, transform: self.transform, look: self.look, of: self.of, bounds: self.bounds }
     }
 
     fn sampler(&self, warnings: &mut Vec<String>) -> Result<Box<dyn Sampler + '_>, pbsr::Error> {

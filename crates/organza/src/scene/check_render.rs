@@ -14,9 +14,6 @@ use splat_core::raster::Accumulation;
 /// Techniques of the design that this version does not have.
 const LATER_TECHNIQUES: [&str; 3] = ["sheets", "surfels", "reference"];
 
-/// Layers that particles do not have.
-const NOT_OF_PARTICLES: [&str; 5] = ["depth.first", "depth.median", "depth.mean", "depth.sigma", "object"];
-
 /// Checks `[render]`.
 pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSettings, Error> {
     let tolerance = raw.tolerance.unwrap_or(1.0 / 255.0);
@@ -64,12 +61,9 @@ fn check_layers(at: &At<'_>, names: &[String], technique: Technique) -> Result<L
             return Err(at.index(i).error(format!("there is no layer `{name}`"), suggest(name, &LAYER_NAMES)));
         }
     }
-    let particles = technique == Technique::Particles;
-    let missing = |name: &&str| if particles { NOT_OF_PARTICLES.contains(name) } else { *name == "std_error" };
-    if let Some(name) = choice.names().find(missing) {
-        let (whose, hint) = if particles { ("particles", "points") } else { ("points", "particles") };
-        let message = format!("the technique `{whose}` has no layer `{name}`");
-        return Err(at.error(message, format!("use technique = \"{hint}\"")));
+    if technique != Technique::Particles && choice.names().any(|name| name == "std_error") {
+        let message = "the technique `points` has no layer `std_error`";
+        return Err(at.error(message, "use technique = \"particles\""));
     }
     Ok(choice)
 }

@@ -1,0 +1,115 @@
+//! An ensemble of particles as layers: means as what splats would leave, and what only the hits tell.
+
+use super::parts::Part;
+use crate::points::Drawing;
+use pbsr::{Ensemble, Occluder};
+use splat_core::raster::OpaqueImage;
+use splat_core::shade::ChannelLayout;
+use splat_core::{Accumulator, LayerData, Layers};
+
+/// Optical depth of a pixel that particles hide in every set.
+const HIDDEN: f32 = 64.0;
+
+/// Means over the sets as what translucent splats leave in an accumulator.
+pub(super) fn accumulate(ensemble: &Ensemble, layout: &ChannelLayout, accumulator: &mut Accumulator) {
+    let layers = ensemble.read(&|_, _| [0.0; 3], None);
+    let alpha = layers.scalar("alpha").expect("invariant: an ensemble has an opacity");
+    let by_channel = layers.rgb("alpha_rgb");
+    let opacity = |k: usize, c: usize| by_channel.map_or(alpha[k], |rgb| rgb[k][c]);
+    for (c, plane) in accumulator.optical_depth.iter_mut().enumerate() {
+        plane.iter_mut().enumerate().for_each(|(k, to)| *to = (-(-opacity(k, c)).ln_1p()).min(HIDDEN));
+    }
+    let mut put = |first: usize, name: &str, weighted: bool| {
+        let image = layers.rgb(name).expect("invariant: an ensemble keeps the layers of its channels");
+        for c in 0..3 {
+            for (k, to) in accumulator.channels[first + c].iter_mut().enumerate() {
+                *to = image[k][c] * if weighted { opacity(k, c) } else { 1.0 };
+            }
+        }
+    };
+    let effects: Vec<usize> = layout.effects().collect();
+    if let [beauty] = effects[..] {
+        put(beauty, "beauty", false);
+    } else {
+        effects.iter().zip(["ambient", "emission", "direct"]).for_each(|(first, name)| put(*first, name, false));
+    }
+    if let Some(first) = layout.normal() {
+        put(first, "normal", true);
+    }
+    if let Some(at) = layout.shadow() {
+        let shadow = layers.scalar("shadow").expect("invariant: an ensemble keeps the layers of its channels");
+        accumulator.channels[at].iter_mut().enumerate().for_each(|(k, to)| *to = shadow[k] * opacity(k, 1));
+    }
+}
+
+/// Layers of the distribution of hits, as far as the ensemble keeps it: the standard error always, depths, and objects.
+pub(super) struct OfHits<'a> {
+    pub(super) ensemble: &'a Ensemble,
+    pub(super) parts: &'a [Part<'a>],
+    pub(super) occluder: Option<&'a Occluder>,
+    pub(super) opaque: &'a OpaqueImage,
+}
+
+impl OfHits<'_> {
+    /// By name, samples become pixels.
+    pub(super) fn layers(&self, drawing: &Drawing<'_>) -> Vec<(&'static str, LayerData)> {
+        let background = drawing.background;
+        let samples = self.ensemble.read(&|_, _| background, self.occluder);
+        let pixels = Pixels { size: self.ensemble.size(), antialias: drawing.settings.antialias };
+        let mut layers = vec![("std_error", pixels.error(&samples))];
+        if drawing.layers.depth {
+            for name in ["depth.first", "depth.median", "depth.mean", "depth.sigma"] {
+                let depths = samples.scalar(name).expect("invariant: depths are kept where they are asked for");
+                let least = name == "depth.first";
+                layers.push((name, LayerData::Scalar(pixels.map(|at| depth(depths, &at, least)))));
+            }
+        }
+        if let Some(LayerData::Id(objects)) = samples.images.get("object") {
+            let seen = |at: usize| match self.parts.get(objects[at] as usize) {
+                Some(part) => Some(part.of),
+                None => self.opaque.object.get(at).copied().filter(|o| *o != u32::MAX),
+            };
+            let first = |at: Vec<usize>| at.into_iter().find_map(seen).unwrap_or(u32::MAX);
+            layers.push(("object", LayerData::Id(pixels.map(first))));
+        }
+        layers
+    }
+}
+
+/// The least depth of some samples, or the mean of those that are defined.
+fn depth(depths: &[f32], at: &[usize], least: bool) -> f32 {
+    let defined: Vec<f32> = at.iter().map(|k| depths[*k]).filter(|d| d.is_finite()).collect();
+    let sum: f32 = defined.iter().sum();
+    match defined.len() {
+        0 => f32::INFINITY,
+        _ if least => defined.into_iter().fold(f32::INFINITY, f32::min),
+        n => sum / n as f32,
+    }
+}
+
+/// Samples of pixels.
+struct Pixels {
+    /// Samples.
+    size: [u32; 2],
+    antialias: u32,
+}
+
+impl Pixels {
+    /// One value a pixel, of its samples.
+    fn map<T>(&self, value: impl Fn(Vec<usize>) -> T) -> Vec<T> {
+        let antialias = self.antialias as usize;
+        let [width, height] = self.size.map(|s| s as usize / antialias);
+        let samples = |k: usize| {
+            let (x, y) = (k % width * antialias, k / width * antialias);
+            (0..antialias * antialias).map(move |s| (y + s / antialias) * width * antialias + x + s % antialias)
+        };
+        (0..width * height).map(|k| value(samples(k).collect())).collect()
+    }
+
+    /// Standard error of each pixel's luminance: that of the mean of its independent samples.
+    fn error(&self, samples: &Layers) -> LayerData {
+        let errors = samples.scalar("std_error").expect("invariant: an ensemble has an error");
+        let square = |at: Vec<usize>| at.into_iter().map(|k| errors[k] * errors[k]).sum::<f32>();
+        LayerData::Scalar(self.map(|at| square(at).sqrt() / (self.antialias * self.antialias) as f32))
+    }
+}
