@@ -101,4 +101,24 @@ kernels! {
     PBSR_RANK = "pbsr_rank" [Read, Read, Read, Read, Read, Write] push 4;
     /// Adds who is seen: view, objects, sets, particles, footings, nearest, winners → sums. Push: level.
     PBSR_ADD = "pbsr_add" [Read, Read, Read, Read, Read, Read, Read, Write] push 4;
+
+    /// Distances as keys, and places: view, distances → keys, places.
+    TSM_KEYS = "tsm_keys" [Read, Read, Write, Write];
+    /// Cells by distance: view, places, cells → keys.
+    TSM_GATHER = "tsm_gather" [Read, Read, Read, Write];
+    /// Entries in order: view, places, distances, absorbances → distances, absorbances.
+    TSM_ARRANGE = "tsm_arrange" [Read, Read, Read, Read, Write, Write];
+    /// Knots and running absorbance of blocks of 1024: view, cells, distances, absorbances → states.
+    TSM_REDUCE = "tsm_reduce" [Read, Read, Read, Read, Write];
+    /// What goes on where blocks begin, by one workgroup: view, states.
+    TSM_SPINE = "tsm_spine" [Read, Write];
+    /// Running sums along cells: view, cells, distances, absorbances, states → marks, totals.
+    TSM_APPLY = "tsm_apply" [Read, Read, Read, Read, Read, Write, Write];
+    /// First entry and kept knots of each cell: view, cells, distances, marks → spans.
+    TSM_SPANS = "tsm_spans" [Read, Read, Read, Read, Write];
+    /// The lists: view, cells, distances, marks, totals, spans → distances, totals.
+    TSM_SETTLE = "tsm_settle" [Read, Read, Read, Read, Read, Read, Write, Write];
+    /// The light that arrives at receivers:
+    /// view, receivers, spans, distances, totals, opaque distances, directions → lights.
+    TSM_LOOK_UP = "tsm_look_up" [Read, Read, Read, Read, Read, Read, Read, Write];
 }

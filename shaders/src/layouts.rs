@@ -144,4 +144,42 @@ layouts! {
         /// Nothing.
         pub unused: u32,
     }
+
+    /// The entries that lists are made of.
+    pub struct ListView {
+        /// A list stops where every channel has reached this: fixed point, 2⁴⁴ units an absorbance of 1, the lower half first.
+        pub stop: [u32; 2],
+        /// Entries.
+        pub entries: u32,
+        /// Cells.
+        pub cells: u32,
+        /// Channels, 1 or 3.
+        pub channels: u32,
+        /// Nothing.
+        pub unused: u32,
+    }
+
+    /// A shadow map and what is looked up in it.
+    pub struct ShadowView {
+        /// Lower corner of a planar table.
+        pub least: [f32; 2],
+        /// Columns and rows.
+        pub size: [u32; 2],
+        /// Side of a cell of a planar table.
+        pub cell: f32,
+        /// Half width of a medium's entry along the ray.
+        pub ramp: f32,
+        /// Light ends above this absorbance.
+        pub dark_from: f32,
+        /// 0 octahedral, 1 planar with rays from a point, 2 planar with parallel rays.
+        pub mapping: u32,
+        /// Receivers.
+        pub receivers: u32,
+        /// Channels, 1 or 3.
+        pub channels: u32,
+        /// 1 where an opaque disc may end a list.
+        pub opaque: u32,
+        /// Nothing.
+        pub unused: u32,
+    }
 }

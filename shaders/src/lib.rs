@@ -27,6 +27,7 @@ mod device;
 pub mod kernels;
 mod layout;
 pub mod layouts;
+pub mod radix;
 mod recording;
 pub mod reflect;
 mod snapshot;

@@ -84,14 +84,14 @@ fn steps(repo: &Repo) -> Vec<Step> {
         step(
             "clippy",
             one(
-                "clippy --workspace --all-targets --features gpu-conformance/driver,hbsort/gpu,pbsr/gpu,splat-core/gpu -- -D warnings",
+                "clippy --workspace --all-targets --features gpu-conformance/driver,hbsort/gpu,pbsr/gpu,splat-core/gpu,tsm/gpu -- -D warnings",
             ),
         ),
         step("docs", docs),
         step("alone", Work::Cargo(alone(repo), &[])),
         step("shaders", Work::Task(|repo| shaders::run(repo, true))),
         step("vulkan", Work::Task(vulkan::run)),
-        step("tests", one("test --workspace --features hbsort/gpu,pbsr/gpu,splat-core/gpu")),
+        step("tests", one("test --workspace --features hbsort/gpu,pbsr/gpu,splat-core/gpu,tsm/gpu")),
     ]
 }
 

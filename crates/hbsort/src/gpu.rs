@@ -30,17 +30,13 @@ use crate::{Error, Params};
 use splat_core::{Camera, Cloud, Direction, SliceOrder};
 use splat_shaders::kernels;
 use splat_shaders::layouts::{Scan, SortState, SortView};
+use splat_shaders::radix::{SCAN_BLOCK, Scanned, sort_pass};
 use splat_shaders::{BufferId, Groups, Recording};
-use std::mem::offset_of;
 
 pub use parts::{Sorted, join};
 
 /// Splats that a workgroup projects.
 const PROJECT_BLOCK: u32 = 1024;
-/// Splats that a workgroup sorts.
-const SORT_BLOCK: u32 = 2048;
-/// Numbers that a workgroup scans.
-const SCAN_BLOCK: u32 = 1024;
 
 /// What a recording makes room for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,13 +76,6 @@ pub struct Uploads {
     radii: Vec<u8>,
 }
 
-/// The digit counts of a pass and what scans them.
-struct Digits {
-    scan: BufferId,
-    counts: BufferId,
-    sums: BufferId,
-}
-
 /// Records a sort with this room.
 pub fn record(capacities: Capacities) -> Recorded {
     let Capacities { splats, kept } = capacities;
@@ -99,57 +88,29 @@ pub fn record(capacities: Capacities) -> Recorded {
     let state = r.scratch("state", size_of::<SortState>() as u64);
     let blocks = splats.div_ceil(PROJECT_BLOCK);
     let block_scan = r.scratch("block scan", size_of::<Scan>() as u64);
-    let block_places = r.scratch("block places", words(blocks));
-    let block_sums = r.scratch("block sums", words(blocks.div_ceil(SCAN_BLOCK)));
+    let blocks_kept = Scanned::scratch(r, block_scan, ["block places", "block sums"], blocks);
+    let block_places = blocks_kept.numbers;
     let all_keys = r.scratch("all keys", words(splats));
     let keys = [r.scratch("keys", words(kept)), r.scratch("keys'", words(kept))];
     let places = [r.scratch("places", words(kept)), r.scratch("places'", words(kept))];
-    let counts = 256 * kept.div_ceil(SORT_BLOCK);
-    let digits = Digits {
-        scan: r.scratch("digit scan", size_of::<Scan>() as u64),
-        counts: r.scratch("digit counts", words(counts)),
-        sums: r.scratch("digit sums", words(counts.div_ceil(SCAN_BLOCK))),
-    };
+    let digit_scan = r.scratch("digit scan", size_of::<Scan>() as u64);
+    let digits = Scanned::digits(r, digit_scan, kept);
 
     r.dispatch(&kernels::HBSORT_BEGIN, Groups::cover(1), &[view, state, block_scan], &[]);
     let projected = [view, positions, radii, all_keys, block_places, state];
     r.dispatch(&kernels::HBSORT_PROJECT, Groups::cover(blocks), &projected, &[]);
-    scan(r, Groups::cover(blocks.div_ceil(SCAN_BLOCK)), block_scan, block_places, block_sums);
+    blocks_kept.record(r, Groups::cover(blocks.div_ceil(SCAN_BLOCK)));
     let compacted = [view, all_keys, block_places, keys[0], places[0]];
     r.dispatch(&kernels::HBSORT_COMPACT, Groups::cover(blocks), &compacted, &[kept]);
-    r.dispatch(&kernels::HBSORT_PREPARE, Groups::cover(1), &[block_scan, state, digits.scan], &[kept]);
+    r.dispatch(&kernels::HBSORT_PREPARE, Groups::cover(1), &[block_scan, state, digit_scan], &[kept]);
     for pass in 0..4 {
         let (from, to) = (pass % 2, 1 - pass % 2);
-        sort_pass(r, 8 * pass as u32, state, [keys[from], places[from]], [keys[to], places[to]], &digits);
+        sort_pass(r, 8 * pass as u32, state, [keys[from], places[from]], [keys[to], places[to]], digits);
     }
     r.read(state);
     r.read(keys[0]);
     r.read(places[0]);
     Recorded { recording, capacities, view, positions, radii, state, keys: keys[0], places: places[0] }
-}
-
-/// Exclusive scan of `numbers` in place.
-fn scan(r: &mut Recording, groups: Groups, scan: BufferId, numbers: BufferId, sums: BufferId) {
-    r.dispatch(&kernels::SCAN_REDUCE, groups, &[scan, numbers, sums], &[]);
-    r.dispatch(&kernels::SCAN_SPINE, Groups::cover(1), &[scan, sums], &[]);
-    r.dispatch(&kernels::SCAN_APPLY, groups, &[scan, numbers, sums], &[]);
-}
-
-/// Sorts keys and places by the eight bits from `shift` on.
-fn sort_pass(
-    r: &mut Recording,
-    shift: u32,
-    state: BufferId,
-    [keys, places]: [BufferId; 2],
-    [sorted_keys, sorted_places]: [BufferId; 2],
-    digits: &Digits,
-) {
-    let at = |offset| Groups::Indirect { buffer: state, offset: offset as u64 };
-    let sort_groups = at(offset_of!(SortState, sort_groups_x));
-    r.dispatch(&kernels::RADIX_HISTOGRAM, sort_groups, &[state, keys, digits.counts], &[shift]);
-    scan(r, at(offset_of!(SortState, scan_groups_x)), digits.scan, digits.counts, digits.sums);
-    let scattered = [state, keys, places, digits.counts, sorted_keys, sorted_places];
-    r.dispatch(&kernels::RADIX_SCATTER, sort_groups, &scattered, &[shift]);
 }
 
 impl Recorded {

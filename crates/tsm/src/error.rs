@@ -24,6 +24,28 @@ pub enum Error {
         /// Bytes allowed.
         limit_bytes: u64,
     },
+    /// A recording has less room than it needs: record again with what it needs.
+    #[cfg(feature = "gpu")]
+    #[error("room for {had} {what}, needed {needed}: record the lists again with that")]
+    Overflow {
+        /// What there is too little room for.
+        what: &'static str,
+        /// Room that is needed.
+        needed: u64,
+        /// Room that there was.
+        had: u64,
+    },
+    /// What was read back is no result of the recording.
+    #[cfg(feature = "gpu")]
+    #[error("{found} bytes of {what} were read back, expected {expected}")]
+    ReadBack {
+        /// The buffer.
+        what: &'static str,
+        /// Bytes expected at least.
+        expected: u64,
+        /// Bytes given.
+        found: u64,
+    },
     /// The light or the cloud breaks a promise, or the caller cancelled.
     #[error(transparent)]
     Core(#[from] splat_core::Error),

@@ -29,10 +29,13 @@ mod appearance;
 mod caster;
 mod cost;
 mod deposit;
+mod deposits;
 mod discs;
 mod entries;
 mod error;
 mod frame;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 mod lanes;
 mod lookup;
 pub mod mapping;
@@ -53,6 +56,7 @@ mod survey;
 mod table;
 
 pub use cost::{Counts, Prediction};
+pub use deposits::Deposits;
 pub use error::Error;
 pub use params::{MappingChoice, Params, Resolution};
 pub use query::SurfacePoint;

@@ -1,16 +1,14 @@
-//! Building a map: survey, plan, opaque discs, deposits, lists (Gunjee 2007, section 4.1, steps 1-3).
+//! A map, and what of it is there before its lists: opaque discs, sizes (Gunjee 2007, section 4.1, steps 1-3).
 
 use crate::caster::Casters;
 use crate::cost::{Counts, Prediction};
-use crate::deposit::{Deposit, Scratch};
 use crate::frame::Frame;
-use crate::mapping::{Mapping, Table, with_mapping};
-use crate::media::Target;
+use crate::mapping::{Mapping, Table};
 use crate::opaque::{DiscBatches, OpaqueDepth};
-use crate::plan::{Plan, plan};
+use crate::plan::Plan;
 use crate::survey::{CHUNK, Survey};
-use crate::table::{Lists, Parted, Ranges};
-use crate::{Error, Params};
+use crate::table::Lists;
+use crate::{Deposits, Error, Params};
 use rayon::prelude::*;
 use splat_core::optics::AbsorbanceModel;
 use splat_core::{Cloud, Light, Material, Object, Progress, SplatKind};
@@ -79,13 +77,7 @@ impl ShadowMap {
         params: &Params,
         progress: &Progress,
     ) -> Result<Self, Error> {
-        params.validate()?;
-        light.validate(0)?;
-        let casters = Casters::new(cloud, materials, objects, params);
-        let survey = Survey::new(&casters);
-        let plan = plan(&casters, &survey, light)?;
-        progress.add_total(cloud.len() as u64);
-        with_mapping!(&plan.table, m => finish(&casters, &survey, &plan, m, progress))
+        Deposits::new(cloud, materials, objects, light, params, progress).map(Deposits::into_map)
     }
 
     /// 1 when all casters absorb every channel alike, else 3.
@@ -109,27 +101,16 @@ impl ShadowMap {
     }
 }
 
-fn finish<M: Mapping>(
-    casters: &Casters<'_>,
-    survey: &Survey,
-    plan: &Plan,
-    mapping: &M,
-    progress: &Progress,
-) -> Result<ShadowMap, Error> {
-    let opaque = opaque_depths(casters, survey, plan, mapping);
-    let absorbances = if survey.coloured {
-        Absorbances::Rgb(deposit_all(casters, plan, mapping, &opaque, progress)?)
-    } else {
-        Absorbances::Mono(deposit_all(casters, plan, mapping, &opaque, progress)?)
-    };
+/// A map without its lists.
+pub(crate) fn head<M: Mapping>(casters: &Casters<'_>, survey: &Survey, plan: &Plan, mapping: &M) -> ShadowMap {
     let params = casters.params;
     let cutoff = params.footprints.layers()[0].cutoff;
     let [columns, rows] = mapping.size().map(u64::from);
-    let mut map = ShadowMap {
+    ShadowMap {
         frame: plan.frame,
         table: plan.table.clone(),
-        opaque,
-        absorbances,
+        opaque: opaque_depths(casters, survey, plan, mapping),
+        absorbances: Absorbances::Mono(Matter { media: None, surfaces: None }),
         ramp: 0.5 * plan.frame.length(survey.mean_medium_radius()),
         bias: params.bias / (cutoff * splat_core::Footprint::SIGMA_OVER_SPACING),
         dark_from: (params.absorbance == AbsorbanceModel::Paper).then(|| params.absorbance_limit()),
@@ -140,12 +121,17 @@ fn finish<M: Mapping>(
             cells: columns * rows,
             ..Counts::default()
         },
-    };
-    map.count();
-    Ok(map)
+    }
 }
 
 impl ShadowMap {
+    /// The map with its lists.
+    pub(crate) fn with(mut self, absorbances: Absorbances) -> Self {
+        self.absorbances = absorbances;
+        self.count();
+        self
+    }
+
     fn count(&mut self) {
         fn add<const C: usize>(matter: &Matter<C>, counts: &mut Counts) {
             for lists in [&matter.media, &matter.surfaces].into_iter().flatten() {
@@ -179,39 +165,6 @@ fn opaque_depths<M: Mapping>(casters: &Casters<'_>, survey: &Survey, plan: &Plan
     depth.into_distances()
 }
 
-type PartedPair<const C: usize> = (Parted<C>, Parted<C>);
-
-fn deposit_all<M: Mapping, const C: usize>(
-    casters: &Casters<'_>,
-    plan: &Plan,
-    mapping: &M,
-    opaque: &[f32],
-    progress: &Progress,
-) -> Result<Matter<C>, Error> {
-    let cloud = casters.cloud;
-    let [columns, rows] = mapping.size();
-    let ranges = Ranges::new(columns as usize * rows as usize, plan.prediction.entries);
-    let chunks: Vec<PartedPair<C>> = (0..cloud.len().div_ceil(CHUNK))
-        .into_par_iter()
-        .map_init(Scratch::default, |scratch, c| {
-            let chunk = c * CHUNK..cloud.len().min((c + 1) * CHUNK);
-            progress.tick(chunk.len() as u64)?;
-            scratch.media.clear();
-            scratch.surfaces.clear();
-            pulp::Arch::new().dispatch(FillChunk {
-                casters,
-                plan,
-                deposit: Deposit { mapping, opaque, scratch },
-                chunk,
-            });
-            Ok((Parted::new(&scratch.media, ranges), Parted::new(&scratch.surfaces, ranges)))
-        })
-        .collect::<Result<_, Error>>()?;
-    let (media, surfaces): (Vec<_>, Vec<_>) = chunks.into_iter().unzip();
-    let limit = casters.params.absorbance_limit();
-    Ok(Matter { media: lists(&media, ranges, limit, casters)?, surfaces: lists(&surfaces, ranges, limit, casters)? })
-}
-
 /// Opaque discs of one chunk of splats, in the form that [`pulp`] compiles once per instruction set.
 struct OpaqueChunk<'a, M: Mapping> {
     casters: &'a Casters<'a>,
@@ -232,60 +185,4 @@ impl<M: Mapping> pulp::NullaryFnOnce for OpaqueChunk<'_, M> {
         let splats = self.chunk.filter(is_wanted).map(|i| i as u32);
         self.depth.add_all(self.mapping, casters, &self.plan.frame, splats, self.work);
     }
-}
-
-/// Deposits of one chunk of splats, in the form that [`pulp`] compiles once per instruction set.
-struct FillChunk<'a, M: Mapping, const C: usize> {
-    casters: &'a Casters<'a>,
-    plan: &'a Plan,
-    deposit: Deposit<'a, M, C>,
-    chunk: Range<usize>,
-}
-
-impl<M: Mapping, const C: usize> pulp::NullaryFnOnce for FillChunk<'_, M, C> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(mut self) {
-        let (casters, cloud) = (self.casters, self.casters.cloud);
-        let Scratch { media, surfaces, media_batches, surface_batches, ids, .. } = &mut *self.deposit.scratch;
-        let [medium_ids, surface_ids, others] = ids;
-        let mut others = std::mem::take(others);
-        others.clear();
-        if casters.has_opaque_discs() {
-            let (frame, mapping, opaque) = (&self.plan.frame, self.deposit.mapping, self.deposit.opaque);
-            let select = |kind, ids: &mut Vec<u32>| {
-                ids.clear();
-                let is_wanted = |&i: &usize| cloud.kind[i] == kind && casters.casts(i);
-                ids.extend(self.chunk.clone().filter(is_wanted).map(|i| i as u32));
-            };
-            select(SplatKind::Medium, medium_ids);
-            select(SplatKind::Surface, surface_ids);
-            let mut target = Target { mapping, opaque, entries: media };
-            target.add_media(casters, frame, medium_ids, media_batches, &mut others);
-            let mut target = Target { mapping, opaque, entries: surfaces };
-            target.add_surfaces(casters, frame, surface_ids, surface_batches, &mut others);
-        } else {
-            others.extend(self.chunk.filter(|&i| casters.casts(i)).map(|i| i as u32));
-        }
-        for &i in &others {
-            self.deposit.add(&casters.get(i as usize, &self.plan.frame, self.deposit.mapping.is_parallel()));
-        }
-        self.deposit.scratch.ids[2] = others;
-    }
-}
-
-fn lists<const C: usize>(
-    parted: &[Parted<C>],
-    ranges: Ranges,
-    limit: f32,
-    casters: &Casters<'_>,
-) -> Result<Option<Lists<C>>, Error> {
-    let entries: u64 = parted.iter().map(|p| p.len() as u64).sum();
-    let needed_bytes = entries * (2 * size_of::<[f32; C]>() as u64 + 12);
-    let limit_bytes = casters.params.max_bytes;
-    if entries > u64::from(u32::MAX) || needed_bytes > limit_bytes {
-        return Err(Error::Memory { what: "the lists", needed_bytes, limit_bytes });
-    }
-    Ok((entries > 0).then(|| Lists::new(parted, ranges, limit)))
 }

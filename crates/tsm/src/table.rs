@@ -17,6 +17,12 @@ const RANGE_ENTRIES: f64 = 32_768.0;
 /// Least and greatest number of ranges.
 const RANGES: [f64; 2] = [64.0, 1024.0];
 
+/// A limit of absorbance in fixed point, at least 0. It is taken 2⁻²⁰ low: f32 parts of a sum may each be rounded down, and
+/// the verdict must not depend on their number.
+pub(crate) fn stop_of(limit: f32) -> i64 {
+    ((f64::from(limit) * (1.0 - 2f64.powi(-20)) * FIXED) as i64).max(0)
+}
+
 /// Ranges of cells that are gathered together.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Ranges {
@@ -34,8 +40,26 @@ impl Ranges {
     }
 }
 
+#[cfg(feature = "gpu")]
+impl Ranges {
+    /// Number of ranges.
+    pub(crate) fn count(self) -> usize {
+        self.count
+    }
+
+    /// Cells of the table.
+    pub(crate) fn cells(self) -> usize {
+        self.cells
+    }
+
+    /// Where a range begins; the cells of the table for the one behind the last.
+    pub(crate) fn first_cell(self, range: usize) -> usize {
+        self.cells.min(range << self.shift)
+    }
+}
+
 /// The entries of one chunk, parted by ranges.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Parted<const C: usize> {
     start: Vec<u32>,
     cell: Vec<u32>,
@@ -79,6 +103,14 @@ impl<const C: usize> Parted<C> {
     pub(crate) fn len(&self) -> usize {
         self.cell.len()
     }
+
+    /// Cells, distances and absorbances of the entries of neighbouring ranges.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn entries_of(&self, ranges: Range<usize>) -> (&[u32], &[f32], &[[f32; C]]) {
+        let begin = if ranges.is_empty() { 0 } else { self.range(ranges.start).start };
+        let end = if ranges.is_empty() { 0 } else { self.range(ranges.end - 1).end };
+        (&self.cell[begin..end], &self.distance[begin..end], &self.own[begin..end])
+    }
 }
 
 /// The sorted entries of one cell: equal distances are one, and nothing follows the visible limit.
@@ -117,14 +149,28 @@ impl<const C: usize> Lists<C> {
             tasks.push(Task { range, first, span, distance, total });
             first = first.wrapping_add(n as u32);
         }
-        // The limit is taken 2⁻²⁰ low: f32 parts of a sum may each be rounded down, and the verdict must not depend on
-        // their number.
-        let stop = (f64::from(limit) * (1.0 - 2f64.powi(-20)) * FIXED) as i64;
+        let stop = stop_of(limit);
         let run = |gathered: &mut Gathered<C>, task: Task<'_, C>| {
             pulp::Arch::new().dispatch(Run { task, parted, shift: ranges.shift, stop, gathered })
         };
         let kept = tasks.into_par_iter().map_init(Gathered::default, run).sum();
         Self { span, distance, total, kept }
+    }
+
+    /// Lists that were sorted and summed elsewhere; `None` where a cell's list is not among the entries.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn from_parts(span: Vec<[u32; 2]>, distance: Vec<f32>, total: Vec<[f32; C]>) -> Option<Self> {
+        let fits =
+            |[begin, kept]: &[u32; 2]| begin.checked_add(*kept).is_some_and(|end| end as usize <= distance.len());
+        let known = span.iter().all(fits) && total.len() == distance.len();
+        let kept = span.iter().map(|[_, kept]| u64::from(*kept)).sum();
+        known.then_some(Self { span, distance, total, kept })
+    }
+
+    /// First entry and number of knots of each cell, distances, totals.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn parts(&self) -> (&[[u32; 2]], &[f32], &[[f32; C]]) {
+        (&self.span, &self.distance, &self.total)
     }
 
     /// The sorted entries of a cell.

@@ -77,3 +77,24 @@ struct ParticleView {
     uint pixels;
     uint unused;
 };
+
+struct ListView {
+    uvec2 stop;
+    uint entries;
+    uint cells;
+    uint channels;
+    uint unused;
+};
+
+struct ShadowView {
+    vec2 least;
+    uvec2 size;
+    float cell;
+    float ramp;
+    float dark_from;
+    uint mapping;
+    uint receivers;
+    uint channels;
+    uint opaque;
+    uint unused;
+};

@@ -54,6 +54,14 @@ impl Octahedral {
     }
 }
 
+#[cfg(feature = "gpu")]
+impl Octahedral {
+    /// Directions of the cell centres with column and row ≥ n/2, row by row.
+    pub(crate) fn quarter(&self) -> &[Vec3] {
+        &self.quarter
+    }
+}
+
 /// A place among the edges of its octant, in cells.
 struct Edges {
     /// From the middle of the table, mirrored to the first quadrant.

@@ -1,0 +1,190 @@
+//! Everything that a map's build leaves before its lists are sorted and summed: by the processor, or by a device.
+
+use crate::caster::Casters;
+use crate::deposit::{Deposit, Scratch};
+use crate::mapping::{Mapping, with_mapping};
+use crate::media::Target;
+use crate::plan::{Plan, plan};
+use crate::shadow_map::{Absorbances, Matter, head};
+use crate::survey::{CHUNK, Survey};
+use crate::table::{Lists, Parted, Ranges};
+use crate::{Error, Params, ShadowMap};
+use rayon::prelude::*;
+use splat_core::{Cloud, Light, Material, Object, Progress, SplatKind};
+use std::ops::Range;
+
+/// The deposits of one light's map, parted by cells: all of the map but its lists (Gunjee 2007, section 4.1, steps 1-2).
+///
+/// [`Deposits::into_map`] makes the lists here; with feature `gpu` a device can, with the same bits.
+#[derive(Debug, Clone)]
+pub struct Deposits {
+    /// The map, without lists.
+    pub(crate) map: ShadowMap,
+    pub(crate) parts: Parts,
+    pub(crate) ranges: Ranges,
+    /// Absorbance at which lists stop.
+    pub(crate) limit: f32,
+}
+
+/// Entries of media and of surfaces, each chunk of splats by itself.
+pub(crate) type Parted2<const C: usize> = [Vec<Parted<C>>; 2];
+
+/// Entries with one absorbance for all channels, or with three.
+#[derive(Debug, Clone)]
+pub(crate) enum Parts {
+    Mono(Parted2<1>),
+    Rgb(Parted2<3>),
+}
+
+impl Deposits {
+    /// Looks at the casters, chooses the table and deposits their absorbance, telling the progress in splats; the
+    /// arguments are those of [`ShadowMap::build_with_progress`].
+    ///
+    /// # Errors
+    /// Those of [`ShadowMap::build_with_progress`].
+    pub fn new(
+        cloud: &Cloud,
+        materials: &[Material],
+        objects: &[Object],
+        light: &Light,
+        params: &Params,
+        progress: &Progress,
+    ) -> Result<Self, Error> {
+        params.validate()?;
+        light.validate(0)?;
+        let casters = Casters::new(cloud, materials, objects, params);
+        let survey = Survey::new(&casters);
+        let plan = plan(&casters, &survey, light)?;
+        progress.add_total(cloud.len() as u64);
+        with_mapping!(&plan.table, m => Self::with_mapping(&casters, &survey, &plan, m, progress))
+    }
+
+    fn with_mapping<M: Mapping>(
+        casters: &Casters<'_>,
+        survey: &Survey,
+        plan: &Plan,
+        mapping: &M,
+        progress: &Progress,
+    ) -> Result<Self, Error> {
+        let map = head(casters, survey, plan, mapping);
+        let [columns, rows] = mapping.size();
+        let ranges = Ranges::new(columns as usize * rows as usize, plan.prediction.entries);
+        let parts = if survey.coloured {
+            Parts::Rgb(deposit_all(casters, plan, mapping, &map.opaque, ranges, progress)?)
+        } else {
+            Parts::Mono(deposit_all(casters, plan, mapping, &map.opaque, ranges, progress)?)
+        };
+        Ok(Self { map, parts, ranges, limit: casters.params.absorbance_limit() })
+    }
+
+    /// Entries of media and of surfaces.
+    pub fn entries(&self) -> [u64; 2] {
+        match &self.parts {
+            Parts::Mono(parts) => entries(parts),
+            Parts::Rgb(parts) => entries(parts),
+        }
+    }
+
+    /// 1 when all casters absorb every channel alike, else 3.
+    pub fn channels(&self) -> usize {
+        if matches!(self.parts, Parts::Mono(_)) { 1 } else { 3 }
+    }
+
+    /// The map, its lists sorted and summed by the processor.
+    pub fn into_map(self) -> ShadowMap {
+        let Self { map, parts, ranges, limit } = self;
+        match parts {
+            Parts::Mono(parts) => map.with(Absorbances::Mono(lists(&parts, ranges, limit))),
+            Parts::Rgb(parts) => map.with(Absorbances::Rgb(lists(&parts, ranges, limit))),
+        }
+    }
+}
+
+fn entries<const C: usize>(parts: &Parted2<C>) -> [u64; 2] {
+    parts.each_ref().map(|parted| parted.iter().map(|p| p.len() as u64).sum())
+}
+
+fn lists<const C: usize>(parts: &Parted2<C>, ranges: Ranges, limit: f32) -> Matter<C> {
+    let [media, surfaces] = [0, 1].map(|of| (entries(parts)[of] > 0).then(|| Lists::new(&parts[of], ranges, limit)));
+    Matter { media, surfaces }
+}
+
+fn deposit_all<M: Mapping, const C: usize>(
+    casters: &Casters<'_>,
+    plan: &Plan,
+    mapping: &M,
+    opaque: &[f32],
+    ranges: Ranges,
+    progress: &Progress,
+) -> Result<Parted2<C>, Error> {
+    let cloud = casters.cloud;
+    let chunks: Vec<(Parted<C>, Parted<C>)> = (0..cloud.len().div_ceil(CHUNK))
+        .into_par_iter()
+        .map_init(Scratch::default, |scratch, c| {
+            let chunk = c * CHUNK..cloud.len().min((c + 1) * CHUNK);
+            progress.tick(chunk.len() as u64)?;
+            scratch.media.clear();
+            scratch.surfaces.clear();
+            pulp::Arch::new().dispatch(FillChunk {
+                casters,
+                plan,
+                deposit: Deposit { mapping, opaque, scratch },
+                chunk,
+            });
+            Ok((Parted::new(&scratch.media, ranges), Parted::new(&scratch.surfaces, ranges)))
+        })
+        .collect::<Result<_, Error>>()?;
+    let (media, surfaces) = chunks.into_iter().unzip();
+    let parts = [media, surfaces];
+    entries(&parts).into_iter().try_for_each(|entries| check_memory::<C>(entries, casters.params.max_bytes))?;
+    Ok(parts)
+}
+
+fn check_memory<const C: usize>(entries: u64, limit_bytes: u64) -> Result<(), Error> {
+    let needed_bytes = entries * (2 * size_of::<[f32; C]>() as u64 + 12);
+    if entries > u64::from(u32::MAX) || needed_bytes > limit_bytes {
+        return Err(Error::Memory { what: "the lists", needed_bytes, limit_bytes });
+    }
+    Ok(())
+}
+
+/// Deposits of one chunk of splats, in the form that [`pulp`] compiles once per instruction set.
+struct FillChunk<'a, M: Mapping, const C: usize> {
+    casters: &'a Casters<'a>,
+    plan: &'a Plan,
+    deposit: Deposit<'a, M, C>,
+    chunk: Range<usize>,
+}
+
+impl<M: Mapping, const C: usize> pulp::NullaryFnOnce for FillChunk<'_, M, C> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(mut self) {
+        let (casters, cloud) = (self.casters, self.casters.cloud);
+        let Scratch { media, surfaces, media_batches, surface_batches, ids, .. } = &mut *self.deposit.scratch;
+        let [medium_ids, surface_ids, others] = ids;
+        let mut others = std::mem::take(others);
+        others.clear();
+        if casters.has_opaque_discs() {
+            let (frame, mapping, opaque) = (&self.plan.frame, self.deposit.mapping, self.deposit.opaque);
+            let select = |kind, ids: &mut Vec<u32>| {
+                ids.clear();
+                let is_wanted = |&i: &usize| cloud.kind[i] == kind && casters.casts(i);
+                ids.extend(self.chunk.clone().filter(is_wanted).map(|i| i as u32));
+            };
+            select(SplatKind::Medium, medium_ids);
+            select(SplatKind::Surface, surface_ids);
+            let mut target = Target { mapping, opaque, entries: media };
+            target.add_media(casters, frame, medium_ids, media_batches, &mut others);
+            let mut target = Target { mapping, opaque, entries: surfaces };
+            target.add_surfaces(casters, frame, surface_ids, surface_batches, &mut others);
+        } else {
+            others.extend(self.chunk.filter(|&i| casters.casts(i)).map(|i| i as u32));
+        }
+        for &i in &others {
+            self.deposit.add(&casters.get(i as usize, &self.plan.frame, self.deposit.mapping.is_parallel()));
+        }
+        self.deposit.scratch.ids[2] = others;
+    }
+}

@@ -1,0 +1,147 @@
+//! The recorded lists and look-ups, without a device: what they are, and what they refuse.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+
+use common::{mixed, point_light};
+use splat_core::Progress;
+use splat_core::glam::DVec3;
+use tsm::gpu::{Capacities, Room, record, record_look_up};
+use tsm::{Deposits, Error, Params};
+
+const ROOM: Capacities = Capacities { entries: 200_000, cells: 2 * 120 * 120, channels: 3 };
+
+fn deposits() -> Deposits {
+    let light = point_light(DVec3::new(0.3, 2.5, 0.2));
+    Deposits::new(&mixed(4000, DVec3::ZERO), &[], &[], &light, &Params::default(), &Progress::new()).unwrap()
+}
+
+#[test]
+fn the_lists_are_as_kept_in_text() {
+    let found = record(ROOM).recording.to_string();
+    assert_eq!(found, include_str!("recording.txt"), "now:\n{found}");
+}
+
+#[test]
+fn look_ups_are_as_kept_in_text() {
+    let map = deposits().into_map();
+    let room = Room { entries: 100_000, ..Room::of(&map, 5000).unwrap() };
+    let recorded = record_look_up(Room { cells: 6000, directions: 1500, ..room });
+    let found = recorded.recording.to_string();
+    assert_eq!(found, include_str!("look_up.txt"), "now:\n{found}");
+    recorded.recording.check().unwrap();
+}
+
+#[test]
+fn look_ups_refuse_what_they_have_no_room_for() {
+    let map = deposits().into_map();
+    let room = Room::of(&map, 10).unwrap();
+    let refused = |room| record_look_up(room).map(&map).unwrap_err();
+    assert!(record_look_up(room).map(&map).is_ok());
+    assert!(matches!(refused(Room { cells: room.cells - 1, ..room }), Error::Overflow { what: "cells", .. }));
+    assert!(matches!(refused(Room { entries: room.entries - 1, ..room }), Error::Overflow { what: "entries", .. }));
+    assert!(matches!(refused(Room { opaque: false, ..room }), Error::Overflow { what: "opaque discs", .. }));
+    assert!(matches!(refused(Room { channels: 3, ..room }), Error::Overflow { what: "channels", .. }));
+    let recorded = record_look_up(room);
+    let uploads = recorded.map(&map).unwrap();
+    let receivers = [common::probe(splat_core::glam::Vec3::X); 11];
+    let refused = recorded.receivers(&map, &uploads, &receivers).unwrap_err();
+    assert_eq!(refused, Error::Overflow { what: "receivers", needed: 11, had: 10 });
+    let own = recorded.receivers(&map, &uploads, &receivers[..10]).unwrap();
+    assert_eq!(recorded.inputs(None, &own).len() + 5, recorded.inputs(Some(&uploads), &own).len());
+    let short = recorded.transmittances(&[0; 36], &own).unwrap_err();
+    assert_eq!(short, Error::ReadBack { what: "lights", expected: 40, found: 36 });
+    assert_eq!(recorded.transmittances(&[0; 40], &own).unwrap(), [[0.0; 3]; 10]);
+    // Polar angles are the CPU's.
+    let polar = Params { mapping: tsm::MappingChoice::PolarAzimuth, ..Params::default() };
+    let light = point_light(DVec3::new(0.3, 2.5, 0.2));
+    assert_eq!(Room::of(&common::build(&mixed(100, DVec3::ZERO), &light, &polar), 10), None);
+}
+
+#[test]
+fn they_are_without_fault_for_any_room() {
+    for entries in [0, 1, 1023, 1025, 5_000_000, 100_000_000, u32::MAX] {
+        for cells in [0, 1, 2, 257, 1 << 21] {
+            for channels in [1, 3] {
+                record(Capacities { entries, cells, channels }).recording.check().unwrap();
+            }
+        }
+    }
+}
+
+#[test]
+fn too_little_room_says_how_much() {
+    let deposits = deposits();
+    let most = Capacities { entries: u32::MAX, cells: u32::MAX, channels: 1 };
+    let batches = deposits.batches(most).unwrap();
+    let [all] = &batches[..] else { panic!("{batches:?}") };
+    assert_eq!(all.entries(), deposits.entries().iter().sum::<u64>());
+    let (entries, cells) = (all.entries() as u32, all.cells() as u32);
+    let refused = |room| record(room).uploads(&deposits, all).unwrap_err();
+    let overflow = |what, needed: u32, had: u32| Error::Overflow { what, needed: needed.into(), had: had.into() };
+    let room = Capacities { entries, cells, channels: 1 };
+    assert_eq!(refused(Capacities { entries: entries - 1, ..room }), overflow("entries", entries, entries - 1));
+    assert_eq!(refused(Capacities { cells: cells - 1, ..room }), overflow("cells", cells, cells - 1));
+    assert_eq!(refused(Capacities { channels: 3, ..room }), overflow("channels", 1, 3));
+    assert!(record(room).uploads(&deposits, all).is_ok());
+}
+
+#[test]
+fn batches_are_all_cells_in_order_and_small_enough() {
+    let deposits = deposits();
+    let all: u64 = deposits.entries().iter().sum();
+    for (entries, cells) in [(all as u32 / 4, 4000), (all as u32, 10_000), (all as u32 / 3, 1 << 30)] {
+        let batches = deposits.batches(Capacities { entries, cells, channels: 1 }).unwrap();
+        assert!(batches.len() > 2, "{}", batches.len());
+        assert!(batches.iter().all(|b| b.entries() <= entries.into() && b.cells() <= cells.into()));
+        assert_eq!(batches.iter().map(|b| b.entries()).sum::<u64>(), all);
+    }
+    let refused = deposits.batches(Capacities { entries: 3, cells: 1 << 30, channels: 1 });
+    assert!(matches!(refused, Err(Error::Overflow { what: "entries", had: 3, .. })), "{refused:?}");
+}
+
+#[test]
+fn bytes_that_no_run_gave_are_refused() {
+    let deposits = deposits();
+    let most = Capacities { entries: u32::MAX, cells: u32::MAX, channels: 1 };
+    let batch = &deposits.batches(most).unwrap()[0];
+    let (entries, cells) = (batch.entries() as usize, batch.cells() as usize);
+    let recorded = record(Capacities { entries: entries as u32, cells: cells as u32, channels: 1 });
+    // Empty lists: those of surfaces begin behind the entries of media.
+    let of_media = deposits.entries()[0] as u32;
+    let empty = |cell| [if cell < cells / 2 { 0 } else { of_media }, 0].map(u32::to_ne_bytes).concat();
+    let (spans, column) = ((0..cells).flat_map(empty).collect::<Vec<u8>>(), vec![0u8; 4 * entries]);
+    let short = |what, expected: usize, found: usize| {
+        Err(Error::ReadBack { what, expected: expected as u64, found: found as u64 })
+    };
+    assert_eq!(recorded.listed([&spans[1..], &column, &column], batch), short("spans", 8 * cells, 8 * cells - 1));
+    assert_eq!(
+        recorded.listed([&spans, &column[4..], &column], batch),
+        short("distances", 4 * entries, 4 * entries - 4)
+    );
+    assert_eq!(recorded.listed([&spans, &column, &[]], batch), short("totals", 4 * entries, 0));
+    let good = recorded.listed([&spans, &column, &column], batch).unwrap();
+    deposits.join(vec![good.clone()]).unwrap();
+    // None, one too many, and lists that reach beyond the entries.
+    assert!(matches!(deposits.join(Vec::new()), Err(Error::ReadBack { what: "spans", .. })));
+    assert!(matches!(deposits.join(vec![good.clone(), good]), Err(Error::ReadBack { what: "spans", .. })));
+    let beyond = recorded.listed([&vec![255u8; 8 * cells], &column, &column], batch).unwrap();
+    assert!(matches!(deposits.join(vec![beyond]), Err(Error::ReadBack { what: "spans", .. })));
+}
+
+#[test]
+fn the_most_room_fits_and_more_does_not() {
+    let largest = |room| record(room).recording.buffers().iter().map(|b| b.bytes).max();
+    for bytes in [1024u64, 4096, 65_536, 128 << 20] {
+        for channels in [1, 3] {
+            let most = Capacities::most(bytes, channels);
+            if bytes == 1024 && channels == 3 {
+                assert_eq!((most.entries, most.cells), (0, 0));
+                continue;
+            }
+            assert!(largest(most) <= Some(bytes), "{bytes}: {most:?}");
+            let more = [Capacities { entries: most.entries + 1, ..most }, Capacities { cells: most.cells + 1, ..most }];
+            assert!(more.into_iter().all(|room| largest(room) > Some(bytes)), "{bytes}: {most:?}");
+        }
+    }
+}
