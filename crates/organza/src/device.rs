@@ -1,21 +1,24 @@
 //! The GPU beside the processor: the passes that have a recording run there when the user asks for it.
 //!
-//! Today that is the order of translucent splats (`hbsort::gpu`), in exact mode, and the projection and average of
-//! particles that are shown as they are (`pbsr::gpu`). Whatever the device cannot do the processor does, with one line
-//! said. The order is the processor's bit for bit: a device that would round otherwise is found out by a trial before it
-//! is used. Sets of particles are the processor's too, up to a pixel in a thousand (see `pbsr::gpu`). Who allows 10⁻⁵ of
-//! difference lets the device composite ordered splats as well (`splat_core::raster::gpu`).
+//! Today that is the lists of shadow maps (`tsm::gpu`), the order of translucent splats (`hbsort::gpu`), in exact mode, and
+//! the projection and average of particles that are shown as they are (`pbsr::gpu`). Whatever the device cannot do the
+//! processor does, with one line said. Lists and order are the processor's bit for bit: a device that would round otherwise
+//! is found out by a trial before it is used. Sets of particles are the processor's too, up to a pixel in a thousand (see
+//! `pbsr::gpu`). Who allows 10⁻⁵ of difference lets the device look shadows up (`tsm::gpu`) and composite ordered splats
+//! (`splat_core::raster::gpu`) as well.
 
 mod helper;
 mod order;
 mod particles;
 mod passport;
+mod shadows;
 mod splats;
 mod trial;
 
 use crate::Error;
 pub(crate) use helper::Helper;
 pub use passport::{Agreement, Checked, KernelTime, Passport, passport};
+pub(crate) use shadows::LookedUp;
 use splat_shaders::{Adapter, Backend, Choice, DeviceError};
 use std::sync::Arc;
 
@@ -105,6 +108,8 @@ enum Failure {
     Sort(#[from] hbsort::Error),
     #[error(transparent)]
     Particles(#[from] pbsr::Error),
+    #[error(transparent)]
+    Shadows(#[from] tsm::Error),
     #[error(transparent)]
     Splats(#[from] splat_core::Error),
     #[error("it rounds otherwise than the processor, so the picture would be another")]

@@ -1,6 +1,6 @@
 //! The `points` technique (Gunjee 2007): shadow maps, slices, attribute-driven shading, splatting.
 
-use crate::device::Helper;
+use crate::device::{Helper, LookedUp};
 use crate::load::Loaded;
 use crate::plan::{Plan, pass};
 use crate::scene::{RenderSettings, ShadowMapping};
@@ -13,7 +13,7 @@ use splat_core::{
     Transmittance,
 };
 use std::borrow::Cow;
-use tsm::ShadowMap;
+use tsm::{Deposits, ShadowMap};
 
 /// What drawing reads.
 pub(crate) struct Drawing<'a> {
@@ -48,16 +48,41 @@ impl Drawing<'_> {
         camera: &Camera,
         cost: &mut CostRecord,
     ) -> Result<Shaded, Error> {
-        let lights: Vec<LitBy<'_>> = self.shining(maps).map(|(light, shadow)| LitBy { light, shadow }).collect();
-        let input = ShadeInput {
-            cloud: &self.loaded.cloud,
-            materials: &self.loaded.materials,
-            objects: &self.loaded.objects,
-            lights: &lights,
-            ambient: self.ambient,
-            camera,
-        };
-        self.shade(&input, &ChannelLayout::new(&self.layers), cost)
+        let projected = self.project(camera, cost)?;
+        let layout = ChannelLayout::new(&self.layers);
+        let values = cost.measure(pass::SHADE, |stage| {
+            let looked_up = self.look_ups(maps, &projected);
+            let known = looked_up.iter().zip(maps).map(|(known, map)| {
+                let map = map.as_ref().map(|map| map as &dyn Transmittance);
+                known.as_ref().map(|known| known as &dyn Transmittance).or(map)
+            });
+            let lights: Vec<LitBy<'_>> =
+                self.with_light(known).map(|(light, shadow)| LitBy { light, shadow }).collect();
+            let input = ShadeInput {
+                cloud: &self.loaded.cloud,
+                materials: &self.loaded.materials,
+                objects: &self.loaded.objects,
+                lights: &lights,
+                ambient: self.ambient,
+                camera,
+            };
+            let values = shade(&input, &projected, &layout, self.progress);
+            stage.items_in = projected.visible();
+            stage.items_out = stage.items_in;
+            stage.bytes = 4 * values.len() as u64;
+            Ok::<_, Error>(values)
+        })?;
+        self.tick()?;
+        Ok(Shaded { projected, values, channels: layout.count() })
+    }
+
+    /// For each map the light at the splats in view, where a device looks it up.
+    fn look_ups<'b>(&self, maps: &'b [Option<ShadowMap>], projected: &Projected) -> Vec<Option<LookedUp<'b>>> {
+        let device = self.helper.filter(|_| self.device_composites && maps.iter().any(Option::is_some));
+        let Some(device) = device else { return maps.iter().map(|_| None).collect() };
+        let cloud = &self.loaded.cloud;
+        let ids: Vec<u32> = (0..cloud.len() as u32).filter(|&i| projected.is_visible(i as usize)).collect();
+        maps.iter().map(|map| device.look_up(map.as_ref()?, cloud, &ids)).collect()
     }
 
     /// The lights that have an intensity, with their shadow maps.
@@ -65,8 +90,13 @@ impl Drawing<'_> {
         &'b self,
         maps: &'b [Option<ShadowMap>],
     ) -> impl Iterator<Item = (Light, Option<&'b dyn Transmittance>)> {
-        let with_map = self.loaded.lights.iter().zip(maps).filter(|(light, _)| light.intensity != [0.0; 3]);
-        with_map.map(|(light, map)| (*light, map.as_ref().map(|m| m as &dyn Transmittance)))
+        self.with_light(maps.iter().map(|map| map.as_ref().map(|m| m as &dyn Transmittance)))
+    }
+
+    /// Lights that have an intensity, each with what is there for it.
+    fn with_light<T>(&self, of_each: impl Iterator<Item = T>) -> impl Iterator<Item = (Light, T)> {
+        let all = self.loaded.lights.iter().zip(of_each);
+        all.filter(|(light, _)| light.intensity != [0.0; 3]).map(|(light, of)| (*light, of))
     }
 
     /// Splats in this order in front of the opaque ones, as layers.
@@ -137,9 +167,10 @@ impl Drawing<'_> {
             }
             let map = cost.measure(pass::SHADOW_MAP, |stage| {
                 let l = self.loaded;
-                let map =
-                    ShadowMap::build_with_progress(&l.cloud, &l.materials, &l.objects, light, &params, self.progress)
-                        .map_err(|e| shadow_error(i, &e))?;
+                let deposits = Deposits::new(&l.cloud, &l.materials, &l.objects, light, &params, self.progress)
+                    .map_err(|e| shadow_error(i, &e))?;
+                let helped = self.helper.and_then(|helper| helper.shadow_map(&deposits));
+                let map = helped.unwrap_or_else(|| deposits.into_map());
                 stage.items_in = l.cloud.len() as u64;
                 stage.items_out = map.counts().kept;
                 stage.bytes = map.counts().bytes;
@@ -196,29 +227,21 @@ impl Drawing<'_> {
         Detail { depth: opaque || self.layers.depth || self.layers.object, object: self.layers.object }
     }
 
-    /// Footprints of all splats, and the radiance of those in view.
-    fn shade(&self, input: &ShadeInput<'_>, layout: &ChannelLayout, cost: &mut CostRecord) -> Result<Shaded, Error> {
+    /// Footprints of all splats.
+    fn project(&self, camera: &Camera, cost: &mut CostRecord) -> Result<Projected, Error> {
         self.tick()?;
         let l = self.loaded;
         let projected = cost.measure(pass::PROJECT, |stage| {
             let mut projected = Projected::default();
             let (params, detail) = (self.raster_params(), self.detail());
-            raster::project_into(&mut projected, &l.cloud, input.camera, &l.footprints, &l.materials, &params, detail);
+            raster::project_into(&mut projected, &l.cloud, camera, &l.footprints, &l.materials, &params, detail);
             stage.items_in = l.cloud.len() as u64;
             stage.items_out = projected.visible();
             stage.bytes = projected.bytes();
             Ok::<_, Error>(projected)
         })?;
         self.tick()?;
-        let values = cost.measure(pass::SHADE, |stage| {
-            let values = shade(input, &projected, layout, self.progress);
-            stage.items_in = projected.visible();
-            stage.items_out = stage.items_in;
-            stage.bytes = 4 * values.len() as u64;
-            Ok::<_, Error>(values)
-        })?;
-        self.tick()?;
-        Ok(Shaded { projected, values, channels: layout.count() })
+        Ok(projected)
     }
 
     pub(crate) fn opaque(&self, shaded: &Shaded, cost: &mut CostRecord) -> Result<OpaqueImage, Error> {

@@ -129,6 +129,8 @@ impl<'a> LocalLight<'a> {
 
 /// One splat being shaded.
 struct Point {
+    /// Its place in the cloud.
+    splat: usize,
     receiver: Receiver,
     normal: Vec3,
     to_eye: Vec3,
@@ -159,6 +161,7 @@ impl Point {
         // A surface shows its viewer the side that faces him; the gradient of a medium has one outside.
         let normal = if kind != SplatKind::Medium && own.dot(to_eye) < 0.0 { -own } else { own };
         Self {
+            splat: i,
             receiver: Receiver { position, normal: own, radius: cloud.radius[i], kind },
             normal,
             to_eye,
@@ -189,7 +192,7 @@ impl Point {
             let transmittance = match light.shadow {
                 // Nothing to attenuate: the map is not asked.
                 Some(shadow) if self.shadow_coefficient > 0.0 && irradiance != [0.0; 3] => {
-                    shadow.transmittance(&self.receiver).map(|t| 1.0 - self.shadow_coefficient * (1.0 - t))
+                    shadow.at_splat(self.splat, &self.receiver).map(|t| 1.0 - self.shadow_coefficient * (1.0 - t))
                 }
                 _ => [1.0; 3],
             };

@@ -20,4 +20,9 @@ pub struct Receiver {
 pub trait Transmittance: Sync {
     /// Share of the light that arrives at the receiver per channel, in \[0, 1\].
     fn transmittance(&self, receiver: &Receiver) -> [f32; 3];
+
+    /// The same for a splat of the cloud that is shaded, by its place there: for who knows the light at splats beforehand.
+    fn at_splat(&self, _splat: usize, receiver: &Receiver) -> [f32; 3] {
+        self.transmittance(receiver)
+    }
 }

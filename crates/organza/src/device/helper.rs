@@ -2,6 +2,7 @@
 
 use super::order::order_on;
 use super::particles::{Folded, fold_on, why_not};
+use super::shadows::{LookUps, LookedUp, look_up_on, map_on};
 use super::splats::{composite_on, why_not_composite};
 use super::trial::order_trial;
 use super::{DeviceChoice, Failure, fault};
@@ -10,9 +11,10 @@ use hbsort::{Params, SliceOrder};
 use pbsr::{Ensemble, Scene};
 use splat_core::raster::RasterCounts;
 use splat_core::raster::gpu::Input;
-use splat_core::{Accumulator, Camera, Cloud, Progress};
+use splat_core::{Accumulator, Camera, Cloud, Progress, Receiver};
 use splat_shaders::{Backend, Choice, DeviceError, Executor, Validation};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use tsm::{Deposits, ShadowMap};
 
 /// The device that helps one render, and what was said about it.
 pub(crate) struct Helper {
@@ -88,6 +90,39 @@ impl Helper {
         }
         let (order, _) = self.with(|device| order_on(device, cloud, ids, camera, params))?;
         Some(order)
+    }
+
+    /// The map of these deposits, or `None` for the processor to make its lists.
+    pub(crate) fn shadow_map(&self, deposits: &Deposits) -> Option<ShadowMap> {
+        if deposits.entries() == [0, 0] {
+            return None;
+        }
+        let made = self.with(|device| map_on(device, deposits))?;
+        if made.is_none() {
+            self.leave("a shadow map's cells have more entries than the device can see: the processor makes its lists");
+        }
+        made.map(|(map, _)| map)
+    }
+
+    /// The light at the splats `ids` of a cloud, or `None` for the processor to look it up.
+    pub(crate) fn look_up<'a>(&self, map: &'a ShadowMap, cloud: &Cloud, ids: &[u32]) -> Option<LookedUp<'a>> {
+        let receiver = |&id: &u32| {
+            let i = id as usize;
+            Receiver {
+                position: cloud.position[i],
+                normal: cloud.normal_of(i),
+                radius: cloud.radius[i],
+                kind: cloud.kind[i],
+            }
+        };
+        let receivers: Vec<Receiver> = ids.iter().map(receiver).collect();
+        match self.with(|device| look_up_on(device, map, &receivers))? {
+            LookUps::Done(lights, _) => Some(LookedUp::new(map, cloud.len(), ids, lights)),
+            LookUps::Left(why) => {
+                self.leave(why);
+                None
+            }
+        }
     }
 
     /// Composites splats in order, or leaves them to the processor.

@@ -1,6 +1,7 @@
 //! `organza passport`: every recording on every device by every backend, against its twin on the processor.
 
 mod composite;
+mod shadow;
 
 use super::particles::{Folded, fold_on};
 use super::trial::OrderInput;
@@ -10,6 +11,7 @@ use composite::CompositeInput;
 use pbsr::{
     Appearance, Ensemble, EnsembleParams, FoldParams, MeshSampler, Object, Renderer, Scene, SurfaceParams, pixel_area,
 };
+use shadow::ShadowInput;
 use splat_core::glam::{DQuat, DVec3, Vec3};
 use splat_core::{Camera, Material, Mesh, Progress, Projection, Shading, Similarity, SliceOrder};
 use splat_shaders::{Adapter, Backend, Choice, DeviceError, Executor, PassTime, Validation};
@@ -46,7 +48,7 @@ impl Passport {
 /// One recording on one device.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Checked {
-    /// `order`, `composite` or `particles`.
+    /// `order`, `shadow lists`, `shadow look-ups`, `composite` or `particles`.
     pub recording: &'static str,
     /// Splats or particles that went in.
     pub items: u64,
@@ -59,16 +61,16 @@ pub struct Checked {
 /// What a device found against what the processor found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreement {
-    /// Whether that is enough: equal bits for the order, 10⁻⁵ for composited splats, 99.9 % of the pixels' hits for
-    /// particles.
+    /// Whether that is enough: equal bits for the order and the lists of shadow maps, 10⁻⁵ for look-ups in them and for
+    /// composited splats, 99.9 % of the pixels' hits for particles.
     pub within: bool,
-    /// Share of places or pixels that are equal in bits.
+    /// Share of places, cells or pixels that are equal in bits.
     pub equal_share: f64,
     /// Mean difference, in the unit.
     pub mean: f64,
     /// Largest difference, in the unit.
     pub max: f64,
-    /// What differences are of: `places` or `radiance`.
+    /// What differences are of: `places`, `absorbance`, `transmittance` or `radiance`.
     pub unit: &'static str,
 }
 
@@ -88,8 +90,12 @@ pub struct KernelTime {
 /// # Errors
 /// [`Error::Gpu`] when a driver fails to say what there is.
 pub fn passport(name: &str) -> Result<Vec<Passport>, Error> {
-    let input =
-        Inputs { order: OrderInput::new(SPLATS), composite: CompositeInput::new(), particles: ParticlesInput::new() };
+    let input = Inputs {
+        order: OrderInput::new(SPLATS),
+        shadow: ShadowInput::new().map_err(|e| Error::Internal(e.to_string()))?,
+        composite: CompositeInput::new(),
+        particles: ParticlesInput::new(),
+    };
     let mut passports = Vec::new();
     for backend in backends() {
         for (place, adapter) in listed(&*backend)?.into_iter().enumerate().filter(|(_, a)| a.name.contains(name)) {
@@ -102,6 +108,7 @@ pub fn passport(name: &str) -> Result<Vec<Passport>, Error> {
 /// What all devices are tried with.
 struct Inputs {
     order: OrderInput,
+    shadow: ShadowInput,
     composite: CompositeInput,
     particles: ParticlesInput,
 }
@@ -128,6 +135,8 @@ fn inspect(backend: &dyn Backend, place: usize, adapter: Adapter, input: &Inputs
     };
     let recordings = vec![
         check("order", &mut |device| check_order(device, &input.order)),
+        check("shadow lists", &mut |device| input.shadow.check_lists(device)),
+        check("shadow look-ups", &mut |device| input.shadow.check_look_ups(device)),
         check("composite", &mut |device| input.composite.check(device)),
         check("particles", &mut |device| input.particles.check(device)),
     ];

@@ -1,0 +1,94 @@
+//! The shadow map of a cloud of media, surfaces and opaque discs by both: its lists, and look-ups in it.
+
+use super::{Agreement, Failure, Found};
+use crate::device::shadows::{LookUps, look_up_on, map_on};
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::{Cloud, Light, LightShape, Material, Progress, Receiver, Splat, SplatKind, Transmittance, rng};
+use splat_shaders::{DeviceError, Executor};
+use tsm::{Deposits, Params, ShadowMap};
+
+/// Splats that throw shadows and receive them.
+const SPLATS: u64 = 1 << 14;
+/// The key of their random numbers.
+const SEED: u64 = 0x5348_4144;
+/// What transmittances may differ by; drivers that round each product and sum by itself stay below a tenth of it.
+const TOLERANCE: f64 = 1e-5;
+
+/// Generated splats around a lamp beside them, and what the processor makes of them.
+pub(super) struct ShadowInput {
+    deposits: Deposits,
+    map: ShadowMap,
+    receivers: Vec<Receiver>,
+}
+
+impl ShadowInput {
+    pub(super) fn new() -> Result<Self, tsm::Error> {
+        let mut cloud = Cloud::new(DVec3::ZERO);
+        for i in 0..SPLATS {
+            let u = |k| 2.0 * rng::unit_f32(SEED, 0, i, k) - 1.0;
+            let kind = [SplatKind::Medium, SplatKind::Surface, SplatKind::Medium, SplatKind::Opaque][(i % 4) as usize];
+            let normal = Vec3::new(u(3), u(4), u(5)).normalize_or(Vec3::Z);
+            cloud.push(&Splat {
+                position: Vec3::new(u(0), u(1), u(2)),
+                radius: 0.03 + 0.02 * u(6),
+                cross_section: 2e-4 * (1.0 + u(7)),
+                kind,
+                normal: if kind == SplatKind::Medium { Vec3::ZERO } else { normal },
+                ..Splat::default()
+            });
+        }
+        let shape = LightShape::Point { position: DVec3::new(0.4, 2.0, -0.3) };
+        let light = Light { shape, intensity: [1.0; 3] };
+        let materials = [Material::default()];
+        let deposits = Deposits::new(&cloud, &materials, &[], &light, &Params::default(), &Progress::new())?;
+        let map = deposits.clone().into_map();
+        let receiver = |i: usize| Receiver {
+            position: cloud.position[i],
+            normal: cloud.normal_of(i),
+            radius: cloud.radius[i],
+            kind: cloud.kind[i],
+        };
+        Ok(Self { deposits, map, receivers: (0..cloud.len()).map(receiver).collect() })
+    }
+
+    /// The lists: equal bits, cell by cell.
+    pub(super) fn check_lists(&self, device: &mut dyn Executor) -> Result<Found, Failure> {
+        let made = map_on(device, &self.deposits)?;
+        let (found, passes) = made.ok_or(Failure::from(DeviceError::Memory { bytes: self.map.counts().bytes }))?;
+        let apart = |cell: u32| {
+            let (a, b) = (found.list(cell), self.map.list(cell));
+            let total =
+                |list: &[(f64, [f32; 3])]| list.iter().rfind(|(_, t)| t[0].is_finite()).map_or(0.0, |(_, t)| t[0]);
+            (a != b, f64::from((total(&a) - total(&b)).abs()))
+        };
+        let apart: Vec<(bool, f64)> = (0..self.map.cells()).map(apart).collect();
+        let n = apart.len() as f64;
+        let agreement = Agreement {
+            within: found == self.map,
+            equal_share: apart.iter().filter(|(differ, _)| !differ).count() as f64 / n,
+            mean: apart.iter().map(|(_, d)| d).sum::<f64>() / n,
+            max: apart.iter().map(|(_, d)| *d).fold(0.0, f64::max),
+            unit: "absorbance",
+        };
+        Ok(Found { items: self.map.counts().entries, agreement, passes })
+    }
+
+    /// The light at the splats.
+    pub(super) fn check_look_ups(&self, device: &mut dyn Executor) -> Result<Found, Failure> {
+        let LookUps::Done(lights, passes) = look_up_on(device, &self.map, &self.receivers)? else {
+            return Err(DeviceError::Memory { bytes: self.map.counts().bytes }.into());
+        };
+        let pairs = self.receivers.iter().map(|receiver| self.map.transmittance(receiver)).zip(&lights);
+        let apart: Vec<f64> = pairs.map(|(a, b)| f64::from((a[0] - b[0]).abs())).collect();
+        let n = apart.len() as f64;
+        let agreement = Agreement {
+            // What is no number is not within it.
+            within: lights.len() == self.receivers.len() && apart.iter().all(|d| *d <= TOLERANCE),
+            equal_share: apart.iter().filter(|d| **d == 0.0).count() as f64 / n,
+            mean: apart.iter().sum::<f64>() / n,
+            max: apart.iter().copied().fold(0.0, f64::max),
+            unit: "transmittance",
+        };
+        Ok(Found { items: lights.len() as u64, agreement, passes })
+    }
+}
