@@ -7,7 +7,7 @@ use crate::toml_lines::{lines, string};
 const MAY_KNOW: [(&str, &[&str]); 14] = [
     ("splat-core", &["splat-shaders"]),
     ("convert", &["splat-core"]),
-    ("tsm", &["splat-core"]),
+    ("tsm", &["splat-core", "splat-shaders"]),
     ("hbsort", &["splat-core", "splat-shaders"]),
     ("pbsr", &["splat-core", "splat-shaders"]),
     ("reference", &["splat-core"]),
@@ -20,7 +20,7 @@ const MAY_KNOW: [(&str, &[&str]); 14] = [
     ),
     ("organza-tests", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza"]),
     ("organza-benches", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza"]),
-    ("gpu-conformance", &["splat-core", "hbsort", "pbsr", "splat-shaders", "gpu-ash", "gpu-wgpu", "organza"]),
+    ("gpu-conformance", &["splat-core", "tsm", "hbsort", "pbsr", "splat-shaders", "gpu-ash", "gpu-wgpu", "organza"]),
     ("xtask", &[]),
 ];
 
