@@ -374,3 +374,23 @@ fn the_memory_that_explain_states_counts_sums_and_batches() {
     let refused = stated(&text, "'depth'", &["--max-memory", "1G"]).unwrap_err();
     assert!(refused.contains("bytes"), "{refused}");
 }
+
+#[test]
+fn frames_of_kept_sets_have_layers_and_the_same_bits_for_any_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let plane = "implicit = { expression = 'z', box = [[-1, -1, -0.2], [1, 1, 0.21]], spacing = 0.025 }";
+    let text = view(COLORED)
+        + &self::plane(plane, "it", 0.0, 0.6, "material = 'c'\n")
+        + "[animation]\nframes = 2\n[[animation.track]]\nset = 'object.it.transform.translate'\n\
+           keys = [{ frame = 0, value = [0, 0, 0] }, { frame = 1, value = [0, 0, 0.5] }]\n";
+    std::fs::write(folder.path().join("s.toml"), text).unwrap();
+    let run = |name: &str, threads: &str| {
+        let mut command = organza();
+        command.args(["render", "s.toml", "-o", &format!("{name}.exr"), "--frames", "--threads", threads]);
+        let out = command.args(["--layers", "depth,object,effects"]).current_dir(&folder).output().unwrap();
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        [0, 1].map(|k| std::fs::read(folder.path().join(format!("{name}.000{k}.exr"))).unwrap())
+    };
+    let (one, three) = (run("a", "1"), run("b", "3"));
+    assert!(one == three && one[0] != one[1]);
+}

@@ -54,13 +54,9 @@ pub(crate) fn draw(
     let wanted = drawing.settings.layers.names().any(|name| name == "std_error");
     // Where there are particles, their hits say where light is absorbed and by whom.
     let by_splats = parts.is_empty();
-    let mut accumulator = Accumulator::new(
-        camera.size,
-        drawing.plan.optical_depth_planes,
-        layout.count(),
-        set.depth && by_splats,
-        set.object && by_splats,
-    );
+    let (planes, count) = (drawing.plan.optical_depth_planes, layout.count());
+    let (depths, objects) = (set.depth && by_splats, set.object && by_splats);
+    let mut accumulator = Accumulator::new(camera.size, planes, count, depths, objects);
     let (mut of_hits, mut sets) = (Vec::new(), None);
     if !by_splats {
         let occluder = occluder(&opaque, &layout);
