@@ -13,6 +13,7 @@ void main() {
         state.entries_low = 0u;
         state.entries_high = 0u;
         state.splats = 0u;
+        state.longest = 0u;
         places.count = view.ordered;
         places.total = 0u;
     }

@@ -73,13 +73,22 @@ kernels! {
     /// An entry for each tile of each splat, in the order of splats:
     /// view, order, splats, scanned counts, scan of places, sort → tiles, ids.
     SPLAT_EMIT = "splat_emit" [Read, Read, Read, Read, Read, Read, Write, Write];
-    /// Where each tile begins among the sorted entries: view, sort, tiles → starts.
-    SPLAT_RANGES = "splat_ranges" [Read, Read, Read, Write];
+    /// Where each tile begins among the sorted entries, and the most that one has: view, sort, tiles → starts, state.
+    SPLAT_RANGES = "splat_ranges" [Read, Read, Read, Write, Write];
     /// Composites the entries of each tile, one plane of optical depth and three channels:
     /// view, starts, ids, splats, values, tables, opaque depth → planes.
     SPLAT_COMPOSITE_BEAUTY = "splat_composite_beauty" [Read, Read, Read, Read, Read, Read, Read, Write];
     /// The same for any number of planes and channels.
     SPLAT_COMPOSITE = "splat_composite" [Read, Read, Read, Read, Read, Read, Read, Write];
+
+    /// Nothing projected yet: → state.
+    SPLAT_NOTHING = "splat_nothing" [Write];
+    /// Splats to footprints: view, positions, radii, looks, frames, tables → splats, state.
+    SPLAT_PROJECT = "splat_project" [Read, Read, Read, Read, Read, Read, Write, Write];
+    /// Attributes to radiance: view, positions, radii, looks, frames, tables, received light → values.
+    SPLAT_SHADE = "splat_shade" [Read, Read, Read, Read, Read, Read, Read, Write];
+    /// The number of composited splats is that of the sorted ones: state of the sort → view.
+    SPLAT_FOLLOW = "splat_follow" [Read, Write];
 
     /// Sets the state of a sort to nothing found: view → state, scan of blocks.
     HBSORT_BEGIN = "hbsort_begin" [Read, Write, Write];

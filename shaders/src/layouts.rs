@@ -101,6 +101,70 @@ layouts! {
         pub entries_high: u32,
         /// Splats that reach a tile.
         pub splats: u32,
+        /// Entries of the tile that has most.
+        pub longest: u32,
+    }
+
+    /// The view that splats are projected into.
+    pub struct ProjectView {
+        /// First column of the rotation from world offsets to view space; the fourth number is unused.
+        pub axis_x: [f32; 4],
+        /// Second column.
+        pub axis_y: [f32; 4],
+        /// Third column.
+        pub axis_z: [f32; 4],
+        /// View position of the cloud's origin.
+        pub translation: [f32; 4],
+        /// Half the size, pixels.
+        pub middle: [f32; 2],
+        /// Width and height, pixels.
+        pub size: [f32; 2],
+        /// Focal length, pixels; pixels a world unit for parallel rays.
+        pub focal: f32,
+        /// Standard deviation of the resampling filter, pixels.
+        pub filter_sigma: f32,
+        /// 1 for parallel rays.
+        pub orthographic: u32,
+        /// Splats.
+        pub splats: u32,
+        /// Words of a projected splat: 8, or 12 with depths.
+        pub splat_words: u32,
+        /// Words of a splat's normal and semi-axis: 0, 3 or 6.
+        pub frame_words: u32,
+        /// Footprints of the table; materials come behind them.
+        pub footprints: u32,
+        /// Nothing.
+        pub unused: u32,
+    }
+
+    /// What a projection found.
+    pub struct ProjectState {
+        /// Splats that reach a pixel.
+        pub visible: u32,
+    }
+
+    /// What shading reads beside splats and tables.
+    pub struct ShadeView {
+        /// The eye as an offset; for parallel rays the direction to it. The fourth number is unused.
+        pub eye: [f32; 4],
+        /// Ambient radiance.
+        pub ambient: [f32; 4],
+        /// 1 for parallel rays.
+        pub orthographic: u32,
+        /// Splats.
+        pub splats: u32,
+        /// Words of a splat's normal and semi-axis: 0, 3 or 6.
+        pub frame_words: u32,
+        /// Materials of the table; lights come behind them.
+        pub materials: u32,
+        /// Lights.
+        pub lights: u32,
+        /// Numbers a splat.
+        pub channels: u32,
+        /// 1 where ambient, emission and direct are kept apart, + 2 where the normal is a channel, + 4 the shadow.
+        pub layers: u32,
+        /// Nothing.
+        pub unused: u32,
     }
 
     /// One object of a set of particles.

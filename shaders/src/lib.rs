@@ -24,6 +24,7 @@
 mod barriers;
 mod check;
 mod device;
+mod join;
 pub mod kernels;
 mod layout;
 pub mod layouts;
@@ -37,6 +38,7 @@ pub use check::Fault;
 pub use device::{
     Adapter, AdapterKind, Backend, Choice, DeviceError, Executor, Inputs, PassTime, Ready, Run, Validation,
 };
+pub use join::Joined;
 pub use kernels::{Access, Kernel};
 pub use layout::{Field, GlslType, Layout};
 pub use recording::{Buffer, BufferId, Dispatch, Groups, Recording, Step};

@@ -73,8 +73,8 @@ pub enum Step {
 /// Buffers, and steps in order. Each step sees what the steps before it wrote.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Recording {
-    buffers: Vec<Buffer>,
-    steps: Vec<Step>,
+    pub(crate) buffers: Vec<Buffer>,
+    pub(crate) steps: Vec<Step>,
 }
 
 impl Recording {

@@ -27,6 +27,7 @@ use crate::radix::depth_of_key;
 use crate::slicing::Slicing;
 use crate::sort::{check_count, check_ids};
 use crate::{Error, Params};
+use glam::DVec3;
 use splat_core::{Camera, Cloud, Direction, SliceOrder};
 use splat_shaders::kernels;
 use splat_shaders::layouts::{Scan, SortState, SortView};
@@ -136,20 +137,9 @@ impl Recorded {
         let places = || (0..needed as usize).map(id);
         let positions: Vec<f32> = places().flat_map(|i| cloud.position[i].to_array()).collect();
         let radii: Vec<f32> = places().flat_map(|i| [cloud.radius[i], bounding_radius(cloud, i)]).collect();
-        let (view, frustum) = (camera.view_from_offset(cloud.origin), Frustum::new(camera, params.margin_px));
-        let view = SortView {
-            axis_x: view.rotation.x_axis.extend(0.0).to_array(),
-            axis_y: view.rotation.y_axis.extend(0.0).to_array(),
-            axis_z: view.rotation.z_axis.extend(0.0).to_array(),
-            translation: view.translation.extend(0.0).to_array(),
-            plane_cos: frustum.cos,
-            plane_sin: frustum.sin,
-            half_extent: frustum.half,
-            splats: needed as u32,
-            back_to_front: u32::from(params.direction == Direction::BackToFront),
-        };
+        let view = view_bytes(cloud.origin, needed as u32, camera, params);
         let bytes = |floats: &[f32]| bytemuck::cast_slice(floats).to_vec();
-        Ok(Uploads { view: bytemuck::bytes_of(&view).to_vec(), positions: bytes(&positions), radii: bytes(&radii) })
+        Ok(Uploads { view, positions: bytes(&positions), radii: bytes(&radii) })
     }
 
     /// The uploads with the buffers that they go to.
@@ -172,6 +162,24 @@ impl Recorded {
     ) -> Result<SliceOrder, Error> {
         join(&[self.sorted([state, keys, places], cloud, ids)?], cloud, ids, params)
     }
+}
+
+/// The bytes of [`Recorded::view`] for the first `splats` of the splats, whose positions are relative to `origin`: all that
+/// a recording takes whose positions and radii another one uploads.
+pub fn view_bytes(origin: DVec3, splats: u32, camera: &Camera, params: &Params) -> Vec<u8> {
+    let (view, frustum) = (camera.view_from_offset(origin), Frustum::new(camera, params.margin_px));
+    let view = SortView {
+        axis_x: view.rotation.x_axis.extend(0.0).to_array(),
+        axis_y: view.rotation.y_axis.extend(0.0).to_array(),
+        axis_z: view.rotation.z_axis.extend(0.0).to_array(),
+        translation: view.translation.extend(0.0).to_array(),
+        plane_cos: frustum.cos,
+        plane_sin: frustum.sin,
+        half_extent: frustum.half,
+        splats,
+        back_to_front: u32::from(params.direction == Direction::BackToFront),
+    };
+    bytemuck::bytes_of(&view).to_vec()
 }
 
 /// Where each slice begins among the sorted keys, then their number.

@@ -6,6 +6,9 @@
 //! Media: L = ω·c·p(θ)·E, single scattering, or the surface form when they have a normal and ask for Phong.
 //! E is the irradiance of a light times its transmittance; ambient radiance adds ρ·L_ambient.
 
+#[cfg(feature = "gpu")]
+pub mod gpu;
+
 use crate::raster::Projected;
 use crate::{
     Camera, Cloud, LayerSet, Light, Material, Object, Progress, Receiver, Shading, SplatKind, Transmittance,
@@ -189,13 +192,7 @@ impl Point {
             let (to_light, irradiance) = light.irradiance(&self.receiver);
             let (diffuse, specular) =
                 if by_phase { (self.scatter(to_light), 0.0) } else { m.reflect(self.normal, to_light, self.to_eye) };
-            let transmittance = match light.shadow {
-                // Nothing to attenuate: the map is not asked.
-                Some(shadow) if self.shadow_coefficient > 0.0 && irradiance != [0.0; 3] => {
-                    shadow.at_splat(self.splat, &self.receiver).map(|t| 1.0 - self.shadow_coefficient * (1.0 - t))
-                }
-                _ => [1.0; 3],
-            };
+            let transmittance = self.transmittance(light, irradiance);
             for c in 0..3 {
                 out.direct[c] += irradiance[c] * transmittance[c] * (self.color[c] * diffuse + specular);
             }
@@ -206,6 +203,17 @@ impl Point {
             out.shadow = received / arriving;
         }
         out
+    }
+
+    /// Share of a light that this splat receives.
+    fn transmittance(&self, light: &LocalLight<'_>, irradiance: [f32; 3]) -> [f32; 3] {
+        match light.shadow {
+            // Nothing to attenuate: the map is not asked.
+            Some(shadow) if self.shadow_coefficient > 0.0 && irradiance != [0.0; 3] => {
+                shadow.at_splat(self.splat, &self.receiver).map(|t| 1.0 - self.shadow_coefficient * (1.0 - t))
+            }
+            _ => [1.0; 3],
+        }
     }
 
     /// Single scattering per unit irradiance: the factor on the colour.

@@ -2,8 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use glam::{DVec3, Vec3};
-use splat_core::raster::gpu::{Capacities, Input, record};
-use splat_core::raster::{Accumulation, OpaqueImage, Params, Projected, project};
+use splat_core::raster::gpu::{AttributeRoom, Capacities, Input, follow, project, record};
+use splat_core::raster::{self, Accumulation, OpaqueImage, Params, Projected};
+use splat_core::shade::{ChannelLayout, gpu as shade};
 use splat_core::{Accumulator, Camera, Cloud, Direction, Error, FootprintStack, Material, Projection, Splat};
 
 const ROOM: Capacities = Capacities {
@@ -56,7 +57,7 @@ fn projected() -> Projected {
     }
     let view = Projection::Orthographic { height: 2.0 };
     let camera = Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y, view, ROOM.size).unwrap();
-    project(&cloud, &camera, &FootprintStack::default(), &[Material::default()], &Params::default())
+    raster::project(&cloud, &camera, &FootprintStack::default(), &[Material::default()], &Params::default())
 }
 
 fn input<'a>(projected: &'a Projected, params: &'a Params, opaque: &'a OpaqueImage) -> Input<'a> {
@@ -110,14 +111,60 @@ fn what_does_not_fit_the_room_or_the_device_is_refused() {
 fn what_is_read_back_is_put_in_or_refused() {
     let recorded = record(Capacities { size: [2, 1], channels: 1, ..ROOM }).unwrap();
     let mut acc = Accumulator::new([2, 1], 1, 1, false, false);
-    let state = |low: u32, high: u32| [low, high, 5].map(u32::to_ne_bytes).concat();
+    let state = |low: u32, high: u32| [low, high, 5, 7].map(u32::to_ne_bytes).concat();
     let planes = [0.5f32, 1.5, 2.5, 3.5].map(f32::to_ne_bytes).concat();
     let counts = recorded.finish([&state(12, 0), &planes], &mut acc).unwrap();
-    assert_eq!((counts.splats, counts.entries), (5, 12));
+    assert_eq!((counts.splats, counts.entries, counts.longest), (5, 12, 7));
     assert_eq!((&acc.optical_depth, &acc.channels), (&vec![vec![0.5, 1.5]], &vec![vec![2.5, 3.5]]));
     let overflow = |needed| Err(Error::Overflow { what: "tile entries", needed, had: 300_000 });
     assert_eq!(recorded.finish([&state(300_001, 0), &planes], &mut acc), overflow(300_001));
     assert_eq!(recorded.finish([&state(1, 1), &planes], &mut acc), overflow((1 << 32) + 1));
     assert!(matches!(recorded.finish([&[], &planes], &mut acc), Err(Error::ColumnLength { .. })));
     assert!(matches!(recorded.finish([&state(1, 0), &planes[4..]], &mut acc), Err(Error::ColumnLength { .. })));
+}
+
+#[test]
+fn projection_and_shading_are_as_kept_in_text() {
+    let attributes = AttributeRoom { splats: 1000, frame_words: 3 };
+    let room = project::Capacities { attributes, footprints: 3, materials: 2, depth: true };
+    let found = project::record(room).unwrap().recording;
+    found.check().unwrap();
+    assert_eq!(found.to_string(), include_str!("recording_project.txt"), "now:\n{found}");
+    let layout = ChannelLayout::default();
+    let found = shade::record(shade::Capacities { attributes, materials: 2, lights: 3, shadows: 2, layout }).recording;
+    found.check().unwrap();
+    assert_eq!(found.to_string(), include_str!("recording_shade.txt"), "now:\n{found}");
+    for frame_words in [1, 7] {
+        let attributes = AttributeRoom { splats: 1, frame_words };
+        assert!(matches!(project::record(project::Capacities { attributes, ..room }), Err(Error::Invalid { .. })));
+    }
+}
+
+#[test]
+fn what_follows_a_sort_reads_how_many_splats_it_left() {
+    let follows = follow::record(ROOM).unwrap();
+    follows.recording.check().unwrap();
+    let text = follows.recording.to_string();
+    assert!(
+        text.contains("upload sorted\nsplat_follow 1x1x1 sorted view*\nsplat_begin 1x1x1 view state* place scan*\n")
+    );
+    assert!(follows.sorted.is_some() && record(ROOM).unwrap().sorted.is_none());
+    // View, tables and planes alone are uploaded; the planes hold nothing yet.
+    let (params, opaque, view) = (Params::default(), OpaqueImage::default(), Projection::Orthographic { height: 2.0 });
+    let camera = Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y, view, ROOM.size).unwrap();
+    let (footprints, direction) = (FootprintStack::default(), Direction::FrontToBack);
+    let input = follow::Input {
+        camera: &camera,
+        footprints: &footprints,
+        materials: &[Material::default()],
+        opaque: &opaque,
+        direction,
+        params: &params,
+    };
+    let plain = Accumulator::new(ROOM.size, 1, 3, false, false);
+    let uploads = follow::uploads(&follows, &input, &plain).unwrap();
+    let given: Vec<usize> = follows.inputs(&uploads).iter().map(|(_, bytes)| bytes.len()).collect();
+    assert_eq!(given, [64, 0, 0, 0, 16 * (3 * footprints.layers().len() + 1), 0, 0]);
+    let other = Accumulator::new([8, 8], 1, 3, false, false);
+    assert!(matches!(follow::uploads(&follows, &input, &other), Err(Error::ColumnLength { .. })));
 }

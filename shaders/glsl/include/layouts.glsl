@@ -53,6 +53,41 @@ struct SplatState {
     uint entries_low;
     uint entries_high;
     uint splats;
+    uint longest;
+};
+
+struct ProjectView {
+    vec4 axis_x;
+    vec4 axis_y;
+    vec4 axis_z;
+    vec4 translation;
+    vec2 middle;
+    vec2 size;
+    float focal;
+    float filter_sigma;
+    uint orthographic;
+    uint splats;
+    uint splat_words;
+    uint frame_words;
+    uint footprints;
+    uint unused;
+};
+
+struct ProjectState {
+    uint visible;
+};
+
+struct ShadeView {
+    vec4 eye;
+    vec4 ambient;
+    uint orthographic;
+    uint splats;
+    uint frame_words;
+    uint materials;
+    uint lights;
+    uint channels;
+    uint layers;
+    uint unused;
 };
 
 struct ParticleObject {

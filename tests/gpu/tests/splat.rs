@@ -264,7 +264,7 @@ fn one_tile_takes_any_number_of_splats_in_their_order() {
     scene.camera.size = [12, 10];
     let order: Vec<u32> = (0..20_000u32).map(|i| i * 7919 % 20_000).collect();
     let mut both = scene.both(&mut device, &order, &scene.accumulator(), 20_000).unwrap();
-    assert_eq!(both.counts, Counts { splats: 20_000, entries: 20_000 });
+    assert_eq!(both.counts, Counts { splats: 20_000, entries: 20_000, longest: 20_000 });
     assert!(both.difference() < TOLERANCE, "{:e}", both.difference());
     let reversed: Vec<u32> = order.iter().rev().copied().collect();
     both.cpu = scene.both(&mut device, &reversed, &scene.accumulator(), 20_000).unwrap().cpu;

@@ -10,6 +10,9 @@
 //! value, agree within 10⁻⁵ for footprints up to 120 pixels long; for long thin ones the error of either grows with the
 //! square of length over thickness. Single precision only; depth and object planes are the CPU's.
 //!
+//! [`project`] makes the footprints on the device too, and [`follow`] composites what a sort on the device has ordered:
+//! joined ([`Recording::join`]), splats are uploaded once and the image alone comes back.
+//!
 //! ```
 //! use splat_core::raster::gpu::{Capacities, record};
 //!
@@ -30,15 +33,23 @@
 //! assert_eq!(recorded.recording.bytes() / 1_000_000, 131);
 //! ```
 
+mod attributes;
+pub mod follow;
+pub mod project;
+mod sort;
+
+pub use attributes::{AttributeBuffers, AttributeRoom, Attributes};
+
 use super::bins::TILE as TWIN_TILE;
+use super::kernel::Kernel;
 use super::projected::{Coverage, ProjectedDepth, ProjectedSplat};
 use super::{Accumulation, OpaqueImage, Params, Projected};
 use crate::shade::MAX_CHANNELS;
 use crate::{Accumulator, Direction, Error, Material};
 use rayon::prelude::*;
-use splat_shaders::layouts::{Scan, SortState, SplatState, SplatView};
+use sort::{Scanned, sort_pass};
+use splat_shaders::layouts::{SortState, SplatState, SplatView};
 use splat_shaders::{BufferId, Groups, Recording, kernels};
-use std::mem::offset_of;
 
 /// Side of a tile, pixels.
 pub const TILE: u32 = 16;
@@ -51,7 +62,7 @@ const EMIT_BLOCK: u32 = 256;
 /// Entries that a workgroup sorts.
 const SORT_BLOCK: u32 = 2048;
 /// Numbers that a workgroup scans.
-const SCAN_BLOCK: u32 = 1024;
+pub(crate) const SCAN_BLOCK: u32 = 1024;
 /// Words of a splat, and with depths.
 const SPLAT_WORDS: [u32; 2] = [8, 12];
 
@@ -116,6 +127,26 @@ impl Input<'_> {
     }
 }
 
+/// What compositing reads beside splats and their order.
+struct Image<'a> {
+    size: [u32; 2],
+    perspective: Option<f32>,
+    kernels: &'a [Kernel],
+    materials: &'a [Material],
+    opaque: &'a OpaqueImage,
+    direction: Direction,
+    params: &'a Params,
+    ordered: u32,
+}
+
+impl<'a> Image<'a> {
+    fn of(input: &Input<'a>) -> Self {
+        let Input { projected, order, materials, opaque, direction, params, .. } = *input;
+        let (size, perspective, kernels) = (projected.size, projected.perspective, &projected.kernels[..]);
+        Self { size, perspective, kernels, materials, opaque, direction, params, ordered: order.len() as u32 }
+    }
+}
+
 /// The recorded compositing and the buffers that the caller meets.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recorded {
@@ -127,6 +158,14 @@ pub struct Recorded {
     pub state: BufferId,
     /// Input, and read back: planes of optical depth, then channels, row by row.
     pub planes: BufferId,
+    /// Input: the words of each splat by id, as [`words`] has them.
+    pub splats: BufferId,
+    /// Input: ids in compositing order.
+    pub order: BufferId,
+    /// Input: channels of each splat by id.
+    pub values: BufferId,
+    /// Of a recording by [`follow::record`]: the input that says how many splats are in the order.
+    pub sorted: Option<BufferId>,
     inputs: [BufferId; 6],
 }
 
@@ -143,6 +182,8 @@ pub struct Counts {
     pub splats: u64,
     /// Pairs of a splat and a tile that it reaches.
     pub entries: u64,
+    /// Those of the tile that has most: as many splats one thread folds in a row.
+    pub longest: u64,
 }
 
 /// Tiles of an image, across and in all.
@@ -156,6 +197,11 @@ fn tiles(size: [u32; 2]) -> [u32; 2] {
 /// # Errors
 /// [`Error::Invalid`] for a size, planes or channels out of range.
 pub fn record(capacities: Capacities) -> Result<Recorded, Error> {
+    record_as(capacities, false)
+}
+
+/// The same, in the order that a sort has left on the device where `follows`.
+fn record_as(capacities: Capacities, follows: bool) -> Result<Recorded, Error> {
     let Capacities { size, planes, channels, splats, ordered, entries, .. } = capacities;
     let refuse = |name, found: String, expected| Err(Error::invalid("recording", 0, name, found, expected));
     if !size.iter().all(|s| (1..=WIDEST).contains(s)) {
@@ -188,6 +234,10 @@ pub fn record(capacities: Capacities) -> Result<Recorded, Error> {
     let ids = [r.scratch("ids", words(entries)), r.scratch("ids'", words(entries))];
     let starts = r.scratch("starts", words(tiles + 1));
 
+    let sorted = follows.then(|| r.input("sorted", size_of::<SortState>() as u64));
+    if let Some(sorted) = sorted {
+        r.dispatch(&kernels::SPLAT_FOLLOW, Groups::cover(1), &[sorted, view], &[]);
+    }
     r.dispatch(&kernels::SPLAT_BEGIN, Groups::cover(1), &[view, state, places.scan], &[]);
     let counted = [view, order, footprints, places.numbers, state];
     r.dispatch(&kernels::SPLAT_COUNT, Groups::cover(ordered.div_ceil(COUNT_BLOCK)), &counted, &[]);
@@ -202,7 +252,12 @@ pub fn record(capacities: Capacities) -> Result<Recorded, Error> {
         sort_pass(r, 8 * pass as u32, sort, [keys[from], ids[from]], [keys[to], ids[to]], &digits);
     }
     let (keys, ids) = (keys[passes % 2], ids[passes % 2]);
-    r.dispatch(&kernels::SPLAT_RANGES, Groups::cover((tiles + 1).div_ceil(256)), &[view, sort, keys, starts], &[]);
+    r.dispatch(
+        &kernels::SPLAT_RANGES,
+        Groups::cover((tiles + 1).div_ceil(256)),
+        &[view, sort, keys, starts, state],
+        &[],
+    );
     let plain = (planes, channels) == (1, 3);
     let kernel = if plain { &kernels::SPLAT_COMPOSITE_BEAUTY } else { &kernels::SPLAT_COMPOSITE };
     let composited = [view, starts, ids, footprints, values, tables, opaque, image];
@@ -210,50 +265,7 @@ pub fn record(capacities: Capacities) -> Result<Recorded, Error> {
     r.read(state);
     r.read(image);
     let inputs = [view, order, footprints, values, tables, opaque];
-    Ok(Recorded { recording, capacities, state, planes: image, inputs })
-}
-
-/// Numbers on the device and what scans them.
-struct Scanned {
-    scan: BufferId,
-    numbers: BufferId,
-    sums: BufferId,
-}
-
-impl Scanned {
-    fn scratch(r: &mut Recording, names: [&'static str; 3], count: u32) -> Self {
-        let words = |n: u32| 4 * u64::from(n);
-        Self {
-            scan: r.scratch(names[0], size_of::<Scan>() as u64),
-            numbers: r.scratch(names[1], words(count)),
-            sums: r.scratch(names[2], words(count.div_ceil(SCAN_BLOCK))),
-        }
-    }
-
-    /// Exclusive scan of the numbers in place.
-    fn scan(&self, r: &mut Recording, groups: Groups) {
-        let Self { scan, numbers, sums } = *self;
-        r.dispatch(&kernels::SCAN_REDUCE, groups, &[scan, numbers, sums], &[]);
-        r.dispatch(&kernels::SCAN_SPINE, Groups::cover(1), &[scan, sums], &[]);
-        r.dispatch(&kernels::SCAN_APPLY, groups, &[scan, numbers, sums], &[]);
-    }
-}
-
-/// Sorts tiles and ids by the eight bits from `shift` on.
-fn sort_pass(
-    r: &mut Recording,
-    shift: u32,
-    sort: BufferId,
-    [keys, ids]: [BufferId; 2],
-    [sorted_keys, sorted_ids]: [BufferId; 2],
-    digits: &Scanned,
-) {
-    let at = |offset| Groups::Indirect { buffer: sort, offset: offset as u64 };
-    let groups = at(offset_of!(SortState, sort_groups_x));
-    r.dispatch(&kernels::RADIX_HISTOGRAM, groups, &[sort, keys, digits.numbers], &[shift]);
-    digits.scan(r, at(offset_of!(SortState, scan_groups_x)));
-    let scattered = [sort, keys, ids, digits.numbers, sorted_keys, sorted_ids];
-    r.dispatch(&kernels::RADIX_SCATTER, groups, &scattered, &[shift]);
+    Ok(Recorded { recording, capacities, state, planes: image, splats: footprints, order, values, sorted, inputs })
 }
 
 impl Recorded {
@@ -264,115 +276,117 @@ impl Recorded {
     /// [`Error::Invalid`] for an id that no splat has and for what only the CPU does: half precision, depth and object
     /// planes.
     pub fn uploads(&self, input: &Input<'_>, accumulator: &Accumulator) -> Result<Uploads, Error> {
-        self.check(input, accumulator)?;
-        let (projected, opaque) = (input.projected, self.capacities.opaque);
-        let given = opaque && !input.opaque.depth.is_empty();
-        let extinctions =
-            input.materials.iter().map(|m| [m.extinction_rgb[0], m.extinction_rgb[1], m.extinction_rgb[2], 0.0]);
-        let footprints = projected.kernels.iter().flat_map(|kernel| kernel.table());
-        let tables: Vec<f32> = footprints.chain(extinctions.flatten()).collect();
+        let image = Image::of(input);
+        self.check_image(&image, accumulator)?;
+        self.check_splats(input)?;
         let splats = self.splats(input)?;
+        let bytes = |order, splats, values| [order, splats, values].map(<[u8]>::to_vec);
+        let order = bytemuck::cast_slice(input.order);
+        let given = bytes(order, bytemuck::cast_slice(&splats), bytemuck::cast_slice(input.values));
+        Ok(self.image_uploads(&image, accumulator, given))
+    }
+
+    fn image_uploads(&self, image: &Image<'_>, accumulator: &Accumulator, given: [Vec<u8>; 3]) -> Uploads {
+        let opaque = self.capacities.opaque && !image.opaque.depth.is_empty();
+        let extinctions =
+            image.materials.iter().map(|m| [m.extinction_rgb[0], m.extinction_rgb[1], m.extinction_rgb[2], 0.0]);
+        let footprints = image.kernels.iter().flat_map(|kernel| kernel.table());
+        let tables: Vec<f32> = footprints.chain(extinctions.flatten()).collect();
         let fresh = all_planes(accumulator).all(|plane| plane.iter().all(|v| v.to_bits() == 0));
-        let image: Vec<f32> = if fresh { Vec::new() } else { all_planes(accumulator).flatten().copied().collect() };
-        let view = self.view(input, given, fresh);
+        let begun: Vec<f32> = if fresh { Vec::new() } else { all_planes(accumulator).flatten().copied().collect() };
+        let view = self.view(image, opaque, fresh);
         let floats = |column: &[f32]| bytemuck::cast_slice(column).to_vec();
-        Ok(Uploads {
+        let [order, splats, values] = given;
+        Uploads {
             bytes: [
                 bytemuck::bytes_of(&view).to_vec(),
-                bytemuck::cast_slice(input.order).to_vec(),
-                bytemuck::cast_slice(&splats).to_vec(),
-                floats(input.values),
+                order,
+                splats,
+                values,
                 floats(&tables),
-                floats(if given { &input.opaque.depth } else { &[] }),
-                floats(&image),
+                floats(if opaque { &image.opaque.depth } else { &[] }),
+                floats(&begun),
             ],
-        })
+        }
     }
 
-    /// The words of all splats.
+    /// The words of all splats, whose ids are known.
     fn splats(&self, input: &Input<'_>) -> Result<Vec<u32>, Error> {
         let projected = input.projected;
-        let words = SPLAT_WORDS[usize::from(self.capacities.opaque)] as usize;
-        let mut splats = vec![0u32; words * projected.splats.len()];
-        let places = splats.par_chunks_exact_mut(words).zip(&projected.splats).zip(&projected.coverage).enumerate();
-        places.with_min_len(1 << 12).try_for_each(|(i, ((to, splat), coverage))| {
-            if *coverage == Coverage::NONE {
-                return Ok(());
-            }
-            let known = (splat.material as usize) < input.materials.len()
-                && (splat.footprint as usize) < projected.kernels.len();
-            pack(splat, projected.depths.get(i), to);
-            let looks = || format!("{} and {}", splat.material, splat.footprint);
-            if known {
-                Ok(())
-            } else {
-                Err(Error::invalid("splat", i, "material or footprint", looks(), "a known one"))
-            }
-        })?;
-        Ok(splats)
+        let unknown = |(splat, coverage): (&ProjectedSplat, &Coverage)| {
+            *coverage != Coverage::NONE
+                && (splat.material as usize >= input.materials.len()
+                    || splat.footprint as usize >= projected.kernels.len())
+        };
+        let splats = projected.splats.par_iter().zip(&projected.coverage).with_min_len(1 << 14);
+        if let Some(i) = splats.position_first(unknown) {
+            let splat = &projected.splats[i];
+            let looks = format!("{} and {}", splat.material, splat.footprint);
+            return Err(Error::invalid("splat", i, "material or footprint", looks, "a known one"));
+        }
+        Ok(words(projected, self.capacities.opaque))
     }
 
-    fn view(&self, input: &Input<'_>, opaque: bool, fresh: bool) -> SplatView {
+    fn view(&self, image: &Image<'_>, opaque: bool, fresh: bool) -> SplatView {
         let Capacities { size, planes, channels, .. } = self.capacities;
         let [columns, tiles] = tiles(size);
         let size = size.map(|s| s as f32);
         SplatView {
             middle: size.map(|s| 0.5 * s),
             size,
-            focal: input.projected.perspective.unwrap_or(0.0),
-            cutoff: input.params.transmittance_cutoff,
+            focal: image.perspective.unwrap_or(0.0),
+            cutoff: image.params.transmittance_cutoff,
             columns,
             tiles,
-            ordered: input.order.len() as u32,
+            ordered: image.ordered,
             splat_words: SPLAT_WORDS[usize::from(self.capacities.opaque)],
-            footprints: input.projected.kernels.len() as u32,
+            footprints: image.kernels.len() as u32,
             planes,
             channels,
             opaque: u32::from(opaque),
-            back_to_front: u32::from(input.direction == Direction::BackToFront),
+            back_to_front: u32::from(image.direction == Direction::BackToFront),
             fresh: u32::from(fresh),
         }
     }
 
-    fn check(&self, input: &Input<'_>, accumulator: &Accumulator) -> Result<(), Error> {
-        let (projected, room) = (input.projected, self.capacities);
+    fn check_image(&self, image: &Image<'_>, accumulator: &Accumulator) -> Result<(), Error> {
+        let room = self.capacities;
         let only_cpu = |what, found: String, expected| Err(Error::invalid("accumulator", 0, what, found, expected));
-        if input.params.accumulation != Accumulation::F32 {
-            return only_cpu("precision", format!("{:?}", input.params.accumulation), "F32 on a device");
+        if image.params.accumulation != Accumulation::F32 {
+            return only_cpu("precision", format!("{:?}", image.params.accumulation), "F32 on a device");
         }
         if !(accumulator.depth.is_empty() && accumulator.object.is_empty()) {
             return only_cpu("planes", "depths or objects".to_owned(), "colours and optical depth on a device");
         }
         for (what, needed, had) in [
-            ("splats", projected.splats.len(), room.splats),
-            ("splats in order", input.order.len(), room.ordered),
-            ("footprints", projected.kernels.len(), room.footprints),
-            ("materials", input.materials.len(), room.materials),
-            ("opaque images", usize::from(!input.opaque.depth.is_empty()), room.opaque.into()),
+            ("footprints", image.kernels.len(), room.footprints),
+            ("materials", image.materials.len(), room.materials),
+            ("opaque images", usize::from(!image.opaque.depth.is_empty()), room.opaque.into()),
         ] {
             fits(what, needed as u64, had)?;
         }
         let area = room.size.map(|s| s as usize).iter().product();
         let lengths = [
-            ("image width", projected.size[0] as usize, room.size[0] as usize),
-            ("image height", projected.size[1] as usize, room.size[1] as usize),
+            ("image width", image.size[0] as usize, room.size[0] as usize),
+            ("image height", image.size[1] as usize, room.size[1] as usize),
             ("optical depth", accumulator.optical_depth.len(), room.planes as usize),
             ("channels", accumulator.channels.len(), room.channels as usize),
-            ("values", input.values.len(), projected.splats.len() * room.channels as usize),
-            ("opaque depth", input.opaque.depth.len(), if input.opaque.depth.is_empty() { 0 } else { area }),
-            (
-                "depths",
-                projected.depths.len(),
-                if room.opaque { projected.splats.len() } else { projected.depths.len() },
-            ),
+            ("opaque depth", image.opaque.depth.len(), if image.opaque.depth.is_empty() { 0 } else { area }),
         ];
         let planes = all_planes(accumulator).map(|plane| ("plane", plane.len(), area));
-        for (attribute, found, expected) in lengths.into_iter().chain(planes) {
-            if found != expected {
-                return Err(Error::ColumnLength { attribute, found, expected });
-            }
-        }
+        equal_lengths(lengths.into_iter().chain(planes))
+    }
+
+    fn check_splats(&self, input: &Input<'_>) -> Result<(), Error> {
+        let (projected, room) = (input.projected, self.capacities);
         let n = projected.splats.len();
+        fits("splats", n as u64, room.splats)?;
+        fits("splats in order", input.order.len() as u64, room.ordered)?;
+        let depths = projected.depths.len();
+        equal_lengths([
+            ("values", input.values.len(), n * room.channels as usize),
+            ("depths", depths, if room.opaque { n } else { depths }),
+        ])?;
         let wrong = input.order.par_iter().with_min_len(1 << 14).position_first(|&id| id as usize >= n);
         wrong.map_or(Ok(()), |at| Err(Error::invalid("place", at, "id", input.order[at], "the id of a splat")))
     }
@@ -389,31 +403,52 @@ impl Recorded {
     /// [`Error::Overflow`] when there are more entries than there is room for: record again with what is needed.
     /// [`Error::ColumnLength`] for bytes that no run gave.
     pub fn finish(&self, [state, planes]: [&[u8]; 2], accumulator: &mut Accumulator) -> Result<Counts, Error> {
-        let short = |attribute, found: usize, expected: usize| Error::ColumnLength { attribute, found, expected };
-        let state_bytes = state.get(..size_of::<SplatState>());
-        let state: SplatState = bytemuck::pod_read_unaligned(state_bytes.ok_or(short(
-            "state read back",
-            state.len(),
-            size_of::<SplatState>(),
-        ))?);
-        let entries = u64::from(state.entries_low) | u64::from(state.entries_high) << 32;
-        fits("tile entries", entries, self.capacities.entries)?;
+        let counts = self.counts(state)?;
         let bytes = 4 * all_planes(accumulator).map(<[f32]>::len).sum::<usize>();
-        if planes.len() != bytes {
-            return Err(short("planes read back", planes.len(), bytes));
-        }
+        equal_lengths([("planes read back", planes.len(), bytes)])?;
         let (words, _) = planes.as_chunks::<4>();
         let mut words = words.iter().map(|w| f32::from_ne_bytes(*w));
         for plane in accumulator.optical_depth.iter_mut().chain(&mut accumulator.channels) {
             plane.iter_mut().zip(&mut words).for_each(|(to, from)| *to = from);
         }
-        Ok(Counts { splats: state.splats.into(), entries })
+        Ok(counts)
+    }
+
+    /// What a device did, from what was read back of [`Recorded::state`].
+    ///
+    /// # Errors
+    /// As [`Recorded::finish`].
+    pub fn counts(&self, state: &[u8]) -> Result<Counts, Error> {
+        let (attribute, found, expected) = ("state read back", state.len(), size_of::<SplatState>());
+        let bytes = state.get(..expected).ok_or(Error::ColumnLength { attribute, found, expected })?;
+        let state: SplatState = bytemuck::pod_read_unaligned(bytes);
+        let entries = u64::from(state.entries_low) | u64::from(state.entries_high) << 32;
+        fits("tile entries", entries, self.capacities.entries)?;
+        Ok(Counts { splats: state.splats.into(), entries, longest: state.longest.into() })
     }
 }
 
 /// Planes of optical depth, then channels.
 fn all_planes(accumulator: &Accumulator) -> impl Iterator<Item = &[f32]> {
     accumulator.optical_depth.iter().chain(&accumulator.channels).map(Vec::as_slice)
+}
+
+fn equal_lengths(lengths: impl IntoIterator<Item = (&'static str, usize, usize)>) -> Result<(), Error> {
+    let wrong = lengths.into_iter().find(|(_, found, expected)| found != expected);
+    wrong.map_or(Ok(()), |(attribute, found, expected)| Err(Error::ColumnLength { attribute, found, expected }))
+}
+
+/// The words of all splats, as the kernels read them: 8 each, 12 with depths; 0 for one that no pixel shows.
+pub fn words(projected: &Projected, depth: bool) -> Vec<u32> {
+    let words = SPLAT_WORDS[usize::from(depth)] as usize;
+    let mut splats = vec![0u32; words * projected.splats.len()];
+    let places = splats.par_chunks_exact_mut(words).zip(&projected.splats).zip(&projected.coverage).enumerate();
+    places.with_min_len(1 << 12).for_each(|(i, ((to, splat), coverage))| {
+        if *coverage != Coverage::NONE {
+            pack(splat, projected.depths.get(i), to);
+        }
+    });
+    splats
 }
 
 fn fits(what: &'static str, needed: u64, had: u32) -> Result<(), Error> {

@@ -1,0 +1,50 @@
+//! Compositing that follows a sort on the device: how many splats are in the order is read where the sort has left it.
+//!
+//! The order, the footprints and the values come from recordings before it, joined by [`Recording::join`]; what is uploaded
+//! is the view, the tables and the opaque surface's depths.
+//!
+//! [`Recording::join`]: splat_shaders::Recording::join
+
+use super::{Capacities, Image, Recorded, Uploads, record_as};
+use crate::raster::kernel::Kernel;
+use crate::raster::{OpaqueImage, Params};
+use crate::{Accumulator, Camera, Direction, Error, FootprintStack, Material};
+
+/// What is composited into, and how.
+#[derive(Debug, Clone, Copy)]
+pub struct Input<'a> {
+    /// The view that splats were projected into.
+    pub camera: &'a Camera,
+    /// Footprints.
+    pub footprints: &'a FootprintStack,
+    /// Extinctions.
+    pub materials: &'a [Material],
+    /// What hides splats.
+    pub opaque: &'a OpaqueImage,
+    /// Which end comes first.
+    pub direction: Direction,
+    /// The cut-off; the precision must be single.
+    pub params: &'a Params,
+}
+
+/// Records the compositing with this room; [`Capacities::ordered`] is the most that the sort may leave.
+///
+/// # Errors
+/// As [`record`](super::record).
+pub fn record(capacities: Capacities) -> Result<Recorded, Error> {
+    record_as(capacities, true)
+}
+
+/// The bytes that a recording by [`record`] takes beside order, footprints and values, of which there are none here.
+///
+/// # Errors
+/// As [`Recorded::uploads`].
+pub fn uploads(recorded: &Recorded, input: &Input<'_>, accumulator: &Accumulator) -> Result<Uploads, Error> {
+    let kernels: Vec<Kernel> = input.footprints.layers().iter().map(Kernel::new).collect();
+    let Input { camera, materials, opaque, direction, params, .. } = *input;
+    let perspective = (!camera.is_orthographic()).then_some(camera.focal_px() as f32);
+    let (size, kernels) = (camera.size, &kernels[..]);
+    let image = Image { size, perspective, kernels, materials, opaque, direction, params, ordered: 0 };
+    recorded.check_image(&image, accumulator)?;
+    Ok(recorded.image_uploads(&image, accumulator, Default::default()))
+}
