@@ -4,9 +4,11 @@
 //! the projection and average of particles that are shown as they are (`pbsr::gpu`). Whatever the device cannot do the
 //! processor does, with one line said. Lists and order are the processor's bit for bit: a device that would round otherwise
 //! is found out by a trial before it is used. Sets of particles are the processor's too, up to a pixel in a thousand (see
-//! `pbsr::gpu`). Who allows 10⁻⁵ of difference lets the device look shadows up (`tsm::gpu`) and composite ordered splats
-//! (`splat_core::raster::gpu`) as well.
+//! `pbsr::gpu`). Who allows 10⁻⁵ of difference lets the device look shadows up (`tsm::gpu`) and composite splats as well:
+//! from their attributes to the picture by one joined recording, or, where that does not fit or is not all the device's,
+//! splats that the processor has projected and shaded (`splat_core::raster::gpu`).
 
+mod chain;
 mod helper;
 mod order;
 mod particles;
@@ -16,6 +18,7 @@ mod splats;
 mod trial;
 
 use crate::Error;
+pub(crate) use chain::Translucent;
 pub(crate) use helper::Helper;
 pub use passport::{Agreement, Checked, KernelTime, Passport, passport};
 pub(crate) use shadows::LookedUp;
@@ -112,6 +115,8 @@ enum Failure {
     Shadows(#[from] tsm::Error),
     #[error(transparent)]
     Splats(#[from] splat_core::Error),
+    #[error("its buffers or its memory are too small for all splats at once")]
+    Small,
     #[error("it rounds otherwise than the processor, so the picture would be another")]
     Rounds,
 }

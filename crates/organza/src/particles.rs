@@ -11,7 +11,6 @@ mod kept;
 mod layers;
 mod parts;
 
-use crate::load::Loaded;
 use crate::plan::pass;
 use crate::points::Drawing;
 use crate::scene::Scene;
@@ -25,8 +24,7 @@ use parts::sources;
 use pbsr::Occluder;
 use splat_core::raster::{self, Background, OpaqueImage};
 use splat_core::shade::ChannelLayout;
-use splat_core::{Accumulator, Camera, CostRecord, LayerData, Layers, SplatKind};
-use tsm::ShadowMap;
+use splat_core::{Accumulator, CostRecord, LayerData, Layers};
 
 /// Runs the planned passes. An interrupt after two sets leaves the picture of the sets so far.
 pub(crate) fn draw(
@@ -41,7 +39,7 @@ pub(crate) fn draw(
     let maps = drawing.shadow_maps(cost)?;
     let camera = drawing.sample_camera();
     let layout = ChannelLayout::new(&drawing.layers);
-    let opaque = opaque(drawing, &maps, &camera, cost)?;
+    let opaque = drawing.solid(&maps, &camera, cost)?;
     let mut sources = sources(drawing, &camera);
     if let Some(kept) = kept.as_deref_mut() {
         kept.sample(&mut sources, drawing, scene, cost, warnings)?;
@@ -87,36 +85,6 @@ pub(crate) fn draw(
         of_hits.into_iter().for_each(|(name, data)| layers.insert(name, data));
         Ok((layers, sets))
     })
-}
-
-/// The opaque splats alone, by the rasterizer.
-fn opaque(
-    drawing: &Drawing<'_>,
-    maps: &[Option<ShadowMap>],
-    camera: &Camera,
-    cost: &mut CostRecord,
-) -> Result<OpaqueImage, Error> {
-    let ids = drawing.ids(|kind| kind == SplatKind::Opaque);
-    if ids.is_empty() {
-        return Ok(OpaqueImage::default());
-    }
-    let all = drawing.loaded;
-    let loaded = Loaded {
-        cloud: all.cloud.gather(&ids),
-        materials: all.materials.clone(),
-        objects: all.objects.clone(),
-        footprints: all.footprints.clone(),
-        lights: all.lights.clone(),
-        casts: all.casts.clone(),
-        own: Vec::new(),
-        statistics: Vec::new(),
-        splats: Vec::new(),
-        warnings: Vec::new(),
-        ..*all
-    };
-    let solid = Drawing { loaded: &loaded, layers: drawing.layers.clone(), ..*drawing };
-    let shaded = solid.light(maps, camera, cost)?;
-    solid.opaque(&shaded, cost)
 }
 
 /// What hides particles, with its beauty.

@@ -1,5 +1,7 @@
 //! The `points` technique (Gunjee 2007): shadow maps, slices, attribute-driven shading, splatting.
 
+mod chained;
+
 use crate::device::{Helper, LookedUp};
 use crate::load::Loaded;
 use crate::plan::{Plan, pass};
@@ -35,6 +37,9 @@ pub(crate) struct Drawing<'a> {
 pub(crate) fn draw(drawing: &Drawing<'_>, cost: &mut CostRecord) -> Result<Layers, Error> {
     let maps = drawing.shadow_maps(cost)?;
     let camera = drawing.sample_camera();
+    if let Some(layers) = drawing.chained(&maps, &camera, cost)? {
+        return Ok(layers);
+    }
     let order = drawing.sort(&camera, cost)?;
     let shaded = drawing.light(&maps, &camera, cost)?;
     drawing.compose(&shaded, &order, cost)
@@ -51,22 +56,10 @@ impl Drawing<'_> {
         let projected = self.project(camera, cost)?;
         let layout = ChannelLayout::new(&self.layers);
         let values = cost.measure(pass::SHADE, |stage| {
-            let looked_up = self.look_ups(maps, &projected);
-            let known = looked_up.iter().zip(maps).map(|(known, map)| {
-                let map = map.as_ref().map(|map| map as &dyn Transmittance);
-                known.as_ref().map(|known| known as &dyn Transmittance).or(map)
-            });
-            let lights: Vec<LitBy<'_>> =
-                self.with_light(known).map(|(light, shadow)| LitBy { light, shadow }).collect();
-            let input = ShadeInput {
-                cloud: &self.loaded.cloud,
-                materials: &self.loaded.materials,
-                objects: &self.loaded.objects,
-                lights: &lights,
-                ambient: self.ambient,
-                camera,
-            };
-            let values = shade(&input, &projected, &layout, self.progress);
+            let visible = (0..self.loaded.cloud.len() as u32).filter(|&i| projected.is_visible(i as usize));
+            let looked_up = self.look_ups(maps, visible);
+            let lights = self.lit_by(maps, &looked_up);
+            let values = shade(&self.shading(&lights, camera), &projected, &layout, self.progress);
             stage.items_in = projected.visible();
             stage.items_out = stage.items_in;
             stage.bytes = 4 * values.len() as u64;
@@ -76,13 +69,32 @@ impl Drawing<'_> {
         Ok(Shaded { projected, values, channels: layout.count() })
     }
 
-    /// For each map the light at the splats in view, where a device looks it up.
-    fn look_ups<'b>(&self, maps: &'b [Option<ShadowMap>], projected: &Projected) -> Vec<Option<LookedUp<'b>>> {
+    /// For each map the light at these splats, where a device looks it up.
+    fn look_ups<'b>(
+        &self,
+        maps: &'b [Option<ShadowMap>],
+        splats: impl Iterator<Item = u32>,
+    ) -> Vec<Option<LookedUp<'b>>> {
         let device = self.helper.filter(|_| self.device_composites && maps.iter().any(Option::is_some));
         let Some(device) = device else { return maps.iter().map(|_| None).collect() };
-        let cloud = &self.loaded.cloud;
-        let ids: Vec<u32> = (0..cloud.len() as u32).filter(|&i| projected.is_visible(i as usize)).collect();
-        maps.iter().map(|map| device.look_up(map.as_ref()?, cloud, &ids)).collect()
+        let ids: Vec<u32> = splats.collect();
+        maps.iter().map(|map| device.look_up(map.as_ref()?, &self.loaded.cloud, &ids)).collect()
+    }
+
+    /// The lights that have an intensity, with what is known of their shadows, or their maps.
+    fn lit_by<'b>(&self, maps: &'b [Option<ShadowMap>], looked_up: &'b [Option<LookedUp<'b>>]) -> Vec<LitBy<'b>> {
+        let known = looked_up.iter().zip(maps).map(|(known, map)| {
+            let map = map.as_ref().map(|map| map as &dyn Transmittance);
+            known.as_ref().map(|known| known as &dyn Transmittance).or(map)
+        });
+        self.with_light(known).map(|(light, shadow)| LitBy { light, shadow }).collect()
+    }
+
+    /// What shading reads.
+    fn shading<'b>(&'b self, lights: &'b [LitBy<'b>], camera: &'b Camera) -> ShadeInput<'b> {
+        let l = self.loaded;
+        let (cloud, materials, objects) = (&l.cloud, &l.materials[..], &l.objects[..]);
+        ShadeInput { cloud, materials, objects, lights, ambient: self.ambient, camera }
     }
 
     /// The lights that have an intensity, with their shadow maps.
@@ -103,13 +115,18 @@ impl Drawing<'_> {
     pub(crate) fn compose(&self, shaded: &Shaded, order: &SliceOrder, cost: &mut CostRecord) -> Result<Layers, Error> {
         let opaque = self.opaque(shaded, cost)?;
         let accumulator = self.translucent(shaded, &opaque, order, cost)?;
+        self.finish(&accumulator, &opaque, cost)
+    }
+
+    /// Layers of what was composited in front of the opaque splats.
+    fn finish(&self, accumulator: &Accumulator, opaque: &OpaqueImage, cost: &mut CostRecord) -> Result<Layers, Error> {
         cost.measure(pass::FINISH, |stage| {
             let background = Background { color: self.background };
-            let [width, height] = shaded.projected.size;
+            let [width, height] = accumulator.size;
             stage.items_in = u64::from(width) * u64::from(height);
             let (set, layout) = (&self.layers, ChannelLayout::new(&self.layers));
             self.tick()?;
-            Ok::<_, Error>(raster::finish(&accumulator, &opaque, &background, &layout, set, self.settings.antialias))
+            Ok::<_, Error>(raster::finish(accumulator, opaque, &background, &layout, set, self.settings.antialias))
         })
     }
 
@@ -189,15 +206,7 @@ impl Drawing<'_> {
             return Ok(SliceOrder::default());
         }
         self.tick()?;
-        let points = &self.settings.points;
-        let params = hbsort::Params {
-            direction: points.direction,
-            thickness: self.loaded.slice_thickness.map_or(hbsort::Thickness::Auto, hbsort::Thickness::World),
-            // Depths are made from splats in order, not from slices.
-            exact: points.exact || self.layers.depth,
-            margin_px: self.filter_reach_px(),
-            ..hbsort::Params::default()
-        };
+        let params = self.sort_params();
         let order = cost.measure(pass::SORT, |stage| {
             let helped = self.helper.and_then(|helper| helper.order(cloud, &translucent, camera, &params));
             let order = helped.map_or_else(
@@ -210,10 +219,22 @@ impl Drawing<'_> {
             stage.bytes = 4 * (order.input_from_sorted.len() + order.slice_starts.len()) as u64;
             Ok::<_, Error>(order)
         })?;
-        Ok(match points.first_slices {
+        Ok(match self.settings.points.first_slices {
             Some(n) => order.first_slices(usize::try_from(n).unwrap_or(usize::MAX)),
             None => order,
         })
+    }
+
+    fn sort_params(&self) -> hbsort::Params {
+        let points = &self.settings.points;
+        hbsort::Params {
+            direction: points.direction,
+            thickness: self.loaded.slice_thickness.map_or(hbsort::Thickness::Auto, hbsort::Thickness::World),
+            // Depths are made from splats in order, not from slices.
+            exact: points.exact || self.layers.depth,
+            margin_px: self.filter_reach_px(),
+            ..hbsort::Params::default()
+        }
     }
 
     pub(crate) fn ids(&self, keep: impl Fn(SplatKind) -> bool) -> Vec<u32> {
@@ -242,6 +263,36 @@ impl Drawing<'_> {
         })?;
         self.tick()?;
         Ok(projected)
+    }
+
+    /// The opaque splats alone: projected, shaded and resolved.
+    pub(crate) fn solid(
+        &self,
+        maps: &[Option<ShadowMap>],
+        camera: &Camera,
+        cost: &mut CostRecord,
+    ) -> Result<OpaqueImage, Error> {
+        let ids = self.ids(|kind| kind == SplatKind::Opaque);
+        if ids.is_empty() {
+            return Ok(OpaqueImage::default());
+        }
+        let all = self.loaded;
+        let loaded = Loaded {
+            cloud: all.cloud.gather(&ids),
+            materials: all.materials.clone(),
+            objects: all.objects.clone(),
+            footprints: all.footprints.clone(),
+            lights: all.lights.clone(),
+            casts: all.casts.clone(),
+            own: Vec::new(),
+            statistics: Vec::new(),
+            splats: Vec::new(),
+            warnings: Vec::new(),
+            ..*all
+        };
+        let solid = Drawing { loaded: &loaded, layers: self.layers.clone(), ..*self };
+        let shaded = solid.light(maps, camera, cost)?;
+        solid.opaque(&shaded, cost)
     }
 
     pub(crate) fn opaque(&self, shaded: &Shaded, cost: &mut CostRecord) -> Result<OpaqueImage, Error> {

@@ -1,9 +1,10 @@
 //! Whole pictures whose splats a device composites: the processor's, within a stated tolerance.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use gpu_conformance::adapter;
+use gpu_conformance::{Loss, Wrapped, adapter};
 use organza::{DeviceChoice, Progress, Render, RenderOptions, render, scene};
-use splat_core::LayerData;
+use std::path::Path;
+use std::sync::Arc;
 
 /// Most that beauty and alpha may differ by, as a share of the brightest pixel, and of 1.
 const TOLERANCE: f32 = 1e-5;
@@ -34,8 +35,34 @@ const SCENE: &str = r#"
 fn picture(settings: &str, device: Option<DeviceChoice>) -> Render {
     let text = format!("{SCENE}\n{settings}\n");
     let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
+    render_of(&scene, device)
+}
+
+fn render_of(scene: &scene::Scene, device: Option<DeviceChoice>) -> Render {
     let options = RenderOptions { device_composites: device.is_some(), device, ..RenderOptions::default() };
-    render(&scene, &options, &Progress::new()).unwrap()
+    render(scene, &options, &Progress::new()).unwrap()
+}
+
+/// The largest difference of beauty as a share of the brightest pixel, and of alpha.
+fn apart(alone: &Render, helped: &Render) -> f32 {
+    let beauty = |r: &Render| r.layers.rgb("beauty").unwrap().as_flattened().to_vec();
+    let alpha = |r: &Render| r.layers.scalar("alpha").unwrap().to_vec();
+    // What is no number is as far apart as can be.
+    let most = |a: Vec<f32>, b: Vec<f32>, of: f32| {
+        assert_eq!(a.len(), b.len());
+        let pairs = a.iter().zip(&b).map(|(a, b)| (a - b).abs() / of);
+        pairs.fold(0.0, |most: f32, d| if d <= most { most } else { d })
+    };
+    let brightest = beauty(alone).into_iter().fold(0.0, f32::max);
+    assert!(brightest > 0.1, "a picture of something");
+    most(beauty(alone), beauty(helped), brightest).max(most(alpha(alone), alpha(helped), 1.0))
+}
+
+/// A device made worse, and its count of submissions.
+fn worse(loss: Loss, binding_bytes: u64) -> (Arc<Wrapped>, DeviceChoice) {
+    let backend = Arc::new(Wrapped::new(gpu_ash::backend(), loss, binding_bytes));
+    let choice = DeviceChoice { backends: vec![backend.clone()], choice: adapter(), or_processor: false };
+    (backend, choice)
 }
 
 /// The device of the environment, by each executor.
@@ -67,24 +94,118 @@ fn a_composited_picture_is_the_processor_s_within_the_tolerance() {
     }
 }
 
-/// Largest difference as a share of the brightest pixel.
-fn apart([a, b]: &[LayerData; 2]) -> f32 {
-    let (LayerData::Rgb(a), LayerData::Rgb(b)) = (a, b) else { panic!("beauty has three channels") };
-    let (a, b) = (a.as_flattened(), b.as_flattened());
-    let most = |values: &mut dyn Iterator<Item = f32>| values.fold(0.0, f32::max);
-    most(&mut a.iter().zip(b).map(|(a, b)| (a - b).abs())) / most(&mut a.iter().copied())
-}
-
 #[test]
 fn what_a_device_does_not_composite_is_said_and_done_by_the_processor() {
     let settings = "[render]\nlayers = [\"depth\"]";
     let alone = picture(settings, None);
     for (_, device) in devices() {
         let helped = picture(settings, Some(device));
+        assert!(apart(&alone, &helped) <= TOLERANCE);
         // The light was looked up by the device all the same; nothing else can differ.
-        let [mut alone, mut helped] = [&alone, &helped].map(|r| (r.layers.clone(), r.warnings.clone()));
-        let beauties = [&mut alone.0, &mut helped.0].map(|l| l.images.remove("beauty").unwrap());
-        assert!(alone.0 == helped.0 && apart(&beauties) <= TOLERANCE);
-        assert!(helped.1.iter().any(|w| w.contains("depth layers are made by the processor")));
+        let but_beauty = |r: &Render| {
+            let mut layers = r.layers.clone();
+            layers.images.remove("beauty").unwrap();
+            layers
+        };
+        assert_eq!(but_beauty(&alone), but_beauty(&helped));
+        assert!(helped.warnings.iter().any(|w| w.contains("depth layers are made by the processor")));
+    }
+}
+
+#[test]
+fn splats_stay_on_the_device_from_their_attributes_to_the_picture() {
+    let alone = picture("", None);
+    // The trial, and everything else at once.
+    let (device, choice) = worse(Loss::Never, u64::MAX);
+    let helped = picture("", Some(choice));
+    assert_eq!((device.submissions(), &helped.warnings), (2, &alone.warnings));
+    assert!(apart(&alone, &helped) <= TOLERANCE, "{:e}", apart(&alone, &helped));
+    // More tile entries than there was room for are recorded again, once.
+    let large = "[render]\nantialias = 5";
+    let alone = picture(large, None);
+    let (device, choice) = worse(Loss::Never, u64::MAX);
+    let helped = picture(large, Some(choice));
+    assert_eq!((device.submissions(), &helped.warnings), (3, &alone.warnings));
+    assert!(apart(&alone, &helped) <= TOLERANCE, "{:e}", apart(&alone, &helped));
+}
+
+#[test]
+fn every_layer_that_is_shaded_is_the_processor_s() {
+    let settings = "[ambient]\ncolor = [0.1, 0.2, 0.3]\n[render]\nlayers = [\"effects\", \"normal\", \"shadow\"]";
+    let alone = picture(settings, None);
+    let (device, choice) = worse(Loss::Never, u64::MAX);
+    let helped = picture(settings, Some(choice));
+    assert_eq!(device.submissions(), 2);
+    assert!(apart(&alone, &helped) <= TOLERANCE);
+    let names = |r: &Render| r.layers.images.keys().copied().collect::<Vec<_>>();
+    assert_eq!(names(&alone), names(&helped));
+    for name in ["ambient", "direct", "normal"] {
+        let of = |r: &Render| r.layers.rgb(name).unwrap().as_flattened().to_vec();
+        let (a, b) = (of(&alone), of(&helped));
+        let largest = a.iter().fold(0.0, |most: f32, v| most.max(v.abs()));
+        assert!(largest > 0.0 && a.iter().zip(&b).all(|(a, b)| (a - b).abs() <= TOLERANCE * largest), "{name}");
+    }
+}
+
+#[test]
+fn a_device_that_cannot_take_all_at_once_or_is_lost_still_yields_the_picture() {
+    let alone = picture("", None);
+    // The order in parts, then ordered splats, each in its own submission; or what is too large for that by the processor.
+    let (device, choice) = worse(Loss::Never, 1 << 16);
+    let parts = picture("", Some(choice));
+    assert!(device.submissions() >= 3 && apart(&alone, &parts) <= TOLERANCE, "{}", device.submissions());
+    for (loss, submissions, said) in
+        [(Loss::Once(2), 4, "was lost and opened once more"), (Loss::Always(2), 3, "was lost; the processor goes on")]
+    {
+        let (device, choice) = worse(loss, u64::MAX);
+        let helped = picture("", Some(choice));
+        assert!(apart(&alone, &helped) <= TOLERANCE, "{loss:?}");
+        assert!(device.submissions() <= submissions, "{loss:?}: {}", device.submissions());
+        assert!(helped.warnings.iter().any(|w| w.contains(said)), "{loss:?}: {:?}", helped.warnings);
+    }
+}
+
+#[test]
+fn small_pictures_of_the_scenes_are_the_processor_s() {
+    for name in ["light-above", "light-inside", "mixed", "truth"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../scenes/{name}.toml"));
+        let mut scene = scene::parse(&path, &std::fs::read(&path).unwrap(), &Default::default()).unwrap();
+        scene.camera.size = [192, 144];
+        let alone = render_of(&scene, None);
+        for (backend, device) in devices() {
+            let helped = render_of(&scene, Some(device));
+            let far = apart(&alone, &helped);
+            println!("{name}, {backend}{far:e}");
+            assert!(helped.backend.starts_with(backend) && helped.warnings == alone.warnings, "{:?}", helped.warnings);
+            assert!(far <= TOLERANCE, "{name}, {backend}{far:e}");
+        }
+    }
+}
+
+#[test]
+fn what_a_software_driver_would_leave_away_is_the_processor_s() {
+    // 90 thousand splats on four tiles: Mesa's driver on the processor ends a thread's loops before that.
+    let text = r#"
+        version = 1
+        [camera]
+        position = [0, 0, 9]
+        target = [0, 0, 0]
+        size = [24, 24]
+        [[light]]
+        kind = "point"
+        position = [1, 2, 4]
+        intensity = [90, 90, 90]
+        [[object]]
+        name = "fog"
+        medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 1.5, spacing = 0.0444 }
+    "#;
+    let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
+    let alone = render_of(&scene, None);
+    for (_, device) in devices() {
+        let helped = render_of(&scene, Some(device));
+        assert!(apart(&alone, &helped) <= TOLERANCE, "{:e}", apart(&alone, &helped));
+        let said = helped.warnings.iter().any(|w| w.contains("more splats than the software driver goes through"));
+        let software = matches!(adapter(), splat_shaders::Choice::Software) || helped.backend.contains("llvmpipe");
+        assert!(said || !software, "{:?}", helped.warnings);
     }
 }

@@ -205,14 +205,18 @@ fn every_device_has_a_passport() {
     assert_eq!(passports.len(), organza::devices().unwrap().len());
     for passport in &passports {
         assert!(passport.valid(), "{passport:?}");
-        let [order, lists, look_ups, composite, particles] = &passport.recordings[..] else { panic!("{passport:?}") };
+        let [order, lists, look_ups, project, shade, composite, chain, particles] = &passport.recordings[..] else {
+            panic!("{passport:?}")
+        };
         assert_eq!((order.recording, order.items), ("order", 1 << 17));
         assert_eq!(order.outcome.as_ref().map(|a| (a.equal_share, a.mean, a.max)), Ok((1.0, 0.0, 0.0)));
         assert_eq!(lists.outcome.as_ref().map(|a| (a.within, a.equal_share, a.max)), Ok((true, 1.0, 0.0)));
         assert!(lists.items > 50_000 && look_ups.items == 1 << 14);
         assert!(look_ups.outcome.as_ref().is_ok_and(|a| a.within && a.mean < 1e-6), "{look_ups:?}");
         let composited = |a: &Agreement| a.within && a.mean < 1e-6 && a.max <= 1e-5;
-        assert!(composite.outcome.as_ref().is_ok_and(composited), "{composite:?}");
+        for splats in [project, shade, composite, chain] {
+            assert!(splats.items == 1 << 14 && splats.outcome.as_ref().is_ok_and(composited), "{splats:?}");
+        }
         assert!(particles.items > 100_000 && particles.outcome.as_ref().is_ok_and(|a| a.mean < 1e-3));
         // Of each kernel one row: four passes of the sort are one.
         let scatter = order.passes.iter().filter(|k| k.kernel.ends_with("scatter")).map(|k| k.dispatches);

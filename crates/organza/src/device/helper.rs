@@ -1,9 +1,10 @@
 //! An opened device: one that is lost is opened once more, one that fails is given up and the processor goes on.
 
+use super::chain::{Chained, Translucent, chain_on};
 use super::order::order_on;
 use super::particles::{Folded, fold_on, why_not};
 use super::shadows::{LookUps, LookedUp, look_up_on, map_on};
-use super::splats::{composite_on, why_not_composite};
+use super::splats::{composite_on, room_for, why_not_composite};
 use super::trial::order_trial;
 use super::{DeviceChoice, Failure, fault};
 use crate::Error;
@@ -131,8 +132,25 @@ impl Helper {
             self.leave(why);
             return None;
         }
-        let (counts, _) = self.with(|device| composite_on(device, input, accumulator))?;
-        Some(counts)
+        let done = self.with(|device| composite_on(device, input, accumulator))?;
+        if done.is_none() {
+            self.leave("a tile has more splats than the software driver goes through: the processor composites them");
+        }
+        done.map(|(counts, _)| counts)
+    }
+
+    /// Orders, projects, shades and composites splats, or leaves them to the passes one by one.
+    pub(crate) fn chain(
+        &self,
+        splats: &Translucent<'_>,
+        accumulator: &mut Accumulator,
+    ) -> Result<Option<Chained>, Error> {
+        let room = room_for(splats.ids.len());
+        let done = self.with(|device| match chain_on(device, splats, room, accumulator) {
+            Err(Failure::Splats(splat_core::Error::Cancelled)) => Ok(Err(Error::Cancelled)),
+            done => done.map(Ok),
+        });
+        done.unwrap_or(Ok(None))
     }
 
     /// Folds sets of particles until the ensemble has `until` of them, or as many as the device can; the rest is the

@@ -1,5 +1,6 @@
 //! `organza passport`: every recording on every device by every backend, against its twin on the processor.
 
+mod chain;
 mod composite;
 mod shadow;
 
@@ -7,6 +8,7 @@ use super::particles::{Folded, fold_on};
 use super::trial::OrderInput;
 use super::{Failure, backends, listed};
 use crate::Error;
+use chain::ChainInput;
 use composite::CompositeInput;
 use pbsr::{
     Appearance, Ensemble, EnsembleParams, FoldParams, MeshSampler, Object, Renderer, Scene, SurfaceParams, pixel_area,
@@ -48,7 +50,8 @@ impl Passport {
 /// One recording on one device.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Checked {
-    /// `order`, `shadow lists`, `shadow look-ups`, `composite` or `particles`.
+    /// `order`, `shadow lists`, `shadow look-ups`, `project`, `shade`, `composite`, `chain` (the order and the three before
+    /// as one) or `particles`.
     pub recording: &'static str,
     /// Splats or particles that went in.
     pub items: u64,
@@ -61,8 +64,8 @@ pub struct Checked {
 /// What a device found against what the processor found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreement {
-    /// Whether that is enough: equal bits for the order and the lists of shadow maps, 10⁻⁵ for look-ups in them and for
-    /// composited splats, 99.9 % of the pixels' hits for particles.
+    /// Whether that is enough: equal bits for the order and the lists of shadow maps, 10⁻⁵ for look-ups in them and for what
+    /// is made of splats, 99.9 % of the pixels' hits for particles.
     pub within: bool,
     /// Share of places, cells or pixels that are equal in bits.
     pub equal_share: f64,
@@ -70,7 +73,7 @@ pub struct Agreement {
     pub mean: f64,
     /// Largest difference, in the unit.
     pub max: f64,
-    /// What differences are of: `places`, `absorbance`, `transmittance` or `radiance`.
+    /// What differences are of: `places`, `absorbance`, `transmittance`, `radiance` or `of itself`.
     pub unit: &'static str,
 }
 
@@ -94,6 +97,7 @@ pub fn passport(name: &str) -> Result<Vec<Passport>, Error> {
         order: OrderInput::new(SPLATS),
         shadow: ShadowInput::new().map_err(|e| Error::Internal(e.to_string()))?,
         composite: CompositeInput::new(),
+        chain: ChainInput::new(),
         particles: ParticlesInput::new(),
     };
     let mut passports = Vec::new();
@@ -110,6 +114,7 @@ struct Inputs {
     order: OrderInput,
     shadow: ShadowInput,
     composite: CompositeInput,
+    chain: ChainInput,
     particles: ParticlesInput,
 }
 
@@ -137,7 +142,10 @@ fn inspect(backend: &dyn Backend, place: usize, adapter: Adapter, input: &Inputs
         check("order", &mut |device| check_order(device, &input.order)),
         check("shadow lists", &mut |device| input.shadow.check_lists(device)),
         check("shadow look-ups", &mut |device| input.shadow.check_look_ups(device)),
+        check("project", &mut |device| input.chain.check_project(device)),
+        check("shade", &mut |device| input.chain.check_shade(device)),
         check("composite", &mut |device| input.composite.check(device)),
+        check("chain", &mut |device| input.chain.check_chain(device)),
         check("particles", &mut |device| input.particles.check(device)),
     ];
     let clockless = recordings.iter().all(|r| r.outcome.is_ok() && r.passes.is_empty());

@@ -1,14 +1,27 @@
 //! Ordered translucent splats composited by a device.
 
 use super::Failure;
-use splat_core::raster::gpu::{Input, TILE, record};
+use splat_core::raster::gpu::{Counts, Input, TILE, record};
 use splat_core::raster::{Accumulation, RasterCounts};
 use splat_core::{Accumulator, Error};
-use splat_shaders::{Executor, PassTime};
+use splat_shaders::{AdapterKind, Executor, PassTime};
 
 /// Room for tile entries before their number is known: so many a splat, and these.
 const ENTRIES_OF_SPLAT: usize = 4;
 const MORE_ENTRIES: usize = 1 << 16;
+/// Splats of a tile that a thread of a software driver goes through: one round each, with some to spare.
+const MOST_OF_A_TILE: u64 = 60_000;
+
+/// Room for the tile entries of so many splats, before their number is known.
+pub(super) fn room_for(splats: usize) -> u32 {
+    let guess = ENTRIES_OF_SPLAT.saturating_mul(splats).saturating_add(MORE_ENTRIES);
+    u32::try_from(guess).unwrap_or(u32::MAX)
+}
+
+/// Whether a driver has left splats away: Mesa's on the processor ends the loops of a thread after 65535 rounds, silently.
+pub(super) fn too_long(device: &dyn Executor, counts: &Counts) -> bool {
+    device.adapter().kind == AdapterKind::Software && counts.longest > MOST_OF_A_TILE
+}
 
 /// What the recording does not do.
 pub(super) fn why_not_composite(input: &Input<'_>, accumulator: &Accumulator) -> Option<&'static str> {
@@ -21,24 +34,28 @@ pub(super) fn why_not_composite(input: &Input<'_>, accumulator: &Accumulator) ->
 }
 
 /// [`splat_core::raster::fold`] by a device, with the times of its passes; the accumulator changes only when all is done.
+/// `None` where the driver cannot go through all splats of a tile.
 pub(super) fn composite_on(
     device: &mut dyn Executor,
     input: &Input<'_>,
     accumulator: &mut Accumulator,
-) -> Result<(RasterCounts, Vec<PassTime>), Failure> {
-    let guess = ENTRIES_OF_SPLAT.saturating_mul(input.order.len()).saturating_add(MORE_ENTRIES);
-    let mut room = u32::try_from(guess).unwrap_or(u32::MAX);
+) -> Result<Option<(RasterCounts, Vec<PassTime>)>, Failure> {
+    let mut room = room_for(input.order.len());
     loop {
         let recorded = record(input.capacities(accumulator, room))?;
         let uploads = recorded.uploads(input, accumulator)?;
         let run = device.prepare(&recorded.recording)?.run(&recorded.inputs(&uploads))?;
-        match recorded.finish([recorded.state, recorded.planes].map(|b| run.bytes(b)), accumulator) {
+        match recorded.counts(run.bytes(recorded.state)) {
             // Too little room: found once, for the device says what it needs.
             Err(Error::Overflow { needed, .. }) if u32::try_from(needed).is_ok_and(|needed| needed > room) => {
                 room = needed as u32;
             }
             counts => {
                 let counts = counts?;
+                if too_long(device, &counts) {
+                    return Ok(None);
+                }
+                recorded.finish([recorded.state, recorded.planes].map(|b| run.bytes(b)), accumulator)?;
                 let counts = RasterCounts {
                     splats: counts.splats,
                     tile_entries: counts.entries,
@@ -46,7 +63,7 @@ pub(super) fn composite_on(
                     fragments: counts.entries * u64::from(TILE * TILE),
                     bytes: recorded.recording.bytes(),
                 };
-                return Ok((counts, run.passes));
+                return Ok(Some((counts, run.passes)));
             }
         }
     }

@@ -59,23 +59,28 @@ impl CompositeInput {
             direction,
             params: &params,
         };
-        let (_, passes) = composite_on(device, &input, &mut found)?;
-        Ok(Found { items: SPLATS.into(), agreement: agreement(&found, &expected), passes })
+        let (_, passes) = composite_on(device, &input, &mut found)?.ok_or(Failure::Small)?;
+        Ok(Found { items: SPLATS.into(), agreement: accumulators(&found, &expected), passes })
     }
 }
 
-fn agreement(found: &Accumulator, expected: &Accumulator) -> Agreement {
+/// How two accumulators of one plane agree.
+pub(super) fn accumulators(found: &Accumulator, expected: &Accumulator) -> Agreement {
     let transmittances = |a: &Accumulator| a.optical_depth[0].iter().map(|tau| (-tau).exp()).collect::<Vec<f32>>();
     let of = |a: &Accumulator| [a.channels.concat(), transmittances(a)].concat();
-    let (a, b) = (of(found), of(expected));
-    let apart: Vec<f64> = a.iter().zip(&b).map(|(a, b)| f64::from((a - b).abs())).collect();
+    numbers(&of(found), &of(expected), "radiance")
+}
+
+/// How numbers up to 1 agree.
+pub(super) fn numbers(found: &[f32], expected: &[f32], unit: &'static str) -> Agreement {
+    let apart: Vec<f64> = found.iter().zip(expected).map(|(a, b)| f64::from((a - b).abs())).collect();
     let n = apart.len() as f64;
     Agreement {
-        // What is no number is not within it.
-        within: apart.iter().all(|d| *d <= TOLERANCE),
+        // What is no number is not within it, nor what is not there.
+        within: found.len() == expected.len() && apart.iter().all(|d| *d <= TOLERANCE),
         equal_share: apart.iter().filter(|d| **d == 0.0).count() as f64 / n,
         mean: apart.iter().sum::<f64>() / n,
         max: apart.iter().copied().fold(0.0, |most, d| if d <= most { most } else { d }),
-        unit: "radiance",
+        unit,
     }
 }

@@ -1,0 +1,232 @@
+//! Translucent splats from their attributes to the picture on a device, with nothing read back between: ordered, projected,
+//! shaded and composited by one joined recording.
+//!
+//! The stages know nothing of each other; the buffers that they have in common are named here.
+
+use super::Failure;
+use super::splats::too_long;
+use hbsort::gpu as order;
+use splat_core::raster::gpu::{Attributes, Capacities, TILE, follow, project};
+use splat_core::raster::{OpaqueImage, Params, RasterCounts};
+use splat_core::shade::{ChannelLayout, ShadeInput, gpu as shade};
+use splat_core::{Accumulator, Error, FootprintStack, Progress};
+use splat_shaders::{BufferId, DeviceError, Executor, Joined, PassTime, Recording};
+
+/// Translucent splats, and what becomes of them.
+pub(crate) struct Translucent<'a> {
+    /// Splats, materials, lights and the camera.
+    pub(crate) input: &'a ShadeInput<'a>,
+    /// The translucent ones.
+    pub(crate) ids: &'a [u32],
+    pub(crate) footprints: &'a FootprintStack,
+    pub(crate) layout: ChannelLayout,
+    /// The order must be exact.
+    pub(crate) sort: &'a hbsort::Params,
+    pub(crate) raster: &'a Params,
+    pub(crate) opaque: &'a OpaqueImage,
+    pub(crate) progress: &'a Progress,
+}
+
+/// What a device did.
+pub(crate) struct Chained {
+    /// Splats that reach a pixel.
+    pub(crate) visible: u64,
+    pub(crate) raster: RasterCounts,
+    pub(crate) passes: Vec<PassTime>,
+}
+
+/// The recordings of the stages as one.
+struct Whole {
+    recording: Recording,
+    sort: order::Recorded,
+    project: (project::Recorded, Joined),
+    shade: (shade::Recorded, Joined),
+    composite: (splat_core::raster::gpu::Recorded, Joined),
+}
+
+impl Whole {
+    fn record(
+        room: Capacities,
+        attributes: &Attributes,
+        input: &ShadeInput<'_>,
+        layout: ChannelLayout,
+    ) -> Result<Self, Error> {
+        let splats = room.splats;
+        let sort = order::record(order::Capacities { splats, kept: splats });
+        let (attributes, footprints, materials) = (attributes.room(), room.footprints, room.materials);
+        let projected = project::record(project::Capacities { attributes, footprints, materials, depth: room.opaque })?;
+        let shaded = shade::record(shade::Capacities::of(input, attributes, layout));
+        let composite = follow::record(room)?;
+        let mut recording = sort.recording.clone();
+        let at = &projected.attributes;
+        let positions = [(at.positions, sort.positions), (at.radii, sort.radii)];
+        let in_project = recording.join(&projected.recording, &positions);
+        let in_shade = recording.join(&shaded.recording, &shaded.attributes.shared(&at.of(&in_project)));
+        let mut taken = vec![
+            (composite.order, sort.places),
+            (composite.splats, in_project.of(projected.splats)),
+            (composite.values, in_shade.of(shaded.values)),
+        ];
+        taken.extend(composite.sorted.map(|sorted| (sorted, sort.state)));
+        let in_composite = recording.join(&composite.recording, &taken);
+        let read =
+            [in_project.of(projected.state), in_composite.of(composite.state), in_composite.of(composite.planes)];
+        recording.read_only(&read);
+        Ok(Self {
+            recording,
+            sort,
+            project: (projected, in_project),
+            shade: (shaded, in_shade),
+            composite: (composite, in_composite),
+        })
+    }
+}
+
+/// [`Translucent`] splats into an empty accumulator by a device, which changes only when all is done; `None` where its
+/// buffers or its memory are too small for all splats at once, or a tile is too long for its driver.
+pub(super) fn chain_on(
+    device: &mut dyn Executor,
+    splats: &Translucent<'_>,
+    room: u32,
+    accumulator: &mut Accumulator,
+) -> Result<Option<Chained>, Failure> {
+    let attributes = Attributes::new(splats.input.cloud, Some(splats.ids))?;
+    let mut capacities = Capacities {
+        size: accumulator.size,
+        planes: accumulator.optical_depth.len() as u32,
+        channels: accumulator.channels.len() as u32,
+        splats: attributes.room().splats,
+        ordered: attributes.room().splats,
+        entries: room,
+        footprints: splats.footprints.layers().len() as u32,
+        materials: splats.input.materials.len() as u32,
+        opaque: !splats.opaque.depth.is_empty(),
+    };
+    let mut looked_up = None;
+    loop {
+        let whole = Whole::record(capacities, &attributes, splats.input, splats.layout)?;
+        let mut ready = match device.prepare(&whole.recording) {
+            Err(DeviceError::TooLarge { .. } | DeviceError::Memory { .. }) => return Ok(None),
+            ready => ready?,
+        };
+        let received = looked_up.take().unwrap_or_else(|| shade::received(splats.input, splats.ids, splats.progress));
+        if splats.progress.is_cancelled() {
+            return Err(Error::Cancelled.into());
+        }
+        let run = |inputs: &[(BufferId, &[u8])]| ready.run(inputs).map_err(Failure::from);
+        let run = whole.with_inputs(splats, &attributes, &received, accumulator, run)?;
+        let (composite, joined) = &whole.composite;
+        let bytes = |buffer| run.bytes(joined.of(buffer));
+        match composite.counts(bytes(composite.state)) {
+            // Too little room: found once, for the device says what it needs.
+            Err(Error::Overflow { needed, .. }) if u32::try_from(needed).is_ok_and(|n| n > capacities.entries) => {
+                capacities.entries = needed as u32;
+                looked_up = Some(received);
+            }
+            counts => {
+                let counts = counts?;
+                if too_long(device, &counts) {
+                    return Ok(None);
+                }
+                composite.finish([bytes(composite.state), bytes(composite.planes)], accumulator)?;
+                let raster = RasterCounts {
+                    splats: counts.splats,
+                    tile_entries: counts.entries,
+                    // At most: tiles that are done are left.
+                    fragments: counts.entries * u64::from(TILE * TILE),
+                    bytes: whole.recording.bytes(),
+                };
+                let (projected, joined) = &whole.project;
+                let visible = project::visible(run.bytes(joined.of(projected.state)))?;
+                return Ok(Some(Chained { visible, raster, passes: run.passes }));
+            }
+        }
+    }
+}
+
+impl Whole {
+    /// Hands the inputs of all stages to `run`.
+    fn with_inputs<T>(
+        &self,
+        splats: &Translucent<'_>,
+        attributes: &Attributes,
+        received: &[[f32; 3]],
+        accumulator: &Accumulator,
+        run: impl FnOnce(&[(BufferId, &[u8])]) -> Result<T, Failure>,
+    ) -> Result<T, Failure> {
+        let Translucent { input, footprints, raster, opaque, sort, .. } = *splats;
+        let (origin, camera, materials) = (input.cloud.origin, input.camera, input.materials);
+        let view = order::view_bytes(origin, attributes.room().splats, camera, sort);
+        let ((projected, in_project), (shaded, in_shade), (composite, in_composite)) =
+            (&self.project, &self.shade, &self.composite);
+        let to = project::Input { origin, camera, footprints, materials, params: raster };
+        let project = projected.uploads(&to, attributes)?;
+        let shade = shaded.uploads(input, attributes, received)?;
+        let direction = sort.direction;
+        let into = follow::Input { camera, footprints, materials, opaque, direction, params: raster };
+        let composited = follow::uploads(composite, &into, accumulator)?;
+        let mut inputs = vec![(self.sort.view, &view[..])];
+        inputs.extend(in_project.inputs(attributes.inputs(&projected.attributes)));
+        inputs.extend(in_project.inputs(projected.inputs(&project)));
+        inputs.extend(in_shade.inputs(shaded.inputs(&shade)));
+        inputs.extend(in_composite.inputs(composite.inputs(&composited)));
+        // What another stage leaves on the device is not uploaded.
+        inputs.retain(|(_, bytes)| !bytes.is_empty());
+        run(&inputs)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splat_core::glam::{DVec3, Vec3};
+    use splat_core::{Camera, Cloud, Material, Projection, Splat};
+    use splat_shaders::Step;
+
+    #[test]
+    fn attributes_are_uploaded_once_and_the_picture_alone_is_large_of_what_comes_back() {
+        let mut cloud = Cloud::new(DVec3::ZERO);
+        (0..3000).for_each(|i| cloud.push(&Splat { position: Vec3::X * i as f32, ..Splat::default() }));
+        let (size, view) = ([64, 48], Projection::Perspective { fov_y: 1.0 });
+        let camera = Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, view, size).expect("a camera");
+        let (materials, objects) = ([Material::default()], []);
+        let input = ShadeInput {
+            cloud: &cloud,
+            materials: &materials,
+            objects: &objects,
+            lights: &[],
+            ambient: [0.0; 3],
+            camera: &camera,
+        };
+        let attributes = Attributes::new(&cloud, None).expect("few splats");
+        let room = Capacities {
+            size,
+            planes: 1,
+            channels: 3,
+            splats: 3000,
+            ordered: 3000,
+            entries: 5000,
+            footprints: 3,
+            materials: 1,
+            opaque: false,
+        };
+        let whole = Whole::record(room, &attributes, &input, ChannelLayout::default()).expect("a recording");
+        whole.recording.check().expect("no fault");
+        let steps = |of: fn(&Step) -> Option<BufferId>| -> Vec<&str> {
+            let buffers = whole.recording.buffers();
+            whole.recording.steps().iter().filter_map(of).map(|b| buffers[b.index()].name).collect()
+        };
+        let uploads = steps(|step| if let Step::Upload(b) = step { Some(*b) } else { None });
+        let expected = [
+            ["view", "positions", "radii", "project view", "looks", "frames", "project tables"],
+            ["shade view", "shade tables", "received", "view", "tables", "opaque", "planes"],
+        ];
+        assert_eq!(uploads, expected.concat());
+        assert_eq!(
+            steps(|step| if let Step::Read(b) = step { Some(*b) } else { None }),
+            ["projected", "state", "planes"]
+        );
+        // Attributes of 40 bytes, a key, and what is sorted, projected, shaded, counted; entries.
+        assert!(whole.recording.bytes() < 3000 * 140 + 5000 * 16 + 64 * 48 * 16 + (64 << 10));
+    }
+}
