@@ -160,6 +160,7 @@ fn what_follows_a_sort_reads_how_many_splats_it_left() {
         opaque: &opaque,
         direction,
         params: &params,
+        order: &[],
     };
     let plain = Accumulator::new(ROOM.size, 1, 3, false, false);
     let uploads = follow::uploads(&follows, &input, &plain).unwrap();

@@ -1,12 +1,15 @@
 //! Translucent splats from their attributes to the picture on a device, with nothing read back between: ordered, projected,
 //! shaded and composited by one joined recording.
 //!
-//! The stages know nothing of each other; the buffers that they have in common are named here.
+//! The stages know nothing of each other; the buffers that they have in common are named here. Splats that the device does not
+//! take all at once go through it in parts, ordered before.
+
+mod parts;
 
 use super::Failure;
-use super::splats::too_long;
+use super::splats::{MOST_OF_A_TILE, raster_counts, room_for, too_long};
 use hbsort::gpu as order;
-use splat_core::raster::gpu::{Attributes, Capacities, TILE, follow, project};
+use splat_core::raster::gpu::{Attributes, Capacities, follow, project, record};
 use splat_core::raster::{OpaqueImage, Params, RasterCounts};
 use splat_core::shade::{ChannelLayout, ShadeInput, gpu as shade};
 use splat_core::{Accumulator, Error, FootprintStack, Progress};
@@ -35,10 +38,20 @@ pub(crate) struct Chained {
     pub(crate) passes: Vec<PassTime>,
 }
 
+/// How it went with splats all at once.
+enum Outcome {
+    Done(Chained),
+    /// The device's buffers or its memory are too small.
+    TooLarge,
+    /// A tile has more splats than the driver goes through.
+    TooLong,
+}
+
 /// The recordings of the stages as one.
 struct Whole {
     recording: Recording,
-    sort: order::Recorded,
+    /// None where the splats are in order.
+    sort: Option<order::Recorded>,
     project: (project::Recorded, Joined),
     shade: (shade::Recorded, Joined),
     composite: (splat_core::raster::gpu::Recorded, Joined),
@@ -50,24 +63,25 @@ impl Whole {
         attributes: &Attributes,
         input: &ShadeInput<'_>,
         layout: ChannelLayout,
+        sorts: bool,
     ) -> Result<Self, Error> {
         let splats = room.splats;
-        let sort = order::record(order::Capacities { splats, kept: splats });
+        let sort = sorts.then(|| order::record(order::Capacities { splats, kept: splats }));
         let (attributes, footprints, materials) = (attributes.room(), room.footprints, room.materials);
         let projected = project::record(project::Capacities { attributes, footprints, materials, depth: room.opaque })?;
         let shaded = shade::record(shade::Capacities::of(input, attributes, layout));
-        let composite = follow::record(room)?;
-        let mut recording = sort.recording.clone();
+        let composite = if sorts { follow::record(room)? } else { record(room)? };
+        let mut recording = sort.as_ref().map_or_else(Recording::default, |sort| sort.recording.clone());
         let at = &projected.attributes;
-        let positions = [(at.positions, sort.positions), (at.radii, sort.radii)];
+        let positions: Vec<_> =
+            sort.iter().flat_map(|sort| [(at.positions, sort.positions), (at.radii, sort.radii)]).collect();
         let in_project = recording.join(&projected.recording, &positions);
         let in_shade = recording.join(&shaded.recording, &shaded.attributes.shared(&at.of(&in_project)));
-        let mut taken = vec![
-            (composite.order, sort.places),
-            (composite.splats, in_project.of(projected.splats)),
-            (composite.values, in_shade.of(shaded.values)),
-        ];
-        taken.extend(composite.sorted.map(|sorted| (sorted, sort.state)));
+        let mut taken =
+            vec![(composite.splats, in_project.of(projected.splats)), (composite.values, in_shade.of(shaded.values))];
+        if let (Some(sort), Some(sorted)) = (&sort, composite.sorted) {
+            taken.extend([(composite.order, sort.places), (sorted, sort.state)]);
+        }
         let in_composite = recording.join(&composite.recording, &taken);
         let read =
             [in_project.of(projected.state), in_composite.of(composite.state), in_composite.of(composite.planes)];
@@ -82,14 +96,30 @@ impl Whole {
     }
 }
 
-/// [`Translucent`] splats into an empty accumulator by a device, which changes only when all is done; `None` where its
-/// buffers or its memory are too small for all splats at once, or a tile is too long for its driver.
+/// [`Translucent`] splats into an accumulator by a device, which changes only when all is done; `None` where it takes not even
+/// few of them.
 pub(super) fn chain_on(
     device: &mut dyn Executor,
     splats: &Translucent<'_>,
-    room: u32,
     accumulator: &mut Accumulator,
 ) -> Result<Option<Chained>, Failure> {
+    let n = splats.ids.len();
+    let most = match run_on(device, splats, true, room_for(n), accumulator)? {
+        Outcome::Done(done) => return Ok(Some(done)),
+        Outcome::TooLarge => n.div_ceil(2),
+        Outcome::TooLong => MOST_OF_A_TILE as usize,
+    };
+    parts::chain_in_parts(device, splats, most, accumulator)
+}
+
+/// All splats at once, sorted by the device or in order as they are, with room for so many tile entries at first.
+fn run_on(
+    device: &mut dyn Executor,
+    splats: &Translucent<'_>,
+    sorts: bool,
+    room: u32,
+    accumulator: &mut Accumulator,
+) -> Result<Outcome, Failure> {
     let attributes = Attributes::new(splats.input.cloud, Some(splats.ids))?;
     let mut capacities = Capacities {
         size: accumulator.size,
@@ -97,16 +127,17 @@ pub(super) fn chain_on(
         channels: accumulator.channels.len() as u32,
         splats: attributes.room().splats,
         ordered: attributes.room().splats,
-        entries: room,
+        // No more than a kernel sees: whether that is enough the device says.
+        entries: room.min(u32::try_from(device.adapter().binding_bytes / 4).unwrap_or(u32::MAX)),
         footprints: splats.footprints.layers().len() as u32,
         materials: splats.input.materials.len() as u32,
         opaque: !splats.opaque.depth.is_empty(),
     };
     let mut looked_up = None;
     loop {
-        let whole = Whole::record(capacities, &attributes, splats.input, splats.layout)?;
+        let whole = Whole::record(capacities, &attributes, splats.input, splats.layout, sorts)?;
         let mut ready = match device.prepare(&whole.recording) {
-            Err(DeviceError::TooLarge { .. } | DeviceError::Memory { .. }) => return Ok(None),
+            Err(DeviceError::TooLarge { .. } | DeviceError::Memory { .. }) => return Ok(Outcome::TooLarge),
             ready => ready?,
         };
         let received = looked_up.take().unwrap_or_else(|| shade::received(splats.input, splats.ids, splats.progress));
@@ -126,19 +157,13 @@ pub(super) fn chain_on(
             counts => {
                 let counts = counts?;
                 if too_long(device, &counts) {
-                    return Ok(None);
+                    return Ok(Outcome::TooLong);
                 }
                 composite.finish([bytes(composite.state), bytes(composite.planes)], accumulator)?;
-                let raster = RasterCounts {
-                    splats: counts.splats,
-                    tile_entries: counts.entries,
-                    // At most: tiles that are done are left.
-                    fragments: counts.entries * u64::from(TILE * TILE),
-                    bytes: whole.recording.bytes(),
-                };
+                let raster = raster_counts(&counts, whole.recording.bytes());
                 let (projected, joined) = &whole.project;
                 let visible = project::visible(run.bytes(joined.of(projected.state)))?;
-                return Ok(Some(Chained { visible, raster, passes: run.passes }));
+                return Ok(Outcome::Done(Chained { visible, raster, passes: run.passes }));
             }
         }
     }
@@ -156,16 +181,19 @@ impl Whole {
     ) -> Result<T, Failure> {
         let Translucent { input, footprints, raster, opaque, sort, .. } = *splats;
         let (origin, camera, materials) = (input.cloud.origin, input.camera, input.materials);
-        let view = order::view_bytes(origin, attributes.room().splats, camera, sort);
+        let count = attributes.room().splats;
+        let view = order::view_bytes(origin, count, camera, sort);
+        // Where nothing sorts they come in their order.
+        let order: Vec<u32> = if self.sort.is_some() { Vec::new() } else { (0..count).collect() };
         let ((projected, in_project), (shaded, in_shade), (composite, in_composite)) =
             (&self.project, &self.shade, &self.composite);
         let to = project::Input { origin, camera, footprints, materials, params: raster };
         let project = projected.uploads(&to, attributes)?;
         let shade = shaded.uploads(input, attributes, received)?;
         let direction = sort.direction;
-        let into = follow::Input { camera, footprints, materials, opaque, direction, params: raster };
+        let into = follow::Input { camera, footprints, materials, opaque, direction, params: raster, order: &order };
         let composited = follow::uploads(composite, &into, accumulator)?;
-        let mut inputs = vec![(self.sort.view, &view[..])];
+        let mut inputs: Vec<(BufferId, &[u8])> = self.sort.iter().map(|sort| (sort.view, &view[..])).collect();
         inputs.extend(in_project.inputs(attributes.inputs(&projected.attributes)));
         inputs.extend(in_project.inputs(projected.inputs(&project)));
         inputs.extend(in_shade.inputs(shaded.inputs(&shade)));
@@ -210,7 +238,7 @@ mod tests {
             materials: 1,
             opaque: false,
         };
-        let whole = Whole::record(room, &attributes, &input, ChannelLayout::default()).expect("a recording");
+        let whole = Whole::record(room, &attributes, &input, ChannelLayout::default(), true).expect("a recording");
         whole.recording.check().expect("no fault");
         let steps = |of: fn(&Step) -> Option<BufferId>| -> Vec<&str> {
             let buffers = whole.recording.buffers();
@@ -226,6 +254,10 @@ mod tests {
             steps(|step| if let Step::Read(b) = step { Some(*b) } else { None }),
             ["projected", "state", "planes"]
         );
+        // Sorted before, its order is an upload; there is nothing else to it.
+        let given = Whole::record(room, &attributes, &input, ChannelLayout::default(), false).expect("a recording");
+        given.recording.check().expect("no fault");
+        assert!(given.sort.is_none() && given.composite.0.sorted.is_none());
         // Attributes of 40 bytes, a key, and what is sorted, projected, shaded, counted; entries.
         assert!(whole.recording.bytes() < 3000 * 140 + 5000 * 16 + 64 * 48 * 16 + (64 << 10));
     }

@@ -4,7 +4,7 @@ use super::chain::{Chained, Translucent, chain_on};
 use super::order::order_on;
 use super::particles::{Folded, fold_on, why_not};
 use super::shadows::{LookUps, LookedUp, look_up_on, map_on};
-use super::splats::{composite_on, room_for, why_not_composite};
+use super::splats::{composite_on, why_not_composite};
 use super::trial::order_trial;
 use super::{DeviceChoice, Failure, fault};
 use crate::Error;
@@ -145,8 +145,7 @@ impl Helper {
         splats: &Translucent<'_>,
         accumulator: &mut Accumulator,
     ) -> Result<Option<Chained>, Error> {
-        let room = room_for(splats.ids.len());
-        let done = self.with(|device| match chain_on(device, splats, room, accumulator) {
+        let done = self.with(|device| match chain_on(device, splats, accumulator) {
             Err(Failure::Splats(splat_core::Error::Cancelled)) => Ok(Err(Error::Cancelled)),
             done => done.map(Ok),
         });

@@ -10,7 +10,7 @@ use splat_shaders::{AdapterKind, Executor, PassTime};
 const ENTRIES_OF_SPLAT: usize = 4;
 const MORE_ENTRIES: usize = 1 << 16;
 /// Splats of a tile that a thread of a software driver goes through: one round each, with some to spare.
-const MOST_OF_A_TILE: u64 = 60_000;
+pub(super) const MOST_OF_A_TILE: u64 = 60_000;
 
 /// Room for the tile entries of so many splats, before their number is known.
 pub(super) fn room_for(splats: usize) -> u32 {
@@ -21,6 +21,13 @@ pub(super) fn room_for(splats: usize) -> u32 {
 /// Whether a driver has left splats away: Mesa's on the processor ends the loops of a thread after 65535 rounds, silently.
 pub(super) fn too_long(device: &dyn Executor, counts: &Counts) -> bool {
     device.adapter().kind == AdapterKind::Software && counts.longest > MOST_OF_A_TILE
+}
+
+/// The device's counts as the processor's.
+pub(super) fn raster_counts(counts: &Counts, bytes: u64) -> RasterCounts {
+    // At most: tiles that are done are left.
+    let fragments = counts.entries * u64::from(TILE * TILE);
+    RasterCounts { splats: counts.splats, tile_entries: counts.entries, fragments, bytes }
 }
 
 /// What the recording does not do.
@@ -56,14 +63,7 @@ pub(super) fn composite_on(
                     return Ok(None);
                 }
                 recorded.finish([recorded.state, recorded.planes].map(|b| run.bytes(b)), accumulator)?;
-                let counts = RasterCounts {
-                    splats: counts.splats,
-                    tile_entries: counts.entries,
-                    // At most: tiles that are done are left.
-                    fragments: counts.entries * u64::from(TILE * TILE),
-                    bytes: recorded.recording.bytes(),
-                };
-                return Ok(Some((counts, run.passes)));
+                return Ok(Some((raster_counts(&counts, recorded.recording.bytes()), run.passes)));
             }
         }
     }

@@ -91,6 +91,23 @@ pub struct Capacities {
     pub opaque: bool,
 }
 
+impl Capacities {
+    fn check(&self) -> Result<(), Error> {
+        let Self { size, planes, channels, .. } = *self;
+        let refuse = |name, found: String, expected| Err(Error::invalid("recording", 0, name, found, expected));
+        if !size.iter().all(|s| (1..=WIDEST).contains(s)) {
+            return refuse("size", format!("{size:?}"), "1 to 16384 pixels a side");
+        }
+        if !matches!(planes, 1 | 3) {
+            return refuse("planes of optical depth", planes.to_string(), "1 or 3");
+        }
+        if !(1..=MAX_CHANNELS).contains(&(channels as usize)) {
+            return refuse("channels", channels.to_string(), "1 to 13");
+        }
+        Ok(())
+    }
+}
+
 /// What is folded: the arguments of [`fold`](super::fold) before the accumulator.
 #[derive(Debug, Clone, Copy)]
 pub struct Input<'a> {
@@ -202,17 +219,8 @@ pub fn record(capacities: Capacities) -> Result<Recorded, Error> {
 
 /// The same, in the order that a sort has left on the device where `follows`.
 fn record_as(capacities: Capacities, follows: bool) -> Result<Recorded, Error> {
+    capacities.check()?;
     let Capacities { size, planes, channels, splats, ordered, entries, .. } = capacities;
-    let refuse = |name, found: String, expected| Err(Error::invalid("recording", 0, name, found, expected));
-    if !size.iter().all(|s| (1..=WIDEST).contains(s)) {
-        return refuse("size", format!("{size:?}"), "1 to 16384 pixels a side");
-    }
-    if !matches!(planes, 1 | 3) {
-        return refuse("planes of optical depth", planes.to_string(), "1 or 3");
-    }
-    if !(1..=MAX_CHANNELS).contains(&(channels as usize)) {
-        return refuse("channels", channels.to_string(), "1 to 13");
-    }
     let [_, tiles] = tiles(size);
     let area = u64::from(size[0]) * u64::from(size[1]);
     let mut recording = Recording::default();

@@ -1,7 +1,8 @@
-//! Compositing that follows a sort on the device: how many splats are in the order is read where the sort has left it.
+//! Compositing that follows other stages on the device.
 //!
-//! The order, the footprints and the values come from recordings before it, joined by [`Recording::join`]; what is uploaded
-//! is the view, the tables and the opaque surface's depths.
+//! The footprints and the values come from recordings before it, joined by [`Recording::join`], and so does the order, or it is
+//! given; how many splats are in an order that a sort has made is read where the sort has left it. What is uploaded is the
+//! view, the tables and the opaque surface's depths.
 //!
 //! [`Recording::join`]: splat_shaders::Recording::join
 
@@ -25,6 +26,8 @@ pub struct Input<'a> {
     pub direction: Direction,
     /// The cut-off; the precision must be single.
     pub params: &'a Params,
+    /// Ids in compositing order; none where a sort on the device makes it.
+    pub order: &'a [u32],
 }
 
 /// Records the compositing with this room; [`Capacities::ordered`] is the most that the sort may leave.
@@ -35,16 +38,19 @@ pub fn record(capacities: Capacities) -> Result<Recorded, Error> {
     record_as(capacities, true)
 }
 
-/// The bytes that a recording by [`record`] takes beside order, footprints and values, of which there are none here.
+/// The bytes that a recording by [`record`] takes beside footprints and values, of which there are none here; or one by
+/// [`record`](super::record), whose order is given.
 ///
 /// # Errors
 /// As [`Recorded::uploads`].
 pub fn uploads(recorded: &Recorded, input: &Input<'_>, accumulator: &Accumulator) -> Result<Uploads, Error> {
     let kernels: Vec<Kernel> = input.footprints.layers().iter().map(Kernel::new).collect();
-    let Input { camera, materials, opaque, direction, params, .. } = *input;
+    let Input { camera, materials, opaque, direction, params, order, .. } = *input;
+    super::fits("splats in order", order.len() as u64, recorded.capacities.ordered)?;
     let perspective = (!camera.is_orthographic()).then_some(camera.focal_px() as f32);
     let (size, kernels) = (camera.size, &kernels[..]);
-    let image = Image { size, perspective, kernels, materials, opaque, direction, params, ordered: 0 };
+    let image = Image { size, perspective, kernels, materials, opaque, direction, params, ordered: order.len() as u32 };
     recorded.check_image(&image, accumulator)?;
-    Ok(recorded.image_uploads(&image, accumulator, Default::default()))
+    let given = [bytemuck::cast_slice(order).to_vec(), Vec::new(), Vec::new()];
+    Ok(recorded.image_uploads(&image, accumulator, given))
 }

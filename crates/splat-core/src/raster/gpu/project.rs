@@ -1,8 +1,9 @@
 //! Projection of splats to footprints as a recording: the GPU's twin of [`project`](crate::raster::project).
 //!
 //! One thread a splat, products and sums in the order of the CPU, each rounded by itself. Where a device divides and takes
-//! square roots as IEEE 754 has it, the footprints have the CPU's bits; Vulkan allows 2.5 units in the last place of a
-//! quotient, which moves a number by less than 10⁻⁵ of itself unless it cancels (the conic of a disc seen edge-on).
+//! square roots as IEEE 754 has it, the footprints have the CPU's bits. Vulkan allows 2.5 units in the last place of a
+//! quotient, and wgpu's translator drops `precise`: numbers then move by less than 10⁻⁵ of the largest of their kind, the
+//! slope of depth of a disc seen edge-on by 2·10⁻³.
 //!
 //! The words are those that [`record`](super::record) composites, so that a joined recording keeps them on the device.
 //!

@@ -1,0 +1,47 @@
+//! The same for more splats than a device takes at once: ordered first, then projected, shaded and composited in parts, one
+//! after the other in compositing order. What has been composited goes on where the part before has left it.
+
+use super::{Chained, Outcome, Translucent, run_on};
+use crate::device::Failure;
+use crate::device::order::order_on;
+use crate::device::splats::{MOST_OF_A_TILE, room_for};
+use splat_core::Accumulator;
+use splat_core::raster::RasterCounts;
+use splat_shaders::Executor;
+
+/// Splats of a part that is not halved any more.
+const LEAST: usize = 256;
+
+/// [`Translucent`] splats into an accumulator by a device, in parts of at most so many; the accumulator changes only when all
+/// is done. `None` where even few splats are too many.
+pub(crate) fn chain_in_parts(
+    device: &mut dyn Executor,
+    splats: &Translucent<'_>,
+    mut most: usize,
+    accumulator: &mut Accumulator,
+) -> Result<Option<Chained>, Failure> {
+    let (order, mut passes) = order_on(device, splats.input.cloud, splats.ids, splats.input.camera, splats.sort)?;
+    let mut begun = accumulator.clone();
+    let (mut visible, mut raster) = (0, RasterCounts::default());
+    let mut rest = &order.input_from_sorted[..];
+    while !rest.is_empty() {
+        let (ids, behind) = rest.split_at(most.min(rest.len()));
+        let part = Translucent { ids, ..*splats };
+        match run_on(device, &part, false, room_for(ids.len()), &mut begun)? {
+            Outcome::Done(done) => {
+                rest = behind;
+                visible += done.visible;
+                raster.splats += done.raster.splats;
+                raster.tile_entries += done.raster.tile_entries;
+                raster.fragments += done.raster.fragments;
+                raster.bytes = raster.bytes.max(done.raster.bytes);
+                passes.extend(done.passes);
+            }
+            Outcome::TooLarge if ids.len() > LEAST => most = ids.len().div_ceil(2),
+            Outcome::TooLong if ids.len() > MOST_OF_A_TILE as usize => most = MOST_OF_A_TILE as usize,
+            Outcome::TooLarge | Outcome::TooLong => return Ok(None),
+        }
+    }
+    *accumulator = begun;
+    Ok(Some(Chained { visible, raster, passes }))
+}
