@@ -33,7 +33,16 @@ const SCENE: &str = r#"
 "#;
 
 fn picture(settings: &str, device: Option<DeviceChoice>) -> Render {
-    let text = format!("{SCENE}\n{settings}\n");
+    picture_of(SCENE, settings, device)
+}
+
+/// Without a shadow map, so that all that a device does is of the splats.
+fn unshadowed(settings: &str, device: Option<DeviceChoice>) -> Render {
+    picture_of(&SCENE.replace("intensity", "shadow = false\n    intensity"), settings, device)
+}
+
+fn picture_of(scene: &str, settings: &str, device: Option<DeviceChoice>) -> Render {
+    let text = format!("{scene}\n{settings}\n");
     let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
     render_of(&scene, device)
 }
@@ -113,18 +122,24 @@ fn what_a_device_does_not_composite_is_said_and_done_by_the_processor() {
 }
 
 #[test]
-fn splats_stay_on_the_device_from_their_attributes_to_the_picture() {
-    let alone = picture("", None);
+fn splats_stay_on_the_device_from_their_attributes_to_the_unshadowed() {
+    let alone = unshadowed("", None);
     // The trial, and everything else at once.
     let (device, choice) = worse(Loss::Never, u64::MAX);
-    let helped = picture("", Some(choice));
+    let helped = unshadowed("", Some(choice));
     assert_eq!((device.submissions(), &helped.warnings), (2, &alone.warnings));
+    assert!(apart(&alone, &helped) <= TOLERANCE, "{:e}", apart(&alone, &helped));
+    // The lists of a shadow map before, and look-ups for splats that are translucent and for those that are opaque.
+    let alone = picture("", None);
+    let (device, choice) = worse(Loss::Never, u64::MAX);
+    let helped = picture("", Some(choice));
+    assert_eq!((device.submissions(), &helped.warnings), (5, &alone.warnings));
     assert!(apart(&alone, &helped) <= TOLERANCE, "{:e}", apart(&alone, &helped));
     // More tile entries than there was room for are recorded again, once.
     let large = "[render]\nantialias = 5";
-    let alone = picture(large, None);
+    let alone = unshadowed(large, None);
     let (device, choice) = worse(Loss::Never, u64::MAX);
-    let helped = picture(large, Some(choice));
+    let helped = unshadowed(large, Some(choice));
     assert_eq!((device.submissions(), &helped.warnings), (3, &alone.warnings));
     assert!(apart(&alone, &helped) <= TOLERANCE, "{:e}", apart(&alone, &helped));
 }
@@ -135,7 +150,7 @@ fn every_layer_that_is_shaded_is_the_processor_s() {
     let alone = picture(settings, None);
     let (device, choice) = worse(Loss::Never, u64::MAX);
     let helped = picture(settings, Some(choice));
-    assert_eq!(device.submissions(), 2);
+    assert_eq!(device.submissions(), 5);
     assert!(apart(&alone, &helped) <= TOLERANCE);
     let names = |r: &Render| r.layers.images.keys().copied().collect::<Vec<_>>();
     assert_eq!(names(&alone), names(&helped));
@@ -148,27 +163,27 @@ fn every_layer_that_is_shaded_is_the_processor_s() {
 }
 
 #[test]
-fn a_device_that_cannot_take_all_at_once_or_is_lost_still_yields_the_picture() {
-    let alone = picture("", None);
+fn a_device_that_cannot_take_all_at_once_or_is_lost_still_yields_the_unshadowed() {
+    let alone = unshadowed("", None);
     // The planes of the image just fit; the order is made in parts, and the rest too.
     for direction in ["front_to_back", "back_to_front"] {
         let settings = format!("[render]\nantialias = 1\n[render.points]\ndirection = \"{direction}\"");
         let (device, choice) = worse(Loss::Never, 100_000);
-        let parts = picture(&settings, Some(choice));
+        let parts = unshadowed(&settings, Some(choice));
         assert!(parts.warnings.is_empty() && device.submissions() > 1 + 2 + 2, "{:?}", parts.warnings);
-        let alone = picture(&settings, None);
+        let alone = unshadowed(&settings, None);
         assert!(apart(&alone, &parts) <= TOLERANCE, "{:e}", apart(&alone, &parts));
     }
     // Nothing fits but a part of the order.
     let (device, choice) = worse(Loss::Never, 1 << 16);
-    let refused = picture("", Some(choice));
+    let refused = unshadowed("", Some(choice));
     assert!(device.submissions() >= 3 && apart(&alone, &refused) == 0.0, "{}", device.submissions());
     assert!(refused.warnings.iter().any(|w| w.contains("kernels see at most")), "{:?}", refused.warnings);
     for (loss, submissions, said) in
         [(Loss::Once(2), 4, "was lost and opened once more"), (Loss::Always(2), 3, "was lost; the processor goes on")]
     {
         let (device, choice) = worse(loss, u64::MAX);
-        let helped = picture("", Some(choice));
+        let helped = unshadowed("", Some(choice));
         assert!(apart(&alone, &helped) <= TOLERANCE, "{loss:?}");
         assert!(device.submissions() <= submissions, "{loss:?}: {}", device.submissions());
         assert!(helped.warnings.iter().any(|w| w.contains(said)), "{loss:?}: {:?}", helped.warnings);
