@@ -68,7 +68,7 @@ pub(crate) fn draw(
         accumulate(&average.ensemble, &layout, &mut accumulator);
         if wanted || set.depth || set.object {
             let (ensemble, occluder) = (&average.ensemble, occluder.as_ref());
-            of_hits = OfHits { ensemble, parts: &parts, occluder, opaque: &opaque }.layers(drawing);
+            of_hits = OfHits { ensemble, parts: &parts, occluder, opaque: &opaque }.layers(drawing, wanted);
         }
         let asked = drawing.settings.particles.repeat_level;
         sets = Some(Sets { averaged: average.ensemble.levels(), asked, interrupted: average.interrupted });

@@ -42,10 +42,9 @@ pub fn predict(scene: &Scene<'_>, ensemble: &EnsembleParams, levels: u32, params
     let of_set: f64 = scene.objects.iter().map(|o| o.sampler.expected_particles()).sum();
     let particles = of_set * f64::from(levels);
     let in_batch = (params.batch_particles as f64).min(particles).max(of_set);
-    let pixels: u64 = scene.camera.size.iter().map(|s| u64::from(s.div_ceil(64)) * 64).product();
     Prediction {
         particles,
         batch_bytes: ((in_batch * BYTES_IN_BATCH as f64) as u64).min(params.max_bytes),
-        ensemble_bytes: pixels * ensemble.bytes_per_pixel(),
+        ensemble_bytes: ensemble.bytes(scene.camera.size.map(u64::from)),
     }
 }

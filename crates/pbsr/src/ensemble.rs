@@ -7,7 +7,7 @@
 //! Where extinction differs by channel, a set has at most one hit a pixel and channel, and hits are counted by channel.
 
 use crate::Error;
-use crate::bins::{AREA, Tiling};
+use crate::bins::{AREA, TILE, Tiling};
 use crate::depths::DepthSum;
 use crate::error::check;
 
@@ -62,9 +62,14 @@ impl EnsembleParams {
         if self.colored_extinction { 3 } else { 1 }
     }
 
-    /// Bytes of the sums of one pixel: 36 for beauty, 8 more a further channel, 184 with depths, 8 with objects, 48 more
-    /// where extinction differs by channel.
-    pub fn bytes_per_pixel(&self) -> u64 {
+    /// Bytes of the sums of an image, whose tiles are whole: a pixel has 36 for beauty, 8 more a further channel, 184 with
+    /// depths, 8 with objects, 48 more where extinction differs by channel.
+    pub fn bytes(&self, size: [u64; 2]) -> u64 {
+        let side = |s: u64| s.next_multiple_of(TILE as u64);
+        side(size[0]).saturating_mul(side(size[1])).saturating_mul(self.bytes_per_pixel())
+    }
+
+    fn bytes_per_pixel(&self) -> u64 {
         let planes = |on: bool, size: usize| if on { size } else { 0 };
         let bytes = 4 * self.hit_channels()
             + 8 * (self.channels() + 1)
@@ -301,9 +306,9 @@ impl Ensemble {
         if self.params.colored_extinction { self.hits[3 * at + channel] } else { self.hits[at] }
     }
 
-    /// Bytes of the sums, see [`EnsembleParams::bytes_per_pixel`].
+    /// Bytes of the sums, see [`EnsembleParams::bytes`].
     pub fn bytes(&self) -> u64 {
-        self.squares.len() as u64 * self.params.bytes_per_pixel()
+        self.params.bytes(self.tiling.size.map(|s| s as u64))
     }
 
     /// The sums by tile.

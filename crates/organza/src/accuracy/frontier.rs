@@ -2,9 +2,11 @@
 //!
 //! From the most accurate on, a setting is on the frontier if it is faster than the last one on it by more than times can
 //! be told apart. Errors that are equal to two digits count as one, and the first setting in the report's order stands for
-//! those that are nearly as fast; so the scene's own does for knobs that change nothing. A setting's time is the least of its repeats: other work of the machine adds to a repeat and never takes
-//! from it. Errors are the same in every run, so a frontier changes with the times alone: what it hangs on is repeated until it has
-//! held for some rounds.
+//! those that are nearly as fast; so the scene's own does for knobs that change nothing.
+//!
+//! A setting's time is the least of its repeats: other work of the machine adds to a repeat and never takes from it. Errors
+//! are the same in every run, so a frontier changes with the times alone: what it hangs on is repeated until it has held for
+//! some rounds.
 
 /// Ratio of times that counts as different.
 pub const TOLD_APART: f64 = 1.1;

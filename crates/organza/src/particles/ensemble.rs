@@ -92,11 +92,10 @@ fn kept_numbers(set: &LayerSet, colored_extinction: bool, range: impl Fn() -> [f
 /// samples when they are read. A set of more than four million particles takes more, up to a quarter of what is allowed.
 pub(crate) fn average_bytes(size: [u64; 2], set: &LayerSet, colored_extinction: bool, options: &RenderOptions) -> u64 {
     let kept = kept_numbers(set, colored_extinction, || [0.0, 1.0]);
-    let [samples, padded] = [1, 64].map(|tile| size.iter().map(|s| s.div_ceil(tile) * tile).product::<u64>());
+    let samples: u64 = size.iter().product();
     let copies = 1 + u64::from(options.checkpoint.is_some());
     // Batches are over when the picture is read.
-    copies * padded * kept.bytes_per_pixel()
-        + fold_params(options).batch_bytes().max(samples * kept.bytes_to_read_pixel())
+    copies * kept.bytes(size) + fold_params(options).batch_bytes().max(samples * kept.bytes_to_read_pixel())
 }
 
 /// View depths that all particles lie between.

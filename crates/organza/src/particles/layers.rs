@@ -42,7 +42,7 @@ pub(super) fn accumulate(ensemble: &Ensemble, layout: &ChannelLayout, accumulato
     }
 }
 
-/// Layers of the distribution of hits, as far as the ensemble keeps it: the standard error always, depths, and objects.
+/// Layers of the distribution of hits that are asked for: the standard error, depths, and objects.
 pub(super) struct OfHits<'a> {
     pub(super) ensemble: &'a Ensemble,
     pub(super) parts: &'a [Part<'a>],
@@ -52,16 +52,19 @@ pub(super) struct OfHits<'a> {
 
 impl OfHits<'_> {
     /// By name, samples become pixels.
-    pub(super) fn layers(&self, drawing: &Drawing<'_>) -> Vec<(&'static str, LayerData)> {
+    pub(super) fn layers(&self, drawing: &Drawing<'_>, std_error: bool) -> Vec<(&'static str, LayerData)> {
         let background = drawing.background;
         let samples = self.ensemble.read(&|_, _| background, self.occluder);
         let pixels = Pixels { size: self.ensemble.size(), antialias: drawing.settings.antialias };
-        let mut layers = vec![("std_error", pixels.error(&samples))];
+        let mut layers = Vec::new();
+        if std_error {
+            layers.push(("std_error", pixels.error(&samples)));
+        }
         if drawing.layers.depth {
             for name in ["depth.first", "depth.median", "depth.mean", "depth.sigma"] {
                 let depths = samples.scalar(name).expect("invariant: depths are kept where they are asked for");
                 let least = name == "depth.first";
-                layers.push((name, LayerData::Scalar(pixels.map(|at| depth(depths, &at, least)))));
+                layers.push((name, LayerData::Scalar(pixels.map(|at| depth(at.map(|k| depths[k]), least)))));
             }
         }
         if let Some(LayerData::Id(objects)) = samples.images.get("object") {
@@ -69,21 +72,22 @@ impl OfHits<'_> {
                 Some(part) => Some(part.of),
                 None => self.opaque.object.get(at).copied().filter(|o| *o != u32::MAX),
             };
-            let first = |at: Vec<usize>| at.into_iter().find_map(seen).unwrap_or(u32::MAX);
-            layers.push(("object", LayerData::Id(pixels.map(first))));
+            let first = pixels.map(|at| at.filter_map(seen).next().unwrap_or(u32::MAX));
+            layers.push(("object", LayerData::Id(first)));
         }
         layers
     }
 }
 
 /// The least depth of some samples, or the mean of those that are defined.
-fn depth(depths: &[f32], at: &[usize], least: bool) -> f32 {
-    let defined: Vec<f32> = at.iter().map(|k| depths[*k]).filter(|d| d.is_finite()).collect();
-    let sum: f32 = defined.iter().sum();
-    match defined.len() {
-        0 => f32::INFINITY,
-        _ if least => defined.into_iter().fold(f32::INFINITY, f32::min),
-        n => sum / n as f32,
+fn depth(samples: impl Iterator<Item = f32>, least: bool) -> f32 {
+    let defined = samples.filter(|d| d.is_finite());
+    if least {
+        return defined.fold(f32::INFINITY, f32::min);
+    }
+    match defined.fold((0.0, 0u32), |(sum, n), d| (sum + d, n + 1)) {
+        (_, 0) => f32::INFINITY,
+        (sum, n) => sum / n as f32,
     }
 }
 
@@ -95,21 +99,21 @@ struct Pixels {
 }
 
 impl Pixels {
-    /// One value a pixel, of its samples.
-    fn map<T>(&self, value: impl Fn(Vec<usize>) -> T) -> Vec<T> {
+    /// One value a pixel, of the places of its samples.
+    fn map<T>(&self, value: impl Fn(&mut dyn Iterator<Item = usize>) -> T) -> Vec<T> {
         let antialias = self.antialias as usize;
         let [width, height] = self.size.map(|s| s as usize / antialias);
-        let samples = |k: usize| {
+        let of_pixel = |k: usize| {
             let (x, y) = (k % width * antialias, k / width * antialias);
-            (0..antialias * antialias).map(move |s| (y + s / antialias) * width * antialias + x + s % antialias)
+            value(&mut (0..antialias * antialias).map(|s| (y + s / antialias) * width * antialias + x + s % antialias))
         };
-        (0..width * height).map(|k| value(samples(k).collect())).collect()
+        (0..width * height).map(of_pixel).collect()
     }
 
     /// Standard error of each pixel's luminance: that of the mean of its independent samples.
     fn error(&self, samples: &Layers) -> LayerData {
         let errors = samples.scalar("std_error").expect("invariant: an ensemble has an error");
-        let square = |at: Vec<usize>| at.into_iter().map(|k| errors[k] * errors[k]).sum::<f32>();
-        LayerData::Scalar(self.map(|at| square(at).sqrt() / (self.antialias * self.antialias) as f32))
+        let all = (self.antialias * self.antialias) as f32;
+        LayerData::Scalar(self.map(|at| at.map(|k| errors[k] * errors[k]).sum::<f32>().sqrt() / all))
     }
 }

@@ -1,6 +1,6 @@
 //! Shading as a recording: the GPU's twin of [`shade`](super::shade).
 //!
-//! One thread a splat. What the shadow maps let through is looked up by the processor ([`received`]) and uploaded.
+//! One thread a splat. What the shadow maps let through ([`received`]) is uploaded.
 //!
 //! Deviations from the CPU: the direction to a light is found in single precision, from a light whose position is a sum of
 //! two f32, so that it keeps its digits near the light; x^m is e^(m ln x) by series, which devices promise less of. A
