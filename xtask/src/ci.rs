@@ -22,6 +22,13 @@ struct Step {
     work: Work,
 }
 
+/// The features that are off by default. Tests on a device and without one have all of them, and the whole workspace: cargo
+/// compiles a crate anew for every other choice.
+pub(crate) const FEATURES: &str = "hbsort/gpu,pbsr/gpu,splat-core/gpu,tsm/gpu";
+
+/// The feature that asks for a Vulkan driver.
+pub(crate) const DRIVER: &str = "gpu-conformance/driver";
+
 /// Jobs that need more than the pinned toolchain: named, so that nobody believes that they ran.
 const SKIPPED: [&str; 1] =
     ["skipped: miri (needs a nightly toolchain; the only unsafe code, in gpu-ash, calls Vulkan, which miri cannot)"];
@@ -81,17 +88,12 @@ fn steps(repo: &Repo) -> Vec<Step> {
         step("tidy", Work::Task(tidy::run)),
         step("papers", Work::Task(papers::check)),
         // All targets: examples, tests and benches compile here too.
-        step(
-            "clippy",
-            one(
-                "clippy --workspace --all-targets --features gpu-conformance/driver,hbsort/gpu,pbsr/gpu,splat-core/gpu,tsm/gpu -- -D warnings",
-            ),
-        ),
+        step("clippy", one(&format!("clippy --workspace --all-targets --features {FEATURES},{DRIVER} -- -D warnings"))),
         step("docs", docs),
         step("alone", Work::Cargo(alone(repo), &[])),
         step("shaders", Work::Task(|repo| shaders::run(repo, true))),
         step("vulkan", Work::Task(vulkan::run)),
-        step("tests", one("test --workspace --features hbsort/gpu,pbsr/gpu,splat-core/gpu,tsm/gpu")),
+        step("tests", one(&format!("test --workspace --features {FEATURES}"))),
     ]
 }
 

@@ -3,6 +3,7 @@
 //! Lavapipe is Mesa's Vulkan on the processor: it needs no GPU, so that every machine can run the tests. It says nothing
 //! about speed. What is missing is installed where that is possible (root, apt), printed where it is not.
 
+use crate::ci::{DRIVER, FEATURES};
 use crate::repo::{Outcome, Repo};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -114,7 +115,7 @@ fn check_modules(repo: &Repo, spirv_val: &Path) -> Result<usize, String> {
 }
 
 fn conformance(repo: &Repo, driver: &Path, executor: &str, validation: &str) -> Result<(), String> {
-    let line = "test --package gpu-conformance --features driver";
+    let line = format!("test --workspace --features {FEATURES},{DRIVER} --test conformance");
     println!("$ cargo {line} (gpu-{executor}, {validation} validation)");
     let program = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let runtime = std::env::var_os("XDG_RUNTIME_DIR").unwrap_or_else(|| std::env::temp_dir().into());

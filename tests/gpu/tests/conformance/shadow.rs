@@ -1,5 +1,4 @@
 //! Shadow maps on a device: the CPU's lists, bit for bit, and its look-ups within a stated tolerance.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use gpu_conformance::{Device, open};
 use splat_core::glam::{DVec3, Vec3};

@@ -1,5 +1,4 @@
 //! Each kernel that stands by itself against a few lines of plain code.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use gpu_conformance::{adapter, bytes, open, words};
 use splat_core::rng;

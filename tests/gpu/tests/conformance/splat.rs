@@ -1,5 +1,4 @@
 //! Compositing on a device: the CPU's accumulator, within a stated tolerance.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use gpu_conformance::{Device, open};
 use splat_core::glam::{DVec3, Vec3};

@@ -1,5 +1,4 @@
 //! The ensemble of uploaded particles on a device: the CPU's sums.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use gpu_conformance::open;
 use pbsr::gpu::{Capacities, record};

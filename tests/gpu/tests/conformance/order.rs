@@ -1,5 +1,4 @@
 //! The sort on a device: the CPU's exact order, bit for bit.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use gpu_conformance::{Device, open};
 use hbsort::gpu::{Capacities, join, record};

@@ -1,5 +1,4 @@
 //! Shading on a device: the CPU's values, within a stated tolerance.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use gpu_conformance::{Device, open, words};
 use splat_core::glam::{DVec3, Vec3};

@@ -1,5 +1,4 @@
 //! Projection on a device: the CPU's footprints.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use gpu_conformance::{Device, open, words};
 use splat_core::glam::{DVec3, Vec3};

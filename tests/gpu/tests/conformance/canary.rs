@@ -1,5 +1,4 @@
 //! Silence means something only if faults are heard: the adapter is a real one, and validation speaks.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use gpu_ash::{AdapterKind, Choice, Device, DeviceError, Validation, adapters};
 use gpu_conformance::{bytes, open_ash as open};

@@ -1,5 +1,4 @@
 //! A whole picture with a device that helps: the processor's, bit for bit.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use gpu_conformance::{Loss, Wrapped, adapter};
 use organza::{Agreement, DeviceChoice, Progress, Render, RenderOptions, render, scene};

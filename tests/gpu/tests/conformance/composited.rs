@@ -1,5 +1,4 @@
 //! Whole pictures whose splats a device composites: the processor's, within a stated tolerance.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use gpu_conformance::{Loss, Wrapped, adapter, backend};
 use organza::{DeviceChoice, Progress, Render, RenderOptions, render, scene};

@@ -1,5 +1,4 @@
 //! The recordings of four stages joined: one submission under validation gives the CPU's picture.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use gpu_conformance::open;
 use hbsort::Scratch;

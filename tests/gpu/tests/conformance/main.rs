@@ -1,0 +1,14 @@
+//! Every kernel and every recording on a device, under validation, against its twin on the CPU: one program, linked once.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod canary;
+mod chained;
+mod composited;
+mod kernels;
+mod order;
+mod particles;
+mod picture;
+mod projected;
+mod shaded;
+mod shadow;
+mod splat;
