@@ -164,3 +164,47 @@ fn what_moves_or_hides_is_not_sampled_again() {
     assert!(document["frames"].as_array().unwrap().iter().all(|f| sampled(f).is_none()));
     assert_eq!(place.bytes("little.0003.png"), drawn(3));
 }
+
+/// A triangle, and vertices that belong to none: 3.6 MB in memory, a few splats.
+fn large_file() -> String {
+    let loose = 300_000;
+    let header = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+         element face 1\nproperty list uchar int vertex_indices\nend_header\n",
+        loose + 3
+    );
+    format!("{header}-1 -1 0\n1 -1 0\n0 1 0\n{}3 0 1 2\n", "0 0 0\n".repeat(loose))
+}
+
+#[test]
+fn files_are_read_once_while_they_fit() {
+    use organza::{Progress, RenderOptions, Sequence, render, scene};
+    let place = Place::new("");
+    let files = ["t.ply", "u.ply"];
+    let write = || files.iter().for_each(|file| place.write(file, large_file()));
+    let remove = || files.iter().for_each(|file| fs::remove_file(place.path(file)).unwrap());
+    write();
+    let object = |file| format!("[[object]]\nname = \"{file}\"\nmesh = \"{file}\"\nspacing = 0.05\n");
+    let text = [still(), files.map(object).concat(), TRACKS.to_owned()].concat();
+    let frame = |k| {
+        let options = scene::LoadOptions { frame: Some(k), ..Default::default() };
+        scene::parse(&place.path("s.toml"), text.as_bytes(), &options).unwrap()
+    };
+    let (scenes, progress) = ([frame(0), frame(6)], Progress::new());
+    let plenty = RenderOptions::default();
+    let alone = scenes.each_ref().map(|s| render(s, &plenty, &progress).unwrap().layers);
+
+    let mut sequence = Sequence::new(&scenes);
+    assert_eq!(sequence.render(&scenes[0], &plenty, &progress).unwrap().layers, alone[0]);
+    remove();
+    assert_eq!(sequence.render(&scenes[1], &plenty, &progress).unwrap().layers, alone[1]);
+
+    // A quarter of this is less than the files take.
+    write();
+    let short = RenderOptions { max_memory: 20 << 20, ..plenty };
+    let mut sequence = Sequence::new(&scenes);
+    assert_eq!(sequence.render(&scenes[0], &short, &progress).unwrap().layers, alone[0]);
+    remove();
+    let refused = sequence.render(&scenes[1], &short, &progress).unwrap_err();
+    assert!(refused.to_string().contains("t.ply"), "{refused}");
+}

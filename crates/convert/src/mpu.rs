@@ -178,6 +178,11 @@ fn check(params: &MpuParams) -> Result<(), ConvertError> {
 }
 
 impl MpuField {
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> u64 {
+        self.octree.bytes()
+    }
+
     /// Opposite corners of the cube.
     pub fn bounds(&self) -> [DVec3; 2] {
         let (center, half) = (self.origin + self.octree.center, self.octree.half);

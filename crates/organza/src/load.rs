@@ -2,6 +2,7 @@
 
 pub(crate) mod bounded;
 mod context;
+pub(crate) mod files;
 pub(crate) mod input;
 pub(crate) mod object;
 pub(crate) mod own;
@@ -13,6 +14,7 @@ use crate::statistics::{LightStatistics, ObjectStatistics};
 use crate::{CostRecord, Error, Progress, RenderOptions, normalize::normalize};
 use context::Context;
 use convert::cost::Prediction;
+use files::Files;
 use glam::DVec3;
 use object::Prepared;
 use own::Own;
@@ -89,17 +91,19 @@ fn scaled_thickness(scene: &Scene, exponent: i32) -> Option<f64> {
 /// # Errors
 /// See [`crate::render`].
 pub fn load(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Loaded, Error> {
-    load_measured(scene, options, progress, &mut CostRecord::default())
+    load_measured(scene, options, progress, &Files::default(), &mut CostRecord::default())
 }
 
-/// [`load`] with entries in the cost record: reading, and conversion where something is converted.
+/// [`load`] with what was read before, and with entries in the cost record: reading, and conversion where something is
+/// converted.
 pub(crate) fn load_measured(
     scene: &Scene,
     options: &RenderOptions,
     progress: &Progress,
+    files: &Files,
     cost: &mut CostRecord,
 ) -> Result<Loaded, Error> {
-    let loading = Loading { scene, options, progress };
+    let loading = Loading { scene, options, progress, files };
     let mut warnings = Vec::new();
     let mut prepared = cost.measure(pass::READ, |stage| {
         let prepared = loading.prepare()?;
@@ -159,6 +163,7 @@ struct Loading<'a> {
     scene: &'a Scene,
     options: &'a RenderOptions,
     progress: &'a Progress,
+    files: &'a Files,
 }
 
 impl<'a> Loading<'a> {
@@ -167,7 +172,8 @@ impl<'a> Loading<'a> {
     }
 
     fn context(&self, id: usize, used: u64, made: u64) -> Context<'a> {
-        Context { scene: self.scene, options: self.options, progress: self.progress, id, used, made }
+        let Self { scene, options, progress, files } = *self;
+        Context { scene, options, files, progress, id, used, made }
     }
 
     fn particles(&self) -> bool {

@@ -1,6 +1,7 @@
 //! From a scene to images: load, plan, draw.
 
 use crate::device::{DeviceChoice, Helper};
+use crate::load::files::Files;
 use crate::load::{Loaded, SplatCount, light_statistics, load_measured};
 use crate::particles::{self, Checkpoint, Kept, average_bytes};
 use crate::plan::{Plan, pass, plan};
@@ -78,7 +79,8 @@ pub struct Explanation {
     pub plan: Plan,
     /// What loading cost.
     pub cost: CostRecord,
-    /// Bytes that rendering will take at most, see [`Explanation::plan`] for the passes that take them.
+    /// Bytes that rendering will take beside the inputs, see [`Explanation::plan`] for the passes that take them. Shadow maps
+    /// are estimated from the number of splats; each is held to the allowed memory when it is built.
     pub memory: u64,
     /// Splats of every visible object, as predicted from its input and as made.
     pub splats: Vec<SplatCount>,
@@ -96,21 +98,44 @@ pub fn render(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Re
     render_keeping(scene, options, progress, None)
 }
 
+/// What the frames of an animation leave for the next.
+pub(crate) struct Left {
+    pub(crate) files: Files,
+    pub(crate) sets: Kept,
+}
+
+impl Left {
+    /// Share of the allowed memory that files may take.
+    const FILES: u64 = 4;
+
+    /// Lets files go that take more than their share, or than is left beside `other` bytes; sets may take what is then left.
+    fn fit(&mut self, max_memory: u64, other: u64) {
+        if self.files.bytes() > (max_memory / Self::FILES).min(max_memory.saturating_sub(other)) {
+            self.files = Files::default();
+        }
+        self.sets.allow(max_memory, other + self.files.bytes());
+    }
+}
+
 /// [`render`] with what other frames of the scene have left.
 pub(crate) fn render_keeping(
     scene: &Scene,
     options: &RenderOptions,
     progress: &Progress,
-    mut kept: Option<&mut Kept>,
+    mut left: Option<&mut Left>,
 ) -> Result<Render, Error> {
-    let open = |path: &PathBuf| Checkpoint::open(path, scene, options, kept.as_deref());
+    let open = |path: &PathBuf| Checkpoint::open(path, scene, options, left.as_ref().map(|left| &left.sets));
     let mut checkpoint = options.checkpoint.as_ref().map(open).transpose()?;
     let helper = options.device.as_ref().map(Helper::open).transpose()?;
-    let (loaded, explanation) = prepare(scene, options, progress)?;
+    let (loaded, explanation) = match &left {
+        Some(left) => prepare(scene, options, progress, &left.files)?,
+        None => prepare(scene, options, progress, &Files::default())?,
+    };
     let Explanation { plan, mut cost, mut warnings, memory, .. } = explanation;
-    if let Some(kept) = kept.as_deref_mut() {
-        kept.allow(options.max_memory, memory);
+    if let Some(left) = left.as_deref_mut() {
+        left.fit(options.max_memory, memory);
     }
+    let kept = left.map(|left| &mut left.sets);
     let drawing = Drawing { helper: helper.as_ref(), ..drawing(scene, &loaded, &plan, options, progress) };
     let (layers, sets) = draw(scene, &drawing, options, checkpoint.as_mut(), kept, &mut cost, &mut warnings)?;
     let backend = helper.as_ref().map_or_else(|| "cpu".to_owned(), Helper::name);
@@ -180,14 +205,19 @@ pub(crate) fn drawing<'a>(
 /// # Errors
 /// As [`render`].
 pub fn explain(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Explanation, Error> {
-    prepare(scene, options, progress).map(|(_, explanation)| explanation)
+    prepare(scene, options, progress, &Files::default()).map(|(_, explanation)| explanation)
 }
 
-fn prepare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<(Loaded, Explanation), Error> {
+fn prepare(
+    scene: &Scene,
+    options: &RenderOptions,
+    progress: &Progress,
+    files: &Files,
+) -> Result<(Loaded, Explanation), Error> {
     let mut cost = CostRecord::default();
     check_memory("the image", image_bytes(scene), options.max_memory)?;
     check_samples(scene)?;
-    let loaded = load_measured(scene, options, progress, &mut cost)?;
+    let loaded = load_measured(scene, options, progress, files, &mut cost)?;
     let (plan, memory) = plan_loaded(scene, &loaded, options)?;
     let (splats, warnings) = (loaded.splats.clone(), loaded.warnings.clone());
     Ok((loaded, Explanation { plan, cost, memory, splats, warnings }))

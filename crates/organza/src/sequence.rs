@@ -1,7 +1,8 @@
 //! Frames of one scene, one after the other: what was sampled for one serves the next.
 
+use crate::load::files::Files;
 use crate::particles::Kept;
-use crate::render::render_keeping;
+use crate::render::{Left, render_keeping};
 use crate::scene::Scene;
 use crate::{Error, Progress, Render, RenderOptions};
 
@@ -9,7 +10,8 @@ use crate::{Error, Progress, Render, RenderOptions};
 ///
 /// The technique `particles` samples an object once, as finely as any frame needs it, and keeps the sets while they fit in a
 /// quarter of [`RenderOptions::max_memory`]: an object whose transform or visibility changes, or that is seen from another
-/// place, is not sampled again. The cost record of a frame has a pass `sample` where something was.
+/// place, is not sampled again. The cost record of a frame has a pass `sample` where something was. Files are read once, while
+/// what they hold fits in another quarter.
 ///
 /// ```
 /// use organza::{Progress, RenderOptions, Sequence, scene};
@@ -43,13 +45,13 @@ use crate::{Error, Progress, Render, RenderOptions};
 /// assert!(sampled(&first) && !sampled(&second));
 /// ```
 pub struct Sequence {
-    kept: Kept,
+    left: Left,
 }
 
 impl Sequence {
     /// Nothing drawn yet; `frames` are all that will be drawn.
     pub fn new(frames: &[Scene]) -> Self {
-        Self { kept: Kept::new(frames) }
+        Self { left: Left { files: Files::default(), sets: Kept::new(frames) } }
     }
 
     /// Draws one of the frames.
@@ -57,6 +59,6 @@ impl Sequence {
     /// # Errors
     /// As [`crate::render`].
     pub fn render(&mut self, frame: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Render, Error> {
-        render_keeping(frame, options, progress, Some(&mut self.kept))
+        render_keeping(frame, options, progress, Some(&mut self.left))
     }
 }

@@ -132,6 +132,16 @@ fn rescaled(mut shape: Shape, radius: f64, support: f64) -> Shape {
 }
 
 impl Octree {
+    /// Bytes that it takes.
+    pub(super) fn bytes(&self) -> u64 {
+        let words = size_of_val(self.nodes.as_slice())
+            + size_of_val(self.starts.as_slice())
+            + size_of_val(self.list.as_slice());
+        let leaves = size_of_val(self.supports.as_slice()) + size_of_val(self.functions.as_slice());
+        let shapes = size_of_val(self.ranges.as_slice()) + size_of_val(self.pieces.as_slice());
+        (words + leaves + shapes) as u64
+    }
+
     /// Builds over a cube.
     pub(super) fn new(tree: &SampleTree, center: DVec3, half: f64, asked: &Tolerances) -> (Self, MpuReport) {
         let root = Build { tree, asked }.cell(center, half, 0, &mut Scratch::default());

@@ -150,7 +150,7 @@ pub(super) struct AccuracyArguments {
     #[command(flatten)]
     pub(super) scene: SceneArguments,
     /// Folder for accuracy.json, accuracy.csv and accuracy.html; made if it is not there
-    #[arg(long, value_name = "DIR", default_value = ".")]
+    #[arg(short = 'o', long, value_name = "DIR", default_value = ".")]
     pub(super) out: PathBuf,
     /// A small picture, few steps and repeats
     #[arg(long)]
@@ -168,7 +168,7 @@ pub(super) struct OrdersArguments {
     #[command(flatten)]
     pub(super) scene: SceneArguments,
     /// Folder for orders.json, orders.csv, orders.html and orders.png; made if it is not there
-    #[arg(long, value_name = "DIR", default_value = ".")]
+    #[arg(short = 'o', long, value_name = "DIR", default_value = ".")]
     pub(super) out: PathBuf,
     /// Replace outputs that exist
     #[arg(long)]

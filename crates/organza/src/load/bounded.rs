@@ -60,8 +60,8 @@ impl BoundedExtinction {
         Some(density * self.extinction)
     }
 
-    pub(super) fn bytes(&self) -> usize {
-        size_of_val(self.most.as_slice())
+    pub(super) fn bytes(&self) -> u64 {
+        size_of_val(self.most.as_slice()) as u64
     }
 
     /// Middles of the cells that may have an extinction, and their sides.

@@ -1,8 +1,9 @@
 //! What reading and converting an object need to know of the scene around it.
 
+use super::files::{FileData, Files};
 use crate::scene::{Scene, SceneObject, Source};
 use crate::{Error, RenderOptions};
-use convert::read::{Loaded as FileData, ReadLimits};
+use convert::read::ReadLimits;
 use convert::{Orientation, SplatParams, SurfelParams, VolumeParams};
 use glam::DVec3;
 use splat_core::{Progress, Shading};
@@ -18,6 +19,7 @@ const LARGEST_SPACING: f64 = 1.7;
 pub(super) struct Context<'a> {
     pub(super) scene: &'a Scene,
     pub(super) options: &'a RenderOptions,
+    pub(super) files: &'a Files,
     pub(super) progress: &'a Progress,
     /// Rank of the object.
     pub(super) id: usize,
@@ -86,7 +88,7 @@ impl Context<'_> {
 
     pub(super) fn read(&self, path: &Path) -> Result<FileData, Error> {
         let limits = ReadLimits { max_bytes: self.options.max_memory, drop_invalid: self.options.drop_invalid };
-        convert::read::file(path, &limits).map_err(|e| Error::from_read(path, &e))
+        self.files.read(path, &limits)
     }
 
     /// Parameters of a volume: normals only where they are used.

@@ -2,14 +2,15 @@
 
 use super::bounded::{BoundedExtinction, Matter};
 use super::context::Context;
+use super::files::{FileData, Fitted, grid_bytes, mesh_bytes, points_bytes};
 use super::object::refuse;
 use super::slice::slice;
 use crate::Error;
 use crate::scene::{
-    CloudSource, DensitySource, ImplicitSource, MediumShape, RectangleSource, SceneObject, Source, VolumeSource,
+    CloudSource, DensitySource, ImplicitSource, LevelSetSource, MediumShape, RectangleSource, SceneObject, Source,
+    VolumeSource,
 };
 use crate::statistics::ObjectData;
-use convert::read::Loaded as FileData;
 use convert::{
     ClippedField, CloudShape, Density, DensityParams, Ellipsoid, ExpressionField, GridField, MeshParams, MpuParams,
     RawPoints, SharedField, SplatParams, SurfelParams, VolumeParams,
@@ -25,8 +26,8 @@ const LEVEL_SET_STEPS: f64 = 192.0;
 /// The data of one object with the parameters of its conversion.
 pub(super) enum Input<'a> {
     /// With the name of its source.
-    Mesh(String, Mesh, MeshParams),
-    Points(&'a Path, RawPoints, SurfelParams),
+    Mesh(String, Arc<Mesh>, MeshParams),
+    Points(&'a Path, Arc<RawPoints>, SurfelParams),
     Volume(Arc<Grid>, &'a TransferFunction, VolumeParams),
     /// The zero set of a field in a box.
     Surface(SharedField, [DVec3; 2], MeshParams),
@@ -39,14 +40,12 @@ pub(super) enum Input<'a> {
 impl Input<'_> {
     /// Bytes that it holds.
     pub(super) fn bytes(&self) -> u64 {
-        let bytes = match self {
+        match self {
             Self::Mesh(_, mesh, _) => mesh_bytes(mesh),
-            // Position, normal, colour, value, class and integers at most.
-            Self::Points(_, points, _) => 64 * points.len(),
-            Self::Volume(grid, ..) => size_of_val(grid.values.as_slice()),
+            Self::Points(_, points, _) => points_bytes(points),
+            Self::Volume(grid, ..) => grid_bytes(grid),
             _ => 0,
-        };
-        bytes as u64
+        }
     }
 
     /// Its attributes and limits.
@@ -110,14 +109,6 @@ impl Input<'_> {
     }
 }
 
-/// Bytes of a mesh.
-pub(super) fn mesh_bytes(mesh: &Mesh) -> usize {
-    size_of_val(mesh.position.as_slice())
-        + size_of_val(mesh.normal.as_slice())
-        + size_of_val(mesh.color.as_slice())
-        + size_of_val(mesh.triangles.as_slice())
-}
-
 /// Reads one object.
 pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Result<Input<'a>, Error> {
     let splat = context.splat_params(object);
@@ -126,20 +117,20 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
         Source::Mesh(path) => {
             let density = object.spacing.map_or(Density::Auto, Density::Spacing);
             let mut mesh = read_mesh(path, context)?;
-            if object.color.is_some() {
-                mesh.color.clear();
+            if object.color.is_some() && !mesh.color.is_empty() {
+                mesh = Mesh { color: Vec::new(), ..Mesh::clone(&mesh) }.into();
             }
             Input::Mesh(crate::printable(path).to_string(), mesh, MeshParams { splat, density, opacity })
         }
         Source::Points(path) => Input::Points(path, read_points(path, context)?, context.surfel_params(object, splat)),
         Source::Volume(VolumeSource { path, transfer }) => {
-            Input::Volume(read_grid(path, context)?.into(), transfer, context.volume_params(splat))
+            Input::Volume(read_grid(path, context)?, transfer, context.volume_params(splat))
         }
         Source::Implicit(ImplicitSource { expression, bounds, spacing }) => {
             surface(Arc::new(field(expression, object)?), *bounds, *spacing, object, splat, opacity)?
         }
         Source::Isosurface(source) => {
-            let grid: Arc<Grid> = read_grid(&source.path, context)?.into();
+            let grid = read_grid(&source.path, context)?;
             let step = shortest_step(&grid);
             let field = GridField::new(grid, source.interpolation, source.level, source.inside)
                 .map_err(|e| refuse_data(&source.path, &e))?;
@@ -147,20 +138,16 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
             surface(Arc::new(field), bounds, step, object, splat, opacity)?
         }
         Source::LevelSet(source) => {
-            let params =
-                MpuParams { object_name: object.name.clone(), tolerance: source.tolerance, ..MpuParams::default() };
-            let points = read_scattered(&source.path, context)?;
-            let (field, _) = convert::points_to_field(&points, &params).map_err(|e| refuse(&e))?;
-            let bounds = field.bounds();
+            let (field, bounds) = level_set(source, object, context)?;
             let step = (bounds[1] - bounds[0]).max_element() / LEVEL_SET_STEPS;
-            surface(Arc::new(field), bounds, step, object, splat, opacity)?
+            surface(field, bounds, step, object, splat, opacity)?
         }
         Source::Slice(source) => {
             let grid = read_grid(&source.path, context)?;
             let spacing = object.spacing.map_or_else(|| shortest_step(&grid), |s| s / splat.transform.scale);
-            let mesh = slice(grid.into(), source, spacing, &splat).map_err(|e| refuse(&e))?;
+            let mesh = slice(grid, source, spacing, &splat).map_err(|e| refuse(&e))?;
             let density = Density::Spacing(spacing * splat.transform.scale);
-            Input::Mesh(crate::printable(&source.path), mesh, MeshParams { splat, density, opacity })
+            Input::Mesh(crate::printable(&source.path), mesh.into(), MeshParams { splat, density, opacity })
         }
         Source::Density(DensitySource { expression, bounds, spacing, extinction }) => {
             let params = DensityParams {
@@ -203,41 +190,54 @@ fn refuse_data(path: &Path, error: &splat_core::Error) -> Error {
     Error::input(crate::printable(path), error.to_string(), "")
 }
 
+/// The field that scattered points lie on, and its bounds.
+fn level_set(source: &LevelSetSource, object: &SceneObject, context: &Context<'_>) -> Result<Fitted, Error> {
+    context.files.fitted(&source.path, source.tolerance, || {
+        let params =
+            MpuParams { object_name: object.name.clone(), tolerance: source.tolerance, ..MpuParams::default() };
+        let points = read_scattered(&source.path, context)?;
+        let (field, _) = convert::points_to_field(&points, &params).map_err(|e| refuse(&e))?;
+        let (bounds, bytes) = (field.bounds(), field.bytes());
+        Ok(((Arc::new(field) as SharedField, bounds), bytes))
+    })
+}
+
 /// Scattered points with normals where the file has some; of a mesh its vertices.
-fn read_scattered(path: &Path, context: &Context<'_>) -> Result<RawPoints, Error> {
+fn read_scattered(path: &Path, context: &Context<'_>) -> Result<Arc<RawPoints>, Error> {
     match context.read(path)? {
         FileData::Points(points) => Ok(points),
         FileData::Mesh(mesh) => {
             mesh.validate().map_err(|e| refuse_data(path, &e))?;
-            let normal = if mesh.normal.is_empty() { convert::vertex_normals(&mesh) } else { mesh.normal };
+            let normal = if mesh.normal.is_empty() { convert::vertex_normals(&mesh) } else { mesh.normal.clone() };
             // A vertex without a triangle has no normal, and says nothing of the surface.
             let known: Vec<usize> = (0..normal.len()).filter(|i| normal[*i] != glam::Vec3::ZERO).collect();
-            Ok(RawPoints {
+            let points = RawPoints {
                 origin: mesh.origin,
                 position: known.iter().map(|i| mesh.position[*i]).collect(),
                 normal: known.iter().map(|i| normal[*i]).collect(),
                 ..RawPoints::default()
-            })
+            };
+            Ok(points.into())
         }
         _ => Err(wrong_kind(path, "points", "use `volume = ` or `isosurface = ` for this file")),
     }
 }
 
-fn read_mesh(path: &Path, context: &Context<'_>) -> Result<Mesh, Error> {
+fn read_mesh(path: &Path, context: &Context<'_>) -> Result<Arc<Mesh>, Error> {
     match context.read(path)? {
         FileData::Mesh(mesh) => Ok(mesh),
         _ => Err(wrong_kind(path, "a mesh with faces", "use `points = ` or `volume = ` for this file")),
     }
 }
 
-fn read_points(path: &Path, context: &Context<'_>) -> Result<RawPoints, Error> {
+fn read_points(path: &Path, context: &Context<'_>) -> Result<Arc<RawPoints>, Error> {
     match context.read(path)? {
         FileData::Points(points) => Ok(points),
         _ => Err(wrong_kind(path, "points without faces", "use `mesh = ` or `volume = ` for this file")),
     }
 }
 
-fn read_grid(path: &Path, context: &Context<'_>) -> Result<Grid, Error> {
+fn read_grid(path: &Path, context: &Context<'_>) -> Result<Arc<Grid>, Error> {
     match context.read(path)? {
         FileData::Grid(grid) => Ok(grid),
         _ => Err(wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file")),

@@ -4,7 +4,8 @@
 
 use super::bounded::BoundedExtinction;
 use super::context::Context;
-use super::input::{Input, mesh_bytes, shortest_step};
+use super::files::{grid_bytes, mesh_bytes};
+use super::input::{Input, shortest_step};
 use super::object::{Prepared, as_it_is, procedural, refuse};
 use crate::Error;
 use crate::plan::ParticleSource;
@@ -108,13 +109,12 @@ impl Own {
 
     /// Bytes of the data.
     pub(crate) fn bytes(&self) -> u64 {
-        let bytes = match &self.body {
+        match &self.body {
             Body::Triangles(mesh) => mesh_bytes(mesh),
-            Body::Cells { grid, .. } => size_of_val(grid.values.as_slice()),
+            Body::Cells { grid, .. } => grid_bytes(grid),
             Body::Field(field) => field.bytes(),
             Body::Surface { .. } => 0,
-        };
-        bytes as u64
+        }
     }
 
     /// Opposite corners of a box in the world that holds the object.
@@ -162,7 +162,7 @@ fn data(
     };
     Ok(match &prepared.input {
         Input::Points(..) => None,
-        Input::Mesh(_, mesh, _) => triangles(mesh.clone(), prepared.prediction.splats),
+        Input::Mesh(_, mesh, _) => triangles(Mesh::clone(mesh), prepared.prediction.splats),
         Input::Rectangle(r, ..) => triangles(rectangle(r), prepared.prediction.splats),
         Input::Surface(field, bounds, params) => {
             let spacing = world_spacing(&params.density) / params.splat.transform.scale;

@@ -1,0 +1,99 @@
+//! What was read from files, shared by all objects and frames that are made from it: a file is read once.
+
+use crate::Error;
+use convert::read::{Loaded, ReadLimits};
+use convert::{RawPoints, SharedField};
+use glam::DVec3;
+use splat_core::{Grid, Mesh};
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// What a file holds.
+#[derive(Debug, Clone)]
+pub(super) enum FileData {
+    Mesh(Arc<Mesh>),
+    Points(Arc<RawPoints>),
+    Grid(Arc<Grid>),
+}
+
+/// The level set of scattered points, and its bounds.
+pub(super) type Fitted = (SharedField, [DVec3; 2]);
+
+/// The files of a scene that were read.
+#[derive(Default)]
+pub(crate) struct Files {
+    read: RefCell<Vec<(PathBuf, ReadLimits, FileData)>>,
+    /// Fits take longer than reading: with their tolerance and the bytes that they take.
+    fitted: RefCell<Vec<(PathBuf, f64, u64, Fitted)>>,
+}
+
+impl Files {
+    /// Reads a file unless it was read with the same limits.
+    pub(super) fn read(&self, path: &Path, limits: &ReadLimits) -> Result<FileData, Error> {
+        let known = |(p, l, data): &(PathBuf, ReadLimits, FileData)| (p == path && l == limits).then(|| data.clone());
+        if let Some(data) = self.read.borrow().iter().find_map(known) {
+            return Ok(data);
+        }
+        let data = match convert::read::file(path, limits).map_err(|e| Error::from_read(path, &e))? {
+            Loaded::Mesh(mesh) => FileData::Mesh(mesh.into()),
+            Loaded::Points(points) => FileData::Points(points.into()),
+            Loaded::Grid(grid) => FileData::Grid(grid.into()),
+            _ => return Err(Error::Internal("a kind of file that scenes do not know".into())),
+        };
+        self.read.borrow_mut().push((path.to_owned(), *limits, data.clone()));
+        Ok(data)
+    }
+
+    /// The level set of a file's points unless it was fitted with the same tolerance; `fit` also says how many bytes it takes.
+    pub(super) fn fitted(
+        &self,
+        path: &Path,
+        tolerance: f64,
+        fit: impl FnOnce() -> Result<(Fitted, u64), Error>,
+    ) -> Result<Fitted, Error> {
+        let known =
+            |(p, t, _, fitted): &(PathBuf, f64, u64, Fitted)| (p == path && *t == tolerance).then(|| fitted.clone());
+        if let Some(fitted) = self.fitted.borrow().iter().find_map(known) {
+            return Ok(fitted);
+        }
+        let (fitted, bytes) = fit()?;
+        self.fitted.borrow_mut().push((path.to_owned(), tolerance, bytes, fitted.clone()));
+        Ok(fitted)
+    }
+
+    /// Bytes that it holds.
+    pub(crate) fn bytes(&self) -> u64 {
+        let read: u64 = self.read.borrow().iter().map(|(_, _, data)| data.bytes()).sum();
+        read + self.fitted.borrow().iter().map(|(_, _, bytes, _)| bytes).sum::<u64>()
+    }
+}
+
+impl FileData {
+    fn bytes(&self) -> u64 {
+        match self {
+            Self::Mesh(mesh) => mesh_bytes(mesh),
+            Self::Points(points) => points_bytes(points),
+            Self::Grid(grid) => grid_bytes(grid),
+        }
+    }
+}
+
+/// Bytes of a mesh.
+pub(super) fn mesh_bytes(mesh: &Mesh) -> u64 {
+    let bytes = size_of_val(mesh.position.as_slice())
+        + size_of_val(mesh.normal.as_slice())
+        + size_of_val(mesh.color.as_slice())
+        + size_of_val(mesh.triangles.as_slice());
+    bytes as u64
+}
+
+/// Bytes of raw points: position, normal, colour, value, class and integers at most.
+pub(super) fn points_bytes(points: &RawPoints) -> u64 {
+    64 * points.len() as u64
+}
+
+/// Bytes of a volume.
+pub(super) fn grid_bytes(grid: &Grid) -> u64 {
+    size_of_val(grid.values.as_slice()) as u64
+}
