@@ -2,6 +2,7 @@
 
 use crate::{BufferId, Fault, Recording};
 use std::fmt::Debug;
+use std::time::Duration;
 
 /// What stands behind an adapter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,6 +23,12 @@ impl AdapterKind {
     /// Whether this is a GPU, and no program that plays one.
     pub fn is_gpu(self) -> bool {
         matches!(self, Self::Discrete | Self::Integrated | Self::Virtual)
+    }
+
+    /// How long a run may take until its device counts as hung. Recordings take a GPU less than a second, and drivers that
+    /// watch over their devices give up after some; a processor takes as long as the work does.
+    pub fn patience(self) -> Duration {
+        Duration::from_secs(if self.is_gpu() { 30 } else { 3600 })
     }
 }
 
@@ -207,7 +214,7 @@ pub enum DeviceError {
         /// Bytes asked for.
         bytes: u64,
     },
-    /// The device is lost: what it held is gone, another may be opened.
+    /// The device is lost, or did not come back in time: what it held is gone, another may be opened.
     #[error("the device was lost")]
     Lost,
     /// The driver refused.

@@ -7,7 +7,7 @@
 mod listen;
 mod wrapped;
 
-pub use wrapped::{Loss, Wrapped};
+pub use wrapped::{Interface, Loss, Wrapped};
 
 use splat_shaders::{Backend, Choice, DeviceError, Executor, Inputs, Ready, Recording, Run, Validation};
 use std::sync::Arc;

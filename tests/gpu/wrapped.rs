@@ -1,9 +1,11 @@
 //! A backend with its devices made worse: lost at a submission, short of memory, or with kernels that see small buffers
 //! alone.
+//!
+//! A device is lost by the driver: by `gpu-ash` it answers `VK_ERROR_DEVICE_LOST`, by `gpu-wgpu` the device is destroyed.
 
 use splat_shaders::{Adapter, Backend, Choice, DeviceError, Executor, Inputs, Ready, Recording, Run, Validation};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// When devices are lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,10 +18,19 @@ pub enum Loss {
     Always(u64),
 }
 
+/// Interfaces whose devices can be lost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Interface {
+    /// `gpu-ash`.
+    Ash,
+    /// `gpu-wgpu`.
+    Wgpu,
+}
+
 /// A backend whose devices fail.
 #[derive(Debug)]
 pub struct Wrapped {
-    inner: Arc<dyn Backend>,
+    interface: Interface,
     loss: Loss,
     binding_bytes: u64,
     memory_bytes: u64,
@@ -27,9 +38,9 @@ pub struct Wrapped {
 }
 
 impl Wrapped {
-    /// Devices of `inner` that are lost, and whose kernels see at most so many bytes of a buffer.
-    pub fn new(inner: Arc<dyn Backend>, loss: Loss, binding_bytes: u64) -> Self {
-        Self { inner, loss, binding_bytes, memory_bytes: u64::MAX, submissions: Arc::default() }
+    /// Devices that are lost, and whose kernels see at most so many bytes of a buffer.
+    pub fn new(interface: Interface, loss: Loss, binding_bytes: u64) -> Self {
+        Self { interface, loss, binding_bytes, memory_bytes: u64::MAX, submissions: Arc::default() }
     }
 
     /// The same with memory for one recording of so many bytes.
@@ -49,39 +60,61 @@ impl Wrapped {
 
 impl Backend for Wrapped {
     fn name(&self) -> &'static str {
-        self.inner.name()
+        match self.interface {
+            Interface::Ash => "ash",
+            Interface::Wgpu => "wgpu",
+        }
     }
 
     fn adapters(&self) -> Result<Vec<Adapter>, DeviceError> {
-        Ok(self.inner.adapters()?.iter().map(|adapter| self.describe(adapter)).collect())
+        let adapters = match self.interface {
+            Interface::Ash => gpu_ash::adapters()?,
+            Interface::Wgpu => gpu_wgpu::adapters()?,
+        };
+        Ok(adapters.iter().map(|adapter| self.describe(adapter)).collect())
     }
 
     fn open(&self, choice: &Choice, validation: Validation) -> Result<Box<dyn Executor>, DeviceError> {
-        let inner = self.inner.open(choice, validation)?;
+        let (inner, lose): (Box<dyn Executor>, Lose) = match self.interface {
+            Interface::Ash => {
+                let device = gpu_ash::Device::open(choice, validation)?;
+                let lose = Arc::new(device.loss());
+                (Box::new(device), lose)
+            }
+            Interface::Wgpu => {
+                let device = gpu_wgpu::Device::open(choice, validation)?;
+                let lose = Arc::new(device.loss());
+                (Box::new(device), lose)
+            }
+        };
         let adapter = self.describe(inner.adapter());
-        let fate = Fate { loss: self.loss, submissions: self.submissions.clone(), lost: Arc::default() };
+        let fate = Fate { loss: self.loss, submissions: self.submissions.clone(), lose };
         Ok(Box::new(WrappedDevice { inner, adapter, memory_bytes: self.memory_bytes, fate }))
     }
 }
+
+/// Loses a device.
+type Lose = Arc<dyn Fn() + Send + Sync>;
 
 /// What becomes of a device; once it is lost it stays so.
 #[derive(Clone)]
 struct Fate {
     loss: Loss,
     submissions: Arc<AtomicU64>,
-    lost: Arc<AtomicBool>,
+    lose: Lose,
 }
 
 impl Fate {
-    fn submit(&self) -> Result<(), DeviceError> {
+    fn submit(&self) {
         let count = self.submissions.fetch_add(1, Ordering::Relaxed) + 1;
         let strikes = match self.loss {
             Loss::Never => false,
             Loss::Once(at) => count == at,
             Loss::Always(at) => count >= at,
         };
-        self.lost.fetch_or(strikes, Ordering::Relaxed);
-        if self.lost.load(Ordering::Relaxed) { Err(DeviceError::Lost) } else { Ok(()) }
+        if strikes {
+            (self.lose)();
+        }
     }
 }
 
@@ -117,7 +150,7 @@ struct WrappedReady {
 
 impl Ready for WrappedReady {
     fn run(&mut self, inputs: &Inputs<'_>) -> Result<Run, DeviceError> {
-        self.fate.submit()?;
+        self.fate.submit();
         self.inner.run(inputs)
     }
 }

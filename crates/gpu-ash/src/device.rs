@@ -10,6 +10,7 @@ use ash::vk;
 use splat_shaders::{Adapter, Barrier, Choice, DeviceError, Inputs, Kernel, Recording, Run, Validation, barriers};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 /// The logical device and its one queue; everything made from it holds it.
 pub(crate) struct Logical {
@@ -32,6 +33,7 @@ pub struct Device {
     logical: Arc<Logical>,
     memory: Arc<Memory>,
     pipelines: HashMap<&'static str, Arc<Pipeline>>,
+    patience: Duration,
 }
 
 impl Device {
@@ -59,10 +61,26 @@ impl Device {
         let raw = unsafe { instance.raw.create_device(found.physical, &info, None) };
         let raw = raw.map_err(failure::of("vkCreateDevice"))?;
         // SAFETY: the device was made with one queue of this family.
-        let queue = Mutex::new(unsafe { raw.get_device_queue(found.family, 0) });
-        let logical = Arc::new(Logical { raw, instance, found, queue });
+        let queue = unsafe { raw.get_device_queue(found.family, 0) };
+        #[cfg(feature = "losing")]
+        let raw = crate::losing::watch(&raw, queue);
+        let patience = found.adapter.kind.patience();
+        let logical = Arc::new(Logical { raw, instance, found, queue: Mutex::new(queue) });
         let memory = Arc::new(Memory::new(&logical)?);
-        Ok(Self { logical, memory, pipelines: HashMap::new() })
+        Ok(Self { logical, memory, pipelines: HashMap::new(), patience })
+    }
+
+    /// Lets what is prepared from now on run that long until the device counts as hung, instead of
+    /// [`splat_shaders::AdapterKind::patience`].
+    pub fn set_patience(&mut self, patience: Duration) {
+        self.patience = patience;
+    }
+
+    /// What makes the driver say from then on that the device is lost.
+    #[cfg(feature = "losing")]
+    pub fn loss(&self) -> impl Fn() + Send + Sync + 'static {
+        let queue = *self.logical.queue.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        move || crate::losing::lose(queue)
     }
 
     /// The adapter that was opened.
@@ -112,6 +130,10 @@ impl Device {
 
     pub(crate) fn logical(&self) -> &Arc<Logical> {
         &self.logical
+    }
+
+    pub(crate) fn patience(&self) -> Duration {
+        self.patience
     }
 
     pub(crate) fn memory(&self) -> &Arc<Memory> {

@@ -33,6 +33,8 @@ mod commands;
 mod device;
 mod failure;
 mod instance;
+#[cfg(feature = "losing")]
+mod losing;
 mod memory;
 mod pipeline;
 mod prepared;

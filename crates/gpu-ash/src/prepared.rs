@@ -8,7 +8,9 @@ use crate::pipeline::Pipeline;
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 use splat_shaders::{Barrier, BufferId, DeviceError, Dispatch, Inputs, PassTime, Recording, Run, Step};
+use std::mem;
 use std::sync::{Arc, PoisonError};
+use std::time::Duration;
 
 /// A buffer that the processor sees, beside one of the recording.
 struct Beside {
@@ -32,6 +34,9 @@ pub struct Prepared {
     commands: vk::CommandBuffer,
     clock: vk::QueryPool,
     fence: vk::Fence,
+    patience: Duration,
+    /// Whether the device did not come back from a run, and may still be at it.
+    hung: bool,
     logical: Arc<Logical>,
 }
 
@@ -49,6 +54,8 @@ impl Prepared {
             commands: vk::CommandBuffer::null(),
             clock: vk::QueryPool::null(),
             fence: vk::Fence::null(),
+            patience: device.patience(),
+            hung: false,
             logical: device.logical().clone(),
         };
         made.take_memory(device, recording)?;
@@ -179,8 +186,12 @@ impl Prepared {
     /// bytes of the run before, zeros at first; so does what lies beyond a shorter one.
     ///
     /// # Errors
-    /// [`DeviceError::Input`] for bytes that do not fit, [`DeviceError::Lost`], [`DeviceError::Driver`].
+    /// [`DeviceError::Input`] for bytes that do not fit, [`DeviceError::Lost`] for a device that is lost or hangs,
+    /// [`DeviceError::Driver`].
     pub fn run(&mut self, inputs: &Inputs<'_>) -> Result<Run, DeviceError> {
+        if self.hung {
+            return Err(DeviceError::Lost);
+        }
         for (id, bytes) in inputs {
             for beside in self.uploads.iter_mut().filter(|b| b.id == *id) {
                 let found = bytes.len() as u64;
@@ -200,13 +211,21 @@ impl Prepared {
         let commands = [self.commands];
         let work = [vk::SubmitInfo::default().command_buffers(&commands)];
         let queue = self.logical.queue.lock().unwrap_or_else(PoisonError::into_inner);
-        // SAFETY: the fence is not in use: every run waits for its own, and a device that failed to is lost. The
-        // commands hold what they use, `self` holds that, and leaves only after the wait.
+        let patience = u64::try_from(self.patience.as_nanos()).unwrap_or(u64::MAX);
+        // SAFETY: the fence is not in use: every run waits for its own, and a device that failed to is lost or hangs, and
+        // then no run comes here. The commands hold what they use, `self` holds that, and leaves only after the wait, or
+        // never.
         unsafe {
             device.reset_fences(&[self.fence]).map_err(failure::of("vkResetFences"))?;
             device.queue_submit(*queue, &work, self.fence).map_err(failure::of("vkQueueSubmit"))?;
             drop(queue);
-            device.wait_for_fences(&[self.fence], true, u64::MAX).map_err(failure::of("vkWaitForFences"))
+            match device.wait_for_fences(&[self.fence], true, patience) {
+                Err(vk::Result::TIMEOUT) => {
+                    self.hung = true;
+                    Err(DeviceError::Lost)
+                }
+                waited => waited.map_err(failure::of("vkWaitForFences")),
+            }
         }
     }
 
@@ -238,6 +257,12 @@ fn dispatch_of(step: &Step) -> Option<&Dispatch> {
 
 impl Drop for Prepared {
     fn drop(&mut self) {
+        if self.hung {
+            // Nothing may end that the device might still use: this is the one leak, of a device that is given up.
+            mem::forget((mem::take(&mut self.uploads), mem::take(&mut self.reads), mem::take(&mut self.buffers)));
+            mem::forget((mem::take(&mut self.pipelines), self.logical.clone()));
+            return;
+        }
         let device = &self.logical.raw;
         // SAFETY: every run waits until the device is done or lost; null is allowed; each is destroyed once.
         unsafe {

@@ -6,6 +6,7 @@ use splat_shaders::{Access, Adapter, Choice, DeviceError, Inputs, Kernel, Record
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 /// What went wrong since somebody asked.
 #[derive(Debug, Default)]
@@ -46,6 +47,7 @@ pub struct Device {
     adapter: Adapter,
     faults: Arc<Faults>,
     pipelines: HashMap<&'static str, wgpu::ComputePipeline>,
+    patience: Duration,
 }
 
 impl Device {
@@ -74,7 +76,15 @@ impl Device {
         let (noted, lost) = (faults.clone(), faults.clone());
         raw.on_uncaptured_error(Arc::new(move |error: wgpu::Error| noted.note(&error)));
         raw.set_device_lost_callback(move |_, _| lost.lost.store(true, Ordering::Relaxed));
-        Ok(Self { raw, queue, adapter: adapters[at].clone(), faults, pipelines: HashMap::new() })
+        let adapter = adapters[at].clone();
+        let patience = adapter.kind.patience();
+        Ok(Self { raw, queue, adapter, faults, pipelines: HashMap::new(), patience })
+    }
+
+    /// Lets what is prepared from now on run that long until the device counts as hung, instead of
+    /// [`splat_shaders::AdapterKind::patience`].
+    pub fn set_patience(&mut self, patience: Duration) {
+        self.patience = patience;
     }
 
     /// The adapter that was opened.
@@ -93,7 +103,7 @@ impl Device {
         if let Some(b) = recording.buffers().iter().find(|b| b.bytes > had) {
             return Err(DeviceError::TooLarge { name: b.name, needed: b.bytes, had });
         }
-        let prepared = Prepared::new(self, recording);
+        let prepared = Prepared::new(self, recording, self.patience);
         self.faults.check("prepare", recording.bytes())?;
         Ok(prepared)
     }
@@ -106,10 +116,11 @@ impl Device {
         self.prepare(recording)?.run(inputs)
     }
 
-    /// Throws the device away, as a driver does that loses it: what runs on it from now on is [`DeviceError::Lost`].
+    /// What throws the device away, as a driver does that loses it: what runs on it from then on is [`DeviceError::Lost`].
     #[cfg(feature = "losing")]
-    pub fn lose(&self) {
-        self.raw.destroy();
+    pub fn loss(&self) -> impl Fn() + Send + Sync + 'static {
+        let raw = self.raw.clone();
+        move || raw.destroy()
     }
 
     pub(crate) fn parts(&self) -> (&wgpu::Device, &wgpu::Queue, &Arc<Faults>) {

@@ -3,6 +3,7 @@
 use crate::device::{Device, Faults};
 use splat_shaders::{BufferId, DeviceError, Dispatch, Groups, Inputs, PassTime, Recording, Run, Step};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// A buffer that the caller meets.
 struct Met {
@@ -43,10 +44,13 @@ pub struct Prepared {
     device: wgpu::Device,
     queue: wgpu::Queue,
     faults: Arc<Faults>,
+    patience: Duration,
+    /// Whether the device did not come back from a run, and may still be at it.
+    hung: bool,
 }
 
 impl Prepared {
-    pub(crate) fn new(device: &mut Device, recording: &Recording) -> Self {
+    pub(crate) fn new(device: &mut Device, recording: &Recording, patience: Duration) -> Self {
         let (raw, queue, faults) = device.parts();
         let (raw, queue, faults) = (raw.clone(), queue.clone(), faults.clone());
         use wgpu::BufferUsages as Usage;
@@ -81,15 +85,19 @@ impl Prepared {
         // Beyond this many queries, wgpu refuses a set.
         let clock =
             (clocked && 2 * dispatches <= wgpu::QUERY_SET_MAX_QUERIES).then(|| Clock::new(&raw, 2 * dispatches));
-        Self { uploads, given, buffers, actions, clock, device: raw, queue, faults }
+        Self { uploads, given, buffers, actions, clock, device: raw, queue, faults, patience, hung: false }
     }
 
     /// Uploads the inputs, runs the steps, waits, and gives what they read back. An input that is not given keeps its
     /// bytes of the run before, zeros at first; so does what lies beyond a shorter one. Uploads come before all else.
     ///
     /// # Errors
-    /// [`DeviceError::Input`] for bytes that do not fit, [`DeviceError::Lost`], [`DeviceError::Driver`].
+    /// [`DeviceError::Input`] for bytes that do not fit, [`DeviceError::Lost`] for a device that is lost or hangs,
+    /// [`DeviceError::Driver`].
     pub fn run(&mut self, inputs: &Inputs<'_>) -> Result<Run, DeviceError> {
+        if self.hung {
+            return Err(DeviceError::Lost);
+        }
         for (id, bytes) in inputs {
             for (met, given) in self.uploads.iter().zip(&mut self.given).filter(|(met, _)| met.id == *id) {
                 let found = bytes.len() as u64;
@@ -114,8 +122,14 @@ impl Prepared {
             .map(|(_, seen)| *seen)
             .chain(self.clock.iter().map(|c| &c.seen))
             .for_each(|b| b.map_async(wgpu::MapMode::Read, .., |_| ()));
-        let waited = self.device.poll(wgpu::PollType::wait_indefinitely());
+        let waited = self.device.poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(self.patience) });
         self.faults.check("run", 0)?;
+        if matches!(waited, Err(wgpu::PollError::Timeout)) {
+            self.hung = true;
+            // Who ends a device waits for it: this one is given up, and never ends.
+            std::mem::forget((self.device.clone(), self.queue.clone()));
+            return Err(DeviceError::Lost);
+        }
         waited.map_err(|e| DeviceError::Driver { call: "poll", why: e.to_string() })?;
         let bytes = reads.iter().map(|(_, seen)| taken(seen)).collect::<Result<Vec<_>, _>>()?;
         let reads = reads.iter().map(|(id, _)| *id).zip(bytes).collect();

@@ -1,6 +1,6 @@
 //! Whole pictures whose splats a device composites: the processor's, within a stated tolerance.
 
-use gpu_conformance::{Loss, Wrapped, adapter, backend};
+use gpu_conformance::{Interface, Loss, Wrapped, adapter, backend};
 use organza::{DeviceChoice, Progress, Render, RenderOptions, render, scene};
 use std::path::Path;
 use std::sync::Arc;
@@ -68,7 +68,7 @@ fn apart(alone: &Render, helped: &Render) -> f32 {
 
 /// A device made worse, and its count of submissions.
 fn worse(loss: Loss, binding_bytes: u64) -> (Arc<Wrapped>, DeviceChoice) {
-    let backend = Arc::new(Wrapped::new(gpu_ash::backend(), loss, binding_bytes));
+    let backend = Arc::new(Wrapped::new(Interface::Ash, loss, binding_bytes));
     let choice = DeviceChoice { backends: vec![backend.clone()], choice: adapter(), or_processor: false };
     (backend, choice)
 }

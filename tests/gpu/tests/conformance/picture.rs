@@ -1,6 +1,6 @@
 //! A whole picture with a device that helps: the processor's, bit for bit.
 
-use gpu_conformance::{Loss, Wrapped, adapter};
+use gpu_conformance::{Interface, Loss, Wrapped, adapter};
 use organza::{Agreement, DeviceChoice, Progress, Render, RenderOptions, render, scene};
 use std::sync::Arc;
 
@@ -25,7 +25,7 @@ const SCENE: &str = r#"
 
 /// A device that is lost, and its count of submissions.
 fn losing(loss: Loss, binding_bytes: u64) -> (Arc<Wrapped>, DeviceChoice) {
-    chosen(Wrapped::new(gpu_ash::backend(), loss, binding_bytes))
+    chosen(Wrapped::new(Interface::Ash, loss, binding_bytes))
 }
 
 fn chosen(backend: Wrapped) -> (Arc<Wrapped>, DeviceChoice) {
@@ -94,18 +94,20 @@ fn a_driver_that_plays_a_gpu_is_never_taken_silently() {
 fn killing_the_device_in_the_middle_of_a_render_still_yields_the_picture() {
     let alone = picture(true, None);
     // The trial is the first submission, the shadow map the second, the order the third.
-    for (loss, submissions, backend, said) in [
-        (Loss::Once(2), 4, "ash, ", "was lost and opened once more"),
-        (Loss::Once(3), 4, "ash, ", "was lost and opened once more"),
-        (Loss::Always(2), 3, "cpu", "was lost; the processor goes on"),
-        (Loss::Always(3), 4, "ash, ", "was lost; the processor goes on"),
-    ] {
-        let (device, choice) = losing(loss, u64::MAX);
-        let helped = picture(true, Some(choice));
-        assert_eq!(alone.layers, helped.layers, "{loss:?}");
-        assert_eq!(device.submissions(), submissions, "{loss:?}");
-        assert!(helped.backend.starts_with(backend), "{loss:?}: {}", helped.backend);
-        assert!(helped.warnings.iter().any(|w| w.contains(said)), "{loss:?}: {:?}", helped.warnings);
+    for (interface, name) in [(Interface::Ash, "ash, "), (Interface::Wgpu, "wgpu, ")] {
+        for (loss, submissions, backend, said) in [
+            (Loss::Once(2), 4, name, "was lost and opened once more"),
+            (Loss::Once(3), 4, name, "was lost and opened once more"),
+            (Loss::Always(2), 3, "cpu", "was lost; the processor goes on"),
+            (Loss::Always(3), 4, name, "was lost; the processor goes on"),
+        ] {
+            let (device, choice) = chosen(Wrapped::new(interface, loss, u64::MAX));
+            let helped = picture(true, Some(choice));
+            assert_eq!(alone.layers, helped.layers, "{interface:?} {loss:?}");
+            assert_eq!(device.submissions(), submissions, "{interface:?} {loss:?}");
+            assert!(helped.backend.starts_with(backend), "{interface:?} {loss:?}: {}", helped.backend);
+            assert!(helped.warnings.iter().any(|w| w.contains(said)), "{loss:?}: {:?}", helped.warnings);
+        }
     }
 }
 
@@ -249,7 +251,7 @@ fn a_device_with_small_buffers_sorts_in_parts() {
     assert!(alone.layers == picture(true, Some(choice)).layers);
     assert_eq!(device.submissions(), 3 + lists + 1);
     // As many parts where the memory is too small for all: 30 bytes a splat.
-    let (device, choice) = chosen(Wrapped::new(gpu_ash::backend(), Loss::Never, u64::MAX).with_memory(200_000));
+    let (device, choice) = chosen(Wrapped::new(Interface::Ash, Loss::Never, u64::MAX).with_memory(200_000));
     let short = picture(true, Some(choice));
     assert!(alone.layers == short.layers && short.warnings.len() == 1, "{:?}", short.warnings);
     assert_eq!(device.submissions(), 1 + 2);
