@@ -337,3 +337,27 @@ fn knobs_that_cannot_matter_are_left_alone() {
     assert_eq!(all.skipped.len(), 1);
     assert_eq!(all.knobs.len(), 9);
 }
+
+#[test]
+fn the_samplers_of_implicit_surfaces_are_knobs_of_particles() {
+    let facts = Facts { slice_thickness: Some(0.1), cells: None };
+    let names = |sweep: &Sweep| sweep.knobs.iter().map(|k| k.name).collect::<Vec<_>>();
+    // Media alone have none.
+    let sweep = particles(&scene(), &facts, &OPTIONS).unwrap();
+    assert_eq!(names(&sweep), ["repeat level"]);
+    assert!(sweep.skipped.iter().any(|s| s.knob == "surface sampler" && s.reason.contains("implicit")));
+
+    let ball = "implicit = { expression = \"x^2 + y^2 + z^2 - 0.25\", box = [[-1, -1, -1], [1, 1, 1]], spacing = 0.1 }";
+    let text = format!("{SCENE}[[object]]\nname = \"ball\"\n{ball}\nopacity = 0.5\n");
+    let with_ball = scene::parse("s.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
+    let quick = particles(&with_ball, &facts, &Options { quick: true, ..OPTIONS }).unwrap();
+    assert_eq!(names(&quick), ["repeat level", "surface sampler"]);
+    let sweep = particles(&with_ball, &facts, &Options { quick: false, ..OPTIONS }).unwrap();
+    assert_eq!(names(&sweep), ["repeat level", "surface sampler", "Brownian step"]);
+    let turned = |knob: &Knob| -> Vec<scene::SurfaceSampler> {
+        knob.steps.iter().map(|s| sweep.turned(knob, s).scene.render.particles.surface_sampler).collect()
+    };
+    let paper = scene::SurfaceSampler::Brownian { step: 0.01 };
+    assert_eq!(turned(&sweep.knobs[1]), [scene::SurfaceSampler::Lines, scene::SurfaceSampler::Triangles, paper]);
+    assert_eq!(turned(&sweep.knobs[2]).last(), Some(&paper), "from coarse to fine");
+}

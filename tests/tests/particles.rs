@@ -189,6 +189,23 @@ fn particles_from_the_data_differ_from_points_by_noise() {
 }
 
 #[test]
+fn every_sampler_of_an_implicit_surface_differs_from_points_by_noise() {
+    let object = "material = 'a'\nimplicit = { expression = 'x^2 + y^2 + z^2 - 0.36', \
+                  box = [[-1, -1, -1], [1, 1, 1]], spacing = 0.02 }\n";
+    // Lines are what it is sampled by above.
+    let mut found = Vec::new();
+    for by in ["triangles", "brownian"] {
+        let folder = tempfile::tempdir().unwrap();
+        let text = own(object, "") + &format!("[render.particles]\nsurface_sampler = '{by}'\n");
+        let (n, square, mean) = against_points(folder.path(), &text);
+        println!("{by}: {n} pixels, mean z² {square:.2}, mean difference {mean:.5}");
+        assert!(square < 2.0 && mean.abs() < 4e-3, "{by}: {square} {mean}");
+        found.push(mean.to_bits());
+    }
+    assert_ne!(found[0], found[1], "each has particles of its own");
+}
+
+#[test]
 fn x7_what_is_sampled_from_its_data_becomes_splats_only_for_a_shadow() {
     let folder = data();
     let passes = |text: &str| -> (Vec<String>, serde_json::Value) {

@@ -203,7 +203,7 @@ fn particles(
 ) -> Result<Result<Ordered, String>, Error> {
     let mut scene = scene.clone();
     scene.render.technique = Technique::Particles;
-    scene.render.particles = ParticlesSettings { repeat_level: SETS, target_error: None };
+    scene.render.particles = ParticlesSettings { repeat_level: SETS, target_error: None, ..scene.render.particles };
     let plan = match plan_loaded(&scene, loaded, options) {
         Err(e @ (Error::Input { .. } | Error::Limit { .. } | Error::TooLarge { .. })) => return Ok(Err(e.to_string())),
         planned => planned?.0,

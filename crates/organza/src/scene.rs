@@ -34,6 +34,6 @@ pub use load::{LoadOptions, MAX_SCENE_BYTES, MAX_SCENE_DEPTH, load, parse, schem
 pub use model::{
     CloudSource, DensitySource, ImplicitSource, IsosurfaceSource, LevelSetSource, MediumShape, ParticlesSettings,
     PointsSettings, RectangleSource, RenderSettings, Scene, SceneMaterial, SceneObject, ShadowMapping, ShadowSettings,
-    SliceSource, Source, Technique, VolumeSource,
+    SliceSource, Source, SurfaceSampler, Technique, VolumeSource,
 };
 pub use overrides::Override;

@@ -1,6 +1,7 @@
 //! Statistics of a loaded scene, from which the plan is made.
 
 use crate::plan::{PlannedSampler, samplers};
+use crate::scene::SurfaceSampler;
 use splat_core::{Cloud, FootprintStack, Light, Material, Object, Shading, SplatKind};
 
 /// What the planner knows of one light.
@@ -25,6 +26,8 @@ pub enum ObjectData {
         /// bound; infinite without a bound, 0 where a first look finds no
         /// surface, and for measured data, whose fields have tight bounds.
         looseness: f64,
+        /// What the scene asks for.
+        by: SurfaceSampler,
     },
     /// Extinction on a lattice.
     Volume,

@@ -1,7 +1,11 @@
-//! The knob of the technique `particles` (Tanaka 2012): the repeat level, how many sets are averaged.
+//! Knobs of the technique `particles` (Tanaka 2012): the repeat level, how many sets are averaged; how implicit surfaces are
+//! sampled, and the step of the paper's Brownian motion on them.
 
-use super::{Facts, Knob, Options, Request, Step, Sweep, Theory};
-use crate::scene::{LayerChoice, Scene, Technique};
+use super::{Facts, Knob, Options, Request, Skipped, Step, Sweep, Theory};
+use crate::scene::{LayerChoice, Scene, Source, SurfaceSampler, Technique};
+
+/// Steps of the Brownian motion, over the width of the surface; the paper's is 0.01.
+const BROWNIAN_STEPS: [f64; 4] = [0.08, 0.04, 0.02, 0.01];
 
 /// Knobs of `particles` in this scene, or why there are none.
 ///
@@ -23,12 +27,33 @@ pub fn particles(scene: &Scene, facts: &Facts, options: &Options) -> Result<Swee
         scene.render.particles.repeat_level = finest;
         scene.render.particles.target_error = None;
     }
+    let mut knobs = vec![repeat_level(levels)];
+    let mut skipped = Vec::new();
+    for (name, knob) in
+        [("surface sampler", surface_sampler(&scene)), ("Brownian step", brownian_step(&scene, options.quick))]
+    {
+        match knob {
+            Ok(knob) => knobs.push(knob),
+            Err(reason) => skipped.push(Skipped { knob: name, reason }),
+        }
+    }
+    Ok(Sweep {
+        technique: "particles",
+        base: Request { scene, oversample: 1 },
+        base_label: if cut { format!("the scene's own, but {finest} of {own} sets") } else { "the scene's own".into() },
+        knobs,
+        skipped,
+        joint_levels: 0,
+    })
+}
+
+fn repeat_level(levels: &[u32]) -> Knob {
     let step = |level: &u32| Step {
         label: format!("{level} sets"),
         size: Some(f64::from(*level).recip()),
         value: f64::from(*level),
     };
-    let knob = Knob {
+    Knob {
         name: "repeat level",
         size_meaning: "1 / repeat level",
         set: |request, value| {
@@ -40,13 +65,61 @@ pub fn particles(scene: &Scene, facts: &Facts, options: &Options) -> Result<Swee
         end_is_exact: true,
         theory: Some(Theory { low: 0.47, high: 0.53, why: "the mean of L independent sets spreads as L^-1/2" }),
         joint: false,
-    };
-    Ok(Sweep {
-        technique: "particles",
-        base: Request { scene, oversample: 1 },
-        base_label: if cut { format!("the scene's own, but {finest} of {own} sets") } else { "the scene's own".into() },
-        knobs: vec![knob],
-        skipped: Vec::new(),
-        joint_levels: 0,
+    }
+}
+
+/// Whether particles of some surface come from a field.
+fn has_surface(scene: &Scene) -> bool {
+    scene.objects.iter().any(|o| {
+        let field = matches!(o.source, Source::Implicit(_) | Source::Isosurface(_) | Source::LevelSet(_));
+        field && o.visible && o.opacity.unwrap_or(scene.materials[o.material].opacity) < 1.0
+    })
+}
+
+const NO_SURFACE: &str = "no translucent surface is implicit";
+
+/// The samplers against each other: their pictures have one expectation, that of the surface.
+fn surface_sampler(scene: &Scene) -> Result<Knob, String> {
+    if !has_surface(scene) {
+        return Err(NO_SURFACE.into());
+    }
+    let step = |(value, label): (f64, &str)| Step { label: label.into(), size: None, value };
+    Ok(Knob {
+        name: "surface sampler",
+        size_meaning: "",
+        set: |request, value| {
+            request.scene.render.particles.surface_sampler = match value {
+                0.0 => SurfaceSampler::Lines,
+                1.0 => SurfaceSampler::Triangles,
+                _ => SurfaceSampler::Brownian { step: BROWNIAN_STEPS[3] },
+            };
+        },
+        steps: [(0.0, "lines"), (1.0, "triangles"), (2.0, "Brownian motion")].map(step).into(),
+        ends: Vec::new(),
+        end_is_exact: true,
+        theory: None,
+        joint: false,
+    })
+}
+
+fn brownian_step(scene: &Scene, quick: bool) -> Result<Knob, String> {
+    if quick {
+        return Err("left out by --quick".into());
+    }
+    if !has_surface(scene) {
+        return Err(NO_SURFACE.into());
+    }
+    let step = |share: &f64| Step { label: format!("{share} of the width"), size: None, value: *share };
+    Ok(Knob {
+        name: "Brownian step",
+        size_meaning: "",
+        set: |request, value| {
+            request.scene.render.particles.surface_sampler = SurfaceSampler::Brownian { step: value };
+        },
+        steps: BROWNIAN_STEPS.iter().map(step).collect(),
+        ends: Vec::new(),
+        end_is_exact: true,
+        theory: None,
+        joint: false,
     })
 }

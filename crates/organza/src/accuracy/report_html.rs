@@ -176,6 +176,7 @@ pub fn verdict(study: &Study, curve: &Curve) -> String {
             let interval = fit.half_width.map_or_else(|| " (two points: no interval)".into(), |h| format!(" ± {h:.2}"));
             format!("Order {:.2}{interval}, from {drawn} points", fit.order)
         }
+        None if curve.points.iter().all(|p| p.size.is_none()) => "A choice: it has no order".to_owned(),
         None => format!("No order: {drawn} points can be drawn"),
     };
     if let (Some(t), Some(fit)) = (theory, curve.settled.fit) {

@@ -8,7 +8,7 @@ use super::slice::slice;
 use crate::Error;
 use crate::scene::{
     CloudSource, DensitySource, ImplicitSource, LevelSetSource, MediumShape, RectangleSource, SceneObject, Source,
-    VolumeSource,
+    SurfaceSampler, VolumeSource,
 };
 use crate::statistics::ObjectData;
 use convert::{
@@ -98,11 +98,11 @@ impl Input<'_> {
     }
 
     /// What it is made of, as far as the data and its field tell.
-    pub(super) fn data(&self, bounded: bool, looseness: f64) -> ObjectData {
+    pub(super) fn data(&self, bounded: bool, looseness: f64, by: SurfaceSampler) -> ObjectData {
         match self {
             Self::Points(..) => ObjectData::Points,
             Self::Mesh(..) | Self::Rectangle(..) => ObjectData::Triangles,
-            Self::Surface(..) => ObjectData::Surface { looseness },
+            Self::Surface(..) => ObjectData::Surface { looseness, by },
             Self::Volume(..) | Self::Procedural(..) => ObjectData::Volume,
             Self::Density(..) | Self::Medium(..) => ObjectData::Density { bounded },
         }

@@ -97,7 +97,7 @@ impl Prepared<'_> {
         let extinct = material.extinction_rgb.iter().any(|e| *e > 0.0) || self.input.opacity() == Some(1.0);
         ObjectStatistics {
             name: object.name.clone(),
-            data: self.input.data(self.bounded.is_some(), looseness),
+            data: self.input.data(self.bounded.is_some(), looseness, context.scene.render.particles.surface_sampler),
             opaque: self.input.opacity() == Some(1.0),
             by_gradient: self.input.by_gradient(),
             casts: object.casts_shadow && extinct,

@@ -9,7 +9,7 @@ use super::input::{Input, shortest_step};
 use super::object::{Prepared, as_it_is, procedural, refuse};
 use crate::Error;
 use crate::plan::ParticleSource;
-use crate::scene::RectangleSource;
+use crate::scene::{RectangleSource, SurfaceSampler};
 use convert::{DensityParams, SharedField, SplatParams};
 use glam::DVec3;
 use splat_core::{Footprint, Grid, Mesh, Similarity, SplatKind, TransferFunction, optics};
@@ -52,6 +52,8 @@ pub(crate) enum Body {
         inside: Inside,
         /// Distance of samples that were asked for, object units.
         spacing: f64,
+        /// Step of a Brownian motion over the longest side of the bounds; without one, lines find particles.
+        step: Option<f64>,
     },
     /// Triangles with normals.
     Triangles(Mesh),
@@ -172,7 +174,11 @@ fn data(
             let domain = field.clone();
             let inside: Inside = Box::new(move |p| domain.in_domain(p));
             let bounds = prepared.search.as_ref().map_or(*bounds, |s| s.bounds);
-            Some((Body::Surface { field: field.clone(), inside, spacing }, bounds, spacing))
+            let step = match context.scene.render.particles.surface_sampler {
+                SurfaceSampler::Brownian { step } => Some(step),
+                _ => None,
+            };
+            Some((Body::Surface { field: field.clone(), inside, spacing, step }, bounds, spacing))
         }
         Input::Volume(grid, transfer, params) => cells(grid.clone(), (*transfer).clone(), params.normals),
         Input::Procedural(shape, spacing, params) => {

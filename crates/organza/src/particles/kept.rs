@@ -118,7 +118,7 @@ impl Kept {
 fn made_from(object: &SceneObject, scene: &Scene, cross_section: f64) -> String {
     let (scale, material) = (object.transform.scale, &scene.materials[object.material]);
     let object = SceneObject { transform: Similarity::default(), visible: true, ..object.clone() };
-    let settings = (scene.render.seed, scene.render.particles.repeat_level, cross_section, scale);
+    let settings = (scene.render.seed, scene.render.particles, cross_section, scale);
     // Where nothing is lit and no layer shows them, volumes have no normals.
     format!("{object:?} {material:?} {settings:?} {:?} {}", scene.render.layers, scene.lights.is_empty())
 }

@@ -11,8 +11,8 @@ use crate::load::own::{Body, Own};
 use crate::points::Drawing;
 use glam::DVec3;
 use pbsr::{
-    Appearance, Density, FieldVolumeSampler, GridSampler, ImplicitSurface, KeptSets, LineReport, LineSampler,
-    MeshSampler, Object, Sampler, SplatParams, SplatSampler, SurfaceParams, VolumeParams,
+    Appearance, BrownianParams, BrownianSampler, Density, FieldVolumeSampler, GridSampler, ImplicitSurface, KeptSets,
+    LineReport, LineSampler, MeshSampler, Object, Sampler, SplatParams, SplatSampler, SurfaceParams, VolumeParams,
 };
 use splat_core::{Camera, Cloud, Similarity, SplatKind, rng};
 use std::collections::BTreeMap;
@@ -218,11 +218,16 @@ impl Source<'_> {
             Data::Own(own) => own,
         };
         Ok(match &own.body {
-            Body::Surface { field, inside, spacing } => {
+            Body::Surface { field, inside, spacing, step } => {
                 let [min, max] = own.bounds;
                 let surface = ImplicitSurface { field: field.as_ref(), level: 0.0, min, max, inside: Some(inside) };
-                let cells = 0.5 * (max - min).max_element() / spacing;
-                let cells = cells.clamp(*LINE_CELLS.start(), *LINE_CELLS.end()).ceil() as u32;
+                let width = (max - min).max_element();
+                let cells = (0.5 * width / spacing).clamp(*LINE_CELLS.start(), *LINE_CELLS.end()).ceil() as u32;
+                if let Some(step) = step {
+                    let paper = BrownianParams::for_width(width);
+                    let walk = BrownianParams { step: step * width, resolution: cells, ..paper };
+                    return Ok(Box::new(BrownianSampler::new(&surface, &walk, &self.surface(own))?));
+                }
                 let sampler = LineSampler::new(&surface, cells, &self.surface(own), None)?;
                 warnings.extend(self.doubts(sampler.report()));
                 Box::new(sampler)

@@ -3,6 +3,7 @@
 //! An object is sampled from its own data wherever a sampler knows them. It becomes splats only where splats are drawn
 //! (opaque surfaces), where they are the data (raw points), or where a shadow map may need them.
 
+use crate::scene::SurfaceSampler;
 use crate::statistics::{LightStatistics, ObjectData, ObjectStatistics};
 
 /// Looseness of a field's bound above which triangles are faster than lines.
@@ -15,6 +16,8 @@ pub enum ParticleSource {
     Opaque,
     /// Random lines through a field.
     Lines,
+    /// A Brownian motion on the zero set of a field.
+    Brownian,
     /// Triangles.
     Triangles,
     /// Cells of a volume.
@@ -31,6 +34,7 @@ impl ParticleSource {
         match self {
             Self::Opaque => "none",
             Self::Lines => "lines",
+            Self::Brownian => "brownian",
             Self::Triangles => "triangles",
             Self::Cells => "cells",
             Self::Field => "field",
@@ -82,12 +86,7 @@ fn source(object: &ObjectStatistics) -> (ParticleSource, &'static str) {
     match object.data {
         ObjectData::Points => (ParticleSource::Splats, "there is nothing between raw points"),
         ObjectData::Triangles => (ParticleSource::Triangles, "a uniform place on a triangle is exact"),
-        ObjectData::Surface { looseness } if looseness > LOOSEST => {
-            (ParticleSource::Triangles, "its field has a loose bound, so that lines would search long: it is meshed")
-        }
-        ObjectData::Surface { .. } => {
-            (ParticleSource::Lines, "random lines meet a surface uniformly, without a mesh of it")
-        }
+        ObjectData::Surface { looseness, by } => surface(looseness, by),
         ObjectData::Volume => (ParticleSource::Cells, "extinction is known on a lattice"),
         ObjectData::Density { bounded: false } => {
             (ParticleSource::Cells, "the expression has no bound, so it is sampled on a lattice")
@@ -96,6 +95,18 @@ fn source(object: &ObjectStatistics) -> (ParticleSource, &'static str) {
             (ParticleSource::Cells, "it is shaded by its gradient, which a lattice gives")
         }
         ObjectData::Density { .. } => (ParticleSource::Field, "extinction has a bound wherever it is asked for"),
+    }
+}
+
+fn surface(looseness: f64, by: SurfaceSampler) -> (ParticleSource, &'static str) {
+    match by {
+        SurfaceSampler::Auto if looseness > LOOSEST => {
+            (ParticleSource::Triangles, "its field has a loose bound, so that lines would search long: it is meshed")
+        }
+        SurfaceSampler::Auto => (ParticleSource::Lines, "random lines meet a surface uniformly, without a mesh of it"),
+        SurfaceSampler::Lines => (ParticleSource::Lines, "the scene asks for it"),
+        SurfaceSampler::Triangles => (ParticleSource::Triangles, "the scene asks for it"),
+        SurfaceSampler::Brownian { .. } => (ParticleSource::Brownian, "the scene asks for it"),
     }
 }
 
@@ -122,17 +133,19 @@ mod tests {
         let of = |o: ObjectStatistics| samplers(&[o], &[])[0].source;
         assert_eq!(of(object(ObjectData::Points)), ParticleSource::Splats);
         assert_eq!(of(object(ObjectData::Triangles)), ParticleSource::Triangles);
-        assert_eq!(of(object(ObjectData::Surface { looseness: 2.6 })), ParticleSource::Lines);
-        assert_eq!(of(object(ObjectData::Surface { looseness: f64::INFINITY })), ParticleSource::Triangles);
+        let surface = |looseness, by| object(ObjectData::Surface { looseness, by });
+        let auto = |looseness| surface(looseness, SurfaceSampler::Auto);
+        assert_eq!(of(auto(2.6)), ParticleSource::Lines);
+        assert_eq!(of(auto(f64::INFINITY)), ParticleSource::Triangles);
+        assert_eq!(of(surface(f64::INFINITY, SurfaceSampler::Lines)), ParticleSource::Lines);
+        assert_eq!(of(surface(2.6, SurfaceSampler::Triangles)), ParticleSource::Triangles);
+        assert_eq!(of(surface(2.6, SurfaceSampler::Brownian { step: 0.01 })), ParticleSource::Brownian);
         assert_eq!(of(object(ObjectData::Volume)), ParticleSource::Cells);
         assert_eq!(of(object(ObjectData::Density { bounded: true })), ParticleSource::Field);
         assert_eq!(of(object(ObjectData::Density { bounded: false })), ParticleSource::Cells);
         let lit = ObjectStatistics { by_gradient: true, ..object(ObjectData::Density { bounded: true }) };
         assert_eq!(of(lit), ParticleSource::Cells);
-        assert_eq!(
-            of(ObjectStatistics { opaque: true, ..object(ObjectData::Surface { looseness: 2.6 }) }),
-            ParticleSource::Opaque
-        );
+        assert_eq!(of(ObjectStatistics { opaque: true, ..auto(2.6) }), ParticleSource::Opaque);
     }
 
     #[test]

@@ -2,10 +2,12 @@
 
 use super::check::{At, LARGEST, SMALLEST};
 use super::de::suggest;
-use super::raw::{Auto, RawAccumulation, RawDirection, RawMapping, RawParticles, RawPoints, RawRender, RawShadow};
+use super::raw::{
+    Auto, RawAccumulation, RawDirection, RawMapping, RawParticles, RawPoints, RawRender, RawShadow, RawSurfaceSampler,
+};
 use super::{
     LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, RenderSettings, ShadowMapping, ShadowSettings,
-    Technique,
+    SurfaceSampler, Technique,
 };
 use crate::Error;
 use splat_core::Direction;
@@ -72,6 +74,22 @@ fn check_particles(at: &At<'_>, raw: &RawParticles) -> Result<ParticlesSettings,
     Ok(ParticlesSettings {
         repeat_level: at.whole("repeat_level", raw.repeat_level.unwrap_or(100), 2..=1_000_000)?,
         target_error: raw.target_error.map(|e| at.number("target_error", e, SMALLEST..=LARGEST)).transpose()?,
+        surface_sampler: check_surface_sampler(at, raw)?,
+    })
+}
+
+fn check_surface_sampler(at: &At<'_>, raw: &RawParticles) -> Result<SurfaceSampler, Error> {
+    let step = raw.brownian_step.map(|s| at.number("brownian_step", s, 1e-4..=0.1)).transpose()?;
+    if step.is_some() && raw.surface_sampler != RawSurfaceSampler::Brownian {
+        let message = "`brownian_step`: the surface sampler is not \"brownian\"";
+        return Err(at.key("brownian_step").error(message, "set surface_sampler = \"brownian\""));
+    }
+    Ok(match raw.surface_sampler {
+        RawSurfaceSampler::Auto => SurfaceSampler::Auto,
+        RawSurfaceSampler::Lines => SurfaceSampler::Lines,
+        RawSurfaceSampler::Triangles => SurfaceSampler::Triangles,
+        // The paper's for a surface of width 1.
+        RawSurfaceSampler::Brownian => SurfaceSampler::Brownian { step: step.unwrap_or(0.01) },
     })
 }
 

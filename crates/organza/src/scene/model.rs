@@ -308,6 +308,24 @@ pub struct ParticlesSettings {
     pub repeat_level: u32,
     /// Root mean square of the pixels' standard errors of luminance at which enough sets are averaged, > 0.
     pub target_error: Option<f64>,
+    /// How implicit surfaces are sampled.
+    pub surface_sampler: SurfaceSampler,
+}
+
+/// How the particles of implicit surfaces are found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SurfaceSampler {
+    /// By lines, or on triangles where the field's bounds are too loose for lines to be fast.
+    Auto,
+    /// Where random lines meet the surface.
+    Lines,
+    /// On the triangles of a mesh, as fine as the object's splats.
+    Triangles,
+    /// Places of a Brownian motion on the surface (Tanaka 2012, section 4).
+    Brownian {
+        /// √(2Δt), over the longest side of the surface's box, > 0.
+        step: f64,
+    },
 }
 
 /// Settings of the `points` technique.

@@ -256,6 +256,22 @@ pub(super) struct RawParticles {
     pub(super) repeat_level: Option<u32>,
     /// Standard error of luminance, root mean square over the pixels, at which enough sets are averaged; default none.
     pub(super) target_error: Option<f64>,
+    /// How implicit surfaces are sampled: "auto" (default), "lines", "triangles" or "brownian".
+    pub(super) surface_sampler: RawSurfaceSampler,
+    /// Step of "brownian" over the longest side of the surface's box, 0.0001 to 0.1; default 0.01.
+    pub(super) brownian_step: Option<f64>,
+}
+
+/// How implicit surfaces are sampled.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(rename = "SurfaceSampler")]
+pub(super) enum RawSurfaceSampler {
+    #[default]
+    Auto,
+    Lines,
+    Triangles,
+    Brownian,
 }
 
 /// Settings of the `points` technique.
