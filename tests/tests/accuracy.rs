@@ -2,11 +2,11 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza::accuracy::{
-    Absent, Facts, Frame, Knob, Options, Report, Request, Step, Study, Sweep, Theory, Truth, least_seconds, particles,
-    points, random_study, study, verdict,
+    Absent, Facts, Frame, Knob, Options, Renderer, Report, Request, Step, Study, Sweep, Theory, Truth, least_seconds,
+    particles, points, random_study, study, verdict,
 };
 use organza::scene::{self, Scene};
-use organza::{Error, Progress};
+use organza::{Error, Progress, RenderOptions};
 use organza_tests::organza;
 use reference::metrics::Image;
 use serde_json::Value;
@@ -360,4 +360,10 @@ fn the_samplers_of_implicit_surfaces_are_knobs_of_particles() {
     let paper = scene::SurfaceSampler::Brownian { step: 0.01 };
     assert_eq!(turned(&sweep.knobs[1]), [scene::SurfaceSampler::Lines, scene::SurfaceSampler::Triangles, paper]);
     assert_eq!(turned(&sweep.knobs[2]).last(), Some(&paper), "from coarse to fine");
+    // What is kept from one setting for the next does not hide the difference.
+    let (options, progress) = (RenderOptions::default(), Progress::new());
+    let mut renderer = Renderer::new(&options, &progress);
+    let mut draw = |step: &Step| renderer.draw(&quick.turned(&quick.knobs[1], step)).unwrap().image;
+    let images: Vec<_> = quick.knobs[1].steps.iter().map(&mut draw).collect();
+    assert!(images[0] != images[1] && images[1] != images[2] && images[0] != images[2]);
 }

@@ -206,9 +206,10 @@ fn same_splats(a: &Scene, b: &Scene) -> bool {
     other.camera.size = a.camera.size;
     other.render = a.render.clone();
     let particles = |s: &Scene| s.render.technique == Technique::Particles;
-    // The technique may decide what is made of an object. Layers decide whether volumes get normals; `max_points` whether a scene is refused.
+    // The technique and its samplers may decide what is made of an object. Layers decide whether volumes get normals; `max_points` whether a scene is refused.
     *a == other
         && particles(a) == particles(b)
+        && a.render.particles.surface_sampler == b.render.particles.surface_sampler
         && a.render.layers == b.render.layers
         && a.render.max_points == b.render.max_points
 }

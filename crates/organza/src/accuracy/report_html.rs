@@ -3,7 +3,7 @@
 use super::plot::{COLORS, Mark, Plot, Series, escaped};
 use super::report_joint::{bar_of, joint};
 use super::report_pictures::{data_uri, difference};
-use super::{Curve, Outcome, Report, SEEDS, Study, TOLD_APART, least_seconds};
+use super::{Curve, CurvePoint, Outcome, Report, SEEDS, Study, TOLD_APART, least_seconds};
 use crate::Error;
 use reference::statistics::median_with_spread;
 use std::fmt::Write;
@@ -167,8 +167,23 @@ fn knob_plot(study: &Study, curve: &Curve, meaning: &str) -> Option<Plot> {
     Some(Plot { size: [320.0, 230.0], x_label: meaning.into(), y_label: y_label.into(), floor: None, series })
 }
 
+/// The steps of a knob that has no order, each with its RMSE and time.
+fn choices(study: &Study, curve: &Curve) -> String {
+    let one = |p: &CurvePoint| {
+        let outcome = &study.outcomes[p.setting];
+        let label = outcome.setting.label.rsplit(": ").next().unwrap_or_default();
+        let rmse = outcome.from_limit.as_ref().filter(|_| outcome.drawn).map(|d| format!("{:.2e}", d.linear.rmse));
+        let ms = least_seconds(outcome).map_or_else(String::new, |s| format!(" in {:.0} ms", 1e3 * s));
+        format!("{label} RMSE {}{ms}", rmse.as_deref().unwrap_or("not resolved"))
+    };
+    format!("A choice: {}.", curve.points.iter().map(one).collect::<Vec<_>>().join("; "))
+}
+
 /// What was found of a knob's order of convergence, what theory says, and what its end is worth.
 pub fn verdict(study: &Study, curve: &Curve) -> String {
+    if curve.points.iter().all(|p| p.size.is_none()) {
+        return choices(study, curve);
+    }
     let theory = study.knobs.iter().find(|k| k.name == curve.knob).and_then(|k| k.theory);
     let drawn = curve.points.iter().filter(|p| p.drawn).count();
     let mut text = match curve.settled.fit {
@@ -176,7 +191,6 @@ pub fn verdict(study: &Study, curve: &Curve) -> String {
             let interval = fit.half_width.map_or_else(|| " (two points: no interval)".into(), |h| format!(" ± {h:.2}"));
             format!("Order {:.2}{interval}, from {drawn} points", fit.order)
         }
-        None if curve.points.iter().all(|p| p.size.is_none()) => "A choice: it has no order".to_owned(),
         None => format!("No order: {drawn} points can be drawn"),
     };
     if let (Some(t), Some(fit)) = (theory, curve.settled.fit) {
