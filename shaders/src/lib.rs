@@ -22,6 +22,7 @@
 #![forbid(unsafe_code)]
 
 mod barriers;
+mod batches;
 mod check;
 mod device;
 mod join;
@@ -34,6 +35,7 @@ pub mod reflect;
 mod snapshot;
 
 pub use barriers::{Barrier, Use, barriers};
+pub use batches::{LONGEST, batches};
 pub use check::Fault;
 pub use device::{
     Adapter, AdapterKind, Backend, Choice, DeviceError, Executor, Inputs, PassTime, Ready, Run, Validation,

@@ -80,6 +80,15 @@ impl Commands<'_> {
         }
     }
 
+    /// Makes the clock's queries ready and notes the time.
+    pub(crate) fn start_clock(&self, queries: u32) {
+        if self.clock != vk::QueryPool::null() {
+            // SAFETY: the pool has this many queries, and no run is under way.
+            unsafe { self.logical.raw.cmd_reset_query_pool(self.raw, self.clock, 0, queries) }
+        }
+        self.tick(0);
+    }
+
     /// Notes the time when everything so far has ended.
     pub(crate) fn tick(&self, query: u32) {
         if self.clock != vk::QueryPool::null() {

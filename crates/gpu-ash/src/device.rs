@@ -34,6 +34,7 @@ pub struct Device {
     memory: Arc<Memory>,
     pipelines: HashMap<&'static str, Arc<Pipeline>>,
     patience: Duration,
+    watched: bool,
 }
 
 impl Device {
@@ -67,7 +68,7 @@ impl Device {
         let patience = found.adapter.kind.patience();
         let logical = Arc::new(Logical { raw, instance, found, queue: Mutex::new(queue) });
         let memory = Arc::new(Memory::new(&logical)?);
-        Ok(Self { logical, memory, pipelines: HashMap::new(), patience })
+        Ok(Self { logical, memory, pipelines: HashMap::new(), patience, watched: validation != Validation::Off })
     }
 
     /// Lets what is prepared from now on run that long until the device counts as hung, instead of
@@ -130,6 +131,11 @@ impl Device {
 
     pub(crate) fn logical(&self) -> &Arc<Logical> {
         &self.logical
+    }
+
+    /// Whether validation looks on.
+    pub(crate) fn is_watched(&self) -> bool {
+        self.watched
     }
 
     pub(crate) fn patience(&self) -> Duration {

@@ -7,8 +7,9 @@ use crate::memory::Buffer;
 use crate::pipeline::Pipeline;
 use ash::vk;
 use gpu_allocator::MemoryLocation;
-use splat_shaders::{Barrier, BufferId, DeviceError, Dispatch, Inputs, PassTime, Recording, Run, Step};
+use splat_shaders::{Barrier, BufferId, DeviceError, Dispatch, Inputs, PassTime, Recording, Run, Step, batches};
 use std::mem;
+use std::ops::Range;
 use std::sync::{Arc, PoisonError};
 use std::time::Duration;
 
@@ -31,7 +32,10 @@ pub struct Prepared {
     steps: usize,
     sets: vk::DescriptorPool,
     pool: vk::CommandPool,
-    commands: vk::CommandBuffer,
+    /// One for each step; one for all under validation, which follows accesses inside a command buffer alone.
+    commands: Vec<vk::CommandBuffer>,
+    /// Command buffers that are submitted together, by what they took in the run before.
+    batches: Vec<Range<usize>>,
     clock: vk::QueryPool,
     fence: vk::Fence,
     patience: Duration,
@@ -51,7 +55,8 @@ impl Prepared {
             steps: recording.steps().len(),
             sets: vk::DescriptorPool::null(),
             pool: vk::CommandPool::null(),
-            commands: vk::CommandBuffer::null(),
+            commands: Vec::new(),
+            batches: Vec::new(),
             clock: vk::QueryPool::null(),
             fence: vk::Fence::null(),
             patience: device.patience(),
@@ -59,7 +64,7 @@ impl Prepared {
             logical: device.logical().clone(),
         };
         made.take_memory(device, recording)?;
-        made.make_objects(recording)?;
+        made.make_objects(recording, if device.is_watched() { 1 } else { made.steps })?;
         for (at, step) in recording.steps().iter().enumerate() {
             if let Step::Dispatch(dispatch) = step {
                 made.dispatches.push((at, dispatch.kernel.name));
@@ -92,7 +97,7 @@ impl Prepared {
         Ok(())
     }
 
-    fn make_objects(&mut self, recording: &Recording) -> Result<(), DeviceError> {
+    fn make_objects(&mut self, recording: &Recording, commands: usize) -> Result<(), DeviceError> {
         let (device, family) = (&self.logical.raw, self.logical.found.family);
         let dispatches = || recording.steps().iter().filter_map(dispatch_of);
         let bindings = dispatches().map(|d| d.buffers.len() as u32).sum::<u32>().max(1);
@@ -107,9 +112,14 @@ impl Prepared {
             self.pool = device.create_command_pool(&pool, None).map_err(failure::of("vkCreateCommandPool"))?;
             let fence = vk::FenceCreateInfo::default();
             self.fence = device.create_fence(&fence, None).map_err(failure::of("vkCreateFence"))?;
-            let one = vk::CommandBufferAllocateInfo::default().command_pool(self.pool).command_buffer_count(1);
-            let made = device.allocate_command_buffers(&one).map_err(failure::of("vkAllocateCommandBuffers"))?;
-            self.commands = made.first().copied().unwrap_or_default();
+            if self.steps > 0 {
+                let each = vk::CommandBufferAllocateInfo::default()
+                    .command_pool(self.pool)
+                    .command_buffer_count(commands as u32);
+                self.commands =
+                    device.allocate_command_buffers(&each).map_err(failure::of("vkAllocateCommandBuffers"))?;
+                self.batches = batches(&vec![f64::INFINITY; commands]);
+            }
             if self.logical.found.tick_ns > 0.0 {
                 let clock = vk::QueryPoolCreateInfo::default()
                     .query_type(vk::QueryType::TIMESTAMP)
@@ -122,18 +132,20 @@ impl Prepared {
 
     fn write(&self, recording: &Recording, waits: &[Vec<Barrier>]) -> Result<(), DeviceError> {
         let device = &self.logical.raw;
-        let begin = vk::CommandBufferBeginInfo::default();
-        // SAFETY: the command buffer is new and nobody else has it.
-        unsafe { device.begin_command_buffer(self.commands, &begin) }.map_err(failure::of("vkBeginCommandBuffer"))?;
-        let commands =
-            Commands { logical: &self.logical, raw: self.commands, buffers: &self.buffers, clock: self.clock };
-        if self.clock != vk::QueryPool::null() {
-            // SAFETY: the pool has this many queries.
-            unsafe { device.cmd_reset_query_pool(self.commands, self.clock, 0, self.steps as u32 + 1) }
-        }
-        commands.tick(0);
         let (mut uploads, mut reads, mut pipelines) = (self.uploads.iter(), self.reads.iter(), self.pipelines.iter());
         for (at, (step, waits)) in recording.steps().iter().zip(waits).enumerate() {
+            let steps_of_one = self.steps / self.commands.len();
+            let raw = self.commands[at / steps_of_one];
+            let commands = Commands { logical: &self.logical, raw, buffers: &self.buffers, clock: self.clock };
+            if at % steps_of_one == 0 {
+                let begin = vk::CommandBufferBeginInfo::default();
+                // SAFETY: the command buffer is new and nobody else has it.
+                unsafe { device.begin_command_buffer(raw, &begin) }.map_err(failure::of("vkBeginCommandBuffer"))?;
+            }
+            if at == 0 {
+                commands.start_clock(self.steps as u32 + 1);
+            }
+            // It waits for what other command buffers do as for its own: they go to one queue, in order.
             commands.barrier(waits);
             match step {
                 Step::Upload(id) => {
@@ -150,10 +162,15 @@ impl Prepared {
                 }
             }
             commands.tick(at as u32 + 1);
+            if at + 1 == self.steps {
+                commands.copies_to_host();
+            }
+            if (at + 1) % steps_of_one == 0 {
+                // SAFETY: the command buffer is being recorded.
+                unsafe { device.end_command_buffer(raw) }.map_err(failure::of("vkEndCommandBuffer"))?;
+            }
         }
-        commands.copies_to_host();
-        // SAFETY: the command buffer is being recorded.
-        unsafe { device.end_command_buffer(self.commands) }.map_err(failure::of("vkEndCommandBuffer"))
+        Ok(())
     }
 
     /// The buffers of a dispatch as the kernel sees them.
@@ -208,8 +225,6 @@ impl Prepared {
 
     fn submit(&mut self) -> Result<(), DeviceError> {
         let device = &self.logical.raw;
-        let commands = [self.commands];
-        let work = [vk::SubmitInfo::default().command_buffers(&commands)];
         let queue = self.logical.queue.lock().unwrap_or_else(PoisonError::into_inner);
         let patience = u64::try_from(self.patience.as_nanos()).unwrap_or(u64::MAX);
         // SAFETY: the fence is not in use: every run waits for its own, and a device that failed to is lost or hangs, and
@@ -217,7 +232,12 @@ impl Prepared {
         // never.
         unsafe {
             device.reset_fences(&[self.fence]).map_err(failure::of("vkResetFences"))?;
-            device.queue_submit(*queue, &work, self.fence).map_err(failure::of("vkQueueSubmit"))?;
+            for batch in &self.batches {
+                let work = [vk::SubmitInfo::default().command_buffers(&self.commands[batch.clone()])];
+                device.queue_submit(*queue, &work, vk::Fence::null()).map_err(failure::of("vkQueueSubmit"))?;
+            }
+            // It is signalled when all that was submitted before has ended.
+            device.queue_submit(*queue, &[], self.fence).map_err(failure::of("vkQueueSubmit"))?;
             drop(queue);
             match device.wait_for_fences(&[self.fence], true, patience) {
                 Err(vk::Result::TIMEOUT) => {
@@ -229,7 +249,8 @@ impl Prepared {
         }
     }
 
-    fn passes(&self) -> Result<Vec<PassTime>, DeviceError> {
+    /// Reads the clock, and plans the next run's submissions by it.
+    fn passes(&mut self) -> Result<Vec<PassTime>, DeviceError> {
         if self.clock == vk::QueryPool::null() {
             return Ok(Vec::new());
         }
@@ -239,11 +260,12 @@ impl Prepared {
         unsafe { self.logical.raw.get_query_pool_results(self.clock, 0, &mut ticks, flags) }
             .map_err(failure::of("vkGetQueryPoolResults"))?;
         let found = &self.logical.found;
-        let between = |step: usize| ticks[step + 1].wrapping_sub(ticks[step]) & found.tick_mask;
-        let pass = |&(step, kernel): &(usize, &'static str)| PassTime {
-            kernel,
-            nanoseconds: between(step) as f64 * found.tick_ns,
-        };
+        let between = |t: &[u64]| (t[1].wrapping_sub(t[0]) & found.tick_mask) as f64 * found.tick_ns;
+        let took: Vec<f64> = ticks.windows(2).map(between).collect();
+        if self.commands.len() == took.len() {
+            self.batches = batches(&took);
+        }
+        let pass = |&(step, kernel): &(usize, &'static str)| PassTime { kernel, nanoseconds: took[step] };
         Ok(self.dispatches.iter().map(pass).collect())
     }
 }

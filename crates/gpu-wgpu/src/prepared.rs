@@ -1,7 +1,8 @@
 //! A recording on the device: its memory, its bindings, and how it is run.
 
 use crate::device::{Device, Faults};
-use splat_shaders::{BufferId, DeviceError, Dispatch, Groups, Inputs, PassTime, Recording, Run, Step};
+use splat_shaders::{BufferId, DeviceError, Dispatch, Groups, Inputs, PassTime, Recording, Run, Step, batches};
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -40,6 +41,8 @@ pub struct Prepared {
     given: Vec<Vec<u8>>,
     buffers: Vec<wgpu::Buffer>,
     actions: Vec<Action>,
+    /// Actions that are submitted together, by what they took in the run before.
+    batches: Vec<Range<usize>>,
     clock: Option<Clock>,
     device: wgpu::Device,
     queue: wgpu::Queue,
@@ -85,7 +88,8 @@ impl Prepared {
         // Beyond this many queries, wgpu refuses a set.
         let clock =
             (clocked && 2 * dispatches <= wgpu::QUERY_SET_MAX_QUERIES).then(|| Clock::new(&raw, 2 * dispatches));
-        Self { uploads, given, buffers, actions, clock, device: raw, queue, faults, patience, hung: false }
+        let batches = batches(&vec![f64::INFINITY; actions.len()]);
+        Self { uploads, given, buffers, actions, batches, clock, device: raw, queue, faults, patience, hung: false }
     }
 
     /// Uploads the inputs, runs the steps, waits, and gives what they read back. An input that is not given keeps its
@@ -110,8 +114,13 @@ impl Prepared {
         for (met, given) in self.uploads.iter().zip(&self.given) {
             self.queue.write_buffer(&self.buffers[met.id.index()], 0, given);
         }
-        let commands = self.encode();
-        self.queue.submit([commands]);
+        let mut query = 0;
+        for batch in &self.batches {
+            self.queue.submit([self.encode(&self.actions[batch.clone()], &mut query)]);
+        }
+        if let Some(clock) = &self.clock {
+            self.queue.submit([clock.read(&self.device, query)]);
+        }
         let reads = self.actions.iter().filter_map(|action| match action {
             Action::Read(met, seen) => Some((met.id, seen)),
             Action::Dispatch(_) => None,
@@ -136,10 +145,10 @@ impl Prepared {
         Ok(Run { reads, passes: self.passes()? })
     }
 
-    fn encode(&self) -> wgpu::CommandBuffer {
+    /// Commands of some actions, whose first query is `query`.
+    fn encode(&self, actions: &[Action], query: &mut u32) -> wgpu::CommandBuffer {
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let mut query = 0;
-        for action in &self.actions {
+        for action in actions {
             match action {
                 Action::Read(met, seen) => {
                     encoder.copy_buffer_to_buffer(&self.buffers[met.id.index()], 0, seen, 0, Some(met.bytes));
@@ -147,19 +156,15 @@ impl Prepared {
                 Action::Dispatch(bound) => {
                     let timestamp_writes = self.clock.as_ref().map(|clock| wgpu::ComputePassTimestampWrites {
                         query_set: &clock.queries,
-                        beginning_of_pass_write_index: Some(query),
-                        end_of_pass_write_index: Some(query + 1),
+                        beginning_of_pass_write_index: Some(*query),
+                        end_of_pass_write_index: Some(*query + 1),
                     });
                     let label = Some(bound.dispatch.kernel.name);
                     let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label, timestamp_writes });
                     self.dispatch(&mut pass, bound);
-                    query += 2;
+                    *query += 2;
                 }
             }
-        }
-        if let Some(clock) = &self.clock {
-            encoder.resolve_query_set(&clock.queries, 0..query, &clock.resolved, 0);
-            encoder.copy_buffer_to_buffer(&clock.resolved, 0, &clock.seen, 0, Some(8 * u64::from(query)));
         }
         encoder.finish()
     }
@@ -178,18 +183,30 @@ impl Prepared {
         }
     }
 
-    fn passes(&self) -> Result<Vec<PassTime>, DeviceError> {
+    /// Reads the clock, and plans the next run's submissions by it.
+    fn passes(&mut self) -> Result<Vec<PassTime>, DeviceError> {
         let Some(clock) = &self.clock else { return Ok(Vec::new()) };
         let bytes = taken(&clock.seen)?;
         let (ticks, _) = bytes.as_chunks::<16>();
         let tick_ns = f64::from(self.queue.get_timestamp_period());
-        let kernels = self.actions.iter().filter_map(|action| match action {
-            Action::Dispatch(bound) => Some(bound.dispatch.kernel.name),
-            Action::Read(..) => None,
-        });
         let half = |pair: &[u8; 16], at: usize| u64::from_ne_bytes(std::array::from_fn(|k| pair[8 * at + k]));
         let time = |pair: &[u8; 16]| half(pair, 1).saturating_sub(half(pair, 0)) as f64 * tick_ns;
-        Ok(kernels.zip(ticks).map(|(kernel, pair)| PassTime { kernel, nanoseconds: time(pair) }).collect())
+        let mut times = ticks.iter().map(time);
+        let (mut passes, mut took) = (Vec::new(), Vec::with_capacity(self.actions.len()));
+        for action in &self.actions {
+            let nanoseconds = match action {
+                Action::Dispatch(bound) => {
+                    let nanoseconds = times.next().unwrap_or(f64::INFINITY);
+                    passes.push(PassTime { kernel: bound.dispatch.kernel.name, nanoseconds });
+                    nanoseconds
+                }
+                // wgpu has no clock for copies; they are short.
+                Action::Read(..) => 0.0,
+            };
+            took.push(nanoseconds);
+        }
+        self.batches = batches(&took);
+        Ok(passes)
     }
 }
 
@@ -203,6 +220,14 @@ impl Clock {
             resolved: buffer(device, "ticks", bytes, Usage::QUERY_RESOLVE | Usage::COPY_SRC),
             seen: buffer(device, "ticks seen", bytes, Usage::MAP_READ | Usage::COPY_DST),
         }
+    }
+
+    /// Brings the first `count` notes to where the processor sees them.
+    fn read(&self, device: &wgpu::Device, count: u32) -> wgpu::CommandBuffer {
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.resolve_query_set(&self.queries, 0..count, &self.resolved, 0);
+        encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.seen, 0, Some(8 * u64::from(count)));
+        encoder.finish()
     }
 }
 

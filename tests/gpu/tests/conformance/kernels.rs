@@ -2,8 +2,7 @@
 
 use gpu_conformance::{adapter, bytes, open, words};
 use splat_core::rng;
-use splat_shaders::{BufferId, DeviceError, Groups, Recording, Validation, kernels};
-use std::time::Duration;
+use splat_shaders::{DeviceError, Groups, Recording, Validation, kernels};
 
 #[test]
 fn a_scan_is_the_sum_of_what_comes_before() {
@@ -51,26 +50,12 @@ fn a_prepared_recording_runs_again() {
     assert_eq!(device.take_messages(), [""; 0]);
 }
 
-/// A recording that gives its second input's running sums, with its inputs' buffers and what is read.
-fn short() -> (Recording, [BufferId; 2]) {
+#[test]
+fn a_device_that_is_lost_says_so_and_another_can_be_opened() {
     let mut r = Recording::default();
     let [scan, sums] = [r.input("scan", 8), r.input("sums", 8)];
     r.dispatch(&kernels::SCAN_SPINE, Groups::cover(1), &[scan, sums], &[]);
     r.read(sums);
-    (r, [scan, sums])
-}
-
-/// What both executors have, for the tests below.
-macro_rules! by_each_executor {
-    ($test:ident) => {
-        $test!(gpu_ash);
-        $test!(gpu_wgpu);
-    };
-}
-
-#[test]
-fn a_device_that_is_lost_says_so_and_another_can_be_opened() {
-    let (r, [scan, sums]) = short();
     let inputs = [(scan, &bytes(&[2000, 0])[..]), (sums, &bytes(&[5, 6])[..])];
     macro_rules! lost {
         ($executor:ident) => {
@@ -84,26 +69,6 @@ fn a_device_that_is_lost_says_so_and_another_can_be_opened() {
             assert_eq!(words(fresh.run(&r, &inputs).unwrap().bytes(sums)), [0, 5]);
         };
     }
-    by_each_executor!(lost);
-}
-
-#[test]
-fn a_device_that_does_not_come_back_in_time_is_given_up() {
-    let recorded = hbsort::gpu::record(hbsort::gpu::Capacities { splats: 200_000, kept: 200_000 });
-    let (r, [scan, sums]) = short();
-    let inputs = [(scan, &bytes(&[2000, 0])[..]), (sums, &bytes(&[5, 6])[..])];
-    macro_rules! hung {
-        ($executor:ident) => {
-            let mut device = $executor::Device::open(&adapter(), Validation::Off).unwrap();
-            device.set_patience(Duration::ZERO);
-            let mut prepared = device.prepare(&recorded.recording).unwrap();
-            assert_eq!(prepared.run(&[]), Err(DeviceError::Lost));
-            assert_eq!(prepared.run(&[]), Err(DeviceError::Lost), "it may still be at work");
-            // What the device might use is not taken from it.
-            drop((prepared, device));
-            let mut fresh = $executor::Device::open(&adapter(), Validation::Off).unwrap();
-            assert_eq!(words(fresh.run(&r, &inputs).unwrap().bytes(sums)), [0, 5]);
-        };
-    }
-    by_each_executor!(hung);
+    lost!(gpu_ash);
+    lost!(gpu_wgpu);
 }

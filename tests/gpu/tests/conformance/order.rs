@@ -1,10 +1,12 @@
 //! The sort on a device: the CPU's exact order, bit for bit.
 
-use gpu_conformance::{Device, open};
+use gpu_conformance::{Device, adapter, open};
 use hbsort::gpu::{Capacities, join, record};
 use hbsort::{Direction, Error, Params, Scratch, SliceOrder, Thickness, slice_cloud};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Camera, Cloud, Projection, Splat, rng};
+use splat_shaders::{DeviceError, Validation};
+use std::time::Duration;
 
 fn cloud(n: u64, origin: DVec3) -> Cloud {
     let mut cloud = Cloud::new(origin);
@@ -138,4 +140,48 @@ fn parts_joined_are_the_order_of_all() {
         assert!(matches!(missing, Err(Error::ReadBack { what: "parts of splats", .. })), "{missing:?}");
     }
     assert_eq!(device.take_messages(), [""; 0]);
+}
+
+#[test]
+fn steps_submitted_one_by_one_or_in_batches_give_the_same() {
+    // Validation follows one command buffer, so that only what it does not watch is submitted in parts.
+    let (cloud, camera) = (cloud(40_000, DVec3::ZERO), camera(DVec3::ZERO, Projection::Perspective { fov_y: 0.9 }));
+    let params = Params { exact: true, ..Params::default() };
+    let capacities = Capacities { splats: 40_000, kept: 40_000 };
+    let recorded = record(capacities);
+    let uploads = recorded.uploads(&cloud, None, &camera, &params).unwrap();
+    let inputs = recorded.inputs(&uploads);
+    let read = [recorded.state, recorded.keys, recorded.places];
+    let watched = open().unwrap().run(&recorded.recording, &inputs).unwrap();
+    let mut ash = gpu_ash::Device::open(&adapter(), Validation::Off).unwrap().prepare(&recorded.recording).unwrap();
+    let mut wgpu = gpu_wgpu::Device::open(&adapter(), Validation::Off).unwrap().prepare(&recorded.recording).unwrap();
+    for run in 0..3 {
+        for found in [ash.run(&inputs).unwrap(), wgpu.run(&inputs).unwrap()] {
+            assert!(read.iter().all(|b| found.bytes(*b) == watched.bytes(*b)), "run {run}");
+        }
+    }
+}
+
+#[test]
+fn a_device_that_does_not_come_back_in_time_is_given_up() {
+    let (cloud, camera) = (cloud(200_000, DVec3::ZERO), camera(DVec3::ZERO, Projection::Perspective { fov_y: 0.9 }));
+    let recorded = record(Capacities { splats: 200_000, kept: 200_000 });
+    let uploads = recorded.uploads(&cloud, None, &camera, &Params { exact: true, ..Params::default() }).unwrap();
+    let inputs = recorded.inputs(&uploads);
+    macro_rules! hung {
+        ($executor:ident) => {
+            let mut device = $executor::Device::open(&adapter(), Validation::Off).unwrap();
+            device.set_patience(Duration::ZERO);
+            let mut prepared = device.prepare(&recorded.recording).unwrap();
+            let mut lost = || matches!(prepared.run(&inputs), Err(DeviceError::Lost));
+            assert!(lost());
+            assert!(lost(), "it may still be at work");
+            // What the device might use is not taken from it.
+            drop((prepared, device));
+            let mut fresh = $executor::Device::open(&adapter(), Validation::Off).unwrap();
+            assert!(fresh.run(&recorded.recording, &inputs).is_ok());
+        };
+    }
+    hung!(gpu_ash);
+    hung!(gpu_wgpu);
 }
