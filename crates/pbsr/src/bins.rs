@@ -1,9 +1,13 @@
 //! Projected particles of one task, sorted by tile: a counting sort of a few thousand records in the nearest cache.
+//!
+//! Blocks of particles are projected in lanes, down to the tile. Those that are not kept are not picked out: they go to a
+//! tile of their own, behind all others.
 
 use crate::project::{BLOCK, Footing, Projector, View};
 use crate::stream::{Stage, scramble};
 use crate::{PackedColor, PackedNormal, Particles, Sampler};
 use splat_core::rng;
+use std::ops::Range;
 
 /// Side of a tile, pixels: its depths fit the first cache.
 pub(crate) const TILE: usize = 64;
@@ -20,7 +24,6 @@ pub(crate) struct Record {
     /// Pixel of the tile (12 bits), place within the pixel (two of 8 bits), channels that it does not hide (3 bits).
     place: u32,
     pub(crate) depth: f32,
-    pub(crate) normal: PackedNormal,
     pub(crate) color: PackedColor,
 }
 
@@ -81,26 +84,49 @@ pub(crate) struct Task {
     pub(crate) object: u32,
     /// Rank of the run among those of the object.
     pub(crate) run: usize,
-    pub(crate) chunks: std::ops::Range<usize>,
+    pub(crate) chunks: Range<usize>,
     records: Vec<Record>,
+    /// Of each record, where they are asked for.
+    normals: Vec<PackedNormal>,
     /// First record of each tile, and the end.
     starts: Vec<u32>,
     pub(crate) particles: u64,
+}
+
+/// What a task does with its particles.
+pub(crate) struct Filling<'a> {
+    pub(crate) sampler: &'a dyn Sampler,
+    pub(crate) projector: &'a Projector,
+    pub(crate) tiling: &'a Tiling,
+    /// Probabilities with which each particle hides a channel; `None` where it hides all.
+    pub(crate) shares: Option<[f32; 3]>,
+    /// Whether normals are kept.
+    pub(crate) normals: bool,
 }
 
 /// What a task needs beside its own: kept by each thread.
 pub(crate) struct Staging {
     particles: Particles,
     view: View,
-    /// Tiles and records, of which the first `len` count.
+    /// Columns of records in the order of their particles, with those of particles that are not kept.
     tiles: Vec<u32>,
-    records: Vec<Record>,
-    len: usize,
+    places: Vec<u32>,
+    depths: Vec<f32>,
+    normals: Vec<PackedNormal>,
+    colors: Vec<PackedColor>,
 }
 
 impl Default for Staging {
     fn default() -> Self {
-        Self { particles: Particles::default(), view: View::EMPTY, tiles: Vec::new(), records: Vec::new(), len: 0 }
+        Self {
+            particles: Particles::default(),
+            view: View::EMPTY,
+            tiles: Vec::new(),
+            places: Vec::new(),
+            depths: Vec::new(),
+            normals: Vec::new(),
+            colors: Vec::new(),
+        }
     }
 }
 
@@ -111,59 +137,61 @@ impl Task {
         &self.records[self.starts[t] as usize..self.starts[t + 1] as usize]
     }
 
+    /// The normals of the records of a tile, where they are kept.
+    #[inline]
+    pub(crate) fn normals(&self, t: usize) -> &[PackedNormal] {
+        &self.normals[self.starts[t] as usize..self.starts[t + 1] as usize]
+    }
+
     pub(crate) fn records(&self) -> u64 {
         self.records.len() as u64
     }
 
     pub(crate) fn bytes(&self) -> u64 {
-        (self.records.capacity() * size_of::<Record>() + self.starts.capacity() * 4) as u64
+        let normals = self.normals.capacity() * size_of::<PackedNormal>();
+        (self.records.capacity() * size_of::<Record>() + normals + self.starts.capacity() * 4) as u64
     }
 
-    /// Samples the chunks, projects and sorts. Each particle hides a channel with the probability in `shares`, if there are
-    /// some, else it hides all.
-    pub(crate) fn fill(
-        &mut self,
-        sampler: &dyn Sampler,
-        projector: &Projector,
-        tiling: &Tiling,
-        shares: Option<[f32; 3]>,
-        staging: &mut Staging,
-    ) {
-        staging.len = 0;
+    /// Samples the chunks, projects and sorts.
+    pub(crate) fn fill(&mut self, with: &Filling<'_>, staging: &mut Staging) {
+        staging.clear();
         self.particles = 0;
-        self.starts.clear();
-        self.starts.resize(tiling.tiles() + 1, 0);
         let mut scratch = std::mem::take(&mut staging.particles);
         let key = thinning_key(self.object, self.set, self.run);
         let channels = rng::bits(u64::from(self.object), Stage::Channels as u64, self.set, self.run as u64);
         for chunk in self.chunks.clone() {
-            let particles = sampler.chunk(self.set, chunk, &mut scratch);
-            let numbers = (key, self.particles);
-            match shares {
-                None => staging.stage(particles, projector, tiling, numbers, |_| 0, &mut self.starts),
-                Some(shares) => {
-                    let clear = |i| clear(thinning(channels, i), shares);
-                    staging.stage(particles, projector, tiling, numbers, clear, &mut self.starts);
-                }
-            }
+            let particles = with.sampler.chunk(self.set, chunk, &mut scratch);
+            staging.stage(particles, with, [key, channels], self.particles);
             self.particles += particles.len() as u64;
         }
         staging.particles = scratch;
-        self.sort(&staging.tiles[..staging.len], &staging.records[..staging.len]);
+        self.sort(staging, with.tiling.tiles(), with.normals);
     }
 
-    /// Sorts by tile; `starts` holds the number of each tile's records, one place on.
-    fn sort(&mut self, of_tile: &[u32], staged: &[Record]) {
-        self.starts[0] = 0;
-        for t in 1..self.starts.len() {
-            self.starts[t] += self.starts[t - 1];
+    /// Sorts by tile.
+    fn sort(&mut self, staged: &Staging, tiles: usize, normals: bool) {
+        self.starts.clear();
+        self.starts.resize(tiles + 1, 0);
+        staged.tiles.iter().for_each(|tile| self.starts[*tile as usize] += 1);
+        let mut before = 0;
+        for start in &mut self.starts {
+            before += std::mem::replace(start, before);
         }
-        self.records.resize(staged.len(), Record::default());
-        for (tile, record) in of_tile.iter().zip(staged) {
-            let at = &mut self.starts[*tile as usize];
-            self.records[*at as usize] = *record;
-            *at += 1;
+        // What is not kept goes to one place behind all.
+        let kept = self.starts[tiles] as usize;
+        self.records.resize(kept + 1, Record::default());
+        self.normals.resize(if normals { kept + 1 } else { 0 }, PackedNormal::default());
+        let columns = staged.tiles.iter().zip(&staged.places).zip(&staged.depths).zip(&staged.colors);
+        for (i, (((&tile, &place), &depth), &color)) in columns.enumerate() {
+            let start = &mut self.starts[tile as usize];
+            let at = *start as usize;
+            *start += u32::from((tile as usize) < tiles);
+            self.records[at] = Record { place, depth, color };
+            if normals {
+                self.normals[at] = staged.normals[i];
+            }
         }
+        self.records.truncate(kept);
         // Each start has moved to the end of its tile.
         self.starts.rotate_right(1);
         self.starts[0] = 0;
@@ -179,7 +207,7 @@ pub(crate) fn thinning_key(object: u32, set: u64, run: usize) -> u64 {
 #[inline(always)]
 pub(crate) fn thinning(key: u64, i: u64) -> f32 {
     let bits = scramble(key.wrapping_add(i.wrapping_mul(0x9e37_79b9_7f4a_7c15)));
-    ((bits >> 41) as f32 + 0.5) * (1.0 / (1u32 << 23) as f32)
+    ((bits >> 41) as i32 as f32 + 0.5) * (1.0 / (1u32 << 23) as f32)
 }
 
 /// The bits of the channels that a particle of this number in (0, 1) does not hide. One number for all three: what one
@@ -190,84 +218,112 @@ fn clear(random: f32, shares: [f32; 3]) -> u32 {
 }
 
 impl Staging {
-    /// Room for `n` records and a block more.
-    fn grow(&mut self, n: usize) {
-        if self.records.len() < n + BLOCK {
-            self.tiles.resize((n + BLOCK).next_power_of_two(), 0);
-            self.records.resize(self.tiles.len(), Record::default());
-        }
+    fn clear(&mut self) {
+        self.tiles.clear();
+        self.places.clear();
+        self.depths.clear();
+        self.normals.clear();
+        self.colors.clear();
     }
 
-    /// Projects the particles of a chunk, of which the first has the number `before` in its run; counts those of each
-    /// tile, one place on in `counts`. `clear` gives the bits of what a particle does not hide, by its number.
-    fn stage(
-        &mut self,
-        particles: &Particles,
-        projector: &Projector,
-        tiling: &Tiling,
-        (key, before): (u64, u64),
-        clear: impl Fn(u64) -> u32,
-        counts: &mut [u32],
-    ) {
-        let columns = tiling.columns as u32;
-        let mut n = self.len;
+    /// Projects the particles of a chunk, of which the first has the number `before` in its run. `keys` are the counters
+    /// of the numbers that thin them out, and of those that choose channels.
+    fn stage(&mut self, particles: &Particles, with: &Filling<'_>, keys: [u64; 2], before: u64) {
         for (block, offsets) in particles.position.chunks(BLOCK).enumerate() {
-            let first = block * BLOCK;
+            let (first, n) = (block * BLOCK, offsets.len());
             let number = before + first as u64;
-            projector.view(offsets, &mut self.view);
-            self.grow(n);
-            let attributes = particles.normal[first..].iter().zip(&particles.color[first..]);
-            for (j, (&normal, &color)) in attributes.enumerate().take(offsets.len()) {
-                let (x, y, depth, mut k) = (self.view.x[j], self.view.y[j], self.view.z[j], self.view.k[j]);
-                if normal.is_per_crossing() {
-                    k *= projector.cosine(offsets[j], normal);
-                }
-                let record = Record { place: clear(number + j as u64), depth, normal, color };
-                if k > 1.0 {
-                    self.len = n;
-                    self.widened(
-                        &projector.widened(x, y, k),
-                        record,
-                        key.wrapping_add(number + j as u64),
-                        columns,
-                        counts,
-                    );
-                    n = self.len;
-                    continue;
-                }
-                let seen = self.view.seen[j] & ((k >= 1.0) || thinning(key, number + j as u64) < k);
-                let [px, py] = [0, 1].map(|a| self.view.pixel[a][j]);
-                let (tile, place) = place(px, py, self.view.within[j], columns);
-                self.tiles[n] = tile;
-                self.records[n] = Record { place: place | record.place, ..record };
-                counts[if seen { tile as usize + 1 } else { 0 }] += 1;
-                n += usize::from(seen);
+            with.projector.view(offsets, with.tiling, &mut self.view);
+            if let Some(shares) = with.shares {
+                let places = self.view.place[..n].iter_mut();
+                places.zip(number..).for_each(|(place, i)| *place |= clear(thinning(keys[1], i), shares));
+            }
+            let (normals, colors) = (&particles.normal[first..first + n], &particles.color[first..first + n]);
+            if self.view.wide || normals.iter().fold(false, |any, n| any | n.is_per_crossing()) {
+                self.one_by_one(particles, first..first + n, with, (keys[0], before));
+                continue;
+            }
+            if self.view.thin {
+                let outside = with.tiling.tiles() as u32;
+                pulp::Arch::new().dispatch(Thin { view: &mut self.view, key: keys[0], number, outside });
+            }
+            self.tiles.extend_from_slice(&self.view.tile[..n]);
+            self.places.extend_from_slice(&self.view.place[..n]);
+            self.depths.extend_from_slice(&self.view.z[..n]);
+            self.colors.extend_from_slice(colors);
+            if with.normals {
+                self.normals.extend_from_slice(normals);
             }
         }
-        self.len = n;
+    }
+    /// A block with particles that are widened or whose k depends on their normal.
+    fn one_by_one(&mut self, of: &Particles, range: Range<usize>, with: &Filling<'_>, (key, before): (u64, u64)) {
+        let (projector, outside) = (with.projector, with.tiling.tiles() as u32);
+        for (j, i) in range.enumerate() {
+            let (normal, color, number) = (of.normal[i], of.color[i], before + i as u64);
+            let (x, y, depth, mut k) = (self.view.x[j], self.view.y[j], self.view.z[j], self.view.k[j]);
+            let (tile, place) = (self.view.tile[j], self.view.place[j]);
+            if normal.is_per_crossing() {
+                k *= projector.cosine(of.position[i], normal);
+            }
+            if k > 1.0 {
+                let foot = projector.widened(x, y, k);
+                let clear = place & (7 << CLEAR);
+                self.widened(&foot, Record { place: clear, depth, color }, normal, key.wrapping_add(number), with);
+            } else if tile != outside && (k >= 1.0 || thinning(key, number) < k) {
+                self.push(tile, Record { place, depth, color }, normal, with.normals);
+            }
+        }
     }
 
     /// A particle on several pixels; its places in them are random.
-    fn widened(&mut self, foot: &Footing, record: Record, key: u64, columns: u32, counts: &mut [u32]) {
+    fn widened(&mut self, foot: &Footing, record: Record, normal: PackedNormal, key: u64, with: &Filling<'_>) {
         for y in foot.y[0]..foot.y[1] {
             for x in foot.x[0]..foot.x[1] {
                 let (x, y) = (x as u32, y as u32);
                 let within = scramble(key ^ u64::from(x) << 48 ^ u64::from(y) << 32) as u32 & 0xffff;
-                let (tile, place) = place(x, y, within, columns);
-                self.tiles[self.len] = tile;
-                self.records[self.len] = Record { place: place | record.place, ..record };
-                counts[tile as usize + 1] += 1;
-                self.len += 1;
-                // A place for the next, and for what remains of the block.
-                self.grow(self.len);
+                let (tile, place) = place(x, y, within, with.tiling.columns as u32);
+                self.push(tile, Record { place: place | record.place, ..record }, normal, with.normals);
             }
+        }
+    }
+
+    fn push(&mut self, tile: u32, record: Record, normal: PackedNormal, normals: bool) {
+        self.tiles.push(tile);
+        self.places.push(record.place);
+        self.depths.push(record.depth);
+        self.colors.push(record.color);
+        if normals {
+            self.normals.push(normal);
+        }
+    }
+}
+
+/// Puts the particles of a block that are thinned out out of the image.
+struct Thin<'a> {
+    view: &'a mut View,
+    key: u64,
+    /// Number of the first in its run.
+    number: u64,
+    outside: u32,
+}
+
+impl pulp::NullaryFnOnce for Thin<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { view, key, number, outside } = self;
+        for j in 0..BLOCK {
+            let k = view.k[j];
+            let kept = (k >= 1.0) | (thinning(key, number + j as u64) < k);
+            view.tile[j] = if kept { view.tile[j] } else { outside };
         }
     }
 }
 
 /// Tile of a pixel, and the place in the tile as a record has it; `within` are two of 8 bits.
 #[inline(always)]
-fn place(x: u32, y: u32, within: u32, columns: u32) -> (u32, u32) {
+pub(crate) fn place(x: u32, y: u32, within: u32, columns: u32) -> (u32, u32) {
     const SIDE: u32 = TILE as u32;
     let tile = (y / SIDE).wrapping_mul(columns).wrapping_add(x / SIDE);
     (tile, (y % SIDE * SIDE + x % SIDE) | ((within & 0xffff) << 12))

@@ -5,7 +5,7 @@
 //! particles of κ_c alone: transmittance e^(−τ_c), without bias. A channel shows the nearest particle that hides it; a
 //! particle is shaded once for all channels that show it.
 
-use crate::bins::{AREA, Record, TILE, Task};
+use crate::bins::{AREA, TILE, Task};
 use crate::ensemble::TileSums;
 use crate::render::{Resolve, solid};
 use crate::shade::MAX_CHANNELS;
@@ -48,7 +48,7 @@ impl Colored {
                 }
             }
             for task in all.of_set(set) {
-                self.add(task, task.tile(t), all, sums);
+                self.add(task, t, all, sums);
             }
             for k in self.touched.drain(..) {
                 let (mask, luminance) = std::mem::take(&mut self.shown[k as usize]);
@@ -58,10 +58,10 @@ impl Colored {
     }
 
     /// Shades what is seen of one task, adds it, and clears the buffers behind it.
-    fn add(&mut self, task: &Task, records: &[Record], all: &Resolve<'_>, sums: &mut TileSums<'_>) {
+    fn add(&mut self, task: &Task, t: usize, all: &Resolve<'_>, sums: &mut TileSums<'_>) {
         let params = &all.shader.channels;
         let mut values = [0.0; MAX_CHANNELS];
-        for record in records {
+        for (record, normal) in task.tile(t).iter().zip(task.normals(t)) {
             let (pixel, hides) = (record.pixel(), record.channels());
             let nearest = &mut self.nearest[pixel];
             let mut mask = 0;
@@ -74,7 +74,7 @@ impl Colored {
             if mask == 0 {
                 continue;
             }
-            all.shade(record, task.object, self.corner, &mut values);
+            all.shade(record, *normal, task.object, self.corner, &mut values);
             let shown = &mut self.shown[pixel];
             if shown.0 == 0 {
                 self.touched.push(pixel as u32);

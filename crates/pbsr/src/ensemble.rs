@@ -240,11 +240,13 @@ pub(crate) fn raise(sum: &mut i64, by: i64) {
     };
 }
 
-/// A square as a multiple of 2⁻²⁴, from what it is times 2²⁴; a value that is not a number counts as 0.
+/// A square as a multiple of 2⁻²⁴, from what it is times 2²⁴, below 2⁵⁷; a value that is not a number counts as 0.
 #[inline(always)]
 pub(crate) fn fixed_square(scaled: f32) -> u64 {
-    // Below 2⁶³, where the signed conversion is the cheaper one.
-    scaled as i64 as u64
+    // The mantissa, shifted by the exponent: a conversion that minds every input is not done in lanes.
+    let bits = scaled.max(0.0).to_bits();
+    let mantissa = u64::from(bits & 0x7f_ffff | 0x80_0000) << 39;
+    mantissa >> (127 + 23 + 39 - (bits >> 23)).min(63)
 }
 
 /// Nearest multiple of 2⁻²⁴, for |v| < 2²⁷; a value that is not a number counts as 0.
@@ -361,5 +363,21 @@ impl Ensemble {
     /// Sum of luminance² of a pixel in tile order.
     pub(crate) fn square(&self, at: usize) -> f64 {
         self.squares[at] as f64 / f64::from(FRACTION) * f64::from(self.params.unit()).powi(2)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn squares_are_cut_to_whole_numbers() {
+        let largest = 65536f32 * 65536.0 * FRACTION;
+        for v in
+            [0.0, -0.0, 1e-45, 0.999_999_94, 1.0, 1.999_999_9, 2.0, 16_777_215.0, 3e9, largest, largest * 1.000_001]
+        {
+            assert_eq!(fixed_square(v), v as u64, "{v}");
+        }
+        assert_eq!(fixed_square(f32::NAN), 0);
     }
 }

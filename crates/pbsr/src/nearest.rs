@@ -3,37 +3,53 @@
 use crate::PackedColor;
 use crate::bins::{AREA, Record, TILE, Task};
 use crate::ensemble::TileSums;
-use crate::flat;
+use crate::flat::{self, Flat};
 use crate::render::{Resolve, solid};
 use crate::shade::MAX_CHANNELS;
-use splat_core::Shading;
+
+/// The key of a pixel that nothing hides.
+const OPEN: u64 = solid(f32::INFINITY);
 
 /// The depth buffer of one tile.
 pub(crate) struct Nearest {
     /// [`Record::key`] of the nearest particle, or `limit` where none is.
     nearest: Vec<u64>,
-    /// What a pixel starts with: the occluder's depth, and nothing is behind it or at it.
+    /// What a pixel starts with: the occluder's depth, and nothing is behind it or at it. Empty without an occluder.
     limit: Vec<u64>,
     /// Records of one task that are seen: their numbers, or their pixels and colours.
-    seen: Vec<(u32, PackedColor)>,
+    seen: Vec<u32>,
+    colors: Vec<PackedColor>,
+    flat: Flat,
     corner: [usize; 2],
 }
 
 impl Nearest {
     pub(crate) fn new() -> Self {
-        let open = vec![solid(f32::INFINITY); AREA];
-        Self { nearest: open.clone(), limit: open, seen: Vec::new(), corner: [0; 2] }
+        Self {
+            nearest: vec![OPEN; AREA],
+            limit: Vec::new(),
+            seen: Vec::new(),
+            colors: Vec::new(),
+            flat: Flat::new(),
+            corner: [0; 2],
+        }
     }
 
     /// Adds all sets of a batch to tile `t`.
     pub(crate) fn fold(&mut self, all: &Resolve<'_>, t: usize, sums: &mut TileSums<'_>) {
         let columns = all.plan.tiling.columns;
         self.corner = [t % columns * TILE, t / columns * TILE];
-        all.limits(self.corner, &mut self.limit);
-        self.nearest.copy_from_slice(&self.limit);
+        if all.scene.occluder.is_some() {
+            self.limit.resize(AREA, OPEN);
+            all.limits(self.corner, &mut self.limit);
+            self.nearest.copy_from_slice(&self.limit);
+        }
         for set in 0..all.batch {
             self.collect(all, set, t);
             self.add(all, set, t, sums);
+            if set % flat::SETS == flat::SETS - 1 || set == all.batch - 1 {
+                self.flat.drain(sums);
+            }
         }
     }
 
@@ -51,45 +67,48 @@ impl Nearest {
     /// Shades what is seen of that set, adds it, and clears the buffer.
     #[inline]
     fn add(&mut self, all: &Resolve<'_>, set: usize, t: usize, sums: &mut TileSums<'_>) {
-        let channels = &all.shader.channels;
         for task in all.of_set(set) {
             let records = task.tile(t);
-            let material = &all.scene.objects[task.object as usize].look.material;
-            // Beauty alone of what is shown as it is needs neither place nor normal.
-            if channels.only_beauty() && material.shading == Shading::Unlit {
-                let n = self.see(records, |seen, _, record| *seen = (record.pixel() as u32, record.color));
-                flat::add(sums, &self.seen[..n], material.emission);
+            if all.plan.shaded[task.object as usize] {
+                let n = self.see(records, |i, _| i as u32);
+                self.shade(n, task, t, all, sums);
             } else {
-                let n = self.see(records, |seen, i, _| seen.0 = i as u32);
-                self.shade(n, task, records, all, sums);
+                let n = self.see(records, |_, record| record.pixel() as u32);
+                let emission = all.scene.objects[task.object as usize].look.material.emission;
+                self.flat.add(&self.seen[..n], &self.colors, emission, sums.inverse_unit);
             }
         }
     }
 
     /// Lists the records that are the nearest of their pixels, and makes their pixels empty; returns their number.
     #[inline]
-    fn see(&mut self, records: &[Record], note: impl Fn(&mut (u32, PackedColor), usize, &Record)) -> usize {
-        if self.seen.len() < records.len() {
-            self.seen.resize(records.len().next_power_of_two(), Default::default());
+    fn see(&mut self, records: &[Record], note: impl Fn(usize, &Record) -> u32) -> usize {
+        let room = (records.len() + flat::BLOCK).next_power_of_two();
+        if self.seen.len() < room {
+            self.seen.resize(room, 0);
+            self.colors.resize(room, PackedColor::default());
         }
+        let (nearest, seen, colors) = (&mut self.nearest[..AREA], &mut self.seen[..], &mut self.colors[..]);
         // Written always, kept when seen: whether a particle is seen cannot be foreseen.
         let mut n = 0;
         for (i, record) in records.iter().enumerate() {
             let pixel = record.pixel();
-            let is_seen = self.nearest[pixel] == record.key();
-            self.nearest[pixel] = if is_seen { self.limit[pixel] } else { self.nearest[pixel] };
-            note(&mut self.seen[n], i, record);
+            let is_seen = nearest[pixel] == record.key();
+            let empty = self.limit.get(pixel).copied().unwrap_or(OPEN);
+            nearest[pixel] = if is_seen { empty } else { nearest[pixel] };
+            (seen[n], colors[n]) = (note(i, record), record.color);
             n += usize::from(is_seen);
         }
         n
     }
 
-    fn shade(&self, n: usize, task: &Task, records: &[Record], all: &Resolve<'_>, sums: &mut TileSums<'_>) {
+    fn shade(&self, n: usize, task: &Task, t: usize, all: &Resolve<'_>, sums: &mut TileSums<'_>) {
         let params = &all.shader.channels;
+        let (records, normals) = (task.tile(t), task.normals(t));
         let mut values = [0.0; MAX_CHANNELS];
-        for &(i, _) in &self.seen[..n] {
+        for &i in &self.seen[..n] {
             let record = &records[i as usize];
-            all.shade(record, task.object, self.corner, &mut values);
+            all.shade(record, normals[i as usize], task.object, self.corner, &mut values);
             sums.add(params, record.pixel(), &values[..params.channels()]);
             sums.locate(params, record.pixel(), task.set, record.depth);
             sums.name(record.pixel(), record.depth, task.object);

@@ -13,6 +13,7 @@
 //! Both make exactly one pixel, floor(x), floor(y), of k = 1. A surface of angle-independent opacity has k·|cos θ|.
 
 use crate::PackedNormal;
+use crate::bins::{Tiling, place};
 use glam::{DMat3, DVec3, Mat3, Vec3};
 use splat_core::{Camera, Similarity, glam};
 
@@ -63,12 +64,13 @@ pub(crate) struct View {
     pub(crate) z: [f32; BLOCK],
     /// k of a thin slab; 0 for what is behind the eye.
     pub(crate) k: [f32; BLOCK],
-    /// The pixel; of what is out of the image, any.
-    pub(crate) pixel: [[u32; BLOCK]; 2],
-    /// Place in the pixel, two of 8 bits.
-    pub(crate) within: [u32; BLOCK],
-    /// Whether the place is in the image.
-    pub(crate) seen: [bool; BLOCK],
+    /// The tile, or [`Tiling::tiles`] out of the image.
+    pub(crate) tile: [u32; BLOCK],
+    /// The place in the tile, as a record has it.
+    pub(crate) place: [u32; BLOCK],
+    /// Whether k > 1 for some, and whether k < 1 for some.
+    pub(crate) wide: bool,
+    pub(crate) thin: bool,
 }
 
 impl View {
@@ -77,9 +79,10 @@ impl View {
         y: [0.0; BLOCK],
         z: [0.0; BLOCK],
         k: [0.0; BLOCK],
-        pixel: [[0; BLOCK]; 2],
-        within: [0; BLOCK],
-        seen: [false; BLOCK],
+        tile: [0; BLOCK],
+        place: [0; BLOCK],
+        wide: false,
+        thin: false,
     };
 }
 
@@ -113,8 +116,8 @@ impl Projector {
     }
 
     /// Brings at most [`BLOCK`] particles into view.
-    pub(crate) fn view(&self, offsets: &[Vec3], view: &mut View) {
-        pulp::Arch::new().dispatch(Lanes { projector: self, offsets, view });
+    pub(crate) fn view(&self, offsets: &[Vec3], tiling: &Tiling, view: &mut View) {
+        pulp::Arch::new().dispatch(Lanes { projector: self, offsets, tiling, view });
     }
 
     /// |cos θ| at an offset with a normal; a particle without one is a thin slab.
@@ -146,6 +149,7 @@ impl Projector {
 struct Lanes<'a> {
     projector: &'a Projector,
     offsets: &'a [Vec3],
+    tiling: &'a Tiling,
     view: &'a mut View,
 }
 
@@ -161,24 +165,37 @@ impl pulp::NullaryFnOnce for Lanes<'_> {
 impl Lanes<'_> {
     #[inline(always)]
     fn run<const ORTHOGRAPHIC: bool>(self) {
-        let Self { projector: &Projector { linear, translation, focal, middle, share, size, .. }, offsets, view } =
-            self;
-        for (i, offset) in offsets.iter().enumerate().take(BLOCK) {
-            let p = linear * *offset + translation;
+        let Self { projector, offsets, tiling, view } = self;
+        let &Projector { linear, translation, focal, middle, share, size, .. } = projector;
+        let (columns, outside) = (tiling.columns as u32, tiling.tiles() as u32);
+        let n = offsets.len().min(BLOCK);
+        for i in 0..n {
+            let p = linear * offsets[i] + translation;
             let inverse = if ORTHOGRAPHIC { 1.0 } else { 1.0 / p.z };
             let at = [middle[0] + focal * p.x * inverse, middle[1] - focal * p.y * inverse];
-            (view.x[i], view.y[i]) = (at[0], at[1]);
+            (view.x[i], view.y[i], view.z[i]) = (at[0], at[1], p.z);
             // NaN is out of the image; in the image nothing is cut.
-            view.seen[i] = (at[0] >= 0.0) & (at[0] < size[0]) & (at[1] >= 0.0) & (at[1] < size[1]);
-            let cut = [0, 1].map(|a| at[a].clamp(0.0, 65535.0) as i32);
-            (view.pixel[0][i], view.pixel[1][i]) = (cut[0] as u32, cut[1] as u32);
-            let within = [0, 1].map(|a| ((at[a] - cut[a] as f32) * 256.0) as i32 as u32 & 255);
-            view.within[i] = within[0] | within[1] << 8;
-            view.z[i] = p.z;
+            let seen = (at[0] >= 0.0) & (at[0] < size[0]) & (at[1] >= 0.0) & (at[1] < size[1]);
+            let pixel = at.map(|v| v.clamp(0.0, 65535.0).floor());
+            let within = [0, 1].map(|a| whole(((at[a] - pixel[a]) * 256.0).floor()) & 255);
+            let pixel = pixel.map(whole);
+            let (tile, place) = place(pixel[0], pixel[1], within[0] | within[1] << 8, columns);
+            (view.tile[i], view.place[i]) = (if seen { tile } else { outside }, place);
             let k = if ORTHOGRAPHIC { share } else { share * p.length() * inverse * inverse * inverse };
-            view.k[i] = if p.z > 0.0 { k } else { 0.0 };
+            let k = if p.z > 0.0 { k } else { 0.0 };
+            view.k[i] = k;
         }
+        // On its own: in the loop above it would keep it from going in lanes.
+        let k = &view.k[..n];
+        view.wide = k.iter().map(|k| u32::from(*k > 1.0)).sum::<u32>() > 0;
+        view.thin = k.iter().map(|k| u32::from(*k >= 1.0)).sum::<u32>() < n as u32;
     }
+}
+
+/// The bits of a whole number in 0 .. 65536, in lanes: a conversion that minds every input is not done in lanes.
+#[inline(always)]
+fn whole(v: f32) -> u32 {
+    (v + 8_388_608.0).to_bits() & 0xffff
 }
 
 #[cfg(test)]
@@ -189,14 +206,17 @@ mod tests {
     /// The pixels of one particle, none of k ≤ 1 that is thinned out by `random`.
     fn project(projector: &Projector, offset: Vec3, random: f32) -> Option<Footing> {
         let mut view = View::EMPTY;
-        projector.view(&[offset], &mut view);
+        let tiling = Tiling::new(projector.size.map(|s| s as u32));
+        projector.view(&[offset], &tiling, &mut view);
         let (x, y, k) = (view.x[0], view.y[0], view.k[0]);
+        assert_eq!((view.wide, view.thin), (k > 1.0, k < 1.0));
         if k > 1.0 {
             let foot = projector.widened(x, y, k);
             return (foot.x[0] < foot.x[1] && foot.y[0] < foot.y[1]).then_some(foot);
         }
         let one = |v: f32| [v as i32, v as i32 + 1];
-        (view.seen[0] && (k >= 1.0 || random < k)).then(|| Footing { x: one(x), y: one(y) })
+        let seen = (view.tile[0] as usize) < tiling.tiles();
+        (seen && (k >= 1.0 || random < k)).then(|| Footing { x: one(x), y: one(y) })
     }
 
     fn camera(projection: Projection) -> Camera {

@@ -5,7 +5,7 @@
 //! Nothing is shared between tasks and every sum is in integers: the result has the same bits for any number of threads.
 //! Memory depends on the image and on the particles of one batch, never on the number of sets.
 
-use crate::bins::{Record, Staging, TILE, Task, Tiling};
+use crate::bins::{Filling, Record, Staging, TILE, Task, Tiling};
 use crate::colored::Colored;
 use crate::cost::Counts;
 use crate::ensemble::Ensemble;
@@ -14,10 +14,10 @@ use crate::nearest::Nearest;
 use crate::project::Projector;
 use crate::sampler::{Run, runs};
 use crate::shade::{Appearance, LitBy, MAX_CHANNELS, Seen, Shader};
-use crate::{Error, Sampler};
+use crate::{Error, PackedNormal, Sampler};
 use glam::{DMat3, DVec3, Mat3};
 use rayon::prelude::*;
-use splat_core::{Camera, Progress, Similarity, glam};
+use splat_core::{Camera, Progress, Shading, Similarity, glam};
 
 /// One object of the scene.
 #[derive(Clone, Copy)]
@@ -142,8 +142,14 @@ impl Renderer {
         self.tasks.par_iter_mut().for_each_init(Staging::default, |staging, task| {
             if !progress.is_cancelled() {
                 let object = task.object as usize;
-                let (sampler, projector) = (scene.objects[object].sampler, &plan.projectors[object]);
-                task.fill(sampler, projector, &plan.tiling, plan.shares[object], staging);
+                let filling = Filling {
+                    sampler: scene.objects[object].sampler,
+                    projector: &plan.projectors[object],
+                    tiling: &plan.tiling,
+                    shares: plan.shares[object],
+                    normals: plan.shaded[object],
+                };
+                task.fill(&filling, staging);
             }
         });
     }
@@ -181,11 +187,18 @@ impl<'a> Resolve<'a> {
 
     /// The channels of what is seen, in the tile with this corner.
     #[inline]
-    pub(crate) fn shade(&self, record: &Record, object: u32, corner: [usize; 2], values: &mut [f32; MAX_CHANNELS]) {
+    pub(crate) fn shade(
+        &self,
+        record: &Record,
+        normal: PackedNormal,
+        object: u32,
+        corner: [usize; 2],
+        values: &mut [f32; MAX_CHANNELS],
+    ) {
         let (o, pixel) = (object as usize, record.pixel());
         let [wx, wy] = record.within().map(f64::from);
         let at_px = [(corner[0] + pixel % TILE) as f64 + wx, (corner[1] + pixel / TILE) as f64 + wy];
-        let normal = self.plan.turns[o] * record.normal.get();
+        let normal = self.plan.turns[o] * normal.get();
         let from_eye = self.plan.behind_pixel(self.scene.camera, at_px, record.depth);
         let look = &self.scene.objects[o].look;
         let seen = Seen { look, from_eye, normal, color: record.color.get() };
@@ -210,8 +223,8 @@ impl<'a> Resolve<'a> {
 }
 
 /// The key of a depth that hides all that is at it or behind it.
-pub(crate) fn solid(depth: f32) -> u64 {
-    u64::from(depth.to_bits()) << 32
+pub(crate) const fn solid(depth: f32) -> u64 {
+    (depth.to_bits() as u64) << 32
 }
 
 /// What is the same for all batches.
@@ -220,6 +233,9 @@ pub(crate) struct Plan {
     projectors: Vec<Projector>,
     /// Probabilities with which a particle of each object hides a channel; `None` where it hides all.
     shares: Vec<Option<[f32; 3]>>,
+    /// Whether what is seen of each object is shaded; else its particles are shown as they are, and nothing but beauty is
+    /// asked for: neither place nor normal are needed.
+    pub(crate) shaded: Vec<bool>,
     /// Of each task of a set: the object, the rank of the run among those of the object, and the run.
     runs: Vec<(u32, usize, Run)>,
     batch_levels: u32,
@@ -252,10 +268,12 @@ impl Plan {
         let of_objects = scene.objects.iter().enumerate().flat_map(of_object);
         let project =
             |o: &Object<'_>| Projector::new(scene.camera, o.sampler.origin(), &o.transform, o.sampler.cross_section());
+        let shaded = |o: &Object<'_>| !ensemble.params.only_beauty() || o.look.material.shading != Shading::Unlit;
         Ok(Self {
             tiling: ensemble.tiling,
             projectors: scene.objects.iter().map(project).collect(),
             shares: scene.objects.iter().map(|o| shares(o).filter(|_| ensemble.params.colored_extinction)).collect(),
+            shaded: scene.objects.iter().map(shaded).collect(),
             runs: of_objects.collect(),
             batch_levels: (budget / expected.max(1.0)).clamp(1.0, 4096.0) as u32,
             world_from_view: DMat3::from_cols(axes[0], axes[1], axes[2]),
