@@ -19,6 +19,7 @@ layout(set = 0, binding = 6, std430) readonly buffer Bound6 { float directions[]
 layout(set = 0, binding = 7, std430) buffer Bound7 { float lights[]; };
 
 #include "directions.glsl"
+#include "rays.glsl"
 
 // Absorbance before the knot at this place of a list.
 vec3 total_before(uvec2 span, uint knot) {

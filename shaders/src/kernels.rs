@@ -130,4 +130,18 @@ kernels! {
     /// The light that arrives at receivers:
     /// view, receivers, spans, distances, totals, opaque distances, directions → lights.
     TSM_LOOK_UP = "tsm_look_up" [Read, Read, Read, Read, Read, Read, Read, Write];
+    /// Casters to footprints on a table: view, casters, positions, radii, looks, frames, tables → footprints.
+    TSM_CAST = "tsm_cast" [Read, Read, Read, Read, Read, Read, Read, Write];
+    /// How many cells each footprint deposits in: view, footprints, opaque distances, directions → counts.
+    TSM_COUNT = "tsm_count" [Read, Read, Read, Read, Write];
+    /// Sizes of what makes the lists, or no entries where there is too little room:
+    /// view, scan of counts → list view, sort, scan of digits, state. Push: room.
+    TSM_PREPARE = "tsm_prepare" [Read, Read, Write, Write, Write, Write] push 4;
+    /// An entry for each cell of each footprint:
+    /// view, footprints, opaque distances, directions, scanned counts → cells, distances, absorbances. Push: room.
+    TSM_DEPOSIT = "tsm_deposit" [Read, Read, Read, Read, Read, Write, Write, Write] push 4;
+    /// Splats as receivers in the light's frame: view, positions, radii, looks, frames → receivers.
+    TSM_RECEIVE = "tsm_receive" [Read, Read, Read, Read, Read, Write];
+    /// Light to what shading receives: view, lights, shares of the shadow → received. Push: which light.
+    TSM_HAND_ON = "tsm_hand_on" [Read, Read, Read, Write] push 4;
 }

@@ -246,4 +246,60 @@ layouts! {
         /// Nothing.
         pub unused: u32,
     }
+
+    /// The light's frame and table, and the splats that deposit absorbance there.
+    pub struct CastView {
+        /// First column of the rotation from offsets to the table's axes; the fourth number is unused.
+        pub axis_x: [f32; 4],
+        /// Second column.
+        pub axis_y: [f32; 4],
+        /// Third column.
+        pub axis_z: [f32; 4],
+        /// The light as an offset.
+        pub light_high: [f32; 4],
+        /// What is left of it after rounding.
+        pub light_low: [f32; 4],
+        /// Lower corner of a planar table.
+        pub least: [f32; 2],
+        /// Columns and rows.
+        pub size: [u32; 2],
+        /// Side of a cell of a planar table.
+        pub cell: f32,
+        /// 0 octahedral, 1 planar with rays from a point, 2 planar with parallel rays.
+        pub mapping: u32,
+        /// 1 over the measure of a cell of an octahedral table.
+        pub inverse_measure: f32,
+        /// Frame units per world unit.
+        pub unit: f32,
+        /// A receiver's radius to its lift.
+        pub bias: f32,
+        /// Splats, all of which may receive.
+        pub splats: u32,
+        /// Those that deposit here.
+        pub casters: u32,
+        /// Entries that are there before.
+        pub given: u32,
+        /// Words of a splat's normal and semi-axis: 0, 3 or 6.
+        pub frame_words: u32,
+        /// Vectors of a footprint: 2, or 4 with planes and colours.
+        pub footprint_vectors: u32,
+        /// Channels, 1 or 3.
+        pub channels: u32,
+        /// 1 where an opaque disc may end a list.
+        pub opaque: u32,
+        /// Materials of the table; one for unknown ones and footprints come behind them.
+        pub materials: u32,
+        /// Footprints.
+        pub footprints: u32,
+        /// Numbers of shares of the shadow: one a splat, or one for all.
+        pub shares: u32,
+        /// Nothing.
+        pub unused: u32,
+    }
+
+    /// What depositing found.
+    pub struct CastState {
+        /// Entries, whether there is room for them or not.
+        pub entries: u32,
+    }
 }

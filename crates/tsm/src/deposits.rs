@@ -140,12 +140,20 @@ fn deposit_all<M: Mapping, const C: usize>(
     Ok(parts)
 }
 
-fn check_memory<const C: usize>(entries: u64, limit_bytes: u64) -> Result<(), Error> {
+pub(crate) fn check_memory<const C: usize>(entries: u64, limit_bytes: u64) -> Result<(), Error> {
     let needed_bytes = entries * (2 * size_of::<[f32; C]>() as u64 + 12);
     if entries > u64::from(u32::MAX) || needed_bytes > limit_bytes {
         return Err(Error::Memory { what: "the lists", needed_bytes, limit_bytes });
     }
     Ok(())
+}
+
+/// The casters of one kind in a chunk.
+#[inline(always)]
+pub(crate) fn select(casters: &Casters<'_>, chunk: &Range<usize>, kind: SplatKind, ids: &mut Vec<u32>) {
+    ids.clear();
+    let is_wanted = |&i: &usize| casters.cloud.kind[i] == kind && casters.casts(i);
+    ids.extend(chunk.clone().filter(is_wanted).map(|i| i as u32));
 }
 
 /// Deposits of one chunk of splats, in the form that [`pulp`] compiles once per instruction set.
@@ -161,20 +169,15 @@ impl<M: Mapping, const C: usize> pulp::NullaryFnOnce for FillChunk<'_, M, C> {
 
     #[inline(always)]
     fn call(mut self) {
-        let (casters, cloud) = (self.casters, self.casters.cloud);
+        let casters = self.casters;
         let Scratch { media, surfaces, media_batches, surface_batches, ids, .. } = &mut *self.deposit.scratch;
         let [medium_ids, surface_ids, others] = ids;
         let mut others = std::mem::take(others);
         others.clear();
         if casters.has_opaque_discs() {
             let (frame, mapping, opaque) = (&self.plan.frame, self.deposit.mapping, self.deposit.opaque);
-            let select = |kind, ids: &mut Vec<u32>| {
-                ids.clear();
-                let is_wanted = |&i: &usize| cloud.kind[i] == kind && casters.casts(i);
-                ids.extend(self.chunk.clone().filter(is_wanted).map(|i| i as u32));
-            };
-            select(SplatKind::Medium, medium_ids);
-            select(SplatKind::Surface, surface_ids);
+            select(casters, &self.chunk, SplatKind::Medium, medium_ids);
+            select(casters, &self.chunk, SplatKind::Surface, surface_ids);
             let mut target = Target { mapping, opaque, entries: media };
             target.add_media(casters, frame, medium_ids, media_batches, &mut others);
             let mut target = Target { mapping, opaque, entries: surfaces };

@@ -46,6 +46,13 @@ pub enum Error {
         /// Bytes given.
         found: u64,
     },
+    /// What devices do not do.
+    #[cfg(feature = "gpu")]
+    #[error("{why}")]
+    Processor {
+        /// The reason, a clause of its own.
+        why: &'static str,
+    },
     /// The light or the cloud breaks a promise, or the caller cancelled.
     #[error(transparent)]
     Core(#[from] splat_core::Error),

@@ -30,6 +30,12 @@ impl Frame {
         self.rotation * ((offset.as_dvec3() - self.origin) * self.unit).as_vec3()
     }
 
+    /// The light relative to the cloud's origin, the rotation, and frame units per world unit.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn parts(&self) -> (DVec3, Mat3, f64) {
+        (self.origin, self.rotation, self.unit)
+    }
+
     /// Direction in the frame.
     #[inline(always)]
     pub(crate) fn turn(&self, direction: Vec3) -> Vec3 {

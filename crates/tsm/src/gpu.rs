@@ -6,7 +6,8 @@
 //! list reaches the limit; knots move to their places.
 //!
 //! The lists are the CPU's bit for bit on every device: sums are the same 64-bit fixed point, in pairs of 32-bit words,
-//! whose order does not matter, and all that is left are comparisons. The deposits themselves are the CPU's.
+//! whose order does not matter, and all that is left are comparisons. The deposits are the CPU's, or made on the device too
+//! ([`record_map`]), where the map may stay ([`record_shadow`]).
 //!
 //! A device's kernels see so many bytes of a buffer and no more ([`Capacities::most`]). Beyond, runs of cells are done one
 //! after the other ([`Deposits::batches`]) and joined on the host ([`Deposits::join`]): the same bits.
@@ -22,7 +23,10 @@
 //! ```
 
 mod batches;
+mod casting;
+mod deposit;
 mod look_up;
+mod shadow;
 
 use crate::table::stop_of;
 use crate::{Deposits, Error};
@@ -31,7 +35,10 @@ use splat_shaders::radix::{Scanned, sort_pass};
 use splat_shaders::{BufferId, Groups, Recording, kernels};
 
 pub use batches::{Batch, Listed};
+pub use casting::Casting;
+pub use deposit::{CastRoom, CastUploads, RecordedCast, record_cast};
 pub use look_up::{MapUploads, ReceiverUploads, RecordedLookUp, Room, record_look_up};
+pub use shadow::{RecordedMap, RecordedShadow, ShadowUploads, record_map, record_shadow};
 
 /// Threads of a workgroup.
 const GROUP: u32 = 256;

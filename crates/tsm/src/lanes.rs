@@ -36,6 +36,21 @@ impl<const F: usize> Columns<F> {
     }
 }
 
+#[cfg(feature = "gpu")]
+impl<const F: usize> Columns<F> {
+    /// Parts splats `ids` by the way that they take.
+    #[inline(always)]
+    pub(crate) fn part(&self, ids: &[u32], plain: &mut Vec<u32>, others: &mut Vec<u32>) {
+        for (side, id) in self.side.iter().zip(ids) {
+            match side.signum() {
+                1 => plain.push(*id),
+                -1 => others.push(*id),
+                _ => {}
+            }
+        }
+    }
+}
+
 /// Splats that wait for others of their size; room for twice as many as leave at once, so that a batch always fits.
 #[derive(Debug)]
 pub(crate) struct Queue<const F: usize> {

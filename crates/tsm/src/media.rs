@@ -118,6 +118,25 @@ pub(crate) struct MediaBatches {
     queues: Queues<FOOTPRINT>,
 }
 
+#[cfg(feature = "gpu")]
+impl MediaBatches {
+    /// Parts media that are plain from those that take another way; those that cover no cell are neither.
+    #[inline(always)]
+    pub(crate) fn part<M: Mapping>(
+        &mut self,
+        (mapping, casters, frame): (&M, &Casters<'_>, &Frame),
+        ids: &[u32],
+        plain: &mut Vec<u32>,
+        others: &mut Vec<u32>,
+    ) {
+        for batch in batches(ids) {
+            load(&mut self.splats, casters, batch, frame);
+            fill(&mut self.footprints, mapping, &self.splats);
+            self.footprints.part(batch, plain, others);
+        }
+    }
+}
+
 /// Where entries come from and go to.
 pub(crate) struct Target<'a, M: Mapping, const C: usize> {
     pub(crate) mapping: &'a M,

@@ -26,6 +26,25 @@ pub(crate) struct SurfaceBatches {
     queues: Queues<SURFACE>,
 }
 
+#[cfg(feature = "gpu")]
+impl SurfaceBatches {
+    /// Parts surfaces that are plain from those that take another way; those that cover no cell are neither.
+    #[inline(always)]
+    pub(crate) fn part<M: Mapping>(
+        &mut self,
+        (mapping, casters, frame): (&M, &Casters<'_>, &Frame),
+        ids: &[u32],
+        plain: &mut Vec<u32>,
+        others: &mut Vec<u32>,
+    ) {
+        for batch in batches(ids) {
+            self.discs.load(casters, batch, frame, false);
+            fill(&mut self.footprints, mapping, &self.discs, &deviations(casters, batch));
+            self.footprints.part(batch, plain, others);
+        }
+    }
+}
+
 impl<M: Mapping, const C: usize> Target<'_, M, C> {
     /// Adds surfaces; those that are not plain go to `others`.
     #[inline(always)]
@@ -41,11 +60,7 @@ impl<M: Mapping, const C: usize> Target<'_, M, C> {
         let SurfaceBatches { discs, footprints, queues } = work;
         for batch in batches(ids) {
             discs.load(casters, batch, frame, false);
-            let mut deviation = [1.0; LANES];
-            for (l, &id) in batch.iter().enumerate() {
-                deviation[l] = casters.kernel(id as usize).deviation;
-            }
-            fill(footprints, self.mapping, discs, &deviation);
+            fill(footprints, self.mapping, discs, &deviations(casters, batch));
             for (l, &id) in batch.iter().enumerate() {
                 let i = id as usize;
                 let extinction = casters.extinction(i);
@@ -62,6 +77,13 @@ impl<M: Mapping, const C: usize> Target<'_, M, C> {
             }
         }
     }
+}
+
+#[inline(always)]
+fn deviations(casters: &Casters<'_>, ids: &[u32]) -> Lane {
+    let mut deviation = [1.0; LANES];
+    deviation.iter_mut().zip(ids).for_each(|(to, id)| *to = casters.kernel(*id as usize).deviation);
+    deviation
 }
 
 /// Footprints of discs on the table, but for the totals.

@@ -6,7 +6,8 @@ mod common;
 use common::{mixed, point_light};
 use splat_core::Progress;
 use splat_core::glam::DVec3;
-use tsm::gpu::{Capacities, Room, record, record_look_up};
+use splat_core::raster::gpu::AttributeRoom;
+use tsm::gpu::{Capacities, CastRoom, Casting, Room, record, record_cast, record_look_up, record_map, record_shadow};
 use tsm::{Deposits, Error, Params};
 
 const ROOM: Capacities = Capacities { entries: 200_000, cells: 2 * 120 * 120, channels: 3 };
@@ -144,4 +145,97 @@ fn the_most_room_fits_and_more_does_not() {
             assert!(more.into_iter().all(|room| largest(room) > Some(bytes)), "{bytes}: {most:?}");
         }
     }
+}
+
+const CAST: CastRoom = CastRoom {
+    attributes: AttributeRoom { splats: 5000, frame_words: 3 },
+    casters: 4000,
+    entries: 200_000,
+    cells: 2 * 120 * 120,
+    channels: 1,
+    directions: 60 * 60,
+    opaque: true,
+    planes: true,
+    tables: 5,
+};
+
+fn casting(params: &Params) -> Result<Casting, Error> {
+    let light = point_light(DVec3::new(0.3, 2.5, 0.2));
+    Casting::new(&mixed(4000, DVec3::ZERO), &[], &[], &light, params, &Progress::new())
+}
+
+#[test]
+fn deposits_are_as_kept_in_text() {
+    let found = record_cast(CAST).recording.to_string();
+    assert_eq!(found, include_str!("deposits.txt"), "now:\n{found}");
+}
+
+#[test]
+fn a_shadow_is_uploaded_as_splats_and_nothing_of_its_map_comes_back() {
+    let recorded = record_shadow(CAST, 1);
+    let steps = recorded.recording.to_string();
+    let named = |what: &str| -> Vec<String> {
+        steps.lines().filter_map(|line| line.strip_prefix(what)).map(str::to_owned).collect()
+    };
+    let uploads = [
+        ["cast view", "positions", "radii", "looks", "frames", "casters", "cast tables", "cast scan"],
+        ["list view", "opaque discs", "directions", "cells", "distances", "absorbances", "view", "shadow shares"],
+    ];
+    assert_eq!(named("upload "), uploads.concat());
+    assert_eq!(named("read "), ["cast state", "received"]);
+    // Light of two lamps.
+    assert_eq!(recorded.recording.buffers()[recorded.received.index()].bytes, 2 * 12 * 5000);
+}
+
+#[test]
+fn maps_and_shadows_are_without_fault_for_any_room() {
+    for (entries, cells, splats) in [(0, 0, 0), (1, 2, 1), (1025, 514, 257), (100_000_000, 1 << 21, 5_000_000)] {
+        for (channels, planes) in [(1, false), (1, true), (3, true)] {
+            let attributes = AttributeRoom { splats, frame_words: 0 };
+            let room = CastRoom { attributes, casters: splats, entries, cells, channels, planes, ..CAST };
+            record_map(room).recording.check().unwrap();
+            record_shadow(room, 0).recording.check().unwrap();
+        }
+    }
+}
+
+#[test]
+fn deposits_refuse_what_they_have_no_room_for() {
+    let casting = casting(&Params::default()).unwrap();
+    let attributes = AttributeRoom { splats: 4000, frame_words: 3 };
+    let room = casting.room(attributes, casting.expected());
+    assert!(casting.casters() > 1000 && casting.given() > 0 && room.opaque && room.planes);
+    let refused = |room, ids: Option<&[u32]>| match record_cast(room).uploads(&casting, ids) {
+        Err(Error::Overflow { what, .. }) => what,
+        other => panic!("{other:?}"),
+    };
+    assert!(record_cast(room).uploads(&casting, None).is_ok());
+    assert_eq!(refused(CastRoom { casters: room.casters - 1, ..room }, None), "casters");
+    assert_eq!(refused(CastRoom { entries: casting.given() as u32 - 1, ..room }, None), "entries");
+    assert_eq!(refused(CastRoom { cells: room.cells - 1, ..room }, None), "cells");
+    assert_eq!(refused(CastRoom { opaque: false, ..room }, None), "opaque discs");
+    assert_eq!(refused(CastRoom { planes: false, ..room }, None), "planes");
+    assert_eq!(refused(CastRoom { channels: 3, ..room }, None), "channels");
+    // Casters that are not among the splats.
+    let few = AttributeRoom { splats: 10, ..attributes };
+    assert_eq!(refused(CastRoom { attributes: few, ..room }, None), "casters among splats");
+    assert_eq!(refused(room, Some(&[0, 1, 2])), "casters among splats");
+    let shares = record_shadow(room, 0).uploads(&casting, None, &[1.0, 0.5]).unwrap_err();
+    assert_eq!(shares, Error::Overflow { what: "shares of shadows", needed: 2, had: 4000 });
+    let recorded = record_cast(CastRoom { entries: 7, ..room });
+    assert_eq!(recorded.found(&8u32.to_ne_bytes()), Err(Error::Overflow { what: "entries", needed: 8, had: 7 }));
+    assert_eq!(recorded.found(&7u32.to_ne_bytes()), Ok(7));
+    assert_eq!(recorded.found(&[7]), Err(Error::ReadBack { what: "cast state", expected: 4, found: 1 }));
+}
+
+#[test]
+fn what_devices_do_not_deposit_is_refused_or_given() {
+    let polar = Params { mapping: tsm::MappingChoice::PolarAzimuth, ..Params::default() };
+    assert!(matches!(casting(&polar), Err(Error::Processor { .. })));
+    let absorbance = splat_core::optics::AbsorbanceModel::Paper;
+    let paper = casting(&Params { absorbance, ..Params::default() }).unwrap();
+    assert!(paper.casters() == 0 && paper.given() > 0);
+    let all = deposits().entries().iter().sum::<u64>();
+    let default = casting(&Params::default()).unwrap();
+    assert!(default.given() < all && u64::from(default.expected()) * 2 > all);
 }

@@ -1,4 +1,4 @@
-// Tables of directions, as `tsm::mapping` has them; `view` and `directions` are bound before.
+// Tables of directions, as `tsm::mapping` has them; `view` is bound before.
 
 const uint OCTAHEDRAL = 0u;
 const uint PERSPECTIVE = 1u;
@@ -12,12 +12,6 @@ struct Place {
     vec2 at;
     float distance;
     bool seen;
-};
-
-// A ray of light through the table.
-struct Ray {
-    vec3 base;
-    vec3 direction;
 };
 
 precise float product(vec3 a, vec3 b) {
@@ -48,22 +42,36 @@ precise float quadrant_share(float x, float y) {
     return x < y ? other : share;
 }
 
-Place octahedral_place(vec3 p) {
+// A direction in its octant: its absolute components, its distance from the axis there, and its azimuth as a share of a
+// right angle.
+struct Octant {
+    float distance;
+    vec3 d;
+    float sin_square;
+    float r;
+    float share;
+};
+
+Octant octant_of(vec3 p) {
     precise float distance = root(product(p, p));
     vec3 d = vec3(quotient(abs(p.x), distance), quotient(abs(p.y), distance), quotient(abs(p.z), distance));
     precise float sin_square = d.x * d.x + d.y * d.y;
     precise float below = 1.0 + d.z;
     precise float r = root(quotient(sin_square, below));
-    precise float share = quadrant_share(d.x, d.y);
-    precise float x = r * (1.0 - share);
-    precise float y = r * share;
+    return Octant(distance, d, sin_square, r, quadrant_share(d.x, d.y));
+}
+
+Place octahedral_place(vec3 p) {
+    Octant o = octant_of(p);
+    precise float x = o.r * (1.0 - o.share);
+    precise float y = o.r * o.share;
     precise float folded_x = 1.0 - y;
     precise float folded_y = 1.0 - x;
     bool lower = p.z < 0.0;
     precise float side = 0.5 * float(view.size.x);
     precise float column = side + side * with_sign(lower ? folded_x : x, p.x);
     precise float row = side + side * with_sign(lower ? folded_y : y, p.y);
-    return Place(vec2(column, row), distance, distance > 0.0);
+    return Place(vec2(column, row), o.distance, o.distance > 0.0);
 }
 
 Place planar_place(vec3 p) {
@@ -96,33 +104,4 @@ uint cell_at(int column, int row) {
     }
     bool inside = column >= 0 && row >= 0 && column < n.x && row < n.y;
     return inside ? uint(row) * view.size.x + uint(column) : NOWHERE;
-}
-
-// One of the mirrored halves of an octahedral table: where in the quarter that is kept, and the sign.
-int mirrored(uint i, uint n, out float sign_of) {
-    bool kept = 2u * i + 1u >= n;
-    sign_of = kept ? 1.0 : -1.0;
-    return kept ? int(i) - int(n / 2u) : int((n - 1u) / 2u) - int(i);
-}
-
-// The ray through the centre of a cell.
-Ray ray_of(uint cell) {
-    uint column = cell % view.size.x;
-    uint row = cell / view.size.x;
-    if (view.mapping == OCTAHEDRAL) {
-        float sign_x;
-        float sign_y;
-        int i = mirrored(column, view.size.x, sign_x);
-        int j = mirrored(row, view.size.x, sign_y);
-        uint at = 3u * uint(j * int((view.size.x + 1u) / 2u) + i);
-        return Ray(vec3(0.0), vec3(directions[at] * sign_x, directions[at + 1u] * sign_y, directions[at + 2u]));
-    }
-    precise float x = view.least.x + (float(column) + 0.5) * view.cell;
-    precise float y = view.least.y + (float(row) + 0.5) * view.cell;
-    if (view.mapping == PARALLEL) {
-        return Ray(vec3(x, y, 0.0), vec3(0.0, 0.0, 1.0));
-    }
-    precise float inverse = quotient(1.0, root(product(vec3(x, y, 1.0), vec3(x, y, 1.0))));
-    precise vec3 direction = vec3(x, y, 1.0) * inverse;
-    return Ray(vec3(0.0), direction);
 }

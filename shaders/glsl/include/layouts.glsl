@@ -133,3 +133,33 @@ struct ShadowView {
     uint opaque;
     uint unused;
 };
+
+struct CastView {
+    vec4 axis_x;
+    vec4 axis_y;
+    vec4 axis_z;
+    vec4 light_high;
+    vec4 light_low;
+    vec2 least;
+    uvec2 size;
+    float cell;
+    uint mapping;
+    float inverse_measure;
+    float unit;
+    float bias;
+    uint splats;
+    uint casters;
+    uint given;
+    uint frame_words;
+    uint footprint_vectors;
+    uint channels;
+    uint opaque;
+    uint materials;
+    uint footprints;
+    uint shares;
+    uint unused;
+};
+
+struct CastState {
+    uint entries;
+};

@@ -36,9 +36,9 @@ impl Batch {
 /// The lists of a batch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Listed {
-    spans: Vec<[u32; 2]>,
-    distances: Vec<f32>,
-    totals: Vec<f32>,
+    pub(super) spans: Vec<[u32; 2]>,
+    pub(super) distances: Vec<f32>,
+    pub(super) totals: Vec<f32>,
 }
 
 impl Capacities {
@@ -144,7 +144,7 @@ impl Deposits {
     }
 }
 
-fn joined<const C: usize>(batches: Vec<Listed>, cells: usize, entries: [u64; 2]) -> Result<Matter<C>, Error>
+pub(super) fn joined<const C: usize>(batches: Vec<Listed>, cells: usize, entries: [u64; 2]) -> Result<Matter<C>, Error>
 where
     [f32; C]: Pod,
 {

@@ -71,9 +71,9 @@ pub struct RecordedLookUp {
     pub room: Room,
     /// Read back: transmittances, f32 a channel.
     pub lights: BufferId,
-    view: BufferId,
-    receivers: BufferId,
-    map: [BufferId; 5],
+    pub(super) view: BufferId,
+    pub(super) receivers: BufferId,
+    pub(super) map: [BufferId; 5],
 }
 
 /// The bytes of a map.
@@ -148,29 +148,7 @@ impl RecordedLookUp {
             bytemuck::cast_slice(&map.opaque).to_vec(),
             bytemuck::cast_slice(&directions).to_vec(),
         ];
-        Ok(MapUploads { view: self.view_of(map), bytes })
-    }
-
-    fn view_of(&self, map: &ShadowMap) -> ShadowView {
-        let planar = |perspective| if perspective { 1 } else { 2 };
-        let (least, size, cell, mapping) = match &map.table {
-            Table::Planar(table) => (table.min.to_array(), table.size, table.cell, planar(table.perspective)),
-            Table::Octahedral(_) | Table::PolarAzimuth(_) => {
-                ([0.0; 2], with_mapping!(&map.table, m => m.size()), 1.0, 0)
-            }
-        };
-        ShadowView {
-            least,
-            size,
-            cell,
-            ramp: map.ramp,
-            dark_from: map.dark_from.unwrap_or(f32::MAX),
-            mapping,
-            receivers: 0,
-            channels: self.room.channels,
-            opaque: u32::from(!map.opaque.is_empty()),
-            unused: 0,
-        }
+        Ok(MapUploads { view: view_of(map, self.room.channels), bytes })
     }
 
     /// The bytes of receivers, as the light of this map sees them.
@@ -220,6 +198,27 @@ impl RecordedLookUp {
             return read("lights", lights, receivers.count);
         }
         Ok(read::<f32>("lights", lights, receivers.count)?.into_iter().map(|t| [t; 3]).collect())
+    }
+}
+
+/// A map as look-ups see it, with lists of so many channels, and no receivers.
+pub(super) fn view_of(map: &ShadowMap, channels: u32) -> ShadowView {
+    let planar = |perspective| if perspective { 1 } else { 2 };
+    let (least, size, cell, mapping) = match &map.table {
+        Table::Planar(table) => (table.min.to_array(), table.size, table.cell, planar(table.perspective)),
+        Table::Octahedral(_) | Table::PolarAzimuth(_) => ([0.0; 2], with_mapping!(&map.table, m => m.size()), 1.0, 0),
+    };
+    ShadowView {
+        least,
+        size,
+        cell,
+        ramp: map.ramp,
+        dark_from: map.dark_from.unwrap_or(f32::MAX),
+        mapping,
+        receivers: 0,
+        channels,
+        opaque: u32::from(!map.opaque.is_empty()),
+        unused: 0,
     }
 }
 

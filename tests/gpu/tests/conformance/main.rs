@@ -4,6 +4,7 @@
 mod canary;
 mod chained;
 mod composited;
+mod deposits;
 mod kernels;
 mod order;
 mod particles;

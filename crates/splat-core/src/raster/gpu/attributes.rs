@@ -32,7 +32,7 @@ pub struct AttributeBuffers {
 
 impl AttributeBuffers {
     /// Records their uploads.
-    pub(crate) fn record(r: &mut Recording, room: AttributeRoom) -> Self {
+    pub fn record(r: &mut Recording, room: AttributeRoom) -> Self {
         let words = |n: u32| 4 * u64::from(n) * u64::from(room.splats);
         Self {
             positions: r.input("positions", words(3)),

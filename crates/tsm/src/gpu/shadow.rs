@@ -1,0 +1,164 @@
+//! Deposits, lists and look-ups as one recording: a map that stays on the device.
+//!
+//! [`record_map`] joins deposits and lists, whose lists can be read back as a map; [`record_shadow`] goes on with the light
+//! at all splats, in the form that shading reads it ([`splat_core::shade::gpu`]), and reads back nothing but how many entries
+//! there were. Where there was too little room for them, all light is what it would be without translucent splats, and
+//! [`RecordedCast::found`] says how much room is needed: record again with that.
+
+use super::batches::{Listed, joined, read};
+use super::casting::Casting;
+use super::deposit::{CastRoom, CastUploads, RecordedCast, record_cast};
+use super::look_up::{RecordedLookUp, Room, record_look_up, view_of};
+use super::{Capacities, record};
+use crate::shadow_map::Absorbances;
+use crate::{Error, ShadowMap};
+use splat_core::raster::gpu::AttributeBuffers;
+use splat_shaders::layouts::ShadowView;
+use splat_shaders::{BufferId, Groups, Recording, kernels};
+
+/// Threads of a workgroup.
+const GROUP: u32 = 256;
+
+/// Recorded deposits and lists, and the buffers that the caller meets.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordedMap {
+    /// What the device is to do.
+    pub recording: Recording,
+    /// Its deposits, whose buffers are those of the recording.
+    pub cast: RecordedCast,
+    /// Read back: spans of cells, distances and totals of knots.
+    pub lists: [BufferId; 3],
+}
+
+/// Records deposits and the lists of them with this room.
+pub fn record_map(room: CastRoom) -> RecordedMap {
+    let cast = record_cast(room);
+    let mut recording = cast.recording.clone();
+    let lists = record(Capacities { entries: room.entries, cells: room.cells, channels: room.channels });
+    let [cells, distances, absorbances] = cast.entries;
+    let from = [cast.list_view, cast.sort, cast.digits, cells, distances, absorbances];
+    let shared: Vec<_> = lists.inputs.into_iter().zip(from).collect();
+    let in_lists = recording.join(&lists.recording, &shared);
+    let lists = [lists.spans, lists.distances, lists.totals].map(|buffer| in_lists.of(buffer));
+    recording.read_only(&[[cast.state].as_slice(), &lists].concat());
+    RecordedMap { recording, cast, lists }
+}
+
+impl RecordedMap {
+    /// The map of a casting, from the bytes that were read back of [`RecordedCast::state`] and of [`RecordedMap::lists`].
+    ///
+    /// # Errors
+    /// As [`RecordedCast::found`].
+    pub fn map(
+        &self,
+        casting: &Casting,
+        state: &[u8],
+        [spans, distances, totals]: [&[u8]; 3],
+    ) -> Result<ShadowMap, Error> {
+        let (entries, channels) = (self.cast.found(state)?, self.cast.room.channels);
+        let cells = casting.map.cells() as usize;
+        let spans: Vec<[u32; 2]> = read("spans", spans, 2 * cells)?;
+        // Lists of surfaces begin behind the entries of media.
+        let of_media = spans.get(cells).map_or(entries, |[begin, _]| *begin).min(entries);
+        let listed = Listed {
+            spans,
+            distances: read("distances", distances, entries as usize)?,
+            totals: read("totals", totals, (entries * channels) as usize)?,
+        };
+        let entries = [of_media.into(), (entries - of_media).into()];
+        let absorbances = if channels == 3 {
+            Absorbances::Rgb(joined(vec![listed], cells, entries)?)
+        } else {
+            Absorbances::Mono(joined(vec![listed], cells, entries)?)
+        };
+        Ok(casting.map.clone().with(absorbances))
+    }
+}
+
+/// Recorded deposits, lists and look-ups, and the buffers that the caller meets.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordedShadow {
+    /// What the device is to do.
+    pub recording: Recording,
+    /// Its deposits, whose buffers are those of the recording.
+    pub cast: RecordedCast,
+    /// Read back: what all splats receive, three f32 each, behind those of the lights before.
+    pub received: BufferId,
+    shares: BufferId,
+    shadow_view: BufferId,
+}
+
+/// The bytes of a shadow beside the attributes of its splats.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShadowUploads {
+    cast: CastUploads,
+    shares: Vec<u8>,
+    view: Vec<u8>,
+}
+
+/// Records the shadow of one light with this room, the `light`th of those that have one.
+pub fn record_shadow(room: CastRoom, light: u32) -> RecordedShadow {
+    let RecordedMap { mut recording, cast, lists } = record_map(room);
+    let (r, splats) = (&mut recording, room.attributes.splats);
+    let [positions, radii, looks, frames] = cast.attributes.all();
+    let each = Groups::cover(splats.div_ceil(GROUP));
+    let receivers = r.scratch("receivers", 32 * u64::from(splats));
+    r.dispatch(&kernels::TSM_RECEIVE, each, &[cast.view, positions, radii, looks, frames, receivers], &[]);
+    let RecordedLookUp { recording: look_up, lights, view, receivers: looking, map, .. } = record_look_up(Room {
+        receivers: splats,
+        cells: room.cells / 2,
+        entries: room.entries,
+        channels: room.channels,
+        directions: room.directions,
+        opaque: room.opaque,
+    });
+    let [spans, distances, totals] = lists;
+    let known = [spans, distances, totals, cast.opaque, cast.directions];
+    let shared: Vec<_> = map.into_iter().zip(known).chain([(looking, receivers)]).collect();
+    let in_look_up = r.join(&look_up, &shared);
+    let mut last = Recording::default();
+    let [own_view, own_lights] = [last.scratch("", 0), last.scratch("", 0)];
+    let shares = last.input("shadow shares", 4 * u64::from(splats));
+    let received = last.scratch("received", 12 * u64::from(splats) * (1 + u64::from(light)));
+    last.dispatch(&kernels::TSM_HAND_ON, each, &[own_view, own_lights, shares, received], &[light]);
+    last.read(received);
+    let in_last = r.join(&last, &[(own_view, cast.view), (own_lights, in_look_up.of(lights))]);
+    let (received, shares, shadow_view) = (in_last.of(received), in_last.of(shares), in_look_up.of(view));
+    r.read_only(&[cast.state, received]);
+    RecordedShadow { recording, cast, received, shares, shadow_view }
+}
+
+impl RecordedShadow {
+    /// The attributes of all splats.
+    pub fn attributes(&self) -> &AttributeBuffers {
+        &self.cast.attributes
+    }
+
+    /// The bytes of a casting beside attributes, as [`RecordedCast::uploads`]; `shares` says for each splat how much of a
+    /// shadow it takes, in \[0, 1\], or is one number for all.
+    ///
+    /// # Errors
+    /// As [`RecordedCast::uploads`].
+    pub fn uploads(&self, casting: &Casting, ids: Option<&[u32]>, shares: &[f32]) -> Result<ShadowUploads, Error> {
+        let splats = self.cast.room.attributes.splats;
+        let found = shares.len() as u64;
+        if found != 1 && found != u64::from(splats) {
+            return Err(Error::Overflow { what: "shares of shadows", needed: found, had: splats.into() });
+        }
+        let mut cast = self.cast.uploads(casting, ids)?;
+        cast.set_shares(shares.len() as u32);
+        let view = ShadowView { receivers: splats, ..view_of(&casting.map, casting.channels) };
+        Ok(ShadowUploads {
+            cast,
+            shares: bytemuck::cast_slice(shares).to_vec(),
+            view: bytemuck::bytes_of(&view).to_vec(),
+        })
+    }
+
+    /// The uploads with the buffers that they go to.
+    pub fn inputs<'a>(&self, uploads: &'a ShadowUploads) -> Vec<(BufferId, &'a [u8])> {
+        let mut inputs = self.cast.inputs(&uploads.cast);
+        inputs.extend([(self.shares, &uploads.shares[..]), (self.shadow_view, &uploads.view)]);
+        inputs
+    }
+}
