@@ -80,8 +80,19 @@ impl Device {
     /// What makes the driver say from then on that the device is lost.
     #[cfg(feature = "losing")]
     pub fn loss(&self) -> impl Fn() + Send + Sync + 'static {
+        self.mark(crate::losing::Fate::Lost)
+    }
+
+    /// What makes the driver take work from then on and never do it.
+    #[cfg(feature = "losing")]
+    pub fn hang(&self) -> impl Fn() + Send + Sync + 'static {
+        self.mark(crate::losing::Fate::Hangs)
+    }
+
+    #[cfg(feature = "losing")]
+    fn mark(&self, fate: crate::losing::Fate) -> impl Fn() + Send + Sync + 'static {
         let queue = *self.logical.queue.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        move || crate::losing::lose(queue)
+        move || crate::losing::mark(queue, fate)
     }
 
     /// The adapter that was opened.

@@ -1,13 +1,22 @@
-//! A driver that loses devices when a test wants it: `vkQueueSubmit` of the marked devices answers `VK_ERROR_DEVICE_LOST`.
+//! A driver that loses devices when a test wants it: `vkQueueSubmit` of the marked devices answers `VK_ERROR_DEVICE_LOST`,
+//! or takes work and never does it.
 
 use ash::vk;
 use std::sync::{Mutex, PoisonError};
 
-/// A queue, the driver's own function, and whether the device is lost.
+/// What becomes of a device.
+#[derive(Clone, Copy)]
+pub(crate) enum Fate {
+    Works,
+    Lost,
+    Hangs,
+}
+
+/// A queue, the driver's own function, and what becomes of the device.
 struct Watched {
     queue: vk::Queue,
     submit: vk::PFN_vkQueueSubmit,
-    lost: bool,
+    fate: Fate,
 }
 
 /// Drivers' functions have no state of their own to tell devices apart.
@@ -16,7 +25,7 @@ static WATCHED: Mutex<Vec<Watched>> = Mutex::new(Vec::new());
 /// The device with its submissions watched.
 pub(crate) fn watch(raw: &ash::Device, queue: vk::Queue) -> ash::Device {
     let mut table = raw.fp_v1_0().clone();
-    let watched = Watched { queue, submit: table.queue_submit, lost: false };
+    let watched = Watched { queue, submit: table.queue_submit, fate: Fate::Works };
     let mut all = WATCHED.lock().unwrap_or_else(PoisonError::into_inner);
     // A queue's number may be that of a device that has ended.
     all.retain(|w| w.queue != queue);
@@ -26,10 +35,10 @@ pub(crate) fn watch(raw: &ash::Device, queue: vk::Queue) -> ash::Device {
     ash::Device::from_parts_1_3(raw.handle(), table, later.0, later.1, later.2)
 }
 
-/// From now on the device is lost.
-pub(crate) fn lose(queue: vk::Queue) {
+/// From now on this becomes of the device.
+pub(crate) fn mark(queue: vk::Queue, fate: Fate) {
     let mut all = WATCHED.lock().unwrap_or_else(PoisonError::into_inner);
-    all.iter_mut().filter(|w| w.queue == queue).for_each(|w| w.lost = true);
+    all.iter_mut().filter(|w| w.queue == queue).for_each(|w| w.fate = fate);
 }
 
 /// # Safety
@@ -42,12 +51,13 @@ unsafe extern "system" fn submit(
 ) -> vk::Result {
     let all = WATCHED.lock().unwrap_or_else(PoisonError::into_inner);
     match all.iter().find(|w| w.queue == queue) {
-        Some(Watched { lost: false, submit, .. }) => {
+        Some(Watched { fate: Fate::Works, submit, .. }) => {
             let submit = *submit;
             drop(all);
             // SAFETY: the caller's promise is passed on to the function that it is made for.
             unsafe { submit(queue, count, work, fence) }
         }
+        Some(Watched { fate: Fate::Hangs, .. }) => vk::Result::SUCCESS,
         _ => vk::Result::ERROR_DEVICE_LOST,
     }
 }
