@@ -1,6 +1,5 @@
 #version 450
 // STEP 2 of PBSR (Tanaka 2012, section 3): particles onto pixels, the nearest depth of each; as `pbsr::project`.
-// Depths in front of the eye are positive, so their bits sort as numbers.
 
 #include "blocks.glsl"
 #include "layouts.glsl"
@@ -14,88 +13,20 @@ layout(set = 0, binding = 4, std430) buffer Bound4 { uint footings[]; };
 layout(set = 0, binding = 5, std430) buffer Bound5 { uint nearest[]; };
 layout(push_constant) uniform Push { uint level; } push;
 
-const uint HAS_NORMAL = 1u << 30;
-const uint PER_CROSSING = 1u << 31;
-const float WIDEST_PX = 64.0;
-
-float normal_part(uint bits) {
-    precise float v = float(bits & 0x7fffu) * (2.0 / 32766.0) - 1.0;
-    return v;
-}
-
-// As `PackedNormal::get`.
-vec3 unpack_normal(uint packed) {
-    float x = normal_part(packed);
-    float y = normal_part(packed >> 15);
-    float z = 1.0 - abs(x) - abs(y);
-    float fold = max(-z, 0.0);
-    return normalize(vec3(x - (x < 0.0 ? -fold : fold), y - (y < 0.0 ? -fold : fold), z));
-}
-
-vec3 turned(ParticleObject o, vec3 v) {
-    precise vec3 r = o.linear_x.xyz * v.x + o.linear_y.xyz * v.y + o.linear_z.xyz * v.z;
-    return r;
-}
-
-float length_of(vec3 p) {
-    precise float square = p.x * p.x + p.y * p.y + p.z * p.z;
-    return sqrt(square);
-}
-
-// The share of its pixel that a particle takes: k = s/s(p), times |cos| where opacity does not depend on the angle.
-float share_of(ParticleObject o, vec3 p, float inverse, uint normal) {
-    precise float slab = view.orthographic != 0u ? o.share.x : o.share.x * length_of(p) * inverse * inverse * inverse;
-    if ((normal & PER_CROSSING) == 0u || (normal & HAS_NORMAL) == 0u) {
-        return slab;
-    }
-    vec3 n = unpack_normal(normal);
-    vec3 turned_normal = o.rotation_x.xyz * n.x + o.rotation_y.xyz * n.y + o.rotation_z.xyz * n.z;
-    float cosine = view.orthographic != 0u ? turned_normal.z : dot(turned_normal, p) / length_of(p);
-    return slab * abs(cosine);
-}
-
-// Pixels whose centres lie in (v - half, v + half], from and to.
-uvec2 reached(float v, float half_px, float size) {
-    float from = max(floor(v - half_px - 0.5) + 1.0, 0.0);
-    float to = min(floor(v + half_px - 0.5) + 1.0, size);
-    return to > from ? uvec2(uint(from), uint(to)) : uvec2(0u);
-}
+#include "footing.glsl"
 
 void main() {
     uint i = block_index() * 256u + gl_LocalInvocationIndex;
     if (i >= sets[3u * push.level + 1u]) {
         return;
     }
-    uint word = (sets[3u * push.level] + i) * PARTICLE_WORDS;
-    vec3 offset = vec3(
-        uintBitsToFloat(particles[word]), uintBitsToFloat(particles[word + 1u]), uintBitsToFloat(particles[word + 2u]));
-    ParticleObject o = objects[particles[word + 6u]];
-    precise vec3 p = turned(o, offset) + o.translation.xyz;
-    uvec2 columns = uvec2(0u);
-    uvec2 rows = uvec2(0u);
-    if (p.z > 0.0) {
-        float inverse = view.orthographic != 0u ? 1.0 : 1.0 / p.z;
-        precise float x = view.middle.x + view.focal * p.x * inverse;
-        precise float y = view.middle.y - view.focal * p.y * inverse;
-        float k = share_of(o, p, inverse, particles[word + 3u]);
-        if (k > 1.0) {
-            float half_px = 0.5 * min(sqrt(k), WIDEST_PX);
-            columns = reached(x, half_px, view.size.x);
-            rows = reached(y, half_px, view.size.y);
-        } else if (x >= 0.0 && x < view.size.x && y >= 0.0 && y < view.size.y) {
-            if (k >= 1.0 || uintBitsToFloat(particles[word + 5u]) < k) {
-                columns = uvec2(uint(x), uint(x) + 1u);
-                rows = uvec2(uint(y), uint(y) + 1u);
-            }
+    Footing f = footing_of((sets[3u * push.level] + i) * PARTICLE_WORDS);
+    for (uint r = f.rows.x; r < f.rows.y; r++) {
+        for (uint c = f.columns.x; c < f.columns.y; c++) {
+            atomicMin(nearest[place_of(c, r, view.columns)], f.depth);
         }
     }
-    uint depth = floatBitsToUint(p.z);
-    for (uint r = rows.x; r < rows.y; r++) {
-        for (uint c = columns.x; c < columns.y; c++) {
-            atomicMin(nearest[place_of(c, r, view.columns)], depth);
-        }
-    }
-    footings[3u * i] = columns.x | (columns.y << 16);
-    footings[3u * i + 1u] = rows.x | (rows.y << 16);
-    footings[3u * i + 2u] = depth;
+    footings[3u * i] = f.columns.x | (f.columns.y << 16);
+    footings[3u * i + 1u] = f.rows.x | (f.rows.y << 16);
+    footings[3u * i + 2u] = f.depth;
 }

@@ -1,6 +1,6 @@
 //! What an executor takes and gives: the same words whichever interface it drives.
 
-use crate::{BufferId, Fault, Recording};
+use crate::{BufferId, Fault, Recording, Step};
 use std::fmt::Debug;
 use std::time::Duration;
 
@@ -17,6 +17,25 @@ pub enum AdapterKind {
     Software,
     /// The driver does not say.
     Other,
+}
+
+impl Adapter {
+    /// Refuses a recording that needs more than this device has: memory that kernels can see, or 64-bit atomics.
+    ///
+    /// # Errors
+    /// [`DeviceError::TooLarge`], [`DeviceError::Lacking`], [`DeviceError::Recording`] for a recording at fault.
+    pub fn accept(&self, recording: &Recording) -> Result<(), DeviceError> {
+        recording.check()?;
+        let had = self.binding_bytes;
+        if let Some(b) = recording.buffers().iter().find(|b| b.bytes > had) {
+            return Err(DeviceError::TooLarge { name: b.name, needed: b.bytes, had });
+        }
+        let lacking = |step: &&Step| matches!(step, Step::Dispatch(d) if d.kernel.wide_atomics && !self.wide_atomics);
+        match recording.steps().iter().find(lacking) {
+            Some(Step::Dispatch(d)) => Err(DeviceError::Lacking { kernel: d.kernel.name, what: "atomics of 64 bits" }),
+            _ => Ok(()),
+        }
+    }
 }
 
 impl AdapterKind {
@@ -47,6 +66,8 @@ pub struct Adapter {
     pub binding_bytes: u64,
     /// Threads of a subgroup; 0 where not known.
     pub subgroup: u32,
+    /// Whether kernels can take the least of numbers of 64 bits in a buffer.
+    pub wide_atomics: bool,
 }
 
 /// Which adapter to open.
@@ -198,6 +219,14 @@ pub enum DeviceError {
         /// Bytes that it holds.
         had: u64,
     },
+    /// A kernel needs what the device does not have.
+    #[error("kernel {kernel} needs {what}, which the device does not have")]
+    Lacking {
+        /// The kernel.
+        kernel: &'static str,
+        /// What it needs.
+        what: &'static str,
+    },
     /// A buffer is larger than a kernel can see on this device.
     #[error("buffer {name} has {needed} bytes, the device's kernels see at most {had}")]
     TooLarge {
@@ -233,7 +262,15 @@ mod tests {
 
     fn adapter(name: &str, kind: AdapterKind) -> Adapter {
         let driver = String::new();
-        Adapter { name: name.to_owned(), driver, kind, memory_bytes: 0, binding_bytes: 0, subgroup: 0 }
+        Adapter {
+            name: name.to_owned(),
+            driver,
+            kind,
+            memory_bytes: 0,
+            binding_bytes: 0,
+            subgroup: 0,
+            wide_atomics: false,
+        }
     }
 
     #[test]

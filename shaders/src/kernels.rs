@@ -22,6 +22,8 @@ pub struct Kernel {
     pub bindings: &'static [Access],
     /// Size of its push constants, bytes.
     pub push_bytes: u32,
+    /// Whether it takes the least of numbers of 64 bits in a buffer, which not every device can.
+    pub wide_atomics: bool,
 }
 
 impl Kernel {
@@ -33,7 +35,7 @@ impl Kernel {
 }
 
 macro_rules! kernels {
-    ($($(#[$about:meta])* $constant:ident = $file:literal [$($access:ident),*] $(push $push:literal)?;)*) => {
+    ($($(#[$about:meta])* $constant:ident = $file:literal [$($access:ident),*] $(push $push:literal)? $(wide $wide:literal)?;)*) => {
         $(
             $(#[$about])*
             pub static $constant: Kernel = Kernel {
@@ -41,6 +43,7 @@ macro_rules! kernels {
                 spirv: include_bytes!(concat!("../spirv/", $file, ".spv")),
                 bindings: &[$(Access::$access),*],
                 push_bytes: 0 $(+ $push)?,
+                wide_atomics: false $(|| $wide)?,
             };
         )*
 
@@ -110,6 +113,25 @@ kernels! {
     PBSR_RANK = "pbsr_rank" [Read, Read, Read, Read, Read, Write] push 4;
     /// Adds who is seen: view, objects, sets, particles, footings, nearest, winners → sums. Push: level.
     PBSR_ADD = "pbsr_add" [Read, Read, Read, Read, Read, Read, Read, Write] push 4;
+
+    /// Sets depths to the limits, above no rank: view, limits → keys.
+    PBSR_KEYS = "pbsr_keys" [Read, Read, Write];
+    /// Particles onto pixels, nearest depth and lowest rank in one number of 64 bits: view, objects, sets, particles → keys.
+    /// Push: level.
+    PBSR_NEAREST = "pbsr_nearest" [Read, Read, Read, Read, Write] push 4 wide true;
+    /// Adds who is seen of each pixel: view, objects, sets, particles, limits, keys → sums. Push: level.
+    PBSR_GATHER = "pbsr_gather" [Read, Read, Read, Read, Read, Write, Write] push 4;
+    /// How many arrivals each chunk of each set has: source, tables → arrivals, counts.
+    PBSR_ARRIVE = "pbsr_arrive" [Read, Read, Write, Write];
+    /// Where each set begins, and what was found: source, scan, scanned counts → sets, found. Push: room for all sets, room
+    /// for one.
+    PBSR_SETS = "pbsr_sets" [Read, Read, Read, Write, Write] push 8;
+    /// Particles on triangles: source, tables, triangles, vertices, arrivals, scanned counts → particles.
+    PBSR_MESH = "pbsr_mesh" [Read, Read, Read, Read, Read, Read, Write];
+    /// How many arrivals in a volume stay: source, tables, cells, values, transfer, arrivals → counts.
+    PBSR_VOLUME_COUNT = "pbsr_volume_count" [Read, Read, Read, Read, Read, Read, Write];
+    /// Particles in a volume: source, tables, cells, values, transfer, arrivals, scanned counts → particles.
+    PBSR_VOLUME = "pbsr_volume" [Read, Read, Read, Read, Read, Read, Read, Write];
 
     /// Distances as keys, and places: view, distances → keys, places.
     TSM_KEYS = "tsm_keys" [Read, Read, Write, Write];

@@ -209,6 +209,62 @@ layouts! {
         pub unused: u32,
     }
 
+    /// A sampler whose sets the device makes itself.
+    pub struct ParticleSource {
+        /// First axis of a volume's lattice; the fourth number is unused.
+        pub axis_x: [f32; 4],
+        /// Second axis.
+        pub axis_y: [f32; 4],
+        /// Third axis.
+        pub axis_z: [f32; 4],
+        /// First column of the map from gradients in lattice steps to the world's.
+        pub gradient_x: [f32; 4],
+        /// Second column.
+        pub gradient_y: [f32; 4],
+        /// Third column.
+        pub gradient_z: [f32; 4],
+        /// Factor on the colours of vertices.
+        pub tint: [f32; 4],
+        /// Hash of seed and stage, the lower half first.
+        pub key: [u32; 2],
+        /// Hash of the object and of the stage that thins out.
+        pub thinning: [u32; 2],
+        /// Number of the first set of a run.
+        pub first_set: [u32; 2],
+        /// Lattice points along the first two axes.
+        pub lattice: [u32; 2],
+        /// Chunks of a set of this object.
+        pub chunks: u32,
+        /// Chunks of the objects before.
+        pub first_chunk: u32,
+        /// Chunks of all objects.
+        pub all_chunks: u32,
+        /// Sets of a run.
+        pub levels: u32,
+        /// The object.
+        pub object: u32,
+        /// Colour of particles that have none of their own, packed.
+        pub color: u32,
+        /// 1 where opacity does not depend on the angle, + 2 where there are normals, + 4 colours of vertices.
+        pub flags: u32,
+        /// Where the alias tables begin, words.
+        pub slots_at: u32,
+        /// Words of a vertex.
+        pub vertex_words: u32,
+        /// Pieces of the transfer function.
+        pub pieces: u32,
+        /// Nothing.
+        pub unused: [u32; 2],
+    }
+
+    /// What was made of sets, whether there was room for it or not.
+    pub struct ParticlesFound {
+        /// Particles of all sets of a run.
+        pub total: u32,
+        /// Particles of the set that has most.
+        pub most: u32,
+    }
+
     /// The entries that lists are made of.
     pub struct ListView {
         /// A list stops where every channel has reached this: fixed point, 2⁴⁴ units an absorbance of 1, the lower half first.

@@ -9,7 +9,7 @@ mod wrapped;
 
 pub use wrapped::{Interface, Loss, Wrapped};
 
-use splat_shaders::{Backend, Choice, DeviceError, Executor, Inputs, Ready, Recording, Run, Validation};
+use splat_shaders::{Adapter, Backend, Choice, DeviceError, Executor, Inputs, Ready, Recording, Run, Validation};
 use std::sync::Arc;
 
 /// A device by the executor that the environment names.
@@ -64,6 +64,11 @@ pub fn open_ash() -> Result<gpu_ash::Device, DeviceError> {
 }
 
 impl Device {
+    /// The adapter that was opened.
+    pub fn adapter(&self) -> &Adapter {
+        self.executor.adapter()
+    }
+
     /// As the executor's.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 
 use crate::failure;
 use crate::instance::Instance;
-use ash::vk;
+use ash::{khr, vk};
 use splat_shaders::{Adapter, AdapterKind, DeviceError, Validation};
 
 /// A device before it is opened.
@@ -58,9 +58,25 @@ fn describe(instance: &Instance, physical: vk::PhysicalDevice) -> Option<Found> 
         memory_bytes: local.map(|heap| heap.size).sum(),
         binding_bytes: u64::from(basic.limits.max_storage_buffer_range),
         subgroup: subgroup.subgroup_size,
+        wide_atomics: wide_atomics(instance, physical),
     };
     let tick_ns = if bits == 0 { 0.0 } else { f64::from(basic.limits.timestamp_period) };
     Some(Found { physical, family: family as u32, tick_ns, tick_mask: u64::MAX >> (64 - bits.clamp(1, 64)), adapter })
+}
+
+/// Whether a device has the extension and both features that kernels with 64-bit atomics need.
+fn wide_atomics(instance: &Instance, physical: vk::PhysicalDevice) -> bool {
+    // SAFETY: `physical` comes from this living instance.
+    let extensions = unsafe { instance.raw.enumerate_device_extension_properties(physical) }.unwrap_or_default();
+    if !extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(khr::shader_atomic_int64::NAME)) {
+        return false;
+    }
+    let mut atomics = vk::PhysicalDeviceShaderAtomicInt64Features::default();
+    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut atomics);
+    // SAFETY: as above; the struct in the chain belongs to an extension that the device has.
+    unsafe { instance.raw.get_physical_device_features2(physical, &mut features) };
+    let whole = features.features.shader_int64 == vk::TRUE;
+    whole && atomics.shader_buffer_int64_atomics == vk::TRUE
 }
 
 fn version(v: u32) -> String {

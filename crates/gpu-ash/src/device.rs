@@ -6,7 +6,7 @@ use crate::instance::Instance;
 use crate::memory::Memory;
 use crate::pipeline::Pipeline;
 use crate::prepared::Prepared;
-use ash::vk;
+use ash::{khr, vk};
 use splat_shaders::{Adapter, Barrier, Choice, DeviceError, Inputs, Kernel, Recording, Run, Validation, barriers};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
@@ -57,8 +57,15 @@ impl Device {
             [vk::DeviceQueueCreateInfo::default().queue_family_index(found.family).queue_priorities(&priorities)];
         // What a kernel reads beyond its buffers is defined then. GPU-assisted validation is to see it instead.
         let robust = vk::PhysicalDeviceFeatures::default().robust_buffer_access(validation != Validation::GpuAssisted);
-        let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_features(&robust);
-        // SAFETY: the adapter belongs to the instance; every device has the feature asked for.
+        let wide = found.adapter.wide_atomics;
+        let enabled = robust.shader_int64(wide);
+        let extensions = [khr::shader_atomic_int64::NAME.as_ptr()];
+        let mut atomics = vk::PhysicalDeviceShaderAtomicInt64Features::default().shader_buffer_int64_atomics(true);
+        let mut info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_features(&enabled);
+        if wide {
+            info = info.enabled_extension_names(&extensions).push_next(&mut atomics);
+        }
+        // SAFETY: the adapter belongs to the instance; every device has robust access, and this one was asked for the rest.
         let raw = unsafe { instance.raw.create_device(found.physical, &info, None) };
         let raw = raw.map_err(failure::of("vkCreateDevice"))?;
         // SAFETY: the device was made with one queue of this family.
@@ -108,8 +115,8 @@ impl Device {
     /// Takes the memory of a recording, compiles its kernels and writes its commands.
     ///
     /// # Errors
-    /// [`DeviceError::Recording`] for a recording at fault, [`DeviceError::TooLarge`], [`DeviceError::Memory`],
-    /// [`DeviceError::Driver`].
+    /// [`DeviceError::Recording`] for a recording at fault, [`DeviceError::TooLarge`], [`DeviceError::Lacking`],
+    /// [`DeviceError::Memory`], [`DeviceError::Driver`].
     pub fn prepare(&mut self, recording: &Recording) -> Result<Prepared, DeviceError> {
         self.prepare_with(recording, &barriers(recording))
     }
@@ -124,11 +131,7 @@ impl Device {
     }
 
     fn prepare_with(&mut self, recording: &Recording, waits: &[Vec<Barrier>]) -> Result<Prepared, DeviceError> {
-        recording.check()?;
-        let had = self.adapter().binding_bytes;
-        if let Some(b) = recording.buffers().iter().find(|b| b.bytes > had) {
-            return Err(DeviceError::TooLarge { name: b.name, needed: b.bytes, had });
-        }
+        self.adapter().accept(recording)?;
         Prepared::new(self, recording, waits)
     }
 

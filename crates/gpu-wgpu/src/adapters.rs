@@ -35,9 +35,15 @@ pub(crate) fn find(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
     found
 }
 
-/// What is asked of an adapter: the needed features, clocks where it has them.
+/// What kernels need that take the least of 64 bits.
+const WIDE_ATOMICS: wgpu::Features = wgpu::Features::SHADER_INT64
+    .union(wgpu::Features::SHADER_INT64_ATOMIC_MIN_MAX)
+    .union(wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS);
+
+/// What is asked of an adapter: the needed features, clocks and 64-bit atomics where it has them.
 pub(crate) fn features(adapter: &wgpu::Adapter) -> wgpu::Features {
-    NEEDED | (adapter.features() & wgpu::Features::TIMESTAMP_QUERY)
+    let wide = if adapter.features().contains(WIDE_ATOMICS) { WIDE_ATOMICS } else { wgpu::Features::empty() };
+    NEEDED | wide | (adapter.features() & wgpu::Features::TIMESTAMP_QUERY)
 }
 
 pub(crate) fn describe(adapter: &wgpu::Adapter) -> Adapter {
@@ -56,5 +62,6 @@ pub(crate) fn describe(adapter: &wgpu::Adapter) -> Adapter {
         memory_bytes: 0,
         binding_bytes: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
         subgroup: info.subgroup_min_size,
+        wide_atomics: adapter.features().contains(WIDE_ATOMICS),
     }
 }

@@ -95,14 +95,10 @@ impl Device {
     /// Takes the memory of a recording, compiles its kernels and binds its buffers.
     ///
     /// # Errors
-    /// [`DeviceError::Recording`] for a recording at fault, [`DeviceError::TooLarge`], [`DeviceError::Memory`],
-    /// [`DeviceError::Driver`].
+    /// [`DeviceError::Recording`] for a recording at fault, [`DeviceError::TooLarge`], [`DeviceError::Lacking`],
+    /// [`DeviceError::Memory`], [`DeviceError::Driver`].
     pub fn prepare(&mut self, recording: &Recording) -> Result<Prepared, DeviceError> {
-        recording.check()?;
-        let had = self.adapter.binding_bytes;
-        if let Some(b) = recording.buffers().iter().find(|b| b.bytes > had) {
-            return Err(DeviceError::TooLarge { name: b.name, needed: b.bytes, had });
-        }
+        self.adapter.accept(recording)?;
         let prepared = Prepared::new(self, recording, self.patience);
         self.faults.check("prepare", recording.bytes())?;
         Ok(prepared)

@@ -84,6 +84,21 @@ impl Blocks {
         }
     }
 
+    /// First element, number of elements and mean of each chunk.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn spans(&self) -> impl Iterator<Item = (usize, usize, f64)> {
+        self.chunks.iter().map(|&(block, mean)| {
+            let first = block as usize * BLOCK;
+            (first, BLOCK.min(self.elements - first), mean)
+        })
+    }
+
+    /// The alias tables: the share of each slot's own element, and which other of its block has the rest.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn slots(&self) -> &[(u32, u16)] {
+        &self.slots
+    }
+
     /// Bytes of the tables.
     pub(crate) fn bytes(&self) -> u64 {
         (self.slots.len() * 8 + self.chunks.len() * 16) as u64

@@ -7,6 +7,8 @@
 //! part of the mesh is sampled on its own.
 
 use crate::blocks::Blocks;
+#[cfg(feature = "gpu")]
+use crate::gpu::{Maker, Twin};
 use crate::params::countable;
 use crate::sampler::{Poisson, PoissonSets};
 use crate::stream::Stage;
@@ -14,6 +16,8 @@ use crate::{Density, Error, PackedColor, PackedNormal, Particles, SurfaceParams}
 use glam::Vec3;
 use splat_core::optics::SurfaceOpacity;
 use splat_core::{Mesh, glam};
+#[cfg(feature = "gpu")]
+use splat_shaders::layouts::ParticleSource;
 
 /// Particles on a mesh.
 pub struct MeshSampler<'a> {
@@ -126,5 +130,30 @@ impl Poisson for MeshSampler<'_> {
             }
             particles.push(p, self.normal(t, triangle, [u, v]), self.color(t, [u, v], own));
         });
+    }
+
+    #[cfg(feature = "gpu")]
+    fn tables(&self) -> Option<Twin> {
+        if self.density.is_some() {
+            return None;
+        }
+        let mesh = self.mesh;
+        let has = [!mesh.normal.is_empty(), !mesh.color.is_empty()];
+        let vertex = |i: usize| {
+            let normal = mesh.normal.get(i).into_iter().flat_map(|n| n.to_array());
+            let color = mesh.color.get(i).into_iter().flat_map(|c| [c[0], c[1], c[2]]);
+            mesh.position[i].to_array().into_iter().chain(normal).chain(color).map(f32::to_bits)
+        };
+        let [r, g, b] = self.params.color;
+        let per_crossing = self.params.surface_opacity == SurfaceOpacity::PerCrossing;
+        let source = ParticleSource {
+            tint: [r, g, b, 0.0],
+            color: PackedColor::new(self.params.color).bits(),
+            flags: u32::from(per_crossing) + 2 * u32::from(has[0]) + 4 * u32::from(has[1]),
+            vertex_words: 3 * (1 + has.iter().filter(|h| **h).count() as u32),
+            ..ParticleSource::default()
+        };
+        let tables = [mesh.triangles.as_flattened().to_vec(), (0..mesh.position.len()).flat_map(vertex).collect()];
+        Some(Twin::new(Maker::Mesh, self, source, tables.into(), (self.params.seed, Stage::Mesh)))
     }
 }

@@ -33,6 +33,22 @@ impl Pieces {
         Self { all: (0..points.len()).map(piece).collect() }
     }
 
+    /// Number of pieces.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn len(&self) -> usize {
+        self.all.len()
+    }
+
+    /// Value, colour, extinction and their changes of each piece, as kernels read them.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn words(&self) -> Vec<u32> {
+        let words = |p: &Piece| {
+            let ([r, g, b], [dr, dg, db]) = (p.from.color, p.color);
+            [p.from.value, r, g, b, p.from.extinction, dr, dg, db, p.extinction].map(f32::to_bits)
+        };
+        self.all.iter().flat_map(words).collect()
+    }
+
     /// The piece in which all values `low ..= high` lie, if there is one that spares a search.
     pub(crate) fn of(&self, low: f32, high: f32) -> u32 {
         let after = self.all.partition_point(|p| p.from.value <= low);

@@ -2,6 +2,8 @@
 
 use crate::Particles;
 use crate::blocks::Blocks;
+#[cfg(feature = "gpu")]
+use crate::gpu::Twin;
 use rayon::prelude::*;
 use splat_core::glam::DVec3;
 use std::ops::Range;
@@ -33,6 +35,12 @@ pub trait Sampler: Sync {
     fn expected_particles(&self) -> f64 {
         (0..self.chunks()).map(|c| self.expected(c)).sum()
     }
+
+    /// The tables from which a device makes the same sets, where it can; else its sets are uploaded.
+    #[cfg(feature = "gpu")]
+    fn twin(&self) -> Option<Twin> {
+        None
+    }
 }
 
 /// What samplers of a Poisson number of particles share: elements with rates, in blocks.
@@ -59,6 +67,12 @@ pub(crate) trait Poisson: Sync {
 
     /// Appends the particles of chunk `chunk` of set `set`.
     fn fill(&self, set: u64, chunk: usize, particles: &mut Particles);
+
+    /// What a device needs to do the same, if it can.
+    #[cfg(feature = "gpu")]
+    fn tables(&self) -> Option<Twin> {
+        None
+    }
 }
 
 impl<T: Poisson> Sampler for T {
@@ -83,6 +97,11 @@ impl<T: Poisson> Sampler for T {
         scratch.reserve((self.expected(chunk) * 1.1) as usize + 64);
         self.fill(set, chunk, scratch);
         scratch
+    }
+
+    #[cfg(feature = "gpu")]
+    fn twin(&self) -> Option<Twin> {
+        self.tables()
     }
 }
 

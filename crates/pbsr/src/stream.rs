@@ -6,6 +6,9 @@
 use glam::DVec3;
 use splat_core::{glam, rng};
 
+/// The mean from which Poisson variables are drawn by rejection.
+pub(crate) const REJECTED_FROM: f64 = 12.0;
+
 /// The first word of each counter names the sampler, so that two samplers of one seed share no numbers.
 #[derive(Debug, Clone, Copy)]
 #[repr(u64)]
@@ -84,7 +87,7 @@ impl Stream {
 
     /// A Poisson variable of mean `mean`; 0 for a mean that is not positive.
     pub(crate) fn poisson(&mut self, mean: f64) -> u64 {
-        if mean < 12.0 { self.poisson_by_inversion(mean) } else { self.poisson_by_rejection(mean) }
+        if mean < REJECTED_FROM { self.poisson_by_inversion(mean) } else { self.poisson_by_rejection(mean) }
     }
 
     fn poisson_by_inversion(&mut self, mean: f64) -> u64 {
@@ -103,10 +106,7 @@ impl Stream {
     }
 
     fn poisson_by_rejection(&mut self, mean: f64) -> u64 {
-        let b = 0.931 + 2.53 * mean.sqrt();
-        let a = -0.059 + 0.02483 * b;
-        let v_r = 0.9277 - 3.6224 / (b - 2.0);
-        let inverse_alpha = 1.1239 + 1.1328 / (b - 3.4);
+        let [b, a, v_r, inverse_alpha] = rejection(mean);
         loop {
             let u = self.unit() - 0.5;
             let v = self.unit();
@@ -124,6 +124,13 @@ impl Stream {
             }
         }
     }
+}
+
+/// b, a, v_r and 1/α of PTRS for a mean.
+pub(crate) fn rejection(mean: f64) -> [f64; 4] {
+    let b = 0.931 + 2.53 * mean.sqrt();
+    let a = -0.059 + 0.02483 * b;
+    [b, a, 0.9277 - 3.6224 / (b - 2.0), 1.1239 + 1.1328 / (b - 3.4)]
 }
 
 #[inline]

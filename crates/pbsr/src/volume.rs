@@ -18,6 +18,8 @@
 
 use crate::blocks::Blocks;
 use crate::error::check;
+#[cfg(feature = "gpu")]
+use crate::gpu::{Maker, Twin};
 use crate::params::{countable, positive};
 use crate::pieces::{Pieces, SEVERAL};
 use crate::sampler::{Poisson, PoissonSets};
@@ -26,6 +28,8 @@ use crate::{Density, Error, PackedColor, PackedNormal, Particles};
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 use splat_core::{Grid, TransferFunction, glam};
+#[cfg(feature = "gpu")]
+use splat_shaders::layouts::ParticleSource;
 
 /// What a sampler of volumes needs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -231,5 +235,31 @@ impl Poisson for GridSampler<'_> {
             let (normal, color) = self.attributes(point.color, gradient);
             particles.push(offset, normal, color);
         });
+    }
+
+    #[cfg(feature = "gpu")]
+    fn tables(&self) -> Option<Twin> {
+        if self.density.is_some() {
+            return None;
+        }
+        let columns = |m: &Mat3| [m.x_axis, m.y_axis, m.z_axis].map(|v| v.extend(0.0).to_array());
+        let ([axis_x, axis_y, axis_z], [gradient_x, gradient_y, gradient_z]) =
+            (columns(&self.axes), columns(&self.gradient));
+        let source = ParticleSource {
+            axis_x,
+            axis_y,
+            axis_z,
+            gradient_x,
+            gradient_y,
+            gradient_z,
+            lattice: [self.grid.dims[0] as u32, self.grid.dims[1] as u32],
+            flags: 2 * u32::from(self.params.normals),
+            pieces: self.pieces.len() as u32,
+            ..ParticleSource::default()
+        };
+        let cells = self.cells.iter().flat_map(|c| [c.at, c.most.to_bits(), c.piece]).collect();
+        let values = self.grid.values.iter().map(|v| v.to_bits()).collect();
+        let tables = vec![cells, values, self.pieces.words()];
+        Some(Twin::new(Maker::Volume, self, source, tables, (self.params.seed, Stage::Volume)))
     }
 }

@@ -2,10 +2,15 @@
 
 /// 64 random bits of the counter; the SplitMix64 finalizer applied to each word in turn.
 pub fn bits(seed: u64, stage: u64, item: u64, sample: u64) -> u64 {
-    let mut h = mix(seed ^ 0x9e37_79b9_7f4a_7c15);
-    h = mix(h ^ stage.wrapping_mul(0xd1b5_4a32_d192_ed03));
+    let mut h = hash(seed, stage);
     h = mix(h ^ item.wrapping_mul(0x8cb9_2ba7_2f3d_8dd7));
     mix(h ^ sample.wrapping_mul(0xaaaa_aaaa_aaaa_aaab))
+}
+
+/// What [`bits`] makes of the first two words: for whoever goes on with the others elsewhere, on a device say.
+pub fn hash(seed: u64, stage: u64) -> u64 {
+    let h = mix(seed ^ 0x9e37_79b9_7f4a_7c15);
+    mix(h ^ stage.wrapping_mul(0xd1b5_4a32_d192_ed03))
 }
 
 /// Uniform f64 in (0, 1): 52 bits, the middle of each interval, so ln(u) and ln(1 − u) are finite.

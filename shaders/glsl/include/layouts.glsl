@@ -113,6 +113,36 @@ struct ParticleView {
     uint unused;
 };
 
+struct ParticleSource {
+    vec4 axis_x;
+    vec4 axis_y;
+    vec4 axis_z;
+    vec4 gradient_x;
+    vec4 gradient_y;
+    vec4 gradient_z;
+    vec4 tint;
+    uvec2 key;
+    uvec2 thinning;
+    uvec2 first_set;
+    uvec2 lattice;
+    uint chunks;
+    uint first_chunk;
+    uint all_chunks;
+    uint levels;
+    uint object;
+    uint color;
+    uint flags;
+    uint slots_at;
+    uint vertex_words;
+    uint pieces;
+    uvec2 unused;
+};
+
+struct ParticlesFound {
+    uint total;
+    uint most;
+};
+
 struct ListView {
     uvec2 stop;
     uint entries;

@@ -4,6 +4,10 @@
 // first particle, particles, seed of the order of equals.
 const uint PARTICLE_WORDS = 7u;
 
+// Bits of a packed normal.
+const uint HAS_NORMAL = 1u << 30;
+const uint PER_CROSSING = 1u << 31;
+
 // A permutation of 32 bits.
 uint scramble(uint v) {
     v ^= v >> 16;
@@ -13,10 +17,24 @@ uint scramble(uint v) {
     return v ^ (v >> 15);
 }
 
+// Its inverse.
+uint unscramble(uint v) {
+    v ^= (v >> 15) ^ (v >> 30);
+    v *= 0x97132227u;
+    v ^= (v >> 15) ^ (v >> 30);
+    v *= 0x333c4925u;
+    return v ^ (v >> 16);
+}
+
 // Place of a particle among those of the same depth on a pixel: a permutation of the particles, another one for each
 // pixel and set, so that nobody is first by its place in the list.
 uint rank_of(uint particle, uint pixel, uint seed) {
     return scramble(particle ^ scramble(pixel ^ scramble(seed)));
+}
+
+// The particle of a rank.
+uint of_rank(uint rank, uint pixel, uint seed) {
+    return unscramble(rank) ^ scramble(pixel ^ scramble(seed));
 }
 
 // Where a pixel stands: tiles of 64 by 64 one after the other, as `pbsr::bins::Tiling` has it.

@@ -2,7 +2,7 @@
 
 use super::chain::{Chained, Translucent, chain_on};
 use super::order::order_on;
-use super::particles::{Folded, fold_on, why_not};
+use super::particles::{Folding, why_not};
 use super::shadows::{LookUps, LookedUp, look_up_on, map_on};
 use super::splats::{composite_on, why_not_composite};
 use super::trial::order_trial;
@@ -153,9 +153,10 @@ impl Helper {
     }
 
     /// Folds sets of particles until the ensemble has `until` of them, or as many as the device can; the rest is the
-    /// processor's. Gives the number of particles.
+    /// processor's. Gives the number of particles. `folding` is that of the steps before.
     pub(crate) fn fold(
         &self,
+        folding: &mut Folding,
         scene: &Scene<'_>,
         ensemble: &mut Ensemble,
         until: u32,
@@ -166,13 +167,16 @@ impl Helper {
             self.leave(why);
             return Ok(0);
         }
-        let mut folded = Folded::default();
+        let before = folding.particles;
         let cancelled =
-            self.with(|device| match fold_on(device, scene, ensemble, until, max_bytes, progress, &mut folded) {
+            self.with(|device| match folding.fold_on(device, scene, ensemble, until, max_bytes, progress) {
                 Err(Failure::Particles(e @ pbsr::Error::Core(splat_core::Error::Cancelled))) => Ok(Some(e)),
                 done => done.map(|()| None),
             });
-        cancelled.flatten().map_or(Ok(folded.particles), Err)
+        if folding.uploads() {
+            self.leave("particles of other things than meshes and regular volumes are sampled by the processor");
+        }
+        cancelled.flatten().map_or(Ok(folding.particles - before), Err)
     }
 
     /// Says why something is the processor's, where somebody could have expected the device to do it.
@@ -254,7 +258,15 @@ mod tests {
             left.map_err(|_| DeviceError::NoDevice { why: "gone".to_owned() })?;
             let (name, driver) = ("X".to_owned(), String::new());
             let kind = AdapterKind::Discrete;
-            Ok(Box::new(Nothing(Adapter { name, driver, kind, memory_bytes: 0, binding_bytes: 0, subgroup: 0 })))
+            Ok(Box::new(Nothing(Adapter {
+                name,
+                driver,
+                kind,
+                memory_bytes: 0,
+                binding_bytes: 0,
+                subgroup: 0,
+                wide_atomics: false,
+            })))
         }
     }
 

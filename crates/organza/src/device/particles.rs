@@ -1,23 +1,31 @@
-//! Sets of particles, projected and averaged by a device.
+//! Sets of particles, made, projected and averaged by a device.
 //!
-//! Sets are independent, so as many go into one run as the device's kernels can see at once; what a run gave is added to
-//! the ensemble here, and a device that is lost costs no more than the sets of its last run.
+//! Where every sampler of a scene has a twin, the device makes the sets itself: tables go up once, and of a set nothing.
+//! Elsewhere the processor samples them and they are uploaded. Sets are independent, so as many go into one run as the
+//! device's kernels can see at once; what a run gave is added to the ensemble here, and a device that is lost costs no more
+//! than the sets of its last run.
 
 use super::Failure;
-use pbsr::gpu::{Capacities, Recorded, record};
+use pbsr::gpu::{Capacities, Generated, Nearest, Recorded, Sources, record, record_generated};
 use pbsr::{Ensemble, Error, Scene};
 use splat_core::{Progress, Shading};
-use splat_shaders::{Executor, PassTime, Ready};
+use splat_shaders::{BufferId, Executor, PassTime, Ready};
 
 /// Most sets of one run: a look at the clock and at an interrupt comes between two.
 const MOST_LEVELS: u32 = 16;
-/// Bytes of a particle that is uploaded.
+/// Bytes of a particle on the device.
 const PARTICLE_BYTES: u64 = 28;
 
-/// What folding on a device did, failures included.
-#[derive(Debug, Default)]
-pub(super) struct Folded {
-    /// Particles that were uploaded.
+/// How a device folds the sets of one scene, kept from step to step, and what it did.
+#[derive(Default)]
+pub(crate) struct Folding {
+    /// The tables of the samplers, once they were asked for; `None` inside where sets are uploaded.
+    sources: Option<Option<Sources>>,
+    making: Option<(Generated, Box<dyn Ready>)>,
+    uploading: Option<(Recorded, Box<dyn Ready>)>,
+    /// Particles that there is room for in a set; more than was expected where that was too few.
+    of_set: Option<u32>,
+    /// Particles of all runs.
     pub(super) particles: u64,
     /// The dispatches of all runs.
     pub(super) passes: Vec<PassTime>,
@@ -36,49 +44,131 @@ pub(super) fn why_not(scene: &Scene<'_>, ensemble: &Ensemble) -> Option<&'static
     lit.then_some("particles that are lit are the processor's (a device does material.shading = \"unlit\")")
 }
 
-/// Folds sets until the ensemble has `until` of them, uploading at most so many bytes of particles at once. What was folded before a failure stays in.
-pub(super) fn fold_on(
-    device: &mut dyn Executor,
-    scene: &Scene<'_>,
-    ensemble: &mut Ensemble,
-    until: u32,
-    max_bytes: u64,
-    progress: &Progress,
-    folded: &mut Folded,
-) -> Result<(), Failure> {
-    let most_bytes = device.adapter().binding_bytes.min(max_bytes);
-    let mut of_set = expected_of_set(scene);
-    let mut prepared: Option<(Recorded, Box<dyn Ready>)> = None;
-    while ensemble.levels() < until {
-        let needed = PARTICLE_BYTES * u64::from(of_set.max(1));
-        if needed > max_bytes {
-            return Err(Error::TooMuch { what: "bytes of one set of particles", needed, had: max_bytes }.into());
+impl Folding {
+    /// Sets that the processor samples, whether or not the device could make them.
+    pub(super) fn uploaded() -> Self {
+        Self { sources: Some(None), ..Self::default() }
+    }
+
+    /// Whether the processor samples the sets.
+    pub(super) fn uploads(&self) -> bool {
+        self.sources == Some(None)
+    }
+
+    /// Folds sets until the ensemble has `until` of them, with at most so many bytes of particles at once. What was folded
+    /// before a failure stays in.
+    pub(super) fn fold_on(
+        &mut self,
+        device: &mut dyn Executor,
+        scene: &Scene<'_>,
+        ensemble: &mut Ensemble,
+        until: u32,
+        max_bytes: u64,
+        progress: &Progress,
+    ) -> Result<(), Failure> {
+        let folded = self.fold(device, scene, ensemble, until, max_bytes, progress);
+        if folded.is_err() {
+            // They belong to a device that may be gone.
+            (self.making, self.uploading) = (None, None);
         }
-        let fit = most_bytes / needed;
-        let levels = (until - ensemble.levels()).min(MOST_LEVELS).min(fit.max(1) as u32);
-        let room = capacities(scene, of_set, levels);
-        let (recorded, ready) = match prepared.take().filter(|(recorded, _)| recorded.capacities == room) {
-            Some(same) => prepared.insert(same),
+        folded
+    }
+
+    fn fold(
+        &mut self,
+        device: &mut dyn Executor,
+        scene: &Scene<'_>,
+        ensemble: &mut Ensemble,
+        until: u32,
+        max_bytes: u64,
+        progress: &Progress,
+    ) -> Result<(), Failure> {
+        let most_bytes = device.adapter().binding_bytes.min(max_bytes);
+        while ensemble.levels() < until {
+            let of_set = *self.of_set.get_or_insert_with(|| expected_of_set(scene));
+            let needed = PARTICLE_BYTES * u64::from(of_set.max(1));
+            if needed > max_bytes {
+                return Err(Error::TooMuch { what: "bytes of one set of particles", needed, had: max_bytes }.into());
+            }
+            let levels = (until - ensemble.levels()).min(MOST_LEVELS).min((most_bytes / needed).max(1) as u32);
+            let room = capacities(scene, of_set, levels);
+            let sources = || Sources::new(scene).filter(|s| s.bytes() <= most_bytes);
+            let folded = match self.sources.get_or_insert_with(sources).take() {
+                None => self.upload(device, scene, ensemble, room)?,
+                Some(sources) => {
+                    let folded = self.make(device, &sources, scene, ensemble, room);
+                    self.sources = Some(Some(sources));
+                    folded?
+                }
+            };
+            match folded {
+                Ok(particles) => self.particles += particles,
+                Err(Error::TooMuch { needed, had, .. }) => {
+                    self.of_set = Some(more_of_set(of_set, needed, had)?);
+                    continue;
+                }
+                Err(other) => return Err(other.into()),
+            }
+            progress.tick(u64::from(levels)).map_err(Error::from)?;
+        }
+        Ok(())
+    }
+
+    /// Lets the device make as many sets as there is room for, and fold them; the inner error says how much room they need.
+    fn make(
+        &mut self,
+        device: &mut dyn Executor,
+        sources: &Sources,
+        scene: &Scene<'_>,
+        ensemble: &mut Ensemble,
+        room: Capacities,
+    ) -> Result<Result<u64, Error>, Failure> {
+        let kept = self.making.take().filter(|(generated, _)| generated.capacities == room);
+        let fresh = kept.is_none();
+        let (generated, ready) = self.making.insert(match kept {
+            Some(kept) => kept,
             None => {
-                let recorded = record(room)?;
+                let generated = record_generated(room, Nearest::of(device.adapter()), sources)?;
+                let ready = device.prepare(&generated.recording)?;
+                (generated, ready)
+            }
+        });
+        let mut inputs = generated.next(sources, ensemble);
+        if fresh {
+            inputs.extend(generated.tables(sources, scene, ensemble)?);
+        }
+        let inputs: Vec<(BufferId, &[u8])> = inputs.iter().map(|(buffer, bytes)| (*buffer, &bytes[..])).collect();
+        let run = ready.run(&inputs)?;
+        let added = generated.add(&run, ensemble);
+        self.passes.extend(run.passes);
+        Ok(added)
+    }
+
+    /// Samples and uploads as many sets as there is room for, and folds them.
+    fn upload(
+        &mut self,
+        device: &mut dyn Executor,
+        scene: &Scene<'_>,
+        ensemble: &mut Ensemble,
+        room: Capacities,
+    ) -> Result<Result<u64, Error>, Failure> {
+        let (recorded, ready) = match self.uploading.take().filter(|(recorded, _)| recorded.capacities == room) {
+            Some(same) => self.uploading.insert(same),
+            None => {
+                let recorded = record(room, Nearest::of(device.adapter()))?;
                 let ready = device.prepare(&recorded.recording)?;
-                prepared.insert((recorded, ready))
+                self.uploading.insert((recorded, ready))
             }
         };
         let uploads = match recorded.uploads(scene, ensemble) {
-            Err(Error::TooMuch { needed, had, .. }) => {
-                of_set = more_of_set(of_set, needed, had)?;
-                continue;
-            }
-            uploads => uploads?,
+            Ok(uploads) => uploads,
+            Err(why) => return Ok(Err(why)),
         };
         let run = ready.run(&recorded.inputs(&uploads))?;
         recorded.add(run.bytes(recorded.sums), ensemble)?;
-        folded.particles += uploads.particles;
-        folded.passes.extend(run.passes);
-        progress.tick(u64::from(levels)).map_err(Error::from)?;
+        self.passes.extend(run.passes);
+        Ok(Ok(uploads.particles))
     }
-    Ok(())
 }
 
 fn capacities(scene: &Scene<'_>, of_set: u32, levels: u32) -> Capacities {

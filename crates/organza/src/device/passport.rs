@@ -4,7 +4,7 @@ mod chain;
 mod composite;
 mod shadow;
 
-use super::particles::{Folded, fold_on};
+use super::particles::Folding;
 use super::trial::OrderInput;
 use super::{Failure, backends, listed};
 use crate::Error;
@@ -51,7 +51,7 @@ impl Passport {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Checked {
     /// `order`, `shadow lists`, `shadow look-ups`, `project`, `shade`, `composite`, `chain` (the order and the three before
-    /// as one) or `particles`.
+    /// as one), `particles` (uploaded sets) or `made particles` (sets of the same seeds that the device makes).
     pub recording: &'static str,
     /// Splats or particles that went in.
     pub items: u64,
@@ -146,7 +146,8 @@ fn inspect(backend: &dyn Backend, place: usize, adapter: Adapter, input: &Inputs
         check("shade", &mut |device| input.chain.check_shade(device)),
         check("composite", &mut |device| input.composite.check(device)),
         check("chain", &mut |device| input.chain.check_chain(device)),
-        check("particles", &mut |device| input.particles.check(device)),
+        check("particles", &mut |device| input.particles.check(device, Folding::uploaded())),
+        check("made particles", &mut |device| input.particles.check(device, Folding::default())),
     ];
     let clockless = recordings.iter().all(|r| r.outcome.is_ok() && r.passes.is_empty());
     let missing = [(clockless, "timestamps"), (adapter.subgroup == 0, "the size of a subgroup")];
@@ -222,7 +223,7 @@ impl ParticlesInput {
         Self { walls: [wall(0.7, 0.8), wall(1.5, -0.5)], camera }
     }
 
-    fn check(&self, device: &mut dyn Executor) -> Result<Found, Failure> {
+    fn check(&self, device: &mut dyn Executor, mut folding: Folding) -> Result<Found, Failure> {
         let middle = pixel_area(&self.camera, DVec3::new(0.0, 0.0, 4.0));
         let params = |s: f64, seed, color| SurfaceParams {
             opacity: 0.4,
@@ -243,9 +244,8 @@ impl ParticlesInput {
         let empty = Ensemble::new(SIZE, &EnsembleParams { radiance_unit: 0.5, ..EnsembleParams::default() })?;
         let (mut expected, mut found, progress) = (empty.clone(), empty, Progress::default());
         Renderer::new().fold(&scene, &mut expected, SETS, &FoldParams::default(), &progress)?;
-        let mut folded = Folded::default();
-        fold_on(device, &scene, &mut found, SETS, u64::MAX, &progress, &mut folded)?;
-        let Folded { particles, passes } = folded;
+        folding.fold_on(device, &scene, &mut found, SETS, u64::MAX, &progress)?;
+        let Folding { particles, passes, .. } = folding;
         Ok(Found { items: particles, agreement: particles_agreement(&found, &expected), passes })
     }
 }

@@ -3,7 +3,7 @@
 use super::checkpoint::Checkpoint;
 use super::fault;
 use super::parts::Part;
-use crate::device::Helper;
+use crate::device::{Folding, Helper};
 use crate::points::Drawing;
 use crate::scene::ParticlesSettings;
 use crate::{Error, Progress, RenderOptions};
@@ -43,12 +43,12 @@ pub(super) fn fold(
     let params = fold_params(options);
     let settings = &drawing.settings.particles;
     let background = |_, _| drawing.background;
-    let mut renderer = Renderer::new();
+    let (mut renderer, mut folding) = (Renderer::new(), Folding::default());
     let helper = helper(drawing, checkpoint.is_some());
     drawing.progress.add_total(u64::from(settings.repeat_level.saturating_sub(average.ensemble.levels())));
     while let Some(levels) = average.next_step(settings) {
         let step = Step { until: average.ensemble.levels() + levels, helper, params, progress: drawing.progress };
-        let folded = step.fold(&mut renderer, &scene, &mut average.ensemble);
+        let folded = step.fold(&mut renderer, &mut folding, &scene, &mut average.ensemble);
         match folded.map_err(fault) {
             Ok(particles) => average.particles += particles,
             // Two sets are a picture, with its error.
@@ -126,9 +126,15 @@ struct Step<'a> {
 
 impl Step<'_> {
     /// Folds by the device, and what that did not do by the processor, from where it was. Gives the number of particles.
-    fn fold(&self, renderer: &mut Renderer, scene: &Scene<'_>, ensemble: &mut Ensemble) -> Result<u64, pbsr::Error> {
+    fn fold(
+        &self,
+        renderer: &mut Renderer,
+        folding: &mut Folding,
+        scene: &Scene<'_>,
+        ensemble: &mut Ensemble,
+    ) -> Result<u64, pbsr::Error> {
         let by_device = match self.helper {
-            Some(helper) => helper.fold(scene, ensemble, self.until, self.params.max_bytes, self.progress)?,
+            Some(helper) => helper.fold(folding, scene, ensemble, self.until, self.params.max_bytes, self.progress)?,
             None => 0,
         };
         match self.until - ensemble.levels() {

@@ -5,6 +5,7 @@ mod canary;
 mod chained;
 mod composited;
 mod deposits;
+mod generated;
 mod kernels;
 mod order;
 mod particles;

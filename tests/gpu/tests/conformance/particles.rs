@@ -1,7 +1,7 @@
 //! The ensemble of uploaded particles on a device: the CPU's sums.
 
 use gpu_conformance::open;
-use pbsr::gpu::{Capacities, record};
+use pbsr::gpu::{Capacities, Nearest, record};
 use pbsr::{
     Appearance, Ensemble, EnsembleParams, Error, FoldParams, MeshSampler, Object, Occluder, Renderer, Sampler, Scene,
     SurfaceParams, pixel_area,
@@ -26,19 +26,28 @@ fn object(sampler: &dyn Sampler, turn: f64, emission: [f32; 3]) -> Object<'_> {
     Object { sampler, transform, look: Appearance { material, ..Appearance::default() } }
 }
 
-/// Folds three sets on the CPU and three on the device; the first begins where the other ends, then both again.
+/// Folds three sets on the CPU and three on the device; the first begins where the other ends, then both again. Whatever way
+/// the device finds the nearest, sums are the same.
 fn both(scene: &Scene<'_>) -> [Ensemble; 2] {
     let mut device = open().unwrap();
-    let recorded = record(ROOM).unwrap();
-    let mut prepared = device.prepare(&recorded.recording).unwrap();
+    let mut ways = vec![Nearest::Ranked];
+    ways.extend((Nearest::of(device.adapter()) == Nearest::Wide).then_some(Nearest::Wide));
     let empty = Ensemble::new(SIZE, &EnsembleParams { radiance_unit: 0.5, ..EnsembleParams::default() }).unwrap();
     let (mut cpu, mut gpu) = (empty.clone(), empty);
     let (params, progress) = (FoldParams::default(), Progress::default());
     Renderer::new().fold(scene, &mut cpu, 2 * ROOM.levels, &params, &progress).unwrap();
-    for _ in 0..2 {
-        let uploads = recorded.uploads(scene, &gpu).unwrap();
-        let run = prepared.run(&recorded.inputs(&uploads)).unwrap();
-        recorded.add(run.bytes(recorded.sums), &mut gpu).unwrap();
+    let empty = gpu.clone();
+    for way in ways {
+        let recorded = record(ROOM, way).unwrap();
+        let mut prepared = device.prepare(&recorded.recording).unwrap();
+        let mut sums = empty.clone();
+        for _ in 0..2 {
+            let uploads = recorded.uploads(scene, &sums).unwrap();
+            let run = prepared.run(&recorded.inputs(&uploads)).unwrap();
+            recorded.add(run.bytes(recorded.sums), &mut sums).unwrap();
+        }
+        assert!(gpu == empty || gpu == sums, "{way:?} finds others");
+        gpu = sums;
     }
     assert_eq!(device.take_messages(), [""; 0]);
     assert_eq!((cpu.levels(), gpu.levels()), (2 * ROOM.levels, 2 * ROOM.levels));
@@ -143,7 +152,7 @@ fn too_little_room_is_refused_with_what_is_needed() {
     let objects = [object(&sampler, 0.0, [0.0; 3])];
     let scene = Scene { objects: &objects, lights: &[], ambient: [0.0; 3], camera: &camera, occluder: None };
     let ensemble = Ensemble::new(SIZE, &EnsembleParams::default()).unwrap();
-    let uploads = |room| record(room).unwrap().uploads(&scene, &ensemble);
+    let uploads = |room| record(room, Nearest::Ranked).unwrap().uploads(&scene, &ensemble);
     let Err(Error::TooMuch { what: "particles of one set", needed, had: 10 }) =
         uploads(Capacities { of_set: 10, ..ROOM })
     else {
@@ -154,5 +163,8 @@ fn too_little_room_is_refused_with_what_is_needed() {
     assert!(matches!(uploads(Capacities { objects: 0, ..ROOM }), Err(Error::TooMuch { what: "objects", .. })));
     let lit = Object { look: Appearance::default(), ..objects[0] };
     let lit = Scene { objects: &[lit], ..scene };
-    assert!(matches!(record(ROOM).unwrap().uploads(&lit, &ensemble), Err(Error::Parameter { name: "objects", .. })));
+    assert!(matches!(
+        record(ROOM, Nearest::Ranked).unwrap().uploads(&lit, &ensemble),
+        Err(Error::Parameter { name: "objects", .. })
+    ));
 }

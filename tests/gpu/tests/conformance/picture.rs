@@ -164,6 +164,22 @@ fn particles_by_a_device_are_the_processor_s_in_almost_every_pixel() {
 }
 
 #[test]
+fn particles_that_the_device_cannot_make_are_uploaded() {
+    let fog = r#"
+        [[object]]
+        name = "fog"
+        material = "plain"
+        medium_box = { min = [-0.5, -1, -1], max = [1, 1, 0.5], extinction = 0.8, spacing = 0.2 }
+        "#;
+    let alone = particles(None, fog);
+    let (device, choice) = losing(Loss::Never, u64::MAX);
+    let helped = particles(Some(choice), fog);
+    assert!(agreement(&alone, &helped) >= 0.999, "{}", agreement(&alone, &helped));
+    assert!(helped.warnings.iter().any(|w| w.contains("are sampled by the processor")), "{:?}", helped.warnings);
+    assert_eq!((device.submissions(), helped.warnings.len()), (1 + 5, alone.warnings.len() + 1));
+}
+
+#[test]
 fn killing_the_device_between_sets_goes_on_from_there() {
     let alone = particles(None, "");
     // 40 sets are five batches of eight, after the trial.
@@ -206,7 +222,8 @@ fn every_device_has_a_passport() {
     assert_eq!(passports.len(), organza::devices().unwrap().len());
     for passport in &passports {
         assert!(passport.valid(), "{passport:?}");
-        let [order, lists, look_ups, project, shade, composite, chain, particles] = &passport.recordings[..] else {
+        let [order, lists, look_ups, project, shade, composite, chain, particles, made] = &passport.recordings[..]
+        else {
             panic!("{passport:?}")
         };
         assert_eq!((order.recording, order.items), ("order", 1 << 17));
@@ -218,7 +235,10 @@ fn every_device_has_a_passport() {
         for splats in [project, shade, composite, chain] {
             assert!(splats.items == 1 << 14 && splats.outcome.as_ref().is_ok_and(composited), "{splats:?}");
         }
-        assert!(particles.items > 100_000 && particles.outcome.as_ref().is_ok_and(|a| a.mean < 1e-3));
+        for particles in [particles, made] {
+            assert!(particles.items > 100_000 && particles.outcome.as_ref().is_ok_and(|a| a.mean < 1e-3));
+        }
+        assert_eq!(particles.items, made.items);
         // Of each kernel one row: four passes of the sort are one.
         let scatter = order.passes.iter().filter(|k| k.kernel.ends_with("scatter")).map(|k| k.dispatches);
         assert!(order.passes.is_empty() || scatter.sum::<u32>() == 4, "{:?}", order.passes);

@@ -1,0 +1,170 @@
+//! Sets that the device makes itself, and folds: nothing of a set is uploaded, and none leaves the device.
+//!
+//! Each chunk of each set draws its Poisson number from its own counter; volumes count what stays of their arrivals; one
+//! scan over the chunks of all sets, objects and levels gives every particle its place, which is the one that it has among
+//! uploaded ones. Then each chunk is made by a workgroup, and the projection of uploaded sets goes on from there.
+//!
+//! Deviations from the CPU: a Poisson number takes logarithms in 32 bits, so in some chunks of 10⁵ it is another by one; a
+//! place takes products and sums alone and has the CPU's bits, a normal and a colour are at most one step off.
+
+use super::twin::{Maker, Sources, halves};
+use super::{Capacities, Nearest, PARTICLE_WORDS, Recorded, record, room, take_in};
+use crate::{Ensemble, Error, Scene};
+use splat_shaders::layouts::{ParticleSource, ParticlesFound, Scan};
+use splat_shaders::radix::{SCAN_BLOCK, Scanned};
+use splat_shaders::{BufferId, Groups, Recording, Run, kernels};
+use std::borrow::Cow;
+
+/// Words of a chunk's arrivals: their number, and the state of its stream after that.
+const ARRIVAL_WORDS: u64 = 3;
+
+/// Inputs of a recording with the buffers that they go to.
+pub type Inputs<'a> = Vec<(BufferId, Cow<'a, [u8]>)>;
+
+/// The recorded making and folding of sets.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Generated {
+    /// What the device is to do.
+    pub recording: Recording,
+    /// The room it has.
+    pub capacities: Capacities,
+    /// Read back: the sums of the sets of this run.
+    pub sums: BufferId,
+    /// Read back: how many particles there are.
+    pub found: BufferId,
+    /// First particle, particles and seed of each set.
+    pub sets: BufferId,
+    /// The particles, as they are uploaded elsewhere.
+    pub particles: BufferId,
+    /// Of each chunk the number of arrivals and the state of its stream after it.
+    pub arrivals: BufferId,
+    scan: BufferId,
+    /// Of each object its source and its tables.
+    sources: Vec<(BufferId, Vec<BufferId>)>,
+    projection: Recorded,
+    /// View, objects and limits.
+    surroundings: [BufferId; 3],
+}
+
+/// Records the making of sets from these sources, and their folding, with this room.
+///
+/// # Errors
+/// [`Error::Parameter`] for a size out of range.
+pub fn record_generated(capacities: Capacities, nearest: Nearest, sources: &Sources) -> Result<Generated, Error> {
+    let projection = record(capacities, nearest)?;
+    let Capacities { levels, particles, of_set, .. } = capacities;
+    let chunks = sources.chunks().saturating_mul(levels);
+    let mut recording = Recording::default();
+    let r = &mut recording;
+    let scan = r.input("scan", size_of::<Scan>() as u64);
+    let inputs: Vec<(BufferId, Vec<BufferId>)> = sources.twins.iter().map(|twin| twin.input(r)).collect();
+    let arrivals = r.scratch("arrivals", 4 * ARRIVAL_WORDS * u64::from(chunks));
+    let counts = Scanned::scratch(r, scan, ["counts", "count sums"], chunks);
+    let particle_bytes = 4 * PARTICLE_WORDS as u64 * u64::from(particles);
+    let (particles, sets) = (r.scratch("particles", particle_bytes), r.scratch("sets", 12 * u64::from(levels)));
+    let found = r.scratch("found", size_of::<ParticlesFound>() as u64);
+    for (twin, (source, tables)) in sources.twins.iter().zip(&inputs) {
+        let each = twin.source.chunks.saturating_mul(levels);
+        let arrive = [*source, tables[0], arrivals, counts.numbers];
+        r.dispatch(&kernels::PBSR_ARRIVE, Groups::cover(each.div_ceil(super::BLOCK)), &arrive, &[]);
+        if let (Maker::Volume, [chunks, cells, values, transfer]) = (twin.maker, &tables[..]) {
+            let buffers = [*source, *chunks, *cells, *values, *transfer, arrivals, counts.numbers];
+            r.dispatch(&kernels::PBSR_VOLUME_COUNT, Groups::cover(each), &buffers, &[]);
+        }
+    }
+    counts.record(r, Groups::cover(chunks.div_ceil(SCAN_BLOCK)));
+    if let Some((source, _)) = inputs.first() {
+        let buffers = [*source, scan, counts.numbers, sets, found];
+        r.dispatch(&kernels::PBSR_SETS, Groups::cover(1), &buffers, &[capacities.particles, of_set]);
+    }
+    for (twin, (source, tables)) in sources.twins.iter().zip(&inputs) {
+        let kernel = match twin.maker {
+            Maker::Mesh => &kernels::PBSR_MESH,
+            Maker::Volume => &kernels::PBSR_VOLUME,
+        };
+        let mut buffers = vec![*source];
+        buffers.extend(tables);
+        buffers.extend([arrivals, counts.numbers, particles]);
+        r.dispatch(kernel, Groups::cover(twin.source.chunks.saturating_mul(levels)), &buffers, &[]);
+    }
+    r.read(found);
+    let [view, objects, limits, of_sets, of_particles] = projection.inputs;
+    let joined = r.join(&projection.recording, &[(of_sets, sets), (of_particles, particles)]);
+    let (sums, surroundings) = (joined.of(projection.sums), [view, objects, limits].map(|b| joined.of(b)));
+    let sources = inputs;
+    Ok(Generated {
+        recording,
+        capacities,
+        sums,
+        found,
+        sets,
+        particles,
+        arrivals,
+        scan,
+        sources,
+        projection,
+        surroundings,
+    })
+}
+
+impl super::Twin {
+    /// The buffers of its source and tables.
+    fn input(&self, r: &mut Recording) -> (BufferId, Vec<BufferId>) {
+        let names: &[&'static str] = match self.maker {
+            Maker::Mesh => &["chunks", "triangles", "vertices"],
+            Maker::Volume => &["chunks", "cells", "values", "transfer"],
+        };
+        let source = r.input("source", size_of::<ParticleSource>() as u64);
+        let bytes = self.tables.iter().map(|t| 4 * t.len() as u64);
+        (source, names.iter().zip(bytes).map(|(name, bytes)| r.input(name, bytes)).collect())
+    }
+}
+
+impl Generated {
+    /// What stays as it is from run to run: give it to the first.
+    ///
+    /// # Errors
+    /// [`Error::TooMuch`] and [`Error::Parameter`] as [`Recorded::uploads`].
+    pub fn tables<'a>(
+        &self,
+        sources: &'a Sources,
+        scene: &Scene<'_>,
+        ensemble: &Ensemble,
+    ) -> Result<Inputs<'a>, Error> {
+        room("objects", sources.twins.len(), self.capacities.objects)?;
+        let around = self.projection.surroundings(scene, ensemble)?;
+        let scan = Scan { count: sources.chunks().saturating_mul(self.capacities.levels), total: 0 };
+        let mut inputs: Inputs<'a> = vec![(self.scan, Cow::Owned(bytemuck::bytes_of(&scan).to_vec()))];
+        inputs.extend(self.surroundings.into_iter().zip(around.map(Cow::Owned)));
+        for (twin, (_, buffers)) in sources.twins.iter().zip(&self.sources) {
+            let tables = twin.tables.iter().map(|words| Cow::Borrowed(bytemuck::cast_slice(words)));
+            inputs.extend(buffers.iter().copied().zip(tables));
+        }
+        Ok(inputs)
+    }
+
+    /// What a run of the next sets needs beside the tables: which they are.
+    pub fn next(&self, sources: &Sources, ensemble: &Ensemble) -> Inputs<'static> {
+        let (first_set, levels) = (halves(u64::from(ensemble.levels)), self.capacities.levels);
+        let of_object = |(twin, (buffer, _)): (&super::Twin, &(BufferId, Vec<BufferId>))| {
+            let source = ParticleSource { first_set, levels, ..twin.source };
+            (*buffer, Cow::Owned(bytemuck::bytes_of(&source).to_vec()))
+        };
+        sources.twins.iter().zip(&self.sources).map(of_object).collect()
+    }
+
+    /// Adds what a run gave to the ensemble that its inputs were made for, and gives the number of its particles.
+    ///
+    /// # Errors
+    /// [`Error::TooMuch`] when there was too little room and nothing was folded: record again with what is needed.
+    /// [`Error::Parameter`] for a run of another recording, or another ensemble.
+    pub fn add(&self, run: &Run, ensemble: &mut Ensemble) -> Result<u64, Error> {
+        let found = run.bytes(self.found).get(..size_of::<ParticlesFound>());
+        let found = found.ok_or_else(|| Error::parameter("bytes read back", 0, "how many particles there are"))?;
+        let ParticlesFound { total, most } = bytemuck::pod_read_unaligned(found);
+        room("particles of one set", most as usize, self.capacities.of_set)?;
+        room("particles", total as usize, self.capacities.particles)?;
+        take_in(self.capacities, run.bytes(self.sums), ensemble)?;
+        Ok(u64::from(total))
+    }
+}

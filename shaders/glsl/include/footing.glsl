@@ -1,0 +1,81 @@
+// Where a particle falls on the image (Tanaka 2012, section 3); as `pbsr::project`. Bound before: `view`, `objects`,
+// `particles`.
+
+const float WIDEST_PX = 64.0;
+
+float normal_part(uint bits) {
+    precise float v = float(bits & 0x7fffu) * (2.0 / 32766.0) - 1.0;
+    return v;
+}
+
+// As `PackedNormal::get`.
+vec3 unpack_normal(uint packed) {
+    float x = normal_part(packed);
+    float y = normal_part(packed >> 15);
+    float z = 1.0 - abs(x) - abs(y);
+    float fold = max(-z, 0.0);
+    return normalize(vec3(x - (x < 0.0 ? -fold : fold), y - (y < 0.0 ? -fold : fold), z));
+}
+
+vec3 turned(ParticleObject o, vec3 v) {
+    precise vec3 r = o.linear_x.xyz * v.x + o.linear_y.xyz * v.y + o.linear_z.xyz * v.z;
+    return r;
+}
+
+float length_of(vec3 p) {
+    precise float square = p.x * p.x + p.y * p.y + p.z * p.z;
+    return sqrt(square);
+}
+
+// The share of its pixel that a particle takes: k = s/s(p), times |cos| where opacity does not depend on the angle.
+float share_of(ParticleObject o, vec3 p, float inverse, uint normal) {
+    precise float slab = view.orthographic != 0u ? o.share.x : o.share.x * length_of(p) * inverse * inverse * inverse;
+    if ((normal & PER_CROSSING) == 0u || (normal & HAS_NORMAL) == 0u) {
+        return slab;
+    }
+    vec3 n = unpack_normal(normal);
+    vec3 turned_normal = o.rotation_x.xyz * n.x + o.rotation_y.xyz * n.y + o.rotation_z.xyz * n.z;
+    float cosine = view.orthographic != 0u ? turned_normal.z : dot(turned_normal, p) / length_of(p);
+    return slab * abs(cosine);
+}
+
+// Pixels whose centres lie in (v - half, v + half], from and to.
+uvec2 reached(float v, float half_px, float size) {
+    float from = max(floor(v - half_px - 0.5) + 1.0, 0.0);
+    float to = min(floor(v + half_px - 0.5) + 1.0, size);
+    return to > from ? uvec2(uint(from), uint(to)) : uvec2(0u);
+}
+
+// Pixels that a particle reaches, from and to in each direction, and the bits of its depth: in front of the eye depths are
+// positive, so their bits sort as numbers.
+struct Footing {
+    uvec2 columns;
+    uvec2 rows;
+    uint depth;
+};
+
+Footing footing_of(uint word) {
+    vec3 offset = vec3(
+        uintBitsToFloat(particles[word]), uintBitsToFloat(particles[word + 1u]), uintBitsToFloat(particles[word + 2u]));
+    ParticleObject o = objects[particles[word + 6u]];
+    precise vec3 p = turned(o, offset) + o.translation.xyz;
+    uvec2 columns = uvec2(0u);
+    uvec2 rows = uvec2(0u);
+    if (p.z > 0.0) {
+        float inverse = view.orthographic != 0u ? 1.0 : 1.0 / p.z;
+        precise float x = view.middle.x + view.focal * p.x * inverse;
+        precise float y = view.middle.y - view.focal * p.y * inverse;
+        float k = share_of(o, p, inverse, particles[word + 3u]);
+        if (k > 1.0) {
+            float half_px = 0.5 * min(sqrt(k), WIDEST_PX);
+            columns = reached(x, half_px, view.size.x);
+            rows = reached(y, half_px, view.size.y);
+        } else if (x >= 0.0 && x < view.size.x && y >= 0.0 && y < view.size.y) {
+            if (k >= 1.0 || uintBitsToFloat(particles[word + 5u]) < k) {
+                columns = uvec2(uint(x), uint(x) + 1u);
+                rows = uvec2(uint(y), uint(y) + 1u);
+            }
+        }
+    }
+    return Footing(columns, rows, floatBitsToUint(p.z));
+}

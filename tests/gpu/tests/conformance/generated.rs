@@ -1,0 +1,371 @@
+//! Sets of particles that the device makes itself: the CPU's of the same seeds, and in the mean the CPU's of any.
+
+use gpu_conformance::{open, words};
+use pbsr::gpu::{Capacities, Nearest, Sources, record, record_generated};
+use pbsr::{
+    Appearance, Density, Ensemble, EnsembleParams, Error, FoldParams, GridSampler, KeptSets, MeshSampler, Object,
+    Renderer, Sampler, Scene, SurfaceParams, VolumeParams, finest_pixel_area,
+};
+use splat_core::glam::{DMat3, DQuat, DVec3, Vec3};
+use splat_core::optics::SurfaceOpacity;
+use splat_core::{
+    Camera, Grid, Material, Mesh, Progress, Projection, Shading, Similarity, TransferFunction, TransferPoint, rng,
+};
+use std::collections::BTreeSet;
+
+const SIZE: [u32; 2] = [96, 64];
+const ROOM: Capacities = Capacities { size: SIZE, objects: 3, levels: 16, of_set: 30_000, particles: 480_000 };
+
+/// Walls, a bent sheet with normals and colours, and a volume of more than one piece of its transfer function.
+struct World {
+    wall: Mesh,
+    sheet: Mesh,
+    grid: Grid,
+    transfer: TransferFunction,
+    camera: Camera,
+}
+
+impl World {
+    fn new() -> Self {
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+        let position = corners.map(|(x, y)| Vec3::new(1.3 * x, 0.9 * y, -0.7)).to_vec();
+        let wall = Mesh { position, triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() };
+        let (mut sheet, n) = (Mesh { origin: DVec3::new(0.1, 0.0, 0.3), ..Mesh::default() }, 48u32);
+        for k in 0..(n + 1) * (n + 1) {
+            let [u, v] = [k % (n + 1), k / (n + 1)].map(|i| i as f32 / n as f32 * 2.0 - 1.0);
+            let z = 0.3 * (3.0 * u).sin() * (2.0 * v).cos();
+            sheet.position.push(Vec3::new(u, 0.8 * v, z));
+            sheet.normal.push(Vec3::new(-0.9 * (3.0 * u).cos() * (2.0 * v).cos(), 0.6 * v, 1.0).normalize());
+            sheet.color.push([0.5 + 0.5 * u, 0.5 + 0.4 * v, 0.3]);
+        }
+        for k in (0..n * n).map(|k| k / n * (n + 1) + k % n) {
+            sheet.triangles.extend([[k, k + 1, k + n + 1], [k + 1, k + n + 2, k + n + 1]]);
+        }
+        let dims = [21usize, 18, 16];
+        let value = |i: usize| {
+            let [x, y, z] = [i % 21, i / 21 % 18, i / (21 * 18)].map(|i| i as f32 / 8.0 - 1.0);
+            1.0 - (x * x + y * y + z * z) + 0.2 * (7.0 * x).sin()
+        };
+        let axes = DMat3::from_cols(DVec3::X / 9.0, DVec3::new(0.01, 0.1, 0.0), DVec3::new(0.0, 0.02, 0.11));
+        let values = (0..dims.iter().product()).map(value).collect();
+        let grid = Grid { origin: DVec3::new(-1.1, -0.9, -0.8), axes, dims, values };
+        let point = |value, color, extinction| TransferPoint { value, color, extinction };
+        let points = vec![
+            point(0.0, [0.2, 0.1, 0.9], 0.0),
+            point(0.35, [0.9, 0.8, 0.1], 1.5),
+            point(0.5, [0.1, 0.9, 0.4], 0.2),
+            point(0.9, [1.0, 0.2, 0.1], 3.0),
+        ];
+        let transfer = TransferFunction::new(points).unwrap();
+        let view = Projection::Perspective { fov_y: 0.6 };
+        let camera = Camera::look_at(DVec3::new(0.4, 0.3, 4.0), DVec3::ZERO, DVec3::Y, view, SIZE).unwrap();
+        Self { wall, sheet, grid, transfer, camera }
+    }
+
+    /// The three samplers; `scale` of the area that no particle needs to be widened for, `bias` of their optical depths.
+    fn samplers(&self, seed: u64, scale: f64, bias: f64) -> (MeshSampler<'_>, MeshSampler<'_>, GridSampler<'_>) {
+        let s = scale * finest_pixel_area(&self.camera, DVec3::ZERO, 1.5, 1e-3);
+        let params = |opacity: f64, surface_opacity, seed, color| SurfaceParams {
+            opacity: 1.0 - (1.0 - opacity).powf(bias),
+            cross_section: s,
+            surface_opacity,
+            color,
+            seed,
+            ..SurfaceParams::default()
+        };
+        let wall = params(0.4, SurfaceOpacity::ThinSlab, seed, [0.9, 0.4, 0.1]);
+        let sheet = params(0.3, SurfaceOpacity::PerCrossing, seed + 1, [1.0, 0.8, 0.6]);
+        let volume = VolumeParams { cross_section: s, extinction_scale: bias, normals: true, seed: seed + 2 };
+        (
+            MeshSampler::new(&self.wall, &wall, None).unwrap(),
+            MeshSampler::new(&self.sheet, &sheet, None).unwrap(),
+            GridSampler::new(&self.grid, &self.transfer, &volume, None).unwrap(),
+        )
+    }
+
+    fn with<T>(&self, samplers: [&dyn Sampler; 3], work: impl FnOnce(&Scene<'_>) -> T) -> T {
+        let object = |sampler, turn, emission| {
+            let material = Material { shading: Shading::Unlit, emission, ..Material::default() };
+            let transform = Similarity { rotation: DQuat::from_rotation_y(turn), ..Similarity::default() };
+            Object { sampler, transform, look: Appearance { material, ..Appearance::default() } }
+        };
+        let [wall, sheet, volume] = samplers;
+        let objects =
+            [object(wall, 0.2, [0.0; 3]), object(sheet, -0.3, [0.0, 0.25, 0.0]), object(volume, 0.4, [0.0; 3])];
+        work(&Scene { objects: &objects, lights: &[], ambient: [0.0; 3], camera: &self.camera, occluder: None })
+    }
+}
+
+/// The better way that the device has.
+fn nearest() -> Nearest {
+    Nearest::of(open().unwrap().adapter())
+}
+
+fn empty() -> Ensemble {
+    Ensemble::new(SIZE, &EnsembleParams::default()).unwrap()
+}
+
+/// Sets that the device makes and folds.
+fn by_device(scene: &Scene<'_>, runs: u32) -> Ensemble {
+    let (mut device, sources, mut ensemble) = (open().unwrap(), Sources::new(scene).unwrap(), empty());
+    let generated = record_generated(ROOM, nearest(), &sources).unwrap();
+    let mut prepared = device.prepare(&generated.recording).unwrap();
+    let tables = generated.tables(&sources, scene, &ensemble).unwrap();
+    for run in 0..runs {
+        // Tables go up once.
+        let mut inputs = if run == 0 { tables.clone() } else { Vec::new() };
+        inputs.extend(generated.next(&sources, &ensemble));
+        let inputs: Vec<_> = inputs.iter().map(|(buffer, bytes)| (*buffer, &bytes[..])).collect();
+        let done = prepared.run(&inputs).unwrap();
+        let particles = generated.add(&done, &mut ensemble).unwrap();
+        assert!(particles > 30_000, "{particles}");
+    }
+    assert_eq!(device.take_messages(), [""; 0]);
+    ensemble
+}
+
+fn by_processor(scene: &Scene<'_>, levels: u32) -> Ensemble {
+    let mut ensemble = empty();
+    Renderer::new().fold(scene, &mut ensemble, levels, &FoldParams::default(), &Progress::default()).unwrap();
+    ensemble
+}
+
+fn pixels() -> impl Iterator<Item = (u32, u32)> {
+    (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| (x, y)))
+}
+
+/// Sets and particles of the first run, made by the device, with the states of its streams; and uploaded ones.
+fn particles(scene: &Scene<'_>) -> ([[Vec<u32>; 2]; 2], Vec<u32>) {
+    let (mut device, sources) = (open().unwrap(), Sources::new(scene).unwrap());
+    let mut generated = record_generated(ROOM, nearest(), &sources).unwrap();
+    let wanted = [generated.sets, generated.particles, generated.arrivals];
+    wanted.iter().for_each(|buffer| generated.recording.read(*buffer));
+    let mut inputs = generated.tables(&sources, scene, &empty()).unwrap();
+    inputs.extend(generated.next(&sources, &empty()));
+    let inputs: Vec<_> = inputs.iter().map(|(buffer, bytes)| (*buffer, &bytes[..])).collect();
+    let run = device.run(&generated.recording, &inputs).unwrap();
+    assert_eq!(device.take_messages(), [""; 0]);
+    let [sets, particles, arrivals] = wanted.map(|buffer| words(run.bytes(buffer)));
+    let recorded = record(ROOM, Nearest::Ranked).unwrap();
+    let uploads = recorded.uploads(scene, &empty()).unwrap();
+    let [.., (_, of_sets), (_, of_particles)] = recorded.inputs(&uploads);
+    ([[sets, particles], [words(of_sets), words(of_particles)]], arrivals)
+}
+
+/// What of a particle must be equal: its place, object and set in bits.
+fn places([sets, particles]: &[Vec<u32>; 2]) -> BTreeSet<[u32; 5]> {
+    let mut places = BTreeSet::new();
+    for (set, span) in sets.chunks(3).enumerate() {
+        let words = &particles[7 * span[0] as usize..][..7 * span[1] as usize];
+        places.extend(words.chunks(7).map(|p| [set as u32, p[0], p[1], p[2], p[6]]));
+    }
+    places
+}
+
+#[test]
+fn particles_of_one_seed_are_the_cpu_s() {
+    let world = World::new();
+    let (wall, sheet, volume) = world.samplers(11, 1.0, 1.0);
+    let ([device, uploaded], _) = world.with([&wall, &sheet, &volume], particles);
+    let [found, expected] = [places(&device), places(&uploaded)];
+    let same = found.intersection(&expected).count() as f64;
+    let all = found.union(&expected).count() as f64;
+    assert!(expected.len() > 150_000 && same >= 0.9999 * all, "{same} of {all}");
+    assert!((0..3).all(|object| expected.iter().any(|p| p[4] == object)));
+    // Where no set has another number of particles, all stand in the same places: normals and colours are steps apart at
+    // most, and thinning numbers equal.
+    assert_eq!(device[0], uploaded[0], "sets");
+    let count = expected.len();
+    let differ = |w: usize| (0..count).filter(|i| device[1][7 * i + w] != uploaded[1][7 * i + w]).count();
+    assert_eq!([differ(5), differ(6)], [0, 0]);
+    let apart = [differ(3), differ(4)].map(|n| n as f64 / count as f64);
+    assert!(apart.iter().all(|share| *share < 1e-3), "{apart:?}");
+    let step = |a: u32, b: u32, at: u32, bits: u32| {
+        ((a >> at) & ((1 << bits) - 1)).abs_diff((b >> at) & ((1 << bits) - 1)) <= 1
+    };
+    for i in 0..count {
+        let [a, b] = [&device[1], &uploaded[1]].map(|words| (words[7 * i + 3], words[7 * i + 4]));
+        assert!(a.0 >> 30 == b.0 >> 30 && [0, 15].iter().all(|at| step(a.0, b.0, *at, 15)), "normal {i}: {a:?} {b:?}");
+        let close = a.1 >> 27 != b.1 >> 27 || [0, 9, 18].iter().all(|at| step(a.1, b.1, *at, 9));
+        assert!(close, "colour {i}: {a:?} {b:?}");
+    }
+}
+
+#[test]
+fn streams_are_the_cpu_s_bit_for_bit() {
+    const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+    const STAGES: [u64; 3] = [0x5042_0001, 0x5042_0001, 0x5042_0002];
+    let world = World::new();
+    let (wall, sheet, volume) = world.samplers(11, 1.0, 1.0);
+    let samplers: [&dyn Sampler; 3] = [&wall, &sheet, &volume];
+    let (_, arrivals) = world.with(samplers, particles);
+    let mut arrivals = arrivals.chunks(3);
+    let (mut sum, mut mean) = (0.0, 0.0);
+    for level in 0..u64::from(ROOM.levels) {
+        for (k, sampler) in samplers.iter().enumerate() {
+            for chunk in 0..sampler.chunks() {
+                let &[count, low, high] = arrivals.next().unwrap() else { panic!("three words") };
+                let begin = rng::bits(11 + k as u64, STAGES[k], level, chunk as u64);
+                let state = u64::from(low) | u64::from(high) << 32;
+                // One number for a small mean, pairs of them for a large one.
+                let drawn = (1u64..40).find(|n| begin.wrapping_add(n.wrapping_mul(GOLDEN)) == state);
+                assert!(drawn.is_some_and(|n| n == 1 || n % 2 == 0), "{level} {k} {chunk}: {drawn:?}");
+                if k < 2 {
+                    sum += f64::from(count);
+                    mean += sampler.expected(chunk);
+                }
+            }
+        }
+    }
+    assert!(mean > 1e5 && (sum - mean).abs() < 4.0 * mean.sqrt(), "{sum} for {mean}");
+}
+
+#[test]
+fn hits_of_one_seed_are_the_cpu_s() {
+    let world = World::new();
+    // Widened and thinned out; the second run begins where the first ends.
+    for scale in [0.5, 6.0] {
+        let (wall, sheet, volume) = world.samplers(5, scale, 1.0);
+        world.with([&wall, &sheet, &volume], |scene| {
+            let [cpu, gpu] = [by_processor(scene, 2 * ROOM.levels), by_device(scene, 2)];
+            let same = pixels().filter(|&(x, y)| cpu.hits(x, y) == gpu.hits(x, y)).count();
+            assert!(same as f64 >= 0.999 * f64::from(SIZE[0] * SIZE[1]), "{scale}: {same}");
+        });
+    }
+}
+
+/// Sets of the test of means, as runs of the device.
+const RUNS: u32 = 6;
+
+/// How far the means of two ensembles of other seeds are apart, in standard deviations that are 3.09 at p = 0.001: of the sum
+/// of the squares of all pixels' deviations (χ², by Wilson and Hilferty), and of hits and of luminance in all.
+fn deviations(a: &Ensemble, b: &Ensemble) -> [f64; 3] {
+    let levels = f64::from(a.levels());
+    assert_eq!(a.levels(), b.levels());
+    let (mut chi2, mut bins, mut sum, mut variance) = (0.0, 0.0, 0.0, 0.0);
+    for (x, y) in pixels() {
+        let [ha, hb] = [a, b].map(|e| f64::from(e.hits(x, y)));
+        let p = (ha + hb) / (2.0 * levels);
+        let of_difference = 2.0 * levels * p * (1.0 - p);
+        sum += ha - hb;
+        variance += of_difference;
+        // Where hits and sets without one are many, the difference is normal.
+        if of_difference > 8.0 {
+            chi2 += (ha - hb).powi(2) / of_difference;
+            bins += 1.0;
+        }
+    }
+    assert!(bins > 2000.0, "{bins}");
+    let h: f64 = 2.0 / (9.0 * bins);
+    let of_chi2 = ((chi2 / bins).cbrt() - (1.0 - h)) / h.sqrt();
+    let [a, b] = [a, b].map(|e| e.read(&|_, _| [0.0; 3], None));
+    let light = |p: &[f32; 3]| f64::from(p[0]) * 0.2126 + f64::from(p[1]) * 0.7152 + f64::from(p[2]) * 0.0722;
+    let lights = a.rgb("beauty").unwrap().iter().zip(b.rgb("beauty").unwrap());
+    let apart: f64 = lights.map(|(a, b)| light(a) - light(b)).sum();
+    let squares =
+        |e: &splat_core::Layers| -> f64 { e.scalar("std_error").unwrap().iter().map(|s| f64::from(*s).powi(2)).sum() };
+    [of_chi2, sum / variance.sqrt(), apart / (squares(&a) + squares(&b)).sqrt()]
+}
+
+#[test]
+fn means_of_other_seeds_are_the_cpu_s_and_a_bias_is_found() {
+    let world = World::new();
+    let ensemble = |seed, bias, device| {
+        // Nothing is widened, so that pixels are independent.
+        let (wall, sheet, volume) = world.samplers(seed, 1.0, bias);
+        world.with([&wall, &sheet, &volume], |scene| {
+            if device { by_device(scene, RUNS) } else { by_processor(scene, RUNS * ROOM.levels) }
+        })
+    };
+    let cpu = ensemble(101, 1.0, false);
+    let [chi2, hits, light] = deviations(&ensemble(202, 1.0, true), &cpu);
+    assert!(chi2 < 3.09 && hits.abs() < 3.29 && light.abs() < 3.29, "{chi2} {hits} {light}");
+    // Optical depths of 4 % more.
+    let [_, hits, light] = deviations(&ensemble(202, 1.04, true), &cpu);
+    assert!(hits > 6.0 && light.abs() > 6.0, "{hits} {light}");
+    // The same number of particles in other places.
+    let mut moved = World::new();
+    moved.camera.position.x += 0.03;
+    let (wall, sheet, volume) = moved.samplers(202, 1.0, 1.0);
+    let [chi2, ..] = deviations(&moved.with([&wall, &sheet, &volume], |scene| by_device(scene, RUNS)), &cpu);
+    assert!(chi2 > 6.0, "{chi2}");
+}
+
+#[test]
+fn too_little_room_folds_nothing_and_says_what_is_needed() {
+    let world = World::new();
+    let (wall, sheet, volume) = world.samplers(3, 1.0, 1.0);
+    world.with([&wall, &sheet, &volume], |scene| {
+        let (mut device, sources) = (open().unwrap(), Sources::new(scene).unwrap());
+        let mut run = |room: Capacities| {
+            let mut ensemble = empty();
+            let generated = record_generated(room, nearest(), &sources).unwrap();
+            let mut inputs = generated.tables(&sources, scene, &ensemble).unwrap();
+            inputs.extend(generated.next(&sources, &ensemble));
+            let inputs: Vec<_> = inputs.iter().map(|(buffer, bytes)| (*buffer, &bytes[..])).collect();
+            let done = device.run(&generated.recording, &inputs).unwrap();
+            let sums_are_zero = done.bytes(generated.sums).iter().all(|byte| *byte == 0);
+            (generated.add(&done, &mut ensemble), ensemble, sums_are_zero)
+        };
+        let (Err(Error::TooMuch { what: "particles of one set", needed, had: 10 }), none, true) =
+            run(Capacities { of_set: 10, ..ROOM })
+        else {
+            panic!("room for 10 particles is enough")
+        };
+        assert_eq!(none, empty());
+        let (Err(Error::TooMuch { what: "particles", needed: all, had: 1000 }), none, true) =
+            run(Capacities { particles: 1000, ..ROOM })
+        else {
+            panic!("room for 1000 particles is enough")
+        };
+        assert_eq!(none, empty());
+        let exactly = Capacities { of_set: needed as u32, particles: all as u32, ..ROOM };
+        let (particles, ensemble, _) = run(exactly);
+        assert_eq!((particles, ensemble.levels()), (Ok(all), ROOM.levels));
+        assert!(matches!(run(Capacities { of_set: needed as u32 - 1, ..exactly }).0, Err(Error::TooMuch { .. })));
+        assert!(matches!(run(Capacities { particles: all as u32 - 1, ..exactly }).0, Err(Error::TooMuch { .. })));
+        let fewer = record_generated(Capacities { objects: 2, ..ROOM }, Nearest::Ranked, &sources).unwrap();
+        assert!(matches!(fewer.tables(&sources, scene, &empty()), Err(Error::TooMuch { what: "objects", .. })));
+        assert_eq!(device.take_messages(), [""; 0]);
+    });
+}
+
+/// 1/2 everywhere.
+struct Half;
+
+impl splat_core::ScalarField for Half {
+    fn value(&self, _: DVec3) -> f64 {
+        0.5
+    }
+
+    fn gradient(&self, _: DVec3) -> DVec3 {
+        DVec3::ZERO
+    }
+
+    fn hessian(&self, _: DVec3) -> DMat3 {
+        DMat3::ZERO
+    }
+
+    fn bound(&self, _: DVec3, _: f64) -> Option<(f64, f64)> {
+        Some((0.5, 0.5))
+    }
+}
+
+#[test]
+fn what_has_no_twin_is_uploaded() {
+    let world = World::new();
+    let (wall, sheet, volume) = world.samplers(3, 1.0, 1.0);
+    let kept = KeptSets::new(&sheet, 0, 1);
+    let thinned =
+        MeshSampler::new(&world.wall, &SurfaceParams::default(), Some(Density { field: &Half, max: 1.0 })).unwrap();
+    let clear = SurfaceParams { opacity: 0.0, ..SurfaceParams::default() };
+    let nothing = MeshSampler::new(&world.wall, &clear, None).unwrap();
+    for samplers in
+        [[&wall as &dyn Sampler, &kept, &volume], [&thinned, &sheet, &volume], [&nothing as &dyn Sampler; 3]]
+    {
+        assert_eq!(world.with(samplers, Sources::new), None);
+    }
+    // One without particles is no hindrance.
+    let sources = world.with([&nothing, &sheet, &nothing], |scene| Sources::new(scene).is_some());
+    assert!(sources);
+}
