@@ -14,6 +14,7 @@ use crate::sampler::{Poisson, PoissonSets};
 use crate::stream::Stage;
 use crate::{Density, Error, PackedColor, PackedNormal, Particles, SurfaceParams};
 use glam::Vec3;
+use rayon::prelude::*;
 use splat_core::optics::SurfaceOpacity;
 use splat_core::{Mesh, glam};
 #[cfg(feature = "gpu")]
@@ -25,6 +26,8 @@ pub struct MeshSampler<'a> {
     params: SurfaceParams,
     density: Option<Density<'a>>,
     sets: PoissonSets,
+    /// Of each triangle, where the mesh has none of its own.
+    normals: Vec<PackedNormal>,
     area: f64,
 }
 
@@ -55,7 +58,13 @@ impl<'a> MeshSampler<'a> {
         countable(area * per_area * density.as_ref().map_or(1.0, |d| d.max))?;
         let blocks = Blocks::new(mesh.triangles.len(), rate);
         let sets = PoissonSets::new(mesh.origin, params.cross_section, blocks);
-        Ok(Self { mesh, params: *params, density, sets, area })
+        let flat = if mesh.normal.is_empty() { mesh.triangles.len() } else { 0 };
+        let normal = |t: usize| {
+            let [a, b, c] = corners(mesh, t);
+            pack((b - a).cross(c - a), params)
+        };
+        let normals = (0..flat).into_par_iter().with_min_len(1024).map(normal).collect();
+        Ok(Self { mesh, params: *params, density, sets, normals, area })
     }
 
     /// Area of the mesh, world units².
@@ -65,20 +74,18 @@ impl<'a> MeshSampler<'a> {
 
     /// Bytes of the tables.
     pub fn bytes(&self) -> u64 {
-        self.sets.blocks.bytes()
+        self.sets.blocks.bytes() + (self.normals.len() * size_of::<PackedNormal>()) as u64
     }
 
     #[inline]
-    fn normal(&self, t: usize, [a, b, c]: [Vec3; 3], [u, v]: [f32; 2]) -> PackedNormal {
-        let normal = match &*self.mesh.normal {
-            [] => (b - a).cross(c - a),
+    fn normal(&self, t: usize, [u, v]: [f32; 2]) -> PackedNormal {
+        match &*self.mesh.normal {
+            [] => self.normals[t],
             normals => {
                 let [na, nb, nc] = self.mesh.triangles[t].map(|i| normals[i as usize]);
-                na * (1.0 - u - v) + nb * u + nc * v
+                pack(na * (1.0 - u - v) + nb * u + nc * v, &self.params)
             }
-        };
-        let packed = PackedNormal::new(normal);
-        if self.params.surface_opacity == SurfaceOpacity::PerCrossing { packed.per_crossing() } else { packed }
+        }
     }
 
     #[inline]
@@ -92,6 +99,13 @@ impl<'a> MeshSampler<'a> {
             }
         }
     }
+}
+
+/// The normal of a particle.
+#[inline]
+fn pack(normal: Vec3, params: &SurfaceParams) -> PackedNormal {
+    let packed = PackedNormal::new(normal);
+    if params.surface_opacity == SurfaceOpacity::PerCrossing { packed.per_crossing() } else { packed }
 }
 
 #[inline]
@@ -112,10 +126,10 @@ impl Poisson for MeshSampler<'_> {
     fn fill(&self, set: u64, chunk: usize, particles: &mut Particles) {
         let own = PackedColor::new(self.params.color);
         self.sets.blocks.arrivals(self.params.seed, Stage::Mesh, set, chunk, |t, stream| {
-            let [mut u, mut v] = stream.pair();
-            if u + v > 1.0 {
-                (u, v) = (1.0 - u, 1.0 - v);
-            }
+            let [u, v] = stream.pair();
+            // Selections, not a branch: whether it is folded cannot be foreseen.
+            let folded = u + v > 1.0;
+            let [u, v] = [u, v].map(|w| if folded { 1.0 - w } else { w });
             let triangle = corners(self.mesh, t);
             let [a, b, c] = triangle;
             let p = a + (b - a) * u + (c - a) * v;
@@ -128,7 +142,7 @@ impl Poisson for MeshSampler<'_> {
                     return;
                 }
             }
-            particles.push(p, self.normal(t, triangle, [u, v]), self.color(t, [u, v], own));
+            particles.push(p, self.normal(t, [u, v]), self.color(t, [u, v], own));
         });
     }
 

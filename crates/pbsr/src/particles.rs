@@ -28,7 +28,7 @@ impl PackedNormal {
         let (x, y) = (n.x * inverse, n.y * inverse);
         let (u, v) =
             if n.z >= 0.0 { (x, y) } else { ((1.0 - y.abs()) * 1f32.copysign(x), (1.0 - x.abs()) * 1f32.copysign(y)) };
-        let step = |w: f32| ((w * 0.5 + 0.5) * STEPS + 0.5) as u32;
+        let step = |w: f32| ((w * 0.5 + 0.5) * STEPS + 0.5) as i32 as u32;
         Self(HAS_NORMAL | step(u) | step(v) << 15)
     }
 
