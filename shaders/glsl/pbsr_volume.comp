@@ -19,22 +19,9 @@ layout(set = 0, binding = 5, std430) readonly buffer Bound5 { uint arrivals[]; }
 layout(set = 0, binding = 6, std430) readonly buffer Bound6 { uint counts[]; };
 layout(set = 0, binding = 7, std430) buffer Bound7 { uint particles[]; };
 
+#include "lattice.glsl"
 #include "volume.glsl"
 #include "put.glsl"
-
-vec3 turned(vec3 x, vec3 y, vec3 z, vec3 v) {
-    precise vec3 r = x * v.x + y * v.y + z * v.z;
-    return r;
-}
-
-// As `GridSampler::offset`.
-vec3 offset_of(Place place) {
-    uint at = cells[CELL_WORDS * place.cell];
-    uint row = at / source.lattice.x;
-    uvec3 corner = uvec3(at % source.lattice.x, row % source.lattice.y, row / source.lattice.y);
-    precise vec3 lattice = vec3(corner) + place.f;
-    return turned(source.axis_x.xyz, source.axis_y.xyz, source.axis_z.xyz, lattice);
-}
 
 void main() {
     uint block = block_index();
@@ -57,8 +44,7 @@ void main() {
         if (kept) {
             uint normal = 0u;
             if ((source.flags & SOURCE_NORMALS) != 0u) {
-                normal = pack_normal(
-                    -turned(source.gradient_x.xyz, source.gradient_y.xyz, source.gradient_z.xyz, place.gradient));
+                normal = pack_normal(-world_gradient(place.gradient));
             }
             put(first, rank, numbering, offset_of(place), normal, pack_color(point.xyz));
         }

@@ -17,6 +17,7 @@ layout(set = 0, binding = 4, std430) readonly buffer Bound4 { float transfer[]; 
 layout(set = 0, binding = 5, std430) readonly buffer Bound5 { uint arrivals[]; };
 layout(set = 0, binding = 6, std430) buffer Bound6 { uint counts[]; };
 
+#include "lattice.glsl"
 #include "volume.glsl"
 
 void main() {

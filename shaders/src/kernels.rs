@@ -133,6 +133,11 @@ kernels! {
     /// Particles in a volume: source, tables, cells, values, transfer, arrivals, scanned counts → particles.
     PBSR_VOLUME = "pbsr_volume" [Read, Read, Read, Read, Read, Read, Read, Write];
 
+    /// How many lines along a lattice leave a particle on an isosurface: source, tables, cells, values, arrivals → counts.
+    PBSR_LATTICE_COUNT = "pbsr_lattice_count" [Read, Read, Read, Read, Read, Write];
+    /// Particles on an isosurface: source, tables, cells, values, arrivals, scanned counts → particles.
+    PBSR_LATTICE = "pbsr_lattice" [Read, Read, Read, Read, Read, Read, Write];
+
     /// Distances as keys, and places: view, distances → keys, places.
     TSM_KEYS = "tsm_keys" [Read, Read, Write, Write];
     /// Cells by distance: view, places, cells → keys.

@@ -253,8 +253,10 @@ layouts! {
         pub vertex_words: u32,
         /// Pieces of the transfer function.
         pub pieces: u32,
-        /// Nothing.
-        pub unused: [u32; 2],
+        /// Value of an isosurface.
+        pub level: f32,
+        /// What the gradients of an isosurface are weighed with.
+        pub weight: f32,
     }
 
     /// What was made of sets, whether there was room for it or not.

@@ -56,6 +56,7 @@ mod flat;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 mod implicit;
+mod lattice;
 mod leaves;
 mod lines;
 mod mesh;
@@ -83,6 +84,7 @@ pub use cost::{Counts, Prediction, predict};
 pub use ensemble::{Ensemble, EnsembleParams};
 pub use error::Error;
 pub use implicit::{CellCounts, ImplicitSurface};
+pub use lattice::LatticeSampler;
 pub use lines::{LineReport, LineSampler};
 pub use mesh::MeshSampler;
 pub use metropolis::{MetropolisParams, MetropolisSampler};

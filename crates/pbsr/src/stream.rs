@@ -22,6 +22,7 @@ pub(crate) enum Stage {
     Thinning,
     Survey,
     Channels,
+    Lattice,
 }
 
 /// The numbers of one chunk, in order.

@@ -155,17 +155,8 @@ impl<'a> GridSampler<'a> {
 
     /// Value and lattice gradient at `f` in \[0, 1\]³ of a cell.
     #[inline]
-    pub(crate) fn interpolate(&self, at: u32, [fx, fy, fz]: [f32; 3]) -> (f32, Vec3) {
-        let (nx, layer) = (self.grid.dims[0], self.grid.dims[0] * self.grid.dims[1]);
-        let at = at as usize;
-        let pair = |i: usize| -> [f32; 2] { [self.grid.values[i], self.grid.values[i + 1]] };
-        let [a, b, c, d] = [pair(at), pair(at + nx), pair(at + layer), pair(at + layer + nx)];
-        let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
-        let [xa, xb, xc, xd] = [a, b, c, d].map(|p| mix(p[0], p[1], fx));
-        let [y0, y1] = [mix(xa, xb, fy), mix(xc, xd, fy)];
-        let [da, db, dc, dd] = [a, b, c, d].map(|p| p[1] - p[0]);
-        let gradient = Vec3::new(mix(mix(da, db, fy), mix(dc, dd, fy), fz), mix(xb - xa, xd - xc, fz), y1 - y0);
-        (mix(y0, y1, fz), gradient)
+    pub(crate) fn interpolate(&self, at: u32, f: [f32; 3]) -> (f32, Vec3) {
+        trilinear(self.grid, at, f)
     }
 
     /// The particle at `f` of a cell, without its position.
@@ -182,6 +173,21 @@ impl<'a> GridSampler<'a> {
         let [i, j, k] = self.corner(at);
         self.axes * Vec3::new(i as f32 + f[0], j as f32 + f[1], k as f32 + f[2])
     }
+}
+
+/// Value and lattice gradient at `f` in \[0, 1\]³ of the cell with this first corner.
+#[inline]
+pub(crate) fn trilinear(grid: &Grid, at: u32, [fx, fy, fz]: [f32; 3]) -> (f32, Vec3) {
+    let (nx, layer) = (grid.dims[0], grid.dims[0] * grid.dims[1]);
+    let at = at as usize;
+    let pair = |i: usize| -> [f32; 2] { [grid.values[i], grid.values[i + 1]] };
+    let [a, b, c, d] = [pair(at), pair(at + nx), pair(at + layer), pair(at + layer + nx)];
+    let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
+    let [xa, xb, xc, xd] = [a, b, c, d].map(|p| mix(p[0], p[1], fx));
+    let [y0, y1] = [mix(xa, xb, fy), mix(xc, xd, fy)];
+    let [da, db, dc, dd] = [a, b, c, d].map(|p| p[1] - p[0]);
+    let gradient = Vec3::new(mix(mix(da, db, fy), mix(dc, dd, fy), fz), mix(xb - xa, xd - xc, fz), y1 - y0);
+    (mix(y0, y1, fz), gradient)
 }
 
 /// The active cells of one row of the lattice that begins at index `first`.

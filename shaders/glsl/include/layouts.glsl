@@ -135,7 +135,8 @@ struct ParticleSource {
     uint slots_at;
     uint vertex_words;
     uint pieces;
-    uvec2 unused;
+    float level;
+    float weight;
 };
 
 struct ParticlesFound {

@@ -63,15 +63,7 @@ pub fn record_generated(capacities: Capacities, nearest: Nearest, sources: &Sour
     let particle_bytes = 4 * PARTICLE_WORDS as u64 * u64::from(particles);
     let (particles, sets) = (r.scratch("particles", particle_bytes), r.scratch("sets", 12 * u64::from(levels)));
     let found = r.scratch("found", size_of::<ParticlesFound>() as u64);
-    for (twin, (source, tables)) in sources.twins.iter().zip(&inputs) {
-        let each = twin.source.chunks.saturating_mul(levels);
-        let arrive = [*source, tables[0], arrivals, counts.numbers];
-        r.dispatch(&kernels::PBSR_ARRIVE, Groups::cover(each.div_ceil(super::BLOCK)), &arrive, &[]);
-        if let (Maker::Volume, [chunks, cells, values, transfer]) = (twin.maker, &tables[..]) {
-            let buffers = [*source, *chunks, *cells, *values, *transfer, arrivals, counts.numbers];
-            r.dispatch(&kernels::PBSR_VOLUME_COUNT, Groups::cover(each), &buffers, &[]);
-        }
-    }
+    count(r, sources, &inputs, levels, [arrivals, counts.numbers]);
     counts.record(r, Groups::cover(chunks.div_ceil(SCAN_BLOCK)));
     if let Some((source, _)) = inputs.first() {
         let buffers = [*source, scan, counts.numbers, sets, found];
@@ -81,6 +73,7 @@ pub fn record_generated(capacities: Capacities, nearest: Nearest, sources: &Sour
         let kernel = match twin.maker {
             Maker::Mesh => &kernels::PBSR_MESH,
             Maker::Volume => &kernels::PBSR_VOLUME,
+            Maker::Lattice => &kernels::PBSR_LATTICE,
         };
         let mut buffers = vec![*source];
         buffers.extend(tables);
@@ -107,12 +100,37 @@ pub fn record_generated(capacities: Capacities, nearest: Nearest, sources: &Sour
     })
 }
 
+/// How many particles each chunk of each set has.
+fn count(
+    r: &mut Recording,
+    sources: &Sources,
+    inputs: &[(BufferId, Vec<BufferId>)],
+    levels: u32,
+    [arrivals, counts]: [BufferId; 2],
+) {
+    for (twin, (source, tables)) in sources.twins.iter().zip(inputs) {
+        let each = twin.source.chunks.saturating_mul(levels);
+        let arrive = [*source, tables[0], arrivals, counts];
+        r.dispatch(&kernels::PBSR_ARRIVE, Groups::cover(each.div_ceil(super::BLOCK)), &arrive, &[]);
+        let thinned = match twin.maker {
+            Maker::Mesh => continue,
+            Maker::Volume => &kernels::PBSR_VOLUME_COUNT,
+            Maker::Lattice => &kernels::PBSR_LATTICE_COUNT,
+        };
+        let mut buffers = vec![*source];
+        buffers.extend(tables);
+        buffers.extend([arrivals, counts]);
+        r.dispatch(thinned, Groups::cover(each), &buffers, &[]);
+    }
+}
+
 impl super::Twin {
     /// The buffers of its source and tables.
     fn input(&self, r: &mut Recording) -> (BufferId, Vec<BufferId>) {
         let names: &[&'static str] = match self.maker {
             Maker::Mesh => &["chunks", "triangles", "vertices"],
             Maker::Volume => &["chunks", "cells", "values", "transfer"],
+            Maker::Lattice => &["chunks", "cells", "values"],
         };
         let source = r.input("source", size_of::<ParticleSource>() as u64);
         let bytes = self.tables.iter().map(|t| 4 * t.len() as u64);

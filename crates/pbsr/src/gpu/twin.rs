@@ -16,6 +16,8 @@ pub(crate) enum Maker {
     Mesh,
     /// Tables: cells, values, pieces of the transfer function.
     Volume,
+    /// Tables: cells, values.
+    Lattice,
 }
 
 /// A sampler as a device takes it.

@@ -1,10 +1,10 @@
 //! Sets of particles that the device makes itself: the CPU's of the same seeds, and in the mean the CPU's of any.
 
-use gpu_conformance::{open, words};
+use gpu_conformance::{Device, open, words};
 use pbsr::gpu::{Capacities, Nearest, Sources, record, record_generated};
 use pbsr::{
-    Appearance, Density, Ensemble, EnsembleParams, Error, FoldParams, GridSampler, KeptSets, MeshSampler, Object,
-    Renderer, Sampler, Scene, SurfaceParams, VolumeParams, finest_pixel_area,
+    Appearance, Density, Ensemble, EnsembleParams, Error, FoldParams, GridSampler, KeptSets, LatticeSampler,
+    MeshSampler, Object, Renderer, Sampler, Scene, SurfaceParams, VolumeParams, finest_pixel_area,
 };
 use splat_core::glam::{DMat3, DQuat, DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
@@ -14,7 +14,7 @@ use splat_core::{
 use std::collections::BTreeSet;
 
 const SIZE: [u32; 2] = [96, 64];
-const ROOM: Capacities = Capacities { size: SIZE, objects: 3, levels: 16, of_set: 30_000, particles: 480_000 };
+const ROOM: Capacities = Capacities { size: SIZE, objects: 3, levels: 8, of_set: 40_000, particles: 320_000 };
 
 /// Walls, a bent sheet with normals and colours, and a volume of more than one piece of its transfer function.
 struct World {
@@ -83,6 +83,19 @@ impl World {
         )
     }
 
+    /// Of the surface that the volume's value makes.
+    fn crossings(&self, seed: u64, scale: f64, bias: f64) -> LatticeSampler<'_> {
+        let params = SurfaceParams {
+            opacity: 1.0 - 0.6f64.powf(bias),
+            cross_section: scale * finest_pixel_area(&self.camera, DVec3::ZERO, 1.5, 1e-3),
+            surface_opacity: SurfaceOpacity::PerCrossing,
+            color: [0.2, 0.7, 0.9],
+            seed: seed + 3,
+            ..SurfaceParams::default()
+        };
+        LatticeSampler::new(&self.grid, 0.4, &params).unwrap()
+    }
+
     fn with<T>(&self, samplers: [&dyn Sampler; 3], work: impl FnOnce(&Scene<'_>) -> T) -> T {
         let object = |sampler, turn, emission| {
             let material = Material { shading: Shading::Unlit, emission, ..Material::default() };
@@ -96,19 +109,14 @@ impl World {
     }
 }
 
-/// The better way that the device has.
-fn nearest() -> Nearest {
-    Nearest::of(open().unwrap().adapter())
-}
-
 fn empty() -> Ensemble {
     Ensemble::new(SIZE, &EnsembleParams::default()).unwrap()
 }
 
 /// Sets that the device makes and folds.
-fn by_device(scene: &Scene<'_>, runs: u32) -> Ensemble {
-    let (mut device, sources, mut ensemble) = (open().unwrap(), Sources::new(scene).unwrap(), empty());
-    let generated = record_generated(ROOM, nearest(), &sources).unwrap();
+fn by_device(device: &mut Device, scene: &Scene<'_>, runs: u32) -> Ensemble {
+    let (sources, mut ensemble) = (Sources::new(scene).unwrap(), empty());
+    let generated = record_generated(ROOM, Nearest::of(device.adapter()), &sources).unwrap();
     let mut prepared = device.prepare(&generated.recording).unwrap();
     let tables = generated.tables(&sources, scene, &ensemble).unwrap();
     for run in 0..runs {
@@ -118,7 +126,7 @@ fn by_device(scene: &Scene<'_>, runs: u32) -> Ensemble {
         let inputs: Vec<_> = inputs.iter().map(|(buffer, bytes)| (*buffer, &bytes[..])).collect();
         let done = prepared.run(&inputs).unwrap();
         let particles = generated.add(&done, &mut ensemble).unwrap();
-        assert!(particles > 30_000, "{particles}");
+        assert!(particles > 15_000, "{particles}");
     }
     assert_eq!(device.take_messages(), [""; 0]);
     ensemble
@@ -135,9 +143,9 @@ fn pixels() -> impl Iterator<Item = (u32, u32)> {
 }
 
 /// Sets and particles of the first run, made by the device, with the states of its streams; and uploaded ones.
-fn particles(scene: &Scene<'_>) -> ([[Vec<u32>; 2]; 2], Vec<u32>) {
-    let (mut device, sources) = (open().unwrap(), Sources::new(scene).unwrap());
-    let mut generated = record_generated(ROOM, nearest(), &sources).unwrap();
+fn particles(device: &mut Device, scene: &Scene<'_>) -> ([[Vec<u32>; 2]; 2], Vec<u32>) {
+    let sources = Sources::new(scene).unwrap();
+    let mut generated = record_generated(ROOM, Nearest::of(device.adapter()), &sources).unwrap();
     let wanted = [generated.sets, generated.particles, generated.arrivals];
     wanted.iter().for_each(|buffer| generated.recording.read(*buffer));
     let mut inputs = generated.tables(&sources, scene, &empty()).unwrap();
@@ -166,11 +174,17 @@ fn places([sets, particles]: &[Vec<u32>; 2]) -> BTreeSet<[u32; 5]> {
 fn particles_of_one_seed_are_the_cpu_s() {
     let world = World::new();
     let (wall, sheet, volume) = world.samplers(11, 1.0, 1.0);
-    let ([device, uploaded], _) = world.with([&wall, &sheet, &volume], particles);
+    let mut device = open().unwrap();
+    are_alike(&mut device, &world, [&wall, &sheet, &volume]);
+    are_alike(&mut device, &world, [&wall, &world.crossings(11, 1.0, 1.0), &volume]);
+}
+
+fn are_alike(device: &mut Device, world: &World, samplers: [&dyn Sampler; 3]) {
+    let ([device, uploaded], _) = world.with(samplers, |scene| particles(device, scene));
     let [found, expected] = [places(&device), places(&uploaded)];
     let same = found.intersection(&expected).count() as f64;
     let all = found.union(&expected).count() as f64;
-    assert!(expected.len() > 150_000 && same >= 0.9999 * all, "{same} of {all}");
+    assert!(expected.len() > 75_000 && same >= 0.9999 * all, "{same} of {all}");
     assert!((0..3).all(|object| expected.iter().any(|p| p[4] == object)));
     // Where no set has another number of particles, all stand in the same places: normals and colours are steps apart at
     // most, and thinning numbers equal.
@@ -198,7 +212,7 @@ fn streams_are_the_cpu_s_bit_for_bit() {
     let world = World::new();
     let (wall, sheet, volume) = world.samplers(11, 1.0, 1.0);
     let samplers: [&dyn Sampler; 3] = [&wall, &sheet, &volume];
-    let (_, arrivals) = world.with(samplers, particles);
+    let (_, arrivals) = world.with(samplers, |scene| particles(&mut open().unwrap(), scene));
     let mut arrivals = arrivals.chunks(3);
     let (mut sum, mut mean) = (0.0, 0.0);
     for level in 0..u64::from(ROOM.levels) {
@@ -217,25 +231,28 @@ fn streams_are_the_cpu_s_bit_for_bit() {
             }
         }
     }
-    assert!(mean > 1e5 && (sum - mean).abs() < 4.0 * mean.sqrt(), "{sum} for {mean}");
+    assert!(mean > 5e4 && (sum - mean).abs() < 4.0 * mean.sqrt(), "{sum} for {mean}");
 }
 
 #[test]
 fn hits_of_one_seed_are_the_cpu_s() {
-    let world = World::new();
+    let (world, mut device) = (World::new(), open().unwrap());
     // Widened and thinned out; the second run begins where the first ends.
     for scale in [0.5, 6.0] {
         let (wall, sheet, volume) = world.samplers(5, scale, 1.0);
-        world.with([&wall, &sheet, &volume], |scene| {
-            let [cpu, gpu] = [by_processor(scene, 2 * ROOM.levels), by_device(scene, 2)];
-            let same = pixels().filter(|&(x, y)| cpu.hits(x, y) == gpu.hits(x, y)).count();
-            assert!(same as f64 >= 0.999 * f64::from(SIZE[0] * SIZE[1]), "{scale}: {same}");
-        });
+        let crossings = world.crossings(5, scale, 1.0);
+        for samplers in [[&wall as &dyn Sampler, &sheet, &volume], [&wall, &crossings, &volume]] {
+            world.with(samplers, |scene| {
+                let [cpu, gpu] = [by_processor(scene, 2 * ROOM.levels), by_device(&mut device, scene, 2)];
+                let same = pixels().filter(|&(x, y)| cpu.hits(x, y) == gpu.hits(x, y)).count();
+                assert!(same as f64 >= 0.999 * f64::from(SIZE[0] * SIZE[1]), "{scale}: {same}");
+            });
+        }
     }
 }
 
 /// Sets of the test of means, as runs of the device.
-const RUNS: u32 = 6;
+const RUNS: u32 = 12;
 
 /// How far the means of two ensembles of other seeds are apart, in standard deviations that are 3.09 at p = 0.001: of the sum
 /// of the squares of all pixels' deviations (χ², by Wilson and Hilferty), and of hits and of luminance in all.
@@ -267,14 +284,22 @@ fn deviations(a: &Ensemble, b: &Ensemble) -> [f64; 3] {
     [of_chi2, sum / variance.sqrt(), apart / (squares(&a) + squares(&b)).sqrt()]
 }
 
+/// Whether every access of a kernel is looked at: then means take minutes, and the tests above show the same recordings.
+fn assisted() -> bool {
+    std::env::var("ORGANZA_VALIDATION").is_ok_and(|v| v == "gpu-assisted")
+}
+
 #[test]
 fn means_of_other_seeds_are_the_cpu_s_and_a_bias_is_found() {
+    if assisted() {
+        return;
+    }
     let world = World::new();
     let ensemble = |seed, bias, device| {
         // Nothing is widened, so that pixels are independent.
         let (wall, sheet, volume) = world.samplers(seed, 1.0, bias);
         world.with([&wall, &sheet, &volume], |scene| {
-            if device { by_device(scene, RUNS) } else { by_processor(scene, RUNS * ROOM.levels) }
+            if device { by_device(&mut open().unwrap(), scene, RUNS) } else { by_processor(scene, RUNS * ROOM.levels) }
         })
     };
     let cpu = ensemble(101, 1.0, false);
@@ -287,8 +312,30 @@ fn means_of_other_seeds_are_the_cpu_s_and_a_bias_is_found() {
     let mut moved = World::new();
     moved.camera.position.x += 0.03;
     let (wall, sheet, volume) = moved.samplers(202, 1.0, 1.0);
-    let [chi2, ..] = deviations(&moved.with([&wall, &sheet, &volume], |scene| by_device(scene, RUNS)), &cpu);
+    let [chi2, ..] =
+        deviations(&moved.with([&wall, &sheet, &volume], |scene| by_device(&mut open().unwrap(), scene, RUNS)), &cpu);
     assert!(chi2 > 6.0, "{chi2}");
+}
+
+#[test]
+fn means_of_crossings_are_the_cpu_s_and_a_bias_is_found() {
+    if assisted() {
+        return;
+    }
+    let world = World::new();
+    let ensemble = |seed, bias, device| {
+        let (wall, ..) = world.samplers(seed, 1.0, bias);
+        let clear = SurfaceParams { opacity: 0.0, ..SurfaceParams::default() };
+        let nothing = MeshSampler::new(&world.wall, &clear, None).unwrap();
+        world.with([&wall, &world.crossings(seed, 1.0, bias), &nothing], |scene| {
+            if device { by_device(&mut open().unwrap(), scene, RUNS) } else { by_processor(scene, RUNS * ROOM.levels) }
+        })
+    };
+    let cpu = ensemble(303, 1.0, false);
+    let [chi2, hits, light] = deviations(&ensemble(404, 1.0, true), &cpu);
+    assert!(chi2 < 3.09 && hits.abs() < 3.29 && light.abs() < 3.29, "{chi2} {hits} {light}");
+    let [_, hits, light] = deviations(&ensemble(404, 1.1, true), &cpu);
+    assert!(hits > 6.0 && light.abs() > 6.0, "{hits} {light}");
 }
 
 #[test]
@@ -299,7 +346,7 @@ fn too_little_room_folds_nothing_and_says_what_is_needed() {
         let (mut device, sources) = (open().unwrap(), Sources::new(scene).unwrap());
         let mut run = |room: Capacities| {
             let mut ensemble = empty();
-            let generated = record_generated(room, nearest(), &sources).unwrap();
+            let generated = record_generated(room, Nearest::of(device.adapter()), &sources).unwrap();
             let mut inputs = generated.tables(&sources, scene, &ensemble).unwrap();
             inputs.extend(generated.next(&sources, &ensemble));
             let inputs: Vec<_> = inputs.iter().map(|(buffer, bytes)| (*buffer, &bytes[..])).collect();
