@@ -184,7 +184,17 @@ fn passport_names_every_device_and_conforms_or_is_exit_6() {
     for passport in &passports {
         let recordings = passport["recordings"].as_array().unwrap();
         let names: Vec<_> = recordings.iter().map(|r| r["recording"].as_str().unwrap()).collect();
-        let all = ["order", "shadow lists", "shadow look-ups", "project", "shade", "composite", "chain", "particles"];
+        let all = [
+            "order",
+            "shadow lists",
+            "shadow look-ups",
+            "project",
+            "shade",
+            "composite",
+            "chain",
+            "particles",
+            "made particles",
+        ];
         assert_eq!(names, all);
     }
 }

@@ -6,9 +6,9 @@ mod common;
 
 use common::*;
 use pbsr::{
-    BrownianParams, BrownianSampler, Density, FieldVolumeSampler, GridSampler, ImplicitSurface, LineSampler,
-    MeshSampler, MetropolisParams, MetropolisSampler, Particles, Sampler, SplatParams, SplatSampler, SurfaceParams,
-    VolumeParams,
+    BrownianParams, BrownianSampler, Density, FieldVolumeSampler, GridSampler, ImplicitSurface, LatticeSampler,
+    LineSampler, MeshSampler, MetropolisParams, MetropolisSampler, Particles, Sampler, SplatParams, SplatSampler,
+    SurfaceParams, VolumeParams,
 };
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::{Cloud, Grid, Splat, SplatKind, TransferFunction, TransferPoint};
@@ -147,6 +147,19 @@ fn pb13_pb14_triangles() {
 fn pb13_pb14_cells() {
     let (grid, transfer) = homogeneous();
     check(&|s| Box::new(GridSampler::new(grid, transfer, &volume(s), None).unwrap()), in_cube, 3);
+}
+
+#[test]
+fn pb13_pb14_lattice_lines() {
+    // The plane z + 0.3·x = 0.1·y through a lattice: uniform in x and y.
+    const N: usize = 12;
+    let step = 2.0 / (N - 1) as f32;
+    let at = |i: usize| i as f32 * step - 1.0;
+    let value = |i: usize| at(i / (N * N)) + 0.3 * at(i % N) - 0.1 * at(i / N % N);
+    let axes = DMat3::from_diagonal(DVec3::splat(f64::from(step)));
+    let grid = Grid { origin: DVec3::splat(-1.0), axes, dims: [N; 3], values: (0..N * N * N).map(value).collect() };
+    let grid = Box::leak(Box::new(grid));
+    check(&|s| Box::new(LatticeSampler::new(grid, 0.0, &half(s)).unwrap()), in_cube, 2);
 }
 
 #[test]
