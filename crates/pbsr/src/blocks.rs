@@ -13,6 +13,18 @@ const BLOCK: usize = 1024;
 /// The most particles of a chunk, in the mean: a block of more is worked on by several tasks.
 const CHUNK_MEAN: f64 = 8192.0;
 
+/// Arrivals that are worked on at once.
+pub(crate) const BATCH: usize = 64;
+
+/// Some arrivals of a chunk.
+pub(crate) struct Batch<const N: usize> {
+    pub(crate) len: usize,
+    /// Element of each.
+    pub(crate) elements: [usize; BATCH],
+    /// Random numbers of each.
+    pub(crate) bits: [[u64; BATCH]; N],
+}
+
 /// Alias tables of all elements.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Blocks {
@@ -69,17 +81,10 @@ impl Blocks {
         chunk: usize,
         mut emit: impl FnMut(usize, &mut Stream),
     ) {
-        let (block, mean) = self.chunks[chunk];
-        let first = block as usize * BLOCK;
-        let slots = &self.slots[first..(first + BLOCK).min(self.elements)];
+        let (first, slots, mean) = self.of_chunk(chunk);
         let mut stream = Stream::new(seed, stage, set, chunk as u64);
         for _ in 0..stream.poisson(mean) {
-            let bits = stream.bits();
-            let slot = (((bits >> 32) * slots.len() as u64) >> 32) as usize;
-            let (share, other) = slots[slot];
-            // A selection, not a branch: which it is cannot be foreseen.
-            let own = 0usize.wrapping_sub(usize::from((bits as u32) < share));
-            let pick = slot & own | usize::from(other) & !own;
+            let pick = pick(slots, stream.bits());
             emit(first + pick, &mut stream);
         }
     }
@@ -99,10 +104,53 @@ impl Blocks {
         &self.slots
     }
 
+    /// The arrivals of a chunk, some at once, each with `N` random numbers: those that [`Blocks::arrivals`] would give.
+    pub(crate) fn batches<const N: usize>(
+        &self,
+        seed: u64,
+        stage: Stage,
+        set: u64,
+        chunk: usize,
+        mut emit: impl FnMut(&Batch<N>),
+    ) {
+        let (first, slots, mean) = self.of_chunk(chunk);
+        let mut stream = Stream::new(seed, stage, set, chunk as u64);
+        let mut left = stream.poisson(mean);
+        let mut batch = Batch { len: 0, elements: [0; BATCH], bits: [[0; BATCH]; N] };
+        while left > 0 {
+            batch.len = left.min(BATCH as u64) as usize;
+            left -= batch.len as u64;
+            // Look-ups that miss the cache do not wait for each other.
+            for j in 0..batch.len {
+                batch.elements[j] = first + pick(slots, stream.bits());
+                (0..N).for_each(|d| batch.bits[d][j] = stream.bits());
+            }
+            emit(&batch);
+        }
+    }
+
+    /// First element, slots, and mean number of arrivals of a chunk.
+    #[inline]
+    fn of_chunk(&self, chunk: usize) -> (usize, &[(u32, u16)], f64) {
+        let (block, mean) = self.chunks[chunk];
+        let first = block as usize * BLOCK;
+        (first, &self.slots[first..(first + BLOCK).min(self.elements)], mean)
+    }
+
     /// Bytes of the tables.
     pub(crate) fn bytes(&self) -> u64 {
         (self.slots.len() * 8 + self.chunks.len() * 16) as u64
     }
+}
+
+/// The element of a block that 64 random bits pick.
+#[inline]
+fn pick(slots: &[(u32, u16)], bits: u64) -> usize {
+    let slot = (((bits >> 32) * slots.len() as u64) >> 32) as usize;
+    let (share, other) = slots[slot];
+    // A selection, not a branch: which it is cannot be foreseen.
+    let own = 0usize.wrapping_sub(usize::from((bits as u32) < share));
+    slot & own | usize::from(other) & !own
 }
 
 /// One alias table; returns the sum of the rates.

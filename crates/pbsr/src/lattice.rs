@@ -16,9 +16,9 @@ use crate::blocks::Blocks;
 #[cfg(feature = "gpu")]
 use crate::gpu::{Maker, Twin};
 use crate::params::countable;
+use crate::places::{corners, interpolate};
 use crate::sampler::{Poisson, PoissonSets};
 use crate::stream::{Stage, Stream};
-use crate::volume::trilinear;
 use crate::{Error, PackedColor, PackedNormal, Particles, SurfaceParams};
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
@@ -116,12 +116,13 @@ impl<'a> LatticeSampler<'a> {
             1 => [v, t, u],
             _ => [u, v, t],
         };
-        let [low, high] = [0.0, 1.0].map(|t| trilinear(self.grid, at, on_line(t)).0);
+        let values = corners(self.grid, at);
+        let [low, high] = [0.0, 1.0].map(|t| interpolate(values, on_line(t)).0);
         if (low < self.level) == (high < self.level) {
             return None;
         }
         let f = on_line((self.level - low) / (high - low));
-        let (_, g) = trilinear(self.grid, at, f);
+        let (_, g) = interpolate(values, f);
         let world = self.gradient * g;
         let bound = lot * self.weight * (g.x.abs() + g.y.abs() + g.z.abs());
         (bound * bound < world.length_squared()).then_some((f, world))

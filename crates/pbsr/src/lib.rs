@@ -67,6 +67,7 @@ mod params;
 mod particles;
 mod picture;
 mod pieces;
+mod places;
 mod project;
 pub mod reference;
 mod render;

@@ -86,7 +86,7 @@ impl PackedColor {
             exponent += 1;
         }
         let s = scale(exponent);
-        let [r, g, b] = c.map(|v| (v * s + 0.5) as u32);
+        let [r, g, b] = c.map(|v| (v * s + 0.5) as i32 as u32);
         Self(r | g << 9 | b << 18 | ((exponent + 15) as u32) << 27)
     }
 

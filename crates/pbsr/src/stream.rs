@@ -52,16 +52,13 @@ impl Stream {
     /// Two uniform numbers in (0, 1), both ends open, 23 bits each.
     #[inline]
     pub(crate) fn pair(&mut self) -> [f32; 2] {
-        let bits = self.bits();
-        [unit_f32(bits >> 41), unit_f32((bits >> 18) & 0x7f_ffff)]
+        pair(self.bits())
     }
 
     /// Three uniform numbers in (0, 1), both ends open, 21 bits each.
     #[inline]
     pub(crate) fn triple(&mut self) -> [f32; 3] {
-        let bits = self.bits();
-        let part = |v: u64| ((v & 0x1f_ffff) as f32 + 0.5) * (1.0 / (1u32 << 21) as f32);
-        [part(bits >> 43), part(bits >> 22), part(bits >> 1)]
+        triple(self.bits())
     }
 
     /// Two independent standard normal numbers (Box-Muller).
@@ -134,9 +131,22 @@ pub(crate) fn rejection(mean: f64) -> [f64; 4] {
     [b, a, 0.9277 - 3.6224 / (b - 2.0), 1.1239 + 1.1328 / (b - 3.4)]
 }
 
-#[inline]
+/// Two uniform numbers in (0, 1), both ends open, of 64 random bits.
+#[inline(always)]
+pub(crate) fn pair(bits: u64) -> [f32; 2] {
+    [unit_f32(bits >> 41), unit_f32((bits >> 18) & 0x7f_ffff)]
+}
+
+/// Three uniform numbers in (0, 1), both ends open, of 64 random bits.
+#[inline(always)]
+pub(crate) fn triple(bits: u64) -> [f32; 3] {
+    let part = |v: u64| ((v & 0x1f_ffff) as i32 as f32 + 0.5) * (1.0 / (1u32 << 21) as f32);
+    [part(bits >> 43), part(bits >> 22), part(bits >> 1)]
+}
+
+#[inline(always)]
 fn unit_f32(bits23: u64) -> f32 {
-    (bits23 as f32 + 0.5) * (1.0 / (1u32 << 23) as f32)
+    (bits23 as i32 as f32 + 0.5) * (1.0 / (1u32 << 23) as f32)
 }
 
 /// The SplitMix64 finalizer.

@@ -16,14 +16,15 @@
 //! σ(x)/σ_max. σ is the transfer function of the trilinearly interpolated value, σ_max its maximum over the range of the
 //! eight corners: the law holds within cells too. The usual cell-by-cell method takes one density a cell.
 
-use crate::blocks::Blocks;
+use crate::blocks::{BATCH, Batch, Blocks};
 use crate::error::check;
 #[cfg(feature = "gpu")]
 use crate::gpu::{Maker, Twin};
 use crate::params::{countable, positive};
 use crate::pieces::{Pieces, SEVERAL};
+use crate::places::{Lattice, Places, corners, interpolate};
 use crate::sampler::{Poisson, PoissonSets};
-use crate::stream::Stage;
+use crate::stream::{Stage, pair};
 use crate::{Density, Error, PackedColor, PackedNormal, Particles};
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
@@ -83,9 +84,7 @@ pub struct GridSampler<'a> {
     pub(crate) cells: Vec<Cell>,
     pieces: Pieces,
     pub(crate) sets: PoissonSets,
-    axes: Mat3,
-    /// 1 over the lattice points along x and y.
-    inverse_dims: [f64; 2],
+    lattice: Lattice,
     /// World gradient from the gradient in lattice steps.
     gradient: Mat3,
 }
@@ -127,9 +126,9 @@ impl<'a> GridSampler<'a> {
         }
         countable(blocks.total())?;
         let sets = PoissonSets::new(grid.origin, params.cross_section, blocks);
-        let (axes, gradient) = (grid.axes.as_mat3(), grid.axes.inverse().transpose().as_mat3());
-        let inverse_dims = [1.0 / nx as f64, 1.0 / ny as f64];
-        Ok(Self { grid, transfer, params: *params, density, cells, pieces, sets, axes, inverse_dims, gradient })
+        let gradient = grid.axes.inverse().transpose().as_mat3();
+        let lattice = Lattice::new(grid.axes.as_mat3(), [nx as u32, ny as u32]);
+        Ok(Self { grid, transfer, params: *params, density, cells, pieces, sets, lattice, gradient })
     }
 
     /// Cells with extinction.
@@ -143,20 +142,14 @@ impl<'a> GridSampler<'a> {
     }
 
     /// The lattice indices of the cell's first corner.
-    #[inline]
     pub(crate) fn corner(&self, at: u32) -> [u32; 3] {
-        let [nx, ny, _] = self.grid.dims.map(|n| n as u32);
-        // 32-bit numbers and a half are further from a whole quotient than f64 rounds: the quotients are exact.
-        let over = |v: u32, inverse: f64| ((f64::from(v) + 0.5) * inverse) as i64 as u32;
-        let row = over(at, self.inverse_dims[0]);
-        let layer = over(row, self.inverse_dims[1]);
-        [at.wrapping_sub(row.wrapping_mul(nx)), row.wrapping_sub(layer.wrapping_mul(ny)), layer]
+        self.lattice.corner(at)
     }
 
     /// Value and lattice gradient at `f` in \[0, 1\]³ of a cell.
     #[inline]
     pub(crate) fn interpolate(&self, at: u32, f: [f32; 3]) -> (f32, Vec3) {
-        trilinear(self.grid, at, f)
+        interpolate(corners(self.grid, at), f)
     }
 
     /// The particle at `f` of a cell, without its position.
@@ -168,26 +161,9 @@ impl<'a> GridSampler<'a> {
     }
 
     /// Offset from the grid's origin.
-    #[inline]
     pub(crate) fn offset(&self, at: u32, f: [f32; 3]) -> Vec3 {
-        let [i, j, k] = self.corner(at);
-        self.axes * Vec3::new(i as f32 + f[0], j as f32 + f[1], k as f32 + f[2])
+        self.lattice.offset(at, f)
     }
-}
-
-/// Value and lattice gradient at `f` in \[0, 1\]³ of the cell with this first corner.
-#[inline]
-pub(crate) fn trilinear(grid: &Grid, at: u32, [fx, fy, fz]: [f32; 3]) -> (f32, Vec3) {
-    let (nx, layer) = (grid.dims[0], grid.dims[0] * grid.dims[1]);
-    let at = at as usize;
-    let pair = |i: usize| -> [f32; 2] { [grid.values[i], grid.values[i + 1]] };
-    let [a, b, c, d] = [pair(at), pair(at + nx), pair(at + layer), pair(at + layer + nx)];
-    let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
-    let [xa, xb, xc, xd] = [a, b, c, d].map(|p| mix(p[0], p[1], fx));
-    let [y0, y1] = [mix(xa, xb, fy), mix(xc, xd, fy)];
-    let [da, db, dc, dd] = [a, b, c, d].map(|p| p[1] - p[0]);
-    let gradient = Vec3::new(mix(mix(da, db, fy), mix(dc, dd, fy), fz), mix(xb - xa, xd - xc, fz), y1 - y0);
-    (mix(y0, y1, fz), gradient)
 }
 
 /// The active cells of one row of the lattice that begins at index `first`.
@@ -225,22 +201,7 @@ impl Poisson for GridSampler<'_> {
     }
 
     fn fill(&self, set: u64, chunk: usize, particles: &mut Particles) {
-        self.sets.blocks.arrivals(self.params.seed, Stage::Volume, set, chunk, |c, stream| {
-            let Cell { at, most, piece } = self.cells[c];
-            let f = stream.triple();
-            let (value, gradient) = self.interpolate(at, f);
-            let point = if piece == SEVERAL { self.transfer.at(value) } else { self.pieces.at(piece, value) };
-            if stream.pair()[0] * most >= point.extinction {
-                return;
-            }
-            let offset = self.offset(at, f);
-            let thinned = |d: &Density<'_>, u: f64| u * d.max >= d.at(self.grid.origin + offset.as_dvec3());
-            if self.density.as_ref().is_some_and(|d| thinned(d, stream.unit())) {
-                return;
-            }
-            let (normal, color) = self.attributes(point.color, gradient);
-            particles.push(offset, normal, color);
-        });
+        self.sets.blocks.batches(self.params.seed, Stage::Volume, set, chunk, |batch| self.place(batch, particles));
     }
 
     #[cfg(feature = "gpu")]
@@ -250,7 +211,7 @@ impl Poisson for GridSampler<'_> {
         }
         let columns = |m: &Mat3| [m.x_axis, m.y_axis, m.z_axis].map(|v| v.extend(0.0).to_array());
         let ([axis_x, axis_y, axis_z], [gradient_x, gradient_y, gradient_z]) =
-            (columns(&self.axes), columns(&self.gradient));
+            (columns(&self.grid.axes.as_mat3()), columns(&self.gradient));
         let source = ParticleSource {
             axis_x,
             axis_y,
@@ -267,5 +228,35 @@ impl Poisson for GridSampler<'_> {
         let values = self.grid.values.iter().map(|v| v.to_bits()).collect();
         let tables = vec![cells, values, self.pieces.words()];
         Some(Twin::new(Maker::Volume, self, source, tables, (self.params.seed, Stage::Volume)))
+    }
+}
+
+impl GridSampler<'_> {
+    /// Appends the particles of some arrivals, step by step, so that what misses the cache is asked for all at once.
+    fn place(&self, batch: &Batch<2>, particles: &mut Particles) {
+        let n = batch.len;
+        let mut cells = [Cell { at: 0, most: 0.0, piece: 0 }; BATCH];
+        cells.iter_mut().zip(&batch.elements[..n]).for_each(|(cell, e)| *cell = self.cells[*e]);
+        let mut places = Places::EMPTY;
+        for j in 0..n {
+            places.begin(j, cells[j].at, corners(self.grid, cells[j].at), batch.bits[0][j]);
+        }
+        places.find(n, &self.lattice);
+        for j in 0..n {
+            let Cell { most, piece, .. } = cells[j];
+            let value = places.value[j];
+            let point = if piece == SEVERAL { self.transfer.at(value) } else { self.pieces.at(piece, value) };
+            let [kept, dense] = pair(batch.bits[1][j]);
+            if kept * most >= point.extinction {
+                continue;
+            }
+            let offset = places.offset(j);
+            let thinned = |d: &Density<'_>| f64::from(dense) * d.max >= d.at(self.grid.origin + offset.as_dvec3());
+            if self.density.as_ref().is_some_and(thinned) {
+                continue;
+            }
+            let (normal, color) = self.attributes(point.color, places.gradient(j));
+            particles.push(offset, normal, color);
+        }
     }
 }

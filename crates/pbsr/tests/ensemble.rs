@@ -5,11 +5,13 @@ mod common;
 
 use common::*;
 use pbsr::{
-    Ensemble, EnsembleParams, Error, FoldParams, KeptSets, LitBy, MeshSampler, Object, Occluder, Renderer, Sampler,
-    Scene, SurfaceParams, pixel_area, predict,
+    Appearance, Ensemble, EnsembleParams, Error, FoldParams, KeptSets, LitBy, MeshSampler, Object, Occluder, Renderer,
+    Sampler, Scene, SurfaceParams, pixel_area, predict,
 };
 use splat_core::glam::{DQuat, DVec3, Vec3};
-use splat_core::{Light, LightShape, Material, Mesh, Progress, Projection, Receiver, Similarity, Transmittance};
+use splat_core::{
+    Light, LightShape, Material, Mesh, Progress, Projection, Receiver, Shading, Similarity, Transmittance,
+};
 
 fn wall(z: f32) -> Mesh {
     rectangle(Vec3::Z * z, Vec3::X * 1.5, Vec3::Y * 1.5, 2)
@@ -345,4 +347,27 @@ fn the_fast_path_sees_what_the_slow_one_sees() {
     }
     assert!((pbsr::reference::equation_1(0.01, 1.0, 100) - pbsr::opacity::opacity(100.0, 0.01)).abs() < 1e-12);
     assert!((pbsr::reference::layers(&[0.5, 0.2]) - 0.6).abs() < 1e-15);
+}
+
+#[test]
+fn sums_gathered_by_tile_are_those_added_hit_by_hit() {
+    // More sets in a batch than a tile gathers at once; blue is negative.
+    let camera = camera(Projection::Orthographic { height: 2.0 }, 3.0, [70, 60]);
+    let mesh = wall(0.0);
+    let sampler = MeshSampler::new(&mesh, &params(0.7, 1e-3, [0.25, 0.5, 0.1], 3), None).unwrap();
+    let material = Material { shading: Shading::Unlit, emission: [0.5, 0.0, -0.75], ..Material::default() };
+    let look = Appearance { material, ..Appearance::default() };
+    let objects = [Object { sampler: &sampler, transform: Similarity::default(), look }];
+    let scene = scene(&camera, &objects);
+    let fold = |object: bool| {
+        let params = EnsembleParams { object, ..EnsembleParams::default() };
+        let mut ensemble = Ensemble::new(camera.size, &params).unwrap();
+        Renderer::new().fold(&scene, &mut ensemble, 300, &FoldParams::default(), &Progress::new()).unwrap();
+        ensemble.read(&|_, _| [0.25; 3], None)
+    };
+    let (gathered, one_by_one) = (fold(false), fold(true));
+    for name in ["beauty", "alpha", "std_error"] {
+        assert_eq!(gathered.images.get(name), one_by_one.images.get(name), "{name}");
+    }
+    assert!(gathered.rgb("beauty").unwrap().iter().any(|p| p[2] < -0.1));
 }
