@@ -35,8 +35,11 @@ pub(crate) struct Drawing<'a> {
 
 /// Runs the planned passes.
 pub(crate) fn draw(drawing: &Drawing<'_>, cost: &mut CostRecord) -> Result<Layers, Error> {
-    let maps = drawing.shadow_maps(cost)?;
     let camera = drawing.sample_camera();
+    if let Some(layers) = drawing.staying(&camera, cost)? {
+        return Ok(layers);
+    }
+    let maps = drawing.shadow_maps(cost)?;
     if let Some(layers) = drawing.chained(&maps, &camera, cost)? {
         return Ok(layers);
     }
@@ -159,11 +162,10 @@ impl Drawing<'_> {
         f64::from(widest * self.raster_params().resampling_sigma_px)
     }
 
-    /// One map for each light that the plan gives one.
-    pub(crate) fn shadow_maps(&self, cost: &mut CostRecord) -> Result<Vec<Option<ShadowMap>>, Error> {
+    fn shadow_params(&self) -> tsm::Params {
         let shadow = &self.settings.points.shadow;
         let defaults = tsm::Params::default();
-        let params = tsm::Params {
+        tsm::Params {
             mapping: match shadow.mapping {
                 ShadowMapping::Auto => tsm::MappingChoice::Auto,
                 ShadowMapping::Octahedral => tsm::MappingChoice::Octahedral,
@@ -174,7 +176,12 @@ impl Drawing<'_> {
             footprints: self.loaded.footprints.clone(),
             max_bytes: self.max_memory,
             ..defaults
-        };
+        }
+    }
+
+    /// One map for each light that the plan gives one.
+    pub(crate) fn shadow_maps(&self, cost: &mut CostRecord) -> Result<Vec<Option<ShadowMap>>, Error> {
+        let params = self.shadow_params();
         let mut maps = Vec::new();
         for (i, (light, wanted)) in self.loaded.lights.iter().zip(&self.plan.shadow_maps).enumerate() {
             self.tick()?;

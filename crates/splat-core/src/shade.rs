@@ -150,6 +150,11 @@ struct Shaded {
     shadow: f32,
 }
 
+/// How much of a shadow splat `i` takes.
+fn shadow_share(input: &ShadeInput<'_>, i: usize) -> f32 {
+    input.cloud.shadow_coefficient_of(i) * input.objects[input.cloud.object[i] as usize].shadow_coefficient
+}
+
 impl Point {
     fn new(input: &ShadeInput<'_>, i: usize, eye: Vec3) -> Self {
         let cloud = input.cloud;
@@ -170,8 +175,7 @@ impl Point {
             to_eye,
             color: cloud.color[i],
             material: input.materials[cloud.material[i] as usize],
-            shadow_coefficient: cloud.shadow_coefficient_of(i)
-                * input.objects[cloud.object[i] as usize].shadow_coefficient,
+            shadow_coefficient: shadow_share(input, i),
         }
     }
 

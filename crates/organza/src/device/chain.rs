@@ -1,19 +1,22 @@
 //! Translucent splats from their attributes to the picture on a device, with nothing read back between: ordered, projected,
-//! shaded and composited by one joined recording.
+//! shaded and composited by one joined recording; where all that throws shadows is among them, their shadows are made there too.
 //!
 //! The stages know nothing of each other; the buffers that they have in common are named here. Splats that the device does not
 //! take all at once go through it in parts, ordered before.
 
 mod parts;
+mod shadows;
 
 use super::Failure;
 use super::splats::{MOST_OF_A_TILE, raster_counts, room_for, too_long};
 use hbsort::gpu as order;
+use shadows::Shadow;
 use splat_core::raster::gpu::{Attributes, Capacities, follow, project, record};
 use splat_core::raster::{OpaqueImage, Params, RasterCounts};
 use splat_core::shade::{ChannelLayout, ShadeInput, gpu as shade};
 use splat_core::{Accumulator, Error, FootprintStack, Progress};
 use splat_shaders::{BufferId, DeviceError, Executor, Joined, PassTime, Recording};
+use tsm::gpu::{CastRoom, Casting};
 
 /// Translucent splats, and what becomes of them.
 pub(crate) struct Translucent<'a> {
@@ -27,6 +30,9 @@ pub(crate) struct Translucent<'a> {
     pub(crate) sort: &'a hbsort::Params,
     pub(crate) raster: &'a Params,
     pub(crate) opaque: &'a OpaqueImage,
+    /// For each light with a shadow what throws it, where all of that happens on the device; else none, and what the lights'
+    /// maps let through is uploaded.
+    pub(crate) castings: &'a [Casting],
     pub(crate) progress: &'a Progress,
 }
 
@@ -53,6 +59,8 @@ struct Whole {
     /// None where the splats are in order.
     sort: Option<order::Recorded>,
     project: (project::Recorded, Joined),
+    /// Of each light with a shadow.
+    shadows: Vec<Shadow>,
     shade: (shade::Recorded, Joined),
     composite: (splat_core::raster::gpu::Recorded, Joined),
 }
@@ -64,6 +72,7 @@ impl Whole {
         input: &ShadeInput<'_>,
         layout: ChannelLayout,
         sorts: bool,
+        casts: &[CastRoom],
     ) -> Result<Self, Error> {
         let splats = room.splats;
         let sort = sorts.then(|| order::record(order::Capacities { splats, kept: splats }));
@@ -76,7 +85,11 @@ impl Whole {
         let positions: Vec<_> =
             sort.iter().flat_map(|sort| [(at.positions, sort.positions), (at.radii, sort.radii)]).collect();
         let in_project = recording.join(&projected.recording, &positions);
-        let in_shade = recording.join(&shaded.recording, &shaded.attributes.shared(&at.of(&in_project)));
+        let at = at.of(&in_project);
+        let shadows = shadows::join(&mut recording, casts, &at);
+        let received = shadows.first().map(|(shadow, joined)| (shaded.received, joined.of(shadow.received)));
+        let known: Vec<_> = shaded.attributes.shared(&at).into_iter().chain(received).collect();
+        let in_shade = recording.join(&shaded.recording, &known);
         let mut taken =
             vec![(composite.splats, in_project.of(projected.splats)), (composite.values, in_shade.of(shaded.values))];
         if let (Some(sort), Some(sorted)) = (&sort, composite.sorted) {
@@ -85,11 +98,13 @@ impl Whole {
         let in_composite = recording.join(&composite.recording, &taken);
         let read =
             [in_project.of(projected.state), in_composite.of(composite.state), in_composite.of(composite.planes)];
-        recording.read_only(&read);
+        let of_shadows = shadows.iter().map(|(shadow, joined)| joined.of(shadow.cast.state));
+        recording.read_only(&read.into_iter().chain(of_shadows).collect::<Vec<_>>());
         Ok(Self {
             recording,
             sort,
             project: (projected, in_project),
+            shadows,
             shade: (shaded, in_shade),
             composite: (composite, in_composite),
         })
@@ -97,7 +112,7 @@ impl Whole {
 }
 
 /// [`Translucent`] splats into an accumulator by a device, which changes only when all is done; `None` where it takes not even
-/// few of them.
+/// few of them, or not all at once with their shadows.
 pub(super) fn chain_on(
     device: &mut dyn Executor,
     splats: &Translucent<'_>,
@@ -106,6 +121,8 @@ pub(super) fn chain_on(
     let n = splats.ids.len();
     let most = match run_on(device, splats, true, room_for(n), accumulator)? {
         Outcome::Done(done) => return Ok(Some(done)),
+        // In parts they would throw their shadows again and again.
+        _ if !splats.castings.is_empty() => return Ok(None),
         Outcome::TooLarge => n.div_ceil(2),
         Outcome::TooLong => MOST_OF_A_TILE as usize,
     };
@@ -133,14 +150,17 @@ fn run_on(
         materials: splats.input.materials.len() as u32,
         opaque: !splats.opaque.depth.is_empty(),
     };
+    let Some(mut casts) = shadows::rooms(splats.castings, &attributes, device.adapter().binding_bytes) else {
+        return Ok(Outcome::TooLarge);
+    };
     let mut looked_up = None;
     loop {
-        let whole = Whole::record(capacities, &attributes, splats.input, splats.layout, sorts)?;
+        let whole = Whole::record(capacities, &attributes, splats.input, splats.layout, sorts, &casts)?;
         let mut ready = match device.prepare(&whole.recording) {
             Err(DeviceError::TooLarge { .. } | DeviceError::Memory { .. }) => return Ok(Outcome::TooLarge),
             ready => ready?,
         };
-        let received = looked_up.take().unwrap_or_else(|| shade::received(splats.input, splats.ids, splats.progress));
+        let received = looked_up.take().unwrap_or_else(|| splats.received());
         if splats.progress.is_cancelled() {
             return Err(Error::Cancelled.into());
         }
@@ -148,12 +168,15 @@ fn run_on(
         let run = whole.with_inputs(splats, &attributes, &received, accumulator, run)?;
         let (composite, joined) = &whole.composite;
         let bytes = |buffer| run.bytes(joined.of(buffer));
+        let fits = shadows::had_room(&whole.shadows, &run, &mut casts)?;
         match composite.counts(bytes(composite.state)) {
             // Too little room: found once, for the device says what it needs.
             Err(Error::Overflow { needed, .. }) if u32::try_from(needed).is_ok_and(|n| n > capacities.entries) => {
                 capacities.entries = needed as u32;
                 looked_up = Some(received);
             }
+            // Without all shadows it is another picture.
+            _ if !fits => looked_up = Some(received),
             counts => {
                 let counts = counts?;
                 if too_long(device, &counts) {
@@ -166,6 +189,13 @@ fn run_on(
                 return Ok(Outcome::Done(Chained { visible, raster, passes: run.passes }));
             }
         }
+    }
+}
+
+impl Translucent<'_> {
+    /// What the maps of the lights let through, where it is uploaded.
+    fn received(&self) -> Vec<[f32; 3]> {
+        if self.castings.is_empty() { shade::received(self.input, self.ids, self.progress) } else { Vec::new() }
     }
 }
 
@@ -189,13 +219,22 @@ impl Whole {
             (&self.project, &self.shade, &self.composite);
         let to = project::Input { origin, camera, footprints, materials, params: raster };
         let project = projected.uploads(&to, attributes)?;
-        let shade = shaded.uploads(input, attributes, received)?;
+        let shade = if self.shadows.is_empty() {
+            shaded.uploads(input, attributes, received)?
+        } else {
+            shaded.uploads_beside_light(input, attributes)?
+        };
+        let shares = shade::shadow_shares(input, splats.ids);
+        let cast = shadows::uploads(&self.shadows, splats.castings, splats.ids, &shares)?;
         let direction = sort.direction;
         let into = follow::Input { camera, footprints, materials, opaque, direction, params: raster, order: &order };
         let composited = follow::uploads(composite, &into, accumulator)?;
         let mut inputs: Vec<(BufferId, &[u8])> = self.sort.iter().map(|sort| (sort.view, &view[..])).collect();
         inputs.extend(in_project.inputs(attributes.inputs(&projected.attributes)));
         inputs.extend(in_project.inputs(projected.inputs(&project)));
+        for ((shadow, joined), uploads) in self.shadows.iter().zip(&cast) {
+            inputs.extend(joined.inputs(shadow.inputs(uploads)));
+        }
         inputs.extend(in_shade.inputs(shaded.inputs(&shade)));
         inputs.extend(in_composite.inputs(composite.inputs(&composited)));
         // What another stage leaves on the device is not uploaded.
@@ -238,7 +277,7 @@ mod tests {
             materials: 1,
             opaque: false,
         };
-        let whole = Whole::record(room, &attributes, &input, ChannelLayout::default(), true).expect("a recording");
+        let whole = Whole::record(room, &attributes, &input, ChannelLayout::default(), true, &[]).expect("a recording");
         whole.recording.check().expect("no fault");
         let steps = |of: fn(&Step) -> Option<BufferId>| -> Vec<&str> {
             let buffers = whole.recording.buffers();
@@ -255,7 +294,8 @@ mod tests {
             ["projected", "state", "planes"]
         );
         // Sorted before, its order is an upload; there is nothing else to it.
-        let given = Whole::record(room, &attributes, &input, ChannelLayout::default(), false).expect("a recording");
+        let given =
+            Whole::record(room, &attributes, &input, ChannelLayout::default(), false, &[]).expect("a recording");
         given.recording.check().expect("no fault");
         assert!(given.sort.is_none() && given.composite.0.sorted.is_none());
         // Attributes of 40 bytes, a key, and what is sorted, projected, shaded, counted; entries.

@@ -5,7 +5,7 @@ use super::order::order_on;
 use super::particles::{Folding, why_not};
 use super::shadows::{LookUps, LookedUp, look_up_on, map_on};
 use super::splats::{composite_on, why_not_composite};
-use super::trial::order_trial;
+use super::trial::{order_trial, shadow_trial};
 use super::{DeviceChoice, Failure, fault};
 use crate::Error;
 use hbsort::{Params, SliceOrder};
@@ -139,6 +139,11 @@ impl Helper {
         done.map(|(counts, _)| counts)
     }
 
+    /// Whether shadow maps may be made and stay where the splats are: whether the device makes the processor's, bit for bit.
+    pub(crate) fn keeps_shadows(&self) -> bool {
+        self.with(|device| shadow_trial(device).or_else(too_small)).unwrap_or(false)
+    }
+
     /// Orders, projects, shades and composites splats, or leaves them to the passes one by one.
     pub(crate) fn chain(
         &self,
@@ -221,6 +226,14 @@ impl Helper {
         if !said.contains(&what) {
             said.push(what);
         }
+    }
+}
+
+/// A device on which not even a trial has room does nothing of the kind.
+fn too_small(why: Failure) -> Result<bool, Failure> {
+    match why {
+        Failure::Device(DeviceError::TooLarge { .. } | DeviceError::Memory { .. }) => Ok(false),
+        why => Err(why),
     }
 }
 

@@ -24,7 +24,8 @@ const SPLATS: u32 = 1 << 17;
 const SETS: u32 = 3;
 /// Pictures of particles and of splats.
 const SIZE: [u32; 2] = [320, 200];
-/// Share of pixels whose hits must agree: a GPU may round the square root and the division in k otherwise.
+/// Share of pixels whose hits must agree, for a GPU may round the square root and the division in k otherwise; and of splats
+/// whose light through maps that stay must.
 const LEAST_SHARE: f64 = 0.999;
 
 /// One device by one backend.
@@ -50,8 +51,9 @@ impl Passport {
 /// One recording on one device.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Checked {
-    /// `order`, `shadow lists`, `shadow look-ups`, `project`, `shade`, `composite`, `chain` (the order and the three before
-    /// as one), `particles` (uploaded sets) or `made particles` (sets of the same seeds that the device makes).
+    /// `order`, `shadow lists`, `shadow look-ups`, `shadow` (deposits, lists and look-ups as one), `project`, `shade`,
+    /// `composite`, `chain` (the order and the three before as one), `particles` (uploaded sets) or `made particles` (sets of
+    /// the same seeds that the device makes).
     pub recording: &'static str,
     /// Splats or particles that went in.
     pub items: u64,
@@ -65,7 +67,8 @@ pub struct Checked {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreement {
     /// Whether that is enough: equal bits for the order and the lists of shadow maps, 10⁻⁵ for look-ups in them and for what
-    /// is made of splats, 99.9 % of the pixels' hits for particles.
+    /// is made of splats, 10⁻⁴ for 99.9 % of the splats lit through maps that stay on the device, 99.9 % of the pixels' hits
+    /// for particles.
     pub within: bool,
     /// Share of places, cells or pixels that are equal in bits.
     pub equal_share: f64,
@@ -142,6 +145,7 @@ fn inspect(backend: &dyn Backend, place: usize, adapter: Adapter, input: &Inputs
         check("order", &mut |device| check_order(device, &input.order)),
         check("shadow lists", &mut |device| input.shadow.check_lists(device)),
         check("shadow look-ups", &mut |device| input.shadow.check_look_ups(device)),
+        check("shadow", &mut |device| input.shadow.check_shadow(device)),
         check("project", &mut |device| input.chain.check_project(device)),
         check("shade", &mut |device| input.chain.check_shade(device)),
         check("composite", &mut |device| input.composite.check(device)),

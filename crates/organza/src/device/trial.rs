@@ -7,8 +7,11 @@ use super::Failure;
 use super::order::order_on;
 use hbsort::{Params, Scratch, SliceOrder, slice_cloud};
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Camera, Cloud, Projection, Splat, rng};
+use splat_core::raster::gpu::Attributes;
+use splat_core::{Camera, Cloud, Light, LightShape, Progress, Projection, Splat, SplatKind, rng};
 use splat_shaders::{Executor, PassTime};
+use tsm::gpu::{Casting, record_map};
+use tsm::{Deposits, Params as ShadowParams, Resolution};
 
 /// Splats of the trial before a device is used.
 const SPLATS: u32 = 4096;
@@ -20,6 +23,33 @@ pub(super) fn order_trial(device: &mut dyn Executor) -> Result<bool, Failure> {
     let input = OrderInput::new(SPLATS);
     let (found, _) = input.on(device)?;
     Ok(found == input.by_processor()?)
+}
+
+/// Whether a device makes the processor's shadow map of generated splats. Coincident distances are as one to look-ups: where
+/// they are rounded apart, a picture moves by more than it may.
+pub(super) fn shadow_trial(device: &mut dyn Executor) -> Result<bool, Failure> {
+    let mut cloud = Cloud::new(DVec3::ZERO);
+    for i in 0..u64::from(SPLATS / 4) {
+        let u = |k| 2.0 * rng::unit_f32(SEED, 1, i, k) - 1.0;
+        let (position, normal) = (Vec3::new(u(0), u(1), u(2)), Vec3::new(u(3), u(4), u(5)).normalize_or(Vec3::Z));
+        let (kind, normal) = if i % 2 == 0 { (SplatKind::Medium, Vec3::ZERO) } else { (SplatKind::Surface, normal) };
+        let (radius, cross_section) = (0.06 + 0.03 * u(6), 1e-3);
+        cloud.push(&Splat { position, radius, cross_section, kind, normal, ..Splat::default() });
+    }
+    let light = Light { shape: LightShape::Point { position: DVec3::new(0.4, 1.3, -0.3) }, intensity: [1.0; 3] };
+    let params = ShadowParams { resolution: Resolution::Cells(64), ..ShadowParams::default() };
+    let casting = Casting::new(&cloud, &[], &[], &light, &params, &Progress::new())?;
+    let expected = Deposits::new(&cloud, &[], &[], &light, &params, &Progress::new())?.into_map();
+    let attributes = Attributes::new(&cloud, None)?;
+    let entries = u32::try_from(expected.counts().entries).unwrap_or(u32::MAX);
+    let recorded = record_map(casting.room(attributes.room(), entries));
+    let uploads = recorded.cast.uploads(&casting, None)?;
+    let mut inputs = recorded.cast.inputs(&uploads);
+    inputs.extend(attributes.inputs(&recorded.cast.attributes));
+    let run = device.run(&recorded.recording, &inputs)?;
+    let found = recorded.map(&casting, run.bytes(recorded.cast.state), recorded.lists.map(|buffer| run.bytes(buffer)));
+    // Where it finds more entries it rounds otherwise, too.
+    Ok(found.is_ok_and(|map| map == expected))
 }
 
 /// Generated splats and a view of them.

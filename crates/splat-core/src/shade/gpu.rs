@@ -1,6 +1,6 @@
 //! Shading as a recording: the GPU's twin of [`shade`](super::shade).
 //!
-//! One thread a splat. What the shadow maps let through ([`received`]) is uploaded.
+//! One thread a splat. What the shadow maps let through ([`received`]) is uploaded, or left there by a recording before.
 //!
 //! Deviations from the CPU: the direction to a light is found in single precision, from a light whose position is a sum of
 //! two f32, so that it keeps its digits near the light; x^m is e^(m ln x) by series, which devices promise less of. A
@@ -19,7 +19,7 @@
 //! assert_eq!(recorded.recording.bytes() / 1_000_000, 76);
 //! ```
 
-use super::{CHUNK, ChannelLayout, LitBy, LocalLight, Point, ShadeInput};
+use super::{CHUNK, ChannelLayout, LitBy, LocalLight, Point, ShadeInput, shadow_share};
 use crate::raster::gpu::{AttributeBuffers, AttributeRoom, Attributes};
 use crate::{Error, Light, LightShape, Material, Progress, Shading};
 use glam::{DVec3, Vec3};
@@ -145,6 +145,20 @@ pub fn received(input: &ShadeInput<'_>, ids: &[u32], progress: &Progress) -> Vec
     all
 }
 
+/// How much of a shadow each of the splats `ids` takes, in \[0, 1\]: one number for all where they are alike.
+///
+/// # Panics
+/// If an id, or an object of the cloud is out of range.
+pub fn shadow_shares(input: &ShadeInput<'_>, ids: &[u32]) -> Vec<f32> {
+    let share = |&id: &u32| shadow_share(input, id as usize);
+    let shares: Vec<f32> = ids.par_iter().with_min_len(1 << 14).map(share).collect();
+    match shares.split_first() {
+        None => vec![1.0],
+        Some((first, others)) if others.iter().all(|share| share == first) => vec![*first],
+        Some(_) => shares,
+    }
+}
+
 fn shadowed<'a>(lights: &'a [LitBy<'a>]) -> impl Iterator<Item = &'a LitBy<'a>> {
     lights.iter().filter(|lit| lit.shadow.is_some())
 }
@@ -156,6 +170,28 @@ impl Recorded {
     /// [`Error::Overflow`] for more than there is room for, [`Error::Invalid`] for ids that the tables do not have,
     /// [`Error::ColumnLength`] for attributes of another room or another number of received lights.
     pub fn uploads(
+        &self,
+        input: &ShadeInput<'_>,
+        attributes: &Attributes,
+        light: &[[f32; 3]],
+    ) -> Result<Uploads, Error> {
+        let splats = attributes.room().splats as usize;
+        let expected = shadowed(input.lights).count() * splats;
+        if light.len() != expected {
+            return Err(Error::ColumnLength { attribute: "received light", found: light.len(), expected });
+        }
+        self.uploads_of(input, attributes, light)
+    }
+
+    /// The same where a recording before this one leaves the received light on the device.
+    ///
+    /// # Errors
+    /// As [`Recorded::uploads`].
+    pub fn uploads_beside_light(&self, input: &ShadeInput<'_>, attributes: &Attributes) -> Result<Uploads, Error> {
+        self.uploads_of(input, attributes, &[])
+    }
+
+    fn uploads_of(
         &self,
         input: &ShadeInput<'_>,
         attributes: &Attributes,
@@ -173,10 +209,6 @@ impl Recorded {
             if needed as u64 > u64::from(had) {
                 return Err(Error::Overflow { what, needed: needed as u64, had: had.into() });
             }
-        }
-        let expected = shadowed(input.lights).count() * splats as usize;
-        if light.len() != expected {
-            return Err(Error::ColumnLength { attribute: "received light", found: light.len(), expected });
         }
         let tables: Vec<[f32; 4]> = input.materials.iter().flat_map(material).chain(lights(input)).collect();
         let view = self.view(input, splats);

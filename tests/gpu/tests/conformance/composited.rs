@@ -143,6 +143,68 @@ fn splats_stay_on_the_device_from_their_attributes_to_the_unshadowed() {
     assert!(apart(&alone, &helped) <= TOLERANCE, "{:e}", apart(&alone, &helped));
 }
 
+/// A beam, and a lamp without a shadow.
+const MORE_LIGHTS: &str = r#"
+    [[light]]
+    kind = "directional"
+    direction = [-0.4, -1, -0.3]
+    irradiance = [1, 0.8, 0.6]
+    [[light]]
+    kind = "point"
+    position = [-2, 1, 1]
+    intensity = [3, 3, 3]
+    shadow = false
+"#;
+
+/// Fog and pane alone, with more lights.
+fn translucent(lights: &str) -> String {
+    let (clear, _) = SCENE.split_once("    [[object]]\n    name = \"wall\"").unwrap();
+    clear.replacen("    [[object]]", &format!("{lights}    [[object]]"), 1)
+}
+
+#[test]
+fn shadow_maps_stay_on_the_device_where_no_opaque_splat_asks_for_light() {
+    let scene = translucent(MORE_LIGHTS);
+    let settings = "[render]\nlayers = [\"effects\", \"shadow\"]";
+    let alone = picture_of(&scene, settings, None);
+    let bright = scene.replace("shadow = false", "").replace("[[light]]", "[[light]]\n    shadow = false");
+    assert!(apart(&alone, &picture_of(&bright, settings, None)) > 0.01, "shadows that can be seen");
+    // Two trials, and everything else at once.
+    let (device, choice) = worse(Loss::Never, u64::MAX);
+    let helped = picture_of(&scene, settings, Some(choice));
+    assert_eq!((device.submissions(), &helped.warnings), (3, &alone.warnings));
+    assert!(apart(&alone, &helped) <= TOLERANCE, "{:e}", apart(&alone, &helped));
+    let maps = |r: &Render| r.cost.stages.iter().filter(|s| s.name == "tsm build").count();
+    assert_eq!((maps(&alone), maps(&helped)), (2, 2));
+    // There it fails the second trial, and makes lists and looks them up as ever.
+    let through_wgpu = picture_of(&scene, settings, Some(DeviceChoice::wgpu(adapter())));
+    assert!(through_wgpu.backend.starts_with("wgpu, "), "{}", through_wgpu.backend);
+    assert!(apart(&alone, &through_wgpu) <= TOLERANCE, "{:e}", apart(&alone, &through_wgpu));
+    let alone = picture_of(&scene, "", None);
+    // Too large for the device all at once, the passes are done one by one, or by the processor.
+    let (device, choice) = worse(Loss::Never, 1 << 18);
+    let parts = picture_of(&scene, "", Some(choice));
+    assert!(parts.warnings.iter().any(|w| w.contains("kernels see")), "{:?}", parts.warnings);
+    assert!(device.submissions() > 2, "{}", device.submissions());
+    assert!(apart(&alone, &parts) <= TOLERANCE, "{:e}", apart(&alone, &parts));
+    for (loss, said) in
+        [(Loss::Once(3), "was lost and opened once more"), (Loss::Always(3), "was lost; the processor goes on")]
+    {
+        let (_, choice) = worse(loss, u64::MAX);
+        let helped = picture_of(&scene, "", Some(choice));
+        assert!(apart(&alone, &helped) <= TOLERANCE, "{loss:?}");
+        assert!(helped.warnings.iter().any(|w| w.contains(said)), "{loss:?}: {:?}", helped.warnings);
+    }
+    // Maps of polar angles are the processor's, with a line said.
+    let polar = "[render.points.shadow]\nmapping = \"polar\"";
+    let lamp = translucent("");
+    let alone = picture_of(&lamp, polar, None);
+    let (_, choice) = worse(Loss::Never, u64::MAX);
+    let helped = picture_of(&lamp, polar, Some(choice));
+    assert!(apart(&alone, &helped) <= TOLERANCE);
+    assert!(helped.warnings.iter().any(|w| w.contains("polar angles are the processor's")), "{:?}", helped.warnings);
+}
+
 #[test]
 fn every_layer_that_is_shaded_is_the_processor_s() {
     let settings = "[ambient]\ncolor = [0.1, 0.2, 0.3]\n[render]\nlayers = [\"effects\", \"normal\", \"shadow\"]";

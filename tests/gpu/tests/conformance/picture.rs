@@ -222,7 +222,8 @@ fn every_device_has_a_passport() {
     assert_eq!(passports.len(), organza::devices().unwrap().len());
     for passport in &passports {
         assert!(passport.valid(), "{passport:?}");
-        let [order, lists, look_ups, project, shade, composite, chain, particles, made] = &passport.recordings[..]
+        let [order, lists, look_ups, shadow, project, shade, composite, chain, particles, made] =
+            &passport.recordings[..]
         else {
             panic!("{passport:?}")
         };
@@ -231,6 +232,8 @@ fn every_device_has_a_passport() {
         assert_eq!(lists.outcome.as_ref().map(|a| (a.within, a.equal_share, a.max)), Ok((true, 1.0, 0.0)));
         assert!(lists.items > 50_000 && look_ups.items == 1 << 14);
         assert!(look_ups.outcome.as_ref().is_ok_and(|a| a.within && a.mean < 1e-6), "{look_ups:?}");
+        assert!(shadow.items.abs_diff(lists.items) * 1000 <= lists.items, "{shadow:?}");
+        assert!(shadow.outcome.as_ref().is_ok_and(|a| a.mean < 1e-5), "{shadow:?}");
         let composited = |a: &Agreement| a.within && a.mean < 1e-6 && a.max <= 1e-5;
         for splats in [project, shade, composite, chain] {
             assert!(splats.items == 1 << 14 && splats.outcome.as_ref().is_ok_and(composited), "{splats:?}");

@@ -155,6 +155,7 @@ impl ChainInput {
                 sort: &sort,
                 raster: &raster,
                 opaque: &opaque,
+                castings: &[],
                 progress: &progress,
             };
             let chained = chain_on(device, &splats, &mut found)?.ok_or(Failure::Small)?;
