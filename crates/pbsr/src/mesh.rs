@@ -6,12 +6,12 @@
 //! Deviation: a Poisson number in place of a fixed n. The opacity of a pixel is then 1 − e^(−τ/cos θ) exactly, and each
 //! part of the mesh is sampled on its own.
 
-use crate::blocks::Blocks;
+use crate::blocks::{BATCH, Batch, Blocks};
 #[cfg(feature = "gpu")]
 use crate::gpu::{Maker, Twin};
 use crate::params::countable;
 use crate::sampler::{Poisson, PoissonSets};
-use crate::stream::Stage;
+use crate::stream::{Stage, pair};
 use crate::{Density, Error, PackedColor, PackedNormal, Particles, SurfaceParams};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -77,6 +77,16 @@ impl<'a> MeshSampler<'a> {
         self.sets.blocks.bytes() + (self.normals.len() * size_of::<PackedNormal>()) as u64
     }
 
+    /// Appends the particles of some arrivals, column by column, so that none waits for another's look-ups.
+    fn place(&self, batch: &Batch<1>, own: PackedColor, particles: &mut Particles) {
+        let mut places = [[0.0; 2]; BATCH];
+        places.iter_mut().zip(&batch.bits[0]).for_each(|(at, bits)| *at = folded(pair(*bits)));
+        let all = || batch.elements[..batch.len].iter().zip(&places);
+        particles.position.extend(all().map(|(t, at)| point(corners(self.mesh, *t), *at)));
+        particles.normal.extend(all().map(|(t, at)| self.normal(*t, *at)));
+        particles.color.extend(all().map(|(t, at)| self.color(*t, *at, own)));
+    }
+
     #[inline]
     fn normal(&self, t: usize, [u, v]: [f32; 2]) -> PackedNormal {
         match &*self.mesh.normal {
@@ -108,6 +118,19 @@ fn pack(normal: Vec3, params: &SurfaceParams) -> PackedNormal {
     if params.surface_opacity == SurfaceOpacity::PerCrossing { packed.per_crossing() } else { packed }
 }
 
+/// Coordinates in a triangle of coordinates in its parallelogram.
+#[inline]
+fn folded([u, v]: [f32; 2]) -> [f32; 2] {
+    // Selections, not a branch: whether it is folded cannot be foreseen.
+    let beyond = u + v > 1.0;
+    [u, v].map(|w| if beyond { 1.0 - w } else { w })
+}
+
+#[inline]
+fn point([a, b, c]: [Vec3; 3], [u, v]: [f32; 2]) -> Vec3 {
+    a + (b - a) * u + (c - a) * v
+}
+
 #[inline]
 fn corners(mesh: &Mesh, t: usize) -> [Vec3; 3] {
     mesh.triangles[t].map(|i| mesh.position[i as usize])
@@ -125,24 +148,22 @@ impl Poisson for MeshSampler<'_> {
 
     fn fill(&self, set: u64, chunk: usize, particles: &mut Particles) {
         let own = PackedColor::new(self.params.color);
-        self.sets.blocks.arrivals(self.params.seed, Stage::Mesh, set, chunk, |t, stream| {
-            let [u, v] = stream.pair();
-            // Selections, not a branch: whether it is folded cannot be foreseen.
-            let folded = u + v > 1.0;
-            let [u, v] = [u, v].map(|w| if folded { 1.0 - w } else { w });
+        let (seed, blocks) = (self.params.seed, &self.sets.blocks);
+        let Some(density) = &self.density else {
+            blocks.batches(seed, Stage::Mesh, set, chunk, |batch| self.place(batch, own, particles));
+            return;
+        };
+        blocks.arrivals(seed, Stage::Mesh, set, chunk, |t, stream| {
+            let at = folded(stream.pair());
             let triangle = corners(self.mesh, t);
-            let [a, b, c] = triangle;
-            let p = a + (b - a) * u + (c - a) * v;
-            if let Some(density) = &self.density {
-                let [a, b, c] = triangle.map(Vec3::as_dvec3);
-                let middle = (a + b + c) / 3.0;
-                let radius = [a, b, c].map(|p| (p - middle).length()).into_iter().fold(0.0, f64::max);
-                let most = density.bound(self.mesh.origin + middle, radius * (1.0 + 1e-12));
-                if stream.unit() * most >= density.at(self.mesh.origin + p.as_dvec3()) {
-                    return;
-                }
+            let p = point(triangle, at);
+            let [a, b, c] = triangle.map(Vec3::as_dvec3);
+            let middle = (a + b + c) / 3.0;
+            let radius = [a, b, c].map(|p| (p - middle).length()).into_iter().fold(0.0, f64::max);
+            let most = density.bound(self.mesh.origin + middle, radius * (1.0 + 1e-12));
+            if stream.unit() * most < density.at(self.mesh.origin + p.as_dvec3()) {
+                particles.push(p, self.normal(t, at), self.color(t, at, own));
             }
-            particles.push(p, self.normal(t, [u, v]), self.color(t, [u, v], own));
         });
     }
 
