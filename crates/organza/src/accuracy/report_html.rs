@@ -3,7 +3,7 @@
 use super::plot::{COLORS, Mark, Plot, Series, escaped};
 use super::report_joint::{bar_of, joint};
 use super::report_pictures::{data_uri, difference};
-use super::{Curve, CurvePoint, Outcome, Report, SEEDS, Study, TOLD_APART, least_seconds};
+use super::{Curve, CurvePoint, Outcome, Report, SEEDS, Step, Study, TOLD_APART, least_seconds};
 use crate::Error;
 use reference::statistics::median_with_spread;
 use std::fmt::Write;
@@ -169,14 +169,15 @@ fn knob_plot(study: &Study, curve: &Curve, meaning: &str) -> Option<Plot> {
 
 /// The steps of a knob that has no order, each with its RMSE and time.
 fn choices(study: &Study, curve: &Curve) -> String {
-    let one = |p: &CurvePoint| {
+    // A setting that two knobs share is called as the first calls it: the steps' own labels are meant.
+    let steps = study.knobs.iter().filter(|k| k.name == curve.knob).flat_map(|k| &k.steps);
+    let one = |(p, Step { label, .. }): (&CurvePoint, &Step)| {
         let outcome = &study.outcomes[p.setting];
-        let label = outcome.setting.label.rsplit(": ").next().unwrap_or_default();
         let rmse = outcome.from_limit.as_ref().filter(|_| outcome.drawn).map(|d| format!("{:.2e}", d.linear.rmse));
         let ms = least_seconds(outcome).map_or_else(String::new, |s| format!(" in {:.0} ms", 1e3 * s));
         format!("{label} RMSE {}{ms}", rmse.as_deref().unwrap_or("not resolved"))
     };
-    format!("A choice: {}.", curve.points.iter().map(one).collect::<Vec<_>>().join("; "))
+    format!("A choice: {}.", curve.points.iter().zip(steps).map(one).collect::<Vec<_>>().join("; "))
 }
 
 /// What was found of a knob's order of convergence, what theory says, and what its end is worth.
