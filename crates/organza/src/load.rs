@@ -208,14 +208,14 @@ impl<'a> Loading<'a> {
 
     /// Splats to be made; refuses those that do not fit.
     fn counts(&self, prepared: &[Prepared<'_>], planned: &[PlannedSampler]) -> Result<Vec<SplatCount>, Error> {
-        let (mut splats, mut held): (Vec<SplatCount>, u64) = (Vec::new(), 0);
+        let (mut splats, mut held): (Vec<SplatCount>, u64) = (Vec::new(), self.files.bytes());
         for ((object, p), plan) in self.visible().map(|v| v.1).zip(prepared).zip(planned) {
             let mut count = SplatCount::predicted(&object.name, &p.prediction);
             if plan.splats.is_none() {
                 (count.predicted, count.exact) = (0, true);
             }
             splats.push(count);
-            held += p.input.bytes();
+            held += p.input.own_bytes();
             check_total(self.scene, self.options, held, &splats)?;
         }
         Ok(splats)

@@ -16,7 +16,7 @@ mod generate;
 mod twin;
 
 pub use generate::{Generated, Inputs, record_generated};
-pub(crate) use twin::Maker;
+pub(crate) use twin::{Maker, columns};
 pub use twin::{Sources, Twin};
 
 use crate::bins::{AREA, Tiling, thinning, thinning_key};
@@ -240,15 +240,16 @@ fn object_of(scene: &Scene<'_>, object: &Object<'_>) -> ParticleObject {
     let (sampler, m) = (object.sampler, &object.look.material);
     let projector = Projector::new(scene.camera, sampler.origin(), &object.transform, sampler.cross_section());
     let wide = |v: glam::Vec3| v.extend(0.0).to_array();
-    let (linear, rotation) = (projector.linear, projector.rotation);
+    let [linear_x, linear_y, linear_z] = columns(&projector.linear);
+    let [rotation_x, rotation_y, rotation_z] = columns(&projector.rotation);
     ParticleObject {
-        linear_x: wide(linear.x_axis),
-        linear_y: wide(linear.y_axis),
-        linear_z: wide(linear.z_axis),
+        linear_x,
+        linear_y,
+        linear_z,
         translation: wide(projector.translation),
-        rotation_x: wide(rotation.x_axis),
-        rotation_y: wide(rotation.y_axis),
-        rotation_z: wide(rotation.z_axis),
+        rotation_x,
+        rotation_y,
+        rotation_z,
         emission: wide(m.emission.into()),
         share: [projector.share, 0.0, 0.0, 0.0],
     }

@@ -14,7 +14,7 @@
 
 use crate::blocks::Blocks;
 #[cfg(feature = "gpu")]
-use crate::gpu::{Maker, Twin};
+use crate::gpu::{Maker, Twin, columns};
 use crate::params::countable;
 use crate::places::{corners, interpolate};
 use crate::sampler::{Poisson, PoissonSets};
@@ -165,7 +165,6 @@ impl Poisson for LatticeSampler<'_> {
 
     #[cfg(feature = "gpu")]
     fn tables(&self) -> Option<Twin> {
-        let columns = |m: &Mat3| [m.x_axis, m.y_axis, m.z_axis].map(|v| v.extend(0.0).to_array());
         let ([axis_x, axis_y, axis_z], [gradient_x, gradient_y, gradient_z]) =
             (columns(&self.axes), columns(&self.gradient));
         let per_crossing = self.params.surface_opacity == SurfaceOpacity::PerCrossing;

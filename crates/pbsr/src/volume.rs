@@ -19,7 +19,7 @@
 use crate::blocks::{BATCH, Batch, Blocks};
 use crate::error::check;
 #[cfg(feature = "gpu")]
-use crate::gpu::{Maker, Twin};
+use crate::gpu::{Maker, Twin, columns};
 use crate::params::{countable, positive};
 use crate::pieces::{Pieces, SEVERAL};
 use crate::places::{Lattice, Places, corners, interpolate};
@@ -209,7 +209,6 @@ impl Poisson for GridSampler<'_> {
         if self.density.is_some() {
             return None;
         }
-        let columns = |m: &Mat3| [m.x_axis, m.y_axis, m.z_axis].map(|v| v.extend(0.0).to_array());
         let ([axis_x, axis_y, axis_z], [gradient_x, gradient_y, gradient_z]) =
             (columns(&self.grid.axes.as_mat3()), columns(&self.gradient));
         let source = ParticleSource {

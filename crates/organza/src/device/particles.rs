@@ -92,7 +92,9 @@ impl Folding {
             }
             let levels = (until - ensemble.levels()).min(MOST_LEVELS).min((most_bytes / needed).max(1) as u32);
             let room = capacities(scene, of_set, levels);
-            let sources = || Sources::new(scene).filter(|s| s.bytes() <= most_bytes);
+            let binding_bytes = device.adapter().binding_bytes;
+            let fit = |s: &Sources| s.largest_bytes() <= binding_bytes && s.bytes() <= max_bytes;
+            let sources = || Sources::new(scene).filter(fit);
             let folded = match self.sources.get_or_insert_with(sources).take() {
                 None => self.upload(device, scene, ensemble, room)?,
                 Some(sources) => {

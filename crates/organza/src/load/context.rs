@@ -86,9 +86,13 @@ impl Context<'_> {
         }
     }
 
+    /// What files may ask for.
+    pub(super) fn read_limits(&self) -> ReadLimits {
+        ReadLimits { max_bytes: self.options.max_memory, drop_invalid: self.options.drop_invalid }
+    }
+
     pub(super) fn read(&self, path: &Path) -> Result<FileData, Error> {
-        let limits = ReadLimits { max_bytes: self.options.max_memory, drop_invalid: self.options.drop_invalid };
-        self.files.read(path, &limits)
+        self.files.read(path, &self.read_limits())
     }
 
     /// Parameters of a volume: normals only where they are used.

@@ -29,20 +29,24 @@ pub(crate) struct Files {
 }
 
 impl Files {
-    /// Reads a file unless it was read with the same limits.
+    /// Reads a file unless it was read with the same limits, and keeps what it holds.
     pub(super) fn read(&self, path: &Path, limits: &ReadLimits) -> Result<FileData, Error> {
-        let known = |(p, l, data): &(PathBuf, ReadLimits, FileData)| (p == path && l == limits).then(|| data.clone());
-        if let Some(data) = self.read.borrow().iter().find_map(known) {
+        if let Some(data) = self.known(path, limits) {
             return Ok(data);
         }
-        let data = match convert::read::file(path, limits).map_err(|e| Error::from_read(path, &e))? {
-            Loaded::Mesh(mesh) => FileData::Mesh(mesh.into()),
-            Loaded::Points(points) => FileData::Points(points.into()),
-            Loaded::Grid(grid) => FileData::Grid(grid.into()),
-            _ => return Err(Error::Internal("a kind of file that scenes do not know".into())),
-        };
+        let data = read(path, limits)?;
         self.read.borrow_mut().push((path.to_owned(), *limits, data.clone()));
         Ok(data)
+    }
+
+    /// The same without keeping it: for whoever keeps what is made from it.
+    pub(super) fn read_once(&self, path: &Path, limits: &ReadLimits) -> Result<FileData, Error> {
+        self.known(path, limits).map_or_else(|| read(path, limits), Ok)
+    }
+
+    fn known(&self, path: &Path, limits: &ReadLimits) -> Option<FileData> {
+        let is_it = |(p, l, data): &(PathBuf, ReadLimits, FileData)| (p == path && l == limits).then(|| data.clone());
+        self.read.borrow().iter().find_map(is_it)
     }
 
     /// The level set of a file's points unless it was fitted with the same tolerance; `fit` also says how many bytes it takes.
@@ -66,6 +70,15 @@ impl Files {
     pub(crate) fn bytes(&self) -> u64 {
         let read: u64 = self.read.borrow().iter().map(|(_, _, data)| data.bytes()).sum();
         read + self.fitted.borrow().iter().map(|(_, _, bytes, _)| bytes).sum::<u64>()
+    }
+}
+
+fn read(path: &Path, limits: &ReadLimits) -> Result<FileData, Error> {
+    match convert::read::file(path, limits).map_err(|e| Error::from_read(path, &e))? {
+        Loaded::Mesh(mesh) => Ok(FileData::Mesh(mesh.into())),
+        Loaded::Points(points) => Ok(FileData::Points(points.into())),
+        Loaded::Grid(grid) => Ok(FileData::Grid(grid.into())),
+        _ => Err(Error::Internal("a kind of file that scenes do not know".into())),
     }
 }
 

@@ -48,6 +48,17 @@ impl Input<'_> {
         }
     }
 
+    /// Bytes that it alone holds: what files hold is shared with [`super::files::Files`].
+    pub(super) fn own_bytes(&self) -> u64 {
+        let is_shared = match self {
+            Self::Mesh(_, mesh, _) => Arc::strong_count(mesh) > 1,
+            Self::Points(_, points, _) => Arc::strong_count(points) > 1,
+            Self::Volume(grid, ..) => Arc::strong_count(grid) > 1,
+            _ => false,
+        };
+        if is_shared { 0 } else { self.bytes() }
+    }
+
     /// Its attributes and limits.
     pub(super) fn splat(&self) -> &SplatParams {
         match self {
@@ -204,7 +215,7 @@ fn level_set(source: &LevelSetSource, object: &SceneObject, context: &Context<'_
 
 /// Scattered points with normals where the file has some; of a mesh its vertices.
 fn read_scattered(path: &Path, context: &Context<'_>) -> Result<Arc<RawPoints>, Error> {
-    match context.read(path)? {
+    match context.files.read_once(path, &context.read_limits())? {
         FileData::Points(points) => Ok(points),
         FileData::Mesh(mesh) => {
             mesh.validate().map_err(|e| refuse_data(path, &e))?;

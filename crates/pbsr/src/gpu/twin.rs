@@ -3,6 +3,7 @@
 use crate::render::Scene;
 use crate::sampler::{Poisson, runs};
 use crate::stream::{REJECTED_FROM, Stage, rejection};
+use splat_core::glam::Mat3;
 use splat_core::rng;
 use splat_shaders::layouts::ParticleSource;
 
@@ -93,6 +94,11 @@ impl Sources {
     pub(crate) fn chunks(&self) -> u32 {
         self.twins.first().map_or(0, |t| t.source.all_chunks)
     }
+}
+
+/// The columns of a matrix as kernels take them.
+pub(crate) fn columns(m: &Mat3) -> [[f32; 4]; 3] {
+    [m.x_axis, m.y_axis, m.z_axis].map(|v| v.extend(0.0).to_array())
 }
 
 /// The lower half, then the upper one.

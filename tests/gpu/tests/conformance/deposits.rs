@@ -211,15 +211,23 @@ fn light_from_maps_that_stay_is_the_cpu_s() {
 fn too_little_room_is_found_and_says_how_much() {
     let mut device = open().unwrap();
     let some = ["media", "far away", "a beam"];
-    for (name, _, case) in cases().into_iter().filter(|(name, ..)| some.contains(name) && !is_loose()) {
+    for (name, _, case) in cases().into_iter().filter(|(name, ..)| some.contains(name)) {
         let (needed, given) = (case.expected.counts().entries as u32, case.casting.given() as u32);
-        for had in [given, needed - 1] {
-            let overflow = Error::Overflow { what: "entries", needed: needed.into(), had: had.into() };
-            assert_eq!(case.map(&mut device, had).unwrap_err(), overflow, "{name}");
+        // A driver that rounds otherwise may find some more or less.
+        let slack = if is_loose() { needed / 10_000 + 1 } else { 0 };
+        let is_told = |error: Error, room: u32| match error {
+            Error::Overflow { what: "entries", needed: n, had } => {
+                n.abs_diff(u64::from(needed)) <= u64::from(slack) && had == u64::from(room)
+            }
+            _ => false,
+        };
+        let little = needed - 1 - slack;
+        for had in [given, little] {
+            assert!(is_told(case.map(&mut device, had).unwrap_err(), had), "{name}");
         }
-        let overflow = Error::Overflow { what: "entries", needed: needed.into(), had: u64::from(needed) - 1 };
-        assert_eq!(case.received(&mut device, needed - 1, 1.0).unwrap_err(), overflow, "{name}");
-        assert!(case.map(&mut device, needed).unwrap() == case.expected, "{name}");
+        assert!(is_told(case.received(&mut device, little, 1.0).unwrap_err(), little), "{name}");
+        let found = case.map(&mut device, needed + slack).unwrap();
+        assert!(is_loose() || found == case.expected, "{name}");
     }
     assert_eq!(device.take_messages(), [""; 0]);
 }
