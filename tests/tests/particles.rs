@@ -206,6 +206,25 @@ fn every_sampler_of_an_implicit_surface_differs_from_points_by_noise() {
 }
 
 #[test]
+fn a_brownian_motion_that_counts_too_much_area_says_so() {
+    let said = |expression: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let surface =
+            format!("implicit = {{ expression = '{expression}', box = [[-1, -1, -1], [1, 1, 1]], spacing = 0.05 }}");
+        let text = own(&format!("material = 'a'\n{surface}\n"), "shadow = false\n")
+            + "[render.particles]\nsurface_sampler = 'brownian'\nrepeat_level = 2\n";
+        std::fs::write(folder.path().join("s.toml"), text).unwrap();
+        let mut command = organza();
+        command.args(["render", "s.toml", "-o", "s.png", "--technique", "particles"]).current_dir(&folder);
+        String::from_utf8(command.output().unwrap().stderr).unwrap()
+    };
+    assert!(!said("x^2 + y^2 + z^2 - 0.36").contains("too dense"));
+    // Caps in the corners of the box, narrower than a counting sphere.
+    let caps = said("x^2 + y^2 + z^2 - 2.85");
+    assert!(caps.contains("% of area, and is that much too dense"), "{caps}");
+}
+
+#[test]
 fn x7_what_is_sampled_from_its_data_becomes_splats_only_for_a_shadow() {
     let folder = data();
     let passes = |text: &str| -> (Vec<String>, serde_json::Value) {

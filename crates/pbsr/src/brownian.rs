@@ -75,6 +75,9 @@ pub struct BrownianReport {
     pub counted: f64,
     /// Area of the surface by the counts, world units².
     pub area: f64,
+    /// Area by the lines that found the starts, world units²: counts are far from it where borders or bends lie within a
+    /// counting sphere.
+    pub area_by_lines: f64,
     /// Standard error of the area, relative: the relative error of the optical depth of all sets.
     pub area_error: f64,
     /// Share of steps that were refused.
@@ -156,6 +159,7 @@ impl<'a> BrownianSampler<'a> {
         Ok(BrownianReport {
             counted: mean,
             area: pilot.len() as f64 * PI * square / mean,
+            area_by_lines: self.starts.report().area,
             area_error: (variance / n).sqrt() / mean,
             refused: refused as f64 / steps.max(1) as f64,
         })

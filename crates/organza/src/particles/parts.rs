@@ -11,8 +11,9 @@ use crate::load::own::{Body, Own};
 use crate::points::Drawing;
 use glam::DVec3;
 use pbsr::{
-    Appearance, BrownianParams, BrownianSampler, Density, FieldVolumeSampler, GridSampler, ImplicitSurface, KeptSets,
-    LineReport, LineSampler, MeshSampler, Object, Sampler, SplatParams, SplatSampler, SurfaceParams, VolumeParams,
+    Appearance, BrownianParams, BrownianReport, BrownianSampler, Density, FieldVolumeSampler, GridSampler,
+    ImplicitSurface, KeptSets, LineReport, LineSampler, MeshSampler, Object, Sampler, SplatParams, SplatSampler,
+    SurfaceParams, VolumeParams,
 };
 use splat_core::{Camera, Cloud, Similarity, SplatKind, rng};
 use std::collections::BTreeMap;
@@ -28,6 +29,8 @@ const DEEPEST: f64 = 64.0;
 
 /// What to do about a field that is not finite.
 const BROKEN_FIELD: &str = "use a smaller box, or an expression that is finite everywhere in it";
+/// Error of a counted area without a word; that of the area by lines is a few percent.
+const MISCOUNTED: f64 = 0.1;
 /// Share of the roots of a surface that may be missed without a word.
 const MISSED: f64 = 1e-3;
 
@@ -226,7 +229,9 @@ impl Source<'_> {
                 if let Some(step) = step {
                     let paper = BrownianParams::for_width(width);
                     let walk = BrownianParams { step: step * width, resolution: cells, ..paper };
-                    return Ok(Box::new(BrownianSampler::new(&surface, &walk, &self.surface(own))?));
+                    let sampler = BrownianSampler::new(&surface, &walk, &self.surface(own))?;
+                    warnings.extend(self.doubtful_area(sampler.report()));
+                    return Ok(Box::new(sampler));
                 }
                 let sampler = LineSampler::new(&surface, cells, &self.surface(own), None)?;
                 warnings.extend(self.doubts(sampler.report()));
@@ -243,6 +248,18 @@ impl Source<'_> {
                 Box::new(GridSampler::new(grid, transfer, &params, None)?)
             }
             Body::Field(field) => self.field(own, field)?,
+        })
+    }
+
+    /// Where the spheres of a Brownian motion count another area than there is.
+    fn doubtful_area(&self, report: &BrownianReport) -> Option<String> {
+        let more = report.area / report.area_by_lines - 1.0;
+        let (name, percent) = (crate::escape_controls(&self.name), 100.0 * more);
+        (more.abs() > MISCOUNTED).then(|| {
+            format!(
+                "object '{name}': its Brownian motion counts {percent:+.0} % of area, and is that much too dense, for borders \
+                 or bends lie within a counting sphere"
+            )
         })
     }
 
