@@ -219,8 +219,8 @@ fn a_brownian_motion_that_counts_too_much_area_says_so() {
         String::from_utf8(command.output().unwrap().stderr).unwrap()
     };
     assert!(!said("x^2 + y^2 + z^2 - 0.36").contains("too dense"));
-    // Caps in the corners of the box, narrower than a counting sphere.
-    let caps = said("x^2 + y^2 + z^2 - 2.85");
+    // Cut by the box into a lattice of bands with borders.
+    let caps = said("x^2 + y^2 + z^2 - 1.6");
     assert!(caps.contains("% of area, and is that much too dense"), "{caps}");
 }
 
