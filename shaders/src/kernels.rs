@@ -83,6 +83,12 @@ kernels! {
     SPLAT_COMPOSITE_BEAUTY = "splat_composite_beauty" [Read, Read, Read, Read, Read, Read, Read, Write];
     /// The same for any number of planes and channels.
     SPLAT_COMPOSITE = "splat_composite" [Read, Read, Read, Read, Read, Read, Read, Write];
+    /// The same with depths and objects.
+    SPLAT_COMPOSITE_LAYERS = "splat_composite_layers" [Read, Read, Read, Read, Read, Read, Read, Write];
+    /// Resolves the opaque entries of each tile, three channels: view, starts, ids, splats, values, tables → image.
+    SPLAT_RESOLVE_BEAUTY = "splat_resolve_beauty" [Read, Read, Read, Read, Read, Read, Write];
+    /// The same for any number of channels.
+    SPLAT_RESOLVE = "splat_resolve" [Read, Read, Read, Read, Read, Read, Write];
 
     /// Nothing projected yet: → state.
     SPLAT_NOTHING = "splat_nothing" [Write];

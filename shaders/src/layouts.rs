@@ -91,6 +91,14 @@ layouts! {
         pub back_to_front: u32,
         /// 1 where the planes hold nothing yet.
         pub fresh: u32,
+        /// Materials of the table.
+        pub materials: u32,
+        /// 1 where depths are made.
+        pub depths: u32,
+        /// 1 where objects are kept.
+        pub objects: u32,
+        /// Nothing.
+        pub unused: u32,
     }
 
     /// What the counting of tiles found.

@@ -18,7 +18,7 @@ mod splats;
 mod trial;
 
 use crate::Error;
-pub(crate) use chain::Translucent;
+pub(crate) use chain::Splats;
 pub(crate) use helper::Helper;
 pub(crate) use particles::Folding;
 pub use passport::{Agreement, Checked, KernelTime, Passport, passport};

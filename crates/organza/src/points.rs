@@ -283,6 +283,9 @@ impl Drawing<'_> {
         if ids.is_empty() {
             return Ok(OpaqueImage::default());
         }
+        if let Some(image) = self.solid_by_device(maps, &ids, camera, cost)? {
+            return Ok(image);
+        }
         let all = self.loaded;
         let loaded = Loaded {
             cloud: all.cloud.gather(&ids),

@@ -17,6 +17,10 @@ const MEDIAN: f32 = std::f32::consts::LN_2;
 /// Growth of optical depth below which m and v are taken from their series, which err by less than 1e-7 there.
 const SERIES: f32 = 0.5;
 
+/// Numbers that a device keeps of a profile.
+#[cfg(feature = "gpu")]
+pub(crate) const WORDS: usize = 9;
+
 /// Absorption along the ray of one pixel so far, front to back.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DepthProfile {
@@ -89,6 +93,23 @@ impl DepthProfile {
             return [f32::INFINITY; 4];
         }
         [self.first, self.median, self.mean, (self.m2 / absorbed).max(0.0).sqrt()]
+    }
+
+    /// As a device keeps it: the largest number stands for infinity, no half thickness for no open splats.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn words(&self) -> [f32; WORDS] {
+        let open = self.open.map_or([0.0; 3], |open| [open.depth, open.half, open.before]);
+        let [z, c] = self.knot;
+        let all = [self.first, self.median, self.mean, self.m2, z, c, open[0], open[1], open[2]];
+        all.map(|v| v.clamp(f32::MIN, f32::MAX))
+    }
+
+    /// From what a device kept.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn of_words([first, median, mean, m2, z, c, depth, half, before]: [f32; WORDS]) -> Self {
+        let far = |v: f32| if v.abs() < f32::MAX { v } else { v.signum() * f32::INFINITY };
+        let open = (half > 0.0).then_some(Open { depth, half, before });
+        Self { first: far(first), median: far(median), mean, m2, knot: [far(z), c], open }
     }
 
     /// Ends the medium so far, whose optical depth is `total`, not behind `limit`.

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use glam::{DVec3, Vec3};
-use splat_core::raster::gpu::{AttributeRoom, Capacities, Input, follow, project, record};
+use splat_core::raster::gpu::{AttributeRoom, Capacities, Input, follow, project, record, resolve};
 use splat_core::raster::{self, Accumulation, OpaqueImage, Params, Projected};
 use splat_core::shade::{ChannelLayout, gpu as shade};
 use splat_core::{Accumulator, Camera, Cloud, Direction, Error, FootprintStack, Material, Projection, Splat};
@@ -17,6 +17,8 @@ const ROOM: Capacities = Capacities {
     footprints: 3,
     materials: 2,
     opaque: true,
+    depths: false,
+    objects: false,
 };
 
 #[test]
@@ -97,14 +99,72 @@ fn what_does_not_fit_the_room_or_the_device_is_refused() {
     for input in [Input { order: &[10], ..input }, Input { params: &half, ..input }] {
         assert!(matches!(uploads(ROOM, &input, &plain), Err(Error::Invalid { .. })));
     }
-    for (depth, object) in [(true, false), (false, true)] {
-        let acc = Accumulator::new(ROOM.size, 1, 3, depth, object);
-        assert!(matches!(uploads(ROOM, &input, &acc), Err(Error::Invalid { .. })));
+    for (depths, objects) in [(true, false), (false, true)] {
+        let acc = Accumulator::new(ROOM.size, 1, 3, depths, objects);
+        let refused = uploads(ROOM, &input, &acc);
+        assert!(matches!(refused, Err(Error::ColumnLength { .. })), "no room for layers: {refused:?}");
+        let room = Capacities { opaque: false, depths, objects, ..ROOM };
+        uploads(room, &input, &acc).unwrap();
+        let (mut shallow, mut nameless) = (projected.clone(), projected.clone());
+        shallow.depths.clear();
+        nameless.objects.clear();
+        let lacking = Input { projected: if depths { &shallow } else { &nameless }, ..input };
+        assert!(matches!(uploads(room, &lacking, &acc), Err(Error::ColumnLength { .. })));
     }
+    let acc = Accumulator::new(ROOM.size, 1, 3, true, false);
+    let backwards = Input { direction: Direction::BackToFront, ..input };
+    assert!(matches!(uploads(Capacities { depths: true, ..ROOM }, &backwards, &acc), Err(Error::Invalid { .. })));
     assert!(matches!(
         uploads(ROOM, &input, &Accumulator::new([9, 9], 1, 3, false, false)),
         Err(Error::ColumnLength { .. })
     ));
+}
+
+#[test]
+fn opaque_splats_are_recorded_without_fault_or_refused() {
+    let room = resolve::Capacities {
+        size: [640, 360],
+        channels: 3,
+        splats: 10,
+        listed: 5,
+        entries: 100,
+        footprints: 3,
+        objects: true,
+    };
+    for size in [[1, 1], [17, 16], [16_384, 16_384]] {
+        for (channels, listed, entries) in [(1, 0, 0), (3, 1, 1), (13, 1025, 2048)] {
+            let room = resolve::Capacities { size, channels, listed, entries, ..room };
+            resolve::record(room).unwrap().recording.check().unwrap();
+        }
+    }
+    for wrong in [resolve::Capacities { size: [0, 9], ..room }, resolve::Capacities { channels: 14, ..room }] {
+        assert!(matches!(resolve::record(wrong), Err(Error::Invalid { .. })));
+    }
+    let projected = projected();
+    let input = resolve::Input { projected: &projected, ids: &[1, 7], values: &[0.5; 30], channels: 3, objects: true };
+    let uploads = |room, input: &resolve::Input<'_>| resolve::record(room).unwrap().uploads(input);
+    uploads(room, &input).unwrap();
+    for small in [
+        resolve::Capacities { splats: 9, ..room },
+        resolve::Capacities { listed: 1, ..room },
+        resolve::Capacities { footprints: 2, ..room },
+    ] {
+        assert!(matches!(uploads(small, &input), Err(Error::Overflow { .. })), "{small:?}");
+    }
+    let mut nameless = projected.clone();
+    nameless.objects.clear();
+    for wrong in [resolve::Input { values: &[0.5; 29], ..input }, resolve::Input { projected: &nameless, ..input }] {
+        assert!(matches!(uploads(room, &wrong), Err(Error::ColumnLength { .. })));
+    }
+    assert!(matches!(uploads(room, &resolve::Input { ids: &[10], ..input }), Err(Error::Invalid { .. })));
+    let recorded = resolve::record(resolve::Capacities { size: [2, 1], channels: 1, ..room }).unwrap();
+    let state = |low: u32| [low, 0, 5, 7].map(u32::to_ne_bytes).concat();
+    let image = [1.5f32.to_bits(), f32::INFINITY.to_bits(), 2.5f32.to_bits(), 0, 4, u32::MAX].map(u32::to_ne_bytes);
+    let (found, counts) = recorded.finish([&state(12), &image.concat()]).unwrap();
+    let (depth, channels, object) = (vec![1.5, f32::INFINITY], vec![vec![2.5, 0.0]], vec![4, u32::MAX]);
+    assert_eq!((found, counts.entries), (OpaqueImage { depth, channels, object }, 12));
+    assert!(matches!(recorded.finish([&state(101), &image.concat()]), Err(Error::Overflow { needed: 101, .. })));
+    assert!(matches!(recorded.finish([&state(12), &[0; 20]]), Err(Error::ColumnLength { .. })));
 }
 
 #[test]
@@ -157,15 +217,16 @@ fn what_follows_a_sort_reads_how_many_splats_it_left() {
         camera: &camera,
         footprints: &footprints,
         materials: &[Material::default()],
-        opaque: &opaque,
+        opaque: Some(&opaque),
         direction,
         params: &params,
         order: &[],
+        objects: &[],
     };
     let plain = Accumulator::new(ROOM.size, 1, 3, false, false);
     let uploads = follow::uploads(&follows, &input, &plain).unwrap();
     let given: Vec<usize> = follows.inputs(&uploads).iter().map(|(_, bytes)| bytes.len()).collect();
-    assert_eq!(given, [64, 0, 0, 0, 16 * (3 * footprints.layers().len() + 1), 0, 0]);
+    assert_eq!(given, [80, 0, 0, 0, 16 * (3 * footprints.layers().len() + 1), 0, 0]);
     let other = Accumulator::new([8, 8], 1, 3, false, false);
     assert!(matches!(follow::uploads(&follows, &input, &other), Err(Error::ColumnLength { .. })));
 }

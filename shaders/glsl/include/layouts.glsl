@@ -47,6 +47,10 @@ struct SplatView {
     uint opaque;
     uint back_to_front;
     uint fresh;
+    uint materials;
+    uint depths;
+    uint objects;
+    uint unused;
 };
 
 struct SplatState {

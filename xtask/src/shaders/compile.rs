@@ -58,7 +58,7 @@ fn read(folder: &Path, path: &str) -> Result<Vec<u8>, String> {
     fs::read(folder.join(path)).map_err(|e| format!("{FOLDER}/{path}: {e}"))
 }
 
-/// Puts the includes in; `#line` keeps the compiler's line numbers right.
+/// Puts the includes in, and theirs; `#line` keeps the compiler's line numbers right.
 fn expand(path: &str, text: &[u8], sources: &Files) -> Outcome {
     let text = std::str::from_utf8(text).map_err(|e| format!("{FOLDER}/{path}: {e}"))?;
     let mut whole = String::new();
@@ -71,7 +71,7 @@ fn expand(path: &str, text: &[u8], sources: &Files) -> Outcome {
                 let wrong = || format!("{FOLDER}/{path}:{}: no file {from}", at + 1);
                 let text = sources.get(&from).ok_or_else(wrong)?;
                 whole.push_str("#line 1\n");
-                whole.push_str(&String::from_utf8_lossy(text));
+                whole.push_str(&expand(&from, text, sources)?);
                 whole.push_str(&format!("#line {}", at + 2));
             }
         }

@@ -1,5 +1,6 @@
-//! Translucent splats from their attributes to the picture on a device, with nothing read back between: ordered, projected,
-//! shaded and composited by one joined recording; where all that throws shadows is among them, their shadows are made there too.
+//! Splats from their attributes to the picture on a device, with nothing read back between: ordered, projected, shaded, the
+//! opaque ones resolved and the translucent ones composited in front of them by one joined recording; where all that throws
+//! shadows is among them, their shadows are made there too.
 //!
 //! The stages know nothing of each other; the buffers that they have in common are named here. Splats that the device does not
 //! take all at once go through it in parts, ordered before.
@@ -11,24 +12,28 @@ use super::Failure;
 use super::splats::{MOST_OF_A_TILE, raster_counts, room_for, too_long};
 use hbsort::gpu as order;
 use shadows::Shadow;
-use splat_core::raster::gpu::{Attributes, Capacities, follow, project, record};
+use splat_core::raster::gpu::{Attributes, Capacities, Counts, follow, project, record, resolve};
 use splat_core::raster::{OpaqueImage, Params, RasterCounts};
 use splat_core::shade::{ChannelLayout, ShadeInput, gpu as shade};
 use splat_core::{Accumulator, Error, FootprintStack, Progress};
-use splat_shaders::{BufferId, DeviceError, Executor, Joined, PassTime, Recording};
+use splat_shaders::{BufferId, DeviceError, Executor, Joined, PassTime, Recording, Run};
 use tsm::gpu::{CastRoom, Casting};
 
-/// Translucent splats, and what becomes of them.
-pub(crate) struct Translucent<'a> {
+/// Splats, and what becomes of them.
+#[derive(Clone, Copy)]
+pub(crate) struct Splats<'a> {
     /// Splats, materials, lights and the camera.
     pub(crate) input: &'a ShadeInput<'a>,
     /// The translucent ones.
     pub(crate) ids: &'a [u32],
+    /// The opaque ones; none where they are resolved.
+    pub(crate) solid: &'a [u32],
     pub(crate) footprints: &'a FootprintStack,
     pub(crate) layout: ChannelLayout,
     /// The order must be exact.
     pub(crate) sort: &'a hbsort::Params,
     pub(crate) raster: &'a Params,
+    /// What hides translucent splats, where opaque ones are resolved.
     pub(crate) opaque: &'a OpaqueImage,
     /// For each light with a shadow what throws it, where all of that happens on the device; else none, and what the lights'
     /// maps let through is uploaded.
@@ -41,6 +46,8 @@ pub(crate) struct Chained {
     /// Splats that reach a pixel.
     pub(crate) visible: u64,
     pub(crate) raster: RasterCounts,
+    /// The opaque splats, where they were among those given.
+    pub(crate) opaque: Option<OpaqueImage>,
     pub(crate) passes: Vec<PassTime>,
 }
 
@@ -62,22 +69,33 @@ struct Whole {
     /// Of each light with a shadow.
     shadows: Vec<Shadow>,
     shade: (shade::Recorded, Joined),
+    /// None where there are no opaque splats, or they are resolved.
+    resolve: Option<(resolve::Recorded, Joined)>,
     composite: (splat_core::raster::gpu::Recorded, Joined),
+}
+
+/// Room for all splats and for the opaque ones.
+struct Rooms {
+    all: Capacities,
+    solid: Option<resolve::Capacities>,
 }
 
 impl Whole {
     fn record(
-        room: Capacities,
+        rooms: &Rooms,
         attributes: &Attributes,
         input: &ShadeInput<'_>,
         layout: ChannelLayout,
         sorts: bool,
         casts: &[CastRoom],
     ) -> Result<Self, Error> {
-        let splats = room.splats;
-        let sort = sorts.then(|| order::record(order::Capacities { splats, kept: splats }));
+        let room = rooms.all;
+        // The translucent ones come first.
+        let sorted = order::Capacities { splats: room.ordered, kept: room.ordered };
+        let sort = sorts.then(|| order::record(sorted));
         let (attributes, footprints, materials) = (attributes.room(), room.footprints, room.materials);
-        let projected = project::record(project::Capacities { attributes, footprints, materials, depth: room.opaque })?;
+        let projected =
+            project::record(project::Capacities { attributes, footprints, materials, depth: room.needs_depth() })?;
         let shaded = shade::record(shade::Capacities::of(input, attributes, layout));
         let composite = if sorts { follow::record(room)? } else { record(room)? };
         let mut recording = sort.as_ref().map_or_else(Recording::default, |sort| sort.recording.clone());
@@ -90,32 +108,43 @@ impl Whole {
         let received = shadows.first().map(|(shadow, joined)| (shaded.received, joined.of(shadow.received)));
         let known: Vec<_> = shaded.attributes.shared(&at).into_iter().chain(received).collect();
         let in_shade = recording.join(&shaded.recording, &known);
+        let mut resolve = None;
+        if let Some(solid) = rooms.solid {
+            let resolved = resolve::record(solid)?;
+            let known =
+                [(resolved.splats, in_project.of(projected.splats)), (resolved.values, in_shade.of(shaded.values))];
+            let joined = recording.join(&resolved.recording, &known);
+            resolve = Some((resolved, joined));
+        }
         let mut taken =
             vec![(composite.splats, in_project.of(projected.splats)), (composite.values, in_shade.of(shaded.values))];
         if let (Some(sort), Some(sorted)) = (&sort, composite.sorted) {
             taken.extend([(composite.order, sort.places), (sorted, sort.state)]);
         }
+        taken.extend(resolve.iter().map(|(resolved, joined)| (composite.opaque, joined.of(resolved.image))));
         let in_composite = recording.join(&composite.recording, &taken);
         let read =
             [in_project.of(projected.state), in_composite.of(composite.state), in_composite.of(composite.planes)];
         let of_shadows = shadows.iter().map(|(shadow, joined)| joined.of(shadow.cast.state));
-        recording.read_only(&read.into_iter().chain(of_shadows).collect::<Vec<_>>());
+        let of_solid = resolve.iter().flat_map(|(r, joined)| [r.state, r.image].map(|buffer| joined.of(buffer)));
+        recording.read_only(&read.into_iter().chain(of_shadows).chain(of_solid).collect::<Vec<_>>());
         Ok(Self {
             recording,
             sort,
             project: (projected, in_project),
             shadows,
             shade: (shaded, in_shade),
+            resolve,
             composite: (composite, in_composite),
         })
     }
 }
 
-/// [`Translucent`] splats into an accumulator by a device, which changes only when all is done; `None` where it takes not even
-/// few of them, or not all at once with their shadows.
+/// [`Splats`] into an accumulator by a device, which changes only when all is done; `None` where it takes not even few of them,
+/// or not all at once with their shadows.
 pub(super) fn chain_on(
     device: &mut dyn Executor,
-    splats: &Translucent<'_>,
+    splats: &Splats<'_>,
     accumulator: &mut Accumulator,
 ) -> Result<Option<Chained>, Failure> {
     let n = splats.ids.len();
@@ -126,93 +155,152 @@ pub(super) fn chain_on(
         Outcome::TooLarge => n.div_ceil(2),
         Outcome::TooLong => MOST_OF_A_TILE as usize,
     };
-    parts::chain_in_parts(device, splats, most, accumulator)
+    if splats.solid.is_empty() {
+        return parts::chain_in_parts(device, splats, most, accumulator);
+    }
+    // Opaque splats hide those of all parts.
+    let mut nothing = accumulator.clone();
+    let solid = Splats { ids: &[], ..*splats };
+    let Outcome::Done(Chained { visible, raster, opaque: Some(opaque), passes }) =
+        run_on(device, &solid, false, 0, &mut nothing)?
+    else {
+        return Ok(None);
+    };
+    let translucent = Splats { solid: &[], opaque: &opaque, ..*splats };
+    let Some(mut done) = parts::chain_in_parts(device, &translucent, most, accumulator)? else { return Ok(None) };
+    done.visible += visible;
+    parts::add(&mut done.raster, &raster);
+    done.passes.splice(..0, passes);
+    done.opaque = Some(opaque);
+    Ok(Some(done))
 }
 
 /// All splats at once, sorted by the device or in order as they are, with room for so many tile entries at first.
 fn run_on(
     device: &mut dyn Executor,
-    splats: &Translucent<'_>,
+    splats: &Splats<'_>,
     sorts: bool,
-    room: u32,
+    entries: u32,
     accumulator: &mut Accumulator,
 ) -> Result<Outcome, Failure> {
-    let attributes = Attributes::new(splats.input.cloud, Some(splats.ids))?;
-    let mut capacities = Capacities {
-        size: accumulator.size,
-        planes: accumulator.optical_depth.len() as u32,
-        channels: accumulator.channels.len() as u32,
-        splats: attributes.room().splats,
-        ordered: attributes.room().splats,
-        // No more than a kernel sees: whether that is enough the device says.
-        entries: room.min(u32::try_from(device.adapter().binding_bytes / 4).unwrap_or(u32::MAX)),
-        footprints: splats.footprints.layers().len() as u32,
-        materials: splats.input.materials.len() as u32,
-        opaque: !splats.opaque.depth.is_empty(),
-    };
+    let all = [splats.ids, splats.solid].concat();
+    let attributes = Attributes::new(splats.input.cloud, Some(&all))?;
+    // No more than a kernel sees: whether that is enough the device says.
+    let most = u32::try_from(device.adapter().binding_bytes / 4).unwrap_or(u32::MAX);
+    let mut rooms = splats.rooms(&attributes, accumulator, entries, most);
     let Some(mut casts) = shadows::rooms(splats.castings, &attributes, device.adapter().binding_bytes) else {
         return Ok(Outcome::TooLarge);
     };
     let mut looked_up = None;
     loop {
-        let whole = Whole::record(capacities, &attributes, splats.input, splats.layout, sorts, &casts)?;
+        let whole = Whole::record(&rooms, &attributes, splats.input, splats.layout, sorts, &casts)?;
         let mut ready = match device.prepare(&whole.recording) {
             Err(DeviceError::TooLarge { .. } | DeviceError::Memory { .. }) => return Ok(Outcome::TooLarge),
             ready => ready?,
         };
-        let received = looked_up.take().unwrap_or_else(|| splats.received());
+        let received = looked_up.take().unwrap_or_else(|| splats.received(&all));
         if splats.progress.is_cancelled() {
             return Err(Error::Cancelled.into());
         }
         let run = |inputs: &[(BufferId, &[u8])]| ready.run(inputs).map_err(Failure::from);
-        let run = whole.with_inputs(splats, &attributes, &received, accumulator, run)?;
-        let (composite, joined) = &whole.composite;
-        let bytes = |buffer| run.bytes(joined.of(buffer));
-        let fits = shadows::had_room(&whole.shadows, &run, &mut casts)?;
-        match composite.counts(bytes(composite.state)) {
-            // Too little room: found once, for the device says what it needs.
-            Err(Error::Overflow { needed, .. }) if u32::try_from(needed).is_ok_and(|n| n > capacities.entries) => {
-                capacities.entries = needed as u32;
-                looked_up = Some(received);
-            }
-            // Without all shadows it is another picture.
-            _ if !fits => looked_up = Some(received),
-            counts => {
-                let counts = counts?;
-                if too_long(device, &counts) {
-                    return Ok(Outcome::TooLong);
-                }
-                composite.finish([bytes(composite.state), bytes(composite.planes)], accumulator)?;
-                let raster = raster_counts(&counts, whole.recording.bytes());
-                let (projected, joined) = &whole.project;
-                let visible = project::visible(run.bytes(joined.of(projected.state)))?;
-                return Ok(Outcome::Done(Chained { visible, raster, passes: run.passes }));
-            }
+        let run = whole.with_inputs(splats, &all, &attributes, &received, accumulator, run)?;
+        let had_room = shadows::had_room(&whole.shadows, &run, &mut casts)?;
+        // Too little room: found once, for the device says what it needs. Without all shadows it is another picture.
+        if !(whole.had_room(&run, &mut rooms)? && had_room) {
+            looked_up = Some(received);
+            continue;
         }
+        let (counts, opaque) = whole.finish(&run, accumulator, |counts| too_long(device, counts))?;
+        let Some(counts) = counts else { return Ok(Outcome::TooLong) };
+        let raster = raster_counts(&counts, whole.recording.bytes());
+        let (projected, joined) = &whole.project;
+        let visible = project::visible(run.bytes(joined.of(projected.state)))?;
+        return Ok(Outcome::Done(Chained { visible, raster, opaque, passes: run.passes }));
     }
 }
 
-impl Translucent<'_> {
-    /// What the maps of the lights let through, where it is uploaded.
-    fn received(&self) -> Vec<[f32; 3]> {
-        if self.castings.is_empty() { shade::received(self.input, self.ids, self.progress) } else { Vec::new() }
+impl Splats<'_> {
+    /// What the maps of the lights let through to these splats, where it is uploaded.
+    fn received(&self, all: &[u32]) -> Vec<[f32; 3]> {
+        if self.castings.is_empty() { shade::received(self.input, all, self.progress) } else { Vec::new() }
+    }
+
+    /// Room for so many entries of translucent splats, and as many as opaque ones may have.
+    fn rooms(&self, attributes: &Attributes, accumulator: &Accumulator, entries: u32, most: u32) -> Rooms {
+        let (size, channels, splats) = (accumulator.size, accumulator.channels.len() as u32, attributes.room().splats);
+        let footprints = self.footprints.layers().len() as u32;
+        let (solid, objects) = (!self.solid.is_empty(), !accumulator.object.is_empty());
+        let all = Capacities {
+            size,
+            planes: accumulator.optical_depth.len() as u32,
+            channels,
+            splats,
+            ordered: self.ids.len() as u32,
+            entries: entries.min(most),
+            footprints,
+            materials: self.input.materials.len() as u32,
+            opaque: solid || !self.opaque.depth.is_empty(),
+            depths: !accumulator.depth.is_empty(),
+            objects,
+        };
+        let (listed, entries) = (self.solid.len() as u32, room_for(self.solid.len()).min(most));
+        let resolved = resolve::Capacities { size, channels, splats, listed, entries, footprints, objects };
+        Rooms { all, solid: solid.then_some(resolved) }
     }
 }
 
 impl Whole {
+    /// Whether all entries had room; those that had not get what they need.
+    fn had_room(&self, run: &Run, rooms: &mut Rooms) -> Result<bool, Failure> {
+        let (composite, joined) = &self.composite;
+        let mut had = grown(composite.counts(run.bytes(joined.of(composite.state))), &mut rooms.all.entries)?;
+        if let (Some((resolved, joined)), Some(solid)) = (&self.resolve, &mut rooms.solid) {
+            had &= grown(resolved.counts(run.bytes(joined.of(resolved.state))), &mut solid.entries)?;
+        }
+        Ok(had)
+    }
+
+    /// Takes what was read back, if nothing was `too_long` for the device, and gives counts of all splats.
+    fn finish(
+        &self,
+        run: &Run,
+        accumulator: &mut Accumulator,
+        too_long: impl Fn(&Counts) -> bool,
+    ) -> Result<(Option<Counts>, Option<OpaqueImage>), Failure> {
+        let (composite, joined) = &self.composite;
+        let bytes = |buffer| run.bytes(joined.of(buffer));
+        let mut counts = composite.counts(bytes(composite.state))?;
+        let mut opaque = None;
+        if let Some((resolved, joined)) = &self.resolve {
+            let (image, of_solid) =
+                resolved.finish([resolved.state, resolved.image].map(|b| run.bytes(joined.of(b))))?;
+            counts = counts.and(&of_solid);
+            opaque = Some(image);
+        }
+        if too_long(&counts) {
+            return Ok((None, None));
+        }
+        composite.finish([bytes(composite.state), bytes(composite.planes)], accumulator)?;
+        Ok((Some(counts), opaque))
+    }
+
     /// Hands the inputs of all stages to `run`.
     fn with_inputs<T>(
         &self,
-        splats: &Translucent<'_>,
+        splats: &Splats<'_>,
+        all: &[u32],
         attributes: &Attributes,
         received: &[[f32; 3]],
         accumulator: &Accumulator,
         run: impl FnOnce(&[(BufferId, &[u8])]) -> Result<T, Failure>,
     ) -> Result<T, Failure> {
-        let Translucent { input, footprints, raster, opaque, sort, .. } = *splats;
+        let Splats { input, ids, footprints, raster, opaque, sort, .. } = *splats;
         let (origin, camera, materials) = (input.cloud.origin, input.camera, input.materials);
-        let count = attributes.room().splats;
+        let count = ids.len() as u32;
         let view = order::view_bytes(origin, count, camera, sort);
+        let of_object = |id: &u32| input.cloud.object[*id as usize];
+        let objects: Vec<u32> =
+            if accumulator.object.is_empty() { Vec::new() } else { all.iter().map(of_object).collect() };
         // Where nothing sorts they come in their order.
         let order: Vec<u32> = if self.sort.is_some() { Vec::new() } else { (0..count).collect() };
         let ((projected, in_project), (shaded, in_shade), (composite, in_composite)) =
@@ -224,11 +312,17 @@ impl Whole {
         } else {
             shaded.uploads_beside_light(input, attributes)?
         };
-        let shares = shade::shadow_shares(input, splats.ids);
-        let cast = shadows::uploads(&self.shadows, splats.castings, splats.ids, &shares)?;
-        let direction = sort.direction;
-        let into = follow::Input { camera, footprints, materials, opaque, direction, params: raster, order: &order };
+        let shares = shade::shadow_shares(input, all);
+        let cast = shadows::uploads(&self.shadows, splats.castings, all, &shares)?;
+        let (direction, params, order, objects) = (sort.direction, raster, &order[..], &objects[..]);
+        let opaque = self.resolve.is_none().then_some(opaque);
+        let into = follow::Input { camera, footprints, materials, opaque, direction, params, order, objects };
         let composited = follow::uploads(composite, &into, accumulator)?;
+        let solid: Vec<u32> = (count..attributes.room().splats).collect();
+        let of_solid = |(resolved, _): &(resolve::Recorded, Joined)| {
+            resolved.uploads_beside_splats(camera, footprints, &solid, objects)
+        };
+        let resolved = self.resolve.as_ref().map(of_solid).transpose()?;
         let mut inputs: Vec<(BufferId, &[u8])> = self.sort.iter().map(|sort| (sort.view, &view[..])).collect();
         inputs.extend(in_project.inputs(attributes.inputs(&projected.attributes)));
         inputs.extend(in_project.inputs(projected.inputs(&project)));
@@ -236,10 +330,24 @@ impl Whole {
             inputs.extend(joined.inputs(shadow.inputs(uploads)));
         }
         inputs.extend(in_shade.inputs(shaded.inputs(&shade)));
+        for ((resolved, joined), uploads) in self.resolve.iter().zip(&resolved) {
+            inputs.extend(joined.inputs(resolved.inputs(uploads)));
+        }
         inputs.extend(in_composite.inputs(composite.inputs(&composited)));
         // What another stage leaves on the device is not uploaded.
         inputs.retain(|(_, bytes)| !bytes.is_empty());
         run(&inputs)
+    }
+}
+
+/// Whether there was room for what was counted; if not it gets what it needs.
+fn grown(counts: Result<Counts, Error>, room: &mut u32) -> Result<bool, Failure> {
+    match counts {
+        Err(Error::Overflow { needed, .. }) if u32::try_from(needed).is_ok_and(|n| n > *room) => {
+            *room = needed as u32;
+            Ok(false)
+        }
+        counts => Ok(counts.map(|_| true)?),
     }
 }
 
@@ -276,8 +384,12 @@ mod tests {
             footprints: 3,
             materials: 1,
             opaque: false,
+            depths: false,
+            objects: false,
         };
-        let whole = Whole::record(room, &attributes, &input, ChannelLayout::default(), true, &[]).expect("a recording");
+        let rooms = Rooms { all: room, solid: None };
+        let whole =
+            Whole::record(&rooms, &attributes, &input, ChannelLayout::default(), true, &[]).expect("a recording");
         whole.recording.check().expect("no fault");
         let steps = |of: fn(&Step) -> Option<BufferId>| -> Vec<&str> {
             let buffers = whole.recording.buffers();
@@ -295,7 +407,7 @@ mod tests {
         );
         // Sorted before, its order is an upload; there is nothing else to it.
         let given =
-            Whole::record(room, &attributes, &input, ChannelLayout::default(), false, &[]).expect("a recording");
+            Whole::record(&rooms, &attributes, &input, ChannelLayout::default(), false, &[]).expect("a recording");
         given.recording.check().expect("no fault");
         assert!(given.sort.is_none() && given.composite.0.sorted.is_none());
         // Attributes of 40 bytes, a key, and what is sorted, projected, shaded, counted; entries.

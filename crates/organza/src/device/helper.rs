@@ -1,6 +1,6 @@
 //! An opened device: one that is lost is opened once more, one that fails is given up and the processor goes on.
 
-use super::chain::{Chained, Translucent, chain_on};
+use super::chain::{Chained, Splats, chain_on};
 use super::order::order_on;
 use super::particles::{Folding, why_not};
 use super::shadows::{LookUps, LookedUp, look_up_on, map_on};
@@ -128,7 +128,7 @@ impl Helper {
 
     /// Composites splats in order, or leaves them to the processor.
     pub(crate) fn composite(&self, input: &Input<'_>, accumulator: &mut Accumulator) -> Option<RasterCounts> {
-        if let Some(why) = why_not_composite(input, accumulator) {
+        if let Some(why) = why_not_composite(input) {
             self.leave(why);
             return None;
         }
@@ -145,11 +145,7 @@ impl Helper {
     }
 
     /// Orders, projects, shades and composites splats, or leaves them to the passes one by one.
-    pub(crate) fn chain(
-        &self,
-        splats: &Translucent<'_>,
-        accumulator: &mut Accumulator,
-    ) -> Result<Option<Chained>, Error> {
+    pub(crate) fn chain(&self, splats: &Splats<'_>, accumulator: &mut Accumulator) -> Result<Option<Chained>, Error> {
         let done = self.with(|device| match chain_on(device, splats, accumulator) {
             Err(Failure::Splats(splat_core::Error::Cancelled)) => Ok(Err(Error::Cancelled)),
             done => done.map(Ok),

@@ -2,6 +2,7 @@
 
 mod chain;
 mod composite;
+mod opaque;
 mod shadow;
 
 use super::particles::Folding;
@@ -10,6 +11,7 @@ use super::{Failure, backends, listed};
 use crate::Error;
 use chain::ChainInput;
 use composite::CompositeInput;
+use opaque::OpaqueInput;
 use pbsr::{
     Appearance, Ensemble, EnsembleParams, FoldParams, MeshSampler, Object, Renderer, Scene, SurfaceParams, pixel_area,
 };
@@ -52,7 +54,7 @@ impl Passport {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Checked {
     /// `order`, `shadow lists`, `shadow look-ups`, `shadow` (deposits, lists and look-ups as one), `project`, `shade`,
-    /// `composite`, `chain` (the order and the three before as one), `particles` (uploaded sets) or `made particles` (sets of
+    /// `composite`, `opaque`, `chain` (the order and the three before as one), `particles` (uploaded sets) or `made particles` (sets of
     /// the same seeds that the device makes).
     pub recording: &'static str,
     /// Splats or particles that went in.
@@ -67,8 +69,8 @@ pub struct Checked {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreement {
     /// Whether that is enough: equal bits for the order and the lists of shadow maps, 10⁻⁵ for look-ups in them and for what
-    /// is made of splats, 10⁻⁴ for 99.9 % of the splats lit through maps that stay on the device, 99.9 % of the pixels' hits
-    /// for particles.
+    /// is made of splats, 10⁻⁴ for 99.9 % of the splats lit through maps that stay on the device, 10⁻⁵ for 99.9 % of the
+    /// pixels of opaque splats, 99.9 % of the pixels' hits for particles.
     pub within: bool,
     /// Share of places, cells or pixels that are equal in bits.
     pub equal_share: f64,
@@ -100,6 +102,7 @@ pub fn passport(name: &str) -> Result<Vec<Passport>, Error> {
         order: OrderInput::new(SPLATS),
         shadow: ShadowInput::new().map_err(|e| Error::Internal(e.to_string()))?,
         composite: CompositeInput::new(),
+        opaque: OpaqueInput::new(),
         chain: ChainInput::new(),
         particles: ParticlesInput::new(),
     };
@@ -117,6 +120,7 @@ struct Inputs {
     order: OrderInput,
     shadow: ShadowInput,
     composite: CompositeInput,
+    opaque: OpaqueInput,
     chain: ChainInput,
     particles: ParticlesInput,
 }
@@ -149,6 +153,7 @@ fn inspect(backend: &dyn Backend, place: usize, adapter: Adapter, input: &Inputs
         check("project", &mut |device| input.chain.check_project(device)),
         check("shade", &mut |device| input.chain.check_shade(device)),
         check("composite", &mut |device| input.composite.check(device)),
+        check("opaque", &mut |device| input.opaque.check(device)),
         check("chain", &mut |device| input.chain.check_chain(device)),
         check("particles", &mut |device| input.particles.check(device, Folding::uploaded())),
         check("made particles", &mut |device| input.particles.check(device, Folding::default())),

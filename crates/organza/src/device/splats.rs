@@ -31,13 +31,9 @@ pub(super) fn raster_counts(counts: &Counts, bytes: u64) -> RasterCounts {
 }
 
 /// What the recording does not do.
-pub(super) fn why_not_composite(input: &Input<'_>, accumulator: &Accumulator) -> Option<&'static str> {
-    match (accumulator.depth.is_empty(), accumulator.object.is_empty(), input.params.accumulation) {
-        (false, ..) => Some("depth layers are made by the processor, and so are the splats composited"),
-        (_, false, _) => Some("object layers are made by the processor, and so are the splats composited"),
-        (.., Accumulation::F16) => Some("splats are composited in half precision by the processor"),
-        _ => None,
-    }
+pub(super) fn why_not_composite(input: &Input<'_>) -> Option<&'static str> {
+    let half = input.params.accumulation == Accumulation::F16;
+    half.then_some("splats are composited in half precision by the processor")
 }
 
 /// [`splat_core::raster::fold`] by a device, with the times of its passes; the accumulator changes only when all is done.

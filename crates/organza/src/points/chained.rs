@@ -1,13 +1,13 @@
-//! The translucent splats of a picture wholly on a device, where it composites and there is nothing that only the processor
-//! does. Where no opaque splat asks for light, shadow maps are made there and stay there.
+//! The splats of a picture wholly on a device, where it composites and there is nothing that only the processor does. Where the
+//! device can, shadow maps are made there and stay there.
 
 use super::{Drawing, record, shadow_error};
 use crate::Error;
-use crate::device::{Helper, Translucent};
+use crate::device::{Helper, Splats};
 use crate::plan::pass;
-use splat_core::raster::{Accumulation, OpaqueImage};
+use splat_core::raster::{self, Accumulation, OpaqueImage};
 use splat_core::shade::{ChannelLayout, LitBy, gpu::suits};
-use splat_core::{Accumulator, Camera, CostRecord, Layers, Receiver, SplatKind, Transmittance};
+use splat_core::{Accumulator, Camera, CostRecord, Direction, Layers, Receiver, SplatKind, StageCost, Transmittance};
 use tsm::ShadowMap;
 use tsm::gpu::Casting;
 
@@ -24,8 +24,7 @@ impl Drawing<'_> {
     /// The picture, its shadow maps on the device too, or `None` for maps first.
     pub(super) fn staying(&self, camera: &Camera, cost: &mut CostRecord) -> Result<Option<Layers>, Error> {
         let Some(helper) = self.chaining() else { return Ok(None) };
-        let has_opaque = self.loaded.cloud.kind.contains(&SplatKind::Opaque);
-        if has_opaque || self.loaded.cloud.is_empty() || !self.plan.shadow_maps.contains(&true) {
+        if self.loaded.cloud.is_empty() || !self.plan.shadow_maps.contains(&true) {
             return Ok(None);
         }
         let on_device = self.plan.shadow_maps.iter().map(|wanted| wanted.then_some(&OnDevice as &dyn Transmittance));
@@ -40,12 +39,7 @@ impl Drawing<'_> {
         }
         let mut stages = CostRecord::default();
         let Some(castings) = self.castings(helper, &mut stages)? else { return Ok(None) };
-        let ids = self.ids(|kind| kind != SplatKind::Opaque);
-        let layers = self.chain(helper, (&lights, &castings), &ids, &OpaqueImage::default(), camera, &mut stages)?;
-        if layers.is_some() {
-            cost.stages.extend(stages.stages);
-        }
-        Ok(layers)
+        self.all_of(helper, (&lights, &castings), camera, stages, cost)
     }
 
     /// What throws the shadow of each light that has one, or `None` where a device does not make it.
@@ -83,79 +77,114 @@ impl Drawing<'_> {
         cost: &mut CostRecord,
     ) -> Result<Option<Layers>, Error> {
         let Some(helper) = self.chaining() else { return Ok(None) };
-        let ids = self.ids(|kind| kind != SplatKind::Opaque);
-        if ids.is_empty() {
-            return Ok(None);
-        }
-        let lights: Vec<LitBy<'_>> = self.shining(maps).map(|(light, shadow)| LitBy { light, shadow }).collect();
-        if let Err(why) = suits(&self.shading(&lights, camera)) {
-            helper.leave(why);
+        if self.loaded.cloud.is_empty() || !self.suits(helper, maps, camera) {
             return Ok(None);
         }
         self.tick()?;
-        let looked_up = self.look_ups(maps, ids.iter().copied());
+        let looked_up = self.look_ups(maps, 0..self.loaded.cloud.len() as u32);
         let lights = self.lit_by(maps, &looked_up);
-        let mut stages = CostRecord::default();
-        let opaque = self.solid(maps, camera, &mut stages)?;
-        self.tick()?;
-        let layers = self.chain(helper, (&lights, &[]), &ids, &opaque, camera, &mut stages)?;
-        if layers.is_some() {
-            cost.stages.extend(stages.stages);
-        }
-        Ok(layers)
+        self.all_of(helper, (&lights, &[]), camera, CostRecord::default(), cost)
     }
 
-    /// The device, where it draws translucent splats from their attributes to the picture.
+    /// The opaque splats `ids`, or `None` for the passes one by one.
+    pub(super) fn solid_by_device(
+        &self,
+        maps: &[Option<ShadowMap>],
+        ids: &[u32],
+        camera: &Camera,
+        cost: &mut CostRecord,
+    ) -> Result<Option<OpaqueImage>, Error> {
+        let Some(helper) = self.helper.filter(|_| self.device_composites) else { return Ok(None) };
+        if !self.suits(helper, maps, camera) {
+            return Ok(None);
+        }
+        let looked_up = self.look_ups(maps, ids.iter().copied());
+        let lights = self.lit_by(maps, &looked_up);
+        let (channels, objects) = (ChannelLayout::new(&self.layers).count(), self.layers.object);
+        let mut nothing = Accumulator::new(camera.size, 1, channels, false, objects);
+        let mut stages = CostRecord::default();
+        let image = stages.measure(pass::OPAQUE, |stage| {
+            self.chain(helper, (&lights, &[]), [&[], ids], camera, &mut nothing, stage)
+        })?;
+        if image.is_some() {
+            cost.stages.extend(stages.stages);
+        }
+        Ok(image)
+    }
+
+    /// Whether a device shades splats in this light; if not it says why.
+    fn suits(&self, helper: &Helper, maps: &[Option<ShadowMap>], camera: &Camera) -> bool {
+        let lights: Vec<LitBy<'_>> = self.shining(maps).map(|(light, shadow)| LitBy { light, shadow }).collect();
+        suits(&self.shading(&lights, camera)).map_err(|why| helper.leave(why)).is_ok()
+    }
+
+    /// The device, where it draws splats from their attributes to the picture.
     fn chaining(&self) -> Option<&Helper> {
         self.helper.filter(|_| self.device_composites && self.by_device())
     }
 
-    /// These splats by the device, lit by lights whose shadows it is given, or makes of castings.
+    /// The picture of all splats; of the stages before, and of these, the cost counts where the device did it.
+    fn all_of(
+        &self,
+        helper: &Helper,
+        lit: (&[LitBy<'_>], &[Casting]),
+        camera: &Camera,
+        mut stages: CostRecord,
+        cost: &mut CostRecord,
+    ) -> Result<Option<Layers>, Error> {
+        let (planes, set) = (self.plan.optical_depth_planes, &self.layers);
+        let channels = ChannelLayout::new(set).count();
+        let mut accumulator = Accumulator::new(camera.size, planes, channels, set.depth, set.object);
+        let [ids, solid] = [false, true].map(|opaque| self.ids(|kind| (kind == SplatKind::Opaque) == opaque));
+        let done = stages
+            .measure(pass::SPLAT, |stage| self.chain(helper, lit, [&ids, &solid], camera, &mut accumulator, stage))?;
+        let Some(opaque) = done else { return Ok(None) };
+        cost.stages.extend(stages.stages);
+        self.tick()?;
+        self.finish(&accumulator, &opaque, cost).map(Some)
+    }
+
+    /// Translucent splats and opaque ones by the device, lit by lights whose shadows it is given, or makes of castings. Gives
+    /// the opaque ones.
     fn chain(
         &self,
         helper: &Helper,
         (lights, castings): (&[LitBy<'_>], &[Casting]),
-        ids: &[u32],
-        opaque: &OpaqueImage,
+        [ids, solid]: [&[u32]; 2],
         camera: &Camera,
-        cost: &mut CostRecord,
-    ) -> Result<Option<Layers>, Error> {
+        accumulator: &mut Accumulator,
+        stage: &mut StageCost,
+    ) -> Result<Option<OpaqueImage>, Error> {
         let input = self.shading(lights, camera);
-        let layout = ChannelLayout::new(&self.layers);
-        let mut accumulator =
-            Accumulator::new(camera.size, self.plan.optical_depth_planes, layout.count(), false, false);
-        let (sort, raster) = (self.sort_params(), self.raster_params());
-        let splats = Translucent {
+        // What asks for half precision is composited elsewhere.
+        let raster = raster::Params { accumulation: Accumulation::F32, ..self.raster_params() };
+        let mut sort = self.sort_params();
+        if self.layers.depth {
+            // Depths are made front to back. The picture is the same.
+            sort.direction = Direction::FrontToBack;
+        }
+        let splats = Splats {
             input: &input,
             ids,
+            solid,
             footprints: &self.loaded.footprints,
-            layout,
+            layout: ChannelLayout::new(&self.layers),
             sort: &sort,
             raster: &raster,
-            opaque,
+            opaque: &OpaqueImage::default(),
             castings,
             progress: self.progress,
         };
-        let done = cost.measure(pass::SPLAT, |stage| {
-            let Some(counts) = helper.chain(&splats, &mut accumulator)? else { return Ok::<_, Error>(false) };
-            record(stage, &counts.raster);
-            stage.items_in = ids.len() as u64;
-            Ok(true)
-        })?;
-        if !done {
-            return Ok(None);
-        }
-        self.tick()?;
-        self.finish(&accumulator, opaque, cost).map(Some)
+        let Some(done) = helper.chain(&splats, accumulator)? else { return Ok(None) };
+        record(stage, &done.raster);
+        stage.items_in = (ids.len() + solid.len()) as u64;
+        Ok(Some(done.opaque.unwrap_or_default()))
     }
 
     /// Whether there is nothing about the picture that only the processor does; what there is it says where it does it.
     fn by_device(&self) -> bool {
         let points = &self.settings.points;
-        points.exact
-            && points.first_slices.is_none()
-            && !self.layers.depth
-            && !self.layers.object
-            && points.accumulation == Accumulation::F32
+        // Depths are made from splats in order, not from slices.
+        (points.exact || self.layers.depth) && points.first_slices.is_none() && points.accumulation == Accumulation::F32
     }
 }

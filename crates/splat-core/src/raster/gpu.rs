@@ -8,10 +8,12 @@
 //! transmittance cut-off optical depths differ, and transmittances and channels by as much as the cut-off allows; divisions,
 //! and on some devices fused products and sums, round otherwise. Transmittances, and channels as a share of the largest
 //! value, agree within 10⁻⁵ for footprints up to 120 pixels long; for long thin ones the error of either grows with the
-//! square of length over thickness. Single precision only; depth and object planes are the CPU's.
+//! square of length over thickness. Single precision only. Depths (which the cut-off moves as it does channels) and objects are
+//! made where they are asked for.
 //!
 //! [`project`] makes the footprints on the device too, and [`follow`] composites what a sort on the device has ordered:
-//! joined ([`Recording::join`]), splats are uploaded once and the image alone comes back.
+//! joined ([`Recording::join`]), splats are uploaded once and the image alone comes back. [`resolve`] draws the opaque surfaces
+//! that hide them.
 //!
 //! ```
 //! use splat_core::raster::gpu::{Capacities, record};
@@ -26,6 +28,8 @@
 //!     footprints: 3,
 //!     materials: 8,
 //!     opaque: false,
+//!     depths: false,
+//!     objects: false,
 //! };
 //! let recorded = record(room).unwrap();
 //! recorded.recording.check().unwrap();
@@ -35,36 +39,37 @@
 
 mod attributes;
 pub mod follow;
+mod list;
+mod packed;
+mod planes;
 pub mod project;
+pub mod resolve;
 mod sort;
 
 pub use attributes::{AttributeBuffers, AttributeRoom, Attributes};
+pub use list::Counts;
+pub use packed::words;
 
 use super::bins::TILE as TWIN_TILE;
 use super::kernel::Kernel;
-use super::projected::{Coverage, ProjectedDepth, ProjectedSplat};
+use super::projected::{Coverage, ProjectedSplat};
 use super::{Accumulation, OpaqueImage, Params, Projected};
 use crate::shade::MAX_CHANNELS;
 use crate::{Accumulator, Direction, Error, Material};
+use list::{List, ListRoom};
+use packed::SPLAT_WORDS;
 use rayon::prelude::*;
-use sort::{Scanned, sort_pass};
-use splat_shaders::layouts::{SortState, SplatState, SplatView};
+use splat_shaders::layouts::{SortState, SplatView};
 use splat_shaders::{BufferId, Groups, Recording, kernels};
 
 /// Side of a tile, pixels.
 pub const TILE: u32 = 16;
 /// The widest image, pixels a side: what one workgroup counts then fits 32 bits.
 const WIDEST: u32 = 16_384;
-/// Splats whose tiles a workgroup counts.
-const COUNT_BLOCK: u32 = 1024;
-/// Splats whose entries a workgroup writes, and threads of any workgroup.
-const EMIT_BLOCK: u32 = 256;
 /// Entries that a workgroup sorts.
 const SORT_BLOCK: u32 = 2048;
 /// Numbers that a workgroup scans.
 pub(crate) const SCAN_BLOCK: u32 = 1024;
-/// Words of a splat, and with depths.
-const SPLAT_WORDS: [u32; 2] = [8, 12];
 
 const _: () = assert!(TWIN_TILE == 32, "`composite.glsl` counts offsets from the corners of the CPU's tiles");
 
@@ -89,23 +94,49 @@ pub struct Capacities {
     pub materials: u32,
     /// Whether an opaque image may hide splats.
     pub opaque: bool,
+    /// Whether depths are made, front to back.
+    pub depths: bool,
+    /// Whether objects are kept.
+    pub objects: bool,
 }
 
 impl Capacities {
-    fn check(&self) -> Result<(), Error> {
-        let Self { size, planes, channels, .. } = *self;
-        let refuse = |name, found: String, expected| Err(Error::invalid("recording", 0, name, found, expected));
-        if !size.iter().all(|s| (1..=WIDEST).contains(s)) {
-            return refuse("size", format!("{size:?}"), "1 to 16384 pixels a side");
-        }
-        if !matches!(planes, 1 | 3) {
-            return refuse("planes of optical depth", planes.to_string(), "1 or 3");
-        }
-        if !(1..=MAX_CHANNELS).contains(&(channels as usize)) {
-            return refuse("channels", channels.to_string(), "1 to 13");
-        }
-        Ok(())
+    /// Words of a splat: with depths where something asks for them.
+    fn splat_words(&self) -> u32 {
+        SPLAT_WORDS[usize::from(self.needs_depth())]
     }
+
+    /// Whether splats come with their depths.
+    pub fn needs_depth(&self) -> bool {
+        self.opaque || self.depths
+    }
+
+    /// Numbers of a pixel.
+    fn planes_of_pixel(&self) -> u32 {
+        let depths = if self.depths { crate::depth_profile::WORDS as u32 } else { 0 };
+        self.planes + self.channels + depths + u32::from(self.objects)
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        if !matches!(self.planes, 1 | 3) {
+            return refused("planes of optical depth", self.planes.to_string(), "1 or 3");
+        }
+        check_image(self.size, self.channels)
+    }
+}
+
+fn refused<T>(name: &'static str, found: String, expected: &'static str) -> Result<T, Error> {
+    Err(Error::invalid("recording", 0, name, found, expected))
+}
+
+fn check_image(size: [u32; 2], channels: u32) -> Result<(), Error> {
+    if !size.iter().all(|s| (1..=WIDEST).contains(s)) {
+        return refused("size", format!("{size:?}"), "1 to 16384 pixels a side");
+    }
+    if !(1..=MAX_CHANNELS).contains(&(channels as usize)) {
+        return refused("channels", channels.to_string(), "1 to 13");
+    }
+    Ok(())
 }
 
 /// What is folded: the arguments of [`fold`](super::fold) before the accumulator.
@@ -140,6 +171,8 @@ impl Input<'_> {
             footprints: self.projected.kernels.len() as u32,
             materials: self.materials.len() as u32,
             opaque: !self.opaque.depth.is_empty(),
+            depths: !accumulator.depth.is_empty(),
+            objects: !accumulator.object.is_empty(),
         }
     }
 }
@@ -154,14 +187,38 @@ struct Image<'a> {
     direction: Direction,
     params: &'a Params,
     ordered: u32,
+    /// By id, where they are kept.
+    objects: &'a [u32],
+    /// Whether the depths of what hides splats are there already.
+    hidden: bool,
 }
 
 impl<'a> Image<'a> {
     fn of(input: &Input<'a>) -> Self {
         let Input { projected, order, materials, opaque, direction, params, .. } = *input;
         let (size, perspective, kernels) = (projected.size, projected.perspective, &projected.kernels[..]);
-        Self { size, perspective, kernels, materials, opaque, direction, params, ordered: order.len() as u32 }
+        let (ordered, objects) = (order.len() as u32, &projected.objects[..]);
+        Self { size, perspective, kernels, materials, opaque, direction, params, ordered, objects, hidden: false }
     }
+
+    fn tables(&self, objects: bool) -> Vec<u32> {
+        Self::table(self.kernels, self.materials, if objects { self.objects } else { &[] })
+    }
+
+    /// Footprints, extinctions, objects: four words a vector.
+    fn table(kernels: &[Kernel], materials: &[Material], objects: &[u32]) -> Vec<u32> {
+        let footprints = kernels.iter().flat_map(|kernel| kernel.table().map(f32::to_bits));
+        let extinctions = materials.iter().flat_map(|m| {
+            let [r, g, b] = m.extinction_rgb.map(f32::to_bits);
+            [r, g, b, 0]
+        });
+        footprints.chain(extinctions).chain(objects.iter().copied()).collect()
+    }
+}
+
+/// Bytes of `Image::table`.
+fn table_bytes(footprints: u32, materials: u32, objects: u32) -> u64 {
+    16 * (3 * u64::from(footprints) + u64::from(materials) + u64::from(objects.div_ceil(4)))
 }
 
 /// The recorded compositing and the buffers that the caller meets.
@@ -171,7 +228,7 @@ pub struct Recorded {
     pub recording: Recording,
     /// The room it has.
     pub capacities: Capacities,
-    /// Read back: one [`SplatState`].
+    /// Read back: one [`SplatState`](splat_shaders::layouts::SplatState).
     pub state: BufferId,
     /// Input, and read back: planes of optical depth, then channels, row by row.
     pub planes: BufferId,
@@ -181,6 +238,8 @@ pub struct Recorded {
     pub order: BufferId,
     /// Input: channels of each splat by id.
     pub values: BufferId,
+    /// Input: depths of the opaque surface, row by row.
+    pub opaque: BufferId,
     /// Of a recording by [`follow::record`]: the input that says how many splats are in the order.
     pub sorted: Option<BufferId>,
     inputs: [BufferId; 6],
@@ -192,21 +251,18 @@ pub struct Uploads {
     bytes: [Vec<u8>; 7],
 }
 
-/// What a device did.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Counts {
-    /// Splats that reach a tile.
-    pub splats: u64,
-    /// Pairs of a splat and a tile that it reaches.
-    pub entries: u64,
-    /// Those of the tile that has most: as many splats one thread folds in a row.
-    pub longest: u64,
-}
-
 /// Tiles of an image, across and in all.
 fn tiles(size: [u32; 2]) -> [u32; 2] {
     let [columns, rows] = size.map(|s| s.div_ceil(TILE));
     [columns, columns * rows]
+}
+
+/// The view of an image of which nothing else is known.
+fn plain_view(size: [u32; 2], perspective: Option<f32>) -> SplatView {
+    let [columns, tiles] = tiles(size);
+    let size = size.map(|s| s as f32);
+    let middle = size.map(|s| 0.5 * s);
+    SplatView { middle, size, focal: perspective.unwrap_or(0.0), columns, tiles, ..SplatView::default() }
 }
 
 /// Records the compositing with this room.
@@ -228,52 +284,43 @@ fn record_as(capacities: Capacities, follows: bool) -> Result<Recorded, Error> {
     let words = |n: u32| 4 * u64::from(n);
     let view = r.input("view", size_of::<SplatView>() as u64);
     let order = r.input("order", words(ordered));
-    let splat_words = SPLAT_WORDS[usize::from(capacities.opaque)];
-    let footprints = r.input("splats", words(splats) * u64::from(splat_words));
+    let footprints = r.input("splats", words(splats) * u64::from(capacities.splat_words()));
     let values = r.input("values", words(splats) * u64::from(channels));
-    let tables = r.input("tables", 16 * (3 * u64::from(capacities.footprints) + u64::from(capacities.materials)));
+    let objects = if capacities.objects { splats } else { 0 };
+    let tables = r.input("tables", table_bytes(capacities.footprints, capacities.materials, objects));
     let opaque = r.input("opaque", if capacities.opaque { 4 * area } else { 0 });
-    let image = r.input("planes", 4 * area * u64::from(planes + channels));
-    let state = r.scratch("state", size_of::<SplatState>() as u64);
-    let places = Scanned::scratch(r, ["place scan", "places", "place sums"], ordered);
-    let sort = r.scratch("sort", size_of::<SortState>() as u64);
-    let digits = Scanned::scratch(r, ["digit scan", "digits", "digit sums"], 256 * entries.div_ceil(SORT_BLOCK));
-    let keys = [r.scratch("tiles", words(entries)), r.scratch("tiles'", words(entries))];
-    let ids = [r.scratch("ids", words(entries)), r.scratch("ids'", words(entries))];
-    let starts = r.scratch("starts", words(tiles + 1));
+    let image = r.input("planes", 4 * area * u64::from(capacities.planes_of_pixel()));
+    let room = ListRoom { tiles, ordered, entries };
+    let list = List::scratch(r, &room);
 
     let sorted = follows.then(|| r.input("sorted", size_of::<SortState>() as u64));
     if let Some(sorted) = sorted {
         r.dispatch(&kernels::SPLAT_FOLLOW, Groups::cover(1), &[sorted, view], &[]);
     }
-    r.dispatch(&kernels::SPLAT_BEGIN, Groups::cover(1), &[view, state, places.scan], &[]);
-    let counted = [view, order, footprints, places.numbers, state];
-    r.dispatch(&kernels::SPLAT_COUNT, Groups::cover(ordered.div_ceil(COUNT_BLOCK)), &counted, &[]);
-    places.scan(r, Groups::cover(ordered.div_ceil(SCAN_BLOCK)));
-    r.dispatch(&kernels::SPLAT_PREPARE, Groups::cover(1), &[state, sort, digits.scan], &[entries]);
-    let emitted = [view, order, footprints, places.numbers, places.scan, sort, keys[0], ids[0]];
-    r.dispatch(&kernels::SPLAT_EMIT, Groups::cover(ordered.div_ceil(EMIT_BLOCK)), &emitted, &[]);
-    // Bits of the greatest tile.
-    let passes = (tiles - 1).checked_ilog2().map_or(0, |top| top as usize / 8 + 1);
-    for pass in 0..passes {
-        let (from, to) = (pass % 2, 1 - pass % 2);
-        sort_pass(r, 8 * pass as u32, sort, [keys[from], ids[from]], [keys[to], ids[to]], &digits);
-    }
-    let (keys, ids) = (keys[passes % 2], ids[passes % 2]);
-    r.dispatch(
-        &kernels::SPLAT_RANGES,
-        Groups::cover((tiles + 1).div_ceil(256)),
-        &[view, sort, keys, starts, state],
-        &[],
-    );
-    let plain = (planes, channels) == (1, 3);
-    let kernel = if plain { &kernels::SPLAT_COMPOSITE_BEAUTY } else { &kernels::SPLAT_COMPOSITE };
-    let composited = [view, starts, ids, footprints, values, tables, opaque, image];
+    let ids = list.record(r, &room, [view, order, footprints]);
+    let kernel = match (capacities.depths || capacities.objects, planes, channels) {
+        (true, ..) => &kernels::SPLAT_COMPOSITE_LAYERS,
+        (false, 1, 3) => &kernels::SPLAT_COMPOSITE_BEAUTY,
+        (false, ..) => &kernels::SPLAT_COMPOSITE,
+    };
+    let composited = [view, list.starts, ids, footprints, values, tables, opaque, image];
     r.dispatch(kernel, Groups::cover(tiles), &composited, &[]);
-    r.read(state);
+    r.read(list.state);
     r.read(image);
     let inputs = [view, order, footprints, values, tables, opaque];
-    Ok(Recorded { recording, capacities, state, planes: image, splats: footprints, order, values, sorted, inputs })
+    let state = list.state;
+    Ok(Recorded {
+        recording,
+        capacities,
+        state,
+        planes: image,
+        splats: footprints,
+        order,
+        values,
+        opaque,
+        sorted,
+        inputs,
+    })
 }
 
 impl Recorded {
@@ -296,14 +343,11 @@ impl Recorded {
 
     fn image_uploads(&self, image: &Image<'_>, accumulator: &Accumulator, given: [Vec<u8>; 3]) -> Uploads {
         let opaque = self.capacities.opaque && !image.opaque.depth.is_empty();
-        let extinctions =
-            image.materials.iter().map(|m| [m.extinction_rgb[0], m.extinction_rgb[1], m.extinction_rgb[2], 0.0]);
-        let footprints = image.kernels.iter().flat_map(|kernel| kernel.table());
-        let tables: Vec<f32> = footprints.chain(extinctions.flatten()).collect();
-        let fresh = all_planes(accumulator).all(|plane| plane.iter().all(|v| v.to_bits() == 0));
-        let begun: Vec<f32> = if fresh { Vec::new() } else { all_planes(accumulator).flatten().copied().collect() };
-        let view = self.view(image, opaque, fresh);
-        let floats = |column: &[f32]| bytemuck::cast_slice(column).to_vec();
+        let tables = image.tables(self.capacities.objects);
+        let fresh = planes::is_fresh(accumulator);
+        let begun = if fresh { Vec::new() } else { planes::words(accumulator) };
+        let view = self.view(image, opaque || image.hidden, fresh);
+        let solid: &[f32] = if opaque { &image.opaque.depth } else { &[] };
         let [order, splats, values] = given;
         Uploads {
             bytes: [
@@ -311,9 +355,9 @@ impl Recorded {
                 order,
                 splats,
                 values,
-                floats(&tables),
-                floats(if opaque { &image.opaque.depth } else { &[] }),
-                floats(&begun),
+                bytemuck::cast_slice(&tables).to_vec(),
+                bytemuck::cast_slice(solid).to_vec(),
+                bytemuck::cast_slice(&begun).to_vec(),
             ],
         }
     }
@@ -332,28 +376,25 @@ impl Recorded {
             let looks = format!("{} and {}", splat.material, splat.footprint);
             return Err(Error::invalid("splat", i, "material or footprint", looks, "a known one"));
         }
-        Ok(words(projected, self.capacities.opaque))
+        Ok(words(projected, self.capacities.needs_depth()))
     }
 
     fn view(&self, image: &Image<'_>, opaque: bool, fresh: bool) -> SplatView {
-        let Capacities { size, planes, channels, .. } = self.capacities;
-        let [columns, tiles] = tiles(size);
-        let size = size.map(|s| s as f32);
+        let room = self.capacities;
         SplatView {
-            middle: size.map(|s| 0.5 * s),
-            size,
-            focal: image.perspective.unwrap_or(0.0),
             cutoff: image.params.transmittance_cutoff,
-            columns,
-            tiles,
             ordered: image.ordered,
-            splat_words: SPLAT_WORDS[usize::from(self.capacities.opaque)],
+            splat_words: room.splat_words(),
             footprints: image.kernels.len() as u32,
-            planes,
-            channels,
+            planes: room.planes,
+            channels: room.channels,
             opaque: u32::from(opaque),
             back_to_front: u32::from(image.direction == Direction::BackToFront),
             fresh: u32::from(fresh),
+            materials: image.materials.len() as u32,
+            depths: u32::from(room.depths),
+            objects: u32::from(room.objects),
+            ..plain_view(room.size, image.perspective)
         }
     }
 
@@ -363,8 +404,8 @@ impl Recorded {
         if image.params.accumulation != Accumulation::F32 {
             return only_cpu("precision", format!("{:?}", image.params.accumulation), "F32 on a device");
         }
-        if !(accumulator.depth.is_empty() && accumulator.object.is_empty()) {
-            return only_cpu("planes", "depths or objects".to_owned(), "colours and optical depth on a device");
+        if room.depths && image.direction == Direction::BackToFront {
+            return only_cpu("direction", "back to front".to_owned(), "front to back, as depths are made");
         }
         for (what, needed, had) in [
             ("footprints", image.kernels.len(), room.footprints),
@@ -381,8 +422,13 @@ impl Recorded {
             ("channels", accumulator.channels.len(), room.channels as usize),
             ("opaque depth", image.opaque.depth.len(), if image.opaque.depth.is_empty() { 0 } else { area }),
         ];
-        let planes = all_planes(accumulator).map(|plane| ("plane", plane.len(), area));
-        equal_lengths(lengths.into_iter().chain(planes))
+        let of_layer = |on: bool| if on { area } else { 0 };
+        let layers = [
+            ("depths", accumulator.depth.len(), of_layer(room.depths)),
+            ("objects", accumulator.object.len(), of_layer(room.objects)),
+        ];
+        let planes = planes::sums(accumulator).map(|plane| ("plane", plane.len(), area));
+        equal_lengths(lengths.into_iter().chain(layers).chain(planes))
     }
 
     fn check_splats(&self, input: &Input<'_>) -> Result<(), Error> {
@@ -390,13 +436,13 @@ impl Recorded {
         let n = projected.splats.len();
         fits("splats", n as u64, room.splats)?;
         fits("splats in order", input.order.len() as u64, room.ordered)?;
-        let depths = projected.depths.len();
+        let (depths, objects) = (projected.depths.len(), projected.objects.len());
         equal_lengths([
             ("values", input.values.len(), n * room.channels as usize),
-            ("depths", depths, if room.opaque { n } else { depths }),
+            ("depths", depths, if room.needs_depth() { n } else { depths }),
+            ("objects", objects, if room.objects { n } else { objects }),
         ])?;
-        let wrong = input.order.par_iter().with_min_len(1 << 14).position_first(|&id| id as usize >= n);
-        wrong.map_or(Ok(()), |at| Err(Error::invalid("place", at, "id", input.order[at], "the id of a splat")))
+        check_ids(input.order, n)
     }
 
     /// The uploads with the buffers that they go to.
@@ -412,13 +458,7 @@ impl Recorded {
     /// [`Error::ColumnLength`] for bytes that no run gave.
     pub fn finish(&self, [state, planes]: [&[u8]; 2], accumulator: &mut Accumulator) -> Result<Counts, Error> {
         let counts = self.counts(state)?;
-        let bytes = 4 * all_planes(accumulator).map(<[f32]>::len).sum::<usize>();
-        equal_lengths([("planes read back", planes.len(), bytes)])?;
-        let (words, _) = planes.as_chunks::<4>();
-        let mut words = words.iter().map(|w| f32::from_ne_bytes(*w));
-        for plane in accumulator.optical_depth.iter_mut().chain(&mut accumulator.channels) {
-            plane.iter_mut().zip(&mut words).for_each(|(to, from)| *to = from);
-        }
+        planes::put(planes, accumulator)?;
         Ok(counts)
     }
 
@@ -427,18 +467,13 @@ impl Recorded {
     /// # Errors
     /// As [`Recorded::finish`].
     pub fn counts(&self, state: &[u8]) -> Result<Counts, Error> {
-        let (attribute, found, expected) = ("state read back", state.len(), size_of::<SplatState>());
-        let bytes = state.get(..expected).ok_or(Error::ColumnLength { attribute, found, expected })?;
-        let state: SplatState = bytemuck::pod_read_unaligned(bytes);
-        let entries = u64::from(state.entries_low) | u64::from(state.entries_high) << 32;
-        fits("tile entries", entries, self.capacities.entries)?;
-        Ok(Counts { splats: state.splats.into(), entries, longest: state.longest.into() })
+        Counts::read(state, self.capacities.entries)
     }
 }
 
-/// Planes of optical depth, then channels.
-fn all_planes(accumulator: &Accumulator) -> impl Iterator<Item = &[f32]> {
-    accumulator.optical_depth.iter().chain(&accumulator.channels).map(Vec::as_slice)
+fn check_ids(ids: &[u32], splats: usize) -> Result<(), Error> {
+    let wrong = ids.par_iter().with_min_len(1 << 14).position_first(|&id| id as usize >= splats);
+    wrong.map_or(Ok(()), |at| Err(Error::invalid("place", at, "id", ids[at], "the id of a splat")))
 }
 
 fn equal_lengths(lengths: impl IntoIterator<Item = (&'static str, usize, usize)>) -> Result<(), Error> {
@@ -446,32 +481,7 @@ fn equal_lengths(lengths: impl IntoIterator<Item = (&'static str, usize, usize)>
     wrong.map_or(Ok(()), |(attribute, found, expected)| Err(Error::ColumnLength { attribute, found, expected }))
 }
 
-/// The words of all splats, as the kernels read them: 8 each, 12 with depths; 0 for one that no pixel shows.
-pub fn words(projected: &Projected, depth: bool) -> Vec<u32> {
-    let words = SPLAT_WORDS[usize::from(depth)] as usize;
-    let mut splats = vec![0u32; words * projected.splats.len()];
-    let places = splats.par_chunks_exact_mut(words).zip(&projected.splats).zip(&projected.coverage).enumerate();
-    places.with_min_len(1 << 12).for_each(|(i, ((to, splat), coverage))| {
-        if *coverage != Coverage::NONE {
-            pack(splat, projected.depths.get(i), to);
-        }
-    });
-    splats
-}
-
 fn fits(what: &'static str, needed: u64, had: u32) -> Result<(), Error> {
     let had = u64::from(had);
     if needed > had { Err(Error::Overflow { what, needed, had }) } else { Ok(()) }
-}
-
-/// The words of a splat, as `splats.glsl` reads them; all 0 for one that is not shown.
-fn pack(splat: &ProjectedSplat, depth: Option<&ProjectedDepth>, to: &mut [u32]) {
-    let [half_x, half_y] = splat.half_extent.map(u32::from);
-    let floats = splat.center_px.into_iter().chain(splat.conic).chain([splat.peak]);
-    to.iter_mut().zip(floats).for_each(|(to, from)| *to = from.to_bits());
-    to[6] = half_x | half_y << 16;
-    to[7] = u32::from(splat.material) | u32::from(splat.footprint) << 16 | (splat.kind as u32) << 24;
-    if let (Some(to), Some(depth)) = (to.get_mut(8..12), depth) {
-        to.copy_from_slice(&[depth.center, depth.slope[0], depth.slope[1], depth.extent].map(f32::to_bits));
-    }
 }

@@ -53,12 +53,13 @@ impl Kernel {
         }
     }
 
-    /// The numbers that [`Kernel::profile`] computes with: G, q, e^−q, 1 where G holds.
+    /// The numbers that [`Kernel::profile`] computes with: G, q, e^−q, 1 where G holds; and the spacing.
     #[cfg(feature = "gpu")]
     pub(crate) fn table(&self) -> [f32; 12] {
         let mut table = [0.0; 12];
         table[..TERMS].copy_from_slice(&self.g);
-        table[TERMS..TERMS + 3].copy_from_slice(&[self.sharpness, self.rim, f32::from(u8::from(self.smooth))]);
+        let smooth = f32::from(u8::from(self.smooth));
+        table[TERMS..].copy_from_slice(&[self.sharpness, self.rim, smooth, self.spacing]);
         table
     }
 

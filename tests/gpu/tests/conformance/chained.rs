@@ -79,15 +79,12 @@ fn four_stages_in_one_submission_are_the_cpu_s_picture() {
             footprints: footprints.layers().len() as u32,
             materials: 1,
             opaque: false,
+            depths: false,
+            objects: false,
         };
-        let (footprint_count, depth) = (room.footprints, false);
-        let project = projection::record(projection::Capacities {
-            attributes: attributes.room(),
-            footprints: footprint_count,
-            materials: 1,
-            depth,
-        })
-        .unwrap();
+        let (held, layers) = (attributes.room(), room.footprints);
+        let room_for = projection::Capacities { attributes: held, footprints: layers, materials: 1, depth: false };
+        let project = projection::record(room_for).unwrap();
         let shade = shading::record(shading::Capacities::of(&input, attributes.room(), layout));
         let composite = follow::record(room).unwrap();
         let mut whole = sort.recording.clone();
@@ -109,8 +106,16 @@ fn four_stages_in_one_submission_are_the_cpu_s_picture() {
         let to = projection::Input { origin, camera, footprints, materials, params: &params };
         let to = project.uploads(&to, &attributes).unwrap();
         let lit = shade.uploads(&input, &attributes, &[]).unwrap();
-        let into =
-            follow::Input { camera, footprints, materials, opaque: &opaque, direction, params: &params, order: &[] };
+        let into = follow::Input {
+            camera,
+            footprints,
+            materials,
+            opaque: Some(&opaque),
+            direction,
+            params: &params,
+            order: &[],
+            objects: &[],
+        };
         let into = follow::uploads(&composite, &into, &gpu).unwrap();
         let mut inputs = vec![(sort.view, &view[..])];
         inputs.extend(p.inputs(attributes.inputs(held)));

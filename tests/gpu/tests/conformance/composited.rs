@@ -2,6 +2,7 @@
 
 use gpu_conformance::{Interface, Loss, Wrapped, adapter, backend};
 use organza::{DeviceChoice, Progress, Render, RenderOptions, render, scene};
+use splat_core::LayerData;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -104,19 +105,41 @@ fn a_composited_picture_is_the_processor_s_within_the_tolerance() {
 
 #[test]
 fn what_a_device_does_not_composite_is_said_and_done_by_the_processor() {
-    let settings = "[render]\nlayers = [\"depth\"]";
+    let settings = "[render.points]\naccumulation = \"f16\"";
     let alone = picture(settings, None);
     for (_, device) in devices() {
         let helped = picture(settings, Some(device));
-        assert!(apart(&alone, &helped) <= TOLERANCE);
-        // The light was looked up by the device all the same; nothing else can differ.
-        let but_beauty = |r: &Render| {
-            let mut layers = r.layers.clone();
-            layers.images.remove("beauty").unwrap();
-            layers
-        };
-        assert_eq!(but_beauty(&alone), but_beauty(&helped));
-        assert!(helped.warnings.iter().any(|w| w.contains("depth layers are made by the processor")));
+        // The light was looked up by the device all the same.
+        assert!(apart(&alone, &helped) <= 1e-3);
+        assert!(helped.warnings.iter().any(|w| w.contains("half precision by the processor")), "{:?}", helped.warnings);
+    }
+}
+
+#[test]
+fn depth_and_object_layers_are_the_processor_s() {
+    // The wall stands out of the fog.
+    let scene = SCENE.replace("center = [0.3, 0, 0]", "center = [0.3, 0.3, 1.1]");
+    for direction in ["front_to_back", "back_to_front"] {
+        let settings =
+            format!("[render]\nlayers = [\"depth\", \"object\"]\n[render.points]\ndirection = \"{direction}\"");
+        let alone = picture_of(&scene, &settings, None);
+        for (name, device) in devices() {
+            let helped = picture_of(&scene, &settings, Some(device));
+            assert!(helped.backend.starts_with(name) && helped.warnings == alone.warnings, "{:?}", helped.warnings);
+            assert!(apart(&alone, &helped) <= TOLERANCE);
+            let LayerData::Id(expected) = &alone.layers.images["object"] else { panic!("ids") };
+            let LayerData::Id(found) = &helped.layers.images["object"] else { panic!("ids") };
+            let mut others = expected.iter().zip(found).filter(|(a, b)| a != b).count();
+            assert!((0..3).all(|o| expected.contains(&o)) && expected.contains(&u32::MAX));
+            for layer in ["depth.first", "depth.median", "depth.mean", "depth.sigma"] {
+                let (a, b) = (alone.layers.scalar(layer).unwrap(), helped.layers.scalar(layer).unwrap());
+                assert!(a.iter().any(|z| *z < f32::INFINITY));
+                // A level may be reached one splat earlier or later; a deviation is the root of a variance.
+                let near = |(a, b): (&f32, &f32)| a == b || (a - b).abs() <= 1e-3;
+                others += a.iter().zip(b).filter(|pair| !near(*pair)).count();
+            }
+            assert!(others <= 96 * 64 / 500, "{name} {direction}: {others}");
+        }
     }
 }
 
@@ -128,11 +151,11 @@ fn splats_stay_on_the_device_from_their_attributes_to_the_unshadowed() {
     let helped = unshadowed("", Some(choice));
     assert_eq!((device.submissions(), &helped.warnings), (2, &alone.warnings));
     assert!(apart(&alone, &helped) <= TOLERANCE, "{:e}", apart(&alone, &helped));
-    // The lists of a shadow map before, and look-ups for splats that are translucent and for those that are opaque.
+    // One more trial, and all with the shadow map at once.
     let alone = picture("", None);
     let (device, choice) = worse(Loss::Never, u64::MAX);
     let helped = picture("", Some(choice));
-    assert_eq!((device.submissions(), &helped.warnings), (5, &alone.warnings));
+    assert_eq!((device.submissions(), &helped.warnings), (3, &alone.warnings));
     assert!(apart(&alone, &helped) <= TOLERANCE, "{:e}", apart(&alone, &helped));
     // More tile entries than there was room for are recorded again, once.
     let large = "[render]\nantialias = 5";
@@ -163,8 +186,8 @@ fn translucent(lights: &str) -> String {
 }
 
 #[test]
-fn shadow_maps_stay_on_the_device_where_no_opaque_splat_asks_for_light() {
-    let scene = translucent(MORE_LIGHTS);
+fn shadow_maps_stay_on_the_device() {
+    let scene = SCENE.replacen("    [[object]]", &format!("{MORE_LIGHTS}    [[object]]"), 1);
     let settings = "[render]\nlayers = [\"effects\", \"shadow\"]";
     let alone = picture_of(&scene, settings, None);
     let bright = scene.replace("shadow = false", "").replace("[[light]]", "[[light]]\n    shadow = false");
@@ -211,7 +234,7 @@ fn every_layer_that_is_shaded_is_the_processor_s() {
     let alone = picture(settings, None);
     let (device, choice) = worse(Loss::Never, u64::MAX);
     let helped = picture(settings, Some(choice));
-    assert_eq!(device.submissions(), 5);
+    assert_eq!(device.submissions(), 3);
     assert!(apart(&alone, &helped) <= TOLERANCE);
     let names = |r: &Render| r.layers.images.keys().copied().collect::<Vec<_>>();
     assert_eq!(names(&alone), names(&helped));
@@ -220,6 +243,24 @@ fn every_layer_that_is_shaded_is_the_processor_s() {
         let (a, b) = (of(&alone), of(&helped));
         let largest = a.iter().fold(0.0, |most: f32, v| most.max(v.abs()));
         assert!(largest > 0.0 && a.iter().zip(&b).all(|(a, b)| (a - b).abs() <= TOLERANCE * largest), "{name}");
+    }
+}
+
+#[test]
+fn what_hides_particles_is_resolved_by_the_device() {
+    let settings = "[render]\ntechnique = \"particles\"\nlayers = [\"object\"]\n[render.particles]\nrepeat_level = 2";
+    let scene = SCENE.replace("center = [0.3, 0, 0]", "center = [0.3, 0.3, 1.1]");
+    let alone = picture_of(&scene, settings, None);
+    for (name, device) in devices() {
+        let helped = picture_of(&scene, settings, Some(device));
+        assert!(helped.backend.starts_with(name), "{}", helped.backend);
+        let beauty = |r: &Render| r.layers.rgb("beauty").unwrap().to_vec();
+        let near = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).all(|c| (a[c] - b[c]).abs() <= TOLERANCE * 10.0);
+        let same = beauty(&alone).iter().zip(&beauty(&helped)).filter(|p| near(*p)).count();
+        // A particle may lie within rounding of the wall.
+        assert!(same >= 96 * 64 * 999 / 1000, "{same}");
+        let tiles = |r: &Render| r.cost.stages.iter().find(|s| s.name == "opaque").unwrap().fragments % 256;
+        assert!(tiles(&helped) == 0 && beauty(&alone) != beauty(&helped), "the device did it");
     }
 }
 

@@ -3,7 +3,7 @@
 use gpu_conformance::{Device, open};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::gpu::{Counts, Input, record};
-use splat_core::raster::{OpaqueImage, Params, Projected, fold, project};
+use splat_core::raster::{Detail, OpaqueImage, Params, Projected, fold, project_into};
 use splat_core::{
     Accumulator, Camera, Cloud, Direction, Error, FootprintStack, Material, Progress, Projection, Splat, SplatKind, rng,
 };
@@ -14,26 +14,29 @@ use splat_core::{
 /// ellipse enters the square of its distance multiplied by the square of length over thickness, and fused products are
 /// rounded once or twice, as the device has it. Measured on lavapipe, by either executor: 4·10⁻⁷ for round splats,
 /// 2.4·10⁻⁶ for discs seen edge-on that are 120 pixels long.
-const TOLERANCE: f32 = 1e-5;
+pub(crate) const TOLERANCE: f32 = 1e-5;
 
-const SIZE: [u32; 2] = [150, 90];
-const VIEWS: [Projection; 2] = [Projection::Perspective { fov_y: 0.8 }, Projection::Orthographic { height: 3.0 }];
+pub(crate) const SIZE: [u32; 2] = [150, 90];
+pub(crate) const VIEWS: [Projection; 2] =
+    [Projection::Perspective { fov_y: 0.8 }, Projection::Orthographic { height: 3.0 }];
 
 /// What is drawn, and how.
-struct Scene {
-    cloud: Cloud,
-    camera: Camera,
-    materials: Vec<Material>,
-    footprints: FootprintStack,
-    planes: usize,
-    channels: usize,
-    opaque: OpaqueImage,
-    direction: Direction,
-    params: Params,
+pub(crate) struct Scene {
+    pub(crate) cloud: Cloud,
+    pub(crate) camera: Camera,
+    pub(crate) materials: Vec<Material>,
+    pub(crate) footprints: FootprintStack,
+    pub(crate) planes: usize,
+    pub(crate) channels: usize,
+    pub(crate) opaque: OpaqueImage,
+    pub(crate) direction: Direction,
+    pub(crate) params: Params,
+    pub(crate) depths: bool,
+    pub(crate) objects: bool,
 }
 
 impl Scene {
-    fn new(cloud: Cloud, view: Projection) -> Self {
+    pub(crate) fn new(cloud: Cloud, view: Projection) -> Self {
         let eye = cloud.origin + DVec3::new(0.3, 0.2, 4.0);
         Self {
             camera: Camera::look_at(eye, cloud.origin, DVec3::Y, view, SIZE).unwrap(),
@@ -45,19 +48,26 @@ impl Scene {
             opaque: OpaqueImage::default(),
             direction: Direction::FrontToBack,
             params: Params::default(),
+            depths: false,
+            objects: false,
         }
     }
 
-    fn accumulator(&self) -> Accumulator {
-        Accumulator::new(self.camera.size, self.planes, self.channels, false, false)
+    pub(crate) fn accumulator(&self) -> Accumulator {
+        Accumulator::new(self.camera.size, self.planes, self.channels, self.depths, self.objects)
     }
 
-    fn project(&self) -> Projected {
-        project(&self.cloud, &self.camera, &self.footprints, &self.materials, &self.params)
+    pub(crate) fn project(&self) -> Projected {
+        let mut projected = Projected::default();
+        let detail =
+            Detail { depth: self.depths || self.objects || !self.opaque.depth.is_empty(), object: self.objects };
+        let (camera, params) = (&self.camera, &self.params);
+        project_into(&mut projected, &self.cloud, camera, &self.footprints, &self.materials, params, detail);
+        projected
     }
 
     /// Ids by depth.
-    fn order(&self) -> Vec<u32> {
+    pub(crate) fn order(&self) -> Vec<u32> {
         let view = self.camera.view_from_offset(self.cloud.origin);
         let mut order: Vec<u32> = (0..self.cloud.len() as u32).collect();
         order.sort_by(|&a, &b| {
@@ -71,7 +81,13 @@ impl Scene {
     }
 
     /// Composites on the CPU and on the device, into two that were alike; `room` is that for entries.
-    fn both(&self, device: &mut Device, order: &[u32], begin: &Accumulator, room: u32) -> Result<Both, Error> {
+    pub(crate) fn both(
+        &self,
+        device: &mut Device,
+        order: &[u32],
+        begin: &Accumulator,
+        room: u32,
+    ) -> Result<Both, Error> {
         let projected = self.project();
         let n = (self.cloud.len() * self.channels) as u64;
         let values: Vec<f32> = (0..n).map(|i| 3.0 * rng::unit_f32(77, 0, i, 0)).collect();
@@ -90,22 +106,22 @@ impl Scene {
     }
 
     /// The same from nothing, and how far the two lie apart at most.
-    fn compare(&self, device: &mut Device) -> (Both, f32) {
+    pub(crate) fn compare(&self, device: &mut Device) -> (Both, f32) {
         let both = self.both(device, &self.order(), &self.accumulator(), 1 << 20).unwrap();
         let difference = both.difference();
         (both, difference)
     }
 }
 
-struct Both {
-    cpu: Accumulator,
-    gpu: Accumulator,
-    counts: Counts,
+pub(crate) struct Both {
+    pub(crate) cpu: Accumulator,
+    pub(crate) gpu: Accumulator,
+    pub(crate) counts: Counts,
 }
 
 impl Both {
     /// The greatest difference of a transmittance, or of a channel as a share of the greatest value.
-    fn difference(&self) -> f32 {
+    pub(crate) fn difference(&self) -> f32 {
         let [a, b] = [&self.cpu, &self.gpu];
         let of = |a: &[Vec<f32>], b: &[Vec<f32>], map: fn(f32) -> f32| {
             let pairs = a.iter().zip(b).flat_map(|(a, b)| a.iter().zip(b));
@@ -122,16 +138,16 @@ impl Both {
     }
 }
 
-fn unit(i: u64, k: u64) -> f32 {
+pub(crate) fn unit(i: u64, k: u64) -> f32 {
     rng::unit_f32(31, 0, i, k)
 }
 
-fn position(i: u64) -> Vec3 {
+pub(crate) fn position(i: u64) -> Vec3 {
     Vec3::new(4.0 * unit(i, 0) - 2.0, 3.0 * unit(i, 1) - 1.5, 2.0 * unit(i, 2) - 1.0)
 }
 
 /// Pieces of a medium of many sizes.
-fn media(n: u64, origin: DVec3) -> Cloud {
+pub(crate) fn media(n: u64, origin: DVec3) -> Cloud {
     let mut cloud = Cloud::new(origin);
     for i in 0..n {
         let radius = 0.02 + 0.2 * unit(i, 3) * unit(i, 4);
@@ -143,7 +159,7 @@ fn media(n: u64, origin: DVec3) -> Cloud {
 }
 
 /// Tangent discs, every third seen edge-on from the axis.
-fn discs(n: u64) -> Cloud {
+pub(crate) fn discs(n: u64) -> Cloud {
     let mut cloud = Cloud::new(DVec3::ZERO);
     for i in 0..n {
         let turn = std::f32::consts::TAU * unit(i, 7);

@@ -1,7 +1,7 @@
 //! The same for more splats than a device takes at once: ordered first, then projected, shaded and composited in parts, one
 //! after the other in compositing order. What has been composited goes on where the part before has left it.
 
-use super::{Chained, Outcome, Translucent, run_on};
+use super::{Chained, Outcome, Splats, run_on};
 use crate::device::Failure;
 use crate::device::order::order_on;
 use crate::device::splats::{MOST_OF_A_TILE, room_for};
@@ -12,11 +12,11 @@ use splat_shaders::Executor;
 /// Splats of a part that is not halved any more.
 const LEAST: usize = 256;
 
-/// [`Translucent`] splats into an accumulator by a device, in parts of at most so many; the accumulator changes only when all
-/// is done. `None` where even few splats are too many.
+/// Translucent splats into an accumulator by a device, in parts of at most so many; the accumulator changes only when all is
+/// done. `None` where even few splats are too many.
 pub(crate) fn chain_in_parts(
     device: &mut dyn Executor,
-    splats: &Translucent<'_>,
+    splats: &Splats<'_>,
     mut most: usize,
     accumulator: &mut Accumulator,
 ) -> Result<Option<Chained>, Failure> {
@@ -26,15 +26,12 @@ pub(crate) fn chain_in_parts(
     let mut rest = &order.input_from_sorted[..];
     while !rest.is_empty() {
         let (ids, behind) = rest.split_at(most.min(rest.len()));
-        let part = Translucent { ids, ..*splats };
+        let part = Splats { ids, ..*splats };
         match run_on(device, &part, false, room_for(ids.len()), &mut begun)? {
             Outcome::Done(done) => {
                 rest = behind;
                 visible += done.visible;
-                raster.splats += done.raster.splats;
-                raster.tile_entries += done.raster.tile_entries;
-                raster.fragments += done.raster.fragments;
-                raster.bytes = raster.bytes.max(done.raster.bytes);
+                add(&mut raster, &done.raster);
                 passes.extend(done.passes);
             }
             Outcome::TooLarge if ids.len() > LEAST => most = ids.len().div_ceil(2),
@@ -43,5 +40,13 @@ pub(crate) fn chain_in_parts(
         }
     }
     *accumulator = begun;
-    Ok(Some(Chained { visible, raster, passes }))
+    Ok(Some(Chained { visible, raster, opaque: None, passes }))
+}
+
+/// Counts of what goes through the same memory one after the other.
+pub(super) fn add(sum: &mut RasterCounts, part: &RasterCounts) {
+    sum.splats += part.splats;
+    sum.tile_entries += part.tile_entries;
+    sum.fragments += part.fragments;
+    sum.bytes = sum.bytes.max(part.bytes);
 }

@@ -1,8 +1,8 @@
-//! Translucent splats projected, shaded, and from their attributes to the picture, by both.
+//! Splats splats projected, shaded, and from their attributes to the picture, by both.
 
 use super::composite::{accumulators, numbers};
 use super::{Failure, Found, SIZE};
-use crate::device::chain::{Translucent, chain_on};
+use crate::device::chain::{Splats, chain_on};
 use hbsort::{Scratch, slice_cloud};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::gpu::{Attributes, project, words};
@@ -147,9 +147,10 @@ impl ChainInput {
                 &mut expected,
                 &progress,
             );
-            let splats = Translucent {
+            let splats = Splats {
                 input,
                 ids: &ids,
+                solid: &[],
                 footprints: &self.footprints,
                 layout,
                 sort: &sort,

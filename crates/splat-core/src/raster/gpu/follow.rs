@@ -20,14 +20,16 @@ pub struct Input<'a> {
     pub footprints: &'a FootprintStack,
     /// Extinctions.
     pub materials: &'a [Material],
-    /// What hides splats.
-    pub opaque: &'a OpaqueImage,
+    /// What hides splats; `None` where it lies on the device, resolved by a recording before.
+    pub opaque: Option<&'a OpaqueImage>,
     /// Which end comes first.
     pub direction: Direction,
     /// The cut-off; the precision must be single.
     pub params: &'a Params,
     /// Ids in compositing order; none where a sort on the device makes it.
     pub order: &'a [u32],
+    /// Objects by id, where the recording keeps them.
+    pub objects: &'a [u32],
 }
 
 /// Records the compositing with this room; [`Capacities::ordered`] is the most that the sort may leave.
@@ -45,12 +47,20 @@ pub fn record(capacities: Capacities) -> Result<Recorded, Error> {
 /// As [`Recorded::uploads`].
 pub fn uploads(recorded: &Recorded, input: &Input<'_>, accumulator: &Accumulator) -> Result<Uploads, Error> {
     let kernels: Vec<Kernel> = input.footprints.layers().iter().map(Kernel::new).collect();
-    let Input { camera, materials, opaque, direction, params, order, .. } = *input;
+    let Input { camera, materials, direction, params, order, objects, .. } = *input;
     super::fits("splats in order", order.len() as u64, recorded.capacities.ordered)?;
     let perspective = (!camera.is_orthographic()).then_some(camera.focal_px() as f32);
     let (size, kernels) = (camera.size, &kernels[..]);
-    let image = Image { size, perspective, kernels, materials, opaque, direction, params, ordered: order.len() as u32 };
+    let (none, ordered) = (OpaqueImage::default(), order.len() as u32);
+    let (opaque, hidden) = (input.opaque.unwrap_or(&none), input.opaque.is_none());
+    let image = Image { size, perspective, kernels, materials, opaque, direction, params, ordered, objects, hidden };
     recorded.check_image(&image, accumulator)?;
+    let splats = recorded.capacities.splats as usize;
+    super::equal_lengths([(
+        "objects",
+        objects.len(),
+        if recorded.capacities.objects { splats } else { objects.len() },
+    )])?;
     let given = [bytemuck::cast_slice(order).to_vec(), Vec::new(), Vec::new()];
     Ok(recorded.image_uploads(&image, accumulator, given))
 }

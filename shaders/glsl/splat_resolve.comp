@@ -1,0 +1,10 @@
+#version 450
+// Resolves the opaque splats of each tile: all channels that shading gives.
+
+#define CHANNELS 13u
+
+#include "blocks.glsl"
+#include "layouts.glsl"
+#include "splats.glsl"
+#include "optics.glsl"
+#include "resolve.glsl"
