@@ -72,7 +72,8 @@ fn particles_differ_from_points_by_their_standard_error() {
 }
 
 /// Objects that particles sample from their own data, each before a light whose shadow falls on all.
-const OWN: [(&str, &str, &str); 12] = [
+const OWN: [(&str, &str, &str); 13] = [
+    ("lattice lines", "a", "isosurface = { volume = 'hill.nrrd', level = 0.4 }\nspacing = 0.02"),
     ("lines", "a", "isosurface = { volume = 'hill.nrrd', level = 0.4, interpolation = 'catmull-rom' }\nspacing = 0.02"),
     ("lines", "a", "level_set = { points = 'ball.xyz' }\nspacing = 0.02"),
     (
@@ -186,6 +187,31 @@ fn particles_from_the_data_differ_from_points_by_noise() {
         worst.push((square, mean.abs()));
     }
     assert!(worst.iter().all(|(square, mean)| *square < 2.0 && *mean < 4e-3), "{worst:?}");
+}
+
+#[test]
+fn a_trilinear_isosurface_is_the_same_by_lines_along_its_lattice_and_by_random_ones() {
+    let folder = data();
+    let object = "material = 'a'\nisosurface = { volume = 'hill.nrrd', level = 0.4 }\nspacing = 0.02\n";
+    let picture = |by: &str| {
+        let text = own(object, "") + &format!("[render.particles]\nrepeat_level = 144\nsurface_sampler = '{by}'\n");
+        let picture = draw_in(folder.path(), &text, &["--technique", "particles", "--layers", "std_error"]);
+        (luminance(&picture), picture.channel("std_error.A"))
+    };
+    let ((a, of_a), (b, of_b)) = (picture("auto"), picture("lines"));
+    let noisy: Vec<usize> = (0..a.len()).filter(|&k| of_a[k] > 0.0 && of_b[k] > 0.0).collect();
+    let n = noisy.len() as f64;
+    let square = noisy.iter().map(|&k| (a[k] - b[k]).powi(2) / (of_a[k].powi(2) + of_b[k].powi(2))).sum::<f64>() / n;
+    let mean = noisy.iter().map(|&k| a[k] - b[k]).sum::<f64>() / n;
+    println!("{n} pixels, mean z² {square:.3}, mean difference {mean:.6}");
+    assert!(n > 300.0 && (0.8..1.2).contains(&square) && mean.abs() < 2e-3, "{n} {square} {mean}");
+    // What is clipped has an end that no lattice knows.
+    let clipped = own(&format!("{object}clip = [{{ normal = [0, 1, 1], point = [0, 0, 0.1] }}]\n"), "");
+    std::fs::write(folder.path().join("s.toml"), clipped).unwrap();
+    let mut command = organza();
+    command.args(["explain", "s.toml", "--json", "--technique", "particles"]).current_dir(&folder);
+    let plan: serde_json::Value = serde_json::from_slice(&command.output().unwrap().stdout).unwrap();
+    assert_eq!(plan["plan"]["samplers"][0]["source"], "lines");
 }
 
 #[test]

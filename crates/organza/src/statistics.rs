@@ -26,6 +26,8 @@ pub enum ObjectData {
         /// bound; infinite without a bound, 0 where a first look finds no
         /// surface, and for measured data, whose fields have tight bounds.
         looseness: f64,
+        /// Whether it is the isosurface of a volume that is interpolated trilinearly, and nothing clips it.
+        trilinear: bool,
         /// What the scene asks for.
         by: SurfaceSampler,
     },

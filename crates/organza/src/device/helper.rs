@@ -175,7 +175,7 @@ impl Helper {
                 done => done.map(|()| None),
             });
         if folding.uploads() {
-            self.leave("particles of other things than meshes and regular volumes are sampled by the processor");
+            self.leave("particles of other things than meshes, regular volumes and their trilinear isosurfaces are sampled by the processor");
         }
         cancelled.flatten().map_or(Ok(folding.particles - before), Err)
     }

@@ -12,8 +12,8 @@ use crate::scene::{
 };
 use crate::statistics::ObjectData;
 use convert::{
-    ClippedField, CloudShape, Density, DensityParams, Ellipsoid, ExpressionField, GridField, MeshParams, MpuParams,
-    RawPoints, SharedField, SplatParams, SurfelParams, VolumeParams,
+    ClippedField, CloudShape, Density, DensityParams, Ellipsoid, ExpressionField, GridField, Interpolation, MeshParams,
+    MpuParams, RawPoints, SharedField, SplatParams, SurfelParams, VolumeParams,
 };
 use glam::DVec3;
 use splat_core::{Grid, Mesh, TransferFunction};
@@ -29,8 +29,8 @@ pub(super) enum Input<'a> {
     Mesh(String, Arc<Mesh>, MeshParams),
     Points(&'a Path, Arc<RawPoints>, SurfelParams),
     Volume(Arc<Grid>, &'a TransferFunction, VolumeParams),
-    /// The zero set of a field in a box.
-    Surface(SharedField, [DVec3; 2], MeshParams),
+    /// The zero set of a field in a box; of a trilinear one that nothing clips with its volume and level.
+    Surface(SharedField, [DVec3; 2], MeshParams, Option<(Arc<Grid>, f32)>),
     Density(SharedField, [DVec3; 2], DensityParams),
     Procedural(CloudShape, f64, VolumeParams),
     Medium(MediumShape, SplatParams),
@@ -62,7 +62,7 @@ impl Input<'_> {
     /// Its attributes and limits.
     pub(super) fn splat(&self) -> &SplatParams {
         match self {
-            Self::Mesh(_, _, params) | Self::Surface(_, _, params) => &params.splat,
+            Self::Mesh(_, _, params) | Self::Surface(_, _, params, _) => &params.splat,
             Self::Points(_, _, params) => &params.splat,
             Self::Volume(_, _, params) | Self::Procedural(_, _, params) => &params.splat,
             Self::Density(_, _, params) => &params.volume.splat,
@@ -73,7 +73,7 @@ impl Input<'_> {
     /// Opacity of one crossing; `None` for a medium.
     pub(super) fn opacity(&self) -> Option<f64> {
         match self {
-            Self::Mesh(_, _, params) | Self::Surface(_, _, params) => Some(params.opacity),
+            Self::Mesh(_, _, params) | Self::Surface(_, _, params, _) => Some(params.opacity),
             Self::Points(_, _, params) => Some(params.opacity),
             Self::Rectangle(_, opacity, _) => Some(*opacity),
             Self::Volume(..) | Self::Procedural(..) | Self::Density(..) | Self::Medium(..) => None,
@@ -113,7 +113,7 @@ impl Input<'_> {
         match self {
             Self::Points(..) => ObjectData::Points,
             Self::Mesh(..) | Self::Rectangle(..) => ObjectData::Triangles,
-            Self::Surface(..) => ObjectData::Surface { looseness, by },
+            Self::Surface(.., lattice) => ObjectData::Surface { looseness, trilinear: lattice.is_some(), by },
             Self::Volume(..) | Self::Procedural(..) => ObjectData::Volume,
             Self::Density(..) | Self::Medium(..) => ObjectData::Density { bounded },
         }
@@ -138,20 +138,22 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
             Input::Volume(read_grid(path, context)?, transfer, context.volume_params(splat))
         }
         Source::Implicit(ImplicitSource { expression, bounds, spacing }) => {
-            surface(Arc::new(field(expression, object)?), *bounds, *spacing, object, splat, opacity)?
+            surface(Arc::new(field(expression, object)?), None, *bounds, *spacing, object, splat, opacity)?
         }
         Source::Isosurface(source) => {
             let grid = read_grid(&source.path, context)?;
             let step = shortest_step(&grid);
+            let trilinear =
+                (source.interpolation == Interpolation::Trilinear).then(|| (grid.clone(), source.level as f32));
             let field = GridField::new(grid, source.interpolation, source.level, source.inside)
                 .map_err(|e| refuse_data(&source.path, &e))?;
             let bounds = field.bounds();
-            surface(Arc::new(field), bounds, step, object, splat, opacity)?
+            surface(Arc::new(field), trilinear, bounds, step, object, splat, opacity)?
         }
         Source::LevelSet(source) => {
             let (field, bounds) = level_set(source, object, context)?;
             let step = (bounds[1] - bounds[0]).max_element() / LEVEL_SET_STEPS;
-            surface(field, bounds, step, object, splat, opacity)?
+            surface(field, None, bounds, step, object, splat, opacity)?
         }
         Source::Slice(source) => {
             let grid = read_grid(&source.path, context)?;
@@ -177,6 +179,7 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
 /// A surface of a field; `step` is the distance of its splats where the object states none, object units.
 fn surface<'a>(
     field: SharedField,
+    trilinear: Option<(Arc<Grid>, f32)>,
     bounds: [DVec3; 2],
     step: f64,
     object: &SceneObject,
@@ -190,7 +193,12 @@ fn surface<'a>(
         let clipped = ClippedField::new(field, object.clip.clone());
         Arc::new(clipped.map_err(|e| Error::Internal(e.to_string()))?)
     };
-    Ok(Input::Surface(field, bounds, MeshParams { splat, density, opacity }))
+    Ok(Input::Surface(
+        field,
+        bounds,
+        MeshParams { splat, density, opacity },
+        trilinear.filter(|_| object.clip.is_empty()),
+    ))
 }
 
 pub(super) fn shortest_step(grid: &Grid) -> f64 {

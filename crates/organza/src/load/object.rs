@@ -46,7 +46,7 @@ pub(super) fn prepare<'a>(
     let input = input(object, context)?;
     let bounded = if sampled { input.bounded(context.extinction_factor(object)) } else { None };
     let search = match &input {
-        Input::Surface(field, bounds, _) if sampled => Some(Search::new(field, *bounds)),
+        Input::Surface(field, bounds, ..) if sampled => Some(Search::new(field, *bounds)),
         _ => None,
     };
     match predict(&input) {
@@ -65,7 +65,7 @@ fn predict(input: &Input<'_>) -> Result<Prediction, ConvertError> {
         Input::Mesh(_, mesh, params) => cost::mesh(mesh, params),
         Input::Points(_, points, params) => cost::raw_points(points, params),
         Input::Volume(grid, transfer, params) => cost::volume(grid, transfer, params),
-        Input::Surface(field, bounds, params) => cost::surface(field.as_ref(), *bounds, params),
+        Input::Surface(field, bounds, params, _) => cost::surface(field.as_ref(), *bounds, params),
         Input::Density(field, bounds, params) => cost::density(field.as_ref(), *bounds, params),
         Input::Procedural(shape, spacing, params) => cost::procedural(shape, *spacing, params),
         Input::Medium(MediumShape::Box { min, max, extinction, spacing }, params) => {
@@ -81,7 +81,7 @@ fn predict(input: &Input<'_>) -> Result<Prediction, ConvertError> {
 impl Prepared<'_> {
     /// See [`crate::statistics::ObjectData::Surface`].
     fn looseness(&self) -> f64 {
-        let (Some(search), Input::Surface(_, _, params)) = (&self.search, &self.input) else { return f64::INFINITY };
+        let (Some(search), Input::Surface(_, _, params, _)) = (&self.search, &self.input) else { return f64::INFINITY };
         let Density::Spacing(spacing) = params.density else { return f64::INFINITY };
         let area =
             self.prediction.splats as f64 / cost::ZERO_SET_EXCESS * (spacing / params.splat.transform.scale).powi(2);
@@ -131,7 +131,7 @@ pub(super) fn convert(
             let params = VolumeParams { splat: context.limited(&params.splat), ..params.clone() };
             convert::volume_to_points_with_progress(grid, transfer, &params, progress).map(|c| c.0)
         }
-        Input::Surface(field, bounds, params) => {
+        Input::Surface(field, bounds, params, _) => {
             let params = MeshParams { splat: context.limited(&params.splat), ..params.clone() };
             convert::surface_to_points_with_progress(field.as_ref(), *bounds, &params, progress)
                 .map(|(cloud, _)| in_domain(cloud, field, &params.splat.transform))

@@ -55,6 +55,8 @@ pub(crate) enum Body {
         /// Step of a Brownian motion over the longest side of the bounds; without one, lines find particles.
         step: Option<f64>,
     },
+    /// An isosurface of a volume, interpolated trilinearly.
+    Lattice { grid: Arc<Grid>, level: f32 },
     /// Triangles with normals.
     Triangles(Mesh),
     /// Extinction by a transfer function, 1/world unit before normalization.
@@ -104,7 +106,7 @@ impl Own {
     /// Surface or medium.
     pub(crate) fn kind(&self) -> SplatKind {
         match self.body {
-            Body::Surface { .. } | Body::Triangles(_) => SplatKind::Surface,
+            Body::Surface { .. } | Body::Lattice { .. } | Body::Triangles(_) => SplatKind::Surface,
             Body::Cells { .. } | Body::Field(_) => SplatKind::Medium,
         }
     }
@@ -113,7 +115,7 @@ impl Own {
     pub(crate) fn bytes(&self) -> u64 {
         match &self.body {
             Body::Triangles(mesh) => mesh_bytes(mesh),
-            Body::Cells { grid, .. } => grid_bytes(grid),
+            Body::Cells { grid, .. } | Body::Lattice { grid, .. } => grid_bytes(grid),
             Body::Field(field) => field.bytes(),
             Body::Surface { .. } => 0,
         }
@@ -166,14 +168,17 @@ fn data(
         Input::Points(..) => None,
         Input::Mesh(_, mesh, _) => triangles(Mesh::clone(mesh), prepared.prediction.splats),
         Input::Rectangle(r, ..) => triangles(rectangle(r), prepared.prediction.splats),
-        Input::Surface(field, bounds, params) => {
+        Input::Surface(field, bounds, params, lattice) => {
             let spacing = world_spacing(&params.density) / params.splat.transform.scale;
             if source == ParticleSource::Triangles {
                 return Ok(triangles(net(field, *bounds, spacing, &params.splat)?, prepared.prediction.splats));
             }
+            let bounds = prepared.search.as_ref().map_or(*bounds, |s| s.bounds);
+            if let (ParticleSource::Lattice, Some((grid, level))) = (source, lattice) {
+                return Ok(Some((Body::Lattice { grid: grid.clone(), level: *level }, bounds, spacing)));
+            }
             let domain = field.clone();
             let inside: Inside = Box::new(move |p| domain.in_domain(p));
-            let bounds = prepared.search.as_ref().map_or(*bounds, |s| s.bounds);
             let step = match context.scene.render.particles.surface_sampler {
                 SurfaceSampler::Brownian { step } => Some(step),
                 _ => None,

@@ -12,8 +12,8 @@ use crate::points::Drawing;
 use glam::DVec3;
 use pbsr::{
     Appearance, BrownianParams, BrownianReport, BrownianSampler, Density, FieldVolumeSampler, GridSampler,
-    ImplicitSurface, KeptSets, LineReport, LineSampler, MeshSampler, Object, Sampler, SplatParams, SplatSampler,
-    SurfaceParams, VolumeParams,
+    ImplicitSurface, KeptSets, LatticeSampler, LineReport, LineSampler, MeshSampler, Object, Sampler, SplatParams,
+    SplatSampler, SurfaceParams, VolumeParams,
 };
 use splat_core::{Camera, Cloud, Similarity, SplatKind, rng};
 use std::collections::BTreeMap;
@@ -237,6 +237,7 @@ impl Source<'_> {
                 warnings.extend(self.doubts(sampler.report()));
                 Box::new(sampler)
             }
+            Body::Lattice { grid, level } => Box::new(LatticeSampler::new(grid, *level, &self.surface(own))?),
             Body::Triangles(mesh) => Box::new(MeshSampler::new(mesh, &self.surface(own), None)?),
             Body::Cells { grid, transfer, normals } => {
                 let params = VolumeParams {

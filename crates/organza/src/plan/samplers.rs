@@ -16,6 +16,8 @@ pub enum ParticleSource {
     Opaque,
     /// Random lines through a field.
     Lines,
+    /// Lines along the lattice of a volume.
+    Lattice,
     /// A Brownian motion on the zero set of a field.
     Brownian,
     /// Triangles.
@@ -34,6 +36,7 @@ impl ParticleSource {
         match self {
             Self::Opaque => "none",
             Self::Lines => "lines",
+            Self::Lattice => "lattice lines",
             Self::Brownian => "brownian",
             Self::Triangles => "triangles",
             Self::Cells => "cells",
@@ -86,7 +89,7 @@ fn source(object: &ObjectStatistics) -> (ParticleSource, &'static str) {
     match object.data {
         ObjectData::Points => (ParticleSource::Splats, "there is nothing between raw points"),
         ObjectData::Triangles => (ParticleSource::Triangles, "a uniform place on a triangle is exact"),
-        ObjectData::Surface { looseness, by } => surface(looseness, by),
+        ObjectData::Surface { looseness, trilinear, by } => surface(looseness, trilinear, by),
         ObjectData::Volume => (ParticleSource::Cells, "extinction is known on a lattice"),
         ObjectData::Density { bounded: false } => {
             (ParticleSource::Cells, "the expression has no bound, so it is sampled on a lattice")
@@ -98,8 +101,11 @@ fn source(object: &ObjectStatistics) -> (ParticleSource, &'static str) {
     }
 }
 
-fn surface(looseness: f64, by: SurfaceSampler) -> (ParticleSource, &'static str) {
+fn surface(looseness: f64, trilinear: bool, by: SurfaceSampler) -> (ParticleSource, &'static str) {
     match by {
+        SurfaceSampler::Auto if trilinear => {
+            (ParticleSource::Lattice, "lines along a lattice meet a trilinear surface in closed form")
+        }
         SurfaceSampler::Auto if looseness > LOOSEST => {
             (ParticleSource::Triangles, "its field has a loose bound, so that lines would search long: it is meshed")
         }
@@ -133,13 +139,16 @@ mod tests {
         let of = |o: ObjectStatistics| samplers(&[o], &[])[0].source;
         assert_eq!(of(object(ObjectData::Points)), ParticleSource::Splats);
         assert_eq!(of(object(ObjectData::Triangles)), ParticleSource::Triangles);
-        let surface = |looseness, by| object(ObjectData::Surface { looseness, by });
+        let surface = |looseness, by| object(ObjectData::Surface { looseness, trilinear: false, by });
         let auto = |looseness| surface(looseness, SurfaceSampler::Auto);
         assert_eq!(of(auto(2.6)), ParticleSource::Lines);
         assert_eq!(of(auto(f64::INFINITY)), ParticleSource::Triangles);
         assert_eq!(of(surface(f64::INFINITY, SurfaceSampler::Lines)), ParticleSource::Lines);
         assert_eq!(of(surface(2.6, SurfaceSampler::Triangles)), ParticleSource::Triangles);
         assert_eq!(of(surface(2.6, SurfaceSampler::Brownian { step: 0.01 })), ParticleSource::Brownian);
+        let trilinear = |by| of(object(ObjectData::Surface { looseness: 0.0, trilinear: true, by }));
+        assert_eq!(trilinear(SurfaceSampler::Auto), ParticleSource::Lattice);
+        assert_eq!(trilinear(SurfaceSampler::Lines), ParticleSource::Lines);
         assert_eq!(of(object(ObjectData::Volume)), ParticleSource::Cells);
         assert_eq!(of(object(ObjectData::Density { bounded: true })), ParticleSource::Field);
         assert_eq!(of(object(ObjectData::Density { bounded: false })), ParticleSource::Cells);
