@@ -1,26 +1,9 @@
 #version 450
 // The exclusive scan of the blocks' sums by one workgroup, and the total.
 
+#define PLACE gl_LocalInvocationIndex
+
 #include "blocks.glsl"
 #include "layouts.glsl"
 #include "scan.glsl"
-
-layout(set = 0, binding = 0, std430) buffer Bound0 { Scan scan; };
-layout(set = 0, binding = 1, std430) buffer Bound1 { uint sums[]; };
-
-void main() {
-    uint blocks = ceil_div(scan.count, 1024u);
-    uint before = 0u;
-    for (uint begin = 0u; begin < blocks; begin += 256u) {
-        uint at = begin + gl_LocalInvocationIndex;
-        uint total;
-        uint within = scan_workgroup(at < blocks ? sums[at] : 0u, total);
-        if (at < blocks) {
-            sums[at] = before + within;
-        }
-        before += total;
-    }
-    if (gl_LocalInvocationIndex == 0u) {
-        scan.total = before;
-    }
-}
+#include "scan_spine.glsl"

@@ -1,6 +1,6 @@
 //! What an executor takes and gives: the same words whichever interface it drives.
 
-use crate::{BufferId, Fault, Recording, Step};
+use crate::{BufferId, Fault, Recording, Step, SubgroupOps};
 use std::fmt::Debug;
 use std::time::Duration;
 
@@ -20,7 +20,8 @@ pub enum AdapterKind {
 }
 
 impl Adapter {
-    /// Refuses a recording that needs more than this device has: memory that kernels can see, or 64-bit atomics.
+    /// Refuses a recording that needs more than this device has: memory that kernels can see, 64-bit atomics, or
+    /// operations of subgroups.
     ///
     /// # Errors
     /// [`DeviceError::TooLarge`], [`DeviceError::Lacking`], [`DeviceError::Recording`] for a recording at fault.
@@ -30,11 +31,15 @@ impl Adapter {
         if let Some(b) = recording.buffers().iter().find(|b| b.bytes > had) {
             return Err(DeviceError::TooLarge { name: b.name, needed: b.bytes, had });
         }
-        let lacking = |step: &&Step| matches!(step, Step::Dispatch(d) if d.kernel.wide_atomics && !self.wide_atomics);
-        match recording.steps().iter().find(lacking) {
-            Some(Step::Dispatch(d)) => Err(DeviceError::Lacking { kernel: d.kernel.name, what: "atomics of 64 bits" }),
-            _ => Ok(()),
+        let dispatched =
+            recording.steps().iter().filter_map(|step| if let Step::Dispatch(d) = step { Some(d) } else { None });
+        for kernel in dispatched.map(|d| d.kernel) {
+            let atomics = (kernel.wide_atomics && !self.wide_atomics).then_some("atomics of 64 bits");
+            if let Some(what) = atomics.or_else(|| kernel.subgroup_ops.beyond(self.subgroup_ops)) {
+                return Err(DeviceError::Lacking { kernel: kernel.name, what });
+            }
         }
+        Ok(())
     }
 }
 
@@ -68,6 +73,8 @@ pub struct Adapter {
     pub subgroup: u32,
     /// Whether kernels can take the least of numbers of 64 bits in a buffer.
     pub wide_atomics: bool,
+    /// What kernels can do across the threads of a subgroup.
+    pub subgroup_ops: SubgroupOps,
 }
 
 /// Which adapter to open.
@@ -270,6 +277,7 @@ mod tests {
             binding_bytes: 0,
             subgroup: 0,
             wide_atomics: false,
+            subgroup_ops: SubgroupOps::NONE,
         }
     }
 

@@ -1,6 +1,8 @@
 //! The kernels: for each the words of its module and what it does with its buffers. `tests/reflection.rs` holds this
 //! table against the modules themselves.
 
+use crate::SubgroupOps;
+
 /// What a kernel does with a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Access {
@@ -24,6 +26,8 @@ pub struct Kernel {
     pub push_bytes: u32,
     /// Whether it takes the least of numbers of 64 bits in a buffer, which not every device can.
     pub wide_atomics: bool,
+    /// What it does across the threads of a subgroup, which not every device can.
+    pub subgroup_ops: SubgroupOps,
 }
 
 impl Kernel {
@@ -35,7 +39,7 @@ impl Kernel {
 }
 
 macro_rules! kernels {
-    ($($(#[$about:meta])* $constant:ident = $file:literal [$($access:ident),*] $(push $push:literal)? $(wide $wide:literal)?;)*) => {
+    ($($(#[$about:meta])* $constant:ident = $file:literal [$($access:ident),*] $(push $push:literal)? $(wide $wide:literal)? $(subgroup $ops:ident)?;)*) => {
         $(
             $(#[$about])*
             pub static $constant: Kernel = Kernel {
@@ -44,6 +48,7 @@ macro_rules! kernels {
                 bindings: &[$(Access::$access),*],
                 push_bytes: 0 $(+ $push)?,
                 wide_atomics: false $(|| $wide)?,
+                subgroup_ops: SubgroupOps::NONE $(.and(SubgroupOps::$ops))?,
             };
         )*
 
@@ -59,12 +64,20 @@ kernels! {
     SCAN_SPINE = "scan_spine" [Write, Write];
     /// The exclusive scan of the numbers, in place, begun at their block's sum: scan, numbers, sums.
     SCAN_APPLY = "scan_apply" [Read, Write, Read];
+    /// As [`SCAN_REDUCE`], by subgroups.
+    SCAN_REDUCE_SUBGROUP = "scan_reduce_subgroup" [Read, Read, Write] subgroup SUMS;
+    /// As [`SCAN_SPINE`], by subgroups.
+    SCAN_SPINE_SUBGROUP = "scan_spine_subgroup" [Write, Write] subgroup SUMS;
+    /// As [`SCAN_APPLY`], by subgroups.
+    SCAN_APPLY_SUBGROUP = "scan_apply_subgroup" [Read, Write, Read] subgroup SUMS;
 
     /// How often each digit occurs in each block of 2048: state, keys → counts. Push: shift.
     RADIX_HISTOGRAM = "radix_histogram" [Read, Read, Write] push 4;
     /// Moves every key and its companion to their digit's place, equal digits in their order:
     /// state, keys, companions, scanned counts → keys, companions. Push: shift.
     RADIX_SCATTER = "radix_scatter" [Read, Read, Read, Read, Write, Write] push 4;
+    /// As [`RADIX_SCATTER`], by subgroups.
+    RADIX_SCATTER_SUBGROUP = "radix_scatter_subgroup" [Read, Read, Read, Read, Write, Write] push 4 subgroup ALL;
 
     /// Nothing counted yet: view → state, scan of places.
     SPLAT_BEGIN = "splat_begin" [Read, Write, Write];

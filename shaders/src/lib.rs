@@ -27,6 +27,7 @@ mod check;
 mod device;
 mod join;
 pub mod kernels;
+mod lanes;
 mod layout;
 pub mod layouts;
 pub mod radix;
@@ -42,5 +43,6 @@ pub use device::{
 };
 pub use join::Joined;
 pub use kernels::{Access, Kernel};
+pub use lanes::{Lanes, SubgroupOps};
 pub use layout::{Field, GlslType, Layout};
 pub use recording::{Buffer, BufferId, Dispatch, Groups, Recording, Step};

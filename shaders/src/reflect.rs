@@ -18,6 +18,8 @@ pub struct Struct {
 pub struct Module {
     /// SPIR-V version, major and minor.
     pub version: (u8, u8),
+    /// Numbers of the capabilities that it asks for.
+    pub capabilities: Vec<u32>,
     /// Threads of a workgroup.
     pub local_size: [u32; 3],
     /// Storage buffers: (set, binding) → whether the module never writes it.
@@ -31,6 +33,7 @@ pub struct Module {
 const OP_NAME: u32 = 5;
 const OP_MEMBER_NAME: u32 = 6;
 const OP_EXECUTION_MODE: u32 = 16;
+const OP_CAPABILITY: u32 = 17;
 const OP_TYPE_STRUCT: u32 = 30;
 const OP_TYPE_POINTER: u32 = 32;
 const OP_VARIABLE: u32 = 59;
@@ -75,6 +78,7 @@ fn read(op: u32, words: &[u32], ids: &mut Ids, module: &mut Module) {
     match (op, words) {
         (OP_NAME, [id, name @ ..]) => drop(ids.names.insert(*id, text(name))),
         (OP_MEMBER_NAME, [id, at, name @ ..]) => drop(ids.members.insert((*id, *at), text(name))),
+        (OP_CAPABILITY, [capability]) => module.capabilities.push(*capability),
         (OP_EXECUTION_MODE, [_, LOCAL_SIZE, x, y, z]) => module.local_size = [*x, *y, *z],
         (OP_TYPE_STRUCT, [id, members @ ..]) => drop(ids.struct_sizes.insert(*id, members.len())),
         (OP_TYPE_POINTER, [id, _, pointee]) => drop(ids.pointees.insert(*id, *pointee)),

@@ -2,7 +2,7 @@
 
 use sha2::{Digest, Sha256};
 use splat_shaders::reflect::{Module, module};
-use splat_shaders::{Access, Kernel, kernels, layouts};
+use splat_shaders::{Access, Kernel, SubgroupOps, kernels, layouts};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -25,6 +25,20 @@ fn every_kernel_is_what_its_module_says() {
         assert_eq!(read_only, declared, "{}: who writes what", kernel.name);
         assert_eq!(4 * module.push_members, kernel.push_bytes as usize, "{}: push constants", kernel.name);
         assert!(kernel.push_bytes <= 128, "{}: every device takes 128 bytes", kernel.name);
+    }
+}
+
+#[test]
+fn every_kernel_says_what_it_does_across_subgroups() {
+    // GroupNonUniform: of any kind, votes, sums, ballots, shuffles, and what nothing here declares.
+    let [any, vote, sums, ballot, shuffle, others] = [61, 62, 63, 64, 65, 66];
+    for kernel in kernels::ALL {
+        let asked = reflected(kernel).capabilities;
+        let has = |capability| asked.contains(&capability);
+        let ops = SubgroupOps { ballot: has(ballot), shuffle: has(shuffle), arithmetic: has(sums) };
+        assert_eq!(kernel.subgroup_ops, ops, "{}", kernel.name);
+        assert!(!has(vote) && (others..=68).all(|other| !has(other)), "{}", kernel.name);
+        assert!(!has(any) || ops != SubgroupOps::NONE, "{}", kernel.name);
     }
 }
 

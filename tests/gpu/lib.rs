@@ -9,7 +9,9 @@ mod wrapped;
 
 pub use wrapped::{Interface, Loss, Wrapped};
 
-use splat_shaders::{Adapter, Backend, Choice, DeviceError, Executor, Inputs, Ready, Recording, Run, Validation};
+use splat_shaders::{
+    Adapter, Backend, Choice, DeviceError, Executor, Inputs, Lanes, Ready, Recording, Run, Validation,
+};
 use std::sync::Arc;
 
 /// A device by the executor that the environment names.
@@ -67,6 +69,13 @@ impl Device {
     /// The adapter that was opened.
     pub fn adapter(&self) -> &Adapter {
         self.executor.adapter()
+    }
+
+    /// The portable kernels, and those by subgroups where the device has them.
+    pub fn lanes(&self) -> Vec<Lanes> {
+        let mut lanes = vec![Lanes::Portable, Lanes::of(self.adapter())];
+        lanes.dedup();
+        lanes
     }
 
     /// As the executor's.

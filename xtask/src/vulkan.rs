@@ -25,8 +25,15 @@ struct Parts {
     spirv_val: PathBuf,
 }
 
+/// Bits of a vector that lavapipe is told to compute with, and so 4 and 16 threads of a subgroup; by itself it takes 8.
+const VECTORS: [&str; 2] = ["128", "512"];
+
+/// The tests of what works across the threads of a subgroup.
+const ACROSS: [&str; 2] = ["kernels::", "order::"];
+
 /// Finds or installs the parts, then checks modules and runs the conformance tests: by `gpu-ash` under synchronization
-/// and under GPU-assisted validation, by `gpu-wgpu` under synchronization validation.
+/// and under GPU-assisted validation, by `gpu-wgpu` under synchronization validation; and those of sorts and scans with
+/// subgroups of other sizes.
 pub(crate) fn run(repo: &Repo) -> Outcome {
     let path = std::env::var_os("PATH").unwrap_or_default();
     let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
@@ -39,7 +46,10 @@ pub(crate) fn run(repo: &Repo) -> Outcome {
     println!("lavapipe: {}\nvalidation: {}", parts.driver.display(), parts.layer.display());
     let modules = check_modules(repo, &parts.spirv_val)?;
     for (executor, validation) in [("ash", "synchronization"), ("ash", "gpu-assisted"), ("wgpu", "synchronization")] {
-        conformance(repo, &parts.driver, executor, validation)?;
+        conformance(repo, &parts.driver, [executor, validation], None)?;
+    }
+    for vector in VECTORS {
+        conformance(repo, &parts.driver, ["ash", "synchronization"], Some(vector))?;
     }
     Ok(format!("vulkan: {modules} modules valid, recordings conform on lavapipe without a message"))
 }
@@ -114,9 +124,21 @@ fn check_modules(repo: &Repo, spirv_val: &Path) -> Result<usize, String> {
     if modules.is_empty() { Err("no modules under shaders/spirv".to_owned()) } else { Ok(modules.len()) }
 }
 
-fn conformance(repo: &Repo, driver: &Path, executor: &str, validation: &str) -> Result<(), String> {
-    let line = format!("test --workspace --features {FEATURES},{DRIVER} --test conformance");
-    println!("$ cargo {line} (gpu-{executor}, {validation} validation)");
+/// Runs the conformance tests by an executor under a validation; with vectors of so many bits those of subgroups alone.
+fn conformance(
+    repo: &Repo,
+    driver: &Path,
+    [executor, validation]: [&str; 2],
+    vector: Option<&str>,
+) -> Result<(), String> {
+    let mut line = format!("test --workspace --features {FEATURES},{DRIVER} --test conformance");
+    if vector.is_some() {
+        line.push_str(&format!(" -- {}", ACROSS.join(" ")));
+    }
+    println!(
+        "$ cargo {line} (gpu-{executor}, {validation} validation, vectors of {} bits)",
+        vector.unwrap_or("native")
+    );
     let program = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let runtime = std::env::var_os("XDG_RUNTIME_DIR").unwrap_or_else(|| std::env::temp_dir().into());
     let ran = Command::new(program)
@@ -129,6 +151,7 @@ fn conformance(repo: &Repo, driver: &Path, executor: &str, validation: &str) -> 
         .env("ORGANZA_EXECUTOR", executor)
         .env("ORGANZA_ADAPTER", "llvmpipe")
         .env("ORGANZA_VALIDATION", validation)
+        .envs(vector.map(|bits| ("LP_NATIVE_VECTOR_WIDTH", bits)))
         .status();
     match ran {
         Ok(status) if status.success() => Ok(()),

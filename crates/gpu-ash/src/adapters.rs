@@ -3,7 +3,7 @@
 use crate::failure;
 use crate::instance::Instance;
 use ash::{khr, vk};
-use splat_shaders::{Adapter, AdapterKind, DeviceError, Validation};
+use splat_shaders::{Adapter, AdapterKind, DeviceError, SubgroupOps, Validation};
 
 /// A device before it is opened.
 pub(crate) struct Found {
@@ -59,6 +59,7 @@ fn describe(instance: &Instance, physical: vk::PhysicalDevice) -> Option<Found> 
         binding_bytes: u64::from(basic.limits.max_storage_buffer_range),
         subgroup: subgroup.subgroup_size,
         wide_atomics: wide_atomics(instance, physical),
+        subgroup_ops: subgroup_ops(&subgroup),
     };
     let tick_ns = if bits == 0 { 0.0 } else { f64::from(basic.limits.timestamp_period) };
     Some(Found { physical, family: family as u32, tick_ns, tick_mask: u64::MAX >> (64 - bits.clamp(1, 64)), adapter })
@@ -77,6 +78,18 @@ fn wide_atomics(instance: &Instance, physical: vk::PhysicalDevice) -> bool {
     unsafe { instance.raw.get_physical_device_features2(physical, &mut features) };
     let whole = features.features.shader_int64 == vk::TRUE;
     whole && atomics.shader_buffer_int64_atomics == vk::TRUE
+}
+
+/// What compute shaders can do across a subgroup.
+fn subgroup_ops(had: &vk::PhysicalDeviceSubgroupProperties<'_>) -> SubgroupOps {
+    use vk::SubgroupFeatureFlags as Ops;
+    let has =
+        |ops| had.supported_stages.contains(vk::ShaderStageFlags::COMPUTE) && had.supported_operations.contains(ops);
+    SubgroupOps {
+        ballot: has(Ops::BASIC | Ops::BALLOT),
+        shuffle: has(Ops::BASIC | Ops::SHUFFLE),
+        arithmetic: has(Ops::BASIC | Ops::ARITHMETIC),
+    }
 }
 
 fn version(v: u32) -> String {

@@ -1,6 +1,6 @@
 //! The adapters that wgpu finds.
 
-use splat_shaders::{Adapter, AdapterKind, DeviceError, Validation};
+use splat_shaders::{Adapter, AdapterKind, DeviceError, SubgroupOps, Validation};
 
 /// Features without which no recording runs.
 const NEEDED: wgpu::Features = wgpu::Features::IMMEDIATES;
@@ -40,10 +40,10 @@ const WIDE_ATOMICS: wgpu::Features = wgpu::Features::SHADER_INT64
     .union(wgpu::Features::SHADER_INT64_ATOMIC_MIN_MAX)
     .union(wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS);
 
-/// What is asked of an adapter: the needed features, clocks and 64-bit atomics where it has them.
+/// What is asked of an adapter: the needed features, clocks, subgroups and 64-bit atomics where it has them.
 pub(crate) fn features(adapter: &wgpu::Adapter) -> wgpu::Features {
     let wide = if adapter.features().contains(WIDE_ATOMICS) { WIDE_ATOMICS } else { wgpu::Features::empty() };
-    NEEDED | wide | (adapter.features() & wgpu::Features::TIMESTAMP_QUERY)
+    NEEDED | wide | (adapter.features() & (wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::SUBGROUP))
 }
 
 pub(crate) fn describe(adapter: &wgpu::Adapter) -> Adapter {
@@ -63,5 +63,11 @@ pub(crate) fn describe(adapter: &wgpu::Adapter) -> Adapter {
         binding_bytes: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
         subgroup: info.subgroup_min_size,
         wide_atomics: adapter.features().contains(WIDE_ATOMICS),
+        // It asks for all operations at once.
+        subgroup_ops: if adapter.features().contains(wgpu::Features::SUBGROUP) {
+            SubgroupOps::ALL
+        } else {
+            SubgroupOps::NONE
+        },
     }
 }

@@ -19,7 +19,21 @@ const MAY_KNOW: [(&str, &[&str]); 14] = [
         &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "splat-shaders", "gpu-ash", "gpu-wgpu"],
     ),
     ("organza-tests", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza"]),
-    ("organza-benches", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza"]),
+    (
+        "organza-benches",
+        &[
+            "splat-core",
+            "convert",
+            "tsm",
+            "hbsort",
+            "pbsr",
+            "reference",
+            "organza",
+            "splat-shaders",
+            "gpu-ash",
+            "gpu-wgpu",
+        ],
+    ),
     ("gpu-conformance", &["splat-core", "tsm", "hbsort", "pbsr", "splat-shaders", "gpu-ash", "gpu-wgpu", "organza"]),
     ("xtask", &[]),
 ];

@@ -64,8 +64,16 @@ mod tests {
     fn a_software_driver_is_named_as_one() {
         let listed = |backend, name: &str, kind, memory_bytes| {
             let (name, driver) = (name.to_owned(), "Vulkan 1.3.0".to_owned());
-            let adapter =
-                Adapter { name, driver, kind, memory_bytes, binding_bytes: 1 << 27, subgroup: 8, wide_atomics: true };
+            let adapter = Adapter {
+                name,
+                driver,
+                kind,
+                memory_bytes,
+                binding_bytes: 1 << 27,
+                subgroup: 8,
+                wide_atomics: true,
+                subgroup_ops: Default::default(),
+            };
             ListedDevice { backend, adapter }
         };
         let both =

@@ -102,8 +102,16 @@ mod tests {
 
     fn one(kind: AdapterKind, outcome: Result<Agreement, String>) -> Passport {
         let (name, driver) = ("X".to_owned(), "Vulkan 1.3.0".to_owned());
-        let adapter =
-            Adapter { name, driver, kind, memory_bytes: 0, binding_bytes: 1 << 27, subgroup: 8, wide_atomics: true };
+        let adapter = Adapter {
+            name,
+            driver,
+            kind,
+            memory_bytes: 0,
+            binding_bytes: 1 << 27,
+            subgroup: 8,
+            wide_atomics: true,
+            subgroup_ops: Default::default(),
+        };
         let passes = vec![KernelTime { kernel: "hbsort_scatter", dispatches: 4, nanoseconds: 2.5e6 }];
         let checked = Checked { recording: "order", items: 9, outcome, passes };
         Passport { backend: "ash", adapter, missing: vec!["timestamps"], recordings: vec![checked] }

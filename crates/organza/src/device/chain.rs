@@ -16,7 +16,7 @@ use splat_core::raster::gpu::{Attributes, Capacities, Counts, follow, project, r
 use splat_core::raster::{OpaqueImage, Params, RasterCounts};
 use splat_core::shade::{ChannelLayout, ShadeInput, gpu as shade};
 use splat_core::{Accumulator, Error, FootprintStack, Progress};
-use splat_shaders::{BufferId, DeviceError, Executor, Joined, PassTime, Recording, Run};
+use splat_shaders::{BufferId, DeviceError, Executor, Joined, Lanes, PassTime, Recording, Run};
 use tsm::gpu::{CastRoom, Casting};
 
 /// Splats, and what becomes of them.
@@ -191,10 +191,10 @@ fn run_on(
     let Some(mut casts) = shadows::rooms(splats.castings, &attributes, device.adapter().binding_bytes) else {
         return Ok(Outcome::TooLarge);
     };
-    let mut looked_up = None;
+    let (mut looked_up, lanes) = (None, Lanes::of(device.adapter()));
     loop {
         let whole = Whole::record(&rooms, &attributes, splats.input, splats.layout, sorts, &casts)?;
-        let mut ready = match device.prepare(&whole.recording) {
+        let mut ready = match device.prepare(&whole.recording.by(lanes)) {
             Err(DeviceError::TooLarge { .. } | DeviceError::Memory { .. }) => return Ok(Outcome::TooLarge),
             ready => ready?,
         };

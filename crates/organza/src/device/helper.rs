@@ -244,7 +244,7 @@ mod tests {
     use super::*;
     use splat_core::Projection;
     use splat_core::glam::DVec3;
-    use splat_shaders::{Adapter, AdapterKind, Ready, Recording};
+    use splat_shaders::{Adapter, AdapterKind, Ready, Recording, SubgroupOps};
     use std::sync::atomic::{AtomicU32, Ordering};
 
     /// Devices that can be opened so many times, and do nothing.
@@ -275,6 +275,7 @@ mod tests {
                 binding_bytes: 0,
                 subgroup: 0,
                 wide_atomics: false,
+                subgroup_ops: SubgroupOps::NONE,
             })))
         }
     }

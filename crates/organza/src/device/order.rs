@@ -5,7 +5,7 @@ use super::Failure;
 use hbsort::gpu::{Capacities, Sorted, join, record};
 use hbsort::{Params, SliceOrder};
 use splat_core::{Camera, Cloud};
-use splat_shaders::{DeviceError, Executor, PassTime};
+use splat_shaders::{DeviceError, Executor, Lanes, PassTime};
 
 /// Splats of a part that is not halved any more.
 const LEAST: u32 = 4096;
@@ -24,9 +24,10 @@ pub(super) fn order_on(
         0 => all,
         most => most.min(all),
     };
+    let lanes = Lanes::of(device.adapter());
     let (recorded, mut ready) = loop {
         let recorded = record(Capacities { splats, kept: splats });
-        match device.prepare(&recorded.recording) {
+        match device.prepare(&recorded.recording.by(lanes)) {
             Err(DeviceError::Memory { .. }) if splats > LEAST => splats = splats.div_ceil(2),
             ready => break (recorded, ready?),
         }

@@ -18,7 +18,7 @@ use pbsr::{
 use shadow::ShadowInput;
 use splat_core::glam::{DQuat, DVec3, Vec3};
 use splat_core::{Camera, Material, Mesh, Progress, Projection, Shading, Similarity, SliceOrder};
-use splat_shaders::{Adapter, Backend, Choice, DeviceError, Executor, PassTime, Validation};
+use splat_shaders::{Adapter, Backend, Choice, DeviceError, Executor, Lanes, PassTime, Validation};
 
 /// Splats that are ordered.
 const SPLATS: u32 = 1 << 17;
@@ -159,7 +159,11 @@ fn inspect(backend: &dyn Backend, place: usize, adapter: Adapter, input: &Inputs
         check("made particles", &mut |device| input.particles.check(device, Folding::default())),
     ];
     let clockless = recordings.iter().all(|r| r.outcome.is_ok() && r.passes.is_empty());
-    let missing = [(clockless, "timestamps"), (adapter.subgroup == 0, "the size of a subgroup")];
+    let missing = [
+        (clockless, "timestamps"),
+        (adapter.subgroup == 0, "the size of a subgroup"),
+        (Lanes::of(&adapter) == Lanes::Portable, "operations of subgroups"),
+    ];
     let missing = missing.into_iter().filter(|(lacks, _)| *lacks).map(|(_, what)| what).collect();
     Passport { backend: backend.name(), adapter, missing, recordings }
 }

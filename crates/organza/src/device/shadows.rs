@@ -2,7 +2,7 @@
 
 use super::Failure;
 use splat_core::{Receiver, Transmittance};
-use splat_shaders::{DeviceError, Executor, PassTime};
+use splat_shaders::{DeviceError, Executor, Lanes, PassTime};
 use tsm::gpu::{Batch, Capacities, Room, record, record_look_up};
 use tsm::{Deposits, Error, ShadowMap};
 
@@ -16,6 +16,7 @@ pub(super) fn map_on(
     deposits: &Deposits,
 ) -> Result<Option<(ShadowMap, Vec<PassTime>)>, Failure> {
     let mut most = Capacities::most(device.adapter().binding_bytes, deposits.channels() as u32);
+    let lanes = Lanes::of(device.adapter());
     let (batches, recorded, mut ready) = loop {
         let batches = match deposits.batches(most) {
             Err(Error::Overflow { .. }) => return Ok(None),
@@ -23,7 +24,7 @@ pub(super) fn map_on(
         };
         let largest = |number: fn(&Batch) -> u64| batches.iter().map(number).max().unwrap_or(0) as u32;
         let recorded = record(Capacities { entries: largest(Batch::entries), cells: largest(Batch::cells), ..most });
-        match device.prepare(&recorded.recording) {
+        match device.prepare(&recorded.recording.by(lanes)) {
             Err(DeviceError::Memory { .. }) if recorded.capacities.entries > LEAST => {
                 most.entries = recorded.capacities.entries.div_ceil(2);
             }

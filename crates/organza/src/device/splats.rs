@@ -4,7 +4,7 @@ use super::Failure;
 use splat_core::raster::gpu::{Counts, Input, TILE, record};
 use splat_core::raster::{Accumulation, RasterCounts};
 use splat_core::{Accumulator, Error};
-use splat_shaders::{AdapterKind, Executor, PassTime};
+use splat_shaders::{AdapterKind, Executor, Lanes, PassTime};
 
 /// Room for tile entries before their number is known: so many a splat, and these.
 const ENTRIES_OF_SPLAT: usize = 4;
@@ -43,11 +43,11 @@ pub(super) fn composite_on(
     input: &Input<'_>,
     accumulator: &mut Accumulator,
 ) -> Result<Option<(RasterCounts, Vec<PassTime>)>, Failure> {
-    let mut room = room_for(input.order.len());
+    let (mut room, lanes) = (room_for(input.order.len()), Lanes::of(device.adapter()));
     loop {
         let recorded = record(input.capacities(accumulator, room))?;
         let uploads = recorded.uploads(input, accumulator)?;
-        let run = device.prepare(&recorded.recording)?.run(&recorded.inputs(&uploads))?;
+        let run = device.prepare(&recorded.recording.by(lanes))?.run(&recorded.inputs(&uploads))?;
         match recorded.counts(run.bytes(recorded.state)) {
             // Too little room: found once, for the device says what it needs.
             Err(Error::Overflow { needed, .. }) if u32::try_from(needed).is_ok_and(|needed| needed > room) => {

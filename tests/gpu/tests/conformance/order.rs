@@ -5,7 +5,7 @@ use hbsort::gpu::{Capacities, join, record};
 use hbsort::{Direction, Error, Params, Scratch, SliceOrder, Thickness, slice_cloud};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Camera, Cloud, Projection, Splat, rng};
-use splat_shaders::{DeviceError, Validation};
+use splat_shaders::{DeviceError, Lanes, Validation};
 use std::time::Duration;
 
 fn cloud(n: u64, origin: DVec3) -> Cloud {
@@ -25,6 +25,7 @@ fn camera(origin: DVec3, projection: Projection) -> Camera {
     Camera::look_at(eye, origin - DVec3::Z, DVec3::Y, projection, [640, 360]).unwrap()
 }
 
+/// The order by the portable kernels, and the same by subgroups.
 fn on_device(
     device: &mut Device,
     capacities: Capacities,
@@ -33,10 +34,16 @@ fn on_device(
     camera: &Camera,
     params: &Params,
 ) -> Result<SliceOrder, Error> {
+    let lanes = device.lanes();
     let recorded = record(capacities);
     let uploads = recorded.uploads(cloud, ids, camera, params)?;
-    let run = device.run(&recorded.recording, &recorded.inputs(&uploads)).unwrap();
-    recorded.order([recorded.state, recorded.keys, recorded.places].map(|b| run.bytes(b)), cloud, ids, params)
+    let mut order = |lanes: Lanes| {
+        let run = device.run(&recorded.recording.by(lanes), &recorded.inputs(&uploads)).unwrap();
+        recorded.order([recorded.state, recorded.keys, recorded.places].map(|b| run.bytes(b)), cloud, ids, params)
+    };
+    let found = lanes.iter().map(|lanes| order(*lanes)).collect::<Vec<_>>();
+    assert!(found.windows(2).all(|w| w[0] == w[1]), "by subgroups it is another");
+    found.into_iter().next().unwrap()
 }
 
 const VIEWS: [Projection; 2] = [Projection::Perspective { fov_y: 0.8 }, Projection::Orthographic { height: 12.0 }];

@@ -1,0 +1,8 @@
+#version 450
+#extension GL_KHR_shader_subgroup_arithmetic : require
+// As `scan_spine`, by sums of subgroups.
+
+#include "blocks.glsl"
+#include "layouts.glsl"
+#include "subgroup_scan.glsl"
+#include "scan_spine.glsl"
