@@ -102,6 +102,7 @@ mod tests {
             subgroup: 8,
             wide_atomics: false,
             subgroup_ops,
+            drawing: Default::default(),
         }
     }
 

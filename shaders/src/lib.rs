@@ -25,24 +25,28 @@ mod barriers;
 mod batches;
 mod check;
 mod device;
+mod draw;
 mod join;
 pub mod kernels;
 mod lanes;
 mod layout;
 pub mod layouts;
+pub mod programs;
 pub mod radix;
 mod recording;
 pub mod reflect;
 mod snapshot;
 
-pub use barriers::{Barrier, Use, barriers};
+pub use barriers::{Barrier, Resource, Use, barriers};
 pub use batches::{LONGEST, batches};
 pub use check::Fault;
 pub use device::{
-    Adapter, AdapterKind, Backend, Choice, DeviceError, Executor, Inputs, PassTime, Ready, Run, Validation,
+    Adapter, AdapterKind, Backend, Choice, DeviceError, Drawing, Executor, Inputs, PassTime, Ready, Run, Validation,
 };
+pub use draw::{Blend, Corners, Draw, Format, Image, ImageId, Target};
 pub use join::Joined;
 pub use kernels::{Access, Kernel};
 pub use lanes::{Lanes, SubgroupOps};
 pub use layout::{Field, GlslType, Layout};
+pub use programs::Program;
 pub use recording::{Buffer, BufferId, Dispatch, Groups, Recording, Step};

@@ -36,6 +36,7 @@ mod instance;
 #[cfg(feature = "losing")]
 mod losing;
 mod memory;
+mod pass;
 mod pipeline;
 mod prepared;
 

@@ -18,6 +18,7 @@
 mod adapters;
 mod backend;
 mod device;
+mod drawing;
 mod prepared;
 
 pub use adapters::adapters;

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use glam::{DVec3, Vec3};
+use splat_core::raster::gpu::draw::{self, Precision};
 use splat_core::raster::gpu::{AttributeRoom, Capacities, Input, follow, project, record, resolve};
 use splat_core::raster::{self, Accumulation, OpaqueImage, Params, Projected};
 use splat_core::shade::{ChannelLayout, gpu as shade};
@@ -25,6 +26,45 @@ const ROOM: Capacities = Capacities {
 fn it_is_as_kept_in_text() {
     let found = record(ROOM).unwrap().recording.to_string();
     assert_eq!(found, include_str!("recording.txt"), "now:\n{found}");
+    let found = draw::record(ROOM, Precision::Single).unwrap().recording.to_string();
+    assert_eq!(found, include_str!("recording_draw.txt"), "now:\n{found}");
+}
+
+#[test]
+fn every_channel_is_drawn_once_with_the_plane_that_hides_it() {
+    for (planes, channels) in [(1, 1), (1, 3), (1, 4), (1, 13), (3, 1), (3, 3), (3, 4), (3, 5), (3, 13)] {
+        let found = draw::follow(Capacities { planes, channels, ..ROOM }, Precision::Half).unwrap();
+        let text = found.recording.to_string();
+        assert!(found.sorted.is_some() && text.contains("splat_follow 1x1x1 sorted view*\n"));
+        let resolved = text.lines().filter(|line| line.starts_with("splat_drawn"));
+        let push = |line: &str| -> Vec<u32> {
+            let words: Vec<u32> = line.split(' ').filter_map(|word| word.parse().ok()).collect();
+            words[words.len() - 8..].to_vec()
+        };
+        let draws: Vec<Vec<u32>> = resolved.map(push).collect();
+        let mut seen = vec![0; channels as usize];
+        for draw in &draws {
+            for &c in draw[1..4].iter().filter(|c| **c != u32::MAX) {
+                let threes = channels / 3 * 3;
+                let expected = if planes == 1 {
+                    0
+                } else if c < threes {
+                    c % 3
+                } else {
+                    1
+                };
+                assert_eq!(draw[0], expected, "{planes} {channels} {draw:?}");
+                seen[c as usize] += 1;
+            }
+            assert_eq!(draw[6], 1, "halves");
+        }
+        assert!(seen.iter().all(|n| *n == 1), "{planes} {channels}: {draws:?}");
+        // A plane is complete once, with its last draw.
+        for plane in 0..planes {
+            let of: Vec<u32> = draws.iter().filter(|d| d[0] == plane).map(|d| d[7]).collect();
+            assert_eq!((of.iter().sum::<u32>(), of.last()), (1, Some(&1)), "{planes} {channels}");
+        }
+    }
 }
 
 #[test]
@@ -34,6 +74,8 @@ fn it_is_without_fault_for_any_room() {
             for (planes, channels) in [(1, 1), (1, 3), (3, 13)] {
                 let room = Capacities { size, planes, channels, ordered, entries, opaque: false, ..ROOM };
                 record(room).unwrap().recording.check().unwrap();
+                draw::record(room, Precision::Single).unwrap().recording.check().unwrap();
+                draw::follow(room, Precision::Half).unwrap().recording.check().unwrap();
             }
         }
     }
@@ -49,6 +91,7 @@ fn what_no_kernel_does_is_refused() {
         Capacities { channels: 14, ..ROOM },
     ] {
         assert!(matches!(record(room), Err(Error::Invalid { .. })), "{room:?}");
+        assert!(matches!(draw::record(room, Precision::Single), Err(Error::Invalid { .. })), "{room:?}");
     }
 }
 

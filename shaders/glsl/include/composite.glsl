@@ -17,45 +17,6 @@ layout(set = 0, binding = 7, std430) buffer Bound7 { uint planes[]; };
 shared vec4 batch_extinction[BATCH];
 shared uint busy;
 
-struct Pixel {
-    uvec2 at;
-    // 1/|d|^2 of the ray, 1 for parallel rays.
-    float ray_factor;
-    // Depth of the opaque surface, and whether there is one.
-    float solid;
-    bool hidden;
-};
-
-precise float ray_factor_of(uvec2 at) {
-    if (view.focal == 0.0) {
-        return 1.0;
-    }
-    precise vec2 d = (vec2(at) + 0.5 - view.middle) / view.focal;
-    precise float length_sq = 1.0 + d.x * d.x + d.y * d.y;
-    return 1.0 / length_sq;
-}
-
-bool is_medium(uint k) {
-    return batch_look[k] >> 8 == MEDIUM;
-}
-
-// Optical depth of splat k of the batch on the pixel.
-precise float optical_depth(uint k, Pixel pixel) {
-    bool medium = is_medium(k);
-    precise vec2 d = offset_of(k, pixel.at);
-    precise float s = distance_sq(k, d);
-    precise float scaled = medium ? s * pixel.ray_factor : s;
-    precise float tau = amount_of(k, scaled);
-    if (pixel.hidden) {
-        if (medium) {
-            tau *= share_in_front((pixel.solid - batch_peak[k].z) * batch_slope[k].z);
-        } else {
-            tau = depth_of(k, d) < pixel.solid ? tau : 0.0;
-        }
-    }
-    return tau;
-}
-
 #ifdef LAYERS
 #include "depth_profile.glsl"
 
@@ -69,14 +30,14 @@ uint object_plane(uint area, uint at) {
 }
 
 // What a splat adds to the depths and the object of a pixel.
-void extras(uint k, Pixel pixel, vec2 thicknesses, inout Profile depths, inout uint object) {
+void extras(uint k, Shape s, Pixel pixel, vec2 thicknesses, inout Profile depths, inout uint object) {
     if (!(thicknesses.y > thicknesses.x)) {
         return;
     }
     if (view.depths != 0u) {
-        float spacing = uintBitsToFloat(tables[FOOTPRINT_VECTORS * (batch_look[k] & 255u) + 2u].w);
-        float thickness = is_medium(k) ? batch_peak[k].w * spacing : 0.0;
-        add_depth(depths, depth_of(k, offset_of(k, pixel.at)), thickness, thicknesses);
+        float spacing = uintBitsToFloat(tables[FOOTPRINT_VECTORS * (s.look & 255u) + 2u].w);
+        float thickness = is_medium(s) ? s.peak.w * spacing : 0.0;
+        add_depth(depths, depth_of(s, offset_of(s, pixel.at)), thickness, thicknesses);
     }
     if (view.objects != 0u && (view.back_to_front != 0u || object == NO_OBJECT)) {
         object = object_of(batch_ids[k]);
@@ -137,7 +98,7 @@ void main() {
         }
         if (lane < BATCH && begin + lane < end) {
             uint material = stage(lane, ids[begin + lane], corner);
-            batch_extinction[lane] = uintBitsToFloat(tables[FOOTPRINT_VECTORS * view.footprints + material]);
+            batch_extinction[lane] = extinction_of(material);
         }
         barrier();
         uint count = min(end - begin, BATCH);
@@ -145,7 +106,8 @@ void main() {
             if (!reaches(k, pixel.at)) {
                 continue;
             }
-            precise float tau = optical_depth(k, pixel);
+            Shape shape = shape_of(k);
+            precise float tau = optical_depth(shape, pixel);
             if (tau == 0.0) {
                 continue;
             }
@@ -176,7 +138,7 @@ void main() {
                 }
             }
 #ifdef LAYERS
-            extras(k, pixel, vec2(nearer, depth[middle]), depths, object);
+            extras(k, shape, pixel, vec2(nearer, depth[middle]), depths, object);
 #endif
         }
         bool clear = false;

@@ -41,9 +41,10 @@ void main() {
         barrier();
         uint count = min(end - begin, BATCH);
         for (uint k = 0u; k < count; k++) {
-            vec2 d = offset_of(k, pixel);
-            if (reaches(k, pixel) && distance_sq(k, d) < CORE) {
-                nearest = min(nearest, depth_of(k, d));
+            Shape shape = shape_of(k);
+            vec2 d = offset_of(shape, pixel);
+            if (reaches(k, pixel) && distance_sq(shape, d) < CORE) {
+                nearest = min(nearest, depth_of(shape, d));
             }
         }
     }
@@ -65,15 +66,16 @@ void main() {
             if (nearest == FAR || !reaches(k, pixel)) {
                 continue;
             }
-            vec2 d = offset_of(k, pixel);
-            float s = distance_sq(k, d);
-            float z = depth_of(k, d);
+            Shape shape = shape_of(k);
+            vec2 d = offset_of(shape, pixel);
+            float s = distance_sq(shape, d);
+            float z = depth_of(shape, d);
             // Of several at the same depth the first.
             if (view.objects != 0u && object == 0xffffffffu && s < CORE && z == nearest) {
                 object = object_of(batch_ids[k]);
             }
             precise float behind = z - nearest;
-            float weight = behind < EPSILON_Z * batch_peak[k].w ? amount_of(k, s) : 0.0;
+            float weight = behind < EPSILON_Z * shape.peak.w ? amount_of(shape, s) : 0.0;
             weights += weight;
             precise float moved = weight * behind;
             behind_sum += moved;

@@ -28,13 +28,16 @@ const MAY_KNOW: [(&str, &[&str]); 14] = [
             "hbsort",
             "pbsr",
             "reference",
-            "organza",
             "splat-shaders",
             "gpu-ash",
             "gpu-wgpu",
+            "organza",
         ],
     ),
-    ("gpu-conformance", &["splat-core", "tsm", "hbsort", "pbsr", "splat-shaders", "gpu-ash", "gpu-wgpu", "organza"]),
+    (
+        "gpu-conformance",
+        &["splat-core", "tsm", "hbsort", "pbsr", "reference", "splat-shaders", "gpu-ash", "gpu-wgpu", "organza"],
+    ),
     ("xtask", &[]),
 ];
 

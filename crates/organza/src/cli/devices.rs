@@ -73,6 +73,7 @@ mod tests {
                 subgroup: 8,
                 wide_atomics: true,
                 subgroup_ops: Default::default(),
+                drawing: Default::default(),
             };
             ListedDevice { backend, adapter }
         };

@@ -5,6 +5,7 @@ mod canary;
 mod chained;
 mod composited;
 mod deposits;
+mod drawn;
 mod generated;
 mod kernels;
 mod layered;

@@ -22,7 +22,7 @@ pub(super) struct ListRoom {
 
 /// Buffers of a list.
 pub(super) struct List {
-    pub(super) state: BufferId,
+    state: BufferId,
     places: Scanned,
     sort: BufferId,
     digits: Scanned,
@@ -33,10 +33,10 @@ pub(super) struct List {
 }
 
 impl List {
-    pub(super) fn scratch(r: &mut Recording, room: &ListRoom) -> Self {
+    /// With its counts in `state`.
+    pub(super) fn scratch(r: &mut Recording, room: &ListRoom, state: BufferId) -> Self {
         let words = |n: u32| 4 * u64::from(n);
         let ListRoom { tiles, ordered, entries } = *room;
-        let state = r.scratch("state", size_of::<SplatState>() as u64);
         let places = Scanned::scratch(r, ["place scan", "places", "place sums"], ordered);
         let sort = r.scratch("sort", size_of::<SortState>() as u64);
         let digits = Scanned::scratch(r, ["digit scan", "digits", "digit sums"], 256 * entries.div_ceil(SORT_BLOCK));
@@ -73,11 +73,11 @@ impl List {
 /// What a device did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
-    /// Splats that reach a tile.
+    /// Splats that reach a tile; of a [`draw`](super::draw), those of the order.
     pub splats: u64,
-    /// Pairs of a splat and a tile that it reaches.
+    /// Pairs of a splat and a tile that it reaches; of a draw, splats of the order.
     pub entries: u64,
-    /// Those of the tile that has most: as many splats one thread folds in a row.
+    /// Those of the tile that has most: as many splats one thread folds in a row. 0 of a draw, which does not count.
     pub longest: u64,
 }
 
@@ -89,13 +89,13 @@ impl Counts {
         Self { splats, entries, longest: self.longest.max(other.longest) }
     }
 
-    /// From the bytes of a [`SplatState`], of a list with so much room.
-    pub(super) fn read(state: &[u8], room: u32) -> Result<Self, Error> {
+    /// From the bytes of a [`SplatState`]; what is counted has so much room.
+    pub(super) fn read(state: &[u8], (what, room): (&'static str, u32)) -> Result<Self, Error> {
         let (attribute, found, expected) = ("state read back", state.len(), size_of::<SplatState>());
         let bytes = state.get(..expected).ok_or(Error::ColumnLength { attribute, found, expected })?;
         let state: SplatState = bytemuck::pod_read_unaligned(bytes);
         let entries = u64::from(state.entries_low) | u64::from(state.entries_high) << 32;
-        super::fits("tile entries", entries, room)?;
+        super::fits(what, entries, room)?;
         Ok(Self { splats: state.splats.into(), entries, longest: state.longest.into() })
     }
 }
