@@ -17,6 +17,7 @@ layout(set = 0, binding = 7, std430) buffer Bound7 { uint sums[]; };
 layout(push_constant) uniform Push { uint level; } push;
 
 #include "sums.glsl"
+#include "shown.glsl"
 
 void main() {
     uint i = block_index() * 256u + gl_LocalInvocationIndex;

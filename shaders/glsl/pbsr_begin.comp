@@ -1,5 +1,5 @@
 #version 450
-// Sums before any set was added: hits, three 64-bit sums and one of squares a pixel, 9 words.
+// Sums before any set was added: hits, a 64-bit sum of each number that a hit brings, and one of squares a pixel.
 
 #include "blocks.glsl"
 #include "layouts.glsl"
@@ -10,8 +10,9 @@ layout(set = 0, binding = 1, std430) buffer Bound1 { uint sums[]; };
 void main() {
     uint pixel = block_index() * 256u + gl_LocalInvocationIndex;
     if (pixel < view.pixels) {
-        for (uint w = 0u; w < 9u; w++) {
-            sums[9u * pixel + w] = 0u;
+        uint words = 3u + 2u * view.channels;
+        for (uint w = 0u; w < words; w++) {
+            sums[words * pixel + w] = 0u;
         }
     }
 }

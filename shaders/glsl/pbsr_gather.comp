@@ -16,6 +16,7 @@ layout(set = 0, binding = 6, std430) buffer Bound6 { uint sums[]; };
 layout(push_constant) uniform Push { uint level; } push;
 
 #include "sums.glsl"
+#include "shown.glsl"
 
 void main() {
     uint pixel = block_index() * 256u + gl_LocalInvocationIndex;

@@ -39,6 +39,22 @@ impl Recording {
     /// of `self`: it is as large as the larger, and what `self` leaves there is what `other` finds, instead of an
     /// upload. Other uploads come with those of `self`, before every dispatch.
     pub fn join(&mut self, other: &Recording, shared: &[(BufferId, BufferId)]) -> Joined {
+        let joined = self.join_uploads(other, shared);
+        for step in &other.steps {
+            match step {
+                Step::Upload(_) => {}
+                Step::Read(buffer) => self.read(joined.of(*buffer)),
+                Step::Dispatch(dispatch) => self.steps.push(Step::Dispatch(moved(dispatch, &joined))),
+                Step::Draw(draw) => self.steps.push(Step::Draw(moved_draw(draw, &joined))),
+                Step::Copy { image, buffer } => self.copy(joined.image(*image), joined.of(*buffer)),
+            }
+        }
+        joined
+    }
+
+    /// Adds the buffers and uploads of `other` as [`Recording::join`] does, and none of its other steps:
+    /// [`Recording::join_dispatches`] adds those it starts, as often as they are wanted.
+    pub fn join_uploads(&mut self, other: &Recording, shared: &[(BufferId, BufferId)]) -> Joined {
         let mut places = Vec::with_capacity(other.buffers.len());
         for (at, buffer) in (0u32..).zip(&other.buffers) {
             let known = shared.iter().find(|(of, _)| of.0 == at).map(|(_, to)| *to);
@@ -51,19 +67,24 @@ impl Recording {
         self.images.extend_from_slice(&other.images);
         let mut uploads = self.steps.iter().take_while(|step| matches!(step, Step::Upload(_))).count();
         for step in &other.steps {
-            match step {
-                Step::Upload(buffer) if shared.iter().any(|(of, _)| of == buffer) => {}
-                Step::Upload(buffer) => {
-                    self.steps.insert(uploads, Step::Upload(joined.of(*buffer)));
-                    uploads += 1;
-                }
-                Step::Read(buffer) => self.read(joined.of(*buffer)),
-                Step::Dispatch(dispatch) => self.steps.push(Step::Dispatch(moved(dispatch, &joined))),
-                Step::Draw(draw) => self.steps.push(Step::Draw(moved_draw(draw, &joined))),
-                Step::Copy { image, buffer } => self.copy(joined.image(*image), joined.of(*buffer)),
+            if let Step::Upload(buffer) = step
+                && !shared.iter().any(|(of, _)| of == buffer)
+            {
+                self.steps.insert(uploads, Step::Upload(joined.of(*buffer)));
+                uploads += 1;
             }
         }
         joined
+    }
+
+    /// Adds the dispatches of `other`, whose buffers were joined before, each over these workgroups instead of its own: those
+    /// of items whose number a dispatch before has found.
+    pub fn join_dispatches(&mut self, other: &Recording, joined: &Joined, groups: Groups) {
+        let dispatches = other.steps.iter().filter_map(|step| match step {
+            Step::Dispatch(dispatch) => Some(Step::Dispatch(Dispatch { groups, ..moved(dispatch, joined) })),
+            _ => None,
+        });
+        self.steps.extend(dispatches);
     }
 
     /// Reads back these buffers alone, of those that are read.
@@ -139,6 +160,32 @@ read sums
         let inputs: Vec<_> = joined.inputs([(of[0], &[1u8; 8][..]), (of[2], &[])]).map(|(b, _)| b).collect();
         assert_eq!(inputs, [scan, joined.of(of[2])]);
         assert_eq!(numbers.index(), 1);
+    }
+
+    #[test]
+    fn dispatches_are_repeated_on_the_same_buffers() {
+        let (mut whole, [scan, _, sums]) = reduced(64);
+        let (other, of) = reduced(128);
+        let joined = whole.join_uploads(&other, &[(of[0], scan)]);
+        for offset in [0, 4] {
+            whole.join_dispatches(&other, &joined, Groups::Indirect { buffer: sums, offset });
+        }
+        let text = "\
+buffer  0 scan             8 bytes
+buffer  1 numbers          64 bytes
+buffer  2 sums             16 bytes
+buffer  3 numbers          128 bytes
+buffer  4 sums             16 bytes
+upload scan
+upload numbers
+upload numbers
+scan_reduce numbers@4 scan numbers sums*
+read sums
+scan_reduce sums@0 scan numbers sums*
+scan_reduce sums@4 scan numbers sums*
+";
+        assert_eq!(whole.to_string(), text);
+        whole.check().expect("no fault");
     }
 
     #[test]

@@ -151,6 +151,17 @@ kernels! {
     PBSR_NEAREST = "pbsr_nearest" [Read, Read, Read, Read, Write] push 4 wide true;
     /// Adds who is seen of each pixel: view, objects, sets, particles, limits, keys → sums. Push: level.
     PBSR_GATHER = "pbsr_gather" [Read, Read, Read, Read, Read, Write, Write] push 4;
+    /// Who is seen on the pixels of a part: view, sets, limits, nearest, winners → found, seen. Push: level, first pixel, place
+    /// of the part among what is found.
+    PBSR_SEE = "pbsr_see" [Read, Read, Read, Read, Read, Write, Write] push 12;
+    /// The same, and pixels ready for the next set: view, sets, limits → keys, found, seen. Push: as before.
+    PBSR_SEE_WIDE = "pbsr_see_wide" [Read, Read, Read, Write, Write, Write] push 12;
+    /// Where those lie that are seen: view, objects, particles, found, seen → positions, frames. Push: place of the part.
+    PBSR_PLACE = "pbsr_place" [Read, Read, Read, Read, Read, Write, Write] push 4;
+    /// How they look: objects, particles, found, seen → radii, looks, shares of shadows. Push: place of the part.
+    PBSR_LOOK = "pbsr_look" [Read, Read, Read, Read, Write, Write, Write] push 4;
+    /// Adds what was shaded: view, found, seen, values → sums. Push: place of the part.
+    PBSR_SUM = "pbsr_sum" [Read, Read, Read, Read, Write] push 4;
     /// How many arrivals each chunk of each set has: source, tables → arrivals, counts.
     PBSR_ARRIVE = "pbsr_arrive" [Read, Read, Write, Write];
     /// Where each set begins, and what was found: source, scan, scanned counts → sets, found. Push: room for all sets, room

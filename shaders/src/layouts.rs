@@ -193,12 +193,18 @@ layouts! {
         pub rotation_z: [f32; 4],
         /// Radiance that it emits.
         pub emission: [f32; 4],
-        /// s·f² in view units, first number.
+        /// s·f² in view units; radius near lights and in shadows; kind of splat; share of a shadow that is received.
         pub share: [f32; 4],
     }
 
     /// The image that particles are projected on.
     pub struct ParticleView {
+        /// First axis of the view in the world; the fourth number is unused.
+        pub world_x: [f32; 4],
+        /// Second axis.
+        pub world_y: [f32; 4],
+        /// The view's direction.
+        pub world_z: [f32; 4],
         /// Half the size, pixels.
         pub middle: [f32; 2],
         /// Width and height, pixels.
@@ -213,8 +219,12 @@ layouts! {
         pub columns: u32,
         /// Pixels of all tiles.
         pub pixels: u32,
-        /// Nothing.
-        pub unused: u32,
+        /// Pixels of a part, whose particles are lit at once.
+        pub at_once: u32,
+        /// Numbers that a hit brings.
+        pub channels: u32,
+        /// Those of them that are light.
+        pub light_channels: u32,
     }
 
     /// A sampler whose sets the device makes itself.

@@ -1,12 +1,12 @@
 //! The GPU beside the processor: the passes that have a recording run there when the user asks for it.
 //!
 //! Today that is the lists of shadow maps (`tsm::gpu`), the order of translucent splats (`hbsort::gpu`), in exact mode, and
-//! the making (on meshes and in volumes), projection and average of particles that are shown as they are (`pbsr::gpu`). Whatever the device cannot do the
-//! processor does, with one line said. Lists and order are the processor's bit for bit: a device that would round otherwise
-//! is found out by a trial before it is used. Sets of particles are the processor's too, up to a pixel in a thousand (see
-//! `pbsr::gpu`). Who allows 10⁻⁵ of difference lets the device look shadows up (`tsm::gpu`) and composite splats as well:
-//! from their attributes to the picture by one joined recording, or, where that does not fit or is not all the device's,
-//! splats that the processor has projected and shaded (`splat_core::raster::gpu`).
+//! the making (on meshes and in volumes), projection, light and average of particles (`pbsr::gpu`). Whatever the device cannot do
+//! the processor does, with one line said. Lists and order are the processor's bit for bit: a device that would round otherwise
+//! is found out by a trial before it is used. Sets of particles are the processor's too, up to a pixel in a thousand and
+//! 3·10⁻⁵ of a hit's light (see `pbsr::gpu`). Who allows 10⁻⁵ of difference lets the device look shadows up for splats
+//! (`tsm::gpu`) and composite them as well: from their attributes to the picture by one joined recording, or, where that does
+//! not fit or is not all the device's, splats that the processor has projected and shaded (`splat_core::raster::gpu`).
 
 mod chain;
 mod helper;
@@ -20,7 +20,7 @@ mod trial;
 use crate::Error;
 pub(crate) use chain::Splats;
 pub(crate) use helper::Helper;
-pub(crate) use particles::Folding;
+pub(crate) use particles::{Folding, Shadow};
 pub use passport::{Agreement, Checked, KernelTime, Passport, passport};
 pub(crate) use shadows::LookedUp;
 use splat_shaders::{Adapter, Backend, Choice, DeviceError};

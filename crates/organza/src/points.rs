@@ -104,8 +104,8 @@ impl Drawing<'_> {
     pub(crate) fn shining<'b>(
         &'b self,
         maps: &'b [Option<ShadowMap>],
-    ) -> impl Iterator<Item = (Light, Option<&'b dyn Transmittance>)> {
-        self.with_light(maps.iter().map(|map| map.as_ref().map(|m| m as &dyn Transmittance)))
+    ) -> impl Iterator<Item = (Light, Option<&'b ShadowMap>)> {
+        self.with_light(maps.iter().map(Option::as_ref))
     }
 
     /// Lights that have an intensity, each with what is there for it.

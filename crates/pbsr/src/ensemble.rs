@@ -57,6 +57,12 @@ impl EnsembleParams {
         self.channels() == 3 && self.depth_range.is_none() && !self.object && !self.colored_extinction
     }
 
+    /// Whether a hit brings nothing but numbers that are added up: no depth and no object, and it hides all channels alike.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn only_numbers(&self) -> bool {
+        self.depth_range.is_none() && !self.object && !self.colored_extinction
+    }
+
     /// Hits that a set can have in one pixel.
     pub(crate) fn hit_channels(&self) -> usize {
         if self.colored_extinction { 3 } else { 1 }

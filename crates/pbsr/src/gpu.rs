@@ -8,31 +8,35 @@
 //! ([`Nearest`]). Sums are the integers of [`Ensemble`], in its own order
 //! of pixels, so what comes back is added to an ensemble as sets that the CPU folded are.
 //!
+//! Where something is lit, or more is kept than beauty, who is seen is listed and shaded before it adds (`lit.rs`).
+//!
 //! Deviations from the CPU: equals are ordered by another permutation, which is as fair; k takes a square root and a
-//! division that a GPU may round otherwise, so a particle in a million is thinned out on one side alone. Only what is
-//! shown as it is ([`Shading::Unlit`]) is folded: shading by lights and shadows, effects apart and depths are the CPU's.
+//! division that a GPU may round otherwise, so a particle in a million is thinned out on one side alone. Depths, objects and
+//! extinction by channel are the CPU's.
 
 mod generate;
+mod lit;
 mod twin;
 
 pub use generate::{Generated, Inputs, record_generated};
+pub use lit::{Lighting, ShadowOf, suits};
+use lit::{Lit, Seen, Winners};
 pub(crate) use twin::{Maker, columns};
 pub use twin::{Sources, Twin};
 
 use crate::bins::{AREA, Tiling, thinning, thinning_key};
 use crate::error::check;
 use crate::project::Projector;
-use crate::{Ensemble, Error, KeptSets, Object, Particles, Sampler, Scene};
+use crate::{Ensemble, EnsembleParams, Error, KeptSets, Object, Particles, Sampler, Scene};
 use splat_core::{Shading, glam, rng};
 use splat_shaders::layouts::{ParticleObject, ParticleView};
 use splat_shaders::{Adapter, BufferId, Groups, Recording, kernels};
+use std::borrow::Cow;
 
 /// Threads of a workgroup.
 const BLOCK: u32 = 256;
 /// Words of a particle.
 const PARTICLE_WORDS: usize = 7;
-/// Words of a pixel's sums: hits, three sums, squares.
-const SUM_WORDS: usize = 9;
 
 /// What a recording makes room for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,6 +51,18 @@ pub struct Capacities {
     pub of_set: u32,
     /// Particles of all sets of a run together.
     pub particles: u32,
+}
+
+impl Capacities {
+    /// Pixels of all tiles.
+    fn pixels(&self) -> u32 {
+        (Tiling::new(self.size).tiles() * AREA) as u32
+    }
+}
+
+/// Words of a pixel's sums: hits, two for each number that a hit brings, squares.
+fn sum_words(params: &EnsembleParams) -> usize {
+    3 + 2 * params.channels()
 }
 
 /// How the nearest particle of a pixel is found; both find the same one.
@@ -76,6 +92,7 @@ pub struct Recorded {
     /// Read back: the sums of the sets of this run.
     pub sums: BufferId,
     inputs: [BufferId; 5],
+    lit: Option<Lit>,
 }
 
 /// The bytes of some sets.
@@ -83,17 +100,17 @@ pub struct Recorded {
 pub struct Uploads {
     /// Particles in them.
     pub particles: u64,
-    bytes: [Vec<u8>; 5],
+    bytes: Vec<Vec<u8>>,
 }
 
-/// Records the folding of sets with this room.
+/// Records the folding of sets with this room, of which nothing is lit and nothing kept but beauty, or as `lighting` says.
 ///
 /// # Errors
-/// [`Error::Parameter`] for a size out of range.
-pub fn record(capacities: Capacities, nearest: Nearest) -> Result<Recorded, Error> {
+/// [`Error::Parameter`] for a size out of range, and for an ensemble that keeps depths, objects or extinction by channel.
+pub fn record(capacities: Capacities, nearest: Nearest, lighting: Option<&Lighting<'_>>) -> Result<Recorded, Error> {
     let size = capacities.size;
     check(size.iter().all(|s| (1..=32768).contains(s)), "size", size, "1 to 32768 pixels a side")?;
-    let pixels = (Tiling::new(size).tiles() * AREA) as u32;
+    let pixels = capacities.pixels();
     let mut recording = Recording::default();
     let r = &mut recording;
     let words = |n: u32, each: usize| 4 * u64::from(n) * each as u64;
@@ -102,49 +119,81 @@ pub fn record(capacities: Capacities, nearest: Nearest) -> Result<Recorded, Erro
     let limits = r.input("limits", words(pixels, 1));
     let sets = r.input("sets", words(capacities.levels, 3));
     let particles = r.input("particles", words(capacities.particles, PARTICLE_WORDS));
-    let sums = r.scratch("sums", words(pixels, SUM_WORDS));
-    let all_pixels = Groups::cover(pixels.div_ceil(BLOCK));
-    r.dispatch(&kernels::PBSR_BEGIN, all_pixels, &[view, sums], &[]);
+    let params = lighting.map_or_else(EnsembleParams::default, |l| l.params);
+    let sums = r.scratch("sums", words(pixels, sum_words(&params)));
+    let lit = match lighting {
+        None => None,
+        Some(lighting) => {
+            let seen = Seen::record(r, &capacities);
+            let lit = Lit::record(r, &capacities, lighting, &seen)?;
+            Some((lighting, seen, lit))
+        }
+    };
+    r.dispatch(&kernels::PBSR_BEGIN, Groups::cover(pixels.div_ceil(BLOCK)), &[view, sums], &[]);
     let inputs = [view, objects, limits, sets, particles];
+    let levels = Levels { capacities: &capacities, inputs, sums, lit: lit.as_ref() };
     match nearest {
-        Nearest::Ranked => ranked(r, &capacities, pixels, inputs, sums),
-        Nearest::Wide => wide(r, &capacities, pixels, inputs, sums),
+        Nearest::Ranked => levels.ranked(r),
+        Nearest::Wide => levels.wide(r),
     }
     r.read(sums);
-    Ok(Recorded { recording, capacities, sums, inputs })
+    let lit = lit.map(|(.., lit)| lit);
+    Ok(Recorded { recording, capacities, sums, inputs, lit })
 }
 
-/// Workgroups over the particles of a set.
-fn over_set(capacities: &Capacities) -> Groups {
-    Groups::cover(capacities.of_set.div_ceil(BLOCK))
+/// What is dispatched level by level.
+struct Levels<'a> {
+    capacities: &'a Capacities,
+    inputs: [BufferId; 5],
+    sums: BufferId,
+    lit: Option<&'a (&'a Lighting<'a>, Seen, Lit)>,
 }
 
-/// Four dispatches a level.
-fn ranked(r: &mut Recording, capacities: &Capacities, pixels: u32, inputs: [BufferId; 5], sums: BufferId) {
-    let [view, objects, limits, sets, particles] = inputs;
-    let (all_pixels, set) = (Groups::cover(pixels.div_ceil(BLOCK)), over_set(capacities));
-    let footings = r.scratch("footings", 12 * u64::from(capacities.of_set));
-    let [nearest, winners] = ["nearest", "winners"].map(|name| r.scratch(name, 4 * u64::from(pixels)));
-    for level in 0..capacities.levels {
-        r.dispatch(&kernels::PBSR_CLEAR, all_pixels, &[view, limits, nearest, winners], &[]);
-        let projected = [view, objects, sets, particles, footings, nearest];
-        r.dispatch(&kernels::PBSR_PROJECT, set, &projected, &[level]);
-        r.dispatch(&kernels::PBSR_RANK, set, &[view, sets, limits, footings, nearest, winners], &[level]);
-        let added = [view, objects, sets, particles, footings, nearest, winners, sums];
-        r.dispatch(&kernels::PBSR_ADD, set, &added, &[level]);
+impl Levels<'_> {
+    /// Workgroups over all pixels, and over the particles of a set.
+    fn groups(&self) -> [Groups; 2] {
+        [self.capacities.pixels(), self.capacities.of_set].map(|n| Groups::cover(n.div_ceil(BLOCK)))
     }
-}
 
-/// Two dispatches a level.
-fn wide(r: &mut Recording, capacities: &Capacities, pixels: u32, inputs: [BufferId; 5], sums: BufferId) {
-    let [view, objects, limits, sets, particles] = inputs;
-    let (all_pixels, set) = (Groups::cover(pixels.div_ceil(BLOCK)), over_set(capacities));
-    let keys = r.scratch("keys", 8 * u64::from(pixels));
-    r.dispatch(&kernels::PBSR_KEYS, all_pixels, &[view, limits, keys], &[]);
-    for level in 0..capacities.levels {
-        r.dispatch(&kernels::PBSR_NEAREST, set, &[view, objects, sets, particles, keys], &[level]);
-        let gathered = [view, objects, sets, particles, limits, keys, sums];
-        r.dispatch(&kernels::PBSR_GATHER, all_pixels, &gathered, &[level]);
+    /// Four dispatches a level, or light in place of the last.
+    fn ranked(&self, r: &mut Recording) {
+        let [view, objects, limits, sets, particles] = self.inputs;
+        let ([all_pixels, set], pixels) = (self.groups(), u64::from(self.capacities.pixels()));
+        let footings = r.scratch("footings", 12 * u64::from(self.capacities.of_set));
+        let [nearest, winners] = ["nearest", "winners"].map(|name| r.scratch(name, 4 * pixels));
+        for level in 0..self.capacities.levels {
+            r.dispatch(&kernels::PBSR_CLEAR, all_pixels, &[view, limits, nearest, winners], &[]);
+            let projected = [view, objects, sets, particles, footings, nearest];
+            r.dispatch(&kernels::PBSR_PROJECT, set, &projected, &[level]);
+            r.dispatch(&kernels::PBSR_RANK, set, &[view, sets, limits, footings, nearest, winners], &[level]);
+            if !self.light(r, &Winners::Ranked([limits, nearest, winners]), level) {
+                let added = [view, objects, sets, particles, footings, nearest, winners, self.sums];
+                r.dispatch(&kernels::PBSR_ADD, set, &added, &[level]);
+            }
+        }
+    }
+
+    /// Two dispatches a level, or light in place of the second.
+    fn wide(&self, r: &mut Recording) {
+        let [view, objects, limits, sets, particles] = self.inputs;
+        let [all_pixels, set] = self.groups();
+        let keys = r.scratch("keys", 8 * u64::from(self.capacities.pixels()));
+        r.dispatch(&kernels::PBSR_KEYS, all_pixels, &[view, limits, keys], &[]);
+        for level in 0..self.capacities.levels {
+            r.dispatch(&kernels::PBSR_NEAREST, set, &[view, objects, sets, particles, keys], &[level]);
+            if !self.light(r, &Winners::Wide([limits, keys]), level) {
+                let gathered = [view, objects, sets, particles, limits, keys, self.sums];
+                r.dispatch(&kernels::PBSR_GATHER, all_pixels, &gathered, &[level]);
+            }
+        }
+    }
+
+    /// Lights a level, if anything is lit.
+    fn light(&self, r: &mut Recording, winners: &Winners, level: u32) -> bool {
+        let Some((lighting, seen, lit)) = self.lit else { return false };
+        let [view, objects, _, sets, particles] = self.inputs;
+        lit.record_level(r, lighting, [view, objects, sets, particles, self.sums], (seen, winners), level);
+        true
     }
 }
 
@@ -153,7 +202,8 @@ impl Recorded {
     ///
     /// # Errors
     /// [`Error::TooMuch`] when the recording has too little room: record again with what is needed.
-    /// [`Error::Parameter`] for sizes that differ, for an object that is lit, or an ensemble that keeps more than beauty.
+    /// [`Error::Parameter`] for sizes that differ, for an object that is lit, or an ensemble that keeps more than beauty, where
+    /// the recording was made for none.
     pub fn uploads(&self, scene: &Scene<'_>, ensemble: &Ensemble) -> Result<Uploads, Error> {
         let [view, objects, limits] = self.surroundings(scene, ensemble)?;
         let (mut sets, mut particles) = (Vec::new(), Vec::new());
@@ -169,7 +219,7 @@ impl Recorded {
         let sets = bytemuck::cast_slice(&sets).to_vec();
         let count = particles.len() as u64;
         let particles = bytemuck::cast_slice(&particles).to_vec();
-        Ok(Uploads { particles: count, bytes: [view, objects, limits, sets, particles] })
+        Ok(Uploads { particles: count, bytes: vec![view, objects, limits, sets, particles] })
     }
 
     /// The bytes of view, objects and limits.
@@ -177,19 +227,62 @@ impl Recorded {
         let size = self.capacities.size;
         check(scene.camera.size == size, "camera size", scene.camera.size, "the size of the recording")?;
         check(ensemble.size() == size, "ensemble size", ensemble.size(), "the size of the recording")?;
-        check(ensemble.params.only_beauty(), "ensemble", ensemble.params, "beauty alone")?;
-        let unlit = scene.objects.iter().all(|o| o.look.material.shading == Shading::Unlit);
-        check(unlit, "objects", "a lit one", "unlit ones")?;
+        match &self.lit {
+            Some(lit) => lit.check(ensemble)?,
+            None => check(is_shown(scene, ensemble.params()), "scene", "lit", "unlit objects, and beauty alone")?,
+        }
         room("objects", scene.objects.len(), self.capacities.objects)?;
-        let view = bytemuck::bytes_of(&view_of(scene, ensemble)).to_vec();
+        let view = bytemuck::bytes_of(&self.view_of(scene, ensemble)).to_vec();
         let objects: Vec<ParticleObject> = scene.objects.iter().map(|o| object_of(scene, o)).collect();
         let objects = bytemuck::cast_slice(&objects).to_vec();
         Ok([view, objects, limits(scene, &ensemble.tiling)?])
     }
 
-    /// The uploads with the buffers that they go to.
-    pub fn inputs<'a>(&self, uploads: &'a Uploads) -> [(BufferId, &'a [u8]); 5] {
-        std::array::from_fn(|k| (self.inputs[k], &uploads.bytes[k][..]))
+    /// The uploads of a run with the buffers that they go to; the first run takes [`Recorded::tables`] beside them.
+    pub fn inputs<'a>(&self, uploads: &'a Uploads) -> Inputs<'a> {
+        let bytes = uploads.bytes.iter().map(|bytes| Cow::Borrowed(&bytes[..]));
+        let nobody = self.lit.iter().map(|lit| lit.nobody()).map(|(buffer, bytes)| (buffer, Cow::Owned(bytes)));
+        nobody.chain(self.inputs.into_iter().zip(bytes)).collect()
+    }
+
+    /// What light needs and what stays as it is from run to run: give it to the first, beside the inputs of the shadows.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a scene that [`suits`] refuses, or of other lights than there is room for;
+    /// [`Error::Core`] for more objects.
+    pub fn tables(&self, scene: &Scene<'_>) -> Result<Inputs<'static>, Error> {
+        self.lit.as_ref().map_or_else(|| Ok(Vec::new()), |lit| lit.tables(scene))
+    }
+
+    /// The inputs of the `light`th shadow ([`Lighting::shadows`]) as those of this recording.
+    pub fn shadow_inputs<'a>(
+        &self,
+        light: usize,
+        inputs: impl IntoIterator<Item = (BufferId, &'a [u8])>,
+    ) -> impl Iterator<Item = (BufferId, Cow<'a, [u8]>)> {
+        let joined = self.lit.as_ref().and_then(|lit| lit.shadows.get(light));
+        let inputs = joined.map(|joined| joined.inputs(inputs));
+        inputs.into_iter().flatten().map(|(buffer, bytes)| (buffer, Cow::Borrowed(bytes)))
+    }
+
+    fn view_of(&self, scene: &Scene<'_>, ensemble: &Ensemble) -> ParticleView {
+        let size = scene.camera.size.map(|s| s as f32);
+        let [world_x, world_y, world_z] = scene.camera.axes.map(|axis| axis.as_vec3().extend(0.0).to_array());
+        ParticleView {
+            world_x,
+            world_y,
+            world_z,
+            middle: size.map(|s| 0.5 * s),
+            size,
+            focal: scene.camera.focal_px() as f32,
+            inverse_unit: 1.0 / ensemble.params.unit(),
+            orthographic: u32::from(scene.camera.is_orthographic()),
+            columns: ensemble.tiling.columns as u32,
+            pixels: ensemble.hits.len() as u32,
+            at_once: self.capacities.seen().splats,
+            channels: ensemble.params.channels() as u32,
+            light_channels: ensemble.params.light_channels() as u32,
+        }
     }
 
     /// Adds what was read back of [`Recorded::sums`] to the ensemble that the uploads were made for.
@@ -201,17 +294,24 @@ impl Recorded {
     }
 }
 
+/// Whether a scene's particles are shown as they are, and no more is kept than that.
+pub fn is_shown(scene: &Scene<'_>, params: &EnsembleParams) -> bool {
+    params.only_beauty() && scene.objects.iter().all(|o| o.look.material.shading == Shading::Unlit)
+}
+
 fn take_in(capacities: Capacities, sums: &[u8], ensemble: &mut Ensemble) -> Result<(), Error> {
     let mut more = Ensemble::new(capacities.size, &ensemble.params)?;
-    let (pixels, _) = sums.as_chunks::<{ 4 * SUM_WORDS }>();
+    let (channels, words) = (ensemble.params.channels(), sum_words(&ensemble.params));
+    let pixels = sums.chunks_exact(4 * words);
     check(pixels.len() >= more.hits.len(), "bytes read back", sums.len(), "the sums of all pixels")?;
     more.levels = capacities.levels;
-    for (k, pixel) in pixels.iter().enumerate().take(more.hits.len()) {
-        let words: [u32; SUM_WORDS] = bytemuck::pod_read_unaligned(pixel);
-        let long = |w: usize| u64::from(words[w]) | u64::from(words[w + 1]) << 32;
-        more.hits[k] = words[0];
-        (0..3).for_each(|c| more.sums[3 * k + c] = long(1 + 2 * c) as i64);
-        more.squares[k] = long(7);
+    let word = |pixel: &[u8], w: usize| bytemuck::pod_read_unaligned::<u32>(&pixel[4 * w..4 * w + 4]);
+    let long = |pixel: &[u8], w: usize| u64::from(word(pixel, w)) | u64::from(word(pixel, w + 1)) << 32;
+    for (k, pixel) in pixels.enumerate().take(more.hits.len()) {
+        more.hits[k] = word(pixel, 0);
+        let numbers = more.sums[channels * k..][..channels].iter_mut();
+        numbers.enumerate().for_each(|(c, sum)| *sum = long(pixel, 1 + 2 * c) as i64);
+        more.squares[k] = long(pixel, words - 2);
     }
     ensemble.merge(&more)
 }
@@ -239,7 +339,7 @@ fn sample(object: &Object<'_>, at: u32, set: u64, out: &mut Vec<[u32; PARTICLE_W
 fn object_of(scene: &Scene<'_>, object: &Object<'_>) -> ParticleObject {
     let (sampler, m) = (object.sampler, &object.look.material);
     let projector = Projector::new(scene.camera, sampler.origin(), &object.transform, sampler.cross_section());
-    let wide = |v: glam::Vec3| v.extend(0.0).to_array();
+    let (wide, kind) = (|v: glam::Vec3| v.extend(0.0).to_array(), object.look.kind as u8);
     let [linear_x, linear_y, linear_z] = columns(&projector.linear);
     let [rotation_x, rotation_y, rotation_z] = columns(&projector.rotation);
     ParticleObject {
@@ -251,21 +351,7 @@ fn object_of(scene: &Scene<'_>, object: &Object<'_>) -> ParticleObject {
         rotation_y,
         rotation_z,
         emission: wide(m.emission.into()),
-        share: [projector.share, 0.0, 0.0, 0.0],
-    }
-}
-
-fn view_of(scene: &Scene<'_>, ensemble: &Ensemble) -> ParticleView {
-    let size = scene.camera.size.map(|s| s as f32);
-    ParticleView {
-        middle: size.map(|s| 0.5 * s),
-        size,
-        focal: scene.camera.focal_px() as f32,
-        inverse_unit: 1.0 / ensemble.params.unit(),
-        orthographic: u32::from(scene.camera.is_orthographic()),
-        columns: ensemble.tiling.columns as u32,
-        pixels: ensemble.hits.len() as u32,
-        unused: 0,
+        share: [projector.share, object.look.radius, f32::from(kind), object.look.shadow_coefficient],
     }
 }
 

@@ -26,6 +26,7 @@ mod batches;
 mod casting;
 mod deposit;
 mod look_up;
+mod received;
 mod shadow;
 
 use crate::table::stop_of;
@@ -38,6 +39,7 @@ pub use batches::{Batch, Listed};
 pub use casting::Casting;
 pub use deposit::{CastRoom, CastUploads, RecordedCast, record_cast};
 pub use look_up::{MapUploads, ReceiverUploads, RecordedLookUp, Room, record_look_up};
+pub use received::{ReceivedUploads, RecordedReceived, record_received};
 pub use shadow::{RecordedMap, RecordedShadow, ShadowUploads, record_map, record_shadow};
 
 /// Threads of a workgroup.

@@ -46,6 +46,28 @@ uvec2 reached(float v, float half_px, float size) {
     return to > from ? uvec2(uint(from), uint(to)) : uvec2(0u);
 }
 
+// A particle in view: its view position, where it falls on the image, and the share of its pixel that it takes. Nothing but
+// the position of one that is not before the eye.
+struct Seen {
+    vec3 p;
+    vec2 at;
+    float k;
+};
+
+Seen seen_from_eye(uint word) {
+    vec3 offset = vec3(
+        uintBitsToFloat(particles[word]), uintBitsToFloat(particles[word + 1u]), uintBitsToFloat(particles[word + 2u]));
+    ParticleObject o = objects[particles[word + 6u]];
+    precise vec3 p = turned(o, offset) + o.translation.xyz;
+    if (!(p.z > 0.0)) {
+        return Seen(p, vec2(0.0), 0.0);
+    }
+    float inverse = view.orthographic != 0u ? 1.0 : 1.0 / p.z;
+    precise float x = view.middle.x + view.focal * p.x * inverse;
+    precise float y = view.middle.y - view.focal * p.y * inverse;
+    return Seen(p, vec2(x, y), share_of(o, p, inverse, particles[word + 3u]));
+}
+
 // Pixels that a particle reaches, from and to in each direction, and the bits of its depth: in front of the eye depths are
 // positive, so their bits sort as numbers.
 struct Footing {
@@ -55,27 +77,20 @@ struct Footing {
 };
 
 Footing footing_of(uint word) {
-    vec3 offset = vec3(
-        uintBitsToFloat(particles[word]), uintBitsToFloat(particles[word + 1u]), uintBitsToFloat(particles[word + 2u]));
-    ParticleObject o = objects[particles[word + 6u]];
-    precise vec3 p = turned(o, offset) + o.translation.xyz;
+    Seen seen = seen_from_eye(word);
     uvec2 columns = uvec2(0u);
     uvec2 rows = uvec2(0u);
-    if (p.z > 0.0) {
-        float inverse = view.orthographic != 0u ? 1.0 : 1.0 / p.z;
-        precise float x = view.middle.x + view.focal * p.x * inverse;
-        precise float y = view.middle.y - view.focal * p.y * inverse;
-        float k = share_of(o, p, inverse, particles[word + 3u]);
-        if (k > 1.0) {
-            float half_px = 0.5 * min(sqrt(k), WIDEST_PX);
-            columns = reached(x, half_px, view.size.x);
-            rows = reached(y, half_px, view.size.y);
-        } else if (x >= 0.0 && x < view.size.x && y >= 0.0 && y < view.size.y) {
-            if (k >= 1.0 || uintBitsToFloat(particles[word + 5u]) < k) {
-                columns = uvec2(uint(x), uint(x) + 1u);
-                rows = uvec2(uint(y), uint(y) + 1u);
+    if (seen.p.z > 0.0) {
+        if (seen.k > 1.0) {
+            float half_px = 0.5 * min(sqrt(seen.k), WIDEST_PX);
+            columns = reached(seen.at.x, half_px, view.size.x);
+            rows = reached(seen.at.y, half_px, view.size.y);
+        } else if (seen.at.x >= 0.0 && seen.at.x < view.size.x && seen.at.y >= 0.0 && seen.at.y < view.size.y) {
+            if (seen.k >= 1.0 || uintBitsToFloat(particles[word + 5u]) < seen.k) {
+                columns = uvec2(uint(seen.at.x), uint(seen.at.x) + 1u);
+                rows = uvec2(uint(seen.at.y), uint(seen.at.y) + 1u);
             }
         }
     }
-    return Footing(columns, rows, floatBitsToUint(p.z));
+    return Footing(columns, rows, floatBitsToUint(seen.p.z));
 }

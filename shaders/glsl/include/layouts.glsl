@@ -107,6 +107,9 @@ struct ParticleObject {
 };
 
 struct ParticleView {
+    vec4 world_x;
+    vec4 world_y;
+    vec4 world_z;
     vec2 middle;
     vec2 size;
     float focal;
@@ -114,7 +117,9 @@ struct ParticleView {
     uint orthographic;
     uint columns;
     uint pixels;
-    uint unused;
+    uint at_once;
+    uint channels;
+    uint light_channels;
 };
 
 struct ParticleSource {

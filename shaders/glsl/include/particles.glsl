@@ -8,6 +8,12 @@ const uint PARTICLE_WORDS = 7u;
 const uint HAS_NORMAL = 1u << 30;
 const uint PER_CROSSING = 1u << 31;
 
+// As `PackedColor::get`.
+vec3 unpack_color(uint packed) {
+    float scale = uintBitsToFloat(((packed >> 27) + 103u) << 23);
+    return vec3(float(packed & 511u), float((packed >> 9) & 511u), float((packed >> 18) & 511u)) * scale;
+}
+
 // A permutation of 32 bits.
 uint scramble(uint v) {
     v ^= v >> 16;
@@ -40,4 +46,10 @@ uint of_rank(uint rank, uint pixel, uint seed) {
 // Where a pixel stands: tiles of 64 by 64 one after the other, as `pbsr::bins::Tiling` has it.
 uint place_of(uint x, uint y, uint columns) {
     return ((y >> 6) * columns + (x >> 6)) * 4096u + (y & 63u) * 64u + (x & 63u);
+}
+
+// The pixel in a place.
+uvec2 pixel_at(uint place, uint columns) {
+    uint tile = place >> 12;
+    return uvec2((tile % columns) * 64u + (place & 63u), (tile / columns) * 64u + ((place >> 6) & 63u));
 }

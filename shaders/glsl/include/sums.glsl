@@ -1,10 +1,4 @@
-// What the particle that is seen on a pixel adds; as `pbsr::ensemble`. Bound before: `view`, `objects`, `particles`, `sums`.
-
-// As `PackedColor::get`.
-vec3 unpack_color(uint packed) {
-    float scale = uintBitsToFloat(((packed >> 27) + 103u) << 23);
-    return vec3(float(packed & 511u), float((packed >> 9) & 511u), float((packed >> 18) & 511u)) * scale;
-}
+// Sums of pixels in fixed point; as `pbsr::ensemble`. Bound before: `view`, `sums`.
 
 // The whole part of a number that is not negative, low and high word.
 uvec2 whole(float v) {
@@ -25,8 +19,10 @@ uvec2 whole(float v) {
 
 // Nearest multiple of 2^-24, two's complement.
 uvec2 fixed_point(float v) {
-    precise float steps = abs(v) * 16777216.0 + 0.5;
-    uvec2 w = whole(steps);
+    float steps = abs(v) * 16777216.0;
+    // From 2^23 on they are whole, and a half would be rounded.
+    precise float rounded = steps < 8388608.0 ? steps + 0.5 : steps;
+    uvec2 w = whole(rounded);
     return v < 0.0 ? uvec2(~w.x + 1u, ~w.y + uint(w.x == 0u)) : w;
 }
 
@@ -36,24 +32,24 @@ void add(uint at, uvec2 v) {
     sums[at] = low;
 }
 
-// What a particle shows: its colour in the unit of radiance, and the square of its luminance in steps of 2^-24.
-struct Shown {
-    vec3 color;
-    float square;
-};
-
-Shown shown_by(uint word) {
-    precise vec3 shown = (unpack_color(particles[word + 4u]) + objects[particles[word + 6u]].emission.xyz) * view.inverse_unit;
-    vec3 v = clamp(shown, -65536.0, 65536.0);
-    precise float luminance = v.x * 0.2126 + v.y * 0.7152 + v.z * 0.0722;
-    precise float square = luminance * luminance * 16777216.0;
-    return Shown(v, square);
+// Words of a pixel's sums: hits, two a number that a hit brings, two of squares.
+uint sums_at(uint pixel) {
+    return (3u + 2u * view.channels) * pixel;
 }
 
-void add_hit(uint pixel, Shown hit) {
-    sums[9u * pixel] += 1u;
-    add(9u * pixel + 1u, fixed_point(hit.color.x));
-    add(9u * pixel + 3u, fixed_point(hit.color.y));
-    add(9u * pixel + 5u, fixed_point(hit.color.z));
-    add(9u * pixel + 7u, whole(hit.square));
+// Radiance in its unit, cut where the CPU cuts it.
+vec3 in_unit(vec3 radiance) {
+    precise vec3 v = radiance * view.inverse_unit;
+    return clamp(v, -65536.0, 65536.0);
+}
+
+float luminance_of(vec3 v) {
+    precise float luminance = v.x * 0.2126 + v.y * 0.7152 + v.z * 0.0722;
+    return luminance;
+}
+
+// The square of a luminance in steps of 2^-24.
+float square_of(float luminance) {
+    precise float square = luminance * luminance * 16777216.0;
+    return square;
 }

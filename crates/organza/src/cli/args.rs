@@ -213,7 +213,7 @@ pub(super) enum Backend {
     Cpu,
     /// A GPU by wgpu helps as by `ash`
     Wgpu,
-    /// A GPU by Vulkan orders the translucent splats or averages unlit particles, the processor does the rest
+    /// A GPU by Vulkan orders the translucent splats or lights and averages particles, the processor does the rest
     Ash,
 }
 

@@ -2,7 +2,7 @@
 
 use super::chain::{Chained, Splats, chain_on};
 use super::order::order_on;
-use super::particles::{Folding, why_not};
+use super::particles::Folding;
 use super::shadows::{LookUps, LookedUp, look_up_on, map_on};
 use super::splats::{composite_on, why_not_composite};
 use super::trial::{order_trial, shadow_trial};
@@ -157,27 +157,30 @@ impl Helper {
     /// processor's. Gives the number of particles. `folding` is that of the steps before.
     pub(crate) fn fold(
         &self,
-        folding: &mut Folding,
+        folding: &mut Folding<'_>,
         scene: &Scene<'_>,
         ensemble: &mut Ensemble,
         until: u32,
         max_bytes: u64,
         progress: &Progress,
     ) -> Result<u64, pbsr::Error> {
-        if let Some(why) = why_not(scene, ensemble) {
+        if let Some(why) = folding.why_not(scene, ensemble) {
             self.leave(why);
             return Ok(0);
         }
         let before = folding.particles;
-        let cancelled =
-            self.with(|device| match folding.fold_on(device, scene, ensemble, until, max_bytes, progress) {
-                Err(Failure::Particles(e @ pbsr::Error::Core(splat_core::Error::Cancelled))) => Ok(Some(e)),
-                done => done.map(|()| None),
-            });
-        if folding.uploads() {
-            self.leave("particles of other things than meshes, regular volumes and their trilinear isosurfaces are sampled by the processor");
+        let folded = self.with(|device| match folding.fold_on(device, scene, ensemble, until, max_bytes, progress) {
+            Err(Failure::Particles(e @ pbsr::Error::Core(splat_core::Error::Cancelled))) => Ok(Err(e)),
+            left => left.map(Ok),
+        });
+        match folded {
+            Some(Ok(Some(why))) => self.leave(why),
+            _ if folding.uploads() => {
+                self.leave("particles of other things than meshes, regular volumes and their trilinear isosurfaces are sampled by the processor");
+            }
+            _ => {}
         }
-        cancelled.flatten().map_or(Ok(folding.particles - before), Err)
+        folded.unwrap_or(Ok(None)).map(|_| folding.particles - before)
     }
 
     /// Says why something is the processor's, where somebody could have expected the device to do it.

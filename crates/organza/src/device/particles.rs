@@ -4,11 +4,17 @@
 //! Elsewhere the processor samples them and they are uploaded. Sets are independent, so as many go into one run as the
 //! device's kernels can see at once; what a run gave is added to the ensemble here, and a device that is lost costs no more
 //! than the sets of its last run.
+//!
+//! What is lit is lit there too, through the processor's shadow maps (`lit.rs`).
+
+mod lit;
 
 use super::Failure;
+use lit::Light;
+pub(crate) use lit::Shadow;
 use pbsr::gpu::{Capacities, Generated, Nearest, Recorded, Sources, record, record_generated};
 use pbsr::{Ensemble, Error, Scene};
-use splat_core::{Progress, Shading};
+use splat_core::Progress;
 use splat_shaders::{BufferId, Executor, PassTime, Ready};
 
 /// Most sets of one run: a look at the clock and at an interrupt comes between two.
@@ -18,7 +24,9 @@ const PARTICLE_BYTES: u64 = 28;
 
 /// How a device folds the sets of one scene, kept from step to step, and what it did.
 #[derive(Default)]
-pub(crate) struct Folding {
+pub(crate) struct Folding<'a> {
+    /// Of the lights with a shadow map, in their order.
+    shadows: Vec<Shadow<'a>>,
     /// The tables of the samplers, once they were asked for; `None` inside where sets are uploaded.
     sources: Option<Option<Sources>>,
     making: Option<(Generated, Box<dyn Ready>)>,
@@ -31,20 +39,17 @@ pub(crate) struct Folding {
     pub(super) passes: Vec<PassTime>,
 }
 
-/// Why a scene's particles are the processor's; `None` when a device can fold them.
-pub(super) fn why_not(scene: &Scene<'_>, ensemble: &Ensemble) -> Option<&'static str> {
-    let params = ensemble.params();
-    if params.channels() != 3 || params.depth_range.is_some() || params.object {
-        return Some("particles with layers besides beauty are the processor's");
+impl<'a> Folding<'a> {
+    /// In the light that these maps let through: those of the scene's lights, in their order.
+    pub(crate) fn new(shadows: Vec<Shadow<'a>>) -> Self {
+        Self { shadows, ..Self::default() }
     }
-    if params.colored_extinction {
-        return Some("particles that hide red, green and blue apart are the processor's");
-    }
-    let lit = scene.objects.iter().any(|o| o.look.material.shading != Shading::Unlit);
-    lit.then_some("particles that are lit are the processor's (a device does material.shading = \"unlit\")")
-}
 
-impl Folding {
+    /// Why a scene's particles are the processor's; `None` when a device can fold them.
+    pub(super) fn why_not(&self, scene: &Scene<'_>, ensemble: &Ensemble) -> Option<&'static str> {
+        lit::why_not(scene, ensemble, &self.shadows)
+    }
+
     /// Sets that the processor samples, whether or not the device could make them.
     pub(super) fn uploaded() -> Self {
         Self { sources: Some(None), ..Self::default() }
@@ -55,8 +60,8 @@ impl Folding {
         self.sources == Some(None)
     }
 
-    /// Folds sets until the ensemble has `until` of them, with at most so many bytes of particles at once. What was folded
-    /// before a failure stays in.
+    /// Folds sets until the ensemble has `until` of them, with at most so many bytes of particles at once, or says why the rest
+    /// is the processor's. What was folded before a failure stays in.
     pub(super) fn fold_on(
         &mut self,
         device: &mut dyn Executor,
@@ -65,7 +70,7 @@ impl Folding {
         until: u32,
         max_bytes: u64,
         progress: &Progress,
-    ) -> Result<(), Failure> {
+    ) -> Result<Option<&'static str>, Failure> {
         let folded = self.fold(device, scene, ensemble, until, max_bytes, progress);
         if folded.is_err() {
             // They belong to a device that may be gone.
@@ -82,7 +87,7 @@ impl Folding {
         until: u32,
         max_bytes: u64,
         progress: &Progress,
-    ) -> Result<(), Failure> {
+    ) -> Result<Option<&'static str>, Failure> {
         let most_bytes = device.adapter().binding_bytes.min(max_bytes);
         while ensemble.levels() < until {
             let of_set = *self.of_set.get_or_insert_with(|| expected_of_set(scene));
@@ -93,12 +98,18 @@ impl Folding {
             let levels = (until - ensemble.levels()).min(MOST_LEVELS).min((most_bytes / needed).max(1) as u32);
             let room = capacities(scene, of_set, levels);
             let binding_bytes = device.adapter().binding_bytes;
+            let light = Light::record(scene, ensemble, &room, &self.shadows);
+            if light.is_larger(binding_bytes) {
+                return Ok(Some(
+                    "a shadow map is larger than the device's kernels see: the processor lights particles",
+                ));
+            }
             let fit = |s: &Sources| s.largest_bytes() <= binding_bytes && s.bytes() <= max_bytes;
             let sources = || Sources::new(scene).filter(fit);
             let folded = match self.sources.get_or_insert_with(sources).take() {
-                None => self.upload(device, scene, ensemble, room)?,
+                None => self.upload(device, &light, scene, ensemble, room)?,
                 Some(sources) => {
-                    let folded = self.make(device, &sources, scene, ensemble, room);
+                    let folded = self.make(device, &sources, &light, scene, ensemble, room);
                     self.sources = Some(Some(sources));
                     folded?
                 }
@@ -113,7 +124,7 @@ impl Folding {
             }
             progress.tick(u64::from(levels)).map_err(Error::from)?;
         }
-        Ok(())
+        Ok(None)
     }
 
     /// Lets the device make as many sets as there is room for, and fold them; the inner error says how much room they need.
@@ -121,6 +132,7 @@ impl Folding {
         &mut self,
         device: &mut dyn Executor,
         sources: &Sources,
+        light: &Light,
         scene: &Scene<'_>,
         ensemble: &mut Ensemble,
         room: Capacities,
@@ -130,14 +142,20 @@ impl Folding {
         let (generated, ready) = self.making.insert(match kept {
             Some(kept) => kept,
             None => {
-                let generated = record_generated(room, Nearest::of(device.adapter()), sources)?;
+                let nearest = Nearest::of(device.adapter());
+                let generated =
+                    light.with(scene, ensemble, |lighting| record_generated(room, nearest, lighting, sources))?;
                 let ready = device.prepare(&generated.recording)?;
                 (generated, ready)
             }
         });
         let mut inputs = generated.next(sources, ensemble);
+        let maps = if fresh { light.uploads(scene, &self.shadows)? } else { Vec::new() };
         if fresh {
             inputs.extend(generated.tables(sources, scene, ensemble)?);
+        }
+        for (k, (shadow, map)) in maps.iter().enumerate() {
+            inputs.extend(generated.shadow_inputs(k, shadow.inputs(map)));
         }
         let inputs: Vec<(BufferId, &[u8])> = inputs.iter().map(|(buffer, bytes)| (*buffer, &bytes[..])).collect();
         let run = ready.run(&inputs)?;
@@ -150,23 +168,36 @@ impl Folding {
     fn upload(
         &mut self,
         device: &mut dyn Executor,
+        light: &Light,
         scene: &Scene<'_>,
         ensemble: &mut Ensemble,
         room: Capacities,
     ) -> Result<Result<u64, Error>, Failure> {
-        let (recorded, ready) = match self.uploading.take().filter(|(recorded, _)| recorded.capacities == room) {
-            Some(same) => self.uploading.insert(same),
+        let kept = self.uploading.take().filter(|(recorded, _)| recorded.capacities == room);
+        let fresh = kept.is_none();
+        let (recorded, ready) = self.uploading.insert(match kept {
+            Some(kept) => kept,
             None => {
-                let recorded = record(room, Nearest::of(device.adapter()))?;
+                let nearest = Nearest::of(device.adapter());
+                let recorded = light.with(scene, ensemble, |lighting| record(room, nearest, lighting))?;
                 let ready = device.prepare(&recorded.recording)?;
-                self.uploading.insert((recorded, ready))
+                (recorded, ready)
             }
-        };
+        });
         let uploads = match recorded.uploads(scene, ensemble) {
             Ok(uploads) => uploads,
             Err(why) => return Ok(Err(why)),
         };
-        let run = ready.run(&recorded.inputs(&uploads))?;
+        let mut inputs = recorded.inputs(&uploads);
+        let maps = if fresh { light.uploads(scene, &self.shadows)? } else { Vec::new() };
+        if fresh {
+            inputs.extend(recorded.tables(scene)?);
+        }
+        for (k, (shadow, map)) in maps.iter().enumerate() {
+            inputs.extend(recorded.shadow_inputs(k, shadow.inputs(map)));
+        }
+        let inputs: Vec<(BufferId, &[u8])> = inputs.iter().map(|(buffer, bytes)| (*buffer, &bytes[..])).collect();
+        let run = ready.run(&inputs)?;
         recorded.add(run.bytes(recorded.sums), ensemble)?;
         self.passes.extend(run.passes);
         Ok(Ok(uploads.particles))

@@ -236,7 +236,7 @@ impl ParticlesInput {
         Self { walls: [wall(0.7, 0.8), wall(1.5, -0.5)], camera }
     }
 
-    fn check(&self, device: &mut dyn Executor, mut folding: Folding) -> Result<Found, Failure> {
+    fn check(&self, device: &mut dyn Executor, mut folding: Folding<'_>) -> Result<Found, Failure> {
         let middle = pixel_area(&self.camera, DVec3::new(0.0, 0.0, 4.0));
         let params = |s: f64, seed, color| SurfaceParams {
             opacity: 0.4,

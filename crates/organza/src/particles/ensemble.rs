@@ -3,12 +3,12 @@
 use super::checkpoint::Checkpoint;
 use super::fault;
 use super::parts::Part;
-use crate::device::{Folding, Helper};
+use crate::device::{Folding, Helper, Shadow};
 use crate::points::Drawing;
 use crate::scene::ParticlesSettings;
 use crate::{Error, Progress, RenderOptions};
 use pbsr::{Ensemble, EnsembleParams, FoldParams, LitBy, Object, Occluder, Renderer, Scene};
-use splat_core::{Camera, LayerSet};
+use splat_core::{Camera, LayerSet, Light, Transmittance};
 use tsm::ShadowMap;
 
 /// Sets between two looks at the error.
@@ -30,8 +30,9 @@ pub(super) fn fold(
 ) -> Result<Average, Error> {
     let objects: Vec<Object<'_>> = parts.iter().map(Part::object).collect();
     let origin = drawing.loaded.cloud.origin;
-    let lit = drawing.shining(maps).map(|(light, map)| LitBy { light, shadow: map.map(|m| (m, origin)) });
-    let lights: Vec<LitBy<'_>> = lit.collect();
+    let shining: Vec<(Light, Option<Shadow<'_>>)> =
+        drawing.shining(maps).map(|(light, map)| (light, map.map(|map| (map, origin)))).collect();
+    let lights: Vec<LitBy<'_>> = shining.iter().map(lit_by).collect();
     let scene = Scene { objects: &objects, lights: &lights, ambient: drawing.ambient, camera, occluder };
     let colored = drawing.plan.optical_depth_planes == 3;
     let kept = kept_numbers(&drawing.layers, colored, || depth_range(parts, camera));
@@ -43,7 +44,8 @@ pub(super) fn fold(
     let params = fold_params(options);
     let settings = &drawing.settings.particles;
     let background = |_, _| drawing.background;
-    let (mut renderer, mut folding) = (Renderer::new(), Folding::default());
+    let (mut renderer, mut folding) =
+        (Renderer::new(), Folding::new(shining.iter().filter_map(|(_, shadow)| *shadow).collect()));
     let helper = helper(drawing, checkpoint.is_some());
     drawing.progress.add_total(u64::from(settings.repeat_level.saturating_sub(average.ensemble.levels())));
     while let Some(levels) = average.next_step(settings) {
@@ -69,6 +71,10 @@ pub(super) fn fold(
         checkpoint.write(&average.ensemble)?;
     }
     Ok(average)
+}
+
+fn lit_by<'a>((light, shadow): &(Light, Option<Shadow<'a>>)) -> LitBy<'a> {
+    LitBy { light: *light, shadow: shadow.map(|(map, origin)| (map as &dyn Transmittance, origin)) }
 }
 
 fn fold_params(options: &RenderOptions) -> FoldParams {
@@ -129,7 +135,7 @@ impl Step<'_> {
     fn fold(
         &self,
         renderer: &mut Renderer,
-        folding: &mut Folding,
+        folding: &mut Folding<'_>,
         scene: &Scene<'_>,
         ensemble: &mut Ensemble,
     ) -> Result<u64, pbsr::Error> {

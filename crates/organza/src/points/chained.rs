@@ -114,7 +114,8 @@ impl Drawing<'_> {
 
     /// Whether a device shades splats in this light; if not it says why.
     fn suits(&self, helper: &Helper, maps: &[Option<ShadowMap>], camera: &Camera) -> bool {
-        let lights: Vec<LitBy<'_>> = self.shining(maps).map(|(light, shadow)| LitBy { light, shadow }).collect();
+        let by = |map| -> Option<&dyn Transmittance> { Some(map? as &ShadowMap) };
+        let lights: Vec<LitBy<'_>> = self.shining(maps).map(|(light, map)| LitBy { light, shadow: by(map) }).collect();
         suits(&self.shading(&lights, camera)).map_err(|why| helper.leave(why)).is_ok()
     }
 

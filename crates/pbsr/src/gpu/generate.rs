@@ -8,11 +8,11 @@
 //! place takes products and sums alone and has the CPU's bits, a normal and a colour are at most one step off.
 
 use super::twin::{Maker, Sources, halves};
-use super::{Capacities, Nearest, PARTICLE_WORDS, Recorded, record, room, take_in};
+use super::{Capacities, Lighting, Lit, Nearest, PARTICLE_WORDS, Recorded, record, room, take_in};
 use crate::{Ensemble, Error, Scene};
 use splat_shaders::layouts::{ParticleSource, ParticlesFound, Scan};
 use splat_shaders::radix::{SCAN_BLOCK, Scanned};
-use splat_shaders::{BufferId, Groups, Recording, Run, kernels};
+use splat_shaders::{BufferId, Groups, Joined, Recording, Run, kernels};
 use std::borrow::Cow;
 
 /// Words of a chunk's arrivals: their number, and the state of its stream after that.
@@ -42,16 +42,20 @@ pub struct Generated {
     /// Of each object its source and its tables.
     sources: Vec<(BufferId, Vec<BufferId>)>,
     projection: Recorded,
-    /// View, objects and limits.
-    surroundings: [BufferId; 3],
+    in_whole: Joined,
 }
 
 /// Records the making of sets from these sources, and their folding, with this room.
 ///
 /// # Errors
-/// [`Error::Parameter`] for a size out of range.
-pub fn record_generated(capacities: Capacities, nearest: Nearest, sources: &Sources) -> Result<Generated, Error> {
-    let projection = record(capacities, nearest)?;
+/// As [`record`].
+pub fn record_generated(
+    capacities: Capacities,
+    nearest: Nearest,
+    lighting: Option<&Lighting<'_>>,
+    sources: &Sources,
+) -> Result<Generated, Error> {
+    let projection = record(capacities, nearest, lighting)?;
     let Capacities { levels, particles, of_set, .. } = capacities;
     let chunks = sources.chunks().saturating_mul(levels);
     let mut recording = Recording::default();
@@ -81,23 +85,10 @@ pub fn record_generated(capacities: Capacities, nearest: Nearest, sources: &Sour
         r.dispatch(kernel, Groups::cover(twin.source.chunks.saturating_mul(levels)), &buffers, &[]);
     }
     r.read(found);
-    let [view, objects, limits, of_sets, of_particles] = projection.inputs;
-    let joined = r.join(&projection.recording, &[(of_sets, sets), (of_particles, particles)]);
-    let (sums, surroundings) = (joined.of(projection.sums), [view, objects, limits].map(|b| joined.of(b)));
-    let sources = inputs;
-    Ok(Generated {
-        recording,
-        capacities,
-        sums,
-        found,
-        sets,
-        particles,
-        arrivals,
-        scan,
-        sources,
-        projection,
-        surroundings,
-    })
+    let [.., of_sets, of_particles] = projection.inputs;
+    let in_whole = r.join(&projection.recording, &[(of_sets, sets), (of_particles, particles)]);
+    let (sums, sources) = (in_whole.of(projection.sums), inputs);
+    Ok(Generated { recording, capacities, sums, found, sets, particles, arrivals, scan, sources, projection, in_whole })
 }
 
 /// How many particles each chunk of each set has.
@@ -150,15 +141,26 @@ impl Generated {
         ensemble: &Ensemble,
     ) -> Result<Inputs<'a>, Error> {
         room("objects", sources.twins.len(), self.capacities.objects)?;
-        let around = self.projection.surroundings(scene, ensemble)?;
+        let around = self.projection.surroundings(scene, ensemble)?.map(Cow::Owned);
         let scan = Scan { count: sources.chunks().saturating_mul(self.capacities.levels), total: 0 };
         let mut inputs: Inputs<'a> = vec![(self.scan, Cow::Owned(bytemuck::bytes_of(&scan).to_vec()))];
-        inputs.extend(self.surroundings.into_iter().zip(around.map(Cow::Owned)));
+        let around = self.projection.inputs.into_iter().zip(around).chain(self.projection.tables(scene)?);
+        inputs.extend(around.map(|(buffer, bytes)| (self.in_whole.of(buffer), bytes)));
         for (twin, (_, buffers)) in sources.twins.iter().zip(&self.sources) {
             let tables = twin.tables.iter().map(|words| Cow::Borrowed(bytemuck::cast_slice(words)));
             inputs.extend(buffers.iter().copied().zip(tables));
         }
         Ok(inputs)
+    }
+
+    /// As [`Recorded::shadow_inputs`].
+    pub fn shadow_inputs<'a>(
+        &self,
+        light: usize,
+        inputs: impl IntoIterator<Item = (BufferId, &'a [u8])>,
+    ) -> impl Iterator<Item = (BufferId, Cow<'a, [u8]>)> {
+        let inputs = self.projection.shadow_inputs(light, inputs);
+        inputs.map(|(buffer, bytes)| (self.in_whole.of(buffer), bytes))
     }
 
     /// What a run of the next sets needs beside the tables: which they are.
@@ -168,7 +170,9 @@ impl Generated {
             let source = ParticleSource { first_set, levels, ..twin.source };
             (*buffer, Cow::Owned(bytemuck::bytes_of(&source).to_vec()))
         };
-        sources.twins.iter().zip(&self.sources).map(of_object).collect()
+        let nobody = self.projection.lit.iter().map(Lit::nobody);
+        let nobody = nobody.map(|(buffer, bytes)| (self.in_whole.of(buffer), Cow::Owned(bytes)));
+        sources.twins.iter().zip(&self.sources).map(of_object).chain(nobody).collect()
     }
 
     /// Adds what a run gave to the ensemble that its inputs were made for, and gives the number of its particles.

@@ -191,16 +191,28 @@ impl Recorded {
         self.uploads_of(input, attributes, &[])
     }
 
+    /// The same where attributes are left there too: there may be as many splats as there is room for, and the cloud gives the
+    /// origin of their positions alone.
+    ///
+    /// # Errors
+    /// [`Error::Overflow`] for more than there is room for.
+    pub fn uploads_beside_splats(&self, input: &ShadeInput<'_>) -> Result<Uploads, Error> {
+        self.uploads_for(input, self.capacities.attributes.splats, &[])
+    }
+
     fn uploads_of(
         &self,
         input: &ShadeInput<'_>,
         attributes: &Attributes,
         light: &[[f32; 3]],
     ) -> Result<Uploads, Error> {
-        let room = self.capacities;
         // Footprints are not read here.
-        attributes.check(room.attributes, input.materials.len(), usize::MAX)?;
-        let splats = attributes.room().splats;
+        attributes.check(self.capacities.attributes, input.materials.len(), usize::MAX)?;
+        self.uploads_for(input, attributes.room().splats, light)
+    }
+
+    fn uploads_for(&self, input: &ShadeInput<'_>, splats: u32, light: &[[f32; 3]]) -> Result<Uploads, Error> {
+        let room = self.capacities;
         for (what, needed, had) in [
             ("materials", input.materials.len(), room.materials),
             ("lights", input.lights.len(), room.lights),

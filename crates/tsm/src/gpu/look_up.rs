@@ -79,8 +79,8 @@ pub struct RecordedLookUp {
 /// The bytes of a map.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MapUploads {
-    view: ShadowView,
-    bytes: [Vec<u8>; 5],
+    pub(super) view: ShadowView,
+    pub(super) bytes: [Vec<u8>; 5],
 }
 
 /// The bytes of some receivers.

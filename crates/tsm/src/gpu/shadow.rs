@@ -8,16 +8,14 @@
 use super::batches::{Listed, joined, read};
 use super::casting::Casting;
 use super::deposit::{CastRoom, CastUploads, RecordedCast, record_cast};
-use super::look_up::{RecordedLookUp, Room, record_look_up, view_of};
+use super::look_up::{Room, view_of};
+use super::received::record_received;
 use super::{Capacities, record};
 use crate::shadow_map::Absorbances;
 use crate::{Error, ShadowMap};
 use splat_core::raster::gpu::AttributeBuffers;
 use splat_shaders::layouts::ShadowView;
-use splat_shaders::{BufferId, Groups, Recording, kernels};
-
-/// Threads of a workgroup.
-const GROUP: u32 = 256;
+use splat_shaders::{BufferId, Recording};
 
 /// Recorded deposits and lists, and the buffers that the caller meets.
 #[derive(Debug, Clone, PartialEq)]
@@ -99,32 +97,22 @@ pub struct ShadowUploads {
 /// Records the shadow of one light with this room, the `light`th of those that have one.
 pub fn record_shadow(room: CastRoom, light: u32) -> RecordedShadow {
     let RecordedMap { mut recording, cast, lists } = record_map(room);
-    let (r, splats) = (&mut recording, room.attributes.splats);
-    let [positions, radii, looks, frames] = cast.attributes.all();
-    let each = Groups::cover(splats.div_ceil(GROUP));
-    let receivers = r.scratch("receivers", 32 * u64::from(splats));
-    r.dispatch(&kernels::TSM_RECEIVE, each, &[cast.view, positions, radii, looks, frames, receivers], &[]);
-    let RecordedLookUp { recording: look_up, lights, view, receivers: looking, map, .. } = record_look_up(Room {
-        receivers: splats,
+    let looked_up = Room {
+        receivers: room.attributes.splats,
         cells: room.cells / 2,
         entries: room.entries,
         channels: room.channels,
         directions: room.directions,
         opaque: room.opaque,
-    });
+    };
+    let last = record_received(looked_up, room.attributes, light);
     let [spans, distances, totals] = lists;
     let known = [spans, distances, totals, cast.opaque, cast.directions];
-    let shared: Vec<_> = map.into_iter().zip(known).chain([(looking, receivers)]).collect();
-    let in_look_up = r.join(&look_up, &shared);
-    let mut last = Recording::default();
-    let [own_view, own_lights] = [last.scratch("", 0), last.scratch("", 0)];
-    let shares = last.input("shadow shares", 4 * u64::from(splats));
-    let received = last.scratch("received", 12 * u64::from(splats) * (1 + u64::from(light)));
-    last.dispatch(&kernels::TSM_HAND_ON, each, &[own_view, own_lights, shares, received], &[light]);
-    last.read(received);
-    let in_last = r.join(&last, &[(own_view, cast.view), (own_lights, in_look_up.of(lights))]);
-    let (received, shares, shadow_view) = (in_last.of(received), in_last.of(shares), in_look_up.of(view));
-    r.read_only(&[cast.state, received]);
+    let shared = last.map.into_iter().zip(known).chain([(last.frame, cast.view)]);
+    let shared: Vec<_> = shared.chain(last.attributes.shared(&cast.attributes)).collect();
+    let joined = recording.join(&last.recording, &shared);
+    let [received, shares, shadow_view] = [last.received, last.shares, last.view].map(|buffer| joined.of(buffer));
+    recording.read_only(&[cast.state, received]);
     RecordedShadow { recording, cast, received, shares, shadow_view }
 }
 

@@ -116,7 +116,7 @@ fn empty() -> Ensemble {
 /// Sets that the device makes and folds.
 fn by_device(device: &mut Device, scene: &Scene<'_>, runs: u32) -> Ensemble {
     let (sources, mut ensemble) = (Sources::new(scene).unwrap(), empty());
-    let generated = record_generated(ROOM, Nearest::of(device.adapter()), &sources).unwrap();
+    let generated = record_generated(ROOM, Nearest::of(device.adapter()), None, &sources).unwrap();
     let mut prepared = device.prepare(&generated.recording).unwrap();
     let tables = generated.tables(&sources, scene, &ensemble).unwrap();
     for run in 0..runs {
@@ -145,7 +145,7 @@ fn pixels() -> impl Iterator<Item = (u32, u32)> {
 /// Sets and particles of the first run, made by the device, with the states of its streams; and uploaded ones.
 fn particles(device: &mut Device, scene: &Scene<'_>) -> ([[Vec<u32>; 2]; 2], Vec<u32>) {
     let sources = Sources::new(scene).unwrap();
-    let mut generated = record_generated(ROOM, Nearest::of(device.adapter()), &sources).unwrap();
+    let mut generated = record_generated(ROOM, Nearest::of(device.adapter()), None, &sources).unwrap();
     let wanted = [generated.sets, generated.particles, generated.arrivals];
     wanted.iter().for_each(|buffer| generated.recording.read(*buffer));
     let mut inputs = generated.tables(&sources, scene, &empty()).unwrap();
@@ -154,9 +154,10 @@ fn particles(device: &mut Device, scene: &Scene<'_>) -> ([[Vec<u32>; 2]; 2], Vec
     let run = device.run(&generated.recording, &inputs).unwrap();
     assert_eq!(device.take_messages(), [""; 0]);
     let [sets, particles, arrivals] = wanted.map(|buffer| words(run.bytes(buffer)));
-    let recorded = record(ROOM, Nearest::Ranked).unwrap();
+    let recorded = record(ROOM, Nearest::Ranked, None).unwrap();
     let uploads = recorded.uploads(scene, &empty()).unwrap();
-    let [.., (_, of_sets), (_, of_particles)] = recorded.inputs(&uploads);
+    let inputs = recorded.inputs(&uploads);
+    let [.., (_, of_sets), (_, of_particles)] = &inputs[..] else { panic!("five inputs") };
     ([[sets, particles], [words(of_sets), words(of_particles)]], arrivals)
 }
 
@@ -346,7 +347,7 @@ fn too_little_room_folds_nothing_and_says_what_is_needed() {
         let (mut device, sources) = (open().unwrap(), Sources::new(scene).unwrap());
         let mut run = |room: Capacities| {
             let mut ensemble = empty();
-            let generated = record_generated(room, Nearest::of(device.adapter()), &sources).unwrap();
+            let generated = record_generated(room, Nearest::of(device.adapter()), None, &sources).unwrap();
             let mut inputs = generated.tables(&sources, scene, &ensemble).unwrap();
             inputs.extend(generated.next(&sources, &ensemble));
             let inputs: Vec<_> = inputs.iter().map(|(buffer, bytes)| (*buffer, &bytes[..])).collect();
@@ -371,7 +372,7 @@ fn too_little_room_folds_nothing_and_says_what_is_needed() {
         assert_eq!((particles, ensemble.levels()), (Ok(all), ROOM.levels));
         assert!(matches!(run(Capacities { of_set: needed as u32 - 1, ..exactly }).0, Err(Error::TooMuch { .. })));
         assert!(matches!(run(Capacities { particles: all as u32 - 1, ..exactly }).0, Err(Error::TooMuch { .. })));
-        let fewer = record_generated(Capacities { objects: 2, ..ROOM }, Nearest::Ranked, &sources).unwrap();
+        let fewer = record_generated(Capacities { objects: 2, ..ROOM }, Nearest::Ranked, None, &sources).unwrap();
         assert!(matches!(fewer.tables(&sources, scene, &empty()), Err(Error::TooMuch { what: "objects", .. })));
         assert_eq!(device.take_messages(), [""; 0]);
     });

@@ -9,6 +9,7 @@ mod drawn;
 mod generated;
 mod kernels;
 mod layered;
+mod lit;
 mod order;
 mod particles;
 mod picture;

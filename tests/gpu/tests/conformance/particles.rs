@@ -38,12 +38,14 @@ fn both(scene: &Scene<'_>) -> [Ensemble; 2] {
     Renderer::new().fold(scene, &mut cpu, 2 * ROOM.levels, &params, &progress).unwrap();
     let empty = gpu.clone();
     for way in ways {
-        let recorded = record(ROOM, way).unwrap();
+        let recorded = record(ROOM, way, None).unwrap();
         let mut prepared = device.prepare(&recorded.recording).unwrap();
         let mut sums = empty.clone();
         for _ in 0..2 {
             let uploads = recorded.uploads(scene, &sums).unwrap();
-            let run = prepared.run(&recorded.inputs(&uploads)).unwrap();
+            let inputs = recorded.inputs(&uploads);
+            let inputs: Vec<_> = inputs.iter().map(|(buffer, bytes)| (*buffer, &bytes[..])).collect();
+            let run = prepared.run(&inputs).unwrap();
             recorded.add(run.bytes(recorded.sums), &mut sums).unwrap();
         }
         assert!(gpu == empty || gpu == sums, "{way:?} finds others");
@@ -152,7 +154,7 @@ fn too_little_room_is_refused_with_what_is_needed() {
     let objects = [object(&sampler, 0.0, [0.0; 3])];
     let scene = Scene { objects: &objects, lights: &[], ambient: [0.0; 3], camera: &camera, occluder: None };
     let ensemble = Ensemble::new(SIZE, &EnsembleParams::default()).unwrap();
-    let uploads = |room| record(room, Nearest::Ranked).unwrap().uploads(&scene, &ensemble);
+    let uploads = |room| record(room, Nearest::Ranked, None).unwrap().uploads(&scene, &ensemble);
     let Err(Error::TooMuch { what: "particles of one set", needed, had: 10 }) =
         uploads(Capacities { of_set: 10, ..ROOM })
     else {
@@ -164,7 +166,7 @@ fn too_little_room_is_refused_with_what_is_needed() {
     let lit = Object { look: Appearance::default(), ..objects[0] };
     let lit = Scene { objects: &[lit], ..scene };
     assert!(matches!(
-        record(ROOM, Nearest::Ranked).unwrap().uploads(&lit, &ensemble),
-        Err(Error::Parameter { name: "objects", .. })
+        record(ROOM, Nearest::Ranked, None).unwrap().uploads(&lit, &ensemble),
+        Err(Error::Parameter { name: "scene", .. })
     ));
 }

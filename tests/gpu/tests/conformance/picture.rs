@@ -208,12 +208,119 @@ fn killing_the_device_between_sets_goes_on_from_there() {
 
 #[test]
 fn particles_that_a_device_cannot_fold_are_the_processor_s() {
-    let layers = "layers = [\"effects\"]";
-    let (device, choice) = losing(Loss::Never, u64::MAX);
-    let helped = particles(Some(choice), layers);
-    assert!(helped.warnings.iter().any(|w| w.contains("layers besides beauty")), "{:?}", helped.warnings);
-    assert_eq!((helped.layers, helped.backend.as_str()), (particles(None, layers).layers, "cpu"));
-    assert_eq!(device.submissions(), 1);
+    for (layer, why) in [("depth", "depth layers"), ("object", "object layers")] {
+        let layers = format!("layers = [\"{layer}\"]");
+        let (device, choice) = losing(Loss::Never, u64::MAX);
+        let helped = particles(Some(choice), &layers);
+        assert!(helped.warnings.iter().any(|w| w.contains(why)), "{:?}", helped.warnings);
+        assert_eq!((helped.layers, helped.backend.as_str()), (particles(None, &layers).layers, "cpu"));
+        assert_eq!(device.submissions(), 1);
+    }
+}
+
+/// A picture by particles that two lamps light, through their shadow maps; a lamp, a pane and fog.
+fn lit_particles(device: Option<DeviceChoice>, more: &str) -> Render {
+    let text = format!(
+        r#"
+        version = 1
+        [camera]
+        position = [0.4, 0.3, 4]
+        target = [0, 0, 0]
+        size = [96, 64]
+        [[light]]
+        kind = "point"
+        position = [1, 2, 2]
+        intensity = [30, 30, 30]
+        [[light]]
+        kind = "directional"
+        direction = [0.3, -0.8, -0.5]
+        irradiance = [2, 1.5, 1]
+        [material.plain]
+        shading = "unlit"
+        [[object]]
+        name = "pane"
+        rectangle = {{ center = [0, 0, 1.2], u = [0.8, 0, 0.2], v = [0, 0.8, 0], spacing = 0.05 }}
+        color = [0.9, 0.5, 0.2]
+        opacity = 0.5
+        [[object]]
+        name = "behind"
+        material = "plain"
+        rectangle = {{ center = [0.3, 0, 0], u = [0.9, 0, 0], v = [0, 0.9, 0], spacing = 0.05 }}
+        color = [0.1, 0.4, 0.9]
+        opacity = 0.7
+        [[object]]
+        name = "fog"
+        medium_box = {{ min = [-0.5, -1, -1], max = [1, 1, 0.5], extinction = 0.8, spacing = 0.2 }}
+        [render]
+        technique = "particles"
+        {more}
+        [render.particles]
+        repeat_level = 40
+        "#
+    );
+    let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
+    render(&scene, &RenderOptions { device, ..RenderOptions::default() }, &Progress::new()).unwrap()
+}
+
+/// Largest difference of the pixels of equal opacity, in every layer, and the brightest number of beauty.
+fn apart(a: &Render, b: &Render) -> (f32, f32) {
+    let [x, y] = [a, b].map(|r| r.layers.scalar("alpha").unwrap());
+    let mut most = 0.0f32;
+    for name in ["beauty", "ambient", "emission", "direct", "normal"] {
+        let (Some(a), Some(b)) = (a.layers.rgb(name), b.layers.rgb(name)) else { continue };
+        let equal = a.iter().zip(b).zip(x.iter().zip(y)).filter(|(_, (x, y))| x == y);
+        most = equal.flat_map(|((a, b), _)| (0..3).map(move |c| (a[c] - b[c]).abs())).fold(most, f32::max);
+    }
+    (most, a.layers.rgb("beauty").unwrap().as_flattened().iter().fold(0.0, |a, b| b.max(a)))
+}
+
+#[test]
+fn lit_particles_by_a_device_are_the_processor_s() {
+    for more in ["", r#"layers = ["beauty", "effects", "normal", "shadow"]"#] {
+        let alone = lit_particles(None, more);
+        for (name, device) in devices() {
+            let helped = lit_particles(Some(device), more);
+            assert!(helped.backend.starts_with(name), "{}", helped.backend);
+            let (most, brightest) = apart(&alone, &helped);
+            assert!(agreement(&alone, &helped) >= 0.999, "{name}: {}", agreement(&alone, &helped));
+            assert!(most <= 3e-5 * brightest && brightest > 0.2, "{name}: {most} of {brightest}");
+        }
+    }
+}
+
+#[test]
+fn killing_the_device_among_lit_sets_goes_on_from_there() {
+    let alone = lit_particles(None, "");
+    let whole = losing(Loss::Never, u64::MAX);
+    let helped = lit_particles(Some(whole.1), "");
+    // The trial, the lists of two maps, and five batches of eight sets.
+    assert_eq!(whole.0.submissions(), 1 + 2 + 5);
+    let (device, choice) = losing(Loss::Once(6), u64::MAX);
+    let again = lit_particles(Some(choice), "");
+    assert_eq!((device.submissions(), &again.layers), (1 + 2 + 5 + 1, &helped.layers));
+    let (_, choice) = losing(Loss::Always(6), u64::MAX);
+    let rest = lit_particles(Some(choice), "");
+    let (most, brightest) = apart(&alone, &rest);
+    assert!(rest.backend.ends_with("then cpu") && agreement(&alone, &rest) >= 0.999, "{}", rest.backend);
+    assert!(most <= 3e-5 * brightest, "{most} of {brightest}");
+}
+
+#[test]
+fn light_that_a_device_does_not_make_is_the_processor_s() {
+    let glossy = r#"
+        [material.glossy]
+        specular = 0.2
+        shininess = 100
+        [[object]]
+        name = "mirror"
+        material = "glossy"
+        rectangle = { center = [-0.5, 0.5, 1.4], u = [0.3, 0, 0], v = [0, 0.3, 0], spacing = 0.05 }
+        opacity = 0.5
+        "#;
+    let (_, choice) = losing(Loss::Never, u64::MAX);
+    let helped = lit_particles(Some(choice), glossy);
+    assert!(helped.warnings.iter().any(|w| w.contains("an exponent above 64")), "{:?}", helped.warnings);
+    assert_eq!(helped.layers, lit_particles(None, glossy).layers);
 }
 
 #[test]
