@@ -6,13 +6,13 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use pbsr::{
     Appearance, BrownianParams, BrownianSampler, Ensemble, EnsembleParams, FoldParams, GridSampler, ImplicitSurface,
     KeptSets, LineSampler, MeshSampler, MetropolisParams, MetropolisSampler, Object, Particles, Renderer, Sampler,
-    Scene, SurfaceParams, VolumeParams, pixel_area,
+    Scene, SplatParams, SplatSampler, SurfaceParams, VolumeParams, pixel_area,
 };
 use rayon::prelude::*;
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::{
-    Camera, Grid, Material, Mesh, Progress, Projection, ScalarField, Shading, Similarity, TransferFunction,
-    TransferPoint, rng,
+    Camera, Cloud, Grid, Material, Mesh, Progress, Projection, ScalarField, Shading, Similarity, Splat, SplatKind,
+    TransferFunction, TransferPoint, rng,
 };
 use std::f64::consts::TAU;
 
@@ -102,6 +102,24 @@ fn gyroid(interpolation: Interpolation) -> GridField {
     GridField::new(grid.into(), interpolation, 0.0, Inside::Below).expect("invariant: a grid")
 }
 
+/// 100 000 splats of one kind.
+fn cloud(kind: SplatKind) -> Cloud {
+    let mut cloud = Cloud::new(DVec3::ZERO);
+    for i in 0..100_000 {
+        let u = |k| rng::unit_f32(3, 0, i, k);
+        let normal = Vec3::new(u(4) - 0.5, u(5) - 0.5, u(6) + 0.1).normalize();
+        cloud.push(&Splat {
+            kind,
+            normal: if kind == SplatKind::Medium { Vec3::ZERO } else { normal },
+            position: Vec3::new(u(0), u(1), u(2)),
+            radius: 0.01 + 0.01 * u(3),
+            cross_section: 1e-4 * (1.0 + u(7)),
+            ..Splat::default()
+        });
+    }
+    cloud
+}
+
 fn camera(n: u32) -> Camera {
     let view = Projection::Orthographic { height: 2.0 };
     Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y, view, [n, n]).expect("invariant: a camera")
@@ -136,7 +154,9 @@ fn sampling(c: &mut Criterion) {
     let (blend, _) = points_to_field(&torus_points(), &MpuParams::default()).expect(why);
     let [low, high] = blend.bounds();
     let scattered = ImplicitSurface { field: &blend, level: 0.0, min: low, max: high, inside: None };
-    let samplers: [(&str, u64, Box<dyn Sampler>); 11] = [
+    let clouds = [SplatKind::Medium, SplatKind::Surface].map(cloud);
+    let of_splats = SplatParams { cross_section: 1e-5, ..SplatParams::default() };
+    let samplers: [(&str, u64, Box<dyn Sampler>); 13] = [
         ("mesh, flat", 8, Box::new(MeshSampler::new(&flat, &surface(0.5), None).expect(why))),
         ("mesh, smooth", 8, Box::new(MeshSampler::new(&mesh, &surface(0.5), None).expect(why))),
         ("volume", 16, Box::new(GridSampler::new(&grid, &transfer, &volume, None).expect(why))),
@@ -151,6 +171,8 @@ fn sampling(c: &mut Criterion) {
         ("trilinear volume, lines", 1, Box::new(LineSampler::new(&levels[0], 64, &surface(0.1), None).expect(why))),
         ("Catmull-Rom volume, lines", 1, Box::new(LineSampler::new(&levels[1], 64, &surface(0.1), None).expect(why))),
         ("scattered points, lines", 1, Box::new(LineSampler::new(&scattered, 48, &surface(0.1), None).expect(why))),
+        ("splats, media", 2, Box::new(SplatSampler::new(&clouds[0], &of_splats).expect(why))),
+        ("splats, discs", 2, Box::new(SplatSampler::new(&clouds[1], &of_splats).expect(why))),
         ("torus, Brownian", 2, Box::new(BrownianSampler::new(&torus, &walk, &surface(0.1)).expect(why))),
     ];
     let mut group = c.benchmark_group("pbsr/sample");

@@ -169,6 +169,8 @@ kernels! {
     PBSR_SETS = "pbsr_sets" [Read, Read, Read, Write, Write] push 8;
     /// Particles on triangles: source, tables, triangles, vertices, arrivals, scanned counts → particles.
     PBSR_MESH = "pbsr_mesh" [Read, Read, Read, Read, Read, Read, Write];
+    /// Particles of splats: source, tables, splats, kernels, arrivals, scanned counts → particles.
+    PBSR_SPLATS = "pbsr_splats" [Read, Read, Read, Read, Read, Read, Write];
     /// How many arrivals in a volume stay: source, tables, cells, values, transfer, arrivals → counts.
     PBSR_VOLUME_COUNT = "pbsr_volume_count" [Read, Read, Read, Read, Read, Read, Write];
     /// Particles in a volume: source, tables, cells, values, transfer, arrivals, scanned counts → particles.

@@ -267,7 +267,7 @@ layouts! {
         pub flags: u32,
         /// Where the alias tables begin, words.
         pub slots_at: u32,
-        /// Words of a vertex.
+        /// Words of a vertex, or of a splat.
         pub vertex_words: u32,
         /// Pieces of the transfer function.
         pub pieces: u32,

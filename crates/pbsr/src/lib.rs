@@ -69,6 +69,7 @@ mod picture;
 mod pieces;
 mod places;
 mod project;
+mod radial;
 pub mod reference;
 mod render;
 mod roots;

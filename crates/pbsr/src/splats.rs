@@ -3,22 +3,28 @@
 //! A splat of cross-section K gets K/s particles in the mean, distributed as its kernel, so that a pixel at u from its
 //! centre sees K/s·s·w(u) = τ(u) of them: the optical depth of the splat along that ray.
 //!
-//! The footprint w(s) = e^(−qs) − e^(−q)(1 + x + x²/2), x = q(1 − s), is the sum over n ≥ 3 of e^(−q)·q^n/n!·(1 − s)^n.
-//! Each term has the weight ∫(1 − s)^n dA = π/(n + 1), so n + 1 is a Poisson variable of mean q, given that it is ≥ 4.
-//!
-//! - A disc has the radius √(1 − u^(1/(n+1))) for uniform u.
-//! - (1 − ρ²)^n is the projection of the ball's (1 − r²)^(n−1/2), for every direction of the ray (Abel's transform), which is
-//!   the distribution of three coordinates of a uniform point on the sphere in 2n + 4 dimensions: g/√(|g|² + χ²), with
-//!   three normal numbers g and χ² of 2n + 1 degrees of freedom.
+//! Where in the kernel, tables say (`radial.rs`): a uniform point of the ball or disc, found by rejection, is moved along its
+//! radius. A device does the same, in products and sums alone.
 
-use crate::blocks::Blocks;
+use crate::blocks::{Batch, Blocks};
+#[cfg(feature = "gpu")]
+use crate::gpu::{Maker, Twin};
 use crate::params::{countable, positive};
+use crate::radial::{Radial, Shape};
 use crate::sampler::{Poisson, PoissonSets};
-use crate::stream::{Stage, Stream};
+use crate::stream::{GOLDEN, Stage, pair, scramble, triple};
 use crate::{Error, PackedColor, PackedNormal, Particles};
 use glam::Vec3;
+#[cfg(feature = "gpu")]
+use rayon::prelude::*;
 use splat_core::optics::SurfaceOpacity;
-use splat_core::{Cloud, Footprint, FootprintStack, SplatKind, glam};
+use splat_core::{Cloud, FootprintStack, SplatKind, glam};
+#[cfg(feature = "gpu")]
+use splat_shaders::layouts::ParticleSource;
+
+/// Bit of a splat's kernel, where it fills a disc.
+#[cfg(feature = "gpu")]
+const DISC: u32 = 1 << 31;
 
 /// What a sampler of clouds needs.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,6 +59,10 @@ pub struct SplatSampler<'a> {
     cloud: &'a Cloud,
     params: SplatParams,
     sets: PoissonSets,
+    /// Tables of the kernels that splats have.
+    radials: Vec<Radial>,
+    /// Of each footprint the table of its ball and of its disc.
+    of_footprint: Vec<[usize; 2]>,
 }
 
 impl<'a> SplatSampler<'a> {
@@ -84,7 +94,8 @@ impl<'a> SplatSampler<'a> {
         }
         countable(blocks.total())?;
         let sets = PoissonSets::new(cloud.origin, params.cross_section, blocks);
-        Ok(Self { cloud, params: params.clone(), sets })
+        let (radials, of_footprint) = radials(cloud, &params.footprints);
+        Ok(Self { cloud, params: params.clone(), sets, radials, of_footprint })
     }
 
     /// Bytes of the tables.
@@ -93,41 +104,93 @@ impl<'a> SplatSampler<'a> {
     }
 }
 
-/// The order n of one term of the footprint.
-fn term(footprint: &Footprint, stream: &mut Stream) -> i32 {
-    let q = f64::from(footprint.sharpness());
-    // Inversion over the tail n + 1 ≥ 4; the sum of the tail is 1 − e^(−q)(1 + q + q²/2 + q³/6).
-    let mut p = q.powi(4) / 24.0;
-    let mut rest = stream.unit() * (q.exp() - 1.0 - q - q * q * (0.5 + q / 6.0));
-    let mut m = 4;
-    while rest > p && m < 400 {
-        rest -= p;
-        m += 1;
-        p *= q / f64::from(m);
+/// The tables of the kernels that occur, and where each is.
+fn radials(cloud: &Cloud, footprints: &FootprintStack) -> (Vec<Radial>, Vec<[usize; 2]>) {
+    let mut radials = Vec::new();
+    let mut of_footprint = vec![[usize::MAX; 2]; footprints.layers().len()];
+    for (kind, footprint) in cloud.kind.iter().zip(&cloud.footprint) {
+        let shape = if *kind == SplatKind::Medium { Shape::Ball } else { Shape::Disc };
+        let at = &mut of_footprint[usize::from(*footprint)][shape as usize];
+        if *at == usize::MAX {
+            *at = radials.len();
+            radials.push(Radial::new(&footprints.layers()[usize::from(*footprint)], shape));
+        }
     }
-    m - 1
+    (radials, of_footprint)
 }
 
-/// Offset in a kernel of radius 1.
-fn in_ball(n: i32, stream: &mut Stream) -> Vec3 {
-    let g = stream.normal3();
-    let one = stream.normal_pair()[0];
-    // χ² of 2n degrees of freedom: −2 ln of a product of n uniform numbers, taken in pieces that do not underflow.
-    let mut log = 0.0;
-    for part in [n / 2, n - n / 2] {
-        log += (0..part.min(16)).map(|_| stream.unit()).product::<f64>().ln();
-        log += (16..part).map(|_| stream.unit().ln()).sum::<f64>();
+/// Draws after which a splat's centre stands for a point that was not found: one arrival in 10²⁰.
+const TRIES: u64 = 64;
+
+/// A uniform point of the unit ball from 64 random bits, and its square: the first of a stream of points of the cube.
+#[inline]
+fn in_ball(bits: u64) -> (Vec3, f32) {
+    for number in tries(bits) {
+        let p = Vec3::from_array(triple(number).map(|u| 2.0 * u - 1.0));
+        let square = p.x * p.x + p.y * p.y + p.z * p.z;
+        if square < 1.0 {
+            return (p, square);
+        }
     }
-    let chi2 = one * one - 2.0 * log;
-    (g / (g.length_squared() + chi2).sqrt()).as_vec3()
+    (Vec3::ZERO, 0.0)
 }
 
-/// Offset on a disc of radius 1.
-fn on_disc(n: i32, stream: &mut Stream) -> [f64; 2] {
-    let s = 1.0 - stream.unit().powf(1.0 / f64::from(n + 1));
-    let (sin, cos) = (std::f64::consts::TAU * stream.unit()).sin_cos();
-    let radius = s.sqrt();
-    [radius * cos, radius * sin]
+/// A uniform point of the unit disc.
+#[inline]
+fn on_disc(bits: u64) -> ([f32; 2], f32) {
+    for number in tries(bits) {
+        let [x, y] = pair(number).map(|u| 2.0 * u - 1.0);
+        let square = x * x + y * y;
+        if square < 1.0 {
+            return ([x, y], square);
+        }
+    }
+    ([0.0; 2], 0.0)
+}
+
+/// The bits, then those that follow from them.
+fn tries(bits: u64) -> impl Iterator<Item = u64> {
+    let later = (1..TRIES).map(move |k| scramble(bits.wrapping_add(k.wrapping_mul(GOLDEN))));
+    std::iter::once(bits).chain(later)
+}
+
+impl SplatSampler<'_> {
+    /// The table of a splat's kernel.
+    #[inline]
+    fn radial(&self, i: usize) -> usize {
+        let shape = if self.cloud.kind[i] == SplatKind::Medium { Shape::Ball } else { Shape::Disc };
+        self.of_footprint[usize::from(self.cloud.footprint[i])][shape as usize]
+    }
+
+    fn normal(&self, i: usize) -> PackedNormal {
+        let normal = PackedNormal::new(self.cloud.normal_of(i));
+        let per_crossing = self.params.surface_opacity == SurfaceOpacity::PerCrossing;
+        if self.cloud.kind[i] != SplatKind::Medium && per_crossing { normal.per_crossing() } else { normal }
+    }
+
+    /// The semi-axes of a disc.
+    #[inline]
+    fn axes(&self, i: usize) -> [Vec3; 2] {
+        let (normal, radius) = (self.cloud.normal_of(i), self.cloud.radius[i]);
+        let tangent = match self.cloud.tangent_of(i) {
+            Vec3::ZERO => normal.any_orthonormal_vector() * radius,
+            tangent => tangent,
+        };
+        [tangent, normal.cross(tangent.normalize_or_zero()) * radius]
+    }
+
+    /// A particle of splat `i` from 64 random bits: products and sums alone beside what a splat has once.
+    #[inline]
+    fn place(&self, i: usize, bits: u64) -> Vec3 {
+        let radial = &self.radials[self.radial(i)];
+        if self.cloud.kind[i] == SplatKind::Medium {
+            let (p, square) = in_ball(bits);
+            return self.cloud.position[i] + p * radial.stretch(square) * self.cloud.radius[i];
+        }
+        let ([x, y], square) = on_disc(bits);
+        let ([tangent, across], h) = (self.axes(i), radial.stretch(square));
+        self.cloud.position[i] + (tangent * x + across * y) * h
+    }
 }
 
 impl Poisson for SplatSampler<'_> {
@@ -136,25 +199,34 @@ impl Poisson for SplatSampler<'_> {
     }
 
     fn fill(&self, set: u64, chunk: usize, particles: &mut Particles) {
-        let layers = self.params.footprints.layers();
-        self.sets.blocks.arrivals(self.params.seed, Stage::Splats, set, chunk, |i, stream| {
-            let n = term(&layers[usize::from(self.cloud.footprint[i])], stream);
-            let (normal, radius) = (self.cloud.normal_of(i), self.cloud.radius[i]);
-            let mut packed = PackedNormal::new(normal);
-            let offset = if self.cloud.kind[i] == SplatKind::Medium {
-                in_ball(n, stream) * radius
-            } else {
-                if self.params.surface_opacity == SurfaceOpacity::PerCrossing {
-                    packed = packed.per_crossing();
-                }
-                let [u, v] = on_disc(n, stream).map(|x| x as f32);
-                let tangent = match self.cloud.tangent_of(i) {
-                    Vec3::ZERO => normal.any_orthonormal_vector() * radius,
-                    tangent => tangent,
-                };
-                tangent * u + normal.cross(tangent.normalize_or_zero()) * (radius * v)
-            };
-            particles.push(self.cloud.position[i] + offset, packed, PackedColor::new(self.cloud.color[i]));
+        self.sets.blocks.batches(self.params.seed, Stage::Splats, set, chunk, |batch: &Batch<1>| {
+            for (&i, &bits) in batch.elements[..batch.len].iter().zip(&batch.bits[0]) {
+                particles.push(self.place(i, bits), self.normal(i), PackedColor::new(self.cloud.color[i]));
+            }
         });
+    }
+
+    #[cfg(feature = "gpu")]
+    fn tables(&self) -> Option<Twin> {
+        let cloud = self.cloud;
+        let medium = |i: usize| cloud.kind[i] == SplatKind::Medium;
+        // Place, normal, colour and kernel; the radius of a ball, or the semi-axes of a disc.
+        let words = if (0..cloud.len()).all(medium) { 7 } else { 12 };
+        let mut splats = vec![0u32; words as usize * cloud.len()];
+        splats.par_chunks_exact_mut(words as usize).enumerate().for_each(|(i, splat)| {
+            let place = cloud.position[i].to_array().map(f32::to_bits);
+            let (color, kernel) = (PackedColor::new(cloud.color[i]).bits(), self.radial(i) as u32);
+            splat[..3].copy_from_slice(&place);
+            splat[3..6].copy_from_slice(&[self.normal(i).bits(), color, kernel | if medium(i) { 0 } else { DISC }]);
+            if medium(i) {
+                splat[6] = cloud.radius[i].to_bits();
+            } else {
+                let axes = self.axes(i).map(|axis| axis.to_array().map(f32::to_bits));
+                splat[6..].copy_from_slice(axes.as_flattened());
+            }
+        });
+        let kernels = self.radials.iter().flat_map(|r| r.cells()).flat_map(|cell| cell.map(f32::to_bits)).collect();
+        let source = ParticleSource { vertex_words: words, ..ParticleSource::default() };
+        Some(Twin::new(Maker::Splats, self, source, vec![splats, kernels], (self.params.seed, Stage::Splats)))
     }
 }

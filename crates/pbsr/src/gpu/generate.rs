@@ -78,6 +78,7 @@ pub fn record_generated(
             Maker::Mesh => &kernels::PBSR_MESH,
             Maker::Volume => &kernels::PBSR_VOLUME,
             Maker::Lattice => &kernels::PBSR_LATTICE,
+            Maker::Splats => &kernels::PBSR_SPLATS,
         };
         let mut buffers = vec![*source];
         buffers.extend(tables);
@@ -104,7 +105,7 @@ fn count(
         let arrive = [*source, tables[0], arrivals, counts];
         r.dispatch(&kernels::PBSR_ARRIVE, Groups::cover(each.div_ceil(super::BLOCK)), &arrive, &[]);
         let thinned = match twin.maker {
-            Maker::Mesh => continue,
+            Maker::Mesh | Maker::Splats => continue,
             Maker::Volume => &kernels::PBSR_VOLUME_COUNT,
             Maker::Lattice => &kernels::PBSR_LATTICE_COUNT,
         };
@@ -122,6 +123,7 @@ impl super::Twin {
             Maker::Mesh => &["chunks", "triangles", "vertices"],
             Maker::Volume => &["chunks", "cells", "values", "transfer"],
             Maker::Lattice => &["chunks", "cells", "values"],
+            Maker::Splats => &["chunks", "splats", "kernels"],
         };
         let source = r.input("source", size_of::<ParticleSource>() as u64);
         let bytes = self.tables.iter().map(|t| 4 * t.len() as u64);

@@ -19,6 +19,8 @@ pub(crate) enum Maker {
     Volume,
     /// Tables: cells, values.
     Lattice,
+    /// Tables: splats, kernels.
+    Splats,
 }
 
 /// A sampler as a device takes it.

@@ -4,12 +4,14 @@ use gpu_conformance::{Device, open, words};
 use pbsr::gpu::{Capacities, Nearest, Sources, record, record_generated};
 use pbsr::{
     Appearance, Density, Ensemble, EnsembleParams, Error, FoldParams, GridSampler, KeptSets, LatticeSampler,
-    MeshSampler, Object, Renderer, Sampler, Scene, SurfaceParams, VolumeParams, finest_pixel_area,
+    MeshSampler, Object, Renderer, Sampler, Scene, SplatParams, SplatSampler, SurfaceParams, VolumeParams,
+    finest_pixel_area,
 };
 use splat_core::glam::{DMat3, DQuat, DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
 use splat_core::{
-    Camera, Grid, Material, Mesh, Progress, Projection, Shading, Similarity, TransferFunction, TransferPoint, rng,
+    Camera, Cloud, Grid, Material, Mesh, Progress, Projection, Shading, Similarity, Splat, SplatKind, TransferFunction,
+    TransferPoint, rng,
 };
 use std::collections::BTreeSet;
 
@@ -22,7 +24,36 @@ struct World {
     sheet: Mesh,
     grid: Grid,
     transfer: TransferFunction,
+    cloud: Cloud,
     camera: Camera,
+}
+
+/// A ball of media and discs, round and long ones, of every kernel; a few of them opaque.
+fn splats() -> Cloud {
+    let mut cloud = Cloud::new(DVec3::new(-0.1, 0.1, 0.2));
+    for i in 0..3000u64 {
+        let u = |k| rng::unit_f32(77, 0, i, k);
+        let from_middle = Vec3::new(u(0) - 0.5, u(1) - 0.5, u(2) - 0.5) * 1.6;
+        let (normal, radius) = ((from_middle + Vec3::splat(0.1)).normalize(), 0.03 + 0.07 * u(3));
+        let kind = match i % 16 {
+            0 => SplatKind::Opaque,
+            1..8 => SplatKind::Surface,
+            _ => SplatKind::Medium,
+        };
+        let disc = kind != SplatKind::Medium;
+        cloud.push(&Splat {
+            position: from_middle,
+            normal: if disc { normal } else { Vec3::ZERO },
+            tangent: if disc && i % 3 == 0 { normal.any_orthonormal_vector() * radius * 1.7 } else { Vec3::ZERO },
+            radius,
+            cross_section: if kind == SplatKind::Opaque { 1e-4 } else { 2e-4 + 2e-3 * u(4) },
+            color: [u(5), 0.6, 1.0 - u(5)],
+            kind,
+            footprint: (i % 3) as u8,
+            ..Splat::default()
+        });
+    }
+    cloud
 }
 
 impl World {
@@ -59,7 +90,7 @@ impl World {
         let transfer = TransferFunction::new(points).unwrap();
         let view = Projection::Perspective { fov_y: 0.6 };
         let camera = Camera::look_at(DVec3::new(0.4, 0.3, 4.0), DVec3::ZERO, DVec3::Y, view, SIZE).unwrap();
-        Self { wall, sheet, grid, transfer, camera }
+        Self { wall, sheet, grid, transfer, cloud: splats(), camera }
     }
 
     /// The three samplers; `scale` of the area that no particle needs to be widened for, `bias` of their optical depths.
@@ -94,6 +125,16 @@ impl World {
             ..SurfaceParams::default()
         };
         LatticeSampler::new(&self.grid, 0.4, &params).unwrap()
+    }
+
+    /// Of the cloud.
+    fn splats(&self, seed: u64, scale: f64) -> SplatSampler<'_> {
+        let params = SplatParams {
+            cross_section: scale * finest_pixel_area(&self.camera, DVec3::ZERO, 1.5, 1e-3),
+            seed: seed + 4,
+            ..SplatParams::default()
+        };
+        SplatSampler::new(&self.cloud, &params).unwrap()
     }
 
     fn with<T>(&self, samplers: [&dyn Sampler; 3], work: impl FnOnce(&Scene<'_>) -> T) -> T {
@@ -178,6 +219,7 @@ fn particles_of_one_seed_are_the_cpu_s() {
     let mut device = open().unwrap();
     are_alike(&mut device, &world, [&wall, &sheet, &volume]);
     are_alike(&mut device, &world, [&wall, &world.crossings(11, 1.0, 1.0), &volume]);
+    are_alike(&mut device, &world, [&wall, &world.splats(11, 1.0), &volume]);
 }
 
 fn are_alike(device: &mut Device, world: &World, samplers: [&dyn Sampler; 3]) {
@@ -241,8 +283,10 @@ fn hits_of_one_seed_are_the_cpu_s() {
     // Widened and thinned out; the second run begins where the first ends.
     for scale in [0.5, 6.0] {
         let (wall, sheet, volume) = world.samplers(5, scale, 1.0);
-        let crossings = world.crossings(5, scale, 1.0);
-        for samplers in [[&wall as &dyn Sampler, &sheet, &volume], [&wall, &crossings, &volume]] {
+        let (crossings, splats) = (world.crossings(5, scale, 1.0), world.splats(5, scale));
+        for samplers in
+            [[&wall as &dyn Sampler, &sheet, &volume], [&wall, &crossings, &volume], [&wall, &sheet, &splats]]
+        {
             world.with(samplers, |scene| {
                 let [cpu, gpu] = [by_processor(scene, 2 * ROOM.levels), by_device(&mut device, scene, 2)];
                 let same = pixels().filter(|&(x, y)| cpu.hits(x, y) == gpu.hits(x, y)).count();
@@ -340,10 +384,45 @@ fn means_of_crossings_are_the_cpu_s_and_a_bias_is_found() {
 }
 
 #[test]
+fn means_of_splats_are_the_cpu_s_and_a_bias_is_found() {
+    if assisted() {
+        return;
+    }
+    let world = World::new();
+    let clear = SurfaceParams { opacity: 0.0, ..SurfaceParams::default() };
+    let nothing = MeshSampler::new(&world.wall, &clear, None).unwrap();
+    let ensemble = |world: &World, seed, device| {
+        world.with([&world.splats(seed, 1.0), &nothing, &nothing], |scene| {
+            if device { by_device(&mut open().unwrap(), scene, RUNS) } else { by_processor(scene, RUNS * ROOM.levels) }
+        })
+    };
+    let cpu = ensemble(&world, 505, false);
+    let [chi2, hits, light] = deviations(&ensemble(&world, 606, true), &cpu);
+    assert!(chi2 < 3.09 && hits.abs() < 3.29 && light.abs() < 3.29, "{chi2} {hits} {light}");
+    // Kernels of 30 % more radius: the same number of particles, in other places.
+    let mut wide = World::new();
+    wide.cloud.radius.iter_mut().for_each(|radius| *radius *= 1.3);
+    let [chi2, ..] = deviations(&ensemble(&wide, 606, true), &cpu);
+    assert!(chi2 > 6.0, "{chi2}");
+    // Optical depths of 4 % more.
+    wide.cloud = splats();
+    wide.cloud.cross_section.iter_mut().for_each(|area| *area *= 1.04);
+    let [_, hits, light] = deviations(&ensemble(&wide, 606, true), &cpu);
+    assert!(hits > 6.0 && light.abs() > 6.0, "{hits} {light}");
+}
+
+#[test]
 fn too_little_room_folds_nothing_and_says_what_is_needed() {
     let world = World::new();
     let (wall, sheet, volume) = world.samplers(3, 1.0, 1.0);
-    world.with([&wall, &sheet, &volume], |scene| {
+    let splats = world.splats(3, 1.0);
+    for samplers in [[&wall as &dyn Sampler, &sheet, &volume], [&wall, &splats, &sheet]] {
+        room_is_told(&world, samplers);
+    }
+}
+
+fn room_is_told(world: &World, samplers: [&dyn Sampler; 3]) {
+    world.with(samplers, |scene| {
         let (mut device, sources) = (open().unwrap(), Sources::new(scene).unwrap());
         let mut run = |room: Capacities| {
             let mut ensemble = empty();
