@@ -54,7 +54,8 @@ impl Passport {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Checked {
     /// `order`, `shadow lists`, `shadow look-ups`, `shadow` (deposits, lists and look-ups as one), `project`, `shade`,
-    /// `composite`, `opaque`, `chain` (the order and the three before as one), `particles` (uploaded sets) or `made particles` (sets of
+    /// `composite`, `draw` (the same by the device's rasterizer, where it blends 32-bit floats), `opaque`, `chain` (the order,
+    /// `project`, `shade` and `composite` as one), `particles` (uploaded sets) or `made particles` (sets of
     /// the same seeds that the device makes).
     pub recording: &'static str,
     /// Splats or particles that went in.
@@ -145,7 +146,8 @@ fn inspect(backend: &dyn Backend, place: usize, adapter: Adapter, input: &Inputs
             Err(why) => Checked { recording, items: 0, outcome: Err(why.to_string()), passes: Vec::new() },
         }
     };
-    let recordings = vec![
+    let draws = adapter.drawing.targets > 1 && adapter.drawing.blends_single;
+    let mut recordings = vec![
         check("order", &mut |device| check_order(device, &input.order)),
         check("shadow lists", &mut |device| input.shadow.check_lists(device)),
         check("shadow look-ups", &mut |device| input.shadow.check_look_ups(device)),
@@ -154,15 +156,18 @@ fn inspect(backend: &dyn Backend, place: usize, adapter: Adapter, input: &Inputs
         check("shade", &mut |device| input.chain.check_shade(device)),
         check("composite", &mut |device| input.composite.check(device)),
         check("opaque", &mut |device| input.opaque.check(device)),
+        check("draw", &mut |device| input.composite.check_drawn(device)),
         check("chain", &mut |device| input.chain.check_chain(device)),
         check("particles", &mut |device| input.particles.check(device, Folding::uploaded())),
         check("made particles", &mut |device| input.particles.check(device, Folding::default())),
     ];
+    recordings.retain(|r| draws || r.recording != "draw");
     let clockless = recordings.iter().all(|r| r.outcome.is_ok() && r.passes.is_empty());
     let missing = [
         (clockless, "timestamps"),
         (adapter.subgroup == 0, "the size of a subgroup"),
         (Lanes::of(&adapter) == Lanes::Portable, "operations of subgroups"),
+        (!draws, "draws that blend 32-bit floats"),
     ];
     let missing = missing.into_iter().filter(|(lacks, _)| *lacks).map(|(_, what)| what).collect();
     Passport { backend: backend.name(), adapter, missing, recordings }
