@@ -5,8 +5,8 @@
 // As `radix_scatter`, by subgroups: the multisplit of S. Ashkiani et al. 2016, with whole runs of equal digits written by
 // neighbours (D. Merrill and A. Grimshaw 2011).
 //
-// Subgroups are shared out to eight rows at most; a row takes 8 times as many keys in a row of the block as it has threads.
-// Of each 8th of them the ballots of a digit's bits say who has an equal one, and the first of those counts all in the row's
+// Subgroups are shared out to eight rows at most; a row takes eight times as many neighbouring keys as it has threads, in steps.
+// In a step the ballots of a digit's bits say who has an equal one, and the first of those counts all of them in the row's
 // table; subgroups of one row take turns. What was counted before, in this row and in those before it, is a key's place in
 // the block. There keys and companions are exchanged, so that neighbours write to neighbours.
 
@@ -100,6 +100,8 @@ void main() {
         uint digit = digit_of(own_keys[k]);
         uvec4 equals = equals_of(digit);
         uint rank = count_of(equals & below);
+        // Known before the barriers, after which all threads of a subgroup go on together.
+        uint leader = first_of(equals);
         uint before = 0u;
         for (uint turn = 0u; turn < turns; turn++) {
             if (rank == 0u && gl_SubgroupID % turns == turn) {
@@ -107,7 +109,7 @@ void main() {
             }
             barrier();
         }
-        to[k] = subgroupShuffle(before, first_of(equals)) + rank;
+        to[k] = subgroupShuffle(before, leader) + rank;
     }
 
     // This thread's own digit.
