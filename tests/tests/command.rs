@@ -185,8 +185,9 @@ fn passport_names_every_device_and_conforms_or_is_exit_6() {
         let recordings = passport["recordings"].as_array().unwrap();
         let names: Vec<_> = recordings.iter().map(|r| r["recording"].as_str().unwrap()).collect();
         let shadows = ["shadow lists", "shadow look-ups", "shadow"];
-        let drawing = ["project", "shade", "composite", "draw", "chain", "particles", "made particles"];
-        let mut all = [&["order"][..], &shadows, &drawing].concat();
+        let splats = ["project", "shade", "composite", "draw", "opaque", "chain"];
+        let particles = ["particles", "made particles", "lit particles"];
+        let mut all = [&["order"][..], &shadows, &splats, &particles].concat();
         // A device that does not draw says so, and is valid all the same.
         let missing = passport["missing"].as_array().unwrap();
         let draws = !missing.contains(&"draws that blend 32-bit floats".into());

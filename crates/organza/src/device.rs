@@ -118,6 +118,8 @@ enum Failure {
     Splats(#[from] splat_core::Error),
     #[error("its buffers or its memory are too small for all splats at once")]
     Small,
+    #[error("{0}")]
+    Left(&'static str),
     #[error("it rounds otherwise than the processor, so the picture would be another")]
     Rounds,
 }

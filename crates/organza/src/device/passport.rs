@@ -3,6 +3,7 @@
 mod chain;
 mod composite;
 mod opaque;
+mod particles;
 mod shadow;
 
 use super::particles::Folding;
@@ -12,18 +13,13 @@ use crate::Error;
 use chain::ChainInput;
 use composite::CompositeInput;
 use opaque::OpaqueInput;
-use pbsr::{
-    Appearance, Ensemble, EnsembleParams, FoldParams, MeshSampler, Object, Renderer, Scene, SurfaceParams, pixel_area,
-};
+use particles::ParticlesInput;
 use shadow::ShadowInput;
-use splat_core::glam::{DQuat, DVec3, Vec3};
-use splat_core::{Camera, Material, Mesh, Progress, Projection, Shading, Similarity, SliceOrder};
+use splat_core::SliceOrder;
 use splat_shaders::{Adapter, Backend, Choice, DeviceError, Executor, Lanes, PassTime, Validation};
 
 /// Splats that are ordered.
 const SPLATS: u32 = 1 << 17;
-/// Sets of particles that are folded.
-const SETS: u32 = 3;
 /// Pictures of particles and of splats.
 const SIZE: [u32; 2] = [320, 200];
 /// Share of pixels whose hits must agree, for a GPU may round the square root and the division in k otherwise; and of splats
@@ -55,8 +51,8 @@ impl Passport {
 pub struct Checked {
     /// `order`, `shadow lists`, `shadow look-ups`, `shadow` (deposits, lists and look-ups as one), `project`, `shade`,
     /// `composite`, `draw` (the same by the device's rasterizer, where it blends 32-bit floats), `opaque`, `chain` (the order,
-    /// `project`, `shade` and `composite` as one), `particles` (uploaded sets) or `made particles` (sets of
-    /// the same seeds that the device makes).
+    /// `project`, `shade` and `composite` as one), `particles` (uploaded sets), `made particles` (sets of the same seeds that the
+    /// device makes) or `lit particles` (the same in the light of a lamp with a shadow map).
     pub recording: &'static str,
     /// Splats or particles that went in.
     pub items: u64,
@@ -71,7 +67,8 @@ pub struct Checked {
 pub struct Agreement {
     /// Whether that is enough: equal bits for the order and the lists of shadow maps, 10⁻⁵ for look-ups in them and for what
     /// is made of splats, 10⁻⁴ for 99.9 % of the splats lit through maps that stay on the device, 10⁻⁵ for 99.9 % of the
-    /// pixels of opaque splats, 99.9 % of the pixels' hits for particles.
+    /// pixels of opaque splats, 99.9 % of the pixels' hits for particles, and where they agree 3·10⁻⁵ of the brightest light, but
+    /// for 0.1 % of the pixels.
     pub within: bool,
     /// Share of places, cells or pixels that are equal in bits.
     pub equal_share: f64,
@@ -155,11 +152,12 @@ fn inspect(backend: &dyn Backend, place: usize, adapter: Adapter, input: &Inputs
         check("project", &mut |device| input.chain.check_project(device)),
         check("shade", &mut |device| input.chain.check_shade(device)),
         check("composite", &mut |device| input.composite.check(device)),
-        check("opaque", &mut |device| input.opaque.check(device)),
         check("draw", &mut |device| input.composite.check_drawn(device)),
+        check("opaque", &mut |device| input.opaque.check(device)),
         check("chain", &mut |device| input.chain.check_chain(device)),
         check("particles", &mut |device| input.particles.check(device, Folding::uploaded())),
         check("made particles", &mut |device| input.particles.check(device, Folding::default())),
+        check("lit particles", &mut |device| input.particles.check_lit(device, &input.shadow)),
     ];
     recordings.retain(|r| draws || r.recording != "draw");
     let clockless = recordings.iter().all(|r| r.outcome.is_ok() && r.passes.is_empty());
@@ -220,70 +218,5 @@ fn order_agreement(found: &SliceOrder, expected: &SliceOrder) -> Agreement {
         mean: apart.iter().sum::<f64>() / n,
         max: apart.iter().copied().fold(0.0, f64::max),
         unit: "places",
-    }
-}
-
-/// Two walls, one before the other, in particles; the nearer ones are widened, the farther thinned out.
-struct ParticlesInput {
-    walls: [Mesh; 2],
-    camera: Camera,
-}
-
-impl ParticlesInput {
-    fn new() -> Self {
-        let wall = |side: f32, z: f32| {
-            let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-            let position = corners.map(|(x, y)| Vec3::new(side * x, side * y, z)).to_vec();
-            Mesh { position, triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() }
-        };
-        let (eye, view) = (DVec3::new(0.3, 0.2, 4.0), Projection::Perspective { fov_y: 0.7 });
-        let camera = Camera::look_at(eye, DVec3::ZERO, DVec3::Y, view, SIZE).expect("invariant: a view of its target");
-        Self { walls: [wall(0.7, 0.8), wall(1.5, -0.5)], camera }
-    }
-
-    fn check(&self, device: &mut dyn Executor, mut folding: Folding<'_>) -> Result<Found, Failure> {
-        let middle = pixel_area(&self.camera, DVec3::new(0.0, 0.0, 4.0));
-        let params = |s: f64, seed, color| SurfaceParams {
-            opacity: 0.4,
-            cross_section: s * middle,
-            color,
-            seed,
-            ..SurfaceParams::default()
-        };
-        let near = MeshSampler::new(&self.walls[0], &params(3.0, 1, [0.9, 0.4, 0.1]), None)?;
-        let far = MeshSampler::new(&self.walls[1], &params(0.5, 2, [0.1, 0.5, 2.0]), None)?;
-        let material = Material { shading: Shading::Unlit, ..Material::default() };
-        let object = |sampler, turn| {
-            let transform = Similarity { rotation: DQuat::from_rotation_y(turn), ..Similarity::default() };
-            Object { sampler, transform, look: Appearance { material, ..Appearance::default() } }
-        };
-        let objects = [object(&near, 0.5), object(&far, -0.3)];
-        let scene = Scene { objects: &objects, lights: &[], ambient: [0.0; 3], camera: &self.camera, occluder: None };
-        let empty = Ensemble::new(SIZE, &EnsembleParams { radiance_unit: 0.5, ..EnsembleParams::default() })?;
-        let (mut expected, mut found, progress) = (empty.clone(), empty, Progress::default());
-        Renderer::new().fold(&scene, &mut expected, SETS, &FoldParams::default(), &progress)?;
-        folding.fold_on(device, &scene, &mut found, SETS, u64::MAX, &progress)?;
-        let Folding { particles, passes, .. } = folding;
-        Ok(Found { items: particles, agreement: particles_agreement(&found, &expected), passes })
-    }
-}
-
-fn particles_agreement(found: &Ensemble, expected: &Ensemble) -> Agreement {
-    let pixels = || (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| (x, y)));
-    let same = pixels().filter(|&(x, y)| found.hits(x, y) == expected.hits(x, y)).count();
-    let radiance = |ensemble: &Ensemble| {
-        let layers = ensemble.read(&|_, _| [0.0; 3], None);
-        layers.rgb("beauty").map(<[[f32; 3]]>::to_vec).unwrap_or_default()
-    };
-    let (a, b) = (radiance(found), radiance(expected));
-    let apart: Vec<f64> =
-        a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| f64::from((a - b).abs())).collect();
-    let equal_share = same as f64 / pixels().count() as f64;
-    Agreement {
-        within: equal_share >= LEAST_SHARE,
-        equal_share,
-        mean: apart.iter().sum::<f64>() / apart.len().max(1) as f64,
-        max: apart.iter().copied().fold(0.0, f64::max),
-        unit: "radiance",
     }
 }

@@ -25,6 +25,7 @@ pub(super) struct ShadowInput {
     deposits: Deposits,
     map: ShadowMap,
     receivers: Vec<Receiver>,
+    light: Light,
 }
 
 impl ShadowInput {
@@ -57,7 +58,12 @@ impl ShadowInput {
             kind: cloud.kind[i],
         };
         let receivers = (0..cloud.len()).map(receiver).collect();
-        Ok(Self { cloud, casting, deposits, map, receivers })
+        Ok(Self { cloud, casting, deposits, map, receivers, light })
+    }
+
+    /// The processor's map, and its light.
+    pub(super) fn lamp(&self) -> (&ShadowMap, Light) {
+        (&self.map, self.light)
     }
 
     /// The lists: equal bits, cell by cell.
