@@ -164,6 +164,10 @@ kernels! {
     PBSR_SUM = "pbsr_sum" [Read, Read, Read, Read, Write] push 4;
     /// How many arrivals each chunk of each set has: source, tables → arrivals, counts.
     PBSR_ARRIVE = "pbsr_arrive" [Read, Read, Write, Write];
+    /// How many particles each part of a set has that the caller gives: spans → counts. Push: spans.
+    PBSR_GIVEN_COUNT = "pbsr_given_count" [Read, Write] push 4;
+    /// Particles that the caller gives: spans, given, scanned counts → particles. Push: spans.
+    PBSR_GIVEN = "pbsr_given" [Read, Read, Read, Write] push 4;
     /// Where each set begins, and what was found: source, scan, scanned counts → sets, found. Push: room for all sets, room
     /// for one.
     PBSR_SETS = "pbsr_sets" [Read, Read, Read, Write, Write] push 8;

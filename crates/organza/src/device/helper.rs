@@ -176,7 +176,7 @@ impl Helper {
         match folded {
             Some(Ok(Some(why))) => self.leave(why),
             _ if folding.uploads() => {
-                self.leave("particles of other things than meshes, regular volumes and their trilinear isosurfaces are sampled by the processor");
+                self.leave("particles by random lines, walks and fields, and of tables too large for the device, are sampled by the processor");
             }
             _ => {}
         }

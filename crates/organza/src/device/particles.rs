@@ -1,7 +1,7 @@
 //! Sets of particles, made, projected and averaged by a device.
 //!
-//! Where every sampler of a scene has a twin, the device makes the sets itself: tables go up once, and of a set nothing.
-//! Elsewhere the processor samples them and they are uploaded. Sets are independent, so as many go into one run as the
+//! Where a sampler has a twin, the device makes its particles itself: tables go up once, and of a set nothing. Those of others the
+//! processor samples, and they are uploaded. Sets are independent, so as many go into one run as the
 //! device's kernels can see at once; what a run gave is added to the ensemble here, and a device that is lost costs no more
 //! than the sets of its last run.
 //!
@@ -55,9 +55,9 @@ impl<'a> Folding<'a> {
         Self { sources: Some(None), ..Self::default() }
     }
 
-    /// Whether the processor samples the sets.
+    /// Whether the processor samples some of the particles.
     pub(super) fn uploads(&self) -> bool {
-        self.sources == Some(None)
+        self.sources.as_ref().is_some_and(|sources| sources.as_ref().is_none_or(Sources::has_given))
     }
 
     /// Folds sets until the ensemble has `until` of them, with at most so many bytes of particles at once, or says why the rest
@@ -149,7 +149,10 @@ impl<'a> Folding<'a> {
                 (generated, ready)
             }
         });
-        let mut inputs = generated.next(sources, ensemble);
+        let mut inputs = match generated.next(sources, scene, ensemble) {
+            Ok(inputs) => inputs,
+            Err(why) => return Ok(Err(why)),
+        };
         let maps = if fresh { light.uploads(scene, &self.shadows)? } else { Vec::new() };
         if fresh {
             inputs.extend(generated.tables(sources, scene, ensemble)?);

@@ -2,13 +2,14 @@
 //!
 //! Each chunk of each set draws its Poisson number from its own counter; volumes count what stays of their arrivals; one
 //! scan over the chunks of all sets, objects and levels gives every particle its place, which is the one that it has among
-//! uploaded ones. Then each chunk is made by a workgroup, and the projection of uploaded sets goes on from there.
+//! uploaded ones. Then each chunk is made by a workgroup, and the projection of uploaded sets goes on from there. Particles of
+//! samplers that have no twin are given run by run: their numbers are counts like those of chunks, and they move to their places.
 //!
 //! Deviations from the CPU: a Poisson number takes logarithms in 32 bits, so in some chunks of 10⁵ it is another by one; a
 //! place takes products and sums alone and has the CPU's bits, a normal and a colour are at most one step off.
 
 use super::twin::{Maker, Sources, halves};
-use super::{Capacities, Lighting, Lit, Nearest, PARTICLE_WORDS, Recorded, record, room, take_in};
+use super::{Capacities, Lighting, Lit, Nearest, PARTICLE_WORDS, Recorded, record, room, sample, take_in};
 use crate::{Ensemble, Error, Scene};
 use splat_shaders::layouts::{ParticleSource, ParticlesFound, Scan};
 use splat_shaders::radix::{SCAN_BLOCK, Scanned};
@@ -41,8 +42,62 @@ pub struct Generated {
     scan: BufferId,
     /// Of each object its source and its tables.
     sources: Vec<(BufferId, Vec<BufferId>)>,
+    given: Option<Given>,
     projection: Recorded,
     in_whole: Joined,
+}
+
+/// Particles of samplers without a twin, uploaded run by run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Given {
+    /// Of each part of each set of each object: place among the counts, first particle, particles.
+    spans: BufferId,
+    particles: BufferId,
+    /// How many spans there are.
+    parts: u32,
+    /// Room for so many particles.
+    room: u32,
+}
+
+impl Given {
+    fn record(r: &mut Recording, capacities: &Capacities, sources: &Sources) -> Option<Self> {
+        let chunks: u32 = sources.twins.iter().filter(|twin| twin.is_given()).map(|twin| twin.source.chunks).sum();
+        let parts = chunks.saturating_mul(capacities.levels);
+        let expected = f64::from(capacities.particles) * sources.given_share;
+        let room = ((expected + 6.0 * expected.sqrt() + 64.0) as u32).min(capacities.particles);
+        let bytes = 4 * PARTICLE_WORDS as u64 * u64::from(room);
+        (chunks > 0).then(|| {
+            let (spans, particles) = (r.input("spans", 12 * u64::from(parts)), r.input("given", bytes));
+            Self { spans, particles, parts, room }
+        })
+    }
+
+    /// Samples the sets from `first` on, as many as there is room for.
+    fn sample(
+        &self,
+        capacities: &Capacities,
+        sources: &Sources,
+        scene: &Scene<'_>,
+        first: u64,
+    ) -> Result<Inputs<'static>, Error> {
+        let (mut spans, mut particles): (Vec<[u32; 3]>, Vec<_>) = (Vec::new(), Vec::new());
+        for level in 0..capacities.levels {
+            let objects = scene.objects.iter().zip(&sources.twins).zip(0u32..);
+            for ((object, twin), at) in objects.filter(|((_, twin), _)| twin.is_given()) {
+                let (begin, source) = (particles.len(), &twin.source);
+                sample(object, at, first + u64::from(level), &mut particles);
+                let each = (particles.len() - begin).div_ceil(source.chunks as usize);
+                let place = level * source.all_chunks + source.first_chunk;
+                spans.extend((0..source.chunks).map(|chunk| {
+                    let [from, to] = [chunk, chunk + 1].map(|c| (begin + c as usize * each).min(particles.len()));
+                    [place + chunk, from as u32, (to - from) as u32]
+                }));
+            }
+        }
+        room("particles", particles.len(), self.room)?;
+        let bytes = [bytemuck::cast_slice(&spans).to_vec(), bytemuck::cast_slice(&particles).to_vec()];
+        Ok([self.spans, self.particles].into_iter().zip(bytes.map(Cow::Owned)).collect())
+    }
 }
 
 /// Records the making of sets from these sources, and their folding, with this room.
@@ -62,34 +117,68 @@ pub fn record_generated(
     let r = &mut recording;
     let scan = r.input("scan", size_of::<Scan>() as u64);
     let inputs: Vec<(BufferId, Vec<BufferId>)> = sources.twins.iter().map(|twin| twin.input(r)).collect();
+    let given = Given::record(r, &capacities, sources);
     let arrivals = r.scratch("arrivals", 4 * ARRIVAL_WORDS * u64::from(chunks));
     let counts = Scanned::scratch(r, scan, ["counts", "count sums"], chunks);
     let particle_bytes = 4 * PARTICLE_WORDS as u64 * u64::from(particles);
     let (particles, sets) = (r.scratch("particles", particle_bytes), r.scratch("sets", 12 * u64::from(levels)));
     let found = r.scratch("found", size_of::<ParticlesFound>() as u64);
     count(r, sources, &inputs, levels, [arrivals, counts.numbers]);
+    if let Some(Given { spans, parts, .. }) = given {
+        let each = Groups::cover(parts.div_ceil(super::BLOCK));
+        r.dispatch(&kernels::PBSR_GIVEN_COUNT, each, &[spans, counts.numbers], &[parts]);
+    }
     counts.record(r, Groups::cover(chunks.div_ceil(SCAN_BLOCK)));
     if let Some((source, _)) = inputs.first() {
         let buffers = [*source, scan, counts.numbers, sets, found];
         r.dispatch(&kernels::PBSR_SETS, Groups::cover(1), &buffers, &[capacities.particles, of_set]);
     }
-    for (twin, (source, tables)) in sources.twins.iter().zip(&inputs) {
+    put(r, sources, (&inputs, given), levels, [arrivals, counts.numbers, particles]);
+    r.read(found);
+    let [.., of_sets, of_particles] = projection.inputs;
+    let in_whole = r.join(&projection.recording, &[(of_sets, sets), (of_particles, particles)]);
+    let (sums, sources) = (in_whole.of(projection.sums), inputs);
+    Ok(Generated {
+        recording,
+        capacities,
+        sums,
+        found,
+        sets,
+        particles,
+        arrivals,
+        scan,
+        sources,
+        given,
+        projection,
+        in_whole,
+    })
+}
+
+/// The particles of all chunks, where they belong.
+fn put(
+    r: &mut Recording,
+    sources: &Sources,
+    (inputs, given): (&[(BufferId, Vec<BufferId>)], Option<Given>),
+    levels: u32,
+    [arrivals, counts, particles]: [BufferId; 3],
+) {
+    for (twin, (source, tables)) in sources.twins.iter().zip(inputs) {
         let kernel = match twin.maker {
             Maker::Mesh => &kernels::PBSR_MESH,
             Maker::Volume => &kernels::PBSR_VOLUME,
             Maker::Lattice => &kernels::PBSR_LATTICE,
             Maker::Splats => &kernels::PBSR_SPLATS,
+            Maker::Processor => continue,
         };
         let mut buffers = vec![*source];
         buffers.extend(tables);
-        buffers.extend([arrivals, counts.numbers, particles]);
+        buffers.extend([arrivals, counts, particles]);
         r.dispatch(kernel, Groups::cover(twin.source.chunks.saturating_mul(levels)), &buffers, &[]);
     }
-    r.read(found);
-    let [.., of_sets, of_particles] = projection.inputs;
-    let in_whole = r.join(&projection.recording, &[(of_sets, sets), (of_particles, particles)]);
-    let (sums, sources) = (in_whole.of(projection.sums), inputs);
-    Ok(Generated { recording, capacities, sums, found, sets, particles, arrivals, scan, sources, projection, in_whole })
+    if let Some(Given { spans, particles: of_given, parts, .. }) = given {
+        let put = [spans, of_given, counts, particles];
+        r.dispatch(&kernels::PBSR_GIVEN, Groups::cover(parts), &put, &[parts]);
+    }
 }
 
 /// How many particles each chunk of each set has.
@@ -100,12 +189,12 @@ fn count(
     levels: u32,
     [arrivals, counts]: [BufferId; 2],
 ) {
-    for (twin, (source, tables)) in sources.twins.iter().zip(inputs) {
+    for (twin, (source, tables)) in sources.twins.iter().zip(inputs).filter(|(twin, _)| !twin.is_given()) {
         let each = twin.source.chunks.saturating_mul(levels);
         let arrive = [*source, tables[0], arrivals, counts];
         r.dispatch(&kernels::PBSR_ARRIVE, Groups::cover(each.div_ceil(super::BLOCK)), &arrive, &[]);
         let thinned = match twin.maker {
-            Maker::Mesh | Maker::Splats => continue,
+            Maker::Mesh | Maker::Splats | Maker::Processor => continue,
             Maker::Volume => &kernels::PBSR_VOLUME_COUNT,
             Maker::Lattice => &kernels::PBSR_LATTICE_COUNT,
         };
@@ -124,6 +213,7 @@ impl super::Twin {
             Maker::Volume => &["chunks", "cells", "values", "transfer"],
             Maker::Lattice => &["chunks", "cells", "values"],
             Maker::Splats => &["chunks", "splats", "kernels"],
+            Maker::Processor => &[],
         };
         let source = r.input("source", size_of::<ParticleSource>() as u64);
         let bytes = self.tables.iter().map(|t| 4 * t.len() as u64);
@@ -165,16 +255,23 @@ impl Generated {
         inputs.map(|(buffer, bytes)| (self.in_whole.of(buffer), bytes))
     }
 
-    /// What a run of the next sets needs beside the tables: which they are.
-    pub fn next(&self, sources: &Sources, ensemble: &Ensemble) -> Inputs<'static> {
-        let (first_set, levels) = (halves(u64::from(ensemble.levels)), self.capacities.levels);
+    /// What a run of the next sets needs beside the tables: which they are, and the particles that the device does not make.
+    ///
+    /// # Errors
+    /// [`Error::TooMuch`] when there is too little room for those: record again with what is needed.
+    pub fn next(&self, sources: &Sources, scene: &Scene<'_>, ensemble: &Ensemble) -> Result<Inputs<'static>, Error> {
+        let (first, levels) = (u64::from(ensemble.levels), self.capacities.levels);
         let of_object = |(twin, (buffer, _)): (&super::Twin, &(BufferId, Vec<BufferId>))| {
-            let source = ParticleSource { first_set, levels, ..twin.source };
+            let source = ParticleSource { first_set: halves(first), levels, ..twin.source };
             (*buffer, Cow::Owned(bytemuck::bytes_of(&source).to_vec()))
         };
+        let mut inputs: Inputs<'static> = sources.twins.iter().zip(&self.sources).map(of_object).collect();
         let nobody = self.projection.lit.iter().map(Lit::nobody);
-        let nobody = nobody.map(|(buffer, bytes)| (self.in_whole.of(buffer), Cow::Owned(bytes)));
-        sources.twins.iter().zip(&self.sources).map(of_object).chain(nobody).collect()
+        inputs.extend(nobody.map(|(buffer, bytes)| (self.in_whole.of(buffer), Cow::Owned(bytes))));
+        if let Some(given) = &self.given {
+            inputs.extend(given.sample(&self.capacities, sources, scene, first)?);
+        }
+        Ok(inputs)
     }
 
     /// Adds what a run gave to the ensemble that its inputs were made for, and gives the number of its particles.

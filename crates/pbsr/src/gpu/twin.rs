@@ -1,6 +1,7 @@
 //! Samplers as tables, from which a device makes the same sets: the same counters, so the same particles but for rounding.
 
-use crate::render::Scene;
+use crate::Sampler;
+use crate::render::{Object, Scene};
 use crate::sampler::{Poisson, runs};
 use crate::stream::{REJECTED_FROM, Stage, rejection};
 use splat_core::glam::Mat3;
@@ -21,7 +22,12 @@ pub(crate) enum Maker {
     Lattice,
     /// Tables: splats, kernels.
     Splats,
+    /// None: the processor samples, and gives its particles in as many parts of a set as there are chunks.
+    Processor,
 }
+
+/// Particles of a part that are expected of a sampler without a twin.
+const GIVEN: f64 = 4096.0;
 
 /// A sampler as a device takes it.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,16 +68,34 @@ impl Twin {
     }
 }
 
-/// The twins of all samplers of a scene, in the order of its objects.
+impl Twin {
+    pub(crate) fn is_given(&self) -> bool {
+        self.maker == Maker::Processor
+    }
+}
+
+/// The twins of all samplers of a scene, in the order of its objects; what has none the processor samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sources {
     pub(crate) twins: Vec<Twin>,
+    /// Share of all particles that is expected of samplers without a twin.
+    pub(crate) given_share: f64,
 }
 
 impl Sources {
-    /// `None` where there are no particles, or a sampler has no twin: its sets are uploaded.
+    /// `None` where there are no particles, or none that a device makes: sets are uploaded as they are.
     pub fn new(scene: &Scene<'_>) -> Option<Self> {
-        let mut twins = scene.objects.iter().map(|o| o.sampler.twin()).collect::<Option<Vec<Twin>>>()?;
+        let sampled = |sampler: &dyn Sampler| {
+            let chunks = (sampler.expected_particles() / GIVEN).ceil() as u32 + 1;
+            let source = ParticleSource { chunks, ..ParticleSource::default() };
+            Twin { maker: Maker::Processor, source, tables: Vec::new() }
+        };
+        let twin = |o: &Object<'_>| o.sampler.twin().unwrap_or_else(|| sampled(o.sampler));
+        let mut twins: Vec<Twin> = scene.objects.iter().map(twin).collect();
+        let expected = |o: &Object<'_>| o.sampler.expected_particles();
+        let all: f64 = scene.objects.iter().map(expected).sum();
+        let of_given = scene.objects.iter().zip(&twins).filter(|(_, twin)| twin.is_given());
+        let given_share = of_given.map(|(o, _)| expected(o)).sum::<f64>() / all.max(1.0);
         let all_chunks: u32 = twins.iter().map(|t| t.source.chunks).sum();
         let mut first_chunk = 0;
         for (twin, object) in twins.iter_mut().zip(0u32..) {
@@ -79,7 +103,13 @@ impl Sources {
             twin.source = ParticleSource { thinning, object, first_chunk, all_chunks, ..twin.source };
             first_chunk += twin.source.chunks;
         }
-        (all_chunks > 0).then_some(Self { twins })
+        let makes = twins.iter().any(|twin| !twin.is_given() && twin.source.chunks > 0);
+        makes.then_some(Self { twins, given_share })
+    }
+
+    /// Whether the processor samples some of the particles.
+    pub fn has_given(&self) -> bool {
+        self.twins.iter().any(Twin::is_given)
     }
 
     /// Bytes of all tables.

@@ -163,7 +163,7 @@ fn by_device(device: &mut Device, scene: &Scene<'_>, runs: u32) -> Ensemble {
     for run in 0..runs {
         // Tables go up once.
         let mut inputs = if run == 0 { tables.clone() } else { Vec::new() };
-        inputs.extend(generated.next(&sources, &ensemble));
+        inputs.extend(generated.next(&sources, scene, &ensemble).unwrap());
         let inputs: Vec<_> = inputs.iter().map(|(buffer, bytes)| (*buffer, &bytes[..])).collect();
         let done = prepared.run(&inputs).unwrap();
         let particles = generated.add(&done, &mut ensemble).unwrap();
@@ -190,7 +190,7 @@ fn particles(device: &mut Device, scene: &Scene<'_>) -> ([[Vec<u32>; 2]; 2], Vec
     let wanted = [generated.sets, generated.particles, generated.arrivals];
     wanted.iter().for_each(|buffer| generated.recording.read(*buffer));
     let mut inputs = generated.tables(&sources, scene, &empty()).unwrap();
-    inputs.extend(generated.next(&sources, &empty()));
+    inputs.extend(generated.next(&sources, scene, &empty()).unwrap());
     let inputs: Vec<_> = inputs.iter().map(|(buffer, bytes)| (*buffer, &bytes[..])).collect();
     let run = device.run(&generated.recording, &inputs).unwrap();
     assert_eq!(device.take_messages(), [""; 0]);
@@ -428,7 +428,7 @@ fn room_is_told(world: &World, samplers: [&dyn Sampler; 3]) {
             let mut ensemble = empty();
             let generated = record_generated(room, Nearest::of(device.adapter()), None, &sources).unwrap();
             let mut inputs = generated.tables(&sources, scene, &ensemble).unwrap();
-            inputs.extend(generated.next(&sources, &ensemble));
+            inputs.extend(generated.next(&sources, scene, &ensemble).unwrap());
             let inputs: Vec<_> = inputs.iter().map(|(buffer, bytes)| (*buffer, &bytes[..])).collect();
             let done = device.run(&generated.recording, &inputs).unwrap();
             let sums_are_zero = done.bytes(generated.sums).iter().all(|byte| *byte == 0);
@@ -488,11 +488,32 @@ fn what_has_no_twin_is_uploaded() {
     let clear = SurfaceParams { opacity: 0.0, ..SurfaceParams::default() };
     let nothing = MeshSampler::new(&world.wall, &clear, None).unwrap();
     for samplers in
-        [[&wall as &dyn Sampler, &kept, &volume], [&thinned, &sheet, &volume], [&nothing as &dyn Sampler; 3]]
+        [[&kept as &dyn Sampler, &kept, &thinned], [&thinned, &nothing, &kept], [&nothing, &nothing, &nothing]]
     {
         assert_eq!(world.with(samplers, Sources::new), None);
     }
     // One without particles is no hindrance.
-    let sources = world.with([&nothing, &sheet, &nothing], |scene| Sources::new(scene).is_some());
-    assert!(sources);
+    let given = |samplers| world.with(samplers, |scene| Sources::new(scene).map(|sources| sources.has_given()));
+    assert_eq!(given([&nothing, &sheet, &nothing]), Some(false));
+    assert_eq!(given([&nothing, &sheet, &kept]), Some(true));
+    // What the device makes stands beside what is uploaded: all where they are when all of it is.
+    let kept = KeptSets::new(&sheet, 0, ROOM.levels as usize);
+    let mut device = open().unwrap();
+    for samplers in [[&wall as &dyn Sampler, &kept, &volume], [&kept, &kept, &wall]] {
+        world.with(samplers, |scene| {
+            let ([made, uploaded], _) = particles(&mut device, scene);
+            assert_eq!(made[0], uploaded[0], "sets");
+            let [found, expected] = [places(&made), places(&uploaded)];
+            assert!(expected.len() > 10_000 && found == expected, "{} of {}", found.len(), expected.len());
+            let [cpu, gpu] = [by_processor(scene, 2 * ROOM.levels), by_device(&mut device, scene, 2)];
+            let same = pixels().filter(|&(x, y)| cpu.hits(x, y) == gpu.hits(x, y)).count();
+            assert!(same as f64 >= 0.999 * f64::from(SIZE[0] * SIZE[1]), "{same}");
+            // Room is asked for before anything is uploaded.
+            let sources = Sources::new(scene).unwrap();
+            let few = Capacities { particles: 1000, ..ROOM };
+            let generated = record_generated(few, Nearest::Ranked, None, &sources).unwrap();
+            let refused = generated.next(&sources, scene, &empty());
+            assert!(matches!(refused, Err(Error::TooMuch { what: "particles", .. })), "{refused:?}");
+        });
+    }
 }

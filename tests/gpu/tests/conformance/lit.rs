@@ -171,7 +171,7 @@ fn by_device(
         let mut inputs = generated.tables(&sources, scene, &ensemble).unwrap();
         each().for_each(|(k, (s, map))| inputs.extend(generated.shadow_inputs(k, s.inputs(map))));
         for _ in 0..2 {
-            inputs.extend(generated.next(&sources, &ensemble));
+            inputs.extend(generated.next(&sources, scene, &ensemble).unwrap());
             let given: Vec<_> = inputs.iter().map(|(buffer, bytes)| (*buffer, &bytes[..])).collect();
             generated.add(&ready.run(&given).unwrap(), &mut ensemble).unwrap();
             inputs.clear();
@@ -400,7 +400,7 @@ fn too_little_room_and_other_lights_are_refused() {
         let room = Capacities { of_set: 10, ..ROOM };
         let generated = record_generated(room, Nearest::of(device.adapter()), Some(&lighting), &sources).unwrap();
         let mut inputs = generated.tables(&sources, &scene, &ensemble).unwrap();
-        inputs.extend(generated.next(&sources, &ensemble));
+        inputs.extend(generated.next(&sources, &scene, &ensemble).unwrap());
         let inputs: Vec<_> = inputs.iter().map(|(buffer, bytes)| (*buffer, &bytes[..])).collect();
         let run = device.run(&generated.recording, &inputs).unwrap();
         // Nothing is folded of what is incomplete.
