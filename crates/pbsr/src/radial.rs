@@ -54,6 +54,10 @@ impl Radial {
         ((d * x + c) * x + b) * x + a
     }
 
+    pub(crate) fn bytes(&self) -> u64 {
+        (self.cells.len() * size_of::<[f32; 4]>()) as u64
+    }
+
     /// The cells one after the other.
     #[cfg(feature = "gpu")]
     pub(crate) fn cells(&self) -> &[[f32; 4]] {

@@ -66,7 +66,7 @@ pub struct SplatSampler<'a> {
 }
 
 impl<'a> SplatSampler<'a> {
-    /// Prepares the tables: 8 bytes a splat.
+    /// Prepares the tables: 8 bytes a splat, and 6 KB for each kernel that occurs.
     ///
     /// # Errors
     /// [`Error::Parameter`] for numbers out of range, [`Error::Core`] for a cloud that breaks a promise or a footprint id
@@ -100,7 +100,7 @@ impl<'a> SplatSampler<'a> {
 
     /// Bytes of the tables.
     pub fn bytes(&self) -> u64 {
-        self.sets.blocks.bytes()
+        self.sets.blocks.bytes() + self.radials.iter().map(Radial::bytes).sum::<u64>()
     }
 }
 
