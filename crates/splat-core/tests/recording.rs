@@ -93,6 +93,9 @@ fn what_no_kernel_does_is_refused() {
         assert!(matches!(record(room), Err(Error::Invalid { .. })), "{room:?}");
         assert!(matches!(draw::record(room, Precision::Single), Err(Error::Invalid { .. })), "{room:?}");
     }
+    for layers in [Capacities { depths: true, ..ROOM }, Capacities { objects: true, ..ROOM }] {
+        assert!(matches!(draw::record(layers, Precision::Single), Err(Error::Invalid { .. })), "{layers:?}");
+    }
 }
 
 fn projected() -> Projected {

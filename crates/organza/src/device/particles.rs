@@ -15,7 +15,7 @@ pub(crate) use lit::Shadow;
 use pbsr::gpu::{Capacities, Generated, Nearest, Recorded, Sources, record, record_generated};
 use pbsr::{Ensemble, Error, Scene};
 use splat_core::Progress;
-use splat_shaders::{BufferId, Executor, PassTime, Ready};
+use splat_shaders::{BufferId, Executor, Lanes, PassTime, Ready};
 
 /// Most sets of one run: a look at the clock and at an interrupt comes between two.
 const MOST_LEVELS: u32 = 16;
@@ -145,7 +145,7 @@ impl<'a> Folding<'a> {
                 let nearest = Nearest::of(device.adapter());
                 let generated =
                     light.with(scene, ensemble, |lighting| record_generated(room, nearest, lighting, sources))?;
-                let ready = device.prepare(&generated.recording)?;
+                let ready = device.prepare(&generated.recording.by(Lanes::of(device.adapter())))?;
                 (generated, ready)
             }
         });
@@ -183,7 +183,7 @@ impl<'a> Folding<'a> {
             None => {
                 let nearest = Nearest::of(device.adapter());
                 let recorded = light.with(scene, ensemble, |lighting| record(room, nearest, lighting))?;
-                let ready = device.prepare(&recorded.recording)?;
+                let ready = device.prepare(&recorded.recording.by(Lanes::of(device.adapter())))?;
                 (recorded, ready)
             }
         });

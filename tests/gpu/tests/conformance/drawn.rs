@@ -301,7 +301,7 @@ fn by_hand(blends: &[Blend], begin: [f32; 4], strips: u32) -> ByHand {
     };
     let SplatView { middle, size, ordered, splat_words, footprints, planes, channels, .. } = view;
     let floats_of_view = [middle, size].concat().into_iter().map(f32::to_bits);
-    let rest = [0, 0, 1, 1, ordered, splat_words, footprints, planes, channels, 0, 0, 1];
+    let rest = [0, 0, 1, 1, ordered, splat_words, footprints, planes, channels, 0, 0, 1, 0, 0, 0, 0];
     let view: Vec<u32> = floats_of_view.chain(rest).collect();
     let [x, y, peak] = [1.0f32, 0.5, 0.5].map(f32::to_bits);
     // Half extents of 4 pixels, a medium.

@@ -1,4 +1,4 @@
-//! Sets of particles that the device makes itself: the CPU's of the same seeds, and in the mean the CPU's of any.
+//! Sets of particles that the device makes itself: the CPU's of the same seeds.
 
 use gpu_conformance::{Device, open, words};
 use pbsr::gpu::{Capacities, Nearest, Sources, record, record_generated};
@@ -15,21 +15,22 @@ use splat_core::{
 };
 use std::collections::BTreeSet;
 
-const SIZE: [u32; 2] = [96, 64];
-const ROOM: Capacities = Capacities { size: SIZE, objects: 3, levels: 8, of_set: 40_000, particles: 320_000 };
+pub(crate) const SIZE: [u32; 2] = [96, 64];
+pub(crate) const ROOM: Capacities =
+    Capacities { size: SIZE, objects: 3, levels: 8, of_set: 40_000, particles: 320_000 };
 
 /// Walls, a bent sheet with normals and colours, and a volume of more than one piece of its transfer function.
-struct World {
-    wall: Mesh,
+pub(crate) struct World {
+    pub(crate) wall: Mesh,
     sheet: Mesh,
     grid: Grid,
     transfer: TransferFunction,
-    cloud: Cloud,
-    camera: Camera,
+    pub(crate) cloud: Cloud,
+    pub(crate) camera: Camera,
 }
 
 /// A ball of media and discs, round and long ones, of every kernel; a few of them opaque.
-fn splats() -> Cloud {
+pub(crate) fn splats() -> Cloud {
     let mut cloud = Cloud::new(DVec3::new(-0.1, 0.1, 0.2));
     for i in 0..3000u64 {
         let u = |k| rng::unit_f32(77, 0, i, k);
@@ -57,7 +58,7 @@ fn splats() -> Cloud {
 }
 
 impl World {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
         let position = corners.map(|(x, y)| Vec3::new(1.3 * x, 0.9 * y, -0.7)).to_vec();
         let wall = Mesh { position, triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() };
@@ -94,7 +95,12 @@ impl World {
     }
 
     /// The three samplers; `scale` of the area that no particle needs to be widened for, `bias` of their optical depths.
-    fn samplers(&self, seed: u64, scale: f64, bias: f64) -> (MeshSampler<'_>, MeshSampler<'_>, GridSampler<'_>) {
+    pub(crate) fn samplers(
+        &self,
+        seed: u64,
+        scale: f64,
+        bias: f64,
+    ) -> (MeshSampler<'_>, MeshSampler<'_>, GridSampler<'_>) {
         let s = scale * finest_pixel_area(&self.camera, DVec3::ZERO, 1.5, 1e-3);
         let params = |opacity: f64, surface_opacity, seed, color| SurfaceParams {
             opacity: 1.0 - (1.0 - opacity).powf(bias),
@@ -115,7 +121,7 @@ impl World {
     }
 
     /// Of the surface that the volume's value makes.
-    fn crossings(&self, seed: u64, scale: f64, bias: f64) -> LatticeSampler<'_> {
+    pub(crate) fn crossings(&self, seed: u64, scale: f64, bias: f64) -> LatticeSampler<'_> {
         let params = SurfaceParams {
             opacity: 1.0 - 0.6f64.powf(bias),
             cross_section: scale * finest_pixel_area(&self.camera, DVec3::ZERO, 1.5, 1e-3),
@@ -128,7 +134,7 @@ impl World {
     }
 
     /// Of the cloud.
-    fn splats(&self, seed: u64, scale: f64) -> SplatSampler<'_> {
+    pub(crate) fn splats(&self, seed: u64, scale: f64) -> SplatSampler<'_> {
         let params = SplatParams {
             cross_section: scale * finest_pixel_area(&self.camera, DVec3::ZERO, 1.5, 1e-3),
             seed: seed + 4,
@@ -137,7 +143,7 @@ impl World {
         SplatSampler::new(&self.cloud, &params).unwrap()
     }
 
-    fn with<T>(&self, samplers: [&dyn Sampler; 3], work: impl FnOnce(&Scene<'_>) -> T) -> T {
+    pub(crate) fn with<T>(&self, samplers: [&dyn Sampler; 3], work: impl FnOnce(&Scene<'_>) -> T) -> T {
         let object = |sampler, turn, emission| {
             let material = Material { shading: Shading::Unlit, emission, ..Material::default() };
             let transform = Similarity { rotation: DQuat::from_rotation_y(turn), ..Similarity::default() };
@@ -150,12 +156,12 @@ impl World {
     }
 }
 
-fn empty() -> Ensemble {
+pub(crate) fn empty() -> Ensemble {
     Ensemble::new(SIZE, &EnsembleParams::default()).unwrap()
 }
 
 /// Sets that the device makes and folds.
-fn by_device(device: &mut Device, scene: &Scene<'_>, runs: u32) -> Ensemble {
+pub(crate) fn by_device(device: &mut Device, scene: &Scene<'_>, runs: u32) -> Ensemble {
     let (sources, mut ensemble) = (Sources::new(scene).unwrap(), empty());
     let generated = record_generated(ROOM, Nearest::of(device.adapter()), None, &sources).unwrap();
     let mut prepared = device.prepare(&generated.recording).unwrap();
@@ -173,13 +179,13 @@ fn by_device(device: &mut Device, scene: &Scene<'_>, runs: u32) -> Ensemble {
     ensemble
 }
 
-fn by_processor(scene: &Scene<'_>, levels: u32) -> Ensemble {
+pub(crate) fn by_processor(scene: &Scene<'_>, levels: u32) -> Ensemble {
     let mut ensemble = empty();
     Renderer::new().fold(scene, &mut ensemble, levels, &FoldParams::default(), &Progress::default()).unwrap();
     ensemble
 }
 
-fn pixels() -> impl Iterator<Item = (u32, u32)> {
+pub(crate) fn pixels() -> impl Iterator<Item = (u32, u32)> {
     (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| (x, y)))
 }
 
@@ -294,121 +300,6 @@ fn hits_of_one_seed_are_the_cpu_s() {
             });
         }
     }
-}
-
-/// Sets of the test of means, as runs of the device.
-const RUNS: u32 = 12;
-
-/// How far the means of two ensembles of other seeds are apart, in standard deviations that are 3.09 at p = 0.001: of the sum
-/// of the squares of all pixels' deviations (χ², by Wilson and Hilferty), and of hits and of luminance in all.
-fn deviations(a: &Ensemble, b: &Ensemble) -> [f64; 3] {
-    let levels = f64::from(a.levels());
-    assert_eq!(a.levels(), b.levels());
-    let (mut chi2, mut bins, mut sum, mut variance) = (0.0, 0.0, 0.0, 0.0);
-    for (x, y) in pixels() {
-        let [ha, hb] = [a, b].map(|e| f64::from(e.hits(x, y)));
-        let p = (ha + hb) / (2.0 * levels);
-        let of_difference = 2.0 * levels * p * (1.0 - p);
-        sum += ha - hb;
-        variance += of_difference;
-        // Where hits and sets without one are many, the difference is normal.
-        if of_difference > 8.0 {
-            chi2 += (ha - hb).powi(2) / of_difference;
-            bins += 1.0;
-        }
-    }
-    assert!(bins > 2000.0, "{bins}");
-    let h: f64 = 2.0 / (9.0 * bins);
-    let of_chi2 = ((chi2 / bins).cbrt() - (1.0 - h)) / h.sqrt();
-    let [a, b] = [a, b].map(|e| e.read(&|_, _| [0.0; 3], None));
-    let light = |p: &[f32; 3]| f64::from(p[0]) * 0.2126 + f64::from(p[1]) * 0.7152 + f64::from(p[2]) * 0.0722;
-    let lights = a.rgb("beauty").unwrap().iter().zip(b.rgb("beauty").unwrap());
-    let apart: f64 = lights.map(|(a, b)| light(a) - light(b)).sum();
-    let squares =
-        |e: &splat_core::Layers| -> f64 { e.scalar("std_error").unwrap().iter().map(|s| f64::from(*s).powi(2)).sum() };
-    [of_chi2, sum / variance.sqrt(), apart / (squares(&a) + squares(&b)).sqrt()]
-}
-
-/// Whether every access of a kernel is looked at: then means take minutes, and the tests above show the same recordings.
-fn assisted() -> bool {
-    std::env::var("ORGANZA_VALIDATION").is_ok_and(|v| v == "gpu-assisted")
-}
-
-#[test]
-fn means_of_other_seeds_are_the_cpu_s_and_a_bias_is_found() {
-    if assisted() {
-        return;
-    }
-    let world = World::new();
-    let ensemble = |seed, bias, device| {
-        // Nothing is widened, so that pixels are independent.
-        let (wall, sheet, volume) = world.samplers(seed, 1.0, bias);
-        world.with([&wall, &sheet, &volume], |scene| {
-            if device { by_device(&mut open().unwrap(), scene, RUNS) } else { by_processor(scene, RUNS * ROOM.levels) }
-        })
-    };
-    let cpu = ensemble(101, 1.0, false);
-    let [chi2, hits, light] = deviations(&ensemble(202, 1.0, true), &cpu);
-    assert!(chi2 < 3.09 && hits.abs() < 3.29 && light.abs() < 3.29, "{chi2} {hits} {light}");
-    // Optical depths of 4 % more.
-    let [_, hits, light] = deviations(&ensemble(202, 1.04, true), &cpu);
-    assert!(hits > 6.0 && light.abs() > 6.0, "{hits} {light}");
-    // The same number of particles in other places.
-    let mut moved = World::new();
-    moved.camera.position.x += 0.03;
-    let (wall, sheet, volume) = moved.samplers(202, 1.0, 1.0);
-    let [chi2, ..] =
-        deviations(&moved.with([&wall, &sheet, &volume], |scene| by_device(&mut open().unwrap(), scene, RUNS)), &cpu);
-    assert!(chi2 > 6.0, "{chi2}");
-}
-
-#[test]
-fn means_of_crossings_are_the_cpu_s_and_a_bias_is_found() {
-    if assisted() {
-        return;
-    }
-    let world = World::new();
-    let ensemble = |seed, bias, device| {
-        let (wall, ..) = world.samplers(seed, 1.0, bias);
-        let clear = SurfaceParams { opacity: 0.0, ..SurfaceParams::default() };
-        let nothing = MeshSampler::new(&world.wall, &clear, None).unwrap();
-        world.with([&wall, &world.crossings(seed, 1.0, bias), &nothing], |scene| {
-            if device { by_device(&mut open().unwrap(), scene, RUNS) } else { by_processor(scene, RUNS * ROOM.levels) }
-        })
-    };
-    let cpu = ensemble(303, 1.0, false);
-    let [chi2, hits, light] = deviations(&ensemble(404, 1.0, true), &cpu);
-    assert!(chi2 < 3.09 && hits.abs() < 3.29 && light.abs() < 3.29, "{chi2} {hits} {light}");
-    let [_, hits, light] = deviations(&ensemble(404, 1.1, true), &cpu);
-    assert!(hits > 6.0 && light.abs() > 6.0, "{hits} {light}");
-}
-
-#[test]
-fn means_of_splats_are_the_cpu_s_and_a_bias_is_found() {
-    if assisted() {
-        return;
-    }
-    let world = World::new();
-    let clear = SurfaceParams { opacity: 0.0, ..SurfaceParams::default() };
-    let nothing = MeshSampler::new(&world.wall, &clear, None).unwrap();
-    let ensemble = |world: &World, seed, device| {
-        world.with([&world.splats(seed, 1.0), &nothing, &nothing], |scene| {
-            if device { by_device(&mut open().unwrap(), scene, RUNS) } else { by_processor(scene, RUNS * ROOM.levels) }
-        })
-    };
-    let cpu = ensemble(&world, 505, false);
-    let [chi2, hits, light] = deviations(&ensemble(&world, 606, true), &cpu);
-    assert!(chi2 < 3.09 && hits.abs() < 3.29 && light.abs() < 3.29, "{chi2} {hits} {light}");
-    // Kernels of 30 % more radius: the same number of particles, in other places.
-    let mut wide = World::new();
-    wide.cloud.radius.iter_mut().for_each(|radius| *radius *= 1.3);
-    let [chi2, ..] = deviations(&ensemble(&wide, 606, true), &cpu);
-    assert!(chi2 > 6.0, "{chi2}");
-    // Optical depths of 4 % more.
-    wide.cloud = splats();
-    wide.cloud.cross_section.iter_mut().for_each(|area| *area *= 1.04);
-    let [_, hits, light] = deviations(&ensemble(&wide, 606, true), &cpu);
-    assert!(hits > 6.0 && light.abs() > 6.0, "{hits} {light}");
 }
 
 #[test]

@@ -366,7 +366,7 @@ fn a_large_image_goes_in_parts() {
     let size = [1400, 800];
     let room = Capacities { size, levels: 1, ..ROOM };
     let pixels = 22 * 13 * 4096;
-    assert!(room.seen().splats < pixels && room.seen().splats % 256 == 0);
+    assert!(room.seen().splats < pixels && room.seen().splats.is_multiple_of(256));
     let (lights, maps) = (world.lights(), world.maps());
     let lights = lit(&lights, &maps, world.origin);
     let camera = world.camera(VIEWS[0], size);

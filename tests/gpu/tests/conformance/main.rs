@@ -10,6 +10,7 @@ mod generated;
 mod kernels;
 mod layered;
 mod lit;
+mod means;
 mod order;
 mod particles;
 mod picture;
