@@ -3,7 +3,8 @@
 //! A kernel is one GLSL file under `glsl/`, named as its twin on the CPU; `cargo xtask shaders` compiles it to the
 //! SPIR-V under `spirv/`, which is committed. A [`Recording`] is plain data: buffers, and steps that upload, dispatch
 //! and read back, with what each step reads and writes. A stage makes its own without a device, so that it can be read
-//! and tested; an executor (`gpu-ash`) runs it and takes every barrier from [`barriers`], none is written by hand.
+//! and tested; an executor (`gpu-ash`) runs it and takes every barrier from [`barriers`], none is written by hand. It may
+//! draw too: a [`Program`] blends triangles into an [`Image`].
 //!
 //! ```
 //! use splat_shaders::{Groups, Recording, barriers, kernels};

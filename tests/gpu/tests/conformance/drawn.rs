@@ -9,6 +9,7 @@ use splat_core::raster::{OpaqueImage, Params};
 use splat_core::{Accumulator, Cloud, Direction, Error, Material, Projection, Splat};
 use splat_shaders::layouts::SplatView;
 use splat_shaders::{Blend, BufferId, Corners, DeviceError, Format, ImageId, Recording, Target, Validation, programs};
+use std::time::Duration;
 
 /// Most that a channel may differ by, as a share of the largest value that a splat has, and transmittance: as by tiles.
 /// Measured on lavapipe, by either executor: 2.4·10⁻⁶.
@@ -406,7 +407,7 @@ fn a_draw_that_reads_beyond_a_buffer_is_heard() {
 }
 
 #[test]
-fn a_device_that_is_lost_while_it_draws_says_so() {
+fn a_device_that_is_lost_or_hangs_while_it_draws_says_so() {
     let hand = by_hand(&[Blend::Under], [0.0, 0.0, 0.0, 1.0], 1);
     macro_rules! lost {
         ($executor:ident) => {
@@ -421,4 +422,11 @@ fn a_device_that_is_lost_while_it_draws_says_so() {
     }
     lost!(gpu_ash);
     lost!(gpu_wgpu);
+    // One that takes the draw and never comes back: what it might still use is not taken from it.
+    let mut device = gpu_ash::Device::open(&adapter(), Validation::Off).unwrap();
+    device.set_patience(Duration::from_millis(50));
+    let mut prepared = device.prepare(&hand.recording).unwrap();
+    device.hang()();
+    assert_eq!(prepared.run(&hand.inputs()), Err(DeviceError::Lost));
+    assert_eq!(prepared.run(&hand.inputs()), Err(DeviceError::Lost), "it may still be at work");
 }
