@@ -2,6 +2,7 @@
 
 use crate::{outdoor, outdoor_cloud};
 use splat_core::glam::{DVec3, Vec3};
+use splat_core::raster::gpu::Input;
 use splat_core::raster::{Detail, OpaqueImage, Params, Projected, RasterCounts, fold, project_into};
 use splat_core::{
     Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Progress, Projection, Splat, SplatKind, rng,
@@ -86,6 +87,20 @@ impl Frame {
         let detail = Detail { depth: false, object: false };
         let (footprints, materials) = (&self.footprints, &self.materials);
         project_into(&mut self.projected, &self.cloud, &self.camera, footprints, materials, &Params::default(), detail);
+    }
+
+    /// What a device composites: the footprints and the order as they are, into an empty image.
+    pub fn with_input<T>(&self, work: impl FnOnce(&Input<'_>, &Accumulator) -> T) -> T {
+        let input = Input {
+            projected: &self.projected,
+            order: &self.order.input_from_sorted,
+            values: &self.values,
+            materials: &self.materials,
+            opaque: &OpaqueImage::default(),
+            direction: Direction::FrontToBack,
+            params: &Params::default(),
+        };
+        work(&input, &Accumulator::new(self.camera.size, 1, 3, false, false))
     }
 
     /// Composites.

@@ -5,8 +5,10 @@
     reason = "a benchmark without its scene has nothing to measure"
 )]
 
+mod device;
 mod frame;
 
+pub use device::device;
 pub use frame::Frame;
 
 use organza::{Loaded, Progress, RenderOptions, load, scene};
