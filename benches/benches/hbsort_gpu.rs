@@ -1,39 +1,20 @@
 //! The order of splats on a device, portable kernels and those by subgroups in one run.
 //!
-//! `ORGANZA_EXECUTOR` names the executor (`ash`, the default, or `wgpu`), `ORGANZA_ADAPTER` a part of the device's name; without
-//! it the first GPU is taken, and a software driver never. Times are the device's own, least of several runs, the ways in
-//! turn. `ORGANZA_SPLATS` is the number of splats.
+//! Times are the device's own, least of several runs, the ways in turn. `-- N` runs one number of splats.
+#![allow(missing_docs, reason = "a benchmark")]
 
 use hbsort::Params;
 use hbsort::gpu::{Capacities, Recorded, record};
-use organza_benches::outdoor_cloud;
-use splat_shaders::{Adapter, Backend, Choice, DeviceError, Executor, Lanes, Ready, Run, Validation};
-use std::sync::Arc;
+use organza_benches::{TABLE_1, device, outdoor_cloud};
+use splat_shaders::{DeviceError, Executor, Lanes, Ready, Run};
 
 /// Runs of each way that count.
 const RUNS: usize = 7;
-
-fn backend() -> Arc<dyn Backend> {
-    match std::env::var("ORGANZA_EXECUTOR").as_deref() {
-        Ok("wgpu") => gpu_wgpu::backend(),
-        _ => gpu_ash::backend(),
-    }
-}
-
-fn open() -> Result<Box<dyn Executor>, DeviceError> {
-    let choice = std::env::var("ORGANZA_ADAPTER").map_or(Choice::Gpu, Choice::Named);
-    backend().open(&choice, Validation::Off)
-}
 
 /// Milliseconds of the passes whose kernel's name begins with one of these.
 fn milliseconds(run: &Run, names: &[&str]) -> f64 {
     let counts = run.passes.iter().filter(|p| names.iter().any(|name| p.kernel.starts_with(name)));
     counts.map(|p| p.nanoseconds).sum::<f64>() * 1e-6
-}
-
-fn heading(adapter: &Adapter) {
-    let about = if adapter.kind.is_gpu() { "" } else { ": no GPU, and no time of one" };
-    println!("{} ({}), subgroups of {}{about}", adapter.name, adapter.driver, adapter.subgroup);
 }
 
 /// A way ready to run, with the least times that it took: of scatters, of all passes of the sort, of everything.
@@ -94,17 +75,9 @@ fn keys(recorded: &Recorded, run: &Run) -> u32 {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let mut device = match open() {
-        Ok(device) => device,
-        Err(DeviceError::NoDevice { why }) => {
-            println!("nothing to measure: {why}");
-            return Ok(());
-        }
-        Err(other) => return Err(other.into()),
-    };
-    heading(device.adapter());
-    let asked = std::env::var("ORGANZA_SPLATS").ok().and_then(|n| n.parse().ok());
-    for splats in asked.map_or_else(|| vec![440_000, 1_840_000], |n| vec![n]) {
+    let only: Option<usize> = std::env::args().skip(1).find_map(|a| a.parse().ok());
+    let Some(mut device) = device() else { return Ok(()) };
+    for splats in TABLE_1.into_iter().filter(|n| only.is_none_or(|only| only == *n)) {
         measure(&mut *device, splats)?;
     }
     Ok(())
