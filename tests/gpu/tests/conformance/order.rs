@@ -189,16 +189,14 @@ fn a_device_that_does_not_come_back_in_time_is_given_up() {
     let mut fresh = gpu_ash::Device::open(&adapter(), Validation::Off).unwrap();
     assert!(fresh.run(recording, &inputs).is_ok());
 
-    // By wgpu there is no such driver, but work that takes a second, and no patience. In the first run, whose steps are
-    // submitted one by one, little may be left of it when the wait begins.
+    // By wgpu there is no such driver, but no patience. Lavapipe does nearly all work while it is submitted: one run in two to
+    // fifty, by the size of its vectors, is not over when the wait begins, and of two thousand none in one case of 10¹⁷.
     let mut device = gpu_wgpu::Device::open(&adapter(), Validation::Off).unwrap();
-    let large = record(Capacities { splats: 1_000_000, kept: 1_000_000 });
-    let cloud = cloud(1_000_000, DVec3::ZERO);
-    let uploads = large.uploads(&cloud, None, &small.1, &params).unwrap();
     device.set_patience(Duration::ZERO);
-    let mut prepared = device.prepare(&large.recording).unwrap();
-    let mut is_lost = || matches!(prepared.run(&large.inputs(&uploads)), Err(DeviceError::Lost));
-    assert!((0..3).any(|_| is_lost()) && is_lost());
+    let mut prepared = device.prepare(recording).unwrap();
+    let mut is_lost = || matches!(prepared.run(&inputs), Err(DeviceError::Lost));
+    assert!((0..2000).any(|_| is_lost()));
+    assert!(is_lost(), "it may still be at work");
     drop((prepared, device));
     let mut fresh = gpu_wgpu::Device::open(&adapter(), Validation::Off).unwrap();
     assert!(fresh.run(recording, &inputs).is_ok());
