@@ -216,12 +216,14 @@ impl Recorded {
         std::array::from_fn(|k| (buffers[k], &uploads.bytes[k][..]))
     }
 
-    /// What a device did, from what was read back of [`Recorded::state`].
+    /// What a device did, from what was read back of [`Recorded::state`]. Lists are gone through twice, so that
+    /// [`Counts::longest`] is twice the longest.
     ///
     /// # Errors
     /// As [`Recorded::finish`].
     pub fn counts(&self, state: &[u8]) -> Result<Counts, Error> {
-        Counts::read(state, ("tile entries", self.capacities.entries))
+        let counts = Counts::read(state, ("tile entries", self.capacities.entries))?;
+        Ok(Counts { longest: 2 * counts.longest, ..counts })
     }
 
     /// The image of what was read back of [`Recorded::state`] and [`Recorded::image`].
