@@ -324,7 +324,7 @@ fn what_a_software_driver_would_leave_away_goes_through_it_in_parts() {
         medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 1.5, spacing = 0.0444 }
     "#;
     // Opaque splats are gone through twice, so that half as many are too many.
-    let wall = "rectangle = { center = [0, 0, 0], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.006 }\nopacity = 1.0";
+    let wall = "rectangle = { center = [0, 0, 0], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.0093 }\nopacity = 1.0";
     let (before, _) = text.split_once("medium_box").unwrap();
     for text in [text.to_owned(), format!("{before}{wall}")] {
         let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
