@@ -46,7 +46,6 @@ mod packed;
 mod planes;
 pub mod project;
 pub mod resolve;
-mod sort;
 
 pub use attributes::{AttributeBuffers, AttributeRoom, Attributes};
 pub use list::Counts;
@@ -69,10 +68,6 @@ use splat_shaders::{BufferId, Groups, Recording, kernels};
 pub const TILE: u32 = 16;
 /// The widest image, pixels a side: what one workgroup counts then fits 32 bits.
 const WIDEST: u32 = 16_384;
-/// Entries that a workgroup sorts.
-const SORT_BLOCK: u32 = 2048;
-/// Numbers that a workgroup scans.
-pub(crate) const SCAN_BLOCK: u32 = 1024;
 
 const _: () = assert!(TWIN_TILE == 32, "`composite.glsl` counts offsets from the corners of the CPU's tiles");
 

@@ -1,9 +1,8 @@
 //! Splats of an order by the tiles that they reach: an entry (tile, splat) for each, sorted by tile, in the order inside one.
 
-use super::sort::{Scanned, sort_pass};
-use super::{SCAN_BLOCK, SORT_BLOCK};
 use crate::Error;
-use splat_shaders::layouts::{SortState, SplatState};
+use splat_shaders::layouts::{Scan, SortState, SplatState};
+use splat_shaders::radix::{SCAN_BLOCK, SORT_BLOCK, Scanned, sort_pass};
 use splat_shaders::{BufferId, Groups, Recording, kernels};
 
 /// Splats whose tiles a workgroup counts.
@@ -37,9 +36,11 @@ impl List {
     pub(super) fn scratch(r: &mut Recording, room: &ListRoom, state: BufferId) -> Self {
         let words = |n: u32| 4 * u64::from(n);
         let ListRoom { tiles, ordered, entries } = *room;
-        let places = Scanned::scratch(r, ["place scan", "places", "place sums"], ordered);
+        let place_scan = r.scratch("place scan", size_of::<Scan>() as u64);
+        let places = Scanned::scratch(r, place_scan, ["places", "place sums"], ordered);
         let sort = r.scratch("sort", size_of::<SortState>() as u64);
-        let digits = Scanned::scratch(r, ["digit scan", "digits", "digit sums"], 256 * entries.div_ceil(SORT_BLOCK));
+        let digit_scan = r.scratch("digit scan", size_of::<Scan>() as u64);
+        let digits = Scanned::scratch(r, digit_scan, ["digits", "digit sums"], 256 * entries.div_ceil(SORT_BLOCK));
         let keys = [r.scratch("tiles", words(entries)), r.scratch("tiles'", words(entries))];
         let ids = [r.scratch("ids", words(entries)), r.scratch("ids'", words(entries))];
         let starts = r.scratch("starts", words(tiles + 1));
@@ -49,22 +50,22 @@ impl List {
     /// Lists the splats of an order, and gives the buffer of the sorted ids.
     pub(super) fn record(&self, r: &mut Recording, room: &ListRoom, [view, order, splats]: [BufferId; 3]) -> BufferId {
         let ListRoom { tiles, ordered, entries } = *room;
-        let Self { state, places, sort, digits, keys, ids, starts } = self;
-        r.dispatch(&kernels::SPLAT_BEGIN, Groups::cover(1), &[view, *state, places.scan], &[]);
-        let counted = [view, order, splats, places.numbers, *state];
+        let Self { state, places, sort, digits, keys, ids, starts } = *self;
+        r.dispatch(&kernels::SPLAT_BEGIN, Groups::cover(1), &[view, state, places.scan], &[]);
+        let counted = [view, order, splats, places.numbers, state];
         r.dispatch(&kernels::SPLAT_COUNT, Groups::cover(ordered.div_ceil(COUNT_BLOCK)), &counted, &[]);
-        places.scan(r, Groups::cover(ordered.div_ceil(SCAN_BLOCK)));
-        r.dispatch(&kernels::SPLAT_PREPARE, Groups::cover(1), &[*state, *sort, digits.scan], &[entries]);
-        let emitted = [view, order, splats, places.numbers, places.scan, *sort, keys[0], ids[0]];
+        places.record(r, Groups::cover(ordered.div_ceil(SCAN_BLOCK)));
+        r.dispatch(&kernels::SPLAT_PREPARE, Groups::cover(1), &[state, sort, digits.scan], &[entries]);
+        let emitted = [view, order, splats, places.numbers, places.scan, sort, keys[0], ids[0]];
         r.dispatch(&kernels::SPLAT_EMIT, Groups::cover(ordered.div_ceil(EMIT_BLOCK)), &emitted, &[]);
         // Bits of the greatest tile.
         let passes = (tiles - 1).checked_ilog2().map_or(0, |top| top as usize / 8 + 1);
         for pass in 0..passes {
             let (from, to) = (pass % 2, 1 - pass % 2);
-            sort_pass(r, 8 * pass as u32, *sort, [keys[from], ids[from]], [keys[to], ids[to]], digits);
+            sort_pass(r, 8 * pass as u32, sort, [keys[from], ids[from]], [keys[to], ids[to]], digits);
         }
         let (keys, ids) = (keys[passes % 2], ids[passes % 2]);
-        let ranged = [view, *sort, keys, *starts, *state];
+        let ranged = [view, sort, keys, starts, state];
         r.dispatch(&kernels::SPLAT_RANGES, Groups::cover((tiles + 1).div_ceil(256)), &ranged, &[]);
         ids
     }
