@@ -8,26 +8,14 @@ pub use place::Place;
 use exr::prelude::{ReadChannels, ReadLayers, read};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
-use std::sync::OnceLock;
 
-/// The command, built once with the profile of the running test.
+/// The command, which cargo builds beside the tests.
 pub fn organza() -> Command {
-    static BINARY: OnceLock<PathBuf> = OnceLock::new();
-    let binary = BINARY.get_or_init(|| {
-        let test = std::env::current_exe().unwrap();
-        let folder = test.parent().and_then(Path::parent).unwrap();
-        let mut build = Command::new(env!("CARGO"));
-        build.args(["build", "--quiet", "--package", "organza", "--bin", "organza"]);
-        if folder.file_name().unwrap() == "release" {
-            build.arg("--release");
-        }
-        build.arg("--target-dir").arg(folder.parent().unwrap()).current_dir(env!("CARGO_MANIFEST_DIR"));
-        assert!(build.status().unwrap().success());
-        folder.join(format!("organza{}", std::env::consts::EXE_SUFFIX))
-    });
-    Command::new(binary)
+    let test = std::env::current_exe().unwrap();
+    let folder = test.parent().and_then(Path::parent).unwrap();
+    Command::new(folder.join(format!("organza-under-test{}", std::env::consts::EXE_SUFFIX)))
 }
 
 /// The channels of an EXR file by name, such as `R`, `A`, `direct.G`, `depth.first.Z`.
