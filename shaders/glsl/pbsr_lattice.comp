@@ -42,7 +42,7 @@ void main() {
         uint rank = before + scan_workgroup(uint(kept), total);
         if (kept) {
             uint normal = pack_normal(gradient) | ((source.flags & SOURCE_PER_CROSSING) != 0u ? PER_CROSSING : 0u);
-            put(first, rank, numbering, offset_of(place), normal, source.color);
+            put(first, rank, numbering, offset_of(place), normal, source.tint.xyz);
         }
         before += total;
     }

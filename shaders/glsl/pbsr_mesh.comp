@@ -66,10 +66,9 @@ void main() {
         precise vec3 p = a + ab * uv.x + ac * uv.y;
         uint normal = pack_normal((source.flags & SOURCE_NORMALS) != 0u ? blend(corners, 3u, uv) : cross_of(ab, ac));
         normal |= (source.flags & SOURCE_PER_CROSSING) != 0u ? PER_CROSSING : 0u;
-        uint color = source.color;
+        precise vec3 color = source.tint.xyz;
         if ((source.flags & SOURCE_COLORS) != 0u) {
-            precise vec3 tinted = blend(corners, source.vertex_words - 3u, uv) * source.tint.xyz;
-            color = pack_color(tinted);
+            color = blend(corners, source.vertex_words - 3u, uv) * source.tint.xyz;
         }
         put(counts[at], j, numbering, p, normal, color);
     }

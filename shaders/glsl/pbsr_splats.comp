@@ -62,16 +62,16 @@ float stretch(uint kernel, float square) {
 }
 
 vec3 place_of(uint splat, uvec2 bits) {
-    uint kernel = splats[splat + 5u];
+    uint kernel = splats[splat + 4u];
     vec3 centre = splat_vector(splat);
     bool disc = (kernel & DISC) != 0u;
     vec4 point = uniform_point(bits, disc);
     float h = stretch(kernel & ~DISC, point.w);
     if (disc) {
-        precise vec3 p = centre + (splat_vector(splat + 6u) * point.x + splat_vector(splat + 9u) * point.y) * h;
+        precise vec3 p = centre + (splat_vector(splat + 8u) * point.x + splat_vector(splat + 11u) * point.y) * h;
         return p;
     }
-    precise vec3 p = centre + point.xyz * h * uintBitsToFloat(splats[splat + 6u]);
+    precise vec3 p = centre + point.xyz * h * uintBitsToFloat(splats[splat + 8u]);
     return p;
 }
 
@@ -94,6 +94,6 @@ void main() {
         uint word = source.slots_at + 2u * (first_element + slot);
         uint splat = source.vertex_words * (first_element + (bits.x < tables[word] ? slot : tables[word + 1u]));
         vec3 p = place_of(splat, stream_bits(state, 2u * j + 2u));
-        put(counts[at], j, numbering, p, splats[splat + 3u], splats[splat + 4u]);
+        put(counts[at], j, numbering, p, splats[splat + 3u], splat_vector(splat + 5u));
     }
 }

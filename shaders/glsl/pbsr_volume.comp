@@ -46,7 +46,7 @@ void main() {
             if ((source.flags & SOURCE_NORMALS) != 0u) {
                 normal = pack_normal(-world_gradient(place.gradient));
             }
-            put(first, rank, numbering, offset_of(place), normal, pack_color(point.xyz));
+            put(first, rank, numbering, offset_of(place), normal, point.xyz);
         }
         before += total;
     }

@@ -229,7 +229,7 @@ layouts! {
 
     /// A sampler whose sets the device makes itself.
     pub struct ParticleSource {
-        /// First axis of a volume's lattice; the fourth number is unused.
+        /// First axis of a volume's lattice; the fourth number is where its last voxel ends, lattice coordinates.
         pub axis_x: [f32; 4],
         /// Second axis.
         pub axis_y: [f32; 4],
@@ -241,7 +241,7 @@ layouts! {
         pub gradient_y: [f32; 4],
         /// Third column.
         pub gradient_z: [f32; 4],
-        /// Factor on the colours of vertices.
+        /// Colour of particles that have none of their own, or factor on the colours of vertices; the fourth number is unused.
         pub tint: [f32; 4],
         /// Hash of seed and stage, the lower half first.
         pub key: [u32; 2],
@@ -261,8 +261,8 @@ layouts! {
         pub levels: u32,
         /// The object.
         pub object: u32,
-        /// Colour of particles that have none of their own, packed.
-        pub color: u32,
+        /// Nothing.
+        pub unused: u32,
         /// 1 where opacity does not depend on the angle, + 2 where there are normals, + 4 colours of vertices.
         pub flags: u32,
         /// Where the alias tables begin, words.

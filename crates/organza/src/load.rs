@@ -134,7 +134,7 @@ pub(crate) fn load_measured(
     let mut camera = scene.camera;
     let exponent = normalize(&mut cloud, &mut own, &mut camera, &mut lights);
     cloud.canonicalize();
-    cloud.validate().map_err(|e| Error::Internal(e.to_string()))?;
+    cloud.validate().map_err(|e| out_of_range(scene, &cloud, e))?;
     Ok(Loaded {
         cloud,
         own,
@@ -151,6 +151,18 @@ pub(crate) fn load_measured(
         splats,
         warnings,
     })
+}
+
+/// Splats beyond what their numbers hold: sizes and places of the input are.
+fn out_of_range(scene: &Scene, cloud: &Cloud, error: splat_core::Error) -> Error {
+    let splat_core::Error::Invalid { element: "splat", index, .. } = &error else {
+        return Error::Internal(error.to_string());
+    };
+    let object = cloud.object.get(*index).and_then(|o| scene.objects.get(*o as usize));
+    let name = object.map_or_else(|| "an object".into(), |o| format!("object '{}'", crate::escape_controls(&o.name)));
+    let file = object.and_then(|o| o.source.path()).map(|path| format!(", {}", crate::printable(path)));
+    let hint = "use a scale, spacing or extinction with which sizes, areas and places stay within 1e38";
+    Error::input(name + &file.unwrap_or_default(), error.to_string(), hint)
 }
 
 /// What the planner asks of all lights.

@@ -97,16 +97,33 @@ fn occluder(opaque: &OpaqueImage, layout: &ChannelLayout) -> Option<Occluder> {
     Some(Occluder { depth: opaque.depth.clone(), color: (0..opaque.depth.len()).map(color).collect() })
 }
 
+/// What went wrong with the particles of the named object or objects: a limit, or data that samplers do not take. They are
+/// refused by the samplers' own checks, so that it is never the program's fault.
+fn refuse(whose: &str, error: pbsr::Error) -> Error {
+    match error {
+        pbsr::Error::Core(splat_core::Error::Cancelled) => Error::Cancelled,
+        pbsr::Error::TooMuch { what, needed, had, unit } => Error::Limit {
+            what: format!("{whose}: {what}"),
+            needed,
+            limit: had,
+            unit,
+            hint: "use a lower extinction or opacity, a smaller image or render.antialias, or a larger --max-memory"
+                .into(),
+        },
+        pbsr::Error::Field { .. } => Error::input(
+            whose,
+            error.to_string(),
+            "use a smaller box, or an expression that is finite everywhere in it",
+        ),
+        other => {
+            Error::input(whose, other.to_string(), "use sizes, places, extinctions and opacities within its reach")
+        }
+    }
+}
+
 fn fault(error: pbsr::Error) -> Error {
     match error {
         pbsr::Error::Core(splat_core::Error::Cancelled) => Error::Cancelled,
-        pbsr::Error::TooMuch { what, needed, had } => Error::Limit {
-            what: what.into(),
-            needed,
-            limit: had,
-            unit: "bytes",
-            hint: "use a smaller image or render.antialias, or a larger --max-memory".into(),
-        },
         other => Error::Internal(other.to_string()),
     }
 }

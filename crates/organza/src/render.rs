@@ -2,6 +2,7 @@
 
 use crate::device::{DeviceChoice, Helper};
 use crate::load::files::Files;
+use crate::load::own::Own;
 use crate::load::{Loaded, SplatCount, light_statistics, load_measured};
 use crate::particles::{self, Checkpoint, Kept, average_bytes};
 use crate::plan::{Plan, pass, plan};
@@ -9,7 +10,7 @@ use crate::points::{self, Drawing};
 use crate::scene::{Scene, Technique};
 use crate::statistics::Statistics;
 use crate::{CostRecord, Error, Layers, Progress};
-use splat_core::{LayerData, LayerSet, Material};
+use splat_core::{Grid, LayerData, LayerSet, Material};
 use std::path::PathBuf;
 
 /// What a render may take and how it treats doubtful input.
@@ -79,7 +80,8 @@ pub struct Explanation {
     pub plan: Plan,
     /// What loading cost.
     pub cost: CostRecord,
-    /// Bytes that rendering will take beside the inputs, see [`Explanation::plan`] for the passes that take them. Shadow maps
+    /// Bytes that rendering will take, with the inputs that particles are sampled from and without others, see
+    /// [`Explanation::plan`] for the passes that take them. Shadow maps
     /// are estimated from the number of splats; each is held to the allowed memory when it is built.
     pub memory: u64,
     /// Splats of every visible object, as predicted from its input and as made.
@@ -246,6 +248,7 @@ pub(crate) fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOption
     if plan.passes.iter().any(|p| p.name == pass::PARTICLES) {
         let size = scene.camera.size.map(|s| u64::from(s) * u64::from(scene.render.antialias));
         memory += average_bytes(size, &scene.render.layers.set(), statistics.colored_extinction, options);
+        memory += own_bytes(loaded);
     }
     check_memory("rendering", memory, options.max_memory)?;
     Ok((plan, memory))
@@ -280,6 +283,21 @@ fn image_bytes(scene: &Scene) -> u64 {
 fn splat_bytes(loaded: &Loaded, layers: &LayerSet) -> u64 {
     let values = 4 * splat_core::shade::ChannelLayout::new(layers).count() as u64;
     loaded.cloud.bytes() + loaded.cloud.len() as u64 * (8 + 64 + 8 + values)
+}
+
+/// Bytes of what particles are sampled from, files that objects share once, and of the tables for that.
+fn own_bytes(loaded: &Loaded) -> u64 {
+    let mut grids: Vec<*const Grid> = Vec::new();
+    let of = |own: &Own| {
+        let known = own.grid().is_some_and(|grid| {
+            let at = std::ptr::from_ref(grid);
+            let known = grids.contains(&at);
+            grids.push(at);
+            known
+        });
+        own.table_bytes() + if known { 0 } else { own.bytes() }
+    };
+    loaded.own.iter().map(of).sum()
 }
 
 /// Bytes of one shadow map: its table, and the entries that its casters leave in it.

@@ -4,6 +4,8 @@
 //! rate. A block's tables and the data of its elements stay in the nearest cache, and no set ever visits an element that
 //! gets no particle. Rates are summed in f64; one look-up resolves shares of 2⁻³² of a block.
 
+use crate::Error;
+use crate::params::countable;
 use crate::stream::{Stage, Stream};
 use rayon::prelude::*;
 
@@ -36,8 +38,12 @@ pub(crate) struct Blocks {
 }
 
 impl Blocks {
-    /// Tables for `elements` elements, of which `rate` gives the mean number of particles in a set, finite and ≥ 0.
-    pub(crate) fn new(elements: usize, rate: impl Fn(usize) -> f64 + Sync) -> Self {
+    /// Tables for `elements` elements, of which `rate` gives the mean number of particles in a set, ≥ 0.
+    ///
+    /// # Errors
+    /// [`Error::TooMuch`] for more than 4·10⁹ particles a set, before lists are made of them; [`Error::Parameter`] where
+    /// rates are not numbers.
+    pub(crate) fn new(elements: usize, rate: impl Fn(usize) -> f64 + Sync) -> Result<Self, Error> {
         let mut slots = vec![(0u32, 0u16); elements];
         let totals: Vec<f64> = slots
             .par_chunks_mut(BLOCK)
@@ -47,13 +53,14 @@ impl Blocks {
                 fill(slots, &rates)
             })
             .collect();
+        countable(totals.iter().sum())?;
         let mut chunks = Vec::new();
         for (b, &total) in totals.iter().enumerate().filter(|(_, t)| **t > 0.0) {
             let parts = (total / CHUNK_MEAN).ceil().max(1.0);
             // Sums of independent Poisson variables are Poisson: a block may be shared by any number of tasks.
             chunks.extend((0..parts as u64).map(|_| (b as u32, total / parts)));
         }
-        Self { elements, slots, chunks }
+        Ok(Self { elements, slots, chunks })
     }
 
     /// Number of chunks.
@@ -156,8 +163,9 @@ fn pick(slots: &[(u32, u16)], bits: u64) -> usize {
 /// One alias table; returns the sum of the rates.
 fn fill(slots: &mut [(u32, u16)], rates: &[f64]) -> f64 {
     let total: f64 = rates.iter().sum();
-    if total <= 0.0 {
-        return 0.0;
+    // Rates without end or value are refused by their sum.
+    if total <= 0.0 || !total.is_finite() {
+        return total;
     }
     let scale = rates.len() as f64 / total;
     let mut rest: Vec<f64> = rates.iter().map(|r| r * scale).collect();
@@ -198,10 +206,25 @@ mod tests {
     }
 
     #[test]
+    fn too_many_particles_are_refused_before_lists_are_made_of_them() {
+        for rate in [1e7, 1e15, 1e300, f64::INFINITY] {
+            let refused = Blocks::new(2000, |_| rate).err();
+            assert!(matches!(refused, Some(Error::TooMuch { unit: "particles", .. })), "{rate}: {refused:?}");
+        }
+        for broken in [f64::NAN, f64::NEG_INFINITY] {
+            let rate = |i: usize| if i == 1500 { broken } else { f64::INFINITY };
+            let refused = Blocks::new(2000, rate).err();
+            assert!(matches!(refused, Some(Error::Parameter { .. })), "{broken}: {refused:?}");
+        }
+        let most = Blocks::new(2000, |_| 1.9e6).unwrap();
+        assert!(most.bytes() < 16 << 20, "{}", most.bytes());
+    }
+
+    #[test]
     fn elements_are_picked_by_their_rates_and_never_at_rate_zero() {
         let rate = |i: usize| [0.0, 1e-3, 1.0, 250.0, 7.0][i % 5] * (1.0 + (i / 1000) as f64);
         const N: usize = 3000;
-        let blocks = Blocks::new(N, rate);
+        let blocks = Blocks::new(N, rate).unwrap();
         let mut count = vec![0u64; N];
         for set in 0..20 {
             for chunk in 0..blocks.chunks() {

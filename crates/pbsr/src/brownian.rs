@@ -15,11 +15,10 @@
 
 use crate::error::check;
 use crate::params::countable;
+use crate::particles::Steps;
 use crate::stream::{Stage, Stream, unit_or_zero};
 use crate::walk::Walk;
-use crate::{
-    Error, ImplicitSurface, LineSampler, PackedColor, PackedNormal, Particles, Sampler, SurfaceParams, opacity,
-};
+use crate::{Error, ImplicitSurface, LineSampler, PackedNormal, Particles, Sampler, SurfaceParams, opacity};
 use glam::DVec3;
 use rayon::prelude::*;
 use splat_core::glam;
@@ -214,13 +213,14 @@ impl Sampler for BrownianSampler<'_> {
         let all = opacity::whole_count(self.number, q, rounding);
         let first = chunk as u64 * CHUNK;
         let (places, ..) = self.run(set, chunk as u64, all.saturating_sub(first).min(CHUNK));
-        let color = PackedColor::new(self.params.color);
+        let color = Steps::new(self.params.color);
         scratch.reserve(places.len());
         for p in places {
             let normal = PackedNormal::new(unit_or_zero(self.surface.field.gradient(p)).as_vec3());
             let per_crossing = self.params.surface_opacity == SurfaceOpacity::PerCrossing;
             let normal = if per_crossing { normal.per_crossing() } else { normal };
-            scratch.push((p - self.origin).as_vec3(), normal, color);
+            let place = (p - self.origin).as_vec3();
+            scratch.push(place, normal, color.at(place));
         }
         scratch
     }

@@ -16,7 +16,7 @@ pub enum Error {
     },
     /// More particles or more memory than allowed.
     #[error(
-        "particles: {what} needs {needed}, the limit is {had}; use a larger particle cross-section or a smaller image"
+        "particles: {what} needs {needed} {unit}, the limit is {had}; use a larger particle cross-section or a smaller image"
     )]
     TooMuch {
         /// What would be too large.
@@ -25,6 +25,8 @@ pub enum Error {
         needed: u64,
         /// Amount allowed.
         had: u64,
+        /// What is counted: `particles`, `bytes` …
+        unit: &'static str,
     },
     /// There is nothing to sample: no surface in the box, no area, no extinction.
     #[error("particles: {what} is empty: {reason}")]

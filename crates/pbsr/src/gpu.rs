@@ -318,7 +318,7 @@ fn take_in(capacities: Capacities, sums: &[u8], ensemble: &mut Ensemble) -> Resu
 
 fn room(what: &'static str, needed: usize, had: u32) -> Result<(), Error> {
     let (needed, had) = (needed as u64, u64::from(had));
-    if needed > had { Err(Error::TooMuch { what, needed, had }) } else { Ok(()) }
+    if needed > had { Err(Error::TooMuch { what, needed, had, unit: "records" }) } else { Ok(()) }
 }
 
 /// The particles of one object in a set, with the numbers that thin them out on the CPU.

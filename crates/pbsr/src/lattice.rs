@@ -15,11 +15,11 @@
 use crate::blocks::Blocks;
 #[cfg(feature = "gpu")]
 use crate::gpu::{Maker, Twin, columns};
-use crate::params::countable;
+use crate::particles::Steps;
 use crate::places::{corners, interpolate};
 use crate::sampler::{Poisson, PoissonSets};
 use crate::stream::{Stage, Stream};
-use crate::{Error, PackedColor, PackedNormal, Particles, SurfaceParams};
+use crate::{Error, PackedNormal, Particles, SurfaceParams};
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 use splat_core::optics::SurfaceOpacity;
@@ -57,7 +57,7 @@ impl<'a> LatticeSampler<'a> {
         crate::error::check(level.is_finite(), "level", level, "a finite number")?;
         if grid.values.len() > u32::MAX as usize {
             let needed = grid.values.len() as u64;
-            return Err(Error::TooMuch { what: "a volume's lattice", needed, had: u64::from(u32::MAX) });
+            return Err(Error::TooMuch { what: "a volume", needed, had: u64::from(u32::MAX), unit: "lattice points" });
         }
         let cells = passed(grid, level);
         if cells.is_empty() {
@@ -68,8 +68,7 @@ impl<'a> LatticeSampler<'a> {
         // Rounded up, so that no share is above 1.
         let weight = columns.map(|c| c.length()).into_iter().fold(0.0, f64::max) * (1.0 + 1e-6);
         let per_cell = 3.0 * params.particles_per_area() * grid.cell_volume() * weight;
-        countable(per_cell * cells.len() as f64)?;
-        let blocks = Blocks::new(cells.len(), |_| per_cell);
+        let blocks = Blocks::new(cells.len(), |_| per_cell)?;
         let sets = PoissonSets::new(grid.origin, params.cross_section, blocks);
         let (axes, gradient, weight) = (grid.axes.as_mat3(), inverse.as_mat3(), weight as f32);
         let mut sampler = Self { grid, level, params: *params, cells, sets, axes, gradient, weight };
@@ -149,7 +148,7 @@ impl Poisson for LatticeSampler<'_> {
     }
 
     fn fill(&self, set: u64, chunk: usize, particles: &mut Particles) {
-        let color = PackedColor::new(self.params.color);
+        let color = Steps::new(self.params.color);
         let [nx, ny, _] = self.grid.dims.map(|n| n as u32);
         let per_crossing = self.params.surface_opacity == SurfaceOpacity::PerCrossing;
         self.sets.blocks.arrivals(self.params.seed, Stage::Lattice, set, chunk, |c, stream| {
@@ -159,7 +158,8 @@ impl Poisson for LatticeSampler<'_> {
             let lattice = Vec3::from_array(std::array::from_fn(|k| corner[k] as f32 + f[k]));
             let normal = PackedNormal::new(gradient);
             let normal = if per_crossing { normal.per_crossing() } else { normal };
-            particles.push(self.axes * lattice, normal, color);
+            let place = self.axes * lattice;
+            particles.push(place, normal, color.at(place));
         });
     }
 
@@ -168,6 +168,7 @@ impl Poisson for LatticeSampler<'_> {
         let ([axis_x, axis_y, axis_z], [gradient_x, gradient_y, gradient_z]) =
             (columns(&self.axes), columns(&self.gradient));
         let per_crossing = self.params.surface_opacity == SurfaceOpacity::PerCrossing;
+        let [r, g, b] = self.params.color;
         let source = ParticleSource {
             axis_x,
             axis_y,
@@ -176,7 +177,7 @@ impl Poisson for LatticeSampler<'_> {
             gradient_y,
             gradient_z,
             lattice: [self.grid.dims[0] as u32, self.grid.dims[1] as u32],
-            color: PackedColor::new(self.params.color).bits(),
+            tint: [r, g, b, 0.0],
             flags: u32::from(per_crossing),
             level: self.level,
             weight: self.weight,

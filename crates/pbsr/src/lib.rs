@@ -15,10 +15,13 @@
 //!
 //! struct Ball;
 //! impl ScalarField for Ball {
-//!     fn value(&self, p: DVec3) -> f64 { p.length() - 1.0 }
-//!     fn gradient(&self, p: DVec3) -> DVec3 { p.normalize() }
-//!     fn hessian(&self, _: DVec3) -> DMat3 { DMat3::ZERO }
-//!     fn bound(&self, p: DVec3, r: f64) -> Option<(f64, f64)> { Some((self.value(p) - r, self.value(p) + r)) }
+//!     fn value(&self, p: DVec3) -> f64 { p.length_squared() - 1.0 }
+//!     fn gradient(&self, p: DVec3) -> DVec3 { 2.0 * p }
+//!     fn hessian(&self, _: DVec3) -> DMat3 { 2.0 * DMat3::IDENTITY }
+//!     fn bound(&self, p: DVec3, r: f64) -> Option<(f64, f64)> {
+//!         let [near, far] = [(p.length() - r).max(0.0), p.length() + r];
+//!         Some((near * near - 1.0, far * far - 1.0))
+//!     }
 //! }
 //!
 //! let view = Projection::Orthographic { height: 2.4 };

@@ -26,11 +26,11 @@ use crate::blocks::Blocks;
 use crate::error::check;
 use crate::implicit::{CellCounts, Cells, ImplicitSurface};
 use crate::leaves::{Graph, Leaf};
-use crate::params::countable;
+use crate::particles::Steps;
 use crate::roots::{Found, Line};
 use crate::sampler::{Poisson, PoissonSets};
 use crate::stream::{Stage, Stream, across, unit_or_zero};
-use crate::{Density, Error, PackedColor, PackedNormal, Particles, SurfaceParams};
+use crate::{Density, Error, PackedNormal, Particles, SurfaceParams};
 use glam::DVec3;
 use rayon::prelude::*;
 use splat_core::glam;
@@ -112,10 +112,9 @@ impl<'a> LineSampler<'a> {
         let (leaves, empty_cubes) = Leaf::all(surface, &cells);
         // A density factor multiplies optical depth.
         let per_area = params.particles_per_area() * density.as_ref().map_or(1.0, |d| d.max);
+        let blocks = Blocks::new(leaves.len(), |l| leaves[l].reach() * per_area)?;
         let mut sum = 0.0;
         let reaches: Vec<f64> = leaves.iter().map(|l| (sum += l.reach(), sum).1).collect();
-        countable(sum * per_area)?;
-        let blocks = Blocks::new(leaves.len(), |l| leaves[l].reach() * per_area);
         let sets = PoissonSets::new(origin, params.cross_section, blocks);
         let report = LineReport {
             cells: cells.counts,
@@ -284,16 +283,17 @@ impl<'a> LineSampler<'a> {
 
     /// Particles from places with their gradients.
     #[inline(always)]
-    fn push(&self, p: DVec3, normal: DVec3, color: PackedColor, particles: &mut Particles) {
+    fn push(&self, p: DVec3, normal: DVec3, color: Steps, particles: &mut Particles) {
         let normal = PackedNormal::new(normal.as_vec3());
         let per_crossing = self.params.surface_opacity == SurfaceOpacity::PerCrossing;
         let normal = if per_crossing { normal.per_crossing() } else { normal };
-        particles.push((p - self.sets.origin).as_vec3(), normal, color);
+        let place = (p - self.sets.origin).as_vec3();
+        particles.push(place, normal, color.at(place));
     }
 
     /// The crossings of an open leaf's line.
     #[cold]
-    fn open(&self, leaf: &Leaf, stream: &mut Stream, color: PackedColor, found: &mut Found, particles: &mut Particles) {
+    fn open(&self, leaf: &Leaf, stream: &mut Stream, color: Steps, found: &mut Found, particles: &mut Particles) {
         let line = self.line(leaf, stream);
         found.roots.clear();
         self.search(leaf, &line, 1, found);
@@ -309,7 +309,7 @@ impl<'a> LineSampler<'a> {
 
     /// The crossings of a batch of graphs' lines.
     #[inline]
-    fn flush(&self, batch: &mut Batch, color: PackedColor, particles: &mut Particles) {
+    fn flush(&self, batch: &mut Batch, color: Steps, particles: &mut Particles) {
         let n = std::mem::take(&mut batch.len);
         self.surface.field.value_gradients(&batch.at[..n], &mut batch.found[..n]);
         for i in 0..n {
@@ -380,7 +380,7 @@ impl Poisson for LineSampler<'_> {
     }
 
     fn fill(&self, set: u64, chunk: usize, particles: &mut Particles) {
-        let color = PackedColor::new(self.params.color);
+        let color = Steps::new(self.params.color);
         let mut found = Found::default();
         let mut batch = Batch::EMPTY;
         self.sets.blocks.arrivals(self.params.seed, Stage::Lines, set, chunk, |l, stream| {

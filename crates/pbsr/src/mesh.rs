@@ -9,10 +9,10 @@
 use crate::blocks::{BATCH, Batch, Blocks};
 #[cfg(feature = "gpu")]
 use crate::gpu::{Maker, Twin};
-use crate::params::countable;
+use crate::particles::Steps;
 use crate::sampler::{Poisson, PoissonSets};
 use crate::stream::{Stage, pair};
-use crate::{Density, Error, PackedColor, PackedNormal, Particles, SurfaceParams};
+use crate::{Density, Error, PackedNormal, Particles, SurfaceParams};
 use glam::Vec3;
 use rayon::prelude::*;
 use splat_core::optics::SurfaceOpacity;
@@ -55,8 +55,7 @@ impl<'a> MeshSampler<'a> {
         if area.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
             return Err(Error::Empty { what: "a mesh", reason: "no triangle has an area" });
         }
-        countable(area * per_area * density.as_ref().map_or(1.0, |d| d.max))?;
-        let blocks = Blocks::new(mesh.triangles.len(), rate);
+        let blocks = Blocks::new(mesh.triangles.len(), rate)?;
         let sets = PoissonSets::new(mesh.origin, params.cross_section, blocks);
         let flat = if mesh.normal.is_empty() { mesh.triangles.len() } else { 0 };
         let normal = |t: usize| {
@@ -78,13 +77,15 @@ impl<'a> MeshSampler<'a> {
     }
 
     /// Appends the particles of some arrivals, column by column, so that none waits for another's look-ups.
-    fn place(&self, batch: &Batch<1>, own: PackedColor, particles: &mut Particles) {
+    fn place(&self, batch: &Batch<1>, own: Steps, particles: &mut Particles) {
         let mut places = [[0.0; 2]; BATCH];
         places.iter_mut().zip(&batch.bits[0]).for_each(|(at, bits)| *at = folded(pair(*bits)));
         let all = || batch.elements[..batch.len].iter().zip(&places);
+        let first = particles.position.len();
         particles.position.extend(all().map(|(t, at)| point(corners(self.mesh, *t), *at)));
         particles.normal.extend(all().map(|(t, at)| self.normal(*t, *at)));
-        particles.color.extend(all().map(|(t, at)| self.color(*t, *at, own)));
+        let colors = all().zip(&particles.position[first..]).map(|((t, at), p)| self.color(*t, *at, own).at(*p));
+        particles.color.extend(colors);
     }
 
     #[inline]
@@ -99,13 +100,13 @@ impl<'a> MeshSampler<'a> {
     }
 
     #[inline]
-    fn color(&self, t: usize, [u, v]: [f32; 2], own: PackedColor) -> PackedColor {
+    fn color(&self, t: usize, [u, v]: [f32; 2], own: Steps) -> Steps {
         match &*self.mesh.color {
             [] => own,
             colors => {
                 let [a, b, c] = self.mesh.triangles[t].map(|i| colors[i as usize]);
                 let at = |k: usize| (a[k] * (1.0 - u - v) + b[k] * u + c[k] * v) * self.params.color[k];
-                PackedColor::new([at(0), at(1), at(2)])
+                Steps::new([at(0), at(1), at(2)])
             }
         }
     }
@@ -147,7 +148,7 @@ impl Poisson for MeshSampler<'_> {
     }
 
     fn fill(&self, set: u64, chunk: usize, particles: &mut Particles) {
-        let own = PackedColor::new(self.params.color);
+        let own = Steps::new(self.params.color);
         let (seed, blocks) = (self.params.seed, &self.sets.blocks);
         let Some(density) = &self.density else {
             blocks.batches(seed, Stage::Mesh, set, chunk, |batch| self.place(batch, own, particles));
@@ -162,7 +163,7 @@ impl Poisson for MeshSampler<'_> {
             let radius = [a, b, c].map(|p| (p - middle).length()).into_iter().fold(0.0, f64::max);
             let most = density.bound(self.mesh.origin + middle, radius * (1.0 + 1e-12));
             if stream.unit() * most < density.at(self.mesh.origin + p.as_dvec3()) {
-                particles.push(p, self.normal(t, at), self.color(t, at, own));
+                particles.push(p, self.normal(t, at), self.color(t, at, own).at(p));
             }
         });
     }
@@ -183,7 +184,6 @@ impl Poisson for MeshSampler<'_> {
         let per_crossing = self.params.surface_opacity == SurfaceOpacity::PerCrossing;
         let source = ParticleSource {
             tint: [r, g, b, 0.0],
-            color: PackedColor::new(self.params.color).bits(),
             flags: u32::from(per_crossing) + 2 * u32::from(has[0]) + 4 * u32::from(has[1]),
             vertex_words: 3 * (1 + has.iter().filter(|h| **h).count() as u32),
             ..ParticleSource::default()

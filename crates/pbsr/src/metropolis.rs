@@ -2,7 +2,8 @@
 //!
 //! A chain at x is offered, in turns, a uniform place of all cells with extinction and one within a cell's length of x; it
 //! goes there with probability min(1, σ(x')/σ(x)). Both offers are symmetric, so places have the density σ/∫σ dV, and a
-//! set gets a Poisson number of them of mean ∫σ dV/s.
+//! set gets a Poisson number of them of mean ∫σ dV/s. Cells at the border are longer (`places.rs`): chains go through cells
+//! as if all were alike, by σ times the volume of the cell.
 //!
 //! The method of the literature, kept for comparison. Cell by cell ([`GridSampler`]) is faster and exact; here ∫σ dV is a
 //! sum over two Gauss points an axis of each cell, a chain starts with the density σ_max of its cell rather than σ, and a
@@ -11,6 +12,7 @@
 
 use crate::error::check;
 use crate::params::countable;
+use crate::places::cells;
 use crate::stream::{Stage, Stream};
 use crate::volume::{Cell, VolumeParams};
 use crate::{Error, GridSampler, Particles, Sampler};
@@ -52,9 +54,12 @@ pub struct MetropolisSampler<'a> {
 #[derive(Clone, Copy)]
 struct Place {
     cell: usize,
-    within: [f32; 3],
+    /// Share of the way through the cell along each axis.
+    share: [f32; 3],
     gradient: Vec3,
     point: TransferPoint,
+    /// Extinction times the volume of the cell in steps³.
+    weight: f32,
 }
 
 impl<'a> MetropolisSampler<'a> {
@@ -73,11 +78,12 @@ impl<'a> MetropolisSampler<'a> {
         let cells = GridSampler::new(grid, transfer, params, None)?;
         const POINTS: [f32; 2] = [0.211_324_87, 0.788_675_1];
         let of_cell = |&Cell { at, .. }: &Cell| {
+            let lattice = cells.lattice();
             let at_point = |k: usize| {
-                let f = [POINTS[k & 1], POINTS[k >> 1 & 1], POINTS[k >> 2]];
-                f64::from(transfer.at(cells.interpolate(at, f).0).extinction)
+                let share = [POINTS[k & 1], POINTS[k >> 1 & 1], POINTS[k >> 2]];
+                f64::from(transfer.at(cells.interpolate(at, lattice.within(lattice.corner(at), share)).0).extinction)
             };
-            (0..8).map(at_point).sum::<f64>() / 8.0
+            f64::from(lattice.volume(at)) * (0..8).map(at_point).sum::<f64>() / 8.0
         };
         // Chunks of fixed size, summed in order: the same bits for any number of threads.
         let sums: Vec<f64> = cells.cells.par_chunks(4096).map(|c| c.iter().map(of_cell).sum()).collect();
@@ -89,12 +95,14 @@ impl<'a> MetropolisSampler<'a> {
         Ok(Self { cells, chains: *chains, mean, cell_at })
     }
 
-    fn place(&self, cell: usize, within: [f32; 3]) -> Place {
-        let (value, gradient) = self.cells.interpolate(self.cells.cells[cell].at, within);
-        Place { cell, within, gradient, point: self.cells.transfer.at(value) }
+    fn place(&self, cell: usize, share: [f32; 3]) -> Place {
+        let (at, lattice) = (self.cells.cells[cell].at, self.cells.lattice());
+        let (value, gradient) = self.cells.interpolate(at, lattice.within(lattice.corner(at), share));
+        let point = self.cells.transfer.at(value);
+        Place { cell, share, gradient, point, weight: point.extinction * lattice.volume(at) }
     }
 
-    /// A uniform place of all cells with extinction.
+    /// A uniform place of all cells with extinction, as if they were alike.
     fn anywhere(&self, stream: &mut Stream) -> Place {
         let cell = (((stream.bits() >> 32) * self.cells.cells.len() as u64) >> 32) as usize;
         self.place(cell, stream.triple())
@@ -102,25 +110,25 @@ impl<'a> MetropolisSampler<'a> {
 
     /// A place within a cell's length of `from`, or `None` out of all cells with extinction.
     fn nearby(&self, from: &Place, stream: &mut Stream) -> Option<Place> {
-        let corner = self.cells.corner(self.cells.cells[from.cell].at);
+        let corner = self.cells.lattice().corner(self.cells.cells[from.cell].at);
         let step = stream.triple();
-        let to: [f32; 3] = std::array::from_fn(|a| from.within[a] + 2.0 * step[a] - 1.0);
+        let to: [f32; 3] = std::array::from_fn(|a| from.share[a] + 2.0 * step[a] - 1.0);
         let floor = to.map(f32::floor);
         let dims = self.cells.grid.dims;
         let mut at = [0usize; 3];
         for a in 0..3 {
             let i = i64::from(corner[a]) + floor[a] as i64;
-            at[a] = usize::try_from(i).ok().filter(|i| i + 1 < dims[a])?;
+            at[a] = usize::try_from(i).ok().filter(|i| *i < cells(dims[a]))?;
         }
         let cell = self.cell_at[(at[2] * dims[1] + at[1]) * dims[0] + at[0]];
-        let within = std::array::from_fn(|a| (to[a] - floor[a]).min(1.0));
-        (cell != u32::MAX).then(|| self.place(cell as usize, within))
+        let share = std::array::from_fn(|a| (to[a] - floor[a]).min(1.0));
+        (cell != u32::MAX).then(|| self.place(cell as usize, share))
     }
 
     fn step(&self, place: &mut Place, number: u32, stream: &mut Stream) {
         let offer = if number.is_multiple_of(2) { Some(self.anywhere(stream)) } else { self.nearby(place, stream) };
         let u = stream.pair()[0];
-        if let Some(to) = offer.filter(|to| u * place.point.extinction < to.point.extinction) {
+        if let Some(to) = offer.filter(|to| u * place.weight < to.weight) {
             *place = to;
         }
     }
@@ -153,9 +161,10 @@ impl Sampler for MetropolisSampler<'_> {
             (0..self.chains.burn_in).for_each(|n| self.step(&mut place, n, &mut stream));
             for _ in 0..self.chains.particles_per_chain.min((wanted - scratch.len()) as u32) {
                 (0..self.chains.stride).for_each(|n| self.step(&mut place, n, &mut stream));
-                let offset = self.cells.offset(self.cells.cells[place.cell].at, place.within);
-                let (normal, color) = self.cells.attributes(place.point.color, place.gradient);
-                scratch.push(offset, normal, color);
+                let (at, lattice) = (self.cells.cells[place.cell].at, self.cells.lattice());
+                let corner = lattice.corner(at);
+                let offset = lattice.offset(corner, lattice.within(corner, place.share));
+                self.cells.push(offset, place.point.color, place.gradient, scratch);
             }
         }
         scratch

@@ -72,12 +72,14 @@ pub(crate) fn color(c: [f32; 3]) -> Result<(), Error> {
     check(c.iter().all(|v| v.is_finite() && *v >= 0.0), "color", c, "three finite numbers ≥ 0")
 }
 
-/// Refuses a set that could not be numbered.
+/// Refuses a set that could not be numbered, or whose optical depths do not add up to a number.
 pub(crate) fn countable(expected: f64) -> Result<(), Error> {
+    check(!expected.is_nan(), "particles of a set", expected, "a number: finite extinctions, opacities and sizes")?;
     if expected <= MAX_PARTICLES {
         return Ok(());
     }
-    Err(Error::TooMuch { what: "a set of particles", needed: expected as u64, had: MAX_PARTICLES as u64 })
+    let (needed, had) = (expected as u64, MAX_PARTICLES as u64);
+    Err(Error::TooMuch { what: "a set", needed, had, unit: "particles" })
 }
 
 /// A field that multiplies the mean number of particles from place to place, for surfaces and volumes alike.

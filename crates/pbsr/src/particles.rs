@@ -66,7 +66,7 @@ impl PackedNormal {
 }
 
 /// A linear colour in 32 bits: three mantissas of nine bits and one exponent, 2⁻²⁴ to 65408, relative error at most
-/// 1/512 of the largest channel.
+/// 1/512 of the largest channel where it is rounded to the nearest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PackedColor(u32);
 
@@ -74,20 +74,18 @@ impl PackedColor {
     /// White.
     pub const WHITE: Self = Self(256 | 256 << 9 | 256 << 18 | 16 << 27);
 
-    /// Packs a colour; negative and not finite channels count as 0, large ones as 65408.
+    /// Packs a colour, rounded to the nearest; negative and not finite channels count as 0, large ones as 65408.
     #[inline]
     pub fn new(color: [f32; 3]) -> Self {
-        let c = color.map(|v| if v > 0.0 { v.min(65408.0) } else { 0.0 });
-        let largest = c[0].max(c[1]).max(c[2]);
-        // Exponent of two above the largest channel, from its bits; rounding may carry into the next.
-        let mut exponent = ((largest.to_bits() >> 23) as i32 - 126).max(-15);
-        let scale = |e: i32| f32::from_bits(((9 - e + 127) as u32) << 23);
-        if largest * scale(exponent) + 0.5 >= 512.0 {
-            exponent += 1;
-        }
-        let s = scale(exponent);
-        let [r, g, b] = c.map(|v| (v * s + 0.5) as i32 as u32);
-        Self(r | g << 9 | b << 18 | ((exponent + 15) as u32) << 27)
+        // The number before 511.5: what is rounded stays below 512.
+        Steps::up_to(color, 511.5 - 1.0 / 32768.0).rounded(0.5)
+    }
+
+    /// Packs a colour for a particle at a random place: rounded up or down by a hash of the place, so that the mean over
+    /// many particles is the colour itself. Colours that need no rounding stay as they are.
+    #[inline]
+    pub fn at(color: [f32; 3], place: Vec3) -> Self {
+        Steps::new(color).at(place)
     }
 
     /// The bits, as kernels read them.
@@ -102,6 +100,63 @@ impl PackedColor {
         let scale = f32::from_bits(((self.0 >> 27) + 127 - 15 - 9) << 23);
         [self.0, self.0 >> 9, self.0 >> 18].map(|v| (v & 511) as f32 * scale)
     }
+}
+
+/// A colour in steps of its packed form, not rounded yet.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Steps {
+    /// Of each channel, below 512.
+    channels: [f32; 3],
+    exponent: u32,
+}
+
+impl Steps {
+    #[inline]
+    pub(crate) fn new(color: [f32; 3]) -> Self {
+        Self::up_to(color, 511.0)
+    }
+
+    /// Of which the largest is at most `most`, 256 or more.
+    #[inline]
+    fn up_to(color: [f32; 3], most: f32) -> Self {
+        let c = color.map(|v| if v > 0.0 { v.min(65408.0) } else { 0.0 });
+        let largest = c[0].max(c[1]).max(c[2]);
+        // Exponent of two above the largest channel, from its bits; rounding may carry into the next.
+        let mut exponent = ((largest.to_bits() >> 23) as i32 - 126).max(-15);
+        let scale = |e: i32| f32::from_bits(((9 - e + 127) as u32) << 23);
+        if largest * scale(exponent) > most {
+            exponent += 1;
+        }
+        let s = scale(exponent);
+        Self { channels: c.map(|v| v * s), exponent: (exponent + 15) as u32 }
+    }
+
+    /// Whole steps below what the channels are with `more`.
+    #[inline]
+    fn rounded(self, more: f32) -> PackedColor {
+        let [r, g, b] = self.channels.map(|v| (v + more) as i32 as u32);
+        PackedColor(r | g << 9 | b << 18 | self.exponent << 27)
+    }
+
+    /// See [`PackedColor::at`].
+    #[inline]
+    pub(crate) fn at(self, place: Vec3) -> PackedColor {
+        // Numbers of 14 bits and a half: beside whole steps up to 512, f32 adds them exactly.
+        self.rounded(((hash_of(place) >> 18) as f32 + 0.5) * (1.0 / 16384.0))
+    }
+}
+
+/// A hash of the bits of a place. Places are random, so it is a random number that costs no other and that a device, which
+/// has the same places, has too.
+#[inline]
+fn hash_of(place: Vec3) -> u32 {
+    let [x, y, z] = place.to_array().map(f32::to_bits);
+    let mut v = x.wrapping_mul(0x9e37_79b1) ^ y.wrapping_mul(0x85eb_ca77) ^ z.wrapping_mul(0xc2b2_ae3d);
+    v ^= v >> 16;
+    v = v.wrapping_mul(0x21f0_aaad);
+    v ^= v >> 15;
+    v = v.wrapping_mul(0x735a_2d97);
+    v ^ (v >> 15)
 }
 
 /// Particles as columns, offsets from their sampler's origin.

@@ -1,4 +1,9 @@
 //! Places of particles in the cells of a grid, with value and gradient there, in lanes.
+//!
+//! A volume is made of voxels, each around its lattice point: n points along an axis span n steps. Cells lie between
+//! lattice points, and those at the border have the half steps beyond it too, where the value is the border's. So along an
+//! axis a cell reaches from 0, or −½ for the first one, to 1, or 1½ for the last one; where there is one lattice point
+//! alone, from −½ to ½.
 
 use crate::blocks::BATCH;
 use crate::stream::triple;
@@ -12,11 +17,20 @@ pub(crate) struct Lattice {
     /// Lattice points along x and y, and 1 over them.
     dims: [u32; 2],
     inverse_dims: [f64; 2],
+    /// Where the last voxel ends along each axis, lattice coordinates.
+    ends: Vec3,
 }
 
 impl Lattice {
-    pub(crate) fn new(axes: Mat3, dims: [u32; 2]) -> Self {
-        Self { axes, dims, inverse_dims: dims.map(|n| 1.0 / f64::from(n)) }
+    pub(crate) fn new(axes: Mat3, [nx, ny, nz]: [u32; 3]) -> Self {
+        let ends = Vec3::from_array([nx, ny, nz].map(|n| (f64::from(n) - 0.5) as f32));
+        Self { axes, dims: [nx, ny], inverse_dims: [nx, ny].map(|n| 1.0 / f64::from(n)), ends }
+    }
+
+    /// Where the last voxel ends along each axis, lattice coordinates.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn ends(&self) -> Vec3 {
+        self.ends
     }
 
     /// The lattice indices of the cell's first corner.
@@ -32,21 +46,57 @@ impl Lattice {
         [at.wrapping_sub(row.wrapping_mul(nx)), row.wrapping_sub(layer.wrapping_mul(ny)), layer]
     }
 
-    /// Offset from the grid's origin at `f` of a cell.
+    /// From where to where a cell reaches along each axis, in steps from its first corner.
     #[inline(always)]
-    pub(crate) fn offset(&self, at: u32, f: [f32; 3]) -> Vec3 {
-        let [i, j, k] = self.corner(at);
-        self.axes * Vec3::new(i as f32 + f[0], j as f32 + f[1], k as f32 + f[2])
+    fn reach(&self, corner: [u32; 3]) -> [[f32; 2]; 3] {
+        std::array::from_fn(|a| {
+            let left = self.ends[a] - corner[a] as f32;
+            [if corner[a] == 0 { -0.5 } else { 0.0 }, if left < 2.0 { left } else { 1.0 }]
+        })
     }
+
+    /// Volume of a cell, in steps³: 1 but at the border.
+    pub(crate) fn volume(&self, at: u32) -> f32 {
+        self.reach(self.corner(at)).into_iter().map(|[low, high]| high - low).product()
+    }
+
+    /// The place at `f` in \[0, 1\]³ of a cell, in steps from its first corner.
+    #[inline(always)]
+    pub(crate) fn within(&self, corner: [u32; 3], f: [f32; 3]) -> [f32; 3] {
+        let reach = self.reach(corner);
+        std::array::from_fn(|a| reach[a][0] + f[a] * (reach[a][1] - reach[a][0]))
+    }
+
+    /// Offset from the grid's origin, so many steps from the first corner of a cell.
+    #[inline(always)]
+    pub(crate) fn offset(&self, [i, j, k]: [u32; 3], within: [f32; 3]) -> Vec3 {
+        self.axes * Vec3::new(i as f32 + within[0], j as f32 + within[1], k as f32 + within[2])
+    }
+}
+
+/// The nearest place between the corners of a cell.
+#[inline(always)]
+pub(crate) fn between(within: [f32; 3]) -> [f32; 3] {
+    within.map(|w| w.clamp(0.0, 1.0))
+}
+
+/// Cells along an axis of so many lattice points.
+pub(crate) fn cells(points: usize) -> usize {
+    points.saturating_sub(1).max(1)
+}
+
+/// From a lattice point to the next along each axis, in values; 0 where there is no other.
+#[inline(always)]
+pub(crate) fn steps([nx, ny, nz]: [usize; 3]) -> [usize; 3] {
+    [usize::from(nx > 1), if ny > 1 { nx } else { 0 }, if nz > 1 { nx * ny } else { 0 }]
 }
 
 /// Values at the corners of the cell with this first corner, x first.
 #[inline]
 pub(crate) fn corners(grid: &Grid, at: u32) -> [f32; 8] {
-    let (nx, layer) = (grid.dims[0], grid.dims[0] * grid.dims[1]);
-    let at = at as usize;
-    let pair = |i: usize| -> [f32; 2] { [grid.values[i], grid.values[i + 1]] };
-    let [[a, b], [c, d], [e, f], [g, h]] = [pair(at), pair(at + nx), pair(at + layer), pair(at + layer + nx)];
+    let ([next, row, layer], at) = (steps(grid.dims), at as usize);
+    let pair = |i: usize| -> [f32; 2] { [grid.values[i], grid.values[i + next]] };
+    let [[a, b], [c, d], [e, f], [g, h]] = [pair(at), pair(at + row), pair(at + layer), pair(at + layer + row)];
     [a, b, c, d, e, f, g, h]
 }
 
@@ -123,8 +173,10 @@ impl pulp::NullaryFnOnce for Find<'_> {
             let f = triple(places.bits[j]);
             let c = &places.corners;
             let corners = [c[0][j], c[1][j], c[2][j], c[3][j], c[4][j], c[5][j], c[6][j], c[7][j]];
-            let (value, gradient) = interpolate(corners, f);
-            let offset = lattice.offset(places.at[j], f);
+            let corner = lattice.corner(places.at[j]);
+            let within = lattice.within(corner, f);
+            let (value, gradient) = interpolate(corners, between(within));
+            let offset = lattice.offset(corner, within);
             places.value[j] = value;
             [places.gradient[0][j], places.gradient[1][j], places.gradient[2][j]] = gradient.to_array();
             [places.offset[0][j], places.offset[1][j], places.offset[2][j]] = offset.to_array();

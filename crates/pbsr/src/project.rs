@@ -20,10 +20,22 @@ use splat_core::{Camera, Similarity, glam};
 /// The widest particle, pixels: nearer to the eye, where it would be wider, opacity is lost.
 const WIDEST_PX: f32 = 64.0;
 
-/// Area of one pixel across its ray at view position `view` (x right, y up, z depth > 0), world units².
-pub fn pixel_area(camera: &Camera, view: DVec3) -> f64 {
+/// Area of one pixel across its ray at a world position, world units². In perspective it is 0 at the eye and behind it,
+/// where there are no pixels; samplers refuse it as a cross-section.
+pub fn pixel_area(camera: &Camera, position: DVec3) -> f64 {
+    pixel_area_view(camera, camera.view_from_world(position))
+}
+
+/// The same at a view position (x right, y up, z depth).
+pub(crate) fn pixel_area_view(camera: &Camera, view: DVec3) -> f64 {
     let f = camera.focal_px();
-    if camera.is_orthographic() { 1.0 / (f * f) } else { view.z / f * (view.z / f) * (view.z / view.length()) }
+    if camera.is_orthographic() {
+        1.0 / (f * f)
+    } else if view.z > 0.0 {
+        view.z / f * (view.z / f) * (view.z / view.length())
+    } else {
+        0.0
+    }
 }
 
 /// The smallest area of a pixel on what lies in a ball, world units²: a cross-section with which no particle needs to be
@@ -34,7 +46,7 @@ pub fn finest_pixel_area(camera: &Camera, center: DVec3, radius: f64, near: f64)
     let f = camera.focal_px();
     // The farthest from the axis that the image reaches.
     let corner = DVec3::new(0.5 * f64::from(camera.size[0]) / f, 0.5 * f64::from(camera.size[1]) / f, 1.0);
-    pixel_area(camera, if camera.is_orthographic() { DVec3::Z } else { corner * z })
+    pixel_area_view(camera, corner * z)
 }
 
 /// From the offsets of one object's particles to pixels.
@@ -252,16 +264,16 @@ mod tests {
             [(Projection::Orthographic { height: 4.0 }, 3.0), (Projection::Perspective { fov_y: 0.8 }, 3.0)]
         {
             let camera = camera(projection);
-            let width = 8.0 * pixel_area(&camera, DVec3::Z * depth).sqrt() as f32;
+            let width = 8.0 * pixel_area(&camera, DVec3::NEG_Z * depth).sqrt() as f32;
             for k in [0.3, 1.0, 2.7, 40.0] {
-                let s = k * pixel_area(&camera, DVec3::new(0.0, 0.0, depth));
+                let s = k * pixel_area(&camera, DVec3::NEG_Z * depth);
                 let projector = Projector::new(&camera, DVec3::ZERO, &Similarity::default(), s);
                 let (mut hits, mut expected, mut variance) = (0.0, 0.0, 0.0);
                 for i in 0..100_000u64 {
                     let u = |c| rng::unit_f32(5, 0, i, c);
                     // Whole pixels around the axis, so that all phases are met, and no widened particle is cut.
                     let p = Vec3::new((u(0) - 0.5) * width, (u(1) - 0.5) * width, -depth as f32);
-                    let own = s / pixel_area(&camera, p.as_dvec3() * DVec3::new(1.0, 1.0, -1.0));
+                    let own = s / pixel_area(&camera, p.as_dvec3());
                     let foot = project(&projector, p, u(2));
                     hits += foot.map_or(0.0, |f| f64::from((f.x[1] - f.x[0]) * (f.y[1] - f.y[0])));
                     expected += own;
@@ -270,6 +282,23 @@ mod tests {
                 assert!((hits - expected).abs() < 4.5 * f64::sqrt(variance), "k {k}: {hits} for {expected}");
             }
         }
+    }
+
+    #[test]
+    fn a_pixel_has_its_area_at_world_positions_and_none_behind_the_eye() {
+        let eye = DVec3::new(3.0, -2.0, 5.0);
+        let view = Projection::Perspective { fov_y: 0.8 };
+        let camera = Camera::look_at(eye, DVec3::new(1.0, 0.5, 0.0), DVec3::Y, view, [64, 48]).unwrap();
+        for (x, y, depth) in [(10.5, 3.5, 1.5), (32.0, 24.0, 4.0), (60.0, 47.0, 0.2)] {
+            let (_, ray) = camera.view_ray(x, y);
+            let turned = camera.axes[0] * ray.x + camera.axes[1] * ray.y + camera.axes[2] * ray.z;
+            // The pixel covers 1/f by 1/f at depth 1, seen at an angle.
+            let expected = (depth / camera.focal_px()).powi(2) / ray.length();
+            let found = pixel_area(&camera, eye + turned * depth);
+            assert!((found / expected - 1.0).abs() < 1e-12, "{found} for {expected}");
+            assert_eq!(pixel_area(&camera, eye - turned * depth), 0.0);
+        }
+        assert_eq!(pixel_area(&camera, eye), 0.0);
     }
 
     #[test]
@@ -288,13 +317,13 @@ mod tests {
             for j in 0..256 {
                 let (_, d) = camera.view_ray(f64::from(i) + 0.5, f64::from(j) + 0.5);
                 let on_sphere = d.normalize();
-                sum += pixel_area(&camera, on_sphere);
+                sum += pixel_area_view(&camera, on_sphere);
             }
         }
         assert!((sum / (4.0 * std::f64::consts::PI / 6.0) - 1.0).abs() < 1e-5, "{sum}");
         let finest = finest_pixel_area(&camera, DVec3::new(0.0, 0.0, -3.0), 1.0, 1e-3);
         for d in [DVec3::new(0.0, 0.0, 2.0), DVec3::new(0.9, 0.3, 3.0), DVec3::new(2.0, 2.0, 2.0)] {
-            assert!(pixel_area(&camera, d) >= finest * (1.0 - 1e-12));
+            assert!(pixel_area_view(&camera, d) >= finest * (1.0 - 1e-12));
         }
     }
 }

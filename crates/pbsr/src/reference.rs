@@ -1,7 +1,8 @@
 //! Slow and obvious: one set on one image in f64, particle by particle; and opacities in closed form.
 
 use crate::bins::{thinning, thinning_key};
-use crate::{KeptSets, Particles, Sampler, Scene, opacity, pixel_area};
+use crate::project::pixel_area_view;
+use crate::{KeptSets, Particles, Sampler, Scene, opacity};
 use splat_core::glam::DVec3;
 
 /// The nearest particle of a pixel.
@@ -29,7 +30,7 @@ pub fn nearest(scene: &Scene<'_>, set: u64) -> Vec<Option<Nearest>> {
             for i in 0..particles.len() {
                 let world = object.transform.apply(object.sampler.origin() + particles.position[i].as_dvec3());
                 let view = scene.camera.view_from_world(world);
-                let mut k = s / pixel_area(scene.camera, view);
+                let mut k = s / pixel_area_view(scene.camera, view);
                 let normal = object.transform.rotate(particles.normal[i].get().as_dvec3());
                 if particles.normal[i].is_per_crossing() && normal != DVec3::ZERO {
                     let ray = if scene.camera.is_orthographic() {

@@ -258,7 +258,7 @@ impl Plan {
         let expected: f64 = scene.objects.iter().map(|o| o.sampler.expected_particles()).sum();
         let needed = (expected * BYTES_IN_BATCH as f64) as u64;
         if needed > params.max_bytes {
-            return Err(Error::TooMuch { what: "bytes of one set of particles", needed, had: params.max_bytes });
+            return Err(Error::TooMuch { what: "one set of particles", needed, had: params.max_bytes, unit: "bytes" });
         }
         let budget = (params.max_bytes / BYTES_IN_BATCH).min(params.batch_particles) as f64;
         let axes = scene.camera.axes;

@@ -9,7 +9,7 @@
 use crate::blocks::{Batch, Blocks};
 #[cfg(feature = "gpu")]
 use crate::gpu::{Maker, Twin};
-use crate::params::{countable, positive};
+use crate::params::positive;
 use crate::radial::{Radial, Shape};
 use crate::sampler::{Poisson, PoissonSets};
 use crate::stream::{GOLDEN, Stage, pair, scramble, triple};
@@ -88,11 +88,10 @@ impl<'a> SplatSampler<'a> {
             let depth = if cloud.kind[i] == SplatKind::Opaque { cap } else { 1.0 };
             depth * f64::from(cloud.cross_section[i]) / params.cross_section
         };
-        let blocks = Blocks::new(cloud.len(), rate);
+        let blocks = Blocks::new(cloud.len(), rate)?;
         if blocks.chunks() == 0 {
             return Err(Error::Empty { what: "a cloud", reason: "no splat has a cross-section" });
         }
-        countable(blocks.total())?;
         let sets = PoissonSets::new(cloud.origin, params.cross_section, blocks);
         let (radials, of_footprint) = radials(cloud, &params.footprints);
         Ok(Self { cloud, params: params.clone(), sets, radials, of_footprint })
@@ -201,7 +200,8 @@ impl Poisson for SplatSampler<'_> {
     fn fill(&self, set: u64, chunk: usize, particles: &mut Particles) {
         self.sets.blocks.batches(self.params.seed, Stage::Splats, set, chunk, |batch: &Batch<1>| {
             for (&i, &bits) in batch.elements[..batch.len].iter().zip(&batch.bits[0]) {
-                particles.push(self.place(i, bits), self.normal(i), PackedColor::new(self.cloud.color[i]));
+                let place = self.place(i, bits);
+                particles.push(place, self.normal(i), PackedColor::at(self.cloud.color[i], place));
             }
         });
     }
@@ -211,18 +211,19 @@ impl Poisson for SplatSampler<'_> {
         let cloud = self.cloud;
         let medium = |i: usize| cloud.kind[i] == SplatKind::Medium;
         // Place, normal, colour and kernel; the radius of a ball, or the semi-axes of a disc.
-        let words = if (0..cloud.len()).all(medium) { 7 } else { 12 };
+        let words = if (0..cloud.len()).all(medium) { 9 } else { 14 };
         let mut splats = vec![0u32; words as usize * cloud.len()];
         splats.par_chunks_exact_mut(words as usize).enumerate().for_each(|(i, splat)| {
             let place = cloud.position[i].to_array().map(f32::to_bits);
-            let (color, kernel) = (PackedColor::new(cloud.color[i]).bits(), self.radial(i) as u32);
+            let kernel = self.radial(i) as u32 | if medium(i) { 0 } else { DISC };
             splat[..3].copy_from_slice(&place);
-            splat[3..6].copy_from_slice(&[self.normal(i).bits(), color, kernel | if medium(i) { 0 } else { DISC }]);
+            splat[3..5].copy_from_slice(&[self.normal(i).bits(), kernel]);
+            splat[5..8].copy_from_slice(&cloud.color[i].map(f32::to_bits));
             if medium(i) {
-                splat[6] = cloud.radius[i].to_bits();
+                splat[8] = cloud.radius[i].to_bits();
             } else {
                 let axes = self.axes(i).map(|axis| axis.to_array().map(f32::to_bits));
-                splat[6..].copy_from_slice(axes.as_flattened());
+                splat[8..].copy_from_slice(axes.as_flattened());
             }
         });
         let kernels = self.radials.iter().flat_map(|r| r.cells()).flat_map(|cell| cell.map(f32::to_bits)).collect();

@@ -15,14 +15,17 @@
 //! A cell of volume V gets a Poisson number of mean σ_max·V/s, uniform in the cell, and each is kept with probability
 //! σ(x)/σ_max. σ is the transfer function of the trilinearly interpolated value, σ_max its maximum over the range of the
 //! eight corners: the law holds within cells too. The usual cell-by-cell method takes one density a cell.
+//!
+//! A volume ends where its voxels do, half a step beyond the outer lattice points (`places.rs`): a constant one of n points
+//! along a ray, h apart, has the optical depth n·h·σ.
 
 use crate::blocks::{BATCH, Batch, Blocks};
 use crate::error::check;
 #[cfg(feature = "gpu")]
 use crate::gpu::{Maker, Twin, columns};
-use crate::params::{countable, positive};
+use crate::params::positive;
 use crate::pieces::{Pieces, SEVERAL};
-use crate::places::{Lattice, Places, corners, interpolate};
+use crate::places::{Lattice, Places, between, cells, corners, interpolate, steps};
 use crate::sampler::{Poisson, PoissonSets};
 use crate::stream::{Stage, pair};
 use crate::{Density, Error, PackedColor, PackedNormal, Particles};
@@ -94,7 +97,7 @@ impl<'a> GridSampler<'a> {
     ///
     /// # Errors
     /// [`Error::Parameter`] for numbers out of range, [`Error::Core`] for a grid that breaks a promise, [`Error::Empty`]
-    /// for one without cells or extinction, [`Error::TooMuch`] for more than 4·10⁹ lattice points, or particles a set.
+    /// for one without extinction, [`Error::TooMuch`] for more than 4·10⁹ lattice points, or particles a set.
     pub fn new(
         grid: &'a Grid,
         transfer: &'a TransferFunction,
@@ -106,28 +109,26 @@ impl<'a> GridSampler<'a> {
         density.as_ref().map_or(Ok(()), Density::validate)?;
         if grid.values.len() > u32::MAX as usize {
             let needed = grid.values.len() as u64;
-            return Err(Error::TooMuch { what: "a volume's lattice", needed, had: u64::from(u32::MAX) });
+            return Err(Error::TooMuch { what: "a volume", needed, had: u64::from(u32::MAX), unit: "lattice points" });
         }
         let [nx, ny, nz] = grid.dims;
         let pieces = Pieces::new(transfer);
-        let cells: Vec<Cell> = (0..ny.saturating_sub(1) * nz.saturating_sub(1))
+        let rows = cells(ny);
+        let cells: Vec<Cell> = (0..rows * cells(nz))
             .into_par_iter()
             .with_min_len(16)
-            .flat_map_iter(|row| {
-                let (j, k) = (row % (ny - 1), row / (ny - 1));
-                row_of_cells(grid, transfer, &pieces, (k * ny + j) * nx)
-            })
+            .flat_map_iter(|row| row_of_cells(grid, transfer, &pieces, (row / rows * ny + row % rows) * nx))
             .collect();
         let most = density.as_ref().map_or(1.0, |d| d.max);
         let per_cell = grid.cell_volume() / params.cross_section * params.extinction_scale * most;
-        let blocks = Blocks::new(cells.len(), |c| f64::from(cells[c].most) * per_cell);
+        let lattice = Lattice::new(grid.axes.as_mat3(), grid.dims.map(|n| n as u32));
+        let rate = |c: usize| f64::from(cells[c].most) * f64::from(lattice.volume(cells[c].at)) * per_cell;
+        let blocks = Blocks::new(cells.len(), rate)?;
         if blocks.chunks() == 0 {
             return Err(Error::Empty { what: "a volume", reason: "no cell has an extinction" });
         }
-        countable(blocks.total())?;
         let sets = PoissonSets::new(grid.origin, params.cross_section, blocks);
         let gradient = grid.axes.inverse().transpose().as_mat3();
-        let lattice = Lattice::new(grid.axes.as_mat3(), [nx as u32, ny as u32]);
         Ok(Self { grid, transfer, params: *params, density, cells, pieces, sets, lattice, gradient })
     }
 
@@ -141,50 +142,45 @@ impl<'a> GridSampler<'a> {
         self.sets.blocks.bytes() + (self.cells.len() * size_of::<Cell>()) as u64
     }
 
-    /// The lattice indices of the cell's first corner.
-    pub(crate) fn corner(&self, at: u32) -> [u32; 3] {
-        self.lattice.corner(at)
+    /// Where its cells are.
+    pub(crate) fn lattice(&self) -> &Lattice {
+        &self.lattice
     }
 
-    /// Value and lattice gradient at `f` in \[0, 1\]³ of a cell.
+    /// Value and lattice gradient so many steps from a cell's first corner.
     #[inline]
-    pub(crate) fn interpolate(&self, at: u32, f: [f32; 3]) -> (f32, Vec3) {
-        interpolate(corners(self.grid, at), f)
+    pub(crate) fn interpolate(&self, at: u32, within: [f32; 3]) -> (f32, Vec3) {
+        interpolate(corners(self.grid, at), between(within))
     }
 
-    /// The particle at `f` of a cell, without its position.
+    /// Appends a particle.
     #[inline]
-    pub(crate) fn attributes(&self, color: [f32; 3], gradient: Vec3) -> (PackedNormal, PackedColor) {
+    pub(crate) fn push(&self, offset: Vec3, color: [f32; 3], gradient: Vec3, particles: &mut Particles) {
         let normal =
             if self.params.normals { PackedNormal::new(-(self.gradient * gradient)) } else { PackedNormal::default() };
-        (normal, PackedColor::new(color))
-    }
-
-    /// Offset from the grid's origin.
-    pub(crate) fn offset(&self, at: u32, f: [f32; 3]) -> Vec3 {
-        self.lattice.offset(at, f)
+        particles.push(offset, normal, PackedColor::at(color, offset));
     }
 }
 
 /// The active cells of one row of the lattice that begins at index `first`.
 fn row_of_cells(grid: &Grid, transfer: &TransferFunction, pieces: &Pieces, first: usize) -> Vec<Cell> {
-    let (nx, layer) = (grid.dims[0], grid.dims[0] * grid.dims[1]);
+    let [next, row, layer] = steps(grid.dims);
     let range = |i: usize| {
-        let v = [i, i + nx, i + layer, i + layer + nx].map(|i| grid.values[i]);
+        let v = [i, i + row, i + layer, i + layer + row].map(|i| grid.values[i]);
         (v[0].min(v[1]).min(v[2]).min(v[3]), v[0].max(v[1]).max(v[2]).max(v[3]))
     };
-    let mut cells = Vec::new();
+    let mut found = Vec::new();
     let mut left = range(first);
-    for i in first..first + nx - 1 {
-        let right = range(i + 1);
+    for i in first..first + cells(grid.dims[0]) {
+        let right = range(i + next);
         let (low, high) = (left.0.min(right.0), left.1.max(right.1));
         let most = largest_extinction(transfer, low, high);
         if most > 0.0 {
-            cells.push(Cell { at: i as u32, most, piece: pieces.of(low, high) });
+            found.push(Cell { at: i as u32, most, piece: pieces.of(low, high) });
         }
         left = right;
     }
-    cells
+    found
 }
 
 /// Maximum of the extinction over the values `low ..= high`: at an end, or at a control point between.
@@ -209,8 +205,10 @@ impl Poisson for GridSampler<'_> {
         if self.density.is_some() {
             return None;
         }
-        let ([axis_x, axis_y, axis_z], [gradient_x, gradient_y, gradient_z]) =
+        let (mut axes, [gradient_x, gradient_y, gradient_z]) =
             (columns(&self.grid.axes.as_mat3()), columns(&self.gradient));
+        axes.iter_mut().zip(self.lattice.ends().to_array()).for_each(|(axis, end)| axis[3] = end);
+        let [axis_x, axis_y, axis_z] = axes;
         let source = ParticleSource {
             axis_x,
             axis_y,
@@ -254,8 +252,7 @@ impl GridSampler<'_> {
             if self.density.as_ref().is_some_and(thinned) {
                 continue;
             }
-            let (normal, color) = self.attributes(point.color, places.gradient(j));
-            particles.push(offset, normal, color);
+            self.push(offset, point.color, places.gradient(j), particles);
         }
     }
 }

@@ -5,10 +5,11 @@
 
 use crate::blocks::Blocks;
 use crate::error::check;
-use crate::params::{color, countable, positive};
+use crate::params::{color, positive};
+use crate::particles::Steps;
 use crate::sampler::{Poisson, PoissonSets};
 use crate::stream::Stage;
-use crate::{Density, Error, PackedColor, PackedNormal, Particles};
+use crate::{Density, Error, PackedNormal, Particles};
 use glam::DVec3;
 use splat_core::glam;
 
@@ -50,11 +51,10 @@ impl<'a> FieldVolumeSampler<'a> {
         let radius = 0.5 * side.length() * (1.0 + 1e-12);
         let per_cell = side.element_product() / cross_section;
         let middle = |c: usize| min + side * (corner(c, n) + 0.5);
-        let blocks = Blocks::new(n * n * n, |c| extinction.bound(middle(c), radius) * per_cell);
+        let blocks = Blocks::new(n * n * n, |c| extinction.bound(middle(c), radius) * per_cell)?;
         if blocks.chunks() == 0 {
             return Err(Error::Empty { what: "a medium", reason: "its extinction is bounded by 0" });
         }
-        countable(blocks.total())?;
         let sets = PoissonSets::new(min, cross_section, blocks);
         Ok(Self { extinction, min, side, cells: n, color: tint, seed, sets })
     }
@@ -71,7 +71,7 @@ impl Poisson for FieldVolumeSampler<'_> {
     }
 
     fn fill(&self, set: u64, chunk: usize, particles: &mut Particles) {
-        let color = PackedColor::new(self.color);
+        let color = Steps::new(self.color);
         let radius = 0.5 * self.side.length() * (1.0 + 1e-12);
         self.sets.blocks.arrivals(self.seed, Stage::Volume, set, chunk, |c, stream| {
             let low = corner(c, self.cells);
@@ -79,7 +79,8 @@ impl Poisson for FieldVolumeSampler<'_> {
             let offset = self.side * (low + within);
             let most = self.extinction.bound(self.min + self.side * (low + 0.5), radius);
             if stream.unit() * most < self.extinction.at(self.min + offset) {
-                particles.push(offset.as_vec3(), PackedNormal::default(), color);
+                let place = offset.as_vec3();
+                particles.push(place, PackedNormal::default(), color.at(place));
             }
         });
     }

@@ -37,7 +37,7 @@ fn two_planes_let_the_product_of_their_channels_through() {
     let (a, b) = (0.8f64, 0.5f64);
     let shares = [[1.0, 0.5, 0.125], [0.0, 0.25, 1.0]];
     for (camera, scale) in [(&front, 1.0), (&front, 0.1), (&oblique, 1.0), (&oblique, 0.3)] {
-        let s = scale * pixel_area(camera, DVec3::Z * 3.5);
+        let s = scale * pixel_area(camera, DVec3::Z * 0.5);
         let meshes = [0.5, -0.5].map(|z| rectangle(Vec3::Z * z, Vec3::X * 4.0, Vec3::Y * 4.0, 2));
         let of = |mesh, tau: f64, seed| {
             let params = surface(-(-tau).exp_m1(), s, [0.0; 3], seed);

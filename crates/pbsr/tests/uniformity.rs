@@ -95,7 +95,7 @@ fn volume(cross_section: f64) -> VolumeParams {
 /// Extinction ½ in the cube.
 fn homogeneous() -> (&'static Grid, &'static TransferFunction) {
     let axes = DMat3::from_diagonal(DVec3::splat(0.25));
-    let grid = Grid { origin: DVec3::splat(-1.0), axes, dims: [9; 3], values: vec![0.5; 729] };
+    let grid = Grid { origin: DVec3::splat(-0.875), axes, dims: [8; 3], values: vec![0.5; 512] };
     let point = |value| TransferPoint { value, color: [0.5; 3], extinction: value };
     let transfer = TransferFunction::new(vec![point(0.0), point(1.0)]).unwrap();
     (Box::leak(Box::new(grid)), Box::leak(Box::new(transfer)))

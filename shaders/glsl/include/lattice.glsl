@@ -28,7 +28,7 @@ float mixed(float a, float b, float t) {
     return m;
 }
 
-// A place in the cell with this first corner, with the value and its gradient in lattice steps.
+// A place in the cell with this first corner, `f` steps from it, with the value and its gradient in lattice steps.
 struct Place {
     uint at;
     vec3 f;
@@ -36,11 +36,19 @@ struct Place {
     vec3 gradient;
 };
 
-Place place_in(uint at, vec3 f) {
-    uint nx = source.lattice.x;
-    uint layer = nx * source.lattice.y;
-    vec4 low = vec4(values[at], values[at + nx], values[at + layer], values[at + layer + nx]);
-    vec4 high = vec4(values[at + 1u], values[at + nx + 1u], values[at + layer + 1u], values[at + layer + nx + 1u]);
+// Lattice indices of the first corner of a cell.
+uvec3 corner_of(uint at) {
+    uint row = at / source.lattice.x;
+    return uvec3(at % source.lattice.x, row % source.lattice.y, row / source.lattice.y);
+}
+
+// Between the lattice points; `steps` leads from one to the next along each axis.
+Place place_between(uint at, vec3 f, uvec3 steps) {
+    uint row = at + steps.y;
+    uint layer = at + steps.z;
+    uint both = layer + steps.y;
+    vec4 low = vec4(values[at], values[row], values[layer], values[both]);
+    vec4 high = vec4(values[at + steps.x], values[row + steps.x], values[layer + steps.x], values[both + steps.x]);
     precise vec4 along = high - low;
     precise vec4 x = low + along * f.x;
     float y0 = mixed(x.x, x.y, f.y);
@@ -50,6 +58,10 @@ Place place_in(uint at, vec3 f) {
     vec3 gradient = vec3(
         mixed(mixed(along.x, along.y, f.y), mixed(along.z, along.w, f.y), f.z), mixed(rows.x, rows.y, f.z), across);
     return Place(at, f, mixed(y0, y1, f.z), gradient);
+}
+
+Place place_in(uint at, vec3 f) {
+    return place_between(at, f, uvec3(1u, source.lattice.x, source.lattice.x * source.lattice.y));
 }
 
 vec3 turned(vec3 x, vec3 y, vec3 z, vec3 v) {
@@ -63,8 +75,6 @@ vec3 world_gradient(vec3 gradient) {
 
 // From the lattice's origin.
 vec3 offset_of(Place place) {
-    uint row = place.at / source.lattice.x;
-    uvec3 corner = uvec3(place.at % source.lattice.x, row % source.lattice.y, row / source.lattice.y);
-    precise vec3 lattice = vec3(corner) + place.f;
+    precise vec3 lattice = vec3(corner_of(place.at)) + place.f;
     return turned(source.axis_x.xyz, source.axis_y.xyz, source.axis_z.xyz, lattice);
 }

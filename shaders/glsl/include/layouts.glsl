@@ -139,7 +139,7 @@ struct ParticleSource {
     uint all_chunks;
     uint levels;
     uint object;
-    uint color;
+    uint unused;
     uint flags;
     uint slots_at;
     uint vertex_words;

@@ -20,7 +20,7 @@ float thinning_of(Numbering numbering, uint rank) {
 }
 
 // Particle `rank` of a chunk of which the first has the place `first`; beyond the room nothing is written.
-void put(uint first, uint rank, Numbering numbering, vec3 p, uint normal, uint color) {
+void put(uint first, uint rank, Numbering numbering, vec3 p, uint normal, vec3 color) {
     uint place = first + rank;
     if (place >= uint(particles.length()) / PARTICLE_WORDS) {
         return;
@@ -30,7 +30,7 @@ void put(uint first, uint rank, Numbering numbering, vec3 p, uint normal, uint c
     particles[word + 1u] = floatBitsToUint(p.y);
     particles[word + 2u] = floatBitsToUint(p.z);
     particles[word + 3u] = normal;
-    particles[word + 4u] = color;
+    particles[word + 4u] = pack_color(color, p);
     particles[word + 5u] = floatBitsToUint(thinning_of(numbering, rank));
     particles[word + 6u] = source.object;
 }

@@ -45,16 +45,23 @@ float color_scale(int exponent) {
     return uintBitsToFloat(uint(136 - exponent) << 23);
 }
 
-// As `PackedColor::new`.
-uint pack_color(vec3 color) {
+// A hash of the bits of a place, as `particles::hash_of`.
+uint hash_of(vec3 place) {
+    uvec3 bits = floatBitsToUint(place);
+    return scramble((bits.x * 0x9e3779b1u) ^ (bits.y * 0x85ebca77u) ^ (bits.z * 0xc2b2ae3du));
+}
+
+// As `PackedColor::at`.
+uint pack_color(vec3 color, vec3 place) {
     vec3 c = vec3(
         color.x > 0.0 ? min(color.x, 65408.0) : 0.0,
         color.y > 0.0 ? min(color.y, 65408.0) : 0.0,
         color.z > 0.0 ? min(color.z, 65408.0) : 0.0);
     float largest = max(max(c.x, c.y), c.z);
     int exponent = max(int(floatBitsToUint(largest) >> 23) - 126, -15);
-    precise float rounded = largest * color_scale(exponent) + 0.5;
-    exponent += int(rounded >= 512.0);
-    precise vec3 steps = c * color_scale(exponent) + 0.5;
+    precise float most = largest * color_scale(exponent);
+    exponent += int(most > 511.0);
+    precise float more = (float(hash_of(place) >> 18) + 0.5) * (1.0 / 16384.0);
+    precise vec3 steps = c * color_scale(exponent) + more;
     return uint(steps.x) | (uint(steps.y) << 9) | (uint(steps.z) << 18) | (uint(exponent + 15) << 27);
 }

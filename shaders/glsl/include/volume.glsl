@@ -44,10 +44,26 @@ vec4 in_transfer(float value) {
     return point;
 }
 
+// The place at `share` of a cell, whose outer ones reach as far as their voxels; as `places::Lattice::within`. The fourth
+// number of an axis is where its last voxel ends.
+Place place_through(uint at, vec3 share) {
+    uvec3 corner = corner_of(at);
+    vec3 ends = vec3(source.axis_x.w, source.axis_y.w, source.axis_z.w);
+    vec3 low = mix(vec3(0.0), vec3(-0.5), equal(corner, uvec3(0u)));
+    precise vec3 left = ends - vec3(corner);
+    vec3 high = mix(vec3(1.0), left, lessThan(left, vec3(2.0)));
+    precise vec3 within = low + share * (high - low);
+    uvec3 steps = uvec3(1u, source.lattice.x, source.lattice.x * source.lattice.y);
+    steps = mix(uvec3(0u), steps, greaterThan(ends, vec3(1.0)));
+    Place place = place_between(at, clamp(within, 0.0, 1.0), steps);
+    place.f = within;
+    return place;
+}
+
 // Arrival j of a chunk, where it stays: its place, and colour and extinction there.
 bool arrives(Chunk chunk, uint j, out Place place, out vec4 point) {
     uint cell = element_of(chunk, stream_bits(chunk.state, 3u * j + 1u));
-    place = place_in(cells[CELL_WORDS * cell], triple_of(stream_bits(chunk.state, 3u * j + 2u)));
+    place = place_through(cells[CELL_WORDS * cell], triple_of(stream_bits(chunk.state, 3u * j + 2u)));
     uint piece = cells[CELL_WORDS * cell + 2u];
     point = piece == SEVERAL ? in_transfer(place.value) : in_piece(piece, place.value);
     precise float lot = pair_of(stream_bits(chunk.state, 3u * j + 3u)).x * uintBitsToFloat(cells[CELL_WORDS * cell + 1u]);

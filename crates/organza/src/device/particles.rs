@@ -93,7 +93,9 @@ impl<'a> Folding<'a> {
             let of_set = *self.of_set.get_or_insert_with(|| expected_of_set(scene));
             let needed = PARTICLE_BYTES * u64::from(of_set.max(1));
             if needed > max_bytes {
-                return Err(Error::TooMuch { what: "bytes of one set of particles", needed, had: max_bytes }.into());
+                return Err(
+                    Error::TooMuch { what: "one set of particles", needed, had: max_bytes, unit: "bytes" }.into()
+                );
             }
             let levels = (until - ensemble.levels()).min(MOST_LEVELS).min((most_bytes / needed).max(1) as u32);
             let room = capacities(scene, of_set, levels);
@@ -223,7 +225,7 @@ fn more_of_set(of_set: u32, needed: u64, had: u64) -> Result<u32, Error> {
     let factor = (needed as f64 / had.max(1) as f64).max(1.25);
     let more = (f64::from(of_set) * factor).ceil();
     if more > f64::from(u32::MAX) {
-        return Err(Error::TooMuch { what: "particles of one set", needed, had });
+        return Err(Error::TooMuch { what: "one set", needed, had, unit: "particles" });
     }
     Ok(more as u32)
 }

@@ -12,9 +12,12 @@ use crate::plan::ParticleSource;
 use crate::scene::{RectangleSource, SurfaceSampler};
 use convert::{DensityParams, SharedField, SplatParams};
 use glam::DVec3;
+use rayon::prelude::*;
 use splat_core::{Footprint, Grid, Mesh, Similarity, SplatKind, TransferFunction, optics};
 use std::sync::Arc;
 
+/// Cells along an object in which lines look for roots.
+const LINE_CELLS: std::ops::RangeInclusive<f64> = 16.0..=96.0;
 /// Cells along the longest side of a box, in which an implicit surface is looked for.
 const SURFACE_CELLS: f64 = 32.0;
 
@@ -41,6 +44,8 @@ pub(crate) struct Own {
     pub(crate) bounds: [DVec3; 2],
     /// Radius that its splats have or would have, normalized world units.
     pub(crate) radius: f64,
+    /// Elements that a sampler has tables of, about: cells with extinction, triangles, cubes that a surface meets.
+    elements: u64,
 }
 
 /// The data of an object.
@@ -89,6 +94,7 @@ impl Own {
         let depth = factor * optics::optical_depth(prepared.input.opacity().unwrap_or(0.0));
         let bounded = prepared.bounded.take();
         let Some((body, bounds, spacing)) = data(prepared, bounded, source, context)? else { return Ok(None) };
+        let elements = elements(&body, bounds, prepared.prediction.splats);
         let radius = f64::from(splat.profile.cutoff) * f64::from(Footprint::SIGMA_OVER_SPACING) * spacing;
         Ok(Some(Self {
             object: context.id,
@@ -100,6 +106,7 @@ impl Own {
             transform: splat.transform,
             bounds,
             radius: radius * splat.transform.scale,
+            elements,
         }))
     }
 
@@ -108,6 +115,14 @@ impl Own {
         match self.body {
             Body::Surface { .. } | Body::Lattice { .. } | Body::Triangles(_) => SplatKind::Surface,
             Body::Cells { .. } | Body::Field(_) => SplatKind::Medium,
+        }
+    }
+
+    /// The volume that it is sampled from.
+    pub(crate) fn grid(&self) -> Option<&Grid> {
+        match &self.body {
+            Body::Cells { grid, .. } | Body::Lattice { grid, .. } => Some(grid),
+            _ => None,
         }
     }
 
@@ -131,12 +146,44 @@ impl Own {
         all.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)])
     }
 
+    /// Bytes that a sampler's tables take, about, and what making them takes beside.
+    pub(crate) fn table_bytes(&self) -> u64 {
+        let each = match &self.body {
+            Body::Cells { .. } => 32,
+            Body::Lattice { .. } | Body::Triangles(_) => 16,
+            Body::Field(_) => 8,
+            Body::Surface { .. } => 96,
+        };
+        each * self.elements
+    }
+
     /// Scales the world, not the object.
     pub(crate) fn scale_world(&mut self, scale: f64) {
         self.transform.scale *= scale;
         self.transform.translation *= scale;
         self.radius *= scale;
     }
+}
+
+/// Elements that a sampler has tables of, about; of a lattice's isosurface the splats are as many as steps across it.
+fn elements(body: &Body, [low, high]: [DVec3; 2], splats: u64) -> u64 {
+    match body {
+        Body::Cells { grid, transfer, .. } => {
+            grid.values.par_iter().filter(|v| transfer.at(**v).extinction > 0.0).count() as u64
+        }
+        Body::Lattice { .. } => 2 * splats,
+        Body::Triangles(mesh) => mesh.triangles.len() as u64,
+        Body::Field(field) => u64::from(field.cells).pow(3),
+        Body::Surface { spacing, .. } => {
+            let cells = line_cells((high - low).max_element(), *spacing);
+            6 * u64::from(cells).pow(2)
+        }
+    }
+}
+
+/// Cells along the longest side of a surface's box, in which lines look for its roots.
+pub(crate) fn line_cells(width: f64, spacing: f64) -> u32 {
+    (0.5 * width / spacing).clamp(*LINE_CELLS.start(), *LINE_CELLS.end()).ceil() as u32
 }
 
 /// Data, bounds and the distance of splats, object units.
@@ -205,19 +252,15 @@ fn world_spacing(density: &convert::Density) -> f64 {
     }
 }
 
-/// A density on a lattice whose outer points lie on the sides of its box, values as extinction in 1/world unit.
+/// A density on a lattice whose voxels fill its box, values as extinction in 1/world unit.
 fn density_lattice(
     field: &SharedField,
-    [low, high]: [DVec3; 2],
+    bounds: [DVec3; 2],
     params: &DensityParams,
 ) -> Result<(Grid, TransferFunction), Error> {
     let splat = &params.volume.splat;
     let spacing = world_spacing(&params.density) / splat.transform.scale;
-    let sides = high - low;
-    let step = sides / (sides / spacing).ceil().max(DVec3::ONE);
-    // Samples lie at the middles of cells.
-    let around = [low - 0.5 * step, high + 0.5 * step];
-    let mut grid = convert::field_to_grid(field.as_ref(), around, step.max_element(), splat).map_err(|e| refuse(&e))?;
+    let mut grid = convert::field_to_grid(field.as_ref(), bounds, spacing, splat).map_err(|e| refuse(&e))?;
     let extinction = params.extinction as f32;
     grid.values.iter_mut().for_each(|v| *v = (*v * extinction).max(0.0));
     let most = grid.values.iter().copied().fold(0.0, f32::max);
@@ -288,7 +331,8 @@ impl Search {
     }
 }
 
-/// Bounds of the lattice points with extinction and one cell around them; those of the lattice where there are none.
+/// Bounds of the lattice points with extinction and one cell around them, no farther than voxels reach; those of the voxels
+/// where there are none.
 pub(super) fn cell_bounds(grid: &Grid, transfer: &TransferFunction) -> [DVec3; 2] {
     let [nx, ny, _] = grid.dims;
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -299,12 +343,9 @@ pub(super) fn cell_bounds(grid: &Grid, transfer: &TransferFunction) -> [DVec3; 2
             (low, high) = (low.min(at(first)), high.max(at(last)));
         }
     }
-    let last = DVec3::from_array(grid.dims.map(|n| (n - 1) as f64));
-    let (low, high) = if low.cmple(high).all() {
-        ((low - 1.0).max(DVec3::ZERO), (high + 1.0).min(last))
-    } else {
-        (DVec3::ZERO, last)
-    };
+    let (first, last) = (DVec3::splat(-0.5), DVec3::from_array(grid.dims.map(|n| n as f64 - 0.5)));
+    let (low, high) =
+        if low.cmple(high).all() { ((low - 1.0).max(first), (high + 1.0).min(last)) } else { (first, last) };
     let corner = |k: u32| {
         let index = DVec3::select(glam::BVec3::new(k & 1 == 1, k >> 1 & 1 == 1, k >> 2 & 1 == 1), high, low);
         grid.origin + grid.axes * index

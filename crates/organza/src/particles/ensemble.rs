@@ -1,8 +1,8 @@
 //! Sets of particles → means of the pixels, and their error.
 
 use super::checkpoint::Checkpoint;
-use super::fault;
-use super::parts::Part;
+use super::parts::{Part, named};
+use super::{fault, refuse};
 use crate::device::{Folding, Helper, Shadow};
 use crate::points::Drawing;
 use crate::scene::ParticlesSettings;
@@ -51,7 +51,11 @@ pub(super) fn fold(
     while let Some(levels) = average.next_step(settings) {
         let step = Step { until: average.ensemble.levels() + levels, helper, params, progress: drawing.progress };
         let folded = step.fold(&mut renderer, &mut folding, &scene, &mut average.ensemble);
-        match folded.map_err(fault) {
+        let folded = folded.map_err(|e| match e {
+            pbsr::Error::TooMuch { .. } => refuse(&named(parts), e),
+            other => fault(other),
+        });
+        match folded {
             Ok(particles) => average.particles += particles,
             // Two sets are a picture, with its error.
             Err(Error::Cancelled) if average.ensemble.levels() >= 2 => average.interrupted = true,

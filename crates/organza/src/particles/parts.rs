@@ -3,11 +3,11 @@
 //! A set of particles has its opacity where a pixel covers the particles' cross-section; elsewhere they are thinned out or
 //! widened. So each object gets the area of the smallest pixel on it.
 
-use super::fault;
+use super::refuse;
 use crate::Error;
 use crate::load::Loaded;
 use crate::load::bounded::BoundedExtinction;
-use crate::load::own::{Body, Own};
+use crate::load::own::{Body, Own, line_cells};
 use crate::points::Drawing;
 use glam::DVec3;
 use pbsr::{
@@ -22,13 +22,9 @@ use std::collections::BTreeMap;
 const SEEDS: u64 = 0x7061_7274;
 /// Depth, in radii of an object, nearer than which particles are widened rather than made finer.
 const NEAR: f64 = 0.5;
-/// Cells along an object in which lines look for roots.
-const LINE_CELLS: std::ops::RangeInclusive<f64> = 16.0..=96.0;
 /// Optical depth of a surface that is not quite opaque, at most.
 const DEEPEST: f64 = 64.0;
 
-/// What to do about a field that is not finite.
-const BROKEN_FIELD: &str = "use a smaller box, or an expression that is finite everywhere in it";
 /// Error of a counted area without a word; that of the area by lines is a few percent.
 const MISCOUNTED: f64 = 0.1;
 /// Share of the roots of a surface that may be missed without a word.
@@ -56,6 +52,7 @@ enum Data<'a> {
 
 /// One object, ready to be drawn.
 pub(super) struct Part<'a> {
+    name: String,
     pub(super) particles: Particles<'a>,
     transform: Similarity,
     look: Appearance,
@@ -68,6 +65,16 @@ pub(super) struct Part<'a> {
 pub(super) enum Particles<'a> {
     Sampled(Box<dyn Sampler + 'a>),
     Kept(&'a KeptSets),
+}
+
+/// The parts in words, by the one that has most particles.
+pub(super) fn named(parts: &[Part<'_>]) -> String {
+    let expected = |part: &Part<'_>| part.object().sampler.expected_particles();
+    match parts.iter().max_by(|a, b| expected(a).total_cmp(&expected(b))) {
+        Some(most) if parts.len() == 1 => format!("object '{}'", crate::escape_controls(&most.name)),
+        Some(most) => format!("all objects, most of all '{}'", crate::escape_controls(&most.name)),
+        None => "no object".into(),
+    }
 }
 
 impl Part<'_> {
@@ -205,14 +212,20 @@ impl Source<'_> {
                 warnings.push(format!("{} has no particles: {reason}", name()));
                 Ok(None)
             }
-            Err(e @ pbsr::Error::Field { .. }) => Err(Error::input(name(), e.to_string(), BROKEN_FIELD)),
-            Err(e) => Err(fault(e)),
+            Err(e) => Err(refuse(&name(), e)),
         }
     }
 
     /// The object with these particles.
     pub(super) fn part_of<'b>(&self, particles: Particles<'b>) -> Part<'b> {
-        Part { particles, transform: self.transform, look: self.look, of: self.of, bounds: self.bounds }
+        Part {
+            name: self.name.clone(),
+            particles,
+            transform: self.transform,
+            look: self.look,
+            of: self.of,
+            bounds: self.bounds,
+        }
     }
 
     fn sampler(&self, warnings: &mut Vec<String>) -> Result<Box<dyn Sampler + '_>, pbsr::Error> {
@@ -225,7 +238,7 @@ impl Source<'_> {
                 let [min, max] = own.bounds;
                 let surface = ImplicitSurface { field: field.as_ref(), level: 0.0, min, max, inside: Some(inside) };
                 let width = (max - min).max_element();
-                let cells = (0.5 * width / spacing).clamp(*LINE_CELLS.start(), *LINE_CELLS.end()).ceil() as u32;
+                let cells = line_cells(width, *spacing);
                 if let Some(step) = step {
                     let paper = BrownianParams::for_width(width);
                     let walk = BrownianParams { step: step * width, resolution: cells, ..paper };

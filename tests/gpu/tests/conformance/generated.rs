@@ -325,13 +325,13 @@ fn room_is_told(world: &World, samplers: [&dyn Sampler; 3]) {
             let sums_are_zero = done.bytes(generated.sums).iter().all(|byte| *byte == 0);
             (generated.add(&done, &mut ensemble), ensemble, sums_are_zero)
         };
-        let (Err(Error::TooMuch { what: "particles of one set", needed, had: 10 }), none, true) =
+        let (Err(Error::TooMuch { what: "particles of one set", needed, had: 10, .. }), none, true) =
             run(Capacities { of_set: 10, ..ROOM })
         else {
             panic!("room for 10 particles is enough")
         };
         assert_eq!(none, empty());
-        let (Err(Error::TooMuch { what: "particles", needed: all, had: 1000 }), none, true) =
+        let (Err(Error::TooMuch { what: "particles", needed: all, had: 1000, .. }), none, true) =
             run(Capacities { particles: 1000, ..ROOM })
         else {
             panic!("room for 1000 particles is enough")

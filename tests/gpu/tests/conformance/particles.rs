@@ -84,7 +84,7 @@ fn hits_and_sums_are_the_cpu_s() {
     ] {
         let camera = Camera::look_at(DVec3::new(0.3, 0.2, 4.0), DVec3::ZERO, DVec3::Y, projection, SIZE).unwrap();
         // Seen from nearer than made for, particles are widened; from farther, thinned out.
-        let middle = pixel_area(&camera, DVec3::new(0.0, 0.0, 4.0));
+        let middle = pixel_area(&camera, camera.position + 4.0 * camera.axes[2]);
         let params = |s: f64, seed, color| SurfaceParams {
             opacity: 0.4,
             cross_section: s * middle,
@@ -155,7 +155,7 @@ fn too_little_room_is_refused_with_what_is_needed() {
     let scene = Scene { objects: &objects, lights: &[], ambient: [0.0; 3], camera: &camera, occluder: None };
     let ensemble = Ensemble::new(SIZE, &EnsembleParams::default()).unwrap();
     let uploads = |room| record(room, Nearest::Ranked, None).unwrap().uploads(&scene, &ensemble);
-    let Err(Error::TooMuch { what: "particles of one set", needed, had: 10 }) =
+    let Err(Error::TooMuch { what: "particles of one set", needed, had: 10, .. }) =
         uploads(Capacities { of_set: 10, ..ROOM })
     else {
         panic!("room for 10 particles is enough")

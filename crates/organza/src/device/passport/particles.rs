@@ -58,7 +58,7 @@ impl ParticlesInput {
         (material, nearer): (Material, f64),
         lights: &[LitBy<'_>],
     ) -> Result<Found, Failure> {
-        let middle = pixel_area(&self.camera, DVec3::new(0.0, 0.0, 4.0));
+        let middle = pixel_area(&self.camera, self.camera.position + 4.0 * self.camera.axes[2]);
         let params = |s: f64, seed, color| SurfaceParams {
             opacity: 0.4,
             cross_section: s * middle,
