@@ -13,7 +13,7 @@ const UNQUESTIONED: f64 = (1u32 << 16) as f64;
 /// How far below the percentile a radius is an outlier.
 const OUTLIER: f32 = 0.25;
 
-/// Classes of radii: exponent and three bits of the mantissa, so that scaling by a power of two scales the result.
+/// Classes of radii among which the percentile is looked for: exponent and three bits of the mantissa.
 const CLASSES: usize = 1 << 11;
 const CLASS_SHIFT: u32 = 20;
 
@@ -35,12 +35,13 @@ pub(crate) fn choose(
     (f64::from(smallest), ThicknessRule::SmallestRadius)
 }
 
-/// The radius that 1 % of the splats fall short of, rounded down to three bits of the mantissa.
+/// The radius that 1 % of the splats fall short of, exactly: rounded to its class it would depend on the unit of length.
 fn percentile(n: usize, radius_at: &(impl Fn(usize) -> f32 + Sync)) -> f32 {
     let chunks = n.div_ceil(CHUNK);
+    let class_of = |radius: f32| (radius.to_bits() >> CLASS_SHIFT) as usize & (CLASSES - 1);
     let count = |mut classes: [u32; CLASSES], c: usize| {
         for i in c * CHUNK..n.min((c + 1) * CHUNK) {
-            classes[(radius_at(i).to_bits() >> CLASS_SHIFT) as usize & (CLASSES - 1)] += 1;
+            classes[class_of(radius_at(i))] += 1;
         }
         classes
     };
@@ -49,12 +50,15 @@ fn percentile(n: usize, radius_at: &(impl Fn(usize) -> f32 + Sync)) -> f32 {
         a
     };
     let classes = (0..chunks).into_par_iter().fold(|| [0; CLASSES], count).reduce(|| [0; CLASSES], sum);
-    let mut below = 0;
+    let mut rank = n / 100;
     let class = classes.iter().position(|c| {
-        below += *c as usize;
-        below > n / 100
+        let is_here = rank < *c as usize;
+        rank -= if is_here { 0 } else { *c as usize };
+        is_here
     });
-    f32::from_bits((class.unwrap_or(0) as u32) << CLASS_SHIFT)
+    let Some(class) = class else { return 0.0 };
+    let mut radii: Vec<f32> = (0..n).into_par_iter().map(radius_at).filter(|r| class_of(*r) == class).collect();
+    *radii.select_nth_unstable_by(rank, f32::total_cmp).1
 }
 
 #[cfg(test)]
@@ -67,9 +71,12 @@ mod tests {
         let (thickness, rule) = choose(10.0, 1e-9, 100_000, &radius);
         assert_eq!(rule, ThicknessRule::Percentile);
         assert!(thickness <= f64::from(1e-3f32) && thickness > 0.85e-3, "{thickness}");
-        // Scaling by a power of two scales the choice exactly.
-        let scaled = |i: usize| radius(i) * 1024.0;
-        assert_eq!(choose(10_240.0, 1e-9 * 1024.0, 100_000, &scaled), (thickness * 1024.0, rule));
+        // Scaling scales the choice, by a power of two or not.
+        for scale in [1024.0, 1.3f32] {
+            let scaled = |i: usize| radius(i) * scale;
+            let found = choose(10.0 * f64::from(scale), 1e-9 * scale, 100_000, &scaled);
+            assert_eq!(found, (f64::from(1e-3f32 * scale), rule));
+        }
     }
 
     #[test]

@@ -40,6 +40,7 @@ mod points;
 mod render;
 pub mod scene;
 mod sequence;
+mod shadows;
 pub mod statistics;
 pub mod truth;
 
@@ -49,5 +50,6 @@ pub use info::{FileInfo, info};
 pub use load::{Loaded, SplatCount, load};
 pub use render::{Explanation, Render, RenderOptions, Sets, explain, render};
 pub use sequence::Sequence;
+pub use shadows::ShadowTable;
 pub use splat_core::{CostRecord, Layers, Progress};
 pub use splat_shaders::{Adapter, AdapterKind, Choice};

@@ -8,6 +8,7 @@ mod samplers;
 
 pub use samplers::{ParticleSource, PlannedSampler, samplers};
 
+use crate::shadows::{CUT_SHARE, ShadowTable};
 use crate::statistics::{LightStatistics, Statistics};
 
 /// One effect of the scene: simulated or not, and why.
@@ -45,6 +46,8 @@ pub struct Plan {
     pub optical_depth_planes: usize,
     /// For each light: whether it gets a shadow map.
     pub shadow_maps: Vec<bool>,
+    /// For each light: the table of its shadow map. Chosen by a look at the splats, when all else is planned.
+    pub shadow_tables: Vec<Option<ShadowTable>>,
     /// Where the particles of each visible object come from; empty for the technique `points`.
     pub samplers: Vec<PlannedSampler>,
 }
@@ -79,9 +82,11 @@ pub mod pass {
 pub fn plan(statistics: &Statistics) -> Plan {
     let technique = if statistics.particles { "particles" } else { "points" };
     let mut plan = Plan { technique, ..Plan::default() };
+    // What ends lists of shadow maps takes the rest.
+    let tolerance = statistics.tolerance * (1.0 - CUT_SHARE);
     let mut skipped = 0.0;
     for (i, light) in statistics.lights.iter().enumerate() {
-        let effect = shadow_effect(i, light, statistics, statistics.tolerance - skipped);
+        let effect = shadow_effect(i, light, statistics, tolerance - skipped);
         if !effect.called_for {
             skipped += effect.bound;
         }
@@ -99,6 +104,16 @@ pub fn plan(statistics: &Statistics) -> Plan {
     plan.optical_depth_planes = if statistics.colored_extinction { 3 } else { 1 };
     plan.passes = passes(statistics, &plan.shadow_maps);
     plan
+}
+
+impl Plan {
+    /// Takes the tables in that were chosen, one for each light.
+    pub(crate) fn set_shadow_tables(&mut self, tables: Vec<Option<ShadowTable>>) {
+        let made = tables.iter().enumerate().filter_map(|(i, table)| Some(table.as_ref()?.describe(i)));
+        let passes = self.passes.iter_mut().filter(|p| p.name == pass::SHADOW_MAP);
+        passes.zip(made).for_each(|(pass, reason)| pass.reason = reason);
+        self.shadow_tables = tables;
+    }
 }
 
 fn effect(name: impl Into<String>, called_for: bool, reason: impl Into<String>) -> Effect {

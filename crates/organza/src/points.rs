@@ -5,7 +5,7 @@ mod chained;
 use crate::device::{Helper, LookedUp};
 use crate::load::Loaded;
 use crate::plan::{Plan, pass};
-use crate::scene::{RenderSettings, ShadowMapping};
+use crate::scene::RenderSettings;
 use crate::{Error, Progress};
 use splat_core::raster::gpu::Input;
 use splat_core::raster::{self, Background, Detail, OpaqueImage, Projected, RasterCounts};
@@ -25,7 +25,6 @@ pub(crate) struct Drawing<'a> {
     pub(crate) ambient: [f32; 3],
     pub(crate) layers: LayerSet,
     pub(crate) plan: &'a Plan,
-    pub(crate) max_memory: u64,
     /// A device that helps.
     pub(crate) helper: Option<&'a Helper>,
     /// Whether it composites splats, which changes the last bits.
@@ -162,33 +161,16 @@ impl Drawing<'_> {
         f64::from(widest * self.raster_params().resampling_sigma_px)
     }
 
-    fn shadow_params(&self) -> tsm::Params {
-        let shadow = &self.settings.points.shadow;
-        let defaults = tsm::Params::default();
-        tsm::Params {
-            mapping: match shadow.mapping {
-                ShadowMapping::Auto => tsm::MappingChoice::Auto,
-                ShadowMapping::Octahedral => tsm::MappingChoice::Octahedral,
-                ShadowMapping::Polar => tsm::MappingChoice::PolarAzimuth,
-            },
-            resolution: shadow.cells.map_or(tsm::Resolution::Auto, tsm::Resolution::Cells),
-            tolerance: shadow.absorbance_cut.map_or(defaults.tolerance, |cut| (-cut).exp() as f32),
-            footprints: self.loaded.footprints.clone(),
-            max_bytes: self.max_memory,
-            ..defaults
-        }
-    }
-
     /// One map for each light that the plan gives one.
     pub(crate) fn shadow_maps(&self, cost: &mut CostRecord) -> Result<Vec<Option<ShadowMap>>, Error> {
-        let params = self.shadow_params();
         let mut maps = Vec::new();
-        for (i, (light, wanted)) in self.loaded.lights.iter().zip(&self.plan.shadow_maps).enumerate() {
+        for (i, (light, table)) in self.loaded.lights.iter().zip(&self.plan.shadow_tables).enumerate() {
             self.tick()?;
-            if !wanted {
+            let Some(table) = table else {
                 maps.push(None);
                 continue;
-            }
+            };
+            let params = table.params(self.settings, self.loaded);
             let map = cost.measure(pass::SHADOW_MAP, |stage| {
                 let l = self.loaded;
                 let deposits = Deposits::new(&l.cloud, &l.materials, &l.objects, light, &params, self.progress)
@@ -380,7 +362,7 @@ fn record(stage: &mut StageCost, counts: &RasterCounts) {
     stage.bytes = counts.bytes;
 }
 
-fn shadow_error(light: usize, error: &tsm::Error) -> Error {
+pub(crate) fn shadow_error(light: usize, error: &tsm::Error) -> Error {
     let what = format!("the shadow map of light {light}");
     match error {
         tsm::Error::Memory { needed_bytes, limit_bytes, .. } => Error::Limit {

@@ -6,10 +6,10 @@ use crate::load::own::Own;
 use crate::load::{Loaded, SplatCount, light_statistics, load_measured};
 use crate::particles::{self, Checkpoint, Kept, average_bytes};
 use crate::plan::{Plan, pass, plan};
-use crate::points::{self, Drawing};
+use crate::points::{self, Drawing, shadow_error};
 use crate::scene::{Scene, Technique};
 use crate::statistics::Statistics;
-use crate::{CostRecord, Error, Layers, Progress};
+use crate::{CostRecord, Error, Layers, Progress, shadows};
 use splat_core::{Grid, LayerData, LayerSet, Material};
 use std::path::PathBuf;
 
@@ -195,7 +195,6 @@ pub(crate) fn drawing<'a>(
         ambient: scene.ambient,
         layers: scene.render.layers.set(),
         plan,
-        max_memory: options.max_memory,
         helper: None,
         device_composites: options.device_composites,
         progress,
@@ -241,16 +240,18 @@ pub(crate) fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOption
         let unequal = |m: &Material| m.extinction_rgb.iter().any(|e| *e != m.extinction_rgb[0]);
         statistics.colored_extinction |= materials.into_iter().any(unequal);
     }
-    let plan = plan(&statistics);
-    let maps = plan.shadow_maps.iter().filter(|on| **on).count() as u64;
-    let splats = splat_bytes(loaded, &scene.render.layers.set());
-    let mut memory = image_bytes(scene) + splats + maps * map_bytes(statistics.casters);
+    let mut plan = plan(&statistics);
+    let mut memory = image_bytes(scene) + splat_bytes(loaded, &scene.render.layers.set());
     if plan.passes.iter().any(|p| p.name == pass::PARTICLES) {
         let size = scene.camera.size.map(|s| u64::from(s) * u64::from(scene.render.antialias));
         memory += average_bytes(size, &scene.render.layers.set(), statistics.colored_extinction, options);
         memory += own_bytes(loaded);
     }
     check_memory("rendering", memory, options.max_memory)?;
+    // Shadow maps share what is left.
+    let tables = shadows::tables(&scene.render, loaded, &plan.shadow_maps, options.max_memory - memory);
+    plan.set_shadow_tables(tables.map_err(|(light, error)| shadow_error(light, &error))?);
+    memory += plan.shadow_tables.iter().flatten().map(|table| table.bytes).sum::<u64>();
     Ok((plan, memory))
 }
 
@@ -298,13 +299,6 @@ fn own_bytes(loaded: &Loaded) -> u64 {
         own.table_bytes() + if known { 0 } else { own.bytes() }
     };
     loaded.own.iter().map(of).sum()
-}
-
-/// Bytes of one shadow map: its table, and the entries that its casters leave in it.
-fn map_bytes(casters: u64) -> u64 {
-    const TABLE: u64 = 1 << 20;
-    const PER_CASTER: u64 = 40;
-    TABLE + PER_CASTER * casters
 }
 
 fn check_memory(what: &str, needed: u64, limit: u64) -> Result<(), Error> {

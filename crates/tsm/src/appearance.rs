@@ -1,24 +1,30 @@
 //! What the casters look like from the light, before any work: where a table has to look, and angular sizes.
 
 use crate::caster::Casters;
+use crate::deposit::{BENT, WIDE};
 use crate::frame::Frame;
 use crate::lanes::{LANES, Lane};
+use crate::shares::{HALF_WIDTH, cells_along};
 use crate::survey::{Block, CHUNK, greater, greatest, least, lesser};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use splat_core::{SplatKind, glam};
+use std::f64::consts::PI;
 use std::ops::Range;
 
-/// Angles at which a table has to look, and how large casters appear: quarter-octave histograms, integers, so that the
-/// order of summing does not matter.
+/// Angles at which a table has to look, and how large casters appear: angles and tangents as they are, lengths as shares of
+/// the frame's extent, so that nothing depends on the unit of length.
 #[derive(Debug, Clone)]
 pub(crate) struct Appearance {
+    apparent: Apparent,
+    /// What a size of 1 is on the table.
+    unit: f64,
     /// Casters by apparent spacing.
-    spacing: Vec<u64>,
+    spacing: Sizes,
     /// Translucent casters by apparent cutoff radius.
-    radius: Vec<u64>,
+    radius: Sizes,
     /// Opaque casters by apparent radius of their dilated disc.
-    disc: Vec<u64>,
+    disc: Sizes,
     /// Bounds on the plane of a planar table, footprints included.
     pub(crate) window: [Vec2; 2],
     /// Least and greatest z/distance.
@@ -27,7 +33,8 @@ pub(crate) struct Appearance {
     pub(crate) sectors: Vec<bool>,
 }
 
-const BINS: usize = 1024;
+/// Half width of the usual kernel's closed form over its radius.
+const HALF_OF_RADIUS: f64 = 0.262 * HALF_WIDTH as f64;
 /// Clouds of this size and more are counted by a sample; their window is that of all.
 const MANY: usize = 1 << 18;
 /// One splat in so many is counted then.
@@ -47,21 +54,75 @@ pub(crate) enum Apparent {
     Length,
 }
 
-/// Exponent and two bits of the mantissa: four bins an octave, monotone.
-fn bin(x: f32) -> usize {
-    ((x.max(0.0).to_bits() >> 21) as usize).min(BINS - 1)
-}
+/// How many casters are of which size: weights at sizes a quarter octave apart. A caster counts at the two sizes about its
+/// own, in proportion, so that what follows does not jump where a size passes one of them; in integers, so that the order
+/// of summing does not matter.
+#[derive(Debug, Clone)]
+struct Sizes(Vec<u64>);
 
-fn bin_value(bin: usize) -> f64 {
-    f64::from(f32::from_bits(((bin as u32) << 21) | 1 << 20))
+impl Sizes {
+    const COUNT: usize = 1024;
+    /// Bits of an f32 below the exponent and two bits of the mantissa: four sizes an octave, and linear between them.
+    const SHIFT: u32 = 21;
+    const WHOLE: u64 = 1 << Self::SHIFT;
+
+    fn new() -> Self {
+        Self(vec![0; Self::COUNT])
+    }
+
+    fn add(&mut self, size: f32, every: u64) {
+        let bits = size.max(0.0).to_bits();
+        let (below, part) = ((bits >> Self::SHIFT) as usize, u64::from(bits) % Self::WHOLE);
+        self.0[below] += every * (Self::WHOLE - part);
+        self.0[below + 1] += every * part;
+    }
+
+    fn join(&mut self, other: &Self) {
+        self.0.iter_mut().zip(&other.0).for_each(|(to, from)| *to += from);
+    }
+
+    /// Sizes and numbers of casters.
+    fn all(&self) -> impl Iterator<Item = (f64, f64)> {
+        let used = self.0.iter().enumerate().filter(|(_, weight)| **weight > 0);
+        used.map(|(k, weight)| (Self::size(k), *weight as f64 / Self::WHOLE as f64))
+    }
+
+    fn size(k: usize) -> f64 {
+        f64::from(f32::from_bits((k as u32) << Self::SHIFT)).min(f64::from(f32::MAX))
+    }
+
+    fn count(&self) -> u64 {
+        self.0.iter().sum::<u64>() / Self::WHOLE
+    }
+
+    /// Size that half of the casters are below, between those where weights sum to less and to more; `None` without any.
+    fn median(&self) -> Option<f64> {
+        let total: u64 = self.0.iter().sum();
+        let (mut before, mut sum) = (None, 0);
+        for (k, &weight) in self.0.iter().enumerate().filter(|(_, weight)| **weight > 0) {
+            // The middle of this weight, so that a caster between two sizes is where it is.
+            let at = (2 * sum + weight, Self::size(k));
+            sum += weight;
+            if at.0 < total {
+                before = Some(at);
+                continue;
+            }
+            let Some((low, below)) = before else { return Some(at.1) };
+            return Some(below + (at.1 - below) * ((total - low) as f64 / (at.0 - low) as f64));
+        }
+        before.map(|(_, size)| size)
+    }
 }
 
 impl Appearance {
-    fn empty(sectors: bool) -> Self {
+    fn empty(frame: &Frame, apparent: Apparent) -> Self {
+        let sectors = apparent == Apparent::AngleAndSectors;
         Self {
-            spacing: vec![0; BINS],
-            radius: vec![0; BINS],
-            disc: vec![0; BINS],
+            apparent,
+            unit: if apparent == Apparent::Length { f64::from(frame.extent()) } else { 1.0 },
+            spacing: Sizes::new(),
+            radius: Sizes::new(),
+            disc: Sizes::new(),
             window: [Vec2::INFINITY, Vec2::NEG_INFINITY],
             cosine: [1.0, -1.0],
             sectors: vec![false; if sectors { SECTORS } else { 0 }],
@@ -70,7 +131,6 @@ impl Appearance {
 
     /// Looks at every caster from the light.
     pub(crate) fn new(casters: &Casters<'_>, frame: &Frame, apparent: Apparent) -> Self {
-        let sectors = apparent == Apparent::AngleAndSectors;
         let n = casters.cloud.len();
         // Few large parts: each carries three histograms.
         let part = CHUNK.max(n.div_ceil(64));
@@ -78,24 +138,24 @@ impl Appearance {
             .into_par_iter()
             .map(|c| {
                 let splats = c * part..n.min((c + 1) * part);
-                let look = Self::empty(sectors);
-                pulp::Arch::new().dispatch(SecondLook { casters, frame, apparent, splats, look })
+                let look = Self::empty(frame, apparent);
+                pulp::Arch::new().dispatch(SecondLook { casters, frame, splats, look })
             })
             .collect();
-        parts.into_iter().fold(Self::empty(sectors), Self::join)
+        parts.into_iter().fold(Self::empty(frame, apparent), Self::join)
     }
 
     /// Counts a splat, given the apparent size of a world unit and of its radius, for `every`.
     fn count(&mut self, casters: &Casters<'_>, i: usize, [unit, radius]: [f32; 2], every: u64) {
         let cloud = casters.cloud;
         let spacing = if cloud.kind[i] == SplatKind::Opaque {
-            self.disc[bin(radius)] += every;
+            self.disc.add(radius, every);
             cloud.cross_section[i].sqrt() * unit
         } else {
-            self.radius[bin(radius)] += every;
+            self.radius.add(radius, every);
             cloud.radius[i] / (casters.kernel(i).cutoff * 0.8) * unit
         };
-        self.spacing[bin(spacing)] += every;
+        self.spacing.add(spacing, every);
     }
 
     /// Marks the sectors of azimuth that a splat spans, given its place and its angular radius.
@@ -111,48 +171,65 @@ impl Appearance {
     }
 
     fn join(mut self, other: Self) -> Self {
-        (0..BINS).for_each(|b| self.spacing[b] += other.spacing[b]);
-        (0..BINS).for_each(|b| self.radius[b] += other.radius[b]);
-        (0..BINS).for_each(|b| self.disc[b] += other.disc[b]);
+        self.spacing.join(&other.spacing);
+        self.radius.join(&other.radius);
+        self.disc.join(&other.disc);
         self.window = [self.window[0].min(other.window[0]), self.window[1].max(other.window[1])];
         self.cosine = [self.cosine[0].min(other.cosine[0]), self.cosine[1].max(other.cosine[1])];
         self.sectors.iter_mut().zip(other.sectors).for_each(|(a, b)| *a |= b);
         self
     }
 
-    /// Apparent spacing that half of the casters are below; `None` without casters.
+    /// Spacing on the table that half of the casters are below; `None` without casters.
     pub(crate) fn median_spacing(&self) -> Option<f64> {
-        let total: u64 = self.spacing.iter().sum();
-        let mut seen = 0;
-        let found = self.spacing.iter().position(|&count| {
-            seen += count;
-            2 * seen >= total && total > 0
-        });
-        found.map(bin_value)
+        self.spacing.median().map(|size| size * self.unit)
     }
 
-    /// Entries that translucent casters make in a table of `cells` cells of side `cell` (angle, tangent or length): a
-    /// kernel of radius r overlaps (1 + 1.8 r/cell)² cells on average, and no more than there are.
+    /// Entries that translucent casters make in a table of `cells` cells of side `cell` (angle, tangent or length).
     pub(crate) fn entries(&self, cell: f64, cells: f64) -> f64 {
-        overlaps(&self.radius, cell, cells)
+        let made = |size| entries_of(size, cell / self.unit, self.apparent == Apparent::Length).min(cells);
+        self.radius.all().map(|(size, count)| count * made(size)).sum()
     }
 
-    /// Cells that casters of all kinds overlap.
+    /// Cells that casters of all kinds overlap: what work goes by. Larger cells are fewer.
     pub(crate) fn covered(&self, cell: f64, cells: f64) -> f64 {
-        self.entries(cell, cells) + overlaps(&self.disc, cell, cells)
+        let kernel = |size: f64| cells_along(HALF_OF_RADIUS * size * self.unit / cell).powi(2).min(cells);
+        let disc = |size: f64| (1.0 + 1.8 * size * self.unit / cell).powi(2).min(cells);
+        let kernels = self.radius.all().map(|(size, count)| count * kernel(size)).sum::<f64>();
+        kernels + self.disc.all().map(|(size, count)| count * disc(size)).sum::<f64>()
     }
 
     /// Casters that have a place.
     pub(crate) fn casters(&self) -> u64 {
-        self.spacing.iter().sum()
+        self.spacing.count()
     }
+}
+
+/// Entries of a kernel of this apparent radius in cells of this side, by the ways that [`crate::deposit`] takes: in a band
+/// between two, both leave their entries.
+fn entries_of(radius: f64, cell: f64, parallel: bool) -> f64 {
+    let [wide, bent] = [WIDE, BENT].map(|band| band.map(f64::from));
+    let across = radius / cell;
+    let bend = if parallel { 0.0 } else { radius * across };
+    let mut entries = 0.0;
+    if across > wide[0] {
+        entries += PI * across * across;
+    }
+    if across < wide[1] && bend > bent[0] {
+        // Two numbers of rays, but for the smallest.
+        let sets = if across > 0.5 { 2.0 } else { 1.0 };
+        entries += sets * (1.0 + across).powi(2);
+    }
+    if across < wide[1] && bend < bent[1] {
+        entries += cells_along(HALF_OF_RADIUS * across).powi(2);
+    }
+    entries
 }
 
 /// The second look at one part of the splats, in the form that [`pulp`] compiles once per instruction set.
 struct SecondLook<'a> {
     casters: &'a Casters<'a>,
     frame: &'a Frame,
-    apparent: Apparent,
     splats: Range<usize>,
     look: Appearance,
 }
@@ -184,16 +261,20 @@ impl Seen {
             let far = match apparent {
                 Apparent::Angle | Apparent::AngleAndSectors => distance,
                 Apparent::Tangent => p.z,
-                Apparent::Length => 1.0,
+                Apparent::Length => frame.extent(),
             };
             let is_seen = (far > 0.0) & (block.radius[l] >= 0.0);
             let radius = seen.radius[l] / far;
             let q = if apparent == Apparent::Length { p.truncate() } else { p.truncate() / p.z };
             // Seen at the tangent t, a ball spans about radius·(1 + t²)/z across the plane z = 1.
-            let stretch = if apparent == Apparent::Length { 1.0 } else { 1.0 + q.length_squared() };
+            let stretch = 1.0 + q.length_squared();
             let is_flat = matches!(apparent, Apparent::Tangent | Apparent::Length);
             let middle = if is_flat { [q.x, q.y] } else { [p.z / distance; 2] };
-            let reach = if is_flat { radius * stretch } else { radius };
+            let reach = match apparent {
+                Apparent::Length => seen.radius[l],
+                Apparent::Tangent => radius * stretch,
+                Apparent::Angle | Apparent::AngleAndSectors => radius,
+            };
             for k in 0..2 {
                 seen.span[k][0][l] = if is_seen { middle[k] - reach } else { f32::INFINITY };
                 seen.span[k][1][l] = if is_seen { middle[k] + reach } else { f32::NEG_INFINITY };
@@ -210,7 +291,8 @@ impl pulp::NullaryFnOnce for SecondLook<'_> {
 
     #[inline(always)]
     fn call(self) -> Appearance {
-        let Self { casters, frame, apparent, splats, mut look } = self;
+        let Self { casters, frame, splats, mut look } = self;
+        let apparent = look.apparent;
         let every = if casters.cloud.len() < MANY { 1 } else { SAMPLE };
         let mut low = [[f32::INFINITY; LANES]; 2];
         let mut high = [[f32::NEG_INFINITY; LANES]; 2];
@@ -241,9 +323,4 @@ impl pulp::NullaryFnOnce for SecondLook<'_> {
         }
         look
     }
-}
-
-fn overlaps(histogram: &[u64], cell: f64, cells: f64) -> f64 {
-    let overlap = |b: usize| (1.0 + 1.8 * bin_value(b) / cell).powi(2).min(cells);
-    histogram.iter().enumerate().filter(|(_, n)| **n > 0).map(|(b, n)| *n as f64 * overlap(b)).sum()
 }

@@ -5,12 +5,29 @@ use crate::mapping::Octahedral;
 use crate::survey::Survey;
 use splat_core::SplatKind;
 
+/// What the size of a table's cells follows from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Limit {
+    /// [`crate::Resolution::Cells`].
+    Asked,
+    /// Half the spacing of splats: nothing made it coarser.
+    Spacing,
+    /// The most cells that a table of so many splats has.
+    Cells,
+    /// The most entries that so many splats make, see [`crate::Resolution::Auto`].
+    Entries,
+    /// [`crate::Params::max_bytes`].
+    Memory,
+}
+
 /// Work and memory predicted from the casters' apparent sizes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prediction {
-    /// Cells of the table.
-    pub cells: f64,
-    /// Entries that translucent splats deposit; within a factor of 2 of the counted ones for kernels on a plane.
+    /// Columns and rows of the table.
+    pub size: [u64; 2],
+    /// What its cells follow from.
+    pub limit: Limit,
+    /// Entries that translucent splats deposit.
     pub entries: f64,
     /// Bytes that the build takes at its peak.
     pub bytes: u64,
@@ -33,15 +50,23 @@ pub struct Counts {
     pub bytes: u64,
 }
 
-/// Entries and bytes for a table of `cells` cells of side `cell`.
-pub(crate) fn predict(look: &Appearance, survey: &Survey, cell: f64, cells: f64, octahedral: bool) -> Prediction {
+/// Entries and bytes for a table of so many columns and rows of cells of side `cell`.
+pub(crate) fn predict(
+    look: &Appearance,
+    survey: &Survey,
+    cell: f64,
+    size: [f64; 2],
+    limit: Limit,
+    octahedral: bool,
+) -> Prediction {
+    let cells = size[0] * size[1];
     let entries = look.entries(cell, cells);
     let knot = if survey.coloured { 16.0 } else { 8.0 };
     let kinds = survey.kinds;
     let lists = u64::from(kinds[SplatKind::Medium as usize] > 0) + u64::from(kinds[SplatKind::Surface as usize] > 0);
     let depth = 4.0 * u64::from(kinds[SplatKind::Opaque as usize] > 0) as f64;
-    let directions = if octahedral { Octahedral::bytes(cells.sqrt() as u32) as f64 } else { 0.0 };
+    let directions = if octahedral { Octahedral::bytes(size[0] as u32) as f64 } else { 0.0 };
     // Entries stand once with their cell, parted by ranges, and once in the lists.
     let bytes = cells * (8.0 * lists as f64 + depth) + directions + entries * (2.0 * knot + 4.0);
-    Prediction { cells, entries, bytes: bytes.min(u64::MAX as f64) as u64 }
+    Prediction { size: size.map(|n| n as u64), limit, entries, bytes: bytes.min(u64::MAX as f64) as u64 }
 }

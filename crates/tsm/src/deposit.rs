@@ -22,18 +22,18 @@ use crate::mapping::{Mapping, Ray};
 use crate::media::MediaBatches;
 use crate::overlap::{Ellipse, Sink, Spread};
 use crate::sampling::{NEAR, Sampled};
-use crate::shares::{BLOCK, between};
+use crate::shares::{Axis, BLOCK, between};
 use crate::surfaces::SurfaceBatches;
 use glam::{Vec2, Vec3};
 use splat_core::optics::SurfaceOpacity;
 use splat_core::{SplatKind, glam};
 
 /// Where a band begins and where it ends.
-type Band = [f32; 2];
+pub(crate) type Band = [f32; 2];
 /// Half height or width of a footprint, in cells, from which on cells' rays sample it.
-const WIDE: Band = [3.0, 4.0];
+pub(crate) const WIDE: Band = [3.0, 4.0];
 /// Bend of a footprint, in cells, that the derivatives at its centre leave out: half extent times angular radius.
-const BENT: Band = [0.3, 0.6];
+pub(crate) const BENT: Band = [0.3, 0.6];
 /// Distance to a corner of the table, in half extents of the footprint.
 const CLEAR: Band = [2.5, 3.5];
 /// Half extent in cells below which a corner does not matter.
@@ -276,7 +276,7 @@ struct Put<'a, 'b, M: Mapping, const C: usize> {
 
 impl<M: Mapping, const C: usize> Sink for Put<'_, '_, M, C> {
     #[inline(always)]
-    fn row(&mut self, row: i32, first: i32, used: usize, shares: &[f32; BLOCK]) {
+    fn row(&mut self, row: i32, first: i32, used: usize, shares: &[f32; BLOCK], _axes: [&Axis; 2]) {
         let mapping = self.deposit.mapping;
         let [columns, rows] = mapping.size().map(|n| n as i32);
         let is_inside = (0..rows).contains(&row) && first >= 0 && first + BLOCK as i32 <= columns;

@@ -8,7 +8,7 @@ use crate::plan::{Plan, plan};
 use crate::shadow_map::{Absorbances, Matter, head};
 use crate::survey::{CHUNK, Survey};
 use crate::table::{Lists, Parted, Ranges};
-use crate::{Error, Params, ShadowMap};
+use crate::{Error, Params, Prediction, ShadowMap};
 use rayon::prelude::*;
 use splat_core::{Cloud, Light, Material, Object, Progress, SplatKind};
 use std::ops::Range;
@@ -57,6 +57,23 @@ impl Deposits {
         let plan = plan(&casters, &survey, light)?;
         progress.add_total(cloud.len() as u64);
         with_mapping!(&plan.table, m => Self::with_mapping(&casters, &survey, &plan, m, progress))
+    }
+
+    /// What [`Deposits::new`] will cost, by looks at the casters alone.
+    ///
+    /// # Errors
+    /// Those of [`ShadowMap::build`].
+    pub fn predict(
+        cloud: &Cloud,
+        materials: &[Material],
+        objects: &[Object],
+        light: &Light,
+        params: &Params,
+    ) -> Result<Prediction, Error> {
+        params.validate()?;
+        light.validate(0)?;
+        let casters = Casters::new(cloud, materials, objects, params);
+        plan(&casters, &Survey::new(&casters), light).map(|plan| plan.prediction)
     }
 
     fn with_mapping<M: Mapping>(

@@ -5,6 +5,7 @@
 //! changes no bit of the table.
 
 use splat_core::glam::{DMat3, DVec3, Mat3, Vec3};
+use std::cmp::Ordering;
 
 /// From offsets of the cloud to the light's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,13 +16,23 @@ pub(crate) struct Frame {
     rotation: Mat3,
     /// Frame units per world unit, a power of two.
     unit: f64,
+    /// The largest distance that occurs.
+    extent: f32,
 }
 
 impl Frame {
     /// Axes are rows; `extent` is the largest distance that occurs, world units.
     pub(crate) fn new(origin: DVec3, axes: [DVec3; 3], extent: f64) -> Self {
         let rotation = DMat3::from_cols(axes[0], axes[1], axes[2]).transpose().as_mat3();
-        Self { origin, rotation, unit: inverse_power_of_two(extent) }
+        let unit = inverse_power_of_two(extent);
+        let of_frame = if extent > 0.0 { (extent * unit) as f32 } else { 1.0 };
+        Self { origin, rotation, unit, extent: of_frame }
+    }
+
+    /// The largest distance that occurs, in the frame.
+    #[inline(always)]
+    pub(crate) fn extent(&self) -> f32 {
+        self.extent
     }
 
     /// Position in the frame.
@@ -82,11 +93,23 @@ fn inverse_power_of_two(x: f64) -> f64 {
     if x > 0.0 && exponent.abs() <= 1000 { f64::from_bits(((1023 - exponent) as u64) << 52) } else { 1.0 }
 }
 
-/// Right, up and `forward`; the choice of right and up turns with no input.
-pub(crate) fn axes_along(forward: DVec3) -> [DVec3; 3] {
+/// Right, up and `forward`: right is the world axis most across it, among equals the one along which the casters extend
+/// farther, so that a scene that is turned with its axes keeps its table.
+pub(crate) fn axes_along(forward: DVec3, extent: DVec3) -> [DVec3; 3] {
     let forward = forward.normalize();
-    let right = forward.any_orthonormal_vector();
+    let across = |k: &usize| (forward[*k].abs(), -extent[*k]);
+    let order = |a: &usize, b: &usize| across(a).partial_cmp(&across(b)).unwrap_or(Ordering::Equal);
+    let right = [0, 1, 2].into_iter().min_by(order).map_or(DVec3::X, |k| DVec3::AXES[k]);
+    let right = (right - forward * forward.dot(right)).normalize();
     [right, forward.cross(right), forward]
+}
+
+/// World axes with the one last along which the casters extend least: the poles of a table of the whole sphere. A scene
+/// that is turned with its axes keeps its table unless two extents are equal.
+pub(crate) fn axes_about(extent: DVec3) -> [DVec3; 3] {
+    let order = |a: &usize, b: &usize| extent[*a].partial_cmp(&extent[*b]).unwrap_or(Ordering::Equal);
+    let pole = [2, 1, 0].into_iter().min_by(order).unwrap_or(2);
+    [1, 2, 0].map(|k| DVec3::AXES[(pole + k) % 3])
 }
 
 #[cfg(test)]
@@ -102,7 +125,7 @@ mod tests {
 
     #[test]
     fn offset_inverts_position() {
-        let frame = Frame::new(DVec3::new(1.0, 2.0, 3.0), axes_along(DVec3::new(1.0, 1.0, -0.3)), 700.0);
+        let frame = Frame::new(DVec3::new(1.0, 2.0, 3.0), axes_along(DVec3::new(1.0, 1.0, -0.3), DVec3::ONE), 700.0);
         let p = Vec3::new(10.0, -20.0, 30.0);
         assert!((frame.offset(frame.position(p)) - p).length() < 1e-4);
     }

@@ -55,7 +55,7 @@ mod surfaces;
 mod survey;
 mod table;
 
-pub use cost::{Counts, Prediction};
+pub use cost::{Counts, Limit, Prediction};
 pub use deposits::Deposits;
 pub use error::Error;
 pub use params::{MappingChoice, Params, Resolution};

@@ -135,10 +135,11 @@ impl Ellipse {
                     block = columns.shares(columns.first);
                 }
                 let used = columns.last - columns.first + 1;
-                sink.row(j, columns.first, (used as usize).min(BLOCK), &block.map(|s| s * height));
+                let axes = [&columns, &rows];
+                sink.row(j, columns.first, (used as usize).min(BLOCK), &block.map(|s| s * height), axes);
                 for first in (columns.first..=columns.last).skip(BLOCK).step_by(BLOCK) {
                     let used = (columns.last - first + 1) as usize;
-                    sink.row(j, first, used.min(BLOCK), &columns.shares(first).map(|s| s * height));
+                    sink.row(j, first, used.min(BLOCK), &columns.shares(first).map(|s| s * height), axes);
                 }
             }
             begin += BLOCK as i32;
@@ -156,11 +157,12 @@ impl Ellipse {
 
 /// Takes shares row by row.
 pub(crate) trait Sink {
-    /// Shares of `BLOCK` columns from `first` on, of which `used` ≤ `BLOCK` may differ from 0.
-    fn row(&mut self, row: i32, first: i32, used: usize, shares: &[f32; BLOCK]);
+    /// Shares of `BLOCK` columns from `first` on, of which `used` ≤ `BLOCK` may differ from 0, and the footprint within
+    /// the row and across rows.
+    fn row(&mut self, row: i32, first: i32, used: usize, shares: &[f32; BLOCK], axes: [&Axis; 2]);
 }
 
-/// Keeps the cells on one side of an edge.
+/// Keeps what lies on one side of an edge.
 struct OneSide<'a> {
     crease: &'a Crease,
     is_near: bool,
@@ -168,13 +170,30 @@ struct OneSide<'a> {
 }
 
 impl Sink for OneSide<'_> {
-    fn row(&mut self, row: i32, first: i32, used: usize, shares: &[f32; BLOCK]) {
-        for (column, share) in (first..).zip(&shares[..used]) {
-            let near = self.crease.near(column, row);
-            let part = if self.is_near { near } else { 1.0 - near };
-            if part * share > 0.0 {
-                (self.cell)(column, row, part * share);
+    fn row(&mut self, row: i32, first: i32, used: usize, shares: &[f32; BLOCK], axes: [&Axis; 2]) {
+        for (column, &share) in (first..).zip(&shares[..used]) {
+            let side = self.crease.side(column, row);
+            let near = if side == 0.0 { near_half(self.crease, axes, column, row).min(share) } else { share };
+            let near = if side < 0.0 { 0.0 } else { near };
+            let part = if self.is_near { near } else { share - near };
+            if part > 0.0 {
+                (self.cell)(column, row, part);
             }
         }
     }
+}
+
+/// Share of a footprint in the near half of a cell that a diagonal halves: strips of rows up to the diagonal.
+fn near_half(crease: &Crease, [columns, rows]: [&Axis; 2], column: i32, row: i32) -> f32 {
+    const STRIPS: i32 = 4;
+    let [a, b, _] = crease.line;
+    let low = column as f32 - columns.at;
+    let [left, right] = [low, low + 1.0].map(|edge| columns.below(edge));
+    let strip = |k: i32| {
+        let [bottom, top] = [k, k + 1].map(|k| rows.below(row as f32 + k as f32 / STRIPS as f32 - rows.at));
+        // a and b are of equal size.
+        let cut = columns.below(low + 0.5 - b / a * ((k as f32 + 0.5) / STRIPS as f32 - 0.5));
+        (top - bottom) * if a > 0.0 { right - cut } else { cut - left }
+    };
+    (0..STRIPS).map(strip).sum()
 }

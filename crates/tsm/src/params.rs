@@ -23,7 +23,9 @@ pub enum MappingChoice {
 /// How fine the table is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Resolution {
-    /// About one cell a splat spacing, coarser where [`Params::entries_per_splat`] would be exceeded.
+    /// Cells of half a splat spacing for up to some ten thousand splats; then cells that stay as they are while a volume's
+    /// splats become finer, until splats overlap no more than [`Params::entries_per_splat`] cells each, and finer ones
+    /// again from there on. Coarser where [`Params::max_bytes`] would be exceeded. Finer splats never make coarser cells.
     #[default]
     Auto,
     /// Cells along the longer side of the table; ≥ 1. A polar table has this many rows over 180° of polar angle.
@@ -42,7 +44,7 @@ pub struct Params {
     pub tolerance: f32,
     /// How absorbance is made; [`AbsorbanceModel::Paper`] reproduces Gunjee 2007, with its limit of 2.0.
     pub absorbance: AbsorbanceModel,
-    /// Mean cells that a splat covers, which [`Resolution::Auto`] aims at for large clouds, ≥ 1.
+    /// Mean cells that a splat covers, which [`Resolution::Auto`] aims at for clouds of a million splats and more, ≥ 1.
     pub entries_per_splat: f32,
     /// Factor ≥ 1 on the radius √(area/π) of an opaque disc, so that neighbouring discs leave no holes.
     pub opaque_dilation: f32,

@@ -2,8 +2,8 @@
 
 use crate::appearance::{Apparent, Appearance, SECTORS};
 use crate::caster::Casters;
-use crate::cost::{self, Prediction};
-use crate::frame::{Frame, axes_along};
+use crate::cost::{self, Limit, Prediction};
+use crate::frame::{Frame, axes_about, axes_along};
 use crate::mapping::{Mapping, Octahedral, Planar, PolarAzimuth, PolarRange, Table, with_mapping};
 use crate::survey::Survey;
 use crate::{Error, MappingChoice, Resolution};
@@ -17,8 +17,11 @@ const CONE: f64 = 0.87;
 const MAX_TANGENT: f32 = 3.732;
 /// Greatest side of a table that the automatic resolution takes.
 const MAX_SIDE: f64 = 8192.0;
-/// Entries that a small cloud may always have.
-const FREE_ENTRIES: f64 = (1u64 << 20) as f64;
+/// Splats, and cells that each overlaps along a side beyond the first, from which on finer splats no longer make finer cells.
+const REFINED: [f64; 2] = [8192.0, 7.0];
+
+/// Part of a cell that a table may be too short by.
+const ROUNDING: f64 = 1.0 / 64.0;
 
 /// The chosen mapping.
 pub(crate) struct Plan {
@@ -45,11 +48,11 @@ pub(crate) fn plan(casters: &Casters<'_>, survey: &Survey, light: &Light) -> Res
     };
     let look = Appearance::new(casters, &frame, apparent);
     let shape = Extent::of(&kind, &look);
-    let cell = match casters.params.resolution {
-        Resolution::Auto => automatic_cell(casters, &look, &shape),
-        Resolution::Cells(n) => shape.side / f64::from(n),
+    let (cell, limit) = match casters.params.resolution {
+        Resolution::Auto => automatic_cell(casters, survey, &look, &shape),
+        Resolution::Cells(n) => (shape.side / f64::from(n), Limit::Asked),
     };
-    let prediction = cost::predict(&look, survey, cell, shape.cells(cell), shape.is_octahedral());
+    let prediction = cost::predict(&look, survey, cell, shape.size(cell), limit, shape.is_octahedral());
     let limit_bytes = casters.params.max_bytes;
     if prediction.bytes > limit_bytes {
         return Err(Error::Memory { what: "the table", needed_bytes: prediction.bytes, limit_bytes });
@@ -66,6 +69,7 @@ pub(crate) fn plan(casters: &Casters<'_>, survey: &Survey, light: &Light) -> Res
 fn frame_of(casters: &Casters<'_>, survey: &Survey, light: &Light) -> Result<(Kind, Frame), Error> {
     let empty = survey.bounds.is_empty();
     let centre = if empty { DVec3::ZERO } else { survey.bounds.center().as_dvec3() };
+    let sides = if empty { DVec3::ONE } else { (survey.bounds.max - survey.bounds.min).as_dvec3() };
     let reach = 0.5 * f64::from(survey.bounds.diagonal()) + f64::from(survey.max_radius);
     let choice = casters.params.mapping;
     let position = match light.shape {
@@ -75,7 +79,7 @@ fn frame_of(casters: &Casters<'_>, survey: &Survey, light: &Light) -> Result<(Ki
                 return Err(Error::Parameter { name: "mapping", found, expected: "Auto or Planar" });
             }
             let origin = centre - direction * (reach * 1.001);
-            return Ok((Kind::Parallel, Frame::new(origin, axes_along(direction), 2.0 * reach)));
+            return Ok((Kind::Parallel, Frame::new(origin, axes_along(direction, sides), 2.0 * reach)));
         }
         LightShape::Point { position } | LightShape::Spot { position, .. } => position - casters.cloud.origin,
         _ => {
@@ -88,14 +92,16 @@ fn frame_of(casters: &Casters<'_>, survey: &Survey, light: &Light) -> Result<(Ki
     };
     let to_centre = centre - position;
     let extent = to_centre.length() + reach;
-    let sphere = |kind| (kind, Frame::new(position, [DVec3::X, DVec3::Y, DVec3::Z], extent));
-    let planar =
-        |axis: DVec3, tan_outer| (Kind::Perspective { tan_outer }, Frame::new(position, axes_along(axis), extent));
+    let sphere = || (Kind::Octahedral, Frame::new(position, axes_about(sides), extent));
+    let planar = |axis: DVec3, tan_outer| {
+        (Kind::Perspective { tan_outer }, Frame::new(position, axes_along(axis, sides), extent))
+    };
     let narrow = to_centre.length() * CONE > reach;
     let wide = to_centre.length() * 0.96 > reach;
     Ok(match (choice, light.shape) {
-        (MappingChoice::Octahedral, _) => sphere(Kind::Octahedral),
-        (MappingChoice::PolarAzimuth, _) => sphere(Kind::Polar),
+        (MappingChoice::Octahedral, _) => sphere(),
+        // The paper's axes are the world's.
+        (MappingChoice::PolarAzimuth, _) => (Kind::Polar, Frame::new(position, DVec3::AXES, extent)),
         (_, LightShape::Spot { direction, outer, .. }) if outer < 1.2 => planar(direction, Some(outer.tan() as f32)),
         (MappingChoice::Planar, _) if wide => planar(to_centre, None),
         (MappingChoice::Planar, _) => {
@@ -106,7 +112,7 @@ fn frame_of(casters: &Casters<'_>, survey: &Survey, light: &Light) -> Result<(Ki
             });
         }
         (MappingChoice::Auto, _) if narrow && !empty => planar(to_centre, None),
-        (MappingChoice::Auto, _) => sphere(Kind::Octahedral),
+        (MappingChoice::Auto, _) => sphere(),
     })
 }
 
@@ -164,7 +170,8 @@ impl Extent {
 impl Extent {
     /// Columns and rows of cells of this side.
     fn size(&self, cell: f64) -> [f64; 2] {
-        let count = |length: f64| (length / cell * (1.0 - 1e-9)).ceil().max(1.0);
+        // A length that is a whole number of cells but for rounding takes no cell more in another unit.
+        let count = |length: f64| (length / cell - ROUNDING).ceil().max(1.0);
         match &self.shape {
             // Even, so that no cell lies across the edge between two octants along an axis.
             Shape::Octahedral => [2.0 * (0.5 * count(self.side)).ceil(); 2],
@@ -177,9 +184,16 @@ impl Extent {
         }
     }
 
+    /// Cells of this side, without rounding to whole columns and rows: what is chosen by it does not jump.
     fn cells(&self, cell: f64) -> f64 {
-        let [columns, rows] = self.size(cell);
-        columns * rows
+        match &self.shape {
+            Shape::Octahedral => (self.side / cell).powi(2),
+            Shape::Polar(range) => (range.azimuth[1] / cell) * ((range.polar[1] - range.polar[0]) / cell),
+            Shape::Planar { window: [low, high], .. } => {
+                let count = (*high - *low).as_dvec2() / cell + 2.0;
+                count.x * count.y
+            }
+        }
     }
 
     fn table(&self, cell: f64) -> Table {
@@ -224,18 +238,46 @@ fn fit(look: &Appearance) -> PolarRange {
     PolarRange { polar, azimuth: [start, (SECTORS - widest.0) as f64 * sector] }
 }
 
-/// Cells of half a median spacing, made coarser by eighths of an octave until entries and cells fit.
-fn automatic_cell(casters: &Casters<'_>, look: &Appearance, extent: &Extent) -> f64 {
-    let Some(spacing) = look.median_spacing() else { return extent.side / 16.0 };
-    let mut cell = (0.5 * spacing).max(extent.side / MAX_SIDE);
-    let budget = FREE_ENTRIES.max(f64::from(casters.params.entries_per_splat) * look.casters() as f64);
+/// Cells of half a median spacing, made coarser until cells, entries and bytes fit.
+fn automatic_cell(casters: &Casters<'_>, survey: &Survey, look: &Appearance, extent: &Extent) -> (f64, Limit) {
+    let Some(spacing) = look.median_spacing() else { return (extent.side / 16.0, Limit::Spacing) };
+    let finest = (0.5 * spacing).min(extent.side);
     let most_cells = (4.0 * casters.cloud.len() as f64).clamp(65_536.0, 16_777_216.0);
-    for _ in 0..256 {
-        let cells = extent.cells(cell);
-        if cells <= most_cells && look.covered(cell, cells) <= budget {
-            break;
-        }
-        cell *= 1.090_507_732_665_257_7;
+    let most_entries = budget(casters, look.casters() as f64);
+    let most_bytes = casters.params.max_bytes;
+    let has_cells = |cell: f64| cell >= extent.side / MAX_SIDE && extent.cells(cell) <= most_cells;
+    let has_entries = |cell: f64| look.covered(cell, extent.cells(cell)) <= most_entries;
+    let has_bytes = |cell: f64| {
+        let size = extent.size(cell);
+        cost::predict(look, survey, cell, size, Limit::Memory, extent.is_octahedral()).bytes <= most_bytes
+    };
+    [
+        (least(finest, extent.side, has_cells), Limit::Cells),
+        (least(finest, extent.side, has_entries), Limit::Entries),
+        (least(finest, extent.side, has_bytes), Limit::Memory),
+    ]
+    .into_iter()
+    .fold((finest, Limit::Spacing), |found, next| if next.0 > found.0 { next } else { found })
+}
+
+/// Entries that a table for `n` casters may have. Splats of a volume that are n^(-1/3) apart and overlap (1 + s·spacing/cell)²
+/// cells each make so many in cells that stay as they are while splats become finer; where that is fewer than
+/// [`crate::Params::entries_per_splat`], cells become finer with the splats again.
+fn budget(casters: &Casters<'_>, n: f64) -> f64 {
+    let [splats, cells] = REFINED;
+    let same = n * (1.0 + cells * (splats / n.max(1.0)).cbrt()).powi(2);
+    same.max(f64::from(casters.params.entries_per_splat) * n)
+}
+
+/// The least cell between two that fits, where larger ones do; the largest where none does.
+fn least(finest: f64, coarsest: f64, fits: impl Fn(f64) -> bool) -> f64 {
+    if fits(finest) {
+        return finest;
     }
-    cell.min(extent.side)
+    let (mut low, mut high) = (finest, coarsest);
+    for _ in 0..52 {
+        let middle = 0.5 * (low + high);
+        (low, high) = if fits(middle) { (low, middle) } else { (middle, high) };
+    }
+    high
 }

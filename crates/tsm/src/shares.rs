@@ -18,6 +18,12 @@ const CUT: [f32; 2] = [0.83, 0.92];
 const SMALL: f32 = 1.0;
 /// Growth of the cut with half width.
 const GROWTH: f32 = 0.06;
+/// Cells that a footprint of this half width overlaps along an axis, mean over where it lies.
+pub(crate) fn cells_along(half: f64) -> f64 {
+    let [small, large] = CUT.map(f64::from);
+    1.0 + 2.0 * half * (small + f64::from(GROWTH) * (half - f64::from(SMALL))).clamp(small, large)
+}
+
 /// Cells that are computed at once.
 pub(crate) const BLOCK: usize = 8;
 

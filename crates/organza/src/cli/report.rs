@@ -1,7 +1,7 @@
 //! Plans and costs as tables and as JSON.
 
 use organza::plan::{Plan, PlannedSampler};
-use organza::{CostRecord, SplatCount};
+use organza::{CostRecord, ShadowTable, SplatCount};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -45,7 +45,15 @@ pub(super) fn plan_json(plan: &Plan) -> Value {
         "passes": passes.collect::<Value>(),
         "optical_depth_planes": plan.optical_depth_planes,
         "shadow_maps": plan.shadow_maps,
+        "shadow_tables": plan.shadow_tables.iter().map(|t| t.as_ref().map(table_json)).collect::<Value>(),
         "samplers": plan.samplers.iter().map(sampler_json).collect::<Value>(),
+    })
+}
+
+fn table_json(t: &ShadowTable) -> Value {
+    json!({
+        "columns": t.size[0], "rows": t.size[1], "cells": t.why(), "entries": t.entries, "bytes": t.bytes,
+        "absorbance_cut": t.absorbance_cut(),
     })
 }
 

@@ -44,12 +44,11 @@ impl Drawing<'_> {
 
     /// What throws the shadow of each light that has one, or `None` where a device does not make it.
     fn castings(&self, helper: &Helper, cost: &mut CostRecord) -> Result<Option<Vec<Casting>>, Error> {
-        let (params, l) = (self.shadow_params(), self.loaded);
+        let l = self.loaded;
         let mut castings = Vec::new();
-        for (i, (light, wanted)) in l.lights.iter().zip(&self.plan.shadow_maps).enumerate() {
-            if !wanted || light.intensity == [0.0; 3] {
-                continue;
-            }
+        for (i, (light, table)) in l.lights.iter().zip(&self.plan.shadow_tables).enumerate() {
+            let Some(table) = table.filter(|_| light.intensity != [0.0; 3]) else { continue };
+            let params = table.params(self.settings, l);
             self.tick()?;
             let made = cost.measure(pass::SHADOW_MAP, |stage| {
                 stage.items_in = l.cloud.len() as u64;

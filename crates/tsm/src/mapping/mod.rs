@@ -128,21 +128,14 @@ pub struct Crease {
     pub jacobian: [Vec2; 2],
     /// (a, b, c): a·x + b·y + c is positive on the side of the place.
     pub line: [f32; 3],
-    /// Share of the far side in cells that the edge halves: from 0 where the footprint only touches it to 1/2 where its
-    /// centre lies on it.
-    pub far: f32,
 }
 
 impl Crease {
-    /// Part of a cell on the near side.
+    /// Which side the middle of a cell lies on: positive the near one, 0 where a diagonal halves the cell.
     #[inline]
-    pub(crate) fn near(&self, column: i32, row: i32) -> f32 {
+    pub(crate) fn side(&self, column: i32, row: i32) -> f32 {
         let [a, b, c] = self.line;
-        match a * (column as f32 + 0.5) + b * (row as f32 + 0.5) + c {
-            side if side > 0.0 => 1.0,
-            side if side < 0.0 => 0.0,
-            _ => 1.0 - self.far,
-        }
+        a * (column as f32 + 0.5) + b * (row as f32 + 0.5) + c
     }
 }
 

@@ -28,6 +28,9 @@ const ATAN: [f32; 8] = [
 /// sin(π/2·p)/p in powers of p² on [0, 1]; errs by less than 1e-8.
 const SIN: [f32; 5] = [std::f32::consts::FRAC_PI_2, -0.645_963_8, 0.079_689_92, -0.004_674_143_6, 0.000_151_671_7];
 
+/// Least r from which a place is continued across a diagonal.
+const LEAST_CONTINUED: f32 = 0.25;
+
 /// Equal-area octahedral table of n × n cells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Octahedral {
@@ -238,7 +241,6 @@ impl Mapping for Octahedral {
                 Vec2::new(signs * jacobian[1].x, jacobian[1].y),
             ],
             line: [a * mirror.x, b * mirror.y, c - (a * mirror.x + b * mirror.y) * side],
-            far: (-0.5 * to_diagonal / (half.x + half.y)).clamp(0.0, 0.5),
         })
     }
 
@@ -265,16 +267,19 @@ fn across_line(q: Vec2, side: f32, upper: bool, rows: bool) -> Across {
     }
 }
 
-/// Across a diagonal: with S = X + Y and D = X − Y in units of the half side, D/S on the upper side and D/(2 − S) on
-/// the lower are the same function of azimuth.
+/// Across a diagonal: with r = √(1 − |cos θ|) and D = X − Y in units of the half side, D/r is the same function of azimuth
+/// on both sides, and r of the one side, continued, is √(1 + cos θ) = √(2 − r²) on the other.
 fn across_diagonal(q: Vec2, side: f32, upper: bool) -> Across {
     let (sum, difference) = ((q.x + q.y) / side, (q.x - q.y) / side);
     let (sign, own) = if upper { (1.0, sum) } else { (-1.0, 2.0 - sum) };
-    let ratio = (2.0 - own) / own;
-    let lean = -sign * 2.0 * difference / (own * own);
-    let there = Vec2::new(sum + difference * ratio, sum - difference * ratio) * (0.5 * side);
-    // d(S, D′)/d(X, Y) with dD′ = ratio·dD + lean·dS.
-    let [dx, dy] = [lean + ratio, lean - ratio];
-    let jacobian = [Vec2::new(1.0 + dx, 1.0 + dy) * 0.5, Vec2::new(1.0 - dx, 1.0 - dy) * 0.5];
-    (there, jacobian, [-sign, -sign, sign * side])
+    // Far from the diagonal, where only footprints of the size of the table reach across it, any slope does.
+    let own = own.max(LEAST_CONTINUED);
+    let other = (2.0 - own * own).max(0.0).sqrt();
+    let (along, across) = (own / other, other / own);
+    let there = Vec2::splat(if upper { 2.0 - other } else { other }) + Vec2::new(1.0, -1.0) * (difference * across);
+    // With dS′ = along·dS and dD′ = across·dD + lean·dS of the sum S = X + Y: the area stays.
+    let lean = -sign * 2.0 * difference / (other * own * own);
+    let [x, y] = [along + lean, along - lean];
+    let jacobian = [Vec2::new(x + across, x - across) * 0.5, Vec2::new(y - across, y + across) * 0.5];
+    (there * (0.5 * side), jacobian, [-sign, -sign, sign * side])
 }

@@ -43,6 +43,37 @@ pub(crate) fn medium(size: [i32; 3], h: f32, sigma_t: f32, inside: impl Fn(Vec3)
     cloud
 }
 
+/// A ball of radius `r` about the origin, its splats weighted by the part of their voxel that lies in it: without that it
+/// would be rough.
+pub(crate) fn smooth_ball(h: f32, sigma_t: f32, r: f32) -> Cloud {
+    let n = (r / h) as i32 + 2;
+    let mut cloud = medium([n; 3], h, sigma_t, |p| p.length() < r + h);
+    for i in 0..cloud.len() {
+        if (cloud.position[i].length() - r).abs() > h {
+            continue;
+        }
+        let part = |k: i32| (k as f32 - 3.5) * h / 8.0;
+        let inside = |k: &i32| {
+            let d = Vec3::new(part(k % 8), part(k / 8 % 8), part(k / 64));
+            (cloud.position[i] + d).length() < r
+        };
+        cloud.cross_section[i] *= (0..512).filter(inside).count() as f32 / 512.0;
+    }
+    cloud
+}
+
+/// Length of a segment within that ball.
+pub(crate) fn chord(from: Vec3, to: Vec3, r: f32) -> f64 {
+    let (from, way) = (from.as_dvec3(), (to - from).as_dvec3());
+    let b = from.dot(way.normalize());
+    let square = b * b - from.length_squared() + f64::from(r * r);
+    if square <= 0.0 {
+        return 0.0;
+    }
+    let [enter, leave] = [-b - square.sqrt(), -b + square.sqrt()].map(|t| t.clamp(0.0, way.length()));
+    leave - enter
+}
+
 /// A square lattice of discs in the plane through `centre` across `normal`, `n` a side.
 pub(crate) fn plane(centre: Vec3, normal: Vec3, n: i32, h: f32, kind: SplatKind, depth: f32) -> Cloud {
     let mut cloud = Cloud::new(DVec3::ZERO);

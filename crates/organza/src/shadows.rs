@@ -1,0 +1,138 @@
+//! What shadow maps are built by: shared by the plan, which tells their size beforehand, and the drawing.
+
+use crate::load::Loaded;
+use crate::scene::{RenderSettings, ShadowMapping};
+use splat_core::{Light, LightShape};
+use tsm::{Deposits, Limit, Params};
+
+/// Share of the tolerance that the ends of lists may take, of all lights together. Absorbance grows with its logarithm only, so
+/// a small share costs little.
+pub(crate) const CUT_SHARE: f64 = 1.0 / 16.0;
+/// Largest slope of a displayed value by radiance, at black: sRGB's.
+const DISPLAY_SLOPE: f64 = 12.92;
+/// Standard deviation of a splat over its radius, at least.
+const LEAST_DEVIATION: f64 = 0.25;
+
+/// The table of one light's shadow map, as it was chosen before any work.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShadowTable {
+    /// Columns and rows.
+    pub size: [u64; 2],
+    /// What the size of its cells follows from.
+    pub limit: Limit,
+    /// Entries that splats will deposit.
+    pub entries: u64,
+    /// Bytes that it takes while it is built.
+    pub bytes: u64,
+    /// Transmittance at which lists stop.
+    pub tolerance: f32,
+    /// Bytes that it may take.
+    pub max_bytes: u64,
+}
+
+impl ShadowTable {
+    /// What it is built by.
+    pub(crate) fn params(&self, settings: &RenderSettings, loaded: &Loaded) -> Params {
+        params(settings, loaded, self.tolerance, self.max_bytes)
+    }
+
+    /// Absorbance at which lists stop.
+    pub fn absorbance_cut(&self) -> f64 {
+        -f64::from(self.tolerance).ln()
+    }
+
+    /// What the size of the cells follows from, in words.
+    pub fn why(&self) -> &'static str {
+        match self.limit {
+            Limit::Asked => "as asked for",
+            Limit::Spacing => "of half a spacing",
+            Limit::Cells => "coarser by their number",
+            Limit::Entries => "coarser by the number of entries",
+            Limit::Memory => "coarser by memory",
+        }
+    }
+
+    /// In words.
+    pub(crate) fn describe(&self, light: usize) -> String {
+        let ([columns, rows], entries) = (self.size, self.entries);
+        let (why, cut) = (self.why(), self.absorbance_cut());
+        format!("light {light}: {columns}x{rows} cells, {why}, {entries} entries up to an absorbance of {cut:.1}")
+    }
+}
+
+/// Parameters of a map with this tolerance, which may take `max_bytes`.
+fn params(settings: &RenderSettings, loaded: &Loaded, tolerance: f32, max_bytes: u64) -> Params {
+    let shadow = &settings.points.shadow;
+    Params {
+        mapping: match shadow.mapping {
+            ShadowMapping::Auto => tsm::MappingChoice::Auto,
+            ShadowMapping::Octahedral => tsm::MappingChoice::Octahedral,
+            ShadowMapping::Polar => tsm::MappingChoice::PolarAzimuth,
+        },
+        resolution: shadow.cells.map_or(tsm::Resolution::Auto, tsm::Resolution::Cells),
+        tolerance,
+        footprints: loaded.footprints.clone(),
+        max_bytes,
+        ..Params::default()
+    }
+}
+
+/// Transmittance e^(−A_cut) below which the light of one lamp is lost in the picture: its brightest light times that changes no
+/// displayed value by more than the lamp's part of the tolerance.
+fn tolerance(settings: &RenderSettings, loaded: &Loaded, light: &Light, maps: u64) -> f32 {
+    let of_lights = || {
+        let gain = DISPLAY_SLOPE * settings.exposure.exp2() * brightest(loaded, light).max(f64::MIN_POSITIVE);
+        CUT_SHARE * settings.tolerance / (gain * maps as f64)
+    };
+    let asked = settings.points.shadow.absorbance_cut.map(|cut| (-cut).exp());
+    asked.unwrap_or_else(of_lights).clamp(f64::from(f32::MIN_POSITIVE), 0.5) as f32
+}
+
+/// The most light that any splat could receive unshadowed, W/m²: at the place of the splats' bounds nearest to the lamp, by their
+/// least radius.
+fn brightest(loaded: &Loaded, light: &Light) -> f64 {
+    let intensity = light.intensity.into_iter().map(f64::from).fold(0.0, f64::max);
+    let (LightShape::Point { position } | LightShape::Spot { position, .. }) = light.shape else { return intensity };
+    let bounds = loaded.cloud.bounds();
+    if bounds.is_empty() {
+        return intensity;
+    }
+    // Relative to the cloud's origin, so that a moved scene has the same bits.
+    let position = position - loaded.cloud.origin;
+    let [low, high] = [bounds.min, bounds.max].map(|p| p.as_dvec3());
+    let least = loaded.cloud.radius.iter().copied().fold(f32::INFINITY, f32::min);
+    let spread = LEAST_DEVIATION * f64::from(least);
+    let square = position.distance_squared(position.clamp(low, high)) + spread * spread;
+    if square > 0.0 { intensity / square } else { f64::INFINITY }
+}
+
+/// The table of each light that gets a map, where all maps together may take so many bytes.
+///
+/// # Errors
+/// That of the first light whose table cannot be chosen, with its number.
+pub(crate) fn tables(
+    settings: &RenderSettings,
+    loaded: &Loaded,
+    wanted: &[bool],
+    max_bytes: u64,
+) -> Result<Vec<Option<ShadowTable>>, (usize, tsm::Error)> {
+    let maps = wanted.iter().filter(|on| **on).count().max(1) as u64;
+    let table = |(i, (light, wanted)): (usize, (&Light, &bool))| {
+        if !wanted {
+            return Ok(None);
+        }
+        let tolerance = tolerance(settings, loaded, light, maps);
+        let params = params(settings, loaded, tolerance, max_bytes / maps);
+        let predicted = Deposits::predict(&loaded.cloud, &loaded.materials, &loaded.objects, light, &params);
+        let predicted = predicted.map_err(|e| (i, e))?;
+        Ok(Some(ShadowTable {
+            size: predicted.size,
+            limit: predicted.limit,
+            entries: predicted.entries as u64,
+            bytes: predicted.bytes,
+            tolerance,
+            max_bytes: params.max_bytes,
+        }))
+    };
+    loaded.lights.iter().zip(wanted).enumerate().map(table).collect()
+}
