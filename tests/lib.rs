@@ -1,8 +1,10 @@
 //! What the end-to-end tests share: the real command, from a scene text to the channels of its EXR file.
 #![allow(clippy::unwrap_used, clippy::missing_panics_doc, reason = "a test fails by panicking")]
 
+mod peak;
 mod place;
 
+pub use peak::{Peak, run_measured};
 pub use place::Place;
 
 use exr::prelude::{ReadChannels, ReadLayers, read};

@@ -139,6 +139,35 @@ fn bi31_an_output_that_is_an_input_is_refused_even_with_force() {
     assert_eq!(fs::read_to_string(place.path("s.toml")).unwrap(), scene());
 }
 
+#[cfg(unix)]
+#[test]
+fn outputs_that_are_links_to_devices_or_one_file_twice_are_refused_before_any_work() {
+    let place = place();
+    let link = |to: &str, name: &str| std::os::unix::fs::symlink(to, place.path(name)).unwrap();
+    Command::new("mkfifo").arg(place.path("pipe")).status().unwrap();
+    link("pipe", "x.png");
+    link("nothing", "y.png");
+    link(".", "here");
+    // The memory limit would be the next error.
+    let refused = |more: &[&str], stderr: &str| {
+        place.expect(4, &[&["render", "s.toml", "--max-memory", "1", "--force"], more].concat(), stderr);
+    };
+    refused(&["-o", "x.png"], "x.png: this is a device, a pipe or a socket");
+    refused(&["-o", "y.png"], "y.png: this link points to nothing");
+    refused(&["--cost", "/dev/null"], "/dev/null: this is a device, a pipe or a socket");
+    refused(&["--cost", "-"], "-: standard output is not a file");
+    refused(&["-o", "a.png", "-o", "./a.png"], "./a.png: this output is named twice");
+    refused(&["-o", "a.png", "--cost", "here/a.png"], "here/a.png: this output is named twice");
+    refused(&["--cost", "c", "--checkpoint", "./c"], "./c: this output is named twice");
+    refused(&["-o", "a.png", "--cost", "here/s.toml"], "here/s.toml: this output is also an input");
+    for command in ["accuracy", "orders"] {
+        link("pipe", &format!("{command}.json"));
+        let message = format!("{command}.json: this is a device, a pipe or a socket");
+        place.expect(4, &[command, "s.toml", "--max-memory", "1", "--force"], &message);
+    }
+    assert_eq!(place.made(), ["accuracy.json", "here", "orders.json", "pipe", "x.png", "y.png"]);
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn bi31_a_folder_that_cannot_be_written_is_refused() {
@@ -292,4 +321,116 @@ fn bi30_threads_0_takes_all_cores_and_the_bytes_do_not_depend_on_it() {
     let bytes = |name: &str| fs::read(place.path(name)).unwrap();
     assert_eq!(bytes("0.exr"), bytes("1.exr"));
     assert_eq!(bytes("1.exr"), bytes("3.exr"));
+}
+
+/// The longest run of one character.
+fn longest_run(text: &str) -> usize {
+    let (mut longest, mut run, mut last) = (0, 0, '\0');
+    for c in text.chars() {
+        run = if c == last { run + 1 } else { 1 };
+        (longest, last) = (longest.max(run), c);
+    }
+    longest
+}
+
+/// Runs and asserts that an error repeats 200 characters at most of what it was given.
+fn expect_no_flood(place: &Place, arguments: &[&str], what: &str) {
+    let out = place.run(arguments);
+    let code = out.status.code();
+    let said = [&out.stderr, &out.stdout].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+    assert!(matches!(code, Some(2..=6)), "{what}: {code:?} {}", &said[0][..said[0].len().min(500)]);
+    for text in said {
+        let run = longest_run(&text);
+        assert!(run <= 200, "{what}: repeats {run} characters");
+        assert!(text.len() < 4000, "{what}: {} bytes", text.len());
+        assert!(!text.contains('\u{1b}'), "{what}: steers the terminal");
+    }
+}
+
+#[test]
+fn messages_repeat_200_characters_at_most_of_a_scene() {
+    let place = place();
+    let long = format!("\u{1b}[2J{}", "q".repeat(1 << 20)).replace('\u{1b}', "\\u001b");
+    let (word, digits) = ("q".repeat(1 << 20), "7".repeat(1 << 20));
+    let fog = "medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 0.5, spacing = 0.25 }";
+    let object = |source: String| scene().replace(fog, &source);
+    let ball = "box = [[-1, -1, -1], [1, 1, 1]], spacing = 0.2 }";
+    for (what, text) in [
+        ("a key", format!("{word} = 1\n{}", scene())),
+        ("a key in quotes", format!("\"{long}\" = 1\n{}", scene())),
+        ("a key twice", format!("{word} = 1\n{word} = 1\n{}", scene())),
+        ("a name", scene().replace("\"fog\"", &format!("\"{long}\""))),
+        ("a name twice", format!("{0}{0}", FOG.replace("fog", &"q".repeat(250))) + &SMALL_SCENE),
+        ("a source", object(format!("\"{long}\" = 1"))),
+        ("a material", object(format!("{fog}\nmaterial = \"{long}\""))),
+        ("a path", object(format!("mesh = \"{long}\""))),
+        ("a path outside", object(format!("mesh = \"/{long}\""))),
+        ("an address", object(format!("mesh = \"http://{long}\""))),
+        ("an expression", object(format!("implicit = {{ expression = \"{long}\", {ball}"))),
+        ("a word in an expression", object(format!("implicit = {{ expression = \"{}\", {ball}", "q".repeat(4000)))),
+        (
+            "a number in an expression",
+            object(format!("implicit = {{ expression = \"x+.{}.7\", {ball}", "7".repeat(3000))),
+        ),
+        ("a value", format!("{}[render]\nseed = \"{long}\"\n", scene())),
+        ("a choice", format!("{}[render]\ntechnique = \"{long}\"\n", scene())),
+        ("a layer", format!("{}[render]\nlayers = [\"{long}\"]\n", scene())),
+        ("a whole number", format!("{}[render]\nseed = {digits}\n", scene())),
+        ("a number", format!("{}[render]\ntolerance = {digits}.5e{digits}\n", scene())),
+        ("no TOML", format!("{}[render]\ntolerance = {word}\n", scene())),
+        ("a track", format!("{}[animation]\nframes = 1\n[[animation.track]]\nset = \"{long}\"\n", scene())),
+    ] {
+        place.write("flood.toml", text);
+        expect_no_flood(&place, &["render", "flood.toml", "--frames", "--json"], what);
+        expect_no_flood(&place, &["explain", "flood.toml"], what);
+    }
+    for (what, text) in [
+        ("a key in JSON", format!("{{\"{long}\": 1}}")),
+        ("a key twice in JSON", format!("{{\"{long}\": 1, \"{long}\": 1}}")),
+        ("a number in JSON", format!("{{\"version\": {digits}}}")),
+        ("a word in JSON", format!("{{\"version\": {word}}}")),
+    ] {
+        place.write("flood.json", text);
+        expect_no_flood(&place, &["render", "flood.json", "--json"], what);
+    }
+}
+
+#[test]
+fn messages_repeat_200_characters_at_most_of_the_command_line() {
+    let place = place();
+    // Linux passes arguments of up to 128 KiB.
+    let long = format!("\u{1b}[2J{}", "q".repeat(100_000));
+    let with = |option: &str, value: String| vec!["render".into(), "s.toml".into(), option.into(), value];
+    for arguments in [
+        vec![long.clone()],
+        vec![format!("--{long}")],
+        vec!["render".into(), long.clone()],
+        vec!["info".into(), long.clone()],
+        with("--set", long.clone()),
+        with("--set", format!("{long}=1")),
+        with("--set", format!("render.{long}=1")),
+        with("--set", format!("object.{long}.visible=true")),
+        with("--set", format!("render.seed={long}")),
+        with("--set", format!("render.seed=\"{}\"", "q".repeat(100_000))),
+        with("--set", format!("render.seed={}", "7".repeat(100_000))),
+        with("--technique", long.clone()),
+        with("--layers", format!("depth,{long}")),
+        with("--size", long.clone()),
+        with("--threads", long.clone()),
+        with("--max-memory", long.clone()),
+        with("--backend", long.clone()),
+        with("--tolerance", format!("0.{}x", "7".repeat(100_000))),
+        with("-o", long.clone()),
+        with("-o", format!("{long}.exr")),
+        with("--cost", long.clone()),
+        with("--checkpoint", long.clone()),
+        vec!["render".into(), "s.toml".into(), format!("--size={long}")],
+        vec!["render".into(), "s.toml".into(), "--backend".into(), "wgpu".into(), "--device".into(), long.clone()],
+        vec!["passport".into(), "--device".into(), long.clone()],
+        vec!["accuracy".into(), "s.toml".into(), "--out".into(), long.clone()],
+    ] {
+        let what: Vec<String> = arguments.iter().map(|a| a.chars().take(30).collect()).collect();
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        expect_no_flood(&place, &arguments, &what.join(" "));
+    }
 }

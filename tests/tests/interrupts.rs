@@ -142,3 +142,24 @@ fn a_checkpoint_of_something_else_is_refused() {
     place.expect(4, &render(&["-o", "a.exr", "--checkpoint", "s.toml"]), "also an input");
     place.expect(2, &render(&["-o", "a.exr", "--repeat-level", "1"]), "--repeat-level 1: ");
 }
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_where_nothing_asks_for_it_ends_within_two_seconds() {
+    // A surface that is everywhere is looked for in a hundred million cells before the first tick.
+    let ball = "[[object]]\nname = \"ball\"\nopacity = 0.5\nimplicit = { expression = \"sin(60*x)*sin(60*y)*sin(60*z)\", \
+                box = [[-2, -2, -2], [2, 2, 2]], spacing = 0.006 }\n[render]\ntechnique = \"particles\"\n\
+                particles = { surface_sampler = \"triangles\" }\n";
+    let place = Place::new(&format!("{SMALL_SCENE}{ball}"));
+    let mut child = spawn(&place, &["-o", "a.exr", "--max-memory", "100G"]);
+    std::thread::sleep(Duration::from_millis(800));
+    assert!(child.try_wait().unwrap().is_none(), "{child:?} has ended by itself");
+    let start = std::time::Instant::now();
+    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let out = child.wait_with_output().unwrap();
+    let text = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(130), "{text}");
+    assert!(text.contains("interrupted"), "{text}");
+    assert!(start.elapsed() < Duration::from_millis(2500), "{:?}", start.elapsed());
+    assert!(place.made().is_empty());
+}

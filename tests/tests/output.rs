@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use exr::prelude::*;
-use organza::output::{Metadata, check_target, write, write_atomically};
+use organza::output::{self, Metadata, Target, Targets, WriteReport};
 use organza::scene::LayerChoice;
 use splat_core::{LayerData, Layers};
 use std::fs;
@@ -32,6 +32,27 @@ fn metadata() -> Metadata {
         sets: Some(12),
         exposure: 1.0,
     }
+}
+
+fn write(
+    layers: &Layers,
+    metadata: &Metadata,
+    path: &Path,
+    half: bool,
+) -> std::result::Result<WriteReport, organza::Error> {
+    output::write(layers, metadata, &Target::new(path, true)?, half)
+}
+
+/// Writes to a place, whatever is there.
+fn replace(path: &Path, bytes: &[u8]) -> std::result::Result<(), organza::Error> {
+    Target::new(path, true)?.write(bytes)
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let name = |e: std::io::Result<fs::DirEntry>| e.unwrap().file_name().to_string_lossy().into_owned();
+    let mut names: Vec<String> = fs::read_dir(folder).unwrap().map(name).collect();
+    names.sort();
+    names
 }
 
 fn read_exr(path: &Path) -> FlatImage {
@@ -146,27 +167,160 @@ fn ou1_pictures_of_one_pixel_and_one_row_are_written() {
 fn targets_are_checked_without_touching_them() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
-    check_target(&path, false, &[]).unwrap();
-    assert_eq!(fs::read_dir(&folder).unwrap().count(), 0);
+    let check = |path: &Path, force: bool, inputs: &[std::path::PathBuf]| {
+        let mut targets = Targets::default();
+        targets.add_inputs(inputs);
+        targets.add(path, force).map_err(|e| e.exit_code())
+    };
+    check(&path, false, &[]).unwrap();
+    assert!(names(folder.path()).is_empty());
     fs::write(&path, "old").unwrap();
-    assert_eq!(check_target(&path, false, &[]).unwrap_err().exit_code(), 4);
-    check_target(&path, true, &[]).unwrap();
-    assert_eq!(check_target(&path, true, std::slice::from_ref(&path)).unwrap_err().exit_code(), 4);
-    assert_eq!(check_target(folder.path(), true, &[]).unwrap_err().exit_code(), 4);
-    assert_eq!(check_target(&folder.path().join("no/a.exr"), true, &[]).unwrap_err().exit_code(), 4);
+    assert_eq!(check(&path, false, &[]), Err(4));
+    check(&path, true, &[]).unwrap();
+    assert_eq!(check(&path, true, std::slice::from_ref(&path)), Err(4));
+    assert_eq!(check(folder.path(), true, &[]), Err(4));
+    assert_eq!(check(&folder.path().join("no/a.exr"), true, &[]), Err(4));
+    assert_eq!(check("-".as_ref(), true, &[]), Err(4));
     assert_eq!(fs::read(&path).unwrap(), b"old");
+    assert_eq!(names(folder.path()), ["a.exr"]);
+}
+
+#[test]
+fn one_file_in_two_spellings_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("b")).unwrap();
+    for other in ["./a.exr", "b/../a.exr", "b/.././/a.exr"] {
+        let mut targets = Targets::default();
+        targets.add(&folder.path().join("a.exr"), false).unwrap();
+        let error = targets.add(&folder.path().join(other), false).unwrap_err();
+        assert_eq!((error.exit_code(), error.to_string().contains("named twice")), (4, true), "{other}: {error}");
+        targets.add(&folder.path().join("b/a.exr"), false).unwrap();
+    }
+    // Nothing of the checks is left.
+    assert_eq!(names(folder.path()), ["b"]);
+    assert!(names(&folder.path().join("b")).is_empty());
+}
+
+#[cfg(unix)]
+#[test]
+fn one_file_by_links_and_hard_links_is_refused() {
+    use std::os::unix::fs::symlink;
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("old.exr"), "old").unwrap();
+    fs::hard_link(path("old.exr"), path("hard.exr")).unwrap();
+    symlink("old.exr", path("soft.exr")).unwrap();
+    symlink(".", path("here")).unwrap();
+    for [one, other] in [
+        ["old.exr", "hard.exr"],
+        ["hard.exr", "soft.exr"],
+        ["soft.exr", "here/old.exr"],
+        ["new.exr", "here/new.exr"],
+        ["here/here/new.exr", "new.exr"],
+    ] {
+        let mut targets = Targets::default();
+        targets.add(&path(one), true).unwrap();
+        let error = targets.add(&path(other), true).unwrap_err();
+        assert_eq!((error.exit_code(), error.to_string().contains("named twice")), (4, true), "{one} {other}: {error}");
+        // As an input it is refused too.
+        let mut targets = Targets::default();
+        targets.add_inputs(&[path(one)]);
+        assert_eq!(targets.add(&path(other), true).is_err(), path(one).exists(), "{one} {other}");
+    }
 }
 
 #[cfg(unix)]
 #[test]
 fn a_link_goes_on_pointing_where_it_does() {
     let folder = tempfile::tempdir().unwrap();
-    let (real, link) = (folder.path().join("real.exr"), folder.path().join("link.exr"));
+    let elsewhere = tempfile::tempdir().unwrap();
+    let (real, link) = (elsewhere.path().join("real.exr"), folder.path().join("link.exr"));
     fs::write(&real, "old").unwrap();
-    std::os::unix::fs::symlink("real.exr", &link).unwrap();
-    write_atomically(&link, b"new").unwrap();
+    std::os::unix::fs::symlink(&real, &link).unwrap();
+    replace(&link, b"new").unwrap();
     assert_eq!(fs::read(&real).unwrap(), b"new");
     assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+    assert_eq!(Target::new(&link, false).unwrap_err().exit_code(), 4);
+}
+
+#[cfg(unix)]
+#[test]
+fn what_is_no_regular_file_is_never_replaced() {
+    use std::os::unix::fs::{FileTypeExt, symlink};
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    // A pipe stands for the null device, which a fault would take from the machine.
+    let made = std::process::Command::new("mkfifo").arg(path("pipe")).status().unwrap();
+    assert!(made.success());
+    symlink("pipe", path("x.png")).unwrap();
+    symlink("nothing", path("y.png")).unwrap();
+    symlink("z.png", path("z.png")).unwrap();
+    let _socket = std::os::unix::net::UnixListener::bind(path("socket")).unwrap();
+    for name in ["pipe", "x.png", "y.png", "z.png", "socket"] {
+        for force in [false, true] {
+            assert_eq!(Target::new(&path(name), force).unwrap_err().exit_code(), 4, "{name} {force}");
+        }
+    }
+    assert_eq!(Target::new("/dev/null".as_ref(), true).unwrap_err().exit_code(), 4);
+    // One that comes in the middle is not replaced either.
+    let target = Target::new(&path("late.png"), true).unwrap();
+    symlink("pipe", path("late.png")).unwrap();
+    assert_eq!(target.write(b"new").unwrap_err().exit_code(), 4);
+    assert!(fs::metadata(path("pipe")).unwrap().file_type().is_fifo());
+    assert_eq!(names(folder.path()), ["late.png", "pipe", "socket", "x.png", "y.png", "z.png"]);
+}
+
+#[test]
+fn what_appears_in_the_middle_is_replaced_by_force_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    for (force, left) in [(false, "other"), (true, "mine")] {
+        let target = Target::new(&path, force).unwrap();
+        fs::write(&path, "other").unwrap();
+        assert_eq!(target.write(b"mine").map_err(|e| e.exit_code()), if force { Ok(()) } else { Err(4) });
+        assert_eq!(fs::read(&path).unwrap(), left.as_bytes());
+        assert_eq!(names(folder.path()), ["a.exr"]);
+        fs::remove_file(&path).unwrap();
+    }
+}
+
+#[test]
+fn bi32_each_step_that_fails_leaves_what_was_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    // No temporary file can be made: its folder is gone.
+    let gone = folder.path().join("gone");
+    fs::create_dir(&gone).unwrap();
+    let target = Target::new(&gone.join("a.exr"), false).unwrap();
+    fs::remove_dir(&gone).unwrap();
+    assert_eq!(target.write(b"new").unwrap_err().exit_code(), 4);
+    // The name cannot be given: a folder has it by now.
+    let target = Target::new(&path, true).unwrap();
+    fs::create_dir(&path).unwrap();
+    assert_eq!(target.write(b"new").unwrap_err().exit_code(), 4);
+    assert_eq!(names(folder.path()), ["a.exr"]);
+    fs::remove_dir(&path).unwrap();
+    // What others have left does not block anyone, whatever the number of their process, and stays theirs.
+    let theirs = format!(".a.exr.tmp-{}", std::process::id());
+    fs::write(folder.path().join(&theirs), "theirs").unwrap();
+    replace(&path, b"new").unwrap();
+    assert_eq!(fs::read(&path).unwrap(), b"new");
+    assert_eq!(names(folder.path()), [&theirs, "a.exr"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn outputs_have_the_permissions_that_others_have() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let [path, plain] = ["a.exr", "plain"].map(|name| folder.path().join(name));
+    let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+    fs::write(&plain, "").unwrap();
+    replace(&path, b"new").unwrap();
+    assert_eq!(mode(&path), mode(&plain));
+    fs::set_permissions(&path, fs::Permissions::from_mode(0o640)).unwrap();
+    replace(&path, b"newer").unwrap();
+    assert_eq!(mode(&path), 0o640);
 }
 
 /// A small file system of its own; `None` where this process may not mount one.
@@ -199,8 +353,24 @@ fn bi32_a_full_disk_leaves_the_old_file_and_no_other() {
     let Some(disk) = SmallDisk::mount() else { return };
     let path = disk.0.path().join("a.exr");
     fs::write(&path, b"old").unwrap();
-    let error = write_atomically(&path, &vec![7; 1 << 20]).unwrap_err();
+    let error = replace(&path, &vec![7; 1 << 20]).unwrap_err();
     assert_eq!((error.exit_code(), error.hint()), (4, "free some space"));
     assert_eq!(fs::read(&path).unwrap(), b"old");
     assert_eq!(fs::read_dir(disk.0.path()).unwrap().count(), 1);
+}
+
+#[cfg(unix)]
+#[test]
+fn bi32_a_file_that_may_not_grow_so_far_leaves_the_old_one() {
+    let place = organza_tests::Place::new(organza_tests::SMALL_SCENE);
+    place.write("a.exr", "old");
+    let program = organza_tests::organza();
+    // Files of at most one block; without the signal the system answers with an error in the middle of writing.
+    let mut shell = std::process::Command::new("sh");
+    shell.args(["-c", "trap '' XFSZ; ulimit -f 1; exec \"$0\" render s.toml --size 96x96 -o a.exr --force"]);
+    let out = shell.arg(program.get_program()).current_dir(place.folder()).output().unwrap();
+    let text = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(4), "{text}");
+    assert!(text.contains("a.exr: cannot write"), "{text}");
+    assert_eq!((place.bytes("a.exr"), place.made()), (b"old".to_vec(), vec!["a.exr".to_owned()]));
 }

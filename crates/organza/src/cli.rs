@@ -7,6 +7,7 @@ mod console;
 mod devices;
 mod explain;
 mod info;
+mod jobs;
 mod memory;
 mod orders;
 mod passport;
@@ -28,7 +29,7 @@ pub(crate) fn main() -> ExitCode {
             // Help and version are not errors; a closed pipe is not worth a word.
             Err(e) if e.exit_code() == 0 => return console::out(&e.render().to_string()).map_or(4, |()| 0),
             Err(e) => {
-                console::note(&e.render().to_string());
+                console::note(&without_floods(&e.render().to_string()));
                 return 2;
             }
         };
@@ -41,6 +42,12 @@ pub(crate) fn main() -> ExitCode {
             }
         }
     }))
+}
+
+/// A message of the parser of arguments, which repeats them whole, with its long lines cut.
+fn without_floods(message: &str) -> String {
+    const MOST_LINES: usize = 20;
+    message.lines().take(MOST_LINES).map(|line| organza::printable(line.as_ref()) + "\n").collect()
 }
 
 /// The exit code of a command that has said what it had to say.

@@ -141,8 +141,8 @@ impl Error {
 
     /// An error of a reader.
     pub fn from_read(path: &Path, error: &convert::ReadError) -> Self {
-        let what = format!("{}{}", error.file, error.place);
-        let message = format!("expected {}, found {}", error.expected, error.found);
+        let what = format!("{}{}", printable(Path::new(&error.file)), error.place);
+        let message = format!("expected {}, found {}", error.expected, shown(&error.found));
         match error.fault {
             convert::Fault::FileSystem => Self::io(path, "cannot read", std::io::Error::other(message)),
             convert::Fault::Limit => Self::TooLarge { what, message, hint: error.hint.into() },
@@ -181,17 +181,35 @@ impl Error {
     }
 }
 
-/// A path for a message: what is not UTF-8 or would steer a terminal is escaped.
-pub fn printable(path: &Path) -> String {
-    let bytes = path.as_os_str().as_encoded_bytes();
-    let mut text = String::with_capacity(bytes.len());
-    for chunk in bytes.utf8_chunks() {
-        text.push_str(&escape_controls(chunk.valid()));
-        for byte in chunk.invalid() {
-            text.push_str(&format!("\\x{byte:02x}"));
+/// Most characters of what was given that a message repeats.
+const MOST_SHOWN: usize = 200;
+
+/// What was given (a name, a key, a value, an expression), for a message: its first 200 characters, those escaped that would
+/// steer a terminal.
+pub fn shown(text: &str) -> String {
+    // Of the bytes that are not looked at there may be millions.
+    match text.char_indices().nth(MOST_SHOWN) {
+        Some(_) => {
+            let end = text.char_indices().nth(MOST_SHOWN - 1).map_or(0, |(at, _)| at);
+            format!("{}…", escape_controls(&text[..end]))
         }
+        None => escape_controls(text).into_owned(),
     }
-    text
+}
+
+/// A path for a message: what is not UTF-8 or would steer a terminal is escaped, and of a long one the middle is left out,
+/// so that 200 characters are shown.
+pub fn printable(path: &Path) -> String {
+    let mut characters = Vec::new();
+    for chunk in path.as_os_str().as_encoded_bytes().utf8_chunks() {
+        characters.extend(chunk.valid().chars().map(|c| escape_controls(c.encode_utf8(&mut [0; 4])).into_owned()));
+        characters.extend(chunk.invalid().iter().map(|byte| format!("\\x{byte:02x}")));
+    }
+    if characters.len() > MOST_SHOWN {
+        let half = MOST_SHOWN / 2;
+        characters.splice(half..characters.len() - half + 1, ["…".to_owned()]);
+    }
+    characters.concat()
 }
 
 /// `text` with control characters and marks that change the direction of writing escaped, so that a name in a file can
@@ -219,6 +237,19 @@ mod tests {
         assert_eq!(escape_controls("a\u{1b}[2Jb\nc"), "a\\u{1b}[2Jb\\nc");
         assert_eq!(escape_controls("grün"), "grün");
         assert_eq!(escape_controls("\u{202e}gnp.exe"), "\\u{202e}gnp.exe");
+    }
+
+    #[test]
+    fn no_more_than_200_characters_are_repeated() {
+        let exact = "ü".repeat(200);
+        assert_eq!(shown(&exact), exact);
+        assert_eq!(shown(&"ü".repeat(1 << 20)), format!("{}…", "ü".repeat(199)));
+        assert_eq!(shown(&"\u{7}".repeat(201)), format!("{}…", "\\u{7}".repeat(199)));
+        assert_eq!(printable(Path::new(&exact)), exact);
+        let long = format!("/start/{}/end.ply", "ü".repeat(1000));
+        let cut = printable(Path::new(&long));
+        assert_eq!(cut.chars().count(), 200);
+        assert!(cut.starts_with("/start/ü") && cut.contains("ü…ü") && cut.ends_with("ü/end.ply"), "{cut}");
     }
 
     #[cfg(unix)]

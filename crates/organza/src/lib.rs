@@ -31,6 +31,7 @@ mod device;
 mod error;
 mod info;
 mod load;
+mod memory;
 mod normalize;
 pub mod orders;
 pub mod output;
@@ -45,7 +46,7 @@ pub mod statistics;
 pub mod truth;
 
 pub use device::{Agreement, Checked, DeviceChoice, KernelTime, ListedDevice, Passport, devices, passport};
-pub use error::{Error, escape_controls, printable};
+pub use error::{Error, escape_controls, printable, shown};
 pub use info::{FileInfo, info};
 pub use load::{Loaded, SplatCount, load};
 pub use render::{Explanation, Render, RenderOptions, Sets, explain, render};

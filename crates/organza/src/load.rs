@@ -12,6 +12,7 @@ use crate::plan::{ParticleSource, PlannedSampler, pass, samplers};
 use crate::scene::{Scene, SceneObject, Technique};
 use crate::statistics::{LightStatistics, ObjectStatistics};
 use crate::{CostRecord, Error, Progress, RenderOptions, normalize::normalize};
+pub(crate) use context::BYTES_PER_SPLAT;
 use context::Context;
 use convert::cost::Prediction;
 use files::Files;
@@ -247,7 +248,7 @@ impl<'a> Loading<'a> {
             }
             let own = Own::new(p, plan.source, &self.context(id, 0, 0))?;
             if own.is_none() {
-                let name = crate::escape_controls(&self.scene.objects[id].name);
+                let name = crate::shown(&self.scene.objects[id].name);
                 warnings.push(format!("object '{name}' has no particles: nothing of it was found"));
             }
             all.extend(own);
@@ -275,7 +276,7 @@ impl<'a> Loading<'a> {
             let of = own.iter().find(|o| o.object == id);
             let cloud = object::convert(&p, of, &self.context(id, used, made), warnings)?;
             if cloud.is_empty() {
-                warnings.push(format!("object '{}' has no splats", crate::escape_controls(&object.name)));
+                warnings.push(format!("object '{}' has no splats", crate::shown(&object.name)));
             }
             count.made = cloud.len() as u64;
             clouds.push(cloud);
@@ -288,13 +289,13 @@ impl<'a> Loading<'a> {
 /// the scene's own limit. Estimates count half, so that nothing is refused that would fit.
 fn check_total(scene: &Scene, options: &RenderOptions, held: u64, splats: &[SplatCount]) -> Result<(), Error> {
     let needed: u64 = splats.iter().map(|s| if s.exact { s.predicted } else { s.predicted / 2 }).sum();
-    let fits = options.max_memory.saturating_sub(held) / context::BYTES_PER_SPLAT;
+    let fits = options.max_memory.saturating_sub(held) / BYTES_PER_SPLAT;
     let limit = scene.render.max_points.map_or(fits, |asked| asked.min(fits));
     if needed <= limit {
         return Ok(());
     }
     let most = splats.iter().max_by_key(|s| s.predicted);
-    let named = most.map(|s| format!(", most of them '{}' with {}", crate::escape_controls(&s.object), s.predicted));
+    let named = most.map(|s| format!(", most of them '{}' with {}", crate::shown(&s.object), s.predicted));
     Err(Error::Limit {
         what: format!("the scene (before conversion{})", named.unwrap_or_default()),
         needed,

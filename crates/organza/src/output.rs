@@ -1,10 +1,12 @@
 //! Finished images → files, whole or not at all.
 
-mod atomic;
 mod exr_file;
 mod png_file;
+mod target;
+mod targets;
 
-pub use atomic::{check_target, write_atomically};
+pub use target::{Target, abandon};
+pub use targets::Targets;
 
 use crate::Error;
 use splat_core::Layers;
@@ -65,21 +67,21 @@ impl Format {
     }
 }
 
-/// Writes layers to `path` in the format of its extension. `half` stores the colours of an EXR file in 16 bits.
+/// Writes layers to a place in the format of its extension. `half` stores the colours of an EXR file in 16 bits.
 ///
 /// The file appears whole or not at all: it is made in memory, written under another name in the same folder, and
-/// renamed. NaN is never written.
+/// gets its own name last. NaN is never written.
 ///
 /// # Errors
 /// [`Error::Usage`] for an unknown extension, [`Error::Io`] and [`Error::Output`] for the file system; a file that was
 /// there before is then unchanged.
-pub fn write(layers: &Layers, metadata: &Metadata, path: &Path, half: bool) -> Result<WriteReport, Error> {
+pub fn write(layers: &Layers, metadata: &Metadata, target: &Target, half: bool) -> Result<WriteReport, Error> {
     let mut report = WriteReport::default();
-    let bytes = match Format::of_path(path)? {
+    let bytes = match Format::of_path(target.path())? {
         Format::Exr => exr_file::encode(layers, metadata, half, &mut report)?,
         Format::Png => png_file::encode(layers, metadata, &mut report)?,
     };
     report.bytes = bytes.len() as u64;
-    write_atomically(path, &bytes)?;
+    target.write(&bytes)?;
     Ok(report)
 }

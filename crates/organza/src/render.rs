@@ -2,15 +2,15 @@
 
 use crate::device::{DeviceChoice, Helper};
 use crate::load::files::Files;
-use crate::load::own::Own;
 use crate::load::{Loaded, SplatCount, light_statistics, load_measured};
+use crate::memory::{self, Memory};
 use crate::particles::{self, Checkpoint, Kept, average_bytes};
 use crate::plan::{Plan, pass, plan};
 use crate::points::{self, Drawing, shadow_error};
 use crate::scene::{Scene, Technique};
 use crate::statistics::Statistics;
 use crate::{CostRecord, Error, Layers, Progress, shadows};
-use splat_core::{Grid, LayerData, LayerSet, Material};
+use splat_core::{LayerData, Material};
 use std::path::PathBuf;
 
 /// What a render may take and how it treats doubtful input.
@@ -80,9 +80,9 @@ pub struct Explanation {
     pub plan: Plan,
     /// What loading cost.
     pub cost: CostRecord,
-    /// Bytes that rendering will take, with the inputs that particles are sampled from and without others, see
-    /// [`Explanation::plan`] for the passes that take them. Shadow maps
-    /// are estimated from the number of splats; each is held to the allowed memory when it is built.
+    /// Bytes that rendering will take at its peak, see [`Explanation::plan`] for the passes that take them. Shadow maps are
+    /// predicted from the sizes of their casters as a light sees them; together they are held to what is allowed when they are
+    /// built.
     pub memory: u64,
     /// Splats of every visible object, as predicted from its input and as made.
     pub splats: Vec<SplatCount>,
@@ -101,6 +101,7 @@ pub fn render(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Re
 }
 
 /// What the frames of an animation leave for the next.
+#[derive(Default)]
 pub(crate) struct Left {
     pub(crate) files: Files,
     pub(crate) sets: Kept,
@@ -129,13 +130,13 @@ pub(crate) fn render_keeping(
     let open = |path: &PathBuf| Checkpoint::open(path, scene, options, left.as_ref().map(|left| &left.sets));
     let mut checkpoint = options.checkpoint.as_ref().map(open).transpose()?;
     let helper = options.device.as_ref().map(Helper::open).transpose()?;
-    let (loaded, explanation) = match &left {
+    let (loaded, explanation, memory) = match &left {
         Some(left) => prepare(scene, options, progress, &left.files)?,
         None => prepare(scene, options, progress, &Files::default())?,
     };
-    let Explanation { plan, mut cost, mut warnings, memory, .. } = explanation;
+    let Explanation { plan, mut cost, mut warnings, .. } = explanation;
     if let Some(left) = left.as_deref_mut() {
-        left.fit(options.max_memory, memory);
+        left.fit(options.max_memory, memory.total());
     }
     let kept = left.map(|left| &mut left.sets);
     let drawing = Drawing { helper: helper.as_ref(), ..drawing(scene, &loaded, &plan, options, progress) };
@@ -206,7 +207,7 @@ pub(crate) fn drawing<'a>(
 /// # Errors
 /// As [`render`].
 pub fn explain(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Explanation, Error> {
-    prepare(scene, options, progress, &Files::default()).map(|(_, explanation)| explanation)
+    prepare(scene, options, progress, &Files::default()).map(|(_, explanation, _)| explanation)
 }
 
 fn prepare(
@@ -214,18 +215,20 @@ fn prepare(
     options: &RenderOptions,
     progress: &Progress,
     files: &Files,
-) -> Result<(Loaded, Explanation), Error> {
+) -> Result<(Loaded, Explanation, Memory), Error> {
     let mut cost = CostRecord::default();
-    check_memory("the image", image_bytes(scene), options.max_memory)?;
+    memory::check("the image", memory::image_bytes(scene), options.max_memory)?;
     check_samples(scene)?;
     let loaded = load_measured(scene, options, progress, files, &mut cost)?;
     let (plan, memory) = plan_loaded(scene, &loaded, options)?;
     let (splats, warnings) = (loaded.splats.clone(), loaded.warnings.clone());
-    Ok((loaded, Explanation { plan, cost, memory, splats, warnings }))
+    let inputs = cost.stages.iter().filter(|s| s.name == pass::READ).map(|s| s.bytes).sum();
+    let most = memory.total().max(memory::loading_bytes(&loaded, inputs));
+    Ok((loaded, Explanation { plan, cost, memory: most, splats, warnings }, memory))
 }
 
 /// The plan of a loaded scene, and the bytes that it takes.
-pub(crate) fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Result<(Plan, u64), Error> {
+pub(crate) fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Result<(Plan, Memory), Error> {
     check_samples(scene)?;
     let mut statistics = Statistics::of_cloud(&loaded.cloud, &loaded.materials, &loaded.objects, &loaded.footprints);
     statistics.lights = light_statistics(&loaded.lights, &loaded.casts);
@@ -241,17 +244,18 @@ pub(crate) fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOption
         statistics.colored_extinction |= materials.into_iter().any(unequal);
     }
     let mut plan = plan(&statistics);
-    let mut memory = image_bytes(scene) + splat_bytes(loaded, &scene.render.layers.set());
+    let mut average = 0;
     if plan.passes.iter().any(|p| p.name == pass::PARTICLES) {
         let size = scene.camera.size.map(|s| u64::from(s) * u64::from(scene.render.antialias));
-        memory += average_bytes(size, &scene.render.layers.set(), statistics.colored_extinction, options);
-        memory += own_bytes(loaded);
+        average = average_bytes(size, &scene.render.layers.set(), statistics.colored_extinction, options);
     }
-    check_memory("rendering", memory, options.max_memory)?;
+    let memory = Memory::new(scene, loaded, average);
+    memory::check("rendering", memory.total(), options.max_memory)?;
     // Shadow maps share what is left.
-    let tables = shadows::tables(&scene.render, loaded, &plan.shadow_maps, options.max_memory - memory);
+    let tables = shadows::tables(&scene.render, loaded, &plan.shadow_maps, options.max_memory - memory.total());
     plan.set_shadow_tables(tables.map_err(|(light, error)| shadow_error(light, &error))?);
-    memory += plan.shadow_tables.iter().flatten().map(|table| table.bytes).sum::<u64>();
+    let memory = memory.with_maps(plan.shadow_tables.iter().flatten());
+    memory::check("rendering", memory.total(), options.max_memory)?;
     Ok((plan, memory))
 }
 
@@ -268,50 +272,6 @@ fn check_samples(scene: &Scene) -> Result<(), Error> {
         limit,
         unit: "samples",
         hint: "use a smaller camera.size or render.antialias".into(),
-    })
-}
-
-/// Bytes of the accumulators and layers.
-fn image_bytes(scene: &Scene) -> u64 {
-    let pixels = scene.camera.size.iter().map(|s| u64::from(*s)).product::<u64>();
-    let samples = pixels * u64::from(scene.render.antialias).pow(2);
-    let channels = splat_core::shade::ChannelLayout::new(&scene.render.layers.set()).count() as u64;
-    // Accumulator and opaque image a sample: channels, up to three optical depths, where light is absorbed, ids.
-    4 * (samples * (2 * channels + 16) + pixels * (2 * channels + 10))
-}
-
-/// Bytes of what is made for each splat: its attributes, order, footprint, tile entries and values.
-fn splat_bytes(loaded: &Loaded, layers: &LayerSet) -> u64 {
-    let values = 4 * splat_core::shade::ChannelLayout::new(layers).count() as u64;
-    loaded.cloud.bytes() + loaded.cloud.len() as u64 * (8 + 64 + 8 + values)
-}
-
-/// Bytes of what particles are sampled from, files that objects share once, and of the tables for that.
-fn own_bytes(loaded: &Loaded) -> u64 {
-    let mut grids: Vec<*const Grid> = Vec::new();
-    let of = |own: &Own| {
-        let known = own.grid().is_some_and(|grid| {
-            let at = std::ptr::from_ref(grid);
-            let known = grids.contains(&at);
-            grids.push(at);
-            known
-        });
-        own.table_bytes() + if known { 0 } else { own.bytes() }
-    };
-    loaded.own.iter().map(of).sum()
-}
-
-fn check_memory(what: &str, needed: u64, limit: u64) -> Result<(), Error> {
-    if needed <= limit {
-        return Ok(());
-    }
-    Err(Error::Limit {
-        what: what.into(),
-        needed,
-        limit,
-        unit: "bytes",
-        hint: "use fewer lights or samples of lights, a larger spacing, a smaller image, or a larger --max-memory"
-            .into(),
     })
 }
 

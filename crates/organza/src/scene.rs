@@ -30,7 +30,7 @@ mod tree;
 
 pub use layer_choice::{LAYER_NAMES, LayerChoice};
 pub use lights::{LightSource, SceneLight};
-pub use load::{LoadOptions, MAX_SCENE_BYTES, MAX_SCENE_DEPTH, load, parse, schema};
+pub use load::{LoadOptions, MAX_SCENE_BYTES, MAX_SCENE_DEPTH, load, parse, read, schema};
 pub use model::{
     CloudSource, DensitySource, ImplicitSource, IsosurfaceSource, LevelSetSource, MediumShape, ParticlesSettings,
     PointsSettings, RectangleSource, RenderSettings, Scene, SceneMaterial, SceneObject, ShadowMapping, ShadowSettings,

@@ -1,7 +1,5 @@
 //! Frames of one scene, one after the other: what was sampled for one serves the next.
 
-use crate::load::files::Files;
-use crate::particles::Kept;
 use crate::render::{Left, render_keeping};
 use crate::scene::Scene;
 use crate::{Error, Progress, Render, RenderOptions};
@@ -44,6 +42,7 @@ use crate::{Error, Progress, Render, RenderOptions};
 /// let sampled = |r: &organza::Render| r.cost.stages.iter().any(|s| s.name == "sample");
 /// assert!(sampled(&first) && !sampled(&second));
 /// ```
+#[derive(Default)]
 pub struct Sequence {
     left: Left,
 }
@@ -51,7 +50,14 @@ pub struct Sequence {
 impl Sequence {
     /// Nothing drawn yet; `frames` are all that will be drawn.
     pub fn new(frames: &[Scene]) -> Self {
-        Self { left: Left { files: Files::default(), sets: Kept::new(frames) } }
+        let mut sequence = Self::default();
+        frames.iter().for_each(|frame| sequence.add(frame));
+        sequence
+    }
+
+    /// Also a frame that will be drawn: all are added before the first is drawn. Little is kept of it.
+    pub fn add(&mut self, frame: &Scene) {
+        self.left.sets.add(frame);
     }
 
     /// Draws one of the frames.

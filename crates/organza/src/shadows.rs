@@ -24,6 +24,8 @@ pub struct ShadowTable {
     pub entries: u64,
     /// Bytes that it takes while it is built.
     pub bytes: u64,
+    /// Bytes of the finished map among them.
+    pub map_bytes: u64,
     /// Transmittance at which lists stop.
     pub tolerance: f32,
     /// Bytes that it may take.
@@ -130,6 +132,7 @@ pub(crate) fn tables(
             limit: predicted.limit,
             entries: predicted.entries as u64,
             bytes: predicted.bytes,
+            map_bytes: predicted.map_bytes,
             tolerance,
             max_bytes: params.max_bytes,
         }))

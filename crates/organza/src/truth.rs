@@ -50,7 +50,7 @@ pub fn truth(
     for object in scene.objects.iter().filter(|o| o.visible) {
         match object::body(scene, object, options)? {
             Ok(body) => bodies.push(body),
-            Err(reason) => return Ok(Err(format!("object '{}': {reason}", crate::escape_controls(&object.name)))),
+            Err(reason) => return Ok(Err(format!("object '{}': {reason}", crate::shown(&object.name)))),
         }
     }
     let mut lights = Vec::new();

@@ -9,6 +9,7 @@ pub struct Progress {
     done: AtomicU64,
     total: AtomicU64,
     cancelled: AtomicBool,
+    heard: AtomicBool,
 }
 
 impl Progress {
@@ -28,7 +29,7 @@ impl Progress {
     /// [`Error::Cancelled`] after [`Progress::cancel`].
     pub fn tick(&self, n: u64) -> Result<(), Error> {
         self.done.fetch_add(n, Relaxed);
-        if self.cancelled.load(Relaxed) { Err(Error::Cancelled) } else { Ok(()) }
+        if self.is_cancelled() { Err(Error::Cancelled) } else { Ok(()) }
     }
 
     /// Asks the work to stop at its next tick.
@@ -39,11 +40,37 @@ impl Progress {
     /// Whether [`Progress::cancel`] was called: a loop that cannot fail leaves its work undone and its caller asks with
     /// [`Progress::tick`].
     pub fn is_cancelled(&self) -> bool {
-        self.cancelled.load(Relaxed)
+        let cancelled = self.cancelled.load(Relaxed);
+        if cancelled {
+            self.heard.store(true, Relaxed);
+        }
+        cancelled
+    }
+
+    /// Whether the work has noticed [`Progress::cancel`]: if not, it is where nothing is asked.
+    pub fn is_heard(&self) -> bool {
+        self.heard.load(Relaxed)
     }
 
     /// Units done and announced.
     pub fn read(&self) -> (u64, u64) {
         (self.done.load(Relaxed), self.total.load(Relaxed))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cancel_is_heard_by_whoever_asks() {
+        let asks: [fn(&Progress) -> bool; 2] = [|p| p.tick(1).is_err(), Progress::is_cancelled];
+        for ask in asks {
+            let progress = Progress::new();
+            assert!(!ask(&progress) && !progress.is_heard());
+            progress.cancel();
+            assert!(!progress.is_heard());
+            assert!(ask(&progress) && progress.is_heard());
+        }
     }
 }

@@ -31,6 +31,8 @@ pub struct Prediction {
     pub entries: f64,
     /// Bytes that the build takes at its peak.
     pub bytes: u64,
+    /// Bytes of the finished map among them.
+    pub map_bytes: u64,
 }
 
 /// What a build did.
@@ -66,7 +68,9 @@ pub(crate) fn predict(
     let lists = u64::from(kinds[SplatKind::Medium as usize] > 0) + u64::from(kinds[SplatKind::Surface as usize] > 0);
     let depth = 4.0 * u64::from(kinds[SplatKind::Opaque as usize] > 0) as f64;
     let directions = if octahedral { Octahedral::bytes(size[0] as u32) as f64 } else { 0.0 };
-    // Entries stand once with their cell, parted by ranges, and once in the lists.
-    let bytes = cells * (8.0 * lists as f64 + depth) + directions + entries * (2.0 * knot + 4.0);
-    Prediction { size: size.map(|n| n as u64), limit, entries, bytes: bytes.min(u64::MAX as f64) as u64 }
+    let map = cells * (8.0 * lists as f64 + depth) + directions + entries * knot;
+    // Before they stand in the lists, entries stand with their cells, parted by ranges.
+    let peak = map + entries * (knot + 4.0);
+    let [bytes, map_bytes] = [peak, map].map(|bytes| bytes.min(u64::MAX as f64) as u64);
+    Prediction { size: size.map(|n| n as u64), limit, entries, bytes, map_bytes }
 }

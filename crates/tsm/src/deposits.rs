@@ -12,6 +12,7 @@ use crate::{Error, Params, Prediction, ShadowMap};
 use rayon::prelude::*;
 use splat_core::{Cloud, Light, Material, Object, Progress, SplatKind};
 use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The deposits of one light's map, parted by cells: all of the map but its lists (Gunjee 2007, section 4.1, steps 1-2).
 ///
@@ -135,6 +136,8 @@ fn deposit_all<M: Mapping, const C: usize>(
     progress: &Progress,
 ) -> Result<Parted2<C>, Error> {
     let cloud = casters.cloud;
+    // Held to the limit while they are made: predictions may be half of it.
+    let made = AtomicU64::new(0);
     let chunks: Vec<(Parted<C>, Parted<C>)> = (0..cloud.len().div_ceil(CHUNK))
         .into_par_iter()
         .map_init(Scratch::default, |scratch, c| {
@@ -148,13 +151,13 @@ fn deposit_all<M: Mapping, const C: usize>(
                 deposit: Deposit { mapping, opaque, scratch },
                 chunk,
             });
+            let more = (scratch.media.len + scratch.surfaces.len) as u64;
+            check_memory::<C>(made.fetch_add(more, Ordering::Relaxed) + more, casters.params.max_bytes)?;
             Ok((Parted::new(&scratch.media, ranges), Parted::new(&scratch.surfaces, ranges)))
         })
         .collect::<Result<_, Error>>()?;
     let (media, surfaces) = chunks.into_iter().unzip();
-    let parts = [media, surfaces];
-    entries(&parts).into_iter().try_for_each(|entries| check_memory::<C>(entries, casters.params.max_bytes))?;
-    Ok(parts)
+    Ok([media, surfaces])
 }
 
 pub(crate) fn check_memory<const C: usize>(entries: u64, limit_bytes: u64) -> Result<(), Error> {

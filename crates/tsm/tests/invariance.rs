@@ -3,7 +3,7 @@
 use common::*;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Cloud, Light, LightShape, SplatKind, Transmittance};
-use tsm::{Error, MappingChoice, Params, Resolution, ShadowMap};
+use tsm::{Deposits, Error, MappingChoice, Params, Resolution, ShadowMap};
 
 mod common;
 
@@ -134,6 +134,23 @@ fn ts14_one_cell_works_and_a_huge_table_is_refused_with_its_bytes() {
         let refused = ShadowMap::build(&cloud, &[], &[], &light, &params(65_536 * 4)).unwrap_err();
         let Error::Memory { needed_bytes, limit_bytes, .. } = refused else { panic!("{refused}") };
         assert!(needed_bytes > limit_bytes && refused.to_string().contains(&needed_bytes.to_string()));
+    }
+}
+
+#[test]
+fn what_maps_cost_together_is_known_before_any_is_built_and_held_while_they_are() {
+    let cloud = mixed(20_000, DVec3::ZERO);
+    let (lights, params) = (lights(), Params::default());
+    let predicted = Deposits::predict(&cloud, &[], &[], lights.iter(), &params);
+    for (light, predicted) in lights.iter().zip(predicted) {
+        let (map, predicted) = (build(&cloud, light, &params), predicted.unwrap());
+        assert_eq!(map.prediction(), predicted);
+        let finished = map.counts().bytes;
+        assert!((finished..=3 * finished).contains(&(2 * predicted.map_bytes)), "{finished}, {predicted:?}");
+        // What deposits more than was predicted is held to the limit while it is made.
+        let entries = map.counts().entries;
+        let held = ShadowMap::build(&cloud, &[], &[], light, &Params { max_bytes: 10 * entries, ..params.clone() });
+        assert!(matches!(held, Err(Error::Memory { .. })));
     }
 }
 

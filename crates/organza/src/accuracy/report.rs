@@ -2,7 +2,7 @@
 
 use super::study::candidates;
 use super::{Options, Study, frontier, report_html, report_tables};
-use crate::output::{check_target, write_atomically};
+use crate::output::{Target, Targets};
 use crate::scene::Scene;
 use crate::{Error, printable};
 use std::path::{Path, PathBuf};
@@ -100,17 +100,15 @@ impl Report {
         report_html::page(self)
     }
 
-    /// The files that [`write()`] makes in a folder.
-    pub fn files(folder: &Path) -> [PathBuf; 3] {
-        ["accuracy.json", "accuracy.csv", "accuracy.html"].map(|name| folder.join(name))
-    }
-
-    /// Checks before any work that the files can be written.
+    /// Checks before any work that the files of [`write()`] can be written to a folder; none may be one of the `inputs`.
     ///
     /// # Errors
-    /// As [`check_target`].
-    pub fn check(folder: &Path, force: bool, inputs: &[PathBuf]) -> Result<(), Error> {
-        Self::files(folder).iter().try_for_each(|path| check_target(path, force, inputs))
+    /// As [`Targets::add`].
+    pub fn check(folder: &Path, force: bool, inputs: &[PathBuf]) -> Result<[Target; 3], Error> {
+        let mut targets = Targets::default();
+        targets.add_inputs(inputs);
+        let mut add = |name: &str| targets.add(&folder.join(name), force);
+        Ok([add("accuracy.json")?, add("accuracy.csv")?, add("accuracy.html")?])
     }
 }
 
@@ -118,12 +116,8 @@ impl Report {
 /// are made.
 ///
 /// # Errors
-/// [`Error::Io`], and [`Error::Internal`] if a picture cannot be encoded.
-pub fn write(report: &Report, folder: &Path) -> Result<[PathBuf; 3], Error> {
+/// As [`Target::write`], and [`Error::Internal`] if a picture cannot be encoded.
+pub fn write(report: &Report, targets: &[Target; 3]) -> Result<(), Error> {
     let contents = [report.json(), report.csv(), report.html()?];
-    let files = Report::files(folder);
-    for (path, text) in files.iter().zip(contents) {
-        write_atomically(path, text.as_bytes())?;
-    }
-    Ok(files)
+    targets.iter().zip(contents).try_for_each(|(target, text)| target.write(text.as_bytes()))
 }

@@ -5,11 +5,11 @@ use super::bar::with_bar;
 use super::console;
 use super::session::{in_folder, load_scene, path_text, processor_only, render_options, start_threads};
 use organza::accuracy::{self, Absent, Facts, Options, Outcome, Renderer, Report, Request, Study};
+use organza::output::Target;
 use organza::scene::Scene;
 use organza::{Error, Progress, printable};
 use serde_json::json;
 use std::fmt::Write;
-use std::path::PathBuf;
 
 /// Sweeps the knobs, judges, writes the report. Whatever can be refused is refused before any work.
 pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
@@ -20,7 +20,7 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
         accuracy::shrink(&mut scene, options.longest_side());
     }
     in_folder(&arguments.out, || {
-        Report::check(&arguments.out, arguments.force, &scene.files())?;
+        let targets = Report::check(&arguments.out, arguments.force, &scene.files())?;
         start_threads(arguments.scene.threads)?;
         let mut render = render_options(&arguments.scene);
         if arguments.scene.max_memory.is_none() {
@@ -39,8 +39,8 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
             })
         })?;
         let report = Report::new(&scene, options, studies, absent);
-        let files = accuracy::write(&report, &arguments.out)?;
-        console::out(&summary(&report, &files, arguments.scene.json))
+        accuracy::write(&report, &targets)?;
+        console::out(&summary(&report, &targets, arguments.scene.json))
     })
 }
 
@@ -65,9 +65,9 @@ fn particles(
     accuracy::random_study(&sweep, &points.limit, points.truth.clone(), options, progress, &mut draw).map(Ok)
 }
 
-fn summary(report: &Report, files: &[PathBuf], as_json: bool) -> String {
+fn summary(report: &Report, files: &[Target], as_json: bool) -> String {
     if as_json {
-        let files: Vec<String> = files.iter().map(|f| path_text(f)).collect();
+        let files: Vec<String> = files.iter().map(|f| path_text(f.path())).collect();
         let report: serde_json::Value = serde_json::from_str(&report.json()).unwrap_or_default();
         return format!("{:#}\n", json!({ "outputs": files, "report": report }));
     }
@@ -87,7 +87,7 @@ fn summary(report: &Report, files: &[PathBuf], as_json: bool) -> String {
         }
     }
     for file in files {
-        let _ = writeln!(text, "wrote {}", printable(file));
+        let _ = writeln!(text, "wrote {}", printable(file.path()));
     }
     text
 }

@@ -65,7 +65,7 @@ pub(super) struct SceneArguments {
     #[arg(long, value_enum, default_value_t = Backend::Cpu)]
     pub(super) backend: Backend,
     /// Part of the name of the GPU for --backend auto, ash or wgpu [default: the best, never a software driver]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = parse_device)]
     pub(super) device: Option<String>,
     /// The GPU composites the splats too; beauty then differs from the processor's by rounding, up to 1e-5
     #[arg(long)]
@@ -197,7 +197,7 @@ pub(super) struct DevicesArguments {
 #[derive(Debug, Args)]
 pub(super) struct PassportArguments {
     /// Part of the names of the devices [default: all, software drivers too]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = parse_device)]
     pub(super) device: Option<String>,
     /// Print one JSON document on stdout
     #[arg(long)]
@@ -252,6 +252,12 @@ fn parse_frames(text: &str) -> Result<Frames, String> {
 fn parse_size(text: &str) -> Result<[i64; 2], String> {
     let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     sides.ok_or_else(|| "expected WIDTHxHEIGHT, such as 960x540".into())
+}
+
+/// Part of the name of a device, which drivers give 256 bytes at most.
+fn parse_device(text: &str) -> Result<String, String> {
+    let fits = text.len() <= 200;
+    fits.then(|| text.to_owned()).ok_or_else(|| "expected a part of a device's name, of 200 bytes at most".into())
 }
 
 fn parse_finite(text: &str) -> Result<f64, String> {

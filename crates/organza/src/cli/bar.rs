@@ -1,5 +1,6 @@
 //! A progress bar on stderr when it is a terminal, and the interrupt.
 
+use super::console;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use organza::{Error, Progress};
 use std::io::IsTerminal;
@@ -10,7 +11,10 @@ use std::time::Duration;
 /// Time between two looks at the progress.
 const INTERVAL: Duration = Duration::from_millis(100);
 
-/// Runs `work` with a bar; an interrupt stops it at its next tick, a second one at once.
+/// Time that the work has to hear of an interrupt: where it asks for none so long, it is ended as by a second one.
+const PATIENCE: Duration = Duration::from_millis(1500);
+
+/// Runs `work` with a bar; an interrupt stops it at its next tick, or within two seconds, a second one at once.
 pub(super) fn with_bar<T>(work: impl FnOnce(&Progress) -> Result<T, Error>) -> Result<T, Error> {
     let progress = Arc::new(Progress::new());
     cancel_on_interrupt(&progress)?;
@@ -32,11 +36,25 @@ fn cancel_on_interrupt(progress: &Arc<Progress>) -> Result<(), Error> {
     let asked = AtomicBool::new(false);
     let handler = move || {
         if asked.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
+            end_at_once();
         }
         progress.cancel();
+        let progress = Arc::clone(&progress);
+        std::thread::spawn(move || {
+            std::thread::sleep(PATIENCE);
+            if !progress.is_heard() {
+                end_at_once();
+            }
+        });
     };
     ctrlc::set_handler(handler).map_err(|e| Error::Internal(format!("interrupt handler: {e}")))
+}
+
+/// Outputs are whole or not there at any time.
+fn end_at_once() -> ! {
+    console::note("error: interrupted\n");
+    organza::output::abandon();
+    std::process::exit(i32::from(Error::Cancelled.exit_code()))
 }
 
 fn watch(progress: &Progress, finished: &AtomicBool) {

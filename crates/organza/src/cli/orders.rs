@@ -16,19 +16,19 @@ pub(super) fn run(arguments: &OrdersArguments) -> Result<(), Error> {
         accuracy::shrink(&mut scene, orders::LONGEST_SIDE);
     }
     in_folder(&arguments.out, || {
-        OrdersReport::check(&arguments.out, arguments.force, &scene.files())?;
+        let targets = OrdersReport::check(&arguments.out, arguments.force, &scene.files())?;
         start_threads(arguments.scene.threads)?;
         let options = render_options(&arguments.scene);
         let comparison = with_bar(|progress| orders::compare(&scene, &options, progress))?;
         let report = OrdersReport::new(&scene, comparison)?;
-        let files = orders::write(&report, &arguments.out)?;
+        orders::write(&report, &targets)?;
         if arguments.scene.json {
-            let files: Vec<String> = files.iter().map(|f| path_text(f)).collect();
+            let files: Vec<String> = targets.iter().map(|f| path_text(f.path())).collect();
             let report: serde_json::Value = serde_json::from_str(&report.json()).unwrap_or_default();
             return console::out(&format!("{:#}\n", json!({ "outputs": files, "report": report })));
         }
         let mut text = report.text();
-        files.iter().for_each(|f| text += &format!("wrote {}\n", printable(f)));
+        targets.iter().for_each(|f| text += &format!("wrote {}\n", printable(f.path())));
         console::out(&text)
     })
 }

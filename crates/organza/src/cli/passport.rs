@@ -15,7 +15,7 @@ pub(super) fn run(arguments: &PassportArguments) -> Result<u8, Error> {
     let name = arguments.device.as_deref().unwrap_or_default();
     let passports = passport(name)?;
     if let (Some(name), true) = (&arguments.device, passports.is_empty()) {
-        let message = format!("--device {name}: there is no such device");
+        let message = format!("--device {}: there is no such device", organza::shown(name));
         return Err(Error::Gpu { message, hint: "`organza devices` lists what there is".into() });
     }
     console::out(&if arguments.json { document(&passports) } else { text(&passports) })?;

@@ -1,25 +1,21 @@
 //! `organza render`.
 
-use super::args::{Frames, RenderArguments};
+use super::args::RenderArguments;
 use super::bar::with_bar;
-use super::session::{load_frame, load_scene, path_text, render_options, start_threads};
+use super::jobs::{Jobs, Places};
+use super::session::{path_text, render_options, start_threads};
 use super::{console, report};
-use organza::output::{self, Format, Metadata, WriteReport, check_target, write_atomically};
+use organza::output::{self, Metadata, Target, WriteReport};
 use organza::scene::Scene;
 use organza::{Error, Progress, Render, RenderOptions, Sequence, Sets, printable};
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
-
-/// Least digits of a frame's number in a file name.
-const DIGITS: usize = 4;
+use std::path::Path;
 
 /// One picture and its files.
-struct Job {
+struct Job<'a> {
     frame: Option<u32>,
-    scene: Scene,
-    outputs: Vec<PathBuf>,
-    cost: Option<PathBuf>,
-    checkpoint: Option<PathBuf>,
+    scene: &'a Scene,
+    places: &'a Places,
 }
 
 /// What a finished picture has to say.
@@ -32,16 +28,14 @@ struct Done {
 
 /// Renders and writes, and gives the exit code. Whatever can be refused is refused before any work.
 pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
-    let jobs = jobs(arguments)?;
-    for job in &jobs {
-        job.check(arguments.force)?;
-    }
+    let jobs = Jobs::new(arguments)?;
+    let mut sequence = jobs.check()?;
     start_threads(arguments.scene.threads)?;
     let mut done: Vec<Done> = Vec::new();
-    let scenes: Vec<Scene> = jobs.iter().map(|job| job.scene.clone()).collect();
-    let mut sequence = arguments.frames.map(|_| Sequence::new(&scenes));
     let outcome = with_bar(|progress| {
-        for job in &jobs {
+        for frame in jobs.frames() {
+            let (scene, places) = (jobs.scene(frame)?, jobs.places(frame, Target::new)?);
+            let job = Job { frame, scene: &scene, places: &places };
             let one = job.run(arguments, sequence.as_mut(), progress)?;
             let interrupted = one.sets.is_some_and(|s| s.interrupted);
             done.push(one);
@@ -71,94 +65,23 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
     })
 }
 
-/// The pictures that are asked for, each with its scene.
-fn jobs(arguments: &RenderArguments) -> Result<Vec<Job>, Error> {
-    let outputs = outputs(arguments)?;
-    let scene = load_scene(&arguments.scene)?;
-    let RenderArguments { cost, checkpoint, .. } = arguments;
-    let Some(frames) = arguments.frames else {
-        return Ok(vec![Job { frame: None, scene, outputs, cost: cost.clone(), checkpoint: checkpoint.clone() }]);
-    };
-    let Some(count) = scene.frames else {
-        let message = format!("--frames: {} has no animation", printable(&scene.file));
-        return Err(Error::usage(message, "add the table [animation], see docs/scene.md"));
-    };
-    let (first, last) = match frames {
-        Frames::All => (0, count - 1),
-        Frames::Range(first, last) => (first, last),
-    };
-    if last >= count {
-        let message = format!("--frames={first}-{last}: the frames of this scene are 0 to {}", count - 1);
-        return Err(Error::usage(message, ""));
-    }
-    let digits = DIGITS.max(last.to_string().len());
-    let job = |frame: u32| {
-        let name = |path: &PathBuf| numbered(path, frame, digits);
-        Ok(Job {
-            frame: Some(frame),
-            scene: load_frame(&arguments.scene, Some(frame))?,
-            outputs: outputs.iter().map(name).collect(),
-            cost: cost.as_ref().map(name),
-            checkpoint: checkpoint.as_ref().map(name),
-        })
-    };
-    (first..=last).map(job).collect()
-}
-
-/// `picture.exr` → `picture.0007.exr`.
-fn numbered(path: &Path, frame: u32, digits: usize) -> PathBuf {
-    let number = format!("{frame:0digits$}");
-    match path.extension() {
-        Some(extension) => path.with_extension(number).with_added_extension(extension),
-        None => path.with_added_extension(number),
-    }
-}
-
-/// The outputs, none twice; the scene's name with `.exr` if none was named.
-fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Error> {
-    let mut outputs = arguments.output.clone();
-    if outputs.is_empty() {
-        let stem = arguments.scene.scene.file_stem().unwrap_or("picture".as_ref());
-        outputs.push(Path::new(stem).with_added_extension("exr"));
-    }
-    for (i, path) in outputs.iter().enumerate() {
-        Format::of_path(path)?;
-        let others = [&arguments.cost, &arguments.checkpoint];
-        if outputs[..i].contains(path) || others.iter().any(|other| other.as_ref() == Some(path)) {
-            return Err(Error::usage(format!("{}: this output is named twice", printable(path)), ""));
-        }
-    }
-    Ok(outputs)
-}
-
-impl Job {
-    fn check(&self, force: bool) -> Result<(), Error> {
-        let inputs = self.scene.files();
-        for path in self.outputs.iter().chain(&self.cost) {
-            check_target(path, force, &inputs)?;
-        }
-        match &self.checkpoint {
-            // One that is there is gone on from; the library refuses a file that is something else.
-            Some(path) => check_target(path, true, &inputs),
-            None => Ok(()),
-        }
-    }
-
+impl Job<'_> {
     fn run(
         &self,
         arguments: &RenderArguments,
         sequence: Option<&mut Sequence>,
         progress: &Progress,
     ) -> Result<Done, Error> {
-        let options = RenderOptions { checkpoint: self.checkpoint.clone(), ..render_options(&arguments.scene) };
+        let checkpoint = self.places.checkpoint.as_ref().map(|target| target.path().to_owned());
+        let options = RenderOptions { checkpoint, ..render_options(&arguments.scene) };
         let render = match sequence {
-            Some(sequence) => sequence.render(&self.scene, &options, progress)?,
-            None => organza::render(&self.scene, &options, progress)?,
+            Some(sequence) => sequence.render(self.scene, &options, progress)?,
+            None => organza::render(self.scene, &options, progress)?,
         };
         let mut warnings = render.warnings.clone();
         let written = self.write_outputs(&render, arguments.half, &mut warnings)?;
-        if let Some(path) = &self.cost {
-            write_atomically(path, format!("{:#}\n", report::cost_json(&render.cost)).as_bytes())?;
+        if let Some(target) = &self.places.cost {
+            target.write(format!("{:#}\n", report::cost_json(&render.cost)).as_bytes())?;
         }
         let (text, json) = (self.text(&render, &written), self.json(&render, &written));
         Ok(Done { text, json, warnings, sets: render.sets })
@@ -182,9 +105,10 @@ impl Job {
         warnings: &mut Vec<String>,
     ) -> Result<Vec<(&Path, WriteReport)>, Error> {
         let metadata = self.metadata(render);
-        let mut written = Vec::with_capacity(self.outputs.len());
-        for path in &self.outputs {
-            let report = output::write(&render.layers, &metadata, path, half)?;
+        let mut written = Vec::with_capacity(self.places.outputs.len());
+        for target in &self.places.outputs {
+            let path = target.path();
+            let report = output::write(&render.layers, &metadata, target, half)?;
             if report.clamped > 0 {
                 warnings.push(format!(
                     "{}: {} values were cut to the format's largest",
@@ -196,7 +120,7 @@ impl Job {
                 let count = report.not_a_number;
                 warnings.push(format!("{}: {count} values were not numbers; this is a bug", printable(path)));
             }
-            written.push((path.as_path(), report));
+            written.push((path, report));
         }
         Ok(written)
     }
@@ -240,26 +164,13 @@ impl Job {
 }
 
 /// Of one picture its own account, of frames a list of them.
-fn summary(jobs: &[Job], done: &[Done], arguments: &RenderArguments) -> String {
+fn summary(jobs: &Jobs<'_>, done: &[Done], arguments: &RenderArguments) -> String {
     if !arguments.scene.json {
         return done.iter().map(|d| d.text.as_str()).collect();
     }
-    let still = jobs.iter().all(|job| job.frame.is_none());
     let mut documents = done.iter().map(|d| &d.json);
-    match (still, documents.next()) {
+    match (jobs.is_still(), documents.next()) {
         (true, Some(document)) => format!("{document:#}\n"),
         _ => format!("{:#}\n", json!({ "frames": done.iter().map(|d| &d.json).collect::<Vec<_>>() })),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn frames_have_a_number_before_the_extension() {
-        assert_eq!(numbered("a/b.exr".as_ref(), 7, 4), Path::new("a/b.0007.exr"));
-        assert_eq!(numbered("a.b.png".as_ref(), 12345, 5), Path::new("a.b.12345.png"));
-        assert_eq!(numbered("sums".as_ref(), 0, 4), Path::new("sums.0000"));
     }
 }

@@ -8,14 +8,19 @@ use std::path::Path;
 
 /// Loads the scene with the options of the command line.
 pub(super) fn load_scene(arguments: &SceneArguments) -> Result<Scene, Error> {
-    load_frame(arguments, None)
+    parse_scene(arguments, &read_scene(arguments)?, None)
 }
 
-/// [`load_scene`] at a frame of its animation.
-pub(super) fn load_frame(arguments: &SceneArguments, frame: Option<u32>) -> Result<Scene, Error> {
+/// The bytes of the scene's file.
+pub(super) fn read_scene(arguments: &SceneArguments) -> Result<Vec<u8>, Error> {
     check_backend(arguments)?;
+    scene::read(&arguments.scene)
+}
+
+/// The scene of these bytes with the options of the command line, as it is written or at a frame of its animation.
+pub(super) fn parse_scene(arguments: &SceneArguments, bytes: &[u8], frame: Option<u32>) -> Result<Scene, Error> {
     let overrides = overrides(arguments)?;
-    scene::load(&arguments.scene, &LoadOptions { allow_path: arguments.allow_path, overrides, frame })
+    scene::parse(&arguments.scene, bytes, &LoadOptions { allow_path: arguments.allow_path, overrides, frame })
 }
 
 /// What the render may take and how it treats doubtful input.

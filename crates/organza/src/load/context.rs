@@ -10,7 +10,7 @@ use splat_core::{Progress, Shading};
 use std::path::Path;
 
 /// Bytes that a splat takes from its conversion to the finished picture, at most.
-pub(super) const BYTES_PER_SPLAT: u64 = 256;
+pub(crate) const BYTES_PER_SPLAT: u64 = 256;
 
 /// Largest spacing of raw points over their median: above it, leaves and wires would become petals.
 const LARGEST_SPACING: f64 = 1.7;

@@ -270,7 +270,7 @@ pub(crate) fn wrong_kind(path: &Path, expected: &str, hint: &str) -> Error {
 pub(crate) fn field(text: &str, object: &SceneObject) -> Result<ExpressionField, Error> {
     // The scene's check has parsed it already.
     ExpressionField::parse(text).map_err(|e| {
-        let what = format!("object '{}', expression", crate::escape_controls(&object.name));
+        let what = format!("object '{}', expression", crate::shown(&object.name));
         Error::input(what, e.to_string(), "variables are x, y and z")
     })
 }

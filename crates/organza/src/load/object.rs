@@ -234,7 +234,7 @@ fn medium(shape: &MediumShape, params: &SplatParams) -> Result<Cloud, ConvertErr
 pub(crate) fn refuse(error: &ConvertError) -> Error {
     match error {
         ConvertError::TooMany { object, what, needed, limit } => Error::Limit {
-            what: format!("object '{}'", crate::escape_controls(object)),
+            what: format!("object '{}'", crate::shown(object)),
             needed: *needed as u64,
             limit: *limit,
             unit: what,

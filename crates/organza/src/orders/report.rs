@@ -3,7 +3,7 @@
 use super::{Comparison, Ordered};
 use crate::accuracy::{Distance, Machine};
 use crate::accuracy::{data_uri, difference, escaped, png};
-use crate::output::{check_target, write_atomically};
+use crate::output::{Target, Targets};
 use crate::scene::Scene;
 use crate::{Error, printable};
 use reference::metrics::{Display, Image};
@@ -42,17 +42,15 @@ impl OrdersReport {
         })
     }
 
-    /// The files that [`write()`] makes in a folder.
-    pub fn files(folder: &Path) -> [PathBuf; 4] {
-        ["orders.json", "orders.csv", "orders.html", "orders.png"].map(|name| folder.join(name))
-    }
-
-    /// Checks before any work that the files can be written.
+    /// Checks before any work that the files of [`write()`] can be written to a folder; none may be one of the `inputs`.
     ///
     /// # Errors
-    /// As [`check_target`].
-    pub fn check(folder: &Path, force: bool, inputs: &[PathBuf]) -> Result<(), Error> {
-        Self::files(folder).iter().try_for_each(|path| check_target(path, force, inputs))
+    /// As [`Targets::add`].
+    pub fn check(folder: &Path, force: bool, inputs: &[PathBuf]) -> Result<[Target; 4], Error> {
+        let mut targets = Targets::default();
+        targets.add_inputs(inputs);
+        let mut add = |name: &str| targets.add(&folder.join(name), force);
+        Ok([add("orders.json")?, add("orders.csv")?, add("orders.html")?, add("orders.png")?])
     }
 
     fn rows(&self) -> impl Iterator<Item = (&Ordered, &Distance)> {
@@ -251,13 +249,9 @@ fn seeds(o: &Ordered) -> String {
 /// are made.
 ///
 /// # Errors
-/// [`Error::Io`], and [`Error::Internal`] if a picture cannot be encoded.
-pub fn write(report: &OrdersReport, folder: &Path) -> Result<[PathBuf; 4], Error> {
+/// As [`Target::write`], and [`Error::Internal`] if a picture cannot be encoded.
+pub fn write(report: &OrdersReport, targets: &[Target; 4]) -> Result<(), Error> {
     let contents =
         [report.json().into_bytes(), report.csv().into_bytes(), report.html()?.into_bytes(), report.contact_sheet()?];
-    let files = OrdersReport::files(folder);
-    for (path, bytes) in files.iter().zip(contents) {
-        write_atomically(path, &bytes)?;
-    }
-    Ok(files)
+    targets.iter().zip(contents).try_for_each(|(target, bytes)| target.write(&bytes))
 }

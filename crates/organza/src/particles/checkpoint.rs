@@ -5,7 +5,7 @@
 //! made of. The count of sets may therefore be raised later.
 
 use super::Kept;
-use crate::output::write_atomically;
+use crate::output::Target;
 use crate::scene::{RenderSettings, Scene, Technique};
 use crate::{Error, RenderOptions, printable};
 use pbsr::Ensemble;
@@ -23,7 +23,7 @@ const PATIENCE: u32 = 100;
 /// Where sums are kept, and those that were found there.
 #[derive(Debug)]
 pub(crate) struct Checkpoint {
-    path: PathBuf,
+    target: Target,
     tag: [u8; 32],
     found: Option<Ensemble>,
     written: Instant,
@@ -42,13 +42,15 @@ impl Checkpoint {
             let message = "only the technique `particles` is drawn in sets that a checkpoint can keep";
             return Err(Error::usage(message, "use --technique particles, or no --checkpoint"));
         }
+        // One that is there is replaced by what goes on from it.
+        let target = Target::new(path, true)?;
         let tag = tag(scene, options, kept)?;
         let found = match std::fs::read(path) {
             Ok(bytes) => Some(Ensemble::from_bytes(&bytes, &tag).map_err(|e| foreign(path, &e))?),
             Err(e) if e.kind() == io::ErrorKind::NotFound => None,
             Err(e) => return Err(Error::io(path, "cannot read the checkpoint", e)),
         };
-        Ok(Self { path: path.to_owned(), tag, found, written: Instant::now(), pause: INTERVAL })
+        Ok(Self { target, tag, found, written: Instant::now(), pause: INTERVAL })
     }
 
     /// The sums that were found, once.
@@ -64,7 +66,7 @@ impl Checkpoint {
     /// Writes the sums, whole or not at all.
     pub(super) fn write(&mut self, ensemble: &Ensemble) -> Result<(), Error> {
         let start = Instant::now();
-        write_atomically(&self.path, &ensemble.to_bytes(&self.tag))?;
+        self.target.write(&ensemble.to_bytes(&self.tag))?;
         self.written = Instant::now();
         self.pause = INTERVAL.max(PATIENCE * start.elapsed());
         Ok(())

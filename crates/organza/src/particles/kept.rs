@@ -3,25 +3,27 @@
 use super::parts::{Part, Particles, Source};
 use crate::plan::pass;
 use crate::points::Drawing;
-use crate::scene::{Scene, SceneObject};
+use crate::scene::{Scene, SceneObject, Technique};
 use crate::{CostRecord, Error};
 use pbsr::KeptSets;
 use splat_core::{Camera, Similarity};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Share of the allowed memory that kept sets may take.
 const SHARE: u64 = 4;
 
 /// One frame's view of the objects, in the scene's unit.
-#[derive(Debug)]
+#[derive(Debug, PartialEq)]
 struct View {
     /// With one pixel a sample.
     camera: Camera,
-    /// From each visible object to the world.
-    transforms: Vec<Option<Similarity>>,
+    /// From each visible object to the world; frames that agree on it share it.
+    transforms: Arc<[Option<Similarity>]>,
 }
 
 /// Kept sets of objects, and the frames that they are for.
+#[derive(Default)]
 pub(crate) struct Kept {
     views: Vec<View>,
     /// Bytes that the sets may take.
@@ -36,15 +38,21 @@ struct Entry {
 }
 
 impl Kept {
-    /// Nothing kept yet.
-    pub(crate) fn new(frames: &[Scene]) -> Self {
-        let view = |scene: &Scene| {
-            let mut camera = scene.camera;
-            camera.size = camera.size.map(|s| s.saturating_mul(scene.render.antialias));
-            let transforms = scene.objects.iter().map(|o| o.visible.then_some(o.transform)).collect();
-            View { camera, transforms }
-        };
-        Self { views: frames.iter().map(view).collect(), allowed: 0, of_object: BTreeMap::new() }
+    /// Keeps how a frame sees the objects, if it samples them.
+    pub(crate) fn add(&mut self, scene: &Scene) {
+        if scene.render.technique != Technique::Particles {
+            return;
+        }
+        let mut camera = scene.camera;
+        camera.size = camera.size.map(|s| s.saturating_mul(scene.render.antialias));
+        let mut view =
+            View { camera, transforms: scene.objects.iter().map(|o| o.visible.then_some(o.transform)).collect() };
+        match self.views.last() {
+            Some(last) if *last == view => return,
+            Some(last) if last.transforms == view.transforms => view.transforms = Arc::clone(&last.transforms),
+            _ => {}
+        }
+        self.views.push(view);
     }
 
     /// Allows a share of the memory, no more than is left beside `other` bytes.

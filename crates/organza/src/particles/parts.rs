@@ -205,7 +205,7 @@ impl Source<'_> {
 
     /// The object, ready to be drawn; `None`, with a warning, when nothing of it is found.
     pub(super) fn part(&self, warnings: &mut Vec<String>) -> Result<Option<Part<'_>>, Error> {
-        let name = || format!("object '{}'", crate::escape_controls(&self.name));
+        let name = || format!("object '{}'", crate::shown(&self.name));
         match self.sampler(warnings) {
             Ok(sampler) => Ok(Some(self.part_of(Particles::Sampled(sampler)))),
             Err(pbsr::Error::Empty { reason, .. }) => {
@@ -268,7 +268,7 @@ impl Source<'_> {
     /// Where the spheres of a Brownian motion count another area than there is.
     fn doubtful_area(&self, report: &BrownianReport) -> Option<String> {
         let more = report.area / report.area_by_lines - 1.0;
-        let (name, percent) = (crate::escape_controls(&self.name), 100.0 * more);
+        let (name, percent) = (crate::shown(&self.name), 100.0 * more);
         (more.abs() > MISCOUNTED).then(|| {
             format!(
                 "object '{name}': its Brownian motion counts {percent:+.0} % of area, and is that much too dense, for borders \
@@ -279,7 +279,7 @@ impl Source<'_> {
 
     /// What a survey of the surface could not settle.
     fn doubts(&self, report: &LineReport) -> Vec<String> {
-        let name = crate::escape_controls(&self.name);
+        let name = crate::shown(&self.name);
         let mut doubts = Vec::new();
         if report.broken > 0 {
             let what = format!(

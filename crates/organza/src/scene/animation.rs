@@ -65,7 +65,7 @@ pub(super) fn apply(document: &mut Document<'_>, frame: u32) -> Result<(), Error
 fn path_of(track: &RawTrack) -> Result<Vec<String>, String> {
     let path = split_path(&track.set)?;
     if path[0] == "animation" || path[0] == "version" {
-        return Err(format!("expected a value of the scene, found `{}`", path[0]));
+        return Err(format!("expected a value of the scene, found `{}`", crate::shown(&path[0])));
     }
     Ok(path)
 }

@@ -162,7 +162,7 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
         let at = at_objects.index(i);
         if let Some(first) = first_of.insert(object.name.clone(), i) {
             let first = at_objects.index(first).key("name").name();
-            let message = format!("duplicate object name `{}`, first at {first}", object.name);
+            let message = format!("duplicate object name `{}`, first at {first}", crate::shown(&object.name));
             return Err(at.key("name").error(message, "each object needs a name of its own"));
         }
         let material = find_material(&at, &at_materials(&at_objects), object.material.as_deref(), &materials)?;

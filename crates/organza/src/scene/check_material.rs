@@ -4,7 +4,7 @@ use super::SceneMaterial;
 use super::check::{At, LARGEST, SMALLEST};
 use super::de::suggest;
 use super::raw_object::{RawMaterial, RawShading, RawSurfaceOpacity};
-use crate::Error;
+use crate::{Error, shown};
 use splat_core::optics::{SurfaceOpacity, absorption_coefficient};
 use splat_core::{Material, Shading};
 use std::collections::BTreeMap;
@@ -44,14 +44,14 @@ pub(super) fn find_material(
     }
     let known: Vec<&str> = materials.iter().skip(1).map(|m| m.name.as_str()).collect();
     let hint = match (known.is_empty(), suggest(name, &known)) {
-        (true, _) => format!("add a table [material.{name}]"),
+        (true, _) => format!("add a table [material.{}]", shown(name)),
         (false, hint) => {
-            let near = known.iter().find(|k| hint == format!("did you mean `{k}`?"));
+            let near = known.iter().find(|k| hint == format!("did you mean `{}`?", shown(k)));
             let place = near.map(|k| format!(" It is defined at {}.", at_materials.key(k).name()));
             hint + &place.unwrap_or_default()
         }
     };
-    Err(at.key("material").error(format!("material `{name}` is not defined"), hint))
+    Err(at.key("material").error(format!("material `{}` is not defined", shown(name)), hint))
 }
 
 fn check_material(at: &At<'_>, name: &str, raw: &RawMaterial) -> Result<SceneMaterial, Error> {

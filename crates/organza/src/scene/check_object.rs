@@ -102,7 +102,7 @@ fn check_source(at: &At<'_>, raw: &RawObject, fallback: Option<f64>, paths: &Pat
     let found: Vec<&str> = SOURCES.into_iter().zip(present(raw)).filter(|(_, on)| *on).map(|(name, _)| name).collect();
     let &[source] = found.as_slice() else {
         let found = if found.is_empty() { "none".to_owned() } else { found.join(" and ") };
-        let message = format!("object `{}`: expected exactly one source, found {found}", raw.name);
+        let message = format!("object `{}`: expected exactly one source, found {found}", crate::shown(&raw.name));
         return Err(at.error(message, format!("sources are {}", SOURCES.join(", "))));
     };
     let at_source = at.key(source);
@@ -281,7 +281,8 @@ fn check_region(
         return Err(at.key("expression").error(message, ""));
     }
     ExpressionField::parse(expression).map_err(|e| {
-        let message = format!("`expression`, column {}: expected {}, found {}", e.column, e.expected, e.found);
+        let found = crate::shown(&e.found);
+        let message = format!("`expression`, column {}: expected {}, found {found}", e.column, e.expected);
         let hint = e.hint.strip_prefix("; ").unwrap_or("variables are x, y and z");
         at.key("expression").error_in_text(expression, e.column, message, hint)
     })?;

@@ -9,7 +9,7 @@ use super::{
     LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, RenderSettings, ShadowMapping, ShadowSettings,
     SurfaceSampler, Technique,
 };
-use crate::Error;
+use crate::{Error, shown};
 use splat_core::Direction;
 use splat_core::raster::Accumulation;
 
@@ -47,9 +47,9 @@ fn check_technique(at: &At<'_>, name: &str) -> Result<Technique, Error> {
         "particles" => Ok(Technique::Particles),
         _ => {
             let message = if LATER_TECHNIQUES.contains(&name) {
-                format!("`technique`: this version does not have \"{name}\"")
+                format!("`technique`: this version does not have \"{}\"", shown(name))
             } else {
-                format!("`technique`: expected \"auto\", \"points\" or \"particles\", found \"{name}\"")
+                format!("`technique`: expected \"auto\", \"points\" or \"particles\", found \"{}\"", shown(name))
             };
             Err(at.key("technique").error(message, "use \"auto\", \"points\" or \"particles\""))
         }
@@ -60,7 +60,7 @@ fn check_layers(at: &At<'_>, names: &[String], technique: Technique) -> Result<L
     let mut choice = LayerChoice::default();
     for (i, name) in names.iter().enumerate() {
         if !choice.add(name) {
-            return Err(at.index(i).error(format!("there is no layer `{name}`"), suggest(name, &LAYER_NAMES)));
+            return Err(at.index(i).error(format!("there is no layer `{}`", shown(name)), suggest(name, &LAYER_NAMES)));
         }
     }
     if technique != Technique::Particles && choice.names().any(|name| name == "std_error") {

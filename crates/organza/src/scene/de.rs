@@ -3,8 +3,9 @@
 //! An error is born without a place inside serde's generated code; the innermost value or key that it passes on its
 //! way out gives it one. A table with a key `kind` deserializes as the enum variant of that name.
 
-use super::tree::{Document, Entry, Node, Place, Value, shorten};
+use super::tree::{Document, Entry, Node, Place, Value};
 use crate::Error;
+use crate::shown;
 use serde::de::{self, DeserializeSeed, IntoDeserializer, Unexpected, Visitor};
 use std::fmt::{self, Display};
 
@@ -66,7 +67,7 @@ fn unexpected_in_words(found: Unexpected<'_>) -> String {
         Unexpected::Signed(i) => Value::Int(i).describe(),
         Unexpected::Unsigned(u) => format!("the number {u}"),
         Unexpected::Float(x) => Value::Float(x).describe(),
-        Unexpected::Str(s) => format!("the text \"{}\"", shorten(s)),
+        Unexpected::Str(s) => format!("the text \"{}\"", shown(s)),
         Unexpected::Unit | Unexpected::Option => "null".into(),
         Unexpected::Seq => "a list".into(),
         Unexpected::Map => "a table".into(),
@@ -82,10 +83,22 @@ pub(super) fn suggest(name: &str, known: &[&str]) -> String {
     let measured = known.iter().take_while(|_| name.len() <= 64).map(|k| (near(k), *k));
     let best = measured.min_by(|(a, _), (b, _)| nearer(a, b));
     match best {
-        Some(((distance, similarity), k)) if distance <= 2 || similarity > 0.8 => format!("did you mean `{k}`?"),
+        Some(((distance, similarity), k)) if distance <= 2 || similarity > 0.8 => {
+            format!("did you mean `{}`?", shown(k))
+        }
         _ if known.is_empty() => String::new(),
-        _ => format!("known here: {}", known.join(", ")),
+        _ => format!("known here: {}", shown_list(known)),
     }
+}
+
+/// Names with commas between them, as many as a message may hold.
+fn shown_list(names: &[&str]) -> String {
+    const MOST: usize = 50;
+    let mut list = names.iter().take(MOST).map(|name| shown(name)).collect::<Vec<_>>().join(", ");
+    if names.len() > MOST {
+        list += &format!(" and {} more", names.len() - MOST);
+    }
+    list
 }
 
 impl de::Error for DeError {
@@ -107,12 +120,12 @@ impl de::Error for DeError {
 
     fn unknown_variant(variant: &str, expected: &'static [&'static str]) -> Self {
         let list = expected.iter().map(|e| format!("\"{e}\"")).collect::<Vec<_>>().join(", ");
-        let message = format!("expected one of {list}, found \"{}\"", shorten(variant));
+        let message = format!("expected one of {list}, found \"{}\"", shown(variant));
         Self::new(message, suggest(variant, expected))
     }
 
     fn unknown_field(field: &str, expected: &'static [&'static str]) -> Self {
-        Self::new(format!("unknown key `{}`", shorten(field)), suggest(field, expected))
+        Self::new(format!("unknown key `{}`", shown(field)), suggest(field, expected))
     }
 
     fn missing_field(field: &'static str) -> Self {

@@ -36,7 +36,11 @@ pub fn load(file: &Path, options: &LoadOptions) -> Result<Scene, Error> {
     parse(file, &read(file)?, options)
 }
 
-fn read(file: &Path) -> Result<Vec<u8>, Error> {
+/// The bytes of a scene file, for [`parse`].
+///
+/// # Errors
+/// [`Error::Io`] for what cannot be read, or is no regular file.
+pub fn read(file: &Path) -> Result<Vec<u8>, Error> {
     let fail = |e| Error::io(file, "cannot read the scene", e);
     let meta = std::fs::metadata(file).map_err(fail)?;
     if !meta.is_file() {

@@ -5,7 +5,7 @@ use super::de::suggest;
 use super::read_toml::read_toml_value;
 use super::tree::{Document, Entry, Node, Place, Value};
 use crate::Error;
-use crate::error::escape_controls;
+use crate::shown;
 
 /// One change: a value at a path of keys.
 ///
@@ -29,7 +29,7 @@ impl Override {
     /// [`Error::Usage`] naming what is wrong.
     pub fn parse(text: &str) -> Result<Self, Error> {
         let bad = |message: String| {
-            let message = format!("--set {}: {message}", escape_controls(text));
+            let message = format!("--set {}: {message}", shown(text));
             Error::usage(message, "write PATH=VALUE, such as --set render.points.exact=true")
         };
         let (path, value) = text.split_once('=').ok_or_else(|| bad("expected PATH=VALUE, found no `=`".into()))?;
@@ -51,7 +51,7 @@ impl Override {
     /// # Errors
     /// [`Error::Usage`] if the value is not TOML.
     pub fn from_option(flag: String, path: &str, toml: &str) -> Result<Self, Error> {
-        let bad = |message: String| Error::usage(format!("{}: {message}", escape_controls(&flag)), "");
+        let bad = |message: String| Error::usage(format!("{}: {message}", shown(&flag)), "");
         let value = read_toml_value(toml).map_err(bad)?;
         Ok(Self { path: path.split('.').map(str::to_owned).collect(), value, flag })
     }
@@ -126,7 +126,12 @@ pub(super) fn set(root: &mut Node, path: &[String], value: Value, place: Place) 
                 let index = index_in_list(items, key)?;
                 &mut items[index]
             }
-            _ => return Err((format!("expected a table or a list before `{key}`, found {found}"), String::new())),
+            _ => {
+                return Err((
+                    format!("expected a table or a list before `{}`, found {found}", shown(key)),
+                    String::new(),
+                ));
+            }
         };
     }
     *node = Node { place, value };
@@ -141,7 +146,7 @@ fn index_in_list(items: &[Node], key: &str) -> Result<usize, (String, String)> {
     }
     let names: Vec<&str> = items.iter().map(|item| name_of(item).unwrap_or("")).collect();
     let position = names.iter().position(|name| *name == key);
-    position.ok_or_else(|| (format!("expected an index or a name, found `{key}`"), suggest(key, &names)))
+    position.ok_or_else(|| (format!("expected an index or a name, found `{}`", shown(key)), suggest(key, &names)))
 }
 
 fn name_of(node: &Node) -> Option<&str> {

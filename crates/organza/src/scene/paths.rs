@@ -1,8 +1,7 @@
 //! Paths of data: relative to the scene file, inside the scene's root folder unless allowed.
 
 use super::check::At;
-use crate::Error;
-use crate::error::printable;
+use crate::{Error, printable, shown};
 use std::path::{Component, Path, PathBuf};
 
 /// Where data may lie.
@@ -32,14 +31,16 @@ impl Paths {
     /// The path of a file named in the scene.
     pub(super) fn resolve(&self, at: &At<'_>, text: &str) -> Result<PathBuf, Error> {
         if text.is_empty() || text.contains('\0') {
-            return Err(at.error(format!("expected a path, found \"{text}\""), ""));
+            return Err(at.error(format!("expected a path, found \"{}\"", shown(text)), ""));
         }
         if text.contains("://") {
-            return Err(at.error(format!("expected a path, found the address \"{text}\""), "fetch the file first"));
+            return Err(
+                at.error(format!("expected a path, found the address \"{}\"", shown(text)), "fetch the file first")
+            );
         }
         let path = self.folder.join(text);
         let Some(root) = &self.root else { return Ok(path) };
-        let absolute = std::path::absolute(&path).map_err(|e| at.error(format!("\"{text}\": {e}"), ""))?;
+        let absolute = std::path::absolute(&path).map_err(|e| at.error(format!("\"{}\": {e}", shown(text)), ""))?;
         // A link that leads out is caught as well; a file that does not exist is reported when it is read.
         let real = |p: &Path| p.canonicalize().ok();
         let outside_by_link = match (real(&absolute), real(root)) {
@@ -47,7 +48,7 @@ impl Paths {
             _ => false,
         };
         if !without_dots(&absolute).starts_with(root) || outside_by_link {
-            let message = format!("\"{text}\" lies outside the scene's root folder {}", printable(root));
+            let message = format!("\"{}\" lies outside the scene's root folder {}", shown(text), printable(root));
             return Err(at.error(message, "allow it with --allow-path"));
         }
         Ok(path)

@@ -101,7 +101,7 @@ impl Reader<'_> {
             let key = self.string()?;
             if let Some(first) = seen.insert(key.clone(), start) {
                 let (line, column) = line_and_column(self.text, first);
-                let message = format!("duplicate key `{key}`, first at line {line}, column {column}");
+                let message = format!("duplicate key `{}`, first at line {line}, column {column}", crate::shown(&key));
                 return Err(error_at(self.file, self.text, start, message, "each key may stand once in its table"));
             }
             self.take(b':', "`:`")?;
@@ -175,7 +175,7 @@ impl Reader<'_> {
         }
         match text.parse::<f64>() {
             Ok(x) if x.is_finite() => Ok(Value::Float(x)),
-            _ => Err(self.error(start, format!("expected a finite number, found {}", super::tree::shorten(text)))),
+            _ => Err(self.error(start, format!("expected a finite number, found {}", crate::shown(text)))),
         }
     }
 

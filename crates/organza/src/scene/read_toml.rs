@@ -2,7 +2,7 @@
 
 use super::MAX_SCENE_DEPTH;
 use super::tree::{Entry, Node, Place, Value, error_at};
-use crate::Error;
+use crate::{Error, shown};
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 use toml_parser::lexer::TokenKind;
@@ -13,7 +13,7 @@ pub(super) fn read_toml(file: &Path, text: &str) -> Result<Node, Error> {
     let table = DeTable::parse(text).map_err(|e| {
         let byte = e.span().map_or(0, |s| s.start);
         let hint = if e.message().contains("duplicate") { "each key may stand once in its table" } else { "" };
-        error_at(file, text, byte, format!("not TOML: {}", e.message()), hint)
+        error_at(file, text, byte, format!("not TOML: {}", shown(e.message())), hint)
     })?;
     let reader = Reader { file, text };
     let place = table.span().start;
@@ -28,7 +28,7 @@ pub(super) fn read_toml_value(text: &str) -> Result<Value, String> {
         other => other.to_string(),
     };
     check_dotted_keys(file, text).map_err(message_of)?;
-    let value = DeValue::parse(text).map_err(|e| format!("not a TOML value: {}", e.message()))?;
+    let value = DeValue::parse(text).map_err(|e| format!("not a TOML value: {}", shown(e.message())))?;
     let node = Reader { file, text }.value(value.into_inner(), 0, 1).map_err(message_of)?;
     Ok(node.value)
 }
@@ -91,12 +91,16 @@ impl Reader<'_> {
             DeValue::Boolean(b) => Value::Bool(b),
             DeValue::Integer(i) => {
                 let parsed = i64::from_str_radix(i.as_str(), i.radix());
-                Value::Int(parsed.map_err(|_| wrong(format!("expected a 64-bit whole number, found {i}")))?)
+                Value::Int(
+                    parsed
+                        .map_err(|_| wrong(format!("expected a 64-bit whole number, found {}", shown(i.as_str()))))?,
+                )
             }
             DeValue::Float(x) => {
-                let parsed: f64 = x.as_str().parse().map_err(|_| wrong(format!("expected a number, found {x}")))?;
+                let parsed: f64 =
+                    x.as_str().parse().map_err(|_| wrong(format!("expected a number, found {}", shown(x.as_str()))))?;
                 if !parsed.is_finite() {
-                    return Err(wrong(format!("expected a finite number, found {x}")));
+                    return Err(wrong(format!("expected a finite number, found {}", shown(x.as_str()))));
                 }
                 Value::Float(parsed)
             }

@@ -1,6 +1,6 @@
 //! A value tree in which everything knows its place, the same for TOML, JSON and overrides.
 
-use crate::Error;
+use crate::{Error, shown};
 use std::path::Path;
 
 /// Where a value was written.
@@ -64,19 +64,11 @@ impl Value {
             Self::Bool(b) => b.to_string(),
             Self::Int(i) => format!("the number {i}"),
             Self::Float(x) => format!("the number {x}"),
-            Self::Text(t) => format!("the text \"{}\"", shorten(t)),
+            Self::Text(t) => format!("the text \"{}\"", shown(t)),
             Self::List(items) if items.len() == 1 => "a list of 1 value".into(),
             Self::List(items) => format!("a list of {} values", items.len()),
             Self::Table(_) => "a table".into(),
         }
-    }
-}
-
-/// The first 60 characters of a text.
-pub(super) fn shorten(text: &str) -> String {
-    match text.char_indices().nth(60) {
-        Some((end, _)) => format!("{}…", &text[..end]),
-        None => text.to_owned(),
     }
 }
 
@@ -108,7 +100,7 @@ impl Document<'_> {
         match place {
             Place::Byte(byte) => error_at(self.file, self.text, byte, message, hint),
             Place::Flag(index) => {
-                let message = format!("{}: {}", self.flags[index], message.into());
+                let message = format!("{}: {}", shown(&self.flags[index]), message.into());
                 let escape = |text: &str| crate::error::escape_controls(text).into_owned();
                 Error::usage(escape(&message), escape(&hint.into()))
             }
@@ -122,7 +114,7 @@ impl Document<'_> {
                 let (line, column) = line_and_column(self.text, byte);
                 format!("line {line}, column {column}")
             }
-            Place::Flag(index) => self.flags[index].clone(),
+            Place::Flag(index) => shown(&self.flags[index]),
         }
     }
 

@@ -1,0 +1,152 @@
+//! The pictures that `organza render` is asked for, checked before the first is drawn. Of a frame nothing is kept but what
+//! others need of it: an animation may have a million.
+
+use super::args::{Frames, RenderArguments};
+use super::session::{parse_scene, read_scene};
+use organza::output::{Format, Target, Targets};
+use organza::scene::Scene;
+use organza::{Error, Sequence, printable};
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+/// Least digits of a frame's number in a file name.
+const DIGITS: usize = 4;
+
+/// All pictures of a run.
+pub(super) struct Jobs<'a> {
+    arguments: &'a RenderArguments,
+    /// The scene's file, read once: what was checked is what is drawn.
+    bytes: Vec<u8>,
+    /// The scene as it is written.
+    still: Scene,
+    outputs: Vec<PathBuf>,
+    /// First and last frame.
+    frames: Option<[u32; 2]>,
+}
+
+/// Where one picture goes.
+pub(super) struct Places {
+    pub(super) outputs: Vec<Target>,
+    pub(super) cost: Option<Target>,
+    pub(super) checkpoint: Option<Target>,
+}
+
+impl<'a> Jobs<'a> {
+    /// Reads the scene.
+    pub(super) fn new(arguments: &'a RenderArguments) -> Result<Self, Error> {
+        let outputs = outputs(arguments)?;
+        let bytes = read_scene(&arguments.scene)?;
+        let still = parse_scene(&arguments.scene, &bytes, None)?;
+        let frames = arguments.frames.map(|frames| range(frames, &still)).transpose()?;
+        Ok(Self { arguments, bytes, still, outputs, frames })
+    }
+
+    /// The frames, or `None` alone for the scene as it is written.
+    pub(super) fn frames(&self) -> impl Iterator<Item = Option<u32>> + use<> {
+        let still = self.frames.is_none().then_some(None);
+        still.into_iter().chain(self.frames.into_iter().flat_map(|[first, last]| first..=last).map(Some))
+    }
+
+    /// Whether it is one picture without a number.
+    pub(super) fn is_still(&self) -> bool {
+        self.frames.is_none()
+    }
+
+    /// Checks scenes and outputs of all frames; gives what draws them where there are frames.
+    pub(super) fn check(&self) -> Result<Option<Sequence>, Error> {
+        let mut targets = Targets::default();
+        let mut sequence = Sequence::default();
+        for frame in self.frames() {
+            let scene = self.scene(frame)?;
+            targets.add_inputs(&scene.files());
+            sequence.add(&scene);
+        }
+        for frame in self.frames() {
+            self.places(frame, |path, replace| targets.add(path, replace))?;
+        }
+        Ok((!self.is_still()).then_some(sequence))
+    }
+
+    /// The scene at a frame.
+    pub(super) fn scene(&self, frame: Option<u32>) -> Result<Cow<'_, Scene>, Error> {
+        match frame {
+            Some(_) => parse_scene(&self.arguments.scene, &self.bytes, frame).map(Cow::Owned),
+            None => Ok(Cow::Borrowed(&self.still)),
+        }
+    }
+
+    /// Where the picture of a frame goes, each place made by `target` of a path and whether a file there may be replaced.
+    pub(super) fn places(
+        &self,
+        frame: Option<u32>,
+        mut target: impl FnMut(&Path, bool) -> Result<Target, Error>,
+    ) -> Result<Places, Error> {
+        let last = self.frames.map_or(0, |[_, last]| last);
+        let name = |path: &PathBuf| frame.map_or(path.clone(), |frame| numbered(path, frame, digits(last)));
+        let RenderArguments { cost, checkpoint, force, .. } = self.arguments;
+        Ok(Places {
+            outputs: self.outputs.iter().map(|path| target(&name(path), *force)).collect::<Result<_, _>>()?,
+            cost: cost.as_ref().map(|path| target(&name(path), *force)).transpose()?,
+            // One that is there is gone on from; the library refuses a file that is something else.
+            checkpoint: checkpoint.as_ref().map(|path| target(&name(path), true)).transpose()?,
+        })
+    }
+}
+
+fn range(frames: Frames, still: &Scene) -> Result<[u32; 2], Error> {
+    let Some(count) = still.frames else {
+        let message = format!("--frames: {} has no animation", printable(&still.file));
+        return Err(Error::usage(message, "add the table [animation], see docs/scene.md"));
+    };
+    let [first, last] = match frames {
+        Frames::All => [0, count - 1],
+        Frames::Range(first, last) => [first, last],
+    };
+    if last >= count {
+        let message = format!("--frames={first}-{last}: the frames of this scene are 0 to {}", count - 1);
+        return Err(Error::usage(message, ""));
+    }
+    Ok([first, last])
+}
+
+fn digits(last: u32) -> usize {
+    DIGITS.max(last.to_string().len())
+}
+
+/// `picture.exr` → `picture.0007.exr`.
+fn numbered(path: &Path, frame: u32, digits: usize) -> PathBuf {
+    let number = format!("{frame:0digits$}");
+    match path.extension() {
+        Some(extension) => path.with_extension(number).with_added_extension(extension),
+        None => path.with_added_extension(number),
+    }
+}
+
+/// The outputs, none twice; the scene's name with `.exr` if none was named.
+fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Error> {
+    let mut outputs = arguments.output.clone();
+    if outputs.is_empty() {
+        let stem = arguments.scene.scene.file_stem().unwrap_or("picture".as_ref());
+        outputs.push(Path::new(stem).with_added_extension("exr"));
+    }
+    for (i, path) in outputs.iter().enumerate() {
+        Format::of_path(path)?;
+        let others = [&arguments.cost, &arguments.checkpoint];
+        if outputs[..i].contains(path) || others.iter().any(|other| other.as_ref() == Some(path)) {
+            return Err(Error::usage(format!("{}: this output is named twice", printable(path)), ""));
+        }
+    }
+    Ok(outputs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_have_a_number_before_the_extension() {
+        assert_eq!(numbered("a/b.exr".as_ref(), 7, 4), Path::new("a/b.0007.exr"));
+        assert_eq!(numbered("a.b.png".as_ref(), 12345, 5), Path::new("a.b.12345.png"));
+        assert_eq!(numbered("sums".as_ref(), 0, 4), Path::new("sums.0000"));
+    }
+}

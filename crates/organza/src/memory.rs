@@ -1,0 +1,140 @@
+//! What a render takes at its peak, counted before it begins.
+
+use crate::load::own::Own;
+use crate::load::{BYTES_PER_SPLAT, Loaded};
+use crate::scene::Scene;
+use crate::{Error, ShadowTable};
+use glam::Vec3;
+use rayon::prelude::*;
+use splat_core::shade::ChannelLayout;
+use splat_core::{Camera, Cloud, DepthProfile, Grid, LayerSet};
+
+/// Bytes of a render by what takes them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Memory {
+    /// Accumulators and layers.
+    pub(crate) image: u64,
+    /// Splats, and what is made for each.
+    pub(crate) splats: u64,
+    /// Objects that particles are sampled from as they are.
+    pub(crate) own: u64,
+    /// Averaging sets of particles.
+    pub(crate) average: u64,
+    /// All shadow maps, the largest of them being built.
+    pub(crate) maps: u64,
+}
+
+impl Memory {
+    /// That of a loaded scene without shadow maps, `average` by its particles.
+    pub(crate) fn new(scene: &Scene, loaded: &Loaded, average: u64) -> Self {
+        let mut camera = loaded.camera;
+        camera.size = camera.size.map(|s| s.saturating_mul(scene.render.antialias));
+        Self {
+            image: image_bytes(scene),
+            splats: splat_bytes(loaded, &camera, &scene.render.layers.set()),
+            own: own_bytes(loaded),
+            average,
+            maps: 0,
+        }
+    }
+
+    /// The same with the shadow maps, which live at once: all finished, and what building one takes beside it.
+    pub(crate) fn with_maps<'a>(self, tables: impl Iterator<Item = &'a ShadowTable>) -> Self {
+        let (mut finished, mut building) = (0u64, 0);
+        for table in tables {
+            finished = finished.saturating_add(table.map_bytes);
+            building = building.max(table.bytes - table.map_bytes);
+        }
+        Self { maps: finished.saturating_add(building), ..self }
+    }
+
+    /// All of it.
+    pub(crate) fn total(&self) -> u64 {
+        [self.splats, self.own, self.average, self.maps].into_iter().fold(self.image, u64::saturating_add)
+    }
+}
+
+/// Bytes of the accumulators and layers.
+pub(crate) fn image_bytes(scene: &Scene) -> u64 {
+    let set = scene.render.layers.set();
+    let pixels = scene.camera.size.iter().map(|s| u64::from(*s)).product::<u64>();
+    let samples = pixels * u64::from(scene.render.antialias).pow(2);
+    let channels = 4 * ChannelLayout::new(&set).count() as u64;
+    let profile = if set.depth { size_of::<DepthProfile>() as u64 } else { 0 };
+    // Up to three optical depths, and an object.
+    let accumulated = channels + 4 * 3 + profile + 4;
+    // The opaque image and its depths, the accumulator, and a copy of it in tiles.
+    let sample = channels + 4 * 2 + 2 * accumulated;
+    samples * sample + pixels * (2 * channels + 4 * 10)
+}
+
+/// Bytes that loading takes, or asks for before it knows: while objects are made one cloud, the `inputs` that were read and two
+/// of each splat are there; before, each splat that was counted may take its most.
+pub(crate) fn loading_bytes(loaded: &Loaded, inputs: u64) -> u64 {
+    let counted: u64 = loaded.splats.iter().map(|s| s.predicted.max(s.made)).sum();
+    inputs.saturating_add((2 * loaded.cloud.bytes()).max(counted.saturating_mul(BYTES_PER_SPLAT)))
+}
+
+/// Bytes of what is made for each splat: its attributes, order, footprint, tile entries and values.
+fn splat_bytes(loaded: &Loaded, camera: &Camera, layers: &LayerSet) -> u64 {
+    let values = 4 * ChannelLayout::new(layers).count() as u64;
+    loaded.cloud.bytes() + loaded.cloud.len() as u64 * (8 + 64 + values) + tile_bytes(&loaded.cloud, camera)
+}
+
+/// Bytes of the lists of splats by tile: how many tiles a splat reaches depends on how near it is.
+fn tile_bytes(cloud: &Cloud, camera: &Camera) -> u64 {
+    /// Side of a tile, pixels.
+    const TILE: f32 = 32.0;
+    /// Splats that are listed, and counted, together.
+    const CHUNK: usize = 1 << 15;
+    let [columns, rows] = camera.size.map(|s| (s as f32 / TILE).ceil());
+    let (view, focal) = (camera.view_from_offset(cloud.origin), camera.focal_px() as f32);
+    let tiles = |(position, radius): (&Vec3, &f32)| {
+        let nearest = view.depth(*position) - radius;
+        let radius_px = if camera.is_orthographic() {
+            radius * focal
+        } else if nearest > 0.0 {
+            radius * focal / nearest
+        } else {
+            f32::INFINITY
+        };
+        // A footprint begins anywhere in a tile.
+        let side = 2.0 * radius_px / TILE + 1.0;
+        let behind = !camera.is_orthographic() && nearest + 2.0 * radius <= 0.0;
+        if behind { 0.0 } else { f64::from(side.min(columns) * side.min(rows)) }
+    };
+    let lists = cloud.position.par_chunks(CHUNK).zip(cloud.radius.par_chunks(CHUNK));
+    let entries: Vec<f64> = lists.map(|(p, r)| p.iter().zip(r).map(tiles).sum()).collect();
+    let starts = entries.len() as f64 * f64::from(columns * rows);
+    (4.0 * (entries.into_iter().sum::<f64>() + starts)) as u64
+}
+
+/// Bytes of what particles are sampled from, files that objects share once, and of the tables for that.
+fn own_bytes(loaded: &Loaded) -> u64 {
+    let mut grids: Vec<*const Grid> = Vec::new();
+    let of = |own: &Own| {
+        let known = own.grid().is_some_and(|grid| {
+            let at = std::ptr::from_ref(grid);
+            let known = grids.contains(&at);
+            grids.push(at);
+            known
+        });
+        own.table_bytes() + if known { 0 } else { own.bytes() }
+    };
+    loaded.own.iter().map(of).sum()
+}
+
+/// Refuses what needs more than the limit.
+pub(crate) fn check(what: &str, needed: u64, limit: u64) -> Result<(), Error> {
+    if needed <= limit {
+        return Ok(());
+    }
+    Err(Error::Limit {
+        what: what.into(),
+        needed,
+        limit,
+        unit: "bytes",
+        hint: "use fewer lights or samples of lights, a larger spacing, a smaller image, or a larger --max-memory"
+            .into(),
+    })
+}

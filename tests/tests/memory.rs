@@ -1,0 +1,145 @@
+//! `--max-memory` and what `explain` says bound what is resident, and a system that gives less is answered with exit code 5.
+#![cfg(target_os = "linux")]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use organza_tests::{Peak, Place, SMALL_SCENE, organza, run_measured};
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// Resident bytes of the program itself, its threads and what an allocator keeps of freed memory.
+const PROGRAM: u64 = 64 << 20;
+
+const FOG: &str = r#"[[object]]
+name = "fog"
+medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 0.5, spacing = SPACING }
+"#;
+
+fn fog(spacing: f64) -> String {
+    format!("{SMALL_SCENE}{}", FOG.replace("SPACING", &format!("{spacing:?}")))
+}
+
+fn command(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = organza();
+    command.current_dir(folder).args(arguments).args(["--threads", "2"]);
+    command
+}
+
+/// Bytes that `explain` says.
+#[track_caller]
+fn explained(folder: &Path, scene: &str, more: &[&str]) -> u64 {
+    let out = command(folder, &[&["explain", scene, "--json"], more].concat()).output().unwrap();
+    assert!(out.status.success(), "{scene}: {}", String::from_utf8_lossy(&out.stderr));
+    let document: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    document["memory_bytes"].as_u64().unwrap()
+}
+
+/// A render that may take so much.
+fn render_within(folder: &Path, scene: &str, bytes: u64, more: &[&str]) -> (Output, Peak) {
+    let bytes = bytes.to_string();
+    let picture = tempfile::tempdir().unwrap();
+    let picture = picture.path().join("p.exr");
+    let arguments = ["render", scene, "-o", picture.to_str().unwrap(), "--max-memory", &bytes];
+    run_measured(&mut command(folder, &[&arguments, more].concat()))
+}
+
+#[track_caller]
+fn stays_within(folder: &Path, scene: &str, more: &[&str]) {
+    let bytes = explained(folder, scene, more);
+    let (out, peak) = render_within(folder, scene, bytes, more);
+    assert!(out.status.success(), "{scene} within {bytes}: {}", String::from_utf8_lossy(&out.stderr));
+    let resident = peak.resident;
+    println!("{scene}: explained {bytes}, resident {resident}");
+    assert!(resident <= bytes + PROGRAM, "{scene}: explained {bytes} bytes, {resident} were resident");
+}
+
+#[test]
+fn every_scene_stays_within_what_explain_says() {
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
+    let mut names: Vec<String> =
+        std::fs::read_dir(&scenes).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.retain(|name| name.ends_with(".toml"));
+    names.sort();
+    assert!(names.len() > 10);
+    for name in names {
+        stays_within(&scenes, &name, &["--size", "96x54", "--repeat-level", "8"]);
+    }
+}
+
+#[test]
+fn shadow_maps_of_many_lights_are_counted_together() {
+    let light = |k: i32| format!("[[light]]\nkind = \"point\"\nposition = [{k}, 4, 1]\nintensity = [1, 1, 1]\n");
+    let lights = |n: i32| (0..n).map(light).collect::<String>() + "[render.points.shadow]\ncells = 128\n";
+    let place = Place::new(&format!("{}{}", fog(0.25), lights(1)));
+    place.write("many.toml", format!("{}{}", fog(0.25), lights(31)));
+    let (few, many) = (explained(place.folder(), "s.toml", &[]), explained(place.folder(), "many.toml", &[]));
+    assert!(many > few + 100_000_000, "{few}, {many}");
+    stays_within(place.folder(), "many.toml", &[]);
+    // Each would fit; together they do not, and that is known before any is built.
+    let (out, peak) = render_within(place.folder(), "many.toml", (few + many) / 2, &[]);
+    assert_eq!(out.status.code(), Some(5));
+    assert!(peak.resident < PROGRAM, "{} resident", peak.resident);
+}
+
+#[test]
+fn large_pictures_stay_within_what_explain_says() {
+    let place = Place::new(&fog(0.1));
+    stays_within(place.folder(), "s.toml", &["--size", "1500x1000"]);
+    stays_within(place.folder(), "s.toml", &["--size", "1200x800", "--layers", "effects,normal,shadow,depth,object"]);
+    let opaque = fog(0.1)
+        + "[[object]]\nname = \"board\"\nrectangle = { center = [0, 0, 0], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.05 }\n";
+    place.write("opaque.toml", opaque);
+    stays_within(place.folder(), "opaque.toml", &["--size", "1500x1000"]);
+}
+
+#[test]
+fn many_splats_stay_within_what_explain_says() {
+    let place = Place::new(&fog(0.02));
+    stays_within(place.folder(), "s.toml", &[]);
+    // Each reaches many tiles.
+    place.write("wide.toml", fog(0.05));
+    stays_within(place.folder(), "wide.toml", &["--size", "1800x1200"]);
+}
+
+#[test]
+fn less_memory_than_a_scene_needs_is_exit_5_and_never_an_abort() {
+    let place = Place::new(&fog(0.1));
+    for more in [vec![], vec!["--technique", "particles", "--repeat-level", "2"]] {
+        let arguments = [&["render", "s.toml", "--force", "--size", "1600x1000", "--threads", "1"], &more[..]].concat();
+        let (out, peak) = run_measured(organza().current_dir(place.folder()).args(&arguments));
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        for percent in [50, 75, 90] {
+            let kib = peak.address_space / 100 * percent / 1024;
+            let mut shell = Command::new("sh");
+            shell.current_dir(place.folder()).arg("-c").arg(format!("ulimit -v {kib}; exec \"$0\" \"$@\""));
+            let out = shell.arg(organza().get_program()).args(&arguments).output().unwrap();
+            let text = String::from_utf8_lossy(&out.stderr);
+            assert_eq!(out.status.code(), Some(5), "{percent} % of {}, {more:?}: {text}", peak.address_space);
+            assert!(text.contains("the limit is"), "{text}");
+        }
+    }
+}
+
+#[test]
+fn frames_that_wait_take_little_memory() {
+    let place = Place::new(&fog(0.25));
+    let track = "[[animation.track]]\nset = \"object.fog.transform.translate\"\n\
+                 keys = [{ frame = 0, value = [0, 0, 0] }, { frame = 9999, value = [1, 0, 0] }]\n";
+    place.write("s.toml", format!("{}[animation]\nframes = 10000\n{track}", fog(0.25)));
+    for technique in ["points", "particles"] {
+        let peak = |last: usize| {
+            // All frames are checked before the first is drawn; the last one is refused.
+            let name = format!("p.{last:04}.png");
+            place.write(&name, "old");
+            let frames = format!("--frames=0-{last}");
+            let arguments = ["render", "s.toml", "-o", "p.png", "--technique", technique, &frames];
+            let (out, peak) = run_measured(organza().current_dir(place.folder()).args(arguments));
+            assert_eq!(out.status.code(), Some(4), "{}", String::from_utf8_lossy(&out.stderr));
+            std::fs::remove_file(place.path(&name)).unwrap();
+            peak.resident
+        };
+        let (few, many) = (peak(100), peak(4100));
+        let each = many.saturating_sub(few) / 4000;
+        println!("{technique}: {each} bytes a frame");
+        assert!(each < 1024, "{technique}: {each} bytes a frame");
+    }
+}
