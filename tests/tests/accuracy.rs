@@ -110,7 +110,7 @@ fn run(offset: f64) -> Result<Study, Error> {
         Ok(frame(slab_image(n, offset, cut), 1e-3 * n * (2.0 - cut)))
     };
     let standard_error = vec![[1e-7; 3]; SIZE[0] * SIZE[1]];
-    let truth = Truth { method: "closed form".into(), image: exact_image(), standard_error };
+    let truth = Truth { method: "closed form".into(), image: exact_image(), standard_error, all_orders: None };
     study(&sweep(), Ok(truth), &OPTIONS, &Progress::new(), &mut draw)
 }
 
@@ -307,6 +307,11 @@ fn the_command_writes_three_files_or_none() {
     let skipped = technique["skipped"].as_array().unwrap();
     assert!(skipped.iter().any(|s| s["knob"] == "footprint table size"));
     let html = fs::read_to_string(folder.path().join("r/accuracy.html")).unwrap();
+    // The truth scatters once, and the report says what that leaves out: light goes between fog and ground.
+    let orders = &technique["truth"]["all_orders"];
+    let [one, all] = ["mean_of_one", "mean_of_all"].map(|key| orders[key].as_f64().unwrap());
+    assert!(all > 1.03 * one && orders["rmse"].as_f64().unwrap() > 0.0, "{orders}");
+    assert!(html.contains("from the truth of all orders it is"));
     let foreign = |text: &str| text.replace("http://www.w3.org/2000/svg", "").contains("http");
     assert!(!foreign(&html) && html.contains("data:image/png;base64,") && html.matches("<svg").count() >= 3);
     let mut names: Vec<_> = fs::read_dir(folder.path().join("r")).unwrap().map(|e| e.unwrap().file_name()).collect();

@@ -6,7 +6,7 @@
 mod write;
 
 use organza::scene::{self, Scene};
-use organza::truth::{Truth, truth};
+use organza::truth::{Truth, truth, truth_of_all_orders};
 use organza::{Progress, RenderOptions, render};
 use std::path::Path;
 
@@ -176,4 +176,36 @@ fn what_has_no_truth_is_named() {
     let ground = "rectangle = { center = [0, 0, -3], u = [0, 0, 8], v = [9, 0, 0], spacing = 0.05 }";
     let raw = mixed(folder.path(), &[[ground, "points = \"raw.xyz\""]]);
     assert!(traced(&raw).unwrap_err().contains("no truth by nature"));
+}
+
+/// What one order of scattering leaves out of a scene of 16² pixels under a sun from the eye.
+fn left_out(objects: &str) -> organza::truth::AllOrders {
+    let head = "version = 1\n[camera]\nposition = [0, 0, 5]\ntarget = [0, 0, 0]\northographic = 1.0\nsize = [16, 16]\n\
+                [[light]]\nkind = 'directional'\ndirection = [0, 0, -1]\nirradiance = [3, 3, 3]\n";
+    let text = head.to_owned() + objects;
+    let scene = scene::parse(Path::new("s.toml"), text.as_bytes(), &Default::default()).unwrap();
+    let all = truth_of_all_orders(&scene, &RenderOptions::default(), SAMPLES, &Progress::new()).unwrap().unwrap();
+    assert!(all.method.contains("all orders"));
+    traced(&scene).unwrap().beside(&all).unwrap()
+}
+
+#[test]
+fn truth_of_all_orders_adds_what_is_scattered_again_and_nothing_else() {
+    // Nothing lies where a plane's light goes: radiance ρE/π, whatever the orders.
+    let plane = "[material.grey]\ncolor = [0.5, 0.5, 0.5]\n[[object]]\nname = 'plane'\nmaterial = 'grey'\n\
+                 rectangle = { center = [0, 0, 0], u = [2, 0, 0], v = [0, 2, 0], spacing = 0.1 }\n";
+    let found = left_out(plane);
+    let exact = 1.5 / std::f64::consts::PI;
+    assert!(found.rmse < 1e-9 && found.mean.iter().all(|m| (m - exact).abs() < 1e-3), "{found:?}");
+    // A deep layer that absorbs nothing: once scattered, back along the sun, E/4π·(1 − e^−2τ)/2. As a half-space gives it all
+    // back, with E·H(1)²/8π (Chandrasekhar), H(1) = 2.908 for isotropic scattering; this one lets some through and out of its sides.
+    let layer = "[material.fog]\nshading = 'phase'\n[[object]]\nname = 'fog'\nmaterial = 'fog'\n\
+                 medium_box = { min = [-4, -4, -1], max = [4, 4, 0], extinction = 10.0, spacing = 0.5 }\n";
+    let found = left_out(layer);
+    let once = 3.0 / (8.0 * std::f64::consts::PI);
+    let most = once * 2.908f64.powi(2);
+    println!("{found:?}, once {once}, at most {most}");
+    assert!((found.mean[0] / once - 1.0).abs() < 0.02, "{found:?}, expected {once}");
+    assert!(found.mean[1] > 0.8 * most && found.mean[1] < 1.02 * most, "{found:?}, at most {most}");
+    assert!((found.rmse / (found.mean[1] - found.mean[0]) - 1.0).abs() < 0.2, "{found:?}");
 }

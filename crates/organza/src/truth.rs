@@ -1,7 +1,8 @@
 //! Physical truth of a scene: the same objects, materials and lights in the path tracer of `reference`, without splats.
 //!
 //! Light takes the paths that the `points` technique simulates: emission, one scattering or reflection, shadows that
-//! translucent things colour. What the scene asks otherwise than nature a path tracer can follow too (`reference::Liberty`):
+//! translucent things colour. [`truth_of_all_orders`] lets it go on as nature does, and [`Truth::beside`] says how much that
+//! is. What the scene asks otherwise than nature a path tracer can follow too (`reference::Liberty`):
 //! shadows that are turned off or weakened, and colours above 1, which scatter more light than arrives; the truth says so.
 //! What has no truth is named instead of being guessed at: raw points (nobody knows the surface that they sample), volumes
 //! shaded by their gradient, surfaces that scatter by a phase function.
@@ -13,7 +14,7 @@ mod volume;
 use crate::scene::{LightSource, Scene, SceneLight};
 use crate::{Error, Progress, RenderOptions};
 use object::Body;
-use reference::metrics::{Image, Linear};
+use reference::metrics::{Image, Linear, compare};
 use reference::{Environment, Liberty, PathRules, PathSettings, PixelSampling, path_trace};
 use std::f64::consts::PI;
 
@@ -26,9 +27,35 @@ pub struct Truth {
     pub image: Image<Linear>,
     /// Standard error of each pixel and channel, row by row from the top left.
     pub standard_error: Vec<[f64; 3]>,
+    /// What it leaves out, where that was asked for.
+    pub all_orders: Option<AllOrders>,
+}
+
+/// Light of all orders of scattering beside that of one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AllOrders {
+    /// RMSE of the truth of one order against that of all, noise of both included.
+    pub rmse: f64,
+    /// Root of the mean squared standard error of the truth of all orders.
+    pub rms_standard_error: f64,
+    /// Mean radiance of all pixels and channels with one order, and with all.
+    pub mean: [f64; 2],
 }
 
 impl Truth {
+    /// What this truth of one order of scattering leaves out beside that of `all`.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] for images of different sizes.
+    pub fn beside(&self, all: &Self) -> Result<AllOrders, Error> {
+        let errors = compare(&self.image, &all.image).map_err(|e| Error::Internal(e.to_string()))?;
+        let mean = |image: &Image<Linear>| {
+            image.pixels().iter().flatten().sum::<f64>() / (3 * image.pixels().len()).max(1) as f64
+        };
+        let mean = [mean(&self.image), mean(&all.image)];
+        Ok(AllOrders { rmse: errors.rmse, rms_standard_error: all.rms_standard_error(), mean })
+    }
+
     /// Root of the mean squared standard error: the RMSE that a perfect picture would show.
     pub fn rms_standard_error(&self) -> f64 {
         let n = (3 * self.standard_error.len()).max(1) as f64;
@@ -36,7 +63,8 @@ impl Truth {
     }
 }
 
-/// Path-traces a scene with so many samples a pixel; `Err` of the inner result says why the scene has no truth.
+/// Path-traces a scene with so many samples a pixel and one scattering or reflection; `Err` of the inner result says why the
+/// scene has no truth.
 ///
 /// # Errors
 /// As [`crate::load`].
@@ -44,6 +72,30 @@ pub fn truth(
     scene: &Scene,
     options: &RenderOptions,
     samples: u32,
+    progress: &Progress,
+) -> Result<Result<Truth, String>, Error> {
+    trace(scene, options, samples, Some(1), progress)
+}
+
+/// The same with light that is scattered and reflected any number of times. Emission and ambient light, which the scene
+/// adds to what is seen, light nothing here either.
+///
+/// # Errors
+/// As [`crate::load`].
+pub fn truth_of_all_orders(
+    scene: &Scene,
+    options: &RenderOptions,
+    samples: u32,
+    progress: &Progress,
+) -> Result<Result<Truth, String>, Error> {
+    trace(scene, options, samples, None, progress)
+}
+
+fn trace(
+    scene: &Scene,
+    options: &RenderOptions,
+    samples: u32,
+    max_bounces: Option<u32>,
     progress: &Progress,
 ) -> Result<Result<Truth, String>, Error> {
     let mut bodies = Vec::new();
@@ -72,7 +124,7 @@ pub fn truth(
     let settings = PathSettings {
         seed: scene.render.seed,
         samples: samples.max(2),
-        rules: PathRules { max_bounces: Some(1), lights_visible: false, emission_illuminates: false },
+        rules: PathRules { max_bounces, lights_visible: false, emission_illuminates: false },
         pixel: PixelSampling::Area,
         ..PathSettings::default()
     };
@@ -83,11 +135,12 @@ pub fn truth(
     let size = estimate.size.map(|s| s as usize);
     let image = Image::from_radiance(size, estimate.radiance.mean).map_err(|e| Error::Internal(e.to_string()))?;
     let method = format!(
-        "path tracing without splats, single scattering, {} samples a pixel{}",
+        "path tracing without splats, {}, {} samples a pixel{}",
+        if max_bounces.is_some() { "single scattering" } else { "all orders of scattering" },
         estimate.samples,
         liberties(scene, &traced)
     );
-    Ok(Ok(Truth { method, image, standard_error: estimate.radiance.standard_error }))
+    Ok(Ok(Truth { method, image, standard_error: estimate.radiance.standard_error, all_orders: None }))
 }
 
 /// What the scene asks otherwise than nature, in words.

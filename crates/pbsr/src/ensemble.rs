@@ -198,14 +198,13 @@ impl TileSums<'_> {
         }
     }
 
-    /// A hit of pixel `k` in some channels (bit c for channel c); returns their luminance. A normal goes by component, as
-    /// compositing by channel has it, and the shadow by green.
+    /// A hit of pixel `k` in some channels (bit c for channel c); returns their luminance. Normal and shadow are no
+    /// colours: both go by green.
     pub(crate) fn add_channels(&mut self, params: &EnsembleParams, k: usize, values: &[f32], mask: u32) -> f32 {
         let mut luminance = 0.0;
         let light = params.light_channels();
         for (at, value) in values.iter().enumerate() {
-            let triple = at < light || (params.normal && at < light + 3);
-            let channel = if triple { at % 3 } else { 1 };
+            let channel = if at < light { at % 3 } else { 1 };
             if mask >> channel & 1 == 0 {
                 continue;
             }

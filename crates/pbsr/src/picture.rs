@@ -116,14 +116,14 @@ impl Ensemble {
             pixel.beauty[c] = ((0..effects).map(|e| mean(3 * e + c)).sum::<f64>() + behind[c] * open[c]) as f32;
             pixel.alpha[c] = if solid.is_some() { 1.0 } else { (hits[c] / levels) as f32 };
         }
-        let seen = hits.map(|hits| hits.max(1.0));
+        let seen = hits[1].max(1.0);
         if self.params.normal {
             let first = self.params.light_channels();
-            pixel.normal = std::array::from_fn(|c| (self.sum(at, first + c) / seen[c]) as f32);
+            pixel.normal = std::array::from_fn(|c| (self.sum(at, first + c) / seen) as f32);
         }
         pixel.shadow = 1.0;
         if self.params.shadow && hits[1] > 0.0 {
-            pixel.shadow = (self.sum(at, self.params.channels() - 1) / seen[1]) as f32;
+            pixel.shadow = (self.sum(at, self.params.channels() - 1) / seen) as f32;
         }
         if let (Some(range), Some(depths)) = (self.params.depth_range, self.depths.get(at)) {
             let wall = solid.and(occluder).map(|o| o.depth[behind_it]);

@@ -141,9 +141,15 @@ fn pixel(input: &Input<'_>, splats: &[Option<Splat>], ids: &[u32], x: usize, y: 
     out
 }
 
-/// The wavelength that attenuates channel `c`: channels come in threes, a lone last one goes with green.
+/// The wavelength that attenuates channel `c`. One colour comes first, or three of nine channels and more; what is no colour,
+/// normal and shadow, goes with green.
 fn band(c: usize, channels: usize) -> usize {
-    if channels - c > channels % 3 { c % 3 } else { 1 }
+    let colored = match channels {
+        0..3 => 0,
+        3..9 => 3,
+        _ => 9,
+    };
+    if c < colored { c % 3 } else { 1 }
 }
 
 /// Nearest opaque surface: depth and blended values.

@@ -1,9 +1,21 @@
 //! Depth of what is translucent: where along a ray its light is absorbed.
 //!
 //! A ray meets splats one by one, yet a medium absorbs everywhere between them. A medium splat stands for a cell as thick
-//! as the spacing h of its lattice, so the optical depth C before depth z is taken as linear between knots
-//! (z_g, S + τ_g/2), S the sum before the splats at z_g and τ_g theirs, and it begins and ends half a cell outside. For
-//! a homogeneous slab that is exact. A surface is a step at its depth.
+//! as the spacing h of its lattice, so the part of its optical depth τ before a depth grows linearly from half a cell before
+//! its centre to half a cell behind. The optical depth C along the ray is taken as linear between knots, which are ends of
+//! cells. A surface is a step at its depth.
+//!
+//! A ray meets splats up to their radius beside it. Where a medium's face is slanted by g = dz/dρ these lie nearer and
+//! farther than the face, and the sum of τ rises over the kernel's width m times g, as that of a blurred face would. So each
+//! splat has a second weight a = τ·n (`narrow`, [`narrowing`]), whose sums over a lattice have no width but a cell's own.
+//! Neither sum is wrong where a medium goes on: there they agree. A piece between two knots lasts until Σa and Στ agree
+//! within [`AGREED`], which they do not in the midst of a face, and then
+//!
+//! - the first of a medium begins where its mean depth by a, μ, has it: at 2μ less its end, as C is linear;
+//! - the last two are one, which ends at 2μ less its beginning;
+//! - one alone has the mean μ and the variance of its a, so it is 2√(3·variance) long.
+//!
+//! For a homogeneous slab that is exact along the axes of its lattice, and within a tenth of h at 45°.
 //!
 //! The absorbed part has the density e^−C·dC. On a piece of length l where C grows by δ its share is e^−C(1 − e^−δ), its
 //! mean lies l·m(δ) behind the piece's beginning, and its variance is l²·v(δ):
@@ -17,9 +29,41 @@ const MEDIAN: f32 = std::f32::consts::LN_2;
 /// Growth of optical depth below which m and v are taken from their series, which err by less than 1e-7 there.
 const SERIES: f32 = 0.5;
 
+/// How far Σa and Στ of a piece may be apart, as a share of Στ. Less follows faces that are more slanted, more leaves
+/// shorter pieces where the extinction bends: at 0.1 the first depth of a smooth cloud suffers more than a slab's gains.
+const AGREED: f32 = 0.15;
+/// Cells after which a piece ends all the same: beside a medium, where kernels alone are met, the sums never agree.
+const MOST_CELLS: f32 = 10.0;
+/// Share of Στ below which Σa says nothing about where a piece lies.
+const TELLING: f32 = 0.5;
+
 /// Numbers that a device keeps of a profile.
 #[cfg(feature = "gpu")]
-pub(crate) const WORDS: usize = 9;
+pub(crate) const WORDS: usize = 21;
+
+/// n = n₀ + n₁·s of a footprint, s = ρ²/R²: τ·n of a lattice of splats has, along a ray through cells of `cell`·R, the sum of
+/// τ, and the mean of ρ² that the cells themselves have, (`cell`·R)²/6. `mean` and `square` are those of s and s² over the
+/// footprint.
+#[cfg(feature = "raster")]
+pub(crate) fn narrowing(mean: f64, square: f64, cell: f64) -> [f32; 2] {
+    let slope = (cell * cell / 6.0 - mean) / (square - mean * mean);
+    [(1.0 - slope * mean) as f32, slope as f32]
+}
+
+/// One splat on the ray of one pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DepthFragment {
+    /// View depth.
+    pub depth: f32,
+    /// How thick the splat is along the ray, 0 for a surface.
+    pub thickness: f32,
+    /// What its optical depth is multiplied with for where it counts; 1 where a ray meets no splats beside it.
+    pub narrow: f32,
+    /// Optical depth of all splats before it.
+    pub before: f32,
+    /// Optical depth of all splats with it.
+    pub after: f32,
+}
 
 /// Absorption along the ray of one pixel so far, front to back.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,15 +75,57 @@ pub struct DepthProfile {
     m2: f32,
     /// The last knot: its depth, and the optical depth before it.
     knot: [f32; 2],
-    /// Depth of the splats since, half of their thickness, and the optical depth before them.
-    open: Option<Open>,
+    medium: Medium,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Open {
-    depth: f32,
-    half: f32,
-    before: f32,
+/// What of a medium is no piece yet. Nothing of it has any optical depth where there is none.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Medium {
+    /// Depth of its first splat, from which moments are counted.
+    origin: f32,
+    /// Depth at which the current cell ends.
+    end: f32,
+    /// Depth at which the piece that is held back ends.
+    held_end: f32,
+    /// The last piece, held back for what follows may belong to it.
+    held: Sums,
+    /// Since that piece, up to `end`.
+    now: Sums,
+    /// Behind `end`.
+    next: Sums,
+}
+
+/// Sums over parts of splats.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Sums {
+    tau: f32,
+    /// Σa, and its first two moments in depth less `origin`.
+    weight: f32,
+    moment: f32,
+    square: f32,
+}
+
+impl Sums {
+    /// A part of optical depth `tau` that is `length` thick around `middle`.
+    fn add(&mut self, tau: f32, narrow: f32, middle: f32, length: f32) {
+        let weight = tau * narrow;
+        self.tau += tau;
+        self.weight += weight;
+        self.moment += weight * middle;
+        self.square += weight * (middle * middle + length * length * (1.0 / 12.0));
+    }
+
+    fn join(&mut self, other: Self) {
+        self.tau += other.tau;
+        self.weight += other.weight;
+        self.moment += other.moment;
+        self.square += other.square;
+    }
+
+    /// Mean depth, less `origin`, where the weights tell one.
+    fn mean(&self) -> Option<f32> {
+        (self.weight > TELLING * self.tau).then(|| self.moment / self.weight)
+    }
 }
 
 impl Default for DepthProfile {
@@ -50,34 +136,65 @@ impl Default for DepthProfile {
             mean: 0.0,
             m2: 0.0,
             knot: [f32::NEG_INFINITY, 0.0],
-            open: None,
+            medium: Medium::default(),
         }
     }
 }
 
 impl DepthProfile {
-    /// Adds a splat at view depth `depth` that is `thickness` thick, 0 for a surface; `before` and `after` are the optical
-    /// depths of all splats without and with it. A splat nearer than the one before counts as lying beside it: slices are
-    /// not sorted inside.
-    pub fn add(&mut self, depth: f32, thickness: f32, [before, after]: [f32; 2]) {
+    /// Adds a splat. One nearer than those before counts at its place within the current piece: slices are not sorted
+    /// inside.
+    pub fn add(&mut self, splat: &DepthFragment) {
+        let DepthFragment { depth, thickness, narrow, before, after } = *splat;
         if thickness <= 0.0 {
             self.close(before, depth);
             self.piece([depth, before]);
             self.piece([depth, after]);
             return;
         }
-        match self.open {
-            Some(open) if depth <= open.depth => {}
-            Some(open) if depth - open.depth <= open.half + 0.5 * thickness => {
-                self.piece([open.depth, 0.5 * (open.before + before)]);
-                self.open = Some(Open { depth, half: 0.5 * thickness, before });
-            }
-            _ => {
-                self.close(before, f32::INFINITY);
-                self.knot = [(depth - 0.5 * thickness).max(self.knot[0]), before];
-                self.open = Some(Open { depth, half: 0.5 * thickness, before });
-            }
+        let begin = depth - 0.5 * thickness;
+        if self.is_open() && begin >= self.medium.end + thickness {
+            self.close(before, f32::INFINITY);
         }
+        if !self.is_open() {
+            self.medium = Medium { origin: depth, end: depth + 0.5 * thickness, ..Medium::default() };
+        }
+        // The gap was less than a cell.
+        if begin >= self.medium.end {
+            self.cell(thickness, before);
+        }
+        let medium = &mut self.medium;
+        let (tau, middle) = (after - before, depth - medium.origin);
+        let share = ((medium.end - begin) / thickness).clamp(0.0, 1.0);
+        let rest = 1.0 - share;
+        medium.now.add(tau * share, narrow, middle - 0.5 * rest * thickness, share * thickness);
+        medium.next.add(tau * rest, narrow, middle + 0.5 * share * thickness, rest * thickness);
+    }
+
+    fn is_open(&self) -> bool {
+        self.medium.held.tau + self.medium.now.tau + self.medium.next.tau > 0.0
+    }
+
+    /// Ends the current cell of a medium, and the piece where its sums agree; `total` is the optical depth so far.
+    fn cell(&mut self, thickness: f32, total: f32) {
+        let Medium { origin, end, held_end, held, now, next } = self.medium;
+        let begin = if held.tau > 0.0 { held_end } else { origin - 0.5 * thickness };
+        let agree = (now.weight - now.tau).abs() <= AGREED * now.tau;
+        if now.tau > 0.0 && (agree || end - begin >= MOST_CELLS * thickness) {
+            let behind = now.tau + next.tau;
+            if held.tau > 0.0 {
+                self.piece([held_end, (total - behind).max(self.knot[1])]);
+            } else {
+                let twice = now.mean().map_or(begin, |mean| origin + (2.0 * mean - (end - origin)));
+                self.knot[0] = self.knot[0].max(twice.max(begin).min(end));
+            }
+            self.medium.held = now;
+            self.medium.held_end = end;
+            self.medium.now = Sums::default();
+        }
+        self.medium.now.join(next);
+        self.medium.next = Sums::default();
+        self.medium.end = end + thickness;
     }
 
     /// First, median, mean and standard deviation of the depth at which light is absorbed, +∞ where undefined; `total` is
@@ -95,29 +212,54 @@ impl DepthProfile {
         [self.first, self.median, self.mean, (self.m2 / absorbed).max(0.0).sqrt()]
     }
 
-    /// As a device keeps it: the largest number stands for infinity, no half thickness for no open splats.
+    /// As a device keeps it: the largest number stands for infinity.
     #[cfg(feature = "gpu")]
     pub(crate) fn words(&self) -> [f32; WORDS] {
-        let open = self.open.map_or([0.0; 3], |open| [open.depth, open.half, open.before]);
-        let [z, c] = self.knot;
-        let all = [self.first, self.median, self.mean, self.m2, z, c, open[0], open[1], open[2]];
-        all.map(|v| v.clamp(f32::MIN, f32::MAX))
+        let (Medium { origin, end, held_end, held, now, next }, [z, c]) = (self.medium, self.knot);
+        let mut words = [0.0; WORDS];
+        words[..9].copy_from_slice(&[self.first, self.median, self.mean, self.m2, z, c, origin, end, held_end]);
+        for (to, sums) in words[9..].chunks_exact_mut(4).zip([held, now, next]) {
+            to.copy_from_slice(&[sums.tau, sums.weight, sums.moment, sums.square]);
+        }
+        words.map(|v| v.clamp(f32::MIN, f32::MAX))
     }
 
     /// From what a device kept.
     #[cfg(feature = "gpu")]
-    pub(crate) fn of_words([first, median, mean, m2, z, c, depth, half, before]: [f32; WORDS]) -> Self {
+    pub(crate) fn of_words(words: [f32; WORDS]) -> Self {
         let far = |v: f32| if v.abs() < f32::MAX { v } else { v.signum() * f32::INFINITY };
-        let open = (half > 0.0).then_some(Open { depth, half, before });
-        Self { first: far(first), median: far(median), mean, m2, knot: [far(z), c], open }
+        let [first, median, mean, m2, z, c, origin, end, held_end, ..] = words;
+        let sums = |k: usize| Sums { tau: words[k], weight: words[k + 1], moment: words[k + 2], square: words[k + 3] };
+        let medium = Medium { origin, end, held_end, held: sums(9), now: sums(13), next: sums(17) };
+        Self { first: far(first), median: far(median), mean, m2, knot: [far(z), c], medium }
     }
 
     /// Ends the medium so far, whose optical depth is `total`, not behind `limit`.
     fn close(&mut self, total: f32, limit: f32) {
-        if let Some(open) = self.open.take() {
-            self.piece([open.depth.min(limit), 0.5 * (open.before + total)]);
-            self.piece([(open.depth + open.half).min(limit), total]);
+        if !self.is_open() {
+            return;
         }
+        let Medium { origin, end, held_end, held, mut now, next } = std::mem::take(&mut self.medium);
+        now.join(next);
+        now.join(held);
+        // No cell reaches beyond these, whatever a few odd weights say.
+        let first_half = end - origin;
+        let (least, most) = if held.tau > 0.0 {
+            (self.knot[0], end + (end - held_end))
+        } else {
+            (origin - first_half, end + 2.0 * first_half)
+        };
+        let (begin, to) = match now.mean() {
+            Some(mean) if held.tau > 0.0 => (least, origin + (2.0 * mean - (least - origin))),
+            Some(mean) => {
+                let half = (3.0 * (now.square / now.weight - mean * mean).max(0.0)).sqrt();
+                (origin + (mean - half), origin + (mean + half))
+            }
+            None => (least, end),
+        };
+        self.knot[0] = self.knot[0].max(begin.max(least).min(limit));
+        let to = to.min(most);
+        self.piece([to.min(limit), total]);
     }
 
     /// A piece from the last knot to the knot `to`.
@@ -164,11 +306,15 @@ fn moments(delta: f32) -> (f32, f32) {
 mod tests {
     use super::*;
 
+    fn at(depth: f32, thickness: f32, [before, after]: [f32; 2]) -> DepthFragment {
+        DepthFragment { depth, thickness, narrow: 1.0, before, after }
+    }
+
     /// Splats at `depths`, all of optical depth `tau` and thickness `thickness`.
     fn profile(depths: &[f32], thickness: f32, tau: f32) -> (DepthProfile, f32) {
         let mut profile = DepthProfile::default();
         for (i, depth) in depths.iter().enumerate() {
-            profile.add(*depth, thickness, [i as f32 * tau, (i + 1) as f32 * tau]);
+            profile.add(&at(*depth, thickness, [i as f32 * tau, (i + 1) as f32 * tau]));
         }
         (profile, depths.len() as f32 * tau)
     }
@@ -210,8 +356,8 @@ mod tests {
         let (near, far) = (0.25f32, 1.5f32);
         let (profile, total) = {
             let mut p = DepthProfile::default();
-            p.add(3.0, 0.0, [0.0, near]);
-            p.add(4.0, 0.0, [near, near + far]);
+            p.add(&at(3.0, 0.0, [0.0, near]));
+            p.add(&at(4.0, 0.0, [near, near + far]));
             (p, near + far)
         };
         let (a, b) = (-(-f64::from(near)).exp_m1(), (-f64::from(near)).exp() - (-f64::from(total)).exp());
@@ -227,12 +373,12 @@ mod tests {
     #[test]
     fn gaps_between_media_stay_empty_and_walls_cut_cells() {
         let mut two = DepthProfile::default();
-        two.add(1.0, 0.2, [0.0, 0.5]);
-        two.add(5.0, 0.2, [0.5, 1.0]);
+        two.add(&at(1.0, 0.2, [0.0, 0.5]));
+        two.add(&at(5.0, 0.2, [0.5, 1.0]));
         let [_, median, ..] = two.depths(1.0, None);
         assert!((median - (4.9 + 0.2 * (std::f32::consts::LN_2 - 0.5) / 0.5)).abs() < 1e-6, "{median}");
         let mut cut = DepthProfile::default();
-        cut.add(1.0, 0.2, [0.0, 3.0]);
+        cut.add(&at(1.0, 0.2, [0.0, 3.0]));
         let [first, median, mean, _] = cut.depths(3.0, Some(1.0));
         assert!(first >= 0.9 && median <= 1.0 && mean <= 1.0, "{first} {median} {mean}");
     }

@@ -55,6 +55,24 @@ impl Footprint {
         (-q * s).exp() - (-q).exp() * (1.0 + x + 0.5 * x * x)
     }
 
+    /// ∫sⁿ·w ds over \[0, 1\] for n = 0, 1, 2, from w = e^−q·Σ_{k≥3} (qt)^k/k!, t = 1 − s, whose terms are all positive.
+    #[cfg(feature = "raster")]
+    pub(crate) fn moments(&self) -> [f64; 3] {
+        let q = f64::from(self.sharpness());
+        let mut sums = [0.0; 3];
+        // e^−q·q^k/(k + 1)!
+        let mut term = (-q).exp() / q;
+        for k in 0..256 {
+            let k = f64::from(k);
+            term *= q / (k + 1.0);
+            if k > 2.0 {
+                let first = term / (k + 2.0);
+                [term, first, 2.0 * first / (k + 3.0)].iter().zip(&mut sums).for_each(|(add, sum)| *sum += add);
+            }
+        }
+        sums
+    }
+
     /// 1/∫w dA for R = 1: the factor that makes the footprint integrate to 1 over its plane is `norm()/R²`.
     pub fn norm(&self) -> f64 {
         let q = f64::from(self.sharpness());

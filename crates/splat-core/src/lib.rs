@@ -39,7 +39,7 @@ pub mod shade;
 pub use camera::{Camera, Projection, ViewTransform};
 pub use cloud::{Cloud, Splat, SplatKind};
 pub use cost::{CostRecord, StageCost};
-pub use depth_profile::DepthProfile;
+pub use depth_profile::{DepthFragment, DepthProfile};
 pub use error::Error;
 pub use field::ScalarField;
 pub use footprint::{Footprint, FootprintStack};

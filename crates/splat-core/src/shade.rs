@@ -44,6 +44,22 @@ impl ChannelLayout {
         (if self.effects { 9 } else { 3 }) + 3 * usize::from(self.normal) + usize::from(self.shadow)
     }
 
+    /// How many of `count` channels in all are red, green and blue, in threes. The others, normal and shadow, are no colours:
+    /// where extinction differs by channel they take one weight, green's.
+    pub(crate) const fn colors_of(count: usize) -> usize {
+        match count {
+            0..3 => 0,
+            3..9 => 3,
+            _ => 9,
+        }
+    }
+
+    /// The plane of optical depth, of 1 or 3, that hides channel `channel` of `count`.
+    #[inline(always)]
+    pub(crate) const fn plane_of(channel: usize, count: usize, planes: usize) -> usize {
+        if planes == 3 && channel < Self::colors_of(count) { channel % 3 } else { planes / 2 }
+    }
+
     /// First channel of each effect colour: ambient, emission, direct; or of beauty alone.
     pub fn effects(&self) -> impl Iterator<Item = usize> + use<> {
         (0..if self.effects { 3 } else { 1 }).map(|e| 3 * e)

@@ -35,9 +35,15 @@ void extras(uint k, Shape s, Pixel pixel, vec2 thicknesses, inout Profile depths
         return;
     }
     if (view.depths != 0u) {
-        float spacing = uintBitsToFloat(tables[FOOTPRINT_VECTORS * (s.look & 255u) + 2u].w);
-        float thickness = is_medium(s) ? s.peak.w * spacing : 0.0;
-        add_depth(depths, depth_of(s, offset_of(s, pixel.at)), thickness, thicknesses);
+        uint footprint = FOOTPRINT_VECTORS * (s.look & 255u);
+        float spacing = uintBitsToFloat(tables[footprint + 2u].w);
+        vec2 narrowing = uintBitsToFloat(tables[footprint + 3u].xy);
+        bool medium = is_medium(s);
+        vec2 offset = offset_of(s, pixel.at);
+        precise float thickness = medium ? s.peak.w * spacing : 0.0;
+        precise float distance = distance_sq(s, offset) * pixel.ray_factor;
+        float narrow = medium ? fma(narrowing.y, distance, narrowing.x) : 1.0;
+        add_depth(depths, depth_of(s, offset), thickness, narrow, thicknesses);
     }
     if (view.objects != 0u && (view.back_to_front != 0u || object == NO_OBJECT)) {
         object = object_of(batch_ids[k]);
@@ -58,6 +64,8 @@ void main() {
     bool inside = pixel.at.x < size.x && pixel.at.y < size.y;
     uint plane_count = PLANES == 1u ? 1u : view.planes;
     uint channel_count = PLANES == 1u ? CHANNELS : view.channels;
+    // Colours come first, in threes; normal and shadow take green's weight, as `ChannelLayout::plane_of` has it.
+    uint colors = channel_count < 3u ? 0u : channel_count < 9u ? 3u : 9u;
     uint area = size.x * size.y;
     uint at = pixel.at.y * size.x + pixel.at.x;
     pixel.ray_factor = ray_factor_of(pixel.at);
@@ -129,9 +137,7 @@ void main() {
             uint first_value = batch_ids[k] * channel_count;
             for (uint c = 0u; c < CHANNELS; c++) {
                 if (c < channel_count) {
-                    // Channels come in threes, red, green, blue; a lone last one takes the green weight.
-                    bool own = plane_count == 3u && channel_count - c > channel_count % 3u;
-                    uint p = own ? c % 3u : plane_count / 2u;
+                    uint p = plane_count == 3u && c < colors ? c % 3u : plane_count / 2u;
                     float value = values[first_value + c];
                     precise float added = front ? value : value - channel[c];
                     channel[c] = fma(weight[p], added, channel[c]);

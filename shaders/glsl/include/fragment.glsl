@@ -4,7 +4,7 @@
 const uint TWIN_TILE = 32u;
 
 // Vectors of a footprint in the tables.
-const uint FOOTPRINT_VECTORS = 3u;
+const uint FOOTPRINT_VECTORS = 4u;
 
 const uint MEDIUM = 0u;
 

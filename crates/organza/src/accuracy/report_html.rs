@@ -319,11 +319,20 @@ fn notes(html: &mut String, study: &Study) {
         note(format!("Not drawn: {}: {}.", o.setting.label, o.timed.failure.as_deref().unwrap_or_default()));
     }
     match &study.truth {
-        Ok(t) => note(format!(
-            "Truth: {}. Its RMS standard error is {:.1e}; no RMSE against it is smaller.",
-            t.method,
-            t.rms_standard_error()
-        )),
+        Ok(t) => {
+            note(format!(
+                "Truth: {}. Its RMS standard error is {:.1e}; no RMSE against it is smaller.",
+                t.method,
+                t.rms_standard_error()
+            ));
+            if let Some(all) = t.all_orders {
+                note(format!(
+                    "Light scattered more than once is no part of that truth: from the truth of all orders it is {:.1e} away \
+                     (RMSE; that truth's own standard error is {:.1e}), with a mean radiance of {:.4} for {:.4}.",
+                    all.rmse, all.rms_standard_error, all.mean[0], all.mean[1]
+                ));
+            }
+        }
         Err(reason) => note(format!("No physical truth: {reason}.")),
     }
     *html += "</ul>\n";

@@ -38,7 +38,16 @@ fn study(study: &Study) -> Value {
             "seconds": limit.seconds,
         },
         "truth": match &study.truth {
-            Ok(t) => json!({ "method": t.method, "rms_standard_error": t.rms_standard_error() }),
+            Ok(t) => json!({
+                "method": t.method,
+                "rms_standard_error": t.rms_standard_error(),
+                "all_orders": t.all_orders.map(|all| json!({
+                    "rmse": all.rmse,
+                    "rms_standard_error": all.rms_standard_error,
+                    "mean_of_one": all.mean[0],
+                    "mean_of_all": all.mean[1],
+                })),
+            }),
             Err(reason) => json!({ "missing": reason }),
         },
         "curves": study.curves.iter().map(|c| curve(study, c)).collect::<Value>(),

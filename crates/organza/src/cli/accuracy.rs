@@ -4,10 +4,10 @@ use super::args::AccuracyArguments;
 use super::bar::with_bar;
 use super::console;
 use super::session::{in_folder, load_scene, path_text, processor_only, render_options, start_threads};
-use organza::accuracy::{self, Absent, Facts, Options, Outcome, Renderer, Report, Request, Study};
+use organza::accuracy::{self, Absent, Facts, Options, Outcome, Renderer, Report, Request, Study, Truth};
 use organza::output::Target;
 use organza::scene::Scene;
-use organza::{Error, Progress, printable};
+use organza::{Error, Progress, RenderOptions, printable};
 use serde_json::json;
 use std::fmt::Write;
 
@@ -30,7 +30,7 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
             let mut renderer = Renderer::new(&render, progress);
             let facts = renderer.facts(&scene)?;
             let sweep = accuracy::points(&scene, &facts, &options);
-            let truth = organza::truth::truth(&scene, &render, options.truth_samples(), progress)?;
+            let truth = truth(&scene, &render, &options, progress)?;
             let points = accuracy::study(&sweep, truth, &options, progress, &mut |request| renderer.draw(request))?;
             let particles = particles(&scene, &facts, &options, &points, &mut renderer, progress)?;
             Ok(match particles {
@@ -42,6 +42,22 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
         accuracy::write(&report, &targets)?;
         console::out(&summary(&report, &targets, arguments.scene.json))
     })
+}
+
+/// The scene's truth, and what its one order of scattering leaves out; or why there is none.
+fn truth(
+    scene: &Scene,
+    render: &RenderOptions,
+    options: &Options,
+    progress: &Progress,
+) -> Result<Result<Truth, String>, Error> {
+    let mut one = organza::truth::truth(scene, render, options.truth_samples(), progress)?;
+    if let Ok(one) = &mut one
+        && let Ok(all) = organza::truth::truth_of_all_orders(scene, render, options.truth_samples(), progress)?
+    {
+        one.all_orders = Some(one.beside(&all)?);
+    }
+    Ok(one)
 }
 
 /// The study of `particles`, by the limit and the truth of `points`; or why there is none.

@@ -19,22 +19,22 @@ pub(super) fn accumulate(ensemble: &Ensemble, layout: &ChannelLayout, accumulato
     for (c, plane) in accumulator.optical_depth.iter_mut().enumerate() {
         plane.iter_mut().enumerate().for_each(|(k, to)| *to = (-(-opacity(k, c)).ln_1p()).min(HIDDEN));
     }
-    let mut put = |first: usize, name: &str, weighted: bool| {
+    let mut put = |first: usize, name: &str, weight: &dyn Fn(usize) -> f32| {
         let image = layers.rgb(name).expect("invariant: an ensemble keeps the layers of its channels");
         for c in 0..3 {
             for (k, to) in accumulator.channels[first + c].iter_mut().enumerate() {
-                *to = image[k][c] * if weighted { opacity(k, c) } else { 1.0 };
+                *to = image[k][c] * weight(k);
             }
         }
     };
     let effects: Vec<usize> = layout.effects().collect();
     if let [beauty] = effects[..] {
-        put(beauty, "beauty", false);
+        put(beauty, "beauty", &|_| 1.0);
     } else {
-        effects.iter().zip(["ambient", "emission", "direct"]).for_each(|(first, name)| put(*first, name, false));
+        effects.iter().zip(["ambient", "emission", "direct"]).for_each(|(first, name)| put(*first, name, &|_| 1.0));
     }
     if let Some(first) = layout.normal() {
-        put(first, "normal", true);
+        put(first, "normal", &|k| opacity(k, 1));
     }
     if let Some(at) = layout.shadow() {
         let shadow = layers.scalar("shadow").expect("invariant: an ensemble keeps the layers of its channels");

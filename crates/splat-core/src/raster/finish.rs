@@ -72,8 +72,7 @@ fn sample(acc: &Accumulator, opaque: &OpaqueImage, background: &Background, k: u
     for (c, (value, plane)) in values.iter_mut().zip(&acc.channels).enumerate() {
         *value = plane[k];
         if solid.is_some() {
-            let t = if count - c > count % 3 { transmittance[c % 3] } else { transmittance[1] };
-            *value += t * opaque.channels[c][k];
+            *value += transmittance[ChannelLayout::plane_of(c, count, 3)] * opaque.channels[c][k];
         }
     }
     let through = if solid.is_some() { [0.0; 3] } else { transmittance };

@@ -52,7 +52,7 @@ pub use list::Counts;
 pub use packed::words;
 
 use super::bins::TILE as TWIN_TILE;
-use super::kernel::Kernel;
+use super::kernel::{Kernel, TABLE};
 use super::projected::{Coverage, ProjectedSplat};
 use super::{Accumulation, OpaqueImage, Params, Projected};
 use crate::shade::MAX_CHANNELS;
@@ -216,7 +216,8 @@ impl<'a> Image<'a> {
 
 /// Bytes of `Image::table`.
 fn table_bytes(footprints: u32, materials: u32, objects: u32) -> u64 {
-    16 * (3 * u64::from(footprints) + u64::from(materials) + u64::from(objects.div_ceil(4)))
+    let footprints = 4 * TABLE as u64 * u64::from(footprints);
+    footprints + 16 * (u64::from(materials) + u64::from(objects.div_ceil(4)))
 }
 
 /// The recorded compositing and the buffers that the caller meets.

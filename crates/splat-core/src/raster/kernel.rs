@@ -8,12 +8,16 @@
 //! exponential.
 
 use super::lanes::{Lanes, exp_neg};
-use crate::Footprint;
+use crate::{Footprint, depth_profile};
 use pulp::Simd;
 use std::f64::consts::PI;
 
 /// Coefficients of the polynomial.
 const TERMS: usize = 8;
+
+/// Numbers of a footprint on a device, in fours.
+#[cfg(feature = "gpu")]
+pub(crate) const TABLE: usize = 16;
 
 /// The greatest q for which a polynomial is used; that of the default cutoff of 3.
 const POLYNOMIAL_LIMIT: f32 = 4.5;
@@ -29,6 +33,8 @@ pub(crate) struct Kernel {
     pub(crate) norm: f32,
     /// Spacing of the lattice that it is meant for, for R = 1.
     pub(crate) spacing: f32,
+    /// For depths: what an optical depth is multiplied with, the constant and the slope in s.
+    pub(crate) narrowing: [f32; 2],
     /// q.
     sharpness: f32,
     /// e^−q.
@@ -46,6 +52,7 @@ impl Kernel {
             cutoff: footprint.cutoff,
             norm: footprint.norm() as f32,
             spacing: footprint.spacing_for_radius(1.0),
+            narrowing: narrowing(footprint),
             sharpness,
             rim: exp_neg(sharpness),
             g: if smooth { fit(f64::from(sharpness)) } else { [0.0; TERMS] },
@@ -53,13 +60,14 @@ impl Kernel {
         }
     }
 
-    /// The numbers that [`Kernel::profile`] computes with: G, q, e^−q, 1 where G holds; and the spacing.
+    /// The numbers that [`Kernel::profile`] computes with: G, q, e^−q, 1 where G holds; then the spacing and the narrowing.
     #[cfg(feature = "gpu")]
-    pub(crate) fn table(&self) -> [f32; 12] {
-        let mut table = [0.0; 12];
+    pub(crate) fn table(&self) -> [f32; TABLE] {
+        let mut table = [0.0; TABLE];
         table[..TERMS].copy_from_slice(&self.g);
         let smooth = f32::from(u8::from(self.smooth));
-        table[TERMS..].copy_from_slice(&[self.sharpness, self.rim, smooth, self.spacing]);
+        let [constant, slope] = self.narrowing;
+        table[TERMS..TERMS + 6].copy_from_slice(&[self.sharpness, self.rim, smooth, self.spacing, constant, slope]);
         table
     }
 
@@ -81,6 +89,12 @@ impl Kernel {
         let taper = of(self.rim) * (of(1.0) + r + of(0.5) * r * r);
         ((q - r).exp_neg() - taper).max(of(0.0)).where_less(of(0.0), t)
     }
+}
+
+/// [`depth_profile::narrowing`] of a footprint.
+fn narrowing(footprint: &Footprint) -> [f32; 2] {
+    let [all, first, second] = footprint.moments();
+    depth_profile::narrowing(first / all, second / all, f64::from(footprint.spacing_for_radius(1.0)))
 }
 
 /// The polynomial that equals G at the Chebyshev points.
@@ -148,6 +162,23 @@ mod tests {
                 })
                 .fold(0.0, f64::max);
             assert!(largest < 1e-6, "cutoff {cutoff}: {largest:e}");
+        }
+    }
+
+    #[test]
+    fn narrowed_footprints_keep_their_sum_and_are_as_wide_as_cells() {
+        for cutoff in [1.0, 2.0, 3.0, 5.0, 8.0] {
+            let footprint = Footprint { cutoff };
+            let [constant, slope] = narrowing(&footprint).map(f64::from);
+            let (n, cell) = (100_000, f64::from(footprint.spacing_for_radius(1.0)));
+            let mut sums = [0.0; 3];
+            for s in (0..n).map(|i| (f64::from(i) + 0.5) / f64::from(n)) {
+                let (w, narrow) = (footprint.profile(s), constant + slope * s);
+                [w, w * narrow, w * narrow * s].iter().zip(&mut sums).for_each(|(add, sum)| *sum += add);
+            }
+            let [all, narrow, width] = sums;
+            assert!((narrow / all - 1.0).abs() < 1e-5, "cutoff {cutoff}: {}", narrow / all);
+            assert!((width / all - cell * cell / 6.0).abs() < 1e-5, "cutoff {cutoff}: {}", width / all);
         }
     }
 

@@ -13,6 +13,8 @@ use super::lanes::{Lanes, MAX_LANES, SMALL, exp_neg};
 use super::projected::{Projected, ProjectedDepth, ProjectedSplat};
 use super::tile::{AREA, BATCH, BLOCKS, Line, PIXELS, Run, Runs, for_each_span, position};
 use super::{Accumulation, OpaqueImage, Params, RasterCounts};
+use crate::depth_profile::DepthFragment;
+use crate::shade::ChannelLayout;
 use crate::{Accumulator, DepthProfile, Direction, Material, Progress, SplatKind};
 use pulp::Simd;
 use rayon::prelude::*;
@@ -328,8 +330,7 @@ impl Tile {
             };
         }
         for c in 0..channels {
-            // Channels come in threes, red, green, blue; a lone last one takes the green weight.
-            let p = if PLANES == 3 && channels - c > channels % 3 { c % 3 } else { PLANES / 2 };
+            let p = ChannelLayout::plane_of(c, channels, PLANES);
             let value = Lanes::splat(simd, source.value[c]);
             let sum = &mut lines[2 * PLANES + c].0[run.lane..];
             let before = Lanes::load(simd, sum);
@@ -356,13 +357,19 @@ impl Tile {
         let line = run.block * (2 * PLANES + self.channels) + PLANES / 2;
         let medium = source.splat.kind == SplatKind::Medium;
         let thickness = if medium { source.depth.extent * source.kernel.spacing } else { 0.0 };
+        let mut narrow = [1.0; MAX_LANES];
+        if medium && !self.depth.is_empty() {
+            let s = run.distance_sq(simd, source.splat) * Lanes::load(simd, &self.ray_factor[run.pixel()..]);
+            let [constant, slope] = source.kernel.narrowing.map(|v| Lanes::splat(simd, v));
+            slope.mul_add(s, constant).store(&mut narrow);
+        }
         for i in 0..Lanes::<S>::COUNT {
             let (k, after) = (run.pixel() + i, self.lines[line].0[run.lane + i]);
             if after <= before[i] {
                 continue;
             }
             if let Some(depth) = self.depth.get_mut(k) {
-                depth.add(z[i], thickness, [before[i], after]);
+                depth.add(&DepthFragment { depth: z[i], thickness, narrow: narrow[i], before: before[i], after });
             }
             if let Some(object) = self.object.get_mut(k).filter(|o| !FRONT || **o == u32::MAX) {
                 *object = source.object;

@@ -43,6 +43,7 @@
 use super::common::Common;
 use super::{Capacities, Recorded, refused};
 use crate::Error;
+use crate::shade::ChannelLayout;
 use splat_shaders::{Blend, BufferId, Corners, Format, Groups, Image, ImageId, Recording, Target, kernels, programs};
 
 /// Numbers that a device blends.
@@ -68,9 +69,9 @@ struct Group {
     last: bool,
 }
 
-/// Channels by the plane that hides them: in threes, red, green, blue; lone last ones by the green.
+/// Channels by the plane that hides them.
 fn groups(planes: u32, channels: u32) -> Vec<Group> {
-    let plane_of = |c: u32| if planes == 3 && channels - c > channels % 3 { c % 3 } else { planes / 2 };
+    let plane_of = |c: u32| ChannelLayout::plane_of(c as usize, channels as usize, planes as usize) as u32;
     let mut groups = Vec::new();
     for plane in 0..planes {
         let mut own: Vec<u32> = (0..channels).filter(|c| plane_of(*c) == plane).collect();
