@@ -27,8 +27,8 @@ precise vec3 in_view(float x, float y, float z) {
 }
 
 bool keeps(vec3 p, float radius) {
-    precise float x = abs(p.x) * view.plane_cos.x - p.z * view.plane_sin.x - view.half_extent.x;
-    precise float y = abs(p.y) * view.plane_cos.y - p.z * view.plane_sin.y - view.half_extent.y;
+    precise float x = abs(p.x) * view.plane_cos.x - abs(p.z) * view.plane_sin.x - view.half_extent.x;
+    precise float y = abs(p.y) * view.plane_cos.y - abs(p.z) * view.plane_sin.y - view.half_extent.y;
     return p.z > -radius && p.z <= 3.402823466e38 && x <= radius && y <= radius;
 }
 

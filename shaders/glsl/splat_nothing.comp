@@ -9,5 +9,6 @@ layout(set = 0, binding = 0, std430) buffer Bound0 { ProjectState state; };
 void main() {
     if (gl_LocalInvocationIndex == 0u && block_index() == 0u) {
         state.visible = 0u;
+        state.near = 0u;
     }
 }

@@ -6,6 +6,7 @@
 #include "layouts.glsl"
 #include "splats.glsl"
 #include "attributes.glsl"
+#include "optics.glsl"
 
 layout(set = 0, binding = 0, std430) readonly buffer Bound0 { ProjectView view; };
 layout(set = 0, binding = 1, std430) readonly buffer Bound1 { float positions[]; };
@@ -18,8 +19,11 @@ layout(set = 0, binding = 7, std430) buffer Bound7 { ProjectState state; };
 
 // Weight of an opaque disc that faces away.
 const float FACING_AWAY = 0.00390625;
+// Least distance of a centre from the eye as a share of the radius, in perspective.
+const float LEAST_DEPTH = 0.03125;
 
 shared uint block_visible;
+shared uint block_near;
 
 struct Splat {
     float radius;
@@ -28,12 +32,16 @@ struct Splat {
     uint look;
     // 1/integral of the profile for R = 1.
     float norm;
+    // Half the width of the share before a plane, for R = 1.
+    float depth;
     vec3 normal;
     vec3 tangent;
 };
 
 struct Center {
     vec3 position;
+    // View depth; that of the position keeps a least distance from the eye plane.
+    float before;
     float px_per_world;
     // x/z and y/z; 0 for parallel rays.
     float u;
@@ -46,6 +54,8 @@ struct Shape {
     float peak;
     vec2 half_extent;
     vec2 slope;
+    // Whether it is a disc that reaches through the eye plane.
+    bool near;
 };
 
 // `precise`: products and sums are rounded one by one, as the CPU does it.
@@ -68,9 +78,14 @@ precise vec3 cross_of(vec3 a, vec3 b) {
     return vec3(x, y, z);
 }
 
-Center center_of(vec3 offset, float cutoff) {
+Center center_of(vec3 offset, float cutoff, float radius) {
     Center c;
     precise vec3 p = turned(offset) + view.translation.xyz;
+    c.before = p.z;
+    if (view.orthographic == 0u) {
+        precise float least = radius * LEAST_DEPTH;
+        p.z = abs(p.z) < least ? (p.z < 0.0 ? 0.0 - least : least) : p.z;
+    }
     c.position = p;
     precise float filter_px = cutoff * view.filter_sigma;
     c.filter_px = filter_px;
@@ -88,6 +103,28 @@ Center center_of(vec3 offset, float cutoff) {
     return c;
 }
 
+// Half the extent of the image of a ball about that of its centre; everything where it reaches the eye plane.
+precise float extent_of_ball(float slope, float length_sq, float ratio_sq) {
+    if (!(ratio_sq < 1.0)) {
+        return uintBitsToFloat(0x7f800000u);
+    }
+    precise float across = sqrt(ratio_sq * (length_sq - ratio_sq));
+    precise float extent = (abs(slope) * ratio_sq + across) / (1.0 - ratio_sq) * view.focal;
+    return extent;
+}
+
+bool beside(float v, float z, float reach, float radius) {
+    precise float distance = abs(v) - abs(z) * reach;
+    precise float most = radius * sqrt(1.0 + reach * reach);
+    return !(distance < most);
+}
+
+// Whether a ball about the centre, or about its mirror image at the eye, reaches into the image.
+bool in_view(Center c, float radius) {
+    vec2 reach = view.middle / view.focal;
+    return !beside(c.position.x, c.position.z, reach.x, radius) && !beside(c.position.y, c.position.z, reach.y, radius);
+}
+
 Shape medium(Splat s, Center c) {
     precise float filter_world = c.filter_px / c.px_per_world;
     precise float radius_sq = s.radius * s.radius + filter_world * filter_world;
@@ -95,18 +132,21 @@ Shape medium(Splat s, Center c) {
     precise float scale = 1.0 / reach_sq;
     precise float x_sq = 1.0 + c.u * c.u;
     precise float y_sq = 1.0 + c.v * c.v;
-    float depth = max(abs(c.position.z), s.radius);
-    precise float widen = 1.0;
-    if (view.orthographic == 0u) {
-        widen = 1.0 + 2.0 * (s.radius / depth);
-    }
+    precise float depth = s.radius * s.depth;
+    float front = c.before < depth ? share_in_front(c.before / depth) : 1.0;
     precise float a = y_sq * scale;
     precise float b = 2.0 * (c.u * c.v * scale);
     precise float d = x_sq * scale;
-    precise float peak = s.cross_section * s.norm / radius_sq;
-    precise float half_x = sqrt(x_sq * reach_sq) * widen;
-    precise float half_y = sqrt(y_sq * reach_sq) * widen;
-    return Shape(vec3(a, b, d), peak, vec2(half_x, half_y), vec2(0.0));
+    precise float peak = s.cross_section * s.norm / radius_sq * front;
+    vec2 half_extent = vec2(sqrt(reach_sq));
+    if (view.orthographic == 0u) {
+        precise float ratio_sq = reach_sq / (view.focal * view.focal);
+        half_extent = vec2(extent_of_ball(c.u, x_sq, ratio_sq), extent_of_ball(c.v, y_sq, ratio_sq));
+        peak = in_view(c, sqrt(radius_sq)) ? peak : 0.0;
+    }
+    precise float per_depth = 1.0 / depth;
+    precise float per_front = 1.0 / front;
+    return Shape(vec3(a, b, d), peak, half_extent, vec2(per_depth, per_front), false);
 }
 
 precise vec2 to_image(Center c, vec3 axis) {
@@ -164,7 +204,9 @@ Shape disc(Splat s, Center c) {
     if (kind == SURFACE && tables[view.footprints + (s.look & 0xffffu)].x > 0.0) {
         peak = peak / max(abs(along) / length_d, 1.0e-3);
     }
-    if (kind == OPAQUE && along > 0.0) {
+    // The side of the plane that the eye is on: for a centre behind the eye `along` has the other sign.
+    precise float facing = view.orthographic == 0u ? along * c.position.z : along;
+    if (kind == OPAQUE && facing > 0.0) {
         peak = peak * FACING_AWAY;
     }
     precise float per_px = 1.0 / (along * c.px_per_world);
@@ -174,8 +216,18 @@ Shape disc(Splat s, Center c) {
     precise float a = yy * inverse;
     precise float b = -2.0 * (mixed * inverse);
     precise float d = xx * inverse;
-    return Shape(
-        vec3(a, b, d), peak, vec2(sqrt(xx), sqrt(yy)), usable ? vec2(slope_x, slope_y) : vec2(0.0));
+    // What reaches through the eye plane is drawn by the processor: here it is counted.
+    precise float reach_z = sqrt(axis_u.z * axis_u.z + axis_v.z * axis_v.z);
+    precise float behind = c.before + reach_z;
+    peak = behind > 0.0 ? peak : 0.0;
+    precise float radius = sqrt(max(dot_of(axis_u, axis_u), dot_of(axis_v, axis_v)));
+    bool near = c.before < (view.orthographic == 0u ? radius : reach_z);
+    vec2 half_extent = vec2(sqrt(xx), sqrt(yy));
+    if (near && view.orthographic == 0u) {
+        half_extent = vec2(uintBitsToFloat(0x7f800000u));
+        peak = in_view(c, radius) ? peak : 0.0;
+    }
+    return Shape(vec3(a, b, d), peak, half_extent, usable ? vec2(slope_x, slope_y) : vec2(0.0), near);
 }
 
 // The upper half of a float, rounded up: an extent is never packed smaller.
@@ -200,7 +252,9 @@ bool project(uint i) {
     }
     vec4 footprint = tables[(s.look >> 16) & 255u];
     s.norm = footprint.x;
-    Center c = center_of(vec3(positions[3u * i], positions[3u * i + 1u], positions[3u * i + 2u]), footprint.y);
+    s.depth = footprint.z;
+    vec3 offset = vec3(positions[3u * i], positions[3u * i + 1u], positions[3u * i + 2u]);
+    Center c = center_of(offset, footprint.y, s.radius);
     Shape shape;
     if (s.look >> 24 == MEDIUM) {
         shape = medium(s, c);
@@ -210,11 +264,14 @@ bool project(uint i) {
     precise float x = view.middle.x + c.position.x * c.px_per_world;
     precise float y = view.middle.y - c.position.y * c.px_per_world;
     uint extents = packed_extent(shape.half_extent.x) | (packed_extent(shape.half_extent.y) << 16);
-    // A splat around the eye has no image; comparisons with what is no number are false.
-    bool shown = shape.peak > 0.0 && (view.orthographic != 0u || c.position.z > s.radius);
+    // Comparisons with what is no number are false.
+    bool shown = shape.peak > 0.0;
     if (shown) {
         uvec4 bounds = bounds_of(vec2(x, y), extents, view.size);
         shown = bounds.x < bounds.y && bounds.z < bounds.w;
+    }
+    if (shown && shape.near) {
+        atomicAdd(block_near, 1u);
     }
     uint to = view.splat_words * i;
     splats[to] = floatBitsToUint(x);
@@ -226,7 +283,7 @@ bool project(uint i) {
     splats[to + SPLAT_EXTENTS] = extents;
     splats[to + SPLAT_TABLES] = s.look;
     if (view.splat_words > SPLAT_DEPTH) {
-        splats[to + SPLAT_DEPTH] = floatBitsToUint(c.position.z);
+        splats[to + SPLAT_DEPTH] = floatBitsToUint(c.before);
         splats[to + 9u] = floatBitsToUint(shape.slope.x);
         splats[to + 10u] = floatBitsToUint(shape.slope.y);
         splats[to + 11u] = floatBitsToUint(s.radius);
@@ -242,6 +299,7 @@ void main() {
     uint lane = gl_LocalInvocationIndex;
     if (lane == 0u) {
         block_visible = 0u;
+        block_near = 0u;
     }
     barrier();
     uint i = block * 256u + lane;
@@ -251,5 +309,8 @@ void main() {
     barrier();
     if (lane == 0u) {
         atomicAdd(state.visible, block_visible);
+        if (block_near > 0u) {
+            atomicAdd(state.near, block_near);
+        }
     }
 }

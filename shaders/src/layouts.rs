@@ -149,6 +149,8 @@ layouts! {
     pub struct ProjectState {
         /// Splats that reach a pixel.
         pub visible: u32,
+        /// Those that are discs through the eye plane.
+        pub near: u32,
     }
 
     /// What shading reads beside splats and tables.

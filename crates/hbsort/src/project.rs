@@ -2,8 +2,9 @@
 //!
 //! A splat is the sphere of its cutoff radius r around its view position (x, y, z); of an elliptical disc r is the
 //! longer semi-axis. It is kept when z > −r and |x|·c − z·s − h ≤ r, the same for y: (c, s, h) = (cos φ, sin φ, 0) for
-//! a pinhole with half angle φ, (1, 0, half extent) for parallel rays. Beyond the paper, which tests centres alone: a
-//! splat whose centre lies outside may still reach into the image.
+//! a pinhole with half angle φ, (1, 0, half extent) for parallel rays; behind the eye with |z|, for the mirror image there of
+//! a pixel's ray passes such a splat, and a renderer counts the share of it that lies before the eye plane. Beyond the paper,
+//! which tests centres alone: a splat whose centre lies outside may still reach into the image.
 
 use crate::scratch::CHUNK;
 use glam::Vec3;
@@ -37,8 +38,8 @@ impl Frustum {
 
     #[inline(always)]
     fn keeps(&self, p: Vec3, radius: f32) -> bool {
-        let x = p.x.abs() * self.cos[0] - p.z * self.sin[0] - self.half[0];
-        let y = p.y.abs() * self.cos[1] - p.z * self.sin[1] - self.half[1];
+        let x = p.x.abs() * self.cos[0] - p.z.abs() * self.sin[0] - self.half[0];
+        let y = p.y.abs() * self.cos[1] - p.z.abs() * self.sin[1] - self.half[1];
         // `&` keeps the lanes free of branches; comparisons with NaN are false, so what is no number is culled.
         (p.z > -radius) & (p.z <= f32::MAX) & (x <= radius) & (y <= radius)
     }

@@ -111,7 +111,7 @@ fn pixel(input: &Input<'_>, splats: &[Option<Splat>], ids: &[u32], x: usize, y: 
     for &i in ids {
         let Some((splat, f)) = at(i) else { continue };
         let seen = match splat.kind {
-            SplatKind::Medium => share_in_front((surface_depth - f.depth) / splat.radius),
+            SplatKind::Medium => splat.share_before(surface_depth),
             SplatKind::Surface => f64::from(f.depth < surface_depth),
             SplatKind::Opaque => 0.0,
         };
@@ -180,10 +180,4 @@ fn opaque<'a>(
         }
     }
     (weight > 0.0).then(|| (depth / weight, values.iter().map(|v| v / weight).collect()))
-}
-
-/// Share of a medium kernel in front of a plane at t radii behind its centre: ∫ 35/32·(1 − u²)³ du from −1 to t.
-fn share_in_front(t: f64) -> f64 {
-    let t = t.clamp(-1.0, 1.0);
-    0.5 + 35.0 / 32.0 * (t - t.powi(3) + 0.6 * t.powi(5) - t.powi(7) / 7.0)
 }

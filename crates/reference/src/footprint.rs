@@ -1,7 +1,9 @@
 //! The definition of a splat's image in f64, from the geometry of one ray and one splat.
 //!
 //! Medium: τ = K·n/R'²·w(ρ²/R'²), ρ the distance of the centre from the ray, R'² = R² + (filter in world units)².
-//! Disc: the projection of the tangent disc by its Jacobian at the centre, widened by the resampling filter.
+//! Disc: the projection of the tangent disc by its Jacobian at the centre, widened by the resampling filter. Of discs that
+//! reach through the eye plane what lies on the ray before the eye; in perspective, for all whose ball does, not widened.
+//! Share of a medium before a plane across the view: ∫ 35/32·(1 − u²)³ du up to u = distance/3δ, δ the kernel's deviation.
 //! w(s) = e^(−qs) − e^(−q)(1 + x + x²/2), x = q(1 − s), q = cutoff²/2.
 
 use crate::Input;
@@ -22,6 +24,8 @@ pub(crate) struct Splat {
     center: DVec3,
     center_px: DVec2,
     cutoff_sq_half: f64,
+    /// Half the width of the share before a plane.
+    share_depth: f64,
     /// K·n/R'², or area·n/R² for an opaque disc.
     peak: f64,
     shape: Shape,
@@ -30,8 +34,19 @@ pub(crate) struct Splat {
 }
 
 enum Shape {
-    Ball { radius_sq: f64 },
-    Disc { metric: DMat2, depth_slope: DVec2 },
+    Ball {
+        radius_sq: f64,
+    },
+    Disc {
+        metric: DMat2,
+        depth_slope: DVec2,
+    },
+    /// Through the eye plane: normal, and the semi-axes over the squares of their lengths.
+    Near {
+        normal: DVec3,
+        axes: [DVec3; 2],
+        slab: bool,
+    },
 }
 
 /// One splat at one pixel.
@@ -51,9 +66,6 @@ impl Splat {
         let center = input.camera.view_from_world(world);
         let radius = f64::from(s.radius);
         let parallel = input.camera.is_orthographic();
-        if !parallel && center.z <= radius {
-            return None;
-        }
         let px_per_world = input.camera.focal_px() / if parallel { 1.0 } else { center.z };
         let size = input.camera.size.map(f64::from);
         let center_px = DVec2::new(0.5 * size[0] + center.x * px_per_world, 0.5 * size[1] - center.y * px_per_world);
@@ -71,6 +83,7 @@ impl Splat {
             center_px,
             cutoff_sq_half: q,
             peak: 0.0,
+            share_depth: 3.0 * radius * deviation(q),
             shape: Shape::Ball { radius_sq: 0.0 },
             reach_px: DVec2::ZERO,
         };
@@ -80,8 +93,10 @@ impl Splat {
             out.shape = Shape::Ball { radius_sq };
             // A ball's image is stretched away from the image centre by up to |d|².
             let d = if parallel { 1.0 } else { (center / center.z).length_squared() };
-            out.reach_px =
-                DVec2::splat(radius_sq.sqrt() * px_per_world * d * (1.0 + 2.0 * radius / center.z.abs()) + 1.0);
+            let reach = radius_sq.sqrt() * px_per_world * d * (1.0 + 2.0 * radius / center.z.abs()) + 1.0;
+            // Near the eye everywhere.
+            let near = !parallel && center.z < 2.0 * radius;
+            out.reach_px = DVec2::splat(if near { f64::INFINITY } else { reach });
         } else {
             out.disc(input, &s, px_per_world, filter_px, amount * n);
         }
@@ -99,6 +114,13 @@ impl Splat {
         };
         let v = normal.cross(u).normalize_or_zero() * self.radius;
         let parallel = input.camera.is_orthographic();
+        let through = u.length().max(v.length());
+        if self.depth <= -u.z.hypot(v.z) {
+            return;
+        }
+        if !parallel && self.depth < through {
+            return self.near_disc(input, normal, [u, v], amount);
+        }
         let slope = if parallel { DVec3::ZERO } else { self.center / self.center.z };
         let project =
             |a: DVec3| DVec2::new((a.x - slope.x * a.z) * px_per_world, -(a.y - slope.y * a.z) * px_per_world);
@@ -123,8 +145,26 @@ impl Splat {
         self.shape = Shape::Disc { metric: covariance.inverse(), depth_slope };
     }
 
+    fn near_disc(&mut self, input: &Input<'_>, normal: DVec3, [u, v]: [DVec3; 2], amount: f64) {
+        let opaque = self.kind == SplatKind::Opaque;
+        let away = if opaque && normal.dot(self.center) > 0.0 { FACING_AWAY } else { 1.0 };
+        let slab = !opaque && input.materials[self.material].surface_opacity == SurfaceOpacity::ThinSlab;
+        self.peak = amount / (u.length() * v.length()) * away;
+        self.reach_px = DVec2::INFINITY;
+        self.shape = Shape::Near { normal, axes: [u, v].map(|a| a / a.length_squared()), slab };
+    }
+
+    /// How much of a medium is seen between the eye and a surface at view depth `depth`.
+    pub(crate) fn share_before(&self, depth: f64) -> f64 {
+        let at = |depth: f64| share_in_front((depth - self.depth) / self.share_depth);
+        (at(depth) - at(0.0)).max(0.0)
+    }
+
     /// Pixel range [low, high) to look at along one axis (0 = x, 1 = y) of `limit` pixels.
     pub(crate) fn range(&self, axis: usize, limit: usize) -> std::ops::Range<usize> {
+        if self.reach_px[axis] == f64::INFINITY {
+            return 0..limit;
+        }
         let clamp = |v: f64| v.clamp(0.0, limit as f64) as usize;
         clamp(self.center_px[axis] - self.reach_px[axis])..clamp(self.center_px[axis] + self.reach_px[axis] + 1.0)
     }
@@ -132,7 +172,20 @@ impl Splat {
     /// The fragment at pixel (x, y), if the footprint reaches its centre.
     pub(crate) fn fragment(&self, input: &Input<'_>, x: usize, y: usize) -> Option<Fragment> {
         let at = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+        let mut peak = self.peak;
         let (s, offset) = match &self.shape {
+            Shape::Near { normal, axes, slab } => {
+                let (origin, d) = input.camera.view_ray(at.x, at.y);
+                let depth = (self.center - origin).dot(*normal) / d.dot(*normal);
+                if !(depth > 0.0 && depth.is_finite()) {
+                    return None;
+                }
+                let p = origin + d * depth - self.center;
+                if *slab {
+                    peak /= (d.dot(*normal).abs() / d.length()).max(1e-3);
+                }
+                (axes.iter().map(|a| p.dot(*a).powi(2)).sum(), depth - self.depth)
+            }
             Shape::Ball { radius_sq } => {
                 let (origin, d) = input.camera.view_ray(at.x, at.y);
                 let rho_sq = (self.center - origin).cross(d).length_squared() / d.length_squared();
@@ -140,12 +193,19 @@ impl Splat {
             }
             Shape::Disc { metric, depth_slope } => {
                 let d = at - self.center_px;
-                (d.dot(*metric * d), depth_slope.dot(d).clamp(-self.radius, self.radius))
+                let offset = depth_slope.dot(d);
+                // In front of the eye alone; a disc through its plane is parallel rays' here.
+                let through = self.depth.abs() < self.radius;
+                let offset = if through { offset } else { offset.clamp(-self.radius, self.radius) };
+                if self.depth + offset <= 0.0 {
+                    return None;
+                }
+                (d.dot(*metric * d), offset)
             }
         };
-        (s < 1.0 && self.peak > 0.0).then(|| Fragment {
+        (s < 1.0 && peak > 0.0).then(|| Fragment {
             s,
-            amount: self.peak * profile(s, self.cutoff_sq_half),
+            amount: peak * profile(s, self.cutoff_sq_half),
             depth: self.depth + offset,
         })
     }
@@ -154,6 +214,17 @@ impl Splat {
 fn profile(s: f64, q: f64) -> f64 {
     let x = q * (1.0 - s);
     (-q * s).exp() - (-q).exp() * (1.0 + x + 0.5 * x * x)
+}
+
+/// Share of a medium before a plane at t half widths behind its centre: ∫ 35/32·(1 − u²)³ du from −1 to t.
+fn share_in_front(t: f64) -> f64 {
+    let t = t.clamp(-1.0, 1.0);
+    0.5 + 35.0 / 32.0 * (t - t.powi(3) + 0.6 * t.powi(5) - t.powi(7) / 7.0)
+}
+
+/// Standard deviation of the kernel along one direction for R = 1, by numerical integration: half the mean of ρ².
+fn deviation(q: f64) -> f64 {
+    (0.5 * simpson(|s| s * profile(s, q)) / simpson(|s| profile(s, q))).sqrt()
 }
 
 /// n = 1/∫w dA of each footprint for R = 1, by numerical integration: shares no closed form with the fast path.

@@ -3,6 +3,7 @@
 
 use reference::{Input, Order, composite};
 use splat_core::glam::{DVec3, Vec3};
+use splat_core::optics::SurfaceOpacity;
 use splat_core::raster::{OpaqueImage, Params, fold, project, resolve_opaque};
 use splat_core::{
     Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Progress, Projection, Splat, SplatKind, rng,
@@ -125,6 +126,23 @@ fn the_exact_compositor_agrees_with_the_rasterizer() {
             let difference = largest_difference(&raster, &cloud, &camera, &materials);
             assert!(difference < 2e-5, "{projection:?} rgb {rgb}: {difference:e}");
         }
+    }
+}
+
+/// The eye among the splats: some lie across the eye plane, some behind it.
+#[test]
+fn the_exact_compositor_agrees_around_the_eye() {
+    let cloud = mixed_cloud(3000);
+    let materials =
+        [Material { surface_opacity: SurfaceOpacity::ThinSlab, ..Material::default() }, Material::default()];
+    // In perspective splats across the eye plane are not filtered by the definition, and seen from R/32 away at least.
+    for (projection, tolerance) in
+        [(Projection::Orthographic { height: 2.0 }, 3e-5), (Projection::Perspective { fov_y: 0.7 }, 0.03)]
+    {
+        let camera = Camera::look_at(DVec3::new(0.1, 0.05, 0.3), DVec3::ZERO, DVec3::Y, projection, SIZE).unwrap();
+        let raster = rasterize(&cloud, &camera, &materials, 1, Direction::FrontToBack);
+        let difference = largest_difference(&raster, &cloud, &camera, &materials);
+        assert!(difference < tolerance, "{projection:?}: {difference:e}");
     }
 }
 

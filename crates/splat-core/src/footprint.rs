@@ -56,7 +56,6 @@ impl Footprint {
     }
 
     /// ∫sⁿ·w ds over \[0, 1\] for n = 0, 1, 2, from w = e^−q·Σ_{k≥3} (qt)^k/k!, t = 1 − s, whose terms are all positive.
-    #[cfg(feature = "raster")]
     pub(crate) fn moments(&self) -> [f64; 3] {
         let q = f64::from(self.sharpness());
         let mut sums = [0.0; 3];
@@ -71,6 +70,13 @@ impl Footprint {
             }
         }
         sums
+    }
+
+    /// Standard deviation of the kernel along any one direction, as a share of R: of the splat's cross-section, how much lies
+    /// before a plane across the ray is told by this deviation. A little below 1/cutoff, for the tail is cut.
+    pub fn deviation(&self) -> f64 {
+        let [all, first, _] = self.moments();
+        (0.5 * first / all).sqrt()
     }
 
     /// 1/∫w dA for R = 1: the factor that makes the footprint integrate to 1 over its plane is `norm()/R²`.
@@ -126,6 +132,19 @@ mod tests {
             let sum: f64 = (0..n).map(|i| f.profile((f64::from(i) + 0.5) / f64::from(n))).sum();
             let integral = PI * sum / f64::from(n);
             assert!((integral * f.norm() - 1.0).abs() < 1e-6, "cutoff {cutoff}: {}", integral * f.norm());
+        }
+    }
+
+    #[test]
+    fn deviation_is_that_of_the_profile() {
+        for cutoff in [1.0, 2.0, 3.0, 5.0, 8.0] {
+            let f = Footprint { cutoff };
+            let n = 200_000;
+            let at = |i: i32| (f64::from(i) + 0.5) / f64::from(n);
+            let sum: f64 = (0..n).map(|i| f.profile(at(i))).sum();
+            // The square of one of two coordinates is half of ρ² on average.
+            let squares: f64 = (0..n).map(|i| 0.5 * at(i) * f.profile(at(i))).sum();
+            assert!((f.deviation() / (squares / sum).sqrt() - 1.0).abs() < 1e-6, "cutoff {cutoff}");
         }
     }
 

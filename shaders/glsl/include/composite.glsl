@@ -43,7 +43,8 @@ void extras(uint k, Shape s, Pixel pixel, vec2 thicknesses, inout Profile depths
         precise float thickness = medium ? s.peak.w * spacing : 0.0;
         precise float distance = distance_sq(s, offset) * pixel.ray_factor;
         float narrow = medium ? fma(narrowing.y, distance, narrowing.x) : 1.0;
-        add_depth(depths, depth_of(s, offset), thickness, narrow, thicknesses);
+        // Nothing lies behind the eye.
+        add_depth(depths, max(depth_of(s, offset), 0.0), thickness, narrow, thicknesses);
     }
     if (view.objects != 0u && (view.back_to_front != 0u || object == NO_OBJECT)) {
         object = object_of(batch_ids[k]);

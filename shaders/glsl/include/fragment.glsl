@@ -18,7 +18,8 @@ struct Pixel {
 };
 
 // Of a splat: offset of the twin's corner from the centre, first numbers of the conic; its last, peak, depth of the centre,
-// extent; slope of the depth, for a medium 1/extent; footprint | kind << 8.
+// extent; slope of the depth, for a medium 1/D of its share before a plane and one over its share before the eye; footprint |
+// kind << 8.
 struct Shape {
     vec4 conic;
     vec4 peak;
@@ -82,7 +83,9 @@ precise float optical_depth(Shape s, Pixel pixel) {
     precise float tau = amount_of(s, scaled);
     if (pixel.hidden) {
         if (medium) {
-            tau *= share_in_front((pixel.solid - s.peak.z) * s.slope.x);
+            // The part between the eye and the surface, as a share of all before the eye.
+            precise float behind = 1.0 - share_in_front((pixel.solid - s.peak.z) * s.slope.x);
+            tau *= max(fma(-behind, s.slope.y, 1.0), 0.0);
         } else {
             tau = depth_of(s, d) < pixel.solid ? tau : 0.0;
         }

@@ -79,6 +79,7 @@ struct ProjectView {
 
 struct ProjectState {
     uint visible;
+    uint near;
 };
 
 struct ShadeView {

@@ -23,7 +23,7 @@ precise float opacity_of(float x) {
     return 1.0 - exp_neg(x);
 }
 
-// Share of a medium kernel in front of a plane at distance / R from its centre.
+// Share of a medium kernel before a plane at distance / D behind its centre, D three deviations of the kernel.
 precise float share_in_front(float distance) {
     precise float t = clamp(distance, -1.0, 1.0);
     precise float u = t * t;

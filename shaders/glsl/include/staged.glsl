@@ -6,7 +6,7 @@ struct Staged {
     vec2 conic;
     // Its last, peak, depth of the centre, extent.
     vec4 peak;
-    // Slope of the depth; for a medium 1/extent.
+    // As `Shape` has it.
     vec2 slope;
     uint material;
     // footprint | kind << 8.
@@ -29,7 +29,7 @@ Staged staged_of(uint id) {
     s.center = center;
     s.conic = shape.xy;
     s.peak = vec4(shape.zw, depth.x, depth.w);
-    s.slope = look >> 24 == MEDIUM ? vec2(1.0 / depth.w, 0.0) : depth.yz;
+    s.slope = depth.yz;
     s.material = look & 0xffffu;
     s.look = look >> 16;
     s.bounds = bounds_of(center, splats[at + SPLAT_EXTENTS], view.size);

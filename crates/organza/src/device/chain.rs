@@ -58,6 +58,8 @@ enum Outcome {
     TooLarge,
     /// A tile has more splats than the driver goes through.
     TooLong,
+    /// Discs reach through the eye plane.
+    ThroughTheEye,
 }
 
 /// The recordings of the stages as one.
@@ -152,6 +154,8 @@ pub(super) fn chain_on(
         Outcome::Done(done) => return Ok(Some(done)),
         // In parts they would throw their shadows again and again.
         _ if !splats.castings.is_empty() => return Ok(None),
+        // Surfaces there are composited by the processor.
+        Outcome::ThroughTheEye => return Ok(None),
         Outcome::TooLarge => n.div_ceil(2),
         Outcome::TooLong => MOST_OF_A_TILE as usize,
     };
@@ -204,6 +208,12 @@ fn run_on(
         }
         let run = |inputs: &[(BufferId, &[u8])]| ready.run(inputs).map_err(Failure::from);
         let run = whole.with_inputs(splats, &all, &attributes, &received, accumulator, run)?;
+        let (projected, joined) = &whole.project;
+        let projection = run.bytes(joined.of(projected.state));
+        if project::through_the_eye(projection)? > 0 {
+            return Ok(Outcome::ThroughTheEye);
+        }
+        let visible = project::visible(projection)?;
         let had_room = shadows::had_room(&whole.shadows, &run, &mut casts)?;
         // Too little room: found once, for the device says what it needs. Without all shadows it is another picture.
         if !(whole.had_room(&run, &mut rooms)? && had_room) {
@@ -213,8 +223,6 @@ fn run_on(
         let (counts, opaque) = whole.finish(&run, accumulator, |counts| too_long(device, counts))?;
         let Some(counts) = counts else { return Ok(Outcome::TooLong) };
         let raster = raster_counts(&counts, whole.recording.bytes());
-        let (projected, joined) = &whole.project;
-        let visible = project::visible(run.bytes(joined.of(projected.state)))?;
         return Ok(Outcome::Done(Chained { visible, raster, opaque, passes: run.passes }));
     }
 }

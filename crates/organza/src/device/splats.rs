@@ -33,7 +33,9 @@ pub(super) fn raster_counts(counts: &Counts, bytes: u64) -> RasterCounts {
 /// What the recording does not do.
 pub(super) fn why_not_composite(input: &Input<'_>) -> Option<&'static str> {
     let half = input.params.accumulation == Accumulation::F16;
+    let through = input.projected.crosses_the_eye();
     half.then_some("splats are composited in half precision by the processor")
+        .or(through.then_some("surfaces through the eye plane are composited by the processor"))
 }
 
 /// [`splat_core::raster::fold`] by a device, with the times of its passes; the accumulator changes only when all is done.

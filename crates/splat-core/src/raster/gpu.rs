@@ -406,6 +406,7 @@ impl Recorded {
 
     fn check_splats(&self, input: &Input<'_>) -> Result<(), Error> {
         let (projected, room) = (input.projected, self.capacities);
+        check_near(projected)?;
         let n = projected.splats.len();
         fits("splats", n as u64, room.splats)?;
         fits("splats in order", input.order.len() as u64, room.ordered)?;
@@ -442,6 +443,12 @@ impl Recorded {
     pub fn counts(&self, state: &[u8]) -> Result<Counts, Error> {
         Counts::read(state, self.counted)
     }
+}
+
+/// Discs through the eye plane are the processor's.
+fn check_near(projected: &Projected) -> Result<(), Error> {
+    let near = projected.near.len();
+    if near > 0 { refused("discs through the eye plane", near.to_string(), "none") } else { Ok(()) }
 }
 
 fn check_ids(ids: &[u32], splats: usize) -> Result<(), Error> {

@@ -31,6 +31,8 @@ pub(crate) struct Kernel {
     pub(crate) cutoff: f32,
     /// 1/∫w dA for R = 1.
     pub(crate) norm: f32,
+    /// Half the width of its share before a plane, [`Lanes::share_in_front`], for R = 1.
+    pub(crate) depth: f32,
     /// Spacing of the lattice that it is meant for, for R = 1.
     pub(crate) spacing: f32,
     /// For depths: what an optical depth is multiplied with, the constant and the slope in s.
@@ -51,6 +53,7 @@ impl Kernel {
         Self {
             cutoff: footprint.cutoff,
             norm: footprint.norm() as f32,
+            depth: depth_of(footprint),
             spacing: footprint.spacing_for_radius(1.0),
             narrowing: narrowing(footprint),
             sharpness,
@@ -95,6 +98,11 @@ impl Kernel {
 fn narrowing(footprint: &Footprint) -> [f32; 2] {
     let [all, first, second] = footprint.moments();
     depth_profile::narrowing(first / all, second / all, f64::from(footprint.spacing_for_radius(1.0)))
+}
+
+/// Half the width of the triweight that has the deviation of a footprint of R = 1: its own is a third of it.
+pub(crate) fn depth_of(footprint: &Footprint) -> f32 {
+    (3.0 * footprint.deviation()) as f32
 }
 
 /// The polynomial that equals G at the Chebyshev points.

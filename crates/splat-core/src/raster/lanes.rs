@@ -140,8 +140,8 @@ impl<S: Simd> Lanes<S> {
         tiny.where_less_or(self.abs(), of(1.0 / 16384.0), normal).min(of(65504.0)).max(of(-65504.0))
     }
 
-    /// Share of a medium kernel in front of a plane at t = distance/R from its centre: the distribution function of the
-    /// triweight density 35/32·(1 − t²)³, whose deviation is R/3, as the footprint's at the default cutoff.
+    /// Share of a medium kernel before a plane at t = distance/D behind its centre: the distribution function of the
+    /// triweight density 35/32·(1 − t²)³. D is three deviations of the kernel, [`Kernel::depth`](super::kernel::Kernel) · R.
     #[inline(always)]
     pub(crate) fn share_in_front(self) -> Self {
         let of = |v| Self::splat(self.simd, v);

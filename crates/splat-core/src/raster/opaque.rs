@@ -7,8 +7,8 @@ use super::RasterCounts;
 use super::bins::{Bins, TILE, bin};
 use super::kernel::Kernel;
 use super::lanes::{Lanes, MAX_LANES};
-use super::projected::{Projected, ProjectedDepth, ProjectedSplat};
-use super::tile::{AREA, BATCH, Runs, for_each_span};
+use super::projected::{NearDisc, Projected, ProjectedDepth, ProjectedSplat};
+use super::tile::{AREA, BATCH, Run, Runs, for_each_span};
 use crate::Progress;
 use pulp::Simd;
 use rayon::prelude::*;
@@ -30,10 +30,31 @@ pub struct OpaqueImage {
     pub object: Vec<u32>,
 }
 
+/// One opaque splat.
+#[derive(Clone, Copy, Default)]
+struct Disc {
+    splat: ProjectedSplat,
+    depth: ProjectedDepth,
+    /// If it reaches through the eye plane.
+    near: Option<NearDisc>,
+}
+
+impl Disc {
+    /// s and view depth of a run of pixels.
+    #[inline(always)]
+    fn at<S: Simd>(&self, simd: S, run: Run<S>, perspective: bool) -> [Lanes<S>; 2] {
+        match &self.near {
+            None => [run.distance_sq(simd, &self.splat), run.depth(simd, &self.depth)],
+            Some(near) => run.meet(simd, &self.splat, near, perspective),
+        }
+    }
+}
+
 /// Planes of `AREA` numbers each.
 struct OpaqueTile {
     x: usize,
     y: usize,
+    perspective: bool,
     /// Nearest depth, +∞ where there is none; at last the blended depth.
     depth: Vec<f32>,
     weight: Vec<f32>,
@@ -67,7 +88,7 @@ pub fn resolve_opaque(
         .into_par_iter()
         .filter(|&t| !bins.is_empty(t) && !progress.is_cancelled())
         .map(|t| {
-            let mut tile = OpaqueTile::new(&bins, t, channels, objects);
+            let mut tile = OpaqueTile::new(&bins, t, channels, objects, projected.perspective.is_some());
             pulp::Arch::new().dispatch(ResolveTile { tile: &mut tile, bins: &bins, t, projected, values });
             tile
         })
@@ -114,30 +135,31 @@ impl pulp::WithSimd for ResolveTile<'_> {
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { tile, bins, t, projected, values } = self;
         let (channels, size) = (tile.channels.len() / AREA, projected.size);
-        let mut records = [(ProjectedSplat::default(), ProjectedDepth::default()); BATCH];
+        let mut records = [Disc::default(); BATCH];
         let batches = || bins.tile(t).flat_map(|list| list.chunks(BATCH));
-        let gather = |batch: &[u32], records: &mut [(ProjectedSplat, ProjectedDepth)]| {
+        let gather = |batch: &[u32], records: &mut [Disc]| {
             for (&j, record) in batch.iter().zip(records) {
-                *record = (projected.splats[j as usize], projected.depths[j as usize]);
+                let (splat, depth) = (projected.splats[j as usize], projected.depths[j as usize]);
+                *record = Disc { splat, depth, near: projected.near_disc(&splat, j).copied() };
             }
         };
         for batch in batches() {
             gather(batch, &mut records);
-            records[..batch.len()].iter().for_each(|(splat, depth)| tile.nearest(simd, size, splat, depth));
+            records[..batch.len()].iter().for_each(|disc| tile.nearest(simd, size, disc));
         }
         if !tile.object.is_empty() {
             for batch in batches() {
                 gather(batch, &mut records);
-                for ((splat, depth), &j) in records.iter().zip(batch) {
-                    tile.name_nearest(simd, size, splat, depth, projected.objects[j as usize]);
+                for (disc, &j) in records.iter().zip(batch) {
+                    tile.name_nearest(simd, size, disc, projected.objects[j as usize]);
                 }
             }
         }
         for batch in batches() {
             gather(batch, &mut records);
-            for ((splat, depth), &j) in records.iter().zip(batch) {
-                let kernel = &projected.kernels[splat.footprint as usize];
-                tile.blend(simd, size, splat, depth, kernel, &values[j as usize * channels..][..channels]);
+            for (disc, &j) in records.iter().zip(batch) {
+                let kernel = &projected.kernels[disc.splat.footprint as usize];
+                tile.blend(simd, size, disc, kernel, &values[j as usize * channels..][..channels]);
             }
         }
         tile.normalize();
@@ -145,8 +167,9 @@ impl pulp::WithSimd for ResolveTile<'_> {
 }
 
 impl OpaqueTile {
-    fn new(bins: &Bins, t: usize, channels: usize, objects: bool) -> Self {
+    fn new(bins: &Bins, t: usize, channels: usize, objects: bool, perspective: bool) -> Self {
         Self {
+            perspective,
             x: (t % bins.columns) * TILE,
             y: (t / bins.columns) * TILE,
             depth: vec![f32::INFINITY; AREA],
@@ -160,13 +183,14 @@ impl OpaqueTile {
 
     /// Step 1: the nearest depth.
     #[inline(always)]
-    fn nearest<S: Simd>(&mut self, simd: S, size: [u32; 2], splat: &ProjectedSplat, depth: &ProjectedDepth) {
-        let runs = Runs::new(simd, splat, size, [self.x, self.y]);
+    fn nearest<S: Simd>(&mut self, simd: S, size: [u32; 2], disc: &Disc) {
+        let runs = Runs::new(simd, &disc.splat, size, [self.x, self.y]);
         self.fragments += runs.pixels();
         for run in runs {
             let far = Lanes::splat(simd, f32::INFINITY);
             let core = Lanes::splat(simd, CORE);
-            let solid = run.depth(simd, depth).where_less_or(run.distance_sq(simd, splat), core, far);
+            let [s, depth] = disc.at(simd, run, self.perspective);
+            let solid = depth.where_less_or(s, core, far);
             let nearest = &mut self.depth[run.pixel()..];
             Lanes::load(simd, nearest).min(solid).store(nearest);
         }
@@ -174,18 +198,12 @@ impl OpaqueTile {
 
     /// Whose the nearest depth is; of several at the same depth the first.
     #[inline(always)]
-    fn name_nearest<S: Simd>(
-        &mut self,
-        simd: S,
-        size: [u32; 2],
-        splat: &ProjectedSplat,
-        depth: &ProjectedDepth,
-        object: u32,
-    ) {
-        for run in Runs::new(simd, splat, size, [self.x, self.y]) {
+    fn name_nearest<S: Simd>(&mut self, simd: S, size: [u32; 2], disc: &Disc, object: u32) {
+        for run in Runs::new(simd, &disc.splat, size, [self.x, self.y]) {
             let (mut s, mut z) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
-            run.distance_sq(simd, splat).store(&mut s);
-            run.depth(simd, depth).store(&mut z);
+            let [distance_sq, depth] = disc.at(simd, run, self.perspective);
+            distance_sq.store(&mut s);
+            depth.store(&mut z);
             for i in 0..Lanes::<S>::COUNT {
                 let k = run.pixel() + i;
                 if s[i] < CORE && z[i] == self.depth[k] && self.object[k] == u32::MAX {
@@ -197,26 +215,19 @@ impl OpaqueTile {
 
     /// Step 2: weights of all fragments within ε-z of the nearest.
     #[inline(always)]
-    fn blend<S: Simd>(
-        &mut self,
-        simd: S,
-        size: [u32; 2],
-        splat: &ProjectedSplat,
-        depth: &ProjectedDepth,
-        kernel: &Kernel,
-        values: &[f32],
-    ) {
+    fn blend<S: Simd>(&mut self, simd: S, size: [u32; 2], disc: &Disc, kernel: &Kernel, values: &[f32]) {
         let of = |v: f32| Lanes::splat(simd, v);
-        let runs = Runs::new(simd, splat, size, [self.x, self.y]);
+        let runs = Runs::new(simd, &disc.splat, size, [self.x, self.y]);
         self.fragments += runs.pixels();
         for run in runs {
             let k = run.pixel();
             let nearest = Lanes::load(simd, &self.depth[k..]);
             // Behind by how much; where there is no surface −∞, and nothing counts.
-            let behind = run.depth(simd, depth) - nearest;
-            let t = (of(1.0) - run.distance_sq(simd, splat)).max(of(0.0));
-            let amount = of(splat.peak) * kernel.profile(simd, t);
-            let near = amount.where_less(behind, of(EPSILON_Z * depth.extent));
+            let [s, depth] = disc.at(simd, run, self.perspective);
+            let behind = depth - nearest;
+            let t = (of(1.0) - s).max(of(0.0));
+            let amount = of(disc.splat.peak) * kernel.profile(simd, t);
+            let near = amount.where_less(behind, of(EPSILON_Z * disc.depth.extent));
             let weight = near.where_less(nearest, of(f32::INFINITY));
             let add = |plane: &mut [f32], v: Lanes<S>| (Lanes::load(simd, plane) + v).store(plane);
             add(&mut self.weight[k..], weight);

@@ -3,7 +3,12 @@
 //! **Medium.** For a centre c = z(u₀, v₀, 1) and a ray d = (u₀+du, v₀+dv, 1) the squared distance of the centre from the
 //! ray is ρ² = |c × d|²/|d|² = z²·(du² + dv² + (u₀dv − v₀du)²)/|d|²: a quadratic form in the pixel offset, exact in
 //! perspective, over a factor that depends on the pixel alone. Nothing cancels for far centres. The form spans
-//! |dx| ≤ √((1 + u₀²)/scale) where |d|² is that of the centre; R/z widens it for the change of |d|² across the footprint.
+//! (r²|u₀| ± r·√(1 + u₀² − r²))/(1 − r²) with r = R/z: the planes through the eye that touch the ball. From r = 1 on it may
+//! reach every pixel.
+//!
+//! What reaches through the eye plane counts with its part before it: a medium with the share of its kernel there, a disc
+//! where the ray meets its plane at a positive depth ([`NearDisc`]). The form of a medium holds for centres behind the eye
+//! too, and loses its digits only where z is much smaller than the splat: such centres are seen from R/32 away.
 //!
 //! **Disc.** The tangent disc is projected by its Jacobian at the centre (Zwicker's EWA): conic = (J Jᵀ + filter)⁻¹, and
 //! the diagonal of J Jᵀ + filter is the square of the half extents.
@@ -12,9 +17,9 @@ use super::Params;
 use super::gather::{Attributes, Column, Columns};
 use super::kernel::Kernel;
 use super::lanes::Lanes;
-use super::projected::{Coverage, Detail, Projected, ProjectedDepth, ProjectedSplat};
+use super::projected::{Coverage, Detail, NearDisc, Projected, ProjectedDepth, ProjectedSplat};
 use crate::{Camera, Cloud, FootprintStack, Material, ViewTransform};
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use pulp::Simd;
 use rayon::prelude::*;
 
@@ -23,6 +28,9 @@ use rayon::prelude::*;
 /// draw a dark rim. Where nothing of the same surface faces the viewer this weight cancels: a back is seen as it is. A
 /// power of two, which changes no bit of the quotient.
 const FACING_AWAY: f32 = 1.0 / 256.0;
+
+/// Least distance of a centre from the eye as a share of the radius, in perspective: nearer, image positions run to infinity.
+const LEAST_DEPTH: f32 = 1.0 / 32.0;
 
 /// Splats projected by one task.
 const CHUNK: usize = 4096;
@@ -46,8 +54,7 @@ pub fn project(
 /// Projects all splats of `cloud`; `out` may hold another frame's projection, whose memory is used again.
 ///
 /// In the order of ids, which is that of memory: splats in view order lie far apart, and gathering their attributes one
-/// column at a time would cost more than projecting those that turn out to be hidden. A splat around the eye has no
-/// image; it is left out as a whole.
+/// column at a time would cost more than projecting those that turn out to be hidden.
 ///
 /// # Panics
 /// If a material or a footprint of the cloud is out of range; `Cloud::validate` and the tables promise it is not.
@@ -69,11 +76,13 @@ pub fn project_into(
     out.kernels.extend(footprints.layers().iter().map(Kernel::new));
     out.size = camera.size;
     out.perspective = (!camera.is_orthographic()).then_some(camera.focal_px() as f32);
+    let half = Vec2::new(camera.size[0] as f32, camera.size[1] as f32) * 0.5;
     let projector = Projector {
         columns: Columns { cloud, kernels: &out.kernels, materials },
         view: camera.view_from_offset(cloud.origin),
         focal: camera.focal_px() as f32,
-        half: Vec2::new(camera.size[0] as f32, camera.size[1] as f32) * 0.5,
+        half,
+        reach: half / camera.focal_px() as f32,
         orthographic: camera.is_orthographic(),
         size: camera.size,
         filter_sigma_px: params.resampling_sigma_px,
@@ -81,10 +90,15 @@ pub fn project_into(
     let mut depths: Vec<&mut [ProjectedDepth]> = out.depths.chunks_mut(CHUNK).collect();
     depths.resize_with(cloud.len().div_ceil(CHUNK), Default::default);
     let chunks = out.splats.par_chunks_mut(CHUNK).zip(out.coverage.par_chunks_mut(CHUNK)).zip(depths);
-    chunks.enumerate().for_each(|(chunk, ((splats, coverage), depths))| {
-        let first = chunk * CHUNK;
-        pulp::Arch::new().dispatch(ProjectChunk { projector: &projector, first, splats, coverage, depths });
-    });
+    let near: Vec<Vec<NearDisc>> = chunks
+        .enumerate()
+        .map(|(chunk, ((splats, coverage), depths))| {
+            let first = chunk * CHUNK;
+            pulp::Arch::new().dispatch(ProjectChunk { projector: &projector, first, splats, coverage, depths })
+        })
+        .collect();
+    out.near.clear();
+    out.near.extend(near.into_iter().flatten());
 }
 
 /// What all splats of a projection share.
@@ -93,6 +107,8 @@ struct Projector<'a> {
     view: ViewTransform,
     focal: f32,
     half: Vec2,
+    /// Half the image over the focal length: |x/z| and |y/z| of its borders.
+    reach: Vec2,
     orthographic: bool,
     size: [u32; 2],
     filter_sigma_px: f32,
@@ -109,23 +125,35 @@ struct ProjectChunk<'a> {
 }
 
 impl pulp::WithSimd for ProjectChunk<'_> {
-    type Output = ();
+    /// The discs that reach through the eye plane.
+    type Output = Vec<NearDisc>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
+    fn with_simd<S: Simd>(self, simd: S) -> Vec<NearDisc> {
         let (projector, lanes) = (self.projector, Lanes::<S>::COUNT);
         let mut attributes = Attributes::default();
         let mut image = Image::default();
+        let mut near = Vec::new();
         for begin in (0..self.splats.len()).step_by(lanes) {
             attributes.read(&projector.columns, self.first + begin, lanes);
             projector.project(simd, &attributes, &mut image);
             let end = self.splats.len().min(begin + lanes);
             let splats = &mut self.splats[begin..end];
             projector.write(self.first + begin, &image, splats, &mut self.coverage[begin..end]);
+            if attributes.any_disc && image.any_near(splats.len()) {
+                projector.write_near(
+                    self.first + begin,
+                    &attributes,
+                    &image,
+                    (splats, &self.coverage[begin..end]),
+                    &mut near,
+                );
+            }
             if !self.depths.is_empty() {
                 image.write_depths(&attributes, &mut self.depths[begin..end]);
             }
         }
+        near
     }
 }
 
@@ -139,11 +167,15 @@ struct Image {
     peak: Column,
     half_extent: [Column; 2],
     slope: [Column; 2],
+    /// 1 for a disc that reaches through the eye plane, else −1.
+    near: Column,
 }
 
 /// Centres in view space.
 struct Centers<S: Simd> {
     position: [Lanes<S>; 3],
+    /// View depth; that of `position` keeps a least distance from the eye plane.
+    before: Lanes<S>,
     px_per_world: Lanes<S>,
     /// x/z and y/z; 0 for parallel rays.
     u: Lanes<S>,
@@ -157,6 +189,8 @@ struct Shapes<S: Simd> {
     peak: Lanes<S>,
     half_extent: [Lanes<S>; 2],
     slope: [Lanes<S>; 2],
+    /// 1 for a disc that reaches through the eye plane, else −1.
+    near: Lanes<S>,
 }
 
 impl Projector<'_> {
@@ -176,11 +210,11 @@ impl Projector<'_> {
         let [x, y, z] = centers.position;
         (of(self.half.x) + x * centers.px_per_world).store(&mut image.center[0]);
         (of(self.half.y) - y * centers.px_per_world).store(&mut image.center[1]);
-        z.store(&mut image.depth);
-        // A splat around the eye has no image; comparisons with NaN are false, so what is no number has none either.
-        let near = if self.orthographic { of(f32::NEG_INFINITY) } else { load(&attributes.radius) };
-        let peak = shapes.peak.where_less(near, z);
-        peak.where_less(of(0.0), shapes.peak).store(&mut image.peak);
+        // Where a ray meets a disc through the eye plane is told from where that is seen.
+        z.where_less_or(of(0.0), shapes.near, centers.before).store(&mut image.depth);
+        // Comparisons with NaN are false: what is no number has no image.
+        shapes.peak.where_less(of(0.0), shapes.peak).store(&mut image.peak);
+        shapes.near.store(&mut image.near);
         for k in 0..3 {
             shapes.conic[k].store(&mut image.conic[k]);
         }
@@ -199,9 +233,14 @@ impl Projector<'_> {
         let [x, y, z] = position;
         let filter_px = Lanes::load(simd, &attributes.cutoff) * of(self.filter_sigma_px);
         if self.orthographic {
-            return Centers { position, px_per_world: of(self.focal), u: of(0.0), v: of(0.0), filter_px };
+            return Centers { position, before: z, px_per_world: of(self.focal), u: of(0.0), v: of(0.0), filter_px };
         }
-        Centers { position, px_per_world: of(self.focal) / z, u: x / z, v: y / z, filter_px }
+        let before = z;
+        let least = Lanes::load(simd, &attributes.radius) * of(LEAST_DEPTH);
+        let side = (of(0.0) - least).where_less_or(z, of(0.0), least);
+        let z = side.where_less_or(z.abs(), least, z);
+        let position = [x, y, z];
+        Centers { before, position, px_per_world: of(self.focal) / z, u: x / z, v: y / z, filter_px }
     }
 
     /// Into view space, in the order of operations of [`ViewTransform::depth`].
@@ -228,15 +267,44 @@ impl Projector<'_> {
         let reach_sq = px_per_world * px_per_world * radius_sq;
         let scale = of(1.0) / reach_sq;
         let (x_sq, y_sq) = (of(1.0) + u * u, of(1.0) + v * v);
-        let depth = centers.position[2].abs().max(radius);
-        let widen = if self.orthographic { of(1.0) } else { of(1.0) + of(2.0) * (radius / depth) };
+        let depth = radius * load(&attributes.depth);
+        let front = (centers.before / depth).share_in_front().where_less_or(centers.before, depth, of(1.0));
+        let mut peak = load(&attributes.cross_section) * load(&attributes.norm) / radius_sq * front;
+        let mut half_extent = [reach_sq.sqrt(); 2];
+        if !self.orthographic {
+            let ratio_sq = reach_sq / of(self.focal * self.focal);
+            half_extent = [self.extent_of_ball(simd, u, x_sq, ratio_sq), self.extent_of_ball(simd, v, y_sq, ratio_sq)];
+            peak = self.in_view(simd, centers, radius_sq.sqrt(), peak);
+        }
         Shapes {
             // y runs down in the image, so the mixed term changes its sign.
             conic: [y_sq * scale, of(2.0) * (u * v * scale), x_sq * scale],
-            peak: load(&attributes.cross_section) * load(&attributes.norm) / radius_sq,
-            half_extent: [(x_sq * reach_sq).sqrt() * widen, (y_sq * reach_sq).sqrt() * widen],
-            slope: [of(0.0); 2],
+            peak,
+            half_extent,
+            slope: [of(1.0) / depth, of(1.0) / front],
+            near: of(-1.0),
         }
+    }
+
+    /// Half the extent of the image of a ball about that of its centre, pixels: `slope` is x/z, `length_sq` 1 + (x/z)², and
+    /// `ratio_sq` (R/z)². Everything where the ball reaches the eye plane.
+    #[inline(always)]
+    fn extent_of_ball<S: Simd>(&self, simd: S, slope: Lanes<S>, length_sq: Lanes<S>, ratio_sq: Lanes<S>) -> Lanes<S> {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let across = (ratio_sq * (length_sq - ratio_sq)).sqrt();
+        let extent = (slope.abs() * ratio_sq + across) / (of(1.0) - ratio_sq) * of(self.focal);
+        extent.where_less_or(ratio_sq, of(1.0), of(f32::INFINITY))
+    }
+
+    /// `peak` where a ball about the centre, or about its mirror image at the eye, reaches into the image; else 0.
+    #[inline(always)]
+    fn in_view<S: Simd>(&self, simd: S, centers: &Centers<S>, radius: Lanes<S>, peak: Lanes<S>) -> Lanes<S> {
+        let [x, y, z] = centers.position;
+        let across = |v: Lanes<S>, reach: f32, peak: Lanes<S>| {
+            let of = |v: f32| Lanes::splat(simd, v);
+            peak.where_less(v.abs() - z.abs() * of(reach), radius * of((1.0 + reach * reach).sqrt()))
+        };
+        across(y, self.reach.y, across(x, self.reach.x, peak))
     }
 
     #[inline(always)]
@@ -268,17 +336,45 @@ impl Projector<'_> {
         };
         let slab = peak / (along.abs() / length).max(of(1e-3));
         peak = slab.where_less_or(load(&attributes.crossing), of(0.0), peak);
-        let away = of(FACING_AWAY).where_less_or(of(0.0), along, of(1.0));
+        // The side of the plane that the eye is on: for a centre behind the eye `along` has the other sign.
+        let facing = if self.orthographic { along } else { along * centers.position[2] };
+        let away = of(FACING_AWAY).where_less_or(of(0.0), facing, of(1.0));
         peak = peak * away.where_less_or(load(&attributes.opaque), of(0.0), of(1.0));
+        let (near, half_extent, peak) = self.near_discs(simd, centers, [axis_u, axis_v], [xx.sqrt(), yy.sqrt()], peak);
         // An edge-on plane has no slope that could be used; its fragments stay at the centre's depth.
         let per_px = of(1.0) / (along * px_per_world);
         let usable = |slope: Lanes<S>| slope.where_less(of(1e-4), along.abs());
         Shapes {
             conic: [yy * inverse, of(-2.0) * (mixed * inverse), xx * inverse],
             peak,
-            half_extent: [xx.sqrt(), yy.sqrt()],
+            half_extent,
             slope: [usable(of(0.0) - normal[0] * per_px), usable(normal[1] * per_px)],
+            near,
         }
+    }
+
+    /// Which discs reach through the eye plane, where they may lie in the image, and the peaks of those that may be seen. In
+    /// perspective all whose ball does, for the affine form holds far from the eye alone.
+    #[inline(always)]
+    fn near_discs<S: Simd>(
+        &self,
+        simd: S,
+        centers: &Centers<S>,
+        axes: [[Lanes<S>; 3]; 2],
+        half_extent: [Lanes<S>; 2],
+        peak: Lanes<S>,
+    ) -> (Lanes<S>, [Lanes<S>; 2], Lanes<S>) {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let z = centers.before;
+        let along = (axes[0][2] * axes[0][2] + axes[1][2] * axes[1][2]).sqrt();
+        let peak = peak.where_less(of(0.0), z + along);
+        if self.orthographic {
+            return (of(1.0).where_less_or(z, along, of(-1.0)), half_extent, peak);
+        }
+        let radius = dot(axes[0], axes[0]).max(dot(axes[1], axes[1])).sqrt();
+        let everywhere = |extent: Lanes<S>| of(f32::INFINITY).where_less_or(z, radius, extent);
+        let seen = self.in_view(simd, centers, radius, peak).where_less_or(z, radius, peak);
+        (of(1.0).where_less_or(z, radius, of(-1.0)), half_extent.map(everywhere), seen)
     }
 
     /// Semi-axes of the discs in view space.
@@ -329,9 +425,48 @@ impl Projector<'_> {
             *coverage = if shown { Coverage::of(splat.bounds(self.size)) } else { Coverage::NONE };
         }
     }
+
+    /// Marks and lists the discs of a group that reach through the eye plane and may be seen.
+    #[cold]
+    fn write_near(
+        &self,
+        first: usize,
+        attributes: &Attributes,
+        image: &Image,
+        (splats, coverage): (&mut [ProjectedSplat], &[Coverage]),
+        list: &mut Vec<NearDisc>,
+    ) {
+        for (l, splat) in splats.iter_mut().enumerate() {
+            if image.near[l] <= 0.0 || coverage[l] == Coverage::NONE {
+                continue;
+            }
+            splat.set_near();
+            let (id, center) = ((first + l) as u32, image.depth[l]);
+            let slab = if attributes.crossing[l] < 0.0 { self.slab_of(id, splat.center_px) } else { [0.0; 2] };
+            list.push(NearDisc { id, center, slope: image.slope.map(|s| s[l]), slab });
+        }
+    }
+
+    /// n·c/z of a slab with the image position of its centre, and the |cosine| that its peak was divided by.
+    fn slab_of(&self, id: u32, at: [f32; 2]) -> [f32; 2] {
+        let normal = self.view.rotation * self.columns.cloud.normal_of(id as usize);
+        let ray = if self.orthographic {
+            Vec3::Z
+        } else {
+            Vec3::new((at[0] - self.half.x) / self.focal, (self.half.y - at[1]) / self.focal, 1.0)
+        };
+        let along = normal.dot(ray);
+        [along, (along.abs() / ray.length()).max(1e-3)]
+    }
 }
 
 impl Image {
+    /// Whether one of the first `count` reaches through the eye plane.
+    #[inline(always)]
+    fn any_near(&self, count: usize) -> bool {
+        self.near[..count].iter().fold(false, |any, near| any | (*near > 0.0))
+    }
+
     fn write_depths(&self, attributes: &Attributes, depths: &mut [ProjectedDepth]) {
         for (l, depth) in depths.iter_mut().enumerate() {
             let (center, slope, extent) = (self.depth[l], self.slope.map(|s| s[l]), attributes.radius[l]);
@@ -351,6 +486,7 @@ impl<S: Simd> Shapes<S> {
             conic: [choose(a, d), choose(b, e), choose(c, f)],
             peak: choose(self.peak, other.peak),
             half_extent: pair(self.half_extent, other.half_extent),
+            near: choose(self.near, other.near),
             slope: pair(self.slope, other.slope),
         }
     }

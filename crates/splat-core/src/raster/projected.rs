@@ -15,7 +15,8 @@ pub struct ProjectedSplat {
     pub conic: [f32; 3],
     /// Optical depth where the profile is 1: K·norm/R². For an opaque splat the weight there, area·norm/R².
     pub peak: f32,
-    /// Half the extent in x and y, pixels: the upper halves of f32s, rounded up.
+    /// Half the extent in x and y, pixels: the upper halves of f32s, rounded up. The sign of the first marks a disc that
+    /// reaches through the eye plane.
     pub(crate) half_extent: [u16; 2],
     /// Material id.
     pub material: u16,
@@ -30,10 +31,26 @@ pub struct ProjectedSplat {
 pub struct ProjectedDepth {
     /// View depth of the centre.
     pub center: f32,
-    /// Change per pixel across a disc; 0 for a medium.
+    /// Change per pixel across a disc. Of a medium, 1/D of its share before a plane, and one over the share of it that lies
+    /// before the eye.
     pub slope: [f32; 2],
     /// Largest distance in depth between a fragment and the centre: R.
     pub extent: f32,
+}
+
+/// A disc that reaches through the eye plane: which pixels see it, each of its fragments tells.
+///
+/// In perspective w = 1 − slope·(dx, dy)/z is (n·d)/(n·c/z) for a pixel's ray d: the ray meets the disc's plane at the depth
+/// z/w, and s is the conic over w². For parallel rays the depth is linear and s the conic.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct NearDisc {
+    pub(crate) id: u32,
+    /// View depth of the centre.
+    pub(crate) center: f32,
+    /// Change of depth per pixel at the centre.
+    pub(crate) slope: [f32; 2],
+    /// n·c/z, and the |cosine| that a slab's peak was divided by; 0 for what is no slab.
+    pub(crate) slab: [f32; 2],
 }
 
 /// Which parts of a projection are made beside the footprints.
@@ -61,6 +78,8 @@ pub struct Projected {
     pub objects: Vec<u32>,
     /// Tiles that each footprint reaches.
     pub(crate) coverage: Vec<Coverage>,
+    /// Discs through the eye plane, by id.
+    pub(crate) near: Vec<NearDisc>,
     pub(crate) kernels: Vec<Kernel>,
     /// Focal length, pixels, for rays; `None` for parallel rays.
     pub(crate) perspective: Option<f32>,
@@ -85,6 +104,23 @@ impl Projected {
             + size_of_val(&*self.depths)
             + size_of_val(&*self.objects)
             + size_of_val(&*self.coverage)) as u64
+    }
+
+    /// Whether discs reach through the eye plane, which only the processor composites.
+    pub fn crosses_the_eye(&self) -> bool {
+        !self.near.is_empty()
+    }
+
+    /// What is known of disc `i` if it reaches through the eye plane.
+    #[inline(always)]
+    pub(crate) fn near_disc(&self, splat: &ProjectedSplat, i: u32) -> Option<&NearDisc> {
+        splat.is_near().then(|| self.found(i))
+    }
+
+    #[cold]
+    fn found(&self, i: u32) -> &NearDisc {
+        let at = self.near.binary_search_by_key(&i, |near| near.id);
+        &self.near[at.expect("invariant: a disc that is marked is listed")]
     }
 
     /// Object of splat `i`; `u32::MAX` when not asked for.
@@ -116,11 +152,23 @@ impl ProjectedSplat {
         self.half_extent = [pack(half_extent[0]), pack(half_extent[1])];
     }
 
+    /// Marks a disc that reaches through the eye plane.
+    #[inline(always)]
+    pub(crate) fn set_near(&mut self) {
+        self.half_extent[0] |= 0x8000;
+    }
+
+    /// Whether it is one.
+    #[inline(always)]
+    pub(crate) fn is_near(&self) -> bool {
+        self.half_extent[0] & 0x8000 != 0
+    }
+
     /// Pixel rectangle [x0, x1, y0, y1) within an image of `size`; empty when x0 ≥ x1 or y0 ≥ y1.
     #[inline(always)]
     pub(crate) fn bounds(&self, size: [u32; 2]) -> [u32; 4] {
         let range = |axis: usize| {
-            let extent = f32::from_bits(u32::from(self.half_extent[axis]) << 16);
+            let extent = f32::from_bits(u32::from(self.half_extent[axis] & 0x7fff) << 16);
             // Pixel i is covered when |i + ½ − centre| < extent; casts round down, and on the rim itself w = 0.
             let clamp = |v: f32| v.max(0.0).min(size[axis] as f32) as i32 as u32;
             let (center, extent) = (self.center_px[axis] + 0.5, extent);

@@ -6,7 +6,7 @@
 
 use super::bins::TILE;
 use super::lanes::{Lanes, MAX_LANES};
-use super::projected::{ProjectedDepth, ProjectedSplat};
+use super::projected::{NearDisc, ProjectedDepth, ProjectedSplat};
 use pulp::Simd;
 
 /// Side of a block, pixels.
@@ -138,7 +138,23 @@ impl<S: Simd> Run<S> {
         along.mul_add(self.dx, of(splat.conic[2]) * self.dy * self.dy)
     }
 
-    /// View depths: the plane of a disc, the centre of a medium.
+    /// s and view depths of a disc that reaches through the eye plane. Where it lies behind, s is 1 and the depth the largest
+    /// number.
+    #[inline(always)]
+    pub(crate) fn meet(&self, simd: S, splat: &ProjectedSplat, near: &NearDisc, perspective: bool) -> [Lanes<S>; 2] {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let (mut s, rise) = (self.distance_sq(simd, splat), of(near.slope[0]) * self.dx + of(near.slope[1]) * self.dy);
+        let mut depth = of(near.center) + rise;
+        if perspective {
+            let w = of(1.0) - rise / of(near.center);
+            s = s / (w * w);
+            depth = of(near.center) / w;
+        }
+        let depth = depth.min(of(f32::MAX));
+        [s.where_less_or(of(0.0), depth, of(1.0)), depth.where_less_or(of(0.0), depth, of(f32::MAX))]
+    }
+
+    /// View depths: the plane of a disc.
     #[inline(always)]
     pub(crate) fn depth(&self, simd: S, depth: &ProjectedDepth) -> Lanes<S> {
         let of = |v: f32| Lanes::splat(simd, v);

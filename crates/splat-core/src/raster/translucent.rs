@@ -4,13 +4,13 @@
 //! rounding however many splats there are, and 1 − e^−τ comes from a series, so tiny τ keep their digits. A = Στ is what
 //! leaves the tile; a fold that goes on begins with T = e^−A. Back to front is the twin: C ← C + (1 − e^−τ)·(c − C).
 //!
-//! A medium that straddles an opaque surface counts with the share of its kernel in front of it: no
-//! seam where a cloud meets the ground.
+//! A medium that straddles an opaque surface counts with the share of its kernel in front of it, as it does at the eye plane: no
+//! seam where a cloud meets the ground. A disc that reaches through the eye plane counts where its plane lies before the eye.
 
 use super::bins::{Bins, TILE, bin};
 use super::kernel::Kernel;
 use super::lanes::{Lanes, MAX_LANES, SMALL, exp_neg};
-use super::projected::{Projected, ProjectedDepth, ProjectedSplat};
+use super::projected::{NearDisc, Projected, ProjectedDepth, ProjectedSplat};
 use super::tile::{AREA, BATCH, BLOCKS, Line, PIXELS, Run, Runs, for_each_span, position};
 use super::{Accumulation, OpaqueImage, Params, RasterCounts};
 use crate::depth_profile::DepthFragment;
@@ -32,6 +32,7 @@ struct Tile {
     channels: usize,
     /// 1/|d|² of each pixel's ray, 1 for parallel rays.
     ray_factor: Vec<f32>,
+    perspective: bool,
     /// Depth of the opaque surface, +∞ without; empty when no pixel has one.
     opaque_depth: Vec<f32>,
     /// Empty when not asked for, as is the next.
@@ -138,6 +139,8 @@ impl pulp::WithSimd for FoldTile<'_> {
 /// One splat as the fold reads it.
 struct Source<'a> {
     splat: &'a ProjectedSplat,
+    /// Of a disc that reaches through the eye plane.
+    near: Option<&'a NearDisc>,
     depth: ProjectedDepth,
     object: u32,
     kernel: &'a Kernel,
@@ -172,11 +175,13 @@ impl FoldTile<'_> {
                     let most = extinction[0].max(extinction[1]).max(extinction[2]);
                     let source = Source {
                         splat,
+                        near: projected.near_disc(splat, j),
                         depth: depths[k],
                         object: if deep { projected.object(j as usize) } else { u32::MAX },
                         kernel: &projected.kernels[splat.footprint as usize],
                         extinction,
-                        thin: splat.peak * most <= SMALL,
+                        // A slab across the eye plane is met at many angles.
+                        thin: splat.peak * most <= SMALL && !splat.is_near(),
                         value: &values[k * channels..][..channels],
                     };
                     self.tile.splat::<S, FRONT, HALF, PLANES, CHANNELS>(simd, &source);
@@ -207,6 +212,7 @@ impl Tile {
             planes,
             channels,
             ray_factor: ray_factors(projected, x, y),
+            perspective: projected.perspective.is_some(),
             opaque_depth,
             depth,
             object,
@@ -269,7 +275,10 @@ impl Tile {
         let runs = Runs::new(simd, source.splat, self.size, [self.x, self.y]);
         self.fragments += runs.pixels();
         for run in runs {
-            let tau = self.optical_depth(simd, source, run);
+            let tau = match source.near {
+                None => self.optical_depth(simd, source, run),
+                Some(near) => self.near_optical_depth(simd, source, run, near),
+            };
             self.composite::<S, FRONT, HALF, PLANES, CHANNELS>(simd, source, run, tau);
         }
     }
@@ -288,10 +297,30 @@ impl Tile {
         if !self.opaque_depth.is_empty() {
             let opaque = Lanes::load(simd, &self.opaque_depth[run.pixel()..]);
             tau = if medium {
-                tau * ((opaque - of(source.depth.center)) * of(1.0 / source.depth.extent)).share_in_front()
+                // What is seen is the part between the eye and the surface, as a share of all before the eye.
+                let [per_depth, per_front] = source.depth.slope;
+                let behind = of(1.0) - ((opaque - of(source.depth.center)) * of(per_depth)).share_in_front();
+                tau * behind.negate_mul_add(of(per_front), of(1.0)).max(of(0.0))
             } else {
                 tau.where_less(run.depth(simd, &source.depth), opaque)
             };
+        }
+        tau
+    }
+
+    /// τ of a run of pixels of a disc that reaches through the eye plane.
+    #[inline(always)]
+    fn near_optical_depth<S: Simd>(&self, simd: S, source: &Source<'_>, run: Run<S>, near: &NearDisc) -> Lanes<S> {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let [s, depth] = run.meet(simd, source.splat, near, self.perspective);
+        let mut tau = of(source.splat.peak) * source.kernel.profile(simd, (of(1.0) - s).max(of(0.0)));
+        if near.slab[1] > 0.0 && self.perspective {
+            let w = of(near.center) / depth;
+            let ray = Lanes::load(simd, &self.ray_factor[run.pixel()..]).sqrt();
+            tau = tau * of(near.slab[1]) / ((of(near.slab[0]) * w).abs() * ray).max(of(1e-3));
+        }
+        if !self.opaque_depth.is_empty() {
+            tau = tau.where_less(depth, Lanes::load(simd, &self.opaque_depth[run.pixel()..]));
         }
         tau
     }
@@ -353,9 +382,15 @@ impl Tile {
     ) {
         let (mut before, mut z) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
         nearer.store(&mut before);
-        run.depth(simd, &source.depth).store(&mut z);
-        let line = run.block * (2 * PLANES + self.channels) + PLANES / 2;
         let medium = source.splat.kind == SplatKind::Medium;
+        let depth = match source.near {
+            Some(near) => run.meet(simd, source.splat, near, self.perspective)[1],
+            // A medium has its centre's, and nothing lies behind the eye.
+            None if medium => Lanes::splat(simd, source.depth.center.max(0.0)),
+            None => run.depth(simd, &source.depth),
+        };
+        depth.store(&mut z);
+        let line = run.block * (2 * PLANES + self.channels) + PLANES / 2;
         let thickness = if medium { source.depth.extent * source.kernel.spacing } else { 0.0 };
         let mut narrow = [1.0; MAX_LANES];
         if medium && !self.depth.is_empty() {

@@ -36,7 +36,7 @@ pub(crate) fn chain_in_parts(
             }
             Outcome::TooLarge if ids.len() > LEAST => most = ids.len().div_ceil(2),
             Outcome::TooLong if ids.len() > MOST_OF_A_TILE as usize => most = MOST_OF_A_TILE as usize,
-            Outcome::TooLarge | Outcome::TooLong => return Ok(None),
+            Outcome::TooLarge | Outcome::TooLong | Outcome::ThroughTheEye => return Ok(None),
         }
     }
     *accumulator = begun;

@@ -22,6 +22,7 @@ use super::attributes::{AttributeBuffers, AttributeRoom, Attributes};
 use super::{SPLAT_WORDS, fits};
 use crate::optics::SurfaceOpacity;
 use crate::raster::Params;
+use crate::raster::kernel::depth_of;
 use crate::{Camera, Error, FootprintStack, Material};
 use splat_shaders::layouts::{ProjectState, ProjectView};
 use splat_shaders::{BufferId, Groups, Recording, kernels};
@@ -138,7 +139,7 @@ impl Recorded {
             footprints: footprints.len() as u32,
             unused: 0,
         };
-        let footprints = footprints.iter().map(|f| [f.norm() as f32, f.cutoff, 0.0, 0.0]);
+        let footprints = footprints.iter().map(|f| [f.norm() as f32, f.cutoff, depth_of(f), 0.0]);
         let slab = |m: &Material| f32::from(u8::from(m.surface_opacity == SurfaceOpacity::ThinSlab));
         let tables: Vec<[f32; 4]> =
             footprints.chain(input.materials.iter().map(|m| [slab(m), 0.0, 0.0, 0.0])).collect();
@@ -156,7 +157,20 @@ impl Recorded {
 /// # Errors
 /// [`Error::ColumnLength`] for bytes that no run gave.
 pub fn visible(state: &[u8]) -> Result<u64, Error> {
+    Ok(read(state)?.visible.into())
+}
+
+/// Discs through the eye plane among them, which only the processor draws: what is composited of this projection is wrong
+/// unless there are none.
+///
+/// # Errors
+/// As [`visible`].
+pub fn through_the_eye(state: &[u8]) -> Result<u64, Error> {
+    Ok(read(state)?.near.into())
+}
+
+fn read(state: &[u8]) -> Result<ProjectState, Error> {
     let (attribute, found, expected) = ("state read back", state.len(), size_of::<ProjectState>());
     let bytes = state.get(..expected).ok_or(Error::ColumnLength { attribute, found, expected })?;
-    Ok(bytemuck::pod_read_unaligned::<ProjectState>(bytes).visible.into())
+    Ok(bytemuck::pod_read_unaligned(bytes))
 }

@@ -23,7 +23,9 @@
 //! ```
 
 use super::list::{Counts, List, ListRoom};
-use super::{Image, SPLAT_WORDS, check_ids, check_image, equal_lengths, fits, plain_view, table_bytes, tiles, words};
+use super::{
+    Image, SPLAT_WORDS, check_ids, check_image, check_near, equal_lengths, fits, plain_view, table_bytes, tiles, words,
+};
 use crate::raster::kernel::Kernel;
 use crate::raster::{OpaqueImage, Projected};
 use crate::{Camera, Error, FootprintStack};
@@ -149,6 +151,7 @@ impl Recorded {
     /// [`Error::Invalid`] for an id that no splat has.
     pub fn uploads(&self, input: &Input<'_>) -> Result<Uploads, Error> {
         let (projected, room) = (input.projected, self.capacities);
+        check_near(projected)?;
         let n = projected.splats.len();
         fits("splats", n as u64, room.splats)?;
         equal_lengths([
