@@ -6,9 +6,13 @@
 
 #[cfg(any(feature = "ply", feature = "las", feature = "xyz"))]
 mod color;
+#[cfg(any(feature = "ply", feature = "stl", feature = "obj", feature = "xyz", feature = "nrrd"))]
+mod decimal;
 mod input;
 #[cfg(feature = "las")]
 mod las;
+#[cfg(any(feature = "nrrd", feature = "nifti"))]
+mod lattice;
 #[cfg(feature = "las")]
 mod laz;
 #[cfg(feature = "nifti")]
@@ -23,10 +27,14 @@ mod origin;
 mod ply;
 #[cfg(any(feature = "ply", feature = "obj"))]
 mod polygon;
+#[cfg(feature = "obj")]
+mod statements;
 #[cfg(feature = "stl")]
 mod stl;
 #[cfg(any(feature = "stl", feature = "obj", feature = "xyz", feature = "nrrd"))]
 mod text;
+#[cfg(any(feature = "nrrd", feature = "nifti"))]
+mod voxels;
 #[cfg(feature = "xyz")]
 mod xyz;
 
@@ -35,6 +43,7 @@ pub use laz::panic_is_input_error;
 
 use crate::error::{Place, ReadError, escaped, escaped_path};
 use crate::raw_points::RawPoints;
+use input::Stream;
 use splat_core::{Grid, Mesh};
 use std::path::Path;
 
@@ -67,14 +76,43 @@ pub enum Loaded {
     Grid(Grid),
 }
 
+/// What a reader has to say of a file beside its data.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Notes {
+    /// Columns, fields and statements of the file that are not used, as the file names them.
+    pub unused: Vec<String>,
+    /// What was made of the data that its user should know, one sentence without a full stop each.
+    pub remarks: Vec<String>,
+}
+
+#[cfg(any(feature = "ply", feature = "obj", feature = "xyz", feature = "las"))]
+impl Notes {
+    /// Adds names that are not used, each once, with what would steer a terminal escaped.
+    fn not_used<'a>(&mut self, names: impl IntoIterator<Item = &'a [u8]>) {
+        for name in names {
+            let name = escaped(name, 40);
+            if !self.unused.contains(&name) {
+                self.unused.push(name);
+            }
+        }
+    }
+}
+
 /// Reads a regular file; its first bytes tell the format, its extension only words the error if they do not.
 ///
 /// # Errors
 /// [`ReadError`] with the file's name, the place, what was expected and what was found.
 pub fn file(path: &Path, limits: &ReadLimits) -> Result<Loaded, ReadError> {
-    let name = escaped_path(path);
-    let content = input::regular_file(path, limits).map_err(|e| e.in_file(&name))?;
-    parse(path, content, Some(path), limits).map_err(|e| e.in_file(&name))
+    file_with_notes(path, limits).map(|(loaded, _)| loaded)
+}
+
+/// [`file()`] with what there is to say of it.
+///
+/// # Errors
+/// As [`file()`].
+pub fn file_with_notes(path: &Path, limits: &ReadLimits) -> Result<(Loaded, Notes), ReadError> {
+    let parsed = Stream::open(path, limits).and_then(|stream| parse(path, stream, Some(path), limits));
+    parsed.map_err(|e| e.in_file(&escaped_path(path)))
 }
 
 /// Reads a file that is in memory already; `name` serves messages and tells the format where the content does not.
@@ -82,34 +120,66 @@ pub fn file(path: &Path, limits: &ReadLimits) -> Result<Loaded, ReadError> {
 /// # Errors
 /// [`ReadError`] as [`file()`] gives it.
 pub fn bytes(name: &str, content: &[u8], limits: &ReadLimits) -> Result<Loaded, ReadError> {
-    let parsed = parse(Path::new(name), content.to_vec(), None, limits);
+    bytes_with_notes(name, content, limits).map(|(loaded, _)| loaded)
+}
+
+/// [`bytes()`] with what there is to say of it.
+///
+/// # Errors
+/// As [`bytes()`].
+pub fn bytes_with_notes(name: &str, content: &[u8], limits: &ReadLimits) -> Result<(Loaded, Notes), ReadError> {
+    let parsed = parse(Path::new(name), Stream::of(content, limits), None, limits);
     parsed.map_err(|e| e.in_file(&escaped(name.as_bytes(), usize::MAX)))
 }
 
+/// Bytes that tell the format.
+const MARK: usize = 512;
+
 /// `place` is where the file lies, for headers that name another one.
-#[cfg_attr(not(feature = "nrrd"), allow(unused_variables, reason = "no other format has detached headers"))]
-fn parse(path: &Path, content: Vec<u8>, place: Option<&Path>, limits: &ReadLimits) -> Result<Loaded, ReadError> {
-    let content = if content.starts_with(&[0x1f, 0x8b]) { input::gunzip(&content, limits)? } else { content };
-    let format = format_of(path, &content);
-    if content.is_empty() && matches!(format, Some(Format::Obj | Format::Xyz)) {
+#[cfg_attr(
+    not(feature = "nrrd"),
+    allow(unused_variables, unused_mut, reason = "no other format has detached headers, some have nothing to note")
+)]
+fn parse(
+    path: &Path,
+    mut stream: Stream<'_>,
+    place: Option<&Path>,
+    limits: &ReadLimits,
+) -> Result<(Loaded, Notes), ReadError> {
+    if stream.peek(2)? == [0x1f, 0x8b] {
+        stream = stream.gunzip();
+    }
+    let head = stream.peek(MARK)?;
+    let format = format_of(path, head);
+    if head.is_empty() && matches!(format, Some(Format::Obj | Format::Xyz)) {
         let hint = "the file is truncated, or was never written";
         return Err(ReadError::input(Place::Byte(0), "vertices or points", "an empty file", hint));
     }
-    match format {
+    let mut notes = Notes::default();
+    let loaded = match format {
         #[cfg(feature = "ply")]
-        Some(Format::Ply) => ply::read(&content, limits),
+        Some(Format::Ply) => {
+            let content = stream.rest()?;
+            let loaded = ply::read(&content, limits)?;
+            notes.not_used(ply::unused(&content)?.iter().map(Vec::as_slice));
+            Ok(loaded)
+        }
         #[cfg(feature = "stl")]
-        Some(Format::Stl) => stl::read(&content, limits).map(Loaded::Mesh),
+        Some(Format::Stl) => stl::read(&stream.rest()?, limits).map(Loaded::Mesh),
         #[cfg(feature = "obj")]
-        Some(Format::Obj) => obj::read(&content, limits),
+        Some(Format::Obj) => {
+            let content = stream.rest()?;
+            notes.not_used(statements::unused(&content));
+            obj::read(&content, limits)
+        }
         #[cfg(feature = "xyz")]
-        Some(Format::Xyz) => xyz::read(&content, limits).map(Loaded::Points),
+        Some(Format::Xyz) => xyz::read(&stream.rest()?, limits, &mut notes).map(Loaded::Points),
         #[cfg(feature = "nrrd")]
-        Some(Format::Nrrd) => nrrd::read(&content, place, limits).map(Loaded::Grid),
+        Some(Format::Nrrd) => nrrd::read(stream, place, limits, &mut notes).map(Loaded::Grid),
         #[cfg(feature = "las")]
-        Some(Format::Las) => las::read(&content, limits).map(Loaded::Points),
+        Some(Format::Las) => las::read(stream.rest()?, limits, &mut notes).map(Loaded::Points),
         #[cfg(feature = "nifti")]
-        Some(Format::Nifti) => nifti::read(&content, limits).map(Loaded::Grid),
+        Some(Format::Nifti) => nifti::read(stream, limits).map(Loaded::Grid),
         #[allow(unreachable_patterns, reason = "reached where a reader is not compiled in")]
         Some(format) => Err(ReadError::input(
             Place::File,
@@ -120,10 +190,11 @@ fn parse(path: &Path, content: Vec<u8>, place: Option<&Path>, limits: &ReadLimit
         None => Err(ReadError::input(
             Place::Byte(0),
             "'ply', 'LASF', 'NRRD', a NIfTI-1 header, or the extension of a format without a mark",
-            format!("'{}' ({} bytes)", escaped(&content[..content.len().min(16)], 16), content.len()),
+            format!("'{}'", escaped(&head[..head.len().min(16)], 16)),
             "PLY, STL, OBJ, XYZ, CSV, LAS, LAZ, NIfTI and NRRD files are read, each also inside gzip",
         )),
-    }
+    }?;
+    Ok((loaded, notes))
 }
 
 #[derive(Debug, Clone, Copy)]

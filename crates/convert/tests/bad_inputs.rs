@@ -202,11 +202,11 @@ fn ba21_ba22_normals_and_colours_out_of_range() {
 #[test]
 fn ba14_voxels_that_do_not_fill_the_file_exactly() {
     let good = nifti(NIFTI_U8, false);
-    refused_with("a.nii", &good[..363], "a.nii@352: expected 12 bytes of voxels (3 x 2 x 2 Uint8), found 11");
+    refused_with("a.nii", &good[..363], "a.nii@352: expected 12 bytes of voxels (3 x 2 x 2 x 1 bytes), found 11");
     refused_with(
         "a.nii",
         &[&good[..], &[0]].concat(),
-        "a.nii@352: expected 12 bytes of voxels (3 x 2 x 2 Uint8), found 13",
+        "a.nii@352: expected 12 bytes of voxels (3 x 2 x 2 x 1 bytes), found 13",
     );
     let mut dims = good.clone();
     for d in 1..=3 {

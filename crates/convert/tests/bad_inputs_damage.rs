@@ -2,13 +2,23 @@
 //! panic, an abort or a huge allocation.
 //!
 //! The work runs in a process of its own whose address space is limited, so an allocation far beyond the file fails it.
-#![cfg(all(feature = "ply", feature = "nifti", feature = "las", unix))]
+#![cfg(all(
+    feature = "ply",
+    feature = "stl",
+    feature = "obj",
+    feature = "xyz",
+    feature = "nrrd",
+    feature = "nifti",
+    feature = "las",
+    unix
+))]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod read_samples;
 
 use convert::read::Loaded;
-use read_samples::{NIFTI_F32, gzip, las, load, nifti, ply_ascii, ply_binary};
+use read_samples::oldest::laz_oldest;
+use read_samples::{NIFTI_F32, gzip, las, load, nifti, nrrd, obj, ply_ascii, ply_binary, stl, text_points};
 use std::process::Command;
 
 const LIMITED: &str = "CONVERT_TEST_LIMITED";
@@ -62,6 +72,22 @@ fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("f7.las", las(7, 20, false)),
         ("f3.laz", las(3, 20, true)),
         ("f7.laz", las(7, 20, true)),
+        ("old.laz", laz_oldest(1, 20)),
+        ("b.stl", stl(true)),
+        ("raw.nrrd", nrrd("raw")),
+        ("gz.nrrd", nrrd("gzip")),
+        ("packed.nrrd.gz", gzip(&nrrd("gzip"))),
+    ]
+}
+
+/// Files of which a part may be a file too.
+fn text_samples() -> Vec<(&'static str, Vec<u8>)> {
+    vec![
+        ("t.stl", stl(false)),
+        ("a.obj", obj()),
+        ("a.xyz", text_points(" ", "")),
+        ("a.csv", text_points(",", "x,y,z,nx,ny,nz\n")),
+        ("text.nrrd", nrrd("text")),
     ]
 }
 
@@ -95,7 +121,7 @@ fn every_flipped_bit_gives_an_error_or_a_valid_object() {
         assert!(convert::read::panic_is_input_error(), "{info}");
     }));
     let mut accepted = Vec::new();
-    for (name, content) in samples() {
+    for (name, content) in samples().into_iter().chain(text_samples()) {
         let mut damaged = content.clone();
         let mut ok = 0;
         for bit in 0..content.len() * 8 {
@@ -117,7 +143,7 @@ fn every_byte_set_to_extremes_gives_an_error_or_a_valid_object() {
     if !limited("every_byte_set_to_extremes_gives_an_error_or_a_valid_object") {
         return;
     }
-    for (name, content) in samples() {
+    for (name, content) in samples().into_iter().chain(text_samples()) {
         let mut damaged = content.clone();
         for at in 0..content.len() {
             for value in [0x00, 0x7f, 0x80, 0xff] {
@@ -134,4 +160,153 @@ fn every_byte_set_to_extremes_gives_an_error_or_a_valid_object() {
             }
         }
     }
+}
+
+/// Seeded numbers (SplitMix64).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, n: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) % n.max(1) as u64) as usize
+    }
+}
+
+/// One to three injuries: bytes set, runs set or filled, swapped, cut out, doubled, the end cut off.
+fn injured(content: &[u8], random: &mut Random) -> Vec<u8> {
+    let mut out = content.to_vec();
+    for _ in 0..=random.below(3) {
+        let at = random.below(out.len());
+        let end = (at + 1 + random.below(24)).min(out.len());
+        match random.below(8) {
+            0 => out[at] = random.below(256) as u8,
+            1 => out[at..end].iter_mut().for_each(|b| *b = random.below(256) as u8),
+            2 => out[at..end].fill([0x00, 0xff, 0x7f, 0x80, b'9', b' '][random.below(6)]),
+            3 => {
+                let other = random.below(out.len());
+                out.swap(at, other);
+            }
+            4 => {
+                let length = (end - at).min(out.len() / 2);
+                let other = random.below(out.len() - length);
+                let at = at.min(out.len() - length);
+                let (a, b) = (out[at..at + length].to_vec(), out[other..other + length].to_vec());
+                out[at..at + length].copy_from_slice(&b);
+                out[other..other + length].copy_from_slice(&a);
+            }
+            5 => drop(out.drain(at..end)),
+            6 => {
+                let run = out[at..end].to_vec();
+                out.splice(at..at, run);
+            }
+            _ => out.truncate(at.max(1)),
+        }
+        if out.is_empty() {
+            break;
+        }
+    }
+    out
+}
+
+/// Also the stack is bounded: the tasks that decode have 2 MiB of it.
+#[test]
+fn thousands_of_injured_files_give_an_error_or_a_valid_object() {
+    if !limited("thousands_of_injured_files_give_an_error_or_a_valid_object") {
+        return;
+    }
+    std::panic::set_hook(Box::new(|info| {
+        assert!(convert::read::panic_is_input_error(), "{info}");
+    }));
+    let clouds =
+        [("f1.laz", 1, 4000), ("f3.laz", 3, 4000), ("f6.laz", 6, 8000), ("f7.laz", 7, 8000), ("f8.laz", 8, 8000)];
+    let clouds = clouds.map(|(name, format, times)| (name, las(format, 400, true), times));
+    let small = samples().into_iter().chain(text_samples()).map(|(name, content)| (name, content, 2000));
+    for (name, content, times) in small.chain(clouds) {
+        let mut random = Random(content.len() as u64);
+        for _ in 0..times {
+            if let Ok(loaded) = load(name, &injured(&content, &mut random)) {
+                valid(&loaded);
+            }
+        }
+    }
+}
+
+/// The file of the outdoor scene, with 50,000 points in a chunk.
+#[test]
+fn an_injured_survey_gives_an_error_or_a_valid_object() {
+    if !limited("an_injured_survey_gives_an_error_or_a_valid_object") {
+        return;
+    }
+    std::panic::set_hook(Box::new(|info| {
+        assert!(convert::read::panic_is_input_error(), "{info}");
+    }));
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/autzen/autzen_trim.laz");
+    let content = std::fs::read(path).unwrap();
+    let mut random = Random(1);
+    for _ in 0..40 {
+        if let Ok(loaded) = load("survey.laz", &injured(&content, &mut random)) {
+            valid(&loaded);
+        }
+    }
+}
+
+/// Most memory that this process had, bytes.
+fn peak() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap();
+    let line = status.lines().find(|l| l.starts_with("VmHWM:")).unwrap();
+    1024 * line.split_ascii_whitespace().nth(1).unwrap().parse::<u64>().unwrap()
+}
+
+/// 512 MiB of zeros in gzip.
+fn zeros() -> Vec<u8> {
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    let block = vec![0; 1 << 20];
+    (0..512).for_each(|_| std::io::Write::write_all(&mut encoder, &block).unwrap());
+    encoder.finish().unwrap()
+}
+
+/// 114 KB took up to 17 GB: neither packing counted the other, and all was unpacked before it was counted.
+#[cfg(target_os = "linux")]
+#[test]
+fn ba15_gzip_inside_gzip_is_unpacked_no_further_than_its_header_says() {
+    if !limited("ba15_gzip_inside_gzip_is_unpacked_no_further_than_its_header_says") {
+        return;
+    }
+    let zeros = zeros();
+    let file = |sizes: &str| {
+        let header = format!("NRRD0004\ntype: uchar\ndimension: 3\nsizes: {sizes}\nencoding: gzip\n\n").into_bytes();
+        gzip(&[header, zeros.clone()].concat())
+    };
+    let (few, many) = (file("3 2 2"), file("1024 1024 512"));
+    let before = peak();
+    let error = load("a.nrrd.gz", &few).unwrap_err().to_string();
+    assert!(error.contains("expected 12 bytes of voxels (3 x 2 x 2 x 1 bytes), found more than 12"), "{error}");
+    let error = load("a.nrrd.gz", &many).unwrap_err();
+    assert_eq!(error.fault.exit_code(), 5, "{error}");
+    let (taken, stored) = (peak() - before, few.len().max(many.len()));
+    assert!(taken < 64 << 20, "{taken} bytes for a file of {stored}");
+    println!("{taken} bytes for a file of {stored}");
+}
+
+/// Of 200 MB of voxels there was a second copy while they were converted.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_volume_is_in_memory_once() {
+    if !limited("a_volume_is_in_memory_once") {
+        return;
+    }
+    let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("large.nrrd");
+    let header = "NRRD0004\ntype: float\ndimension: 3\nsizes: 500 500 200\nendian: little\nencoding: raw\n\n";
+    let mut file = std::fs::File::create(&path).unwrap();
+    std::io::Write::write_all(&mut file, header.as_bytes()).unwrap();
+    file.set_len(header.len() as u64 + 200_000_000).unwrap();
+    let before = peak();
+    let loaded = convert::read::file(&path, &convert::read::ReadLimits::default()).unwrap();
+    std::fs::remove_file(&path).unwrap();
+    valid(&loaded);
+    let ratio = (peak() - before) as f64 / 200e6;
+    println!("{ratio:.2} of the voxels");
+    assert!(ratio < 1.3, "{ratio:.2} of the voxels");
 }

@@ -6,6 +6,7 @@ mod read_samples;
 
 use convert::RawPoints;
 use convert::read::Loaded;
+use read_samples::oldest::{EndlessSwitches, laz_oldest, laz_pointwise};
 use read_samples::{gzip, las, las_steps, load};
 
 fn points(content: &[u8]) -> RawPoints {
@@ -29,6 +30,38 @@ fn cv12_integers_survive_exactly_in_every_point_format() {
             assert_eq!(p.color.is_empty(), !matches!(format, 2 | 3 | 7 | 8));
             p.validate().unwrap();
         }
+    }
+}
+
+/// Files of the oldest kind of LAZ have no chunks; they were called damaged.
+#[test]
+fn laz_without_chunks_is_read() {
+    for format in 0..=3 {
+        assert_eq!(points(&laz_oldest(format, 300)), points(&las(format, 300, false)), "format {format}");
+    }
+    // What may follow the points of version 1.3 and later.
+    let mut content = laz_oldest(1, 300);
+    content.pop();
+    assert!(load("c.laz", &content).is_err());
+    content.extend([0, 0]);
+    assert!(load("c.laz", &content).is_err());
+}
+
+/// The decoder called itself for each switch between sequences of times, until the stack was full: no catching that.
+#[test]
+fn times_that_switch_without_end_are_damage() {
+    let model = laz::models::ArithmeticModelBuilder::new(6).with_compression(true).build();
+    let content = laz_pointwise(1, 2, Some(EndlessSwitches(model)));
+    let error = load("c.laz", &content).unwrap_err();
+    assert!(error.to_string().starts_with("c.laz@327: expected a chunk of 2 points, found two switches"), "{error}");
+}
+
+/// Fields that nobody asks for are read over, whatever they hold.
+#[test]
+fn every_field_gets_its_own_values_whatever_is_read_over() {
+    for format in [1, 3, 6, 7, 8] {
+        let (plain, packed) = (points(&las(format, 3000, false)), points(&las(format, 3000, true)));
+        assert_eq!(plain, packed, "format {format}");
     }
 }
 

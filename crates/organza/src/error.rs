@@ -150,6 +150,24 @@ impl Error {
         }
     }
 
+    /// The same error, naming the file of an object where it names no more than the scene: errors of conversions know the
+    /// object and its element, but not where the data came from.
+    pub(crate) fn in_object(self, scene: &Path, file: Option<&Path>) -> Self {
+        match self {
+            Self::Input { what, message, hint } if what == Self::OF_SCENE => {
+                Self::Input { what: printable(file.unwrap_or(scene)), message, hint }
+            }
+            Self::Limit { what, needed, limit, unit, hint } => {
+                let what = file.map_or_else(|| what.clone(), |file| format!("{}: {what}", printable(file)));
+                Self::Limit { what, needed, limit, unit, hint }
+            }
+            other => other,
+        }
+    }
+
+    /// What an error is about before it is known which file an object was made from.
+    pub(crate) const OF_SCENE: &str = "scene";
+
     /// The exit code of the command.
     pub fn exit_code(&self) -> u8 {
         match self {

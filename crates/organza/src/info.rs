@@ -22,6 +22,10 @@ pub struct FileInfo {
     pub bounds: Option<[DVec3; 2]>,
     /// Lowest and highest value of a volume.
     pub range: Option<[f32; 2]>,
+    /// Columns, fields and statements of the file that are not used, as the file names them.
+    pub unused: Vec<String>,
+    /// What was made of the data, one sentence each.
+    pub remarks: Vec<String>,
 }
 
 /// Reads a data file of at most `max_bytes` and describes it.
@@ -31,7 +35,7 @@ pub struct FileInfo {
 /// one that would take more than `max_bytes`.
 pub fn info(path: &Path, max_bytes: u64) -> Result<FileInfo, Error> {
     let limits = ReadLimits { max_bytes, drop_invalid: false };
-    let data = convert::read::file(path, &limits).map_err(|e| Error::from_read(path, &e))?;
+    let (data, notes) = convert::read::file_with_notes(path, &limits).map_err(|e| Error::from_read(path, &e))?;
     let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "cannot read", e))?.len();
     let info = match data {
         Loaded::Mesh(mesh) => of_mesh(&mesh),
@@ -39,7 +43,8 @@ pub fn info(path: &Path, max_bytes: u64) -> Result<FileInfo, Error> {
         Loaded::Grid(grid) => of_grid(&grid),
         _ => return Err(Error::Internal("a reader gave data of no known kind".into())),
     };
-    Ok(FileInfo { bytes, ..info })
+    let remarks = notes.remarks.into_iter().chain(info.remarks).collect();
+    Ok(FileInfo { bytes, unused: notes.unused, remarks, ..info })
 }
 
 fn present(columns: &[(&'static str, bool)]) -> Vec<&'static str> {
@@ -71,6 +76,11 @@ fn of_points(points: &RawPoints) -> FileInfo {
             ("value", !points.value.is_empty()),
             ("classification", !points.classification.is_empty()),
         ]),
+        remarks: if points.color.is_empty() {
+            Vec::new()
+        } else {
+            vec!["colours are drawn as they are, without light, unless the scene names a material".to_owned()]
+        },
         bounds: bounds_of(points.origin, &points.position),
         ..FileInfo::default()
     }

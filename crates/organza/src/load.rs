@@ -19,7 +19,7 @@ use files::Files;
 use glam::DVec3;
 use object::Prepared;
 use own::Own;
-use splat_core::{Camera, Cloud, FootprintStack, Light, Material, Object};
+use splat_core::{Camera, Cloud, FootprintStack, Light, Material, Object, Shading};
 use std::cmp::Ordering;
 
 /// A scene in memory, normalized by a power of two (see [`Loaded::exponent`]) and ready for a technique.
@@ -53,6 +53,8 @@ pub struct Loaded {
     pub splats: Vec<SplatCount>,
     /// What a user should know of the input, one sentence each.
     pub warnings: Vec<String>,
+    /// What files hold that is not drawn, and what was made of them, one sentence each.
+    pub notes: Vec<String>,
 }
 
 /// Splats of one object.
@@ -117,6 +119,7 @@ pub(crate) fn load_measured(
     let statistics: Vec<ObjectStatistics> = loading.statistics(&prepared);
     let planned = loading.samplers(&statistics, &light_statistics(&lights, &casts));
     let mut splats = loading.counts(&prepared, &planned)?;
+    let materials = materials(scene, &prepared);
     let mut own = loading.own(&mut prepared, &planned, &mut warnings)?;
     let converted = planned.iter().filter(|p| p.splats.is_some()).count();
     let mut cloud = Cloud::default();
@@ -140,7 +143,7 @@ pub(crate) fn load_measured(
         cloud,
         own,
         statistics,
-        materials: scene.materials.iter().map(|m| m.material).collect(),
+        materials,
         objects: scene.objects.iter().map(object::entry).collect(),
         footprints: scene.footprints.clone(),
         camera,
@@ -151,6 +154,7 @@ pub(crate) fn load_measured(
         exponent,
         splats,
         warnings,
+        notes: files.notes(),
     })
 }
 
@@ -164,6 +168,15 @@ fn out_of_range(scene: &Scene, cloud: &Cloud, error: splat_core::Error) -> Error
     let file = object.and_then(|o| o.source.path()).map(|path| format!(", {}", crate::printable(path)));
     let hint = "use a scale, spacing or extinction with which sizes, areas and places stay within 1e38";
     Error::input(name + &file.unwrap_or_default(), error.to_string(), hint)
+}
+
+/// The materials of the scene, and after them the one of colours that are shown as they are, if there are any.
+fn materials(scene: &Scene, prepared: &[Prepared<'_>]) -> Vec<Material> {
+    let mut all: Vec<Material> = scene.materials.iter().map(|m| m.material).collect();
+    if let (true, Some(default)) = (prepared.iter().any(|p| p.as_it_is), all.first().copied()) {
+        all.push(Material { shading: Shading::Unlit, ..default });
+    }
+    all
 }
 
 /// What the planner asks of all lights.
@@ -189,6 +202,11 @@ impl<'a> Loading<'a> {
         Context { scene, options, files, progress, id, used, made }
     }
 
+    /// An error of an object with the file that its data is from.
+    fn named(&self, object: &SceneObject, error: Error) -> Error {
+        error.in_object(&self.scene.file, object.source.path())
+    }
+
     fn particles(&self) -> bool {
         self.scene.render.technique == Technique::Particles
     }
@@ -199,7 +217,7 @@ impl<'a> Loading<'a> {
         self.progress.add_total(self.visible().count() as u64);
         let one = |(id, object): (usize, &'a SceneObject)| {
             self.progress.tick(1).map_err(|_| Error::Cancelled)?;
-            object::prepare(object, &self.context(id, 0, 0), self.particles())
+            object::prepare(object, &self.context(id, 0, 0), self.particles()).map_err(|e| self.named(object, e))
         };
         self.visible().map(one).collect()
     }
@@ -246,7 +264,8 @@ impl<'a> Loading<'a> {
             if !plan.source.is_own() {
                 continue;
             }
-            let own = Own::new(p, plan.source, &self.context(id, 0, 0))?;
+            let own = Own::new(p, plan.source, &self.context(id, 0, 0));
+            let own = own.map_err(|e| self.named(&self.scene.objects[id], e))?;
             if own.is_none() {
                 let name = crate::shown(&self.scene.objects[id].name);
                 warnings.push(format!("object '{name}' has no particles: nothing of it was found"));
@@ -274,7 +293,8 @@ impl<'a> Loading<'a> {
             let used = held + clouds.iter().map(Cloud::bytes).sum::<u64>();
             let made = clouds.iter().map(|c| c.len() as u64).sum();
             let of = own.iter().find(|o| o.object == id);
-            let cloud = object::convert(&p, of, &self.context(id, used, made), warnings)?;
+            let cloud = object::convert(&p, of, &self.context(id, used, made), warnings);
+            let cloud = cloud.map_err(|e| self.named(object, e))?;
             if cloud.is_empty() {
                 warnings.push(format!("object '{}' has no splats", crate::shown(&object.name)));
             }

@@ -280,6 +280,7 @@ impl Drawing<'_> {
             statistics: Vec::new(),
             splats: Vec::new(),
             warnings: Vec::new(),
+            notes: Vec::new(),
             ..*all
         };
         let solid = Drawing { loaded: &loaded, layers: self.layers.clone(), ..*self };

@@ -58,6 +58,8 @@ pub struct Render {
     pub sets: Option<Sets>,
     /// What a user should know of the input, one sentence each.
     pub warnings: Vec<String>,
+    /// What files hold that the picture does not show, and what was made of them, one sentence each.
+    pub notes: Vec<String>,
     /// What drew it: `cpu`, or the interface and the device that helped.
     pub backend: String,
 }
@@ -88,6 +90,8 @@ pub struct Explanation {
     pub splats: Vec<SplatCount>,
     /// What a user should know of the input.
     pub warnings: Vec<String>,
+    /// What files hold that a picture does not show, and what was made of them.
+    pub notes: Vec<String>,
 }
 
 /// Renders a scene. The technique `particles` has a picture at any time: cancelled after two sets, it is that of the sets
@@ -134,7 +138,7 @@ pub(crate) fn render_keeping(
         Some(left) => prepare(scene, options, progress, &left.files)?,
         None => prepare(scene, options, progress, &Files::default())?,
     };
-    let Explanation { plan, mut cost, mut warnings, .. } = explanation;
+    let Explanation { plan, mut cost, mut warnings, notes, .. } = explanation;
     if let Some(left) = left.as_deref_mut() {
         left.fit(options.max_memory, memory.total());
     }
@@ -143,7 +147,7 @@ pub(crate) fn render_keeping(
     let (layers, sets) = draw(scene, &drawing, options, checkpoint.as_mut(), kept, &mut cost, &mut warnings)?;
     let backend = helper.as_ref().map_or_else(|| "cpu".to_owned(), Helper::name);
     warnings.extend(helper.map(Helper::said).unwrap_or_default());
-    Ok(Render { layers, cost, plan, sets, warnings, backend })
+    Ok(Render { layers, cost, plan, sets, warnings, notes, backend })
 }
 
 /// Runs the planned passes on a loaded scene to their end, by the processor alone, and keeps the layers that it asks for.
@@ -221,10 +225,10 @@ fn prepare(
     check_samples(scene)?;
     let loaded = load_measured(scene, options, progress, files, &mut cost)?;
     let (plan, memory) = plan_loaded(scene, &loaded, options)?;
-    let (splats, warnings) = (loaded.splats.clone(), loaded.warnings.clone());
+    let (splats, warnings, notes) = (loaded.splats.clone(), loaded.warnings.clone(), loaded.notes.clone());
     let inputs = cost.stages.iter().filter(|s| s.name == pass::READ).map(|s| s.bytes).sum();
     let most = memory.total().max(memory::loading_bytes(&loaded, inputs));
-    Ok((loaded, Explanation { plan, cost, memory: most, splats, warnings }, memory))
+    Ok((loaded, Explanation { plan, cost, memory: most, splats, warnings, notes }, memory))
 }
 
 /// The plan of a loaded scene, and the bytes that it takes.

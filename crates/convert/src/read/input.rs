@@ -1,10 +1,10 @@
-//! Bytes of a regular file, and their gzip-decompressed form, each within the limits.
+//! Bytes of a regular file from front to back, unpacked from gzip where they are packed, each within the limits.
 
 use super::ReadLimits;
 use crate::error::{Place, ReadError};
 use flate2::bufread::MultiGzDecoder;
 use std::fs::File;
-use std::io::Read;
+use std::io::{self, BufReader, Read};
 use std::path::Path;
 
 /// Most bytes asked from the allocator at once.
@@ -13,69 +13,218 @@ const STEP: usize = 64 << 20;
 const MAX_RATIO: u64 = 1000;
 const FREE: u64 = 16 << 20;
 
-/// The whole content of a regular file.
-pub(super) fn regular_file(path: &Path, limits: &ReadLimits) -> Result<Vec<u8>, ReadError> {
-    let refused = |e: std::io::Error| {
-        ReadError::file_system("a file that can be read", e.to_string(), "check the path and its permissions")
-    };
-    // Asked before opening: opening a FIFO waits for its writer.
-    let kind = std::fs::metadata(path).map_err(refused)?;
-    if !kind.is_file() {
-        let found = if kind.is_dir() { "a directory" } else { "a pipe, socket or device" };
-        return Err(ReadError::file_system("a regular file", found, "name a file; copy a stream into one first"));
-    }
-    let mut source = File::open(path).map_err(refused)?;
-    let length = source.metadata().map_err(refused)?.len();
-    check_bytes("the file", length, limits)?;
-    let mut content = Vec::new();
-    // One byte more than announced: a file that grows meanwhile is noticed, and one that never ends is not followed.
-    while (content.len() as u64) <= length {
-        let step = (length + 1 - content.len() as u64).min(STEP as u64);
-        reserve(&mut content, step as usize)?;
-        if source.by_ref().take(step).read_to_end(&mut content).map_err(refused)? == 0 {
-            break;
-        }
-    }
-    if content.len() as u64 != length {
-        return Err(ReadError::input(
-            Place::Byte(content.len() as u64),
-            format!("{length} bytes, the length before reading"),
-            "another length: the file changed while it was read",
-            "wait until the file is complete, then try again",
-        ));
-    }
-    Ok(content)
+/// Bytes in the order of the file. What was looked at by [`Stream::peek`] is given once more.
+pub(super) struct Stream<'a> {
+    source: Box<dyn Read + 'a>,
+    head: Vec<u8>,
+    /// Bytes of `head` that were taken.
+    taken: usize,
+    /// Bytes taken in all.
+    position: u64,
+    /// Bytes in all, unless they are packed.
+    length: Option<u64>,
+    /// Bytes of the file itself, packed or not.
+    stored: u64,
+    limits: ReadLimits,
 }
 
-/// The decompressed content of a gzip file, of one or several members.
-pub(super) fn gunzip(compressed: &[u8], limits: &ReadLimits) -> Result<Vec<u8>, ReadError> {
-    let mut source = MultiGzDecoder::new(compressed);
-    let mut content = Vec::new();
-    let mut block = vec![0u8; 1 << 18];
-    loop {
-        let got = source.read(&mut block).map_err(|e| {
-            ReadError::input(
-                Place::Byte((compressed.len() - source.get_ref().len()) as u64),
-                "a complete gzip stream",
-                e.to_string(),
-                "the file is truncated or damaged; fetch it again",
-            )
-        })?;
-        if got == 0 {
-            return Ok(content);
+impl<'a> Stream<'a> {
+    /// A regular file.
+    pub(super) fn open(path: &Path, limits: &ReadLimits) -> Result<Self, ReadError> {
+        let refused = |e: io::Error| refused(&e);
+        // Asked before opening: opening a FIFO waits for its writer.
+        let kind = std::fs::metadata(path).map_err(refused)?;
+        if !kind.is_file() {
+            let found = if kind.is_dir() { "a directory" } else { "a pipe, socket or device" };
+            return Err(ReadError::file_system("a regular file", found, "name a file; copy a stream into one first"));
         }
-        let total = (content.len() + got) as u64;
-        check_bytes("the decompressed file", total, limits)?;
-        if total > FREE && total / MAX_RATIO > compressed.len() as u64 {
-            return Err(ReadError::limit(
-                format!("at most {MAX_RATIO} decompressed bytes for each byte of gzip"),
-                format!("more than {total} bytes from {}", compressed.len()),
-                "decompress the file yourself if it is to be trusted",
-            ));
-        }
-        reserve(&mut content, got)?;
-        content.extend_from_slice(&block[..got]);
+        let file = File::open(path).map_err(refused)?;
+        let length = file.metadata().map_err(refused)?.len();
+        check_bytes("the file", length, limits)?;
+        Ok(Self::new(Measured { file, length, read: 0 }, Some(length), length, limits))
     }
+
+    /// Bytes in memory.
+    pub(super) fn of(content: &'a [u8], limits: &ReadLimits) -> Self {
+        let length = content.len() as u64;
+        Self::new(content, Some(length), length, limits)
+    }
+
+    fn new(source: impl Read + 'a, length: Option<u64>, stored: u64, limits: &ReadLimits) -> Self {
+        Self { source: Box::new(source), head: Vec::new(), taken: 0, position: 0, length, stored, limits: *limits }
+    }
+
+    /// The unpacked bytes of what is left, which is gzip of one or several members. However often gzip is packed into
+    /// gzip, the bytes of the file itself decide how much may come out.
+    pub(super) fn gunzip(self) -> Stream<'a> {
+        let (stored, limits) = (self.stored, self.limits);
+        let counted = Counted { read: self.position, source: self };
+        let decoder = MultiGzDecoder::new(BufReader::with_capacity(1 << 18, counted));
+        Stream::new(Unpacked { decoder, given: 0, stored, limits }, None, stored, &limits)
+    }
+
+    /// Up to `n` of the bytes to come, without taking them; fewer only at the end.
+    pub(super) fn peek(&mut self, n: usize) -> Result<&[u8], ReadError> {
+        while self.head.len() - self.taken < n {
+            let missing = n - (self.head.len() - self.taken);
+            reserve(&mut self.head, missing)?;
+            if self.source.by_ref().take(missing as u64).read_to_end(&mut self.head).map_err(failed)? == 0 {
+                break;
+            }
+        }
+        let ahead = &self.head[self.taken..];
+        Ok(&ahead[..n.min(ahead.len())])
+    }
+
+    /// Fills `target` as far as there are bytes; gives how many.
+    #[cfg(any(feature = "nrrd", feature = "nifti"))]
+    pub(super) fn fill(&mut self, target: &mut [u8]) -> Result<usize, ReadError> {
+        let mut filled = 0;
+        while filled < target.len() {
+            match self.read(&mut target[filled..]).map_err(failed)? {
+                0 => break,
+                n => filled += n,
+            }
+        }
+        Ok(filled)
+    }
+
+    /// Passes over `n` bytes; gives how many there were.
+    #[cfg(any(feature = "nrrd", feature = "nifti"))]
+    pub(super) fn skip(&mut self, n: u64) -> Result<u64, ReadError> {
+        io::copy(&mut self.by_ref().take(n), &mut io::sink()).map_err(failed)
+    }
+
+    /// All that is left.
+    pub(super) fn rest(mut self) -> Result<Vec<u8>, ReadError> {
+        let mut content = Vec::new();
+        loop {
+            let step = self.left().map_or(1 << 18, |left| (left + 1).min(STEP as u64));
+            reserve(&mut content, step as usize)?;
+            if self.by_ref().take(step).read_to_end(&mut content).map_err(failed)? == 0 {
+                return Ok(content);
+            }
+        }
+    }
+
+    /// Bytes taken so far.
+    #[cfg(any(feature = "nrrd", feature = "nifti"))]
+    pub(super) fn position(&self) -> u64 {
+        self.position
+    }
+
+    /// Bytes to come, if that is known before they are unpacked.
+    pub(super) fn left(&self) -> Option<u64> {
+        self.length.map(|n| n.saturating_sub(self.position))
+    }
+
+    /// Refuses what cannot come, before memory is taken for it.
+    #[cfg(any(feature = "nrrd", feature = "nifti"))]
+    pub(super) fn expect(&self, bytes: u64) -> Result<(), ReadError> {
+        if self.length.is_none() { check_ratio(bytes, self.stored) } else { Ok(()) }
+    }
+}
+
+impl Read for Stream<'_> {
+    fn read(&mut self, target: &mut [u8]) -> io::Result<usize> {
+        let ahead = &self.head[self.taken..];
+        let n = if ahead.is_empty() {
+            self.source.read(target)?
+        } else {
+            let n = ahead.len().min(target.len());
+            target[..n].copy_from_slice(&ahead[..n]);
+            self.taken += n;
+            n
+        };
+        self.position += n as u64;
+        Ok(n)
+    }
+}
+
+/// A file that has to have the length that it had before.
+struct Measured {
+    file: File,
+    length: u64,
+    read: u64,
+}
+
+impl Read for Measured {
+    fn read(&mut self, target: &mut [u8]) -> io::Result<usize> {
+        // One byte more than announced: a file that grows meanwhile is noticed, and one that never ends is not followed.
+        let most = (self.length + 1 - self.read).min(target.len() as u64) as usize;
+        let n = self.file.read(&mut target[..most])?;
+        self.read += n as u64;
+        let ended = n == 0 && most > 0;
+        if self.read > self.length || ended && self.read < self.length {
+            return Err(io::Error::other(ReadError::input(
+                Place::Byte(self.read),
+                format!("{} bytes, the length before reading", self.length),
+                "another length: the file changed while it was read",
+                "wait until the file is complete, then try again",
+            )));
+        }
+        Ok(n)
+    }
+}
+
+/// Tells how far a source was read.
+struct Counted<'a> {
+    source: Stream<'a>,
+    read: u64,
+}
+
+impl Read for Counted<'_> {
+    fn read(&mut self, target: &mut [u8]) -> io::Result<usize> {
+        let n = self.source.read(target)?;
+        self.read += n as u64;
+        Ok(n)
+    }
+}
+
+/// What comes out of gzip.
+struct Unpacked<'a> {
+    decoder: MultiGzDecoder<BufReader<Counted<'a>>>,
+    given: u64,
+    stored: u64,
+    limits: ReadLimits,
+}
+
+impl Read for Unpacked<'_> {
+    fn read(&mut self, target: &mut [u8]) -> io::Result<usize> {
+        let n = self.decoder.read(target).map_err(|e| {
+            let source = self.decoder.get_ref();
+            let at = source.get_ref().read - source.buffer().len() as u64;
+            let hint = "the file is truncated or damaged; fetch it again";
+            let damaged =
+                |e: io::Error| ReadError::input(Place::Byte(at), "a complete gzip stream", e.to_string(), hint);
+            io::Error::other(e.downcast::<ReadError>().unwrap_or_else(damaged))
+        })?;
+        self.given += n as u64;
+        check_bytes("the decompressed file", self.given, &self.limits).map_err(io::Error::other)?;
+        check_ratio(self.given, self.stored).map_err(io::Error::other)?;
+        Ok(n)
+    }
+}
+
+fn refused(e: &io::Error) -> ReadError {
+    ReadError::file_system("a file that can be read", e.to_string(), "check the path and its permissions")
+}
+
+/// What a source said went wrong.
+fn failed(e: io::Error) -> ReadError {
+    e.downcast::<ReadError>().unwrap_or_else(|e| refused(&e))
+}
+
+/// Refuses more bytes than gzip of `stored` bytes may stand for.
+fn check_ratio(bytes: u64, stored: u64) -> Result<(), ReadError> {
+    if bytes <= FREE || bytes / MAX_RATIO <= stored {
+        return Ok(());
+    }
+    Err(ReadError::limit(
+        format!("at most {MAX_RATIO} decompressed bytes for each byte of gzip"),
+        format!("{bytes} from {stored}"),
+        "decompress the file yourself if it is to be trusted",
+    ))
 }
 
 /// Refuses sizes above the limit.

@@ -1,18 +1,21 @@
 //! LAS 1.0 to 1.4 and LAZ → raw points with colours, intensity as value, classes and their exact integers.
 
-use super::{ReadLimits, color::linear_from_srgb, input, laz};
+use super::{Notes, ReadLimits, color::linear_from_srgb, input, laz};
 use crate::error::{Place, ReadError};
 use crate::raw_points::{PointLattice, RawPoints};
 use ::las::point::Format;
 use ::las::{PointData, PointDataBuilder, raw};
 use splat_core::glam::{DVec3, Vec3};
-use std::borrow::Cow;
 
 /// Points decoded at once: the reader's working memory does not depend on the announced count.
 const BLOCK: usize = 1 << 16;
 /// Bytes that a point takes in the columns at most.
 const BYTES_PER_POINT: u64 = 12 + 12 + 6 + 12 + 4 + 1;
 const HINT: &str = "the file is truncated or damaged; fetch it again";
+const RECORD_HEADER: usize = 54;
+/// The record that describes extra bytes, and the length of one description.
+const EXTRA_BYTES: u16 = 4;
+const DESCRIPTION: usize = 192;
 
 /// What the checked header says.
 pub(super) struct Layout {
@@ -32,20 +35,74 @@ pub(super) struct Layout {
 }
 
 /// Reads a LAS or LAZ file.
-pub(super) fn read(content: &[u8], limits: &ReadLimits) -> Result<RawPoints, ReadError> {
-    let layout = layout(content)?;
-    let records = if layout.compressed {
-        Cow::Owned(laz::decompress(content, &layout, limits)?)
-    } else {
-        Cow::Borrowed(plain_records(content, &layout)?)
-    };
+pub(super) fn read(content: Vec<u8>, limits: &ReadLimits, notes: &mut Notes) -> Result<RawPoints, ReadError> {
+    let layout = layout(&content)?;
     input::check_bytes("the points", layout.count.saturating_mul(BYTES_PER_POINT), limits)?;
-    let mut columns = Columns::new(&layout)?;
-    for block in records.chunks(BLOCK * layout.record as usize) {
-        let data = PointDataBuilder::new().with_format(layout.format).build_from_bytes(block.to_vec());
-        columns.append(&data.map_err(|e| damaged(layout.points, "whole point records", &e.to_string()))?);
+    notes.not_used(unused(&content, &layout).iter().map(String::as_bytes));
+    let mut columns = Columns::default();
+    let mut take = |records: Vec<u8>| {
+        let data = PointDataBuilder::new().with_format(layout.format).build_from_bytes(records);
+        columns.append(&data.map_err(|e| damaged(layout.points, "whole point records", &e.to_string()))?, &layout)
+    };
+    if layout.compressed {
+        laz::decompress(&content, &layout, limits, take)?;
+    } else {
+        let records = plain_records(&content, &layout)?;
+        records.chunks(BLOCK * layout.record as usize).try_for_each(|block| take(block.to_vec()))?;
     }
+    // Before the columns are converted: the file takes about as much as they do.
+    drop(content);
     columns.into_points(&layout)
+}
+
+/// Names of the dimensions of its points that are read over.
+fn unused(content: &[u8], layout: &Layout) -> Vec<String> {
+    let Format { has_gps_time, has_waveform, has_nir, extra_bytes, .. } = layout.format;
+    let always = ["return_number", "number_of_returns", "flags", "scan_angle", "user_data", "point_source_id"];
+    let some = [(has_gps_time, "gps_time"), (has_nir, "nir"), (has_waveform, "waveform")];
+    let mut names: Vec<String> = always.map(str::to_owned).to_vec();
+    names.extend(some.iter().filter(|(has, _)| *has).map(|(_, name)| (*name).to_owned()));
+    if extra_bytes > 0 {
+        let described = extra_names(content, layout);
+        names.extend(if described.is_empty() { vec![format!("{extra_bytes} extra bytes")] } else { described });
+    }
+    names
+}
+
+/// Names of the extra dimensions, as far as the file describes them.
+fn extra_names(content: &[u8], layout: &Layout) -> Vec<String> {
+    let described = variable_records(content, layout).find(|r| r.user == b"LASF_Spec" && r.id == EXTRA_BYTES);
+    let described = described.map_or(&[][..], |r| r.data).as_chunks::<DESCRIPTION>().0;
+    let name = |d: &[u8; DESCRIPTION]| {
+        let name = d[4..36].split(|b| *b == 0).next().unwrap_or_default();
+        String::from_utf8_lossy(name).into_owned()
+    };
+    described.iter().map(name).filter(|n| !n.is_empty()).collect()
+}
+
+/// A variable-length record before the points.
+pub(super) struct VariableRecord<'a> {
+    /// Byte offset of its header.
+    pub(super) at: usize,
+    pub(super) user: &'a [u8],
+    pub(super) id: u16,
+    pub(super) data: &'a [u8],
+}
+
+/// The variable-length records between the header and the points, as many as are whole.
+pub(super) fn variable_records<'a>(content: &'a [u8], layout: &Layout) -> impl Iterator<Item = VariableRecord<'a>> {
+    let (mut at, count) = layout.records;
+    let before_points = &content[..layout.points];
+    (0..count).map_while(move |_| {
+        let head = before_points.get(at..)?.first_chunk::<RECORD_HEADER>()?;
+        let (begin, length) = (at + RECORD_HEADER, usize::from(u16::from_le_bytes([head[20], head[21]])));
+        let data = before_points.get(begin..begin + length)?;
+        let user = &before_points[at + 2..at + 18];
+        let user = user.split(|b| *b == 0).next().unwrap_or_default();
+        let record = VariableRecord { at, user, id: u16::from_le_bytes([head[18], head[19]]), data };
+        at = begin + length;
+        Some(record)
+    })
 }
 
 fn damaged(byte: usize, expected: &str, found: &str) -> ReadError {
@@ -139,7 +196,7 @@ fn plain_records<'a>(content: &'a [u8], layout: &Layout) -> Result<&'a [u8], Rea
 }
 
 /// Where extended records or waveforms begin behind the points, else the end of the file.
-fn first_byte_after_points(content: &[u8], end: usize) -> usize {
+pub(super) fn first_byte_after_points(content: &[u8], end: usize) -> usize {
     let Ok(header) = raw::Header::read_from(content) else { return content.len() };
     let evlrs = header.evlr.filter(|e| e.number_of_evlrs > 0).map(|e| e.start_of_first_evlr);
     let parts = [evlrs, header.start_of_waveform_data_packet_record];
@@ -148,6 +205,7 @@ fn first_byte_after_points(content: &[u8], end: usize) -> usize {
 }
 
 /// Columns while they are filled.
+#[derive(Default)]
 struct Columns {
     steps: Vec<[i32; 3]>,
     rgb: Vec<[u16; 3]>,
@@ -156,25 +214,24 @@ struct Columns {
 }
 
 impl Columns {
-    fn new(layout: &Layout) -> Result<Self, ReadError> {
-        let n = layout.count as usize;
-        let mut columns = Self { steps: Vec::new(), rgb: Vec::new(), value: Vec::new(), classification: Vec::new() };
-        input::reserve(&mut columns.steps, n)?;
-        input::reserve(&mut columns.value, n)?;
-        input::reserve(&mut columns.classification, n)?;
-        if layout.format.has_color {
-            input::reserve(&mut columns.rgb, n)?;
+    fn append(&mut self, data: &PointData, layout: &Layout) -> Result<(), ReadError> {
+        if self.steps.is_empty() {
+            // Once some records are there: until then a damaged file may announce what it does not hold.
+            let n = layout.count as usize;
+            input::reserve(&mut self.steps, n)?;
+            input::reserve(&mut self.value, n)?;
+            input::reserve(&mut self.classification, n)?;
+            if layout.format.has_color {
+                input::reserve(&mut self.rgb, n)?;
+            }
         }
-        Ok(columns)
-    }
-
-    fn append(&mut self, data: &PointData) {
         self.steps.extend(data.x_raw().zip(data.y_raw()).zip(data.z_raw()).map(|((x, y), z)| [x, y, z]));
         self.value.extend(data.intensity().map(f32::from));
         self.classification.extend(data.classification());
         if let Some(rgb) = data.rgb() {
             self.rgb.extend(rgb.map(|(r, g, b)| [r, g, b]));
         }
+        Ok(())
     }
 
     /// Positions relative to a lattice point in the middle, so that offsets are small multiples of the scale.

@@ -2,13 +2,17 @@
 //!
 //! The chunk table is read and checked first: chunks must fill exactly the bytes between their start and the table, and
 //! their points must add up to the header's count, so nothing is allocated that the file does not stand for. Each chunk
-//! is then decoded from its own bytes.
+//! is then decoded from its own bytes. Files of the oldest kind have no chunks: their points are one stream.
 
-use super::las::Layout;
+mod gps_time;
+
+use super::las::{self, Layout, VariableRecord};
 use super::{ReadLimits, input};
 use crate::error::{Place, ReadError};
 use ::laz::laszip::{ChunkTable, ChunkTableEntry};
-use ::laz::{LasZipDecompressor, LazItem, LazItemRecordBuilder, LazItemType, LazVlr, LazVlrBuilder};
+use ::laz::record::{LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor};
+use ::laz::{DecompressionSelection, LazItem, LazItemRecordBuilder, LazItemType, LazVlr};
+use gps_time::GpsTimes;
 use rayon::prelude::*;
 use std::cell::Cell;
 use std::io::Cursor;
@@ -17,67 +21,75 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 /// Most decompressed bytes per compressed byte, past the first [`FREE`] bytes.
 const MAX_RATIO: u64 = 1000;
 const FREE: u64 = 16 << 20;
-const RECORD_HEADER: usize = 54;
+/// Compressors of the LASzip record: one stream of records, the same in chunks, chunks of one stream a field.
+const POINTWISE: u16 = 1;
+const POINTWISE_CHUNKED: u16 = 2;
+const LAYERED: u16 = 3;
+/// Chunks decoded at once, 50,000 records each in most files.
+const WAVE: usize = 16;
 const HINT: &str = "the file is truncated or damaged; fetch it again";
 
-/// All point records, uncompressed.
-pub(super) fn decompress(content: &[u8], layout: &Layout, limits: &ReadLimits) -> Result<Vec<u8>, ReadError> {
-    let vlr = laszip_record(content, layout)?;
+/// Decodes all point records and hands them to `take`, in order and in parts, so that not all of them are in memory.
+pub(super) fn decompress(
+    content: &[u8],
+    layout: &Layout,
+    limits: &ReadLimits,
+    mut take: impl FnMut(Vec<u8>) -> Result<(), ReadError>,
+) -> Result<(), ReadError> {
+    let (compressor, vlr) = laszip_record(content, layout)?;
     if layout.count == 0 {
-        return Ok(Vec::new());
+        return Ok(());
     }
     let items = checked_items(&vlr, layout)?;
-    let (chunks, data) = chunks(content, layout, &vlr)?;
+    let chunks = match compressor {
+        POINTWISE if layout.format_id < 6 => vec![whole(content, layout)?],
+        POINTWISE_CHUNKED if layout.format_id < 6 => chunks(content, layout, &vlr)?,
+        LAYERED if layout.format_id >= 6 => chunks(content, layout, &vlr)?,
+        _ => {
+            let expected = format!("a compressor of point format {}", layout.format_id);
+            return Err(damaged(layout.points, &expected, format!("compressor {compressor}")));
+        }
+    };
     let total = layout.count.saturating_mul(layout.record);
+    let stored = chunks.iter().map(|c| c.bytes.len() as u64).sum::<u64>();
     input::check_bytes("the decompressed points", total, limits)?;
-    if total > FREE && total / MAX_RATIO > data.len() as u64 {
+    if total > FREE && total / MAX_RATIO > stored {
         return Err(ReadError::limit(
             format!("at most {MAX_RATIO} decompressed bytes for each byte of LAZ"),
-            format!("{total} from {}", data.len()),
+            format!("{total} from {stored}"),
             "decompress the file yourself if it is to be trusted",
         ));
     }
-    let mut tasks = Vec::with_capacity(chunks.len());
-    let mut start = 0;
-    for chunk in &chunks {
-        // Cannot leave `data`: the chunks add up to its length.
-        let bytes = &data[start..start + chunk.byte_count as usize];
-        tasks.push((layout.points + 8 + start, bytes, chunk.point_count));
-        start += bytes.len();
+    for wave in chunks.chunks(WAVE) {
+        let parts: Result<Vec<Vec<u8>>, ReadError> = wave.par_iter().map(|c| c.decode(&items, layout)).collect();
+        parts?.into_iter().try_for_each(&mut take)?;
     }
-    let parts: Vec<Vec<u8>> = tasks
-        .into_par_iter()
-        .map(|(at, bytes, points)| chunk(at, bytes, points, &items, layout))
-        .collect::<Result<_, _>>()?;
-    let mut records = Vec::new();
-    input::reserve(&mut records, total as usize)?;
-    parts.into_iter().for_each(|part| records.extend(part));
-    Ok(records)
+    Ok(())
+}
+
+/// What is decoded on its own.
+struct Chunk<'a> {
+    /// Byte offset in the file.
+    at: usize,
+    bytes: &'a [u8],
+    points: u64,
+    /// Whether other things may follow the points in `bytes`.
+    open: bool,
 }
 
 fn damaged(byte: usize, expected: &str, found: impl Into<String>) -> ReadError {
     ReadError::input(Place::Byte(byte as u64), expected, found, HINT)
 }
 
-/// The record that describes the compression, among the variable-length records before the points.
-fn laszip_record(content: &[u8], layout: &Layout) -> Result<LazVlr, ReadError> {
-    let (mut at, count) = layout.records;
-    for _ in 0..count {
-        let (Some(head), true) = (content.get(at..at + RECORD_HEADER), at + RECORD_HEADER <= layout.points) else {
-            break;
-        };
-        let length = usize::from(u16::from_le_bytes([head[20], head[21]]));
-        let data = at + RECORD_HEADER..at + RECORD_HEADER + length;
-        if data.end > layout.points {
-            break;
-        }
-        let user = head[2..18].split(|b| *b == 0).next().unwrap_or_default();
-        if user == LazVlr::USER_ID.as_bytes() && u16::from_le_bytes([head[18], head[19]]) == LazVlr::RECORD_ID {
-            return LazVlr::from_buffer(&content[data]).map_err(|e| damaged(at, "a LASzip record", e.to_string()));
-        }
-        at = data.end;
-    }
-    Err(damaged(at, "a LASzip record before the points of a compressed file", "none"))
+/// The record that describes the compression, among the variable-length records before the points, with its compressor.
+fn laszip_record(content: &[u8], layout: &Layout) -> Result<(u16, LazVlr), ReadError> {
+    let mut records = las::variable_records(content, layout);
+    let found = records.find(|r| r.user == LazVlr::USER_ID.as_bytes() && r.id == LazVlr::RECORD_ID);
+    let Some(VariableRecord { at, data, .. }) = found else {
+        return Err(damaged(layout.records.0, "a LASzip record before the points of a compressed file", "none"));
+    };
+    let vlr = LazVlr::from_buffer(data).map_err(|e| damaged(at, "a LASzip record", e.to_string()))?;
+    Ok((data.first_chunk().map_or(0, |b| u16::from_le_bytes(*b)), vlr))
 }
 
 /// The compressed fields, refused unless they are those of the point format: the decoder trusts their sizes.
@@ -98,8 +110,19 @@ fn checked_items(vlr: &LazVlr, layout: &Layout) -> Result<Vec<LazItem>, ReadErro
     Err(damaged(layout.points, &format!("the LASzip items of point format {}", layout.format_id), found))
 }
 
-/// The checked chunk table, and the bytes of all chunks.
-fn chunks<'a>(content: &'a [u8], layout: &Layout, vlr: &LazVlr) -> Result<(Vec<ChunkTableEntry>, &'a [u8]), ReadError> {
+/// All points as one stream without a table; what may follow them does not say where it begins in every version.
+fn whole<'a>(content: &'a [u8], layout: &Layout) -> Result<Chunk<'a>, ReadError> {
+    let end = las::first_byte_after_points(content, layout.points);
+    let bytes = &content[layout.points..end];
+    if (bytes.len() as u64) < layout.record {
+        let expected = format!("a record of {} bytes", layout.record);
+        return Err(damaged(layout.points, &expected, format!("{} bytes", bytes.len())));
+    }
+    Ok(Chunk { at: layout.points, bytes, points: layout.count, open: end < content.len() })
+}
+
+/// The chunks of the checked chunk table.
+fn chunks<'a>(content: &'a [u8], layout: &Layout, vlr: &LazVlr) -> Result<Vec<Chunk<'a>>, ReadError> {
     let start = layout.points + 8;
     let table = table_start(content, layout)?;
     let data = &content[start..table];
@@ -129,7 +152,15 @@ fn chunks<'a>(content: &'a [u8], layout: &Layout, vlr: &LazVlr) -> Result<(Vec<C
     let points = entries.iter().try_fold(0u64, |n, e| n.checked_add(e.point_count));
     let filled = entries.iter().all(|e| e.byte_count >= layout.record && e.point_count > 0);
     if filled && bytes == Some(data.len() as u64) && points == Some(layout.count) {
-        return Ok((entries, data));
+        let mut from = 0;
+        let chunk = |entry: ChunkTableEntry| {
+            // Cannot leave `data`: the chunks add up to its length.
+            let bytes = &data[from..from + entry.byte_count as usize];
+            let at = start + from;
+            from += bytes.len();
+            Chunk { at, bytes, points: entry.point_count, open: false }
+        };
+        return Ok(entries.into_iter().map(chunk).collect());
     }
     let expected = format!("chunks of {} points in {} bytes", layout.count, data.len());
     Err(damaged(table, &expected, format!("{points:?} points in {bytes:?} bytes, none of them empty: {filled}")))
@@ -146,32 +177,56 @@ fn table_start(content: &[u8], layout: &Layout) -> Result<usize, ReadError> {
     found.ok_or_else(|| damaged(layout.points, "the offset of a chunk table behind the points", "one outside the file"))
 }
 
-/// Decodes one chunk of `points` records.
-fn chunk(at: usize, bytes: &[u8], points: u64, items: &[LazItem], layout: &Layout) -> Result<Vec<u8>, ReadError> {
-    if layout.format_id >= 6 {
-        check_layers(at, bytes, points, items, layout)?;
-    }
-    // The decoder wants the offset of a chunk table and looks for the table there: an empty one follows the chunk.
-    let mut source = Vec::new();
-    input::reserve(&mut source, bytes.len() + 16)?;
-    source.extend_from_slice(&(bytes.len() as i64 + 8).to_le_bytes());
-    source.extend_from_slice(bytes);
-    source.extend_from_slice(&[0; 8]);
-    let size = u32::try_from(points).map_err(|_| damaged(at, "a chunk of fewer points", points.to_string()))?;
-    let length = points.checked_mul(layout.record).and_then(|n| usize::try_from(n).ok()).unwrap_or(usize::MAX);
-    let mut records = Vec::new();
-    input::reserve(&mut records, length)?;
-    records.resize(length, 0);
-    let vlr = LazVlrBuilder::new(items.to_vec()).with_fixed_chunk_size(size).build();
-    guarded(|| {
-        let mut decoder = LasZipDecompressor::new(Cursor::new(source), vlr).map_err(|e| e.to_string())?;
-        decoder.decompress_many(&mut records).map_err(|e| e.to_string())?;
+impl Chunk<'_> {
+    /// Its records.
+    fn decode(&self, items: &[LazItem], layout: &Layout) -> Result<Vec<u8>, ReadError> {
+        let Self { at, bytes, points, open } = *self;
+        let layered = layout.format_id >= 6;
+        if layered {
+            check_layers(at, bytes, points, items, layout)?;
+        }
+        let length = points.checked_mul(layout.record).and_then(|n| usize::try_from(n).ok()).unwrap_or(usize::MAX);
+        let mut records = Vec::new();
+        input::reserve(&mut records, length)?;
+        records.resize(length, 0);
+        let source = Cursor::new(bytes);
+        let used = guarded(|| {
+            if layered { by_layers(source, items, &mut records) } else { by_points(source, items, &mut records) }
+        });
         // The coder writes exactly as many bytes as the decoder reads: anything else is damage, which no checksum tells.
-        let (used, stored) = (decoder.get().position(), bytes.len() as u64 + 8);
-        if used == stored { Ok(()) } else { Err(format!("{used} bytes used of {stored}")) }
-    })
-    .map_err(|e| damaged(at, &format!("a chunk of {points} points"), e))?;
-    Ok(records)
+        let whole = used.and_then(|used| {
+            let stored = bytes.len() as u64;
+            if used == stored || open && used < stored { Ok(()) } else { Err(format!("{used} bytes used of {stored}")) }
+        });
+        whole.map_err(|e| damaged(at, &format!("a chunk of {points} points"), e))?;
+        Ok(records)
+    }
+}
+
+/// Decodes records whose fields share one stream; gives the bytes used.
+fn by_points(source: Cursor<&[u8]>, items: &[LazItem], records: &mut [u8]) -> Result<u64, String> {
+    let mut decoder = SequentialPointRecordDecompressor::new(source);
+    for item in items {
+        if item.item_type() == LazItemType::GpsTime && item.version() == 2 {
+            decoder.add_field_decompressor(GpsTimes::new());
+        } else {
+            decoder.set_fields_from(&vec![*item]).map_err(|e| e.to_string())?;
+        }
+    }
+    decoder.decompress_many(records).map_err(|e| e.to_string())?;
+    Ok(decoder.get().position())
+}
+
+/// Decodes records whose fields have streams of their own, of which only those are decoded that are asked for; gives the
+/// bytes used.
+fn by_layers(source: Cursor<&[u8]>, items: &[LazItem], records: &mut [u8]) -> Result<u64, String> {
+    let mut decoder = LayeredPointRecordDecompressor::new(source);
+    decoder.set_fields_from(&items.to_vec()).map_err(|e| e.to_string())?;
+    // GPS times above all: a damaged stream of them makes the decoder call itself until the stack is full.
+    let asked = DecompressionSelection::base().decompress_z().decompress_classification().decompress_intensity();
+    decoder.set_selection(asked.decompress_rgb());
+    decoder.decompress_many(records).map_err(|e| e.to_string())?;
+    Ok(decoder.get().position())
 }
 
 /// Checks the sizes of a layered chunk: one raw record, the point count, a size for each layer, then the layers.

@@ -3,46 +3,36 @@
 //! Affine: sform if its code is positive, else qform, else the voxel size alone (NIfTI-1 methods 3, 2 and 1).
 //! Values: stored · scl_slope + scl_inter, as they are where the slope is 0 or NaN.
 
-use super::{ReadLimits, input};
+use super::input::Stream;
+use super::voxels::{self, Kind, Stored};
+use super::{ReadLimits, lattice};
 use crate::error::{Place, ReadError};
 use ::nifti::{NiftiHeader, NiftiType};
-use rayon::prelude::*;
 use splat_core::Grid;
 use splat_core::glam::{DMat3, DVec3};
 
 const HEADER: usize = 348;
 const HINT: &str = "the file is truncated, damaged or not NIfTI-1";
-/// Voxels converted by one task.
-const CHUNK: usize = 1 << 16;
 
 /// Reads a volume.
-pub(super) fn read(content: &[u8], limits: &ReadLimits) -> Result<Grid, ReadError> {
-    let (header, big_endian) = header(content)?;
+pub(super) fn read(mut stream: Stream<'_>, limits: &ReadLimits) -> Result<Grid, ReadError> {
+    let (header, big_endian) = header(stream.peek(HEADER)?)?;
     let dims = dims(&header)?;
-    let kind = header.data_type().ok().filter(|k| size_of_scalar(*k).is_some()).ok_or_else(|| {
+    let kind = header.data_type().ok().and_then(scalar).ok_or_else(|| {
         let expected = "a datatype of real scalars: 8- to 64-bit integers, 32- or 64-bit floats";
         ReadError::input(Place::Byte(70), expected, format!("code {}", header.datatype), "convert the volume first")
     })?;
-    let raw = raw_voxels(content, &header, dims, kind, limits)?;
+    to_voxels(&mut stream, header.vox_offset)?;
     let (origin, axes) = affine(&header);
-    let volume = axes.determinant();
-    if !(origin.is_finite() && volume.is_finite() && volume != 0.0) {
-        let found = format!("origin {origin}, axes {axes}");
-        return Err(ReadError::input(Place::Byte(252), "an affine of three independent finite axes", found, HINT));
-    }
-    let values = values(raw, kind, big_endian, scaling(&header)?)?;
-    if let Some(i) = values.par_iter().position_first(|v| !v.is_finite()) {
-        let found = format!("{} at voxel {i}", values[i]);
-        let hint = "replace NaN by the background value first";
-        let place = Place::Byte(header.vox_offset as u64 + i as u64 * size_of_scalar(kind).unwrap_or(0));
-        return Err(ReadError::input(place, "finite values that fit 32-bit floats", found, hint));
-    }
+    lattice::check(origin, &axes, Place::Byte(252), HINT)?;
+    let stored = Stored { kind, big_endian, dims: dims.map(|n| n as u64), scaling: scaling(&header)? };
+    let values = voxels::read(&mut stream, &stored, limits, HINT)?;
     Ok(Grid { origin, axes, dims, values })
 }
 
 /// The header, and whether the file is big endian.
 fn header(content: &[u8]) -> Result<(NiftiHeader, bool), ReadError> {
-    let Some(bytes) = content.get(..HEADER) else {
+    let Some(bytes) = content.first_chunk::<HEADER>() else {
         let found = format!("{} bytes", content.len());
         return Err(ReadError::input(Place::Byte(0), format!("a header of {HEADER} bytes"), found, HINT));
     };
@@ -66,7 +56,7 @@ fn header(content: &[u8]) -> Result<(NiftiHeader, bool), ReadError> {
             hint,
         ));
     }
-    let header = NiftiHeader::from_reader(bytes)
+    let header = NiftiHeader::from_reader(bytes.as_slice())
         .map_err(|e| ReadError::input(Place::Byte(0), "a NIfTI-1 header", e.to_string(), HINT))?;
     // The crate guesses the byte order from the number of dimensions; it has to agree with the header's size.
     if header.sizeof_hdr != HEADER as i32 {
@@ -93,42 +83,31 @@ fn dims(header: &NiftiHeader) -> Result<[usize; 3], ReadError> {
     Ok([1, 2, 3].map(|i| usize::from(header.dim[i])))
 }
 
-fn size_of_scalar(kind: NiftiType) -> Option<u64> {
+fn scalar(kind: NiftiType) -> Option<Kind> {
     Some(match kind {
-        NiftiType::Uint8 | NiftiType::Int8 => 1,
-        NiftiType::Uint16 | NiftiType::Int16 => 2,
-        NiftiType::Uint32 | NiftiType::Int32 | NiftiType::Float32 => 4,
-        NiftiType::Uint64 | NiftiType::Int64 | NiftiType::Float64 => 8,
+        NiftiType::Uint8 => Kind::U8,
+        NiftiType::Int8 => Kind::I8,
+        NiftiType::Uint16 => Kind::U16,
+        NiftiType::Int16 => Kind::I16,
+        NiftiType::Uint32 => Kind::U32,
+        NiftiType::Int32 => Kind::I32,
+        NiftiType::Uint64 => Kind::U64,
+        NiftiType::Int64 => Kind::I64,
+        NiftiType::Float32 => Kind::F32,
+        NiftiType::Float64 => Kind::F64,
         _ => return None,
     })
 }
 
-/// The stored voxels, exactly as many as the dimensions say.
-fn raw_voxels<'a>(
-    content: &'a [u8],
-    header: &NiftiHeader,
-    dims: [usize; 3],
-    kind: NiftiType,
-    limits: &ReadLimits,
-) -> Result<&'a [u8], ReadError> {
-    let offset = header.vox_offset;
-    if !(offset >= HEADER as f32 && offset.fract() == 0.0 && offset <= content.len() as f32) {
-        let expected = format!("an offset of the voxels from {HEADER} to {}", content.len());
-        return Err(ReadError::input(Place::Byte(108), expected, offset.to_string(), HINT));
+/// Passes over the header and what may follow it before the voxels.
+fn to_voxels(stream: &mut Stream<'_>, offset: f32) -> Result<(), ReadError> {
+    let whole = offset >= HEADER as f32 && offset.fract() == 0.0;
+    let inside = stream.left().is_none_or(|left| f64::from(offset) <= left as f64);
+    if whole && inside && stream.skip(offset as u64)? == offset as u64 {
+        return Ok(());
     }
-    let count = dims.iter().fold(1u64, |n, d| n * *d as u64); // below 2^45
-    let needed = count * size_of_scalar(kind).unwrap_or(0);
-    let stored = content.get(offset as usize..).unwrap_or_default();
-    if stored.len() as u64 != needed {
-        return Err(ReadError::input(
-            Place::Byte(offset as u64),
-            format!("{needed} bytes of voxels ({} x {} x {} {kind:?})", dims[0], dims[1], dims[2]),
-            format!("{}", stored.len()),
-            HINT,
-        ));
-    }
-    input::check_bytes("the voxels", count * size_of::<f32>() as u64, limits)?;
-    Ok(stored)
+    let expected = format!("an offset of the voxels from {HEADER} to the end of the file");
+    Err(ReadError::input(Place::Byte(108), expected, offset.to_string(), HINT))
 }
 
 /// Slope and intercept, (1, 0) where the file asks for none.
@@ -142,37 +121,6 @@ fn scaling(header: &NiftiHeader) -> Result<(f64, f64), ReadError> {
     }
     let found = format!("slope {slope}, intercept {intercept}");
     Err(ReadError::input(Place::Byte(112), "a finite slope and intercept", found, HINT))
-}
-
-fn values(raw: &[u8], kind: NiftiType, big_endian: bool, (slope, inter): (f64, f64)) -> Result<Vec<f32>, ReadError> {
-    macro_rules! decode {
-        ($t:ty) => {
-            convert(raw, |b: [u8; size_of::<$t>()]| {
-                let stored = if big_endian { <$t>::from_be_bytes(b) } else { <$t>::from_le_bytes(b) };
-                (stored as f64 * slope + inter) as f32
-            })
-        };
-    }
-    match kind {
-        NiftiType::Uint8 => decode!(u8),
-        NiftiType::Int8 => decode!(i8),
-        NiftiType::Uint16 => decode!(u16),
-        NiftiType::Int16 => decode!(i16),
-        NiftiType::Uint32 => decode!(u32),
-        NiftiType::Int32 => decode!(i32),
-        NiftiType::Uint64 => decode!(u64),
-        NiftiType::Int64 => decode!(i64),
-        NiftiType::Float32 => decode!(f32),
-        _ => decode!(f64),
-    }
-}
-
-fn convert<const N: usize>(raw: &[u8], decode: impl Fn([u8; N]) -> f32 + Sync) -> Result<Vec<f32>, ReadError> {
-    let (stored, _) = raw.as_chunks::<N>();
-    let mut values = Vec::new();
-    input::reserve(&mut values, stored.len())?;
-    values.par_extend(stored.par_iter().with_min_len(CHUNK).map(|b| decode(*b)));
-    Ok(values)
 }
 
 /// World position of voxel (0, 0, 0) and the steps along i, j and k.

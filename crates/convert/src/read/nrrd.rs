@@ -1,48 +1,136 @@
 //! NRRD (`.nrrd`, `.nhdr`) → a volume of scalars in the file's own axes and units.
 //!
 //! Read are three-dimensional volumes of real scalars, encoded raw, gzip or as text, in one file or with one data file
-//! in the header's folder or below. Axes: `space directions`, else `spacings`, else 1; `space origin`, else 0.
+//! in the header's folder or below. Axes: `space directions`, else `spacings`, else 1; `space origin`, else 0. Directions
+//! in a patient's space that points left or to the back are turned to right, anterior, superior, as NIfTI has them.
 
-mod data;
 mod header;
 
-use super::{ReadLimits, input};
+use super::input::{self, Stream};
+use super::text::Lines;
+use super::voxels::{self, Stored};
+use super::{Notes, ReadLimits};
 use crate::error::{Place, ReadError, escaped};
 use header::{Encoding, Header};
 use splat_core::Grid;
-use std::borrow::Cow;
 use std::path::{Component, Path};
 
 const HINT: &str = "the file is truncated or damaged, or its header states other sizes";
 
+/// Longest header; real ones have some hundred bytes.
+const MAX_HEADER: usize = 16 << 20;
+
 /// Reads a volume; `path` is where the header was read from, if from a file.
-pub(super) fn read(content: &[u8], path: Option<&Path>, limits: &ReadLimits) -> Result<Grid, ReadError> {
-    let header = header::parse(content)?;
+pub(super) fn read(
+    mut stream: Stream<'_>,
+    path: Option<&Path>,
+    limits: &ReadLimits,
+    notes: &mut Notes,
+) -> Result<Grid, ReadError> {
+    let header = header::parse(header_bytes(&mut stream)?)?;
     let count = header.sizes.iter().try_fold(1u64, |n, s| n.checked_mul(*s)).filter(|n| *n <= 1 << 40);
     let count = count.ok_or_else(|| {
         let found = format!("{:?}", header.sizes);
         ReadError::input(header.place_of_sizes, "at most 2^40 voxels", found, HINT)
     })?;
     input::check_bytes("the voxels", count * size_of::<f32>() as u64, limits)?;
-    let stored = match &header.data_file {
-        None => Cow::Borrowed(content.get(header.end..).unwrap_or_default()),
-        Some((name, place)) => Cow::Owned(detached(name, *place, path, limits)?),
+    if let Some(space) = header.converted_from {
+        notes.remarks.push(format!("space: {space}, converted to right-anterior-superior"));
+    }
+    let mut stream = match &header.data_file {
+        None => {
+            stream.skip(header.end as u64)?;
+            stream
+        }
+        Some((name, place)) => detached(name, *place, path, limits)?,
     };
-    let at = if header.data_file.is_some() { 0 } else { header.end };
-    let stored = skip_lines(&stored, header.line_skip)?;
-    let unpacked = match header.encoding {
-        Encoding::Gzip => Cow::Owned(input::gunzip(stored, limits)?),
-        Encoding::Raw | Encoding::Text => Cow::Borrowed(stored),
-    };
+    skip_lines(&mut stream, header.line_skip)?;
+    let (kind, big_endian, scaling) = (header.kind, header.big_endian, (1.0, 0.0));
+    let stored = Stored { kind, big_endian, dims: header.sizes, scaling };
     let values = match header.encoding {
-        Encoding::Text => data::text(&unpacked, count)?,
-        Encoding::Raw | Encoding::Gzip => data::binary(skip_bytes(&unpacked, &header, count)?, &header, count, at)?,
+        Encoding::Text => text(&stream.rest()?, count)?,
+        Encoding::Raw if header.byte_skip == -1 => last(stream, &stored, limits)?,
+        Encoding::Raw => binary(stream, &header, &stored, limits)?,
+        Encoding::Gzip => binary(stream.gunzip(), &header, &stored, limits)?,
     };
     Ok(Grid { origin: header.origin, axes: header.axes, dims: header.sizes.map(|n| n as usize), values })
 }
 
+/// The bytes up to the empty line after the header, and some more; all of them where there is none.
+fn header_bytes<'a>(stream: &'a mut Stream<'_>) -> Result<&'a [u8], ReadError> {
+    let ends = |head: &[u8]| [&b"\n\n"[..], b"\n\r\n", b"\r\r"].iter().any(|e| head.windows(e.len()).any(|w| w == *e));
+    let mut length = 1 << 12;
+    loop {
+        let head = stream.peek(length)?;
+        if head.len() < length || ends(head) {
+            return stream.peek(length);
+        }
+        if length >= MAX_HEADER {
+            let expected = format!("an empty line after at most {MAX_HEADER} bytes of header");
+            return Err(ReadError::input(Place::Byte(0), expected, "a longer header", HINT));
+        }
+        length *= 4;
+    }
+}
+
+/// Voxels after the bytes to be skipped.
+fn binary(
+    mut stream: Stream<'_>,
+    header: &Header,
+    stored: &Stored,
+    limits: &ReadLimits,
+) -> Result<Vec<f32>, ReadError> {
+    let skipped = match u64::try_from(header.byte_skip) {
+        Ok(n) if stream.left().is_none_or(|left| n <= left) => stream.skip(n)? == n,
+        _ => false,
+    };
+    if skipped {
+        return voxels::read(&mut stream, stored, limits, HINT);
+    }
+    let found = format!("byte skip {}", header.byte_skip);
+    Err(ReadError::input(Place::File, "a number of bytes before the voxels, within the data", found, HINT))
+}
+
+/// Voxels that the data ends with, whatever comes before.
+fn last(stream: Stream<'_>, stored: &Stored, limits: &ReadLimits) -> Result<Vec<f32>, ReadError> {
+    let data = stream.rest()?;
+    let Some(start) = (data.len() as u64).checked_sub(stored.bytes()) else {
+        let found = format!("{} bytes, byte skip -1", data.len());
+        return Err(ReadError::input(Place::File, format!("{} bytes of voxels", stored.bytes()), found, HINT));
+    };
+    voxels::read(&mut Stream::of(&data[start as usize..], limits), stored, limits, HINT)
+}
+
+/// Exactly `count` numbers in text.
+fn text(stored: &[u8], count: u64) -> Result<Vec<f32>, ReadError> {
+    let wrong = |found: String| ReadError::input(Place::File, format!("{count} voxels"), found, HINT);
+    let mut values = Vec::new();
+    // A digit and a blank each, but for the last one: the text cannot hold more, whatever the header says.
+    input::reserve(&mut values, count.min((stored.len() as u64).div_ceil(2)) as usize)?;
+    let mut lines = Lines::new(stored);
+    while let Some(line) = lines.next()? {
+        for word in line.words(true) {
+            let value = word.number()? as f32;
+            if !value.is_finite() {
+                let expected = "a value that fits a 32-bit float";
+                return Err(ReadError::input(Place::File, expected, word.shown(), "scale the values"));
+            }
+            if values.len() as u64 == count {
+                return Err(wrong("more".to_owned()));
+            }
+            values.push(value);
+        }
+    }
+    if values.len() as u64 == count { Ok(values) } else { Err(wrong(values.len().to_string())) }
+}
+
 /// The content of the data file that a header names.
-fn detached(name: &str, place: Place, header: Option<&Path>, limits: &ReadLimits) -> Result<Vec<u8>, ReadError> {
+fn detached(
+    name: &str,
+    place: Place,
+    header: Option<&Path>,
+    limits: &ReadLimits,
+) -> Result<Stream<'static>, ReadError> {
     let shown = || format!("'{}'", escaped(name.as_bytes(), 60));
     let refused = |expected: &str| {
         Err(ReadError::input(place, expected, shown(), "put the data beside the header and name it without folders"))
@@ -68,30 +156,20 @@ fn detached(name: &str, place: Place, header: Option<&Path>, limits: &ReadLimits
             return refused("a data file that is not the header itself");
         }
     }
-    input::regular_file(&path, limits).map_err(|e| {
+    Stream::open(&path, limits).map_err(|e| {
         let expected = format!("the data file {}: {}", shown(), e.expected);
         ReadError { expected, ..e }
     })
 }
 
-fn skip_lines(mut data: &[u8], lines: u64) -> Result<&[u8], ReadError> {
+fn skip_lines(stream: &mut Stream<'_>, lines: u64) -> Result<(), ReadError> {
     for _ in 0..lines {
-        let Some(end) = data.iter().position(|b| *b == b'\n') else {
-            return Err(ReadError::input(Place::File, format!("{lines} lines before the data"), "fewer", HINT));
-        };
-        data = &data[end + 1..];
+        let mut byte = [0];
+        while byte != *b"\n" {
+            if stream.fill(&mut byte)? == 0 {
+                return Err(ReadError::input(Place::File, format!("{lines} lines before the data"), "fewer", HINT));
+            }
+        }
     }
-    Ok(data)
-}
-
-/// The data after `byte skip`; −1 means that it is what the file ends with.
-fn skip_bytes<'a>(data: &'a [u8], header: &Header, count: u64) -> Result<&'a [u8], ReadError> {
-    let skip = match header.byte_skip {
-        -1 => (data.len() as u64).checked_sub(count * header.kind.size()),
-        n => u64::try_from(n).ok().filter(|n| *n <= data.len() as u64),
-    };
-    skip.map(|n| &data[n as usize..]).ok_or_else(|| {
-        let found = format!("{} bytes, byte skip {}", data.len(), header.byte_skip);
-        ReadError::input(Place::File, format!("{} bytes of voxels", count * header.kind.size()), found, HINT)
-    })
+    Ok(())
 }

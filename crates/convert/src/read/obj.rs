@@ -19,7 +19,7 @@ const BYTES_PER_CORNER: u64 = 32;
 const BYTES_PER_TRIANGLE: u64 = 12;
 
 /// Statements without a meaning here.
-const READ_OVER: [&[u8]; 22] = [
+pub(super) const READ_OVER: [&[u8]; 22] = [
     b"vt",
     b"vp",
     b"g",

@@ -1,7 +1,7 @@
 //! PLY: ascii and both binary byte orders → a mesh where there are faces, else raw points.
 //!
 //! The parser is our own: places down to line and column or byte, line ends of every system, duplicate properties and
-//! sizes checked against the file before allocation are asked of it. Properties it has no use for are read over.
+//! sizes checked against the file before allocation are asked of it. Properties it has no use for are read over and named.
 
 mod ascii;
 mod binary;
@@ -23,4 +23,21 @@ pub(super) fn read(content: &[u8], limits: &ReadLimits) -> Result<Loaded, ReadEr
         Encoding::LittleEndian => body::read(Binary::<false>::new(content, header.body), &header, limits),
         Encoding::BigEndian => body::read(Binary::<true>::new(content, header.body), &header, limits),
     }
+}
+
+/// Names of what [`read`] reads over in a file that it has read: properties of vertices, and `element.property` of others.
+pub(super) fn unused(content: &[u8]) -> Result<Vec<Vec<u8>>, ReadError> {
+    let header = header::parse(content)?;
+    let is_index = |name: &[u8]| name == b"vertex_indices" || name == b"vertex_index";
+    let mut names = Vec::new();
+    for element in &header.elements {
+        let all = element.properties.iter().map(|p| p.name.as_slice());
+        match element.name.as_slice() {
+            b"vertex" => names.extend(columns::Columns::new(element, false)?.unused(element).map(<[u8]>::to_vec)),
+            b"tristrips" => {}
+            b"face" => names.extend(all.filter(|n| !is_index(n)).map(|n| [b"face.", n].concat())),
+            other => names.extend(all.map(|n| [other, b".", n].concat())),
+        }
+    }
+    Ok(names)
 }

@@ -1,5 +1,6 @@
 //! Text files as lines of words with places.
 
+use super::decimal::{CUT, decimal};
 use crate::error::{Place, ReadError, escaped};
 
 /// Longest line accepted, bytes.
@@ -18,6 +19,8 @@ pub(super) struct Line<'a> {
     pub(super) text: &'a [u8],
     /// From 1.
     pub(super) number: u64,
+    /// Whether the file ends with it, without a line end.
+    open: bool,
 }
 
 /// A word of a line.
@@ -27,6 +30,8 @@ pub(super) struct Word<'a> {
     line: u64,
     /// From 1, bytes.
     column: u64,
+    /// Whether the file ends with it.
+    open: bool,
 }
 
 impl<'a> Lines<'a> {
@@ -49,7 +54,7 @@ impl<'a> Lines<'a> {
         }
         let end = if rest[length..].starts_with(b"\r\n") { 2 } else { 1 };
         self.at += length + end;
-        Ok(Some(Line { text: &rest[..length], number: self.number }))
+        Ok(Some(Line { text: &rest[..length], number: self.number, open: length == rest.len() }))
     }
 
     /// Bytes read.
@@ -73,7 +78,8 @@ impl<'a> Line<'a> {
         self.text.split(parts).filter_map(move |text| {
             let column = at as u64 + 1;
             at += text.len() + 1;
-            (!text.is_empty()).then_some(Word { text, line: self.number, column })
+            let open = self.open && at > self.text.len();
+            (!text.is_empty()).then_some(Word { text, line: self.number, column, open })
         })
     }
 
@@ -95,12 +101,13 @@ impl Word<'_> {
 
     /// A finite decimal number, whatever the system's language.
     pub(super) fn number(self) -> Result<f64, ReadError> {
-        let value = std::str::from_utf8(self.text).ok().and_then(|t| t.parse::<f64>().ok());
-        match value {
+        match decimal(self.text, self.open) {
             Some(value) if value.is_finite() => Ok(value),
             _ => {
                 let hint = "numbers are written with a point; NaN and infinity are not coordinates";
-                Err(ReadError::input(self.place(), "a finite decimal number", self.shown(), hint))
+                let expected =
+                    if self.open && decimal(self.text, false).is_some() { CUT } else { "a finite decimal number" };
+                Err(ReadError::input(self.place(), expected, self.shown(), hint))
             }
         }
     }

@@ -6,7 +6,7 @@
 //! nothing but a whole number before the first point is a count, which is checked.
 
 use super::text::{Line, Lines, Word};
-use super::{ReadLimits, color::linear_from_srgb, input, origin};
+use super::{Notes, ReadLimits, color::linear_from_srgb, input, origin};
 use crate::error::{Place, ReadError};
 use crate::raw_points::RawPoints;
 use splat_core::glam::{DVec3, Vec3};
@@ -32,7 +32,7 @@ const VALUE: usize = 9;
 const BYTES_PER_POINT: u64 = 24 + 12 + 12 + 12 + 4;
 
 /// Reads points.
-pub(super) fn read(content: &[u8], limits: &ReadLimits) -> Result<RawPoints, ReadError> {
+pub(super) fn read(content: &[u8], limits: &ReadLimits, notes: &mut Notes) -> Result<RawPoints, ReadError> {
     let mut lines = Lines::new(content);
     let mut columns: Option<Vec<Option<usize>>> = None;
     let (mut count, mut positions, mut points) = (None, Vec::new(), RawPoints::default());
@@ -46,7 +46,9 @@ pub(super) fn read(content: &[u8], limits: &ReadLimits) -> Result<RawPoints, Rea
                 continue;
             }
             if first.number().is_err() {
-                columns = Some(named(line, &words)?);
+                let roles = named(line, &words)?;
+                notes.not_used(words.iter().zip(&roles).filter(|(_, r)| r.is_none()).map(|(w, _)| bare(w)));
+                columns = Some(roles);
                 continue;
             }
         }
@@ -89,12 +91,15 @@ fn whole(word: Word<'_>) -> Result<u64, ReadError> {
     })
 }
 
+/// A name without quotes.
+fn bare<'a>(word: &Word<'a>) -> &'a [u8] {
+    word.text.strip_prefix(b"\"").and_then(|n| n.strip_suffix(b"\"")).unwrap_or(word.text)
+}
+
 /// Roles of columns with names; others are read over.
 fn named(line: Line<'_>, words: &[Word<'_>]) -> Result<Vec<Option<usize>>, ReadError> {
-    let role = |w: &Word<'_>| {
-        let name = w.text.strip_prefix(b"\"").and_then(|n| n.strip_suffix(b"\"")).unwrap_or(w.text);
-        ROLES.iter().position(|names| names.iter().any(|n| name.eq_ignore_ascii_case(n.as_bytes())))
-    };
+    let role =
+        |w: &Word<'_>| ROLES.iter().position(|names| names.iter().any(|n| bare(w).eq_ignore_ascii_case(n.as_bytes())));
     let mut columns: Vec<Option<usize>> = words.iter().map(role).collect();
     let found: Vec<usize> = columns.iter().flatten().copied().collect();
     if let Some(twice) = (0..ROLES.len()).find(|r| found.iter().filter(|f| *f == r).count() > 1) {

@@ -1,6 +1,9 @@
 //! Small valid files of every format, made in memory.
 #![allow(dead_code, reason = "each test file uses some of them")]
 
+#[cfg(feature = "las")]
+pub(crate) mod oldest;
+
 use convert::ReadError;
 use convert::read::{Loaded, ReadLimits, bytes};
 use std::io::Write;
@@ -120,12 +123,23 @@ pub(crate) fn las(format: u8, n: i32, compressed: bool) -> Vec<u8> {
                 classification: las::point::Classification::new((i % 7) as u8).unwrap(),
                 color: has_color(format).then(|| las::Color::new(i as u16 % 256, 128, 255)),
                 nir: (format == 8).then_some(i as u16),
-                gps_time: (format == 1 || format >= 3).then_some(f64::from(i)),
+                gps_time: (format == 1 || format >= 3).then(|| gps_time(i)),
                 ..Default::default()
             })
             .unwrap();
     }
     writer.into_inner().unwrap().into_inner()
+}
+
+/// Times as of several sensors: steps, gaps, the same time again, and some from another day.
+fn gps_time(i: i32) -> f64 {
+    let step = f64::from(i / 3) * 0.01 + f64::from(i % 17);
+    match i % 11 {
+        0 => 1e9 + step,
+        1 => 3.0,
+        5 | 6 => 2e5,
+        _ => step,
+    }
 }
 
 fn has_color(format: u8) -> bool {
@@ -135,4 +149,53 @@ fn has_color(format: u8) -> bool {
 /// Integer coordinates of point `i` of [`las`].
 pub(crate) fn las_steps(i: i32) -> [i32; 3] {
     [1_234_500 + 67 * (i % 31).pow(2), -987_654 + i * 13, i % 5]
+}
+
+/// Two facets, binary or as text.
+pub(crate) fn stl(binary: bool) -> Vec<u8> {
+    let corners =
+        [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [5.0, 0.0, 1.0], [6.5, 0.0, 1.0], [5.0, 2.0, 1.0]];
+    let mut out = if binary { [vec![b' '; 80], 2u32.to_le_bytes().to_vec()].concat() } else { b"solid two\n".to_vec() };
+    for facet in corners.chunks(3) {
+        if binary {
+            out.extend([0; 12]);
+            facet.iter().flatten().for_each(|c| out.extend(c.to_le_bytes()));
+            out.extend([0; 2]);
+        } else {
+            out.extend(b"facet normal 0 0 1\nouter loop\n");
+            facet.iter().for_each(|[x, y, z]| out.extend(format!("vertex {x} {y} {z}\n").bytes()));
+            out.extend(b"endloop\nendfacet\n");
+        }
+    }
+    if !binary {
+        out.extend(b"endsolid\n");
+    }
+    out
+}
+
+/// A quad and a triangle with normals.
+pub(crate) fn obj() -> Vec<u8> {
+    b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0.5\nvt 0 0\nvn 0 0 2\nusemtl stone\nf 1//1 2//1 3//1 4//1\nf -4 -2 -1\n"
+        .to_vec()
+}
+
+/// Points with normals, words between `separator`, after the line `names`.
+pub(crate) fn text_points(separator: &str, names: &str) -> Vec<u8> {
+    let line = |i: i32| ["0.25", &i.to_string(), "-1.5e1", "0", "0.6", "0.8"].join(separator) + "\n";
+    (names.to_owned() + &(0..20).map(line).collect::<String>()).into_bytes()
+}
+
+/// A 3 x 2 x 2 volume of floats 0 to 11.
+pub(crate) fn nrrd(encoding: &str) -> Vec<u8> {
+    let header = format!(
+        "NRRD0004\ntype: float\ndimension: 3\nspace: right-anterior-superior\nsizes: 3 2 2\n\
+         space directions: (2,0,0) (0,-1,0) (0,0,3)\nspace origin: (1,2,3)\nendian: little\nencoding: {encoding}\n\n"
+    );
+    let raw: Vec<u8> = (0..12).flat_map(|v| (v as f32).to_le_bytes()).collect();
+    let data = match encoding {
+        "raw" => raw,
+        "gzip" => gzip(&raw),
+        _ => (0..12).map(|v| format!("{v} ")).collect::<String>().into_bytes(),
+    };
+    [header.into_bytes(), data].concat()
 }

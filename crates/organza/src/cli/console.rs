@@ -19,6 +19,11 @@ pub(super) fn note(text: &str) {
     let _ = io::stderr().lock().write_all(text.as_bytes());
 }
 
+/// Prints what is good to know as one line on stderr.
+pub(super) fn remark(text: &str) {
+    note(&format!("note: {}\n", escape_controls(text)));
+}
+
 /// Prints a warning of one line on stderr.
 pub(super) fn warn(text: &str) {
     note(&format!("warning: {}\n", escape_controls(text)));

@@ -13,18 +13,19 @@ pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
     let scene = load_scene(&arguments.scene)?;
     start_threads(arguments.scene.threads)?;
     let options = render_options(&arguments.scene);
-    let (plan, cost, prepared, warnings) = with_bar(|progress| {
+    let (plan, cost, prepared, (warnings, notes)) = with_bar(|progress| {
         if arguments.measure {
             let render = organza::render(&scene, &options, progress)?;
-            return Ok((render.plan, render.cost, None, render.warnings));
+            return Ok((render.plan, render.cost, None, (render.warnings, render.notes)));
         }
         let explanation = organza::explain(&scene, &options, progress)?;
-        let organza::Explanation { plan, cost, memory, splats, warnings } = explanation;
-        Ok((plan, cost, Some((memory, splats)), warnings))
+        let organza::Explanation { plan, cost, memory, splats, warnings, notes } = explanation;
+        Ok((plan, cost, Some((memory, splats)), (warnings, notes)))
     })?;
     for warning in &warnings {
         console::warn(warning);
     }
+    notes.iter().for_each(|note| console::remark(note));
     if arguments.scene.json {
         let document = json!({
             "scene": path_text(&scene.file),
@@ -33,6 +34,7 @@ pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
             "memory_bytes": prepared.as_ref().map(|p| p.0),
             "splats": prepared.as_ref().map(|p| report::splats_json(&p.1)),
             "warnings": warnings,
+            "notes": notes,
         });
         return console::out(&format!("{document:#}\n"));
     }

@@ -91,6 +91,8 @@ fn file_document(info: &FileInfo) -> Value {
         "attributes": info.attributes,
         "bounds": info.bounds.map(|b| b.map(|p| p.to_array())),
         "range": info.range,
+        "not_used": info.unused,
+        "remarks": info.remarks,
     })
 }
 

@@ -23,6 +23,7 @@ struct Done {
     text: String,
     json: Value,
     warnings: Vec<String>,
+    notes: Vec<String>,
     sets: Option<Sets>,
 }
 
@@ -50,6 +51,13 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
         if !said.contains(&warning) {
             console::warn(warning);
             said.push(warning);
+        }
+    }
+    let mut noted: Vec<&String> = Vec::new();
+    for note in done.iter().flat_map(|d| &d.notes) {
+        if !noted.contains(&note) {
+            console::remark(note);
+            noted.push(note);
         }
     }
     if outcome.is_ok() || !arguments.scene.json {
@@ -84,7 +92,7 @@ impl Job<'_> {
             target.write(format!("{:#}\n", report::cost_json(&render.cost)).as_bytes())?;
         }
         let (text, json) = (self.text(&render, &written), self.json(&render, &written));
-        Ok(Done { text, json, warnings, sets: render.sets })
+        Ok(Done { text, json, warnings, notes: render.notes, sets: render.sets })
     }
 
     fn metadata(&self, render: &Render) -> Metadata {
@@ -155,6 +163,7 @@ impl Job<'_> {
             "cost": report::cost_json(&render.cost),
             "sets": render.sets.map(sets),
             "warnings": render.warnings,
+            "notes": render.notes,
         });
         if let Some(frame) = self.frame {
             document["frame"] = frame.into();

@@ -1,7 +1,7 @@
 //! What was read from files, shared by all objects and frames that are made from it: a file is read once.
 
 use crate::Error;
-use convert::read::{Loaded, ReadLimits};
+use convert::read::{Loaded, Notes, ReadLimits};
 use convert::{RawPoints, SharedField};
 use glam::DVec3;
 use splat_core::{Grid, Mesh};
@@ -24,6 +24,8 @@ pub(super) type Fitted = (SharedField, [DVec3; 2]);
 #[derive(Default)]
 pub(crate) struct Files {
     read: RefCell<Vec<(PathBuf, ReadLimits, FileData)>>,
+    /// What there is to say of them, one sentence each.
+    notes: RefCell<Vec<String>>,
     /// Fits take longer than reading: with their tolerance and the bytes that they take.
     fitted: RefCell<Vec<(PathBuf, f64, u64, Fitted)>>,
 }
@@ -34,14 +36,35 @@ impl Files {
         if let Some(data) = self.known(path, limits) {
             return Ok(data);
         }
-        let data = read(path, limits)?;
+        let data = self.read_anew(path, limits)?;
         self.read.borrow_mut().push((path.to_owned(), *limits, data.clone()));
         Ok(data)
     }
 
     /// The same without keeping it: for whoever keeps what is made from it.
     pub(super) fn read_once(&self, path: &Path, limits: &ReadLimits) -> Result<FileData, Error> {
-        self.known(path, limits).map_or_else(|| read(path, limits), Ok)
+        self.known(path, limits).map_or_else(|| self.read_anew(path, limits), Ok)
+    }
+
+    /// What the files hold that is not drawn, and what was made of them, one sentence each.
+    pub(super) fn notes(&self) -> Vec<String> {
+        self.notes.borrow().clone()
+    }
+
+    fn read_anew(&self, path: &Path, limits: &ReadLimits) -> Result<FileData, Error> {
+        let (data, noted) = convert::read::file_with_notes(path, limits).map_err(|e| Error::from_read(path, &e))?;
+        let mut notes = self.notes.borrow_mut();
+        for note in sentences(path, &data, noted) {
+            if !notes.contains(&note) {
+                notes.push(note);
+            }
+        }
+        match data {
+            Loaded::Mesh(mesh) => Ok(FileData::Mesh(mesh.into())),
+            Loaded::Points(points) => Ok(FileData::Points(points.into())),
+            Loaded::Grid(grid) => Ok(FileData::Grid(grid.into())),
+            _ => Err(Error::Internal("a kind of file that scenes do not know".into())),
+        }
     }
 
     fn known(&self, path: &Path, limits: &ReadLimits) -> Option<FileData> {
@@ -73,13 +96,19 @@ impl Files {
     }
 }
 
-fn read(path: &Path, limits: &ReadLimits) -> Result<FileData, Error> {
-    match convert::read::file(path, limits).map_err(|e| Error::from_read(path, &e))? {
-        Loaded::Mesh(mesh) => Ok(FileData::Mesh(mesh.into())),
-        Loaded::Points(points) => Ok(FileData::Points(points.into())),
-        Loaded::Grid(grid) => Ok(FileData::Grid(grid.into())),
-        _ => Err(Error::Internal("a kind of file that scenes do not know".into())),
+/// What a picture does not show of a file, and what its reader made of it.
+fn sentences(path: &Path, data: &Loaded, Notes { mut unused, remarks }: Notes) -> Vec<String> {
+    let file = crate::printable(path);
+    if let Loaded::Points(points) = data {
+        // Read, but no key of a scene asks for them.
+        let columns = [("value", points.value.is_empty()), ("classification", points.classification.is_empty())];
+        unused.extend(columns.iter().filter(|(_, empty)| !empty).map(|(name, _)| (*name).to_owned()));
     }
+    let mut all: Vec<String> = remarks.iter().map(|remark| format!("{file}: {remark}")).collect();
+    if !unused.is_empty() {
+        all.push(format!("{file}: columns not used: {}", unused.join(", ")));
+    }
+    all
 }
 
 impl FileData {

@@ -20,6 +20,8 @@ use std::path::Path;
 pub(super) struct Prepared<'a> {
     pub(super) input: Input<'a>,
     pub(super) prediction: Prediction,
+    /// Whether it is drawn in the colours of its file, without light: photographs hold the light of their day already.
+    pub(super) as_it_is: bool,
     /// The refusal of a conversion that would make too many splats.
     pub(super) too_many: Option<ConvertError>,
     /// Extinction, where particles could be sampled from a field of it.
@@ -43,18 +45,28 @@ pub(super) fn prepare<'a>(
     context: &Context<'_>,
     sampled: bool,
 ) -> Result<Prepared<'a>, Error> {
-    let input = input(object, context)?;
+    let mut input = input(object, context)?;
+    let as_it_is = match &mut input {
+        // No material is named, and no colour put in the place of the file's.
+        Input::Points(_, points, params)
+            if object.material == 0 && object.color.is_none() && !points.color.is_empty() =>
+        {
+            params.splat.material = context.scene.materials.len() as u16;
+            true
+        }
+        _ => false,
+    };
     let bounded = if sampled { input.bounded(context.extinction_factor(object)) } else { None };
     let search = match &input {
         Input::Surface(field, bounds, ..) if sampled => Some(Search::new(field, *bounds)),
         _ => None,
     };
     match predict(&input) {
-        Ok(prediction) => Ok(Prepared { input, prediction, too_many: None, bounded, search }),
+        Ok(prediction) => Ok(Prepared { input, prediction, as_it_is, too_many: None, bounded, search }),
         Err(ConvertError::TooMany { object, what, needed, limit }) => {
             let prediction = Prediction { splats: needed as u64, ..Prediction::default() };
             let too_many = Some(ConvertError::TooMany { object, what, needed, limit });
-            Ok(Prepared { input, prediction, too_many, bounded, search })
+            Ok(Prepared { input, prediction, as_it_is, too_many, bounded, search })
         }
         Err(e) => Err(refuse(&e)),
     }
@@ -101,7 +113,7 @@ impl Prepared<'_> {
             opaque: self.input.opacity() == Some(1.0),
             by_gradient: self.input.by_gradient(),
             casts: object.casts_shadow && extinct,
-            receives: material.shading != Shading::Unlit && object.shadow_coefficient > 0.0,
+            receives: !self.as_it_is && material.shading != Shading::Unlit && object.shadow_coefficient > 0.0,
             splats: self.prediction.splats,
         }
     }
@@ -241,6 +253,6 @@ pub(crate) fn refuse(error: &ConvertError) -> Error {
             hint: "use a larger spacing, or a larger --max-memory or render.max_points".into(),
         },
         ConvertError::Cancelled => Error::Cancelled,
-        other => Error::input("scene", other.to_string(), ""),
+        other => Error::input(Error::OF_SCENE, other.to_string(), ""),
     }
 }

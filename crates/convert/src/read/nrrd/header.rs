@@ -1,50 +1,26 @@
 //! The header of an NRRD file: lines `field: value` up to an empty line.
 
 use crate::error::{Place, ReadError, escaped};
+use crate::read::lattice;
 use crate::read::text::{Line, Lines};
+use crate::read::voxels::Kind;
 use splat_core::glam::{DMat3, DVec3};
 
-/// Type of one stored voxel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    I64,
-    U64,
-    F32,
-    F64,
-}
-
-impl Kind {
-    fn named(name: &str) -> Option<Self> {
-        Some(match name {
-            "signed char" | "int8" | "int8_t" => Self::I8,
-            "uchar" | "unsigned char" | "uint8" | "uint8_t" => Self::U8,
-            "short" | "short int" | "signed short" | "signed short int" | "int16" | "int16_t" => Self::I16,
-            "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => Self::U16,
-            "int" | "signed int" | "int32" | "int32_t" => Self::I32,
-            "uint" | "unsigned int" | "uint32" | "uint32_t" => Self::U32,
-            "longlong" | "long long" | "long long int" | "signed long long" | "int64" | "int64_t" => Self::I64,
-            "ulonglong" | "unsigned long long" | "unsigned long long int" | "uint64" | "uint64_t" => Self::U64,
-            "float" => Self::F32,
-            "double" => Self::F64,
-            _ => return None,
-        })
-    }
-
-    /// Bytes of a voxel.
-    pub(super) fn size(self) -> u64 {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::I64 | Self::U64 | Self::F64 => 8,
-        }
-    }
+/// The type of a voxel by its name.
+fn kind_named(name: &str) -> Option<Kind> {
+    Some(match name {
+        "signed char" | "int8" | "int8_t" => Kind::I8,
+        "uchar" | "unsigned char" | "uint8" | "uint8_t" => Kind::U8,
+        "short" | "short int" | "signed short" | "signed short int" | "int16" | "int16_t" => Kind::I16,
+        "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => Kind::U16,
+        "int" | "signed int" | "int32" | "int32_t" => Kind::I32,
+        "uint" | "unsigned int" | "uint32" | "uint32_t" => Kind::U32,
+        "longlong" | "long long" | "long long int" | "signed long long" | "int64" | "int64_t" => Kind::I64,
+        "ulonglong" | "unsigned long long" | "unsigned long long int" | "uint64" | "uint64_t" => Kind::U64,
+        "float" => Kind::F32,
+        "double" => Kind::F64,
+        _ => return None,
+    })
 }
 
 /// How voxels are stored.
@@ -65,6 +41,8 @@ pub(super) struct Header {
     pub(super) big_endian: bool,
     pub(super) origin: DVec3,
     pub(super) axes: DMat3,
+    /// What the file calls the space that its axes were converted from.
+    pub(super) converted_from: Option<&'static str>,
     pub(super) line_skip: u64,
     pub(super) byte_skip: i64,
     /// Name of the file with the voxels, and where the header names it.
@@ -79,7 +57,7 @@ struct Fields<'a> {
     found: Vec<(String, String, Line<'a>)>,
 }
 
-const KNOWN: [&str; 12] = [
+const KNOWN: [&str; 13] = [
     "type",
     "dimension",
     "sizes",
@@ -92,6 +70,18 @@ const KNOWN: [&str; 12] = [
     "line skip",
     "byte skip",
     "axis mins",
+    "space",
+];
+
+/// Spaces of three dimensions, their short names, and how their axes point along right, anterior and superior; those of a
+/// scanner or of no patient are taken as they are.
+const SPACES: [(&str, &str, DVec3); 6] = [
+    ("right-anterior-superior", "ras", DVec3::ONE),
+    ("left-anterior-superior", "las", DVec3::new(-1.0, 1.0, 1.0)),
+    ("left-posterior-superior", "lps", DVec3::new(-1.0, -1.0, 1.0)),
+    ("scanner-xyz", "scanner-xyz", DVec3::ONE),
+    ("3d-right-handed", "3d-right-handed", DVec3::ONE),
+    ("3d-left-handed", "3d-left-handed", DVec3::ONE),
 ];
 
 /// Parses the header.
@@ -116,7 +106,7 @@ pub(super) fn parse(content: &[u8]) -> Result<Header, ReadError> {
         return Err(ReadError::input(at, "dimension: 3", escaped(dimension.as_bytes(), 20), hint));
     }
     let (name, at) = fields.required("type", last)?;
-    let kind = Kind::named(name).ok_or_else(|| {
+    let kind = kind_named(name).ok_or_else(|| {
         let expected = "a type of real scalars: 8- to 64-bit integers, float or double";
         ReadError::input(at, expected, format!("'{}'", escaped(name.as_bytes(), 40)), "convert the volume first")
     })?;
@@ -124,11 +114,24 @@ pub(super) fn parse(content: &[u8]) -> Result<Header, ReadError> {
     let sizes = sizes_of(sizes, place_of_sizes)?;
     let encoding = fields.encoding(last)?;
     let big_endian = fields.big_endian(kind, encoding, last)?;
-    let (origin, axes) = fields.affine()?;
+    let (origin, axes, converted_from) = fields.affine()?;
     let line_skip = fields.whole("line skip")?.unwrap_or(0).max(0) as u64;
     let byte_skip = fields.whole("byte skip")?.unwrap_or(0);
     let data_file = fields.find("data file").map(|(name, place)| (name.to_owned(), place));
-    Ok(Header { kind, sizes, place_of_sizes, encoding, big_endian, origin, axes, line_skip, byte_skip, data_file, end })
+    Ok(Header {
+        kind,
+        sizes,
+        place_of_sizes,
+        encoding,
+        big_endian,
+        origin,
+        axes,
+        converted_from,
+        line_skip,
+        byte_skip,
+        data_file,
+        end,
+    })
 }
 
 fn wrong(place: Place, expected: &str, found: &str) -> ReadError {
@@ -219,8 +222,22 @@ impl<'a> Fields<'a> {
         number.map(Some).ok_or_else(|| wrong(place, "a whole number from 0, or -1", text))
     }
 
-    /// Place of voxel (0, 0, 0) and the steps of the lattice.
-    fn affine(&self) -> Result<(DVec3, DMat3), ReadError> {
+    /// Signs that make a right-anterior-superior space of the file's, and its name if that changes anything.
+    fn space(&self) -> Result<(DVec3, Option<&'static str>), ReadError> {
+        let Some((name, place)) = self.find("space") else { return Ok((DVec3::ONE, None)) };
+        let lower = name.to_ascii_lowercase();
+        let Some((long, _, signs)) = SPACES.iter().find(|(long, short, _)| lower == *long || lower == *short) else {
+            let expected =
+                "a space of three dimensions: right-anterior-superior, left-posterior-superior, scanner-xyz …";
+            return Err(wrong(place, expected, name));
+        };
+        Ok((*signs, (*signs != DVec3::ONE).then_some(*long)))
+    }
+
+    /// Place of voxel (0, 0, 0) and the steps of the lattice, in a right-anterior-superior space where the file says how its
+    /// own lies to it, and then the name of that.
+    fn affine(&self) -> Result<(DVec3, DMat3, Option<&'static str>), ReadError> {
+        let (signs, converted_from) = self.space()?;
         let mut axes = DMat3::IDENTITY;
         let mut place = Place::File;
         if let Some((text, at)) = self.find("space directions") {
@@ -236,14 +253,15 @@ impl<'a> Fields<'a> {
             let known = |s: f64| if s.is_nan() { 1.0 } else { s };
             (axes, place) = (DMat3::from_diagonal(DVec3::new(known(*x), known(*y), known(*z))), at);
         }
-        let volume = axes.determinant();
-        if !(volume.is_finite() && volume != 0.0) {
-            return Err(ReadError::input(place, "three independent finite steps", format!("{axes}"), super::HINT));
-        }
         let origin = match self.find("space origin") {
             None => DVec3::ZERO,
             Some((text, at)) => vector(text).ok_or_else(|| wrong(at, "an origin such as (0,0,0)", text))?,
         };
-        Ok((origin, axes))
+        lattice::check(origin, &axes, place, super::HINT)?;
+        // Spacings alone do not say how the volume lies in the space.
+        if self.find("space directions").is_none() {
+            return Ok((origin, axes, None));
+        }
+        Ok((signs * origin, DMat3::from_diagonal(signs) * axes, converted_from))
     }
 }

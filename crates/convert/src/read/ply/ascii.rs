@@ -3,6 +3,7 @@
 use super::body::Source;
 use super::header::{MAX_LINE, Type};
 use crate::error::{Place, ReadError, escaped};
+use crate::read::decimal::{CUT, decimal};
 
 /// A cursor over the text.
 pub(super) struct Ascii<'a> {
@@ -70,14 +71,16 @@ impl Source for Ascii<'_> {
     }
 
     fn number(&mut self, kind: Type) -> Result<f64, ReadError> {
-        let word = std::str::from_utf8(self.word()?).unwrap_or("?");
+        let word = self.word()?;
         if let Some((low, high)) = kind.integer_range() {
-            return match word.parse::<i64>() {
+            return match std::str::from_utf8(word).unwrap_or("?").parse::<i64>() {
                 Ok(n) if (low..=high).contains(&n) => Ok(n as f64),
                 _ => Err(self.wrong(&format!("an integer from {low} to {high}"))),
             };
         }
-        word.parse::<f64>().map_err(|_| self.wrong("a decimal number"))
+        let last = self.at == self.content.len();
+        decimal(word, last)
+            .ok_or_else(|| self.wrong(if last && decimal(word, false).is_some() { CUT } else { "a decimal number" }))
     }
 
     fn end_record(&mut self) -> Result<(), ReadError> {

@@ -1,7 +1,7 @@
 //! The vertex properties that are kept, as columns, and what they become.
 
 use super::header::{Element, Property, Shape, Type, at_line};
-use crate::error::{Place, ReadError};
+use crate::error::ReadError;
 use crate::raw_points::RawPoints;
 use crate::read::{color::linear_from_srgb, input, origin};
 use splat_core::Mesh;
@@ -29,9 +29,15 @@ const VALUE: usize = 9;
 pub(super) struct Columns {
     /// Role and stored type of each property, `None` for those that are read over.
     kept: Vec<Option<(usize, Type)>>,
-    data: [Vec<f64>; 10],
+    /// The last property that is kept: with it a record is complete.
+    last: usize,
+    /// Whether normals, colours and values are kept.
+    has: [bool; 3],
+    /// The kept numbers of the record, by role; 0 for the others.
+    record: [f64; 10],
+    positions: Vec<DVec3>,
+    points: RawPoints,
     drop_invalid: bool,
-    count: u64,
     line: u64,
 }
 
@@ -66,19 +72,29 @@ impl Columns {
         for slot in &mut kept {
             *slot = slot.filter(|(role, _)| whole(*role));
         }
-        Ok(Self { kept, data: Default::default(), drop_invalid, count: vertex.count, line: vertex.line })
+        let last = kept.iter().rposition(Option::is_some).unwrap_or(0);
+        let has = [NORMAL, COLOR, VALUE].map(|role| kept.iter().flatten().any(|(r, _)| *r == role));
+        let (record, positions, points) = ([0.0; 10], Vec::new(), RawPoints::default());
+        Ok(Self { kept, last, has, record, positions, points, drop_invalid, line: vertex.line })
+    }
+
+    /// Names of the properties of `vertex` that are read over.
+    pub(super) fn unused<'a>(&'a self, vertex: &'a Element) -> impl Iterator<Item = &'a [u8]> {
+        vertex.properties.iter().zip(&self.kept).filter(|(_, k)| k.is_none()).map(|(p, _)| p.name.as_slice())
     }
 
     /// Bytes that a vertex takes while it is read and converted.
     pub(super) fn bytes_per_vertex(&self) -> u64 {
-        self.kept.iter().flatten().count() as u64 * 12 + 24
+        let more = self.has.iter().zip([12, 12, 4]).filter(|(has, _)| **has).map(|(_, bytes)| bytes);
+        24 + 12 + more.sum::<u64>()
     }
 
     pub(super) fn reserve(&mut self, vertices: usize) -> Result<(), ReadError> {
-        for (role, _) in self.kept.iter().flatten() {
-            input::reserve(&mut self.data[*role], vertices)?;
-        }
-        Ok(())
+        let [normals, colors, values] = self.has.map(|has| if has { vertices } else { 0 });
+        input::reserve(&mut self.positions, vertices)?;
+        input::reserve(&mut self.points.normal, normals)?;
+        input::reserve(&mut self.points.color, colors)?;
+        input::reserve(&mut self.points.value, values)
     }
 
     /// Takes the value of property `index`; `Err` is what was expected, and a hint.
@@ -102,7 +118,32 @@ impl Columns {
             }
             _ => value,
         };
-        self.data[role].push(value);
+        self.record[role] = value;
+        if index == self.last { self.end_record() } else { Ok(()) }
+    }
+
+    /// Takes the record, or counts it as dropped if one of its numbers is not finite.
+    fn end_record(&mut self) -> Result<(), (String, &'static str)> {
+        let of = |first: usize| DVec3::from_slice(&self.record[first..]);
+        if !self.record.iter().all(|v| v.is_finite()) {
+            self.points.dropped += 1;
+            return Ok(());
+        }
+        self.positions.push(of(POSITION));
+        let [has_normal, has_color, has_value] = self.has;
+        if has_normal {
+            self.points.normal.push(unit(of(NORMAL)));
+        }
+        if has_color {
+            self.points.color.push(of(COLOR).as_vec3().to_array());
+        }
+        if has_value {
+            let value = self.record[VALUE] as f32;
+            if !value.is_finite() {
+                return Err(("a value that fits a 32-bit float".to_owned(), "scale the values"));
+            }
+            self.points.value.push(value);
+        }
         Ok(())
     }
 
@@ -114,41 +155,17 @@ impl Columns {
     }
 
     /// The columns as points.
-    pub(super) fn into_points(mut self) -> Result<RawPoints, ReadError> {
-        let dropped = self.drop_records();
-        let triple = |first: usize, i: usize| [0, 1, 2].map(|c| self.data[first + c][i]);
-        let positions: Vec<DVec3> =
-            (0..self.data[POSITION].len()).map(|i| DVec3::from_array(triple(POSITION, i))).collect();
+    pub(super) fn into_points(self) -> Result<RawPoints, ReadError> {
+        let Self { positions, points, line, .. } = self;
         let (origin, position) = origin::split(&positions).map_err(|i| {
             ReadError::input(
-                at_line(self.line),
+                at_line(line),
                 "coordinates that fit 32-bit floats once the middle is subtracted",
                 format!("{} at vertex {i}", positions[i]),
                 "scale the data, or remove outliers",
             )
         })?;
-        let normal = (0..self.data[NORMAL].len()).map(|i| unit(DVec3::from_array(triple(NORMAL, i)))).collect();
-        let color = (0..self.data[COLOR].len()).map(|i| triple(COLOR, i).map(|c| c as f32)).collect();
-        let value: Vec<f32> = self.data[VALUE].iter().map(|v| *v as f32).collect();
-        if let Some(i) = value.iter().position(|v| !v.is_finite()) {
-            let found = format!("{} at vertex {i}", self.data[VALUE][i]);
-            return Err(ReadError::input(Place::File, "a value that fits a 32-bit float", found, "scale the values"));
-        }
-        Ok(RawPoints { origin, position, normal, color, value, dropped, ..RawPoints::default() })
-    }
-
-    /// Removes records with a number that is not finite; there are none unless they are to be dropped.
-    fn drop_records(&mut self) -> u64 {
-        if !self.drop_invalid {
-            return 0;
-        }
-        let columns = self.data.iter().filter(|c| !c.is_empty());
-        let valid: Vec<bool> = (0..self.count as usize).map(|i| columns.clone().all(|c| c[i].is_finite())).collect();
-        for column in self.data.iter_mut().filter(|c| !c.is_empty()) {
-            let mut flags = valid.iter();
-            column.retain(|_| flags.next().copied().unwrap_or(false));
-        }
-        valid.iter().filter(|v| !**v).count() as u64
+        Ok(RawPoints { origin, position, ..points })
     }
 }
 

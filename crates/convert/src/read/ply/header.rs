@@ -102,6 +102,26 @@ pub(super) struct Header {
     pub(super) body_line: u64,
 }
 
+/// Properties by which files of 3D Gaussian splats are told: colour as spherical harmonics, log scale, rotation, logit of
+/// the opacity.
+const OF_SPLATS: [&[u8]; 4] = [b"f_dc_0", b"scale_0", b"rot_0", b"opacity"];
+
+impl Header {
+    /// Refuses 3D Gaussian splats: without what makes them one, they would be drawn as white points.
+    fn refuse_splats(&self) -> Result<(), ReadError> {
+        let has = |e: &Element, name: &[u8]| e.properties.iter().any(|p| p.name == name);
+        match self.elements.iter().find(|e| OF_SPLATS.iter().all(|name| has(e, name))) {
+            None => Ok(()),
+            Some(splats) => Err(ReadError::input(
+                at_line(splats.line),
+                "a mesh or points",
+                "a 3D Gaussian splat file (f_dc_0, scale_0, rot_0, opacity); not read yet",
+                "export the scene as a mesh or as points with colours",
+            )),
+        }
+    }
+}
+
 /// The place of a whole line.
 pub(super) fn at_line(line: u64) -> Place {
     Place::Line { line, column: 0 }
@@ -149,7 +169,9 @@ pub(super) fn parse(content: &[u8]) -> Result<Header, ReadError> {
         }
     }
     let encoding = encoding.ok_or_else(|| wrong(lines.line, "a format line before end_header", b"none"))?;
-    Ok(Header { encoding, elements, body: lines.at, body_line: lines.line + 1 })
+    let header = Header { encoding, elements, body: lines.at, body_line: lines.line + 1 };
+    header.refuse_splats()?;
+    Ok(header)
 }
 
 fn format<'a>(words: &mut impl Iterator<Item = &'a [u8]>, line: u64, text: &[u8]) -> Result<Encoding, ReadError> {

@@ -1,0 +1,70 @@
+//! What readers leave aside is named, and what they cannot show is refused by name.
+#![cfg(all(feature = "ply", feature = "obj", feature = "xyz", feature = "las"))]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod read_samples;
+
+use convert::read::{ReadLimits, bytes_with_notes};
+use read_samples::{las, load, obj, ply_ascii, ply_binary, text_points};
+
+fn unused(name: &str, content: &[u8]) -> Vec<String> {
+    bytes_with_notes(name, content, &ReadLimits::default()).unwrap().1.unused
+}
+
+#[test]
+fn every_column_that_is_not_used_is_named() {
+    for content in [ply_ascii().into_bytes(), ply_binary(false), ply_binary(true)] {
+        assert_eq!(unused("a.ply", &content), ["skipped", "skipped_too", "camera.focal", "face.flags"]);
+    }
+    assert!(unused("a.csv", &text_points(",", "x,y,z,nx,ny,nz\n")).is_empty());
+    let names = "x,y,z,nx,\"return number\",t\n".replace(' ', "_");
+    assert_eq!(unused("a.csv", &text_points(",", &names)), ["nx", "return_number", "t"]);
+    assert!(unused("a.xyz", &text_points(" ", "")).is_empty());
+    assert_eq!(unused("a.obj", &obj()), ["vt", "usemtl", "mtllib"]);
+    let always = ["return_number", "number_of_returns", "flags", "scan_angle", "user_data", "point_source_id"];
+    for compressed in [false, true] {
+        assert_eq!(unused("a.las", &las(0, 3, compressed)), always);
+        assert_eq!(unused("a.las", &las(1, 3, compressed))[6..], ["gps_time"]);
+        assert_eq!(unused("a.las", &las(8, 3, compressed))[6..], ["gps_time", "nir"]);
+    }
+    // A name cannot steer the terminal.
+    let steering = ply_ascii().replace("skipped_too", "a\u{1b}[2J");
+    assert_eq!(unused("a.ply", steering.as_bytes())[1], "a\\u{1b}[2J");
+}
+
+#[test]
+fn extra_bytes_of_las_are_named_as_the_file_does() {
+    let plain = las(0, 3, false);
+    let (points, record) = (u32::from_le_bytes(plain[96..100].try_into().unwrap()) as usize, 20);
+    let widened = |described: &[u8]| {
+        let mut out = plain[..points].to_vec();
+        out[96..100].copy_from_slice(&((points + described.len()) as u32).to_le_bytes());
+        out[100..104].copy_from_slice(&u32::from(!described.is_empty()).to_le_bytes());
+        out[105..107].copy_from_slice(&(record as u16 + 2).to_le_bytes());
+        out.extend(described);
+        plain[points..].chunks_exact(record).for_each(|r| out.extend(r.iter().chain(&[7, 7])));
+        out
+    };
+    assert_eq!(unused("a.las", &widened(&[])).last().unwrap(), "2 extra bytes");
+    let mut described = vec![0; 54 + 192];
+    described[2..11].copy_from_slice(b"LASF_Spec");
+    described[18] = 4;
+    described[20] = 192;
+    described[54 + 4..54 + 13].copy_from_slice(b"amplitude");
+    assert_eq!(unused("a.las", &widened(&described)).last().unwrap(), "amplitude");
+}
+
+/// They were drawn as white discs.
+#[test]
+fn gaussian_splats_are_refused_by_name() {
+    let mut text = "ply\nformat ascii 1.0\nelement vertex 1\n".to_owned();
+    let names = "x y z nx ny nz f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3";
+    names.split(' ').for_each(|n| text += &format!("property float {n}\n"));
+    text += &format!("end_header\n{}\n", "0 ".repeat(17));
+    let error = load("a.ply", text.as_bytes()).unwrap_err().to_string();
+    let expected =
+        "a.ply:3: expected a mesh or points, found a 3D Gaussian splat file (f_dc_0, scale_0, rot_0, opacity); not";
+    assert!(error.starts_with(expected), "{error}");
+    // Points with an opacity are no splats.
+    load("a.ply", text.replace("rot_0", "angle").as_bytes()).unwrap();
+}
