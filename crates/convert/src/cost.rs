@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | mesh | Σ pieces of its triangles' splits | yes |
 //! | raw points | one a point | yes; fewer where duplicates are merged |
-//! | volume | lattice points above zero extinction, times the factors that split its steps | where none is split |
+//! | volume | cells with extinction; where steps are split voxels with extinction, times the factors | where none is split |
 //! | zero set | 2·A/h², A from a mesh of 48 cells a side | within some ten percent |
 //! | density, procedural cloud | lattice points times the share of a coarse lattice that is above zero | within some percent |
 //! | box, ball, parallelogram | cells; of a ball π/6 of them | yes; a ball within some percent |
@@ -13,10 +13,11 @@
 
 use crate::columns::Wanted;
 use crate::field_points::{coarse_area, density_lattice, surface_spacing};
+use crate::keep::Keep;
 #[cfg(feature = "noise")]
 use crate::procedural::CloudShape;
 use crate::shapes::{Lattice, rectangle_counts};
-use crate::volume_points::{Keep, lattice_factors, longest_path};
+use crate::volume_points::lattice_factors;
 use crate::{ConvertError, DensityParams, MeshParams, SplatParams, VolumeParams, mesh_points, resample};
 #[cfg(feature = "surfels")]
 use crate::{RawPoints, SurfelParams, surfels};
@@ -91,11 +92,11 @@ pub fn volume(grid: &Grid, tf: &TransferFunction, params: &VolumeParams) -> Resu
     params.check()?;
     grid.validate().map_err(|e| p.input(e))?;
     let factors = lattice_factors(grid, params)?;
-    let threshold = params.omitted_optical_depth / (longest_path(grid) * p.transform.scale);
-    let kept = Keep::new(tf, threshold, params.clip).count(grid) as f64;
+    let keep = Keep::new(tf, grid, params);
     if factors == [1; 3] {
-        return Ok(Prediction::exact(kept, params.wanted()));
+        return Ok(Prediction::exact(keep.count(grid) as f64, params.wanted()));
     }
+    let kept = keep.count_voxels(grid) as f64;
     let finer = factors.iter().map(|f| *f as f64).product::<f64>();
     Ok(Prediction::new(kept * finer, Some(grid.values.len() as f64 * finer), params.wanted()))
 }

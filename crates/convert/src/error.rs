@@ -12,15 +12,18 @@ pub enum Fault {
     Input,
     /// The file asks for more memory than [`crate::read::ReadLimits`] allows.
     Limit,
+    /// Nobody's: the reader was asked to stop.
+    Cancelled,
 }
 
 impl Fault {
-    /// The exit code of a command that stops with this fault: 4, 3 or 5.
+    /// The exit code of a command that stops with this fault: 4, 3, 5 or 130.
     pub fn exit_code(self) -> u8 {
         match self {
             Self::FileSystem => 4,
             Self::Input => 3,
             Self::Limit => 5,
+            Self::Cancelled => 130,
         }
     }
 }
@@ -88,6 +91,12 @@ impl ReadError {
     /// More memory is needed than allowed.
     pub(crate) fn limit(expected: impl Into<String>, found: impl Into<String>, hint: &'static str) -> Self {
         Self { fault: Fault::Limit, ..Self::input(Place::File, expected, found, hint) }
+    }
+
+    /// The reader was asked to stop.
+    pub(crate) fn cancelled() -> Self {
+        let fault = Fault::Cancelled;
+        Self { fault, ..Self::input(Place::File, "to read on", "a request to stop", "start again") }
     }
 
     /// The file system refused.

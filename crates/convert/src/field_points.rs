@@ -174,7 +174,9 @@ pub fn density_to_points_with_progress<F: ScalarField + ?Sized>(
         points.push(TransferPoint { value: thickest, color: p.color, extinction });
     }
     let tf = TransferFunction::new(points).map_err(|e| p.input(e))?;
-    volume_to_points_with_progress(&grid, &tf, &params.volume, progress)
+    // Extinction is the density's, straight up to where it ends: a cell's middle tells, which the field has exactly.
+    let volume = VolumeParams { classification_error: f64::MAX, ..params.volume.clone() };
+    volume_to_points_with_progress(&grid, &tf, &volume, progress)
 }
 
 /// The lattice that a density is sampled on.

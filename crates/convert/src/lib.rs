@@ -15,6 +15,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod classify;
 mod columns;
 mod combine;
 mod convert_error;
@@ -26,6 +27,7 @@ mod error;
 mod expression;
 mod field_points;
 mod grid_field;
+mod keep;
 mod marching_cubes;
 mod mesh_points;
 #[cfg(feature = "surfels")]
@@ -34,6 +36,8 @@ mod mpu;
 mod neighbours;
 #[cfg(feature = "surfels")]
 mod orient;
+#[cfg(any(feature = "ply", feature = "stl", feature = "obj"))]
+mod outwards;
 mod params;
 mod pieces;
 #[cfg(feature = "surfels")]

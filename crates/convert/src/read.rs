@@ -27,6 +27,7 @@ mod origin;
 mod ply;
 #[cfg(any(feature = "ply", feature = "obj"))]
 mod polygon;
+mod reading;
 #[cfg(feature = "obj")]
 mod statements;
 #[cfg(feature = "stl")]
@@ -40,11 +41,13 @@ mod xyz;
 
 #[cfg(feature = "las")]
 pub use laz::panic_is_input_error;
+pub use reading::{Fix, Mended, Notes};
 
 use crate::error::{Place, ReadError, escaped, escaped_path};
 use crate::raw_points::RawPoints;
 use input::Stream;
-use splat_core::{Grid, Mesh};
+use reading::Reading;
+use splat_core::{Grid, Mesh, Progress};
 use std::path::Path;
 
 /// How much a file may ask for, and what happens to points that are no numbers.
@@ -55,16 +58,18 @@ pub struct ReadLimits {
     /// Whether points of a cloud with a coordinate that is not finite are left out and counted in
     /// [`RawPoints::dropped`] instead of refused. Vertices of a mesh are always refused.
     pub drop_invalid: bool,
+    /// Whether a file with a fault that could be mended (see [`Fix`]) is refused instead.
+    pub strict: bool,
 }
 
 impl Default for ReadLimits {
-    /// 4 GiB, nothing dropped.
+    /// 4 GiB, nothing dropped, what can be mended is mended.
     fn default() -> Self {
-        Self { max_bytes: 4 << 30, drop_invalid: false }
+        Self { max_bytes: 4 << 30, drop_invalid: false, strict: false }
     }
 }
 
-/// What a file holds, in the file's own axes and units.
+/// What a file holds, in the file's own axes and units. Meshes face outwards, also where the file's do not.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Loaded {
@@ -76,43 +81,24 @@ pub enum Loaded {
     Grid(Grid),
 }
 
-/// What a reader has to say of a file beside its data.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Notes {
-    /// Columns, fields and statements of the file that are not used, as the file names them.
-    pub unused: Vec<String>,
-    /// What was made of the data that its user should know, one sentence without a full stop each.
-    pub remarks: Vec<String>,
-}
-
-#[cfg(any(feature = "ply", feature = "obj", feature = "xyz", feature = "las"))]
-impl Notes {
-    /// Adds names that are not used, each once, with what would steer a terminal escaped.
-    fn not_used<'a>(&mut self, names: impl IntoIterator<Item = &'a [u8]>) {
-        for name in names {
-            let name = escaped(name, 40);
-            if !self.unused.contains(&name) {
-                self.unused.push(name);
-            }
-        }
-    }
-}
-
 /// Reads a regular file; its first bytes tell the format, its extension only words the error if they do not.
 ///
 /// # Errors
 /// [`ReadError`] with the file's name, the place, what was expected and what was found.
 pub fn file(path: &Path, limits: &ReadLimits) -> Result<Loaded, ReadError> {
-    file_with_notes(path, limits).map(|(loaded, _)| loaded)
+    file_with_notes(path, limits, &Progress::new()).map(|(loaded, _)| loaded)
 }
 
-/// [`file()`] with what there is to say of it.
+/// [`file()`] that stops when `progress` is cancelled, with what there is to say of the file.
 ///
 /// # Errors
-/// As [`file()`].
-pub fn file_with_notes(path: &Path, limits: &ReadLimits) -> Result<(Loaded, Notes), ReadError> {
-    let parsed = Stream::open(path, limits).and_then(|stream| parse(path, stream, Some(path), limits));
-    parsed.map_err(|e| e.in_file(&escaped_path(path)))
+/// As [`file()`], and one with [`Fault::Cancelled`](crate::Fault::Cancelled).
+pub fn file_with_notes(path: &Path, limits: &ReadLimits, progress: &Progress) -> Result<(Loaded, Notes), ReadError> {
+    let name = escaped_path(path);
+    let mut reading = Reading::new(limits, progress);
+    let stream = Stream::open(path, limits);
+    let loaded = stream.and_then(|stream| whole(path, stream, Some(path), &mut reading));
+    Ok((loaded.map_err(|e| e.in_file(&name))?, reading.finish(&name)))
 }
 
 /// Reads a file that is in memory already; `name` serves messages and tells the format where the content does not.
@@ -120,16 +106,43 @@ pub fn file_with_notes(path: &Path, limits: &ReadLimits) -> Result<(Loaded, Note
 /// # Errors
 /// [`ReadError`] as [`file()`] gives it.
 pub fn bytes(name: &str, content: &[u8], limits: &ReadLimits) -> Result<Loaded, ReadError> {
-    bytes_with_notes(name, content, limits).map(|(loaded, _)| loaded)
+    bytes_with_notes(name, content, limits, &Progress::new()).map(|(loaded, _)| loaded)
 }
 
-/// [`bytes()`] with what there is to say of it.
+/// [`bytes()`] with what [`file_with_notes`] adds.
 ///
 /// # Errors
-/// As [`bytes()`].
-pub fn bytes_with_notes(name: &str, content: &[u8], limits: &ReadLimits) -> Result<(Loaded, Notes), ReadError> {
-    let parsed = parse(Path::new(name), Stream::of(content, limits), None, limits);
-    parsed.map_err(|e| e.in_file(&escaped(name.as_bytes(), usize::MAX)))
+/// As [`file_with_notes`].
+pub fn bytes_with_notes(
+    name: &str,
+    content: &[u8],
+    limits: &ReadLimits,
+    progress: &Progress,
+) -> Result<(Loaded, Notes), ReadError> {
+    let shown = escaped(name.as_bytes(), usize::MAX);
+    let mut reading = Reading::new(limits, progress);
+    let loaded = whole(Path::new(name), Stream::of(content, limits), None, &mut reading);
+    Ok((loaded.map_err(|e| e.in_file(&shown))?, reading.finish(&shown)))
+}
+
+/// The content with meshes turned outwards.
+fn whole(
+    path: &Path,
+    stream: Stream<'_>,
+    place: Option<&Path>,
+    reading: &mut Reading<'_>,
+) -> Result<Loaded, ReadError> {
+    let mut loaded = parse(path, stream, place, reading)?;
+    #[cfg(any(feature = "ply", feature = "stl", feature = "obj"))]
+    if let Loaded::Mesh(mesh) = &mut loaded {
+        for _ in 0..crate::outwards::turn_outwards(mesh) {
+            reading.mend((Fix::InsideOut, Place::File, None), || {
+                let hint = "turn the faces around, or leave out --strict";
+                ReadError::input(Place::File, "surfaces whose faces are wound outwards", "one that is inside out", hint)
+            })?;
+        }
+    }
+    Ok(loaded)
 }
 
 /// Bytes that tell the format.
@@ -144,8 +157,10 @@ fn parse(
     path: &Path,
     mut stream: Stream<'_>,
     place: Option<&Path>,
-    limits: &ReadLimits,
-) -> Result<(Loaded, Notes), ReadError> {
+    reading: &mut Reading<'_>,
+) -> Result<Loaded, ReadError> {
+    reading.go_on()?;
+    let limits = reading.limits;
     if stream.peek(2)? == [0x1f, 0x8b] {
         stream = stream.gunzip();
     }
@@ -155,29 +170,28 @@ fn parse(
         let hint = "the file is truncated, or was never written";
         return Err(ReadError::input(Place::Byte(0), "vertices or points", "an empty file", hint));
     }
-    let mut notes = Notes::default();
-    let loaded = match format {
+    match format {
         #[cfg(feature = "ply")]
         Some(Format::Ply) => {
             let content = stream.rest()?;
-            let loaded = ply::read(&content, limits)?;
-            notes.not_used(ply::unused(&content)?.iter().map(Vec::as_slice));
+            let loaded = ply::read(&content, reading)?;
+            reading.notes.not_used(ply::unused(&content)?.iter().map(Vec::as_slice));
             Ok(loaded)
         }
         #[cfg(feature = "stl")]
-        Some(Format::Stl) => stl::read(&stream.rest()?, limits).map(Loaded::Mesh),
+        Some(Format::Stl) => stl::read(&stream.rest()?, reading).map(Loaded::Mesh),
         #[cfg(feature = "obj")]
         Some(Format::Obj) => {
             let content = stream.rest()?;
-            notes.not_used(statements::unused(&content));
-            obj::read(&content, limits)
+            reading.notes.not_used(statements::unused(&content));
+            obj::read(&content, reading)
         }
         #[cfg(feature = "xyz")]
-        Some(Format::Xyz) => xyz::read(&stream.rest()?, limits, &mut notes).map(Loaded::Points),
+        Some(Format::Xyz) => xyz::read(&stream.rest()?, limits, &mut reading.notes).map(Loaded::Points),
         #[cfg(feature = "nrrd")]
-        Some(Format::Nrrd) => nrrd::read(stream, place, limits, &mut notes).map(Loaded::Grid),
+        Some(Format::Nrrd) => nrrd::read(stream, place, limits, &mut reading.notes).map(Loaded::Grid),
         #[cfg(feature = "las")]
-        Some(Format::Las) => las::read(stream.rest()?, limits, &mut notes).map(Loaded::Points),
+        Some(Format::Las) => las::read(stream.rest()?, limits, &mut reading.notes).map(Loaded::Points),
         #[cfg(feature = "nifti")]
         Some(Format::Nifti) => nifti::read(stream, limits).map(Loaded::Grid),
         #[allow(unreachable_patterns, reason = "reached where a reader is not compiled in")]
@@ -193,8 +207,7 @@ fn parse(
             format!("'{}'", escaped(&head[..head.len().min(16)], 16)),
             "PLY, STL, OBJ, XYZ, CSV, LAS, LAZ, NIfTI and NRRD files are read, each also inside gzip",
         )),
-    }?;
-    Ok((loaded, notes))
+    }
 }
 
 #[derive(Debug, Clone, Copy)]

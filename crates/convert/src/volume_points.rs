@@ -2,11 +2,13 @@
 //!
 //! Each voxel of extinction σ_t > 0 becomes one isotropic kernel at its place with K = σ_t·(cell volume) and
 //! R = cutoff·0.8·h, h the spacing of the lattice (`resample.rs`), so that kernels of a homogeneous volume sum to
-//! σ_t. Colour and extinction come from a transfer function after interpolation (post-classification); normals are
-//! −∇v/|∇v| of the values by the Sobel operator.
+//! σ_t. Colour and extinction come from a transfer function after interpolation (post-classification), as the mean over the
+//! voxel's cell where the function bends within it (`classify.rs`); normals are −∇v/|∇v| of the values by the Sobel operator.
 
+use crate::classify::Class;
 use crate::columns::{self, Wanted};
 use crate::convert_error::check_cancelled;
+use crate::keep::{Keep, Slab, longest_path};
 use crate::params::SplatParams;
 use crate::sobel::{Rows, Sobel, normal_from_gradient};
 use crate::{ConvertError, resample};
@@ -31,6 +33,9 @@ pub struct VolumeParams {
     pub values: bool,
     /// Optical depth that leaving out thin voxels may cost any straight ray, ≥ 0.
     pub omitted_optical_depth: f64,
+    /// Optical depth across a cell, ≥ 0, that may be wrong because the transfer function is taken at the voxel alone; cells
+    /// where more could be have its mean.
+    pub classification_error: f64,
     /// Lowest and highest corner of the part to keep, object space.
     pub clip: Option<[DVec3; 2]>,
 }
@@ -44,6 +49,7 @@ impl Default for VolumeParams {
             normals: false,
             values: false,
             omitted_optical_depth: 0.0,
+            classification_error: 2.0f64.powi(-11),
             clip: None,
         }
     }
@@ -58,10 +64,14 @@ impl VolumeParams {
     /// Checks what does not depend on the volume.
     pub(crate) fn check(&self) -> Result<(), ConvertError> {
         self.splat.check()?;
-        if self.omitted_optical_depth.is_finite() && self.omitted_optical_depth >= 0.0 {
-            return Ok(());
+        let depths = [
+            ("omitted_optical_depth", self.omitted_optical_depth),
+            ("classification_error", self.classification_error),
+        ];
+        match depths.into_iter().find(|(_, depth)| !(depth.is_finite() && *depth >= 0.0)) {
+            Some((name, depth)) => Err(self.splat.bad(name, depth, "a finite number ≥ 0")),
+            None => Ok(()),
         }
-        Err(self.splat.bad("omitted_optical_depth", self.omitted_optical_depth, "a finite number ≥ 0"))
     }
 }
 
@@ -74,6 +84,8 @@ pub struct VolumeReport {
     pub lattice_points: u64,
     /// Splats made.
     pub splats: u64,
+    /// Splats whose colour and extinction are means over their cell.
+    pub averaged: u64,
     /// Lattice points with some extinction that were left out as too thin.
     pub omitted: u64,
     /// Most optical depth that a straight ray lost by that; at most the parameter.
@@ -168,11 +180,12 @@ fn convert(
     let p = &params.splat;
     let scale = p.transform.scale;
     let longest_path = longest_path(lattice) * scale;
-    let keep = Keep::new(tf, params.omitted_optical_depth / longest_path, params.clip);
+    let keep = Keep::new(tf, lattice, params);
     let slabs = keep.slabs(lattice, progress)?;
     let n: usize = slabs.iter().map(|s| s.kept.len()).sum();
     p.check_count(n as f64)?;
     report.splats = n as u64;
+    report.averaged = slabs.iter().map(|s| s.averaged.len() as u64).sum();
     report.omitted = slabs.iter().map(|s| s.omitted).sum();
     report.omitted_optical_depth = slabs.iter().fold(0.0f64, |m, s| m.max(f64::from(s.thickest))) * longest_path;
     let mut cloud = Cloud::new(p.transform.apply(lattice.origin));
@@ -182,88 +195,6 @@ fn convert(
     let emit = Emit { lattice, tf, params, sobel: Sobel::new(lattice), cell: lattice.cell_volume() * scale.powi(3) };
     report.without_normal = emit.run(&slabs, &mut cloud, progress)?;
     Ok((cloud, report))
-}
-
-/// The longest straight line within the lattice's cells: the longest body diagonal.
-pub(crate) fn longest_path(lattice: &Grid) -> f64 {
-    let n = DVec3::from_array(lattice.dims.map(|n| n as f64));
-    [DVec3::ONE, DVec3::new(-1.0, 1.0, 1.0), DVec3::new(1.0, -1.0, 1.0), DVec3::new(1.0, 1.0, -1.0)]
-        .iter()
-        .fold(0.0, |longest, s| (lattice.axes * (n * *s)).length().max(longest))
-}
-
-/// Which lattice points become splats.
-pub(crate) struct Keep<'a> {
-    tf: &'a TransferFunction,
-    /// Extinction that is left out up to here.
-    threshold: f64,
-    /// Values outside have no extinction at all: two comparisons spare most look-ups.
-    support: [f32; 2],
-    clip: Option<[DVec3; 2]>,
-}
-
-/// The kept lattice points of one slab of constant k.
-pub(crate) struct Slab {
-    /// Index within the slab.
-    pub(crate) kept: Vec<u32>,
-    omitted: u64,
-    /// Largest extinction left out.
-    thickest: f32,
-}
-
-impl<'a> Keep<'a> {
-    pub(crate) fn new(tf: &'a TransferFunction, threshold: f64, clip: Option<[DVec3; 2]>) -> Self {
-        let points = tf.points();
-        let some = |p: &splat_core::TransferPoint| p.extinction > 0.0;
-        let support = match (points.iter().position(some), points.iter().rposition(some)) {
-            (Some(first), Some(last)) => [
-                if first == 0 { f32::NEG_INFINITY } else { points[first - 1].value },
-                points.get(last + 1).map_or(f32::INFINITY, |p| p.value),
-            ],
-            _ => [f32::INFINITY, f32::NEG_INFINITY],
-        };
-        Self { tf, threshold, support, clip }
-    }
-
-    /// All slabs, in order.
-    pub(crate) fn slabs(&self, lattice: &Grid, progress: &Progress) -> Result<Vec<Slab>, ConvertError> {
-        let points = (lattice.dims[0] * lattice.dims[1]) as u64;
-        let slab = |k| progress.tick(points).map(|()| self.slab(lattice, k)).map_err(|_| ConvertError::Cancelled);
-        (0..lattice.dims[2]).into_par_iter().map(slab).collect()
-    }
-
-    /// How many lattice points become splats.
-    pub(crate) fn count(&self, lattice: &Grid) -> u64 {
-        (0..lattice.dims[2]).into_par_iter().map(|k| self.slab(lattice, k).kept.len() as u64).sum()
-    }
-
-    fn slab(&self, lattice: &Grid, k: usize) -> Slab {
-        let [nx, ny, _] = lattice.dims;
-        let mut slab = Slab { kept: Vec::new(), omitted: 0, thickest: 0.0 };
-        for (n, &v) in lattice.values[k * nx * ny..][..nx * ny].iter().enumerate() {
-            if v < self.support[0] || v > self.support[1] {
-                continue;
-            }
-            let extinction = self.tf.at(v).extinction;
-            if extinction <= 0.0 || self.clipped(lattice, n, k) {
-                continue;
-            }
-            if f64::from(extinction) > self.threshold {
-                slab.kept.push(n as u32);
-            } else {
-                slab.omitted += 1;
-                slab.thickest = slab.thickest.max(extinction);
-            }
-        }
-        slab
-    }
-
-    fn clipped(&self, lattice: &Grid, n: usize, k: usize) -> bool {
-        self.clip.is_some_and(|[low, high]| {
-            let p = lattice.position(n % lattice.dims[0], n / lattice.dims[0], k);
-            !(p.cmpge(low).all() && p.cmple(high).all())
-        })
-    }
 }
 
 /// Writes the splats of the kept lattice points.
@@ -331,9 +262,16 @@ impl Emit<'_> {
         let axes = splat_core::glam::DMat3::from_quat(t.rotation) * self.lattice.axes * t.scale;
         let base = axes.z_axis * k as f64;
         let values = &self.lattice.values[k * nx * self.lattice.dims[1]..];
+        let mut averaged = slab.averaged.iter().peekable();
         for (s, &n) in slab.kept.iter().enumerate() {
             let (i, j) = (n as usize % nx, n as usize / nx);
-            let at = self.tf.at(values[n as usize]);
+            let at = match averaged.next_if(|(of, _)| *of as usize == s) {
+                Some((_, mean)) => *mean,
+                None => {
+                    let at = self.tf.at(values[n as usize]);
+                    Class { color: at.color, extinction: at.extinction }
+                }
+            };
             target.position[s] = (base + axes.y_axis * j as f64 + axes.x_axis * i as f64).as_vec3();
             target.cross_section[s] = (f64::from(at.extinction) * self.cell) as f32;
             target.color[s] = at.color;

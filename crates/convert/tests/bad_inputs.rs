@@ -112,8 +112,9 @@ fn ba06_face_indices_outside_the_vertices() {
     let text = ply_ascii().replace("1 3 0 2 3", "1 3 0 2 4");
     let error = refused("a.ply", text.as_bytes());
     assert!(error.expected.contains("a vertex of face 1 from 0 to 3"), "{error}");
-    let text = ply_ascii().replace("1 3 0 2 3", "1 2 0 2");
-    assert!(refused("a.ply", text.as_bytes()).expected.contains("3 or more corners of face 1"));
+    // Corners of a face that is left out are looked at too.
+    let text = ply_ascii().replace("1 3 0 2 3", "1 2 0 4");
+    assert!(refused("a.ply", text.as_bytes()).expected.contains("a vertex of face 1 from 0 to 3"));
 }
 
 #[test]
@@ -131,7 +132,6 @@ fn ba07_headers_that_make_no_sense() {
         (with("format ascii 1.0\n", ""), "a.ply:20: expected a format line"),
         (with("comment", "property float q\ncomment"), "a.ply:3: expected an element before its properties"),
         (with("vertex_indices", "corners"), "a.ply:18: expected a list 'vertex_indices'"),
-        (with("element camera 1", "element tristrips 1"), "a.ply:16: expected faces, found triangle strips"),
     ];
     for (text, beginning) in cases {
         refused_with("a.ply", text.as_bytes(), beginning);

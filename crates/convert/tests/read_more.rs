@@ -109,7 +109,7 @@ fn ba13_stl_is_binary_or_text_by_its_size() {
     let two = format!("{}\n\n{}\n", stl_text().to_uppercase(), stl_text().replace('\n', "\r\n"));
     assert_eq!(mesh("unnamed", two.as_bytes()).triangles.len(), 4);
     let mut long = stl_binary(b"a");
-    long.push(0);
+    long.extend([0; 50]);
     refused("a.stl", long, "a.stl@80: expected 84 + 50 x 2 = 184 bytes of a binary STL, or a text");
     let mut count = stl_binary(b"a");
     count[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
@@ -126,9 +126,13 @@ fn ba13_stl_is_binary_or_text_by_its_size() {
         "a.stl:5:16: expected a finite decimal number, found '1,5'",
     );
     refused("a.stl", bad("vertex 1 0e0 0", "vertex 1 nan 0"), "a.stl:5:16: expected a finite decimal number");
+    refused("a.stl", bad("normal 0 0 1", "normal up up up"), "a.stl:2: expected 'facet normal X Y Z', found 'facet");
+    for none in ["nan -nan(ind) 1.#IND", "-nan nan(snan) -1.#QNAN", "inf -inf 0"] {
+        assert_eq!(mesh("a.stl", bad("normal 0 0 1", &format!("normal {none}")).as_bytes()).position, expected);
+    }
     refused("a.stl", bad("    endloop\n", ""), "a.stl:7: expected 'endloop', found 'endfacet'");
     refused("a.stl", bad("endsolid", "solid"), "a.stl:16: expected 'facet normal X Y Z' or 'endsolid'");
-    let limits = ReadLimits { max_bytes: 239, drop_invalid: false };
+    let limits = ReadLimits { max_bytes: 239, ..ReadLimits::default() };
     assert_eq!(bytes("a.stl", &stl_binary(b"a"), &limits).unwrap_err().fault, Fault::Limit);
     assert_eq!(bytes("a.stl", stl_text().as_bytes(), &limits).unwrap_err().fault, Fault::Limit);
 }
@@ -184,8 +188,6 @@ fn ba11_obj_indices_are_checked() {
         ("1 2 -9223372036854775808", "a.obj:5:7: expected an index"),
         ("1 2 x", "a.obj:5:7: expected an index"),
         ("1 2 3/1/1/1", "a.obj:5:7: expected v, v/vt, v//vn or v/vt/vn"),
-        ("1 2", "a.obj:5:1: expected 3 or more corners of face 1, found 2"),
-        ("", "a.obj:5:1: expected 3 or more corners of face 1, found 0"),
     ] {
         refused("a.obj", face(f), beginning);
     }
@@ -195,12 +197,10 @@ fn ba11_obj_indices_are_checked() {
     refused("a.obj", "v 0 0 0 2 0 0\n", "a.obj:1:9: expected a colour from 0 to 1, found '2'");
     refused("a.obj", "hello\n", "a.obj:1:1: expected a statement of OBJ such as v, vn or f, found 'hello'");
     refused("a.obj", "v 0 0 \\\n0\n", "a.obj:1: expected vertices and faces on one line");
-    let crossing = "v 0 0 0\nv 2 2 0\nv 2 0 0\nv 0 1 0\n\nf 1 2 3 4\n";
-    refused("a.obj", crossing, "a.obj:6: expected faces whose edges do not cross, found face 1 of 4 corners");
     // A face of a million corners, all of them there: a fan of triangles without area, within the limit.
     let many = format!("v 0 0 0\nf{}\n", " 1".repeat(500_000));
     assert_eq!(mesh("a.obj", many.as_bytes()).triangles.len(), 499_998);
-    let limits = ReadLimits { max_bytes: 2 << 20, drop_invalid: false };
+    let limits = ReadLimits { max_bytes: 2 << 20, ..ReadLimits::default() };
     assert_eq!(bytes("a.obj", many.as_bytes(), &limits).unwrap_err().fault, Fault::Limit);
     let long = format!("v 0 0 0\nf{}\n", " 1".repeat(600_000));
     refused("a.obj", long, "a.obj:2: expected a line of at most 1 MiB");

@@ -8,7 +8,7 @@ use convert::read::{ReadLimits, bytes_with_notes};
 use read_samples::{las, load, obj, ply_ascii, ply_binary, text_points};
 
 fn unused(name: &str, content: &[u8]) -> Vec<String> {
-    bytes_with_notes(name, content, &ReadLimits::default()).unwrap().1.unused
+    bytes_with_notes(name, content, &ReadLimits::default(), &splat_core::Progress::new()).unwrap().1.unused
 }
 
 #[test]

@@ -58,8 +58,12 @@ fn one_head_lies_in_one_place_whichever_space_its_file_has() {
 
 #[test]
 fn what_was_converted_is_said() {
-    let remarks =
-        |space: &str, x, y| bytes_with_notes("a.nrrd", &nrrd(space, x, y), &ReadLimits::default()).unwrap().1.remarks;
+    let remarks = |space: &str, x, y| {
+        bytes_with_notes("a.nrrd", &nrrd(space, x, y), &ReadLimits::default(), &splat_core::Progress::new())
+            .unwrap()
+            .1
+            .remarks
+    };
     let said = "space: left-posterior-superior, converted to right-anterior-superior";
     assert_eq!(remarks("space: LPS", -1.0, -1.0), [said]);
     assert!(remarks("space: RAS", 1.0, 1.0).is_empty());

@@ -145,6 +145,7 @@ impl Error {
         let message = format!("expected {}, found {}", error.expected, shown(&error.found));
         match error.fault {
             convert::Fault::FileSystem => Self::io(path, "cannot read", std::io::Error::other(message)),
+            convert::Fault::Cancelled => Self::Cancelled,
             convert::Fault::Limit => Self::TooLarge { what, message, hint: error.hint.into() },
             _ => Self::input(what, message, error.hint),
         }

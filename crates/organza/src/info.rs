@@ -2,9 +2,9 @@
 
 use crate::Error;
 use convert::RawPoints;
-use convert::read::{Loaded, ReadLimits};
+use convert::read::{Loaded, Mended, ReadLimits};
 use glam::{DVec3, Vec3};
-use splat_core::{Aabb, Grid, Mesh};
+use splat_core::{Aabb, Grid, Mesh, Progress};
 use std::path::Path;
 
 /// What a data file holds.
@@ -26,16 +26,19 @@ pub struct FileInfo {
     pub unused: Vec<String>,
     /// What was made of the data, one sentence each.
     pub remarks: Vec<String>,
+    /// What was mended in the file or left out of it, one sentence a kind of fault.
+    pub mended: Vec<String>,
 }
 
-/// Reads a data file of at most `max_bytes` and describes it.
+/// Reads a data file of at most `max_bytes` and describes it; `strict` refuses a file with a fault that could be mended.
 ///
 /// # Errors
 /// [`Error::Io`] for the file system, [`Error::Input`] for a file that is not what its name says, [`Error::Limit`] for
 /// one that would take more than `max_bytes`.
-pub fn info(path: &Path, max_bytes: u64) -> Result<FileInfo, Error> {
-    let limits = ReadLimits { max_bytes, drop_invalid: false };
-    let (data, notes) = convert::read::file_with_notes(path, &limits).map_err(|e| Error::from_read(path, &e))?;
+pub fn info(path: &Path, max_bytes: u64, strict: bool) -> Result<FileInfo, Error> {
+    let limits = ReadLimits { max_bytes, strict, ..ReadLimits::default() };
+    let read = convert::read::file_with_notes(path, &limits, &Progress::new());
+    let (data, notes) = read.map_err(|e| Error::from_read(path, &e))?;
     let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "cannot read", e))?.len();
     let info = match data {
         Loaded::Mesh(mesh) => of_mesh(&mesh),
@@ -44,7 +47,8 @@ pub fn info(path: &Path, max_bytes: u64) -> Result<FileInfo, Error> {
         _ => return Err(Error::Internal("a reader gave data of no known kind".into())),
     };
     let remarks = notes.remarks.into_iter().chain(info.remarks).collect();
-    Ok(FileInfo { bytes, unused: notes.unused, remarks, ..info })
+    let mended = notes.mended.iter().map(Mended::to_string).collect();
+    Ok(FileInfo { bytes, unused: notes.unused, remarks, mended, ..info })
 }
 
 fn present(columns: &[(&'static str, bool)]) -> Vec<&'static str> {

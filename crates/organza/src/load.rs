@@ -115,6 +115,7 @@ pub(crate) fn load_measured(
         stage.bytes = prepared.iter().map(|p| p.input.bytes()).sum();
         Ok::<_, Error>(prepared)
     })?;
+    warnings.extend(files.mended());
     let (mut lights, casts) = lights(scene);
     let statistics: Vec<ObjectStatistics> = loading.statistics(&prepared);
     let planned = loading.samplers(&statistics, &light_statistics(&lights, &casts));

@@ -10,6 +10,7 @@ use crate::points::{self, Drawing, shadow_error};
 use crate::scene::{Scene, Technique};
 use crate::statistics::Statistics;
 use crate::{CostRecord, Error, Layers, Progress, shadows};
+use convert::read::ReadLimits;
 use splat_core::{LayerData, Material};
 use std::path::PathBuf;
 
@@ -20,6 +21,8 @@ pub struct RenderOptions {
     pub max_memory: u64,
     /// Leave out records with values that are not finite instead of refusing the file.
     pub drop_invalid: bool,
+    /// Refuse files with a fault that could be mended, see [`convert::read::Fix`].
+    pub strict: bool,
     /// Make one point of points at the same place, for every object.
     pub merge_duplicates: bool,
     /// File of the sums of the technique `particles`: read before, if it is there, and written every few seconds, at the
@@ -37,11 +40,19 @@ impl Default for RenderOptions {
         Self {
             max_memory: 8 << 30,
             drop_invalid: false,
+            strict: false,
             merge_duplicates: false,
             checkpoint: None,
             device: None,
             device_composites: false,
         }
+    }
+}
+
+impl RenderOptions {
+    /// What files may ask for.
+    pub(crate) fn read_limits(&self) -> ReadLimits {
+        ReadLimits { max_bytes: self.max_memory, drop_invalid: self.drop_invalid, strict: self.strict }
     }
 }
 

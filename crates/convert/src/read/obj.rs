@@ -4,9 +4,11 @@
 //! lines and materials are read over: no material file is ever opened, wherever `mtllib` points to. The parser is our
 //! own: lines, columns and checked indices are asked of it.
 
+use super::ReadLimits;
 use super::polygon::{self, Polygon};
+use super::reading::{Fix, Reading};
 use super::text::{Line, Lines, Word};
-use super::{Loaded, ReadLimits, input, origin};
+use super::{Loaded, input, origin};
 use crate::error::{Place, ReadError};
 use crate::raw_points::RawPoints;
 use splat_core::Mesh;
@@ -57,12 +59,17 @@ struct Content {
     /// Lines of the polygons.
     lines: Vec<u64>,
     faces: u64,
+    /// The first corner that names a normal before there is any.
+    without_normal: Option<ReadError>,
 }
 
 const NONE: u32 = u32::MAX;
 
+/// Lines between two looks at whether to stop.
+const LOOK: u64 = 1 << 14;
+
 /// Reads an OBJ file.
-pub(super) fn read(content: &[u8], limits: &ReadLimits) -> Result<Loaded, ReadError> {
+pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
     let mut lines = Lines::new(content);
     let mut found = Content::default();
     let mut continued = false;
@@ -70,14 +77,17 @@ pub(super) fn read(content: &[u8], limits: &ReadLimits) -> Result<Loaded, ReadEr
         // A backslash joins lines; only statements that are read over are written so.
         let before = std::mem::replace(&mut continued, line.text.ends_with(b"\\"));
         if !before {
-            found.statement(line, continued, limits)?;
+            found.statement(line, continued, reading)?;
+        }
+        if line.number.is_multiple_of(LOOK) {
+            reading.go_on()?;
         }
     }
-    found.finish()
+    found.finish(reading)
 }
 
 impl Content {
-    fn statement(&mut self, line: Line<'_>, continued: bool, limits: &ReadLimits) -> Result<(), ReadError> {
+    fn statement(&mut self, line: Line<'_>, continued: bool, reading: &mut Reading<'_>) -> Result<(), ReadError> {
         let mut words = line.words(false).take_while(|w| !w.text.starts_with(b"#"));
         let Some(keyword) = words.next() else { return Ok(()) };
         match keyword.text {
@@ -85,9 +95,9 @@ impl Content {
                 let hint = "write the statement on one line";
                 Err(ReadError::input(line.place(), "vertices and faces on one line", "a line that goes on", hint))
             }
-            b"v" => self.vertex(keyword, words, limits),
-            b"vn" => self.normal(keyword, words, limits),
-            b"f" => self.face(keyword, words, limits),
+            b"v" => self.vertex(keyword, words, reading.limits),
+            b"vn" => self.normal(keyword, words, reading.limits),
+            b"f" => self.face(keyword, words, reading),
             other if READ_OVER.contains(&other) => Ok(()),
             _ => {
                 let hint = "is this a Wavefront OBJ file?";
@@ -152,45 +162,47 @@ impl Content {
         &mut self,
         keyword: Word<'a>,
         words: impl Iterator<Item = Word<'a>>,
-        limits: &ReadLimits,
+        reading: &mut Reading<'_>,
     ) -> Result<(), ReadError> {
         let mut fan = [0; 2];
         let mut corners = 0;
         let first = self.triangles.len();
         for word in words {
-            let corner = self.corner(word, limits)?;
+            let corner = self.corner(word, reading)?;
             if corners < 2 {
                 fan[corners] = corner;
             } else {
                 let bytes = (self.triangles.len() as u64 + 1) * BYTES_PER_TRIANGLE;
-                input::check_bytes("the triangles", bytes, limits)?;
+                input::check_bytes("the triangles", bytes, reading.limits)?;
                 input::reserve(&mut self.triangles, 1)?;
                 self.triangles.push([fan[0], fan[1], corner]);
                 fan[1] = corner;
             }
             corners += 1;
         }
+        self.faces += 1;
         if corners < 3 {
-            let expected = format!("3 or more corners of face {}", self.faces + 1);
-            return Err(ReadError::input(keyword.place(), expected, corners.to_string(), "remove degenerate faces"));
+            return reading.mend((Fix::TooFewCorners, keyword.place(), Some(self.faces)), || {
+                let expected = format!("3 or more corners of face {}", self.faces);
+                ReadError::input(keyword.place(), expected, corners.to_string(), "remove degenerate faces")
+            });
         }
         if corners > 3 {
             let Place::Line { line, .. } = keyword.place() else { return Ok(()) };
-            self.polygons.push(Polygon { face: self.faces + 1, first, count: corners - 2 });
+            self.polygons.push(Polygon { face: self.faces, first, count: corners - 2 });
             self.lines.push(line);
         }
-        self.faces += 1;
         Ok(())
     }
 
     /// The vertex of the mesh for `v`, `v/vt`, `v//vn` or `v/vt/vn`.
-    fn corner(&mut self, word: Word<'_>, limits: &ReadLimits) -> Result<u32, ReadError> {
+    fn corner(&mut self, word: Word<'_>, reading: &mut Reading<'_>) -> Result<u32, ReadError> {
         let mut parts = word.text.split(|b| *b == b'/');
         let position = index(word, parts.next().unwrap_or_default(), self.positions.len(), "vertices")?;
         let _texture = parts.next();
         let normal = match parts.next() {
             None | Some(b"") => NONE,
-            Some(part) => index(word, part, self.normals.len(), "normals")?,
+            Some(part) => self.normal_index(word, part, reading)?,
         };
         if parts.next().is_some() {
             return Err(ReadError::input(word.place(), "v, v/vt, v//vn or v/vt/vn", word.shown(), "repair the face"));
@@ -199,7 +211,7 @@ impl Content {
         if let Some(&known) = self.of_corner.get(&key) {
             return Ok(known);
         }
-        input::check_bytes("the corners", (self.corners.len() as u64 + 1) * BYTES_PER_CORNER, limits)?;
+        input::check_bytes("the corners", (self.corners.len() as u64 + 1) * BYTES_PER_CORNER, reading.limits)?;
         input::reserve(&mut self.corners, 1)?;
         let new = self.corners.len() as u32;
         self.corners.push(key);
@@ -207,7 +219,25 @@ impl Content {
         Ok(new)
     }
 
-    fn finish(self) -> Result<Loaded, ReadError> {
+    /// The normal of a corner. Where the file has none so far that is an error only if it gets some later: exporters write
+    /// indices of normals that they were told to leave out.
+    fn normal_index(&mut self, word: Word<'_>, part: &[u8], reading: &mut Reading<'_>) -> Result<u32, ReadError> {
+        let found = index(word, part, self.normals.len(), "normals");
+        let is_index = std::str::from_utf8(part).is_ok_and(|t| t.parse::<i64>().is_ok_and(|n| n != 0));
+        match found {
+            Err(error) if self.normals.is_empty() && is_index => {
+                reading.mend((Fix::MissingNormals, word.place(), None), || error.clone())?;
+                self.without_normal.get_or_insert(error);
+                Ok(NONE)
+            }
+            found => found,
+        }
+    }
+
+    fn finish(self, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+        if let Some(error) = self.without_normal.filter(|_| !self.normals.is_empty()) {
+            return Err(error);
+        }
         let (origin, offsets) = origin::split(&self.positions).map_err(|i| {
             let found = format!("{} at vertex {}", self.positions[i], i + 1);
             let expected = "coordinates that fit 32-bit floats once the middle is subtracted";
@@ -228,12 +258,8 @@ impl Content {
             color: if colored { self.corners.iter().map(|c| self.colors[c[0] as usize]).collect() } else { Vec::new() },
             triangles: self.triangles,
         };
-        polygon::triangulate(&mut mesh, &self.polygons).map_err(|p| {
-            let at = self.polygons.iter().position(|q| *q == p).map_or(0, |i| self.lines[i]);
-            let found = format!("face {} of {} corners that crosses itself", p.face, p.count + 2);
-            let hint = "split the face into triangles, or put its corners in order";
-            ReadError::input(Place::Line { line: at, column: 0 }, "faces whose edges do not cross", found, hint)
-        })?;
+        let at = |rank: usize| Place::Line { line: self.lines[rank], column: 0 };
+        polygon::triangulate(&mut mesh, &self.polygons, reading, at)?;
         Ok(Loaded::Mesh(mesh))
     }
 }

@@ -2,26 +2,29 @@
 //!
 //! The parser is our own: places down to line and column or byte, line ends of every system, duplicate properties and
 //! sizes checked against the file before allocation are asked of it. Properties it has no use for are read over and named.
+//! Faces come as polygons (`face`), as triangle strips (`tristrips`, which −1 starts anew), or as both.
 
 mod ascii;
 mod binary;
 mod body;
 mod columns;
+mod faces;
 mod header;
 
-use super::{Loaded, ReadLimits};
+use super::Loaded;
+use super::reading::Reading;
 use crate::error::ReadError;
 use ascii::Ascii;
 use binary::Binary;
 use header::Encoding;
 
 /// Reads a PLY file.
-pub(super) fn read(content: &[u8], limits: &ReadLimits) -> Result<Loaded, ReadError> {
+pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
     let header = header::parse(content)?;
     match header.encoding {
-        Encoding::Ascii => body::read(Ascii::new(content, header.body, header.body_line), &header, limits),
-        Encoding::LittleEndian => body::read(Binary::<false>::new(content, header.body), &header, limits),
-        Encoding::BigEndian => body::read(Binary::<true>::new(content, header.body), &header, limits),
+        Encoding::Ascii => body::read(Ascii::new(content, header.body, header.body_line), &header, reading),
+        Encoding::LittleEndian => body::read(Binary::<false>::new(content, header.body), &header, reading),
+        Encoding::BigEndian => body::read(Binary::<true>::new(content, header.body), &header, reading),
     }
 }
 

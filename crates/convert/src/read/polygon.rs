@@ -5,18 +5,31 @@
 //! an exact one, so that the turns at the corners are decided without rounding (J. Shewchuk's predicates).
 //!
 //! What is inside is decided by parity: crossing an edge that is run through an odd number of times changes sides. So
-//! holes that are joined to the rim by an edge run through twice stay open. A polygon that crosses itself has no inside
-//! and is refused.
+//! holes that are joined to the rim by an edge run through twice stay open. A polygon that crosses itself has no inside;
+//! it is mended: one of four corners is its two triangles, a larger one fills what its edges go around.
+//!
+//! All corners are put into the triangulation at once and edges follow in a scattered order, O(n log n); one after the
+//! other, the corners of a comb and the edges of a zigzag take O(n²).
 
+use super::input;
+use super::reading::{Fix, Reading};
+use crate::error::{Place, ReadError};
 use rayon::prelude::*;
 use robust::{Coord, orient2d};
 use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
 use splat_core::Mesh;
 use splat_core::glam::{DVec2, DVec3, Vec3};
+use std::collections::HashMap;
 
 /// Coordinates below this share of the extent become 0: spade takes none that are tiny.
 const NOTHING: f64 = f64::from_bits((1023 - 100) << 52); // 2⁻¹⁰⁰
+
+/// Corners of a crossing polygon whose inside is looked for: every triangle asks every edge.
+const MOST_CROSSING: usize = 4096;
+
+/// Bytes that a corner takes while its polygon is triangulated.
+const BYTES_PER_CORNER: u64 = 512;
 
 /// A face of more than three corners, held as a fan: `[c0, c1, c2], [c0, c2, c3], …`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,37 +41,74 @@ pub(super) struct Polygon {
     pub(super) count: usize,
 }
 
-/// Replaces the fans of polygons that are not strictly convex; `Err` is the first polygon that crosses itself.
-pub(super) fn triangulate(mesh: &mut Mesh, polygons: &[Polygon]) -> Result<(), Polygon> {
-    let better: Vec<Result<Option<Vec<[u32; 3]>>, Polygon>> = polygons
+/// What becomes of a polygon.
+enum Outcome {
+    /// Its fan stays.
+    Fan,
+    Triangles(Vec<[u32; 3]>),
+    Mended(Fix, Vec<[u32; 3]>),
+    Refused(ReadError),
+}
+
+/// Replaces the fans of polygons that are not strictly convex; `place` tells where the polygon of that rank is.
+pub(super) fn triangulate(
+    mesh: &mut Mesh,
+    polygons: &[Polygon],
+    reading: &mut Reading<'_>,
+    place: impl Fn(usize) -> Place,
+) -> Result<(), ReadError> {
+    let shared: &Reading<'_> = reading;
+    let outcomes: Vec<Outcome> = polygons
         .par_iter()
         .with_min_len(256)
-        .map(|p| {
-            let fan = &mesh.triangles[p.first..p.first + p.count];
-            let corners: Vec<u32> = fan[0][..2].iter().copied().chain(fan.iter().map(|t| t[2])).collect();
-            match project(&corners, &mesh.position) {
-                Some(flat) if !is_strictly_convex(&flat) => constrained(&corners, &flat).map(Some).ok_or(*p),
-                // Without any area every triangulation is as good.
-                _ => Ok(None),
-            }
-        })
+        .map(|p| outcome(mesh, p, shared).unwrap_or_else(Outcome::Refused))
         .collect();
-    let better = better.into_iter().collect::<Result<Vec<_>, _>>()?;
-    if better.iter().all(Option::is_none) {
+    reading.go_on()?;
+    if outcomes.iter().all(|o| matches!(o, Outcome::Fan)) {
         return Ok(());
     }
     let mut triangles = Vec::with_capacity(mesh.triangles.len());
     let mut copied = 0;
-    for (polygon, better) in polygons.iter().zip(&better) {
-        if let Some(better) = better {
-            triangles.extend_from_slice(&mesh.triangles[copied..polygon.first]);
-            triangles.extend_from_slice(better);
-            copied = polygon.first + polygon.count;
-        }
+    for (rank, (polygon, outcome)) in polygons.iter().zip(outcomes).enumerate() {
+        let better = match outcome {
+            Outcome::Fan => continue,
+            Outcome::Triangles(better) => better,
+            Outcome::Mended(fix, better) => {
+                reading.mend((fix, place(rank), Some(polygon.face)), || {
+                    let found = format!("face {} of {} corners that crosses itself", polygon.face, polygon.count + 2);
+                    let hint = "split the face into triangles, or put its corners in order";
+                    ReadError::input(place(rank), "faces whose edges do not cross", found, hint)
+                })?;
+                better
+            }
+            Outcome::Refused(error) => return Err(error),
+        };
+        triangles.extend_from_slice(&mesh.triangles[copied..polygon.first]);
+        triangles.extend_from_slice(&better);
+        copied = polygon.first + polygon.count;
     }
     triangles.extend_from_slice(&mesh.triangles[copied..]);
     mesh.triangles = triangles;
     Ok(())
+}
+
+fn outcome(mesh: &Mesh, polygon: &Polygon, reading: &Reading<'_>) -> Result<Outcome, ReadError> {
+    reading.go_on()?;
+    let fan = &mesh.triangles[polygon.first..polygon.first + polygon.count];
+    let corners: Vec<u32> = fan[0][..2].iter().copied().chain(fan.iter().map(|t| t[2])).collect();
+    // Without any area every triangulation is as good.
+    let Some(flat) = project(&corners, &mesh.position) else { return Ok(Outcome::Fan) };
+    if is_strictly_convex(&flat) {
+        return Ok(Outcome::Fan);
+    }
+    input::check_bytes("the corners of a face", corners.len() as u64 * BYTES_PER_CORNER, reading.limits)?;
+    let Some(flat) = Flat::new(&corners, flat, reading)? else { return Ok(Outcome::Fan) };
+    Ok(match flat.by_parity() {
+        Some(triangles) => Outcome::Triangles(triangles),
+        None if corners.len() == 4 => Outcome::Mended(Fix::CrossingQuad, fan.to_vec()),
+        None if corners.len() <= MOST_CROSSING => Outcome::Mended(Fix::CrossingPolygon, flat.by_winding()),
+        None => Outcome::Mended(Fix::CrossingLarge, Vec::new()),
+    })
 }
 
 /// Two coordinates of each corner, counter-clockwise seen from where the normal points; scaled by a power of two. `None`
@@ -101,7 +151,10 @@ fn is_strictly_convex(p: &[DVec2]) -> bool {
 #[derive(Debug, Clone, Copy)]
 struct Corner {
     at: Point2<f64>,
+    /// Vertex of the mesh.
     id: u32,
+    /// Rank among the different places of the polygon.
+    rank: usize,
 }
 
 impl HasPosition for Corner {
@@ -112,35 +165,96 @@ impl HasPosition for Corner {
     }
 }
 
-/// The triangles inside; `None` where edges cross.
-fn constrained(corners: &[u32], flat: &[DVec2]) -> Option<Vec<[u32; 3]>> {
-    let mut plane = ConstrainedDelaunayTriangulation::<Corner>::new();
-    let mut handles: Vec<FixedVertexHandle> = Vec::with_capacity(corners.len());
-    for (id, p) in corners.iter().zip(flat) {
-        // Coordinates are 0 or within what spade takes, see `project`.
-        handles.push(plane.insert(Corner { at: Point2::new(p.x, p.y), id: *id }).ok()?);
+type Plane = ConstrainedDelaunayTriangulation<Corner>;
+
+/// A polygon in its plane, triangulated.
+struct Flat {
+    plane: Plane,
+    /// The corners in order.
+    corners: Vec<DVec2>,
+    /// How often the polygon runs through each edge; `None` where edges of it cross.
+    times: Option<Vec<u32>>,
+}
+
+impl Flat {
+    /// `None` where the corners cannot be triangulated, which coordinates of [`project`] can.
+    fn new(ids: &[u32], corners: Vec<DVec2>, reading: &Reading<'_>) -> Result<Option<Self>, ReadError> {
+        // Corners at one place are one; the first gives the id.
+        let mut rank: HashMap<[u64; 2], usize> = HashMap::with_capacity(corners.len());
+        let mut places: Vec<Corner> = Vec::with_capacity(corners.len());
+        let mut run: Vec<usize> = Vec::with_capacity(corners.len());
+        for (&id, &p) in ids.iter().zip(&corners) {
+            // −0 and 0 are one place.
+            let key = [(p.x + 0.0).to_bits(), (p.y + 0.0).to_bits()];
+            run.push(*rank.entry(key).or_insert_with(|| {
+                places.push(Corner { at: Point2::new(p.x, p.y), id, rank: places.len() });
+                places.len() - 1
+            }));
+        }
+        let count = places.len();
+        let Ok(mut plane) = Plane::bulk_load(places) else { return Ok(None) };
+        let mut handles: Vec<Option<FixedVertexHandle>> = vec![None; count];
+        plane.vertices().for_each(|v| handles[v.data().rank] = Some(v.fix()));
+        let mut times = vec![0u32; plane.num_undirected_edges()];
+        for i in scattered(run.len()) {
+            reading.go_on()?;
+            let (from, to) = (run[i], run[(i + 1) % run.len()]);
+            let (Some(a), Some(b)) = (handles[from], handles[to]) else { return Ok(None) };
+            if from == to {
+                continue;
+            }
+            let edges = plane.try_add_constraint(a, b);
+            if edges.is_empty() {
+                return Ok(Some(Self { plane, corners, times: None }));
+            }
+            for edge in edges {
+                times[edge.as_undirected().index()] += 1;
+            }
+        }
+        Ok(Some(Self { plane, corners, times: Some(times) }))
     }
-    let mut times = vec![0u32; plane.num_undirected_edges()];
-    for (i, &from) in handles.iter().enumerate() {
-        let to = handles[(i + 1) % handles.len()];
-        if from == to {
-            continue;
-        }
-        let edges = plane.try_add_constraint(from, to);
-        if edges.is_empty() {
-            return None;
-        }
-        for edge in edges {
-            times[edge.as_undirected().index()] += 1;
-        }
+
+    /// The triangles inside; `None` where edges cross.
+    fn by_parity(&self) -> Option<Vec<[u32; 3]>> {
+        let inside = sides(&self.plane, self.times.as_ref()?);
+        let faces = self.plane.inner_faces().filter(|f| inside[f.fix().index()] == Some(true));
+        Some(faces.map(|f| f.vertices().map(|v| v.data().id)).collect())
     }
-    let inside = sides(&plane, &times);
-    let faces = plane.inner_faces().filter(|f| inside[f.fix().index()] == Some(true));
-    Some(faces.map(|f| f.vertices().map(|v| v.data().id)).collect())
+
+    /// The triangles around whose middle the polygon goes, turned as it goes. Where edges cross there is no corner, so the
+    /// rim is off there by parts of a triangle.
+    fn by_winding(&self) -> Vec<[u32; 3]> {
+        let turned = |[a, b, c]: [Corner; 3]| {
+            let at = |v: Corner| DVec2::new(v.at.x, v.at.y);
+            match winding(&self.corners, (at(a) + at(b) + at(c)) / 3.0) {
+                0 => None,
+                n if n > 0 => Some([a.id, b.id, c.id]),
+                _ => Some([a.id, c.id, b.id]),
+            }
+        };
+        self.plane.inner_faces().filter_map(|f| turned(f.vertices().map(|v| *v.data()))).collect()
+    }
+}
+
+/// 0 to n − 1, halves before quarters before eighths: an edge of the polygon crosses the triangles between its nearest
+/// neighbours so far. In their own order, the edges of a zigzag would each cross all that are to come.
+fn scattered(n: usize) -> impl Iterator<Item = usize> {
+    let bits = n.next_power_of_two().trailing_zeros();
+    (0..1usize << bits).map(move |i| i.reverse_bits().unbounded_shr(usize::BITS - bits)).filter(move |i| *i < n)
+}
+
+/// How often the polygon goes around a place, counter-clockwise.
+fn winding(corners: &[DVec2], p: DVec2) -> i64 {
+    let next = corners.iter().cycle().skip(1);
+    corners.iter().zip(next).fold(0, |turns, (a, b)| match (a.y <= p.y, b.y <= p.y) {
+        (true, false) if turn(*a, *b, p) > 0.0 => turns + 1,
+        (false, true) if turn(*a, *b, p) < 0.0 => turns - 1,
+        _ => turns,
+    })
 }
 
 /// For each face whether it is inside.
-fn sides(plane: &ConstrainedDelaunayTriangulation<Corner>, times: &[u32]) -> Vec<Option<bool>> {
+fn sides(plane: &Plane, times: &[u32]) -> Vec<Option<bool>> {
     let mut inside = vec![None; plane.num_all_faces()];
     inside[plane.outer_face().fix().index()] = Some(false);
     let mut waiting: Vec<_> = plane.convex_hull().flat_map(|e| [e, e.rev()]).filter(|e| e.is_outer_edge()).collect();

@@ -1,9 +1,11 @@
 //! STL, binary and text → a mesh of separate facets.
 //!
-//! A binary file has 84 + 50·n bytes; that decides, as many binary files begin with `solid` like a text. The parser is our
-//! own, for lines and columns. Corners are not joined: STL says facets, so each keeps its own plane. Its
+//! A binary file has 84 + 50·n bytes; that decides, as many binary files begin with `solid` like a text. Where the size
+//! fits neither, the content does: a text has no zero byte, the first 512 bytes of a binary file have some. The parser
+//! is our own, for lines and columns. Corners are not joined: STL says facets, so each keeps its own plane. Its
 //! stored normals and attribute bytes are read over: normals follow from the order of the corners.
 
+use super::reading::{Fix, Reading};
 use super::text::{Line, Lines, Word};
 use super::{ReadLimits, input, origin};
 use crate::error::{Place, ReadError};
@@ -12,37 +14,62 @@ use splat_core::glam::DVec3;
 
 const HEADER: usize = 84;
 const FACET: usize = 50;
+/// Bytes in which a binary file has a zero.
+const BEGINNING: usize = 512;
+/// Facets between two looks at whether to stop.
+const LOOK: usize = 1 << 14;
 /// Bytes that a facet takes while it is read and converted.
 const BYTES_PER_FACET: u64 = 3 * (24 + 12) + 12;
 
 /// Reads an STL file.
-pub(super) fn read(content: &[u8], limits: &ReadLimits) -> Result<Mesh, ReadError> {
+pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Mesh, ReadError> {
     let announced = content.get(80..HEADER).map(|b| u64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])));
-    let is_binary = announced.is_some_and(|n| content.len() as u64 == HEADER as u64 + FACET as u64 * n);
-    if is_binary {
-        return binary(content, limits);
+    let length = content.len() as u64;
+    // At most 2³²·50 + 84.
+    let needed = announced.map(|n| HEADER as u64 + FACET as u64 * n);
+    if needed == Some(length) {
+        return binary(&content[HEADER..], reading);
     }
     if is_text(content) {
-        return text(content, limits);
+        return text(content, reading);
     }
-    let expected = match announced {
-        Some(n) => format!("84 + 50 x {n} = {} bytes of a binary STL, or a text that begins with 'solid'", 84 + 50 * n),
-        None => "a binary STL of at least 84 bytes, or a text that begins with 'solid'".to_owned(),
+    let refused = || {
+        let expected = match (announced, needed) {
+            (Some(n), Some(needed)) => {
+                format!("84 + 50 x {n} = {needed} bytes of a binary STL, or a text that begins with 'solid'")
+            }
+            _ => "a binary STL of at least 84 bytes, or a text that begins with 'solid'".to_owned(),
+        };
+        let found = format!("{length} bytes");
+        ReadError::input(Place::Byte(80), expected, found, "the file is truncated, damaged or not STL")
     };
-    let found = format!("{} bytes", content.len());
-    Err(ReadError::input(Place::Byte(80), expected, found, "the file is truncated, damaged or not STL"))
+    match needed {
+        // Less than a facet more is padding; more, and the number of facets is not to be believed.
+        Some(needed) if needed < length && length - needed < FACET as u64 => {
+            for _ in needed..length {
+                reading.mend((Fix::TrailingBytes, Place::Byte(needed), None), refused)?;
+            }
+            binary(&content[HEADER..needed as usize], reading)
+        }
+        _ => Err(refused()),
+    }
 }
 
 /// Whether a file begins like a text.
 pub(super) fn is_text(content: &[u8]) -> bool {
-    let content = content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(content).trim_ascii_start();
-    content.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
+    let beginning = &content[..content.len().min(BEGINNING)];
+    let words = content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(content).trim_ascii_start();
+    words.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid")) && !beginning.contains(&0)
 }
 
-fn binary(content: &[u8], limits: &ReadLimits) -> Result<Mesh, ReadError> {
-    let facets = content[HEADER..].as_chunks::<FACET>().0;
-    let mut corners = reserved(facets.len(), limits)?;
+/// The facets after the header.
+fn binary(content: &[u8], reading: &Reading<'_>) -> Result<Mesh, ReadError> {
+    let facets = content.as_chunks::<FACET>().0;
+    let mut corners = reserved(facets.len(), reading.limits)?;
     for (n, facet) in facets.iter().enumerate() {
+        if n.is_multiple_of(LOOK) {
+            reading.go_on()?;
+        }
         let numbers = facet[12..48].as_chunks::<4>().0;
         for (i, c) in numbers.as_chunks::<3>().0.iter().enumerate() {
             let corner = DVec3::from_array(c.map(|b| f64::from(f32::from_le_bytes(b))));
@@ -104,13 +131,20 @@ fn is(word: Word<'_>, keyword: &str) -> bool {
     word.text.eq_ignore_ascii_case(keyword.as_bytes())
 }
 
+/// Whether a word is a number as C's printf writes one: also `-nan`, `nan(ind)`, `-1.#IND` and `inf`.
+fn is_number(word: Word<'_>) -> bool {
+    let Ok(text) = std::str::from_utf8(word.text) else { return false };
+    let plain = text.trim_start_matches('-').to_ascii_lowercase();
+    text.parse::<f64>().is_ok() || plain.starts_with("1.#") || plain.starts_with("nan(")
+}
+
 fn wrong(line: Line<'_>, expected: &str) -> ReadError {
     let found = format!("'{}'", crate::error::escaped(line.text.trim_ascii(), 60));
     ReadError::input(line.place(), format!("'{expected}'"), found, "one statement a line, as STL writers do")
 }
 
 /// One or several solids of facets.
-fn text(content: &[u8], limits: &ReadLimits) -> Result<Mesh, ReadError> {
+fn text(content: &[u8], reading: &Reading<'_>) -> Result<Mesh, ReadError> {
     let mut text = Text { lines: Lines::new(content) };
     let mut corners: Vec<DVec3> = Vec::new();
     let mut inside = false;
@@ -124,11 +158,14 @@ fn text(content: &[u8], limits: &ReadLimits) -> Result<Mesh, ReadError> {
             [first, ..] if !inside && is(*first, "solid") => inside = true,
             [first, ..] if inside && is(*first, "endsolid") => inside = false,
             [facet, normal, numbers @ ..] if inside && is(*facet, "facet") && is(*normal, "normal") => {
-                // Read over, but a number it must be: some writers store nan for facets without area.
-                if numbers.len() != 3 {
+                // Read over, but numbers they must be; some writers store what is none for facets without area.
+                if numbers.len() != 3 || !numbers.iter().all(|n| is_number(*n)) {
                     return Err(wrong(line, "facet normal X Y Z"));
                 }
-                input::check_bytes("the facets", (corners.len() as u64 / 3 + 1) * BYTES_PER_FACET, limits)?;
+                if corners.len().is_multiple_of(3 * LOOK) {
+                    reading.go_on()?;
+                }
+                input::check_bytes("the facets", (corners.len() as u64 / 3 + 1) * BYTES_PER_FACET, reading.limits)?;
                 input::reserve(&mut corners, 3)?;
                 facet_corners(&mut text, &mut corners)?;
             }

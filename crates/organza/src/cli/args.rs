@@ -100,6 +100,9 @@ pub(super) struct SceneArguments {
     /// Leave out records that are not finite instead of refusing the file
     #[arg(long)]
     pub(super) drop_invalid: bool,
+    /// Refuse files with faults that could be mended, such as a face that crosses itself
+    #[arg(long)]
+    pub(super) strict: bool,
     /// Make points at one place one
     #[arg(long)]
     pub(super) merge_duplicates: bool,
@@ -179,6 +182,9 @@ pub(super) struct OrdersArguments {
 pub(super) struct InfoArguments {
     /// Data file, or scene (.toml, .json)
     pub(super) file: PathBuf,
+    /// Refuse a data file with faults that could be mended
+    #[arg(long)]
+    pub(super) strict: bool,
     /// Allow data outside the scene's root folder
     #[arg(long)]
     pub(super) allow_path: bool,

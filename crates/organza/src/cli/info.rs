@@ -16,7 +16,9 @@ pub(super) fn run(arguments: &InfoArguments) -> Result<(), Error> {
         let options = LoadOptions { allow_path: arguments.allow_path, ..LoadOptions::default() };
         scene_document(&scene::load(&arguments.file, &options)?)
     } else {
-        file_document(&organza::info(&arguments.file, memory::default_limit())?)
+        let info = organza::info(&arguments.file, memory::default_limit(), arguments.strict)?;
+        info.mended.iter().for_each(|line| console::warn(line));
+        file_document(&info)
     };
     if arguments.json {
         return console::out(&format!("{document:#}\n"));
@@ -93,6 +95,7 @@ fn file_document(info: &FileInfo) -> Value {
         "range": info.range,
         "not_used": info.unused,
         "remarks": info.remarks,
+        "mended": info.mended,
     })
 }
 

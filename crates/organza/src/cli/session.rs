@@ -28,6 +28,7 @@ pub(super) fn render_options(arguments: &SceneArguments) -> RenderOptions {
     RenderOptions {
         max_memory: arguments.max_memory.unwrap_or_else(memory::default_limit),
         drop_invalid: arguments.drop_invalid,
+        strict: arguments.strict,
         merge_duplicates: arguments.merge_duplicates,
         checkpoint: None,
         device: device(arguments),

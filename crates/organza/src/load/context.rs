@@ -3,7 +3,6 @@
 use super::files::{FileData, Files};
 use crate::scene::{Scene, SceneObject, Source};
 use crate::{Error, RenderOptions};
-use convert::read::ReadLimits;
 use convert::{Orientation, SplatParams, SurfelParams, VolumeParams};
 use glam::DVec3;
 use splat_core::{Progress, Shading};
@@ -14,6 +13,10 @@ pub(crate) const BYTES_PER_SPLAT: u64 = 256;
 
 /// Largest spacing of raw points over their median: above it, leaves and wires would become petals.
 const LARGEST_SPACING: f64 = 1.7;
+
+/// Share of the tolerance that the optical depth of one cell of a volume may be off: some dozens that a ray
+/// crosses are off to both sides.
+const CLASSIFICATION_SHARE: f64 = 1.0 / 8.0;
 
 /// What the conversion of an object reads beside it.
 pub(super) struct Context<'a> {
@@ -86,19 +89,20 @@ impl Context<'_> {
         }
     }
 
-    /// What files may ask for.
-    pub(super) fn read_limits(&self) -> ReadLimits {
-        ReadLimits { max_bytes: self.options.max_memory, drop_invalid: self.options.drop_invalid }
+    pub(super) fn read(&self, path: &Path) -> Result<FileData, Error> {
+        self.files.read(path, &self.options.read_limits(), self.progress)
     }
 
-    pub(super) fn read(&self, path: &Path) -> Result<FileData, Error> {
-        self.files.read(path, &self.read_limits())
+    /// The same of a file that nothing but what is made from it needs.
+    pub(super) fn read_once(&self, path: &Path) -> Result<FileData, Error> {
+        self.files.read_once(path, &self.options.read_limits(), self.progress)
     }
 
     /// Parameters of a volume: normals only where they are used.
     pub(super) fn volume_params(&self, splat: SplatParams) -> VolumeParams {
         let normals = needs_gradients(&self.scene.objects[self.id], self.scene);
-        VolumeParams { splat, normals, ..VolumeParams::default() }
+        let classification_error = CLASSIFICATION_SHARE * self.scene.render.tolerance;
+        VolumeParams { splat, normals, classification_error, ..VolumeParams::default() }
     }
 
     /// Opacity of one crossing of the object's surfaces.

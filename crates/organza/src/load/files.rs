@@ -1,10 +1,10 @@
 //! What was read from files, shared by all objects and frames that are made from it: a file is read once.
 
 use crate::Error;
-use convert::read::{Loaded, Notes, ReadLimits};
+use convert::read::{Loaded, Mended, Notes, ReadLimits};
 use convert::{RawPoints, SharedField};
 use glam::DVec3;
-use splat_core::{Grid, Mesh};
+use splat_core::{Grid, Mesh, Progress};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -28,22 +28,24 @@ pub(crate) struct Files {
     notes: RefCell<Vec<String>>,
     /// Fits take longer than reading: with their tolerance and the bytes that they take.
     fitted: RefCell<Vec<(PathBuf, f64, u64, Fitted)>>,
+    /// What was mended in them.
+    mended: RefCell<Vec<String>>,
 }
 
 impl Files {
     /// Reads a file unless it was read with the same limits, and keeps what it holds.
-    pub(super) fn read(&self, path: &Path, limits: &ReadLimits) -> Result<FileData, Error> {
+    pub(super) fn read(&self, path: &Path, limits: &ReadLimits, progress: &Progress) -> Result<FileData, Error> {
         if let Some(data) = self.known(path, limits) {
             return Ok(data);
         }
-        let data = self.read_anew(path, limits)?;
+        let data = self.read_anew(path, limits, progress)?;
         self.read.borrow_mut().push((path.to_owned(), *limits, data.clone()));
         Ok(data)
     }
 
     /// The same without keeping it: for whoever keeps what is made from it.
-    pub(super) fn read_once(&self, path: &Path, limits: &ReadLimits) -> Result<FileData, Error> {
-        self.known(path, limits).map_or_else(|| self.read_anew(path, limits), Ok)
+    pub(super) fn read_once(&self, path: &Path, limits: &ReadLimits, progress: &Progress) -> Result<FileData, Error> {
+        self.known(path, limits).map_or_else(|| self.read_anew(path, limits, progress), Ok)
     }
 
     /// What the files hold that is not drawn, and what was made of them, one sentence each.
@@ -51,14 +53,16 @@ impl Files {
         self.notes.borrow().clone()
     }
 
-    fn read_anew(&self, path: &Path, limits: &ReadLimits) -> Result<FileData, Error> {
-        let (data, noted) = convert::read::file_with_notes(path, limits).map_err(|e| Error::from_read(path, &e))?;
-        let mut notes = self.notes.borrow_mut();
-        for note in sentences(path, &data, noted) {
-            if !notes.contains(&note) {
-                notes.push(note);
-            }
-        }
+    /// What was mended in the files, one sentence a kind of fault.
+    pub(super) fn mended(&self) -> Vec<String> {
+        self.mended.borrow().clone()
+    }
+
+    fn read_anew(&self, path: &Path, limits: &ReadLimits, progress: &Progress) -> Result<FileData, Error> {
+        let read = convert::read::file_with_notes(path, limits, progress);
+        let (data, noted) = read.map_err(|e| Error::from_read(path, &e))?;
+        add(&self.mended, noted.mended.iter().map(Mended::to_string));
+        add(&self.notes, sentences(path, &data, noted));
         match data {
             Loaded::Mesh(mesh) => Ok(FileData::Mesh(mesh.into())),
             Loaded::Points(points) => Ok(FileData::Points(points.into())),
@@ -97,7 +101,7 @@ impl Files {
 }
 
 /// What a picture does not show of a file, and what its reader made of it.
-fn sentences(path: &Path, data: &Loaded, Notes { mut unused, remarks }: Notes) -> Vec<String> {
+fn sentences(path: &Path, data: &Loaded, Notes { mut unused, remarks, .. }: Notes) -> Vec<String> {
     let file = crate::printable(path);
     if let Loaded::Points(points) = data {
         // Read, but no key of a scene asks for them.
@@ -109,6 +113,16 @@ fn sentences(path: &Path, data: &Loaded, Notes { mut unused, remarks }: Notes) -
         all.push(format!("{file}: columns not used: {}", unused.join(", ")));
     }
     all
+}
+
+/// Adds what is not said yet.
+fn add(all: &RefCell<Vec<String>>, sentences: impl IntoIterator<Item = String>) {
+    let mut all = all.borrow_mut();
+    for sentence in sentences {
+        if !all.contains(&sentence) {
+            all.push(sentence);
+        }
+    }
 }
 
 impl FileData {

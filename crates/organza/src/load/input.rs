@@ -223,7 +223,7 @@ fn level_set(source: &LevelSetSource, object: &SceneObject, context: &Context<'_
 
 /// Scattered points with normals where the file has some; of a mesh its vertices.
 fn read_scattered(path: &Path, context: &Context<'_>) -> Result<Arc<RawPoints>, Error> {
-    match context.files.read_once(path, &context.read_limits())? {
+    match context.read_once(path)? {
         FileData::Points(points) => Ok(points),
         FileData::Mesh(mesh) => {
             mesh.validate().map_err(|e| refuse_data(path, &e))?;

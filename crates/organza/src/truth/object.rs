@@ -7,7 +7,7 @@ use crate::load::object::refuse;
 use crate::scene::{MediumShape, Scene, SceneMaterial, SceneObject, Source, VolumeSource};
 use crate::{Error, RenderOptions};
 use convert::SplatParams;
-use convert::read::{Loaded as FileData, ReadLimits};
+use convert::read::Loaded as FileData;
 use glam::{DMat3, DQuat, DVec3, Vec3};
 use reference::{ColorAt, Density, Lattice, Liberty, Medium, Surface, SurfaceKind, SurfaceMaterial};
 use splat_core::{Grid, Mesh, ScalarField, Shading, Similarity, optics};
@@ -287,8 +287,7 @@ fn surface(scene: &Scene, object: &SceneObject, mut mesh: Mesh) -> Body {
 }
 
 fn read(path: &Path, options: &RenderOptions) -> Result<FileData, Error> {
-    let limits = ReadLimits { max_bytes: options.max_memory, drop_invalid: options.drop_invalid };
-    convert::read::file(path, &limits).map_err(|e| Error::from_read(path, &e))
+    convert::read::file(path, &options.read_limits()).map_err(|e| Error::from_read(path, &e))
 }
 
 fn rectangle(center: DVec3, u: DVec3, v: DVec3) -> Mesh {

@@ -1,10 +1,11 @@
 //! The body of a PLY file, record by record, from text or bytes alike.
 
 use super::columns::Columns;
+use super::faces::{Faces, Form};
 use super::header::{Element, Header, Property, Shape, Type, at_line};
 use crate::error::{Place, ReadError, escaped};
-use crate::read::polygon::{self, Polygon};
-use crate::read::{Loaded, ReadLimits, input};
+use crate::read::reading::Reading;
+use crate::read::{Loaded, input};
 
 /// Where numbers come from.
 pub(super) trait Source {
@@ -26,39 +27,38 @@ pub(super) trait Source {
     fn shown(&self, value: f64) -> String;
 }
 
+/// Records between two looks at whether to stop.
+const LOOK: u64 = 1 << 14;
+
 /// Reads every element.
-pub(super) fn read<S: Source>(mut source: S, header: &Header, limits: &ReadLimits) -> Result<Loaded, ReadError> {
-    let named = |name: &[u8]| header.elements.iter().find(|e| e.name == name && e.count > 0);
-    if let Some(strips) = named(b"tristrips") {
-        let hint = "convert the strips to faces with another tool";
-        return Err(ReadError::input(at_line(strips.line), "faces", "triangle strips", hint));
-    }
+pub(super) fn read<S: Source>(mut source: S, header: &Header, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+    let named = |name: &[u8]| header.elements.iter().any(|e| e.name == name && e.count > 0);
     let Some(vertices) = header.elements.iter().find(|e| e.name == b"vertex") else {
         let hint = "only meshes and point clouds are read";
         return Err(ReadError::input(at_line(header.body_line - 1), "an element 'vertex'", "none", hint));
     };
-    let mesh = named(b"face").is_some();
-    let mut columns = Columns::new(vertices, limits.drop_invalid && !mesh)?;
-    let mut faces = Faces::default();
+    let mesh = named(b"face") || named(b"tristrips");
+    let mut columns = Columns::new(vertices, reading.limits.drop_invalid && !mesh)?;
+    let mut faces = Faces::new(vertices.count);
     for element in &header.elements {
         check_count(&source, element)?;
         match element.name.as_slice() {
-            b"vertex" => read_vertices(&mut source, element, &mut columns, limits)?,
-            b"face" => read_faces(&mut source, element, vertices.count, &mut faces, limits)?,
-            _ => skip_element(&mut source, element)?,
+            b"vertex" => read_vertices(&mut source, element, &mut columns, reading)?,
+            b"face" => faces.read(&mut source, element, Form::Polygons, reading)?,
+            b"tristrips" => faces.read(&mut source, element, Form::Strips, reading)?,
+            _ => skip_element(&mut source, element, reading)?,
         }
     }
     source.finish()?;
     if !mesh {
         return columns.into_points().map(Loaded::Points);
     }
-    let mut mesh = columns.into_mesh(faces.triangles)?;
-    polygon::triangulate(&mut mesh, &faces.polygons).map_err(|p| {
-        let found = format!("face {} of {} corners that crosses itself", p.face, p.count + 2);
-        let hint = "split the face into triangles, or put its corners in order";
-        ReadError::input(at_line(faces.line), "faces whose edges do not cross", found, hint)
-    })?;
-    Ok(Loaded::Mesh(mesh))
+    faces.into_mesh(columns, reading).map(Loaded::Mesh)
+}
+
+/// Looks now and then whether to stop.
+pub(super) fn look(record: u64, reading: &Reading<'_>) -> Result<(), ReadError> {
+    if record.is_multiple_of(LOOK) { reading.go_on() } else { Ok(()) }
 }
 
 /// Refuses a count that the rest of the file cannot hold.
@@ -87,11 +87,12 @@ fn read_vertices<S: Source>(
     source: &mut S,
     element: &Element,
     columns: &mut Columns,
-    limits: &ReadLimits,
+    reading: &Reading<'_>,
 ) -> Result<(), ReadError> {
-    input::check_bytes("the vertices", element.count.saturating_mul(columns.bytes_per_vertex()), limits)?;
+    input::check_bytes("the vertices", element.count.saturating_mul(columns.bytes_per_vertex()), reading.limits)?;
     columns.reserve(element.count as usize)?;
-    for _ in 0..element.count {
+    for record in 0..element.count {
+        look(record, reading)?;
         source.begin_record()?;
         for (index, property) in element.properties.iter().enumerate() {
             match property.shape {
@@ -109,96 +110,8 @@ fn read_vertices<S: Source>(
     Ok(())
 }
 
-/// The faces so far.
-#[derive(Default)]
-struct Faces {
-    triangles: Vec<[u32; 3]>,
-    /// Faces of more than three corners; fans among the triangles until all vertices are known.
-    polygons: Vec<Polygon>,
-    /// Line of the header that announces them.
-    line: u64,
-}
-
-fn read_faces<S: Source>(
-    source: &mut S,
-    element: &Element,
-    vertices: u64,
-    faces: &mut Faces,
-    limits: &ReadLimits,
-) -> Result<(), ReadError> {
-    let is_index = |p: &Property| p.name == b"vertex_indices" || p.name == b"vertex_index";
-    let Some(indices) = element.properties.iter().find(|p| is_index(p)) else {
-        let hint = "faces without vertices cannot be drawn";
-        return Err(ReadError::input(at_line(element.line), "a list 'vertex_indices'", "none", hint));
-    };
-    if !matches!(indices.shape, Shape::List { item, .. } if item.integer_range().is_some()) {
-        let hint = "write 'property list uchar int vertex_indices'";
-        return Err(ReadError::input(at_line(indices.line), "a list of integers", "another type", hint));
-    }
-    input::check_bytes("the faces", element.count.saturating_mul(12), limits)?;
-    input::reserve(&mut faces.triangles, element.count as usize)?;
-    faces.line = element.line;
-    for face in 0..element.count {
-        source.begin_record()?;
-        for property in &element.properties {
-            match property.shape {
-                Shape::Scalar(kind) => {
-                    source.number(kind)?;
-                }
-                Shape::List { count, item } if is_index(property) => {
-                    read_polygon(source, face, (count, item), vertices, faces, limits)?;
-                }
-                Shape::List { count, item } => skip_list(source, count, item)?,
-            }
-        }
-        source.end_record()?;
-    }
-    Ok(())
-}
-
-/// One polygon → a fan around its first vertex, for now.
-fn read_polygon<S: Source>(
-    source: &mut S,
-    face: u64,
-    (count, item): (Type, Type),
-    vertices: u64,
-    faces: &mut Faces,
-    limits: &ReadLimits,
-) -> Result<(), ReadError> {
-    let corners = list_length(source, count, item)?;
-    if corners < 3 {
-        let expected = format!("3 or more corners of face {face}");
-        return Err(ReadError::input(source.place(), expected, corners.to_string(), "remove degenerate faces"));
-    }
-    let Faces { triangles, polygons, .. } = faces;
-    let total = triangles.len() as u64 + corners - 2;
-    let bytes = total.saturating_mul(12).saturating_add((polygons.len() * size_of::<Polygon>()) as u64);
-    input::check_bytes("the triangles", bytes, limits)?;
-    let count = corners as usize - 2;
-    input::reserve(triangles, count)?;
-    if count > 1 {
-        input::reserve(polygons, 1)?;
-        polygons.push(Polygon { face, first: triangles.len(), count });
-    }
-    let mut corner = || {
-        let index = source.number(item)?;
-        if (0.0..vertices as f64).contains(&index) {
-            return Ok(index as u32);
-        }
-        let expected = format!("a vertex of face {face} from 0 to {}", vertices.saturating_sub(1));
-        Err(ReadError::input(source.place(), expected, source.shown(index), "the face list is damaged"))
-    };
-    let (first, mut previous) = (corner()?, corner()?);
-    for _ in 2..corners {
-        let next = corner()?;
-        triangles.push([first, previous, next]);
-        previous = next;
-    }
-    Ok(())
-}
-
 /// The length of a list, refused if the rest of the file cannot hold it.
-fn list_length<S: Source>(source: &mut S, count: Type, item: Type) -> Result<u64, ReadError> {
+pub(super) fn list_length<S: Source>(source: &mut S, count: Type, item: Type) -> Result<u64, ReadError> {
     let length = source.number(count)?;
     let most = source.remaining() / source.least_bytes(item);
     if length >= 0.0 && length <= most as f64 {
@@ -208,18 +121,19 @@ fn list_length<S: Source>(source: &mut S, count: Type, item: Type) -> Result<u64
     Err(ReadError::input(source.place(), expected, source.shown(length), "the file is truncated or damaged"))
 }
 
-fn skip_list<S: Source>(source: &mut S, count: Type, item: Type) -> Result<(), ReadError> {
+pub(super) fn skip_list<S: Source>(source: &mut S, count: Type, item: Type) -> Result<(), ReadError> {
     for _ in 0..list_length(source, count, item)? {
         source.number(item)?;
     }
     Ok(())
 }
 
-fn skip_element<S: Source>(source: &mut S, element: &Element) -> Result<(), ReadError> {
+fn skip_element<S: Source>(source: &mut S, element: &Element, reading: &Reading<'_>) -> Result<(), ReadError> {
     if element.properties.is_empty() {
         return Ok(());
     }
-    for _ in 0..element.count {
+    for record in 0..element.count {
+        look(record, reading)?;
         source.begin_record()?;
         for property in &element.properties {
             match property.shape {

@@ -1,0 +1,145 @@
+//! What goes along while a file is read: its limits, who may stop it, and what was mended in it.
+
+use super::ReadLimits;
+use crate::error::{Place, ReadError, escaped};
+use splat_core::Progress;
+use std::fmt;
+
+/// A fault of a file that does not stop the rest of it from being drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Fix {
+    /// A face of four corners crosses itself: it is its two triangles.
+    CrossingQuad,
+    /// A larger face crosses itself: it is what its edges go around.
+    CrossingPolygon,
+    /// A face crosses itself and has too many corners to find what its edges go around: it is left out.
+    CrossingLarge,
+    /// A face has fewer than three corners: it is left out.
+    TooFewCorners,
+    /// Faces name normals, and the file has none: they are computed.
+    MissingNormals,
+    /// A part of a mesh is wound inside out, or its normals point inwards: it is turned.
+    InsideOut,
+    /// A few bytes follow the last facet of a binary STL: they are read over.
+    TrailingBytes,
+}
+
+/// All faults of one kind that were mended in a file. Prints as one line: `FILE:LINE: 2 faces …`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Mended {
+    /// The file's name, escaped.
+    pub file: String,
+    /// What was wrong, and what became of it.
+    pub fix: Fix,
+    /// How often.
+    pub count: u64,
+    /// Where the first of them is.
+    pub place: Place,
+    /// The number of the first face, as the file's format counts; `None` for what is no fault of a face.
+    pub face: Option<u64>,
+}
+
+impl fmt::Display for Mended {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { file, fix, count, place, face } = self;
+        write!(f, "{file}{place}: {count} ")?;
+        let by = |one: &'static str, many: &'static str| if *count == 1 { one } else { many };
+        f.write_str(match fix {
+            Fix::CrossingQuad => by(
+                "face of four corners crosses itself and is drawn as two triangles",
+                "faces of four corners cross themselves and are drawn as two triangles each",
+            ),
+            Fix::CrossingPolygon => by(
+                "face crosses itself and is filled where its edges go around",
+                "faces cross themselves and are filled where their edges go around",
+            ),
+            Fix::CrossingLarge => by(
+                "face crosses itself, has too many corners to be mended, and is left out",
+                "faces cross themselves, have too many corners to be mended, and are left out",
+            ),
+            Fix::TooFewCorners => {
+                by("face of fewer than three corners is left out", "faces of fewer than three corners are left out")
+            }
+            Fix::MissingNormals => by(
+                "corner names a normal, of which the file has none: normals are computed",
+                "corners name normals, of which the file has none: normals are computed",
+            ),
+            Fix::InsideOut => by("part is inside out and is turned", "parts are inside out and are turned"),
+            Fix::TrailingBytes => {
+                by("byte after the last facet is read over", "bytes after the last facet are read over")
+            }
+        })?;
+        match face {
+            Some(face) if *count > 1 => write!(f, " (the first is face {face})"),
+            Some(face) => write!(f, " (face {face})"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// What a reader has to say of a file beside its data.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Notes {
+    /// Columns, fields and statements of the file that are not used, as the file names them.
+    pub unused: Vec<String>,
+    /// What was made of the data that its user should know, one sentence without a full stop each.
+    pub remarks: Vec<String>,
+    /// What was mended in it, one entry a kind of fault.
+    pub mended: Vec<Mended>,
+}
+
+#[cfg(any(feature = "ply", feature = "obj", feature = "xyz", feature = "las"))]
+impl Notes {
+    /// Adds names that are not used, each once, with what would steer a terminal escaped.
+    pub(super) fn not_used<'a>(&mut self, names: impl IntoIterator<Item = &'a [u8]>) {
+        for name in names {
+            let name = escaped(name, 40);
+            if !self.unused.contains(&name) {
+                self.unused.push(name);
+            }
+        }
+    }
+}
+
+/// A file that is being read.
+pub(super) struct Reading<'a> {
+    pub(super) limits: &'a ReadLimits,
+    progress: &'a Progress,
+    pub(super) notes: Notes,
+}
+
+impl<'a> Reading<'a> {
+    pub(super) fn new(limits: &'a ReadLimits, progress: &'a Progress) -> Self {
+        Self { limits, progress, notes: Notes::default() }
+    }
+
+    /// Counts a fault that is mended; with [`ReadLimits::strict`] it is the error that it stands for.
+    #[cfg(any(feature = "ply", feature = "stl", feature = "obj"))]
+    pub(super) fn mend(
+        &mut self,
+        (fix, place, face): (Fix, Place, Option<u64>),
+        error: impl FnOnce() -> ReadError,
+    ) -> Result<(), ReadError> {
+        if self.limits.strict {
+            return Err(error());
+        }
+        match self.notes.mended.iter_mut().find(|m| m.fix == fix) {
+            Some(known) => known.count += 1,
+            None => self.notes.mended.push(Mended { file: String::new(), fix, count: 1, place, face }),
+        }
+        Ok(())
+    }
+
+    /// What there is to say of the file of this name.
+    pub(super) fn finish(mut self, file: &str) -> Notes {
+        self.notes.mended.iter_mut().for_each(|m| file.clone_into(&mut m.file));
+        self.notes
+    }
+
+    /// Looks whether the reader is to stop.
+    pub(super) fn go_on(&self) -> Result<(), ReadError> {
+        if self.progress.is_cancelled() { Err(ReadError::cancelled()) } else { Ok(()) }
+    }
+}
