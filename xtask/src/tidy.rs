@@ -3,6 +3,7 @@
 
 mod assets;
 mod dependencies;
+mod functions;
 mod size;
 mod text;
 
@@ -11,7 +12,7 @@ pub(crate) use assets::{MAX_BYTES, credit_of, in_assets};
 
 type Rule = fn(&Repo) -> Vec<String>;
 
-const RULES: [(&str, Rule); 9] = [
+const RULES: [(&str, Rule); 10] = [
     ("heads", text::heads),
     ("foreign paths", text::foreign_paths),
     ("ignored tests", text::ignored_tests),
@@ -20,6 +21,7 @@ const RULES: [(&str, Rule); 9] = [
     ("file size", size::files),
     ("function size", size::functions),
     ("dependency direction", dependencies::direction),
+    ("functions of the platform", functions::platform),
     ("assets", assets::assets),
 ];
 
