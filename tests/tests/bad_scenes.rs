@@ -239,6 +239,12 @@ fn an_object_has_exactly_one_source() {
     refused("mesh = \"a.ply\"", "", "10:1: object `a`: expected exactly one source, found none");
     refused("volume = \"b.nii\"", "mesh = \"b.ply\"", "`transfer` belongs to a `volume`");
     refused("volume = \"b.nii\"", "volume = \"b.nii\"\nopacity = 0.5", "a medium has no `opacity`");
+    refused(
+        "volume = \"b.nii\"",
+        "volume = \"b.nii\"\ncolor = [1, 0, 0]",
+        "the colours of a volume are those of its `transfer`",
+    );
+    refused("mesh = \"a.ply\"", "mesh = \"a.ply\"\nmerge_duplicates = true", "`merge_duplicates` belongs to `points`");
 }
 
 #[test]

@@ -71,3 +71,23 @@ fn an_interrupt_stops_loading() {
     });
     assert!(matches!(result, Err(Error::Cancelled)));
 }
+
+#[test]
+fn an_expression_that_nothing_bounds_is_refused_by_its_operations_before_the_work() {
+    // A long sum whose bounds say nothing, for every term has any sign.
+    let terms: Vec<String> = (1..60).map(|k| format!("sin({k}*x)*cos({k}*y)*sin({k}*z)")).collect();
+    let implicit = |resolution: u32, expression: &str| {
+        scene(&format!(
+            "[[object]]\nname = 'long'\nimplicit = {{ expression = '{expression}', box = [[-1, -1, -1], [1, 1, 1]], \
+             resolution = {resolution} }}\n"
+        ))
+    };
+    let explain = |s: &Scene| organza::explain(s, &RenderOptions::default(), &Progress::new());
+    let error = explain(&implicit(800, &terms.join(" + "))).unwrap_err();
+    assert_eq!(error.exit_code(), 5, "{error}");
+    let words = "the expression of object 'long'";
+    assert!(error.to_string().contains(words) && error.hint().contains("larger spacing"), "{error} {}", error.hint());
+    // The same lattice with a bound, and a coarser one without, are no work.
+    explain(&implicit(800, "x^2 + y^2 + z^2 - 0.001")).unwrap();
+    explain(&implicit(40, &terms.join(" + "))).unwrap();
+}

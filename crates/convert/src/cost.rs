@@ -12,13 +12,13 @@
 //! `at_most` holds always: memory that is not to be exceeded is planned with it.
 
 use crate::columns::Wanted;
-use crate::field_points::{coarse_area, density_lattice, surface_spacing};
+use crate::field_points::{coarse_area, density_lattice, surface_lattice, surface_spacing};
 use crate::keep::Keep;
 #[cfg(feature = "noise")]
 use crate::procedural::CloudShape;
 use crate::shapes::{Lattice, rectangle_counts};
 use crate::volume_points::lattice_factors;
-use crate::{ConvertError, DensityParams, MeshParams, SplatParams, VolumeParams, mesh_points, resample};
+use crate::{ConvertError, DensityParams, MeshParams, SplatParams, VolumeParams, mesh_points, resample, surface_nets};
 #[cfg(feature = "surfels")]
 use crate::{RawPoints, SurfelParams, surfels};
 use splat_core::{
@@ -114,6 +114,29 @@ pub fn surface<F: ScalarField + ?Sized>(
     let area = if params.opacity > 0.0 { coarse_area(field, bounds, &params.splat)? } else { 0.0 };
     let spacing = surface_spacing(field, bounds, params)?;
     Ok(Prediction::new(ZERO_SET_EXCESS * area / (spacing * spacing), None, mesh_points::WANTED))
+}
+
+/// About how many values of the field [`crate::surface_to_points`] asks for: a field whose bounds exclude nothing is
+/// evaluated on the whole lattice.
+///
+/// # Errors
+/// As the conversion.
+pub fn surface_evaluations<F: ScalarField + ?Sized>(
+    field: &F,
+    bounds: [DVec3; 2],
+    params: &MeshParams,
+) -> Result<f64, ConvertError> {
+    params.splat.check()?;
+    Ok(surface_nets::evaluations(field, &surface_lattice(field, bounds, params)?))
+}
+
+/// How many values of a field [`crate::density_to_points`] asks for.
+///
+/// # Errors
+/// As the conversion.
+pub fn density_evaluations(bounds: [DVec3; 2], params: &DensityParams) -> Result<f64, ConvertError> {
+    params.volume.check()?;
+    Ok(density_lattice(bounds, params)?.cells.iter().map(|n| *n as f64).product())
 }
 
 /// Of [`crate::density_to_points`]; the field is looked at on a coarse lattice.

@@ -55,6 +55,11 @@ impl ExpressionField {
     pub fn parse_with(text: &str, constants: &[(&str, f64)]) -> Result<Self, ExpressionError> {
         Ok(Self { program: parse::parse(text, constants)? })
     }
+
+    /// Operations that a value takes.
+    pub fn operations(&self) -> usize {
+        self.program.len()
+    }
 }
 
 impl ExpressionField {

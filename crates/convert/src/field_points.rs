@@ -82,6 +82,15 @@ pub fn surface_to_points_with_progress<F: ScalarField + ?Sized>(
     Ok((cloud, report))
 }
 
+/// The lattice that a zero set is looked for on.
+pub(crate) fn surface_lattice<F: ScalarField + ?Sized>(
+    field: &F,
+    bounds: [DVec3; 2],
+    params: &MeshParams,
+) -> Result<Lattice, ConvertError> {
+    lattice(bounds, surface_spacing(field, bounds, params)? * CELL_OVER_SPACING, &params.splat)
+}
+
 /// Spacing of the splats of a zero set, object units.
 pub(crate) fn surface_spacing<F: ScalarField + ?Sized>(
     field: &F,

@@ -57,6 +57,8 @@ mod surface_nets;
 mod surfels;
 #[cfg(feature = "surfels")]
 mod tangent_plane;
+#[cfg(feature = "surfels")]
+mod thin;
 mod vertex_normals;
 mod volume_points;
 
@@ -81,9 +83,12 @@ pub use params::{Density, SplatParams};
 #[cfg(feature = "noise")]
 pub use procedural::{CloudShape, Ellipsoid, procedural_cloud, procedural_cloud_with_progress};
 pub use raw_points::{PointLattice, RawPoints};
+pub use resample::resampled;
 pub use shapes::{medium_ball, medium_box, rectangle};
 pub use sobel::{sobel_gradient, sobel_gradient_into};
 #[cfg(feature = "surfels")]
 pub use surfels::{SurfelParams, SurfelReport, raw_to_surfels, raw_to_surfels_with_progress};
+#[cfg(feature = "surfels")]
+pub use thin::thinned;
 pub use vertex_normals::vertex_normals;
 pub use volume_points::{VolumeParams, VolumeReport, volume_to_points, volume_to_points_with_progress};

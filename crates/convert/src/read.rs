@@ -34,6 +34,7 @@ mod statements;
 mod stl;
 #[cfg(any(feature = "stl", feature = "obj", feature = "xyz", feature = "nrrd"))]
 mod text;
+mod up;
 #[cfg(any(feature = "nrrd", feature = "nifti"))]
 mod voxels;
 #[cfg(feature = "xyz")]
@@ -42,6 +43,7 @@ mod xyz;
 #[cfg(feature = "las")]
 pub use laz::panic_is_input_error;
 pub use reading::{Fix, Mended, Notes};
+pub use up::{UpAxis, up_axis};
 
 use crate::error::{Place, ReadError, escaped, escaped_path};
 use crate::raw_points::RawPoints;

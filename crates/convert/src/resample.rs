@@ -5,6 +5,8 @@
 //! voxel into f cells, values between voxels by trilinear interpolation, values beyond the last voxel repeated. Every
 //! cell is covered once, so Σ K stays σ_t·V.
 
+use crate::volume_points::check_lattice;
+use crate::{ConvertError, SplatParams};
 use rayon::prelude::*;
 use splat_core::{
     Grid,
@@ -32,15 +34,41 @@ pub(crate) fn kernel_spacing(axes: &DMat3) -> f64 {
     1.0 / shortest.min((reciprocal * DVec3::NEG_ONE).length())
 }
 
-/// The grid with every cell split into `factors` cells, by trilinear interpolation.
-pub(crate) fn resample(grid: &Grid, factors: [usize; 3]) -> Grid {
-    let dims = [0, 1, 2].map(|a| grid.dims[a] * factors[a]);
-    let inverse = DVec3::from_array(factors.map(|f| 1.0 / f as f64));
-    let axes = grid.axes * DMat3::from_diagonal(inverse);
-    // Centre of the first small cell within the first cell, which is centred at lattice point 0.
-    let origin = grid.origin + grid.axes * ((inverse - DVec3::ONE) * 0.5);
+/// The grid on a lattice whose steps are `spacing` long at most (but for rounding) and as alike as whole numbers of cells allow, units of the
+/// grid: coarser or finer. It fills the same place; values are interpolated trilinearly.
+///
+/// ```
+/// use convert::{SplatParams, resampled};
+/// use splat_core::{Grid, glam::{DMat3, DVec3}};
+/// let values = (0..64).map(|i| (i % 4) as f32).collect();
+/// let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [4, 4, 4], values };
+/// let coarse = resampled(&grid, 2.0, &SplatParams::default()).unwrap();
+/// assert_eq!((coarse.dims, coarse.values[0], coarse.values[1]), ([2, 2, 2], 0.5, 2.5));
+/// ```
+///
+/// # Errors
+/// [`ConvertError::Parameter`] for a spacing that is no length, [`ConvertError::Input`] for a grid that is none,
+/// [`ConvertError::TooMany`] before memory is taken.
+pub fn resampled(grid: &Grid, spacing: f64, params: &SplatParams) -> Result<Grid, ConvertError> {
+    params.check_spacing(spacing)?;
+    grid.validate().map_err(|e| params.input(e))?;
+    let steps = [grid.axes.x_axis, grid.axes.y_axis, grid.axes.z_axis].map(DVec3::length);
+    // Headers round steps to f32: no cell more for that.
+    let cells = |a: usize| ((grid.dims[a] as f64 * steps[a] / spacing) * (1.0 - 1e-6)).ceil().max(1.0);
+    let dims = [cells(0), cells(1), cells(2)];
+    check_lattice(params, dims)?;
+    Ok(resample(grid, dims.map(|n| n as usize)))
+}
+
+/// The grid's place filled with `dims` cells, values by trilinear interpolation.
+pub(crate) fn resample(grid: &Grid, dims: [usize; 3]) -> Grid {
+    let ratio = DVec3::from_array([0, 1, 2].map(|a| grid.dims[a] as f64 / dims[a] as f64));
+    let axes = grid.axes * DMat3::from_diagonal(ratio);
+    // Centre of the first new cell; the first old one is centred at lattice point 0.
+    let origin = grid.origin + grid.axes * ((ratio - DVec3::ONE) * 0.5);
     let place = |i: usize, a: usize| -> (usize, usize, f32) {
-        let at = ((i as f64 + 0.5) / factors[a] as f64 - 0.5).clamp(0.0, (grid.dims[a] - 1) as f64);
+        let at = (i as f64 + 0.5) * grid.dims[a] as f64 / dims[a] as f64 - 0.5;
+        let at = at.clamp(0.0, (grid.dims[a] - 1) as f64);
         let low = at as usize;
         (low, (low + 1).min(grid.dims[a] - 1), (at - low as f64) as f32)
     };
@@ -71,7 +99,7 @@ mod tests {
         let grid = Grid { origin: DVec3::new(5.0, 0.0, 0.0), axes, dims: [3, 4, 5], values };
         let f = factors(&grid.axes, 2);
         assert_eq!(f, [2, 2, 6]);
-        let fine = resample(&grid, f);
+        let fine = resample(&grid, [0, 1, 2].map(|a| grid.dims[a] * f[a]));
         assert!((fine.cell_volume() * fine.values.len() as f64 - 3.0 * 60.0).abs() < 1e-9);
         let p = fine.position(3, 3, 13);
         let index = DVec3::new(p.x - 5.0, p.y, p.z / 3.0);

@@ -34,9 +34,44 @@ impl Lattice {
         self.low + self.step * DVec3::new(c[0] as f64, c[1] as f64, c[2] as f64)
     }
 
+    /// Blocks along x, y and z.
+    fn blocks(&self) -> [usize; 3] {
+        self.cells.map(|n| n.div_ceil(BLOCK))
+    }
+
+    /// The first cell of a block.
+    fn first_of(&self, block: usize) -> [usize; 3] {
+        let [nx, ny, _] = self.blocks();
+        [block % nx, block / nx % ny, block / nx / ny].map(|i| i * BLOCK)
+    }
+
     fn id(&self, c: [usize; 3]) -> u64 {
         ((c[2] * self.cells[1] + c[1]) * self.cells[0] + c[0]) as u64
     }
+}
+
+/// Blocks that are looked at to predict how many are evaluated.
+const LOOKED_AT: usize = 512;
+
+/// About how many values of the field [`surface_nets`] asks for at lattice points.
+pub(crate) fn evaluations<F: ScalarField + ?Sized>(field: &F, lattice: &Lattice) -> f64 {
+    let count = lattice.blocks().iter().product::<usize>();
+    let looked_at = count.min(LOOKED_AT);
+    // Steps of the golden section: even, and in step with no side of the lattice.
+    let block = |k: usize| {
+        if count <= LOOKED_AT { k } else { ((k as f64 * 0.618_033_988_749_894_9).fract() * count as f64) as usize }
+    };
+    let kept = (0..looked_at).filter(|k| !is_empty(field, lattice, lattice.first_of(block(*k)))).count();
+    let points = lattice.cells.map(|n| n as f64 * POINTS as f64 / BLOCK as f64).iter().product::<f64>();
+    points * kept as f64 / looked_at.max(1) as f64
+}
+
+/// Whether the field's bound excludes zero in the block that begins at a cell.
+fn is_empty<F: ScalarField + ?Sized>(field: &F, lattice: &Lattice, first: [usize; 3]) -> bool {
+    let low = lattice.at(first);
+    let last = [0, 1, 2].map(|a| (first[a] + BLOCK).min(lattice.cells[a]));
+    let half = (lattice.at(last) - low) * 0.5;
+    field.bound(low + half, half.length()).is_some_and(|(min, max)| min > 0.0 || max < 0.0)
 }
 
 /// What one block of cells contributes.
@@ -55,15 +90,14 @@ pub(crate) fn surface_nets<F: ScalarField + ?Sized>(
     object: &str,
     progress: &Progress,
 ) -> Result<Mesh, ConvertError> {
-    let blocks = lattice.cells.map(|n| n.div_ceil(BLOCK));
-    let count = blocks[0] * blocks[1] * blocks[2];
+    let count = lattice.blocks().iter().product::<usize>();
     progress.add_total(count as u64);
     let parts: Vec<Result<Part, ConvertError>> = (0..count)
         .into_par_iter()
         .map(|b| {
             progress.tick(1).map_err(|_| ConvertError::Cancelled)?;
-            let first = [b % blocks[0], b / blocks[0] % blocks[1], b / blocks[0] / blocks[1]].map(|i| i * BLOCK);
-            Block::sample(field, lattice, first, object).map(|block| block.map_or(Part::default(), |b| b.part(field)))
+            Block::sample(field, lattice, lattice.first_of(b), object)
+                .map(|block| block.map_or(Part::default(), |b| b.part(field)))
         })
         .collect();
     check_cancelled(progress)?;
@@ -109,9 +143,7 @@ impl<'a> Block<'a> {
         object: &str,
     ) -> Result<Option<Self>, ConvertError> {
         let cells = [0, 1, 2].map(|a| BLOCK.min(lattice.cells[a] - first[a]));
-        let low = lattice.at(first);
-        let half = (lattice.at([0, 1, 2].map(|a| first[a] + cells[a])) - low) * 0.5;
-        if field.bound(low + half, half.length()).is_some_and(|(min, max)| min > 0.0 || max < 0.0) {
+        if is_empty(field, lattice, first) {
             return Ok(None);
         }
         let mut values = vec![0.0; POINTS * POINTS * POINTS];

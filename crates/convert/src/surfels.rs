@@ -27,6 +27,8 @@ use std::cmp::Ordering;
 pub struct SurfelParams {
     /// Attributes and limits; `color` is for points without one.
     pub splat: SplatParams,
+    /// Whether surfels keep the points' colours.
+    pub colors: bool,
     /// Opacity of one crossing, in (0, 1\]; 1 makes the surface opaque.
     pub opacity: f64,
     /// Neighbours that normals and areas come from, 3 to 32.
@@ -47,6 +49,7 @@ impl Default for SurfelParams {
     fn default() -> Self {
         Self {
             splat: SplatParams::default(),
+            colors: true,
             opacity: 1.0,
             neighbours: 10,
             orientation: Orientation::default(),
@@ -155,7 +158,7 @@ fn canonical_order(points: &RawPoints) -> Vec<u32> {
     keys.into_iter().map(|k| k.1).collect()
 }
 
-fn compare(points: &RawPoints, a: usize, b: usize) -> Ordering {
+pub(crate) fn compare(points: &RawPoints, a: usize, b: usize) -> Ordering {
     let bits = |v: Vec3| v.to_array().map(f32::to_bits);
     let place = |i: usize| points.position[i].to_array().map(|c| (c + 0.0).to_bits());
     let attributes = |i: usize| {
@@ -266,7 +269,7 @@ fn emit(
             *normal = t.rotate(n).as_vec3();
             *radius = params.splat.radius(known.spacing * t.scale) as f32;
             *cross_section = (tau * known.area / f64::from(sharers)) as f32;
-            *color = points.color.get(i).copied().unwrap_or(params.splat.color);
+            *color = points.color.get(i).filter(|_| params.colors).copied().unwrap_or(params.splat.color);
         },
     );
     cloud.value.iter_mut().zip(&surfels).for_each(|(v, s)| *v = points.value[s.1 as usize]);

@@ -136,7 +136,7 @@ pub fn volume_to_points_with_progress(
     params.check()?;
     grid.validate().map_err(|e| p.input(e))?;
     let factors = lattice_factors(grid, params)?;
-    let fine = (factors != [1; 3]).then(|| resample::resample(grid, factors));
+    let fine = (factors != [1; 3]).then(|| resample::resample(grid, [0, 1, 2].map(|a| grid.dims[a] * factors[a])));
     let lattice = fine.as_ref().unwrap_or(grid);
     let spacing = p.check_spacing(resample::kernel_spacing(&lattice.axes) * p.transform.scale)?;
     let report = VolumeReport {

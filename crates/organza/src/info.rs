@@ -2,7 +2,7 @@
 
 use crate::Error;
 use convert::RawPoints;
-use convert::read::{Loaded, Mended, ReadLimits};
+use convert::read::{Loaded, Mended, ReadLimits, UpAxis, up_axis};
 use glam::{DVec3, Vec3};
 use splat_core::{Aabb, Grid, Mesh, Progress};
 use std::path::Path;
@@ -28,6 +28,8 @@ pub struct FileInfo {
     pub remarks: Vec<String>,
     /// What was mended in the file or left out of it, one sentence a kind of fault.
     pub mended: Vec<String>,
+    /// The axis that points up where a scene says `up = "auto"`.
+    pub up: UpAxis,
 }
 
 /// Reads a data file of at most `max_bytes` and describes it; `strict` refuses a file with a fault that could be mended.
@@ -48,7 +50,7 @@ pub fn info(path: &Path, max_bytes: u64, strict: bool) -> Result<FileInfo, Error
     };
     let remarks = notes.remarks.into_iter().chain(info.remarks).collect();
     let mended = notes.mended.iter().map(Mended::to_string).collect();
-    Ok(FileInfo { bytes, unused: notes.unused, remarks, mended, ..info })
+    Ok(FileInfo { bytes, unused: notes.unused, remarks, mended, up: up_axis(path), ..info })
 }
 
 fn present(columns: &[(&'static str, bool)]) -> Vec<&'static str> {

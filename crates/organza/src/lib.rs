@@ -28,6 +28,7 @@
 
 pub mod accuracy;
 mod device;
+mod doubts;
 mod error;
 mod info;
 mod load;
@@ -44,6 +45,7 @@ mod sequence;
 mod shadows;
 pub mod statistics;
 pub mod truth;
+mod work;
 
 pub use device::{Agreement, Checked, DeviceChoice, KernelTime, ListedDevice, Passport, devices, passport};
 pub use error::{Error, escape_controls, printable, shown};

@@ -11,7 +11,7 @@ mod slice;
 use crate::plan::{ParticleSource, PlannedSampler, pass, samplers};
 use crate::scene::{Scene, SceneObject, Technique};
 use crate::statistics::{LightStatistics, ObjectStatistics};
-use crate::{CostRecord, Error, Progress, RenderOptions, normalize::normalize};
+use crate::{CostRecord, Error, Progress, RenderOptions, normalize::normalize, work};
 pub(crate) use context::BYTES_PER_SPLAT;
 use context::Context;
 use convert::cost::Prediction;
@@ -121,6 +121,7 @@ pub(crate) fn load_measured(
     let planned = loading.samplers(&statistics, &light_statistics(&lights, &casts));
     let mut splats = loading.counts(&prepared, &planned)?;
     let materials = materials(scene, &prepared);
+    progress.plan(work::of_counts(scene, &splats, &planned, lights.len()));
     let mut own = loading.own(&mut prepared, &planned, &mut warnings)?;
     let converted = planned.iter().filter(|p| p.splats.is_some()).count();
     let mut cloud = Cloud::default();
@@ -215,9 +216,14 @@ impl<'a> Loading<'a> {
     /// Reads every object and counts its splats, so that a scene that does not fit is refused before anything is
     /// converted.
     fn prepare(&self) -> Result<Vec<Prepared<'a>>, Error> {
+        self.progress.plan(work::of_scene(self.scene));
+        self.progress.begin(work::stage::READ);
         self.progress.add_total(self.visible().count() as u64);
         let one = |(id, object): (usize, &'a SceneObject)| {
             self.progress.tick(1).map_err(|_| Error::Cancelled)?;
+            if let Some(reading) = work::reading(object) {
+                self.progress.begin(&reading);
+            }
             object::prepare(object, &self.context(id, 0, 0), self.particles()).map_err(|e| self.named(object, e))
         };
         self.visible().map(one).collect()
@@ -240,15 +246,18 @@ impl<'a> Loading<'a> {
 
     /// Splats to be made; refuses those that do not fit.
     fn counts(&self, prepared: &[Prepared<'_>], planned: &[PlannedSampler]) -> Result<Vec<SplatCount>, Error> {
-        let (mut splats, mut held): (Vec<SplatCount>, u64) = (Vec::new(), self.files.bytes());
+        let mut splats: Vec<SplatCount> = Vec::new();
+        let (mut held, mut needed) = (self.files.bytes(), 0);
         for ((object, p), plan) in self.visible().map(|v| v.1).zip(prepared).zip(planned) {
             let mut count = SplatCount::predicted(&object.name, &p.prediction);
             if plan.splats.is_none() {
                 (count.predicted, count.exact) = (0, true);
             }
+            // Estimates count half, so that nothing is refused that would fit.
+            needed += if count.exact { count.predicted } else { count.predicted / 2 };
             splats.push(count);
             held += p.input.own_bytes();
-            check_total(self.scene, self.options, held, &splats)?;
+            check_total(self.scene, self.options, [held, needed], &splats)?;
         }
         Ok(splats)
     }
@@ -286,30 +295,37 @@ impl<'a> Loading<'a> {
         warnings: &mut Vec<String>,
     ) -> Result<Vec<Cloud>, Error> {
         let mut clouds: Vec<Cloud> = Vec::new();
-        let held: u64 = own.iter().map(Own::bytes).sum();
+        let mut used: u64 = own.iter().map(Own::bytes).sum();
+        let mut made = 0;
+        // Both are in the order of the scene.
+        let mut own = own.iter().peekable();
         for ((((id, object), p), plan), count) in self.visible().zip(prepared).zip(planned).zip(splats) {
+            let of = own.next_if(|o| o.object == id);
             if plan.splats.is_none() {
                 continue;
             }
-            let used = held + clouds.iter().map(Cloud::bytes).sum::<u64>();
-            let made = clouds.iter().map(|c| c.len() as u64).sum();
-            let of = own.iter().find(|o| o.object == id);
+            self.progress.begin(&work::converting(&object.name));
             let cloud = object::convert(&p, of, &self.context(id, used, made), warnings);
             let cloud = cloud.map_err(|e| self.named(object, e))?;
             if cloud.is_empty() {
                 warnings.push(format!("object '{}' has no splats", crate::shown(&object.name)));
             }
             count.made = cloud.len() as u64;
+            (used, made) = (used + cloud.bytes(), made + count.made);
             clouds.push(cloud);
         }
         Ok(clouds)
     }
 }
 
-/// Refuses a scene whose objects together make too many splats for the memory beside the inputs, of `held` bytes, or for
-/// the scene's own limit. Estimates count half, so that nothing is refused that would fit.
-fn check_total(scene: &Scene, options: &RenderOptions, held: u64, splats: &[SplatCount]) -> Result<(), Error> {
-    let needed: u64 = splats.iter().map(|s| if s.exact { s.predicted } else { s.predicted / 2 }).sum();
+/// Refuses a scene whose objects together make too many splats, `needed`, for the memory beside the inputs, of `held` bytes,
+/// or for the scene's own limit.
+fn check_total(
+    scene: &Scene,
+    options: &RenderOptions,
+    [held, needed]: [u64; 2],
+    splats: &[SplatCount],
+) -> Result<(), Error> {
     let fits = options.max_memory.saturating_sub(held) / BYTES_PER_SPLAT;
     let limit = scene.render.max_points.map_or(fits, |asked| asked.min(fits));
     if needed <= limit {

@@ -27,6 +27,11 @@ pub const LONGEST_SIDE: u32 = 240;
 
 /// Timed repeats of each ordering.
 const REPEATS: usize = 5;
+/// Stages.
+const LOAD: &str = "first look";
+const ORDERS: &str = "orders";
+const TRUTH: &str = "exact truth";
+const SETS_OF_PARTICLES: &str = "particles";
 
 /// About as many rays are looked at for wrong pairs.
 const RAYS: f64 = 20_000.0;
@@ -97,6 +102,9 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
     (points.transmittance_cutoff, points.first_slices) = (0.0, None);
     (points.exact, points.direction) = (false, Direction::FrontToBack);
     scene.render.layers = crate::scene::LayerChoice::default();
+    progress.plan([(LOAD, 2.0), (ORDERS, 8.0), (TRUTH, 8.0), (SETS_OF_PARTICLES, 8.0)]);
+    progress.begin(LOAD);
+    progress.enter();
     let loaded = load(&scene, options, progress)?;
     let (plan, _) = plan_loaded(&scene, &loaded, options)?;
     let drawing = drawing(&scene, &loaded, &plan, options, progress);
@@ -120,29 +128,31 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
     let pixels = f64::from(camera.size[0]) * f64::from(camera.size[1]);
     let rays = Rays::new(&input, (pixels / RAYS).sqrt().ceil() as usize);
     let world = f64::from(loaded.exponent).exp2();
-    let mut orderings = Vec::new();
     let sliced = THICKER.map(|f| Ordering::Slices(f * auto));
     let all = [&[Ordering::Exact][..], &sliced, &[Ordering::Centre, Ordering::Distance, Ordering::Unsorted]].concat();
-    progress.add_total(all.len() as u64 + u64::from(scene.camera.size[1] * scene.render.antialias));
-    for ordering in all {
+    progress.leave();
+    let mut draw = |ordering: Ordering| {
+        progress.begin(&ordering.name(auto));
         let (order, seconds, bytes) = sorter.timed(ordering)?;
+        progress.enter();
         let layers = drawing.compose(&shaded, &order, &mut cost)?;
+        progress.leave();
         let mut disorder = rays.disorder(&ranks(&order, loaded.cloud.len()));
         disorder.worst_backtrack *= world;
-        orderings.push(Ordered {
-            name: ordering.name(auto),
-            thickness: ordering.thickness().map(|t| t * world),
-            image: image(&layers)?,
-            disorder: Some(disorder),
-            seconds,
-            bytes,
-            sampled: None,
-        });
-        progress.tick(1).map_err(|_| Error::Cancelled)?;
-    }
+        progress.tick(0).map_err(|_| Error::Cancelled)?;
+        let (name, thickness) = (ordering.name(auto), ordering.thickness().map(|t| t * world));
+        let (image, disorder) = (image(&layers)?, Some(disorder));
+        Ok::<_, Error>(Ordered { name, thickness, image, disorder, seconds, bytes, sampled: None })
+    };
+    let stages = all.iter().map(|ordering| (ordering.name(auto), 1.0));
+    let drawn = progress.within(ORDERS, stages, || all.iter().map(|o| draw(*o)).collect::<Result<Vec<_>, _>>());
+    let mut orderings = drawn?;
+    progress.begin(TRUTH);
+    progress.add_total(u64::from(scene.camera.size[1] * scene.render.antialias));
     let start = Instant::now();
     let truth = truth(&input, &scene, progress)?;
     let truth_seconds = start.elapsed().as_secs_f64();
+    progress.begin(SETS_OF_PARTICLES);
     let unordered = particles(&scene, &loaded, &truth, options, progress)?;
     let without_particles = unordered.as_ref().err().cloned();
     orderings.extend(unordered);
@@ -209,10 +219,17 @@ fn particles(
         planned => planned?.0,
     };
     let mut images = Vec::new();
-    for _ in 0..SEEDS {
+    let seed = |k: usize| format!("seed {k} of {SEEDS}");
+    progress.enter();
+    progress.plan((1..=SEEDS).map(|k| (seed(k), 1.0)));
+    for k in 1..=SEEDS {
+        progress.begin(&seed(k));
+        progress.enter();
         images.push(image(&draw_loaded(&scene, loaded, &plan, options, progress, &mut CostRecord::default())?)?);
         scene.render.seed = scene.render.seed.wrapping_add(1);
+        progress.leave();
     }
+    progress.leave();
     let sampled = Sampled::of(&images, truth, 0.0, None)?;
     let name = format!("particles, {SETS} sets: none needed");
     let image = images.swap_remove(0);

@@ -5,6 +5,7 @@ mod png_file;
 mod target;
 mod targets;
 
+pub(crate) use png_file::displayed;
 pub use target::{Target, abandon};
 pub use targets::Targets;
 

@@ -14,7 +14,7 @@ mod parts;
 use crate::plan::pass;
 use crate::points::Drawing;
 use crate::scene::Scene;
-use crate::{Error, RenderOptions, Sets};
+use crate::{Error, RenderOptions, Sets, work};
 pub(crate) use checkpoint::Checkpoint;
 pub(crate) use ensemble::average_bytes;
 use ensemble::fold;
@@ -73,6 +73,7 @@ pub(crate) fn draw(
         let asked = drawing.settings.particles.repeat_level;
         sets = Some(Sets { averaged: average.ensemble.levels(), asked, interrupted: average.interrupted });
     }
+    drawing.progress.begin(work::stage::FINISH);
     cost.measure(pass::FINISH, |stage| {
         stage.items_in = u64::from(camera.size[0]) * u64::from(camera.size[1]);
         let background = Background { color: drawing.background };

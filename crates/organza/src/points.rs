@@ -6,6 +6,7 @@ use crate::device::{Helper, LookedUp};
 use crate::load::Loaded;
 use crate::plan::{Plan, pass};
 use crate::scene::RenderSettings;
+use crate::work::{self, stage};
 use crate::{Error, Progress};
 use splat_core::raster::gpu::Input;
 use splat_core::raster::{self, Background, Detail, OpaqueImage, Projected, RasterCounts};
@@ -57,6 +58,7 @@ impl Drawing<'_> {
     ) -> Result<Shaded, Error> {
         let projected = self.project(camera, cost)?;
         let layout = ChannelLayout::new(&self.layers);
+        self.progress.begin(stage::SHADE);
         let values = cost.measure(pass::SHADE, |stage| {
             let visible = (0..self.loaded.cloud.len() as u32).filter(|&i| projected.is_visible(i as usize));
             let looked_up = self.look_ups(maps, visible);
@@ -122,6 +124,7 @@ impl Drawing<'_> {
 
     /// Layers of what was composited in front of the opaque splats.
     fn finish(&self, accumulator: &Accumulator, opaque: &OpaqueImage, cost: &mut CostRecord) -> Result<Layers, Error> {
+        self.progress.begin(stage::FINISH);
         cost.measure(pass::FINISH, |stage| {
             let background = Background { color: self.background };
             let [width, height] = accumulator.size;
@@ -164,12 +167,15 @@ impl Drawing<'_> {
     /// One map for each light that the plan gives one.
     pub(crate) fn shadow_maps(&self, cost: &mut CostRecord) -> Result<Vec<Option<ShadowMap>>, Error> {
         let mut maps = Vec::new();
+        let (mut made, count) = (0, self.plan.shadow_maps.iter().filter(|on| **on).count());
         for (i, (light, table)) in self.loaded.lights.iter().zip(&self.plan.shadow_tables).enumerate() {
             self.tick()?;
             let Some(table) = table else {
                 maps.push(None);
                 continue;
             };
+            made += 1;
+            self.progress.begin(&work::shadow_map(made, count));
             let params = table.params(self.settings, self.loaded);
             let map = cost.measure(pass::SHADOW_MAP, |stage| {
                 let l = self.loaded;
@@ -194,6 +200,7 @@ impl Drawing<'_> {
         if translucent.is_empty() {
             return Ok(SliceOrder::default());
         }
+        self.progress.begin(stage::SORT);
         self.tick()?;
         let params = self.sort_params();
         let order = cost.measure(pass::SORT, |stage| {
@@ -239,6 +246,7 @@ impl Drawing<'_> {
 
     /// Footprints of all splats.
     fn project(&self, camera: &Camera, cost: &mut CostRecord) -> Result<Projected, Error> {
+        self.progress.begin(stage::PROJECT);
         self.tick()?;
         let l = self.loaded;
         let projected = cost.measure(pass::PROJECT, |stage| {
@@ -293,6 +301,7 @@ impl Drawing<'_> {
         if ids.is_empty() {
             return Ok(OpaqueImage::default());
         }
+        self.progress.begin(stage::OPAQUE);
         cost.measure(pass::OPAQUE, |stage| {
             stage.items_in = ids.len() as u64;
             let Shaded { projected, values, channels } = shaded;
@@ -323,6 +332,7 @@ impl Drawing<'_> {
             ids.to_mut().reverse();
             direction = Direction::FrontToBack;
         }
+        self.progress.begin(stage::COMPOSITE);
         self.tick()?;
         cost.measure(pass::SPLAT, |stage| {
             stage.items_in = ids.len() as u64;

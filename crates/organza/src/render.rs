@@ -9,7 +9,7 @@ use crate::plan::{Plan, pass, plan};
 use crate::points::{self, Drawing, shadow_error};
 use crate::scene::{Scene, Technique};
 use crate::statistics::Statistics;
-use crate::{CostRecord, Error, Layers, Progress, shadows};
+use crate::{CostRecord, Error, Layers, Progress, doubts, shadows, work};
 use convert::read::ReadLimits;
 use splat_core::{LayerData, Material};
 use std::path::PathBuf;
@@ -150,6 +150,9 @@ pub(crate) fn render_keeping(
         None => prepare(scene, options, progress, &Files::default())?,
     };
     let Explanation { plan, mut cost, mut warnings, notes, .. } = explanation;
+    // A reason that is told already is enough.
+    let is_empty = loaded.cloud.is_empty() && loaded.own.is_empty();
+    let doubtful = is_empty || warnings.len() > loaded.warnings.len();
     if let Some(left) = left.as_deref_mut() {
         left.fit(options.max_memory, memory.total());
     }
@@ -157,6 +160,9 @@ pub(crate) fn render_keeping(
     let drawing = Drawing { helper: helper.as_ref(), ..drawing(scene, &loaded, &plan, options, progress) };
     let (layers, sets) = draw(scene, &drawing, options, checkpoint.as_mut(), kept, &mut cost, &mut warnings)?;
     let backend = helper.as_ref().map_or_else(|| "cpu".to_owned(), Helper::name);
+    if !doubtful {
+        warnings.extend(doubts::of_picture(scene, &layers));
+    }
     warnings.extend(helper.map(Helper::said).unwrap_or_default());
     Ok(Render { layers, cost, plan, sets, warnings, notes, backend })
 }
@@ -186,13 +192,14 @@ fn draw(
     cost: &mut CostRecord,
     warnings: &mut Vec<String>,
 ) -> Result<(Layers, Option<Sets>), Error> {
-    drawing.progress.add_total(drawing.plan.passes.len() as u64);
+    drawing.progress.plan(work::of_passes(drawing, scene));
     let (mut layers, sets) = match scene.render.technique {
         Technique::Auto | Technique::Points => (points::draw(drawing, cost)?, None),
         Technique::Particles => particles::draw(drawing, scene, options, checkpoint, kept, cost, warnings)?,
     };
     restore_depths(&mut layers, drawing.loaded.exponent);
     scene.render.layers.keep(&mut layers);
+    drawing.progress.finish();
     Ok((layers, sets))
 }
 
@@ -222,7 +229,9 @@ pub(crate) fn drawing<'a>(
 /// # Errors
 /// As [`render`].
 pub fn explain(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Explanation, Error> {
-    prepare(scene, options, progress, &Files::default()).map(|(_, explanation, _)| explanation)
+    let (_, explanation, _) = prepare(scene, options, progress, &Files::default())?;
+    progress.finish();
+    Ok(explanation)
 }
 
 fn prepare(
@@ -236,7 +245,9 @@ fn prepare(
     check_samples(scene)?;
     let loaded = load_measured(scene, options, progress, files, &mut cost)?;
     let (plan, memory) = plan_loaded(scene, &loaded, options)?;
-    let (splats, warnings, notes) = (loaded.splats.clone(), loaded.warnings.clone(), loaded.notes.clone());
+    let (splats, notes) = (loaded.splats.clone(), loaded.notes.clone());
+    let mut warnings = loaded.warnings.clone();
+    warnings.extend(doubts::of_scene(scene, &loaded));
     let inputs = cost.stages.iter().filter(|s| s.name == pass::READ).map(|s| s.bytes).sum();
     let most = memory.total().max(memory::loading_bytes(&loaded, inputs));
     Ok((loaded, Explanation { plan, cost, memory: most, splats, warnings, notes }, memory))

@@ -28,12 +28,13 @@ mod read_json;
 mod read_toml;
 mod tree;
 
+pub use convert::read::UpAxis;
 pub use layer_choice::{LAYER_NAMES, LayerChoice};
 pub use lights::{LightSource, SceneLight};
 pub use load::{LoadOptions, MAX_SCENE_BYTES, MAX_SCENE_DEPTH, load, parse, read, schema};
 pub use model::{
     CloudSource, DensitySource, ImplicitSource, IsosurfaceSource, LevelSetSource, MediumShape, ParticlesSettings,
     PointsSettings, RectangleSource, RenderSettings, Scene, SceneMaterial, SceneObject, ShadowMapping, ShadowSettings,
-    SliceSource, Source, SurfaceSampler, Technique, VolumeSource,
+    SliceSource, Source, SurfaceSampler, Technique, Up, VolumeSource,
 };
 pub use overrides::Override;

@@ -111,8 +111,9 @@ pub fn shade(input: &ShadeInput<'_>, projected: &Projected, layout: &ChannelLayo
     let eye = (input.camera.position - input.cloud.origin).as_vec3();
     let lights: Vec<LocalLight<'_>> = input.lights.iter().map(|l| LocalLight::new(l, input.cloud.origin)).collect();
     let mut values = vec![0.0; input.cloud.len() * channels];
+    progress.add_total(input.cloud.len().div_ceil(CHUNK) as u64);
     values.par_chunks_mut(CHUNK * channels).enumerate().for_each(|(chunk, values)| {
-        if progress.is_cancelled() {
+        if progress.tick(1).is_err() {
             return;
         }
         for (k, out) in values.chunks_exact_mut(channels).enumerate() {

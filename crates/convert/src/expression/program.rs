@@ -84,6 +84,11 @@ impl Program {
         }
     }
 
+    /// Steps.
+    pub(crate) fn len(&self) -> usize {
+        self.ops.len()
+    }
+
     /// Operands that wait at the deepest point.
     pub(crate) fn depth(&self) -> usize {
         let mut depth = 0usize;

@@ -115,6 +115,18 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// As [`crate::render`].
     pub fn draw(&mut self, request: &Request) -> Result<Frame, Error> {
+        self.within_stage(|renderer| renderer.frame(request))
+    }
+
+    /// What `work` plans shares the present stage.
+    fn within_stage<T>(&mut self, work: impl FnOnce(&mut Self) -> T) -> T {
+        self.progress.enter();
+        let out = work(self);
+        self.progress.leave();
+        out
+    }
+
+    fn frame(&mut self, request: &Request) -> Result<Frame, Error> {
         let mut scene = request.scene.clone();
         scene.camera.size = scene.camera.size.map(|s| s.saturating_mul(request.oversample));
         let (options, progress) = (self.options, self.progress);
@@ -138,6 +150,10 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// As [`Renderer::draw`].
     pub fn facts(&mut self, scene: &Scene) -> Result<Facts, Error> {
+        self.within_stage(|renderer| renderer.look(scene))
+    }
+
+    fn look(&mut self, scene: &Scene) -> Result<Facts, Error> {
         let (options, progress) = (self.options, self.progress);
         let (loaded, _) = self.load(scene)?;
         let (plan, _) = plan_loaded(scene, loaded, options)?;
@@ -162,6 +178,10 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// As [`Renderer::draw`], but what the planner refuses is no error.
     pub fn refused(&mut self, scene: &Scene) -> Result<Option<String>, Error> {
+        self.within_stage(|renderer| renderer.refusal(scene))
+    }
+
+    fn refusal(&mut self, scene: &Scene) -> Result<Option<String>, Error> {
         let options = self.options;
         let (loaded, _) = self.load(scene)?;
         match plan_loaded(scene, loaded, options) {

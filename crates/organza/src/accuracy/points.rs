@@ -273,13 +273,16 @@ fn scale_spacings(scene: &mut Scene, factor: f64) {
 
 fn spacing_of(object: &mut SceneObject) -> Option<&mut f64> {
     match &mut object.source {
-        Source::Mesh(_) | Source::Isosurface(_) | Source::LevelSet(_) | Source::Slice(_) => object.spacing.as_mut(),
+        Source::Mesh(_) | Source::Volume(_) | Source::Isosurface(_) | Source::LevelSet(_) | Source::Slice(_) => {
+            object.spacing.as_mut()
+        }
         // The spacing of its samples decides what an implicit surface is, that of the object how it is splatted.
         Source::Implicit(implicit) => Some(object.spacing.as_mut().unwrap_or(&mut implicit.spacing)),
         Source::Density(density) => Some(&mut density.spacing),
         Source::Cloud(cloud) => Some(&mut cloud.spacing),
         Source::Rectangle(rectangle) => Some(&mut rectangle.spacing),
         Source::Medium(MediumShape::Box { spacing, .. } | MediumShape::Ball { spacing, .. }) => Some(spacing),
-        Source::Points(_) | Source::Volume(_) => None,
+        // What lies between points is no field that finer ones would approach.
+        Source::Points(_) => None,
     }
 }

@@ -80,6 +80,13 @@ impl Study {
     }
 }
 
+/// Stages of a study.
+const FIRST: &str = "each setting once";
+const ENDS: &str = "the limit";
+const TOGETHER: &str = "all knobs";
+const REPEATS: &str = "repeats";
+const FRONTIER: &str = "the frontier";
+
 /// A function that draws: the technique's renderer, or a test's.
 pub type Draw<'a> = dyn FnMut(&Request) -> Result<Frame, Error> + 'a;
 
@@ -97,21 +104,32 @@ pub fn study(
 ) -> Result<Study, Error> {
     let mut settings = Settings::of(sweep);
     let mut timed = vec![Timed::default(); settings.list.len()];
-    for (setting, timed) in settings.list.iter().zip(&mut timed) {
-        // Not timed: it pays for loading and for cold caches.
-        attempt(&setting.request, timed, false, false, draw)?;
-    }
+    progress.enter();
+    progress.plan(stages(sweep, settings.list.len() as f64, options));
+    progress.within(FIRST, settings.list.iter().map(|s| (s.label.clone(), 1.0)), || {
+        settings.list.iter().zip(&mut timed).try_for_each(|(setting, timed)| {
+            progress.begin(&setting.label);
+            // Not timed: it pays for loading and for cold caches.
+            attempt(&setting.request, timed, false, false, draw)
+        })
+    })?;
     let own = timed[0].image().ok_or_else(|| unresolved(timed[0].failure.clone().unwrap_or_default(), ""))?;
     let floor = ROUNDING * root_mean_square(own);
     let mut curves = Vec::new();
-    for (knob, of_step) in sweep.knobs.iter().zip(&settings.of_step) {
-        curves.extend(curve(sweep, knob, of_step, &settings, &timed, floor, draw)?);
-    }
-    let limit = limit(sweep, &curves, draw)?;
+    let ends = sweep.knobs.iter().map(|k| (k.name, 1.0)).chain([(TOGETHER, 1.0)]);
+    let limit = progress.within(ENDS, ends, || {
+        for (knob, of_step) in sweep.knobs.iter().zip(&settings.of_step) {
+            progress.begin(knob.name);
+            curves.extend(curve(sweep, knob, of_step, &settings, &timed, floor, draw)?);
+        }
+        progress.begin(TOGETHER);
+        limit(sweep, &curves, draw)
+    })?;
     let resolved: Vec<&str> = limit.parts.iter().map(|p| p.0).collect();
     settings.join(sweep, &resolved);
     timed.resize(settings.list.len(), Timed::default());
     let repeats = Repeats { times: options.repeats(), seeded: false, order: options.seed };
+    progress.begin(REPEATS);
     repeat_all(&settings, &mut timed, &repeats, progress, draw)?;
     let exposure = sweep.base.scene.render.exposure;
     let mut outcomes = Vec::new();
@@ -124,7 +142,9 @@ pub fn study(
         outcomes.push(Outcome { setting, timed, from_limit, from_truth, sampled: None, drawn });
     }
     refuse_unless_resolved(&outcomes, &limit, &curves)?;
+    progress.begin(FRONTIER);
     let frontier = hold_frontier(&mut outcomes, options, progress, draw)?;
+    progress.leave();
     Ok(Study {
         technique: sweep.technique,
         outcomes,
@@ -135,6 +155,13 @@ pub fn study(
         frontier,
         knobs: sweep.knobs.clone(),
     })
+}
+
+/// The stages of a study of so many settings, weighed by draws; ends are large ones.
+fn stages(sweep: &Sweep, settings: f64, options: &Options) -> [(&'static str, f64); 4] {
+    let repeats = settings * options.repeats() as f64;
+    let ends = 4.0 * sweep.knobs.iter().map(|k| k.ends.len()).sum::<usize>() as f64;
+    [(FIRST, settings), (ENDS, ends), (REPEATS, repeats), (FRONTIER, 0.1 * repeats)]
 }
 
 /// How often and in which order settings are timed.
@@ -159,9 +186,12 @@ pub(super) fn repeat_all(
     for i in (1..jobs.len()).rev() {
         jobs.swap(i, (rng::unit(repeats.order, 0, i as u64, 0) * (i + 1) as f64) as usize);
     }
-    progress.add_total(jobs.len() as u64);
+    progress.enter();
+    let name = |job: usize| format!("{} ({} of {})", settings.list[job % n].label, job / n + 1, repeats.times);
+    progress.plan(jobs.iter().map(|job| (name(*job), 1.0)));
     for job in jobs {
-        progress.tick(1).map_err(|_| Error::Cancelled)?;
+        progress.begin(&name(job));
+        progress.tick(0).map_err(|_| Error::Cancelled)?;
         let (setting, repeat) = (job % n, job / n);
         let mut request = settings.list[setting].request.clone();
         if repeats.seeded {
@@ -169,6 +199,7 @@ pub(super) fn repeat_all(
         }
         attempt(&request, &mut timed[setting], true, repeats.seeded, draw)?;
     }
+    progress.leave();
     Ok(())
 }
 
@@ -359,8 +390,7 @@ pub(super) fn hold_frontier(
     draw: &mut Draw<'_>,
 ) -> Result<Vec<usize>, Error> {
     hold(&mut candidates(outcomes.iter()), options.hold(), |id| {
-        progress.add_total(1);
-        progress.tick(1).map_err(|_| Error::Cancelled)?;
+        progress.tick(0).map_err(|_| Error::Cancelled)?;
         let frame = draw(&outcomes[id].setting.request)?;
         outcomes[id].timed.seconds.push(frame.seconds);
         Ok(frame.seconds)

@@ -11,6 +11,10 @@ use organza::{Error, Progress, RenderOptions, printable};
 use serde_json::json;
 use std::fmt::Write;
 
+/// Stages with their shares, about as long as they take for `scenes/mixed.toml`.
+const STAGES: [(&str, f64); 4] =
+    [("first look", 1.0), ("physical truth", 8.0), ("settings of points", 10.0), ("settings of particles", 10.0)];
+
 /// Sweeps the knobs, judges, writes the report. Whatever can be refused is refused before any work.
 pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
     processor_only(&arguments.scene)?;
@@ -27,11 +31,16 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
             render.max_memory = render.max_memory.min(options.memory());
         }
         let (studies, absent) = with_bar(|progress| {
+            progress.plan(STAGES);
             let mut renderer = Renderer::new(&render, progress);
+            progress.begin(STAGES[0].0);
             let facts = renderer.facts(&scene)?;
             let sweep = accuracy::points(&scene, &facts, &options);
+            progress.begin(STAGES[1].0);
             let truth = truth(&scene, &render, &options, progress)?;
+            progress.begin(STAGES[2].0);
             let points = accuracy::study(&sweep, truth, &options, progress, &mut |request| renderer.draw(request))?;
+            progress.begin(STAGES[3].0);
             let particles = particles(&scene, &facts, &options, &points, &mut renderer, progress)?;
             Ok(match particles {
                 Ok(particles) => (vec![points, particles], Vec::new()),

@@ -61,7 +61,7 @@ pub(super) struct SceneArguments {
     /// Technique: auto, points or particles
     #[arg(long, value_name = "NAME")]
     pub(super) technique: Option<String>,
-    /// What computes
+    /// What computes; `render` alone takes another than cpu
     #[arg(long, value_enum, default_value_t = Backend::Cpu)]
     pub(super) backend: Backend,
     /// Part of the name of the GPU for --backend auto, ash or wgpu [default: the best, never a software driver]
@@ -88,7 +88,7 @@ pub(super) struct SceneArguments {
     /// Most sets that the technique `particles` averages
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(i64).range(0..))]
     pub(super) repeat_level: Option<i64>,
-    /// Exposure of the displayed picture, stops
+    /// Exposure of PNG files, stops; EXR files keep radiance
     #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = parse_finite)]
     pub(super) exposure: Option<f64>,
     /// Images to keep besides beauty and alpha, such as direct,shadow,depth
@@ -97,13 +97,13 @@ pub(super) struct SceneArguments {
     /// Bytes that all buffers together may take, such as 8G [default: three quarters of the memory]
     #[arg(long, value_name = "BYTES", value_parser = parse_bytes)]
     pub(super) max_memory: Option<u64>,
-    /// Leave out records that are not finite instead of refusing the file
+    /// Leave out points that are not finite instead of refusing their file; meshes are refused all the same
     #[arg(long)]
     pub(super) drop_invalid: bool,
     /// Refuse files with faults that could be mended, such as a face that crosses itself
     #[arg(long)]
     pub(super) strict: bool,
-    /// Make points at one place one
+    /// Make points of a `points` object at one place one
     #[arg(long)]
     pub(super) merge_duplicates: bool,
     /// Allow data outside the scene's root folder
@@ -128,7 +128,7 @@ pub(super) struct RenderArguments {
     #[arg(long, value_name = "FIRST-LAST", num_args = 0..=1, require_equals = true, default_missing_value = "all",
           value_parser = parse_frames)]
     pub(super) frames: Option<Frames>,
-    /// Store the colours of EXR files in 16 bits
+    /// Store colours, alpha and shadow of EXR files in 16 bits
     #[arg(long)]
     pub(super) half: bool,
     /// Write what the render cost to a JSON file

@@ -1,4 +1,4 @@
-//! A progress bar on stderr when it is a terminal, and the interrupt.
+//! Progress on stderr, a bar on a terminal and else a line now and then, and the interrupt.
 
 use super::console;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -6,24 +6,31 @@ use organza::{Error, Progress};
 use std::io::IsTerminal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Time between two looks at the progress.
 const INTERVAL: Duration = Duration::from_millis(100);
+/// Time between two lines where there is no terminal, and before the first: short work is silent.
+const LINES: Duration = Duration::from_secs(10);
+/// Steps of the bar.
+const STEPS: f64 = 1000.0;
 
 /// Time that the work has to hear of an interrupt: where it asks for none so long, it is ended as by a second one.
 const PATIENCE: Duration = Duration::from_millis(1500);
 
-/// Runs `work` with a bar; an interrupt stops it at its next tick, or within two seconds, a second one at once.
+/// Runs `work` and shows how far it is; an interrupt stops it at its next tick, or within two seconds, a second one at once.
 pub(super) fn with_bar<T>(work: impl FnOnce(&Progress) -> Result<T, Error>) -> Result<T, Error> {
     let progress = Arc::new(Progress::new());
     cancel_on_interrupt(&progress)?;
-    if !std::io::stderr().is_terminal() {
-        return work(&progress);
-    }
     let finished = AtomicBool::new(false);
     std::thread::scope(|scope| {
-        let watcher = scope.spawn(|| watch(&progress, &finished));
+        let watcher = scope.spawn(|| {
+            if std::io::stderr().is_terminal() {
+                draw_bar(&progress, &finished);
+            } else {
+                print_lines(&progress, &finished);
+            }
+        });
         let out = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(&progress)));
         finished.store(true, Ordering::Relaxed);
         watcher.thread().unpark();
@@ -57,16 +64,43 @@ fn end_at_once() -> ! {
     std::process::exit(i32::from(Error::Cancelled.exit_code()))
 }
 
-fn watch(progress: &Progress, finished: &AtomicBool) {
-    let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr());
-    if let Ok(style) = ProgressStyle::with_template("{elapsed_precise} [{wide_bar}] {percent:>3} %") {
+fn draw_bar(progress: &Progress, finished: &AtomicBool) {
+    let bar = ProgressBar::with_draw_target(Some(STEPS as u64), ProgressDrawTarget::stderr());
+    if let Ok(style) = ProgressStyle::with_template("{elapsed_precise} [{wide_bar}] {percent:>3} % {msg}") {
         bar.set_style(style.progress_chars("=> "));
     }
     while !finished.load(Ordering::Relaxed) {
-        let (done, total) = progress.read();
-        bar.set_length(total);
-        bar.set_position(done.min(total));
+        let (stage, fraction) = progress.report();
+        bar.set_message(stage);
+        bar.set_position((STEPS * fraction) as u64);
         std::thread::park_timeout(INTERVAL);
     }
     bar.finish_and_clear();
+}
+
+fn print_lines(progress: &Progress, finished: &AtomicBool) {
+    let start = Instant::now();
+    let mut next = LINES;
+    while !finished.load(Ordering::Relaxed) {
+        if start.elapsed() >= next {
+            let (stage, fraction) = progress.report();
+            console::note(&line(start.elapsed(), &stage, fraction));
+            next += LINES;
+        }
+        std::thread::park_timeout(next.saturating_sub(start.elapsed()));
+    }
+}
+
+fn line(elapsed: Duration, stage: &str, fraction: f64) -> String {
+    let stage = organza::escape_controls(stage);
+    format!("{} s, {:.0} %: {stage}\n", elapsed.as_secs(), (100.0 * fraction).floor())
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn a_line_has_time_share_and_stage() {
+        let line = super::line(std::time::Duration::from_millis(20_900), "reading a\n.ply", 0.999);
+        assert_eq!(line, "20 s, 99 %: reading a\\n.ply\n");
+    }
 }

@@ -4,8 +4,9 @@ use super::args::ExplainArguments;
 use super::bar::with_bar;
 use super::session::{load_scene, path_text, processor_only, render_options, start_threads};
 use super::{console, report};
-use organza::Error;
-use serde_json::json;
+use organza::scene::{Scene, SceneObject};
+use organza::{Error, escape_controls};
+use serde_json::{Value, json};
 
 /// Prints the plan; with `--measure` renders too and prints what it cost.
 pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
@@ -32,6 +33,7 @@ pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
             "plan": report::plan_json(&plan),
             "cost": report::cost_json(&cost),
             "memory_bytes": prepared.as_ref().map(|p| p.0),
+            "up": up_json(&scene),
             "splats": prepared.as_ref().map(|p| report::splats_json(&p.1)),
             "warnings": warnings,
             "notes": notes,
@@ -41,9 +43,28 @@ pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
     let mut text = report::plan_text(&plan);
     text.push('\n');
     text += &report::cost_text(&cost);
+    text += &up_text(&scene);
     if let Some((memory, splats)) = prepared {
         text += &format!("\n{}\n", report::splats_text(&splats));
         text += &format!("rendering takes at most {memory} bytes\n");
     }
     console::out(&text)
+}
+
+/// Visible objects from files, whose data has an axis that points up.
+fn from_files(scene: &Scene) -> impl Iterator<Item = &SceneObject> {
+    scene.objects.iter().filter(|o| o.visible && o.source.path().is_some())
+}
+
+fn up_json(scene: &Scene) -> Value {
+    from_files(scene).map(|o| json!({ "object": o.name, "axis": o.up.axis.name(), "by_file": o.up.by_file })).collect()
+}
+
+fn up_text(scene: &Scene) -> String {
+    let line = |o: &SceneObject| {
+        let by = if o.up.by_file { "by its file" } else { "as the scene says" };
+        format!("{}: {} points up, {by}\n", escape_controls(&o.name), o.up.axis.name())
+    };
+    let lines: String = from_files(scene).map(line).collect();
+    if lines.is_empty() { lines } else { format!("\n{lines}") }
 }

@@ -34,6 +34,7 @@ fn scene_document(scene: &Scene) -> Value {
             "name": o.name,
             "source": source_name(&o.source),
             "path": source_path(&o.source),
+            "up": o.up.axis.name(),
             "material": scene.materials[o.material].name,
             "visible": o.visible,
         })
@@ -96,6 +97,7 @@ fn file_document(info: &FileInfo) -> Value {
         "not_used": info.unused,
         "remarks": info.remarks,
         "mended": info.mended,
+        "up": info.up.name(),
     })
 }
 

@@ -11,6 +11,12 @@ use organza::{Error, Progress, Render, RenderOptions, Sequence, Sets, printable}
 use serde_json::{Value, json};
 use std::path::Path;
 
+/// Stages of a picture; those of the first have names of their own.
+const DRAWING: &str = "";
+const WRITING: &str = "writing";
+/// All frames behind the present one.
+const LATER: &str = "later frames";
+
 /// One picture and its files.
 struct Job<'a> {
     frame: Option<u32>,
@@ -34,10 +40,15 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
     start_threads(arguments.scene.threads)?;
     let mut done: Vec<Done> = Vec::new();
     let outcome = with_bar(|progress| {
-        for frame in jobs.frames() {
+        let count = jobs.frames().count();
+        for (at, frame) in jobs.frames().enumerate() {
             let (scene, places) = (jobs.scene(frame)?, jobs.places(frame, Target::new)?);
             let job = Job { frame, scene: &scene, places: &places };
+            progress.plan([(job.stage(), 1.0), (LATER.to_owned(), (count - at - 1) as f64)]);
+            progress.begin(&job.stage());
+            progress.enter();
             let one = job.run(arguments, sequence.as_mut(), progress)?;
+            progress.leave();
             let interrupted = one.sets.is_some_and(|s| s.interrupted);
             done.push(one);
             if interrupted {
@@ -74,6 +85,11 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
 }
 
 impl Job<'_> {
+    /// Its name among the frames; a single picture needs none.
+    fn stage(&self) -> String {
+        self.frame.map_or_else(String::new, |frame| format!("frame {frame}"))
+    }
+
     fn run(
         &self,
         arguments: &RenderArguments,
@@ -82,15 +98,21 @@ impl Job<'_> {
     ) -> Result<Done, Error> {
         let checkpoint = self.places.checkpoint.as_ref().map(|target| target.path().to_owned());
         let options = RenderOptions { checkpoint, ..render_options(&arguments.scene) };
+        progress.plan([(DRAWING, 0.95), (WRITING, 0.05)]);
+        progress.begin(DRAWING);
+        progress.enter();
         let render = match sequence {
             Some(sequence) => sequence.render(self.scene, &options, progress)?,
             None => organza::render(self.scene, &options, progress)?,
         };
+        progress.leave();
+        progress.begin(WRITING);
         let mut warnings = render.warnings.clone();
         let written = self.write_outputs(&render, arguments.half, &mut warnings)?;
         if let Some(target) = &self.places.cost {
             target.write(format!("{:#}\n", report::cost_json(&render.cost)).as_bytes())?;
         }
+        progress.finish();
         let (text, json) = (self.text(&render, &written), self.json(&render, &written));
         Ok(Done { text, json, warnings, notes: render.notes, sets: render.sets })
     }

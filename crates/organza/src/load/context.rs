@@ -81,6 +81,7 @@ impl Context<'_> {
         let up = splat.transform.rotation.inverse() * DVec3::Y;
         SurfelParams {
             splat,
+            colors: object.color.is_none(),
             orientation: Orientation::Toward(up),
             opacity: self.opacity(object),
             largest_spacing: LARGEST_SPACING,

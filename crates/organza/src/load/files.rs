@@ -6,6 +6,7 @@ use convert::{RawPoints, SharedField};
 use glam::DVec3;
 use splat_core::{Grid, Mesh, Progress};
 use std::cell::RefCell;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -23,7 +24,7 @@ pub(super) type Fitted = (SharedField, [DVec3; 2]);
 /// The files of a scene that were read.
 #[derive(Default)]
 pub(crate) struct Files {
-    read: RefCell<Vec<(PathBuf, ReadLimits, FileData)>>,
+    read: RefCell<HashMap<PathBuf, (ReadLimits, FileData)>>,
     /// What there is to say of them, one sentence each.
     notes: RefCell<Vec<String>>,
     /// Fits take longer than reading: with their tolerance and the bytes that they take.
@@ -39,7 +40,7 @@ impl Files {
             return Ok(data);
         }
         let data = self.read_anew(path, limits, progress)?;
-        self.read.borrow_mut().push((path.to_owned(), *limits, data.clone()));
+        self.read.borrow_mut().insert(path.to_owned(), (*limits, data.clone()));
         Ok(data)
     }
 
@@ -72,8 +73,8 @@ impl Files {
     }
 
     fn known(&self, path: &Path, limits: &ReadLimits) -> Option<FileData> {
-        let is_it = |(p, l, data): &(PathBuf, ReadLimits, FileData)| (p == path && l == limits).then(|| data.clone());
-        self.read.borrow().iter().find_map(is_it)
+        let read = self.read.borrow();
+        read.get(path).filter(|(with, _)| with == limits).map(|(_, data)| data.clone())
     }
 
     /// The level set of a file's points unless it was fitted with the same tolerance; `fit` also says how many bytes it takes.
@@ -95,7 +96,7 @@ impl Files {
 
     /// Bytes that it holds.
     pub(crate) fn bytes(&self) -> u64 {
-        let read: u64 = self.read.borrow().iter().map(|(_, _, data)| data.bytes()).sum();
+        let read: u64 = self.read.borrow().values().map(|(_, data)| data.bytes()).sum();
         read + self.fitted.borrow().iter().map(|(_, _, bytes, _)| bytes).sum::<u64>()
     }
 }

@@ -133,9 +133,13 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
             }
             Input::Mesh(crate::printable(path).to_string(), mesh, MeshParams { splat, density, opacity })
         }
-        Source::Points(path) => Input::Points(path, read_points(path, context)?, context.surfel_params(object, splat)),
+        Source::Points(path) => {
+            let points = at_spacing(read_points(path, context)?, object, &splat, convert::thinned)?;
+            Input::Points(path, points, context.surfel_params(object, splat))
+        }
         Source::Volume(VolumeSource { path, transfer }) => {
-            Input::Volume(read_grid(path, context)?, transfer, context.volume_params(splat))
+            let grid = at_spacing(read_grid(path, context)?, object, &splat, convert::resampled)?;
+            Input::Volume(grid, transfer, context.volume_params(splat))
         }
         Source::Implicit(ImplicitSource { expression, bounds, spacing }) => {
             surface(Arc::new(field(expression, object)?), None, *bounds, *spacing, object, splat, opacity)?
@@ -174,6 +178,19 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
         Source::Medium(shape) => Input::Medium(*shape, splat),
         Source::Rectangle(r) => Input::Rectangle(*r, opacity, splat),
     })
+}
+
+/// Data as it is, or as the object's spacing asks for it.
+fn at_spacing<T>(
+    data: Arc<T>,
+    object: &SceneObject,
+    splat: &SplatParams,
+    change: impl Fn(&T, f64, &SplatParams) -> Result<T, convert::ConvertError>,
+) -> Result<Arc<T>, Error> {
+    match object.spacing {
+        Some(spacing) => change(&data, spacing / splat.transform.scale, splat).map(Arc::new).map_err(|e| refuse(&e)),
+        None => Ok(data),
+    }
 }
 
 /// A surface of a field; `step` is the distance of its splats where the object states none, object units.

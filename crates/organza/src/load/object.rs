@@ -16,6 +16,9 @@ use glam::DVec3;
 use splat_core::{Cloud, Grid, Mesh, Object, Shading, Similarity, TransferFunction, TransferPoint};
 use std::path::Path;
 
+/// Most operations of an expression on its way to splats: some minutes of two cores.
+const MOST_OPERATIONS: f64 = 1e11;
+
 /// The data of one object, and what its conversion would make.
 pub(super) struct Prepared<'a> {
     pub(super) input: Input<'a>,
@@ -46,6 +49,7 @@ pub(super) fn prepare<'a>(
     sampled: bool,
 ) -> Result<Prepared<'a>, Error> {
     let mut input = input(object, context)?;
+    check_work(object, &input)?;
     let as_it_is = match &mut input {
         // No material is named, and no colour put in the place of the file's.
         Input::Points(_, points, params)
@@ -70,6 +74,32 @@ pub(super) fn prepare<'a>(
         }
         Err(e) => Err(refuse(&e)),
     }
+}
+
+/// Refuses an expression that would be worked at for many minutes before anything is drawn.
+fn check_work(object: &SceneObject, input: &Input<'_>) -> Result<(), Error> {
+    let (expression, evaluations) = match (&object.source, input) {
+        (Source::Implicit(i), Input::Surface(field, bounds, params, _)) => {
+            (&i.expression, cost::surface_evaluations(field.as_ref(), *bounds, params))
+        }
+        (Source::Density(d), Input::Density(_, bounds, params)) => {
+            (&d.expression, cost::density_evaluations(*bounds, params))
+        }
+        _ => return Ok(()),
+    };
+    // A lattice of too many points has a refusal of its own.
+    let Ok(evaluations) = evaluations else { return Ok(()) };
+    let needed = evaluations * super::input::field(expression, object)?.operations() as f64;
+    if needed <= MOST_OPERATIONS {
+        return Ok(());
+    }
+    Err(Error::Limit {
+        what: format!("the expression of object '{}'", crate::escape_controls(&object.name)),
+        needed: needed as u64,
+        limit: MOST_OPERATIONS as u64,
+        unit: "operations before anything is drawn",
+        hint: "use a larger spacing or a smaller resolution, a smaller box, or an expression with a bound".into(),
+    })
 }
 
 fn predict(input: &Input<'_>) -> Result<Prediction, ConvertError> {

@@ -98,11 +98,16 @@ impl Own {
         let radius = f64::from(splat.profile.cutoff) * f64::from(Footprint::SIGMA_OVER_SPACING) * spacing;
         Ok(Some(Self {
             object: context.id,
-            body,
             material: usize::from(splat.material),
             opacity: optics::opacity(depth),
             extinction_scale: factor * splat.transform.scale,
-            color: splat.color,
+            // The technique multiplies the data's colours by it.
+            color: if matches!(&body, Body::Triangles(mesh) if !mesh.color.is_empty()) {
+                [1.0; 3]
+            } else {
+                splat.color
+            },
+            body,
             transform: splat.transform,
             bounds,
             radius: radius * splat.transform.scale,

@@ -13,7 +13,7 @@ pub(super) fn encode(layers: &Layers, metadata: &Metadata, report: &mut WriteRep
     let mut pixels = Vec::with_capacity(beauty.len() * 3);
     for channel in beauty.iter().flatten() {
         report.not_a_number += u64::from(channel.is_nan());
-        pixels.push(display(channel * gain));
+        pixels.push(displayed(channel * gain));
     }
     let mut bytes = Vec::new();
     let [width, height] = layers.size;
@@ -24,7 +24,7 @@ pub(super) fn encode(layers: &Layers, metadata: &Metadata, report: &mut WriteRep
 }
 
 /// Linear radiance → sRGB (IEC 61966-2-1) in 8 bits; NaN gives 0.
-fn display(linear: f32) -> u8 {
+pub(crate) fn displayed(linear: f32) -> u8 {
     // Before the curve: its power is undefined below 0. NaN.max(0) is 0, where NaN.clamp would stay NaN.
     let x = linear.max(0.0).clamp(0.0, 1.0);
     let encoded = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
@@ -33,15 +33,15 @@ fn display(linear: f32) -> u8 {
 
 #[cfg(test)]
 mod tests {
-    use super::display;
+    use super::displayed;
 
     #[test]
     fn ou4_hostile_values_are_displayable() {
         let cases = [(-1e-9, 0), (-1e30, 0), (f32::NAN, 0), (1e30, 255), (f32::INFINITY, 255), (0.0, 0), (1.0, 255)];
         for (linear, expected) in cases {
-            assert_eq!(display(linear), expected, "{linear}");
+            assert_eq!(displayed(linear), expected, "{linear}");
         }
         // 18 % grey is 117.6 in sRGB.
-        assert_eq!(display(0.18), 118);
+        assert_eq!(displayed(0.18), 118);
     }
 }

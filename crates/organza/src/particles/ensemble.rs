@@ -6,7 +6,7 @@ use super::{fault, refuse};
 use crate::device::{Folding, Helper, Shadow};
 use crate::points::Drawing;
 use crate::scene::ParticlesSettings;
-use crate::{Error, Progress, RenderOptions};
+use crate::{Error, Progress, RenderOptions, work};
 use pbsr::{Ensemble, EnsembleParams, FoldParams, LitBy, Object, Occluder, Renderer, Scene};
 use splat_core::{Camera, LayerSet, Light, Transmittance};
 use tsm::ShadowMap;
@@ -47,6 +47,7 @@ pub(super) fn fold(
     let (mut renderer, mut folding) =
         (Renderer::new(), Folding::new(shining.iter().filter_map(|(_, shadow)| *shadow).collect()));
     let helper = helper(drawing, checkpoint.is_some());
+    drawing.progress.begin(work::stage::PARTICLES);
     drawing.progress.add_total(u64::from(settings.repeat_level.saturating_sub(average.ensemble.levels())));
     while let Some(levels) = average.next_step(settings) {
         let step = Step { until: average.ensemble.levels() + levels, helper, params, progress: drawing.progress };

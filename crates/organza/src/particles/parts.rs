@@ -100,7 +100,13 @@ impl Part<'_> {
 /// Everything translucent in view: objects by their own data, the splats of the others by object.
 pub(super) fn sources<'a>(drawing: &Drawing<'a>, camera: &Camera) -> Vec<Source<'a>> {
     let loaded = drawing.loaded;
-    let own = loaded.own.iter().map(|o| of_own(o, drawing, camera));
+    // Splats of each object, and the sum of their radii.
+    let mut splats = vec![(0u32, 0.0); loaded.objects.len()];
+    for (object, radius) in loaded.cloud.object.iter().zip(&loaded.cloud.radius) {
+        let (n, sum) = &mut splats[*object as usize];
+        (*n, *sum) = (*n + 1, *sum + f64::from(*radius));
+    }
+    let own = loaded.own.iter().map(|o| of_own(o, splats[o.object], drawing, camera));
     own.chain(of_splats(drawing, camera)).collect()
 }
 
@@ -115,13 +121,10 @@ fn seed(drawing: &Drawing<'_>, object: u32, kind: SplatKind) -> u64 {
     rng::bits(drawing.settings.seed, SEEDS, u64::from(object), kind as u64)
 }
 
-fn of_own<'a>(own: &'a Own, drawing: &Drawing<'a>, camera: &Camera) -> Source<'a> {
-    let Loaded { objects, materials, cloud, .. } = drawing.loaded;
+fn of_own<'a>(own: &'a Own, (n, sum): (u32, f64), drawing: &Drawing<'a>, camera: &Camera) -> Source<'a> {
+    let Loaded { objects, materials, .. } = drawing.loaded;
     let material = materials[own.material];
     // As its splats have it, where it has some.
-    let splats = |k: &usize| cloud.object[*k] as usize == own.object;
-    let (n, sum) =
-        (0..cloud.len()).filter(splats).fold((0, 0.0), |(n, sum), k| (n + 1, sum + f64::from(cloud.radius[k])));
     let radius = if n > 0 { sum / f64::from(n) } else { own.radius };
     Source {
         name: objects[own.object].name.clone(),
@@ -144,9 +147,11 @@ fn of_own<'a>(own: &'a Own, drawing: &Drawing<'a>, camera: &Camera) -> Source<'a
 fn of_splats<'a>(drawing: &Drawing<'a>, camera: &Camera) -> Vec<Source<'a>> {
     let Loaded { cloud, objects, materials, footprints, own, .. } = drawing.loaded;
     let mut of_object: BTreeMap<(u32, bool), Vec<u32>> = BTreeMap::new();
+    let mut has_own = vec![false; objects.len()];
+    own.iter().for_each(|o| has_own[o.object] = true);
     for i in drawing.ids(|kind| kind != SplatKind::Opaque) {
         let k = i as usize;
-        if cloud.cross_section[k] > 0.0 && own.iter().all(|o| o.object != cloud.object[k] as usize) {
+        if cloud.cross_section[k] > 0.0 && !has_own[cloud.object[k] as usize] {
             of_object.entry((cloud.object[k], cloud.kind[k] == SplatKind::Surface)).or_default().push(i);
         }
     }

@@ -2,7 +2,7 @@
 
 use super::animation::check_animation;
 use super::check_light::check_light;
-use super::check_material::{check_materials, find_material};
+use super::check_material::{check_materials, unknown_material};
 use super::check_object::{Named, check_object};
 use super::check_render::check_render;
 use super::paths::Paths;
@@ -155,6 +155,8 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
     let materials = check_materials(&at.key("material"), &raw.material)?;
     let paths = Paths::new(document.file, allow_path)?;
     let named = Named { materials: &materials, footprints: &footprints, paths: &paths };
+    let named_materials: HashMap<&str, usize> =
+        materials.iter().enumerate().skip(1).map(|(i, m)| (m.name.as_str(), i)).collect();
     let at_objects = at.key("object");
     let mut objects: Vec<SceneObject> = Vec::with_capacity(raw.object.len());
     let mut first_of: HashMap<String, usize> = HashMap::new();
@@ -165,7 +167,13 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
             let message = format!("duplicate object name `{}`, first at {first}", crate::shown(&object.name));
             return Err(at.key("name").error(message, "each object needs a name of its own"));
         }
-        let material = find_material(&at, &at_materials(&at_objects), object.material.as_deref(), &materials)?;
+        let material = match object.material.as_deref() {
+            None => 0,
+            Some(name) => match named_materials.get(name) {
+                Some(i) => *i,
+                None => return Err(unknown_material(&at, &at_materials(&at_objects), name, &materials)),
+            },
+        };
         objects.push(check_object(&at, object, material, &named)?);
     }
     let at_lights = at.key("light");

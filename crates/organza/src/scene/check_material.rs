@@ -31,17 +31,8 @@ pub(super) fn check_materials<'a>(
     Ok(materials)
 }
 
-/// Index of the named material; 0 for none.
-pub(super) fn find_material(
-    at: &At<'_>,
-    at_materials: &At<'_>,
-    name: Option<&str>,
-    materials: &[SceneMaterial],
-) -> Result<usize, Error> {
-    let Some(name) = name else { return Ok(0) };
-    if let Some(i) = materials.iter().skip(1).position(|m| m.name == name) {
-        return Ok(i + 1);
-    }
+/// The error of an object whose material is not there.
+pub(super) fn unknown_material(at: &At<'_>, at_materials: &At<'_>, name: &str, materials: &[SceneMaterial]) -> Error {
     let known: Vec<&str> = materials.iter().skip(1).map(|m| m.name.as_str()).collect();
     let hint = match (known.is_empty(), suggest(name, &known)) {
         (true, _) => format!("add a table [material.{}]", shown(name)),
@@ -51,7 +42,7 @@ pub(super) fn find_material(
             hint + &place.unwrap_or_default()
         }
     };
-    Err(at.key("material").error(format!("material `{}` is not defined", shown(name)), hint))
+    at.key("material").error(format!("material `{}` is not defined", shown(name)), hint)
 }
 
 fn check_material(at: &At<'_>, name: &str, raw: &RawMaterial) -> Result<SceneMaterial, Error> {

@@ -6,11 +6,12 @@ use super::check_light::check_half_axes;
 use super::paths::Paths;
 use super::raw_object::{RawCloud, RawDensity, RawImplicit, RawObject, RawTransferPoint, RawTransform, RawUp};
 use super::{
-    CloudSource, DensitySource, ImplicitSource, MediumShape, RectangleSource, SceneMaterial, SceneObject, Source,
+    CloudSource, DensitySource, ImplicitSource, MediumShape, RectangleSource, SceneMaterial, SceneObject, Source, Up,
     VolumeSource,
 };
 use crate::Error;
 use convert::ExpressionField;
+use convert::read::{UpAxis, up_axis};
 use glam::{DQuat, DVec3, EulerRot};
 use splat_core::{FootprintStack, Similarity, TransferFunction, TransferPoint, optics};
 
@@ -59,9 +60,17 @@ pub(super) fn check_object(
         let message = format!("`footprint`: expected an index below {footprints}, found {}", raw.footprint);
         return Err(at.key("footprint").error(message, "`footprints` lists them, counted from 0"));
     }
+    let up = match raw.transform.up {
+        // An invisible object is not even read.
+        RawUp::Auto if raw.visible == Some(false) => Up { axis: UpAxis::Y, by_file: false },
+        RawUp::Auto => Up { axis: source.path().map_or(UpAxis::Y, up_axis), by_file: source.path().is_some() },
+        RawUp::Y => Up { axis: UpAxis::Y, by_file: false },
+        RawUp::Z => Up { axis: UpAxis::Z, by_file: false },
+    };
     Ok(SceneObject {
+        transform: check_transform(&at.key("transform"), &raw.transform, up.axis)?,
+        up,
         source,
-        transform: check_transform(&at.key("transform"), &raw.transform)?,
         material,
         color: raw.color.map(|c| at.color("color", c)).transpose()?,
         opacity: raw.opacity.map(|a| at.number("opacity", a, 0.0..=1.0)).transpose()?,
@@ -177,8 +186,13 @@ fn refuse_what_does_not_apply(at: &At<'_>, raw: &RawObject, source: &Source) -> 
     if raw.slice.is_some() && raw.unit_length.is_some() {
         return Err(at.key("unit_length").error("a slice has no extinction", "its `opacity` is that of one crossing"));
     }
-    if raw.slice.is_some() && raw.color.is_some() {
-        return Err(at.key("color").error("the colours of a slice are those of its `transfer`", ""));
+    let colored = [(raw.volume.is_some(), "volume"), (raw.slice.is_some(), "slice")].into_iter().find(|c| c.0);
+    if let (Some((_, what)), true) = (colored, raw.color.is_some()) {
+        let message = format!("the colours of a {what} are those of its `transfer`");
+        return Err(at.key("color").error(message, "change `color` in `transfer`"));
+    }
+    if raw.points.is_none() && raw.merge_duplicates {
+        return Err(at.key("merge_duplicates").error("`merge_duplicates` belongs to `points`", ""));
     }
     if raw.volume.is_none() && raw.slice.is_none() {
         for (key, on) in [("transfer", raw.transfer.is_some()), ("unit_length", raw.unit_length.is_some())] {
@@ -334,13 +348,13 @@ fn check_cloud(at: &At<'_>, raw: &RawCloud, extinction: f64) -> Result<CloudSour
 }
 
 /// Turns `up`, then rotates around x, y and z in this order.
-fn check_transform(at: &At<'_>, raw: &RawTransform) -> Result<Similarity, Error> {
+fn check_transform(at: &At<'_>, raw: &RawTransform, up: UpAxis) -> Result<Similarity, Error> {
     let angles = at.vector("rotate", raw.rotate)?.map(f64::to_radians);
     // Extrinsic x, y, z is intrinsic z, y, x.
     let rotation = DQuat::from_euler(EulerRot::ZYX, angles.z, angles.y, angles.x);
-    let up = match raw.up {
-        RawUp::Y => DQuat::IDENTITY,
-        RawUp::Z => DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2),
+    let up = match up {
+        UpAxis::Y => DQuat::IDENTITY,
+        UpAxis::Z => DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2),
     };
     Ok(Similarity {
         scale: at.length("scale", raw.scale.unwrap_or(1.0))?,

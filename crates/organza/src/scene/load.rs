@@ -27,7 +27,8 @@ pub struct LoadOptions {
     pub frame: Option<u32>,
 }
 
-/// Reads and checks a scene file; JSON if its name ends in `.json`, else TOML. Data files are not opened.
+/// Reads and checks a scene file; JSON if its name ends in `.json`, else TOML. Of data files that are drawn
+/// only the beginning is looked at, for the axis that points up.
 ///
 /// # Errors
 /// [`Error::Io`], [`Error::Limit`] for a file over [`MAX_SCENE_BYTES`], [`Error::Scene`] with line and column,

@@ -1,6 +1,7 @@
 //! The checked scene: everything a render needs, in radians and f64 world units.
 
 use super::{LayerChoice, SceneLight};
+use convert::read::UpAxis;
 use convert::{Clip, Inside, Interpolation};
 use glam::DVec3;
 use splat_core::raster::Accumulation;
@@ -51,6 +52,8 @@ pub struct SceneObject {
     pub source: Source,
     /// From the source's axes (after `up`) to the world.
     pub transform: Similarity,
+    /// The axis of the source that [`Self::transform`] turns up.
+    pub up: Up,
     /// Index into [`Scene::materials`].
     pub material: usize,
     /// Colour that replaces the data's and the material's, linear Rec.709.
@@ -71,6 +74,15 @@ pub struct SceneObject {
     pub footprint: u8,
     /// Whether splats at one place become one.
     pub merge_duplicates: bool,
+}
+
+/// The axis of a source that points up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Up {
+    /// The axis.
+    pub axis: UpAxis,
+    /// Whether the file's format told it; else the scene, or it is the default of what has no file.
+    pub by_file: bool,
 }
 
 /// Where an object's data comes from.
@@ -258,7 +270,7 @@ pub struct SceneMaterial {
     pub name: String,
     /// What shading needs.
     pub material: Material,
-    /// Colour of data that has none; it multiplies the colour of data that has one. Linear Rec.709.
+    /// Colour of data that has none. Linear Rec.709.
     pub color: [f32; 3],
     /// Opacity of one crossing of a surface, in \[0, 1\].
     pub opacity: f64,

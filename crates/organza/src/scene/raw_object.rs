@@ -273,7 +273,7 @@ pub(super) struct RawTransform {
     pub(super) rotate: [f64; 3],
     /// World units.
     pub(super) translate: [f64; 3],
-    /// The axis of the data that points up; default "y".
+    /// The axis of the data that points up; default "auto": what the file's format says, else "y".
     pub(super) up: RawUp,
 }
 
@@ -283,6 +283,7 @@ pub(super) struct RawTransform {
 #[schemars(rename = "Up")]
 pub(super) enum RawUp {
     #[default]
+    Auto,
     Y,
     Z,
 }

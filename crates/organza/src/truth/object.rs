@@ -251,8 +251,6 @@ fn surface(scene: &Scene, object: &SceneObject, mut mesh: Mesh) -> Body {
     let tint = object.color.unwrap_or(material.color);
     if mesh.color.is_empty() || object.color.is_some() {
         mesh.color = vec![tint; mesh.position.len()];
-    } else {
-        mesh.color.iter_mut().for_each(|c| (0..3).for_each(|k| c[k] *= tint[k]));
     }
     let brightest = mesh.color.iter().flatten().fold(0.0, |most, c| f32::max(most, *c));
     let liberty = liberty(object, m.shading, f64::from(brightest));

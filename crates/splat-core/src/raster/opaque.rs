@@ -84,9 +84,10 @@ pub fn resolve_opaque(
     assert_eq!(projected.depths.len(), projected.splats.len(), "invariant: opaque splats have depths");
     assert!(!objects || projected.objects.len() == projected.splats.len(), "invariant: objects when asked for");
     let bins = bin(projected, ids);
+    progress.add_total(bins.tiles() as u64);
     let tiles: Vec<OpaqueTile> = (0..bins.tiles())
         .into_par_iter()
-        .filter(|&t| !bins.is_empty(t) && !progress.is_cancelled())
+        .filter(|&t| progress.tick(1).is_ok() && !bins.is_empty(t))
         .map(|t| {
             let mut tile = OpaqueTile::new(&bins, t, channels, objects, projected.perspective.is_some());
             pulp::Arch::new().dispatch(ResolveTile { tile: &mut tile, bins: &bins, t, projected, values });

@@ -80,9 +80,10 @@ pub fn fold(
         "invariant: objects for an object plane"
     );
     let bins = bin(projected, order);
+    progress.add_total(bins.tiles() as u64);
     let finished: Vec<Tile> = (0..bins.tiles())
         .into_par_iter()
-        .filter(|&t| !bins.is_empty(t) && !progress.is_cancelled())
+        .filter(|&t| progress.tick(1).is_ok() && !bins.is_empty(t))
         .map(|t| {
             let mut tile = Tile::load(accumulator, projected, opaque, &bins, t);
             let input = FoldTile { tile: &mut tile, bins: &bins, t, projected, values, materials, direction, params };

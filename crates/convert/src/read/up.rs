@@ -1,0 +1,116 @@
+//! Which axis of a file points up, where its format says so.
+
+use super::{Format, format_of};
+use flate2::bufread::MultiGzDecoder;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// Bytes in which a header tells its space.
+const HEADER: u64 = 1 << 16;
+
+/// The axis of a data file that points up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum UpAxis {
+    /// As meshes mostly have it, and for formats that say nothing.
+    #[default]
+    Y,
+    /// Elevation in LAS and LAZ; superior in NIfTI and in an NRRD whose `space` is one of a body.
+    Z,
+}
+
+impl UpAxis {
+    /// Its letter.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Y => "y",
+            Self::Z => "z",
+        }
+    }
+}
+
+/// The axis that points up by a file's format; y for a file that cannot be read, which [`super::file()`] has the words for.
+/// Only the file's beginning is looked at.
+pub fn up_axis(path: &Path) -> UpAxis {
+    beginning(path).map_or(UpAxis::Y, |content| of_content(path, &content))
+}
+
+fn beginning(path: &Path) -> Option<Vec<u8>> {
+    // Asked before opening: opening a FIFO waits for its writer.
+    if !std::fs::metadata(path).ok()?.is_file() {
+        return None;
+    }
+    let mut content = Vec::new();
+    File::open(path).ok()?.take(HEADER).read_to_end(&mut content).ok()?;
+    if !content.starts_with(&[0x1f, 0x8b]) {
+        return Some(content);
+    }
+    let mut unpacked = Vec::new();
+    // The compressed bytes end early, which is no error here.
+    let _ = MultiGzDecoder::new(content.as_slice()).take(HEADER).read_to_end(&mut unpacked);
+    Some(unpacked)
+}
+
+fn of_content(path: &Path, content: &[u8]) -> UpAxis {
+    match format_of(path, content) {
+        Some(Format::Las | Format::Nifti) => UpAxis::Z,
+        Some(Format::Nrrd) if is_of_a_body(content) => UpAxis::Z,
+        _ => UpAxis::Y,
+    }
+}
+
+/// Whether an NRRD header names an anatomical space: the third axis of each leads to the head.
+fn is_of_a_body(content: &[u8]) -> bool {
+    let lines = content.split(|b| *b == b'\n').map(|line| line.strip_suffix(b"\r").unwrap_or(line));
+    let header = lines.take_while(|line| !line.is_empty());
+    let mut spaces = header.filter_map(|line| line.strip_prefix(b"space:"));
+    spaces.next().is_some_and(|name| {
+        let name = String::from_utf8_lossy(name).trim().to_ascii_lowercase();
+        let name = name.strip_suffix("-time").unwrap_or(&name);
+        let name = name.strip_suffix('t').filter(|n| n.len() == 3).unwrap_or(name);
+        ["ras", "las", "lps"].contains(&name)
+            || ["right-anterior-superior", "left-anterior-superior", "left-posterior-superior"].contains(&name)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_formats_that_state_it_have_z() {
+        let of = |name: &str, content: &[u8]| of_content(Path::new(name), content);
+        assert_eq!(of("a", b"LASF\x01\x02"), UpAxis::Z);
+        assert_eq!(of("a.ply", b"ply\nformat ascii 1.0\n"), UpAxis::Y);
+        assert_eq!(of("a.stl", b"solid a\n"), UpAxis::Y);
+        assert_eq!(of("a.xyz", b"0 0 0\n"), UpAxis::Y);
+        assert_eq!(of("a.nii", &[0; 348]), UpAxis::Z);
+        assert_eq!(of("a.nrrd", b"NRRD0004\ntype: float\n\nspace: RAS\n"), UpAxis::Y);
+        for (space, up) in [
+            ("RAS", UpAxis::Z),
+            ("left-posterior-superior", UpAxis::Z),
+            ("LPST", UpAxis::Z),
+            ("left-anterior-superior-time", UpAxis::Z),
+            ("scanner-xyz", UpAxis::Y),
+            ("3D-right-handed", UpAxis::Y),
+        ] {
+            let header = format!("NRRD0005\r\ndimension: 3\r\nspace: {space}\r\n\r\n");
+            assert_eq!(of("a.nrrd", header.as_bytes()), up, "{space}");
+        }
+    }
+
+    #[test]
+    fn a_file_inside_gzip_tells_it_too_and_one_that_is_not_there_tells_nothing() {
+        use std::io::Write;
+        let folder = std::env::temp_dir().join(format!("organza-up-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("a folder");
+        let path = folder.join("a.las.gz");
+        let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        packed.write_all(b"LASF and more").expect("memory");
+        std::fs::write(&path, packed.finish().expect("memory")).expect("a file");
+        assert_eq!(up_axis(&path), UpAxis::Z);
+        assert_eq!(up_axis(&folder), UpAxis::Y);
+        assert_eq!(up_axis(&folder.join("none.las")), UpAxis::Y);
+        std::fs::remove_dir_all(&folder).expect("its own folder");
+    }
+}

@@ -1,0 +1,209 @@
+//! What a picture would fail to show, and what to change: a scene without light, things outside the view, a picture of one
+//! colour. None is an error, and none is said of an [animation]: there things come into view and fade.
+
+use crate::load::Loaded;
+use crate::output::displayed;
+use crate::scene::{Scene, SceneObject};
+use crate::{Layers, escape_controls};
+use glam::DVec3;
+use rayon::prelude::*;
+use splat_core::{Camera, LightShape, Shading};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+/// Most objects outside the view that are told one by one.
+const TOLD: usize = 4;
+/// Splats that are looked at together.
+const CHUNK: usize = 1 << 14;
+/// Middle grey, which an exposure is proposed for.
+const GREY: f64 = 0.18;
+
+/// What can be told of a scene before it is drawn, one sentence each.
+pub(crate) fn of_scene(scene: &Scene, loaded: &Loaded) -> Vec<String> {
+    let outside = if scene.frames.is_none() { outside(scene, loaded) } else { Vec::new() };
+    without_light(scene).into_iter().chain(outside).collect()
+}
+
+/// What a finished picture shows too little of.
+pub(crate) fn of_picture(scene: &Scene, layers: &Layers) -> Option<String> {
+    let beauty = layers.rgb("beauty").filter(|b| scene.frames.is_none() && !b.is_empty())?;
+    let gain = scene.render.exposure.exp2() as f32;
+    let all =
+        |byte: u8| beauty.par_chunks(CHUNK).all(|part| part.iter().flatten().all(|v| displayed(v * gain) == byte));
+    let stops = |radiance: f32| (GREY / f64::from(radiance)).log2().round();
+    if all(0) {
+        let brightest = beauty.iter().flatten().fold(0.0, |most, v| f32::max(most, *v));
+        return Some(if brightest > 0.0 {
+            let stops = stops(brightest);
+            format!("the picture is all black: its brightest radiance is {brightest:.1e}; try --exposure {stops}")
+        } else {
+            "the picture is all black: no light comes from what the camera sees; move or strengthen a [[light]], or add \
+             [ambient]"
+                .to_owned()
+        });
+    }
+    all(255).then(|| {
+        let darkest = beauty.iter().flatten().fold(f32::INFINITY, |least, v| f32::min(least, *v));
+        let stops = if darkest.is_finite() { stops(darkest) } else { -60.0 };
+        format!("the picture is all white: its darkest radiance is {darkest:.1e}; try --exposure {stops}")
+    })
+}
+
+fn without_light(scene: &Scene) -> Option<String> {
+    let drawn = || scene.objects.iter().filter(|o| o.visible);
+    let material = |o: &SceneObject| &scene.materials[o.material].material;
+    let shines =
+        drawn().any(|o| material(o).shading == Shading::Unlit || material(o).emission.iter().any(|e| *e > 0.0));
+    let reflects = drawn().any(|o| match material(o).shading {
+        Shading::Phase => material(o).single_scattering_albedo > 0.0,
+        _ => material(o).diffuse > 0.0 || material(o).specular > 0.0 || material(o).transmission > 0.0,
+    });
+    let lit = scene.lights.iter().any(|l| l.intensity.iter().any(|i| *i > 0.0))
+        || scene.ambient.iter().any(|a| *a > 0.0) && drawn().any(|o| material(o).ambient > 0.0);
+    (reflects && !shines && !lit).then(|| {
+        "the scene has no light: add a [[light]], a `color` in [ambient], or a material with `emission` or shading = \
+         \"unlit\""
+            .to_owned()
+    })
+}
+
+/// Objects of which nothing lies in the view.
+fn outside(scene: &Scene, loaded: &Loaded) -> Vec<String> {
+    let seen = seen(loaded);
+    let mut lost: Vec<(usize, [DVec3; 2])> = bounds(loaded, &seen);
+    // Back into the scene's unit.
+    let unit = f64::from(loaded.exponent).exp2();
+    lost.iter_mut().for_each(|(_, b)| *b = b.map(|p| p * unit));
+    let camera = &scene.camera;
+    let looks = format!("the camera at {} looks along {}", place(camera.position), place(camera.axes[2]));
+    if !lost.is_empty() && !seen.iter().any(|s| s.load(Relaxed)) {
+        let all = lost.iter().map(|(_, b)| *b).fold([DVec3::INFINITY, DVec3::NEG_INFINITY], around);
+        return vec![format!(
+            "the camera sees nothing: all objects lie from {} to {}, and {looks}; set camera.target to {}",
+            place(all[0]),
+            place(all[1]),
+            place(0.5 * (all[0] + all[1]))
+        )];
+    }
+    // The body of a lamp stands where its light is, seen or not.
+    lost.retain(|(_, [low, high])| !lights(loaded).any(|p| (p * unit).clamp(*low, *high) == p * unit));
+    let told = |(id, [low, high]): &(usize, [DVec3; 2])| {
+        let name = escape_controls(&scene.objects[*id].name);
+        let (low, high) = (place(*low), place(*high));
+        format!(
+            "object '{name}' lies outside the view, from {low} to {high}: {looks}; move either, or set visible = false"
+        )
+    };
+    let more = lost.len().saturating_sub(TOLD);
+    let rest = (more > 0).then(|| format!("{more} other objects lie outside the view as well"));
+    lost.iter().take(TOLD).map(told).chain(rest).collect()
+}
+
+/// Where light comes from, in the normalized world.
+fn lights(loaded: &Loaded) -> impl Iterator<Item = DVec3> {
+    loaded.lights.iter().filter_map(|light| match light.shape {
+        LightShape::Point { position } | LightShape::Spot { position, .. } => Some(position),
+        _ => None,
+    })
+}
+
+fn around([low, high]: [DVec3; 2], [l, h]: [DVec3; 2]) -> [DVec3; 2] {
+    [low.min(l), high.max(h)]
+}
+
+/// Four digits are enough to find a place.
+fn place(p: DVec3) -> String {
+    let digits = |v: f64| {
+        let unit = 10f64.powi(3 - v.abs().max(1e-300).log10().floor() as i32);
+        let rounded = (v * unit).round() / unit;
+        if rounded.is_finite() { rounded } else { v }
+    };
+    format!("{:?}", p.to_array().map(digits))
+}
+
+/// For each object whether some of it lies in the view.
+fn seen(loaded: &Loaded) -> Vec<AtomicBool> {
+    let seen: Vec<AtomicBool> = loaded.objects.iter().map(|_| AtomicBool::new(false)).collect();
+    let view = View::new(&loaded.camera);
+    for own in &loaded.own {
+        let [low, high] = own.world_box();
+        let (middle, reach) = (0.5 * (low + high), 0.5 * (high - low).length());
+        seen[own.object].store(view.may_see(loaded.camera.view_from_world(middle), reach), Relaxed);
+    }
+    let cloud = &loaded.cloud;
+    let place = loaded.camera.view_from_offset(cloud.origin);
+    let splats =
+        cloud.object.par_chunks(CHUNK).zip(cloud.position.par_chunks(CHUNK)).zip(cloud.radius.par_chunks(CHUNK));
+    splats.for_each(|((objects, positions), radii)| {
+        for ((object, position), radius) in objects.iter().zip(positions).zip(radii) {
+            let known = &seen[*object as usize];
+            // Most objects are found at their first splat.
+            if !known.load(Relaxed) && view.may_see(place.apply(*position).as_dvec3(), f64::from(*radius)) {
+                known.store(true, Relaxed);
+            }
+        }
+    });
+    seen
+}
+
+/// The objects that are not seen and not empty, with their bounds in the normalized world.
+fn bounds(loaded: &Loaded, seen: &[AtomicBool]) -> Vec<(usize, [DVec3; 2])> {
+    let mut of: Vec<Option<[DVec3; 2]>> = vec![None; seen.len()];
+    let unseen = |id: usize| !seen[id].load(Relaxed);
+    if !(0..seen.len()).any(unseen) {
+        return Vec::new();
+    }
+    let mut add = |id: usize, b: [DVec3; 2]| of[id] = Some(of[id].map_or(b, |a| around(a, b)));
+    loaded.own.iter().filter(|o| unseen(o.object)).for_each(|o| add(o.object, o.world_box()));
+    let cloud = &loaded.cloud;
+    for (object, position) in cloud.object.iter().zip(&cloud.position).filter(|(o, _)| unseen(**o as usize)) {
+        let p = cloud.origin + position.as_dvec3();
+        add(*object as usize, [p, p]);
+    }
+    of.into_iter().enumerate().filter_map(|(id, b)| Some((id, b?))).collect()
+}
+
+/// The pyramid, or the box, that a camera sees.
+struct View {
+    /// Half width and height of the picture: at depth 1, or at all depths for parallel rays.
+    half: [f64; 2],
+    parallel: bool,
+}
+
+impl View {
+    fn new(camera: &Camera) -> Self {
+        let focal = camera.focal_px();
+        Self { half: camera.size.map(|s| 0.5 * f64::from(s) / focal), parallel: camera.is_orthographic() }
+    }
+
+    /// Whether a ball in view space may reach into it; wrong only beside edges, where it says yes.
+    fn may_see(&self, middle: DVec3, radius: f64) -> bool {
+        let [x, y] = [middle.x.abs(), middle.y.abs()];
+        let inside = |at: f64, half: f64| {
+            if self.parallel { at - radius <= half } else { at - half * middle.z <= radius * half.hypot(1.0) }
+        };
+        middle.z + radius > 0.0 && inside(x, self.half[0]) && inside(y, self.half[1])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splat_core::Projection;
+
+    #[test]
+    fn a_ball_is_seen_as_soon_as_it_touches_the_pyramid() {
+        let projection = Projection::Perspective { fov_y: std::f64::consts::FRAC_PI_2 };
+        let camera = Camera::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, projection, [20, 10]).expect("a camera");
+        let view = View::new(&camera);
+        // The upper side is y = z, which a ball at (0, 2, 1) is √½ away from.
+        assert!(!view.may_see(DVec3::new(0.0, 2.0, 1.0), 0.70));
+        assert!(view.may_see(DVec3::new(0.0, 2.0, 1.0), 0.71));
+        assert!(view.may_see(DVec3::new(1.9, 0.0, 1.0), 0.0) && !view.may_see(DVec3::new(2.1, 0.0, 1.0), 0.0));
+        assert!(!view.may_see(DVec3::new(0.0, 0.0, -1.0), 0.9));
+    }
+
+    #[test]
+    fn places_have_four_digits() {
+        assert_eq!(place(DVec3::new(1234.56, -0.000_123_456, 0.0)), "[1235.0, -0.0001235, 0.0]");
+    }
+}

@@ -1,0 +1,144 @@
+//! What a picture would fail to show is said, with what to change; and of the scenes that come with Organza nothing.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use organza::scene::{LoadOptions, load, parse};
+use organza::{Progress, RenderOptions};
+use std::path::Path;
+
+/// A ball of fog and a wall, seen from +z; `light` and `render` end the scene.
+fn scene(camera: &str, light: &str, wall: &str) -> String {
+    format!(
+        "version = 1\n[camera]\nposition = [0, 0, 4]\nsize = [16, 12]\n{camera}\n\
+         [[object]]\nname = 'fog'\nmaterial = 'fog'\n\
+         medium_ball = {{ center = [0, 0, 0], radius = 0.5, spacing = 0.1, extinction = 3 }}\n\
+         [[object]]\nname = 'wall'\n{wall}\n\
+         rectangle = {{ center = [0, 0, -1], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.1 }}\n\
+         [material.fog]\nmedium = {{ albedo = 0.9 }}\n{light}"
+    )
+}
+
+const AHEAD: &str = "target = [0, 0, 0]";
+const LAMP: &str = "[[light]]\nkind = 'point'\nposition = [1, 2, 3]\nintensity = [9, 9, 9]\n";
+
+fn warnings(text: &str) -> Vec<String> {
+    ["points", "particles"]
+        .map(|technique| {
+            let set = format!("render.technique='{technique}'");
+            let overrides = vec![organza::scene::Override::parse(&set).unwrap()];
+            let options = LoadOptions { overrides, ..LoadOptions::default() };
+            let scene = parse(Path::new("s.toml"), text.as_bytes(), &options).unwrap();
+            organza::render(&scene, &RenderOptions::default(), &Progress::new()).unwrap().warnings
+        })
+        .into_iter()
+        .reduce(|points, particles| {
+            // Bounds and brightness differ a little.
+            assert_eq!(points.len(), particles.len(), "{points:?} {particles:?}");
+            points
+        })
+        .unwrap()
+}
+
+#[track_caller]
+fn one(text: &str, expected: &str) {
+    let found = warnings(text);
+    assert!(found.len() == 1 && found[0].contains(expected), "expected: {expected}\nfound: {found:?}");
+}
+
+#[test]
+fn a_good_scene_has_none() {
+    assert_eq!(warnings(&scene(AHEAD, LAMP, "")), Vec::<String>::new());
+}
+
+#[test]
+fn a_scene_without_light_is_told() {
+    let words = "the scene has no light: add a [[light]]";
+    one(&scene(AHEAD, "", ""), words);
+    one(&scene(AHEAD, &LAMP.replace("9, 9, 9", "0, 0, 0"), ""), words);
+    assert_eq!(warnings(&scene(AHEAD, "[ambient]\ncolor = [0.2, 0.2, 0.2]\n", "")), Vec::<String>::new());
+    assert_eq!(warnings(&scene(AHEAD, "[material.x]\nemission = [1, 0, 0]\n", "material = 'x'")), Vec::<String>::new());
+    assert_eq!(warnings(&scene(AHEAD, "[material.x]\nshading = 'unlit'\n", "material = 'x'")), Vec::<String>::new());
+    // Matter that only absorbs needs none.
+    let dark = scene(AHEAD, "[background]\ncolor = [0.5, 0.5, 0.5]\n", "visible = false")
+        .replace("albedo = 0.9", "albedo = 0");
+    assert_eq!(warnings(&dark), Vec::<String>::new());
+}
+
+#[test]
+fn an_object_outside_the_view_is_named_with_its_bounds_and_the_camera() {
+    let moved = |to: &str| scene(AHEAD, LAMP, &format!("transform = {{ translate = [{to}] }}"));
+    let words = "object 'wall' lies outside the view, from [";
+    one(&moved("50, 0, 0"), words);
+    one(&moved("0, 0, 50"), words);
+    one(&moved("50, 0, 0"), "the camera at [0.0, 0.0, 4.0] looks along [0.0, 0.0, -1.0]");
+    // A corner in the picture is enough.
+    assert_eq!(warnings(&moved("2.2, 0, 0")), Vec::<String>::new());
+    // The body of a lamp may stand where its light is.
+    let lamp = LAMP.to_owned()
+        + "[[object]]\nname = 'lamp'\n\
+        medium_ball = { center = [1, 2, 3], radius = 0.1, spacing = 0.03, extinction = 1 }\n";
+    assert_eq!(warnings(&scene(AHEAD, &lamp, "")), Vec::<String>::new());
+    // Things come into view in an animation.
+    let animated = moved("50, 0, 0") + "[animation]\nframes = 2\n";
+    assert_eq!(warnings(&animated), Vec::<String>::new());
+}
+
+#[test]
+fn objects_outside_the_view_are_not_all_named() {
+    let mut text = scene(AHEAD, LAMP, "");
+    for i in 0..9 {
+        text += &format!(
+            "[[object]]\nname = 'far {i}'\nrectangle = {{ center = [{}, 0, -1], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.5 }}\n",
+            40 + i
+        );
+    }
+    let found = warnings(&text);
+    assert_eq!(found.len(), 5, "{found:?}");
+    assert_eq!(found[4], "5 other objects lie outside the view as well");
+}
+
+#[test]
+fn a_camera_that_sees_nothing_is_told_where_to_look() {
+    let found = "the camera sees nothing: all objects lie from [";
+    one(&scene("target = [0, 0, 9]", LAMP, ""), found);
+    one(
+        &scene("target = [0, 9, 4]\north = 1", LAMP, "").replace("orth = 1", "orthographic = 2"),
+        "set camera.target to [",
+    );
+}
+
+#[test]
+fn a_picture_of_one_colour_is_told_with_an_exposure() {
+    let faint = LAMP.replace("9, 9, 9", "0.0001, 0.0001, 0.0001");
+    let found = warnings(&scene(AHEAD, &faint, ""));
+    assert!(
+        found.len() == 1 && found[0].starts_with("the picture is all black: its brightest radiance is"),
+        "{found:?}"
+    );
+    let stops: f64 = found[0].rsplit(' ').next().unwrap().parse().unwrap();
+    assert_eq!(
+        warnings(&(scene(AHEAD, &faint, "") + &format!("[render]\nexposure = {stops}\n"))),
+        Vec::<String>::new()
+    );
+    let behind = LAMP.replace("[1, 2, 3]", "[0, 0, -3]").replace("[[light]]", "[[light]]\nshadow = true");
+    one(
+        &scene(AHEAD, &behind, "").replace("name = 'fog'\n", "name = 'fog'\nvisible = false\n"),
+        "no light comes from what the camera sees",
+    );
+    let bright = LAMP.replace("9, 9, 9", "1e9, 1e9, 1e9") + "[background]\ncolor = [9, 9, 9]\n";
+    one(&scene(AHEAD, &bright, ""), "the picture is all white: its darkest radiance is");
+}
+
+#[test]
+fn the_scenes_that_come_with_organza_have_none() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
+    let mut scenes: Vec<_> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+    scenes.retain(|p| p.extension().is_some_and(|e| e == "toml"));
+    scenes.sort();
+    assert!(scenes.len() > 10);
+    for path in scenes {
+        let scene = load(&path, &LoadOptions::default()).unwrap();
+        let explained = organza::explain(&scene, &RenderOptions::default(), &Progress::new()).unwrap();
+        let doubtful = |w: &&String| w.contains("light") || w.contains("camera") || w.contains("picture");
+        assert!(!explained.warnings.iter().any(|w| doubtful(&w)), "{}: {:?}", path.display(), explained.warnings);
+    }
+}

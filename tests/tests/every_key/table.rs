@@ -1,0 +1,419 @@
+//! A value for every key that must change what is seen, and where it must not, with the reason.
+
+use super::scenes::SOURCES;
+
+/// Where a change is looked for.
+#[derive(Clone, Copy)]
+pub(crate) enum Look {
+    /// The bits of beauty.
+    Picture,
+    /// The names of the layers.
+    Layers,
+    /// The PNG file.
+    Displayed,
+    /// What the passes made.
+    Work,
+    /// Sets of particles that were averaged.
+    Sets,
+    /// Objects and frames, as `explain` names them.
+    Told,
+}
+
+/// What a changed value does.
+#[derive(Clone, Copy)]
+pub(crate) enum Expected {
+    Changes,
+    /// Refused with an exit code and these words.
+    Refused(u8, &'static str),
+    /// Nothing by its nature, and why.
+    Nothing(&'static str),
+}
+
+use Expected::{Nothing, Refused};
+
+/// A key and its trial.
+pub(crate) struct Entry {
+    pub(crate) key: &'static str,
+    /// The trial, as for `--set`.
+    pub(crate) set: &'static str,
+    /// What the scene has before and after.
+    pub(crate) with: &'static [&'static str],
+    pub(crate) look: Look,
+    pub(crate) frame: Option<u32>,
+    pub(crate) techniques: &'static [&'static str],
+    /// Sources that it is tried with.
+    sources: Which,
+    /// Other outcomes than a change: of these sources, and by these techniques.
+    but: Vec<(Which, &'static [&'static str], Expected)>,
+}
+
+/// Sources.
+#[derive(Clone, Copy)]
+pub(crate) enum Which {
+    All,
+    Media,
+    These(&'static [&'static str]),
+}
+
+use Which::{All, Media, These};
+
+impl Which {
+    fn has(self, source: &str) -> bool {
+        let is_medium = SOURCES.iter().any(|s| s.name == source && s.is_medium);
+        match self {
+            All => true,
+            Media => is_medium,
+            These(names) => names.contains(&source),
+        }
+    }
+}
+
+const BOTH: &[&str] = &["points", "particles"];
+const POINTS: &[&str] = &["points"];
+const PARTICLES: &[&str] = &["particles"];
+
+impl Entry {
+    pub(crate) fn applies_to(&self, source: &str) -> bool {
+        self.sources.has(source)
+    }
+
+    pub(crate) fn expected(&self, source: &str, technique: &str) -> Expected {
+        let of = |(which, by, _): &&(Which, &[&str], Expected)| which.has(source) && by.contains(&technique);
+        self.but.iter().find(of).map_or(Expected::Changes, |b| b.2)
+    }
+
+    fn with(self, with: &'static [&'static str]) -> Self {
+        Self { with, ..self }
+    }
+
+    fn look(self, look: Look) -> Self {
+        Self { look, ..self }
+    }
+
+    fn by(self, techniques: &'static [&'static str]) -> Self {
+        Self { techniques, ..self }
+    }
+
+    fn at(self, frame: u32) -> Self {
+        Self { frame: Some(frame), ..self }
+    }
+
+    fn but(mut self, which: Which, expected: Expected) -> Self {
+        self.but.push((which, BOTH, expected));
+        self
+    }
+
+    fn but_by(mut self, techniques: &'static [&'static str], expected: Expected) -> Self {
+        self.but.push((All, techniques, expected));
+        self
+    }
+}
+
+/// A trial with some sources.
+fn of(sources: Which, key: &'static str, set: &'static str) -> Entry {
+    let (with, but) = (&[][..], Vec::new());
+    Entry { key, set, with, look: Look::Picture, frame: None, techniques: BOTH, sources, but }
+}
+
+/// A trial with one source.
+fn one(key: &'static str, set: &'static str) -> Entry {
+    of(These(&["implicit"]), key, set)
+}
+
+pub(crate) fn entries() -> Vec<Entry> {
+    [scene(), lights(), objects(), sources(), materials(), render(), animation()].into_iter().flatten().collect()
+}
+
+fn scene() -> Vec<Entry> {
+    vec![
+        one("version", "version=2").but(All, Refused(2, "expected 1")),
+        one("camera", "camera={position=[1, 0, 4], target=[0, 0, 0], size=[24, 18]}"),
+        one("camera.position", "camera.position=[0.5, 0.4, 4]"),
+        one("camera.target", "camera.target=[0.1, 0, 0]"),
+        one("camera.up", "camera.up=[1, 0, 0]"),
+        one("camera.fov_y", "camera.fov_y=50"),
+        one("camera.orthographic", "camera.orthographic=2"),
+        one("camera.size", "camera.size=[30, 18]"),
+        one("background", "background={color=[1, 0, 0]}"),
+        one("background.color", "background.color=[1, 0, 0]"),
+        one("ambient", "ambient={color=[1, 0, 0]}"),
+        one("ambient.color", "ambient.color=[1, 0, 0]"),
+        of(All, "footprints", "footprints=[2]"),
+        one("material", "material={m={opacity=0.9}}"),
+    ]
+}
+
+const SPOT: &[&str] =
+    &["light=[{kind='spot', position=[2, 3, 2], target=[0, 0, 0], outer=20, intensity=[20, 18, 16]}]"];
+const AIMED: &[&str] =
+    &["light=[{kind='spot', position=[2, 3, 2], direction=[-2, -3, -2], outer=20, intensity=[20, 18, 16]}]"];
+const SUN: &[&str] = &["light=[{kind='directional', direction=[-2, -3, -2], irradiance=[2, 1.8, 1.6]}]"];
+const SPHERE: &[&str] = &["light=[{kind='sphere', position=[2, 3, 2], radius=0.3, intensity=[20, 18, 16], samples=4}]"];
+const DISK: &[&str] =
+    &["light=[{kind='disk', position=[2, 3, 2], normal=[-1, -1, -1], radius=0.3, intensity=[20, 18, 16], samples=4}]"];
+const RECT: &[&str] = &[
+    "light=[{kind='rect', position=[2, 3, 2], u=[0.3, -0.2, 0], v=[0.1, 0, -0.3], intensity=[20, 18, 16], samples=4}]",
+];
+
+fn lights() -> Vec<Entry> {
+    let mut all = vec![
+        one("light", "light=[]"),
+        one("light.spot.target", "light.0.target=[0.5, 0, 0]").with(SPOT),
+        one("light.spot.direction", "light.0.direction=[-2, -3, -2.6]").with(AIMED),
+        one("light.spot.inner", "light.0.inner=15").with(SPOT),
+        one("light.spot.outer", "light.0.outer=12").with(SPOT),
+        one("light.directional.direction", "light.0.direction=[-2, -3, -1]").with(SUN),
+        one("light.directional.irradiance", "light.0.irradiance=[1, 1, 1]").with(SUN),
+        one("light.directional.shadow", "light.0.shadow=false").with(SUN),
+        one("light.disk.normal", "light.0.normal=[1, 0, 0]").with(DISK),
+        one("light.rect.u", "light.0.u=[0.6, -0.2, 0]").with(RECT),
+        one("light.rect.v", "light.0.v=[0.1, 0, -0.6]").with(RECT),
+    ];
+    for (kind, with) in [("point", &[][..]), ("spot", SPOT), ("sphere", SPHERE), ("disk", DISK), ("rect", RECT)] {
+        let key = |name: &str| -> &'static str { format!("light.{kind}.{name}").leak() };
+        all.push(one(key("position"), "light.0.position=[2, 2.9, 2]").with(with));
+        all.push(one(key("intensity"), "light.0.intensity=[10, 10, 10]").with(with));
+        all.push(one(key("shadow"), "light.0.shadow=false").with(with));
+        if matches!(kind, "sphere" | "disk" | "rect") {
+            all.push(one(key("samples"), "light.0.samples=9").with(with));
+        }
+        if matches!(kind, "sphere" | "disk") {
+            all.push(one(key("radius"), "light.0.radius=0.6").with(with));
+        }
+    }
+    all
+}
+
+const OF_THE_TRANSFER: Expected = Refused(2, "are those of its `transfer`");
+const NOT_OF_POINTS: Expected = Refused(2, "`merge_duplicates` belongs to `points`");
+const NO_CLIP: Expected = Refused(2, "`clip` belongs to");
+const OWN_SPACING: Expected = Refused(2, "states its own spacing");
+const NO_TRANSFER: Expected = Refused(2, "belongs to a `volume` or `slice`");
+const OPEN: Which = These(&["implicit", "isosurface", "level_set"]);
+
+fn objects() -> Vec<Entry> {
+    vec![
+        one("object", "object=[]"),
+        of(All, "object.name", "object.2.name='else'").look(Look::Told),
+        of(All, "object.transform", "object.it.transform={translate=[0.1, 0, 0]}"),
+        of(All, "object.transform.scale", "object.it.transform.scale=0.8"),
+        of(All, "object.transform.rotate", "object.it.transform.rotate=[20, 30, 0]"),
+        of(All, "object.transform.translate", "object.it.transform.translate=[0.1, 0, 0]"),
+        of(All, "object.transform.up", "object.it.transform.up='z'"),
+        of(All, "object.material", "object.it.material='other'"),
+        of(All, "object.opacity", "object.it.opacity=0.9").but(Media, Refused(2, "a medium has no `opacity`")),
+        of(All, "object.color", "object.it.color=[0.1, 0.9, 0.3]").but(These(&["volume", "slice"]), OF_THE_TRANSFER),
+        of(All, "object.spacing", "object.it.spacing=0.16")
+            .but(These(&["density", "cloud", "rectangle", "medium_box", "medium_ball"]), OWN_SPACING),
+        of(All, "object.shadow_coefficient", "object.it.shadow_coefficient=0.2"),
+        of(All, "object.casts_shadow", "object.it.casts_shadow=false"),
+        of(All, "object.visible", "object.it.visible=false"),
+        of(All, "object.footprint", "object.it.footprint=2"),
+        of(All, "object.merge_duplicates", "object.it.merge_duplicates=true")
+            .look(Look::Told)
+            .but(These(&["points", "plain points"]), Expected::Changes)
+            .but(All, NOT_OF_POINTS),
+        of(All, "object.clip", "object.it.clip=[{normal=[0, 1, 0], point=[0, 0.1, 0]}]")
+            .but(OPEN, Expected::Changes)
+            .but(All, NO_CLIP),
+        of(OPEN, "object.clip.normal", "object.it.clip.0.normal=[1, 0, 0]")
+            .with(&["object.it.clip=[{normal=[0, 1, 0], point=[0, 0.1, 0]}]"]),
+        of(OPEN, "object.clip.point", "object.it.clip.0.point=[0, -0.1, 0]")
+            .with(&["object.it.clip=[{normal=[0, 1, 0], point=[0, 0.1, 0]}]"]),
+        of(OPEN, "object.clip.box", "object.it.clip.0.box=[[-0.2, -0.3, -1], [0.3, 0.3, 1]]")
+            .with(&["object.it.clip=[{box=[[-0.3, -0.3, -1], [0.3, 0.3, 1]]}]"]),
+    ]
+}
+
+const CLOUD: Which = These(&["cloud"]);
+const VOLUME: Which = These(&["volume"]);
+const OPACITIES: &[&str] = &[
+    "object.it.unit_length=0.5",
+    "object.it.transfer=[{value=0, color=[1, 0.5, 0.2], opacity=0.1}, {value=1, color=[0.2, 0.6, 1], opacity=0.8}]",
+];
+
+fn sources() -> Vec<Entry> {
+    vec![
+        of(These(&["mesh"]), "object.mesh", "object.it.mesh='other.ply'"),
+        of(These(&["points"]), "object.points", "object.it.points='other.xyz'"),
+        of(VOLUME, "object.volume", "object.it.volume='other.nrrd'"),
+        of(All, "object.transfer", "object.it.transfer=[{value=0, color=[1, 0, 0], extinction=1}]")
+            .but(VOLUME, Expected::Changes)
+            .but(These(&["slice"]), Refused(2, "a slice has no extinction"))
+            .but(All, NO_TRANSFER),
+        of(VOLUME, "object.transfer.value", "object.it.transfer.1.value=0.7"),
+        of(These(&["volume", "slice"]), "object.transfer.color", "object.it.transfer.1.color=[1, 0, 0]"),
+        of(VOLUME, "object.transfer.extinction", "object.it.transfer.1.extinction=2"),
+        of(VOLUME, "object.transfer.opacity", "object.it.transfer.1.opacity=0.5").with(OPACITIES),
+        of(VOLUME, "object.unit_length", "object.it.unit_length=0.3").with(OPACITIES),
+        one("object.implicit", "object.it.implicit={expression='x^2 + y^2 + z^2 - 0.2', box=[[-0.9, -0.9, -0.9], [0.9, 0.9, 0.9]], spacing=0.1}"),
+        one("object.implicit.expression", "object.it.implicit.expression='x^2 + y^2 + z^2 - 0.2'"),
+        one("object.implicit.box", "object.it.implicit.box=[[-0.9, -0.9, -0.9], [0.2, 0.9, 0.9]]"),
+        one("object.implicit.resolution", "object.it.implicit.resolution=12"),
+        one("object.implicit.spacing", "object.it.implicit.spacing=0.15").with(&["object.it.implicit={expression='x^2 + y^2 + 2*z^2 - 0.3', box=[[-0.9, -0.9, -0.9], [0.9, 0.9, 0.9]], spacing=0.1}"]),
+        of(These(&["isosurface"]), "object.isosurface", "object.it.isosurface={volume='grid.nrrd', level=0.75}"),
+        of(These(&["isosurface"]), "object.isosurface.volume", "object.it.isosurface.volume='other.nrrd'"),
+        of(These(&["isosurface"]), "object.isosurface.level", "object.it.isosurface.level=0.75"),
+        of(These(&["isosurface"]), "object.isosurface.interpolation", "object.it.isosurface.interpolation='catmull-rom'"),
+        of(These(&["isosurface"]), "object.isosurface.inside", "object.it.isosurface.inside='below'"),
+        of(These(&["level_set"]), "object.level_set", "object.it.level_set={points='larger.xyz'}"),
+        of(These(&["level_set"]), "object.level_set.points", "object.it.level_set.points='larger.xyz'"),
+        of(These(&["level_set"]), "object.level_set.tolerance", "object.it.level_set.tolerance=0.05"),
+        of(These(&["slice"]), "object.slice", "object.it.slice={volume='grid.nrrd', center=[0, 0, 0.2], normal=[0, 0, 1]}"),
+        of(These(&["slice"]), "object.slice.volume", "object.it.slice.volume='other.nrrd'"),
+        of(These(&["slice"]), "object.slice.center", "object.it.slice.center=[0, 0, 0.2]"),
+        of(These(&["slice"]), "object.slice.normal", "object.it.slice.normal=[0.5, 0.3, 1]"),
+        of(These(&["density"]), "object.density", "object.it.density={expression='1', box=[[-0.6, -0.6, -0.6], [0.6, 0.6, 0.6]], resolution=10}"),
+        of(These(&["density"]), "object.density.expression", "object.it.density.expression='1'"),
+        of(These(&["density"]), "object.density.box", "object.it.density.box=[[-0.6, -0.6, -0.6], [0.3, 0.6, 0.6]]"),
+        of(These(&["density"]), "object.density.resolution", "object.it.density.resolution=7"),
+        of(These(&["density"]), "object.density.spacing", "object.it.density.spacing=0.2").with(&["object.it.density={expression='1.2 + x - y - 2*z', box=[[-0.6, -0.6, -0.6], [0.6, 0.6, 0.6]], spacing=0.12}"]),
+        of(These(&["density"]), "object.density.extinction", "object.it.density.extinction=1"),
+        of(CLOUD, "object.cloud", "object.it.cloud={ellipsoids=[{center=[0, 0, 0], radii=[0.5, 0.5, 0.5]}], spacing=0.12}"),
+        of(CLOUD, "object.cloud.ellipsoids", "object.it.cloud.ellipsoids=[{center=[0, 0, 0], radii=[0.5, 0.5, 0.5]}]"),
+        of(CLOUD, "object.cloud.ellipsoids.center", "object.it.cloud.ellipsoids.0.center=[0.1, 0, 0]"),
+        of(CLOUD, "object.cloud.ellipsoids.radii", "object.it.cloud.ellipsoids.0.radii=[0.5, 0.5, 0.5]"),
+        of(CLOUD, "object.cloud.octaves", "object.it.cloud.octaves=2"),
+        of(CLOUD, "object.cloud.frequency", "object.it.cloud.frequency=2"),
+        of(CLOUD, "object.cloud.amplitude", "object.it.cloud.amplitude=0.1"),
+        of(CLOUD, "object.cloud.seed", "object.it.cloud.seed=7"),
+        of(CLOUD, "object.cloud.spacing", "object.it.cloud.spacing=0.2"),
+        of(CLOUD, "object.cloud.extinction", "object.it.cloud.extinction=1"),
+        of(These(&["rectangle"]), "object.rectangle", "object.it.rectangle={center=[0.1, 0, 0], u=[0.6, 0, 0], v=[0, 0.5, 0], spacing=0.1}"),
+        of(These(&["rectangle"]), "object.rectangle.center", "object.it.rectangle.center=[0.1, 0, 0]"),
+        of(These(&["rectangle"]), "object.rectangle.u", "object.it.rectangle.u=[0.4, 0, 0.2]"),
+        of(These(&["rectangle"]), "object.rectangle.v", "object.it.rectangle.v=[0, 0.4, 0.1]"),
+        of(These(&["rectangle"]), "object.rectangle.spacing", "object.it.rectangle.spacing=0.2"),
+        of(These(&["medium_box"]), "object.medium_box", "object.it.medium_box={min=[-0.5, -0.4, -0.5], max=[0.2, 0.6, 0.5], spacing=0.12}"),
+        of(These(&["medium_box"]), "object.medium_box.min", "object.it.medium_box.min=[-0.2, -0.4, -0.5]"),
+        of(These(&["medium_box"]), "object.medium_box.max", "object.it.medium_box.max=[0.2, 0.6, 0.5]"),
+        of(These(&["medium_box"]), "object.medium_box.extinction", "object.it.medium_box.extinction=1"),
+        of(These(&["medium_box"]), "object.medium_box.spacing", "object.it.medium_box.spacing=0.2"),
+        of(These(&["medium_ball"]), "object.medium_ball", "object.it.medium_ball={center=[0.1, 0, 0], radius=0.6, spacing=0.12}"),
+        of(These(&["medium_ball"]), "object.medium_ball.center", "object.it.medium_ball.center=[0.1, 0, 0]"),
+        of(These(&["medium_ball"]), "object.medium_ball.radius", "object.it.medium_ball.radius=0.4"),
+        of(These(&["medium_ball"]), "object.medium_ball.extinction", "object.it.medium_ball.extinction=1"),
+        of(These(&["medium_ball"]), "object.medium_ball.spacing", "object.it.medium_ball.spacing=0.2"),
+    ]
+}
+
+const HAS_COLORS: Which = These(&["mesh", "points", "volume", "slice"]);
+const OF_SURFACES: Expected = Nothing("a key of surfaces");
+const HOMOGENEOUS: Which = These(&["medium_box", "medium_ball"]);
+const NO_NORMAL: Expected = Nothing("a homogeneous medium has no gradient, which Phong's model needs");
+const PHONG: &[&str] = &["material.m.shading='phong'"];
+const BROAD: &[&str] = &["material.m.shading='phong'", "material.m.shininess=1"];
+const SHINY: &[&str] = &["material.m.shading='phong'", "material.m.shininess=1", "material.m.specular=0.9"];
+const ABSORPTION: &[&str] =
+    &["material.m.absorption={kappa=[0.01, 0.02, 0.03], wavelength=[0.2, 0.2, 0.2]}", "material.m.medium={albedo=0.8}"];
+
+fn materials() -> Vec<Entry> {
+    vec![
+        of(All, "material.color", "material.m.color=[0.1, 0.9, 0.3]")
+            .but(HAS_COLORS, Nothing("it is the colour of data that has none")),
+        of(All, "material.opacity", "material.m.opacity=0.9").but(Media, OF_SURFACES),
+        of(All, "material.surface_opacity", "material.m.surface_opacity='thin_slab'").but(Media, OF_SURFACES),
+        of(All, "material.shading", "material.m.shading='unlit'"),
+        of(All, "material.ambient", "material.m.ambient=0.2"),
+        of(All, "material.diffuse", "material.m.diffuse=0.3").with(PHONG).but(HOMOGENEOUS, NO_NORMAL),
+        of(All, "material.specular", "material.m.specular=0.9").with(BROAD).but(HOMOGENEOUS, NO_NORMAL),
+        of(All, "material.shininess", "material.m.shininess=2").with(SHINY).but(HOMOGENEOUS, NO_NORMAL),
+        of(All, "material.transmission", "material.m.transmission=0.6").with(PHONG).but(HOMOGENEOUS, NO_NORMAL),
+        of(All, "material.emission", "material.m.emission=[0.5, 0.1, 0]"),
+        of(All, "material.extinction_rgb", "material.m.extinction_rgb=[1, 0.5, 0.2]"),
+        of(All, "material.medium", "material.m.medium={albedo=0.3, extinction=2}"),
+        of(Media, "material.medium.extinction", "material.m.medium.extinction=1")
+            .but(VOLUME, Nothing("`transfer` states it")),
+        of(Media, "material.medium.albedo", "material.m.medium.albedo=0.2"),
+        of(Media, "material.medium.asymmetry", "material.m.medium.asymmetry=-0.5"),
+        of(
+            Media,
+            "material.absorption",
+            "material.m.absorption={kappa=[0.05, 0.02, 0.03], wavelength=[0.2, 0.2, 0.2]}",
+        )
+        .with(ABSORPTION),
+        of(Media, "material.absorption.kappa", "material.m.absorption.kappa=[0.05, 0.02, 0.03]").with(ABSORPTION),
+        of(Media, "material.absorption.wavelength", "material.m.absorption.wavelength=[0.2, 0.3, 0.4]")
+            .with(ABSORPTION),
+    ]
+}
+
+const BALL: Which = These(&["medium_ball"]);
+const POINTS_ONLY: Expected = Nothing("a setting of the technique `points`");
+const PARTICLES_ONLY: Expected = Nothing("a setting of the technique `particles`");
+
+fn render() -> Vec<Entry> {
+    vec![
+        one("render", "render={antialias=1}").by(POINTS),
+        one("render.technique", "render.technique='particles'").by(POINTS),
+        one("render.antialias", "render.antialias=1"),
+        of(BALL, "render.tolerance", "render.tolerance=1").look(Look::Work).with(THIN),
+        one("render.exposure", "render.exposure=1").look(Look::Displayed),
+        one("render.layers", "render.layers=['depth']").look(Look::Layers),
+        one("render.seed", "render.seed=5").but_by(POINTS, Nothing("nothing of it is random")),
+        of(All, "render.max_points", "render.max_points=3").but(All, Refused(5, "max_points")),
+        of(BALL, "render.points", "render.points={first_slices=1}").but_by(PARTICLES, POINTS_ONLY),
+        of(BALL, "render.points.slice_thickness", "render.points.slice_thickness=0.5")
+            .by(POINTS)
+            .with(&["render.points.exact=false"]),
+        of(BALL, "render.points.exact", "render.points.exact=false")
+            .by(POINTS)
+            .with(&["render.points.slice_thickness=0.5"]),
+        of(BALL, "render.points.direction", "render.points.direction='back_to_front'")
+            .look(Look::Work)
+            .by(POINTS)
+            .with(&[
+                "object.it.medium_ball.spacing=0.04",
+                "object.it.transform.scale=4",
+                "render.points.transmittance_cutoff=0.5",
+            ]),
+        of(BALL, "render.points.first_slices", "render.points.first_slices=1").by(POINTS),
+        of(BALL, "render.points.transmittance_cutoff", "render.points.transmittance_cutoff=0.9")
+            .by(POINTS)
+            .with(&["object.it.medium_ball.spacing=0.04", "object.it.transform.scale=4"]),
+        of(BALL, "render.points.resampling_filter", "render.points.resampling_filter=false").by(POINTS),
+        of(BALL, "render.points.accumulation", "render.points.accumulation='f16'").by(POINTS),
+        of(BALL, "render.points.shadow", "render.points.shadow={cells=2}"),
+        of(BALL, "render.points.shadow.mapping", "render.points.shadow.mapping='polar'"),
+        of(BALL, "render.points.shadow.cells", "render.points.shadow.cells=4"),
+        of(BALL, "render.points.shadow.absorbance_cut", "render.points.shadow.absorbance_cut=0.1"),
+        one("render.particles", "render.particles={repeat_level=7}").but_by(POINTS, PARTICLES_ONLY),
+        one("render.particles.repeat_level", "render.particles.repeat_level=7").by(PARTICLES).look(Look::Sets),
+        one("render.particles.target_error", "render.particles.target_error=100")
+            .by(PARTICLES)
+            .look(Look::Sets)
+            .with(&["render.particles.repeat_level=50"]),
+        of(OPEN, "render.particles.surface_sampler", "render.particles.surface_sampler='triangles'").by(PARTICLES),
+        one("render.particles.brownian_step", "render.particles.brownian_step=0.05")
+            .by(PARTICLES)
+            .with(&["render.particles.surface_sampler='brownian'"]),
+    ]
+}
+
+const THIN: &[&str] = &[
+    "material.m.medium.extinction=0.01",
+    "object.wall.casts_shadow=false",
+    "object.blocker.visible=false",
+    "render.tolerance=1e-9",
+];
+
+const MOVING: &[&str] = &["animation={frames=3, track=[{set='object.it.transform.translate', \
+     keys=[{frame=0, value=[0, 0, 0]}, {frame=1, value=[0.1, 0, 0]}, {frame=2, value=[0.4, 0.3, 0]}]}]}"];
+const HALF: &[&str] = &["animation={frames=5, track=[{set='object.it.transform.translate', \
+     keys=[{frame=0, value=[0, 0, 0]}, {frame=4, value=[0.4, 0.3, 0]}]}]}"];
+
+const BENT: &[&str] = &["animation={frames=5, track=[{set='object.it.transform.translate', \
+     keys=[{frame=0, value=[0, 0, 0]}, {frame=2, value=[0.3, 0, 0]}, {frame=4, value=[0, 0.2, 0]}]}]}"];
+
+fn animation() -> Vec<Entry> {
+    vec![
+        one("animation", "animation={frames=1, track=[{set='camera.fov_y', keys=[{frame=0, value=50}]}]}").at(0),
+        one("animation.frames", "animation.frames=9").at(1).with(MOVING).look(Look::Told),
+        one("animation.track", "animation.track=[]").at(1).with(MOVING),
+        one("animation.track.set", "animation.track.0.set='object.it.transform.rotate'").at(1).with(MOVING),
+        one("animation.track.keys", "animation.track.0.keys=[{frame=0, value=[0.2, 0, 0]}]").at(1).with(MOVING),
+        one("animation.track.keys.frame", "animation.track.0.keys.1.frame=3").at(1).with(HALF),
+        one("animation.track.keys.value", "animation.track.0.keys.1.value=[0, 0.4, 0]").at(1).with(HALF),
+        one("animation.track.interpolation", "animation.track.0.interpolation='smooth'").at(1).with(BENT),
+    ]
+}
