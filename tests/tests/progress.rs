@@ -29,8 +29,7 @@ fn stages(text: &str, technique: &str) -> Vec<(String, f64)> {
     let progress = Progress::watched(move |name, fraction| list.lock().unwrap().push((name.to_owned(), fraction)));
     organza::render(&scene, &RenderOptions::default(), &progress).unwrap();
     assert_eq!(progress.report().1, 1.0);
-    let told = told.lock().unwrap().clone();
-    told
+    told.lock().unwrap().clone()
 }
 
 #[test]

@@ -96,12 +96,7 @@ pub struct Comparison {
 /// # Errors
 /// As [`crate::render`]; [`Error::Input`] for a scene without translucent splats.
 pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Comparison, Error> {
-    let mut scene = scene.clone();
-    scene.render.technique = Technique::Points;
-    let points = &mut scene.render.points;
-    (points.transmittance_cutoff, points.first_slices) = (0.0, None);
-    (points.exact, points.direction) = (false, Direction::FrontToBack);
-    scene.render.layers = crate::scene::LayerChoice::default();
+    let scene = by_slices_alone(scene);
     progress.plan([(LOAD, 2.0), (ORDERS, 8.0), (TRUTH, 8.0), (SETS_OF_PARTICLES, 8.0)]);
     progress.begin(LOAD);
     progress.enter();
@@ -158,6 +153,17 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
     orderings.extend(unordered);
     let splats = sorter.translucent.len() as u64;
     Ok(Comparison { orderings, truth, truth_seconds, splats, without_particles })
+}
+
+/// The scene by points without cut-offs and layers, front to back, in the order of slices.
+fn by_slices_alone(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    scene.render.technique = Technique::Points;
+    let points = &mut scene.render.points;
+    (points.transmittance_cutoff, points.first_slices) = (0.0, None);
+    (points.exact, points.direction) = (false, Direction::FrontToBack);
+    scene.render.layers = crate::scene::LayerChoice::default();
+    scene
 }
 
 impl Ordering {

@@ -293,9 +293,10 @@ mod tests {
         progress.plan([("a", 1.0)]);
         progress.begin("a");
         progress.add_total(2);
-        progress.tick(2).unwrap();
+        progress.tick(1).unwrap();
+        assert_eq!(progress.report().1, 0.5);
         progress.add_total(100);
-        assert_eq!(progress.report().1, 1.0);
+        assert_eq!(progress.report().1, 0.5);
     }
 
     #[test]

@@ -141,15 +141,17 @@ fn ts14_one_cell_works_and_a_huge_table_is_refused_with_its_bytes() {
 fn what_maps_cost_together_is_known_before_any_is_built_and_held_while_they_are() {
     let cloud = mixed(20_000, DVec3::ZERO);
     let (lights, params) = (lights(), Params::default());
-    let predicted = Deposits::predict(&cloud, &[], &[], lights.iter(), &params);
-    for (light, predicted) in lights.iter().zip(predicted) {
-        let (map, predicted) = (build(&cloud, light, &params), predicted.unwrap());
+    for light in &lights {
+        let predicted = Deposits::predict(&cloud, &[], &[], light, &params).unwrap();
+        let map = build(&cloud, light, &params);
         assert_eq!(map.prediction(), predicted);
         let finished = map.counts().bytes;
         assert!((finished..=3 * finished).contains(&(2 * predicted.map_bytes)), "{finished}, {predicted:?}");
         // What deposits more than was predicted is held to the limit while it is made.
         let entries = map.counts().entries;
-        let held = ShadowMap::build(&cloud, &[], &[], light, &Params { max_bytes: 10 * entries, ..params.clone() });
+        let resolution = Resolution::Cells(predicted.size[0].max(predicted.size[1]) as u32);
+        let short = Params { resolution, max_bytes: 10 * entries, ..params.clone() };
+        let held = ShadowMap::build(&cloud, &[], &[], light, &short);
         assert!(matches!(held, Err(Error::Memory { .. })));
     }
 }

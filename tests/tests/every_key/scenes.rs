@@ -118,7 +118,8 @@ impl Folder {
             exposure,
         };
         let path = self.0.path().join("picture.png");
-        organza::output::write(&render.layers, &metadata, &path, false).unwrap();
+        let target = organza::output::Target::new(&path, false).unwrap();
+        organza::output::write(&render.layers, &metadata, &target, false).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         std::fs::remove_file(&path).unwrap();
         format!("{bytes:?}")
