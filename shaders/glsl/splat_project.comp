@@ -21,6 +21,8 @@ layout(set = 0, binding = 7, std430) buffer Bound7 { ProjectState state; };
 const float FACING_AWAY = 0.00390625;
 // Least distance of a centre from the eye as a share of the radius, in perspective.
 const float LEAST_DEPTH = 0.03125;
+// Half an extent that leaves nothing out.
+const float EVERYWHERE = 3.4028235e38;
 
 shared uint block_visible;
 shared uint block_near;
@@ -106,7 +108,7 @@ Center center_of(vec3 offset, float cutoff, float radius) {
 // Half the extent of the image of a ball about that of its centre; everything where it reaches the eye plane.
 precise float extent_of_ball(float slope, float length_sq, float ratio_sq) {
     if (!(ratio_sq < 1.0)) {
-        return uintBitsToFloat(0x7f800000u);
+        return EVERYWHERE;
     }
     precise float across = sqrt(ratio_sq * (length_sq - ratio_sq));
     precise float extent = (abs(slope) * ratio_sq + across) / (1.0 - ratio_sq) * view.focal;
@@ -224,7 +226,7 @@ Shape disc(Splat s, Center c) {
     bool near = c.before < (view.orthographic == 0u ? radius : reach_z);
     vec2 half_extent = vec2(sqrt(xx), sqrt(yy));
     if (near && view.orthographic == 0u) {
-        half_extent = vec2(uintBitsToFloat(0x7f800000u));
+        half_extent = vec2(EVERYWHERE);
         peak = in_view(c, radius) ? peak : 0.0;
     }
     return Shape(vec3(a, b, d), peak, half_extent, usable ? vec2(slope_x, slope_y) : vec2(0.0), near);

@@ -96,8 +96,10 @@ pub fn volume(grid: &Grid, tf: &TransferFunction, params: &VolumeParams) -> Resu
     if factors == [1; 3] {
         return Ok(Prediction::exact(keep.count(grid) as f64, params.wanted()));
     }
-    let kept = keep.count_voxels(grid) as f64;
     let finer = factors.iter().map(|f| *f as f64).product::<f64>();
+    // Cells around the border of what has extinction count too: finer ones are as much thinner.
+    let inside = keep.count_voxels(grid) as f64;
+    let kept = inside + (keep.count(grid) as f64 - inside).max(0.0) / finer.cbrt();
     Ok(Prediction::new(kept * finer, Some(grid.values.len() as f64 * finer), params.wanted()))
 }
 

@@ -227,12 +227,14 @@ fn ba14_voxels_that_do_not_fill_the_file_exactly() {
 
 #[test]
 fn ba15_gzip_bombs_stop_at_the_ratio_and_at_the_limit() {
-    let bomb = gzip(&vec![0; 40 << 20]);
-    let error = refused("a.nii.gz", &bomb);
+    let bomb = gzip(&vec![b' '; 40 << 20]);
+    let error = refused("a.xyz.gz", &bomb);
     assert_eq!((error.fault, error.fault.exit_code()), (Fault::Limit, 5), "{error}");
     let limits = ReadLimits { max_bytes: 1 << 20, ..ReadLimits::default() };
-    let error = bytes("a.nii.gz", &gzip(&vec![7; 2 << 20]), &limits).unwrap_err();
+    let error = bytes("a.xyz.gz", &gzip(&vec![b' '; 2 << 20]), &limits).unwrap_err();
     assert_eq!(error.fault, Fault::Limit, "{error}");
+    // A volume's header comes first: what it does not announce is not unpacked.
+    refused_with("a.nii.gz", &bomb, "a.nii.gz@0: expected a header size of 348");
     let volume = nifti(NIFTI_U8, false);
     assert_eq!(bytes("a.nii", &volume, &ReadLimits { max_bytes: 47, ..limits }).unwrap_err().fault, Fault::Limit);
     assert!(bytes("a.nii", &volume, &ReadLimits { max_bytes: 48, ..limits }).is_ok());

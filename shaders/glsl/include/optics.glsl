@@ -26,8 +26,11 @@ precise float opacity_of(float x) {
 // Share of a medium kernel before a plane at distance / D behind its centre, D three deviations of the kernel.
 precise float share_in_front(float distance) {
     precise float t = clamp(distance, -1.0, 1.0);
-    precise float u = t * t;
-    return 0.5 + 1.09375 * t * (1.0 - u * (1.0 - u * (0.6 - u * 0.14285715)));
+    // By powers of what lies before the plane: a small share keeps its digits.
+    precise float before = 1.0 + t;
+    precise float square = before * before;
+    precise float rest = 0.5 - t * (0.90625 - t * (0.625 - t * 0.15625));
+    return square * square * rest;
 }
 
 // The profile at t = max(1 - s, 0). Words of a footprint: the polynomial (8), q, e^-q, whether the polynomial holds.

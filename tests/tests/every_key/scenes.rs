@@ -69,7 +69,7 @@ impl Folder {
         write("larger.xyz", &ball(0.75));
         write("grid.nrrd", &nrrd("", 1.0));
         write("other.nrrd", &nrrd("", 0.6));
-        write("body.nrrd", &nrrd("space: left-posterior-superior\n", 1.0).replace("LPS", "RAS"));
+        write("body.nrrd", &nrrd("space: right-anterior-superior\n", 1.0));
         Self(folder)
     }
 

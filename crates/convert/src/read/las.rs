@@ -37,6 +37,8 @@ pub(super) struct Layout {
 /// Reads a LAS or LAZ file.
 pub(super) fn read(content: Vec<u8>, limits: &ReadLimits, notes: &mut Notes) -> Result<RawPoints, ReadError> {
     let layout = layout(&content)?;
+    // What the file cannot hold is its fault, not the limit's.
+    let plain = (!layout.compressed).then(|| plain_records(&content, &layout)).transpose()?;
     input::check_bytes("the points", layout.count.saturating_mul(BYTES_PER_POINT), limits)?;
     notes.not_used(unused(&content, &layout).iter().map(String::as_bytes));
     let mut columns = Columns::default();
@@ -44,11 +46,9 @@ pub(super) fn read(content: Vec<u8>, limits: &ReadLimits, notes: &mut Notes) -> 
         let data = PointDataBuilder::new().with_format(layout.format).build_from_bytes(records);
         columns.append(&data.map_err(|e| damaged(layout.points, "whole point records", &e.to_string()))?, &layout)
     };
-    if layout.compressed {
-        laz::decompress(&content, &layout, limits, take)?;
-    } else {
-        let records = plain_records(&content, &layout)?;
-        records.chunks(BLOCK * layout.record as usize).try_for_each(|block| take(block.to_vec()))?;
+    match plain {
+        Some(records) => records.chunks(BLOCK * layout.record as usize).try_for_each(|block| take(block.to_vec()))?,
+        None => laz::decompress(&content, &layout, limits, take)?,
     }
     // Before the columns are converted: the file takes about as much as they do.
     drop(content);

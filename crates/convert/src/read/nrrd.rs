@@ -37,18 +37,18 @@ pub(super) fn read(
     if let Some(space) = header.converted_from {
         notes.remarks.push(format!("space: {space}, converted to right-anterior-superior"));
     }
-    let mut stream = match &header.data_file {
+    let (mut stream, lines) = match &header.data_file {
         None => {
             stream.skip(header.end as u64)?;
-            stream
+            (stream, header.lines)
         }
-        Some((name, place)) => detached(name, *place, path, limits)?,
+        Some((name, place)) => (detached(name, *place, path, limits)?, 0),
     };
     skip_lines(&mut stream, header.line_skip)?;
     let (kind, big_endian, scaling) = (header.kind, header.big_endian, (1.0, 0.0));
     let stored = Stored { kind, big_endian, dims: header.sizes, scaling };
     let values = match header.encoding {
-        Encoding::Text => text(&stream.rest()?, count)?,
+        Encoding::Text => text(&stream.rest()?, count, lines + header.line_skip)?,
         Encoding::Raw if header.byte_skip == -1 => last(stream, &stored, limits)?,
         Encoding::Raw => binary(stream, &header, &stored, limits)?,
         Encoding::Gzip => binary(stream.gunzip(), &header, &stored, limits)?,
@@ -101,13 +101,13 @@ fn last(stream: Stream<'_>, stored: &Stored, limits: &ReadLimits) -> Result<Vec<
     voxels::read(&mut Stream::of(&data[start as usize..], limits), stored, limits, HINT)
 }
 
-/// Exactly `count` numbers in text.
-fn text(stored: &[u8], count: u64) -> Result<Vec<f32>, ReadError> {
+/// Exactly `count` numbers in text, after so many lines of the file.
+fn text(stored: &[u8], count: u64, before: u64) -> Result<Vec<f32>, ReadError> {
     let wrong = |found: String| ReadError::input(Place::File, format!("{count} voxels"), found, HINT);
     let mut values = Vec::new();
     // A digit and a blank each, but for the last one: the text cannot hold more, whatever the header says.
     input::reserve(&mut values, count.min((stored.len() as u64).div_ceil(2)) as usize)?;
-    let mut lines = Lines::new(stored);
+    let mut lines = Lines::after(stored, before);
     while let Some(line) = lines.next()? {
         for word in line.words(true) {
             let value = word.number()? as f32;

@@ -40,6 +40,18 @@ impl<'a> Lines<'a> {
         Self { content, at, number: 0 }
     }
 
+    /// The same behind so many lines of a header.
+    #[cfg(feature = "nrrd")]
+    pub(super) fn after(content: &'a [u8], lines: u64) -> Self {
+        Self { number: lines, ..Self::new(content) }
+    }
+
+    /// Number of the line that was read last.
+    #[cfg(feature = "nrrd")]
+    pub(super) fn number(&self) -> u64 {
+        self.number
+    }
+
     /// The next line, or `None` at the end.
     pub(super) fn next(&mut self) -> Result<Option<Line<'a>>, ReadError> {
         if self.at >= self.content.len() {

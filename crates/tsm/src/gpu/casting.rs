@@ -148,7 +148,7 @@ impl Casting {
 
     /// Entries that there may be; how many there are the device says.
     pub fn expected(&self) -> u32 {
-        let predicted = (1.25 * self.map.prediction().entries).min(f64::from(MOST_ENTRIES)) as u64;
+        let predicted = (1.5 * self.map.prediction().entries).min(f64::from(MOST_ENTRIES)) as u64;
         (self.given() + 4 * self.casters()).max(predicted).clamp(1, MOST_ENTRIES.into()) as u32
     }
 

@@ -309,9 +309,9 @@ fn by_hand(blends: &[Blend], begin: [f32; 4], strips: u32) -> ByHand {
     let extents = (4.0f32.to_bits() >> 16) * 0x1_0001;
     let splat = bytes(&[x, y, 0, 0, 0, peak, extents, 0]);
     // A profile of t^3, and t is 1.
-    let mut table = [0.0f32; 16];
+    let mut table = [0.0f32; 20];
     (table[0], table[10]) = (1.0, 1.0);
-    table[12..].copy_from_slice(&[1.0; 4]);
+    table[16..].copy_from_slice(&[1.0; 4]);
     let given = [
         ("view", bytes(&view)),
         ("order", bytes(&[0])),

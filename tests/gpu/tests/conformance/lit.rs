@@ -15,7 +15,7 @@ use tsm::gpu::{Room, record_received};
 use tsm::{Params, Resolution, ShadowMap};
 
 const SIZE: [u32; 2] = [120, 80];
-const ROOM: Capacities = Capacities { size: SIZE, objects: 3, levels: 3, of_set: 60_000, particles: 180_000 };
+const ROOM: Capacities = Capacities { size: SIZE, objects: 3, levels: 3, of_set: 66_000, particles: 198_000 };
 const VIEWS: [Projection; 2] = [Projection::Perspective { fov_y: 0.6 }, Projection::Orthographic { height: 2.6 }];
 
 /// Most that the mean of a pixel may differ by, as a share of the brightest one: what shading promises, and what look-ups do

@@ -49,6 +49,8 @@ pub(super) struct Header {
     pub(super) data_file: Option<(String, Place)>,
     /// Byte offset of what follows the header.
     pub(super) end: usize,
+    /// Lines of the header, the empty one at its end among them.
+    pub(super) lines: u64,
 }
 
 /// The fields as they are written, with their lines.
@@ -100,6 +102,7 @@ pub(super) fn parse(content: &[u8]) -> Result<Header, ReadError> {
     }
     let end = lines.offset();
     let last = lines.end();
+    let lines = lines.number();
     let (dimension, at) = fields.required("dimension", last)?;
     if dimension != "3" {
         let hint = "extract one volume of scalars first";
@@ -131,6 +134,7 @@ pub(super) fn parse(content: &[u8]) -> Result<Header, ReadError> {
         byte_skip,
         data_file,
         end,
+        lines,
     })
 }
 
