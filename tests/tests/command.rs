@@ -360,7 +360,7 @@ fn messages_repeat_200_characters_at_most_of_a_scene() {
         ("a key in quotes", format!("\"{long}\" = 1\n{}", scene())),
         ("a key twice", format!("{word} = 1\n{word} = 1\n{}", scene())),
         ("a name", scene().replace("\"fog\"", &format!("\"{long}\""))),
-        ("a name twice", format!("{0}{0}", FOG.replace("fog", &"q".repeat(250))) + &SMALL_SCENE),
+        ("a name twice", format!("{0}{0}", FOG.replace("fog", &"q".repeat(250))) + SMALL_SCENE),
         ("a source", object(format!("\"{long}\" = 1"))),
         ("a material", object(format!("{fog}\nmaterial = \"{long}\""))),
         ("a path", object(format!("mesh = \"{long}\""))),

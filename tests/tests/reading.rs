@@ -63,7 +63,7 @@ fn columns_that_are_not_used_are_named_once() {
     assert!(said[0].starts_with("note: ") && said[0].ends_with("wall.csv: columns not used: red, green, time, value"));
     let document: Value = serde_json::from_slice(&out.stdout).unwrap();
     assert_eq!(document["notes"].as_array().unwrap().len(), 1);
-    assert_eq!(document["warnings"], json!([]));
+    assert!(!document["warnings"].to_string().contains("not used"));
     let explained = run(folder.path(), &["explain", "s.toml"]);
     assert!(errors(&explained).contains("columns not used: red, green, time, value"), "{}", errors(&explained));
     let info: Value = serde_json::from_slice(&run(folder.path(), &["info", "wall.csv", "--json"]).stdout).unwrap();

@@ -99,7 +99,7 @@ pub fn volume(grid: &Grid, tf: &TransferFunction, params: &VolumeParams) -> Resu
     let finer = factors.iter().map(|f| *f as f64).product::<f64>();
     // Cells around the border of what has extinction count too: finer ones are as much thinner.
     let inside = keep.count_voxels(grid) as f64;
-    let kept = inside + (keep.count(grid) as f64 - inside).max(0.0) / finer.cbrt();
+    let kept = inside + (keep.count(grid) as f64 - inside).max(0.0) / libm::cbrt(finer);
     Ok(Prediction::new(kept * finer, Some(grid.values.len() as f64 * finer), params.wanted()))
 }
 
@@ -200,7 +200,7 @@ pub fn medium_ball(
     let reach = DVec3::splat(radius);
     let cells = medium_box(center - reach, center + reach, extinction, spacing, params)?.splats as f64;
     // Cells that the surface cuts count whole: a shell of about half a cell.
-    let inside = std::f64::consts::PI / 6.0 * (cells.cbrt() + 1.0).powi(3);
+    let inside = std::f64::consts::PI / 6.0 * (libm::cbrt(cells) + 1.0).powi(3);
     Ok(Prediction::new(inside.min(cells), Some(cells), Wanted::default()))
 }
 

@@ -194,7 +194,7 @@ pub(crate) fn density_lattice(bounds: [DVec3; 2], params: &DensityParams) -> Res
     let sides = bounds[1] - bounds[0];
     let spacing = match params.density {
         Density::Spacing(h) => p.check_spacing(h)? / p.transform.scale,
-        Density::Splats(n) => (sides.x * sides.y * sides.z / n.max(1) as f64).cbrt(),
+        Density::Splats(n) => libm::cbrt(sides.x * sides.y * sides.z / n.max(1) as f64),
         Density::Auto => sides.max_element() / 128.0,
     };
     lattice(bounds, spacing, p)

@@ -139,8 +139,8 @@ impl Tree {
     pub(crate) fn new(points: &[Vec3]) -> Self {
         let bounds = Aabb::of_points(points);
         let extent = (bounds.max.as_dvec3() - bounds.min.as_dvec3()).max_element();
-        let exponent = if extent > 0.0 { extent.log2().floor().clamp(-126.0, 126.0) } else { 0.0 };
-        let factor = (-exponent).exp2() as f32;
+        let exponent = if extent > 0.0 { libm::log2(extent).floor().clamp(-126.0, 126.0) } else { 0.0 };
+        let factor = libm::exp2(-exponent) as f32;
         let leaves: Vec<Leaf> = points.par_chunks(WIDTH).with_min_len(512).map(|c| Leaf::of(c, factor)).collect();
         let mut boxes: Vec<[Vec3; 2]> = leaves.par_iter().with_min_len(512).map(Leaf::bounds).collect();
         let mut levels: Vec<Vec<Node>> = Vec::new();

@@ -163,7 +163,7 @@ impl Part {
         let size = (self.high.as_dvec3() - self.low.as_dvec3()).max_element();
         // The exponent of an f64: sizes of f32 places are normal numbers of it.
         let exponent = (size.to_bits() >> 52) as i32 - 1023;
-        if size > 0.0 { f64::from(-exponent).exp2() } else { 0.0 }
+        if size > 0.0 { libm::exp2(f64::from(-exponent)) } else { 0.0 }
     }
 
     fn side(&self) -> Side {

@@ -117,9 +117,9 @@ impl CloudShape {
     fn depth(&self, p: DVec3) -> f64 {
         let depth = |e: &Ellipsoid| 1.0 - ((p - e.center) / e.radii).length();
         let deepest = self.ellipsoids.iter().map(depth).fold(f64::NEG_INFINITY, f64::max);
-        let sum: f64 = self.ellipsoids.iter().map(|e| ((depth(e) - deepest) / MERGE_WIDTH).exp()).sum();
+        let sum: f64 = self.ellipsoids.iter().map(|e| libm::exp((depth(e) - deepest) / MERGE_WIDTH)).sum();
         // Bounded by the number of ellipsoids, so an empty place stays empty.
-        deepest + MERGE_WIDTH * sum.ln()
+        deepest + MERGE_WIDTH * libm::log(sum)
     }
 
     fn turbulence(&self, noise: &Perlin, p: DVec3) -> f64 {
@@ -138,7 +138,8 @@ impl CloudShape {
     /// Corners of a box outside of which the density is 0, object units.
     pub fn bounds(&self) -> [DVec3; 2] {
         // The smooth maximum adds at most MERGE_WIDTH·ln n to the depth.
-        let reach = 1.0 + MOST_TURBULENCE * self.amplitude + MERGE_WIDTH * (self.ellipsoids.len().max(1) as f64).ln();
+        let reach =
+            1.0 + MOST_TURBULENCE * self.amplitude + MERGE_WIDTH * libm::log(self.ellipsoids.len().max(1) as f64);
         let mut low = DVec3::INFINITY;
         let mut high = DVec3::NEG_INFINITY;
         for e in &self.ellipsoids {

@@ -43,8 +43,8 @@ fn smallest_eigenvector(d: DVec3, m: DVec3) -> Option<DVec3> {
     let columns =
         |e: DVec3| DMat3::from_cols(DVec3::new(e.x, m.z, m.y), DVec3::new(m.z, e.y, m.x), DVec3::new(m.y, m.x, e.z));
     let half_determinant = (columns(e).determinant() / (2.0 * p * p * p)).clamp(-1.0, 1.0);
-    let angle = half_determinant.acos() / 3.0;
-    let smallest = third + 2.0 * p * (angle + std::f64::consts::TAU / 3.0).cos();
+    let angle = libm::acos(half_determinant) / 3.0;
+    let smallest = third + 2.0 * p * libm::cos(angle + std::f64::consts::TAU / 3.0);
     // The rows of A − λ lie in the plane across the eigenvector; the longest cross product is the safest.
     let a = columns(d - DVec3::splat(smallest));
     let crosses = [a.x_axis.cross(a.y_axis), a.y_axis.cross(a.z_axis), a.z_axis.cross(a.x_axis)];

@@ -31,7 +31,7 @@ impl Frustum {
         if camera.is_orthographic() {
             return Self { cos: [1.0; 2], sin: [0.0; 2], half: extent.map(|e| e as f32) };
         }
-        let length = extent.map(|e| e.hypot(1.0));
+        let length = extent.map(|e| libm::hypot(e, 1.0));
         let sin = [extent[0] / length[0], extent[1] / length[1]].map(|v| v as f32);
         Self { cos: length.map(|l| (1.0 / l) as f32), sin, half: [0.0; 2] }
     }

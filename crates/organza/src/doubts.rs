@@ -26,10 +26,10 @@ pub(crate) fn of_scene(scene: &Scene, loaded: &Loaded) -> Vec<String> {
 /// What a finished picture shows too little of.
 pub(crate) fn of_picture(scene: &Scene, layers: &Layers) -> Option<String> {
     let beauty = layers.rgb("beauty").filter(|b| scene.frames.is_none() && !b.is_empty())?;
-    let gain = scene.render.exposure.exp2() as f32;
+    let gain = libm::exp2(scene.render.exposure) as f32;
     let all =
         |byte: u8| beauty.par_chunks(CHUNK).all(|part| part.iter().flatten().all(|v| displayed(v * gain) == byte));
-    let stops = |radiance: f32| (GREY / f64::from(radiance)).log2().round();
+    let stops = |radiance: f32| libm::log2(GREY / f64::from(radiance)).round();
     if all(0) {
         let brightest = beauty.iter().flatten().fold(0.0, |most, v| f32::max(most, *v));
         return Some(if brightest > 0.0 {
@@ -71,7 +71,7 @@ fn outside(scene: &Scene, loaded: &Loaded) -> Vec<String> {
     let seen = seen(loaded);
     let mut lost: Vec<(usize, [DVec3; 2])> = bounds(loaded, &seen);
     // Back into the scene's unit.
-    let unit = f64::from(loaded.exponent).exp2();
+    let unit = libm::exp2(f64::from(loaded.exponent));
     lost.iter_mut().for_each(|(_, b)| *b = b.map(|p| p * unit));
     let camera = &scene.camera;
     let looks = format!("the camera at {} looks along {}", place(camera.position), place(camera.axes[2]));
@@ -113,7 +113,7 @@ fn around([low, high]: [DVec3; 2], [l, h]: [DVec3; 2]) -> [DVec3; 2] {
 /// Four digits are enough to find a place.
 fn place(p: DVec3) -> String {
     let digits = |v: f64| {
-        let unit = 10f64.powi(3 - v.abs().max(1e-300).log10().floor() as i32);
+        let unit = 10f64.powi(3 - libm::log10(v.abs().max(1e-300)).floor() as i32);
         let rounded = (v * unit).round() / unit;
         if rounded.is_finite() { rounded } else { v }
     };
@@ -179,7 +179,7 @@ impl View {
     fn may_see(&self, middle: DVec3, radius: f64) -> bool {
         let [x, y] = [middle.x.abs(), middle.y.abs()];
         let inside = |at: f64, half: f64| {
-            if self.parallel { at - radius <= half } else { at - half * middle.z <= radius * half.hypot(1.0) }
+            if self.parallel { at - radius <= half } else { at - half * middle.z <= radius * libm::hypot(half, 1.0) }
         };
         middle.z + radius > 0.0 && inside(x, self.half[0]) && inside(y, self.half[1])
     }

@@ -86,7 +86,7 @@ impl Loaded {
 }
 
 fn scaled_thickness(scene: &Scene, exponent: i32) -> Option<f64> {
-    scene.render.points.slice_thickness.map(|e| e * f64::from(-exponent).exp2())
+    scene.render.points.slice_thickness.map(|e| e * libm::exp2(f64::from(-exponent)))
 }
 
 /// Reads and converts every visible object.

@@ -1,9 +1,9 @@
 //! What a render takes at its peak, counted before it begins.
 
+use crate::Error;
 use crate::load::own::Own;
 use crate::load::{BYTES_PER_SPLAT, Loaded};
 use crate::scene::Scene;
-use crate::{Error, ShadowTable};
 use glam::Vec3;
 use rayon::prelude::*;
 use splat_core::shade::ChannelLayout;
@@ -38,14 +38,9 @@ impl Memory {
         }
     }
 
-    /// The same with the shadow maps, which live at once: all finished, and what building one takes beside it.
-    pub(crate) fn with_maps<'a>(self, tables: impl Iterator<Item = &'a ShadowTable>) -> Self {
-        let (mut finished, mut building) = (0u64, 0);
-        for table in tables {
-            finished = finished.saturating_add(table.map_bytes);
-            building = building.max(table.bytes - table.map_bytes);
-        }
-        Self { maps: finished.saturating_add(building), ..self }
+    /// The same with shadow maps of these bytes.
+    pub(crate) fn with_maps(self, maps: u64) -> Self {
+        Self { maps, ..self }
     }
 
     /// All of it.

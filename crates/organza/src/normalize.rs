@@ -13,8 +13,8 @@ pub(crate) fn normalize(cloud: &mut Cloud, own: &mut [Own], camera: &mut Camera,
     if !(diagonal.is_finite() && diagonal > 0.0) {
         return 0;
     }
-    let exponent = diagonal.log2().floor() as i32;
-    let scale = f64::from(exponent).exp2().recip();
+    let exponent = libm::log2(diagonal).floor() as i32;
+    let scale = libm::exp2(f64::from(exponent)).recip();
     let (length, area) = (scale as f32, (scale * scale) as f32);
     cloud.origin *= scale;
     cloud.position.iter_mut().for_each(|p| *p *= length);

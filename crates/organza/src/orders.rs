@@ -122,7 +122,7 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
     let input = exact_input(&loaded, &camera, &shaded, drawing.raster_params().resampling_sigma_px);
     let pixels = f64::from(camera.size[0]) * f64::from(camera.size[1]);
     let rays = Rays::new(&input, (pixels / RAYS).sqrt().ceil() as usize);
-    let world = f64::from(loaded.exponent).exp2();
+    let world = libm::exp2(f64::from(loaded.exponent));
     let sliced = THICKER.map(|f| Ordering::Slices(f * auto));
     let all = [&[Ordering::Exact][..], &sliced, &[Ordering::Centre, Ordering::Distance, Ordering::Unsorted]].concat();
     progress.leave();

@@ -48,6 +48,8 @@ pub struct Plan {
     pub shadow_maps: Vec<bool>,
     /// For each light: the table of its shadow map. Chosen by a look at the splats, when all else is planned.
     pub shadow_tables: Vec<Option<ShadowTable>>,
+    /// Bytes that all shadow maps together may take.
+    pub shadow_bytes: u64,
     /// Where the particles of each visible object come from; empty for the technique `points`.
     pub samplers: Vec<PlannedSampler>,
 }
@@ -107,12 +109,12 @@ pub fn plan(statistics: &Statistics) -> Plan {
 }
 
 impl Plan {
-    /// Takes the tables in that were chosen, one for each light.
-    pub(crate) fn set_shadow_tables(&mut self, tables: Vec<Option<ShadowTable>>) {
+    /// Takes the tables in that were chosen, one for each light, and the bytes that their maps may take together.
+    pub(crate) fn set_shadow_tables(&mut self, tables: Vec<Option<ShadowTable>>, bytes: u64) {
         let made = tables.iter().enumerate().filter_map(|(i, table)| Some(table.as_ref()?.describe(i)));
         let passes = self.passes.iter_mut().filter(|p| p.name == pass::SHADOW_MAP);
         passes.zip(made).for_each(|(pass, reason)| pass.reason = reason);
-        self.shadow_tables = tables;
+        (self.shadow_tables, self.shadow_bytes) = (tables, bytes);
     }
 }
 
@@ -135,7 +137,7 @@ fn shadow_effect(i: usize, light: &LightStatistics, statistics: &Statistics, all
         return effect(name, false, "nothing can cast it");
     }
     // A displayed pixel is at most 1, so what a shadow can take away is at most its opacity.
-    let bound = if statistics.opaque_casters > 0 { 1.0 } else { -(-statistics.caster_optical_depth).exp_m1() };
+    let bound = if statistics.opaque_casters > 0 { 1.0 } else { -libm::expm1(-statistics.caster_optical_depth) };
     let called_for = bound > allowance;
     let reason = if called_for {
         format!("{} splats cast and {} receive it", statistics.casters, statistics.receivers)

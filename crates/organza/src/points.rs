@@ -167,6 +167,7 @@ impl Drawing<'_> {
     /// One map for each light that the plan gives one.
     pub(crate) fn shadow_maps(&self, cost: &mut CostRecord) -> Result<Vec<Option<ShadowMap>>, Error> {
         let mut maps = Vec::new();
+        let mut left = self.plan.shadow_bytes;
         let (mut made, count) = (0, self.plan.shadow_maps.iter().filter(|on| **on).count());
         for (i, (light, table)) in self.loaded.lights.iter().zip(&self.plan.shadow_tables).enumerate() {
             self.tick()?;
@@ -176,7 +177,7 @@ impl Drawing<'_> {
             };
             made += 1;
             self.progress.begin(&work::shadow_map(made, count));
-            let params = table.params(self.settings, self.loaded);
+            let params = table.params(self.settings, self.loaded, left);
             let map = cost.measure(pass::SHADOW_MAP, |stage| {
                 let l = self.loaded;
                 let deposits = Deposits::new(&l.cloud, &l.materials, &l.objects, light, &params, self.progress)
@@ -188,6 +189,7 @@ impl Drawing<'_> {
                 stage.bytes = map.counts().bytes;
                 Ok::<_, Error>(map)
             })?;
+            left = left.saturating_sub(map.counts().bytes);
             maps.push(Some(map));
         }
         Ok(maps)

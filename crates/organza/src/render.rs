@@ -278,9 +278,10 @@ pub(crate) fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOption
     let memory = Memory::new(scene, loaded, average);
     memory::check("rendering", memory.total(), options.max_memory)?;
     // Shadow maps share what is left.
-    let tables = shadows::tables(&scene.render, loaded, &plan.shadow_maps, options.max_memory - memory.total());
-    plan.set_shadow_tables(tables.map_err(|(light, error)| shadow_error(light, &error))?);
-    let memory = memory.with_maps(plan.shadow_tables.iter().flatten());
+    let left = options.max_memory - memory.total();
+    let tables = shadows::tables(&scene.render, loaded, &plan.shadow_maps, left);
+    plan.set_shadow_tables(tables.map_err(|(light, error)| shadow_error(light, &error))?, left);
+    let memory = memory.with_maps(shadows::bytes(plan.shadow_tables.iter().flatten()));
     memory::check("rendering", memory.total(), options.max_memory)?;
     Ok((plan, memory))
 }
@@ -303,7 +304,7 @@ fn check_samples(scene: &Scene) -> Result<(), Error> {
 
 /// Depths back into the scene's unit.
 fn restore_depths(layers: &mut Layers, exponent: i32) {
-    let scale = f64::from(exponent).exp2() as f32;
+    let scale = libm::exp2(f64::from(exponent)) as f32;
     for (name, data) in &mut layers.images {
         if let (true, LayerData::Scalar(depth)) = (name.starts_with("depth."), data) {
             depth.iter_mut().for_each(|d| *d *= scale);

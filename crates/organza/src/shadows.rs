@@ -28,19 +28,19 @@ pub struct ShadowTable {
     pub map_bytes: u64,
     /// Transmittance at which lists stop.
     pub tolerance: f32,
-    /// Bytes that it may take.
+    /// Bytes within which its cells were chosen.
     pub max_bytes: u64,
 }
 
 impl ShadowTable {
-    /// What it is built by.
-    pub(crate) fn params(&self, settings: &RenderSettings, loaded: &Loaded) -> Params {
-        params(settings, loaded, self.tolerance, self.max_bytes)
+    /// What it is built by, where it and those after it may take so many bytes.
+    pub(crate) fn params(&self, settings: &RenderSettings, loaded: &Loaded, left: u64) -> Params {
+        params(settings, loaded, self.tolerance, self.max_bytes.min(left))
     }
 
     /// Absorbance at which lists stop.
     pub fn absorbance_cut(&self) -> f64 {
-        -f64::from(self.tolerance).ln()
+        -libm::log(f64::from(self.tolerance))
     }
 
     /// What the size of the cells follows from, in words.
@@ -83,10 +83,10 @@ fn params(settings: &RenderSettings, loaded: &Loaded, tolerance: f32, max_bytes:
 /// displayed value by more than the lamp's part of the tolerance.
 fn tolerance(settings: &RenderSettings, loaded: &Loaded, light: &Light, maps: u64) -> f32 {
     let of_lights = || {
-        let gain = DISPLAY_SLOPE * settings.exposure.exp2() * brightest(loaded, light).max(f64::MIN_POSITIVE);
+        let gain = DISPLAY_SLOPE * libm::exp2(settings.exposure) * brightest(loaded, light).max(f64::MIN_POSITIVE);
         CUT_SHARE * settings.tolerance / (gain * maps as f64)
     };
-    let asked = settings.points.shadow.absorbance_cut.map(|cut| (-cut).exp());
+    let asked = settings.points.shadow.absorbance_cut.map(|cut| libm::exp(-cut));
     asked.unwrap_or_else(of_lights).clamp(f64::from(f32::MIN_POSITIVE), 0.5) as f32
 }
 
@@ -108,11 +108,38 @@ fn brightest(loaded: &Loaded, light: &Light) -> f64 {
     if square > 0.0 { intensity / square } else { f64::INFINITY }
 }
 
-/// The table of each light that gets a map, where all maps together may take so many bytes.
+/// Bytes of shadow maps, which live at once: all finished, and what building one takes beside it. With a half more, for casters that
+/// are not spread evenly make more entries than are predicted.
+pub(crate) fn bytes<'a>(tables: impl Iterator<Item = &'a ShadowTable>) -> u64 {
+    let (mut finished, mut building) = (0u64, 0);
+    for table in tables {
+        finished = finished.saturating_add(table.map_bytes);
+        building = building.max(table.bytes - table.map_bytes);
+    }
+    let predicted = finished.saturating_add(building);
+    predicted.saturating_add(predicted / 2)
+}
+
+/// The table of each light that gets a map, where all maps together may take so many bytes: as fine as each would be alone, or,
+/// where that is too much, within an equal share of it.
 ///
 /// # Errors
 /// That of the first light whose table cannot be chosen, with its number.
 pub(crate) fn tables(
+    settings: &RenderSettings,
+    loaded: &Loaded,
+    wanted: &[bool],
+    max_bytes: u64,
+) -> Result<Vec<Option<ShadowTable>>, (usize, tsm::Error)> {
+    let alone = tables_within(settings, loaded, wanted, max_bytes)?;
+    if bytes(alone.iter().flatten()) <= max_bytes {
+        return Ok(alone);
+    }
+    let maps = alone.iter().flatten().count().max(1) as u64;
+    tables_within(settings, loaded, wanted, max_bytes / maps * 2 / 3)
+}
+
+fn tables_within(
     settings: &RenderSettings,
     loaded: &Loaded,
     wanted: &[bool],
@@ -124,7 +151,7 @@ pub(crate) fn tables(
             return Ok(None);
         }
         let tolerance = tolerance(settings, loaded, light, maps);
-        let params = params(settings, loaded, tolerance, max_bytes / maps);
+        let params = params(settings, loaded, tolerance, max_bytes);
         let predicted = Deposits::predict(&loaded.cloud, &loaded.materials, &loaded.objects, light, &params);
         let predicted = predicted.map_err(|e| (i, e))?;
         Ok(Some(ShadowTable {
@@ -134,7 +161,7 @@ pub(crate) fn tables(
             bytes: predicted.bytes,
             map_bytes: predicted.map_bytes,
             tolerance,
-            max_bytes: params.max_bytes,
+            max_bytes,
         }))
     };
     loaded.lights.iter().zip(wanted).enumerate().map(table).collect()

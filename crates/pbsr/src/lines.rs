@@ -263,7 +263,7 @@ impl<'a> LineSampler<'a> {
         let d = stream.direction();
         let [a, b] = across(d);
         let r = 0.75f64.sqrt() * leaf.side * stream.unit().sqrt();
-        let (sin, cos) = (TAU * stream.unit()).sin_cos();
+        let (sin, cos) = libm::sincos(TAU * stream.unit());
         Line { surface: self.surface, o: leaf.corner + 0.5 * leaf.side + (a * cos + b * sin) * r, d }
     }
 

@@ -35,7 +35,7 @@ pub fn opacity(n: f64, q: f64) -> f64 {
     if n <= 0.0 || q <= 0.0 {
         return 0.0;
     }
-    -(n * (-q.min(1.0)).ln_1p()).exp_m1()
+    -libm::expm1(n * libm::log1p(-q.min(1.0)))
 }
 
 /// n for opacity `alpha` at hit probability `q`: 0 for α ≤ 0, +∞ for α ≥ 1, which asks for the opaque path
@@ -49,7 +49,7 @@ pub fn count(alpha: f64, q: f64) -> f64 {
         // One particle is enough; the share of sets that have it is α.
         alpha
     } else {
-        (-alpha).ln_1p() / (-q).ln_1p()
+        libm::log1p(-alpha) / libm::log1p(-q)
     }
 }
 
@@ -58,7 +58,7 @@ pub fn count(alpha: f64, q: f64) -> f64 {
 pub fn whole_count(n: f64, q: f64, u: f64) -> u64 {
     let floor = n.max(0.0).floor();
     let fraction = n.max(0.0) - floor;
-    let share = if q > 0.0 && q < 1.0 { -(fraction * (-q).ln_1p()).exp_m1() / q } else { fraction };
+    let share = if q > 0.0 && q < 1.0 { -libm::expm1(fraction * libm::log1p(-q)) / q } else { fraction };
     floor as u64 + u64::from(u < share)
 }
 

@@ -115,7 +115,7 @@ impl Shares {
 
     /// What lies at θ, per angle.
     fn density(&self, theta: f64) -> f64 {
-        let (sin, cos) = theta.sin_cos();
+        let (sin, cos) = libm::sincos(theta);
         let at = cos * cos;
         let sum = self.powers.iter().rev().fold(0.0, |sum, weight| sum * at + weight);
         // cos^(2n−1)·sin²·cos in the ball, cos^(2n)·sin·cos on the disc.
@@ -141,7 +141,7 @@ impl Shares {
         }
         let total = self.inside[STEPS];
         // Whichever is smaller, and has its digits.
-        let (inside, outside) = (square.powf(power), -(power * (-t).ln_1p()).exp_m1());
+        let (inside, outside) = (libm::pow(square, power), -libm::expm1(power * libm::log1p(-t)));
         let (goal, begins_before) = if inside < 0.5 {
             (inside * total, self.inside.partition_point(|sum| *sum <= inside * total))
         } else {
@@ -159,7 +159,7 @@ impl Shares {
             };
             theta = (theta + rest / self.density(theta).max(f64::MIN_POSITIVE)).clamp(begin, end);
         }
-        theta.sin() / square.sqrt()
+        libm::sin(theta) / square.sqrt()
     }
 }
 

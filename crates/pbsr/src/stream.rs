@@ -66,8 +66,8 @@ impl Stream {
 
     /// Two independent standard normal numbers (Box-Muller).
     pub(crate) fn normal_pair(&mut self) -> [f64; 2] {
-        let radius = (-2.0 * self.unit().ln()).sqrt();
-        let (sin, cos) = (std::f64::consts::TAU * self.unit()).sin_cos();
+        let radius = (-2.0 * libm::log(self.unit())).sqrt();
+        let (sin, cos) = libm::sincos(std::f64::consts::TAU * self.unit());
         [radius * cos, radius * sin]
     }
 
@@ -80,7 +80,7 @@ impl Stream {
     /// A uniform point of the unit sphere.
     pub(crate) fn direction(&mut self) -> DVec3 {
         let z = 2.0 * self.unit() - 1.0;
-        let (sin, cos) = (std::f64::consts::TAU * self.unit()).sin_cos();
+        let (sin, cos) = libm::sincos(std::f64::consts::TAU * self.unit());
         // (1 − z)(1 + z) does not cancel at the poles.
         let r = ((1.0 - z) * (1.0 + z)).sqrt();
         DVec3::new(r * cos, r * sin, z)
@@ -96,7 +96,7 @@ impl Stream {
             return 0;
         }
         let mut rest = self.unit();
-        let mut p = (-mean).exp();
+        let mut p = libm::exp(-mean);
         let mut k = 0;
         while rest > p && k < 200 {
             rest -= p;
@@ -119,8 +119,8 @@ impl Stream {
             if k < 0.0 || (us < 0.013 && v > us) {
                 continue;
             }
-            let accept = (v * inverse_alpha / (a / (us * us) + b)).ln();
-            if accept <= k * mean.ln() - mean - ln_factorial(k) {
+            let accept = libm::log(v * inverse_alpha / (a / (us * us) + b));
+            if accept <= k * libm::log(mean) - mean - ln_factorial(k) {
                 return k as u64;
             }
         }
@@ -163,11 +163,11 @@ pub(crate) fn scramble(mut z: u64) -> u64 {
 /// ln(k!) for whole k ≥ 0: Stirling's series from 16 on.
 fn ln_factorial(k: f64) -> f64 {
     if k < 16.0 {
-        return (2..=k as u32).map(|i| f64::from(i).ln()).sum();
+        return (2..=k as u32).map(|i| libm::log(f64::from(i))).sum();
     }
     let i = 1.0 / k;
     let series = i * (1.0 / 12.0 - i * i * (1.0 / 360.0 - i * i / 1260.0));
-    (k + 0.5) * k.ln() - k + 0.5 * std::f64::consts::TAU.ln() + series
+    (k + 0.5) * libm::log(k) - k + 0.5 * libm::log(std::f64::consts::TAU) + series
 }
 
 /// Two unit vectors that span the plane across the unit vector `d`.

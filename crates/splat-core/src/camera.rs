@@ -120,7 +120,7 @@ impl Camera {
     pub fn focal_px(&self) -> f64 {
         let height_px = f64::from(self.size[1]);
         match self.projection {
-            Projection::Perspective { fov_y } => 0.5 * height_px / (0.5 * fov_y).tan(),
+            Projection::Perspective { fov_y } => 0.5 * height_px / libm::tan(0.5 * fov_y),
             Projection::Orthographic { height } => height_px / height,
         }
     }

@@ -205,7 +205,7 @@ impl DepthProfile {
             self.piece([depth, total]);
             self.piece([depth, f32::INFINITY]);
         }
-        let absorbed = -(-self.knot[1]).exp_m1();
+        let absorbed = -libm::expm1f(-self.knot[1]);
         if absorbed <= 0.0 {
             return [f32::INFINITY; 4];
         }
@@ -281,9 +281,9 @@ impl DepthProfile {
         if c < MEDIAN && MEDIAN <= to[1] {
             self.median = at(MEDIAN);
         }
-        let share = (-c).exp() * -(-delta).exp_m1();
+        let share = libm::expf(-c) * -libm::expm1f(-delta);
         let (mean, variance) = if length > 0.0 { moments(delta) } else { (0.0, 0.0) };
-        let absorbed = -(-to[1]).exp_m1();
+        let absorbed = -libm::expm1f(-to[1]);
         let step = start + length * mean - self.mean;
         self.mean += step * (share / absorbed).min(1.0);
         self.m2 += share * (step * (start + length * mean - self.mean) + length * length * variance);
@@ -297,7 +297,7 @@ fn moments(delta: f32) -> (f32, f32) {
         let mean = 0.5 - delta * (1.0 / 12.0 - square * (1.0 / 720.0 - square / 30_240.0));
         return (mean, 1.0 / 12.0 - square * (1.0 / 240.0 - square / 6048.0));
     }
-    let fall = -(-delta).exp_m1();
+    let fall = -libm::expm1f(-delta);
     let rest = 1.0 - fall;
     (1.0 / delta - rest / fall, 1.0 / square - rest / (fall * fall))
 }

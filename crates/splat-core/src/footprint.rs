@@ -52,7 +52,7 @@ impl Footprint {
         }
         let q = f64::from(self.sharpness());
         let x = q * (1.0 - s);
-        (-q * s).exp() - (-q).exp() * (1.0 + x + 0.5 * x * x)
+        libm::exp(-q * s) - libm::exp(-q) * (1.0 + x + 0.5 * x * x)
     }
 
     /// ∫sⁿ·w ds over \[0, 1\] for n = 0, 1, 2, from w = e^−q·Σ_{k≥3} (qt)^k/k!, t = 1 − s, whose terms are all positive.
@@ -60,7 +60,7 @@ impl Footprint {
         let q = f64::from(self.sharpness());
         let mut sums = [0.0; 3];
         // e^−q·q^k/(k + 1)!
-        let mut term = (-q).exp() / q;
+        let mut term = libm::exp(-q) / q;
         for k in 0..256 {
             let k = f64::from(k);
             term *= q / (k + 1.0);
@@ -82,7 +82,7 @@ impl Footprint {
     /// 1/∫w dA for R = 1: the factor that makes the footprint integrate to 1 over its plane is `norm()/R²`.
     pub fn norm(&self) -> f64 {
         let q = f64::from(self.sharpness());
-        1.0 / (PI * ((-(-q).exp_m1()) / q - (-q).exp() * (1.0 + q / 2.0 + q * q / 6.0)))
+        1.0 / (PI * ((-libm::expm1(-q)) / q - libm::exp(-q) * (1.0 + q / 2.0 + q * q / 6.0)))
     }
 }
 

@@ -98,7 +98,7 @@ impl Light {
             LightShape::Directional { direction } => (-direction, 1.0),
             LightShape::Spot { position, direction, inner, outer } => {
                 let (to_light, falloff) = from_point(position);
-                let (low, high) = (outer.cos(), inner.cos());
+                let (low, high) = (libm::cos(outer), libm::cos(inner));
                 let cosine = -to_light.dot(direction);
                 let t =
                     if high > low { ((cosine - low) / (high - low)).clamp(0.0, 1.0) } else { f64::from(cosine >= low) };

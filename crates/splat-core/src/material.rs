@@ -73,7 +73,7 @@ impl Material {
         let mut specular = 0.0;
         if self.specular > 0.0 && cosine > 0.0 {
             let mirrored = 2.0 * cosine * normal - to_light;
-            let lobe = mirrored.dot(to_eye).max(0.0).powf(self.shininess);
+            let lobe = libm::powf(mirrored.dot(to_eye).max(0.0), self.shininess);
             specular = self.specular * (self.shininess + 2.0) / (2.0 * PI) * lobe * cosine;
         }
         (self.diffuse / PI * diffuse, specular)

@@ -32,12 +32,12 @@ impl SurfaceOpacity {
 
 /// α = 1 − e^−τ, exact for τ → 0.
 pub fn opacity(optical_depth: f64) -> f64 {
-    -(-optical_depth).exp_m1()
+    -libm::expm1(-optical_depth)
 }
 
 /// τ = −ln(1 − α), exact for α → 0; infinite for α = 1.
 pub fn optical_depth(opacity: f64) -> f64 {
-    -(-opacity).ln_1p()
+    -libm::log1p(-opacity)
 }
 
 /// Opacity of each of `k` coincident layers that together have opacity `alpha`: 1 − (1 − α)^(1/k).

@@ -18,6 +18,7 @@ mod lanes;
 mod opaque;
 mod project;
 mod projected;
+mod shapes;
 mod tile;
 mod translucent;
 

@@ -163,7 +163,7 @@ impl Appearance {
         let cosine = p.z / p.length();
         let sin = (1.0 - cosine * cosine).max(0.0).sqrt();
         let turn = |angle: f64| angle / std::f64::consts::TAU * SECTORS as f64;
-        let centre = turn(f64::from(p.y + 0.0).atan2(f64::from(p.x)));
+        let centre = turn(libm::atan2(f64::from(p.y + 0.0), f64::from(p.x)));
         let half = if sin > 2.0 * reach { turn(1.2 * f64::from(reach / sin)) + 1.0 } else { SECTORS as f64 };
         let first = (centre - half).floor() as i64;
         let count = ((2.0 * half) as i64 + 2).min(SECTORS as i64);

@@ -25,7 +25,7 @@ impl Kernel {
     pub(crate) fn of_stack(stack: &FootprintStack) -> Vec<Self> {
         let kernel = |f: &splat_core::Footprint| Self {
             sharpness: f.sharpness(),
-            rim: (-f.sharpness()).exp(),
+            rim: libm::expf(-f.sharpness()),
             norm: f.norm() as f32,
             cutoff: f.cutoff,
             deviation: deviation(f),
@@ -45,7 +45,7 @@ impl Kernel {
 /// √(½·∫s·w dA/∫w dA) with s and w of [`splat_core::Footprint::profile`], in closed form.
 fn deviation(f: &Footprint) -> f32 {
     let q = 0.5 * f64::from(f.cutoff).powi(2);
-    let rim = (-q).exp();
+    let rim = libm::exp(-q);
     let moment = (1.0 - rim * (1.0 + q)) / (q * q) - rim * (0.5 + q / 6.0 + q * q / 24.0);
     (0.5 * std::f64::consts::PI * f.norm() * moment).sqrt() as f32
 }

@@ -122,7 +122,7 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
         let bent = self.weight(caster, through(BENT, most * angle).max(corner)) * (1.0 - wide);
         let mut rest = 1.0 - wide - bent;
         // Between two powers of two, both numbers of rays are taken in part.
-        let octave = if bent > 0.0 { between(RAYS / least, 1.0, FINE).log2() } else { 0.0 };
+        let octave = if bent > 0.0 { libm::log2f(between(RAYS / least, 1.0, FINE)) } else { 0.0 };
         let finer = self.weight(caster, octave.fract());
         let rays = 1 << octave as u32;
         for (weight, samples) in [(wide, 1), (bent * (1.0 - finer), rays), (bent * finer, 2 * rays)] {

@@ -122,7 +122,7 @@ impl ShadowMap {
             let step = steps(lists.list(cell), surface);
             (0..C).for_each(|c| absorbance[c] += step[c]);
         }
-        absorbance.map(|a| if self.dark_from.is_some_and(|limit| a > limit) { 0.0 } else { (-a).exp() })
+        absorbance.map(|a| if self.dark_from.is_some_and(|limit| a > limit) { 0.0 } else { libm::expf(-a) })
     }
 }
 

@@ -77,7 +77,7 @@ impl Params {
     /// Absorbance at which lists stop.
     pub fn absorbance_limit(&self) -> f32 {
         match self.absorbance {
-            AbsorbanceModel::CrossSection => -self.tolerance.ln(),
+            AbsorbanceModel::CrossSection => -libm::logf(self.tolerance),
             AbsorbanceModel::Paper => 2.0,
         }
     }

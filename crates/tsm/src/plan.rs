@@ -102,7 +102,9 @@ fn frame_of(casters: &Casters<'_>, survey: &Survey, light: &Light) -> Result<(Ki
         (MappingChoice::Octahedral, _) => sphere(),
         // The paper's axes are the world's.
         (MappingChoice::PolarAzimuth, _) => (Kind::Polar, Frame::new(position, DVec3::AXES, extent)),
-        (_, LightShape::Spot { direction, outer, .. }) if outer < 1.2 => planar(direction, Some(outer.tan() as f32)),
+        (_, LightShape::Spot { direction, outer, .. }) if outer < 1.2 => {
+            planar(direction, Some(libm::tan(outer) as f32))
+        }
         (MappingChoice::Planar, _) if wide => planar(to_centre, None),
         (MappingChoice::Planar, _) => {
             return Err(Error::Parameter {
@@ -213,7 +215,7 @@ impl Extent {
 
 /// The paper's pol_min, pol_max, az_min, az_max: the azimuth leaves out the widest gap between casters.
 fn fit(look: &Appearance) -> PolarRange {
-    let acos = |c: f32| f64::from(c.clamp(-1.0, 1.0)).acos();
+    let acos = |c: f32| libm::acos(f64::from(c.clamp(-1.0, 1.0)));
     let mut polar = [acos(look.cosine[1]), acos(look.cosine[0])];
     if polar[0] >= polar[1] {
         return PolarRange::SPHERE;
@@ -265,7 +267,7 @@ fn automatic_cell(casters: &Casters<'_>, survey: &Survey, look: &Appearance, ext
 /// [`crate::Params::entries_per_splat`], cells become finer with the splats again.
 fn budget(casters: &Casters<'_>, n: f64) -> f64 {
     let [splats, cells] = REFINED;
-    let same = n * (1.0 + cells * (splats / n.max(1.0)).cbrt()).powi(2);
+    let same = n * (1.0 + cells * libm::cbrt(splats / n.max(1.0))).powi(2);
     same.max(f64::from(casters.params.entries_per_splat) * n)
 }
 

@@ -148,7 +148,7 @@ pub(crate) fn ahead(caster: &Caster, along: f32, s: f32) -> Option<(f32, f32)> {
     let scale = std::f64::consts::FRAC_1_SQRT_2;
     let share = 0.5 * (1.0 + erf(t * scale) / erf(f64::from(half) / sigma * scale));
     let below = (0.5 * (1.0 + erf(t * scale))).max(1e-6);
-    let density = (-0.5 * t * t).exp() / (2.0 * std::f64::consts::PI).sqrt();
+    let density = libm::exp(-0.5 * t * t) / (2.0 * std::f64::consts::PI).sqrt();
     let mean = sigma * (t + density / below);
     Some((share as f32, mean.max(sigma / 1024.0) as f32))
 }

@@ -62,14 +62,14 @@ impl Interval {
             return Self { low: -1.0, high: 1.0 };
         }
         let passes = |v: f64| ((low - v) / TAU).ceil() * TAU + v <= high;
-        let (a, b) = (low.sin(), high.sin());
+        let (a, b) = (libm::sin(low), libm::sin(high));
         Self {
             low: if passes(-FRAC_PI_2) { -1.0 } else { (a.min(b) - slack).max(-1.0) },
             high: if passes(FRAC_PI_2) { 1.0 } else { (a.max(b) + slack).min(1.0) },
         }
     }
 
-    fn tan(self) -> Self {
+    fn tangent(self) -> Self {
         let slack = 1e-15 * (self.low.abs().max(self.high.abs()) + PI);
         let pole = ((self.low - slack - FRAC_PI_2) / PI).ceil() * PI + FRAC_PI_2;
         let width = self.high - self.low;
@@ -118,14 +118,14 @@ impl Number for Interval {
             Unary::Neg => Self { low: -self.high, high: -self.low },
             Unary::Sin => self.wave(0.0),
             Unary::Cos => self.wave(FRAC_PI_2),
-            Unary::Tan => self.tan(),
+            Unary::Tan => self.tangent(),
             Unary::Asin => self.rising_within(f, -1.0, 1.0),
             Unary::Acos if self.low < -1.0 || self.high > 1.0 => UNKNOWN,
-            Unary::Acos => Self::widened(self.high.acos(), self.low.acos()),
+            Unary::Acos => Self::widened(libm::acos(self.high), libm::acos(self.low)),
             Unary::Atan | Unary::Sinh | Unary::Tanh | Unary::Exp => self.rising(f),
             Unary::Cosh => {
-                let low = if self.contains(0.0) { 1.0 } else { self.low.cosh().min(self.high.cosh()) };
-                Self::widened(low, self.low.cosh().max(self.high.cosh()))
+                let low = if self.contains(0.0) { 1.0 } else { libm::cosh(self.low).min(libm::cosh(self.high)) };
+                Self::widened(low, libm::cosh(self.low).max(libm::cosh(self.high)))
             }
             Unary::Ln | Unary::Log10 | Unary::Log2 => self.rising_within(f, f64::MIN_POSITIVE, f64::INFINITY),
             Unary::Sqrt => self.rising_within(f, 0.0, f64::INFINITY),

@@ -75,8 +75,8 @@ fn derivatives(f: Unary, x: f64) -> [f64; 3] {
     let u = x.unary(f);
     match f {
         Unary::Neg => [u, -1.0, 0.0],
-        Unary::Sin => [u, x.cos(), -u],
-        Unary::Cos => [u, -x.sin(), -u],
+        Unary::Sin => [u, libm::cos(x), -u],
+        Unary::Cos => [u, -libm::sin(x), -u],
         Unary::Tan => [u, 1.0 + u * u, 2.0 * u * (1.0 + u * u)],
         Unary::Asin => {
             let c = 1.0 - x * x;
@@ -90,8 +90,8 @@ fn derivatives(f: Unary, x: f64) -> [f64; 3] {
             let d = 1.0 / (1.0 + x * x);
             [u, d, -2.0 * x * d * d]
         }
-        Unary::Sinh => [u, x.cosh(), u],
-        Unary::Cosh => [u, x.sinh(), u],
+        Unary::Sinh => [u, libm::cosh(x), u],
+        Unary::Cosh => [u, libm::sinh(x), u],
         Unary::Tanh => [u, 1.0 - u * u, -2.0 * u * (1.0 - u * u)],
         Unary::Exp => [u, u, u],
         Unary::Ln => [u, 1.0 / x, -1.0 / (x * x)],
@@ -129,10 +129,12 @@ impl Number for Jet {
                 self.combine(other, [u, r, -u * r, 0.0, -r * r, 2.0 * u * r * r])
             }
             // ln a is not wanted where the exponent is constant: a may be negative or 0.
-            Binary::Pow if other.is_constant() => self.chain([u, b * a.powf(b - 1.0), b * (b - 1.0) * a.powf(b - 2.0)]),
+            Binary::Pow if other.is_constant() => {
+                self.chain([u, b * libm::pow(a, b - 1.0), b * (b - 1.0) * libm::pow(a, b - 2.0)])
+            }
             Binary::Pow => {
-                let (l, w) = (a.ln(), a.powf(b - 1.0));
-                let aa = b * (b - 1.0) * a.powf(b - 2.0);
+                let (l, w) = (libm::log(a), libm::pow(a, b - 1.0));
+                let aa = b * (b - 1.0) * libm::pow(a, b - 2.0);
                 self.combine(other, [u, b * w, u * l, aa, w * (1.0 + b * l), u * l * l])
             }
             Binary::Min => {

@@ -143,19 +143,19 @@ impl Number for f64 {
     fn unary(self, f: Unary) -> Self {
         match f {
             Unary::Neg => -self,
-            Unary::Sin => self.sin(),
-            Unary::Cos => self.cos(),
-            Unary::Tan => self.tan(),
-            Unary::Asin => self.asin(),
-            Unary::Acos => self.acos(),
-            Unary::Atan => self.atan(),
-            Unary::Sinh => self.sinh(),
-            Unary::Cosh => self.cosh(),
-            Unary::Tanh => self.tanh(),
-            Unary::Exp => self.exp(),
-            Unary::Ln => self.ln(),
-            Unary::Log10 => self.log10(),
-            Unary::Log2 => self.log2(),
+            Unary::Sin => libm::sin(self),
+            Unary::Cos => libm::cos(self),
+            Unary::Tan => libm::tan(self),
+            Unary::Asin => libm::asin(self),
+            Unary::Acos => libm::acos(self),
+            Unary::Atan => libm::atan(self),
+            Unary::Sinh => libm::sinh(self),
+            Unary::Cosh => libm::cosh(self),
+            Unary::Tanh => libm::tanh(self),
+            Unary::Exp => libm::exp(self),
+            Unary::Ln => libm::log(self),
+            Unary::Log10 => libm::log10(self),
+            Unary::Log2 => libm::log2(self),
             Unary::Sqrt => self.sqrt(),
             Unary::Abs => self.abs(),
             Unary::Powi(n) => self.powi(n),
@@ -168,7 +168,7 @@ impl Number for f64 {
             Binary::Sub => self - other,
             Binary::Mul => self * other,
             Binary::Div => self / other,
-            Binary::Pow => self.powf(other),
+            Binary::Pow => libm::pow(self, other),
             // f64::min and max hide NaN; a field must not.
             Binary::Min => {
                 if self <= other || self.is_nan() {
@@ -184,7 +184,7 @@ impl Number for f64 {
                     other
                 }
             }
-            Binary::Atan2 => self.atan2(other),
+            Binary::Atan2 => libm::atan2(self, other),
         }
     }
 }

@@ -107,9 +107,9 @@ impl<const N: usize> Slopes<N> {
         let mut found = self;
         for i in 0..N {
             let (a, b) = (self.value[i], other.value[i]);
-            let (u, by_base) = (a.powf(b), b * a.powf(b - 1.0));
+            let (u, by_base) = (libm::pow(a, b), b * libm::pow(a, b - 1.0));
             let constant = (0..3).all(|axis| other.gradient[axis][i] == 0.0);
-            let by_exponent = if constant { 0.0 } else { u * a.ln() };
+            let by_exponent = if constant { 0.0 } else { u * libm::log(a) };
             found.value[i] = u;
             for axis in 0..3 {
                 found.gradient[axis][i] = self.gradient[axis][i] * by_base + other.gradient[axis][i] * by_exponent;
@@ -149,7 +149,7 @@ impl<const N: usize> Number for Slopes<N> {
             Binary::Pow => self.power(other),
             Binary::Atan2 => self.combine(other, |a, b| {
                 let q = 1.0 / (a * a + b * b);
-                [a.atan2(b), b * q, -a * q]
+                [libm::atan2(a, b), b * q, -a * q]
             }),
         }
     }
@@ -161,19 +161,19 @@ fn slope(f: Unary, x: f64) -> [f64; 2] {
     match f {
         Unary::Neg => [-x, -1.0],
         Unary::Sin => {
-            let (sin, cos) = x.sin_cos();
+            let (sin, cos) = libm::sincos(x);
             [sin, cos]
         }
         Unary::Cos => {
-            let (sin, cos) = x.sin_cos();
+            let (sin, cos) = libm::sincos(x);
             [cos, -sin]
         }
         Unary::Tan => [u(f), 1.0 + u(f) * u(f)],
         Unary::Asin => [u(f), 1.0 / (1.0 - x * x).sqrt()],
         Unary::Acos => [u(f), -1.0 / (1.0 - x * x).sqrt()],
         Unary::Atan => [u(f), 1.0 / (1.0 + x * x)],
-        Unary::Sinh => [u(f), x.cosh()],
-        Unary::Cosh => [u(f), x.sinh()],
+        Unary::Sinh => [u(f), libm::cosh(x)],
+        Unary::Cosh => [u(f), libm::sinh(x)],
         Unary::Tanh => [u(f), 1.0 - u(f) * u(f)],
         Unary::Exp => [u(f), u(f)],
         Unary::Ln => [u(f), 1.0 / x],

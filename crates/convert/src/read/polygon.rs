@@ -127,7 +127,7 @@ fn project(corners: &[u32], position: &[Vec3]) -> Option<Vec<DVec2>> {
         (u, v) = (v, u);
     }
     let largest = (0..corners.len()).fold(0.0, |l: f64, i| l.max(at(i)[u].abs()).max(at(i)[v].abs()));
-    let factor = (-largest.log2().floor()).exp2();
+    let factor = libm::exp2(-libm::log2(largest).floor());
     let scaled = |x: f64| if (x * factor).abs() < NOTHING { 0.0 } else { x * factor };
     Some((0..corners.len()).map(|i| DVec2::new(scaled(at(i)[u]), scaled(at(i)[v]))).collect())
 }

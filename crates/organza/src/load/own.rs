@@ -332,7 +332,7 @@ impl Search {
         }
         let some = found[0].cmplt(found[1]).all();
         let bounds = if some { found.map(|p| p.clamp(low, high)) } else { [low, high] };
-        Self { bounds, area: n * cells.step.element_product().powf(2.0 / 3.0) }
+        Self { bounds, area: n * libm::pow(cells.step.element_product(), 2.0 / 3.0) }
     }
 }
 

@@ -9,7 +9,7 @@ use splat_core::Layers;
 /// The bytes of the PNG file.
 pub(super) fn encode(layers: &Layers, metadata: &Metadata, report: &mut WriteReport) -> Result<Vec<u8>, Error> {
     let beauty = layers.rgb("beauty").ok_or_else(|| Error::Internal("a render has no beauty layer".into()))?;
-    let gain = metadata.exposure.exp2() as f32;
+    let gain = libm::exp2(metadata.exposure) as f32;
     let mut pixels = Vec::with_capacity(beauty.len() * 3);
     for channel in beauty.iter().flatten() {
         report.not_a_number += u64::from(channel.is_nan());
@@ -27,7 +27,7 @@ pub(super) fn encode(layers: &Layers, metadata: &Metadata, report: &mut WriteRep
 pub(crate) fn displayed(linear: f32) -> u8 {
     // Before the curve: its power is undefined below 0. NaN.max(0) is 0, where NaN.clamp would stay NaN.
     let x = linear.max(0.0).clamp(0.0, 1.0);
-    let encoded = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
+    let encoded = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * libm::powf(x, 1.0 / 2.4) - 0.055 };
     (encoded * 255.0 + 0.5) as u8
 }
 

@@ -17,7 +17,7 @@ pub(super) fn accumulate(ensemble: &Ensemble, layout: &ChannelLayout, accumulato
     let by_channel = layers.rgb("alpha_rgb");
     let opacity = |k: usize, c: usize| by_channel.map_or(alpha[k], |rgb| rgb[k][c]);
     for (c, plane) in accumulator.optical_depth.iter_mut().enumerate() {
-        plane.iter_mut().enumerate().for_each(|(k, to)| *to = (-(-opacity(k, c)).ln_1p()).min(HIDDEN));
+        plane.iter_mut().enumerate().for_each(|(k, to)| *to = (-libm::log1pf(-opacity(k, c))).min(HIDDEN));
     }
     let mut put = |first: usize, name: &str, weight: &dyn Fn(usize) -> f32| {
         let image = layers.rgb(name).expect("invariant: an ensemble keeps the layers of its channels");

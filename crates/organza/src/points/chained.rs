@@ -48,7 +48,7 @@ impl Drawing<'_> {
         let mut castings = Vec::new();
         for (i, (light, table)) in l.lights.iter().zip(&self.plan.shadow_tables).enumerate() {
             let Some(table) = table.filter(|_| light.intensity != [0.0; 3]) else { continue };
-            let params = table.params(self.settings, l);
+            let params = table.params(self.settings, l, self.plan.shadow_bytes);
             self.tick()?;
             let made = cost.measure(pass::SHADOW_MAP, |stage| {
                 stage.items_in = l.cloud.len() as u64;

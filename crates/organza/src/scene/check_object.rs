@@ -12,7 +12,7 @@ use super::{
 use crate::Error;
 use convert::ExpressionField;
 use convert::read::{UpAxis, up_axis};
-use glam::{DQuat, DVec3, EulerRot};
+use glam::{DQuat, DVec3};
 use splat_core::{FootprintStack, Similarity, TransferFunction, TransferPoint, optics};
 
 /// The keys that name a source.
@@ -351,14 +351,21 @@ fn check_cloud(at: &At<'_>, raw: &RawCloud, extinction: f64) -> Result<CloudSour
 fn check_transform(at: &At<'_>, raw: &RawTransform, up: UpAxis) -> Result<Similarity, Error> {
     let angles = at.vector("rotate", raw.rotate)?.map(f64::to_radians);
     // Extrinsic x, y, z is intrinsic z, y, x.
-    let rotation = DQuat::from_euler(EulerRot::ZYX, angles.z, angles.y, angles.x);
+    let rotation = turned(DVec3::Z, angles.z) * turned(DVec3::Y, angles.y) * turned(DVec3::X, angles.x);
     let up = match up {
         UpAxis::Y => DQuat::IDENTITY,
-        UpAxis::Z => DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2),
+        UpAxis::Z => turned(DVec3::X, -std::f64::consts::FRAC_PI_2),
     };
     Ok(Similarity {
         scale: at.length("scale", raw.scale.unwrap_or(1.0))?,
         rotation: (rotation * up).normalize(),
         translation: at.vector("translate", raw.translate)?,
     })
+}
+
+/// A turn about an axis, radians, with the same bits on every system, which glam's own has not.
+fn turned(axis: DVec3, angle: f64) -> DQuat {
+    let (sin, cos) = libm::sincos(0.5 * angle);
+    let v = axis * sin;
+    DQuat::from_xyzw(v.x, v.y, v.z, cos)
 }

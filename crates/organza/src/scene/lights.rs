@@ -90,7 +90,7 @@ impl SceneLight {
 fn in_disc(i: u32, n: f64) -> (f64, f64) {
     let radius = ((f64::from(i) + 0.5) / n).sqrt();
     let angle = std::f64::consts::TAU * (GOLDEN * f64::from(i)).fract();
-    (radius * angle.cos(), radius * angle.sin())
+    (radius * libm::cos(angle), radius * libm::sin(angle))
 }
 
 /// Point `i` of `n` in the unit ball with density ∝ 1/√(1 − r²), which projects to an even disc in every direction, as
@@ -101,12 +101,12 @@ fn in_ball(i: u32, n: f64) -> DVec3 {
     let z = 1.0 - 2.0 * (f64::from(i) + 0.5) / n;
     let angle = std::f64::consts::TAU * (GOLDEN * f64::from(i)).fract();
     let ring = (1.0 - z * z).sqrt();
-    let direction = DVec3::new(ring * angle.cos(), ring * angle.sin(), z);
+    let direction = DVec3::new(ring * libm::cos(angle), ring * libm::sin(angle), z);
     let share = (0.5 + PLASTIC[0] * f64::from(i)).fract();
     let (mut low, mut high) = (0.0, 1.0f64);
     for _ in 0..40 {
         let r = 0.5 * (low + high);
-        let inside = std::f64::consts::FRAC_2_PI * (r.asin() - r * (1.0 - r * r).sqrt());
+        let inside = std::f64::consts::FRAC_2_PI * (libm::asin(r) - r * (1.0 - r * r).sqrt());
         if inside < share { low = r } else { high = r }
     }
     direction * (0.5 * (low + high))

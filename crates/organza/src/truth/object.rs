@@ -259,7 +259,7 @@ fn surface(scene: &Scene, object: &SceneObject, mut mesh: Mesh) -> Body {
     let opacity = object.opacity.unwrap_or(material.opacity);
     let kind = if opacity < 1.0 {
         let tau = optics::optical_depth(opacity);
-        let opacity = m.extinction_rgb.map(|e| -(-tau * f64::from(e)).exp_m1());
+        let opacity = m.extinction_rgb.map(|e| -libm::expm1(-tau * f64::from(e)));
         SurfaceKind::Translucent { opacity, law: m.surface_opacity }
     } else {
         SurfaceKind::Opaque

@@ -52,7 +52,7 @@ impl Twin {
         let runs = of_run.flat_map(|(run, rank)| run.chunks.clone().map(move |_| [run.chunks.start as u32, rank]));
         for ((first, elements, mean), [run_begin, run]) in blocks.spans().zip(runs) {
             let [whole, fraction] = [mean.floor(), mean.fract()];
-            let numbers = if mean < REJECTED_FROM { [(-mean).exp(), 0.0, 0.0, 0.0] } else { rejection(mean) };
+            let numbers = if mean < REJECTED_FROM { [libm::exp(-mean), 0.0, 0.0, 0.0] } else { rejection(mean) };
             let [b, a, v_r, inverse_alpha] = numbers.map(|v| (v as f32).to_bits());
             let fraction = (fraction as f32).to_bits();
             let of_chunk = [first as u32, elements as u32, whole as u32, fraction];

@@ -109,7 +109,7 @@ pub(crate) fn depth_of(footprint: &Footprint) -> f32 {
 fn fit(q: f64) -> [f32; TERMS] {
     let node = |k: usize| {
         let angle = (k as f64 + 0.5) * PI / TERMS as f64;
-        FIT_BEGIN + (1.0 - FIT_BEGIN) * (0.5 + 0.5 * angle.cos())
+        FIT_BEGIN + (1.0 - FIT_BEGIN) * (0.5 + 0.5 * libm::cos(angle))
     };
     let nodes: [f64; TERMS] = std::array::from_fn(node);
     // Newton's divided differences, then multiplied out from the last.
@@ -136,7 +136,7 @@ fn tail(q: f64, t: f64) -> f64 {
         sum += term;
         term *= q * t / f64::from(j);
     }
-    q * q * q * (-q).exp() * sum
+    q * q * q * libm::exp(-q) * sum
 }
 
 #[cfg(test)]

@@ -18,6 +18,7 @@ use super::gather::{Attributes, Column, Columns};
 use super::kernel::Kernel;
 use super::lanes::Lanes;
 use super::projected::{Coverage, Detail, NearDisc, Projected, ProjectedDepth, ProjectedSplat};
+use super::shapes::{Image, Shapes};
 use crate::{Camera, Cloud, FootprintStack, Material, ViewTransform};
 use glam::{Vec2, Vec3};
 use pulp::Simd;
@@ -157,20 +158,6 @@ impl pulp::WithSimd for ProjectChunk<'_> {
     }
 }
 
-/// Footprints of one group of lanes, on their way to memory.
-#[derive(Default)]
-struct Image {
-    center: [Column; 2],
-    depth: Column,
-    conic: [Column; 3],
-    /// Not positive for what has no image.
-    peak: Column,
-    half_extent: [Column; 2],
-    slope: [Column; 2],
-    /// 1 for a disc that reaches through the eye plane, else −1.
-    near: Column,
-}
-
 /// Centres in view space.
 struct Centers<S: Simd> {
     position: [Lanes<S>; 3],
@@ -181,16 +168,6 @@ struct Centers<S: Simd> {
     u: Lanes<S>,
     v: Lanes<S>,
     filter_px: Lanes<S>,
-}
-
-/// What differs between media and discs.
-struct Shapes<S: Simd> {
-    conic: [Lanes<S>; 3],
-    peak: Lanes<S>,
-    half_extent: [Lanes<S>; 2],
-    slope: [Lanes<S>; 2],
-    /// 1 for a disc that reaches through the eye plane, else −1.
-    near: Lanes<S>,
 }
 
 impl Projector<'_> {
@@ -457,38 +434,6 @@ impl Projector<'_> {
         };
         let along = normal.dot(ray);
         [along, (along.abs() / ray.length()).max(1e-3)]
-    }
-}
-
-impl Image {
-    /// Whether one of the first `count` reaches through the eye plane.
-    #[inline(always)]
-    fn any_near(&self, count: usize) -> bool {
-        self.near[..count].iter().fold(false, |any, near| any | (*near > 0.0))
-    }
-
-    fn write_depths(&self, attributes: &Attributes, depths: &mut [ProjectedDepth]) {
-        for (l, depth) in depths.iter_mut().enumerate() {
-            let (center, slope, extent) = (self.depth[l], self.slope.map(|s| s[l]), attributes.radius[l]);
-            *depth = ProjectedDepth { center, slope, extent };
-        }
-    }
-}
-
-impl<S: Simd> Shapes<S> {
-    /// `self` where `a` < `b`, `other` elsewhere.
-    #[inline(always)]
-    fn where_less(&self, a: Lanes<S>, b: Lanes<S>, other: &Self) -> Self {
-        let choose = |one: Lanes<S>, other: Lanes<S>| one.where_less_or(a, b, other);
-        let pair = |one: [Lanes<S>; 2], other: [Lanes<S>; 2]| [choose(one[0], other[0]), choose(one[1], other[1])];
-        let ([a, b, c], [d, e, f]) = (self.conic, other.conic);
-        Self {
-            conic: [choose(a, d), choose(b, e), choose(c, f)],
-            peak: choose(self.peak, other.peak),
-            half_extent: pair(self.half_extent, other.half_extent),
-            near: choose(self.near, other.near),
-            slope: pair(self.slope, other.slope),
-        }
     }
 }
 

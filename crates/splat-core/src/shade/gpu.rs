@@ -110,7 +110,7 @@ pub fn suits(input: &ShadeInput<'_>) -> Result<(), &'static str> {
         return Err("highlights of an exponent above 64 are shaded by the processor");
     }
     let narrow = |light: &Light| match light.shape {
-        LightShape::Spot { inner, outer, .. } => inner.cos() - outer.cos() < LEAST_RIM,
+        LightShape::Spot { inner, outer, .. } => libm::cos(inner) - libm::cos(outer) < LEAST_RIM,
         LightShape::Point { .. } | LightShape::Directional { .. } => false,
     };
     if input.lights.iter().any(|lit| narrow(&lit.light)) {
@@ -279,7 +279,7 @@ fn lights(input: &ShadeInput<'_>) -> impl Iterator<Item = [f32; 4]> {
             LightShape::Point { position } => (0.0, position, DVec3::ZERO, 0.0, 0.0),
             LightShape::Directional { direction } => (1.0, origin, direction, 0.0, 0.0),
             LightShape::Spot { position, direction, inner, outer } => {
-                (2.0, position, direction, outer.cos() as f32, inner.cos() as f32)
+                (2.0, position, direction, libm::cos(outer) as f32, libm::cos(inner) as f32)
             }
         };
         let slot = if lit.shadow.is_some() { slots as f32 } else { -1.0 };

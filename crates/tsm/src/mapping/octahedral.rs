@@ -96,7 +96,7 @@ fn direction([x, y]: [f64; 2]) -> Vec3 {
     let phi = if r > 0.0 { std::f64::consts::FRAC_PI_2 * y / r } else { 0.0 };
     let sin_theta = r * (2.0 - r * r).max(0.0).sqrt();
     let z = if upper { 1.0 - r * r } else { r * r - 1.0 };
-    Vec3::new((sin_theta * phi.cos()) as f32, (sin_theta * phi.sin()) as f32, z as f32)
+    Vec3::new((sin_theta * libm::cos(phi)) as f32, (sin_theta * libm::sin(phi)) as f32, z as f32)
 }
 
 /// Azimuth in the first quadrant as a share of a right angle.

@@ -70,8 +70,8 @@ impl Mapping for PolarAzimuth {
             return None;
         }
         // Adding zero turns −0 into +0, so that both sides of the seam agree on its azimuth.
-        let azimuth = f64::from(p.y + 0.0).atan2(f64::from(p.x));
-        let polar = f64::from(p.x.hypot(p.y)).atan2(f64::from(p.z));
+        let azimuth = libm::atan2(f64::from(p.y + 0.0), f64::from(p.x));
+        let polar = libm::atan2(f64::from(libm::hypotf(p.x, p.y)), f64::from(p.z));
         let [per_azimuth, per_polar] = self.scale();
         let turn = (azimuth - self.range.azimuth[0]).rem_euclid(TAU);
         let row = (polar - self.range.polar[0]) * per_polar;
@@ -83,7 +83,7 @@ impl Mapping for PolarAzimuth {
 
     fn gradients(&self, p: Vec3) -> [Vec3; 2] {
         let distance = p.length();
-        let sin = p.x.hypot(p.y) / distance;
+        let sin = libm::hypotf(p.x, p.y) / distance;
         let cos = p.z / distance;
         let (c, s) = if sin > 0.0 { (p.x / (sin * distance), p.y / (sin * distance)) } else { (1.0, 0.0) };
         let [per_azimuth, per_polar] = self.scale().map(|v| v as f32);
@@ -109,8 +109,8 @@ impl Mapping for PolarAzimuth {
 
     fn ray(&self, at: Vec2) -> Ray {
         let [per_azimuth, per_polar] = self.scale();
-        let (sin_a, cos_a) = (self.range.azimuth[0] + f64::from(at.x) / per_azimuth).sin_cos();
-        let (sin_p, cos_p) = (self.range.polar[0] + f64::from(at.y) / per_polar).sin_cos();
+        let (sin_a, cos_a) = libm::sincos(self.range.azimuth[0] + f64::from(at.x) / per_azimuth);
+        let (sin_p, cos_p) = libm::sincos(self.range.polar[0] + f64::from(at.y) / per_polar);
         let direction = Vec3::new((sin_p * cos_a) as f32, (sin_p * sin_a) as f32, cos_p as f32);
         Ray { base: Vec3::ZERO, direction }
     }
@@ -123,11 +123,11 @@ impl Mapping for PolarAzimuth {
         let [per_azimuth, per_polar] = self.scale();
         let row = f64::from(cell / self.columns);
         let middle = self.range.polar[0] + (row + 0.5) / per_polar;
-        2.0 * middle.sin() * (0.5 / per_polar).sin() / per_azimuth
+        2.0 * libm::sin(middle) * libm::sin(0.5 / per_polar) / per_azimuth
     }
 
     fn density(&self, ray: &Ray) -> f32 {
-        ray.direction.x.hypot(ray.direction.y)
+        libm::hypotf(ray.direction.x, ray.direction.y)
     }
 
     fn clearance(&self, at: Vec2, half: Vec2) -> f32 {

@@ -1,0 +1,62 @@
+//! Footprints of one group of lanes: as they are computed, and on their way to memory.
+
+use super::gather::{Attributes, Column};
+use super::lanes::Lanes;
+use super::projected::ProjectedDepth;
+use pulp::Simd;
+
+/// Footprints of one group of lanes, on their way to memory.
+#[derive(Default)]
+pub(super) struct Image {
+    pub(super) center: [Column; 2],
+    pub(super) depth: Column,
+    pub(super) conic: [Column; 3],
+    /// Not positive for what has no image.
+    pub(super) peak: Column,
+    pub(super) half_extent: [Column; 2],
+    pub(super) slope: [Column; 2],
+    /// 1 for a disc that reaches through the eye plane, else −1.
+    pub(super) near: Column,
+}
+
+/// What differs between media and discs.
+pub(super) struct Shapes<S: Simd> {
+    pub(super) conic: [Lanes<S>; 3],
+    pub(super) peak: Lanes<S>,
+    pub(super) half_extent: [Lanes<S>; 2],
+    pub(super) slope: [Lanes<S>; 2],
+    /// 1 for a disc that reaches through the eye plane, else −1.
+    pub(super) near: Lanes<S>,
+}
+
+impl Image {
+    /// Whether one of the first `count` reaches through the eye plane.
+    #[inline(always)]
+    pub(super) fn any_near(&self, count: usize) -> bool {
+        self.near[..count].iter().fold(false, |any, near| any | (*near > 0.0))
+    }
+
+    pub(super) fn write_depths(&self, attributes: &Attributes, depths: &mut [ProjectedDepth]) {
+        for (l, depth) in depths.iter_mut().enumerate() {
+            let (center, slope, extent) = (self.depth[l], self.slope.map(|s| s[l]), attributes.radius[l]);
+            *depth = ProjectedDepth { center, slope, extent };
+        }
+    }
+}
+
+impl<S: Simd> Shapes<S> {
+    /// `self` where `a` < `b`, `other` elsewhere.
+    #[inline(always)]
+    pub(super) fn where_less(&self, a: Lanes<S>, b: Lanes<S>, other: &Self) -> Self {
+        let choose = |one: Lanes<S>, other: Lanes<S>| one.where_less_or(a, b, other);
+        let pair = |one: [Lanes<S>; 2], other: [Lanes<S>; 2]| [choose(one[0], other[0]), choose(one[1], other[1])];
+        let ([a, b, c], [d, e, f]) = (self.conic, other.conic);
+        Self {
+            conic: [choose(a, d), choose(b, e), choose(c, f)],
+            peak: choose(self.peak, other.peak),
+            half_extent: pair(self.half_extent, other.half_extent),
+            near: choose(self.near, other.near),
+            slope: pair(self.slope, other.slope),
+        }
+    }
+}
