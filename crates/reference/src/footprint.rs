@@ -40,6 +40,8 @@ enum Shape {
     Disc {
         metric: DMat2,
         depth_slope: DVec2,
+        /// Whether it reaches through the eye plane: then it is seen where it lies before it.
+        crosses: bool,
     },
     /// Through the eye plane: normal, and the semi-axes over the squares of their lengths.
     Near {
@@ -115,7 +117,8 @@ impl Splat {
         let v = normal.cross(u).normalize_or_zero() * self.radius;
         let parallel = input.camera.is_orthographic();
         let through = u.length().max(v.length());
-        if self.depth <= -u.z.hypot(v.z) {
+        let reach_z = u.z.hypot(v.z);
+        if self.depth <= -reach_z {
             return;
         }
         if !parallel && self.depth < through {
@@ -142,7 +145,8 @@ impl Splat {
         let depth_slope =
             if along.abs() < 1e-4 { DVec2::ZERO } else { DVec2::new(-normal.x, normal.y) / (along * px_per_world) };
         self.reach_px = DVec2::new(covariance.x_axis.x, covariance.y_axis.y).map(|c| c.sqrt() + 1.0);
-        self.shape = Shape::Disc { metric: covariance.inverse(), depth_slope };
+        let crosses = self.depth < reach_z;
+        self.shape = Shape::Disc { metric: covariance.inverse(), depth_slope, crosses };
     }
 
     fn near_disc(&mut self, input: &Input<'_>, normal: DVec3, [u, v]: [DVec3; 2], amount: f64) {
@@ -191,13 +195,11 @@ impl Splat {
                 let rho_sq = (self.center - origin).cross(d).length_squared() / d.length_squared();
                 (rho_sq / radius_sq, 0.0)
             }
-            Shape::Disc { metric, depth_slope } => {
+            Shape::Disc { metric, depth_slope, crosses } => {
                 let d = at - self.center_px;
                 let offset = depth_slope.dot(d);
-                // In front of the eye alone; a disc through its plane is parallel rays' here.
-                let through = self.depth.abs() < self.radius;
-                let offset = if through { offset } else { offset.clamp(-self.radius, self.radius) };
-                if self.depth + offset <= 0.0 {
+                let offset = if *crosses { offset } else { offset.clamp(-self.radius, self.radius) };
+                if *crosses && self.depth + offset <= 0.0 {
                     return None;
                 }
                 (d.dot(*metric * d), offset)

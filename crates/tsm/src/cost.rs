@@ -27,7 +27,7 @@ pub struct Prediction {
     pub size: [u64; 2],
     /// What its cells follow from.
     pub limit: Limit,
-    /// Entries that translucent splats deposit.
+    /// Entries that translucent splats deposit; of a ball 0.6 to 1.4 times the counted ones.
     pub entries: f64,
     /// Bytes that the build takes at its peak.
     pub bytes: u64,
