@@ -23,6 +23,8 @@ const float FACING_AWAY = 0.00390625;
 const float LEAST_DEPTH = 0.03125;
 // Half an extent that leaves nothing out.
 const float EVERYWHERE = 3.4028235e38;
+// Marks a disc that reaches through the eye plane: the sign of its first half extent.
+const uint NEAR = 0x8000u;
 
 shared uint block_visible;
 shared uint block_near;
@@ -274,6 +276,7 @@ bool project(uint i) {
     }
     if (shown && shape.near) {
         atomicAdd(block_near, 1u);
+        extents |= NEAR;
     }
     uint to = view.splat_words * i;
     splats[to] = floatBitsToUint(x);

@@ -158,7 +158,7 @@ fn what_moves_or_hides_is_not_sampled_again() {
     place.expect(0, &["render", "s.toml", "-o", "still.png"], "");
     assert_eq!(drawn(0), place.bytes("still.png"));
     // Without room every frame samples as it draws.
-    let little = ["render", "s.toml", "-o", "little.png", "--frames", "--json", "--max-memory", "20M"];
+    let little = ["render", "s.toml", "-o", "little.png", "--frames", "--json", "--max-memory", "60M"];
     let out = place.expect(0, &little, "");
     let document: Value = serde_json::from_slice(&out.stdout).unwrap();
     assert!(document["frames"].as_array().unwrap().iter().all(|f| sampled(f).is_none()));

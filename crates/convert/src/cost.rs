@@ -97,9 +97,10 @@ pub fn volume(grid: &Grid, tf: &TransferFunction, params: &VolumeParams) -> Resu
         return Ok(Prediction::exact(keep.count(grid) as f64, params.wanted()));
     }
     let finer = factors.iter().map(|f| *f as f64).product::<f64>();
-    // Cells around the border of what has extinction count too: finer ones are as much thinner.
+    // Cells around the border of what has extinction count too: finer ones are as much thinner, and about half of them bend little
+    // enough to go by their voxel.
     let inside = keep.count_voxels(grid) as f64;
-    let kept = inside + (keep.count(grid) as f64 - inside).max(0.0) / libm::cbrt(finer);
+    let kept = inside + (keep.count(grid) as f64 - inside).max(0.0) / (2.0 * libm::cbrt(finer));
     Ok(Prediction::new(kept * finer, Some(grid.values.len() as f64 * finer), params.wanted()))
 }
 

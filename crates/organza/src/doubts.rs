@@ -4,7 +4,7 @@
 use crate::load::Loaded;
 use crate::output::displayed;
 use crate::scene::{Scene, SceneObject};
-use crate::{Layers, escape_controls};
+use crate::{Layers, ShadowTable, escape_controls};
 use glam::DVec3;
 use rayon::prelude::*;
 use splat_core::{Camera, LightShape, Shading};
@@ -183,6 +183,15 @@ impl View {
         };
         middle.z + radius > 0.0 && inside(x, self.half[0]) && inside(y, self.half[1])
     }
+}
+
+/// Shadow maps that memory made coarser.
+pub(crate) fn of_shadows(tables: &[Option<ShadowTable>]) -> Option<String> {
+    let coarse = tables.iter().flatten().filter(|table| table.limit == tsm::Limit::Memory).count();
+    (coarse > 0).then(|| {
+        let maps = if coarse == 1 { "a shadow map is" } else { "shadow maps are" };
+        format!("{maps} coarser than the splats ask for, to fit the memory: a larger --max-memory makes them finer")
+    })
 }
 
 #[cfg(test)]

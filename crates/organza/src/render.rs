@@ -248,6 +248,7 @@ fn prepare(
     let (splats, notes) = (loaded.splats.clone(), loaded.notes.clone());
     let mut warnings = loaded.warnings.clone();
     warnings.extend(doubts::of_scene(scene, &loaded));
+    warnings.extend(doubts::of_shadows(&plan.shadow_tables));
     let inputs = cost.stages.iter().filter(|s| s.name == pass::READ).map(|s| s.bytes).sum();
     let most = memory.total().max(memory::loading_bytes(&loaded, inputs));
     Ok((loaded, Explanation { plan, cost, memory: most, splats, warnings, notes }, memory))

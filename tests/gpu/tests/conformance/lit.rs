@@ -321,7 +321,9 @@ fn faults_of_light_are_found() {
         // Shares of shadows that are dropped, a radius, a map that lies elsewhere by a hundredth, or for another light.
         let mut others = objects.to_vec();
         others.iter_mut().for_each(|o| o.look.shadow_coefficient = 1.0);
-        assert!(near(&Scene { objects: &others, ..scene }, right) < 0.95);
+        // The sheet, which most pixels see, has the whole share already.
+        let dropped = near(&Scene { objects: &others, ..scene }, right);
+        assert!(dropped < 0.97, "{dropped}");
         others.clone_from_slice(objects);
         others.iter_mut().for_each(|o| o.look.radius *= 1.5);
         assert!(near(&Scene { objects: &others, ..scene }, right) < 0.95);
