@@ -126,6 +126,7 @@ medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 0.5, spacing = 
 [render]
 technique = "particles"
 antialias = 1
+points = { shadow = { cells = 64 } }
 particles = { repeat_level = 2000 }
 [animation]
 frames = 4
@@ -158,7 +159,7 @@ fn what_moves_or_hides_is_not_sampled_again() {
     place.expect(0, &["render", "s.toml", "-o", "still.png"], "");
     assert_eq!(drawn(0), place.bytes("still.png"));
     // Without room every frame samples as it draws.
-    let little = ["render", "s.toml", "-o", "little.png", "--frames", "--json", "--max-memory", "60M"];
+    let little = ["render", "s.toml", "-o", "little.png", "--frames", "--json", "--max-memory", "20M"];
     let out = place.expect(0, &little, "");
     let document: Value = serde_json::from_slice(&out.stdout).unwrap();
     assert!(document["frames"].as_array().unwrap().iter().all(|f| sampled(f).is_none()));

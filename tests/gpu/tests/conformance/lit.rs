@@ -23,6 +23,8 @@ const VIEWS: [Projection; 2] = [Projection::Perspective { fov_y: 0.6 }, Projecti
 const TOLERANCE: f32 = 3e-5;
 /// Share of pixels that may differ by more: those whose hits do, and where a step of a map lies within rounding of what is seen.
 const OTHERS: f64 = 1e-3;
+/// Share of pixels that a planted fault leaves as they are, at most.
+const FOUND: f64 = 0.97;
 
 /// A bent sheet with normals, a wall, a volume, and what throws shadows on them.
 struct World {
@@ -321,16 +323,14 @@ fn faults_of_light_are_found() {
         // Shares of shadows that are dropped, a radius, a map that lies elsewhere by a hundredth, or for another light.
         let mut others = objects.to_vec();
         others.iter_mut().for_each(|o| o.look.shadow_coefficient = 1.0);
-        // The sheet, which most pixels see, has the whole share already.
-        let dropped = near(&Scene { objects: &others, ..scene }, right);
-        assert!(dropped < 0.97, "{dropped}");
+        assert!(near(&Scene { objects: &others, ..scene }, right) < FOUND);
         others.clone_from_slice(objects);
         others.iter_mut().for_each(|o| o.look.radius *= 1.5);
-        assert!(near(&Scene { objects: &others, ..scene }, right) < 0.95);
-        assert!(near(&scene, [right[0], (&maps[1], DVec3::X * 0.01)]) < 0.95);
-        assert!(near(&scene, [(&maps[0], DVec3::X * 0.01), right[1]]) < 0.95);
+        assert!(near(&Scene { objects: &others, ..scene }, right) < FOUND);
+        assert!(near(&scene, [right[0], (&maps[1], DVec3::X * 0.01)]) < FOUND);
+        assert!(near(&scene, [(&maps[0], DVec3::X * 0.01), right[1]]) < FOUND);
         let ambient = Scene { ambient: [0.101; 3], ..scene };
-        assert!(near(&ambient, right) < 0.95);
+        assert!(near(&ambient, right) < FOUND);
     });
 }
 
