@@ -8,6 +8,7 @@
 mod color;
 #[cfg(any(feature = "ply", feature = "stl", feature = "obj", feature = "xyz", feature = "nrrd"))]
 mod decimal;
+#[cfg_attr(not(feature = "ply"), allow(dead_code, reason = "each format uses a part of it"))]
 mod input;
 #[cfg(feature = "las")]
 mod las;
@@ -134,15 +135,16 @@ fn whole(
     place: Option<&Path>,
     reading: &mut Reading<'_>,
 ) -> Result<Loaded, ReadError> {
-    let mut loaded = parse(path, stream, place, reading)?;
+    let loaded = parse(path, stream, place, reading)?;
     #[cfg(any(feature = "ply", feature = "stl", feature = "obj"))]
-    if let Loaded::Mesh(mesh) = &mut loaded {
-        for _ in 0..crate::outwards::turn_outwards(mesh) {
+    if let Loaded::Mesh(mut mesh) = loaded {
+        for _ in 0..crate::outwards::turn_outwards(&mut mesh) {
             reading.mend((Fix::InsideOut, Place::File, None), || {
                 let hint = "turn the faces around, or leave out --strict";
                 ReadError::input(Place::File, "surfaces whose faces are wound outwards", "one that is inside out", hint)
             })?;
         }
+        return Ok(Loaded::Mesh(mesh));
     }
     Ok(loaded)
 }

@@ -1,7 +1,9 @@
 //! What goes along while a file is read: its limits, who may stop it, and what was mended in it.
 
 use super::ReadLimits;
-use crate::error::{Place, ReadError, escaped};
+#[cfg(any(feature = "ply", feature = "obj", feature = "xyz", feature = "las"))]
+use crate::error::escaped;
+use crate::error::{Place, ReadError};
 use splat_core::Progress;
 use std::fmt;
 
