@@ -163,6 +163,7 @@ pub(crate) fn render_keeping(
     if !doubtful {
         warnings.extend(doubts::of_picture(scene, &layers));
     }
+    warnings.extend(doubts::of_shadows(&plan.shadow_tables));
     warnings.extend(helper.map(Helper::said).unwrap_or_default());
     Ok(Render { layers, cost, plan, sets, warnings, notes, backend })
 }
@@ -229,7 +230,8 @@ pub(crate) fn drawing<'a>(
 /// # Errors
 /// As [`render`].
 pub fn explain(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Explanation, Error> {
-    let (_, explanation, _) = prepare(scene, options, progress, &Files::default())?;
+    let (_, mut explanation, _) = prepare(scene, options, progress, &Files::default())?;
+    explanation.warnings.extend(doubts::of_shadows(&explanation.plan.shadow_tables));
     progress.finish();
     Ok(explanation)
 }
@@ -248,7 +250,6 @@ fn prepare(
     let (splats, notes) = (loaded.splats.clone(), loaded.notes.clone());
     let mut warnings = loaded.warnings.clone();
     warnings.extend(doubts::of_scene(scene, &loaded));
-    warnings.extend(doubts::of_shadows(&plan.shadow_tables));
     let inputs = cost.stages.iter().filter(|s| s.name == pass::READ).map(|s| s.bytes).sum();
     let most = memory.total().max(memory::loading_bytes(&loaded, inputs));
     Ok((loaded, Explanation { plan, cost, memory: most, splats, warnings, notes }, memory))

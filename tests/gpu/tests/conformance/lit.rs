@@ -23,8 +23,6 @@ const VIEWS: [Projection; 2] = [Projection::Perspective { fov_y: 0.6 }, Projecti
 const TOLERANCE: f32 = 3e-5;
 /// Share of pixels that may differ by more: those whose hits do, and where a step of a map lies within rounding of what is seen.
 const OTHERS: f64 = 1e-3;
-/// Share of pixels that a planted fault leaves as they are, at most.
-const FOUND: f64 = 0.97;
 
 /// A bent sheet with normals, a wall, a volume, and what throws shadows on them.
 struct World {
@@ -322,15 +320,15 @@ fn faults_of_light_are_found() {
         assert!(near(&scene, right) >= 1.0 - 2.0 * OTHERS);
         // Shares of shadows that are dropped, a radius, a map that lies elsewhere by a hundredth, or for another light.
         let mut others = objects.to_vec();
-        others.iter_mut().for_each(|o| o.look.shadow_coefficient = 1.0);
-        assert!(near(&Scene { objects: &others, ..scene }, right) < FOUND);
+        others.iter_mut().for_each(|o| o.look.shadow_coefficient = 0.0);
+        assert!(near(&Scene { objects: &others, ..scene }, right) < 0.95);
         others.clone_from_slice(objects);
-        others.iter_mut().for_each(|o| o.look.radius *= 1.5);
-        assert!(near(&Scene { objects: &others, ..scene }, right) < FOUND);
-        assert!(near(&scene, [right[0], (&maps[1], DVec3::X * 0.01)]) < FOUND);
-        assert!(near(&scene, [(&maps[0], DVec3::X * 0.01), right[1]]) < FOUND);
+        others.iter_mut().for_each(|o| o.look.radius *= 3.0);
+        assert!(near(&Scene { objects: &others, ..scene }, right) < 0.95);
+        assert!(near(&scene, [right[0], (&maps[1], DVec3::X * 0.01)]) < 0.95);
+        assert!(near(&scene, [(&maps[0], DVec3::X * 0.01), right[1]]) < 0.95);
         let ambient = Scene { ambient: [0.101; 3], ..scene };
-        assert!(near(&ambient, right) < FOUND);
+        assert!(near(&ambient, right) < 0.95);
     });
 }
 
