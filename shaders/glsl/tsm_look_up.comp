@@ -46,40 +46,26 @@ uint knots_before(uvec2 span, float distance, bool at_it) {
     return low;
 }
 
-precise vec3 half_at(uvec2 span, uint knot) {
-    precise vec3 sum = 0.5 * (total_before(span, knot) + total_before(span, knot + 1u));
-    return sum;
-}
+const uint MOST_PARTS = 64u;
 
-precise vec3 mixed(vec3 a, vec3 b, float t) {
-    precise vec3 sum = a + (b - a) * t;
-    return sum;
-}
-
-// Absorbance of media: half of each entry before it and half behind, spread over at most `ramp` to either side.
+// Absorbance of media, every entry spread evenly over `ramp` to either side of its own distance.
 vec3 continuous(uvec2 span, float distance) {
-    uint after = knots_before(span, distance, true);
-    bool has_last = after > 0u;
-    bool has_next = after < span.y;
-    float last = has_last ? distances[span.x + after - 1u] : 0.0;
-    float next = has_next ? distances[span.x + after] : 0.0;
-    vec3 flat_total = total_before(span, after);
-    precise float reach = view.ramp;
-    if (has_last && has_next) {
-        reach = min(reach, 0.5 * (next - last));
+    precise float nearest = distance - view.ramp;
+    precise float farthest = distance + view.ramp;
+    uint begin = knots_before(span, nearest, true);
+    uint end = max(begin, knots_before(span, farthest, false));
+    uint stride = max(1u, (end - begin + MOST_PARTS - 1u) / MOST_PARTS);
+    float inverse = quotient(0.5, view.ramp);
+    precise vec3 sum = total_before(span, begin);
+    vec3 before = sum;
+    for (uint first = begin; first < end; first += stride) {
+        uint last = min(first + stride, end) - 1u;
+        precise float share = (distance - distances[span.x + first + (last - first) / 2u]) * inverse + 0.5;
+        vec3 total = total_before(span, last + 1u);
+        sum += (total - before) * share;
+        before = total;
     }
-    if (reach <= 0.0) {
-        return has_last && last == distance ? half_at(span, after - 1u) : flat_total;
-    }
-    precise float behind = distance - last;
-    if (has_last && behind < reach) {
-        return mixed(half_at(span, after - 1u), flat_total, quotient(behind, reach));
-    }
-    precise float before = next - distance;
-    if (has_next && before < reach) {
-        return mixed(half_at(span, after), flat_total, quotient(before, reach));
-    }
-    return flat_total;
+    return sum;
 }
 
 // Transmittance of one cell up to the distances for media and for surfaces.
@@ -127,6 +113,75 @@ bool distances_in(uint cell, vec4 position, vec4 normal, float distance, float l
     return true;
 }
 
+// The four cells about a place, and where it lies among them.
+struct Patch {
+    uint cells[4];
+    vec2 part;
+};
+
+Patch patch_at(vec2 at) {
+    precise vec2 from_centres = at - 0.5;
+    vec2 corner = floor(from_centres);
+    precise vec2 part = from_centres - corner;
+    Patch patch_of;
+    for (int k = 0; k < 4; k++) {
+        patch_of.cells[k] = cell_at(int(corner.x) + (k & 1), int(corner.y) + (k >> 1));
+    }
+    patch_of.part = part;
+    return patch_of;
+}
+
+float weight_of(vec2 part, int k) {
+    precise float weight = ((k & 1) == 1 ? part.x : 1.0 - part.x) * (k >= 2 ? part.y : 1.0 - part.y);
+    return weight;
+}
+
+precise vec3 crossed(vec3 a, vec3 b) {
+    precise vec3 c = vec3(a.y * b.z - b.y * a.z, a.z * b.x - b.z * a.x, a.x * b.y - b.x * a.y);
+    return c;
+}
+
+// Whether an edge between octants lies within a cell of a place, or two of one along its diagonal.
+bool is_creased(vec2 at) {
+    precise float side = 0.5 * float(view.size.x);
+    precise vec2 q = abs(at - side);
+    precise float sum = q.x + q.y;
+    precise float to_line = sum <= side ? min(q.x, q.y) : min(side - q.x, side - q.y);
+    precise float to_diagonal = abs(sum - side) - 1.0;
+    return min(to_line, to_diagonal) < 1.0;
+}
+
+const int STEPS = 3;
+const float LEAST_SPREAD = 0.1;
+
+// Where the rays of the four nearest cells, weighted bilinearly, meet a direction; from its place in the table.
+vec2 met_at(vec3 towards, vec2 at) {
+    vec2 met = at;
+    float least = LEAST_SPREAD * quotient(12.566370614359172, float(view.size.x) * float(view.size.y));
+    for (int step = 0; step < STEPS; step++) {
+        Patch near = patch_at(met);
+        vec3 rays[4];
+        for (int k = 0; k < 4; k++) {
+            if (near.cells[k] == NOWHERE) {
+                return at;
+            }
+            rays[k] = ray_of(near.cells[k]).direction;
+        }
+        precise vec3 ray = rays[0] * weight_of(near.part, 0) + rays[1] * weight_of(near.part, 1)
+            + rays[2] * weight_of(near.part, 2) + rays[3] * weight_of(near.part, 3);
+        precise vec3 along_x = (rays[1] - rays[0]) * (1.0 - near.part.y) + (rays[3] - rays[2]) * near.part.y;
+        precise vec3 along_y = (rays[2] - rays[0]) * (1.0 - near.part.x) + (rays[3] - rays[1]) * near.part.x;
+        float area = product(crossed(along_x, along_y), towards);
+        if (abs(area) < least) {
+            return at;
+        }
+        vec2 off = vec2(product(crossed(along_y, ray), towards), product(crossed(ray, along_x), towards));
+        precise vec2 next = met + clamp(vec2(quotient(off.x, area), quotient(off.y, area)), -1.0, 1.0);
+        met = next;
+    }
+    return met;
+}
+
 vec3 look_up(vec4 position, vec4 normal) {
     Place place = place_of(position.xyz);
     if (!place.seen) {
@@ -134,16 +189,18 @@ vec3 look_up(vec4 position, vec4 normal) {
     }
     precise float least_lift = place.distance * (1.0 / 262144.0);
     float lift = max(position.w, least_lift);
-    precise vec2 from_centres = place.at - 0.5;
-    vec2 corner = floor(from_centres);
-    precise vec2 part = from_centres - corner;
+    vec2 at = place.at;
+    if (view.mapping == OCTAHEDRAL && is_creased(at)) {
+        float inverse = quotient(1.0, place.distance);
+        precise vec3 towards = position.xyz * inverse;
+        at = met_at(towards, at);
+    }
+    Patch near = patch_at(at);
     precise vec3 light = vec3(0.0);
     precise float seen = 0.0;
     for (int k = 0; k < 4; k++) {
-        int i = k & 1;
-        int j = k >> 1;
-        precise float weight = (i == 1 ? part.x : 1.0 - part.x) * (j == 1 ? part.y : 1.0 - part.y);
-        uint cell = cell_at(int(corner.x) + i, int(corner.y) + j);
+        float weight = weight_of(near.part, k);
+        uint cell = near.cells[k];
         vec3 share = vec3(1.0);
         if (cell != NOWHERE) {
             float medium;

@@ -104,15 +104,15 @@ impl ShadowMap {
 /// A map without its lists.
 pub(crate) fn head<M: Mapping>(casters: &Casters<'_>, survey: &Survey, plan: &Plan, mapping: &M) -> ShadowMap {
     let params = casters.params;
-    let cutoff = params.footprints.layers()[0].cutoff;
+    let radius_over_spacing = params.footprints.layers()[0].cutoff * splat_core::Footprint::SIGMA_OVER_SPACING;
     let [columns, rows] = mapping.size().map(u64::from);
     ShadowMap {
         frame: plan.frame,
         table: plan.table.clone(),
         opaque: opaque_depths(casters, survey, plan, mapping),
         absorbances: Absorbances::Mono(Matter { media: None, surfaces: None }),
-        ramp: 0.5 * plan.frame.length(survey.mean_medium_radius()),
-        bias: params.bias / (cutoff * splat_core::Footprint::SIGMA_OVER_SPACING),
+        ramp: 0.5 * plan.frame.length(survey.mean_medium_radius()) / radius_over_spacing,
+        bias: params.bias / radius_over_spacing,
         dark_from: (params.absorbance == AbsorbanceModel::Paper).then(|| params.absorbance_limit()),
         prediction: plan.prediction,
         counts: Counts {
