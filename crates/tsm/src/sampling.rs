@@ -144,13 +144,12 @@ pub(crate) fn ahead(caster: &Caster, along: f32, s: f32) -> Option<(f32, f32)> {
         return None;
     }
     let sigma = f64::from(caster.radius / caster.kernel.cutoff);
-    let t = f64::from(along) / sigma;
-    let scale = std::f64::consts::FRAC_1_SQRT_2;
-    let share = 0.5 * (1.0 + erf(t * scale) / erf(f64::from(half) / sigma * scale));
-    let below = (0.5 * (1.0 + erf(t * scale))).max(1e-6);
-    let density = libm::exp(-0.5 * t * t) / (2.0 * std::f64::consts::PI).sqrt();
-    let mean = sigma * (t + density / below);
-    Some((share as f32, mean.max(sigma / 1024.0) as f32))
+    let [t, end] = [along, half].map(|x| f64::from(x) / sigma);
+    let part = |t: f64| 0.5 * erf(t * std::f64::consts::FRAC_1_SQRT_2);
+    let density = |t: f64| libm::exp(-0.5 * t * t) / (2.0 * std::f64::consts::PI).sqrt();
+    let (before, whole) = (part(t) + part(end), 2.0 * part(end));
+    let mean = sigma * (t + (density(t) - density(end)) / before.max(1e-6));
+    Some(((before / whole) as f32, mean.max(sigma / 1024.0) as f32))
 }
 
 #[inline]

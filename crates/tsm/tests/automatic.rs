@@ -19,16 +19,17 @@ fn scaled(cloud: &Cloud, light: &Light, s: f64) -> (Cloud, Light) {
     (cloud, light)
 }
 
-/// Light behind everything, along the ray of each splat.
-fn shine_behind(cloud: &Cloud, light: &Light, s: f64) -> Vec<f32> {
+/// Light on each splat, and behind everything along its ray.
+fn shine(cloud: &Cloud, light: &Light, s: f64) -> Vec<f32> {
     let (cloud, light) = scaled(cloud, light, s);
     let map = build(&cloud, &light, &Params::default());
     let behind = |p: &Vec3| match light.shape {
-        LightShape::Point { position } => position.as_vec3() + (*p - position.as_vec3()) * 100.0,
-        LightShape::Directional { direction } => *p + direction.as_vec3() * (10.0 * s as f32),
+        LightShape::Point { position } => position.as_vec3() + (*p - position.as_vec3()) * 2.0,
+        LightShape::Directional { direction } => *p + direction.as_vec3() * (2.0 * s as f32),
         _ => *p,
     };
-    cloud.position.iter().map(|p| light_at(&map, behind(p))).collect()
+    let places = cloud.position.iter().copied().chain(cloud.position.iter().map(behind));
+    places.map(|p| light_at(&map, p)).collect()
 }
 
 #[test]
@@ -43,13 +44,14 @@ fn ts12_tables_do_not_depend_on_the_unit_of_length() {
         point_light(DVec3::new(0.3, 0.2, -5.0)),
         point_light(DVec3::new(0.03, 0.02, 0.01)),
     ];
-    for (cloud, light) in [&slab, &random].into_iter().flat_map(|c| lights.iter().map(move |l| (c, l))) {
-        let base = shine_behind(cloud, light, 1.0);
+    // Random media are steep: what rounding moves a place in a table of a thousand cells changes their light.
+    let cases = [(&slab, 1e-5), (&random, 1e-4)];
+    for ((cloud, bound), light) in cases.into_iter().flat_map(|c| lights.iter().map(move |l| (c, l))) {
+        let base = shine(cloud, light, 1.0);
         for s in [1.1, 1.3, 0.7, 0.003] {
-            let light_in = shine_behind(cloud, light, s);
+            let light_in = shine(cloud, light, s);
             let worst = light_in.iter().zip(&base).fold(0.0f32, |m, (a, b)| m.max((a - b).abs()));
-            // Knots at nearly equal distances are one or two by rounding.
-            assert!(worst < 1e-4, "{s}, {:?}: {worst:e}", light.shape);
+            assert!(worst < bound, "{s}, {:?}: {worst:e}", light.shape);
         }
     }
 }
