@@ -111,3 +111,31 @@ fn x8_light_is_additive_and_layers_sum_to_beauty() {
     let largest = largest_difference(&twice, &draw(&brighter, &[]).channel("direct.G"));
     assert!(largest <= 1e-6 * brightest, "twice the light: {largest:e} of {brightest}");
 }
+
+/// The scene, lit by a sun in place of the second lamp.
+fn sunny(scale: f64, technique: &str) -> String {
+    let text = scene(scale, 0.0, false);
+    let begin = text.find("[[light]]").unwrap() + 1;
+    let lamp = begin + text[begin..].find("[[light]]").unwrap();
+    let end = lamp + text[lamp..].find("[[object]]").unwrap();
+    let sun = "[[light]]\nkind = 'directional'\ndirection = [0.2, -1, -0.3]\nirradiance = [2, 2, 2]\n";
+    let text = format!("{}{sun}{}", &text[..lamp], &text[end..]);
+    text.replace("points = { exact = true }", technique)
+}
+
+#[test]
+fn x3_any_unit_of_length_gives_the_same_picture() {
+    // Particles lie at places that are rounded to f32, and light is taken where they lie.
+    let techniques =
+        [("points = { exact = true }", 1.5e-5), ("technique = 'particles'\nparticles = { repeat_level = 20 }", 1e-4)];
+    for (technique, bound) in techniques {
+        let plain = draw(&sunny(1.0, technique), &[]);
+        for scale in [1.3, 0.7, 0.01] {
+            let other = draw(&sunny(scale, technique), &[]);
+            for name in ["R", "G", "B", "A"] {
+                let largest = largest_difference(&plain.channel(name), &other.channel(name));
+                assert!(largest < bound, "{technique}, lengths times {scale}, {name}: {largest:e}");
+            }
+        }
+    }
+}
