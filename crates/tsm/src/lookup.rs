@@ -78,17 +78,15 @@ impl ShadowMap {
         };
         let at = if mapping.is_creased(place.at, Vec2::ONE) { met_at(mapping, p, place.at) } else { place.at };
         let Patch { cells, weights, .. } = Patch::at(mapping, at);
+        let distances = cells.map(|cell| match cell {
+            None => Some([place.distance; 2]),
+            Some(cell) => target.distances(mapping, cell),
+        });
+        let through = self.through(matter, cells, distances.map(Option::unwrap_or_default));
         let (mut light, mut seen) = ([0.0; C], 0.0);
-        for (cell, weight) in cells.into_iter().zip(weights) {
-            let through = match cell {
-                None => [1.0; C],
-                Some(cell) => match target.distances(mapping, cell) {
-                    None => continue,
-                    Some(distances) => self.through(matter, cell, distances),
-                },
-            };
-            (0..C).for_each(|c| light[c] += weight * through[c]);
-            seen += weight;
+        for k in (0..4).filter(|k| distances[*k].is_some()) {
+            (0..C).for_each(|c| light[c] += weights[k] * through[k][c]);
+            seen += weights[k];
         }
         if seen > 0.0 { light.map(|l| (l / seen).min(1.0)) } else { self.grazing(mapping, matter, &target, place.at) }
     }
@@ -103,24 +101,39 @@ impl ShadowMap {
         at: Vec2,
     ) -> [f32; C] {
         let cell = mapping.wrap(floor(at.x), floor(at.y));
-        cell.map_or([1.0; C], |cell| self.through(matter, cell, [target.distance, 0.0]))
+        self.through(matter, [cell, None, None, None], [[target.distance, 0.0]; 4])[0]
     }
 
-    /// Transmittance of one cell up to the distances for media and for surfaces.
+    /// Transmittance of four cells, each up to its distances for media and for surfaces; 1 outside of the table.
     #[inline]
-    fn through<const C: usize>(&self, matter: &Matter<C>, cell: u32, [medium, surface]: [f32; 2]) -> [f32; C] {
-        if self.opaque.get(cell as usize).is_some_and(|d| *d < surface) {
-            return [0.0; C];
-        }
-        let mut absorbance = [0.0; C];
+    fn through<const C: usize>(
+        &self,
+        matter: &Matter<C>,
+        cells: [Option<u32>; 4],
+        distances: [[f32; 2]; 4],
+    ) -> [[f32; C]; 4] {
+        let is_dark =
+            |k: usize| cells[k].and_then(|c| self.opaque.get(c as usize)).is_some_and(|d| *d < distances[k][1]);
+        let mut absorbance = [[0.0; C]; 4];
         if let Some(lists) = &matter.media {
-            absorbance = continuous(lists.list(cell), medium, self.ramp);
+            let lists = cells.map(|c| c.map_or(List::NONE, |c| lists.list(c)));
+            let nearest = distances.map(|[medium, _]| medium - self.ramp);
+            let begin = places(lists.map(|l| l.distance), nearest, |d, nearest| d <= nearest);
+            for k in 0..4 {
+                absorbance[k] = continuous(lists[k], begin[k], distances[k][0], self.ramp);
+            }
         }
         if let Some(lists) = &matter.surfaces {
-            let step = steps(lists.list(cell), surface);
-            (0..C).for_each(|c| absorbance[c] += step[c]);
+            let lists = cells.map(|c| c.map_or(List::NONE, |c| lists.list(c)));
+            let before =
+                places(lists.map(|l| l.distance), distances.map(|[_, surface]| surface), |d, surface| d < surface);
+            for k in 0..4 {
+                let step = lists[k].total_of(before[k]);
+                (0..C).for_each(|c| absorbance[k][c] += step[c]);
+            }
         }
-        absorbance.map(|a| if self.dark_from.is_some_and(|limit| a > limit) { 0.0 } else { libm::expf(-a) })
+        let light = |a: f32| if self.dark_from.is_some_and(|limit| a > limit) { 0.0 } else { libm::expf(-a) };
+        std::array::from_fn(|k| if is_dark(k) { [0.0; C] } else { absorbance[k].map(light) })
     }
 }
 
@@ -173,24 +186,35 @@ fn met_at<M: Mapping>(mapping: &M, p: Vec3, at: Vec2) -> Vec2 {
     met
 }
 
-/// Sum of the entries nearer than `distance`.
+/// How many numbers of each rising list come before a bound. All four are searched at once: a search by halves waits for
+/// memory at every step, four of them wait together.
 #[inline]
-pub(crate) fn steps<const C: usize>(list: List<'_, C>, distance: f32) -> [f32; C] {
-    let before = list.distance.partition_point(|d| *d < distance);
-    if before == 0 { [0.0; C] } else { list.total[before - 1] }
+fn places(lists: [&[f32]; 4], bounds: [f32; 4], is_before: impl Fn(f32, f32) -> bool) -> [usize; 4] {
+    let mut begin = [0; 4];
+    let mut size = lists.map(<[f32]>::len);
+    while size.iter().any(|n| *n > 0) {
+        for k in 0..4 {
+            let half = size[k].div_ceil(2);
+            let is_before = lists[k].get((begin[k] + half).wrapping_sub(1)).is_some_and(|x| is_before(*x, bounds[k]));
+            begin[k] += if is_before { half } else { 0 };
+            size[k] -= half;
+        }
+    }
+    begin
 }
 
 /// Most parts into which the entries about a distance are taken; beyond, neighbours share the distance of one.
 const MOST_PARTS: usize = 64;
 
-/// Absorbance at `distance`, every entry spread evenly over `ramp` to either side of its own distance.
+/// Absorbance at `distance`, every entry spread evenly over `ramp` to either side of its own distance; those before `begin`
+/// lie wholly before it.
 #[inline]
-pub(crate) fn continuous<const C: usize>(list: List<'_, C>, distance: f32, ramp: f32) -> [f32; C] {
-    let begin = list.distance.partition_point(|d| *d <= distance - ramp);
-    let mut sum = if begin == 0 { [0.0; C] } else { list.total[begin - 1] };
-    let about = list.distance[begin..].partition_point(|d| *d < distance + ramp);
+fn continuous<const C: usize>(list: List<'_, C>, begin: usize, distance: f32, ramp: f32) -> [f32; C] {
+    let mut sum = list.total_of(begin);
+    let (inverse, farthest, mut before) = (0.5 / ramp, distance + ramp, sum);
+    let about = list.distance[begin..].iter().take(MOST_PARTS + 1).take_while(|d| **d < farthest).count();
+    let about = if about <= MOST_PARTS { about } else { list.distance[begin..].partition_point(|d| *d < farthest) };
     let stride = about.div_ceil(MOST_PARTS).max(1);
-    let (inverse, mut before) = (0.5 / ramp, sum);
     for first in (begin..begin + about).step_by(stride) {
         let last = (first + stride).min(begin + about) - 1;
         let share = (distance - list.distance[first + (last - first) / 2]) * inverse + 0.5;
@@ -214,13 +238,17 @@ mod tests {
         sums.unzip()
     }
 
+    fn absorbance(list: List<'_, 1>, distance: f32, ramp: f32) -> f32 {
+        let [begin, ..] = places([list.distance; 4], [distance - ramp; 4], |d, nearest| d <= nearest);
+        continuous(list, begin, distance, ramp)[0]
+    }
+
     #[test]
     fn media_absorb_continuously_and_by_half_at_their_own_distance() {
         let (distance, total) = sums(&[(1.0, 0.4), (2.0, 0.2), (9.0, 1.0)]);
         let list = List { distance: &distance, total: &total };
-        let at = |d: f32| continuous(list, d, 1.0)[0];
-        for (d, a) in
-            [(0.0, 0.0), (1.0, 0.2), (1.5, 0.35), (2.0, 0.5), (3.0, 0.6), (5.0, 0.6), (9.0, 1.1), (10.0, 1.6)]
+        let at = |d: f32| absorbance(list, d, 1.0);
+        for (d, a) in [(0.0, 0.0), (1.0, 0.2), (1.5, 0.35), (2.0, 0.5), (3.0, 0.6), (5.0, 0.6), (9.0, 1.1), (10.0, 1.6)]
         {
             assert!((at(d) - a).abs() < 1e-6, "A({d}) = {}, not {a}", at(d));
         }
@@ -239,7 +267,7 @@ mod tests {
         let (one, many) = (List { distance: &one.0, total: &one.1 }, List { distance: &many.0, total: &many.1 });
         for i in 0..400 {
             let d = i as f32 * 0.005;
-            let (a, b) = (continuous(one, d, 0.5)[0], continuous(many, d, 0.5)[0]);
+            let (a, b) = (absorbance(one, d, 0.5), absorbance(many, d, 0.5));
             assert!((a - b).abs() < 1e-6, "A({d}) = {a} or {b}");
         }
     }
@@ -251,18 +279,24 @@ mod tests {
         let list = List { distance: &distance, total: &total };
         for i in 0..300 {
             let d = 0.8 + i as f32 * 0.001;
-            let exact: f64 = entries.iter().map(|e| f64::from(e.1) * f64::from((d - e.0) / 0.2 + 0.5).clamp(0.0, 1.0)).sum();
-            let a = f64::from(continuous(list, d, 0.1)[0]);
+            let exact: f64 =
+                entries.iter().map(|e| f64::from(e.1) * f64::from((d - e.0) / 0.2 + 0.5).clamp(0.0, 1.0)).sum();
+            let a = f64::from(absorbance(list, d, 0.1));
             assert!((a - exact).abs() < 2e-4, "A({d}) = {a}, not {exact}");
         }
     }
 
     #[test]
-    fn surfaces_are_steps_behind_their_distance() {
-        let (distance, total) = sums(&[(1.0, 0.4), (2.0, 0.2)]);
-        let list = List { distance: &distance, total: &total };
-        for (d, a) in [(0.5, 0.0), (1.0, 0.0), (1.001, 0.4), (2.0, 0.4), (7.0, 0.6)] {
-            assert!((steps(list, d)[0] - a).abs() < 1e-6);
+    fn four_searches_at_once_find_what_each_finds() {
+        let numbers: Vec<f32> = (0..200).map(|i| (i / 3) as f32).collect();
+        for (i, lengths) in [[0, 1, 2, 3], [7, 64, 0, 200], [199, 5, 128, 1]].into_iter().enumerate() {
+            let lists = lengths.map(|n| &numbers[..n]);
+            for step in 0..150 {
+                let bounds = [0, 1, 2, 3].map(|k| 0.5 * (step + k * i) as f32 - 1.0);
+                for (found, k) in places(lists, bounds, |d, bound| d < bound).into_iter().zip(0..) {
+                    assert_eq!(found, lists[k].partition_point(|d| *d < bounds[k]));
+                }
+            }
         }
     }
 }

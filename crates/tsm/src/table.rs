@@ -121,6 +121,17 @@ pub(crate) struct List<'a, const C: usize> {
     pub(crate) total: &'a [[f32; C]],
 }
 
+impl<const C: usize> List<'_, C> {
+    /// Of a cell that is covered by nothing.
+    pub(crate) const NONE: Self = List { distance: &[], total: &[] };
+
+    /// Absorbance of the first `n` entries.
+    #[inline(always)]
+    pub(crate) fn total_of(&self, n: usize) -> [f32; C] {
+        n.checked_sub(1).and_then(|last| self.total.get(last)).copied().unwrap_or([0.0; C])
+    }
+}
+
 /// Sorted lists of every cell.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Lists<const C: usize> {
