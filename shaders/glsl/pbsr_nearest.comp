@@ -26,6 +26,9 @@ void main() {
     Footing f = footing_of((sets[3u * push.level] + i) * PARTICLE_WORDS);
     for (uint r = f.rows.x; r < f.rows.y; r++) {
         for (uint c = f.columns.x; c < f.columns.y; c++) {
+            if (!covers(f, c, r)) {
+                continue;
+            }
             uint pixel = place_of(c, r, view.columns);
             atomicMin(keys[pixel], (uint64_t(f.depth) << 32) | uint64_t(rank_of(i, pixel, seed)));
         }

@@ -23,7 +23,9 @@ void main() {
     Footing f = footing_of((sets[3u * push.level] + i) * PARTICLE_WORDS);
     for (uint r = f.rows.x; r < f.rows.y; r++) {
         for (uint c = f.columns.x; c < f.columns.y; c++) {
-            atomicMin(nearest[place_of(c, r, view.columns)], f.depth);
+            if (covers(f, c, r)) {
+                atomicMin(nearest[place_of(c, r, view.columns)], f.depth);
+            }
         }
     }
     footings[3u * i] = f.columns.x | (f.columns.y << 16);

@@ -9,17 +9,26 @@ const ANGLE: f64 = 40.0;
 
 /// A camera at depth `z` that looks along −z.
 fn eye(z: f64, parallel: bool) -> String {
-    let projection = if parallel { "orthographic = 0.8".to_owned() } else { format!("fov_y = {ANGLE:?}") };
+    eye_of(z, (!parallel).then_some(ANGLE))
+}
+
+/// The same with a vertical angle, degrees; without, parallel rays.
+fn eye_of(z: f64, angle: Option<f64>) -> String {
+    let projection = angle.map_or("orthographic = 0.8".to_owned(), |angle| format!("fov_y = {angle:?}"));
     format!("version = 1\n[camera]\nposition = [0, 0, {z:?}]\ntarget = [0, 0, {:?}]\n{projection}\n", z - 1.0)
         + &format!("size = [{SIZE}, {SIZE}]\n[render]\nantialias = 1\n")
 }
 
 /// |d| of a pixel's ray, its depth being 1.
 fn stretch(k: usize, parallel: bool) -> f64 {
-    let focal = f64::from(SIZE) / 2.0 / (ANGLE / 2.0).to_radians().tan();
-    let at = |v: usize| (v as f64 + 0.5 - f64::from(SIZE) / 2.0) / focal;
+    stretch_of(k, (!parallel).then_some(ANGLE))
+}
+
+fn stretch_of(k: usize, angle: Option<f64>) -> f64 {
+    let slope = angle.map_or(0.0, |angle| (angle / 2.0).to_radians().tan() * 2.0 / f64::from(SIZE));
+    let at = |v: usize| (v as f64 + 0.5 - f64::from(SIZE) / 2.0) * slope;
     let (x, y) = (at(k % SIZE as usize), at(k / SIZE as usize));
-    if parallel { 1.0 } else { (1.0 + x * x + y * y).sqrt() }
+    (1.0 + x * x + y * y).sqrt()
 }
 
 /// Fog from z = −0.8 to 1.
@@ -85,19 +94,27 @@ fn fog_between_the_eye_and_a_wall_counts_however_near_the_wall_is() {
 
 #[test]
 fn particles_of_fog_around_the_eye_count_from_the_eye_on() {
-    for parallel in [false, true] {
+    for (angle, noise) in [(None, 0.002), (Some(40.0), 0.003), (Some(90.0), 0.008)] {
         let z = 0.237;
-        let text = eye(z, parallel) + &fog(2.0, 0.1);
+        let fog = "[[object]]\nname = 'fog'\n\
+                   medium_box = { min = [-2.4, -2.4, -0.8], max = [2.4, 2.4, 1], extinction = 2.0, spacing = 0.1 }\n";
+        let text = eye_of(z, angle) + fog;
         let picture =
-            draw(&text, &["--technique", "particles", "--set", "render.particles.repeat_level=2000", "--seed", "3"]);
-        let ratios: Vec<f64> = alpha(&picture)
-            .iter()
-            .enumerate()
-            .map(|(k, a)| (1.0 - a) / (-2.0 * (z + 0.8) * stretch(k, parallel)).exp())
-            .collect();
-        let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
-        // 2000 sets of 256 pixels: 0.35 % of noise in the mean at T = 0.13.
-        assert!((mean - 1.0).abs() < 0.02, "parallel {parallel}: {mean}");
+            draw(&text, &["--technique", "particles", "--set", "render.particles.repeat_level=6000", "--seed", "3"]);
+        let alpha = alpha(&picture);
+        let ratio = |is_in: &dyn Fn(usize) -> bool| {
+            let of = |value: &dyn Fn(usize) -> f64| (0..alpha.len()).filter(|k| is_in(*k)).map(value).sum::<f64>();
+            of(&|k| 1.0 - alpha[k]) / of(&|k| (-2.0 * (z + 0.8) * stretch_of(k, angle)).exp())
+        };
+        // Particles beside the eye cover many pixels at once, the more the wider the angle.
+        let to_border = |k: usize| [k % SIZE as usize, k / SIZE as usize].map(|v| v.min(SIZE as usize - 1 - v));
+        let [all, border, middle] =
+            [ratio(&|_| true), ratio(&|k| to_border(k).contains(&0)), ratio(&|k| to_border(k).iter().all(|d| *d > 5))];
+        assert!((all - 1.0).abs() < 3.3 * noise, "{angle:?}: {all}");
+        assert!(
+            (border - 1.0).abs() < 6.0 * noise && (middle - 1.0).abs() < 10.0 * noise,
+            "{angle:?}: {border}, {middle}"
+        );
     }
 }
 

@@ -278,7 +278,7 @@ impl Staging {
     /// A particle on several pixels; its places in them are random.
     fn widened(&mut self, foot: &Footing, record: Record, normal: PackedNormal, key: u64, with: &Filling<'_>) {
         for y in foot.y[0]..foot.y[1] {
-            for x in foot.x[0]..foot.x[1] {
+            for x in (foot.x[0]..foot.x[1]).filter(|x| foot.covers(*x, y)) {
                 let (x, y) = (x as u32, y as u32);
                 let within = scramble(key ^ u64::from(x) << 48 ^ u64::from(y) << 32) as u32 & 0xffff;
                 let (tile, place) = place(x, y, within, with.tiling.columns as u32);

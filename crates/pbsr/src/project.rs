@@ -6,9 +6,11 @@
 //!
 //! - k ≤ 1: each particle is kept with probability k, by a number of its own. A binomial variable thinned is binomial: with
 //!   the share of particles that reach the pixel goes q to k·q = s/(S·cos θ), the same for all depths.
-//! - k > 1, nearer than the set was made for: the particle covers the pixels whose centres lie in a square of side √k
-//!   around it. Each pixel is then hit with k times the probability, each particle at most once: α is exact where the
-//!   surface is flat over √k pixels, and blurred by them elsewhere.
+//! - k > 1, nearer than the set was made for: the particle covers the pixels around which a square of side √k holds it, k
+//!   being the pixel's at the particle's depth. Each pixel is then hit with k times the probability, each particle at most
+//!   once: α is exact where the surface is flat over √k pixels, and blurred by them elsewhere. Fog around the eye has its
+//!   optical depth along every ray, since k grows with the angle from pixel to pixel; the particle's own would grow without
+//!   limit for what lies beside the image.
 //!
 //! Both make exactly one pixel, floor(x), floor(y), of k = 1. A surface of angle-independent opacity has k·|cos θ|.
 
@@ -17,8 +19,8 @@ use crate::bins::{Tiling, place};
 use glam::{DMat3, DVec3, Mat3, Vec3};
 use splat_core::{Camera, Similarity, glam};
 
-/// The widest particle, pixels: nearer to the eye, where it would be wider, opacity is lost.
-const WIDEST_PX: f32 = 64.0;
+/// The widest particle, pixels: more than an image has.
+const WIDEST_PX: f32 = 131_072.0;
 
 /// Area of one pixel across its ray at a world position, world units². In perspective it is 0 at the eye and behind it,
 /// where there are no pixels; samplers refuse it as a cross-section.
@@ -59,8 +61,10 @@ pub(crate) struct Projector {
     focal: f32,
     middle: [f32; 2],
     size: [f32; 2],
+    /// Slopes of the rays at the image's right and upper border.
+    reach: [f32; 2],
     orthographic: bool,
-    /// s·f² in view units: k is this times |p|/z³, or this.
+    /// s·f² in view units: k is this times |d|/z², d the ray of depth 1, or this.
     pub(crate) share: f32,
 }
 
@@ -98,11 +102,37 @@ impl View {
     };
 }
 
-/// Pixels that a widened particle reaches: `x[0] .. x[1]` × `y[0] .. y[1]`.
+/// Pixels that a widened particle may reach: `x[0] .. x[1]` × `y[0] .. y[1]`, of which it covers those that
+/// [`Footing::covers`] says.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Footing {
     pub(crate) x: [i32; 2],
     pub(crate) y: [i32; 2],
+    /// Where the particle falls.
+    at: [f32; 2],
+    /// k of a pixel that is seen along the view.
+    k: f32,
+    middle: [f32; 2],
+    /// Slope of a ray for each pixel from the middle; 0 for parallel rays.
+    slope: f32,
+}
+
+impl Footing {
+    /// Whether a pixel's square holds the particle.
+    #[inline]
+    pub(crate) fn covers(&self, x: i32, y: i32) -> bool {
+        let centre = [x as f32 + 0.5, y as f32 + 0.5];
+        let half = 0.5 * (self.k * stretch(self.slope, self.middle, centre)).sqrt();
+        let within = |a: usize| centre[a] - self.at[a] > -half && centre[a] - self.at[a] <= half;
+        within(0) && within(1)
+    }
+}
+
+/// |d| of the ray of depth 1 through a place of the image.
+#[inline(always)]
+fn stretch(slope: f32, middle: [f32; 2], at: [f32; 2]) -> f32 {
+    let [x, y] = [(at[0] - middle[0]) * slope, (at[1] - middle[1]) * slope];
+    (1.0 + x * x + y * y).sqrt()
 }
 
 impl Projector {
@@ -117,6 +147,7 @@ impl Projector {
             focal: f as f32,
             middle: camera.size.map(|s| 0.5 * s as f32),
             size: camera.size.map(|s| s as f32),
+            reach: camera.size.map(|s| (0.5 * f64::from(s) / f) as f32),
             orthographic: camera.is_orthographic(),
             share: (cross_section * transform.scale * transform.scale * f * f) as f32,
         }
@@ -146,14 +177,17 @@ impl Projector {
     /// The pixels of a particle with k > 1.
     #[inline]
     pub(crate) fn widened(&self, x: f32, y: f32, k: f32) -> Footing {
-        let half = 0.5 * k.sqrt().min(WIDEST_PX);
+        let slope = if self.orthographic { 0.0 } else { 1.0 / self.focal };
+        let inside = [x.clamp(0.0, self.size[0]), y.clamp(0.0, self.size[1])];
+        let k = k / stretch(slope, self.middle, inside);
+        let half = 0.5 * (k * stretch(slope, self.middle, [0.0; 2])).sqrt().min(WIDEST_PX);
         let range = |v: f32, size: f32| {
             // Centres i + 1/2 in (v − half, v + half].
             let from = ((v - half - 0.5).floor() + 1.0).max(0.0);
             let to = ((v + half - 0.5).floor() + 1.0).min(size);
             [from as i32, to as i32]
         };
-        Footing { x: range(x, self.size[0]), y: range(y, self.size[1]) }
+        Footing { x: range(x, self.size[0]), y: range(y, self.size[1]), at: [x, y], k, middle: self.middle, slope }
     }
 }
 
@@ -178,7 +212,7 @@ impl Lanes<'_> {
     #[inline(always)]
     fn run<const ORTHOGRAPHIC: bool>(self) {
         let Self { projector, offsets, tiling, view } = self;
-        let &Projector { linear, translation, focal, middle, share, size, .. } = projector;
+        let &Projector { linear, translation, focal, middle, share, size, reach, .. } = projector;
         let (columns, outside) = (tiling.columns as u32, tiling.tiles() as u32);
         let n = offsets.len().min(BLOCK);
         for i in 0..n {
@@ -193,7 +227,10 @@ impl Lanes<'_> {
             let pixel = pixel.map(whole);
             let (tile, place) = place(pixel[0], pixel[1], within[0] | within[1] << 8, columns);
             (view.tile[i], view.place[i]) = (if seen { tile } else { outside }, place);
-            let k = if ORTHOGRAPHIC { share } else { share * p.length() * inverse * inverse * inverse };
+            let [dx, dy] = [p.x * inverse, p.y * inverse];
+            let [dx, dy] = [dx.clamp(-reach[0], reach[0]), dy.clamp(-reach[1], reach[1])];
+            let long = (1.0 + dx * dx + dy * dy).sqrt();
+            let k = if ORTHOGRAPHIC { share } else { share * long * inverse * inverse };
             let k = if p.z > 0.0 { k } else { 0.0 };
             view.k[i] = k;
         }
@@ -216,7 +253,7 @@ mod tests {
     use splat_core::{Projection, rng};
 
     /// The pixels of one particle, none of k ≤ 1 that is thinned out by `random`.
-    fn project(projector: &Projector, offset: Vec3, random: f32) -> Option<Footing> {
+    fn project(projector: &Projector, offset: Vec3, random: f32) -> Vec<[i32; 2]> {
         let mut view = View::EMPTY;
         let tiling = Tiling::new(projector.size.map(|s| s as u32));
         projector.view(&[offset], &tiling, &mut view);
@@ -224,11 +261,11 @@ mod tests {
         assert_eq!((view.wide, view.thin), (k > 1.0, k < 1.0));
         if k > 1.0 {
             let foot = projector.widened(x, y, k);
-            return (foot.x[0] < foot.x[1] && foot.y[0] < foot.y[1]).then_some(foot);
+            let all = (foot.y[0]..foot.y[1]).flat_map(|y| (foot.x[0]..foot.x[1]).map(move |x| [x, y]));
+            return all.filter(|[x, y]| foot.covers(*x, *y)).collect();
         }
-        let one = |v: f32| [v as i32, v as i32 + 1];
         let seen = (view.tile[0] as usize) < tiling.tiles();
-        (seen && (k >= 1.0 || random < k)).then(|| Footing { x: one(x), y: one(y) })
+        if seen && (k >= 1.0 || random < k) { vec![[x as i32, y as i32]] } else { Vec::new() }
     }
 
     fn camera(projection: Projection) -> Camera {
@@ -246,13 +283,10 @@ mod tests {
         for i in -40i32..40 {
             for j in -30i32..30 {
                 let p = Vec3::new(i as f32 / 8.0, j as f32 / 8.0, -1.0);
-                let foot = project(&at(1.0), p, 0.5);
+                let pixels = project(&at(1.0), p, 0.5);
                 let inside = (-32..32).contains(&i) && (-24..24).contains(&-j);
-                assert_eq!(foot.is_some(), inside, "{i} {j}");
-                if let Some(foot) = foot {
-                    assert_eq!((foot.x, foot.y), ([i + 32, i + 33], [24 - j, 25 - j]));
-                    seen += 1;
-                }
+                assert_eq!(pixels, if inside { vec![[i + 32, 24 - j]] } else { Vec::new() }, "{i} {j}");
+                seen += pixels.len();
             }
         }
         assert_eq!(seen, 64 * 48);
@@ -274,8 +308,7 @@ mod tests {
                     // Whole pixels around the axis, so that all phases are met, and no widened particle is cut.
                     let p = Vec3::new((u(0) - 0.5) * width, (u(1) - 0.5) * width, -depth as f32);
                     let own = s / pixel_area(&camera, p.as_dvec3());
-                    let foot = project(&projector, p, u(2));
-                    hits += foot.map_or(0.0, |f| f64::from((f.x[1] - f.x[0]) * (f.y[1] - f.y[0])));
+                    hits += project(&projector, p, u(2)).len() as f64;
                     expected += own;
                     variance += own;
                 }

@@ -30,7 +30,7 @@ pub fn nearest(scene: &Scene<'_>, set: u64) -> Vec<Option<Nearest>> {
             for i in 0..particles.len() {
                 let world = object.transform.apply(object.sampler.origin() + particles.position[i].as_dvec3());
                 let view = scene.camera.view_from_world(world);
-                let mut k = s / pixel_area_view(scene.camera, view);
+                let mut cosine = 1.0;
                 let normal = object.transform.rotate(particles.normal[i].get().as_dvec3());
                 if particles.normal[i].is_per_crossing() && normal != DVec3::ZERO {
                     let ray = if scene.camera.is_orthographic() {
@@ -38,15 +38,21 @@ pub fn nearest(scene: &Scene<'_>, set: u64) -> Vec<Option<Nearest>> {
                     } else {
                         world - scene.camera.position
                     };
-                    k *= (normal.dot(ray) / ray.length()).abs();
+                    cosine = (normal.dot(ray) / ray.length()).abs();
                 }
+                let k = s * cosine / pixel_area_view(scene.camera, view);
                 if view.z <= 0.0 || (k < 1.0 && f64::from(thinning(key, i as u64)) >= k) {
                     continue;
                 }
                 let scale = scene.camera.focal_px() / if scene.camera.is_orthographic() { 1.0 } else { view.z };
                 let at = [0.5 * w as f64 + view.x * scale, 0.5 * h as f64 - view.y * scale];
                 let color = particles.color[i].get();
-                for pixel in pixels(at, k, [w, h]) {
+                // Of a wider particle each pixel asks with its own area.
+                let side = |pixel: [f64; 2]| {
+                    let (_, ray) = scene.camera.view_ray(pixel[0], pixel[1]);
+                    if k <= 1.0 { 1.0 } else { (s * cosine / pixel_area_view(scene.camera, ray * view.z)).sqrt() }
+                };
+                for pixel in pixels(at, side, [w, h]) {
                     let hidden = scene.occluder.is_some_and(|c| f64::from(c.depth[pixel]) <= view.z);
                     if !hidden && image[pixel].is_none_or(|n| view.z < n.depth) {
                         image[pixel] = Some(Nearest { depth: view.z, object: o, color });
@@ -58,12 +64,14 @@ pub fn nearest(scene: &Scene<'_>, set: u64) -> Vec<Option<Nearest>> {
     image
 }
 
-/// Pixels whose centres lie in the square of side √max(k, 1) around `at`, upper ends included.
-fn pixels(at: [f64; 2], k: f64, size: [usize; 2]) -> Vec<usize> {
-    let half = 0.5 * k.max(1.0).sqrt().min(64.0);
-    let inside = |v: usize, a: usize| v as f64 + 0.5 > at[a] - half && v as f64 + 0.5 <= at[a] + half;
-    let rows = (0..size[1]).filter(|y| inside(*y, 1));
-    rows.flat_map(|y| (0..size[0]).filter(|x| inside(*x, 0)).map(move |x| y * size[0] + x)).collect()
+/// Pixels around whose centres a square of this side holds `at`.
+fn pixels(at: [f64; 2], side: impl Fn([f64; 2]) -> f64, size: [usize; 2]) -> Vec<usize> {
+    let centre = |i: usize| [(i % size[0]) as f64 + 0.5, (i / size[0]) as f64 + 0.5];
+    let holds = |i: &usize| {
+        let (centre, half) = (centre(*i), 0.5 * side(centre(*i)));
+        (0..2).all(|a| centre[a] > at[a] - half && centre[a] <= at[a] + half)
+    };
+    (0..size[0] * size[1]).filter(holds).collect()
 }
 
 /// Opacity of layers of these opacities, one behind the other: 1 − Π(1 − α).

@@ -1,7 +1,7 @@
 // Where a particle falls on the image (Tanaka 2012, section 3); as `pbsr::project`. Bound before: `view`, `objects`,
 // `particles`.
 
-const float WIDEST_PX = 64.0;
+const float WIDEST_PX = 131072.0;
 
 float normal_part(uint bits) {
     precise float v = float(bits & 0x7fffu) * (2.0 / 32766.0) - 1.0;
@@ -27,9 +27,15 @@ float length_of(vec3 p) {
     return sqrt(square);
 }
 
-// The share of its pixel that a particle takes: k = s/s(p), times |cos| where opacity does not depend on the angle.
+// The share of its pixel that a particle takes: k = s/s(p), times |cos| where opacity does not depend on the angle. What
+// lies beside the image has that of the border.
 float share_of(ParticleObject o, vec3 p, float inverse, uint normal) {
-    precise float slab = view.orthographic != 0u ? o.share.x : o.share.x * length_of(p) * inverse * inverse * inverse;
+    vec2 reach = view.middle / view.focal;
+    precise vec2 slope = clamp(p.xy * inverse, -reach, reach);
+    precise float slab = o.share.x;
+    if (view.orthographic == 0u) {
+        slab = o.share.x * length_of(vec3(slope, 1.0)) * inverse * inverse;
+    }
     if ((normal & PER_CROSSING) == 0u || (normal & HAS_NORMAL) == 0u) {
         return slab;
     }
@@ -68,21 +74,35 @@ Seen seen_from_eye(uint word) {
     return Seen(p, vec2(x, y), share_of(o, p, inverse, particles[word + 3u]));
 }
 
-// Pixels that a particle reaches, from and to in each direction, and the bits of its depth: in front of the eye depths are
-// positive, so their bits sort as numbers.
+// Pixels that a particle may reach, from and to in each direction, and the bits of its depth: in front of the eye depths are
+// positive, so their bits sort as numbers. A widened one covers those that `covers` says: `k` is that of a pixel seen along
+// the view, 0 for one that is not widened.
 struct Footing {
     uvec2 columns;
     uvec2 rows;
     uint depth;
+    vec2 at;
+    float k;
 };
+
+// |d| of the ray of depth 1 through a place of the image.
+float stretch(vec2 at) {
+    if (view.orthographic != 0u) {
+        return 1.0;
+    }
+    vec2 slope = (at - view.middle) * (1.0 / view.focal);
+    return length_of(vec3(slope, 1.0));
+}
 
 Footing footing_of(uint word) {
     Seen seen = seen_from_eye(word);
     uvec2 columns = uvec2(0u);
     uvec2 rows = uvec2(0u);
+    float k = 0.0;
     if (seen.p.z > 0.0) {
         if (seen.k > 1.0) {
-            float half_px = 0.5 * min(sqrt(seen.k), WIDEST_PX);
+            k = seen.k / stretch(clamp(seen.at, vec2(0.0), view.size));
+            float half_px = 0.5 * min(sqrt(k * stretch(vec2(0.0))), WIDEST_PX);
             columns = reached(seen.at.x, half_px, view.size.x);
             rows = reached(seen.at.y, half_px, view.size.y);
         } else if (seen.at.x >= 0.0 && seen.at.x < view.size.x && seen.at.y >= 0.0 && seen.at.y < view.size.y) {
@@ -92,5 +112,16 @@ Footing footing_of(uint word) {
             }
         }
     }
-    return Footing(columns, rows, floatBitsToUint(seen.p.z));
+    return Footing(columns, rows, floatBitsToUint(seen.p.z), seen.at, k);
+}
+
+// Whether the square of a pixel that a footing may reach holds the particle.
+bool covers(Footing f, uint column, uint row) {
+    if (f.k == 0.0) {
+        return true;
+    }
+    vec2 centre = vec2(float(column), float(row)) + 0.5;
+    float half_px = 0.5 * sqrt(f.k * stretch(centre));
+    vec2 off = centre - f.at;
+    return off.x > -half_px && off.y > -half_px && off.x <= half_px && off.y <= half_px;
 }
