@@ -49,6 +49,7 @@ mod majorant;
 mod march;
 mod medium;
 pub mod metrics;
+mod opaque;
 mod path;
 mod phase;
 mod quadrature;

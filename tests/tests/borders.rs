@@ -1,0 +1,68 @@
+//! Borders and silhouettes of opaque surfaces lie where they are, whatever the spacing of the splats beside a pixel.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use organza_tests::draw;
+
+const SIZE: u32 = 64;
+/// Height of the view, world units, and a sample's side.
+const HEIGHT: f64 = 2.0;
+const SAMPLE: f64 = HEIGHT / 2.0 / SIZE as f64;
+
+/// Area that is covered, seen by parallel rays along −z, world units².
+fn covered(objects: &str, technique: &str) -> f64 {
+    let text = format!(
+        "version = 1\n[camera]\nposition = [0, 0, 5]\ntarget = [0, 0, 0]\northographic = {HEIGHT:?}\nsize = [{SIZE}, {SIZE}]\n\
+         [render]\nantialias = 2\ntechnique = '{technique}'\n{objects}"
+    );
+    let side = HEIGHT / f64::from(SIZE);
+    draw(&text, &[]).channel("A").iter().sum::<f64>() * side * side
+}
+
+#[test]
+fn open_borders_lie_where_they_are() {
+    // Turned by 20 degrees in its plane, and leaning back by 0 and 50 degrees.
+    let (sin, cos) = 20f64.to_radians().sin_cos();
+    for lean in [0.0f64, 50.0] {
+        let (down, away) = (lean.to_radians().cos(), lean.to_radians().sin());
+        for spacing in [0.1, 0.05, 0.02, 0.005] {
+            for technique in ["points", "particles"] {
+                let rectangle = format!(
+                    "[[object]]\nname = 'sheet'\nrectangle = {{ center = [0, 0, 0], u = [{:?}, {:?}, {:?}], \
+                     v = [{:?}, {:?}, {:?}], spacing = {spacing:?} }}\n",
+                    0.8 * cos,
+                    0.8 * sin * down,
+                    0.8 * sin * away,
+                    -0.6 * sin,
+                    0.6 * cos * down,
+                    0.6 * cos * away
+                );
+                let found = covered(&rectangle, technique);
+                // By how much each border would have to be moved outwards, in the sheet's plane.
+                let (area, rim) = (4.0 * 0.8 * 0.6 * down, 4.0 * (0.8 + 0.6) * down);
+                let outwards = (found - area) / rim;
+                println!(
+                    "{technique} lean {lean}, h {spacing}: {:+.3} h, {:+.3} samples",
+                    outwards / spacing,
+                    outwards / SAMPLE
+                );
+                assert!(
+                    outwards.abs() < 0.08 * spacing + 0.08 * SAMPLE,
+                    "{technique}, lean {lean}, h {spacing}: {outwards}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn silhouettes_lie_where_they_are() {
+    for spacing in [0.1, 0.05, 0.02, 0.008] {
+        let ball = format!(
+            "[[object]]\nname = 'ball'\n\
+             implicit = {{ expression = 'x^2 + y^2 + z^2 - 0.49', box = [[-1, -1, -1], [1, 1, 1]], spacing = {spacing:?} }}\n"
+        );
+        let outwards = (covered(&ball, "points") / std::f64::consts::PI).sqrt() - 0.7;
+        println!("h {spacing}: {:+.3} h, {:+.3} samples", outwards / spacing, outwards / SAMPLE);
+        assert!(outwards.abs() < 0.08 * spacing + 0.08 * SAMPLE, "h {spacing}: {outwards}");
+    }
+}
