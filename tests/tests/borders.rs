@@ -40,11 +40,6 @@ fn open_borders_lie_where_they_are() {
                 // By how much each border would have to be moved outwards, in the sheet's plane.
                 let (area, rim) = (4.0 * 0.8 * 0.6 * down, 4.0 * (0.8 + 0.6) * down);
                 let outwards = (found - area) / rim;
-                println!(
-                    "{technique} lean {lean}, h {spacing}: {:+.3} h, {:+.3} samples",
-                    outwards / spacing,
-                    outwards / SAMPLE
-                );
                 assert!(
                     outwards.abs() < 0.08 * spacing + 0.08 * SAMPLE,
                     "{technique}, lean {lean}, h {spacing}: {outwards}"
@@ -62,7 +57,21 @@ fn silhouettes_lie_where_they_are() {
              implicit = {{ expression = 'x^2 + y^2 + z^2 - 0.49', box = [[-1, -1, -1], [1, 1, 1]], spacing = {spacing:?} }}\n"
         );
         let outwards = (covered(&ball, "points") / std::f64::consts::PI).sqrt() - 0.7;
-        println!("h {spacing}: {:+.3} h, {:+.3} samples", outwards / spacing, outwards / SAMPLE);
         assert!(outwards.abs() < 0.08 * spacing + 0.08 * SAMPLE, "h {spacing}: {outwards}");
+    }
+}
+
+#[test]
+fn nothing_shows_between_a_silhouette_and_the_wall_behind() {
+    for spacing in [0.05, 0.006] {
+        let scene = format!(
+            "version = 1\n[camera]\nposition = [0, 0, 5]\ntarget = [0, 0, 0]\northographic = {HEIGHT:?}\nsize = [{SIZE}, {SIZE}]\n\
+             [[object]]\nname = 'ball'\n\
+             implicit = {{ expression = 'x^2 + y^2 + z^2 - 0.49', box = [[-1, -1, -1], [1, 1, 1]], spacing = {spacing:?} }}\n\
+             [[object]]\nname = 'wall'\n\
+             rectangle = {{ center = [0, 0, -2], u = [2, 0, 0], v = [0, 2, 0], spacing = 0.1 }}\n"
+        );
+        let least = draw(&scene, &[]).channel("A").into_iter().fold(1.0, f64::min);
+        assert!(least > 0.999, "h {spacing}: {least}");
     }
 }

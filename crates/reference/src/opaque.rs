@@ -3,7 +3,7 @@
 use crate::footprint::{Fragment, Splat};
 
 /// ε-z of opaque surfaces as a share of the radius, the share of a disc within which it may be the nearest, the coverage from
-/// which on a surface is solid and how many are looked through: part of the definition of an opaque splat.
+/// which on a surface is solid and how many are looked through, each four times as deep: part of the definition of an opaque splat.
 const EPSILON_Z: f64 = 0.5;
 const CORE: f64 = 0.45 * 0.45;
 const SOLID: f64 = 0.48;
@@ -31,11 +31,12 @@ pub(crate) struct Surface<'a> {
 pub(crate) fn surface<'a>(discs: &'a [Disc<'a>]) -> Option<Surface<'a>> {
     let (mut thin, mut coverage) = (f64::NEG_INFINITY, [0.0; 2]);
     let mut best: Option<Surface<'_>> = None;
-    for _ in 0..MOST_LAYERS {
+    for layer in 0..MOST_LAYERS {
+        let epsilon_z = EPSILON_Z * f64::from(1 << (2 * layer));
         let behind = || discs.iter().filter(|d| d.fragment.depth > thin);
         let nearest = behind().filter(|d| d.fragment.s < CORE).map(|d| d.fragment.depth).reduce(f64::min)?;
         let layer: Vec<&Disc<'_>> =
-            behind().filter(|d| (d.fragment.depth - nearest).abs() < EPSILON_Z * d.splat.radius).collect();
+            behind().filter(|d| (d.fragment.depth - nearest).abs() < epsilon_z * d.splat.radius).collect();
         for disc in &layer {
             coverage[usize::from(disc.splat.faces_away)] +=
                 disc.fragment.amount + f64::from(u8::from(disc.fragment.is_own));

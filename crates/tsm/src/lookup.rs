@@ -287,6 +287,16 @@ mod tests {
     }
 
     #[test]
+    fn surfaces_are_steps_behind_their_distance() {
+        let (distance, total) = sums(&[(1.0, 0.4), (2.0, 0.2)]);
+        let list = List { distance: &distance, total: &total };
+        for (d, a) in [(0.5, 0.0), (1.0, 0.0), (1.001, 0.4), (2.0, 0.4), (7.0, 0.6)] {
+            let [before, ..] = places([list.distance; 4], [d; 4], |entry, d| entry < d);
+            assert!((list.total_of(before)[0] - a).abs() < 1e-6);
+        }
+    }
+
+    #[test]
     fn four_searches_at_once_find_what_each_finds() {
         let numbers: Vec<f32> = (0..200).map(|i| (i / 3) as f32).collect();
         for (i, lengths) in [[0, 1, 2, 3], [7, 64, 0, 200], [199, 5, 128, 1]].into_iter().enumerate() {

@@ -15,7 +15,7 @@ layout(set = 0, binding = 6, std430) buffer Bound6 { uint image[]; };
 // s within which a disc may be the nearest, and epsilon-z as a share of the radius.
 const float CORE = 0.2025;
 const float EPSILON_Z = 0.5;
-// Coverage from which on a surface is solid, and how many that are not a pixel looks through.
+// Coverage from which on a surface is solid, and how many that are not a pixel looks through, each four times as deep.
 const float SOLID = 0.48;
 const uint MOST_LAYERS = 8u;
 // Weight of a disc that faces away.
@@ -79,6 +79,7 @@ void main() {
             }
         }
         float last = nearest;
+        float epsilon_z = EPSILON_Z * float(1u << (2u * layer));
         if (open) {
             object = 0xffffffffu;
             weights = 0.0;
@@ -107,7 +108,7 @@ void main() {
                     object = object_of(batch_ids[k]);
                 }
                 precise float behind = z - nearest;
-                if (!(abs(behind) < EPSILON_Z * shape.peak.w && z > thin)) {
+                if (!(abs(behind) < epsilon_z * shape.peak.w && z > thin)) {
                     continue;
                 }
                 bool front = shape.peak.y > 0.0;

@@ -25,7 +25,8 @@ const CORE: f32 = 0.45 * 0.45;
 /// Coverage from which on a surface is solid: a half, less what keeps a single row of discs in one piece (0.4987 on it).
 const SOLID: f32 = 0.48;
 
-/// How many surfaces too thin to be solid a pixel looks through.
+/// How many surfaces too thin to be solid a pixel looks through; each is taken four times as deep as the one before, for beside
+/// a silhouette the filter of a pixel reaches over many small discs, one behind the other.
 pub(super) const MOST_LAYERS: usize = 8;
 
 /// Weight of a disc that faces away beside one that faces the viewer. Behind the silhouette of a closed surface discs face
@@ -203,7 +204,8 @@ impl pulp::WithSimd for ResolveTile<'_> {
                 *record = Disc { splat, depth, near: projected.near_disc(&splat, j).copied() };
             }
         };
-        for _ in 0..MOST_LAYERS {
+        for layer in 0..MOST_LAYERS {
+            let epsilon_z = EPSILON_Z * (1 << (2 * layer)) as f32;
             for batch in batches() {
                 gather(batch, &mut records);
                 records[..batch.len()].iter().for_each(|disc| tile.nearest(simd, size, disc));
@@ -212,7 +214,7 @@ impl pulp::WithSimd for ResolveTile<'_> {
                 gather(batch, &mut records);
                 for (disc, &j) in records.iter().zip(batch) {
                     let kernel = &projected.kernels[disc.splat.footprint as usize];
-                    tile.blend(simd, size, disc, kernel, &values[j as usize * channels..][..channels]);
+                    tile.blend(simd, size, disc, (kernel, epsilon_z), &values[j as usize * channels..][..channels]);
                 }
             }
             if !tile.look_behind() {
@@ -287,7 +289,14 @@ impl OpaqueTile {
 
     /// Step 2: weights of all fragments within ε-z of the nearest.
     #[inline(always)]
-    fn blend<S: Simd>(&mut self, simd: S, size: [u32; 2], disc: &Disc, kernel: &Kernel, values: &[f32]) {
+    fn blend<S: Simd>(
+        &mut self,
+        simd: S,
+        size: [u32; 2],
+        disc: &Disc,
+        (kernel, epsilon_z): (&Kernel, f32),
+        values: &[f32],
+    ) {
         let of = |v: f32| Lanes::splat(simd, v);
         let runs = Runs::new(simd, &disc.splat, size, [self.x, self.y]);
         self.fragments += runs.pixels();
@@ -295,7 +304,7 @@ impl OpaqueTile {
         let is_front = disc.splat.peak > 0.0;
         let share = if is_front { 1.0 } else { FACING_AWAY };
         let own = of(amount * kernel.own);
-        let reach = of(EPSILON_Z * disc.depth.extent);
+        let reach = of(epsilon_z * disc.depth.extent);
         for run in runs {
             if !self.open[run.block] {
                 continue;
