@@ -17,7 +17,7 @@ shared uint block_splats;
 
 uint count(uint id) {
     uint at = id * view.splat_words;
-    if (!(abs(uintBitsToFloat(splats[at + SPLAT_PEAK])) > 0.0)) {
+    if (!(uintBitsToFloat(splats[at + SPLAT_PEAK]) > 0.0)) {
         return 0u;
     }
     vec2 center = vec2(uintBitsToFloat(splats[at]), uintBitsToFloat(splats[at + 1u]));

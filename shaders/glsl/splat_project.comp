@@ -17,6 +17,8 @@ layout(set = 0, binding = 5, std430) readonly buffer Bound5 { vec4 tables[]; };
 layout(set = 0, binding = 6, std430) buffer Bound6 { uint splats[]; };
 layout(set = 0, binding = 7, std430) buffer Bound7 { ProjectState state; };
 
+// Weight of an opaque disc that faces away.
+const float FACING_AWAY = 0.00390625;
 // Least distance of a centre from the eye as a share of the radius, in perspective.
 const float LEAST_DEPTH = 0.03125;
 // Half an extent that leaves nothing out.
@@ -209,7 +211,7 @@ Shape disc(Splat s, Center c) {
     // The side of the plane that the eye is on: for a centre behind the eye `along` has the other sign.
     precise float facing = view.orthographic == 0u ? along * c.position.z : along;
     if (kind == OPAQUE && facing > 0.0) {
-        peak = -peak;
+        peak = peak * FACING_AWAY;
     }
     precise float per_px = 1.0 / (along * c.px_per_world);
     precise float slope_x = 0.0 - normal.x * per_px;
@@ -267,7 +269,7 @@ bool project(uint i) {
     precise float y = view.middle.y - c.position.y * c.px_per_world;
     uint extents = packed_extent(shape.half_extent.x) | (packed_extent(shape.half_extent.y) << 16);
     // Comparisons with what is no number are false.
-    bool shown = abs(shape.peak) > 0.0;
+    bool shown = shape.peak > 0.0;
     if (shown) {
         uvec4 bounds = bounds_of(vec2(x, y), extents, view.size);
         shown = bounds.x < bounds.y && bounds.z < bounds.w;

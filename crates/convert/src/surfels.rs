@@ -1,10 +1,9 @@
 //! Raw points become surfels: radius from the distances of distinct neighbours, normals from their covariance.
 //!
 //! Gunjee 2007 takes points with all attributes; scanners give positions. Each distinct position gets the normal of its
-//! neighbours' plane, its Voronoi cell in that plane as area a (K = τ₁·a) and the radius
+//! neighbours' plane, its Voronoi cell in that plane as area a (K = τ₁·a, or a when opaque) and the radius
 //! R = cutoff·0.8·h with h = √2 times the cell's farthest corner, between √a and 2√a: on a square lattice that is the
-//! lattice's spacing, among scattered points it bridges the gaps. An opaque one has the area π·h²/2 of the disc around its
-//! cell instead: what a scan leaves out between its points would be holes.
+//! lattice's spacing, among scattered points it bridges the gaps.
 //!
 //! Points at one place share the area of that place, so duplicates neither darken it nor shrink radii to 0.
 
@@ -22,7 +21,6 @@ use splat_core::{
     optics,
 };
 use std::cmp::Ordering;
-use std::f64::consts::FRAC_PI_2;
 
 /// How raw points become surfels.
 #[derive(Debug, Clone, PartialEq)]
@@ -255,7 +253,7 @@ fn emit(
     let surfels = sorted.surfels(params.merge_duplicates);
     report.splats = surfels.len() as u64;
     let opaque = params.opacity >= 1.0;
-    let tau = optics::optical_depth(params.opacity) * t.scale * t.scale;
+    let tau = if opaque { 1.0 } else { optics::optical_depth(params.opacity) } * t.scale * t.scale;
     let mut cloud = Cloud::new(t.apply(points.origin));
     let wanted = wanted(points, params);
     let kind = if opaque { SplatKind::Opaque } else { SplatKind::Surface };
@@ -270,11 +268,7 @@ fn emit(
             let n = if given == Vec3::ZERO { sorted.normals[place as usize] } else { given.as_dvec3() };
             *normal = t.rotate(n).as_vec3();
             *radius = params.splat.radius(known.spacing * t.scale) as f32;
-            *cross_section = if opaque {
-                FRAC_PI_2 * (known.spacing * t.scale).powi(2)
-            } else {
-                tau * known.area / f64::from(sharers)
-            } as f32;
+            *cross_section = (tau * known.area / f64::from(sharers)) as f32;
             *color = points.color.get(i).filter(|_| params.colors).copied().unwrap_or(params.splat.color);
         },
     );

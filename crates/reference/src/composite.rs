@@ -1,7 +1,6 @@
 //! Exact compositing: all fragments of a pixel, sorted, one by one.
 
-use crate::footprint::{Fragment, Splat, norms};
-use crate::opaque::{Disc, surface};
+use crate::footprint::{Splat, norms};
 use rayon::prelude::*;
 use splat_core::{Camera, Cloud, Error, FootprintStack, Material, Progress, SplatKind};
 
@@ -42,6 +41,10 @@ pub struct ExactImage {
     /// Transmittance to the background per channel.
     pub transmittance: Vec<[f64; 3]>,
 }
+
+/// ε-z of opaque surfaces and the solid share of a disc, part of the definition of an opaque splat.
+const EPSILON_Z: f64 = 0.5;
+const CORE: f64 = 0.45 * 0.45;
 
 /// Composites all splats of the input exactly, in f64.
 pub fn composite(input: &Input<'_>) -> ExactImage {
@@ -149,21 +152,31 @@ fn band(c: usize, channels: usize) -> usize {
     if c < colored { c % 3 } else { 1 }
 }
 
-/// The opaque surface: depth and blended values.
+/// Nearest opaque surface: depth and blended values.
 fn opaque<'a>(
     input: &Input<'_>,
     ids: &[u32],
-    at: &impl Fn(u32) -> Option<(&'a Splat, Fragment)>,
+    at: &impl Fn(u32) -> Option<(&'a Splat, crate::footprint::Fragment)>,
 ) -> Option<(f64, Vec<f64>)> {
-    let disc = |&id: &u32| at(id).map(|(splat, fragment)| Disc { id, splat, fragment });
-    let discs: Vec<Disc<'_>> = ids.iter().filter_map(disc).filter(|d| d.splat.kind == SplatKind::Opaque).collect();
-    let surface = surface(&discs)?;
+    let solid = |i: u32| at(i).filter(|(splat, _)| splat.kind == SplatKind::Opaque);
+    let nearest = ids
+        .iter()
+        .filter_map(|&i| solid(i))
+        .filter(|(_, f)| f.s <= CORE)
+        .map(|(_, f)| f.depth)
+        .fold(f64::INFINITY, f64::min);
+    if nearest == f64::INFINITY {
+        return None;
+    }
     let (mut weight, mut depth, mut values) = (0.0, 0.0, vec![0.0; input.channels]);
-    for (disc, w) in surface.discs {
-        weight += w;
-        depth += w * disc.fragment.depth;
-        for (c, value) in values.iter_mut().enumerate() {
-            *value += w * f64::from(input.values[disc.id as usize * input.channels + c]);
+    for &i in ids {
+        let Some((splat, f)) = solid(i) else { continue };
+        if f.depth <= nearest + EPSILON_Z * splat.radius {
+            weight += f.amount;
+            depth += f.amount * f.depth;
+            for (c, value) in values.iter_mut().enumerate() {
+                *value += f.amount * f64::from(input.values[i as usize * input.channels + c]);
+            }
         }
     }
     (weight > 0.0).then(|| (depth / weight, values.iter().map(|v| v / weight).collect()))

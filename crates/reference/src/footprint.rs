@@ -12,6 +12,9 @@ use splat_core::optics::SurfaceOpacity;
 use splat_core::{FootprintStack, SplatKind};
 use std::f64::consts::PI;
 
+/// Weight of an opaque disc that faces away, part of the definition of an opaque splat.
+const FACING_AWAY: f64 = 1.0 / 256.0;
+
 /// One splat seen by the camera, in f64.
 pub(crate) struct Splat {
     pub(crate) kind: SplatKind,
@@ -25,9 +28,6 @@ pub(crate) struct Splat {
     share_depth: f64,
     /// K·n/R'², or area·n/R² for an opaque disc.
     peak: f64,
-    norm: f64,
-    /// Whether a disc is seen from behind.
-    pub(crate) faces_away: bool,
     shape: Shape,
     /// Half the pixel extent to look at.
     pub(crate) reach_px: DVec2,
@@ -58,8 +58,6 @@ pub(crate) struct Fragment {
     /// Optical depth, or weight of an opaque disc.
     pub(crate) amount: f64,
     pub(crate) depth: f64,
-    /// Whether it lies in the ellipse that has the disc's own area.
-    pub(crate) is_own: bool,
 }
 
 impl Splat {
@@ -87,8 +85,6 @@ impl Splat {
             center_px,
             cutoff_sq_half: q,
             peak: 0.0,
-            norm: n,
-            faces_away: false,
             share_depth: 3.0 * radius * deviation(q),
             shape: Shape::Ball { radius_sq: 0.0 },
             reach_px: DVec2::ZERO,
@@ -142,8 +138,9 @@ impl Splat {
             SurfaceOpacity::ThinSlab if self.kind == SplatKind::Surface => 1.0 / normal.dot(view_dir).abs().max(1e-3),
             _ => 1.0,
         };
-        self.faces_away = normal.dot(view_dir) > 0.0;
-        self.peak = amount / (u.length() * v.length()) * spread * grazing;
+        // Beside discs of the same surface that face the viewer, opaque ones that face away hardly count.
+        let away = self.kind == SplatKind::Opaque && normal.dot(view_dir) > 0.0;
+        self.peak = amount / (u.length() * v.length()) * spread * grazing * if away { FACING_AWAY } else { 1.0 };
         let along = if parallel { normal.z } else { normal.dot(self.center) / self.center.z };
         let depth_slope =
             if along.abs() < 1e-4 { DVec2::ZERO } else { DVec2::new(-normal.x, normal.y) / (along * px_per_world) };
@@ -154,9 +151,9 @@ impl Splat {
 
     fn near_disc(&mut self, input: &Input<'_>, normal: DVec3, [u, v]: [DVec3; 2], amount: f64) {
         let opaque = self.kind == SplatKind::Opaque;
-        self.faces_away = normal.dot(self.center) > 0.0;
+        let away = if opaque && normal.dot(self.center) > 0.0 { FACING_AWAY } else { 1.0 };
         let slab = !opaque && input.materials[self.material].surface_opacity == SurfaceOpacity::ThinSlab;
-        self.peak = amount / (u.length() * v.length());
+        self.peak = amount / (u.length() * v.length()) * away;
         self.reach_px = DVec2::INFINITY;
         self.shape = Shape::Near { normal, axes: [u, v].map(|a| a / a.length_squared()), slab };
     }
@@ -212,7 +209,6 @@ impl Splat {
             s,
             amount: peak * profile(s, self.cutoff_sq_half),
             depth: self.depth + offset,
-            is_own: s < peak / (PI * self.norm),
         })
     }
 }

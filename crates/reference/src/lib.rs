@@ -49,7 +49,6 @@ mod majorant;
 mod march;
 mod medium;
 pub mod metrics;
-mod opaque;
 mod path;
 mod phase;
 mod quadrature;

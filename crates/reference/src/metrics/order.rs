@@ -5,9 +5,11 @@
 
 use crate::Input;
 use crate::footprint::{Splat, norms};
-use crate::opaque::{Disc, surface};
 use rayon::prelude::*;
 use splat_core::SplatKind;
+
+/// Share of an opaque disc's radius that hides, squared; part of the definition of an opaque splat.
+const CORE: f64 = 0.45 * 0.45;
 
 /// Translucent fragments on some rays of a picture.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,18 +81,18 @@ impl Rays {
 }
 
 fn on_ray(input: &Input<'_>, splats: &[Option<Splat>], ids: &[u32], x: usize, y: usize) -> Vec<(u32, f64)> {
-    let (mut opaque, mut found) = (Vec::new(), Vec::new());
+    let mut surface = f64::INFINITY;
+    let mut found = Vec::new();
     for &i in ids {
         let Some(splat) = &splats[i as usize] else { continue };
         let Some(f) = splat.fragment(input, x, y) else { continue };
         if splat.kind != SplatKind::Opaque {
             found.push((i, f.depth));
-        } else {
-            opaque.push(Disc { id: i, splat, fragment: f });
+        } else if f.s <= CORE {
+            surface = surface.min(f.depth);
         }
     }
-    let nearest = surface(&opaque).map_or(f64::INFINITY, |surface| surface.nearest);
-    found.retain(|f| f.1 < nearest);
+    found.retain(|f| f.1 < surface);
     found
 }
 

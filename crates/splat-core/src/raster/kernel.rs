@@ -31,8 +31,6 @@ pub(crate) struct Kernel {
     pub(crate) cutoff: f32,
     /// 1/∫w dA for R = 1.
     pub(crate) norm: f32,
-    /// s within which an ellipse has the area of an opaque splat, for a peak of 1: 1/(π·norm).
-    pub(crate) own: f32,
     /// Half the width of its share before a plane, [`Lanes::share_in_front`], for R = 1.
     pub(crate) depth: f32,
     /// Spacing of the lattice that it is meant for, for R = 1.
@@ -55,7 +53,6 @@ impl Kernel {
         Self {
             cutoff: footprint.cutoff,
             norm: footprint.norm() as f32,
-            own: (1.0 / (PI * footprint.norm())) as f32,
             depth: depth_of(footprint),
             spacing: footprint.spacing_for_radius(1.0),
             narrowing: narrowing(footprint),
@@ -66,16 +63,14 @@ impl Kernel {
         }
     }
 
-    /// The numbers that [`Kernel::profile`] computes with: G, q, e^−q, 1 where G holds; then the spacing, the narrowing, and
-    /// the share that is an opaque splat's own.
+    /// The numbers that [`Kernel::profile`] computes with: G, q, e^−q, 1 where G holds; then the spacing and the narrowing.
     #[cfg(feature = "gpu")]
     pub(crate) fn table(&self) -> [f32; TABLE] {
         let mut table = [0.0; TABLE];
         table[..TERMS].copy_from_slice(&self.g);
         let smooth = f32::from(u8::from(self.smooth));
         let [constant, slope] = self.narrowing;
-        let rest = [self.sharpness, self.rim, smooth, self.spacing, constant, slope, self.own];
-        table[TERMS..TERMS + rest.len()].copy_from_slice(&rest);
+        table[TERMS..TERMS + 6].copy_from_slice(&[self.sharpness, self.rim, smooth, self.spacing, constant, slope]);
         table
     }
 

@@ -24,6 +24,12 @@ use glam::{Vec2, Vec3};
 use pulp::Simd;
 use rayon::prelude::*;
 
+/// Weight of an opaque disc that faces away beside one that faces the viewer. Behind the silhouette of a closed surface
+/// discs face away and stick out by R sin θ; lit on the side that they turn to the viewer, which is the inside, they would
+/// draw a dark rim. Where nothing of the same surface faces the viewer this weight cancels: a back is seen as it is. A
+/// power of two, which changes no bit of the quotient.
+const FACING_AWAY: f32 = 1.0 / 256.0;
+
 /// Least distance of a centre from the eye as a share of the radius, in perspective: nearer, image positions run to infinity.
 const LEAST_DEPTH: f32 = 1.0 / 32.0;
 
@@ -184,7 +190,7 @@ impl Projector<'_> {
         // Where a ray meets a disc through the eye plane is told from where that is seen.
         z.where_less_or(of(0.0), shapes.near, centers.before).store(&mut image.depth);
         // Comparisons with NaN are false: what is no number has no image.
-        shapes.peak.where_less(of(0.0), shapes.peak.abs()).store(&mut image.peak);
+        shapes.peak.where_less(of(0.0), shapes.peak).store(&mut image.peak);
         shapes.near.store(&mut image.near);
         for k in 0..3 {
             shapes.conic[k].store(&mut image.conic[k]);
@@ -309,7 +315,7 @@ impl Projector<'_> {
         peak = slab.where_less_or(load(&attributes.crossing), of(0.0), peak);
         // The side of the plane that the eye is on: for a centre behind the eye `along` has the other sign.
         let facing = if self.orthographic { along } else { along * centers.position[2] };
-        let away = of(-1.0).where_less_or(of(0.0), facing, of(1.0));
+        let away = of(FACING_AWAY).where_less_or(of(0.0), facing, of(1.0));
         peak = peak * away.where_less_or(load(&attributes.opaque), of(0.0), of(1.0));
         let (near, half_extent, peak) = self.near_discs(simd, centers, [axis_u, axis_v], [xx.sqrt(), yy.sqrt()], peak);
         // An edge-on plane has no slope that could be used; its fragments stay at the centre's depth.
@@ -392,7 +398,7 @@ impl Projector<'_> {
                 ..ProjectedSplat::default()
             };
             splat.set_half_extent([image.half_extent[0][l], image.half_extent[1][l]]);
-            let shown = splat.peak != 0.0;
+            let shown = splat.peak > 0.0;
             *coverage = if shown { Coverage::of(splat.bounds(self.size)) } else { Coverage::NONE };
         }
     }

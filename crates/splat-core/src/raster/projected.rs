@@ -13,8 +13,7 @@ pub struct ProjectedSplat {
     pub center_px: [f32; 2],
     /// s = a·dx² + b·dx·dy + c·dy² in 1/pixel², s < 1 inside; for a medium in perspective times the pixel's 1/|d|².
     pub conic: [f32; 3],
-    /// Optical depth where the profile is 1: K·norm/R². For an opaque splat the coverage there, area·norm/R², negative where
-    /// it faces away from the viewer.
+    /// Optical depth where the profile is 1: K·norm/R². For an opaque splat the weight there, area·norm/R².
     pub peak: f32,
     /// Half the extent in x and y, pixels: the upper halves of f32s, rounded up. The sign of the first marks a disc that
     /// reaches through the eye plane.

@@ -11,7 +11,7 @@ pub(super) struct Image {
     pub(super) center: [Column; 2],
     pub(super) depth: Column,
     pub(super) conic: [Column; 3],
-    /// 0 for what has no image.
+    /// Not positive for what has no image.
     pub(super) peak: Column,
     pub(super) half_extent: [Column; 2],
     pub(super) slope: [Column; 2],

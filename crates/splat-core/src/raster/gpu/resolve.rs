@@ -27,7 +27,6 @@ use super::{
     Image, SPLAT_WORDS, check_ids, check_image, check_near, equal_lengths, fits, plain_view, table_bytes, tiles, words,
 };
 use crate::raster::kernel::Kernel;
-use crate::raster::opaque::MOST_LAYERS;
 use crate::raster::{OpaqueImage, Projected};
 use crate::{Camera, Error, FootprintStack};
 use splat_shaders::layouts::{SplatState, SplatView};
@@ -221,13 +220,13 @@ impl Recorded {
     }
 
     /// What a device did, from what was read back of [`Recorded::state`]. Lists are gone through twice, so that
-    /// [`Counts::longest`] is as often the longest as a thread may go through it.
+    /// [`Counts::longest`] is twice the longest.
     ///
     /// # Errors
     /// As [`Recorded::finish`].
     pub fn counts(&self, state: &[u8]) -> Result<Counts, Error> {
         let counts = Counts::read(state, ("tile entries", self.capacities.entries))?;
-        Ok(Counts { longest: 2 * MOST_LAYERS as u64 * counts.longest, ..counts })
+        Ok(Counts { longest: 2 * counts.longest, ..counts })
     }
 
     /// The image of what was read back of [`Recorded::state`] and [`Recorded::image`].
