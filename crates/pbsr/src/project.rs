@@ -61,8 +61,6 @@ pub(crate) struct Projector {
     focal: f32,
     middle: [f32; 2],
     size: [f32; 2],
-    /// Slopes of the rays at the image's right and upper border.
-    reach: [f32; 2],
     orthographic: bool,
     /// s·f² in view units: k is this times |d|/z², d the ray of depth 1, or this.
     pub(crate) share: f32,
@@ -147,7 +145,6 @@ impl Projector {
             focal: f as f32,
             middle: camera.size.map(|s| 0.5 * s as f32),
             size: camera.size.map(|s| s as f32),
-            reach: camera.size.map(|s| (0.5 * f64::from(s) / f) as f32),
             orthographic: camera.is_orthographic(),
             share: (cross_section * transform.scale * transform.scale * f * f) as f32,
         }
@@ -212,7 +209,9 @@ impl Lanes<'_> {
     #[inline(always)]
     fn run<const ORTHOGRAPHIC: bool>(self) {
         let Self { projector, offsets, tiling, view } = self;
-        let &Projector { linear, translation, focal, middle, share, size, reach, .. } = projector;
+        let &Projector { linear, translation, focal, middle, share, size, .. } = projector;
+        // Slopes of the rays at the borders: what lies beside the image has the k of the nearest pixel.
+        let reach = middle.map(|middle| middle / focal);
         let (columns, outside) = (tiling.columns as u32, tiling.tiles() as u32);
         let n = offsets.len().min(BLOCK);
         for i in 0..n {
