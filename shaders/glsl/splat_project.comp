@@ -21,6 +21,8 @@ layout(set = 0, binding = 7, std430) buffer Bound7 { ProjectState state; };
 const float FACING_AWAY = 0.00390625;
 // Least distance of a centre from the eye as a share of the radius, in perspective.
 const float LEAST_DEPTH = 0.03125;
+// The filter of what is solid, pixels.
+const float CORE_FILTER_PX = 0.03125;
 // Half an extent that leaves nothing out.
 const float EVERYWHERE = 3.4028235e38;
 // Marks a disc that reaches through the eye plane: the sign of its first half extent.
@@ -55,6 +57,8 @@ struct Center {
 
 struct Shape {
     vec3 conic;
+    // That of a disc without the filter.
+    vec3 core;
     float peak;
     vec2 half_extent;
     vec2 slope;
@@ -150,7 +154,7 @@ Shape medium(Splat s, Center c) {
     }
     precise float per_depth = 1.0 / depth;
     precise float per_front = 1.0 / front;
-    return Shape(vec3(a, b, d), peak, half_extent, vec2(per_depth, per_front), false);
+    return Shape(vec3(a, b, d), vec3(0.0), peak, half_extent, vec2(per_depth, per_front), false);
 }
 
 precise vec2 to_image(Center c, vec3 axis) {
@@ -173,6 +177,15 @@ precise vec3 first_axis(Splat s, vec3 n) {
     precise float y = (side + n.y * n.y * a) * s.radius;
     precise float z = (0.0 - n.y) * s.radius;
     return vec3(x, y, z);
+}
+
+// Inverse of a disc's image, J J^T, widened by a filter, as a conic.
+precise vec3 conic_of(float area_sq, float trace_x, float mixed, float trace_y, float filter_sq) {
+    precise float xx = trace_x + filter_sq;
+    precise float yy = trace_y + filter_sq;
+    precise float inverse = 1.0 / (area_sq + filter_sq * (trace_x + trace_y) + filter_sq * filter_sq);
+    precise vec3 conic = vec3(yy * inverse, -2.0 * (mixed * inverse), xx * inverse);
+    return conic;
 }
 
 Shape disc(Splat s, Center c) {
@@ -217,9 +230,8 @@ Shape disc(Splat s, Center c) {
     precise float slope_x = 0.0 - normal.x * per_px;
     precise float slope_y = normal.y * per_px;
     bool usable = abs(along) > 1.0e-4;
-    precise float a = yy * inverse;
-    precise float b = -2.0 * (mixed * inverse);
-    precise float d = xx * inverse;
+    vec3 conic = conic_of(area_sq, trace_x, mixed, trace_y, filter_sq);
+    vec3 core = conic_of(area_sq, trace_x, mixed, trace_y, CORE_FILTER_PX * CORE_FILTER_PX);
     // What reaches through the eye plane is drawn by the processor: here it is counted.
     precise float reach_z = sqrt(axis_u.z * axis_u.z + axis_v.z * axis_v.z);
     precise float behind = c.before + reach_z;
@@ -231,7 +243,7 @@ Shape disc(Splat s, Center c) {
         half_extent = vec2(EVERYWHERE);
         peak = in_view(c, radius) ? peak : 0.0;
     }
-    return Shape(vec3(a, b, d), peak, half_extent, usable ? vec2(slope_x, slope_y) : vec2(0.0), near);
+    return Shape(conic, core, peak, half_extent, usable ? vec2(slope_x, slope_y) : vec2(0.0), near);
 }
 
 // The upper half of a float, rounded up: an extent is never packed smaller.
@@ -292,6 +304,9 @@ bool project(uint i) {
         splats[to + 9u] = floatBitsToUint(shape.slope.x);
         splats[to + 10u] = floatBitsToUint(shape.slope.y);
         splats[to + 11u] = floatBitsToUint(s.radius);
+        splats[to + SPLAT_CORE] = floatBitsToUint(shape.core.x);
+        splats[to + SPLAT_CORE + 1u] = floatBitsToUint(shape.core.y);
+        splats[to + SPLAT_CORE + 2u] = floatBitsToUint(shape.core.z);
     }
     return shown;
 }

@@ -142,11 +142,15 @@ Point point_of(uint i, Material m, uint kind) {
         uint at = view.frame_words * i;
         p.normal = vec3(frames[at], frames[at + 1u], frames[at + 2u]);
     }
-    p.by_phase = m.look.x == SHADING_PHASE || p.normal == vec3(0.0);
     // A surface shows its viewer the side that faces him; the gradient of a medium has one outside.
-    if (kind != MEDIUM && dot_of(p.normal, p.to_eye) < 0.0) {
-        p.normal = -p.normal;
+    bool away = kind != MEDIUM && dot_of(p.normal, p.to_eye) < 0.0;
+    if (view.frame_words > SHADING_WORD) {
+        uint at = view.frame_words * i + SHADING_WORD;
+        vec3 shading = vec3(frames[at], frames[at + 1u], frames[at + 2u]);
+        p.normal = shading == vec3(0.0) ? p.normal : shading;
     }
+    p.by_phase = m.look.x == SHADING_PHASE || p.normal == vec3(0.0);
+    p.normal = away ? -p.normal : p.normal;
     return p;
 }
 

@@ -139,3 +139,42 @@ fn x3_any_unit_of_length_gives_the_same_picture() {
         }
     }
 }
+
+/// The scene after a quarter turn, camera and all: every place and direction is turned.
+fn turned(text: &str, turn: fn([f64; 3]) -> [f64; 3]) -> String {
+    let text = text.replace("target = [", "up = [0.0, 1.0, 0.0]\ntarget = [");
+    let mut parts = text.split('[');
+    let mut out = parts.next().unwrap().to_owned();
+    for part in parts {
+        let key = out.rsplit(['\n', '{', ',']).next().unwrap().trim().trim_end_matches(" =").to_owned();
+        if !["position", "target", "up", "center", "u", "v"].contains(&key.as_str()) {
+            write!(out, "[{part}").unwrap();
+            continue;
+        }
+        let (numbers, rest) = part.split_once(']').unwrap();
+        let vector: Vec<f64> = numbers.split(',').map(|n| n.trim().parse().unwrap()).collect();
+        let [x, y, z] = turn(vector.try_into().unwrap());
+        write!(out, "[{x:?}, {y:?}, {z:?}]{rest}").unwrap();
+    }
+    out
+}
+
+/// Tables of shadow maps have directions of their own: along the edges of shadows other cells are met.
+#[test]
+fn x3_a_quarter_turn_changes_next_to_nothing() {
+    let text = scene(1.0, 0.0, false);
+    let plain = draw(&turned(&text, |v| v), &[]);
+    let turns: [fn([f64; 3]) -> [f64; 3]; 3] = [|[x, y, z]| [x, -z, y], |[x, y, z]| [z, y, -x], |[x, y, z]| [-y, x, z]];
+    for (turn, axis) in turns.into_iter().zip(["x", "y", "z"]) {
+        let other = draw(&turned(&text, turn), &[]);
+        let off = |name| {
+            let pairs = plain.channel(name).into_iter().zip(other.channel(name)).map(|(a, b)| (a - b).abs());
+            pairs.collect::<Vec<_>>()
+        };
+        let [r, g, b] = ["R", "G", "B"].map(off);
+        let seen = (0..r.len()).filter(|k| r[*k].max(g[*k]).max(b[*k]) > 1.0 / 255.0).count();
+        let share = seen as f64 / r.len() as f64;
+        println!("{axis}: {share:.4}");
+        assert!(share < 0.005, "a quarter turn about {axis} changes {:.2} % of the pixels", 100.0 * share);
+    }
+}

@@ -13,6 +13,10 @@ pub(crate) const CHUNK: usize = 1 << 14;
 pub(crate) struct Wanted {
     /// Unit normals.
     pub(crate) normal: bool,
+    /// Normals of shading.
+    pub(crate) shading_normal: bool,
+    /// Semi-axes of discs.
+    pub(crate) tangent: bool,
     /// Physical values.
     pub(crate) value: bool,
 }
@@ -22,7 +26,8 @@ impl Wanted {
     pub(crate) fn bytes_per_splat(self) -> u64 {
         let required = size_of::<Vec3>() + 2 * size_of::<f32>() + size_of::<[f32; 3]>();
         let ids = size_of::<SplatKind>() + size_of::<u16>() + size_of::<u8>() + size_of::<u32>();
-        let optional = usize::from(self.normal) * size_of::<Vec3>() + usize::from(self.value) * size_of::<f32>();
+        let vectors = [self.normal, self.shading_normal, self.tangent].map(usize::from).iter().sum::<usize>();
+        let optional = vectors * size_of::<Vec3>() + usize::from(self.value) * size_of::<f32>();
         (required + ids + optional) as u64
     }
 }
@@ -47,12 +52,13 @@ pub(crate) fn size_columns(
     sized(&mut cloud.cross_section, n).map_err(full)?;
     sized(&mut cloud.color, n).map_err(full)?;
     sized(&mut cloud.normal, if wanted.normal { n } else { 0 }).map_err(full)?;
+    sized(&mut cloud.shading_normal, if wanted.shading_normal { n } else { 0 }).map_err(full)?;
+    sized(&mut cloud.tangent, if wanted.tangent { n } else { 0 }).map_err(full)?;
     sized(&mut cloud.value, if wanted.value { n } else { 0 }).map_err(full)?;
     constant(&mut cloud.kind, n, kind);
     constant(&mut cloud.material, n, params.material);
     constant(&mut cloud.footprint, n, params.footprint);
     constant(&mut cloud.object, n, params.object);
-    cloud.tangent.clear();
     cloud.shadow_coefficient.clear();
     Ok(())
 }

@@ -11,8 +11,9 @@
 //!
 //! `at_most` holds always: memory that is not to be exceeded is planned with it.
 
+use crate::borders::open_edges;
 use crate::columns::Wanted;
-use crate::field_points::{coarse_area, density_lattice, surface_lattice, surface_spacing};
+use crate::field_points::{area, coarse_mesh, density_lattice, surface_lattice, surface_spacing};
 use crate::keep::Keep;
 #[cfg(feature = "noise")]
 use crate::procedural::CloudShape;
@@ -69,8 +70,8 @@ impl Prediction {
 /// # Errors
 /// As the conversion.
 pub fn mesh(mesh: &Mesh, params: &MeshParams) -> Result<Prediction, ConvertError> {
-    let splats = mesh_points::plan(mesh, params)?.report.splats as f64;
-    Ok(Prediction::exact(splats, mesh_points::WANTED))
+    let plan = mesh_points::plan(mesh, params)?;
+    Ok(Prediction::exact(plan.report.splats as f64, plan.wanted))
 }
 
 /// Of [`crate::raw_to_surfels`]; with merged duplicates as if there were none.
@@ -114,9 +115,11 @@ pub fn surface<F: ScalarField + ?Sized>(
     params: &MeshParams,
 ) -> Result<Prediction, ConvertError> {
     params.splat.check()?;
-    let area = if params.opacity > 0.0 { coarse_area(field, bounds, &params.splat)? } else { 0.0 };
+    let coarse = if params.opacity > 0.0 { coarse_mesh(field, bounds, &params.splat)? } else { Mesh::default() };
     let spacing = surface_spacing(field, bounds, params)?;
-    Ok(Prediction::new(ZERO_SET_EXCESS * area / (spacing * spacing), None, mesh_points::WANTED))
+    // As if it were smooth.
+    let wanted = Wanted { tangent: params.opacity >= 1.0 && !open_edges(&coarse).is_empty(), ..mesh_points::WANTED };
+    Ok(Prediction::new(ZERO_SET_EXCESS * area(&coarse) / (spacing * spacing), None, wanted))
 }
 
 /// About how many values of the field [`crate::surface_to_points`] asks for: a field whose bounds exclude nothing is
@@ -209,12 +212,18 @@ pub fn medium_ball(
 ///
 /// # Errors
 /// As the conversion.
-pub fn rectangle(u: DVec3, v: DVec3, spacing: f64, params: &SplatParams) -> Result<Prediction, ConvertError> {
+pub fn rectangle(
+    u: DVec3,
+    v: DVec3,
+    opacity: f64,
+    spacing: f64,
+    params: &SplatParams,
+) -> Result<Prediction, ConvertError> {
     params.check()?;
     params.check_spacing(spacing * params.transform.scale)?;
     let splats = rectangle_counts(u, v, spacing).iter().product();
     params.check_count(splats)?;
-    Ok(Prediction::exact(splats, mesh_points::WANTED))
+    Ok(Prediction::exact(splats, Wanted { tangent: opacity >= 1.0, ..mesh_points::WANTED }))
 }
 
 /// Lattice points from `low` on, times the share of a coarser lattice in the same box that is `positive`.

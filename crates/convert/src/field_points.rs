@@ -103,20 +103,23 @@ pub(crate) fn surface_spacing<F: ScalarField + ?Sized>(
         Density::Spacing(h) => p.check_spacing(h)? / p.transform.scale,
         Density::Auto => longest / AUTO_CELLS,
         Density::Splats(n) => {
-            let area = coarse_area(field, bounds, p)?;
+            let area = area(&coarse_mesh(field, bounds, p)?);
             if area > 0.0 { (area / n.max(1) as f64).sqrt() } else { longest / AUTO_CELLS }
         }
     })
 }
 
-/// Area of a zero set by a first look, object units².
-pub(crate) fn coarse_area<F: ScalarField + ?Sized>(
+/// A zero set by a first look, object space.
+pub(crate) fn coarse_mesh<F: ScalarField + ?Sized>(
     field: &F,
     bounds: [DVec3; 2],
     splat: &SplatParams,
-) -> Result<f64, ConvertError> {
-    let coarse = field_to_mesh(field, bounds, (bounds[1] - bounds[0]).max_element() / COARSE_CELLS, splat)?;
-    Ok(coarse.triangles.iter().map(|t| subdivide::measure(corners(&coarse, t)).area).sum())
+) -> Result<Mesh, ConvertError> {
+    field_to_mesh(field, bounds, (bounds[1] - bounds[0]).max_element() / COARSE_CELLS, splat)
+}
+
+pub(crate) fn area(mesh: &Mesh) -> f64 {
+    mesh.triangles.iter().map(|t| subdivide::measure(corners(mesh, t)).area).sum()
 }
 
 /// How a density field becomes a medium.

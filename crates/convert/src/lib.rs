@@ -15,6 +15,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod borders;
 mod classify;
 mod columns;
 mod combine;

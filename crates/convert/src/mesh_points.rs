@@ -8,12 +8,17 @@
 //! Deviation from the paper: it gives each piece the opacity of the surface, which multiplies where discs overlap.
 
 use crate::ConvertError;
+use crate::borders::{Borders, open_edges};
 use crate::columns::{self, Wanted};
 use crate::params::{Density, SplatParams};
 use crate::pieces::Pieces;
 use crate::subdivide::{self, Measure};
+use crate::vertex_normals::vertex_normals;
 use rayon::prelude::*;
-use splat_core::{Cloud, Mesh, Progress, SplatKind, glam::DVec3};
+use splat_core::{
+    Cloud, Mesh, Progress, SplatKind,
+    glam::{DVec3, Vec3},
+};
 
 /// How a mesh becomes splats.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,6 +38,9 @@ impl Default for MeshParams {
         Self { splat: SplatParams::default(), density: Density::Auto, opacity: 1.0 }
     }
 }
+
+/// Splats of a mesh have normals at least.
+pub(crate) const WANTED: Wanted = Wanted { normal: true, shading_normal: false, tangent: false, value: false };
 
 /// What the conversion of a mesh did.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -57,8 +65,9 @@ pub struct MeshReport {
 const AUTO_STEPS: f64 = 400.0;
 const AUTO_SPLATS: f64 = 4e6;
 
-/// Splats of a mesh have normals.
-pub(crate) const WANTED: Wanted = Wanted { normal: true, value: false };
+/// The splats of a triangle that has several lie in its plane where a vertex normal leans further from it than this cosine: by
+/// interpolated normals they would stand out of a coarse mesh as scales, with gaps between them.
+const LEANING: f32 = 0.94;
 
 /// Makes a new cloud from a mesh, see [`mesh_to_points_into`].
 ///
@@ -102,22 +111,32 @@ pub fn mesh_to_points_with_progress(
     progress: &Progress,
 ) -> Result<MeshReport, ConvertError> {
     let p = &params.splat;
-    let Plan { measures, starts, report } = plan(mesh, params)?;
+    let plan = plan(mesh, params)?;
+    let report = plan.report;
     cloud.origin = p.transform.apply(mesh.origin);
     let kind = if params.opacity < 1.0 { SplatKind::Surface } else { SplatKind::Opaque };
-    columns::size_columns(cloud, report.splats as usize, kind, WANTED, p)?;
+    columns::size_columns(cloud, report.splats as usize, kind, plan.wanted, p)?;
     progress.add_total(report.splats);
     if report.splats > 0 {
-        Pieces::new(mesh, params, &measures, &starts, &report).emit(cloud, progress)?;
+        let pieces = Pieces::new(mesh, params, &plan);
+        pieces.emit(cloud, progress)?;
+        if plan.wanted.tangent {
+            Borders::new(plan.borders.iter().map(|edge| pieces.place(edge))).clip(cloud);
+        }
     }
     Ok(report)
 }
 
 /// What is known before any splat is made.
 pub(crate) struct Plan {
-    measures: Vec<Measure>,
+    pub(crate) measures: Vec<Measure>,
     /// First splat of every triangle, then the number of all; empty where there is none.
-    starts: Vec<u64>,
+    pub(crate) starts: Vec<u64>,
+    /// Normals of the vertices, in the mesh's space.
+    pub(crate) normal: Vec<Vec3>,
+    /// Edges where an opaque surface ends.
+    borders: Vec<[u32; 2]>,
+    pub(crate) wanted: Wanted,
     pub(crate) report: MeshReport,
 }
 
@@ -140,7 +159,8 @@ pub(crate) fn plan(mesh: &Mesh, params: &MeshParams) -> Result<Plan, ConvertErro
         ..MeshReport::default()
     };
     if area == 0.0 || params.opacity == 0.0 {
-        return Ok(Plan { measures, starts: Vec::new(), report });
+        let nothing = (Vec::new(), Vec::new(), Vec::new());
+        return Ok(Plan { measures, starts: nothing.0, normal: nothing.1, borders: nothing.2, wanted: WANTED, report });
     }
     let spacing = p.check_spacing(spacing(mesh, &measures, params, &report))?;
     let starts = starts(&measures, spacing / scale, p)?;
@@ -148,7 +168,26 @@ pub(crate) fn plan(mesh: &Mesh, params: &MeshParams) -> Result<Plan, ConvertErro
     report.radius = p.radius(spacing);
     report.splats = starts.last().copied().unwrap_or(0);
     report.normals_computed = mesh.normal.is_empty();
-    Ok(Plan { measures, starts, report })
+    let normal = if report.normals_computed { vertex_normals(mesh) } else { mesh.normal.clone() };
+    let borders = if params.opacity < 1.0 { Vec::new() } else { open_edges(mesh) };
+    let shading_normal = mesh.triangles.par_iter().enumerate().with_min_len(4096).any(|(i, t)| {
+        let leans = |plane: DVec3| leans(t.map(|v| normal[v as usize]), plane.as_vec3());
+        starts[i + 1] - starts[i] > 1 && plane(mesh, t).is_some_and(leans)
+    });
+    let wanted = Wanted { shading_normal, tangent: !borders.is_empty(), ..WANTED };
+    Ok(Plan { measures, starts, normal, borders, wanted, report })
+}
+
+/// Unit normal of a triangle by the right-hand rule.
+pub(crate) fn plane(mesh: &Mesh, triangle: &[u32; 3]) -> Option<DVec3> {
+    // From the mesh itself: a sliver may collapse when its turned corners are rounded.
+    let v = corners(mesh, triangle);
+    subdivide::robust_cross(v[1] - v[0], v[2] - v[0]).try_normalize()
+}
+
+/// Whether a corner's normal leans away from a plane on either side.
+pub(crate) fn leans(corners: [Vec3; 3], plane: Vec3) -> bool {
+    corners.iter().any(|n| n.dot(plane).abs() < LEANING * n.length())
 }
 
 /// The spacing in world units that the density asks for.

@@ -2,9 +2,9 @@
 
 use crate::columns::{self, CHUNK};
 use crate::convert_error::check_cancelled;
-use crate::mesh_points::corners;
+use crate::mesh_points::{Plan, leans, plane};
 use crate::subdivide::{self, Measure, Run, Split};
-use crate::{ConvertError, MeshParams, MeshReport, vertex_normals};
+use crate::{ConvertError, MeshParams};
 use rayon::prelude::*;
 use splat_core::{
     Cloud, Mesh, Progress,
@@ -39,46 +39,48 @@ pub(crate) struct Pieces<'a> {
 struct Target<'a> {
     position: &'a mut [Vec3],
     normal: &'a mut [Vec3],
+    /// Empty where no triangle has normals that lean from it.
+    shading_normal: &'a mut [Vec3],
     cross_section: &'a mut [f32],
     color: &'a mut [[f32; 3]],
 }
 
 impl<'a> Pieces<'a> {
-    pub(crate) fn new(
-        mesh: &'a Mesh,
-        params: &MeshParams,
-        measures: &'a [Measure],
-        starts: &'a [u64],
-        report: &MeshReport,
-    ) -> Self {
+    pub(crate) fn new(mesh: &'a Mesh, params: &MeshParams, plan: &'a Plan) -> Self {
         let t = &params.splat.transform;
         let place = |v: &Vec3| (t.rotation * (v.as_dvec3() * t.scale)).as_vec3();
         let turn = |n: &Vec3| columns::unit_or_zero(t.rotate(n.as_dvec3()).as_vec3());
-        let normal = if report.normals_computed { vertex_normals(mesh) } else { mesh.normal.clone() };
         let tau = if params.opacity < 1.0 { optics::optical_depth(params.opacity) } else { 1.0 };
         Self {
             mesh,
-            measures,
-            starts,
+            measures: &plan.measures,
+            starts: &plan.starts,
             position: mesh.position.par_iter().with_min_len(CHUNK).map(place).collect(),
-            normal: normal.par_iter().with_min_len(CHUNK).map(turn).collect(),
-            spacing: report.spacing / t.scale,
+            normal: plan.normal.par_iter().with_min_len(CHUNK).map(turn).collect(),
+            spacing: plan.report.spacing / t.scale,
             depth: tau * t.scale * t.scale,
-            radius: report.radius as f32,
+            radius: plan.report.radius as f32,
             color: params.splat.color,
             rotation: t.rotation,
             weights: (0..=TABULATED).map(weights).collect(),
         }
     }
 
+    /// An edge relative to the cloud's origin.
+    pub(crate) fn place(&self, edge: &[u32; 2]) -> [Vec3; 2] {
+        edge.map(|v| self.position[v as usize])
+    }
+
     /// Fills the columns in tasks of [`CHUNK`] splats, wherever triangles begin: one huge triangle is shared too.
     pub(crate) fn emit(&self, cloud: &mut Cloud, progress: &Progress) -> Result<(), ConvertError> {
         let columns = (cloud.position.par_chunks_mut(CHUNK), cloud.normal.par_chunks_mut(CHUNK));
         let rest = (cloud.cross_section.par_chunks_mut(CHUNK), cloud.color.par_chunks_mut(CHUNK));
-        (columns.0, columns.1, rest.0, rest.1, cloud.radius.par_chunks_mut(CHUNK))
+        let mut shading: Vec<&mut [Vec3]> = cloud.shading_normal.chunks_mut(CHUNK).collect();
+        shading.resize_with(cloud.radius.len().div_ceil(CHUNK), Default::default);
+        (columns.0, columns.1, shading, rest.0, rest.1, cloud.radius.par_chunks_mut(CHUNK))
             .into_par_iter()
             .enumerate()
-            .for_each(|(chunk, (position, normal, cross_section, color, radius))| {
+            .for_each(|(chunk, (position, normal, shading_normal, cross_section, color, radius))| {
                 if progress.tick(radius.len() as u64).is_err() {
                     return;
                 }
@@ -86,7 +88,7 @@ impl<'a> Pieces<'a> {
                 if self.mesh.color.is_empty() {
                     color.fill(self.color);
                 }
-                let target = Target { position, normal, cross_section, color };
+                let target = Target { position, normal, shading_normal, cross_section, color };
                 pulp::Arch::new().dispatch(Fill { pieces: self, first: (chunk * CHUNK) as u64, target });
             });
         check_cancelled(progress)
@@ -142,8 +144,10 @@ struct Corners {
     position: [Vec3; 3],
     normal: [Vec3; 3],
     color: Option<[Vec3; 3]>,
-    /// Normal of the plane, where interpolated normals cancel.
+    /// Normal of the plane, on the side of the vertex normals.
     plane: Vec3,
+    /// Whether its discs lie in the plane, since normals lean.
+    is_flat: bool,
     /// K of the whole triangle.
     depth: f64,
 }
@@ -152,13 +156,13 @@ impl Corners {
     fn new(pieces: &Pieces<'_>, triangle: usize) -> Self {
         let ids = pieces.mesh.triangles[triangle].map(|v| v as usize);
         let position = ids.map(|v| pieces.position[v]);
-        // From the mesh itself: a sliver may collapse when its turned corners are rounded.
-        let v = corners(pieces.mesh, &pieces.mesh.triangles[triangle]);
-        let plane = pieces.rotation * subdivide::robust_cross(v[1] - v[0], v[2] - v[0]).normalize_or(DVec3::Y);
-        let plane = plane.as_vec3();
+        let plane = plane(pieces.mesh, &pieces.mesh.triangles[triangle]).unwrap_or(DVec3::Y);
+        let plane = (pieces.rotation * plane).as_vec3();
         let normal = ids.map(|v| if pieces.normal[v] == Vec3::ZERO { plane } else { pieces.normal[v] });
+        let is_flat = pieces.starts[triangle + 1] - pieces.starts[triangle] > 1 && leans(normal, plane);
+        let plane = if normal.iter().sum::<Vec3>().dot(plane) < 0.0 { -plane } else { plane };
         let color = (!pieces.mesh.color.is_empty()).then(|| ids.map(|v| Vec3::from(pieces.mesh.color[v])));
-        Self { position, normal, color, plane, depth: pieces.depth * pieces.measures[triangle].area }
+        Self { position, normal, color, plane, is_flat, depth: pieces.depth * pieces.measures[triangle].area }
     }
 
     /// Writes pieces of one share of the area, given by their weights of corners 1 and 2.
@@ -170,7 +174,7 @@ impl Corners {
             *p = from + e1 * w[0] + e2 * w[1];
         }
         let (from, e1, e2) = edges(&self.normal);
-        for (n, w) in target.normal[range.clone()].iter_mut().zip(weights) {
+        for (n, w) in self.normals(range.clone(), target).iter_mut().zip(weights) {
             *n = self.unit(from + e1 * w[0] + e2 * w[1]);
         }
         if let Some(color) = &self.color {
@@ -180,6 +184,19 @@ impl Corners {
             }
         }
         target.cross_section[range].fill((self.depth * share) as f32);
+    }
+
+    /// Where interpolated normals go.
+    #[inline(always)]
+    fn normals<'t>(&self, range: Range<usize>, target: &'t mut Target<'_>) -> &'t mut [Vec3] {
+        if self.is_flat {
+            target.normal[range.clone()].fill(self.plane);
+            return &mut target.shading_normal[range];
+        }
+        if !target.shading_normal.is_empty() {
+            target.shading_normal[range.clone()].fill(Vec3::ZERO);
+        }
+        &mut target.normal[range]
     }
 
     /// Opposite vertex normals cancel on the way from one to the other.
@@ -221,7 +238,7 @@ impl Corners {
             *p = from + along * (j as f32 + skip);
         }
         let (from, along) = line(&self.normal);
-        for (j, n) in target.normal[range.clone()].iter_mut().enumerate() {
+        for (j, n) in self.normals(range.clone(), target).iter_mut().enumerate() {
             *n = self.unit(from + along * (j as f32 + skip));
         }
         if let Some(color) = &self.color {

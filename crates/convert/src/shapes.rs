@@ -3,6 +3,7 @@
 //! A lattice whose cells tile the shape exactly: Σ K = σ_t·V and Σ K = τ₁·A hold to rounding, so the optical depth along a
 //! ray is the closed form convolved with the kernel. For tests, and for scenes that want just a slab of fog.
 
+use crate::borders::Borders;
 use crate::{ConvertError, SplatParams};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Cloud, Splat, SplatKind, optics};
@@ -90,6 +91,10 @@ pub fn rectangle(
             let offset = params.transform.rotate((u * s + v * t) * scale);
             cloud.push(&Splat { position: offset.as_vec3(), ..splat });
         }
+    }
+    if splat.kind == SplatKind::Opaque {
+        let corners = [u + v, v - u, -u - v, u - v].map(|c| params.transform.rotate(c * scale).as_vec3());
+        Borders::new((0..4).map(|i| [corners[i], corners[(i + 1) % 4]])).clip(&mut cloud);
     }
     Ok(cloud)
 }

@@ -240,7 +240,7 @@ impl Sorted {
 
 /// Which columns surfels fill.
 pub(crate) fn wanted(points: &RawPoints, params: &SurfelParams) -> Wanted {
-    Wanted { normal: true, value: params.values && !points.value.is_empty() }
+    Wanted { normal: true, value: params.values && !points.value.is_empty(), ..Wanted::default() }
 }
 
 fn emit(

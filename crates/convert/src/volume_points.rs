@@ -58,7 +58,7 @@ impl Default for VolumeParams {
 impl VolumeParams {
     /// Which columns the splats fill.
     pub(crate) fn wanted(&self) -> Wanted {
-        Wanted { normal: self.normals, value: self.values }
+        Wanted { normal: self.normals, value: self.values, ..Wanted::default() }
     }
 
     /// Checks what does not depend on the volume.

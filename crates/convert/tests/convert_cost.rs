@@ -103,7 +103,9 @@ fn closed_shapes_are_counted() {
     exact(cost::medium_box(low, high, 5.0, 0.07, &p).unwrap(), &medium_box(low, high, 5.0, 0.07, &p).unwrap());
     exact(cost::medium_box(low, high, 0.0, 0.07, &p).unwrap(), &medium_box(low, high, 0.0, 0.07, &p).unwrap());
     let (u, v) = (DVec3::X, DVec3::Z * 2.0);
-    exact(cost::rectangle(u, v, 0.05, &p).unwrap(), &rectangle(low, u, v, 0.75, 0.05, &p).unwrap());
+    for opacity in [0.75, 1.0] {
+        exact(cost::rectangle(u, v, opacity, 0.05, &p).unwrap(), &rectangle(low, u, v, opacity, 0.05, &p).unwrap());
+    }
     for spacing in [0.03, 0.1] {
         let ball = medium_ball(DVec3::ONE, 0.8, 2.0, spacing, &p).unwrap();
         close(cost::medium_ball(DVec3::ONE, 0.8, 2.0, spacing, &p).unwrap(), &ball, 0.06);

@@ -294,3 +294,23 @@ fn memory_is_used_again() {
     assert_eq!(cloud.position.as_ptr(), place);
     assert_eq!(cloud, mesh_to_points(&quad(1.0), &fine).unwrap().0);
 }
+
+#[test]
+fn discs_of_coarse_triangles_lie_in_their_planes() {
+    let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z];
+    let octant = |a: u32, b: u32, c: u32, outwards: bool| if outwards { [a, b, c] } else { [a, c, b] };
+    let signs = (0..8u32).map(|k| octant(k & 1, 2 + (k >> 1 & 1), 4 + (k >> 2), k.count_ones() % 2 == 0));
+    let mut mesh = Mesh { position: vec![x, -x, y, -y, z, -z], triangles: signs.collect(), ..Mesh::default() };
+    mesh.normal = mesh.position.clone();
+    let (cloud, _) = mesh_to_points(&mesh, &params(0.1, 1.0)).unwrap();
+    cloud.validate().unwrap();
+    assert!(cloud.tangent.is_empty(), "a closed surface has no border");
+    for (i, p) in cloud.position.iter().enumerate() {
+        let plane = p.signum() / 3f32.sqrt();
+        assert!(cloud.normal[i].distance(plane) < 1e-6, "{} at {p}", cloud.normal[i]);
+        assert!(cloud.shading_normal_of(i).distance(p.normalize()) < 1e-6, "{} at {p}", cloud.shading_normal[i]);
+    }
+    // Triangles of one splat each stand for a surface that is as fine as they are.
+    let fine = mesh_to_points(&mesh, &params(2.0, 1.0)).unwrap().0;
+    assert!(fine.shading_normal.is_empty() && fine.normal[0].distance(fine.position[0].normalize()) < 1e-6);
+}

@@ -42,9 +42,8 @@ pub struct ExactImage {
     pub transmittance: Vec<[f64; 3]>,
 }
 
-/// ε-z of opaque surfaces and the solid share of a disc, part of the definition of an opaque splat.
+/// ε-z of opaque surfaces, part of the definition of an opaque splat.
 const EPSILON_Z: f64 = 0.5;
-const CORE: f64 = 0.45 * 0.45;
 
 /// Composites all splats of the input exactly, in f64.
 pub fn composite(input: &Input<'_>) -> ExactImage {
@@ -162,7 +161,7 @@ fn opaque<'a>(
     let nearest = ids
         .iter()
         .filter_map(|&i| solid(i))
-        .filter(|(_, f)| f.s <= CORE)
+        .filter(|(_, f)| f.is_solid)
         .map(|(_, f)| f.depth)
         .fold(f64::INFINITY, f64::min);
     if nearest == f64::INFINITY {
@@ -171,7 +170,7 @@ fn opaque<'a>(
     let (mut weight, mut depth, mut values) = (0.0, 0.0, vec![0.0; input.channels]);
     for &i in ids {
         let Some((splat, f)) = solid(i) else { continue };
-        if f.depth <= nearest + EPSILON_Z * splat.radius {
+        if (f.depth - nearest).abs() <= EPSILON_Z * splat.radius {
             weight += f.amount;
             depth += f.amount * f.depth;
             for (c, value) in values.iter_mut().enumerate() {

@@ -15,6 +15,10 @@ use std::f64::consts::PI;
 /// Weight of an opaque disc that faces away, part of the definition of an opaque splat.
 const FACING_AWAY: f64 = 1.0 / 256.0;
 
+/// Share of an opaque disc's radius that hides, squared, and the filter there, part of the definition of an opaque splat.
+const CORE: f64 = 0.45 * 0.45;
+const CORE_FILTER_PX: f64 = 1.0 / 32.0;
+
 /// One splat seen by the camera, in f64.
 pub(crate) struct Splat {
     pub(crate) kind: SplatKind,
@@ -39,6 +43,8 @@ enum Shape {
     },
     Disc {
         metric: DMat2,
+        /// Without the filter.
+        core: DMat2,
         depth_slope: DVec2,
         /// Whether it reaches through the eye plane: then it is seen where it lies before it.
         crosses: bool,
@@ -53,8 +59,8 @@ enum Shape {
 
 /// One splat at one pixel.
 pub(crate) struct Fragment {
-    /// s in [0, 1).
-    pub(crate) s: f64,
+    /// Whether an opaque disc is solid here.
+    pub(crate) is_solid: bool,
     /// Optical depth, or weight of an opaque disc.
     pub(crate) amount: f64,
     pub(crate) depth: f64,
@@ -128,7 +134,8 @@ impl Splat {
         let project =
             |a: DVec3| DVec2::new((a.x - slope.x * a.z) * px_per_world, -(a.y - slope.y * a.z) * px_per_world);
         let jacobian = DMat2::from_cols(project(u), project(v));
-        let covariance = jacobian * jacobian.transpose() + DMat2::from_diagonal(DVec2::splat(filter_px * filter_px));
+        let widened = |by_px: f64| jacobian * jacobian.transpose() + DMat2::from_diagonal(DVec2::splat(by_px * by_px));
+        let covariance = widened(filter_px);
         if covariance.determinant() <= 0.0 {
             return;
         }
@@ -146,7 +153,8 @@ impl Splat {
             if along.abs() < 1e-4 { DVec2::ZERO } else { DVec2::new(-normal.x, normal.y) / (along * px_per_world) };
         self.reach_px = DVec2::new(covariance.x_axis.x, covariance.y_axis.y).map(|c| c.sqrt() + 1.0);
         let crosses = self.depth < reach_z;
-        self.shape = Shape::Disc { metric: covariance.inverse(), depth_slope, crosses };
+        self.shape =
+            Shape::Disc { metric: covariance.inverse(), core: widened(CORE_FILTER_PX).inverse(), depth_slope, crosses };
     }
 
     fn near_disc(&mut self, input: &Input<'_>, normal: DVec3, [u, v]: [DVec3; 2], amount: f64) {
@@ -177,7 +185,7 @@ impl Splat {
     pub(crate) fn fragment(&self, input: &Input<'_>, x: usize, y: usize) -> Option<Fragment> {
         let at = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
         let mut peak = self.peak;
-        let (s, offset) = match &self.shape {
+        let (s, core, offset) = match &self.shape {
             Shape::Near { normal, axes, slab } => {
                 let (origin, d) = input.camera.view_ray(at.x, at.y);
                 let depth = (self.center - origin).dot(*normal) / d.dot(*normal);
@@ -188,25 +196,26 @@ impl Splat {
                 if *slab {
                     peak /= (d.dot(*normal).abs() / d.length()).max(1e-3);
                 }
-                (axes.iter().map(|a| p.dot(*a).powi(2)).sum(), depth - self.depth)
+                let s = axes.iter().map(|a| p.dot(*a).powi(2)).sum();
+                (s, s, depth - self.depth)
             }
             Shape::Ball { radius_sq } => {
                 let (origin, d) = input.camera.view_ray(at.x, at.y);
                 let rho_sq = (self.center - origin).cross(d).length_squared() / d.length_squared();
-                (rho_sq / radius_sq, 0.0)
+                (rho_sq / radius_sq, f64::INFINITY, 0.0)
             }
-            Shape::Disc { metric, depth_slope, crosses } => {
+            Shape::Disc { metric, core, depth_slope, crosses } => {
                 let d = at - self.center_px;
                 let offset = depth_slope.dot(d);
                 let offset = if *crosses { offset } else { offset.clamp(-self.radius, self.radius) };
                 if *crosses && self.depth + offset <= 0.0 {
                     return None;
                 }
-                (d.dot(*metric * d), offset)
+                (d.dot(*metric * d), d.dot(*core * d), offset)
             }
         };
         (s < 1.0 && peak > 0.0).then(|| Fragment {
-            s,
+            is_solid: core <= CORE,
             amount: peak * profile(s, self.cutoff_sq_half),
             depth: self.depth + offset,
         })

@@ -38,8 +38,11 @@ pub struct Splat {
     pub footprint: u8,
     /// Index into the [`crate::ObjectTable`].
     pub object: u32,
-    /// Unit normal, or zero for none.
+    /// Unit normal, or zero for none. A disc lies across it.
     pub normal: Vec3,
+    /// Unit normal that light is reflected about, or zero where that is `normal`: the interpolated one of a mesh whose
+    /// triangles are coarser than the surface that they stand for.
+    pub shading_normal: Vec3,
     /// Semi-axis of the tangent disc along the first principal direction, or zero for a circular disc.
     pub tangent: Vec3,
     /// Share of the shadow that this splat receives, in \[0, 1\]; the paper's shadow coefficient.
@@ -60,6 +63,7 @@ impl Default for Splat {
             footprint: 0,
             object: 0,
             normal: Vec3::ZERO,
+            shading_normal: Vec3::ZERO,
             tangent: Vec3::ZERO,
             shadow_coefficient: 1.0,
             value: 0.0,
@@ -69,7 +73,7 @@ impl Default for Splat {
 
 macro_rules! columns {
     (required: $($(#[$rm:meta])* $r:ident: $rt:ty,)* ; optional: $($(#[$om:meta])* $o:ident: $ot:ty = $od:expr,)*) => {
-        /// Splats as columns. The last four columns may be empty, which means their default for every splat.
+        /// Splats as columns. The last five columns may be empty, which means their default for every splat.
         ///
         /// The id of a splat is its rank; [`Cloud::canonicalize`] makes that independent of the order of the input.
         ///
@@ -189,6 +193,8 @@ columns! {
     optional:
     /// Unit normals, zero for none; may be empty.
     normal: Vec3 = Vec3::ZERO,
+    /// Unit normals of shading, zero for `normal`; may be empty.
+    shading_normal: Vec3 = Vec3::ZERO,
     /// First semi-axes of elliptical tangent discs, zero for circular; may be empty.
     tangent: Vec3 = Vec3::ZERO,
     /// Shadow coefficients; may be empty, which means 1.
@@ -211,6 +217,11 @@ impl Cloud {
     /// Normal of splat `i`, zero for none.
     pub fn normal_of(&self, i: usize) -> Vec3 {
         self.normal.get(i).copied().unwrap_or(Vec3::ZERO)
+    }
+
+    /// Normal that splat `i` reflects light about, zero for none.
+    pub fn shading_normal_of(&self, i: usize) -> Vec3 {
+        self.shading_normal.get(i).copied().filter(|n| *n != Vec3::ZERO).unwrap_or_else(|| self.normal_of(i))
     }
 
     /// First semi-axis of splat `i`'s disc, zero for circular.
@@ -255,11 +266,12 @@ impl Cloud {
             if !s.color.iter().all(|c| c.is_finite() && *c >= 0.0) {
                 return bad(i, "color", format!("{:?}", s.color), "three finite numbers ≥ 0");
             }
-            let length_sq = s.normal.length_squared();
-            if !(length_sq == 0.0 || (length_sq - 1.0).abs() < 1e-3) {
-                return bad(i, "normal", s.normal.to_string(), "a unit vector, or zero for none");
+            for (attribute, n) in [("normal", s.normal), ("shading_normal", s.shading_normal)] {
+                if !(n == Vec3::ZERO || (n.length_squared() - 1.0).abs() < 1e-3) {
+                    return bad(i, attribute, n.to_string(), "a unit vector, or zero for none");
+                }
             }
-            if s.kind != SplatKind::Medium && length_sq == 0.0 {
+            if s.kind != SplatKind::Medium && s.normal == Vec3::ZERO {
                 return bad(i, "normal", s.normal.to_string(), "a unit vector, as for every surface splat");
             }
             if !s.tangent.is_finite() {

@@ -30,6 +30,10 @@ impl Footprint {
     /// the default cutoff; wider cutoffs keep σ = 0.8 spacings.
     pub const SIGMA_OVER_SPACING: f32 = 0.8;
 
+    /// Share of an opaque disc's radius within which it hides what lies behind: 1.08 spacings at the default cutoff, so that
+    /// neighbours leave no hole.
+    pub const CORE: f32 = 0.45;
+
     /// Cutoff radius for splats that are `spacing` apart.
     pub fn radius_for_spacing(&self, spacing: f32) -> f32 {
         self.cutoff * Self::SIGMA_OVER_SPACING * spacing

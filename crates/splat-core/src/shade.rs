@@ -184,7 +184,8 @@ impl Point {
         let own = cloud.normal_of(i);
         let kind = cloud.kind[i];
         // A surface shows its viewer the side that faces him; the gradient of a medium has one outside.
-        let normal = if kind != SplatKind::Medium && own.dot(to_eye) < 0.0 { -own } else { own };
+        let (facing, shading) = (own.dot(to_eye), cloud.shading_normal_of(i));
+        let normal = if kind != SplatKind::Medium && facing < 0.0 { -shading } else { shading };
         Self {
             splat: i,
             receiver: Receiver { position, normal: own, radius: cloud.radius[i], kind },

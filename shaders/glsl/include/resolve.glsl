@@ -33,22 +33,28 @@ void main() {
     uint first = starts[tile];
     uint end = starts[tile + 1u];
     float nearest = FAR;
+    uint named = 0u;
     for (uint begin = first; begin < end; begin += BATCH) {
         barrier();
         if (lane < BATCH && begin + lane < end) {
             stage(lane, ids[begin + lane], corner);
+            uint core = ids[begin + lane] * view.splat_words + SPLAT_CORE;
+            batch_conic[lane].zw = uintBitsToFloat(uvec2(splats[core], splats[core + 1u]));
+            batch_peak[lane].x = uintBitsToFloat(splats[core + 2u]);
         }
         barrier();
         uint count = min(end - begin, BATCH);
         for (uint k = 0u; k < count; k++) {
             Shape shape = shape_of(k);
             vec2 d = offset_of(shape, pixel);
-            if (reaches(k, pixel) && distance_sq(shape, d) < CORE) {
-                nearest = min(nearest, depth_of(shape, d));
+            float z = depth_of(shape, d);
+            // Of several at the same depth the first.
+            if (reaches(k, pixel) && distance_sq(shape, d) < CORE && z < nearest) {
+                nearest = z;
+                named = batch_ids[k];
             }
         }
     }
-    uint object = 0xffffffffu;
     float weights = 0.0;
     float behind_sum = 0.0;
     float channel[CHANNELS];
@@ -70,12 +76,8 @@ void main() {
             vec2 d = offset_of(shape, pixel);
             float s = distance_sq(shape, d);
             float z = depth_of(shape, d);
-            // Of several at the same depth the first.
-            if (view.objects != 0u && object == 0xffffffffu && s < CORE && z == nearest) {
-                object = object_of(batch_ids[k]);
-            }
             precise float behind = z - nearest;
-            float weight = behind < EPSILON_Z * shape.peak.w ? amount_of(shape, s) : 0.0;
+            float weight = abs(behind) < EPSILON_Z * shape.peak.w ? amount_of(shape, s) : 0.0;
             weights += weight;
             precise float moved = weight * behind;
             behind_sum += moved;
@@ -101,6 +103,6 @@ void main() {
         }
     }
     if (view.objects != 0u) {
-        image[(1u + channel_count) * area + at] = object;
+        image[(1u + channel_count) * area + at] = nearest < FAR ? object_of(named) : 0xffffffffu;
     }
 }

@@ -1,11 +1,13 @@
 // What the kernels of splatting share: the words of a splat and the pixels that it reaches.
 
 // Words of a splat: centre (2 f32), conic (3), peak, halves of its extents, material | footprint << 16 | kind << 24; then
-// with depths: depth of the centre, its slope (2; of a medium as `ProjectedDepth` has it), extent. A splat without an image has the peak 0.
+// with depths: depth of the centre, its slope (2; of a medium as `ProjectedDepth` has it), extent,
+// conic of a disc without the filter (3). A splat without an image has the peak 0.
 const uint SPLAT_PEAK = 5u;
 const uint SPLAT_EXTENTS = 6u;
 const uint SPLAT_TABLES = 7u;
 const uint SPLAT_DEPTH = 8u;
+const uint SPLAT_CORE = 12u;
 
 // Side of a tile, pixels.
 const uint TILE = 16u;

@@ -116,7 +116,7 @@ fn predict(input: &Input<'_>) -> Result<Prediction, ConvertError> {
         Input::Medium(MediumShape::Ball { center, radius, extinction, spacing }, params) => {
             cost::medium_ball(*center, *radius, *extinction, *spacing, params)
         }
-        Input::Rectangle(r, _, params) => cost::rectangle(r.u, r.v, r.spacing, params),
+        Input::Rectangle(r, opacity, params) => cost::rectangle(r.u, r.v, *opacity, r.spacing, params),
     }
 }
 

@@ -8,9 +8,6 @@ use crate::footprint::{Splat, norms};
 use rayon::prelude::*;
 use splat_core::SplatKind;
 
-/// Share of an opaque disc's radius that hides, squared; part of the definition of an opaque splat.
-const CORE: f64 = 0.45 * 0.45;
-
 /// Translucent fragments on some rays of a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rays {
@@ -88,7 +85,7 @@ fn on_ray(input: &Input<'_>, splats: &[Option<Splat>], ids: &[u32], x: usize, y:
         let Some(f) = splat.fragment(input, x, y) else { continue };
         if splat.kind != SplatKind::Opaque {
             found.push((i, f.depth));
-        } else if f.s <= CORE {
+        } else if f.is_solid {
             surface = surface.min(f.depth);
         }
     }

@@ -1,7 +1,8 @@
-//! Opaque surfaces first: nearest depth per pixel, then all fragments within ε-z of it, weights normalised.
+//! Opaque surfaces first: nearest depth per pixel, then all fragments within ε-z of it on either side, weights normalised.
 //!
-//! A disc hides what lies behind it within [`CORE`] of its radius, which leaves no hole between neighbours on a surface
-//! and keeps open borders sharp; its colour is blended over the whole radius: c = Σwc/Σw.
+//! A disc hides what lies behind it within [`Footprint::CORE`] of its radius, which leaves no hole between neighbours on a surface,
+//! and without the image's filter, which would make every silhouette wider. Its colour is blended over the whole radius,
+//! filter and all: c = Σwc/Σw.
 
 use super::RasterCounts;
 use super::bins::{Bins, TILE, bin};
@@ -9,14 +10,14 @@ use super::kernel::Kernel;
 use super::lanes::{Lanes, MAX_LANES};
 use super::projected::{NearDisc, Projected, ProjectedDepth, ProjectedSplat};
 use super::tile::{AREA, BATCH, Run, Runs, for_each_span};
-use crate::Progress;
+use crate::{Footprint, Progress};
 use pulp::Simd;
 use rayon::prelude::*;
 
-/// s = ρ²/R² within which a disc is solid: ρ = 0.45 R, or 1.08 spacings at the default footprint.
-const CORE: f32 = 0.45 * 0.45;
+/// s = ρ²/R² within which a disc is solid.
+const CORE: f32 = Footprint::CORE * Footprint::CORE;
 
-/// ε-z as a share of the radius: fragments this close behind the nearest belong to the same surface.
+/// ε-z as a share of the radius: fragments this close to the nearest belong to the same surface.
 const EPSILON_Z: f32 = 0.5;
 
 /// The opaque surfaces of an image.
@@ -144,13 +145,17 @@ impl pulp::WithSimd for ResolveTile<'_> {
                 *record = Disc { splat, depth, near: projected.near_disc(&splat, j).copied() };
             }
         };
+        let gather_cores = |batch: &[u32], records: &mut [Disc]| {
+            gather(batch, records);
+            records.iter_mut().for_each(|disc| disc.splat.conic = disc.depth.core);
+        };
         for batch in batches() {
-            gather(batch, &mut records);
+            gather_cores(batch, &mut records);
             records[..batch.len()].iter().for_each(|disc| tile.nearest(simd, size, disc));
         }
         if !tile.object.is_empty() {
             for batch in batches() {
-                gather(batch, &mut records);
+                gather_cores(batch, &mut records);
                 for (disc, &j) in records.iter().zip(batch) {
                     tile.name_nearest(simd, size, disc, projected.objects[j as usize]);
                 }
@@ -223,12 +228,12 @@ impl OpaqueTile {
         for run in runs {
             let k = run.pixel();
             let nearest = Lanes::load(simd, &self.depth[k..]);
-            // Behind by how much; where there is no surface −∞, and nothing counts.
+            // Behind by how much; where there is no surface −∞, and nothing counts. Before it lie the rims of nearer surfaces.
             let [s, depth] = disc.at(simd, run, self.perspective);
             let behind = depth - nearest;
             let t = (of(1.0) - s).max(of(0.0));
             let amount = of(disc.splat.peak) * kernel.profile(simd, t);
-            let near = amount.where_less(behind, of(EPSILON_Z * disc.depth.extent));
+            let near = amount.where_less(behind.abs(), of(EPSILON_Z * disc.depth.extent));
             let weight = near.where_less(nearest, of(f32::INFINITY));
             let add = |plane: &mut [f32], v: Lanes<S>| (Lanes::load(simd, plane) + v).store(plane);
             add(&mut self.weight[k..], weight);

@@ -33,6 +33,9 @@ const FACING_AWAY: f32 = 1.0 / 256.0;
 /// Least distance of a centre from the eye as a share of the radius, in perspective: nearer, image positions run to infinity.
 const LEAST_DEPTH: f32 = 1.0 / 32.0;
 
+/// Standard filter of what is solid, pixels: an edge-on disc is a line and no number divided by zero.
+const CORE_FILTER_PX: f32 = 1.0 / 32.0;
+
 /// Splats projected by one task.
 const CHUNK: usize = 4096;
 
@@ -194,6 +197,7 @@ impl Projector<'_> {
         shapes.near.store(&mut image.near);
         for k in 0..3 {
             shapes.conic[k].store(&mut image.conic[k]);
+            shapes.core[k].store(&mut image.core[k]);
         }
         for k in 0..2 {
             shapes.half_extent[k].store(&mut image.half_extent[k]);
@@ -259,6 +263,7 @@ impl Projector<'_> {
             peak,
             half_extent,
             slope: [of(1.0) / depth, of(1.0) / front],
+            core: [of(0.0); 3],
             near: of(-1.0),
         }
     }
@@ -297,10 +302,16 @@ impl Projector<'_> {
         let area = ju[0] * jv[1] - ju[1] * jv[0];
         let area_sq = area * area;
         let (trace_x, trace_y) = (ju[0] * ju[0] + jv[0] * jv[0], ju[1] * ju[1] + jv[1] * jv[1]);
-        let (xx, mixed, yy) = (trace_x + filter_sq, ju[0] * ju[1] + jv[0] * jv[1], trace_y + filter_sq);
-        // det = |J|² + filter²·trace(JJᵀ) + filter⁴, written so that an edge-on disc does not cancel.
-        let det = area_sq + filter_sq * (trace_x + trace_y) + filter_sq * filter_sq;
-        let inverse = of(1.0) / det;
+        let mixed = ju[0] * ju[1] + jv[0] * jv[1];
+        // (J Jᵀ + filter)⁻¹, its determinant |J|² + filter²·trace(JJᵀ) + filter⁴ written so that an edge-on disc does not
+        // cancel.
+        let conic_of = |filter_sq: Lanes<S>| {
+            let (xx, yy) = (trace_x + filter_sq, trace_y + filter_sq);
+            let inverse = of(1.0) / (area_sq + filter_sq * (trace_x + trace_y) + filter_sq * filter_sq);
+            ([yy * inverse, of(-2.0) * (mixed * inverse), xx * inverse], [xx, yy], inverse)
+        };
+        let (conic, [xx, yy], inverse) = conic_of(filter_sq);
+        let (core, ..) = conic_of(of(CORE_FILTER_PX * CORE_FILTER_PX));
         let radius_sq = dot(axis_u, axis_u).sqrt() * dot(axis_v, axis_v).sqrt();
         // The filter spreads the same optical depth over a larger image area.
         let spread = (area_sq * inverse).sqrt();
@@ -322,7 +333,8 @@ impl Projector<'_> {
         let per_px = of(1.0) / (along * px_per_world);
         let usable = |slope: Lanes<S>| slope.where_less(of(1e-4), along.abs());
         Shapes {
-            conic: [yy * inverse, of(-2.0) * (mixed * inverse), xx * inverse],
+            conic,
+            core,
             peak,
             half_extent,
             slope: [usable(of(0.0) - normal[0] * per_px), usable(normal[1] * per_px)],

@@ -36,6 +36,8 @@ pub struct ProjectedDepth {
     pub slope: [f32; 2],
     /// Largest distance in depth between a fragment and the centre: R.
     pub extent: f32,
+    /// The conic of a disc without the image's filter, which tells where an opaque one is solid.
+    pub core: [f32; 3],
 }
 
 /// A disc that reaches through the eye plane: which pixels see it, each of its fragments tells.
@@ -56,7 +58,7 @@ pub(crate) struct NearDisc {
 /// Which parts of a projection are made beside the footprints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Detail {
-    /// Depths: for opaque splats, what may lie behind them, and depth layers. 16 bytes a splat.
+    /// Depths: for opaque splats, what may lie behind them, and depth layers. 28 bytes a splat.
     pub depth: bool,
     /// Object ids, for object layers. 4 bytes a splat.
     pub object: bool,

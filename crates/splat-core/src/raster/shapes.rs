@@ -15,6 +15,7 @@ pub(super) struct Image {
     pub(super) peak: Column,
     pub(super) half_extent: [Column; 2],
     pub(super) slope: [Column; 2],
+    pub(super) core: [Column; 3],
     /// 1 for a disc that reaches through the eye plane, else −1.
     pub(super) near: Column,
 }
@@ -25,6 +26,8 @@ pub(super) struct Shapes<S: Simd> {
     pub(super) peak: Lanes<S>,
     pub(super) half_extent: [Lanes<S>; 2],
     pub(super) slope: [Lanes<S>; 2],
+    /// The conic of a disc without the filter.
+    pub(super) core: [Lanes<S>; 3],
     /// 1 for a disc that reaches through the eye plane, else −1.
     pub(super) near: Lanes<S>,
 }
@@ -39,7 +42,7 @@ impl Image {
     pub(super) fn write_depths(&self, attributes: &Attributes, depths: &mut [ProjectedDepth]) {
         for (l, depth) in depths.iter_mut().enumerate() {
             let (center, slope, extent) = (self.depth[l], self.slope.map(|s| s[l]), attributes.radius[l]);
-            *depth = ProjectedDepth { center, slope, extent };
+            *depth = ProjectedDepth { center, slope, extent, core: self.core.map(|c| c[l]) };
         }
     }
 }
@@ -50,9 +53,10 @@ impl<S: Simd> Shapes<S> {
     pub(super) fn where_less(&self, a: Lanes<S>, b: Lanes<S>, other: &Self) -> Self {
         let choose = |one: Lanes<S>, other: Lanes<S>| one.where_less_or(a, b, other);
         let pair = |one: [Lanes<S>; 2], other: [Lanes<S>; 2]| [choose(one[0], other[0]), choose(one[1], other[1])];
-        let ([a, b, c], [d, e, f]) = (self.conic, other.conic);
+        let conic = |[a, b, c]: [Lanes<S>; 3], [d, e, f]: [Lanes<S>; 3]| [choose(a, d), choose(b, e), choose(c, f)];
         Self {
-            conic: [choose(a, d), choose(b, e), choose(c, f)],
+            conic: conic(self.conic, other.conic),
+            core: conic(self.core, other.core),
             peak: choose(self.peak, other.peak),
             half_extent: pair(self.half_extent, other.half_extent),
             near: choose(self.near, other.near),

@@ -75,7 +75,7 @@ fn apart(a: &[u32], b: &[u32]) -> (f32, bool) {
     let mut most = [0..2, 2..5, 5..6].map(share).into_iter().fold(0.0, f32::max);
     if a.len() > 8 {
         let slope = share(9..11) * (TOLERANCE / SLOPE_TOLERANCE);
-        most = [share(8..9), share(11..12), slope].into_iter().fold(most, f32::max);
+        most = [share(8..9), share(11..12), share(12..15), slope].into_iter().fold(most, f32::max);
     }
     (if steps > 1 { 1.0 } else { most }, a == b)
 }
@@ -107,7 +107,7 @@ fn footprints_and_their_number_are_the_cpu_s() {
                 let (found, count) = on_device(&mut device, &cloud, None, &camera, depth);
                 assert_eq!(count, twin.visible(), "{n} {view:?}");
                 assert!(n < 1000 || (count > n / 4 && count < n), "{count} of {n}");
-                let words = if depth { 12 } else { 8 };
+                let words = if depth { 15 } else { 8 };
                 assert_eq!(found.len(), expected.len());
                 let (mut most, mut same) = (0.0f32, 0);
                 for (i, (a, b)) in expected.chunks(words).zip(found.chunks(words)).enumerate() {

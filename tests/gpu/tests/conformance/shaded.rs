@@ -22,7 +22,7 @@ fn unit(i: u64, k: u64) -> f32 {
 }
 
 /// Splats with a normal or without, of all materials.
-fn cloud(n: u64, origin: DVec3) -> Cloud {
+fn cloud(n: u64, origin: DVec3, shading: bool) -> Cloud {
     let mut cloud = Cloud::new(origin);
     for i in 0..n {
         let position = Vec3::new(3.0 * unit(i, 0) - 1.5, 2.0 * unit(i, 1) - 1.0, 2.0 * unit(i, 2) - 1.0);
@@ -32,6 +32,8 @@ fn cloud(n: u64, origin: DVec3) -> Cloud {
         cloud.push(&Splat {
             position,
             normal: if i % 3 == 0 { Vec3::ZERO } else { normal },
+            // Light is reflected about another one.
+            shading_normal: if shading && i % 4 == 1 { (normal + Vec3::X * 0.3).normalize() } else { Vec3::ZERO },
             radius: 0.02 + 0.1 * unit(i, 5),
             kind,
             color: [unit(i, 8), 0.7, 2.0 * unit(i, 9)],
@@ -97,7 +99,7 @@ fn values_are_the_cpu_s() {
     let mut device = open().unwrap();
     let (materials, objects) = (materials(), objects());
     for (n, origin) in [(1, DVec3::ZERO), (9000, DVec3::ZERO), (3000, DVec3::new(1e7, -3e6, 5e6))] {
-        let (cloud, lights) = (cloud(n, origin), lights(origin));
+        let (cloud, lights) = (cloud(n, origin, n % 2 == 0), lights(origin));
         let veiled = |(k, light): (usize, &Light)| {
             let shadow = (k % 2 == 0).then_some(&Veil as &dyn Transmittance);
             LitBy { light: *light, shadow }
@@ -147,7 +149,7 @@ fn values_are_the_cpu_s() {
 
 #[test]
 fn what_single_precision_does_not_resolve_is_said() {
-    let (cloud, objects) = (cloud(4, DVec3::ZERO), objects());
+    let (cloud, objects) = (cloud(4, DVec3::ZERO, false), objects());
     let camera = Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, VIEWS[0], [8, 8]).unwrap();
     let spot = |inner, outer| LightShape::Spot { position: DVec3::Y, direction: DVec3::NEG_Y, inner, outer };
     let asks = |shape, shininess| {

@@ -13,7 +13,7 @@ const LOOK_WORDS: usize = 5;
 pub struct AttributeRoom {
     /// Splats.
     pub splats: u32,
-    /// Words of a splat's normal and semi-axis: 0, 3 without semi-axes, 6.
+    /// Words of a splat's normal, semi-axis and normal of shading: 0, 3 without the last two, 6 without the last, 9.
     pub frame_words: u32,
 }
 
@@ -26,7 +26,7 @@ pub struct AttributeBuffers {
     pub radii: BufferId,
     /// Cross-section, material | footprint << 16 | kind << 24, colour.
     pub looks: BufferId,
-    /// Normal, and the semi-axis of the disc, where the cloud has them.
+    /// Normal, semi-axis of the disc, and normal of shading, where the cloud has them.
     pub frames: BufferId,
 }
 
@@ -83,11 +83,8 @@ impl Attributes {
             return Err(Error::invalid("place", at, "id", ids[at], "the id of a splat"));
         }
         let id = |place: usize| ids.map_or(place, |ids| ids[place] as usize);
-        let frame_words = match (cloud.normal.is_empty(), cloud.tangent.is_empty()) {
-            (true, true) => 0,
-            (false, true) => 3,
-            (_, false) => 6,
-        };
+        let columns = [&cloud.normal, &cloud.tangent, &cloud.shading_normal];
+        let frame_words = 3 * columns.iter().rposition(|column| !column.is_empty()).map_or(0, |last| last as u32 + 1);
         let position = |i: usize| cloud.position[i].to_array();
         let radii = |i: usize| [cloud.radius[i], cloud.radius[i].max(cloud.tangent_of(i).length())];
         let look = |i: usize| {
@@ -96,15 +93,21 @@ impl Attributes {
                 u32::from(cloud.material[i]) | u32::from(cloud.footprint[i]) << 16 | (cloud.kind[i] as u32) << 24;
             [cloud.cross_section[i].to_bits(), tables, r, g, b]
         };
-        let of = |v: Vec3| v.to_array();
-        let both = |i: usize| {
-            let ([a, b, c], [d, e, f]) = (of(cloud.normal_of(i)), of(cloud.tangent_of(i)));
-            [a, b, c, d, e, f]
-        };
+        let frame = |i: usize| columns.map(|column| column.get(i).copied().unwrap_or(Vec3::ZERO));
         let frames = match frame_words {
             0 => Vec::new(),
-            3 => rows(n, |k| of(cloud.normal_of(id(k)))),
-            _ => rows(n, |k| both(id(k))),
+            3 => rows(n, |k| {
+                let [normal, ..] = frame(id(k));
+                normal.to_array()
+            }),
+            6 => rows(n, |k| {
+                let [a, b, _] = frame(id(k));
+                [a.x, a.y, a.z, b.x, b.y, b.z]
+            }),
+            _ => rows(n, |k| {
+                let [a, b, c] = frame(id(k));
+                [a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z]
+            }),
         };
         let greatest = (0..n).into_par_iter().with_min_len(1 << 14).map(|k| {
             let i = id(k);

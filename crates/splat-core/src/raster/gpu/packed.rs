@@ -5,9 +5,9 @@ use crate::raster::projected::{Coverage, ProjectedDepth, ProjectedSplat};
 use rayon::prelude::*;
 
 /// Words of a splat, and with depths.
-pub(super) const SPLAT_WORDS: [u32; 2] = [8, 12];
+pub(super) const SPLAT_WORDS: [u32; 2] = [8, 15];
 
-/// The words of all splats, as the kernels read them: 8 each, 12 with depths; 0 for one that no pixel shows.
+/// The words of all splats, as the kernels read them: 8 each, 15 with depths; 0 for one that no pixel shows.
 pub fn words(projected: &Projected, depth: bool) -> Vec<u32> {
     let words = SPLAT_WORDS[usize::from(depth)] as usize;
     let mut splats = vec![0u32; words * projected.splats.len()];
@@ -27,7 +27,8 @@ fn pack(splat: &ProjectedSplat, depth: Option<&ProjectedDepth>, to: &mut [u32]) 
     to.iter_mut().zip(floats).for_each(|(to, from)| *to = from.to_bits());
     to[6] = half_x | half_y << 16;
     to[7] = u32::from(splat.material) | u32::from(splat.footprint) << 16 | (splat.kind as u32) << 24;
-    if let (Some(to), Some(depth)) = (to.get_mut(8..12), depth) {
-        to.copy_from_slice(&[depth.center, depth.slope[0], depth.slope[1], depth.extent].map(f32::to_bits));
+    if let (Some(to), Some(depth)) = (to.get_mut(8..), depth) {
+        let floats = [depth.center, depth.slope[0], depth.slope[1], depth.extent].into_iter().chain(depth.core);
+        to.iter_mut().zip(floats).for_each(|(to, from)| *to = from.to_bits());
     }
 }

@@ -90,8 +90,8 @@ pub struct Uploads {
 /// [`Error::Invalid`] for words of a frame that no cloud has.
 pub fn record(capacities: Capacities) -> Result<Recorded, Error> {
     let Capacities { attributes: room, footprints, materials, depth } = capacities;
-    if !matches!(room.frame_words, 0 | 3 | 6) {
-        return Err(Error::invalid("recording", 0, "words of a frame", room.frame_words, "0, 3 or 6"));
+    if !matches!(room.frame_words, 0 | 3 | 6 | 9) {
+        return Err(Error::invalid("recording", 0, "words of a frame", room.frame_words, "0, 3, 6 or 9"));
     }
     let mut recording = Recording::default();
     let r = &mut recording;
