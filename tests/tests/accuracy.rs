@@ -136,6 +136,28 @@ fn a_technique_of_known_order_is_measured_as_such() {
 }
 
 #[test]
+fn a_knob_whose_ends_are_too_large_is_held_with_the_reason() {
+    let mut draw = |request: &Request| {
+        let (n, cut) = (f64::from(request.oversample), request.scene.render.points.transmittance_cutoff);
+        if cut == 0.0 {
+            let hint = "raise it".to_owned();
+            return Err(Error::Limit {
+                what: "a picture without a cut".into(),
+                needed: 2,
+                limit: 1,
+                unit: "bytes",
+                hint,
+            });
+        }
+        Ok(frame(slab_image(n, 0.5, cut), 1e-3 * n * (2.0 - cut)))
+    };
+    let study = study(&sweep(), Err("a test".into()), &OPTIONS, &Progress::new(), &mut draw).unwrap();
+    let [held] = &study.limit.held[..] else { panic!("{:?}", study.limit.held) };
+    assert!(held.knob == "cut" && held.reason.contains("a picture without a cut needs 2"), "{held:?}");
+    assert!(study.curves.iter().all(|c| c.knob == "slabs") && study.limit.parts.len() == 1);
+}
+
+#[test]
 fn a_flipped_sign_shows_up_in_the_report() {
     let (healthy, broken) = (run(0.5).unwrap(), run(-0.5).unwrap());
     let curve = broken.curves.iter().find(|c| c.knob == "slabs").unwrap();

@@ -4,11 +4,8 @@
 //! neither table of `every_key/` fails the test, so a new one cannot be silently ignored.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-#[path = "every_key/scenes.rs"]
 mod scenes;
-#[path = "every_key/schema.rs"]
 mod schema;
-#[path = "every_key/table.rs"]
 mod table;
 
 use scenes::{Folder, SOURCES};

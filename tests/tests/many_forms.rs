@@ -2,10 +2,8 @@
 //! all forms of a shape show its transmittance and cast its shadow, and come together as their resolution rises.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-#[path = "many_forms/shape.rs"]
 mod shape;
-#[path = "many_forms/write.rs"]
-mod write;
+pub(crate) mod write;
 
 use organza_tests::{draw_in, parallel_view, window};
 use shape::{Rays, Shape};

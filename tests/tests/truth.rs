@@ -1,10 +1,7 @@
 //! The points technique against physical truth: the same scene path-traced without splats.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-#[path = "many_forms/write.rs"]
-#[allow(dead_code, reason = "volumes alone are written here")]
-mod write;
-
+use crate::many_forms::write;
 use organza::scene::{self, Scene};
 use organza::truth::{Truth, truth, truth_of_all_orders};
 use organza::{Progress, RenderOptions, render};

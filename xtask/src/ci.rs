@@ -92,8 +92,8 @@ fn steps(repo: &Repo) -> Vec<Step> {
         step("docs", docs),
         step("alone", Work::Cargo(alone(repo), &[])),
         step("shaders", Work::Task(|repo| shaders::run(repo, true))),
-        step("vulkan", Work::Task(vulkan::run)),
-        step("tests", one(&format!("test --workspace --features {FEATURES}"))),
+        step("tests", Work::Task(vulkan::tests)),
+        step("vulkan", Work::Task(vulkan::beside_tests)),
     ]
 }
 
@@ -135,10 +135,10 @@ mod tests {
     }
 
     #[test]
-    fn warnings_fail_and_tests_come_last() {
+    fn warnings_fail_and_what_is_slow_comes_last() {
         let steps = steps(&Repo::of(&[]));
         let names: Vec<_> = steps.iter().map(|s| s.name).collect();
-        assert_eq!(names, ["fmt", "tidy", "papers", "clippy", "docs", "alone", "shaders", "vulkan", "tests"]);
+        assert_eq!(names, ["fmt", "tidy", "papers", "clippy", "docs", "alone", "shaders", "tests", "vulkan"]);
         let Work::Cargo(_, environment) = &steps[4].work else { panic!("docs are built by cargo") };
         assert_eq!(*environment, [("RUSTDOCFLAGS", "-D warnings")]);
     }

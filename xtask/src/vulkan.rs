@@ -31,27 +31,67 @@ const VECTORS: [&str; 2] = ["128", "512"];
 /// The tests of what works across the threads of a subgroup.
 const ACROSS: [&str; 2] = ["kernels::", "order::"];
 
-/// Finds or installs the parts, then checks modules and runs the conformance tests: by `gpu-ash` under synchronization
-/// and under GPU-assisted validation, by `gpu-wgpu` under synchronization validation; and those of sorts and scans with
-/// subgroups of other sizes.
+/// The executor and the validation that all tests run with.
+const WITH_TESTS: [&str; 2] = ["ash", "synchronization"];
+
+/// Those that the conformance tests run with beside.
+const BESIDE_TESTS: [[&str; 2]; 2] = [["ash", "gpu-assisted"], ["wgpu", "synchronization"]];
+
+/// Finds or installs the parts, then checks modules and runs the conformance tests by every executor under every validation.
 pub(crate) fn run(repo: &Repo) -> Outcome {
+    let parts = match parts()? {
+        Ok(parts) => parts,
+        Err(missing) => return without("vulkan", &missing),
+    };
+    conformance(repo, &parts.driver, WITH_TESTS, None)?;
+    others(repo, &parts)
+}
+
+/// All tests; those of conformance by the first executor, where the parts can be had.
+pub(crate) fn tests(repo: &Repo) -> Outcome {
+    let (line, said, parts) = match parts()? {
+        Ok(parts) => (format!("test --workspace --features {FEATURES},{DRIVER}"), "tests: all".to_owned(), Some(parts)),
+        Err(missing) => {
+            (format!("test --workspace --features {FEATURES}"), without("conformance tests", &missing)?, None)
+        }
+    };
+    cargo_test(repo, &line, parts.as_ref().map(|parts| (parts.driver.as_path(), WITH_TESTS)), None)?;
+    Ok(said)
+}
+
+/// What [`run`] does beside what [`tests`] did.
+pub(crate) fn beside_tests(repo: &Repo) -> Outcome {
+    match parts()? {
+        Ok(parts) => others(repo, &parts),
+        Err(missing) => without("vulkan", &missing),
+    }
+}
+
+/// Modules; the other executors and validations; and sorts and scans with subgroups of other sizes.
+fn others(repo: &Repo, parts: &Parts) -> Outcome {
+    let modules = check_modules(repo, &parts.spirv_val)?;
+    for by in BESIDE_TESTS {
+        conformance(repo, &parts.driver, by, None)?;
+    }
+    for vector in VECTORS {
+        conformance(repo, &parts.driver, WITH_TESTS, Some(vector))?;
+    }
+    Ok(format!("vulkan: {modules} modules valid, recordings conform on lavapipe without a message"))
+}
+
+/// The parts, installed where that is possible, or the names of what is missing.
+fn parts() -> Result<Result<Parts, String>, String> {
     let path = std::env::var_os("PATH").unwrap_or_default();
     let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
     let look = || find(&ROOTS.map(PathBuf::from), &folders);
-    let parts = match look() {
-        Ok(parts) => parts,
-        Err(missing) if install(&folders, &missing)? => look()?,
-        Err(missing) => return without(&missing, std::env::var("CI").as_deref() == Ok("true")),
+    let found = match look() {
+        Err(missing) if install(&folders, &missing)? => Ok(look()?),
+        found => found,
     };
-    println!("lavapipe: {}\nvalidation: {}", parts.driver.display(), parts.layer.display());
-    let modules = check_modules(repo, &parts.spirv_val)?;
-    for (executor, validation) in [("ash", "synchronization"), ("ash", "gpu-assisted"), ("wgpu", "synchronization")] {
-        conformance(repo, &parts.driver, [executor, validation], None)?;
+    if let Ok(parts) = &found {
+        println!("lavapipe: {}\nvalidation: {}", parts.driver.display(), parts.layer.display());
     }
-    for vector in VECTORS {
-        conformance(repo, &parts.driver, ["ash", "synchronization"], Some(vector))?;
-    }
-    Ok(format!("vulkan: {modules} modules valid, recordings conform on lavapipe without a message"))
+    Ok(found)
 }
 
 /// The parts, or the names of what is missing.
@@ -107,9 +147,13 @@ fn command() -> String {
 }
 
 /// Without the parts nothing is tested: said by name, and no success where everything must be.
-fn without(missing: &str, ci: bool) -> Outcome {
+fn without(what: &str, missing: &str) -> Outcome {
+    refuse_or_skip(what, missing, std::env::var("CI").as_deref() == Ok("true"))
+}
+
+fn refuse_or_skip(what: &str, missing: &str, ci: bool) -> Outcome {
     let said = format!("missing: {missing}; install with `{}`", command());
-    if ci { Err(said) } else { Ok(format!("vulkan: SKIPPED, {said}")) }
+    if ci { Err(said) } else { Ok(format!("{what}: SKIPPED, {said}")) }
 }
 
 fn check_modules(repo: &Repo, spirv_val: &Path) -> Result<usize, String> {
@@ -125,37 +169,37 @@ fn check_modules(repo: &Repo, spirv_val: &Path) -> Result<usize, String> {
 }
 
 /// Runs the conformance tests by an executor under a validation; with vectors of so many bits those of subgroups alone.
-fn conformance(
-    repo: &Repo,
-    driver: &Path,
-    [executor, validation]: [&str; 2],
-    vector: Option<&str>,
-) -> Result<(), String> {
+fn conformance(repo: &Repo, driver: &Path, by: [&str; 2], vector: Option<&str>) -> Result<(), String> {
     let mut line = format!("test --workspace --features {FEATURES},{DRIVER} --test conformance");
     if vector.is_some() {
         line.push_str(&format!(" -- {}", ACROSS.join(" ")));
     }
-    println!(
-        "$ cargo {line} (gpu-{executor}, {validation} validation, vectors of {} bits)",
-        vector.unwrap_or("native")
-    );
+    cargo_test(repo, &line, Some((driver, by)), vector)
+}
+
+/// Runs cargo with these words; on a driver, by an executor under a validation.
+fn cargo_test(repo: &Repo, line: &str, on: Option<(&Path, [&str; 2])>, vector: Option<&str>) -> Result<(), String> {
     let program = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let runtime = std::env::var_os("XDG_RUNTIME_DIR").unwrap_or_else(|| std::env::temp_dir().into());
-    let ran = Command::new(program)
-        .args(line.split(' '))
-        .current_dir(&repo.root)
+    let mut command = Command::new(program);
+    command.args(line.split(' ')).current_dir(&repo.root).envs(vector.map(|bits| ("LP_NATIVE_VECTOR_WIDTH", bits)));
+    let mut by = String::new();
+    if let Some((driver, [executor, validation])) = on {
+        let bits = vector.unwrap_or("native");
+        by = format!(" (gpu-{executor}, {validation} validation, vectors of {bits} bits)");
         // Two names for the one variable: loaders before 1.3.207 know the second alone.
-        .env("VK_DRIVER_FILES", driver)
-        .env("VK_ICD_FILENAMES", driver)
-        .env("XDG_RUNTIME_DIR", runtime)
-        .env("ORGANZA_EXECUTOR", executor)
-        .env("ORGANZA_ADAPTER", "llvmpipe")
-        .env("ORGANZA_VALIDATION", validation)
-        .envs(vector.map(|bits| ("LP_NATIVE_VECTOR_WIDTH", bits)))
-        .status();
-    match ran {
+        command.env("VK_DRIVER_FILES", driver).env("VK_ICD_FILENAMES", driver);
+        if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
+            command.env("XDG_RUNTIME_DIR", std::env::temp_dir());
+        }
+        command
+            .env("ORGANZA_EXECUTOR", executor)
+            .env("ORGANZA_ADAPTER", "llvmpipe")
+            .env("ORGANZA_VALIDATION", validation);
+    }
+    println!("$ cargo {line}{by}");
+    match command.status() {
         Ok(status) if status.success() => Ok(()),
-        Ok(status) => Err(format!("`cargo {line}` by gpu-{executor} under {validation} validation: {status}")),
+        Ok(status) => Err(format!("`cargo {line}`{by}: {status}")),
         Err(e) => Err(format!("`cargo {line}` did not start: {e}")),
     }
 }
@@ -172,9 +216,9 @@ mod tests {
 
     #[test]
     fn a_missing_part_is_a_failure_only_where_everything_must_run() {
-        let said = without("lavapipe", false).expect("a skip is no failure");
+        let said = refuse_or_skip("vulkan", "lavapipe", false).expect("a skip is no failure");
         assert!(said.starts_with("vulkan: SKIPPED, missing: lavapipe; install with `apt-get update"), "{said}");
-        assert!(without("lavapipe", true).is_err());
+        assert!(refuse_or_skip("vulkan", "lavapipe", true).is_err());
     }
 
     #[test]

@@ -2,11 +2,9 @@
 #![cfg(all(feature = "ply", feature = "nifti", feature = "las"))]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod read_samples;
-
+use crate::read_samples::{NIFTI_F32, NIFTI_U8, gzip, las, load, nifti, ply_ascii, ply_binary};
 use convert::read::{ReadLimits, bytes, file};
 use convert::{Fault, Place, ReadError, escaped_path};
-use read_samples::{NIFTI_F32, NIFTI_U8, gzip, las, load, nifti, ply_ascii, ply_binary};
 use std::path::{Path, PathBuf};
 
 fn refused(name: &str, content: &[u8]) -> ReadError {

@@ -2,12 +2,10 @@
 #![cfg(feature = "las")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod read_samples;
-
+use crate::read_samples::oldest::{EndlessSwitches, laz_oldest, laz_pointwise};
+use crate::read_samples::{gzip, las, las_steps, load};
 use convert::RawPoints;
 use convert::read::Loaded;
-use read_samples::oldest::{EndlessSwitches, laz_oldest, laz_pointwise};
-use read_samples::{gzip, las, las_steps, load};
 
 fn points(content: &[u8]) -> RawPoints {
     match load("c.laz", content).unwrap() {

@@ -2,11 +2,9 @@
 #![cfg(all(feature = "stl", feature = "obj", feature = "xyz", feature = "nrrd", feature = "ply"))]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod read_samples;
-
+use crate::read_samples::{gzip, load};
 use convert::read::{Loaded, ReadLimits, bytes, file};
 use convert::{Fault, RawPoints};
-use read_samples::{gzip, load};
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::{Grid, Mesh};
 use std::path::{Path, PathBuf};

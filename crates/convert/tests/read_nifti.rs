@@ -2,10 +2,8 @@
 #![cfg(feature = "nifti")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod read_samples;
-
+use crate::read_samples::{Dtype, NIFTI_F32, NIFTI_U8, gzip, load, nifti};
 use convert::read::Loaded;
-use read_samples::{Dtype, NIFTI_F32, NIFTI_U8, gzip, load, nifti};
 use splat_core::Grid;
 use splat_core::glam::{DMat3, DVec3};
 

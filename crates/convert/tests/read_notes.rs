@@ -2,10 +2,8 @@
 #![cfg(all(feature = "ply", feature = "obj", feature = "xyz", feature = "las"))]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod read_samples;
-
+use crate::read_samples::{las, load, obj, ply_ascii, ply_binary, text_points};
 use convert::read::{ReadLimits, bytes_with_notes};
-use read_samples::{las, load, obj, ply_ascii, ply_binary, text_points};
 
 fn unused(name: &str, content: &[u8]) -> Vec<String> {
     bytes_with_notes(name, content, &ReadLimits::default(), &splat_core::Progress::new()).unwrap().1.unused

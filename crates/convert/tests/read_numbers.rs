@@ -2,11 +2,9 @@
 #![cfg(all(feature = "ply", feature = "stl", feature = "obj", feature = "xyz", feature = "nrrd"))]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod read_samples;
-
+use crate::read_samples::load;
 use convert::Place;
 use convert::read::Loaded;
-use read_samples::load;
 
 /// The file around one number, and where the number stands.
 type File = (&'static str, fn(&str, &str) -> String, u64, u64);

@@ -2,10 +2,8 @@
 #![cfg(feature = "ply")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod read_samples;
-
+use crate::read_samples::{VERTICES, gzip, load, ply_ascii, ply_binary};
 use convert::read::{Loaded, ReadLimits, bytes};
-use read_samples::{VERTICES, gzip, load, ply_ascii, ply_binary};
 use splat_core::Mesh;
 use splat_core::glam::{DVec3, Vec3};
 

@@ -2,11 +2,9 @@
 #![cfg(all(feature = "nrrd", feature = "nifti"))]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod read_samples;
-
+use crate::read_samples::{NIFTI_F32, load, nifti};
 use convert::read::{Loaded, ReadLimits, bytes_with_notes};
 use convert::{VolumeParams, volume_to_points};
-use read_samples::{NIFTI_F32, load, nifti};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::{Grid, TransferFunction, TransferPoint};
 

@@ -1,9 +1,7 @@
 //! BS1 to BS9: the inputs that break a naive bucket sort.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
-
-use common::{camera, depths, outdoor, slices_of};
+use crate::common::{camera, depths, outdoor, slices_of};
 use hbsort::{
     Direction, Error, Method, Params, Scratch, Thickness, ThicknessRule, reference, slice_cloud, slice_depths,
 };

@@ -1,9 +1,7 @@
 //! Promises beside the order: same bits on any number of threads, memory, subsets, culling, errors, scaling.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
-
-use common::{camera, depths, outdoor, slices_of};
+use crate::common::{camera, depths, outdoor, slices_of};
 use hbsort::{Direction, Error, Method, Params, Scratch, Thickness, cost, reference, slice_cloud, slice_depths};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Camera, Cloud, Projection, Splat};

@@ -1,9 +1,7 @@
 //! The recorded sort, without a device: what it is, and what it refuses.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
-
-use common::{camera, outdoor};
+use crate::common::{camera, outdoor};
 use hbsort::gpu::{Capacities, record};
 use hbsort::{Error, Params};
 use splat_core::glam::DVec3;

@@ -1,9 +1,7 @@
 //! One-off checks at p = 0.001 against closed forms: opacity of planes, spheres, slabs and clouds of splats.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use pbsr::{
     Density, FieldVolumeSampler, GridSampler, MeshSampler, MetropolisParams, MetropolisSampler, Particles, Sampler,
     SplatParams, SplatSampler, SurfaceParams, VolumeParams, pixel_area,

@@ -1,9 +1,7 @@
 //! The paper's Brownian motion: stays on the surface, stays uniform, and counts what it must.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use pbsr::{BrownianParams, BrownianSampler, Error, ImplicitSurface, LineSampler, SurfaceParams, Walk, pixel_area};
 use rayon::prelude::*;
 use splat_core::ScalarField;

@@ -1,9 +1,7 @@
 //! Extinction that differs by channel: each channel is what particles of its own extinction would give.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use pbsr::{Ensemble, EnsembleParams, MeshSampler, Object, Occluder, SurfaceParams, pixel_area};
 use splat_core::Projection;
 use splat_core::glam::{DVec3, Vec3};

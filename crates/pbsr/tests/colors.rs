@@ -1,9 +1,7 @@
 //! Colours of particles have nine bits each, and no bias: what is seen of many is the colour itself.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use pbsr::{
     BrownianParams, BrownianSampler, Density, FieldVolumeSampler, GridSampler, ImplicitSurface, LatticeSampler,
     LineSampler, MeshSampler, MetropolisParams, MetropolisSampler, PackedColor, Particles, Sampler, SplatParams,

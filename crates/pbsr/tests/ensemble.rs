@@ -1,9 +1,7 @@
 //! The average over sets: its error, its integers, its determinism; ties, occluders, depths, checkpoints, cancelling.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use pbsr::{
     Appearance, Ensemble, EnsembleParams, Error, FoldParams, KeptSets, LitBy, MeshSampler, Object, Occluder, Renderer,
     Sampler, Scene, SurfaceParams, pixel_area, predict,

@@ -1,9 +1,7 @@
 //! A volume fills its voxels: n lattice points along an axis span n steps, whatever their lengths and directions.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use pbsr::{GridSampler, MetropolisParams, MetropolisSampler, Sampler, VolumeParams, pixel_area};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::{Camera, Grid, Projection, TransferFunction, TransferPoint};

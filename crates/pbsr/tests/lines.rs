@@ -1,9 +1,7 @@
 //! Random lines on implicit surfaces: uniform, exact in opacity, and clear about what they could not find.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use pbsr::{Density, Error, ImplicitSurface, LineSampler, Sampler, SurfaceParams, pixel_area};
 use splat_core::ScalarField;
 use splat_core::glam::{DMat3, DVec3};

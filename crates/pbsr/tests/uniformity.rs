@@ -2,9 +2,7 @@
 //! independent (variance of a count, correlation at lags 1 to 5).
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use pbsr::{
     BrownianParams, BrownianSampler, Density, FieldVolumeSampler, GridSampler, ImplicitSurface, LatticeSampler,
     LineSampler, MeshSampler, MetropolisParams, MetropolisSampler, Particles, Sampler, SplatParams, SplatSampler,

@@ -2,8 +2,7 @@
 //! pixel is held to 4.5 of its standard errors (two-sided 7e-6).
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod support;
-
+use crate::support::{assert_mean, parallel, quad, trace};
 use reference::{
     Density, Estimate, Liberty, LightSource, MarchParams, Medium, PathRules, PathSettings, PixelSampling, Scene,
     Surface, SurfaceMaterial, march_image, path_trace,
@@ -11,7 +10,6 @@ use reference::{
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Camera, Progress};
 use std::f64::consts::PI;
-use support::{assert_mean, parallel, quad, trace};
 
 const ALBEDO: f64 = 0.5;
 

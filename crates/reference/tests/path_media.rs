@@ -2,8 +2,7 @@
 //! of its standard errors (two-sided 6e-5 and 7e-6), an image's mean to 3.3 (1e-3).
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod support;
-
+use crate::support::{assert_mean, parallel, trace};
 use reference::{
     Density, Environment, LatLong, Lattice, LightSource, MarchParams, Medium, PathRules, PathSettings, PixelSampling,
     Scene, march_image,
@@ -11,7 +10,6 @@ use reference::{
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::{Grid, Progress};
 use std::f64::consts::PI;
-use support::{assert_mean, parallel, trace};
 
 const WIDE: f64 = 1e6;
 

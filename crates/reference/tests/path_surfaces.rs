@@ -1,8 +1,7 @@
 //! The path tracer on surfaces, and its promises of determinism. Statistical levels as in `path_media.rs`.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod support;
-
+use crate::support::{assert_mean, ball_mesh, box_mesh, parallel, quad, trace};
 use reference::{
     Cauchy, Density, Dielectric, Environment, Estimate, LatLong, LightSource, Medium, PathRules, PathSettings,
     PixelSampling, Scene, Surface, SurfaceKind, SurfaceMaterial, path_trace,
@@ -11,7 +10,6 @@ use splat_core::glam::{DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
 use splat_core::{Camera, Error, Mesh, Progress, Projection};
 use std::f64::consts::PI;
-use support::{assert_mean, ball_mesh, box_mesh, parallel, quad, trace};
 
 fn settings(samples: u32) -> PathSettings {
     PathSettings { seed: 5, samples, batch: samples, pixel: PixelSampling::Center, ..PathSettings::default() }

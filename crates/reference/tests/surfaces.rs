@@ -1,8 +1,7 @@
 //! Ordered surfaces and exact visibility against closed forms and brute force.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod support;
-
+use crate::support::{ball_mesh, box_mesh, parallel};
 use reference::{
     Density, ImplicitSurface, LightSource, MarchParams, Medium, Ray, RootParams, Scene, Surface, SurfaceKind,
     SurfaceMaterial, SurfaceScene, Visibility, composite_surfaces, march_image, optical_depth,
@@ -11,7 +10,6 @@ use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
 use splat_core::{Mesh, Progress, ScalarField, rng};
 use std::f64::consts::PI;
-use support::{ball_mesh, box_mesh, parallel};
 
 /// |p − center|² − r², with the exact bound over a ball.
 struct Ball {

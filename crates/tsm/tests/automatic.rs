@@ -1,11 +1,9 @@
 //! TS10, TS12, TS16: the table that is chosen by itself, in any unit of length, for splats of any fineness.
 
-use common::*;
+use crate::common::*;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Cloud, Light, LightShape};
 use tsm::{Deposits, Limit, Params, Resolution};
-
-mod common;
 
 fn scaled(cloud: &Cloud, light: &Light, s: f64) -> (Cloud, Light) {
     let (mut cloud, mut light, f) = (cloud.clone(), *light, s as f32);

@@ -1,11 +1,9 @@
 //! X2, TS16: no light jumps when a splat moves or grows across a threshold between two ways of depositing it.
 
-use common::*;
+use crate::common::*;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Cloud, Splat, SplatKind};
 use tsm::{MappingChoice, Params, Resolution};
-
-mod common;
 
 const CELLS: u32 = 64;
 /// Optical depth of the splat at its middle; all bounds are shares of it.

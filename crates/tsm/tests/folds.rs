@@ -1,11 +1,9 @@
 //! TS2, TS16: absorbance about a lamp is as even beside the edges and corners of the octahedral table as elsewhere.
 
-use common::*;
+use crate::common::*;
 use splat_core::glam::{DVec3, Vec3};
 use tsm::mapping::{Mapping, Table};
 use tsm::{MappingChoice, Params, Resolution, ShadowMap};
-
-mod common;
 
 /// Tables, and how much a cell may be off.
 const SIZES: [(Resolution, f64); 4] = [

@@ -1,11 +1,9 @@
 //! X1-X4, TS12, TS14: threads, permutation, shift, scale, linearity, memory.
 
-use common::*;
+use crate::common::*;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Cloud, Light, LightShape, SplatKind, Transmittance};
 use tsm::{Deposits, Error, MappingChoice, Params, Resolution, ShadowMap};
-
-mod common;
 
 fn lights() -> [Light; 4] {
     let position = DVec3::new(0.25, -0.5, 0.125);

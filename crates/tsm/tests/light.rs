@@ -1,12 +1,10 @@
 //! TS1, TS3, TS8-TS13, TS16: how much light arrives.
 
-use common::*;
+use crate::common::*;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::optics::AbsorbanceModel;
 use splat_core::{Cloud, Material, Object, Receiver, Splat, SplatKind, Transmittance};
 use tsm::{MappingChoice, Params, Resolution, ShadowMap};
-
-mod common;
 
 #[test]
 fn ts01_light_exactly_on_a_point() {

@@ -5,8 +5,6 @@ use splat_core::glam::{Vec2, Vec3};
 use std::f64::consts::PI;
 use tsm::mapping::{Mapping, Octahedral, Planar, PolarAzimuth, PolarRange};
 
-mod common;
-
 fn sphere_tables(n: u32) -> [Box<dyn Mapping>; 2] {
     [Box::new(Octahedral::new(n)), Box::new(PolarAzimuth::new(2 * n, n, PolarRange::SPHERE))]
 }
@@ -33,7 +31,7 @@ fn ts05_octahedral_cells_have_equal_solid_angle() {
     let (n, cells) = (576_000u64, 576);
     let mut count = vec![0u64; cells];
     for i in 0..n {
-        let at = table.locate(common::direction(1, i)).unwrap().at.floor();
+        let at = table.locate(crate::common::direction(1, i)).unwrap().at.floor();
         count[table.wrap(at.x as i32, at.y as i32).unwrap() as usize] += 1;
     }
     let expected = n as f64 / cells as f64;
@@ -64,7 +62,7 @@ fn gradients_are_the_derivatives_of_places() {
     tables.extend(sphere_tables(64));
     for (k, table) in tables.iter().enumerate() {
         for i in 0..2000 {
-            let mut p = common::direction(2, i);
+            let mut p = crate::common::direction(2, i);
             if k < 2 {
                 p = Vec3::new(0.4 * p.x, 0.4 * p.y, 1.0 + 0.3 * p.z);
             }
@@ -133,7 +131,7 @@ fn octahedral_edges_continue_at_the_neighbouring_direction() {
 fn ts04_a_table_of_one_direction_is_widened() {
     let table = PolarAzimuth::new(180, 180, PolarRange { polar: [1.0, 1.0], azimuth: [0.3, 0.0] });
     for i in 0..10_000 {
-        if let Some(place) = table.locate(common::direction(4, i)) {
+        if let Some(place) = table.locate(crate::common::direction(4, i)) {
             assert!(place.at.x < 181.0 && place.at.y < 181.0);
         }
     }

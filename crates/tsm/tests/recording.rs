@@ -1,9 +1,7 @@
 //! The recorded lists and look-ups, without a device: what they are, and what they refuse.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
-
-use common::{mixed, point_light};
+use crate::common::{mixed, point_light};
 use splat_core::Progress;
 use splat_core::glam::DVec3;
 use splat_core::raster::gpu::AttributeRoom;
@@ -45,7 +43,7 @@ fn look_ups_refuse_what_they_have_no_room_for() {
     assert!(matches!(refused(Room { channels: 3, ..room }), Error::Overflow { what: "channels", .. }));
     let recorded = record_look_up(room);
     let uploads = recorded.map(&map).unwrap();
-    let receivers = [common::probe(splat_core::glam::Vec3::X); 11];
+    let receivers = [crate::common::probe(splat_core::glam::Vec3::X); 11];
     let refused = recorded.receivers(&map, &uploads, &receivers).unwrap_err();
     assert_eq!(refused, Error::Overflow { what: "receivers", needed: 11, had: 10 });
     let own = recorded.receivers(&map, &uploads, &receivers[..10]).unwrap();
@@ -56,7 +54,7 @@ fn look_ups_refuse_what_they_have_no_room_for() {
     // Polar angles are the CPU's.
     let polar = Params { mapping: tsm::MappingChoice::PolarAzimuth, ..Params::default() };
     let light = point_light(DVec3::new(0.3, 2.5, 0.2));
-    assert_eq!(Room::of(&common::build(&mixed(100, DVec3::ZERO), &light, &polar), 10), None);
+    assert_eq!(Room::of(&crate::common::build(&mixed(100, DVec3::ZERO), &light, &polar), 10), None);
 }
 
 #[test]

@@ -1,11 +1,9 @@
 //! TS15: no shadow acne, and contact shadows; opaque shadows without holes.
 
-use common::*;
+use crate::common::*;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Receiver, SplatKind, Transmittance};
 use tsm::{MappingChoice, Params, Resolution};
-
-mod common;
 
 #[test]
 fn ts15_plane_lit_at_any_angle_has_no_acne() {

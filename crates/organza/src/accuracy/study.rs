@@ -115,16 +115,8 @@ pub fn study(
     })?;
     let own = timed[0].image().ok_or_else(|| unresolved(timed[0].failure.clone().unwrap_or_default(), ""))?;
     let floor = ROUNDING * root_mean_square(own);
-    let mut curves = Vec::new();
     let ends = sweep.knobs.iter().map(|k| (k.name, 1.0)).chain([(TOGETHER, 1.0)]);
-    let limit = progress.within(ENDS, ends, || {
-        for (knob, of_step) in sweep.knobs.iter().zip(&settings.of_step) {
-            progress.begin(knob.name);
-            curves.extend(curve(sweep, knob, of_step, &settings, &timed, floor, draw)?);
-        }
-        progress.begin(TOGETHER);
-        limit(sweep, &curves, draw)
-    })?;
+    let (curves, limit) = progress.within(ENDS, ends, || converge(sweep, &settings, &timed, floor, progress, draw))?;
     let resolved: Vec<&str> = limit.parts.iter().map(|p| p.0).collect();
     settings.join(sweep, &resolved);
     timed.resize(settings.list.len(), Timed::default());
@@ -226,6 +218,29 @@ fn is_resource_limit(error: &Error) -> bool {
     matches!(error, Error::Limit { .. } | Error::TooLarge { .. })
 }
 
+/// The convergence of every knob that has an end which can be drawn, and of all together.
+fn converge(
+    sweep: &Sweep,
+    settings: &Settings,
+    timed: &[Timed],
+    floor: f64,
+    progress: &Progress,
+    draw: &mut Draw<'_>,
+) -> Result<(Vec<Curve>, Limit), Error> {
+    let (mut curves, mut refused) = (Vec::new(), Vec::new());
+    for (knob, of_step) in sweep.knobs.iter().zip(&settings.of_step) {
+        progress.begin(knob.name);
+        match curve(sweep, knob, of_step, settings, timed, floor, draw) {
+            Ok(curve) => curves.extend(curve),
+            Err(e) if is_resource_limit(&e) => refused.push(Skipped { knob: knob.name, reason: e.to_string() }),
+            Err(e) => return Err(e),
+        }
+    }
+    progress.begin(TOGETHER);
+    let limit = limit(sweep, &curves, refused, draw)?;
+    Ok((curves, limit))
+}
+
 /// The convergence of one knob against its end, the other knobs as in the scene; `None` for a choice.
 fn curve(
     sweep: &Sweep,
@@ -291,16 +306,16 @@ fn end(
     refused.map_or(Ok(None), Err)
 }
 
-/// All knobs to their ends; those whose ends are not good enough stay where the scene has them.
+/// All knobs to their ends; those whose ends are not good enough stay where the scene has them, as do those that `held` names.
 ///
 /// Ends join, the best first, while the sum of their own errors stays ten times below the distance that the scene's own
 /// setting has from them together.
-fn limit(sweep: &Sweep, curves: &[Curve], draw: &mut Draw<'_>) -> Result<Limit, Error> {
+fn limit(sweep: &Sweep, curves: &[Curve], mut held: Vec<Skipped>, draw: &mut Draw<'_>) -> Result<Limit, Error> {
     let mut best_first: Vec<&Curve> = curves.iter().collect();
     let worth = |c: &Curve| if c.end_size.is_none() { f64::INFINITY } else { c.own_setting / c.settled.own_error };
     best_first.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
     let (mut own_error, mut square) = (0.0, 0.0);
-    let (mut parts, mut held) = (Vec::new(), Vec::new());
+    let mut parts = Vec::new();
     for curve in best_first {
         let own = own_error + curve.settled.own_error;
         let apart = square + curve.own_setting * curve.own_setting;

@@ -1,0 +1,26 @@
+//! Conversions and readers on real files, hard cases and bad inputs. One program: it is linked once, and its tests share all cores.
+
+mod bad_inputs;
+mod combined_fields;
+mod convert_bunny;
+mod convert_cost;
+mod convert_fields;
+mod convert_mesh;
+mod convert_surfels;
+mod convert_volume;
+mod grid_fields;
+mod marching_cubes;
+mod mpu_fields;
+mod read_assets;
+mod read_las;
+mod read_mended;
+mod read_more;
+mod read_nifti;
+mod read_notes;
+mod read_numbers;
+mod read_ply;
+mod read_polygons;
+#[cfg(feature = "read")]
+mod read_samples;
+mod read_spaces;
+mod readme;

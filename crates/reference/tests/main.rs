@@ -1,0 +1,9 @@
+//! Path tracing and metrics against closed forms. One program: it is linked once, and its tests share all cores.
+
+mod agrees_with_raster;
+mod flip;
+mod path_liberties;
+mod path_media;
+mod path_surfaces;
+mod support;
+mod surfaces;

@@ -1,0 +1,12 @@
+//! Shadow maps: closed forms, continuity, invariances, the recording. One program: it is linked once, and its tests share all cores.
+
+mod automatic;
+mod common;
+mod continuity;
+mod folds;
+mod invariance;
+mod light;
+mod mappings;
+#[cfg(feature = "gpu")]
+mod recording;
+mod surfaces;

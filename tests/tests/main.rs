@@ -1,0 +1,29 @@
+//! The whole command, from scene files to pictures. One program: it is linked once, and its tests share all cores.
+
+mod accuracy;
+mod animation;
+mod bad_scenes;
+mod borders;
+mod closed_forms;
+mod command;
+mod doubts;
+mod every_key;
+mod exact_particles;
+mod eye_inside;
+mod interrupts;
+mod invariances;
+mod layers;
+mod loading;
+mod many_forms;
+mod memory;
+mod memory_particles;
+mod meshes;
+mod only_what_is_called_for;
+mod orders;
+mod output;
+mod particle_layers;
+mod particles;
+mod progress;
+mod reading;
+mod slanted_slabs;
+mod truth;
