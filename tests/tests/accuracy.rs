@@ -1,5 +1,4 @@
 //! `organza accuracy`: a technique of known order, the same one broken, one that does not converge, and the command.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza::accuracy::{
     Absent, Facts, Frame, Knob, Options, Renderer, Report, Request, Step, Study, Sweep, Theory, Truth, least_seconds,

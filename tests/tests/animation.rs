@@ -1,5 +1,4 @@
 //! Frames of a scene whose values have keys.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza_tests::{Place, SMALL_SCENE, draw};
 use serde_json::Value;

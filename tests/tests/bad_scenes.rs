@@ -1,5 +1,4 @@
 //! Scene files that are wrong: every one is refused with its place, a reason and exit code 3, and none panics.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza::Error;
 use organza::scene::{LoadOptions, MAX_SCENE_BYTES, Override, Scene, load, parse};

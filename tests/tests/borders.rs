@@ -1,6 +1,5 @@
 //! Borders and silhouettes of opaque surfaces lie where they are, whatever the spacing of the splats beside a pixel, and a
 //! surface has no holes.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza_tests::draw;
 

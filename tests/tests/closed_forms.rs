@@ -1,5 +1,4 @@
 //! Closed forms through the whole command, scene file in, EXR out: slabs, shadows of slabs, crossed planes, a ball.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza_tests::{draw, mean_and_ripple, parallel_view, window};
 use splat_core::Footprint;

@@ -1,5 +1,4 @@
 //! The real command: exit codes, refusals before work, closed pipes, odd names, interrupts.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza_tests::{Place, SMALL_SCENE, organza};
 use serde_json::Value;

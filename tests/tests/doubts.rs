@@ -1,5 +1,4 @@
 //! What a picture would fail to show is said, with what to change; and of the scenes that come with Organza nothing.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza::scene::{LoadOptions, load, parse};
 use organza::{Progress, RenderOptions};

@@ -2,7 +2,6 @@
 //!
 //! The keys are those of the JSON Schema that `organza schema` prints; docs/scene.md lists the same. A key that is in
 //! neither table of `every_key/` fails the test, so a new one cannot be silently ignored.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod scenes;
 mod schema;

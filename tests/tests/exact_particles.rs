@@ -3,7 +3,6 @@
 //! A particle falls anywhere in a pixel and where the kernel of its splat is, the compositor looks at a pixel's centre and
 //! gives a splat one depth on a ray. So kernels are tens of pixels wide, the perspective is that of a telescope, and the
 //! colours of media that overlap in depth are equal: then the two have the same expectation.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use pbsr::{
     Appearance, Ensemble, EnsembleParams, FoldParams, Object, Particles, Renderer, Sampler, Scene, SplatParams,

@@ -1,5 +1,4 @@
 //! The eye inside matter, and matter behind the eye: what lies before the eye counts, all of it and nothing else.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza_tests::{Picture, draw};
 

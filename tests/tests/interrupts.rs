@@ -1,5 +1,4 @@
 //! Renders by particles that stop in the middle: checkpoints, the picture at an interrupt, and the same bits at the end.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza_tests::{Place, SMALL_SCENE, organza};
 use std::fs;

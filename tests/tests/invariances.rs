@@ -1,5 +1,4 @@
 //! Invariances through the whole command: threads, shuffled input, scale by powers of two, shift by 10⁷, linearity.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza_tests::{draw, largest_difference};
 use std::fmt::Write;

@@ -1,5 +1,4 @@
 //! Layers mean what they say: effects sum to beauty in every scene, and depth is one thing for every primitive.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::many_forms::write;
 use organza_tests::{Picture, draw, draw_file, draw_in, largest_difference, mean_and_ripple, parallel_view, window};

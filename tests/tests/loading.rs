@@ -1,5 +1,4 @@
 //! Loading a scene: splats are counted before they are made, limits hold for the scene as a whole, interrupts are heard.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza::scene::{LoadOptions, Scene, parse};
 use organza::{Error, Progress, RenderOptions, explain, load};

@@ -1,4 +1,5 @@
 //! The whole command, from scene files to pictures. One program: it is linked once, and its tests share all cores.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod accuracy;
 mod animation;

@@ -1,6 +1,5 @@
 //! The same object in many forms: mesh, implicit surface, raw points; grid, formula, lattice. Through the whole command,
 //! all forms of a shape show its transmittance and cast its shadow, and come together as their resolution rises.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod shape;
 pub(crate) mod write;

@@ -1,6 +1,5 @@
 //! `--max-memory` and what `explain` says bound what is resident, and a system that gives less is answered with exit code 5.
 #![cfg(target_os = "linux")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza_tests::{Peak, Place, SMALL_SCENE, organza, run_measured};
 use std::path::Path;

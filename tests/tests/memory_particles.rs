@@ -1,6 +1,5 @@
 //! What particles take is known before they are made: memory stays below what is allowed, and data that no sampler takes is
 //! refused by name.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza_tests::{Place, SMALL_SCENE};
 

@@ -1,5 +1,4 @@
 //! Meshes as they are found: one bad face among many, surfaces turned inside out.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use convert::read::{Loaded, ReadLimits};
 use glam::{DVec3, Vec3};

@@ -1,5 +1,4 @@
 //! Passes that a scene does not call for do not run: the cost record has no entry, and the picture does not change.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza_tests::{draw, largest_difference, organza, parallel_view};
 use serde_json::Value;

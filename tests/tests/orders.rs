@@ -1,5 +1,4 @@
 //! `organza orders`: every ordering against the truth of each pixel.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza::orders::compare;
 use organza::{Progress, RenderOptions, scene};

@@ -1,5 +1,4 @@
 //! Files that were written: channels, values, metadata, and that they appear whole or not at all.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use exr::prelude::*;
 use organza::output::{self, Metadata, Target, Targets, WriteReport};

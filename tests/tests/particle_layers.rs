@@ -1,5 +1,4 @@
 //! Layers and coloured extinction of the technique `particles`: closed forms within stated statistics, sums, bits.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::many_forms::write;
 use organza_tests::{Picture, draw_in, largest_difference, organza, parallel_view, window};

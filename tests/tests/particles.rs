@@ -1,5 +1,4 @@
 //! The technique `particles` through the whole command: the picture of `points` but for noise that its standard error states.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza_tests::{Picture, draw, draw_in, organza, parallel_view};
 

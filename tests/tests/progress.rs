@@ -1,5 +1,4 @@
 //! Progress is told by stages that share the predicted work: it never goes back, and is whole at the end, not before.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza::scene::{LoadOptions, parse};
 use organza::{Progress, RenderOptions};

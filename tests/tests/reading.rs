@@ -1,5 +1,4 @@
 //! What the command says of the files that it reads, and how colours of photographs are drawn.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza_tests::{draw_in, mean_and_ripple, organza, parallel_view, window};
 use serde_json::{Value, json};

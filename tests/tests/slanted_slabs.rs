@@ -1,5 +1,4 @@
 //! Depths of a homogeneous slab, seen straight and aslant, against the closed form of the slab cut by each pixel's own ray.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza_tests::draw;
 use splat_core::glam::DVec3;

@@ -1,5 +1,4 @@
 //! The points technique against physical truth: the same scene path-traced without splats.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::many_forms::write;
 use organza::scene::{self, Scene};

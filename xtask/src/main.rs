@@ -3,6 +3,7 @@
 mod assets;
 mod ci;
 mod papers;
+mod quick;
 mod repo;
 mod shaders;
 mod source;
@@ -17,6 +18,7 @@ const HELP: &str = "\
 usage: cargo xtask COMMAND
 
   ci               everything that must hold before a merge, step by step; stops at the first failure
+  quick            format, rules, clippy, and the tests of the crates that changed since main
   tidy             the rules that the compiler does not know: heads, sizes, dependency direction, assets
   papers           writes docs/papers.md from docs/papers/*.toml
   papers --check   fails where docs/papers.md is stale or names code or a test that does not exist
@@ -32,6 +34,7 @@ fn main() -> ExitCode {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let outcome = match words.as_slice() {
         ["ci"] => Repo::open().and_then(|repo| ci::run(&repo)),
+        ["quick"] => Repo::open().and_then(|repo| quick::run(&repo)),
         ["tidy"] => Repo::open().and_then(|repo| tidy::run(&repo)),
         ["papers"] => Repo::open().and_then(|repo| papers::write(&repo)),
         ["papers", "--check"] => Repo::open().and_then(|repo| papers::check(&repo)),

@@ -1,6 +1,5 @@
 //! Bad inputs by their number in the list of required behaviours: refused with place, expectation and finding.
 #![cfg(all(feature = "ply", feature = "nifti", feature = "las"))]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::read_samples::{NIFTI_F32, NIFTI_U8, gzip, las, load, nifti, ply_ascii, ply_binary};
 use convert::read::{ReadLimits, bytes, file};

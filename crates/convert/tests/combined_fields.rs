@@ -1,5 +1,4 @@
 //! Unions, intersections, differences, complements and clipped surfaces.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use convert::{
     Clip, ClippedField, CombinedField, Density, MeshParams, SharedField, SplatParams, field_to_mesh, surface_to_points,

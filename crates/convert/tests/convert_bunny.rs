@@ -1,6 +1,5 @@
 //! The scanned bunny: its splats cover it once.
 #![cfg(feature = "ply")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use convert::read::{self, Loaded, ReadLimits};
 use convert::{Density, MeshParams, mesh_to_points, reference};

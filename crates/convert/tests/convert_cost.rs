@@ -1,6 +1,5 @@
 //! Predicted splats and bytes against the counters of the conversions, and conversions that are interrupted.
 #![cfg(all(feature = "surfels", feature = "expression", feature = "noise"))]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use convert::cost::{self, Prediction};
 use convert::*;

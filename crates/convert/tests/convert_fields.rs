@@ -1,6 +1,5 @@
 //! Fields: formulas, derivatives, bounds, surfaces, densities, procedural clouds.
 #![cfg(all(feature = "expression", feature = "noise"))]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use convert::{
     CloudShape, ConvertError, Density, DensityParams, ExpressionField, MeshParams, SplatParams, VolumeParams,

@@ -1,5 +1,4 @@
 //! Meshes become splats: hard cases CV1-CV6, CV10, weights, conserved areas, invariances.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use convert::{ConvertError, Density, MeshParams, SplatParams, mesh_to_points, reference};
 use splat_core::glam::{DQuat, DVec3, Vec3};

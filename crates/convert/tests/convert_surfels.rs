@@ -1,6 +1,5 @@
 //! Raw points become surfels: hard cases CV11 and CV12, normals, areas, orientation, invariances.
 #![cfg(feature = "surfels")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use convert::{Orientation, RawPoints, SurfelParams, raw_to_surfels, reference};
 use splat_core::glam::{DVec3, Vec3};

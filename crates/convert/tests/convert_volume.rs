@@ -1,5 +1,4 @@
 //! Volumes become splats: hard cases CV7-CV9, conserved extinction, gradients, invariances.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use convert::{ConvertError, SplatParams, VolumeParams, reference, sobel_gradient, volume_to_points};
 use splat_core::glam::{DMat3, DQuat, DVec3, Vec3};

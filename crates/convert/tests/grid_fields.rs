@@ -1,5 +1,4 @@
 //! Isosurfaces of volumes as fields: exactness, derivatives, borders, bounds.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use convert::{GridField, Inside, Interpolation, SplatParams, field_to_mesh};
 use splat_core::glam::{DMat3, DVec3};

@@ -1,4 +1,5 @@
 //! Conversions and readers on real files, hard cases and bad inputs. One program: it is linked once, and its tests share all cores.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod bad_inputs;
 mod combined_fields;

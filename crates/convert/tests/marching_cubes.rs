@@ -1,5 +1,4 @@
 //! Isosurfaces as meshes: closed, oriented, accurate, the same for any number of threads.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use convert::{Inside, MeshParams, isosurface_to_mesh, mesh_to_points};
 use splat_core::glam::{DMat3, DVec3};

@@ -1,6 +1,5 @@
 //! Fields of scattered points: accuracy, derivatives, bounds, sameness, and inputs that are hardly surfaces.
 #![cfg(all(feature = "surfels", feature = "ply"))]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use convert::read::{self, Loaded, ReadLimits};
 use convert::{

@@ -1,6 +1,5 @@
 //! The real inputs that come with the repository.
 #![cfg(all(feature = "ply", feature = "nifti", feature = "las"))]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use convert::read::{Loaded, ReadLimits, file};
 use splat_core::glam::DVec3;

@@ -1,6 +1,5 @@
 //! LAS and LAZ: exact integers, colours, intensity, classes.
 #![cfg(feature = "las")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::read_samples::oldest::{EndlessSwitches, laz_oldest, laz_pointwise};
 use crate::read_samples::{gzip, las, las_steps, load};

@@ -1,6 +1,5 @@
 //! Files with one fault among much that is right: the rest is read, what was mended is counted, strict readers refuse.
 #![cfg(all(feature = "ply", feature = "stl", feature = "obj"))]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use convert::Fault;
 use convert::read::{Fix, Loaded, ReadLimits, bytes, bytes_with_notes};

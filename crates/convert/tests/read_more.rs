@@ -1,6 +1,5 @@
 //! STL, OBJ, XYZ and NRRD: what they become, and bad inputs by their number in the list of required behaviours.
 #![cfg(all(feature = "stl", feature = "obj", feature = "xyz", feature = "nrrd", feature = "ply"))]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::read_samples::{gzip, load};
 use convert::read::{Loaded, ReadLimits, bytes, file};

@@ -1,6 +1,5 @@
 //! NIfTI volumes: every voxel type, both byte orders, the three affine methods, scaling.
 #![cfg(feature = "nifti")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::read_samples::{Dtype, NIFTI_F32, NIFTI_U8, gzip, load, nifti};
 use convert::read::Loaded;

@@ -1,6 +1,5 @@
 //! What readers leave aside is named, and what they cannot show is refused by name.
 #![cfg(all(feature = "ply", feature = "obj", feature = "xyz", feature = "las"))]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::read_samples::{las, load, obj, ply_ascii, ply_binary, text_points};
 use convert::read::{ReadLimits, bytes_with_notes};

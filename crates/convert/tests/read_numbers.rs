@@ -1,6 +1,5 @@
 //! Which forms of numbers every reader of text takes, and which it refuses with line and column.
 #![cfg(all(feature = "ply", feature = "stl", feature = "obj", feature = "xyz", feature = "nrrd"))]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::read_samples::load;
 use convert::Place;

@@ -1,6 +1,5 @@
 //! PLY of every encoding gives the same mesh; points without faces become raw points.
 #![cfg(feature = "ply")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::read_samples::{VERTICES, gzip, load, ply_ascii, ply_binary};
 use convert::read::{Loaded, ReadLimits, bytes};

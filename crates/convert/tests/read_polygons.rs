@@ -1,6 +1,5 @@
 //! Faces of more than three corners: concave ones, collinear corners, holes by bridges, far away, scaled, crossing.
 #![cfg(feature = "ply")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use convert::read::{self, Loaded, ReadLimits};
 use splat_core::Mesh;

@@ -1,6 +1,5 @@
 //! One head in one world, whichever way its file points: NRRD and NIfTI.
 #![cfg(all(feature = "nrrd", feature = "nifti"))]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::read_samples::{NIFTI_F32, load, nifti};
 use convert::read::{Loaded, ReadLimits, bytes_with_notes};

@@ -1,5 +1,4 @@
 //! The README names every feature, and what needs it.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 const README: &str = include_str!("../README.md");
 const MANIFEST: &str = include_str!("../Cargo.toml");

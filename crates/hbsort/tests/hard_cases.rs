@@ -1,5 +1,4 @@
 //! BS1 to BS9: the inputs that break a naive bucket sort.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common::{camera, depths, outdoor, slices_of};
 use hbsort::{

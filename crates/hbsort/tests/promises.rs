@@ -1,5 +1,4 @@
 //! Promises beside the order: same bits on any number of threads, memory, subsets, culling, errors, scaling.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common::{camera, depths, outdoor, slices_of};
 use hbsort::{Direction, Error, Method, Params, Scratch, Thickness, cost, reference, slice_cloud, slice_depths};

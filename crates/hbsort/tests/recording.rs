@@ -1,5 +1,4 @@
 //! The recorded sort, without a device: what it is, and what it refuses.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common::{camera, outdoor};
 use hbsort::gpu::{Capacities, record};

@@ -1,5 +1,4 @@
 //! One-off checks at p = 0.001 against closed forms: opacity of planes, spheres, slabs and clouds of splats.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common::*;
 use pbsr::{

@@ -1,5 +1,4 @@
 //! The paper's Brownian motion: stays on the surface, stays uniform, and counts what it must.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common::*;
 use pbsr::{BrownianParams, BrownianSampler, Error, ImplicitSurface, LineSampler, SurfaceParams, Walk, pixel_area};

@@ -1,5 +1,4 @@
 //! Extinction that differs by channel: each channel is what particles of its own extinction would give.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common::*;
 use pbsr::{Ensemble, EnsembleParams, MeshSampler, Object, Occluder, SurfaceParams, pixel_area};

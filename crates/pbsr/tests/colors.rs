@@ -1,5 +1,4 @@
 //! Colours of particles have nine bits each, and no bias: what is seen of many is the colour itself.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common::*;
 use pbsr::{

@@ -1,5 +1,4 @@
 //! The average over sets: its error, its integers, its determinism; ties, occluders, depths, checkpoints, cancelling.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common::*;
 use pbsr::{

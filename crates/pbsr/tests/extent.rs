@@ -1,5 +1,4 @@
 //! A volume fills its voxels: n lattice points along an axis span n steps, whatever their lengths and directions.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common::*;
 use pbsr::{GridSampler, MetropolisParams, MetropolisSampler, Sampler, VolumeParams, pixel_area};

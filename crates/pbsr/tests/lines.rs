@@ -1,5 +1,4 @@
 //! Random lines on implicit surfaces: uniform, exact in opacity, and clear about what they could not find.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common::*;
 use pbsr::{Density, Error, ImplicitSurface, LineSampler, Sampler, SurfaceParams, pixel_area};

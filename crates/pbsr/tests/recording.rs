@@ -1,5 +1,4 @@
 //! The recorded ensemble, without a device: what it is, and what it refuses.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use pbsr::gpu::{Capacities, Lighting, Nearest, ShadowOf, Sources, record, record_generated};
 use pbsr::{Appearance, EnsembleParams, GridSampler, MeshSampler, Object, Sampler, Scene, SurfaceParams, VolumeParams};

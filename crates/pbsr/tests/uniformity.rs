@@ -1,6 +1,5 @@
 //! Every sampler by the same two tests: places are uniform (χ² on bins of equal measure, 99.9 % point), and sets are
 //! independent (variance of a count, correlation at lags 1 to 5).
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common::*;
 use pbsr::{

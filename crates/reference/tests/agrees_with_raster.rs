@@ -1,5 +1,4 @@
 //! The rasterizer against the exact compositor, and the twin orders against each other, on mixed random scenes.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use reference::{Input, Order, composite};
 use splat_core::glam::{DVec3, Vec3};

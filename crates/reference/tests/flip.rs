@@ -1,5 +1,4 @@
 //! LDR-FLIP against the implementation of its authors (crate `nv-flip`, C++), pixel by pixel.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use nv_flip::{FlipImageRgb8, FlipPool};
 use reference::metrics::{Display, Image, Viewing, flip};

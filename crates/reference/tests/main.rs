@@ -1,4 +1,5 @@
 //! Path tracing and metrics against closed forms. One program: it is linked once, and its tests share all cores.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod agrees_with_raster;
 mod flip;

@@ -1,6 +1,5 @@
 //! What a scene may ask otherwise than nature: shadows left out or weakened, and more light than arrives. Closed forms; a
 //! pixel is held to 4.5 of its standard errors (two-sided 7e-6).
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::support::{assert_mean, parallel, quad, trace};
 use reference::{

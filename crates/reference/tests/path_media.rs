@@ -1,6 +1,5 @@
 //! The path tracer in media against closed forms. Every statistical check has a fixed seed; a pixel is held to 4 or 4.5
 //! of its standard errors (two-sided 6e-5 and 7e-6), an image's mean to 3.3 (1e-3).
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::support::{assert_mean, parallel, trace};
 use reference::{

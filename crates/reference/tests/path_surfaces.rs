@@ -1,5 +1,4 @@
 //! The path tracer on surfaces, and its promises of determinism. Statistical levels as in `path_media.rs`.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::support::{assert_mean, ball_mesh, box_mesh, parallel, quad, trace};
 use reference::{

@@ -1,5 +1,4 @@
 //! Ordered surfaces and exact visibility against closed forms and brute force.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::support::{ball_mesh, box_mesh, parallel};
 use reference::{

@@ -1,5 +1,4 @@
 //! What half precision does to sums of many thin splats.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use glam::DVec3;
 use splat_core::raster::{Accumulation, OpaqueImage, Params, fold, project};

@@ -1,4 +1,5 @@
 //! Footprints, opaque rims and recordings. One program: it is linked once, and its tests share all cores.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod accumulation;
 mod opaque_rim;

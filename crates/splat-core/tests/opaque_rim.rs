@@ -1,5 +1,4 @@
 //! Opaque surfaces at their silhouette: closed ones have no dark rim, open ones show their back.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use glam::{DVec3, Vec3};
 use splat_core::raster::{OpaqueImage, Params, project, resolve_opaque};

@@ -1,5 +1,4 @@
 //! The recorded compositing, without a device: what it is, and what it refuses.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use glam::{DVec3, Vec3};
 use splat_core::raster::gpu::draw::{self, Precision};

@@ -1,4 +1,5 @@
 //! Shadow maps: closed forms, continuity, invariances, the recording. One program: it is linked once, and its tests share all cores.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod automatic;
 mod common;

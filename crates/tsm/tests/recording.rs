@@ -1,5 +1,4 @@
 //! The recorded lists and look-ups, without a device: what they are, and what they refuse.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common::{mixed, point_light};
 use splat_core::Progress;

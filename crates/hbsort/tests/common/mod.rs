@@ -1,6 +1,4 @@
 //! Scenes that several tests sort.
-#![allow(dead_code, reason = "each test file uses some of them")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use hbsort::SliceOrder;
 use splat_core::glam::{DVec3, Vec3};

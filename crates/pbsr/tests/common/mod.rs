@@ -1,23 +1,21 @@
 //! What the tests share: small scenes, pictures, and tests of hypotheses with a stated level.
-#![allow(dead_code, unreachable_pub, reason = "each test file uses its part")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use pbsr::{Appearance, Ensemble, EnsembleParams, FoldParams, LitBy, Object, Renderer, Sampler, Scene};
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::{Camera, Material, Mesh, Progress, Projection, ScalarField, Shading, Similarity};
 
 /// Looks along −Z from `distance` away from the origin.
-pub fn camera(projection: Projection, distance: f64, size: [u32; 2]) -> Camera {
+pub(crate) fn camera(projection: Projection, distance: f64, size: [u32; 2]) -> Camera {
     Camera::look_at(DVec3::Z * distance, DVec3::ZERO, DVec3::Y, projection, size).unwrap()
 }
 
 /// Orthographic view of the square [−1, 1]² by n² pixels.
-pub fn front(n: u32) -> Camera {
+pub(crate) fn front(n: u32) -> Camera {
     camera(Projection::Orthographic { height: 2.0 }, 4.0, [n, n])
 }
 
 /// A rectangle a·(±1) + b·(±1) around `middle`, of `n`² × 2 triangles.
-pub fn rectangle(middle: Vec3, a: Vec3, b: Vec3, n: u32) -> Mesh {
+pub(crate) fn rectangle(middle: Vec3, a: Vec3, b: Vec3, n: u32) -> Mesh {
     let mut mesh = Mesh::default();
     for j in 0..=n {
         for i in 0..=n {
@@ -36,44 +34,44 @@ pub fn rectangle(middle: Vec3, a: Vec3, b: Vec3, n: u32) -> Mesh {
 }
 
 /// Shown as it is.
-pub fn unlit() -> Appearance {
+pub(crate) fn unlit() -> Appearance {
     Appearance { material: Material { shading: Shading::Unlit, ..Material::default() }, ..Appearance::default() }
 }
 
-pub fn object(sampler: &dyn Sampler) -> Object<'_> {
+pub(crate) fn object(sampler: &dyn Sampler) -> Object<'_> {
     Object { sampler, transform: Similarity::default(), look: unlit() }
 }
 
-pub fn objects<'a>(samplers: &[&'a dyn Sampler]) -> Vec<Object<'a>> {
+pub(crate) fn objects<'a>(samplers: &[&'a dyn Sampler]) -> Vec<Object<'a>> {
     samplers.iter().map(|s| object(*s)).collect()
 }
 
-pub fn scene<'a>(camera: &'a Camera, objects: &'a [Object<'a>]) -> Scene<'a> {
+pub(crate) fn scene<'a>(camera: &'a Camera, objects: &'a [Object<'a>]) -> Scene<'a> {
     Scene { objects, lights: &[] as &[LitBy<'_>], ambient: [0.0; 3], camera, occluder: None }
 }
 
-pub fn fold(scene: &Scene<'_>, levels: u32) -> Ensemble {
+pub(crate) fn fold(scene: &Scene<'_>, levels: u32) -> Ensemble {
     let mut ensemble = Ensemble::new(scene.camera.size, &EnsembleParams::default()).unwrap();
     fold_into(scene, &mut ensemble, levels);
     ensemble
 }
 
-pub fn fold_into(scene: &Scene<'_>, ensemble: &mut Ensemble, levels: u32) {
+pub(crate) fn fold_into(scene: &Scene<'_>, ensemble: &mut Ensemble, levels: u32) {
     Renderer::new().fold(scene, ensemble, levels, &FoldParams::default(), &Progress::new()).unwrap();
 }
 
-pub fn render(camera: &Camera, samplers: &[&dyn Sampler], levels: u32) -> Ensemble {
+pub(crate) fn render(camera: &Camera, samplers: &[&dyn Sampler], levels: u32) -> Ensemble {
     fold(&scene(camera, &objects(samplers)), levels)
 }
 
 /// Hits of all pixels.
-pub fn all_hits(ensemble: &Ensemble) -> Vec<u32> {
+pub(crate) fn all_hits(ensemble: &Ensemble) -> Vec<u32> {
     let [w, h] = ensemble.size();
     (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).map(|(x, y)| ensemble.hits(x, y)).collect()
 }
 
 /// |z| that n independent standard normal numbers exceed with probability `p` (Šidák), two-sided.
-pub fn sidak(p: f64, n: usize) -> f64 {
+pub(crate) fn sidak(p: f64, n: usize) -> f64 {
     let each = -((-p).ln_1p() / n as f64).exp_m1();
     // Quantile of the normal tail each/2 by bisection on its asymptotic series' integral.
     let tail = |z: f64| 0.5 * erfc(z / std::f64::consts::SQRT_2);
@@ -86,7 +84,7 @@ pub fn sidak(p: f64, n: usize) -> f64 {
 }
 
 /// Complementary error function, relative error below 1.2e-7 (Numerical Recipes).
-pub fn erfc(x: f64) -> f64 {
+pub(crate) fn erfc(x: f64) -> f64 {
     let t = 1.0 / (1.0 + 0.5 * x.abs());
     let c = [
         -1.265_512_23,
@@ -108,24 +106,24 @@ pub fn erfc(x: f64) -> f64 {
 /// What a one-off check found: the largest |z| of a pixel with its limit, and |z| of the whole image with its own, both at
 /// p = 0.001.
 #[derive(Debug)]
-pub struct Bias {
-    pub pixel: f64,
-    pub pixel_limit: f64,
-    pub image: f64,
-    pub image_limit: f64,
-    pub spread: f64,
-    pub spread_limit: f64,
+pub(crate) struct Bias {
+    pub(crate) pixel: f64,
+    pub(crate) pixel_limit: f64,
+    pub(crate) image: f64,
+    pub(crate) image_limit: f64,
+    pub(crate) spread: f64,
+    pub(crate) spread_limit: f64,
 }
 
 impl Bias {
-    pub fn none(&self) -> bool {
+    pub(crate) fn none(&self) -> bool {
         self.pixel < self.pixel_limit && self.image < self.image_limit && self.spread.abs() < self.spread_limit
     }
 }
 
 /// Hits of `levels` sets against the opacity of each pixel; pixels of expected opacity 0 or 1 must agree exactly.
 /// `spread` is the normalised sum of z² − 1: sets that are not independent widen it.
-pub fn bias(ensemble: &Ensemble, alpha: &dyn Fn(u32, u32) -> Option<f64>) -> Bias {
+pub(crate) fn bias(ensemble: &Ensemble, alpha: &dyn Fn(u32, u32) -> Option<f64>) -> Bias {
     let levels = f64::from(ensemble.levels());
     let [w, h] = ensemble.size();
     let (mut worst, mut n, mut sum, mut variance, mut squares) = (0.0f64, 0usize, 0.0, 0.0, 0.0);
@@ -159,20 +157,20 @@ pub fn bias(ensemble: &Ensemble, alpha: &dyn Fn(u32, u32) -> Option<f64>) -> Bia
 }
 
 /// The 99.9 % point of χ² (Wilson and Hilferty).
-pub fn chi2_limit(dof: f64) -> f64 {
+pub(crate) fn chi2_limit(dof: f64) -> f64 {
     let h = 2.0 / (9.0 * dof);
     dof * (1.0 - h + 3.0902 * h.sqrt()).powi(3)
 }
 
 /// χ² of counts against equal expectations.
-pub fn chi2_equal(counts: &[u64]) -> f64 {
+pub(crate) fn chi2_equal(counts: &[u64]) -> f64 {
     let expected = counts.iter().sum::<u64>() as f64 / counts.len() as f64;
     assert!(expected >= 5.0, "too few: {expected} a bin");
     counts.iter().map(|c| (*c as f64 - expected).powi(2) / expected).sum()
 }
 
 /// All positions of one set.
-pub fn positions(sampler: &dyn Sampler, set: u64) -> Vec<DVec3> {
+pub(crate) fn positions(sampler: &dyn Sampler, set: u64) -> Vec<DVec3> {
     let mut scratch = pbsr::Particles::default();
     let mut all = Vec::new();
     for c in 0..sampler.chunks() {
@@ -184,7 +182,7 @@ pub fn positions(sampler: &dyn Sampler, set: u64) -> Vec<DVec3> {
 
 /// scale · (|p − middle| − radius) and friends, with exact derivatives and bounds.
 #[derive(Clone, Copy)]
-pub enum Field {
+pub(crate) enum Field {
     /// scale·(|p − c|² − r²).
     Sphere { middle: DVec3, radius: f64, scale: f64 },
     /// n·p − d.
@@ -214,7 +212,7 @@ pub enum Field {
 }
 
 impl Field {
-    pub const UNIT: Self = Self::Sphere { middle: DVec3::ZERO, radius: 1.0, scale: 1.0 };
+    pub(crate) const UNIT: Self = Self::Sphere { middle: DVec3::ZERO, radius: 1.0, scale: 1.0 };
 
     /// The nearer of the two spheres; of any other field itself.
     fn sphere_at(p: DVec3, field: &Field) -> Field {

@@ -1,5 +1,4 @@
 //! Cameras, meshes and statistics that the tests share.
-#![allow(dead_code, reason = "each test file uses its share")]
 
 use reference::{Estimate, PathSettings, Scene, path_trace};
 use splat_core::glam::{DVec3, Vec3};
