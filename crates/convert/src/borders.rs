@@ -28,27 +28,27 @@ const IN_PLANE: f64 = 0.8;
 
 /// The edges of a mesh that one triangle has alone. Vertices at one place are one, so that seams of textures are none.
 pub(crate) fn open_edges(mesh: &Mesh) -> Vec<[u32; 2]> {
-    let edges = mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-    let open = alone(edges.collect(), |v| v);
-    let mut first = HashMap::new();
-    let mut places = HashMap::new();
+    let mut edges = vec![[0; 2]; 3 * mesh.triangles.len()];
+    let written = edges.par_chunks_exact_mut(3).zip(&mesh.triangles).with_min_len(CHUNK);
+    written.for_each(|(edges, &[a, b, c])| edges.copy_from_slice(&[sorted(a, b), sorted(b, c), sorted(c, a)]));
+    edges.par_sort_unstable();
+    let open: Vec<[u32; 2]> =
+        edges.chunk_by(|a, b| a == b).filter(|same| same.len() == 1).map(|same| same[0]).collect();
+    drop(edges);
+    let (mut first, mut places) = (HashMap::new(), HashMap::new());
     for &v in open.iter().flatten() {
         // −0 is 0.
         let place = (mesh.position[v as usize] + Vec3::ZERO).to_array().map(f32::to_bits);
         places.insert(v, *first.entry(place).or_insert(v));
     }
-    alone(open, |v| places[&v])
+    let joined = |[a, b]: [u32; 2]| sorted(places[&a], places[&b]);
+    let mut times: HashMap<[u32; 2], u32> = HashMap::new();
+    open.iter().for_each(|edge| *times.entry(joined(*edge)).or_default() += 1);
+    open.into_iter().filter(|edge| places[&edge[0]] != places[&edge[1]] && times[&joined(*edge)] == 1).collect()
 }
 
-/// The edges between two places that no other edge joins.
-fn alone(edges: Vec<[u32; 2]>, place: impl Fn(u32) -> u32 + Sync) -> Vec<[u32; 2]> {
-    let keyed = edges.into_par_iter().map(|edge| {
-        let [a, b] = edge.map(&place);
-        ([a.min(b), a.max(b)], edge)
-    });
-    let mut keyed: Vec<_> = keyed.filter(|([a, b], _)| a != b).collect();
-    keyed.par_sort_unstable();
-    keyed.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1).map(|same| same[0].1).collect()
+fn sorted(a: u32, b: u32) -> [u32; 2] {
+    [a.min(b), a.max(b)]
 }
 
 /// Least sine between the ways to two borders that bound a disc on two sides.
@@ -106,7 +106,9 @@ impl Borders {
         };
         let near = self.edges.locate_within_distance(p.to_array(), whole * whole).filter_map(inwards);
         let mut near: Vec<(f64, DVec3)> = near.collect();
-        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // Of two equally near the one that any order of the edges gives.
+        let key = |(distance, way): &(f64, DVec3)| [*distance, way.x, way.y, way.z].map(f64::to_bits);
+        near.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| key(a).cmp(&key(b))));
         let &(nearest, way) = near.first()?;
         let across = (nearest + overlap).min(whole);
         let along = n.cross(way).normalize();
@@ -142,10 +144,7 @@ mod tests {
 
     #[test]
     fn seams_of_textures_are_no_borders() {
-        let mut open = open_edges(&seamed());
-        open.iter_mut().for_each(|edge| edge.sort_unstable());
-        open.sort_unstable();
-        assert_eq!(open, [[0, 1], [0, 3], [2, 3], [4, 5], [5, 6], [6, 7]]);
+        assert_eq!(open_edges(&seamed()), [[0, 1], [0, 3], [2, 3], [4, 5], [5, 6], [6, 7]]);
         let tetrahedron = Mesh {
             position: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z],
             triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],

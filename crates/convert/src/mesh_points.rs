@@ -55,7 +55,7 @@ pub struct MeshReport {
     pub area: f64,
     /// Spacing h, world units; 0 for an empty mesh.
     pub spacing: f64,
-    /// Cutoff radius of every splat, world units; 0 for an empty mesh.
+    /// Cutoff radius of every splat, but for opaque ones near a border, world units; 0 for an empty mesh.
     pub radius: f64,
     /// Whether normals came from the triangles because the mesh has none.
     pub normals_computed: bool,
@@ -128,6 +128,7 @@ pub fn mesh_to_points_with_progress(
 }
 
 /// What is known before any splat is made.
+#[derive(Default)]
 pub(crate) struct Plan {
     pub(crate) measures: Vec<Measure>,
     /// First splat of every triangle, then the number of all; empty where there is none.
@@ -159,8 +160,7 @@ pub(crate) fn plan(mesh: &Mesh, params: &MeshParams) -> Result<Plan, ConvertErro
         ..MeshReport::default()
     };
     if area == 0.0 || params.opacity == 0.0 {
-        let nothing = (Vec::new(), Vec::new(), Vec::new());
-        return Ok(Plan { measures, starts: nothing.0, normal: nothing.1, borders: nothing.2, wanted: WANTED, report });
+        return Ok(Plan { measures, report, ..Plan::default() });
     }
     let spacing = p.check_spacing(spacing(mesh, &measures, params, &report))?;
     let starts = starts(&measures, spacing / scale, p)?;
@@ -170,24 +170,29 @@ pub(crate) fn plan(mesh: &Mesh, params: &MeshParams) -> Result<Plan, ConvertErro
     report.normals_computed = mesh.normal.is_empty();
     let normal = if report.normals_computed { vertex_normals(mesh) } else { mesh.normal.clone() };
     let borders = if params.opacity < 1.0 { Vec::new() } else { open_edges(mesh) };
-    let shading_normal = mesh.triangles.par_iter().enumerate().with_min_len(4096).any(|(i, t)| {
-        let leans = |plane: DVec3| leans(t.map(|v| normal[v as usize]), plane.as_vec3());
-        starts[i + 1] - starts[i] > 1 && plane(mesh, t).is_some_and(leans)
-    });
-    let wanted = Wanted { shading_normal, tangent: !borders.is_empty(), ..WANTED };
-    Ok(Plan { measures, starts, normal, borders, wanted, report })
+    let wanted = Wanted { tangent: !borders.is_empty(), ..WANTED };
+    let mut plan = Plan { measures, starts, normal, borders, wanted, report };
+    let triangles = (0..mesh.triangles.len()).into_par_iter().with_min_len(4096);
+    plan.wanted.shading_normal = triangles.any(|i| plan.is_flat(mesh, i, plane(mesh, i)));
+    Ok(plan)
 }
 
-/// Unit normal of a triangle by the right-hand rule.
-pub(crate) fn plane(mesh: &Mesh, triangle: &[u32; 3]) -> Option<DVec3> {
-    // From the mesh itself: a sliver may collapse when its turned corners are rounded.
-    let v = corners(mesh, triangle);
-    subdivide::robust_cross(v[1] - v[0], v[2] - v[0]).try_normalize()
+impl Plan {
+    /// Whether the splats of triangle `i` lie in its `plane`: it has several, and a corner's normal leans away.
+    pub(crate) fn is_flat(&self, mesh: &Mesh, i: usize, plane: DVec3) -> bool {
+        let leans = |v: u32| {
+            let normal = self.normal[v as usize];
+            normal.dot(plane.as_vec3()).abs() < LEANING * normal.length()
+        };
+        self.starts[i + 1] - self.starts[i] > 1 && mesh.triangles[i].into_iter().any(leans)
+    }
 }
 
-/// Whether a corner's normal leans away from a plane on either side.
-pub(crate) fn leans(corners: [Vec3; 3], plane: Vec3) -> bool {
-    corners.iter().any(|n| n.dot(plane).abs() < LEANING * n.length())
+/// Unit normal of triangle `i` by the right-hand rule, from the mesh itself: a sliver may collapse when its turned corners are
+/// rounded. Any for one without area.
+pub(crate) fn plane(mesh: &Mesh, i: usize) -> DVec3 {
+    let v = corners(mesh, &mesh.triangles[i]);
+    subdivide::robust_cross(v[1] - v[0], v[2] - v[0]).normalize_or(DVec3::Y)
 }
 
 /// The spacing in world units that the density asks for.

@@ -2,13 +2,13 @@
 
 use crate::columns::{self, CHUNK};
 use crate::convert_error::check_cancelled;
-use crate::mesh_points::{Plan, leans, plane};
-use crate::subdivide::{self, Measure, Run, Split};
+use crate::mesh_points::{Plan, plane};
+use crate::subdivide::{self, Run, Split};
 use crate::{ConvertError, MeshParams};
 use rayon::prelude::*;
 use splat_core::{
     Cloud, Mesh, Progress,
-    glam::{DQuat, DVec3, Vec3},
+    glam::{DQuat, Vec3},
     optics,
 };
 use std::ops::Range;
@@ -19,8 +19,7 @@ const TABULATED: u32 = 32;
 /// Everything that the pieces are made from.
 pub(crate) struct Pieces<'a> {
     mesh: &'a Mesh,
-    measures: &'a [Measure],
-    starts: &'a [u64],
+    plan: &'a Plan,
     /// Vertices relative to the cloud's origin.
     position: Vec<Vec3>,
     normal: Vec<Vec3>,
@@ -53,8 +52,7 @@ impl<'a> Pieces<'a> {
         let tau = if params.opacity < 1.0 { optics::optical_depth(params.opacity) } else { 1.0 };
         Self {
             mesh,
-            measures: &plan.measures,
-            starts: &plan.starts,
+            plan,
             position: mesh.position.par_iter().with_min_len(CHUNK).map(place).collect(),
             normal: plan.normal.par_iter().with_min_len(CHUNK).map(turn).collect(),
             spacing: plan.report.spacing / t.scale,
@@ -108,14 +106,14 @@ impl pulp::NullaryFnOnce for Fill<'_> {
     #[inline(always)]
     fn call(self) {
         let Self { pieces, first, mut target } = self;
-        let mut triangle = pieces.starts.partition_point(|&s| s <= first) - 1;
-        let mut skip = first - pieces.starts[triangle];
+        let mut triangle = pieces.plan.starts.partition_point(|&s| s <= first) - 1;
+        let mut skip = first - pieces.plan.starts[triangle];
         let mut written = 0;
         while written < target.position.len() {
-            let left = (pieces.starts[triangle + 1] - pieces.starts[triangle] - skip) as usize;
+            let left = (pieces.plan.starts[triangle + 1] - pieces.plan.starts[triangle] - skip) as usize;
             let end = target.position.len().min(written + left);
             if end > written {
-                let split = subdivide::split(&pieces.measures[triangle], pieces.spacing);
+                let split = subdivide::split(&pieces.plan.measures[triangle], pieces.spacing);
                 let corner = Corners::new(pieces, triangle);
                 match split {
                     Split::Congruent(k) if k <= TABULATED => {
@@ -156,13 +154,13 @@ impl Corners {
     fn new(pieces: &Pieces<'_>, triangle: usize) -> Self {
         let ids = pieces.mesh.triangles[triangle].map(|v| v as usize);
         let position = ids.map(|v| pieces.position[v]);
-        let plane = plane(pieces.mesh, &pieces.mesh.triangles[triangle]).unwrap_or(DVec3::Y);
-        let plane = (pieces.rotation * plane).as_vec3();
+        let own = plane(pieces.mesh, triangle);
+        let plane = (pieces.rotation * own).as_vec3();
         let normal = ids.map(|v| if pieces.normal[v] == Vec3::ZERO { plane } else { pieces.normal[v] });
-        let is_flat = pieces.starts[triangle + 1] - pieces.starts[triangle] > 1 && leans(normal, plane);
+        let is_flat = pieces.plan.is_flat(pieces.mesh, triangle, own);
         let plane = if normal.iter().sum::<Vec3>().dot(plane) < 0.0 { -plane } else { plane };
         let color = (!pieces.mesh.color.is_empty()).then(|| ids.map(|v| Vec3::from(pieces.mesh.color[v])));
-        Self { position, normal, color, plane, is_flat, depth: pieces.depth * pieces.measures[triangle].area }
+        Self { position, normal, color, plane, is_flat, depth: pieces.depth * pieces.plan.measures[triangle].area }
     }
 
     /// Writes pieces of one share of the area, given by their weights of corners 1 and 2.
