@@ -1,7 +1,8 @@
 //! Borders and silhouettes of opaque surfaces lie where they are, whatever the spacing of the splats beside a pixel, and a
 //! surface has no holes.
 
-use organza_tests::draw;
+use organza_tests::{draw, window};
+use std::path::{Path, PathBuf};
 
 const SIZE: u32 = 64;
 /// Height of the view, world units, and a sample's side.
@@ -76,17 +77,44 @@ fn nothing_shows_between_a_silhouette_and_the_wall_behind() {
     }
 }
 
-/// Smooth normals that lean by 55 degrees from the faces at their corners: by such normals discs would stand out as scales.
-#[test]
-fn a_coarse_mesh_with_smooth_normals_has_no_holes() {
-    let folder = tempfile::tempdir().unwrap();
+/// An octahedron of eight triangles, its corners one away from 0, with smooth normals.
+fn octahedron(folder: &Path) -> PathBuf {
     let axes = ["1 0 0", "-1 0 0", "0 1 0", "0 -1 0", "0 0 1", "0 0 -1"];
     let mut text: String = axes.iter().map(|v| format!("v {v}\nvn {v}\n")).collect();
     for [a, b, c] in [[1, 3, 5], [3, 2, 5], [2, 4, 5], [4, 1, 5], [3, 1, 6], [2, 3, 6], [4, 2, 6], [1, 4, 6]] {
         text += &format!("f {a}//{a} {b}//{b} {c}//{c}\n");
     }
-    let path = folder.path().join("octahedron.obj");
+    let path = folder.join("octahedron.obj");
     std::fs::write(&path, text).unwrap();
+    path
+}
+
+/// Whichever way normals lean, a ray crosses a face once on its way in and once on its way out.
+#[test]
+fn a_coarse_translucent_mesh_hides_what_its_faces_hide() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = octahedron(folder.path());
+    for (camera, crossings) in [
+        ("position = [3, 2, 5]\ntarget = [0, 0, 0]\northographic = 1.0", 2),
+        ("position = [0.9, 0.6, 1.5]\ntarget = [0, 0, 0]\nfov_y = 90", 2),
+        ("position = [0.05, 0.1, 0.1]\ntarget = [0, 0, -1]\nfov_y = 90", 1),
+    ] {
+        let scene = format!(
+            "version = 1\n[camera]\n{camera}\nsize = [{SIZE}, {SIZE}]\n[render]\ntechnique = 'points'\n\
+             [[object]]\nname = 'octahedron'\nmesh = '{}'\nspacing = 0.02\nopacity = 0.5\n",
+            path.display()
+        );
+        let middle = window(&draw(&scene, &[]).channel("A"), SIZE, 28..36, 28..36);
+        let mean = middle.iter().sum::<f64>() / middle.len() as f64;
+        assert!((mean - (1.0 - 0.5f64.powi(crossings))).abs() < 1e-3, "{crossings} crossings: {mean}");
+    }
+}
+
+/// Smooth normals that lean by 55 degrees from the faces at their corners: by such normals discs would stand out as scales.
+#[test]
+fn a_coarse_mesh_with_smooth_normals_has_no_holes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = octahedron(folder.path());
     for spacing in [0.2, 0.05, 0.01] {
         for position in [[0.0, 0.0, 5.0], [3.0, 2.0, 4.0], [1.0, 0.3, 5.0], [4.0, 4.0, 0.1]] {
             let scene = format!(
