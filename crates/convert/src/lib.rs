@@ -75,7 +75,9 @@ pub use field_points::{
 };
 pub use grid_field::{GridField, Inside, Interpolation};
 pub use marching_cubes::isosurface_to_mesh;
-pub use mesh_points::{MeshParams, MeshReport, mesh_to_points, mesh_to_points_into, mesh_to_points_with_progress};
+pub use mesh_points::{
+    MeshParams, MeshReport, flatten_leaning, mesh_to_points, mesh_to_points_into, mesh_to_points_with_progress,
+};
 #[cfg(feature = "surfels")]
 pub use mpu::{MpuField, MpuParams, MpuReport, points_to_field};
 #[cfg(feature = "surfels")]

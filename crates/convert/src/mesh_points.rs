@@ -180,11 +180,39 @@ pub(crate) fn plan(mesh: &Mesh, params: &MeshParams) -> Result<Plan, ConvertErro
 impl Plan {
     /// Whether the splats of triangle `i` lie in its `plane`: it has several, and a corner's normal leans away.
     pub(crate) fn is_flat(&self, mesh: &Mesh, i: usize, plane: DVec3) -> bool {
-        let leans = |v: u32| {
-            let normal = self.normal[v as usize];
-            normal.dot(plane.as_vec3()).abs() < LEANING * normal.length()
-        };
-        self.starts[i + 1] - self.starts[i] > 1 && mesh.triangles[i].into_iter().any(leans)
+        let normals = mesh.triangles[i].map(|v| self.normal[v as usize]);
+        self.starts[i + 1] - self.starts[i] > 1 && leans(normals, plane.as_vec3())
+    }
+}
+
+/// Whether a corner's normal leans away from a plane, on either side.
+fn leans(normals: [Vec3; 3], plane: Vec3) -> bool {
+    normals.iter().any(|n| n.dot(plane).abs() < LEANING * n.length())
+}
+
+/// Gives the triangles larger than `least` (area, object units²) whose normals lean by more than 20° from their plane vertices of
+/// their own, with the plane's normal on the side of theirs: for who takes one normal both for where a surface lies and for
+/// how it is lit. A mesh without normals stays as it is.
+///
+/// # Panics
+/// If a vertex index is out of range, see [`Mesh::validate`].
+pub fn flatten_leaning(mesh: &mut Mesh, least: f64) {
+    if mesh.normal.is_empty() {
+        return;
+    }
+    for i in 0..mesh.triangles.len() {
+        let [ids, own] = [mesh.triangles[i].map(|v| v as usize), [0, 1, 2].map(|k| mesh.position.len() + k)];
+        let (normals, plane) = (ids.map(|v| mesh.normal[v]), plane(mesh, i).as_vec3());
+        if !leans(normals, plane) || subdivide::measure(corners(mesh, &mesh.triangles[i])).area <= least {
+            continue;
+        }
+        let side = if normals.iter().sum::<Vec3>().dot(plane) < 0.0 { -plane } else { plane };
+        for v in ids {
+            mesh.position.push(mesh.position[v]);
+            mesh.normal.push(side);
+            mesh.color.extend(mesh.color.get(v).copied());
+        }
+        mesh.triangles[i] = own.map(|v| v as u32);
     }
 }
 

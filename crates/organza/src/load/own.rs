@@ -284,7 +284,10 @@ fn triangles(mut mesh: Mesh, splats: u64) -> Option<Data> {
     let used = || mesh.triangles.iter().flatten().map(|v| corner(*v));
     let (low, high) = (used().reduce(DVec3::min)?, used().reduce(DVec3::max)?);
     let bounds = [mesh.origin + low, mesh.origin + high];
-    (area > 0.0).then_some((Body::Triangles(mesh), bounds, (area / splats.max(1) as f64).sqrt()))
+    // Particles are thinned by the angle at which they are seen: of faces, not of normals that lean from them.
+    let piece = area / splats.max(1) as f64;
+    convert::flatten_leaning(&mut mesh, piece);
+    (area > 0.0).then_some((Body::Triangles(mesh), bounds, piece.sqrt()))
 }
 
 /// A surface as triangles whose vertices and normals are those of the field, as fine as its splats.
