@@ -27,4 +27,5 @@ mod particles;
 mod progress;
 mod reading;
 mod slanted_slabs;
+mod techniques;
 mod truth;

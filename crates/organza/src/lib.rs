@@ -3,7 +3,7 @@
 //! This crate joins the stages: it reads a scene, asks what the scene calls for, runs those passes and writes images.
 //!
 //! ```text
-//! scene.toml ─ scene ─► load (convert) ─► statistics ─► plan ─► points (tsm, hbsort, splat-core) ─► output
+//! scene.toml ─ scene ─► load::read ─► choose ─► load convert ─► plan ─► frame ─► techniques in turns ─► output
 //! ```
 //!
 //! ```
@@ -27,31 +27,37 @@
 #![forbid(unsafe_code)]
 
 pub mod accuracy;
+mod choose;
 mod device;
 mod doubts;
+mod draw;
 mod error;
+mod form;
+mod frame;
 mod info;
 mod load;
 mod memory;
 mod normalize;
 pub mod orders;
 pub mod output;
-mod particles;
 pub mod plan;
-mod points;
+mod prepare;
 mod render;
 pub mod scene;
 mod sequence;
 mod shadows;
+mod stage;
 pub mod statistics;
+mod technique;
 pub mod truth;
 mod work;
 
 pub use device::{Agreement, Checked, DeviceChoice, KernelTime, ListedDevice, Passport, devices, passport};
 pub use error::{Error, escape_controls, printable, shown};
 pub use info::{FileInfo, info};
-pub use load::{Loaded, SplatCount, load};
-pub use render::{Explanation, Render, RenderOptions, Sets, explain, render};
+pub use load::{Loaded, SplatCount};
+pub use prepare::{Explanation, explain, load};
+pub use render::{Render, RenderOptions, Sets, render};
 pub use sequence::Sequence;
 pub use shadows::ShadowTable;
 pub use splat_core::{CostRecord, Layers, Progress};

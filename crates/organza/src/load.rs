@@ -8,10 +8,11 @@ pub(crate) mod object;
 pub(crate) mod own;
 mod slice;
 
-use crate::plan::{ParticleSource, PlannedSampler, pass, samplers};
-use crate::scene::{Scene, SceneObject, Technique};
+use crate::form::PlannedObject;
+use crate::plan::pass;
+use crate::scene::{Scene, SceneObject};
 use crate::statistics::{LightStatistics, ObjectStatistics};
-use crate::{CostRecord, Error, Progress, RenderOptions, normalize::normalize, work};
+use crate::{CostRecord, Error, Progress, RenderOptions, normalize::normalize, stage, work};
 pub(crate) use context::BYTES_PER_SPLAT;
 use context::Context;
 use convert::cost::Prediction;
@@ -27,10 +28,12 @@ use std::cmp::Ordering;
 pub struct Loaded {
     /// All splats in canonical order; also of translucent objects in `own`, which are not drawn, if they may cast shadows.
     pub cloud: Cloud,
-    /// Translucent objects that particles are sampled from as they are; none for the technique `points`.
+    /// Translucent objects in the form in which their technique takes them, where that is not splats.
     pub(crate) own: Vec<Own>,
     /// What the planner was told of every visible object.
     pub(crate) statistics: Vec<ObjectStatistics>,
+    /// How each of them was to be drawn.
+    pub(crate) planned: Vec<PlannedObject>,
     /// Materials by id.
     pub materials: Vec<Material>,
     /// Objects by id.
@@ -89,75 +92,97 @@ fn scaled_thickness(scene: &Scene, exponent: i32) -> Option<f64> {
     scene.render.points.slice_thickness.map(|e| e * libm::exp2(f64::from(-exponent)))
 }
 
-/// Reads and converts every visible object.
-///
-/// # Errors
-/// See [`crate::render`].
-pub fn load(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Loaded, Error> {
-    load_measured(scene, options, progress, &Files::default(), &mut CostRecord::default())
+/// Every visible object as it was read, before anything is converted.
+pub(crate) struct Inputs<'a> {
+    loading: Loading<'a>,
+    prepared: Vec<Prepared<'a>>,
+    lights: Vec<Light>,
+    casts: Vec<bool>,
+    warnings: Vec<String>,
+    /// What is known of each visible object, in the order of the scene.
+    pub(crate) statistics: Vec<ObjectStatistics>,
 }
 
-/// [`load`] with what was read before, and with entries in the cost record: reading, and conversion where something is
-/// converted.
-pub(crate) fn load_measured(
-    scene: &Scene,
-    options: &RenderOptions,
-    progress: &Progress,
-    files: &Files,
+/// Reads every visible object once and counts its splats; `looks` says of which objects it is asked how they could be drawn from
+/// their own data.
+pub(crate) fn read<'a>(
+    scene: &'a Scene,
+    options: &'a RenderOptions,
+    progress: &'a Progress,
+    files: &'a Files,
+    looks: &dyn Fn(&SceneObject) -> bool,
     cost: &mut CostRecord,
-) -> Result<Loaded, Error> {
+) -> Result<Inputs<'a>, Error> {
     let loading = Loading { scene, options, progress, files };
-    let mut warnings = Vec::new();
-    let mut prepared = cost.measure(pass::READ, |stage| {
-        let prepared = loading.prepare()?;
+    let prepared = cost.measure(pass::READ, |stage| {
+        let prepared = loading.prepare(looks)?;
         stage.items_in = prepared.len() as u64;
         stage.items_out = stage.items_in;
         stage.bytes = prepared.iter().map(|p| p.input.bytes()).sum();
         Ok::<_, Error>(prepared)
     })?;
-    warnings.extend(files.mended());
-    let (mut lights, casts) = lights(scene);
-    let statistics: Vec<ObjectStatistics> = loading.statistics(&prepared);
-    let planned = loading.samplers(&statistics, &light_statistics(&lights, &casts));
-    let mut splats = loading.counts(&prepared, &planned)?;
-    let materials = materials(scene, &prepared);
-    progress.plan(work::of_counts(scene, &splats, &planned, lights.len()));
-    let mut own = loading.own(&mut prepared, &planned, &mut warnings)?;
-    let converted = planned.iter().filter(|p| p.splats.is_some()).count();
-    let mut cloud = Cloud::default();
-    if converted > 0 || own.is_empty() {
-        cloud = cost.measure(pass::CONVERT, |stage| {
-            let cloud = merge(loading.clouds(prepared, &planned, &own, &mut splats, &mut warnings)?);
-            stage.items_in = converted as u64;
-            stage.items_out = cloud.len() as u64;
-            stage.bytes = cloud.bytes();
-            Ok::<_, Error>(cloud)
-        })?;
+    let (lights, casts) = lights(scene);
+    let statistics = loading.statistics(&prepared);
+    Ok(Inputs { loading, prepared, lights, casts, warnings: files.mended(), statistics })
+}
+
+impl Inputs<'_> {
+    /// What the planner asks of all lights.
+    pub(crate) fn light_statistics(&self) -> Vec<LightStatistics> {
+        light_statistics(&self.lights, &self.casts)
     }
-    if cloud.is_empty() && own.is_empty() {
-        warnings.push("the scene has no splats: only the background is drawn".into());
+
+    /// Converts every object to the form that was chosen for it, and to splats where they are needed; `sets` are the seconds of
+    /// what techniques will make beside splats.
+    pub(crate) fn convert(
+        self,
+        planned: Vec<PlannedObject>,
+        sets: f64,
+        cost: &mut CostRecord,
+    ) -> Result<Loaded, Error> {
+        let Self { loading, mut prepared, mut lights, casts, mut warnings, statistics } = self;
+        let Loading { scene, progress, files, .. } = loading;
+        let mut splats = loading.counts(&prepared, &planned)?;
+        let materials = materials(scene, &prepared);
+        progress.plan(work::of_counts(scene, &splats, &planned, lights.len(), sets));
+        let mut own = loading.own(&mut prepared, &planned, &mut warnings)?;
+        let converted = planned.iter().filter(|p| p.splats.is_some()).count();
+        let mut cloud = Cloud::default();
+        if converted > 0 || own.is_empty() {
+            cloud = cost.measure(pass::CONVERT, |stage| {
+                let cloud = merge(loading.clouds(prepared, &planned, &own, &mut splats, &mut warnings)?);
+                stage.items_in = converted as u64;
+                stage.items_out = cloud.len() as u64;
+                stage.bytes = cloud.bytes();
+                Ok::<_, Error>(cloud)
+            })?;
+        }
+        if cloud.is_empty() && own.is_empty() {
+            warnings.push("the scene has no splats: only the background is drawn".into());
+        }
+        let mut camera = scene.camera;
+        let exponent = normalize(&mut cloud, &mut own, &mut camera, &mut lights);
+        cloud.canonicalize();
+        cloud.validate().map_err(|e| out_of_range(scene, &cloud, e))?;
+        Ok(Loaded {
+            cloud,
+            own,
+            statistics,
+            planned,
+            materials,
+            objects: scene.objects.iter().map(object::entry).collect(),
+            footprints: scene.footprints.clone(),
+            camera,
+            lights,
+            casts,
+            slice_thickness: scaled_thickness(scene, exponent),
+            normals: scene.objects.iter().any(|o| o.visible && context::needs_gradients(o, scene)),
+            exponent,
+            splats,
+            warnings,
+            notes: files.notes(),
+        })
     }
-    let mut camera = scene.camera;
-    let exponent = normalize(&mut cloud, &mut own, &mut camera, &mut lights);
-    cloud.canonicalize();
-    cloud.validate().map_err(|e| out_of_range(scene, &cloud, e))?;
-    Ok(Loaded {
-        cloud,
-        own,
-        statistics,
-        materials,
-        objects: scene.objects.iter().map(object::entry).collect(),
-        footprints: scene.footprints.clone(),
-        camera,
-        lights,
-        casts,
-        slice_thickness: scaled_thickness(scene, exponent),
-        normals: scene.objects.iter().any(|o| o.visible && context::needs_gradients(o, scene)),
-        exponent,
-        splats,
-        warnings,
-        notes: files.notes(),
-    })
 }
 
 /// Splats beyond what their numbers hold: sizes and places of the input are.
@@ -187,6 +212,7 @@ pub(crate) fn light_statistics(lights: &[Light], casts: &[bool]) -> Vec<LightSta
 }
 
 /// What loading reads.
+#[derive(Clone, Copy)]
 struct Loading<'a> {
     scene: &'a Scene,
     options: &'a RenderOptions,
@@ -209,22 +235,18 @@ impl<'a> Loading<'a> {
         error.in_object(&self.scene.file, object.source.path())
     }
 
-    fn particles(&self) -> bool {
-        self.scene.render.technique == Technique::Particles
-    }
-
     /// Reads every object and counts its splats, so that a scene that does not fit is refused before anything is
     /// converted.
-    fn prepare(&self) -> Result<Vec<Prepared<'a>>, Error> {
+    fn prepare(&self, looks: &dyn Fn(&SceneObject) -> bool) -> Result<Vec<Prepared<'a>>, Error> {
         self.progress.plan(work::of_scene(self.scene));
-        self.progress.begin(work::stage::READ);
+        self.progress.begin(stage::READ);
         self.progress.add_total(self.visible().count() as u64);
         let one = |(id, object): (usize, &'a SceneObject)| {
             self.progress.tick(1).map_err(|_| Error::Cancelled)?;
             if let Some(reading) = work::reading(object) {
                 self.progress.begin(&reading);
             }
-            object::prepare(object, &self.context(id, 0, 0), self.particles()).map_err(|e| self.named(object, e))
+            object::prepare(object, &self.context(id, 0, 0), looks(object)).map_err(|e| self.named(object, e))
         };
         self.visible().map(one).collect()
     }
@@ -235,17 +257,8 @@ impl<'a> Loading<'a> {
         self.visible().zip(prepared).map(one).collect()
     }
 
-    /// For the technique `points`, everything becomes splats.
-    fn samplers(&self, objects: &[ObjectStatistics], lights: &[LightStatistics]) -> Vec<PlannedSampler> {
-        let mut planned = samplers(objects, lights);
-        if !self.particles() {
-            planned.iter_mut().for_each(|p| (p.source, p.splats) = (ParticleSource::Splats, Some("they are drawn")));
-        }
-        planned
-    }
-
     /// Splats to be made; refuses those that do not fit.
-    fn counts(&self, prepared: &[Prepared<'_>], planned: &[PlannedSampler]) -> Result<Vec<SplatCount>, Error> {
+    fn counts(&self, prepared: &[Prepared<'_>], planned: &[PlannedObject]) -> Result<Vec<SplatCount>, Error> {
         let mut splats: Vec<SplatCount> = Vec::new();
         let (mut held, mut needed) = (self.files.bytes(), 0);
         for ((object, p), plan) in self.visible().map(|v| v.1).zip(prepared).zip(planned) {
@@ -262,19 +275,19 @@ impl<'a> Loading<'a> {
         Ok(splats)
     }
 
-    /// The objects that are sampled from their own data.
+    /// The objects that are drawn from their own data.
     fn own(
         &self,
         prepared: &mut [Prepared<'_>],
-        planned: &[PlannedSampler],
+        planned: &[PlannedObject],
         warnings: &mut Vec<String>,
     ) -> Result<Vec<Own>, Error> {
         let mut all = Vec::new();
         for (((id, _), p), plan) in self.visible().zip(prepared).zip(planned) {
-            if !plan.source.is_own() {
+            if !plan.form.is_own() {
                 continue;
             }
-            let own = Own::new(p, plan.source, &self.context(id, 0, 0));
+            let own = Own::new(p, plan.form, &self.context(id, 0, 0));
             let own = own.map_err(|e| self.named(&self.scene.objects[id], e))?;
             if own.is_none() {
                 let name = crate::shown(&self.scene.objects[id].name);
@@ -289,7 +302,7 @@ impl<'a> Loading<'a> {
     fn clouds(
         &self,
         prepared: Vec<Prepared<'_>>,
-        planned: &[PlannedSampler],
+        planned: &[PlannedObject],
         own: &[Own],
         splats: &mut [SplatCount],
         warnings: &mut Vec<String>,

@@ -10,16 +10,18 @@ mod report;
 pub use report::{OrdersReport, write};
 
 use crate::accuracy::{SEEDS, Sampled};
-use crate::load::{Loaded, load};
-use crate::points::Shaded;
-use crate::render::{draw_loaded, drawing, plan_loaded};
+use crate::draw::draw_loaded;
+use crate::frame::{Frame, Shaded};
+use crate::load::Loaded;
+use crate::prepare::{load, plan_loaded};
 use crate::scene::{ParticlesSettings, Scene, Technique};
+use crate::technique::{EVERYWHERE, points};
 use crate::{CostRecord, Error, Progress, RenderOptions};
 use hbsort::{Params, Scratch, Thickness, slice_cloud};
 use reference::metrics::{Disorder, Image, Linear, Rays};
 use reference::statistics::{Spread, median_with_spread};
 use reference::{Input, Order, composite_with_progress};
-use splat_core::{Camera, Direction, Layers, SliceOrder, SplatKind};
+use splat_core::{Camera, Direction, Layers, SliceOrder};
 use std::time::Instant;
 
 /// Longest side of the picture, pixels, unless the user asked for a size.
@@ -102,16 +104,15 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
     progress.enter();
     let loaded = load(&scene, options, progress)?;
     let (plan, _) = plan_loaded(&scene, &loaded, options)?;
-    let drawing = drawing(&scene, &loaded, &plan, options, progress);
+    let frame = Frame::new(&scene, &loaded, &plan, None, progress);
     let mut cost = CostRecord::default();
-    let maps = drawing.shadow_maps(&mut cost)?;
-    let camera = drawing.sample_camera();
-    let shaded = drawing.light(&maps, &camera, &mut cost)?;
+    let camera = frame.camera;
+    let shaded = frame.shaded(&mut cost)?;
     let sorter = Sorter {
         loaded: &loaded,
         camera,
-        translucent: drawing.ids(|kind| kind != SplatKind::Opaque),
-        margin_px: drawing.filter_reach_px(),
+        translucent: frame.translucent(frame.drawn(), Technique::Points),
+        margin_px: frame.filter_reach_px(),
     };
     let auto = sorter.slices(Thickness::Auto, false)?;
     if auto.input_from_sorted.is_empty() {
@@ -119,7 +120,7 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
         return Err(Error::input("scene", message, ""));
     }
     let auto = auto.thickness;
-    let input = exact_input(&loaded, &camera, &shaded, drawing.raster_params().resampling_sigma_px);
+    let input = exact_input(&loaded, &camera, shaded, frame.raster_params().resampling_sigma_px);
     let pixels = f64::from(camera.size[0]) * f64::from(camera.size[1]);
     let rays = Rays::new(&input, (pixels / RAYS).sqrt().ceil() as usize);
     let world = libm::exp2(f64::from(loaded.exponent));
@@ -130,7 +131,9 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
         progress.begin(&ordering.name(auto));
         let (order, seconds, bytes) = sorter.timed(ordering)?;
         progress.enter();
-        let layers = drawing.compose(&shaded, &order, &mut cost)?;
+        let mut accumulator = frame.accumulator();
+        points::composite(&frame, &order, EVERYWHERE, &mut accumulator, &mut cost)?;
+        let layers = frame.finish(&accumulator, &mut cost)?;
         progress.leave();
         let mut disorder = rays.disorder(&ranks(&order, loaded.cloud.len()));
         disorder.worst_backtrack *= world;

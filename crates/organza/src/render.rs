@@ -1,17 +1,15 @@
-//! From a scene to images: load, plan, draw.
+//! From a scene to images: prepare, draw.
 
 use crate::device::{DeviceChoice, Helper};
+use crate::draw::draw;
+use crate::frame::Frame;
 use crate::load::files::Files;
-use crate::load::{Loaded, SplatCount, light_statistics, load_measured};
-use crate::memory::{self, Memory};
-use crate::particles::{self, Checkpoint, Kept, average_bytes};
-use crate::plan::{Plan, pass, plan};
-use crate::points::{self, Drawing, shadow_error};
-use crate::scene::{Scene, Technique};
-use crate::statistics::Statistics;
-use crate::{CostRecord, Error, Layers, Progress, doubts, shadows, work};
+use crate::plan::Plan;
+use crate::prepare::{Explanation, prepare};
+use crate::scene::Scene;
+use crate::technique::{Checkpoint, Kept, Session};
+use crate::{CostRecord, Error, Layers, Progress, doubts};
 use convert::read::ReadLimits;
-use splat_core::{LayerData, Material};
 use std::path::PathBuf;
 
 /// What a render may take and how it treats doubtful input.
@@ -86,25 +84,6 @@ pub struct Sets {
     pub interrupted: bool,
 }
 
-/// What a render would do, without doing it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Explanation {
-    /// Effects and passes with their reasons.
-    pub plan: Plan,
-    /// What loading cost.
-    pub cost: CostRecord,
-    /// Bytes that rendering will take at its peak, see [`Explanation::plan`] for the passes that take them. Shadow maps are
-    /// predicted from the sizes of their casters as a light sees them; together they are held to what is allowed when they are
-    /// built.
-    pub memory: u64,
-    /// Splats of every visible object, as predicted from its input and as made.
-    pub splats: Vec<SplatCount>,
-    /// What a user should know of the input.
-    pub warnings: Vec<String>,
-    /// What files hold that a picture does not show, and what was made of them.
-    pub notes: Vec<String>,
-}
-
 /// Renders a scene. The technique `particles` has a picture at any time: cancelled after two sets, it is that of the sets
 /// so far, and [`Render::sets`] says so.
 ///
@@ -156,9 +135,12 @@ pub(crate) fn render_keeping(
     if let Some(left) = left.as_deref_mut() {
         left.fit(options.max_memory, memory.total());
     }
+    let device = helper.as_ref().map(|helper| (helper, options.device_composites));
+    let frame = Frame::new(scene, &loaded, &plan, device, progress);
     let kept = left.map(|left| &mut left.sets);
-    let drawing = Drawing { helper: helper.as_ref(), ..drawing(scene, &loaded, &plan, options, progress) };
-    let (layers, sets) = draw(scene, &drawing, options, checkpoint.as_mut(), kept, &mut cost, &mut warnings)?;
+    let mut session = Session { options, checkpoint: checkpoint.as_mut(), kept, warnings: &mut warnings, sets: None };
+    let layers = draw(&frame, &mut session, &mut cost)?;
+    let sets = session.sets;
     let backend = helper.as_ref().map_or_else(|| "cpu".to_owned(), Helper::name);
     if !doubtful {
         warnings.extend(doubts::of_picture(scene, &layers));
@@ -166,150 +148,4 @@ pub(crate) fn render_keeping(
     warnings.extend(doubts::of_shadows(&plan.shadow_tables));
     warnings.extend(helper.map(Helper::said).unwrap_or_default());
     Ok(Render { layers, cost, plan, sets, warnings, notes, backend })
-}
-
-/// Runs the planned passes on a loaded scene to their end, by the processor alone, and keeps the layers that it asks for.
-pub(crate) fn draw_loaded(
-    scene: &Scene,
-    loaded: &Loaded,
-    plan: &Plan,
-    options: &RenderOptions,
-    progress: &Progress,
-    cost: &mut CostRecord,
-) -> Result<Layers, Error> {
-    let drawing = drawing(scene, loaded, plan, options, progress);
-    match draw(scene, &drawing, options, None, None, cost, &mut Vec::new())? {
-        (_, Some(Sets { interrupted: true, .. })) => Err(Error::Cancelled),
-        (layers, _) => Ok(layers),
-    }
-}
-
-fn draw(
-    scene: &Scene,
-    drawing: &Drawing<'_>,
-    options: &RenderOptions,
-    checkpoint: Option<&mut Checkpoint>,
-    kept: Option<&mut Kept>,
-    cost: &mut CostRecord,
-    warnings: &mut Vec<String>,
-) -> Result<(Layers, Option<Sets>), Error> {
-    drawing.progress.plan(work::of_passes(drawing, scene));
-    let (mut layers, sets) = match scene.render.technique {
-        Technique::Auto | Technique::Points => (points::draw(drawing, cost)?, None),
-        Technique::Particles => particles::draw(drawing, scene, options, checkpoint, kept, cost, warnings)?,
-    };
-    restore_depths(&mut layers, drawing.loaded.exponent);
-    scene.render.layers.keep(&mut layers);
-    drawing.progress.finish();
-    Ok((layers, sets))
-}
-
-/// What drawing a loaded scene reads.
-pub(crate) fn drawing<'a>(
-    scene: &'a Scene,
-    loaded: &'a Loaded,
-    plan: &'a Plan,
-    options: &RenderOptions,
-    progress: &'a Progress,
-) -> Drawing<'a> {
-    Drawing {
-        loaded,
-        settings: &scene.render,
-        background: scene.background,
-        ambient: scene.ambient,
-        layers: scene.render.layers.set(),
-        plan,
-        helper: None,
-        device_composites: options.device_composites,
-        progress,
-    }
-}
-
-/// Loads a scene and plans its render.
-///
-/// # Errors
-/// As [`render`].
-pub fn explain(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Explanation, Error> {
-    let (_, mut explanation, _) = prepare(scene, options, progress, &Files::default())?;
-    explanation.warnings.extend(doubts::of_shadows(&explanation.plan.shadow_tables));
-    progress.finish();
-    Ok(explanation)
-}
-
-fn prepare(
-    scene: &Scene,
-    options: &RenderOptions,
-    progress: &Progress,
-    files: &Files,
-) -> Result<(Loaded, Explanation, Memory), Error> {
-    let mut cost = CostRecord::default();
-    memory::check("the image", memory::image_bytes(scene), options.max_memory)?;
-    check_samples(scene)?;
-    let loaded = load_measured(scene, options, progress, files, &mut cost)?;
-    let (plan, memory) = plan_loaded(scene, &loaded, options)?;
-    let (splats, notes) = (loaded.splats.clone(), loaded.notes.clone());
-    let mut warnings = loaded.warnings.clone();
-    warnings.extend(doubts::of_scene(scene, &loaded));
-    let inputs = cost.stages.iter().filter(|s| s.name == pass::READ).map(|s| s.bytes).sum();
-    let most = memory.total().max(memory::loading_bytes(&loaded, inputs));
-    Ok((loaded, Explanation { plan, cost, memory: most, splats, warnings, notes }, memory))
-}
-
-/// The plan of a loaded scene, and the bytes that it takes.
-pub(crate) fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Result<(Plan, Memory), Error> {
-    check_samples(scene)?;
-    let mut statistics = Statistics::of_cloud(&loaded.cloud, &loaded.materials, &loaded.objects, &loaded.footprints);
-    statistics.lights = light_statistics(&loaded.lights, &loaded.casts);
-    statistics.normals_needed = loaded.normals;
-    statistics.layers = scene.render.layers.names().map(str::to_owned).collect();
-    statistics.tolerance = scene.render.tolerance;
-    statistics.particles = scene.render.technique == Technique::Particles;
-    if statistics.particles {
-        let made: Vec<u64> = loaded.splats.iter().map(|s| s.made).collect();
-        statistics = statistics.with_objects(loaded.statistics.clone(), &made);
-        let materials = loaded.own.iter().map(|o| &loaded.materials[scene.objects[o.object].material]);
-        let unequal = |m: &Material| m.extinction_rgb.iter().any(|e| *e != m.extinction_rgb[0]);
-        statistics.colored_extinction |= materials.into_iter().any(unequal);
-    }
-    let mut plan = plan(&statistics);
-    let mut average = 0;
-    if plan.passes.iter().any(|p| p.name == pass::PARTICLES) {
-        let size = scene.camera.size.map(|s| u64::from(s) * u64::from(scene.render.antialias));
-        average = average_bytes(size, &scene.render.layers.set(), statistics.colored_extinction, options);
-    }
-    let memory = Memory::new(scene, loaded, average);
-    memory::check("rendering", memory.total(), options.max_memory)?;
-    // Shadow maps share what is left.
-    let left = options.max_memory - memory.total();
-    let tables = shadows::tables(&scene.render, loaded, &plan.shadow_maps, left);
-    plan.set_shadow_tables(tables.map_err(|(light, error)| shadow_error(light, &error))?, left);
-    let memory = memory.with_maps(shadows::bytes(plan.shadow_tables.iter().flatten()));
-    memory::check("rendering", memory.total(), options.max_memory)?;
-    Ok((plan, memory))
-}
-
-/// Footprints keep their pixel rectangles in 16 bits.
-fn check_samples(scene: &Scene) -> Result<(), Error> {
-    let longest = scene.camera.size[0].max(scene.camera.size[1]);
-    let (needed, limit) = (u64::from(longest) * u64::from(scene.render.antialias), u64::from(u16::MAX));
-    if needed <= limit {
-        return Ok(());
-    }
-    Err(Error::Limit {
-        what: "the longer side of the image".into(),
-        needed,
-        limit,
-        unit: "samples",
-        hint: "use a smaller camera.size or render.antialias".into(),
-    })
-}
-
-/// Depths back into the scene's unit.
-fn restore_depths(layers: &mut Layers, exponent: i32) {
-    let scale = libm::exp2(f64::from(exponent)) as f32;
-    for (name, data) in &mut layers.images {
-        if let (true, LayerData::Scalar(depth)) = (name.starts_with("depth."), data) {
-            depth.iter_mut().for_each(|d| *d *= scale);
-        }
-    }
 }

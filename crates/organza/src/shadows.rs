@@ -1,5 +1,6 @@
 //! What shadow maps are built by: shared by the plan, which tells their size beforehand, and the drawing.
 
+use crate::Error;
 use crate::load::Loaded;
 use crate::scene::{RenderSettings, ShadowMapping};
 use splat_core::{Light, LightShape};
@@ -165,4 +166,22 @@ fn tables_within(
         }))
     };
     loaded.lights.iter().zip(wanted).enumerate().map(table).collect()
+}
+
+/// What went wrong with the map of a light.
+pub(crate) fn shadow_error(light: usize, error: &tsm::Error) -> Error {
+    let what = format!("the shadow map of light {light}");
+    match error {
+        tsm::Error::Memory { needed_bytes, limit_bytes, .. } => Error::Limit {
+            what,
+            needed: *needed_bytes,
+            limit: *limit_bytes,
+            unit: "bytes",
+            hint:
+                "use fewer lights or samples of lights, fewer cells in render.points.shadow, or a larger --max-memory"
+                    .into(),
+        },
+        tsm::Error::Core(splat_core::Error::Cancelled) => Error::Cancelled,
+        other => Error::input(what, other.to_string(), ""),
+    }
 }

@@ -1,7 +1,7 @@
 //! Statistics of a loaded scene, from which the plan is made.
 
-use crate::plan::{PlannedSampler, samplers};
-use crate::scene::SurfaceSampler;
+use crate::form::PlannedObject;
+use crate::scene::{SurfaceSampler, Technique};
 use splat_core::{Cloud, FootprintStack, Light, Material, Object, Shading, SplatKind};
 
 /// What the planner knows of one light.
@@ -62,8 +62,12 @@ pub struct ObjectStatistics {
 /// What the planner knows of a scene.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Statistics {
-    /// Visible objects, where the technique asks how each is sampled.
-    pub objects: Vec<ObjectStatistics>,
+    /// How each visible object is drawn.
+    pub planned: Vec<PlannedObject>,
+    /// Techniques that draw, in the order of their table.
+    pub techniques: Vec<Technique>,
+    /// By technique: translucent splats that it draws or samples, and objects that it draws from their own data.
+    pub translucent_by: Vec<(Technique, [u64; 2])>,
     /// All splats.
     pub splats: u64,
     /// Translucent splats that are drawn: media and surfaces.
@@ -88,8 +92,6 @@ pub struct Statistics {
     pub layers: Vec<String>,
     /// Largest change of a displayed pixel that may be left out.
     pub tolerance: f64,
-    /// Whether the technique is `particles`.
-    pub particles: bool,
 }
 
 impl Statistics {
@@ -119,24 +121,45 @@ impl Statistics {
         s
     }
 
-    /// Objects that are sampled from their own data.
+    /// Objects that are drawn from their own data.
     pub fn own(&self) -> u64 {
-        let own = |o: &&PlannedSampler| o.source.is_own();
-        samplers(&self.objects, &self.lights).iter().filter(own).count() as u64
+        self.planned.iter().filter(|o| o.form.is_own()).count() as u64
     }
 
-    /// Takes objects in that are sampled from their own data: the `made` splats of each are not drawn, and those that
-    /// became none may receive shadows all the same.
-    pub fn with_objects(mut self, objects: Vec<ObjectStatistics>, made: &[u64]) -> Self {
-        self.objects = objects;
-        let planned = samplers(&self.objects, &self.lights);
-        for ((object, sampler), made) in self.objects.iter().zip(&planned).zip(made) {
-            if sampler.source.is_own() {
+    /// Takes in how objects are drawn, of which each has become `made` splats: those of an object that is drawn from its own
+    /// data are not drawn, and where it became none it may receive shadows all the same.
+    pub fn with_objects(mut self, objects: &[ObjectStatistics], planned: &[PlannedObject], made: &[u64]) -> Self {
+        self.planned = planned.to_vec();
+        for ((object, planned), made) in objects.iter().zip(planned).zip(made) {
+            let is_own = planned.form.is_own();
+            if is_own {
                 self.translucent = self.translucent.saturating_sub(*made);
                 self.receivers += if *made == 0 && object.receives { object.splats } else { 0 };
             }
+            if !object.opaque {
+                let counts = if is_own { [0, 1] } else { [*made, 0] };
+                self.add(planned.technique, counts);
+            }
         }
         self
+    }
+
+    fn add(&mut self, technique: Technique, counts: [u64; 2]) {
+        match self.translucent_by.iter_mut().find(|(t, _)| *t == technique) {
+            Some((_, sum)) => (0..2).for_each(|k| sum[k] += counts[k]),
+            None => self.translucent_by.push((technique, counts)),
+        }
+    }
+
+    /// What is translucent and drawn by a technique, in words; `None` for nothing.
+    pub fn translucent_of(&self, technique: Technique) -> Option<String> {
+        let [splats, own] = self.translucent_by.iter().find(|(t, _)| *t == technique)?.1;
+        match (splats, own) {
+            (0, 0) => None,
+            (n, 0) => Some(format!("{n} translucent splats")),
+            (0, own) => Some(format!("{own} translucent objects by their own data")),
+            (n, own) => Some(format!("{n} translucent splats and {own} translucent objects by their own data")),
+        }
     }
 }
 

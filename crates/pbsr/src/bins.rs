@@ -3,7 +3,7 @@
 //! Blocks of particles are projected in lanes, down to the tile. Those that are not kept are not picked out: they go to a
 //! tile of their own, behind all others.
 
-use crate::project::{BLOCK, Footing, Projector, View};
+use crate::project::{BLOCK, EVERYWHERE, Footing, Projector, View};
 use crate::stream::{Stage, scramble};
 use crate::{PackedColor, PackedNormal, Particles, Sampler};
 use splat_core::rng;
@@ -102,6 +102,8 @@ pub(crate) struct Filling<'a> {
     pub(crate) shares: Option<[f32; 3]>,
     /// Whether normals are kept.
     pub(crate) normals: bool,
+    /// View depths between which particles count.
+    pub(crate) depths: [f32; 2],
 }
 
 /// What a task needs beside its own: kept by each thread.
@@ -233,6 +235,9 @@ impl Staging {
             let (first, n) = (block * BLOCK, offsets.len());
             let number = before + first as u64;
             with.projector.view(offsets, with.tiling, &mut self.view);
+            if with.depths != EVERYWHERE {
+                self.view.leave_out(n, with.depths, with.tiling.tiles() as u32);
+            }
             if let Some(shares) = with.shares {
                 let places = self.view.place[..n].iter_mut();
                 places.zip(number..).for_each(|(place, i)| *place |= clear(thinning(keys[1], i), shares));

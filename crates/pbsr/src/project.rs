@@ -100,6 +100,21 @@ impl View {
     };
 }
 
+impl View {
+    /// Leaves out those of `n` particles before the first depth, or at the second or behind it.
+    pub(crate) fn leave_out(&mut self, n: usize, [near, far]: [f32; 2], outside: u32) {
+        for i in 0..n {
+            if !(near..far).contains(&self.z[i]) {
+                (self.tile[i], self.k[i]) = (outside, 0.0);
+            }
+        }
+        self.thin = true;
+    }
+}
+
+/// All depths.
+pub(crate) const EVERYWHERE: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
+
 /// Pixels that a widened particle may reach: `x[0] .. x[1]` × `y[0] .. y[1]`, of which it covers those that
 /// [`Footing::covers`] says.
 #[derive(Debug, Clone, Copy)]

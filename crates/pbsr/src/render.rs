@@ -62,9 +62,12 @@ pub struct Scene<'a> {
     pub occluder: Option<&'a Occluder>,
 }
 
-/// What folding may take.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// What folding may take, and of what.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FoldParams {
+    /// Nearest and farthest view depth; particles before the first, or at the second or behind it, are left out. Averages of
+    /// ranges that meet, one behind the other, are an average of everything: their particles are independent.
+    pub depths: [f32; 2],
     /// Bytes of the particles of one batch: 32 a particle. A set that needs more is refused.
     pub max_bytes: u64,
     /// Particles of a batch that are worth a pass over the image; more only takes memory.
@@ -80,7 +83,7 @@ impl FoldParams {
 
 impl Default for FoldParams {
     fn default() -> Self {
-        Self { max_bytes: 2 << 30, batch_particles: 4 << 20 }
+        Self { depths: [f32::NEG_INFINITY, f32::INFINITY], max_bytes: 2 << 30, batch_particles: 4 << 20 }
     }
 }
 
@@ -148,6 +151,7 @@ impl Renderer {
                     tiling: &plan.tiling,
                     shares: plan.shares[object],
                     normals: plan.shaded[object],
+                    depths: plan.depths,
                 };
                 task.fill(&filling, staging);
             }
@@ -239,6 +243,7 @@ pub(crate) struct Plan {
     /// Of each task of a set: the object, the rank of the run among those of the object, and the run.
     runs: Vec<(u32, usize, Run)>,
     batch_levels: u32,
+    depths: [f32; 2],
     world_from_view: DMat3,
     /// Turn of each object's normals.
     turns: Vec<Mat3>,
@@ -276,6 +281,7 @@ impl Plan {
             shaded: scene.objects.iter().map(shaded).collect(),
             runs: of_objects.collect(),
             batch_levels: (budget / expected.max(1.0)).clamp(1.0, 4096.0) as u32,
+            depths: params.depths,
             world_from_view: DMat3::from_cols(axes[0], axes[1], axes[2]),
             turns: scene.objects.iter().map(|o| DMat3::from_quat(o.transform.rotation).as_mat3()).collect(),
             focal: scene.camera.focal_px(),

@@ -21,6 +21,7 @@ use splat_core::optics::SurfaceOpacity;
 use splat_core::{Cloud, FootprintStack, SplatKind, glam};
 #[cfg(feature = "gpu")]
 use splat_shaders::layouts::ParticleSource;
+use std::borrow::Cow;
 
 /// Bit of a splat's kernel, where it fills a disc.
 #[cfg(feature = "gpu")]
@@ -56,7 +57,7 @@ impl Default for SplatParams {
 
 /// Particles from splats, by their cross-sections; these are to be those of the channel that absorbs most.
 pub struct SplatSampler<'a> {
-    cloud: &'a Cloud,
+    cloud: Cow<'a, Cloud>,
     params: SplatParams,
     sets: PoissonSets,
     /// Tables of the kernels that splats have.
@@ -73,6 +74,18 @@ impl<'a> SplatSampler<'a> {
     /// out of range, [`Error::Empty`] for a cloud without cross-section, [`Error::TooMuch`] for more than 4·10⁹
     /// particles a set.
     pub fn new(cloud: &'a Cloud, params: &SplatParams) -> Result<Self, Error> {
+        Self::of(Cow::Borrowed(cloud), params)
+    }
+
+    /// The same of a cloud that it keeps.
+    ///
+    /// # Errors
+    /// As [`SplatSampler::new`].
+    pub fn owning(cloud: Cloud, params: &SplatParams) -> Result<Self, Error> {
+        Self::of(Cow::Owned(cloud), params)
+    }
+
+    fn of(cloud: Cow<'a, Cloud>, params: &SplatParams) -> Result<Self, Error> {
         positive(params.cross_section, "cross_section")?;
         let cap = params.opaque_optical_depth;
         crate::error::check(cap > 0.0 && cap <= 64.0, "opaque_optical_depth", cap, "a number in (0, 64]")?;
@@ -93,7 +106,7 @@ impl<'a> SplatSampler<'a> {
             return Err(Error::Empty { what: "a cloud", reason: "no splat has a cross-section" });
         }
         let sets = PoissonSets::new(cloud.origin, params.cross_section, blocks);
-        let (radials, of_footprint) = radials(cloud, &params.footprints);
+        let (radials, of_footprint) = radials(&cloud, &params.footprints);
         Ok(Self { cloud, params: params.clone(), sets, radials, of_footprint })
     }
 
@@ -208,7 +221,7 @@ impl Poisson for SplatSampler<'_> {
 
     #[cfg(feature = "gpu")]
     fn tables(&self) -> Option<Twin> {
-        let cloud = self.cloud;
+        let cloud = self.cloud.as_ref();
         let medium = |i: usize| cloud.kind[i] == SplatKind::Medium;
         // Place, normal, colour and kernel; the radius of a ball, or the semi-axes of a disc.
         let words = if (0..cloud.len()).all(medium) { 9 } else { 14 };

@@ -56,17 +56,71 @@ pub fn composite(input: &Input<'_>) -> ExactImage {
 /// # Errors
 /// [`Error::Cancelled`].
 pub fn composite_with_progress(input: &Input<'_>, progress: &Progress) -> Result<ExactImage, Error> {
-    let [width, height] = input.camera.size.map(|s| s as usize);
+    let splats = splats(input);
+    let pixels = by_pixel(input, &splats, progress, |ids, x, y| pixel(input, &splats, ids, x, y))?;
+    let mut image = ExactImage { values: Vec::new(), transmittance: Vec::new() };
+    for p in pixels {
+        image.values.push(p.values);
+        image.transmittance.push(p.transmittance);
+    }
+    Ok(image)
+}
+
+/// A translucent fragment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fragment {
+    /// Id of its splat.
+    pub splat: u32,
+    /// View depth by which it is sorted.
+    pub depth: f64,
+    /// Optical depth where its material absorbs with factor 1, without what an opaque surface hides.
+    pub optical_depth: f64,
+    /// Squared distance from the splat's centre over its squared radius, below 1.
+    pub distance_sq: f64,
+}
+
+/// What becomes of the fragments of every pixel, sorted near to far: the way to composite the same splats exactly into anything.
+/// `solid` has for each pixel the view depth of an opaque surface, which hides what lies behind it, and +∞ where there is none;
+/// it may be empty. Opaque splats have no fragments. The caller adds the rows to the total of `progress`.
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub fn fold_fragments<T: Send>(
+    input: &Input<'_>,
+    solid: &[f32],
+    progress: &Progress,
+    fold: impl Fn(usize, &[Fragment]) -> T + Sync,
+) -> Result<Vec<T>, Error> {
+    let width = input.camera.size[0] as usize;
+    let splats = splats(input);
+    let of_pixel = |ids: &[u32], x: usize, y: usize| {
+        let k = y * width + x;
+        let surface = solid.get(k).map_or(f64::INFINITY, |d| f64::from(*d));
+        fold(k, &fragments(input, &splats, ids, [x, y], surface))
+    };
+    by_pixel(input, &splats, progress, of_pixel)
+}
+
+fn splats(input: &Input<'_>) -> Vec<Option<Splat>> {
     let norms = norms(input.footprints);
-    let splats: Vec<Option<Splat>> =
-        (0..input.cloud.len()).into_par_iter().map(|i| Splat::new(input, &norms, i)).collect();
+    (0..input.cloud.len()).into_par_iter().map(|i| Splat::new(input, &norms, i)).collect()
+}
+
+/// Something of every pixel from the splats that may reach it, row by row.
+fn by_pixel<T: Send>(
+    input: &Input<'_>,
+    splats: &[Option<Splat>],
+    progress: &Progress,
+    of_pixel: impl Fn(&[u32], usize, usize) -> T + Sync,
+) -> Result<Vec<T>, Error> {
+    let [width, height] = input.camera.size.map(|s| s as usize);
     let mut by_row: Vec<Vec<u32>> = vec![Vec::new(); height];
     for (i, splat) in splats.iter().enumerate() {
         if let Some(splat) = splat {
             splat.range(1, height).for_each(|y| by_row[y].push(i as u32));
         }
     }
-    let pixels: Result<Vec<Vec<Pixel>>, Error> = by_row
+    let rows: Result<Vec<Vec<T>>, Error> = by_row
         .par_iter()
         .enumerate()
         .map(|(y, ids)| {
@@ -76,27 +130,41 @@ pub fn composite_with_progress(input: &Input<'_>, progress: &Progress) -> Result
                 let splat = splats[i as usize].as_ref().expect("invariant: listed splats exist");
                 splat.range(0, width).for_each(|x| lists[x].push(i));
             }
-            Ok(lists.iter().enumerate().map(|(x, ids)| pixel(input, &splats, ids, x, y)).collect())
+            Ok(lists.iter().enumerate().map(|(x, ids)| of_pixel(ids, x, y)).collect())
         })
         .collect();
-    let mut image = ExactImage { values: Vec::new(), transmittance: Vec::new() };
-    for p in pixels?.into_iter().flatten() {
-        image.values.push(p.values);
-        image.transmittance.push(p.transmittance);
+    Ok(rows?.into_iter().flatten().collect())
+}
+
+/// The translucent fragments of a pixel before a surface, sorted.
+fn fragments(
+    input: &Input<'_>,
+    splats: &[Option<Splat>],
+    ids: &[u32],
+    [x, y]: [usize; 2],
+    surface_depth: f64,
+) -> Vec<Fragment> {
+    let mut all: Vec<Fragment> = Vec::new();
+    for &i in ids {
+        let splat = splats[i as usize].as_ref().expect("invariant: listed splats exist");
+        let Some(f) = splat.fragment(input, x, y) else { continue };
+        let seen = match splat.kind {
+            SplatKind::Medium => splat.share_before(surface_depth),
+            SplatKind::Surface => f64::from(f.depth < surface_depth),
+            SplatKind::Opaque => 0.0,
+        };
+        if seen > 0.0 {
+            let depth = if input.order == Order::Centre { splat.depth } else { f.depth };
+            all.push(Fragment { splat: i, depth, optical_depth: f.amount * seen, distance_sq: f.distance_sq });
+        }
     }
-    Ok(image)
+    all.sort_by(|a, b| a.depth.total_cmp(&b.depth).then(a.splat.cmp(&b.splat)));
+    all
 }
 
 struct Pixel {
     values: Vec<f64>,
     transmittance: [f64; 3],
-}
-
-/// A translucent fragment to be sorted.
-struct Entry {
-    key: f64,
-    id: u32,
-    optical_depth: f64,
 }
 
 fn pixel(input: &Input<'_>, splats: &[Option<Splat>], ids: &[u32], x: usize, y: usize) -> Pixel {
@@ -106,28 +174,15 @@ fn pixel(input: &Input<'_>, splats: &[Option<Splat>], ids: &[u32], x: usize, y: 
     };
     let solid = opaque(input, ids, &at);
     let surface_depth = solid.as_ref().map_or(f64::INFINITY, |s| s.0);
-    let mut entries: Vec<Entry> = Vec::new();
-    for &i in ids {
-        let Some((splat, f)) = at(i) else { continue };
-        let seen = match splat.kind {
-            SplatKind::Medium => splat.share_before(surface_depth),
-            SplatKind::Surface => f64::from(f.depth < surface_depth),
-            SplatKind::Opaque => 0.0,
-        };
-        if seen > 0.0 {
-            let key = if input.order == Order::Centre { splat.depth } else { f.depth };
-            entries.push(Entry { key, id: i, optical_depth: f.amount * seen });
-        }
-    }
-    entries.sort_by(|a, b| a.key.total_cmp(&b.key).then(a.id.cmp(&b.id)));
+    let fragments = fragments(input, splats, ids, [x, y], surface_depth);
     let mut out = Pixel { values: vec![0.0; input.channels], transmittance: [1.0; 3] };
-    for e in &entries {
-        let material = input.cloud.material[e.id as usize] as usize;
-        let keep = input.materials[material].extinction_rgb.map(|k| (-e.optical_depth * f64::from(k)).exp());
+    for f in &fragments {
+        let material = input.cloud.material[f.splat as usize] as usize;
+        let keep = input.materials[material].extinction_rgb.map(|k| (-f.optical_depth * f64::from(k)).exp());
         for (c, value) in out.values.iter_mut().enumerate() {
             let p = band(c, input.channels);
             *value +=
-                out.transmittance[p] * (1.0 - keep[p]) * f64::from(input.values[e.id as usize * input.channels + c]);
+                out.transmittance[p] * (1.0 - keep[p]) * f64::from(input.values[f.splat as usize * input.channels + c]);
         }
         (0..3).for_each(|c| out.transmittance[c] *= keep[c]);
     }

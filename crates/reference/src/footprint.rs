@@ -64,6 +64,8 @@ pub(crate) struct Fragment {
     /// Optical depth, or weight of an opaque disc.
     pub(crate) amount: f64,
     pub(crate) depth: f64,
+    /// Squared distance from the centre over the squared radius.
+    pub(crate) distance_sq: f64,
 }
 
 impl Splat {
@@ -218,6 +220,7 @@ impl Splat {
             is_solid: core <= CORE,
             amount: peak * profile(s, self.cutoff_sq_half),
             depth: self.depth + offset,
+            distance_sq: s,
         })
     }
 }

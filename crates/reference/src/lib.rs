@@ -62,7 +62,7 @@ mod tracking;
 mod triangle;
 mod visibility;
 
-pub use composite::{ExactImage, Input, Order, composite, composite_with_progress};
+pub use composite::{ExactImage, Fragment, Input, Order, composite, composite_with_progress, fold_fragments};
 pub use density::{Density, Lattice};
 pub use dielectric::{
     CHANNEL_WAVELENGTHS_UM, Cauchy, Dielectric, fresnel_reflectance, reflect, refract, transmitted_cosine,

@@ -212,6 +212,64 @@ impl DepthProfile {
         [self.first, self.median, self.mean, (self.m2 / absorbed).max(0.0).sqrt()]
     }
 
+    /// The profile whose first, median, mean and standard deviation are known, such as those of an average of hits; `total` is
+    /// the optical depth of all. What its curve is between them is forgotten.
+    pub fn of_depths([first, median, mean, sigma]: [f32; 4], total: f32) -> Self {
+        let absorbed = -libm::expm1f(-total);
+        if !(absorbed > 0.0 && mean.is_finite()) {
+            return Self::default();
+        }
+        // No later than anything that may lie behind it.
+        let last = [first, median].into_iter().filter(|d| d.is_finite()).fold(mean, f32::max);
+        Self { first, median, mean, m2: sigma * sigma * absorbed, knot: [last, total], medium: Medium::default() }
+    }
+
+    /// Goes on with the profile of what lies behind, whose optical depth is `own`; `before` is that of all so far. Mean and
+    /// deviation are exact. Where the first depth, or the median, is reached in it depends on the curve of what it hides; between
+    /// its known depths that is taken as linear.
+    pub fn append(&mut self, behind: &Self, before: f32, own: f32) {
+        self.close(before, f32::INFINITY);
+        if before <= 0.0 {
+            *self = *behind;
+            return;
+        }
+        let mut behind = *behind;
+        behind.close(own, f32::INFINITY);
+        let total = before + behind.knot[1];
+        if behind.knot[1] <= 0.0 {
+            return;
+        }
+        if self.first == f32::INFINITY && total >= FIRST {
+            self.first = behind.depth_at(FIRST - before);
+        }
+        if self.median == f32::INFINITY && total >= MEDIAN {
+            self.median = behind.depth_at(MEDIAN - before);
+        }
+        let transmittance = libm::expf(-before);
+        let share = transmittance * -libm::expm1f(-behind.knot[1]);
+        let step = behind.mean - self.mean;
+        let so_far = -libm::expm1f(-before);
+        self.mean += step * (share / (so_far + share)).min(1.0);
+        self.m2 += transmittance * behind.m2 + step * step * so_far * share / (so_far + share);
+        self.knot = [self.knot[0].max(behind.knot[0]), total];
+    }
+
+    /// Where the optical depth of a closed profile reaches a level, linear between the depths that it knows.
+    fn depth_at(&self, level: f32) -> f32 {
+        let deviation = libm::sqrtf((self.m2 / -libm::expm1f(-self.knot[1])).max(0.0));
+        let begin = (self.mean - libm::sqrtf(3.0) * deviation).min(self.first);
+        let known = [[begin, 0.0], [self.first, FIRST], [self.median, MEDIAN], self.knot];
+        let mut last = known[0];
+        for [depth, optical] in known.into_iter().skip(1).filter(|k| k[0].is_finite()) {
+            if level <= optical {
+                let share = ((level - last[1]) / (optical - last[1]).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+                return last[0] + (depth - last[0]).max(0.0) * share;
+            }
+            last = [depth.max(last[0]), optical];
+        }
+        last[0]
+    }
+
     /// As a device keeps it: the largest number stands for infinity.
     #[cfg(feature = "gpu")]
     pub(crate) fn words(&self) -> [f32; WORDS] {

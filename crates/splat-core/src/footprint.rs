@@ -59,6 +59,14 @@ impl Footprint {
         libm::exp(-q * s) - libm::exp(-q) * (1.0 + x + 0.5 * x * x)
     }
 
+    /// n₀ and n₁ of a second weight n₀ + n₁·s at the squared distance s = ρ²/R² from the centre, by which splats of a medium
+    /// count for where it lies along a ray: see [`crate::DepthFragment::narrow`].
+    #[cfg(feature = "raster")]
+    pub fn narrowing(&self) -> [f32; 2] {
+        let [all, first, second] = self.moments();
+        crate::depth_profile::narrowing(first / all, second / all, f64::from(self.spacing_for_radius(1.0)))
+    }
+
     /// ∫sⁿ·w ds over \[0, 1\] for n = 0, 1, 2, from w = e^−q·Σ_{k≥3} (qt)^k/k!, t = 1 − s, whose terms are all positive.
     pub(crate) fn moments(&self) -> [f64; 3] {
         let q = f64::from(self.sharpness());

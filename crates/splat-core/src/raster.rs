@@ -8,6 +8,7 @@
 //!
 //! Every pixel belongs to one task and its splats are visited in list order, so the result does not depend on threads.
 
+mod append;
 mod bins;
 mod finish;
 mod gather;

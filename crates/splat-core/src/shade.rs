@@ -56,7 +56,7 @@ impl ChannelLayout {
 
     /// The plane of optical depth, of 1 or 3, that hides channel `channel` of `count`.
     #[inline(always)]
-    pub(crate) const fn plane_of(channel: usize, count: usize, planes: usize) -> usize {
+    pub const fn plane_of(channel: usize, count: usize, planes: usize) -> usize {
         if planes == 3 && channel < Self::colors_of(count) { channel % 3 } else { planes / 2 }
     }
 

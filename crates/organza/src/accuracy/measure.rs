@@ -1,8 +1,9 @@
 //! Drawing with a clock, and the distance of a picture from a reference.
 
 use super::{Facts, Request};
-use crate::load::{Loaded, load};
-use crate::render::{draw_loaded, drawing, plan_loaded};
+use crate::draw::draw_loaded;
+use crate::load::Loaded;
+use crate::prepare::{load, plan_loaded};
 use crate::scene::{Scene, Technique};
 use crate::{CostRecord, Error, Progress, RenderOptions};
 use reference::metrics::{Display, Errors, Image, Linear, Viewing, compare, epsilon_8_bit, flip, psnr};
@@ -165,8 +166,8 @@ impl<'a> Renderer<'a> {
         let order = hbsort::slice_cloud(&loaded.cloud, Some(&translucent), &loaded.camera, &params, &mut scratch)
             .map_err(|e| Error::Internal(e.to_string()))?;
         let visible = !order.input_from_sorted.is_empty();
-        let drawing = drawing(scene, loaded, &plan, options, progress);
-        let maps = drawing.shadow_maps(&mut CostRecord::default())?;
+        let frame = crate::frame::Frame::new(scene, loaded, &plan, None, progress);
+        let maps = frame.maps(&mut CostRecord::default())?;
         Ok(Facts {
             slice_thickness: visible.then(|| order.thickness * f64::from(loaded.exponent).exp2()),
             cells: maps.iter().flatten().map(|m| longest_side(m.table())).max(),

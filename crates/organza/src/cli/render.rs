@@ -120,7 +120,7 @@ impl Job<'_> {
     fn metadata(&self, render: &Render) -> Metadata {
         Metadata {
             scene_sha256: self.scene.sha256.clone(),
-            technique: render.plan.technique.to_owned(),
+            technique: render.plan.technique.clone(),
             seed: self.scene.render.seed,
             backend: render.backend.clone(),
             sets: render.sets.map(|s| s.averaged),

@@ -1,6 +1,6 @@
 //! Plans and costs as tables and as JSON.
 
-use organza::plan::{Plan, PlannedSampler};
+use organza::plan::{Plan, PlannedObject};
 use organza::{CostRecord, ShadowTable, SplatCount};
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -46,7 +46,7 @@ pub(super) fn plan_json(plan: &Plan) -> Value {
         "optical_depth_planes": plan.optical_depth_planes,
         "shadow_maps": plan.shadow_maps,
         "shadow_tables": plan.shadow_tables.iter().map(|t| t.as_ref().map(table_json)).collect::<Value>(),
-        "samplers": plan.samplers.iter().map(sampler_json).collect::<Value>(),
+        "samplers": chosen(plan).iter().map(object_json).collect::<Value>(),
     })
 }
 
@@ -57,8 +57,17 @@ fn table_json(t: &ShadowTable) -> Value {
     })
 }
 
-fn sampler_json(s: &PlannedSampler) -> Value {
-    json!({ "object": s.object, "source": s.source.name(), "reason": s.reason, "becomes_splats": s.splats })
+/// What draws each object; nothing where one technique draws all of them as splats.
+fn chosen(plan: &Plan) -> &[PlannedObject] {
+    let plain = plan.techniques.len() == 1 && plan.objects.iter().all(PlannedObject::is_drawn_as_splats);
+    if plain { &[] } else { &plan.objects }
+}
+
+fn object_json(o: &PlannedObject) -> Value {
+    let (technique, source) = (o.technique.name(), o.form.name());
+    json!({
+        "object": o.object, "technique": technique, "source": source, "reason": o.reason, "becomes_splats": o.splats,
+    })
 }
 
 /// The plan as a table.
@@ -72,13 +81,13 @@ pub(super) fn plan_text(plan: &Plan) -> String {
     text.push('\n');
     let passes = plan.passes.iter().map(|p| [p.name.clone(), p.reason.clone()]);
     text += &table(["pass", "what for"], "ll", passes);
-    if !plan.samplers.is_empty() {
-        let samplers = plan.samplers.iter().map(|s| {
-            let splats = s.splats.map_or("no".to_owned(), |why| format!("yes: {why}"));
-            [s.object.clone(), s.source.name().to_owned(), s.reason.to_owned(), splats]
+    if !chosen(plan).is_empty() {
+        let objects = chosen(plan).iter().map(|o| {
+            let splats = o.splats.map_or("no".to_owned(), |why| format!("yes: {why}"));
+            [o.object.clone(), o.technique.name().to_owned(), o.form.name().to_owned(), o.reason.to_owned(), splats]
         });
         text.push('\n');
-        text += &table(["object", "particles from", "why", "becomes splats"], "llll", samplers);
+        text += &table(["object", "technique", "from", "why", "becomes splats"], "lllll", objects);
     }
     text
 }

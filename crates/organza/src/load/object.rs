@@ -42,7 +42,7 @@ pub(super) fn entry(object: &SceneObject) -> Object {
     }
 }
 
-/// Reads one object and counts its splats; `sampled` where particles may come from its own data.
+/// Reads one object and counts its splats; `sampled` where it may be drawn from its own data.
 pub(super) fn prepare<'a>(
     object: &'a SceneObject,
     context: &Context<'_>,

@@ -1,4 +1,4 @@
-//! Translucent objects in the form that particles are sampled from: a field, triangles, or a volume.
+//! Translucent objects in a neutral form other than splats: a field, triangles, or a volume.
 //!
 //! Lengths and places are the object's own, so nothing is rounded where it lies far away; a transform leads to the world.
 
@@ -8,7 +8,7 @@ use super::files::{grid_bytes, mesh_bytes};
 use super::input::{Input, shortest_step};
 use super::object::{Prepared, as_it_is, procedural, refuse};
 use crate::Error;
-use crate::plan::ParticleSource;
+use crate::form::Form;
 use crate::scene::{RectangleSource, SurfaceSampler};
 use convert::{DensityParams, SharedField, SplatParams};
 use glam::DVec3;
@@ -84,11 +84,7 @@ impl std::fmt::Debug for Own {
 impl Own {
     /// Takes the data of an object; its splats, if it has any, are made from the same. `None` for raw points, and where
     /// there is nothing to sample.
-    pub(super) fn new(
-        prepared: &mut Prepared<'_>,
-        source: ParticleSource,
-        context: &Context<'_>,
-    ) -> Result<Option<Self>, Error> {
+    pub(super) fn new(prepared: &mut Prepared<'_>, source: Form, context: &Context<'_>) -> Result<Option<Self>, Error> {
         let splat = prepared.input.splat().clone();
         let factor = context.extinction_factor(&context.scene.objects[context.id]);
         let depth = factor * optics::optical_depth(prepared.input.opacity().unwrap_or(0.0));
@@ -197,7 +193,7 @@ type Data = (Body, [DVec3; 2], f64);
 fn data(
     prepared: &Prepared<'_>,
     bounded: Option<BoundedExtinction>,
-    source: ParticleSource,
+    source: Form,
     context: &Context<'_>,
 ) -> Result<Option<Data>, Error> {
     if let Some(field) = bounded {
@@ -222,11 +218,11 @@ fn data(
         Input::Rectangle(r, ..) => triangles(rectangle(r), prepared.prediction.splats),
         Input::Surface(field, bounds, params, lattice) => {
             let spacing = world_spacing(&params.density) / params.splat.transform.scale;
-            if source == ParticleSource::Triangles {
+            if source == Form::Triangles {
                 return Ok(triangles(net(field, *bounds, spacing, &params.splat)?, prepared.prediction.splats));
             }
             let bounds = prepared.search.as_ref().map_or(*bounds, |s| s.bounds);
-            if let (ParticleSource::Lattice, Some((grid, level))) = (source, lattice) {
+            if let (Form::Lattice, Some((grid, level))) = (source, lattice) {
                 return Ok(Some((Body::Lattice { grid: grid.clone(), level: *level }, bounds, spacing)));
             }
             let domain = field.clone();

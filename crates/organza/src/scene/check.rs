@@ -176,6 +176,8 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
         };
         objects.push(check_object(&at, object, material, &named)?);
     }
+    let render = check_render(&at.key("render"), &raw.render)?;
+    check_one_technique(&at_objects, &objects, &render)?;
     let at_lights = at.key("light");
     let lights = raw.light.iter().enumerate().map(|(i, l)| check_light(&at_lights.index(i), l));
     Ok(Scene {
@@ -187,9 +189,21 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
         ambient: check_color(&at.key("ambient"), &raw.ambient)?,
         lights: lights.collect::<Result<_, _>>()?,
         objects,
-        render: check_render(&at.key("render"), &raw.render)?,
+        render,
         materials,
         footprints,
+    })
+}
+
+/// Refuses what a picture has only if one technique draws all of it.
+fn check_one_technique(at: &At<'_>, objects: &[SceneObject], render: &super::RenderSettings) -> Result<(), Error> {
+    if !render.layers.names().any(|name| name == "std_error") {
+        return Ok(());
+    }
+    let other = objects.iter().position(|o| o.visible && o.technique.is_some_and(|t| t != render.technique));
+    other.map_or(Ok(()), |i| {
+        let message = "a picture by several techniques has no layer `std_error`";
+        Err(at.index(i).key("technique").error(message, "leave the layer or this key out"))
     })
 }
 

@@ -3,11 +3,12 @@
 use super::check::{At, LARGEST, SMALLEST};
 use super::check_field::{check_clip, check_isosurface, check_level_set, check_slice};
 use super::check_light::check_half_axes;
+use super::check_render::check_technique;
 use super::paths::Paths;
 use super::raw_object::{RawCloud, RawDensity, RawImplicit, RawObject, RawTransferPoint, RawTransform, RawUp};
 use super::{
-    CloudSource, DensitySource, ImplicitSource, MediumShape, RectangleSource, SceneMaterial, SceneObject, Source, Up,
-    VolumeSource,
+    CloudSource, DensitySource, ImplicitSource, MediumShape, RectangleSource, SceneMaterial, SceneObject, Source,
+    Technique, Up, VolumeSource,
 };
 use crate::Error;
 use convert::ExpressionField;
@@ -86,8 +87,15 @@ pub(super) fn check_object(
         visible: raw.visible.unwrap_or(true),
         footprint: raw.footprint as u8,
         merge_duplicates: raw.merge_duplicates,
+        technique: check_own_technique(at, raw.technique.as_deref())?,
         name: raw.name,
     })
+}
+
+/// The technique that an object names; "auto" is that of the scene.
+fn check_own_technique(at: &At<'_>, name: Option<&str>) -> Result<Option<Technique>, Error> {
+    let named = name.map(|name| check_technique(at, name)).transpose()?;
+    Ok(named.filter(|technique| *technique != Technique::Auto))
 }
 
 fn present(raw: &RawObject) -> [bool; 12] {

@@ -14,7 +14,7 @@ use splat_core::Direction;
 use splat_core::raster::Accumulation;
 
 /// Techniques of the design that this version does not have.
-const LATER_TECHNIQUES: [&str; 3] = ["sheets", "surfels", "reference"];
+const LATER_TECHNIQUES: [&str; 2] = ["sheets", "surfels"];
 
 /// Checks `[render]`.
 pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSettings, Error> {
@@ -32,6 +32,7 @@ pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSetting
         antialias: at.whole("antialias", raw.antialias.unwrap_or(2), 1..=8)?,
         tolerance,
         exposure: at.number("exposure", raw.exposure.unwrap_or(0.0), -60.0..=60.0)?,
+        depth_ranges: at.whole("depth_ranges", raw.depth_ranges.unwrap_or(16), 1..=1024)?,
         layers: check_layers(&at.key("layers"), &raw.layers, technique)?,
         seed: raw.seed.unwrap_or(0),
         max_points: raw.max_points,
@@ -40,20 +41,18 @@ pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSetting
     })
 }
 
-fn check_technique(at: &At<'_>, name: &str) -> Result<Technique, Error> {
-    match name {
-        "auto" => Ok(Technique::Auto),
-        "points" => Ok(Technique::Points),
-        "particles" => Ok(Technique::Particles),
-        _ => {
-            let message = if LATER_TECHNIQUES.contains(&name) {
-                format!("`technique`: this version does not have \"{}\"", shown(name))
-            } else {
-                format!("`technique`: expected \"auto\", \"points\" or \"particles\", found \"{}\"", shown(name))
-            };
-            Err(at.key("technique").error(message, "use \"auto\", \"points\" or \"particles\""))
-        }
+/// A technique by its name.
+pub(super) fn check_technique(at: &At<'_>, name: &str) -> Result<Technique, Error> {
+    if let Some(known) = Technique::ALL.into_iter().find(|t| t.name() == name) {
+        return Ok(known);
     }
+    const NAMES: &str = r#""auto", "points", "particles" or "reference""#;
+    let message = if LATER_TECHNIQUES.contains(&name) {
+        format!("`technique`: this version does not have \"{}\"", shown(name))
+    } else {
+        format!("`technique`: expected {NAMES}, found \"{}\"", shown(name))
+    };
+    Err(at.key("technique").error(message, format!("use {NAMES}")))
 }
 
 fn check_layers(at: &At<'_>, names: &[String], technique: Technique) -> Result<LayerChoice, Error> {
@@ -64,7 +63,7 @@ fn check_layers(at: &At<'_>, names: &[String], technique: Technique) -> Result<L
         }
     }
     if technique != Technique::Particles && choice.names().any(|name| name == "std_error") {
-        let message = "the technique `points` has no layer `std_error`";
+        let message = format!("the technique `{}` has no layer `std_error`", technique.name());
         return Err(at.error(message, "use technique = \"particles\""));
     }
     Ok(choice)

@@ -74,6 +74,8 @@ pub struct SceneObject {
     pub footprint: u8,
     /// Whether splats at one place become one.
     pub merge_duplicates: bool,
+    /// What draws it where it is translucent; `None` for the technique of the scene.
+    pub technique: Option<Technique>,
 }
 
 /// The axis of a source that points up.
@@ -289,6 +291,8 @@ pub struct RenderSettings {
     pub tolerance: f64,
     /// Exposure of the displayed picture: radiance is multiplied by 2^exposure.
     pub exposure: f64,
+    /// Ranges into which the depths are cut that several techniques share.
+    pub depth_ranges: u32,
     /// Images to keep.
     pub layers: LayerChoice,
     /// Seed of everything random.
@@ -311,6 +315,23 @@ pub enum Technique {
     Points,
     /// Opaque particles, averaged over many sets (Tanaka 2012).
     Particles,
+    /// Every fragment of every pixel, sorted, in f64: exact and slow.
+    Reference,
+}
+
+impl Technique {
+    /// All that can be asked for.
+    pub const ALL: [Self; 4] = [Self::Auto, Self::Points, Self::Particles, Self::Reference];
+
+    /// As scenes and reports name it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Points => "points",
+            Self::Particles => "particles",
+            Self::Reference => "reference",
+        }
+    }
 }
 
 /// Settings of the `particles` technique.

@@ -229,7 +229,7 @@ pub(super) enum RawLight {
 #[serde(deny_unknown_fields, default, expecting = "a table")]
 #[schemars(rename = "Render")]
 pub(super) struct RawRender {
-    /// "auto", "points" or "particles"; default "auto", which is "points".
+    /// "auto", "points", "particles" or "reference"; default "auto", which is "points".
     pub(super) technique: Option<String>,
     /// Samples along each side of a pixel, 1 to 8; default 2.
     pub(super) antialias: Option<u32>,
@@ -237,6 +237,8 @@ pub(super) struct RawRender {
     pub(super) tolerance: Option<f64>,
     /// Exposure of the displayed picture in stops; default 0.
     pub(super) exposure: Option<f64>,
+    /// Ranges into which the depths are cut that several techniques share, 1 to 1024; default 16.
+    pub(super) depth_ranges: Option<u32>,
     /// Images to keep besides beauty and alpha.
     pub(super) layers: Vec<String>,
     /// Seed of everything random; default 0.

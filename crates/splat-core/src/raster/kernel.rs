@@ -8,7 +8,7 @@
 //! exponential.
 
 use super::lanes::{Lanes, exp_neg};
-use crate::{Footprint, depth_profile};
+use crate::Footprint;
 use pulp::Simd;
 use std::f64::consts::PI;
 
@@ -55,7 +55,7 @@ impl Kernel {
             norm: footprint.norm() as f32,
             depth: depth_of(footprint),
             spacing: footprint.spacing_for_radius(1.0),
-            narrowing: narrowing(footprint),
+            narrowing: footprint.narrowing(),
             sharpness,
             rim: exp_neg(sharpness),
             g: if smooth { fit(f64::from(sharpness)) } else { [0.0; TERMS] },
@@ -92,12 +92,6 @@ impl Kernel {
         let taper = of(self.rim) * (of(1.0) + r + of(0.5) * r * r);
         ((q - r).exp_neg() - taper).max(of(0.0)).where_less(of(0.0), t)
     }
-}
-
-/// [`depth_profile::narrowing`] of a footprint.
-fn narrowing(footprint: &Footprint) -> [f32; 2] {
-    let [all, first, second] = footprint.moments();
-    depth_profile::narrowing(first / all, second / all, f64::from(footprint.spacing_for_radius(1.0)))
 }
 
 /// Half the width of the triweight that has the deviation of a footprint of R = 1: its own is a third of it.
@@ -177,7 +171,7 @@ mod tests {
     fn narrowed_footprints_keep_their_sum_and_are_as_wide_as_cells() {
         for cutoff in [1.0, 2.0, 3.0, 5.0, 8.0] {
             let footprint = Footprint { cutoff };
-            let [constant, slope] = narrowing(&footprint).map(f64::from);
+            let [constant, slope] = footprint.narrowing().map(f64::from);
             let (n, cell) = (100_000, f64::from(footprint.spacing_for_radius(1.0)));
             let mut sums = [0.0; 3];
             for s in (0..n).map(|i| (f64::from(i) + 0.5) / f64::from(n)) {

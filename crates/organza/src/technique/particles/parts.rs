@@ -5,10 +5,11 @@
 
 use super::refuse;
 use crate::Error;
+use crate::frame::Frame;
 use crate::load::Loaded;
 use crate::load::bounded::BoundedExtinction;
 use crate::load::own::{Body, Own, line_cells};
-use crate::points::Drawing;
+use crate::scene::Technique;
 use glam::DVec3;
 use pbsr::{
     Appearance, BrownianParams, BrownianReport, BrownianSampler, Density, FieldVolumeSampler, GridSampler,
@@ -17,6 +18,8 @@ use pbsr::{
 };
 use splat_core::{Camera, Cloud, Similarity, SplatKind, rng};
 use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
 
 /// Stage of the random numbers that seed the objects.
 const SEEDS: u64 = 0x7061_7274;
@@ -64,12 +67,12 @@ pub(super) struct Part<'a> {
 /// Where the particles of an object come from.
 pub(super) enum Particles<'a> {
     Sampled(Box<dyn Sampler + 'a>),
-    Kept(&'a KeptSets),
+    Kept(Arc<KeptSets>),
 }
 
 /// The parts in words, by the one that has most particles.
-pub(super) fn named(parts: &[Part<'_>]) -> String {
-    let expected = |part: &Part<'_>| part.object().sampler.expected_particles();
+pub(super) fn named(parts: &[&Part<'_>]) -> String {
+    let expected = |part: &&Part<'_>| part.object().sampler.expected_particles();
     match parts.iter().max_by(|a, b| expected(a).total_cmp(&expected(b))) {
         Some(most) if parts.len() == 1 => format!("object '{}'", crate::escape_controls(&most.name)),
         Some(most) => format!("all objects, most of all '{}'", crate::escape_controls(&most.name)),
@@ -82,9 +85,16 @@ impl Part<'_> {
     pub(super) fn object(&self) -> Object<'_> {
         let sampler: &dyn Sampler = match &self.particles {
             Particles::Sampled(sampler) => sampler.as_ref(),
-            Particles::Kept(sets) => *sets,
+            Particles::Kept(sets) => sets.as_ref(),
         };
         Object { sampler, transform: self.transform, look: self.look }
+    }
+
+    /// Whether some of it may lie at view depths in a range.
+    pub(super) fn reaches(&self, range: &Range<f32>, camera: &Camera) -> bool {
+        let depths = self.corners().map(|p| camera.view_from_world(p).z as f32);
+        let [near, far] = depths.fold([f32::INFINITY, f32::NEG_INFINITY], |[n, f], z| [n.min(z), f.max(z)]);
+        far >= range.start && near <= range.end
     }
 
     /// Corners of a box in the world that holds the object.
@@ -97,17 +107,17 @@ impl Part<'_> {
     }
 }
 
-/// Everything translucent in view: objects by their own data, the splats of the others by object.
-pub(super) fn sources<'a>(drawing: &Drawing<'a>, camera: &Camera) -> Vec<Source<'a>> {
-    let loaded = drawing.loaded;
+/// Everything translucent that is drawn by particles: objects by their own data, the splats of the others by object.
+pub(super) fn sources<'a>(frame: &Frame<'a>) -> Vec<Source<'a>> {
+    let loaded = frame.loaded;
     // Splats of each object, and the sum of their radii.
     let mut splats = vec![(0u32, 0.0); loaded.objects.len()];
     for (object, radius) in loaded.cloud.object.iter().zip(&loaded.cloud.radius) {
         let (n, sum) = &mut splats[*object as usize];
         (*n, *sum) = (*n + 1, *sum + f64::from(*radius));
     }
-    let own = loaded.own.iter().map(|o| of_own(o, splats[o.object], drawing, camera));
-    own.chain(of_splats(drawing, camera)).collect()
+    let own = loaded.own.iter().map(|o| of_own(o, splats[o.object], frame));
+    own.chain(of_splats(frame)).collect()
 }
 
 /// The finest cross-section that a camera needs of an object, units² of the object.
@@ -117,12 +127,12 @@ fn finest_area(camera: &Camera, transform: &Similarity, [low, high]: [DVec3; 2])
     pbsr::finest_pixel_area(camera, center, reach, NEAR) / transform.scale.powi(2)
 }
 
-fn seed(drawing: &Drawing<'_>, object: u32, kind: SplatKind) -> u64 {
-    rng::bits(drawing.settings.seed, SEEDS, u64::from(object), kind as u64)
+fn seed(frame: &Frame<'_>, object: u32, kind: SplatKind) -> u64 {
+    rng::bits(frame.settings.seed, SEEDS, u64::from(object), kind as u64)
 }
 
-fn of_own<'a>(own: &'a Own, (n, sum): (u32, f64), drawing: &Drawing<'a>, camera: &Camera) -> Source<'a> {
-    let Loaded { objects, materials, .. } = drawing.loaded;
+fn of_own<'a>(own: &'a Own, (n, sum): (u32, f64), frame: &Frame<'a>) -> Source<'a> {
+    let Loaded { objects, materials, .. } = frame.loaded;
     let material = materials[own.material];
     // As its splats have it, where it has some.
     let radius = if n > 0 { sum / f64::from(n) } else { own.radius };
@@ -136,22 +146,21 @@ fn of_own<'a>(own: &'a Own, (n, sum): (u32, f64), drawing: &Drawing<'a>, camera:
             radius: radius as f32,
             shadow_coefficient: objects[own.object].shadow_coefficient,
         },
-        cross_section: finest_area(camera, &own.transform, own.bounds),
-        seed: seed(drawing, own.object as u32, own.kind()),
+        cross_section: finest_area(&frame.camera, &own.transform, own.bounds),
+        seed: seed(frame, own.object as u32, own.kind()),
         of: own.object as u32,
         bounds: own.world_box(),
     }
 }
 
 /// Translucent splats of the objects without data of their own; an object has one material and one kind of them.
-fn of_splats<'a>(drawing: &Drawing<'a>, camera: &Camera) -> Vec<Source<'a>> {
-    let Loaded { cloud, objects, materials, footprints, own, .. } = drawing.loaded;
+fn of_splats<'a>(frame: &Frame<'a>) -> Vec<Source<'a>> {
+    let Loaded { cloud, objects, materials, footprints, .. } = frame.loaded;
+    let camera = &frame.camera;
     let mut of_object: BTreeMap<(u32, bool), Vec<u32>> = BTreeMap::new();
-    let mut has_own = vec![false; objects.len()];
-    own.iter().for_each(|o| has_own[o.object] = true);
-    for i in drawing.ids(|kind| kind != SplatKind::Opaque) {
+    for i in frame.translucent(cloud, Technique::Particles) {
         let k = i as usize;
-        if cloud.cross_section[k] > 0.0 && !has_own[cloud.object[k] as usize] {
+        if cloud.cross_section[k] > 0.0 {
             of_object.entry((cloud.object[k], cloud.kind[k] == SplatKind::Surface)).or_default().push(i);
         }
     }
@@ -170,7 +179,7 @@ fn of_splats<'a>(drawing: &Drawing<'a>, camera: &Camera) -> Vec<Source<'a>> {
         let corner = |v: glam::Vec3| splats.origin + v.as_dvec3();
         let bounds = [corner(bounds.min) - widest, corner(bounds.max) + widest];
         let cross_section = pbsr::finest_pixel_area(camera, center, reach, NEAR);
-        let seed = seed(drawing, object, kind);
+        let seed = seed(frame, object, kind);
         let params = SplatParams {
             cross_section,
             surface_opacity: material.surface_opacity,
@@ -187,7 +196,7 @@ fn of_splats<'a>(drawing: &Drawing<'a>, camera: &Camera) -> Vec<Source<'a>> {
     of_object.into_iter().map(part).collect()
 }
 
-impl Source<'_> {
+impl<'a> Source<'a> {
     /// The object with data of its own, by its rank.
     pub(super) fn own_object(&self) -> Option<usize> {
         match &self.data {
@@ -208,10 +217,20 @@ impl Source<'_> {
         }
     }
 
-    /// The object, ready to be drawn; `None`, with a warning, when nothing of it is found.
-    pub(super) fn part(&self, warnings: &mut Vec<String>) -> Result<Option<Part<'_>>, Error> {
+    /// The object, ready to be drawn, once where it is splats; `None`, with a warning, when nothing of it is found.
+    pub(super) fn part(&mut self, warnings: &mut Vec<String>) -> Result<Option<Part<'a>>, Error> {
+        let sampler = match &mut self.data {
+            Data::Splats(splats) => {
+                let (cloud, params) = splats.as_mut();
+                SplatSampler::owning(std::mem::take(cloud), params).map(|s| Box::new(s) as Box<dyn Sampler>)
+            }
+            Data::Own(own) => {
+                let own = *own;
+                self.sampler(own, warnings)
+            }
+        };
         let name = || format!("object '{}'", crate::shown(&self.name));
-        match self.sampler(warnings) {
+        match sampler {
             Ok(sampler) => Ok(Some(self.part_of(Particles::Sampled(sampler)))),
             Err(pbsr::Error::Empty { reason, .. }) => {
                 warnings.push(format!("{} has no particles: {reason}", name()));
@@ -222,7 +241,7 @@ impl Source<'_> {
     }
 
     /// The object with these particles.
-    pub(super) fn part_of<'b>(&self, particles: Particles<'b>) -> Part<'b> {
+    pub(super) fn part_of(&self, particles: Particles<'a>) -> Part<'a> {
         Part {
             name: self.name.clone(),
             particles,
@@ -233,11 +252,7 @@ impl Source<'_> {
         }
     }
 
-    fn sampler(&self, warnings: &mut Vec<String>) -> Result<Box<dyn Sampler + '_>, pbsr::Error> {
-        let own = match &self.data {
-            Data::Splats(splats) => return Ok(Box::new(SplatSampler::new(&splats.0, &splats.1)?)),
-            Data::Own(own) => own,
-        };
+    fn sampler(&self, own: &'a Own, warnings: &mut Vec<String>) -> Result<Box<dyn Sampler + 'a>, pbsr::Error> {
         Ok(match &own.body {
             Body::Surface { field, inside, spacing, step } => {
                 let [min, max] = own.bounds;

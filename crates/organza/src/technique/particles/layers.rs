@@ -1,11 +1,10 @@
 //! An ensemble of particles as layers: means as what splats would leave, and what only the hits tell.
 
 use super::parts::Part;
-use crate::points::Drawing;
+use crate::frame::Frame;
 use pbsr::{Ensemble, Occluder};
-use splat_core::raster::OpaqueImage;
 use splat_core::shade::ChannelLayout;
-use splat_core::{Accumulator, LayerData, Layers};
+use splat_core::{Accumulator, DepthProfile, LayerData, Layers};
 
 /// Optical depth of a pixel that particles hide in every set.
 const HIDDEN: f32 = 64.0;
@@ -42,53 +41,29 @@ pub(super) fn accumulate(ensemble: &Ensemble, layout: &ChannelLayout, accumulato
     }
 }
 
-/// Layers of the distribution of hits that are asked for: the standard error, depths, and objects.
-pub(super) struct OfHits<'a> {
-    pub(super) ensemble: &'a Ensemble,
-    pub(super) parts: &'a [Part<'a>],
-    pub(super) occluder: Option<&'a Occluder>,
-    pub(super) opaque: &'a OpaqueImage,
-}
-
-impl OfHits<'_> {
-    /// By name, samples become pixels.
-    pub(super) fn layers(&self, drawing: &Drawing<'_>, std_error: bool) -> Vec<(&'static str, LayerData)> {
-        let background = drawing.background;
-        let samples = self.ensemble.read(&|_, _| background, self.occluder);
-        let pixels = Pixels { size: self.ensemble.size(), antialias: drawing.settings.antialias };
-        let mut layers = Vec::new();
-        if std_error {
-            layers.push(("std_error", pixels.error(&samples)));
-        }
-        if drawing.layers.depth {
-            for name in ["depth.first", "depth.median", "depth.mean", "depth.sigma"] {
-                let depths = samples.scalar(name).expect("invariant: depths are kept where they are asked for");
-                let least = name == "depth.first";
-                layers.push((name, LayerData::Scalar(pixels.map(|at| depth(at.map(|k| depths[k]), least)))));
-            }
-        }
-        if let Some(LayerData::Id(objects)) = samples.images.get("object") {
-            let seen = |at: usize| match self.parts.get(objects[at] as usize) {
-                Some(part) => Some(part.of),
-                None => self.opaque.object.get(at).copied().filter(|o| *o != u32::MAX),
-            };
-            let first = pixels.map(|at| at.filter_map(seen).next().unwrap_or(u32::MAX));
-            layers.push(("object", LayerData::Id(first)));
-        }
-        layers
+/// Where the hits lie, and whose they are, where a segment keeps that.
+pub(super) fn of_hits(ensemble: &Ensemble, parts: &[&Part<'_>], segment: &mut Accumulator) {
+    if segment.depth.is_empty() && segment.object.is_empty() {
+        return;
+    }
+    let samples = ensemble.read(&|_, _| [0.0; 3], None);
+    let plane = &segment.optical_depth[segment.optical_depth.len() / 2];
+    let depths = ["depth.first", "depth.median", "depth.mean", "depth.sigma"].map(|name| samples.scalar(name));
+    for (k, profile) in segment.depth.iter_mut().enumerate() {
+        let at = depths.map(|d| d.expect("invariant: depths are kept where they are asked for")[k]);
+        *profile = DepthProfile::of_depths(at, plane[k]);
+    }
+    if let Some(LayerData::Id(of_part)) = samples.images.get("object") {
+        let objects = segment.object.iter_mut().zip(of_part);
+        objects.for_each(|(to, part)| *to = parts.get(*part as usize).map_or(u32::MAX, |part| part.of));
     }
 }
 
-/// The least depth of some samples, or the mean of those that are defined.
-fn depth(samples: impl Iterator<Item = f32>, least: bool) -> f32 {
-    let defined = samples.filter(|d| d.is_finite());
-    if least {
-        return defined.fold(f32::INFINITY, f32::min);
-    }
-    match defined.fold((0.0, 0u32), |(sum, n), d| (sum + d, n + 1)) {
-        (_, 0) => f32::INFINITY,
-        (sum, n) => sum / n as f32,
-    }
+/// Standard error of each pixel's luminance.
+pub(super) fn std_error(ensemble: &Ensemble, occluder: Option<&Occluder>, frame: &Frame<'_>) -> LayerData {
+    let background = frame.scene.background;
+    let samples = ensemble.read(&|_, _| background, occluder);
+    Pixels { size: ensemble.size(), antialias: frame.settings.antialias }.error(&samples)
 }
 
 /// Samples of pixels.

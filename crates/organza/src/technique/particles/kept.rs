@@ -1,8 +1,9 @@
 //! Sets of particles that serve all frames of an animation.
 
-use super::parts::{Part, Particles, Source};
+use super::parts::Source;
+use crate::choose::technique_of;
+use crate::frame::Frame;
 use crate::plan::pass;
-use crate::points::Drawing;
 use crate::scene::{Scene, SceneObject, Technique};
 use crate::{CostRecord, Error};
 use pbsr::KeptSets;
@@ -34,13 +35,13 @@ pub(crate) struct Kept {
 struct Entry {
     /// All that the sets depend on.
     made_from: String,
-    sets: KeptSets,
+    sets: Arc<KeptSets>,
 }
 
 impl Kept {
     /// Keeps how a frame sees the objects, if it samples them.
     pub(crate) fn add(&mut self, scene: &Scene) {
-        if scene.render.technique != Technique::Particles {
+        if !scene.objects.iter().any(|o| technique_of(o, scene) == Technique::Particles) {
             return;
         }
         let mut camera = scene.camera;
@@ -69,12 +70,12 @@ impl Kept {
     pub(super) fn sample(
         &mut self,
         sources: &mut [Source<'_>],
-        drawing: &Drawing<'_>,
-        scene: &Scene,
+        frame: &Frame<'_>,
         cost: &mut CostRecord,
         warnings: &mut Vec<String>,
     ) -> Result<(), Error> {
-        let levels = drawing.settings.particles.repeat_level;
+        let scene = frame.scene;
+        let levels = frame.settings.particles.repeat_level;
         for source in sources.iter_mut() {
             let Some(object) = source.own_object() else { continue };
             for view in &self.views {
@@ -93,31 +94,20 @@ impl Kept {
             let needed = sampler.expected_particles() * f64::from(levels) * pbsr::Particles::BYTES as f64;
             if needed <= self.allowed.saturating_sub(held) as f64 {
                 let sets = cost.measure(pass::SAMPLE, |stage| {
-                    let sets = KeptSets::new(sampler, 0, levels as usize);
+                    let sets = Arc::new(KeptSets::new(sampler, 0, levels as usize));
                     (stage.items_in, stage.items_out, stage.bytes) = (1, sets.particles(), sets.bytes());
                     Ok::<_, Error>(sets)
                 })?;
                 self.of_object.insert(object, Entry { made_from, sets });
             }
-            drawing.progress.tick(0).map_err(|_| Error::Cancelled)?;
+            frame.progress.tick(0).map_err(|_| Error::Cancelled)?;
         }
         Ok(())
     }
 
-    /// What is drawn: kept sets where there are some.
-    pub(super) fn parts<'a>(
-        &'a self,
-        sources: &'a [Source<'_>],
-        warnings: &mut Vec<String>,
-    ) -> Result<Vec<Part<'a>>, Error> {
-        let mut parts = Vec::with_capacity(sources.len());
-        for source in sources {
-            match source.own_object().and_then(|object| self.of_object.get(&object)) {
-                Some(entry) => parts.push(source.part_of(Particles::Kept(&entry.sets))),
-                None => parts.extend(source.part(warnings)?),
-            }
-        }
-        Ok(parts)
+    /// The sets of an object, by its rank in the scene.
+    pub(super) fn of(&self, object: usize) -> Option<Arc<KeptSets>> {
+        self.of_object.get(&object).map(|entry| Arc::clone(&entry.sets))
     }
 }
 

@@ -5,8 +5,9 @@
 //! made of. The count of sets may therefore be raised later.
 
 use super::Kept;
+use crate::choose::{row, techniques};
 use crate::output::Target;
-use crate::scene::{RenderSettings, Scene, Technique};
+use crate::scene::{RenderSettings, Scene};
 use crate::{Error, RenderOptions, printable};
 use pbsr::Ensemble;
 use sha2::{Digest, Sha256};
@@ -38,7 +39,7 @@ impl Checkpoint {
         options: &RenderOptions,
         kept: Option<&Kept>,
     ) -> Result<Self, Error> {
-        if scene.render.technique != Technique::Particles {
+        if !matches!(techniques(scene)[..], [only] if row(only).is_random) {
             let message = "only the technique `particles` is drawn in sets that a checkpoint can keep";
             return Err(Error::usage(message, "use --technique particles, or no --checkpoint"));
         }

@@ -4,11 +4,13 @@ use super::checkpoint::Checkpoint;
 use super::parts::{Part, named};
 use super::{fault, refuse};
 use crate::device::{Folding, Helper, Shadow};
-use crate::points::Drawing;
+use crate::frame::Frame;
 use crate::scene::ParticlesSettings;
-use crate::{Error, Progress, RenderOptions, work};
-use pbsr::{Ensemble, EnsembleParams, FoldParams, LitBy, Object, Occluder, Renderer, Scene};
+use crate::technique::Session;
+use crate::{Error, Progress, RenderOptions, stage};
+use pbsr::{Ensemble, EnsembleParams, FoldParams, LitBy, Object, Occluder, Renderer};
 use splat_core::{Camera, LayerSet, Light, Transmittance};
+use std::ops::Range;
 use tsm::ShadowMap;
 
 /// Sets between two looks at the error.
@@ -18,39 +20,40 @@ const GROWTH: u32 = 16;
 /// Share of the allowed memory that the particles of one batch may take.
 const BATCH_SHARE: u64 = 4;
 
-/// Folds sets until there are as many as asked for, or the error is small enough.
+/// Folds sets of what lies in a range of depths until there are as many as asked for, or the error is small enough.
 pub(super) fn fold(
-    drawing: &Drawing<'_>,
-    parts: &[Part<'_>],
+    frame: &Frame<'_>,
+    parts: &[&Part<'_>],
     maps: &[Option<ShadowMap>],
-    camera: &Camera,
+    range: Range<f32>,
     occluder: Option<&Occluder>,
-    options: &RenderOptions,
-    mut checkpoint: Option<&mut Checkpoint>,
+    session: &mut Session<'_>,
 ) -> Result<Average, Error> {
-    let objects: Vec<Object<'_>> = parts.iter().map(Part::object).collect();
-    let origin = drawing.loaded.cloud.origin;
+    let objects: Vec<Object<'_>> = parts.iter().map(|part| part.object()).collect();
+    let origin = frame.loaded.cloud.origin;
     let shining: Vec<(Light, Option<Shadow<'_>>)> =
-        drawing.shining(maps).map(|(light, map)| (light, map.map(|map| (map, origin)))).collect();
+        frame.shining(maps).map(|(light, map)| (light, map.map(|map| (map, origin)))).collect();
     let lights: Vec<LitBy<'_>> = shining.iter().map(lit_by).collect();
-    let scene = Scene { objects: &objects, lights: &lights, ambient: drawing.ambient, camera, occluder };
-    let colored = drawing.plan.optical_depth_planes == 3;
-    let kept = kept_numbers(&drawing.layers, colored, || depth_range(parts, camera));
+    let (camera, ambient) = (&frame.camera, frame.scene.ambient);
+    let scene = pbsr::Scene { objects: &objects, lights: &lights, ambient, camera, occluder };
+    let colored = frame.plan.optical_depth_planes == 3;
+    let kept = kept_numbers(&frame.layers, colored, || depth_range(parts, camera));
+    let checkpoint = &mut session.checkpoint;
     let ensemble = match checkpoint.as_deref_mut().and_then(Checkpoint::take) {
         Some(found) => found,
         None => Ensemble::new(camera.size, &kept).map_err(fault)?,
     };
     let mut average = Average { ensemble, particles: 0, interrupted: false };
-    let params = fold_params(options);
-    let settings = &drawing.settings.particles;
-    let background = |_, _| drawing.background;
+    let params = FoldParams { depths: [range.start, range.end], ..fold_params(session.options) };
+    let settings = &frame.settings.particles;
+    let background = |_, _| frame.scene.background;
     let (mut renderer, mut folding) =
         (Renderer::new(), Folding::new(shining.iter().filter_map(|(_, shadow)| *shadow).collect()));
-    let helper = helper(drawing, checkpoint.is_some());
-    drawing.progress.begin(work::stage::PARTICLES);
-    drawing.progress.add_total(u64::from(settings.repeat_level.saturating_sub(average.ensemble.levels())));
+    let helper = helper(frame, checkpoint.is_some());
+    frame.progress.begin(stage::PARTICLES);
+    frame.progress.add_total(u64::from(settings.repeat_level.saturating_sub(average.ensemble.levels())));
     while let Some(levels) = average.next_step(settings) {
-        let step = Step { until: average.ensemble.levels() + levels, helper, params, progress: drawing.progress };
+        let step = Step { until: average.ensemble.levels() + levels, helper, params, progress: frame.progress };
         let folded = step.fold(&mut renderer, &mut folding, &scene, &mut average.ensemble);
         let folded = folded.map_err(|e| match e {
             pbsr::Error::TooMuch { .. } => refuse(&named(parts), e),
@@ -66,7 +69,7 @@ pub(super) fn fold(
             checkpoint.write_if_due(&average.ensemble)?;
         }
         let reached = |target: f64| {
-            average.ensemble.rms_error(&background, occluder) / f64::from(drawing.settings.antialias) <= target
+            average.ensemble.rms_error(&background, occluder) / f64::from(frame.settings.antialias) <= target
         };
         if average.interrupted || settings.target_error.is_some_and(reached) {
             break;
@@ -110,8 +113,8 @@ pub(crate) fn average_bytes(size: [u64; 2], set: &LayerSet, colored_extinction: 
 }
 
 /// View depths that all particles lie between.
-fn depth_range(parts: &[Part<'_>], camera: &Camera) -> [f32; 2] {
-    let depths = parts.iter().flat_map(Part::corners).map(|p| camera.view_from_world(p).z.max(0.0) as f32);
+fn depth_range(parts: &[&Part<'_>], camera: &Camera) -> [f32; 2] {
+    let depths = parts.iter().flat_map(|part| part.corners()).map(|p| camera.view_from_world(p).z.max(0.0) as f32);
     let [near, far] = depths.fold([f32::INFINITY, 0.0], |[near, far], z| [near.min(z), far.max(z)]);
     // A plane that faces the eye has one depth, which lies inside.
     let margin = far * f32::EPSILON * 1024.0;
@@ -119,8 +122,8 @@ fn depth_range(parts: &[Part<'_>], camera: &Camera) -> [f32; 2] {
 }
 
 /// The device that folds, if there is one and it may.
-fn helper<'a>(drawing: &Drawing<'a>, checkpoint: bool) -> Option<&'a Helper> {
-    let helper = drawing.helper?;
+fn helper<'a>(frame: &Frame<'a>, checkpoint: bool) -> Option<&'a Helper> {
+    let helper = frame.helper?;
     if checkpoint {
         helper.leave("particles with a checkpoint are the processor's, whose bits do not depend on where it went on");
     }
@@ -141,7 +144,7 @@ impl Step<'_> {
         &self,
         renderer: &mut Renderer,
         folding: &mut Folding<'_>,
-        scene: &Scene<'_>,
+        scene: &pbsr::Scene<'_>,
         ensemble: &mut Ensemble,
     ) -> Result<u64, pbsr::Error> {
         let by_device = match self.helper {

@@ -1,0 +1,241 @@
+//! Drawing: techniques in turns, front to back, into one accumulator.
+
+mod ranges;
+
+use crate::choose::row;
+use crate::frame::Frame;
+use crate::load::Loaded;
+use crate::plan::Plan;
+use crate::scene::{Scene, Technique};
+use crate::technique::{Finished, Fold, Session};
+use crate::work::{self, Stages, Translucent, cost};
+use crate::{CostRecord, Error, Layers, Progress, RenderOptions, stage};
+use splat_core::{LayerData, SplatKind};
+use std::ops::Range;
+
+/// Splats whose footprints stand for all.
+const LOOKED_AT: usize = 4096;
+
+/// Runs the planned passes of a frame, and keeps the layers that its scene asks for.
+pub(crate) fn draw(frame: &Frame<'_>, session: &mut Session<'_>, cost: &mut CostRecord) -> Result<Layers, Error> {
+    frame.progress.plan(stages(frame));
+    let layers = draw_ranges(frame, &ranges::ranges(frame), session, cost)?;
+    frame.progress.finish();
+    Ok(layers)
+}
+
+/// The same in these ranges of depth, which follow each other.
+pub(crate) fn draw_ranges(
+    frame: &Frame<'_>,
+    ranges: &[Range<f32>],
+    session: &mut Session<'_>,
+    cost: &mut CostRecord,
+) -> Result<Layers, Error> {
+    let mut folds: Vec<Box<dyn Fold + '_>> =
+        frame.plan.techniques.iter().map(|technique| (row(*technique).begin)(frame)).collect();
+    let mut accumulator = frame.accumulator();
+    for range in ranges {
+        for fold in &mut folds {
+            fold.fold(range.clone(), &mut accumulator, session, cost)?;
+        }
+    }
+    let layers = frame.finish(&accumulator, cost)?;
+    let mut finished = Finished { layers, opaque: Some(frame.opaque(cost)?) };
+    folds.iter_mut().for_each(|fold| fold.finish(&mut finished));
+    let mut layers = finished.layers;
+    restore_depths(&mut layers, frame.loaded.exponent);
+    frame.settings.layers.keep(&mut layers);
+    Ok(layers)
+}
+
+/// Runs the planned passes on a loaded scene to their end, by the processor alone, and keeps the layers that it asks for.
+pub(crate) fn draw_loaded(
+    scene: &Scene,
+    loaded: &Loaded,
+    plan: &Plan,
+    options: &RenderOptions,
+    progress: &Progress,
+    cost: &mut CostRecord,
+) -> Result<Layers, Error> {
+    let frame = Frame::new(scene, loaded, plan, None, progress);
+    let mut session = Session { options, checkpoint: None, kept: None, warnings: &mut Vec::new(), sets: None };
+    let layers = draw(&frame, &mut session, cost)?;
+    if session.sets.is_some_and(|sets| sets.interrupted) { Err(Error::Cancelled) } else { Ok(layers) }
+}
+
+/// Stages with their weights, after everything was loaded.
+fn stages(frame: &Frame<'_>) -> Stages {
+    let (loaded, plan, scene) = (frame.loaded, frame.plan, frame.scene);
+    let maps = plan.shadow_maps.iter().filter(|on| **on).count();
+    let all = loaded.cloud.len() as f64;
+    let opaque = Count::of(frame, None);
+    let of: Vec<(Technique, Count)> = plan.techniques.iter().map(|t| (*t, Count::of(frame, Some(*t)))).collect();
+    let mut stages: Stages = (1..=maps).map(|k| (work::shadow_map(k, maps), cost::CAST * all)).collect();
+    let mut add = |name: &str, seconds: f64| stages.push((name.to_owned(), seconds));
+    let mut drawn = opaque.splats;
+    let mut last = Vec::new();
+    for (technique, count) in of {
+        let row = row(technique);
+        drawn += if row.draws_splats { count.splats } else { 0.0 };
+        let any = plan.passes.iter().any(|p| row.steps.last().is_some_and(|step| step.pass == p.name));
+        let translucent = Translucent { splats: count.splats, fragments: count.fragments, any };
+        let mut steps: Vec<(&str, f64)> =
+            row.steps.iter().map(|step| (step.stage, (step.seconds)(scene, &translucent))).collect();
+        last.extend(steps.pop());
+        steps.into_iter().for_each(|(name, seconds)| add(name, seconds));
+    }
+    add(stage::PROJECT, cost::PROJECT * drawn);
+    add(stage::SHADE, drawn * (cost::SHADE + maps as f64 * cost::LOOK_UP));
+    add(stage::OPAQUE, cost::FRAGMENT * opaque.fragments);
+    last.into_iter().for_each(|(name, seconds)| add(name, seconds));
+    add(stage::FINISH, work::samples(scene) * cost::SAMPLE);
+    stages
+}
+
+/// Splats of a kind and the fragments of their footprints.
+struct Count {
+    splats: f64,
+    fragments: f64,
+}
+
+impl Count {
+    /// The opaque ones, or the translucent ones of a technique; from splats at even distances in the list.
+    fn of(frame: &Frame<'_>, technique: Option<Technique>) -> Self {
+        let (cloud, camera) = (&frame.loaded.cloud, &frame.camera);
+        let is_one = |i: &usize| match technique {
+            None => cloud.kind[*i] == SplatKind::Opaque,
+            Some(t) => cloud.kind[*i] != SplatKind::Opaque && frame.plan.by[cloud.object[*i] as usize] == t,
+        };
+        let (place, focal) = (camera.view_from_offset(cloud.origin), camera.focal_px());
+        let picture = camera.size.iter().map(|s| f64::from(*s)).product::<f64>();
+        let footprint = |i: usize| {
+            let p = place.apply(cloud.position[i]).as_dvec3();
+            let near = if camera.is_orthographic() { 1.0 } else { p.z.max(f64::from(cloud.radius[i])) };
+            let radius = focal * f64::from(cloud.radius[i]) / near;
+            let at = |v: f64| (focal * v / near).abs() - radius;
+            let half = camera.size.map(|s| 0.5 * f64::from(s));
+            let seen = p.z > 0.0 && at(p.x) < half[0] && at(p.y) < half[1];
+            if seen { (std::f64::consts::PI * radius * radius).clamp(4.0, picture) } else { 0.0 }
+        };
+        let stride = cloud.len().div_ceil(LOOKED_AT).max(1);
+        let (mut splats, mut fragments) = (0.0, 0.0);
+        for i in (0..cloud.len()).step_by(stride).filter(is_one) {
+            splats += stride as f64;
+            fragments += stride as f64 * footprint(i);
+        }
+        Self { splats, fragments }
+    }
+}
+/// Depths back into the scene's unit.
+fn restore_depths(layers: &mut Layers, exponent: i32) {
+    let scale = libm::exp2(f64::from(exponent)) as f32;
+    for (name, data) in &mut layers.images {
+        if let (true, LayerData::Scalar(depth)) = (name.starts_with("depth."), data) {
+            depth.iter_mut().for_each(|d| *d *= scale);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::prepare::{load, plan_loaded};
+    use crate::scene::{LoadOptions, parse};
+
+    /// Fog, a pane and a wall behind them, in every layer.
+    const SCENE: &[u8] = br#"
+        version = 1
+        [camera]
+        position = [0.2, 0.1, 4]
+        target = [0, 0, 0]
+        size = [40, 30]
+        [[light]]
+        kind = "point"
+        position = [2, 3, 4]
+        intensity = [20, 18, 16]
+        [[object]]
+        name = "fog"
+        medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 0.7, spacing = 0.12 }
+        [[object]]
+        name = "pane"
+        rectangle = { center = [0, 0, 0.3], u = [1.2, 0, 0.5], v = [0, 1.2, 0], spacing = 0.1 }
+        opacity = 0.4
+        [[object]]
+        name = "wall"
+        rectangle = { center = [0.5, 0, -2], u = [2, 0, 0], v = [0, 2, 0], spacing = 0.1 }
+        [render]
+        layers = ["effects", "shadow", "normal", "depth", "object"]
+        particles = { repeat_level = 400 }
+    "#;
+
+    /// The picture by a technique, in ranges that end at these depths and behind all.
+    fn drawn(technique: &str, seed: u64, ends: &[f32]) -> Layers {
+        let overrides = [format!("render.technique=\"{technique}\""), format!("render.seed={seed}")];
+        let overrides = overrides.iter().map(|o| crate::scene::Override::parse(o).unwrap()).collect();
+        let options = LoadOptions { overrides, ..LoadOptions::default() };
+        let scene = parse("seam.toml".as_ref(), SCENE, &options).unwrap();
+        let (options, progress) = (RenderOptions::default(), Progress::new());
+        let loaded = load(&scene, &options, &progress).unwrap();
+        let (plan, _) = plan_loaded(&scene, &loaded, &options).unwrap();
+        let frame = Frame::new(&scene, &loaded, &plan, None, &progress);
+        let unit = libm::exp2(f64::from(-loaded.exponent)) as f32;
+        let cuts = ends.iter().map(|end| end * unit);
+        let cuts: Vec<f32> = [f32::NEG_INFINITY].into_iter().chain(cuts).chain([f32::INFINITY]).collect();
+        let ranges: Vec<Range<f32>> = cuts.windows(2).map(|w| w[0]..w[1]).collect();
+        let mut session =
+            Session { options: &options, checkpoint: None, kept: None, warnings: &mut Vec::new(), sets: None };
+        draw_ranges(&frame, &ranges, &mut session, &mut CostRecord::default()).unwrap()
+    }
+
+    /// All numbers of two pictures, layer by layer.
+    fn numbers<'a>(a: &'a Layers, b: &'a Layers) -> Vec<(&'static str, Vec<[f32; 2]>)> {
+        assert_eq!(a.images.keys().collect::<Vec<_>>(), b.images.keys().collect::<Vec<_>>());
+        let flat = |data: &LayerData| -> Vec<f32> {
+            match data {
+                LayerData::Scalar(v) => v.clone(),
+                LayerData::Rgb(v) => v.iter().flatten().copied().collect(),
+                LayerData::Id(v) => v.iter().map(|id| *id as f32).collect(),
+            }
+        };
+        let pair = |(name, data): (&&'static str, &LayerData)| {
+            (*name, flat(data).into_iter().zip(flat(&b.images[name])).map(|(a, b)| [a, b]).collect())
+        };
+        a.images.iter().map(pair).collect()
+    }
+
+    const TWO: [f32; 1] = [4.1];
+    const SEVEN: [f32; 6] = [3.2, 3.7, 4.0, 4.3, 4.6, 5.5];
+
+    #[test]
+    fn splats_in_one_two_and_seven_ranges_give_one_picture() {
+        for technique in ["points", "reference"] {
+            let whole = drawn(technique, 0, &[]);
+            for ends in [&TWO[..], &SEVEN] {
+                for (name, pairs) in numbers(&whole, &drawn(technique, 0, ends)) {
+                    let near = |[a, b]: &[f32; 2]| a == b || (a - b).abs() <= 1e-6 * a.abs().max(1.0);
+                    let worst = pairs.iter().find(|pair| !near(pair));
+                    assert_eq!(worst, None, "{technique}, {name}, {} ranges", ends.len() + 1);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn particles_in_one_two_and_seven_ranges_agree_within_their_noise() {
+        let whole = drawn("particles", 1, &[]);
+        for ends in [&TWO[..], &SEVEN] {
+            let other = drawn("particles", 2, ends);
+            for (name, pairs) in numbers(&whole, &other) {
+                if !["beauty", "alpha", "direct", "ambient", "background"].contains(&name) {
+                    continue;
+                }
+                let n = pairs.len() as f64;
+                let bias = pairs.iter().map(|[a, b]| f64::from(b - a)).sum::<f64>() / n;
+                let square = pairs.iter().map(|[a, b]| f64::from(b - a).powi(2)).sum::<f64>() / n;
+                // Pixels are independent: three standard errors of their mean difference, and rounding.
+                let error = (square / n).sqrt();
+                assert!(bias.abs() <= 3.0 * error + 1e-7, "{name}, {} ranges: {bias:e} of {error:e}", ends.len() + 1);
+            }
+        }
+    }
+}

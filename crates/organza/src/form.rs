@@ -1,0 +1,70 @@
+//! The forms in which techniques take objects: neutral, so that whatever reads and converts knows no technique.
+
+use crate::scene::Technique;
+
+/// What a technique draws an object from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// Opaque splats, which the frame draws.
+    Opaque,
+    /// A field whose zero set random lines find.
+    Lines,
+    /// An isosurface of a volume, found along its lattice.
+    Lattice,
+    /// A field on whose zero set a Brownian motion goes.
+    Brownian,
+    /// Triangles.
+    Triangles,
+    /// A lattice with a transfer function, or of extinction.
+    Cells,
+    /// A field of extinction.
+    Field,
+    /// Splats.
+    Splats,
+}
+
+impl Form {
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Opaque => "none",
+            Self::Lines => "lines",
+            Self::Lattice => "lattice lines",
+            Self::Brownian => "brownian",
+            Self::Triangles => "triangles",
+            Self::Cells => "cells",
+            Self::Field => "field",
+            Self::Splats => "splats",
+        }
+    }
+
+    /// Whether it is the object's own data, not its splats.
+    pub fn is_own(self) -> bool {
+        !matches!(self, Self::Opaque | Self::Splats)
+    }
+}
+
+/// How one object is drawn, and why.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlannedObject {
+    /// Name of the object.
+    pub object: String,
+    /// What draws it.
+    pub technique: Technique,
+    /// What it is drawn from.
+    pub form: Form,
+    /// Why from that.
+    pub reason: &'static str,
+    /// Why the object becomes splats; `None` where it does not.
+    pub splats: Option<&'static str>,
+}
+
+impl PlannedObject {
+    /// Whether it becomes splats that are drawn as they are.
+    pub fn is_drawn_as_splats(&self) -> bool {
+        self.splats == Some(DRAWN)
+    }
+}
+
+/// Why splats are made that are drawn.
+pub(crate) const DRAWN: &str = "they are drawn";

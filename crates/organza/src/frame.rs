@@ -1,0 +1,116 @@
+//! One frame: what all techniques share. The camera of samples, lights and their shadow maps, the splats that are drawn with
+//! their footprints and radiance, the opaque image, the device, progress. Whatever is made for it is made once, when it is first
+//! asked for.
+
+mod light;
+mod on_device;
+mod splats;
+
+pub(crate) use splats::{Shaded, record};
+
+use crate::device::Helper;
+use crate::load::Loaded;
+use crate::plan::Plan;
+use crate::scene::{RenderSettings, Scene, Technique};
+use crate::{Error, Progress};
+use splat_core::raster::{self, OpaqueImage};
+use splat_core::shade::ChannelLayout;
+use splat_core::{Accumulator, Camera, Cloud, LayerSet, SplatKind};
+use std::cell::OnceCell;
+use tsm::ShadowMap;
+
+/// What techniques read.
+pub(crate) struct Frame<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) settings: &'a RenderSettings,
+    pub(crate) loaded: &'a Loaded,
+    pub(crate) plan: &'a Plan,
+    /// What a pixel keeps.
+    pub(crate) layers: LayerSet,
+    /// With one pixel a sample.
+    pub(crate) camera: Camera,
+    /// A device that helps.
+    pub(crate) helper: Option<&'a Helper>,
+    /// Whether it composites splats, which changes the last bits.
+    pub(crate) device_composites: bool,
+    pub(crate) progress: &'a Progress,
+    /// `None` inside where all splats are drawn.
+    drawn: OnceCell<Option<Cloud>>,
+    maps: OnceCell<Vec<Option<ShadowMap>>>,
+    shaded: OnceCell<Shaded>,
+    opaque: OnceCell<OpaqueImage>,
+}
+
+impl<'a> Frame<'a> {
+    /// Nothing made yet.
+    pub(crate) fn new(
+        scene: &'a Scene,
+        loaded: &'a Loaded,
+        plan: &'a Plan,
+        device: Option<(&'a Helper, bool)>,
+        progress: &'a Progress,
+    ) -> Self {
+        let mut camera = loaded.camera;
+        camera.size = camera.size.map(|s| s * scene.render.antialias);
+        Self {
+            scene,
+            settings: &scene.render,
+            loaded,
+            plan,
+            layers: scene.render.layers.set(),
+            camera,
+            helper: device.map(|(helper, _)| helper),
+            device_composites: device.is_some_and(|(_, composites)| composites),
+            progress,
+            drawn: OnceCell::new(),
+            maps: OnceCell::new(),
+            shaded: OnceCell::new(),
+            opaque: OnceCell::new(),
+        }
+    }
+
+    /// An interrupt, if there was one.
+    pub(crate) fn tick(&self) -> Result<(), Error> {
+        self.progress.tick(1).map_err(|_| Error::Cancelled)
+    }
+
+    /// The numbers that a splat, or a hit, brings to a pixel.
+    pub(crate) fn layout(&self) -> ChannelLayout {
+        ChannelLayout::new(&self.layers)
+    }
+
+    /// An accumulator for the frame.
+    pub(crate) fn accumulator(&self) -> Accumulator {
+        let set = &self.layers;
+        Accumulator::new(self.camera.size, self.plan.optical_depth_planes, self.layout().count(), set.depth, set.object)
+    }
+
+    pub(crate) fn raster_params(&self) -> raster::Params {
+        raster::Params {
+            resampling_sigma_px: if self.settings.points.resampling_filter {
+                raster::Params::default().resampling_sigma_px
+            } else {
+                0.0
+            },
+            transmittance_cutoff: self.settings.points.transmittance_cutoff as f32,
+            accumulation: self.settings.points.accumulation,
+        }
+    }
+
+    /// How far the resampling filter widens a footprint, pixels.
+    pub(crate) fn filter_reach_px(&self) -> f64 {
+        let widest = self.loaded.footprints.layers().iter().map(|f| f.cutoff).fold(0.0, f32::max);
+        f64::from(widest * self.raster_params().resampling_sigma_px)
+    }
+
+    /// The translucent ones of some splats that a technique draws or samples; not those of objects by their own data.
+    pub(crate) fn translucent(&self, cloud: &Cloud, technique: Technique) -> Vec<u32> {
+        let takes: Vec<bool> =
+            self.plan.by.iter().zip(&self.plan.is_own).map(|(by, is_own)| *by == technique && !is_own).collect();
+        let is_one = |i: &u32| {
+            let (kind, object) = (cloud.kind[*i as usize], cloud.object[*i as usize] as usize);
+            kind != SplatKind::Opaque && takes[object]
+        };
+        (0..cloud.len() as u32).filter(is_one).collect()
+    }
+}

@@ -1,0 +1,98 @@
+//! Light of a frame: shadow maps, and what reaches splats through them.
+
+use super::Frame;
+use crate::device::LookedUp;
+use crate::plan::pass;
+use crate::shadows::shadow_error;
+use crate::{CostRecord, Error, work};
+use splat_core::shade::{LitBy, ShadeInput};
+use splat_core::{Light, Transmittance};
+use tsm::{Deposits, ShadowMap};
+
+impl<'a> Frame<'a> {
+    /// One map for each light that the plan gives one.
+    pub(crate) fn maps(&self, cost: &mut CostRecord) -> Result<&[Option<ShadowMap>], Error> {
+        if let Some(maps) = self.maps.get() {
+            return Ok(maps);
+        }
+        let maps = self.shadow_maps(cost)?;
+        Ok(self.maps.get_or_init(|| maps))
+    }
+
+    fn shadow_maps(&self, cost: &mut CostRecord) -> Result<Vec<Option<ShadowMap>>, Error> {
+        let mut maps = Vec::new();
+        let mut left = self.plan.shadow_bytes;
+        let (mut made, count) = (0, self.plan.shadow_maps.iter().filter(|on| **on).count());
+        for (i, (light, table)) in self.loaded.lights.iter().zip(&self.plan.shadow_tables).enumerate() {
+            self.tick()?;
+            let Some(table) = table else {
+                maps.push(None);
+                continue;
+            };
+            made += 1;
+            self.progress.begin(&work::shadow_map(made, count));
+            let params = table.params(self.settings, self.loaded, left);
+            let map = cost.measure(pass::SHADOW_MAP, |stage| {
+                let l = self.loaded;
+                let deposits = Deposits::new(&l.cloud, &l.materials, &l.objects, light, &params, self.progress)
+                    .map_err(|e| shadow_error(i, &e))?;
+                let helped = self.helper.and_then(|helper| helper.shadow_map(&deposits));
+                let map = helped.unwrap_or_else(|| deposits.into_map());
+                stage.items_in = l.cloud.len() as u64;
+                stage.items_out = map.counts().kept;
+                stage.bytes = map.counts().bytes;
+                Ok::<_, Error>(map)
+            })?;
+            left = left.saturating_sub(map.counts().bytes);
+            maps.push(Some(map));
+        }
+        Ok(maps)
+    }
+
+    /// For each map the light at these splats, where a device looks it up.
+    pub(crate) fn look_ups<'b>(
+        &self,
+        maps: &'b [Option<ShadowMap>],
+        splats: impl Iterator<Item = u32>,
+    ) -> Vec<Option<LookedUp<'b>>> {
+        let device = self.helper.filter(|_| self.device_composites && maps.iter().any(Option::is_some));
+        let Some(device) = device else { return maps.iter().map(|_| None).collect() };
+        let ids: Vec<u32> = splats.collect();
+        maps.iter().map(|map| device.look_up(map.as_ref()?, self.drawn(), &ids)).collect()
+    }
+
+    /// The lights that have an intensity, with what is known of their shadows, or their maps.
+    pub(crate) fn lit_by<'b>(
+        &self,
+        maps: &'b [Option<ShadowMap>],
+        looked_up: &'b [Option<LookedUp<'b>>],
+    ) -> Vec<LitBy<'b>> {
+        let known = looked_up.iter().zip(maps).map(|(known, map)| {
+            let map = map.as_ref().map(|map| map as &dyn Transmittance);
+            known.as_ref().map(|known| known as &dyn Transmittance).or(map)
+        });
+        self.with_light(known).map(|(light, shadow)| LitBy { light, shadow }).collect()
+    }
+
+    /// What shading the drawn splats reads.
+    pub(crate) fn shading<'b>(&'b self, lights: &'b [LitBy<'b>]) -> ShadeInput<'b> {
+        let l = self.loaded;
+        let (materials, objects) = (&l.materials[..], &l.objects[..]);
+        let (ambient, camera) = (self.scene.ambient, &self.camera);
+        ShadeInput { cloud: self.drawn(), materials, objects, lights, ambient, camera }
+    }
+
+    /// The lights that have an intensity, with their shadow maps.
+    pub(crate) fn shining<'b>(
+        &'b self,
+        maps: &'b [Option<ShadowMap>],
+    ) -> impl Iterator<Item = (Light, Option<&'b ShadowMap>)> {
+        self.with_light(maps.iter().map(Option::as_ref))
+    }
+
+    /// Lights that have an intensity, each with what is there for it.
+    pub(crate) fn with_light<T>(&self, of_each: impl Iterator<Item = T>) -> impl Iterator<Item = (Light, T)> {
+        let all = self.loaded.lights.iter().zip(of_each);
+        all.filter(|(light, _)| light.intensity != [0.0; 3]).map(|(light, of)| (*light, of))
+    }
+}

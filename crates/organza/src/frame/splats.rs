@@ -1,0 +1,138 @@
+//! Splats of a frame: those that are drawn, their footprints and radiance, and the opaque ones as an image.
+
+use super::Frame;
+use crate::plan::pass;
+use crate::{CostRecord, Error, stage};
+use splat_core::raster::{self, Background, Detail, OpaqueImage, Projected, RasterCounts};
+use splat_core::shade::shade;
+use splat_core::{Accumulator, Cloud, Layers, SplatKind, StageCost};
+
+/// Splats ready to be composited, by id.
+pub(crate) struct Shaded {
+    pub(crate) projected: Projected,
+    /// As many numbers a splat as a pixel has channels.
+    pub(crate) values: Vec<f32>,
+    pub(crate) channels: usize,
+}
+
+impl Frame<'_> {
+    /// The splats that are drawn as they are: opaque ones, and those of techniques that draw splats. Ids of what is shaded, sorted
+    /// and composited are places in this cloud.
+    pub(crate) fn drawn(&self) -> &Cloud {
+        let cloud = &self.loaded.cloud;
+        let some = self.drawn.get_or_init(|| {
+            let is_drawn = |i: &u32| {
+                let (kind, object) = (cloud.kind[*i as usize], cloud.object[*i as usize] as usize);
+                kind == SplatKind::Opaque || self.plan.draws[object]
+            };
+            let drawn: Vec<u32> = (0..cloud.len() as u32).filter(is_drawn).collect();
+            (drawn.len() < cloud.len()).then(|| cloud.gather(&drawn))
+        });
+        some.as_ref().unwrap_or(cloud)
+    }
+
+    /// Footprints and radiance of the drawn splats in view.
+    pub(crate) fn shaded(&self, cost: &mut CostRecord) -> Result<&Shaded, Error> {
+        if let Some(shaded) = self.shaded.get() {
+            return Ok(shaded);
+        }
+        let maps = self.maps(cost)?;
+        let projected = self.project(cost)?;
+        let layout = self.layout();
+        self.progress.begin(stage::SHADE);
+        let values = cost.measure(pass::SHADE, |stage| {
+            let visible = (0..self.drawn().len() as u32).filter(|&i| projected.is_visible(i as usize));
+            let looked_up = self.look_ups(maps, visible);
+            let lights = self.lit_by(maps, &looked_up);
+            let values = shade(&self.shading(&lights), &projected, &layout, self.progress);
+            stage.items_in = projected.visible();
+            stage.items_out = stage.items_in;
+            stage.bytes = 4 * values.len() as u64;
+            Ok::<_, Error>(values)
+        })?;
+        self.tick()?;
+        Ok(self.shaded.get_or_init(|| Shaded { projected, values, channels: layout.count() }))
+    }
+
+    /// Depths are for opaque splats and what they hide, for depth layers, and for telling objects apart.
+    fn detail(&self) -> Detail {
+        let opaque = self.drawn().kind.contains(&SplatKind::Opaque);
+        Detail { depth: opaque || self.layers.depth || self.layers.object, object: self.layers.object }
+    }
+
+    /// Footprints of the drawn splats.
+    fn project(&self, cost: &mut CostRecord) -> Result<Projected, Error> {
+        self.progress.begin(stage::PROJECT);
+        self.tick()?;
+        let (l, cloud) = (self.loaded, self.drawn());
+        let projected = cost.measure(pass::PROJECT, |stage| {
+            let mut projected = Projected::default();
+            let (params, detail) = (self.raster_params(), self.detail());
+            raster::project_into(&mut projected, cloud, &self.camera, &l.footprints, &l.materials, &params, detail);
+            stage.items_in = cloud.len() as u64;
+            stage.items_out = projected.visible();
+            stage.bytes = projected.bytes();
+            Ok::<_, Error>(projected)
+        })?;
+        self.tick()?;
+        Ok(projected)
+    }
+
+    /// The opaque ones of the drawn splats.
+    pub(crate) fn solid_ids(&self) -> Vec<u32> {
+        let kinds = &self.drawn().kind;
+        (0..kinds.len() as u32).filter(|&i| kinds[i as usize] == SplatKind::Opaque).collect()
+    }
+
+    /// The nearest opaque surface of every sample; an empty image where nothing is opaque.
+    pub(crate) fn opaque(&self, cost: &mut CostRecord) -> Result<&OpaqueImage, Error> {
+        if let Some(opaque) = self.opaque.get() {
+            return Ok(opaque);
+        }
+        let ids = self.solid_ids();
+        // Beside translucent splats they have been shaded already.
+        let alone = self.shaded.get().is_none() && !ids.is_empty();
+        let by_device = if alone { self.solid_by_device(&ids, cost)? } else { None };
+        let mut image = by_device.unwrap_or_default();
+        if !ids.is_empty() && image.depth.is_empty() {
+            let Shaded { projected, values, channels } = self.shaded(cost)?;
+            self.progress.begin(stage::OPAQUE);
+            image = cost.measure(pass::OPAQUE, |stage| {
+                stage.items_in = ids.len() as u64;
+                let objects = self.layers.object;
+                let (image, counts) =
+                    raster::resolve_opaque(projected, &ids, values, *channels, objects, self.progress);
+                record(stage, &counts);
+                Ok::<_, Error>(image)
+            })?;
+        }
+        Ok(self.opaque.get_or_init(|| image))
+    }
+
+    /// Takes the opaque image that a device has made.
+    pub(crate) fn set_opaque(&self, image: OpaqueImage) {
+        // One that is there already is the same.
+        let _ = self.opaque.set(image);
+    }
+
+    /// Layers of what was composited in front of the opaque splats.
+    pub(crate) fn finish(&self, accumulator: &Accumulator, cost: &mut CostRecord) -> Result<Layers, Error> {
+        let opaque = self.opaque(cost)?;
+        self.progress.begin(stage::FINISH);
+        cost.measure(pass::FINISH, |stage| {
+            let background = Background { color: self.scene.background };
+            let [width, height] = accumulator.size;
+            stage.items_in = u64::from(width) * u64::from(height);
+            self.tick()?;
+            let antialias = self.settings.antialias;
+            Ok::<_, Error>(raster::finish(accumulator, opaque, &background, &self.layout(), &self.layers, antialias))
+        })
+    }
+}
+
+/// What rasterization did, in the record of its stage.
+pub(crate) fn record(stage: &mut StageCost, counts: &RasterCounts) {
+    stage.items_out = counts.splats;
+    stage.fragments = counts.fragments;
+    stage.bytes = counts.bytes;
+}

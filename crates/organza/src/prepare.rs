@@ -1,0 +1,154 @@
+//! From a scene to what drawing reads: read, choose, convert, plan.
+
+use crate::choose::{choose, plan, row, technique_of, techniques};
+use crate::form::PlannedObject;
+use crate::load::files::Files;
+use crate::load::{self, Loaded, SplatCount, light_statistics};
+use crate::memory::{self, Memory};
+use crate::plan::{Plan, pass};
+use crate::scene::{Scene, SceneObject, Technique};
+use crate::shadows::shadow_error;
+use crate::statistics::Statistics;
+use crate::work::Translucent;
+use crate::{CostRecord, Error, Progress, RenderOptions, doubts, shadows};
+use splat_core::Material;
+
+/// What a render would do, without doing it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Explanation {
+    /// Effects and passes with their reasons.
+    pub plan: Plan,
+    /// What loading cost.
+    pub cost: CostRecord,
+    /// Bytes that rendering will take at its peak, see [`Explanation::plan`] for the passes that take them. Shadow maps are
+    /// predicted from the sizes of their casters as a light sees them; together they are held to what is allowed when they are
+    /// built.
+    pub memory: u64,
+    /// Splats of every visible object, as predicted from its input and as made.
+    pub splats: Vec<SplatCount>,
+    /// What a user should know of the input.
+    pub warnings: Vec<String>,
+    /// What files hold that a picture does not show, and what was made of them.
+    pub notes: Vec<String>,
+}
+
+/// Loads a scene and plans its render.
+///
+/// # Errors
+/// As [`render`].
+pub fn explain(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Explanation, Error> {
+    let (_, mut explanation, _) = prepare(scene, options, progress, &Files::default())?;
+    explanation.warnings.extend(doubts::of_shadows(&explanation.plan.shadow_tables));
+    progress.finish();
+    Ok(explanation)
+}
+
+pub(crate) fn prepare(
+    scene: &Scene,
+    options: &RenderOptions,
+    progress: &Progress,
+    files: &Files,
+) -> Result<(Loaded, Explanation, Memory), Error> {
+    let mut cost = CostRecord::default();
+    memory::check("the image", memory::image_bytes(scene), options.max_memory)?;
+    check_samples(scene)?;
+    let loaded = load_measured(scene, options, progress, files, &mut cost)?;
+    let (plan, memory) = plan_loaded(scene, &loaded, options)?;
+    let (splats, notes) = (loaded.splats.clone(), loaded.notes.clone());
+    let mut warnings = loaded.warnings.clone();
+    warnings.extend(doubts::of_scene(scene, &loaded));
+    let inputs = cost.stages.iter().filter(|s| s.name == pass::READ).map(|s| s.bytes).sum();
+    let most = memory.total().max(memory::loading_bytes(&loaded, inputs));
+    Ok((loaded, Explanation { plan, cost, memory: most, splats, warnings, notes }, memory))
+}
+
+/// The plan of a loaded scene, and the bytes that it takes.
+pub(crate) fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Result<(Plan, Memory), Error> {
+    check_samples(scene)?;
+    let planned: Vec<PlannedObject> = visible(scene)
+        .zip(&loaded.planned)
+        .map(|(object, planned)| PlannedObject { technique: technique_of(object, scene), ..planned.clone() })
+        .collect();
+    let made: Vec<u64> = loaded.splats.iter().map(|s| s.made).collect();
+    let mut statistics = Statistics::of_cloud(&loaded.cloud, &loaded.materials, &loaded.objects, &loaded.footprints);
+    statistics.lights = light_statistics(&loaded.lights, &loaded.casts);
+    statistics.normals_needed = loaded.normals;
+    statistics.layers = scene.render.layers.names().map(str::to_owned).collect();
+    statistics.tolerance = scene.render.tolerance;
+    statistics = statistics.with_objects(&loaded.statistics, &planned, &made);
+    statistics.techniques = techniques(scene);
+    // Those that draw something; where nothing is translucent, one that has nothing to do.
+    let idle = |t: &Technique| statistics.translucent_of(*t).is_none();
+    match statistics.techniques.iter().all(idle) {
+        true => statistics.techniques.truncate(1),
+        false => statistics.techniques = statistics.techniques.iter().copied().filter(|t| !idle(t)).collect(),
+    }
+    let materials = loaded.own.iter().map(|o| &loaded.materials[scene.objects[o.object].material]);
+    let unequal = |m: &Material| m.extinction_rgb.iter().any(|e| *e != m.extinction_rgb[0]);
+    statistics.colored_extinction |= materials.into_iter().any(unequal);
+    let mut plan = plan(&statistics);
+    plan.by = scene.objects.iter().map(|o| technique_of(o, scene)).collect();
+    plan.is_own = vec![false; scene.objects.len()];
+    loaded.own.iter().for_each(|own| plan.is_own[own.object] = true);
+    plan.draws = plan.by.iter().zip(&plan.is_own).map(|(by, own)| row(*by).draws_splats && !own).collect();
+    let used = statistics.techniques.iter().filter(|t| statistics.translucent_of(**t).is_some());
+    // They take turns, and each keeps what it has.
+    let own = used.map(|t| (row(*t).bytes)(scene, statistics.colored_extinction, options)).sum();
+    let memory = Memory::new(scene, loaded, own);
+    memory::check("rendering", memory.total(), options.max_memory)?;
+    let left = options.max_memory - memory.total();
+    // Shadow maps share what is left.
+    let tables = shadows::tables(&scene.render, loaded, &plan.shadow_maps, left);
+    plan.set_shadow_tables(tables.map_err(|(light, error)| shadow_error(light, &error))?, left);
+    let memory = memory.with_maps(shadows::bytes(plan.shadow_tables.iter().flatten()));
+    memory::check("rendering", memory.total(), options.max_memory)?;
+    Ok((plan, memory))
+}
+
+/// Footprints keep their pixel rectangles in 16 bits.
+fn check_samples(scene: &Scene) -> Result<(), Error> {
+    let longest = scene.camera.size[0].max(scene.camera.size[1]);
+    let (needed, limit) = (u64::from(longest) * u64::from(scene.render.antialias), u64::from(u16::MAX));
+    if needed <= limit {
+        return Ok(());
+    }
+    Err(Error::Limit {
+        what: "the longer side of the image".into(),
+        needed,
+        limit,
+        unit: "samples",
+        hint: "use a smaller camera.size or render.antialias".into(),
+    })
+}
+
+/// Reads every visible object, chooses its technique and form, and converts it.
+///
+/// # Errors
+/// See [`crate::render`].
+pub fn load(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Loaded, Error> {
+    load_measured(scene, options, progress, &Files::default(), &mut CostRecord::default())
+}
+
+/// [`load`] with what was read before, and with entries in the cost record: reading, and conversion where something is
+/// converted.
+fn load_measured(
+    scene: &Scene,
+    options: &RenderOptions,
+    progress: &Progress,
+    files: &Files,
+    cost: &mut CostRecord,
+) -> Result<Loaded, Error> {
+    let looks = |object: &SceneObject| row(technique_of(object, scene)).form.is_some();
+    let inputs = load::read(scene, options, progress, files, &looks, cost)?;
+    let by = visible(scene).map(|o| technique_of(o, scene));
+    let planned = choose(inputs.statistics.iter().zip(by), &inputs.light_statistics());
+    // Of what comes beside splats nothing is known but that there is some.
+    let some = Translucent { splats: 0.0, fragments: 0.0, any: true };
+    let steps = techniques(scene).into_iter().flat_map(|t| row(t).steps);
+    let beside = steps.map(|step| (step.seconds)(scene, &some)).sum();
+    inputs.convert(planned, beside, cost)
+}
+
+fn visible(scene: &Scene) -> impl Iterator<Item = &SceneObject> + Clone {
+    scene.objects.iter().filter(|o| o.visible)
+}

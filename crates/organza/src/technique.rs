@@ -1,0 +1,145 @@
+//! The table of techniques: what each states before anything is converted, and how it begins. Nothing else in this crate knows
+//! their names.
+//!
+//! A technique folds what is translucent into an accumulator, front to back: all of it at once, or one range of depths after the
+//! other, in turns with other techniques. What it cannot fold in order, such as an average of random sets, fills a segment of its
+//! own, which [`Accumulator::append`] puts behind what was there. Opaque surfaces, light and shadows are the frame's.
+
+pub(crate) mod particles;
+pub(crate) mod points;
+pub(crate) mod reference;
+
+use crate::form::{DRAWN, Form};
+use crate::frame::Frame;
+use crate::plan::pass;
+use crate::scene::{Scene, Technique};
+use crate::stage;
+use crate::statistics::ObjectStatistics;
+use crate::work::{Translucent, cost};
+use crate::{CostRecord, Error, Layers, RenderOptions, Sets};
+pub(crate) use particles::{Checkpoint, Kept};
+use splat_core::Accumulator;
+use splat_core::raster::OpaqueImage;
+use std::ops::Range;
+
+/// What a technique states.
+pub(crate) struct Row {
+    /// As scenes name it.
+    pub(crate) technique: Technique,
+    /// Whether `auto` may choose it: it takes the first that it may.
+    pub(crate) is_offered: bool,
+    /// What becomes of translucent things, in words.
+    pub(crate) how: &'static str,
+    /// What it does where extinction differs by channel, in words; `None` where that goes without saying.
+    pub(crate) by_channel: Option<&'static str>,
+    /// The form in which it takes an object, and why; `None` for splats, whatever an object is.
+    pub(crate) form: Option<fn(&ObjectStatistics) -> (Form, &'static str)>,
+    /// What it makes of splats, in words.
+    pub(crate) of_splats: &'static str,
+    /// Whether it draws translucent splats as they are: they get footprints and radiance.
+    pub(crate) draws_splats: bool,
+    /// Its passes; the last one comes behind opaque surfaces, those before it come before footprints.
+    pub(crate) steps: &'static [Step],
+    /// Whether its picture is an average of random sets, which a checkpoint can keep and which have a standard error.
+    pub(crate) is_random: bool,
+    /// Bytes that it takes beside what all techniques take.
+    pub(crate) bytes: fn(&Scene, colored_extinction: bool, &RenderOptions) -> u64,
+    /// Begins a frame.
+    pub(crate) begin: for<'a> fn(&'a Frame<'a>) -> Box<dyn Fold + 'a>,
+}
+
+/// One pass of a technique.
+pub(crate) struct Step {
+    /// Its name in plans and cost records.
+    pub(crate) pass: &'static str,
+    /// Its name for those who wait.
+    pub(crate) stage: &'static str,
+    /// Seconds of one core, about.
+    pub(crate) seconds: fn(&Scene, &Translucent) -> f64,
+}
+
+/// A technique at work on a frame.
+pub(crate) trait Fold {
+    /// Folds what is its own at view depths in `range`, behind all that the accumulator holds.
+    fn fold(
+        &mut self,
+        range: Range<f32>,
+        into: &mut Accumulator,
+        session: &mut Session<'_>,
+        cost: &mut CostRecord,
+    ) -> Result<(), Error>;
+
+    /// Adds the layers that it alone can make to a finished picture, which it drew by itself.
+    fn finish(&mut self, _: &mut Finished<'_>) {}
+}
+
+/// All depths.
+pub(crate) const EVERYWHERE: Range<f32> = f32::NEG_INFINITY..f32::INFINITY;
+
+/// What a render leaves for the next, takes from the last, and tells.
+pub(crate) struct Session<'s> {
+    pub(crate) options: &'s RenderOptions,
+    /// Where sums of random sets are kept on disk.
+    pub(crate) checkpoint: Option<&'s mut Checkpoint>,
+    /// Sets that serve all frames of an animation.
+    pub(crate) kept: Option<&'s mut Kept>,
+    pub(crate) warnings: &'s mut Vec<String>,
+    /// Sets that were averaged, where some were.
+    pub(crate) sets: Option<Sets>,
+}
+
+/// A finished picture.
+pub(crate) struct Finished<'f> {
+    pub(crate) layers: Layers,
+    pub(crate) opaque: Option<&'f OpaqueImage>,
+}
+
+/// Every technique, the preferred first.
+pub(crate) static TABLE: [Row; 3] = [
+    Row {
+        technique: Technique::Points,
+        is_offered: true,
+        how: "are composited in order",
+        by_channel: None,
+        form: None,
+        of_splats: DRAWN,
+        draws_splats: true,
+        steps: &[
+            Step { pass: pass::SORT, stage: stage::SORT, seconds: |_, all| cost::SORT * all.splats },
+            Step { pass: pass::SPLAT, stage: stage::COMPOSITE, seconds: |_, all| cost::FRAGMENT * all.fragments },
+        ],
+        is_random: false,
+        bytes: |_, _, _| 0,
+        begin: points::begin,
+    },
+    Row {
+        technique: Technique::Particles,
+        is_offered: false,
+        how: "become particles",
+        by_channel: Some("a particle hides each channel by chance"),
+        form: Some(particles::form),
+        of_splats: "particles are sampled from them",
+        draws_splats: false,
+        steps: &[Step { pass: pass::PARTICLES, stage: stage::PARTICLES, seconds: particles::seconds }],
+        is_random: true,
+        bytes: particles::bytes,
+        begin: particles::begin,
+    },
+    Row {
+        technique: Technique::Reference,
+        is_offered: false,
+        how: "are sorted pixel by pixel, exactly, which is slow",
+        by_channel: None,
+        form: None,
+        of_splats: DRAWN,
+        draws_splats: true,
+        steps: &[Step {
+            pass: pass::REFERENCE,
+            stage: stage::REFERENCE,
+            seconds: |_, all| cost::EXACT_FRAGMENT * all.fragments,
+        }],
+        is_random: false,
+        bytes: reference::bytes,
+        begin: reference::begin,
+    },
+];

@@ -1,0 +1,174 @@
+//! The `particles` technique (Tanaka 2012): translucent things become sets of opaque particles, each set is drawn by depth
+//! alone, and the pictures are averaged. Nothing is sorted.
+//!
+//! Splats are the particles' source: a splat of cross-section K gives a Poisson number of particles distributed as its
+//! kernel, so that its optical depth is that of the `points` technique. Opaque surfaces are drawn exactly and hide particles
+//! behind them. Light comes from the same shadow maps.
+//!
+//! An average is a segment of its own: what lies in a range of depths hides what lies behind it as its mean opacity does, for
+//! the particles of two ranges are independent.
+
+mod checkpoint;
+mod ensemble;
+mod form;
+mod kept;
+mod layers;
+mod parts;
+
+use crate::frame::Frame;
+use crate::plan::pass;
+use crate::scene::Scene;
+use crate::technique::{EVERYWHERE, Finished, Fold, Session};
+use crate::{CostRecord, Error, RenderOptions, Sets};
+pub(crate) use checkpoint::Checkpoint;
+use ensemble::{Average, average_bytes, fold};
+pub(crate) use form::form;
+pub(crate) use kept::Kept;
+use layers::{accumulate, of_hits, std_error};
+use parts::{Part, sources};
+use pbsr::Occluder;
+use splat_core::raster::OpaqueImage;
+use splat_core::shade::ChannelLayout;
+use splat_core::{Accumulator, LayerData};
+use std::ops::Range;
+
+/// Seconds of a sample of a set.
+const SET: f64 = 4e-7;
+
+/// Seconds of one core that the sets of a scene take, about.
+pub(crate) fn seconds(scene: &Scene, all: &crate::work::Translucent) -> f64 {
+    let sets = SET * crate::work::samples(scene) * f64::from(scene.render.particles.repeat_level);
+    if all.any { sets } else { 0.0 }
+}
+
+/// Bytes of averaging the picture of a scene.
+pub(crate) fn bytes(scene: &Scene, colored_extinction: bool, options: &RenderOptions) -> u64 {
+    let size = scene.camera.size.map(|s| u64::from(s) * u64::from(scene.render.antialias));
+    average_bytes(size, &scene.render.layers.set(), colored_extinction, options)
+}
+
+/// Begins a frame.
+pub(crate) fn begin<'a>(frame: &'a Frame<'a>) -> Box<dyn Fold + 'a> {
+    Box::new(Particles { frame, parts: None, average: None })
+}
+
+/// What particles are sampled from, and what they left.
+struct Particles<'a> {
+    frame: &'a Frame<'a>,
+    /// Once they were made.
+    parts: Option<Vec<Part<'a>>>,
+    /// The sets of the last range.
+    average: Option<Average>,
+}
+
+impl Fold for Particles<'_> {
+    /// An interrupt after two sets leaves the picture of the sets so far.
+    fn fold(
+        &mut self,
+        range: Range<f32>,
+        into: &mut Accumulator,
+        session: &mut Session<'_>,
+        cost: &mut CostRecord,
+    ) -> Result<(), Error> {
+        let frame = self.frame;
+        let opaque = frame.opaque(cost)?;
+        if self.parts.is_none() {
+            self.parts = Some(parts(frame, session, cost)?);
+        }
+        let parts = self.parts.as_deref().unwrap_or_default();
+        let inside: Vec<&Part<'_>> = parts.iter().filter(|part| part.reaches(&range, &frame.camera)).collect();
+        if inside.is_empty() {
+            return Ok(());
+        }
+        let layout = frame.layout();
+        let occluder = occluder(opaque, &layout);
+        let maps = frame.maps(cost)?;
+        let average = cost.measure(pass::PARTICLES, |stage| {
+            let average = fold(frame, &inside, maps, range.clone(), occluder.as_ref(), session)?;
+            stage.items_in = inside.len() as u64;
+            stage.items_out = average.particles;
+            stage.bytes = average.ensemble.bytes();
+            Ok::<_, Error>(average)
+        })?;
+        let asked = frame.settings.particles.repeat_level;
+        let (averaged, interrupted) = (average.ensemble.levels(), average.interrupted);
+        session.sets = Some(Sets { averaged, asked, interrupted });
+        let mut segment = frame.accumulator();
+        accumulate(&average.ensemble, &layout, &mut segment);
+        of_hits(&average.ensemble, &inside, &mut segment);
+        into.append(&segment);
+        self.average = (range == EVERYWHERE).then_some(average);
+        Ok(())
+    }
+
+    fn finish(&mut self, finished: &mut Finished<'_>) {
+        if !self.frame.settings.layers.names().any(|name| name == "std_error") {
+            return;
+        }
+        // Without particles there is no noise.
+        let none = || LayerData::Scalar(vec![0.0; finished.layers.size.iter().map(|s| *s as usize).product()]);
+        let error = self.average.as_ref().map_or_else(none, |average| {
+            let occluder = finished.opaque.and_then(|opaque| occluder(opaque, &self.frame.layout()));
+            std_error(&average.ensemble, occluder.as_ref(), self.frame)
+        });
+        finished.layers.insert("std_error", error);
+    }
+}
+
+/// Everything translucent in view that is drawn by particles; sets that are kept where there are some.
+fn parts<'a>(frame: &'a Frame<'a>, session: &mut Session<'_>, cost: &mut CostRecord) -> Result<Vec<Part<'a>>, Error> {
+    let mut sources = sources(frame);
+    if let Some(kept) = session.kept.as_deref_mut() {
+        kept.sample(&mut sources, frame, cost, session.warnings)?;
+    }
+    let mut parts = Vec::with_capacity(sources.len());
+    for mut source in sources {
+        let sets = session.kept.as_deref().and_then(|kept| kept.of(source.own_object()?));
+        match sets {
+            Some(sets) => parts.push(source.part_of(parts::Particles::Kept(sets))),
+            None => parts.extend(source.part(session.warnings)?),
+        }
+    }
+    Ok(parts)
+}
+
+/// What hides particles, with its beauty.
+fn occluder(opaque: &OpaqueImage, layout: &ChannelLayout) -> Option<Occluder> {
+    if opaque.depth.is_empty() {
+        return None;
+    }
+    let color =
+        |k: usize| std::array::from_fn(|c| layout.effects().map(|first| opaque.channels[first + c][k]).sum::<f32>());
+    Some(Occluder { depth: opaque.depth.clone(), color: (0..opaque.depth.len()).map(color).collect() })
+}
+
+/// What went wrong with the particles of the named object or objects: a limit, or data that samplers do not take. They are
+/// refused by the samplers' own checks, so that it is never the program's fault.
+fn refuse(whose: &str, error: pbsr::Error) -> Error {
+    match error {
+        pbsr::Error::Core(splat_core::Error::Cancelled) => Error::Cancelled,
+        pbsr::Error::TooMuch { what, needed, had, unit } => Error::Limit {
+            what: format!("{whose}: {what}"),
+            needed,
+            limit: had,
+            unit,
+            hint: "use a lower extinction or opacity, a smaller image or render.antialias, or a larger --max-memory"
+                .into(),
+        },
+        pbsr::Error::Field { .. } => Error::input(
+            whose,
+            error.to_string(),
+            "use a smaller box, or an expression that is finite everywhere in it",
+        ),
+        other => {
+            Error::input(whose, other.to_string(), "use sizes, places, extinctions and opacities within its reach")
+        }
+    }
+}
+
+fn fault(error: pbsr::Error) -> Error {
+    match error {
+        pbsr::Error::Core(splat_core::Error::Cancelled) => Error::Cancelled,
+        other => Error::Internal(other.to_string()),
+    }
+}

@@ -1,0 +1,45 @@
+//! The form from which the particles of an object are sampled.
+//!
+//! An object is sampled from its own data wherever a sampler knows them, and from its splats where those are the data (raw
+//! points).
+
+use crate::form::Form;
+use crate::scene::SurfaceSampler;
+use crate::statistics::{ObjectData, ObjectStatistics};
+
+/// Looseness of a field's bound above which triangles are faster than lines.
+const LOOSEST: f64 = 4.2;
+
+pub(crate) fn form(object: &ObjectStatistics) -> (Form, &'static str) {
+    if object.opaque {
+        return (Form::Opaque, "an opaque surface is drawn exactly");
+    }
+    match object.data {
+        ObjectData::Points => (Form::Splats, "there is nothing between raw points"),
+        ObjectData::Triangles => (Form::Triangles, "a uniform place on a triangle is exact"),
+        ObjectData::Surface { looseness, trilinear, by } => surface(looseness, trilinear, by),
+        ObjectData::Volume => (Form::Cells, "extinction is known on a lattice"),
+        ObjectData::Density { bounded: false } => {
+            (Form::Cells, "the expression has no bound, so it is sampled on a lattice")
+        }
+        ObjectData::Density { .. } if object.by_gradient => {
+            (Form::Cells, "it is shaded by its gradient, which a lattice gives")
+        }
+        ObjectData::Density { .. } => (Form::Field, "extinction has a bound wherever it is asked for"),
+    }
+}
+
+fn surface(looseness: f64, trilinear: bool, by: SurfaceSampler) -> (Form, &'static str) {
+    match by {
+        SurfaceSampler::Auto if trilinear => {
+            (Form::Lattice, "lines along a lattice meet a trilinear surface in closed form")
+        }
+        SurfaceSampler::Auto if looseness > LOOSEST => {
+            (Form::Triangles, "its field has a loose bound, so that lines would search long: it is meshed")
+        }
+        SurfaceSampler::Auto => (Form::Lines, "random lines meet a surface uniformly, without a mesh of it"),
+        SurfaceSampler::Lines => (Form::Lines, "the scene asks for it"),
+        SurfaceSampler::Triangles => (Form::Triangles, "the scene asks for it"),
+        SurfaceSampler::Brownian { .. } => (Form::Brownian, "the scene asks for it"),
+    }
+}

@@ -1,0 +1,143 @@
+//! The `points` technique (Gunjee 2007): translucent splats in slices, composited in order.
+
+mod chained;
+
+use crate::frame::{Frame, Shaded, record};
+use crate::plan::pass;
+use crate::scene::Technique;
+use crate::technique::{EVERYWHERE, Fold, Session};
+use crate::{CostRecord, Error, stage};
+use splat_core::raster;
+use splat_core::raster::gpu::Input;
+use splat_core::{Accumulator, Direction, SliceOrder};
+use std::borrow::Cow;
+use std::ops::Range;
+
+/// Begins a frame.
+pub(crate) fn begin<'a>(frame: &'a Frame<'a>) -> Box<dyn Fold + 'a> {
+    Box::new(Points { frame, order: None })
+}
+
+/// The translucent splats of a frame that are the technique's own.
+struct Points<'a> {
+    frame: &'a Frame<'a>,
+    /// Once it was made.
+    order: Option<SliceOrder>,
+}
+
+impl Fold for Points<'_> {
+    fn fold(
+        &mut self,
+        range: Range<f32>,
+        into: &mut Accumulator,
+        _: &mut Session<'_>,
+        cost: &mut CostRecord,
+    ) -> Result<(), Error> {
+        let frame = self.frame;
+        let whole = range == EVERYWHERE && frame.plan.techniques.len() == 1;
+        if whole && self.staying(into, cost)? {
+            return Ok(());
+        }
+        frame.maps(cost)?;
+        if whole && self.chained(into, cost)? {
+            return Ok(());
+        }
+        if self.order.is_none() {
+            self.order = Some(sorted(frame, Technique::Points, cost)?);
+        }
+        frame.shaded(cost)?;
+        frame.opaque(cost)?;
+        let order = self.order.as_ref().expect("invariant: the order was made above");
+        composite(frame, order, range, into, cost)
+    }
+}
+
+/// Slices of the translucent splats of a technique; an empty order without any.
+fn sorted(frame: &Frame<'_>, technique: Technique, cost: &mut CostRecord) -> Result<SliceOrder, Error> {
+    let (cloud, camera) = (frame.drawn(), &frame.camera);
+    let translucent: Vec<u32> = frame.translucent(cloud, technique);
+    if translucent.is_empty() {
+        return Ok(SliceOrder::default());
+    }
+    frame.progress.begin(stage::SORT);
+    frame.tick()?;
+    let params = sort_params(frame);
+    let order = cost.measure(pass::SORT, |stage| {
+        let helped = frame.helper.and_then(|helper| helper.order(cloud, &translucent, camera, &params));
+        let order = helped.map_or_else(
+            || hbsort::slice_cloud(cloud, Some(&translucent), camera, &params, &mut hbsort::Scratch::default()),
+            Ok,
+        );
+        let order = order.map_err(|e| Error::Internal(e.to_string()))?;
+        stage.items_in = translucent.len() as u64;
+        stage.items_out = order.input_from_sorted.len() as u64;
+        stage.bytes = 4 * (order.input_from_sorted.len() + order.slice_starts.len()) as u64;
+        Ok::<_, Error>(order)
+    })?;
+    Ok(match frame.settings.points.first_slices {
+        Some(n) => order.first_slices(usize::try_from(n).unwrap_or(usize::MAX)),
+        None => order,
+    })
+}
+
+fn sort_params(frame: &Frame<'_>) -> hbsort::Params {
+    let points = &frame.settings.points;
+    hbsort::Params {
+        direction: points.direction,
+        thickness: frame.loaded.slice_thickness.map_or(hbsort::Thickness::Auto, hbsort::Thickness::World),
+        // Depths are made from splats in order, not from slices.
+        exact: points.exact || frame.layers.depth,
+        margin_px: frame.filter_reach_px(),
+        ..hbsort::Params::default()
+    }
+}
+
+/// Composites the splats of an order whose centres lie at view depths in `range` in front of the opaque ones, behind all that the
+/// accumulator holds.
+pub(crate) fn composite(
+    frame: &Frame<'_>,
+    order: &SliceOrder,
+    range: Range<f32>,
+    into: &mut Accumulator,
+    cost: &mut CostRecord,
+) -> Result<(), Error> {
+    let mut ids = Cow::Borrowed(order.input_from_sorted.as_slice());
+    if ids.is_empty() {
+        return Ok(());
+    }
+    let mut direction = order.direction;
+    let whole = range == EVERYWHERE;
+    if (frame.layers.depth || !whole) && direction == Direction::BackToFront {
+        // Depths, and one range after the other, are made front to back. The picture is the same.
+        ids.to_mut().reverse();
+        direction = Direction::FrontToBack;
+    }
+    let ids = if whole { &ids[..] } else { &ids[within(frame, &ids, range)] };
+    let Shaded { projected, values, .. } = frame.shaded(cost)?;
+    let opaque = frame.opaque(cost)?;
+    frame.progress.begin(stage::COMPOSITE);
+    frame.tick()?;
+    cost.measure(pass::SPLAT, |stage| {
+        stage.items_in = ids.len() as u64;
+        let (materials, params) = (&frame.loaded.materials, frame.raster_params());
+        let input = Input { projected, order: ids, values, materials, opaque, direction, params: &params };
+        let device = frame.helper.filter(|_| frame.device_composites);
+        let counts = device.and_then(|device| device.composite(&input, into)).unwrap_or_else(|| {
+            raster::fold(projected, ids, values, materials, opaque, direction, &params, into, frame.progress)
+        });
+        record(stage, &counts);
+        Ok::<_, Error>(())
+    })?;
+    frame.tick()
+}
+
+/// The part of an order, front to back, whose centres lie at view depths in a range. Ranges that meet share no splat and lose
+/// none: where slices are not sorted inside, a splat belongs to where the order has it.
+fn within(frame: &Frame<'_>, ids: &[u32], range: Range<f32>) -> Range<usize> {
+    let cloud = frame.drawn();
+    let place = frame.camera.view_from_offset(cloud.origin);
+    let before = |limit: f32| ids.partition_point(|i| place.depth(cloud.position[*i as usize]) < limit);
+    let start = if range.start <= 0.0 { 0 } else { before(range.start) };
+    let end = if range.end == f32::INFINITY { ids.len() } else { before(range.end) };
+    start..end.max(start)
+}
