@@ -3,7 +3,7 @@
 //! This crate joins the stages: it reads a scene, asks what the scene calls for, runs those passes and writes images.
 //!
 //! ```text
-//! scene.toml ─ scene ─► load (convert) ─► statistics ─► plan ─► points (tsm, hbsort, splat-core) ─► output
+//! scene.toml ─ organza-scene ─► load (convert) ─► statistics ─► plan ─► points (tsm, hbsort, splat-core) ─► output
 //! ```
 //!
 //! ```
@@ -40,7 +40,6 @@ mod particles;
 pub mod plan;
 mod points;
 mod render;
-pub mod scene;
 mod sequence;
 mod shadows;
 pub mod statistics;
@@ -48,9 +47,11 @@ pub mod truth;
 mod work;
 
 pub use device::{Agreement, Checked, DeviceChoice, KernelTime, ListedDevice, Passport, devices, passport};
-pub use error::{Error, escape_controls, printable, shown};
+pub use error::Error;
 pub use info::{FileInfo, info};
 pub use load::{Loaded, SplatCount, load};
+pub use organza_scene as scene;
+pub use organza_scene::{escape_controls, printable, shown};
 pub use render::{Explanation, Render, RenderOptions, Sets, explain, render};
 pub use sequence::Sequence;
 pub use shadows::ShadowTable;
