@@ -5,7 +5,7 @@ use crate::points::Drawing;
 use pbsr::{Ensemble, Occluder};
 use splat_core::raster::OpaqueImage;
 use splat_core::shade::ChannelLayout;
-use splat_core::{Accumulator, LayerData, Layers};
+use splat_core::{Accumulator, LayerData, Layers, PixelSamples};
 
 /// Optical depth of a pixel that particles hide in every set.
 const HIDDEN: f32 = 64.0;
@@ -55,10 +55,10 @@ impl OfHits<'_> {
     pub(super) fn layers(&self, drawing: &Drawing<'_>, std_error: bool) -> Vec<(&'static str, LayerData)> {
         let background = drawing.background;
         let samples = self.ensemble.read(&|_, _| background, self.occluder);
-        let pixels = Pixels { size: self.ensemble.size(), antialias: drawing.settings.antialias };
+        let pixels = PixelSamples { size: self.ensemble.size(), antialias: drawing.settings.antialias };
         let mut layers = Vec::new();
         if std_error {
-            layers.push(("std_error", pixels.error(&samples)));
+            layers.push(("std_error", error(&pixels, &samples)));
         }
         if drawing.layers.depth {
             for name in ["depth.first", "depth.median", "depth.mean", "depth.sigma"] {
@@ -91,29 +91,9 @@ fn depth(samples: impl Iterator<Item = f32>, least: bool) -> f32 {
     }
 }
 
-/// Samples of pixels.
-struct Pixels {
-    /// Samples.
-    size: [u32; 2],
-    antialias: u32,
-}
-
-impl Pixels {
-    /// One value a pixel, of the places of its samples.
-    fn map<T>(&self, value: impl Fn(&mut dyn Iterator<Item = usize>) -> T) -> Vec<T> {
-        let antialias = self.antialias as usize;
-        let [width, height] = self.size.map(|s| s as usize / antialias);
-        let of_pixel = |k: usize| {
-            let (x, y) = (k % width * antialias, k / width * antialias);
-            value(&mut (0..antialias * antialias).map(|s| (y + s / antialias) * width * antialias + x + s % antialias))
-        };
-        (0..width * height).map(of_pixel).collect()
-    }
-
-    /// Standard error of each pixel's luminance: that of the mean of its independent samples.
-    fn error(&self, samples: &Layers) -> LayerData {
-        let errors = samples.scalar("std_error").expect("invariant: an ensemble has an error");
-        let all = (self.antialias * self.antialias) as f32;
-        LayerData::Scalar(self.map(|at| at.map(|k| errors[k] * errors[k]).sum::<f32>().sqrt() / all))
-    }
+/// Standard error of each pixel's luminance: that of the mean of its independent samples.
+fn error(pixels: &PixelSamples, samples: &Layers) -> LayerData {
+    let errors = samples.scalar("std_error").expect("invariant: an ensemble has an error");
+    let all = pixels.per_pixel() as f32;
+    LayerData::Scalar(pixels.map(|at| at.map(|k| errors[k] * errors[k]).sum::<f32>().sqrt() / all))
 }
