@@ -1,7 +1,7 @@
 //! Scene files that are wrong: every one is refused with its place, a reason and exit code 3, and none panics.
 
 use organza::Error;
-use organza::scene::{LoadOptions, MAX_SCENE_BYTES, Override, Scene, load, parse};
+use organza::scene::{self, LoadOptions, MAX_SCENE_BYTES, Override, Scene};
 use std::path::Path;
 
 const SCENE: &str = r#"version = 1
@@ -26,6 +26,11 @@ opacity = 0.3
 [render]
 points = { slice_thickness = "auto" }
 "#;
+
+/// As the command sees it, which knows an exit code for every error.
+fn parse(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Scene, Error> {
+    Ok(scene::parse(file, bytes, options)?)
+}
 
 fn try_toml(text: &str) -> Result<Scene, Error> {
     parse(Path::new("s.toml"), text.as_bytes(), &LoadOptions::default())
@@ -414,7 +419,11 @@ fn overrides_change_the_scene_and_are_to_blame_for_their_errors() {
 #[test]
 fn bi1_what_is_no_file_is_a_file_system_error() {
     for path in ["/nowhere/s.toml", "/", "/dev/zero"] {
-        assert_eq!(load(Path::new(path), &LoadOptions::default()).unwrap_err().exit_code(), 4, "{path}");
+        assert_eq!(
+            Error::from(scene::load(Path::new(path), &LoadOptions::default()).unwrap_err()).exit_code(),
+            4,
+            "{path}"
+        );
     }
 }
 

@@ -47,6 +47,36 @@ pub fn field_to_mesh<F: ScalarField + ?Sized>(
     surface_nets(field, &lattice, &splat.object_name, &Progress::new())
 }
 
+/// The zero set of a field inside a box as triangles that are as fine as splats `spacing` apart (object units): cells of
+/// √2 `spacing`, vertices and normals of the field. Triangles whose middle lies beyond the border of the field's own domain
+/// are left out, so an open surface ends within one triangle of it.
+///
+/// ```
+/// use convert::{Clip, ClippedField, ExpressionField, SplatParams, surface_to_mesh};
+/// use splat_core::glam::DVec3;
+/// let ball = ExpressionField::parse("sqrt(x^2 + y^2 + z^2) - 1").unwrap();
+/// let above = Clip::HalfSpace { normal: -DVec3::Y, offset: 0.0 };
+/// let dome = ClippedField::new(std::sync::Arc::new(ball), vec![above]).unwrap();
+/// let mesh = surface_to_mesh(&dome, [DVec3::splat(-1.2), DVec3::splat(1.2)], 0.1, &SplatParams::default()).unwrap();
+/// let lowest = mesh.triangles.iter().flatten().map(|v| mesh.position[*v as usize].y).fold(1.0, f32::min);
+/// assert!((lowest + mesh.origin.y as f32).abs() < 0.2);
+/// ```
+///
+/// # Errors
+/// As [`field_to_mesh`].
+pub fn surface_to_mesh<F: ScalarField + ?Sized>(
+    field: &F,
+    bounds: [DVec3; 2],
+    spacing: f64,
+    splat: &SplatParams,
+) -> Result<Mesh, ConvertError> {
+    let mut mesh = field_to_mesh(field, bounds, CELL_OVER_SPACING * spacing, splat)?;
+    let corner = |v: u32| mesh.position[v as usize].as_dvec3();
+    let middle = |t: &[u32; 3]| mesh.origin + (corner(t[0]) + corner(t[1]) + corner(t[2])) / 3.0;
+    mesh.triangles = mesh.triangles.iter().copied().filter(|t| field.in_domain(middle(t))).collect();
+    Ok(mesh)
+}
+
 /// Splats of the zero set of a field inside a box (object space); `params` as for a mesh, where [`Density::Auto`] is
 /// 1/256 of the longest side of the box.
 ///

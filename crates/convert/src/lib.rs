@@ -50,6 +50,7 @@ mod raw_points;
 pub mod read;
 pub mod reference;
 mod resample;
+mod section;
 mod shapes;
 mod sobel;
 mod subdivide;
@@ -70,8 +71,8 @@ pub use error::{Fault, Place, ReadError, escaped_path};
 #[cfg(feature = "expression")]
 pub use expression::{ExpressionError, ExpressionField};
 pub use field_points::{
-    DensityParams, density_to_points, density_to_points_with_progress, field_to_grid, field_to_mesh, surface_to_points,
-    surface_to_points_with_progress,
+    DensityParams, density_to_points, density_to_points_with_progress, field_to_grid, field_to_mesh, surface_to_mesh,
+    surface_to_points, surface_to_points_with_progress,
 };
 pub use grid_field::{GridField, Inside, Interpolation};
 pub use marching_cubes::isosurface_to_mesh;
@@ -87,6 +88,7 @@ pub use params::{Density, SplatParams};
 pub use procedural::{CloudShape, Ellipsoid, procedural_cloud, procedural_cloud_with_progress};
 pub use raw_points::{PointLattice, RawPoints};
 pub use resample::resampled;
+pub use section::volume_section;
 pub use shapes::{medium_ball, medium_box, rectangle};
 pub use sobel::{sobel_gradient, sobel_gradient_into};
 #[cfg(feature = "surfels")]

@@ -1,12 +1,10 @@
 //! The objects of a scene become one cloud in canonical order, with its tables.
 
-pub(crate) mod bounded;
 mod context;
 pub(crate) mod files;
 pub(crate) mod input;
 pub(crate) mod object;
 pub(crate) mod own;
-mod slice;
 
 use crate::form::PlannedObject;
 use crate::plan::pass;

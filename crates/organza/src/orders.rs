@@ -17,6 +17,7 @@ use crate::prepare::{load, plan_loaded};
 use crate::scene::{ParticlesSettings, Scene, Technique};
 use crate::technique::{EVERYWHERE, points};
 use crate::{CostRecord, Error, Progress, RenderOptions};
+use hbsort::reference::{CentreKey, as_given, by_centre};
 use hbsort::{Params, Scratch, Thickness, slice_cloud};
 use reference::metrics::{Disorder, Image, Linear, Rays};
 use reference::statistics::{Spread, median_with_spread};
@@ -277,9 +278,9 @@ impl Sorter<'_> {
             order = match ordering {
                 Ordering::Exact => self.slices(Thickness::Auto, true)?,
                 Ordering::Slices(t) => self.slices(Thickness::World(t), false)?,
-                Ordering::Centre => self.sorted(|view| f64::from(view.z)),
-                Ordering::Distance => self.sorted(|view| view.as_dvec3().length_squared()),
-                Ordering::Unsorted => self.in_order(self.translucent.clone()),
+                Ordering::Centre => self.by_centre(CentreKey::Depth),
+                Ordering::Distance => self.by_centre(CentreKey::Distance),
+                Ordering::Unsorted => as_given(self.translucent.clone()),
             };
             seconds.push(start.elapsed().as_secs_f64());
         }
@@ -315,22 +316,8 @@ impl Sorter<'_> {
         Ok(scratch.info().bytes)
     }
 
-    /// A comparison sort of all splats by a key of the centre's place in the view; culling is left to the rasterizer.
-    fn sorted(&self, key: impl Fn(splat_core::glam::Vec3) -> f64) -> SliceOrder {
-        let cloud = &self.loaded.cloud;
-        let view = self.camera.view_from_offset(cloud.origin);
-        let keyed = self.translucent.iter().map(|&i| (key(view.apply(cloud.position[i as usize])), i));
-        let mut keyed: Vec<(f64, u32)> = keyed.collect();
-        keyed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        self.in_order(keyed.into_iter().map(|k| k.1).collect())
-    }
-
-    fn in_order(&self, ids: Vec<u32>) -> SliceOrder {
-        SliceOrder {
-            slice_starts: vec![0, ids.len() as u32],
-            input_from_sorted: ids,
-            slices: 1,
-            ..SliceOrder::default()
-        }
+    /// Culling is left to the rasterizer.
+    fn by_centre(&self, key: CentreKey) -> SliceOrder {
+        by_centre(&self.loaded.cloud, &self.translucent, &self.camera, key)
     }
 }

@@ -8,8 +8,6 @@
 //! shaded by their gradient, surfaces that scatter by a phase function.
 
 mod object;
-mod placed;
-mod volume;
 
 use crate::scene::{LightSource, Scene, SceneLight};
 use crate::{Error, Progress, RenderOptions};

@@ -48,6 +48,7 @@
 
 mod bins;
 mod blocks;
+mod bounded;
 mod brownian;
 mod checkpoint;
 mod colored;
@@ -84,6 +85,7 @@ mod volume;
 mod volume_field;
 mod walk;
 
+pub use bounded::{BoundedExtinction, Matter};
 pub use brownian::{BrownianParams, BrownianReport, BrownianSampler};
 pub use cost::{Counts, Prediction, predict};
 pub use ensemble::{Ensemble, EnsembleParams};

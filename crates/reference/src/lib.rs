@@ -36,6 +36,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod classified;
 mod composite;
 mod density;
 mod dielectric;
@@ -51,6 +52,7 @@ mod medium;
 pub mod metrics;
 mod path;
 mod phase;
+mod placed;
 mod quadrature;
 mod random;
 mod ray;
@@ -62,6 +64,7 @@ mod tracking;
 mod triangle;
 mod visibility;
 
+pub use classified::Classified;
 pub use composite::{ExactImage, Fragment, Input, Order, composite, composite_with_progress, fold_fragments};
 pub use density::{Density, Lattice};
 pub use dielectric::{
@@ -76,6 +79,7 @@ pub use march::{MarchedImage, MarchedRay, march, march_image, optical_depth};
 pub use medium::{ColorAt, Medium};
 pub use path::PathRules;
 pub use phase::{henyey_greenstein, sample_henyey_greenstein};
+pub use placed::{Placed, TurnedBox, box_around};
 pub use quadrature::{Integral, MarchParams};
 pub use ray::Ray;
 pub use roots::{Crossings, RootParams, crossings};

@@ -30,7 +30,7 @@ pub enum LightShape {
     },
 }
 
-/// One light. An extended light is several points, see `organza::scene::SceneLight`.
+/// One light. An extended light is several points, see `organza_scene::SceneLight`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Light {
     /// Where it comes from.

@@ -104,7 +104,7 @@ impl Folder {
         let path = self.0.path().join("scene.toml");
         std::fs::write(&path, text).unwrap();
         let overrides = overrides.iter().map(|o| Override::parse(o)).collect::<Result<_, _>>()?;
-        load(&path, &LoadOptions { overrides, frame, ..LoadOptions::default() })
+        Ok(load(&path, &LoadOptions { overrides, frame, ..LoadOptions::default() })?)
     }
 
     /// The displayed picture.

@@ -1,10 +1,8 @@
 //! What an object is made from: files read, formulas parsed, with the parameters of the conversion.
 
-use super::bounded::{BoundedExtinction, Matter};
 use super::context::Context;
 use super::files::{FileData, Fitted, grid_bytes, mesh_bytes, points_bytes};
 use super::object::refuse;
-use super::slice::slice;
 use crate::Error;
 use crate::scene::{
     CloudSource, DensitySource, ImplicitSource, LevelSetSource, MediumShape, RectangleSource, SceneObject, Source,
@@ -16,6 +14,7 @@ use convert::{
     MpuParams, RawPoints, SharedField, SplatParams, SurfelParams, VolumeParams,
 };
 use glam::DVec3;
+use pbsr::{BoundedExtinction, Matter};
 use splat_core::{Grid, Mesh, TransferFunction};
 use std::path::Path;
 use std::sync::Arc;
@@ -162,7 +161,8 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
         Source::Slice(source) => {
             let grid = read_grid(&source.path, context)?;
             let spacing = object.spacing.map_or_else(|| shortest_step(&grid), |s| s / splat.transform.scale);
-            let mesh = slice(grid, source, spacing, &splat).map_err(|e| refuse(&e))?;
+            let mesh = convert::volume_section(grid, &source.transfer, source.center, source.normal, spacing, &splat);
+            let mesh = mesh.map_err(|e| refuse(&e))?;
             let density = Density::Spacing(spacing * splat.transform.scale);
             Input::Mesh(crate::printable(&source.path), mesh.into(), MeshParams { splat, density, opacity })
         }

@@ -1,6 +1,5 @@
 //! One object → its cloud.
 
-use super::bounded::BoundedExtinction;
 use super::context::Context;
 use super::input::{Input, input};
 use super::own::{Body, Own, Search};
@@ -13,6 +12,7 @@ use convert::{
     VolumeParams,
 };
 use glam::DVec3;
+use pbsr::BoundedExtinction;
 use splat_core::{Cloud, Grid, Mesh, Object, Shading, Similarity, TransferFunction, TransferPoint};
 use std::path::Path;
 

@@ -2,7 +2,6 @@
 //!
 //! Lengths and places are the object's own, so nothing is rounded where it lies far away; a transform leads to the world.
 
-use super::bounded::BoundedExtinction;
 use super::context::Context;
 use super::files::{grid_bytes, mesh_bytes};
 use super::input::{Input, shortest_step};
@@ -10,8 +9,9 @@ use super::object::{Prepared, as_it_is, procedural, refuse};
 use crate::Error;
 use crate::form::Form;
 use crate::scene::{RectangleSource, SurfaceSampler};
-use convert::{DensityParams, SharedField, SplatParams};
+use convert::{DensityParams, SharedField};
 use glam::DVec3;
+use pbsr::BoundedExtinction;
 use rayon::prelude::*;
 use splat_core::{Footprint, Grid, Mesh, Similarity, SplatKind, TransferFunction, optics};
 use std::sync::Arc;
@@ -174,7 +174,7 @@ fn elements(body: &Body, [low, high]: [DVec3; 2], splats: u64) -> u64 {
         }
         Body::Lattice { .. } => 2 * splats,
         Body::Triangles(mesh) => mesh.triangles.len() as u64,
-        Body::Field(field) => u64::from(field.cells).pow(3),
+        Body::Field(field) => u64::from(field.cells()).pow(3),
         Body::Surface { spacing, .. } => {
             let cells = line_cells((high - low).max_element(), *spacing);
             6 * u64::from(cells).pow(2)
@@ -205,7 +205,7 @@ fn data(
         let (seen, side) = field.seen();
         let around = |[low, high]: [DVec3; 2], p: DVec3| [low.min(p - 0.5 * side), high.max(p + 0.5 * side)];
         let bounds = seen.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], around);
-        let some = field.max > 0.0;
+        let some = field.max() > 0.0;
         return Ok(some.then_some((Body::Field(field), bounds, spacing)));
     }
     let cells = |grid: Arc<Grid>, transfer: TransferFunction, normals: bool| {
@@ -219,7 +219,8 @@ fn data(
         Input::Surface(field, bounds, params, lattice) => {
             let spacing = world_spacing(&params.density) / params.splat.transform.scale;
             if source == Form::Triangles {
-                return Ok(triangles(net(field, *bounds, spacing, &params.splat)?, prepared.prediction.splats));
+                let mesh = convert::surface_to_mesh(field.as_ref(), *bounds, spacing, &params.splat);
+                return Ok(triangles(mesh.map_err(|e| refuse(&e))?, prepared.prediction.splats));
             }
             let bounds = prepared.search.as_ref().map_or(*bounds, |s| s.bounds);
             if let (Form::Lattice, Some((grid, level))) = (source, lattice) {
@@ -284,16 +285,6 @@ fn triangles(mut mesh: Mesh, splats: u64) -> Option<Data> {
     let piece = area / splats.max(1) as f64;
     convert::flatten_leaning(&mut mesh, piece);
     (area > 0.0).then_some((Body::Triangles(mesh), bounds, piece.sqrt()))
-}
-
-/// A surface as triangles whose vertices and normals are those of the field, as fine as its splats.
-fn net(field: &SharedField, bounds: [DVec3; 2], spacing: f64, splat: &SplatParams) -> Result<Mesh, Error> {
-    let cell = std::f64::consts::SQRT_2 * spacing;
-    let mut mesh = convert::field_to_mesh(field.as_ref(), bounds, cell, splat).map_err(|e| refuse(&e))?;
-    let corner = |v: u32| mesh.position[v as usize].as_dvec3();
-    let middle = |t: &[u32; 3]| mesh.origin + (corner(t[0]) + corner(t[1]) + corner(t[2])) / 3.0;
-    mesh.triangles = mesh.triangles.iter().copied().filter(|t| field.in_domain(middle(t))).collect();
-    Ok(mesh)
 }
 
 fn rectangle(r: &RectangleSource) -> Mesh {

@@ -1,15 +1,16 @@
 //! One object as the path tracer takes it: a density or a mesh in the world.
 
-use super::placed::{Placed, TurnedBox};
-use super::volume::Classified;
 use crate::load::input::{cloud_shape, field, wrong_kind};
 use crate::load::object::refuse;
 use crate::scene::{MediumShape, Scene, SceneMaterial, SceneObject, Source, VolumeSource};
 use crate::{Error, RenderOptions};
-use convert::SplatParams;
 use convert::read::Loaded as FileData;
+use convert::{ExpressionField, SplatParams};
 use glam::{DMat3, DQuat, DVec3, Vec3};
-use reference::{ColorAt, Density, Lattice, Liberty, Medium, Surface, SurfaceKind, SurfaceMaterial};
+use reference::{
+    Classified, ColorAt, Density, Lattice, Liberty, Medium, Placed, Surface, SurfaceKind, SurfaceMaterial,
+};
+use reference::{TurnedBox, box_around};
 use splat_core::{Grid, Mesh, ScalarField, Shading, Similarity, optics};
 use std::path::Path;
 use std::sync::Arc;
@@ -47,7 +48,7 @@ enum Shape {
     Box([DVec3; 2]),
     Ball { center: DVec3, radius: f64 },
     Grid(Grid),
-    Field { field: Placed, bounds: [DVec3; 2], majorant: f64 },
+    Field { field: Placed<ExpressionField>, bounds: [DVec3; 2], majorant: f64 },
     Turned { field: TurnedBox, bounds: [DVec3; 2] },
     Volume(Arc<Classified>),
 }
@@ -174,7 +175,7 @@ fn shape(object: &SceneObject, options: &RenderOptions) -> Result<(Shape, f64), 
             (Shape::Ball { center: t.apply(*center), radius: radius * t.scale }, *extinction)
         }
         Source::Medium(MediumShape::Box { min, max, extinction, .. }) => {
-            let bounds = around(|p| t.apply(p), [*min, *max]);
+            let bounds = box_around(|p| t.apply(p), [*min, *max]);
             let shape = if t.rotation == DQuat::IDENTITY {
                 Shape::Box(bounds)
             } else {
@@ -192,7 +193,7 @@ fn shape(object: &SceneObject, options: &RenderOptions) -> Result<(Shape, f64), 
         }
         Source::Density(d) => {
             let field = Placed::new(field(&d.expression, object)?, t, d.bounds);
-            let bounds = around(|p| t.apply(p), d.bounds);
+            let bounds = box_around(|p| t.apply(p), d.bounds);
             let majorant = majorant(&field, bounds);
             (Shape::Field { field, bounds, majorant }, d.extinction)
         }
@@ -207,19 +208,9 @@ fn shape(object: &SceneObject, options: &RenderOptions) -> Result<(Shape, f64), 
     })
 }
 
-/// The box along the world's axes around a box that is moved.
-pub(super) fn around(place: impl Fn(DVec3) -> DVec3, [low, high]: [DVec3; 2]) -> [DVec3; 2] {
-    let corner = |k: usize| {
-        let pick = |bit: usize| if k >> bit & 1 == 1 { high[bit] } else { low[bit] };
-        place(DVec3::new(pick(0), pick(1), pick(2)))
-    };
-    let both = |[a, b]: [DVec3; 2], p: DVec3| [a.min(p), b.max(p)];
-    (0..8).map(corner).fold([DVec3::INFINITY, DVec3::NEG_INFINITY], both)
-}
-
 /// A number that a field does not exceed in a box: the largest upper bound over balls around its cells, or where there is
 /// none a guess from samples, which the tracer watches.
-fn majorant(field: &Placed, [low, high]: [DVec3; 2]) -> f64 {
+fn majorant(field: &Placed<ExpressionField>, [low, high]: [DVec3; 2]) -> f64 {
     let size = high - low;
     let cell = size.max_element() / MAJORANT_CELLS;
     let count = (size / cell).ceil().max(DVec3::ONE);

@@ -4,7 +4,7 @@ use super::parts::Part;
 use crate::frame::Frame;
 use pbsr::{Ensemble, Occluder};
 use splat_core::shade::ChannelLayout;
-use splat_core::{Accumulator, DepthProfile, LayerData, Layers};
+use splat_core::{Accumulator, DepthProfile, LayerData, Layers, PixelSamples};
 
 /// Optical depth of a pixel that particles hide in every set.
 const HIDDEN: f32 = 64.0;
@@ -63,32 +63,12 @@ pub(super) fn of_hits(ensemble: &Ensemble, parts: &[&Part<'_>], segment: &mut Ac
 pub(super) fn std_error(ensemble: &Ensemble, occluder: Option<&Occluder>, frame: &Frame<'_>) -> LayerData {
     let background = frame.scene.background;
     let samples = ensemble.read(&|_, _| background, occluder);
-    Pixels { size: ensemble.size(), antialias: frame.settings.antialias }.error(&samples)
+    error(&PixelSamples { size: ensemble.size(), antialias: frame.settings.antialias }, &samples)
 }
 
-/// Samples of pixels.
-struct Pixels {
-    /// Samples.
-    size: [u32; 2],
-    antialias: u32,
-}
-
-impl Pixels {
-    /// One value a pixel, of the places of its samples.
-    fn map<T>(&self, value: impl Fn(&mut dyn Iterator<Item = usize>) -> T) -> Vec<T> {
-        let antialias = self.antialias as usize;
-        let [width, height] = self.size.map(|s| s as usize / antialias);
-        let of_pixel = |k: usize| {
-            let (x, y) = (k % width * antialias, k / width * antialias);
-            value(&mut (0..antialias * antialias).map(|s| (y + s / antialias) * width * antialias + x + s % antialias))
-        };
-        (0..width * height).map(of_pixel).collect()
-    }
-
-    /// Standard error of each pixel's luminance: that of the mean of its independent samples.
-    fn error(&self, samples: &Layers) -> LayerData {
-        let errors = samples.scalar("std_error").expect("invariant: an ensemble has an error");
-        let all = (self.antialias * self.antialias) as f32;
-        LayerData::Scalar(self.map(|at| at.map(|k| errors[k] * errors[k]).sum::<f32>().sqrt() / all))
-    }
+/// Standard error of each pixel's luminance: that of the mean of its independent samples.
+fn error(pixels: &PixelSamples, samples: &Layers) -> LayerData {
+    let errors = samples.scalar("std_error").expect("invariant: an ensemble has an error");
+    let all = pixels.per_pixel() as f32;
+    LayerData::Scalar(pixels.map(|at| at.map(|k| errors[k] * errors[k]).sum::<f32>().sqrt() / all))
 }

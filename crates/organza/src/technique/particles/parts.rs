@@ -7,14 +7,13 @@ use super::refuse;
 use crate::Error;
 use crate::frame::Frame;
 use crate::load::Loaded;
-use crate::load::bounded::BoundedExtinction;
 use crate::load::own::{Body, Own, line_cells};
 use crate::scene::Technique;
 use glam::DVec3;
 use pbsr::{
-    Appearance, BrownianParams, BrownianReport, BrownianSampler, Density, FieldVolumeSampler, GridSampler,
-    ImplicitSurface, KeptSets, LatticeSampler, LineReport, LineSampler, MeshSampler, Object, Sampler, SplatParams,
-    SplatSampler, SurfaceParams, VolumeParams,
+    Appearance, BoundedExtinction, BrownianParams, BrownianReport, BrownianSampler, Density, FieldVolumeSampler,
+    GridSampler, ImplicitSurface, KeptSets, LatticeSampler, LineReport, LineSampler, MeshSampler, Object, Sampler,
+    SplatParams, SplatSampler, SurfaceParams, VolumeParams,
 };
 use splat_core::{Camera, Cloud, Similarity, SplatKind, rng};
 use std::collections::BTreeMap;
@@ -318,8 +317,8 @@ impl<'a> Source<'a> {
     }
 
     fn field<'b>(&self, own: &Own, field: &'b BoundedExtinction) -> Result<Box<dyn Sampler + 'b>, pbsr::Error> {
-        let extinction = Density { field, max: field.max };
-        let (bounds, cells, color) = (field.bounds, field.cells, own.color);
+        let extinction = Density { field, max: field.max() };
+        let (bounds, cells, color) = (field.bounds(), field.cells(), own.color);
         Ok(Box::new(FieldVolumeSampler::new(extinction, bounds, cells, self.cross_section, color, self.seed)?))
     }
 

@@ -2,7 +2,7 @@
 
 use super::check::{At, LARGEST};
 use super::paths::Paths;
-use super::raw_object::{RawClip, RawInside, RawInterpolation, RawIsosurface, RawLevelSet, RawSlice};
+use super::raw_source::{RawClip, RawInside, RawInterpolation, RawIsosurface, RawLevelSet, RawSlice};
 use super::{IsosurfaceSource, LevelSetSource, SliceSource};
 use crate::Error;
 use convert::{Clip, Inside, Interpolation, MpuParams};

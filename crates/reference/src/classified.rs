@@ -1,21 +1,36 @@
-//! A classified volume as the path tracer takes it: v(p) trilinear between lattice points, then colour and extinction by the
+//! A classified volume as a field of extinction: v(p) trilinear between lattice points, then colour and extinction by the
 //! transfer function (post-classification).
 //!
 //! The value at a lattice point stands for its cell: constant in the outer half cells, nothing beyond.
 
+use crate::placed::box_around;
 use glam::{DMat3, DVec3};
 use splat_core::{Grid, ScalarField, Similarity, TransferFunction};
 
-/// The extinction of a volume in the world, as a field.
-pub(super) struct Classified {
+/// The extinction of a volume in the world, 1/world unit, as a field: a [`Density::Field`](crate::Density::Field) of a medium
+/// whose own extinction is 1.
+///
+/// ```
+/// use reference::Classified;
+/// use splat_core::glam::{DMat3, DVec3};
+/// use splat_core::{Grid, ScalarField, Similarity, TransferFunction, TransferPoint};
+/// let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [2, 1, 1], values: vec![0.0, 1.0] };
+/// let point = |value, extinction| TransferPoint { value, color: [1.0; 3], extinction };
+/// let transfer = TransferFunction::new(vec![point(0.0, 0.0), point(1.0, 4.0)]).unwrap();
+/// let volume = Classified::new(grid, transfer, &Similarity::default());
+/// assert_eq!(volume.value(DVec3::new(0.5, 0.0, 0.0)), 2.0);
+/// assert_eq!((volume.most(), volume.bounds()[1].x), (4.0, 1.5));
+/// ```
+pub struct Classified {
     grid: Grid,
     index_from_world: DMat3,
     transfer: TransferFunction,
 }
 
 impl Classified {
-    /// The volume, moved into the world.
-    pub(super) fn new(mut grid: Grid, transfer: TransferFunction, t: &Similarity) -> Self {
+    /// The volume, moved into the world; `transfer` gives extinction in 1/world unit. `grid` is expected to be valid
+    /// ([`Grid::validate`]).
+    pub fn new(mut grid: Grid, transfer: TransferFunction, t: &Similarity) -> Self {
         grid.origin = t.apply(grid.origin);
         grid.axes = DMat3::from_quat(t.rotation) * grid.axes * t.scale;
         Self { index_from_world: grid.axes.inverse(), grid, transfer }
@@ -47,25 +62,25 @@ impl Classified {
         Some(mix(plane(0), plane(1), part.z))
     }
 
-    /// Colour by the transfer function.
-    pub(super) fn color(&self, p: DVec3) -> [f64; 3] {
+    /// Colour by the transfer function, linear Rec.709; black outside.
+    pub fn color(&self, p: DVec3) -> [f64; 3] {
         self.trilinear(self.index(p)).map_or([0.0; 3], |v| self.transfer.at(v as f32).color.map(f64::from))
     }
 
-    /// Largest number in a colour.
-    pub(super) fn brightest(&self) -> f64 {
+    /// Largest number in a colour of the transfer function.
+    pub fn brightest(&self) -> f64 {
         self.transfer.points().iter().flat_map(|p| p.color).fold(0.0, |most, c| most.max(f64::from(c)))
     }
 
-    /// Largest extinction.
-    pub(super) fn most(&self) -> f64 {
+    /// Largest extinction of the transfer function, 1/world unit: a majorant of the field.
+    pub fn most(&self) -> f64 {
         self.transfer.points().iter().fold(0.0, |most, p| most.max(f64::from(p.extinction)))
     }
 
-    /// The box, along the world's axes, outside which there is nothing.
-    pub(super) fn bounds(&self) -> [DVec3; 2] {
+    /// Lowest and highest corner of a box outside which there is nothing, world units.
+    pub fn bounds(&self) -> [DVec3; 2] {
         let (low, high) = (DVec3::splat(-0.5), self.last() + 0.5);
-        super::object::around(|corner| self.grid.origin + self.grid.axes * corner, [low, high])
+        box_around(|corner| self.grid.origin + self.grid.axes * corner, [low, high])
     }
 
     /// Least and largest extinction of the values between two.

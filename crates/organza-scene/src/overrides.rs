@@ -10,7 +10,7 @@ use crate::shown;
 /// One change: a value at a path of keys.
 ///
 /// ```
-/// use organza::scene::Override;
+/// use organza_scene::Override;
 /// let change = Override::parse("render.points.exact=true").unwrap();
 /// assert_eq!(change.flag(), "--set render.points.exact=true");
 /// ```

@@ -2,41 +2,59 @@
 //!
 //! Particles are thinned out by value over bound, and ask for the bound of their cell each time: it is looked up.
 
-use convert::SharedField;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
-use splat_core::ScalarField;
+use splat_core::{ScalarField, glam};
+use std::sync::Arc;
 
-/// Cells along each side of the box.
-pub(crate) const CELLS: u32 = 64;
+/// Cells along each side of the box, unless the medium is the same everywhere in it.
+const CELLS: u32 = 64;
 
 /// What has an extinction.
-pub(crate) enum Matter {
+#[derive(Clone)]
+#[non_exhaustive]
+pub enum Matter {
     /// A homogeneous box: all of it.
     Everywhere,
     /// A homogeneous ball.
-    Ball { center: DVec3, radius: f64 },
+    Ball {
+        /// Centre.
+        center: DVec3,
+        /// Radius, > 0.
+        radius: f64,
+    },
     /// Where the field is 1, extinction is whole; negative values count as 0.
-    Density(SharedField),
+    Density(Arc<dyn ScalarField + Send>),
 }
 
-/// Extinction in a box, 1/object unit.
-pub(crate) struct BoundedExtinction {
+/// Extinction in a box, 1/unit of length, never negative, with a bound for each of its cells: what
+/// [`FieldVolumeSampler`](crate::FieldVolumeSampler) thins particles by. A bound costs a look-up, a value what the field costs.
+///
+/// ```
+/// use pbsr::{BoundedExtinction, Matter};
+/// use splat_core::{ScalarField, glam::DVec3};
+/// let ball = Matter::Ball { center: DVec3::ZERO, radius: 1.0 };
+/// let fog = BoundedExtinction::new(ball, 0.5, [DVec3::splat(-1.0), DVec3::ONE]).unwrap();
+/// assert_eq!((fog.value(DVec3::X * 0.9), fog.value(DVec3::ONE)), (0.5, 0.0));
+/// assert_eq!(fog.max(), 0.5);
+/// ```
+pub struct BoundedExtinction {
     matter: Matter,
     /// Where the density is 1.
     extinction: f64,
-    pub(crate) bounds: [DVec3; 2],
+    bounds: [DVec3; 2],
     /// Cells along each side.
-    pub(crate) cells: u32,
+    cells: u32,
     /// Largest extinction in each cell, x fastest.
     most: Vec<f64>,
     /// Largest of all.
-    pub(crate) max: f64,
+    max: f64,
 }
 
 impl BoundedExtinction {
-    /// Bounds `matter` in a box; `None` where a density has no bound.
-    pub(crate) fn new(matter: Matter, extinction: f64, bounds: [DVec3; 2]) -> Option<Self> {
+    /// Bounds `matter` in the box between two corners, the first less in all three; `extinction`, ≥ 0, is that of density
+    /// 1. `None` where a density has no finite bound.
+    pub fn new(matter: Matter, extinction: f64, bounds: [DVec3; 2]) -> Option<Self> {
         let cells = if matches!(matter, Matter::Everywhere) { 1 } else { CELLS };
         let n = cells as usize;
         let mut field = Self { matter, extinction, bounds, cells, most: Vec::new(), max: 0.0 };
@@ -60,12 +78,28 @@ impl BoundedExtinction {
         Some(density * self.extinction)
     }
 
-    pub(super) fn bytes(&self) -> u64 {
+    /// Lowest and highest corner of the box.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        self.bounds
+    }
+
+    /// Cells along each side of the box, each with a bound.
+    pub fn cells(&self) -> u32 {
+        self.cells
+    }
+
+    /// No value exceeds this.
+    pub fn max(&self) -> f64 {
+        self.max
+    }
+
+    /// Bytes of the bounds.
+    pub fn bytes(&self) -> u64 {
         size_of_val(self.most.as_slice()) as u64
     }
 
     /// Middles of the cells that may have an extinction, and their sides.
-    pub(super) fn seen(&self) -> (impl Iterator<Item = DVec3> + '_, DVec3) {
+    pub fn seen(&self) -> (impl Iterator<Item = DVec3> + '_, DVec3) {
         let (n, side) = (self.cells as usize, (self.bounds[1] - self.bounds[0]) / f64::from(self.cells));
         let index = move |c: usize| DVec3::new((c % n) as f64, (c / n % n) as f64, (c / (n * n)) as f64);
         let some = self.most.iter().enumerate().filter(|(_, most)| **most > 0.0);
@@ -114,14 +148,56 @@ impl ScalarField for BoundedExtinction {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use convert::ExpressionField;
     use splat_core::rng;
-    use std::sync::Arc;
+
+    /// exp(−x² − y²)·(1 + sin 9z) − 1/2, bounded term by term.
+    struct Hill;
+
+    impl ScalarField for Hill {
+        fn value(&self, p: DVec3) -> f64 {
+            libm::exp(-p.x * p.x - p.y * p.y) * (1.0 + libm::sin(9.0 * p.z)) - 0.5
+        }
+
+        fn gradient(&self, _: DVec3) -> DVec3 {
+            DVec3::ZERO
+        }
+
+        fn hessian(&self, _: DVec3) -> DMat3 {
+            DMat3::ZERO
+        }
+
+        fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> {
+            let nearest = (p.truncate().length() - radius).max(0.0);
+            let wave = (1.0 + libm::sin(9.0 * p.z) + 9.0 * radius).min(2.0);
+            Some((-0.5, libm::exp(-nearest * nearest) * wave - 0.5))
+        }
+    }
+
+    /// Without a bound.
+    struct Pole;
+
+    impl ScalarField for Pole {
+        fn value(&self, p: DVec3) -> f64 {
+            1.0 / p.x
+        }
+
+        fn gradient(&self, _: DVec3) -> DVec3 {
+            DVec3::ZERO
+        }
+
+        fn hessian(&self, _: DVec3) -> DMat3 {
+            DMat3::ZERO
+        }
+
+        fn bound(&self, _: DVec3, _: f64) -> Option<(f64, f64)> {
+            None
+        }
+    }
 
     #[test]
     fn values_stay_below_the_bound_of_their_cell() {
-        let hill: SharedField = Arc::new(ExpressionField::parse("exp(-x^2 - y^2) * (1 + sin(9*z)) - 0.5").unwrap());
-        let field = BoundedExtinction::new(Matter::Density(hill), 3.0, [DVec3::splat(-1.0), DVec3::ONE]).unwrap();
+        let field =
+            BoundedExtinction::new(Matter::Density(Arc::new(Hill)), 3.0, [DVec3::splat(-1.0), DVec3::ONE]).unwrap();
         let radius = (2.0 / f64::from(CELLS)) * 0.75f64.sqrt();
         let mut positive = 0;
         for i in 0..10_000 {
@@ -139,7 +215,8 @@ mod tests {
 
     #[test]
     fn a_density_without_a_bound_is_none() {
-        let pole: SharedField = Arc::new(ExpressionField::parse("1/x").unwrap());
-        assert!(BoundedExtinction::new(Matter::Density(pole), 1.0, [DVec3::splat(-1.0), DVec3::ONE]).is_none());
+        assert!(
+            BoundedExtinction::new(Matter::Density(Arc::new(Pole)), 1.0, [DVec3::splat(-1.0), DVec3::ONE]).is_none()
+        );
     }
 }

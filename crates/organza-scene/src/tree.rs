@@ -89,8 +89,8 @@ pub(super) fn error_at(
     hint: impl Into<String>,
 ) -> Error {
     let (line, column) = line_and_column(text, byte);
-    let message = crate::error::escape_controls(&message.into()).into_owned();
-    let hint = crate::error::escape_controls(&hint.into()).into_owned();
+    let message = crate::escape_controls(&message.into()).into_owned();
+    let hint = crate::escape_controls(&hint.into()).into_owned();
     Error::Scene { file: file.to_owned(), line, column, message, hint }
 }
 
@@ -101,7 +101,7 @@ impl Document<'_> {
             Place::Byte(byte) => error_at(self.file, self.text, byte, message, hint),
             Place::Flag(index) => {
                 let message = format!("{}: {}", shown(&self.flags[index]), message.into());
-                let escape = |text: &str| crate::error::escape_controls(text).into_owned();
+                let escape = |text: &str| crate::escape_controls(text).into_owned();
                 Error::usage(escape(&message), escape(&hint.into()))
             }
         }

@@ -2,7 +2,7 @@
 
 use super::check::{At, LARGEST, SMALLEST};
 use super::de::suggest;
-use super::raw::{
+use super::raw_render::{
     Auto, RawAccumulation, RawDirection, RawMapping, RawParticles, RawPoints, RawRender, RawShadow, RawSurfaceSampler,
 };
 use super::{

@@ -14,13 +14,14 @@ pub(super) fn load_scene(arguments: &SceneArguments) -> Result<Scene, Error> {
 /// The bytes of the scene's file.
 pub(super) fn read_scene(arguments: &SceneArguments) -> Result<Vec<u8>, Error> {
     check_backend(arguments)?;
-    scene::read(&arguments.scene)
+    Ok(scene::read(&arguments.scene)?)
 }
 
 /// The scene of these bytes with the options of the command line, as it is written or at a frame of its animation.
 pub(super) fn parse_scene(arguments: &SceneArguments, bytes: &[u8], frame: Option<u32>) -> Result<Scene, Error> {
     let overrides = overrides(arguments)?;
-    scene::parse(&arguments.scene, bytes, &LoadOptions { allow_path: arguments.allow_path, overrides, frame })
+    let options = LoadOptions { allow_path: arguments.allow_path, overrides, frame };
+    Ok(scene::parse(&arguments.scene, bytes, &options)?)
 }
 
 /// What the render may take and how it treats doubtful input.
@@ -118,7 +119,7 @@ fn overrides(a: &SceneArguments) -> Result<Vec<Override>, Error> {
         options.push((format!("--layers {}", layers.join(",")), "render.layers", format!("[{list}]")));
     }
     let options = options.into_iter().map(|(flag, path, value)| Override::from_option(flag, path, &value));
-    options.chain(a.set.iter().map(|text| Override::parse(text))).collect()
+    Ok(options.chain(a.set.iter().map(|text| Override::parse(text))).collect::<Result<_, _>>()?)
 }
 
 /// A text as TOML, which takes JSON's quotes and escapes.

@@ -1,4 +1,10 @@
-//! The command line: arguments → library calls → text or JSON, with one exit code for each kind of error.
+//! The command `organza`: arguments → library calls → text or JSON, with one exit code for each kind of error.
+//!
+//! ```text
+//! args ─► session (overrides, scene, threads, memory) ─► render explain accuracy orders ─► report ─► console
+//!                                                        info devices passport
+//! ```
+#![forbid(unsafe_code)]
 
 mod accuracy;
 mod args;
@@ -21,8 +27,7 @@ use organza::Error;
 use std::panic::{self, AssertUnwindSafe};
 use std::process::ExitCode;
 
-/// Runs the command of the process's arguments.
-pub(crate) fn main() -> ExitCode {
+fn main() -> ExitCode {
     ExitCode::from(guard(|| {
         let arguments = match Arguments::try_parse() {
             Ok(arguments) => arguments,

@@ -3,7 +3,7 @@
 use super::SceneMaterial;
 use super::check::{At, LARGEST, SMALLEST};
 use super::de::suggest;
-use super::raw_object::{RawMaterial, RawShading, RawSurfaceOpacity};
+use super::raw_material::{RawMaterial, RawShading, RawSurfaceOpacity};
 use crate::{Error, shown};
 use splat_core::optics::{SurfaceOpacity, absorption_coefficient};
 use splat_core::{Material, Shading};

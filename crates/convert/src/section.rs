@@ -1,19 +1,42 @@
 //! A plane through a volume as triangles, coloured by the volume's values.
 
-use crate::scene::SliceSource;
-use convert::{ConvertError, GridField, Inside, Interpolation, SplatParams};
-use glam::DVec3;
-use splat_core::{Grid, Mesh, ScalarField};
+use crate::{ConvertError, GridField, Inside, Interpolation, SplatParams};
+use splat_core::glam::DVec3;
+use splat_core::{Grid, Mesh, ScalarField, TransferFunction};
 use std::sync::Arc;
 
 /// Most squares along one side of the plane.
 const MOST_SQUARES: f64 = 4096.0;
 
-/// The part of the plane within the lattice, in squares of about `spacing` (object units) that are cut off at its border.
-/// Colours are those of the interpolated values at their corners.
-pub(super) fn slice(
+/// A section: the part of a plane within a volume's lattice, in squares of about `spacing` (object units) that are cut off at
+/// its border.
+///
+/// The plane goes through `center` across the unit vector `normal`, both in the volume's own space. Colours are those that
+/// `transfer` gives the trilinear values at the squares' corners; its extinctions are not used. A plane beside the lattice
+/// gives a mesh without triangles. Of `splat` only the name is used, for errors.
+///
+/// ```
+/// use convert::{SplatParams, volume_section};
+/// use splat_core::glam::{DMat3, DVec3};
+/// use splat_core::{Grid, TransferFunction, TransferPoint};
+/// // Values grow along x, and so does red.
+/// let values = (0..27).map(|k| (k % 3) as f32).collect();
+/// let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [3; 3], values };
+/// let point = |value| TransferPoint { value, color: [value, 0.0, 0.0], extinction: 0.0 };
+/// let transfer = TransferFunction::new(vec![point(0.0), point(2.0)]).unwrap();
+/// let mesh = volume_section(grid.into(), &transfer, DVec3::ONE, DVec3::Z, 0.5, &SplatParams::default()).unwrap();
+/// for (p, color) in mesh.position.iter().zip(&mesh.color) {
+///     assert!((mesh.origin.x + f64::from(p.x) - f64::from(color[0])).abs() < 1e-6);
+/// }
+/// ```
+///
+/// # Errors
+/// [`ConvertError::Input`] for a grid that is not valid.
+pub fn volume_section(
     grid: Arc<Grid>,
-    source: &SliceSource,
+    transfer: &TransferFunction,
+    center: DVec3,
+    normal: DVec3,
     spacing: f64,
     splat: &SplatParams,
 ) -> Result<Mesh, ConvertError> {
@@ -23,8 +46,8 @@ pub(super) fn slice(
     let reach = 0.5 * (high - low).length();
     // The place of the plane nearest to the middle of the volume, so that it does not matter which point was given.
     let middle = 0.5 * (low + high);
-    let center = middle - source.normal * source.normal.dot(middle - source.center);
-    let (u, v) = source.normal.any_orthonormal_pair();
+    let center = middle - normal * normal.dot(middle - center);
+    let (u, v) = normal.any_orthonormal_pair();
     let n = (2.0 * reach / spacing).ceil().clamp(1.0, MOST_SQUARES);
     let step = 2.0 * reach / n;
     let index = grid.axes.inverse();
@@ -38,8 +61,8 @@ pub(super) fn slice(
         let first = mesh.position.len() as u32;
         for p in &polygon {
             mesh.position.push((*p - center).as_vec3());
-            mesh.normal.push(source.normal.as_vec3());
-            mesh.color.push(source.transfer.at(field.value(*p) as f32).color);
+            mesh.normal.push(normal.as_vec3());
+            mesh.color.push(transfer.at(field.value(*p) as f32).color);
         }
         mesh.triangles.extend((2..polygon.len() as u32).map(|c| [first, first + c - 1, first + c]));
     }
@@ -76,21 +99,18 @@ fn within(mut polygon: Vec<DVec3>, coordinates: impl Fn(DVec3) -> DVec3, last: D
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::DMat3;
-    use splat_core::{TransferFunction, TransferPoint};
+    use splat_core::TransferPoint;
+    use splat_core::glam::DMat3;
 
     #[test]
     fn a_slice_ends_where_the_volume_does_and_has_its_colours() {
         let values: Vec<f32> = (0..64).map(|i| (i % 4) as f32).collect();
         let grid = Grid { origin: DVec3::ONE, axes: DMat3::from_diagonal(DVec3::splat(0.5)), dims: [4; 3], values };
         let point = |value, red| TransferPoint { value, color: [red, 0.0, 1.0], extinction: 0.0 };
-        let source = SliceSource {
-            path: "v".into(),
-            transfer: TransferFunction::new(vec![point(0.0, 0.0), point(3.0, 3.0)]).unwrap(),
-            center: DVec3::splat(1.75),
-            normal: DVec3::new(0.0, 1.0, 1.0).normalize(),
-        };
-        let mesh = slice(grid.into(), &source, 0.2, &SplatParams::default()).unwrap();
+        let transfer = TransferFunction::new(vec![point(0.0, 0.0), point(3.0, 3.0)]).unwrap();
+        let normal = DVec3::new(0.0, 1.0, 1.0).normalize();
+        let (center, splat) = (DVec3::splat(1.75), SplatParams::default());
+        let mesh = volume_section(grid.into(), &transfer, center, normal, 0.2, &splat).unwrap();
         let corner = |v: u32| mesh.position[v as usize].as_dvec3();
         let area = |t: &[u32; 3]| 0.5 * (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).length();
         let total: f64 = mesh.triangles.iter().map(area).sum();

@@ -1,7 +1,7 @@
 //! Checks of lights.
 
 use super::check::{At, LARGEST};
-use super::raw::RawLight;
+use super::raw_light::RawLight;
 use super::{LightSource, SceneLight};
 use crate::Error;
 use glam::DVec3;

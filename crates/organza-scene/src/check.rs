@@ -8,7 +8,7 @@ use super::check_render::check_render;
 use super::paths::Paths;
 use super::raw::{RawCamera, RawColor, RawScene};
 use super::tree::{Document, Step};
-use super::{Scene, SceneObject};
+use super::{RenderSettings, Scene, SceneObject};
 use crate::Error;
 use glam::DVec3;
 use splat_core::{Camera, Footprint, FootprintStack, Projection};
@@ -196,7 +196,7 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
 }
 
 /// Refuses what a picture has only if one technique draws all of it.
-fn check_one_technique(at: &At<'_>, objects: &[SceneObject], render: &super::RenderSettings) -> Result<(), Error> {
+fn check_one_technique(at: &At<'_>, objects: &[SceneObject], render: &RenderSettings) -> Result<(), Error> {
     if !render.layers.names().any(|name| name == "std_error") {
         return Ok(());
     }

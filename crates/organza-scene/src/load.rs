@@ -61,7 +61,7 @@ pub fn read(file: &Path) -> Result<Vec<u8>, Error> {
 pub fn parse(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Scene, Error> {
     if bytes.len() as u64 > MAX_SCENE_BYTES {
         return Err(Error::Limit {
-            what: format!("the scene file {}", crate::error::printable(file)),
+            what: format!("the scene file {}", crate::printable(file)),
             needed: bytes.len() as u64,
             limit: MAX_SCENE_BYTES,
             unit: "bytes",

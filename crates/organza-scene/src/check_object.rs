@@ -1,0 +1,135 @@
+//! Checks of objects: what all of them have, whatever their source.
+
+use super::check::At;
+use super::check_field::check_clip;
+use super::check_render::check_technique;
+use super::check_source::check_source;
+use super::paths::Paths;
+use super::raw_object::{RawObject, RawTransform, RawUp};
+use super::{SceneMaterial, SceneObject, Source, Technique, Up};
+use crate::Error;
+use convert::read::{UpAxis, up_axis};
+use glam::{DQuat, DVec3};
+use splat_core::{FootprintStack, Similarity};
+
+/// What objects refer to.
+pub(super) struct Named<'a> {
+    pub(super) materials: &'a [SceneMaterial],
+    pub(super) footprints: &'a FootprintStack,
+    pub(super) paths: &'a Paths,
+}
+
+/// Checks one object whose material is known.
+pub(super) fn check_object(
+    at: &At<'_>,
+    raw: RawObject,
+    material: usize,
+    named: &Named<'_>,
+) -> Result<SceneObject, Error> {
+    if raw.name.is_empty() || raw.name.len() > 256 {
+        let message = format!("`name`: expected 1 to 256 bytes of text, found {}", raw.name.len());
+        return Err(at.key("name").error(message, ""));
+    }
+    let fallback = named.materials[material].extinction;
+    let source = check_source(at, &raw, fallback, named.paths)?;
+    refuse_what_does_not_apply(at, &raw, &source)?;
+    let footprints = named.footprints.layers().len();
+    if raw.footprint as usize >= footprints {
+        let message = format!("`footprint`: expected an index below {footprints}, found {}", raw.footprint);
+        return Err(at.key("footprint").error(message, "`footprints` lists them, counted from 0"));
+    }
+    let up = match raw.transform.up {
+        // An invisible object is not even read.
+        RawUp::Auto if raw.visible == Some(false) => Up { axis: UpAxis::Y, by_file: false },
+        RawUp::Auto => Up { axis: source.path().map_or(UpAxis::Y, up_axis), by_file: source.path().is_some() },
+        RawUp::Y => Up { axis: UpAxis::Y, by_file: false },
+        RawUp::Z => Up { axis: UpAxis::Z, by_file: false },
+    };
+    Ok(SceneObject {
+        transform: check_transform(&at.key("transform"), &raw.transform, up.axis)?,
+        up,
+        source,
+        material,
+        color: raw.color.map(|c| at.color("color", c)).transpose()?,
+        opacity: raw.opacity.map(|a| at.number("opacity", a, 0.0..=1.0)).transpose()?,
+        clip: raw
+            .clip
+            .iter()
+            .enumerate()
+            .map(|(i, c)| check_clip(&at.key("clip").index(i), c))
+            .collect::<Result<_, _>>()?,
+        spacing: raw.spacing.map(|s| at.length("spacing", s)).transpose()?,
+        shadow_coefficient: at.number("shadow_coefficient", raw.shadow_coefficient.unwrap_or(1.0), 0.0..=1.0)? as f32,
+        casts_shadow: raw.casts_shadow.unwrap_or(true),
+        visible: raw.visible.unwrap_or(true),
+        footprint: raw.footprint as u8,
+        merge_duplicates: raw.merge_duplicates,
+        technique: check_own_technique(at, raw.technique.as_deref())?,
+        name: raw.name,
+    })
+}
+
+/// The technique that an object names; "auto" is that of the scene.
+fn check_own_technique(at: &At<'_>, name: Option<&str>) -> Result<Option<Technique>, Error> {
+    let named = name.map(|name| check_technique(at, name)).transpose()?;
+    Ok(named.filter(|technique| *technique != Technique::Auto))
+}
+
+/// A key that would silently do nothing is an error.
+fn refuse_what_does_not_apply(at: &At<'_>, raw: &RawObject, source: &Source) -> Result<(), Error> {
+    let is_medium = matches!(source, Source::Volume(_) | Source::Density(_) | Source::Cloud(_) | Source::Medium(_));
+    if is_medium && raw.opacity.is_some() {
+        return Err(at.key("opacity").error("a medium has no `opacity`", "use its extinction"));
+    }
+    let has_own_spacing =
+        matches!(source, Source::Density(_) | Source::Cloud(_) | Source::Medium(_) | Source::Rectangle(_));
+    if has_own_spacing && raw.spacing.is_some() {
+        return Err(at.key("spacing").error("this source states its own spacing", "move `spacing` into the source"));
+    }
+    let of_field = matches!(source, Source::Implicit(_) | Source::Isosurface(_) | Source::LevelSet(_));
+    if !of_field && !raw.clip.is_empty() {
+        return Err(at.key("clip").error("`clip` belongs to an `implicit`, `isosurface` or `level_set`", ""));
+    }
+    if raw.slice.is_some() && raw.unit_length.is_some() {
+        return Err(at.key("unit_length").error("a slice has no extinction", "its `opacity` is that of one crossing"));
+    }
+    let colored = [(raw.volume.is_some(), "volume"), (raw.slice.is_some(), "slice")].into_iter().find(|c| c.0);
+    if let (Some((_, what)), true) = (colored, raw.color.is_some()) {
+        let message = format!("the colours of a {what} are those of its `transfer`");
+        return Err(at.key("color").error(message, "change `color` in `transfer`"));
+    }
+    if raw.points.is_none() && raw.merge_duplicates {
+        return Err(at.key("merge_duplicates").error("`merge_duplicates` belongs to `points`", ""));
+    }
+    if raw.volume.is_none() && raw.slice.is_none() {
+        for (key, on) in [("transfer", raw.transfer.is_some()), ("unit_length", raw.unit_length.is_some())] {
+            if on {
+                return Err(at.key(key).error(format!("`{key}` belongs to a `volume` or `slice`"), ""));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Turns `up`, then rotates around x, y and z in this order.
+fn check_transform(at: &At<'_>, raw: &RawTransform, up: UpAxis) -> Result<Similarity, Error> {
+    let angles = at.vector("rotate", raw.rotate)?.map(f64::to_radians);
+    // Extrinsic x, y, z is intrinsic z, y, x.
+    let rotation = turned(DVec3::Z, angles.z) * turned(DVec3::Y, angles.y) * turned(DVec3::X, angles.x);
+    let up = match up {
+        UpAxis::Y => DQuat::IDENTITY,
+        UpAxis::Z => turned(DVec3::X, -std::f64::consts::FRAC_PI_2),
+    };
+    Ok(Similarity {
+        scale: at.length("scale", raw.scale.unwrap_or(1.0))?,
+        rotation: (rotation * up).normalize(),
+        translation: at.vector("translate", raw.translate)?,
+    })
+}
+
+/// A turn about an axis, radians, with the same bits on every system, which glam's own has not.
+fn turned(axis: DVec3, angle: f64) -> DQuat {
+    let (sin, cos) = libm::sincos(0.5 * angle);
+    let v = axis * sin;
+    DQuat::from_xyzw(v.x, v.y, v.z, cos)
+}

@@ -1,0 +1,217 @@
+//! Checks of the source of an object.
+
+use super::check::{At, LARGEST, SMALLEST};
+use super::check_field::{check_isosurface, check_level_set, check_slice};
+use super::check_light::check_half_axes;
+use super::check_transfer::check_transfer;
+use super::paths::Paths;
+use super::raw_object::RawObject;
+use super::raw_source::{RawCloud, RawDensity, RawImplicit, RawMediumBall, RawMediumBox, RawRectangle};
+use super::{CloudSource, DensitySource, ImplicitSource, MediumShape, RectangleSource, Source, VolumeSource};
+use crate::{Error, shown};
+use convert::ExpressionField;
+use glam::DVec3;
+
+/// The keys that name a source.
+const SOURCES: [&str; 12] = [
+    "mesh",
+    "volume",
+    "points",
+    "implicit",
+    "isosurface",
+    "level_set",
+    "slice",
+    "density",
+    "cloud",
+    "rectangle",
+    "medium_box",
+    "medium_ball",
+];
+
+/// Longest expression, bytes.
+const LONGEST_EXPRESSION: usize = 4096;
+
+fn present(raw: &RawObject) -> [bool; 12] {
+    [
+        raw.mesh.is_some(),
+        raw.volume.is_some(),
+        raw.points.is_some(),
+        raw.implicit.is_some(),
+        raw.isosurface.is_some(),
+        raw.level_set.is_some(),
+        raw.slice.is_some(),
+        raw.density.is_some(),
+        raw.cloud.is_some(),
+        raw.rectangle.is_some(),
+        raw.medium_box.is_some(),
+        raw.medium_ball.is_some(),
+    ]
+}
+
+/// Checks that an object has one source, and that one; `fallback` is the extinction that its material gives media.
+pub(super) fn check_source(
+    at: &At<'_>,
+    raw: &RawObject,
+    fallback: Option<f64>,
+    paths: &Paths,
+) -> Result<Source, Error> {
+    let found: Vec<&str> = SOURCES.into_iter().zip(present(raw)).filter(|(_, on)| *on).map(|(name, _)| name).collect();
+    let &[source] = found.as_slice() else {
+        let found = if found.is_empty() { "none".to_owned() } else { found.join(" and ") };
+        let message = format!("object `{}`: expected exactly one source, found {found}", shown(&raw.name));
+        return Err(at.error(message, format!("sources are {}", SOURCES.join(", "))));
+    };
+    let at_source = at.key(source);
+    let extinction = |stated: Option<f64>| check_extinction(&at_source, stated.or(fallback));
+    if let Some(path) = &raw.mesh {
+        return Ok(Source::Mesh(paths.resolve(&at_source, path)?));
+    }
+    if let Some(path) = &raw.points {
+        return Ok(Source::Points(paths.resolve(&at_source, path)?));
+    }
+    if let Some(path) = &raw.volume {
+        let path = paths.resolve(&at_source, path)?;
+        return Ok(Source::Volume(VolumeSource { path, transfer: check_transfer(at, raw, false)? }));
+    }
+    if let Some(implicit) = &raw.implicit {
+        return check_implicit(&at_source, implicit).map(Source::Implicit);
+    }
+    if let Some(isosurface) = &raw.isosurface {
+        return check_isosurface(&at_source, isosurface, paths).map(Source::Isosurface);
+    }
+    if let Some(level_set) = &raw.level_set {
+        return check_level_set(&at_source, level_set, paths).map(Source::LevelSet);
+    }
+    if let Some(slice) = &raw.slice {
+        return check_slice(&at_source, slice, check_transfer(at, raw, true)?, paths).map(Source::Slice);
+    }
+    if let Some(density) = &raw.density {
+        return check_density(&at_source, density, extinction(density.extinction)?).map(Source::Density);
+    }
+    if let Some(cloud) = &raw.cloud {
+        return check_cloud(&at_source, cloud, extinction(cloud.extinction)?).map(Source::Cloud);
+    }
+    if let Some(r) = &raw.rectangle {
+        return check_rectangle(&at_source, r).map(Source::Rectangle);
+    }
+    if let Some(b) = &raw.medium_box {
+        return check_medium_box(&at_source, b, fallback).map(Source::Medium);
+    }
+    let Some(b) = &raw.medium_ball else {
+        return Err(Error::Internal("an object has a source of no kind".into()));
+    };
+    check_medium_ball(&at_source, b, fallback).map(Source::Medium)
+}
+
+fn check_extinction(at: &At<'_>, extinction: Option<f64>) -> Result<f64, Error> {
+    match extinction {
+        Some(e) => at.number("extinction", e, 0.0..=LARGEST),
+        None => {
+            Err(at.error("expected a key `extinction` here, found none", "or give its material a `medium.extinction`"))
+        }
+    }
+}
+
+fn check_rectangle(at: &At<'_>, raw: &RawRectangle) -> Result<RectangleSource, Error> {
+    let (u, v) = check_half_axes(at, raw.u, raw.v)?;
+    let spacing = at.spacing("spacing", raw.spacing, 2.0 * u.length().max(v.length()))?;
+    Ok(RectangleSource { center: at.vector("center", raw.center)?, u, v, spacing })
+}
+
+fn check_medium_box(at: &At<'_>, raw: &RawMediumBox, fallback: Option<f64>) -> Result<MediumShape, Error> {
+    let (min, max) = check_box(at, "min", "max", raw.min, raw.max)?;
+    let spacing = at.spacing("spacing", raw.spacing, (max - min).max_element())?;
+    let extinction = check_extinction(at, raw.extinction.or(fallback))?;
+    Ok(MediumShape::Box { min, max, extinction, spacing })
+}
+
+fn check_medium_ball(at: &At<'_>, raw: &RawMediumBall, fallback: Option<f64>) -> Result<MediumShape, Error> {
+    let radius = at.length("radius", raw.radius)?;
+    let spacing = at.spacing("spacing", raw.spacing, 2.0 * radius)?;
+    let center = at.vector("center", raw.center)?;
+    let extinction = check_extinction(at, raw.extinction.or(fallback))?;
+    Ok(MediumShape::Ball { center, radius, extinction, spacing })
+}
+
+fn check_box<'a>(
+    at: &At<'a>,
+    min_key: &'a str,
+    max_key: &'a str,
+    min: [f64; 3],
+    max: [f64; 3],
+) -> Result<(DVec3, DVec3), Error> {
+    let (low, high) = (at.vector(min_key, min)?, at.vector(max_key, max)?);
+    if !low.cmplt(high).all() {
+        let message = format!("expected a highest corner above the lowest in all axes, found {min:?} and {max:?}");
+        return Err(at.key(max_key).error(message, ""));
+    }
+    Ok((low, high))
+}
+
+/// Checks an expression's region and how finely it is sampled.
+fn check_region(
+    at: &At<'_>,
+    expression: &str,
+    bounds: [[f64; 3]; 2],
+    resolution: Option<u32>,
+    spacing: Option<f64>,
+) -> Result<([DVec3; 2], f64), Error> {
+    if expression.trim().is_empty() || expression.len() > LONGEST_EXPRESSION {
+        let message = format!(
+            "`expression`: expected 1 to {LONGEST_EXPRESSION} bytes in x, y and z, found {}",
+            expression.trim().len()
+        );
+        return Err(at.key("expression").error(message, ""));
+    }
+    ExpressionField::parse(expression).map_err(|e| {
+        let found = shown(&e.found);
+        let message = format!("`expression`, column {}: expected {}, found {found}", e.column, e.expected);
+        let hint = e.hint.strip_prefix("; ").unwrap_or("variables are x, y and z");
+        at.key("expression").error_in_text(expression, e.column, message, hint)
+    })?;
+    let (low, high) = check_box(at, "box", "box", bounds[0], bounds[1])?;
+    let longest = (high - low).max_element();
+    let spacing = match (resolution, spacing) {
+        (Some(n), None) => longest / f64::from(at.whole("resolution", n, 1..=16384)?),
+        (None, Some(spacing)) => at.spacing("spacing", spacing, longest)?,
+        (Some(_), Some(_)) => {
+            return Err(at.key("spacing").error("expected one of `resolution` and `spacing`, found both", ""));
+        }
+        (None, None) => return Err(at.error("expected a key `resolution` or `spacing` here, found neither", "")),
+    };
+    Ok(([low, high], spacing))
+}
+
+fn check_implicit(at: &At<'_>, raw: &RawImplicit) -> Result<ImplicitSource, Error> {
+    let (bounds, spacing) = check_region(at, &raw.expression, raw.bounds, raw.resolution, raw.spacing)?;
+    Ok(ImplicitSource { expression: raw.expression.clone(), bounds, spacing })
+}
+
+fn check_density(at: &At<'_>, raw: &RawDensity, extinction: f64) -> Result<DensitySource, Error> {
+    let (bounds, spacing) = check_region(at, &raw.expression, raw.bounds, raw.resolution, raw.spacing)?;
+    Ok(DensitySource { expression: raw.expression.clone(), bounds, spacing, extinction })
+}
+
+fn check_cloud(at: &At<'_>, raw: &RawCloud, extinction: f64) -> Result<CloudSource, Error> {
+    if raw.ellipsoids.is_empty() {
+        return Err(at.key("ellipsoids").error("expected at least one ellipsoid, found none", ""));
+    }
+    let mut ellipsoids = Vec::with_capacity(raw.ellipsoids.len());
+    for (i, e) in raw.ellipsoids.iter().enumerate() {
+        let at = at.key("ellipsoids").index(i);
+        for radius in e.radii {
+            at.length("radii", radius)?;
+        }
+        ellipsoids.push((at.vector("center", e.center)?, DVec3::from_array(e.radii)));
+    }
+    let longest = ellipsoids.iter().map(|(_, radii)| 2.0 * radii.max_element()).fold(0.0, f64::max);
+    Ok(CloudSource {
+        ellipsoids,
+        octaves: at.whole("octaves", raw.octaves.unwrap_or(5), 1..=16)?,
+        frequency: at.number("frequency", raw.frequency.unwrap_or(1.0), SMALLEST..=LARGEST)?,
+        amplitude: at.number("amplitude", raw.amplitude.unwrap_or(0.5), 0.0..=100.0)?,
+        seed: raw.seed,
+        spacing: at.spacing("spacing", raw.spacing, longest)?,
+        extinction,
+    })
+}

@@ -1,0 +1,62 @@
+//! Scene files: text → located value tree → raw tables → checked [`Scene`].
+//!
+//! ```text
+//! .toml ─ read_toml ─┐
+//!                    ├─► tree ─► overrides ─► animation ─► de ─► raw ─► check ─► Scene
+//! .json ─ read_json ─┘ (places)   (--set)     (a frame)        (serde)
+//! ```
+//! Serde stops here: a [`Scene`] has radians, f64 world units, resolved paths and nothing left to check.
+//! The schema is described in `docs/scene.md` and printed by `organza schema`. Every error has a place in the file, or
+//! names the option, and says what to do.
+#![forbid(unsafe_code)]
+
+mod animation;
+mod check;
+mod check_field;
+mod check_light;
+mod check_material;
+mod check_object;
+mod check_render;
+mod check_source;
+mod check_transfer;
+mod de;
+mod error;
+mod layer_choice;
+mod lights;
+mod load;
+mod model;
+mod overrides;
+mod paths;
+mod raw;
+mod raw_light;
+mod raw_material;
+mod raw_object;
+mod raw_render;
+mod raw_source;
+mod read_json;
+mod read_toml;
+mod settings;
+mod shown;
+mod source;
+mod tree;
+
+pub use convert::read::UpAxis;
+pub use error::Error;
+pub use layer_choice::{LAYER_NAMES, LayerChoice};
+pub use lights::{LightSource, SceneLight};
+pub use load::{LoadOptions, MAX_SCENE_BYTES, MAX_SCENE_DEPTH, load, parse, read, schema};
+pub use model::{Scene, SceneMaterial, SceneObject, Up};
+pub use overrides::Override;
+pub use settings::{
+    ParticlesSettings, PointsSettings, RenderSettings, ShadowMapping, ShadowSettings, SurfaceSampler, Technique,
+};
+pub use shown::{escape_controls, printable, shown};
+pub use source::{
+    CloudSource, DensitySource, ImplicitSource, IsosurfaceSource, LevelSetSource, MediumShape, RectangleSource,
+    SliceSource, Source, VolumeSource,
+};
+
+/// The page's example compiles and holds.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Page;

@@ -1,0 +1,101 @@
+//! The checked scene: everything a render needs, in radians and f64 world units.
+
+use super::{RenderSettings, SceneLight, Source, Technique};
+use convert::Clip;
+use convert::read::UpAxis;
+use splat_core::{Camera, FootprintStack, Material, Similarity};
+use std::path::{Path, PathBuf};
+
+/// A whole scene. Made by [`super::load()`] or [`super::parse`] alone, so that every number in it is finite and in range.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    /// The scene file, as it was named.
+    pub file: PathBuf,
+    /// SHA-256 of the scene file's bytes, of the overrides from the command line and of the frame, lower-case hex.
+    pub sha256: String,
+    /// Number of frames of its animation, if it has one.
+    pub frames: Option<u32>,
+    /// The camera with the image size.
+    pub camera: Camera,
+    /// Radiance behind everything, linear Rec.709.
+    pub background: [f32; 3],
+    /// Ambient radiance, the same from all directions.
+    pub ambient: [f32; 3],
+    /// Lights in file order.
+    pub lights: Vec<SceneLight>,
+    /// Objects in file order, invisible ones included.
+    pub objects: Vec<SceneObject>,
+    /// Materials; entry 0 is the default one, the others are in order of name.
+    pub materials: Vec<SceneMaterial>,
+    /// How to render.
+    pub render: RenderSettings,
+    /// The footprints that objects name by index.
+    pub footprints: FootprintStack,
+}
+
+impl Scene {
+    /// Every file that the scene is made of, its own first.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let data = self.objects.iter().filter_map(|o| o.source.path().map(Path::to_owned));
+        std::iter::once(self.file.clone()).chain(data).collect()
+    }
+}
+
+/// One object of the scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneObject {
+    /// Unique name.
+    pub name: String,
+    /// Where its data comes from.
+    pub source: Source,
+    /// From the source's axes (after `up`) to the world.
+    pub transform: Similarity,
+    /// The axis of the source that [`Self::transform`] turns up.
+    pub up: Up,
+    /// Index into [`Scene::materials`].
+    pub material: usize,
+    /// Colour that replaces the data's and the material's, linear Rec.709.
+    pub color: Option<[f32; 3]>,
+    /// Opacity of one crossing that replaces the material's, in \[0, 1\]; surfaces and raw points.
+    pub opacity: Option<f64>,
+    /// Regions outside of which a surface of a field ends, before the object's transform.
+    pub clip: Vec<Clip>,
+    /// Distance between splats, world units; `None` means that it is chosen from the data and the camera.
+    pub spacing: Option<f64>,
+    /// Share of the shadow that it receives, in \[0, 1\].
+    pub shadow_coefficient: f32,
+    /// Whether it casts shadows.
+    pub casts_shadow: bool,
+    /// Whether it is drawn at all; an invisible object is not even read.
+    pub visible: bool,
+    /// Index into [`Scene::footprints`].
+    pub footprint: u8,
+    /// Whether splats at one place become one.
+    pub merge_duplicates: bool,
+    /// What draws it where it is translucent; `None` for the technique of the scene.
+    pub technique: Option<Technique>,
+}
+
+/// The axis of a source that points up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Up {
+    /// The axis.
+    pub axis: UpAxis,
+    /// Whether the file's format told it; else the scene, or it is the default of what has no file.
+    pub by_file: bool,
+}
+
+/// A named material.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneMaterial {
+    /// Name in the scene file; empty for the default material.
+    pub name: String,
+    /// What shading needs.
+    pub material: Material,
+    /// Colour of data that has none. Linear Rec.709.
+    pub color: [f32; 3],
+    /// Opacity of one crossing of a surface, in \[0, 1\].
+    pub opacity: f64,
+    /// Extinction σ_t of a medium that states none itself, 1/world unit.
+    pub extinction: Option<f64>,
+}

@@ -1,0 +1,124 @@
+//! The scene file as it is written: degrees, names and nothing checked but types. Source of the JSON Schema.
+
+use super::raw_light::RawLight;
+use super::raw_material::RawMaterial;
+use super::raw_object::RawObject;
+use super::raw_render::RawRender;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// A scene of Organza.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(title = "Organza scene")]
+pub(super) struct RawScene {
+    /// Version of the schema: 1.
+    pub(super) version: u32,
+    pub(super) camera: RawCamera,
+    #[serde(default)]
+    pub(super) background: RawColor,
+    /// Radiance that comes from all directions alike and is not shadowed.
+    #[serde(default)]
+    pub(super) ambient: RawColor,
+    #[serde(default)]
+    pub(super) light: Vec<RawLight>,
+    #[serde(default)]
+    pub(super) object: Vec<RawObject>,
+    /// Materials by name.
+    #[serde(default)]
+    pub(super) material: BTreeMap<String, RawMaterial>,
+    #[serde(default)]
+    pub(super) render: RawRender,
+    /// What changes from frame to frame.
+    pub(super) animation: Option<RawAnimation>,
+    /// Where each Gaussian footprint is cut, in standard deviations, 1 to 8. Objects name them by index.
+    pub(super) footprints: Option<Vec<f64>>,
+}
+
+/// What changes from frame to frame.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(rename = "Animation")]
+pub(super) struct RawAnimation {
+    /// Number of frames, counted from 0.
+    pub(super) frames: u32,
+    /// One value of the scene each, in the order in which they are set.
+    #[serde(default)]
+    pub(super) track: Vec<RawTrack>,
+}
+
+/// One value of the scene by frame.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(rename = "Track")]
+pub(super) struct RawTrack {
+    /// Path of the value as for `--set`, such as `object.bunny.transform.rotate`.
+    pub(super) set: String,
+    /// Its values, by increasing frame.
+    pub(super) keys: Vec<RawKey>,
+    /// What lies between keys; default linear.
+    #[serde(default)]
+    pub(super) interpolation: Blend,
+}
+
+/// A value at a frame.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(rename = "Key")]
+pub(super) struct RawKey {
+    /// The frame.
+    pub(super) frame: u32,
+    /// The value; it stays in the value tree.
+    #[serde(rename = "value")]
+    #[schemars(with = "serde_json::Value")]
+    pub(super) _value: serde::de::IgnoredAny,
+}
+
+/// What lies between two keys.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(rename = "Interpolation")]
+pub(super) enum Blend {
+    /// A straight line.
+    #[default]
+    Linear,
+    /// A cubic without corners at the keys.
+    Smooth,
+}
+
+/// The camera.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(rename = "Camera")]
+pub(super) struct RawCamera {
+    /// World position of the eye.
+    pub(super) position: [f64; 3],
+    /// A point in the middle of the picture.
+    pub(super) target: [f64; 3],
+    /// What points up in the picture; default [0, 1, 0].
+    #[serde(default = "up")]
+    pub(super) up: [f64; 3],
+    /// Full vertical angle of view, degrees, between 0 and 180; default 35.
+    pub(super) fov_y: Option<f64>,
+    /// Height of the picture in world units, for parallel rays; instead of `fov_y`.
+    pub(super) orthographic: Option<f64>,
+    /// Width and height of the picture, pixels.
+    pub(super) size: [u32; 2],
+}
+
+fn up() -> [f64; 3] {
+    [0.0, 1.0, 0.0]
+}
+
+/// A colour, linear Rec.709.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default, expecting = "a table")]
+#[schemars(rename = "Color")]
+pub(super) struct RawColor {
+    /// Radiance per channel, each ≥ 0; default black.
+    pub(super) color: [f64; 3],
+    /// Environment maps are not in this version.
+    #[schemars(skip)]
+    pub(super) environment: Option<String>,
+}

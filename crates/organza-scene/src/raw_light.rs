@@ -1,0 +1,108 @@
+//! Lights as they are written.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+fn yes() -> bool {
+    true
+}
+
+fn sixteen() -> u32 {
+    16
+}
+
+/// A light.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "lowercase", expecting = "a table with a key `kind`")]
+#[schemars(tag = "kind")]
+#[schemars(rename = "Light")]
+pub(super) enum RawLight {
+    /// Radiates equally in all directions from a point.
+    Point {
+        /// World position.
+        position: [f64; 3],
+        /// Radiant intensity per channel, W/sr or relative.
+        intensity: [f64; 3],
+        /// Whether it casts shadows; default true.
+        #[serde(default = "yes")]
+        shadow: bool,
+    },
+    /// Parallel light.
+    Directional {
+        /// Direction of travel, away from the light; any length.
+        direction: [f64; 3],
+        /// Irradiance per channel on a plane that faces the light, W/m² or relative.
+        irradiance: [f64; 3],
+        /// Whether it casts shadows; default true.
+        #[serde(default = "yes")]
+        shadow: bool,
+    },
+    /// A cone of light.
+    Spot {
+        /// World position.
+        position: [f64; 3],
+        /// A point on the axis; or `direction`.
+        target: Option<[f64; 3]>,
+        /// Direction of the axis; or `target`.
+        direction: Option<[f64; 3]>,
+        /// Half angle of full light, degrees; default 0.
+        #[serde(default)]
+        inner: f64,
+        /// Half angle of no light, degrees, below 90.
+        outer: f64,
+        /// Radiant intensity on the axis per channel, W/sr or relative.
+        intensity: [f64; 3],
+        /// Whether it casts shadows; default true.
+        #[serde(default = "yes")]
+        shadow: bool,
+    },
+    /// A sphere, as several points.
+    Sphere {
+        /// World position of the centre.
+        position: [f64; 3],
+        /// Radius, world units.
+        radius: f64,
+        /// Radiant intensity of the whole light per channel, W/sr or relative.
+        intensity: [f64; 3],
+        /// Points that it becomes; default 16.
+        #[serde(default = "sixteen")]
+        samples: u32,
+        /// Whether it casts shadows; default true.
+        #[serde(default = "yes")]
+        shadow: bool,
+    },
+    /// A flat disc, as several points.
+    Disk {
+        /// World position of the centre.
+        position: [f64; 3],
+        /// Normal; any length.
+        normal: [f64; 3],
+        /// Radius, world units.
+        radius: f64,
+        /// Radiant intensity of the whole light per channel, W/sr or relative.
+        intensity: [f64; 3],
+        /// Points that it becomes; default 16.
+        #[serde(default = "sixteen")]
+        samples: u32,
+        /// Whether it casts shadows; default true.
+        #[serde(default = "yes")]
+        shadow: bool,
+    },
+    /// A flat parallelogram, as several points.
+    Rect {
+        /// World position of the centre.
+        position: [f64; 3],
+        /// First half-axis, world units.
+        u: [f64; 3],
+        /// Second half-axis, world units.
+        v: [f64; 3],
+        /// Radiant intensity of the whole light per channel, W/sr or relative.
+        intensity: [f64; 3],
+        /// Points that it becomes; default 16.
+        #[serde(default = "sixteen")]
+        samples: u32,
+        /// Whether it casts shadows; default true.
+        #[serde(default = "yes")]
+        shadow: bool,
+    },
+}

@@ -1,0 +1,84 @@
+//! Materials as they are written.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// How light becomes radiance.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(rename = "Shading")]
+pub(super) enum RawShading {
+    Phong,
+    Phase,
+    Unlit,
+}
+
+/// How opacity grows at grazing angles.
+#[derive(Debug, Default, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "SurfaceOpacity")]
+pub(super) enum RawSurfaceOpacity {
+    #[default]
+    PerCrossing,
+    ThinSlab,
+}
+
+/// A material.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default, expecting = "a table")]
+#[schemars(rename = "Material")]
+pub(super) struct RawMaterial {
+    /// Linear Rec.709; default white.
+    pub(super) color: Option<[f64; 3]>,
+    /// Opacity of one crossing of a surface, from 0 to 1; default 1.
+    pub(super) opacity: Option<f64>,
+    /// Share of ambient radiance that is reflected, from 0; default 1.
+    pub(super) ambient: Option<f64>,
+    /// Diffuse reflectance, from 0 to 1; default 1.
+    pub(super) diffuse: Option<f64>,
+    /// Specular reflectance, from 0 to 1; default 0.
+    pub(super) specular: Option<f64>,
+    /// Phong exponent, from 0; default 32.
+    pub(super) shininess: Option<f64>,
+    /// Share of diffuse light that passes a thin surface, from 0 to 1; default 0.
+    pub(super) transmission: Option<f64>,
+    /// Default "phase" with `medium`, else "phong".
+    pub(super) shading: Option<RawShading>,
+    /// Radiance per channel of a fully opaque column; default black.
+    pub(super) emission: [f64; 3],
+    /// Extinction per channel relative to the extinction itself, each from 0; default [1, 1, 1].
+    pub(super) extinction_rgb: Option<[f64; 3]>,
+    /// Extinction from the material's physics, instead of `extinction_rgb` and `medium.extinction`.
+    pub(super) absorption: Option<RawAbsorption>,
+    /// Default "per_crossing".
+    pub(super) surface_opacity: RawSurfaceOpacity,
+    /// What the matter of a medium does.
+    pub(super) medium: Option<RawMedium>,
+    /// Refraction is not in this version.
+    #[schemars(skip)]
+    pub(super) ior: Option<f64>,
+}
+
+/// Extinction 4πκ/λ per channel (Gunjee 2007, Eq. 7).
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(rename = "Absorption")]
+pub(super) struct RawAbsorption {
+    /// Imaginary part of the refractive index per channel, each from 0.
+    pub(super) kappa: [f64; 3],
+    /// Wavelength per channel, world units.
+    pub(super) wavelength: [f64; 3],
+}
+
+/// A participating medium.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default, expecting = "a table")]
+#[schemars(rename = "Medium")]
+pub(super) struct RawMedium {
+    /// Extinction of objects that state none, 1/world unit.
+    pub(super) extinction: Option<f64>,
+    /// Single-scattering albedo, from 0 to 1; default 1, or 0 with `absorption`.
+    pub(super) albedo: Option<f64>,
+    /// Mean cosine of scattering, between −1 and 1; default 0.
+    pub(super) asymmetry: Option<f64>,
+}

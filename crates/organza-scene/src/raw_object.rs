@@ -1,0 +1,99 @@
+//! Objects as they are written.
+
+use super::raw_source::{
+    RawClip, RawCloud, RawDensity, RawImplicit, RawIsosurface, RawLevelSet, RawMediumBall, RawMediumBox, RawRectangle,
+    RawSlice, RawTransferPoint,
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// An object: a name, exactly one source (`mesh`, `volume`, `points`, `implicit`, `isosurface`, `level_set`, `slice`,
+/// `density`, `cloud`, `rectangle`, `medium_box` or `medium_ball`), and how it looks.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(rename = "Object")]
+pub(super) struct RawObject {
+    /// Unique name.
+    pub(super) name: String,
+    /// Path of a triangle mesh.
+    pub(super) mesh: Option<String>,
+    /// Path of a regular volume; needs `transfer`.
+    pub(super) volume: Option<String>,
+    /// Path of a raw point cloud.
+    pub(super) points: Option<String>,
+    /// The zero set of an expression.
+    pub(super) implicit: Option<RawImplicit>,
+    /// The surface in a volume on which its value is a given one.
+    pub(super) isosurface: Option<RawIsosurface>,
+    /// The surface through scattered points.
+    pub(super) level_set: Option<RawLevelSet>,
+    /// A plane through a volume, coloured by `transfer`.
+    pub(super) slice: Option<RawSlice>,
+    /// An expression as the density of a medium.
+    pub(super) density: Option<RawDensity>,
+    /// A procedural cloud.
+    pub(super) cloud: Option<RawCloud>,
+    /// A flat parallelogram.
+    pub(super) rectangle: Option<RawRectangle>,
+    /// A homogeneous box.
+    pub(super) medium_box: Option<RawMediumBox>,
+    /// A homogeneous ball.
+    pub(super) medium_ball: Option<RawMediumBall>,
+    /// Regions that an `implicit`, `isosurface` or `level_set` is kept in; it ends open at their borders.
+    #[serde(default)]
+    pub(super) clip: Vec<RawClip>,
+    /// Control points of the transfer function of a `volume` or `slice`, by rising value.
+    pub(super) transfer: Option<Vec<RawTransferPoint>>,
+    /// World length that opacities of `transfer` refer to.
+    pub(super) unit_length: Option<f64>,
+    #[serde(default)]
+    pub(super) transform: RawTransform,
+    /// Name of a material.
+    pub(super) material: Option<String>,
+    /// Opacity of one crossing, from 0 to 1, instead of the material's.
+    pub(super) opacity: Option<f64>,
+    /// Colour, linear Rec.709, instead of the data's and the material's.
+    pub(super) color: Option<[f64; 3]>,
+    /// What draws it where it is translucent, "points", "particles" or "reference"; default the technique of `render`.
+    pub(super) technique: Option<String>,
+    /// Distance between splats, world units; default from the data and the camera.
+    pub(super) spacing: Option<f64>,
+    /// Share of shadow that it receives, from 0 to 1; default 1.
+    pub(super) shadow_coefficient: Option<f64>,
+    /// Whether it casts shadows; default true.
+    pub(super) casts_shadow: Option<bool>,
+    /// Whether it is drawn; default true.
+    pub(super) visible: Option<bool>,
+    /// Index into `footprints`; default 0.
+    #[serde(default)]
+    pub(super) footprint: u32,
+    /// Make splats at one place one; default false.
+    #[serde(default)]
+    pub(super) merge_duplicates: bool,
+}
+
+/// Turns `up`, then scales, rotates and translates.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default, expecting = "a table")]
+#[schemars(rename = "Transform")]
+pub(super) struct RawTransform {
+    /// Uniform scale, above 0; default 1.
+    pub(super) scale: Option<f64>,
+    /// Angles around x, then y, then z, degrees.
+    pub(super) rotate: [f64; 3],
+    /// World units.
+    pub(super) translate: [f64; 3],
+    /// The axis of the data that points up; default "auto": what the file's format says, else "y".
+    pub(super) up: RawUp,
+}
+
+/// The axis that points up.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(rename = "Up")]
+pub(super) enum RawUp {
+    #[default]
+    Auto,
+    Y,
+    Z,
+}

@@ -1,0 +1,161 @@
+//! Settings of a render as they are written.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// How to render.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default, expecting = "a table")]
+#[schemars(rename = "Render")]
+pub(super) struct RawRender {
+    /// "auto", "points", "particles" or "reference"; default "auto", which is "points".
+    pub(super) technique: Option<String>,
+    /// Samples along each side of a pixel, 1 to 8; default 2.
+    pub(super) antialias: Option<u32>,
+    /// Largest change of a displayed pixel by what is not simulated, above 0, at most 1; default 1/255.
+    pub(super) tolerance: Option<f64>,
+    /// Exposure of the displayed picture in stops; default 0.
+    pub(super) exposure: Option<f64>,
+    /// Ranges into which the depths are cut that several techniques share, 1 to 1024; default 16.
+    pub(super) depth_ranges: Option<u32>,
+    /// Images to keep besides beauty and alpha.
+    pub(super) layers: Vec<String>,
+    /// Seed of everything random; default 0.
+    pub(super) seed: Option<u64>,
+    /// Most splats that the scene may become.
+    pub(super) max_points: Option<u64>,
+    pub(super) points: RawPoints,
+    pub(super) particles: RawParticles,
+}
+
+/// Settings of the `particles` technique.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default, expecting = "a table")]
+#[schemars(rename = "Particles")]
+pub(super) struct RawParticles {
+    /// Most sets of particles that are averaged, 2 to 1000000; default 100.
+    pub(super) repeat_level: Option<u32>,
+    /// Standard error of luminance, root mean square over the pixels, at which enough sets are averaged; default none.
+    pub(super) target_error: Option<f64>,
+    /// How implicit surfaces are sampled: "auto" (default), "lines", "triangles" or "brownian".
+    pub(super) surface_sampler: RawSurfaceSampler,
+    /// Step of "brownian" over the longest side of the surface's box, 0.0001 to 0.1; default 0.01.
+    pub(super) brownian_step: Option<f64>,
+}
+
+/// How implicit surfaces are sampled.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(rename = "SurfaceSampler")]
+pub(super) enum RawSurfaceSampler {
+    #[default]
+    Auto,
+    Lines,
+    Triangles,
+    Brownian,
+}
+
+/// Settings of the `points` technique.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default, expecting = "a table")]
+#[schemars(rename = "Points")]
+pub(super) struct RawPoints {
+    /// Thickness of a slice in world units, or "auto" (the default).
+    pub(super) slice_thickness: Option<Auto>,
+    /// Exact order inside slices too; default true.
+    pub(super) exact: Option<bool>,
+    /// "front_to_back" (default) or "back_to_front".
+    pub(super) direction: RawDirection,
+    /// Composite only so many non-empty slices.
+    pub(super) first_slices: Option<u64>,
+    /// A pixel is finished when its transmittance is below this, from 0 to below 1; default 1/1024.
+    pub(super) transmittance_cutoff: Option<f64>,
+    /// Widen footprints to a pixel; default true.
+    pub(super) resampling_filter: Option<bool>,
+    /// Precision of the running sums, "f32" (default) or "f16".
+    pub(super) accumulation: RawAccumulation,
+    pub(super) shadow: RawShadow,
+}
+
+/// Which end of the view is composited first.
+#[derive(Debug, Default, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "Direction")]
+pub(super) enum RawDirection {
+    #[default]
+    FrontToBack,
+    BackToFront,
+}
+
+/// Precision of the running sums.
+#[derive(Debug, Default, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(rename = "Accumulation")]
+pub(super) enum RawAccumulation {
+    #[default]
+    F32,
+    F16,
+}
+
+/// Settings of the translucent shadow maps.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default, expecting = "a table")]
+#[schemars(rename = "Shadow")]
+pub(super) struct RawShadow {
+    /// How directions become cells; default "auto".
+    pub(super) mapping: RawMapping,
+    /// Cells along a side of the table, 1 to 16384, or "auto" (the default).
+    pub(super) cells: Option<Auto>,
+    /// Absorbance behind which light counts as gone, above 0; default from the tolerance.
+    pub(super) absorbance_cut: Option<f64>,
+}
+
+/// How directions from a light become cells of its table.
+#[derive(Debug, Default, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "Mapping")]
+pub(super) enum RawMapping {
+    #[default]
+    Auto,
+    Octahedral,
+    Polar,
+}
+
+/// A number, or "auto".
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Auto {
+    Auto,
+    Number(f64),
+}
+
+impl<'de> Deserialize<'de> for Auto {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct AutoVisitor;
+        impl serde::de::Visitor<'_> for AutoVisitor {
+            type Value = Auto;
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a number or \"auto\"")
+            }
+            fn visit_i64<E: serde::de::Error>(self, v: i64) -> Result<Auto, E> {
+                Ok(Auto::Number(v as f64))
+            }
+            fn visit_f64<E: serde::de::Error>(self, v: f64) -> Result<Auto, E> {
+                Ok(Auto::Number(v))
+            }
+            fn visit_str<E: serde::de::Error>(self, v: &str) -> Result<Auto, E> {
+                if v == "auto" { Ok(Auto::Auto) } else { Err(E::invalid_value(serde::de::Unexpected::Str(v), &self)) }
+            }
+        }
+        deserializer.deserialize_any(AutoVisitor)
+    }
+}
+
+impl JsonSchema for Auto {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Auto".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({ "anyOf": [{ "type": "number" }, { "const": "auto" }] })
+    }
+}

@@ -1,0 +1,130 @@
+//! How to render, checked: the technique and the knobs of each.
+
+use super::LayerChoice;
+use splat_core::Direction;
+use splat_core::raster::Accumulation;
+
+/// How to render.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RenderSettings {
+    /// The technique.
+    pub technique: Technique,
+    /// Samples along each side of a pixel, 1 to 8.
+    pub antialias: u32,
+    /// How much any pixel of the displayed picture may change by what is not simulated, in (0, 1].
+    pub tolerance: f64,
+    /// Exposure of the displayed picture: radiance is multiplied by 2^exposure.
+    pub exposure: f64,
+    /// Ranges into which the depths are cut that several techniques share.
+    pub depth_ranges: u32,
+    /// Images to keep.
+    pub layers: LayerChoice,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Most splats that the scene may become; more is a resource error.
+    pub max_points: Option<u64>,
+    /// Settings of the `points` technique; its shadow maps serve the others too.
+    pub points: PointsSettings,
+    /// Settings of the `particles` technique.
+    pub particles: ParticlesSettings,
+}
+
+/// What draws the picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Technique {
+    /// The planner chooses.
+    #[default]
+    Auto,
+    /// Rendering-oriented points (Gunjee 2007).
+    Points,
+    /// Opaque particles, averaged over many sets (Tanaka 2012).
+    Particles,
+    /// Every fragment of every pixel, sorted, in f64: exact and slow.
+    Reference,
+}
+
+impl Technique {
+    /// All that can be asked for.
+    pub const ALL: [Self; 4] = [Self::Auto, Self::Points, Self::Particles, Self::Reference];
+
+    /// As scenes and reports name it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Points => "points",
+            Self::Particles => "particles",
+            Self::Reference => "reference",
+        }
+    }
+}
+
+/// Settings of the `particles` technique.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ParticlesSettings {
+    /// Most sets of particles that are averaged, ≥ 2 (Tanaka 2012: repeat level L_R).
+    pub repeat_level: u32,
+    /// Root mean square of the pixels' standard errors of luminance at which enough sets are averaged, > 0.
+    pub target_error: Option<f64>,
+    /// How implicit surfaces are sampled.
+    pub surface_sampler: SurfaceSampler,
+}
+
+/// How the particles of implicit surfaces are found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SurfaceSampler {
+    /// By lines, or on triangles where the field's bounds are too loose for lines to be fast.
+    Auto,
+    /// Where random lines meet the surface.
+    Lines,
+    /// On the triangles of a mesh, as fine as the object's splats.
+    Triangles,
+    /// Places of a Brownian motion on the surface (Tanaka 2012, section 4).
+    Brownian {
+        /// √(2Δt), over the longest side of the surface's box, > 0.
+        step: f64,
+    },
+}
+
+/// Settings of the `points` technique.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointsSettings {
+    /// Thickness ε of a slice, world units; `None` takes the radius of the smallest splats.
+    pub slice_thickness: Option<f64>,
+    /// Whether splats are in exact order inside slices too.
+    pub exact: bool,
+    /// Which end of the view is composited first.
+    pub direction: Direction,
+    /// Composite only so many non-empty slices.
+    pub first_slices: Option<u64>,
+    /// A pixel is finished when its transmittance falls below this, in [0, 1).
+    pub transmittance_cutoff: f64,
+    /// Whether footprints are widened to a pixel so that small splats do not flicker.
+    pub resampling_filter: bool,
+    /// Precision of the running sums of a pixel.
+    pub accumulation: Accumulation,
+    /// Shadow maps.
+    pub shadow: ShadowSettings,
+}
+
+/// Settings of the translucent shadow maps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShadowSettings {
+    /// How directions become cells.
+    pub mapping: ShadowMapping,
+    /// Cells along one side of the table, a power of two or not; `None` is chosen from splat sizes.
+    pub cells: Option<u32>,
+    /// Absorbance behind which light counts as gone; `None` follows from the tolerance.
+    pub absorbance_cut: Option<f64>,
+}
+
+/// How directions from a light become cells of its table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ShadowMapping {
+    /// Octahedral for points, planar for directional and spot lights.
+    #[default]
+    Auto,
+    /// Equal-area octahedral.
+    Octahedral,
+    /// Polar angle and azimuth, as in the paper.
+    Polar,
+}

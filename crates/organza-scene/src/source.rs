@@ -1,0 +1,184 @@
+//! Where an object's data comes from, checked: files, expressions and shapes.
+
+use convert::{Inside, Interpolation};
+use glam::DVec3;
+use splat_core::TransferFunction;
+use std::path::{Path, PathBuf};
+
+/// Where an object's data comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Source {
+    /// A triangle mesh in a file.
+    Mesh(PathBuf),
+    /// A raw point cloud in a file.
+    Points(PathBuf),
+    /// A regular volume in a file.
+    Volume(VolumeSource),
+    /// The zero set of an expression.
+    Implicit(ImplicitSource),
+    /// An isosurface of a volume.
+    Isosurface(IsosurfaceSource),
+    /// The surface through scattered points.
+    LevelSet(LevelSetSource),
+    /// A plane through a volume.
+    Slice(SliceSource),
+    /// An expression as a density.
+    Density(DensitySource),
+    /// A procedural cloud.
+    Cloud(CloudSource),
+    /// A plane.
+    Rectangle(RectangleSource),
+    /// A homogeneous medium.
+    Medium(MediumShape),
+}
+
+impl Source {
+    /// The file that it reads.
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Mesh(path) | Self::Points(path) => Some(path),
+            Self::Volume(source) => Some(&source.path),
+            Self::Isosurface(source) => Some(&source.path),
+            Self::LevelSet(source) => Some(&source.path),
+            Self::Slice(source) => Some(&source.path),
+            _ => None,
+        }
+    }
+}
+
+/// A volume file and how its values become colour and extinction.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VolumeSource {
+    /// The file.
+    pub path: PathBuf,
+    /// Value → colour and extinction, 1/world unit (after the object's transform).
+    pub transfer: TransferFunction,
+}
+
+/// The surface where an expression in x, y, z is zero; negative inside. Lengths are before the object's transform.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImplicitSource {
+    /// The expression.
+    pub expression: String,
+    /// Lowest and highest corner of the region that is searched.
+    pub bounds: [DVec3; 2],
+    /// Distance between samples.
+    pub spacing: f64,
+}
+
+/// A volume file, and the surface on which its value is a given one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IsosurfaceSource {
+    /// The file.
+    pub path: PathBuf,
+    /// Physical value.
+    pub level: f64,
+    /// Values between lattice points.
+    pub interpolation: Interpolation,
+    /// Which side the normals do not point to.
+    pub inside: Inside,
+}
+
+/// Scattered points through which a surface is laid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LevelSetSource {
+    /// The file.
+    pub path: PathBuf,
+    /// How far points may lie from the surface, over the diagonal of their box.
+    pub tolerance: f64,
+}
+
+/// A plane through a volume. Lengths are before the object's transform.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SliceSource {
+    /// The file.
+    pub path: PathBuf,
+    /// Value → colour; the extinctions are 0.
+    pub transfer: TransferFunction,
+    /// A point of the plane.
+    pub center: DVec3,
+    /// Unit normal.
+    pub normal: DVec3,
+}
+
+/// A medium whose density is an expression in x, y, z, negative values counting as 0. Lengths are before the object's
+/// transform.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DensitySource {
+    /// The expression.
+    pub expression: String,
+    /// Lowest and highest corner of the region that is sampled.
+    pub bounds: [DVec3; 2],
+    /// Distance between samples.
+    pub spacing: f64,
+    /// Extinction σ_t where the expression is 1, 1/world unit.
+    pub extinction: f64,
+}
+
+/// A cloud: ellipsoids whose density is disturbed by turbulence. Lengths are before the object's transform.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CloudSource {
+    /// Centre and three radii of each ellipsoid.
+    pub ellipsoids: Vec<(DVec3, DVec3)>,
+    /// Octaves of turbulence.
+    pub octaves: u32,
+    /// Frequency of the first octave, 1/unit of length.
+    pub frequency: f64,
+    /// Strength of the disturbance, in ellipsoid radii.
+    pub amplitude: f64,
+    /// Seed of the turbulence.
+    pub seed: u32,
+    /// Distance between samples.
+    pub spacing: f64,
+    /// Largest extinction σ_t, 1/world unit.
+    pub extinction: f64,
+}
+
+/// A flat parallelogram. Lengths are before the object's transform.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RectangleSource {
+    /// Centre.
+    pub center: DVec3,
+    /// First half-axis.
+    pub u: DVec3,
+    /// Second half-axis, not parallel to the first.
+    pub v: DVec3,
+    /// Distance between splats.
+    pub spacing: f64,
+}
+
+/// A homogeneous medium. Lengths are before the object's transform.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum MediumShape {
+    /// An axis-aligned box.
+    Box {
+        /// Lowest corner.
+        min: DVec3,
+        /// Highest corner.
+        max: DVec3,
+        /// Extinction σ_t, 1/world unit.
+        extinction: f64,
+        /// Distance between splats.
+        spacing: f64,
+    },
+    /// A ball.
+    Ball {
+        /// Centre.
+        center: DVec3,
+        /// Radius, > 0.
+        radius: f64,
+        /// Extinction σ_t, 1/world unit.
+        extinction: f64,
+        /// Distance between splats.
+        spacing: f64,
+    },
+}
+
+impl MediumShape {
+    /// Distance between splats.
+    pub fn spacing(&self) -> f64 {
+        match self {
+            Self::Box { spacing, .. } | Self::Ball { spacing, .. } => *spacing,
+        }
+    }
+}
