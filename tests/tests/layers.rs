@@ -1,7 +1,10 @@
 //! Layers mean what they say: effects sum to beauty in every scene, and depth is one thing for every primitive.
 
 use crate::many_forms::write;
-use organza_tests::{Picture, draw, draw_file, draw_in, largest_difference, mean_and_ripple, parallel_view, window};
+use organza_tests::{
+    Picture, draw, draw_file, draw_in, largest_difference, mean_and_ripple, parallel_view, sum_of_effects,
+    window,
+};
 use splat_core::glam::DVec3;
 use std::path::Path;
 
@@ -17,12 +20,7 @@ fn effects_sum_to_beauty_in_every_scene() {
         let picture =
             draw_file(&path, &["--size", "120x68", "--layers", "effects", "--set", "render.particles.repeat_level=2"]);
         for c in ["R", "G", "B"] {
-            let sum = ["background", "ambient", "emission", "direct"]
-                .iter()
-                .map(|name| picture.channel(&format!("{name}.{c}")))
-                .reduce(|a, b| a.iter().zip(b).map(|(a, b)| a + b).collect())
-                .unwrap();
-            let largest = largest_difference(&sum, &picture.channel(c));
+            let largest = largest_difference(&sum_of_effects(&picture, c), &picture.channel(c));
             assert!(largest < 1e-5, "{}, {c}: {largest:e}", path.display());
         }
         seen += 1;
