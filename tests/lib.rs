@@ -114,6 +114,15 @@ pub fn mean_and_ripple(values: &[f64]) -> (f64, f64) {
     (mean, values.iter().map(|v| (v - mean).abs()).fold(0.0, f64::max))
 }
 
+/// The layers that sum to beauty, of every technique that there is.
+pub const EFFECTS: [&str; 5] = ["background", "ambient", "emission", "direct", "scatter1"];
+
+/// The sum of [`EFFECTS`] in the channel `R`, `G` or `B`.
+pub fn sum_of_effects(picture: &Picture, channel: &str) -> Vec<f64> {
+    let effects = EFFECTS.map(|effect| picture.channel(&format!("{effect}.{channel}")));
+    (0..effects[0].len()).map(|k| effects.iter().map(|effect| effect[k]).sum()).collect()
+}
+
 /// Largest difference between two channels.
 pub fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());

@@ -1,7 +1,7 @@
 #version 450
 // Resolves the opaque splats of each tile: all channels that shading gives.
 
-#define CHANNELS 13u
+#define CHANNELS MOST_CHANNELS
 
 #include "blocks.glsl"
 #include "layouts.glsl"

@@ -172,7 +172,8 @@ void main() {
     Point p = point_of(i, m, look >> 24);
     vec3 ambient = vec3(0.0);
     vec3 emission = m.emission;
-    vec3 direct = vec3(0.0);
+    // Of lights: reflected about the normal, or scattered once by the phase function.
+    vec3 lit = vec3(0.0);
     float shadow = 1.0;
     if (m.look.x == SHADING_UNLIT) {
         emission += p.color;
@@ -192,7 +193,7 @@ void main() {
             }
             vec2 lobes = p.by_phase ? vec2(m.lobes.z * phase(-from.xyz, p.to_eye, m.lobes.w), 0.0)
                                     : reflect_of(m, p, from.xyz);
-            direct += irradiance * share * (p.color * lobes.x + lobes.y);
+            lit += irradiance * share * (p.color * lobes.x + lobes.y);
             left += irradiance.y * share.y;
             arriving += irradiance.y;
         }
@@ -204,9 +205,10 @@ void main() {
     if ((view.layers & 1u) != 0u) {
         put(at, ambient);
         put(at, emission);
-        put(at, direct);
+        put(at, p.by_phase ? vec3(0.0) : lit);
+        put(at, p.by_phase ? lit : vec3(0.0));
     } else {
-        put(at, ambient + emission + direct);
+        put(at, ambient + emission + lit);
     }
     if ((view.layers & 2u) != 0u) {
         put(at, p.normal);

@@ -68,7 +68,8 @@ macro_rules! layouts {
         pub fn glsl() -> String {
             use $crate::Layout;
             let structs = [$(<$name>::glsl()),*].join("\n");
-            format!("// Written by `cargo xtask shaders` from src/layouts.rs.\n\n{structs}")
+            let most = format!("#define MOST_CHANNELS {}u", $crate::layouts::MOST_CHANNELS);
+            format!("// Written by `cargo xtask shaders` from src/layouts.rs.\n\n{most}\n\n{structs}")
         }
     };
 }

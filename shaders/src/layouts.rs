@@ -2,6 +2,9 @@
 
 use crate::layout::layouts;
 
+/// The most channels of a splat for which kernels that keep them apart make room.
+pub const MOST_CHANNELS: u32 = 16;
+
 layouts! {
     /// The view of one cloud, with which splats are culled and projected.
     pub struct SortView {
@@ -97,8 +100,8 @@ layouts! {
         pub depths: u32,
         /// 1 where objects are kept.
         pub objects: u32,
-        /// Nothing.
-        pub unused: u32,
+        /// Channels that are red, green and blue in threes; they come first.
+        pub colors: u32,
     }
 
     /// What the counting of tiles found.
@@ -171,7 +174,7 @@ layouts! {
         pub lights: u32,
         /// Numbers a splat.
         pub channels: u32,
-        /// 1 where ambient, emission and direct are kept apart, + 2 where the normal is a channel, + 4 the shadow.
+        /// 1 where effects are kept apart, + 2 where the normal is a channel, + 4 the shadow.
         pub layers: u32,
         /// Nothing.
         pub unused: u32,

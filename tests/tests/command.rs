@@ -78,6 +78,11 @@ fn exit_2_is_for_the_command_line() {
         (vec!["render", "s.toml", "--tolerance", "-1"], "--tolerance -1: `tolerance`: expected a number above 0"),
         (vec!["render", "s.toml", "--exposure", "1e9"], "`exposure`: expected a number from -60 to 60"),
         (vec!["render", "s.toml", "--layers", "depth,norml"], "there is no layer `norml`"),
+        (
+            vec!["render", "s.toml", "--layers", "refraction"],
+            "no technique of this version fills the layer `refraction`",
+        ),
+        (vec!["render", "s.toml", "--layers", "effects,scatterN"], "fills the layer `scatterN`"),
         (vec!["render", "s.toml", "--technique", "surfels"], "this version does not have \"surfels\""),
         (vec!["render", "s.toml", "--max-memory", "0"], "expected a number of bytes above 0"),
     ] {

@@ -1,6 +1,6 @@
 //! Invariances through the whole command: threads, shuffled input, scale by powers of two, shift by 10⁷, linearity.
 
-use organza_tests::{draw, largest_difference};
+use organza_tests::{draw, largest_difference, sum_of_effects};
 use std::fmt::Write;
 
 /// A scene with everything that the points technique does, all lengths times `scale`, moved by `shift`. Positions are
@@ -96,12 +96,7 @@ fn x8_light_is_additive_and_layers_sum_to_beauty() {
     let text = scene(1.0, 0.0, false);
     let all = draw(&text, &[]);
     for c in ["R", "G", "B"] {
-        let sum = ["background", "ambient", "emission", "direct"]
-            .iter()
-            .map(|name| all.channel(&format!("{name}.{c}")))
-            .reduce(|a, b| a.iter().zip(b).map(|(a, b)| a + b).collect())
-            .unwrap();
-        let largest = largest_difference(&sum, &all.channel(c));
+        let largest = largest_difference(&sum_of_effects(&all, c), &all.channel(c));
         assert!(largest < 1e-5, "channel {c}: {largest:e}");
     }
     let brighter = text.replace("20.0, 20.0, 20.0", "40.0, 40.0, 40.0").replace("0.5, 0.5, 0.5", "1.0, 1.0, 1.0");

@@ -1,7 +1,10 @@
 //! Layers mean what they say: effects sum to beauty in every scene, and depth is one thing for every primitive.
 
 use crate::many_forms::write;
-use organza_tests::{Picture, draw, draw_file, draw_in, largest_difference, mean_and_ripple, parallel_view, window};
+use organza_tests::{
+    EFFECTS, Picture, draw, draw_file, draw_in, largest_difference, mean_and_ripple, parallel_view, sum_of_effects,
+    window,
+};
 use splat_core::glam::DVec3;
 use std::path::Path;
 
@@ -17,17 +20,65 @@ fn effects_sum_to_beauty_in_every_scene() {
         let picture =
             draw_file(&path, &["--size", "120x68", "--layers", "effects", "--set", "render.particles.repeat_level=2"]);
         for c in ["R", "G", "B"] {
-            let sum = ["background", "ambient", "emission", "direct"]
-                .iter()
-                .map(|name| picture.channel(&format!("{name}.{c}")))
-                .reduce(|a, b| a.iter().zip(b).map(|(a, b)| a + b).collect())
-                .unwrap();
-            let largest = largest_difference(&sum, &picture.channel(c));
+            let largest = largest_difference(&sum_of_effects(&picture, c), &picture.channel(c));
             assert!(largest < 1e-5, "{}, {c}: {largest:e}", path.display());
         }
         seen += 1;
     }
     assert!(seen >= 8, "{seen} scenes");
+}
+
+/// A cloud that glows and scatters before a surface that reflects and one that is opaque, under a light and an ambient one, with
+/// a background beside them.
+const EVERY_EFFECT: &str = "[background]\ncolor = [0.2, 0.3, 0.4]\n[ambient]\ncolor = [0.1, 0.2, 0.3]\n\
+     [material.cloud]\nmedium = { extinction = 2.0, asymmetry = 0.4 }\nemission = [0.05, 0.1, 0.15]\n\
+     [material.sheet]\ncolor = [0.9, 0.5, 0.2]\nspecular = 0.2\n\
+     [[light]]\nkind = 'directional'\ndirection = [0.3, -0.4, -1]\nirradiance = [2, 1.5, 1]\n\
+     [[object]]\nname = 'cloud'\nmaterial = 'cloud'\n\
+     medium_box = { min = [-0.8, -0.8, 0.2], max = [0.3, 0.8, 0.7], extinction = 2.0, spacing = 0.06 }\n\
+     [[object]]\nname = 'sheet'\nmaterial = 'sheet'\nopacity = 0.5\n\
+     rectangle = { center = [0.2, 0, 0], u = [0.6, 0, 0.1], v = [0, 0.6, 0], spacing = 0.04 }\n\
+     [[object]]\nname = 'wall'\nmaterial = 'sheet'\n\
+     rectangle = { center = [0, 0.5, -1], u = [0.8, 0, 0], v = [0, 0.4, 0], spacing = 0.04 }\n";
+
+/// Arguments of each technique.
+const TECHNIQUES: [&[&str]; 2] =
+    [&["--technique", "points"], &["--technique", "particles", "--repeat-level", "20", "--seed", "3"]];
+
+#[test]
+fn effects_sum_to_the_beauty_of_a_picture_without_them() {
+    let text = parallel_view(2.0, 40) + EVERY_EFFECT;
+    for technique in TECHNIQUES {
+        let plain = draw(&text, technique);
+        assert_eq!(plain.names(), ["A", "B", "G", "R"]);
+        let apart = draw(&text, &[technique, &["--layers", "effects"]].concat());
+        for c in ["R", "G", "B"] {
+            let largest = largest_difference(&sum_of_effects(&apart, c), &plain.channel(c));
+            assert!(largest < 1e-5, "{technique:?}, {c}: {largest:e}");
+            for effect in EFFECTS {
+                let part = apart.channel(&format!("{effect}.{c}"));
+                let most = part.iter().copied().fold(0.0, f64::max);
+                assert!(most > 0.01, "{technique:?}: {effect}.{c} is at most {most:e}, the sum says nothing of it");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_surfaces_reflect_is_direct_and_what_media_scatter_once_is_scatter1() {
+    let (head, objects) = EVERY_EFFECT.split_at(EVERY_EFFECT.find("[[object]]").unwrap());
+    let (cloud, surfaces) = objects.split_at(objects.find("[[object]]\nname = 'sheet'").unwrap());
+    for technique in TECHNIQUES {
+        for (what, object, filled, empty) in
+            [("cloud", cloud, "scatter1", "direct"), ("surfaces", surfaces, "direct", "scatter1")]
+        {
+            let text = parallel_view(2.0, 24) + head + object;
+            let picture = draw(&text, &[technique, &["--layers", "effects"]].concat());
+            let most = |effect: &str| picture.channel(&format!("{effect}.G")).iter().copied().fold(0.0, f64::max);
+            assert!(most(filled) > 0.01, "{technique:?}, {what}: {filled} is at most {}", most(filled));
+            assert_eq!(most(empty), 0.0, "{technique:?}, {what}: {empty}");
+        }
+    }
 }
 
 /// First, median, mean and standard deviation of depth, means over the middle of a picture; no pixel is farther from

@@ -1,7 +1,7 @@
 //! Layers and coloured extinction of the technique `particles`: closed forms within stated statistics, sums, bits.
 
 use crate::many_forms::write;
-use organza_tests::{Picture, draw_in, largest_difference, organza, parallel_view, window};
+use organza_tests::{Picture, draw_in, largest_difference, organza, parallel_view, sum_of_effects, window};
 use std::path::Path;
 
 const SIZE: u32 = 32;
@@ -243,10 +243,7 @@ fn transmission_is_that_of_each_channel_whatever_absorbs() {
             agree(&seen, expected, &format!("{name}, {object}"));
             agree(&middle(&picture, &format!("background.{name}")), [BACK[c] * t, BACK[c] * spread], &object);
             alpha += (1.0 - t) / 3.0;
-            let effects =
-                ["background", "ambient", "emission", "direct"].map(|e| picture.channel(&format!("{e}.{name}")));
-            let sum: Vec<f64> = (0..effects[0].len()).map(|k| effects.iter().map(|e| e[k]).sum()).collect();
-            assert!(largest_difference(&sum, &picture.channel(name)) < 1e-5, "{object}");
+            assert!(largest_difference(&sum_of_effects(&picture, name), &picture.channel(name)) < 1e-5, "{object}");
         }
         let found = middle(&picture, "A");
         assert!((found.iter().sum::<f64>() / found.len() as f64 - alpha).abs() < 0.004, "{object}");
@@ -336,7 +333,7 @@ fn x7_only_the_planes_that_are_asked_for_take_memory() {
     };
     let grey = fog_and_plane("").replace("extinction_rgb", "# ");
     let of = |layers: &str| bytes(&grey, layers);
-    assert_eq!([of("alpha"), of("std_error"), of("effects")], [36, 36, 84]);
+    assert_eq!([of("alpha"), of("std_error"), of("effects")], [36, 36, 108]);
     assert_eq!([of("depth"), of("object"), of("depth.first,object")], [36 + 184, 36 + 8, 36 + 192]);
     assert_eq!(bytes(&fog_and_plane(""), "alpha"), 36 + 48);
     // Unequal numbers that are equal are none.

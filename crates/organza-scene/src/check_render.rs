@@ -10,8 +10,8 @@ use super::{
     SurfaceSampler, Technique,
 };
 use crate::{Error, shown};
-use splat_core::Direction;
 use splat_core::raster::Accumulation;
+use splat_core::{ADDITIVE_LAYERS, Direction};
 
 /// Techniques of the design that this version does not have.
 const LATER_TECHNIQUES: [&str; 2] = ["sheets", "surfels"];
@@ -59,6 +59,10 @@ fn check_layers(at: &At<'_>, names: &[String], technique: Technique) -> Result<L
     let mut choice = LayerChoice::default();
     for (i, name) in names.iter().enumerate() {
         if !choice.add(name) {
+            if ADDITIVE_LAYERS.contains(&name.as_str()) {
+                let message = format!("no technique of this version fills the layer `{name}`");
+                return Err(at.index(i).error(message, "leave it out; `effects` keeps those that are filled"));
+            }
             return Err(at.index(i).error(format!("there is no layer `{}`", shown(name)), suggest(name, &LAYER_NAMES)));
         }
     }

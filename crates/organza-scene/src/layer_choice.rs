@@ -1,10 +1,10 @@
 //! Which images a render keeps.
 
-use splat_core::{ADDITIVE_LAYERS, LayerSet, Layers};
+use splat_core::{ADDITIVE_LAYERS, LayerSet, Layers, SHADED_EFFECTS};
 use std::collections::BTreeSet;
 
 /// Every name that `layers` accepts. `effects` and `depth` stand for several; `beauty` and `alpha` are always kept.
-pub const LAYER_NAMES: [&str; 16] = [
+pub const LAYER_NAMES: [&str; 17] = [
     "beauty",
     "alpha",
     "effects",
@@ -12,6 +12,7 @@ pub const LAYER_NAMES: [&str; 16] = [
     "ambient",
     "emission",
     "direct",
+    "scatter1",
     "shadow",
     "normal",
     "depth",
@@ -36,7 +37,7 @@ impl LayerChoice {
     #[must_use]
     pub fn add(&mut self, name: &str) -> bool {
         match name {
-            "effects" => self.names.extend(ADDITIVE_LAYERS),
+            "effects" => self.names.extend(["background"].into_iter().chain(SHADED_EFFECTS)),
             "depth" => self.names.extend(DEPTHS),
             _ => match LAYER_NAMES.iter().find(|known| **known == name) {
                 Some(known) => _ = self.names.insert(known),

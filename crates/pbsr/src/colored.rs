@@ -8,7 +8,7 @@
 use crate::bins::{AREA, TILE, Task};
 use crate::ensemble::TileSums;
 use crate::render::{Resolve, solid};
-use crate::shade::MAX_CHANNELS;
+use splat_core::shade::MAX_CHANNELS;
 
 /// The depth buffers of one tile.
 pub(crate) struct Colored {

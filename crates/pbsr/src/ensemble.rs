@@ -10,6 +10,8 @@ use crate::Error;
 use crate::bins::{AREA, TILE, Tiling};
 use crate::depths::DepthSum;
 use crate::error::check;
+use splat_core::LayerSet;
+use splat_core::shade::ChannelLayout;
 
 /// Bits behind the point of a channel's sum.
 pub(crate) const FRACTION: f32 = 16_777_216.0;
@@ -23,7 +25,7 @@ pub(crate) const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
 /// What a pixel keeps beside hits and beauty.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct EnsembleParams {
-    /// Ambient, emission and direct light apart.
+    /// Each of [`splat_core::SHADED_EFFECTS`] apart.
     pub effects: bool,
     /// Normal of what is seen.
     pub normal: bool,
@@ -43,13 +45,22 @@ pub struct EnsembleParams {
 }
 
 impl EnsembleParams {
-    /// Numbers a hit brings: 3 or 9 for light, 3 for a normal, 1 for shadow.
+    /// Numbers a hit brings: 3 for light or for each effect, 3 for a normal, 1 for shadow.
+    #[inline]
     pub fn channels(&self) -> usize {
-        self.light_channels() + 3 * usize::from(self.normal) + usize::from(self.shadow)
+        self.layout().count()
     }
 
+    #[inline]
     pub(crate) fn light_channels(&self) -> usize {
-        if self.effects { 9 } else { 3 }
+        self.layout().colors()
+    }
+
+    /// Which of these numbers is where.
+    #[inline]
+    pub(crate) fn layout(&self) -> ChannelLayout {
+        let Self { effects, normal, shadow, .. } = *self;
+        ChannelLayout::new(&LayerSet { effects, normal, shadow, ..LayerSet::default() })
     }
 
     /// Whether a hit brings nothing but its radiance.

@@ -5,7 +5,7 @@ use crate::bins::{AREA, Record, TILE, Task};
 use crate::ensemble::TileSums;
 use crate::flat::{self, Flat};
 use crate::render::{Resolve, solid};
-use crate::shade::MAX_CHANNELS;
+use splat_core::shade::MAX_CHANNELS;
 
 /// The key of a pixel that nothing hides.
 const OPEN: u64 = solid(f32::INFINITY);

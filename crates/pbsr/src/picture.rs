@@ -12,10 +12,8 @@
 use crate::ensemble::{Ensemble, FRACTION, LUMINANCE};
 use crate::{EnsembleParams, Occluder};
 use rayon::prelude::*;
-use splat_core::{LayerData, Layers};
+use splat_core::{LayerData, Layers, SHADED_EFFECTS};
 
-/// Effects apart, in the order of their channels.
-const EFFECTS: [&str; 3] = ["ambient", "emission", "direct"];
 /// The four depths.
 const DEPTHS: [&str; 4] = ["depth.first", "depth.median", "depth.mean", "depth.sigma"];
 
@@ -24,7 +22,7 @@ const DEPTHS: [&str; 4] = ["depth.first", "depth.median", "depth.mean", "depth.s
 struct Pixel {
     beauty: [f32; 3],
     behind: [f32; 3],
-    effects: [[f32; 3]; 3],
+    effects: [[f32; 3]; SHADED_EFFECTS.len()],
     alpha: [f32; 3],
     std_error: f32,
     normal: [f32; 3],
@@ -38,7 +36,7 @@ impl EnsembleParams {
     pub fn bytes_to_read_pixel(&self) -> u64 {
         let count = |on: bool, numbers: usize| if on { numbers } else { 0 };
         let numbers = 8
-            + count(self.effects, 12)
+            + count(self.effects, 3 * (1 + SHADED_EFFECTS.len()))
             + count(self.normal, 3)
             + count(self.shadow, 1)
             + count(self.depth_range.is_some(), 4)
@@ -49,8 +47,8 @@ impl EnsembleParams {
 
 impl Ensemble {
     /// The picture so far, valid after any number of sets: `beauty`, `alpha` and `std_error` (of the luminance of beauty),
-    /// and what else was kept: `background`, `ambient`, `emission`, `direct`, `normal`, `shadow`, `depth.first`,
-    /// `depth.median`, `depth.mean`, `depth.sigma` (of what is seen, the occluder included; of green where extinction
+    /// and what else was kept: `background` and [`SHADED_EFFECTS`], `normal`, `shadow`, `depth.first`, `depth.median`,
+    /// `depth.mean`, `depth.sigma` (of what is seen, the occluder included; of green where extinction
     /// differs by channel), `object` (the rank of the object of the nearest hit; `u32::MAX` without one), and `alpha_rgb`
     /// where extinction differs by channel, of which `alpha` is then the mean.
     ///
@@ -72,7 +70,7 @@ impl Ensemble {
         }
         if self.params.effects {
             layers.insert("background", rgb(&|p| p.behind));
-            for (name, e) in EFFECTS.into_iter().zip(0..) {
+            for (name, e) in SHADED_EFFECTS.into_iter().zip(0..) {
                 layers.insert(name, rgb(&|p| p.effects[e]));
             }
         }

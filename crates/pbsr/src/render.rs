@@ -13,10 +13,11 @@ use crate::error::check;
 use crate::nearest::Nearest;
 use crate::project::Projector;
 use crate::sampler::{Run, runs};
-use crate::shade::{Appearance, LitBy, MAX_CHANNELS, Seen, Shader};
+use crate::shade::{Appearance, LitBy, Seen, Shader};
 use crate::{Error, PackedNormal, Sampler};
 use glam::{DMat3, DVec3, Mat3};
 use rayon::prelude::*;
+use splat_core::shade::MAX_CHANNELS;
 use splat_core::{Camera, Progress, Shading, Similarity, glam};
 
 /// One object of the scene.

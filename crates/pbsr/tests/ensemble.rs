@@ -286,8 +286,9 @@ fn light_and_shadow_make_the_radiance_of_a_lambertian() {
         near("ambient", [0.08, 0.04, 0.02]);
         near("normal", [0.0, 0.0, 1.0]);
         assert_eq!(layers.scalar("shadow").unwrap()[k], 0.5);
-        let sum: f32 =
-            ["background", "ambient", "emission", "direct"].iter().map(|n| layers.rgb(n).unwrap()[k][0]).sum();
+        near("scatter1", [0.0; 3]);
+        let effects = ["background", "ambient", "emission", "direct", "scatter1"];
+        let sum: f32 = effects.iter().map(|n| layers.rgb(n).unwrap()[k][0]).sum();
         assert!((sum - layers.rgb("beauty").unwrap()[k][0]).abs() < 1e-5);
     }
 }

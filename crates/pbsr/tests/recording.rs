@@ -89,7 +89,7 @@ fn large_images_are_lit_in_parts_and_what_is_kept_makes_room() {
         assert_eq!(text.lines().filter(|line| line.starts_with(see)).count(), 2 * 12);
         assert_eq!(room.seen().splats, 256 * 4096);
         let bytes = recorded.recording.buffers()[recorded.sums.index()].bytes;
-        assert_eq!(bytes, 63 * 47 * 4096 * 4 * (3 + 2 * 10));
+        assert_eq!(bytes, 63 * 47 * 4096 * 4 * (3 + 2 * 13));
     }
     let object = EnsembleParams { object: true, ..EnsembleParams::default() };
     assert!(record(room, Nearest::Wide, Some(&Lighting { params: object, lights: 0, shadows: &[] })).is_err());

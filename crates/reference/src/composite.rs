@@ -2,7 +2,7 @@
 
 use crate::footprint::{Splat, norms};
 use rayon::prelude::*;
-use splat_core::{Camera, Cloud, Error, FootprintStack, Material, Progress, SplatKind};
+use splat_core::{Camera, Cloud, Error, FootprintStack, Material, Progress, SHADED_EFFECTS, SplatKind};
 
 /// What the fragments of a pixel are sorted by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -195,13 +195,14 @@ fn pixel(input: &Input<'_>, splats: &[Option<Splat>], ids: &[u32], x: usize, y: 
     out
 }
 
-/// The wavelength that attenuates channel `c`. One colour comes first, or three of nine channels and more; what is no colour,
-/// normal and shadow, goes with green.
+/// The wavelength that attenuates channel `c`. One colour comes first, or every effect apart; what is no colour, normal
+/// and shadow, goes with green.
 fn band(c: usize, channels: usize) -> usize {
+    const APART: usize = 3 * SHADED_EFFECTS.len();
     let colored = match channels {
         0..3 => 0,
-        3..9 => 3,
-        _ => 9,
+        3..APART => 3,
+        _ => APART,
     };
     if c < colored { c % 3 } else { 1 }
 }

@@ -3,13 +3,23 @@
 use crate::DepthProfile;
 use std::collections::BTreeMap;
 
-/// The additive effects, in the order of their sum: background + … = beauty.
-pub const ADDITIVE_LAYERS: [&str; 4] = ["background", "ambient", "emission", "direct"];
+/// The additive effects, in the order of their sum: background + … = beauty. A technique fills those that it shows; the others
+/// are names that are kept for techniques to come.
+pub const ADDITIVE_LAYERS: [&str; 8] =
+    ["background", "ambient", "emission", "direct", "scatter1", "scatterN", "reflection", "refraction"];
+
+/// The effects that shading gives to what is seen, in the order of their channels. An effect more is a name here and a row of
+/// `Radiance::effects`.
+///
+/// `ambient`: ambient radiance that is reflected or scattered. `emission`: what materials give off, colours shown as they are
+/// included. `direct`: light that comes from a light and is reflected about a normal. `scatter1`: light that comes from a
+/// light and is scattered once, by a phase function.
+pub const SHADED_EFFECTS: [&str; 4] = ["ambient", "emission", "direct", "scatter1"];
 
 /// Which images are kept. Beauty is always made.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct LayerSet {
-    /// Additive effects, each an image of its own.
+    /// Additive effects that are filled, each an image of its own.
     pub effects: bool,
     /// Transmittance of the shadow maps at what is seen, weighted by opacity.
     pub shadow: bool,
@@ -32,8 +42,8 @@ pub enum LayerData {
     Id(Vec<u32>),
 }
 
-/// Everything that one render returns, by name: `beauty` and `alpha` always; `background`, `ambient`, `emission`,
-/// `direct`, `shadow`, `normal`, `depth.first`, `depth.median`, `depth.mean`, `depth.sigma`, `object` when asked for.
+/// Everything that one render returns, by name: `beauty` and `alpha` always; those of [`ADDITIVE_LAYERS`] that are filled,
+/// `shadow`, `normal`, `depth.first`, `depth.median`, `depth.mean`, `depth.sigma`, `object` when asked for.
 ///
 /// Depth is linear view depth and +∞ where it is undefined.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -46,7 +46,7 @@ pub use field::ScalarField;
 pub use footprint::{Footprint, FootprintStack};
 pub use glam;
 pub use grid::Grid;
-pub use layers::{ADDITIVE_LAYERS, Accumulator, LayerData, LayerSet, Layers};
+pub use layers::{ADDITIVE_LAYERS, Accumulator, LayerData, LayerSet, Layers, SHADED_EFFECTS};
 pub use light::{Light, LightShape};
 pub use material::{Material, MaterialTable, Object, ObjectTable, Shading};
 pub use mesh::Mesh;

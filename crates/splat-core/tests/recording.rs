@@ -4,8 +4,11 @@ use glam::{DVec3, Vec3};
 use splat_core::raster::gpu::draw::{self, Precision};
 use splat_core::raster::gpu::{AttributeRoom, Capacities, Input, follow, project, record, resolve};
 use splat_core::raster::{self, Accumulation, OpaqueImage, Params, Projected};
-use splat_core::shade::{ChannelLayout, gpu as shade};
+use splat_core::shade::{ChannelLayout, MAX_CHANNELS, gpu as shade};
 use splat_core::{Accumulator, Camera, Cloud, Direction, Error, FootprintStack, Material, Projection, Splat};
+
+/// All effects, the normal and the shadow.
+const MOST: u32 = MAX_CHANNELS as u32;
 
 const ROOM: Capacities = Capacities {
     size: [640, 360],
@@ -31,7 +34,9 @@ fn it_is_as_kept_in_text() {
 
 #[test]
 fn every_channel_is_drawn_once_with_the_plane_that_hides_it() {
-    for (planes, channels) in [(1, 1), (1, 3), (1, 4), (1, 13), (3, 1), (3, 3), (3, 4), (3, 6), (3, 13)] {
+    for (planes, channels) in
+        [(1, 1), (1, 3), (1, 4), (1, MOST), (3, 1), (3, 3), (3, 4), (3, 6), (3, 12), (3, 13), (3, MOST)]
+    {
         let found = draw::follow(Capacities { planes, channels, ..ROOM }, Precision::Half).unwrap();
         let text = found.recording.to_string();
         assert!(found.sorted.is_some() && text.contains("splat_follow 1x1x1 sorted view*\n"));
@@ -44,8 +49,8 @@ fn every_channel_is_drawn_once_with_the_plane_that_hides_it() {
         let mut seen = vec![0; channels as usize];
         for draw in &draws {
             for &c in draw[1..4].iter().filter(|c| **c != u32::MAX) {
-                // One colour or three effects; normal and shadow behind them are no colours.
-                let colors = [0, 3, 9][usize::from(channels >= 3) + usize::from(channels >= 9)];
+                // One colour or four effects; normal and shadow behind them are no colours.
+                let colors = [0, 3, 12][usize::from(channels >= 3) + usize::from(channels >= 12)];
                 let expected = if planes == 1 {
                     0
                 } else if c < colors {
@@ -71,7 +76,7 @@ fn every_channel_is_drawn_once_with_the_plane_that_hides_it() {
 fn it_is_without_fault_for_any_room() {
     for size in [[1, 1], [16, 16], [17, 16], [4096, 16], [4097, 16], [16_384, 16_384]] {
         for (ordered, entries) in [(0, 0), (1, 1), (1025, 2048), (50_000_000, 200_000_000)] {
-            for (planes, channels) in [(1, 1), (1, 3), (3, 13)] {
+            for (planes, channels) in [(1, 1), (1, 3), (3, MOST)] {
                 let room = Capacities { size, planes, channels, ordered, entries, opaque: false, ..ROOM };
                 record(room).unwrap().recording.check().unwrap();
                 draw::record(room, Precision::Single).unwrap().recording.check().unwrap();
@@ -88,7 +93,7 @@ fn what_no_kernel_does_is_refused() {
         Capacities { size: [5, 16_385], ..ROOM },
         Capacities { planes: 2, ..ROOM },
         Capacities { channels: 0, ..ROOM },
-        Capacities { channels: 14, ..ROOM },
+        Capacities { channels: MOST + 1, ..ROOM },
     ] {
         assert!(matches!(record(room), Err(Error::Invalid { .. })), "{room:?}");
         assert!(matches!(draw::record(room, Precision::Single), Err(Error::Invalid { .. })), "{room:?}");
@@ -178,12 +183,12 @@ fn opaque_splats_are_recorded_without_fault_or_refused() {
         objects: true,
     };
     for size in [[1, 1], [17, 16], [16_384, 16_384]] {
-        for (channels, listed, entries) in [(1, 0, 0), (3, 1, 1), (13, 1025, 2048)] {
+        for (channels, listed, entries) in [(1, 0, 0), (3, 1, 1), (MOST, 1025, 2048)] {
             let room = resolve::Capacities { size, channels, listed, entries, ..room };
             resolve::record(room).unwrap().recording.check().unwrap();
         }
     }
-    for wrong in [resolve::Capacities { size: [0, 9], ..room }, resolve::Capacities { channels: 14, ..room }] {
+    for wrong in [resolve::Capacities { size: [0, 9], ..room }, resolve::Capacities { channels: MOST + 1, ..room }] {
         assert!(matches!(resolve::record(wrong), Err(Error::Invalid { .. })));
     }
     let projected = projected();

@@ -66,7 +66,7 @@ void main() {
     uint plane_count = PLANES == 1u ? 1u : view.planes;
     uint channel_count = PLANES == 1u ? CHANNELS : view.channels;
     // Colours come first, in threes; normal and shadow take green's weight, as `ChannelLayout::plane_of` has it.
-    uint colors = channel_count < 3u ? 0u : channel_count < 9u ? 3u : 9u;
+    uint colors = view.colors;
     uint area = size.x * size.y;
     uint at = pixel.at.y * size.x + pixel.at.x;
     pixel.ray_factor = ray_factor_of(pixel.at);

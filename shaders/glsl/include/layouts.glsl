@@ -1,5 +1,7 @@
 // Written by `cargo xtask shaders` from src/layouts.rs.
 
+#define MOST_CHANNELS 16u
+
 struct SortView {
     vec4 axis_x;
     vec4 axis_y;
@@ -50,7 +52,7 @@ struct SplatView {
     uint materials;
     uint depths;
     uint objects;
-    uint unused;
+    uint colors;
 };
 
 struct SplatState {

@@ -137,8 +137,9 @@ fn occluder(opaque: &OpaqueImage, layout: &ChannelLayout) -> Option<Occluder> {
     if opaque.depth.is_empty() {
         return None;
     }
-    let color =
-        |k: usize| std::array::from_fn(|c| layout.effects().map(|first| opaque.channels[first + c][k]).sum::<f32>());
+    let color = |k: usize| {
+        std::array::from_fn(|c| layout.effects().map(|(_, first)| opaque.channels[first + c][k]).sum::<f32>())
+    };
     Some(Occluder { depth: opaque.depth.clone(), color: (0..opaque.depth.len()).map(color).collect() })
 }
 

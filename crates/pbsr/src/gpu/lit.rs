@@ -14,8 +14,8 @@
 use super::{BLOCK, Capacities, Inputs};
 use crate::{Ensemble, EnsembleParams, Error, LitBy, Scene};
 use splat_core::raster::gpu::{AttributeBuffers, AttributeRoom};
-use splat_core::shade::{self, ChannelLayout, ShadeInput, gpu as shading};
-use splat_core::{Cloud, LayerSet, Material};
+use splat_core::shade::{self, ShadeInput, gpu as shading};
+use splat_core::{Cloud, Material};
 use splat_shaders::{BufferId, Groups, Joined, Recording, kernels};
 use std::borrow::Cow;
 
@@ -157,14 +157,12 @@ impl Lit {
             let shared: Vec<_> = shared.chain([(shadow.shares, seen.shares)]).chain(received).collect();
             shadows.push(r.join_uploads(shadow.recording, &shared));
         }
-        let set =
-            LayerSet { effects: params.effects, normal: params.normal, shadow: params.shadow, ..LayerSet::default() };
         let shade = shading::record(shading::Capacities {
             attributes: capacities.seen(),
             materials: capacities.objects,
             lights: lighting.lights,
             shadows: lighting.shadows.len() as u32,
-            layout: ChannelLayout::new(&set),
+            layout: params.layout(),
         });
         let first = lighting.shadows.first().zip(shadows.first());
         let received = first.map(|(first, joined)| (shade.received, joined.of(first.received)));

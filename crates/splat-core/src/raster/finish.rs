@@ -145,7 +145,7 @@ impl Output {
             (0..self.alpha.len()).map(|k| std::array::from_fn(|c| self.values[at + c][k])).collect()
         };
         let mut beauty = self.background.clone();
-        for at in layout.effects() {
+        for (_, at) in layout.effects() {
             for (sum, part) in beauty.iter_mut().zip(rgb(at)) {
                 for c in 0..3 {
                     sum[c] += part[c];
@@ -155,7 +155,7 @@ impl Output {
         layers.insert("beauty", LayerData::Rgb(beauty));
         if set.effects {
             layers.insert("background", LayerData::Rgb(self.background.clone()));
-            for (name, at) in ["ambient", "emission", "direct"].into_iter().zip(layout.effects()) {
+            for (name, at) in layout.effects() {
                 layers.insert(name, LayerData::Rgb(rgb(at)));
             }
         }

@@ -55,13 +55,13 @@ use super::bins::TILE as TWIN_TILE;
 use super::kernel::{Kernel, TABLE};
 use super::projected::{Coverage, ProjectedSplat};
 use super::{Accumulation, OpaqueImage, Params, Projected};
-use crate::shade::MAX_CHANNELS;
+use crate::shade::{ChannelLayout, MAX_CHANNELS};
 use crate::{Accumulator, Direction, Error, Material};
 use common::Common;
 use list::{List, ListRoom};
 use packed::SPLAT_WORDS;
 use rayon::prelude::*;
-use splat_shaders::layouts::SplatView;
+use splat_shaders::layouts::{MOST_CHANNELS, SplatView};
 use splat_shaders::{BufferId, Groups, Recording, kernels};
 
 /// Side of a tile, pixels.
@@ -69,6 +69,7 @@ pub const TILE: u32 = 16;
 /// The widest image, pixels a side: what one workgroup counts then fits 32 bits.
 const WIDEST: u32 = 16_384;
 
+const _: () = assert!(MAX_CHANNELS == MOST_CHANNELS as usize, "kernels make room for every effect that shading gives");
 const _: () = assert!(TWIN_TILE == 32, "`composite.glsl` counts offsets from the corners of the CPU's tiles");
 
 /// What a recording makes room for.
@@ -78,7 +79,7 @@ pub struct Capacities {
     pub size: [u32; 2],
     /// Planes of optical depth, 1 or 3.
     pub planes: u32,
-    /// Channels, 1 to 13.
+    /// Channels, 1 to [`MAX_CHANNELS`].
     pub channels: u32,
     /// Splats by id.
     pub splats: u32,
@@ -132,7 +133,7 @@ fn check_image(size: [u32; 2], channels: u32) -> Result<(), Error> {
         return refused("size", format!("{size:?}"), "1 to 16384 pixels a side");
     }
     if !(1..=MAX_CHANNELS).contains(&(channels as usize)) {
-        return refused("channels", channels.to_string(), "1 to 13");
+        return refused("channels", channels.to_string(), "1 to as many as all effects, a normal and a shadow have");
     }
     Ok(())
 }
@@ -361,6 +362,7 @@ impl Recorded {
             footprints: image.kernels.len() as u32,
             planes: room.planes,
             channels: room.channels,
+            colors: ChannelLayout::colors_of(room.channels as usize) as u32,
             opaque: u32::from(opaque),
             back_to_front: u32::from(image.direction == Direction::BackToFront),
             fresh: u32::from(fresh),

@@ -19,7 +19,7 @@
 //! assert_eq!(recorded.recording.bytes() / 1_000_000, 76);
 //! ```
 
-use super::{CHUNK, ChannelLayout, LitBy, LocalLight, Point, ShadeInput, shadow_share};
+use super::{CHUNK, ChannelLayout, LitBy, LitSplat, ShadeInput, shadow_share};
 use crate::raster::gpu::{AttributeBuffers, AttributeRoom, Attributes};
 use crate::{Error, Light, LightShape, Material, Progress, Shading};
 use glam::{DVec3, Vec3};
@@ -128,16 +128,15 @@ pub fn received(input: &ShadeInput<'_>, ids: &[u32], progress: &Progress) -> Vec
     let eye = (input.camera.position - input.cloud.origin).as_vec3();
     let mut all = Vec::new();
     for lit in shadowed(input.lights) {
-        let light = LocalLight::new(lit, input.cloud.origin);
         let mut column = vec![[0.0; 3]; ids.len()];
         column.par_chunks_mut(CHUNK).zip(ids.par_chunks(CHUNK)).for_each(|(to, ids)| {
             if progress.is_cancelled() {
                 return;
             }
             for (to, &i) in to.iter_mut().zip(ids) {
-                let point = Point::new(input, i as usize, eye);
-                let (_, irradiance) = light.irradiance(&point.receiver);
-                *to = point.transmittance(&light, irradiance);
+                let splat = LitSplat::new(input, i as usize, eye);
+                let (_, irradiance) = splat.point.irradiance(&lit.light);
+                *to = splat.transmittance(lit.shadow, irradiance);
             }
         });
         all.append(&mut column);
@@ -246,7 +245,7 @@ impl Recorded {
             materials: input.materials.len() as u32,
             lights: input.lights.len() as u32,
             channels: layout.count() as u32,
-            layers: u32::from(layout.effects) | u32::from(layout.normal) << 1 | u32::from(layout.shadow) << 2,
+            layers: layer_bits(&layout),
             unused: 0,
         }
     }
@@ -256,6 +255,12 @@ impl Recorded {
         let buffers = [self.view, self.tables, self.received];
         std::array::from_fn(|k| (buffers[k], &uploads.bytes[k][..]))
     }
+}
+
+/// 1 where effects are apart, + 2 where the normal is a channel, + 4 the shadow.
+fn layer_bits(layout: &ChannelLayout) -> u32 {
+    let bits = [layout.is_apart(), layout.normal().is_some(), layout.shadow().is_some()];
+    (0..).zip(bits).map(|(k, on)| u32::from(on) << k).sum()
 }
 
 fn material(m: &Material) -> [[f32; 4]; 3] {

@@ -238,7 +238,7 @@ fn every_layer_that_is_shaded_is_the_processor_s() {
     assert!(apart(&alone, &helped) <= TOLERANCE);
     let names = |r: &Render| r.layers.images.keys().copied().collect::<Vec<_>>();
     assert_eq!(names(&alone), names(&helped));
-    for name in ["ambient", "direct", "normal"] {
+    for name in ["ambient", "direct", "scatter1", "normal"] {
         let of = |r: &Render| r.layers.rgb(name).unwrap().as_flattened().to_vec();
         let (a, b) = (of(&alone), of(&helped));
         let largest = a.iter().fold(0.0, |most: f32, v| most.max(v.abs()));

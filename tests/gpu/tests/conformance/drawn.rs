@@ -50,7 +50,7 @@ fn every_number_of_planes_and_channels_is_drawn() {
     let mut cloud = media(2000, DVec3::ZERO);
     (0..2000).step_by(2).for_each(|i| cloud.material[i] = 1);
     let green = Material { extinction_rgb: [0.2, 1.0, 0.7], ..Material::default() };
-    for (planes, channels) in [(1, 1), (1, 7), (3, 1), (3, 3), (3, 4), (3, 13)] {
+    for (planes, channels) in [(1, 1), (1, 7), (3, 1), (3, 3), (3, 4), (3, 13), (3, 16)] {
         for direction in DIRECTIONS {
             let materials = vec![Material::default(), green];
             let scene = Scene { planes, channels, materials, direction, ..drawn(cloud.clone(), VIEWS[0]) };

@@ -207,8 +207,10 @@ fn agreement(a: &Ensemble, b: &Ensemble) -> (f64, f64, f32) {
     let pixels = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
     let same = |&(x, y): &(u32, u32)| a.hits(x, y) == b.hits(x, y);
     let [one, other] = [a, b].map(|e| e.read(&|_, _| [0.0; 3], None));
-    let names: Vec<&str> =
-        ["beauty", "ambient", "emission", "direct", "normal"].into_iter().filter(|n| one.rgb(n).is_some()).collect();
+    let names: Vec<&str> = ["beauty", "ambient", "emission", "direct", "scatter1", "normal"]
+        .into_iter()
+        .filter(|n| one.rgb(n).is_some())
+        .collect();
     let brightest = one.rgb("beauty").unwrap().as_flattened().iter().fold(0.0f32, |a, b| a.max(*b));
     let far = |k: usize| {
         let of_rgb = names.iter().map(|name| {

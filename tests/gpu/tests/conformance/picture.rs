@@ -266,7 +266,7 @@ fn lit_particles(device: Option<DeviceChoice>, more: &str) -> Render {
 fn apart(a: &Render, b: &Render) -> (f32, f32) {
     let [x, y] = [a, b].map(|r| r.layers.scalar("alpha").unwrap());
     let mut most = 0.0f32;
-    for name in ["beauty", "ambient", "emission", "direct", "normal"] {
+    for name in ["beauty", "ambient", "emission", "direct", "scatter1", "normal"] {
         let (Some(a), Some(b)) = (a.layers.rgb(name), b.layers.rgb(name)) else { continue };
         let equal = a.iter().zip(b).zip(x.iter().zip(y)).filter(|(_, (x, y))| x == y);
         most = equal.flat_map(|((a, b), _)| (0..3).map(move |c| (a[c] - b[c]).abs())).fold(most, f32::max);

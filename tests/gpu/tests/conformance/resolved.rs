@@ -74,7 +74,7 @@ fn opaque_surfaces_are_the_cpu_s() {
     let ids = opaque_ids(&cloud);
     for view in VIEWS {
         let projected = projected(&cloud, view, SIZE);
-        for (channels, objects) in [(3, false), (3, true), (1, true), (7, false), (13, true)] {
+        for (channels, objects) in [(3, false), (3, true), (1, true), (7, false), (16, true)] {
             let values = values(cloud.len(), channels);
             let input = Input { projected: &projected, ids: &ids, values: &values, channels, objects };
             let (found, counts) = on_device(&mut device, &input, 1 << 18).unwrap();

@@ -202,7 +202,7 @@ fn every_number_of_planes_and_channels_is_the_cpu_s() {
     let mut cloud = media(2000, DVec3::ZERO);
     (0..2000).step_by(2).for_each(|i| cloud.material[i] = 1);
     let green = Material { extinction_rgb: [0.2, 1.0, 0.7], ..Material::default() };
-    for (planes, channels) in [(1, 1), (1, 2), (1, 7), (3, 3), (3, 4), (3, 13)] {
+    for (planes, channels) in [(1, 1), (1, 2), (1, 7), (3, 3), (3, 4), (3, 13), (3, 16)] {
         for direction in [Direction::FrontToBack, Direction::BackToFront] {
             let materials = vec![Material::default(), green];
             let scene = Scene { planes, channels, materials, direction, ..Scene::new(cloud.clone(), VIEWS[0]) };

@@ -26,12 +26,7 @@ pub(super) fn accumulate(ensemble: &Ensemble, layout: &ChannelLayout, accumulato
             }
         }
     };
-    let effects: Vec<usize> = layout.effects().collect();
-    if let [beauty] = effects[..] {
-        put(beauty, "beauty", &|_| 1.0);
-    } else {
-        effects.iter().zip(["ambient", "emission", "direct"]).for_each(|(first, name)| put(*first, name, &|_| 1.0));
-    }
+    layout.effects().for_each(|(name, first)| put(first, name, &|_| 1.0));
     if let Some(first) = layout.normal() {
         put(first, "normal", &|k| opacity(k, 1));
     }
