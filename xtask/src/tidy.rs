@@ -3,6 +3,7 @@
 
 mod assets;
 mod dependencies;
+mod floors;
 mod functions;
 mod size;
 mod text;
@@ -12,7 +13,7 @@ pub(crate) use assets::{MAX_BYTES, credit_of, in_assets};
 
 type Rule = fn(&Repo) -> Vec<String>;
 
-const RULES: [(&str, Rule); 10] = [
+const RULES: [(&str, Rule); 11] = [
     ("heads", text::heads),
     ("foreign paths", text::foreign_paths),
     ("ignored tests", text::ignored_tests),
@@ -21,6 +22,7 @@ const RULES: [(&str, Rule); 10] = [
     ("file size", size::files),
     ("function size", size::functions),
     ("dependency direction", dependencies::direction),
+    ("floors", floors::upward),
     ("functions of the platform", functions::platform),
     ("assets", assets::assets),
 ];

@@ -4,7 +4,8 @@
 //! answered by the table of techniques.
 
 use crate::form::{DRAWN, Form, PlannedObject};
-use crate::plan::{Effect, Plan, PlannedPass, pass};
+use crate::pass;
+use crate::plan::{Effect, Plan, PlannedPass};
 use crate::scene::{Scene, SceneObject, Technique};
 use crate::shadows::CUT_SHARE;
 use crate::statistics::{LightStatistics, ObjectStatistics, Statistics};

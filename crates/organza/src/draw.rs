@@ -39,6 +39,9 @@ pub(crate) fn draw_ranges(
             fold.fold(range.clone(), &mut accumulator, session, cost)?;
         }
     }
+    for technique in &frame.plan.techniques {
+        row(*technique).steps.last().into_iter().for_each(|step| join(cost, step.pass));
+    }
     let layers = frame.finish(&accumulator, cost)?;
     let mut finished = Finished { layers, opaque: Some(frame.opaque(cost)?) };
     folds.iter_mut().for_each(|fold| fold.finish(&mut finished));
@@ -46,6 +49,21 @@ pub(crate) fn draw_ranges(
     restore_depths(&mut layers, frame.loaded.exponent);
     frame.settings.layers.keep(&mut layers);
     Ok(layers)
+}
+
+/// Makes one entry of those that a pass has left, one a range.
+fn join(cost: &mut CostRecord, pass: &str) {
+    let (of_pass, others): (Vec<_>, Vec<_>) = cost.stages.drain(..).partition(|stage| stage.name == pass);
+    cost.stages = others;
+    cost.stages.extend(of_pass.into_iter().reduce(|mut sum, stage| {
+        sum.seconds += stage.seconds;
+        sum.items_in += stage.items_in;
+        sum.items_out += stage.items_out;
+        sum.fragments += stage.fragments;
+        sum.passes += stage.passes;
+        sum.bytes = sum.bytes.max(stage.bytes);
+        sum
+    }));
 }
 
 /// Runs the planned passes on a loaded scene to their end, by the processor alone, and keeps the layers that it asks for.

@@ -3,19 +3,19 @@
 mod context;
 pub(crate) mod files;
 pub(crate) mod input;
+mod normalize;
 pub(crate) mod object;
 pub(crate) mod own;
 
 use crate::form::PlannedObject;
-use crate::plan::pass;
 use crate::scene::{Scene, SceneObject};
 use crate::statistics::{LightStatistics, ObjectStatistics};
-use crate::{CostRecord, Error, Progress, RenderOptions, normalize::normalize, stage, work};
+use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, pass, stage, work};
 pub(crate) use context::BYTES_PER_SPLAT;
 use context::Context;
-use convert::cost::Prediction;
 use files::Files;
 use glam::DVec3;
+use normalize::normalize;
 use object::Prepared;
 use own::Own;
 use splat_core::{Camera, Cloud, FootprintStack, Light, Material, Object, Shading};
@@ -56,26 +56,6 @@ pub struct Loaded {
     pub warnings: Vec<String>,
     /// What files hold that is not drawn, and what was made of them, one sentence each.
     pub notes: Vec<String>,
-}
-
-/// Splats of one object.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SplatCount {
-    /// Name of the object.
-    pub object: String,
-    /// Splats counted from the input before the conversion.
-    pub predicted: u64,
-    /// Whether that is exact rather than an estimate.
-    pub exact: bool,
-    /// Splats made.
-    pub made: u64,
-}
-
-impl SplatCount {
-    fn predicted(object: &str, prediction: &Prediction) -> Self {
-        let exact = prediction.at_most == Some(prediction.splats);
-        Self { object: object.to_owned(), predicted: prediction.splats, exact, made: 0 }
-    }
 }
 
 impl Loaded {

@@ -59,33 +59,6 @@ pub struct Plan {
     pub draws: Vec<bool>,
 }
 
-/// Names of the passes, shared by the plan and the cost record.
-pub mod pass {
-    /// Files are read, and what they will become is counted.
-    pub const READ: &str = "read";
-    /// Files and fields become splats.
-    pub const CONVERT: &str = "convert";
-    /// A shadow map is built.
-    pub const SHADOW_MAP: &str = "tsm build";
-    /// Translucent splats are culled and sliced.
-    pub const SORT: &str = "hbsort";
-    /// Splats get their footprints.
-    pub const PROJECT: &str = "project";
-    /// Splats get their radiance.
-    pub const SHADE: &str = "shade";
-    /// Opaque splats are resolved.
-    pub const OPAQUE: &str = "opaque";
-    /// Translucent splats are composited.
-    pub const SPLAT: &str = "splat";
-    /// Sets of particles are made that serve many frames.
-    pub const SAMPLE: &str = "sample";
-    /// Translucent objects become particles, which are projected and averaged.
-    pub const PARTICLES: &str = "particles";
-    /// Translucent splats are composited exactly, pixel by pixel, in f64.
-    pub const REFERENCE: &str = "reference";
-    /// Samples become pixels and layers.
-    pub const FINISH: &str = "finish";
-}
 
 impl Plan {
     /// Takes the tables in that were chosen, one for each light, and the bytes that their maps may take together.

@@ -3,14 +3,15 @@
 use crate::choose::{choose, plan, row, technique_of, techniques};
 use crate::form::PlannedObject;
 use crate::load::files::Files;
-use crate::load::{self, Loaded, SplatCount, light_statistics};
+use crate::load::{self, Loaded, light_statistics};
 use crate::memory::{self, Memory};
-use crate::plan::{Plan, pass};
+use crate::pass;
+use crate::plan::Plan;
 use crate::scene::{Scene, SceneObject, Technique};
 use crate::shadows::shadow_error;
 use crate::statistics::Statistics;
 use crate::work::Translucent;
-use crate::{CostRecord, Error, Progress, RenderOptions, doubts, shadows};
+use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, doubts, shadows};
 use splat_core::Material;
 
 /// What a render would do, without doing it.

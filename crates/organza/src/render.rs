@@ -1,58 +1,16 @@
 //! From a scene to images: prepare, draw.
 
-use crate::device::{DeviceChoice, Helper};
+use crate::device::Helper;
+use crate::choose::{row, techniques};
 use crate::draw::draw;
 use crate::frame::Frame;
 use crate::load::files::Files;
 use crate::plan::Plan;
 use crate::prepare::{Explanation, prepare};
 use crate::scene::Scene;
-use crate::technique::{Checkpoint, Kept, Session};
-use crate::{CostRecord, Error, Layers, Progress, doubts};
-use convert::read::ReadLimits;
+use crate::technique::{Checkpoint, Kept, Sets, Session};
+use crate::{CostRecord, Error, Layers, Progress, RenderOptions, doubts};
 use std::path::PathBuf;
-
-/// What a render may take and how it treats doubtful input.
-#[derive(Debug, Clone)]
-pub struct RenderOptions {
-    /// Bytes that all buffers together may take.
-    pub max_memory: u64,
-    /// Leave out records with values that are not finite instead of refusing the file.
-    pub drop_invalid: bool,
-    /// Refuse files with a fault that could be mended, see [`convert::read::Fix`].
-    pub strict: bool,
-    /// Make one point of points at the same place, for every object.
-    pub merge_duplicates: bool,
-    /// File of the sums of the technique `particles`: read before, if it is there, and written every few seconds, at the
-    /// end and at an interrupt. A render that is stopped at any moment goes on from it and ends in the same bits.
-    pub checkpoint: Option<PathBuf>,
-    /// The device on which the passes run that can; `None`: the processor alone.
-    pub device: Option<DeviceChoice>,
-    /// Whether the device composites the splats too: beauty then differs from the processor's by rounding, up to 10⁻⁵ of
-    /// the brightest splat.
-    pub device_composites: bool,
-}
-
-impl Default for RenderOptions {
-    fn default() -> Self {
-        Self {
-            max_memory: 8 << 30,
-            drop_invalid: false,
-            strict: false,
-            merge_duplicates: false,
-            checkpoint: None,
-            device: None,
-            device_composites: false,
-        }
-    }
-}
-
-impl RenderOptions {
-    /// What files may ask for.
-    pub(crate) fn read_limits(&self) -> ReadLimits {
-        ReadLimits { max_bytes: self.max_memory, drop_invalid: self.drop_invalid, strict: self.strict }
-    }
-}
 
 /// A finished render.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,17 +31,6 @@ pub struct Render {
     pub backend: String,
 }
 
-/// Sets of particles in a picture.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sets {
-    /// Sets that were averaged.
-    pub averaged: u32,
-    /// Most sets that were asked for.
-    pub asked: u32,
-    /// Whether it was cancelled before there were enough.
-    pub interrupted: bool,
-}
-
 /// Renders a scene. The technique `particles` has a picture at any time: cancelled after two sets, it is that of the sets
 /// so far, and [`Render::sets`] says so.
 ///
@@ -102,6 +49,13 @@ pub(crate) struct Left {
 }
 
 impl Left {
+    /// A frame that will be drawn.
+    pub(crate) fn add(&mut self, frame: &Scene) {
+        if techniques(frame).into_iter().any(|technique| row(technique).is_random) {
+            self.sets.add(frame);
+        }
+    }
+
     /// Share of the allowed memory that files may take.
     const FILES: u64 = 4;
 
@@ -121,7 +75,13 @@ pub(crate) fn render_keeping(
     progress: &Progress,
     mut left: Option<&mut Left>,
 ) -> Result<Render, Error> {
-    let open = |path: &PathBuf| Checkpoint::open(path, scene, options, left.as_ref().map(|left| &left.sets));
+    let open = |path: &PathBuf| {
+        if !matches!(techniques(scene)[..], [only] if row(only).is_random) {
+            let message = "only the technique `particles` is drawn in sets that a checkpoint can keep";
+            return Err(Error::usage(message, "use --technique particles, or no --checkpoint"));
+        }
+        Checkpoint::open(path, scene, options, left.as_ref().map(|left| &left.sets))
+    };
     let mut checkpoint = options.checkpoint.as_ref().map(open).transpose()?;
     let helper = options.device.as_ref().map(Helper::open).transpose()?;
     let (loaded, explanation, memory) = match &left {

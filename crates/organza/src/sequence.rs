@@ -57,7 +57,7 @@ impl Sequence {
 
     /// Also a frame that will be drawn: all are added before the first is drawn. Little is kept of it.
     pub fn add(&mut self, frame: &Scene) {
-        self.left.sets.add(frame);
+        self.left.add(frame);
     }
 
     /// Draws one of the frames.

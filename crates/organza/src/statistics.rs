@@ -2,6 +2,7 @@
 
 use crate::form::PlannedObject;
 use crate::scene::{SurfaceSampler, Technique};
+use convert::cost::Prediction;
 use splat_core::{Cloud, FootprintStack, Light, Material, Object, Shading, SplatKind};
 
 /// What the planner knows of one light.
@@ -57,6 +58,26 @@ pub struct ObjectStatistics {
     pub receives: bool,
     /// Splats that it would become, as predicted.
     pub splats: u64,
+}
+
+/// Splats of one object.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SplatCount {
+    /// Name of the object.
+    pub object: String,
+    /// Splats counted from the input before the conversion.
+    pub predicted: u64,
+    /// Whether that is exact rather than an estimate.
+    pub exact: bool,
+    /// Splats made.
+    pub made: u64,
+}
+
+impl SplatCount {
+    pub(crate) fn predicted(object: &str, prediction: &Prediction) -> Self {
+        let exact = prediction.at_most == Some(prediction.splats);
+        Self { object: object.to_owned(), predicted: prediction.splats, exact, made: 0 }
+    }
 }
 
 /// What the planner knows of a scene.

@@ -11,12 +11,12 @@ pub(crate) mod reference;
 
 use crate::form::{DRAWN, Form};
 use crate::frame::Frame;
-use crate::plan::pass;
+use crate::pass;
 use crate::scene::{Scene, Technique};
 use crate::stage;
 use crate::statistics::ObjectStatistics;
 use crate::work::{Translucent, cost};
-use crate::{CostRecord, Error, Layers, RenderOptions, Sets};
+use crate::{CostRecord, Error, Layers, RenderOptions};
 pub(crate) use particles::{Checkpoint, Kept};
 use splat_core::Accumulator;
 use splat_core::raster::OpaqueImage;
@@ -86,6 +86,17 @@ pub(crate) struct Session<'s> {
     pub(crate) warnings: &'s mut Vec<String>,
     /// Sets that were averaged, where some were.
     pub(crate) sets: Option<Sets>,
+}
+
+/// Sets of particles in a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sets {
+    /// Sets that were averaged.
+    pub averaged: u32,
+    /// Most sets that were asked for.
+    pub asked: u32,
+    /// Whether it was cancelled before there were enough.
+    pub interrupted: bool,
 }
 
 /// A finished picture.

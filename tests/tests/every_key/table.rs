@@ -206,6 +206,7 @@ fn objects() -> Vec<Entry> {
         of(All, "object.spacing", "object.it.spacing=0.16")
             .but(These(&["density", "cloud", "rectangle", "medium_box", "medium_ball"]), OWN_SPACING),
         of(All, "object.shadow_coefficient", "object.it.shadow_coefficient=0.2"),
+        one("object.technique", "object.it.technique='reference'"),
         of(All, "object.casts_shadow", "object.it.casts_shadow=false"),
         of(All, "object.visible", "object.it.visible=false"),
         of(All, "object.footprint", "object.it.footprint=2"),
@@ -346,6 +347,7 @@ fn render() -> Vec<Entry> {
     vec![
         one("render", "render={antialias=1}").by(POINTS),
         one("render.technique", "render.technique='particles'").by(POINTS),
+        one("render.depth_ranges", "render.depth_ranges=3").with(THROUGH_THE_WALL),
         one("render.antialias", "render.antialias=1"),
         of(BALL, "render.tolerance", "render.tolerance=1").look(Look::Work).with(THIN),
         one("render.exposure", "render.exposure=1").look(Look::Displayed),
@@ -395,6 +397,12 @@ const THIN: &[&str] = &[
     "object.wall.casts_shadow=false",
     "object.blocker.visible=false",
     "render.tolerance=1e-9",
+];
+
+const THROUGH_THE_WALL: &[&str] = &[
+    "object.wall.rectangle={center=[0, 0, 0], u=[1, 0, 1], v=[0, 1, 0], spacing=0.12}",
+    "object.wall.opacity=0.5",
+    "object.wall.technique='reference'",
 ];
 
 const MOVING: &[&str] = &["animation={frames=3, track=[{set='object.it.transform.translate', \

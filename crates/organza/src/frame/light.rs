@@ -2,7 +2,7 @@
 
 use super::Frame;
 use crate::device::LookedUp;
-use crate::plan::pass;
+use crate::pass;
 use crate::shadows::shadow_error;
 use crate::{CostRecord, Error, work};
 use splat_core::shade::{LitBy, ShadeInput};

@@ -4,7 +4,7 @@ use super::Frame;
 use super::splats::record;
 use crate::Error;
 use crate::device::{Helper, Splats};
-use crate::plan::pass;
+use crate::pass;
 use splat_core::raster::{self, Accumulation, OpaqueImage};
 use splat_core::shade::{LitBy, gpu::suits};
 use splat_core::{Accumulator, CostRecord, Direction, StageCost, Transmittance};

@@ -1,7 +1,7 @@
 //! Splats of a frame: those that are drawn, their footprints and radiance, and the opaque ones as an image.
 
 use super::Frame;
-use crate::plan::pass;
+use crate::pass;
 use crate::{CostRecord, Error, stage};
 use splat_core::raster::{self, Background, Detail, OpaqueImage, Projected, RasterCounts};
 use splat_core::shade::shade;

@@ -16,7 +16,7 @@ mod layers;
 mod parts;
 
 use crate::frame::Frame;
-use crate::plan::pass;
+use crate::pass;
 use crate::scene::Scene;
 use crate::technique::{EVERYWHERE, Finished, Fold, Session};
 use crate::{CostRecord, Error, RenderOptions, Sets};

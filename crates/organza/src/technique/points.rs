@@ -3,7 +3,7 @@
 mod chained;
 
 use crate::frame::{Frame, Shaded, record};
-use crate::plan::pass;
+use crate::pass;
 use crate::scene::Technique;
 use crate::technique::{EVERYWHERE, Fold, Session};
 use crate::{CostRecord, Error, stage};

@@ -3,7 +3,7 @@
 //! judges.
 
 use crate::frame::{Frame, Shaded};
-use crate::plan::pass;
+use crate::pass;
 use crate::scene::{Scene, Technique};
 use crate::technique::{Fold, Session};
 use crate::{CostRecord, Error, RenderOptions, stage};

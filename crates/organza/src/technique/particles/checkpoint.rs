@@ -5,7 +5,6 @@
 //! made of. The count of sets may therefore be raised later.
 
 use super::Kept;
-use crate::choose::{row, techniques};
 use crate::output::Target;
 use crate::scene::{RenderSettings, Scene};
 use crate::{Error, RenderOptions, printable};
@@ -39,10 +38,6 @@ impl Checkpoint {
         options: &RenderOptions,
         kept: Option<&Kept>,
     ) -> Result<Self, Error> {
-        if !matches!(techniques(scene)[..], [only] if row(only).is_random) {
-            let message = "only the technique `particles` is drawn in sets that a checkpoint can keep";
-            return Err(Error::usage(message, "use --technique particles, or no --checkpoint"));
-        }
         // One that is there is replaced by what goes on from it.
         let target = Target::new(path, true)?;
         let tag = tag(scene, options, kept)?;

@@ -1,10 +1,9 @@
 //! Sets of particles that serve all frames of an animation.
 
 use super::parts::Source;
-use crate::choose::technique_of;
 use crate::frame::Frame;
-use crate::plan::pass;
-use crate::scene::{Scene, SceneObject, Technique};
+use crate::pass;
+use crate::scene::{Scene, SceneObject};
 use crate::{CostRecord, Error};
 use pbsr::KeptSets;
 use splat_core::{Camera, Similarity};
@@ -39,11 +38,8 @@ struct Entry {
 }
 
 impl Kept {
-    /// Keeps how a frame sees the objects, if it samples them.
+    /// Keeps how a frame that samples objects sees them.
     pub(crate) fn add(&mut self, scene: &Scene) {
-        if !scene.objects.iter().any(|o| technique_of(o, scene) == Technique::Particles) {
-            return;
-        }
         let mut camera = scene.camera;
         camera.size = camera.size.map(|s| s.saturating_mul(scene.render.antialias));
         let mut view =

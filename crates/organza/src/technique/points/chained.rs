@@ -4,7 +4,7 @@
 use super::{Points, sort_params};
 use crate::Error;
 use crate::device::Helper;
-use crate::plan::pass;
+use crate::pass;
 use crate::scene::Technique;
 use crate::shadows::shadow_error;
 use splat_core::raster::Accumulation;

@@ -1,14 +1,14 @@
 //! Scenes of any size become scenes of size one, by a power of two, so that squares of lengths neither overflow nor vanish
 //! in f32 and a scene scaled by a power of two gives the same picture bit by bit.
 
-use crate::load::own::Own;
+use super::own::Own;
 use glam::DVec3;
 use splat_core::{Camera, Cloud, Light, LightShape, Projection};
 
 /// Scales everything by 2^−e, where 2^e is the size of the bounds of all splats and objects, and returns e.
 ///
 /// Lengths scale with 2^−e, cross-sections and point intensities with 2^−2e; directional irradiance stays.
-pub(crate) fn normalize(cloud: &mut Cloud, own: &mut [Own], camera: &mut Camera, lights: &mut [Light]) -> i32 {
+pub(super) fn normalize(cloud: &mut Cloud, own: &mut [Own], camera: &mut Camera, lights: &mut [Light]) -> i32 {
     let diagonal = diagonal(cloud, own);
     if !(diagonal.is_finite() && diagonal > 0.0) {
         return 0;

@@ -1,0 +1,47 @@
+//! What a render may take, and how it treats doubtful input.
+
+use crate::device::DeviceChoice;
+use convert::read::ReadLimits;
+use std::path::PathBuf;
+
+/// What a render may take and how it treats doubtful input.
+#[derive(Debug, Clone)]
+pub struct RenderOptions {
+    /// Bytes that all buffers together may take.
+    pub max_memory: u64,
+    /// Leave out records with values that are not finite instead of refusing the file.
+    pub drop_invalid: bool,
+    /// Refuse files with a fault that could be mended, see [`convert::read::Fix`].
+    pub strict: bool,
+    /// Make one point of points at the same place, for every object.
+    pub merge_duplicates: bool,
+    /// File of the sums of the technique `particles`: read before, if it is there, and written every few seconds, at the
+    /// end and at an interrupt. A render that is stopped at any moment goes on from it and ends in the same bits.
+    pub checkpoint: Option<PathBuf>,
+    /// The device on which the passes run that can; `None`: the processor alone.
+    pub device: Option<DeviceChoice>,
+    /// Whether the device composites the splats too: beauty then differs from the processor's by rounding, up to 10⁻⁵ of
+    /// the brightest splat.
+    pub device_composites: bool,
+}
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self {
+            max_memory: 8 << 30,
+            drop_invalid: false,
+            strict: false,
+            merge_duplicates: false,
+            checkpoint: None,
+            device: None,
+            device_composites: false,
+        }
+    }
+}
+
+impl RenderOptions {
+    /// What files may ask for.
+    pub(crate) fn read_limits(&self) -> ReadLimits {
+        ReadLimits { max_bytes: self.max_memory, drop_invalid: self.drop_invalid, strict: self.strict }
+    }
+}
