@@ -26,7 +26,6 @@
 //! ```
 #![forbid(unsafe_code)]
 
-pub mod accuracy;
 mod choose;
 mod device;
 mod doubts;
@@ -38,7 +37,6 @@ mod info;
 mod load;
 mod memory;
 mod normalize;
-pub mod orders;
 pub mod output;
 pub mod plan;
 mod prepare;
@@ -48,16 +46,18 @@ mod shadows;
 mod stage;
 pub mod statistics;
 mod technique;
-pub mod truth;
 mod work;
 
 pub use device::{Agreement, Checked, DeviceChoice, KernelTime, ListedDevice, Passport, devices, passport};
+pub use draw::draw_loaded;
 pub use error::Error;
+pub use frame::{Frame, Shaded};
 pub use info::{FileInfo, info};
+pub use load::input::expression_field;
 pub use load::{Loaded, SplatCount};
 pub use organza_scene as scene;
 pub use organza_scene::{escape_controls, printable, shown};
-pub use prepare::{Explanation, explain, load};
+pub use prepare::{Explanation, explain, load, plan_loaded};
 pub use render::{Render, RenderOptions, Sets, render};
 pub use sequence::Sequence;
 pub use shadows::ShadowTable;

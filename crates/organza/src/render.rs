@@ -48,8 +48,8 @@ impl Default for RenderOptions {
 }
 
 impl RenderOptions {
-    /// What files may ask for.
-    pub(crate) fn read_limits(&self) -> ReadLimits {
+    /// What a file may ask for when it is read.
+    pub fn read_limits(&self) -> ReadLimits {
         ReadLimits { max_bytes: self.max_memory, drop_invalid: self.drop_invalid, strict: self.strict }
     }
 }
@@ -136,7 +136,7 @@ pub(crate) fn render_keeping(
         left.fit(options.max_memory, memory.total());
     }
     let device = helper.as_ref().map(|helper| (helper, options.device_composites));
-    let frame = Frame::new(scene, &loaded, &plan, device, progress);
+    let frame = Frame::new(scene, &loaded, &plan, progress).helped_by(device);
     let kept = left.map(|left| &mut left.sets);
     let mut session = Session { options, checkpoint: checkpoint.as_mut(), kept, warnings: &mut warnings, sets: None };
     let layers = draw(&frame, &mut session, &mut cost)?;
