@@ -1,11 +1,11 @@
 //! `organza accuracy`: a technique of known order, the same one broken, one that does not converge, and the command.
 
-use organza::accuracy::{
+use organza::scene::{self, Scene};
+use organza::{Error, Progress, RenderOptions};
+use organza_judge::accuracy::{
     Absent, Facts, Frame, Knob, Options, Renderer, Report, Request, Step, Study, Sweep, Theory, Truth, least_seconds,
     particles, points, random_study, study, verdict,
 };
-use organza::scene::{self, Scene};
-use organza::{Error, Progress, RenderOptions};
 use organza_tests::organza;
 use reference::metrics::Image;
 use serde_json::Value;

@@ -1,7 +1,7 @@
 //! `organza orders`: every ordering against the truth of each pixel.
 
-use organza::orders::compare;
 use organza::{Progress, RenderOptions, scene};
+use organza_judge::orders::compare;
 use organza_tests::organza;
 use serde_json::Value;
 use std::fs;

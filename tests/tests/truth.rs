@@ -2,8 +2,8 @@
 
 use crate::many_forms::write;
 use organza::scene::{self, Scene};
-use organza::truth::{Truth, truth, truth_of_all_orders};
 use organza::{Progress, RenderOptions, render};
+use organza_judge::truth::{Truth, truth, truth_of_all_orders};
 use std::path::Path;
 
 const SAMPLES: u32 = 64;
@@ -175,7 +175,7 @@ fn what_has_no_truth_is_named() {
 }
 
 /// What one order of scattering leaves out of a scene of 16² pixels under a sun from the eye.
-fn left_out(objects: &str) -> organza::truth::AllOrders {
+fn left_out(objects: &str) -> organza_judge::truth::AllOrders {
     let head = "version = 1\n[camera]\nposition = [0, 0, 5]\ntarget = [0, 0, 0]\northographic = 1.0\nsize = [16, 16]\n\
                 [[light]]\nkind = 'directional'\ndirection = [0, 0, -1]\nirradiance = [3, 3, 3]\n";
     let text = head.to_owned() + objects;

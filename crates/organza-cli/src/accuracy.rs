@@ -4,10 +4,11 @@ use super::args::AccuracyArguments;
 use super::bar::with_bar;
 use super::console;
 use super::session::{in_folder, load_scene, path_text, processor_only, render_options, start_threads};
-use organza::accuracy::{self, Absent, Facts, Options, Outcome, Renderer, Report, Request, Study, Truth};
 use organza::output::Target;
 use organza::scene::Scene;
 use organza::{Error, Progress, RenderOptions, printable};
+use organza_judge::accuracy::{self, Absent, Facts, Options, Outcome, Renderer, Report, Request, Study};
+use organza_judge::truth::{self, Truth};
 use serde_json::json;
 use std::fmt::Write;
 
@@ -60,9 +61,9 @@ fn truth(
     options: &Options,
     progress: &Progress,
 ) -> Result<Result<Truth, String>, Error> {
-    let mut one = organza::truth::truth(scene, render, options.truth_samples(), progress)?;
+    let mut one = truth::truth(scene, render, options.truth_samples(), progress)?;
     if let Ok(one) = &mut one
-        && let Ok(all) = organza::truth::truth_of_all_orders(scene, render, options.truth_samples(), progress)?
+        && let Ok(all) = truth::truth_of_all_orders(scene, render, options.truth_samples(), progress)?
     {
         one.all_orders = Some(one.beside(&all)?);
     }
@@ -148,7 +149,7 @@ fn study_text(study: &Study) -> String {
 }
 
 fn outcome_text(o: &Outcome) -> String {
-    let time = organza::accuracy::least_seconds(o).map_or_else(|| "-".into(), |s| format!("{:.1} ms", 1e3 * s));
+    let time = accuracy::least_seconds(o).map_or_else(|| "-".into(), |s| format!("{:.1} ms", 1e3 * s));
     let error = o.from_limit.as_ref().filter(|_| o.drawn);
     let half = o.sampled.map_or_else(String::new, |s| format!(" ± {:.0e}", s.from_limit.half_width));
     let error = error.map_or_else(|| "-".into(), |d| format!("RMSE {:.2e}{half}  FLIP {:.4}", d.linear.rmse, d.flip));

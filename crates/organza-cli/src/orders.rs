@@ -4,8 +4,9 @@ use super::args::OrdersArguments;
 use super::bar::with_bar;
 use super::console;
 use super::session::{in_folder, load_scene, path_text, processor_only, render_options, start_threads};
-use organza::orders::{self, OrdersReport};
-use organza::{Error, accuracy, printable};
+use organza::{Error, printable};
+use organza_judge::accuracy;
+use organza_judge::orders::{self, OrdersReport};
 use serde_json::json;
 
 /// Draws by every ordering and writes the comparison. Whatever can be refused is refused before any work.

@@ -1,6 +1,6 @@
 //! Where an object's data comes from, checked: files, expressions and shapes.
 
-use convert::{Inside, Interpolation};
+use convert::{CloudShape, Ellipsoid, Inside, Interpolation};
 use glam::DVec3;
 use splat_core::TransferFunction;
 use std::path::{Path, PathBuf};
@@ -132,6 +132,22 @@ pub struct CloudSource {
     pub spacing: f64,
     /// Largest extinction σ_t, 1/world unit.
     pub extinction: f64,
+}
+
+impl CloudSource {
+    /// What [`convert::procedural_cloud`] makes a lattice of, lengths before the object's transform.
+    pub fn shape(&self) -> CloudShape {
+        CloudShape {
+            ellipsoids: self.ellipsoids.iter().map(|&(center, radii)| Ellipsoid { center, radii }).collect(),
+            octaves: self.octaves,
+            frequency: self.frequency,
+            amplitude: self.amplitude,
+            seed: self.seed,
+            extinction: self.extinction,
+            base: None,
+            ..CloudShape::default()
+        }
+    }
 }
 
 /// A flat parallelogram. Lengths are before the object's transform.

@@ -66,8 +66,12 @@ fn join(cost: &mut CostRecord, pass: &str) {
     }));
 }
 
-/// Runs the planned passes on a loaded scene to their end, by the processor alone, and keeps the layers that it asks for.
-pub(crate) fn draw_loaded(
+/// Draws a loaded scene as [`plan_loaded`](crate::plan_loaded) has planned it, by the processor alone, and keeps the layers
+/// that it asks for. The passes that ran are added to `cost`.
+///
+/// # Errors
+/// As [`crate::render`]; [`Error::Cancelled`] also where a random technique was interrupted between its sets.
+pub fn draw_loaded(
     scene: &Scene,
     loaded: &Loaded,
     plan: &Plan,
@@ -75,7 +79,7 @@ pub(crate) fn draw_loaded(
     progress: &Progress,
     cost: &mut CostRecord,
 ) -> Result<Layers, Error> {
-    let frame = Frame::new(scene, loaded, plan, None, progress);
+    let frame = Frame::new(scene, loaded, plan, progress);
     let mut session = Session { options, checkpoint: None, kept: None, warnings: &mut Vec::new(), sets: None };
     let layers = draw(&frame, &mut session, cost)?;
     if session.sets.is_some_and(|sets| sets.interrupted) { Err(Error::Cancelled) } else { Ok(layers) }
@@ -194,8 +198,8 @@ mod tests {
         let scene = parse("seam.toml".as_ref(), SCENE, &options).unwrap();
         let (options, progress) = (RenderOptions::default(), Progress::new());
         let loaded = load(&scene, &options, &progress).unwrap();
-        let (plan, _) = plan_loaded(&scene, &loaded, &options).unwrap();
-        let frame = Frame::new(&scene, &loaded, &plan, None, &progress);
+        let plan = plan_loaded(&scene, &loaded, &options).unwrap();
+        let frame = Frame::new(&scene, &loaded, &plan, &progress);
         let unit = libm::exp2(f64::from(-loaded.exponent)) as f32;
         let cuts = ends.iter().map(|end| end * unit);
         let cuts: Vec<f32> = [f32::NEG_INFINITY].into_iter().chain(cuts).chain([f32::INFINITY]).collect();

@@ -151,6 +151,22 @@ impl Error {
         }
     }
 
+    /// An error of a conversion; it knows the object, but not the file that the object came from.
+    pub fn from_convert(error: &convert::ConvertError) -> Self {
+        use convert::ConvertError;
+        match error {
+            ConvertError::TooMany { object, what, needed, limit } => Self::Limit {
+                what: format!("object '{}'", shown(object)),
+                needed: *needed as u64,
+                limit: *limit,
+                unit: what,
+                hint: "use a larger spacing, or a larger --max-memory or render.max_points".into(),
+            },
+            ConvertError::Cancelled => Self::Cancelled,
+            other => Self::input(Self::OF_SCENE, other.to_string(), ""),
+        }
+    }
+
     /// The same error, naming the file of an object where it names no more than the scene: errors of conversions know the
     /// object and its element, but not where the data came from.
     pub(crate) fn in_object(self, scene: &Path, file: Option<&Path>) -> Self {

@@ -6,7 +6,8 @@ mod light;
 mod on_device;
 mod splats;
 
-pub(crate) use splats::{Shaded, record};
+pub use splats::Shaded;
+pub(crate) use splats::record;
 
 use crate::device::Helper;
 use crate::load::Loaded;
@@ -19,16 +20,18 @@ use splat_core::{Accumulator, Camera, Cloud, LayerSet, SplatKind};
 use std::cell::OnceCell;
 use tsm::ShadowMap;
 
-/// What techniques read.
-pub(crate) struct Frame<'a> {
+/// One frame of a loaded scene: what techniques read, each part made once, when it is first asked for.
+///
+/// Lengths are in the scale of [`Loaded::cloud`]; ids of splats are places in [`Frame::drawn`].
+pub struct Frame<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) settings: &'a RenderSettings,
     pub(crate) loaded: &'a Loaded,
     pub(crate) plan: &'a Plan,
     /// What a pixel keeps.
     pub(crate) layers: LayerSet,
-    /// With one pixel a sample.
-    pub(crate) camera: Camera,
+    /// The camera of samples: the scene's, with `render.antialias` times its pixels along each side.
+    pub camera: Camera,
     /// A device that helps.
     pub(crate) helper: Option<&'a Helper>,
     /// Whether it composites splats, which changes the last bits.
@@ -42,14 +45,8 @@ pub(crate) struct Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
-    /// Nothing made yet.
-    pub(crate) fn new(
-        scene: &'a Scene,
-        loaded: &'a Loaded,
-        plan: &'a Plan,
-        device: Option<(&'a Helper, bool)>,
-        progress: &'a Progress,
-    ) -> Self {
+    /// A frame by the processor, with nothing made yet. `plan` is that of [`plan_loaded`](crate::plan_loaded) for the same scene.
+    pub fn new(scene: &'a Scene, loaded: &'a Loaded, plan: &'a Plan, progress: &'a Progress) -> Self {
         let mut camera = loaded.camera;
         camera.size = camera.size.map(|s| s * scene.render.antialias);
         Self {
@@ -59,14 +56,21 @@ impl<'a> Frame<'a> {
             plan,
             layers: scene.render.layers.set(),
             camera,
-            helper: device.map(|(helper, _)| helper),
-            device_composites: device.is_some_and(|(_, composites)| composites),
+            helper: None,
+            device_composites: false,
             progress,
             drawn: OnceCell::new(),
             maps: OnceCell::new(),
             shaded: OnceCell::new(),
             opaque: OnceCell::new(),
         }
+    }
+
+    /// With a device that helps, and whether it composites.
+    pub(crate) fn helped_by(mut self, device: Option<(&'a Helper, bool)>) -> Self {
+        self.helper = device.map(|(helper, _)| helper);
+        self.device_composites = device.is_some_and(|(_, composites)| composites);
+        self
     }
 
     /// An interrupt, if there was one.
@@ -79,13 +83,14 @@ impl<'a> Frame<'a> {
         ChannelLayout::new(&self.layers)
     }
 
-    /// An accumulator for the frame.
-    pub(crate) fn accumulator(&self) -> Accumulator {
+    /// An empty accumulator of the frame's samples, with the channels that its layers need.
+    pub fn accumulator(&self) -> Accumulator {
         let set = &self.layers;
         Accumulator::new(self.camera.size, self.plan.optical_depth_planes, self.layout().count(), set.depth, set.object)
     }
 
-    pub(crate) fn raster_params(&self) -> raster::Params {
+    /// How splats are rasterized.
+    pub fn raster_params(&self) -> raster::Params {
         raster::Params {
             resampling_sigma_px: if self.settings.points.resampling_filter {
                 raster::Params::default().resampling_sigma_px
@@ -97,14 +102,15 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// How far the resampling filter widens a footprint, pixels.
-    pub(crate) fn filter_reach_px(&self) -> f64 {
+    /// How far the resampling filter widens a footprint, pixels of [`Frame::camera`].
+    pub fn filter_reach_px(&self) -> f64 {
         let widest = self.loaded.footprints.layers().iter().map(|f| f.cutoff).fold(0.0, f32::max);
         f64::from(widest * self.raster_params().resampling_sigma_px)
     }
 
-    /// The translucent ones of some splats that a technique draws or samples; not those of objects by their own data.
-    pub(crate) fn translucent(&self, cloud: &Cloud, technique: Technique) -> Vec<u32> {
+    /// Ids of the translucent ones of some splats that a technique draws or samples, ascending; not those of objects that are
+    /// drawn from their own data.
+    pub fn translucent(&self, cloud: &Cloud, technique: Technique) -> Vec<u32> {
         let takes: Vec<bool> =
             self.plan.by.iter().zip(&self.plan.is_own).map(|(by, is_own)| *by == technique && !is_own).collect();
         let is_one = |i: &u32| {

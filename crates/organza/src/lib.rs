@@ -26,7 +26,6 @@
 //! ```
 #![forbid(unsafe_code)]
 
-pub mod accuracy;
 mod choose;
 mod device;
 mod doubts;
@@ -38,7 +37,6 @@ mod info;
 mod load;
 mod memory;
 mod options;
-pub mod orders;
 pub mod output;
 pub mod pass;
 pub mod plan;
@@ -49,21 +47,23 @@ mod shadows;
 mod stage;
 pub mod statistics;
 mod technique;
-pub mod truth;
 mod work;
 
 pub use device::{Agreement, Checked, DeviceChoice, KernelTime, ListedDevice, Passport, devices, passport};
+pub use draw::draw_loaded;
 pub use error::Error;
+pub use frame::{Frame, Shaded};
 pub use info::{FileInfo, info};
 pub use load::Loaded;
+pub use load::input::expression_field;
+pub use options::RenderOptions;
 pub use organza_scene as scene;
 pub use organza_scene::{escape_controls, printable, shown};
-pub use prepare::{Explanation, explain, load};
-pub use options::RenderOptions;
+pub use prepare::{Explanation, explain, load, plan_loaded};
 pub use render::{Render, render};
 pub use sequence::Sequence;
 pub use shadows::ShadowTable;
-pub use statistics::SplatCount;
-pub use technique::Sets;
 pub use splat_core::{CostRecord, Layers, Progress};
 pub use splat_shaders::{Adapter, AdapterKind, Choice};
+pub use statistics::SplatCount;
+pub use technique::Sets;

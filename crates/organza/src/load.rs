@@ -59,8 +59,9 @@ pub struct Loaded {
 }
 
 impl Loaded {
-    /// Takes the size of the picture and the slice thickness from a scene whose splats are these.
-    pub(crate) fn retarget(&mut self, scene: &Scene) {
+    /// Takes the size of the picture and the slice thickness from a scene that differs from the loaded one in those and in
+    /// other render settings alone: its splats are these.
+    pub fn retarget(&mut self, scene: &Scene) {
         self.camera.size = scene.camera.size;
         self.slice_thickness = scaled_thickness(scene, self.exponent);
     }

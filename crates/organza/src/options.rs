@@ -40,8 +40,8 @@ impl Default for RenderOptions {
 }
 
 impl RenderOptions {
-    /// What files may ask for.
-    pub(crate) fn read_limits(&self) -> ReadLimits {
+    /// What a file may ask for when it is read.
+    pub fn read_limits(&self) -> ReadLimits {
         ReadLimits { max_bytes: self.max_memory, drop_invalid: self.drop_invalid, strict: self.strict }
     }
 }

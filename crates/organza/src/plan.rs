@@ -5,6 +5,7 @@
 //! shows it.
 
 pub use crate::form::{Form, PlannedObject};
+use crate::pass;
 use crate::scene::Technique;
 use crate::shadows::ShadowTable;
 
@@ -58,7 +59,6 @@ pub struct Plan {
     /// For each object, by its rank: whether its translucent splats are drawn as they are.
     pub draws: Vec<bool>,
 }
-
 
 impl Plan {
     /// Takes the tables in that were chosen, one for each light, and the bytes that their maps may take together.

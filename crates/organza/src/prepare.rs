@@ -54,7 +54,7 @@ pub(crate) fn prepare(
     memory::check("the image", memory::image_bytes(scene), options.max_memory)?;
     check_samples(scene)?;
     let loaded = load_measured(scene, options, progress, files, &mut cost)?;
-    let (plan, memory) = plan_loaded(scene, &loaded, options)?;
+    let (plan, memory) = plan_counted(scene, &loaded, options)?;
     let (splats, notes) = (loaded.splats.clone(), loaded.notes.clone());
     let mut warnings = loaded.warnings.clone();
     warnings.extend(doubts::of_scene(scene, &loaded));
@@ -63,8 +63,17 @@ pub(crate) fn prepare(
     Ok((loaded, Explanation { plan, cost, memory: most, splats, warnings, notes }, memory))
 }
 
+/// Plans the render of a loaded scene. `scene` may differ from the one that was loaded in its render settings; whether the same
+/// splats serve them is for the caller to know.
+///
+/// # Errors
+/// [`Error::Input`] where the technique cannot draw the scene; [`Error::Limit`] where it needs more than `options` allow.
+pub fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Result<Plan, Error> {
+    plan_counted(scene, loaded, options).map(|(plan, _)| plan)
+}
+
 /// The plan of a loaded scene, and the bytes that it takes.
-pub(crate) fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Result<(Plan, Memory), Error> {
+fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Result<(Plan, Memory), Error> {
     check_samples(scene)?;
     let planned: Vec<PlannedObject> = visible(scene)
         .zip(&loaded.planned)

@@ -1,14 +1,14 @@
 //! From a scene to images: prepare, draw.
 
-use crate::device::Helper;
 use crate::choose::{row, techniques};
+use crate::device::Helper;
 use crate::draw::draw;
 use crate::frame::Frame;
 use crate::load::files::Files;
 use crate::plan::Plan;
 use crate::prepare::{Explanation, prepare};
 use crate::scene::Scene;
-use crate::technique::{Checkpoint, Kept, Sets, Session};
+use crate::technique::{Checkpoint, Kept, Session, Sets};
 use crate::{CostRecord, Error, Layers, Progress, RenderOptions, doubts};
 use std::path::PathBuf;
 
@@ -96,7 +96,7 @@ pub(crate) fn render_keeping(
         left.fit(options.max_memory, memory.total());
     }
     let device = helper.as_ref().map(|helper| (helper, options.device_composites));
-    let frame = Frame::new(scene, &loaded, &plan, device, progress);
+    let frame = Frame::new(scene, &loaded, &plan, progress).helped_by(device);
     let kept = left.map(|left| &mut left.sets);
     let mut session = Session { options, checkpoint: checkpoint.as_mut(), kept, warnings: &mut warnings, sets: None };
     let layers = draw(&frame, &mut session, &mut cost)?;

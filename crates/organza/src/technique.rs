@@ -22,6 +22,9 @@ use splat_core::Accumulator;
 use splat_core::raster::OpaqueImage;
 use std::ops::Range;
 
+/// The form in which a technique takes an object, and why.
+type FormOf = fn(&ObjectStatistics) -> (Form, &'static str);
+
 /// What a technique states.
 pub(crate) struct Row {
     /// As scenes name it.
@@ -33,7 +36,7 @@ pub(crate) struct Row {
     /// What it does where extinction differs by channel, in words; `None` where that goes without saying.
     pub(crate) by_channel: Option<&'static str>,
     /// The form in which it takes an object, and why; `None` for splats, whatever an object is.
-    pub(crate) form: Option<fn(&ObjectStatistics) -> (Form, &'static str)>,
+    pub(crate) form: Option<FormOf>,
     /// What it makes of splats, in words.
     pub(crate) of_splats: &'static str,
     /// Whether it draws translucent splats as they are: they get footprints and radiance.

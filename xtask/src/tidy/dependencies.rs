@@ -4,7 +4,7 @@ use crate::repo::Repo;
 use crate::toml_lines::{lines, string};
 
 /// For each crate of the workspace, the crates of the workspace that it may depend on, tests and benches included.
-const MAY_KNOW: [(&str, &[&str]); 16] = [
+const MAY_KNOW: [(&str, &[&str]); 17] = [
     ("splat-core", &["splat-shaders"]),
     ("convert", &["splat-core"]),
     ("tsm", &["splat-core", "splat-shaders"]),
@@ -30,8 +30,9 @@ const MAY_KNOW: [(&str, &[&str]); 16] = [
             "organza-scene",
         ],
     ),
-    ("organza-cli", &["splat-core", "convert", "organza"]),
-    ("organza-tests", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza"]),
+    ("organza-judge", &["splat-core", "convert", "tsm", "hbsort", "reference", "organza"]),
+    ("organza-cli", &["splat-core", "convert", "organza", "organza-judge"]),
+    ("organza-tests", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza", "organza-judge"]),
     (
         "organza-benches",
         &[
@@ -130,7 +131,7 @@ mod tests {
     #[test]
     fn nobody_depends_on_what_stands_above() {
         for (name, on) in
-            [("splat-core", "tsm"), ("reference", "tsm"), ("organza", "organza-cli"), ("xtask", "splat-core")]
+            [("splat-core", "tsm"), ("reference", "tsm"), ("organza", "organza-judge"), ("xtask", "splat-core")]
         {
             assert_eq!(found(name, &format!("[dependencies]\n{on}.workspace = true\n")).len(), 1, "{name} on {on}");
         }

@@ -41,7 +41,8 @@ pub(crate) fn upward(repo: &Repo) -> Vec<String> {
             let home = |name| exports.iter().find(|(export, _)| *export == name).map_or(name, |(_, module)| *module);
             let names = names(after).into_iter().map(home).filter(|name| *name != module);
             for name in names.filter(|name| self::floor(name).is_some_and(|other| other >= floor)) {
-                found.push(format!("{path}:{}: {module} names {name}, which does not lie below it", line_of(&code, at)));
+                found
+                    .push(format!("{path}:{}: {module} names {name}, which does not lie below it", line_of(&code, at)));
             }
         }
     }

@@ -3,7 +3,7 @@
 use crate::repo::Repo;
 use crate::source::{code_only, line_of};
 
-/// Crates whose results reach a picture's bits. `reference` judges them, within tolerances.
+/// Crates whose results reach a picture's bits. `reference` and `organza-judge` judge them, within tolerances.
 const EXACT: [&str; 7] = ["splat-core", "convert", "tsm", "hbsort", "pbsr", "organza-scene", "organza"];
 
 /// The standard library's functions that are not exactly rounded.
@@ -33,9 +33,7 @@ pub(crate) fn platform(repo: &Repo) -> Vec<String> {
 }
 
 fn is_exact(path: &str) -> bool {
-    EXACT.iter().any(|name| path.starts_with(&format!("crates/{name}/src/")))
-        && !path.contains("/accuracy")
-        && !path.ends_with("/reference.rs")
+    EXACT.iter().any(|name| path.starts_with(&format!("crates/{name}/src/"))) && !path.ends_with("/reference.rs")
 }
 
 #[cfg(test)]

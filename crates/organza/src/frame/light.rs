@@ -10,8 +10,11 @@ use splat_core::{Light, Transmittance};
 use tsm::{Deposits, ShadowMap};
 
 impl<'a> Frame<'a> {
-    /// One map for each light that the plan gives one.
-    pub(crate) fn maps(&self, cost: &mut CostRecord) -> Result<&[Option<ShadowMap>], Error> {
+    /// One shadow map for each light that the plan gives one, `None` for the others. What building them took is added to `cost`.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`]; [`Error::Limit`] where a map needs more bytes than the plan leaves for it.
+    pub fn maps(&self, cost: &mut CostRecord) -> Result<&[Option<ShadowMap>], Error> {
         if let Some(maps) = self.maps.get() {
             return Ok(maps);
         }

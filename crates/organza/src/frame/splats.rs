@@ -7,18 +7,19 @@ use splat_core::raster::{self, Background, Detail, OpaqueImage, Projected, Raste
 use splat_core::shade::shade;
 use splat_core::{Accumulator, Cloud, Layers, SplatKind, StageCost};
 
-/// Splats ready to be composited, by id.
-pub(crate) struct Shaded {
+/// The drawn splats, ready to be composited, by id.
+pub struct Shaded {
     pub(crate) projected: Projected,
-    /// As many numbers a splat as a pixel has channels.
-    pub(crate) values: Vec<f32>,
-    pub(crate) channels: usize,
+    /// Radiance by effect, and whatever else a splat brings to a pixel: [`Shaded::channels`] numbers a splat.
+    pub values: Vec<f32>,
+    /// Numbers a splat, as many as a pixel of the accumulator has.
+    pub channels: usize,
 }
 
 impl Frame<'_> {
     /// The splats that are drawn as they are: opaque ones, and those of techniques that draw splats. Ids of what is shaded, sorted
     /// and composited are places in this cloud.
-    pub(crate) fn drawn(&self) -> &Cloud {
+    pub fn drawn(&self) -> &Cloud {
         let cloud = &self.loaded.cloud;
         let some = self.drawn.get_or_init(|| {
             let is_drawn = |i: &u32| {
@@ -31,8 +32,12 @@ impl Frame<'_> {
         some.as_ref().unwrap_or(cloud)
     }
 
-    /// Footprints and radiance of the drawn splats in view.
-    pub(crate) fn shaded(&self, cost: &mut CostRecord) -> Result<&Shaded, Error> {
+    /// Footprints and radiance of the drawn splats in view; of those out of view the radiance is 0. The passes that were run for
+    /// it are added to `cost`.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`], and those of [`Frame::maps`].
+    pub fn shaded(&self, cost: &mut CostRecord) -> Result<&Shaded, Error> {
         if let Some(shaded) = self.shaded.get() {
             return Ok(shaded);
         }
@@ -115,8 +120,12 @@ impl Frame<'_> {
         let _ = self.opaque.set(image);
     }
 
-    /// Layers of what was composited in front of the opaque splats.
-    pub(crate) fn finish(&self, accumulator: &Accumulator, cost: &mut CostRecord) -> Result<Layers, Error> {
+    /// Layers of what was composited in front of the opaque splats, which lie in front of the background. The passes that were run
+    /// for it are added to `cost`.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`], and those of [`Frame::maps`].
+    pub fn finish(&self, accumulator: &Accumulator, cost: &mut CostRecord) -> Result<Layers, Error> {
         let opaque = self.opaque(cost)?;
         self.progress.begin(stage::FINISH);
         cost.measure(pass::FINISH, |stage| {

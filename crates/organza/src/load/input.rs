@@ -2,16 +2,15 @@
 
 use super::context::Context;
 use super::files::{FileData, Fitted, grid_bytes, mesh_bytes, points_bytes};
-use super::object::refuse;
 use crate::Error;
 use crate::scene::{
-    CloudSource, DensitySource, ImplicitSource, LevelSetSource, MediumShape, RectangleSource, SceneObject, Source,
-    SurfaceSampler, VolumeSource,
+    DensitySource, ImplicitSource, LevelSetSource, MediumShape, RectangleSource, SceneObject, Source, SurfaceSampler,
+    VolumeSource,
 };
 use crate::statistics::ObjectData;
 use convert::{
-    ClippedField, CloudShape, Density, DensityParams, Ellipsoid, ExpressionField, GridField, Interpolation, MeshParams,
-    MpuParams, RawPoints, SharedField, SplatParams, SurfelParams, VolumeParams,
+    ClippedField, CloudShape, Density, DensityParams, ExpressionField, GridField, Interpolation, MeshParams, MpuParams,
+    RawPoints, SharedField, SplatParams, SurfelParams, VolumeParams,
 };
 use glam::DVec3;
 use pbsr::{BoundedExtinction, Matter};
@@ -141,7 +140,7 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
             Input::Volume(grid, transfer, context.volume_params(splat))
         }
         Source::Implicit(ImplicitSource { expression, bounds, spacing }) => {
-            surface(Arc::new(field(expression, object)?), None, *bounds, *spacing, object, splat, opacity)?
+            surface(Arc::new(expression_field(expression, object)?), None, *bounds, *spacing, object, splat, opacity)?
         }
         Source::Isosurface(source) => {
             let grid = read_grid(&source.path, context)?;
@@ -162,7 +161,7 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
             let grid = read_grid(&source.path, context)?;
             let spacing = object.spacing.map_or_else(|| shortest_step(&grid), |s| s / splat.transform.scale);
             let mesh = convert::volume_section(grid, &source.transfer, source.center, source.normal, spacing, &splat);
-            let mesh = mesh.map_err(|e| refuse(&e))?;
+            let mesh = mesh.map_err(|e| Error::from_convert(&e))?;
             let density = Density::Spacing(spacing * splat.transform.scale);
             Input::Mesh(crate::printable(&source.path), mesh.into(), MeshParams { splat, density, opacity })
         }
@@ -172,9 +171,9 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
                 extinction: *extinction,
                 volume: context.volume_params(splat),
             };
-            Input::Density(Arc::new(field(expression, object)?), *bounds, params)
+            Input::Density(Arc::new(expression_field(expression, object)?), *bounds, params)
         }
-        Source::Cloud(cloud) => Input::Procedural(cloud_shape(cloud), cloud.spacing, context.volume_params(splat)),
+        Source::Cloud(cloud) => Input::Procedural(cloud.shape(), cloud.spacing, context.volume_params(splat)),
         Source::Medium(shape) => Input::Medium(*shape, splat),
         Source::Rectangle(r) => Input::Rectangle(*r, opacity, splat),
     })
@@ -188,7 +187,9 @@ fn at_spacing<T>(
     change: impl Fn(&T, f64, &SplatParams) -> Result<T, convert::ConvertError>,
 ) -> Result<Arc<T>, Error> {
     match object.spacing {
-        Some(spacing) => change(&data, spacing / splat.transform.scale, splat).map(Arc::new).map_err(|e| refuse(&e)),
+        Some(spacing) => {
+            change(&data, spacing / splat.transform.scale, splat).map(Arc::new).map_err(|e| Error::from_convert(&e))
+        }
         None => Ok(data),
     }
 }
@@ -232,7 +233,7 @@ fn level_set(source: &LevelSetSource, object: &SceneObject, context: &Context<'_
         let params =
             MpuParams { object_name: object.name.clone(), tolerance: source.tolerance, ..MpuParams::default() };
         let points = read_scattered(&source.path, context)?;
-        let (field, _) = convert::points_to_field(&points, &params).map_err(|e| refuse(&e))?;
+        let (field, _) = convert::points_to_field(&points, &params).map_err(|e| Error::from_convert(&e))?;
         let (bounds, bytes) = (field.bounds(), field.bytes());
         Ok(((Arc::new(field) as SharedField, bounds), bytes))
     })
@@ -280,27 +281,18 @@ fn read_grid(path: &Path, context: &Context<'_>) -> Result<Arc<Grid>, Error> {
     }
 }
 
-pub(crate) fn wrong_kind(path: &Path, expected: &str, hint: &str) -> Error {
+fn wrong_kind(path: &Path, expected: &str, hint: &str) -> Error {
     Error::input(crate::printable(path), format!("expected {expected}"), hint)
 }
 
-pub(crate) fn field(text: &str, object: &SceneObject) -> Result<ExpressionField, Error> {
+/// The field of an expression of an object, in the coordinates of the expression: before the object's transform.
+///
+/// # Errors
+/// [`Error::Input`] for a text that is no expression of x, y and z.
+pub fn expression_field(text: &str, object: &SceneObject) -> Result<ExpressionField, Error> {
     // The scene's check has parsed it already.
     ExpressionField::parse(text).map_err(|e| {
         let what = format!("object '{}', expression", crate::shown(&object.name));
         Error::input(what, e.to_string(), "variables are x, y and z")
     })
-}
-
-pub(crate) fn cloud_shape(source: &CloudSource) -> CloudShape {
-    CloudShape {
-        ellipsoids: source.ellipsoids.iter().map(|&(center, radii)| Ellipsoid { center, radii }).collect(),
-        octaves: source.octaves,
-        frequency: source.frequency,
-        amplitude: source.amplitude,
-        seed: source.seed,
-        extinction: source.extinction,
-        base: None,
-        ..CloudShape::default()
-    }
 }

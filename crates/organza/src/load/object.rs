@@ -72,7 +72,7 @@ pub(super) fn prepare<'a>(
             let too_many = Some(ConvertError::TooMany { object, what, needed, limit });
             Ok(Prepared { input, prediction, as_it_is, too_many, bounded, search })
         }
-        Err(e) => Err(refuse(&e)),
+        Err(e) => Err(Error::from_convert(&e)),
     }
 }
 
@@ -89,7 +89,7 @@ fn check_work(object: &SceneObject, input: &Input<'_>) -> Result<(), Error> {
     };
     // A lattice of too many points has a refusal of its own.
     let Ok(evaluations) = evaluations else { return Ok(()) };
-    let needed = evaluations * super::input::field(expression, object)?.operations() as f64;
+    let needed = evaluations * super::input::expression_field(expression, object)?.operations() as f64;
     if needed <= MOST_OPERATIONS {
         return Ok(());
     }
@@ -157,7 +157,7 @@ pub(super) fn convert(
     warnings: &mut Vec<String>,
 ) -> Result<Cloud, Error> {
     if let Some(too_many) = &prepared.too_many {
-        return Err(refuse(too_many));
+        return Err(Error::from_convert(too_many));
     }
     let progress = context.progress;
     let cloud = match &prepared.input {
@@ -199,7 +199,7 @@ pub(super) fn convert(
             convert::rectangle(r.center, r.u, r.v, *opacity, r.spacing, &context.limited(params))
         }
     };
-    cloud.map_err(|e| refuse(&e))
+    cloud.map_err(|e| Error::from_convert(&e))
 }
 
 /// Without the splats beyond the border of an open surface.
@@ -270,19 +270,5 @@ fn medium(shape: &MediumShape, params: &SplatParams) -> Result<Cloud, ConvertErr
         MediumShape::Ball { center, radius, extinction, spacing } => {
             convert::medium_ball(center, radius, extinction, spacing, params)
         }
-    }
-}
-
-pub(crate) fn refuse(error: &ConvertError) -> Error {
-    match error {
-        ConvertError::TooMany { object, what, needed, limit } => Error::Limit {
-            what: format!("object '{}'", crate::shown(object)),
-            needed: *needed as u64,
-            limit: *limit,
-            unit: what,
-            hint: "use a larger spacing, or a larger --max-memory or render.max_points".into(),
-        },
-        ConvertError::Cancelled => Error::Cancelled,
-        other => Error::input(Error::OF_SCENE, other.to_string(), ""),
     }
 }

@@ -5,7 +5,7 @@
 use super::context::Context;
 use super::files::{grid_bytes, mesh_bytes};
 use super::input::{Input, shortest_step};
-use super::object::{Prepared, as_it_is, procedural, refuse};
+use super::object::{Prepared, as_it_is, procedural};
 use crate::Error;
 use crate::form::Form;
 use crate::scene::{RectangleSource, SurfaceSampler};
@@ -220,7 +220,7 @@ fn data(
             let spacing = world_spacing(&params.density) / params.splat.transform.scale;
             if source == Form::Triangles {
                 let mesh = convert::surface_to_mesh(field.as_ref(), *bounds, spacing, &params.splat);
-                return Ok(triangles(mesh.map_err(|e| refuse(&e))?, prepared.prediction.splats));
+                return Ok(triangles(mesh.map_err(|e| Error::from_convert(&e))?, prepared.prediction.splats));
             }
             let bounds = prepared.search.as_ref().map_or(*bounds, |s| s.bounds);
             if let (Form::Lattice, Some((grid, level))) = (source, lattice) {
@@ -236,7 +236,8 @@ fn data(
         }
         Input::Volume(grid, transfer, params) => cells(grid.clone(), (*transfer).clone(), params.normals),
         Input::Procedural(shape, spacing, params) => {
-            let (grid, transfer) = procedural(shape, *spacing, &params.splat, context).map_err(|e| refuse(&e))?;
+            let (grid, transfer) =
+                procedural(shape, *spacing, &params.splat, context).map_err(|e| Error::from_convert(&e))?;
             cells(grid.into(), transfer, params.normals)
         }
         Input::Density(field, bounds, params) => {
@@ -262,11 +263,12 @@ fn density_lattice(
 ) -> Result<(Grid, TransferFunction), Error> {
     let splat = &params.volume.splat;
     let spacing = world_spacing(&params.density) / splat.transform.scale;
-    let mut grid = convert::field_to_grid(field.as_ref(), bounds, spacing, splat).map_err(|e| refuse(&e))?;
+    let mut grid =
+        convert::field_to_grid(field.as_ref(), bounds, spacing, splat).map_err(|e| Error::from_convert(&e))?;
     let extinction = params.extinction as f32;
     grid.values.iter_mut().for_each(|v| *v = (*v * extinction).max(0.0));
     let most = grid.values.iter().copied().fold(0.0, f32::max);
-    let transfer = as_it_is(f64::from(most), splat).map_err(|e| refuse(&e))?;
+    let transfer = as_it_is(f64::from(most), splat).map_err(|e| Error::from_convert(&e))?;
     Ok((grid, transfer))
 }
 

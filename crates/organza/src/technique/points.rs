@@ -92,9 +92,20 @@ fn sort_params(frame: &Frame<'_>) -> hbsort::Params {
     }
 }
 
+impl Frame<'_> {
+    /// Composites the splats of an order of [`Frame::drawn`] in front of the opaque ones, behind all that the accumulator holds, as
+    /// the technique `points` does. What that took is added to `cost`.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`], and those of [`Frame::maps`].
+    pub fn composite(&self, order: &SliceOrder, into: &mut Accumulator, cost: &mut CostRecord) -> Result<(), Error> {
+        composite(self, order, EVERYWHERE, into, cost)
+    }
+}
+
 /// Composites the splats of an order whose centres lie at view depths in `range` in front of the opaque ones, behind all that the
 /// accumulator holds.
-pub(crate) fn composite(
+fn composite(
     frame: &Frame<'_>,
     order: &SliceOrder,
     range: Range<f32>,

@@ -1,11 +1,8 @@
 //! Drawing with a clock, and the distance of a picture from a reference.
 
 use super::{Facts, Request};
-use crate::draw::draw_loaded;
-use crate::load::Loaded;
-use crate::prepare::{load, plan_loaded};
-use crate::scene::{Scene, Technique};
-use crate::{CostRecord, Error, Progress, RenderOptions};
+use organza::scene::{Scene, Technique};
+use organza::{CostRecord, Error, Loaded, Progress, RenderOptions, draw_loaded, load, plan_loaded};
 use reference::metrics::{Display, Errors, Image, Linear, Viewing, compare, epsilon_8_bit, flip, psnr};
 use splat_core::SplatKind;
 use std::time::Instant;
@@ -114,7 +111,7 @@ impl<'a> Renderer<'a> {
     /// Draws.
     ///
     /// # Errors
-    /// As [`crate::render`].
+    /// As [`organza::render`].
     pub fn draw(&mut self, request: &Request) -> Result<Frame, Error> {
         self.within_stage(|renderer| renderer.frame(request))
     }
@@ -132,7 +129,7 @@ impl<'a> Renderer<'a> {
         scene.camera.size = scene.camera.size.map(|s| s.saturating_mul(request.oversample));
         let (options, progress) = (self.options, self.progress);
         let (loaded, convert_seconds) = self.load(&scene)?;
-        let (plan, _) = plan_loaded(&scene, loaded, options)?;
+        let plan = plan_loaded(&scene, loaded, options)?;
         let mut cost = CostRecord::default();
         let layers = draw_loaded(&scene, loaded, &plan, options, progress, &mut cost)?;
         let beauty = layers.rgb("beauty").ok_or_else(|| Error::Internal("a render has no beauty layer".into()))?;
@@ -157,7 +154,7 @@ impl<'a> Renderer<'a> {
     fn look(&mut self, scene: &Scene) -> Result<Facts, Error> {
         let (options, progress) = (self.options, self.progress);
         let (loaded, _) = self.load(scene)?;
-        let (plan, _) = plan_loaded(scene, loaded, options)?;
+        let plan = plan_loaded(scene, loaded, options)?;
         let translucent: Vec<u32> =
             (0u32..).zip(&loaded.cloud.kind).filter(|(_, k)| **k != SplatKind::Opaque).map(|(i, _)| i).collect();
         let thickness = loaded.slice_thickness.map_or(hbsort::Thickness::Auto, hbsort::Thickness::World);
@@ -166,7 +163,7 @@ impl<'a> Renderer<'a> {
         let order = hbsort::slice_cloud(&loaded.cloud, Some(&translucent), &loaded.camera, &params, &mut scratch)
             .map_err(|e| Error::Internal(e.to_string()))?;
         let visible = !order.input_from_sorted.is_empty();
-        let frame = crate::frame::Frame::new(scene, loaded, &plan, None, progress);
+        let frame = organza::Frame::new(scene, loaded, &plan, progress);
         let maps = frame.maps(&mut CostRecord::default())?;
         Ok(Facts {
             slice_thickness: visible.then(|| order.thickness * f64::from(loaded.exponent).exp2()),

@@ -1,10 +1,10 @@
 //! Pictures inside the page: PNG files as data URIs, and differences made visible.
 
-use crate::Error;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
+use organza::Error;
 use reference::metrics::{Display, Image};
 
 /// A displayed picture as `data:image/png;base64,…`.

@@ -2,7 +2,7 @@
 //! sampled, and the step of the paper's Brownian motion on them.
 
 use super::{Facts, Knob, Options, Request, Skipped, Step, Sweep, Theory};
-use crate::scene::{LayerChoice, Scene, Source, SurfaceSampler, Technique};
+use organza::scene::{LayerChoice, Scene, Source, SurfaceSampler, Technique};
 
 /// Steps of the Brownian motion, over the width of the surface; the paper's is 0.01.
 const BROWNIAN_STEPS: [f64; 4] = [0.08, 0.04, 0.02, 0.01];

@@ -1,6 +1,6 @@
 //! What a technique can trade: its knobs, their steps from coarse to fine, and their ends.
 
-use crate::scene::Scene;
+use organza::scene::Scene;
 
 /// What is to be drawn.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,9 +3,9 @@
 use super::{Comparison, Ordered};
 use crate::accuracy::{Distance, Machine};
 use crate::accuracy::{data_uri, difference, escaped, png};
-use crate::output::{Target, Targets};
-use crate::scene::Scene;
-use crate::{Error, printable};
+use organza::output::{Target, Targets};
+use organza::scene::Scene;
+use organza::{Error, printable};
 use reference::metrics::{Display, Image};
 use serde_json::{Value, json};
 use std::fmt::Write;

@@ -13,11 +13,13 @@
 
 mod frontier;
 mod knob;
+mod limit;
 mod measure;
 mod particles;
 mod plot;
 mod points;
 mod random;
+mod repeat;
 mod report;
 mod report_html;
 mod report_joint;
@@ -27,26 +29,28 @@ mod resolve;
 mod sampled;
 mod settings;
 mod study;
+mod verdict;
 
 pub use frontier::{Candidate, Hold, TOLD_APART, frontier, hold};
 pub use knob::{Knob, Request, Skipped, Step, Sweep, Theory};
+pub use limit::Limit;
 pub use measure::{Distance, Frame, Renderer, Timed};
 pub use particles::particles;
 pub use points::{Facts, points};
 pub use random::{SEEDS, random_study};
 pub use report::{Absent, Machine, Report, write};
-pub use report_html::verdict;
 pub use resolve::{Curve, CurvePoint, Settled, settle};
 pub use sampled::Sampled;
 pub use settings::Setting;
-pub use study::{Draw, Limit, Outcome, Study, least_seconds, study};
+pub use study::{Draw, Outcome, Study, least_seconds, study};
+pub use verdict::verdict;
 
 pub(crate) use plot::escaped;
 pub(crate) use report_pictures::{data_uri, difference, png};
 
 pub use crate::truth::Truth;
 
-use crate::scene::Scene;
+use organza::scene::Scene;
 
 /// How much work a report may take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,30 +6,24 @@
 //! particles are sampled from the same splats, and its pictures of several seeds are judged by the same truth.
 
 mod report;
+mod sorter;
 
 pub use report::{OrdersReport, write};
 
 use crate::accuracy::{SEEDS, Sampled};
-use crate::draw::draw_loaded;
-use crate::frame::{Frame, Shaded};
-use crate::load::Loaded;
-use crate::prepare::{load, plan_loaded};
-use crate::scene::{ParticlesSettings, Scene, Technique};
-use crate::technique::{EVERYWHERE, points};
-use crate::{CostRecord, Error, Progress, RenderOptions};
-use hbsort::reference::{CentreKey, as_given, by_centre};
-use hbsort::{Params, Scratch, Thickness, slice_cloud};
+use hbsort::Thickness;
+use organza::scene::{LayerChoice, ParticlesSettings, Scene, Technique};
+use organza::{CostRecord, Error, Frame, Loaded, Progress, RenderOptions, Shaded, draw_loaded, load, plan_loaded};
 use reference::metrics::{Disorder, Image, Linear, Rays};
-use reference::statistics::{Spread, median_with_spread};
+use reference::statistics::Spread;
 use reference::{Input, Order, composite_with_progress};
+use sorter::{Ordering, Sorter};
 use splat_core::{Camera, Direction, Layers, SliceOrder};
 use std::time::Instant;
 
 /// Longest side of the picture, pixels, unless the user asked for a size.
 pub const LONGEST_SIDE: u32 = 240;
 
-/// Timed repeats of each ordering.
-const REPEATS: usize = 5;
 /// Stages.
 const LOAD: &str = "first look";
 const ORDERS: &str = "orders";
@@ -44,21 +38,6 @@ const SETS: u32 = 32;
 
 /// Slices so many times thicker than the scene's own.
 const THICKER: [f64; 4] = [1.0, 8.0, 64.0, 512.0];
-
-/// How splats are put in order.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Ordering {
-    /// Slices with exact order inside.
-    Exact,
-    /// Slices of a thickness, in the scale of the cloud.
-    Slices(f64),
-    /// One comparison sort by the view depth of centres.
-    Centre,
-    /// One comparison sort by the distance of centres from the camera.
-    Distance,
-    /// As the splats lie in memory.
-    Unsorted,
-}
 
 /// What one ordering is worth.
 #[derive(Debug, Clone, PartialEq)]
@@ -97,15 +76,15 @@ pub struct Comparison {
 /// Draws a scene by every ordering. `scene.render` counts but for what concerns order, cut-offs and layers.
 ///
 /// # Errors
-/// As [`crate::render`]; [`Error::Input`] for a scene without translucent splats.
+/// As [`organza::render`]; [`Error::Input`] for a scene without translucent splats.
 pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Comparison, Error> {
     let scene = by_slices_alone(scene);
     progress.plan([(LOAD, 2.0), (ORDERS, 8.0), (TRUTH, 8.0), (SETS_OF_PARTICLES, 8.0)]);
     progress.begin(LOAD);
     progress.enter();
     let loaded = load(&scene, options, progress)?;
-    let (plan, _) = plan_loaded(&scene, &loaded, options)?;
-    let frame = Frame::new(&scene, &loaded, &plan, None, progress);
+    let plan = plan_loaded(&scene, &loaded, options)?;
+    let frame = Frame::new(&scene, &loaded, &plan, progress);
     let mut cost = CostRecord::default();
     let camera = frame.camera;
     let shaded = frame.shaded(&mut cost)?;
@@ -133,7 +112,7 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
         let (order, seconds, bytes) = sorter.timed(ordering)?;
         progress.enter();
         let mut accumulator = frame.accumulator();
-        points::composite(&frame, &order, EVERYWHERE, &mut accumulator, &mut cost)?;
+        frame.composite(&order, &mut accumulator, &mut cost)?;
         let layers = frame.finish(&accumulator, &mut cost)?;
         progress.leave();
         let mut disorder = rays.disorder(&ranks(&order, loaded.cloud.len()));
@@ -163,30 +142,13 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
 fn by_slices_alone(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     scene.render.technique = Technique::Points;
+    // All of it is put in order, also what the scene has drawn otherwise.
+    scene.objects.iter_mut().for_each(|o| o.technique = None);
     let points = &mut scene.render.points;
     (points.transmittance_cutoff, points.first_slices) = (0.0, None);
     (points.exact, points.direction) = (false, Direction::FrontToBack);
-    scene.render.layers = crate::scene::LayerChoice::default();
+    scene.render.layers = LayerChoice::default();
     scene
-}
-
-impl Ordering {
-    fn name(self, auto: f64) -> String {
-        match self {
-            Self::Exact => "slices, exact inside".into(),
-            Self::Slices(t) => format!("slices, {} x thickness", (t / auto).round()),
-            Self::Centre => "comparison sort by view depth".into(),
-            Self::Distance => "comparison sort by camera distance".into(),
-            Self::Unsorted => "unsorted".into(),
-        }
-    }
-
-    fn thickness(self) -> Option<f64> {
-        match self {
-            Self::Slices(t) => Some(t),
-            _ => None,
-        }
-    }
 }
 
 fn exact_input<'a>(loaded: &'a Loaded, camera: &'a Camera, shaded: &'a Shaded, sigma_px: f32) -> Input<'a> {
@@ -226,7 +188,7 @@ fn particles(
     scene.render.particles = ParticlesSettings { repeat_level: SETS, target_error: None, ..scene.render.particles };
     let plan = match plan_loaded(&scene, loaded, options) {
         Err(e @ (Error::Input { .. } | Error::Limit { .. } | Error::TooLarge { .. })) => return Ok(Err(e.to_string())),
-        planned => planned?.0,
+        planned => planned?,
     };
     let mut images = Vec::new();
     let seed = |k: usize| format!("seed {k} of {SEEDS}");
@@ -258,66 +220,4 @@ fn ranks(order: &SliceOrder, splats: usize) -> Vec<u32> {
         rank[*id as usize] = place;
     }
     rank
-}
-
-/// Puts the translucent splats of a scene in order.
-struct Sorter<'a> {
-    loaded: &'a Loaded,
-    camera: Camera,
-    translucent: Vec<u32>,
-    margin_px: f64,
-}
-
-impl Sorter<'_> {
-    /// The order, seconds of the repeats, and bytes.
-    fn timed(&self, ordering: Ordering) -> Result<(SliceOrder, Option<Spread>, u64), Error> {
-        let mut seconds = Vec::new();
-        let mut order = SliceOrder::default();
-        for _ in 0..REPEATS {
-            let start = Instant::now();
-            order = match ordering {
-                Ordering::Exact => self.slices(Thickness::Auto, true)?,
-                Ordering::Slices(t) => self.slices(Thickness::World(t), false)?,
-                Ordering::Centre => self.by_centre(CentreKey::Depth),
-                Ordering::Distance => self.by_centre(CentreKey::Distance),
-                Ordering::Unsorted => as_given(self.translucent.clone()),
-            };
-            seconds.push(start.elapsed().as_secs_f64());
-        }
-        let n = self.translucent.len() as u64;
-        let bytes = match ordering {
-            // The result, and a key of eight bytes beside each id while it is sorted.
-            Ordering::Centre | Ordering::Distance => 4 * n + 16 * n,
-            Ordering::Unsorted => 4 * n,
-            _ => {
-                4 * (order.input_from_sorted.len() + order.slice_starts.len()) as u64 + self.scratch_bytes(ordering)?
-            }
-        };
-        Ok((order, median_with_spread(&seconds), bytes))
-    }
-
-    fn params(&self, thickness: Thickness, exact: bool) -> Params {
-        Params { direction: Direction::FrontToBack, thickness, exact, margin_px: self.margin_px, ..Params::default() }
-    }
-
-    fn slices(&self, thickness: Thickness, exact: bool) -> Result<SliceOrder, Error> {
-        let params = self.params(thickness, exact);
-        let mut scratch = Scratch::default();
-        slice_cloud(&self.loaded.cloud, Some(&self.translucent), &self.camera, &params, &mut scratch)
-            .map_err(|e| Error::Internal(e.to_string()))
-    }
-
-    fn scratch_bytes(&self, ordering: Ordering) -> Result<u64, Error> {
-        let thickness = ordering.thickness().map_or(Thickness::Auto, Thickness::World);
-        let params = self.params(thickness, ordering == Ordering::Exact);
-        let mut scratch = Scratch::default();
-        slice_cloud(&self.loaded.cloud, Some(&self.translucent), &self.camera, &params, &mut scratch)
-            .map_err(|e| Error::Internal(e.to_string()))?;
-        Ok(scratch.info().bytes)
-    }
-
-    /// Culling is left to the rasterizer.
-    fn by_centre(&self, key: CentreKey) -> SliceOrder {
-        by_centre(&self.loaded.cloud, &self.translucent, &self.camera, key)
-    }
 }

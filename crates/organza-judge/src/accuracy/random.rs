@@ -3,13 +3,14 @@
 //! The limit is another technique's: an expectation has no end that could be drawn. How the error falls with the repeats is
 //! read from the spread over seeds, which needs no reference; so no error is too small to be shown, and none is refused.
 
+use super::repeat::{Repeats, repeat_all};
 use super::settings::Settings;
-use super::study::{Repeats, hold_frontier, repeat_all};
+use super::study::hold_frontier;
 use super::{
     Curve, CurvePoint, Distance, Draw, Limit, Options, Outcome, Sampled, Setting, Settled, Step, Study, Sweep, Timed,
     Truth,
 };
-use crate::{Error, Progress};
+use organza::{Error, Progress};
 use reference::metrics::{Image, Linear};
 use reference::statistics::fit_order;
 

@@ -1,7 +1,7 @@
 //! The knobs of the technique `points` (Gunjee 2007).
 
 use super::{Knob, Options, Request, Skipped, Step, Sweep, Theory};
-use crate::scene::{LightSource, MediumShape, Scene, SceneObject, ShadowMapping, Source, Technique};
+use organza::scene::{LightSource, MediumShape, Scene, SceneObject, ShadowMapping, Source, Technique};
 use splat_core::{LightShape, raster::Accumulation};
 
 /// What has to be known of a loaded scene to choose the steps.

@@ -9,9 +9,9 @@
 
 mod object;
 
-use crate::scene::{LightSource, Scene, SceneLight};
-use crate::{Error, Progress, RenderOptions};
 use object::Body;
+use organza::scene::{LightSource, Scene, SceneLight};
+use organza::{Error, Progress, RenderOptions};
 use reference::metrics::{Image, Linear, compare};
 use reference::{Environment, Liberty, PathRules, PathSettings, PixelSampling, path_trace};
 use std::f64::consts::PI;
@@ -65,7 +65,7 @@ impl Truth {
 /// scene has no truth.
 ///
 /// # Errors
-/// As [`crate::load`].
+/// As [`organza::load`].
 pub fn truth(
     scene: &Scene,
     options: &RenderOptions,
@@ -79,7 +79,7 @@ pub fn truth(
 /// adds to what is seen, light nothing here either.
 ///
 /// # Errors
-/// As [`crate::load`].
+/// As [`organza::load`].
 pub fn truth_of_all_orders(
     scene: &Scene,
     options: &RenderOptions,
@@ -100,7 +100,7 @@ fn trace(
     for object in scene.objects.iter().filter(|o| o.visible) {
         match object::body(scene, object, options)? {
             Ok(body) => bodies.push(body),
-            Err(reason) => return Ok(Err(format!("object '{}': {reason}", crate::shown(&object.name)))),
+            Err(reason) => return Ok(Err(format!("object '{}': {reason}", organza::shown(&object.name)))),
         }
     }
     let mut lights = Vec::new();

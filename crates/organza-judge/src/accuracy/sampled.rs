@@ -6,7 +6,7 @@
 //! and channels.
 
 use super::Distance;
-use crate::Error;
+use organza::Error;
 use reference::metrics::{Errors, Image, Linear, compare};
 use reference::statistics::{Mean, mean_with_interval, student_t_95};
 

@@ -2,9 +2,9 @@
 
 use super::study::candidates;
 use super::{Options, Study, frontier, report_html, report_tables};
-use crate::output::{Target, Targets};
-use crate::scene::Scene;
-use crate::{Error, printable};
+use organza::output::{Target, Targets};
+use organza::scene::Scene;
+use organza::{Error, printable};
 use std::path::{Path, PathBuf};
 
 /// What computed.
@@ -24,7 +24,7 @@ impl Machine {
         let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
         let model = info.lines().find_map(|l| l.strip_prefix("model name")?.split_once(':').map(|(_, name)| name));
         Self {
-            cpu: model.map(|name| crate::escape_controls(name.trim()).into_owned()),
+            cpu: model.map(|name| organza::escape_controls(name.trim()).into_owned()),
             system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
             threads: rayon::current_num_threads(),
         }

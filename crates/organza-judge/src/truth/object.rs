@@ -1,12 +1,10 @@
 //! One object as the path tracer takes it: a density or a mesh in the world.
 
-use crate::load::input::{cloud_shape, field, wrong_kind};
-use crate::load::object::refuse;
-use crate::scene::{MediumShape, Scene, SceneMaterial, SceneObject, Source, VolumeSource};
-use crate::{Error, RenderOptions};
 use convert::read::Loaded as FileData;
 use convert::{ExpressionField, SplatParams};
 use glam::{DMat3, DQuat, DVec3, Vec3};
+use organza::scene::{MediumShape, Scene, SceneMaterial, SceneObject, Source, VolumeSource};
+use organza::{Error, RenderOptions, expression_field, printable};
 use reference::{
     Classified, ColorAt, Density, Lattice, Liberty, Medium, Placed, Surface, SurfaceKind, SurfaceMaterial,
 };
@@ -77,9 +75,9 @@ pub(super) fn body(
             _ => return Err(wrong_kind(path, "a mesh with faces", "use `points = ` or `volume = ` for this file")),
         },
         Source::Implicit(i) => {
-            let field = field(&i.expression, object)?;
+            let field = expression_field(&i.expression, object)?;
             let params = SplatParams { object_name: object.name.clone(), ..SplatParams::default() };
-            convert::field_to_mesh(&field, i.bounds, i.spacing * FINER, &params).map_err(|e| refuse(&e))?
+            convert::field_to_mesh(&field, i.bounds, i.spacing * FINER, &params).map_err(|e| Error::from_convert(&e))?
         }
         Source::Rectangle(r) => rectangle(r.center, r.u, r.v),
         Source::Medium(_) => return medium(scene, object, options).map(Ok),
@@ -185,14 +183,14 @@ fn shape(object: &SceneObject, options: &RenderOptions) -> Result<(Shape, f64), 
         }
         Source::Cloud(cloud) => {
             let params = SplatParams { object_name: object.name.clone(), ..SplatParams::default() };
-            let grid = convert::procedural_cloud(&cloud_shape(cloud), cloud.spacing * FINER, &params);
-            let mut grid = grid.map_err(|e| refuse(&e))?;
+            let grid = convert::procedural_cloud(&cloud.shape(), cloud.spacing * FINER, &params);
+            let mut grid = grid.map_err(|e| Error::from_convert(&e))?;
             grid.origin = t.apply(grid.origin);
             grid.axes = DMat3::from_quat(t.rotation) * grid.axes * t.scale;
             (Shape::Grid(grid), 1.0)
         }
         Source::Density(d) => {
-            let field = Placed::new(field(&d.expression, object)?, t, d.bounds);
+            let field = Placed::new(expression_field(&d.expression, object)?, t, d.bounds);
             let bounds = box_around(|p| t.apply(p), d.bounds);
             let majorant = majorant(&field, bounds);
             (Shape::Field { field, bounds, majorant }, d.extinction)
@@ -201,7 +199,7 @@ fn shape(object: &SceneObject, options: &RenderOptions) -> Result<(Shape, f64), 
             let FileData::Grid(grid) = read(path, options)? else {
                 return Err(wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file"));
             };
-            grid.validate().map_err(|e| Error::input(crate::printable(path), e.to_string(), ""))?;
+            grid.validate().map_err(|e| Error::input(printable(path), e.to_string(), ""))?;
             (Shape::Volume(Arc::new(Classified::new(grid, transfer.clone(), &t))), 1.0)
         }
         _ => return Err(Error::Internal("a surface is no medium".into())),
@@ -273,6 +271,10 @@ fn surface(scene: &Scene, object: &SceneObject, mut mesh: Mesh) -> Body {
         liberty,
     };
     Body::Surface(mesh, material)
+}
+
+fn wrong_kind(path: &Path, expected: &str, hint: &str) -> Error {
+    Error::input(printable(path), format!("expected {expected}"), hint)
 }
 
 fn read(path: &Path, options: &RenderOptions) -> Result<FileData, Error> {

@@ -1,0 +1,204 @@
+//! Draws all settings in shuffled order, finds the limit, and judges every setting by it.
+
+use super::limit::{TOGETHER, converge, finer_by};
+use super::repeat::{Repeats, attempt, repeat_all};
+use super::resolve::MARGIN;
+use super::settings::Settings;
+use super::{
+    Candidate, Curve, Distance, Frame, Knob, Limit, Options, Request, Sampled, Setting, Skipped, Sweep, Timed, Truth,
+    hold,
+};
+use organza::{Error, Progress};
+use reference::metrics::{Image, Linear};
+
+/// Relative size of what f32 rounding leaves in a picture.
+const ROUNDING: f64 = 1e-7;
+
+/// What became of one setting.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// The setting.
+    pub setting: Setting,
+    /// Its repeats.
+    pub timed: Timed,
+    /// Distance from the limit, the mean over seeds of a random setting; `None` where the setting was not drawn or turns a
+    /// knob that the limit holds.
+    pub from_limit: Option<Distance>,
+    /// Distance from physical truth, where there is one.
+    pub from_truth: Option<Distance>,
+    /// What its seeds say together; `None` of what is not random.
+    pub sampled: Option<Sampled>,
+    /// Whether the error against the limit is large enough to be drawn; a random setting has an interval instead.
+    pub drawn: bool,
+}
+
+/// Least seconds of a setting's repeats, loading and conversion left out; `None` if it was not drawn. Other work of the machine
+/// only ever adds to a repeat.
+pub fn least_seconds(outcome: &Outcome) -> Option<f64> {
+    outcome.timed.seconds.iter().copied().min_by(f64::total_cmp)
+}
+
+/// A judged sweep.
+#[derive(Debug, Clone)]
+pub struct Study {
+    /// Name of the technique.
+    pub technique: &'static str,
+    /// All settings; the first is the scene's own.
+    pub outcomes: Vec<Outcome>,
+    /// One curve for each knob with a size.
+    pub curves: Vec<Curve>,
+    /// Knobs that were not turned.
+    pub skipped: Vec<Skipped>,
+    /// The limit.
+    pub limit: Limit,
+    /// Physical truth, or why the scene has none.
+    pub truth: Result<Truth, String>,
+    /// Settings of the frontier, from the most accurate to the fastest.
+    pub frontier: Vec<usize>,
+    /// The knobs.
+    pub knobs: Vec<Knob>,
+}
+
+impl Study {
+    /// Whether its settings are random: they have intervals, and no error is too small to be shown.
+    pub fn is_random(&self) -> bool {
+        self.outcomes.iter().any(|o| o.sampled.is_some())
+    }
+}
+
+/// Stages of a study.
+const FIRST: &str = "each setting once";
+const ENDS: &str = "the limit";
+const REPEATS: &str = "repeats";
+const FRONTIER: &str = "the frontier";
+
+/// A function that draws: the technique's renderer, or a test's.
+pub type Draw<'a> = dyn FnMut(&Request) -> Result<Frame, Error> + 'a;
+
+/// Draws and judges.
+///
+/// # Errors
+/// [`Error::Unresolved`] when the limit's own error is not ten times below that of the scene's own setting, or leaves fewer
+/// than three settings to draw; those of `draw`, but a setting that exceeds a limit of resources is noted and left out.
+pub fn study(
+    sweep: &Sweep,
+    truth: Result<Truth, String>,
+    options: &Options,
+    progress: &Progress,
+    draw: &mut Draw<'_>,
+) -> Result<Study, Error> {
+    let mut settings = Settings::of(sweep);
+    let mut timed = vec![Timed::default(); settings.list.len()];
+    progress.enter();
+    progress.plan(stages(sweep, settings.list.len() as f64, options));
+    progress.within(FIRST, settings.list.iter().map(|s| (s.label.clone(), 1.0)), || {
+        settings.list.iter().zip(&mut timed).try_for_each(|(setting, timed)| {
+            progress.begin(&setting.label);
+            // Not timed: it pays for loading and for cold caches.
+            attempt(&setting.request, timed, false, false, draw)
+        })
+    })?;
+    let own = timed[0].image().ok_or_else(|| unresolved(timed[0].failure.clone().unwrap_or_default(), ""))?;
+    let floor = ROUNDING * root_mean_square(own);
+    let ends = sweep.knobs.iter().map(|k| (k.name, 1.0)).chain([(TOGETHER, 1.0)]);
+    let (curves, limit) = progress.within(ENDS, ends, || converge(sweep, &settings, &timed, floor, progress, draw))?;
+    let resolved: Vec<&str> = limit.parts.iter().map(|p| p.0).collect();
+    settings.join(sweep, &resolved);
+    timed.resize(settings.list.len(), Timed::default());
+    let repeats = Repeats { times: options.repeats(), seeded: false, order: options.seed };
+    progress.begin(REPEATS);
+    repeat_all(&settings, &mut timed, &repeats, progress, draw)?;
+    let exposure = sweep.base.scene.render.exposure;
+    let mut outcomes = Vec::new();
+    for (setting, timed) in settings.list.into_iter().zip(timed) {
+        let held = limit.held.iter().any(|h| Some(h.knob) == setting.knob);
+        let distance = |to: &Image<Linear>| timed.image().map(|i| Distance::between(i, to, exposure)).transpose();
+        let from_limit = if held { None } else { distance(&limit.image)? };
+        let from_truth = truth.as_ref().map_or(Ok(None), |t| distance(&t.image))?;
+        let drawn = from_limit.as_ref().is_some_and(|d| d.linear.rmse >= MARGIN * limit.own_error);
+        outcomes.push(Outcome { setting, timed, from_limit, from_truth, sampled: None, drawn });
+    }
+    refuse_unless_resolved(&outcomes, &limit, &curves)?;
+    progress.begin(FRONTIER);
+    let frontier = hold_frontier(&mut outcomes, options, progress, draw)?;
+    progress.leave();
+    Ok(Study {
+        technique: sweep.technique,
+        outcomes,
+        curves,
+        skipped: sweep.skipped.clone(),
+        limit,
+        truth,
+        frontier,
+        knobs: sweep.knobs.clone(),
+    })
+}
+
+/// The stages of a study of so many settings, weighed by draws; ends are large ones.
+fn stages(sweep: &Sweep, settings: f64, options: &Options) -> [(&'static str, f64); 4] {
+    let repeats = settings * options.repeats() as f64;
+    let ends = 4.0 * sweep.knobs.iter().map(|k| k.ends.len()).sum::<usize>() as f64;
+    [(FIRST, settings), (ENDS, ends), (REPEATS, repeats), (FRONTIER, 0.1 * repeats)]
+}
+
+fn refuse_unless_resolved(outcomes: &[Outcome], limit: &Limit, curves: &[Curve]) -> Result<(), Error> {
+    let own = outcomes[0].from_limit.as_ref().map_or(0.0, |d| d.linear.rmse);
+    let drawn = outcomes.iter().filter(|o| o.drawn).count();
+    // A scene whose own setting is the limit has no error to draw.
+    if (outcomes[0].drawn || own <= limit.own_error) && drawn >= 3 {
+        return Ok(());
+    }
+    let target = own / MARGIN / limit.parts.len().max(1) as f64;
+    let blame =
+        limit.parts.iter().filter(|p| p.1 > target).filter_map(|(knob, _)| {
+            let settled = &curves.iter().find(|c| c.knob == *knob)?.settled;
+            let factor = finer_by(settled, target);
+            Some(factor.map_or_else(
+                || format!("{knob}: not converging yet"),
+                |f| format!("{knob}: an end {f:.1} times finer"),
+            ))
+        });
+    let held = limit.held.iter().map(|h| format!("{}: {}", h.knob, h.reason));
+    let blame: Vec<String> = blame.chain(held).collect();
+    let hint = format!("{}; --finer N doubles every end N times", blame.join("; "));
+    let message = format!(
+        "the limit's own error is {:.1e}, the scene's own setting is {own:.1e} from it, and {drawn} of {} settings are at \
+         least ten times as far: expected three, and the scene's own among them unless it is the limit",
+        limit.own_error,
+        outcomes.len(),
+    );
+    Err(unresolved(message, hint))
+}
+
+fn unresolved(message: impl Into<String>, hint: impl Into<String>) -> Error {
+    Error::Unresolved { message: message.into(), hint: hint.into() }
+}
+
+/// What may be on a frontier; ids are places in `outcomes`.
+pub(super) fn candidates<'a>(outcomes: impl Iterator<Item = &'a Outcome>) -> Vec<Candidate> {
+    let candidate = |(id, o): (usize, &Outcome)| {
+        let error = o.from_limit.as_ref().filter(|_| o.drawn)?.linear.rmse;
+        Some(Candidate { id, error, seconds: least_seconds(o)? })
+    };
+    outcomes.enumerate().filter_map(candidate).collect()
+}
+
+/// Places of those on the frontier, the most accurate first, after repeats of those that it hangs on.
+pub(super) fn hold_frontier(
+    outcomes: &mut [Outcome],
+    options: &Options,
+    progress: &Progress,
+    draw: &mut Draw<'_>,
+) -> Result<Vec<usize>, Error> {
+    hold(&mut candidates(outcomes.iter()), options.hold(), |id| {
+        progress.tick(0).map_err(|_| Error::Cancelled)?;
+        let frame = draw(&outcomes[id].setting.request)?;
+        outcomes[id].timed.seconds.push(frame.seconds);
+        Ok(frame.seconds)
+    })
+}
+
+fn root_mean_square(image: &Image<Linear>) -> f64 {
+    let n = (3 * image.pixels().len()).max(1) as f64;
+    (image.pixels().iter().flatten().map(|v| v * v).sum::<f64>() / n).sqrt()
+}

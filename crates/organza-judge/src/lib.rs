@@ -1,0 +1,19 @@
+//! What Organza's pictures are worth: judged by a technique's own limit, by the exact order, by physics.
+//!
+//! ```text
+//! scene ─┬─► accuracy   a technique's knobs are turned ─► error and time of every setting ─► frontier
+//!        ├─► orders     the same splats by every ordering, against each pixel's exact order
+//!        └─► truth      the scene path-traced without splats
+//! ```
+//! Pictures are drawn by [`organza`] as any render is, by the processor alone; what is true comes from [`reference`], in f64.
+//! A technique joins by a [`accuracy::Sweep`] of its own in `accuracy/`.
+#![forbid(unsafe_code)]
+
+pub mod accuracy;
+pub mod orders;
+pub mod truth;
+
+/// The page's example compiles and holds.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Page;
