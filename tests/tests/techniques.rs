@@ -12,8 +12,8 @@ fn three(order: [usize; 3], apart: f64) -> String {
          rectangle = {{ center = [0, 0, {:?}], u = [2, 0, 0], v = [0, 2, 0], spacing = 0.1 }}\n\
          [[object]]\nname = 'slab'\ntechnique = 'reference'\n\
          medium_box = {{ min = [-2, -2, {:?}], max = [2, 2, {:?}], extinction = 0.5, spacing = 0.1 }}\n\
-         [render]\nantialias = 1\nparticles = {{ repeat_level = 400 }}\n",
-        parallel_view(2.0, 48),
+         [render]\nantialias = 1\nparticles = {{ repeat_level = 100 }}\n",
+        parallel_view(2.0, 32),
         at(0) - 0.5,
         at(0) + 0.5,
         at(1),
@@ -25,16 +25,16 @@ fn three(order: [usize; 3], apart: f64) -> String {
 #[test]
 fn fog_by_points_glass_by_particles_and_a_slab_by_reference_multiply() {
     let exact = (-0.8f64).exp() * (1.0 - 0.4) * (-0.5f64).exp();
-    // Transmittance of the glass is that of 400 sets; the rest of the picture has no noise.
-    let error = (-0.8f64).exp() * (-0.5f64).exp() * (0.4 * 0.6 / 400f64).sqrt();
+    // Transmittance of the glass is that of 100 sets; the rest of the picture has no noise.
+    let error = (-0.8f64).exp() * (-0.5f64).exp() * (0.4 * 0.6 / 100f64).sqrt();
     for order in [[0, 1, 2], [2, 1, 0], [1, 0, 2], [1, 1, 1]] {
         for apart in [2.0, 0.3] {
             let picture = draw(&three(order, apart), &[]);
-            let seen = window(&picture.channel("A"), 48, 12..36, 12..36);
+            let seen = window(&picture.channel("A"), 32, 8..24, 8..24);
             let off: Vec<f64> = seen.iter().map(|alpha| (1.0 - alpha - exact) / error).collect();
-            // 576 pixels: one of 370 is beyond three standard errors; five is beyond chance, and so is a mean of 4 / √576.
+            // 256 pixels: one of 370 is beyond three standard errors. The rest of the picture is off by at most 0.05 of one.
             let beyond = off.iter().filter(|z| z.abs() > 3.0).count();
-            assert!(beyond <= 8, "{order:?}, {apart}: {beyond} of {} pixels", off.len());
+            assert!(beyond <= 5, "{order:?}, {apart}: {beyond} of {} pixels", off.len());
             assert!(off.iter().all(|z| z.abs() < 5.0), "{order:?}, {apart}");
             let mean = off.iter().sum::<f64>() / off.len() as f64;
             assert!(mean.abs() < 4.0 / (off.len() as f64).sqrt() + 0.05, "{order:?}, {apart}: mean {mean}");
@@ -48,7 +48,7 @@ fn two_lights(first: &str, second: &str) -> String {
         format!(
             "[[object]]\nname = '{name}'\nmaterial = '{name}'\ntechnique = '{technique}'\n\
              medium_box = {{ min = [-2, -2, {:?}], max = [2, 2, {:?}], extinction = 2.0, spacing = 0.1 }}\n\
-             [material.{name}]\nambient = 0\nsingle_scattering_albedo = 0\n",
+             [material.{name}]\nmedium = {{ extinction = 2, albedo = 0 }}\n",
             z - 0.25,
             z + 0.25
         )
@@ -101,6 +101,7 @@ fn a_technique_that_is_not_there_is_refused_where_it_is_named() {
     let text = three([0, 1, 2], 1.0);
     let refused = refusal(&text.replace("'particles'", "'sheets'"));
     assert!(refused.contains("this version does not have \"sheets\""), "{refused}");
-    let refused = refusal(&text.replace("antialias = 1", "antialias = 1\nlayers = ['std_error']"));
+    let refused =
+        refusal(&text.replace("antialias = 1", "antialias = 1\ntechnique = 'particles'\nlayers = ['std_error']"));
     assert!(refused.contains("a picture by several techniques has no layer `std_error`"), "{refused}");
 }

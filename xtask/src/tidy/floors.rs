@@ -38,7 +38,9 @@ pub(crate) fn upward(repo: &Repo) -> Vec<String> {
         let product = &code[..code.find("#[cfg(test)]\nmod ").unwrap_or(code.len())];
         for (at, _) in product.match_indices("crate::") {
             let after = &product[at + "crate::".len()..];
-            let home = |name| exports.iter().find(|(export, _)| *export == name).map_or(name, |(_, module)| *module);
+            // A module and something that the root exports may have one name: then it is the module.
+            let export = |name: &str| exports.iter().find(|(export, _)| *export == name && self::floor(name).is_none());
+            let home = |name| export(name).map_or(name, |(_, module)| *module);
             let names = names(after).into_iter().map(home).filter(|name| *name != module);
             for name in names.filter(|name| self::floor(name).is_some_and(|other| other >= floor)) {
                 found

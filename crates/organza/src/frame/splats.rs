@@ -132,7 +132,6 @@ impl Frame<'_> {
             let background = Background { color: self.scene.background };
             let [width, height] = accumulator.size;
             stage.items_in = u64::from(width) * u64::from(height);
-            self.tick()?;
             let antialias = self.settings.antialias;
             Ok::<_, Error>(raster::finish(accumulator, opaque, &background, &self.layout(), &self.layers, antialias))
         })
