@@ -36,7 +36,7 @@ pub struct Explanation {
 /// Loads a scene and plans its render.
 ///
 /// # Errors
-/// As [`render`].
+/// As [`crate::render`].
 pub fn explain(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Explanation, Error> {
     let (_, mut explanation, _) = prepare(scene, options, progress, &Files::default())?;
     explanation.warnings.extend(doubts::of_shadows(&explanation.plan.shadow_tables));
