@@ -5,7 +5,7 @@
 //!        ├─► orders     the same splats by every ordering, against each pixel's exact order
 //!        └─► truth      the scene path-traced without splats
 //! ```
-//! Pictures are drawn by [`organza`] as any render is, by the processor alone; what is true comes from [`reference`], in f64.
+//! Pictures are drawn by [`organza`] as any render is, by the processor alone; what is true comes from [`mod@reference`], in f64.
 //! A technique joins by a [`accuracy::Sweep`] of its own in `accuracy/`.
 #![forbid(unsafe_code)]
 
