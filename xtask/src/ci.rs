@@ -109,7 +109,9 @@ pub(crate) fn split(line: &str) -> Vec<String> {
 /// Each library crate without its default features, then with each of its features alone.
 fn alone(repo: &Repo) -> Vec<Vec<String>> {
     let mut runs = Vec::new();
-    for folder in repo.crate_folders() {
+    // A command has no library.
+    let is_library = |folder: &&str| repo.text(&format!("{folder}/src/main.rs")).is_none();
+    for folder in repo.crate_folders().into_iter().filter(is_library) {
         let name = folder.trim_start_matches("crates/");
         let bare = format!("check --package {name} --lib --no-default-features");
         let manifest = repo.text(&format!("{folder}/Cargo.toml")).unwrap_or_default();
@@ -127,7 +129,9 @@ mod tests {
     #[test]
     fn every_feature_is_checked_alone() {
         let manifest = "[features]\ndefault = [\"ply\"]\nply = [\"dep:x\"]\nlas = []\n[dependencies]\ny = \"1\"\n";
-        let repo = Repo::of(&[("crates/a/Cargo.toml", manifest), ("crates/b/Cargo.toml", "")]);
+        let command = [("crates/c/Cargo.toml", ""), ("crates/c/src/main.rs", "")];
+        let repo =
+            Repo::of(&[&[("crates/a/Cargo.toml", manifest), ("crates/b/Cargo.toml", "")], &command[..]].concat());
         let found: Vec<_> = alone(&repo).iter().map(|words| words[2..].join(" ")).collect();
         let bare = "--lib --no-default-features";
         let expected = [
