@@ -251,10 +251,14 @@ mod tests {
                 if !["beauty", "alpha", "direct", "ambient", "background"].contains(&name) {
                     continue;
                 }
-                let n = pairs.len() as f64;
-                let bias = pairs.iter().map(|[a, b]| f64::from(b - a)).sum::<f64>() / n;
-                let square = pairs.iter().map(|[a, b]| f64::from(b - a).powi(2)).sum::<f64>() / n;
-                // Pixels are independent: three standard errors of their mean difference, and rounding.
+                // Pixels are independent, the channels of one are not.
+                let channels = pairs.len() / (40 * 30);
+                let of_pixel = |p: &[[f32; 2]]| p.iter().map(|[a, b]| f64::from(b - a)).sum::<f64>() / p.len() as f64;
+                let differences: Vec<f64> = pairs.chunks(channels).map(of_pixel).collect();
+                let n = differences.len() as f64;
+                let bias = differences.iter().sum::<f64>() / n;
+                let square = differences.iter().map(|d| d * d).sum::<f64>() / n;
+                // Three standard errors of the mean difference, and rounding.
                 let error = (square / n).sqrt();
                 assert!(bias.abs() <= 3.0 * error + 1e-7, "{name}, {} ranges: {bias:e} of {error:e}", ends.len() + 1);
             }

@@ -24,7 +24,7 @@ pub(crate) fn bytes(scene: &Scene, _: bool, _: &RenderOptions) -> u64 {
 /// Begins a frame.
 pub(crate) fn begin<'a>(frame: &'a Frame<'a>) -> Box<dyn Fold + 'a> {
     let narrowing = frame.loaded.footprints.layers().iter().map(|f| f.narrowing()).collect();
-    Box::new(Exact { frame, own: None, narrowing })
+    Box::new(Exact { frame, own: None, pixels: Vec::new(), narrowing })
 }
 
 /// The splats of a frame that are composited exactly.
@@ -32,6 +32,8 @@ struct Exact<'a> {
     frame: &'a Frame<'a>,
     /// Once they were gathered: the splats, and the values of each.
     own: Option<(Cloud, Vec<f32>)>,
+    /// What the last range left, to go on from without rounding where nobody else has been in between.
+    pixels: Vec<Pixel>,
     /// Of each footprint, see [`splat_core::Footprint::narrowing`].
     narrowing: Vec<[f32; 2]>,
 }
@@ -70,9 +72,11 @@ impl Fold for Exact<'_> {
         frame.progress.begin(stage::REFERENCE);
         frame.progress.add_total(u64::from(frame.camera.size[1]));
         cost.measure(pass::REFERENCE, |stage| {
-            let begun = &*into;
+            let (begun, last) = (&*into, &self.pixels);
             let pixel = |k: usize, fragments: &[Fragment]| {
-                let mut pixel = Pixel::of(begun, k);
+                let known = last.get(k).filter(|pixel| pixel.is_rounded_in(begun, k));
+                let mut pixel = known.cloned().unwrap_or_else(|| Pixel::of(begun, k));
+                pixel.fragments = 0;
                 fragments.iter().filter(|f| range.contains(&f.depth)).for_each(|f| pixel.add(&input, f, narrowing));
                 pixel
             };
@@ -81,13 +85,15 @@ impl Fold for Exact<'_> {
             stage.items_out = pixels.len() as u64;
             stage.fragments = pixels.iter().map(|p| p.fragments).sum();
             stage.bytes = SAMPLE_BYTES * pixels.len() as u64;
-            pixels.into_iter().enumerate().for_each(|(k, pixel)| pixel.store(into, k));
+            pixels.iter().enumerate().for_each(|(k, pixel)| pixel.store(into, k));
+            self.pixels = pixels;
             Ok(())
         })
     }
 }
 
 /// What a pixel has so far, in f64.
+#[derive(Debug, Clone)]
 struct Pixel {
     /// One, or three.
     optical_depth: Vec<f64>,
@@ -143,9 +149,18 @@ impl Pixel {
         }
     }
 
-    fn store(self, accumulator: &mut Accumulator, k: usize) {
-        accumulator.optical_depth.iter_mut().zip(self.optical_depth).for_each(|(plane, v)| plane[k] = v as f32);
-        accumulator.channels.iter_mut().zip(self.channels).for_each(|(plane, v)| plane[k] = v as f32);
+    /// Whether an accumulator has what was stored of it.
+    fn is_rounded_in(&self, accumulator: &Accumulator, k: usize) -> bool {
+        let same = |planes: &[Vec<f32>], own: &[f64]| planes.iter().zip(own).all(|(plane, v)| plane[k] == *v as f32);
+        same(&accumulator.optical_depth, &self.optical_depth) && same(&accumulator.channels, &self.channels)
+    }
+
+    fn store(&self, accumulator: &mut Accumulator, k: usize) {
+        let store = |planes: &mut [Vec<f32>], own: &[f64]| {
+            planes.iter_mut().zip(own).for_each(|(plane, v)| plane[k] = *v as f32);
+        };
+        store(&mut accumulator.optical_depth, &self.optical_depth);
+        store(&mut accumulator.channels, &self.channels);
         accumulator.depth.get_mut(k).into_iter().zip(self.depth).for_each(|(to, from)| *to = from);
         accumulator.object.get_mut(k).into_iter().zip(self.object).for_each(|(to, from)| *to = from);
     }
