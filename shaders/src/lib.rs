@@ -27,6 +27,7 @@ mod batches;
 mod check;
 mod device;
 mod draw;
+mod fit;
 mod join;
 pub mod kernels;
 mod lanes;
@@ -45,6 +46,7 @@ pub use device::{
     Adapter, AdapterKind, Backend, Choice, DeviceError, Drawing, Executor, Inputs, PassTime, Ready, Run, Validation,
 };
 pub use draw::{Blend, Corners, Draw, Format, Image, ImageId, Target};
+pub use fit::most_that_fits;
 pub use join::Joined;
 pub use kernels::{Access, Kernel};
 pub use lanes::{Lanes, SubgroupOps};

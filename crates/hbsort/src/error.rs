@@ -61,6 +61,10 @@ pub enum Error {
         /// Bytes given.
         found: u64,
     },
+    /// The device could not do it.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Device(#[from] splat_shaders::DeviceError),
     /// The system refused the memory for the buffers.
     #[error("no memory for {bytes} bytes of sort buffers")]
     Memory {

@@ -21,6 +21,7 @@
 //! ```
 
 mod parts;
+mod run;
 
 use crate::project::{Frustum, bounding_radius};
 use crate::radix::depth_of_key;
@@ -35,6 +36,7 @@ use splat_shaders::radix::{SCAN_BLOCK, Scanned, sort_pass};
 use splat_shaders::{BufferId, Groups, Recording};
 
 pub use parts::{Sorted, join};
+pub use run::slice_cloud_on;
 
 /// Splats that a workgroup projects.
 const PROJECT_BLOCK: u32 = 1024;

@@ -2,12 +2,13 @@
 
 use super::args::DevicesArguments;
 use super::console;
-use organza::{Adapter, AdapterKind, Error, ListedDevice, escape_controls};
+use organza::device::{self, Adapter, AdapterKind, ListedDevice};
+use organza::{Error, escape_controls};
 use serde_json::json;
 
 /// Lists the devices that `--backend` can use.
 pub(super) fn run(arguments: &DevicesArguments) -> Result<(), Error> {
-    let devices = organza::devices()?;
+    let devices = device::devices()?;
     console::out(&if arguments.json { document(&devices) } else { text(&devices) })
 }
 

@@ -3,7 +3,8 @@
 use super::args::PassportArguments;
 use super::console;
 use super::devices::kind;
-use organza::{AdapterKind, Checked, Error, Passport, escape_controls, passport};
+use organza::device::{AdapterKind, Checked, Passport, passport};
+use organza::{Error, escape_controls};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -98,7 +99,7 @@ fn checked_json(checked: &Checked) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use organza::{Adapter, Agreement, KernelTime};
+    use organza::device::{Adapter, Agreement, KernelTime};
 
     fn one(kind: AdapterKind, outcome: Result<Agreement, String>) -> Passport {
         let (name, driver) = ("X".to_owned(), "Vulkan 1.3.0".to_owned());

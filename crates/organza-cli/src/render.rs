@@ -3,7 +3,7 @@
 use super::args::RenderArguments;
 use super::bar::with_bar;
 use super::jobs::{Jobs, Places};
-use super::session::{path_text, render_options, start_threads};
+use super::session::{open_device, path_text, render_options, start_threads};
 use super::{console, report};
 use organza::output::{self, Metadata, Target, WriteReport};
 use organza::scene::Scene;
@@ -38,6 +38,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
     let jobs = Jobs::new(arguments)?;
     let mut sequence = jobs.check()?;
     start_threads(arguments.scene.threads)?;
+    let options = RenderOptions { device: open_device(&arguments.scene)?, ..render_options(&arguments.scene) };
     let mut done: Vec<Done> = Vec::new();
     let outcome = with_bar(|progress| {
         let count = jobs.frames().count();
@@ -47,7 +48,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
             progress.plan([(job.stage(), 1.0), (LATER.to_owned(), (count - at - 1) as f64)]);
             progress.begin(&job.stage());
             progress.enter();
-            let one = job.run(arguments, sequence.as_mut(), progress)?;
+            let one = job.run(arguments, &options, sequence.as_mut(), progress)?;
             progress.leave();
             let interrupted = one.sets.is_some_and(|s| s.interrupted);
             done.push(one);
@@ -93,11 +94,12 @@ impl Job<'_> {
     fn run(
         &self,
         arguments: &RenderArguments,
+        options: &RenderOptions,
         sequence: Option<&mut Sequence>,
         progress: &Progress,
     ) -> Result<Done, Error> {
         let checkpoint = self.places.checkpoint.as_ref().map(|target| target.path().to_owned());
-        let options = RenderOptions { checkpoint, ..render_options(&arguments.scene) };
+        let options = RenderOptions { checkpoint, ..options.clone() };
         progress.plan([(DRAWING, 0.95), (WRITING, 0.05)]);
         progress.begin(DRAWING);
         progress.enter();

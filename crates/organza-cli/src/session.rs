@@ -3,8 +3,10 @@
 use super::args::{Backend, SceneArguments};
 use super::memory;
 use organza::scene::{self, LoadOptions, Override, Scene};
-use organza::{Choice, DeviceChoice, Error, RenderOptions, printable};
+use organza::device::{Choice, Device, DeviceChoice};
+use organza::{Error, RenderOptions, printable};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Loads the scene with the options of the command line.
 pub(super) fn load_scene(arguments: &SceneArguments) -> Result<Scene, Error> {
@@ -24,7 +26,7 @@ pub(super) fn parse_scene(arguments: &SceneArguments, bytes: &[u8], frame: Optio
     Ok(scene::parse(&arguments.scene, bytes, &options)?)
 }
 
-/// What the render may take and how it treats doubtful input.
+/// What the render may take and how it treats doubtful input, by the processor.
 pub(super) fn render_options(arguments: &SceneArguments) -> RenderOptions {
     RenderOptions {
         max_memory: arguments.max_memory.unwrap_or_else(memory::default_limit),
@@ -32,9 +34,14 @@ pub(super) fn render_options(arguments: &SceneArguments) -> RenderOptions {
         strict: arguments.strict,
         merge_duplicates: arguments.merge_duplicates,
         checkpoint: None,
-        device: device(arguments),
+        device: None,
         device_composites: arguments.device_composites,
     }
+}
+
+/// Opens the device that was asked for.
+pub(super) fn open_device(arguments: &SceneArguments) -> Result<Option<Arc<Device>>, Error> {
+    Ok(device(arguments).as_ref().map(Device::open).transpose()?.map(Arc::new))
 }
 
 /// Starts the threads that all stages share.

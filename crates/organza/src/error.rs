@@ -216,6 +216,13 @@ impl Error {
     }
 }
 
+impl From<organza_device::Error> for Error {
+    fn from(error: organza_device::Error) -> Self {
+        let hint = "`organza devices` lists what there is; --backend cpu needs none".into();
+        Self::Gpu { message: error.to_string(), hint }
+    }
+}
+
 /// An error of a scene file, variant by variant: it is said and counted as one of the house.
 impl From<organza_scene::Error> for Error {
     fn from(error: organza_scene::Error) -> Self {

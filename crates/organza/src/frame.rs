@@ -33,7 +33,7 @@ pub struct Frame<'a> {
     /// The camera of samples: the scene's, with `render.antialias` times its pixels along each side.
     pub camera: Camera,
     /// A device that helps.
-    pub(crate) helper: Option<&'a Helper>,
+    pub(crate) helper: Option<&'a Helper<'a>>,
     /// Whether it composites splats, which changes the last bits.
     pub(crate) device_composites: bool,
     pub(crate) progress: &'a Progress,
@@ -67,7 +67,7 @@ impl<'a> Frame<'a> {
     }
 
     /// With a device that helps, and whether it composites.
-    pub(crate) fn helped_by(mut self, device: Option<(&'a Helper, bool)>) -> Self {
+    pub(crate) fn helped_by(mut self, device: Option<(&'a Helper<'a>, bool)>) -> Self {
         self.helper = device.map(|(helper, _)| helper);
         self.device_composites = device.is_some_and(|(_, composites)| composites);
         self

@@ -27,7 +27,6 @@
 #![forbid(unsafe_code)]
 
 mod choose;
-mod device;
 mod doubts;
 mod draw;
 mod error;
@@ -49,7 +48,6 @@ pub mod statistics;
 mod technique;
 mod work;
 
-pub use device::{Agreement, Checked, DeviceChoice, KernelTime, ListedDevice, Passport, devices, passport};
 pub use draw::draw_loaded;
 pub use error::Error;
 pub use frame::{Frame, Shaded};
@@ -57,6 +55,7 @@ pub use info::{FileInfo, info};
 pub use load::Loaded;
 pub use load::input::expression_field;
 pub use options::RenderOptions;
+pub use organza_device as device;
 pub use organza_scene as scene;
 pub use organza_scene::{escape_controls, printable, shown};
 pub use prepare::{Explanation, explain, load, plan_loaded};
@@ -64,6 +63,5 @@ pub use render::{Render, render};
 pub use sequence::Sequence;
 pub use shadows::ShadowTable;
 pub use splat_core::{CostRecord, Layers, Progress};
-pub use splat_shaders::{Adapter, AdapterKind, Choice};
 pub use statistics::SplatCount;
 pub use technique::Sets;

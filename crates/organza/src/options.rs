@@ -1,8 +1,9 @@
 //! What a render may take, and how it treats doubtful input.
 
-use crate::device::DeviceChoice;
+use crate::device::Device;
 use convert::read::ReadLimits;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// What a render may take and how it treats doubtful input.
 #[derive(Debug, Clone)]
@@ -18,8 +19,8 @@ pub struct RenderOptions {
     /// File of the sums of the technique `particles`: read before, if it is there, and written every few seconds, at the
     /// end and at an interrupt. A render that is stopped at any moment goes on from it and ends in the same bits.
     pub checkpoint: Option<PathBuf>,
-    /// The device on which the passes run that can; `None`: the processor alone.
-    pub device: Option<DeviceChoice>,
+    /// The device on which the passes run that can, opened once for all pictures; `None`: the processor alone.
+    pub device: Option<Arc<Device>>,
     /// Whether the device composites the splats too: beauty then differs from the processor's by rounding, up to 10⁻⁵ of
     /// the brightest splat.
     pub device_composites: bool,

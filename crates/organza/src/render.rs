@@ -36,7 +36,7 @@ pub struct Render {
 ///
 /// # Errors
 /// [`Error::Input`] and [`Error::Io`] for data, [`Error::Limit`] before more memory is taken than allowed,
-/// [`Error::Cancelled`] after `progress.cancel()`, [`Error::Gpu`] when there is no device as asked for.
+/// [`Error::Cancelled`] after `progress.cancel()`.
 pub fn render(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Render, Error> {
     render_keeping(scene, options, progress, None)
 }
@@ -83,7 +83,7 @@ pub(crate) fn render_keeping(
         Checkpoint::open(path, scene, options, left.as_ref().map(|left| &left.sets))
     };
     let mut checkpoint = options.checkpoint.as_ref().map(open).transpose()?;
-    let helper = options.device.as_ref().map(Helper::open).transpose()?;
+    let helper = options.device.as_deref().map(Helper::new);
     let (loaded, explanation, memory) = match &left {
         Some(left) => prepare(scene, options, progress, &left.files)?,
         None => prepare(scene, options, progress, &Files::default())?,
@@ -101,11 +101,11 @@ pub(crate) fn render_keeping(
     let mut session = Session { options, checkpoint: checkpoint.as_mut(), kept, warnings: &mut warnings, sets: None };
     let layers = draw(&frame, &mut session, &mut cost)?;
     let sets = session.sets;
-    let backend = helper.as_ref().map_or_else(|| "cpu".to_owned(), Helper::name);
+    let backend = helper.as_ref().map_or_else(|| "cpu".to_owned(), |helper| helper.name());
     if !doubtful {
         warnings.extend(doubts::of_picture(scene, &layers));
     }
     warnings.extend(doubts::of_shadows(&plan.shadow_tables));
-    warnings.extend(helper.map(Helper::said).unwrap_or_default());
+    warnings.extend(helper.map(|helper| helper.said()).unwrap_or_default());
     Ok(Render { layers, cost, plan, sets, warnings, notes, backend })
 }

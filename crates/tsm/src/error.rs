@@ -53,6 +53,10 @@ pub enum Error {
         /// The reason, a clause of its own.
         why: &'static str,
     },
+    /// The device could not do it.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Device(#[from] splat_shaders::DeviceError),
     /// The light or the cloud breaks a promise, or the caller cancelled.
     #[error(transparent)]
     Core(#[from] splat_core::Error),

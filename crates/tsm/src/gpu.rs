@@ -27,6 +27,7 @@ mod casting;
 mod deposit;
 mod look_up;
 mod received;
+mod run;
 mod shadow;
 
 use crate::table::stop_of;
@@ -40,6 +41,7 @@ pub use casting::Casting;
 pub use deposit::{CastRoom, CastUploads, RecordedCast, record_cast};
 pub use look_up::{MapUploads, ReceiverUploads, RecordedLookUp, Room, record_look_up};
 pub use received::{ReceivedUploads, RecordedReceived, record_received};
+pub use run::map_on;
 pub use shadow::{RecordedMap, RecordedShadow, ShadowUploads, record_map, record_shadow};
 
 /// Threads of a workgroup.

@@ -1,7 +1,7 @@
 //! Light of a frame: shadow maps, and what reaches splats through them.
 
 use super::Frame;
-use crate::device::LookedUp;
+use crate::device;
 use crate::pass;
 use crate::shadows::shadow_error;
 use crate::{CostRecord, Error, work};
@@ -39,7 +39,7 @@ impl<'a> Frame<'a> {
                 let l = self.loaded;
                 let deposits = Deposits::new(&l.cloud, &l.materials, &l.objects, light, &params, self.progress)
                     .map_err(|e| shadow_error(i, &e))?;
-                let helped = self.helper.and_then(|helper| helper.shadow_map(&deposits));
+                let helped = self.helper.and_then(|helper| device::shadow_map(helper, &deposits));
                 let map = helped.unwrap_or_else(|| deposits.into_map());
                 stage.items_in = l.cloud.len() as u64;
                 stage.items_out = map.counts().kept;
@@ -52,29 +52,10 @@ impl<'a> Frame<'a> {
         Ok(maps)
     }
 
-    /// For each map the light at these splats, where a device looks it up.
-    pub(crate) fn look_ups<'b>(
-        &self,
-        maps: &'b [Option<ShadowMap>],
-        splats: impl Iterator<Item = u32>,
-    ) -> Vec<Option<LookedUp<'b>>> {
-        let device = self.helper.filter(|_| self.device_composites && maps.iter().any(Option::is_some));
-        let Some(device) = device else { return maps.iter().map(|_| None).collect() };
-        let ids: Vec<u32> = splats.collect();
-        maps.iter().map(|map| device.look_up(map.as_ref()?, self.drawn(), &ids)).collect()
-    }
-
-    /// The lights that have an intensity, with what is known of their shadows, or their maps.
-    pub(crate) fn lit_by<'b>(
-        &self,
-        maps: &'b [Option<ShadowMap>],
-        looked_up: &'b [Option<LookedUp<'b>>],
-    ) -> Vec<LitBy<'b>> {
-        let known = looked_up.iter().zip(maps).map(|(known, map)| {
-            let map = map.as_ref().map(|map| map as &dyn Transmittance);
-            known.as_ref().map(|known| known as &dyn Transmittance).or(map)
-        });
-        self.with_light(known).map(|(light, shadow)| LitBy { light, shadow }).collect()
+    /// The lights that have an intensity, with their maps.
+    pub(crate) fn lit_by<'b>(&'b self, maps: &'b [Option<ShadowMap>]) -> Vec<LitBy<'b>> {
+        let shadow = |map: Option<&'b ShadowMap>| map.map(|map| map as &dyn Transmittance);
+        self.shining(maps).map(|(light, map)| LitBy { light, shadow: shadow(map) }).collect()
     }
 
     /// What shading the drawn splats reads.

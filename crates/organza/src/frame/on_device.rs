@@ -3,11 +3,11 @@
 use super::Frame;
 use super::splats::record;
 use crate::Error;
-use crate::device::{Helper, Splats};
+use crate::device::{self, Helper, Splats};
 use crate::pass;
 use splat_core::raster::{self, Accumulation, OpaqueImage};
 use splat_core::shade::{LitBy, gpu::suits};
-use splat_core::{Accumulator, CostRecord, Direction, StageCost, Transmittance};
+use splat_core::{Accumulator, CostRecord, Direction, StageCost};
 use tsm::ShadowMap;
 use tsm::gpu::Casting;
 
@@ -19,8 +19,7 @@ impl Frame<'_> {
         if !self.suits(helper, maps) {
             return Ok(None);
         }
-        let looked_up = self.look_ups(maps, ids.iter().copied());
-        let lights = self.lit_by(maps, &looked_up);
+        let lights = self.lit_by(maps);
         let mut nothing = Accumulator::new(self.camera.size, 1, self.layout().count(), false, self.layers.object);
         let mut stages = CostRecord::default();
         let params = hbsort::Params { exact: true, ..hbsort::Params::default() };
@@ -34,17 +33,15 @@ impl Frame<'_> {
     }
 
     /// Whether a device shades splats in this light; if not it says why.
-    pub(crate) fn suits(&self, helper: &Helper, maps: &[Option<ShadowMap>]) -> bool {
-        let by = |map| -> Option<&dyn Transmittance> { Some(map? as &ShadowMap) };
-        let lights: Vec<LitBy<'_>> = self.shining(maps).map(|(light, map)| LitBy { light, shadow: by(map) }).collect();
-        suits(&self.shading(&lights)).map_err(|why| helper.leave(why)).is_ok()
+    pub(crate) fn suits(&self, helper: &Helper<'_>, maps: &[Option<ShadowMap>]) -> bool {
+        suits(&self.shading(&self.lit_by(maps))).map_err(|why| helper.leave(why)).is_ok()
     }
 
     /// Translucent splats and opaque ones by the device, lit by lights whose shadows it is given, or makes of castings. Gives
     /// the opaque ones.
     pub(crate) fn chain(
         &self,
-        helper: &Helper,
+        helper: &Helper<'_>,
         (lights, castings): (&[LitBy<'_>], &[Casting]),
         [ids, solid]: [&[u32]; 2],
         sort: &hbsort::Params,
@@ -71,7 +68,7 @@ impl Frame<'_> {
             castings,
             progress: self.progress,
         };
-        let Some(done) = helper.chain(&splats, accumulator)? else { return Ok(None) };
+        let Some(done) = device::chain(helper, &splats, accumulator).map_err(|_| Error::Cancelled)? else { return Ok(None) };
         record(stage, &done.raster);
         stage.items_in = (ids.len() + solid.len()) as u64;
         Ok(Some(done.opaque.unwrap_or_default()))

@@ -46,9 +46,7 @@ impl Frame<'_> {
         let layout = self.layout();
         self.progress.begin(stage::SHADE);
         let values = cost.measure(pass::SHADE, |stage| {
-            let visible = (0..self.drawn().len() as u32).filter(|&i| projected.is_visible(i as usize));
-            let looked_up = self.look_ups(maps, visible);
-            let lights = self.lit_by(maps, &looked_up);
+            let lights = self.lit_by(maps);
             let values = shade(&self.shading(&lights), &projected, &layout, self.progress);
             stage.items_in = projected.visible();
             stage.items_out = stage.items_in;

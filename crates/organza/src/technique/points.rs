@@ -1,14 +1,14 @@
 //! The `points` technique (Gunjee 2007): translucent splats in slices, composited in order.
 
-mod chained;
+mod on_device;
 
+use crate::device;
 use crate::frame::{Frame, Shaded, record};
 use crate::pass;
 use crate::scene::Technique;
 use crate::technique::{EVERYWHERE, Fold, Session};
 use crate::{CostRecord, Error, stage};
 use splat_core::raster;
-use splat_core::raster::gpu::Input;
 use splat_core::{Accumulator, Direction, SliceOrder};
 use std::borrow::Cow;
 use std::ops::Range;
@@ -35,13 +35,10 @@ impl Fold for Points<'_> {
     ) -> Result<(), Error> {
         let frame = self.frame;
         let whole = range == EVERYWHERE && frame.plan.techniques.len() == 1;
-        if whole && self.staying(into, cost)? {
+        if whole && self.by_device(into, cost)? {
             return Ok(());
         }
         frame.maps(cost)?;
-        if whole && self.chained(into, cost)? {
-            return Ok(());
-        }
         if self.order.is_none() {
             self.order = Some(sorted(frame, Technique::Points, cost)?);
         }
@@ -63,7 +60,7 @@ fn sorted(frame: &Frame<'_>, technique: Technique, cost: &mut CostRecord) -> Res
     frame.tick()?;
     let params = sort_params(frame);
     let order = cost.measure(pass::SORT, |stage| {
-        let helped = frame.helper.and_then(|helper| helper.order(cloud, &translucent, camera, &params));
+        let helped = frame.helper.and_then(|helper| device::order(helper, cloud, &translucent, camera, &params));
         let order = helped.map_or_else(
             || hbsort::slice_cloud(cloud, Some(&translucent), camera, &params, &mut hbsort::Scratch::default()),
             Ok,
@@ -131,11 +128,8 @@ fn composite(
     cost.measure(pass::SPLAT, |stage| {
         stage.items_in = ids.len() as u64;
         let (materials, params) = (&frame.loaded.materials, frame.raster_params());
-        let input = Input { projected, order: ids, values, materials, opaque, direction, params: &params };
-        let device = frame.helper.filter(|_| frame.device_composites);
-        let counts = device.and_then(|device| device.composite(&input, into)).unwrap_or_else(|| {
-            raster::fold(projected, ids, values, materials, opaque, direction, &params, into, frame.progress)
-        });
+        let counts =
+            raster::fold(projected, ids, values, materials, opaque, direction, &params, into, frame.progress);
         record(stage, &counts);
         Ok::<_, Error>(())
     })?;

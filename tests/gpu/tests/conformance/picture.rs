@@ -1,7 +1,8 @@
 //! A whole picture with a device that helps: the processor's, bit for bit.
 
 use gpu_conformance::{Interface, Loss, Wrapped, adapter};
-use organza::{Agreement, DeviceChoice, Progress, Render, RenderOptions, render, scene};
+use organza::device::{self, Agreement, Device, DeviceChoice};
+use organza::{Progress, Render, RenderOptions, render, scene};
 use std::sync::Arc;
 
 const SCENE: &str = r#"
@@ -34,6 +35,10 @@ fn chosen(backend: Wrapped) -> (Arc<Wrapped>, DeviceChoice) {
     (backend, choice)
 }
 
+fn opened(choice: Option<DeviceChoice>) -> Option<Arc<Device>> {
+    choice.map(|choice| Arc::new(Device::open(&choice).unwrap()))
+}
+
 /// The device of the environment, by each executor.
 fn devices() -> [(&'static str, DeviceChoice); 2] {
     [("ash, ", DeviceChoice::ash(adapter())), ("wgpu, ", DeviceChoice::wgpu(adapter()))]
@@ -42,7 +47,7 @@ fn devices() -> [(&'static str, DeviceChoice); 2] {
 fn picture(exact: bool, device: Option<DeviceChoice>) -> Render {
     let text = format!("{SCENE}\n[render.points]\nexact = {exact}\n");
     let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
-    render(&scene, &RenderOptions { device, ..RenderOptions::default() }, &Progress::new()).unwrap()
+    render(&scene, &RenderOptions { device: opened(device), ..RenderOptions::default() }, &Progress::new()).unwrap()
 }
 
 #[test]
@@ -72,7 +77,7 @@ fn what_a_device_cannot_do_is_said_and_done_by_the_processor() {
 
 #[test]
 fn a_driver_that_plays_a_gpu_is_never_taken_silently() {
-    let drivers = organza::devices().unwrap();
+    let drivers = device::devices().unwrap();
     assert!(drivers.iter().any(|d| d.backend == "ash") && drivers.iter().any(|d| d.backend == "wgpu"));
     if drivers.iter().any(|d| d.adapter.kind.is_gpu()) {
         return;
@@ -142,7 +147,7 @@ fn particles(device: Option<DeviceChoice>, more: &str) -> Render {
         "#
     );
     let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
-    render(&scene, &RenderOptions { device, ..RenderOptions::default() }, &Progress::new()).unwrap()
+    render(&scene, &RenderOptions { device: opened(device), ..RenderOptions::default() }, &Progress::new()).unwrap()
 }
 
 /// Share of pixels of equal opacity, which are those of equal hits.
@@ -259,7 +264,7 @@ fn lit_particles(device: Option<DeviceChoice>, more: &str) -> Render {
         "#
     );
     let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
-    render(&scene, &RenderOptions { device, ..RenderOptions::default() }, &Progress::new()).unwrap()
+    render(&scene, &RenderOptions { device: opened(device), ..RenderOptions::default() }, &Progress::new()).unwrap()
 }
 
 /// Largest difference of the pixels of equal opacity, in every layer, and the brightest number of beauty.
@@ -325,11 +330,11 @@ fn light_that_a_device_does_not_make_is_the_processor_s() {
 
 #[test]
 fn every_device_has_a_passport() {
-    let passports = organza::passport("").unwrap();
-    assert_eq!(passports.len(), organza::devices().unwrap().len());
+    let passports = device::passport("").unwrap();
+    assert_eq!(passports.len(), device::devices().unwrap().len());
     for passport in &passports {
         assert!(passport.valid(), "{passport:?}");
-        let [order, lists, look_ups, shadow, project, shade, composite, draw, opaque, chain, particles, made, lit] =
+        let [order, lists, shadow, project, shade, composite, opaque, chain, particles, made, lit] =
             &passport.recordings[..]
         else {
             panic!("{passport:?}")
@@ -337,12 +342,11 @@ fn every_device_has_a_passport() {
         assert_eq!((order.recording, order.items), ("order", 1 << 17));
         assert_eq!(order.outcome.as_ref().map(|a| (a.equal_share, a.mean, a.max)), Ok((1.0, 0.0, 0.0)));
         assert_eq!(lists.outcome.as_ref().map(|a| (a.within, a.equal_share, a.max)), Ok((true, 1.0, 0.0)));
-        assert!(lists.items > 50_000 && look_ups.items == 1 << 14);
-        assert!(look_ups.outcome.as_ref().is_ok_and(|a| a.within && a.mean < 1e-6), "{look_ups:?}");
+        assert!(lists.items > 50_000);
         assert!(shadow.items.abs_diff(lists.items) * 1000 <= lists.items, "{shadow:?}");
         assert!(shadow.outcome.as_ref().is_ok_and(|a| a.mean < 1e-5), "{shadow:?}");
         let composited = |a: &Agreement| a.within && a.mean < 1e-6 && a.max <= 1e-5;
-        for splats in [project, shade, composite, draw, chain] {
+        for splats in [project, shade, composite, chain] {
             assert!(splats.items == 1 << 14 && splats.outcome.as_ref().is_ok_and(composited), "{splats:?}");
         }
         assert!(opaque.outcome.as_ref().is_ok_and(|a| a.within && a.mean < 1e-6), "{opaque:?}");
@@ -355,7 +359,7 @@ fn every_device_has_a_passport() {
         assert!(order.passes.is_empty() || scatter.sum::<u32>() == 4, "{:?}", order.passes);
         assert_eq!(passport.missing.contains(&"timestamps"), order.passes.is_empty());
     }
-    assert!(organza::passport("no such device").unwrap().is_empty());
+    assert!(device::passport("no such device").unwrap().is_empty());
 }
 
 #[test]
@@ -388,9 +392,6 @@ fn a_device_with_small_buffers_sorts_in_parts() {
     assert_eq!(device.submissions(), 1 + 2);
     // Too small for anything: refused at the trial.
     let (_, choice) = losing(Loss::Never, 512);
-    let text = SCENE.as_bytes();
-    let scene = scene::parse("scene.toml".as_ref(), text, &Default::default()).unwrap();
-    let options = RenderOptions { device: Some(choice), ..RenderOptions::default() };
-    let error = render(&scene, &options, &Progress::new()).unwrap_err();
-    assert!(error.exit_code() == 6 && error.to_string().contains("kernels see at most 512"), "{error}");
+    let error = Device::open(&choice).unwrap_err();
+    assert!(error.to_string().contains("kernels see at most 512"), "{error}");
 }

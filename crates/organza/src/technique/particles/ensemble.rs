@@ -122,7 +122,7 @@ fn depth_range(parts: &[&Part<'_>], camera: &Camera) -> [f32; 2] {
 }
 
 /// The device that folds, if there is one and it may.
-fn helper<'a>(frame: &Frame<'a>, checkpoint: bool) -> Option<&'a Helper> {
+fn helper<'a>(frame: &Frame<'a>, checkpoint: bool) -> Option<&'a Helper<'a>> {
     let helper = frame.helper?;
     if checkpoint {
         helper.leave("particles with a checkpoint are the processor's, whose bits do not depend on where it went on");
@@ -133,7 +133,7 @@ fn helper<'a>(frame: &Frame<'a>, checkpoint: bool) -> Option<&'a Helper> {
 /// Sets between two looks.
 struct Step<'a> {
     until: u32,
-    helper: Option<&'a Helper>,
+    helper: Option<&'a Helper<'a>>,
     params: FoldParams,
     progress: &'a Progress,
 }
@@ -148,7 +148,7 @@ impl Step<'_> {
         ensemble: &mut Ensemble,
     ) -> Result<u64, pbsr::Error> {
         let by_device = match self.helper {
-            Some(helper) => helper.fold(folding, scene, ensemble, self.until, self.params.max_bytes, self.progress)?,
+            Some(helper) => folding.fold(helper, scene, ensemble, self.until, self.params.max_bytes, self.progress)?,
             None => 0,
         };
         match self.until - ensemble.levels() {

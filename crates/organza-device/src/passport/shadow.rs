@@ -1,22 +1,20 @@
-//! The shadow map of a cloud of media, surfaces and opaque discs by both: its lists, look-ups in it, and all of it in one go.
+//! The shadow map of a cloud of media, surfaces and opaque discs by both: its lists, and from splats to light in one go.
 
 use super::{Agreement, Failure, Found, LEAST_SHARE};
-use crate::device::shadows::{LookUps, look_up_on, map_on};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::gpu::Attributes;
 use splat_core::{Cloud, Light, LightShape, Material, Progress, Receiver, Splat, SplatKind, Transmittance, rng};
 use splat_shaders::{DeviceError, Executor};
-use tsm::gpu::{Casting, record_shadow};
+use tsm::gpu::{Casting, map_on, record_shadow};
 use tsm::{Deposits, Params, ShadowMap};
 
 /// Splats that throw shadows and receive them.
 const SPLATS: u64 = 1 << 14;
 /// The key of their random numbers.
 const SEED: u64 = 0x5348_4144;
-/// What transmittances may differ by; drivers that round each product and sum by itself stay below a tenth of it.
-const TOLERANCE: f64 = 1e-5;
-/// The same where a device makes the map too, for nearly all splats; where bits are kept it is as small as for look-ups.
-const STAYING_TOLERANCE: f64 = 1e-4;
+/// What transmittances may differ by, for nearly all splats: where a driver rounds each product and sum by itself they stay below a
+/// tenth of it.
+const TOLERANCE: f64 = 1e-4;
 
 /// Generated splats around a lamp beside them, and what the processor makes of them.
 pub(super) struct ShadowInput {
@@ -29,7 +27,7 @@ pub(super) struct ShadowInput {
 }
 
 impl ShadowInput {
-    pub(super) fn new() -> Result<Self, tsm::Error> {
+    pub(super) fn new() -> Self {
         let mut cloud = Cloud::new(DVec3::ZERO);
         for i in 0..SPLATS {
             let u = |k| 2.0 * rng::unit_f32(SEED, 0, i, k) - 1.0;
@@ -48,8 +46,9 @@ impl ShadowInput {
         let light = Light { shape, intensity: [1.0; 3] };
         let materials = [Material::default()];
         let (params, progress) = (Params::default(), Progress::new());
-        let casting = Casting::new(&cloud, &materials, &[], &light, &params, &progress)?;
-        let deposits = Deposits::new(&cloud, &materials, &[], &light, &params, &progress)?;
+        let valid = "invariant: generated splats and a lamp are valid, and fit";
+        let casting = Casting::new(&cloud, &materials, &[], &light, &params, &progress).expect(valid);
+        let deposits = Deposits::new(&cloud, &materials, &[], &light, &params, &progress).expect(valid);
         let map = deposits.clone().into_map();
         let receiver = |i: usize| Receiver {
             position: cloud.position[i],
@@ -58,7 +57,7 @@ impl ShadowInput {
             kind: cloud.kind[i],
         };
         let receivers = (0..cloud.len()).map(receiver).collect();
-        Ok(Self { cloud, casting, deposits, map, receivers, light })
+        Self { cloud, casting, deposits, map, receivers, light }
     }
 
     /// The processor's map, and its light.
@@ -88,15 +87,7 @@ impl ShadowInput {
         Ok(Found { items: self.map.counts().entries, agreement, passes })
     }
 
-    /// The light at the splats.
-    pub(super) fn check_look_ups(&self, device: &mut dyn Executor) -> Result<Found, Failure> {
-        let LookUps::Done(lights, passes) = look_up_on(device, &self.map, &self.receivers)? else {
-            return Err(DeviceError::Memory { bytes: self.map.counts().bytes }.into());
-        };
-        Ok(Found { items: lights.len() as u64, agreement: self.agreement(&lights), passes })
-    }
-
-    /// The same from splats to light in one go, deposits and lists included.
+    /// From splats to light in one go: deposits, lists and look-ups.
     pub(super) fn check_shadow(&self, device: &mut dyn Executor) -> Result<Found, Failure> {
         let attributes = Attributes::new(&self.cloud, None)?;
         let recorded = record_shadow(self.casting.room(attributes.room(), self.casting.expected()), 0);
@@ -111,7 +102,7 @@ impl ShadowInput {
         let mut agreement = self.agreement(&lights);
         // A surface's step that lies at a receiver within rounding may fall on its other side.
         let pairs = self.receivers.iter().map(|receiver| self.map.transmittance(receiver)).zip(&lights);
-        let close = pairs.filter(|(a, b)| f64::from((a[0] - b[0]).abs()) <= STAYING_TOLERANCE).count();
+        let close = pairs.filter(|(a, b)| f64::from((a[0] - b[0]).abs()) <= TOLERANCE).count();
         agreement.within = close as f64 >= LEAST_SHARE * self.receivers.len() as f64;
         Ok(Found { items: entries.into(), agreement, passes: run.passes })
     }

@@ -1,10 +1,9 @@
 //! The same for more splats than a device takes at once: ordered first, then projected, shaded and composited in parts, one
 //! after the other in compositing order. What has been composited goes on where the part before has left it.
 
-use super::{Chained, Outcome, Splats, run_on};
-use crate::device::Failure;
-use crate::device::order::order_on;
-use crate::device::splats::{MOST_OF_A_TILE, room_for};
+use super::{Chained, MOST_OF_A_TILE, Reason, Splats, room_for, run_on};
+use crate::Failure;
+use hbsort::gpu::slice_cloud_on;
 use splat_core::Accumulator;
 use splat_core::raster::RasterCounts;
 use splat_shaders::Executor;
@@ -13,14 +12,14 @@ use splat_shaders::Executor;
 const LEAST: usize = 256;
 
 /// Translucent splats into an accumulator by a device, in parts of at most so many; the accumulator changes only when all is
-/// done. `None` where even few splats are too many.
-pub(crate) fn chain_in_parts(
+/// done. Where even few splats are too many it says why.
+pub(super) fn chain_in_parts(
     device: &mut dyn Executor,
     splats: &Splats<'_>,
     mut most: usize,
     accumulator: &mut Accumulator,
-) -> Result<Option<Chained>, Failure> {
-    let (order, mut passes) = order_on(device, splats.input.cloud, splats.ids, splats.input.camera, splats.sort)?;
+) -> Result<Result<Chained, Reason>, Failure> {
+    let (order, mut passes) = slice_cloud_on(device, splats.input.cloud, splats.ids, splats.input.camera, splats.sort)?;
     let mut begun = accumulator.clone();
     let (mut visible, mut raster) = (0, RasterCounts::default());
     let mut rest = &order.input_from_sorted[..];
@@ -28,19 +27,19 @@ pub(crate) fn chain_in_parts(
         let (ids, behind) = rest.split_at(most.min(rest.len()));
         let part = Splats { ids, ..*splats };
         match run_on(device, &part, false, room_for(ids.len()), &mut begun)? {
-            Outcome::Done(done) => {
+            Ok(done) => {
                 rest = behind;
                 visible += done.visible;
                 add(&mut raster, &done.raster);
                 passes.extend(done.passes);
             }
-            Outcome::TooLarge if ids.len() > LEAST => most = ids.len().div_ceil(2),
-            Outcome::TooLong if ids.len() > MOST_OF_A_TILE as usize => most = MOST_OF_A_TILE as usize,
-            Outcome::TooLarge | Outcome::TooLong | Outcome::ThroughTheEye => return Ok(None),
+            Err(Reason::TooLarge) if ids.len() > LEAST => most = ids.len().div_ceil(2),
+            Err(Reason::TooLong) if ids.len() > MOST_OF_A_TILE as usize => most = MOST_OF_A_TILE as usize,
+            Err(reason) => return Ok(Err(reason)),
         }
     }
     *accumulator = begun;
-    Ok(Some(Chained { visible, raster, opaque: None, passes }))
+    Ok(Ok(Chained { visible, raster, opaque: None, passes }))
 }
 
 /// Counts of what goes through the same memory one after the other.

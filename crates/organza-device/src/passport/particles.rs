@@ -1,7 +1,7 @@
 //! Sets of particles by both: uploaded and made by the device, shown as they are and lit through a shadow map.
 
 use super::{Agreement, Failure, Found, LEAST_SHARE, SIZE, ShadowInput};
-use crate::device::particles::Folding;
+use crate::Folding;
 use pbsr::{
     Appearance, Ensemble, EnsembleParams, FoldParams, LitBy, MeshSampler, Object, Renderer, Scene, SurfaceParams,
     pixel_area,

@@ -1,8 +1,8 @@
-//! Splats splats projected, shaded, and from their attributes to the picture, by both.
+//! Splats projected, shaded, and from their attributes to the picture, by both.
 
 use super::composite::{accumulators, numbers};
 use super::{Failure, Found, SIZE};
-use crate::device::chain::{Splats, chain_on};
+use crate::chain::{Splats, chain_on};
 use hbsort::{Scratch, slice_cloud};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::gpu::{Attributes, project, words};
@@ -159,7 +159,7 @@ impl ChainInput {
                 castings: &[],
                 progress: &progress,
             };
-            let chained = chain_on(device, &splats, &mut found)?.ok_or(Failure::Small)?;
+            let chained = chain_on(device, &splats, &mut found)?.map_err(|reason| Failure::Left(reason.words()))?;
             let mut agreement = accumulators(&found, &expected);
             agreement.within &= chained.visible == self.projected.visible();
             Ok(Found { items: SPLATS.into(), agreement, passes: chained.passes })

@@ -3,8 +3,8 @@
 //! Half of the splats lie in a plane across the view, so that their depths differ by the rounding of products and sums
 //! alone: a driver that fuses what the processor rounds apart orders them otherwise.
 
-use super::Failure;
-use super::order::order_on;
+use crate::Failure;
+use hbsort::gpu::slice_cloud_on;
 use hbsort::{Params, Scratch, SliceOrder, slice_cloud};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::gpu::Attributes;
@@ -80,7 +80,7 @@ impl OrderInput {
     }
 
     pub(super) fn on(&self, device: &mut dyn Executor) -> Result<(SliceOrder, Vec<PassTime>), Failure> {
-        order_on(device, &self.cloud, &self.ids, &self.camera, &self.params)
+        Ok(slice_cloud_on(device, &self.cloud, &self.ids, &self.camera, &self.params)?)
     }
 
     pub(super) fn by_processor(&self) -> Result<SliceOrder, Failure> {

@@ -1,6 +1,6 @@
 //! Light on the particles that are seen: the processor's shadow maps, uploaded once and looked up on the device.
 
-use crate::device::Failure;
+use crate::Failure;
 use pbsr::gpu::{Capacities, Lighting, ShadowOf, is_shown, suits};
 use pbsr::{Ensemble, Scene};
 use splat_core::glam::DVec3;
@@ -8,7 +8,7 @@ use tsm::ShadowMap;
 use tsm::gpu::{ReceivedUploads, RecordedReceived, Room, record_received};
 
 /// A shadow map, and the world position that its casters are relative to.
-pub(crate) type Shadow<'a> = (&'a ShadowMap, DVec3);
+pub type Shadow<'a> = (&'a ShadowMap, DVec3);
 
 /// Why a scene's particles are the processor's; `None` when a device can fold them.
 pub(super) fn why_not(scene: &Scene<'_>, ensemble: &Ensemble, shadows: &[Shadow<'_>]) -> Option<&'static str> {

@@ -1,6 +1,6 @@
 //! Shadows that are made where the splats are: deposits, lists and look-ups of each light among the recordings of the chain.
 
-use crate::device::Failure;
+use crate::Failure;
 use splat_core::raster::gpu::{AttributeBuffers, Attributes};
 use splat_shaders::{Joined, Recording, Run};
 use tsm::gpu::{CastRoom, Casting, RecordedShadow, ShadowUploads, record_shadow};

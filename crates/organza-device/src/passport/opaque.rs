@@ -1,7 +1,7 @@
 //! Opaque splats resolved, by both.
 
 use super::{Agreement, Found, SIZE, composite::numbers};
-use crate::device::Failure;
+use crate::Failure;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::gpu::resolve::{Input, record};
 use splat_core::raster::{Detail, OpaqueImage, Params, Projected, project_into, resolve_opaque};

@@ -1,75 +1,24 @@
-//! Splats from their attributes to the picture on a device, with nothing read back between: ordered, projected, shaded, the
-//! opaque ones resolved and the translucent ones composited in front of them by one joined recording; where all that throws
-//! shadows is among them, their shadows are made there too.
-//!
-//! The stages know nothing of each other; the buffers that they have in common are named here. Splats that the device does not
-//! take all at once go through it in parts, ordered before.
+//! The recordings of the stages as one: which buffers they have in common, what is uploaded to them, and what is read back.
 
-mod parts;
-mod shadows;
-
-use super::Failure;
-use super::splats::{MOST_OF_A_TILE, raster_counts, room_for, too_long};
+use super::{Splats, shadows};
+use crate::Failure;
 use hbsort::gpu as order;
 use shadows::Shadow;
+use splat_core::raster::OpaqueImage;
 use splat_core::raster::gpu::{Attributes, Capacities, Counts, follow, project, record, resolve};
-use splat_core::raster::{OpaqueImage, Params, RasterCounts};
 use splat_core::shade::{ChannelLayout, ShadeInput, gpu as shade};
-use splat_core::{Accumulator, Error, FootprintStack, Progress};
-use splat_shaders::{BufferId, DeviceError, Executor, Joined, Lanes, PassTime, Recording, Run};
-use tsm::gpu::{CastRoom, Casting};
-
-/// Splats, and what becomes of them.
-#[derive(Clone, Copy)]
-pub(crate) struct Splats<'a> {
-    /// Splats, materials, lights and the camera.
-    pub(crate) input: &'a ShadeInput<'a>,
-    /// The translucent ones.
-    pub(crate) ids: &'a [u32],
-    /// The opaque ones; none where they are resolved.
-    pub(crate) solid: &'a [u32],
-    pub(crate) footprints: &'a FootprintStack,
-    pub(crate) layout: ChannelLayout,
-    /// The order must be exact.
-    pub(crate) sort: &'a hbsort::Params,
-    pub(crate) raster: &'a Params,
-    /// What hides translucent splats, where opaque ones are resolved.
-    pub(crate) opaque: &'a OpaqueImage,
-    /// For each light with a shadow what throws it, where all of that happens on the device; else none, and what the lights'
-    /// maps let through is uploaded.
-    pub(crate) castings: &'a [Casting],
-    pub(crate) progress: &'a Progress,
-}
-
-/// What a device did.
-pub(crate) struct Chained {
-    /// Splats that reach a pixel.
-    pub(crate) visible: u64,
-    pub(crate) raster: RasterCounts,
-    /// The opaque splats, where they were among those given.
-    pub(crate) opaque: Option<OpaqueImage>,
-    pub(crate) passes: Vec<PassTime>,
-}
-
-/// How it went with splats all at once.
-enum Outcome {
-    Done(Chained),
-    /// The device's buffers or its memory are too small.
-    TooLarge,
-    /// A tile has more splats than the driver goes through.
-    TooLong,
-    /// Discs reach through the eye plane.
-    ThroughTheEye,
-}
+use splat_core::{Accumulator, Error};
+use splat_shaders::{BufferId, Joined, Recording, Run};
+use tsm::gpu::CastRoom;
 
 /// The recordings of the stages as one.
-struct Whole {
-    recording: Recording,
+pub(super) struct Whole {
+    pub(super) recording: Recording,
     /// None where the splats are in order.
     sort: Option<order::Recorded>,
-    project: (project::Recorded, Joined),
+    pub(super) project: (project::Recorded, Joined),
     /// Of each light with a shadow.
-    shadows: Vec<Shadow>,
+    pub(super) shadows: Vec<Shadow>,
     shade: (shade::Recorded, Joined),
     /// None where there are no opaque splats, or they are resolved.
     resolve: Option<(resolve::Recorded, Joined)>,
@@ -77,13 +26,13 @@ struct Whole {
 }
 
 /// Room for all splats and for the opaque ones.
-struct Rooms {
-    all: Capacities,
-    solid: Option<resolve::Capacities>,
+pub(super) struct Rooms {
+    pub(super) all: Capacities,
+    pub(super) solid: Option<resolve::Capacities>,
 }
 
 impl Whole {
-    fn record(
+    pub(super) fn record(
         rooms: &Rooms,
         attributes: &Attributes,
         input: &ShadeInput<'_>,
@@ -142,124 +91,9 @@ impl Whole {
     }
 }
 
-/// [`Splats`] into an accumulator by a device, which changes only when all is done; `None` where it takes not even few of them,
-/// or not all at once with their shadows.
-pub(super) fn chain_on(
-    device: &mut dyn Executor,
-    splats: &Splats<'_>,
-    accumulator: &mut Accumulator,
-) -> Result<Option<Chained>, Failure> {
-    let n = splats.ids.len();
-    let most = match run_on(device, splats, true, room_for(n), accumulator)? {
-        Outcome::Done(done) => return Ok(Some(done)),
-        // In parts they would throw their shadows again and again.
-        _ if !splats.castings.is_empty() => return Ok(None),
-        // Surfaces there are composited by the processor.
-        Outcome::ThroughTheEye => return Ok(None),
-        Outcome::TooLarge => n.div_ceil(2),
-        Outcome::TooLong => MOST_OF_A_TILE as usize,
-    };
-    if splats.solid.is_empty() {
-        return parts::chain_in_parts(device, splats, most, accumulator);
-    }
-    // Opaque splats hide those of all parts.
-    let mut nothing = accumulator.clone();
-    let solid = Splats { ids: &[], ..*splats };
-    let Outcome::Done(Chained { visible, raster, opaque: Some(opaque), passes }) =
-        run_on(device, &solid, false, 0, &mut nothing)?
-    else {
-        return Ok(None);
-    };
-    let translucent = Splats { solid: &[], opaque: &opaque, ..*splats };
-    let Some(mut done) = parts::chain_in_parts(device, &translucent, most, accumulator)? else { return Ok(None) };
-    done.visible += visible;
-    parts::add(&mut done.raster, &raster);
-    done.passes.splice(..0, passes);
-    done.opaque = Some(opaque);
-    Ok(Some(done))
-}
-
-/// All splats at once, sorted by the device or in order as they are, with room for so many tile entries at first.
-fn run_on(
-    device: &mut dyn Executor,
-    splats: &Splats<'_>,
-    sorts: bool,
-    entries: u32,
-    accumulator: &mut Accumulator,
-) -> Result<Outcome, Failure> {
-    let all = [splats.ids, splats.solid].concat();
-    let attributes = Attributes::new(splats.input.cloud, Some(&all))?;
-    // No more than a kernel sees: whether that is enough the device says.
-    let most = u32::try_from(device.adapter().binding_bytes / 4).unwrap_or(u32::MAX);
-    let mut rooms = splats.rooms(&attributes, accumulator, entries, most);
-    let Some(mut casts) = shadows::rooms(splats.castings, &attributes, device.adapter().binding_bytes) else {
-        return Ok(Outcome::TooLarge);
-    };
-    let (mut looked_up, lanes) = (None, Lanes::of(device.adapter()));
-    loop {
-        let whole = Whole::record(&rooms, &attributes, splats.input, splats.layout, sorts, &casts)?;
-        let mut ready = match device.prepare(&whole.recording.by(lanes)) {
-            Err(DeviceError::TooLarge { .. } | DeviceError::Memory { .. }) => return Ok(Outcome::TooLarge),
-            ready => ready?,
-        };
-        let received = looked_up.take().unwrap_or_else(|| splats.received(&all));
-        if splats.progress.is_cancelled() {
-            return Err(Error::Cancelled.into());
-        }
-        let run = |inputs: &[(BufferId, &[u8])]| ready.run(inputs).map_err(Failure::from);
-        let run = whole.with_inputs(splats, &all, &attributes, &received, accumulator, run)?;
-        let (projected, joined) = &whole.project;
-        let projection = run.bytes(joined.of(projected.state));
-        if project::through_the_eye(projection)? > 0 {
-            return Ok(Outcome::ThroughTheEye);
-        }
-        let visible = project::visible(projection)?;
-        let had_room = shadows::had_room(&whole.shadows, &run, &mut casts)?;
-        // Too little room: found once, for the device says what it needs. Without all shadows it is another picture.
-        if !(whole.had_room(&run, &mut rooms)? && had_room) {
-            looked_up = Some(received);
-            continue;
-        }
-        let (counts, opaque) = whole.finish(&run, accumulator, |counts| too_long(device, counts))?;
-        let Some(counts) = counts else { return Ok(Outcome::TooLong) };
-        let raster = raster_counts(&counts, whole.recording.bytes());
-        return Ok(Outcome::Done(Chained { visible, raster, opaque, passes: run.passes }));
-    }
-}
-
-impl Splats<'_> {
-    /// What the maps of the lights let through to these splats, where it is uploaded.
-    fn received(&self, all: &[u32]) -> Vec<[f32; 3]> {
-        if self.castings.is_empty() { shade::received(self.input, all, self.progress) } else { Vec::new() }
-    }
-
-    /// Room for so many entries of translucent splats, and as many as opaque ones may have.
-    fn rooms(&self, attributes: &Attributes, accumulator: &Accumulator, entries: u32, most: u32) -> Rooms {
-        let (size, channels, splats) = (accumulator.size, accumulator.channels.len() as u32, attributes.room().splats);
-        let footprints = self.footprints.layers().len() as u32;
-        let (solid, objects) = (!self.solid.is_empty(), !accumulator.object.is_empty());
-        let all = Capacities {
-            size,
-            planes: accumulator.optical_depth.len() as u32,
-            channels,
-            splats,
-            ordered: self.ids.len() as u32,
-            entries: entries.min(most),
-            footprints,
-            materials: self.input.materials.len() as u32,
-            opaque: solid || !self.opaque.depth.is_empty(),
-            depths: !accumulator.depth.is_empty(),
-            objects,
-        };
-        let (listed, entries) = (self.solid.len() as u32, room_for(self.solid.len()).min(most));
-        let resolved = resolve::Capacities { size, channels, splats, listed, entries, footprints, objects };
-        Rooms { all, solid: solid.then_some(resolved) }
-    }
-}
-
 impl Whole {
     /// Whether all entries had room; those that had not get what they need.
-    fn had_room(&self, run: &Run, rooms: &mut Rooms) -> Result<bool, Failure> {
+    pub(super) fn had_room(&self, run: &Run, rooms: &mut Rooms) -> Result<bool, Failure> {
         let (composite, joined) = &self.composite;
         let mut had = grown(composite.counts(run.bytes(joined.of(composite.state))), &mut rooms.all.entries)?;
         if let (Some((resolved, joined)), Some(solid)) = (&self.resolve, &mut rooms.solid) {
@@ -269,7 +103,7 @@ impl Whole {
     }
 
     /// Takes what was read back, if nothing was `too_long` for the device, and gives counts of all splats.
-    fn finish(
+    pub(super) fn finish(
         &self,
         run: &Run,
         accumulator: &mut Accumulator,
@@ -293,7 +127,7 @@ impl Whole {
     }
 
     /// Hands the inputs of all stages to `run`.
-    fn with_inputs<T>(
+    pub(super) fn with_inputs<T>(
         &self,
         splats: &Splats<'_>,
         all: &[u32],

@@ -6,10 +6,9 @@ mod opaque;
 mod particles;
 mod shadow;
 
-use super::particles::Folding;
-use super::trial::OrderInput;
-use super::{Failure, backends, listed};
-use crate::Error;
+use crate::choice::{backends, listed};
+use crate::trial::OrderInput;
+use crate::{Error, Failure, Folding};
 use chain::ChainInput;
 use composite::CompositeInput;
 use opaque::OpaqueInput;
@@ -49,8 +48,8 @@ impl Passport {
 /// One recording on one device.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Checked {
-    /// `order`, `shadow lists`, `shadow look-ups`, `shadow` (deposits, lists and look-ups as one), `project`, `shade`,
-    /// `composite`, `draw` (the same by the device's rasterizer, where it blends 32-bit floats), `opaque`, `chain` (the order,
+    /// `order`, `shadow lists`, `shadow` (deposits, lists and look-ups as one), `project`, `shade`,
+    /// `composite`, `opaque`, `chain` (the order,
     /// `project`, `shade` and `composite` as one), `particles` (uploaded sets), `made particles` (sets of the same seeds that the
     /// device makes) or `lit particles` (the same in the light of a lamp with a shadow map).
     pub recording: &'static str,
@@ -65,7 +64,7 @@ pub struct Checked {
 /// What a device found against what the processor found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreement {
-    /// Whether that is enough: equal bits for the order and the lists of shadow maps, 10⁻⁵ for look-ups in them and for what
+    /// Whether that is enough: equal bits for the order and the lists of shadow maps, 10⁻⁵ for what
     /// is made of splats, 10⁻⁴ for 99.9 % of the splats lit through maps that stay on the device, 10⁻⁵ for 99.9 % of the
     /// pixels of opaque splats, 99.9 % of the pixels' hits for particles, and where they agree 3·10⁻⁵ of the brightest light, but
     /// for 0.1 % of the pixels.
@@ -94,11 +93,11 @@ pub struct KernelTime {
 /// Runs every recording on generated input on every device whose name contains `name`, software drivers included.
 ///
 /// # Errors
-/// [`Error::Gpu`] when a driver fails to say what there is.
+/// When a driver fails to say what there is.
 pub fn passport(name: &str) -> Result<Vec<Passport>, Error> {
     let input = Inputs {
         order: OrderInput::new(SPLATS),
-        shadow: ShadowInput::new().map_err(|e| Error::Internal(e.to_string()))?,
+        shadow: ShadowInput::new(),
         composite: CompositeInput::new(),
         opaque: OpaqueInput::new(),
         chain: ChainInput::new(),
@@ -143,29 +142,24 @@ fn inspect(backend: &dyn Backend, place: usize, adapter: Adapter, input: &Inputs
             Err(why) => Checked { recording, items: 0, outcome: Err(why.to_string()), passes: Vec::new() },
         }
     };
-    let draws = adapter.drawing.targets > 1 && adapter.drawing.blends_single;
-    let mut recordings = vec![
+    let recordings = vec![
         check("order", &mut |device| check_order(device, &input.order)),
         check("shadow lists", &mut |device| input.shadow.check_lists(device)),
-        check("shadow look-ups", &mut |device| input.shadow.check_look_ups(device)),
         check("shadow", &mut |device| input.shadow.check_shadow(device)),
         check("project", &mut |device| input.chain.check_project(device)),
         check("shade", &mut |device| input.chain.check_shade(device)),
         check("composite", &mut |device| input.composite.check(device)),
-        check("draw", &mut |device| input.composite.check_drawn(device)),
         check("opaque", &mut |device| input.opaque.check(device)),
         check("chain", &mut |device| input.chain.check_chain(device)),
         check("particles", &mut |device| input.particles.check(device, Folding::uploaded())),
         check("made particles", &mut |device| input.particles.check(device, Folding::default())),
         check("lit particles", &mut |device| input.particles.check_lit(device, &input.shadow)),
     ];
-    recordings.retain(|r| draws || r.recording != "draw");
     let clockless = recordings.iter().all(|r| r.outcome.is_ok() && r.passes.is_empty());
     let missing = [
         (clockless, "timestamps"),
         (adapter.subgroup == 0, "the size of a subgroup"),
         (Lanes::of(&adapter) == Lanes::Portable, "operations of subgroups"),
-        (!draws, "draws that blend 32-bit floats"),
     ];
     let missing = missing.into_iter().filter(|(lacks, _)| *lacks).map(|(_, what)| what).collect();
     Passport { backend: backend.name(), adapter, missing, recordings }

@@ -9,9 +9,9 @@
 
 mod lit;
 
-use super::Failure;
+use crate::{Failure, Helper};
 use lit::Light;
-pub(crate) use lit::Shadow;
+pub use lit::Shadow;
 use pbsr::gpu::{Capacities, Generated, Nearest, Recorded, Sources, record, record_generated};
 use pbsr::{Ensemble, Error, Scene};
 use splat_core::Progress;
@@ -21,10 +21,13 @@ use splat_shaders::{BufferId, Executor, Lanes, PassTime, Ready};
 const MOST_LEVELS: u32 = 16;
 /// Bytes of a particle on the device.
 const PARTICLE_BYTES: u64 = 28;
+/// Said of particles that a device does not make.
+const UPLOADED: &str = "particles by random lines, walks and fields, and of tables too large for the device, are sampled by \
+                        the processor";
 
 /// How a device folds the sets of one scene, kept from step to step, and what it did.
 #[derive(Default)]
-pub(crate) struct Folding<'a> {
+pub struct Folding<'a> {
     /// Of the lights with a shadow map, in their order.
     shadows: Vec<Shadow<'a>>,
     /// The tables of the samplers, once they were asked for; `None` inside where sets are uploaded.
@@ -34,35 +37,61 @@ pub(crate) struct Folding<'a> {
     /// Particles that there is room for in a set; more than was expected where that was too few.
     of_set: Option<u32>,
     /// Particles of all runs.
-    pub(super) particles: u64,
+    pub(crate) particles: u64,
     /// The dispatches of all runs.
-    pub(super) passes: Vec<PassTime>,
+    pub(crate) passes: Vec<PassTime>,
 }
 
 impl<'a> Folding<'a> {
     /// In the light that these maps let through: those of the scene's lights, in their order.
-    pub(crate) fn new(shadows: Vec<Shadow<'a>>) -> Self {
+    pub fn new(shadows: Vec<Shadow<'a>>) -> Self {
         Self { shadows, ..Self::default() }
     }
 
-    /// Why a scene's particles are the processor's; `None` when a device can fold them.
-    pub(super) fn why_not(&self, scene: &Scene<'_>, ensemble: &Ensemble) -> Option<&'static str> {
-        lit::why_not(scene, ensemble, &self.shadows)
+    /// Folds sets of particles until the ensemble has `until` of them, or as many as the device can; the rest is the
+    /// processor's. At most `max_bytes` of particles lie on the device at once. Gives the number of particles.
+    ///
+    /// # Errors
+    /// When `progress` is cancelled; what was folded before stays in the ensemble.
+    pub fn fold(
+        &mut self,
+        helper: &Helper<'_>,
+        scene: &Scene<'_>,
+        ensemble: &mut Ensemble,
+        until: u32,
+        max_bytes: u64,
+        progress: &Progress,
+    ) -> Result<u64, Error> {
+        if let Some(why) = lit::why_not(scene, ensemble, &self.shadows) {
+            helper.leave(why);
+            return Ok(0);
+        }
+        let before = self.particles;
+        let folded = helper.with(|device| match self.fold_on(device, scene, ensemble, until, max_bytes, progress) {
+            Err(Failure::Particles(e @ Error::Core(splat_core::Error::Cancelled))) => Ok(Err(e)),
+            left => left.map(Ok),
+        });
+        match folded {
+            Some(Ok(Some(why))) => helper.leave(why),
+            _ if self.uploads() => helper.leave(UPLOADED),
+            _ => {}
+        }
+        folded.unwrap_or(Ok(None)).map(|_| self.particles - before)
     }
 
     /// Sets that the processor samples, whether or not the device could make them.
-    pub(super) fn uploaded() -> Self {
+    pub(crate) fn uploaded() -> Self {
         Self { sources: Some(None), ..Self::default() }
     }
 
     /// Whether the processor samples some of the particles.
-    pub(super) fn uploads(&self) -> bool {
+    fn uploads(&self) -> bool {
         self.sources.as_ref().is_some_and(|sources| sources.as_ref().is_none_or(Sources::has_given))
     }
 
     /// Folds sets until the ensemble has `until` of them, with at most so many bytes of particles at once, or says why the rest
     /// is the processor's. What was folded before a failure stays in.
-    pub(super) fn fold_on(
+    pub(crate) fn fold_on(
         &mut self,
         device: &mut dyn Executor,
         scene: &Scene<'_>,
@@ -71,7 +100,7 @@ impl<'a> Folding<'a> {
         max_bytes: u64,
         progress: &Progress,
     ) -> Result<Option<&'static str>, Failure> {
-        let folded = self.fold(device, scene, ensemble, until, max_bytes, progress);
+        let folded = self.fold_sets(device, scene, ensemble, until, max_bytes, progress);
         if folded.is_err() {
             // They belong to a device that may be gone.
             (self.making, self.uploading) = (None, None);
@@ -79,7 +108,7 @@ impl<'a> Folding<'a> {
         folded
     }
 
-    fn fold(
+    fn fold_sets(
         &mut self,
         device: &mut dyn Executor,
         scene: &Scene<'_>,

@@ -1,18 +1,18 @@
 //! Ordered splats of a medium composited by both.
 
 use super::{Agreement, Failure, Found, SIZE};
-use crate::device::splats::composite_on;
 use splat_core::glam::DVec3;
-use splat_core::raster::gpu::Input;
-use splat_core::raster::gpu::draw::{self, Precision};
+use splat_core::raster::gpu::{Input, record};
 use splat_core::raster::{OpaqueImage, Params, fold, project};
 use splat_core::{
     Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Progress, Projection, Splat, SplatKind, rng,
 };
-use splat_shaders::{Executor, PassTime};
+use splat_shaders::Executor;
 
 /// Splats that are composited.
 const SPLATS: u32 = 1 << 14;
+/// Pairs of a splat and a tile, more than there are.
+const ENTRIES: u32 = 1 << 19;
 /// The key of their random numbers.
 const SEED: u64 = 0x434f_4d50;
 /// What transmittances, and channels of values up to 1, may differ by.
@@ -43,26 +43,7 @@ impl CompositeInput {
         Self { cloud, camera, values: (0..3 * u64::from(SPLATS)).map(|i| number(i, 6)).collect() }
     }
 
-    /// By tiles, as pictures are made.
     pub(super) fn check(&self, device: &mut dyn Executor) -> Result<Found, Failure> {
-        self.check_by(|input, found| Ok(composite_on(device, input, found)?.ok_or(Failure::Small)?.1))
-    }
-
-    /// By the device's rasterizer.
-    pub(super) fn check_drawn(&self, device: &mut dyn Executor) -> Result<Found, Failure> {
-        self.check_by(|input, found| {
-            let recorded = draw::record(input.capacities(found, 0), Precision::Single)?;
-            let uploads = recorded.uploads(input, found)?;
-            let run = device.run(&recorded.recording, &recorded.inputs(&uploads))?;
-            recorded.finish([recorded.state, recorded.planes].map(|buffer| run.bytes(buffer)), found)?;
-            Ok(run.passes)
-        })
-    }
-
-    fn check_by(
-        &self,
-        composite: impl FnOnce(&Input<'_>, &mut Accumulator) -> Result<Vec<PassTime>, Failure>,
-    ) -> Result<Found, Failure> {
         let (params, materials, opaque) = (Params::default(), [Material::default()], OpaqueImage::default());
         let projected = project(&self.cloud, &self.camera, &FootprintStack::default(), &materials, &params);
         let order: Vec<u32> = (0..SPLATS).collect();
@@ -79,8 +60,11 @@ impl CompositeInput {
             direction,
             params: &params,
         };
-        let passes = composite(&input, &mut found)?;
-        Ok(Found { items: SPLATS.into(), agreement: accumulators(&found, &expected), passes })
+        let recorded = record(input.capacities(&found, ENTRIES))?;
+        let uploads = recorded.uploads(&input, &found)?;
+        let run = device.run(&recorded.recording, &recorded.inputs(&uploads))?;
+        recorded.finish([recorded.state, recorded.planes].map(|buffer| run.bytes(buffer)), &mut found)?;
+        Ok(Found { items: SPLATS.into(), agreement: accumulators(&found, &expected), passes: run.passes })
     }
 }
 

@@ -1,0 +1,125 @@
+//! The splats of a picture wholly by a device, where it composites and there is nothing that only the processor does. Where the
+//! device can, shadow maps are made there and stay there.
+
+use super::{Points, sort_params};
+use crate::Error;
+use crate::device::{Helper, keeps_shadows};
+use crate::pass;
+use crate::scene::Technique;
+use crate::shadows::shadow_error;
+use splat_core::raster::Accumulation;
+use splat_core::shade::{LitBy, gpu::suits};
+use splat_core::{Accumulator, CostRecord, Receiver, Transmittance};
+use tsm::gpu::Casting;
+
+/// Stands for a map that lies on the device alone: its light is looked up there.
+struct OnDevice;
+
+impl Transmittance for OnDevice {
+    fn transmittance(&self, _: &Receiver) -> [f32; 3] {
+        [1.0; 3]
+    }
+}
+
+impl Points<'_> {
+    /// All of it, from attributes to the picture; whether that was done. Where it was not, one line says why.
+    pub(super) fn by_device(&self, into: &mut Accumulator, cost: &mut CostRecord) -> Result<bool, Error> {
+        let frame = self.frame;
+        let Some(helper) = frame.helper.filter(|_| frame.device_composites) else { return Ok(false) };
+        if let Some(why) = self.why_not() {
+            helper.leave(why);
+            return Ok(false);
+        }
+        if frame.loaded.cloud.is_empty() {
+            return Ok(false);
+        }
+        let mut stages = CostRecord::default();
+        if let Some(castings) = self.castings(helper, &mut stages)?
+            && self.chained(helper, (&self.lit_on_device(), &castings), stages, into, cost)?
+        {
+            return Ok(true);
+        }
+        let maps = frame.maps(cost)?;
+        if !frame.suits(helper, maps) {
+            return Ok(false);
+        }
+        frame.tick()?;
+        self.chained(helper, (&frame.lit_by(maps), &[]), CostRecord::default(), into, cost)
+    }
+
+    /// What about the picture only the processor does.
+    fn why_not(&self) -> Option<&'static str> {
+        let points = &self.frame.settings.points;
+        // Depths are made from splats in order, not from slices.
+        if !(points.exact || self.frame.layers.depth) {
+            Some("slices without order inside (render.points.exact = false) are made and composited by the processor")
+        } else if points.first_slices.is_some() {
+            Some("the first slices alone (render.points.first_slices) are composited by the processor")
+        } else if points.accumulation != Accumulation::F32 {
+            Some("splats are composited in half precision by the processor")
+        } else {
+            None
+        }
+    }
+
+    /// The lights that have an intensity, those with a shadow map lit through what the device makes.
+    fn lit_on_device(&self) -> Vec<LitBy<'_>> {
+        let shadow = |wanted: &bool| wanted.then_some(&OnDevice as &dyn Transmittance);
+        let with_shadow = self.frame.with_light(self.frame.plan.shadow_maps.iter().map(shadow));
+        with_shadow.map(|(light, shadow)| LitBy { light, shadow }).collect()
+    }
+
+    /// What throws the shadow of each light that has one, or `None` where no light has, and where a device does not make all of
+    /// them.
+    fn castings(&self, helper: &Helper<'_>, cost: &mut CostRecord) -> Result<Option<Vec<Casting>>, Error> {
+        let (frame, l) = (self.frame, self.frame.loaded);
+        if !frame.plan.shadow_maps.contains(&true) {
+            return Ok(None);
+        }
+        // In the light of finished maps it is said why, if shading does not suit.
+        if suits(&frame.shading(&self.lit_on_device())).is_err() || !keeps_shadows(helper) {
+            return Ok(None);
+        }
+        let mut castings = Vec::new();
+        for (i, (light, table)) in l.lights.iter().zip(&frame.plan.shadow_tables).enumerate() {
+            let Some(table) = table.filter(|_| light.intensity != [0.0; 3]) else { continue };
+            let params = table.params(frame.settings, l, frame.plan.shadow_bytes);
+            frame.tick()?;
+            let made = cost.measure(pass::SHADOW_MAP, |stage| {
+                stage.items_in = l.cloud.len() as u64;
+                let casting = Casting::new(&l.cloud, &l.materials, &l.objects, light, &params, frame.progress);
+                stage.items_out = casting.as_ref().map_or(0, |casting| casting.casters() + casting.given());
+                casting
+            });
+            match made {
+                Ok(casting) => castings.push(casting),
+                Err(tsm::Error::Processor { why }) => {
+                    helper.leave(why);
+                    return Ok(None);
+                }
+                Err(e) => return Err(shadow_error(i, &e)),
+            }
+        }
+        Ok(Some(castings))
+    }
+
+    /// All splats; of the stages before, and of these, the cost counts where the device did it.
+    fn chained(
+        &self,
+        helper: &Helper<'_>,
+        lit: (&[LitBy<'_>], &[Casting]),
+        mut stages: CostRecord,
+        into: &mut Accumulator,
+        cost: &mut CostRecord,
+    ) -> Result<bool, Error> {
+        let frame = self.frame;
+        let (ids, solid) = (frame.translucent(frame.drawn(), Technique::Points), frame.solid_ids());
+        let sort = sort_params(frame);
+        let done = stages.measure(pass::SPLAT, |stage| frame.chain(helper, lit, [&ids, &solid], &sort, into, stage))?;
+        let Some(opaque) = done else { return Ok(false) };
+        cost.stages.extend(stages.stages);
+        frame.set_opaque(opaque);
+        frame.tick()?;
+        Ok(true)
+    }
+}
