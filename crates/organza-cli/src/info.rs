@@ -1,10 +1,13 @@
 //! `organza info`.
 
+mod contents;
+
 use super::args::InfoArguments;
 use super::session::path_text;
 use super::{console, memory};
+use contents::{FileInfo, contents};
 use organza::scene::{self, LightSource, LoadOptions, Scene, SceneLight, Source};
-use organza::{Error, FileInfo, escape_controls};
+use organza::{Error, escape_controls};
 use serde_json::{Value, json};
 use splat_core::LightShape;
 
@@ -16,7 +19,7 @@ pub(super) fn run(arguments: &InfoArguments) -> Result<(), Error> {
         let options = LoadOptions { allow_path: arguments.allow_path, ..LoadOptions::default() };
         scene_document(&scene::load(&arguments.file, &options)?)
     } else {
-        let info = organza::info(&arguments.file, memory::default_limit(), arguments.strict)?;
+        let info = contents(&arguments.file, memory::default_limit(), arguments.strict)?;
         info.mended.iter().for_each(|line| console::warn(line));
         file_document(&info)
     };

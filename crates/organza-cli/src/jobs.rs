@@ -3,7 +3,7 @@
 
 use super::args::{Frames, RenderArguments};
 use super::session::{parse_scene, read_scene};
-use organza::output::{Format, Target, Targets};
+use organza::output::{self, Format, Target, Targets};
 use organza::scene::Scene;
 use organza::{Error, Sequence, printable};
 use std::borrow::Cow;
@@ -79,7 +79,7 @@ impl<'a> Jobs<'a> {
     pub(super) fn places(
         &self,
         frame: Option<u32>,
-        mut target: impl FnMut(&Path, bool) -> Result<Target, Error>,
+        mut target: impl FnMut(&Path, bool) -> Result<Target, output::Error>,
     ) -> Result<Places, Error> {
         let last = self.frames.map_or(0, |[_, last]| last);
         let name = |path: &PathBuf| frame.map_or(path.clone(), |frame| numbered(path, frame, digits(last)));

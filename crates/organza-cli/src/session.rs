@@ -2,8 +2,8 @@
 
 use super::args::{Backend, SceneArguments};
 use super::memory;
-use organza::scene::{self, LoadOptions, Override, Scene};
 use organza::device::{Choice, Device, DeviceChoice};
+use organza::scene::{self, LoadOptions, Override, Scene};
 use organza::{Error, RenderOptions, printable};
 use std::path::Path;
 use std::sync::Arc;

@@ -250,4 +250,3 @@ impl Splats<'_> {
         Rooms { all, solid: solid.then_some(resolved) }
     }
 }
-

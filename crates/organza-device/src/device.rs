@@ -152,8 +152,8 @@ mod tests {
     use super::*;
     use crate::order;
     use hbsort::Params;
-    use splat_core::{Camera, Cloud, Projection};
     use splat_core::glam::DVec3;
+    use splat_core::{Camera, Cloud, Projection};
     use splat_shaders::{Adapter, AdapterKind, Ready, Recording, SubgroupOps};
     use std::sync::atomic::{AtomicU32, Ordering};
 

@@ -216,6 +216,20 @@ impl Error {
     }
 }
 
+/// An error of an output, variant by variant.
+impl From<organza_output::Error> for Error {
+    fn from(error: organza_output::Error) -> Self {
+        use organza_output::Error as Output;
+        match error {
+            Output::Usage { message, hint } => Self::Usage { message, hint },
+            Output::Io { path, action, source } => Self::Io { path, action, source },
+            Output::Output { path, message, hint } => Self::Output { path, message, hint },
+            Output::Internal(message) => Self::Internal(message),
+            other => Self::Internal(other.to_string()),
+        }
+    }
+}
+
 impl From<organza_device::Error> for Error {
     fn from(error: organza_device::Error) -> Self {
         let hint = "`organza devices` lists what there is; --backend cpu needs none".into();

@@ -9,7 +9,7 @@ const HOUSE: &str = "crates/organza/src/";
 /// The modules of each floor, from the ground up.
 const FLOORS: [&[&str]; 13] = [
     &["error", "form", "pass", "stage"],
-    &["info", "output", "statistics"],
+    &["statistics"],
     &["options", "work"],
     &["load"],
     &["memory", "shadows"],

@@ -119,5 +119,5 @@ impl Report {
 /// As [`Target::write`], and [`Error::Internal`] if a picture cannot be encoded.
 pub fn write(report: &Report, targets: &[Target; 3]) -> Result<(), Error> {
     let contents = [report.json(), report.csv(), report.html()?];
-    targets.iter().zip(contents).try_for_each(|(target, text)| target.write(text.as_bytes()))
+    Ok(targets.iter().zip(contents).try_for_each(|(target, text)| target.write(text.as_bytes()))?)
 }

@@ -253,5 +253,5 @@ fn seeds(o: &Ordered) -> String {
 pub fn write(report: &OrdersReport, targets: &[Target; 4]) -> Result<(), Error> {
     let contents =
         [report.json().into_bytes(), report.csv().into_bytes(), report.html()?.into_bytes(), report.contact_sheet()?];
-    targets.iter().zip(contents).try_for_each(|(target, bytes)| target.write(&bytes))
+    Ok(targets.iter().zip(contents).try_for_each(|(target, bytes)| target.write(&bytes))?)
 }

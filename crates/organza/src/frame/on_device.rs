@@ -68,7 +68,9 @@ impl Frame<'_> {
             castings,
             progress: self.progress,
         };
-        let Some(done) = device::chain(helper, &splats, accumulator).map_err(|_| Error::Cancelled)? else { return Ok(None) };
+        let Some(done) = device::chain(helper, &splats, accumulator).map_err(|_| Error::Cancelled)? else {
+            return Ok(None);
+        };
         record(stage, &done.raster);
         stage.items_in = (ids.len() + solid.len()) as u64;
         Ok(Some(done.opaque.unwrap_or_default()))

@@ -128,8 +128,7 @@ fn composite(
     cost.measure(pass::SPLAT, |stage| {
         stage.items_in = ids.len() as u64;
         let (materials, params) = (&frame.loaded.materials, frame.raster_params());
-        let counts =
-            raster::fold(projected, ids, values, materials, opaque, direction, &params, into, frame.progress);
+        let counts = raster::fold(projected, ids, values, materials, opaque, direction, &params, into, frame.progress);
         record(stage, &counts);
         Ok::<_, Error>(())
     })?;

@@ -24,7 +24,7 @@ pub(super) fn encode(layers: &Layers, metadata: &Metadata, report: &mut WriteRep
 }
 
 /// Linear radiance → sRGB (IEC 61966-2-1) in 8 bits; NaN gives 0.
-pub(crate) fn displayed(linear: f32) -> u8 {
+pub fn displayed(linear: f32) -> u8 {
     // Before the curve: its power is undefined below 0. NaN.max(0) is 0, where NaN.clamp would stay NaN.
     let x = linear.max(0.0).clamp(0.0, 1.0);
     let encoded = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * libm::powf(x, 1.0 / 2.4) - 0.055 };

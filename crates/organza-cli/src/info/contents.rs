@@ -1,35 +1,35 @@
 //! What is in a data file, without a scene.
 
-use crate::Error;
 use convert::RawPoints;
 use convert::read::{Loaded, Mended, ReadLimits, UpAxis, up_axis};
-use glam::{DVec3, Vec3};
+use organza::Error;
+use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Aabb, Grid, Mesh, Progress};
 use std::path::Path;
 
 /// What a data file holds.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct FileInfo {
+pub(super) struct FileInfo {
     /// `mesh`, `volume` or `points`.
-    pub kind: &'static str,
+    pub(super) kind: &'static str,
     /// Length of the file.
-    pub bytes: u64,
+    pub(super) bytes: u64,
     /// How many there are of what: `vertices`, `triangles`, `points`, or `x`, `y`, `z` of a volume's lattice.
-    pub counts: Vec<(&'static str, u64)>,
+    pub(super) counts: Vec<(&'static str, u64)>,
     /// Attributes beside positions: `normal`, `color`, `value`, `classification`.
-    pub attributes: Vec<&'static str>,
+    pub(super) attributes: Vec<&'static str>,
     /// Lowest and highest corner in the file's own coordinates; `None` for an empty file.
-    pub bounds: Option<[DVec3; 2]>,
+    pub(super) bounds: Option<[DVec3; 2]>,
     /// Lowest and highest value of a volume.
-    pub range: Option<[f32; 2]>,
+    pub(super) range: Option<[f32; 2]>,
     /// Columns, fields and statements of the file that are not used, as the file names them.
-    pub unused: Vec<String>,
+    pub(super) unused: Vec<String>,
     /// What was made of the data, one sentence each.
-    pub remarks: Vec<String>,
+    pub(super) remarks: Vec<String>,
     /// What was mended in the file or left out of it, one sentence a kind of fault.
-    pub mended: Vec<String>,
+    pub(super) mended: Vec<String>,
     /// The axis that points up where a scene says `up = "auto"`.
-    pub up: UpAxis,
+    pub(super) up: UpAxis,
 }
 
 /// Reads a data file of at most `max_bytes` and describes it; `strict` refuses a file with a fault that could be mended.
@@ -37,7 +37,7 @@ pub struct FileInfo {
 /// # Errors
 /// [`Error::Io`] for the file system, [`Error::Input`] for a file that is not what its name says, [`Error::Limit`] for
 /// one that would take more than `max_bytes`.
-pub fn info(path: &Path, max_bytes: u64, strict: bool) -> Result<FileInfo, Error> {
+pub(super) fn contents(path: &Path, max_bytes: u64, strict: bool) -> Result<FileInfo, Error> {
     let limits = ReadLimits { max_bytes, strict, ..ReadLimits::default() };
     let read = convert::read::file_with_notes(path, &limits, &Progress::new());
     let (data, notes) = read.map_err(|e| Error::from_read(path, &e))?;
@@ -111,7 +111,7 @@ fn of_grid(grid: &Grid) -> FileInfo {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::DMat3;
+    use splat_core::glam::DMat3;
 
     #[test]
     fn a_mirrored_volume_has_ordered_bounds() {

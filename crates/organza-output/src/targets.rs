@@ -30,7 +30,7 @@ impl Targets {
     /// Checks a further output: its folder can be written to, nothing is there yet unless `replace`, and then a regular file.
     ///
     /// # Errors
-    /// [`Error::Output`] or [`Error::Io`], exit code 4.
+    /// [`Error::Output`] or [`Error::Io`].
     pub fn add(&mut self, path: &Path, replace: bool) -> Result<Target, Error> {
         let refuse = |message: &str| {
             let hint = "choose another name".into();

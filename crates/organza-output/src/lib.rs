@@ -1,15 +1,35 @@
-//! Finished images → files, whole or not at all.
+//! Finished images as OpenEXR and PNG files, whole or not at all.
+//!
+//! A [`Target`] is checked before any work: it is no input, no other output spelled in a second way, and nothing that may not be
+//! replaced. [`write`] makes the file in memory and gives it its name last.
+//!
+//! ```
+//! use organza_output::{Metadata, Target, write};
+//! use splat_core::{LayerData, Layers};
+//!
+//! let mut layers = Layers { size: [2, 1], ..Layers::default() };
+//! layers.insert("beauty", LayerData::Rgb(vec![[0.0, 0.5, 1.0]; 2]));
+//! layers.insert("alpha", LayerData::Scalar(vec![1.0; 2]));
+//! let folder = tempfile::tempdir().unwrap();
+//! let target = Target::new(&folder.path().join("two.exr"), false).unwrap();
+//! let report = write(&layers, &Metadata::default(), &target, false).unwrap();
+//! assert_eq!(report.bytes, std::fs::metadata(target.path()).unwrap().len());
+//! // It is there now, and is not replaced unasked.
+//! assert!(Target::new(target.path(), false).is_err());
+//! ```
+#![forbid(unsafe_code)]
 
+mod error;
 mod exr_file;
 mod png_file;
 mod target;
 mod targets;
 
-pub(crate) use png_file::displayed;
+pub use error::Error;
+pub use png_file::displayed;
 pub use target::{Target, abandon};
 pub use targets::Targets;
 
-use crate::Error;
 use splat_core::Layers;
 use std::path::Path;
 
@@ -62,8 +82,8 @@ impl Format {
         } else if extension.eq_ignore_ascii_case("png") {
             Ok(Self::Png)
         } else {
-            let message = format!("{}: expected a name that ends in .exr or .png", crate::printable(path));
-            Err(Error::usage(message, "the format follows from the extension"))
+            let message = format!("{}: expected a name that ends in .exr or .png", organza_scene::printable(path));
+            Err(Error::Usage { message, hint: "the format follows from the extension".into() })
         }
     }
 }

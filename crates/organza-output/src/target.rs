@@ -25,7 +25,7 @@ impl Target {
     /// Follows `path` to its place. Nothing may be there yet, unless `replace`; then it must be a regular file.
     ///
     /// # Errors
-    /// [`Error::Output`] or [`Error::Io`], exit code 4.
+    /// [`Error::Output`] or [`Error::Io`].
     pub fn new(path: &Path, replace: bool) -> Result<Self, Error> {
         Self::resolve(path, replace)?.unless_taken()
     }

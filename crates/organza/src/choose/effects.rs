@@ -1,0 +1,220 @@
+//! The effects that a scene calls for, each with its reason and the bound of what it could change, and the passes that simulate
+//! them.
+
+use super::row;
+use crate::pass;
+use crate::plan::{Effect, Plan, PlannedPass};
+use crate::scene::Technique;
+use crate::shadows::CUT_SHARE;
+use crate::statistics::{LightStatistics, Statistics};
+use crate::technique::Row;
+
+/// Chooses effects and passes.
+pub(crate) fn plan(statistics: &Statistics) -> Plan {
+    let rows: Vec<&Row> = statistics.techniques.iter().map(|t| row(*t)).collect();
+    let names: Vec<&str> = rows.iter().map(|row| row.technique.name()).collect();
+    let mut plan =
+        Plan { technique: names.join(" and "), techniques: statistics.techniques.clone(), ..Plan::default() };
+    // What ends lists of shadow maps takes the rest.
+    let tolerance = statistics.tolerance * (1.0 - CUT_SHARE);
+    let mut skipped = 0.0;
+    for (i, light) in statistics.lights.iter().enumerate() {
+        let effect = shadow_effect(i, light, statistics, tolerance - skipped);
+        if !effect.called_for {
+            skipped += effect.bound;
+        }
+        plan.shadow_maps.push(effect.called_for);
+        plan.effects.push(effect);
+    }
+    plan.effects.push(colored_extinction(statistics));
+    plan.effects.push(normals(statistics));
+    plan.effects.push(translucency(statistics));
+    plan.effects.push(opaque_surfaces(statistics));
+    plan.effects.push(kept_layers(statistics));
+    plan.objects = statistics.planned.clone();
+    plan.optical_depth_planes = if statistics.colored_extinction { 3 } else { 1 };
+    plan.passes = passes(statistics, &plan.shadow_maps);
+    plan
+}
+
+fn effect(name: impl Into<String>, called_for: bool, reason: impl Into<String>) -> Effect {
+    Effect { name: name.into(), called_for, reason: reason.into(), bound: 0.0 }
+}
+
+fn shadow_effect(i: usize, light: &LightStatistics, statistics: &Statistics, allowance: f64) -> Effect {
+    let name = format!("shadow of light {i}");
+    if !light.wants_shadow {
+        return effect(name, false, "the light has shadow = false");
+    }
+    if light.is_dark {
+        return effect(name, false, "the light has no intensity");
+    }
+    if statistics.receivers == 0 {
+        return effect(name, false, "nothing can receive it: no lit splat with a shadow coefficient");
+    }
+    if statistics.casters == 0 {
+        return effect(name, false, "nothing can cast it");
+    }
+    // A displayed pixel is at most 1, so what a shadow can take away is at most its opacity.
+    let bound = if statistics.opaque_casters > 0 { 1.0 } else { -libm::expm1(-statistics.caster_optical_depth) };
+    let called_for = bound > allowance;
+    let reason = if called_for {
+        format!("{} splats cast and {} receive it", statistics.casters, statistics.receivers)
+    } else {
+        format!("no ray could lose more than {bound:.1e} of its light")
+    };
+    Effect { name, called_for, reason, bound }
+}
+
+fn colored_extinction(statistics: &Statistics) -> Effect {
+    const UNEQUAL: &str = "some material absorbs red, green and blue unequally";
+    if statistics.colored_extinction {
+        let how: Vec<&str> = statistics.techniques.iter().filter_map(|t| row(*t).by_channel).collect();
+        let how = how.iter().map(|how| format!(": {how}")).collect::<String>();
+        effect("transmittance per channel", true, format!("{UNEQUAL}{how}"))
+    } else {
+        effect("transmittance per channel", false, "all materials absorb red, green and blue alike")
+    }
+}
+
+fn normals(statistics: &Statistics) -> Effect {
+    if statistics.normals_needed {
+        effect("normals of volumes", true, "a light shades a volume by its gradient, or the layer was asked for")
+    } else {
+        effect("normals of volumes", false, "no volume is shaded by its gradient, and none is asked for")
+    }
+}
+
+fn translucency(statistics: &Statistics) -> Effect {
+    let some = |t: &Technique| Some(format!("{} {}", statistics.translucent_of(*t)?, row(*t).how));
+    let all: Vec<String> = statistics.techniques.iter().filter_map(some).collect();
+    if all.is_empty() {
+        return effect("translucency", false, "nothing is translucent: nothing to sort");
+    }
+    effect("translucency", true, all.join("; "))
+}
+
+fn opaque_surfaces(statistics: &Statistics) -> Effect {
+    let n = statistics.opaque;
+    if n > 0 {
+        effect("opaque surfaces", true, format!("{n} opaque splats hide what lies behind"))
+    } else {
+        effect("opaque surfaces", false, "no splat is opaque")
+    }
+}
+
+fn kept_layers(statistics: &Statistics) -> Effect {
+    if statistics.layers.is_empty() {
+        effect("extra layers", false, "no layer beside beauty and alpha was asked for")
+    } else {
+        effect("extra layers", true, format!("asked for: {}", statistics.layers.join(", ")))
+    }
+}
+
+fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<PlannedPass> {
+    let opaque = statistics.opaque;
+    let rows = || statistics.techniques.iter().map(|t| (row(*t), statistics.translucent_of(*t)));
+    let mut passes = Vec::new();
+    let mut pass = |name: &str, reason: String| passes.push(PlannedPass { name: name.into(), reason });
+    pass(pass::READ, "the objects' data".into());
+    if statistics.splats > 0 || statistics.own() == 0 {
+        pass(pass::CONVERT, format!("{} splats", statistics.splats));
+    }
+    for (i, _) in shadow_maps.iter().enumerate().filter(|(_, on)| **on) {
+        pass(pass::SHADOW_MAP, format!("light {i}"));
+    }
+    for (row, what) in rows() {
+        let before = row.steps.split_last().map_or(&[][..], |(_, before)| before);
+        before.iter().for_each(|step| what.iter().for_each(|what| pass(step.pass, what.clone())));
+    }
+    let as_they_are = |draws: &bool| statistics.techniques.iter().any(|t| row(*t).draws_splats == *draws);
+    // What is not drawn as splats is projected and shaded in the pass of its technique.
+    let which = match [true, false].map(|draws| as_they_are(&draws)) {
+        [true, true] => "drawn",
+        [true, false] => "all",
+        _ => "opaque",
+    };
+    if which != "opaque" || opaque > 0 {
+        pass(pass::PROJECT, format!("{which} splats"));
+        pass(pass::SHADE, format!("{which} splats in view"));
+    }
+    if opaque > 0 {
+        pass(pass::OPAQUE, format!("{opaque} opaque splats"));
+    }
+    for (row, what) in rows() {
+        row.steps.last().into_iter().for_each(|step| what.iter().for_each(|what| pass(step.pass, what.clone())));
+    }
+    pass(pass::FINISH, "samples become pixels".into());
+    passes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene() -> Statistics {
+        let light = LightStatistics { wants_shadow: true, is_dark: false };
+        Statistics {
+            translucent: 10,
+            opaque: 5,
+            receivers: 15,
+            casters: 15,
+            opaque_casters: 5,
+            lights: vec![light],
+            tolerance: 1.0 / 255.0,
+            normals_needed: true,
+            techniques: vec![Technique::Points],
+            translucent_by: vec![(Technique::Points, [10, 0]), (Technique::Particles, [10, 0])],
+            ..Statistics::default()
+        }
+    }
+
+    fn has(plan: &Plan, name: &str) -> bool {
+        plan.passes.iter().any(|p| p.name == name)
+    }
+
+    #[test]
+    fn x7_no_shadow_map_without_caster_receiver_or_light() {
+        assert!(has(&plan(&scene()), pass::SHADOW_MAP));
+        for change in [
+            |s: &mut Statistics| s.casters = 0,
+            |s: &mut Statistics| s.receivers = 0,
+            |s: &mut Statistics| s.lights[0].is_dark = true,
+            |s: &mut Statistics| s.lights[0].wants_shadow = false,
+            |s: &mut Statistics| s.lights.clear(),
+        ] {
+            let mut statistics = scene();
+            change(&mut statistics);
+            assert!(!has(&plan(&statistics), pass::SHADOW_MAP));
+        }
+    }
+
+    #[test]
+    fn x7_faint_casters_are_skipped_while_their_bounds_fit_the_tolerance() {
+        let mut s = scene();
+        s.opaque_casters = 0;
+        s.caster_optical_depth = 0.003;
+        s.lights = vec![s.lights[0]; 2];
+        let plan = plan(&s);
+        // Two of 0.003 are above 1/255 together, so the second one is simulated.
+        assert_eq!(plan.shadow_maps, [false, true]);
+        let skipped: f64 = plan.effects.iter().filter(|e| !e.called_for).map(|e| e.bound).sum();
+        assert!(skipped <= s.tolerance);
+    }
+
+    #[test]
+    fn x7_only_the_passes_for_what_is_there() {
+        let mut s = scene();
+        s.translucent_by.clear();
+        assert!(!has(&plan(&s), pass::SORT) && !has(&plan(&s), pass::SPLAT) && has(&plan(&s), pass::OPAQUE));
+        s = scene();
+        s.opaque = 0;
+        assert!(has(&plan(&s), pass::SORT) && !has(&plan(&s), pass::OPAQUE));
+        assert_eq!(plan(&s).optical_depth_planes, 1);
+        s.colored_extinction = true;
+        assert_eq!(plan(&s).optical_depth_planes, 3);
+        s.techniques = vec![Technique::Particles];
+        let only = plan(&s);
+        assert!(has(&only, pass::PARTICLES) && ![pass::SORT, pass::PROJECT, pass::SPLAT].iter().any(|p| has(&only, p)));
+    }
+}
