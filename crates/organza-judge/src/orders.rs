@@ -16,7 +16,7 @@ use organza::scene::{LayerChoice, ParticlesSettings, Scene, Technique};
 use organza::{CostRecord, Error, Frame, Loaded, Progress, RenderOptions, Shaded, draw_loaded, load, plan_loaded};
 use reference::metrics::{Disorder, Image, Linear, Rays};
 use reference::statistics::Spread;
-use reference::{Input, Order, composite_with_progress};
+use reference::{Input, Order};
 use sorter::{Ordering, Sorter};
 use splat_core::{Camera, Direction, Layers, SliceOrder};
 use std::time::Instant;
@@ -126,9 +126,8 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
     let drawn = progress.within(ORDERS, stages, || all.iter().map(|o| draw(*o)).collect::<Result<Vec<_>, _>>());
     let mut orderings = drawn?;
     progress.begin(TRUTH);
-    progress.add_total(u64::from(scene.camera.size[1] * scene.render.antialias));
     let start = Instant::now();
-    let truth = truth(&input, &scene, progress)?;
+    let truth = by_technique(Technique::Reference, &scene, &loaded, options, progress)?;
     let truth_seconds = start.elapsed().as_secs_f64();
     progress.begin(SETS_OF_PARTICLES);
     let unordered = particles(&scene, &loaded, &truth, options, progress)?;
@@ -164,14 +163,21 @@ fn exact_input<'a>(loaded: &'a Loaded, camera: &'a Camera, shaded: &'a Shaded, s
     }
 }
 
-/// Fragments sorted per pixel, the background behind them, samples averaged.
-fn truth(input: &Input<'_>, scene: &Scene, progress: &Progress) -> Result<Image<Linear>, Error> {
-    let exact = composite_with_progress(input, progress).map_err(|_| Error::Cancelled)?;
-    let behind = scene.background.map(f64::from);
-    let pixel = |(v, t): (&Vec<f64>, &[f64; 3])| std::array::from_fn(|c| v[c] + t[c] * behind[c]);
-    let pixels = exact.values.iter().zip(&exact.transmittance).map(pixel).collect();
-    let image = Image::from_radiance(input.camera.size.map(|s| s as usize), pixels);
-    image.map(|i| i.box_downsampled(scene.render.antialias as usize)).map_err(|e| Error::Internal(e.to_string()))
+/// The picture of a loaded scene by one technique.
+fn by_technique(
+    technique: Technique,
+    scene: &Scene,
+    loaded: &Loaded,
+    options: &RenderOptions,
+    progress: &Progress,
+) -> Result<Image<Linear>, Error> {
+    let mut scene = scene.clone();
+    scene.render.technique = technique;
+    let plan = plan_loaded(&scene, loaded, options)?;
+    progress.enter();
+    let layers = draw_loaded(&scene, loaded, &plan, options, progress, &mut CostRecord::default())?;
+    progress.leave();
+    image(&layers)
 }
 
 /// Particles of the same splats, which are drawn by depth in any order, with several seeds; or why they cannot show the

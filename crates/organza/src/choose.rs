@@ -39,6 +39,11 @@ pub(crate) fn row(technique: Technique) -> &'static Row {
     known.expect("invariant: every technique of a scene has a row")
 }
 
+/// Whether two techniques take every object in the same form.
+pub(crate) fn same_forms(a: Technique, b: Technique) -> bool {
+    a == b || (row(a).form.is_none() && row(b).form.is_none())
+}
+
 /// The form in which its technique takes each of these visible objects, and whether it becomes splats: only where splats are
 /// drawn, or are what there is, or where a shadow map may need them.
 pub(crate) fn choose<'a>(

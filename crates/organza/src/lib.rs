@@ -56,7 +56,7 @@ pub use organza_device as device;
 pub use organza_output as output;
 pub use organza_scene as scene;
 pub use organza_scene::{escape_controls, printable, shown};
-pub use prepare::{Explanation, explain, load, plan_loaded};
+pub use prepare::{Explanation, explain, load, plan_loaded, same_splats};
 pub use render::{Render, render};
 pub use sequence::Sequence;
 pub use shadows::ShadowTable;

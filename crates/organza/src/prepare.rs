@@ -1,6 +1,6 @@
 //! From a scene to what drawing reads: read, choose, convert, plan.
 
-use crate::choose::{choose, plan, row, technique_of, techniques};
+use crate::choose::{choose, plan, row, same_forms, technique_of, techniques};
 use crate::form::PlannedObject;
 use crate::load::files::Files;
 use crate::load::{self, Loaded, light_statistics};
@@ -61,6 +61,20 @@ pub(crate) fn prepare(
     let inputs = cost.stages.iter().filter(|s| s.name == pass::READ).map(|s| s.bytes).sum();
     let most = memory.total().max(memory::loading_bytes(&loaded, inputs));
     Ok((loaded, Explanation { plan, cost, memory: most, splats, warnings, notes }, memory))
+}
+
+/// Whether what is loaded of one scene serves the other, after [`Loaded::retarget`]: whether they differ in the size of the
+/// picture and in settings of the render alone, and none of these decides what is made of an object.
+pub fn same_splats(a: &Scene, b: &Scene) -> bool {
+    let mut other = b.clone();
+    other.camera.size = a.camera.size;
+    other.render = a.render.clone();
+    // Layers decide whether volumes get normals, the most points whether a scene is refused.
+    *a == other
+        && a.objects.iter().zip(&b.objects).all(|(of_a, of_b)| same_forms(technique_of(of_a, a), technique_of(of_b, b)))
+        && a.render.particles.surface_sampler == b.render.particles.surface_sampler
+        && a.render.layers == b.render.layers
+        && a.render.max_points == b.render.max_points
 }
 
 /// Plans the render of a loaded scene. `scene` may differ from the one that was loaded in its render settings; whether the same

@@ -1,8 +1,8 @@
 //! Drawing with a clock, and the distance of a picture from a reference.
 
 use super::{Facts, Request};
-use organza::scene::{Scene, Technique};
-use organza::{CostRecord, Error, Loaded, Progress, RenderOptions, draw_loaded, load, plan_loaded};
+use organza::scene::Scene;
+use organza::{CostRecord, Error, Loaded, Progress, RenderOptions, draw_loaded, load, plan_loaded, same_splats};
 use reference::metrics::{Display, Errors, Image, Linear, Viewing, compare, epsilon_8_bit, flip, psnr};
 use splat_core::SplatKind;
 use std::time::Instant;
@@ -216,18 +216,4 @@ fn longest_side(table: &Table) -> u32 {
         Table::Planar(m) => m.size(),
     };
     columns.max(rows)
-}
-
-/// Whether two scenes differ in the size of the picture and in render settings alone.
-fn same_splats(a: &Scene, b: &Scene) -> bool {
-    let mut other = b.clone();
-    other.camera.size = a.camera.size;
-    other.render = a.render.clone();
-    let particles = |s: &Scene| s.render.technique == Technique::Particles;
-    // The technique and its samplers may decide what is made of an object. Layers decide whether volumes get normals; `max_points` whether a scene is refused.
-    *a == other
-        && particles(a) == particles(b)
-        && a.render.particles.surface_sampler == b.render.particles.surface_sampler
-        && a.render.layers == b.render.layers
-        && a.render.max_points == b.render.max_points
 }

@@ -35,6 +35,7 @@ pub fn points(scene: &Scene, facts: &Facts, options: &Options) -> Sweep {
     // One line a knob; a technique with others has a list of its own.
     let knobs = [
         ("slice thickness", slices(facts, options)),
+        ("order", order(facts, options)),
         ("shadow table cells", cells(facts, options)),
         ("shadow table mapping", mapping(scene, facts)),
         ("absorbance cut", absorbance_cut(facts, options)),
@@ -96,6 +97,26 @@ fn slices(facts: &Facts, options: &Options) -> Result<Knob, String> {
                   1 where it is not; 1/2 where few pixels, whose number grows with ε, are wrong altogether",
         }),
         joint: true,
+    })
+}
+
+/// Splats by their centres, or every fragment of a pixel by its own depth.
+fn order(facts: &Facts, options: &Options) -> Result<Knob, String> {
+    facts.slice_thickness.ok_or(NO_TRANSLUCENT)?;
+    if options.quick {
+        return Err("left out by --quick".into());
+    }
+    Ok(Knob {
+        name: "order",
+        size_meaning: "",
+        set: |request, value| {
+            request.scene.render.technique = if value > 0.0 { Technique::Reference } else { Technique::Points };
+        },
+        steps: vec![choice("by splats (points)", 0.0), choice("by fragments (reference)", 1.0)],
+        ends: Vec::new(),
+        end_is_exact: false,
+        theory: None,
+        joint: false,
     })
 }
 
