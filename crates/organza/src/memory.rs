@@ -58,7 +58,7 @@ pub(crate) fn image_bytes(scene: &Scene) -> u64 {
     let profile = if set.depth { size_of::<DepthProfile>() as u64 } else { 0 };
     // Up to three optical depths, and an object.
     let accumulated = channels + 4 * 3 + profile + 4;
-    // The opaque image and its depths, the accumulator, and a copy of it in tiles.
+    // The opaque image and its depths, the accumulator, and a second one: a copy in tiles, or a segment of particles.
     let sample = channels + 4 * 2 + 2 * accumulated;
     samples * sample + pixels * (2 * channels + 4 * 10)
 }

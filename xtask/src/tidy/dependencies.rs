@@ -4,7 +4,7 @@ use crate::repo::Repo;
 use crate::toml_lines::{lines, string};
 
 /// For each crate of the workspace, the crates of the workspace that it may depend on, tests and benches included.
-const MAY_KNOW: [(&str, &[&str]); 17] = [
+const MAY_KNOW: [(&str, &[&str]); 19] = [
     ("splat-core", &["splat-shaders"]),
     ("convert", &["splat-core"]),
     ("tsm", &["splat-core", "splat-shaders"]),
@@ -15,6 +15,8 @@ const MAY_KNOW: [(&str, &[&str]); 17] = [
     ("gpu-ash", &["splat-shaders"]),
     ("gpu-wgpu", &["splat-shaders"]),
     ("organza-scene", &["splat-core", "convert"]),
+    ("organza-output", &["splat-core", "organza-scene"]),
+    ("organza-device", &["splat-core", "tsm", "hbsort", "pbsr", "splat-shaders", "gpu-ash", "gpu-wgpu"]),
     (
         "organza",
         &[
@@ -24,10 +26,9 @@ const MAY_KNOW: [(&str, &[&str]); 17] = [
             "hbsort",
             "pbsr",
             "reference",
-            "splat-shaders",
-            "gpu-ash",
-            "gpu-wgpu",
             "organza-scene",
+            "organza-output",
+            "organza-device",
         ],
     ),
     ("organza-judge", &["splat-core", "convert", "tsm", "hbsort", "reference", "organza"]),
