@@ -50,9 +50,9 @@ impl Passport {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Checked {
     /// `order`, `shadow lists`, `shadow look-ups`, `shadow` (deposits, lists and look-ups as one), `project`, `shade`,
-    /// `composite`, `draw` (the same by the device's rasterizer, where it blends 32-bit floats), `opaque`, `chain` (the order,
-    /// `project`, `shade` and `composite` as one), `particles` (uploaded sets), `made particles` (sets of the same seeds that the
-    /// device makes) or `lit particles` (the same in the light of a lamp with a shadow map).
+    /// `composite`, `opaque`, `chain` (the order, `project`, `shade` and `composite` as one), `particles` (uploaded sets),
+    /// `made particles` (sets of the same seeds that the device makes) or `lit particles` (the same in the light of a lamp with
+    /// a shadow map).
     pub recording: &'static str,
     /// Splats or particles that went in.
     pub items: u64,
@@ -143,8 +143,7 @@ fn inspect(backend: &dyn Backend, place: usize, adapter: Adapter, input: &Inputs
             Err(why) => Checked { recording, items: 0, outcome: Err(why.to_string()), passes: Vec::new() },
         }
     };
-    let draws = adapter.drawing.targets > 1 && adapter.drawing.blends_single;
-    let mut recordings = vec![
+    let recordings = vec![
         check("order", &mut |device| check_order(device, &input.order)),
         check("shadow lists", &mut |device| input.shadow.check_lists(device)),
         check("shadow look-ups", &mut |device| input.shadow.check_look_ups(device)),
@@ -152,20 +151,17 @@ fn inspect(backend: &dyn Backend, place: usize, adapter: Adapter, input: &Inputs
         check("project", &mut |device| input.chain.check_project(device)),
         check("shade", &mut |device| input.chain.check_shade(device)),
         check("composite", &mut |device| input.composite.check(device)),
-        check("draw", &mut |device| input.composite.check_drawn(device)),
         check("opaque", &mut |device| input.opaque.check(device)),
         check("chain", &mut |device| input.chain.check_chain(device)),
         check("particles", &mut |device| input.particles.check(device, Folding::uploaded())),
         check("made particles", &mut |device| input.particles.check(device, Folding::default())),
         check("lit particles", &mut |device| input.particles.check_lit(device, &input.shadow)),
     ];
-    recordings.retain(|r| draws || r.recording != "draw");
     let clockless = recordings.iter().all(|r| r.outcome.is_ok() && r.passes.is_empty());
     let missing = [
         (clockless, "timestamps"),
         (adapter.subgroup == 0, "the size of a subgroup"),
         (Lanes::of(&adapter) == Lanes::Portable, "operations of subgroups"),
-        (!draws, "draws that blend 32-bit floats"),
     ];
     let missing = missing.into_iter().filter(|(lacks, _)| *lacks).map(|(_, what)| what).collect();
     Passport { backend: backend.name(), adapter, missing, recordings }

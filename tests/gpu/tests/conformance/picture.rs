@@ -329,7 +329,7 @@ fn every_device_has_a_passport() {
     assert_eq!(passports.len(), organza::devices().unwrap().len());
     for passport in &passports {
         assert!(passport.valid(), "{passport:?}");
-        let [order, lists, look_ups, shadow, project, shade, composite, draw, opaque, chain, particles, made, lit] =
+        let [order, lists, look_ups, shadow, project, shade, composite, opaque, chain, particles, made, lit] =
             &passport.recordings[..]
         else {
             panic!("{passport:?}")
@@ -342,7 +342,7 @@ fn every_device_has_a_passport() {
         assert!(shadow.items.abs_diff(lists.items) * 1000 <= lists.items, "{shadow:?}");
         assert!(shadow.outcome.as_ref().is_ok_and(|a| a.mean < 1e-5), "{shadow:?}");
         let composited = |a: &Agreement| a.within && a.mean < 1e-6 && a.max <= 1e-5;
-        for splats in [project, shade, composite, draw, chain] {
+        for splats in [project, shade, composite, chain] {
             assert!(splats.items == 1 << 14 && splats.outcome.as_ref().is_ok_and(composited), "{splats:?}");
         }
         assert!(opaque.outcome.as_ref().is_ok_and(|a| a.within && a.mean < 1e-6), "{opaque:?}");

@@ -4,12 +4,11 @@ use super::{Agreement, Failure, Found, SIZE};
 use crate::device::splats::composite_on;
 use splat_core::glam::DVec3;
 use splat_core::raster::gpu::Input;
-use splat_core::raster::gpu::draw::{self, Precision};
 use splat_core::raster::{OpaqueImage, Params, fold, project};
 use splat_core::{
     Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Progress, Projection, Splat, SplatKind, rng,
 };
-use splat_shaders::{Executor, PassTime};
+use splat_shaders::Executor;
 
 /// Splats that are composited.
 const SPLATS: u32 = 1 << 14;
@@ -43,26 +42,7 @@ impl CompositeInput {
         Self { cloud, camera, values: (0..3 * u64::from(SPLATS)).map(|i| number(i, 6)).collect() }
     }
 
-    /// By tiles, as pictures are made.
     pub(super) fn check(&self, device: &mut dyn Executor) -> Result<Found, Failure> {
-        self.check_by(|input, found| Ok(composite_on(device, input, found)?.ok_or(Failure::Small)?.1))
-    }
-
-    /// By the device's rasterizer.
-    pub(super) fn check_drawn(&self, device: &mut dyn Executor) -> Result<Found, Failure> {
-        self.check_by(|input, found| {
-            let recorded = draw::record(input.capacities(found, 0), Precision::Single)?;
-            let uploads = recorded.uploads(input, found)?;
-            let run = device.run(&recorded.recording, &recorded.inputs(&uploads))?;
-            recorded.finish([recorded.state, recorded.planes].map(|buffer| run.bytes(buffer)), found)?;
-            Ok(run.passes)
-        })
-    }
-
-    fn check_by(
-        &self,
-        composite: impl FnOnce(&Input<'_>, &mut Accumulator) -> Result<Vec<PassTime>, Failure>,
-    ) -> Result<Found, Failure> {
         let (params, materials, opaque) = (Params::default(), [Material::default()], OpaqueImage::default());
         let projected = project(&self.cloud, &self.camera, &FootprintStack::default(), &materials, &params);
         let order: Vec<u32> = (0..SPLATS).collect();
@@ -79,7 +59,7 @@ impl CompositeInput {
             direction,
             params: &params,
         };
-        let passes = composite(&input, &mut found)?;
+        let (_, passes) = composite_on(device, &input, &mut found)?.ok_or(Failure::Small)?;
         Ok(Found { items: SPLATS.into(), agreement: accumulators(&found, &expected), passes })
     }
 }
