@@ -4,22 +4,11 @@
 //! writes what it read, must wait for it. No tool can find every such wait that is missing (two dispatches of one
 //! kernel that change one buffer look innocent), so they are computed here and never written by hand.
 
-use crate::{Access, BufferId, Corners, Draw, Groups, ImageId, Recording, Step};
+use crate::{Access, BufferId, Groups, Recording, Step};
 
-/// What steps touch.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Resource {
-    /// A buffer.
-    Buffer(BufferId),
-    /// An image.
-    Image(ImageId),
-}
-
-/// How a step touches a buffer or an image.
+/// How a step touches a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Use {
-    /// Nobody has touched the image in this run, and what it holds counts for nothing.
-    Nothing,
     /// A copy writes it.
     CopyWrite,
     /// A copy reads it.
@@ -28,49 +17,41 @@ pub enum Use {
     KernelRead,
     /// A kernel writes it, and may read it.
     KernelWrite,
-    /// The device reads the size of a dispatch or of a draw from it.
+    /// The device reads the size of a dispatch from it.
     Indirect,
-    /// A program that draws reads it.
-    DrawRead,
-    /// A draw blends into it.
-    Target,
 }
 
 impl Use {
-    /// Whether what is touched may be different afterwards.
+    /// Whether the buffer may be different afterwards.
     pub fn writes(self) -> bool {
-        matches!(self, Self::CopyWrite | Self::KernelWrite | Self::Target)
+        matches!(self, Self::CopyWrite | Self::KernelWrite)
     }
 }
 
-/// A wait before a step: earlier uses of this kind of the buffer or image end before this step's use begins. An image
-/// goes over from the layout of the one use to that of the other.
+/// A wait before a step: earlier uses of this kind of the buffer end before this step's use begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Barrier {
-    /// The buffer or image.
-    pub of: Resource,
+    /// The buffer.
+    pub buffer: BufferId,
     /// What is waited for.
     pub from: Use,
     /// What waits.
     pub to: Use,
 }
 
-/// What a step does to buffers and images, in the order of its bindings.
-pub(crate) fn uses(step: &Step) -> Vec<(Resource, Use)> {
-    let of = Resource::Buffer;
+/// What a step does to buffers, in the order of its bindings.
+pub(crate) fn uses(step: &Step) -> Vec<(BufferId, Use)> {
     match step {
-        Step::Upload(buffer) => vec![(of(*buffer), Use::CopyWrite)],
-        Step::Read(buffer) => vec![(of(*buffer), Use::CopyRead)],
-        Step::Copy { image, buffer } => vec![(Resource::Image(*image), Use::CopyRead), (of(*buffer), Use::CopyWrite)],
-        Step::Draw(draw) => draw_uses(draw),
+        Step::Upload(buffer) => vec![(*buffer, Use::CopyWrite)],
+        Step::Read(buffer) => vec![(*buffer, Use::CopyRead)],
         Step::Dispatch(dispatch) => {
             let kind = |access: &Access| match access {
                 Access::Read => Use::KernelRead,
                 Access::Write => Use::KernelWrite,
             };
-            let bound = dispatch.buffers.iter().map(|b| of(*b)).zip(dispatch.kernel.bindings.iter().map(kind));
+            let bound = dispatch.buffers.iter().copied().zip(dispatch.kernel.bindings.iter().map(kind));
             let size = match dispatch.groups {
-                Groups::Indirect { buffer, .. } => Some((of(buffer), Use::Indirect)),
+                Groups::Indirect { buffer, .. } => Some((buffer, Use::Indirect)),
                 Groups::Direct(_) => None,
             };
             bound.chain(size).collect()
@@ -78,17 +59,7 @@ pub(crate) fn uses(step: &Step) -> Vec<(Resource, Use)> {
     }
 }
 
-fn draw_uses(draw: &Draw) -> Vec<(Resource, Use)> {
-    let bound = draw.buffers.iter().map(|b| (Resource::Buffer(*b), Use::DrawRead));
-    let size = match draw.corners {
-        Corners::Indirect { buffer, .. } => Some((Resource::Buffer(buffer), Use::Indirect)),
-        Corners::Direct(_) => None,
-    };
-    let targets = draw.targets.iter().map(|t| (Resource::Image(t.image), Use::Target));
-    bound.chain(size).chain(targets).collect()
-}
-
-/// What a buffer or an image went through since its last write.
+/// What a buffer went through since its last write.
 #[derive(Debug, Clone, Default)]
 struct History {
     write: Option<Use>,
@@ -96,43 +67,28 @@ struct History {
     reads: Vec<Use>,
 }
 
-/// Those of all buffers, and of all images.
-struct Histories([Vec<History>; 2]);
-
-impl Histories {
-    fn of(&mut self, resource: Resource) -> Option<&mut History> {
-        match resource {
-            Resource::Buffer(buffer) => self.0[0].get_mut(buffer.index()),
-            Resource::Image(image) => self.0[1].get_mut(image.index()),
-        }
-    }
-}
-
 /// For each step the waits before it.
 pub fn barriers(recording: &Recording) -> Vec<Vec<Barrier>> {
-    // An image has no layout yet: the first who touches it waits for that.
-    let image = History { write: Some(Use::Nothing), reads: Vec::new() };
-    let buffers = vec![History::default(); recording.buffers().len()];
-    let mut histories = Histories([buffers, vec![image; recording.images().len()]]);
+    let mut histories = vec![History::default(); recording.buffers().len()];
     recording.steps().iter().map(|step| before(step, &mut histories)).collect()
 }
 
-fn before(step: &Step, histories: &mut Histories) -> Vec<Barrier> {
+fn before(step: &Step, histories: &mut [History]) -> Vec<Barrier> {
     let uses = uses(step);
     let mut found = Vec::new();
-    for &(of, to) in &uses {
-        let Some(history) = histories.of(of) else { continue };
-        let wait = |from| Barrier { of, from, to };
+    for &(buffer, to) in &uses {
+        let Some(history) = histories.get(buffer.index()) else { continue };
+        let wait = |from| Barrier { buffer, from, to };
         // Whoever read since has waited for the write already; a kind of read that has not must.
-        let seen = if to.writes() { is_image(of) && !history.reads.is_empty() } else { history.reads.contains(&to) };
+        let seen = !to.writes() && history.reads.contains(&to);
         found.extend(history.write.filter(|_| !seen).map(wait));
         if to.writes() {
             found.extend(history.reads.iter().copied().map(wait));
         }
     }
     // A step's own uses do not wait for each other: its reads are noted first, so that its writes come last.
-    for &(of, to) in uses.iter().filter(|u| !u.1.writes()).chain(uses.iter().filter(|u| u.1.writes())) {
-        let Some(history) = histories.of(of) else { continue };
+    for &(buffer, to) in uses.iter().filter(|u| !u.1.writes()).chain(uses.iter().filter(|u| u.1.writes())) {
+        let Some(history) = histories.get_mut(buffer.index()) else { continue };
         if to.writes() {
             *history = History { write: Some(to), reads: Vec::new() };
         } else if !history.reads.contains(&to) {
@@ -142,22 +98,13 @@ fn before(step: &Step, histories: &mut Histories) -> Vec<Barrier> {
     found
 }
 
-/// What reads an image has put it in another layout: who writes it then waits for the reads alone, from that layout.
-fn is_image(of: Resource) -> bool {
-    matches!(of, Resource::Image(_))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::kernels::{HBSORT_BEGIN, SCAN_APPLY, SCAN_SPINE};
 
     fn between(recording: &Recording, step: usize) -> Vec<(usize, Use, Use)> {
-        let index = |of| match of {
-            Resource::Buffer(buffer) => buffer.index(),
-            Resource::Image(image) => 100 + image.index(),
-        };
-        barriers(recording)[step].iter().map(|b| (index(b.of), b.from, b.to)).collect()
+        barriers(recording)[step].iter().map(|b| (b.buffer.index(), b.from, b.to)).collect()
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! What an executor takes and gives: the same words whichever interface it drives.
 
-use crate::{BufferId, Draw, Fault, Image, Kernel, Recording, Step, SubgroupOps, Target};
+use crate::{BufferId, Fault, Recording, Step, SubgroupOps};
 use std::fmt::Debug;
 use std::time::Duration;
 
@@ -20,8 +20,8 @@ pub enum AdapterKind {
 }
 
 impl Adapter {
-    /// Refuses a recording that needs more than this device has: memory that kernels can see, 64-bit atomics, operations of
-    /// subgroups, draws, images of that size, targets, blending of 32-bit floats.
+    /// Refuses a recording that needs more than this device has: memory that kernels can see, 64-bit atomics, or
+    /// operations of subgroups.
     ///
     /// # Errors
     /// [`DeviceError::TooLarge`], [`DeviceError::Lacking`], [`DeviceError::Recording`] for a recording at fault.
@@ -31,51 +31,15 @@ impl Adapter {
         if let Some(b) = recording.buffers().iter().find(|b| b.bytes > had) {
             return Err(DeviceError::TooLarge { name: b.name, needed: b.bytes, had });
         }
-        recording.steps().iter().try_for_each(|step| match step {
-            Step::Dispatch(d) => {
-                self.lacks(d.kernel).map_or(Ok(()), |what| Err(DeviceError::Lacking { kernel: d.kernel.name, what }))
+        let dispatched =
+            recording.steps().iter().filter_map(|step| if let Step::Dispatch(d) = step { Some(d) } else { None });
+        for kernel in dispatched.map(|d| d.kernel) {
+            let atomics = (kernel.wide_atomics && !self.wide_atomics).then_some("atomics of 64 bits");
+            if let Some(what) = atomics.or_else(|| kernel.subgroup_ops.beyond(self.subgroup_ops)) {
+                return Err(DeviceError::Lacking { kernel: kernel.name, what });
             }
-            Step::Draw(draw) => {
-                let lacking = |what| DeviceError::Lacking { kernel: draw.program.name, what };
-                self.drawing.lacks(draw, recording.images()).map_or(Ok(()), |what| Err(lacking(what)))
-            }
-            _ => Ok(()),
-        })
-    }
-
-    /// What a kernel needs and the device does not have.
-    fn lacks(&self, kernel: &Kernel) -> Option<&'static str> {
-        let atomics = (kernel.wide_atomics && !self.wide_atomics).then_some("atomics of 64 bits");
-        atomics.or_else(|| kernel.subgroup_ops.beyond(self.subgroup_ops))
-    }
-}
-
-/// What a device draws; nothing by default.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Drawing {
-    /// Images that one draw blends into, each in a way of its own; 0 where the device does not draw.
-    pub targets: u32,
-    /// The widest and highest image, pixels.
-    pub side: u32,
-    /// Whether it blends floats of 32 bits.
-    pub blends_single: bool,
-}
-
-impl Drawing {
-    /// What the draw needs and the device does not have.
-    fn lacks(self, draw: &Draw, images: &[Image]) -> Option<&'static str> {
-        let of = |target: &Target| images.get(target.image.index());
-        if self.targets == 0 {
-            Some("draws")
-        } else if draw.targets.len() > self.targets as usize {
-            Some("more images to draw into at once")
-        } else if draw.targets.iter().filter_map(of).any(|i| i.size.iter().any(|side| *side > self.side)) {
-            Some("larger images to draw into")
-        } else if !self.blends_single && draw.targets.iter().filter_map(of).any(|i| i.format.is_single()) {
-            Some("blending of 32-bit floats")
-        } else {
-            None
         }
+        Ok(())
     }
 }
 
@@ -111,8 +75,6 @@ pub struct Adapter {
     pub wide_atomics: bool,
     /// What kernels can do across the threads of a subgroup.
     pub subgroup_ops: SubgroupOps,
-    /// What it draws.
-    pub drawing: Drawing,
 }
 
 /// Which adapter to open.
@@ -162,10 +124,10 @@ pub enum Validation {
 /// The caller's bytes for the uploads of a recording. A buffer takes as many as are given, at most its size.
 pub type Inputs<'a> = [(BufferId, &'a [u8])];
 
-/// The time of one dispatch or draw on the device.
+/// The time of one dispatch on the device.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PassTime {
-    /// The kernel or program.
+    /// The kernel.
     pub kernel: &'static str,
     /// Between the end of what came before and its own end, nanoseconds.
     pub nanoseconds: f64,
@@ -176,7 +138,7 @@ pub struct PassTime {
 pub struct Run {
     /// The bytes of each read, in the order of the steps.
     pub reads: Vec<(BufferId, Vec<u8>)>,
-    /// The dispatches and draws in order; empty where the device has no clock.
+    /// The dispatches in order; empty where the device has no clock.
     pub passes: Vec<PassTime>,
 }
 
@@ -264,10 +226,10 @@ pub enum DeviceError {
         /// Bytes that it holds.
         had: u64,
     },
-    /// A kernel or a draw needs what the device does not have.
+    /// A kernel needs what the device does not have.
     #[error("kernel {kernel} needs {what}, which the device does not have")]
     Lacking {
-        /// The kernel or program.
+        /// The kernel.
         kernel: &'static str,
         /// What it needs.
         what: &'static str,
@@ -316,33 +278,7 @@ mod tests {
             subgroup: 0,
             wide_atomics: false,
             subgroup_ops: SubgroupOps::NONE,
-            drawing: Drawing::default(),
         }
-    }
-
-    #[test]
-    fn what_a_device_cannot_draw_is_refused_by_name() {
-        use crate::{Blend, Corners, Format, programs};
-        let accept = |drawing: Drawing, [color, sum]: [Format; 2], size: [u32; 2]| {
-            let mut r = Recording::default();
-            let b = r.input("b", 16);
-            let target = |image, blend| Target { image, blend, clear: Some([0.0; 4]) };
-            let [color, sum] = [r.image("color", size, color), r.image("sum", size, sum)];
-            let targets = [target(color, Blend::Over), target(sum, Blend::Add)];
-            r.draw(&programs::SPLAT_DRAW, Corners::Direct([4, 1]), &[b; 6], &[0; 4], &targets);
-            let adapter = Adapter { binding_bytes: 16, drawing, ..adapter("any", AdapterKind::Other) };
-            adapter.accept(&r).map_err(|e| e.to_string())
-        };
-        let (single, half) = ([Format::Rgba32F, Format::R32F], [Format::Rgba16F, Format::R16F]);
-        let able = Drawing { targets: 2, side: 64, blends_single: true };
-        let refused = |what: &str| Err(format!("kernel splat_draw needs {what}, which the device does not have"));
-        assert_eq!(accept(able, single, [64, 1]), Ok(()));
-        assert_eq!(accept(Drawing::default(), half, [1, 1]), refused("draws"));
-        assert_eq!(accept(Drawing { targets: 1, ..able }, half, [1, 1]), refused("more images to draw into at once"));
-        assert_eq!(accept(able, half, [1, 65]), refused("larger images to draw into"));
-        let halves = Drawing { blends_single: false, ..able };
-        assert_eq!(accept(halves, single, [1, 1]), refused("blending of 32-bit floats"));
-        assert_eq!(accept(halves, half, [1, 1]), Ok(()));
     }
 
     #[test]

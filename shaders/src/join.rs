@@ -3,14 +3,12 @@
 //! Neither stage knows the other; whoever knows both names the buffers that are the same.
 
 use crate::recording::Buffer;
-use crate::{BufferId, Corners, Dispatch, Draw, Groups, ImageId, Recording, Step, Target};
+use crate::{BufferId, Dispatch, Groups, Recording, Step};
 
 /// Where the buffers of a joined recording lie in the whole.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Joined {
     places: Vec<BufferId>,
-    /// Images before those of the joined recording, and these.
-    images: [usize; 2],
 }
 
 impl Joined {
@@ -18,11 +16,6 @@ impl Joined {
     /// [`Recording::check`] finds.
     pub fn of(&self, buffer: BufferId) -> BufferId {
         self.places.get(buffer.index()).copied().unwrap_or(BufferId(u32::MAX))
-    }
-
-    fn image(&self, image: ImageId) -> ImageId {
-        let [before, own] = self.images;
-        ImageId(if image.index() < own { (before + image.index()) as u32 } else { u32::MAX })
     }
 
     /// Inputs of the joined recording as inputs of the whole. Give none for a buffer that an earlier one fills.
@@ -45,8 +38,6 @@ impl Recording {
                 Step::Upload(_) => {}
                 Step::Read(buffer) => self.read(joined.of(*buffer)),
                 Step::Dispatch(dispatch) => self.steps.push(Step::Dispatch(moved(dispatch, &joined))),
-                Step::Draw(draw) => self.steps.push(Step::Draw(moved_draw(draw, &joined))),
-                Step::Copy { image, buffer } => self.copy(joined.image(*image), joined.of(*buffer)),
             }
         }
         joined
@@ -63,8 +54,7 @@ impl Recording {
                 *bytes = buffer.bytes.max(*bytes);
             }
         }
-        let joined = Joined { places, images: [self.images.len(), other.images.len()] };
-        self.images.extend_from_slice(&other.images);
+        let joined = Joined { places };
         let mut uploads = self.steps.iter().take_while(|step| matches!(step, Step::Upload(_))).count();
         for step in &other.steps {
             if let Step::Upload(buffer) = step
@@ -100,16 +90,6 @@ fn moved(dispatch: &Dispatch, joined: &Joined) -> Dispatch {
     };
     let buffers = dispatch.buffers.iter().map(|buffer| joined.of(*buffer)).collect();
     Dispatch { groups, buffers, ..dispatch.clone() }
-}
-
-fn moved_draw(draw: &Draw, joined: &Joined) -> Draw {
-    let corners = match draw.corners {
-        Corners::Indirect { buffer, offset } => Corners::Indirect { buffer: joined.of(buffer), offset },
-        direct @ Corners::Direct(_) => direct,
-    };
-    let buffers = draw.buffers.iter().map(|buffer| joined.of(*buffer)).collect();
-    let targets = draw.targets.iter().map(|target| Target { image: joined.image(target.image), ..*target }).collect();
-    Draw { corners, buffers, targets, ..draw.clone() }
 }
 
 #[cfg(test)]
@@ -150,11 +130,7 @@ read sums
         first.check().expect("no fault");
         // The second run waits for the first, as if both had been recorded at once.
         let waits = barriers(&first);
-        assert!(
-            waits[4]
-                .iter()
-                .any(|wait| wait.of == crate::Resource::Buffer(sums) && wait.from == crate::Use::KernelWrite)
-        );
+        assert!(waits[4].iter().any(|wait| wait.buffer == sums && wait.from == crate::Use::KernelWrite));
         first.read_only(&[joined.of(of[2])]);
         assert_eq!(first.steps().iter().filter(|s| matches!(s, Step::Read(_))).count(), 1);
         let inputs: Vec<_> = joined.inputs([(of[0], &[1u8; 8][..]), (of[2], &[])]).map(|(b, _)| b).collect();

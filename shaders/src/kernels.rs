@@ -33,14 +33,9 @@ pub struct Kernel {
 impl Kernel {
     /// The module's words.
     pub fn words(&self) -> Vec<u32> {
-        words(self.spirv)
+        let (words, _) = self.spirv.as_chunks::<4>();
+        words.iter().map(|w| u32::from_le_bytes(*w)).collect()
     }
-}
-
-/// The words of a module.
-pub(crate) fn words(spirv: &[u8]) -> Vec<u32> {
-    let (words, _) = spirv.as_chunks::<4>();
-    words.iter().map(|w| u32::from_le_bytes(*w)).collect()
 }
 
 macro_rules! kernels {
@@ -107,12 +102,6 @@ kernels! {
     SPLAT_RESOLVE_BEAUTY = "splat_resolve_beauty" [Read, Read, Read, Read, Read, Read, Write];
     /// The same for any number of channels.
     SPLAT_RESOLVE = "splat_resolve" [Read, Read, Read, Read, Read, Read, Write];
-
-    /// How many splats are drawn: view → strips of a draw, state. Push: room.
-    SPLAT_INSTANCES = "splat_instances" [Read, Write, Write] push 4;
-    /// Drawn pixels into planes: view, colours, optical depths → planes. Push: plane, three channels, words of a row of
-    /// either, whether they are halves, whether the plane is complete.
-    SPLAT_DRAWN = "splat_drawn" [Read, Read, Read, Write] push 32;
 
     /// Nothing projected yet: → state.
     SPLAT_NOTHING = "splat_nothing" [Write];

@@ -102,7 +102,6 @@ mod tests {
             subgroup: 8,
             wide_atomics: false,
             subgroup_ops,
-            drawing: Default::default(),
         }
     }
 

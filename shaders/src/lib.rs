@@ -3,8 +3,7 @@
 //! A kernel is one GLSL file under `glsl/`, named as its twin on the CPU; `cargo xtask shaders` compiles it to the
 //! SPIR-V under `spirv/`, which is committed. A [`Recording`] is plain data: buffers, and steps that upload, dispatch
 //! and read back, with what each step reads and writes. A stage makes its own without a device, so that it can be read
-//! and tested; an executor (`gpu-ash`) runs it and takes every barrier from [`barriers`], none is written by hand. It may
-//! draw too: a [`Program`] blends triangles into an [`Image`].
+//! and tested; an executor (`gpu-ash`) runs it and takes every barrier from [`barriers`], none is written by hand.
 //!
 //! ```
 //! use splat_shaders::{Groups, Recording, barriers, kernels};
@@ -26,30 +25,26 @@ mod barriers;
 mod batches;
 mod check;
 mod device;
-mod draw;
 mod fit;
 mod join;
 pub mod kernels;
 mod lanes;
 mod layout;
 pub mod layouts;
-pub mod programs;
 pub mod radix;
 mod recording;
 pub mod reflect;
 mod snapshot;
 
-pub use barriers::{Barrier, Resource, Use, barriers};
+pub use barriers::{Barrier, Use, barriers};
 pub use batches::{LONGEST, batches};
 pub use check::Fault;
 pub use device::{
-    Adapter, AdapterKind, Backend, Choice, DeviceError, Drawing, Executor, Inputs, PassTime, Ready, Run, Validation,
+    Adapter, AdapterKind, Backend, Choice, DeviceError, Executor, Inputs, PassTime, Ready, Run, Validation,
 };
-pub use draw::{Blend, Corners, Draw, Format, Image, ImageId, Target};
 pub use fit::most_that_fits;
 pub use join::Joined;
 pub use kernels::{Access, Kernel};
 pub use lanes::{Lanes, SubgroupOps};
 pub use layout::{Field, GlslType, Layout};
-pub use programs::Program;
 pub use recording::{Buffer, BufferId, Dispatch, Groups, Recording, Step};

@@ -1,6 +1,6 @@
 //! What a device is to do, as plain data.
 
-use crate::{Corners, Draw, Format, Image, ImageId, Kernel, Program, Target};
+use crate::Kernel;
 
 /// A buffer of one recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -66,24 +66,14 @@ pub enum Step {
     Upload(BufferId),
     /// A kernel runs.
     Dispatch(Dispatch),
-    /// A program draws.
-    Draw(Draw),
-    /// The image's pixels go into the buffer, row by row, rows [`Image::row_bytes`] apart.
-    Copy {
-        /// The image.
-        image: ImageId,
-        /// The buffer.
-        buffer: BufferId,
-    },
     /// The buffer's bytes go to the caller.
     Read(BufferId),
 }
 
-/// Buffers and images, and steps in order. Each step sees what the steps before it wrote.
+/// Buffers, and steps in order. Each step sees what the steps before it wrote.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Recording {
     pub(crate) buffers: Vec<Buffer>,
-    pub(crate) images: Vec<Image>,
     pub(crate) steps: Vec<Step>,
 }
 
@@ -93,22 +83,14 @@ impl Recording {
         &self.buffers
     }
 
-    /// The images; an [`ImageId`] is a place here.
-    pub fn images(&self) -> &[Image] {
-        &self.images
-    }
-
     /// The steps in order.
     pub fn steps(&self) -> &[Step] {
         &self.steps
     }
 
-    /// Bytes of all buffers and images together.
+    /// Bytes of all buffers together.
     pub fn bytes(&self) -> u64 {
-        let image =
-            |i: &Image| i.size.iter().fold(u64::from(i.format.bytes()), |n, side| n.saturating_mul((*side).into()));
-        let buffers = self.buffers.iter().map(|b| b.bytes);
-        buffers.chain(self.images.iter().map(image)).fold(0, u64::saturating_add)
+        self.buffers.iter().map(|b| b.bytes).sum()
     }
 
     /// A buffer that steps fill. `bytes` is rounded up to a multiple of 4, and to 4 at least.
@@ -128,31 +110,6 @@ impl Recording {
     pub fn dispatch(&mut self, kernel: &'static Kernel, groups: Groups, buffers: &[BufferId], push: &[u32]) {
         let push = push.iter().flat_map(|word| word.to_ne_bytes()).collect();
         self.steps.push(Step::Dispatch(Dispatch { kernel, groups, buffers: buffers.to_vec(), push }));
-    }
-
-    /// An image that draws blend into.
-    pub fn image(&mut self, name: &'static str, size: [u32; 2], format: Format) -> ImageId {
-        self.images.push(Image { name, size, format });
-        ImageId(self.images.len() as u32 - 1)
-    }
-
-    /// Runs a program that reads these buffers and blends into these images.
-    pub fn draw(
-        &mut self,
-        program: &'static Program,
-        corners: Corners,
-        buffers: &[BufferId],
-        push: &[u32],
-        targets: &[Target],
-    ) {
-        let push = push.iter().flat_map(|word| word.to_ne_bytes()).collect();
-        let (buffers, targets) = (buffers.to_vec(), targets.to_vec());
-        self.steps.push(Step::Draw(Draw { program, corners, buffers, push, targets }));
-    }
-
-    /// Copies an image into a buffer.
-    pub fn copy(&mut self, image: ImageId, buffer: BufferId) {
-        self.steps.push(Step::Copy { image, buffer });
     }
 
     /// Gives the buffer's bytes to the caller.

@@ -24,10 +24,6 @@ pub struct Module {
     pub local_size: [u32; 3],
     /// Storage buffers: (set, binding) → whether the module never writes it.
     pub buffers: BTreeMap<(u32, u32), bool>,
-    /// What a fragment shader gives, or a vertex shader hands on: location → how many numbers.
-    pub outputs: BTreeMap<u32, u32>,
-    /// What a shader takes from the one before it.
-    pub taken: BTreeMap<u32, u32>,
     /// Whether it declares push constants, and how many members of 4 bytes.
     pub push_members: usize,
     /// Structs with offsets.
@@ -38,7 +34,6 @@ const OP_NAME: u32 = 5;
 const OP_MEMBER_NAME: u32 = 6;
 const OP_EXECUTION_MODE: u32 = 16;
 const OP_CAPABILITY: u32 = 17;
-const OP_TYPE_VECTOR: u32 = 23;
 const OP_TYPE_STRUCT: u32 = 30;
 const OP_TYPE_POINTER: u32 = 32;
 const OP_VARIABLE: u32 = 59;
@@ -46,12 +41,9 @@ const OP_DECORATE: u32 = 71;
 const OP_MEMBER_DECORATE: u32 = 72;
 const LOCAL_SIZE: u32 = 17;
 const NON_WRITABLE: u32 = 24;
-const LOCATION: u32 = 30;
 const BINDING: u32 = 33;
 const DESCRIPTOR_SET: u32 = 34;
 const OFFSET: u32 = 35;
-const INPUT: u32 = 1;
-const OUTPUT: u32 = 3;
 const STORAGE_BUFFER: u32 = 12;
 const PUSH_CONSTANT: u32 = 9;
 
@@ -64,7 +56,6 @@ struct Ids {
     decorations: BTreeMap<(u32, u32), u32>,
     struct_sizes: BTreeMap<u32, usize>,
     pointees: BTreeMap<u32, u32>,
-    vectors: BTreeMap<u32, u32>,
     variables: Vec<(u32, u32, u32)>,
 }
 
@@ -90,7 +81,6 @@ fn read(op: u32, words: &[u32], ids: &mut Ids, module: &mut Module) {
         (OP_CAPABILITY, [capability]) => module.capabilities.push(*capability),
         (OP_EXECUTION_MODE, [_, LOCAL_SIZE, x, y, z]) => module.local_size = [*x, *y, *z],
         (OP_TYPE_STRUCT, [id, members @ ..]) => drop(ids.struct_sizes.insert(*id, members.len())),
-        (OP_TYPE_VECTOR, [id, _, numbers]) => drop(ids.vectors.insert(*id, *numbers)),
         (OP_TYPE_POINTER, [id, _, pointee]) => drop(ids.pointees.insert(*id, *pointee)),
         (OP_VARIABLE, [kind, id, class, ..]) => ids.variables.push((*kind, *id, *class)),
         (OP_DECORATE, [id, what, value @ ..]) => {
@@ -108,13 +98,6 @@ fn finish(ids: &Ids, module: &mut Module) {
             STORAGE_BUFFER => {
                 let place = (of(DESCRIPTOR_SET).unwrap_or(0), of(BINDING).unwrap_or(0));
                 module.buffers.insert(place, of(NON_WRITABLE).is_some());
-            }
-            INPUT | OUTPUT => {
-                // What has no location the device gives or takes itself.
-                let Some(location) = of(LOCATION) else { continue };
-                let vector = ids.pointees.get(kind).and_then(|pointee| ids.vectors.get(pointee));
-                let side = if *class == INPUT { &mut module.taken } else { &mut module.outputs };
-                side.insert(location, vector.copied().unwrap_or(1));
             }
             PUSH_CONSTANT => {
                 let block = ids.pointees.get(kind).and_then(|pointee| ids.struct_sizes.get(pointee));

@@ -2,7 +2,7 @@
 
 use sha2::{Digest, Sha256};
 use splat_shaders::reflect::{Module, module};
-use splat_shaders::{Access, Kernel, Program, SubgroupOps, kernels, layouts, programs};
+use splat_shaders::{Access, Kernel, SubgroupOps, kernels, layouts};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -28,31 +28,6 @@ fn every_kernel_is_what_its_module_says() {
     }
 }
 
-fn both(program: &Program) -> [Module; 2] {
-    program.words().map(|words| module(&words).unwrap_or_else(|| panic!("{} is no SPIR-V", program.name)))
-}
-
-#[test]
-fn every_program_is_what_its_modules_say() {
-    for program in programs::ALL {
-        let [vertex, fragment] = both(program);
-        let name = program.name;
-        for module in [&vertex, &fragment] {
-            assert_eq!(module.version, (1, 3), "{name}");
-            // Each sees some of the buffers, and writes none.
-            assert!(module.buffers.keys().all(|(set, binding)| *set == 0 && *binding < program.bindings), "{name}");
-            assert!(module.buffers.values().all(|read_only| *read_only), "{name}: who draws writes no buffer");
-            assert!([0, program.push_bytes as usize].contains(&(4 * module.push_members)), "{name}: push constants");
-        }
-        let seen: BTreeSet<_> = vertex.buffers.keys().chain(fragment.buffers.keys()).map(|(_, b)| *b).collect();
-        assert_eq!(seen, (0..program.bindings).collect(), "{name}: every buffer is seen by one of both");
-        assert!(program.push_bytes <= 128 && program.bindings <= 8, "{name}: every device takes as much");
-        let outputs: Vec<_> = (0..).zip(program.outputs.iter().copied()).collect();
-        assert_eq!(fragment.outputs.into_iter().collect::<Vec<_>>(), outputs, "{name}: outputs");
-        assert_eq!(vertex.outputs, fragment.taken, "{name}: what one hands on the other takes");
-    }
-}
-
 #[test]
 fn every_kernel_says_what_it_does_across_subgroups() {
     // GroupNonUniform: of any kind, votes, sums, ballots, shuffles, and what nothing here declares.
@@ -70,15 +45,13 @@ fn every_kernel_says_what_it_does_across_subgroups() {
 #[test]
 fn structs_lie_alike_on_both_sides() {
     let mut seen = BTreeSet::new();
-    let kernels = kernels::ALL.iter().map(|kernel| (kernel.name, reflected(kernel)));
-    let programs = programs::ALL.iter().flat_map(|program| both(program).map(|module| (program.name, module)));
-    for (user, module) in kernels.chain(programs) {
-        for found in module.structs {
+    for kernel in kernels::ALL {
+        for found in reflected(kernel).structs {
             let Some((name, fields, _)) = layouts::all().into_iter().find(|(name, ..)| *name == found.name) else {
                 continue;
             };
             let declared: Vec<_> = fields.iter().map(|f| (f.name.to_owned(), f.offset as u32)).collect();
-            assert_eq!(found.members, declared, "{name} in {user}");
+            assert_eq!(found.members, declared, "{name} in {}", kernel.name);
             seen.insert(name);
         }
     }
@@ -97,11 +70,10 @@ fn committed_files_are_those_of_the_manifest() {
             Sha256::digest(std::fs::read(folder.join(path)).unwrap()).iter().map(|b| format!("{b:02x}")).collect();
         assert_eq!(found, *hash, "{path}: run `cargo xtask shaders`");
     }
-    let kernels = kernels::ALL.iter().map(|k| [format!("glsl/{}.comp", k.name), format!("spirv/{}.spv", k.name)]);
-    let stage = |name: &str, stage: &str| [format!("glsl/{name}.{stage}"), format!("spirv/{name}.{stage}.spv")];
-    let programs = programs::ALL.iter().flat_map(|p| [stage(p.name, "vert"), stage(p.name, "frag")]);
-    for path in kernels.chain(programs).flatten() {
-        assert!(listed.iter().any(|(p, _)| *p == path), "{path} is not in the manifest");
+    for kernel in kernels::ALL {
+        for path in [format!("glsl/{}.comp", kernel.name), format!("spirv/{}.spv", kernel.name)] {
+            assert!(listed.iter().any(|(p, _)| *p == path), "{path} is not in the manifest");
+        }
     }
     let structs = std::fs::read_to_string(folder.join("glsl/include/layouts.glsl")).unwrap();
     assert_eq!(structs, layouts::glsl());

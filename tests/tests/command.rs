@@ -218,13 +218,9 @@ fn passport_names_every_device_and_conforms_or_is_exit_6() {
         let recordings = passport["recordings"].as_array().unwrap();
         let names: Vec<_> = recordings.iter().map(|r| r["recording"].as_str().unwrap()).collect();
         let shadows = ["shadow lists", "shadow look-ups", "shadow"];
-        let splats = ["project", "shade", "composite", "draw", "opaque", "chain"];
+        let splats = ["project", "shade", "composite", "opaque", "chain"];
         let particles = ["particles", "made particles", "lit particles"];
-        let mut all = [&["order"][..], &shadows, &splats, &particles].concat();
-        // A device that does not draw says so, and is valid all the same.
-        let missing = passport["missing"].as_array().unwrap();
-        let draws = !missing.contains(&"draws that blend 32-bit floats".into());
-        all.retain(|name| draws || *name != "draw");
+        let all = [&["order"][..], &shadows, &splats, &particles].concat();
         assert_eq!(names, all);
     }
 }

@@ -1,4 +1,4 @@
-//! `cargo xtask shaders`: `shaders/glsl/*.{comp,vert,frag}` → `shaders/spirv/*.spv`, and the manifest that says from what and by what.
+//! `cargo xtask shaders`: `shaders/glsl/*.comp` → `shaders/spirv/*.spv`, and the manifest that says from what and by what.
 
 #[cfg(feature = "glslang")]
 mod compile;
@@ -11,7 +11,7 @@ use std::process::Command;
 #[cfg(feature = "glslang")]
 const FOLDER: &str = "shaders";
 
-/// Compiles every kernel and all that draws; `check` compares with what is committed and writes nothing.
+/// Compiles every kernel; `check` compares with what is committed and writes nothing.
 #[cfg(feature = "glslang")]
 pub(crate) fn run(repo: &Repo, check: bool) -> Outcome {
     compile::run(&repo.root, check)

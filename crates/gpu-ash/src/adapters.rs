@@ -2,14 +2,13 @@
 
 use crate::failure;
 use crate::instance::Instance;
-use crate::memory;
 use ash::{khr, vk};
-use splat_shaders::{Adapter, AdapterKind, DeviceError, Drawing, Format, SubgroupOps, Validation};
+use splat_shaders::{Adapter, AdapterKind, DeviceError, SubgroupOps, Validation};
 
 /// A device before it is opened.
 pub(crate) struct Found {
     pub(crate) physical: vk::PhysicalDevice,
-    /// A family of queues that compute, and draw where there is one that does both.
+    /// A family of queues that compute.
     pub(crate) family: u32,
     /// Nanoseconds a tick of the device's clock; 0 where it has none.
     pub(crate) tick_ns: f64,
@@ -47,9 +46,8 @@ fn describe(instance: &Instance, physical: vk::PhysicalDevice) -> Option<Found> 
         let families = instance.raw.get_physical_device_queue_family_properties(physical);
         (families, instance.raw.get_physical_device_memory_properties(physical))
     };
-    let able = |flags| families.iter().position(|f| f.queue_flags.contains(flags));
-    let both = able(vk::QueueFlags::COMPUTE | vk::QueueFlags::GRAPHICS);
-    let family = both.or_else(|| able(vk::QueueFlags::COMPUTE))?;
+    let computes = |f: &vk::QueueFamilyProperties| f.queue_flags.contains(vk::QueueFlags::COMPUTE);
+    let family = families.iter().position(computes)?;
     let bits = families[family].timestamp_valid_bits;
     let heaps = memory.memory_heaps_as_slice().iter();
     let local = heaps.filter(|heap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL));
@@ -62,30 +60,9 @@ fn describe(instance: &Instance, physical: vk::PhysicalDevice) -> Option<Found> 
         subgroup: subgroup.subgroup_size,
         wide_atomics: wide_atomics(instance, physical),
         subgroup_ops: subgroup_ops(&subgroup),
-        drawing: both.map_or(Drawing::default(), |_| drawing(instance, physical, &basic.limits)),
     };
     let tick_ns = if bits == 0 { 0.0 } else { f64::from(basic.limits.timestamp_period) };
     Some(Found { physical, family: family as u32, tick_ns, tick_mask: u64::MAX >> (64 - bits.clamp(1, 64)), adapter })
-}
-
-/// What a device with a queue that draws can draw.
-fn drawing(instance: &Instance, physical: vk::PhysicalDevice, limits: &vk::PhysicalDeviceLimits) -> Drawing {
-    // SAFETY: `physical` comes from this living instance.
-    let (features, blends) = unsafe {
-        let blends = [Format::R32F, Format::Rgba32F].map(|format| {
-            let known = instance.raw.get_physical_device_format_properties(physical, memory::format(format));
-            known.optimal_tiling_features.contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND)
-        });
-        (instance.raw.get_physical_device_features(physical), blends)
-    };
-    let most = limits.max_color_attachments.min(limits.max_fragment_output_attachments);
-    let [width, height] = limits.max_viewport_dimensions;
-    let framebuffer = limits.max_framebuffer_width.min(limits.max_framebuffer_height);
-    Drawing {
-        targets: if features.independent_blend == vk::TRUE { most } else { 1 },
-        side: limits.max_image_dimension2_d.min(framebuffer).min(width).min(height),
-        blends_single: blends == [true; 2],
-    }
 }
 
 /// Whether a device has the extension and both features that kernels with 64-bit atomics need.

@@ -7,9 +7,7 @@ use crate::memory::Memory;
 use crate::pipeline::Pipeline;
 use crate::prepared::Prepared;
 use ash::{khr, vk};
-use splat_shaders::{
-    Adapter, Barrier, Blend, Choice, DeviceError, Format, Inputs, Kernel, Program, Recording, Run, Validation, barriers,
-};
+use splat_shaders::{Adapter, Barrier, Choice, DeviceError, Inputs, Kernel, Recording, Run, Validation, barriers};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -30,15 +28,11 @@ impl Drop for Logical {
     }
 }
 
-/// A program's name, and the formats that it blends into, with how.
-type Drawn = (&'static str, Vec<(Format, Blend)>);
-
 /// A device that runs recordings. Everything it made lives as long as somebody holds it.
 pub struct Device {
     logical: Arc<Logical>,
     memory: Arc<Memory>,
     pipelines: HashMap<&'static str, Arc<Pipeline>>,
-    drawings: HashMap<Drawn, Arc<Pipeline>>,
     patience: Duration,
     watched: bool,
 }
@@ -64,7 +58,7 @@ impl Device {
         // What a kernel reads beyond its buffers is defined then. GPU-assisted validation is to see it instead.
         let robust = vk::PhysicalDeviceFeatures::default().robust_buffer_access(validation != Validation::GpuAssisted);
         let wide = found.adapter.wide_atomics;
-        let enabled = robust.shader_int64(wide).independent_blend(found.adapter.drawing.targets > 1);
+        let enabled = robust.shader_int64(wide);
         let extensions = [khr::shader_atomic_int64::NAME.as_ptr()];
         let mut atomics = vk::PhysicalDeviceShaderAtomicInt64Features::default().shader_buffer_int64_atomics(true);
         let mut info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_features(&enabled);
@@ -81,8 +75,7 @@ impl Device {
         let patience = found.adapter.kind.patience();
         let logical = Arc::new(Logical { raw, instance, found, queue: Mutex::new(queue) });
         let memory = Arc::new(Memory::new(&logical)?);
-        let (pipelines, drawings) = (HashMap::new(), HashMap::new());
-        Ok(Self { logical, memory, pipelines, drawings, patience, watched: validation != Validation::Off })
+        Ok(Self { logical, memory, pipelines: HashMap::new(), patience, watched: validation != Validation::Off })
     }
 
     /// Lets what is prepared from now on run that long until the device counts as hung, instead of
@@ -174,21 +167,6 @@ impl Device {
         }
         let made = Arc::new(Pipeline::new(&self.logical, kernel)?);
         self.pipelines.insert(kernel.name, made.clone());
-        Ok(made)
-    }
-
-    /// The program for images of these formats, compiled once.
-    pub(crate) fn drawing(
-        &mut self,
-        program: &'static Program,
-        targets: Vec<(Format, Blend)>,
-    ) -> Result<Arc<Pipeline>, DeviceError> {
-        let drawn = (program.name, targets);
-        if let Some(known) = self.drawings.get(&drawn) {
-            return Ok(known.clone());
-        }
-        let made = Arc::new(Pipeline::of_program(&self.logical, program, &drawn.1)?);
-        self.drawings.insert(drawn, made.clone());
         Ok(made)
     }
 }

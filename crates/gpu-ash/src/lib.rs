@@ -36,7 +36,6 @@ mod instance;
 #[cfg(feature = "losing")]
 mod losing;
 mod memory;
-mod pass;
 mod pipeline;
 mod prepared;
 

@@ -3,12 +3,11 @@
 use crate::commands::Commands;
 use crate::device::{Device, Logical};
 use crate::failure;
-use crate::memory::{Buffer, Image};
-use crate::pass::Pass;
+use crate::memory::Buffer;
 use crate::pipeline::Pipeline;
 use ash::vk;
 use gpu_allocator::MemoryLocation;
-use splat_shaders::{Barrier, BufferId, DeviceError, Inputs, PassTime, Recording, Run, Step, Target, batches};
+use splat_shaders::{Barrier, BufferId, DeviceError, Dispatch, Inputs, PassTime, Recording, Run, Step, batches};
 use std::mem;
 use std::ops::Range;
 use std::sync::{Arc, PoisonError};
@@ -27,11 +26,8 @@ pub struct Prepared {
     uploads: Vec<Beside>,
     reads: Vec<Beside>,
     buffers: Vec<Buffer>,
-    images: Vec<Image>,
-    /// One for each draw.
-    passes: Vec<Pass>,
-    /// The steps that are dispatches or draws, with their kernels or programs.
-    works: Vec<(usize, &'static str)>,
+    /// The steps that are dispatches, with their kernels.
+    dispatches: Vec<(usize, &'static str)>,
     pipelines: Vec<Arc<Pipeline>>,
     steps: usize,
     sets: vk::DescriptorPool,
@@ -54,9 +50,7 @@ impl Prepared {
             uploads: Vec::new(),
             reads: Vec::new(),
             buffers: Vec::new(),
-            images: Vec::new(),
-            passes: Vec::new(),
-            works: Vec::new(),
+            dispatches: Vec::new(),
             pipelines: Vec::new(),
             steps: recording.steps().len(),
             sets: vk::DescriptorPool::null(),
@@ -72,19 +66,9 @@ impl Prepared {
         made.take_memory(device, recording)?;
         made.make_objects(recording, if device.is_watched() { 1 } else { made.steps })?;
         for (at, step) in recording.steps().iter().enumerate() {
-            match step {
-                Step::Dispatch(dispatch) => {
-                    made.works.push((at, dispatch.kernel.name));
-                    made.pipelines.push(device.pipeline(dispatch.kernel)?);
-                }
-                Step::Draw(draw) => {
-                    let target = |t: &Target| (recording.images()[t.image.index()].format, t.blend);
-                    let targets = draw.targets.iter().map(target).collect();
-                    made.works.push((at, draw.program.name));
-                    made.pipelines.push(device.drawing(draw.program, targets)?);
-                    made.passes.push(Pass::new(&made.logical, recording, draw, &made.images)?);
-                }
-                Step::Upload(_) | Step::Read(_) | Step::Copy { .. } => {}
+            if let Step::Dispatch(dispatch) = step {
+                made.dispatches.push((at, dispatch.kernel.name));
+                made.pipelines.push(device.pipeline(dispatch.kernel)?);
             }
         }
         made.write(recording, waits)?;
@@ -98,14 +82,11 @@ impl Prepared {
         for b in recording.buffers() {
             self.buffers.push(Buffer::new(memory, b.name, b.bytes, all, MemoryLocation::GpuOnly)?);
         }
-        for image in recording.images() {
-            self.images.push(Image::new(memory, image)?);
-        }
         for step in recording.steps() {
             let (id, usage, location, side) = match step {
                 Step::Upload(id) => (*id, Usage::TRANSFER_SRC, MemoryLocation::CpuToGpu, &mut self.uploads),
                 Step::Read(id) => (*id, Usage::TRANSFER_DST, MemoryLocation::GpuToCpu, &mut self.reads),
-                Step::Dispatch(_) | Step::Draw(_) | Step::Copy { .. } => continue,
+                Step::Dispatch(_) => continue,
             };
             let of = &recording.buffers()[id.index()];
             let mut buffer = Buffer::new(memory, of.name, of.bytes, usage, location)?;
@@ -118,11 +99,12 @@ impl Prepared {
 
     fn make_objects(&mut self, recording: &Recording, commands: usize) -> Result<(), DeviceError> {
         let (device, family) = (&self.logical.raw, self.logical.found.family);
-        let bound = || recording.steps().iter().filter_map(bound_by);
-        let bindings = bound().map(|buffers| buffers.len() as u32).sum::<u32>().max(1);
+        let dispatches = || recording.steps().iter().filter_map(dispatch_of);
+        let bindings = dispatches().map(|d| d.buffers.len() as u32).sum::<u32>().max(1);
         let sizes =
             [vk::DescriptorPoolSize::default().ty(vk::DescriptorType::STORAGE_BUFFER).descriptor_count(bindings)];
-        let sets = vk::DescriptorPoolCreateInfo::default().max_sets(bound().count().max(1) as u32).pool_sizes(&sizes);
+        let sets =
+            vk::DescriptorPoolCreateInfo::default().max_sets(dispatches().count().max(1) as u32).pool_sizes(&sizes);
         let pool = vk::CommandPoolCreateInfo::default().queue_family_index(family);
         // SAFETY: the infos and what they point to outlive the calls; `Drop` destroys what was made.
         unsafe {
@@ -150,13 +132,11 @@ impl Prepared {
 
     fn write(&self, recording: &Recording, waits: &[Vec<Barrier>]) -> Result<(), DeviceError> {
         let device = &self.logical.raw;
-        let (mut uploads, mut reads) = (self.uploads.iter(), self.reads.iter());
-        let (mut pipelines, mut passes) = (self.pipelines.iter(), self.passes.iter());
+        let (mut uploads, mut reads, mut pipelines) = (self.uploads.iter(), self.reads.iter(), self.pipelines.iter());
         for (at, (step, waits)) in recording.steps().iter().zip(waits).enumerate() {
             let steps_of_one = self.steps / self.commands.len();
             let raw = self.commands[at / steps_of_one];
-            let (buffers, images) = (&self.buffers[..], &self.images[..]);
-            let commands = Commands { logical: &self.logical, raw, buffers, images, clock: self.clock };
+            let commands = Commands { logical: &self.logical, raw, buffers: &self.buffers, clock: self.clock };
             if at % steps_of_one == 0 {
                 let begin = vk::CommandBufferBeginInfo::default();
                 // SAFETY: the command buffer is new and nobody else has it.
@@ -178,16 +158,7 @@ impl Prepared {
                 }
                 Step::Dispatch(dispatch) => {
                     let pipeline = pipelines.next().expect("invariant: one for each dispatch");
-                    commands.dispatch(dispatch, pipeline, self.bind(&dispatch.buffers, pipeline)?);
-                }
-                Step::Draw(draw) => {
-                    let pipeline = pipelines.next().expect("invariant: one for each draw");
-                    let pass = passes.next().expect("invariant: one for each draw");
-                    commands.draw(draw, pipeline, self.bind(&draw.buffers, pipeline)?, pass);
-                }
-                Step::Copy { image, buffer } => {
-                    let of = &recording.images()[image.index()];
-                    commands.copy_image(&images[image.index()], buffers[buffer.index()].raw, of);
+                    commands.dispatch(dispatch, pipeline, self.bind(dispatch, pipeline)?);
                 }
             }
             commands.tick(at as u32 + 1);
@@ -202,19 +173,19 @@ impl Prepared {
         Ok(())
     }
 
-    /// The buffers of a dispatch or a draw as its shaders see them.
-    fn bind(&self, buffers: &[BufferId], pipeline: &Pipeline) -> Result<vk::DescriptorSet, DeviceError> {
+    /// The buffers of a dispatch as the kernel sees them.
+    fn bind(&self, dispatch: &Dispatch, pipeline: &Pipeline) -> Result<vk::DescriptorSet, DeviceError> {
         let device = &self.logical.raw;
         let layouts = [pipeline.set_layout];
         let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.sets).set_layouts(&layouts);
-        // SAFETY: the pool was made with room for every set.
+        // SAFETY: the pool was made with room for every dispatch's set.
         let made =
             unsafe { device.allocate_descriptor_sets(&info) }.map_err(failure::of("vkAllocateDescriptorSets"))?;
         let set = made.first().copied().unwrap_or_default();
         let whole = |id: &BufferId| {
             [vk::DescriptorBufferInfo::default().buffer(self.buffers[id.index()].raw).range(vk::WHOLE_SIZE)]
         };
-        let infos: Vec<_> = buffers.iter().map(whole).collect();
+        let infos: Vec<_> = dispatch.buffers.iter().map(whole).collect();
         let write = |(binding, info)| {
             vk::WriteDescriptorSet::default()
                 .dst_set(set)
@@ -295,16 +266,14 @@ impl Prepared {
             self.batches = batches(&took);
         }
         let pass = |&(step, kernel): &(usize, &'static str)| PassTime { kernel, nanoseconds: took[step] };
-        Ok(self.works.iter().map(pass).collect())
+        Ok(self.dispatches.iter().map(pass).collect())
     }
 }
 
-/// The buffers that a step's shaders see.
-fn bound_by(step: &Step) -> Option<&[BufferId]> {
+fn dispatch_of(step: &Step) -> Option<&Dispatch> {
     match step {
-        Step::Dispatch(dispatch) => Some(&dispatch.buffers),
-        Step::Draw(draw) => Some(&draw.buffers),
-        Step::Upload(_) | Step::Read(_) | Step::Copy { .. } => None,
+        Step::Dispatch(dispatch) => Some(dispatch),
+        Step::Upload(_) | Step::Read(_) => None,
     }
 }
 
@@ -313,7 +282,6 @@ impl Drop for Prepared {
         if self.hung {
             // Nothing may end that the device might still use: this is the one leak, of a device that is given up.
             mem::forget((mem::take(&mut self.uploads), mem::take(&mut self.reads), mem::take(&mut self.buffers)));
-            mem::forget((mem::take(&mut self.images), mem::take(&mut self.passes)));
             mem::forget((mem::take(&mut self.pipelines), self.logical.clone()));
             return;
         }

@@ -1,6 +1,6 @@
 //! The adapters that wgpu finds.
 
-use splat_shaders::{Adapter, AdapterKind, DeviceError, Drawing, SubgroupOps, Validation};
+use splat_shaders::{Adapter, AdapterKind, DeviceError, SubgroupOps, Validation};
 
 /// Features without which no recording runs.
 const NEEDED: wgpu::Features = wgpu::Features::IMMEDIATES;
@@ -40,12 +40,10 @@ const WIDE_ATOMICS: wgpu::Features = wgpu::Features::SHADER_INT64
     .union(wgpu::Features::SHADER_INT64_ATOMIC_MIN_MAX)
     .union(wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS);
 
-/// What is asked of an adapter: the needed features; clocks, subgroups, blending of 32-bit floats and 64-bit atomics where it has
-/// them.
+/// What is asked of an adapter: the needed features, clocks, subgroups and 64-bit atomics where it has them.
 pub(crate) fn features(adapter: &wgpu::Adapter) -> wgpu::Features {
     let wide = if adapter.features().contains(WIDE_ATOMICS) { WIDE_ATOMICS } else { wgpu::Features::empty() };
-    let welcome = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::SUBGROUP | wgpu::Features::FLOAT32_BLENDABLE;
-    NEEDED | wide | (adapter.features() & welcome)
+    NEEDED | wide | (adapter.features() & (wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::SUBGROUP))
 }
 
 pub(crate) fn describe(adapter: &wgpu::Adapter) -> Adapter {
@@ -71,20 +69,5 @@ pub(crate) fn describe(adapter: &wgpu::Adapter) -> Adapter {
         } else {
             SubgroupOps::NONE
         },
-        drawing: drawing(adapter),
-    }
-}
-
-/// Nothing where programs cannot pull what they draw from buffers.
-fn drawing(adapter: &wgpu::Adapter) -> Drawing {
-    let (flags, limits) = (adapter.get_downlevel_capabilities().flags, adapter.limits());
-    if !flags.contains(wgpu::DownlevelFlags::VERTEX_STORAGE | wgpu::DownlevelFlags::INDIRECT_EXECUTION) {
-        return Drawing::default();
-    }
-    let own = flags.contains(wgpu::DownlevelFlags::INDEPENDENT_BLEND);
-    Drawing {
-        targets: if own { limits.max_color_attachments } else { 1 },
-        side: limits.max_texture_dimension_2d,
-        blends_single: adapter.features().contains(wgpu::Features::FLOAT32_BLENDABLE),
     }
 }

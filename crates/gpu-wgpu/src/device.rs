@@ -1,11 +1,8 @@
 //! An opened device and the kernels it compiled.
 
 use crate::adapters::{describe, features, find, instance};
-use crate::drawing;
 use crate::prepared::Prepared;
-use splat_shaders::{
-    Access, Adapter, Blend, Choice, DeviceError, Format, Inputs, Kernel, Program, Recording, Run, Validation,
-};
+use splat_shaders::{Access, Adapter, Choice, DeviceError, Inputs, Kernel, Recording, Run, Validation};
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -43,9 +40,6 @@ impl Faults {
     }
 }
 
-/// A program's name, and the formats that it blends into, with how.
-type Drawn = (&'static str, Vec<(Format, Blend)>);
-
 /// A device that runs recordings.
 pub struct Device {
     raw: wgpu::Device,
@@ -53,7 +47,6 @@ pub struct Device {
     adapter: Adapter,
     faults: Arc<Faults>,
     pipelines: HashMap<&'static str, wgpu::ComputePipeline>,
-    drawings: HashMap<Drawn, wgpu::RenderPipeline>,
     patience: Duration,
 }
 
@@ -85,8 +78,7 @@ impl Device {
         raw.set_device_lost_callback(move |_, _| lost.lost.store(true, Ordering::Relaxed));
         let adapter = adapters[at].clone();
         let patience = adapter.kind.patience();
-        let (pipelines, drawings) = (HashMap::new(), HashMap::new());
-        Ok(Self { raw, queue, adapter, faults, pipelines, drawings, patience })
+        Ok(Self { raw, queue, adapter, faults, pipelines: HashMap::new(), patience })
     }
 
     /// Lets what is prepared from now on run that long until the device counts as hung, instead of
@@ -138,17 +130,6 @@ impl Device {
         }
         let made = compile(&self.raw, kernel);
         self.pipelines.insert(kernel.name, made.clone());
-        made
-    }
-
-    /// The program for images of these formats, compiled once.
-    pub(crate) fn drawing(&mut self, program: &'static Program, targets: Vec<(Format, Blend)>) -> wgpu::RenderPipeline {
-        let drawn = (program.name, targets);
-        if let Some(known) = self.drawings.get(&drawn) {
-            return known.clone();
-        }
-        let made = drawing::compile(&self.raw, program, &drawn.1);
-        self.drawings.insert(drawn, made.clone());
         made
     }
 }

@@ -18,7 +18,6 @@
 mod adapters;
 mod backend;
 mod device;
-mod drawing;
 mod prepared;
 
 pub use adapters::adapters;

@@ -1,10 +1,7 @@
 //! A recording on the device: its memory, its bindings, and how it is run.
 
 use crate::device::{Device, Faults};
-use crate::drawing::{BoundDraw, Texture};
-use splat_shaders::{
-    BufferId, DeviceError, Dispatch, Draw, Groups, ImageId, Inputs, PassTime, Recording, Run, Step, Target, batches,
-};
+use splat_shaders::{BufferId, DeviceError, Dispatch, Groups, Inputs, PassTime, Recording, Run, Step, batches};
 use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
@@ -26,13 +23,11 @@ struct Bound {
 /// What is done in the order of the recording.
 enum Action {
     Dispatch(Bound),
-    Draw(BoundDraw),
-    Copy(ImageId, BufferId),
     /// Into this buffer, which the processor sees.
     Read(Met, wgpu::Buffer),
 }
 
-/// The device's clock: two notes for each dispatch and each draw.
+/// The device's clock: two notes for each dispatch.
 struct Clock {
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,
@@ -45,7 +40,6 @@ pub struct Prepared {
     /// What was given last for each upload, in whole; zeros at first.
     given: Vec<Vec<u8>>,
     buffers: Vec<wgpu::Buffer>,
-    textures: Vec<Texture>,
     actions: Vec<Action>,
     /// Actions that are submitted together, by what they took in the run before.
     batches: Vec<Range<usize>>,
@@ -65,7 +59,6 @@ impl Prepared {
         use wgpu::BufferUsages as Usage;
         let all = Usage::STORAGE | Usage::INDIRECT | Usage::COPY_SRC | Usage::COPY_DST;
         let buffers: Vec<_> = recording.buffers().iter().map(|b| buffer(&raw, b.name, b.bytes, all)).collect();
-        let textures = recording.images().iter().map(|image| Texture::new(&raw, image)).collect();
         let met = |id: BufferId| {
             let of = &recording.buffers()[id.index()];
             Met { id, name: of.name, bytes: of.bytes }
@@ -85,20 +78,18 @@ impl Prepared {
                 }
                 Step::Dispatch(dispatch) => {
                     let pipeline = device.pipeline(dispatch.kernel);
-                    let group = bind(&raw, &pipeline.get_bind_group_layout(0), &dispatch.buffers, &buffers);
+                    let group = bind(&raw, dispatch, &pipeline, &buffers);
                     actions.push(Action::Dispatch(Bound { dispatch: dispatch.clone(), pipeline, group }));
                 }
-                Step::Draw(draw) => actions.push(Action::Draw(bound_draw(device, recording, draw, &buffers))),
-                Step::Copy { image, buffer } => actions.push(Action::Copy(*image, *buffer)),
             }
         }
-        let works = actions.iter().filter(|a| matches!(a, Action::Dispatch(_) | Action::Draw(_))).count() as u32;
-        let clocked = works > 0 && raw.features().contains(wgpu::Features::TIMESTAMP_QUERY);
+        let dispatches = actions.iter().filter(|a| matches!(a, Action::Dispatch(_))).count() as u32;
+        let clocked = dispatches > 0 && raw.features().contains(wgpu::Features::TIMESTAMP_QUERY);
         // Beyond this many queries, wgpu refuses a set.
-        let clock = (clocked && 2 * works <= wgpu::QUERY_SET_MAX_QUERIES).then(|| Clock::new(&raw, 2 * works));
+        let clock =
+            (clocked && 2 * dispatches <= wgpu::QUERY_SET_MAX_QUERIES).then(|| Clock::new(&raw, 2 * dispatches));
         let batches = batches(&vec![f64::INFINITY; actions.len()]);
-        let (device, hung) = (raw, false);
-        Self { uploads, given, buffers, textures, actions, batches, clock, device, queue, faults, patience, hung }
+        Self { uploads, given, buffers, actions, batches, clock, device: raw, queue, faults, patience, hung: false }
     }
 
     /// Uploads the inputs, runs the steps, waits, and gives what they read back. An input that is not given keeps its
@@ -132,7 +123,7 @@ impl Prepared {
         }
         let reads = self.actions.iter().filter_map(|action| match action {
             Action::Read(met, seen) => Some((met.id, seen)),
-            Action::Dispatch(_) | Action::Draw(_) | Action::Copy(..) => None,
+            Action::Dispatch(_) => None,
         });
         let reads: Vec<_> = reads.collect();
         reads
@@ -161,18 +152,6 @@ impl Prepared {
             match action {
                 Action::Read(met, seen) => {
                     encoder.copy_buffer_to_buffer(&self.buffers[met.id.index()], 0, seen, 0, Some(met.bytes));
-                }
-                Action::Copy(image, buffer) => {
-                    self.textures[image.index()].copy(&mut encoder, &self.buffers[buffer.index()]);
-                }
-                Action::Draw(bound) => {
-                    let clock = self.clock.as_ref().map(|clock| wgpu::RenderPassTimestampWrites {
-                        query_set: &clock.queries,
-                        beginning_of_pass_write_index: Some(*query),
-                        end_of_pass_write_index: Some(*query + 1),
-                    });
-                    bound.encode(&mut encoder, &self.textures, &self.buffers, clock);
-                    *query += 2;
                 }
                 Action::Dispatch(bound) => {
                     let timestamp_writes = self.clock.as_ref().map(|clock| wgpu::ComputePassTimestampWrites {
@@ -215,14 +194,15 @@ impl Prepared {
         let mut times = ticks.iter().map(time);
         let (mut passes, mut took) = (Vec::new(), Vec::with_capacity(self.actions.len()));
         for action in &self.actions {
-            let kernel = match action {
-                Action::Dispatch(bound) => Some(bound.dispatch.kernel.name),
-                Action::Draw(bound) => Some(bound.draw.program.name),
-                Action::Read(..) | Action::Copy(..) => None,
+            let nanoseconds = match action {
+                Action::Dispatch(bound) => {
+                    let nanoseconds = times.next().unwrap_or(f64::INFINITY);
+                    passes.push(PassTime { kernel: bound.dispatch.kernel.name, nanoseconds });
+                    nanoseconds
+                }
+                // wgpu has no clock for copies; they are short.
+                Action::Read(..) => 0.0,
             };
-            // wgpu has no clock for copies; they are short.
-            let nanoseconds = kernel.map_or(0.0, |_| times.next().unwrap_or(f64::INFINITY));
-            passes.extend(kernel.map(|kernel| PassTime { kernel, nanoseconds }));
             took.push(nanoseconds);
         }
         self.batches = batches(&took);
@@ -255,26 +235,19 @@ fn buffer(device: &wgpu::Device, name: &str, size: u64, usage: wgpu::BufferUsage
     device.create_buffer(&wgpu::BufferDescriptor { label: Some(name), size, usage, mapped_at_creation: false })
 }
 
-fn bound_draw(device: &mut Device, recording: &Recording, draw: &Draw, buffers: &[wgpu::Buffer]) -> BoundDraw {
-    let target = |t: &Target| (recording.images()[t.image.index()].format, t.blend);
-    let pipeline = device.drawing(draw.program, draw.targets.iter().map(target).collect());
-    let (raw, ..) = device.parts();
-    let group = bind(raw, &pipeline.get_bind_group_layout(0), &draw.buffers, buffers);
-    BoundDraw { draw: draw.clone(), pipeline, group }
-}
-
 fn bind(
     device: &wgpu::Device,
-    layout: &wgpu::BindGroupLayout,
-    bound: &[BufferId],
+    dispatch: &Dispatch,
+    pipeline: &wgpu::ComputePipeline,
     buffers: &[wgpu::Buffer],
 ) -> wgpu::BindGroup {
     let entry = |(binding, id): (u32, &BufferId)| wgpu::BindGroupEntry {
         binding,
         resource: buffers[id.index()].as_entire_binding(),
     };
-    let entries: Vec<_> = (0..).zip(bound).map(entry).collect();
-    device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
+    let entries: Vec<_> = (0..).zip(&dispatch.buffers).map(entry).collect();
+    let (label, layout) = (Some(dispatch.kernel.name), &pipeline.get_bind_group_layout(0));
+    device.create_bind_group(&wgpu::BindGroupDescriptor { label, layout, entries: &entries })
 }
 
 /// The bytes of a buffer that was asked to be mapped and waited for.

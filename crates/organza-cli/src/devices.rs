@@ -74,7 +74,6 @@ mod tests {
                 subgroup: 8,
                 wide_atomics: true,
                 subgroup_ops: Default::default(),
-                drawing: Default::default(),
             };
             ListedDevice { backend, adapter }
         };

@@ -112,7 +112,6 @@ mod tests {
             subgroup: 8,
             wide_atomics: true,
             subgroup_ops: Default::default(),
-            drawing: Default::default(),
         };
         let passes = vec![KernelTime { kernel: "hbsort_scatter", dispatches: 4, nanoseconds: 2.5e6 }];
         let checked = Checked { recording: "order", items: 9, outcome, passes };

@@ -186,7 +186,6 @@ mod tests {
                 subgroup: 0,
                 wide_atomics: false,
                 subgroup_ops: SubgroupOps::NONE,
-                drawing: Default::default(),
             })))
         }
     }

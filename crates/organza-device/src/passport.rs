@@ -48,10 +48,9 @@ impl Passport {
 /// One recording on one device.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Checked {
-    /// `order`, `shadow lists`, `shadow` (deposits, lists and look-ups as one), `project`, `shade`,
-    /// `composite`, `opaque`, `chain` (the order,
-    /// `project`, `shade` and `composite` as one), `particles` (uploaded sets), `made particles` (sets of the same seeds that the
-    /// device makes) or `lit particles` (the same in the light of a lamp with a shadow map).
+    /// `order`, `shadow lists`, `shadow` (deposits, lists and look-ups as one), `project`, `shade`, `composite`, `opaque`,
+    /// `chain` (the order, `project`, `shade` and `composite` as one), `particles` (uploaded sets), `made particles` (sets of the
+    /// same seeds that the device makes) or `lit particles` (the same in the light of a lamp with a shadow map).
     pub recording: &'static str,
     /// Splats or particles that went in.
     pub items: u64,

@@ -1,7 +1,6 @@
 //! The recorded compositing, without a device: what it is, and what it refuses.
 
 use glam::{DVec3, Vec3};
-use splat_core::raster::gpu::draw::{self, Precision};
 use splat_core::raster::gpu::{AttributeRoom, Capacities, Input, follow, project, record, resolve};
 use splat_core::raster::{self, Accumulation, OpaqueImage, Params, Projected};
 use splat_core::shade::{ChannelLayout, MAX_CHANNELS, gpu as shade};
@@ -28,48 +27,6 @@ const ROOM: Capacities = Capacities {
 fn it_is_as_kept_in_text() {
     let found = record(ROOM).unwrap().recording.to_string();
     assert_eq!(found, include_str!("recording.txt"), "now:\n{found}");
-    let found = draw::record(ROOM, Precision::Single).unwrap().recording.to_string();
-    assert_eq!(found, include_str!("recording_draw.txt"), "now:\n{found}");
-}
-
-#[test]
-fn every_channel_is_drawn_once_with_the_plane_that_hides_it() {
-    for (planes, channels) in
-        [(1, 1), (1, 3), (1, 4), (1, MOST), (3, 1), (3, 3), (3, 4), (3, 6), (3, 12), (3, 13), (3, MOST)]
-    {
-        let found = draw::follow(Capacities { planes, channels, ..ROOM }, Precision::Half).unwrap();
-        let text = found.recording.to_string();
-        assert!(found.sorted.is_some() && text.contains("splat_follow 1x1x1 sorted view*\n"));
-        let resolved = text.lines().filter(|line| line.starts_with("splat_drawn"));
-        let push = |line: &str| -> Vec<u32> {
-            let words: Vec<u32> = line.split(' ').filter_map(|word| word.parse().ok()).collect();
-            words[words.len() - 8..].to_vec()
-        };
-        let draws: Vec<Vec<u32>> = resolved.map(push).collect();
-        let mut seen = vec![0; channels as usize];
-        for draw in &draws {
-            for &c in draw[1..4].iter().filter(|c| **c != u32::MAX) {
-                // One colour or four effects; normal and shadow behind them are no colours.
-                let colors = [0, 3, 12][usize::from(channels >= 3) + usize::from(channels >= 12)];
-                let expected = if planes == 1 {
-                    0
-                } else if c < colors {
-                    c % 3
-                } else {
-                    1
-                };
-                assert_eq!(draw[0], expected, "{planes} {channels} {draw:?}");
-                seen[c as usize] += 1;
-            }
-            assert_eq!(draw[6], 1, "halves");
-        }
-        assert!(seen.iter().all(|n| *n == 1), "{planes} {channels}: {draws:?}");
-        // A plane is complete once, with its last draw.
-        for plane in 0..planes {
-            let of: Vec<u32> = draws.iter().filter(|d| d[0] == plane).map(|d| d[7]).collect();
-            assert_eq!((of.iter().sum::<u32>(), of.last()), (1, Some(&1)), "{planes} {channels}");
-        }
-    }
 }
 
 #[test]
@@ -79,8 +36,6 @@ fn it_is_without_fault_for_any_room() {
             for (planes, channels) in [(1, 1), (1, 3), (3, MOST)] {
                 let room = Capacities { size, planes, channels, ordered, entries, opaque: false, ..ROOM };
                 record(room).unwrap().recording.check().unwrap();
-                draw::record(room, Precision::Single).unwrap().recording.check().unwrap();
-                draw::follow(room, Precision::Half).unwrap().recording.check().unwrap();
             }
         }
     }
@@ -96,10 +51,6 @@ fn what_no_kernel_does_is_refused() {
         Capacities { channels: MOST + 1, ..ROOM },
     ] {
         assert!(matches!(record(room), Err(Error::Invalid { .. })), "{room:?}");
-        assert!(matches!(draw::record(room, Precision::Single), Err(Error::Invalid { .. })), "{room:?}");
-    }
-    for layers in [Capacities { depths: true, ..ROOM }, Capacities { objects: true, ..ROOM }] {
-        assert!(matches!(draw::record(layers, Precision::Single), Err(Error::Invalid { .. })), "{layers:?}");
     }
 }
 

@@ -1,7 +1,6 @@
 // The splats of a tile in shared memory, batch by batch. Bound before: `view`, `splats`, `tables`.
 
 #include "fragment.glsl"
-#include "staged.glsl"
 
 // Splats that are looked at together. Also how often a tile is looked at for being done.
 const uint BATCH = 128u;
@@ -17,14 +16,24 @@ shared uint batch_look[BATCH];
 
 // Puts a splat into the batch, and gives its material.
 uint stage(uint k, uint id, uvec2 corner) {
-    Staged s = staged_of(id);
+    uint at = id * view.splat_words;
+    vec2 center = uintBitsToFloat(uvec2(splats[at], splats[at + 1u]));
+    uint look = splats[at + SPLAT_TABLES];
+    uvec4 bounds = bounds_of(center, splats[at + SPLAT_EXTENTS], view.size);
+    vec4 depth = vec4(0.0, 0.0, 0.0, 1.0);
+    if (view.splat_words > SPLAT_DEPTH) {
+        depth = uintBitsToFloat(
+            uvec4(splats[at + SPLAT_DEPTH], splats[at + 9u], splats[at + 10u], splats[at + 11u]));
+    }
+    vec4 shape = uintBitsToFloat(uvec4(splats[at + 2u], splats[at + 3u], splats[at + 4u], splats[at + SPLAT_PEAK]));
     batch_ids[k] = id;
-    batch_reach[k] = uvec4(s.bounds.x & ~3u, (s.bounds.y + 3u) & ~3u, s.bounds.z & ~3u, (s.bounds.w + 3u) & ~3u);
-    batch_conic[k] = vec4(origin_of(corner, s.center), s.conic);
-    batch_peak[k] = s.peak;
-    batch_slope[k] = s.slope;
-    batch_look[k] = s.look;
-    return s.material;
+    batch_reach[k] = uvec4(bounds.x & ~3u, (bounds.y + 3u) & ~3u, bounds.z & ~3u, (bounds.w + 3u) & ~3u);
+    batch_conic[k] = vec4(origin_of(corner, center), shape.xy);
+    batch_peak[k] = vec4(shape.zw, depth.x, depth.w);
+    batch_slope[k] = depth.yz;
+    // footprint | kind << 8.
+    batch_look[k] = look >> 16;
+    return look & 0xffffu;
 }
 
 Shape shape_of(uint k) {

@@ -107,7 +107,7 @@ void main() {
         }
         if (lane < BATCH && begin + lane < end) {
             uint material = stage(lane, ids[begin + lane], corner);
-            batch_extinction[lane] = extinction_of(material);
+            batch_extinction[lane] = uintBitsToFloat(tables[FOOTPRINT_VECTORS * view.footprints + material]);
         }
         barrier();
         uint count = min(end - begin, BATCH);

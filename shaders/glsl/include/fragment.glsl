@@ -1,4 +1,4 @@
-// What one splat does to one pixel, whoever composites: `view` and `tables` are bound before.
+// What one splat does to one pixel: `view` and `tables` are bound before.
 
 // Tiles of the processor's twin: offsets are counted from their corners, so that they have its bits.
 const uint TWIN_TILE = 32u;

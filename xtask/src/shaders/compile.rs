@@ -2,7 +2,9 @@
 
 use super::{FOLDER, cargo};
 use crate::repo::Outcome;
-use glslang::{Compiler, CompilerOptions, ShaderInput, ShaderSource, ShaderStage, SpirvVersion, Target, VulkanVersion};
+use glslang::{
+    Compiler, CompilerOptions, Shader, ShaderInput, ShaderSource, ShaderStage, SpirvVersion, Target, VulkanVersion,
+};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fs;
@@ -16,10 +18,10 @@ type Files = BTreeMap<String, Vec<u8>>;
 
 pub(super) fn run(root: &Path, check: bool) -> Outcome {
     let folder = root.join(FOLDER);
-    let shaders = shaders(&folder.join("glsl"))?;
+    let kernels = names(&folder.join("glsl"), ".comp")?;
     if !check {
         // The crate that prints the structs holds the modules too: a kernel that has none yet must not stop it.
-        let absent = shaders.iter().map(|s| folder.join(&s.module)).filter(|p| !p.exists());
+        let absent = kernels.iter().map(|k| folder.join(format!("spirv/{k}.spv"))).filter(|p| !p.exists());
         absent.into_iter().try_for_each(|p| fs::write(&p, []).map_err(|e| format!("{}: {e}", p.display())))?;
     }
     let mut made = Files::new();
@@ -32,40 +34,15 @@ pub(super) fn run(root: &Path, check: bool) -> Outcome {
         sources.insert(path, text);
     }
     sources.insert("glsl/include/layouts.glsl".to_owned(), made["glsl/include/layouts.glsl"].clone());
-    for Shader { path, module, stage } in &shaders {
-        let text = read(&folder, path)?;
-        let words = compile(path, *stage, &expand(path, &text, &sources)?)?;
-        made.insert(module.clone(), words.iter().flat_map(|w| w.to_le_bytes()).collect());
-        sources.insert(path.clone(), text);
+    for kernel in &kernels {
+        let path = format!("glsl/{kernel}.comp");
+        let text = read(&folder, &path)?;
+        let words = compile(&path, &expand(&path, &text, &sources)?)?;
+        made.insert(format!("spirv/{kernel}.spv"), words.iter().flat_map(|w| w.to_le_bytes()).collect());
+        sources.insert(path, text);
     }
     made.insert("manifest.toml".to_owned(), manifest(root, &sources, &made)?.into_bytes());
-    if check { compare(&folder, &made, &shaders) } else { write(&folder, &made, &shaders) }
-}
-
-/// A file that becomes a module.
-struct Shader {
-    path: String,
-    module: String,
-    stage: ShaderStage,
-}
-
-/// Every file that becomes a module: kernels, whose modules have their names, and both halves of what draws.
-fn shaders(folder: &Path) -> Result<Vec<Shader>, String> {
-    let stages = [
-        ("comp", "", ShaderStage::Compute),
-        ("vert", ".vert", ShaderStage::Vertex),
-        ("frag", ".frag", ShaderStage::Fragment),
-    ];
-    let mut found = Vec::new();
-    for (ending, kept, stage) in stages {
-        let shader = |name: String| Shader {
-            path: format!("glsl/{name}.{ending}"),
-            module: format!("spirv/{name}{kept}.spv"),
-            stage,
-        };
-        found.extend(names(folder, &format!(".{ending}"))?.into_iter().map(shader));
-    }
-    Ok(found)
+    if check { compare(&folder, &made, &kernels) } else { write(&folder, &made, &kernels) }
 }
 
 /// Names of the files of a folder that end so, without the ending, in order.
@@ -103,15 +80,15 @@ fn expand(path: &str, text: &[u8], sources: &Files) -> Outcome {
     Ok(whole)
 }
 
-fn compile(path: &str, stage: ShaderStage, text: &str) -> Result<Vec<u32>, String> {
+fn compile(path: &str, text: &str) -> Result<Vec<u32>, String> {
     let failed = |why: String| format!("{FOLDER}/{path}: {why}");
     let compiler = Compiler::acquire().ok_or_else(|| failed("no compiler".to_owned()))?;
     let target = Target::Vulkan { version: VulkanVersion::Vulkan1_1, spirv_version: SpirvVersion::SPIRV1_3 };
     let options = CompilerOptions { target, ..CompilerOptions::default() };
     let source = ShaderSource::from(text);
-    let input = ShaderInput::new(&source, stage, &options, None::<&[(&str, Option<&str>)]>, None);
+    let input = ShaderInput::new(&source, ShaderStage::Compute, &options, None::<&[(&str, Option<&str>)]>, None);
     let input = input.map_err(|e| failed(e.to_string()))?;
-    let shader = glslang::Shader::new(compiler, input).parse().map_err(|e| failed(e.to_string()))?;
+    let shader = Shader::new(compiler, input).parse().map_err(|e| failed(e.to_string()))?;
     shader.compile().map_err(|e| failed(e.to_string()))
 }
 
@@ -131,26 +108,26 @@ fn manifest(root: &Path, sources: &Files, made: &Files) -> Outcome {
     Ok(text)
 }
 
-/// Modules without a source.
-fn orphans(folder: &Path, shaders: &[Shader]) -> Result<Vec<String>, String> {
-    let modules = names(&folder.join("spirv"), ".spv")?.into_iter().map(|m| format!("spirv/{m}.spv"));
-    Ok(modules.filter(|m| !shaders.iter().any(|s| s.module == *m)).collect())
+/// Modules without a kernel.
+fn orphans(folder: &Path, kernels: &[String]) -> Result<Vec<String>, String> {
+    let modules = names(&folder.join("spirv"), ".spv")?;
+    Ok(modules.into_iter().filter(|m| !kernels.contains(m)).map(|m| format!("spirv/{m}.spv")).collect())
 }
 
-fn compare(folder: &Path, made: &Files, shaders: &[Shader]) -> Outcome {
+fn compare(folder: &Path, made: &Files, kernels: &[String]) -> Outcome {
     let mut stale: Vec<String> = made
         .iter()
         .filter(|(path, bytes)| fs::read(folder.join(path)).ok().as_ref() != Some(bytes))
         .map(|(p, _)| p.clone())
         .collect();
-    stale.extend(orphans(folder, shaders)?);
+    stale.extend(orphans(folder, kernels)?);
     if stale.is_empty() {
-        return Ok(format!("shaders: {} modules are what is committed", shaders.len()));
+        return Ok(format!("shaders: {} kernels compile to what is committed", kernels.len()));
     }
     Err(format!("stale, run `cargo xtask shaders`: {}", stale.join(", ")))
 }
 
-fn write(folder: &Path, made: &Files, shaders: &[Shader]) -> Outcome {
+fn write(folder: &Path, made: &Files, kernels: &[String]) -> Outcome {
     for (path, bytes) in made {
         let full = folder.join(path);
         // Untouched files keep their time, so that cargo rebuilds nothing for them.
@@ -158,8 +135,8 @@ fn write(folder: &Path, made: &Files, shaders: &[Shader]) -> Outcome {
             fs::write(&full, bytes).map_err(|e| format!("{}: {e}", full.display()))?;
         }
     }
-    for path in orphans(folder, shaders)? {
+    for path in orphans(folder, kernels)? {
         fs::remove_file(folder.join(&path)).map_err(|e| format!("{path}: {e}"))?;
     }
-    Ok(format!("shaders: {} modules written", shaders.len()))
+    Ok(format!("shaders: {} kernels written", kernels.len()))
 }

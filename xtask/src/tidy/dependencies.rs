@@ -49,10 +49,7 @@ const MAY_KNOW: [(&str, &[&str]); 19] = [
             "organza",
         ],
     ),
-    (
-        "gpu-conformance",
-        &["splat-core", "tsm", "hbsort", "pbsr", "reference", "splat-shaders", "gpu-ash", "gpu-wgpu", "organza"],
-    ),
+    ("gpu-conformance", &["splat-core", "tsm", "hbsort", "pbsr", "splat-shaders", "gpu-ash", "gpu-wgpu", "organza"]),
     ("xtask", &[]),
 ];
 

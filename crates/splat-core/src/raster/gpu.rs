@@ -13,7 +13,7 @@
 //!
 //! [`project`] makes the footprints on the device too, and [`follow`] composites what a sort on the device has ordered:
 //! joined ([`Recording::join`]), splats are uploaded once and the image alone comes back. [`resolve`] draws the opaque surfaces
-//! that hide them. [`draw`] records the compositing by the device's rasterizer.
+//! that hide them.
 //!
 //! ```
 //! use splat_core::raster::gpu::{Capacities, record};
@@ -38,8 +38,6 @@
 //! ```
 
 mod attributes;
-mod common;
-pub mod draw;
 pub mod follow;
 mod list;
 mod packed;
@@ -57,11 +55,10 @@ use super::projected::{Coverage, ProjectedSplat};
 use super::{Accumulation, OpaqueImage, Params, Projected};
 use crate::shade::{ChannelLayout, MAX_CHANNELS};
 use crate::{Accumulator, Direction, Error, Material};
-use common::Common;
 use list::{List, ListRoom};
 use packed::SPLAT_WORDS;
 use rayon::prelude::*;
-use splat_shaders::layouts::{MOST_CHANNELS, SplatView};
+use splat_shaders::layouts::{MOST_CHANNELS, SortState, SplatView};
 use splat_shaders::{BufferId, Groups, Recording, kernels};
 
 /// Side of a tile, pixels.
@@ -243,8 +240,6 @@ pub struct Recorded {
     /// Of a recording by [`follow::record`]: the input that says how many splats are in the order.
     pub sorted: Option<BufferId>,
     inputs: [BufferId; 6],
-    /// What is counted on the device, and the room for it.
-    counted: (&'static str, u32),
 }
 
 /// The bytes of some splats.
@@ -277,24 +272,40 @@ pub fn record(capacities: Capacities) -> Result<Recorded, Error> {
 
 /// The same, in the order that a sort has left on the device where `follows`.
 fn record_as(capacities: Capacities, follows: bool) -> Result<Recorded, Error> {
-    let Capacities { size, planes, channels, ordered, entries, .. } = capacities;
+    capacities.check()?;
+    let Capacities { size, channels, splats, ordered, entries, .. } = capacities;
+    let [_, tiles] = tiles(size);
+    let area = u64::from(size[0]) * u64::from(size[1]);
     let mut recording = Recording::default();
     let r = &mut recording;
-    let common = Common::record(r, capacities)?;
-    let Common { view, order, splats: footprints, values, tables, opaque, planes: image, state } = common;
-    let [_, tiles] = tiles(size);
+    let words = |n: u32| 4 * u64::from(n);
+    let view = r.input("view", size_of::<SplatView>() as u64);
+    let order = r.input("order", words(ordered));
+    let footprints = r.input("splats", words(splats) * u64::from(capacities.splat_words()));
+    let values = r.input("values", words(splats) * u64::from(channels));
+    let objects = if capacities.objects { splats } else { 0 };
+    let tables = r.input("tables", table_bytes(capacities.footprints, capacities.materials, objects));
+    let opaque = r.input("opaque", if capacities.opaque { 4 * area } else { 0 });
+    let planes = r.input("planes", 4 * area * u64::from(capacities.planes_of_pixel()));
     let room = ListRoom { tiles, ordered, entries };
-    let list = List::scratch(r, &room, state);
-    let sorted = common.follow(r, follows);
+    let list = List::scratch(r, &room);
+    let sorted = follows.then(|| r.input("sorted", size_of::<SortState>() as u64));
+    if let Some(sorted) = sorted {
+        r.dispatch(&kernels::SPLAT_FOLLOW, Groups::cover(1), &[sorted, view], &[]);
+    }
     let ids = list.record(r, &room, [view, order, footprints]);
-    let kernel = match (capacities.depths || capacities.objects, planes, channels) {
+    let kernel = match (capacities.depths || capacities.objects, capacities.planes, channels) {
         (true, ..) => &kernels::SPLAT_COMPOSITE_LAYERS,
         (false, 1, 3) => &kernels::SPLAT_COMPOSITE_BEAUTY,
         (false, ..) => &kernels::SPLAT_COMPOSITE,
     };
-    let composited = [view, list.starts, ids, footprints, values, tables, opaque, image];
+    let composited = [view, list.starts, ids, footprints, values, tables, opaque, planes];
     r.dispatch(kernel, Groups::cover(tiles), &composited, &[]);
-    Ok(common.finish(recording, capacities, sorted, ("tile entries", entries)))
+    r.read(list.state);
+    r.read(planes);
+    let (inputs, state) = ([view, order, footprints, values, tables, opaque], list.state);
+    let splats = footprints;
+    Ok(Recorded { recording, capacities, state, planes, splats, order, values, opaque, sorted, inputs })
 }
 
 impl Recorded {
@@ -443,7 +454,7 @@ impl Recorded {
     /// # Errors
     /// As [`Recorded::finish`].
     pub fn counts(&self, state: &[u8]) -> Result<Counts, Error> {
-        Counts::read(state, self.counted)
+        Counts::read(state, self.capacities.entries)
     }
 }
 

@@ -3,7 +3,6 @@
 use gpu_conformance::open;
 use hbsort::Scratch;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::raster::gpu::draw::{self, Precision};
 use splat_core::raster::gpu::{Attributes, Capacities, follow, project as projection};
 use splat_core::raster::{OpaqueImage, Params, fold, project};
 use splat_core::shade::{ChannelLayout, LitBy, ShadeInput, gpu as shading, shade};
@@ -50,9 +49,7 @@ fn four_stages_in_one_submission_are_the_cpu_s_picture() {
     let input = ShadeInput { cloud: &cloud, materials: &materials, objects, lights, ambient, camera: &camera };
     let (layout, params, opaque) = (ChannelLayout::default(), Params::default(), OpaqueImage::default());
     let mut device = open().unwrap();
-    let directions = [Direction::FrontToBack, Direction::BackToFront];
-    // By tiles, and drawn.
-    for (direction, draws) in directions.into_iter().flat_map(|d| [(d, false), (d, true)]) {
+    for direction in [Direction::FrontToBack, Direction::BackToFront] {
         let sort_params = hbsort::Params { direction, exact: true, margin_px: 2.0, ..hbsort::Params::default() };
         let projected = project(&cloud, &camera, &footprints, &materials, &params);
         let values = shade(&input, &projected, &layout, &Progress::new());
@@ -82,8 +79,7 @@ fn four_stages_in_one_submission_are_the_cpu_s_picture() {
         let room_for = projection::Capacities { attributes: held, footprints: layers, materials: 1, depth: false };
         let project = projection::record(room_for).unwrap();
         let shade = shading::record(shading::Capacities::of(&input, attributes.room(), layout));
-        let drawn = |room| draw::follow(room, Precision::Single);
-        let composite = if draws { drawn(room).unwrap() } else { follow::record(room).unwrap() };
+        let composite = follow::record(room).unwrap();
         let mut whole = sort.recording.clone();
         let held = &project.attributes;
         let p = whole.join(&project.recording, &[(held.positions, sort.positions), (held.radii, sort.radii)]);
@@ -124,8 +120,7 @@ fn four_stages_in_one_submission_are_the_cpu_s_picture() {
         let read = [composite.state, composite.planes].map(|b| run.bytes(c.of(b)));
         let counts = composite.finish(read, &mut gpu).unwrap();
         assert_eq!(projection::visible(run.bytes(p.of(project.state))).unwrap(), projected.visible());
-        assert!(draws || counts.longest > 100 && counts.longest < counts.entries);
-        assert!(!draws || counts.splats > 1000 && counts.splats < u64::from(SPLATS));
+        assert!(counts.longest > 100 && counts.longest < counts.entries);
 
         let largest = values.iter().fold(0.0, |most: f32, v| most.max(*v));
         let far = |a: &[f32], b: &[f32], of: f32| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= TOLERANCE * of);

@@ -5,7 +5,6 @@ mod canary;
 mod chained;
 mod composited;
 mod deposits;
-mod drawn;
 mod generated;
 mod kernels;
 mod layered;

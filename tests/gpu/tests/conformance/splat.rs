@@ -2,7 +2,7 @@
 
 use gpu_conformance::{Device, open};
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::raster::gpu::{Capacities, Counts, Input, Recorded, record};
+use splat_core::raster::gpu::{Counts, Input, record};
 use splat_core::raster::{Detail, OpaqueImage, Params, Projected, fold, project_into};
 use splat_core::{
     Accumulator, Camera, Cloud, Direction, Error, FootprintStack, Material, Progress, Projection, Splat, SplatKind, rng,
@@ -33,8 +33,6 @@ pub(crate) struct Scene {
     pub(crate) params: Params,
     pub(crate) depths: bool,
     pub(crate) objects: bool,
-    /// By tiles, or drawn.
-    pub(crate) record: fn(Capacities) -> Result<Recorded, Error>,
 }
 
 impl Scene {
@@ -52,7 +50,6 @@ impl Scene {
             params: Params::default(),
             depths: false,
             objects: false,
-            record,
         }
     }
 
@@ -67,11 +64,6 @@ impl Scene {
         let (camera, params) = (&self.camera, &self.params);
         project_into(&mut projected, &self.cloud, camera, &self.footprints, &self.materials, params, detail);
         projected
-    }
-
-    /// Of each splat, below 3.
-    pub(crate) fn values(&self) -> Vec<f32> {
-        (0..(self.cloud.len() * self.channels) as u64).map(|i| 3.0 * rng::unit_f32(77, 0, i, 0)).collect()
     }
 
     /// Ids by depth.
@@ -97,7 +89,8 @@ impl Scene {
         room: u32,
     ) -> Result<Both, Error> {
         let projected = self.project();
-        let values = self.values();
+        let n = (self.cloud.len() * self.channels) as u64;
+        let values: Vec<f32> = (0..n).map(|i| 3.0 * rng::unit_f32(77, 0, i, 0)).collect();
         let (direction, params) = (self.direction, &self.params);
         let (materials, opaque) = (&self.materials[..], &self.opaque);
         let mut cpu = begin.clone();
@@ -105,7 +98,7 @@ impl Scene {
         fold(&projected, order, &values, materials, opaque, direction, params, &mut cpu, &progress);
         let input = Input { projected: &projected, order, values: &values, materials, opaque, direction, params };
         let mut gpu = begin.clone();
-        let recorded = (self.record)(input.capacities(&gpu, room))?;
+        let recorded = record(input.capacities(&gpu, room))?;
         let uploads = recorded.uploads(&input, &gpu)?;
         let run = device.run(&recorded.recording, &recorded.inputs(&uploads)).unwrap();
         let counts = recorded.finish([recorded.state, recorded.planes].map(|b| run.bytes(b)), &mut gpu)?;
@@ -140,7 +133,7 @@ impl Both {
     }
 
     /// Pixels that anything was added to.
-    pub(crate) fn touched(&self) -> usize {
+    fn touched(&self) -> usize {
         self.gpu.optical_depth[0].iter().filter(|a| **a > 0.0).count()
     }
 }

@@ -21,7 +21,7 @@ pub(super) struct ListRoom {
 
 /// Buffers of a list.
 pub(super) struct List {
-    state: BufferId,
+    pub(super) state: BufferId,
     places: Scanned,
     sort: BufferId,
     digits: Scanned,
@@ -32,10 +32,10 @@ pub(super) struct List {
 }
 
 impl List {
-    /// With its counts in `state`.
-    pub(super) fn scratch(r: &mut Recording, room: &ListRoom, state: BufferId) -> Self {
+    pub(super) fn scratch(r: &mut Recording, room: &ListRoom) -> Self {
         let words = |n: u32| 4 * u64::from(n);
         let ListRoom { tiles, ordered, entries } = *room;
+        let state = r.scratch("state", size_of::<SplatState>() as u64);
         let place_scan = r.scratch("place scan", size_of::<Scan>() as u64);
         let places = Scanned::scratch(r, place_scan, ["places", "place sums"], ordered);
         let sort = r.scratch("sort", size_of::<SortState>() as u64);
@@ -74,11 +74,11 @@ impl List {
 /// What a device did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
-    /// Splats that reach a tile; of a [`draw`](super::draw), those of the order.
+    /// Splats that reach a tile.
     pub splats: u64,
-    /// Pairs of a splat and a tile that it reaches; of a draw, splats of the order.
+    /// Pairs of a splat and a tile that it reaches.
     pub entries: u64,
-    /// Those of the tile that has most: as many splats one thread folds in a row. 0 of a draw, which does not count.
+    /// Those of the tile that has most: as many splats one thread folds in a row.
     pub longest: u64,
 }
 
@@ -90,13 +90,13 @@ impl Counts {
         Self { splats, entries, longest: self.longest.max(other.longest) }
     }
 
-    /// From the bytes of a [`SplatState`]; what is counted has so much room.
-    pub(super) fn read(state: &[u8], (what, room): (&'static str, u32)) -> Result<Self, Error> {
+    /// From the bytes of a [`SplatState`], of a list with so much room.
+    pub(super) fn read(state: &[u8], room: u32) -> Result<Self, Error> {
         let (attribute, found, expected) = ("state read back", state.len(), size_of::<SplatState>());
         let bytes = state.get(..expected).ok_or(Error::ColumnLength { attribute, found, expected })?;
         let state: SplatState = bytemuck::pod_read_unaligned(bytes);
         let entries = u64::from(state.entries_low) | u64::from(state.entries_high) << 32;
-        super::fits(what, entries, room)?;
+        super::fits("tile entries", entries, room)?;
         Ok(Self { splats: state.splats.into(), entries, longest: state.longest.into() })
     }
 }

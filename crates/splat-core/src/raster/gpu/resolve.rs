@@ -29,7 +29,7 @@ use super::{
 use crate::raster::kernel::Kernel;
 use crate::raster::{OpaqueImage, Projected};
 use crate::{Camera, Error, FootprintStack};
-use splat_shaders::layouts::{SplatState, SplatView};
+use splat_shaders::layouts::SplatView;
 use splat_shaders::{BufferId, Groups, Recording, kernels};
 
 /// What a recording makes room for.
@@ -95,7 +95,7 @@ pub struct Recorded {
     pub recording: Recording,
     /// The room it has.
     pub capacities: Capacities,
-    /// Read back: one [`SplatState`].
+    /// Read back: one [`SplatState`](splat_shaders::layouts::SplatState).
     pub state: BufferId,
     /// Read back: depths, then channels, then objects, row by row.
     pub image: BufferId,
@@ -133,14 +133,13 @@ pub fn record(capacities: Capacities) -> Result<Recorded, Error> {
     let tables = r.input("resolve tables", table_bytes(footprints, 0, if objects { splats } else { 0 }));
     let image = r.scratch("opaque image", 4 * area * u64::from(capacities.planes()));
     let room = ListRoom { tiles, ordered: listed, entries };
-    let state = r.scratch("state", size_of::<SplatState>() as u64);
-    let list = List::scratch(r, &room, state);
+    let list = List::scratch(r, &room);
     let listed = list.record(r, &room, [view, ids, at]);
     let kernel = if channels == 3 { &kernels::SPLAT_RESOLVE_BEAUTY } else { &kernels::SPLAT_RESOLVE };
     r.dispatch(kernel, Groups::cover(tiles), &[view, list.starts, listed, at, values, tables, image], &[]);
-    r.read(state);
+    r.read(list.state);
     r.read(image);
-    Ok(Recorded { recording, capacities, state, image, splats: at, values, view, ids, tables })
+    Ok(Recorded { recording, capacities, state: list.state, image, splats: at, values, view, ids, tables })
 }
 
 impl Recorded {
@@ -225,7 +224,7 @@ impl Recorded {
     /// # Errors
     /// As [`Recorded::finish`].
     pub fn counts(&self, state: &[u8]) -> Result<Counts, Error> {
-        let counts = Counts::read(state, ("tile entries", self.capacities.entries))?;
+        let counts = Counts::read(state, self.capacities.entries)?;
         Ok(Counts { longest: 2 * counts.longest, ..counts })
     }
 
