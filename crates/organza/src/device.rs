@@ -20,7 +20,7 @@ mod trial;
 use crate::Error;
 pub(crate) use chain::Splats;
 pub(crate) use helper::Helper;
-pub(crate) use particles::{Folding, Shadow};
+pub(crate) use particles::Folding;
 pub use passport::{Agreement, Checked, KernelTime, Passport, passport};
 pub(crate) use shadows::LookedUp;
 use splat_shaders::{Adapter, Backend, Choice, DeviceError};

@@ -7,7 +7,7 @@ use crate::scene::{Scene, SceneObject};
 use crate::{Layers, ShadowTable, escape_controls};
 use glam::DVec3;
 use rayon::prelude::*;
-use splat_core::{Camera, LightShape, Shading};
+use splat_core::{Camera, Shading};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// Most objects outside the view that are told one by one.
@@ -57,7 +57,7 @@ fn without_light(scene: &Scene) -> Option<String> {
         Shading::Phase => material(o).single_scattering_albedo > 0.0,
         _ => material(o).diffuse > 0.0 || material(o).specular > 0.0 || material(o).transmission > 0.0,
     });
-    let lit = scene.lights.iter().any(|l| l.intensity.iter().any(|i| *i > 0.0))
+    let lit = scene.lights.iter().any(|l| l.light.intensity.iter().any(|i| *i > 0.0))
         || scene.ambient.iter().any(|a| *a > 0.0) && drawn().any(|o| material(o).ambient > 0.0);
     (reflects && !shines && !lit).then(|| {
         "the scene has no light: add a [[light]], a `color` in [ambient], or a material with `emission` or shading = \
@@ -100,10 +100,7 @@ fn outside(scene: &Scene, loaded: &Loaded) -> Vec<String> {
 
 /// Where light comes from, in the normalized world.
 fn lights(loaded: &Loaded) -> impl Iterator<Item = DVec3> {
-    loaded.lights.iter().filter_map(|light| match light.shape {
-        LightShape::Point { position } | LightShape::Spot { position, .. } => Some(position),
-        _ => None,
-    })
+    loaded.lights.iter().filter_map(|light| light.light.shape.place())
 }
 
 fn around([low, high]: [DVec3; 2], [l, h]: [DVec3; 2]) -> [DVec3; 2] {

@@ -34,6 +34,7 @@ mod error;
 mod form;
 mod frame;
 mod info;
+mod lights;
 mod load;
 mod memory;
 mod options;

@@ -10,8 +10,7 @@
 mod lit;
 
 use super::Failure;
-use lit::Light;
-pub(crate) use lit::Shadow;
+use lit::{Light, Shadow};
 use pbsr::gpu::{Capacities, Generated, Nearest, Recorded, Sources, record, record_generated};
 use pbsr::{Ensemble, Error, Scene};
 use splat_core::Progress;

@@ -20,8 +20,8 @@
 //! ```
 
 use super::{CHUNK, ChannelLayout, LitBy, LitSplat, ShadeInput, shadow_share};
-use crate::raster::gpu::{AttributeBuffers, AttributeRoom, Attributes};
 use crate::light::rect_normal;
+use crate::raster::gpu::{AttributeBuffers, AttributeRoom, Attributes};
 use crate::{Error, Light, LightShape, Material, Progress, Shading};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;

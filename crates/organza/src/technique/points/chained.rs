@@ -29,7 +29,8 @@ impl Points<'_> {
         if frame.loaded.cloud.is_empty() || !frame.plan.shadow_maps.contains(&true) {
             return Ok(false);
         }
-        let on_device = frame.plan.shadow_maps.iter().map(|wanted| wanted.then_some(&OnDevice as &dyn Transmittance));
+        let tables = &frame.plan.shadow_tables;
+        let on_device = tables.iter().map(|table| table.is_some().then_some(&OnDevice as &dyn Transmittance));
         let lights: Vec<LitBy<'_>> =
             frame.with_light(on_device).map(|(light, shadow)| LitBy { light, shadow }).collect();
         // The passes one by one say why, if it does not suit.
@@ -45,7 +46,8 @@ impl Points<'_> {
     fn castings(&self, helper: &Helper, cost: &mut CostRecord) -> Result<Option<Vec<Casting>>, Error> {
         let (frame, l) = (self.frame, self.frame.loaded);
         let mut castings = Vec::new();
-        for (i, (light, table)) in l.lights.iter().zip(&frame.plan.shadow_tables).enumerate() {
+        for (point, table) in frame.light_points().iter().zip(&frame.plan.shadow_tables) {
+            let light = &point.light;
             let Some(table) = table.filter(|_| light.intensity != [0.0; 3]) else { continue };
             let params = table.params(frame.settings, l, frame.plan.shadow_bytes);
             frame.tick()?;
@@ -61,7 +63,7 @@ impl Points<'_> {
                     helper.leave(why);
                     return Ok(None);
                 }
-                Err(e) => return Err(shadow_error(i, &e)),
+                Err(e) => return Err(shadow_error(point, &e)),
             }
         }
         Ok(Some(castings))
