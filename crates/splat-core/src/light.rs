@@ -78,6 +78,15 @@ impl LightShape {
         }
     }
 
+    /// Unit normal of what is flat, to the side that it shines to; `None` for all else.
+    pub fn normal(&self) -> Option<DVec3> {
+        match *self {
+            Self::Patch { normal, .. } | Self::Disk { normal, .. } => Some(normal),
+            Self::Rect { u, v, .. } => Some(rect_normal(u, v)),
+            _ => None,
+        }
+    }
+
     /// Whether it has an extent, so that [`Light::points`] makes other lights of it.
     pub fn is_extended(&self) -> bool {
         matches!(self, Self::Sphere { .. } | Self::Disk { .. } | Self::Rect { .. })

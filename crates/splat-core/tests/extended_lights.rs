@@ -1,4 +1,8 @@
 //! Points of extended lights against the irradiance of the whole lights in closed form.
+//!
+//! The errors that are allowed are about twice those that are found, at distances of half the light's width and more. They fall
+//! with the square of the number of points of a disk on its axis, and with the number of those of a rectangle; those of a sphere
+//! are 0.1 by 16 points at half its radius above it, and 0.002 by 256 and more.
 
 use splat_core::glam::DVec3;
 use splat_core::{Light, LightShape};
@@ -20,14 +24,11 @@ fn error(shape: LightShape, n: u32, [p, normal]: [DVec3; 2], exact: f64) -> f64 
 const FRAME: [DVec3; 3] = [DVec3::new(0.36, 0.48, -0.8), DVec3::new(-0.8, 0.6, 0.0), DVec3::new(0.48, 0.64, 0.6)];
 const CENTER: DVec3 = DVec3::new(3.0, -1.0, 0.5);
 
-/// Errors of rising numbers of points, each number with what it may be.
+/// Holds the errors of rising numbers of points against what each may be.
 fn check(what: &str, allowed: &[(u32, f64)], error: impl Fn(u32) -> f64) {
     let found: Vec<(u32, f64)> = allowed.iter().map(|(n, _)| (*n, error(*n).abs())).collect();
-    println!("{what}: {}", found.iter().map(|(n, e)| format!("{e:.1e} by {n}")).collect::<Vec<_>>().join(", "));
-    let holds = found.iter().zip(allowed).all(|((_, found), (_, most))| found < most);
-    if false {
-        assert!(holds, "{what}: {found:?}, allowed {allowed:?}");
-    }
+    println!("{what}: {found:?}");
+    assert!(found.iter().zip(allowed).all(|(found, most)| found.1 < most.1), "{what}: {found:?}, allowed {allowed:?}");
 }
 
 #[test]
@@ -37,7 +38,7 @@ fn points_of_a_disk_tend_to_pi_l_sine_squared_on_its_axis() {
         let disk = LightShape::Disk { center: CENTER, normal: z, radius };
         let (p, l) = (CENTER + z * height, 1.0 / (PI * radius * radius));
         let exact = PI * l * radius * radius / (radius * radius + height * height);
-        let allowed = [(16, 2e-3), (256, 2e-5), (4096, 2e-6)];
+        let allowed = [(16, 1e-2), (256, 4e-5), (4096, 2e-7)];
         check("disk", &allowed, |n| error(disk, n, [p, -z], exact));
         // Behind it there is none.
         assert_eq!(error(disk, 256, [CENTER - z * height, z], 1.0), -1.0);
@@ -59,7 +60,7 @@ fn points_of_a_rectangle_tend_to_the_form_factor_below_its_corner() {
         let rect = LightShape::Rect { center: CENTER, u, v };
         let p = CENTER + u + v + z * c;
         let exact = PI * corner(a, b, c) / (a * b);
-        let allowed = [(16, 0.2), (256, 0.02), (4096, 2e-3), (65536, 2e-4)];
+        let allowed = [(16, 0.2), (256, 0.01), (4096, 1e-3), (65536, 1e-4)];
         check("rect", &allowed, |n| error(rect, n, [p, -z], exact));
         assert_eq!(error(rect, 256, [CENTER - z * c, z], 1.0), -1.0);
     }
@@ -72,7 +73,7 @@ fn points_of_a_sphere_give_what_a_point_at_its_centre_gives_outside_of_it() {
     for distance in [1.5, 3.0, 10.0] {
         let p = CENTER + (x * 0.6 + z * 0.8) * distance;
         let normal = (CENTER - p).normalize();
-        let allowed = [(16, 0.2), (256, 0.02), (4096, 2e-3)];
+        let allowed = [(16, 0.2), (256, 5e-3), (4096, 4e-3), (65536, 1e-3)];
         check("sphere", &allowed, |n| error(sphere, n, [p, normal], 1.0 / (distance * distance)));
     }
 }
@@ -124,7 +125,7 @@ fn points_of_flat_lights_lie_on_them() {
     let points = places(LightShape::Rect { center, u: DVec3::X * 2.0, v: DVec3::Y }, 256);
     assert!(points.iter().all(|p| p.z == 1.0 && (p.x - 1.0).abs() <= 2.0 && (p.y - 1.0).abs() <= 1.0));
     let mean = points.iter().sum::<DVec3>() / 256.0;
-    assert!((mean - center).length() < 0.02, "{mean}");
+    assert!((mean - center).length() < 1e-12, "{mean}");
     // What has no extent is one point, itself.
     let lamp = Light { shape: LightShape::Point { position: center }, intensity: [1.0; 3] };
     assert_eq!(lamp.points(16), [lamp]);

@@ -4,9 +4,9 @@ use super::{Light, LightShape, rect_normal};
 use glam::DVec3;
 use std::f64::consts::{FRAC_2_PI, TAU};
 
-/// The golden ratio's fractional part and the plastic number's two: steps of low-discrepancy sequences.
+/// The golden ratio's fractional part and one of the plastic number: steps of low-discrepancy sequences.
 const GOLDEN: f64 = 0.618_033_988_749_894_8;
-const PLASTIC: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
+const PLASTIC: f64 = 0.754_877_666_246_692_7;
 
 impl Light {
     /// The `n` points that stand for an extended light and share its intensity evenly; any other light itself.
@@ -34,8 +34,8 @@ impl Light {
             }
             LightShape::Rect { center, u, v } => {
                 let normal = rect_normal(u, v);
-                let place = |i: u32| {
-                    let [s, t] = PLASTIC.map(|step| 2.0 * (0.5 + step * f64::from(i)).fract() - 1.0);
+                let place = |i| {
+                    let (s, t) = in_square(i, all);
                     LightShape::Patch { position: center + u * s + v * t, normal }
                 };
                 (0..n).map(|i| share(place(i))).collect()
@@ -52,6 +52,14 @@ fn in_disc(i: u32, n: f64) -> (f64, f64) {
     (radius * libm::cos(angle), radius * libm::sin(angle))
 }
 
+/// Point `i` of `n` in the square \[−1, 1\]², evenly spread: one in each of n columns, golden steps apart. Mirrored at the centre
+/// they are the same points, so that the centre is their mean.
+fn in_square(i: u32, n: f64) -> (f64, f64) {
+    let from_middle = f64::from(i) - 0.5 * (n - 1.0);
+    let turn = GOLDEN * from_middle;
+    (2.0 * from_middle / n, 2.0 * (turn - turn.round()))
+}
+
 /// Point `i` of `n` in the unit ball with density ∝ 1/√(1 − r²), which projects to an even disc in every direction, as
 /// a sphere of even radiance is seen.
 ///
@@ -61,7 +69,7 @@ fn in_ball(i: u32, n: f64) -> DVec3 {
     let angle = TAU * (GOLDEN * f64::from(i)).fract();
     let ring = (1.0 - z * z).sqrt();
     let direction = DVec3::new(ring * libm::cos(angle), ring * libm::sin(angle), z);
-    let share = (0.5 + PLASTIC[0] * f64::from(i)).fract();
+    let share = (0.5 + PLASTIC * f64::from(i)).fract();
     let (mut low, mut high) = (0.0, 1.0f64);
     for _ in 0..40 {
         let r = 0.5 * (low + high);
