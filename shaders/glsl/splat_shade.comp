@@ -24,10 +24,11 @@ const float SHADING_PHASE = 1.0;
 const float SHADING_UNLIT = 2.0;
 
 // Vectors of a light: intensity, kind; position as a sum of two, each with a cosine of the cone: no light, full light;
-// direction of travel, place among the lights with a shadow map or -1.
+// direction of travel, which is the normal of a patch, and place among the lights with a shadow map or -1.
 const uint LIGHT_VECTORS = 4u;
 const float LIGHT_DIRECTIONAL = 1.0;
 const float LIGHT_SPOT = 2.0;
+const float LIGHT_PATCH = 3.0;
 
 struct Material {
     vec4 look;
@@ -120,6 +121,9 @@ vec4 arriving_from(uint light, Point p) {
             t = clamp((cosine - high.w) / (low.w - high.w), 0.0, 1.0);
         }
         falloff = falloff * t * t * (3.0 - 2.0 * t);
+    }
+    if (intensity.w == LIGHT_PATCH) {
+        falloff = falloff * max(-dot_of(to_light, direction), 0.0);
     }
     return vec4(to_light, falloff);
 }

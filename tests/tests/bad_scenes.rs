@@ -391,7 +391,7 @@ fn overrides_change_the_scene_and_are_to_blame_for_their_errors() {
     assert!(with("render.points.exact=true").unwrap().render.points.exact);
     assert_eq!(with("render.points.slice_thickness = 0.5").unwrap().render.points.slice_thickness, Some(0.5));
     assert_eq!(with("object.a.opacity=0.25").unwrap().objects[0].opacity, Some(0.25));
-    assert_eq!(with("light.0.intensity=[1, 2, 3]").unwrap().lights[0].intensity, [1.0, 2.0, 3.0]);
+    assert_eq!(with("light.0.intensity=[1, 2, 3]").unwrap().lights[0].light.intensity, [1.0, 2.0, 3.0]);
     assert_eq!(with("material.glass.shading=phase").unwrap().materials[1].opacity, 0.3);
     assert_ne!(with("render.seed=1").unwrap().sha256, try_toml(SCENE).unwrap().sha256);
     for bad in [

@@ -17,6 +17,7 @@ fn scene(camera: &str, light: &str, wall: &str) -> String {
 }
 
 const AHEAD: &str = "target = [0, 0, 0]";
+const AMBIENT: &str = "[ambient]\ncolor = [0.2, 0.2, 0.2]\n";
 const LAMP: &str = "[[light]]\nkind = 'point'\nposition = [1, 2, 3]\nintensity = [9, 9, 9]\n";
 
 fn warnings(text: &str) -> Vec<String> {
@@ -60,6 +61,19 @@ fn a_scene_without_light_is_told() {
     let dark = scene(AHEAD, "[background]\ncolor = [0.5, 0.5, 0.5]\n", "visible = false")
         .replace("albedo = 0.9", "albedo = 0");
     assert_eq!(warnings(&dark), Vec::<String>::new());
+}
+
+#[test]
+fn a_flat_light_that_is_turned_away_is_told() {
+    let rect = |u: &str, v: &str| {
+        format!(
+            "[[light]]\nkind = 'rect'\nposition = [0, 1, 2]\nu = [{u}]\nv = [{v}]\nintensity = [9, 9, 9]\n{AMBIENT}"
+        )
+    };
+    // u × v is −z, towards the objects.
+    assert_eq!(warnings(&scene(AHEAD, &rect("0, 1, 0", "1, 0, 0"), "")), Vec::<String>::new());
+    let words = "the flat light at [0.0, 1.0, 2.0] shines along [0.0, 0.0, 1.0], away from all objects";
+    one(&scene(AHEAD, &rect("1, 0, 0", "0, 1, 0"), ""), words);
 }
 
 #[test]

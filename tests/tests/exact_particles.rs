@@ -156,7 +156,14 @@ impl Case {
         let sampler: &dyn Sampler = if paired { &correlated } else { &independent };
         let look = Appearance { material: self.material(), ..Appearance::default() };
         let objects = [Object { sampler, transform: Similarity::default(), look }];
-        let scene = Scene { objects: &objects, lights: &[], ambient: [0.0; 3], camera: &camera, occluder: None };
+        let scene = Scene {
+            objects: &objects,
+            lights: &[],
+            shadow_origin: DVec3::ZERO,
+            ambient: [0.0; 3],
+            camera: &camera,
+            occluder: None,
+        };
         moments_of(&scene, add)
     }
 }

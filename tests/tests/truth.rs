@@ -4,6 +4,7 @@ use crate::many_forms::write;
 use organza::scene::{self, Scene};
 use organza::{Progress, RenderOptions, render};
 use organza_judge::truth::{Truth, truth, truth_of_all_orders};
+use splat_core::{Light, LightShape};
 use std::path::Path;
 
 const SAMPLES: u32 = 64;
@@ -61,6 +62,62 @@ fn points_agree_with_path_tracing_of_meshes_media_and_translucent_surfaces() {
     let mut dimmer = scene.clone();
     dimmer.lights.iter_mut().for_each(|l| l.shadow = false);
     assert!(rmse(&squares(&drawn(&dimmer), size), &exact) > 3.0 * error);
+}
+
+/// A floor, fog above it, and one light above both.
+const BELOW: &str = r#"version = 1
+[camera]
+position = [0, 2.5, 3]
+target = [0, 0.1, 0]
+fov_y = 36
+size = [96, 64]
+[material.fog]
+medium = { extinction = 5, albedo = 0.5 }
+[[object]]
+name = "fog"
+medium_ball = { center = [0.35, 0.35, 0], radius = 0.25, spacing = 0.03 }
+material = "fog"
+[[object]]
+name = "floor"
+rectangle = { center = [0, 0, 0], u = [0, 0, 5], v = [5, 0, 0], spacing = 0.04 }
+color = [0.8, 0.7, 0.6]
+[[light]]
+intensity = [4, 4, 4]
+samples = 64
+"#;
+
+#[test]
+fn flat_lights_shine_to_one_side_with_the_cosine_as_path_tracing_has_it() {
+    for light in [
+        "kind = 'rect'\nposition = [0, 1, 0]\nu = [0.5, 0, 0]\nv = [0, 0, 0.4]\n",
+        "kind = 'disk'\nposition = [0.8, 0.9, -0.3]\nnormal = [-1, -1, 0.2]\nradius = 0.5\n",
+    ] {
+        let text = BELOW.to_owned() + light;
+        let mut scene = scene::parse(Path::new("s.toml"), text.as_bytes(), &Default::default()).unwrap();
+        let size = scene.camera.size;
+        let truth = traced(&scene).unwrap();
+        let exact = squares(truth.image.pixels(), size);
+        let noise = truth.rms_standard_error() / SIDE as f64;
+        let points = rmse(&squares(&drawn(&scene), size), &exact);
+        scene.render.technique = scene::Technique::Particles;
+        let particles = rmse(&squares(&drawn(&scene), size), &exact);
+        // Points of the light that shine to all sides alike are what it would be without the cosine.
+        let whole = scene.lights[0];
+        let bare = |point: Light| {
+            let shape = LightShape::Point { position: point.shape.place().unwrap() };
+            scene::SceneLight { light: Light { shape, ..point }, samples: 1, shadow: true }
+        };
+        scene.lights = whole.light.points(whole.samples).into_iter().map(bare).collect();
+        scene.render.technique = scene::Technique::Points;
+        let without = rmse(&squares(&drawn(&scene), size), &exact);
+        let mean = exact.iter().flatten().sum::<f64>() / (3 * exact.len()) as f64;
+        println!(
+            "mean {mean:.4}, RMSE of points {points:.5}, of particles {particles:.5}, without cosine {without:.5}, truth's standard error {noise:.5}"
+        );
+        assert!(noise < 0.003, "truth's standard error {noise}");
+        assert!(points < 0.006 && particles < 0.006, "RMSE of points {points}, of particles {particles}");
+        assert!(without > 5.0 * points, "{without}");
+    }
 }
 
 /// A turned box, a turned formula, a classified volume and a ground, with one sun, and no border in view; `volume.nii` lies in the scene's folder.

@@ -6,7 +6,7 @@ use super::args::InfoArguments;
 use super::session::path_text;
 use super::{console, memory};
 use contents::{FileInfo, contents};
-use organza::scene::{self, LightSource, LoadOptions, Scene, SceneLight, Source};
+use organza::scene::{self, LoadOptions, Scene, Source};
 use organza::{Error, escape_controls};
 use serde_json::{Value, json};
 use splat_core::LightShape;
@@ -45,7 +45,7 @@ fn scene_document(scene: &Scene) -> Value {
     let lights = scene
         .lights
         .iter()
-        .map(|l| json!({ "kind": light_name(l), "intensity": l.intensity, "points": l.samples, "shadow": l.shadow }));
+        .map(|l| json!({ "kind": light_name(&l.light.shape), "intensity": l.light.intensity, "points": l.samples, "shadow": l.shadow }));
     json!({
         "kind": "scene",
         "sha256": scene.sha256,
@@ -76,16 +76,14 @@ fn source_path(source: &Source) -> Option<String> {
     source.path().map(path_text)
 }
 
-fn light_name(light: &SceneLight) -> &'static str {
-    match light.source {
-        LightSource::Simple(simple) => match simple.shape {
-            LightShape::Directional { .. } => "directional",
-            LightShape::Spot { .. } => "spot",
-            _ => "point",
-        },
-        LightSource::Sphere { .. } => "sphere",
-        LightSource::Disk { .. } => "disk",
-        LightSource::Rect { .. } => "rect",
+fn light_name(shape: &LightShape) -> &'static str {
+    match shape {
+        LightShape::Directional { .. } => "directional",
+        LightShape::Spot { .. } => "spot",
+        LightShape::Sphere { .. } => "sphere",
+        LightShape::Disk { .. } => "disk",
+        LightShape::Rect { .. } => "rect",
+        _ => "point",
     }
 }
 

@@ -10,11 +10,10 @@
 mod object;
 
 use object::Body;
-use organza::scene::{LightSource, Scene, SceneLight};
+use organza::scene::Scene;
 use organza::{Error, Progress, RenderOptions};
 use reference::metrics::{Image, Linear, compare};
 use reference::{Environment, Liberty, PathRules, PathSettings, PixelSampling, path_trace};
-use std::f64::consts::PI;
 
 /// An unbiased estimate of what is seen, with its error.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,7 +104,8 @@ fn trace(
     }
     let mut lights = Vec::new();
     for light in &scene.lights {
-        lights.push(source(light)?);
+        let known = reference::LightSource::from_light(&light.light);
+        lights.push(known.ok_or_else(|| Error::Internal(format!("the reference knows no light such as {light:?}")))?);
     }
     let fault = |e: splat_core::Error| match e {
         splat_core::Error::Cancelled => Error::Cancelled,
@@ -154,22 +154,4 @@ fn liberties(scene: &Scene, traced: &reference::Scene<'_>) -> String {
         text += "; shadows are left out or weakened, as the scene asks";
     }
     text
-}
-
-/// The light with its extent; intensity I on the axis becomes radiance I over the area that is seen from there.
-fn source(light: &SceneLight) -> Result<reference::LightSource, Error> {
-    let over = |area: f64| light.intensity.map(|i| f64::from(i) / area);
-    Ok(match light.source {
-        LightSource::Simple(simple) => reference::LightSource::from_light(&simple)
-            .ok_or_else(|| Error::Internal(format!("the reference knows no light such as {simple:?}")))?,
-        LightSource::Sphere { position, radius } => {
-            reference::LightSource::Sphere { center: position, radius, radiance: over(PI * radius * radius) }
-        }
-        LightSource::Disk { position, normal, radius } => {
-            reference::LightSource::Disk { center: position, normal, radius, radiance: over(PI * radius * radius) }
-        }
-        LightSource::Rect { position, u, v } => {
-            reference::LightSource::Rect { center: position, u, v, radiance: over(4.0 * u.cross(v).length()) }
-        }
-    })
 }

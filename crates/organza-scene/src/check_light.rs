@@ -1,65 +1,49 @@
 //! Checks of lights.
 
+use super::SceneLight;
 use super::check::{At, LARGEST};
 use super::raw_light::RawLight;
-use super::{LightSource, SceneLight};
 use crate::Error;
 use glam::DVec3;
 use splat_core::{Light, LightShape};
 
-/// Most points that an extended light may become.
+/// Most points that an extended light may be taken for.
 const MOST_LIGHT_SAMPLES: u32 = 1_000_000;
 
 /// Checks one light.
 pub(super) fn check_light(at: &At<'_>, raw: &RawLight) -> Result<SceneLight, Error> {
-    let samples_of = |samples| at.whole("samples", samples, 1..=MOST_LIGHT_SAMPLES);
-    let simple = |shape, intensity, shadow| SceneLight {
-        source: LightSource::Simple(Light { shape, intensity }),
-        intensity,
-        samples: 1,
-        shadow,
+    let of = |shape, intensity, shadow| SceneLight { light: Light { shape, intensity }, samples: 1, shadow };
+    let extended = |shape, intensity, samples, shadow| {
+        let samples = at.whole("samples", samples, 1..=MOST_LIGHT_SAMPLES)?;
+        Ok(SceneLight { samples, ..of(shape, at.color("intensity", intensity)?, shadow) })
     };
-    Ok(match *raw {
+    match *raw {
         RawLight::Point { position, intensity, shadow } => {
             let position = at.vector("position", position)?;
-            simple(LightShape::Point { position }, at.color("intensity", intensity)?, shadow)
+            Ok(of(LightShape::Point { position }, at.color("intensity", intensity)?, shadow))
         }
         RawLight::Directional { direction, irradiance, shadow } => {
             let direction = at.direction("direction", direction)?;
-            simple(LightShape::Directional { direction }, at.color("irradiance", irradiance)?, shadow)
+            Ok(of(LightShape::Directional { direction }, at.color("irradiance", irradiance)?, shadow))
         }
         RawLight::Spot { intensity, shadow, .. } => {
-            simple(spot_shape(at, raw)?, at.color("intensity", intensity)?, shadow)
+            Ok(of(spot_shape(at, raw)?, at.color("intensity", intensity)?, shadow))
         }
-        RawLight::Sphere { position, radius, intensity, samples, shadow } => SceneLight {
-            source: LightSource::Sphere {
-                position: at.vector("position", position)?,
-                radius: at.length("radius", radius)?,
-            },
-            intensity: at.color("intensity", intensity)?,
-            samples: samples_of(samples)?,
-            shadow,
-        },
-        RawLight::Disk { position, normal, radius, intensity, samples, shadow } => SceneLight {
-            source: LightSource::Disk {
-                position: at.vector("position", position)?,
-                normal: at.direction("normal", normal)?,
-                radius: at.length("radius", radius)?,
-            },
-            intensity: at.color("intensity", intensity)?,
-            samples: samples_of(samples)?,
-            shadow,
-        },
+        RawLight::Sphere { position, radius, intensity, samples, shadow } => {
+            let (center, radius) = (at.vector("position", position)?, at.length("radius", radius)?);
+            extended(LightShape::Sphere { center, radius }, intensity, samples, shadow)
+        }
+        RawLight::Disk { position, normal, radius, intensity, samples, shadow } => {
+            let (center, normal) = (at.vector("position", position)?, at.direction("normal", normal)?);
+            let radius = at.length("radius", radius)?;
+            extended(LightShape::Disk { center, normal, radius }, intensity, samples, shadow)
+        }
         RawLight::Rect { position, u, v, intensity, samples, shadow } => {
             let (u, v) = check_half_axes(at, u, v)?;
-            SceneLight {
-                source: LightSource::Rect { position: at.vector("position", position)?, u, v },
-                intensity: at.color("intensity", intensity)?,
-                samples: samples_of(samples)?,
-                shadow,
-            }
+            let center = at.vector("position", position)?;
+            extended(LightShape::Rect { center, u, v }, intensity, samples, shadow)
         }
-    })
+    }
 }
 
 fn spot_shape(at: &At<'_>, raw: &RawLight) -> Result<LightShape, Error> {

@@ -43,7 +43,7 @@ mod tree;
 pub use convert::read::UpAxis;
 pub use error::Error;
 pub use layer_choice::{LAYER_NAMES, LayerChoice};
-pub use lights::{LightSource, SceneLight};
+pub use lights::SceneLight;
 pub use load::{LoadOptions, MAX_SCENE_BYTES, MAX_SCENE_DEPTH, load, parse, read, schema};
 pub use model::{Scene, SceneMaterial, SceneObject, Up};
 pub use overrides::Override;

@@ -56,22 +56,22 @@ pub(super) enum RawLight {
         #[serde(default = "yes")]
         shadow: bool,
     },
-    /// A sphere, as several points.
+    /// A sphere that shines outwards.
     Sphere {
         /// World position of the centre.
         position: [f64; 3],
         /// Radius, world units.
         radius: f64,
-        /// Radiant intensity of the whole light per channel, W/sr or relative.
+        /// Radiant intensity of the whole light per channel, seen from far away, W/sr or relative.
         intensity: [f64; 3],
-        /// Points that it becomes; default 16.
+        /// Points that it is taken for by techniques that light by points; default 16.
         #[serde(default = "sixteen")]
         samples: u32,
         /// Whether it casts shadows; default true.
         #[serde(default = "yes")]
         shadow: bool,
     },
-    /// A flat disc, as several points.
+    /// A flat disc that shines to the side of its normal.
     Disk {
         /// World position of the centre.
         position: [f64; 3],
@@ -79,16 +79,16 @@ pub(super) enum RawLight {
         normal: [f64; 3],
         /// Radius, world units.
         radius: f64,
-        /// Radiant intensity of the whole light per channel, W/sr or relative.
+        /// Radiant intensity of the whole light per channel, along its normal, seen from far away, W/sr or relative.
         intensity: [f64; 3],
-        /// Points that it becomes; default 16.
+        /// Points that it is taken for by techniques that light by points; default 16.
         #[serde(default = "sixteen")]
         samples: u32,
         /// Whether it casts shadows; default true.
         #[serde(default = "yes")]
         shadow: bool,
     },
-    /// A flat parallelogram, as several points.
+    /// A flat parallelogram that shines to the side of u × v.
     Rect {
         /// World position of the centre.
         position: [f64; 3],
@@ -96,9 +96,9 @@ pub(super) enum RawLight {
         u: [f64; 3],
         /// Second half-axis, world units.
         v: [f64; 3],
-        /// Radiant intensity of the whole light per channel, W/sr or relative.
+        /// Radiant intensity of the whole light per channel, along its normal, seen from far away, W/sr or relative.
         intensity: [f64; 3],
-        /// Points that it becomes; default 16.
+        /// Points that it is taken for by techniques that light by points; default 16.
         #[serde(default = "sixteen")]
         samples: u32,
         /// Whether it casts shadows; default true.

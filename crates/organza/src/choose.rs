@@ -88,7 +88,7 @@ mod tests {
         }
     }
 
-    const SUN: LightStatistics = LightStatistics { wants_shadow: true, is_dark: false };
+    const SUN: LightStatistics = LightStatistics { wants_shadow: true, is_dark: false, points: 1 };
 
     #[test]
     fn every_kind_of_data_has_its_sampler() {

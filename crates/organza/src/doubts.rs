@@ -1,13 +1,13 @@
 //! What a picture would fail to show, and what to change: a scene without light, things outside the view, a picture of one
 //! colour. None is an error, and none is said of an [animation]: there things come into view and fade.
 
-use crate::load::Loaded;
+use crate::load::{Loaded, own::Own};
 use crate::output::displayed;
-use crate::scene::{Scene, SceneObject};
+use crate::scene::{Scene, SceneLight, SceneObject};
 use crate::{Layers, ShadowTable, escape_controls};
 use glam::DVec3;
 use rayon::prelude::*;
-use splat_core::{Camera, LightShape, Shading};
+use splat_core::{Camera, Shading};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// Most objects outside the view that are told one by one.
@@ -20,7 +20,7 @@ const GREY: f64 = 0.18;
 /// What can be told of a scene before it is drawn, one sentence each.
 pub(crate) fn of_scene(scene: &Scene, loaded: &Loaded) -> Vec<String> {
     let outside = if scene.frames.is_none() { outside(scene, loaded) } else { Vec::new() };
-    without_light(scene).into_iter().chain(outside).collect()
+    without_light(scene).into_iter().chain(turned_away(loaded)).chain(outside).collect()
 }
 
 /// What a finished picture shows too little of.
@@ -57,13 +57,36 @@ fn without_light(scene: &Scene) -> Option<String> {
         Shading::Phase => material(o).single_scattering_albedo > 0.0,
         _ => material(o).diffuse > 0.0 || material(o).specular > 0.0 || material(o).transmission > 0.0,
     });
-    let lit = scene.lights.iter().any(|l| l.intensity.iter().any(|i| *i > 0.0))
+    let lit = scene.lights.iter().any(|l| l.light.intensity.iter().any(|i| *i > 0.0))
         || scene.ambient.iter().any(|a| *a > 0.0) && drawn().any(|o| material(o).ambient > 0.0);
     (reflects && !shines && !lit).then(|| {
         "the scene has no light: add a [[light]], a `color` in [ambient], or a material with `emission` or shading = \
          \"unlit\""
             .to_owned()
     })
+}
+
+/// Flat lights that nothing lies before.
+fn turned_away(loaded: &Loaded) -> Vec<String> {
+    let cloud = &loaded.cloud;
+    let splats = (!cloud.is_empty()).then(|| [cloud.bounds().min, cloud.bounds().max]);
+    let splats = splats.map(|b| b.map(|p| cloud.origin + p.as_dvec3()));
+    let boxes: Vec<[DVec3; 2]> = loaded.own.iter().map(Own::world_box).chain(splats).collect();
+    let unit = libm::exp2(f64::from(loaded.exponent));
+    let one = |light: &SceneLight| {
+        let shape = &light.light.shape;
+        let (place, normal) = (shape.place()?, shape.normal()?);
+        // The corner of a box that lies farthest along the normal.
+        let farthest = |[low, high]: &[DVec3; 2]| DVec3::select(normal.cmpgt(DVec3::ZERO), *high, *low);
+        let is_lit = boxes.iter().any(|b| (farthest(b) - place).dot(normal) > 0.0);
+        (!is_lit && !boxes.is_empty()).then(|| {
+            let (at, along) = (self::place(place * unit), self::place(normal));
+            format!(
+                "the flat light at {at} shines along {along}, away from all objects: turn its `normal`, or exchange `u` and `v`"
+            )
+        })
+    };
+    loaded.lights.iter().filter_map(one).collect()
 }
 
 /// Objects of which nothing lies in the view.
@@ -100,10 +123,7 @@ fn outside(scene: &Scene, loaded: &Loaded) -> Vec<String> {
 
 /// Where light comes from, in the normalized world.
 fn lights(loaded: &Loaded) -> impl Iterator<Item = DVec3> {
-    loaded.lights.iter().filter_map(|light| match light.shape {
-        LightShape::Point { position } | LightShape::Spot { position, .. } => Some(position),
-        _ => None,
-    })
+    loaded.lights.iter().filter_map(|light| light.light.shape.place())
 }
 
 fn around([low, high]: [DVec3; 2], [l, h]: [DVec3; 2]) -> [DVec3; 2] {

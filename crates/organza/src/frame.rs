@@ -10,6 +10,7 @@ pub use splats::Shaded;
 pub(crate) use splats::record;
 
 use crate::device::Helper;
+use crate::lights::LightPoint;
 use crate::load::Loaded;
 use crate::plan::Plan;
 use crate::scene::{RenderSettings, Scene, Technique};
@@ -39,6 +40,7 @@ pub struct Frame<'a> {
     pub(crate) progress: &'a Progress,
     /// `None` inside where all splats are drawn.
     drawn: OnceCell<Option<Cloud>>,
+    light_points: OnceCell<Vec<LightPoint>>,
     maps: OnceCell<Vec<Option<ShadowMap>>>,
     shaded: OnceCell<Shaded>,
     opaque: OnceCell<OpaqueImage>,
@@ -60,6 +62,7 @@ impl<'a> Frame<'a> {
             device_composites: false,
             progress,
             drawn: OnceCell::new(),
+            light_points: OnceCell::new(),
             maps: OnceCell::new(),
             shaded: OnceCell::new(),
             opaque: OnceCell::new(),

@@ -32,6 +32,7 @@ mod draw;
 mod error;
 mod form;
 mod frame;
+mod lights;
 mod load;
 mod memory;
 mod options;

@@ -8,7 +8,7 @@ pub(crate) mod object;
 pub(crate) mod own;
 
 use crate::form::PlannedObject;
-use crate::scene::{Scene, SceneObject};
+use crate::scene::{Scene, SceneLight, SceneObject};
 use crate::statistics::{LightStatistics, ObjectStatistics};
 use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, pass, stage, work};
 pub(crate) use context::BYTES_PER_SPLAT;
@@ -18,7 +18,7 @@ use glam::DVec3;
 use normalize::normalize;
 use object::Prepared;
 use own::Own;
-use splat_core::{Camera, Cloud, FootprintStack, Light, Material, Object, Shading};
+use splat_core::{Camera, Cloud, FootprintStack, Material, Object, Shading};
 use std::cmp::Ordering;
 
 /// A scene in memory, normalized by a power of two (see [`Loaded::exponent`]) and ready for a technique.
@@ -40,10 +40,8 @@ pub struct Loaded {
     pub footprints: FootprintStack,
     /// The camera.
     pub camera: Camera,
-    /// Lights, extended ones as their points, in an order that does not depend on the file's.
-    pub lights: Vec<Light>,
-    /// For each light: whether it casts shadows.
-    pub casts: Vec<bool>,
+    /// Lights, whole, in an order that does not depend on the file's.
+    pub lights: Vec<SceneLight>,
     /// Slice thickness asked for, in the scale of the cloud.
     pub slice_thickness: Option<f64>,
     /// Whether normals were computed from the gradients of some volume.
@@ -75,8 +73,7 @@ fn scaled_thickness(scene: &Scene, exponent: i32) -> Option<f64> {
 pub(crate) struct Inputs<'a> {
     loading: Loading<'a>,
     prepared: Vec<Prepared<'a>>,
-    lights: Vec<Light>,
-    casts: Vec<bool>,
+    lights: Vec<SceneLight>,
     warnings: Vec<String>,
     /// What is known of each visible object, in the order of the scene.
     pub(crate) statistics: Vec<ObjectStatistics>,
@@ -100,15 +97,15 @@ pub(crate) fn read<'a>(
         stage.bytes = prepared.iter().map(|p| p.input.bytes()).sum();
         Ok::<_, Error>(prepared)
     })?;
-    let (lights, casts) = lights(scene);
+    let lights = lights(scene);
     let statistics = loading.statistics(&prepared);
-    Ok(Inputs { loading, prepared, lights, casts, warnings: files.mended(), statistics })
+    Ok(Inputs { loading, prepared, lights, warnings: files.mended(), statistics })
 }
 
 impl Inputs<'_> {
     /// What the planner asks of all lights.
     pub(crate) fn light_statistics(&self) -> Vec<LightStatistics> {
-        light_statistics(&self.lights, &self.casts)
+        light_statistics(&self.lights)
     }
 
     /// Converts every object to the form that was chosen for it, and to splats where they are needed; `sets` are the seconds of
@@ -119,11 +116,12 @@ impl Inputs<'_> {
         sets: f64,
         cost: &mut CostRecord,
     ) -> Result<Loaded, Error> {
-        let Self { loading, mut prepared, mut lights, casts, mut warnings, statistics } = self;
+        let Self { loading, mut prepared, mut lights, mut warnings, statistics } = self;
         let Loading { scene, progress, files, .. } = loading;
         let mut splats = loading.counts(&prepared, &planned)?;
         let materials = materials(scene, &prepared);
-        progress.plan(work::of_counts(scene, &splats, &planned, lights.len(), sets));
+        let points = lights.iter().map(crate::lights::count).sum();
+        progress.plan(work::of_counts(scene, &splats, &planned, points, sets));
         let mut own = loading.own(&mut prepared, &planned, &mut warnings)?;
         let converted = planned.iter().filter(|p| p.splats.is_some()).count();
         let mut cloud = Cloud::default();
@@ -153,7 +151,6 @@ impl Inputs<'_> {
             footprints: scene.footprints.clone(),
             camera,
             lights,
-            casts,
             slice_thickness: scaled_thickness(scene, exponent),
             normals: scene.objects.iter().any(|o| o.visible && context::needs_gradients(o, scene)),
             exponent,
@@ -186,8 +183,8 @@ fn materials(scene: &Scene, prepared: &[Prepared<'_>]) -> Vec<Material> {
 }
 
 /// What the planner asks of all lights.
-pub(crate) fn light_statistics(lights: &[Light], casts: &[bool]) -> Vec<LightStatistics> {
-    lights.iter().zip(casts).map(|(l, casts)| LightStatistics::of_light(l, *casts)).collect()
+pub(crate) fn light_statistics(lights: &[SceneLight]) -> Vec<LightStatistics> {
+    lights.iter().map(LightStatistics::of_light).collect()
 }
 
 /// What loading reads.
@@ -346,10 +343,9 @@ fn merge(clouds: Vec<Cloud>) -> Cloud {
     all
 }
 
-/// All point lights, sorted by their bits so that the order of the file does not matter.
-fn lights(scene: &Scene) -> (Vec<Light>, Vec<bool>) {
-    let mut all: Vec<(Light, bool)> =
-        scene.lights.iter().flat_map(|l| l.points().into_iter().map(|p| (p, l.shadow))).collect();
-    all.sort_by_cached_key(|(light, casts)| (light.bits(), *casts));
-    all.into_iter().unzip()
+/// All lights, sorted by their bits so that the order of the file does not matter.
+fn lights(scene: &Scene) -> Vec<SceneLight> {
+    let mut all = scene.lights.clone();
+    all.sort_by_cached_key(|l| (l.light.bits(), l.shadow, l.samples));
+    all
 }

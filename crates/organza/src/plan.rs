@@ -5,6 +5,7 @@
 //! shows it.
 
 pub use crate::form::{Form, PlannedObject};
+use crate::lights::LightPoint;
 use crate::pass;
 use crate::scene::Technique;
 use crate::shadows::ShadowTable;
@@ -44,9 +45,10 @@ pub struct Plan {
     pub passes: Vec<PlannedPass>,
     /// Planes of optical depth, or depth buffers of particles: 1 when all materials absorb red, green and blue alike, else 3.
     pub optical_depth_planes: usize,
-    /// For each light: whether it gets a shadow map.
+    /// For each light, by its place in [`Loaded::lights`](crate::Loaded::lights): whether its points get shadow maps.
     pub shadow_maps: Vec<bool>,
-    /// For each light: the table of its shadow map. Chosen by a look at the splats, when all else is planned.
+    /// For each point of each light, in the order of the frame's points: the table of its shadow map, if it gets one. Chosen by
+    /// a look at the splats, when all else is planned.
     pub shadow_tables: Vec<Option<ShadowTable>>,
     /// Bytes that all shadow maps together may take.
     pub shadow_bytes: u64,
@@ -61,9 +63,10 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Takes the tables in that were chosen, one for each light, and the bytes that their maps may take together.
-    pub(crate) fn set_shadow_tables(&mut self, tables: Vec<Option<ShadowTable>>, bytes: u64) {
-        let made = tables.iter().enumerate().filter_map(|(i, table)| Some(table.as_ref()?.describe(i)));
+    /// Takes the tables in that were chosen, one for each point of a light, and the bytes that their maps may take together.
+    pub(crate) fn set_shadow_tables(&mut self, points: &[LightPoint], tables: Vec<Option<ShadowTable>>, bytes: u64) {
+        let of_each = tables.iter().zip(points);
+        let made = of_each.filter_map(|(table, point)| Some(table.as_ref()?.describe(&point.name())));
         let passes = self.passes.iter_mut().filter(|p| p.name == pass::SHADOW_MAP);
         passes.zip(made).for_each(|(pass, reason)| pass.reason = reason);
         (self.shadow_tables, self.shadow_bytes) = (tables, bytes);

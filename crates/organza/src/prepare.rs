@@ -8,10 +8,9 @@ use crate::memory::{self, Memory};
 use crate::pass;
 use crate::plan::Plan;
 use crate::scene::{Scene, SceneObject, Technique};
-use crate::shadows::shadow_error;
 use crate::statistics::Statistics;
 use crate::work::Translucent;
-use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, doubts, shadows};
+use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, doubts, lights, shadows};
 use splat_core::Material;
 
 /// What a render would do, without doing it.
@@ -95,7 +94,7 @@ fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Resu
         .collect();
     let made: Vec<u64> = loaded.splats.iter().map(|s| s.made).collect();
     let mut statistics = Statistics::of_cloud(&loaded.cloud, &loaded.materials, &loaded.objects, &loaded.footprints);
-    statistics.lights = light_statistics(&loaded.lights, &loaded.casts);
+    statistics.lights = light_statistics(&loaded.lights);
     statistics.normals_needed = loaded.normals;
     statistics.layers = scene.render.layers.names().map(str::to_owned).collect();
     statistics.tolerance = scene.render.tolerance;
@@ -122,8 +121,9 @@ fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Resu
     memory::check("rendering", memory.total(), options.max_memory)?;
     let left = options.max_memory - memory.total();
     // Shadow maps share what is left.
-    let tables = shadows::tables(&scene.render, loaded, &plan.shadow_maps, left);
-    plan.set_shadow_tables(tables.map_err(|(light, error)| shadow_error(light, &error))?, left);
+    let points = lights::points(&loaded.lights);
+    let tables = shadows::tables(&scene.render, loaded, &points, &plan.shadow_maps, left)?;
+    plan.set_shadow_tables(&points, tables, left);
     let memory = memory.with_maps(shadows::bytes(plan.shadow_tables.iter().flatten()));
     memory::check("rendering", memory.total(), options.max_memory)?;
     Ok((plan, memory))

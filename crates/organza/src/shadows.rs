@@ -1,9 +1,10 @@
 //! What shadow maps are built by: shared by the plan, which tells their size beforehand, and the drawing.
 
 use crate::Error;
+use crate::lights::LightPoint;
 use crate::load::Loaded;
 use crate::scene::{RenderSettings, ShadowMapping};
-use splat_core::{Light, LightShape};
+use splat_core::Light;
 use tsm::{Deposits, Limit, Params};
 
 /// Share of the tolerance that the ends of lists may take, of all lights together. Absorbance grows with its logarithm only, so
@@ -56,10 +57,10 @@ impl ShadowTable {
     }
 
     /// In words.
-    pub(crate) fn describe(&self, light: usize) -> String {
+    pub(crate) fn describe(&self, light: &str) -> String {
         let ([columns, rows], entries) = (self.size, self.entries);
         let (why, cut) = (self.why(), self.absorbance_cut());
-        format!("light {light}: {columns}x{rows} cells, {why}, {entries} entries up to an absorbance of {cut:.1}")
+        format!("{light}: {columns}x{rows} cells, {why}, {entries} entries up to an absorbance of {cut:.1}")
     }
 }
 
@@ -95,7 +96,7 @@ fn tolerance(settings: &RenderSettings, loaded: &Loaded, light: &Light, maps: u6
 /// least radius.
 fn brightest(loaded: &Loaded, light: &Light) -> f64 {
     let intensity = light.intensity.into_iter().map(f64::from).fold(0.0, f64::max);
-    let (LightShape::Point { position } | LightShape::Spot { position, .. }) = light.shape else { return intensity };
+    let Some(position) = light.shape.place() else { return intensity };
     let bounds = loaded.cloud.bounds();
     if bounds.is_empty() {
         return intensity;
@@ -121,40 +122,43 @@ pub(crate) fn bytes<'a>(tables: impl Iterator<Item = &'a ShadowTable>) -> u64 {
     predicted.saturating_add(predicted / 2)
 }
 
-/// The table of each light that gets a map, where all maps together may take so many bytes: as fine as each would be alone, or,
-/// where that is too much, within an equal share of it.
+/// The table of each point of the lights `wanted`, where all maps together may take so many bytes: as fine as each would be alone,
+/// or, where that is too much, within an equal share of it.
 ///
 /// # Errors
-/// That of the first light whose table cannot be chosen, with its number.
+/// That of the first point whose table cannot be chosen, with its name.
 pub(crate) fn tables(
     settings: &RenderSettings,
     loaded: &Loaded,
+    points: &[LightPoint],
     wanted: &[bool],
     max_bytes: u64,
-) -> Result<Vec<Option<ShadowTable>>, (usize, tsm::Error)> {
-    let alone = tables_within(settings, loaded, wanted, max_bytes)?;
+) -> Result<Vec<Option<ShadowTable>>, Error> {
+    let alone = tables_within(settings, loaded, points, wanted, max_bytes)?;
     if bytes(alone.iter().flatten()) <= max_bytes {
         return Ok(alone);
     }
     let maps = alone.iter().flatten().count().max(1) as u64;
-    tables_within(settings, loaded, wanted, max_bytes / maps * 2 / 3)
+    tables_within(settings, loaded, points, wanted, max_bytes / maps * 2 / 3)
 }
 
 fn tables_within(
     settings: &RenderSettings,
     loaded: &Loaded,
+    points: &[LightPoint],
     wanted: &[bool],
     max_bytes: u64,
-) -> Result<Vec<Option<ShadowTable>>, (usize, tsm::Error)> {
-    let maps = wanted.iter().filter(|on| **on).count().max(1) as u64;
-    let table = |(i, (light, wanted)): (usize, (&Light, &bool))| {
-        if !wanted {
+) -> Result<Vec<Option<ShadowTable>>, Error> {
+    let maps = points.iter().filter(|point| wanted[point.of]).count().max(1) as u64;
+    let table = |point: &LightPoint| {
+        if !wanted[point.of] {
             return Ok(None);
         }
+        let light = &point.light;
         let tolerance = tolerance(settings, loaded, light, maps);
         let params = params(settings, loaded, tolerance, max_bytes);
         let predicted = Deposits::predict(&loaded.cloud, &loaded.materials, &loaded.objects, light, &params);
-        let predicted = predicted.map_err(|e| (i, e))?;
+        let predicted = predicted.map_err(|e| shadow_error(point, &e))?;
         Ok(Some(ShadowTable {
             size: predicted.size,
             limit: predicted.limit,
@@ -165,12 +169,12 @@ fn tables_within(
             max_bytes,
         }))
     };
-    loaded.lights.iter().zip(wanted).enumerate().map(table).collect()
+    points.iter().map(table).collect()
 }
 
-/// What went wrong with the map of a light.
-pub(crate) fn shadow_error(light: usize, error: &tsm::Error) -> Error {
-    let what = format!("the shadow map of light {light}");
+/// What went wrong with the map of a point of a light.
+pub(crate) fn shadow_error(point: &LightPoint, error: &tsm::Error) -> Error {
+    let what = format!("the shadow map of {}", point.name());
     match error {
         tsm::Error::Memory { needed_bytes, limit_bytes, .. } => Error::Limit {
             what,

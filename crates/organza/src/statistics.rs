@@ -1,9 +1,10 @@
 //! Statistics of a loaded scene, from which the plan is made.
 
 use crate::form::PlannedObject;
-use crate::scene::{SurfaceSampler, Technique};
+use crate::lights;
+use crate::scene::{SceneLight, SurfaceSampler, Technique};
 use convert::cost::Prediction;
-use splat_core::{Cloud, FootprintStack, Light, Material, Object, Shading, SplatKind};
+use splat_core::{Cloud, FootprintStack, Material, Object, Shading, SplatKind};
 
 /// What the planner knows of one light.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -12,6 +13,8 @@ pub struct LightStatistics {
     pub wants_shadow: bool,
     /// Whether it has no intensity.
     pub is_dark: bool,
+    /// Points that it is for who lights by points, each with a shadow map of its own.
+    pub points: usize,
 }
 
 /// What an object is made of.
@@ -107,7 +110,7 @@ pub struct Statistics {
     pub colored_extinction: bool,
     /// Whether normals were computed for volumes.
     pub normals_needed: bool,
-    /// Lights, extended ones as their points.
+    /// Lights, whole.
     pub lights: Vec<LightStatistics>,
     /// Layers asked for beside beauty and alpha.
     pub layers: Vec<String>,
@@ -186,7 +189,8 @@ impl Statistics {
 
 impl LightStatistics {
     /// Statistics of one light.
-    pub fn of_light(light: &Light, wants_shadow: bool) -> Self {
-        Self { wants_shadow, is_dark: light.intensity.iter().all(|i| *i == 0.0) }
+    pub fn of_light(light: &SceneLight) -> Self {
+        let is_dark = light.light.intensity.iter().all(|i| *i == 0.0);
+        Self { wants_shadow: light.shadow, is_dark, points: lights::count(light) }
     }
 }

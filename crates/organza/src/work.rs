@@ -62,18 +62,18 @@ pub(crate) fn of_scene(scene: &Scene) -> Stages {
     stages
 }
 
-/// After everything was read and counted; `sets` are the seconds of what techniques make beside splats.
+/// After everything was read and counted; `light_points` is how many points of lights there are, `sets` the seconds of what techniques make beside splats.
 pub(crate) fn of_counts(
     scene: &Scene,
     splats: &[SplatCount],
     planned: &[PlannedObject],
-    lights: usize,
+    light_points: usize,
     sets: f64,
 ) -> Stages {
     let converted = splats.iter().zip(planned).filter(|(_, plan)| plan.splats.is_some());
     let mut stages: Stages = converted.map(|(s, _)| (converting(&s.object), CONVERT * s.predicted as f64)).collect();
     let all: f64 = splats.iter().map(|s| s.predicted as f64).sum();
-    let drawn = all * (SORT + PROJECT + SHADE + 20.0 * FRAGMENT + lights as f64 * (CAST + LOOK_UP));
+    let drawn = all * (SORT + PROJECT + SHADE + 20.0 * FRAGMENT + light_points as f64 * (CAST + LOOK_UP));
     stages.push((stage::DRAW.to_owned(), drawn + sets + samples(scene) * SAMPLE));
     stages
 }

@@ -56,7 +56,14 @@ fn main() -> Result<(), Error> {
 
     let object = |sampler| Object { sampler, transform: Similarity::default(), look: Appearance::default() };
     let objects = [object(&ball), object(&cloud), object(&plane)];
-    let scene = Scene { objects: &objects, lights: &[], ambient: [1.0; 3], camera: &camera, occluder: None };
+    let scene = Scene {
+        objects: &objects,
+        lights: &[],
+        shadow_origin: DVec3::ZERO,
+        ambient: [1.0; 3],
+        camera: &camera,
+        occluder: None,
+    };
     let mut ensemble = Ensemble::new(camera.size, &EnsembleParams::default())?;
     let mut renderer = Renderer::new();
     while ensemble.rms_error(&|_, _| [0.0; 3], None) > 0.02 {

@@ -32,7 +32,9 @@
 //! let sampler = LineSampler::new(&ball, 16, &params, None).unwrap();
 //!
 //! let objects = [Object { sampler: &sampler, transform: Similarity::default(), look: Appearance::default() }];
-//! let scene = Scene { objects: &objects, lights: &[], ambient: [1.0; 3], camera: &camera, occluder: None };
+//! let (objects, lights, camera) = (&objects[..], &[][..], &camera);
+//! let shadow_origin = DVec3::ZERO;
+//! let scene = Scene { objects, lights, shadow_origin, ambient: [1.0; 3], camera, occluder: None };
 //! let mut ensemble = Ensemble::new(camera.size, &EnsembleParams::default()).unwrap();
 //! Renderer::new().fold(&scene, &mut ensemble, 100, &FoldParams::default(), &Progress::new()).unwrap();
 //! let picture = ensemble.read(&|_, _| [0.0; 3], None);
@@ -100,7 +102,8 @@ pub use particles::{PackedColor, PackedNormal, Particles};
 pub use project::{finest_pixel_area, pixel_area};
 pub use render::{FoldParams, Object, Occluder, Renderer, Scene};
 pub use sampler::{KeptSets, Sampler};
-pub use shade::{Appearance, LitBy};
+pub use shade::Appearance;
+pub use splat_core::shade::LitBy;
 pub use splats::{SplatParams, SplatSampler};
 pub use volume::{GridSampler, VolumeParams};
 pub use volume_field::FieldVolumeSampler;

@@ -13,10 +13,11 @@ use crate::error::check;
 use crate::nearest::Nearest;
 use crate::project::Projector;
 use crate::sampler::{Run, runs};
-use crate::shade::{Appearance, LitBy, Seen, Shader};
+use crate::shade::{Appearance, Seen, Shader};
 use crate::{Error, PackedNormal, Sampler};
 use glam::{DMat3, DVec3, Mat3};
 use rayon::prelude::*;
+use splat_core::shade::LitBy;
 use splat_core::shade::MAX_CHANNELS;
 use splat_core::{Camera, Progress, Shading, Similarity, glam};
 
@@ -55,6 +56,8 @@ pub struct Scene<'a> {
     pub objects: &'a [Object<'a>],
     /// Lights with their shadows.
     pub lights: &'a [LitBy<'a>],
+    /// World position that what receives shadows is relative to: the origin of the cloud that casts them.
+    pub shadow_origin: DVec3,
     /// Ambient radiance, the same from everywhere.
     pub ambient: [f32; 3],
     /// The viewer.
@@ -161,7 +164,8 @@ impl Renderer {
 
     fn resolve(&self, scene: &Scene<'_>, plan: &Plan, batch: usize, ensemble: &mut Ensemble) {
         let channels = ensemble.params;
-        let shader = Shader { lights: scene.lights, ambient: scene.ambient, camera: scene.camera, channels };
+        let Scene { lights, shadow_origin, ambient, camera, .. } = *scene;
+        let shader = Shader { lights, shadow_origin, ambient, camera, channels };
         let all = Resolve { scene, plan, shader: &shader, tasks: &self.tasks, batch };
         let mut tiles = ensemble.tiles();
         let tiles = tiles.par_iter_mut().enumerate();

@@ -4,17 +4,8 @@
 
 use crate::EnsembleParams;
 use glam::{DVec3, Vec3};
-use splat_core::shade::{MAX_CHANNELS, Point, arriving, facing};
-use splat_core::{Camera, Light, Material, Receiver, SplatKind, Transmittance, glam};
-
-/// A light with its shadow map, if it has one.
-#[derive(Clone, Copy)]
-pub struct LitBy<'a> {
-    /// The light.
-    pub light: Light,
-    /// Its transmittance to any point, and the world position that the map's receivers are relative to.
-    pub shadow: Option<(&'a dyn Transmittance, DVec3)>,
-}
+use splat_core::shade::{LitBy, MAX_CHANNELS, Point, arriving, facing};
+use splat_core::{Camera, Material, Receiver, SplatKind, glam};
 
 /// How the particles of an object look.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +29,8 @@ impl Default for Appearance {
 /// Lights and viewer.
 pub(crate) struct Shader<'a> {
     pub(crate) lights: &'a [LitBy<'a>],
+    /// World position that receivers are relative to.
+    pub(crate) shadow_origin: DVec3,
     pub(crate) ambient: [f32; 3],
     pub(crate) camera: &'a Camera,
     pub(crate) channels: EnsembleParams,
@@ -73,9 +66,9 @@ impl Shader<'_> {
         };
         let lights = self.lights.iter().map(|lit| &lit.light);
         let radiance = point.radiance(self.ambient, lights, |rank, irradiance| {
-            let shadow = self.lights[rank].shadow.map(|(map, origin)| {
+            let shadow = self.lights[rank].shadow.map(|map| {
                 move || {
-                    let position = (point.position - origin).as_vec3();
+                    let position = (point.position - self.shadow_origin).as_vec3();
                     map.transmittance(&Receiver { position, normal: seen.normal, radius: look.radius, kind: look.kind })
                 }
             });

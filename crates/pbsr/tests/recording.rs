@@ -32,7 +32,14 @@ fn sets_that_the_device_makes_are_as_kept_in_text() {
     let camera = Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y, view, ROOM.size).unwrap();
     let object = |sampler| Object { sampler, transform: Similarity::default(), look: Appearance::default() };
     let objects = [object(&surface as &dyn Sampler), object(&volume)];
-    let scene = Scene { objects: &objects, lights: &[], ambient: [0.0; 3], camera: &camera, occluder: None };
+    let scene = Scene {
+        objects: &objects,
+        lights: &[],
+        shadow_origin: DVec3::ZERO,
+        ambient: [0.0; 3],
+        camera: &camera,
+        occluder: None,
+    };
     let sources = Sources::new(&scene).unwrap();
     let found = record_generated(ROOM, Nearest::Wide, None, &sources).unwrap().recording;
     found.check().unwrap();

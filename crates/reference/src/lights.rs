@@ -86,14 +86,26 @@ pub(crate) struct LightSample {
 }
 
 impl LightSource {
-    /// The reference's form of a noun; `None` for a shape that is not known here.
+    /// The reference's form of a noun; `None` for a shape that is not known here, such as one of the points that others take
+    /// a flat light for.
     pub fn from_light(light: &Light) -> Option<Self> {
         let power = light.intensity.map(f64::from);
+        // Intensity along the normal over the area that is seen from there.
+        let over = |area: f64| power.map(|i| i / area);
         match light.shape {
             LightShape::Point { position } => Some(Self::Point { position, intensity: power }),
             LightShape::Directional { direction } => Some(Self::Directional { direction, irradiance: power }),
             LightShape::Spot { position, direction, inner, outer } => {
                 Some(Self::Spot { position, direction, inner, outer, intensity: power })
+            }
+            LightShape::Sphere { center, radius } => {
+                Some(Self::Sphere { center, radius, radiance: over(PI * radius * radius) })
+            }
+            LightShape::Disk { center, normal, radius } => {
+                Some(Self::Disk { center, normal, radius, radiance: over(PI * radius * radius) })
+            }
+            LightShape::Rect { center, u, v } => {
+                Some(Self::Rect { center, u, v, radiance: over(4.0 * u.cross(v).length()) })
             }
             _ => None,
         }

@@ -1,7 +1,13 @@
 //! Lights.
+//!
+//! A sphere, a disk and a rectangle are lights of their own: each stays whole until somebody needs points of it and asks
+//! [`Light::points`]. What is flat shines to one side, with the cosine.
+
+mod points;
 
 use crate::Error;
 use glam::DVec3;
+use std::f64::consts::FRAC_PI_2;
 
 /// Where the light comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,57 +34,159 @@ pub enum LightShape {
         /// Half angle of no light, radians, < π/2.
         outer: f64,
     },
+    /// A point of a flat light: intensity times the cosine to its normal, and none behind it.
+    Patch {
+        /// World position.
+        position: DVec3,
+        /// Unit normal, to the side that it shines to.
+        normal: DVec3,
+    },
+    /// A sphere of even radiance that shines outwards.
+    Sphere {
+        /// Centre, world.
+        center: DVec3,
+        /// Radius, world units, > 0.
+        radius: f64,
+    },
+    /// A flat disc of even radiance that shines to the side of its normal.
+    Disk {
+        /// Centre, world.
+        center: DVec3,
+        /// Unit normal.
+        normal: DVec3,
+        /// Radius, world units, > 0.
+        radius: f64,
+    },
+    /// A parallelogram `center` ± `u` ± `v` of even radiance that shines to the side of u × v.
+    Rect {
+        /// Centre, world.
+        center: DVec3,
+        /// First half-axis, world units.
+        u: DVec3,
+        /// Second half-axis, world units, not parallel to the first.
+        v: DVec3,
+    },
 }
 
-/// One light. An extended light is several points, see `organza_scene::SceneLight`.
+impl LightShape {
+    /// World position of a light, the centre of one with an extent; `None` for parallel light.
+    pub fn place(&self) -> Option<DVec3> {
+        match *self {
+            Self::Point { position } | Self::Spot { position, .. } | Self::Patch { position, .. } => Some(position),
+            Self::Sphere { center, .. } | Self::Disk { center, .. } | Self::Rect { center, .. } => Some(center),
+            Self::Directional { .. } => None,
+        }
+    }
+
+    /// Unit normal of what is flat, to the side that it shines to; `None` for all else.
+    pub fn normal(&self) -> Option<DVec3> {
+        match *self {
+            Self::Patch { normal, .. } | Self::Disk { normal, .. } => Some(normal),
+            Self::Rect { u, v, .. } => Some(rect_normal(u, v)),
+            _ => None,
+        }
+    }
+
+    /// Whether it has an extent, so that [`Light::points`] makes other lights of it.
+    pub fn is_extended(&self) -> bool {
+        matches!(self, Self::Sphere { .. } | Self::Disk { .. } | Self::Rect { .. })
+    }
+
+    /// What is wrong with it: attribute, found, expected.
+    fn fault(&self) -> Option<(&'static str, String, &'static str)> {
+        let positive = |radius: f64| radius.is_finite() && radius > 0.0;
+        if let Some(place) = self.place().filter(|p| !p.is_finite()) {
+            return Some(("position", place.to_string(), "finite numbers"));
+        }
+        match *self {
+            Self::Spot { inner, outer, .. } if !(0.0 <= inner && inner <= outer && outer < FRAC_PI_2) => {
+                return Some(("cone", format!("{inner}..{outer}"), "0 ≤ inner ≤ outer < π/2 radians"));
+            }
+            Self::Sphere { radius, .. } | Self::Disk { radius, .. } if !positive(radius) => {
+                return Some(("radius", radius.to_string(), "a finite length > 0"));
+            }
+            Self::Rect { u, v, .. } if !positive(u.cross(v).length()) => {
+                return Some(("half-axes", format!("{u}, {v}"), "two finite vectors that are not parallel"));
+            }
+            _ => {}
+        }
+        let (attribute, direction) = match *self {
+            Self::Directional { direction } | Self::Spot { direction, .. } => ("direction", direction),
+            Self::Patch { normal, .. } | Self::Disk { normal, .. } => ("normal", normal),
+            _ => return None,
+        };
+        // Not a number is no unit vector either.
+        let is_unit = (direction.length_squared() - 1.0).abs() < 1e-6;
+        (!is_unit).then(|| (attribute, direction.to_string(), "a unit vector"))
+    }
+}
+
+/// One light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Light {
     /// Where it comes from.
     pub shape: LightShape,
-    /// Radiant intensity I in W/sr per channel (relative units allowed); irradiance in W/m² for directional light.
+    /// Radiant intensity I in W/sr per channel (relative units allowed), on the axis of a spot and along the normal of what
+    /// is flat; irradiance in W/m² for directional light. That of an extended light is the whole light's as it is seen from
+    /// far away: its radiance is I over the area that is seen from there, πr² of a sphere or disk, 4·|u × v| of a rectangle.
     pub intensity: [f32; 3],
 }
 
 impl Light {
-    /// Checks that everything is finite, intensities are ≥ 0 and directions are of unit length.
+    /// Checks that everything is finite, intensities are ≥ 0, directions are of unit length, and extents above 0.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the light by `index`.
     pub fn validate(&self, index: usize) -> Result<(), Error> {
-        let bad = |attribute, found: String, expected| {
-            Err(Error::Invalid { element: "light", index, attribute, found, expected })
-        };
-        if !self.intensity.iter().all(|i| i.is_finite() && *i >= 0.0) {
-            return bad("intensity", format!("{:?}", self.intensity), "three finite numbers ≥ 0");
-        }
-        let (position, direction) = match self.shape {
-            LightShape::Point { position } => (position, DVec3::Z),
-            LightShape::Directional { direction } => (DVec3::ZERO, direction),
-            LightShape::Spot { position, direction, inner, outer } => {
-                if !(0.0 <= inner && inner <= outer && outer < std::f64::consts::FRAC_PI_2) {
-                    return bad("cone", format!("{inner}..{outer}"), "0 ≤ inner ≤ outer < π/2 radians");
-                }
-                (position, direction)
+        let dark = || ("intensity", format!("{:?}", self.intensity), "three finite numbers ≥ 0");
+        let is_bright = self.intensity.iter().all(|i| i.is_finite() && *i >= 0.0);
+        match self.shape.fault().or_else(|| (!is_bright).then(dark)) {
+            Some((attribute, found, expected)) => {
+                Err(Error::Invalid { element: "light", index, attribute, found, expected })
             }
-        };
-        if !position.is_finite() {
-            return bad("position", position.to_string(), "finite numbers");
+            None => Ok(()),
         }
-        if (direction.length_squared() - 1.0).abs() >= 1e-6 {
-            return bad("direction", direction.to_string(), "a unit vector");
-        }
-        Ok(())
     }
 
     /// Shape and intensity as bits, the same for equal lights alone: a key that puts lights in an order of their own.
-    pub fn bits(&self) -> (u8, [u64; 8], [u32; 3]) {
-        let (kind, p, d, angles) = match self.shape {
-            LightShape::Point { position } => (0, position, DVec3::ZERO, [0.0; 2]),
-            LightShape::Directional { direction } => (1, DVec3::ZERO, direction, [0.0; 2]),
-            LightShape::Spot { position, direction, inner, outer } => (2, position, direction, [inner, outer]),
+    pub fn bits(&self) -> (u8, [u64; 9], [u32; 3]) {
+        let zero = DVec3::ZERO;
+        let (kind, vectors) = match self.shape {
+            LightShape::Point { position } => (0, [position, zero, zero]),
+            LightShape::Directional { direction } => (1, [zero, direction, zero]),
+            LightShape::Spot { position, direction, inner, outer } => {
+                (2, [position, direction, DVec3::new(inner, outer, 0.0)])
+            }
+            LightShape::Patch { position, normal } => (3, [position, normal, zero]),
+            LightShape::Sphere { center, radius } => (4, [center, DVec3::new(radius, 0.0, 0.0), zero]),
+            LightShape::Disk { center, normal, radius } => (5, [center, normal, DVec3::new(radius, 0.0, 0.0)]),
+            LightShape::Rect { center, u, v } => (6, [center, u, v]),
         };
-        let shape = [p.x, p.y, p.z, d.x, d.y, d.z, angles[0], angles[1]];
-        (kind, shape.map(f64::to_bits), self.intensity.map(f32::to_bits))
+        let mut shape = [0; 9];
+        let numbers = vectors.iter().flat_map(|v| v.to_array());
+        shape.iter_mut().zip(numbers).for_each(|(bits, number)| *bits = number.to_bits());
+        (kind, shape, self.intensity.map(f32::to_bits))
+    }
+
+    /// The same light in a world whose lengths are `scale` times as large, so that everything there receives the same
+    /// irradiance: intensities times `scale`², the irradiance of parallel light as it is.
+    pub fn scaled(&self, scale: f64) -> Self {
+        let at = |p: DVec3| p * scale;
+        let shape = match self.shape {
+            LightShape::Point { position } => LightShape::Point { position: at(position) },
+            LightShape::Directional { .. } => return *self,
+            LightShape::Spot { position, direction, inner, outer } => {
+                LightShape::Spot { position: at(position), direction, inner, outer }
+            }
+            LightShape::Patch { position, normal } => LightShape::Patch { position: at(position), normal },
+            LightShape::Sphere { center, radius } => LightShape::Sphere { center: at(center), radius: radius * scale },
+            LightShape::Disk { center, normal, radius } => {
+                LightShape::Disk { center: at(center), normal, radius: radius * scale }
+            }
+            LightShape::Rect { center, u, v } => LightShape::Rect { center: at(center), u: at(u), v: at(v) },
+        };
+        let area = (scale * scale) as f32;
+        Self { shape, intensity: self.intensity.map(|i| i * area) }
     }
 
     /// Direction from `p` to the light, and the unshadowed irradiance per channel on a plane that faces it, W/m².
@@ -86,15 +194,22 @@ impl Light {
     /// `spread` is the standard deviation σ of the splat that receives the light, world units; 0 for a bare point. A
     /// splat is no point: near a light at distance d it receives 1/(d² + σ²), which is the mean of 1/d² over a Gaussian
     /// at d = 0 and tends to 1/d² away from it. The direction shrinks with it, d/√(d² + σ²), to nothing at the light
-    /// itself.
+    /// itself; so does the cosine to the normal of a patch, which has nothing behind it at any distance.
+    ///
+    /// A light with an extent counts as one point at its centre. That is exact outside of a sphere that is seen whole, and
+    /// far from what is flat; who lights what is nearer asks for [`Light::points`].
     pub fn irradiance(&self, p: DVec3, spread: f64) -> (DVec3, [f32; 3]) {
         let from_point = |position: DVec3| {
             let to_light = position - p;
             let distance_sq = to_light.length_squared() + spread * spread;
             if distance_sq > 0.0 { (to_light / distance_sq.sqrt(), distance_sq.recip()) } else { (DVec3::ZERO, 0.0) }
         };
+        let from_patch = |position: DVec3, normal: DVec3| {
+            let (to_light, falloff) = from_point(position);
+            (to_light, falloff * (-to_light.dot(normal)).max(0.0))
+        };
         let (to_light, falloff) = match self.shape {
-            LightShape::Point { position } => from_point(position),
+            LightShape::Point { position } | LightShape::Sphere { center: position, .. } => from_point(position),
             LightShape::Directional { direction } => (-direction, 1.0),
             LightShape::Spot { position, direction, inner, outer } => {
                 let (to_light, falloff) = from_point(position);
@@ -104,18 +219,31 @@ impl Light {
                     if high > low { ((cosine - low) / (high - low)).clamp(0.0, 1.0) } else { f64::from(cosine >= low) };
                 (to_light, falloff * t * t * (3.0 - 2.0 * t))
             }
+            LightShape::Patch { position, normal } | LightShape::Disk { center: position, normal, .. } => {
+                from_patch(position, normal)
+            }
+            LightShape::Rect { center, u, v } => from_patch(center, rect_normal(u, v)),
         };
         (to_light, self.intensity.map(|i| (f64::from(i) * falloff) as f32))
     }
+}
+
+/// Unit normal of a rectangle with these half-axes, to the side that it shines to.
+pub(crate) fn rect_normal(u: DVec3, v: DVec3) -> DVec3 {
+    u.cross(v).normalize_or_zero()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn light(shape: LightShape) -> Light {
+        Light { shape, intensity: [2.0; 3] }
+    }
+
     #[test]
     fn ts01_a_splat_at_the_light_receives_a_finite_mean() {
-        let light = Light { shape: LightShape::Point { position: DVec3::ONE }, intensity: [2.0; 3] };
+        let light = light(LightShape::Point { position: DVec3::ONE });
         for offset in [0.0, 1e-12, 1e-3] {
             let (to_light, irradiance) = light.irradiance(DVec3::ONE + DVec3::X * offset, 0.1);
             assert!((irradiance[0] / 200.0 - 1.0).abs() < 1e-3, "{offset}: {irradiance:?}");
@@ -124,5 +252,62 @@ mod tests {
         let (to_light, irradiance) = light.irradiance(DVec3::new(1.0, 1.0, -9.0), 0.1);
         assert!((irradiance[0] - 0.02).abs() < 1e-5 && (to_light - DVec3::Z).length() < 1e-4);
         assert_eq!(light.irradiance(DVec3::ONE, 0.0).1, [0.0; 3]);
+    }
+
+    #[test]
+    fn a_patch_shines_to_one_side_with_the_cosine() {
+        let patch = light(LightShape::Patch { position: DVec3::ONE, normal: DVec3::NEG_Y });
+        let at = |x: f64, y: f64| patch.irradiance(DVec3::ONE + DVec3::new(x, y, 0.0), 0.0).1[0];
+        // I·cos θ/d²: 2 at a distance of 1 along the normal, and at 60° to it a half of that.
+        assert_eq!(at(0.0, -1.0), 2.0);
+        assert!((at(0.75f64.sqrt(), -0.5) - 1.0).abs() < 1e-6);
+        // Nothing beside it and behind it, whatever receives it.
+        assert_eq!([at(1.0, 0.0), at(0.5, 1.0)], [0.0; 2]);
+        assert_eq!(patch.irradiance(DVec3::ONE + DVec3::Y * 0.01, 0.1).1, [0.0; 3]);
+        assert!(patch.irradiance(DVec3::ONE - DVec3::Y * 0.01, 0.1).1[0] > 0.0);
+    }
+
+    #[test]
+    fn a_scaled_light_gives_a_scaled_world_the_same_irradiance() {
+        let (center, normal) = (DVec3::new(1.0, 2.0, 3.0), DVec3::NEG_Y);
+        let shapes = [
+            LightShape::Point { position: center },
+            LightShape::Directional { direction: normal },
+            LightShape::Spot { position: center, direction: normal, inner: 0.2, outer: 0.9 },
+            LightShape::Patch { position: center, normal },
+            LightShape::Sphere { center, radius: 0.5 },
+            LightShape::Disk { center, normal, radius: 0.5 },
+            LightShape::Rect { center, u: DVec3::X, v: DVec3::Z },
+        ];
+        for shape in shapes {
+            let (light, p) = (light(shape), DVec3::new(0.5, 0.25, 2.5));
+            light.validate(0).expect("a light");
+            for (one, other) in light.points(5).iter().zip(light.scaled(0.25).points(5)) {
+                assert_eq!(one.irradiance(p, 0.125), other.irradiance(p * 0.25, 0.125 * 0.25), "{shape:?}");
+                assert_eq!(one.scaled(0.25), other);
+            }
+        }
+    }
+
+    #[test]
+    fn lights_without_extent_direction_or_place_are_refused() {
+        let (center, normal, nan) = (DVec3::ZERO, DVec3::Y, f64::NAN);
+        let bad = [
+            ("position", LightShape::Patch { position: DVec3::splat(nan), normal }),
+            ("normal", LightShape::Patch { position: center, normal: normal * 2.0 }),
+            ("radius", LightShape::Sphere { center, radius: 0.0 }),
+            ("radius", LightShape::Disk { center, normal, radius: nan }),
+            ("normal", LightShape::Disk { center, normal: DVec3::splat(nan), radius: 1.0 }),
+            ("half-axes", LightShape::Rect { center, u: DVec3::X, v: DVec3::X * 3.0 }),
+            ("half-axes", LightShape::Rect { center, u: DVec3::X, v: DVec3::splat(nan) }),
+            ("cone", LightShape::Spot { position: center, direction: normal, inner: 1.0, outer: 0.5 }),
+            ("direction", LightShape::Directional { direction: DVec3::ZERO }),
+        ];
+        for (expected, shape) in bad {
+            match light(shape).validate(7) {
+                Err(Error::Invalid { index: 7, attribute, .. }) => assert_eq!(attribute, expected),
+                other => panic!("{shape:?}: {other:?}"),
+            }
+        }
     }
 }

@@ -18,10 +18,12 @@ use rayon::prelude::*;
 const CHUNK: usize = 4096;
 
 /// A light with its shadow map, if it has one.
+#[derive(Clone, Copy)]
 pub struct LitBy<'a> {
     /// The light.
     pub light: Light,
-    /// Its transmittance to any point; `None` when nothing casts or receives its shadow.
+    /// Its transmittance to any point, relative to the origin of the cloud that casts; `None` when nothing casts or receives its
+    /// shadow.
     pub shadow: Option<&'a dyn Transmittance>,
 }
 
@@ -33,7 +35,7 @@ pub struct ShadeInput<'a> {
     pub materials: &'a [Material],
     /// Objects by id.
     pub objects: &'a [Object],
-    /// Lights with their shadows.
+    /// Lights with their shadows, which lie relative to the cloud's origin.
     pub lights: &'a [LitBy<'a>],
     /// Ambient radiance, the same from everywhere.
     pub ambient: [f32; 3],

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod accumulation;
+mod extended_lights;
 mod opaque_rim;
 #[cfg(feature = "gpu")]
 mod recording;

@@ -81,12 +81,14 @@ fn frame_of(casters: &Casters<'_>, survey: &Survey, light: &Light) -> Result<(Ki
             let origin = centre - direction * (reach * 1.001);
             return Ok((Kind::Parallel, Frame::new(origin, axes_along(direction, sides), 2.0 * reach)));
         }
-        LightShape::Point { position } | LightShape::Spot { position, .. } => position - casters.cloud.origin,
+        LightShape::Point { position } | LightShape::Spot { position, .. } | LightShape::Patch { position, .. } => {
+            position - casters.cloud.origin
+        }
         _ => {
             return Err(Error::Parameter {
                 name: "light",
                 found: format!("{:?}", light.shape),
-                expected: "a point, spot or directional light; extended lights are several points",
+                expected: "a point, patch, spot or directional light; `Light::points` makes such of one with an extent",
             });
         }
     };

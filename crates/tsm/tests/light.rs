@@ -3,7 +3,7 @@
 use crate::common::*;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::optics::AbsorbanceModel;
-use splat_core::{Cloud, Material, Object, Receiver, Splat, SplatKind, Transmittance};
+use splat_core::{Cloud, Light, LightShape, Material, Object, Receiver, Splat, SplatKind, Transmittance};
 use tsm::{MappingChoice, Params, Resolution, ShadowMap};
 
 #[test]
@@ -331,6 +331,21 @@ fn thin_slabs_absorb_more_at_an_angle_and_crossings_do_not() {
             assert!((light - (-0.4 * factor as f32).exp()).abs() < 3e-3, "{surface_opacity:?}: {light}");
         }
     }
+}
+
+#[test]
+fn a_patch_casts_the_shadows_of_a_point_and_whole_lights_are_refused() {
+    let cloud = medium([4; 3], 0.1, 3.0, |_| true);
+    let (position, normal) = (DVec3::new(0.3, 2.0, -0.2), DVec3::NEG_Y);
+    let patch = Light { shape: LightShape::Patch { position, normal }, intensity: [1.0; 3] };
+    let [of_patch, of_point] = [patch, point_light(position)].map(|light| build(&cloud, &light, &Params::default()));
+    for k in 0..cloud.len() {
+        let receiver = receiver(&cloud, k);
+        assert_eq!(of_patch.transmittance(&receiver), of_point.transmittance(&receiver), "{k}");
+    }
+    let whole = Light { shape: LightShape::Disk { center: position, normal, radius: 0.5 }, ..patch };
+    let refused = ShadowMap::build(&cloud, &[Material::default()], &[], &whole, &Params::default());
+    assert!(refused.is_err_and(|e| e.to_string().contains("Light::points")));
 }
 
 #[test]

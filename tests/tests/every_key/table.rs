@@ -152,7 +152,7 @@ const SPHERE: &[&str] = &["light=[{kind='sphere', position=[2, 3, 2], radius=0.3
 const DISK: &[&str] =
     &["light=[{kind='disk', position=[2, 3, 2], normal=[-1, -1, -1], radius=0.3, intensity=[20, 18, 16], samples=4}]"];
 const RECT: &[&str] = &[
-    "light=[{kind='rect', position=[2, 3, 2], u=[0.3, -0.2, 0], v=[0.1, 0, -0.3], intensity=[20, 18, 16], samples=4}]",
+    "light=[{kind='rect', position=[2, 3, 2], u=[0.1, 0, -0.3], v=[0.3, -0.2, 0], intensity=[20, 18, 16], samples=4}]",
 ];
 
 fn lights() -> Vec<Entry> {
@@ -165,9 +165,9 @@ fn lights() -> Vec<Entry> {
         one("light.directional.direction", "light.0.direction=[-2, -3, -1]").with(SUN),
         one("light.directional.irradiance", "light.0.irradiance=[1, 1, 1]").with(SUN),
         one("light.directional.shadow", "light.0.shadow=false").with(SUN),
-        one("light.disk.normal", "light.0.normal=[1, 0, 0]").with(DISK),
-        one("light.rect.u", "light.0.u=[0.6, -0.2, 0]").with(RECT),
-        one("light.rect.v", "light.0.v=[0.1, 0, -0.6]").with(RECT),
+        one("light.disk.normal", "light.0.normal=[-1, 0, 0]").with(DISK),
+        one("light.rect.u", "light.0.u=[0.1, 0, -0.6]").with(RECT),
+        one("light.rect.v", "light.0.v=[0.6, -0.2, 0]").with(RECT),
     ];
     for (kind, with) in [("point", &[][..]), ("spot", SPOT), ("sphere", SPHERE), ("disk", DISK), ("rect", RECT)] {
         let key = |name: &str| -> &'static str { format!("light.{kind}.{name}").leak() };

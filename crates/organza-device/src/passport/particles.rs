@@ -46,7 +46,7 @@ impl ParticlesInput {
     /// Lit by the lamp of a shadow map; none is widened, so that places within pixels are the same.
     pub(super) fn check_lit(&self, device: &mut dyn Executor, shadow: &ShadowInput) -> Result<Found, Failure> {
         let (map, light) = shadow.lamp();
-        let lit = LitBy { light, shadow: Some((map, DVec3::ZERO)) };
+        let lit = LitBy { light, shadow: Some(map) };
         let material = Material { specular: 0.2, shininess: 20.0, ..Material::default() };
         self.check_in(device, Folding::new(vec![(map, DVec3::ZERO)]), (material, 0.6), &[lit])
     }
@@ -73,7 +73,8 @@ impl ParticlesInput {
             Object { sampler, transform, look: Appearance { material, radius: RADIUS, ..Appearance::default() } }
         };
         let objects = [object(&near, 0.5), object(&far, -0.3)];
-        let scene = Scene { objects: &objects, lights, ambient: [0.1; 3], camera: &self.camera, occluder: None };
+        let (shadow_origin, camera) = (DVec3::ZERO, &self.camera);
+        let scene = Scene { objects: &objects, lights, shadow_origin, ambient: [0.1; 3], camera, occluder: None };
         let empty = Ensemble::new(SIZE, &EnsembleParams { radiance_unit: 0.5, ..EnsembleParams::default() })?;
         let (mut expected, mut found, progress) = (empty.clone(), empty, Progress::default());
         Renderer::new().fold(&scene, &mut expected, SETS, &FoldParams::default(), &progress)?;

@@ -1,7 +1,7 @@
 //! The knobs of the technique `points` (Gunjee 2007).
 
 use super::{Knob, Options, Request, Skipped, Step, Sweep, Theory};
-use organza::scene::{LightSource, MediumShape, Scene, SceneObject, ShadowMapping, Source, Technique};
+use organza::scene::{MediumShape, Scene, SceneObject, ShadowMapping, Source, Technique};
 use splat_core::{LightShape, raster::Accumulation};
 
 /// What has to be known of a loaded scene to choose the steps.
@@ -146,8 +146,8 @@ fn cells(facts: &Facts, options: &Options) -> Result<Knob, String> {
 
 fn mapping(scene: &Scene, facts: &Facts) -> Result<Knob, String> {
     facts.cells.ok_or(NO_MAP)?;
-    let directional = |l: &LightSource| matches!(l, LightSource::Simple(light) if matches!(light.shape, LightShape::Directional { .. }));
-    if scene.lights.iter().any(|l| l.shadow && directional(&l.source)) {
+    let directional = |shape| matches!(shape, LightShape::Directional { .. });
+    if scene.lights.iter().any(|l| l.shadow && directional(l.light.shape)) {
         return Err("a directional light takes the planar table alone".into());
     }
     Ok(Knob {

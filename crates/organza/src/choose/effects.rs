@@ -120,8 +120,8 @@ fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<PlannedPass> {
     if statistics.splats > 0 || statistics.own() == 0 {
         pass(pass::CONVERT, format!("{} splats", statistics.splats));
     }
-    for (i, _) in shadow_maps.iter().enumerate().filter(|(_, on)| **on) {
-        pass(pass::SHADOW_MAP, format!("light {i}"));
+    for (i, light) in statistics.lights.iter().enumerate().filter(|(i, _)| shadow_maps[*i]) {
+        (0..light.points).for_each(|_| pass(pass::SHADOW_MAP, format!("light {i}")));
     }
     for (row, what) in rows() {
         let before = row.steps.split_last().map_or(&[][..], |(_, before)| before);
@@ -153,7 +153,7 @@ mod tests {
     use super::*;
 
     fn scene() -> Statistics {
-        let light = LightStatistics { wants_shadow: true, is_dark: false };
+        let light = LightStatistics { wants_shadow: true, is_dark: false, points: 1 };
         Statistics {
             translucent: 10,
             opaque: 5,

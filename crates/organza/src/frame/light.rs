@@ -2,6 +2,7 @@
 
 use super::Frame;
 use crate::device;
+use crate::lights::{self, LightPoint};
 use crate::pass;
 use crate::shadows::shadow_error;
 use crate::{CostRecord, Error, work};
@@ -10,7 +11,12 @@ use splat_core::{Light, Transmittance};
 use tsm::{Deposits, ShadowMap};
 
 impl<'a> Frame<'a> {
-    /// One shadow map for each light that the plan gives one, `None` for the others. What building them took is added to `cost`.
+    /// The points of all lights, by which techniques light what they draw.
+    pub(crate) fn light_points(&self) -> &[LightPoint] {
+        self.light_points.get_or_init(|| lights::points(&self.loaded.lights))
+    }
+
+    /// One shadow map for each point of a light that the plan gives one, `None` for the others. What building them took is added to `cost`.
     ///
     /// # Errors
     /// [`Error::Cancelled`]; [`Error::Limit`] where a map needs more bytes than the plan leaves for it.
@@ -25,8 +31,8 @@ impl<'a> Frame<'a> {
     fn shadow_maps(&self, cost: &mut CostRecord) -> Result<Vec<Option<ShadowMap>>, Error> {
         let mut maps = Vec::new();
         let mut left = self.plan.shadow_bytes;
-        let (mut made, count) = (0, self.plan.shadow_maps.iter().filter(|on| **on).count());
-        for (i, (light, table)) in self.loaded.lights.iter().zip(&self.plan.shadow_tables).enumerate() {
+        let (mut made, count) = (0, self.plan.shadow_tables.iter().flatten().count());
+        for (point, table) in self.light_points().iter().zip(&self.plan.shadow_tables) {
             self.tick()?;
             let Some(table) = table else {
                 maps.push(None);
@@ -37,8 +43,8 @@ impl<'a> Frame<'a> {
             let params = table.params(self.settings, self.loaded, left);
             let map = cost.measure(pass::SHADOW_MAP, |stage| {
                 let l = self.loaded;
-                let deposits = Deposits::new(&l.cloud, &l.materials, &l.objects, light, &params, self.progress)
-                    .map_err(|e| shadow_error(i, &e))?;
+                let deposits = Deposits::new(&l.cloud, &l.materials, &l.objects, &point.light, &params, self.progress)
+                    .map_err(|e| shadow_error(point, &e))?;
                 let helped = self.helper.and_then(|helper| device::shadow_map(helper, &deposits));
                 let map = helped.unwrap_or_else(|| deposits.into_map());
                 stage.items_in = l.cloud.len() as u64;
@@ -52,7 +58,7 @@ impl<'a> Frame<'a> {
         Ok(maps)
     }
 
-    /// The lights that have an intensity, with their maps.
+    /// The points of lights that have an intensity, with their maps.
     pub(crate) fn lit_by<'b>(&'b self, maps: &'b [Option<ShadowMap>]) -> Vec<LitBy<'b>> {
         let shadow = |map: Option<&'b ShadowMap>| map.map(|map| map as &dyn Transmittance);
         self.shining(maps).map(|(light, map)| LitBy { light, shadow: shadow(map) }).collect()
@@ -66,7 +72,7 @@ impl<'a> Frame<'a> {
         ShadeInput { cloud: self.drawn(), materials, objects, lights, ambient, camera }
     }
 
-    /// The lights that have an intensity, with their shadow maps.
+    /// The points of lights that have an intensity, with their shadow maps.
     pub(crate) fn shining<'b>(
         &'b self,
         maps: &'b [Option<ShadowMap>],
@@ -74,9 +80,9 @@ impl<'a> Frame<'a> {
         self.with_light(maps.iter().map(Option::as_ref))
     }
 
-    /// Lights that have an intensity, each with what is there for it.
+    /// Points of lights that have an intensity, each with what is there for it.
     pub(crate) fn with_light<T>(&self, of_each: impl Iterator<Item = T>) -> impl Iterator<Item = (Light, T)> {
-        let all = self.loaded.lights.iter().zip(of_each);
-        all.filter(|(light, _)| light.intensity != [0.0; 3]).map(|(light, of)| (*light, of))
+        let all = self.light_points().iter().zip(of_each);
+        all.map(|(point, of)| (point.light, of)).filter(|(light, _)| light.intensity != [0.0; 3])
     }
 }

@@ -2,13 +2,13 @@
 //! in f32 and a scene scaled by a power of two gives the same picture bit by bit.
 
 use super::own::Own;
-use glam::DVec3;
-use splat_core::{Camera, Cloud, Light, LightShape, Projection};
+use crate::scene::SceneLight;
+use splat_core::{Camera, Cloud, Projection};
 
 /// Scales everything by 2^−e, where 2^e is the size of the bounds of all splats and objects, and returns e.
 ///
 /// Lengths scale with 2^−e, cross-sections and point intensities with 2^−2e; directional irradiance stays.
-pub(super) fn normalize(cloud: &mut Cloud, own: &mut [Own], camera: &mut Camera, lights: &mut [Light]) -> i32 {
+pub(super) fn normalize(cloud: &mut Cloud, own: &mut [Own], camera: &mut Camera, lights: &mut [SceneLight]) -> i32 {
     let diagonal = diagonal(cloud, own);
     if !(diagonal.is_finite() && diagonal > 0.0) {
         return 0;
@@ -27,14 +27,7 @@ pub(super) fn normalize(cloud: &mut Cloud, own: &mut [Own], camera: &mut Camera,
         *height *= scale;
     }
     for light in lights {
-        let position: Option<&mut DVec3> = match &mut light.shape {
-            LightShape::Point { position } | LightShape::Spot { position, .. } => Some(position),
-            _ => None,
-        };
-        if let Some(position) = position {
-            *position *= scale;
-            light.intensity.iter_mut().for_each(|i| *i *= area);
-        }
+        light.light = light.light.scaled(scale);
     }
     exponent
 }

@@ -12,9 +12,9 @@
 //! within what shading and look-ups promise.
 
 use super::{BLOCK, Capacities, Inputs};
-use crate::{Ensemble, EnsembleParams, Error, LitBy, Scene};
+use crate::{Ensemble, EnsembleParams, Error, Scene};
 use splat_core::raster::gpu::{AttributeBuffers, AttributeRoom};
-use splat_core::shade::{self, ShadeInput, gpu as shading};
+use splat_core::shade::{ShadeInput, gpu as shading};
 use splat_core::{Cloud, Material};
 use splat_shaders::{BufferId, Groups, Joined, Recording, kernels};
 use std::borrow::Cow;
@@ -81,17 +81,14 @@ pub fn suits(scene: &Scene<'_>) -> Result<(), &'static str> {
 }
 
 /// The scene as shading sees it: each object a material, positions relative to the eye.
-fn with_input<'a, T>(scene: &Scene<'a>, work: impl FnOnce(&ShadeInput<'_>) -> T) -> T {
+fn with_input<T>(scene: &Scene<'_>, work: impl FnOnce(&ShadeInput<'_>) -> T) -> T {
     let cloud = Cloud::new(scene.camera.position);
     let materials: Vec<Material> = scene.objects.iter().map(|o| o.look.material).collect();
-    let shadow = |lit: &LitBy<'a>| lit.shadow.map(|(map, _)| map);
-    let lights: Vec<_> =
-        scene.lights.iter().map(|lit| shade::LitBy { light: lit.light, shadow: shadow(lit) }).collect();
     work(&ShadeInput {
         cloud: &cloud,
         materials: &materials,
         objects: &[],
-        lights: &lights,
+        lights: scene.lights,
         ambient: scene.ambient,
         camera: scene.camera,
     })

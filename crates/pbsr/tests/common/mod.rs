@@ -1,6 +1,6 @@
 //! What the tests share: small scenes, pictures, and tests of hypotheses with a stated level.
 
-use pbsr::{Appearance, Ensemble, EnsembleParams, FoldParams, LitBy, Object, Renderer, Sampler, Scene};
+use pbsr::{Appearance, Ensemble, EnsembleParams, FoldParams, Object, Renderer, Sampler, Scene};
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::{Camera, Material, Mesh, Progress, Projection, ScalarField, Shading, Similarity};
 
@@ -47,7 +47,7 @@ pub(crate) fn objects<'a>(samplers: &[&'a dyn Sampler]) -> Vec<Object<'a>> {
 }
 
 pub(crate) fn scene<'a>(camera: &'a Camera, objects: &'a [Object<'a>]) -> Scene<'a> {
-    Scene { objects, lights: &[] as &[LitBy<'_>], ambient: [0.0; 3], camera, occluder: None }
+    Scene { objects, lights: &[], shadow_origin: DVec3::ZERO, ambient: [0.0; 3], camera, occluder: None }
 }
 
 pub(crate) fn fold(scene: &Scene<'_>, levels: u32) -> Ensemble {

@@ -20,6 +20,7 @@
 //! ```
 
 use super::{CHUNK, ChannelLayout, LitBy, LitSplat, ShadeInput, shadow_share};
+use crate::light::rect_normal;
 use crate::raster::gpu::{AttributeBuffers, AttributeRoom, Attributes};
 use crate::{Error, Light, LightShape, Material, Progress, Shading};
 use glam::{DVec3, Vec3};
@@ -111,7 +112,7 @@ pub fn suits(input: &ShadeInput<'_>) -> Result<(), &'static str> {
     }
     let narrow = |light: &Light| match light.shape {
         LightShape::Spot { inner, outer, .. } => libm::cos(inner) - libm::cos(outer) < LEAST_RIM,
-        LightShape::Point { .. } | LightShape::Directional { .. } => false,
+        _ => false,
     };
     if input.lights.iter().any(|lit| narrow(&lit.light)) {
         return Err("a spot with a sharp rim is shaded by the processor");
@@ -276,16 +277,22 @@ fn material(m: &Material) -> [[f32; 4]; 3] {
     ]
 }
 
-/// The vectors of all lights, relative to the cloud's origin.
+/// The vectors of all lights, relative to the cloud's origin; one with an extent is what [`Light::irradiance`] takes it for.
 fn lights(input: &ShadeInput<'_>) -> impl Iterator<Item = [f32; 4]> {
     let (origin, mut slots) = (input.cloud.origin, 0u32);
     input.lights.iter().flat_map(move |lit| {
         let (kind, position, direction, low, high) = match lit.light.shape {
-            LightShape::Point { position } => (0.0, position, DVec3::ZERO, 0.0, 0.0),
+            LightShape::Point { position } | LightShape::Sphere { center: position, .. } => {
+                (0.0, position, DVec3::ZERO, 0.0, 0.0)
+            }
             LightShape::Directional { direction } => (1.0, origin, direction, 0.0, 0.0),
             LightShape::Spot { position, direction, inner, outer } => {
                 (2.0, position, direction, libm::cos(outer) as f32, libm::cos(inner) as f32)
             }
+            LightShape::Patch { position, normal } | LightShape::Disk { center: position, normal, .. } => {
+                (3.0, position, normal, 0.0, 0.0)
+            }
+            LightShape::Rect { center, u, v } => (3.0, center, rect_normal(u, v), 0.0, 0.0),
         };
         let slot = if lit.shadow.is_some() { slots as f32 } else { -1.0 };
         slots += u32::from(lit.shadow.is_some());

@@ -241,8 +241,8 @@ const ALL: EnsembleParams = EnsembleParams {
 };
 
 /// The two lights with maps, and the one without.
-fn lit<'a>(lights: &[Light; 3], maps: &'a [ShadowMap; 2], origin: DVec3) -> Vec<LitBy<'a>> {
-    let shadow = |k: usize| maps.get(k).map(|map| (map as &dyn Transmittance, origin));
+fn lit<'a>(lights: &[Light; 3], maps: &'a [ShadowMap; 2]) -> Vec<LitBy<'a>> {
+    let shadow = |k: usize| maps.get(k).map(|map| map as &dyn Transmittance);
     lights.iter().enumerate().map(|(k, light)| LitBy { light: *light, shadow: shadow(k) }).collect()
 }
 
@@ -257,11 +257,12 @@ fn lit_sets_are_the_cpu_s() {
     for (origin, views) in [(DVec3::ZERO, &VIEWS[..]), (DVec3::new(1e7, -3e6, 5e6), &VIEWS[..1])] {
         let world = World::new(origin);
         let (lights, maps) = (world.lights(), world.maps());
-        let lights = lit(&lights, &maps, origin);
+        let lights = lit(&lights, &maps);
         let with_maps = [(&maps[0], origin), (&maps[1], origin)];
         for (view, plain) in views.iter().zip([true, false]) {
             world.with(*view, 0.7, plain, |objects, camera| {
-                let scene = Scene { objects, lights: &lights, ambient: [0.1, 0.2, 0.3], camera, occluder: None };
+                let ambient = [0.1, 0.2, 0.3];
+                let scene = Scene { objects, lights: &lights, shadow_origin: origin, ambient, camera, occluder: None };
                 for params in [ALL, EnsembleParams::default()] {
                     let expected = by_processor(&scene, params, 2 * ROOM.levels);
                     for nearest in ways(&device) {
@@ -289,7 +290,8 @@ fn ambient_light_alone_and_lights_without_maps() {
     let lights = world.lights().map(|light| LitBy { light, shadow: None });
     for lights in [&lights[..0], &lights[..]] {
         world.with(VIEWS[0], 0.7, false, |objects, camera| {
-            let scene = Scene { objects, lights, ambient: [0.4, 0.5, 0.6], camera, occluder: None };
+            let scene =
+                Scene { objects, lights, shadow_origin: DVec3::ZERO, ambient: [0.4, 0.5, 0.6], camera, occluder: None };
             let expected = by_processor(&scene, ALL, 2 * ROOM.levels);
             let way = Way { params: ALL, nearest: Nearest::of(device.adapter()), made: true };
             let (same, near, brightest) = agreement(&expected, &by_device(&mut device, &scene, &[], way, ROOM));
@@ -308,10 +310,11 @@ fn faults_of_light_are_found() {
     }
     let (mut device, world) = (open().unwrap(), World::new(DVec3::ZERO));
     let (lights, maps) = (world.lights(), world.maps());
-    let lights = lit(&lights, &maps, world.origin);
+    let lights = lit(&lights, &maps);
     let way = Way { params: EnsembleParams::default(), nearest: Nearest::of(device.adapter()), made: false };
     world.with(VIEWS[0], 0.7, false, |objects, camera| {
-        let scene = Scene { objects, lights: &lights, ambient: [0.1; 3], camera, occluder: None };
+        let scene =
+            Scene { objects, lights: &lights, shadow_origin: world.origin, ambient: [0.1; 3], camera, occluder: None };
         let expected = by_processor(&scene, way.params, 2 * ROOM.levels);
         let mut near = |scene: &Scene<'_>, maps: [(&ShadowMap, DVec3); 2]| {
             let (same, near, _) = agreement(&expected, &by_device(&mut device, scene, &maps, way, ROOM));
@@ -341,10 +344,11 @@ fn widened_particles_are_lit_as_the_cpu_s_in_the_mean() {
     }
     let (mut device, world) = (open().unwrap(), World::new(DVec3::ZERO));
     let (lights, maps) = (world.lights(), world.maps());
-    let lights = lit(&lights, &maps, world.origin);
+    let lights = lit(&lights, &maps);
     let with_maps = [(&maps[0], DVec3::ZERO), (&maps[1], DVec3::ZERO)];
     world.with(VIEWS[0], 8.0, false, |objects, camera| {
-        let scene = Scene { objects, lights: &lights, ambient: [0.1; 3], camera, occluder: None };
+        let scene =
+            Scene { objects, lights: &lights, shadow_origin: world.origin, ambient: [0.1; 3], camera, occluder: None };
         let expected = by_processor(&scene, EnsembleParams::default(), 2 * ROOM.levels);
         let way = Way { params: EnsembleParams::default(), nearest: Nearest::of(device.adapter()), made: false };
         let found = by_device(&mut device, &scene, &with_maps, way, ROOM);
@@ -370,13 +374,20 @@ fn a_large_image_goes_in_parts() {
     let pixels = 22 * 13 * 4096;
     assert!(room.seen().splats < pixels && room.seen().splats.is_multiple_of(256));
     let (lights, maps) = (world.lights(), world.maps());
-    let lights = lit(&lights, &maps, world.origin);
+    let lights = lit(&lights, &maps);
     let camera = world.camera(VIEWS[0], size);
     // Sets for a smaller picture: sparse in this one, in all parts.
     world.with(VIEWS[0], 1.0, true, |objects, small| {
         let s = finest_pixel_area(small, DVec3::ZERO, 1.5, 1e-3) / finest_pixel_area(&camera, DVec3::ZERO, 1.5, 1e-3);
         assert!(s > 50.0, "{s}");
-        let scene = Scene { objects, lights: &lights, ambient: [0.1; 3], camera: &camera, occluder: None };
+        let scene = Scene {
+            objects,
+            lights: &lights,
+            shadow_origin: world.origin,
+            ambient: [0.1; 3],
+            camera: &camera,
+            occluder: None,
+        };
         let expected = by_processor(&scene, EnsembleParams::default(), 2);
         for nearest in ways(&device) {
             let way = Way { params: EnsembleParams::default(), nearest, made: true };
@@ -396,7 +407,8 @@ fn too_little_room_and_other_lights_are_refused() {
     let (mut device, world) = (open().unwrap(), World::new(DVec3::ZERO));
     world.with(VIEWS[0], 0.7, false, |objects, camera| {
         let lights = world.lights().map(|light| LitBy { light, shadow: None });
-        let scene = Scene { objects, lights: &lights, ambient: [0.1; 3], camera, occluder: None };
+        let scene =
+            Scene { objects, lights: &lights, shadow_origin: world.origin, ambient: [0.1; 3], camera, occluder: None };
         let (sources, mut ensemble) = (Sources::new(&scene).unwrap(), Ensemble::new(SIZE, &ALL).unwrap());
         let lighting = Lighting { params: ALL, lights: 3, shadows: &[] };
         let room = Capacities { of_set: 10, ..ROOM };

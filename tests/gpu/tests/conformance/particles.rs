@@ -96,7 +96,14 @@ fn hits_and_sums_are_the_cpu_s() {
         let a = MeshSampler::new(&near, &params(3.0, 1, [0.9, 0.4, 0.1]), None).unwrap();
         let b = MeshSampler::new(&far, &params(0.5, 2, [0.1, 0.5, 2.0]), None).unwrap();
         let objects = [object(&a, 0.5, [0.0, 0.25, 0.0]), object(&b, -0.3, [0.0; 3])];
-        let scene = Scene { objects: &objects, lights: &[], ambient: [0.0; 3], camera: &camera, occluder: None };
+        let scene = Scene {
+            objects: &objects,
+            lights: &[],
+            shadow_origin: DVec3::ZERO,
+            ambient: [0.0; 3],
+            camera: &camera,
+            occluder: None,
+        };
         let ensembles = both(&scene);
         let (same, hits) = agreement(&ensembles);
         assert!(hits > 10_000 && same >= 0.999, "{projection:?}: {same} of {hits} hits");
@@ -116,7 +123,14 @@ fn what_hides_particles_hides_them_and_its_own_depth_is_the_surface_s() {
     // All particles are at depth 4: behind, at, and before what hides.
     let depth = pixels().map(|(x, _)| [3.5, 4.0, 4.5, f32::INFINITY][x as usize % 4]).collect();
     let occluder = Occluder { depth, color: vec![[1.0; 3]; (SIZE[0] * SIZE[1]) as usize] };
-    let scene = Scene { objects: &objects, lights: &[], ambient: [0.0; 3], camera: &camera, occluder: Some(&occluder) };
+    let scene = Scene {
+        objects: &objects,
+        lights: &[],
+        shadow_origin: DVec3::ZERO,
+        ambient: [0.0; 3],
+        camera: &camera,
+        occluder: Some(&occluder),
+    };
     let [cpu, gpu] = both(&scene);
     assert_eq!(agreement(&[cpu, gpu.clone()]).0, 1.0);
     assert!(pixels().all(|(x, y)| x % 4 > 1 || gpu.hits(x, y) == 0));
@@ -134,7 +148,14 @@ fn pb16_equals_share_a_pixel_fairly() {
     let white = MeshSampler::new(&mesh, &of([1.0; 3], 1), None).unwrap();
     let black = MeshSampler::new(&mesh, &of([0.0; 3], 2), None).unwrap();
     let objects = [object(&white, 0.0, [0.0; 3]), object(&black, 0.0, [0.0; 3])];
-    let scene = Scene { objects: &objects, lights: &[], ambient: [0.0; 3], camera: &camera, occluder: None };
+    let scene = Scene {
+        objects: &objects,
+        lights: &[],
+        shadow_origin: DVec3::ZERO,
+        ambient: [0.0; 3],
+        camera: &camera,
+        occluder: None,
+    };
     let [_, gpu] = both(&scene);
     let layers = gpu.read(&|_, _| [0.0; 3], None);
     let hits: f64 = pixels().map(|(x, y)| f64::from(gpu.hits(x, y))).sum();
@@ -152,7 +173,14 @@ fn too_little_room_is_refused_with_what_is_needed() {
     let params = SurfaceParams { opacity: 0.5, cross_section: 1e-3, ..SurfaceParams::default() };
     let sampler = MeshSampler::new(&mesh, &params, None).unwrap();
     let objects = [object(&sampler, 0.0, [0.0; 3])];
-    let scene = Scene { objects: &objects, lights: &[], ambient: [0.0; 3], camera: &camera, occluder: None };
+    let scene = Scene {
+        objects: &objects,
+        lights: &[],
+        shadow_origin: DVec3::ZERO,
+        ambient: [0.0; 3],
+        camera: &camera,
+        occluder: None,
+    };
     let ensemble = Ensemble::new(SIZE, &EnsembleParams::default()).unwrap();
     let uploads = |room| record(room, Nearest::Ranked, None).unwrap().uploads(&scene, &ensemble);
     let Err(Error::TooMuch { what: "particles of one set", needed, had: 10, .. }) =

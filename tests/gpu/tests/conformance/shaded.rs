@@ -67,11 +67,14 @@ fn lights(origin: DVec3) -> Vec<Light> {
     let (position, direction) = (origin + DVec3::new(0.3, 0.1, 0.2), DVec3::new(0.6, -0.8, 0.0));
     let spot = LightShape::Spot { position: origin + DVec3::new(-1.0, 2.0, 0.5), direction, inner: 0.3, outer: 0.6 };
     let intensity = [3.0, 2.0, 1.0];
-    // One light within the cloud, one that gives nothing.
+    // One light within the cloud, one before it that shines to the side of its middle, one that gives nothing.
+    let patch =
+        LightShape::Patch { position: origin + DVec3::new(0.5, 1.0, -0.3), normal: DVec3::new(-0.6, -0.8, 0.0) };
     vec![
         Light { shape: LightShape::Point { position }, intensity },
         Light { shape: LightShape::Directional { direction }, intensity },
         Light { shape: spot, intensity: [20.0; 3] },
+        Light { shape: patch, intensity },
         Light { shape: LightShape::Point { position: origin + DVec3::Y * 3.0 }, intensity: [0.0; 3] },
     ]
 }

@@ -3,7 +3,7 @@
 use super::checkpoint::Checkpoint;
 use super::parts::{Part, named};
 use super::{fault, refuse};
-use crate::device::{Folding, Helper, Shadow};
+use crate::device::{Folding, Helper};
 use crate::frame::Frame;
 use crate::scene::ParticlesSettings;
 use crate::technique::Session;
@@ -31,11 +31,12 @@ pub(super) fn fold(
 ) -> Result<Average, Error> {
     let objects: Vec<Object<'_>> = parts.iter().map(|part| part.object()).collect();
     let origin = frame.loaded.cloud.origin;
-    let shining: Vec<(Light, Option<Shadow<'_>>)> =
-        frame.shining(maps).map(|(light, map)| (light, map.map(|map| (map, origin)))).collect();
-    let lights: Vec<LitBy<'_>> = shining.iter().map(lit_by).collect();
+    let shining: Vec<(Light, Option<&ShadowMap>)> = frame.shining(maps).collect();
+    let shadow = |map| -> Option<&dyn Transmittance> { Some(map? as &ShadowMap) };
+    let lights: Vec<LitBy<'_>> =
+        shining.iter().map(|(light, map)| LitBy { light: *light, shadow: shadow(*map) }).collect();
     let (camera, ambient) = (&frame.camera, frame.scene.ambient);
-    let scene = pbsr::Scene { objects: &objects, lights: &lights, ambient, camera, occluder };
+    let scene = pbsr::Scene { objects: &objects, lights: &lights, shadow_origin: origin, ambient, camera, occluder };
     let colored = frame.plan.optical_depth_planes == 3;
     let kept = kept_numbers(&frame.layers, colored, || depth_range(parts, camera));
     let checkpoint = &mut session.checkpoint;
@@ -48,7 +49,7 @@ pub(super) fn fold(
     let settings = &frame.settings.particles;
     let background = |_, _| frame.scene.background;
     let (mut renderer, mut folding) =
-        (Renderer::new(), Folding::new(shining.iter().filter_map(|(_, shadow)| *shadow).collect()));
+        (Renderer::new(), Folding::new(shining.iter().filter_map(|(_, map)| Some(((*map)?, origin))).collect()));
     let helper = helper(frame, checkpoint.is_some());
     frame.progress.begin(stage::PARTICLES);
     frame.progress.add_total(u64::from(settings.repeat_level.saturating_sub(average.ensemble.levels())));
@@ -79,10 +80,6 @@ pub(super) fn fold(
         checkpoint.write(&average.ensemble)?;
     }
     Ok(average)
-}
-
-fn lit_by<'a>((light, shadow): &(Light, Option<Shadow<'a>>)) -> LitBy<'a> {
-    LitBy { light: *light, shadow: shadow.map(|(map, origin)| (map as &dyn Transmittance, origin)) }
 }
 
 fn fold_params(options: &RenderOptions) -> FoldParams {

@@ -64,9 +64,9 @@ impl Points<'_> {
 
     /// The lights that have an intensity, those with a shadow map lit through what the device makes.
     fn lit_on_device(&self) -> Vec<LitBy<'_>> {
-        let shadow = |wanted: &bool| wanted.then_some(&OnDevice as &dyn Transmittance);
-        let with_shadow = self.frame.with_light(self.frame.plan.shadow_maps.iter().map(shadow));
-        with_shadow.map(|(light, shadow)| LitBy { light, shadow }).collect()
+        let tables = self.frame.plan.shadow_tables.iter();
+        let shadows = tables.map(|table| table.is_some().then_some(&OnDevice as &dyn Transmittance));
+        self.frame.with_light(shadows).map(|(light, shadow)| LitBy { light, shadow }).collect()
     }
 
     /// What throws the shadow of each light that has one, or `None` where no light has, and where a device does not make all of
@@ -81,7 +81,8 @@ impl Points<'_> {
             return Ok(None);
         }
         let mut castings = Vec::new();
-        for (i, (light, table)) in l.lights.iter().zip(&frame.plan.shadow_tables).enumerate() {
+        for (point, table) in frame.light_points().iter().zip(&frame.plan.shadow_tables) {
+            let light = &point.light;
             let Some(table) = table.filter(|_| light.intensity != [0.0; 3]) else { continue };
             let params = table.params(frame.settings, l, frame.plan.shadow_bytes);
             frame.tick()?;
@@ -97,7 +98,7 @@ impl Points<'_> {
                     helper.leave(why);
                     return Ok(None);
                 }
-                Err(e) => return Err(shadow_error(i, &e)),
+                Err(e) => return Err(shadow_error(point, &e)),
             }
         }
         Ok(Some(castings))
