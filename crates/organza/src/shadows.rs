@@ -177,9 +177,8 @@ pub(crate) fn shadow_error(light: usize, error: &tsm::Error) -> Error {
             needed: *needed_bytes,
             limit: *limit_bytes,
             unit: "bytes",
-            hint:
-                "use fewer lights or samples of lights, fewer cells in render.shadow, or a larger --max-memory"
-                    .into(),
+            hint: "use fewer lights or samples of lights, fewer cells in render.shadow, or a larger --max-memory"
+                .into(),
         },
         tsm::Error::Core(splat_core::Error::Cancelled) => Error::Cancelled,
         other => Error::input(what, other.to_string(), ""),
