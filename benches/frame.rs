@@ -69,8 +69,8 @@ impl Frame {
             + 2 * cloud.material.len()
             + cloud.kind.len()
             + cloud.footprint.len();
-        let frame = 4 * (self.values.len() + self.order.input_from_sorted.len() + self.order.slice_starts.len());
-        let bytes = (columns + frame) as u64 + self.scratch.bytes() + self.projected.bytes();
+        let frame = 4 * self.values.len() as u64 + self.order.bytes();
+        let bytes = columns as u64 + frame + self.scratch.bytes() + self.projected.bytes();
         bytes as f64 / cloud.len() as f64
     }
 

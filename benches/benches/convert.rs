@@ -8,7 +8,7 @@ use convert::{
 };
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::{DMat3, DVec3, Vec3};
-use splat_core::{Cloud, Grid, Mesh, TransferFunction, TransferPoint, rng};
+use splat_core::{Cloud, DAabb, Grid, Mesh, TransferFunction, TransferPoint, rng};
 use std::path::Path;
 
 fn asset(name: &str) -> Loaded {
@@ -100,7 +100,7 @@ fn fields(c: &mut Criterion) {
     let mut group = c.benchmark_group("fields");
     let text = "sin(x)*cos(y) + sin(y)*cos(z) + sin(z)*cos(x)";
     let Ok(gyroid) = ExpressionField::parse(text) else { return };
-    let bounds = [DVec3::ZERO, DVec3::splat(6.0)];
+    let bounds = DAabb::new(DVec3::ZERO, DVec3::splat(6.0));
     let params = MeshParams { density: Density::Spacing(0.03), ..MeshParams::default() };
     if let Ok((_, report)) = surface_to_points(&gyroid, bounds, &params) {
         group.throughput(Throughput::Elements(report.splats));

@@ -11,8 +11,8 @@ use pbsr::{
 use rayon::prelude::*;
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::{
-    Camera, Cloud, Grid, Material, Mesh, Progress, Projection, ScalarField, Shading, Similarity, Splat, SplatKind,
-    TransferFunction, TransferPoint, rng,
+    Camera, Cloud, DAabb, Grid, Material, Mesh, Progress, Projection, ScalarField, Shading, Similarity, Splat,
+    SplatKind, TransferFunction, TransferPoint, rng,
 };
 use std::f64::consts::TAU;
 
@@ -141,19 +141,17 @@ fn sampling(c: &mut Criterion) {
     let surface = |opacity| SurfaceParams { opacity, cross_section: s, ..SurfaceParams::default() };
     let volume = VolumeParams { cross_section: s, ..VolumeParams::default() };
     let lit = VolumeParams { normals: true, ..volume };
-    let (min, max) = (DVec3::new(-1.1, -1.1, -0.4), DVec3::new(1.1, 1.1, 0.4));
-    let torus = ImplicitSurface { field: &Torus, level: 0.0, min, max, inside: None };
+    let bounds = DAabb::around(DVec3::ZERO, DVec3::new(1.1, 1.1, 0.4));
+    let torus = ImplicitSurface { field: &Torus, level: 0.0, bounds, inside: None };
     let why = "invariant: the benchmark's scene";
     let walk = BrownianParams::for_width(2.0);
     let formula = ExpressionField::parse("z - 0.2*cos(9*sqrt(x^2 + y^2))").expect(why);
-    let [low, high] = [-1.0, 1.0].map(DVec3::splat);
-    let wave = ImplicitSurface { field: &formula, level: 0.0, min: low, max: high, inside: None };
+    let bounds = DAabb::around(DVec3::ZERO, DVec3::ONE);
+    let wave = ImplicitSurface { field: &formula, level: 0.0, bounds, inside: None };
     let volumes = [Interpolation::Trilinear, Interpolation::CatmullRom].map(gyroid);
-    let levels =
-        volumes.each_ref().map(|field| ImplicitSurface { field, level: 0.0, min: low, max: high, inside: None });
+    let levels = volumes.each_ref().map(|field| ImplicitSurface { field, level: 0.0, bounds, inside: None });
     let (blend, _) = points_to_field(&torus_points(), &MpuParams::default()).expect(why);
-    let [low, high] = blend.bounds();
-    let scattered = ImplicitSurface { field: &blend, level: 0.0, min: low, max: high, inside: None };
+    let scattered = ImplicitSurface { field: &blend, level: 0.0, bounds: blend.bounds(), inside: None };
     let clouds = [SplatKind::Medium, SplatKind::Surface].map(cloud);
     let of_splats = SplatParams { cross_section: 1e-5, ..SplatParams::default() };
     let samplers: [(&str, u64, Box<dyn Sampler>); 13] = [

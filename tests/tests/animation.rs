@@ -125,7 +125,7 @@ medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 0.5, spacing = 
 [render]
 technique = "particles"
 antialias = 1
-points = { shadow = { cells = 64 } }
+shadow = { cells = 64 }
 particles = { repeat_level = 2000 }
 [animation]
 frames = 4

@@ -66,6 +66,7 @@ fn bi23_unknown_keys_suggest_the_nearest() {
         ("mesh = ", "mehs = ", "12:1: unknown key `mehs`", "did you mean `mesh`?"),
         ("opacity = 0.3", "opactiy = 0.3", "19:1: unknown key `opactiy`", "did you mean `opacity`?"),
         ("slice_thickness", "slice", "21:12: unknown key `slice`", "did you mean `slice_thickness`?"),
+        ("slice_thickness", "shadow", "21:12: unknown key `shadow`", "it is `render.shadow` now"),
         (
             "position = [2",
             "radius = 1\nposition = [2",

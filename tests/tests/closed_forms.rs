@@ -72,7 +72,7 @@ fn shadow_of_a_slab_has_the_transmittance_of_its_optical_depth() {
 
 #[test]
 fn ripple_of_a_shadow_falls_with_the_size_of_its_table() {
-    let ripple = |cells: u32| shadow(1.0, &format!("points = {{ shadow = {{ cells = {cells} }} }}")).1;
+    let ripple = |cells: u32| shadow(1.0, &format!("shadow = {{ cells = {cells} }}")).1;
     let (coarse, fine) = (ripple(48), ripple(192));
     assert!(fine < coarse && fine < 1e-2, "48 cells {coarse:e}, 192 cells {fine:e}");
 }

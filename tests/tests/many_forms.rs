@@ -99,7 +99,7 @@ impl Object {
         let folder = tempfile::tempdir().unwrap();
         let scene = parallel_view(HEIGHT, self.size)
             + &format!(
-                "[render]\nlayers = ['shadow']\npoints = {{ shadow = {{ cells = {} }} }}\n\
+                "[render]\nlayers = ['shadow']\nshadow = {{ cells = {} }}\n\
                  [[light]]\nkind = 'directional'\ndirection = [0, -1, -1]\nirradiance = [1, 1, 1]\n\
                  [[object]]\nname = 'wall'\nrectangle = {{ center = [0, 0, {WALL:?}], u = [1.5, 0, 0], \
                  v = [0, 1.5, 0], spacing = {:?} }}\n",

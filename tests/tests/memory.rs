@@ -67,7 +67,7 @@ fn every_scene_stays_within_what_explain_says() {
 #[test]
 fn shadow_maps_of_many_lights_are_counted_together() {
     let light = |k: i32| format!("[[light]]\nkind = \"point\"\nposition = [{k}, 4, 1]\nintensity = [1, 1, 1]\n");
-    let lights = |n: i32| (0..n).map(light).collect::<String>() + "[render.points.shadow]\ncells = 128\n";
+    let lights = |n: i32| (0..n).map(light).collect::<String>() + "[render.shadow]\ncells = 128\n";
     let place = Place::new(&format!("{}{}", fog(0.25), lights(1)));
     place.write("many.toml", format!("{}{}", fog(0.25), lights(31)));
     let (few, many) = (explained(place.folder(), "s.toml", &[]), explained(place.folder(), "many.toml", &[]));

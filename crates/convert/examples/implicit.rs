@@ -6,7 +6,7 @@
 use convert::read::{self, Loaded, ReadLimits};
 use convert::{GridField, Inside, Interpolation, MpuParams, RawPoints, isosurface_to_mesh, points_to_field};
 use splat_core::glam::{DMat3, DVec3};
-use splat_core::{Grid, Mesh, ScalarField, rng};
+use splat_core::{DAabb, Grid, Mesh, ScalarField, rng};
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
@@ -35,9 +35,9 @@ fn ball(n: usize) -> Grid {
 }
 
 /// Places in a box, or near given ones.
-fn places(bounds: [DVec3; 2], count: u64) -> Vec<DVec3> {
+fn places(bounds: DAabb, count: u64) -> Vec<DVec3> {
     let unit = |i| DVec3::from_array([0, 1, 2].map(|a| rng::unit(1, 0, i, a)));
-    (0..count).map(|i| bounds[0] + (bounds[1] - bounds[0]) * unit(i)).collect()
+    (0..count).map(|i| bounds.min + bounds.size() * unit(i)).collect()
 }
 
 fn rates(name: &str, field: &dyn ScalarField, places: &[DVec3], radii: &[f64]) {
@@ -104,7 +104,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let at = |part: f64| distance[(part * (distance.len() - 1) as f64) as usize];
         println!("  distance of vertices over ε₀: median {:.3}, 99 % {:.3}, all {:.3}", at(0.5), at(0.99), at(1.0));
         let near: Vec<DVec3> = (0..points.len()).map(|i| points.exact_position(i)).collect();
-        let side = (field.bounds()[1] - field.bounds()[0]).x;
+        let side = field.bounds().size().x;
         rates("near the bunny", &field, &near, &[1e-6 * side, 1e-3 * side, 1e-2 * side, 0.1 * side]);
         rates("anywhere in the cube", &field, &places(field.bounds(), 50_000), &[1e-3 * side]);
     }

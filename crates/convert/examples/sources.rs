@@ -7,7 +7,7 @@ use convert::{
     mesh_to_points, procedural_cloud, raw_to_surfels, surface_to_points, volume_to_points,
 };
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Mesh, TransferFunction, TransferPoint};
+use splat_core::{DAabb, Mesh, TransferFunction, TransferPoint};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mesh = Mesh { position: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]], ..Mesh::default() };
@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("triangle: {:?}", mesh_to_points(&mesh, &glass)?.1);
 
     let ball = ExpressionField::parse("x^2 + y^2 + z^2 - 1")?;
-    let bounds = [DVec3::splat(-1.2), DVec3::splat(1.2)];
+    let bounds = DAabb::around(DVec3::ZERO, DVec3::splat(1.2));
     println!("ball: {:?}", surface_to_points(&ball, bounds, &MeshParams::default())?.1);
 
     let cloud = procedural_cloud(&CloudShape::default(), 0.06, &SplatParams::default())?;

@@ -8,7 +8,7 @@
 //! [`ScalarField::in_domain`] says which zeros belong to it.
 
 use splat_core::glam::{DMat3, DVec3};
-use splat_core::{Error, ScalarField};
+use splat_core::{DAabb, Error, ScalarField};
 use std::sync::Arc;
 
 /// A field that combinations share.
@@ -144,15 +144,15 @@ pub enum Clip {
         /// normal·p of the border.
         offset: f64,
     },
-    /// Between two opposite corners, the first below the second on each axis or level with it.
-    Box([DVec3; 2]),
+    /// Inside a box that is not empty.
+    Box(DAabb),
 }
 
 impl Clip {
     fn keeps(&self, p: DVec3) -> bool {
         match *self {
             Self::HalfSpace { normal, offset } => normal.dot(p) <= offset,
-            Self::Box([low, high]) => p.cmpge(low).all() && p.cmple(high).all(),
+            Self::Box(bounds) => bounds.contains(p),
         }
     }
 
@@ -160,7 +160,7 @@ impl Clip {
     fn may_keep(&self, p: DVec3, radius: f64) -> bool {
         match *self {
             Self::HalfSpace { normal, offset } => normal.dot(p) - offset <= radius * normal.length(),
-            Self::Box([low, high]) => (p - p.clamp(low, high)).length() <= radius,
+            Self::Box(bounds) => bounds.distance_squared(p).sqrt() <= radius,
         }
     }
 
@@ -177,13 +177,13 @@ impl Clip {
                     ));
                 }
             }
-            Self::Box([low, high]) => {
-                if !(low.is_finite() && high.is_finite() && low.cmple(high).all()) {
+            Self::Box(DAabb { min, max }) => {
+                if !(min.is_finite() && max.is_finite() && min.cmple(max).all()) {
                     return Err(Error::invalid(
                         "clip box",
                         index,
                         "corners",
-                        [low, high],
+                        [min, max],
                         "two finite corners, the first nowhere above the second",
                     ));
                 }

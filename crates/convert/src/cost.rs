@@ -23,7 +23,7 @@ use crate::{ConvertError, DensityParams, MeshParams, SplatParams, VolumeParams, 
 #[cfg(feature = "surfels")]
 use crate::{RawPoints, SurfelParams, surfels};
 use splat_core::{
-    Grid, Mesh, ScalarField, TransferFunction,
+    DAabb, Grid, Mesh, ScalarField, TransferFunction,
     glam::{DMat3, DVec3},
 };
 
@@ -111,7 +111,7 @@ pub fn volume(grid: &Grid, tf: &TransferFunction, params: &VolumeParams) -> Resu
 /// As the conversion, but for too many splats.
 pub fn surface<F: ScalarField + ?Sized>(
     field: &F,
-    bounds: [DVec3; 2],
+    bounds: DAabb,
     params: &MeshParams,
 ) -> Result<Prediction, ConvertError> {
     params.splat.check()?;
@@ -129,7 +129,7 @@ pub fn surface<F: ScalarField + ?Sized>(
 /// As the conversion.
 pub fn surface_evaluations<F: ScalarField + ?Sized>(
     field: &F,
-    bounds: [DVec3; 2],
+    bounds: DAabb,
     params: &MeshParams,
 ) -> Result<f64, ConvertError> {
     params.splat.check()?;
@@ -140,7 +140,7 @@ pub fn surface_evaluations<F: ScalarField + ?Sized>(
 ///
 /// # Errors
 /// As the conversion.
-pub fn density_evaluations(bounds: [DVec3; 2], params: &DensityParams) -> Result<f64, ConvertError> {
+pub fn density_evaluations(bounds: DAabb, params: &DensityParams) -> Result<f64, ConvertError> {
     params.volume.check()?;
     Ok(density_lattice(bounds, params)?.cells.iter().map(|n| *n as f64).product())
 }
@@ -151,7 +151,7 @@ pub fn density_evaluations(bounds: [DVec3; 2], params: &DensityParams) -> Result
 /// As the conversion, but for too many splats.
 pub fn density<F: ScalarField + ?Sized>(
     field: &F,
-    bounds: [DVec3; 2],
+    bounds: DAabb,
     params: &DensityParams,
 ) -> Result<Prediction, ConvertError> {
     params.volume.check()?;
@@ -171,7 +171,7 @@ pub fn procedural(shape: &CloudShape, spacing: f64, params: &VolumeParams) -> Re
     let dims = shape.lattice(spacing, &params.splat)?;
     let noise = noise::Perlin::new(shape.seed);
     let positive = |p: DVec3| shape.extinction * shape.density_with(&noise, p) > 0.0;
-    Ok(sampled(positive, shape.bounds()[0], DVec3::splat(spacing), dims, params))
+    Ok(sampled(positive, shape.bounds().min, DVec3::splat(spacing), dims, params))
 }
 
 /// Of [`crate::medium_box`].
@@ -179,13 +179,12 @@ pub fn procedural(shape: &CloudShape, spacing: f64, params: &VolumeParams) -> Re
 /// # Errors
 /// As the conversion.
 pub fn medium_box(
-    min: DVec3,
-    max: DVec3,
+    bounds: DAabb,
     extinction: f64,
     spacing: f64,
     params: &SplatParams,
 ) -> Result<Prediction, ConvertError> {
-    let counts = Lattice::new(min, max, extinction, spacing, params)?.counts;
+    let counts = Lattice::new(bounds, extinction, spacing, params)?.counts;
     let cells = if extinction > 0.0 { counts.iter().product::<u64>() as f64 } else { 0.0 };
     Ok(Prediction::exact(cells, Wanted::default()))
 }
@@ -201,8 +200,8 @@ pub fn medium_ball(
     spacing: f64,
     params: &SplatParams,
 ) -> Result<Prediction, ConvertError> {
-    let reach = DVec3::splat(radius);
-    let cells = medium_box(center - reach, center + reach, extinction, spacing, params)?.splats as f64;
+    let bounds = DAabb::around(center, DVec3::splat(radius));
+    let cells = medium_box(bounds, extinction, spacing, params)?.splats as f64;
     // Cells that the surface cuts count whole: a shell of about half a cell.
     let inside = std::f64::consts::PI / 6.0 * (libm::cbrt(cells) + 1.0).powi(3);
     Ok(Prediction::new(inside.min(cells), Some(cells), Wanted::default()))

@@ -12,7 +12,7 @@ use crate::volume_points::{check_lattice, volume_to_points_with_progress};
 use crate::{ConvertError, MeshParams, MeshReport, VolumeParams, VolumeReport, subdivide};
 use rayon::prelude::*;
 use splat_core::{
-    Cloud, Grid, Mesh, Progress, ScalarField, TransferFunction, TransferPoint,
+    Cloud, DAabb, Grid, Mesh, Progress, ScalarField, TransferFunction, TransferPoint,
     glam::{DMat3, DVec3},
 };
 
@@ -29,9 +29,10 @@ const COARSE_CELLS: f64 = 48.0;
 ///
 /// ```
 /// use convert::{ExpressionField, SplatParams, field_to_mesh};
-/// use splat_core::glam::DVec3;
+/// use splat_core::{DAabb, glam::DVec3};
 /// let ball = ExpressionField::parse("sqrt(x^2 + y^2 + z^2) - 1").unwrap();
-/// let mesh = field_to_mesh(&ball, [DVec3::splat(-1.2), DVec3::splat(1.2)], 0.1, &SplatParams::default()).unwrap();
+/// let bounds = DAabb::around(DVec3::ZERO, DVec3::splat(1.2));
+/// let mesh = field_to_mesh(&ball, bounds, 0.1, &SplatParams::default()).unwrap();
 /// assert!(mesh.position.iter().all(|p| (p.length() - 1.0).abs() < 1e-6));
 /// ```
 ///
@@ -39,7 +40,7 @@ const COARSE_CELLS: f64 = 48.0;
 /// [`ConvertError::NonFinite`] with the point, [`ConvertError::Parameter`] for an empty box or an absurd cell.
 pub fn field_to_mesh<F: ScalarField + ?Sized>(
     field: &F,
-    bounds: [DVec3; 2],
+    bounds: DAabb,
     cell: f64,
     splat: &SplatParams,
 ) -> Result<Mesh, ConvertError> {
@@ -53,11 +54,12 @@ pub fn field_to_mesh<F: ScalarField + ?Sized>(
 ///
 /// ```
 /// use convert::{Clip, ClippedField, ExpressionField, SplatParams, surface_to_mesh};
-/// use splat_core::glam::DVec3;
+/// use splat_core::{DAabb, glam::DVec3};
 /// let ball = ExpressionField::parse("sqrt(x^2 + y^2 + z^2) - 1").unwrap();
 /// let above = Clip::HalfSpace { normal: -DVec3::Y, offset: 0.0 };
 /// let dome = ClippedField::new(std::sync::Arc::new(ball), vec![above]).unwrap();
-/// let mesh = surface_to_mesh(&dome, [DVec3::splat(-1.2), DVec3::splat(1.2)], 0.1, &SplatParams::default()).unwrap();
+/// let bounds = DAabb::around(DVec3::ZERO, DVec3::splat(1.2));
+/// let mesh = surface_to_mesh(&dome, bounds, 0.1, &SplatParams::default()).unwrap();
 /// let lowest = mesh.triangles.iter().flatten().map(|v| mesh.position[*v as usize].y).fold(1.0, f32::min);
 /// assert!((lowest + mesh.origin.y as f32).abs() < 0.2);
 /// ```
@@ -66,7 +68,7 @@ pub fn field_to_mesh<F: ScalarField + ?Sized>(
 /// As [`field_to_mesh`].
 pub fn surface_to_mesh<F: ScalarField + ?Sized>(
     field: &F,
-    bounds: [DVec3; 2],
+    bounds: DAabb,
     spacing: f64,
     splat: &SplatParams,
 ) -> Result<Mesh, ConvertError> {
@@ -84,7 +86,7 @@ pub fn surface_to_mesh<F: ScalarField + ?Sized>(
 /// As [`field_to_mesh`] and [`crate::mesh_to_points`].
 pub fn surface_to_points<F: ScalarField + ?Sized>(
     field: &F,
-    bounds: [DVec3; 2],
+    bounds: DAabb,
     params: &MeshParams,
 ) -> Result<(Cloud, MeshReport), ConvertError> {
     surface_to_points_with_progress(field, bounds, params, &Progress::new())
@@ -96,7 +98,7 @@ pub fn surface_to_points<F: ScalarField + ?Sized>(
 /// As [`surface_to_points`], and [`ConvertError::Cancelled`].
 pub fn surface_to_points_with_progress<F: ScalarField + ?Sized>(
     field: &F,
-    bounds: [DVec3; 2],
+    bounds: DAabb,
     params: &MeshParams,
     progress: &Progress,
 ) -> Result<(Cloud, MeshReport), ConvertError> {
@@ -115,7 +117,7 @@ pub fn surface_to_points_with_progress<F: ScalarField + ?Sized>(
 /// The lattice that a zero set is looked for on.
 pub(crate) fn surface_lattice<F: ScalarField + ?Sized>(
     field: &F,
-    bounds: [DVec3; 2],
+    bounds: DAabb,
     params: &MeshParams,
 ) -> Result<Lattice, ConvertError> {
     lattice(bounds, surface_spacing(field, bounds, params)? * CELL_OVER_SPACING, &params.splat)
@@ -124,11 +126,11 @@ pub(crate) fn surface_lattice<F: ScalarField + ?Sized>(
 /// Spacing of the splats of a zero set, object units.
 pub(crate) fn surface_spacing<F: ScalarField + ?Sized>(
     field: &F,
-    bounds: [DVec3; 2],
+    bounds: DAabb,
     params: &MeshParams,
 ) -> Result<f64, ConvertError> {
     let p = &params.splat;
-    let longest = (bounds[1] - bounds[0]).max_element();
+    let longest = bounds.size().max_element();
     Ok(match params.density {
         Density::Spacing(h) => p.check_spacing(h)? / p.transform.scale,
         Density::Auto => longest / AUTO_CELLS,
@@ -142,10 +144,10 @@ pub(crate) fn surface_spacing<F: ScalarField + ?Sized>(
 /// A zero set by a first look, object space.
 pub(crate) fn coarse_mesh<F: ScalarField + ?Sized>(
     field: &F,
-    bounds: [DVec3; 2],
+    bounds: DAabb,
     splat: &SplatParams,
 ) -> Result<Mesh, ConvertError> {
-    field_to_mesh(field, bounds, (bounds[1] - bounds[0]).max_element() / COARSE_CELLS, splat)
+    field_to_mesh(field, bounds, bounds.size().max_element() / COARSE_CELLS, splat)
 }
 
 pub(crate) fn area(mesh: &Mesh) -> f64 {
@@ -174,10 +176,10 @@ impl Default for DensityParams {
 ///
 /// ```
 /// use convert::{Density, DensityParams, ExpressionField, density_to_points};
-/// use splat_core::glam::DVec3;
+/// use splat_core::{DAabb, glam::DVec3};
 /// let fog = ExpressionField::parse("2").unwrap();
 /// let params = DensityParams { density: Density::Spacing(0.25), ..DensityParams::default() };
-/// let (cloud, _) = density_to_points(&fog, [DVec3::ZERO, DVec3::ONE], &params).unwrap();
+/// let (cloud, _) = density_to_points(&fog, DAabb::new(DVec3::ZERO, DVec3::ONE), &params).unwrap();
 /// assert_eq!(cloud.cross_section.iter().sum::<f32>(), 2.0);
 /// ```
 ///
@@ -185,7 +187,7 @@ impl Default for DensityParams {
 /// [`ConvertError::NonFinite`] with the point, and as [`crate::volume_to_points`].
 pub fn density_to_points<F: ScalarField + ?Sized>(
     field: &F,
-    bounds: [DVec3; 2],
+    bounds: DAabb,
     params: &DensityParams,
 ) -> Result<(Cloud, VolumeReport), ConvertError> {
     density_to_points_with_progress(field, bounds, params, &Progress::new())
@@ -198,7 +200,7 @@ pub fn density_to_points<F: ScalarField + ?Sized>(
 /// As [`density_to_points`], and [`ConvertError::Cancelled`].
 pub fn density_to_points_with_progress<F: ScalarField + ?Sized>(
     field: &F,
-    bounds: [DVec3; 2],
+    bounds: DAabb,
     params: &DensityParams,
     progress: &Progress,
 ) -> Result<(Cloud, VolumeReport), ConvertError> {
@@ -222,9 +224,9 @@ pub fn density_to_points_with_progress<F: ScalarField + ?Sized>(
 }
 
 /// The lattice that a density is sampled on.
-pub(crate) fn density_lattice(bounds: [DVec3; 2], params: &DensityParams) -> Result<Lattice, ConvertError> {
+pub(crate) fn density_lattice(bounds: DAabb, params: &DensityParams) -> Result<Lattice, ConvertError> {
     let p = &params.volume.splat;
-    let sides = bounds[1] - bounds[0];
+    let sides = bounds.size();
     let spacing = match params.density {
         Density::Spacing(h) => p.check_spacing(h)? / p.transform.scale,
         Density::Splats(n) => libm::cbrt(sides.x * sides.y * sides.z / n.max(1) as f64),
@@ -240,7 +242,7 @@ pub(crate) fn density_lattice(bounds: [DVec3; 2], params: &DensityParams) -> Res
 /// an empty box or an absurd spacing; [`ConvertError::TooMany`].
 pub fn field_to_grid<F: ScalarField + ?Sized>(
     field: &F,
-    bounds: [DVec3; 2],
+    bounds: DAabb,
     spacing: f64,
     splat: &SplatParams,
 ) -> Result<Grid, ConvertError> {
@@ -286,15 +288,19 @@ fn sample<F: ScalarField + ?Sized>(
 }
 
 /// The lattice of cells of at most `cell` that fills a box.
-fn lattice(bounds: [DVec3; 2], cell: f64, splat: &SplatParams) -> Result<Lattice, ConvertError> {
-    let sides = bounds[1] - bounds[0];
-    if !(sides.is_finite() && sides.min_element() > 0.0) {
-        return Err(splat.bad("box", bounds, "two finite corners, the second above the first on every axis"));
+fn lattice(bounds: DAabb, cell: f64, splat: &SplatParams) -> Result<Lattice, ConvertError> {
+    let sides = bounds.size();
+    if !bounds.is_solid() {
+        return Err(splat.bad(
+            "box",
+            [bounds.min, bounds.max],
+            "two finite corners, the second above the first on every axis",
+        ));
     }
     let cell = splat.check_spacing(cell)?;
     // A side of n cells may come out as n·(1 + ε).
     let cells = sides.to_array().map(|s| (s / cell - 1e-9).ceil().max(1.0));
     check_lattice(splat, cells)?;
     let step = sides / DVec3::from_array(cells);
-    Ok(Lattice { low: bounds[0], step, cells: cells.map(|n| n as usize) })
+    Ok(Lattice { low: bounds.min, step, cells: cells.map(|n| n as usize) })
 }

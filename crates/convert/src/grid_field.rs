@@ -17,7 +17,7 @@ mod stencil;
 use jet::{Slope, control_range, hessian, slope};
 use ranges::{Ranges, widen};
 use splat_core::glam::{BVec3, DMat3, DVec3};
-use splat_core::{Error, Grid, ScalarField};
+use splat_core::{DAabb, Error, Grid, ScalarField};
 use std::sync::Arc;
 use stencil::{Control, Stencil};
 
@@ -126,13 +126,13 @@ impl GridField {
         &self.volume.grid
     }
 
-    /// Opposite corners of the box around the lattice; a sheared lattice fills it in part.
-    pub fn bounds(&self) -> [DVec3; 2] {
+    /// The box around the lattice; a sheared lattice fills it in part.
+    pub fn bounds(&self) -> DAabb {
         let far = self.grid().axes * DMat3::from_diagonal(self.last);
         let (zero, origin) = (DVec3::ZERO, self.grid().origin);
         let low = far.x_axis.min(zero) + far.y_axis.min(zero) + far.z_axis.min(zero);
         let high = far.x_axis.max(zero) + far.y_axis.max(zero) + far.z_axis.max(zero);
-        [origin + low, origin + high]
+        DAabb::new(origin + low, origin + high)
     }
 
     #[inline(always)]

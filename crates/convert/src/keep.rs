@@ -3,7 +3,7 @@
 use crate::classify::{Class, Classes, cell_length};
 use crate::{ConvertError, VolumeParams};
 use rayon::prelude::*;
-use splat_core::{Grid, Progress, TransferFunction, glam::DVec3};
+use splat_core::{DAabb, Grid, Progress, TransferFunction, glam::DVec3};
 
 /// The longest straight line within the lattice's cells: the longest body diagonal.
 pub(crate) fn longest_path(lattice: &Grid) -> f64 {
@@ -20,7 +20,7 @@ pub(crate) struct Keep<'a> {
     threshold: f64,
     /// Values up to and from here have no extinction at all: two comparisons spare most look-ups.
     support: [f32; 2],
-    clip: Option<[DVec3; 2]>,
+    clip: Option<DAabb>,
 }
 
 /// The kept lattice points of one slab of constant k.
@@ -110,10 +110,8 @@ impl<'a> Keep<'a> {
     }
 
     fn clipped(&self, lattice: &Grid, n: usize, k: usize) -> bool {
-        self.clip.is_some_and(|[low, high]| {
-            let p = lattice.position(n % lattice.dims[0], n / lattice.dims[0], k);
-            !(p.cmpge(low).all() && p.cmple(high).all())
-        })
+        let position = || lattice.position(n % lattice.dims[0], n / lattice.dims[0], k);
+        self.clip.is_some_and(|clip| !clip.contains(position()))
     }
 }
 

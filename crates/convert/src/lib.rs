@@ -6,10 +6,10 @@
 //!
 //! ```
 //! use convert::{Density, ExpressionField, MeshParams, surface_to_points};
-//! use splat_core::glam::DVec3;
+//! use splat_core::{DAabb, glam::DVec3};
 //! let ball = ExpressionField::parse("x^2 + y^2 + z^2 - 1").unwrap();
 //! let glass = MeshParams { opacity: 0.3, density: Density::Spacing(0.05), ..MeshParams::default() };
-//! let bounds = [DVec3::splat(-1.2), DVec3::splat(1.2)];
+//! let bounds = DAabb::around(DVec3::ZERO, DVec3::splat(1.2));
 //! let (cloud, report) = surface_to_points(&ball, bounds, &glass).unwrap();
 //! assert_eq!(cloud.len() as u64, report.splats);
 //! ```

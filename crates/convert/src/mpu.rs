@@ -24,8 +24,8 @@ mod weight;
 use crate::{ConvertError, Orientation, RawPoints};
 use octree::Octree;
 use samples::{SampleTree, box_of, samples_of};
-use splat_core::ScalarField;
 use splat_core::glam::{DMat3, DVec3};
+use splat_core::{DAabb, ScalarField};
 
 /// Half the side of the cube over half the longest side of the points' box: closed surfaces end before the cube does.
 const MARGIN: f64 = 1.25;
@@ -134,21 +134,21 @@ pub fn points_to_field(points: &RawPoints, params: &MpuParams) -> Result<(MpuFie
     if samples.len() < params.samples {
         return Err(bad(params, "points", samples.len(), "at least as many different points as `samples` asks for"));
     }
-    let [low, high] = box_of(&samples);
-    let side = (high - low).max_element();
+    let bounds = box_of(&samples);
+    let side = bounds.size().max_element();
     // The square of the smallest cell must be a normal number.
     if !(1e-140..1e140).contains(&side) {
         return Err(bad(params, "extent of the points", side, "points at different places, 1e-140 to 1e140 apart"));
     }
     let asked = Tolerances {
-        error: params.tolerance * (high - low).length(),
+        error: params.tolerance * bounds.diagonal(),
         depth: params.max_depth,
         samples: params.samples,
         support: params.support,
         sharp: params.sharp,
     };
     let tree = SampleTree::new(samples);
-    let (octree, report) = Octree::new(&tree, low + 0.5 * (high - low), 0.5 * MARGIN * side, &asked);
+    let (octree, report) = Octree::new(&tree, bounds.min + 0.5 * bounds.size(), 0.5 * MARGIN * side, &asked);
     Ok((MpuField { origin, octree }, MpuReport { points: points.len() as u64, ..report }))
 }
 
@@ -183,10 +183,9 @@ impl MpuField {
         self.octree.bytes()
     }
 
-    /// Opposite corners of the cube.
-    pub fn bounds(&self) -> [DVec3; 2] {
-        let (center, half) = (self.origin + self.octree.center, self.octree.half);
-        [center - half, center + half]
+    /// The cube.
+    pub fn bounds(&self) -> DAabb {
+        DAabb::around(self.origin + self.octree.center, DVec3::splat(self.octree.half))
     }
 
     /// The place of the cube that stands for `p`, relative to the origin, and 1 for each axis on which it is `p`.

@@ -17,7 +17,7 @@ use crate::volume_points::check_lattice;
 use noise::{NoiseFn, Perlin};
 use rayon::prelude::*;
 use splat_core::{
-    Grid, Progress,
+    DAabb, Grid, Progress,
     glam::{DMat3, DVec3},
 };
 
@@ -135,28 +135,24 @@ impl CloudShape {
         sum / total
     }
 
-    /// Corners of a box outside of which the density is 0, object units.
-    pub fn bounds(&self) -> [DVec3; 2] {
+    /// A box outside of which the density is 0, object units.
+    pub fn bounds(&self) -> DAabb {
         // The smooth maximum adds at most MERGE_WIDTH·ln n to the depth.
         let reach =
             1.0 + MOST_TURBULENCE * self.amplitude + MERGE_WIDTH * libm::log(self.ellipsoids.len().max(1) as f64);
-        let mut low = DVec3::INFINITY;
-        let mut high = DVec3::NEG_INFINITY;
-        for e in &self.ellipsoids {
-            low = low.min(e.center - e.radii * reach);
-            high = high.max(e.center + e.radii * reach);
-        }
+        let around = |e: &Ellipsoid| DAabb::around(e.center, e.radii * reach);
+        let DAabb { min: mut low, max: high } =
+            self.ellipsoids.iter().fold(DAabb::EMPTY, |all, e| all.union(around(e)));
         if let Some(base) = self.base.filter(|_| !self.ellipsoids.is_empty()) {
             low.y = low.y.max(base - MOST_TURBULENCE * BASE_WAVE * self.amplitude * self.mean_height()).min(high.y);
         }
-        [low, high]
+        DAabb::new(low, high)
     }
 
     /// Lattice points along x, y and z.
     pub(crate) fn lattice(&self, spacing: f64, splat: &SplatParams) -> Result<[usize; 3], ConvertError> {
         self.check(splat)?;
-        let [low, high] = self.bounds();
-        let counts = ((high - low) / splat.check_spacing(spacing)?).ceil().to_array();
+        let counts = (self.bounds().size() / splat.check_spacing(spacing)?).ceil().to_array();
         check_lattice(splat, counts)?;
         Ok(counts.map(|n| n.max(1.0) as usize))
     }
@@ -226,7 +222,7 @@ pub fn procedural_cloud_with_progress(
 ) -> Result<Grid, ConvertError> {
     splat.check()?;
     let dims = shape.lattice(spacing, splat)?;
-    let low = shape.bounds()[0];
+    let low = shape.bounds().min;
     let noise = Perlin::new(shape.seed);
     let mut values = vec![0.0f32; dims[0] * dims[1] * dims[2]];
     progress.add_total(values.len() as u64);

@@ -42,10 +42,10 @@ pub fn volume_section(
 ) -> Result<Mesh, ConvertError> {
     let wrong = |source| ConvertError::Input { object: splat.object_name.clone(), source };
     let field = GridField::new(grid.clone(), Interpolation::Trilinear, 0.0, Inside::Below).map_err(wrong)?;
-    let [low, high] = field.bounds();
-    let reach = 0.5 * (high - low).length();
+    let bounds = field.bounds();
+    let reach = 0.5 * bounds.diagonal();
     // The place of the plane nearest to the middle of the volume, so that it does not matter which point was given.
-    let middle = 0.5 * (low + high);
+    let middle = bounds.center();
     let center = middle - normal * normal.dot(middle - center);
     let (u, v) = normal.any_orthonormal_pair();
     let n = (2.0 * reach / spacing).ceil().clamp(1.0, MOST_SQUARES);

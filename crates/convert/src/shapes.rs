@@ -6,24 +6,17 @@
 use crate::borders::Borders;
 use crate::{ConvertError, SplatParams};
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Cloud, Splat, SplatKind, optics};
+use splat_core::{Cloud, DAabb, Splat, SplatKind, optics};
 
 /// Sub-samples along each axis of a cell that a ball's surface cuts.
 const SUBDIVISION: i32 = 8;
 
-/// A homogeneous medium of extinction σ_t (1/world unit) in the box from `min` to `max`, lattice points about `spacing`
-/// apart; lengths are before the transform of `params`.
+/// A homogeneous medium of extinction σ_t (1/world unit) in a box, lattice points about `spacing` apart; lengths are before the transform of `params`.
 ///
 /// # Errors
 /// [`ConvertError::Parameter`] for an empty box, a spacing or an extinction out of range, [`ConvertError::TooMany`].
-pub fn medium_box(
-    min: DVec3,
-    max: DVec3,
-    extinction: f64,
-    spacing: f64,
-    params: &SplatParams,
-) -> Result<Cloud, ConvertError> {
-    let lattice = Lattice::new(min, max, extinction, spacing, params)?;
+pub fn medium_box(bounds: DAabb, extinction: f64, spacing: f64, params: &SplatParams) -> Result<Cloud, ConvertError> {
+    let lattice = Lattice::new(bounds, extinction, spacing, params)?;
     lattice.fill(params, |_| 1.0)
 }
 
@@ -39,8 +32,7 @@ pub fn medium_ball(
     spacing: f64,
     params: &SplatParams,
 ) -> Result<Cloud, ConvertError> {
-    let reach = DVec3::splat(radius);
-    let lattice = Lattice::new(center - reach, center + reach, extinction, spacing, params)?;
+    let lattice = Lattice::new(DAabb::around(center, DVec3::splat(radius)), extinction, spacing, params)?;
     let mut cloud = lattice.fill(params, |offset| share_in_ball(offset, radius, lattice.step))?;
     let total: f64 = cloud.cross_section.iter().map(|k| f64::from(*k)).sum();
     let volume = 4.0 / 3.0 * std::f64::consts::PI * (radius * params.transform.scale).powi(3);
@@ -124,16 +116,15 @@ pub(crate) struct Lattice {
 
 impl Lattice {
     pub(crate) fn new(
-        min: DVec3,
-        max: DVec3,
+        bounds: DAabb,
         extinction: f64,
         spacing: f64,
         params: &SplatParams,
     ) -> Result<Self, ConvertError> {
         params.check()?;
         params.check_spacing(spacing * params.transform.scale)?;
-        let extent = max - min;
-        if !(min.is_finite() && max.is_finite() && extent.min_element() > 0.0) {
+        let (DAabb { min, max }, extent) = (bounds, bounds.size());
+        if !bounds.is_solid() {
             return Err(params.bad("box", [min, max], "a lowest corner below the highest on every axis"));
         }
         if !(extinction.is_finite() && extinction >= 0.0) {
@@ -202,7 +193,7 @@ mod tests {
     #[test]
     fn cross_sections_sum_to_extinction_times_volume() {
         let p = SplatParams::default();
-        let slab = medium_box(DVec3::ZERO, DVec3::new(2.0, 1.0, 0.3), 5.0, 0.07, &p).unwrap();
+        let slab = medium_box(DAabb::new(DVec3::ZERO, DVec3::new(2.0, 1.0, 0.3)), 5.0, 0.07, &p).unwrap();
         assert!((total(&slab) / 3.0 - 1.0).abs() < 1e-6, "{}", total(&slab));
         let ball = medium_ball(DVec3::ONE, 0.5, 2.0, 0.04, &p).unwrap();
         let exact = 2.0 * 4.0 / 3.0 * std::f64::consts::PI * 0.125;
@@ -222,8 +213,8 @@ mod tests {
     fn cv10_a_spacing_beyond_the_budget_is_refused() {
         let p = SplatParams { max_splats: 1000, ..SplatParams::default() };
         for spacing in [1e-9, 0.0, f64::INFINITY, f64::NAN] {
-            assert!(medium_box(DVec3::ZERO, DVec3::ONE, 1.0, spacing, &p).is_err(), "{spacing}");
+            assert!(medium_box(DAabb::new(DVec3::ZERO, DVec3::ONE), 1.0, spacing, &p).is_err(), "{spacing}");
         }
-        assert!(medium_box(DVec3::ONE, DVec3::ZERO, 1.0, 0.5, &p).is_err());
+        assert!(medium_box(DAabb::new(DVec3::ONE, DVec3::ZERO), 1.0, 0.5, &p).is_err());
     }
 }

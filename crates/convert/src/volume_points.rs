@@ -14,7 +14,7 @@ use crate::sobel::{Rows, Sobel, normal_from_gradient};
 use crate::{ConvertError, resample};
 use rayon::prelude::*;
 use splat_core::{
-    Cloud, Grid, Progress, SplatKind, TransferFunction,
+    Cloud, DAabb, Grid, Progress, SplatKind, TransferFunction,
     glam::{DVec3, Vec3},
 };
 
@@ -36,8 +36,8 @@ pub struct VolumeParams {
     /// Optical depth across a cell, ≥ 0, that may be wrong because the transfer function is taken at the voxel alone; cells
     /// where more could be have its mean.
     pub classification_error: f64,
-    /// Lowest and highest corner of the part to keep, object space.
-    pub clip: Option<[DVec3; 2]>,
+    /// The part to keep, object space.
+    pub clip: Option<DAabb>,
 }
 
 impl Default for VolumeParams {

@@ -4,7 +4,7 @@ use convert::{
     Clip, ClippedField, CombinedField, Density, MeshParams, SharedField, SplatParams, field_to_mesh, surface_to_points,
 };
 use splat_core::glam::{DMat3, DVec3};
-use splat_core::{ScalarField, rng};
+use splat_core::{DAabb, ScalarField, rng};
 use std::sync::Arc;
 
 /// Distance from a ball's surface; its domain is where x < 2, its values end at |p| = 50.
@@ -103,7 +103,7 @@ fn the_domain_is_that_of_the_active_part() {
     let half: SharedField = Arc::new(clip(Clip::HalfSpace { normal: DVec3::Z * 2.0, offset: 0.5 }));
     assert!(half.in_domain(DVec3::Z * 0.25) && !half.in_domain(DVec3::Z * 0.26));
     assert!(!half.in_domain(DVec3::new(3.0, 0.0, 0.0)), "the ball's own domain ends");
-    let boxed = clip(Clip::Box([DVec3::splat(-0.5), DVec3::splat(0.5)]));
+    let boxed = clip(Clip::Box(DAabb::around(DVec3::ZERO, DVec3::splat(0.5))));
     assert!(boxed.in_domain(DVec3::splat(0.5)) && !boxed.in_domain(DVec3::X * 0.51));
     let p = DVec3::new(0.3, 0.1, 0.9);
     assert_eq!((half.value_gradient(p), half.hessian(p)), (a.value_gradient(p), a.hessian(p)));
@@ -118,7 +118,8 @@ fn the_domain_is_that_of_the_active_part() {
 fn a_union_becomes_one_closed_mesh() {
     let (a, b) = balls();
     let f = CombinedField::union(vec![a, b]).unwrap();
-    let mesh = field_to_mesh(&f, [DVec3::splat(-1.3), DVec3::splat(1.8)], 0.06, &SplatParams::default()).unwrap();
+    let mesh =
+        field_to_mesh(&f, DAabb::new(DVec3::splat(-1.3), DVec3::splat(1.8)), 0.06, &SplatParams::default()).unwrap();
     for p in mesh.position.iter().map(|p| p.as_dvec3() + mesh.origin) {
         assert!(f.value(p).abs() < 1e-6, "{p}: {}", f.value(p));
     }
@@ -144,8 +145,8 @@ fn what_makes_no_sense_is_refused() {
     for clip in [
         Clip::HalfSpace { normal: DVec3::ZERO, offset: 0.0 },
         Clip::HalfSpace { normal: DVec3::X, offset: f64::NAN },
-        Clip::Box([DVec3::ONE, DVec3::ZERO]),
-        Clip::Box([DVec3::ZERO, DVec3::INFINITY]),
+        Clip::Box(DAabb::new(DVec3::ONE, DVec3::ZERO)),
+        Clip::Box(DAabb::new(DVec3::ZERO, DVec3::INFINITY)),
     ] {
         assert!(ClippedField::new(a.clone(), vec![clip]).is_err(), "{clip:?}");
     }
@@ -154,7 +155,7 @@ fn what_makes_no_sense_is_refused() {
 #[test]
 fn meshes_and_splats_end_at_the_border_of_the_domain() {
     let (a, _) = balls();
-    let bounds = [DVec3::splat(-1.2), DVec3::splat(1.2)];
+    let bounds = DAabb::around(DVec3::ZERO, DVec3::splat(1.2));
     let area = |field: &dyn ScalarField| {
         let mesh = field_to_mesh(field, bounds, 0.05, &SplatParams::default()).unwrap();
         mesh.validate().unwrap();
@@ -179,8 +180,8 @@ fn meshes_and_splats_end_at_the_border_of_the_domain() {
     assert!(cloud.position.iter().all(|p| cloud.origin.z + f64::from(p.z) < 0.26));
     // A domain that holds all of the surface changes no bit; one that holds nothing leaves nothing.
     let (.., same) =
-        area(&ClippedField::new(a.clone(), vec![Clip::Box([DVec3::splat(-2.0), DVec3::splat(2.0)])]).unwrap());
+        area(&ClippedField::new(a.clone(), vec![Clip::Box(DAabb::around(DVec3::ZERO, DVec3::splat(2.0)))]).unwrap());
     assert_eq!((same.position, same.triangles), (uncut.position, uncut.triangles));
-    let none = ClippedField::new(a, vec![Clip::Box([DVec3::splat(-0.1), DVec3::splat(0.1)])]).unwrap();
+    let none = ClippedField::new(a, vec![Clip::Box(DAabb::around(DVec3::ZERO, DVec3::splat(0.1)))]).unwrap();
     assert!(field_to_mesh(&none, bounds, 0.05, &SplatParams::default()).unwrap().triangles.is_empty());
 }

@@ -4,7 +4,7 @@
 use convert::cost::{self, Prediction};
 use convert::*;
 use splat_core::glam::{DMat3, DVec3, Vec3};
-use splat_core::{Cloud, Grid, Mesh, Progress, Similarity, TransferFunction, TransferPoint, rng};
+use splat_core::{Cloud, DAabb, Grid, Mesh, Progress, Similarity, TransferFunction, TransferPoint, rng};
 
 fn mesh() -> Mesh {
     let unit = |i: u64, a: u64| rng::unit_f32(8, 0, i, a);
@@ -58,7 +58,7 @@ fn meshes_points_and_unsplit_volumes_are_counted_exactly() {
             normals: values,
             values,
             omitted_optical_depth: if values { 0.5 } else { 0.0 },
-            clip: values.then_some([DVec3::splat(2.0), DVec3::splat(7.5)]),
+            clip: values.then_some(DAabb::new(DVec3::splat(2.0), DVec3::splat(7.5))),
             ..VolumeParams::default()
         };
         let grid = wave([12, 13, 14], DVec3::ONE);
@@ -75,7 +75,7 @@ fn split_volumes_fields_and_clouds_are_predicted_closely() {
     let cloud = volume_to_points(&grid, &transfer(), &params).unwrap().0;
     close(cost::volume(&grid, &transfer(), &params).unwrap(), &cloud, 0.05);
 
-    let bounds = [DVec3::splat(-1.3), DVec3::splat(1.3)];
+    let bounds = DAabb::around(DVec3::ZERO, DVec3::splat(1.3));
     for text in ["x^2 + y^2 + z^2 - 1", "y - 0.1*sin(7*x)*cos(5*z)", "(sqrt(x^2+z^2) - 0.8)^2 + y^2 - 0.06"] {
         let field = ExpressionField::parse(text).unwrap();
         for density in [Density::Spacing(0.03), Density::Splats(20_000), Density::Auto] {
@@ -99,8 +99,14 @@ fn split_volumes_fields_and_clouds_are_predicted_closely() {
 fn closed_shapes_are_counted() {
     let p = SplatParams::default();
     let (low, high) = (DVec3::ZERO, DVec3::new(2.0, 1.0, 0.3));
-    exact(cost::medium_box(low, high, 5.0, 0.07, &p).unwrap(), &medium_box(low, high, 5.0, 0.07, &p).unwrap());
-    exact(cost::medium_box(low, high, 0.0, 0.07, &p).unwrap(), &medium_box(low, high, 0.0, 0.07, &p).unwrap());
+    exact(
+        cost::medium_box(DAabb::new(low, high), 5.0, 0.07, &p).unwrap(),
+        &medium_box(DAabb::new(low, high), 5.0, 0.07, &p).unwrap(),
+    );
+    exact(
+        cost::medium_box(DAabb::new(low, high), 0.0, 0.07, &p).unwrap(),
+        &medium_box(DAabb::new(low, high), 0.0, 0.07, &p).unwrap(),
+    );
     let (u, v) = (DVec3::X, DVec3::Z * 2.0);
     for opacity in [0.75, 1.0] {
         exact(cost::rectangle(u, v, opacity, 0.05, &p).unwrap(), &rectangle(low, u, v, opacity, 0.05, &p).unwrap());
@@ -147,7 +153,7 @@ fn interrupted(run: &dyn Fn(&Progress) -> Result<(), ConvertError>) {
 #[test]
 fn long_conversions_tick_and_stop() {
     let field = ExpressionField::parse("x^2 + y^2 + z^2 - 1").unwrap();
-    let bounds = [DVec3::splat(-1.3), DVec3::splat(1.3)];
+    let bounds = DAabb::around(DVec3::ZERO, DVec3::splat(1.3));
     let fine = MeshParams { density: Density::Spacing(0.01), ..MeshParams::default() };
     interrupted(&|p| mesh_to_points_with_progress(&mesh(), &fine, &mut Cloud::default(), p).map(|_| ()));
     interrupted(&|p| raw_to_surfels_with_progress(&points(3000), &SurfelParams::default(), p).map(|_| ()));

@@ -6,7 +6,7 @@ use convert::{
     density_to_points, procedural_cloud, surface_to_points,
 };
 use splat_core::glam::DVec3;
-use splat_core::{ScalarField, rng};
+use splat_core::{DAabb, ScalarField, rng};
 
 fn field(text: &str) -> ExpressionField {
     ExpressionField::parse(text).unwrap()
@@ -139,7 +139,7 @@ fn sphere_params(opacity: f64) -> MeshParams {
 
 #[test]
 fn an_implicit_sphere_has_the_area_and_the_normals_of_a_sphere() {
-    let bounds = [DVec3::splat(-1.3), DVec3::splat(1.4)];
+    let bounds = DAabb::new(DVec3::splat(-1.3), DVec3::splat(1.4));
     for text in ["x^2 + y^2 + z^2 - 1", "1 - 1/sqrt(x^2 + y^2 + z^2 + 1e-30)"] {
         let (cloud, report) = surface_to_points(&field(text), bounds, &sphere_params(0.5)).unwrap();
         assert!((report.area / (4.0 * std::f64::consts::PI) - 1.0).abs() < 1e-3, "{text}: {}", report.area);
@@ -155,7 +155,7 @@ fn an_implicit_sphere_has_the_area_and_the_normals_of_a_sphere() {
 
 #[test]
 fn a_surface_is_closed_across_blocks_and_stays_inside_the_box() {
-    let bounds = [DVec3::splat(-1.3), DVec3::splat(1.4)];
+    let bounds = DAabb::new(DVec3::splat(-1.3), DVec3::splat(1.4));
     let mesh = convert::field_to_mesh(&field("x^2+y^2+z^2-1"), bounds, 0.05, &SplatParams::default()).unwrap();
     let mut edges = std::collections::HashMap::new();
     for t in &mesh.triangles {
@@ -167,7 +167,8 @@ fn a_surface_is_closed_across_blocks_and_stays_inside_the_box() {
     // Euler: V − E + F = 2.
     assert_eq!(mesh.position.len() + mesh.triangles.len() - edges.len() / 2, 2);
     let gyroid = field("sin(x)*cos(y) + sin(y)*cos(z) + sin(z)*cos(x)");
-    let (cloud, _) = surface_to_points(&gyroid, [DVec3::ZERO, DVec3::splat(6.0)], &MeshParams::default()).unwrap();
+    let (cloud, _) =
+        surface_to_points(&gyroid, DAabb::new(DVec3::ZERO, DVec3::splat(6.0)), &MeshParams::default()).unwrap();
     assert!(cloud.len() > 10_000);
     for p in cloud.position.iter().map(|p| p.as_dvec3() + cloud.origin) {
         assert!(p.min_element() > -0.1 && p.max_element() < 6.1 && gyroid.value(p).abs() < 1e-2);
@@ -177,7 +178,7 @@ fn a_surface_is_closed_across_blocks_and_stays_inside_the_box() {
 #[test]
 fn a_splat_budget_is_met_within_a_factor() {
     let params = MeshParams { density: Density::Splats(20_000), ..MeshParams::default() };
-    let bounds = [DVec3::splat(-1.3), DVec3::splat(1.4)];
+    let bounds = DAabb::new(DVec3::splat(-1.3), DVec3::splat(1.4));
     let (cloud, _) = surface_to_points(&field("x^2 + y^2 + z^2 - 1"), bounds, &params).unwrap();
     assert!(cloud.len() > 10_000 && cloud.len() < 45_000, "{}", cloud.len());
 }
@@ -192,7 +193,7 @@ fn fields_that_are_not_finite_are_refused_with_the_point() {
         density: Density::Spacing(0.5),
         extinction: 1.0,
     };
-    let bounds = [DVec3::splat(-1.0), DVec3::ONE];
+    let bounds = DAabb::new(DVec3::splat(-1.0), DVec3::ONE);
     let error = density_to_points(&field("ln(x)"), bounds, &params).unwrap_err();
     assert!(error.to_string().contains("[-0.75, -0.75, -0.75]"), "{error}");
     assert!(error.to_string().contains("fog"));
@@ -200,7 +201,8 @@ fn fields_that_are_not_finite_are_refused_with_the_point() {
         surface_to_points(&field("sqrt(x) - 1"), bounds, &MeshParams::default()),
         Err(ConvertError::NonFinite { .. })
     ));
-    for bad in [[DVec3::ONE, DVec3::ZERO], [DVec3::ZERO, DVec3::new(1.0, 1.0, f64::NAN)], [DVec3::ZERO, DVec3::X]] {
+    let corners = [[DVec3::ONE, DVec3::ZERO], [DVec3::ZERO, DVec3::new(1.0, 1.0, f64::NAN)], [DVec3::ZERO, DVec3::X]];
+    for bad in corners.map(|[min, max]| DAabb::new(min, max)) {
         assert!(density_to_points(&field("1"), bad, &params).is_err());
         assert!(surface_to_points(&field("x"), bad, &MeshParams::default()).is_err());
     }
@@ -210,11 +212,11 @@ fn fields_that_are_not_finite_are_refused_with_the_point() {
 fn densities_integrate_to_their_closed_form() {
     // ∫∫∫ x over the unit cube is 1/2; the midpoint rule is exact for it. Negative densities count as nothing.
     let params = DensityParams { density: Density::Spacing(0.1), extinction: 4.0, ..DensityParams::default() };
-    let (cloud, report) = density_to_points(&field("x"), [DVec3::ZERO, DVec3::ONE], &params).unwrap();
+    let (cloud, report) = density_to_points(&field("x"), DAabb::new(DVec3::ZERO, DVec3::ONE), &params).unwrap();
     let sum: f64 = cloud.cross_section.iter().map(|k| f64::from(*k)).sum();
     assert!((sum - 2.0).abs() < 1e-5, "{sum}");
     assert_eq!(report.splats, 1000);
-    assert_eq!(density_to_points(&field("-1"), [DVec3::ZERO, DVec3::ONE], &params).unwrap().0.len(), 0);
+    assert_eq!(density_to_points(&field("-1"), DAabb::new(DVec3::ZERO, DVec3::ONE), &params).unwrap().0.len(), 0);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use convert::{ConvertError, SplatParams, VolumeParams, reference, sobel_gradient, volume_to_points};
 use splat_core::glam::{DMat3, DQuat, DVec3, Vec3};
-use splat_core::{Footprint, Grid, Similarity, TransferFunction, TransferPoint, rng};
+use splat_core::{DAabb, Footprint, Grid, Similarity, TransferFunction, TransferPoint, rng};
 
 fn grid(dims: [usize; 3], steps: DVec3, value: impl Fn(usize, usize, usize) -> f32) -> Grid {
     let values = (0..dims[0] * dims[1] * dims[2])
@@ -153,7 +153,8 @@ fn normals_point_to_lower_values_and_turn_with_the_transform() {
 
 #[test]
 fn a_clip_box_keeps_what_lies_inside() {
-    let params = VolumeParams { clip: Some([DVec3::splat(1.5), DVec3::splat(4.0)]), ..VolumeParams::default() };
+    let params =
+        VolumeParams { clip: Some(DAabb::new(DVec3::splat(1.5), DVec3::splat(4.0))), ..VolumeParams::default() };
     let (cloud, _) = volume_to_points(&grid([8; 3], DVec3::ONE, |_, _, _| 1.0), &ramp(0.0, 1.0, 1.0), &params).unwrap();
     assert_eq!(cloud.len(), 27);
 }

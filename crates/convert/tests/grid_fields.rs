@@ -208,7 +208,7 @@ fn single_voxels_slices_and_pairs_are_fields_too() {
         for dims in [[1, 1, 1], [5, 4, 1], [1, 4, 5], [2, 2, 2], [3, 1, 2]] {
             let grid = noise(dims, 13);
             let f = field(&grid, interpolation);
-            assert_eq!(f.bounds()[1], DVec3::from_array(dims.map(|n| (n - 1) as f64)));
+            assert_eq!(f.bounds().max, DVec3::from_array(dims.map(|n| (n - 1) as f64)));
             let p = place(&grid, 1);
             assert!(f.value(p).is_finite() && f.in_domain(p));
             for a in (0..3).filter(|a| dims[*a] == 1) {

@@ -6,7 +6,7 @@ use convert::{
     MpuField, MpuParams, MpuReport, Orientation, RawPoints, SplatParams, field_to_mesh, points_to_field, vertex_normals,
 };
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{ScalarField, rng};
+use splat_core::{DAabb, ScalarField, rng};
 use std::f64::consts::TAU;
 use std::path::Path;
 
@@ -191,7 +191,7 @@ fn scaling_by_two_scales_exactly_and_far_away_is_like_here() {
 #[test]
 fn beyond_the_cube_the_value_stays_and_there_is_no_surface() {
     let (f, _) = field(&cloud(on_sphere, 2000), 1e-3);
-    let [_, high] = f.bounds();
+    let high = f.bounds().max;
     let (edge, out) = (DVec3::new(high.x, 0.1, 0.2), DVec3::new(high.x + 5.0, 0.1, 0.2));
     assert!(f.in_domain(edge - DVec3::X * 1e-9) && !f.in_domain(out));
     assert!((f.value(edge) - f.value(out)).abs() < 1e-12 && f.gradient(out).x == 0.0);
@@ -203,7 +203,7 @@ fn beyond_the_cube_the_value_stays_and_there_is_no_surface() {
 /// A field of these points, all finite within the cube.
 fn survives(name: &str, points: &RawPoints) -> (MpuField, MpuReport) {
     let (f, report) = field(points, 1e-3);
-    let [low, high] = f.bounds();
+    let DAabb { min: low, max: high } = f.bounds();
     for i in 0..200 {
         let p = low + (high - low) * DVec3::new(unit(i, 0), unit(i, 1), unit(i, 2));
         let (v, g) = f.value_gradient(p);
@@ -308,9 +308,8 @@ fn the_bunny_is_met_within_the_tolerance_and_has_no_other_sheets() {
     distance.sort_by(f64::total_cmp);
     let n = distance.len();
     assert!(distance[n / 2] < 0.05 && distance[n * 99 / 100] < 0.25 && distance[n - 1] < 1.0, "{}", distance[n - 1]);
-    let [low, high] = f.bounds();
-    let side = (high - low).x;
-    let zero_set = field_to_mesh(&f, [low, high], side / 150.0, &SplatParams::default()).unwrap();
+    let side = f.bounds().size().x;
+    let zero_set = field_to_mesh(&f, f.bounds(), side / 150.0, &SplatParams::default()).unwrap();
     let nearest = |p: DVec3| {
         let squared = points.position.iter().map(|q| (q.as_dvec3() + points.origin - p).length_squared());
         squared.fold(f64::INFINITY, f64::min).sqrt()

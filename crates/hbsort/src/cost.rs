@@ -5,7 +5,7 @@ use crate::ranges::{BINS, SAMPLERS, bucket_count};
 use crate::scratch::{BucketSlices, CHUNK, Method};
 
 /// Bytes of the scratch for `n` splats and `buckets` first-level buckets on `threads` threads: 4 bytes a splat for two
-/// levels, 8 by depth bits, plus the buckets. (The result itself takes 4 bytes a kept splat and 4 a slice.)
+/// levels, 8 by depth bits, plus the buckets. (The result itself takes 4 bytes a kept splat and 12 a non-empty slice.)
 pub fn scratch_bytes(method: Method, n: usize, buckets: usize, threads: usize) -> u64 {
     8 * entry_words(method, n) as u64 + bucket_bytes(method, n, buckets, threads)
 }

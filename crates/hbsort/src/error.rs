@@ -1,5 +1,7 @@
 //! Errors of the sort: parameters out of range, depths that are no numbers, too many splats, no memory.
 
+use splat_core::glam::DVec3;
+
 /// Why a sort was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -13,6 +15,14 @@ pub enum Error {
     /// [`crate::Thickness::Auto`] takes ε from splat radii, and depths alone have none.
     #[error("depths alone have no splat radii to take the slice thickness from: give Thickness::World")]
     NoRadii,
+    /// The axis that slices should lie across has no finite origin or no direction of unit length.
+    #[error("slices along {direction} from {origin}: expected a direction of length 1 and a finite origin")]
+    Axis {
+        /// Where distances are 0, world units.
+        origin: DVec3,
+        /// The direction.
+        direction: DVec3,
+    },
     /// A ready depth is NaN or infinite.
     #[error("depth {index} is {found}, expected a finite number")]
     Depth {

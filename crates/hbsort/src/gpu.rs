@@ -184,10 +184,10 @@ pub fn view_bytes(origin: DVec3, splats: u32, camera: &Camera, params: &Params) 
     bytemuck::bytes_of(&view).to_vec()
 }
 
-/// Where each slice begins among the sorted keys, then their number.
-fn slice_starts(slicing: &Slicing, keys: impl ExactSizeIterator<Item = u32>) -> Vec<u32> {
+/// Where each slice begins among the sorted keys, then their number; and which slices these are, counted from near.
+fn slices_of(slicing: &Slicing, keys: impl ExactSizeIterator<Item = u32>) -> (Vec<u32>, Vec<u64>) {
     let end = keys.len() as u32;
-    let mut starts = Vec::new();
+    let (mut starts, mut indices) = (Vec::new(), Vec::new());
     // The slice of the last key that was asked for its slice, and the keys that surely share it.
     let mut current: Option<(u64, u32)> = None;
     for (at, key) in (0u32..).zip(keys) {
@@ -199,9 +199,10 @@ fn slice_starts(slicing: &Slicing, keys: impl ExactSizeIterator<Item = u32>) -> 
         let slice = slicing.slice_of(depth);
         if current.is_none_or(|(of, _)| of != slice) {
             starts.push(at);
+            indices.push(slice);
             current = Some((slice, slicing.surely_within(slice)));
         }
     }
     starts.push(end);
-    starts
+    (starts, indices)
 }

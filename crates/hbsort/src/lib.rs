@@ -31,6 +31,8 @@
 //! let slices: Vec<&[u32]> = (0..order.non_empty_slices()).map(|k| order.slice(k)).collect();
 //! assert_eq!(slices, [&[3][..], &[2], &[0, 1]]);
 //! assert_eq!((order.near, order.far, order.slices), (5.0, 14.0, 18));
+//! // Slice 0 is the nearest, so the farthest is the last of 18.
+//! assert_eq!(order.slice_indices, [17, 6, 0]);
 //! scratch.recycle(order); // The next frame allocates nothing.
 //! ```
 //!
@@ -38,6 +40,7 @@
 //! this deviates from the paper and why.
 #![forbid(unsafe_code)]
 
+mod along;
 mod buckets;
 pub mod cost;
 mod crowd;
@@ -57,6 +60,7 @@ mod slicing;
 mod sort;
 mod thickness;
 
+pub use along::{SliceAxis, slice_along};
 pub use error::Error;
 pub use params::{Params, Thickness};
 pub use scratch::{Method, Scratch, SortInfo, ThicknessRule};

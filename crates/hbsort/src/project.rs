@@ -58,7 +58,7 @@ impl Extremes {
         Self { near: [f32::INFINITY; LANES], far: [f32::NEG_INFINITY; LANES], radius: [f32::INFINITY; LANES] };
 
     #[inline(always)]
-    fn take(&mut self, lane: usize, depth: f32, radius: f32) {
+    pub(crate) fn take(&mut self, lane: usize, depth: f32, radius: f32) {
         // Comparisons with NaN are false: a culled depth changes nothing.
         self.near[lane] = if depth < self.near[lane] { depth } else { self.near[lane] };
         self.far[lane] = if depth > self.far[lane] { depth } else { self.far[lane] };
@@ -108,10 +108,9 @@ impl<'a> Projector<'a> {
         Self { cloud, ids, view, frustum: Frustum::new(camera, margin_px) }
     }
 
-    /// View depth of the splat at `place` in the input; the same bits as [`Projector::project`] writes.
-    pub(crate) fn depth(&self, place: usize) -> f32 {
-        let id = self.ids.map_or(place, |ids| ids[place] as usize);
-        self.view.depth(self.cloud.position[id]) + 0.0
+    /// View depth of splat `id`; the same bits as [`Projector::project`] writes.
+    pub(crate) fn depth(&self, id: u32) -> f32 {
+        self.view.depth(self.cloud.position[id as usize]) + 0.0
     }
 
     /// Writes the bits of every splat's depth, [`CULLED`] for those outside the view.

@@ -73,7 +73,7 @@ pub fn by_centre(cloud: &Cloud, ids: &[u32], camera: &Camera, key: CentreKey) ->
 /// The splats `ids` in the order in which they are given, as one slice.
 pub fn as_given(ids: Vec<u32>) -> SliceOrder {
     let slice_starts = vec![0, ids.len() as u32];
-    SliceOrder { slice_starts, input_from_sorted: ids, slices: 1, ..SliceOrder::default() }
+    SliceOrder { slice_starts, slice_indices: vec![0], input_from_sorted: ids, slices: 1, ..SliceOrder::default() }
 }
 
 /// Whether any part of splat `i`'s sphere lies inside the view, in f64: `margin` is the distance in world units by

@@ -116,10 +116,12 @@ impl Scratch {
     /// An order to fill, with the recycled buffers and room for `n` ids.
     pub(crate) fn take_order(&mut self, n: usize) -> Result<SliceOrder, Error> {
         let spare = std::mem::take(&mut self.spare);
-        let (mut ids, mut slice_starts) = (spare.input_from_sorted, spare.slice_starts);
+        let (mut ids, mut slice_starts, mut slice_indices) =
+            (spare.input_from_sorted, spare.slice_starts, spare.slice_indices);
         resize(&mut ids, n)?;
         slice_starts.clear();
-        Ok(SliceOrder { input_from_sorted: ids, slice_starts, ..SliceOrder::default() })
+        slice_indices.clear();
+        Ok(SliceOrder { input_from_sorted: ids, slice_starts, slice_indices, ..SliceOrder::default() })
     }
 }
 

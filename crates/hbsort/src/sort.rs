@@ -4,13 +4,17 @@ use crate::buckets;
 use crate::crowd;
 use crate::depth_bits::{DIGITS, DepthBits, MOST_PASSES, leaf_capacity};
 use crate::first_level::{Distributed, distribute, scan_buckets};
-use crate::project::{Projector, extremes_of};
+use crate::project::{Extremes, Projector, extremes_of};
 use crate::ranges::{BINS, Ranges, SAMPLERS, bucket_count};
 use crate::scratch::{CHUNK, MOST_SPLATS, Method, SortInfo, ThicknessRule, resize};
 use crate::slicing::Slicing;
 use crate::{Error, Params, Scratch, cost, thickness};
+use rayon::prelude::*;
 use splat_core::{Camera, Cloud, SliceOrder};
 use std::sync::{Mutex, PoisonError};
+
+/// Slices whose index one task finds at least.
+const INDEXED: usize = 1 << 12;
 
 /// Culls the splats of a cloud against the view and orders the rest in slices of equal view-depth thickness.
 ///
@@ -36,11 +40,26 @@ pub fn slice_cloud(
     if let Some(ids) = ids {
         check_ids(ids, len)?;
     }
-    let given = params.given_thickness()?;
-    let n = ids.map_or(len, <[u32]>::len);
-    let mut order = scratch.take_order(n)?;
+    params.given_thickness()?;
+    let mut order = scratch.take_order(ids.map_or(len, <[u32]>::len))?;
     let projector = Projector::new(cloud, ids, camera, params.margin_px);
     let extremes = projector.project(&mut order.input_from_sorted);
+    slice_projected(cloud, ids, &extremes, |id| projector.depth(id), params, order, scratch)
+}
+
+/// Slices the splats of a cloud, or those of `ids`, whose depths' bits stand in `order`. `depth_of` gives a splat's depth
+/// by its id.
+pub(crate) fn slice_projected(
+    cloud: &Cloud,
+    ids: Option<&[u32]>,
+    extremes: &Extremes,
+    depth_of: impl Fn(u32) -> f32 + Sync,
+    params: &Params,
+    order: SliceOrder,
+    scratch: &mut Scratch,
+) -> Result<SliceOrder, Error> {
+    let given = params.given_thickness()?;
+    let n = order.input_from_sorted.len();
     let Some((near, far)) = extremes.depths() else { return Ok(nothing(order, params, n, scratch)) };
     let radius_of_place = |place: usize| cloud.radius[ids.map_or(place, |ids| ids[place] as usize)];
     let (thickness, rule) = given.map_or_else(
@@ -49,8 +68,7 @@ pub fn slice_cloud(
     );
     let slicing = slicing_of(near, far, thickness, params, n);
     let id_of = |place: u32| ids.map_or(place, |ids| ids[place as usize]);
-    let depth = |place: usize| projector.depth(place);
-    run(&slicing, None, depth, id_of, params, rule, order, scratch)
+    run(&slicing, None, depth_of, id_of, params, rule, order, scratch)
 }
 
 /// Orders ready view depths in slices; nothing is culled, and the id of a splat is its place in `depth`.
@@ -65,7 +83,7 @@ pub fn slice_depths(depth: &[f32], params: &Params, scratch: &mut Scratch) -> Re
     let order = scratch.take_order(depth.len())?;
     let Some((near, far)) = extremes.depths() else { return Ok(nothing(order, params, 0, scratch)) };
     let slicing = slicing_of(near, far, thickness, params, depth.len());
-    run(&slicing, Some(depth), |i| depth[i], |place| place, params, ThicknessRule::Given, order, scratch)
+    run(&slicing, Some(depth), |id| depth[id as usize], |place| place, params, ThicknessRule::Given, order, scratch)
 }
 
 pub(crate) fn check_count(n: usize) -> Result<(), Error> {
@@ -99,8 +117,8 @@ fn nothing(mut order: SliceOrder, params: &Params, n: usize, scratch: &mut Scrat
 }
 
 /// The two levels and the slices, once near, far and ε are known. `order` holds the bits of the depths, unless they
-/// are in `depths`.
-fn run<D: Fn(usize) -> f32 + Sync, I: Fn(u32) -> u32 + Sync>(
+/// are in `depths`; `depth_of` gives a splat's depth by its id.
+fn run<D: Fn(u32) -> f32 + Sync, I: Fn(u32) -> u32 + Sync>(
     slicing: &Slicing,
     depths: Option<&[f32]>,
     depth_of: D,
@@ -119,8 +137,11 @@ fn run<D: Fn(usize) -> f32 + Sync, I: Fn(u32) -> u32 + Sync>(
     prepare(scratch, method, n, buckets)?;
     let ids = &mut order.input_from_sorted;
     let kept = match method {
-        Method::DepthBits => by_depth_bits(slicing, depths, depth_of, id_of, ids, scratch),
-        _ => by_two_levels(slicing, depths, id_of, ids, scratch),
+        Method::DepthBits => {
+            let depth_at = |place: usize| depth_of(id_of(place as u32));
+            by_depth_bits(slicing, depths, depth_at, &id_of, ids, scratch)
+        }
+        _ => by_two_levels(slicing, depths, &id_of, ids, scratch),
     };
     ids.truncate(kept);
     let slices = buckets::join_slices(&scratch.bucket_starts, ids, &mut scratch.bucket_slices);
@@ -128,6 +149,8 @@ fn run<D: Fn(usize) -> f32 + Sync, I: Fn(u32) -> u32 + Sync>(
     let (starts, found) = (&scratch.bucket_starts, &scratch.bucket_slices);
     buckets::gather_marks(0..buckets, starts, ids, found, &mut order.slice_starts[..slices]);
     order.slice_starts[slices] = kept as u32;
+    resize(&mut order.slice_indices, slices)?;
+    index_slices(slicing, &mut order, &depth_of);
     scratch.info = SortInfo { items_in: n as u64, rule, method, buckets: buckets as u32, bytes: scratch.bytes() };
     Ok(SliceOrder {
         direction: params.direction,
@@ -138,6 +161,13 @@ fn run<D: Fn(usize) -> f32 + Sync, I: Fn(u32) -> u32 + Sync>(
         culled: (n - kept) as u64,
         ..order
     })
+}
+
+/// Which slices those are that begin at `slice_starts`: as their first splats tell.
+fn index_slices(slicing: &Slicing, order: &mut SliceOrder, depth_of: &(impl Fn(u32) -> f32 + Sync)) {
+    let SliceOrder { input_from_sorted: ids, slice_starts: starts, slice_indices: indices, .. } = order;
+    let index_of = |(index, start): (&mut u64, &u32)| *index = slicing.slice_of(depth_of(ids[*start as usize]));
+    indices.par_iter_mut().zip(&starts[..]).with_min_len(INDEXED).for_each(index_of);
 }
 
 /// Makes every buffer as large as the sort needs it.

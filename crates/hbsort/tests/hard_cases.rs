@@ -18,9 +18,10 @@ fn agrees(depth: &[f32], params: &Params, scratch: &mut Scratch) -> Method {
     let order = slice_depths(depth, params, scratch).unwrap();
     let method = scratch.info().method;
     let by_depth = Params { exact: method == Method::DepthBits, ..*params };
-    let expected: Vec<Vec<u32>> =
-        reference::slices(depth, order.thickness, &by_depth).into_iter().map(|(_, ids)| ids).collect();
+    let (indices, expected): (Vec<u64>, Vec<Vec<u32>>) =
+        reference::slices(depth, order.thickness, &by_depth).into_iter().unzip();
     assert_eq!(slices_of(&order), expected, "{params:?}");
+    assert_eq!(order.slice_indices, indices, "{params:?}");
     scratch.recycle(order);
     method
 }

@@ -41,6 +41,7 @@ fn the_cloud_and_its_depths_give_the_same_order() {
         let named: Vec<u32> = from_depths.input_from_sorted.iter().map(|&k| kept[k as usize]).collect();
         assert_eq!(named, order.input_from_sorted);
         assert_eq!(from_depths.slice_starts, order.slice_starts);
+        assert_eq!(from_depths.slice_indices, order.slice_indices);
         assert_eq!((from_depths.near, from_depths.far), (order.near, order.far));
     }
 }
@@ -157,6 +158,7 @@ fn x3_scaling_by_a_power_of_two_changes_no_bit_of_the_order() {
             let order = slice_cloud(&scaled, None, &scaled_eye, &params, &mut scratch).unwrap();
             assert_eq!(order.input_from_sorted, plain.input_from_sorted);
             assert_eq!(order.slice_starts, plain.slice_starts);
+            assert_eq!(order.slice_indices, plain.slice_indices);
             assert_eq!((order.near, order.thickness), (plain.near * scale, plain.thickness * f64::from(scale)));
         }
     }

@@ -93,7 +93,7 @@ fn file_document(info: &FileInfo) -> Value {
         "bytes": info.bytes,
         "counts": info.counts.iter().map(|(name, n)| ((*name).to_owned(), json!(n))).collect::<Value>(),
         "attributes": info.attributes,
-        "bounds": info.bounds.map(|b| b.map(|p| p.to_array())),
+        "bounds": info.bounds.map(|b| [b.min.to_array(), b.max.to_array()]),
         "range": info.range,
         "not_used": info.unused,
         "remarks": info.remarks,

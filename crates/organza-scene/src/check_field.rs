@@ -1,6 +1,7 @@
 //! Checks of the surfaces of fields: isosurfaces, level sets, slices, and where they end.
 
 use super::check::{At, LARGEST};
+use super::check_source::check_box;
 use super::paths::Paths;
 use super::raw_source::{RawClip, RawInside, RawInterpolation, RawIsosurface, RawLevelSet, RawSlice};
 use super::{IsosurfaceSource, LevelSetSource, SliceSource};
@@ -52,15 +53,7 @@ pub(super) fn check_clip(at: &At<'_>, raw: &RawClip) -> Result<Clip, Error> {
             let normal = at.direction("normal", normal)?;
             Ok(Clip::HalfSpace { normal, offset: normal.dot(at.vector("point", point)?) })
         }
-        (None, None, Some([low, high])) => {
-            let (from, to) = (at.vector("box", low)?, at.vector("box", high)?);
-            if !from.cmplt(to).all() {
-                let message =
-                    format!("expected a highest corner above the lowest in all axes, found {low:?} and {high:?}");
-                return Err(at.key("box").error(message, ""));
-            }
-            Ok(Clip::Box([from, to]))
-        }
+        (None, None, Some([low, high])) => Ok(Clip::Box(check_box(at, "box", "box", low, high)?)),
         _ => {
             let hint = "such as { normal = [0, 1, 0], point = [0, 0.5, 0] } or { box = [[-1, -1, -1], [1, 1, 1]] }";
             Err(at.error("expected either `normal` and `point`, or `box`", hint))

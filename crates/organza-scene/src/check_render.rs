@@ -36,6 +36,7 @@ pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSetting
         layers: check_layers(&at.key("layers"), &raw.layers, technique)?,
         seed: raw.seed.unwrap_or(0),
         max_points: raw.max_points,
+        shadow: check_shadow(&at.key("shadow"), &raw.shadow)?,
         points: check_points(&at.key("points"), &raw.points)?,
         particles: check_particles(&at.key("particles"), &raw.particles)?,
     })
@@ -123,7 +124,6 @@ fn check_points(at: &At<'_>, raw: &RawPoints) -> Result<PointsSettings, Error> {
             RawAccumulation::F32 => Accumulation::F32,
             RawAccumulation::F16 => Accumulation::F16,
         },
-        shadow: check_shadow(&at.key("shadow"), &raw.shadow)?,
     })
 }
 

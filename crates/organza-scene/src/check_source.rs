@@ -11,6 +11,7 @@ use super::{CloudSource, DensitySource, ImplicitSource, MediumShape, RectangleSo
 use crate::{Error, shown};
 use convert::ExpressionField;
 use glam::DVec3;
+use splat_core::DAabb;
 
 /// The keys that name a source.
 const SOURCES: [&str; 12] = [
@@ -119,10 +120,10 @@ fn check_rectangle(at: &At<'_>, raw: &RawRectangle) -> Result<RectangleSource, E
 }
 
 fn check_medium_box(at: &At<'_>, raw: &RawMediumBox, fallback: Option<f64>) -> Result<MediumShape, Error> {
-    let (min, max) = check_box(at, "min", "max", raw.min, raw.max)?;
-    let spacing = at.spacing("spacing", raw.spacing, (max - min).max_element())?;
+    let bounds = check_box(at, "min", "max", raw.min, raw.max)?;
+    let spacing = at.spacing("spacing", raw.spacing, bounds.size().max_element())?;
     let extinction = check_extinction(at, raw.extinction.or(fallback))?;
-    Ok(MediumShape::Box { min, max, extinction, spacing })
+    Ok(MediumShape::Box { bounds, extinction, spacing })
 }
 
 fn check_medium_ball(at: &At<'_>, raw: &RawMediumBall, fallback: Option<f64>) -> Result<MediumShape, Error> {
@@ -133,19 +134,20 @@ fn check_medium_ball(at: &At<'_>, raw: &RawMediumBall, fallback: Option<f64>) ->
     Ok(MediumShape::Ball { center, radius, extinction, spacing })
 }
 
-fn check_box<'a>(
+/// A box between two corners, the lowest and the highest.
+pub(super) fn check_box<'a>(
     at: &At<'a>,
     min_key: &'a str,
     max_key: &'a str,
     min: [f64; 3],
     max: [f64; 3],
-) -> Result<(DVec3, DVec3), Error> {
+) -> Result<DAabb, Error> {
     let (low, high) = (at.vector(min_key, min)?, at.vector(max_key, max)?);
     if !low.cmplt(high).all() {
         let message = format!("expected a highest corner above the lowest in all axes, found {min:?} and {max:?}");
         return Err(at.key(max_key).error(message, ""));
     }
-    Ok((low, high))
+    Ok(DAabb::new(low, high))
 }
 
 /// Checks an expression's region and how finely it is sampled.
@@ -155,7 +157,7 @@ fn check_region(
     bounds: [[f64; 3]; 2],
     resolution: Option<u32>,
     spacing: Option<f64>,
-) -> Result<([DVec3; 2], f64), Error> {
+) -> Result<(DAabb, f64), Error> {
     if expression.trim().is_empty() || expression.len() > LONGEST_EXPRESSION {
         let message = format!(
             "`expression`: expected 1 to {LONGEST_EXPRESSION} bytes in x, y and z, found {}",
@@ -169,8 +171,8 @@ fn check_region(
         let hint = e.hint.strip_prefix("; ").unwrap_or("variables are x, y and z");
         at.key("expression").error_in_text(expression, e.column, message, hint)
     })?;
-    let (low, high) = check_box(at, "box", "box", bounds[0], bounds[1])?;
-    let longest = (high - low).max_element();
+    let bounds = check_box(at, "box", "box", bounds[0], bounds[1])?;
+    let longest = bounds.size().max_element();
     let spacing = match (resolution, spacing) {
         (Some(n), None) => longest / f64::from(at.whole("resolution", n, 1..=16384)?),
         (None, Some(spacing)) => at.spacing("spacing", spacing, longest)?,
@@ -179,7 +181,7 @@ fn check_region(
         }
         (None, None) => return Err(at.error("expected a key `resolution` or `spacing` here, found neither", "")),
     };
-    Ok(([low, high], spacing))
+    Ok((bounds, spacing))
 }
 
 fn check_implicit(at: &At<'_>, raw: &RawImplicit) -> Result<ImplicitSource, Error> {

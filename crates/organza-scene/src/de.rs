@@ -19,6 +19,17 @@ pub(super) fn from_node<T: de::DeserializeOwned>(document: &Document<'_>, node: 
     T::deserialize(node).map_err(|e| document.error(e.place.unwrap_or(node.place), e.message, e.hint))
 }
 
+/// A key that was in another table once.
+struct Moved {
+    key: &'static str,
+    /// A key of the table where it was.
+    beside: &'static str,
+    /// Where it is.
+    to: &'static str,
+}
+
+const MOVED: [Moved; 1] = [Moved { key: "shadow", beside: "slice_thickness", to: "render.shadow" }];
+
 /// An error and, once known, its place.
 #[derive(Debug)]
 pub(super) struct DeError {
@@ -125,7 +136,9 @@ impl de::Error for DeError {
     }
 
     fn unknown_field(field: &str, expected: &'static [&'static str]) -> Self {
-        Self::new(format!("unknown key `{}`", shown(field)), suggest(field, expected))
+        let moved = MOVED.iter().find(|m| m.key == field && expected.contains(&m.beside));
+        let hint = moved.map_or_else(|| suggest(field, expected), |m| format!("it is `{}` now", m.to));
+        Self::new(format!("unknown key `{}`", shown(field)), hint)
     }
 
     fn missing_field(field: &'static str) -> Self {

@@ -24,6 +24,7 @@ pub(super) struct RawRender {
     pub(super) seed: Option<u64>,
     /// Most splats that the scene may become.
     pub(super) max_points: Option<u64>,
+    pub(super) shadow: RawShadow,
     pub(super) points: RawPoints,
     pub(super) particles: RawParticles,
 }
@@ -74,7 +75,6 @@ pub(super) struct RawPoints {
     pub(super) resampling_filter: Option<bool>,
     /// Precision of the running sums, "f32" (default) or "f16".
     pub(super) accumulation: RawAccumulation,
-    pub(super) shadow: RawShadow,
 }
 
 /// Which end of the view is composited first.

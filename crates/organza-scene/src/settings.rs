@@ -23,7 +23,9 @@ pub struct RenderSettings {
     pub seed: u64,
     /// Most splats that the scene may become; more is a resource error.
     pub max_points: Option<u64>,
-    /// Settings of the `points` technique; its shadow maps serve the others too.
+    /// Shadow maps, which all techniques take their light from.
+    pub shadow: ShadowSettings,
+    /// Settings of the `points` technique.
     pub points: PointsSettings,
     /// Settings of the `particles` technique.
     pub particles: ParticlesSettings,
@@ -102,8 +104,6 @@ pub struct PointsSettings {
     pub resampling_filter: bool,
     /// Precision of the running sums of a pixel.
     pub accumulation: Accumulation,
-    /// Shadow maps.
-    pub shadow: ShadowSettings,
 }
 
 /// Settings of the translucent shadow maps.

@@ -2,7 +2,7 @@
 
 use convert::{CloudShape, Ellipsoid, Inside, Interpolation};
 use glam::DVec3;
-use splat_core::TransferFunction;
+use splat_core::{DAabb, TransferFunction};
 use std::path::{Path, PathBuf};
 
 /// Where an object's data comes from.
@@ -60,8 +60,8 @@ pub struct VolumeSource {
 pub struct ImplicitSource {
     /// The expression.
     pub expression: String,
-    /// Lowest and highest corner of the region that is searched.
-    pub bounds: [DVec3; 2],
+    /// The region that is searched.
+    pub bounds: DAabb,
     /// Distance between samples.
     pub spacing: f64,
 }
@@ -107,8 +107,8 @@ pub struct SliceSource {
 pub struct DensitySource {
     /// The expression.
     pub expression: String,
-    /// Lowest and highest corner of the region that is sampled.
-    pub bounds: [DVec3; 2],
+    /// The region that is sampled.
+    pub bounds: DAabb,
     /// Distance between samples.
     pub spacing: f64,
     /// Extinction σ_t where the expression is 1, 1/world unit.
@@ -168,10 +168,8 @@ pub struct RectangleSource {
 pub enum MediumShape {
     /// An axis-aligned box.
     Box {
-        /// Lowest corner.
-        min: DVec3,
-        /// Highest corner.
-        max: DVec3,
+        /// The box.
+        bounds: DAabb,
         /// Extinction σ_t, 1/world unit.
         extinction: f64,
         /// Distance between splats.

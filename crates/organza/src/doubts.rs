@@ -7,7 +7,7 @@ use crate::scene::{Scene, SceneLight, SceneObject};
 use crate::{Layers, ShadowTable, escape_controls};
 use glam::DVec3;
 use rayon::prelude::*;
-use splat_core::{Camera, Shading};
+use splat_core::{Camera, DAabb, Shading};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// Most objects outside the view that are told one by one.
@@ -69,15 +69,15 @@ fn without_light(scene: &Scene) -> Option<String> {
 /// Flat lights that nothing lies before.
 fn turned_away(loaded: &Loaded) -> Vec<String> {
     let cloud = &loaded.cloud;
-    let splats = (!cloud.is_empty()).then(|| [cloud.bounds().min, cloud.bounds().max]);
-    let splats = splats.map(|b| b.map(|p| cloud.origin + p.as_dvec3()));
-    let boxes: Vec<[DVec3; 2]> = loaded.own.iter().map(Own::world_box).chain(splats).collect();
+    let around = |p: glam::Vec3| cloud.origin + p.as_dvec3();
+    let splats = (!cloud.is_empty()).then(|| cloud.bounds()).map(|b| DAabb::new(around(b.min), around(b.max)));
+    let boxes: Vec<DAabb> = loaded.own.iter().map(Own::world_box).chain(splats).collect();
     let unit = libm::exp2(f64::from(loaded.exponent));
     let one = |light: &SceneLight| {
         let shape = &light.light.shape;
         let (place, normal) = (shape.place()?, shape.normal()?);
         // The corner of a box that lies farthest along the normal.
-        let farthest = |[low, high]: &[DVec3; 2]| DVec3::select(normal.cmpgt(DVec3::ZERO), *high, *low);
+        let farthest = |b: &DAabb| DVec3::select(normal.cmpgt(DVec3::ZERO), b.max, b.min);
         let is_lit = boxes.iter().any(|b| (farthest(b) - place).dot(normal) > 0.0);
         (!is_lit && !boxes.is_empty()).then(|| {
             let (at, along) = (self::place(place * unit), self::place(normal));
@@ -92,26 +92,26 @@ fn turned_away(loaded: &Loaded) -> Vec<String> {
 /// Objects of which nothing lies in the view.
 fn outside(scene: &Scene, loaded: &Loaded) -> Vec<String> {
     let seen = seen(loaded);
-    let mut lost: Vec<(usize, [DVec3; 2])> = bounds(loaded, &seen);
+    let mut lost: Vec<(usize, DAabb)> = bounds(loaded, &seen);
     // Back into the scene's unit.
     let unit = libm::exp2(f64::from(loaded.exponent));
-    lost.iter_mut().for_each(|(_, b)| *b = b.map(|p| p * unit));
+    lost.iter_mut().for_each(|(_, b)| *b = DAabb::new(b.min * unit, b.max * unit));
     let camera = &scene.camera;
     let looks = format!("the camera at {} looks along {}", place(camera.position), place(camera.axes[2]));
     if !lost.is_empty() && !seen.iter().any(|s| s.load(Relaxed)) {
-        let all = lost.iter().map(|(_, b)| *b).fold([DVec3::INFINITY, DVec3::NEG_INFINITY], around);
+        let all = lost.iter().fold(DAabb::EMPTY, |all, (_, b)| all.union(*b));
         return vec![format!(
             "the camera sees nothing: all objects lie from {} to {}, and {looks}; set camera.target to {}",
-            place(all[0]),
-            place(all[1]),
-            place(0.5 * (all[0] + all[1]))
+            place(all.min),
+            place(all.max),
+            place(all.center())
         )];
     }
     // The body of a lamp stands where its light is, seen or not.
-    lost.retain(|(_, [low, high])| !lights(loaded).any(|p| (p * unit).clamp(*low, *high) == p * unit));
-    let told = |(id, [low, high]): &(usize, [DVec3; 2])| {
+    lost.retain(|(_, b)| !lights(loaded).any(|p| b.contains(p * unit)));
+    let told = |(id, bounds): &(usize, DAabb)| {
         let name = escape_controls(&scene.objects[*id].name);
-        let (low, high) = (place(*low), place(*high));
+        let (low, high) = (place(bounds.min), place(bounds.max));
         format!(
             "object '{name}' lies outside the view, from {low} to {high}: {looks}; move either, or set visible = false"
         )
@@ -124,10 +124,6 @@ fn outside(scene: &Scene, loaded: &Loaded) -> Vec<String> {
 /// Where light comes from, in the normalized world.
 fn lights(loaded: &Loaded) -> impl Iterator<Item = DVec3> {
     loaded.lights.iter().filter_map(|light| light.light.shape.place())
-}
-
-fn around([low, high]: [DVec3; 2], [l, h]: [DVec3; 2]) -> [DVec3; 2] {
-    [low.min(l), high.max(h)]
 }
 
 /// Four digits are enough to find a place.
@@ -145,9 +141,9 @@ fn seen(loaded: &Loaded) -> Vec<AtomicBool> {
     let seen: Vec<AtomicBool> = loaded.objects.iter().map(|_| AtomicBool::new(false)).collect();
     let view = View::new(&loaded.camera);
     for own in &loaded.own {
-        let [low, high] = own.world_box();
-        let (middle, reach) = (0.5 * (low + high), 0.5 * (high - low).length());
-        seen[own.object].store(view.may_see(loaded.camera.view_from_world(middle), reach), Relaxed);
+        let bounds = own.world_box();
+        let middle = loaded.camera.view_from_world(bounds.center());
+        seen[own.object].store(view.may_see(middle, 0.5 * bounds.diagonal()), Relaxed);
     }
     let cloud = &loaded.cloud;
     let place = loaded.camera.view_from_offset(cloud.origin);
@@ -166,20 +162,20 @@ fn seen(loaded: &Loaded) -> Vec<AtomicBool> {
 }
 
 /// The objects that are not seen and not empty, with their bounds in the normalized world.
-fn bounds(loaded: &Loaded, seen: &[AtomicBool]) -> Vec<(usize, [DVec3; 2])> {
-    let mut of: Vec<Option<[DVec3; 2]>> = vec![None; seen.len()];
+fn bounds(loaded: &Loaded, seen: &[AtomicBool]) -> Vec<(usize, DAabb)> {
+    let mut of = vec![DAabb::EMPTY; seen.len()];
     let unseen = |id: usize| !seen[id].load(Relaxed);
     if !(0..seen.len()).any(unseen) {
         return Vec::new();
     }
-    let mut add = |id: usize, b: [DVec3; 2]| of[id] = Some(of[id].map_or(b, |a| around(a, b)));
+    let mut add = |id: usize, b: DAabb| of[id] = of[id].union(b);
     loaded.own.iter().filter(|o| unseen(o.object)).for_each(|o| add(o.object, o.world_box()));
     let cloud = &loaded.cloud;
     for (object, position) in cloud.object.iter().zip(&cloud.position).filter(|(o, _)| unseen(**o as usize)) {
         let p = cloud.origin + position.as_dvec3();
-        add(*object as usize, [p, p]);
+        add(*object as usize, DAabb::new(p, p));
     }
-    of.into_iter().enumerate().filter_map(|(id, b)| Some((id, b?))).collect()
+    of.into_iter().enumerate().filter(|(_, b)| !b.is_empty()).collect()
 }
 
 /// The pyramid, or the box, that a camera sees.

@@ -66,7 +66,7 @@ impl ShadowTable {
 
 /// Parameters of a map with this tolerance, which may take `max_bytes`.
 fn params(settings: &RenderSettings, loaded: &Loaded, tolerance: f32, max_bytes: u64) -> Params {
-    let shadow = &settings.points.shadow;
+    let shadow = &settings.shadow;
     Params {
         mapping: match shadow.mapping {
             ShadowMapping::Auto => tsm::MappingChoice::Auto,
@@ -88,7 +88,7 @@ fn tolerance(settings: &RenderSettings, loaded: &Loaded, light: &Light, maps: u6
         let gain = DISPLAY_SLOPE * libm::exp2(settings.exposure) * brightest(loaded, light).max(f64::MIN_POSITIVE);
         CUT_SHARE * settings.tolerance / (gain * maps as f64)
     };
-    let asked = settings.points.shadow.absorbance_cut.map(|cut| libm::exp(-cut));
+    let asked = settings.shadow.absorbance_cut.map(|cut| libm::exp(-cut));
     asked.unwrap_or_else(of_lights).clamp(f64::from(f32::MIN_POSITIVE), 0.5) as f32
 }
 
@@ -181,9 +181,8 @@ pub(crate) fn shadow_error(point: &LightPoint, error: &tsm::Error) -> Error {
             needed: *needed_bytes,
             limit: *limit_bytes,
             unit: "bytes",
-            hint:
-                "use fewer lights or samples of lights, fewer cells in render.points.shadow, or a larger --max-memory"
-                    .into(),
+            hint: "use fewer lights or samples of lights, fewer cells in render.shadow, or a larger --max-memory"
+                .into(),
         },
         tsm::Error::Core(splat_core::Error::Cancelled) => Error::Cancelled,
         other => Error::input(what, other.to_string(), ""),

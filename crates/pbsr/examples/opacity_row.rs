@@ -5,7 +5,7 @@ use pbsr::{
     MeshSampler, Object, Renderer, Scene, SurfaceParams, finest_pixel_area,
 };
 use splat_core::glam::{DMat3, DVec3, Vec3};
-use splat_core::{Camera, Mesh, Progress, Projection, ScalarField, Similarity};
+use splat_core::{Camera, DAabb, Mesh, Progress, Projection, ScalarField, Similarity};
 
 /// Distance to a sphere; outside minus inside of the cloud, too.
 struct Ball {
@@ -38,16 +38,16 @@ fn main() -> Result<(), Error> {
     let camera = Camera::look_at(DVec3::new(0.0, 1.0, 4.0), DVec3::ZERO, DVec3::Y, view, [64, 64])?;
     let cross_section = finest_pixel_area(&camera, DVec3::ZERO, 1.2, 0.1);
     let params = |opacity, seed| SurfaceParams { opacity, cross_section, seed, ..SurfaceParams::default() };
-    let [min, max] = [-1.1, 1.1].map(DVec3::splat);
+    let bounds = DAabb::around(DVec3::ZERO, DVec3::splat(1.1));
 
     let shell = Ball { radius: 1.0, sign: 1.0 };
-    let surface = ImplicitSurface { field: &shell, level: 0.0, min, max, inside: None };
+    let surface = ImplicitSurface { field: &shell, level: 0.0, bounds, inside: None };
     let ball = LineSampler::new(&surface, 24, &params(0.2, 1), None)?;
     println!("{:?}", ball.report());
 
     let fog = Ball { radius: 0.7, sign: -1.0 };
     let extinction = Density { field: &fog, max: 0.7 };
-    let cloud = FieldVolumeSampler::new(extinction, [min, max], 24, cross_section, [1.0, 0.8, 0.6], 2)?;
+    let cloud = FieldVolumeSampler::new(extinction, bounds, 24, cross_section, [1.0, 0.8, 0.6], 2)?;
 
     let corner = |x: f32, z: f32| Vec3::new(x, -0.3, z);
     let position = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];

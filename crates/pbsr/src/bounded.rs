@@ -4,7 +4,7 @@
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
-use splat_core::{ScalarField, glam};
+use splat_core::{DAabb, ScalarField, glam};
 use std::sync::Arc;
 
 /// Cells along each side of the box, unless the medium is the same everywhere in it.
@@ -32,9 +32,9 @@ pub enum Matter {
 ///
 /// ```
 /// use pbsr::{BoundedExtinction, Matter};
-/// use splat_core::{ScalarField, glam::DVec3};
+/// use splat_core::{DAabb, ScalarField, glam::DVec3};
 /// let ball = Matter::Ball { center: DVec3::ZERO, radius: 1.0 };
-/// let fog = BoundedExtinction::new(ball, 0.5, [DVec3::splat(-1.0), DVec3::ONE]).unwrap();
+/// let fog = BoundedExtinction::new(ball, 0.5, DAabb::new(DVec3::splat(-1.0), DVec3::ONE)).unwrap();
 /// assert_eq!((fog.value(DVec3::X * 0.9), fog.value(DVec3::ONE)), (0.5, 0.0));
 /// assert_eq!(fog.max(), 0.5);
 /// ```
@@ -42,7 +42,7 @@ pub struct BoundedExtinction {
     matter: Matter,
     /// Where the density is 1.
     extinction: f64,
-    bounds: [DVec3; 2],
+    bounds: DAabb,
     /// Cells along each side.
     cells: u32,
     /// Largest extinction in each cell, x fastest.
@@ -52,16 +52,15 @@ pub struct BoundedExtinction {
 }
 
 impl BoundedExtinction {
-    /// Bounds `matter` in the box between two corners, the first less in all three; `extinction`, ≥ 0, is that of density
-    /// 1. `None` where a density has no finite bound.
-    pub fn new(matter: Matter, extinction: f64, bounds: [DVec3; 2]) -> Option<Self> {
+    /// Bounds `matter` in a box that is not empty; `extinction`, ≥ 0, is that of density 1. `None` where a density has no finite bound.
+    pub fn new(matter: Matter, extinction: f64, bounds: DAabb) -> Option<Self> {
         let cells = if matches!(matter, Matter::Everywhere) { 1 } else { CELLS };
         let n = cells as usize;
         let mut field = Self { matter, extinction, bounds, cells, most: Vec::new(), max: 0.0 };
-        let side = (bounds[1] - bounds[0]) / f64::from(cells);
+        let side = bounds.size() / f64::from(cells);
         let radius = 0.5 * side.length() * (1.0 + 1e-12);
         let index = |c: usize| DVec3::new((c % n) as f64, (c / n % n) as f64, (c / (n * n)) as f64);
-        let bound = |c: usize| field.bound_in(bounds[0] + side * (index(c) + 0.5), radius);
+        let bound = |c: usize| field.bound_in(bounds.min + side * (index(c) + 0.5), radius);
         let most: Option<Vec<f64>> = (0..n.pow(3)).into_par_iter().with_min_len(256).map(bound).collect();
         field.most = most?;
         field.max = field.most.iter().copied().fold(0.0, f64::max);
@@ -78,8 +77,8 @@ impl BoundedExtinction {
         Some(density * self.extinction)
     }
 
-    /// Lowest and highest corner of the box.
-    pub fn bounds(&self) -> [DVec3; 2] {
+    /// The box.
+    pub fn bounds(&self) -> DAabb {
         self.bounds
     }
 
@@ -100,10 +99,10 @@ impl BoundedExtinction {
 
     /// Middles of the cells that may have an extinction, and their sides.
     pub fn seen(&self) -> (impl Iterator<Item = DVec3> + '_, DVec3) {
-        let (n, side) = (self.cells as usize, (self.bounds[1] - self.bounds[0]) / f64::from(self.cells));
+        let (n, side) = (self.cells as usize, self.bounds.size() / f64::from(self.cells));
         let index = move |c: usize| DVec3::new((c % n) as f64, (c / n % n) as f64, (c / (n * n)) as f64);
         let some = self.most.iter().enumerate().filter(|(_, most)| **most > 0.0);
-        (some.map(move |(c, _)| self.bounds[0] + side * (index(c) + 0.5)), side)
+        (some.map(move |(c, _)| self.bounds.min + side * (index(c) + 0.5)), side)
     }
 }
 
@@ -133,8 +132,8 @@ impl ScalarField for BoundedExtinction {
 
     /// That of a whole cell where the ball is one around the middle of a cell.
     fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> {
-        let side = (self.bounds[1] - self.bounds[0]) / f64::from(self.cells);
-        let at = ((p - self.bounds[0]) / side).clamp(DVec3::ZERO, DVec3::splat(f64::from(self.cells - 1)));
+        let side = self.bounds.size() / f64::from(self.cells);
+        let at = ((p - self.bounds.min) / side).clamp(DVec3::ZERO, DVec3::splat(f64::from(self.cells - 1)));
         let index = at.floor();
         let off_middle = ((at - index - 0.5) * side).length();
         if radius + off_middle > 0.5 * side.length() * (1.0 + 1e-6) {
@@ -197,7 +196,8 @@ mod tests {
     #[test]
     fn values_stay_below_the_bound_of_their_cell() {
         let field =
-            BoundedExtinction::new(Matter::Density(Arc::new(Hill)), 3.0, [DVec3::splat(-1.0), DVec3::ONE]).unwrap();
+            BoundedExtinction::new(Matter::Density(Arc::new(Hill)), 3.0, DAabb::new(DVec3::splat(-1.0), DVec3::ONE))
+                .unwrap();
         let radius = (2.0 / f64::from(CELLS)) * 0.75f64.sqrt();
         let mut positive = 0;
         for i in 0..10_000 {
@@ -216,7 +216,8 @@ mod tests {
     #[test]
     fn a_density_without_a_bound_is_none() {
         assert!(
-            BoundedExtinction::new(Matter::Density(Arc::new(Pole)), 1.0, [DVec3::splat(-1.0), DVec3::ONE]).is_none()
+            BoundedExtinction::new(Matter::Density(Arc::new(Pole)), 1.0, DAabb::new(DVec3::splat(-1.0), DVec3::ONE))
+                .is_none()
         );
     }
 }

@@ -114,7 +114,7 @@ impl<'a> BrownianSampler<'a> {
             walk: *walk,
             steps: Walk::new(surface, walk.step)?,
             starts: LineSampler::new(surface, walk.resolution, params, None)?,
-            origin: 0.5 * (surface.min + surface.max),
+            origin: surface.bounds.center(),
             number: f64::from(walk.pilot_particles),
             report: BrownianReport::default(),
         };

@@ -7,7 +7,7 @@ use crate::Error;
 use crate::error::check;
 use glam::DVec3;
 use rayon::prelude::*;
-use splat_core::{ScalarField, glam};
+use splat_core::{DAabb, ScalarField, glam};
 
 /// The surface f = level inside a box; open where the box or `inside` cuts it.
 #[derive(Clone, Copy)]
@@ -16,10 +16,8 @@ pub struct ImplicitSurface<'a> {
     pub field: &'a dyn ScalarField,
     /// c.
     pub level: f64,
-    /// Lowest corner of the box, world units.
-    pub min: DVec3,
-    /// Highest corner of the box, world units.
-    pub max: DVec3,
+    /// The box, world units.
+    pub bounds: DAabb,
     /// The part of the box that counts; all of it without.
     pub inside: Option<&'a (dyn Fn(DVec3) -> bool + Sync)>,
 }
@@ -31,12 +29,11 @@ impl ImplicitSurface<'_> {
     /// [`Error::Parameter`] for a box without volume or a level that is not finite, [`Error::Field`].
     pub fn validate(&self) -> Result<(), Error> {
         check(self.level.is_finite(), "level", self.level, "a finite number")?;
-        let extent = self.max - self.min;
-        let ok = self.min.is_finite() && self.max.is_finite() && extent.min_element() > 0.0;
-        check(ok, "box", (self.min, self.max), "two finite corners, the first less in all three")?;
+        let DAabb { min, max } = self.bounds;
+        check(self.bounds.is_solid(), "box", (min, max), "two finite corners, the first less in all three")?;
         for k in 0..9u32 {
             let corner = DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2 & 1));
-            let at = self.min + extent * if k == 8 { DVec3::splat(0.5) } else { corner };
+            let at = min + self.bounds.size() * if k == 8 { DVec3::splat(0.5) } else { corner };
             let found = self.field.value(at);
             if !found.is_finite() {
                 return Err(Error::Field { at: at.to_string(), found: found.to_string() });
@@ -47,7 +44,7 @@ impl ImplicitSurface<'_> {
 
     /// Whether `p` lies in the box, in the part of it that counts, and in the field's own domain.
     pub(crate) fn contains(&self, p: DVec3) -> bool {
-        let in_box = p.cmpge(self.min).all() && p.cmple(self.max).all();
+        let in_box = self.bounds.contains(p);
         in_box && self.field.in_domain(p) && self.inside.is_none_or(|inside| inside(p))
     }
 
@@ -57,7 +54,7 @@ impl ImplicitSurface<'_> {
         let half = 0.5 * side;
         // √3 rounded up: the ball must hold the cube.
         let radius = half * 1.732_050_807_568_878;
-        let beside = corner.cmpgt(self.max).any() || (corner + side).cmplt(self.min).any();
+        let beside = corner.cmpgt(self.bounds.max).any() || (corner + side).cmplt(self.bounds.min).any();
         if beside || !self.field.may_be_in_domain(corner + half, radius) {
             return (true, true);
         }
@@ -100,10 +97,10 @@ pub(crate) struct Cells {
 impl Cells {
     /// Cubes of which the longest side of the box has `resolution`.
     pub(crate) fn new(surface: &ImplicitSurface<'_>, resolution: u32) -> Self {
-        let extent = surface.max - surface.min;
+        let extent = surface.bounds.size();
         let side = extent.max_element() / f64::from(resolution);
         let dims = (extent / side + SHIFT).to_array().map(|n| (n - 1e-9).ceil().max(1.0) as i32);
-        let search = Search { surface, min: surface.min - side * SHIFT, side, dims };
+        let search = Search { surface, min: surface.bounds.min - side * SHIFT, side, dims };
         let blocks = dims.map(|n| (n + 7) / 8);
         let found: Vec<(DVec3, bool)> = (0..blocks[0] * blocks[1] * blocks[2])
             .into_par_iter()

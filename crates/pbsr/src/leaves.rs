@@ -241,14 +241,14 @@ fn corner_of(k: usize) -> DVec3 {
 
 /// Looks at a cube.
 fn look(surface: &ImplicitSurface<'_>, corner: DVec3, side: f64) -> Look {
-    let middle = surface.field.gradient((corner + 0.5 * side).clamp(surface.min, surface.max));
+    let middle = surface.field.gradient((corner + 0.5 * side).clamp(surface.bounds.min, surface.bounds.max));
     let limit = TURN * TURN * middle.length_squared();
     // False for what is not a number.
     let steady = |g: DVec3| (g - middle).length_squared() <= limit;
     let clear = CLEAR * middle.length() * side;
     let (mut above, mut below) = (true, true);
     for place in (0..8).map(corner_of).chain(INSIDE) {
-        let p = (corner + place * side).clamp(surface.min, surface.max);
+        let p = (corner + place * side).clamp(surface.bounds.min, surface.bounds.max);
         let (f, gradient) = surface.field.value_gradient(p);
         if !steady(gradient) {
             return Look::Unknown;
@@ -259,7 +259,7 @@ fn look(surface: &ImplicitSurface<'_>, corner: DVec3, side: f64) -> Look {
     if above || below {
         return Look::Empty;
     }
-    let foot = foot(surface, (corner + 0.5 * side).clamp(surface.min, surface.max), side)
+    let foot = foot(surface, (corner + 0.5 * side).clamp(surface.bounds.min, surface.bounds.max), side)
         .filter(|(_, gradient)| steady(*gradient));
     let graph = foot.and_then(|(foot, gradient)| Graph::new(surface, corner, side, foot, gradient, &steady));
     graph.map_or(Look::Unknown, |(graph, error)| Look::Graph(graph, error))
@@ -283,7 +283,7 @@ impl Graph {
         graph.slack = 0.1;
         for uv in TRIED {
             let Some(p) = leaf.start(&graph, uv.map(|x| x as f32)) else { continue };
-            if p.cmplt(surface.min).any() || p.cmpgt(surface.max).any() {
+            if p.cmplt(surface.bounds.min).any() || p.cmpgt(surface.bounds.max).any() {
                 continue;
             }
             let (f, g) = surface.field.value_gradient(p);

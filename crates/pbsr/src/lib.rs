@@ -11,7 +11,7 @@
 //! use pbsr::{Appearance, Ensemble, EnsembleParams, FoldParams, ImplicitSurface, LineSampler, Object, Renderer, Scene};
 //! use pbsr::{SurfaceParams, pixel_area};
 //! use splat_core::glam::{DMat3, DVec3};
-//! use splat_core::{Camera, Progress, Projection, ScalarField, Similarity};
+//! use splat_core::{Camera, DAabb, Progress, Projection, ScalarField, Similarity};
 //!
 //! struct Ball;
 //! impl ScalarField for Ball {
@@ -26,8 +26,8 @@
 //!
 //! let view = Projection::Orthographic { height: 2.4 };
 //! let camera = Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y, view, [48, 48]).unwrap();
-//! let [min, max] = [-1.1, 1.1].map(DVec3::splat);
-//! let ball = ImplicitSurface { field: &Ball, level: 0.0, min, max, inside: None };
+//! let bounds = DAabb::around(DVec3::ZERO, DVec3::splat(1.1));
+//! let ball = ImplicitSurface { field: &Ball, level: 0.0, bounds, inside: None };
 //! let params = SurfaceParams { opacity: 0.3, cross_section: pixel_area(&camera, DVec3::Z), ..SurfaceParams::default() };
 //! let sampler = LineSampler::new(&ball, 16, &params, None).unwrap();
 //!
@@ -100,7 +100,7 @@ pub use metropolis::{MetropolisParams, MetropolisSampler};
 pub use params::{Density, SurfaceParams};
 pub use particles::{PackedColor, PackedNormal, Particles};
 pub use project::{finest_pixel_area, pixel_area};
-pub use render::{FoldParams, Object, Occluder, Renderer, Scene};
+pub use render::{FoldParams, Object, Renderer, Scene};
 pub use sampler::{KeptSets, Sampler};
 pub use shade::Appearance;
 pub use splat_core::shade::LitBy;

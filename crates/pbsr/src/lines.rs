@@ -269,8 +269,8 @@ impl<'a> LineSampler<'a> {
 
     /// All roots of a line in a leaf and in the box, searched in `parts` parts.
     fn search(&self, leaf: &Leaf, line: &Line<'_>, parts: u32, found: &mut Found) {
-        let low = leaf.corner.max(self.surface.min);
-        let high = (leaf.corner + leaf.side).min(self.surface.max);
+        let low = leaf.corner.max(self.surface.bounds.min);
+        let high = (leaf.corner + leaf.side).min(self.surface.bounds.max);
         let Some((enter, leave)) = clip(line, low, high) else { return };
         let mut a = line.at(enter);
         for k in 1..=parts {

@@ -39,7 +39,7 @@ pub fn opacity(n: f64, q: f64) -> f64 {
 }
 
 /// n for opacity `alpha` at hit probability `q`: 0 for α ≤ 0, +∞ for α ≥ 1, which asks for the opaque path
-/// (see [`crate::Occluder`]), and 1 for q = 1 and any α between, to be rounded by [`whole_count`].
+/// (see [`crate::Scene::occluder`]), and 1 for q = 1 and any α between, to be rounded by [`whole_count`].
 pub fn count(alpha: f64, q: f64) -> f64 {
     if alpha <= 0.0 || q <= 0.0 {
         0.0
@@ -63,7 +63,7 @@ pub fn whole_count(n: f64, q: f64, u: f64) -> u64 {
 }
 
 /// Optical depth that gives opacity `alpha`, at most `cap`: what an opaque surface is sampled with when it is not drawn
-/// by [`crate::Occluder`]. At the default cap of 16, one pixel in nine million stays open in a set.
+/// by [`crate::Scene::occluder`]. At the default cap of 16, one pixel in nine million stays open in a set.
 pub fn capped_optical_depth(alpha: f64, cap: f64) -> f64 {
     optics::optical_depth(alpha.clamp(0.0, 1.0)).min(cap)
 }

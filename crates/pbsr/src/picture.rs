@@ -9,9 +9,10 @@
 //!
 //! Σy² = Σh² + 2·Σᵢ wᵢbᵢ·(Σ h of the sets that leave i open) + Σᵢ wᵢ²bᵢ²·nᵢ + 2·Σ_{i<j} wᵢbᵢ·wⱼbⱼ·nᵢⱼ.
 
+use crate::EnsembleParams;
 use crate::ensemble::{Ensemble, FRACTION, LUMINANCE};
-use crate::{EnsembleParams, Occluder};
 use rayon::prelude::*;
+use splat_core::raster::OpaqueImage;
 use splat_core::{LayerData, Layers, SHADED_EFFECTS};
 
 /// The four depths.
@@ -53,7 +54,7 @@ impl Ensemble {
     /// where extinction differs by channel, of which `alpha` is then the mean.
     ///
     /// `background` gives the radiance behind pixel (x, y); `occluder` must be the one that the sets were made with.
-    pub fn read(&self, background: &(dyn Fn(u32, u32) -> [f32; 3] + Sync), occluder: Option<&Occluder>) -> Layers {
+    pub fn read(&self, background: &(dyn Fn(u32, u32) -> [f32; 3] + Sync), occluder: Option<&OpaqueImage>) -> Layers {
         let mut layers = Layers { size: self.size(), ..Layers::default() };
         let [width, height] = self.tiling.size;
         let pixel = |k: usize| self.pixel(k % width, k / width, background, occluder);
@@ -96,13 +97,13 @@ impl Ensemble {
         x: usize,
         y: usize,
         background: &dyn Fn(u32, u32) -> [f32; 3],
-        occluder: Option<&Occluder>,
+        occluder: Option<&OpaqueImage>,
     ) -> Pixel {
         let at = self.tiling.index(x, y);
         let levels = f64::from(self.levels.max(1));
         let hits: [f64; 3] = std::array::from_fn(|c| f64::from(self.hits_in(at, c)));
         let behind_it = y * self.tiling.size[0] + x;
-        let solid = occluder.and_then(|o| o.at(behind_it));
+        let solid = occluder.and_then(|o| self.solid(o, behind_it));
         let behind = solid.unwrap_or_else(|| background(x as u32, y as u32)).map(f64::from);
         let open = hits.map(|hits| (levels - hits) / levels);
         let mean = |c: usize| self.sum(at, c) / levels;
@@ -131,6 +132,13 @@ impl Ensemble {
             pixel.object = nearest.object;
         }
         pixel
+    }
+
+    /// Radiance of the opaque surface at a pixel, rows from the top left, where there is one.
+    fn solid(&self, image: &OpaqueImage, pixel: usize) -> Option<[f32; 3]> {
+        let colors = image.channels.get(..self.params.light_channels())?;
+        let sum = |c: usize| colors.iter().skip(c).step_by(3).map(|plane| plane[pixel]).sum::<f32>();
+        (*image.depth.get(pixel)? < f32::INFINITY).then(|| [sum(0), sum(1), sum(2)])
     }
 
     /// Standard error of the luminance of one pixel in tile order; infinite below two sets.
@@ -166,12 +174,12 @@ impl Ensemble {
     }
 
     /// Root mean square of the standard error over all pixels, for a stop at a wanted error; infinite below two sets.
-    pub fn rms_error(&self, background: &dyn Fn(u32, u32) -> [f32; 3], occluder: Option<&Occluder>) -> f64 {
+    pub fn rms_error(&self, background: &dyn Fn(u32, u32) -> [f32; 3], occluder: Option<&OpaqueImage>) -> f64 {
         let [w, h] = self.tiling.size;
         let mut sum = 0.0;
         for y in 0..h {
             for x in 0..w {
-                let solid = occluder.and_then(|o| o.at(y * w + x));
+                let solid = occluder.and_then(|o| self.solid(o, y * w + x));
                 let behind = solid.unwrap_or_else(|| background(x as u32, y as u32)).map(f64::from);
                 sum += self.std_error(self.tiling.index(x, y), behind).powi(2);
             }

@@ -17,6 +17,7 @@ use crate::shade::{Appearance, Seen, Shader};
 use crate::{Error, PackedNormal, Sampler};
 use glam::{DMat3, DVec3, Mat3};
 use rayon::prelude::*;
+use splat_core::raster::OpaqueImage;
 use splat_core::shade::LitBy;
 use splat_core::shade::MAX_CHANNELS;
 use splat_core::{Camera, Progress, Shading, Similarity, glam};
@@ -32,23 +33,6 @@ pub struct Object<'a> {
     pub look: Appearance,
 }
 
-/// Opaque surfaces drawn exactly, by any other means: particles behind them are hidden, and rays that pass all
-/// particles end on them. The way to have α = 1.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Occluder {
-    /// View depth per pixel, rows from the top left; +∞ where there is none.
-    pub depth: Vec<f32>,
-    /// Radiance per pixel.
-    pub color: Vec<[f32; 3]>,
-}
-
-impl Occluder {
-    /// Radiance at a pixel that has a surface.
-    pub(crate) fn at(&self, pixel: usize) -> Option<[f32; 3]> {
-        (*self.depth.get(pixel)? < f32::INFINITY).then(|| self.color[pixel])
-    }
-}
-
 /// Everything that is seen.
 #[derive(Clone, Copy)]
 pub struct Scene<'a> {
@@ -62,8 +46,10 @@ pub struct Scene<'a> {
     pub ambient: [f32; 3],
     /// The viewer.
     pub camera: &'a Camera,
-    /// Exact opaque surfaces.
-    pub occluder: Option<&'a Occluder>,
+    /// Opaque surfaces drawn exactly, by any other means: particles behind them are hidden, and rays that pass all particles
+    /// end on them. The way to have α = 1. Its first planes are radiance, three for each colour that the ensemble keeps:
+    /// beauty, or [`SHADED_EFFECTS`](splat_core::SHADED_EFFECTS).
+    pub occluder: Option<&'a OpaqueImage>,
 }
 
 /// What folding may take, and of what.
@@ -261,8 +247,9 @@ impl Plan {
         check(scene.camera.size == size, "camera size", scene.camera.size, "the size of the ensemble")?;
         if let Some(o) = scene.occluder {
             let pixels = size[0] as usize * size[1] as usize;
-            let ok = o.depth.len() == pixels && o.color.len() == pixels;
-            check(ok, "occluder", o.depth.len(), "a depth and a colour for each pixel")?;
+            let colors = o.channels.get(..ensemble.params.light_channels()).unwrap_or(&[]);
+            let ok = o.depth.len() == pixels && !colors.is_empty() && colors.iter().all(|c| c.len() == pixels);
+            check(ok, "occluder", o.depth.len(), "a depth and the colours of the ensemble for each pixel")?;
         }
         check(ensemble.levels.checked_add(levels).is_some(), "levels", levels, "at most 2³² − 1 in all")?;
         let expected: f64 = scene.objects.iter().map(|o| o.sampler.expected_particles()).sum();

@@ -170,7 +170,7 @@ impl Line<'_> {
 mod tests {
     use super::*;
     use glam::DMat3;
-    use splat_core::ScalarField;
+    use splat_core::{DAabb, ScalarField};
 
     /// Π(x − root), without a bound.
     struct Roots(&'static [f64]);
@@ -196,8 +196,12 @@ mod tests {
     }
 
     fn found(field: &Roots, from: f64, to: f64) -> Found {
-        let surface =
-            ImplicitSurface { field, level: 0.0, min: DVec3::splat(-9.0), max: DVec3::splat(9.0), inside: None };
+        let surface = ImplicitSurface {
+            field,
+            level: 0.0,
+            bounds: DAabb::new(DVec3::splat(-9.0), DVec3::splat(9.0)),
+            inside: None,
+        };
         let line = Line { surface, o: DVec3::ZERO, d: DVec3::X };
         let mut found = Found::default();
         line.roots(line.at(from), line.at(to), &mut found);

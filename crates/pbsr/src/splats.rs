@@ -34,7 +34,7 @@ pub struct SplatParams {
     pub cross_section: f64,
     /// How the opacity of surface splats grows at grazing angles.
     pub surface_opacity: SurfaceOpacity,
-    /// Optical depth at which opaque splats are sampled, in (0, 64\]; draw them by [`crate::Occluder`] where they must be
+    /// Optical depth at which opaque splats are sampled, in (0, 64\]; draw them by [`crate::Scene::occluder`] where they must be
     /// exact.
     pub opaque_optical_depth: f64,
     /// Kernels by footprint id.

@@ -11,7 +11,7 @@ use crate::sampler::{Poisson, PoissonSets};
 use crate::stream::Stage;
 use crate::{Density, Error, PackedNormal, Particles};
 use glam::DVec3;
-use splat_core::glam;
+use splat_core::{DAabb, glam};
 
 /// Particles in the box of a field of extinction, 1/world unit.
 pub struct FieldVolumeSampler<'a> {
@@ -26,7 +26,7 @@ pub struct FieldVolumeSampler<'a> {
 }
 
 impl<'a> FieldVolumeSampler<'a> {
-    /// `extinction` between the corners `min` and `max`, in `cells`³ cells (1 to 512 an axis). Where the field knows no
+    /// `extinction` in a box, in `cells`³ cells (1 to 512 an axis). Where the field knows no
     /// bound, `extinction.max` is taken, and values above it are cut.
     ///
     /// # Errors
@@ -34,7 +34,7 @@ impl<'a> FieldVolumeSampler<'a> {
     /// [`Error::TooMuch`] for more than 4·10⁹ particles a set.
     pub fn new(
         extinction: Density<'a>,
-        [min, max]: [DVec3; 2],
+        bounds: DAabb,
         cells: u32,
         cross_section: f64,
         tint: [f32; 3],
@@ -44,10 +44,10 @@ impl<'a> FieldVolumeSampler<'a> {
         positive(cross_section, "cross_section")?;
         color(tint)?;
         check((1..=512).contains(&cells), "cells", cells, "1 to 512")?;
-        let ok = min.is_finite() && max.is_finite() && (max - min).min_element() > 0.0;
-        check(ok, "box", (min, max), "two finite corners, the first less in all three")?;
+        let DAabb { min, max } = bounds;
+        check(bounds.is_solid(), "box", (min, max), "two finite corners, the first less in all three")?;
         let n = cells as usize;
-        let side = (max - min) / f64::from(cells);
+        let side = bounds.size() / f64::from(cells);
         let radius = 0.5 * side.length() * (1.0 + 1e-12);
         let per_cell = side.element_product() / cross_section;
         let middle = |c: usize| min + side * (corner(c, n) + 0.5);

@@ -42,7 +42,7 @@ impl<'a> Walk<'a> {
     pub fn new(surface: &ImplicitSurface<'a>, step: f64) -> Result<Self, crate::Error> {
         surface.validate()?;
         crate::params::positive(step, "step")?;
-        let trust = (surface.max - surface.min).max_element() / 16.0;
+        let trust = surface.bounds.size().max_element() / 16.0;
         Ok(Self { surface: *surface, step, trust })
     }
 
@@ -70,7 +70,7 @@ impl<'a> Walk<'a> {
 
     /// Mirrored at the faces of the box.
     fn reflect(&self, p: DVec3) -> DVec3 {
-        let (low, high) = (self.surface.min, self.surface.max);
+        let (low, high) = (self.surface.bounds.min, self.surface.bounds.max);
         let p = DVec3::select(p.cmplt(low), 2.0 * low - p, p);
         DVec3::select(p.cmpgt(high), 2.0 * high - p, p)
     }

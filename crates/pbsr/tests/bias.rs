@@ -7,7 +7,7 @@ use pbsr::{
 };
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
-use splat_core::{Cloud, Footprint, Grid, Projection, Splat, SplatKind, TransferFunction, TransferPoint};
+use splat_core::{Cloud, DAabb, Footprint, Grid, Projection, Splat, SplatKind, TransferFunction, TransferPoint};
 
 fn surface(opacity: f64, cross_section: f64, seed: u64) -> SurfaceParams {
     SurfaceParams { opacity, cross_section, seed, ..SurfaceParams::default() }
@@ -222,7 +222,7 @@ fn three_samplers_of_one_volume_agree() {
     let chains = MetropolisSampler::new(&grid, &transfer, &params, &chains).unwrap();
     let ramp = Density { field: &Field::Ramp, max: 1.0 };
     let [low, high] = [DVec3::new(0.0, -0.5, -0.5), DVec3::new(1.0, 0.5, 0.5)];
-    let field = FieldVolumeSampler::new(ramp, [low, high], 6, s, [1.0; 3], 3).unwrap();
+    let field = FieldVolumeSampler::new(ramp, DAabb::new(low, high), 6, s, [1.0; 3], 3).unwrap();
     let samplers: [&dyn Sampler; 3] = [&cells, &chains, &field];
     for (name, sampler) in ["cells", "chains", "field"].iter().zip(samplers) {
         let found = bias(&render(&camera, &[sampler], 1500), &|x, y| {

@@ -3,12 +3,12 @@
 use crate::common::*;
 use pbsr::{BrownianParams, BrownianSampler, Error, ImplicitSurface, LineSampler, SurfaceParams, Walk, pixel_area};
 use rayon::prelude::*;
-use splat_core::ScalarField;
 use splat_core::glam::DVec3;
+use splat_core::{DAabb, ScalarField};
 use std::f64::consts::PI;
 
 fn boxed(field: &Field, half: f64) -> ImplicitSurface<'_> {
-    ImplicitSurface { field, level: 0.0, min: DVec3::splat(-half), max: DVec3::splat(half), inside: None }
+    ImplicitSurface { field, level: 0.0, bounds: DAabb::new(DVec3::splat(-half), DVec3::splat(half)), inside: None }
 }
 
 fn walk_on(walk: &Walk<'_>, starts: &[DVec3], steps: u64) -> Vec<DVec3> {
@@ -38,8 +38,10 @@ fn pb08_walkers_stay_on_the_surface_for_every_step() {
 fn pb13_walkers_that_are_uniform_stay_so() {
     // Equal-area bins of height, 20 000 walkers after 300 steps of dt = 0.005: more than one relaxation time.
     let field = Field::Ellipsoid { axes: DVec3::new(1.0, 1.0, 2.0) };
-    let surface =
-        ImplicitSurface { min: DVec3::new(-1.2, -1.2, -2.2), max: DVec3::new(1.2, 1.2, 2.2), ..boxed(&field, 1.0) };
+    let surface = ImplicitSurface {
+        bounds: DAabb::new(DVec3::new(-1.2, -1.2, -2.2), DVec3::new(1.2, 1.2, 2.2)),
+        ..boxed(&field, 1.0)
+    };
     let params = SurfaceParams { opacity: 0.5, cross_section: 6e-4, ..SurfaceParams::default() };
     let starts = positions(&LineSampler::new(&surface, 24, &params, None).unwrap(), 0);
     assert!(starts.len() >= 20_000, "{}", starts.len());

@@ -1,9 +1,10 @@
 //! Extinction that differs by channel: each channel is what particles of its own extinction would give.
 
 use crate::common::*;
-use pbsr::{Ensemble, EnsembleParams, MeshSampler, Object, Occluder, SurfaceParams, pixel_area};
+use pbsr::{Ensemble, EnsembleParams, MeshSampler, Object, SurfaceParams, pixel_area};
 use splat_core::Projection;
 use splat_core::glam::{DVec3, Vec3};
+use splat_core::raster::OpaqueImage;
 
 const APART: EnsembleParams = EnsembleParams {
     effects: false,
@@ -96,7 +97,8 @@ fn the_stated_error_is_that_of_the_sets() {
     let objects = [tinted(&samplers[0], [1.0, 0.5, 0.25]), tinted(&samplers[1], [0.25, 0.5, 1.0])];
     // A wall behind one half.
     let depth = (0..256).map(|k| if k % 16 < 8 { 6.0 } else { f32::INFINITY }).collect();
-    let occluder = Occluder { depth, color: vec![[0.25, 1.0, 0.5]; 256] };
+    let channels = [0.25, 1.0, 0.5].map(|v| vec![v; 256]).to_vec();
+    let occluder = OpaqueImage { depth, channels, ..OpaqueImage::default() };
     let scene = pbsr::Scene { occluder: Some(&occluder), ..scene(&camera, &objects) };
     let mut ensemble = Ensemble::new([16, 16], &APART).unwrap();
     let (mut sums, mut squares, mut last) = (vec![0.0f64; 256], vec![0.0f64; 256], vec![0.0f64; 256]);

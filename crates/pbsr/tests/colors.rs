@@ -7,7 +7,7 @@ use pbsr::{
     SplatSampler, SurfaceParams, VolumeParams, pixel_area,
 };
 use splat_core::glam::{DMat3, DVec3, Vec3};
-use splat_core::{Cloud, Grid, Splat, SplatKind, TransferFunction, TransferPoint, rng};
+use splat_core::{Cloud, DAabb, Grid, Splat, SplatKind, TransferFunction, TransferPoint, rng};
 
 /// Far from what nine bits hold: nearest rounding changes the channels by 8·10⁻⁴, 10⁻³ and 6·10⁻³ of themselves.
 const COLOR: [f32; 3] = [0.950_01, 0.5005, 0.0511];
@@ -49,8 +49,7 @@ fn every_sampler_gives_its_colour_in_the_mean() {
     let ball = ImplicitSurface {
         field: &Field::UNIT,
         level: 0.0,
-        min: DVec3::splat(-1.1),
-        max: DVec3::splat(1.1),
+        bounds: DAabb::around(DVec3::ZERO, DVec3::splat(1.1)),
         inside: None,
     };
     let axes = DMat3::from_diagonal(DVec3::splat(0.25));
@@ -76,7 +75,12 @@ fn every_sampler_gives_its_colour_in_the_mean() {
         ("cells", Box::new(GridSampler::new(&grid, &transfer, &volume, None).unwrap())),
         ("chains", Box::new(MetropolisSampler::new(&grid, &transfer, &volume, &few).unwrap())),
         ("splats", Box::new(SplatSampler::new(&cloud, &splats).unwrap())),
-        ("field", Box::new(FieldVolumeSampler::new(extinction, [DVec3::ZERO, DVec3::ONE], 4, 2e-6, COLOR, 1).unwrap())),
+        (
+            "field",
+            Box::new(
+                FieldVolumeSampler::new(extinction, DAabb::new(DVec3::ZERO, DVec3::ONE), 4, 2e-6, COLOR, 1).unwrap(),
+            ),
+        ),
     ];
     for (name, sampler) in &samplers {
         let mut scratch = Particles::default();

@@ -2,10 +2,11 @@
 
 use crate::common::*;
 use pbsr::{
-    Appearance, Ensemble, EnsembleParams, Error, FoldParams, KeptSets, LitBy, MeshSampler, Object, Occluder, Renderer,
-    Sampler, Scene, SurfaceParams, pixel_area, predict,
+    Appearance, Ensemble, EnsembleParams, Error, FoldParams, KeptSets, LitBy, MeshSampler, Object, Renderer, Sampler,
+    Scene, SurfaceParams, pixel_area, predict,
 };
 use splat_core::glam::{DQuat, DVec3, Vec3};
+use splat_core::raster::OpaqueImage;
 use splat_core::{
     Light, LightShape, Material, Mesh, Progress, Projection, Receiver, Shading, Similarity, Transmittance,
 };
@@ -81,11 +82,12 @@ fn pb02_opaque_surfaces_are_exact_as_occluders() {
     let sampler = MeshSampler::new(&mesh, &params(0.4, pixel_area(&camera, DVec3::Z), [1.0; 3], 1), None).unwrap();
     let objects = objects(&[&sampler]);
     // The camera is at z = 4: the wall at depth 3.5. A solid left half in front of it, a solid row behind it.
-    let mut occluder = Occluder { depth: vec![f32::INFINITY; 256], color: vec![[0.0; 3]; 256] };
+    let mut occluder =
+        OpaqueImage { depth: vec![f32::INFINITY; 256], channels: vec![vec![0.0; 256]; 3], ..OpaqueImage::default() };
     for k in 0..256 {
         if k % 16 < 8 || k / 16 == 3 {
             occluder.depth[k] = if k % 16 < 8 { 3.0 } else { 5.0 };
-            occluder.color[k] = [0.25, 0.5, 0.75];
+            (0..3).for_each(|c| occluder.channels[c][k] = [0.25, 0.5, 0.75][c]);
         }
     }
     let ensemble = fold(&Scene { occluder: Some(&occluder), ..scene(&camera, &objects) }, 400);

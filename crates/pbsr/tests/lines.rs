@@ -2,12 +2,12 @@
 
 use crate::common::*;
 use pbsr::{Density, Error, ImplicitSurface, LineSampler, Sampler, SurfaceParams, pixel_area};
-use splat_core::ScalarField;
 use splat_core::glam::{DMat3, DVec3};
+use splat_core::{DAabb, ScalarField};
 use std::f64::consts::PI;
 
 fn boxed(field: &Field, half: f64) -> ImplicitSurface<'_> {
-    ImplicitSurface { field, level: 0.0, min: DVec3::splat(-half), max: DVec3::splat(half), inside: None }
+    ImplicitSurface { field, level: 0.0, bounds: DAabb::new(DVec3::splat(-half), DVec3::splat(half)), inside: None }
 }
 
 fn params(opacity: f64, cross_section: f64) -> SurfaceParams {
@@ -29,8 +29,10 @@ fn pb13_lines_are_uniform_on_spheres_and_ellipsoids() {
     assert!((sampler.report().area / (4.0 * PI) - 1.0).abs() < 0.03, "{:?}", sampler.report());
     // A prolate ellipsoid: area below height z by its closed form.
     let field = Field::Ellipsoid { axes: DVec3::new(1.0, 1.0, 3.0) };
-    let surface =
-        ImplicitSurface { min: DVec3::new(-1.1, -1.1, -3.1), max: DVec3::new(1.1, 1.1, 3.1), ..boxed(&field, 1.0) };
+    let surface = ImplicitSurface {
+        bounds: DAabb::new(DVec3::new(-1.1, -1.1, -3.1), DVec3::new(1.1, 1.1, 3.1)),
+        ..boxed(&field, 1.0)
+    };
     let sampler = LineSampler::new(&surface, 48, &params(0.5, 1e-4), None).unwrap();
     let below = |z: f64| {
         // ∫ √(1 + (e·z)²…): with k² = 8/81, area element ∝ √(1 − k²z²).
@@ -171,7 +173,7 @@ fn pb10_the_apex_of_a_cone_is_no_trouble() {
 #[test]
 fn pb12_components_get_particles_by_their_areas() {
     let field = Field::Two { radius: [0.3, 0.6], apart: 0.7 };
-    let surface = ImplicitSurface { min: DVec3::splat(-1.4), max: DVec3::splat(1.4), ..boxed(&field, 1.0) };
+    let surface = ImplicitSurface { bounds: DAabb::new(DVec3::splat(-1.4), DVec3::splat(1.4)), ..boxed(&field, 1.0) };
     let sampler = LineSampler::new(&surface, 32, &params(0.5, 1e-4), None).unwrap();
     let all = positions(&sampler, 0);
     let left = all.iter().filter(|p| p.x < -0.2).count() as f64;
@@ -226,7 +228,8 @@ fn what_cannot_be_sampled_says_why() {
     let no = |field: &Field| LineSampler::new(&boxed(field, 1.1), 16, &params(0.5, 1e-3), None).err().unwrap();
     assert!(matches!(no(&Field::Nothing), Error::Empty { .. }));
     assert!(matches!(no(&Field::Broken), Error::Field { .. }));
-    let flat = ImplicitSurface { max: DVec3::splat(-1.1), ..boxed(&Field::UNIT, 1.1) };
+    let flat =
+        ImplicitSurface { bounds: DAabb::new(DVec3::splat(-1.1), DVec3::splat(-1.1)), ..boxed(&Field::UNIT, 1.1) };
     assert!(matches!(LineSampler::new(&flat, 16, &params(0.5, 1e-3), None), Err(Error::Parameter { .. })));
     assert!(matches!(
         LineSampler::new(&boxed(&Field::UNIT, 1.1), 16, &params(0.5, 1e-30), None),

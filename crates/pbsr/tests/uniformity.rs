@@ -8,7 +8,7 @@ use pbsr::{
     SurfaceParams, VolumeParams,
 };
 use splat_core::glam::{DMat3, DVec3, Vec3};
-use splat_core::{Cloud, Grid, Splat, SplatKind, TransferFunction, TransferPoint};
+use splat_core::{Cloud, DAabb, Grid, Splat, SplatKind, TransferFunction, TransferPoint};
 
 /// Sets in which a count is taken.
 const SETS: u64 = 400;
@@ -78,8 +78,12 @@ fn fault(make: Make<'_>, measure: Measure, axes: usize) -> Option<String> {
     lag.map(|lag| format!("sets {lag} apart correlate"))
 }
 
-const SPHERE: ImplicitSurface<'static> =
-    ImplicitSurface { field: &Field::UNIT, level: 0.0, min: DVec3::splat(-1.1), max: DVec3::splat(1.1), inside: None };
+const SPHERE: ImplicitSurface<'static> = ImplicitSurface {
+    field: &Field::UNIT,
+    level: 0.0,
+    bounds: DAabb::new(DVec3::splat(-1.1), DVec3::splat(1.1)),
+    inside: None,
+};
 
 fn half(cross_section: f64) -> SurfaceParams {
     SurfaceParams { opacity: 0.5, cross_section, seed: 9, ..SurfaceParams::default() }
@@ -172,7 +176,7 @@ fn pb13_pb14_fields() {
     let [low, high] = [DVec3::new(0.0, -0.5, -0.5), DVec3::new(1.0, 0.5, 0.5)];
     let make = |s| {
         let ramp = Density { field: &Field::Ramp, max: 1.0 };
-        Box::new(FieldVolumeSampler::new(ramp, [low, high], 6, s, [1.0; 3], 9).unwrap()) as Box<dyn Sampler>
+        Box::new(FieldVolumeSampler::new(ramp, DAabb::new(low, high), 6, s, [1.0; 3], 9).unwrap()) as Box<dyn Sampler>
     };
     check(&make, by_ramp, 3);
 }

@@ -3,9 +3,8 @@
 //!
 //! The value at a lattice point stands for its cell: constant in the outer half cells, nothing beyond.
 
-use crate::placed::box_around;
 use glam::{DMat3, DVec3};
-use splat_core::{Grid, ScalarField, Similarity, TransferFunction};
+use splat_core::{DAabb, Grid, ScalarField, Similarity, TransferFunction};
 
 /// The extinction of a volume in the world, 1/world unit, as a field: a [`Density::Field`](crate::Density::Field) of a medium
 /// whose own extinction is 1.
@@ -19,7 +18,7 @@ use splat_core::{Grid, ScalarField, Similarity, TransferFunction};
 /// let transfer = TransferFunction::new(vec![point(0.0, 0.0), point(1.0, 4.0)]).unwrap();
 /// let volume = Classified::new(grid, transfer, &Similarity::default());
 /// assert_eq!(volume.value(DVec3::new(0.5, 0.0, 0.0)), 2.0);
-/// assert_eq!((volume.most(), volume.bounds()[1].x), (4.0, 1.5));
+/// assert_eq!((volume.most(), volume.bounds().max.x), (4.0, 1.5));
 /// ```
 pub struct Classified {
     grid: Grid,
@@ -77,10 +76,10 @@ impl Classified {
         self.transfer.points().iter().fold(0.0, |most, p| most.max(f64::from(p.extinction)))
     }
 
-    /// Lowest and highest corner of a box outside which there is nothing, world units.
-    pub fn bounds(&self) -> [DVec3; 2] {
-        let (low, high) = (DVec3::splat(-0.5), self.last() + 0.5);
-        box_around(|corner| self.grid.origin + self.grid.axes * corner, [low, high])
+    /// A box outside which there is nothing, world units.
+    pub fn bounds(&self) -> DAabb {
+        let voxels = DAabb::new(DVec3::splat(-0.5), self.last() + 0.5);
+        DAabb::of_points(voxels.corners().map(|corner| self.grid.origin + self.grid.axes * corner))
     }
 
     /// Least and largest extinction of the values between two.
@@ -158,7 +157,7 @@ mod tests {
             let found = v.value(v.grid.position(i as usize, j as usize, k as usize));
             assert!((found - f64::from(own)).abs() < 1e-4, "{found} and {own}");
         }
-        let [low, high] = v.bounds();
+        let DAabb { min: low, max: high } = v.bounds();
         assert_eq!((v.value(low - 0.01), v.value(high + 0.01)), (0.0, 0.0));
         assert_eq!((v.most(), v.brightest()), (9.0, 1.5));
     }
@@ -166,7 +165,7 @@ mod tests {
     #[test]
     fn bounds_hold_for_every_point_of_a_ball() {
         let v = volume();
-        let [low, high] = v.bounds();
+        let DAabb { min: low, max: high } = v.bounds();
         for i in 0..400 {
             let u = |k| rng::unit(7, 1, i, k);
             let p = low + (high - low) * DVec3::new(u(0), u(1), u(2));

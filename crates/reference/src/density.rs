@@ -4,14 +4,14 @@
 use crate::ray::Ray;
 use crate::roots::{RootParams, crossings};
 use glam::{DMat3, DVec3};
-use splat_core::{Error, Grid, ScalarField};
+use splat_core::{DAabb, Error, Grid, ScalarField};
 
 /// Relative density over space, ≥ 0; the medium multiplies it by its extinction.
 #[derive(Clone, Copy)]
 #[non_exhaustive]
 pub enum Density<'a> {
-    /// 1 inside an axis-aligned box (lowest and highest corner), 0 outside.
-    Box([DVec3; 2]),
+    /// 1 inside an axis-aligned box, 0 outside.
+    Box(DAabb),
     /// 1 inside a ball.
     Ball {
         /// Centre, world units.
@@ -26,7 +26,7 @@ pub enum Density<'a> {
         /// The field.
         field: &'a dyn ScalarField,
         /// Lowest and highest corner; 0 outside.
-        bounds: [DVec3; 2],
+        bounds: DAabb,
         /// No value in the box exceeds this; the field's own `bound` makes it local.
         majorant: f64,
     },
@@ -35,14 +35,14 @@ pub enum Density<'a> {
         /// The field.
         field: &'a dyn ScalarField,
         /// Lowest and highest corner; 0 outside.
-        bounds: [DVec3; 2],
+        bounds: DAabb,
     },
     /// Any function, ≥ 0 inside a box.
     Function {
         /// The density.
         function: &'a (dyn Fn(DVec3) -> f64 + Sync),
         /// Lowest and highest corner; 0 outside.
-        bounds: [DVec3; 2],
+        bounds: DAabb,
         /// No value in the box exceeds this.
         majorant: f64,
     },
@@ -114,13 +114,8 @@ impl<'a> Lattice<'a> {
         })
     }
 
-    fn upper(&self, bounds: &[DVec3; 2]) -> f64 {
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for c in 0..8 {
-            let pick = |bit: usize| bounds[c >> bit & 1][bit];
-            let q = self.index(DVec3::new(pick(0), pick(1), pick(2)));
-            (low, high) = (low.min(q), high.max(q));
-        }
+    fn upper(&self, bounds: &DAabb) -> f64 {
+        let DAabb { min: low, max: high } = DAabb::of_points(bounds.corners().map(|c| self.index(c)));
         // A guard of 2⁻²⁰ cells: the box may be computed in other roundings than the points in it.
         let guard = DVec3::splat(0.5 + 1.0 / 1_048_576.0);
         if high.cmplt(-guard).any() || low.cmpgt(self.last + guard).any() {
@@ -143,7 +138,7 @@ impl<'a> Lattice<'a> {
         // In index space the lattice is a box of unit cells; t stays the world distance.
         let local = Ray { origin: self.index(ray.origin), direction: self.index_from_world * ray.direction };
         let half = DVec3::splat(0.5);
-        let Some((enter, leave)) = local.clip(&[-half, self.last + half], t0, t1) else { return };
+        let Some((enter, leave)) = local.clip(&DAabb::new(-half, self.last + half), t0, t1) else { return };
         out.extend([enter, leave]);
         for a in 0..3 {
             let (o, d) = (local.origin[a], local.direction[a]);
@@ -160,51 +155,43 @@ impl<'a> Lattice<'a> {
     }
 }
 
-fn inside(bounds: &[DVec3; 2], p: DVec3) -> bool {
-    p.cmpge(bounds[0]).all() && p.cmple(bounds[1]).all()
-}
-
 impl Density<'_> {
     /// Density at a world position.
     #[inline]
     pub fn value(&self, p: DVec3) -> f64 {
         match self {
             Self::Grid(lattice) => lattice.value(p),
-            Self::Box(bounds) => f64::from(inside(bounds, p)),
+            Self::Box(bounds) => f64::from(bounds.contains(p)),
             Self::Ball { center, radius } => f64::from((p - center).length() <= *radius),
-            Self::Field { field, bounds, .. } if inside(bounds, p) => field.value(p).max(0.0),
-            Self::Inside { field, bounds } if inside(bounds, p) => f64::from(field.value(p) < 0.0),
-            Self::Function { function, bounds, .. } if inside(bounds, p) => function(p).max(0.0),
+            Self::Field { field, bounds, .. } if bounds.contains(p) => field.value(p).max(0.0),
+            Self::Inside { field, bounds } if bounds.contains(p) => f64::from(field.value(p) < 0.0),
+            Self::Function { function, bounds, .. } if bounds.contains(p) => function(p).max(0.0),
             _ => 0.0,
         }
     }
 
-    /// Lowest and highest corner of where the density can be positive, world axes.
-    pub fn bounds(&self) -> [DVec3; 2] {
+    /// Where the density can be positive, along the world's axes.
+    pub fn bounds(&self) -> DAabb {
         match self {
             Self::Box(b) => *b,
             Self::Field { bounds, .. } | Self::Inside { bounds, .. } | Self::Function { bounds, .. } => *bounds,
-            Self::Ball { center, radius } => [center - DVec3::splat(*radius), center + DVec3::splat(*radius)],
-            Self::Grid(lattice) => {
-                let corners = lattice.corners();
-                let fold = |f: fn(DVec3, DVec3) -> DVec3| corners.into_iter().reduce(f).unwrap_or(DVec3::ZERO);
-                [fold(DVec3::min), fold(DVec3::max)]
-            }
+            Self::Ball { center, radius } => DAabb::around(*center, DVec3::splat(*radius)),
+            Self::Grid(lattice) => DAabb::of_points(lattice.corners()),
         }
     }
 
-    /// A number that no density inside the box (lowest and highest corner) exceeds.
-    pub fn upper(&self, bounds: &[DVec3; 2]) -> f64 {
+    /// A number that no density inside the box exceeds.
+    pub fn upper(&self, bounds: &DAabb) -> f64 {
         let own = self.bounds();
-        if bounds[1].cmplt(own[0]).any() || bounds[0].cmpgt(own[1]).any() {
+        if bounds.max.cmplt(own.min).any() || bounds.min.cmpgt(own.max).any() {
             return 0.0;
         }
-        let middle = bounds[0] + (bounds[1] - bounds[0]) * 0.5;
-        let reach = (bounds[1] - bounds[0]).length() * 0.5 * (1.0 + 1e-9);
+        let middle = bounds.min + bounds.size() * 0.5;
+        let reach = bounds.diagonal() * 0.5 * (1.0 + 1e-9);
         match self {
             Self::Box(_) => 1.0,
             Self::Ball { center, radius } => {
-                let nearest = center.clamp(bounds[0], bounds[1]);
+                let nearest = center.clamp(bounds.min, bounds.max);
                 f64::from((nearest - center).length() <= radius * (1.0 + 1e-9))
             }
             Self::Grid(lattice) => lattice.upper(bounds),
@@ -250,7 +237,7 @@ impl Density<'_> {
 
     pub(crate) fn validate(&self, index: usize) -> Result<(), Error> {
         let bounds = self.bounds();
-        if !(bounds[0].is_finite() && bounds[1].is_finite() && bounds[0].cmplt(bounds[1]).all()) {
+        if !bounds.is_solid() {
             return Err(Error::invalid("medium", index, "bounds", bounds, "finite corners, the lowest first"));
         }
         match self {

@@ -11,15 +11,15 @@ use crate::surface::{Surface, SurfaceKind, SurfaceMaterial};
 use crate::visibility::{Hit, Visibility};
 use glam::DVec3;
 use rayon::prelude::*;
-use splat_core::{Camera, Error, Progress, ScalarField};
+use splat_core::{Camera, DAabb, Error, Progress, ScalarField};
 
 /// The zero set of a field inside a box.
 #[derive(Clone, Copy)]
 pub struct ImplicitSurface<'a> {
     /// The field.
     pub field: &'a dyn ScalarField,
-    /// Lowest and highest corner; nothing outside.
-    pub bounds: [DVec3; 2],
+    /// Nothing outside.
+    pub bounds: DAabb,
     /// Colour, linear Rec.709.
     pub color: [f64; 3],
     /// What it is made of; a dielectric counts as opaque.
@@ -126,7 +126,7 @@ impl<'a> Renderer<'a> {
         for (i, s) in scene.implicits.iter().enumerate() {
             s.material.validate(i)?;
             s.material.liberty.refuse("surface", i)?;
-            let ordered = s.bounds[0].is_finite() && s.bounds[1].is_finite() && s.bounds[0].cmplt(s.bounds[1]).all();
+            let ordered = s.bounds.is_solid();
             if !ordered || !s.color.iter().all(|c| c.is_finite() && *c >= 0.0) {
                 let found = (s.bounds, s.color);
                 return Err(Error::invalid(
@@ -263,7 +263,7 @@ impl<'a> Renderer<'a> {
     /// How far a refined root may lie from the surface: roundings of its coordinates and of the extent of its bounds.
     fn rounding(&self, at: DVec3, surface: usize) -> f64 {
         let bounds = &self.scene.implicits[surface].bounds;
-        let size = (bounds[1] - bounds[0]).max_element();
+        let size = bounds.size().max_element();
         (size + at.abs().max_element()) * 1e-9_f64.max(f64::EPSILON)
     }
 }

@@ -25,8 +25,8 @@
 //!
 //! ```
 //! use reference::{Density, Medium, PathSettings, Scene, path_trace};
-//! use splat_core::{Camera, Progress, Projection, glam::DVec3};
-//! let fog = Medium::new(Density::Box([DVec3::splat(-1.0), DVec3::splat(1.0)]), 0.5, 0.0);
+//! use splat_core::{Camera, DAabb, Progress, Projection, glam::DVec3};
+//! let fog = Medium::new(Density::Box(DAabb::around(DVec3::ZERO, DVec3::ONE)), 0.5, 0.0);
 //! let scene = Scene { media: vec![fog], background: Some([1.0; 3]), ..Scene::default() };
 //! let camera = Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y,
 //!     Projection::Orthographic { height: 1.0 }, [4, 4]).unwrap();
@@ -79,7 +79,7 @@ pub use march::{MarchedImage, MarchedRay, march, march_image, optical_depth};
 pub use medium::{ColorAt, Medium};
 pub use path::PathRules;
 pub use phase::{henyey_greenstein, sample_henyey_greenstein};
-pub use placed::{Placed, TurnedBox, box_around};
+pub use placed::{Placed, TurnedBox};
 pub use quadrature::{Integral, MarchParams};
 pub use ray::Ray;
 pub use roots::{Crossings, RootParams, crossings};

@@ -9,10 +9,11 @@ use crate::random::Stream;
 use crate::ray::Ray;
 use glam::DVec3;
 use rayon::prelude::*;
+use splat_core::DAabb;
 
 /// Majorants of several media over their common bounds.
 pub(crate) struct MajorantGrid {
-    bounds: [DVec3; 2],
+    bounds: DAabb,
     dims: [usize; 3],
     cell: DVec3,
     per_cell: DVec3,
@@ -26,19 +27,15 @@ pub(crate) struct MajorantGrid {
 impl MajorantGrid {
     /// The grid of some media, or `None` when nothing can collide.
     pub(crate) fn new(media: &[Medium<'_>]) -> Option<Self> {
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for medium in media.iter().filter(|m| m.largest_extinction() > 0.0) {
-            let b = medium.density.bounds();
-            (low, high) = (low.min(b[0]), high.max(b[1]));
-        }
-        if !low.cmplt(high).all() {
+        let some = media.iter().filter(|m| m.largest_extinction() > 0.0);
+        let bounds = some.fold(DAabb::EMPTY, |all, m| all.union(m.density.bounds()));
+        if !bounds.is_solid() {
             return None;
         }
-        let size = high - low;
+        let size = bounds.size();
         let finest = |a: usize| {
             let wanted = media.iter().map(|m| {
-                let b = m.density.bounds();
-                let share = size[a] / (b[1][a] - b[0][a]);
+                let share = size[a] / m.density.bounds().size()[a];
                 (m.density.detail()[a] as f64 * share).ceil() as usize
             });
             // Several media share cells: a few cells each keep them apart.
@@ -47,7 +44,7 @@ impl MajorantGrid {
         let dims = [finest(0), finest(1), finest(2)];
         let cell = size / DVec3::from_array(dims.map(|d| d as f64));
         let mut out = Self {
-            bounds: [low, high],
+            bounds,
             dims,
             cell,
             per_cell: cell.recip(),
@@ -61,14 +58,14 @@ impl MajorantGrid {
 
     fn fill(&mut self, media: &[Medium<'_>]) {
         let [nx, ny, nz] = self.dims;
-        let (low, cell) = (self.bounds[0], self.cell);
+        let (low, cell) = (self.bounds.min, self.cell);
         let cells: Vec<(f64, Vec<u32>)> = (0..nx * ny * nz)
             .into_par_iter()
             .map(|i| {
                 let at = DVec3::new((i % nx) as f64, (i / nx % ny) as f64, (i / (nx * ny)) as f64);
                 // Grown by 2⁻²⁰ of a cell: a point may fall into the neighbour by rounding.
                 let guard = cell / 1_048_576.0;
-                let bounds = [low + at * cell - guard, low + (at + 1.0) * cell + guard];
+                let bounds = DAabb::new(low + at * cell - guard, low + (at + 1.0) * cell + guard);
                 let mut sum = 0.0;
                 let mut members = Vec::new();
                 for (m, medium) in media.iter().enumerate() {
@@ -95,7 +92,7 @@ impl MajorantGrid {
     }
 
     /// Bounds of all media.
-    pub(crate) fn bounds(&self) -> &[DVec3; 2] {
+    pub(crate) fn bounds(&self) -> &DAabb {
         &self.bounds
     }
 
@@ -106,7 +103,7 @@ impl MajorantGrid {
         let (mut enter, mut leave) = (t0, t1);
         let per = ray.direction.recip();
         for a in 0..3 {
-            let (p, q) = (self.bounds[0][a] - ray.origin[a], self.bounds[1][a] - ray.origin[a]);
+            let (p, q) = (self.bounds.min[a] - ray.origin[a], self.bounds.max[a] - ray.origin[a]);
             if ray.direction[a] != 0.0 {
                 let (p, q) = (p * per[a], q * per[a]);
                 enter = enter.max(p.min(q));
@@ -169,7 +166,7 @@ struct Steps {
 impl Steps {
     #[inline(always)]
     fn new(grid: &MajorantGrid, ray: &Ray, per: DVec3, t: f64) -> Self {
-        let q = (ray.at(t) - grid.bounds[0]) * grid.per_cell;
+        let q = (ray.at(t) - grid.bounds.min) * grid.per_cell;
         let strides = [1, grid.dims[0], grid.dims[0] * grid.dims[1]];
         let mut out = Self { cell: 0, next: [f64::INFINITY; 3], delta: [0.0; 3], left: [0; 3], stride: [0; 3] };
         for a in 0..3 {
@@ -178,7 +175,7 @@ impl Steps {
             out.cell += i * strides[a];
             let d = ray.direction[a];
             if d != 0.0 {
-                let edge = grid.bounds[0][a] + (i + usize::from(d > 0.0)) as f64 * grid.cell[a];
+                let edge = grid.bounds.min[a] + (i + usize::from(d > 0.0)) as f64 * grid.cell[a];
                 out.next[a] = (edge - ray.origin[a]) * per[a];
                 out.delta[a] = grid.cell[a] * per[a].abs();
                 out.left[a] = if d > 0.0 { last - i } else { i };

@@ -155,7 +155,7 @@ impl<'a> Tracer<'a> {
         let lamps = scene.lights.iter().enumerate().filter(|(_, l)| lit(l)).map(lamp);
         let lights: Vec<Lamp> = lamps.collect();
         let inside = |l: &Lamp| match (l.source.pole(), volume.bounds()) {
-            (Some(p), Some(b)) => p.cmpge(b[0]).all() && p.cmple(b[1]).all(),
+            (Some(p), Some(b)) => b.contains(p),
             _ => false,
         };
         let (along_segments, at_vertices) = lights.iter().partition(|l| inside(l));

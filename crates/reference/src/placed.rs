@@ -1,22 +1,11 @@
 //! Fields of an object's own space, in the world: any field inside a box, and boxes that are turned.
 
 use glam::{DMat3, DVec3};
-use splat_core::{ScalarField, Similarity};
+use splat_core::{DAabb, ScalarField, Similarity};
 
 /// Place of a world point in the object's own space.
 fn local(t: &Similarity, p: DVec3) -> DVec3 {
     t.rotation.inverse() * (p - t.translation) / t.scale
-}
-
-/// Lowest and highest corner of the box along the world's axes around a box whose corners are moved by `place`, which is
-/// affine.
-pub fn box_around(place: impl Fn(DVec3) -> DVec3, [low, high]: [DVec3; 2]) -> [DVec3; 2] {
-    let corner = |k: usize| {
-        let pick = |bit: usize| if k >> bit & 1 == 1 { high[bit] } else { low[bit] };
-        place(DVec3::new(pick(0), pick(1), pick(2)))
-    };
-    let both = |[a, b]: [DVec3; 2], p: DVec3| [a.min(p), b.max(p)];
-    (0..8).map(corner).fold([DVec3::INFINITY, DVec3::NEG_INFINITY], both)
 }
 
 /// A field inside a box of its own space, 0 outside, moved into the world. Values stay as they are; gradients are over world
@@ -25,7 +14,7 @@ pub fn box_around(place: impl Fn(DVec3) -> DVec3, [low, high]: [DVec3; 2]) -> [D
 /// ```
 /// use reference::Placed;
 /// use splat_core::glam::{DMat3, DVec3};
-/// use splat_core::{ScalarField, Similarity};
+/// use splat_core::{DAabb, ScalarField, Similarity};
 /// struct Height;
 /// impl ScalarField for Height {
 ///     fn value(&self, p: DVec3) -> f64 { p.y }
@@ -34,23 +23,23 @@ pub fn box_around(place: impl Fn(DVec3) -> DVec3, [low, high]: [DVec3; 2]) -> [D
 ///     fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> { Some((p.y - radius, p.y + radius)) }
 /// }
 /// let twice = Similarity { scale: 2.0, ..Similarity::default() };
-/// let placed = Placed::new(Height, twice, [DVec3::ZERO, DVec3::ONE]);
+/// let placed = Placed::new(Height, twice, DAabb::new(DVec3::ZERO, DVec3::ONE));
 /// assert_eq!([1.5, 2.5].map(|y| placed.value(DVec3::new(1.0, y, 1.0))), [0.75, 0.0]);
 /// ```
 pub struct Placed<F> {
     field: F,
     transform: Similarity,
-    within: [DVec3; 2],
+    within: DAabb,
 }
 
 impl<F: ScalarField> Placed<F> {
-    /// `field` within the lowest and the highest corner of `within`, both in its own space; `transform` leads to the world.
-    pub fn new(field: F, transform: Similarity, within: [DVec3; 2]) -> Self {
+    /// `field` within a box of its own space; `transform` leads to the world.
+    pub fn new(field: F, transform: Similarity, within: DAabb) -> Self {
         Self { field, transform, within }
     }
 
     fn holds(&self, q: DVec3) -> bool {
-        q.cmpge(self.within[0]).all() && q.cmple(self.within[1]).all()
+        self.within.contains(q)
     }
 }
 
@@ -72,7 +61,7 @@ impl<F: ScalarField> ScalarField for Placed<F> {
 
     fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> {
         let (q, reach) = (local(&self.transform, p), DVec3::splat(radius / self.transform.scale));
-        if (q + reach).cmplt(self.within[0]).any() || (q - reach).cmpgt(self.within[1]).any() {
+        if (q + reach).cmplt(self.within.min).any() || (q - reach).cmpgt(self.within.max).any() {
             return Some((0.0, 0.0));
         }
         let (low, high) = self.field.bound(q, reach.x)?;
@@ -89,9 +78,9 @@ impl<F: ScalarField> ScalarField for Placed<F> {
 /// ```
 /// use reference::TurnedBox;
 /// use splat_core::glam::{DQuat, DVec3};
-/// use splat_core::{ScalarField, Similarity};
+/// use splat_core::{DAabb, ScalarField, Similarity};
 /// let eighth = Similarity { rotation: DQuat::from_rotation_z(std::f64::consts::FRAC_PI_4), ..Similarity::default() };
-/// let cube = TurnedBox::new([DVec3::splat(-1.0), DVec3::ONE], eighth);
+/// let cube = TurnedBox::new(DAabb::around(DVec3::ZERO, DVec3::ONE), eighth);
 /// // A corner of the square lies on the axis now.
 /// assert!(cube.value(DVec3::X * 1.4) < 0.0 && cube.value(DVec3::X * 1.42) > 0.0);
 /// ```
@@ -102,9 +91,9 @@ pub struct TurnedBox {
 }
 
 impl TurnedBox {
-    /// The box between two corners of its own space; `transform` leads to the world.
-    pub fn new([low, high]: [DVec3; 2], transform: Similarity) -> Self {
-        Self { center: 0.5 * (low + high), half: 0.5 * (high - low), transform }
+    /// A box of its own space; `transform` leads to the world.
+    pub fn new(bounds: DAabb, transform: Similarity) -> Self {
+        Self { center: bounds.center(), half: 0.5 * bounds.size(), transform }
     }
 }
 

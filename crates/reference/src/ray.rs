@@ -1,7 +1,7 @@
 //! Rays in world space, f64.
 
 use glam::DVec3;
-use splat_core::Camera;
+use splat_core::{Camera, DAabb};
 
 /// A ray; points are origin + t·direction, t in world units.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,17 +31,17 @@ impl Ray {
     }
 
     /// The part [enter, leave] of (t0, t1) inside an axis-aligned box, if any.
-    pub(crate) fn clip(&self, bounds: &[DVec3; 2], t0: f64, t1: f64) -> Option<(f64, f64)> {
+    pub(crate) fn clip(&self, bounds: &DAabb, t0: f64, t1: f64) -> Option<(f64, f64)> {
         let (mut enter, mut leave) = (t0, t1);
         for a in 0..3 {
             let (o, d) = (self.origin[a], self.direction[a]);
             if d == 0.0 {
-                if o < bounds[0][a] || o > bounds[1][a] {
+                if o < bounds.min[a] || o > bounds.max[a] {
                     return None;
                 }
                 continue;
             }
-            let (p, q) = ((bounds[0][a] - o) / d, (bounds[1][a] - o) / d);
+            let (p, q) = ((bounds.min[a] - o) / d, (bounds.max[a] - o) / d);
             enter = enter.max(p.min(q));
             leave = leave.min(p.max(q));
         }

@@ -11,6 +11,7 @@ use crate::medium::Medium;
 use crate::random::Stream;
 use crate::ray::Ray;
 use glam::DVec3;
+use splat_core::DAabb;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// Below this transmittance a ratio-tracked ray goes on with probability ¼.
@@ -39,7 +40,7 @@ impl<'a> Volume<'a> {
     }
 
     /// Bounds of everything that can collide.
-    pub(crate) fn bounds(&self) -> Option<&[DVec3; 2]> {
+    pub(crate) fn bounds(&self) -> Option<&DAabb> {
         self.grid.as_ref().map(MajorantGrid::bounds)
     }
 

@@ -12,7 +12,7 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, builder::build_bvh2};
 use obvhs::ray::RayHit;
 use obvhs::{BvhBuildParams, ray};
-use splat_core::{Error, Mesh};
+use splat_core::{DAabb, Error, Mesh};
 use std::time::Duration;
 
 /// Padding of f32 boxes in a scene of size one.
@@ -201,7 +201,7 @@ impl Visibility {
         }
         let origin = ray.origin - self.center;
         let grown = self.half + DVec3::splat(f64::from(PAD) / self.scale);
-        let (enter, leave) = Ray { origin, ..*ray }.clip(&[-grown, grown], 0.0, t1)?;
+        let (enter, leave) = Ray { origin, ..*ray }.clip(&DAabb::new(-grown, grown), 0.0, t1)?;
         let start = (origin + ray.direction * enter) * self.scale;
         let mut local = Local {
             ray: ray::Ray::new(start.as_vec3a(), ray.direction.as_vec3a(), 0.0, f32::INFINITY),

@@ -7,7 +7,7 @@ use reference::{
     Surface, SurfaceMaterial, march_image, path_trace,
 };
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Camera, Progress};
+use splat_core::{Camera, DAabb, Progress};
 use std::f64::consts::PI;
 
 const ALBEDO: f64 = 0.5;
@@ -71,7 +71,7 @@ fn media_that_cast_no_shadow_are_seen_all_the_same() {
         material: SurfaceMaterial { diffuse: [ALBEDO; 3], ..SurfaceMaterial::default() },
     }];
     // A black slab over the ground, between it and both the sun and the eye: the eye's path is 0.2·√(1 + 25).
-    let slab = Density::Box([DVec3::new(-5.0, 0.1, -5.0), DVec3::new(5.0, 0.3, 5.0)]);
+    let slab = Density::Box(DAabb::new(DVec3::new(-5.0, 0.1, -5.0), DVec3::new(5.0, 0.3, 5.0)));
     let seen = (-2.0 * 0.2 * (1.0f64 + 25.0).sqrt()).exp();
     for (casts_shadow, arrives) in [(true, (-2.0f64 * 0.2).exp()), (false, 1.0)] {
         let liberty = Liberty { casts_shadow, ..Liberty::default() };

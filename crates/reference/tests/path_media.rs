@@ -7,14 +7,14 @@ use reference::{
     Scene, march_image,
 };
 use splat_core::glam::{DMat3, DVec3};
-use splat_core::{Grid, Progress};
+use splat_core::{DAabb, Grid, Progress};
 use std::f64::consts::PI;
 
 const WIDE: f64 = 1e6;
 
 /// A slab between z = −thickness and z = 0, as wide as the sea.
 fn slab<'a>(thickness: f64) -> Density<'a> {
-    Density::Box([DVec3::new(-WIDE, -WIDE, -thickness), DVec3::new(WIDE, WIDE, 0.0)])
+    Density::Box(DAabb::new(DVec3::new(-WIDE, -WIDE, -thickness), DVec3::new(WIDE, WIDE, 0.0)))
 }
 
 fn settings(samples: u32, max_bounces: Option<u32>) -> PathSettings {
@@ -198,7 +198,7 @@ fn thin_slab_scatters_parallel_light_once() {
 
 /// A sky of radiance `above` for z > 0 and `below` for z < 0 does not fit rows around +Y, so slabs here lie across y.
 fn slab_under_sky(tau: f64, g: f64, above: f64, below: f64) -> (Medium<'static>, Environment) {
-    let density = Density::Box([DVec3::new(-WIDE, -1.0, -WIDE), DVec3::new(WIDE, 0.0, WIDE)]);
+    let density = Density::Box(DAabb::new(DVec3::new(-WIDE, -1.0, -WIDE), DVec3::new(WIDE, 0.0, WIDE)));
     let sky = LatLong::new([1, 2], vec![[above; 3], [below; 3]]).unwrap();
     (Medium { asymmetry: g, ..Medium::new(density, tau, 1.0) }, Environment::Image(sky))
 }
@@ -267,7 +267,7 @@ fn single_scattering_in_a_volume_agrees_with_the_marcher() {
 #[test]
 fn a_broken_majorant_is_counted_and_does_not_bias() {
     let density = |_: DVec3| 2.0;
-    let bounds = [DVec3::new(-WIDE, -WIDE, -1.0), DVec3::new(WIDE, WIDE, 0.0)];
+    let bounds = DAabb::new(DVec3::new(-WIDE, -WIDE, -1.0), DVec3::new(WIDE, WIDE, 0.0));
     let density = Density::Function { function: &density, bounds, majorant: 1.6 };
     let scene = Scene { media: vec![Medium::new(density, 1.0, 0.0)], background: Some([1.0; 3]), ..Scene::default() };
     let camera = parallel(DVec3::Z, DVec3::ZERO, 1.0, [4, 4]);

@@ -7,7 +7,7 @@ use reference::{
 };
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
-use splat_core::{Mesh, Progress, ScalarField, rng};
+use splat_core::{DAabb, Mesh, Progress, ScalarField, rng};
 use std::f64::consts::PI;
 
 /// |p − center|² − r², with the exact bound over a ball.
@@ -38,8 +38,8 @@ fn glass(alpha: f64, law: SurfaceOpacity) -> SurfaceMaterial {
     SurfaceMaterial { kind, diffuse: [0.0; 3], glow: [1.0; 3], ..SurfaceMaterial::default() }
 }
 
-fn around(center: DVec3, reach: f64) -> [DVec3; 2] {
-    [center - DVec3::splat(reach), center + DVec3::splat(reach)]
+fn around(center: DVec3, reach: f64) -> DAabb {
+    DAabb::around(center, DVec3::splat(reach))
 }
 
 #[test]

@@ -54,6 +54,6 @@ pub use phase::henyey_greenstein;
 pub use pixel_samples::PixelSamples;
 pub use progress::Progress;
 pub use slice_order::{Direction, SliceOrder};
-pub use space::{Aabb, Similarity};
+pub use space::{Aabb, DAabb, Similarity};
 pub use transfer::{TransferFunction, TransferPoint};
 pub use transmittance::{Receiver, Transmittance};

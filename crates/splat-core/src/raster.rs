@@ -6,27 +6,31 @@
 //! 3. [`fold`] composites translucent splats in a [`crate::SliceOrder`] in front of it.
 //! 4. [`finish`] adds the opaque surface and the background, and box-filters samples to pixels.
 //!
+//! What blends splats in another way walks the same tiles ([`tile`]) over the same lists ([`bins`]), on the same lanes ([`lanes`]) and with
+//! the same profiles ([`kernel`]).
+//!
 //! Every pixel belongs to one task and its splats are visited in list order, so the result does not depend on threads.
 
 mod append;
-mod bins;
+pub mod bins;
 mod finish;
 mod gather;
 #[cfg(feature = "gpu")]
 pub mod gpu;
-mod kernel;
-mod lanes;
+pub mod kernel;
+pub mod lanes;
 mod opaque;
 mod project;
 mod projected;
 mod shapes;
-mod tile;
+pub mod tile;
 mod translucent;
 
 pub use finish::{Background, finish};
 pub use opaque::{OpaqueImage, resolve_opaque};
 pub use project::{project, project_into};
-pub use projected::{Detail, Projected, ProjectedDepth, ProjectedSplat};
+pub use projected::{Detail, NearDisc, Projected, ProjectedDepth, ProjectedSplat};
+pub use pulp;
 pub use translucent::fold;
 
 /// What rasterization may trade.

@@ -56,7 +56,7 @@ impl Survey {
     fn join(mut self, other: Self) -> Self {
         self.casters += other.casters;
         (0..3).for_each(|k| self.kinds[k] += other.kinds[k]);
-        self.bounds = Aabb { min: self.bounds.min.min(other.bounds.min), max: self.bounds.max.max(other.bounds.max) };
+        self.bounds = self.bounds.union(other.bounds);
         self.max_radius = self.max_radius.max(other.max_radius);
         self.medium_radius_sum += other.medium_radius_sum;
         self.coloured |= other.coloured;

@@ -92,7 +92,7 @@ pub(crate) fn heading(table: &str) -> &'static str {
         "material" | "material.medium" | "material.absorption" => "`[material.NAME]`",
         "render" => "## `[render]`",
         "render.points" => "`[render.points]`",
-        "render.points.shadow" => "`[render.points.shadow]`",
+        "render.shadow" => "`[render.shadow]`",
         "render.particles" => "`[render.particles]`",
         "animation" | "animation.track" | "animation.track.keys" => "`[animation]`",
         _ if table.starts_with("light") => "`[[light]]`",

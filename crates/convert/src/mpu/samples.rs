@@ -6,7 +6,7 @@
 use super::MpuParams;
 use crate::{ConvertError, RawPoints, SplatParams, SurfelParams, raw_to_surfels};
 use rayon::prelude::*;
-use splat_core::glam::DVec3;
+use splat_core::{DAabb, glam::DVec3};
 use std::cmp::Ordering;
 
 /// Samples in a leaf of the tree, at most.
@@ -66,18 +66,13 @@ fn estimated(points: &RawPoints, params: &MpuParams) -> Result<(DVec3, Vec<Sampl
 /// Samples that can be asked for neighbours.
 pub(super) struct SampleTree {
     pub(super) samples: Vec<Sample>,
-    /// Corners of the box of each node; entry 0 is not used.
-    boxes: Vec<[DVec3; 2]>,
+    /// The box of each node; entry 0 is not used.
+    boxes: Vec<DAabb>,
 }
 
-/// Corners of the box of some samples, which are not none.
-pub(super) fn box_of(samples: &[Sample]) -> [DVec3; 2] {
-    let first = [samples[0].position; 2];
-    samples.iter().fold(first, |[low, high], s| [low.min(s.position), high.max(s.position)])
-}
-
-fn box_distance_squared([low, high]: &[DVec3; 2], p: DVec3) -> f64 {
-    (*low - p).max(p - *high).max(DVec3::ZERO).length_squared()
+/// The box of some samples.
+pub(super) fn box_of(samples: &[Sample]) -> DAabb {
+    DAabb::of_points(samples.iter().map(|s| s.position))
 }
 
 impl SampleTree {
@@ -85,14 +80,13 @@ impl SampleTree {
     pub(super) fn new(mut samples: Vec<Sample>) -> Self {
         let leaves = samples.len().div_ceil(LEAF).next_power_of_two();
         halve(&mut samples, leaves);
-        let mut boxes = vec![[DVec3::ZERO; 2]; 2 * leaves];
+        let mut boxes = vec![DAabb::EMPTY; 2 * leaves];
         for node in (1..2 * leaves).rev() {
             boxes[node] = if node >= leaves {
                 let (from, to) = range(node, samples.len());
                 box_of(&samples[from..to])
             } else {
-                let ([a, b], [c, d]) = (boxes[2 * node], boxes[2 * node + 1]);
-                [a.min(c), b.max(d)]
+                boxes[2 * node].union(boxes[2 * node + 1])
             };
         }
         Self { samples, boxes }
@@ -102,7 +96,7 @@ impl SampleTree {
     fn visit<S>(&self, p: DVec3, state: &mut S, limit: fn(&S) -> f64, leaf: &mut impl FnMut(&mut S, usize, usize)) {
         let leaves = self.boxes.len() / 2;
         let mut stack = [(0.0f64, 0usize); 64];
-        stack[0] = (box_distance_squared(&self.boxes[1], p), 1);
+        stack[0] = (self.boxes[1].distance_squared(p), 1);
         let mut top = 1;
         while top > 0 {
             top -= 1;
@@ -115,7 +109,7 @@ impl SampleTree {
                 leaf(state, from, to);
                 continue;
             }
-            let child = |c: usize| (box_distance_squared(&self.boxes[c], p), c);
+            let child = |c: usize| (self.boxes[c].distance_squared(p), c);
             let (a, b) = (child(2 * node), child(2 * node + 1));
             (stack[top], stack[top + 1]) = if a.0 <= b.0 { (b, a) } else { (a, b) };
             top += 2;
@@ -165,8 +159,7 @@ fn halve(samples: &mut [Sample], leaves: usize) {
     if leaves < 2 {
         return;
     }
-    let [low, high] = box_of(samples);
-    let side = high - low;
+    let side = box_of(samples).size();
     let axis = (0..3).fold(0, |best, a| if side[a] > side[best] { a } else { best });
     let middle = samples.len() / 2;
     samples.select_nth_unstable_by(middle, |a, b| a.position[axis].total_cmp(&b.position[axis]).then(order(a, b)));

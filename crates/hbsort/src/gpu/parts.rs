@@ -3,7 +3,7 @@
 //! A part is a run of the ids. Parts are sorted one after the other by one recording, and merged here by (depth, id),
 //! which no two splats share: the result is that of all splats at once, however they were cut.
 
-use super::{Capacities, Recorded, record, slice_starts};
+use super::{Capacities, Recorded, record, slices_of};
 use crate::radix::depth_of_key;
 use crate::slicing::Slicing;
 use crate::{Error, Params, ThicknessRule, thickness};
@@ -100,8 +100,10 @@ pub fn join(parts: &[Sorted], cloud: &Cloud, ids: Option<&[u32]>, params: &Param
     };
     let (thickness, _) = given.map_or_else(chosen, |t| (t, ThicknessRule::Given));
     let slicing = Slicing::new(near, far, thickness, params.direction, 0);
+    let (slice_starts, slice_indices) = slices_of(&slicing, entries.iter().map(|entry| (entry >> 32) as u32));
     Ok(SliceOrder {
-        slice_starts: slice_starts(&slicing, entries.iter().map(|entry| (entry >> 32) as u32)),
+        slice_starts,
+        slice_indices,
         direction: params.direction,
         near,
         far,

@@ -4,7 +4,7 @@ use convert::RawPoints;
 use convert::read::{Loaded, Mended, ReadLimits, UpAxis, up_axis};
 use organza::Error;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Aabb, Grid, Mesh, Progress};
+use splat_core::{Aabb, DAabb, Grid, Mesh, Progress};
 use std::path::Path;
 
 /// What a data file holds.
@@ -18,8 +18,8 @@ pub(super) struct FileInfo {
     pub(super) counts: Vec<(&'static str, u64)>,
     /// Attributes beside positions: `normal`, `color`, `value`, `classification`.
     pub(super) attributes: Vec<&'static str>,
-    /// Lowest and highest corner in the file's own coordinates; `None` for an empty file.
-    pub(super) bounds: Option<[DVec3; 2]>,
+    /// In the file's own coordinates; `None` for an empty file.
+    pub(super) bounds: Option<DAabb>,
     /// Lowest and highest value of a volume.
     pub(super) range: Option<[f32; 2]>,
     /// Columns, fields and statements of the file that are not used, as the file names them.
@@ -57,9 +57,9 @@ fn present(columns: &[(&'static str, bool)]) -> Vec<&'static str> {
     columns.iter().filter(|(_, on)| *on).map(|(name, _)| *name).collect()
 }
 
-fn bounds_of(origin: DVec3, positions: &[Vec3]) -> Option<[DVec3; 2]> {
+fn bounds_of(origin: DVec3, positions: &[Vec3]) -> Option<DAabb> {
     let bounds = Aabb::of_points(positions);
-    (!bounds.is_empty()).then(|| [origin + bounds.min.as_dvec3(), origin + bounds.max.as_dvec3()])
+    (!bounds.is_empty()).then(|| DAabb::new(origin + bounds.min.as_dvec3(), origin + bounds.max.as_dvec3()))
 }
 
 fn of_mesh(mesh: &Mesh) -> FileInfo {
@@ -97,12 +97,11 @@ fn of_grid(grid: &Grid) -> FileInfo {
     // The corners of the lattice bound it, sheared or not.
     let last = |bit: usize, n: usize| if bit == 0 { 0 } else { n.saturating_sub(1) };
     let corners = (0..8).map(|c| grid.position(last(c & 1, x), last(c & 2, y), last(c & 4, z)));
-    let bounds = corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |b, p| [b[0].min(p), b[1].max(p)]);
     let range = grid.values.iter().fold([f32::INFINITY, f32::NEG_INFINITY], |r, v| [r[0].min(*v), r[1].max(*v)]);
     FileInfo {
         kind: "volume",
         counts: vec![("x", x as u64), ("y", y as u64), ("z", z as u64)],
-        bounds: Some(bounds),
+        bounds: Some(DAabb::of_points(corners)),
         range: (!grid.values.is_empty()).then_some(range),
         ..FileInfo::default()
     }
@@ -118,7 +117,7 @@ mod tests {
         let axes = DMat3::from_diagonal(DVec3::new(-1.0, 2.0, 3.0));
         let grid = Grid { origin: DVec3::ONE, axes, dims: [2, 2, 1], values: vec![3.0, -1.0, 2.0, 0.0] };
         let info = of_grid(&grid);
-        assert_eq!(info.bounds, Some([DVec3::new(0.0, 1.0, 1.0), DVec3::new(1.0, 3.0, 1.0)]));
+        assert_eq!(info.bounds, Some(DAabb::new(DVec3::new(0.0, 1.0, 1.0), DVec3::new(1.0, 3.0, 1.0))));
         assert_eq!(info.range, Some([-1.0, 3.0]));
     }
 

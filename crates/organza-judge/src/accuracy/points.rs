@@ -130,7 +130,7 @@ fn cells(facts: &Facts, options: &Options) -> Result<Knob, String> {
     Ok(Knob {
         name: "shadow table cells",
         size_meaning: "1 / cells along a side",
-        set: |request, value| request.scene.render.points.shadow.cells = Some(value as u32),
+        set: |request, value| request.scene.render.shadow.cells = Some(value as u32),
         steps: parts.iter().map(at).collect(),
         ends: [end, 2.0 * end].iter().map(at).collect(),
         end_is_exact: false,
@@ -154,7 +154,7 @@ fn mapping(scene: &Scene, facts: &Facts) -> Result<Knob, String> {
         name: "shadow table mapping",
         size_meaning: "",
         set: |request, value| {
-            request.scene.render.points.shadow.mapping =
+            request.scene.render.shadow.mapping =
                 if value == 0.0 { ShadowMapping::Octahedral } else { ShadowMapping::Polar };
         },
         steps: vec![choice("octahedral", 0.0), choice("polar", 1.0)],
@@ -171,7 +171,7 @@ fn absorbance_cut(facts: &Facts, options: &Options) -> Result<Knob, String> {
     Ok(Knob {
         name: "absorbance cut",
         size_meaning: "e^-A_cut",
-        set: |request, value| request.scene.render.points.shadow.absorbance_cut = Some(value),
+        set: |request, value| request.scene.render.shadow.absorbance_cut = Some(value),
         steps: cuts.iter().map(|a| step(format!("A_cut {a}"), (-a).exp(), *a)).collect(),
         ends: vec![step("A_cut 40", 0.0, 40.0)],
         end_is_exact: true,

@@ -73,9 +73,7 @@ impl Sorter<'_> {
             // The result, and a key of eight bytes beside each id while it is sorted.
             Ordering::Centre | Ordering::Distance => 4 * n + 16 * n,
             Ordering::Unsorted => 4 * n,
-            _ => {
-                4 * (order.input_from_sorted.len() + order.slice_starts.len()) as u64 + self.scratch_bytes(ordering)?
-            }
+            _ => order.bytes() + self.scratch_bytes(ordering)?,
         };
         Ok((order, median_with_spread(&seconds), bytes))
     }

@@ -6,10 +6,9 @@ use glam::{DMat3, DQuat, DVec3, Vec3};
 use organza::scene::{MediumShape, Scene, SceneMaterial, SceneObject, Source, VolumeSource};
 use organza::{Error, RenderOptions, expression_field, printable};
 use reference::{
-    Classified, ColorAt, Density, Lattice, Liberty, Medium, Placed, Surface, SurfaceKind, SurfaceMaterial,
+    Classified, ColorAt, Density, Lattice, Liberty, Medium, Placed, Surface, SurfaceKind, SurfaceMaterial, TurnedBox,
 };
-use reference::{TurnedBox, box_around};
-use splat_core::{Grid, Mesh, ScalarField, Shading, Similarity, optics};
+use splat_core::{DAabb, Grid, Mesh, ScalarField, Shading, Similarity, optics};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -43,11 +42,11 @@ pub(super) struct MediumBody {
 
 /// A density in the world.
 enum Shape {
-    Box([DVec3; 2]),
+    Box(DAabb),
     Ball { center: DVec3, radius: f64 },
     Grid(Grid),
-    Field { field: Placed<ExpressionField>, bounds: [DVec3; 2], majorant: f64 },
-    Turned { field: TurnedBox, bounds: [DVec3; 2] },
+    Field { field: Placed<ExpressionField>, bounds: DAabb, majorant: f64 },
+    Turned { field: TurnedBox, bounds: DAabb },
     Volume(Arc<Classified>),
 }
 
@@ -172,12 +171,12 @@ fn shape(object: &SceneObject, options: &RenderOptions) -> Result<(Shape, f64), 
         Source::Medium(MediumShape::Ball { center, radius, extinction, .. }) => {
             (Shape::Ball { center: t.apply(*center), radius: radius * t.scale }, *extinction)
         }
-        Source::Medium(MediumShape::Box { min, max, extinction, .. }) => {
-            let bounds = box_around(|p| t.apply(p), [*min, *max]);
+        Source::Medium(MediumShape::Box { bounds: own, extinction, .. }) => {
+            let bounds = DAabb::of_points(own.corners().map(|p| t.apply(p)));
             let shape = if t.rotation == DQuat::IDENTITY {
                 Shape::Box(bounds)
             } else {
-                Shape::Turned { field: TurnedBox::new([*min, *max], t), bounds }
+                Shape::Turned { field: TurnedBox::new(*own, t), bounds }
             };
             (shape, *extinction)
         }
@@ -191,7 +190,7 @@ fn shape(object: &SceneObject, options: &RenderOptions) -> Result<(Shape, f64), 
         }
         Source::Density(d) => {
             let field = Placed::new(expression_field(&d.expression, object)?, t, d.bounds);
-            let bounds = box_around(|p| t.apply(p), d.bounds);
+            let bounds = DAabb::of_points(d.bounds.corners().map(|p| t.apply(p)));
             let majorant = majorant(&field, bounds);
             (Shape::Field { field, bounds, majorant }, d.extinction)
         }
@@ -208,8 +207,8 @@ fn shape(object: &SceneObject, options: &RenderOptions) -> Result<(Shape, f64), 
 
 /// A number that a field does not exceed in a box: the largest upper bound over balls around its cells, or where there is
 /// none a guess from samples, which the tracer watches.
-fn majorant(field: &Placed<ExpressionField>, [low, high]: [DVec3; 2]) -> f64 {
-    let size = high - low;
+fn majorant(field: &Placed<ExpressionField>, bounds: DAabb) -> f64 {
+    let (low, size) = (bounds.min, bounds.size());
     let cell = size.max_element() / MAJORANT_CELLS;
     let count = (size / cell).ceil().max(DVec3::ONE);
     let step = size / count;

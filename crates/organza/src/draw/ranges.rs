@@ -54,10 +54,8 @@ fn spans(frame: &Frame<'_>) -> Vec<(usize, [f32; 2])> {
         }
     }
     for own in &loaded.own {
-        let [low, high] = own.world_box();
-        for k in 0..8u32 {
-            let mask = glam::BVec3::new(k & 1 == 1, k >> 1 & 1 == 1, k >> 2 & 1 == 1);
-            let z = frame.camera.view_from_world(glam::DVec3::select(mask, high, low)).z as f32;
+        for corner in own.world_box().corners() {
+            let z = frame.camera.view_from_world(corner).z as f32;
             meet(own.object, [z, z]);
         }
     }

@@ -3,8 +3,7 @@
 use crate::Error;
 use convert::read::{Loaded, Mended, Notes, ReadLimits};
 use convert::{RawPoints, SharedField};
-use glam::DVec3;
-use splat_core::{Grid, Mesh, Progress};
+use splat_core::{DAabb, Grid, Mesh, Progress};
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -19,7 +18,7 @@ pub(super) enum FileData {
 }
 
 /// The level set of scattered points, and its bounds.
-pub(super) type Fitted = (SharedField, [DVec3; 2]);
+pub(super) type Fitted = (SharedField, DAabb);
 
 /// The files of a scene that were read.
 #[derive(Default)]

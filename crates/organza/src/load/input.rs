@@ -14,7 +14,7 @@ use convert::{
 };
 use glam::DVec3;
 use pbsr::{BoundedExtinction, Matter};
-use splat_core::{Grid, Mesh, TransferFunction};
+use splat_core::{DAabb, Grid, Mesh, TransferFunction};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -28,8 +28,8 @@ pub(super) enum Input<'a> {
     Points(&'a Path, Arc<RawPoints>, SurfelParams),
     Volume(Arc<Grid>, &'a TransferFunction, VolumeParams),
     /// The zero set of a field in a box; of a trilinear one that nothing clips with its volume and level.
-    Surface(SharedField, [DVec3; 2], MeshParams, Option<(Arc<Grid>, f32)>),
-    Density(SharedField, [DVec3; 2], DensityParams),
+    Surface(SharedField, DAabb, MeshParams, Option<(Arc<Grid>, f32)>),
+    Density(SharedField, DAabb, DensityParams),
     Procedural(CloudShape, f64, VolumeParams),
     Medium(MediumShape, SplatParams),
     Rectangle(RectangleSource, f64, SplatParams),
@@ -94,13 +94,13 @@ impl Input<'_> {
             Self::Density(field, bounds, params) if !params.volume.normals => {
                 BoundedExtinction::new(Matter::Density(field.clone()), params.extinction * scale, *bounds)
             }
-            Self::Medium(MediumShape::Box { min, max, extinction, .. }, _) => {
-                BoundedExtinction::new(Matter::Everywhere, extinction * scale, [*min, *max])
+            Self::Medium(MediumShape::Box { bounds, extinction, .. }, _) => {
+                BoundedExtinction::new(Matter::Everywhere, extinction * scale, *bounds)
             }
             Self::Medium(MediumShape::Ball { center, radius, extinction, .. }, _) => {
                 let matter = Matter::Ball { center: *center, radius: *radius };
-                let reach = DVec3::splat(*radius);
-                BoundedExtinction::new(matter, extinction * scale, [*center - reach, *center + reach])
+                let bounds = DAabb::around(*center, DVec3::splat(*radius));
+                BoundedExtinction::new(matter, extinction * scale, bounds)
             }
             _ => None,
         }
@@ -154,7 +154,7 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
         }
         Source::LevelSet(source) => {
             let (field, bounds) = level_set(source, object, context)?;
-            let step = (bounds[1] - bounds[0]).max_element() / LEVEL_SET_STEPS;
+            let step = bounds.size().max_element() / LEVEL_SET_STEPS;
             surface(field, None, bounds, step, object, splat, opacity)?
         }
         Source::Slice(source) => {
@@ -198,7 +198,7 @@ fn at_spacing<T>(
 fn surface<'a>(
     field: SharedField,
     trilinear: Option<(Arc<Grid>, f32)>,
-    bounds: [DVec3; 2],
+    bounds: DAabb,
     step: f64,
     object: &SceneObject,
     splat: SplatParams,

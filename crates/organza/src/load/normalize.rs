@@ -3,7 +3,7 @@
 
 use super::own::Own;
 use crate::scene::SceneLight;
-use splat_core::{Camera, Cloud, Projection};
+use splat_core::{Camera, Cloud, DAabb, Projection};
 
 /// Scales everything by 2^−e, where 2^e is the size of the bounds of all splats and objects, and returns e.
 ///
@@ -38,8 +38,7 @@ fn diagonal(cloud: &Cloud, own: &[Own]) -> f64 {
     if own.is_empty() {
         return f64::from(bounds.diagonal());
     }
-    let splats = (!bounds.is_empty()).then(|| [bounds.min, bounds.max].map(|p| cloud.origin + p.as_dvec3()));
-    let boxes = own.iter().map(Own::world_box).chain(splats);
-    let all = boxes.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]);
-    all.map_or(0.0, |[low, high]| (high - low).length())
+    // Nothing stays nothing: its corners are infinite.
+    let splats = DAabb::new(cloud.origin + bounds.min.as_dvec3(), cloud.origin + bounds.max.as_dvec3());
+    own.iter().map(Own::world_box).fold(splats, DAabb::union).diagonal()
 }

@@ -110,8 +110,8 @@ fn predict(input: &Input<'_>) -> Result<Prediction, ConvertError> {
         Input::Surface(field, bounds, params, _) => cost::surface(field.as_ref(), *bounds, params),
         Input::Density(field, bounds, params) => cost::density(field.as_ref(), *bounds, params),
         Input::Procedural(shape, spacing, params) => cost::procedural(shape, *spacing, params),
-        Input::Medium(MediumShape::Box { min, max, extinction, spacing }, params) => {
-            cost::medium_box(*min, *max, *extinction, *spacing, params)
+        Input::Medium(MediumShape::Box { bounds, extinction, spacing }, params) => {
+            cost::medium_box(*bounds, *extinction, *spacing, params)
         }
         Input::Medium(MediumShape::Ball { center, radius, extinction, spacing }, params) => {
             cost::medium_ball(*center, *radius, *extinction, *spacing, params)
@@ -264,9 +264,7 @@ pub(super) fn as_it_is(most: f64, params: &SplatParams) -> Result<TransferFuncti
 
 fn medium(shape: &MediumShape, params: &SplatParams) -> Result<Cloud, ConvertError> {
     match *shape {
-        MediumShape::Box { min, max, extinction, spacing } => {
-            convert::medium_box(min, max, extinction, spacing, params)
-        }
+        MediumShape::Box { bounds, extinction, spacing } => convert::medium_box(bounds, extinction, spacing, params),
         MediumShape::Ball { center, radius, extinction, spacing } => {
             convert::medium_ball(center, radius, extinction, spacing, params)
         }

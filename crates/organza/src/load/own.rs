@@ -13,7 +13,7 @@ use convert::{DensityParams, SharedField};
 use glam::DVec3;
 use pbsr::BoundedExtinction;
 use rayon::prelude::*;
-use splat_core::{Footprint, Grid, Mesh, Similarity, SplatKind, TransferFunction, optics};
+use splat_core::{DAabb, Footprint, Grid, Mesh, Similarity, SplatKind, TransferFunction, optics};
 use std::sync::Arc;
 
 /// Cells along an object in which lines look for roots.
@@ -41,7 +41,7 @@ pub(crate) struct Own {
     /// From the object to the normalized world.
     pub(crate) transform: Similarity,
     /// Bounds of what can be seen, object units.
-    pub(crate) bounds: [DVec3; 2],
+    pub(crate) bounds: DAabb,
     /// Radius that its splats have or would have, normalized world units.
     pub(crate) radius: f64,
     /// Elements that a sampler has tables of, about: cells with extinction, triangles, cubes that a surface meets.
@@ -137,14 +137,9 @@ impl Own {
         }
     }
 
-    /// Opposite corners of a box in the world that holds the object.
-    pub(crate) fn world_box(&self) -> [DVec3; 2] {
-        let corner = |k: u32| {
-            let at = |axis: usize| self.bounds[(k >> axis & 1) as usize][axis];
-            self.transform.apply(DVec3::new(at(0), at(1), at(2)))
-        };
-        let all = (0..8).map(corner);
-        all.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)])
+    /// A box in the world that holds the object.
+    pub(crate) fn world_box(&self) -> DAabb {
+        DAabb::of_points(self.bounds.corners().map(|p| self.transform.apply(p)))
     }
 
     /// Bytes that a sampler's tables take, about, and what making them takes beside.
@@ -167,7 +162,7 @@ impl Own {
 }
 
 /// Elements that a sampler has tables of, about; of a lattice's isosurface the splats are as many as steps across it.
-fn elements(body: &Body, [low, high]: [DVec3; 2], splats: u64) -> u64 {
+fn elements(body: &Body, bounds: DAabb, splats: u64) -> u64 {
     match body {
         Body::Cells { grid, transfer, .. } => {
             grid.values.par_iter().filter(|v| transfer.at(**v).extinction > 0.0).count() as u64
@@ -176,7 +171,7 @@ fn elements(body: &Body, [low, high]: [DVec3; 2], splats: u64) -> u64 {
         Body::Triangles(mesh) => mesh.triangles.len() as u64,
         Body::Field(field) => u64::from(field.cells()).pow(3),
         Body::Surface { spacing, .. } => {
-            let cells = line_cells((high - low).max_element(), *spacing);
+            let cells = line_cells(bounds.size().max_element(), *spacing);
             6 * u64::from(cells).pow(2)
         }
     }
@@ -188,7 +183,7 @@ pub(crate) fn line_cells(width: f64, spacing: f64) -> u32 {
 }
 
 /// Data, bounds and the distance of splats, object units.
-type Data = (Body, [DVec3; 2], f64);
+type Data = (Body, DAabb, f64);
 
 fn data(
     prepared: &Prepared<'_>,
@@ -203,8 +198,7 @@ fn data(
             _ => 0.0,
         };
         let (seen, side) = field.seen();
-        let around = |[low, high]: [DVec3; 2], p: DVec3| [low.min(p - 0.5 * side), high.max(p + 0.5 * side)];
-        let bounds = seen.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], around);
+        let bounds = seen.fold(DAabb::EMPTY, |all, p| all.union(DAabb::around(p, 0.5 * side)));
         let some = field.max() > 0.0;
         return Ok(some.then_some((Body::Field(field), bounds, spacing)));
     }
@@ -258,7 +252,7 @@ fn world_spacing(density: &convert::Density) -> f64 {
 /// A density on a lattice whose voxels fill its box, values as extinction in 1/world unit.
 fn density_lattice(
     field: &SharedField,
-    bounds: [DVec3; 2],
+    bounds: DAabb,
     params: &DensityParams,
 ) -> Result<(Grid, TransferFunction), Error> {
     let splat = &params.volume.splat;
@@ -280,9 +274,8 @@ fn triangles(mut mesh: Mesh, splats: u64) -> Option<Data> {
     let corner = |v: u32| mesh.position[v as usize].as_dvec3();
     let area = |t: &[u32; 3]| 0.5 * (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).length();
     let area: f64 = mesh.triangles.iter().map(area).sum();
-    let used = || mesh.triangles.iter().flatten().map(|v| corner(*v));
-    let (low, high) = (used().reduce(DVec3::min)?, used().reduce(DVec3::max)?);
-    let bounds = [mesh.origin + low, mesh.origin + high];
+    let used = DAabb::of_points(mesh.triangles.iter().flatten().map(|v| corner(*v)));
+    let bounds = DAabb::new(mesh.origin + used.min, mesh.origin + used.max);
     // Particles are thinned by the angle at which they are seen: of faces, not of normals that lean from them.
     let piece = area / splats.max(1) as f64;
     convert::flatten_leaning(&mut mesh, piece);
@@ -303,34 +296,34 @@ fn rectangle(r: &RectangleSource) -> Mesh {
 /// Where in a box a field may be zero.
 pub(super) struct Search {
     /// The part of the box; the whole box where the field knows no bound.
-    bounds: [DVec3; 2],
+    bounds: DAabb,
     /// Cells that may hold a zero times the area of a cell's side; infinite where the field knows no bound.
     pub(super) area: f64,
 }
 
 impl Search {
-    pub(super) fn new(field: &SharedField, [low, high]: [DVec3; 2]) -> Self {
-        let cells = Cells::new([low, high], SURFACE_CELLS);
-        let (mut found, mut n) = ([DVec3::INFINITY, DVec3::NEG_INFINITY], 0.0);
+    pub(super) fn new(field: &SharedField, whole: DAabb) -> Self {
+        let cells = Cells::new(whole, SURFACE_CELLS);
+        let (mut found, mut n) = (DAabb::EMPTY, 0.0);
         for k in 0..cells.count() {
             let (middle, radius) = cells.ball(k);
             let Some((least, most)) = field.bound(middle, radius) else {
-                return Self { bounds: [low, high], area: f64::INFINITY };
+                return Self { bounds: whole, area: f64::INFINITY };
             };
             if least <= 0.0 && most >= 0.0 && field.may_be_in_domain(middle, radius) {
-                found = [found[0].min(middle - 0.5 * cells.step), found[1].max(middle + 0.5 * cells.step)];
+                found = found.union(DAabb::around(middle, 0.5 * cells.step));
                 n += 1.0;
             }
         }
-        let some = found[0].cmplt(found[1]).all();
-        let bounds = if some { found.map(|p| p.clamp(low, high)) } else { [low, high] };
+        let within = |p: DVec3| p.clamp(whole.min, whole.max);
+        let bounds = if found.is_solid() { DAabb::new(within(found.min), within(found.max)) } else { whole };
         Self { bounds, area: n * libm::pow(cells.step.element_product(), 2.0 / 3.0) }
     }
 }
 
 /// Bounds of the lattice points with extinction and one cell around them, no farther than voxels reach; those of the voxels
 /// where there are none.
-pub(super) fn cell_bounds(grid: &Grid, transfer: &TransferFunction) -> [DVec3; 2] {
+pub(super) fn cell_bounds(grid: &Grid, transfer: &TransferFunction) -> DAabb {
     let [nx, ny, _] = grid.dims;
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for (row, values) in grid.values.chunks(nx).enumerate() {
@@ -343,11 +336,7 @@ pub(super) fn cell_bounds(grid: &Grid, transfer: &TransferFunction) -> [DVec3; 2
     let (first, last) = (DVec3::splat(-0.5), DVec3::from_array(grid.dims.map(|n| n as f64 - 0.5)));
     let (low, high) =
         if low.cmple(high).all() { ((low - 1.0).max(first), (high + 1.0).min(last)) } else { (first, last) };
-    let corner = |k: u32| {
-        let index = DVec3::select(glam::BVec3::new(k & 1 == 1, k >> 1 & 1 == 1, k >> 2 & 1 == 1), high, low);
-        grid.origin + grid.axes * index
-    };
-    (0..8).map(corner).fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[l, h], p| [l.min(p), h.max(p)])
+    DAabb::of_points(DAabb::new(low, high).corners().map(|index| grid.origin + grid.axes * index))
 }
 
 /// Cells that fill a box.
@@ -359,10 +348,10 @@ pub(super) struct Cells {
 
 impl Cells {
     /// About `longest` cells along the longest side.
-    pub(super) fn new([low, high]: [DVec3; 2], longest: f64) -> Self {
-        let sides = high - low;
+    pub(super) fn new(bounds: DAabb, longest: f64) -> Self {
+        let sides = bounds.size();
         let counts = (sides / sides.max_element() * longest).ceil().max(DVec3::ONE);
-        Self { low, step: sides / counts, counts: counts.to_array().map(|n| n as usize) }
+        Self { low: bounds.min, step: sides / counts, counts: counts.to_array().map(|n| n as usize) }
     }
 
     pub(super) fn count(&self) -> usize {

@@ -26,9 +26,7 @@ pub(crate) use form::form;
 pub(crate) use kept::Kept;
 use layers::{accumulate, of_hits, std_error};
 use parts::{Part, sources};
-use pbsr::Occluder;
 use splat_core::raster::OpaqueImage;
-use splat_core::shade::ChannelLayout;
 use splat_core::{Accumulator, LayerData};
 use std::ops::Range;
 
@@ -81,10 +79,10 @@ impl Fold for Particles<'_> {
             return Ok(());
         }
         let layout = frame.layout();
-        let occluder = occluder(opaque, &layout);
+        let occluder = occluder(opaque);
         let maps = frame.maps(cost)?;
         let average = cost.measure(pass::PARTICLES, |stage| {
-            let average = fold(frame, &inside, maps, range.clone(), occluder.as_ref(), session)?;
+            let average = fold(frame, &inside, maps, range.clone(), occluder, session)?;
             stage.items_in = inside.len() as u64;
             stage.items_out = average.particles;
             stage.bytes = average.ensemble.bytes();
@@ -108,8 +106,8 @@ impl Fold for Particles<'_> {
         // Without particles there is no noise.
         let none = || LayerData::Scalar(vec![0.0; finished.layers.size.iter().map(|s| *s as usize).product()]);
         let error = self.average.as_ref().map_or_else(none, |average| {
-            let occluder = finished.opaque.and_then(|opaque| occluder(opaque, &self.frame.layout()));
-            std_error(&average.ensemble, occluder.as_ref(), self.frame)
+            let occluder = finished.opaque.and_then(occluder);
+            std_error(&average.ensemble, occluder, self.frame)
         });
         finished.layers.insert("std_error", error);
     }
@@ -132,15 +130,9 @@ fn parts<'a>(frame: &'a Frame<'a>, session: &mut Session<'_>, cost: &mut CostRec
     Ok(parts)
 }
 
-/// What hides particles, with its beauty.
-fn occluder(opaque: &OpaqueImage, layout: &ChannelLayout) -> Option<Occluder> {
-    if opaque.depth.is_empty() {
-        return None;
-    }
-    let color = |k: usize| {
-        std::array::from_fn(|c| layout.effects().map(|(_, first)| opaque.channels[first + c][k]).sum::<f32>())
-    };
-    Some(Occluder { depth: opaque.depth.clone(), color: (0..opaque.depth.len()).map(color).collect() })
+/// What hides particles.
+fn occluder(opaque: &OpaqueImage) -> Option<&OpaqueImage> {
+    (!opaque.depth.is_empty()).then_some(opaque)
 }
 
 /// What went wrong with the particles of the named object or objects: a limit, or data that samplers do not take. They are

@@ -68,7 +68,7 @@ fn sorted(frame: &Frame<'_>, technique: Technique, cost: &mut CostRecord) -> Res
         let order = order.map_err(|e| Error::Internal(e.to_string()))?;
         stage.items_in = translucent.len() as u64;
         stage.items_out = order.input_from_sorted.len() as u64;
-        stage.bytes = 4 * (order.input_from_sorted.len() + order.slice_starts.len()) as u64;
+        stage.bytes = order.bytes();
         Ok::<_, Error>(order)
     })?;
     Ok(match frame.settings.points.first_slices {

@@ -7,19 +7,21 @@ use super::projected::{Coverage, Projected};
 use rayon::prelude::*;
 
 /// Side of a tile, pixels.
-pub(crate) const TILE: usize = 32;
+pub const TILE: usize = 32;
 
 /// Splats binned by one task.
 const CHUNK: usize = 1 << 15;
 
-/// Tile lists of all chunks.
-pub(crate) struct Bins {
+/// Tile lists of all chunks: tiles row by row from the top left.
+#[derive(Debug, Clone)]
+pub struct Bins {
     pub(crate) columns: usize,
     pub(crate) rows: usize,
     chunks: Vec<ChunkLists>,
 }
 
 /// Tile lists of one chunk in CSR form.
+#[derive(Debug, Clone)]
 struct ChunkLists {
     starts: Vec<u32>,
     entries: Vec<u32>,
@@ -29,35 +31,49 @@ struct ChunkLists {
 
 impl Bins {
     /// The splats of tile `t` in list order, as ids, a slice a chunk.
-    pub(crate) fn tile(&self, t: usize) -> impl Iterator<Item = &[u32]> {
+    ///
+    /// # Panics
+    /// If there is no tile `t`, as for all that ask for one.
+    pub fn tile(&self, t: usize) -> impl Iterator<Item = &[u32]> {
         self.chunks.iter().map(move |c| &c.entries[c.starts[t] as usize..c.starts[t + 1] as usize])
     }
 
     /// True when no splat reaches tile `t`.
-    pub(crate) fn is_empty(&self, t: usize) -> bool {
+    pub fn is_empty(&self, t: usize) -> bool {
         self.tile(t).all(<[u32]>::is_empty)
     }
 
-    pub(crate) fn tiles(&self) -> usize {
+    /// First pixel of tile `t`.
+    pub fn corner(&self, t: usize) -> [usize; 2] {
+        [t % self.columns * TILE, t / self.columns * TILE]
+    }
+
+    /// Number of tiles.
+    pub fn tiles(&self) -> usize {
         self.columns * self.rows
     }
 
-    pub(crate) fn entries(&self) -> u64 {
+    /// Entries of all lists.
+    pub fn entries(&self) -> u64 {
         self.chunks.iter().map(|c| c.entries.len() as u64).sum()
     }
 
     /// Splats that reach any tile.
-    pub(crate) fn splats(&self) -> u64 {
+    pub fn splats(&self) -> u64 {
         self.chunks.iter().map(|c| c.splats).sum()
     }
 
-    pub(crate) fn bytes(&self) -> u64 {
+    /// Bytes of all lists.
+    pub fn bytes(&self) -> u64 {
         self.chunks.iter().map(|c| 4 * (c.entries.len() + c.starts.len()) as u64).sum()
     }
 }
 
 /// Bins the splats `ids`, in that order.
-pub(crate) fn bin(projected: &Projected, ids: &[u32]) -> Bins {
+///
+/// # Panics
+/// If an id is not below the number of projected splats.
+pub fn bin(projected: &Projected, ids: &[u32]) -> Bins {
     let columns = (projected.size[0] as usize).div_ceil(TILE);
     let rows = (projected.size[1] as usize).div_ceil(TILE);
     let chunks = ids.par_chunks(CHUNK).map(|ids| bin_chunk(projected, ids, columns, columns * rows)).collect();

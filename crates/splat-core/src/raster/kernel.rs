@@ -1,7 +1,7 @@
 //! The profile of a footprint as a fragment evaluates it: a polynomial in t = 1 − s where one of degree 10 suffices.
 //!
 //! With q = cutoff²/2 the profile of [`Footprint`] is the tail of an exponential series,
-//! w = e^−q·Σ_{k≥3} (qt)^k/k! = t³·G(t). G is smooth and positive, so for q ≤ [`POLYNOMIAL_LIMIT`] the polynomial of
+//! w = e^−q·Σ_{k≥3} (qt)^k/k! = t³·G(t). G is smooth and positive, so for q ≤ 4.5 the polynomial of
 //! degree 7 through the Chebyshev points of \[0.2, 1\] stands for it: |error of w| < 4·10⁻⁷ (the profile is about 1 at
 //! its centre). The interval leaves out small t, where t³ forgives all. w and its first two slopes vanish at the rim
 //! by the factor t³, so the area outside needs no mask but t = max(1 − s, 0). Sharper footprints are evaluated by the
@@ -27,7 +27,7 @@ const FIT_BEGIN: f64 = 0.2;
 
 /// One footprint, ready for fragments.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Kernel {
+pub struct Kernel {
     pub(crate) cutoff: f32,
     /// 1/∫w dA for R = 1.
     pub(crate) norm: f32,
@@ -47,7 +47,8 @@ pub(crate) struct Kernel {
 }
 
 impl Kernel {
-    pub(crate) fn new(footprint: &Footprint) -> Self {
+    /// Of a footprint.
+    pub fn new(footprint: &Footprint) -> Self {
         let sharpness = footprint.sharpness();
         let smooth = sharpness <= POLYNOMIAL_LIMIT;
         Self {
@@ -74,9 +75,9 @@ impl Kernel {
         table
     }
 
-    /// w at t = max(1 − s, 0).
+    /// w at t = max(1 − s, 0), 1 − e^−q·(1 + q + q²/2) at the centre.
     #[inline(always)]
-    pub(crate) fn profile<S: Simd>(&self, simd: S, t: Lanes<S>) -> Lanes<S> {
+    pub fn profile<S: Simd>(&self, simd: S, t: Lanes<S>) -> Lanes<S> {
         let of = |v: f32| Lanes::splat(simd, v);
         if self.smooth {
             // Pairs first: half the latency of Horner's scheme.

@@ -2,16 +2,36 @@
 //!
 //! Lanes never mix and a multiplication is fused with an addition where [`Lanes::mul_add`] says so and nowhere else, so
 //! every instruction set gives the same bits.
+//!
+//! ```
+//! use splat_core::raster::{lanes::Lanes, pulp};
+//!
+//! /// e^−x of one number, on all lanes of the machine.
+//! struct Transmittance(f32);
+//!
+//! impl pulp::WithSimd for Transmittance {
+//!     type Output = f32;
+//!
+//!     fn with_simd<S: pulp::Simd>(self, simd: S) -> f32 {
+//!         let mut out = [0.0; splat_core::raster::lanes::MAX_LANES];
+//!         Lanes::splat(simd, self.0).exp_neg().store(&mut out);
+//!         out[0]
+//!     }
+//! }
+//!
+//! let half = pulp::Arch::new().dispatch(Transmittance(std::f32::consts::LN_2));
+//! assert!((half - 0.5).abs() < 1e-6);
+//! ```
 
 use pulp::Simd;
 use std::ops::{Add, Div, Mul, Sub};
 
 /// The most lanes that any instruction set has.
-pub(crate) const MAX_LANES: usize = 16;
+pub const MAX_LANES: usize = 16;
 
 /// One f32 per lane.
 #[derive(Clone, Copy)]
-pub(crate) struct Lanes<S: Simd> {
+pub struct Lanes<S: Simd> {
     simd: S,
     value: S::f32s,
 }
@@ -32,74 +52,84 @@ operator!(Add add add_f32s, Sub sub sub_f32s, Mul mul mul_f32s, Div div div_f32s
 
 impl<S: Simd> Lanes<S> {
     /// Lanes of this instruction set.
-    pub(crate) const COUNT: usize = S::F32_LANES;
+    pub const COUNT: usize = S::F32_LANES;
 
     /// The same number in all lanes.
     #[inline(always)]
-    pub(crate) fn splat(simd: S, value: f32) -> Self {
+    pub fn splat(simd: S, value: f32) -> Self {
         Self { simd, value: simd.splat_f32s(value) }
     }
 
-    /// The first lanes of `from`, which must have as many.
+    /// The first lanes of `from`.
+    ///
+    /// # Panics
+    /// If `from` has fewer.
     #[inline(always)]
-    pub(crate) fn load(simd: S, from: &[f32]) -> Self {
+    pub fn load(simd: S, from: &[f32]) -> Self {
         Self { simd, value: S::as_simd_f32s(from).0[0] }
     }
 
-    /// Writes to the first lanes of `to`, which must have as many.
+    /// Writes to the first lanes of `to`.
+    ///
+    /// # Panics
+    /// If `to` has fewer.
     #[inline(always)]
-    pub(crate) fn store(self, to: &mut [f32]) {
+    pub fn store(self, to: &mut [f32]) {
         S::as_mut_simd_f32s(to).0[0] = self.value;
     }
 
     /// `self`·`factor` + `addend`, rounded once, on every machine.
     #[inline(always)]
-    pub(crate) fn mul_add(self, factor: Self, addend: Self) -> Self {
+    pub fn mul_add(self, factor: Self, addend: Self) -> Self {
         Self { simd: self.simd, value: self.simd.mul_add_f32s(self.value, factor.value, addend.value) }
     }
 
     /// `addend` − `self`·`factor`, rounded once.
     #[inline(always)]
-    pub(crate) fn negate_mul_add(self, factor: Self, addend: Self) -> Self {
+    pub fn negate_mul_add(self, factor: Self, addend: Self) -> Self {
         Self { simd: self.simd, value: self.simd.negate_mul_add_f32s(self.value, factor.value, addend.value) }
     }
 
+    /// The square root.
     #[inline(always)]
-    pub(crate) fn sqrt(self) -> Self {
+    pub fn sqrt(self) -> Self {
         Self { simd: self.simd, value: self.simd.sqrt_f32s(self.value) }
     }
 
+    /// The absolute value.
     #[inline(always)]
-    pub(crate) fn abs(self) -> Self {
+    pub fn abs(self) -> Self {
         Self { simd: self.simd, value: self.simd.abs_f32s(self.value) }
     }
 
+    /// The lesser of the two; neither may be NaN.
     #[inline(always)]
-    pub(crate) fn min(self, other: Self) -> Self {
+    pub fn min(self, other: Self) -> Self {
         Self { simd: self.simd, value: self.simd.min_f32s(self.value, other.value) }
     }
 
+    /// The greater of the two; neither may be NaN.
     #[inline(always)]
-    pub(crate) fn max(self, other: Self) -> Self {
+    pub fn max(self, other: Self) -> Self {
         Self { simd: self.simd, value: self.simd.max_f32s(self.value, other.value) }
     }
 
     /// `self` where `a` < `b`, `other` elsewhere.
     #[inline(always)]
-    pub(crate) fn where_less_or(self, a: Self, b: Self, other: Self) -> Self {
+    pub fn where_less_or(self, a: Self, b: Self, other: Self) -> Self {
         let mask = self.simd.less_than_f32s(a.value, b.value);
         Self { simd: self.simd, value: self.simd.select_f32s(mask, self.value, other.value) }
     }
 
     /// `self` where `a` < `b`, 0 elsewhere.
     #[inline(always)]
-    pub(crate) fn where_less(self, a: Self, b: Self) -> Self {
+    pub fn where_less(self, a: Self, b: Self) -> Self {
         self.where_less_or(a, b, Self::splat(self.simd, 0.0))
     }
 
     /// e^−x for x ≥ 0, as [`exp_neg`] in every bit.
     #[inline(always)]
-    pub(crate) fn exp_neg(self) -> Self {
+    pub fn exp_neg(self) -> Self {
         let (simd, of) = (self.simd, |v| Self::splat(self.simd, v));
         let t = (self * of(-std::f32::consts::LOG2_E)).max(of(-127.0));
         let shifted = t + of(MAGIC);
@@ -112,9 +142,9 @@ impl<S: Simd> Lanes<S> {
         Self { simd, value: simd.transmute_f32s_u32s(bits) }.where_less(of(-126.0), t)
     }
 
-    /// 1 − e^−x for 0 ≤ x ≤ [`SMALL`], relative error below 2·10⁻⁷: tiny x keep their digits.
+    /// 1 − e^−x for 0 ≤ x ≤ ½, relative error below 2·10⁻⁷: tiny x keep their digits.
     #[inline(always)]
-    pub(crate) fn opacity_of_small(self) -> Self {
+    pub fn opacity_of_small(self) -> Self {
         let of = |v| Self::splat(self.simd, v);
         let (low, high) = (of(OPACITY[1]).mul_add(self, of(OPACITY[0])), of(OPACITY[3]).mul_add(self, of(OPACITY[2])));
         let x2 = self * self;
@@ -123,7 +153,7 @@ impl<S: Simd> Lanes<S> {
 
     /// 1 − e^−x for any x ≥ 0: [`Lanes::opacity_of_small`] where it holds, the exponential elsewhere.
     #[inline(always)]
-    pub(crate) fn opacity(self) -> Self {
+    pub fn opacity(self) -> Self {
         let of = |v| Self::splat(self.simd, v);
         let small = self.min(of(SMALL)).opacity_of_small();
         small.where_less_or(self, of(SMALL), of(1.0) - self.exp_neg())
@@ -131,7 +161,7 @@ impl<S: Simd> Lanes<S> {
 
     /// Rounded to half precision (11 bits, least normal number 2⁻¹⁴), at most 65504.
     #[inline(always)]
-    pub(crate) fn to_half(self) -> Self {
+    pub fn to_half(self) -> Self {
         let of = |v| Self::splat(self.simd, v);
         // Veltkamp's splitting keeps 11 of 24 bits; below 2⁻¹⁴ the unit is 2⁻²⁴, that of a float near 0.75.
         let scaled = self * of(8193.0);
@@ -169,7 +199,7 @@ const MAGIC: f32 = 12_582_912.0;
 
 /// e^−x for x ≥ 0, relative error below 3·10⁻⁷ up to x = 8; 0 below 2⁻¹²⁶.
 #[inline(always)]
-pub(crate) fn exp_neg(x: f32) -> f32 {
+pub fn exp_neg(x: f32) -> f32 {
     let t = (x * -std::f32::consts::LOG2_E).max(-127.0);
     let shifted = t + MAGIC;
     let f = t - (shifted - MAGIC);

@@ -5,7 +5,7 @@
 //! filter and all: c = Σwc/Σw.
 
 use super::RasterCounts;
-use super::bins::{Bins, TILE, bin};
+use super::bins::{Bins, bin};
 use super::kernel::Kernel;
 use super::lanes::{Lanes, MAX_LANES};
 use super::projected::{NearDisc, Projected, ProjectedDepth, ProjectedSplat};
@@ -174,10 +174,11 @@ impl pulp::WithSimd for ResolveTile<'_> {
 
 impl OpaqueTile {
     fn new(bins: &Bins, t: usize, channels: usize, objects: bool, perspective: bool) -> Self {
+        let [x, y] = bins.corner(t);
         Self {
             perspective,
-            x: (t % bins.columns) * TILE,
-            y: (t / bins.columns) * TILE,
+            x,
+            y,
             depth: vec![f32::INFINITY; AREA],
             weight: vec![0.0; AREA],
             depth_sum: vec![0.0; AREA],

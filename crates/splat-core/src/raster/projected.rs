@@ -2,6 +2,7 @@
 
 use super::bins::TILE;
 use super::kernel::Kernel;
+use super::tile::{AREA, position};
 use crate::SplatKind;
 use rayon::prelude::*;
 
@@ -45,7 +46,7 @@ pub struct ProjectedDepth {
 /// In perspective w = 1 − slope·(dx, dy)/z is (n·d)/(n·c/z) for a pixel's ray d: the ray meets the disc's plane at the depth
 /// z/w, and s is the conic over w². For parallel rays the depth is linear and s the conic.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct NearDisc {
+pub struct NearDisc {
     pub(crate) id: u32,
     /// View depth of the centre.
     pub(crate) center: f32,
@@ -113,9 +114,33 @@ impl Projected {
         !self.near.is_empty()
     }
 
+    /// The profile of a splat's footprint.
+    #[inline(always)]
+    pub fn kernel(&self, splat: &ProjectedSplat) -> &Kernel {
+        &self.kernels[splat.footprint as usize]
+    }
+
+    /// Whether rays leave one point; else they are parallel.
+    pub fn is_perspective(&self) -> bool {
+        self.perspective.is_some()
+    }
+
+    /// 1/|d|² for the rays of the pixels of the tile at `corner`, those outside the image included: what
+    /// [`Run::distance_sq`](super::tile::Run::distance_sq) of a medium is multiplied by. 1 for parallel rays.
+    pub fn ray_factors(&self, [x, y]: [usize; 2]) -> Vec<f32> {
+        let Some(focal) = self.perspective else { return vec![1.0; AREA] };
+        let half = self.size.map(|s| s as f32 * 0.5);
+        let factor = |k: usize| {
+            let [column, row] = position(k, x, y);
+            let (u, v) = ((column as f32 + 0.5 - half[0]) / focal, (row as f32 + 0.5 - half[1]) / focal);
+            1.0 / (1.0 + u * u + v * v)
+        };
+        (0..AREA).map(factor).collect()
+    }
+
     /// What is known of disc `i` if it reaches through the eye plane.
     #[inline(always)]
-    pub(crate) fn near_disc(&self, splat: &ProjectedSplat, i: u32) -> Option<&NearDisc> {
+    pub fn near_disc(&self, splat: &ProjectedSplat, i: u32) -> Option<&NearDisc> {
         splat.is_near().then(|| self.found(i))
     }
 

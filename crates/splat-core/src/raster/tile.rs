@@ -3,6 +3,46 @@
 //! Pixels of a tile are kept block by block, 16 numbers each, row by row inside. A footprint of 3x3 pixels touches 2.25
 //! blocks on average; whole rows of as many lanes would be touched 3.4 times, and blocks never overlap in memory, so a
 //! store is never half of the next load.
+//!
+//! What blends splats in another way than [`fold`](super::fold) does walks tiles by the same few names:
+//!
+//! ```
+//! use splat_core::raster::{Detail, Params, Projected, bins::{Bins, bin}, lanes::Lanes, project, pulp, tile::{AREA, Runs}};
+//! use splat_core::{Camera, Cloud, FootprintStack, Projection, Splat, glam::DVec3};
+//!
+//! /// The sum of all optical depths in a tile.
+//! struct Sum<'a>(&'a Projected, &'a Bins, usize);
+//!
+//! impl pulp::WithSimd for Sum<'_> {
+//!     type Output = f32;
+//!
+//!     fn with_simd<S: pulp::Simd>(self, simd: S) -> f32 {
+//!         let Self(projected, bins, t) = self;
+//!         let (corner, of) = (bins.corner(t), |v: f32| Lanes::splat(simd, v));
+//!         let (mut plane, factors) = (vec![0.0; AREA], projected.ray_factors(corner));
+//!         for &id in bins.tile(t).flatten() {
+//!             let splat = &projected.splats[id as usize];
+//!             for run in Runs::new(simd, splat, projected.size, corner) {
+//!                 let s = run.distance_sq(simd, splat) * Lanes::load(simd, &factors[run.pixel()..]);
+//!                 let tau = of(splat.peak) * projected.kernel(splat).profile(simd, (of(1.0) - s).max(of(0.0)));
+//!                 (Lanes::load(simd, &plane[run.pixel()..]) + tau).store(&mut plane[run.pixel()..]);
+//!             }
+//!         }
+//!         plane.iter().sum()
+//!     }
+//! }
+//!
+//! let mut cloud = Cloud::new(DVec3::ZERO);
+//! cloud.push(&Splat { radius: 0.5, cross_section: 0.2, ..Splat::default() });
+//! let view = Projection::Orthographic { height: 2.0 };
+//! let camera = Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, view, [64, 64]).unwrap();
+//! let detail = Detail { depth: false, object: false };
+//! let projected = project(&cloud, &camera, &FootprintStack::default(), &[Default::default()], &Params::default(), detail);
+//! let bins = bin(&projected, &[0]);
+//! let sum: f32 = (0..bins.tiles()).map(|t| pulp::Arch::new().dispatch(Sum(&projected, &bins, t))).sum();
+//! // ∫τ dA is the cross-section, whatever the splat's size: 32 pixels are one unit of length.
+//! assert!((sum / (32.0 * 32.0) - 0.2).abs() < 1e-4);
+//! ```
 
 use super::bins::TILE;
 use super::lanes::{Lanes, MAX_LANES};
@@ -13,20 +53,20 @@ use pulp::Simd;
 const BLOCK: usize = 4;
 
 /// Pixels in a block.
-pub(crate) const PIXELS: usize = BLOCK * BLOCK;
+pub const PIXELS: usize = BLOCK * BLOCK;
 
 /// Blocks in a row of a tile.
 const COLUMNS: usize = TILE / BLOCK;
 
 /// Blocks in a tile.
-pub(crate) const BLOCKS: usize = COLUMNS * COLUMNS;
+pub const BLOCKS: usize = COLUMNS * COLUMNS;
 
 /// Pixels in a tile.
-pub(crate) const AREA: usize = TILE * TILE;
+pub const AREA: usize = TILE * TILE;
 
 /// Splats whose records are copied together before they are folded: the records of one tile lie far apart in memory,
 /// and the misses of a batch overlap. Also how often a tile is looked at for being opaque.
-pub(crate) const BATCH: usize = 64;
+pub const BATCH: usize = 64;
 
 /// Offsets of the pixels of a block from its first.
 const X: [f32; PIXELS] = [0., 1., 2., 3., 0., 1., 2., 3., 0., 1., 2., 3., 0., 1., 2., 3.];
@@ -35,24 +75,25 @@ const Y: [f32; PIXELS] = [0., 0., 0., 0., 1., 1., 1., 1., 2., 2., 2., 2., 3., 3.
 /// One number for each pixel of a block, in one cache line.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
-pub(crate) struct Line(pub(crate) [f32; PIXELS]);
+pub struct Line(pub [f32; PIXELS]);
 
 const _: () = assert!(PIXELS == MAX_LANES, "a block is the widest vector");
 
 /// Some pixels of a block under a footprint, as many as there are lanes.
 #[derive(Clone, Copy)]
-pub(crate) struct Run<S: Simd> {
-    pub(crate) block: usize,
+pub struct Run<S: Simd> {
+    /// Block of the tile, row by row.
+    pub block: usize,
     /// First pixel within the block.
-    pub(crate) lane: usize,
+    pub lane: usize,
     /// Offsets from the splat's centre, pixels.
     dx: Lanes<S>,
     dy: Lanes<S>,
 }
 
-/// The runs of one splat in one tile. An iterator and no function that calls back: only what is surely inlined is
+/// The [runs](Run) of one splat in one tile, in the order of memory. An iterator and no function that calls back: only what is surely inlined is
 /// compiled for the instruction set.
-pub(crate) struct Runs<S: Simd> {
+pub struct Runs<S: Simd> {
     simd: S,
     /// Blocks left, and the lane of the next run.
     blocks: usize,
@@ -69,7 +110,7 @@ pub(crate) struct Runs<S: Simd> {
 impl<S: Simd> Runs<S> {
     /// The runs of `splat` in the tile whose first pixel is `origin`.
     #[inline(always)]
-    pub(crate) fn new(simd: S, splat: &ProjectedSplat, size: [u32; 2], origin: [usize; 2]) -> Self {
+    pub fn new(simd: S, splat: &ProjectedSplat, size: [u32; 2], origin: [usize; 2]) -> Self {
         let [x0, x1, y0, y1] = splat.bounds(size);
         let ((x0, x1), (y0, y1)) = (block_range(x0, x1, origin[0]), block_range(y0, y1, origin[1]));
         let [cx, cy] = splat.center_px;
@@ -87,7 +128,7 @@ impl<S: Simd> Runs<S> {
 
     /// Pixels of all runs.
     #[inline(always)]
-    pub(crate) fn pixels(&self) -> u64 {
+    pub fn pixels(&self) -> u64 {
         (self.blocks * PIXELS) as u64
     }
 }
@@ -126,13 +167,13 @@ fn block_range(low: u32, high: u32, origin: usize) -> (usize, usize) {
 impl<S: Simd> Run<S> {
     /// Index of the first pixel in a plane of the tile.
     #[inline(always)]
-    pub(crate) fn pixel(&self) -> usize {
+    pub fn pixel(&self) -> usize {
         self.block * PIXELS + self.lane
     }
 
     /// s of each pixel; for a medium in perspective yet to be multiplied by the pixel's 1/|d|².
     #[inline(always)]
-    pub(crate) fn distance_sq(&self, simd: S, splat: &ProjectedSplat) -> Lanes<S> {
+    pub fn distance_sq(&self, simd: S, splat: &ProjectedSplat) -> Lanes<S> {
         let of = |v: f32| Lanes::splat(simd, v);
         let along = of(splat.conic[0]) * self.dx + of(splat.conic[1]) * self.dy;
         along.mul_add(self.dx, of(splat.conic[2]) * self.dy * self.dy)
@@ -141,7 +182,7 @@ impl<S: Simd> Run<S> {
     /// s and view depths of a disc that reaches through the eye plane. Where it lies behind, s is 1 and the depth the largest
     /// number.
     #[inline(always)]
-    pub(crate) fn meet(&self, simd: S, splat: &ProjectedSplat, near: &NearDisc, perspective: bool) -> [Lanes<S>; 2] {
+    pub fn meet(&self, simd: S, splat: &ProjectedSplat, near: &NearDisc, perspective: bool) -> [Lanes<S>; 2] {
         let of = |v: f32| Lanes::splat(simd, v);
         let (mut s, rise) = (self.distance_sq(simd, splat), of(near.slope[0]) * self.dx + of(near.slope[1]) * self.dy);
         let mut depth = of(near.center) + rise;
@@ -156,7 +197,7 @@ impl<S: Simd> Run<S> {
 
     /// View depths: the plane of a disc.
     #[inline(always)]
-    pub(crate) fn depth(&self, simd: S, depth: &ProjectedDepth) -> Lanes<S> {
+    pub fn depth(&self, simd: S, depth: &ProjectedDepth) -> Lanes<S> {
         let of = |v: f32| Lanes::splat(simd, v);
         let offset = of(depth.slope[0]) * self.dx + of(depth.slope[1]) * self.dy;
         of(depth.center) + offset.max(of(-depth.extent)).min(of(depth.extent))
@@ -165,7 +206,7 @@ impl<S: Simd> Run<S> {
 
 /// Pixels of the tile at (x, y) that lie in the image, in spans of neighbours: their range in a plane of the tile and
 /// in the image.
-pub(crate) fn for_each_span(
+pub fn for_each_span(
     size: [u32; 2],
     x: usize,
     y: usize,
@@ -183,7 +224,19 @@ pub(crate) fn for_each_span(
 }
 
 /// Image position of pixel `k` of a plane of the tile at (x, y).
-pub(crate) fn position(k: usize, x: usize, y: usize) -> [usize; 2] {
+pub fn position(k: usize, x: usize, y: usize) -> [usize; 2] {
     let (block, pixel) = (k / PIXELS, k % PIXELS);
     [x + BLOCK * (block % COLUMNS) + pixel % BLOCK, y + BLOCK * (block / COLUMNS) + pixel / BLOCK]
+}
+
+/// The part of a plane of the image in the tile at `corner`, `fill` outside the image; nothing of an empty plane.
+///
+/// # Panics
+/// If the plane is shorter than the image.
+pub fn tile_of<T: Copy>(plane: &[T], size: [u32; 2], [x, y]: [usize; 2], fill: T) -> Vec<T> {
+    let mut out = vec![fill; if plane.is_empty() { 0 } else { AREA }];
+    if !plane.is_empty() {
+        for_each_span(size, x, y, |tile, image| out[tile].copy_from_slice(&plane[image]));
+    }
+    out
 }

@@ -7,11 +7,11 @@
 //! A medium that straddles an opaque surface counts with the share of its kernel in front of it, as it does at the eye plane: no
 //! seam where a cloud meets the ground. A disc that reaches through the eye plane counts where its plane lies before the eye.
 
-use super::bins::{Bins, TILE, bin};
+use super::bins::{Bins, bin};
 use super::kernel::Kernel;
 use super::lanes::{Lanes, MAX_LANES, SMALL, exp_neg};
 use super::projected::{NearDisc, Projected, ProjectedDepth, ProjectedSplat};
-use super::tile::{AREA, BATCH, BLOCKS, Line, PIXELS, Run, Runs, for_each_span, position};
+use super::tile::{BATCH, BLOCKS, Line, PIXELS, Run, Runs, for_each_span, tile_of};
 use super::{Accumulation, OpaqueImage, Params, RasterCounts};
 use crate::depth_profile::DepthFragment;
 use crate::shade::ChannelLayout;
@@ -197,7 +197,7 @@ impl FoldTile<'_> {
 
 impl Tile {
     fn load(acc: &Accumulator, projected: &Projected, opaque: &OpaqueImage, bins: &Bins, t: usize) -> Self {
-        let (x, y) = ((t % bins.columns) * TILE, (t / bins.columns) * TILE);
+        let [x, y] = bins.corner(t);
         let mut opaque_depth = tile_of(&opaque.depth, acc.size, [x, y], f32::INFINITY);
         if opaque_depth.iter().all(|d| *d == f32::INFINITY) {
             opaque_depth.clear();
@@ -212,7 +212,7 @@ impl Tile {
             lines: vec![Line([0.0; PIXELS]); BLOCKS * (2 * planes + channels)],
             planes,
             channels,
-            ray_factor: ray_factors(projected, x, y),
+            ray_factor: projected.ray_factors([x, y]),
             perspective: projected.perspective.is_some(),
             opaque_depth,
             depth,
@@ -418,25 +418,4 @@ impl Tile {
 #[inline(always)]
 fn rounded<S: Simd, const HALF: bool>(sum: Lanes<S>) -> Lanes<S> {
     if HALF { sum.to_half() } else { sum }
-}
-
-/// The part of a plane of the image in the tile at `corner`, `fill` outside the image; nothing of an empty plane.
-fn tile_of<T: Copy>(plane: &[T], size: [u32; 2], [x, y]: [usize; 2], fill: T) -> Vec<T> {
-    let mut out = vec![fill; if plane.is_empty() { 0 } else { AREA }];
-    if !plane.is_empty() {
-        for_each_span(size, x, y, |tile, image| out[tile].copy_from_slice(&plane[image]));
-    }
-    out
-}
-
-/// 1/|d|² for the pixels of the tile, those outside the image included.
-fn ray_factors(projected: &Projected, x: usize, y: usize) -> Vec<f32> {
-    let Some(focal) = projected.perspective else { return vec![1.0; AREA] };
-    let half = projected.size.map(|s| s as f32 * 0.5);
-    let factor = |k: usize| {
-        let [column, row] = position(k, x, y);
-        let (u, v) = ((column as f32 + 0.5 - half[0]) / focal, (row as f32 + 0.5 - half[1]) / focal);
-        1.0 / (1.0 + u * u + v * v)
-    };
-    (0..AREA).map(factor).collect()
 }

@@ -220,7 +220,7 @@ fn shadow_maps_stay_on_the_device() {
         assert!(helped.warnings.iter().any(|w| w.contains(said)), "{loss:?}: {:?}", helped.warnings);
     }
     // Maps of polar angles are the processor's, with a line said.
-    let polar = "[render.points.shadow]\nmapping = \"polar\"";
+    let polar = "[render.shadow]\nmapping = \"polar\"";
     let lamp = translucent("");
     let alone = picture_of(&lamp, polar, None);
     let (_, choice) = worse(Loss::Never, u64::MAX);

@@ -152,7 +152,14 @@ impl World {
         let [wall, sheet, volume] = samplers;
         let objects =
             [object(wall, 0.2, [0.0; 3]), object(sheet, -0.3, [0.0, 0.25, 0.0]), object(volume, 0.4, [0.0; 3])];
-        work(&Scene { objects: &objects, lights: &[], shadow_origin: DVec3::ZERO, ambient: [0.0; 3], camera: &self.camera, occluder: None })
+        work(&Scene {
+            objects: &objects,
+            lights: &[],
+            shadow_origin: DVec3::ZERO,
+            ambient: [0.0; 3],
+            camera: &self.camera,
+            occluder: None,
+        })
     }
 }
 

@@ -3,11 +3,12 @@
 use gpu_conformance::open;
 use pbsr::gpu::{Capacities, Nearest, record};
 use pbsr::{
-    Appearance, Ensemble, EnsembleParams, Error, FoldParams, MeshSampler, Object, Occluder, Renderer, Sampler, Scene,
+    Appearance, Ensemble, EnsembleParams, Error, FoldParams, MeshSampler, Object, Renderer, Sampler, Scene,
     SurfaceParams, pixel_area,
 };
 use splat_core::glam::{DQuat, DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
+use splat_core::raster::OpaqueImage;
 use splat_core::{Camera, Material, Mesh, Progress, Projection, Shading, Similarity};
 
 const SIZE: [u32; 2] = [150, 90];
@@ -122,7 +123,8 @@ fn what_hides_particles_hides_them_and_its_own_depth_is_the_surface_s() {
     let objects = [object(&sampler, 0.0, [0.0; 3])];
     // All particles are at depth 4: behind, at, and before what hides.
     let depth = pixels().map(|(x, _)| [3.5, 4.0, 4.5, f32::INFINITY][x as usize % 4]).collect();
-    let occluder = Occluder { depth, color: vec![[1.0; 3]; (SIZE[0] * SIZE[1]) as usize] };
+    let channels = vec![vec![1.0; (SIZE[0] * SIZE[1]) as usize]; 3];
+    let occluder = OpaqueImage { depth, channels, ..OpaqueImage::default() };
     let scene = Scene {
         objects: &objects,
         lights: &[],

@@ -8,7 +8,8 @@ use crate::frame::Frame;
 use crate::scene::ParticlesSettings;
 use crate::technique::Session;
 use crate::{Error, Progress, RenderOptions, stage};
-use pbsr::{Ensemble, EnsembleParams, FoldParams, LitBy, Object, Occluder, Renderer};
+use pbsr::{Ensemble, EnsembleParams, FoldParams, LitBy, Object, Renderer};
+use splat_core::raster::OpaqueImage;
 use splat_core::{Camera, LayerSet, Light, Transmittance};
 use std::ops::Range;
 use tsm::ShadowMap;
@@ -26,7 +27,7 @@ pub(super) fn fold(
     parts: &[&Part<'_>],
     maps: &[Option<ShadowMap>],
     range: Range<f32>,
-    occluder: Option<&Occluder>,
+    occluder: Option<&OpaqueImage>,
     session: &mut Session<'_>,
 ) -> Result<Average, Error> {
     let objects: Vec<Object<'_>> = parts.iter().map(|part| part.object()).collect();

@@ -2,7 +2,8 @@
 
 use super::parts::Part;
 use crate::frame::Frame;
-use pbsr::{Ensemble, Occluder};
+use pbsr::Ensemble;
+use splat_core::raster::OpaqueImage;
 use splat_core::shade::ChannelLayout;
 use splat_core::{Accumulator, DepthProfile, LayerData, Layers, PixelSamples};
 
@@ -55,7 +56,7 @@ pub(super) fn of_hits(ensemble: &Ensemble, parts: &[&Part<'_>], segment: &mut Ac
 }
 
 /// Standard error of each pixel's luminance.
-pub(super) fn std_error(ensemble: &Ensemble, occluder: Option<&Occluder>, frame: &Frame<'_>) -> LayerData {
+pub(super) fn std_error(ensemble: &Ensemble, occluder: Option<&OpaqueImage>, frame: &Frame<'_>) -> LayerData {
     let background = frame.scene.background;
     let samples = ensemble.read(&|_, _| background, occluder);
     error(&PixelSamples { size: ensemble.size(), antialias: frame.settings.antialias }, &samples)

@@ -15,7 +15,7 @@ use pbsr::{
     GridSampler, ImplicitSurface, KeptSets, LatticeSampler, LineReport, LineSampler, MeshSampler, Object, Sampler,
     SplatParams, SplatSampler, SurfaceParams, VolumeParams,
 };
-use splat_core::{Camera, Cloud, Similarity, SplatKind, rng};
+use splat_core::{Camera, Cloud, DAabb, Similarity, SplatKind, rng};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -43,8 +43,8 @@ pub(super) struct Source<'a> {
     seed: u64,
     /// Rank of the object in the scene.
     of: u32,
-    /// Opposite corners of a box in the world that holds it.
-    bounds: [DVec3; 2],
+    /// A box in the world that holds it.
+    bounds: DAabb,
 }
 
 enum Data<'a> {
@@ -60,7 +60,7 @@ pub(super) struct Part<'a> {
     look: Appearance,
     /// Rank of the object in the scene.
     pub(super) of: u32,
-    bounds: [DVec3; 2],
+    bounds: DAabb,
 }
 
 /// Where the particles of an object come from.
@@ -91,18 +91,14 @@ impl Part<'_> {
 
     /// Whether some of it may lie at view depths in a range.
     pub(super) fn reaches(&self, range: &Range<f32>, camera: &Camera) -> bool {
-        let depths = self.corners().map(|p| camera.view_from_world(p).z as f32);
+        let depths = self.corners().into_iter().map(|p| camera.view_from_world(p).z as f32);
         let [near, far] = depths.fold([f32::INFINITY, f32::NEG_INFINITY], |[n, f], z| [n.min(z), f.max(z)]);
         far >= range.start && near <= range.end
     }
 
     /// Corners of a box in the world that holds the object.
-    pub(super) fn corners(&self) -> impl Iterator<Item = DVec3> + use<> {
-        let [low, high] = self.bounds;
-        (0..8).map(move |k: u32| {
-            let mask = glam::BVec3::new(k & 1 == 1, k >> 1 & 1 == 1, k >> 2 & 1 == 1);
-            DVec3::select(mask, high, low)
-        })
+    pub(super) fn corners(&self) -> [DVec3; 8] {
+        self.bounds.corners()
     }
 }
 
@@ -120,9 +116,9 @@ pub(super) fn sources<'a>(frame: &Frame<'a>) -> Vec<Source<'a>> {
 }
 
 /// The finest cross-section that a camera needs of an object, units² of the object.
-fn finest_area(camera: &Camera, transform: &Similarity, [low, high]: [DVec3; 2]) -> f64 {
-    let center = transform.apply(0.5 * (low + high));
-    let reach = 0.5 * (high - low).length() * transform.scale;
+fn finest_area(camera: &Camera, transform: &Similarity, bounds: DAabb) -> f64 {
+    let center = transform.apply(bounds.center());
+    let reach = 0.5 * bounds.diagonal() * transform.scale;
     pbsr::finest_pixel_area(camera, center, reach, NEAR) / transform.scale.powi(2)
 }
 
@@ -176,7 +172,7 @@ fn of_splats<'a>(frame: &Frame<'a>) -> Vec<Source<'a>> {
         let reach = 0.5 * f64::from(bounds.diagonal()) + radius;
         let widest = DVec3::splat(f64::from(splats.radius.iter().copied().fold(0.0, f32::max)));
         let corner = |v: glam::Vec3| splats.origin + v.as_dvec3();
-        let bounds = [corner(bounds.min) - widest, corner(bounds.max) + widest];
+        let bounds = DAabb::new(corner(bounds.min) - widest, corner(bounds.max) + widest);
         let cross_section = pbsr::finest_pixel_area(camera, center, reach, NEAR);
         let seed = seed(frame, object, kind);
         let params = SplatParams {
@@ -254,9 +250,9 @@ impl<'a> Source<'a> {
     fn sampler(&self, own: &'a Own, warnings: &mut Vec<String>) -> Result<Box<dyn Sampler + 'a>, pbsr::Error> {
         Ok(match &own.body {
             Body::Surface { field, inside, spacing, step } => {
-                let [min, max] = own.bounds;
-                let surface = ImplicitSurface { field: field.as_ref(), level: 0.0, min, max, inside: Some(inside) };
-                let width = (max - min).max_element();
+                let bounds = own.bounds;
+                let surface = ImplicitSurface { field: field.as_ref(), level: 0.0, bounds, inside: Some(inside) };
+                let width = bounds.size().max_element();
                 let cells = line_cells(width, *spacing);
                 if let Some(step) = step {
                     let paper = BrownianParams::for_width(width);
