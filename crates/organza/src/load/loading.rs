@@ -1,0 +1,159 @@
+//! The objects of a scene one after the other: read, counted, and converted.
+
+use super::context::{BYTES_PER_SPLAT, Context};
+use super::files::Files;
+use super::object::{self, Prepared};
+use super::own::Own;
+use crate::form::PlannedObject;
+use crate::scene::{Scene, SceneObject};
+use crate::statistics::ObjectStatistics;
+use crate::{Error, Progress, RenderOptions, SplatCount, stage, work};
+use splat_core::Cloud;
+
+/// What loading reads.
+#[derive(Clone, Copy)]
+pub(super) struct Loading<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) options: &'a RenderOptions,
+    pub(super) progress: &'a Progress,
+    pub(super) files: &'a Files,
+}
+
+impl<'a> Loading<'a> {
+    fn visible(&self) -> impl Iterator<Item = (usize, &'a SceneObject)> + use<'a> {
+        self.scene.objects.iter().enumerate().filter(|(_, object)| object.visible)
+    }
+
+    fn context(&self, id: usize, used: u64, made: u64) -> Context<'a> {
+        let Self { scene, options, progress, files } = *self;
+        Context { scene, options, files, progress, id, used, made }
+    }
+
+    /// An error of an object with the file that its data is from.
+    fn named(&self, object: &SceneObject, error: Error) -> Error {
+        error.in_object(&self.scene.file, object.source.path())
+    }
+
+    /// Reads every object and counts its splats, so that a scene that does not fit is refused before anything is
+    /// converted.
+    pub(super) fn prepare(&self, looks: &dyn Fn(&SceneObject) -> bool) -> Result<Vec<Prepared<'a>>, Error> {
+        self.progress.plan(work::of_scene(self.scene));
+        self.progress.begin(stage::READ);
+        self.progress.add_total(self.visible().count() as u64);
+        let one = |(id, object): (usize, &'a SceneObject)| {
+            self.progress.tick(1).map_err(|_| Error::Cancelled)?;
+            if let Some(reading) = work::reading(object) {
+                self.progress.begin(&reading);
+            }
+            object::prepare(object, &self.context(id, 0, 0), looks(object)).map_err(|e| self.named(object, e))
+        };
+        self.visible().map(one).collect()
+    }
+
+    pub(super) fn statistics(&self, prepared: &[Prepared<'_>]) -> Vec<ObjectStatistics> {
+        let one =
+            |((id, object), p): ((usize, &SceneObject), &Prepared<'_>)| p.statistics(object, &self.context(id, 0, 0));
+        self.visible().zip(prepared).map(one).collect()
+    }
+
+    /// Splats to be made; refuses those that do not fit.
+    pub(super) fn counts(
+        &self,
+        prepared: &[Prepared<'_>],
+        planned: &[PlannedObject],
+    ) -> Result<Vec<SplatCount>, Error> {
+        let mut splats: Vec<SplatCount> = Vec::new();
+        let (mut held, mut needed) = (self.files.bytes(), 0);
+        for ((object, p), plan) in self.visible().map(|v| v.1).zip(prepared).zip(planned) {
+            let mut count = SplatCount::predicted(&object.name, &p.prediction);
+            if plan.splats.is_none() {
+                (count.predicted, count.exact) = (0, true);
+            }
+            // Estimates count half, so that nothing is refused that would fit.
+            needed += if count.exact { count.predicted } else { count.predicted / 2 };
+            splats.push(count);
+            held += p.input.own_bytes();
+            check_total(self.scene, self.options, [held, needed], &splats)?;
+        }
+        Ok(splats)
+    }
+
+    /// The objects that are drawn from their own data.
+    pub(super) fn own(
+        &self,
+        prepared: &mut [Prepared<'_>],
+        planned: &[PlannedObject],
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<Own>, Error> {
+        let mut all = Vec::new();
+        for (((id, _), p), plan) in self.visible().zip(prepared).zip(planned) {
+            if !plan.form.is_own() {
+                continue;
+            }
+            let own = Own::new(p, plan.form, &self.context(id, 0, 0));
+            let own = own.map_err(|e| self.named(&self.scene.objects[id], e))?;
+            if own.is_none() {
+                let name = crate::shown(&self.scene.objects[id].name);
+                warnings.push(format!("object '{name}' has no particles: nothing of it was found"));
+            }
+            all.extend(own);
+        }
+        Ok(all)
+    }
+
+    /// The clouds of all objects that become splats.
+    pub(super) fn clouds(
+        &self,
+        prepared: Vec<Prepared<'_>>,
+        planned: &[PlannedObject],
+        own: &[Own],
+        splats: &mut [SplatCount],
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<Cloud>, Error> {
+        let mut clouds: Vec<Cloud> = Vec::new();
+        let mut used: u64 = own.iter().map(Own::bytes).sum();
+        let mut made = 0;
+        // Both are in the order of the scene.
+        let mut own = own.iter().peekable();
+        for ((((id, object), p), plan), count) in self.visible().zip(prepared).zip(planned).zip(splats) {
+            let of = own.next_if(|o| o.object == id);
+            if plan.splats.is_none() {
+                continue;
+            }
+            self.progress.begin(&work::converting(&object.name));
+            let cloud = object::convert(&p, of, &self.context(id, used, made), warnings);
+            let cloud = cloud.map_err(|e| self.named(object, e))?;
+            if cloud.is_empty() {
+                warnings.push(format!("object '{}' has no splats", crate::shown(&object.name)));
+            }
+            count.made = cloud.len() as u64;
+            (used, made) = (used + cloud.bytes(), made + count.made);
+            clouds.push(cloud);
+        }
+        Ok(clouds)
+    }
+}
+
+/// Refuses a scene whose objects together make too many splats, `needed`, for the memory beside the inputs, of `held` bytes,
+/// or for the scene's own limit.
+fn check_total(
+    scene: &Scene,
+    options: &RenderOptions,
+    [held, needed]: [u64; 2],
+    splats: &[SplatCount],
+) -> Result<(), Error> {
+    let fits = options.max_memory.saturating_sub(held) / BYTES_PER_SPLAT;
+    let limit = scene.render.max_points.map_or(fits, |asked| asked.min(fits));
+    if needed <= limit {
+        return Ok(());
+    }
+    let most = splats.iter().max_by_key(|s| s.predicted);
+    let named = most.map(|s| format!(", most of them '{}' with {}", crate::shown(&s.object), s.predicted));
+    Err(Error::Limit {
+        what: format!("the scene (before conversion{})", named.unwrap_or_default()),
+        needed,
+        limit,
+        unit: "splats",
+        hint: "use a larger spacing, or a larger --max-memory or render.max_points".into(),
+    })
+}

@@ -1,0 +1,81 @@
+//! Where in a box there is something: zeros of a field, extinction of a volume.
+
+use convert::SharedField;
+use glam::DVec3;
+use splat_core::{DAabb, Grid, TransferFunction};
+
+/// Cells along the longest side of a box, in which an implicit surface is looked for.
+const SURFACE_CELLS: f64 = 32.0;
+
+/// Where in a box a field may be zero.
+pub(in crate::load) struct Search {
+    /// The part of the box; the whole box where the field knows no bound.
+    pub(super) bounds: DAabb,
+    /// Cells that may hold a zero times the area of a cell's side; infinite where the field knows no bound.
+    pub(in crate::load) area: f64,
+}
+
+impl Search {
+    pub(in crate::load) fn new(field: &SharedField, whole: DAabb) -> Self {
+        let cells = Cells::new(whole, SURFACE_CELLS);
+        let (mut found, mut n) = (DAabb::EMPTY, 0.0);
+        for k in 0..cells.count() {
+            let (middle, radius) = cells.ball(k);
+            let Some((least, most)) = field.bound(middle, radius) else {
+                return Self { bounds: whole, area: f64::INFINITY };
+            };
+            if least <= 0.0 && most >= 0.0 && field.may_be_in_domain(middle, radius) {
+                found = found.union(DAabb::around(middle, 0.5 * cells.step));
+                n += 1.0;
+            }
+        }
+        let within = |p: DVec3| p.clamp(whole.min, whole.max);
+        let bounds = if found.is_solid() { DAabb::new(within(found.min), within(found.max)) } else { whole };
+        Self { bounds, area: n * libm::pow(cells.step.element_product(), 2.0 / 3.0) }
+    }
+}
+
+/// Bounds of the lattice points with extinction and one cell around them, no farther than voxels reach; those of the voxels
+/// where there are none.
+pub(super) fn cell_bounds(grid: &Grid, transfer: &TransferFunction) -> DAabb {
+    let [nx, ny, _] = grid.dims;
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for (row, values) in grid.values.chunks(nx).enumerate() {
+        let seen = |v: &f32| transfer.at(*v).extinction > 0.0;
+        if let (Some(first), Some(last)) = (values.iter().position(seen), values.iter().rposition(seen)) {
+            let at = |i: usize| DVec3::new(i as f64, (row % ny) as f64, (row / ny) as f64);
+            (low, high) = (low.min(at(first)), high.max(at(last)));
+        }
+    }
+    let (first, last) = (DVec3::splat(-0.5), DVec3::from_array(grid.dims.map(|n| n as f64 - 0.5)));
+    let (low, high) =
+        if low.cmple(high).all() { ((low - 1.0).max(first), (high + 1.0).min(last)) } else { (first, last) };
+    DAabb::of_points(DAabb::new(low, high).corners().map(|index| grid.origin + grid.axes * index))
+}
+
+/// Cells that fill a box.
+struct Cells {
+    low: DVec3,
+    step: DVec3,
+    counts: [usize; 3],
+}
+
+impl Cells {
+    /// About `longest` cells along the longest side.
+    fn new(bounds: DAabb, longest: f64) -> Self {
+        let sides = bounds.size();
+        let counts = (sides / sides.max_element() * longest).ceil().max(DVec3::ONE);
+        Self { low: bounds.min, step: sides / counts, counts: counts.to_array().map(|n| n as usize) }
+    }
+
+    fn count(&self) -> usize {
+        self.counts.iter().product()
+    }
+
+    /// A ball around cell `k`: its middle and radius.
+    fn ball(&self, k: usize) -> (DVec3, f64) {
+        let [nx, ny, _] = self.counts;
+        let index = DVec3::new((k % nx) as f64, (k / nx % ny) as f64, (k / (nx * ny)) as f64);
+        (self.low + self.step * (index + 0.5), 0.5 * self.step.length() * (1.0 + 1e-12))
+    }
+}
