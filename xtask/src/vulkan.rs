@@ -14,6 +14,9 @@ const ROOTS: [&str; 4] = ["/usr/share/vulkan", "/usr/local/share/vulkan", "/etc/
 /// Debian's and Ubuntu's names of what is needed.
 const PACKAGES: [&str; 4] = ["libvulkan1", "mesa-vulkan-drivers", "vulkan-validationlayers", "spirv-tools"];
 
+/// Benchmarks have no tests, and peers that take minutes to compile.
+const TESTS: &str = "test --workspace --exclude organza-benches";
+
 /// What the conformance tests run with.
 #[derive(Debug, PartialEq)]
 struct Parts {
@@ -50,9 +53,9 @@ pub(crate) fn run(repo: &Repo) -> Outcome {
 /// All tests; those of conformance by the first executor, where the parts can be had.
 pub(crate) fn tests(repo: &Repo) -> Outcome {
     let (line, said, parts) = match parts()? {
-        Ok(parts) => (format!("test --workspace --features {FEATURES},{DRIVER}"), "tests: all".to_owned(), Some(parts)),
+        Ok(parts) => (format!("{TESTS} --features {FEATURES},{DRIVER}"), "tests: all".to_owned(), Some(parts)),
         Err(missing) => {
-            (format!("test --workspace --features {FEATURES}"), without("conformance tests", &missing)?, None)
+            (format!("{TESTS} --features {FEATURES}"), without("conformance tests", &missing)?, None)
         }
     };
     cargo_test(repo, &line, parts.as_ref().map(|parts| (parts.driver.as_path(), WITH_TESTS)), None)?;
@@ -170,7 +173,7 @@ fn check_modules(repo: &Repo, spirv_val: &Path) -> Result<usize, String> {
 
 /// Runs the conformance tests by an executor under a validation; with vectors of so many bits those of subgroups alone.
 fn conformance(repo: &Repo, driver: &Path, by: [&str; 2], vector: Option<&str>) -> Result<(), String> {
-    let mut line = format!("test --workspace --features {FEATURES},{DRIVER} --test conformance");
+    let mut line = format!("{TESTS} --features {FEATURES},{DRIVER} --test conformance");
     if vector.is_some() {
         line.push_str(&format!(" -- {}", ACROSS.join(" ")));
     }
