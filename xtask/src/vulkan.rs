@@ -54,9 +54,7 @@ pub(crate) fn run(repo: &Repo) -> Outcome {
 pub(crate) fn tests(repo: &Repo) -> Outcome {
     let (line, said, parts) = match parts()? {
         Ok(parts) => (format!("{TESTS} --features {FEATURES},{DRIVER}"), "tests: all".to_owned(), Some(parts)),
-        Err(missing) => {
-            (format!("{TESTS} --features {FEATURES}"), without("conformance tests", &missing)?, None)
-        }
+        Err(missing) => (format!("{TESTS} --features {FEATURES}"), without("conformance tests", &missing)?, None),
     };
     cargo_test(repo, &line, parts.as_ref().map(|parts| (parts.driver.as_path(), WITH_TESTS)), None)?;
     Ok(said)

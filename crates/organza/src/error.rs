@@ -123,6 +123,11 @@ impl Error {
         Self::Io { path: path.to_owned(), action, source }
     }
 
+    /// A file that holds something else than the object takes.
+    pub fn wrong_kind(path: &Path, expected: &str, hint: &str) -> Self {
+        Self::input(printable(path), format!("expected {expected}"), hint)
+    }
+
     /// An error of the nouns about the data of `what` (an object, a file): broken promises are bad input, overflows
     /// are limits.
     pub fn from_core(what: &str, error: splat_core::Error) -> Self {

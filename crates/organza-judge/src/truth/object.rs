@@ -71,7 +71,13 @@ pub(super) fn body(
         Source::Implicit(_) if !object.clip.is_empty() => return no("open surfaces are not path-traced"),
         Source::Mesh(path) => match read(path, options)? {
             FileData::Mesh(mesh) => mesh,
-            _ => return Err(wrong_kind(path, "a mesh with faces", "use `points = ` or `volume = ` for this file")),
+            _ => {
+                return Err(Error::wrong_kind(
+                    path,
+                    "a mesh with faces",
+                    "use `points = ` or `volume = ` for this file",
+                ));
+            }
         },
         Source::Implicit(i) => {
             let field = expression_field(&i.expression, object)?;
@@ -196,7 +202,7 @@ fn shape(object: &SceneObject, options: &RenderOptions) -> Result<(Shape, f64), 
         }
         Source::Volume(VolumeSource { path, transfer }) => {
             let FileData::Grid(grid) = read(path, options)? else {
-                return Err(wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file"));
+                return Err(Error::wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file"));
             };
             grid.validate().map_err(|e| Error::input(printable(path), e.to_string(), ""))?;
             (Shape::Volume(Arc::new(Classified::new(grid, transfer.clone(), &t))), 1.0)
@@ -270,10 +276,6 @@ fn surface(scene: &Scene, object: &SceneObject, mut mesh: Mesh) -> Body {
         liberty,
     };
     Body::Surface(mesh, material)
-}
-
-fn wrong_kind(path: &Path, expected: &str, hint: &str) -> Error {
-    Error::input(printable(path), format!("expected {expected}"), hint)
 }
 
 fn read(path: &Path, options: &RenderOptions) -> Result<FileData, Error> {

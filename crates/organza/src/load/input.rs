@@ -256,33 +256,29 @@ fn read_scattered(path: &Path, context: &Context<'_>) -> Result<Arc<RawPoints>, 
             };
             Ok(points.into())
         }
-        _ => Err(wrong_kind(path, "points", "use `volume = ` or `isosurface = ` for this file")),
+        _ => Err(Error::wrong_kind(path, "points", "use `volume = ` or `isosurface = ` for this file")),
     }
 }
 
 fn read_mesh(path: &Path, context: &Context<'_>) -> Result<Arc<Mesh>, Error> {
     match context.read(path)? {
         FileData::Mesh(mesh) => Ok(mesh),
-        _ => Err(wrong_kind(path, "a mesh with faces", "use `points = ` or `volume = ` for this file")),
+        _ => Err(Error::wrong_kind(path, "a mesh with faces", "use `points = ` or `volume = ` for this file")),
     }
 }
 
 fn read_points(path: &Path, context: &Context<'_>) -> Result<Arc<RawPoints>, Error> {
     match context.read(path)? {
         FileData::Points(points) => Ok(points),
-        _ => Err(wrong_kind(path, "points without faces", "use `mesh = ` or `volume = ` for this file")),
+        _ => Err(Error::wrong_kind(path, "points without faces", "use `mesh = ` or `volume = ` for this file")),
     }
 }
 
 fn read_grid(path: &Path, context: &Context<'_>) -> Result<Arc<Grid>, Error> {
     match context.read(path)? {
         FileData::Grid(grid) => Ok(grid),
-        _ => Err(wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file")),
+        _ => Err(Error::wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file")),
     }
-}
-
-fn wrong_kind(path: &Path, expected: &str, hint: &str) -> Error {
-    Error::input(crate::printable(path), format!("expected {expected}"), hint)
 }
 
 /// The field of an expression of an object, in the coordinates of the expression: before the object's transform.
