@@ -208,7 +208,14 @@ fn projection(c: &mut Criterion) {
         let material = Material { shading: Shading::Unlit, ..Material::default() };
         let look = Appearance { material, ..Appearance::default() };
         let objects = [Object { sampler: &kept, transform: Similarity::default(), look }];
-        let scene = Scene { objects: &objects, lights: &[], ambient: [0.0; 3], camera: &camera, occluder: None };
+        let scene = Scene {
+            objects: &objects,
+            lights: &[],
+            shadow_origin: DVec3::ZERO,
+            ambient: [0.0; 3],
+            camera: &camera,
+            occluder: None,
+        };
         let mut renderer = Renderer::new();
         group.throughput(Throughput::Elements(kept.particles()));
         group.bench_function(name, |b| {

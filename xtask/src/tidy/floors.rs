@@ -8,7 +8,7 @@ const HOUSE: &str = "crates/organza/src/";
 
 /// The modules of each floor, from the ground up.
 const FLOORS: [&[&str]; 13] = [
-    &["error", "form", "pass", "stage"],
+    &["error", "form", "lights", "pass", "stage"],
     &["device", "info", "output", "statistics"],
     &["options", "work"],
     &["load"],
