@@ -1,7 +1,7 @@
 //! The points technique against physical truth: the same scene path-traced without splats.
 
 use crate::many_forms::write;
-use organza::scene::{self, Scene};
+use organza::scene::{self, Scene, SceneLight};
 use organza::{Progress, RenderOptions, render};
 use organza_judge::truth::{Truth, truth, truth_of_all_orders};
 use splat_core::{Light, LightShape};
@@ -86,11 +86,21 @@ intensity = [4, 4, 4]
 samples = 64
 "#;
 
+/// The points of a light, shining to all sides alike.
+fn without_cosine(whole: &SceneLight) -> Vec<SceneLight> {
+    let bare = |point: Light| {
+        let shape = LightShape::Point { position: point.shape.place().unwrap() };
+        SceneLight { light: Light { shape, ..point }, samples: 1, shadow: true }
+    };
+    whole.light.points(whole.samples).into_iter().map(bare).collect()
+}
+
 #[test]
-fn flat_lights_shine_to_one_side_with_the_cosine_as_path_tracing_has_it() {
+fn extended_lights_shine_as_path_tracing_has_them() {
     for light in [
         "kind = 'rect'\nposition = [0, 1, 0]\nu = [0.5, 0, 0]\nv = [0, 0, 0.4]\n",
         "kind = 'disk'\nposition = [0.8, 0.9, -0.3]\nnormal = [-1, -1, 0.2]\nradius = 0.5\n",
+        "kind = 'sphere'\nposition = [-0.5, 1, 0.2]\nradius = 0.3\n",
     ] {
         let text = BELOW.to_owned() + light;
         let mut scene = scene::parse(Path::new("s.toml"), text.as_bytes(), &Default::default()).unwrap();
@@ -101,22 +111,18 @@ fn flat_lights_shine_to_one_side_with_the_cosine_as_path_tracing_has_it() {
         let points = rmse(&squares(&drawn(&scene), size), &exact);
         scene.render.technique = scene::Technique::Particles;
         let particles = rmse(&squares(&drawn(&scene), size), &exact);
-        // Points of the light that shine to all sides alike are what it would be without the cosine.
-        let whole = scene.lights[0];
-        let bare = |point: Light| {
-            let shape = LightShape::Point { position: point.shape.place().unwrap() };
-            scene::SceneLight { light: Light { shape, ..point }, samples: 1, shadow: true }
-        };
-        scene.lights = whole.light.points(whole.samples).into_iter().map(bare).collect();
         scene.render.technique = scene::Technique::Points;
+        scene.lights = without_cosine(&scene.lights[0]);
         let without = rmse(&squares(&drawn(&scene), size), &exact);
         let mean = exact.iter().flatten().sum::<f64>() / (3 * exact.len()) as f64;
         println!(
-            "mean {mean:.4}, RMSE of points {points:.5}, of particles {particles:.5}, without cosine {without:.5}, truth's standard error {noise:.5}"
+            "{light}mean {mean:.4}, RMSE of points {points:.5}, of particles {particles:.5}, without cosine {without:.5}, \
+             truth's standard error {noise:.5}"
         );
         assert!(noise < 0.003, "truth's standard error {noise}");
         assert!(points < 0.006 && particles < 0.006, "RMSE of points {points}, of particles {particles}");
-        assert!(without > 5.0 * points, "{without}");
+        // The comparison can fail: a flat light that shines to all sides. Points of a sphere do.
+        assert_eq!(without > 5.0 * points, !light.contains("sphere"), "{without}");
     }
 }
 

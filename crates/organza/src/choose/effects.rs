@@ -59,7 +59,8 @@ fn shadow_effect(i: usize, light: &LightStatistics, statistics: &Statistics, all
     let bound = if statistics.opaque_casters > 0 { 1.0 } else { -libm::expm1(-statistics.caster_optical_depth) };
     let called_for = bound > allowance;
     let reason = if called_for {
-        format!("{} splats cast and {} receive it", statistics.casters, statistics.receivers)
+        let from = if light.points > 1 { format!(", from {} points", light.points) } else { String::new() };
+        format!("{} splats cast and {} receive it{from}", statistics.casters, statistics.receivers)
     } else {
         format!("no ray could lose more than {bound:.1e} of its light")
     };
@@ -187,6 +188,17 @@ mod tests {
             change(&mut statistics);
             assert!(!has(&plan(&statistics), pass::SHADOW_MAP));
         }
+    }
+
+    #[test]
+    fn every_point_of_a_light_gets_a_map() {
+        let mut s = scene();
+        let light = LightStatistics { points: 3, ..s.lights[0] };
+        s.lights = vec![light, LightStatistics { wants_shadow: false, ..light }];
+        let plan = plan(&s);
+        assert_eq!(plan.shadow_maps, [true, false]);
+        assert_eq!(plan.passes.iter().filter(|p| p.name == pass::SHADOW_MAP).count(), 3);
+        assert!(plan.effects[0].reason.ends_with("receive it, from 3 points"), "{}", plan.effects[0].reason);
     }
 
     #[test]

@@ -152,14 +152,8 @@ impl World {
         let [wall, sheet, volume] = samplers;
         let objects =
             [object(wall, 0.2, [0.0; 3]), object(sheet, -0.3, [0.0, 0.25, 0.0]), object(volume, 0.4, [0.0; 3])];
-        work(&Scene {
-            objects: &objects,
-            lights: &[],
-            shadow_origin: DVec3::ZERO,
-            ambient: [0.0; 3],
-            camera: &self.camera,
-            occluder: None,
-        })
+        let (objects, camera, shadow_origin) = (&objects[..], &self.camera, DVec3::ZERO);
+        work(&Scene { objects, lights: &[], shadow_origin, ambient: [0.0; 3], camera, occluder: None })
     }
 }
 
