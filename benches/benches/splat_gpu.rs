@@ -6,8 +6,9 @@
 #![allow(missing_docs, clippy::expect_used, reason = "a benchmark")]
 
 use organza_benches::{Frame, TABLE_1, device};
+use splat_core::raster::FoldInput;
 use splat_core::raster::gpu::draw::{self, Precision};
-use splat_core::raster::gpu::{Capacities, Input, Recorded, record};
+use splat_core::raster::gpu::{Capacities, Recorded, record};
 use splat_core::{Accumulator, Error};
 use splat_shaders::{DeviceError, Executor, Ready};
 use std::time::Instant;
@@ -47,7 +48,7 @@ struct Row {
     best: (f64, Vec<(&'static str, f64)>),
 }
 
-fn rows(device: &mut dyn Executor, input: &Input<'_>, empty: &Accumulator) {
+fn rows(device: &mut dyn Executor, input: &FoldInput<'_>, empty: &Accumulator) {
     let mut rows = Vec::new();
     for (name, record) in WAYS {
         match row(device, input, empty, name, record) {
@@ -69,7 +70,7 @@ fn rows(device: &mut dyn Executor, input: &Input<'_>, empty: &Accumulator) {
 /// Ready with room for all tile entries, which a first try counts.
 fn row(
     device: &mut dyn Executor,
-    input: &Input<'_>,
+    input: &FoldInput<'_>,
     empty: &Accumulator,
     name: &'static str,
     record: fn(Capacities) -> Result<Recorded, Error>,
@@ -91,7 +92,7 @@ fn row(
 
 impl Row {
     /// Runs once; the entries that there was no room for.
-    fn run(&mut self, input: &Input<'_>, empty: &Accumulator) -> Option<u32> {
+    fn run(&mut self, input: &FoldInput<'_>, empty: &Accumulator) -> Option<u32> {
         let uploads = self.recorded.uploads(input, empty).expect("room for all splats");
         let start = Instant::now();
         let run = self.ready.run(&self.recorded.inputs(&uploads)).expect("a device that is there");

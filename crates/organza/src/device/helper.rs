@@ -10,8 +10,8 @@ use super::{DeviceChoice, Failure, fault};
 use crate::Error;
 use hbsort::{Params, SliceOrder};
 use pbsr::{Ensemble, Scene};
+use splat_core::raster::FoldInput;
 use splat_core::raster::RasterCounts;
-use splat_core::raster::gpu::Input;
 use splat_core::{Accumulator, Camera, Cloud, Progress, Receiver};
 use splat_shaders::{Backend, Choice, DeviceError, Executor, Validation};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -127,7 +127,7 @@ impl Helper {
     }
 
     /// Composites splats in order, or leaves them to the processor.
-    pub(crate) fn composite(&self, input: &Input<'_>, accumulator: &mut Accumulator) -> Option<RasterCounts> {
+    pub(crate) fn composite(&self, input: &FoldInput<'_>, accumulator: &mut Accumulator) -> Option<RasterCounts> {
         if let Some(why) = why_not_composite(input) {
             self.leave(why);
             return None;

@@ -1,7 +1,8 @@
 //! Ordered translucent splats composited by a device.
 
 use super::Failure;
-use splat_core::raster::gpu::{Counts, Input, TILE, record};
+use splat_core::raster::FoldInput;
+use splat_core::raster::gpu::{Counts, TILE, record};
 use splat_core::raster::{Accumulation, RasterCounts};
 use splat_core::{Accumulator, Error};
 use splat_shaders::{AdapterKind, Executor, Lanes, PassTime};
@@ -31,7 +32,7 @@ pub(super) fn raster_counts(counts: &Counts, bytes: u64) -> RasterCounts {
 }
 
 /// What the recording does not do.
-pub(super) fn why_not_composite(input: &Input<'_>) -> Option<&'static str> {
+pub(super) fn why_not_composite(input: &FoldInput<'_>) -> Option<&'static str> {
     let half = input.params.accumulation == Accumulation::F16;
     let through = input.projected.crosses_the_eye();
     half.then_some("splats are composited in half precision by the processor")
@@ -42,7 +43,7 @@ pub(super) fn why_not_composite(input: &Input<'_>) -> Option<&'static str> {
 /// `None` where the driver cannot go through all splats of a tile.
 pub(super) fn composite_on(
     device: &mut dyn Executor,
-    input: &Input<'_>,
+    input: &FoldInput<'_>,
     accumulator: &mut Accumulator,
 ) -> Result<Option<(RasterCounts, Vec<PassTime>)>, Failure> {
     let (mut room, lanes) = (room_for(input.order.len()), Lanes::of(device.adapter()));

@@ -8,7 +8,7 @@ use crate::scene::Technique;
 use crate::technique::{EVERYWHERE, Fold, Session};
 use crate::{CostRecord, Error, stage};
 use splat_core::raster;
-use splat_core::raster::gpu::Input;
+use splat_core::raster::FoldInput;
 use splat_core::{Accumulator, Direction, SliceOrder};
 use std::borrow::Cow;
 use std::ops::Range;
@@ -131,11 +131,11 @@ fn composite(
     cost.measure(pass::SPLAT, |stage| {
         stage.items_in = ids.len() as u64;
         let (materials, params) = (&frame.loaded.materials, frame.raster_params());
-        let input = Input { projected, order: ids, values, materials, opaque, direction, params: &params };
+        let input = FoldInput { projected, order: ids, values, materials, opaque, direction, params: &params };
         let device = frame.helper.filter(|_| frame.device_composites);
-        let counts = device.and_then(|device| device.composite(&input, into)).unwrap_or_else(|| {
-            raster::fold(projected, ids, values, materials, opaque, direction, &params, into, frame.progress)
-        });
+        let by_device = device.and_then(|device| device.composite(&input, into));
+        let counts = by_device.map_or_else(|| raster::fold(&input, into, Some(frame.progress)), Ok);
+        let counts = counts.map_err(|e| Error::from_core("compositing", e))?;
         record(stage, &counts);
         Ok::<_, Error>(())
     })?;

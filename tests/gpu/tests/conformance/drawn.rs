@@ -3,8 +3,9 @@
 use crate::splat::{Both, SIZE, Scene, VIEWS, discs, media, position, unit};
 use gpu_conformance::{Device, adapter, bytes, open, open_ash};
 use splat_core::glam::{DVec3, Vec3};
+use splat_core::raster::FoldInput;
 use splat_core::raster::gpu::draw::{Precision, follow, record};
-use splat_core::raster::gpu::{Counts, Input, follow as following};
+use splat_core::raster::gpu::{Counts, follow as following};
 use splat_core::raster::{OpaqueImage, Params};
 use splat_core::{Accumulator, Cloud, Direction, Error, Material, Projection, Splat};
 use splat_shaders::layouts::SplatView;
@@ -227,7 +228,7 @@ fn followed(device: &mut Device, scene: &Scene, sorted: u32, room: u32) -> Resul
     let (projected, order, values, empty) = (scene.project(), scene.order(), scene.values(), scene.accumulator());
     let (materials, opaque, direction, params) = (&scene.materials[..], &scene.opaque, scene.direction, &scene.params);
     let order = &order[..room as usize];
-    let input = Input { projected: &projected, order, values: &values, materials, opaque, direction, params };
+    let input = FoldInput { projected: &projected, order, values: &values, materials, opaque, direction, params };
     let recorded = follow(input.capacities(&empty, 0), Precision::Single)?;
     let (camera, footprints) = (&scene.camera, &scene.footprints);
     let view = following::Input {

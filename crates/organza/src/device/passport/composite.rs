@@ -3,12 +3,10 @@
 use super::{Agreement, Failure, Found, SIZE};
 use crate::device::splats::composite_on;
 use splat_core::glam::DVec3;
-use splat_core::raster::gpu::Input;
+use splat_core::raster::FoldInput;
 use splat_core::raster::gpu::draw::{self, Precision};
 use splat_core::raster::{OpaqueImage, Params, fold, project};
-use splat_core::{
-    Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Progress, Projection, Splat, SplatKind, rng,
-};
+use splat_core::{Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Projection, Splat, SplatKind, rng};
 use splat_shaders::{Executor, PassTime};
 
 /// Splats that are composited.
@@ -61,16 +59,15 @@ impl CompositeInput {
 
     fn check_by(
         &self,
-        composite: impl FnOnce(&Input<'_>, &mut Accumulator) -> Result<Vec<PassTime>, Failure>,
+        composite: impl FnOnce(&FoldInput<'_>, &mut Accumulator) -> Result<Vec<PassTime>, Failure>,
     ) -> Result<Found, Failure> {
         let (params, materials, opaque) = (Params::default(), [Material::default()], OpaqueImage::default());
         let projected = project(&self.cloud, &self.camera, &FootprintStack::default(), &materials, &params);
         let order: Vec<u32> = (0..SPLATS).collect();
-        let (values, direction, progress) = (&self.values[..], Direction::FrontToBack, Progress::new());
+        let (values, direction) = (&self.values[..], Direction::FrontToBack);
         let mut expected = Accumulator::new(SIZE, 1, 3, false, false);
         let mut found = expected.clone();
-        fold(&projected, &order, values, &materials, &opaque, direction, &params, &mut expected, &progress);
-        let input = Input {
+        let input = FoldInput {
             projected: &projected,
             order: &order,
             values,
@@ -79,6 +76,7 @@ impl CompositeInput {
             direction,
             params: &params,
         };
+        fold(&input, &mut expected, None)?;
         let passes = composite(&input, &mut found)?;
         Ok(Found { items: SPLATS.into(), agreement: accumulators(&found, &expected), passes })
     }
