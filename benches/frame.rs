@@ -2,11 +2,9 @@
 
 use crate::{outdoor, outdoor_cloud};
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::raster::gpu::Input;
+use splat_core::raster::FoldInput;
 use splat_core::raster::{Detail, OpaqueImage, Params, Projected, RasterCounts, fold, project_into};
-use splat_core::{
-    Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Progress, Projection, Splat, SplatKind, rng,
-};
+use splat_core::{Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Projection, Splat, SplatKind, rng};
 
 /// Everything that a frame of translucent splats needs, shaded values included.
 pub struct Frame {
@@ -90,8 +88,8 @@ impl Frame {
     }
 
     /// What a device composites: the footprints and the order as they are, into an empty image.
-    pub fn with_input<T>(&self, work: impl FnOnce(&Input<'_>, &Accumulator) -> T) -> T {
-        let input = Input {
+    pub fn with_input<T>(&self, work: impl FnOnce(&FoldInput<'_>, &Accumulator) -> T) -> T {
+        let input = FoldInput {
             projected: &self.projected,
             order: &self.order.input_from_sorted,
             values: &self.values,
@@ -106,17 +104,16 @@ impl Frame {
     /// Composites.
     pub fn fold(&mut self) -> RasterCounts {
         let mut acc = Accumulator::new(self.camera.size, 1, 3, false, false);
-        let counts = fold(
-            &self.projected,
-            &self.order.input_from_sorted,
-            &self.values,
-            &self.materials,
-            &OpaqueImage::default(),
-            Direction::FrontToBack,
-            &Params::default(),
-            &mut acc,
-            &Progress::new(),
-        );
+        let input = FoldInput {
+            projected: &self.projected,
+            order: &self.order.input_from_sorted,
+            values: &self.values,
+            materials: &self.materials,
+            opaque: &OpaqueImage::default(),
+            direction: Direction::FrontToBack,
+            params: &Params::default(),
+        };
+        let counts = fold(&input, &mut acc, None).expect("invariant: nobody cancels");
         std::hint::black_box(&acc);
         counts
     }

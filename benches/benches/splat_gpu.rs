@@ -6,7 +6,8 @@
 #![allow(missing_docs, clippy::expect_used, reason = "a benchmark")]
 
 use organza_benches::{Frame, TABLE_1, device};
-use splat_core::raster::gpu::{Input, Recorded, record};
+use splat_core::raster::FoldInput;
+use splat_core::raster::gpu::{Recorded, record};
 use splat_core::{Accumulator, Error};
 use splat_shaders::{DeviceError, Executor, Lanes, Ready};
 use std::time::Instant;
@@ -37,7 +38,7 @@ struct Best {
     passes: (f64, Vec<(&'static str, f64)>),
 }
 
-fn measure(device: &mut dyn Executor, input: &Input<'_>, empty: &Accumulator) -> Result<(), DeviceError> {
+fn measure(device: &mut dyn Executor, input: &FoldInput<'_>, empty: &Accumulator) -> Result<(), DeviceError> {
     let mut best = Best { run: f64::INFINITY, passes: (f64::INFINITY, Vec::new()) };
     let (recorded, mut ready) = ready(device, input, empty)?;
     for _ in 0..REPEATS {
@@ -52,7 +53,7 @@ fn measure(device: &mut dyn Executor, input: &Input<'_>, empty: &Accumulator) ->
 /// Ready, as pictures are made on this device, with room for all tile entries, which a first run counts.
 fn ready(
     device: &mut dyn Executor,
-    input: &Input<'_>,
+    input: &FoldInput<'_>,
     empty: &Accumulator,
 ) -> Result<(Recorded, Box<dyn Ready>), DeviceError> {
     let lanes = Lanes::of(device.adapter());
@@ -77,7 +78,7 @@ fn ready(
 }
 
 impl Best {
-    fn run(&mut self, recorded: &Recorded, ready: &mut dyn Ready, input: &Input<'_>, empty: &Accumulator) {
+    fn run(&mut self, recorded: &Recorded, ready: &mut dyn Ready, input: &FoldInput<'_>, empty: &Accumulator) {
         let uploads = recorded.uploads(input, empty).expect("room for all splats");
         let start = Instant::now();
         let run = ready.run(&recorded.inputs(&uploads)).expect("a device that is there");

@@ -196,7 +196,7 @@ fn run_on(
             Err(DeviceError::TooLarge { .. } | DeviceError::Memory { .. }) => return Ok(Err(Reason::TooLarge)),
             ready => ready?,
         };
-        let received = looked_up.take().unwrap_or_else(|| splats.received(&all));
+        let received = looked_up.take().map_or_else(|| splats.received(&all), Ok)?;
         if splats.progress.is_cancelled() {
             return Err(Error::Cancelled.into());
         }
@@ -223,8 +223,8 @@ fn run_on(
 
 impl Splats<'_> {
     /// What the maps of the lights let through to these splats, where it is uploaded.
-    fn received(&self, all: &[u32]) -> Vec<[f32; 3]> {
-        if self.castings.is_empty() { shade::received(self.input, all, self.progress) } else { Vec::new() }
+    fn received(&self, all: &[u32]) -> Result<Vec<[f32; 3]>, Error> {
+        if self.castings.is_empty() { shade::received(self.input, all, Some(self.progress)) } else { Ok(Vec::new()) }
     }
 
     /// Room for so many entries of translucent splats, and as many as opaque ones may have.

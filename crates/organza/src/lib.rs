@@ -3,8 +3,12 @@
 //! This crate joins the stages: it reads a scene, asks what the scene calls for, runs those passes and writes images.
 //!
 //! ```text
-//! scene.toml ─ scene ─► load::read ─► choose ─► load convert ─► plan ─► frame ─► techniques in turns ─► output
+//! scene.toml ─► read ─► statistics ─► choose ─► convert ─► plan ─► frame ─► techniques in turns ─► finish ─► output
 //! ```
+//!
+//! Objects are read once, so that what is known of them chooses the technique of each, and the form that it takes. Only those
+//! forms are made. A frame makes what techniques share (shadow maps, opaque surfaces), and each technique folds its own objects
+//! into the picture from front to back.
 //!
 //! ```
 //! use organza::{Progress, RenderOptions, render, scene};

@@ -10,14 +10,13 @@
 //! ```
 //! use pbsr::{Appearance, Ensemble, EnsembleParams, FoldParams, ImplicitSurface, LineSampler, Object, Renderer, Scene};
 //! use pbsr::{SurfaceParams, pixel_area};
-//! use splat_core::glam::{DMat3, DVec3};
+//! use splat_core::glam::DVec3;
 //! use splat_core::{Camera, DAabb, Progress, Projection, ScalarField, Similarity};
 //!
 //! struct Ball;
 //! impl ScalarField for Ball {
 //!     fn value(&self, p: DVec3) -> f64 { p.length_squared() - 1.0 }
 //!     fn gradient(&self, p: DVec3) -> DVec3 { 2.0 * p }
-//!     fn hessian(&self, _: DVec3) -> DMat3 { 2.0 * DMat3::IDENTITY }
 //!     fn bound(&self, p: DVec3, r: f64) -> Option<(f64, f64)> {
 //!         let [near, far] = [(p.length() - r).max(0.0), p.length() + r];
 //!         Some((near * near - 1.0, far * far - 1.0))

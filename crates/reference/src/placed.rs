@@ -13,13 +13,12 @@ fn local(t: &Similarity, p: DVec3) -> DVec3 {
 ///
 /// ```
 /// use reference::Placed;
-/// use splat_core::glam::{DMat3, DVec3};
+/// use splat_core::glam::DVec3;
 /// use splat_core::{DAabb, ScalarField, Similarity};
 /// struct Height;
 /// impl ScalarField for Height {
 ///     fn value(&self, p: DVec3) -> f64 { p.y }
 ///     fn gradient(&self, _: DVec3) -> DVec3 { DVec3::Y }
-///     fn hessian(&self, _: DVec3) -> DMat3 { DMat3::ZERO }
 ///     fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> { Some((p.y - radius, p.y + radius)) }
 /// }
 /// let twice = Similarity { scale: 2.0, ..Similarity::default() };

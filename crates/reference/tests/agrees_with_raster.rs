@@ -3,10 +3,8 @@
 use reference::{Input, Order, composite};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
-use splat_core::raster::{OpaqueImage, Params, fold, project, resolve_opaque};
-use splat_core::{
-    Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Progress, Projection, Splat, SplatKind, rng,
-};
+use splat_core::raster::{FoldInput, OpaqueImage, OpaqueInput, Params, fold, project, resolve_opaque};
+use splat_core::{Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Projection, Splat, SplatKind, rng};
 
 const SIZE: [u32; 2] = [75, 50];
 
@@ -64,10 +62,19 @@ fn rasterize(cloud: &Cloud, camera: &Camera, materials: &[Material], planes: usi
     let (footprints, params) = (FootprintStack::default(), Params { transmittance_cutoff: 0.0, ..Params::default() });
     let projected = project(cloud, camera, &footprints, materials, &params);
     let values: Vec<f32> = cloud.color.iter().flatten().copied().collect();
-    let progress = Progress::new();
-    let (solid, _) = resolve_opaque(&projected, &opaque, &values, 3, false, &progress);
+    let solid = OpaqueInput { projected: &projected, ids: &opaque, values: &values, channels: 3, objects: false };
+    let (solid, _) = resolve_opaque(&solid, None).unwrap();
+    let input = FoldInput {
+        projected: &projected,
+        order: &translucent,
+        values: &values,
+        materials,
+        opaque: &solid,
+        direction,
+        params: &params,
+    };
     let mut acc = Accumulator::new(SIZE, planes, 3, false, false);
-    fold(&projected, &translucent, &values, materials, &solid, direction, &params, &mut acc, &progress);
+    fold(&input, &mut acc, None).unwrap();
     finish(acc, &solid)
 }
 

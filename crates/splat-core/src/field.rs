@@ -2,6 +2,10 @@
 
 use glam::{DMat3, DVec3};
 
+/// Step of differences over the size of what they are taken of: the cube root of a rounding, where the error of the difference and
+/// that of rounding are alike.
+const STEP: f64 = 1.0 / (1u64 << 17) as f64;
+
 /// A scalar field; a surface is its zero set, negative inside.
 pub trait ScalarField: Sync {
     /// Value at `p`.
@@ -20,8 +24,31 @@ pub trait ScalarField: Sync {
         at.iter().zip(out).for_each(|(p, out)| *out = self.value_gradient(*p));
     }
 
-    /// Hessian at `p`, symmetric.
-    fn hessian(&self, p: DVec3) -> DMat3;
+    /// Hessian at `p`, symmetric. By default central differences of the gradient at 2⁻¹⁷ times the greatest coordinate of `p`, or
+    /// the distance at which the gradient would reach 0 from the value if that is more: about ten digits where the field is smooth
+    /// over that way. A field whose features are far smaller than that, or that knows it in closed form, gives its own.
+    ///
+    /// ```
+    /// use splat_core::{ScalarField, glam::{DMat3, DVec3}};
+    /// struct Ball;
+    /// impl ScalarField for Ball {
+    ///     fn value(&self, p: DVec3) -> f64 { p.length_squared() - 1.0 }
+    ///     fn gradient(&self, p: DVec3) -> DVec3 { 2.0 * p }
+    ///     fn bound(&self, _: DVec3, _: f64) -> Option<(f64, f64)> { None }
+    /// }
+    /// let hessian = Ball.hessian(DVec3::new(0.6, 0.0, 0.8));
+    /// assert!(hessian.abs_diff_eq(2.0 * DMat3::IDENTITY, 1e-9));
+    /// ```
+    fn hessian(&self, p: DVec3) -> DMat3 {
+        let (value, gradient) = self.value_gradient(p);
+        let way = value.abs() / gradient.length();
+        let size = p.abs().max_element().max(if way.is_finite() { way } else { 0.0 });
+        let step = STEP * if size > 0.0 { size } else { 1.0 };
+        let along = |axis: DVec3| (self.gradient(p + axis * step) - self.gradient(p - axis * step)) * (0.5 / step);
+        let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z].map(along);
+        let slopes = DMat3::from_cols(x, y, z);
+        (slopes + slopes.transpose()) * 0.5
+    }
 
     /// An interval that contains every value within `radius` of `p`, or `None` where no bound is known.
     fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)>;
@@ -35,5 +62,57 @@ pub trait ScalarField: Sync {
     /// Whether some place within `radius` of `p` may be in the domain; false only where surely none is.
     fn may_be_in_domain(&self, _p: DVec3, _radius: f64) -> bool {
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng;
+
+    /// exp(x·y) + sin z, scaled in space.
+    struct Wave(f64);
+
+    impl Wave {
+        fn own_hessian(&self, p: DVec3) -> DMat3 {
+            let q = p / self.0;
+            let e = (q.x * q.y).exp();
+            let mixed = e * (1.0 + q.x * q.y);
+            DMat3::from_cols_array(&[q.y * q.y * e, mixed, 0.0, mixed, q.x * q.x * e, 0.0, 0.0, 0.0, -q.z.sin()])
+                * (1.0 / (self.0 * self.0))
+        }
+    }
+
+    impl ScalarField for Wave {
+        fn value(&self, p: DVec3) -> f64 {
+            let q = p / self.0;
+            (q.x * q.y).exp() + q.z.sin()
+        }
+
+        fn gradient(&self, p: DVec3) -> DVec3 {
+            let q = p / self.0;
+            let e = (q.x * q.y).exp();
+            DVec3::new(q.y * e, q.x * e, q.z.cos()) / self.0
+        }
+
+        fn bound(&self, _: DVec3, _: f64) -> Option<(f64, f64)> {
+            None
+        }
+    }
+
+    #[test]
+    fn differences_give_the_hessian_at_any_scale() {
+        for scale in [1e-9, 1.0, 1e6] {
+            let wave = Wave(scale);
+            for i in 0..500 {
+                let p = DVec3::from_array([0, 1, 2].map(|a| rng::unit(5, 0, i, a) * 4.0 - 2.0)) * scale;
+                let error = (wave.hessian(p) - wave.own_hessian(p)) * (scale * scale);
+                let largest = error.to_cols_array().into_iter().fold(0.0, |m: f64, e| m.max(e.abs()));
+                assert!(largest < 2e-8, "{p} at {scale}: {largest:e}");
+            }
+            // At the origin nothing but the field's own size is known.
+            let error = wave.hessian(DVec3::ZERO) - wave.own_hessian(DVec3::ZERO);
+            assert!((error * (scale * scale)).abs_diff_eq(DMat3::ZERO, 1e-8), "{scale}: {error}");
+        }
     }
 }

@@ -27,11 +27,11 @@ pub mod tile;
 mod translucent;
 
 pub use finish::{Background, finish};
-pub use opaque::{OpaqueImage, resolve_opaque};
+pub use opaque::{OpaqueImage, OpaqueInput, resolve_opaque};
 pub use project::{project, project_into};
 pub use projected::{Detail, NearDisc, Projected, ProjectedDepth, ProjectedSplat};
 pub use pulp;
-pub use translucent::fold;
+pub use translucent::{FoldInput, fold};
 
 /// What rasterization may trade.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -10,7 +10,7 @@ pub use channels::{ChannelLayout, MAX_CHANNELS};
 pub use point::{Point, Radiance, arriving, facing};
 
 use crate::raster::Projected;
-use crate::{Camera, Cloud, Light, Material, Object, Progress, Receiver, Transmittance};
+use crate::{Camera, Cloud, Error, Light, Material, Object, Progress, Receiver, Transmittance};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -43,12 +43,21 @@ pub struct ShadeInput<'a> {
     pub camera: &'a Camera,
 }
 
-/// Values of all splats that `projected` shows, `layout.count()` numbers each, by id; 0 for the others. After
-/// `progress.cancel()` the rest stays 0.
+/// Values of all splats that `projected` shows, `layout.count()` numbers each, by id; 0 for the others. One tick for each 2¹⁴ splats or so.
+///
+/// # Errors
+/// [`Error::Cancelled`].
 ///
 /// # Panics
 /// If a material or object of the cloud is out of range, or `projected` is of another cloud.
-pub fn shade(input: &ShadeInput<'_>, projected: &Projected, layout: &ChannelLayout, progress: &Progress) -> Vec<f32> {
+pub fn shade(
+    input: &ShadeInput<'_>,
+    projected: &Projected,
+    layout: &ChannelLayout,
+    progress: Option<&Progress>,
+) -> Result<Vec<f32>, Error> {
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
     assert_eq!(projected.splats.len(), input.cloud.len(), "invariant: one footprint a splat");
     let channels = layout.count();
     let eye = (input.camera.position - input.cloud.origin).as_vec3();
@@ -66,7 +75,8 @@ pub fn shade(input: &ShadeInput<'_>, projected: &Projected, layout: &ChannelLayo
             }
         }
     });
-    values
+    progress.tick(0)?;
+    Ok(values)
 }
 
 /// How much of a shadow splat `i` takes.

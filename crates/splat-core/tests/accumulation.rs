@@ -1,8 +1,8 @@
 //! What half precision does to sums of many thin splats.
 
 use glam::DVec3;
-use splat_core::raster::{Accumulation, OpaqueImage, Params, fold, project};
-use splat_core::{Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Progress, Projection, Splat};
+use splat_core::raster::{Accumulation, FoldInput, OpaqueImage, Params, fold, project};
+use splat_core::{Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Projection, Splat};
 
 /// Optical depth and first channel after `count` splats of cross-section `k` over one pixel.
 fn stack(k: f32, count: usize, accumulation: Accumulation) -> (f32, f32) {
@@ -13,9 +13,16 @@ fn stack(k: f32, count: usize, accumulation: Accumulation) -> (f32, f32) {
     let (materials, params) = ([Material::default()], Params { accumulation, ..Params::default() });
     let projected = project(&cloud, &camera, &FootprintStack::default(), &materials, &params);
     let mut acc = Accumulator::new([1, 1], 1, 3, false, false);
-    let (order, opaque, progress) = (vec![0; count], OpaqueImage::default(), Progress::new());
-    let (front, values) = (Direction::FrontToBack, [1.0; 3]);
-    fold(&projected, &order, &values, &materials, &opaque, front, &params, &mut acc, &progress);
+    let input = FoldInput {
+        projected: &projected,
+        order: &vec![0; count],
+        values: &[1.0; 3],
+        materials: &materials,
+        opaque: &OpaqueImage::default(),
+        direction: Direction::FrontToBack,
+        params: &params,
+    };
+    fold(&input, &mut acc, None).unwrap();
     (acc.optical_depth[0][0], acc.channels[0][0])
 }
 

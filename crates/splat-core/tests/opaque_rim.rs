@@ -1,11 +1,11 @@
 //! Opaque surfaces at their silhouette: closed ones have no dark rim, open ones show their back.
 
 use glam::{DVec3, Vec3};
-use splat_core::raster::{OpaqueImage, Params, project, resolve_opaque};
+use splat_core::raster::{OpaqueImage, OpaqueInput, Params, project, resolve_opaque};
 use splat_core::shade::{ChannelLayout, LitBy, ShadeInput, shade};
 use splat_core::{
-    Camera, Cloud, Footprint, FootprintStack, LayerSet, Light, LightShape, Material, Object, Progress, Projection,
-    Splat, SplatKind,
+    Camera, Cloud, Footprint, FootprintStack, LayerSet, Light, LightShape, Material, Object, Projection, Splat,
+    SplatKind,
 };
 use std::f64::consts::PI;
 
@@ -46,10 +46,10 @@ fn picture(cloud: &Cloud, to_light: DVec3) -> OpaqueImage {
         ambient: [0.0; 3],
         camera: &camera,
     };
-    let progress = Progress::new();
-    let values = shade(&input, &projected, &ChannelLayout::new(&LayerSet::default()), &progress);
+    let values = shade(&input, &projected, &ChannelLayout::new(&LayerSet::default()), None).unwrap();
     let ids: Vec<u32> = (0..cloud.len() as u32).collect();
-    resolve_opaque(&projected, &ids, &values, 3, false, &progress).0
+    let input = OpaqueInput { projected: &projected, ids: &ids, values: &values, channels: 3, objects: false };
+    resolve_opaque(&input, None).unwrap().0
 }
 
 /// Position of a pixel on the image plane.

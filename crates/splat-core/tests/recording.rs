@@ -1,8 +1,9 @@
 //! The recorded compositing, without a device: what it is, and what it refuses.
 
 use glam::{DVec3, Vec3};
-use splat_core::raster::gpu::{AttributeRoom, Capacities, Input, follow, project, record, resolve};
+use splat_core::raster::gpu::{AttributeRoom, Capacities, follow, project, record, resolve};
 use splat_core::raster::{self, Accumulation, OpaqueImage, Params, Projected};
+use splat_core::raster::{FoldInput, OpaqueInput};
 use splat_core::shade::{ChannelLayout, MAX_CHANNELS, gpu as shade};
 use splat_core::{Accumulator, Camera, Cloud, Direction, Error, FootprintStack, Material, Projection, Splat};
 
@@ -64,10 +65,10 @@ fn projected() -> Projected {
     raster::project(&cloud, &camera, &FootprintStack::default(), &[Material::default()], &Params::default())
 }
 
-fn input<'a>(projected: &'a Projected, params: &'a Params, opaque: &'a OpaqueImage) -> Input<'a> {
+fn input<'a>(projected: &'a Projected, params: &'a Params, opaque: &'a OpaqueImage) -> FoldInput<'a> {
     static MATERIALS: std::sync::LazyLock<[Material; 1]> = std::sync::LazyLock::new(|| [Material::default()]);
     let direction = Direction::FrontToBack;
-    Input { projected, order: &[3, 1, 9], values: &[0.5; 30], materials: &*MATERIALS, opaque, direction, params }
+    FoldInput { projected, order: &[3, 1, 9], values: &[0.5; 30], materials: &*MATERIALS, opaque, direction, params }
 }
 
 #[test]
@@ -75,7 +76,8 @@ fn what_does_not_fit_the_room_or_the_device_is_refused() {
     let (projected, params, opaque) = (projected(), Params::default(), OpaqueImage::default());
     let plain = Accumulator::new(ROOM.size, 1, 3, false, false);
     let input = input(&projected, &params, &opaque);
-    let uploads = |room: Capacities, input: &Input<'_>, acc: &Accumulator| record(room).unwrap().uploads(input, acc);
+    let uploads =
+        |room: Capacities, input: &FoldInput<'_>, acc: &Accumulator| record(room).unwrap().uploads(input, acc);
     uploads(ROOM, &input, &plain).unwrap();
     assert_eq!(
         input.capacities(&plain, 7),
@@ -90,15 +92,15 @@ fn what_does_not_fit_the_room_or_the_device_is_refused() {
         assert!(matches!(uploads(room, &input, &plain), Err(Error::Overflow { .. })), "{room:?}");
     }
     let wall = OpaqueImage { depth: vec![1.0; 640 * 360], ..OpaqueImage::default() };
-    let hidden = Input { opaque: &wall, ..input };
+    let hidden = FoldInput { opaque: &wall, ..input };
     let refused = uploads(Capacities { opaque: false, ..ROOM }, &hidden, &plain);
     assert_eq!(refused, Err(Error::Overflow { what: "opaque images", needed: 1, had: 0 }));
     let short = OpaqueImage { depth: vec![1.0; 5], ..OpaqueImage::default() };
-    for input in [Input { values: &[0.5; 29], ..input }, Input { opaque: &short, ..input }] {
+    for input in [FoldInput { values: &[0.5; 29], ..input }, FoldInput { opaque: &short, ..input }] {
         assert!(matches!(uploads(ROOM, &input, &plain), Err(Error::ColumnLength { .. })));
     }
     let half = Params { accumulation: Accumulation::F16, ..params };
-    for input in [Input { order: &[10], ..input }, Input { params: &half, ..input }] {
+    for input in [FoldInput { order: &[10], ..input }, FoldInput { params: &half, ..input }] {
         assert!(matches!(uploads(ROOM, &input, &plain), Err(Error::Invalid { .. })));
     }
     for (depths, objects) in [(true, false), (false, true)] {
@@ -110,11 +112,11 @@ fn what_does_not_fit_the_room_or_the_device_is_refused() {
         let (mut shallow, mut nameless) = (projected.clone(), projected.clone());
         shallow.depths.clear();
         nameless.objects.clear();
-        let lacking = Input { projected: if depths { &shallow } else { &nameless }, ..input };
+        let lacking = FoldInput { projected: if depths { &shallow } else { &nameless }, ..input };
         assert!(matches!(uploads(room, &lacking, &acc), Err(Error::ColumnLength { .. })));
     }
     let acc = Accumulator::new(ROOM.size, 1, 3, true, false);
-    let backwards = Input { direction: Direction::BackToFront, ..input };
+    let backwards = FoldInput { direction: Direction::BackToFront, ..input };
     assert!(matches!(uploads(Capacities { depths: true, ..ROOM }, &backwards, &acc), Err(Error::Invalid { .. })));
     assert!(matches!(
         uploads(ROOM, &input, &Accumulator::new([9, 9], 1, 3, false, false)),
@@ -143,8 +145,8 @@ fn opaque_splats_are_recorded_without_fault_or_refused() {
         assert!(matches!(resolve::record(wrong), Err(Error::Invalid { .. })));
     }
     let projected = projected();
-    let input = resolve::Input { projected: &projected, ids: &[1, 7], values: &[0.5; 30], channels: 3, objects: true };
-    let uploads = |room, input: &resolve::Input<'_>| resolve::record(room).unwrap().uploads(input);
+    let input = OpaqueInput { projected: &projected, ids: &[1, 7], values: &[0.5; 30], channels: 3, objects: true };
+    let uploads = |room, input: &OpaqueInput<'_>| resolve::record(room).unwrap().uploads(input);
     uploads(room, &input).unwrap();
     for small in [
         resolve::Capacities { splats: 9, ..room },
@@ -155,10 +157,10 @@ fn opaque_splats_are_recorded_without_fault_or_refused() {
     }
     let mut nameless = projected.clone();
     nameless.objects.clear();
-    for wrong in [resolve::Input { values: &[0.5; 29], ..input }, resolve::Input { projected: &nameless, ..input }] {
+    for wrong in [OpaqueInput { values: &[0.5; 29], ..input }, OpaqueInput { projected: &nameless, ..input }] {
         assert!(matches!(uploads(room, &wrong), Err(Error::ColumnLength { .. })));
     }
-    assert!(matches!(uploads(room, &resolve::Input { ids: &[10], ..input }), Err(Error::Invalid { .. })));
+    assert!(matches!(uploads(room, &OpaqueInput { ids: &[10], ..input }), Err(Error::Invalid { .. })));
     let recorded = resolve::record(resolve::Capacities { size: [2, 1], channels: 1, ..room }).unwrap();
     let state = |low: u32| [low, 0, 5, 7].map(u32::to_ne_bytes).concat();
     let image = [1.5f32.to_bits(), f32::INFINITY.to_bits(), 2.5f32.to_bits(), 0, 4, u32::MAX].map(u32::to_ne_bytes);

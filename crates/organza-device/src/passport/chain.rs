@@ -109,16 +109,15 @@ impl ChainInput {
     }
 
     pub(super) fn check_shade(&self, device: &mut dyn Executor) -> Result<Found, Failure> {
-        let (attributes, layout, progress) =
-            (Attributes::new(&self.cloud, None)?, ChannelLayout::default(), Progress::new());
+        let (attributes, layout) = (Attributes::new(&self.cloud, None)?, ChannelLayout::default());
         let ids: Vec<u32> = (0..SPLATS).collect();
         self.lit(|input| {
             let recorded = shade::record(shade::Capacities::of(input, attributes.room(), layout));
-            let uploads = recorded.uploads(input, &attributes, &shade::received(input, &ids, &progress))?;
+            let uploads = recorded.uploads(input, &attributes, &shade::received(input, &ids, None)?)?;
             let mut inputs: Vec<(BufferId, &[u8])> = recorded.inputs(&uploads).to_vec();
             inputs.extend(attributes.inputs(&recorded.attributes));
             let run = device.run(&recorded.recording, &inputs)?;
-            let expected = splat_core::shade::shade(input, &self.projected, &layout, &progress);
+            let expected = splat_core::shade::shade(input, &self.projected, &layout, None)?;
             let mut found = floats(run.bytes(recorded.values));
             // The processor shades what a pixel shows.
             found.iter_mut().enumerate().filter(|(k, _)| !self.projected.is_visible(k / 3)).for_each(|(_, v)| *v = 0.0);
@@ -134,19 +133,18 @@ impl ChainInput {
         let mut expected = Accumulator::new(SIZE, 1, layout.count(), false, false);
         let mut found = expected.clone();
         self.lit(|input| {
-            let values = splat_core::shade::shade(input, &self.projected, &layout, &progress);
+            let values = splat_core::shade::shade(input, &self.projected, &layout, None)?;
             let order = slice_cloud(&self.cloud, Some(&ids), &self.camera, &sort, &mut Scratch::new())?;
-            raster::fold(
-                &self.projected,
-                &order.input_from_sorted,
-                &values,
-                &self.materials,
-                &opaque,
+            let folded = raster::FoldInput {
+                projected: &self.projected,
+                order: &order.input_from_sorted,
+                values: &values,
+                materials: &self.materials,
+                opaque: &opaque,
                 direction,
-                &raster,
-                &mut expected,
-                &progress,
-            );
+                params: &raster,
+            };
+            raster::fold(&folded, &mut expected, None)?;
             let splats = Splats {
                 input,
                 ids: &ids,

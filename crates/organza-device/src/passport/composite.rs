@@ -2,11 +2,10 @@
 
 use super::{Agreement, Failure, Found, SIZE};
 use splat_core::glam::DVec3;
-use splat_core::raster::gpu::{Input, record};
+use splat_core::raster::FoldInput;
+use splat_core::raster::gpu::record;
 use splat_core::raster::{OpaqueImage, Params, fold, project};
-use splat_core::{
-    Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Progress, Projection, Splat, SplatKind, rng,
-};
+use splat_core::{Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Projection, Splat, SplatKind, rng};
 use splat_shaders::Executor;
 
 /// Splats that are composited.
@@ -47,11 +46,10 @@ impl CompositeInput {
         let (params, materials, opaque) = (Params::default(), [Material::default()], OpaqueImage::default());
         let projected = project(&self.cloud, &self.camera, &FootprintStack::default(), &materials, &params);
         let order: Vec<u32> = (0..SPLATS).collect();
-        let (values, direction, progress) = (&self.values[..], Direction::FrontToBack, Progress::new());
+        let (values, direction) = (&self.values[..], Direction::FrontToBack);
         let mut expected = Accumulator::new(SIZE, 1, 3, false, false);
         let mut found = expected.clone();
-        fold(&projected, &order, values, &materials, &opaque, direction, &params, &mut expected, &progress);
-        let input = Input {
+        let input = FoldInput {
             projected: &projected,
             order: &order,
             values,
@@ -60,6 +58,7 @@ impl CompositeInput {
             direction,
             params: &params,
         };
+        fold(&input, &mut expected, None)?;
         let recorded = record(input.capacities(&found, ENTRIES))?;
         let uploads = recorded.uploads(&input, &found)?;
         let run = device.run(&recorded.recording, &recorded.inputs(&uploads))?;

@@ -3,9 +3,9 @@
 use super::{Agreement, Found, SIZE, composite::numbers};
 use crate::Failure;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::raster::gpu::resolve::{Input, record};
-use splat_core::raster::{Detail, OpaqueImage, Params, Projected, project_into, resolve_opaque};
-use splat_core::{Camera, Cloud, FootprintStack, Material, Progress, Projection, Splat, SplatKind, rng};
+use splat_core::raster::gpu::resolve::record;
+use splat_core::raster::{self, Detail, OpaqueImage, Params, Projected, project_into, resolve_opaque};
+use splat_core::{Camera, Cloud, FootprintStack, Material, Projection, Splat, SplatKind, rng};
 use splat_shaders::Executor;
 
 /// Discs.
@@ -45,8 +45,8 @@ impl OpaqueInput {
 
     pub(super) fn check(&self, device: &mut dyn Executor) -> Result<Found, Failure> {
         let Self { projected, ids, values } = self;
-        let (expected, _) = resolve_opaque(projected, ids, values, 3, false, &Progress::new());
-        let input = Input { projected, ids, values, channels: 3, objects: false };
+        let input = raster::OpaqueInput { projected, ids, values, channels: 3, objects: false };
+        let (expected, _) = resolve_opaque(&input, None)?;
         let recorded = record(input.capacities(ENTRIES))?;
         let uploads = recorded.uploads(&input)?;
         let run = device.run(&recorded.recording, &recorded.inputs(&uploads))?;

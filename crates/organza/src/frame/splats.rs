@@ -3,7 +3,7 @@
 use super::Frame;
 use crate::pass;
 use crate::{CostRecord, Error, stage};
-use splat_core::raster::{self, Background, Detail, OpaqueImage, Projected, RasterCounts};
+use splat_core::raster::{self, Background, Detail, OpaqueImage, OpaqueInput, Projected, RasterCounts};
 use splat_core::shade::shade;
 use splat_core::{Accumulator, Cloud, Layers, SplatKind, StageCost};
 
@@ -47,7 +47,8 @@ impl Frame<'_> {
         self.progress.begin(stage::SHADE);
         let values = cost.measure(pass::SHADE, |stage| {
             let lights = self.lit_by(maps);
-            let values = shade(&self.shading(&lights), &projected, &layout, self.progress);
+            let values = shade(&self.shading(&lights), &projected, &layout, Some(self.progress));
+            let values = values.map_err(|e| Error::from_core("shading", e))?;
             stage.items_in = projected.visible();
             stage.items_out = stage.items_in;
             stage.bytes = 4 * values.len() as u64;
@@ -103,8 +104,9 @@ impl Frame<'_> {
             image = cost.measure(pass::OPAQUE, |stage| {
                 stage.items_in = ids.len() as u64;
                 let objects = self.layers.object;
-                let (image, counts) =
-                    raster::resolve_opaque(projected, &ids, values, *channels, objects, self.progress);
+                let input = OpaqueInput { projected, ids: &ids, values, channels: *channels as u32, objects };
+                let resolved = raster::resolve_opaque(&input, Some(self.progress));
+                let (image, counts) = resolved.map_err(|e| Error::from_core("opaque splats", e))?;
                 record(stage, &counts);
                 Ok::<_, Error>(image)
             })?;

@@ -1,9 +1,10 @@
 //! The `particles` technique (Tanaka 2012): translucent things become sets of opaque particles, each set is drawn by depth
 //! alone, and the pictures are averaged. Nothing is sorted.
 //!
-//! Splats are the particles' source: a splat of cross-section K gives a Poisson number of particles distributed as its
-//! kernel, so that its optical depth is that of the `points` technique. Opaque surfaces are drawn exactly and hide particles
-//! behind them. Light comes from the same shadow maps.
+//! Particles come from an object's own data where there is a sampler for it: lines through a field, triangles, the cells of a
+//! volume. Raw points, and what must be splats for another reason, are sampled splat by splat: one of cross-section K gives a
+//! Poisson number of particles distributed as its kernel, so that its optical depth is that of the `points` technique. Opaque
+//! surfaces are drawn exactly and hide particles behind them. Light comes from the same shadow maps.
 //!
 //! An average is a segment of its own: what lies in a range of depths hides what lies behind it as its mean opacity does, for
 //! the particles of two ranges are independent.

@@ -9,6 +9,7 @@ use crate::scene::Technique;
 use crate::technique::{EVERYWHERE, Fold, Session};
 use crate::{CostRecord, Error, stage};
 use splat_core::raster;
+use splat_core::raster::FoldInput;
 use splat_core::{Accumulator, Direction, SliceOrder};
 use std::borrow::Cow;
 use std::ops::Range;
@@ -128,7 +129,9 @@ fn composite(
     cost.measure(pass::SPLAT, |stage| {
         stage.items_in = ids.len() as u64;
         let (materials, params) = (&frame.loaded.materials, frame.raster_params());
-        let counts = raster::fold(projected, ids, values, materials, opaque, direction, &params, into, frame.progress);
+        let input = FoldInput { projected, order: ids, values, materials, opaque, direction, params: &params };
+        let counts = raster::fold(&input, into, Some(frame.progress));
+        let counts = counts.map_err(|e| Error::from_core("compositing", e))?;
         record(stage, &counts);
         Ok::<_, Error>(())
     })?;

@@ -52,7 +52,7 @@ pub use packed::words;
 use super::bins::TILE as TWIN_TILE;
 use super::kernel::{Kernel, TABLE};
 use super::projected::{Coverage, ProjectedSplat};
-use super::{Accumulation, OpaqueImage, Params, Projected};
+use super::{Accumulation, FoldInput, OpaqueImage, Params, Projected};
 use crate::shade::{ChannelLayout, MAX_CHANNELS};
 use crate::{Accumulator, Direction, Error, Material};
 use list::{List, ListRoom};
@@ -135,26 +135,7 @@ fn check_image(size: [u32; 2], channels: u32) -> Result<(), Error> {
     Ok(())
 }
 
-/// What is folded: the arguments of [`fold`](super::fold) before the accumulator.
-#[derive(Debug, Clone, Copy)]
-pub struct Input<'a> {
-    /// Footprints by id.
-    pub projected: &'a Projected,
-    /// Ids in compositing order.
-    pub order: &'a [u32],
-    /// As many numbers a splat as the accumulator has channels, by id.
-    pub values: &'a [f32],
-    /// Extinctions.
-    pub materials: &'a [Material],
-    /// What hides splats.
-    pub opaque: &'a OpaqueImage,
-    /// Which end comes first.
-    pub direction: Direction,
-    /// The cut-off; the precision must be single.
-    pub params: &'a Params,
-}
-
-impl Input<'_> {
+impl FoldInput<'_> {
     /// Room for this input, with so many entries.
     pub fn capacities(&self, accumulator: &Accumulator, entries: u32) -> Capacities {
         Capacities {
@@ -190,8 +171,8 @@ struct Image<'a> {
 }
 
 impl<'a> Image<'a> {
-    fn of(input: &Input<'a>) -> Self {
-        let Input { projected, order, materials, opaque, direction, params, .. } = *input;
+    fn of(input: &FoldInput<'a>) -> Self {
+        let FoldInput { projected, order, materials, opaque, direction, params, .. } = *input;
         let (size, perspective, kernels) = (projected.size, projected.perspective, &projected.kernels[..]);
         let (ordered, objects) = (order.len() as u32, &projected.objects[..]);
         Self { size, perspective, kernels, materials, opaque, direction, params, ordered, objects, hidden: false }
@@ -315,7 +296,7 @@ impl Recorded {
     /// [`Error::Overflow`] for more than there is room for, [`Error::ColumnLength`] for columns of different lengths,
     /// [`Error::Invalid`] for an id that no splat has and for what only the CPU does: half precision, depth and object
     /// planes.
-    pub fn uploads(&self, input: &Input<'_>, accumulator: &Accumulator) -> Result<Uploads, Error> {
+    pub fn uploads(&self, input: &FoldInput<'_>, accumulator: &Accumulator) -> Result<Uploads, Error> {
         let image = Image::of(input);
         self.check_image(&image, accumulator)?;
         self.check_splats(input)?;
@@ -348,7 +329,7 @@ impl Recorded {
     }
 
     /// The words of all splats, whose ids are known.
-    fn splats(&self, input: &Input<'_>) -> Result<Vec<u32>, Error> {
+    fn splats(&self, input: &FoldInput<'_>) -> Result<Vec<u32>, Error> {
         let projected = input.projected;
         let unknown = |(splat, coverage): (&ProjectedSplat, &Coverage)| {
             *coverage != Coverage::NONE
@@ -417,7 +398,7 @@ impl Recorded {
         equal_lengths(lengths.into_iter().chain(layers).chain(planes))
     }
 
-    fn check_splats(&self, input: &Input<'_>) -> Result<(), Error> {
+    fn check_splats(&self, input: &FoldInput<'_>) -> Result<(), Error> {
         let (projected, room) = (input.projected, self.capacities);
         check_near(projected)?;
         let n = projected.splats.len();

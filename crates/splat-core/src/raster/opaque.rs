@@ -10,7 +10,7 @@ use super::kernel::Kernel;
 use super::lanes::{Lanes, MAX_LANES};
 use super::projected::{NearDisc, Projected, ProjectedDepth, ProjectedSplat};
 use super::tile::{AREA, BATCH, Run, Runs, for_each_span};
-use crate::{Footprint, Progress};
+use crate::{Error, Footprint, Progress};
 use pulp::Simd;
 use rayon::prelude::*;
 
@@ -66,21 +66,38 @@ struct OpaqueTile {
     fragments: u64,
 }
 
-/// Resolves the opaque splats `ids`; `values` holds `channels` numbers a splat, by id. Object ids are kept
-/// when `objects` asks for them. After `progress.cancel()` the remaining tiles stay empty.
+/// What [`resolve_opaque`] resolves.
+#[derive(Debug, Clone, Copy)]
+pub struct OpaqueInput<'a> {
+    /// Footprints by id, with their depths.
+    pub projected: &'a Projected,
+    /// Ids of opaque splats.
+    pub ids: &'a [u32],
+    /// As many numbers a splat as there are channels, by id.
+    pub values: &'a [f32],
+    /// Number of channels.
+    pub channels: u32,
+    /// Whether objects are kept.
+    pub objects: bool,
+}
+
+/// Resolves opaque splats. One tick a tile.
+///
+/// # Errors
+/// [`Error::Cancelled`].
 ///
 /// # Panics
 /// If `projected` lacks depths, or objects that are asked for.
 pub fn resolve_opaque(
-    projected: &Projected,
-    ids: &[u32],
-    values: &[f32],
-    channels: usize,
-    objects: bool,
-    progress: &Progress,
-) -> (OpaqueImage, RasterCounts) {
+    input: &OpaqueInput<'_>,
+    progress: Option<&Progress>,
+) -> Result<(OpaqueImage, RasterCounts), Error> {
+    let OpaqueInput { projected, ids, values, objects, .. } = *input;
+    let channels = input.channels as usize;
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
     if ids.is_empty() {
-        return (OpaqueImage::default(), RasterCounts::default());
+        return Ok((OpaqueImage::default(), RasterCounts::default()));
     }
     assert_eq!(projected.depths.len(), projected.splats.len(), "invariant: opaque splats have depths");
     assert!(!objects || projected.objects.len() == projected.splats.len(), "invariant: objects when asked for");
@@ -95,6 +112,7 @@ pub fn resolve_opaque(
             tile
         })
         .collect();
+    progress.tick(0)?;
     let n = projected.size.iter().map(|s| *s as usize).product();
     let mut image = OpaqueImage {
         depth: vec![f32::INFINITY; n],
@@ -118,7 +136,7 @@ pub fn resolve_opaque(
         fragments: tiles.iter().map(|t| t.fragments).sum(),
         bytes: bins.bytes() + (n * 4 * (channels + 2)) as u64,
     };
-    (image, counts)
+    Ok((image, counts))
 }
 
 /// One tile's work, in the form that [`pulp`] compiles once per instruction set.

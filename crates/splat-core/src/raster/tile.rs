@@ -7,7 +7,7 @@
 //! What blends splats in another way than [`fold`](super::fold) does walks tiles by the same few names:
 //!
 //! ```
-//! use splat_core::raster::{Detail, Params, Projected, bins::{Bins, bin}, lanes::Lanes, project, pulp, tile::{AREA, Runs}};
+//! use splat_core::raster::{Params, Projected, bins::{Bins, bin}, lanes::Lanes, project, pulp, tile::{AREA, Runs}};
 //! use splat_core::{Camera, Cloud, FootprintStack, Projection, Splat, glam::DVec3};
 //!
 //! /// The sum of all optical depths in a tile.
@@ -36,8 +36,7 @@
 //! cloud.push(&Splat { radius: 0.5, cross_section: 0.2, ..Splat::default() });
 //! let view = Projection::Orthographic { height: 2.0 };
 //! let camera = Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, view, [64, 64]).unwrap();
-//! let detail = Detail { depth: false, object: false };
-//! let projected = project(&cloud, &camera, &FootprintStack::default(), &[Default::default()], &Params::default(), detail);
+//! let projected = project(&cloud, &camera, &FootprintStack::default(), &[Default::default()], &Params::default());
 //! let bins = bin(&projected, &[0]);
 //! let sum: f32 = (0..bins.tiles()).map(|t| pulp::Arch::new().dispatch(Sum(&projected, &bins, t))).sum();
 //! // ∫τ dA is the cross-section, whatever the splat's size: 32 pixels are one unit of length.

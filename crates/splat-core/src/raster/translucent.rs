@@ -15,7 +15,7 @@ use super::tile::{BATCH, BLOCKS, Line, PIXELS, Run, Runs, for_each_span, tile_of
 use super::{Accumulation, OpaqueImage, Params, RasterCounts};
 use crate::depth_profile::DepthFragment;
 use crate::shade::ChannelLayout;
-use crate::{Accumulator, DepthProfile, Direction, Material, Progress, SplatKind};
+use crate::{Accumulator, DepthProfile, Direction, Error, Material, Progress, SplatKind};
 use pulp::Simd;
 use rayon::prelude::*;
 
@@ -41,28 +41,45 @@ struct Tile {
     fragments: u64,
 }
 
-/// Folds the splats `order`, ids in compositing order, into `accumulator`.
+/// What is folded.
+#[derive(Debug, Clone, Copy)]
+pub struct FoldInput<'a> {
+    /// Footprints by id.
+    pub projected: &'a Projected,
+    /// Ids in compositing order.
+    pub order: &'a [u32],
+    /// As many numbers a splat as the accumulator has channels, by id.
+    pub values: &'a [f32],
+    /// Extinction per channel, by id; with one plane of optical depth, which is for materials that absorb all channels alike, that
+    /// of the first channel.
+    pub materials: &'a [Material],
+    /// What hides splats; empty where nothing does.
+    pub opaque: &'a OpaqueImage,
+    /// Which end comes first.
+    pub direction: Direction,
+    /// The cut-off and the precision of sums, which on a device must be single.
+    pub params: &'a Params,
+}
+
+/// Folds splats, in compositing order, into `accumulator`. Front to back can continue an accumulator that holds nearer splats;
+/// back to front can continue one that holds farther ones, but not one with depths, which are made front to back. One tick a
+/// tile.
 ///
-/// `values` holds as many numbers a splat as the accumulator has channels, by id. `materials` gives the
-/// extinction per channel; with one plane of optical depth, which is for materials that absorb all channels alike, the
-/// first channel's counts. Front to back can continue an
-/// accumulator that holds nearer splats; back to front can continue one that holds farther ones, but not one with depths,
-/// which are made front to back. After `progress.cancel()` the remaining tiles are left as they are.
+/// # Errors
+/// [`Error::Cancelled`]: the tiles that were done are in the accumulator, which is of no use as a picture; the others are as they
+/// were.
 ///
 /// # Panics
 /// If sizes of the image, the accumulator and `values` disagree, or `projected` lacks depths or objects that an opaque
 /// image, depths or an object plane call for; for depths back to front.
 pub fn fold(
-    projected: &Projected,
-    order: &[u32],
-    values: &[f32],
-    materials: &[Material],
-    opaque: &OpaqueImage,
-    direction: Direction,
-    params: &Params,
+    input: &FoldInput<'_>,
     accumulator: &mut Accumulator,
-    progress: &Progress,
-) -> RasterCounts {
+    progress: Option<&Progress>,
+) -> Result<RasterCounts, Error> {
+    let FoldInput { projected, order, values, opaque, direction, .. } = *input;
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
     assert_eq!(projected.size, accumulator.size, "invariant: one image size");
     assert_eq!(values.len(), projected.splats.len() * accumulator.channels.len(), "invariant: values for each splat");
     let needs_object = !accumulator.object.is_empty();
@@ -86,8 +103,7 @@ pub fn fold(
         .filter(|&t| progress.tick(1).is_ok() && !bins.is_empty(t))
         .map(|t| {
             let mut tile = Tile::load(accumulator, projected, opaque, &bins, t);
-            let input = FoldTile { tile: &mut tile, bins: &bins, t, projected, values, materials, direction, params };
-            pulp::Arch::new().dispatch(input);
+            pulp::Arch::new().dispatch(FoldTile { tile: &mut tile, bins: &bins, t, input });
             tile
         })
         .collect();
@@ -102,7 +118,8 @@ pub fn fold(
         counts.bytes += size_of_val(&*tile.lines) as u64;
         tile.store(accumulator);
     }
-    counts
+    progress.tick(0)?;
+    Ok(counts)
 }
 
 /// One tile's work, in the form that [`pulp`] compiles once per instruction set.
@@ -110,11 +127,7 @@ struct FoldTile<'a> {
     tile: &'a mut Tile,
     bins: &'a Bins,
     t: usize,
-    projected: &'a Projected,
-    values: &'a [f32],
-    materials: &'a [Material],
-    direction: Direction,
-    params: &'a Params,
+    input: &'a FoldInput<'a>,
 }
 
 impl pulp::WithSimd for FoldTile<'_> {
@@ -122,8 +135,8 @@ impl pulp::WithSimd for FoldTile<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let half = self.params.accumulation == Accumulation::F16;
-        match (self.direction, half, self.tile.planes, self.tile.channels) {
+        let half = self.input.params.accumulation == Accumulation::F16;
+        match (self.input.direction, half, self.tile.planes, self.tile.channels) {
             (Direction::FrontToBack, false, 1, 3) => self.fold::<S, true, false, 1, 3>(simd),
             (Direction::FrontToBack, false, 1, _) => self.fold::<S, true, false, 1, 0>(simd),
             (Direction::FrontToBack, false, ..) => self.fold::<S, true, false, 3, 0>(simd),
@@ -156,7 +169,7 @@ impl FoldTile<'_> {
     #[inline(always)]
     fn fold<S: Simd, const FRONT: bool, const HALF: bool, const PLANES: usize, const CHANNELS: usize>(self, simd: S) {
         let channels = if CHANNELS > 0 { CHANNELS } else { self.tile.channels };
-        let projected = self.projected;
+        let FoldInput { projected, values: of_splats, materials, params, .. } = *self.input;
         let deep = self.tile.needs_depth();
         let mut records = [ProjectedSplat::default(); BATCH];
         let mut depths = [ProjectedDepth::default(); BATCH];
@@ -165,14 +178,14 @@ impl FoldTile<'_> {
             for batch in list.chunks(BATCH) {
                 for ((&j, record), value) in batch.iter().zip(&mut records).zip(values.chunks_exact_mut(channels)) {
                     *record = projected.splats[j as usize];
-                    value.copy_from_slice(&self.values[j as usize * channels..][..channels]);
+                    value.copy_from_slice(&of_splats[j as usize * channels..][..channels]);
                 }
                 if deep {
                     batch.iter().zip(&mut depths).for_each(|(&j, depth)| *depth = projected.depths[j as usize]);
                 }
                 for (k, &j) in batch.iter().enumerate() {
                     let splat = &records[k];
-                    let extinction = self.materials[splat.material as usize].extinction_rgb;
+                    let extinction = materials[splat.material as usize].extinction_rgb;
                     let most = extinction[0].max(extinction[1]).max(extinction[2]);
                     let source = Source {
                         splat,
@@ -187,7 +200,7 @@ impl FoldTile<'_> {
                     };
                     self.tile.splat::<S, FRONT, HALF, PLANES, CHANNELS>(simd, &source);
                 }
-                if FRONT && self.tile.is_done(self.params.transmittance_cutoff) {
+                if FRONT && self.tile.is_done(params.transmittance_cutoff) {
                     return;
                 }
             }

@@ -121,11 +121,16 @@ pub fn suits(input: &ShadeInput<'_>) -> Result<(), &'static str> {
 }
 
 /// Share of each light with a shadow map that each splat receives, per channel: for one light after the other, of the
-/// splats `ids` in their order. After `progress.cancel()` the rest is 0.
+/// splats `ids` in their order.
+///
+/// # Errors
+/// [`Error::Cancelled`].
 ///
 /// # Panics
 /// If an id, or a material or object of the cloud is out of range.
-pub fn received(input: &ShadeInput<'_>, ids: &[u32], progress: &Progress) -> Vec<[f32; 3]> {
+pub fn received(input: &ShadeInput<'_>, ids: &[u32], progress: Option<&Progress>) -> Result<Vec<[f32; 3]>, Error> {
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
     let eye = (input.camera.position - input.cloud.origin).as_vec3();
     let mut all = Vec::new();
     for lit in shadowed(input.lights) {
@@ -142,7 +147,8 @@ pub fn received(input: &ShadeInput<'_>, ids: &[u32], progress: &Progress) -> Vec
         });
         all.append(&mut column);
     }
-    all
+    progress.tick(0)?;
+    Ok(all)
 }
 
 /// How much of a shadow each of the splats `ids` takes, in \[0, 1\]: one number for all where they are alike.

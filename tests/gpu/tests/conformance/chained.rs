@@ -4,11 +4,11 @@ use gpu_conformance::open;
 use hbsort::Scratch;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::gpu::{Attributes, Capacities, follow, project as projection};
-use splat_core::raster::{OpaqueImage, Params, fold, project};
+use splat_core::raster::{FoldInput, OpaqueImage, Params, fold, project};
 use splat_core::shade::{ChannelLayout, LitBy, ShadeInput, gpu as shading, shade};
 use splat_core::{
-    Accumulator, Camera, Cloud, Direction, FootprintStack, Light, LightShape, Material, Object, Progress, Projection,
-    Splat, SplatKind, rng,
+    Accumulator, Camera, Cloud, Direction, FootprintStack, Light, LightShape, Material, Object, Projection, Splat,
+    SplatKind, rng,
 };
 
 /// Most that a transmittance may differ by, or a channel as a share of the largest value.
@@ -52,13 +52,22 @@ fn four_stages_in_one_submission_are_the_cpu_s_picture() {
     for direction in [Direction::FrontToBack, Direction::BackToFront] {
         let sort_params = hbsort::Params { direction, exact: true, margin_px: 2.0, ..hbsort::Params::default() };
         let projected = project(&cloud, &camera, &footprints, &materials, &params);
-        let values = shade(&input, &projected, &layout, &Progress::new());
+        let values = shade(&input, &projected, &layout, None).unwrap();
         let order = hbsort::slice_cloud(&cloud, None, &camera, &sort_params, &mut Scratch::new()).unwrap();
         assert!(order.culled > u64::from(SPLATS) / 20);
         let mut cpu = Accumulator::new(SIZE, 1, 3, false, false);
         let mut gpu = cpu.clone();
         let ids = &order.input_from_sorted;
-        fold(&projected, ids, &values, &materials, &opaque, direction, &params, &mut cpu, &Progress::new());
+        let folded = FoldInput {
+            projected: &projected,
+            order: ids,
+            values: &values,
+            materials: &materials,
+            opaque: &opaque,
+            direction,
+            params: &params,
+        };
+        fold(&folded, &mut cpu, None).unwrap();
 
         let attributes = Attributes::new(&cloud, None).unwrap();
         let sort = hbsort::gpu::record(hbsort::gpu::Capacities { splats: SPLATS, kept: SPLATS });

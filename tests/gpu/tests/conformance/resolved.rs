@@ -3,10 +3,11 @@
 use super::splat::{SIZE, VIEWS, discs, unit};
 use gpu_conformance::{Device, open};
 use splat_core::glam::DVec3;
+use splat_core::raster::OpaqueInput;
 use splat_core::raster::gpu::Counts;
-use splat_core::raster::gpu::resolve::{Input, record};
+use splat_core::raster::gpu::resolve::record;
 use splat_core::raster::{Detail, OpaqueImage, Params, Projected, project_into, resolve_opaque};
-use splat_core::{Camera, Cloud, Error, FootprintStack, Material, Progress, Projection, SplatKind, rng};
+use splat_core::{Camera, Cloud, Error, FootprintStack, Material, Projection, SplatKind, rng};
 
 /// Most that a depth may differ by, as a share of the scene's extent, and a channel as a share of the largest value.
 const TOLERANCE: f32 = 1e-5;
@@ -41,16 +42,15 @@ fn values(splats: usize, channels: u32) -> Vec<f32> {
     (0..splats as u64 * u64::from(channels)).map(|i| 3.0 * rng::unit_f32(77, 0, i, 0)).collect()
 }
 
-fn on_device(device: &mut Device, input: &Input<'_>, room: u32) -> Result<(OpaqueImage, Counts), Error> {
+fn on_device(device: &mut Device, input: &OpaqueInput<'_>, room: u32) -> Result<(OpaqueImage, Counts), Error> {
     let recorded = record(input.capacities(room))?;
     let uploads = recorded.uploads(input)?;
     let run = device.run(&recorded.recording, &recorded.inputs(&uploads)).unwrap();
     recorded.finish([recorded.state, recorded.image].map(|b| run.bytes(b)))
 }
 
-fn on_processor(input: &Input<'_>) -> OpaqueImage {
-    let Input { projected, ids, values, channels, objects } = *input;
-    resolve_opaque(projected, ids, values, channels as usize, objects, &Progress::new()).0
+fn on_processor(input: &OpaqueInput<'_>) -> OpaqueImage {
+    resolve_opaque(input, None).unwrap().0
 }
 
 /// Share of the pixels that differ by more than the tolerance, or are another object's.
@@ -76,7 +76,7 @@ fn opaque_surfaces_are_the_cpu_s() {
         let projected = projected(&cloud, view, SIZE);
         for (channels, objects) in [(3, false), (3, true), (1, true), (7, false), (16, true)] {
             let values = values(cloud.len(), channels);
-            let input = Input { projected: &projected, ids: &ids, values: &values, channels, objects };
+            let input = OpaqueInput { projected: &projected, ids: &ids, values: &values, channels, objects };
             let (found, counts) = on_device(&mut device, &input, 1 << 18).unwrap();
             let expected = on_processor(&input);
             let differ = others(&expected, &found);
@@ -86,7 +86,7 @@ fn opaque_surfaces_are_the_cpu_s() {
             assert!(counts.splats > 2000 && counts.splats <= ids.len() as u64, "{counts:?}");
             // The translucent ones are none of them: with those, or in another order of depths, it is another image.
             let all: Vec<u32> = (0..cloud.len() as u32).collect();
-            let with_others = on_processor(&Input { ids: &all, ..input });
+            let with_others = on_processor(&OpaqueInput { ids: &all, ..input });
             assert!(others(&with_others, &found) > 10.0 * OTHER_SHARE);
         }
     }
@@ -100,15 +100,15 @@ fn any_size_no_splat_and_too_little_room_are_the_cpu_s() {
     let (ids, values) = (opaque_ids(&cloud), values(cloud.len(), 3));
     for size in [[1, 1], [17, 33], [257 * 16, 9]] {
         let projected = projected(&cloud, VIEWS[1], size);
-        let input = Input { projected: &projected, ids: &ids, values: &values, channels: 3, objects: true };
+        let input = OpaqueInput { projected: &projected, ids: &ids, values: &values, channels: 3, objects: true };
         let (found, _) = on_device(&mut device, &input, 1 << 20).unwrap();
         assert!(others(&on_processor(&input), &found) <= OTHER_SHARE, "{size:?}");
-        let (none, counts) = on_device(&mut device, &Input { ids: &[], ..input }, 0).unwrap();
+        let (none, counts) = on_device(&mut device, &OpaqueInput { ids: &[], ..input }, 0).unwrap();
         assert!(none.depth.iter().all(|z| *z == f32::INFINITY) && none.object.iter().all(|o| *o == u32::MAX));
         assert!(none.channels.iter().flatten().all(|v| *v == 0.0) && counts == Counts::default());
     }
     let projected = projected(&cloud, VIEWS[0], SIZE);
-    let input = Input { projected: &projected, ids: &ids, values: &values, channels: 3, objects: false };
+    let input = OpaqueInput { projected: &projected, ids: &ids, values: &values, channels: 3, objects: false };
     let expected = on_device(&mut device, &input, 1 << 18).unwrap();
     let Err(Error::Overflow { needed, had: 100, .. }) = on_device(&mut device, &input, 100) else {
         panic!("room for 100 entries is enough")

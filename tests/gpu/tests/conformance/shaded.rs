@@ -7,8 +7,8 @@ use splat_core::raster::{Params, project};
 use splat_core::shade::gpu::{Capacities, received, record, suits};
 use splat_core::shade::{ChannelLayout, LitBy, ShadeInput, shade};
 use splat_core::{
-    Camera, Cloud, Error, FootprintStack, LayerSet, Light, LightShape, Material, Object, Progress, Projection,
-    Receiver, Shading, Splat, SplatKind, Transmittance, rng,
+    Camera, Cloud, Error, FootprintStack, LayerSet, Light, LightShape, Material, Object, Projection, Receiver, Shading,
+    Splat, SplatKind, Transmittance, rng,
 };
 
 /// Most that a value may differ by, as a share of the largest that its light could give with its material: highlights of
@@ -90,7 +90,7 @@ fn on_device(device: &mut Device, input: &ShadeInput<'_>, layout: ChannelLayout)
     let attributes = Attributes::new(input.cloud, None).unwrap();
     let recorded = record(Capacities::of(input, attributes.room(), layout));
     let ids: Vec<u32> = (0..input.cloud.len() as u32).collect();
-    let light = received(input, &ids, &Progress::new());
+    let light = received(input, &ids, None).unwrap();
     let uploads = recorded.uploads(input, &attributes, &light).unwrap();
     let inputs = [&recorded.inputs(&uploads)[..], &attributes.inputs(&recorded.attributes)[..]].concat();
     let run = device.run(&recorded.recording, &inputs).unwrap();
@@ -128,7 +128,7 @@ fn values_are_the_cpu_s() {
                 suits(&input).unwrap();
                 let layout = ChannelLayout::new(&set);
                 let projected = project(&cloud, camera, &FootprintStack::default(), &materials, &Params::default());
-                let expected = shade(&input, &projected, &layout, &Progress::new());
+                let expected = shade(&input, &projected, &layout, None).unwrap();
                 let found = on_device(&mut device, &input, layout);
                 assert_eq!(found.len(), expected.len());
                 let (mut most, mut seen) = (0.0f32, 0);

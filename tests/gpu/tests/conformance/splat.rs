@@ -2,10 +2,11 @@
 
 use gpu_conformance::{Device, open};
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::raster::gpu::{Counts, Input, record};
+use splat_core::raster::FoldInput;
+use splat_core::raster::gpu::{Counts, record};
 use splat_core::raster::{Detail, OpaqueImage, Params, Projected, fold, project_into};
 use splat_core::{
-    Accumulator, Camera, Cloud, Direction, Error, FootprintStack, Material, Progress, Projection, Splat, SplatKind, rng,
+    Accumulator, Camera, Cloud, Direction, Error, FootprintStack, Material, Projection, Splat, SplatKind, rng,
 };
 
 /// Most that a channel may differ by, as a share of the largest value that a splat has, and transmittance.
@@ -94,9 +95,8 @@ impl Scene {
         let (direction, params) = (self.direction, &self.params);
         let (materials, opaque) = (&self.materials[..], &self.opaque);
         let mut cpu = begin.clone();
-        let progress = Progress::new();
-        fold(&projected, order, &values, materials, opaque, direction, params, &mut cpu, &progress);
-        let input = Input { projected: &projected, order, values: &values, materials, opaque, direction, params };
+        let input = FoldInput { projected: &projected, order, values: &values, materials, opaque, direction, params };
+        fold(&input, &mut cpu, None).unwrap();
         let mut gpu = begin.clone();
         let recorded = record(input.capacities(&gpu, room))?;
         let uploads = recorded.uploads(&input, &gpu)?;

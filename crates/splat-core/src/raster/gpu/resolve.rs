@@ -27,7 +27,7 @@ use super::{
     Image, SPLAT_WORDS, check_ids, check_image, check_near, equal_lengths, fits, plain_view, table_bytes, tiles, words,
 };
 use crate::raster::kernel::Kernel;
-use crate::raster::{OpaqueImage, Projected};
+use crate::raster::{OpaqueImage, OpaqueInput};
 use crate::{Camera, Error, FootprintStack};
 use splat_shaders::layouts::SplatView;
 use splat_shaders::{BufferId, Groups, Recording, kernels};
@@ -58,22 +58,7 @@ impl Capacities {
     }
 }
 
-/// What is resolved: the arguments of [`resolve_opaque`](crate::raster::resolve_opaque).
-#[derive(Debug, Clone, Copy)]
-pub struct Input<'a> {
-    /// Footprints by id, with their depths.
-    pub projected: &'a Projected,
-    /// Opaque splats.
-    pub ids: &'a [u32],
-    /// As many numbers a splat as there are channels, by id.
-    pub values: &'a [f32],
-    /// Channels.
-    pub channels: u32,
-    /// Whether objects are kept.
-    pub objects: bool,
-}
-
-impl Input<'_> {
+impl OpaqueInput<'_> {
     /// Room for this input, with so many entries.
     pub fn capacities(&self, entries: u32) -> Capacities {
         Capacities {
@@ -148,7 +133,7 @@ impl Recorded {
     /// # Errors
     /// [`Error::Overflow`] for more than there is room for, [`Error::ColumnLength`] for columns of different lengths,
     /// [`Error::Invalid`] for an id that no splat has.
-    pub fn uploads(&self, input: &Input<'_>) -> Result<Uploads, Error> {
+    pub fn uploads(&self, input: &OpaqueInput<'_>) -> Result<Uploads, Error> {
         let (projected, room) = (input.projected, self.capacities);
         check_near(projected)?;
         let n = projected.splats.len();

@@ -9,9 +9,9 @@ use pbsr::{
 
 /// Optical depth of a surface that is not quite opaque, at most.
 const DEEPEST: f64 = 64.0;
-/// Error of a counted area without a word; that of the area by lines is a few percent.
+/// Relative error of a counted area up to which no warning is given; that of the area by lines is a few percent.
 const MISCOUNTED: f64 = 0.1;
-/// Share of the roots of a surface that may be missed without a word.
+/// Share of the roots of a surface that may be missed before a warning is given.
 const MISSED: f64 = 1e-3;
 
 impl<'a> Source<'a> {
