@@ -70,7 +70,9 @@ const BELOW: &str = r#"version = 1
 position = [0, 2.5, 3]
 target = [0, 0.1, 0]
 fov_y = 36
-size = [96, 64]
+size = [64, 40]
+[render]
+particles = { repeat_level = 16 }
 [material.fog]
 medium = { extinction = 5, albedo = 0.5 }
 [[object]]

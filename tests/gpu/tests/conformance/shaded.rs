@@ -67,9 +67,9 @@ fn lights(origin: DVec3) -> Vec<Light> {
     let (position, direction) = (origin + DVec3::new(0.3, 0.1, 0.2), DVec3::new(0.6, -0.8, 0.0));
     let spot = LightShape::Spot { position: origin + DVec3::new(-1.0, 2.0, 0.5), direction, inner: 0.3, outer: 0.6 };
     let intensity = [3.0, 2.0, 1.0];
-    // One light within the cloud, one before it that shines to the side of its middle, one that gives nothing.
+    // One light within the cloud, one above that shines to one side, one that gives nothing.
     let patch =
-        LightShape::Patch { position: origin + DVec3::new(0.5, 1.0, -0.3), normal: DVec3::new(-0.6, -0.8, 0.0) };
+        LightShape::Patch { position: origin + DVec3::new(0.9, 1.8, -0.3), normal: DVec3::new(-0.6, -0.8, 0.0) };
     vec![
         Light { shape: LightShape::Point { position }, intensity },
         Light { shape: LightShape::Directional { direction }, intensity },
