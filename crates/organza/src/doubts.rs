@@ -19,8 +19,11 @@ const GREY: f64 = 0.18;
 
 /// What can be told of a scene before it is drawn, one sentence each.
 pub(crate) fn of_scene(scene: &Scene, loaded: &Loaded) -> Vec<String> {
-    let outside = if scene.frames.is_none() { outside(scene, loaded) } else { Vec::new() };
-    without_light(scene).into_iter().chain(turned_away(loaded)).chain(outside).collect()
+    let dark = without_light(scene).into_iter();
+    if scene.frames.is_some() {
+        return dark.collect();
+    }
+    dark.chain(turned_away(loaded)).chain(outside(scene, loaded)).collect()
 }
 
 /// What a finished picture shows too little of.
