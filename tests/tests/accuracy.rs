@@ -351,6 +351,7 @@ fn knobs_that_cannot_matter_are_left_alone() {
     let skipped: Vec<&str> = sweep.skipped.iter().map(|s| s.knob).collect();
     let expected = [
         "slice thickness",
+        "order",
         "shadow table cells",
         "shadow table mapping",
         "absorbance cut",
@@ -361,7 +362,7 @@ fn knobs_that_cannot_matter_are_left_alone() {
     assert_eq!(skipped, expected);
     let all = points(&scene(), &Facts { slice_thickness: Some(0.1), cells: Some(64) }, &OPTIONS);
     assert_eq!(all.skipped.len(), 1);
-    assert_eq!(all.knobs.len(), 9);
+    assert_eq!(all.knobs.len(), 10);
 }
 
 #[test]

@@ -217,7 +217,7 @@ fn passport_names_every_device_and_conforms_or_is_exit_6() {
     for passport in &passports {
         let recordings = passport["recordings"].as_array().unwrap();
         let names: Vec<_> = recordings.iter().map(|r| r["recording"].as_str().unwrap()).collect();
-        let shadows = ["shadow lists", "shadow look-ups", "shadow"];
+        let shadows = ["shadow lists", "shadow"];
         let splats = ["project", "shade", "composite", "opaque", "chain"];
         let particles = ["particles", "made particles", "lit particles"];
         let all = [&["order"][..], &shadows, &splats, &particles].concat();
