@@ -360,7 +360,8 @@ fn knobs_that_cannot_matter_are_left_alone() {
         "footprint table size",
     ];
     assert_eq!(skipped, expected);
-    let all = points(&scene(), &Facts { slice_thickness: Some(0.1), cells: Some(64) }, &OPTIONS);
+    let thorough = Options { quick: false, ..OPTIONS };
+    let all = points(&scene(), &Facts { slice_thickness: Some(0.1), cells: Some(64) }, &thorough);
     assert_eq!(all.skipped.len(), 1);
     assert_eq!(all.knobs.len(), 10);
 }
