@@ -24,9 +24,9 @@ pub trait ScalarField: Sync {
         at.iter().zip(out).for_each(|(p, out)| *out = self.value_gradient(*p));
     }
 
-    /// Hessian at `p`, symmetric. By default central differences of the gradient at 2⁻¹⁷ times the greatest coordinate of `p`, or
-    /// the distance at which the gradient would reach 0 from the value if that is more: about ten digits where the field is smooth
-    /// over that way. A field whose features are far smaller than that, or that knows it in closed form, gives its own.
+    /// Hessian at `p`, symmetric. By default central differences of the gradient at 2⁻¹⁷ times the greatest coordinate of `p`, at
+    /// the origin of the way to 0 along the gradient: about ten digits where the features of the field are as large as `p` is far
+    /// from the origin, fewer where they are much smaller or larger. A field that knows it in closed form gives its own.
     ///
     /// ```
     /// use splat_core::{ScalarField, glam::{DMat3, DVec3}};
@@ -40,10 +40,13 @@ pub trait ScalarField: Sync {
     /// assert!(hessian.abs_diff_eq(2.0 * DMat3::IDENTITY, 1e-9));
     /// ```
     fn hessian(&self, p: DVec3) -> DMat3 {
-        let (value, gradient) = self.value_gradient(p);
-        let way = value.abs() / gradient.length();
-        let size = p.abs().max_element().max(if way.is_finite() { way } else { 0.0 });
-        let step = STEP * if size > 0.0 { size } else { 1.0 };
+        let way_to_zero = || {
+            let (value, gradient) = self.value_gradient(p);
+            let way = value.abs() / gradient.length();
+            if way.is_finite() && way > 0.0 { way } else { 1.0 }
+        };
+        let size = p.abs().max_element();
+        let step = STEP * if size > 0.0 { size } else { way_to_zero() };
         let along = |axis: DVec3| (self.gradient(p + axis * step) - self.gradient(p - axis * step)) * (0.5 / step);
         let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z].map(along);
         let slopes = DMat3::from_cols(x, y, z);

@@ -51,22 +51,15 @@ fn four_stages_in_one_submission_are_the_cpu_s_picture() {
     let mut device = open().unwrap();
     for direction in [Direction::FrontToBack, Direction::BackToFront] {
         let sort_params = hbsort::Params { direction, exact: true, margin_px: 2.0, ..hbsort::Params::default() };
-        let projected = project(&cloud, &camera, &footprints, &materials, &params);
-        let values = shade(&input, &projected, &layout, None).unwrap();
+        let projected = &project(&cloud, &camera, &footprints, &materials, &params);
+        let values = &shade(&input, projected, &layout, None).unwrap();
         let order = hbsort::slice_cloud(&cloud, None, &camera, &sort_params, &mut Scratch::new()).unwrap();
         assert!(order.culled > u64::from(SPLATS) / 20);
         let mut cpu = Accumulator::new(SIZE, 1, 3, false, false);
         let mut gpu = cpu.clone();
         let ids = &order.input_from_sorted;
-        let folded = FoldInput {
-            projected: &projected,
-            order: ids,
-            values: &values,
-            materials: &materials,
-            opaque: &opaque,
-            direction,
-            params: &params,
-        };
+        let (opaque, params, materials) = (&opaque, &params, &materials[..]);
+        let folded = FoldInput { projected, order: ids, values, materials, opaque, direction, params };
         fold(&folded, &mut cpu, None).unwrap();
 
         let attributes = Attributes::new(&cloud, None).unwrap();
@@ -104,17 +97,17 @@ fn four_stages_in_one_submission_are_the_cpu_s_picture() {
         );
         let origin = cloud.origin;
         let view = hbsort::gpu::view_bytes(origin, SPLATS, &camera, &sort_params);
-        let (camera, footprints, materials) = (&camera, &footprints, &materials[..]);
-        let to = projection::Input { origin, camera, footprints, materials, params: &params };
+        let (camera, footprints) = (&camera, &footprints);
+        let to = projection::Input { origin, camera, footprints, materials, params };
         let to = project.uploads(&to, &attributes).unwrap();
         let lit = shade.uploads(&input, &attributes, &[]).unwrap();
         let into = follow::Input {
             camera,
             footprints,
             materials,
-            opaque: Some(&opaque),
+            opaque: Some(opaque),
             direction,
-            params: &params,
+            params,
             order: &[],
             objects: &[],
         };
