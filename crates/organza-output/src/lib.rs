@@ -1,7 +1,7 @@
 //! Finished images as OpenEXR and PNG files, whole or not at all.
 //!
 //! A [`Target`] is checked before any work: it is no input, no other output spelled in a second way, and nothing that may not be
-//! replaced. [`write`] makes the file in memory and gives it its name last.
+//! replaced. [`write()`] makes the file in memory and gives it its name last.
 //!
 //! ```
 //! use organza_output::{Metadata, Target, write};
