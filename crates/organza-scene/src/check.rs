@@ -4,7 +4,7 @@ use super::animation::check_animation;
 use super::check_light::check_light;
 use super::check_material::{check_materials, unknown_material};
 use super::check_object::{Named, check_object};
-use super::check_render::check_render;
+use super::check_render::{check_render, own_layers};
 use super::paths::Paths;
 use super::raw::{RawCamera, RawColor, RawScene};
 use super::tree::{Document, Step};
@@ -197,12 +197,10 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
 
 /// Refuses what a picture has only if one technique draws all of it.
 fn check_one_technique(at: &At<'_>, objects: &[SceneObject], render: &RenderSettings) -> Result<(), Error> {
-    if !render.layers.names().any(|name| name == "std_error") {
-        return Ok(());
-    }
+    let Some((_, layer)) = own_layers(&render.layers).next() else { return Ok(()) };
     let other = objects.iter().position(|o| o.visible && o.technique.is_some_and(|t| t != render.technique));
     other.map_or(Ok(()), |i| {
-        let message = "a picture by several techniques has no layer `std_error`";
+        let message = format!("a picture by several techniques has no layer `{layer}`");
         Err(at.index(i).key("technique").error(message, "leave the layer or this key out"))
     })
 }

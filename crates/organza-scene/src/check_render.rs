@@ -67,11 +67,20 @@ fn check_layers(at: &At<'_>, names: &[String], technique: Technique) -> Result<L
             return Err(at.index(i).error(format!("there is no layer `{}`", shown(name)), suggest(name, &LAYER_NAMES)));
         }
     }
-    if technique != Technique::Particles && choice.names().any(|name| name == "std_error") {
-        let message = format!("the technique `{}` has no layer `std_error`", technique.name());
-        return Err(at.error(message, "use technique = \"particles\""));
+    let lacking = own_layers(&choice).find(|(owner, _)| *owner != technique);
+    match lacking {
+        None => Ok(choice),
+        Some((owner, layer)) => {
+            let message = format!("the technique `{}` has no layer `{layer}`", technique.name());
+            Err(at.error(message, format!("use technique = \"{}\"", owner.name())))
+        }
     }
-    Ok(choice)
+}
+
+/// The layers of a choice that one technique alone fills, each after that technique.
+pub(super) fn own_layers(choice: &LayerChoice) -> impl Iterator<Item = (Technique, &'static str)> + '_ {
+    let owner = |layer: &&str| Technique::ALL.into_iter().find(|t| t.own_layers().contains(layer));
+    choice.names().filter_map(move |layer| Some((owner(&layer)?, layer)))
 }
 
 fn check_particles(at: &At<'_>, raw: &RawParticles) -> Result<ParticlesSettings, Error> {

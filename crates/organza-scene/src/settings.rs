@@ -58,6 +58,15 @@ impl Technique {
             Self::Reference => "reference",
         }
     }
+
+    /// Layers that it fills in a picture that it draws alone, beside those that every technique fills. A scene that asks any
+    /// other for them is refused where it does.
+    pub const fn own_layers(self) -> &'static [&'static str] {
+        match self {
+            Self::Particles => &["std_error"],
+            Self::Auto | Self::Points | Self::Reference => &[],
+        }
+    }
 }
 
 /// Settings of the `particles` technique.

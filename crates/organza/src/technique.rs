@@ -4,6 +4,9 @@
 //! A technique folds what is translucent into an accumulator, front to back: all of it at once, or one range of depths after the
 //! other, in turns with other techniques. What it cannot fold in order, such as an average of random sets, fills a segment of its
 //! own, which [`Accumulator::append`] puts behind what was there. Opaque surfaces, light and shadows are the frame's.
+//!
+//! Every technique fills the effects that shading gives; layers that one alone fills [`Technique::own_layers`] names, so that a scene
+//! is refused, at its line, where it asks another for them.
 
 pub(crate) mod particles;
 pub(crate) mod points;
@@ -43,7 +46,7 @@ pub(crate) struct Row {
     pub(crate) draws_splats: bool,
     /// Its passes; the last one comes behind opaque surfaces, those before it come before footprints.
     pub(crate) steps: &'static [Step],
-    /// Whether its picture is an average of random sets, which a checkpoint can keep and which have a standard error.
+    /// Whether its picture is an average of random sets, which a checkpoint can keep.
     pub(crate) is_random: bool,
     /// Bytes that it takes beside what all techniques take.
     pub(crate) bytes: fn(&Scene, colored_extinction: bool, &RenderOptions) -> u64,
