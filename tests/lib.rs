@@ -71,8 +71,13 @@ pub fn draw_file(scene: &Path, arguments: &[&str]) -> Picture {
     command.arg("render").arg(scene).arg("-o").arg(&image).args(arguments);
     let out = command.output().unwrap();
     assert!(out.status.success(), "{}\n{}", String::from_utf8_lossy(&out.stderr), scene.display());
+    picture_of(&image)
+}
+
+/// The channels of an EXR file.
+pub fn picture_of(image: &Path) -> Picture {
     let reader = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
-    let image = reader.from_file(&image).unwrap();
+    let image = reader.from_file(image).unwrap();
     let layer = image.layer_data;
     let channels = layer.channel_data.list.iter();
     Picture {

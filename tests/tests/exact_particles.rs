@@ -20,7 +20,7 @@ const PIXELS: usize = (SIDE * SIDE) as usize;
 /// Blocks along a side, and pixels along theirs.
 const BLOCKS: usize = 8;
 const BLOCK: usize = SIDE as usize / BLOCKS;
-const SETS: u32 = 1500;
+const SETS: u32 = 800;
 
 struct Case {
     name: &'static str,

@@ -70,7 +70,7 @@ fn a_checkpoint_goes_on_to_more_sets_in_the_same_bits() {
 #[test]
 fn a_killed_render_resumes_to_the_same_bits() {
     let place = place();
-    let arguments = ["-o", "a.exr", "--repeat-level", "1200", "--checkpoint", "sums"];
+    let arguments = ["-o", "a.exr", "--repeat-level", "600", "--checkpoint", "sums"];
     place.expect(0, &render(&arguments), "");
     let whole = place.bytes("a.exr");
     fs::remove_file(place.path("sums")).unwrap();

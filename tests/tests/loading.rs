@@ -86,7 +86,7 @@ fn an_expression_that_nothing_bounds_is_refused_by_its_operations_before_the_wor
     assert_eq!(error.exit_code(), 5, "{error}");
     let words = "the expression of object 'long'";
     assert!(error.to_string().contains(words) && error.hint().contains("larger spacing"), "{error} {}", error.hint());
-    // The same lattice with a bound, and a coarser one without, are no work.
+    // The same lattice with a bound, and a coarser one with a shorter sum that has none, are no work.
     explain(&implicit(800, "x^2 + y^2 + z^2 - 0.001")).unwrap();
-    explain(&implicit(40, &terms.join(" + "))).unwrap();
+    explain(&implicit(40, &terms[..4].join(" + "))).unwrap();
 }

@@ -9,6 +9,8 @@ mod closed_forms;
 mod command;
 mod doubts;
 mod every_key;
+#[cfg(target_os = "linux")]
+mod every_scene;
 mod exact_particles;
 mod eye_inside;
 mod interrupts;

@@ -74,7 +74,7 @@ fn depths_of(from: f64, to: f64, levels: u32, extinction: &dyn Fn(f64) -> f64) -
 
 #[test]
 fn depths_of_a_slab_are_its_closed_form_within_their_errors_whatever_it_is_made_of() {
-    const LEVELS: u32 = 3000;
+    const LEVELS: u32 = 1500;
     let folder = tempfile::tempdir().unwrap();
     let cells: Vec<f32> = (0..40 * 40 * 40).map(|k| f32::from(u8::from((15..25).contains(&(k / 1600))))).collect();
     std::fs::write(folder.path().join("grid.nii"), write::nifti(&cells, 0.05)).unwrap();

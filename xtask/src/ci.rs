@@ -96,10 +96,19 @@ fn steps(repo: &Repo) -> Vec<Step> {
         step("clippy", one(&format!("clippy --workspace --all-targets --features {FEATURES},{DRIVER} -- -D warnings"))),
         step("docs", docs),
         step("alone", Work::Cargo(alone(repo), &[])),
-        step("shaders", Work::Task(|repo| shaders::run(repo, true))),
         step("tests", Work::Task(vulkan::tests)),
         step("vulkan", Work::Task(vulkan::beside_tests)),
     ]
+}
+
+/// What takes minutes and rarely breaks where [`run`] holds, to be run before a release: kernels compiled anew, where tests hold the
+/// hashes of what they were compiled from; recordings by every executor under every validation.
+pub(crate) fn deep(repo: &Repo) -> Outcome {
+    let steps = [
+        Step { name: "shaders", work: Work::Task(|repo| shaders::run(repo, true)) },
+        Step { name: "vulkan", work: Work::Task(vulkan::run) },
+    ];
+    follow(&steps, repo)
 }
 
 pub(crate) fn split(line: &str) -> Vec<String> {
@@ -147,7 +156,7 @@ mod tests {
     fn warnings_fail_and_what_is_slow_comes_last() {
         let steps = steps(&Repo::of(&[]));
         let names: Vec<_> = steps.iter().map(|s| s.name).collect();
-        assert_eq!(names, ["fmt", "tidy", "papers", "clippy", "docs", "alone", "shaders", "tests", "vulkan"]);
+        assert_eq!(names, ["fmt", "tidy", "papers", "clippy", "docs", "alone", "tests", "vulkan"]);
         let Work::Cargo(_, environment) = &steps[4].work else { panic!("docs are built by cargo") };
         assert_eq!(*environment, [("RUSTDOCFLAGS", "-D warnings")]);
     }

@@ -18,6 +18,7 @@ const HELP: &str = "\
 usage: cargo xtask COMMAND
 
   ci               everything that must hold before a merge, step by step; stops at the first failure
+  deep             what takes minutes and rarely breaks: kernels compiled anew, GPU work under every validation
   quick            format, rules, clippy, and the tests of the crates that changed since main
   tidy             the rules that the compiler does not know: heads, sizes, dependency direction, assets
   papers           writes docs/papers.md from docs/papers/*.toml
@@ -34,6 +35,7 @@ fn main() -> ExitCode {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let outcome = match words.as_slice() {
         ["ci"] => Repo::open().and_then(|repo| ci::run(&repo)),
+        ["deep"] => Repo::open().and_then(|repo| ci::deep(&repo)),
         ["quick"] => Repo::open().and_then(|repo| quick::run(&repo)),
         ["tidy"] => Repo::open().and_then(|repo| tidy::run(&repo)),
         ["papers"] => Repo::open().and_then(|repo| papers::write(&repo)),

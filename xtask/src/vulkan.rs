@@ -37,8 +37,11 @@ const ACROSS: [&str; 2] = ["kernels::", "order::"];
 /// The executor and the validation that all tests run with.
 const WITH_TESTS: [&str; 2] = ["ash", "synchronization"];
 
-/// Those that the conformance tests run with beside.
-const BESIDE_TESTS: [[&str; 2]; 2] = [["ash", "gpu-assisted"], ["wgpu", "synchronization"]];
+/// Those that the conformance tests run with beside, at every merge.
+const BESIDE_TESTS: [&str; 2] = ["wgpu", "synchronization"];
+
+/// Those that take minutes and rarely find what the others do not.
+const DEEP: [&str; 2] = ["ash", "gpu-assisted"];
 
 /// Finds or installs the parts, then checks modules and runs the conformance tests by every executor under every validation.
 pub(crate) fn run(repo: &Repo) -> Outcome {
@@ -47,6 +50,7 @@ pub(crate) fn run(repo: &Repo) -> Outcome {
         Err(missing) => return without("vulkan", &missing),
     };
     conformance(repo, &parts.driver, WITH_TESTS, None)?;
+    conformance(repo, &parts.driver, DEEP, None)?;
     others(repo, &parts)
 }
 
@@ -60,7 +64,7 @@ pub(crate) fn tests(repo: &Repo) -> Outcome {
     Ok(said)
 }
 
-/// What [`run`] does beside what [`tests`] did.
+/// What holds at every merge beside what [`tests`] did: what [`run`] does but for validation on the device.
 pub(crate) fn beside_tests(repo: &Repo) -> Outcome {
     match parts()? {
         Ok(parts) => others(repo, &parts),
@@ -68,12 +72,10 @@ pub(crate) fn beside_tests(repo: &Repo) -> Outcome {
     }
 }
 
-/// Modules; the other executors and validations; and sorts and scans with subgroups of other sizes.
+/// Modules; the other executor; and sorts and scans with subgroups of other sizes.
 fn others(repo: &Repo, parts: &Parts) -> Outcome {
     let modules = check_modules(repo, &parts.spirv_val)?;
-    for by in BESIDE_TESTS {
-        conformance(repo, &parts.driver, by, None)?;
-    }
+    conformance(repo, &parts.driver, BESIDE_TESTS, None)?;
     for vector in VECTORS {
         conformance(repo, &parts.driver, WITH_TESTS, Some(vector))?;
     }

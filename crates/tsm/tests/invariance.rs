@@ -192,7 +192,7 @@ fn empty_clouds_cast_no_shadow_and_cancelled_builds_stop() {
 #[test]
 fn predicted_work_is_near_the_counted() {
     for light in lights() {
-        let cloud = medium([25; 3], 0.04, 1.0, |p| p.length() < 1.0);
+        let cloud = medium([17; 3], 0.06, 1.0, |p| p.length() < 1.0);
         for resolution in [Resolution::Auto, Resolution::Cells(64), Resolution::Cells(256)] {
             let map = build(&cloud, &light, &Params { resolution, ..Params::default() });
             let (p, c) = (map.prediction(), map.counts());

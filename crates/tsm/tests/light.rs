@@ -163,7 +163,8 @@ fn ts13_objects_that_cast_no_shadow_leave_no_trace() {
 fn ts16_deposits_keep_the_cross_section_in_any_table() {
     for (k, kind) in [SplatKind::Medium, SplatKind::Surface].into_iter().enumerate() {
         for n in [1, 3, 64, 200, 513, 1024, 4096] {
-            for seed in 0..10 {
+            // The largest table takes most of the time: a corner of the octahedron, and two other places.
+            for seed in if n > 1024 { 3..6 } else { 0..10 } {
                 let p = directions(10 * seed + k as u64) * 2.0;
                 let mut cloud = Cloud::new(DVec3::ZERO);
                 let normal = (direction(9, seed) - p).normalize();
@@ -220,14 +221,14 @@ fn cross_section(map: &ShadowMap) -> f64 {
 
 #[test]
 fn ts16_mean_transmittance_does_not_depend_on_the_table() {
-    // One layer of optical depth 1, so that 4096 rows fit; seen at an angle, and along an axis, where the octahedral
+    // One layer of optical depth 1, so that 2048 rows fit; seen at an angle, and along an axis, where the octahedral
     // table has a corner and the polar one its pole.
     let cloud = medium([10, 10, 0], 0.1, 10.0, |_| true);
     for (position, tolerance) in [(DVec3::new(-1.3, 0.9, -2.6), 1e-3), (DVec3::new(0.05, 0.02, -3.0), 5e-3)] {
         for mapping in [MappingChoice::Octahedral, MappingChoice::PolarAzimuth, MappingChoice::Planar] {
             // A planar table spends all its cells on the casters.
             let planar = mapping == MappingChoice::Planar;
-            let sizes = if planar { [16, 32, 64, 128, 256, 512] } else { [64, 128, 256, 512, 1024, 4096] };
+            let sizes = if planar { [16, 32, 64, 128, 256, 512] } else { [64, 128, 256, 512, 1024, 2048] };
             let means = sizes.map(|n| {
                 let params = Params { mapping, resolution: Resolution::Cells(n), ..Params::default() };
                 mean_behind_layer(&build(&cloud, &point_light(position), &params), position)

@@ -31,10 +31,10 @@ pub(crate) const SOURCES: [SourceCase; 14] = [
     case(
         "implicit",
         false,
-        "implicit = { expression = 'x^2 + y^2 + 2*z^2 - 0.3 + 0.2*x', box = [[-0.9, -0.9, -0.9], [0.9, 0.9, 0.9]], resolution = 16 }",
+        "implicit = { expression = 'x^2 + y^2 + 2*z^2 - 0.3 + 0.2*x', box = [[-0.9, -0.9, -0.9], [0.9, 0.9, 0.9]], resolution = 12 }",
     ),
     case("isosurface", false, "isosurface = { volume = 'grid.nrrd', level = 0.85 }"),
-    case("level_set", false, "level_set = { points = 'ball.xyz' }\nspacing = 0.08"),
+    case("level_set", false, "level_set = { points = 'ball.xyz' }\nspacing = 0.12"),
     case(
         "slice",
         false,
@@ -96,7 +96,7 @@ impl Folder {
              [[object]]\nname = 'wall'\n\
              rectangle = {{ center = [0, 0, -1.2], u = [2, 0, 0], v = [0, 2, 0], spacing = 0.12 }}\n\
              [[object]]\nname = 'blocker'\nrectangle = {{ center = [0.67, 0.64, 1.5], u = [0.15, -0.1, 0], \
-             v = [0.1, 0.15, -0.108], spacing = 0.03 }}\n\
+             v = [0.1, 0.15, -0.108], spacing = 0.05 }}\n\
              [[object]]\nname = 'it'\nmaterial = 'm'\n{}\n{transfer}\n\
              [render]\nparticles = {{ repeat_level = 4 }}\n",
             SIZE[0], SIZE[1], case.keys

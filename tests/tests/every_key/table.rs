@@ -3,7 +3,7 @@
 use super::scenes::SOURCES;
 
 /// Where a change is looked for.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Look {
     /// The bits of beauty.
     Picture,
@@ -250,7 +250,7 @@ fn sources() -> Vec<Entry> {
         one("object.implicit", "object.it.implicit={expression='x^2 + y^2 + z^2 - 0.2', box=[[-0.9, -0.9, -0.9], [0.9, 0.9, 0.9]], spacing=0.1}"),
         one("object.implicit.expression", "object.it.implicit.expression='x^2 + y^2 + z^2 - 0.2'"),
         one("object.implicit.box", "object.it.implicit.box=[[-0.9, -0.9, -0.9], [0.2, 0.9, 0.9]]"),
-        one("object.implicit.resolution", "object.it.implicit.resolution=12"),
+        one("object.implicit.resolution", "object.it.implicit.resolution=16"),
         one("object.implicit.spacing", "object.it.implicit.spacing=0.15").with(&["object.it.implicit={expression='x^2 + y^2 + 2*z^2 - 0.3', box=[[-0.9, -0.9, -0.9], [0.9, 0.9, 0.9]], spacing=0.1}"]),
         of(These(&["isosurface"]), "object.isosurface", "object.it.isosurface={volume='grid.nrrd', level=0.75}"),
         of(These(&["isosurface"]), "object.isosurface.volume", "object.it.isosurface.volume='other.nrrd'"),
