@@ -11,8 +11,8 @@ use pbsr::{
 use rayon::prelude::*;
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::{
-    Camera, Cloud, DAabb, Grid, Material, Mesh, Progress, Projection, ScalarField, Shading, Similarity, Splat,
-    SplatKind, TransferFunction, TransferPoint, rng,
+    Camera, Cloud, DAabb, Grid, Material, Mesh, Projection, ScalarField, Shading, Similarity, Splat, SplatKind,
+    TransferFunction, TransferPoint, rng,
 };
 use std::f64::consts::TAU;
 
@@ -150,7 +150,7 @@ fn sampling(c: &mut Criterion) {
     let wave = ImplicitSurface { field: &formula, level: 0.0, bounds, inside: None };
     let volumes = [Interpolation::Trilinear, Interpolation::CatmullRom].map(gyroid);
     let levels = volumes.each_ref().map(|field| ImplicitSurface { field, level: 0.0, bounds, inside: None });
-    let (blend, _) = points_to_field(&torus_points(), &MpuParams::default()).expect(why);
+    let (blend, _) = points_to_field(&torus_points(), &MpuParams::default(), None).expect(why);
     let scattered = ImplicitSurface { field: &blend, level: 0.0, bounds: blend.bounds(), inside: None };
     let clouds = [SplatKind::Medium, SplatKind::Surface].map(cloud);
     let of_splats = SplatParams { cross_section: 1e-5, ..SplatParams::default() };
@@ -219,7 +219,7 @@ fn projection(c: &mut Criterion) {
         group.bench_function(name, |b| {
             b.iter(|| {
                 let mut ensemble = Ensemble::new(camera.size, &EnsembleParams::default()).expect(why);
-                renderer.fold(&scene, &mut ensemble, levels, &FoldParams::default(), &Progress::new()).expect(why);
+                renderer.fold(&scene, &mut ensemble, &FoldParams { levels, ..FoldParams::default() }, None).expect(why);
                 ensemble
             });
         });

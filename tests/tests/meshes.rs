@@ -57,7 +57,9 @@ fn torus() -> Mesh {
 
 fn bunny() -> Mesh {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/stanford-bunny/bunny.ply.gz");
-    let Loaded::Mesh(mesh) = convert::read::file(&file, &ReadLimits::default()).unwrap() else { panic!("no mesh") };
+    let Loaded::Mesh(mesh) = convert::read::file(&file, &ReadLimits::default(), None).unwrap().0 else {
+        panic!("no mesh")
+    };
     mesh
 }
 

@@ -58,7 +58,7 @@ fn rates(name: &str, field: &dyn ScalarField, places: &[DVec3], radii: &[f64]) {
 
 fn bunny() -> Result<Mesh, Box<dyn std::error::Error>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/stanford-bunny/bunny.ply.gz");
-    match read::file(&path, &ReadLimits::default())? {
+    match read::file(&path, &ReadLimits::default(), None)?.0 {
         Loaded::Mesh(mesh) => Ok(mesh),
         _ => Err("the bunny is a mesh".into()),
     }
@@ -93,7 +93,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for tolerance in [1e-3, 3e-4, 1e-4] {
         let params = MpuParams { tolerance, ..MpuParams::default() };
         let start = Instant::now();
-        let (field, report) = points_to_field(&points, &params)?;
+        let (field, report) = points_to_field(&points, &params, None)?;
         println!("bunny within {tolerance}: {:.0} ms, {report:?}", 1e3 * start.elapsed().as_secs_f64());
         let mut distance: Vec<f64> = Vec::new();
         for i in 0..points.len() {

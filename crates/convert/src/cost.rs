@@ -64,7 +64,7 @@ impl Prediction {
 /// let mesh = Mesh { position: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]], ..Mesh::default() };
 /// let params = MeshParams { density: Density::Spacing(0.1), ..MeshParams::default() };
 /// let predicted = cost::mesh(&mesh, &params).unwrap();
-/// assert_eq!(predicted.bytes, mesh_to_points(&mesh, &params).unwrap().0.bytes());
+/// assert_eq!(predicted.bytes, mesh_to_points(&mesh, &params, None).unwrap().0.bytes());
 /// ```
 ///
 /// # Errors

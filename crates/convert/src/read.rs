@@ -84,19 +84,13 @@ pub enum Loaded {
     Grid(Grid),
 }
 
-/// Reads a regular file; its first bytes tell the format, its extension only words the error if they do not.
+/// Reads a regular file, and says what there is to say of it; its first bytes tell the format, its extension only words the
+/// error if they do not. Reading stops where `progress` is cancelled.
 ///
 /// # Errors
-/// [`ReadError`] with the file's name, the place, what was expected and what was found.
-pub fn file(path: &Path, limits: &ReadLimits) -> Result<Loaded, ReadError> {
-    file_with_notes(path, limits, &Progress::new()).map(|(loaded, _)| loaded)
-}
-
-/// [`file()`] that stops when `progress` is cancelled, with what there is to say of the file.
-///
-/// # Errors
-/// As [`file()`], and one with [`Fault::Cancelled`](crate::Fault::Cancelled).
-pub fn file_with_notes(path: &Path, limits: &ReadLimits, progress: &Progress) -> Result<(Loaded, Notes), ReadError> {
+/// [`ReadError`] with the file's name, the place, what was expected and what was found, and one with
+/// [`Fault::Cancelled`](crate::Fault::Cancelled).
+pub fn file(path: &Path, limits: &ReadLimits, progress: Option<&Progress>) -> Result<(Loaded, Notes), ReadError> {
     let name = escaped_path(path);
     let mut reading = Reading::new(limits, progress);
     let stream = Stream::open(path, limits);
@@ -108,19 +102,11 @@ pub fn file_with_notes(path: &Path, limits: &ReadLimits, progress: &Progress) ->
 ///
 /// # Errors
 /// [`ReadError`] as [`file()`] gives it.
-pub fn bytes(name: &str, content: &[u8], limits: &ReadLimits) -> Result<Loaded, ReadError> {
-    bytes_with_notes(name, content, limits, &Progress::new()).map(|(loaded, _)| loaded)
-}
-
-/// [`bytes()`] with what [`file_with_notes`] adds.
-///
-/// # Errors
-/// As [`file_with_notes`].
-pub fn bytes_with_notes(
+pub fn bytes(
     name: &str,
     content: &[u8],
     limits: &ReadLimits,
-    progress: &Progress,
+    progress: Option<&Progress>,
 ) -> Result<(Loaded, Notes), ReadError> {
     let shown = escaped(name.as_bytes(), usize::MAX);
     let mut reading = Reading::new(limits, progress);

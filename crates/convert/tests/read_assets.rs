@@ -11,7 +11,7 @@ fn path(name: &str) -> PathBuf {
 }
 
 fn load(name: &str) -> Loaded {
-    file(&path(name), &ReadLimits::default()).unwrap_or_else(|e| panic!("{e}"))
+    file(&path(name), &ReadLimits::default(), None).map(|read| read.0).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn mesh(name: &str) -> Mesh {

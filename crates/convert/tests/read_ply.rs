@@ -91,7 +91,9 @@ fn ba18_points_that_are_no_numbers_are_named_or_dropped_and_counted() {
     let error = load("p.ply", text.as_bytes()).unwrap_err().to_string();
     assert!(error.starts_with("p.ply:16:1: expected a finite number, found 'nan'"), "{error}");
     let limits = ReadLimits { drop_invalid: true, ..ReadLimits::default() };
-    let Loaded::Points(points) = bytes("p.ply", text.as_bytes(), &limits).unwrap() else { panic!("not points") };
+    let Loaded::Points(points) = bytes("p.ply", text.as_bytes(), &limits, None).unwrap().0 else {
+        panic!("not points")
+    };
     assert_eq!((points.len(), points.dropped, points.value.as_slice()), (2, 1, &[7.0, 9.5][..]));
     assert_eq!(points.exact_position(1).x, 5_000_002.75);
 }

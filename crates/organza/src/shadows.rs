@@ -157,7 +157,11 @@ fn tables_within(
         let light = &point.light;
         let tolerance = tolerance(settings, loaded, light, maps);
         let params = params(settings, loaded, tolerance, max_bytes);
-        let predicted = Deposits::predict(&loaded.cloud, &loaded.materials, &loaded.objects, light, &params);
+        let predicted = Deposits::predict(
+            &tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects: &loaded.objects },
+            light,
+            &params,
+        );
         let predicted = predicted.map_err(|e| shadow_error(point, &e))?;
         Ok(Some(ShadowTable {
             size: predicted.size,

@@ -5,7 +5,7 @@ use pbsr::{
     MeshSampler, Object, Renderer, Scene, SurfaceParams, finest_pixel_area,
 };
 use splat_core::glam::{DMat3, DVec3, Vec3};
-use splat_core::{Camera, DAabb, Mesh, Progress, Projection, ScalarField, Similarity};
+use splat_core::{Camera, DAabb, Mesh, Projection, ScalarField, Similarity};
 
 /// Distance to a sphere; outside minus inside of the cloud, too.
 struct Ball {
@@ -67,7 +67,7 @@ fn main() -> Result<(), Error> {
     let mut ensemble = Ensemble::new(camera.size, &EnsembleParams::default())?;
     let mut renderer = Renderer::new();
     while ensemble.rms_error(&|_, _| [0.0; 3], None) > 0.02 {
-        let counts = renderer.fold(&scene, &mut ensemble, 50, &FoldParams::default(), &Progress::new())?;
+        let counts = renderer.fold(&scene, &mut ensemble, &FoldParams { levels: 50, ..FoldParams::default() }, None)?;
         println!("{} sets, {} particles more", ensemble.levels(), counts.particles);
     }
     let picture = ensemble.read(&|_, _| [0.0; 3], None);

@@ -11,7 +11,7 @@
 //! use pbsr::{Appearance, Ensemble, EnsembleParams, FoldParams, ImplicitSurface, LineSampler, Object, Renderer, Scene};
 //! use pbsr::{SurfaceParams, pixel_area};
 //! use splat_core::glam::DVec3;
-//! use splat_core::{Camera, DAabb, Progress, Projection, ScalarField, Similarity};
+//! use splat_core::{Camera, DAabb, Projection, ScalarField, Similarity};
 //!
 //! struct Ball;
 //! impl ScalarField for Ball {
@@ -35,7 +35,7 @@
 //! let shadow_origin = DVec3::ZERO;
 //! let scene = Scene { objects, lights, shadow_origin, ambient: [1.0; 3], camera, occluder: None };
 //! let mut ensemble = Ensemble::new(camera.size, &EnsembleParams::default()).unwrap();
-//! Renderer::new().fold(&scene, &mut ensemble, 100, &FoldParams::default(), &Progress::new()).unwrap();
+//! Renderer::new().fold(&scene, &mut ensemble, &FoldParams { levels: 100, ..FoldParams::default() }, None).unwrap();
 //! let picture = ensemble.read(&|_, _| [0.0; 3], None);
 //! // Front and back: 1 − 0.7² = 0.51.
 //! let alpha = picture.scalar("alpha").unwrap()[24 * 48 + 24];

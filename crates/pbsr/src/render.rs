@@ -52,9 +52,11 @@ pub struct Scene<'a> {
     pub occluder: Option<&'a OpaqueImage>,
 }
 
-/// What folding may take, and of what.
+/// How many sets are folded, of what, and what that may take.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FoldParams {
+    /// Sets to add: what one call adds to the repeat level.
+    pub levels: u32,
     /// Nearest and farthest view depth; particles before the first, or at the second or behind it, are left out. Averages of
     /// ranges that meet, one behind the other, are an average of everything: their particles are independent.
     pub depths: [f32; 2],
@@ -73,7 +75,7 @@ impl FoldParams {
 
 impl Default for FoldParams {
     fn default() -> Self {
-        Self { depths: [f32::NEG_INFINITY, f32::INFINITY], max_bytes: 2 << 30, batch_particles: 4 << 20 }
+        Self { levels: 100, depths: [f32::NEG_INFINITY, f32::INFINITY], max_bytes: 2 << 30, batch_particles: 4 << 20 }
     }
 }
 
@@ -92,9 +94,9 @@ impl Renderer {
         Self::default()
     }
 
-    /// Adds `levels` sets to `ensemble`, from set `ensemble.levels()` on; ticks once a set (the caller announces
-    /// them). When it fails, the sets of
-    /// whole batches before are in, and the ensemble is valid.
+    /// Adds `params.levels` sets to `ensemble`, from set `ensemble.levels()` on. Sets are reported to `progress`, where the
+    /// caller announces them, who may ask for them in several calls; work stops where it is cancelled. When it fails, the
+    /// sets of whole batches before are in, and the ensemble is valid.
     ///
     /// # Errors
     /// [`Error::Parameter`] when the sizes of camera, ensemble and occluder differ, or levels overflow;
@@ -103,13 +105,14 @@ impl Renderer {
         &mut self,
         scene: &Scene<'_>,
         ensemble: &mut Ensemble,
-        levels: u32,
         params: &FoldParams,
-        progress: &Progress,
+        progress: Option<&Progress>,
     ) -> Result<Counts, Error> {
-        let plan = Plan::new(scene, ensemble, levels, params)?;
+        let quiet = Progress::new();
+        let progress = progress.unwrap_or(&quiet);
+        let plan = Plan::new(scene, ensemble, params)?;
         let mut counts = Counts::default();
-        let mut left = levels;
+        let mut left = params.levels;
         while left > 0 {
             let batch = left.min(plan.batch_levels);
             self.sample(scene, &plan, u64::from(ensemble.levels), batch, progress);
@@ -242,7 +245,8 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    fn new(scene: &Scene<'_>, ensemble: &Ensemble, levels: u32, params: &FoldParams) -> Result<Self, Error> {
+    fn new(scene: &Scene<'_>, ensemble: &Ensemble, params: &FoldParams) -> Result<Self, Error> {
+        let levels = params.levels;
         let size = ensemble.size();
         check(scene.camera.size == size, "camera size", scene.camera.size, "the size of the ensemble")?;
         if let Some(o) = scene.occluder {

@@ -124,7 +124,8 @@ struct Pixel {
     transmittance: Running,
 }
 
-/// Path-traces a scene.
+/// Path-traces a scene. Rows of pixels are reported to `progress`, those of each batch of samples by themselves, and work stops
+/// where that is cancelled.
 ///
 /// # Errors
 /// As [`Scene::validate`]; [`Error::Invalid`] for fewer than two samples or no pixels; [`Error::Cancelled`].
@@ -132,8 +133,10 @@ pub fn path_trace(
     scene: &Scene<'_>,
     camera: &Camera,
     settings: &PathSettings,
-    progress: &Progress,
+    progress: Option<&Progress>,
 ) -> Result<Estimate, Error> {
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
     if settings.samples < 2 || settings.batch < 1 {
         let found = [settings.samples, settings.batch];
         return Err(Error::invalid("path settings", 0, "samples, batch", found, "at least 2 samples, batches of 1"));

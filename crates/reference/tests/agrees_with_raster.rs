@@ -95,16 +95,20 @@ fn finish(mut acc: Accumulator, solid: &OpaqueImage) -> Raster {
 
 fn largest_difference(raster: &Raster, cloud: &Cloud, camera: &Camera, materials: &[Material]) -> f64 {
     let values: Vec<f32> = cloud.color.iter().flatten().copied().collect();
-    let exact = composite(&Input {
-        cloud,
-        camera,
-        footprints: &FootprintStack::default(),
-        materials,
-        values: &values,
-        channels: 3,
-        resampling_sigma_px: Params::default().resampling_sigma_px,
-        order: Order::Centre,
-    });
+    let exact = composite(
+        &Input {
+            cloud,
+            camera,
+            footprints: &FootprintStack::default(),
+            materials,
+            values: &values,
+            channels: 3,
+            resampling_sigma_px: Params::default().resampling_sigma_px,
+            order: Order::Centre,
+        },
+        None,
+    )
+    .unwrap();
     let mut largest: f64 = 0.0;
     for k in 0..exact.values.len() {
         for c in 0..3 {

@@ -3,7 +3,7 @@
 use crate::common::*;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Cloud, Light, LightShape};
-use tsm::{Deposits, Limit, Params, Resolution};
+use tsm::{Deposits, Limit, Params, Resolution, Scene};
 
 fn scaled(cloud: &Cloud, light: &Light, s: f64) -> (Cloud, Light) {
     let (mut cloud, mut light, f) = (cloud.clone(), *light, s as f32);
@@ -95,7 +95,7 @@ fn ts16_finer_splats_have_better_shadows() {
 fn predictions_say_what_is_chosen_and_by_what() {
     let cloud = smooth_ball(0.06, 1.5, 1.0);
     for light in [point_light(DVec3::Z * 4.0), point_light(DVec3::ZERO), directional(DVec3::Z)] {
-        let of = |params: &Params| Deposits::predict(&cloud, &[], &[], &light, params).unwrap();
+        let of = |params: &Params| Deposits::predict(&Scene::from(&cloud), &light, params).unwrap();
         let free = of(&Params::default());
         let map = build(&cloud, &light, &Params::default());
         assert_eq!(free, map.prediction());

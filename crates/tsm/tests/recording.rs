@@ -1,7 +1,6 @@
 //! The recorded lists and look-ups, without a device: what they are, and what they refuse.
 
 use crate::common::{mixed, point_light};
-use splat_core::Progress;
 use splat_core::glam::DVec3;
 use splat_core::raster::gpu::AttributeRoom;
 use tsm::gpu::{Capacities, CastRoom, Casting, Room, record, record_cast, record_look_up, record_map, record_shadow};
@@ -11,7 +10,7 @@ const ROOM: Capacities = Capacities { entries: 200_000, cells: 2 * 120 * 120, ch
 
 fn deposits() -> Deposits {
     let light = point_light(DVec3::new(0.3, 2.5, 0.2));
-    Deposits::new(&mixed(4000, DVec3::ZERO), &[], &[], &light, &Params::default(), &Progress::new()).unwrap()
+    Deposits::new(&tsm::Scene::from(&mixed(4000, DVec3::ZERO)), &light, &Params::default(), None).unwrap()
 }
 
 #[test]
@@ -158,7 +157,7 @@ const CAST: CastRoom = CastRoom {
 
 fn casting(params: &Params) -> Result<Casting, Error> {
     let light = point_light(DVec3::new(0.3, 2.5, 0.2));
-    Casting::new(&mixed(4000, DVec3::ZERO), &[], &[], &light, params, &Progress::new())
+    Casting::new(&tsm::Scene::from(&mixed(4000, DVec3::ZERO)), &light, params, None)
 }
 
 #[test]

@@ -108,12 +108,12 @@ impl Notes {
 /// A file that is being read.
 pub(super) struct Reading<'a> {
     pub(super) limits: &'a ReadLimits,
-    progress: &'a Progress,
+    progress: Option<&'a Progress>,
     pub(super) notes: Notes,
 }
 
 impl<'a> Reading<'a> {
-    pub(super) fn new(limits: &'a ReadLimits, progress: &'a Progress) -> Self {
+    pub(super) fn new(limits: &'a ReadLimits, progress: Option<&'a Progress>) -> Self {
         Self { limits, progress, notes: Notes::default() }
     }
 
@@ -142,6 +142,6 @@ impl<'a> Reading<'a> {
 
     /// Looks whether the reader is to stop.
     pub(super) fn go_on(&self) -> Result<(), ReadError> {
-        if self.progress.is_cancelled() { Err(ReadError::cancelled()) } else { Ok(()) }
+        if self.progress.is_some_and(Progress::is_cancelled) { Err(ReadError::cancelled()) } else { Ok(()) }
     }
 }

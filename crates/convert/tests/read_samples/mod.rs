@@ -12,7 +12,7 @@ use std::io::Write;
 pub(crate) const VERTICES: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.25], [1.0, 1.0, 0.0], [0.0, 1.0, -0.5]];
 
 pub(crate) fn load(name: &str, content: &[u8]) -> Result<Loaded, ReadError> {
-    bytes(name, content, &ReadLimits::default())
+    bytes(name, content, &ReadLimits::default(), None).map(|read| read.0)
 }
 
 pub(crate) fn gzip(content: &[u8]) -> Vec<u8> {

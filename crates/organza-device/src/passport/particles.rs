@@ -77,7 +77,12 @@ impl ParticlesInput {
         let scene = Scene { objects: &objects, lights, shadow_origin, ambient: [0.1; 3], camera, occluder: None };
         let empty = Ensemble::new(SIZE, &EnsembleParams { radiance_unit: 0.5, ..EnsembleParams::default() })?;
         let (mut expected, mut found, progress) = (empty.clone(), empty, Progress::default());
-        Renderer::new().fold(&scene, &mut expected, SETS, &FoldParams::default(), &progress)?;
+        Renderer::new().fold(
+            &scene,
+            &mut expected,
+            &FoldParams { levels: SETS, ..FoldParams::default() },
+            Some(&progress),
+        )?;
         if let Some(why) = folding.fold_on(device, &scene, &mut found, SETS, u64::MAX, &progress)? {
             return Err(Failure::Left(why));
         }

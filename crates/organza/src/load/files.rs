@@ -59,7 +59,7 @@ impl Files {
     }
 
     fn read_anew(&self, path: &Path, limits: &ReadLimits, progress: &Progress) -> Result<FileData, Error> {
-        let read = convert::read::file_with_notes(path, limits, progress);
+        let read = convert::read::file(path, limits, Some(progress));
         let (data, noted) = read.map_err(|e| Error::from_read(path, &e))?;
         add(&self.mended, noted.mended.iter().map(Mended::to_string));
         add(&self.notes, sentences(path, &data, noted));

@@ -233,7 +233,8 @@ fn level_set(source: &LevelSetSource, object: &SceneObject, context: &Context<'_
         let params =
             MpuParams { object_name: object.name.clone(), tolerance: source.tolerance, ..MpuParams::default() };
         let points = read_scattered(&source.path, context)?;
-        let (field, _) = convert::points_to_field(&points, &params).map_err(|e| Error::from_convert(&e))?;
+        let (field, _) =
+            convert::points_to_field(&points, &params, Some(context.progress)).map_err(|e| Error::from_convert(&e))?;
         let (bounds, bytes) = (field.bounds(), field.bytes());
         Ok(((Arc::new(field) as SharedField, bounds), bytes))
     })

@@ -171,23 +171,23 @@ pub(super) fn convert(
         }
         Input::Volume(grid, transfer, params) => {
             let params = VolumeParams { splat: context.limited(&params.splat), ..params.clone() };
-            convert::volume_to_points_with_progress(grid, transfer, &params, progress).map(|c| c.0)
+            convert::volume_to_points(grid, transfer, &params, Some(progress)).map(|c| c.0)
         }
         Input::Surface(field, bounds, params, _) => {
             let params = MeshParams { splat: context.limited(&params.splat), ..params.clone() };
-            convert::surface_to_points_with_progress(field.as_ref(), *bounds, &params, progress)
+            convert::surface_to_points(field.as_ref(), *bounds, &params, Some(progress))
                 .map(|(cloud, _)| in_domain(cloud, field, &params.splat.transform))
         }
         Input::Density(field, bounds, params) => {
             let splat = context.limited(&params.volume.splat);
             let volume = VolumeParams { splat, ..params.volume.clone() };
             let params = DensityParams { volume, ..params.clone() };
-            convert::density_to_points_with_progress(field.as_ref(), *bounds, &params, progress).map(|c| c.0)
+            convert::density_to_points(field.as_ref(), *bounds, &params, Some(progress)).map(|c| c.0)
         }
         Input::Procedural(shape, spacing, params) => {
             let params = VolumeParams { splat: context.limited(&params.splat), ..params.clone() };
             let convert = |grid: &Grid, transfer: &TransferFunction| {
-                convert::volume_to_points_with_progress(grid, transfer, &params, progress).map(|c| c.0)
+                convert::volume_to_points(grid, transfer, &params, Some(progress)).map(|c| c.0)
             };
             match own.map(|o| &o.body) {
                 Some(Body::Cells { grid, transfer, .. }) => convert(grid, transfer),
@@ -218,7 +218,7 @@ fn mesh_splats(
     warnings: &mut Vec<String>,
 ) -> Result<Cloud, ConvertError> {
     let mut cloud = Cloud::default();
-    let report = convert::mesh_to_points_with_progress(mesh, params, &mut cloud, context.progress)?;
+    let report = convert::mesh_to_points_into(mesh, params, &mut cloud, Some(context.progress))?;
     if report.degenerate > 0 {
         warnings.push(format!("{name}: {} faces have no area", report.degenerate));
     }
@@ -232,7 +232,7 @@ fn surfels(
     context: &Context<'_>,
     warnings: &mut Vec<String>,
 ) -> Result<Cloud, ConvertError> {
-    let (cloud, report) = convert::raw_to_surfels_with_progress(points, params, context.progress)?;
+    let (cloud, report) = convert::raw_to_surfels(points, params, Some(context.progress))?;
     if report.duplicates > 0 && !params.merge_duplicates {
         let n = report.duplicates;
         warnings
@@ -248,7 +248,7 @@ pub(super) fn procedural(
     params: &SplatParams,
     context: &Context<'_>,
 ) -> Result<(Grid, TransferFunction), ConvertError> {
-    let lattice = convert::procedural_cloud_with_progress(shape, spacing, params, context.progress)?;
+    let lattice = convert::procedural_cloud(shape, spacing, params, Some(context.progress))?;
     Ok((lattice, as_it_is(shape.extinction, params)?))
 }
 

@@ -73,8 +73,21 @@ struct Case {
 impl Case {
     fn new(cloud: Cloud, coloured: bool, light: &Light, params: &Params) -> Self {
         let (materials, progress) = (materials(coloured), Progress::new());
-        let casting = Casting::new(&cloud, &materials, &[], light, params, &progress).unwrap();
-        let expected = Deposits::new(&cloud, &materials, &[], light, params, &progress).unwrap().into_map();
+        let casting = Casting::new(
+            &tsm::Scene { cloud: &cloud, materials: &materials, objects: &[] },
+            light,
+            params,
+            Some(&progress),
+        )
+        .unwrap();
+        let expected = Deposits::new(
+            &tsm::Scene { cloud: &cloud, materials: &materials, objects: &[] },
+            light,
+            params,
+            Some(&progress),
+        )
+        .unwrap()
+        .into_map();
         Self { cloud, casting, expected }
     }
 

@@ -10,7 +10,7 @@ use pbsr::{
 use splat_core::glam::{DMat3, DQuat, DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
 use splat_core::{
-    Camera, Cloud, Grid, Material, Mesh, Progress, Projection, Shading, Similarity, Splat, SplatKind, TransferFunction,
+    Camera, Cloud, Grid, Material, Mesh, Projection, Shading, Similarity, Splat, SplatKind, TransferFunction,
     TransferPoint, rng,
 };
 use std::collections::BTreeSet;
@@ -182,7 +182,7 @@ pub(crate) fn by_device(device: &mut Device, scene: &Scene<'_>, runs: u32) -> En
 
 pub(crate) fn by_processor(scene: &Scene<'_>, levels: u32) -> Ensemble {
     let mut ensemble = empty();
-    Renderer::new().fold(scene, &mut ensemble, levels, &FoldParams::default(), &Progress::default()).unwrap();
+    Renderer::new().fold(scene, &mut ensemble, &FoldParams { levels, ..FoldParams::default() }, None).unwrap();
     ensemble
 }
 

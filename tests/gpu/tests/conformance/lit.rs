@@ -8,8 +8,8 @@ use pbsr::{
 };
 use splat_core::glam::{DMat3, DQuat, DVec3, Vec3};
 use splat_core::{
-    Camera, Cloud, Grid, Light, LightShape, Material, Mesh, Progress, Projection, Shading, Similarity, Splat,
-    SplatKind, TransferFunction, TransferPoint, Transmittance, rng,
+    Camera, Cloud, Grid, Light, LightShape, Material, Mesh, Projection, Shading, Similarity, Splat, SplatKind,
+    TransferFunction, TransferPoint, Transmittance, rng,
 };
 use tsm::gpu::{Room, record_received};
 use tsm::{Params, Resolution, ShadowMap};
@@ -96,7 +96,13 @@ impl World {
         let build = |light, extinction_rgb| {
             let tinted = Material { extinction_rgb, ..Material::default() };
             let materials = [Material::default(), tinted];
-            ShadowMap::build(&self.casters, &materials, &[], light, &params).unwrap()
+            ShadowMap::build(
+                &tsm::Scene { cloud: &self.casters, materials: &materials, objects: &[] },
+                light,
+                &params,
+                None,
+            )
+            .unwrap()
         };
         [build(&lamp, [1.0; 3]), build(&beam, [1.0, 0.4, 0.1])]
     }
@@ -197,7 +203,7 @@ fn by_device(
 
 fn by_processor(scene: &Scene<'_>, params: EnsembleParams, levels: u32) -> Ensemble {
     let mut ensemble = Ensemble::new(scene.camera.size, &params).unwrap();
-    Renderer::new().fold(scene, &mut ensemble, levels, &FoldParams::default(), &Progress::default()).unwrap();
+    Renderer::new().fold(scene, &mut ensemble, &FoldParams { levels, ..FoldParams::default() }, None).unwrap();
     ensemble
 }
 

@@ -36,7 +36,7 @@ fn both(scene: &Scene<'_>) -> [Ensemble; 2] {
     let empty = Ensemble::new(SIZE, &EnsembleParams { radiance_unit: 0.5, ..EnsembleParams::default() }).unwrap();
     let (mut cpu, mut gpu) = (empty.clone(), empty);
     let (params, progress) = (FoldParams::default(), Progress::default());
-    Renderer::new().fold(scene, &mut cpu, 2 * ROOM.levels, &params, &progress).unwrap();
+    Renderer::new().fold(scene, &mut cpu, &FoldParams { levels: 2 * ROOM.levels, ..params }, Some(&progress)).unwrap();
     let empty = gpu.clone();
     for way in ways {
         let recorded = record(ROOM, way, None).unwrap();

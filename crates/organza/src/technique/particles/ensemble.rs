@@ -151,7 +151,10 @@ impl Step<'_> {
         };
         match self.until - ensemble.levels() {
             0 => Ok(by_device),
-            left => Ok(by_device + renderer.fold(scene, ensemble, left, &self.params, self.progress)?.particles),
+            left => {
+                let params = FoldParams { levels: left, ..self.params };
+                Ok(by_device + renderer.fold(scene, ensemble, &params, Some(self.progress))?.particles)
+            }
         }
     }
 }

@@ -88,7 +88,12 @@ impl Points<'_> {
             frame.tick()?;
             let made = cost.measure(pass::SHADOW_MAP, |stage| {
                 stage.items_in = l.cloud.len() as u64;
-                let casting = Casting::new(&l.cloud, &l.materials, &l.objects, light, &params, frame.progress);
+                let casting = Casting::new(
+                    &tsm::Scene { cloud: &l.cloud, materials: &l.materials, objects: &l.objects },
+                    light,
+                    &params,
+                    Some(frame.progress),
+                );
                 stage.items_out = casting.as_ref().map_or(0, |casting| casting.casters() + casting.given());
                 casting
             });
