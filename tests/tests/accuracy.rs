@@ -3,8 +3,8 @@
 use organza::scene::{self, Scene};
 use organza::{Error, Progress, RenderOptions};
 use organza_judge::accuracy::{
-    Absent, Facts, Frame, Knob, Options, Renderer, Report, Request, Step, Study, Sweep, Theory, Truth, least_seconds,
-    particles, points, random_study, study, verdict,
+    Absent, Facts, Frame, Knob, Options, Renderer, Report, Request, Step, Study, Sweep, Theory, Truth, Yardsticks,
+    least_seconds, particles, points, random_study, study, verdict,
 };
 use organza_tests::organza;
 use reference::metrics::Image;
@@ -230,7 +230,14 @@ fn noisy(seed_of: fn(u64, u32) -> u64, bias: f64) -> Study {
         let pixels = exact_image().pixels().iter().enumerate().map(pixel).collect();
         Ok(frame(Image::from_radiance(SIZE, pixels).unwrap(), 1e-3 * f64::from(level)))
     };
-    random_study(&repeats(), &limit, Err("a test".into()), &OPTIONS, &Progress::new(), &mut draw).unwrap()
+    random_study(
+        &repeats(),
+        Yardsticks { limit: &limit, truth: Err("a test".into()) },
+        &OPTIONS,
+        &Progress::new(),
+        &mut draw,
+    )
+    .unwrap()
 }
 
 #[test]
@@ -265,7 +272,14 @@ fn sets_that_are_not_independent_show_up_in_the_report() {
         let image = Image::from_radiance(SIZE, (0..SIZE[0] * SIZE[1]).map(value).collect()).unwrap();
         Ok(frame(image, 1e-3))
     };
-    let study = random_study(&repeats(), &limit, Err("a test".into()), &OPTIONS, &Progress::new(), &mut draw).unwrap();
+    let study = random_study(
+        &repeats(),
+        Yardsticks { limit: &limit, truth: Err("a test".into()) },
+        &OPTIONS,
+        &Progress::new(),
+        &mut draw,
+    )
+    .unwrap();
     assert!(verdict(&study, &study.curves[0]).contains("theory says otherwise"));
 }
 

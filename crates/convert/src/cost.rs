@@ -17,7 +17,7 @@ use crate::field_points::{area, coarse_mesh, density_lattice, surface_lattice, s
 use crate::keep::Keep;
 #[cfg(feature = "noise")]
 use crate::procedural::CloudShape;
-use crate::shapes::{Lattice, rectangle_counts};
+use crate::shapes::{Lattice, Rectangle, rectangle_counts};
 use crate::volume_points::lattice_factors;
 use crate::{ConvertError, DensityParams, MeshParams, SplatParams, VolumeParams, mesh_points, resample, surface_nets};
 #[cfg(feature = "surfels")]
@@ -211,13 +211,8 @@ pub fn medium_ball(
 ///
 /// # Errors
 /// As the conversion.
-pub fn rectangle(
-    u: DVec3,
-    v: DVec3,
-    opacity: f64,
-    spacing: f64,
-    params: &SplatParams,
-) -> Result<Prediction, ConvertError> {
+pub fn rectangle(rectangle: &Rectangle, params: &SplatParams) -> Result<Prediction, ConvertError> {
+    let Rectangle { u, v, opacity, spacing, .. } = *rectangle;
     params.check()?;
     params.check_spacing(spacing * params.transform.scale)?;
     let splats = rectangle_counts(u, v, spacing).iter().product();

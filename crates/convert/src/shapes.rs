@@ -41,19 +41,27 @@ pub fn medium_ball(
     Ok(cloud)
 }
 
-/// A flat parallelogram around `center` with half-axes `u` and `v` as surface splats about `spacing` apart; `opacity` is
-/// that of one crossing, 1 for an opaque surface. Its normal is u × v.
+/// A flat parallelogram; its normal is u × v.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rectangle {
+    /// The middle, object space.
+    pub center: DVec3,
+    /// One half-axis, object units.
+    pub u: DVec3,
+    /// The other; not parallel to the first.
+    pub v: DVec3,
+    /// Opacity of one crossing, in [0, 1]; 1 is an opaque surface.
+    pub opacity: f64,
+    /// Distance of the splats, about, object units.
+    pub spacing: f64,
+}
+
+/// A flat parallelogram as surface splats.
 ///
 /// # Errors
 /// As [`medium_box`]; [`ConvertError::Parameter`] for parallel half-axes.
-pub fn rectangle(
-    center: DVec3,
-    u: DVec3,
-    v: DVec3,
-    opacity: f64,
-    spacing: f64,
-    params: &SplatParams,
-) -> Result<Cloud, ConvertError> {
+pub fn rectangle(rectangle: &Rectangle, params: &SplatParams) -> Result<Cloud, ConvertError> {
+    let Rectangle { center, u, v, opacity, spacing } = *rectangle;
     params.check()?;
     let scale = params.transform.scale;
     params.check_spacing(spacing * scale)?;
@@ -203,7 +211,11 @@ mod tests {
     #[test]
     fn rectangle_carries_the_optical_depth_of_its_area() {
         let p = SplatParams::default();
-        let plane = rectangle(DVec3::ZERO, DVec3::X, DVec3::Z * 2.0, 0.75, 0.05, &p).unwrap();
+        let plane = rectangle(
+            &Rectangle { center: DVec3::ZERO, u: DVec3::X, v: DVec3::Z * 2.0, opacity: 0.75, spacing: 0.05 },
+            &p,
+        )
+        .unwrap();
         assert!((total(&plane) / (8.0 * 4.0_f64.ln()) - 1.0).abs() < 1e-6);
         assert_eq!(plane.normal[0], Vec3::NEG_Y);
         plane.validate().unwrap();

@@ -112,7 +112,8 @@ fn closed_shapes_are_counted() {
     );
     let (u, v) = (DVec3::X, DVec3::Z * 2.0);
     for opacity in [0.75, 1.0] {
-        exact(cost::rectangle(u, v, opacity, 0.05, &p).unwrap(), &rectangle(low, u, v, opacity, 0.05, &p).unwrap());
+        let flat = Rectangle { center: low, u, v, opacity, spacing: 0.05 };
+        exact(cost::rectangle(&flat, &p).unwrap(), &rectangle(&flat, &p).unwrap());
     }
     for spacing in [0.03, 0.1] {
         let ball = medium_ball(DVec3::ONE, 0.8, 2.0, spacing, &p).unwrap();

@@ -32,7 +32,7 @@ use glam::DVec3;
 use splat_core::{Camera, Cloud, Direction, SliceOrder};
 use splat_shaders::kernels;
 use splat_shaders::layouts::{Scan, SortState, SortView};
-use splat_shaders::radix::{SCAN_BLOCK, Scanned, sort_pass};
+use splat_shaders::radix::{SCAN_BLOCK, Scanned, SortPass, sort_pass};
 use splat_shaders::{BufferId, Groups, Recording};
 
 pub use parts::{Sorted, join};
@@ -108,7 +108,16 @@ pub fn record(capacities: Capacities) -> Recorded {
     r.dispatch(&kernels::HBSORT_PREPARE, Groups::cover(1), &[block_scan, state, digit_scan], &[kept]);
     for pass in 0..4 {
         let (from, to) = (pass % 2, 1 - pass % 2);
-        sort_pass(r, 8 * pass as u32, state, [keys[from], places[from]], [keys[to], places[to]], digits);
+        sort_pass(
+            r,
+            SortPass {
+                shift: 8 * pass as u32,
+                state,
+                from: [keys[from], places[from]],
+                to: [keys[to], places[to]],
+                digits,
+            },
+        );
     }
     r.read(state);
     r.read(keys[0]);

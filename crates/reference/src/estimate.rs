@@ -155,7 +155,7 @@ pub fn path_trace(
             progress.tick(1)?;
             for (x, pixel) in row.iter_mut().enumerate() {
                 for sample in done..until {
-                    one_sample(&tracer, camera, settings, [x, y], (y * width + x) as u64, sample, pixel);
+                    one_sample(&tracer, camera, settings, [x, y], sample, pixel);
                 }
             }
             Ok(())
@@ -175,10 +175,10 @@ fn one_sample(
     camera: &Camera,
     settings: &PathSettings,
     [x, y]: [usize; 2],
-    item: u64,
     sample: u32,
     pixel: &mut Pixel,
 ) {
+    let item = (y * camera.size[0] as usize + x) as u64;
     let mut rng = Stream::new(settings.seed, RADIANCE, item, u64::from(sample));
     let [dx, dy] = match settings.pixel {
         PixelSampling::Area => rng.pair(),

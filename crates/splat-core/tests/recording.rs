@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 use splat_core::raster::gpu::{AttributeRoom, Capacities, follow, project, record, resolve};
-use splat_core::raster::{self, Accumulation, OpaqueImage, Params, Projected};
+use splat_core::raster::{self, Accumulation, Detail, OpaqueImage, Params, ProjectInput, Projected};
 use splat_core::raster::{FoldInput, OpaqueInput};
 use splat_core::shade::{ChannelLayout, MAX_CHANNELS, gpu as shade};
 use splat_core::{Accumulator, Camera, Cloud, Direction, Error, FootprintStack, Material, Projection, Splat};
@@ -62,7 +62,14 @@ fn projected() -> Projected {
     }
     let view = Projection::Orthographic { height: 2.0 };
     let camera = Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y, view, ROOM.size).unwrap();
-    raster::project(&cloud, &camera, &FootprintStack::default(), &[Material::default()], &Params::default())
+    raster::project(&ProjectInput {
+        cloud: &cloud,
+        camera: &camera,
+        footprints: &FootprintStack::default(),
+        materials: &[Material::default()],
+        params: &Params::default(),
+        detail: Detail::ALL,
+    })
 }
 
 fn input<'a>(projected: &'a Projected, params: &'a Params, opaque: &'a OpaqueImage) -> FoldInput<'a> {

@@ -33,7 +33,7 @@ mod shadow;
 use crate::table::stop_of;
 use crate::{Deposits, Error};
 use splat_shaders::layouts::{ListView, Scan, SortState};
-use splat_shaders::radix::{Scanned, sort_pass};
+use splat_shaders::radix::{Scanned, SortPass, sort_pass};
 use splat_shaders::{BufferId, Groups, Recording, kernels};
 
 pub use batches::{Batch, Listed};
@@ -141,7 +141,16 @@ impl Sort {
     fn by_bits(&mut self, r: &mut Recording, bits: u32) {
         for shift in (0..bits).step_by(8) {
             let ([keys, sorted_keys], [places, sorted_places]) = (self.keys, self.places);
-            sort_pass(r, shift, self.state, [keys, places], [sorted_keys, sorted_places], self.digits);
+            sort_pass(
+                r,
+                SortPass {
+                    shift,
+                    state: self.state,
+                    from: [keys, places],
+                    to: [sorted_keys, sorted_places],
+                    digits: self.digits,
+                },
+            );
             self.keys.reverse();
             self.places.reverse();
         }

@@ -126,12 +126,11 @@ impl Whole {
         Ok((Some(counts), opaque))
     }
 
-    /// Hands the inputs of all stages to `run`.
+    /// Hands the inputs of all stages to `run`: of all splats, their attributes, and what they receive.
     pub(super) fn with_inputs<T>(
         &self,
         splats: &Splats<'_>,
-        all: &[u32],
-        attributes: &Attributes,
+        (all, attributes): (&[u32], &Attributes),
         received: &[[f32; 3]],
         accumulator: &Accumulator,
         run: impl FnOnce(&[(BufferId, &[u8])]) -> Result<T, Failure>,

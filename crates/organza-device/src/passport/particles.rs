@@ -1,7 +1,7 @@
 //! Sets of particles by both: uploaded and made by the device, shown as they are and lit through a shadow map.
 
 use super::{Agreement, Failure, Found, LEAST_SHARE, SIZE, ShadowInput};
-use crate::Folding;
+use crate::{Folding, Goal};
 use pbsr::{
     Appearance, Ensemble, EnsembleParams, FoldParams, LitBy, MeshSampler, Object, Renderer, Scene, SurfaceParams,
     pixel_area,
@@ -83,7 +83,9 @@ impl ParticlesInput {
             &FoldParams { levels: SETS, ..FoldParams::default() },
             Some(&progress),
         )?;
-        if let Some(why) = folding.fold_on(device, &scene, &mut found, SETS, u64::MAX, &progress)? {
+        if let Some(why) =
+            folding.fold_on(device, &scene, &mut found, Goal { until: SETS, max_bytes: u64::MAX }, &progress)?
+        {
             return Err(Failure::Left(why));
         }
         let Folding { particles, passes, .. } = folding;

@@ -4,7 +4,7 @@ use super::context::Context;
 use super::input::{Input, input};
 use super::own::{Body, Own, Search};
 use crate::Error;
-use crate::scene::{MediumShape, SceneObject, Source};
+use crate::scene::{MediumShape, RectangleSource, SceneObject, Source};
 use crate::statistics::ObjectStatistics;
 use convert::cost::{self, Prediction};
 use convert::{
@@ -116,7 +116,7 @@ fn predict(input: &Input<'_>) -> Result<Prediction, ConvertError> {
         Input::Medium(MediumShape::Ball { center, radius, extinction, spacing }, params) => {
             cost::medium_ball(*center, *radius, *extinction, *spacing, params)
         }
-        Input::Rectangle(r, opacity, params) => cost::rectangle(r.u, r.v, *opacity, r.spacing, params),
+        Input::Rectangle(r, opacity, params) => cost::rectangle(&flat(r, *opacity), params),
     }
 }
 
@@ -195,9 +195,7 @@ pub(super) fn convert(
             }
         }
         Input::Medium(shape, params) => medium(shape, &context.limited(params)),
-        Input::Rectangle(r, opacity, params) => {
-            convert::rectangle(r.center, r.u, r.v, *opacity, r.spacing, &context.limited(params))
-        }
+        Input::Rectangle(r, opacity, params) => convert::rectangle(&flat(r, *opacity), &context.limited(params)),
     };
     cloud.map_err(|e| Error::from_convert(&e))
 }
@@ -260,6 +258,12 @@ pub(super) fn as_it_is(most: f64, params: &SplatParams) -> Result<TransferFuncti
         points.push(point(most as f32));
     }
     TransferFunction::new(points).map_err(|source| ConvertError::Input { object: params.object_name.clone(), source })
+}
+
+/// A rectangle of a scene.
+fn flat(source: &RectangleSource, opacity: f64) -> convert::Rectangle {
+    let RectangleSource { center, u, v, spacing } = *source;
+    convert::Rectangle { center, u, v, opacity, spacing }
 }
 
 fn medium(shape: &MediumShape, params: &SplatParams) -> Result<Cloud, ConvertError> {

@@ -36,7 +36,7 @@
 //! cloud.push(&Splat { radius: 0.5, cross_section: 0.2, ..Splat::default() });
 //! let view = Projection::Orthographic { height: 2.0 };
 //! let camera = Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, view, [64, 64]).unwrap();
-//! let projected = project(&cloud, &camera, &FootprintStack::default(), &[Default::default()], &Params::default());
+//! let projected = project(&ProjectInput { cloud: &cloud, camera: &camera, footprints: &FootprintStack::default(), materials: &[Default::default()], params: &Params::default(), detail: Detail::ALL });
 //! let bins = bin(&projected, &[0]);
 //! let sum: f32 = (0..bins.tiles()).map(|t| pulp::Arch::new().dispatch(Sum(&projected, &bins, t))).sum();
 //! // ∫τ dA is the cross-section, whatever the splat's size: 32 pixels are one unit of length.

@@ -6,7 +6,7 @@ use splat_core::glam::DVec3;
 use splat_core::raster::OpaqueInput;
 use splat_core::raster::gpu::Counts;
 use splat_core::raster::gpu::resolve::record;
-use splat_core::raster::{Detail, OpaqueImage, Params, Projected, project_into, resolve_opaque};
+use splat_core::raster::{Detail, OpaqueImage, Params, ProjectInput, Projected, project_into, resolve_opaque};
 use splat_core::{Camera, Cloud, Error, FootprintStack, Material, Projection, SplatKind, rng};
 
 /// Most that a depth may differ by, as a share of the scene's extent, and a channel as a share of the largest value.
@@ -34,7 +34,17 @@ fn projected(cloud: &Cloud, view: Projection, size: [u32; 2]) -> Projected {
     let camera = Camera::look_at(eye, cloud.origin, DVec3::Y, view, size).unwrap();
     let mut projected = Projected::default();
     let (footprints, materials) = (FootprintStack::default(), [Material::default()]);
-    project_into(&mut projected, cloud, &camera, &footprints, &materials, &Params::default(), Detail::ALL);
+    project_into(
+        &mut projected,
+        &ProjectInput {
+            cloud,
+            camera: &camera,
+            footprints: &footprints,
+            materials: &materials,
+            params: &Params::default(),
+            detail: Detail::ALL,
+        },
+    );
     projected
 }
 

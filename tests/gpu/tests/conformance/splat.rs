@@ -4,7 +4,7 @@ use gpu_conformance::{Device, open};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::FoldInput;
 use splat_core::raster::gpu::{Counts, record};
-use splat_core::raster::{Detail, OpaqueImage, Params, Projected, fold, project_into};
+use splat_core::raster::{Detail, OpaqueImage, Params, ProjectInput, Projected, fold, project_into};
 use splat_core::{
     Accumulator, Camera, Cloud, Direction, Error, FootprintStack, Material, Projection, Splat, SplatKind, rng,
 };
@@ -63,7 +63,17 @@ impl Scene {
         let detail =
             Detail { depth: self.depths || self.objects || !self.opaque.depth.is_empty(), object: self.objects };
         let (camera, params) = (&self.camera, &self.params);
-        project_into(&mut projected, &self.cloud, camera, &self.footprints, &self.materials, params, detail);
+        project_into(
+            &mut projected,
+            &ProjectInput {
+                cloud: &self.cloud,
+                camera,
+                footprints: &self.footprints,
+                materials: &self.materials,
+                params,
+                detail,
+            },
+        );
         projected
     }
 

@@ -3,7 +3,7 @@
 use super::checkpoint::Checkpoint;
 use super::parts::{Part, named};
 use super::{fault, refuse};
-use crate::device::{Folding, Helper};
+use crate::device::{Folding, Goal, Helper};
 use crate::frame::Frame;
 use crate::scene::ParticlesSettings;
 use crate::technique::Session;
@@ -146,7 +146,10 @@ impl Step<'_> {
         ensemble: &mut Ensemble,
     ) -> Result<u64, pbsr::Error> {
         let by_device = match self.helper {
-            Some(helper) => folding.fold(helper, scene, ensemble, self.until, self.params.max_bytes, self.progress)?,
+            Some(helper) => {
+                let goal = Goal { until: self.until, max_bytes: self.params.max_bytes };
+                folding.fold(helper, scene, ensemble, goal, self.progress)?
+            }
             None => 0,
         };
         match self.until - ensemble.levels() {

@@ -4,6 +4,7 @@
 use super::{Points, sort_params};
 use crate::Error;
 use crate::device::{Helper, keeps_shadows};
+use crate::frame::Chained;
 use crate::pass;
 use crate::scene::Technique;
 use crate::shadows::shadow_error;
@@ -121,7 +122,9 @@ impl Points<'_> {
         let frame = self.frame;
         let (ids, solid) = (frame.translucent(frame.drawn(), Technique::Points), frame.solid_ids());
         let sort = sort_params(frame);
-        let done = stages.measure(pass::SPLAT, |stage| frame.chain(helper, lit, [&ids, &solid], &sort, into, stage))?;
+        let (lights, castings) = lit;
+        let chained = Chained { lights, castings, ids: &ids, solid: &solid, sort: &sort };
+        let done = stages.measure(pass::SPLAT, |stage| frame.chain(helper, &chained, into, stage))?;
         let Some(opaque) = done else { return Ok(false) };
         cost.stages.extend(stages.stages);
         frame.set_opaque(opaque);
