@@ -1,6 +1,6 @@
 //! Benchmark of convert: files to nouns are not timed, nouns to splats are; splats (or points, voxels) per second.
 
-use convert::read::{self, Loaded, ReadLimits};
+use convert::read::{self, Loaded, ReadParams};
 use convert::{
     CloudShape, Density, ExpressionField, MeshParams, RawPoints, SplatParams, SurfelParams, VolumeParams,
     mesh_to_points, mesh_to_points_into, procedural_cloud, raw_to_surfels, sobel_gradient_into, surface_to_points,
@@ -13,7 +13,7 @@ use std::path::Path;
 
 fn asset(name: &str) -> Loaded {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets").join(name);
-    read::file(&path, &ReadLimits::default(), None).expect("an asset of the repository").0
+    read::file(&path, &ReadParams::default(), None).expect("an asset of the repository").0
 }
 
 fn bunny() -> Mesh {

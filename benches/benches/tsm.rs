@@ -4,7 +4,7 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rdst::RadixSort;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Cloud, Light, LightShape, Receiver, Transmittance, rng};
+use splat_core::{Cloud, Light, LightShape, Limits, Receiver, Transmittance, rng};
 use std::hint::black_box;
 use tsm::{Params, Scene, ShadowMap};
 
@@ -103,7 +103,7 @@ fn growth(c: &mut Criterion) {
         let mut group = c.benchmark_group(format!("tsm/growth/{millions} M"));
         group.sample_size(10).throughput(Throughput::Elements(cloud.len() as u64));
         for (name, light) in lights(&cloud).into_iter().skip(1) {
-            let params = Params { max_bytes: 8 << 30, ..Params::default() };
+            let params = Params { limits: Limits::bytes(8 << 30), ..Params::default() };
             let build =
                 || ShadowMap::build(&Scene::from(&cloud), &light, &params, None).expect("invariant: 8 GiB are enough");
             let counts = build().counts();

@@ -9,6 +9,7 @@ use organza_judge::accuracy::{
 use organza_tests::organza;
 use reference::metrics::Image;
 use serde_json::Value;
+use splat_core::Exceeded;
 use std::fs;
 
 const SIZE: [usize; 2] = [24, 16];
@@ -139,14 +140,8 @@ fn a_knob_whose_ends_are_too_large_is_held_with_the_reason() {
     let mut draw = |request: &Request| {
         let (n, cut) = (f64::from(request.oversample), request.scene.render.points.transmittance_cutoff);
         if cut == 0.0 {
-            let hint = "raise it".to_owned();
-            return Err(Error::Limit {
-                what: "a picture without a cut".into(),
-                needed: 2,
-                limit: 1,
-                unit: "bytes",
-                hint,
-            });
+            let (what, hint) = ("a picture without a cut".into(), "raise it".into());
+            return Err(Error::Limit(Exceeded { what, needed: 2, limit: Some(1), unit: "bytes", hint }));
         }
         Ok(frame(slab_image(n, 0.5, cut), 1e-3 * n * (2.0 - cut)))
     };
@@ -188,8 +183,8 @@ fn what_was_not_measured_is_null() {
     let mut draw = |request: &Request| {
         let (n, cut) = (f64::from(request.oversample), request.scene.render.points.transmittance_cutoff);
         if n == 16.0 {
-            let what = "the table".into();
-            return Err(Error::Limit { what, needed: 9, limit: 1, unit: "bytes", hint: String::new() });
+            let (what, hint) = ("the table".into(), "".into());
+            return Err(Error::Limit(Exceeded { what, needed: 9, limit: Some(1), unit: "bytes", hint }));
         }
         Ok(frame(slab_image(n, 0.5, cut), 1e-3 * n))
     };

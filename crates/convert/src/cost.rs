@@ -17,7 +17,7 @@ use crate::field_points::{area, coarse_mesh, density_lattice, surface_lattice, s
 use crate::keep::Keep;
 #[cfg(feature = "noise")]
 use crate::procedural::CloudShape;
-use crate::shapes::{Lattice, Rectangle, rectangle_counts};
+use crate::shapes::{Lattice, Rectangle, rectangle_columns, rectangle_counts};
 use crate::volume_points::lattice_factors;
 use crate::{ConvertError, DensityParams, MeshParams, SplatParams, VolumeParams, mesh_points, resample, surface_nets};
 #[cfg(feature = "surfels")]
@@ -216,8 +216,9 @@ pub fn rectangle(rectangle: &Rectangle, params: &SplatParams) -> Result<Predicti
     params.check()?;
     params.check_spacing(spacing * params.transform.scale)?;
     let splats = rectangle_counts(u, v, spacing).iter().product();
-    params.check_count(splats)?;
-    Ok(Prediction::exact(splats, Wanted { tangent: opacity >= 1.0, ..mesh_points::WANTED }))
+    let wanted = rectangle_columns(opacity);
+    params.check_cloud(splats, wanted)?;
+    Ok(Prediction::exact(splats, wanted))
 }
 
 /// Lattice points from `low` on, times the share of a coarser lattice in the same box that is `positive`.

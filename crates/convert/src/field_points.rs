@@ -227,7 +227,7 @@ pub(crate) fn density_lattice(bounds: DAabb, params: &DensityParams) -> Result<L
 ///
 /// # Errors
 /// [`ConvertError::NonFinite`] with the point, also where the value overflows f32; [`ConvertError::Parameter`] for
-/// an empty box or an absurd spacing; [`ConvertError::TooMany`], [`ConvertError::Cancelled`].
+/// an empty box or an absurd spacing; [`ConvertError::Limit`], [`ConvertError::Cancelled`].
 pub fn field_to_grid<F: ScalarField + ?Sized>(
     field: &F,
     bounds: DAabb,

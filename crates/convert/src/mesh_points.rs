@@ -100,7 +100,7 @@ pub fn mesh_to_points(
 /// Splats are reported to `progress`, and work stops where that is cancelled.
 ///
 /// # Errors
-/// [`ConvertError::Parameter`] and [`ConvertError::Input`] for what breaks a promise, [`ConvertError::TooMany`] before
+/// [`ConvertError::Parameter`] and [`ConvertError::Input`] for what breaks a promise, [`ConvertError::Limit`] before
 /// any memory is taken, and [`ConvertError::Cancelled`], after which the cloud is of no use.
 pub fn mesh_to_points_into(
     mesh: &Mesh,
@@ -232,7 +232,7 @@ fn spacing(mesh: &Mesh, measures: &[Measure], params: &MeshParams, report: &Mesh
         Density::Auto => {
             let diagonal = f64::from(splat_core::Aabb::of_points(&mesh.position).diagonal()) * scale;
             let triangle = (report.area / (report.triangles - report.degenerate) as f64).sqrt();
-            let budget = (params.splat.max_splats as f64 / 2.0).clamp(1.0, AUTO_SPLATS);
+            let budget = (params.splat.most_splats() as f64 / 2.0).clamp(1.0, AUTO_SPLATS);
             (diagonal / AUTO_STEPS).min(triangle).max((report.area / budget).sqrt())
         }
     }
@@ -270,7 +270,7 @@ fn starts(measures: &[Measure], spacing: f64, p: &SplatParams) -> Result<Vec<u64
         .map(|m| {
             // A strip count is a loop: a needle that would exceed the budget by its length alone is not walked.
             let strips = m.longest_sq.sqrt() / spacing;
-            if strips > p.max_splats as f64 { strips as u64 } else { subdivide::split(m, spacing).pieces() }
+            if strips > p.most_splats() as f64 { strips as u64 } else { subdivide::split(m, spacing).pieces() }
         })
         .collect();
     p.check_count(counts.iter().map(|&n| n as f64).sum())?;

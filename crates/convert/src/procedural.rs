@@ -207,7 +207,7 @@ impl CloudShape {
 /// Lattice points are reported to `progress`, and work stops where that is cancelled.
 ///
 /// # Errors
-/// [`ConvertError::Parameter`], [`ConvertError::TooMany`] before memory is taken, or [`ConvertError::Cancelled`].
+/// [`ConvertError::Parameter`], [`ConvertError::Limit`] before memory is taken, or [`ConvertError::Cancelled`].
 pub fn procedural_cloud(
     shape: &CloudShape,
     spacing: f64,

@@ -95,7 +95,7 @@ pub struct SurfelReport {
 /// Places are reported to `progress`, and work stops where that is cancelled.
 ///
 /// # Errors
-/// [`ConvertError::Parameter`], [`ConvertError::Input`], [`ConvertError::TooMany`] or [`ConvertError::Cancelled`].
+/// [`ConvertError::Parameter`], [`ConvertError::Input`], [`ConvertError::Limit`] or [`ConvertError::Cancelled`].
 pub fn raw_to_surfels(
     points: &RawPoints,
     params: &SurfelParams,

@@ -114,7 +114,7 @@ pub struct VolumeReport {
 /// Lattice points are reported to `progress`, each twice (chosen, written), and work stops where that is cancelled.
 ///
 /// # Errors
-/// [`ConvertError::Parameter`], [`ConvertError::Input`], [`ConvertError::TooMany`] before memory is taken, or
+/// [`ConvertError::Parameter`], [`ConvertError::Input`], [`ConvertError::Limit`] before memory is taken, or
 /// [`ConvertError::Cancelled`].
 pub fn volume_to_points(
     grid: &Grid,
@@ -155,11 +155,8 @@ pub(crate) fn lattice_factors(grid: &Grid, params: &VolumeParams) -> Result<[usi
 
 /// Refuses lattices that no budget can mean: eight lattice points a splat.
 pub(crate) fn check_lattice(p: &SplatParams, dims: [f64; 3]) -> Result<(), ConvertError> {
-    let (needed, limit) = (dims[0] * dims[1] * dims[2], p.max_splats.saturating_mul(8).min(u64::from(u32::MAX)));
-    if needed <= limit as f64 {
-        return Ok(());
-    }
-    Err(ConvertError::TooMany { object: p.object_name.clone(), what: "lattice points", needed, limit })
+    let limit = p.limits.max_elements.saturating_mul(8).min(u32::MAX.into());
+    p.check_limit(dims[0] * dims[1] * dims[2], limit, "lattice points")
 }
 
 fn convert(

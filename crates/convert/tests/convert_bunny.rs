@@ -1,7 +1,7 @@
 //! The scanned bunny: its splats cover it once.
 #![cfg(feature = "ply")]
 
-use convert::read::{self, Loaded, ReadLimits};
+use convert::read::{self, Loaded, ReadParams};
 use convert::{Density, MeshParams, mesh_to_points, reference};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Cloud, Footprint, Mesh, optics, rng};
@@ -10,7 +10,7 @@ use std::path::Path;
 
 fn bunny() -> Mesh {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/stanford-bunny/bunny.ply.gz");
-    match read::file(&path, &ReadLimits::default(), None).unwrap().0 {
+    match read::file(&path, &ReadParams::default(), None).unwrap().0 {
         Loaded::Mesh(mesh) => mesh,
         other => panic!("not a mesh: {other:?}"),
     }

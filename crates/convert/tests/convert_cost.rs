@@ -4,7 +4,7 @@
 use convert::cost::{self, Prediction};
 use convert::*;
 use splat_core::glam::{DMat3, DVec3, Vec3};
-use splat_core::{Cloud, DAabb, Grid, Mesh, Progress, Similarity, TransferFunction, TransferPoint, rng};
+use splat_core::{Cloud, DAabb, Grid, Limits, Mesh, Progress, Similarity, TransferFunction, TransferPoint, rng};
 
 fn mesh() -> Mesh {
     let unit = |i: u64, a: u64| rng::unit_f32(8, 0, i, a);
@@ -123,11 +123,11 @@ fn closed_shapes_are_counted() {
 
 #[test]
 fn cv10_predictions_refuse_what_conversions_refuse() {
-    let splat = SplatParams { max_splats: 1000, ..SplatParams::default() };
+    let splat = SplatParams { limits: Limits::elements(1000), ..SplatParams::default() };
     let params = MeshParams { splat: splat.clone(), density: Density::Spacing(1e-6), ..MeshParams::default() };
-    assert!(matches!(cost::mesh(&mesh(), &params), Err(ConvertError::TooMany { .. })));
+    assert!(matches!(cost::mesh(&mesh(), &params), Err(ConvertError::Limit(_))));
     let params = SurfelParams { splat, ..SurfelParams::default() };
-    assert!(matches!(cost::raw_points(&points(1001), &params), Err(ConvertError::TooMany { .. })));
+    assert!(matches!(cost::raw_points(&points(1001), &params), Err(ConvertError::Limit(_))));
 }
 
 /// Every conversion ticks what it announced, and stops when it is cancelled.

@@ -282,7 +282,7 @@ fn impossible_clouds_are_refused() {
     ] {
         assert!(matches!(procedural_cloud(&shape, 0.1, &splat, None), Err(ConvertError::Parameter { .. })));
     }
-    assert!(matches!(procedural_cloud(&base(), 1e-6, &splat, None), Err(ConvertError::TooMany { .. })));
+    assert!(matches!(procedural_cloud(&base(), 1e-6, &splat, None), Err(ConvertError::Limit(_))));
 }
 
 #[test]

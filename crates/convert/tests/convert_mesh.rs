@@ -2,7 +2,7 @@
 
 use convert::{ConvertError, Density, MeshParams, SplatParams, mesh_to_points, reference};
 use splat_core::glam::{DQuat, DVec3, Vec3};
-use splat_core::{Cloud, Footprint, Mesh, Similarity, SplatKind, optics, rng};
+use splat_core::{Cloud, Footprint, Limits, Mesh, Similarity, SplatKind, optics, rng};
 
 fn quad(side: f32) -> Mesh {
     let p = |x, z| Vec3::new(x, 0.0, z);
@@ -140,12 +140,16 @@ fn cv06_tiny_opacities_keep_their_ratio() {
 #[test]
 fn cv10_absurd_spacings_are_refused_by_name() {
     let with = |density, max_splats| MeshParams {
-        splat: SplatParams { object_name: "bunny".into(), max_splats, ..SplatParams::default() },
+        splat: SplatParams {
+            object_name: "bunny".into(),
+            limits: Limits::elements(max_splats),
+            ..SplatParams::default()
+        },
         density,
         opacity: 1.0,
     };
     let error = mesh_to_points(&quad(1.0), &with(Density::Spacing(1e-9), 1000), None).unwrap_err();
-    assert!(matches!(error, ConvertError::TooMany { .. }));
+    assert!(matches!(error, ConvertError::Limit(_)));
     assert!(error.to_string().contains("bunny") && error.to_string().contains("1.000e18"), "{error}");
     for spacing in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-300] {
         let error = mesh_to_points(&quad(1.0), &with(Density::Spacing(spacing), 1000), None).unwrap_err();
@@ -159,11 +163,11 @@ fn cv10_absurd_spacings_are_refused_by_name() {
     };
     assert!(matches!(
         mesh_to_points(&needle, &with(Density::Spacing(1e-4), 1 << 20), None),
-        Err(ConvertError::TooMany { .. })
+        Err(ConvertError::Limit(_))
     ));
     let (cloud, _) = mesh_to_points(&quad(1.0), &with(Density::Splats(u64::MAX), 100_000), None).map_or_else(
         |e| {
-            assert!(matches!(e, ConvertError::TooMany { .. } | ConvertError::Parameter { .. }));
+            assert!(matches!(e, ConvertError::Limit(_) | ConvertError::Parameter { .. }));
             (Cloud::default(), 0)
         },
         |r| (r.0, 1),

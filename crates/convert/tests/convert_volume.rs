@@ -2,7 +2,7 @@
 
 use convert::{ConvertError, SplatParams, VolumeParams, reference, sobel_gradient, volume_to_points};
 use splat_core::glam::{DMat3, DQuat, DVec3, Vec3};
-use splat_core::{DAabb, Footprint, Grid, Similarity, TransferFunction, TransferPoint, rng};
+use splat_core::{DAabb, Exceeded, Footprint, Grid, Similarity, TransferFunction, TransferPoint, rng};
 
 fn grid(dims: [usize; 3], steps: DVec3, value: impl Fn(usize, usize, usize) -> f32) -> Grid {
     let values = (0..dims[0] * dims[1] * dims[2])
@@ -76,7 +76,7 @@ fn cv09_absurd_lattices_are_refused() {
     let named = SplatParams { object_name: "ct".into(), ..SplatParams::default() };
     let params = VolumeParams { splat: named, refine: 65536, ..VolumeParams::default() };
     let error = volume_to_points(&small, &ramp(0.0, 1.0, 1.0), &params, None).unwrap_err();
-    assert!(matches!(error, ConvertError::TooMany { what: "lattice points", .. }), "{error}");
+    assert!(matches!(error, ConvertError::Limit(Exceeded { unit: "lattice points", .. })), "{error}");
     assert!(error.to_string().contains("ct"));
     // A needle lattice would be split a million times along two axes.
     let needle = grid([2, 2, 2], DVec3::new(1e-9, 1.0, 1.0), |_, _, _| 1.0);

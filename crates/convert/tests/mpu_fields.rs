@@ -1,7 +1,7 @@
 //! Fields of scattered points: accuracy, derivatives, bounds, sameness, and inputs that are hardly surfaces.
 #![cfg(all(feature = "surfels", feature = "ply"))]
 
-use convert::read::{self, Loaded, ReadLimits};
+use convert::read::{self, Loaded, ReadParams};
 use convert::{
     MpuField, MpuParams, MpuReport, Orientation, RawPoints, SplatParams, field_to_mesh, points_to_field, vertex_normals,
 };
@@ -295,7 +295,7 @@ fn what_is_no_surface_is_refused() {
 #[test]
 fn the_bunny_is_met_within_the_tolerance_and_has_no_other_sheets() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/stanford-bunny/bunny.ply.gz");
-    let Loaded::Mesh(mesh) = read::file(&path, &ReadLimits::default(), None).unwrap().0 else { panic!("not a mesh") };
+    let Loaded::Mesh(mesh) = read::file(&path, &ReadParams::default(), None).unwrap().0 else { panic!("not a mesh") };
     let normal = vertex_normals(&mesh);
     let points = RawPoints { origin: mesh.origin, position: mesh.position, normal, ..RawPoints::default() };
     let (f, report) = field(&points, 1e-3);

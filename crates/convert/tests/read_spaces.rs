@@ -2,7 +2,7 @@
 #![cfg(all(feature = "nrrd", feature = "nifti"))]
 
 use crate::read_samples::{NIFTI_F32, load, nifti};
-use convert::read::{Loaded, ReadLimits, bytes};
+use convert::read::{Loaded, ReadParams, bytes};
 use convert::{VolumeParams, volume_to_points};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::{Grid, TransferFunction, TransferPoint};
@@ -56,7 +56,7 @@ fn one_head_lies_in_one_place_whichever_space_its_file_has() {
 #[test]
 fn what_was_converted_is_said() {
     let remarks =
-        |space: &str, x, y| bytes("a.nrrd", &nrrd(space, x, y), &ReadLimits::default(), None).unwrap().1.remarks;
+        |space: &str, x, y| bytes("a.nrrd", &nrrd(space, x, y), &ReadParams::default(), None).unwrap().1.remarks;
     let said = "space: left-posterior-superior, converted to right-anterior-superior";
     assert_eq!(remarks("space: LPS", -1.0, -1.0), [said]);
     assert!(remarks("space: RAS", 1.0, 1.0).is_empty());

@@ -10,7 +10,7 @@ use crate::scratch::{CHUNK, MOST_SPLATS, Method, SortInfo, ThicknessRule, resize
 use crate::slicing::Slicing;
 use crate::{Error, Params, Scratch, cost, thickness};
 use rayon::prelude::*;
-use splat_core::{Camera, Cloud, SliceOrder};
+use splat_core::{Camera, Cloud, Exceeded, SliceOrder};
 use std::sync::{Mutex, PoisonError};
 
 /// Slices whose index one task finds at least.
@@ -26,7 +26,7 @@ const INDEXED: usize = 1 << 12;
 /// has the same bits for any number of threads. Scaling scene and camera by a power of two changes no id.
 ///
 /// # Errors
-/// [`Error::Thickness`], [`Error::Ids`], [`Error::TooMany`] or [`Error::Memory`]. A cloud whose columns differ in
+/// [`Error::Thickness`], [`Error::Ids`] or [`Error::Limit`]. A cloud whose columns differ in
 /// length is cut to the shorter of positions and radii; splats that are no finite numbers are culled.
 pub fn slice_cloud(
     cloud: &Cloud,
@@ -79,7 +79,7 @@ pub(crate) fn slice_projected(
 ///
 /// # Errors
 /// [`Error::Depth`] for a depth that is not finite, [`Error::NoRadii`] without [`crate::Thickness::World`],
-/// [`Error::Thickness`], [`Error::TooMany`] or [`Error::Memory`].
+/// [`Error::Thickness`] or [`Error::Limit`].
 pub fn slice_depths(depth: &[f32], params: &Params, scratch: &mut Scratch) -> Result<SliceOrder, Error> {
     check_count(depth.len())?;
     let thickness = params.given_thickness()?.ok_or(Error::NoRadii)?;
@@ -92,7 +92,11 @@ pub fn slice_depths(depth: &[f32], params: &Params, scratch: &mut Scratch) -> Re
 }
 
 pub(crate) fn check_count(n: usize) -> Result<(), Error> {
-    if n as u64 > MOST_SPLATS { Err(Error::TooMany { needed: n as u64, had: MOST_SPLATS }) } else { Ok(()) }
+    if n as u64 <= MOST_SPLATS {
+        return Ok(());
+    }
+    let (what, hint) = ("an order".into(), "sort parts of the cloud, one behind the other".into());
+    Err(Error::Limit(Exceeded { what, needed: n as u64, limit: Some(MOST_SPLATS), unit: "splats", hint }))
 }
 
 pub(crate) fn check_ids(ids: &[u32], len: usize) -> Result<(), Error> {

@@ -15,7 +15,7 @@ pub use lit::Shadow;
 use pbsr::gpu::{Capacities, Generated, Nearest, Recorded, Sources, record, record_generated};
 use pbsr::{Ensemble, Error, Scene};
 use splat_core::Progress;
-use splat_shaders::{BufferId, Executor, Lanes, PassTime, Ready};
+use splat_shaders::{BufferId, Executor, Lanes, Overflow, PassTime, Ready};
 
 /// Most sets of one run: a look at the clock and at an interrupt comes between two.
 const MOST_LEVELS: u32 = 16;
@@ -136,9 +136,7 @@ impl<'a> Folding<'a> {
             let of_set = *self.of_set.get_or_insert_with(|| expected_of_set(scene));
             let needed = PARTICLE_BYTES * u64::from(of_set.max(1));
             if needed > max_bytes {
-                return Err(
-                    Error::TooMuch { what: "one set of particles", needed, had: max_bytes, unit: "bytes" }.into()
-                );
+                return Err(Error::limit("one set of particles", needed, max_bytes, "bytes").into());
             }
             let levels = (until - ensemble.levels()).min(MOST_LEVELS).min((most_bytes / needed).max(1) as u32);
             let room = capacities(scene, of_set, levels);
@@ -162,7 +160,7 @@ impl<'a> Folding<'a> {
             };
             match folded {
                 Ok(particles) => self.particles += particles,
-                Err(Error::TooMuch { needed, had, .. }) => {
+                Err(Error::Overflow(Overflow { needed, had, .. })) => {
                     self.of_set = Some(more_of_set(of_set, needed, had)?);
                     continue;
                 }
@@ -265,7 +263,7 @@ fn more_of_set(of_set: u32, needed: u64, had: u64) -> Result<u32, Error> {
     let factor = (needed as f64 / had.max(1) as f64).max(1.25);
     let more = (f64::from(of_set) * factor).ceil();
     if more > f64::from(u32::MAX) {
-        return Err(Error::TooMuch { what: "one set", needed, had, unit: "particles" });
+        return Err(Error::limit("one set", needed, had, "particles"));
     }
     Ok(more as u32)
 }

@@ -196,7 +196,7 @@ fn particles(
     scene.render.technique = Technique::Particles;
     scene.render.particles = ParticlesSettings { repeat_level: SETS, target_error: None, ..scene.render.particles };
     let plan = match plan_loaded(&scene, loaded, options) {
-        Err(e @ (Error::Input { .. } | Error::Limit { .. } | Error::TooLarge { .. })) => return Ok(Err(e.to_string())),
+        Err(e @ (Error::Input { .. } | Error::Limit(_) | Error::TooLarge { .. })) => return Ok(Err(e.to_string())),
         planned => planned?,
     };
     let mut images = Vec::new();

@@ -44,7 +44,7 @@ pub fn predict(scene: &Scene<'_>, ensemble: &EnsembleParams, levels: u32, params
     let in_batch = (params.batch_particles as f64).min(particles).max(of_set);
     Prediction {
         particles,
-        batch_bytes: ((in_batch * BYTES_IN_BATCH as f64) as u64).min(params.max_bytes),
+        batch_bytes: ((in_batch * BYTES_IN_BATCH as f64) as u64).min(params.limits.max_bytes),
         ensemble_bytes: ensemble.bytes(scene.camera.size.map(u64::from)),
     }
 }

@@ -107,7 +107,7 @@ impl<'a> LineSampler<'a> {
     ///
     /// # Errors
     /// [`Error::Parameter`] for numbers out of range, [`Error::Field`] where the field is not finite, [`Error::Empty`] when
-    /// no line of the survey meets the surface, [`Error::TooMuch`] for more than 4·10⁹ lines a set.
+    /// no line of the survey meets the surface, [`Error::Limit`] for more than 4·10⁹ lines a set.
     pub fn new(
         surface: &ImplicitSurface<'a>,
         lines: &LineParams,

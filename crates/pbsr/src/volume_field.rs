@@ -49,7 +49,7 @@ impl<'a> FieldVolumeSampler<'a> {
     ///
     /// # Errors
     /// [`Error::Parameter`] for numbers out of range, [`Error::Empty`] when the extinction is bounded by 0 everywhere,
-    /// [`Error::TooMuch`] for more than 4·10⁹ particles a set.
+    /// [`Error::Limit`] for more than 4·10⁹ particles a set.
     pub fn new(extinction: Density<'a>, bounds: DAabb, params: &FieldVolumeParams) -> Result<Self, Error> {
         let FieldVolumeParams { resolution, cross_section, color: tint, seed } = *params;
         extinction.validate()?;

@@ -8,7 +8,7 @@ use pbsr::{
 use splat_core::glam::{DQuat, DVec3, Vec3};
 use splat_core::raster::OpaqueImage;
 use splat_core::{
-    Light, LightShape, Material, Mesh, Progress, Projection, Receiver, Shading, Similarity, Transmittance,
+    Light, LightShape, Limits, Material, Mesh, Progress, Projection, Receiver, Shading, Similarity, Transmittance,
 };
 
 fn wall(z: f32) -> Mesh {
@@ -317,9 +317,9 @@ fn cost_is_predicted_and_work_can_be_cancelled() {
     let stopped = Renderer::new().fold(&scene, &mut ensemble, &FoldParams { levels: 50, ..fold }, Some(&progress));
     assert!(matches!(stopped, Err(Error::Core(splat_core::Error::Cancelled))));
     assert_eq!(ensemble, before);
-    let small = FoldParams { max_bytes: 1000, ..fold };
+    let small = FoldParams { limits: Limits::bytes(1000), ..fold };
     let refused = Renderer::new().fold(&scene, &mut ensemble, &FoldParams { levels: 1, ..small }, None);
-    assert!(matches!(refused, Err(Error::TooMuch { .. })));
+    assert!(matches!(refused, Err(Error::Limit(_))));
     let other = front(32);
     let refused = Renderer::new().fold(
         &Scene { camera: &other, ..scene },

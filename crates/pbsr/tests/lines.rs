@@ -252,7 +252,7 @@ fn what_cannot_be_sampled_says_why() {
     ));
     assert!(matches!(
         LineSampler::new(&boxed(&Field::UNIT, 1.1), &LineParams { resolution: 16 }, &params(0.5, 1e-30), None),
-        Err(Error::TooMuch { .. })
+        Err(Error::Limit(_))
     ));
     // Without a bound everything is searched, and the report says so.
     let sampler =

@@ -158,7 +158,7 @@ pub fn path_trace(
                     one_sample(&tracer, camera, settings, [x, y], sample, pixel);
                 }
             }
-            Ok(())
+            Ok::<(), Error>(())
         };
         pixels.par_chunks_mut(width).enumerate().try_for_each(row)?;
         done = until;

@@ -10,7 +10,7 @@ use crate::survey::{CHUNK, Survey};
 use crate::table::{Lists, Parted, Ranges};
 use crate::{Error, Params, Prediction, Scene, ShadowMap};
 use rayon::prelude::*;
-use splat_core::{Light, Progress, SplatKind};
+use splat_core::{Light, Limits, Progress, SplatKind};
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -141,7 +141,7 @@ fn deposit_all<M: Mapping, const C: usize>(
                 chunk,
             });
             let more = (scratch.media.len + scratch.surfaces.len) as u64;
-            check_memory::<C>(made.fetch_add(more, Ordering::Relaxed) + more, casters.params.max_bytes)?;
+            check_entries::<C>(made.fetch_add(more, Ordering::Relaxed) + more, &casters.params.limits)?;
             Ok((Parted::new(&scratch.media, ranges), Parted::new(&scratch.surfaces, ranges)))
         })
         .collect::<Result<_, Error>>()?;
@@ -149,10 +149,15 @@ fn deposit_all<M: Mapping, const C: usize>(
     Ok([media, surfaces])
 }
 
-pub(crate) fn check_memory<const C: usize>(entries: u64, limit_bytes: u64) -> Result<(), Error> {
-    let needed_bytes = entries * (2 * size_of::<[f32; C]>() as u64 + 12);
-    if entries > u64::from(u32::MAX) || needed_bytes > limit_bytes {
-        return Err(Error::Memory { what: "the lists", needed_bytes, limit_bytes });
+/// Holds the lists to what they may take.
+pub(crate) fn check_entries<const C: usize>(entries: u64, limits: &Limits) -> Result<(), Error> {
+    let most = limits.max_elements.min(u32::MAX.into());
+    if entries > most {
+        return Err(Error::limit("the lists", entries, most, "entries"));
+    }
+    let needed = entries * (2 * size_of::<[f32; C]>() as u64 + 12);
+    if needed > limits.max_bytes {
+        return Err(Error::limit("the lists", needed, limits.max_bytes, "bytes"));
     }
     Ok(())
 }

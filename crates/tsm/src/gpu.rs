@@ -34,7 +34,7 @@ use crate::table::stop_of;
 use crate::{Deposits, Error};
 use splat_shaders::layouts::{ListView, Scan, SortState};
 use splat_shaders::radix::{Scanned, SortPass, sort_pass};
-use splat_shaders::{BufferId, Groups, Recording, kernels};
+use splat_shaders::{BufferId, Groups, Overflow, Recording, kernels};
 
 pub use batches::{Batch, Listed};
 pub use casting::Casting;
@@ -171,7 +171,7 @@ impl Recorded {
         ];
         for (what, needed, had) in room {
             if needed > u64::from(had) || (what == "channels" && needed != u64::from(had)) {
-                return Err(Error::Overflow { what, needed, had: had.into() });
+                return Err(Error::Overflow(Overflow { what, needed, had: had.into() }));
             }
         }
         let entries = batch.entries() as u32;

@@ -50,8 +50,8 @@ impl ShadowMap {
     /// Builds the map of one light. Splats are reported to `progress`, and work stops where that is cancelled.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for parameters out of range or a mapping that does not fit the light, [`Error::Memory`]
-    /// for a table beyond [`Params::max_bytes`], [`Error::Core`] for a light or splat that breaks a promise, and
+    /// [`Error::Parameter`] for parameters out of range or a mapping that does not fit the light, [`Error::Limit`]
+    /// for a map beyond [`Params::limits`], [`Error::Core`] for a light or splat that breaks a promise, and
     /// [`splat_core::Error::Cancelled`] in it.
     pub fn build(
         scene: &Scene<'_>,

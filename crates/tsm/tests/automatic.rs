@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Cloud, Light, LightShape};
+use splat_core::{Cloud, Light, LightShape, Limits};
 use tsm::{Deposits, Limit, Params, Resolution, Scene};
 
 fn scaled(cloud: &Cloud, light: &Light, s: f64) -> (Cloud, Light) {
@@ -104,7 +104,7 @@ fn predictions_say_what_is_chosen_and_by_what() {
         assert!((0.6..1.4).contains(&ratio), "{:?}: {ratio}", light.shape);
         // Less memory, coarser cells that fit.
         let max_bytes = free.bytes / 3;
-        let less = of(&Params { max_bytes, ..Params::default() });
+        let less = of(&Params { limits: Limits::bytes(max_bytes), ..Params::default() });
         assert!(less.limit == Limit::Memory && less.bytes <= max_bytes && less.size[0] < free.size[0], "{less:?}");
         assert_eq!(of(&Params { resolution: Resolution::Cells(32), ..Params::default() }).limit, Limit::Asked);
     }

@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Cloud, Light, LightShape, SplatKind, Transmittance};
+use splat_core::{Cloud, Exceeded, Light, LightShape, Limits, SplatKind, Transmittance};
 use tsm::{Deposits, Error, MappingChoice, Params, Resolution, Scene, ShadowMap};
 
 fn lights() -> [Light; 4] {
@@ -130,8 +130,8 @@ fn ts14_one_cell_works_and_a_huge_table_is_refused_with_its_bytes() {
         let map = build(&cloud, &light, &params(1));
         assert!((0..cloud.len()).all(|i| (0.0..=1.0).contains(&map.transmittance(&receiver(&cloud, i))[0])));
         let refused = ShadowMap::build(&Scene::from(&cloud), &light, &params(65_536 * 4), None).unwrap_err();
-        let Error::Memory { needed_bytes, limit_bytes, .. } = refused else { panic!("{refused}") };
-        assert!(needed_bytes > limit_bytes && refused.to_string().contains(&needed_bytes.to_string()));
+        let Error::Limit(Exceeded { needed, limit, unit: "bytes", .. }) = &refused else { panic!("{refused}") };
+        assert!(Some(*needed) > *limit && refused.to_string().contains(&needed.to_string()));
     }
 }
 
@@ -148,9 +148,9 @@ fn what_maps_cost_together_is_known_before_any_is_built_and_held_while_they_are(
         // What deposits more than was predicted is held to the limit while it is made.
         let entries = map.counts().entries;
         let resolution = Resolution::Cells(predicted.size[0].max(predicted.size[1]) as u32);
-        let short = Params { resolution, max_bytes: 10 * entries, ..params.clone() };
+        let short = Params { resolution, limits: Limits::bytes(10 * entries), ..params.clone() };
         let held = ShadowMap::build(&Scene::from(&cloud), light, &short, None);
-        assert!(matches!(held, Err(Error::Memory { .. })));
+        assert!(matches!(held, Err(Error::Limit(_))));
     }
 }
 

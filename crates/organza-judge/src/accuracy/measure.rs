@@ -185,7 +185,7 @@ impl<'a> Renderer<'a> {
         let options = self.options;
         let (loaded, _) = self.load(scene)?;
         match plan_loaded(scene, loaded, options) {
-            Err(e @ (Error::Input { .. } | Error::Limit { .. } | Error::TooLarge { .. })) => Ok(Some(e.to_string())),
+            Err(e @ (Error::Input { .. } | Error::Limit(_) | Error::TooLarge { .. })) => Ok(Some(e.to_string())),
             other => other.map(|_| None),
         }
     }

@@ -280,7 +280,7 @@ fn surface(scene: &Scene, object: &SceneObject, mut mesh: Mesh) -> Body {
 }
 
 fn read(path: &Path, options: &RenderOptions) -> Result<FileData, Error> {
-    convert::read::file(path, &options.read_limits(), None).map(|read| read.0).map_err(|e| Error::from_read(path, &e))
+    convert::read::file(path, &options.read_params(), None).map(|read| read.0).map_err(|e| Error::from_read(path, &e))
 }
 
 fn rectangle(center: DVec3, u: DVec3, v: DVec3) -> Mesh {

@@ -13,7 +13,7 @@ use convert::{
 };
 use glam::DVec3;
 use pbsr::BoundedExtinction;
-use splat_core::{Cloud, Grid, Mesh, Object, Shading, Similarity, TransferFunction, TransferPoint};
+use splat_core::{Cloud, Exceeded, Grid, Mesh, Object, Shading, Similarity, TransferFunction, TransferPoint};
 use std::path::Path;
 
 /// Most operations of an expression on its way to splats: some minutes of two cores.
@@ -67,9 +67,9 @@ pub(super) fn prepare<'a>(
     };
     match predict(&input) {
         Ok(prediction) => Ok(Prepared { input, prediction, as_it_is, too_many: None, bounded, search }),
-        Err(ConvertError::TooMany { object, what, needed, limit }) => {
-            let prediction = Prediction { splats: needed as u64, ..Prediction::default() };
-            let too_many = Some(ConvertError::TooMany { object, what, needed, limit });
+        Err(ConvertError::Limit(exceeded)) => {
+            let prediction = Prediction { splats: exceeded.needed, ..Prediction::default() };
+            let too_many = Some(ConvertError::Limit(exceeded));
             Ok(Prepared { input, prediction, as_it_is, too_many, bounded, search })
         }
         Err(e) => Err(Error::from_convert(&e)),
@@ -93,13 +93,13 @@ fn check_work(object: &SceneObject, input: &Input<'_>) -> Result<(), Error> {
     if needed <= MOST_OPERATIONS {
         return Ok(());
     }
-    Err(Error::Limit {
-        what: format!("the expression of object '{}'", crate::escape_controls(&object.name)),
+    Err(Error::Limit(Exceeded {
+        what: format!("the expression of object '{}'", crate::escape_controls(&object.name)).into(),
         needed: needed as u64,
-        limit: MOST_OPERATIONS as u64,
+        limit: Some(MOST_OPERATIONS as u64),
         unit: "operations before anything is drawn",
         hint: "use a larger spacing or a smaller resolution, a smaller box, or an expression with a bound".into(),
-    })
+    }))
 }
 
 fn predict(input: &Input<'_>) -> Result<Prediction, ConvertError> {

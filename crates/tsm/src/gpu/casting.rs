@@ -7,7 +7,7 @@
 
 use crate::caster::Casters;
 use crate::deposit::{Deposit, Scratch};
-use crate::deposits::{check_memory, select};
+use crate::deposits::{check_entries, select};
 use crate::entries::Entries;
 use crate::gpu::MOST_ENTRIES;
 use crate::mapping::{Mapping, Table, with_mapping};
@@ -124,7 +124,7 @@ impl Casting {
             plain.extend(of_chunk);
             given.append(entries);
         }
-        check_memory::<C>(given.cells.len() as u64, casters.params.max_bytes)?;
+        check_entries::<C>(given.cells.len() as u64, &casters.params.limits)?;
         let has_planes = C > 1 || survey.kinds[SplatKind::Surface as usize] > 0;
         let (tables, footprints) = (tables(casters), casters.kernels.len() as u32);
         let limit = casters.params.absorbance_limit();

@@ -11,6 +11,7 @@ use splat_core::{
     Camera, Cloud, Grid, Light, LightShape, Material, Mesh, Projection, Shading, Similarity, Splat, SplatKind,
     TransferFunction, TransferPoint, Transmittance, rng,
 };
+use splat_shaders::Overflow;
 use tsm::gpu::{Room, record_received};
 use tsm::{Params, Resolution, ShadowMap};
 
@@ -425,7 +426,7 @@ fn too_little_room_and_other_lights_are_refused() {
         let run = device.run(&generated.recording, &inputs).unwrap();
         // Nothing is folded of what is incomplete.
         assert!(run.bytes(generated.sums).iter().all(|byte| *byte == 0));
-        assert!(matches!(generated.add(&run, &mut ensemble), Err(Error::TooMuch { had: 10, .. })));
+        assert!(matches!(generated.add(&run, &mut ensemble), Err(Error::Overflow(Overflow { had: 10, .. }))));
         assert_eq!((ensemble.levels(), device.take_messages()), (0, Vec::new()));
         let refused = |lighting: Lighting<'_>| {
             let recorded = record(ROOM, Nearest::Ranked, Some(&lighting))?;

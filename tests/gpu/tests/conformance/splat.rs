@@ -8,6 +8,7 @@ use splat_core::raster::{Detail, OpaqueImage, Params, ProjectInput, Projected, f
 use splat_core::{
     Accumulator, Camera, Cloud, Direction, Error, FootprintStack, Material, Projection, Splat, SplatKind, rng,
 };
+use splat_shaders::Overflow;
 
 /// Most that a channel may differ by, as a share of the largest value that a splat has, and transmittance.
 ///
@@ -350,7 +351,7 @@ fn too_little_room_is_found_and_recording_again_cures_it() {
     let (order, begin) = (scene.order(), scene.accumulator());
     let expected = scene.both(&mut device, &order, &begin, 1 << 18).unwrap();
     for room in [0, 1, 4000] {
-        let Err(Error::Overflow { needed, had, .. }) = scene.both(&mut device, &order, &begin, room) else {
+        let Err(Error::Overflow(Overflow { needed, had, .. })) = scene.both(&mut device, &order, &begin, room) else {
             panic!("room for {room} entries is enough")
         };
         assert_eq!((needed, had), (expected.counts.entries, u64::from(room)));
