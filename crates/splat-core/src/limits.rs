@@ -54,6 +54,9 @@ pub struct Exceeded {
     pub hint: Cow<'static, str>,
 }
 
+/// From here on numbers are shown with four digits.
+const ROUNDED: u64 = 1_000_000_000_000_000;
+
 impl Exceeded {
     /// The same said of something larger, `whose: what`, with the knob that is known there.
     pub fn of(self, whose: &str, hint: impl Into<Cow<'static, str>>) -> Self {
@@ -64,8 +67,9 @@ impl Exceeded {
 impl std::fmt::Display for Exceeded {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { what, needed, limit, unit, .. } = self;
-        match needed {
-            &u64::MAX => write!(f, "{what} needs more {unit} than can be counted")?,
+        match *needed {
+            u64::MAX => write!(f, "{what} needs more {unit} than can be counted")?,
+            ROUNDED.. => write!(f, "{what} needs {:.3e} {unit}", *needed as f64)?,
             needed => write!(f, "{what} needs {needed} {unit}")?,
         }
         match limit {
@@ -89,6 +93,8 @@ mod tests {
             many.to_string(),
             "a cloud needs more splats than can be counted, the system has no memory for them"
         );
+        let rounded = Exceeded { needed: 10_u64.pow(18), ..few.clone() };
+        assert_eq!(rounded.to_string(), "a cloud needs 1.000e18 splats, the limit is 2");
         let of = few.of("object 'fog'", "");
         assert_eq!(of.to_string(), "object 'fog': a cloud needs 3 splats, the limit is 2");
     }
