@@ -37,10 +37,10 @@ impl Counts {
     }
 }
 
-/// Predicts the cost of `levels` sets of `scene`.
-pub fn predict(scene: &Scene<'_>, ensemble: &EnsembleParams, levels: u32, params: &FoldParams) -> Prediction {
+/// Predicts the cost of folding sets of `scene`.
+pub fn predict(scene: &Scene<'_>, ensemble: &EnsembleParams, params: &FoldParams) -> Prediction {
     let of_set: f64 = scene.objects.iter().map(|o| o.sampler.expected_particles()).sum();
-    let particles = of_set * f64::from(levels);
+    let particles = of_set * f64::from(params.levels);
     let in_batch = (params.batch_particles as f64).min(particles).max(of_set);
     Prediction {
         particles,

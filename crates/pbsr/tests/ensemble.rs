@@ -304,9 +304,9 @@ fn cost_is_predicted_and_work_can_be_cancelled() {
     let objects = objects(&[&sampler]);
     let scene = scene(&camera, &objects);
     let mut ensemble = Ensemble::new([64, 64], &EnsembleParams::default()).unwrap();
-    let fold = FoldParams { batch_particles: 20_000, ..FoldParams::default() };
-    let expected = predict(&scene, ensemble.params(), 50, &fold);
-    let counts = Renderer::new().fold(&scene, &mut ensemble, &FoldParams { levels: 50, ..fold }, None).unwrap();
+    let fold = FoldParams { levels: 50, batch_particles: 20_000, ..FoldParams::default() };
+    let expected = predict(&scene, ensemble.params(), &fold);
+    let counts = Renderer::new().fold(&scene, &mut ensemble, &fold, None).unwrap();
     assert!((counts.particles as f64 - expected.particles).abs() < 4.5 * expected.particles.sqrt(), "{counts:?}");
     assert!(counts.bytes <= expected.batch_bytes, "{counts:?} {expected:?}");
     assert_eq!(ensemble.bytes(), expected.ensemble_bytes);
@@ -314,7 +314,7 @@ fn cost_is_predicted_and_work_can_be_cancelled() {
     let progress = Progress::new();
     progress.cancel();
     let before = ensemble.clone();
-    let stopped = Renderer::new().fold(&scene, &mut ensemble, &FoldParams { levels: 50, ..fold }, Some(&progress));
+    let stopped = Renderer::new().fold(&scene, &mut ensemble, &fold, Some(&progress));
     assert!(matches!(stopped, Err(Error::Core(splat_core::Error::Cancelled))));
     assert_eq!(ensemble, before);
     let small = FoldParams { limits: Limits::bytes(1000), ..fold };
