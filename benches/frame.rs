@@ -3,7 +3,7 @@
 use crate::{outdoor, outdoor_cloud};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::FoldInput;
-use splat_core::raster::{Detail, OpaqueImage, Params, Projected, RasterCounts, fold, project_into};
+use splat_core::raster::{Detail, OpaqueImage, Params, ProjectInput, Projected, RasterCounts, fold, project_into};
 use splat_core::{Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Projection, Splat, SplatKind, rng};
 
 /// Everything that a frame of translucent splats needs, shaded values included.
@@ -84,7 +84,17 @@ impl Frame {
     pub fn project(&mut self) {
         let detail = Detail { depth: false, object: false };
         let (footprints, materials) = (&self.footprints, &self.materials);
-        project_into(&mut self.projected, &self.cloud, &self.camera, footprints, materials, &Params::default(), detail);
+        project_into(
+            &mut self.projected,
+            &ProjectInput {
+                cloud: &self.cloud,
+                camera: &self.camera,
+                footprints,
+                materials,
+                params: &Params::default(),
+                detail,
+            },
+        );
     }
 
     /// What a device composites: the footprints and the order as they are, into an empty image.

@@ -1,6 +1,6 @@
 //! Benchmark of convert: files to nouns are not timed, nouns to splats are; splats (or points, voxels) per second.
 
-use convert::read::{self, Loaded, ReadLimits};
+use convert::read::{self, Loaded, ReadParams};
 use convert::{
     CloudShape, Density, ExpressionField, MeshParams, RawPoints, SplatParams, SurfelParams, VolumeParams,
     mesh_to_points, mesh_to_points_into, procedural_cloud, raw_to_surfels, sobel_gradient_into, surface_to_points,
@@ -13,7 +13,7 @@ use std::path::Path;
 
 fn asset(name: &str) -> Loaded {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets").join(name);
-    read::file(&path, &ReadLimits::default()).expect("an asset of the repository")
+    read::file(&path, &ReadParams::default(), None).expect("an asset of the repository").0
 }
 
 fn bunny() -> Mesh {
@@ -43,13 +43,13 @@ fn meshes(c: &mut Criterion) {
     for wanted in [440_000, 620_000, 1_840_000, 10_000_000] {
         let params = MeshParams { density: Density::Splats(wanted), ..MeshParams::default() };
         let mut cloud = Cloud::default();
-        let Ok(report) = mesh_to_points_into(&mesh, &params, &mut cloud) else { continue };
+        let Ok(report) = mesh_to_points_into(&mesh, &params, &mut cloud, None) else { continue };
         group.throughput(Throughput::Elements(report.splats));
         group.bench_function(BenchmarkId::new("reused memory", report.splats), |b| {
-            b.iter(|| mesh_to_points_into(&mesh, &params, &mut cloud));
+            b.iter(|| mesh_to_points_into(&mesh, &params, &mut cloud, None));
         });
         group.bench_function(BenchmarkId::new("fresh memory", report.splats), |b| {
-            b.iter(|| mesh_to_points(&mesh, &params));
+            b.iter(|| mesh_to_points(&mesh, &params, None));
         });
     }
     group.finish();
@@ -76,11 +76,11 @@ fn volumes(c: &mut Criterion) {
     let mut group = c.benchmark_group("volume_to_points");
     for normals in [false, true] {
         let params = VolumeParams { normals, ..VolumeParams::default() };
-        let Ok((_, report)) = volume_to_points(&head, &tf, &params) else { continue };
+        let Ok((_, report)) = volume_to_points(&head, &tf, &params, None) else { continue };
         group.throughput(Throughput::Elements(report.splats));
         let name = if normals { "head with normals" } else { "head" };
         group.bench_function(BenchmarkId::new(name, report.splats), |b| {
-            b.iter(|| volume_to_points(&head, &tf, &params));
+            b.iter(|| volume_to_points(&head, &tf, &params, None));
         });
     }
     group.finish();
@@ -91,7 +91,7 @@ fn points(c: &mut Criterion) {
     let mut group = c.benchmark_group("raw_to_surfels");
     group.throughput(Throughput::Elements(terrain.len() as u64));
     group.bench_function(BenchmarkId::new("terrain", terrain.len()), |b| {
-        b.iter(|| raw_to_surfels(&terrain, &SurfelParams::default()));
+        b.iter(|| raw_to_surfels(&terrain, &SurfelParams::default(), None));
     });
     group.finish();
 }
@@ -102,17 +102,17 @@ fn fields(c: &mut Criterion) {
     let Ok(gyroid) = ExpressionField::parse(text) else { return };
     let bounds = DAabb::new(DVec3::ZERO, DVec3::splat(6.0));
     let params = MeshParams { density: Density::Spacing(0.03), ..MeshParams::default() };
-    if let Ok((_, report)) = surface_to_points(&gyroid, bounds, &params) {
+    if let Ok((_, report)) = surface_to_points(&gyroid, bounds, &params, None) {
         group.throughput(Throughput::Elements(report.splats));
         group.bench_function(BenchmarkId::new("gyroid surface", report.splats), |b| {
-            b.iter(|| surface_to_points(&gyroid, bounds, &params));
+            b.iter(|| surface_to_points(&gyroid, bounds, &params, None));
         });
     }
     let (shape, splat) = (CloudShape::default(), SplatParams::default());
-    if let Ok(grid) = procedural_cloud(&shape, 0.05, &splat) {
+    if let Ok(grid) = procedural_cloud(&shape, 0.05, &splat, None) {
         group.throughput(Throughput::Elements(grid.values.len() as u64));
         group.bench_function(BenchmarkId::new("procedural cloud", grid.values.len()), |b| {
-            b.iter(|| procedural_cloud(&shape, 0.05, &splat));
+            b.iter(|| procedural_cloud(&shape, 0.05, &splat, None));
         });
     }
     group.finish();
@@ -127,13 +127,13 @@ fn growth(c: &mut Criterion) {
         group.throughput(Throughput::Elements(n));
         let params = MeshParams { density: Density::Splats(n), ..MeshParams::default() };
         let mut cloud = Cloud::default();
-        let Ok(_) = mesh_to_points_into(&mesh, &params, &mut cloud) else { continue };
+        let Ok(_) = mesh_to_points_into(&mesh, &params, &mut cloud, None) else { continue };
         group.bench_function(BenchmarkId::new("mesh", millions), |b| {
-            b.iter(|| mesh_to_points_into(&mesh, &params, &mut cloud));
+            b.iter(|| mesh_to_points_into(&mesh, &params, &mut cloud, None));
         });
         let hills = hills(n);
         group.bench_function(BenchmarkId::new("raw points", millions), |b| {
-            b.iter(|| raw_to_surfels(&hills, &SurfelParams::default()));
+            b.iter(|| raw_to_surfels(&hills, &SurfelParams::default(), None));
         });
     }
     group.finish();

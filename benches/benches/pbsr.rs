@@ -5,14 +5,14 @@ use convert::{ExpressionField, GridField, Inside, Interpolation, MpuParams, RawP
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use pbsr::{
     Appearance, BrownianParams, BrownianSampler, Ensemble, EnsembleParams, FoldParams, GridSampler, ImplicitSurface,
-    KeptSets, LineSampler, MeshSampler, MetropolisParams, MetropolisSampler, Object, Particles, Renderer, Sampler,
-    Scene, SplatParams, SplatSampler, SurfaceParams, VolumeParams, pixel_area,
+    KeptSets, LineParams, LineSampler, MeshSampler, MetropolisParams, MetropolisSampler, Object, Particles, Renderer,
+    Sampler, Scene, SplatParams, SplatSampler, SurfaceParams, VolumeParams, pixel_area,
 };
 use rayon::prelude::*;
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::{
-    Camera, Cloud, DAabb, Grid, Material, Mesh, Progress, Projection, ScalarField, Shading, Similarity, Splat,
-    SplatKind, TransferFunction, TransferPoint, rng,
+    Camera, Cloud, DAabb, Grid, Material, Mesh, Projection, ScalarField, Shading, Similarity, Splat, SplatKind,
+    TransferFunction, TransferPoint, rng,
 };
 use std::f64::consts::TAU;
 
@@ -133,6 +133,10 @@ fn sample(sampler: &dyn Sampler, sets: u64) -> usize {
     (0..sampler.chunks()).into_par_iter().map_init(Particles::default, of_chunk).sum()
 }
 
+fn lines<'a>(surface: &ImplicitSurface<'a>, resolution: u32, params: &SurfaceParams) -> Box<dyn Sampler + 'a> {
+    Box::new(LineSampler::new(surface, &LineParams { resolution }, params, None).expect("invariant: it has a surface"))
+}
+
 fn sampling(c: &mut Criterion) {
     let s = pixel_area(&camera(1024), DVec3::Z);
     let mesh = sheet();
@@ -150,10 +154,11 @@ fn sampling(c: &mut Criterion) {
     let wave = ImplicitSurface { field: &formula, level: 0.0, bounds, inside: None };
     let volumes = [Interpolation::Trilinear, Interpolation::CatmullRom].map(gyroid);
     let levels = volumes.each_ref().map(|field| ImplicitSurface { field, level: 0.0, bounds, inside: None });
-    let (blend, _) = points_to_field(&torus_points(), &MpuParams::default()).expect(why);
+    let (blend, _) = points_to_field(&torus_points(), &MpuParams::default(), None).expect(why);
     let scattered = ImplicitSurface { field: &blend, level: 0.0, bounds: blend.bounds(), inside: None };
     let clouds = [SplatKind::Medium, SplatKind::Surface].map(cloud);
     let of_splats = SplatParams { cross_section: 1e-5, ..SplatParams::default() };
+    let by_lines = surface(0.1);
     let samplers: [(&str, u64, Box<dyn Sampler>); 13] = [
         ("mesh, flat", 8, Box::new(MeshSampler::new(&flat, &surface(0.5), None).expect(why))),
         ("mesh, smooth", 8, Box::new(MeshSampler::new(&mesh, &surface(0.5), None).expect(why))),
@@ -164,11 +169,11 @@ fn sampling(c: &mut Criterion) {
             1,
             Box::new(MetropolisSampler::new(&grid, &transfer, &volume, &MetropolisParams::default()).expect(why)),
         ),
-        ("torus, lines", 2, Box::new(LineSampler::new(&torus, 32, &surface(0.1), None).expect(why))),
-        ("cosine wave, lines", 2, Box::new(LineSampler::new(&wave, 48, &surface(0.1), None).expect(why))),
-        ("trilinear volume, lines", 1, Box::new(LineSampler::new(&levels[0], 64, &surface(0.1), None).expect(why))),
-        ("Catmull-Rom volume, lines", 1, Box::new(LineSampler::new(&levels[1], 64, &surface(0.1), None).expect(why))),
-        ("scattered points, lines", 1, Box::new(LineSampler::new(&scattered, 48, &surface(0.1), None).expect(why))),
+        ("torus, lines", 2, lines(&torus, 32, &by_lines)),
+        ("cosine wave, lines", 2, lines(&wave, 48, &by_lines)),
+        ("trilinear volume, lines", 1, lines(&levels[0], 64, &by_lines)),
+        ("Catmull-Rom volume, lines", 1, lines(&levels[1], 64, &by_lines)),
+        ("scattered points, lines", 1, lines(&scattered, 48, &by_lines)),
         ("splats, media", 2, Box::new(SplatSampler::new(&clouds[0], &of_splats).expect(why))),
         ("splats, discs", 2, Box::new(SplatSampler::new(&clouds[1], &of_splats).expect(why))),
         ("torus, Brownian", 2, Box::new(BrownianSampler::new(&torus, &walk, &surface(0.1)).expect(why))),
@@ -219,7 +224,7 @@ fn projection(c: &mut Criterion) {
         group.bench_function(name, |b| {
             b.iter(|| {
                 let mut ensemble = Ensemble::new(camera.size, &EnsembleParams::default()).expect(why);
-                renderer.fold(&scene, &mut ensemble, levels, &FoldParams::default(), &Progress::new()).expect(why);
+                renderer.fold(&scene, &mut ensemble, &FoldParams { levels, ..FoldParams::default() }, None).expect(why);
                 ensemble
             });
         });

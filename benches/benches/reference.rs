@@ -6,7 +6,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use organza_benches::{TABLE_1, outdoor, outdoor_cloud};
 use reference::{Density, Input, Lattice, LightSource, Medium, Order, PathSettings, Scene, composite, path_trace};
 use splat_core::glam::{DMat3, DVec3};
-use splat_core::{Camera, Grid, Progress, Projection};
+use splat_core::{Camera, Grid, Projection};
 use std::hint::black_box;
 
 /// A soft ball in the unit cube around the origin.
@@ -39,7 +39,7 @@ fn paths(c: &mut Criterion) {
         let scene = Scene { media: vec![medium], lights: vec![light], ..Scene::default() };
         group.throughput(Throughput::Elements(256 * 256 * u64::from(settings.samples)));
         group.bench_function(BenchmarkId::new("paths", extinction), |b| {
-            b.iter(|| black_box(path_trace(&scene, &camera, &settings, &Progress::new())));
+            b.iter(|| black_box(path_trace(&scene, &camera, &settings, None)));
         });
     }
     group.finish();
@@ -64,7 +64,7 @@ fn exact(c: &mut Criterion) {
             order: Order::Fragment,
         };
         group.throughput(Throughput::Elements(n as u64));
-        group.bench_function(BenchmarkId::new("composite", n), |b| b.iter(|| black_box(composite(&input))));
+        group.bench_function(BenchmarkId::new("composite", n), |b| b.iter(|| black_box(composite(&input, None))));
     }
     group.finish();
 }

@@ -9,7 +9,7 @@ use organza_benches::{Frame, TABLE_1, device};
 use splat_core::raster::FoldInput;
 use splat_core::raster::gpu::{Recorded, record};
 use splat_core::{Accumulator, Error};
-use splat_shaders::{DeviceError, Executor, Lanes, Ready};
+use splat_shaders::{DeviceError, Executor, Lanes, Overflow, Ready};
 use std::time::Instant;
 
 /// Runs that count.
@@ -66,7 +66,7 @@ fn ready(
     let uploads = recorded.uploads(input, empty).expect("room for all splats");
     let run = first.run(&recorded.inputs(&uploads))?;
     match recorded.counts(run.bytes(recorded.state)) {
-        Err(Error::Overflow { needed, .. }) => {
+        Err(Error::Overflow(Overflow { needed, .. })) => {
             drop(first);
             made(u32::try_from(needed).expect("entries that a device can count"))
         }

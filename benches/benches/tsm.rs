@@ -4,9 +4,9 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rdst::RadixSort;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Cloud, Light, LightShape, Receiver, Transmittance, rng};
+use splat_core::{Cloud, Light, LightShape, Limits, Receiver, Transmittance, rng};
 use std::hint::black_box;
-use tsm::{Params, ShadowMap};
+use tsm::{Params, Scene, ShadowMap};
 
 /// Points of Gunjee 2007, Table 1.
 const SIZES: [usize; 3] = [437_645, 624_614, 1_841_320];
@@ -25,7 +25,7 @@ fn lights(cloud: &Cloud) -> [(&'static str, Light); 3] {
 }
 
 fn build(cloud: &Cloud, light: &Light) -> ShadowMap {
-    ShadowMap::build(cloud, &[], &[], light, &Params::default()).expect("invariant: the default table fits")
+    ShadowMap::build(&Scene::from(cloud), light, &Params::default(), None).expect("invariant: the default table fits")
 }
 
 fn on_one_ray(cloud: &Cloud) -> Cloud {
@@ -103,8 +103,9 @@ fn growth(c: &mut Criterion) {
         let mut group = c.benchmark_group(format!("tsm/growth/{millions} M"));
         group.sample_size(10).throughput(Throughput::Elements(cloud.len() as u64));
         for (name, light) in lights(&cloud).into_iter().skip(1) {
-            let params = Params { max_bytes: 8 << 30, ..Params::default() };
-            let build = || ShadowMap::build(&cloud, &[], &[], &light, &params).expect("invariant: 8 GiB are enough");
+            let params = Params { limits: Limits::bytes(8 << 30), ..Params::default() };
+            let build =
+                || ShadowMap::build(&Scene::from(&cloud), &light, &params, None).expect("invariant: 8 GiB are enough");
             let counts = build().counts();
             let per_entry = counts.bytes as f64 / counts.entries.max(1) as f64;
             println!("{name}: {counts:?}, {per_entry:.1} bytes an entry");

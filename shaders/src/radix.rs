@@ -44,16 +44,25 @@ impl Scanned {
     }
 }
 
-/// Sorts keys and their companions by the eight bits from `shift` on, as many as `state` (a [`SortState`]) says; equal
-/// digits keep their order.
-pub fn sort_pass(
-    r: &mut Recording,
-    shift: u32,
-    state: BufferId,
-    [keys, companions]: [BufferId; 2],
-    [sorted_keys, sorted_companions]: [BufferId; 2],
-    digits: Scanned,
-) {
+/// One pass of a radix sort: where keys and their companions lie, and where they go.
+#[derive(Debug, Clone, Copy)]
+pub struct SortPass {
+    /// First of the eight bits of the key that are looked at.
+    pub shift: u32,
+    /// A [`SortState`]: how many entries there are.
+    pub state: BufferId,
+    /// Keys and companions, as they are.
+    pub from: [BufferId; 2],
+    /// Keys and companions, sorted.
+    pub to: [BufferId; 2],
+    /// Room for the counts of the digits.
+    pub digits: Scanned,
+}
+
+/// Sorts keys and their companions by the eight bits from `shift` on, as many as `state` says; equal digits keep their
+/// order.
+pub fn sort_pass(r: &mut Recording, pass: SortPass) {
+    let SortPass { shift, state, from: [keys, companions], to: [sorted_keys, sorted_companions], digits } = pass;
     let at = |offset| Groups::Indirect { buffer: state, offset: offset as u64 };
     let groups = at(offset_of!(SortState, sort_groups_x));
     r.dispatch(&kernels::RADIX_HISTOGRAM, groups, &[state, keys, digits.numbers], &[shift]);

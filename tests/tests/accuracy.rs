@@ -3,12 +3,13 @@
 use organza::scene::{self, Scene};
 use organza::{Error, Progress, RenderOptions};
 use organza_judge::accuracy::{
-    Absent, Facts, Frame, Knob, Options, Renderer, Report, Request, Step, Study, Sweep, Theory, Truth, least_seconds,
-    particles, points, random_study, study, verdict,
+    Absent, Facts, Frame, Knob, Options, Renderer, Report, Request, Step, Study, Sweep, Theory, Truth, Yardsticks,
+    least_seconds, particles, points, random_study, study, verdict,
 };
 use organza_tests::organza;
 use reference::metrics::Image;
 use serde_json::Value;
+use splat_core::Exceeded;
 use std::fs;
 
 const SIZE: [usize; 2] = [24, 16];
@@ -139,14 +140,8 @@ fn a_knob_whose_ends_are_too_large_is_held_with_the_reason() {
     let mut draw = |request: &Request| {
         let (n, cut) = (f64::from(request.oversample), request.scene.render.points.transmittance_cutoff);
         if cut == 0.0 {
-            let hint = "raise it".to_owned();
-            return Err(Error::Limit {
-                what: "a picture without a cut".into(),
-                needed: 2,
-                limit: 1,
-                unit: "bytes",
-                hint,
-            });
+            let (what, hint) = ("a picture without a cut".into(), "raise it".into());
+            return Err(Error::Limit(Exceeded { what, needed: 2, limit: Some(1), unit: "bytes", hint }));
         }
         Ok(frame(slab_image(n, 0.5, cut), 1e-3 * n * (2.0 - cut)))
     };
@@ -188,8 +183,8 @@ fn what_was_not_measured_is_null() {
     let mut draw = |request: &Request| {
         let (n, cut) = (f64::from(request.oversample), request.scene.render.points.transmittance_cutoff);
         if n == 16.0 {
-            let what = "the table".into();
-            return Err(Error::Limit { what, needed: 9, limit: 1, unit: "bytes", hint: String::new() });
+            let (what, hint) = ("the table".into(), "".into());
+            return Err(Error::Limit(Exceeded { what, needed: 9, limit: Some(1), unit: "bytes", hint }));
         }
         Ok(frame(slab_image(n, 0.5, cut), 1e-3 * n))
     };
@@ -230,7 +225,14 @@ fn noisy(seed_of: fn(u64, u32) -> u64, bias: f64) -> Study {
         let pixels = exact_image().pixels().iter().enumerate().map(pixel).collect();
         Ok(frame(Image::from_radiance(SIZE, pixels).unwrap(), 1e-3 * f64::from(level)))
     };
-    random_study(&repeats(), &limit, Err("a test".into()), &OPTIONS, &Progress::new(), &mut draw).unwrap()
+    random_study(
+        &repeats(),
+        Yardsticks { limit: &limit, truth: Err("a test".into()) },
+        &OPTIONS,
+        &Progress::new(),
+        &mut draw,
+    )
+    .unwrap()
 }
 
 #[test]
@@ -265,7 +267,14 @@ fn sets_that_are_not_independent_show_up_in_the_report() {
         let image = Image::from_radiance(SIZE, (0..SIZE[0] * SIZE[1]).map(value).collect()).unwrap();
         Ok(frame(image, 1e-3))
     };
-    let study = random_study(&repeats(), &limit, Err("a test".into()), &OPTIONS, &Progress::new(), &mut draw).unwrap();
+    let study = random_study(
+        &repeats(),
+        Yardsticks { limit: &limit, truth: Err("a test".into()) },
+        &OPTIONS,
+        &Progress::new(),
+        &mut draw,
+    )
+    .unwrap();
     assert!(verdict(&study, &study.curves[0]).contains("theory says otherwise"));
 }
 

@@ -11,9 +11,7 @@ use pbsr::{
 use reference::{Input, Order, composite};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
-use splat_core::{
-    Camera, Cloud, FootprintStack, Material, Progress, Projection, Shading, Similarity, Splat, SplatKind, rng,
-};
+use splat_core::{Camera, Cloud, FootprintStack, Material, Projection, Shading, Similarity, Splat, SplatKind, rng};
 
 const SIDE: u32 = 96;
 const PIXELS: usize = (SIDE * SIDE) as usize;
@@ -131,16 +129,20 @@ impl Case {
     fn exact(&self) -> Vec<[f64; 4]> {
         let (cloud, camera, materials) = (self.cloud(), self.camera(), [self.material()]);
         let values: Vec<f32> = cloud.color.iter().flatten().copied().collect();
-        let image = composite(&Input {
-            cloud: &cloud,
-            camera: &camera,
-            footprints: &FootprintStack::default(),
-            materials: &materials,
-            values: &values,
-            channels: 3,
-            resampling_sigma_px: 0.0,
-            order: Order::Fragment,
-        });
+        let image = composite(
+            &Input {
+                cloud: &cloud,
+                camera: &camera,
+                footprints: &FootprintStack::default(),
+                materials: &materials,
+                values: &values,
+                channels: 3,
+                resampling_sigma_px: 0.0,
+                order: Order::Fragment,
+            },
+            None,
+        )
+        .unwrap();
         let pixel = |(v, t): (&Vec<f64>, &[f64; 3])| [1.0 - t[0], v[0], v[1], v[2]];
         image.values.iter().zip(&image.transmittance).map(pixel).collect()
     }
@@ -180,7 +182,7 @@ fn moments_of(scene: &Scene<'_>, add: fn(f64, f64) -> f64) -> Moments {
     let mut ensemble = Ensemble::new([SIDE; 2], &EnsembleParams::default()).unwrap();
     let mut renderer = Renderer::new();
     for level in 1..=SETS {
-        renderer.fold(scene, &mut ensemble, 1, &FoldParams::default(), &Progress::new()).unwrap();
+        renderer.fold(scene, &mut ensemble, &FoldParams { levels: 1, ..FoldParams::default() }, None).unwrap();
         let layers = ensemble.read(&|_, _| [0.0; 3], None);
         let (alpha, beauty) = (layers.scalar("alpha").unwrap(), layers.rgb("beauty").unwrap());
         for k in 0..PIXELS {

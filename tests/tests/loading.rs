@@ -2,6 +2,7 @@
 
 use organza::scene::{LoadOptions, Scene, parse};
 use organza::{Error, Progress, RenderOptions, explain, load};
+use splat_core::Exceeded;
 use std::path::Path;
 
 const SCENE: &str = "version = 1\n\
@@ -38,7 +39,7 @@ fn the_limit_of_splats_holds_for_the_scene_and_before_any_conversion() {
     load(&most(made), &RenderOptions::default(), &Progress::new()).unwrap();
     let progress = Progress::new();
     let error = load(&most(5599), &RenderOptions::default(), &progress).unwrap_err();
-    assert!(matches!(error, Error::Limit { needed: 5600, limit: 5599, .. }), "{error}");
+    assert!(matches!(error, Error::Limit(Exceeded { needed: 5600, limit: Some(5599), .. })), "{error}");
     assert!(error.to_string().contains("before conversion, most of them 'fog' with 4000"), "{error}");
     // Objects were counted, nothing was converted: only their own units are announced.
     assert_eq!(progress.read().1, 5);
@@ -46,7 +47,10 @@ fn the_limit_of_splats_holds_for_the_scene_and_before_any_conversion() {
     let error = load(&most(made - 1), &RenderOptions::default(), &Progress::new()).unwrap_err();
     assert_eq!(error.exit_code(), 5, "{error}");
     let options = RenderOptions { max_memory: 256 * 5599, ..RenderOptions::default() };
-    assert!(matches!(load(&scene(""), &options, &Progress::new()), Err(Error::Limit { limit: 5599, .. })));
+    assert!(matches!(
+        load(&scene(""), &options, &Progress::new()),
+        Err(Error::Limit(Exceeded { limit: Some(5599), .. }))
+    ));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Meshes as they are found: one bad face among many, surfaces turned inside out.
 
-use convert::read::{Loaded, ReadLimits};
+use convert::read::{Loaded, ReadParams};
 use glam::{DVec3, Vec3};
 use organza_tests::{Picture, Place, SMALL_SCENE, draw_in, largest_difference};
 use splat_core::Mesh;
@@ -57,7 +57,9 @@ fn torus() -> Mesh {
 
 fn bunny() -> Mesh {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/stanford-bunny/bunny.ply.gz");
-    let Loaded::Mesh(mesh) = convert::read::file(&file, &ReadLimits::default()).unwrap() else { panic!("no mesh") };
+    let Loaded::Mesh(mesh) = convert::read::file(&file, &ReadParams::default(), None).unwrap().0 else {
+        panic!("no mesh")
+    };
     mesh
 }
 

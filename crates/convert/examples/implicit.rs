@@ -3,7 +3,7 @@
 //! `cargo run --release -p convert --example implicit`. Times are the least of several runs on one
 //! thread.
 
-use convert::read::{self, Loaded, ReadLimits};
+use convert::read::{self, Loaded, ReadParams};
 use convert::{GridField, Inside, Interpolation, MpuParams, RawPoints, isosurface_to_mesh, points_to_field};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::{DAabb, Grid, Mesh, ScalarField, rng};
@@ -58,7 +58,7 @@ fn rates(name: &str, field: &dyn ScalarField, places: &[DVec3], radii: &[f64]) {
 
 fn bunny() -> Result<Mesh, Box<dyn std::error::Error>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/stanford-bunny/bunny.ply.gz");
-    match read::file(&path, &ReadLimits::default())? {
+    match read::file(&path, &ReadParams::default(), None)?.0 {
         Loaded::Mesh(mesh) => Ok(mesh),
         _ => Err("the bunny is a mesh".into()),
     }
@@ -93,7 +93,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for tolerance in [1e-3, 3e-4, 1e-4] {
         let params = MpuParams { tolerance, ..MpuParams::default() };
         let start = Instant::now();
-        let (field, report) = points_to_field(&points, &params)?;
+        let (field, report) = points_to_field(&points, &params, None)?;
         println!("bunny within {tolerance}: {:.0} ms, {report:?}", 1e3 * start.elapsed().as_secs_f64());
         let mut distance: Vec<f64> = Vec::new();
         for i in 0..points.len() {

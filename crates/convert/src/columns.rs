@@ -41,12 +41,8 @@ pub(crate) fn size_columns(
     wanted: Wanted,
     params: &SplatParams,
 ) -> Result<(), ConvertError> {
-    let full = |_| ConvertError::TooMany {
-        object: params.object_name.clone(),
-        what: "splats in free memory",
-        needed: n as f64,
-        limit: params.max_splats,
-    };
+    params.check_cloud(n as f64, wanted)?;
+    let full = |_| params.exceeded(n as f64 * wanted.bytes_per_splat() as f64, None, "bytes");
     sized(&mut cloud.position, n).map_err(full)?;
     sized(&mut cloud.radius, n).map_err(full)?;
     sized(&mut cloud.cross_section, n).map_err(full)?;

@@ -1,6 +1,6 @@
 //! Why a conversion was refused; every message names the object and says what would be accepted.
 
-use splat_core::{Progress, glam::DVec3};
+use splat_core::{Exceeded, Progress, glam::DVec3};
 
 /// What can go wrong between a mesh, a volume, raw points or a field and a cloud.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -18,18 +18,9 @@ pub enum ConvertError {
         /// The accepted range, in words.
         expected: &'static str,
     },
-    /// The conversion would make more elements than the budget allows.
-    #[error("object '{object}': {needed:.3e} {what} needed, the limit is {limit}; choose a larger spacing")]
-    TooMany {
-        /// Name of the object.
-        object: String,
-        /// What is counted: `splats` or `lattice points`.
-        what: &'static str,
-        /// Elements needed, rounded; may be infinite.
-        needed: f64,
-        /// Elements allowed.
-        limit: u64,
-    },
+    /// The conversion would make more than its limits allow, or than the system has memory for.
+    #[error("{0}; {hint}", hint = .0.hint)]
+    Limit(Exceeded),
     /// The input breaks a promise of its noun.
     #[error("object '{object}': {source}")]
     Input {

@@ -17,7 +17,7 @@ use crate::field_points::{area, coarse_mesh, density_lattice, surface_lattice, s
 use crate::keep::Keep;
 #[cfg(feature = "noise")]
 use crate::procedural::CloudShape;
-use crate::shapes::{Lattice, rectangle_counts};
+use crate::shapes::{Lattice, Rectangle, rectangle_columns, rectangle_counts};
 use crate::volume_points::lattice_factors;
 use crate::{ConvertError, DensityParams, MeshParams, SplatParams, VolumeParams, mesh_points, resample, surface_nets};
 #[cfg(feature = "surfels")]
@@ -64,7 +64,7 @@ impl Prediction {
 /// let mesh = Mesh { position: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]], ..Mesh::default() };
 /// let params = MeshParams { density: Density::Spacing(0.1), ..MeshParams::default() };
 /// let predicted = cost::mesh(&mesh, &params).unwrap();
-/// assert_eq!(predicted.bytes, mesh_to_points(&mesh, &params).unwrap().0.bytes());
+/// assert_eq!(predicted.bytes, mesh_to_points(&mesh, &params, None).unwrap().0.bytes());
 /// ```
 ///
 /// # Errors
@@ -211,18 +211,14 @@ pub fn medium_ball(
 ///
 /// # Errors
 /// As the conversion.
-pub fn rectangle(
-    u: DVec3,
-    v: DVec3,
-    opacity: f64,
-    spacing: f64,
-    params: &SplatParams,
-) -> Result<Prediction, ConvertError> {
+pub fn rectangle(rectangle: &Rectangle, params: &SplatParams) -> Result<Prediction, ConvertError> {
+    let Rectangle { u, v, opacity, spacing, .. } = *rectangle;
     params.check()?;
     params.check_spacing(spacing * params.transform.scale)?;
     let splats = rectangle_counts(u, v, spacing).iter().product();
-    params.check_count(splats)?;
-    Ok(Prediction::exact(splats, Wanted { tangent: opacity >= 1.0, ..mesh_points::WANTED }))
+    let wanted = rectangle_columns(opacity);
+    params.check_cloud(splats, wanted)?;
+    Ok(Prediction::exact(splats, wanted))
 }
 
 /// Lattice points from `low` on, times the share of a coarser lattice in the same box that is `positive`.

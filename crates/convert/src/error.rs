@@ -10,7 +10,7 @@ pub enum Fault {
     FileSystem,
     /// The content of the file.
     Input,
-    /// The file asks for more memory than [`crate::read::ReadLimits`] allows.
+    /// The file asks for more memory than [`crate::read::ReadParams`] allows.
     Limit,
     /// Nobody's: the reader was asked to stop.
     Cancelled,

@@ -5,10 +5,10 @@
 //! mesh's; a density is sampled at the middles of lattice cells and goes the way of every volume.
 
 use crate::convert_error::check_cancelled;
-use crate::mesh_points::{corners, mesh_to_points_with_progress};
+use crate::mesh_points::{corners, mesh_to_points_into};
 use crate::params::{Density, SplatParams};
 use crate::surface_nets::{Lattice, surface_nets};
-use crate::volume_points::{check_lattice, volume_to_points_with_progress};
+use crate::volume_points::{check_lattice, volume_to_points};
 use crate::{ConvertError, MeshParams, MeshReport, VolumeParams, VolumeReport, subdivide};
 use rayon::prelude::*;
 use splat_core::{
@@ -25,27 +25,30 @@ const COARSE_CELLS: f64 = 48.0;
 /// Meshes the zero set of a field inside a box, cells of about `cell` (object units).
 ///
 /// Normals point to where the field is positive. Parts thinner than a cell are lost, and the surface ends within one
-/// cell of the box, and at the border of the field's own domain ([`ScalarField::in_domain`]).
+/// cell of the box, and at the border of the field's own domain ([`ScalarField::in_domain`]). Blocks of cells are reported to
+/// `progress`, and work stops where that is cancelled.
 ///
 /// ```
 /// use convert::{ExpressionField, SplatParams, field_to_mesh};
 /// use splat_core::{DAabb, glam::DVec3};
 /// let ball = ExpressionField::parse("sqrt(x^2 + y^2 + z^2) - 1").unwrap();
 /// let bounds = DAabb::around(DVec3::ZERO, DVec3::splat(1.2));
-/// let mesh = field_to_mesh(&ball, bounds, 0.1, &SplatParams::default()).unwrap();
+/// let mesh = field_to_mesh(&ball, bounds, 0.1, &SplatParams::default(), None).unwrap();
 /// assert!(mesh.position.iter().all(|p| (p.length() - 1.0).abs() < 1e-6));
 /// ```
 ///
 /// # Errors
-/// [`ConvertError::NonFinite`] with the point, [`ConvertError::Parameter`] for an empty box or an absurd cell.
+/// [`ConvertError::NonFinite`] with the point, [`ConvertError::Parameter`] for an empty box or an absurd cell,
+/// [`ConvertError::Cancelled`].
 pub fn field_to_mesh<F: ScalarField + ?Sized>(
     field: &F,
     bounds: DAabb,
     cell: f64,
     splat: &SplatParams,
+    progress: Option<&Progress>,
 ) -> Result<Mesh, ConvertError> {
     let lattice = lattice(bounds, cell, splat)?;
-    surface_nets(field, &lattice, &splat.object_name, &Progress::new())
+    surface_nets(field, &lattice, &splat.object_name, progress.unwrap_or(&Progress::new()))
 }
 
 /// The zero set of a field inside a box as triangles that are as fine as splats `spacing` apart (object units): cells of
@@ -59,7 +62,7 @@ pub fn field_to_mesh<F: ScalarField + ?Sized>(
 /// let above = Clip::HalfSpace { normal: -DVec3::Y, offset: 0.0 };
 /// let dome = ClippedField::new(std::sync::Arc::new(ball), vec![above]).unwrap();
 /// let bounds = DAabb::around(DVec3::ZERO, DVec3::splat(1.2));
-/// let mesh = surface_to_mesh(&dome, bounds, 0.1, &SplatParams::default()).unwrap();
+/// let mesh = surface_to_mesh(&dome, bounds, 0.1, &SplatParams::default(), None).unwrap();
 /// let lowest = mesh.triangles.iter().flatten().map(|v| mesh.position[*v as usize].y).fold(1.0, f32::min);
 /// assert!((lowest + mesh.origin.y as f32).abs() < 0.2);
 /// ```
@@ -71,8 +74,9 @@ pub fn surface_to_mesh<F: ScalarField + ?Sized>(
     bounds: DAabb,
     spacing: f64,
     splat: &SplatParams,
+    progress: Option<&Progress>,
 ) -> Result<Mesh, ConvertError> {
-    let mut mesh = field_to_mesh(field, bounds, CELL_OVER_SPACING * spacing, splat)?;
+    let mut mesh = field_to_mesh(field, bounds, CELL_OVER_SPACING * spacing, splat, progress)?;
     let corner = |v: u32| mesh.position[v as usize].as_dvec3();
     let middle = |t: &[u32; 3]| mesh.origin + (corner(t[0]) + corner(t[1]) + corner(t[2])) / 3.0;
     mesh.triangles = mesh.triangles.iter().copied().filter(|t| field.in_domain(middle(t))).collect();
@@ -82,26 +86,18 @@ pub fn surface_to_mesh<F: ScalarField + ?Sized>(
 /// Splats of the zero set of a field inside a box (object space); `params` as for a mesh, where [`Density::Auto`] is
 /// 1/256 of the longest side of the box.
 ///
+/// Blocks of the lattice and splats are reported to `progress`, and work stops where that is cancelled.
+///
 /// # Errors
 /// As [`field_to_mesh`] and [`crate::mesh_to_points`].
 pub fn surface_to_points<F: ScalarField + ?Sized>(
     field: &F,
     bounds: DAabb,
     params: &MeshParams,
+    progress: Option<&Progress>,
 ) -> Result<(Cloud, MeshReport), ConvertError> {
-    surface_to_points_with_progress(field, bounds, params, &Progress::new())
-}
-
-/// [`surface_to_points`] that reports blocks of the lattice and splats to `progress` and stops when that is cancelled.
-///
-/// # Errors
-/// As [`surface_to_points`], and [`ConvertError::Cancelled`].
-pub fn surface_to_points_with_progress<F: ScalarField + ?Sized>(
-    field: &F,
-    bounds: DAabb,
-    params: &MeshParams,
-    progress: &Progress,
-) -> Result<(Cloud, MeshReport), ConvertError> {
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
     let p = &params.splat;
     p.check()?;
     let spacing = surface_spacing(field, bounds, params)?;
@@ -110,7 +106,7 @@ pub fn surface_to_points_with_progress<F: ScalarField + ?Sized>(
     let density = Density::Spacing(spacing * p.transform.scale);
     let mesh_params = MeshParams { density, ..params.clone() };
     let mut cloud = Cloud::default();
-    let report = mesh_to_points_with_progress(&mesh, &mesh_params, &mut cloud, progress)?;
+    let report = mesh_to_points_into(&mesh, &mesh_params, &mut cloud, Some(progress))?;
     Ok((cloud, report))
 }
 
@@ -147,7 +143,7 @@ pub(crate) fn coarse_mesh<F: ScalarField + ?Sized>(
     bounds: DAabb,
     splat: &SplatParams,
 ) -> Result<Mesh, ConvertError> {
-    field_to_mesh(field, bounds, bounds.size().max_element() / COARSE_CELLS, splat)
+    field_to_mesh(field, bounds, bounds.size().max_element() / COARSE_CELLS, splat, None)
 }
 
 pub(crate) fn area(mesh: &Mesh) -> f64 {
@@ -179,9 +175,11 @@ impl Default for DensityParams {
 /// use splat_core::{DAabb, glam::DVec3};
 /// let fog = ExpressionField::parse("2").unwrap();
 /// let params = DensityParams { density: Density::Spacing(0.25), ..DensityParams::default() };
-/// let (cloud, _) = density_to_points(&fog, DAabb::new(DVec3::ZERO, DVec3::ONE), &params).unwrap();
+/// let (cloud, _) = density_to_points(&fog, DAabb::new(DVec3::ZERO, DVec3::ONE), &params, None).unwrap();
 /// assert_eq!(cloud.cross_section.iter().sum::<f32>(), 2.0);
 /// ```
+///
+/// Lattice points are reported to `progress`, each thrice (sampled, chosen, written), and work stops where that is cancelled.
 ///
 /// # Errors
 /// [`ConvertError::NonFinite`] with the point, and as [`crate::volume_to_points`].
@@ -189,21 +187,10 @@ pub fn density_to_points<F: ScalarField + ?Sized>(
     field: &F,
     bounds: DAabb,
     params: &DensityParams,
+    progress: Option<&Progress>,
 ) -> Result<(Cloud, VolumeReport), ConvertError> {
-    density_to_points_with_progress(field, bounds, params, &Progress::new())
-}
-
-/// [`density_to_points`] that reports lattice points to `progress`, each thrice (sampled, chosen, written), and stops
-/// when that is cancelled.
-///
-/// # Errors
-/// As [`density_to_points`], and [`ConvertError::Cancelled`].
-pub fn density_to_points_with_progress<F: ScalarField + ?Sized>(
-    field: &F,
-    bounds: DAabb,
-    params: &DensityParams,
-    progress: &Progress,
-) -> Result<(Cloud, VolumeReport), ConvertError> {
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
     let p = &params.volume.splat;
     p.check()?;
     if !(params.extinction.is_finite() && params.extinction >= 0.0) {
@@ -220,7 +207,7 @@ pub fn density_to_points_with_progress<F: ScalarField + ?Sized>(
     let tf = TransferFunction::new(points).map_err(|e| p.input(e))?;
     // Extinction is the density's, straight up to where it ends: a cell's middle tells, which the field has exactly.
     let volume = VolumeParams { classification_error: f64::MAX, ..params.volume.clone() };
-    volume_to_points_with_progress(&grid, &tf, &volume, progress)
+    volume_to_points(&grid, &tf, &volume, Some(progress))
 }
 
 /// The lattice that a density is sampled on.
@@ -235,18 +222,20 @@ pub(crate) fn density_lattice(bounds: DAabb, params: &DensityParams) -> Result<L
     lattice(bounds, spacing, p)
 }
 
-/// Samples a field at the middles of cells of about `spacing` (object units) that fill a box.
+/// Samples a field at the middles of cells of about `spacing` (object units) that fill a box. Cells are reported to `progress`,
+/// and work stops where that is cancelled.
 ///
 /// # Errors
 /// [`ConvertError::NonFinite`] with the point, also where the value overflows f32; [`ConvertError::Parameter`] for
-/// an empty box or an absurd spacing; [`ConvertError::TooMany`].
+/// an empty box or an absurd spacing; [`ConvertError::Limit`], [`ConvertError::Cancelled`].
 pub fn field_to_grid<F: ScalarField + ?Sized>(
     field: &F,
     bounds: DAabb,
     spacing: f64,
     splat: &SplatParams,
+    progress: Option<&Progress>,
 ) -> Result<Grid, ConvertError> {
-    sample(field, &lattice(bounds, spacing, splat)?, splat, &Progress::new())
+    sample(field, &lattice(bounds, spacing, splat)?, splat, progress.unwrap_or(&Progress::new()))
 }
 
 /// The field at the middles of a lattice's cells.

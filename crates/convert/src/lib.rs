@@ -10,7 +10,7 @@
 //! let ball = ExpressionField::parse("x^2 + y^2 + z^2 - 1").unwrap();
 //! let glass = MeshParams { opacity: 0.3, density: Density::Spacing(0.05), ..MeshParams::default() };
 //! let bounds = DAabb::around(DVec3::ZERO, DVec3::splat(1.2));
-//! let (cloud, report) = surface_to_points(&ball, bounds, &glass).unwrap();
+//! let (cloud, report) = surface_to_points(&ball, bounds, &glass, None).unwrap();
 //! assert_eq!(cloud.len() as u64, report.splats);
 //! ```
 #![forbid(unsafe_code)]
@@ -71,29 +71,26 @@ pub use error::{Fault, Place, ReadError, escaped_path};
 #[cfg(feature = "expression")]
 pub use expression::{ExpressionError, ExpressionField};
 pub use field_points::{
-    DensityParams, density_to_points, density_to_points_with_progress, field_to_grid, field_to_mesh, surface_to_mesh,
-    surface_to_points, surface_to_points_with_progress,
+    DensityParams, density_to_points, field_to_grid, field_to_mesh, surface_to_mesh, surface_to_points,
 };
 pub use grid_field::{GridField, Inside, Interpolation};
 pub use marching_cubes::isosurface_to_mesh;
-pub use mesh_points::{
-    MeshParams, MeshReport, flatten_leaning, mesh_to_points, mesh_to_points_into, mesh_to_points_with_progress,
-};
+pub use mesh_points::{MeshParams, MeshReport, flatten_leaning, mesh_to_points, mesh_to_points_into};
 #[cfg(feature = "surfels")]
 pub use mpu::{MpuField, MpuParams, MpuReport, points_to_field};
 #[cfg(feature = "surfels")]
 pub use orient::Orientation;
 pub use params::{Density, SplatParams};
 #[cfg(feature = "noise")]
-pub use procedural::{CloudShape, Ellipsoid, procedural_cloud, procedural_cloud_with_progress};
+pub use procedural::{CloudShape, Ellipsoid, procedural_cloud};
 pub use raw_points::{PointLattice, RawPoints};
 pub use resample::resampled;
-pub use section::volume_section;
-pub use shapes::{medium_ball, medium_box, rectangle};
+pub use section::{Section, volume_section};
+pub use shapes::{Rectangle, medium_ball, medium_box, rectangle};
 pub use sobel::{sobel_gradient, sobel_gradient_into};
 #[cfg(feature = "surfels")]
-pub use surfels::{SurfelParams, SurfelReport, raw_to_surfels, raw_to_surfels_with_progress};
+pub use surfels::{SurfelParams, SurfelReport, raw_to_surfels};
 #[cfg(feature = "surfels")]
 pub use thin::thinned;
 pub use vertex_normals::vertex_normals;
-pub use volume_points::{VolumeParams, VolumeReport, volume_to_points, volume_to_points_with_progress};
+pub use volume_points::{VolumeParams, VolumeReport, volume_to_points};

@@ -18,7 +18,7 @@ use crate::Inside;
 use rayon::prelude::*;
 use signs::Signs;
 use splat_core::glam::{DMat3, DVec3, Vec3};
-use splat_core::{Error, Grid, Mesh};
+use splat_core::{Error, Exceeded, Grid, Mesh};
 use table::TABLE;
 
 /// Vertices along x, y and z and triangles of one row; then where they begin.
@@ -42,7 +42,7 @@ type Row = [u32; 4];
 ///
 /// # Errors
 /// [`Error::Invalid`] or [`Error::ColumnLength`] for a grid that does not validate or an isovalue that is not finite;
-/// [`Error::Overflow`] for more than 2³² − 1 vertices or triangles.
+/// [`Error::Limit`] for more than 2³² − 1 vertices or triangles.
 pub fn isosurface_to_mesh(grid: &Grid, isovalue: f64, inside: Inside) -> Result<Mesh, Error> {
     if !isovalue.is_finite() {
         return Err(Error::invalid("isosurface", 0, "isovalue", isovalue, "a finite number"));
@@ -111,9 +111,10 @@ fn count(signs: &Signs) -> Result<(Vec<Row>, [usize; 2]), Error> {
         (vertices, faces) = (vertices + x + y + z, faces + t);
     }
     let limit = u64::from(u32::MAX);
-    for (what, needed) in [("vertices of an isosurface", vertices), ("triangles of an isosurface", faces)] {
+    for (unit, needed) in [("vertices", vertices), ("triangles", faces)] {
         if needed > limit {
-            return Err(Error::Overflow { what, needed, had: limit });
+            let (what, hint) = ("an isosurface".into(), "use a coarser grid".into());
+            return Err(Error::Limit(Exceeded { what, needed, limit: Some(limit), unit, hint }));
         }
     }
     Ok((rows, [vertices as usize, faces as usize]))

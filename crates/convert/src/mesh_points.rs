@@ -76,7 +76,7 @@ const LEANING: f32 = 0.94;
 /// use splat_core::{Mesh, glam::Vec3};
 /// let mesh = Mesh { position: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]], ..Mesh::default() };
 /// let params = MeshParams { density: Density::Spacing(0.1), opacity: 0.5, ..MeshParams::default() };
-/// let (cloud, report) = mesh_to_points(&mesh, &params).unwrap();
+/// let (cloud, report) = mesh_to_points(&mesh, &params, None).unwrap();
 /// let depth: f32 = cloud.cross_section.iter().sum();
 /// assert!((depth - 0.5 * 2.0_f32.ln()).abs() < 1e-5);
 /// assert_eq!(report.splats, 64);
@@ -84,32 +84,32 @@ const LEANING: f32 = 0.94;
 ///
 /// # Errors
 /// As [`mesh_to_points_into`].
-pub fn mesh_to_points(mesh: &Mesh, params: &MeshParams) -> Result<(Cloud, MeshReport), ConvertError> {
+pub fn mesh_to_points(
+    mesh: &Mesh,
+    params: &MeshParams,
+    progress: Option<&Progress>,
+) -> Result<(Cloud, MeshReport), ConvertError> {
     let mut cloud = Cloud::default();
-    let report = mesh_to_points_into(mesh, params, &mut cloud)?;
+    let report = mesh_to_points_into(mesh, params, &mut cloud, progress)?;
     Ok((cloud, report))
 }
 
 /// Replaces the content of `cloud` by the splats of a mesh; its memory is used again. The cloud's origin is the mesh's,
 /// transformed, so a mesh far away gives the same offsets as one at 0.
 ///
-/// # Errors
-/// [`ConvertError::Parameter`] and [`ConvertError::Input`] for what breaks a promise, [`ConvertError::TooMany`] before
-/// any memory is taken.
-pub fn mesh_to_points_into(mesh: &Mesh, params: &MeshParams, cloud: &mut Cloud) -> Result<MeshReport, ConvertError> {
-    mesh_to_points_with_progress(mesh, params, cloud, &Progress::new())
-}
-
-/// [`mesh_to_points_into`] that reports splats to `progress` and stops when that is cancelled.
+/// Splats are reported to `progress`, and work stops where that is cancelled.
 ///
 /// # Errors
-/// As [`mesh_to_points_into`], and [`ConvertError::Cancelled`]; the cloud is then of no use.
-pub fn mesh_to_points_with_progress(
+/// [`ConvertError::Parameter`] and [`ConvertError::Input`] for what breaks a promise, [`ConvertError::Limit`] before
+/// any memory is taken, and [`ConvertError::Cancelled`], after which the cloud is of no use.
+pub fn mesh_to_points_into(
     mesh: &Mesh,
     params: &MeshParams,
     cloud: &mut Cloud,
-    progress: &Progress,
+    progress: Option<&Progress>,
 ) -> Result<MeshReport, ConvertError> {
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
     let p = &params.splat;
     let plan = plan(mesh, params)?;
     let report = plan.report;
@@ -232,7 +232,7 @@ fn spacing(mesh: &Mesh, measures: &[Measure], params: &MeshParams, report: &Mesh
         Density::Auto => {
             let diagonal = f64::from(splat_core::Aabb::of_points(&mesh.position).diagonal()) * scale;
             let triangle = (report.area / (report.triangles - report.degenerate) as f64).sqrt();
-            let budget = (params.splat.max_splats as f64 / 2.0).clamp(1.0, AUTO_SPLATS);
+            let budget = (params.splat.most_splats() as f64 / 2.0).clamp(1.0, AUTO_SPLATS);
             (diagonal / AUTO_STEPS).min(triangle).max((report.area / budget).sqrt())
         }
     }
@@ -270,7 +270,7 @@ fn starts(measures: &[Measure], spacing: f64, p: &SplatParams) -> Result<Vec<u64
         .map(|m| {
             // A strip count is a loop: a needle that would exceed the budget by its length alone is not walked.
             let strips = m.longest_sq.sqrt() / spacing;
-            if strips > p.max_splats as f64 { strips as u64 } else { subdivide::split(m, spacing).pieces() }
+            if strips > p.most_splats() as f64 { strips as u64 } else { subdivide::split(m, spacing).pieces() }
         })
         .collect();
     p.check_count(counts.iter().map(|&n| n as f64).sum())?;

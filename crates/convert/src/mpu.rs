@@ -25,7 +25,7 @@ use crate::{ConvertError, Orientation, RawPoints};
 use octree::Octree;
 use samples::{SampleTree, box_of, samples_of};
 use splat_core::glam::{DMat3, DVec3};
-use splat_core::{DAabb, ScalarField};
+use splat_core::{DAabb, Progress, ScalarField};
 
 /// Half the side of the cube over half the longest side of the points' box: closed surfaces end before the cube does.
 const MARGIN: f64 = 1.25;
@@ -109,7 +109,7 @@ pub struct MpuField {
 
 /// Makes a field whose zero set passes by the points; normals point to where it is positive.
 ///
-/// Missing normals are estimated as [`crate::raw_to_surfels`] does it.
+/// Missing normals are estimated as [`crate::raw_to_surfels`] does it. Work stops where `progress` is cancelled.
 ///
 /// ```
 /// use convert::{MpuParams, RawPoints, points_to_field};
@@ -120,17 +120,23 @@ pub struct MpuField {
 /// };
 /// let ball: Vec<Vec3> = (0..2000).map(turn).collect();
 /// let points = RawPoints { position: ball.clone(), normal: ball, ..RawPoints::default() };
-/// let (field, report) = points_to_field(&points, &MpuParams::default()).unwrap();
+/// let (field, report) = points_to_field(&points, &MpuParams::default(), None).unwrap();
 /// assert!(field.value(DVec3::new(0.6, 0.0, 0.8)).abs() < report.tolerance);
 /// assert!(field.value(DVec3::ZERO) < 0.0);
 /// ```
 ///
 /// # Errors
 /// [`ConvertError::Parameter`] for parameters outside their ranges, fewer than N_min distinct points or points at one
-/// place; [`ConvertError::Input`] for points that do not validate.
-pub fn points_to_field(points: &RawPoints, params: &MpuParams) -> Result<(MpuField, MpuReport), ConvertError> {
+/// place; [`ConvertError::Input`] for points that do not validate; [`ConvertError::Cancelled`].
+pub fn points_to_field(
+    points: &RawPoints,
+    params: &MpuParams,
+    progress: Option<&Progress>,
+) -> Result<(MpuField, MpuReport), ConvertError> {
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
     check(params)?;
-    let (origin, samples) = samples_of(points, params)?;
+    let (origin, samples) = samples_of(points, params, progress)?;
     if samples.len() < params.samples {
         return Err(bad(params, "points", samples.len(), "at least as many different points as `samples` asks for"));
     }
@@ -148,7 +154,7 @@ pub fn points_to_field(points: &RawPoints, params: &MpuParams) -> Result<(MpuFie
         sharp: params.sharp,
     };
     let tree = SampleTree::new(samples);
-    let (octree, report) = Octree::new(&tree, bounds.min + 0.5 * bounds.size(), 0.5 * MARGIN * side, &asked);
+    let (octree, report) = Octree::new(&tree, bounds.min + 0.5 * bounds.size(), 0.5 * MARGIN * side, &asked, progress)?;
     Ok((MpuField { origin, octree }, MpuReport { points: points.len() as u64, ..report }))
 }
 

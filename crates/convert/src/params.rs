@@ -1,7 +1,8 @@
 //! Parameters that all conversions share.
 
 use crate::ConvertError;
-use splat_core::{Footprint, Similarity};
+use crate::columns::Wanted;
+use splat_core::{Exceeded, Footprint, Limits, Similarity};
 
 /// Smallest and largest splat spacing, world units: areas must stay normal f32 numbers.
 const SPACING_RANGE: std::ops::RangeInclusive<f64> = 1e-15..=1e15;
@@ -23,8 +24,8 @@ pub struct SplatParams {
     pub transform: Similarity,
     /// Linear Rec.709 colour, each channel ≥ 0, where the input has none.
     pub color: [f32; 3],
-    /// Most splats that this object may become, ≤ 2³² − 1.
-    pub max_splats: u64,
+    /// Splats that this object may become, 2³² − 1 at most, and the bytes of their cloud.
+    pub limits: Limits,
 }
 
 impl Default for SplatParams {
@@ -37,7 +38,7 @@ impl Default for SplatParams {
             profile: Footprint::default(),
             transform: Similarity::default(),
             color: [1.0; 3],
-            max_splats: 100_000_000,
+            limits: Limits::default(),
         }
     }
 }
@@ -55,7 +56,7 @@ pub enum Density {
 }
 
 impl SplatParams {
-    /// Checks the transform, the colour and the limit.
+    /// Checks the transform and the colour.
     pub(crate) fn check(&self) -> Result<(), ConvertError> {
         let t = &self.transform;
         if !(t.scale.is_finite() && t.scale > 0.0) {
@@ -66,9 +67,6 @@ impl SplatParams {
         }
         if !self.color.iter().all(|c| c.is_finite() && *c >= 0.0) {
             return Err(self.bad("color", self.color, "three finite numbers ≥ 0"));
-        }
-        if self.max_splats > u64::from(u32::MAX) {
-            return Err(self.bad("max_splats", self.max_splats, "at most 4294967295"));
         }
         if !(1.0..=8.0).contains(&self.profile.cutoff) {
             return Err(self.bad("cutoff", self.profile.cutoff, "1 to 8 standard deviations"));
@@ -101,10 +99,30 @@ impl SplatParams {
 
     /// Refuses more splats than the limit.
     pub(crate) fn check_count(&self, needed: f64) -> Result<(), ConvertError> {
-        if needed <= self.max_splats as f64 {
-            return Ok(());
-        }
-        Err(ConvertError::TooMany { object: self.object_name.clone(), what: "splats", needed, limit: self.max_splats })
+        self.check_limit(needed, self.most_splats(), "splats")
+    }
+
+    /// Refuses a cloud of more splats or bytes than the limits.
+    pub(crate) fn check_cloud(&self, splats: f64, wanted: Wanted) -> Result<(), ConvertError> {
+        self.check_count(splats)?;
+        self.check_limit(splats * wanted.bytes_per_splat() as f64, self.limits.max_bytes, "bytes")
+    }
+
+    /// Refuses more of something than the limit.
+    pub(crate) fn check_limit(&self, needed: f64, limit: u64, unit: &'static str) -> Result<(), ConvertError> {
+        if needed <= limit as f64 { Ok(()) } else { Err(self.exceeded(needed, Some(limit), unit)) }
+    }
+
+    /// Most splats that this object may become.
+    pub(crate) fn most_splats(&self) -> u64 {
+        self.limits.max_elements.min(u32::MAX.into())
+    }
+
+    /// The refusal of this object; numbers beyond counting, and those that are none, are the largest.
+    pub(crate) fn exceeded(&self, needed: f64, limit: Option<u64>, unit: &'static str) -> ConvertError {
+        let needed = if needed.is_nan() { u64::MAX } else { needed as u64 };
+        let what = format!("object '{}'", self.object_name).into();
+        ConvertError::Limit(Exceeded { what, needed, limit, unit, hint: "choose a larger spacing".into() })
     }
 
     /// Cutoff radius of splats that are `spacing` apart, world units.

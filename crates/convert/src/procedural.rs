@@ -200,26 +200,22 @@ impl CloudShape {
 /// ```
 /// use convert::{CloudShape, SplatParams, procedural_cloud};
 /// let shape = CloudShape::default();
-/// let grid = procedural_cloud(&shape, 0.1, &SplatParams::default()).unwrap();
+/// let grid = procedural_cloud(&shape, 0.1, &SplatParams::default(), None).unwrap();
 /// assert!(grid.values.iter().all(|v| (0.0..=12.0).contains(v)));
 /// ```
 ///
-/// # Errors
-/// [`ConvertError::Parameter`], or [`ConvertError::TooMany`] before memory is taken.
-pub fn procedural_cloud(shape: &CloudShape, spacing: f64, splat: &SplatParams) -> Result<Grid, ConvertError> {
-    procedural_cloud_with_progress(shape, spacing, splat, &Progress::new())
-}
-
-/// [`procedural_cloud`] that reports lattice points to `progress` and stops when that is cancelled.
+/// Lattice points are reported to `progress`, and work stops where that is cancelled.
 ///
 /// # Errors
-/// As [`procedural_cloud`], and [`ConvertError::Cancelled`].
-pub fn procedural_cloud_with_progress(
+/// [`ConvertError::Parameter`], [`ConvertError::Limit`] before memory is taken, or [`ConvertError::Cancelled`].
+pub fn procedural_cloud(
     shape: &CloudShape,
     spacing: f64,
     splat: &SplatParams,
-    progress: &Progress,
+    progress: Option<&Progress>,
 ) -> Result<Grid, ConvertError> {
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
     splat.check()?;
     let dims = shape.lattice(spacing, splat)?;
     let low = shape.bounds().min;

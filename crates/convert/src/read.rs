@@ -50,14 +50,14 @@ use crate::error::{Place, ReadError, escaped, escaped_path};
 use crate::raw_points::RawPoints;
 use input::Stream;
 use reading::Reading;
-use splat_core::{Grid, Mesh, Progress};
+use splat_core::{Grid, Limits, Mesh, Progress};
 use std::path::Path;
 
-/// How much a file may ask for, and what happens to points that are no numbers.
+/// How much a file may ask for, and what happens to what is wrong in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ReadLimits {
-    /// Most bytes that the file, its decompressed form or the columns made from it may each take.
-    pub max_bytes: u64,
+pub struct ReadParams {
+    /// Bytes that the file, its decompressed form and the columns made from it may each take; elements are not counted.
+    pub limits: Limits,
     /// Whether points of a cloud with a coordinate that is not finite are left out and counted in
     /// [`RawPoints::dropped`] instead of refused. Vertices of a mesh are always refused.
     pub drop_invalid: bool,
@@ -65,10 +65,10 @@ pub struct ReadLimits {
     pub strict: bool,
 }
 
-impl Default for ReadLimits {
+impl Default for ReadParams {
     /// 4 GiB, nothing dropped, what can be mended is mended.
     fn default() -> Self {
-        Self { max_bytes: 4 << 30, drop_invalid: false, strict: false }
+        Self { limits: Limits::bytes(4 << 30), drop_invalid: false, strict: false }
     }
 }
 
@@ -84,22 +84,16 @@ pub enum Loaded {
     Grid(Grid),
 }
 
-/// Reads a regular file; its first bytes tell the format, its extension only words the error if they do not.
+/// Reads a regular file, and says what there is to say of it; its first bytes tell the format, its extension only words the
+/// error if they do not. Reading stops where `progress` is cancelled.
 ///
 /// # Errors
-/// [`ReadError`] with the file's name, the place, what was expected and what was found.
-pub fn file(path: &Path, limits: &ReadLimits) -> Result<Loaded, ReadError> {
-    file_with_notes(path, limits, &Progress::new()).map(|(loaded, _)| loaded)
-}
-
-/// [`file()`] that stops when `progress` is cancelled, with what there is to say of the file.
-///
-/// # Errors
-/// As [`file()`], and one with [`Fault::Cancelled`](crate::Fault::Cancelled).
-pub fn file_with_notes(path: &Path, limits: &ReadLimits, progress: &Progress) -> Result<(Loaded, Notes), ReadError> {
+/// [`ReadError`] with the file's name, the place, what was expected and what was found, and one with
+/// [`Fault::Cancelled`](crate::Fault::Cancelled).
+pub fn file(path: &Path, params: &ReadParams, progress: Option<&Progress>) -> Result<(Loaded, Notes), ReadError> {
     let name = escaped_path(path);
-    let mut reading = Reading::new(limits, progress);
-    let stream = Stream::open(path, limits);
+    let mut reading = Reading::new(params, progress);
+    let stream = Stream::open(path, params);
     let loaded = stream.and_then(|stream| whole(path, stream, Some(path), &mut reading));
     Ok((loaded.map_err(|e| e.in_file(&name))?, reading.finish(&name)))
 }
@@ -108,23 +102,15 @@ pub fn file_with_notes(path: &Path, limits: &ReadLimits, progress: &Progress) ->
 ///
 /// # Errors
 /// [`ReadError`] as [`file()`] gives it.
-pub fn bytes(name: &str, content: &[u8], limits: &ReadLimits) -> Result<Loaded, ReadError> {
-    bytes_with_notes(name, content, limits, &Progress::new()).map(|(loaded, _)| loaded)
-}
-
-/// [`bytes()`] with what [`file_with_notes`] adds.
-///
-/// # Errors
-/// As [`file_with_notes`].
-pub fn bytes_with_notes(
+pub fn bytes(
     name: &str,
     content: &[u8],
-    limits: &ReadLimits,
-    progress: &Progress,
+    params: &ReadParams,
+    progress: Option<&Progress>,
 ) -> Result<(Loaded, Notes), ReadError> {
     let shown = escaped(name.as_bytes(), usize::MAX);
-    let mut reading = Reading::new(limits, progress);
-    let loaded = whole(Path::new(name), Stream::of(content, limits), None, &mut reading);
+    let mut reading = Reading::new(params, progress);
+    let loaded = whole(Path::new(name), Stream::of(content, params), None, &mut reading);
     Ok((loaded.map_err(|e| e.in_file(&shown))?, reading.finish(&shown)))
 }
 
@@ -164,7 +150,7 @@ fn parse(
     reading: &mut Reading<'_>,
 ) -> Result<Loaded, ReadError> {
     reading.go_on()?;
-    let limits = reading.limits;
+    let params = reading.params;
     if stream.peek(2)? == [0x1f, 0x8b] {
         stream = stream.gunzip();
     }
@@ -191,13 +177,13 @@ fn parse(
             obj::read(&content, reading)
         }
         #[cfg(feature = "xyz")]
-        Some(Format::Xyz) => xyz::read(&stream.rest()?, limits, &mut reading.notes).map(Loaded::Points),
+        Some(Format::Xyz) => xyz::read(&stream.rest()?, params, &mut reading.notes).map(Loaded::Points),
         #[cfg(feature = "nrrd")]
-        Some(Format::Nrrd) => nrrd::read(stream, place, limits, &mut reading.notes).map(Loaded::Grid),
+        Some(Format::Nrrd) => nrrd::read(stream, place, params, &mut reading.notes).map(Loaded::Grid),
         #[cfg(feature = "las")]
-        Some(Format::Las) => las::read(stream.rest()?, limits, &mut reading.notes).map(Loaded::Points),
+        Some(Format::Las) => las::read(stream.rest()?, params, &mut reading.notes).map(Loaded::Points),
         #[cfg(feature = "nifti")]
-        Some(Format::Nifti) => nifti::read(stream, limits).map(Loaded::Grid),
+        Some(Format::Nifti) => nifti::read(stream, params).map(Loaded::Grid),
         #[allow(unreachable_patterns, reason = "reached where a reader is not compiled in")]
         Some(format) => Err(ReadError::input(
             Place::File,

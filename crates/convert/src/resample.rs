@@ -48,7 +48,7 @@ pub(crate) fn kernel_spacing(axes: &DMat3) -> f64 {
 ///
 /// # Errors
 /// [`ConvertError::Parameter`] for a spacing that is no length, [`ConvertError::Input`] for a grid that is none,
-/// [`ConvertError::TooMany`] before memory is taken.
+/// [`ConvertError::Limit`] before memory is taken.
 pub fn resampled(grid: &Grid, spacing: f64, params: &SplatParams) -> Result<Grid, ConvertError> {
     params.check_spacing(spacing)?;
     grid.validate().map_err(|e| params.input(e))?;

@@ -2,21 +2,31 @@
 
 use crate::{ConvertError, GridField, Inside, Interpolation, SplatParams};
 use splat_core::glam::DVec3;
-use splat_core::{Grid, Mesh, ScalarField, TransferFunction};
+use splat_core::{Grid, Mesh, Progress, ScalarField, TransferFunction};
 use std::sync::Arc;
 
 /// Most squares along one side of the plane.
 const MOST_SQUARES: f64 = 4096.0;
 
-/// A section: the part of a plane within a volume's lattice, in squares of about `spacing` (object units) that are cut off at
-/// its border.
+/// A plane through a volume, in the volume's own space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Section {
+    /// A point that the plane goes through.
+    pub center: DVec3,
+    /// Its normal, of length 1.
+    pub normal: DVec3,
+    /// Side of the squares that it is made of, about, object units, > 0; no side has more than 4096 of them.
+    pub spacing: f64,
+}
+
+/// The part of a plane within a volume's lattice, in squares that are cut off at its border.
 ///
-/// The plane goes through `center` across the unit vector `normal`, both in the volume's own space. Colours are those that
-/// `transfer` gives the trilinear values at the squares' corners; its extinctions are not used. A plane beside the lattice
-/// gives a mesh without triangles. Of `splat` only the name is used, for errors.
+/// Colours are those that `transfer` gives the trilinear values at the squares' corners; its extinctions are not used. A plane
+/// beside the lattice gives a mesh without triangles. Of `splat` only the name is used, for errors. Rows of squares are reported
+/// to `progress`, and work stops where that is cancelled.
 ///
 /// ```
-/// use convert::{SplatParams, volume_section};
+/// use convert::{Section, SplatParams, volume_section};
 /// use splat_core::glam::{DMat3, DVec3};
 /// use splat_core::{Grid, TransferFunction, TransferPoint};
 /// // Values grow along x, and so does red.
@@ -24,22 +34,25 @@ const MOST_SQUARES: f64 = 4096.0;
 /// let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [3; 3], values };
 /// let point = |value| TransferPoint { value, color: [value, 0.0, 0.0], extinction: 0.0 };
 /// let transfer = TransferFunction::new(vec![point(0.0), point(2.0)]).unwrap();
-/// let mesh = volume_section(grid.into(), &transfer, DVec3::ONE, DVec3::Z, 0.5, &SplatParams::default()).unwrap();
+/// let middle = Section { center: DVec3::ONE, normal: DVec3::Z, spacing: 0.5 };
+/// let mesh = volume_section(grid.into(), &transfer, &middle, &SplatParams::default(), None).unwrap();
 /// for (p, color) in mesh.position.iter().zip(&mesh.color) {
 ///     assert!((mesh.origin.x + f64::from(p.x) - f64::from(color[0])).abs() < 1e-6);
 /// }
 /// ```
 ///
 /// # Errors
-/// [`ConvertError::Input`] for a grid that is not valid.
+/// [`ConvertError::Input`] for a grid that is not valid, [`ConvertError::Cancelled`].
 pub fn volume_section(
     grid: Arc<Grid>,
     transfer: &TransferFunction,
-    center: DVec3,
-    normal: DVec3,
-    spacing: f64,
+    section: &Section,
     splat: &SplatParams,
+    progress: Option<&Progress>,
 ) -> Result<Mesh, ConvertError> {
+    let Section { center, normal, spacing } = *section;
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
     let wrong = |source| ConvertError::Input { object: splat.object_name.clone(), source };
     let field = GridField::new(grid.clone(), Interpolation::Trilinear, 0.0, Inside::Below).map_err(wrong)?;
     let bounds = field.bounds();
@@ -53,7 +66,11 @@ pub fn volume_section(
     let index = grid.axes.inverse();
     let last = DVec3::from_array(grid.dims.map(|n| (n - 1) as f64));
     let mut mesh = Mesh { origin: center, ..Mesh::default() };
+    progress.add_total(n as u64);
     for k in 0..(n * n) as u64 {
+        if k % n as u64 == 0 {
+            progress.tick(1).map_err(|_| ConvertError::Cancelled)?;
+        }
         let at = |i: f64, j: f64| center + u * (i * step - reach) + v * (j * step - reach);
         let (i, j) = ((k % n as u64) as f64, (k / n as u64) as f64);
         let square = [at(i, j), at(i + 1.0, j), at(i + 1.0, j + 1.0), at(i, j + 1.0)];
@@ -110,7 +127,8 @@ mod tests {
         let transfer = TransferFunction::new(vec![point(0.0, 0.0), point(3.0, 3.0)]).unwrap();
         let normal = DVec3::new(0.0, 1.0, 1.0).normalize();
         let (center, splat) = (DVec3::splat(1.75), SplatParams::default());
-        let mesh = volume_section(grid.into(), &transfer, center, normal, 0.2, &splat).unwrap();
+        let mesh =
+            volume_section(grid.into(), &transfer, &Section { center, normal, spacing: 0.2 }, &splat, None).unwrap();
         let corner = |v: u32| mesh.position[v as usize].as_dvec3();
         let area = |t: &[u32; 3]| 0.5 * (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).length();
         let total: f64 = mesh.triangles.iter().map(area).sum();

@@ -4,7 +4,8 @@
 //! ray is the closed form convolved with the kernel. For tests, and for scenes that want just a slab of fog.
 
 use crate::borders::Borders;
-use crate::{ConvertError, SplatParams};
+use crate::columns::Wanted;
+use crate::{ConvertError, SplatParams, mesh_points};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Cloud, DAabb, Splat, SplatKind, optics};
 
@@ -14,7 +15,7 @@ const SUBDIVISION: i32 = 8;
 /// A homogeneous medium of extinction σ_t (1/world unit) in a box, lattice points about `spacing` apart; lengths are before the transform of `params`.
 ///
 /// # Errors
-/// [`ConvertError::Parameter`] for an empty box, a spacing or an extinction out of range, [`ConvertError::TooMany`].
+/// [`ConvertError::Parameter`] for an empty box, a spacing or an extinction out of range, [`ConvertError::Limit`].
 pub fn medium_box(bounds: DAabb, extinction: f64, spacing: f64, params: &SplatParams) -> Result<Cloud, ConvertError> {
     let lattice = Lattice::new(bounds, extinction, spacing, params)?;
     lattice.fill(params, |_| 1.0)
@@ -41,19 +42,27 @@ pub fn medium_ball(
     Ok(cloud)
 }
 
-/// A flat parallelogram around `center` with half-axes `u` and `v` as surface splats about `spacing` apart; `opacity` is
-/// that of one crossing, 1 for an opaque surface. Its normal is u × v.
+/// A flat parallelogram; its normal is u × v.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rectangle {
+    /// The middle, object space.
+    pub center: DVec3,
+    /// One half-axis, object units.
+    pub u: DVec3,
+    /// The other; not parallel to the first.
+    pub v: DVec3,
+    /// Opacity of one crossing, in [0, 1]; 1 is an opaque surface.
+    pub opacity: f64,
+    /// Distance of the splats, about, object units.
+    pub spacing: f64,
+}
+
+/// A flat parallelogram as surface splats.
 ///
 /// # Errors
 /// As [`medium_box`]; [`ConvertError::Parameter`] for parallel half-axes.
-pub fn rectangle(
-    center: DVec3,
-    u: DVec3,
-    v: DVec3,
-    opacity: f64,
-    spacing: f64,
-    params: &SplatParams,
-) -> Result<Cloud, ConvertError> {
+pub fn rectangle(rectangle: &Rectangle, params: &SplatParams) -> Result<Cloud, ConvertError> {
+    let Rectangle { center, u, v, opacity, spacing } = *rectangle;
     params.check()?;
     let scale = params.transform.scale;
     params.check_spacing(spacing * scale)?;
@@ -65,7 +74,7 @@ pub fn rectangle(
         return Err(params.bad("opacity", opacity, "a number in [0, 1]"));
     }
     let [nu, nv] = rectangle_counts(u, v, spacing);
-    params.check_count(nu * nv)?;
+    params.check_cloud(nu * nv, rectangle_columns(opacity))?;
     let area = 4.0 * normal.length() * scale * scale / (nu * nv);
     let step = (2.0 * u.length() / nu).max(2.0 * v.length() / nv) * scale;
     let splat = Splat {
@@ -94,6 +103,11 @@ pub fn rectangle(
 /// Splats along the two half-axes of a parallelogram.
 pub(crate) fn rectangle_counts(u: DVec3, v: DVec3, spacing: f64) -> [f64; 2] {
     [u, v].map(|axis| (2.0 * axis.length() / spacing).ceil().max(1.0))
+}
+
+/// Columns of a parallelogram's cloud.
+pub(crate) fn rectangle_columns(opacity: f64) -> Wanted {
+    Wanted { tangent: opacity >= 1.0, ..mesh_points::WANTED }
 }
 
 fn template(params: &SplatParams) -> Splat {
@@ -131,7 +145,7 @@ impl Lattice {
             return Err(params.bad("extinction", extinction, "a finite number ≥ 0"));
         }
         let counts = (extent / spacing).to_array().map(|n| n.ceil().max(1.0));
-        params.check_count(counts.iter().product())?;
+        params.check_cloud(counts.iter().product(), Wanted::default())?;
         let step = extent / DVec3::from_array(counts);
         Ok(Self { step, counts: counts.map(|n| n as u64), center: (min + max) * 0.5, extinction })
     }
@@ -203,7 +217,11 @@ mod tests {
     #[test]
     fn rectangle_carries_the_optical_depth_of_its_area() {
         let p = SplatParams::default();
-        let plane = rectangle(DVec3::ZERO, DVec3::X, DVec3::Z * 2.0, 0.75, 0.05, &p).unwrap();
+        let plane = rectangle(
+            &Rectangle { center: DVec3::ZERO, u: DVec3::X, v: DVec3::Z * 2.0, opacity: 0.75, spacing: 0.05 },
+            &p,
+        )
+        .unwrap();
         assert!((total(&plane) / (8.0 * 4.0_f64.ln()) - 1.0).abs() < 1e-6);
         assert_eq!(plane.normal[0], Vec3::NEG_Y);
         plane.validate().unwrap();
@@ -211,7 +229,7 @@ mod tests {
 
     #[test]
     fn cv10_a_spacing_beyond_the_budget_is_refused() {
-        let p = SplatParams { max_splats: 1000, ..SplatParams::default() };
+        let p = SplatParams { limits: splat_core::Limits::elements(1000), ..SplatParams::default() };
         for spacing in [1e-9, 0.0, f64::INFINITY, f64::NAN] {
             assert!(medium_box(DAabb::new(DVec3::ZERO, DVec3::ONE), 1.0, spacing, &p).is_err(), "{spacing}");
         }

@@ -87,26 +87,22 @@ pub struct SurfelReport {
 /// use splat_core::glam::Vec3;
 /// let position = (0..100).map(|i| Vec3::new((i % 10) as f32, 0.0, (i / 10) as f32)).collect();
 /// let points = RawPoints { position, ..RawPoints::default() };
-/// let (cloud, report) = raw_to_surfels(&points, &SurfelParams::default()).unwrap();
+/// let (cloud, report) = raw_to_surfels(&points, &SurfelParams::default(), None).unwrap();
 /// assert!((report.median_spacing - 1.0).abs() < 1e-12);
 /// assert!(cloud.normal.iter().all(|n| *n == Vec3::Y));
 /// ```
 ///
-/// # Errors
-/// [`ConvertError::Parameter`], [`ConvertError::Input`] or [`ConvertError::TooMany`].
-pub fn raw_to_surfels(points: &RawPoints, params: &SurfelParams) -> Result<(Cloud, SurfelReport), ConvertError> {
-    raw_to_surfels_with_progress(points, params, &Progress::new())
-}
-
-/// [`raw_to_surfels`] that reports places to `progress` and stops when that is cancelled.
+/// Places are reported to `progress`, and work stops where that is cancelled.
 ///
 /// # Errors
-/// As [`raw_to_surfels`], and [`ConvertError::Cancelled`].
-pub fn raw_to_surfels_with_progress(
+/// [`ConvertError::Parameter`], [`ConvertError::Input`], [`ConvertError::Limit`] or [`ConvertError::Cancelled`].
+pub fn raw_to_surfels(
     points: &RawPoints,
     params: &SurfelParams,
-    progress: &Progress,
+    progress: Option<&Progress>,
 ) -> Result<(Cloud, SurfelReport), ConvertError> {
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
     check(points, params)?;
     let order = canonical_order(points);
     let (distinct, starts) = distinct_places(points, &order);

@@ -106,32 +106,24 @@ pub struct VolumeReport {
 /// let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [4, 4, 4], values: vec![1.0; 64] };
 /// let point = |value, extinction| TransferPoint { value, color: [1.0; 3], extinction };
 /// let tf = TransferFunction::new(vec![point(0.0, 0.0), point(1.0, 0.5)]).unwrap();
-/// let (cloud, report) = volume_to_points(&grid, &tf, &VolumeParams::default()).unwrap();
+/// let (cloud, report) = volume_to_points(&grid, &tf, &VolumeParams::default(), None).unwrap();
 /// assert_eq!(report.splats, 64);
 /// assert_eq!(cloud.cross_section.iter().sum::<f32>(), 32.0);
 /// ```
 ///
+/// Lattice points are reported to `progress`, each twice (chosen, written), and work stops where that is cancelled.
+///
 /// # Errors
-/// [`ConvertError::Parameter`], [`ConvertError::Input`], or [`ConvertError::TooMany`] before memory is taken.
+/// [`ConvertError::Parameter`], [`ConvertError::Input`], [`ConvertError::Limit`] before memory is taken, or
+/// [`ConvertError::Cancelled`].
 pub fn volume_to_points(
     grid: &Grid,
     tf: &TransferFunction,
     params: &VolumeParams,
+    progress: Option<&Progress>,
 ) -> Result<(Cloud, VolumeReport), ConvertError> {
-    volume_to_points_with_progress(grid, tf, params, &Progress::new())
-}
-
-/// [`volume_to_points`] that reports lattice points to `progress`, each twice (chosen, written), and stops when that
-/// is cancelled.
-///
-/// # Errors
-/// As [`volume_to_points`], and [`ConvertError::Cancelled`].
-pub fn volume_to_points_with_progress(
-    grid: &Grid,
-    tf: &TransferFunction,
-    params: &VolumeParams,
-    progress: &Progress,
-) -> Result<(Cloud, VolumeReport), ConvertError> {
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
     let p = &params.splat;
     params.check()?;
     grid.validate().map_err(|e| p.input(e))?;
@@ -163,11 +155,8 @@ pub(crate) fn lattice_factors(grid: &Grid, params: &VolumeParams) -> Result<[usi
 
 /// Refuses lattices that no budget can mean: eight lattice points a splat.
 pub(crate) fn check_lattice(p: &SplatParams, dims: [f64; 3]) -> Result<(), ConvertError> {
-    let (needed, limit) = (dims[0] * dims[1] * dims[2], p.max_splats.saturating_mul(8).min(u64::from(u32::MAX)));
-    if needed <= limit as f64 {
-        return Ok(());
-    }
-    Err(ConvertError::TooMany { object: p.object_name.clone(), what: "lattice points", needed, limit })
+    let limit = p.limits.max_elements.saturating_mul(8).min(u32::MAX.into());
+    p.check_limit(dims[0] * dims[1] * dims[2], limit, "lattice points")
 }
 
 fn convert(

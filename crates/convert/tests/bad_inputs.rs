@@ -2,8 +2,9 @@
 #![cfg(all(feature = "ply", feature = "nifti", feature = "las"))]
 
 use crate::read_samples::{NIFTI_F32, NIFTI_U8, gzip, las, load, nifti, ply_ascii, ply_binary};
-use convert::read::{ReadLimits, bytes, file};
+use convert::read::{ReadParams, bytes, file};
 use convert::{Fault, Place, ReadError, escaped_path};
+use splat_core::Limits;
 use std::path::{Path, PathBuf};
 
 fn refused(name: &str, content: &[u8]) -> ReadError {
@@ -29,7 +30,7 @@ fn folder(name: &str) -> PathBuf {
 }
 
 fn opened(path: &Path) -> ReadError {
-    file(path, &ReadLimits::default()).unwrap_err()
+    file(path, &ReadParams::default(), None).unwrap_err()
 }
 
 #[test]
@@ -227,16 +228,19 @@ fn ba15_gzip_bombs_stop_at_the_ratio_and_at_the_limit() {
     let bomb = gzip(&vec![b' '; 40 << 20]);
     let error = refused("a.xyz.gz", &bomb);
     assert_eq!((error.fault, error.fault.exit_code()), (Fault::Limit, 5), "{error}");
-    let limits = ReadLimits { max_bytes: 1 << 20, ..ReadLimits::default() };
-    let error = bytes("a.xyz.gz", &gzip(&vec![b' '; 2 << 20]), &limits).unwrap_err();
+    let limits = ReadParams { limits: Limits::bytes(1 << 20), ..ReadParams::default() };
+    let error = bytes("a.xyz.gz", &gzip(&vec![b' '; 2 << 20]), &limits, None).unwrap_err();
     assert_eq!(error.fault, Fault::Limit, "{error}");
     // A volume's header comes first: what it does not announce is not unpacked.
     refused_with("a.nii.gz", &bomb, "a.nii.gz@0: expected a header size of 348");
     let volume = nifti(NIFTI_U8, false);
-    assert_eq!(bytes("a.nii", &volume, &ReadLimits { max_bytes: 47, ..limits }).unwrap_err().fault, Fault::Limit);
-    assert!(bytes("a.nii", &volume, &ReadLimits { max_bytes: 48, ..limits }).is_ok());
+    assert_eq!(
+        bytes("a.nii", &volume, &ReadParams { limits: Limits::bytes(47), ..limits }, None).unwrap_err().fault,
+        Fault::Limit
+    );
+    assert!(bytes("a.nii", &volume, &ReadParams { limits: Limits::bytes(48), ..limits }, None).is_ok());
     let cloud = las(3, 100, true);
-    let error = bytes("a.laz", &cloud, &ReadLimits { max_bytes: 3_000, ..limits }).unwrap_err();
+    let error = bytes("a.laz", &cloud, &ReadParams { limits: Limits::bytes(3_000), ..limits }, None).unwrap_err();
     assert_eq!(error.fault, Fault::Limit, "{error}");
 }
 
@@ -253,7 +257,7 @@ fn ba34_names_with_newlines_escapes_and_bytes_are_shown_escaped() {
         use std::os::unix::ffi::OsStrExt;
         let path = folder.join(std::ffi::OsStr::from_bytes(b"x\xff.ply"));
         std::fs::write(&path, ply_ascii()).unwrap();
-        file(&path, &ReadLimits::default()).unwrap();
+        file(&path, &ReadParams::default(), None).unwrap();
         assert!(escaped_path(&path).ends_with("x\\xff.ply"));
     }
     let long = opened(&folder.join("n".repeat(4096)));

@@ -303,7 +303,7 @@ fn a_volume_is_in_memory_once() {
     std::io::Write::write_all(&mut file, header.as_bytes()).unwrap();
     file.set_len(header.len() as u64 + 200_000_000).unwrap();
     let before = peak();
-    let loaded = convert::read::file(&path, &convert::read::ReadLimits::default()).unwrap();
+    let loaded = convert::read::file(&path, &convert::read::ReadParams::default(), None).unwrap().0;
     std::fs::remove_file(&path).unwrap();
     valid(&loaded);
     let ratio = (peak() - before) as f64 / 200e6;

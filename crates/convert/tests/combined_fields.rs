@@ -119,7 +119,8 @@ fn a_union_becomes_one_closed_mesh() {
     let (a, b) = balls();
     let f = CombinedField::union(vec![a, b]).unwrap();
     let mesh =
-        field_to_mesh(&f, DAabb::new(DVec3::splat(-1.3), DVec3::splat(1.8)), 0.06, &SplatParams::default()).unwrap();
+        field_to_mesh(&f, DAabb::new(DVec3::splat(-1.3), DVec3::splat(1.8)), 0.06, &SplatParams::default(), None)
+            .unwrap();
     for p in mesh.position.iter().map(|p| p.as_dvec3() + mesh.origin) {
         assert!(f.value(p).abs() < 1e-6, "{p}: {}", f.value(p));
     }
@@ -157,7 +158,7 @@ fn meshes_and_splats_end_at_the_border_of_the_domain() {
     let (a, _) = balls();
     let bounds = DAabb::around(DVec3::ZERO, DVec3::splat(1.2));
     let area = |field: &dyn ScalarField| {
-        let mesh = field_to_mesh(field, bounds, 0.05, &SplatParams::default()).unwrap();
+        let mesh = field_to_mesh(field, bounds, 0.05, &SplatParams::default(), None).unwrap();
         mesh.validate().unwrap();
         let at = |i: u32| mesh.origin + mesh.position[i as usize].as_dvec3();
         let highest = (0..mesh.position.len() as u32).map(|i| at(i).z).fold(f64::MIN, f64::max);
@@ -172,9 +173,9 @@ fn meshes_and_splats_end_at_the_border_of_the_domain() {
     assert!((part / whole - 0.625).abs() < 1e-3, "{part} of {whole}");
     assert!((0.25 - 1e-6..=0.25 + 1e-6).contains(&top), "{top}");
     let params = MeshParams { density: Density::Spacing(0.05), ..MeshParams::default() };
-    let (cloud, _) = surface_to_points(&half, bounds, &params).unwrap();
+    let (cloud, _) = surface_to_points(&half, bounds, &params, None).unwrap();
     let sum: f64 = cloud.cross_section.iter().map(|k| f64::from(*k)).sum();
-    let (all, _) = surface_to_points(&*a, bounds, &params).unwrap();
+    let (all, _) = surface_to_points(&*a, bounds, &params, None).unwrap();
     let total: f64 = all.cross_section.iter().map(|k| f64::from(*k)).sum();
     assert!((sum / total - 0.625).abs() < 2e-3, "{sum} of {total}");
     assert!(cloud.position.iter().all(|p| cloud.origin.z + f64::from(p.z) < 0.26));
@@ -183,5 +184,5 @@ fn meshes_and_splats_end_at_the_border_of_the_domain() {
         area(&ClippedField::new(a.clone(), vec![Clip::Box(DAabb::around(DVec3::ZERO, DVec3::splat(2.0)))]).unwrap());
     assert_eq!((same.position, same.triangles), (uncut.position, uncut.triangles));
     let none = ClippedField::new(a, vec![Clip::Box(DAabb::around(DVec3::ZERO, DVec3::splat(0.1)))]).unwrap();
-    assert!(field_to_mesh(&none, bounds, 0.05, &SplatParams::default()).unwrap().triangles.is_empty());
+    assert!(field_to_mesh(&none, bounds, 0.05, &SplatParams::default(), None).unwrap().triangles.is_empty());
 }

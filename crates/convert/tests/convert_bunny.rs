@@ -1,7 +1,7 @@
 //! The scanned bunny: its splats cover it once.
 #![cfg(feature = "ply")]
 
-use convert::read::{self, Loaded, ReadLimits};
+use convert::read::{self, Loaded, ReadParams};
 use convert::{Density, MeshParams, mesh_to_points, reference};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Cloud, Footprint, Mesh, optics, rng};
@@ -10,7 +10,7 @@ use std::path::Path;
 
 fn bunny() -> Mesh {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/stanford-bunny/bunny.ply.gz");
-    match read::file(&path, &ReadLimits::default()).unwrap() {
+    match read::file(&path, &ReadParams::default(), None).unwrap().0 {
         Loaded::Mesh(mesh) => mesh,
         other => panic!("not a mesh: {other:?}"),
     }
@@ -59,7 +59,7 @@ fn weights(cloud: &Cloud, tau: f64, points: &[(DVec3, DVec3)]) -> Vec<f64> {
 /// Mean weight and the 5 % and 95 % quantiles at about this many splats.
 fn coverage(mesh: &Mesh, wanted: u64) -> (f64, f64, f64) {
     let params = MeshParams { density: Density::Splats(wanted), opacity: 0.5, ..MeshParams::default() };
-    let (cloud, report) = mesh_to_points(mesh, &params).unwrap();
+    let (cloud, report) = mesh_to_points(mesh, &params, None).unwrap();
     cloud.validate().unwrap();
     let tau = optics::optical_depth(0.5);
     let sum: f64 = cloud.cross_section.iter().map(|k| f64::from(*k)).sum();

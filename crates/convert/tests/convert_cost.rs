@@ -4,7 +4,7 @@
 use convert::cost::{self, Prediction};
 use convert::*;
 use splat_core::glam::{DMat3, DVec3, Vec3};
-use splat_core::{Cloud, DAabb, Grid, Mesh, Progress, Similarity, TransferFunction, TransferPoint, rng};
+use splat_core::{Cloud, DAabb, Grid, Limits, Mesh, Progress, Similarity, TransferFunction, TransferPoint, rng};
 
 fn mesh() -> Mesh {
     let unit = |i: u64, a: u64| rng::unit_f32(8, 0, i, a);
@@ -48,12 +48,15 @@ fn meshes_points_and_unsplit_volumes_are_counted_exactly() {
         for opacity in [0.0, 0.5, 1.0] {
             let splat = SplatParams { transform, ..SplatParams::default() };
             let params = MeshParams { splat, density, opacity };
-            exact(cost::mesh(&mesh(), &params).unwrap(), &mesh_to_points(&mesh(), &params).unwrap().0);
+            exact(cost::mesh(&mesh(), &params).unwrap(), &mesh_to_points(&mesh(), &params, None).unwrap().0);
         }
     }
     for values in [false, true] {
         let params = SurfelParams { values, ..SurfelParams::default() };
-        exact(cost::raw_points(&points(500), &params).unwrap(), &raw_to_surfels(&points(500), &params).unwrap().0);
+        exact(
+            cost::raw_points(&points(500), &params).unwrap(),
+            &raw_to_surfels(&points(500), &params, None).unwrap().0,
+        );
         let params = VolumeParams {
             normals: values,
             values,
@@ -62,7 +65,7 @@ fn meshes_points_and_unsplit_volumes_are_counted_exactly() {
             ..VolumeParams::default()
         };
         let grid = wave([12, 13, 14], DVec3::ONE);
-        let cloud = volume_to_points(&grid, &transfer(), &params).unwrap().0;
+        let cloud = volume_to_points(&grid, &transfer(), &params, None).unwrap().0;
         exact(cost::volume(&grid, &transfer(), &params).unwrap(), &cloud);
         assert!(!cloud.is_empty());
     }
@@ -72,7 +75,7 @@ fn meshes_points_and_unsplit_volumes_are_counted_exactly() {
 fn split_volumes_fields_and_clouds_are_predicted_closely() {
     let grid = wave([20, 20, 20], DVec3::new(1.0, 1.0, 3.0));
     let params = VolumeParams { refine: 2, ..VolumeParams::default() };
-    let cloud = volume_to_points(&grid, &transfer(), &params).unwrap().0;
+    let cloud = volume_to_points(&grid, &transfer(), &params, None).unwrap().0;
     close(cost::volume(&grid, &transfer(), &params).unwrap(), &cloud, 0.05);
 
     let bounds = DAabb::around(DVec3::ZERO, DVec3::splat(1.3));
@@ -80,18 +83,18 @@ fn split_volumes_fields_and_clouds_are_predicted_closely() {
         let field = ExpressionField::parse(text).unwrap();
         for density in [Density::Spacing(0.03), Density::Splats(20_000), Density::Auto] {
             let params = MeshParams { density, ..MeshParams::default() };
-            let cloud = surface_to_points(&field, bounds, &params).unwrap().0;
+            let cloud = surface_to_points(&field, bounds, &params, None).unwrap().0;
             close(cost::surface(&field, bounds, &params).unwrap(), &cloud, 0.3);
         }
         let params = DensityParams { density: Density::Spacing(0.04), ..DensityParams::default() };
-        let cloud = density_to_points(&field, bounds, &params).unwrap().0;
+        let cloud = density_to_points(&field, bounds, &params, None).unwrap().0;
         close(cost::density(&field, bounds, &params).unwrap(), &cloud, 0.03);
     }
     let (shape, params) = (CloudShape::default(), VolumeParams::default());
-    let lattice = procedural_cloud(&shape, 0.06, &params.splat).unwrap();
+    let lattice = procedural_cloud(&shape, 0.06, &params.splat, None).unwrap();
     let point = |value: f32| TransferPoint { value, color: [1.0; 3], extinction: value };
     let tf = TransferFunction::new(vec![point(0.0), point(12.0)]).unwrap();
-    let cloud = volume_to_points(&lattice, &tf, &params).unwrap().0;
+    let cloud = volume_to_points(&lattice, &tf, &params, None).unwrap().0;
     close(cost::procedural(&shape, 0.06, &params).unwrap(), &cloud, 0.05);
 }
 
@@ -109,7 +112,8 @@ fn closed_shapes_are_counted() {
     );
     let (u, v) = (DVec3::X, DVec3::Z * 2.0);
     for opacity in [0.75, 1.0] {
-        exact(cost::rectangle(u, v, opacity, 0.05, &p).unwrap(), &rectangle(low, u, v, opacity, 0.05, &p).unwrap());
+        let flat = Rectangle { center: low, u, v, opacity, spacing: 0.05 };
+        exact(cost::rectangle(&flat, &p).unwrap(), &rectangle(&flat, &p).unwrap());
     }
     for spacing in [0.03, 0.1] {
         let ball = medium_ball(DVec3::ONE, 0.8, 2.0, spacing, &p).unwrap();
@@ -119,11 +123,11 @@ fn closed_shapes_are_counted() {
 
 #[test]
 fn cv10_predictions_refuse_what_conversions_refuse() {
-    let splat = SplatParams { max_splats: 1000, ..SplatParams::default() };
+    let splat = SplatParams { limits: Limits::elements(1000), ..SplatParams::default() };
     let params = MeshParams { splat: splat.clone(), density: Density::Spacing(1e-6), ..MeshParams::default() };
-    assert!(matches!(cost::mesh(&mesh(), &params), Err(ConvertError::TooMany { .. })));
+    assert!(matches!(cost::mesh(&mesh(), &params), Err(ConvertError::Limit(_))));
     let params = SurfelParams { splat, ..SurfelParams::default() };
-    assert!(matches!(cost::raw_points(&points(1001), &params), Err(ConvertError::TooMany { .. })));
+    assert!(matches!(cost::raw_points(&points(1001), &params), Err(ConvertError::Limit(_))));
 }
 
 /// Every conversion ticks what it announced, and stops when it is cancelled.
@@ -155,13 +159,13 @@ fn long_conversions_tick_and_stop() {
     let field = ExpressionField::parse("x^2 + y^2 + z^2 - 1").unwrap();
     let bounds = DAabb::around(DVec3::ZERO, DVec3::splat(1.3));
     let fine = MeshParams { density: Density::Spacing(0.01), ..MeshParams::default() };
-    interrupted(&|p| mesh_to_points_with_progress(&mesh(), &fine, &mut Cloud::default(), p).map(|_| ()));
-    interrupted(&|p| raw_to_surfels_with_progress(&points(3000), &SurfelParams::default(), p).map(|_| ()));
+    interrupted(&|p| mesh_to_points_into(&mesh(), &fine, &mut Cloud::default(), Some(p)).map(|_| ()));
+    interrupted(&|p| raw_to_surfels(&points(3000), &SurfelParams::default(), Some(p)).map(|_| ()));
     let (grid, params) = (wave([20; 3], DVec3::ONE), VolumeParams { normals: true, ..VolumeParams::default() });
-    interrupted(&|p| volume_to_points_with_progress(&grid, &transfer(), &params, p).map(|_| ()));
-    interrupted(&|p| surface_to_points_with_progress(&field, bounds, &fine, p).map(|_| ()));
+    interrupted(&|p| volume_to_points(&grid, &transfer(), &params, Some(p)).map(|_| ()));
+    interrupted(&|p| surface_to_points(&field, bounds, &fine, Some(p)).map(|_| ()));
     let density = DensityParams { density: Density::Spacing(0.1), ..DensityParams::default() };
-    interrupted(&|p| density_to_points_with_progress(&field, bounds, &density, p).map(|_| ()));
+    interrupted(&|p| density_to_points(&field, bounds, &density, Some(p)).map(|_| ()));
     let (shape, splat) = (CloudShape::default(), SplatParams::default());
-    interrupted(&|p| procedural_cloud_with_progress(&shape, 0.2, &splat, p).map(|_| ()));
+    interrupted(&|p| procedural_cloud(&shape, 0.2, &splat, Some(p)).map(|_| ()));
 }

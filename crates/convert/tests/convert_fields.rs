@@ -141,7 +141,7 @@ fn sphere_params(opacity: f64) -> MeshParams {
 fn an_implicit_sphere_has_the_area_and_the_normals_of_a_sphere() {
     let bounds = DAabb::new(DVec3::splat(-1.3), DVec3::splat(1.4));
     for text in ["x^2 + y^2 + z^2 - 1", "1 - 1/sqrt(x^2 + y^2 + z^2 + 1e-30)"] {
-        let (cloud, report) = surface_to_points(&field(text), bounds, &sphere_params(0.5)).unwrap();
+        let (cloud, report) = surface_to_points(&field(text), bounds, &sphere_params(0.5), None).unwrap();
         assert!((report.area / (4.0 * std::f64::consts::PI) - 1.0).abs() < 1e-3, "{text}: {}", report.area);
         for i in 0..cloud.len() {
             let p = cloud.position[i].as_dvec3() + cloud.origin;
@@ -156,7 +156,7 @@ fn an_implicit_sphere_has_the_area_and_the_normals_of_a_sphere() {
 #[test]
 fn a_surface_is_closed_across_blocks_and_stays_inside_the_box() {
     let bounds = DAabb::new(DVec3::splat(-1.3), DVec3::splat(1.4));
-    let mesh = convert::field_to_mesh(&field("x^2+y^2+z^2-1"), bounds, 0.05, &SplatParams::default()).unwrap();
+    let mesh = convert::field_to_mesh(&field("x^2+y^2+z^2-1"), bounds, 0.05, &SplatParams::default(), None).unwrap();
     let mut edges = std::collections::HashMap::new();
     for t in &mesh.triangles {
         for e in 0..3 {
@@ -168,7 +168,7 @@ fn a_surface_is_closed_across_blocks_and_stays_inside_the_box() {
     assert_eq!(mesh.position.len() + mesh.triangles.len() - edges.len() / 2, 2);
     let gyroid = field("sin(x)*cos(y) + sin(y)*cos(z) + sin(z)*cos(x)");
     let (cloud, _) =
-        surface_to_points(&gyroid, DAabb::new(DVec3::ZERO, DVec3::splat(6.0)), &MeshParams::default()).unwrap();
+        surface_to_points(&gyroid, DAabb::new(DVec3::ZERO, DVec3::splat(6.0)), &MeshParams::default(), None).unwrap();
     assert!(cloud.len() > 10_000);
     for p in cloud.position.iter().map(|p| p.as_dvec3() + cloud.origin) {
         assert!(p.min_element() > -0.1 && p.max_element() < 6.1 && gyroid.value(p).abs() < 1e-2);
@@ -179,7 +179,7 @@ fn a_surface_is_closed_across_blocks_and_stays_inside_the_box() {
 fn a_splat_budget_is_met_within_a_factor() {
     let params = MeshParams { density: Density::Splats(20_000), ..MeshParams::default() };
     let bounds = DAabb::new(DVec3::splat(-1.3), DVec3::splat(1.4));
-    let (cloud, _) = surface_to_points(&field("x^2 + y^2 + z^2 - 1"), bounds, &params).unwrap();
+    let (cloud, _) = surface_to_points(&field("x^2 + y^2 + z^2 - 1"), bounds, &params, None).unwrap();
     assert!(cloud.len() > 10_000 && cloud.len() < 45_000, "{}", cloud.len());
 }
 
@@ -194,17 +194,17 @@ fn fields_that_are_not_finite_are_refused_with_the_point() {
         extinction: 1.0,
     };
     let bounds = DAabb::new(DVec3::splat(-1.0), DVec3::ONE);
-    let error = density_to_points(&field("ln(x)"), bounds, &params).unwrap_err();
+    let error = density_to_points(&field("ln(x)"), bounds, &params, None).unwrap_err();
     assert!(error.to_string().contains("[-0.75, -0.75, -0.75]"), "{error}");
     assert!(error.to_string().contains("fog"));
     assert!(matches!(
-        surface_to_points(&field("sqrt(x) - 1"), bounds, &MeshParams::default()),
+        surface_to_points(&field("sqrt(x) - 1"), bounds, &MeshParams::default(), None),
         Err(ConvertError::NonFinite { .. })
     ));
     let corners = [[DVec3::ONE, DVec3::ZERO], [DVec3::ZERO, DVec3::new(1.0, 1.0, f64::NAN)], [DVec3::ZERO, DVec3::X]];
     for bad in corners.map(|[min, max]| DAabb::new(min, max)) {
-        assert!(density_to_points(&field("1"), bad, &params).is_err());
-        assert!(surface_to_points(&field("x"), bad, &MeshParams::default()).is_err());
+        assert!(density_to_points(&field("1"), bad, &params, None).is_err());
+        assert!(surface_to_points(&field("x"), bad, &MeshParams::default(), None).is_err());
     }
 }
 
@@ -212,20 +212,20 @@ fn fields_that_are_not_finite_are_refused_with_the_point() {
 fn densities_integrate_to_their_closed_form() {
     // ∫∫∫ x over the unit cube is 1/2; the midpoint rule is exact for it. Negative densities count as nothing.
     let params = DensityParams { density: Density::Spacing(0.1), extinction: 4.0, ..DensityParams::default() };
-    let (cloud, report) = density_to_points(&field("x"), DAabb::new(DVec3::ZERO, DVec3::ONE), &params).unwrap();
+    let (cloud, report) = density_to_points(&field("x"), DAabb::new(DVec3::ZERO, DVec3::ONE), &params, None).unwrap();
     let sum: f64 = cloud.cross_section.iter().map(|k| f64::from(*k)).sum();
     assert!((sum - 2.0).abs() < 1e-5, "{sum}");
     assert_eq!(report.splats, 1000);
-    assert_eq!(density_to_points(&field("-1"), DAabb::new(DVec3::ZERO, DVec3::ONE), &params).unwrap().0.len(), 0);
+    assert_eq!(density_to_points(&field("-1"), DAabb::new(DVec3::ZERO, DVec3::ONE), &params, None).unwrap().0.len(), 0);
 }
 
 #[test]
 fn a_procedural_cloud_is_bounded_smooth_and_repeatable() {
     let shape = CloudShape::default();
     let splat = SplatParams::default();
-    let grid = procedural_cloud(&shape, 0.08, &splat).unwrap();
-    assert_eq!(grid, procedural_cloud(&shape, 0.08, &splat).unwrap());
-    assert!(grid != procedural_cloud(&CloudShape { seed: 2, ..shape.clone() }, 0.08, &splat).unwrap());
+    let grid = procedural_cloud(&shape, 0.08, &splat, None).unwrap();
+    assert_eq!(grid, procedural_cloud(&shape, 0.08, &splat, None).unwrap());
+    assert!(grid != procedural_cloud(&CloudShape { seed: 2, ..shape.clone() }, 0.08, &splat, None).unwrap());
     let [nx, ny, nz] = grid.dims;
     let at = |n: usize| [n % nx, n / nx % ny, n / nx / ny];
     let (mut core, mut rim) = (0, 0);
@@ -249,7 +249,7 @@ fn turbulence_makes_a_cauliflower_not_a_blob() {
     let smooth = CloudShape { amplitude: 0.0, ..shape.clone() };
     // Surface area over what the same volume needs as a ball: octaves must wrinkle the boundary.
     let wrinkles = |shape: &CloudShape| {
-        let grid = procedural_cloud(shape, 0.05, &SplatParams::default()).unwrap();
+        let grid = procedural_cloud(shape, 0.05, &SplatParams::default(), None).unwrap();
         let inside = |i: isize, j: isize, k: isize| grid.at_clamped(i, j, k) > 6.0;
         let [nx, ny, nz] = grid.dims.map(|n| n as isize);
         let (mut faces, mut volume) = (0.0f64, 0.0f64);
@@ -280,9 +280,9 @@ fn impossible_clouds_are_refused() {
         CloudShape { frequency: 0.0, ..base() },
         CloudShape { extinction: -1.0, ..base() },
     ] {
-        assert!(matches!(procedural_cloud(&shape, 0.1, &splat), Err(ConvertError::Parameter { .. })));
+        assert!(matches!(procedural_cloud(&shape, 0.1, &splat, None), Err(ConvertError::Parameter { .. })));
     }
-    assert!(matches!(procedural_cloud(&base(), 1e-6, &splat), Err(ConvertError::TooMany { .. })));
+    assert!(matches!(procedural_cloud(&base(), 1e-6, &splat, None), Err(ConvertError::Limit(_))));
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use convert::{ConvertError, Density, MeshParams, SplatParams, mesh_to_points, reference};
 use splat_core::glam::{DQuat, DVec3, Vec3};
-use splat_core::{Cloud, Footprint, Mesh, Similarity, SplatKind, optics, rng};
+use splat_core::{Cloud, Footprint, Limits, Mesh, Similarity, SplatKind, optics, rng};
 
 fn quad(side: f32) -> Mesh {
     let p = |x, z| Vec3::new(x, 0.0, z);
@@ -56,12 +56,12 @@ fn cv01_zero_area_triangles_become_nothing() {
     let n = mesh.position.len() as u32;
     mesh.position.extend([Vec3::ZERO, Vec3::X, Vec3::X * 2.0]);
     mesh.triangles.extend([[0, 0, 1], [n, n + 1, n + 2], [2, 2, 2]]);
-    let (cloud, report) = mesh_to_points(&mesh, &params(0.1, 0.5)).unwrap();
+    let (cloud, report) = mesh_to_points(&mesh, &params(0.1, 0.5), None).unwrap();
     assert_eq!(report.degenerate, 3);
     cloud.validate().unwrap();
-    assert_eq!(cloud.len(), mesh_to_points(&quad(1.0), &params(0.1, 0.5)).unwrap().0.len());
+    assert_eq!(cloud.len(), mesh_to_points(&quad(1.0), &params(0.1, 0.5), None).unwrap().0.len());
     let only = Mesh { triangles: vec![[0, 0, 1]], ..mesh };
-    assert_eq!(mesh_to_points(&only, &MeshParams::default()).unwrap().0.len(), 0);
+    assert_eq!(mesh_to_points(&only, &MeshParams::default(), None).unwrap().0.len(), 0);
 }
 
 #[test]
@@ -71,7 +71,7 @@ fn cv02_slivers_keep_their_area() {
         triangles: vec![[0, 1, 2]],
         ..Mesh::default()
     };
-    let (cloud, report) = mesh_to_points(&mesh, &params(0.05, 1.0)).unwrap();
+    let (cloud, report) = mesh_to_points(&mesh, &params(0.05, 1.0), None).unwrap();
     let exact = 0.5 * f64::from(1e-4_f32);
     assert!((report.area / exact - 1.0).abs() < 1e-6, "{}", report.area);
     let sum: f64 = cloud.cross_section.iter().map(|k| f64::from(*k)).sum();
@@ -83,9 +83,9 @@ fn cv02_slivers_keep_their_area() {
 #[test]
 fn cv03_a_mesh_far_away_gives_the_same_offsets() {
     let mut mesh = quad(0.5);
-    let (near, _) = mesh_to_points(&mesh, &params(0.01, 0.5)).unwrap();
+    let (near, _) = mesh_to_points(&mesh, &params(0.01, 0.5), None).unwrap();
     mesh.origin = DVec3::splat(1e7);
-    let (mut far, report) = mesh_to_points(&mesh, &params(0.01, 0.5)).unwrap();
+    let (mut far, report) = mesh_to_points(&mesh, &params(0.01, 0.5), None).unwrap();
     assert_eq!(far.origin, DVec3::splat(1e7));
     assert!((report.area - 0.25).abs() < 1e-12);
     far.origin = DVec3::ZERO;
@@ -102,7 +102,7 @@ fn cv04_small_triangles_keep_their_share_among_many() {
         mesh.position.extend([Vec3::ZERO, Vec3::X * s, Vec3::Z * s].map(|p| p + Vec3::Y * i as f32));
         mesh.triangles.push([n, n + 2, n + 1]);
     }
-    let (cloud, _) = mesh_to_points(&mesh, &params(0.03, 1.0)).unwrap();
+    let (cloud, _) = mesh_to_points(&mesh, &params(0.03, 1.0), None).unwrap();
     for i in 0..21u32 {
         let of_triangle = |j: &usize| cloud.position[*j].y == i as f32;
         let sum: f64 = (0..cloud.len()).filter(of_triangle).map(|j| f64::from(cloud.cross_section[j])).sum();
@@ -115,14 +115,14 @@ fn cv05_transmittance_does_not_depend_on_the_number_of_pieces() {
     let tau = optics::optical_depth(0.9);
     let footprint = Footprint::default();
     for (spacing, splats) in [(1.0 / 16.0, 288), (1.0 / 45.0, 2048), (1.0 / 64.0, 4232)] {
-        let (cloud, report) = mesh_to_points(&quad(1.0), &params(spacing, 0.9)).unwrap();
+        let (cloud, report) = mesh_to_points(&quad(1.0), &params(spacing, 0.9), None).unwrap();
         assert!(report.splats.abs_diff(splats) < splats / 2, "{}", report.splats);
         let (mean, ripple) = coverage(&cloud, tau, 1.0);
         assert!((mean - 1.0).abs() < 1e-3, "spacing {spacing}: mean {mean}");
         assert!(ripple < 1e-2, "spacing {spacing}: ripple {ripple}");
     }
     // Far finer than the kernels: the sum is the integral.
-    let (mut cloud, report) = mesh_to_points(&quad(1.0), &params(1.0 / 64.0, 0.9)).unwrap();
+    let (mut cloud, report) = mesh_to_points(&quad(1.0), &params(1.0 / 64.0, 0.9), None).unwrap();
     cloud.radius.fill(4.0 * report.radius as f32);
     let depth = reference::layer_depth(&cloud, footprint, DVec3::new(0.5, 0.0, 0.5), DVec3::Y);
     assert!((depth / tau - 1.0).abs() < 1e-4, "{depth}");
@@ -131,7 +131,7 @@ fn cv05_transmittance_does_not_depend_on_the_number_of_pieces() {
 #[test]
 fn cv06_tiny_opacities_keep_their_ratio() {
     for alpha in [1e-6, 1e-12] {
-        let (cloud, report) = mesh_to_points(&quad(1.0), &params(0.1, alpha)).unwrap();
+        let (cloud, report) = mesh_to_points(&quad(1.0), &params(0.1, alpha), None).unwrap();
         let sum: f64 = cloud.cross_section.iter().map(|k| f64::from(*k)).sum();
         assert!((sum / report.area / alpha - 1.0).abs() < 1e-5);
     }
@@ -140,15 +140,19 @@ fn cv06_tiny_opacities_keep_their_ratio() {
 #[test]
 fn cv10_absurd_spacings_are_refused_by_name() {
     let with = |density, max_splats| MeshParams {
-        splat: SplatParams { object_name: "bunny".into(), max_splats, ..SplatParams::default() },
+        splat: SplatParams {
+            object_name: "bunny".into(),
+            limits: Limits::elements(max_splats),
+            ..SplatParams::default()
+        },
         density,
         opacity: 1.0,
     };
-    let error = mesh_to_points(&quad(1.0), &with(Density::Spacing(1e-9), 1000)).unwrap_err();
-    assert!(matches!(error, ConvertError::TooMany { .. }));
+    let error = mesh_to_points(&quad(1.0), &with(Density::Spacing(1e-9), 1000), None).unwrap_err();
+    assert!(matches!(error, ConvertError::Limit(_)));
     assert!(error.to_string().contains("bunny") && error.to_string().contains("1.000e18"), "{error}");
     for spacing in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-300] {
-        let error = mesh_to_points(&quad(1.0), &with(Density::Spacing(spacing), 1000)).unwrap_err();
+        let error = mesh_to_points(&quad(1.0), &with(Density::Spacing(spacing), 1000), None).unwrap_err();
         assert!(matches!(error, ConvertError::Parameter { parameter: "spacing", .. }), "{error}");
     }
     // A needle of no area to speak of whose strips alone would exceed the budget.
@@ -158,12 +162,12 @@ fn cv10_absurd_spacings_are_refused_by_name() {
         ..Mesh::default()
     };
     assert!(matches!(
-        mesh_to_points(&needle, &with(Density::Spacing(1e-4), 1 << 20)),
-        Err(ConvertError::TooMany { .. })
+        mesh_to_points(&needle, &with(Density::Spacing(1e-4), 1 << 20), None),
+        Err(ConvertError::Limit(_))
     ));
-    let (cloud, _) = mesh_to_points(&quad(1.0), &with(Density::Splats(u64::MAX), 100_000)).map_or_else(
+    let (cloud, _) = mesh_to_points(&quad(1.0), &with(Density::Splats(u64::MAX), 100_000), None).map_or_else(
         |e| {
-            assert!(matches!(e, ConvertError::TooMany { .. } | ConvertError::Parameter { .. }));
+            assert!(matches!(e, ConvertError::Limit(_) | ConvertError::Parameter { .. }));
             (Cloud::default(), 0)
         },
         |r| (r.0, 1),
@@ -181,7 +185,7 @@ fn slivers_cover_a_plane_as_evenly_as_squares() {
     }
     mesh.triangles = (1..=40).map(|i| [0, i + 1, i]).collect();
     let tau = optics::optical_depth(0.5);
-    let (cloud, report) = mesh_to_points(&mesh, &params(1.0 / 40.0, 0.5)).unwrap();
+    let (cloud, report) = mesh_to_points(&mesh, &params(1.0 / 40.0, 0.5), None).unwrap();
     let (mean, ripple) = coverage(&cloud, tau, 1.0);
     assert!((mean - 1.0).abs() < 1e-3 && ripple < 0.02, "mean {mean} ripple {ripple}");
     assert!(report.splats < 3 * 1600, "{}", report.splats);
@@ -189,7 +193,7 @@ fn slivers_cover_a_plane_as_evenly_as_squares() {
 
 #[test]
 fn computed_normals_of_a_sphere_point_outwards() {
-    let (cloud, report) = mesh_to_points(&sphere(24), &params(0.05, 1.0)).unwrap();
+    let (cloud, report) = mesh_to_points(&sphere(24), &params(0.05, 1.0), None).unwrap();
     assert!(report.normals_computed);
     assert!((report.area / (4.0 * std::f64::consts::PI) - 1.0).abs() < 0.01, "{}", report.area);
     for i in 0..cloud.len() {
@@ -204,7 +208,7 @@ fn computed_normals_of_a_sphere_point_outwards() {
 #[test]
 fn a_sphere_is_covered_once_by_its_own_splats() {
     let tau = optics::optical_depth(0.3);
-    let (cloud, _) = mesh_to_points(&sphere(64), &params(0.025, 0.3)).unwrap();
+    let (cloud, _) = mesh_to_points(&sphere(64), &params(0.025, 0.3), None).unwrap();
     let mut mean = 0.0;
     for i in 0..400u64 {
         let u = |k| 2.0 * rng::unit(5, 0, i, k) - 1.0;
@@ -219,7 +223,7 @@ fn colours_and_given_normals_are_interpolated() {
     let mut mesh = quad(1.0);
     mesh.normal = vec![Vec3::Y; 4];
     mesh.color = mesh.position.iter().map(|p| [p.x, p.z, 0.25]).collect();
-    let (cloud, report) = mesh_to_points(&mesh, &params(0.1, 1.0)).unwrap();
+    let (cloud, report) = mesh_to_points(&mesh, &params(0.1, 1.0), None).unwrap();
     assert!(!report.normals_computed);
     for i in 0..cloud.len() {
         let p = cloud.position[i];
@@ -237,20 +241,20 @@ fn a_transform_moves_scales_and_turns() {
         rotation: DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2),
         translation: DVec3::new(10.0, 20.0, 30.0),
     };
-    let (cloud, report) = mesh_to_points(&quad(1.0), &params).unwrap();
+    let (cloud, report) = mesh_to_points(&quad(1.0), &params, None).unwrap();
     assert!((report.area - 4.0).abs() < 1e-12);
     assert_eq!(cloud.origin, DVec3::new(10.0, 20.0, 30.0));
     assert!(cloud.normal.iter().all(|n| (*n - Vec3::NEG_X).length() < 1e-6));
     assert!(cloud.position.iter().all(|p| p.x.abs() < 1e-6 && p.y > 0.0 && p.y < 2.0));
-    assert_eq!(cloud.len(), mesh_to_points(&quad(1.0), &self::params(0.1, 0.5)).unwrap().0.len());
+    assert_eq!(cloud.len(), mesh_to_points(&quad(1.0), &self::params(0.1, 0.5), None).unwrap().0.len());
 }
 
 #[test]
 fn x3_scaling_by_a_power_of_two_scales_every_number() {
     let mesh = sphere(12);
-    let (one, _) = mesh_to_points(&mesh, &MeshParams::default()).unwrap();
+    let (one, _) = mesh_to_points(&mesh, &MeshParams::default(), None).unwrap();
     let big = Mesh { position: mesh.position.iter().map(|p| *p * 1024.0).collect(), ..mesh };
-    let (two, _) = mesh_to_points(&big, &MeshParams::default()).unwrap();
+    let (two, _) = mesh_to_points(&big, &MeshParams::default(), None).unwrap();
     assert_eq!(one.len(), two.len());
     for i in 0..one.len() {
         assert_eq!(one.position[i] * 1024.0, two.position[i]);
@@ -264,7 +268,7 @@ fn x3_scaling_by_a_power_of_two_scales_every_number() {
 fn x1_any_number_of_threads_gives_the_same_bits() {
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| mesh_to_points(&sphere(20), &params(0.007, 0.4)).unwrap().0)
+        pool.install(|| mesh_to_points(&sphere(20), &params(0.007, 0.4), None).unwrap().0)
     };
     let one = run(1);
     assert!(one.len() > 100_000);
@@ -277,7 +281,7 @@ fn x1_any_number_of_threads_gives_the_same_bits() {
 fn a_number_of_splats_is_met() {
     for wanted in [2_000u64, 30_000, 400_000] {
         let params = MeshParams { density: Density::Splats(wanted), ..MeshParams::default() };
-        let splats = mesh_to_points(&sphere(16), &params).unwrap().1.splats as f64;
+        let splats = mesh_to_points(&sphere(16), &params, None).unwrap().1.splats as f64;
         assert!((splats / wanted as f64 - 1.0).abs() < 0.25, "{splats} of {wanted}");
     }
 }
@@ -286,12 +290,12 @@ fn a_number_of_splats_is_met() {
 fn memory_is_used_again() {
     let mut cloud = Cloud::default();
     let fine = params(0.01, 0.5);
-    convert::mesh_to_points_into(&quad(1.0), &fine, &mut cloud).unwrap();
+    convert::mesh_to_points_into(&quad(1.0), &fine, &mut cloud, None).unwrap();
     let place = cloud.position.as_ptr();
-    convert::mesh_to_points_into(&quad(1.0), &params(0.02, 1.0), &mut cloud).unwrap();
-    convert::mesh_to_points_into(&quad(1.0), &fine, &mut cloud).unwrap();
+    convert::mesh_to_points_into(&quad(1.0), &params(0.02, 1.0), &mut cloud, None).unwrap();
+    convert::mesh_to_points_into(&quad(1.0), &fine, &mut cloud, None).unwrap();
     assert_eq!(cloud.position.as_ptr(), place);
-    assert_eq!(cloud, mesh_to_points(&quad(1.0), &fine).unwrap().0);
+    assert_eq!(cloud, mesh_to_points(&quad(1.0), &fine, None).unwrap().0);
 }
 
 #[test]
@@ -301,7 +305,7 @@ fn discs_of_coarse_triangles_lie_in_their_planes() {
     let signs = (0..8u32).map(|k| octant(k & 1, 2 + (k >> 1 & 1), 4 + (k >> 2), k.count_ones() % 2 == 0));
     let mut mesh = Mesh { position: vec![x, -x, y, -y, z, -z], triangles: signs.collect(), ..Mesh::default() };
     mesh.normal = mesh.position.clone();
-    let (cloud, _) = mesh_to_points(&mesh, &params(0.1, 1.0)).unwrap();
+    let (cloud, _) = mesh_to_points(&mesh, &params(0.1, 1.0), None).unwrap();
     cloud.validate().unwrap();
     assert!(cloud.tangent.is_empty(), "a closed surface has no border");
     for (i, p) in cloud.position.iter().enumerate() {
@@ -310,6 +314,6 @@ fn discs_of_coarse_triangles_lie_in_their_planes() {
         assert!(cloud.shading_normal_of(i).distance(p.normalize()) < 1e-6, "{} at {p}", cloud.shading_normal[i]);
     }
     // Triangles of one splat each stand for a surface that is as fine as they are.
-    let fine = mesh_to_points(&mesh, &params(2.0, 1.0)).unwrap().0;
+    let fine = mesh_to_points(&mesh, &params(2.0, 1.0), None).unwrap().0;
     assert!(fine.shading_normal.is_empty() && fine.normal[0].distance(fine.position[0].normalize()) < 1e-6);
 }

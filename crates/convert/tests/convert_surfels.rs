@@ -25,8 +25,8 @@ fn sphere(n: u64) -> RawPoints {
 fn cv11_a_million_points_at_one_place_are_counted_and_do_not_darken() {
     let mut points = plane(10);
     points.position.extend(std::iter::repeat_n(Vec3::new(5.0, 0.0, 5.0), 999_999));
-    let alone = raw_to_surfels(&plane(10), &SurfelParams::default()).unwrap().1;
-    let (cloud, report) = raw_to_surfels(&points, &SurfelParams::default()).unwrap();
+    let alone = raw_to_surfels(&plane(10), &SurfelParams::default(), None).unwrap().1;
+    let (cloud, report) = raw_to_surfels(&points, &SurfelParams::default(), None).unwrap();
     assert_eq!(report.duplicates, 999_999);
     assert_eq!(cloud.len(), 1_000_099);
     assert!((report.area - alone.area).abs() < 1e-9 * alone.area);
@@ -34,9 +34,9 @@ fn cv11_a_million_points_at_one_place_are_counted_and_do_not_darken() {
     assert!((sum / alone.area - 1.0).abs() < 1e-4);
     assert!(cloud.radius.iter().all(|r| *r >= 2.4 && r.is_finite()));
     let merged = SurfelParams { merge_duplicates: true, ..SurfelParams::default() };
-    assert_eq!(raw_to_surfels(&points, &merged).unwrap().0.len(), 100);
+    assert_eq!(raw_to_surfels(&points, &merged, None).unwrap().0.len(), 100);
     let same = RawPoints { position: vec![Vec3::ONE; 1_000_000], ..RawPoints::default() };
-    let (cloud, report) = raw_to_surfels(&same, &SurfelParams::default()).unwrap();
+    let (cloud, report) = raw_to_surfels(&same, &SurfelParams::default(), None).unwrap();
     assert_eq!(report.duplicates, 999_999);
     cloud.validate().unwrap();
 }
@@ -45,9 +45,9 @@ fn cv11_a_million_points_at_one_place_are_counted_and_do_not_darken() {
 fn cv12_points_far_away_keep_their_millimetres() {
     let mut points = plane(12);
     points.position.iter_mut().for_each(|p| *p *= 1e-3);
-    let near = raw_to_surfels(&points, &SurfelParams::default()).unwrap().0;
+    let near = raw_to_surfels(&points, &SurfelParams::default(), None).unwrap().0;
     points.origin = DVec3::new(5_001_234.567, 0.0, 5e6);
-    let mut far = raw_to_surfels(&points, &SurfelParams::default()).unwrap().0;
+    let mut far = raw_to_surfels(&points, &SurfelParams::default(), None).unwrap().0;
     assert_eq!(far.origin, points.origin);
     far.origin = DVec3::ZERO;
     assert_eq!(far, near);
@@ -56,7 +56,7 @@ fn cv12_points_far_away_keep_their_millimetres() {
 #[test]
 fn a_lattice_is_covered_once() {
     let params = SurfelParams { opacity: 0.4, ..SurfelParams::default() };
-    let (cloud, report) = raw_to_surfels(&plane(20), &params).unwrap();
+    let (cloud, report) = raw_to_surfels(&plane(20), &params, None).unwrap();
     assert!((report.median_spacing - 1.0).abs() < 1e-9);
     for i in 0..64u32 {
         let p = DVec3::new(9.0 + f64::from(i % 8) / 8.0, 0.0, 9.0 + f64::from(i / 8) / 8.0);
@@ -69,7 +69,7 @@ fn a_lattice_is_covered_once() {
 fn areas_of_a_sphere_sum_to_its_area_and_normals_are_radial() {
     for orientation in [Orientation::Propagate, Orientation::Toward(DVec3::Y), Orientation::Viewpoint(DVec3::Z * 9.0)] {
         let params = SurfelParams { orientation, ..SurfelParams::default() };
-        let (cloud, report) = raw_to_surfels(&sphere(20_000), &params).unwrap();
+        let (cloud, report) = raw_to_surfels(&sphere(20_000), &params, None).unwrap();
         assert!((report.area / (4.0 * std::f64::consts::PI) - 1.0).abs() < 2e-3, "{}", report.area);
         for i in 0..cloud.len() {
             let (p, n) = (cloud.position[i].normalize(), cloud.normal[i]);
@@ -88,7 +88,7 @@ fn scattered_points_cover_their_plane_once_in_the_mean() {
     let n = 4000u64;
     let position = (0..n).map(|i| Vec3::new(rng::unit_f32(9, 0, i, 0), 0.0, rng::unit_f32(9, 0, i, 1))).collect();
     let points = RawPoints { position, ..RawPoints::default() };
-    let (cloud, _) = raw_to_surfels(&points, &SurfelParams { opacity: 0.5, ..SurfelParams::default() }).unwrap();
+    let (cloud, _) = raw_to_surfels(&points, &SurfelParams { opacity: 0.5, ..SurfelParams::default() }, None).unwrap();
     let (mut mean, mut thinnest) = (0.0, f64::INFINITY);
     for i in 0..1024u32 {
         let p = DVec3::new(0.2 + 0.6 * f64::from(i % 32) / 32.0, 0.0, 0.2 + 0.6 * f64::from(i / 32) / 32.0);
@@ -106,7 +106,7 @@ fn few_points_and_lines_have_finite_attributes() {
         let points = RawPoints { position, ..RawPoints::default() };
         for orientation in [Orientation::Propagate, Orientation::default()] {
             let (cloud, report) =
-                raw_to_surfels(&points, &SurfelParams { orientation, ..SurfelParams::default() }).unwrap();
+                raw_to_surfels(&points, &SurfelParams { orientation, ..SurfelParams::default() }, None).unwrap();
             cloud.validate().unwrap();
             assert_eq!((cloud.len(), report.without_plane), (n, n as u64));
         }
@@ -117,7 +117,7 @@ fn few_points_and_lines_have_finite_attributes() {
 fn a_lone_point_does_not_become_a_huge_disc() {
     let mut points = plane(30);
     points.position.push(Vec3::new(1e4, 1e4, 0.0));
-    let (cloud, report) = raw_to_surfels(&points, &SurfelParams::default()).unwrap();
+    let (cloud, report) = raw_to_surfels(&points, &SurfelParams::default(), None).unwrap();
     assert!(report.lone >= 1);
     assert!(cloud.radius.iter().all(|r| *r <= 4.0 * 2.4 * 1.001));
 }
@@ -134,7 +134,7 @@ fn x4_and_x1_neither_order_nor_threads_matter() {
     let params = SurfelParams { values: true, orientation: Orientation::Propagate, ..SurfelParams::default() };
     let run = |points: &RawPoints, threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| raw_to_surfels(points, &params).unwrap().0)
+        pool.install(|| raw_to_surfels(points, &params, None).unwrap().0)
     };
     let one = run(&points, 1);
     assert!(run(&reversed, 3) == one);

@@ -2,7 +2,7 @@
 
 use convert::{ConvertError, SplatParams, VolumeParams, reference, sobel_gradient, volume_to_points};
 use splat_core::glam::{DMat3, DQuat, DVec3, Vec3};
-use splat_core::{DAabb, Footprint, Grid, Similarity, TransferFunction, TransferPoint, rng};
+use splat_core::{DAabb, Exceeded, Footprint, Grid, Similarity, TransferFunction, TransferPoint, rng};
 
 fn grid(dims: [usize; 3], steps: DVec3, value: impl Fn(usize, usize, usize) -> f32) -> Grid {
     let values = (0..dims[0] * dims[1] * dims[2])
@@ -59,13 +59,13 @@ fn sobel_agrees_with_its_reference() {
 fn cv08_constant_volumes_and_empty_slices_have_no_normals_and_no_nan() {
     let params = VolumeParams { normals: true, values: true, ..VolumeParams::default() };
     let constant = grid([8, 8, 8], DVec3::ONE, |_, _, _| 3.0);
-    let (cloud, report) = volume_to_points(&constant, &ramp(0.0, 3.0, 1.0), &params).unwrap();
+    let (cloud, report) = volume_to_points(&constant, &ramp(0.0, 3.0, 1.0), &params, None).unwrap();
     assert_eq!((report.splats, report.without_normal), (512, 512));
     assert!(cloud.normal.iter().all(|n| *n == Vec3::ZERO));
     assert_eq!(cloud.value, vec![3.0; 512]);
     cloud.validate().unwrap();
     let slices = grid([8, 8, 8], DVec3::ONE, |_, _, k| if k == 3 { 1.0 } else { 0.0 });
-    let (cloud, report) = volume_to_points(&slices, &ramp(0.0, 1.0, 1.0), &params).unwrap();
+    let (cloud, report) = volume_to_points(&slices, &ramp(0.0, 1.0, 1.0), &params, None).unwrap();
     cloud.validate().unwrap();
     assert_eq!(report.splats, 64);
 }
@@ -75,15 +75,15 @@ fn cv09_absurd_lattices_are_refused() {
     let small = grid([2, 2, 2], DVec3::ONE, |_, _, _| 1.0);
     let named = SplatParams { object_name: "ct".into(), ..SplatParams::default() };
     let params = VolumeParams { splat: named, refine: 65536, ..VolumeParams::default() };
-    let error = volume_to_points(&small, &ramp(0.0, 1.0, 1.0), &params).unwrap_err();
-    assert!(matches!(error, ConvertError::TooMany { what: "lattice points", .. }), "{error}");
+    let error = volume_to_points(&small, &ramp(0.0, 1.0, 1.0), &params, None).unwrap_err();
+    assert!(matches!(error, ConvertError::Limit(Exceeded { unit: "lattice points", .. })), "{error}");
     assert!(error.to_string().contains("ct"));
     // A needle lattice would be split a million times along two axes.
     let needle = grid([2, 2, 2], DVec3::new(1e-9, 1.0, 1.0), |_, _, _| 1.0);
-    assert!(volume_to_points(&needle, &ramp(0.0, 1.0, 1.0), &VolumeParams::default()).is_err());
+    assert!(volume_to_points(&needle, &ramp(0.0, 1.0, 1.0), &VolumeParams::default(), None).is_err());
     let lying = Grid { dims: [2048, 2048, 2048], ..small };
     assert!(matches!(
-        volume_to_points(&lying, &ramp(0.0, 1.0, 1.0), &VolumeParams::default()),
+        volume_to_points(&lying, &ramp(0.0, 1.0, 1.0), &VolumeParams::default(), None),
         Err(ConvertError::Input { .. })
     ));
 }
@@ -95,7 +95,7 @@ fn cross_sections_of_a_homogeneous_box_sum_to_extinction_times_volume() {
             let box_grid = grid([6, 5, 4], steps, |_, _, _| 1.0);
             let mut params = VolumeParams { refine, ..VolumeParams::default() };
             params.splat.transform.scale = 2.0;
-            let (cloud, _) = volume_to_points(&box_grid, &ramp(0.0, 1.0, 0.3), &params).unwrap();
+            let (cloud, _) = volume_to_points(&box_grid, &ramp(0.0, 1.0, 0.3), &params, None).unwrap();
             let sum: f64 = cloud.cross_section.iter().map(|k| f64::from(*k)).sum();
             let exact = f64::from(0.3f32) * 120.0 * box_grid.cell_volume() * 8.0;
             assert!((sum / exact - 1.0).abs() < 1e-6, "{steps} {refine}: {sum} {exact}");
@@ -106,7 +106,7 @@ fn cross_sections_of_a_homogeneous_box_sum_to_extinction_times_volume() {
 #[test]
 fn kernels_of_uneven_lattices_sum_to_a_homogeneous_medium() {
     let uneven = grid([24, 24, 12], DVec3::new(1.0, 1.0, 2.6), |_, _, _| 1.0);
-    let (cloud, report) = volume_to_points(&uneven, &ramp(0.0, 1.0, 0.1), &VolumeParams::default()).unwrap();
+    let (cloud, report) = volume_to_points(&uneven, &ramp(0.0, 1.0, 0.1), &VolumeParams::default(), None).unwrap();
     assert_eq!(report.lattice_points, 24 * 24 * 36);
     let exact = 0.1 * 24.0;
     for n in 0..64 {
@@ -120,9 +120,9 @@ fn kernels_of_uneven_lattices_sum_to_a_homogeneous_medium() {
 fn thin_voxels_may_be_left_out_within_the_bound() {
     let fading = grid([20, 20, 20], DVec3::ONE, |i, _, _| 0.5f32.powi(i as i32));
     let tf = ramp(0.0, 1.0, 1.0);
-    let (all, _) = volume_to_points(&fading, &tf, &VolumeParams::default()).unwrap();
+    let (all, _) = volume_to_points(&fading, &tf, &VolumeParams::default(), None).unwrap();
     let params = VolumeParams { omitted_optical_depth: 0.01, ..VolumeParams::default() };
-    let (some, report) = volume_to_points(&fading, &tf, &params).unwrap();
+    let (some, report) = volume_to_points(&fading, &tf, &params, None).unwrap();
     assert!(report.omitted > 0 && report.omitted + report.splats == 8000);
     assert!(report.omitted_optical_depth > 0.0 && report.omitted_optical_depth <= 0.01);
     for i in 0..20 {
@@ -140,7 +140,7 @@ fn normals_point_to_lower_values_and_turn_with_the_transform() {
     let mut params = VolumeParams { normals: true, ..VolumeParams::default() };
     params.splat.transform =
         Similarity { rotation: DQuat::from_rotation_y(0.7), translation: DVec3::splat(1e7), ..Similarity::default() };
-    let (cloud, _) = volume_to_points(&grid([17; 3], DVec3::ONE, ball), &ramp(0.0, 10.0, 1.0), &params).unwrap();
+    let (cloud, _) = volume_to_points(&grid([17; 3], DVec3::ONE, ball), &ramp(0.0, 10.0, 1.0), &params, None).unwrap();
     let middle = (params.splat.transform.rotation * DVec3::splat(8.0)).as_vec3();
     for i in 0..cloud.len() {
         let out = cloud.position[i] - middle;
@@ -155,7 +155,8 @@ fn normals_point_to_lower_values_and_turn_with_the_transform() {
 fn a_clip_box_keeps_what_lies_inside() {
     let params =
         VolumeParams { clip: Some(DAabb::new(DVec3::splat(1.5), DVec3::splat(4.0))), ..VolumeParams::default() };
-    let (cloud, _) = volume_to_points(&grid([8; 3], DVec3::ONE, |_, _, _| 1.0), &ramp(0.0, 1.0, 1.0), &params).unwrap();
+    let (cloud, _) =
+        volume_to_points(&grid([8; 3], DVec3::ONE, |_, _, _| 1.0), &ramp(0.0, 1.0, 1.0), &params, None).unwrap();
     assert_eq!(cloud.len(), 27);
 }
 
@@ -165,7 +166,7 @@ fn x1_any_number_of_threads_gives_the_same_bits() {
     let params = VolumeParams { normals: true, values: true, ..VolumeParams::default() };
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| volume_to_points(&noisy, &ramp(0.4, 1.0, 1.0), &params).unwrap())
+        pool.install(|| volume_to_points(&noisy, &ramp(0.4, 1.0, 1.0), &params, None).unwrap())
     };
     let one = run(1);
     for threads in [2, 3, 7] {
@@ -188,7 +189,7 @@ fn thin_oblique_sheets_have_no_moire() {
             let tf = TransferFunction::new(vec![point(-width, 0.0), point(0.0, 2.0), point(width, 0.0)]).unwrap();
             let exact = 2.0 * f64::from(width) / normal.z;
             let worst = |params: &VolumeParams| {
-                let (cloud, _) = volume_to_points(&sheet, &tf, params).unwrap();
+                let (cloud, _) = volume_to_points(&sheet, &tf, params, None).unwrap();
                 assert!(cloud.color.iter().all(|c| (c[2] - 0.8).abs() < 1e-6));
                 let places = (0..100).map(|n| DVec3::new(f64::from(n % 10), f64::from(n / 10), 0.0) * 0.57);
                 let depths = places.map(|p| {
@@ -209,7 +210,7 @@ fn thin_oblique_sheets_have_no_moire() {
 #[test]
 fn cells_without_a_bend_keep_their_voxels_value() {
     let linear = grid([9, 8, 7], DVec3::ONE, |i, j, k| 1.0 + 0.1 * (i + 2 * j + k) as f32);
-    let (cloud, report) = volume_to_points(&linear, &ramp(0.5, 8.0, 3.0), &VolumeParams::default()).unwrap();
+    let (cloud, report) = volume_to_points(&linear, &ramp(0.5, 8.0, 3.0), &VolumeParams::default(), None).unwrap();
     assert_eq!((report.splats, report.averaged), (9 * 8 * 7, 0));
     let tf = ramp(0.5, 8.0, 3.0);
     assert!(cloud.cross_section.iter().zip(&linear.values).all(|(k, v)| *k == tf.at(*v).extinction));

@@ -239,7 +239,7 @@ fn a_ball_in_a_volume_becomes_the_mesh_of_a_ball() {
     let center = DVec3::splat(10.0);
     let grid = sampled([21; 3], |u| u.distance(center));
     let f = GridField::new(Arc::new(grid), Interpolation::CatmullRom, 6.5, Inside::Below).unwrap();
-    let mesh = field_to_mesh(&f, f.bounds(), 0.7, &SplatParams::default()).unwrap();
+    let mesh = field_to_mesh(&f, f.bounds(), 0.7, &SplatParams::default(), None).unwrap();
     assert!(mesh.position.len() > 1000);
     for (p, n) in mesh.position.iter().zip(&mesh.normal) {
         let out = p.as_dvec3() + mesh.origin - center;

@@ -166,7 +166,7 @@ fn values_equal_to_the_isovalue_keep_the_mesh_closed() {
         let mesh = isosurface_to_mesh(&grid, 1.0, inside).unwrap();
         assert_closed(&mesh);
         assert!(mesh.position.iter().all(|p| p.is_finite()) && mesh.normal.iter().all(|n| n.is_normalized()));
-        let (cloud, report) = mesh_to_points(&mesh, &MeshParams::default()).unwrap();
+        let (cloud, report) = mesh_to_points(&mesh, &MeshParams::default(), None).unwrap();
         assert!(cloud.len() as u64 == report.splats && report.splats > 1000);
     }
     // A flat step meets the isovalue on a whole layer: no triangle is lost or doubled.

@@ -1,7 +1,7 @@
 //! Fields of scattered points: accuracy, derivatives, bounds, sameness, and inputs that are hardly surfaces.
 #![cfg(all(feature = "surfels", feature = "ply"))]
 
-use convert::read::{self, Loaded, ReadLimits};
+use convert::read::{self, Loaded, ReadParams};
 use convert::{
     MpuField, MpuParams, MpuReport, Orientation, RawPoints, SplatParams, field_to_mesh, points_to_field, vertex_normals,
 };
@@ -44,7 +44,7 @@ fn cloud(of: fn(u64) -> (DVec3, DVec3), count: u64) -> RawPoints {
 }
 
 fn field(points: &RawPoints, tolerance: f64) -> (MpuField, MpuReport) {
-    points_to_field(points, &MpuParams { tolerance, ..MpuParams::default() }).unwrap()
+    points_to_field(points, &MpuParams { tolerance, ..MpuParams::default() }, None).unwrap()
 }
 
 /// Mean and largest distance from the zero set, to first order, at places of the true surface, over the tolerance.
@@ -80,7 +80,7 @@ fn a_box_keeps_its_edges_where_shapes_may_be_sharp() {
     let points = cloud(on_box, 20_000);
     let (sharp, report) = field(&points, 1e-3);
     let rounded =
-        points_to_field(&points, &MpuParams { tolerance: 1e-3, sharp: false, ..MpuParams::default() }).unwrap();
+        points_to_field(&points, &MpuParams { tolerance: 1e-3, sharp: false, ..MpuParams::default() }, None).unwrap();
     let (a, b) = (misses(on_box, &sharp, &report), misses(on_box, &rounded.0, &rounded.1));
     println!("sharp {a:?} {report:?}\nrounded {b:?} {:?}", rounded.1);
     assert!(report.sharp > 0 && rounded.1.sharp == 0);
@@ -255,13 +255,13 @@ fn missing_normals_are_estimated() {
     assert!(f.value(DVec3::ZERO) < 0.0 && f.value(DVec3::splat(0.7)) > 0.0);
     // Towards the middle: inside out.
     let params = MpuParams { orientation: Orientation::Viewpoint(DVec3::ZERO), ..MpuParams::default() };
-    assert!(points_to_field(&points, &params).unwrap().0.value(DVec3::ZERO) > 0.0);
+    assert!(points_to_field(&points, &params, None).unwrap().0.value(DVec3::ZERO) > 0.0);
 }
 
 #[test]
 fn what_is_no_surface_is_refused() {
     let says = |points: &RawPoints, params: &MpuParams, needle: &str| {
-        let error = points_to_field(points, params).unwrap_err().to_string();
+        let error = points_to_field(points, params, None).unwrap_err().to_string();
         assert!(error.contains(needle), "{error}");
     };
     let (good, default) = (cloud(on_sphere, 100), MpuParams::default());
@@ -295,7 +295,7 @@ fn what_is_no_surface_is_refused() {
 #[test]
 fn the_bunny_is_met_within_the_tolerance_and_has_no_other_sheets() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/stanford-bunny/bunny.ply.gz");
-    let Loaded::Mesh(mesh) = read::file(&path, &ReadLimits::default()).unwrap() else { panic!("not a mesh") };
+    let Loaded::Mesh(mesh) = read::file(&path, &ReadParams::default(), None).unwrap().0 else { panic!("not a mesh") };
     let normal = vertex_normals(&mesh);
     let points = RawPoints { origin: mesh.origin, position: mesh.position, normal, ..RawPoints::default() };
     let (f, report) = field(&points, 1e-3);
@@ -309,7 +309,7 @@ fn the_bunny_is_met_within_the_tolerance_and_has_no_other_sheets() {
     let n = distance.len();
     assert!(distance[n / 2] < 0.05 && distance[n * 99 / 100] < 0.25 && distance[n - 1] < 1.0, "{}", distance[n - 1]);
     let side = f.bounds().size().x;
-    let zero_set = field_to_mesh(&f, f.bounds(), side / 150.0, &SplatParams::default()).unwrap();
+    let zero_set = field_to_mesh(&f, f.bounds(), side / 150.0, &SplatParams::default(), None).unwrap();
     let nearest = |p: DVec3| {
         let squared = points.position.iter().map(|q| (q.as_dvec3() + points.origin - p).length_squared());
         squared.fold(f64::INFINITY, f64::min).sqrt()

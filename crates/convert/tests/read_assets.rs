@@ -1,7 +1,7 @@
 //! The real inputs that come with the repository.
 #![cfg(all(feature = "ply", feature = "nifti", feature = "las"))]
 
-use convert::read::{Loaded, ReadLimits, file};
+use convert::read::{Loaded, ReadParams, file};
 use splat_core::glam::DVec3;
 use splat_core::{Aabb, Mesh};
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ fn path(name: &str) -> PathBuf {
 }
 
 fn load(name: &str) -> Loaded {
-    file(&path(name), &ReadLimits::default()).unwrap_or_else(|e| panic!("{e}"))
+    file(&path(name), &ReadParams::default(), None).map(|read| read.0).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn mesh(name: &str) -> Mesh {

@@ -2,7 +2,7 @@
 #![cfg(all(feature = "ply", feature = "stl", feature = "obj"))]
 
 use convert::Fault;
-use convert::read::{Fix, Loaded, ReadLimits, bytes, bytes_with_notes};
+use convert::read::{Fix, Loaded, ReadParams, bytes};
 use splat_core::glam::Vec3;
 use splat_core::{Mesh, Progress};
 
@@ -10,11 +10,11 @@ use splat_core::{Mesh, Progress};
 #[track_caller]
 fn mended(name: &str, content: impl AsRef<[u8]>, refusal: &str) -> (Mesh, Vec<(Fix, String)>) {
     let content = content.as_ref();
-    let strict = ReadLimits { strict: true, ..ReadLimits::default() };
-    let error = bytes(name, content, &strict).unwrap_err();
+    let strict = ReadParams { strict: true, ..ReadParams::default() };
+    let error = bytes(name, content, &strict, None).unwrap_err();
     assert_eq!(error.fault, Fault::Input);
     assert!(error.to_string().starts_with(refusal) && error.to_string().contains("\nhint: "), "{error}");
-    let read = bytes_with_notes(name, content, &ReadLimits::default(), &Progress::new()).unwrap();
+    let read = bytes(name, content, &ReadParams::default(), None).unwrap();
     let (Loaded::Mesh(mesh), notes) = read else { panic!("no mesh") };
     mesh.validate().unwrap();
     (mesh, notes.mended.iter().map(|m| (m.fix, m.to_string())).collect())
@@ -23,8 +23,8 @@ fn mended(name: &str, content: impl AsRef<[u8]>, refusal: &str) -> (Mesh, Vec<(F
 /// A mesh that also a strict reader takes, with nothing to say.
 #[track_caller]
 fn whole(name: &str, content: impl AsRef<[u8]>) -> Mesh {
-    let strict = ReadLimits { strict: true, ..ReadLimits::default() };
-    let (loaded, notes) = bytes_with_notes(name, content.as_ref(), &strict, &Progress::new()).unwrap();
+    let strict = ReadParams { strict: true, ..ReadParams::default() };
+    let (loaded, notes) = bytes(name, content.as_ref(), &strict, None).unwrap();
     assert!(notes.mended.is_empty(), "{:?}", notes.mended);
     let Loaded::Mesh(mesh) = loaded else { panic!("no mesh") };
     mesh
@@ -127,7 +127,7 @@ fn triangle_strips_are_faces_of_one_orientation() {
         let mesh = whole("a.ply", file(kind, strip));
         assert_eq!((mesh.triangles.len(), up(&mesh)), (count, true), "{strip} {:?}", mesh.triangles);
     }
-    let bad = bytes("a.ply", file("int", "4 1 0 3 8\n").as_bytes(), &ReadLimits::default()).unwrap_err();
+    let bad = bytes("a.ply", file("int", "4 1 0 3 8\n").as_bytes(), &ReadParams::default(), None).unwrap_err();
     assert!(bad.to_string().starts_with("a.ply:18:9: expected a vertex of strip 0 from 0 to 7, found '8'"), "{bad}");
     // Beside faces.
     let both = ply(&vertices, &[&[0, 2, 1]])
@@ -146,7 +146,7 @@ fn normals_that_an_obj_names_and_has_not_are_computed() {
     assert_eq!(said, [(Fix::MissingNormals, line.to_owned())]);
     // Normals that come too late, or are no numbers, are errors.
     for face in ["f 1//1 2//1 3//1\nvn 0 0 1\n", "f 1//x 2//1 3//1\n", "f 1//0 2//1 3//1\n"] {
-        let error = bytes("a.obj", format!("{corners}{face}").as_bytes(), &ReadLimits::default()).unwrap_err();
+        let error = bytes("a.obj", format!("{corners}{face}").as_bytes(), &ReadParams::default(), None).unwrap_err();
         assert!(error.to_string().starts_with("a.obj:4:3: expected an index"), "{error}");
     }
 }
@@ -166,7 +166,7 @@ fn a_binary_stl_that_begins_like_a_text_and_has_some_bytes_more_is_binary() {
     let line = "a.stl@134: 2 bytes after the last facet are read over";
     assert_eq!(said, [(Fix::TrailingBytes, line.to_owned())]);
     file.truncate(130);
-    let error = bytes("a.stl", &file, &ReadLimits::default()).unwrap_err();
+    let error = bytes("a.stl", &file, &ReadParams::default(), None).unwrap_err();
     assert!(error.to_string().starts_with("a.stl@80: expected 84 + 50 x 1"), "{error}");
 }
 
@@ -175,7 +175,7 @@ fn a_reader_that_is_asked_to_stop_stops() {
     let progress = Progress::new();
     progress.cancel();
     for (name, content) in [("a.ply", ply(&BOW_TIE, &[&[0, 1, 2, 3]])), ("a.obj", "v 0 0 0\n".repeat(9))] {
-        let error = bytes_with_notes(name, content.as_bytes(), &ReadLimits::default(), &progress).unwrap_err();
+        let error = bytes(name, content.as_bytes(), &ReadParams::default(), Some(&progress)).unwrap_err();
         assert_eq!((error.fault, error.fault.exit_code()), (Fault::Cancelled, 130));
     }
 }

@@ -2,10 +2,10 @@
 #![cfg(all(feature = "stl", feature = "obj", feature = "xyz", feature = "nrrd", feature = "ply"))]
 
 use crate::read_samples::{gzip, load};
-use convert::read::{Loaded, ReadLimits, bytes, file};
+use convert::read::{Loaded, ReadParams, bytes, file};
 use convert::{Fault, RawPoints};
 use splat_core::glam::{DMat3, DVec3, Vec3};
-use splat_core::{Grid, Mesh};
+use splat_core::{Grid, Limits, Mesh};
 use std::path::{Path, PathBuf};
 
 const CORNERS: [[f32; 3]; 6] =
@@ -129,9 +129,9 @@ fn ba13_stl_is_binary_or_text_by_its_size() {
     }
     refused("a.stl", bad("    endloop\n", ""), "a.stl:7: expected 'endloop', found 'endfacet'");
     refused("a.stl", bad("endsolid", "solid"), "a.stl:16: expected 'facet normal X Y Z' or 'endsolid'");
-    let limits = ReadLimits { max_bytes: 239, ..ReadLimits::default() };
-    assert_eq!(bytes("a.stl", &stl_binary(b"a"), &limits).unwrap_err().fault, Fault::Limit);
-    assert_eq!(bytes("a.stl", stl_text().as_bytes(), &limits).unwrap_err().fault, Fault::Limit);
+    let limits = ReadParams { limits: Limits::bytes(239), ..ReadParams::default() };
+    assert_eq!(bytes("a.stl", &stl_binary(b"a"), &limits, None).unwrap_err().fault, Fault::Limit);
+    assert_eq!(bytes("a.stl", stl_text().as_bytes(), &limits, None).unwrap_err().fault, Fault::Limit);
 }
 
 #[test]
@@ -197,8 +197,8 @@ fn ba11_obj_indices_are_checked() {
     // A face of a million corners, all of them there: a fan of triangles without area, within the limit.
     let many = format!("v 0 0 0\nf{}\n", " 1".repeat(500_000));
     assert_eq!(mesh("a.obj", many.as_bytes()).triangles.len(), 499_998);
-    let limits = ReadLimits { max_bytes: 2 << 20, ..ReadLimits::default() };
-    assert_eq!(bytes("a.obj", many.as_bytes(), &limits).unwrap_err().fault, Fault::Limit);
+    let limits = ReadParams { limits: Limits::bytes(2 << 20), ..ReadParams::default() };
+    assert_eq!(bytes("a.obj", many.as_bytes(), &limits, None).unwrap_err().fault, Fault::Limit);
     let long = format!("v 0 0 0\nf{}\n", " 1".repeat(600_000));
     refused("a.obj", long, "a.obj:2: expected a line of at most 1 MiB");
 }
@@ -213,7 +213,7 @@ fn ba12_material_files_of_an_obj_are_never_opened() {
     for library in ["../../etc/passwd", "/etc/passwd", "https://example.org/a.mtl", "pipe.mtl", "missing.mtl"] {
         std::fs::write(folder.join("a.obj"), OBJ.replace("../../etc/passwd", library)).unwrap();
         // Opening the pipe would wait for ever.
-        assert!(file(&folder.join("a.obj"), &ReadLimits::default()).is_ok());
+        assert!(file(&folder.join("a.obj"), &ReadParams::default(), None).is_ok());
     }
 }
 
@@ -242,10 +242,12 @@ fn points_as_text_with_and_without_names() {
     refused("a.pts", "3\n1 2 3\n4 5 6\n", "a.pts:1: expected 3 points, as announced, found 2 points");
     refused("a.xyz", "hello\n1 2 3\n", "a.xyz:1:1: expected x, y and z, names of columns, or a number of points");
     refused("a.xyz", "1 2 3\n4 5 1e308\n", "a.xyz: expected coordinates that fit 32-bit floats");
-    let limits = ReadLimits { drop_invalid: true, ..ReadLimits::default() };
-    let Loaded::Points(p) = bytes("a.xyz", b"1 2 3\n4 nan 6\n7 8 inf\n1 1 1\n", &limits).unwrap() else { panic!() };
+    let limits = ReadParams { drop_invalid: true, ..ReadParams::default() };
+    let Loaded::Points(p) = bytes("a.xyz", b"1 2 3\n4 nan 6\n7 8 inf\n1 1 1\n", &limits, None).unwrap().0 else {
+        panic!()
+    };
     assert_eq!((p.len(), p.dropped), (2, 2));
-    assert!(bytes("a.xyz", b"1 2 3\n4 x 6\n", &limits).is_err());
+    assert!(bytes("a.xyz", b"1 2 3\n4 x 6\n", &limits, None).is_err());
 }
 
 #[test]
@@ -338,10 +340,10 @@ fn ba16_detached_data_lies_in_the_headers_folder() {
         let text = NRRD.replace("encoding: raw", &format!("encoding: {encoding}\ndata file: {name}"));
         let path = folder.join("a.nhdr");
         std::fs::write(&path, text.trim_end()).unwrap();
-        file(&path, &ReadLimits::default())
+        file(&path, &ReadParams::default(), None)
     };
     for (name, encoding) in [("data.raw", "raw"), ("./data.raw", "raw"), ("sub/data.raw.gz", "gzip")] {
-        let Ok(Loaded::Grid(grid)) = header(name, encoding) else { panic!("{name}") };
+        let Ok((Loaded::Grid(grid), _)) = header(name, encoding) else { panic!("{name}") };
         assert_eq!(grid.values[5], 1500.0);
     }
     let absolute = folder.join("data.raw");

@@ -2,10 +2,10 @@
 #![cfg(all(feature = "ply", feature = "obj", feature = "xyz", feature = "las"))]
 
 use crate::read_samples::{las, load, obj, ply_ascii, ply_binary, text_points};
-use convert::read::{ReadLimits, bytes_with_notes};
+use convert::read::{ReadParams, bytes};
 
 fn unused(name: &str, content: &[u8]) -> Vec<String> {
-    bytes_with_notes(name, content, &ReadLimits::default(), &splat_core::Progress::new()).unwrap().1.unused
+    bytes(name, content, &ReadParams::default(), None).unwrap().1.unused
 }
 
 #[test]

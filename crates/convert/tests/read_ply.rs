@@ -2,7 +2,7 @@
 #![cfg(feature = "ply")]
 
 use crate::read_samples::{VERTICES, gzip, load, ply_ascii, ply_binary};
-use convert::read::{Loaded, ReadLimits, bytes};
+use convert::read::{Loaded, ReadParams, bytes};
 use splat_core::Mesh;
 use splat_core::glam::{DVec3, Vec3};
 
@@ -90,8 +90,10 @@ fn ba18_points_that_are_no_numbers_are_named_or_dropped_and_counted() {
     let text = POINTS.replace("5000001.5 2", "nan inf");
     let error = load("p.ply", text.as_bytes()).unwrap_err().to_string();
     assert!(error.starts_with("p.ply:16:1: expected a finite number, found 'nan'"), "{error}");
-    let limits = ReadLimits { drop_invalid: true, ..ReadLimits::default() };
-    let Loaded::Points(points) = bytes("p.ply", text.as_bytes(), &limits).unwrap() else { panic!("not points") };
+    let limits = ReadParams { drop_invalid: true, ..ReadParams::default() };
+    let Loaded::Points(points) = bytes("p.ply", text.as_bytes(), &limits, None).unwrap().0 else {
+        panic!("not points")
+    };
     assert_eq!((points.len(), points.dropped, points.value.as_slice()), (2, 1, &[7.0, 9.5][..]));
     assert_eq!(points.exact_position(1).x, 5_000_002.75);
 }

@@ -1,7 +1,7 @@
 //! Faces of more than three corners: concave ones, collinear corners, holes by bridges, far away, scaled, crossing.
 #![cfg(feature = "ply")]
 
-use convert::read::{self, Loaded, ReadLimits};
+use convert::read::{self, Loaded, ReadParams};
 use splat_core::Mesh;
 use splat_core::glam::{DQuat, DVec3};
 
@@ -60,7 +60,7 @@ fn ply(corners: &[DVec3]) -> String {
 }
 
 fn read(text: &str) -> Result<Mesh, String> {
-    match read::bytes("p.ply", text.as_bytes(), &ReadLimits::default()).map_err(|e| e.to_string())? {
+    match read::bytes("p.ply", text.as_bytes(), &ReadParams::default(), None).map_err(|e| e.to_string())?.0 {
         Loaded::Mesh(mesh) => Ok(mesh),
         _ => Err("no mesh".into()),
     }
@@ -157,7 +157,7 @@ fn long_polygons(n: usize) -> [(Vec<[f64; 2]>, f64); 2] {
 fn a_face_of_a_hundred_thousand_corners_is_covered_once() {
     for (corners, expected) in long_polygons(100_000) {
         let text = ply(&flat(&corners, |p| p));
-        let Loaded::Mesh(mesh) = read::bytes("p.ply", text.as_bytes(), &ReadLimits::default()).unwrap() else {
+        let Loaded::Mesh(mesh) = read::bytes("p.ply", text.as_bytes(), &ReadParams::default(), None).unwrap().0 else {
             panic!()
         };
         let at = |i: u32| mesh.position[i as usize].as_dvec3().truncate();

@@ -2,7 +2,7 @@
 #![cfg(all(feature = "nrrd", feature = "nifti"))]
 
 use crate::read_samples::{NIFTI_F32, load, nifti};
-use convert::read::{Loaded, ReadLimits, bytes_with_notes};
+use convert::read::{Loaded, ReadParams, bytes};
 use convert::{VolumeParams, volume_to_points};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::{Grid, TransferFunction, TransferPoint};
@@ -34,7 +34,7 @@ fn one_head_lies_in_one_place_whichever_space_its_file_has() {
     let cloud = |grid: &Grid| {
         let point = |value, extinction| TransferPoint { value, color: [0.5, value.abs() / 5.0, 1.0], extinction };
         let transfer = TransferFunction::new(vec![point(-1.0, 0.0), point(4.5, 2.0)]).unwrap();
-        volume_to_points(grid, &transfer, &VolumeParams { normals: true, ..VolumeParams::default() }).unwrap().0
+        volume_to_points(grid, &transfer, &VolumeParams { normals: true, ..VolumeParams::default() }, None).unwrap().0
     };
     for (space, x, y) in [
         ("space: right-anterior-superior", 1.0, 1.0),
@@ -55,12 +55,8 @@ fn one_head_lies_in_one_place_whichever_space_its_file_has() {
 
 #[test]
 fn what_was_converted_is_said() {
-    let remarks = |space: &str, x, y| {
-        bytes_with_notes("a.nrrd", &nrrd(space, x, y), &ReadLimits::default(), &splat_core::Progress::new())
-            .unwrap()
-            .1
-            .remarks
-    };
+    let remarks =
+        |space: &str, x, y| bytes("a.nrrd", &nrrd(space, x, y), &ReadParams::default(), None).unwrap().1.remarks;
     let said = "space: left-posterior-superior, converted to right-anterior-superior";
     assert_eq!(remarks("space: LPS", -1.0, -1.0), [said]);
     assert!(remarks("space: RAS", 1.0, 1.0).is_empty());

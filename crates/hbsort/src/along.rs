@@ -5,7 +5,7 @@
 
 use crate::project::{CULLED, Extremes};
 use crate::scratch::CHUNK;
-use crate::sort::{check_count, check_ids, slice_projected};
+use crate::sort::{Bits, check_count, check_ids, slice_projected};
 use crate::{Error, Params, Scratch};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -91,5 +91,5 @@ pub fn slice_along(
     };
     let extremes = order.input_from_sorted.par_chunks_mut(CHUNK).enumerate().map(chunk);
     let extremes = extremes.reduce(|| Extremes::NONE, Extremes::join);
-    slice_projected(cloud, ids, &extremes, distance, params, order, scratch)
+    slice_projected((cloud, ids), Bits { extremes, order }, distance, params, scratch)
 }

@@ -1,6 +1,6 @@
 //! Errors of the sort: parameters out of range, depths that are no numbers, too many splats, no memory.
 
-use splat_core::glam::DVec3;
+use splat_core::{Exceeded, glam::DVec3};
 
 /// Why a sort was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -41,25 +41,13 @@ pub enum Error {
         /// Splats in the cloud.
         len: usize,
     },
-    /// More splats than an order can name.
-    #[error("{needed} splats, the limit is {had}")]
-    TooMany {
-        /// Splats given.
-        needed: u64,
-        /// Splats allowed.
-        had: u64,
-    },
-    /// A recording has less room than it needs: record again with what it needs.
+    /// More splats than an order can name, or buffers that the system has no memory for.
+    #[error("{0}; {hint}", hint = .0.hint)]
+    Limit(Exceeded),
+    /// A recording has less room than it needs.
     #[cfg(feature = "gpu")]
-    #[error("room for {had} {what}, needed {needed}: record the sort again with that")]
-    Overflow {
-        /// What there is too little room for.
-        what: &'static str,
-        /// Room that is needed.
-        needed: u64,
-        /// Room that there was.
-        had: u64,
-    },
+    #[error(transparent)]
+    Overflow(#[from] splat_shaders::Overflow),
     /// What was read back is no result of the recording.
     #[cfg(feature = "gpu")]
     #[error("{found} bytes of {what} were read back, expected {expected}")]
@@ -75,10 +63,4 @@ pub enum Error {
     #[cfg(feature = "gpu")]
     #[error(transparent)]
     Device(#[from] splat_shaders::DeviceError),
-    /// The system refused the memory for the buffers.
-    #[error("no memory for {bytes} bytes of sort buffers")]
-    Memory {
-        /// Size of the buffer that was refused, bytes.
-        bytes: u64,
-    },
 }

@@ -32,8 +32,8 @@ use glam::DVec3;
 use splat_core::{Camera, Cloud, Direction, SliceOrder};
 use splat_shaders::kernels;
 use splat_shaders::layouts::{Scan, SortState, SortView};
-use splat_shaders::radix::{SCAN_BLOCK, Scanned, sort_pass};
-use splat_shaders::{BufferId, Groups, Recording};
+use splat_shaders::radix::{SCAN_BLOCK, Scanned, SortPass, sort_pass};
+use splat_shaders::{BufferId, Groups, Overflow, Recording};
 
 pub use parts::{Sorted, join};
 pub use run::slice_cloud_on;
@@ -108,7 +108,16 @@ pub fn record(capacities: Capacities) -> Recorded {
     r.dispatch(&kernels::HBSORT_PREPARE, Groups::cover(1), &[block_scan, state, digit_scan], &[kept]);
     for pass in 0..4 {
         let (from, to) = (pass % 2, 1 - pass % 2);
-        sort_pass(r, 8 * pass as u32, state, [keys[from], places[from]], [keys[to], places[to]], digits);
+        sort_pass(
+            r,
+            SortPass {
+                shift: 8 * pass as u32,
+                state,
+                from: [keys[from], places[from]],
+                to: [keys[to], places[to]],
+                digits,
+            },
+        );
     }
     r.read(state);
     r.read(keys[0]);
@@ -120,7 +129,7 @@ impl Recorded {
     /// The bytes that the recording takes for this view of a cloud, or of the splats `ids` of it.
     ///
     /// # Errors
-    /// [`Error::Overflow`] for more splats than there is room for, [`Error::Ids`], [`Error::TooMany`].
+    /// [`Error::Overflow`] for more splats than there is room for, [`Error::Ids`], [`Error::Limit`].
     pub fn uploads(
         &self,
         cloud: &Cloud,
@@ -133,7 +142,7 @@ impl Recorded {
         ids.map_or(Ok(()), |ids| check_ids(ids, len))?;
         let (needed, had) = (ids.map_or(len, <[u32]>::len) as u64, u64::from(self.capacities.splats));
         if needed > had {
-            return Err(Error::Overflow { what: "splats", needed, had });
+            return Err(Error::Overflow(Overflow { what: "splats", needed, had }));
         }
         let id = |place: usize| ids.map_or(place, |ids| ids[place] as usize);
         let places = || (0..needed as usize).map(id);

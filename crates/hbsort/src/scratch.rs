@@ -1,7 +1,7 @@
 //! Buffers that live from one sort to the next, and what the last sort did.
 
 use crate::Error;
-use splat_core::SliceOrder;
+use splat_core::{Exceeded, SliceOrder};
 use std::sync::Mutex;
 
 /// Splats that one task distributes at a time. A constant, never a share of the threads; small enough that the task's
@@ -137,7 +137,11 @@ fn bytes_of<T>(buffer: &Vec<T>) -> u64 {
 
 /// Makes `buffer` `n` entries long; entries that were there keep their value, which the caller overwrites.
 pub(crate) fn resize<T: Clone + Default>(buffer: &mut Vec<T>, n: usize) -> Result<(), Error> {
-    let refused = |_| Error::Memory { bytes: (n as u64).saturating_mul(size_of::<T>() as u64) };
+    let refused = |_| {
+        let (what, hint) = ("a buffer of the sort".into(), "free memory, or sort parts of the cloud".into());
+        let needed = (n as u64).saturating_mul(size_of::<T>() as u64);
+        Error::Limit(Exceeded { what, needed, limit: None, unit: "bytes", hint })
+    };
     if buffer.capacity() < n {
         // Nothing of the old content is wanted: no copy, and fresh pages that the system has already cleared.
         *buffer = Vec::new();

@@ -10,7 +10,7 @@ use crate::scratch::{CHUNK, MOST_SPLATS, Method, SortInfo, ThicknessRule, resize
 use crate::slicing::Slicing;
 use crate::{Error, Params, Scratch, cost, thickness};
 use rayon::prelude::*;
-use splat_core::{Camera, Cloud, SliceOrder};
+use splat_core::{Camera, Cloud, Exceeded, SliceOrder};
 use std::sync::{Mutex, PoisonError};
 
 /// Slices whose index one task finds at least.
@@ -26,7 +26,7 @@ const INDEXED: usize = 1 << 12;
 /// has the same bits for any number of threads. Scaling scene and camera by a power of two changes no id.
 ///
 /// # Errors
-/// [`Error::Thickness`], [`Error::Ids`], [`Error::TooMany`] or [`Error::Memory`]. A cloud whose columns differ in
+/// [`Error::Thickness`], [`Error::Ids`] or [`Error::Limit`]. A cloud whose columns differ in
 /// length is cut to the shorter of positions and radii; splats that are no finite numbers are culled.
 pub fn slice_cloud(
     cloud: &Cloud,
@@ -44,18 +44,22 @@ pub fn slice_cloud(
     let mut order = scratch.take_order(ids.map_or(len, <[u32]>::len))?;
     let projector = Projector::new(cloud, ids, camera, params.margin_px);
     let extremes = projector.project(&mut order.input_from_sorted);
-    slice_projected(cloud, ids, &extremes, |id| projector.depth(id), params, order, scratch)
+    slice_projected((cloud, ids), Bits { extremes, order }, |id| projector.depth(id), params, scratch)
 }
 
-/// Slices the splats of a cloud, or those of `ids`, whose depths' bits stand in `order`. `depth_of` gives a splat's depth
-/// by its id.
+/// What a projection leaves: the bits of the depths, in the place of the ids that come of them, and their extremes.
+pub(crate) struct Bits {
+    pub(crate) extremes: Extremes,
+    pub(crate) order: SliceOrder,
+}
+
+/// Slices the splats of a cloud, or those of `ids`, once their depths are known. `depth_of` gives a splat's depth by its
+/// id.
 pub(crate) fn slice_projected(
-    cloud: &Cloud,
-    ids: Option<&[u32]>,
-    extremes: &Extremes,
+    (cloud, ids): (&Cloud, Option<&[u32]>),
+    Bits { extremes, order }: Bits,
     depth_of: impl Fn(u32) -> f32 + Sync,
     params: &Params,
-    order: SliceOrder,
     scratch: &mut Scratch,
 ) -> Result<SliceOrder, Error> {
     let given = params.given_thickness()?;
@@ -68,14 +72,14 @@ pub(crate) fn slice_projected(
     );
     let slicing = slicing_of(near, far, thickness, params, n);
     let id_of = |place: u32| ids.map_or(place, |ids| ids[place as usize]);
-    run(&slicing, None, depth_of, id_of, params, rule, order, scratch)
+    run(&slicing, Splats { depths: None, depth_of, id_of }, rule, order, scratch)
 }
 
 /// Orders ready view depths in slices; nothing is culled, and the id of a splat is its place in `depth`.
 ///
 /// # Errors
 /// [`Error::Depth`] for a depth that is not finite, [`Error::NoRadii`] without [`crate::Thickness::World`],
-/// [`Error::Thickness`], [`Error::TooMany`] or [`Error::Memory`].
+/// [`Error::Thickness`] or [`Error::Limit`].
 pub fn slice_depths(depth: &[f32], params: &Params, scratch: &mut Scratch) -> Result<SliceOrder, Error> {
     check_count(depth.len())?;
     let thickness = params.given_thickness()?.ok_or(Error::NoRadii)?;
@@ -83,11 +87,16 @@ pub fn slice_depths(depth: &[f32], params: &Params, scratch: &mut Scratch) -> Re
     let order = scratch.take_order(depth.len())?;
     let Some((near, far)) = extremes.depths() else { return Ok(nothing(order, params, 0, scratch)) };
     let slicing = slicing_of(near, far, thickness, params, depth.len());
-    run(&slicing, Some(depth), |id| depth[id as usize], |place| place, params, ThicknessRule::Given, order, scratch)
+    let splats = Splats { depths: Some(depth), depth_of: |id: u32| depth[id as usize], id_of: |place: u32| place };
+    run(&slicing, splats, ThicknessRule::Given, order, scratch)
 }
 
 pub(crate) fn check_count(n: usize) -> Result<(), Error> {
-    if n as u64 > MOST_SPLATS { Err(Error::TooMany { needed: n as u64, had: MOST_SPLATS }) } else { Ok(()) }
+    if n as u64 <= MOST_SPLATS {
+        return Ok(());
+    }
+    let (what, hint) = ("an order".into(), "sort parts of the cloud, one behind the other".into());
+    Err(Error::Limit(Exceeded { what, needed: n as u64, limit: Some(MOST_SPLATS), unit: "splats", hint }))
 }
 
 pub(crate) fn check_ids(ids: &[u32], len: usize) -> Result<(), Error> {
@@ -116,14 +125,21 @@ fn nothing(mut order: SliceOrder, params: &Params, n: usize, scratch: &mut Scrat
     order
 }
 
-/// The two levels and the slices, once near, far and ε are known. `order` holds the bits of the depths, unless they
-/// are in `depths`; `depth_of` gives a splat's depth by its id.
+/// Splats as the sort sees them.
+struct Splats<'a, D, I> {
+    /// Depths by place; `None` where their bits stand in the order.
+    depths: Option<&'a [f32]>,
+    /// A splat's depth by its id.
+    depth_of: D,
+    /// A splat's id by its place.
+    id_of: I,
+}
+
+/// The two levels and the slices, once near, far and ε are known. `order` holds the bits of the depths, unless the splats
+/// have them.
 fn run<D: Fn(u32) -> f32 + Sync, I: Fn(u32) -> u32 + Sync>(
     slicing: &Slicing,
-    depths: Option<&[f32]>,
-    depth_of: D,
-    id_of: I,
-    params: &Params,
+    Splats { depths, depth_of, id_of }: Splats<'_, D, I>,
     rule: ThicknessRule,
     mut order: SliceOrder,
     scratch: &mut Scratch,
@@ -153,7 +169,7 @@ fn run<D: Fn(u32) -> f32 + Sync, I: Fn(u32) -> u32 + Sync>(
     index_slices(slicing, &mut order, &depth_of);
     scratch.info = SortInfo { items_in: n as u64, rule, method, buckets: buckets as u32, bytes: scratch.bytes() };
     Ok(SliceOrder {
-        direction: params.direction,
+        direction: slicing.direction,
         near: slicing.near,
         far: slicing.far,
         thickness: slicing.thickness,

@@ -4,6 +4,7 @@ use crate::common::{camera, outdoor};
 use hbsort::gpu::{Capacities, record};
 use hbsort::{Error, Params};
 use splat_core::glam::DVec3;
+use splat_shaders::Overflow;
 
 const ROOM: Capacities = Capacities { splats: 100_000, kept: 60_000 };
 
@@ -28,12 +29,12 @@ fn too_little_room_says_how_much() {
     let small = record(Capacities { splats: 1999, kept: 100 });
     let params = Params::default();
     let refused = small.uploads(&cloud, None, &camera(DVec3::ZERO), &params);
-    assert_eq!(refused, Err(Error::Overflow { what: "splats", needed: 2000, had: 1999 }));
+    assert_eq!(refused, Err(Error::Overflow(Overflow { what: "splats", needed: 2000, had: 1999 })));
     // What a device reads back when 101 splats are in the view.
     let mut state = [0u8; 48];
     state[0] = 101;
     let order = small.order([&state, &[0; 400], &[0; 400]], &cloud, None, &params);
-    assert_eq!(order, Err(Error::Overflow { what: "splats in the view", needed: 101, had: 100 }));
+    assert_eq!(order, Err(Error::Overflow(Overflow { what: "splats in the view", needed: 101, had: 100 })));
 }
 
 #[test]

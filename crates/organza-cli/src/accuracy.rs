@@ -88,7 +88,14 @@ fn particles(
         return absent(reason);
     }
     let mut draw = |request: &Request| renderer.draw(request);
-    accuracy::random_study(&sweep, &points.limit, points.truth.clone(), options, progress, &mut draw).map(Ok)
+    accuracy::random_study(
+        &sweep,
+        accuracy::Yardsticks { limit: &points.limit, truth: points.truth.clone() },
+        options,
+        progress,
+        &mut draw,
+    )
+    .map(Ok)
 }
 
 fn summary(report: &Report, files: &[Target], as_json: bool) -> String {

@@ -38,7 +38,7 @@ pub use chain::{Chained, Splats, chain, keeps_shadows};
 pub use choice::{DeviceChoice, ListedDevice, devices};
 pub use device::{Device, Helper};
 pub use order::order;
-pub use particles::{Folding, Shadow};
+pub use particles::{Folding, Goal, Shadow};
 pub use passport::{Agreement, Checked, KernelTime, Passport, passport};
 pub use shadows::shadow_map;
 pub use splat_shaders::{Adapter, AdapterKind, Choice};

@@ -15,7 +15,7 @@ pub use lit::Shadow;
 use pbsr::gpu::{Capacities, Generated, Nearest, Recorded, Sources, record, record_generated};
 use pbsr::{Ensemble, Error, Scene};
 use splat_core::Progress;
-use splat_shaders::{BufferId, Executor, Lanes, PassTime, Ready};
+use splat_shaders::{BufferId, Executor, Lanes, Overflow, PassTime, Ready};
 
 /// Most sets of one run: a look at the clock and at an interrupt comes between two.
 const MOST_LEVELS: u32 = 16;
@@ -24,6 +24,23 @@ const PARTICLE_BYTES: u64 = 28;
 /// Said of particles that a device does not make.
 const UPLOADED: &str = "particles by random lines, walks and fields, and of tables too large for the device, are sampled by \
                         the processor";
+
+/// How far sets are folded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Goal {
+    /// Sets that the ensemble has then.
+    pub until: u32,
+    /// Bytes of particles that may lie on the device at once.
+    pub max_bytes: u64,
+}
+
+/// Sets that are folded by one recording.
+#[derive(Clone, Copy)]
+struct Batch<'a> {
+    scene: &'a Scene<'a>,
+    light: &'a Light,
+    room: Capacities,
+}
 
 /// How a device folds the sets of one scene, kept from step to step, and what it did.
 #[derive(Default)]
@@ -48,8 +65,8 @@ impl<'a> Folding<'a> {
         Self { shadows, ..Self::default() }
     }
 
-    /// Folds sets of particles until the ensemble has `until` of them, or as many as the device can; the rest is the
-    /// processor's. At most `max_bytes` of particles lie on the device at once. Gives the number of particles.
+    /// Folds sets of particles until the goal is reached, or as many as the device can; the rest is the processor's. Gives
+    /// the number of particles.
     ///
     /// # Errors
     /// When `progress` is cancelled; what was folded before stays in the ensemble.
@@ -58,8 +75,7 @@ impl<'a> Folding<'a> {
         helper: &Helper<'_>,
         scene: &Scene<'_>,
         ensemble: &mut Ensemble,
-        until: u32,
-        max_bytes: u64,
+        goal: Goal,
         progress: &Progress,
     ) -> Result<u64, Error> {
         if let Some(why) = lit::why_not(scene, ensemble, &self.shadows) {
@@ -67,7 +83,7 @@ impl<'a> Folding<'a> {
             return Ok(0);
         }
         let before = self.particles;
-        let folded = helper.with(|device| match self.fold_on(device, scene, ensemble, until, max_bytes, progress) {
+        let folded = helper.with(|device| match self.fold_on(device, scene, ensemble, goal, progress) {
             Err(Failure::Particles(e @ Error::Core(splat_core::Error::Cancelled))) => Ok(Err(e)),
             left => left.map(Ok),
         });
@@ -89,18 +105,16 @@ impl<'a> Folding<'a> {
         self.sources.as_ref().is_some_and(|sources| sources.as_ref().is_none_or(Sources::has_given))
     }
 
-    /// Folds sets until the ensemble has `until` of them, with at most so many bytes of particles at once, or says why the rest
-    /// is the processor's. What was folded before a failure stays in.
+    /// Folds sets until the goal is reached, or says why the rest is the processor's. What was folded before a failure stays in.
     pub(crate) fn fold_on(
         &mut self,
         device: &mut dyn Executor,
         scene: &Scene<'_>,
         ensemble: &mut Ensemble,
-        until: u32,
-        max_bytes: u64,
+        goal: Goal,
         progress: &Progress,
     ) -> Result<Option<&'static str>, Failure> {
-        let folded = self.fold_sets(device, scene, ensemble, until, max_bytes, progress);
+        let folded = self.fold_sets(device, scene, ensemble, goal, progress);
         if folded.is_err() {
             // They belong to a device that may be gone.
             (self.making, self.uploading) = (None, None);
@@ -113,18 +127,16 @@ impl<'a> Folding<'a> {
         device: &mut dyn Executor,
         scene: &Scene<'_>,
         ensemble: &mut Ensemble,
-        until: u32,
-        max_bytes: u64,
+        goal: Goal,
         progress: &Progress,
     ) -> Result<Option<&'static str>, Failure> {
+        let Goal { until, max_bytes } = goal;
         let most_bytes = device.adapter().binding_bytes.min(max_bytes);
         while ensemble.levels() < until {
             let of_set = *self.of_set.get_or_insert_with(|| expected_of_set(scene));
             let needed = PARTICLE_BYTES * u64::from(of_set.max(1));
             if needed > max_bytes {
-                return Err(
-                    Error::TooMuch { what: "one set of particles", needed, had: max_bytes, unit: "bytes" }.into()
-                );
+                return Err(Error::limit("one set of particles", needed, max_bytes, "bytes").into());
             }
             let levels = (until - ensemble.levels()).min(MOST_LEVELS).min((most_bytes / needed).max(1) as u32);
             let room = capacities(scene, of_set, levels);
@@ -135,19 +147,20 @@ impl<'a> Folding<'a> {
                     "a shadow map is larger than the device's kernels see: the processor lights particles",
                 ));
             }
+            let batch = Batch { scene, light: &light, room };
             let fit = |s: &Sources| s.largest_bytes() <= binding_bytes && s.bytes() <= max_bytes;
             let sources = || Sources::new(scene).filter(fit);
             let folded = match self.sources.get_or_insert_with(sources).take() {
-                None => self.upload(device, &light, scene, ensemble, room)?,
+                None => self.upload(device, batch, ensemble)?,
                 Some(sources) => {
-                    let folded = self.make(device, &sources, &light, scene, ensemble, room);
+                    let folded = self.make(device, &sources, batch, ensemble);
                     self.sources = Some(Some(sources));
                     folded?
                 }
             };
             match folded {
                 Ok(particles) => self.particles += particles,
-                Err(Error::TooMuch { needed, had, .. }) => {
+                Err(Error::Overflow(Overflow { needed, had, .. })) => {
                     self.of_set = Some(more_of_set(of_set, needed, had)?);
                     continue;
                 }
@@ -163,10 +176,8 @@ impl<'a> Folding<'a> {
         &mut self,
         device: &mut dyn Executor,
         sources: &Sources,
-        light: &Light,
-        scene: &Scene<'_>,
+        Batch { scene, light, room }: Batch<'_>,
         ensemble: &mut Ensemble,
-        room: Capacities,
     ) -> Result<Result<u64, Error>, Failure> {
         let kept = self.making.take().filter(|(generated, _)| generated.capacities == room);
         let fresh = kept.is_none();
@@ -202,10 +213,8 @@ impl<'a> Folding<'a> {
     fn upload(
         &mut self,
         device: &mut dyn Executor,
-        light: &Light,
-        scene: &Scene<'_>,
+        Batch { scene, light, room }: Batch<'_>,
         ensemble: &mut Ensemble,
-        room: Capacities,
     ) -> Result<Result<u64, Error>, Failure> {
         let kept = self.uploading.take().filter(|(recorded, _)| recorded.capacities == room);
         let fresh = kept.is_none();
@@ -254,7 +263,7 @@ fn more_of_set(of_set: u32, needed: u64, had: u64) -> Result<u32, Error> {
     let factor = (needed as f64 / had.max(1) as f64).max(1.25);
     let more = (f64::from(of_set) * factor).ceil();
     if more > f64::from(u32::MAX) {
-        return Err(Error::TooMuch { what: "one set", needed, had, unit: "particles" });
+        return Err(Error::limit("one set", needed, had, "particles"));
     }
     Ok(more as u32)
 }

@@ -8,7 +8,7 @@ use hbsort::gpu::slice_cloud_on;
 use hbsort::{Params, Scratch, SliceOrder, slice_cloud};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::gpu::Attributes;
-use splat_core::{Camera, Cloud, Light, LightShape, Progress, Projection, Splat, SplatKind, rng};
+use splat_core::{Camera, Cloud, Light, LightShape, Projection, Splat, SplatKind, rng};
 use splat_shaders::{Executor, PassTime};
 use tsm::gpu::{Casting, record_map};
 use tsm::{Deposits, Params as ShadowParams, Resolution};
@@ -38,8 +38,8 @@ pub(super) fn shadow_trial(device: &mut dyn Executor) -> Result<bool, Failure> {
     }
     let light = Light { shape: LightShape::Point { position: DVec3::new(0.4, 1.3, -0.3) }, intensity: [1.0; 3] };
     let params = ShadowParams { resolution: Resolution::Cells(64), ..ShadowParams::default() };
-    let casting = Casting::new(&cloud, &[], &[], &light, &params, &Progress::new())?;
-    let expected = Deposits::new(&cloud, &[], &[], &light, &params, &Progress::new())?.into_map();
+    let casting = Casting::new(&tsm::Scene::from(&cloud), &light, &params, None)?;
+    let expected = Deposits::new(&tsm::Scene::from(&cloud), &light, &params, None)?.into_map();
     let attributes = Attributes::new(&cloud, None)?;
     let entries = u32::try_from(expected.counts().entries).unwrap_or(u32::MAX);
     let recorded = record_map(casting.room(attributes.room(), entries));

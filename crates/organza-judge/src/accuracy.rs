@@ -37,7 +37,7 @@ pub use limit::Limit;
 pub use measure::{Distance, Frame, Renderer, Timed};
 pub use particles::particles;
 pub use points::{Facts, points};
-pub use random::{SEEDS, random_study};
+pub use random::{SEEDS, Yardsticks, random_study};
 pub use report::{Absent, Machine, Report, write};
 pub use resolve::{Curve, CurvePoint, Settled, settle};
 pub use sampled::Sampled;

@@ -13,7 +13,9 @@ pub use report::{OrdersReport, write};
 use crate::accuracy::{SEEDS, Sampled};
 use hbsort::Thickness;
 use organza::scene::{LayerChoice, ParticlesSettings, Scene, Technique};
-use organza::{CostRecord, Error, Frame, Loaded, Progress, RenderOptions, Shaded, draw_loaded, load, plan_loaded};
+use organza::{
+    CostRecord, Error, Frame, Loaded, Planned, Progress, RenderOptions, Shaded, draw_loaded, load, plan_loaded,
+};
 use reference::metrics::{Disorder, Image, Linear, Rays};
 use reference::statistics::Spread;
 use reference::{Input, Order};
@@ -175,7 +177,8 @@ fn by_technique(
     scene.render.technique = technique;
     let plan = plan_loaded(&scene, loaded, options)?;
     progress.enter();
-    let layers = draw_loaded(&scene, loaded, &plan, options, progress, &mut CostRecord::default())?;
+    let layers =
+        draw_loaded(&Planned { scene: &scene, loaded, plan: &plan, options }, progress, &mut CostRecord::default())?;
     progress.leave();
     image(&layers)
 }
@@ -193,7 +196,7 @@ fn particles(
     scene.render.technique = Technique::Particles;
     scene.render.particles = ParticlesSettings { repeat_level: SETS, target_error: None, ..scene.render.particles };
     let plan = match plan_loaded(&scene, loaded, options) {
-        Err(e @ (Error::Input { .. } | Error::Limit { .. } | Error::TooLarge { .. })) => return Ok(Err(e.to_string())),
+        Err(e @ (Error::Input { .. } | Error::Limit(_) | Error::TooLarge { .. })) => return Ok(Err(e.to_string())),
         planned => planned?,
     };
     let mut images = Vec::new();
@@ -203,7 +206,11 @@ fn particles(
     for k in 1..=SEEDS {
         progress.begin(&seed(k));
         progress.enter();
-        images.push(image(&draw_loaded(&scene, loaded, &plan, options, progress, &mut CostRecord::default())?)?);
+        images.push(image(&draw_loaded(
+            &Planned { scene: &scene, loaded, plan: &plan, options },
+            progress,
+            &mut CostRecord::default(),
+        )?)?);
         scene.render.seed = scene.render.seed.wrapping_add(1);
         progress.leave();
     }

@@ -126,7 +126,7 @@ fn trace(
         pixel: PixelSampling::Area,
         ..PathSettings::default()
     };
-    let estimate = path_trace(&traced, &scene.camera, &settings, progress).map_err(fault)?;
+    let estimate = path_trace(&traced, &scene.camera, &settings, Some(progress)).map_err(fault)?;
     if estimate.majorant_violations > 0 {
         return Ok(Err("a density exceeds every bound that could be found for it".into()));
     }

@@ -1,6 +1,7 @@
 //! What can be wrong with a scene, by whose fault it is; each says what to do.
 
 use super::printable;
+use splat_core::Exceeded;
 use std::path::{Path, PathBuf};
 
 /// Why a scene file gives no scene.
@@ -40,19 +41,8 @@ pub enum Error {
         source: std::io::Error,
     },
     /// The scene file is larger than it may be.
-    #[error("{what} needs {needed} {unit}, the limit is {limit}")]
-    Limit {
-        /// What needs it.
-        what: String,
-        /// How much is needed.
-        needed: u64,
-        /// How much is allowed.
-        limit: u64,
-        /// What is counted, such as `bytes`.
-        unit: &'static str,
-        /// The knob to turn; may be empty.
-        hint: String,
-    },
+    #[error("{0}")]
+    Limit(Exceeded),
     /// A promise between the steps of this crate was broken.
     #[error("{0}")]
     Internal(String),
@@ -62,7 +52,8 @@ impl Error {
     /// What to do about it; may be empty.
     pub fn hint(&self) -> &str {
         match self {
-            Self::Usage { hint, .. } | Self::Scene { hint, .. } | Self::Limit { hint, .. } => hint,
+            Self::Usage { hint, .. } | Self::Scene { hint, .. } => hint,
+            Self::Limit(exceeded) => &exceeded.hint,
             Self::Io { .. } => "",
             Self::Internal(_) => "this is a bug in Organza, please report it",
         }

@@ -6,6 +6,7 @@ use super::tree::{Document, error_at};
 use super::{Scene, animation, check, de, read_json, read_toml};
 use crate::Error;
 use sha2::{Digest, Sha256};
+use splat_core::Exceeded;
 use std::io::Read;
 use std::path::Path;
 
@@ -60,13 +61,13 @@ pub fn read(file: &Path) -> Result<Vec<u8>, Error> {
 /// As [`load`], without those of reading.
 pub fn parse(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Scene, Error> {
     if bytes.len() as u64 > MAX_SCENE_BYTES {
-        return Err(Error::Limit {
-            what: format!("the scene file {}", crate::printable(file)),
+        return Err(Error::Limit(Exceeded {
+            what: format!("the scene file {}", crate::printable(file)).into(),
             needed: bytes.len() as u64,
-            limit: MAX_SCENE_BYTES,
+            limit: Some(MAX_SCENE_BYTES),
             unit: "bytes",
             hint: "put data into files that the scene names".into(),
-        });
+        }));
     }
     let text = decode(file, bytes)?;
     let is_json = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));

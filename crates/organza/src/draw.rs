@@ -66,19 +66,25 @@ fn join(cost: &mut CostRecord, pass: &str) {
     }));
 }
 
-/// Draws a loaded scene as [`plan_loaded`](crate::plan_loaded) has planned it, by the processor alone, and keeps the layers
-/// that it asks for. The passes that ran are added to `cost`.
+/// A scene that was loaded and planned.
+#[derive(Clone, Copy)]
+pub struct Planned<'a> {
+    /// What is drawn.
+    pub scene: &'a Scene,
+    /// Its data.
+    pub loaded: &'a Loaded,
+    /// What [`plan_loaded`](crate::plan_loaded) makes of both.
+    pub plan: &'a Plan,
+    /// What it may take.
+    pub options: &'a RenderOptions,
+}
+
+/// Draws a planned scene by the processor alone, and keeps the layers that it asks for. The passes that ran are added to `cost`.
 ///
 /// # Errors
 /// As [`crate::render`]; [`Error::Cancelled`] also where a random technique was interrupted between its sets.
-pub fn draw_loaded(
-    scene: &Scene,
-    loaded: &Loaded,
-    plan: &Plan,
-    options: &RenderOptions,
-    progress: &Progress,
-    cost: &mut CostRecord,
-) -> Result<Layers, Error> {
+pub fn draw_loaded(planned: &Planned<'_>, progress: &Progress, cost: &mut CostRecord) -> Result<Layers, Error> {
+    let Planned { scene, loaded, plan, options } = *planned;
     let frame = Frame::new(scene, loaded, plan, progress);
     let mut session = Session { options, checkpoint: None, kept: None, warnings: &mut Vec::new(), sets: None };
     let layers = draw(&frame, &mut session, cost)?;

@@ -1,6 +1,7 @@
 //! Errors by whose fault they are; each has one exit code and says what to do.
 
 use organza_scene::{printable, shown};
+use splat_core::Exceeded;
 use std::path::{Path, PathBuf};
 
 /// Everything that can go wrong, from the command line to the finished file.
@@ -60,19 +61,8 @@ pub enum Error {
         hint: String,
     },
     /// The work would take more than it may. Exit code 5.
-    #[error("{what} needs {needed} {unit}, the limit is {limit}")]
-    Limit {
-        /// What needs it.
-        what: String,
-        /// How much is needed.
-        needed: u64,
-        /// How much is allowed.
-        limit: u64,
-        /// What is counted: `bytes`, `splats` …
-        unit: &'static str,
-        /// The knob to turn; may be empty.
-        hint: String,
-    },
+    #[error("{0}")]
+    Limit(Exceeded),
     /// A file asks for more memory than it may. Exit code 5.
     #[error("{what}: {message}")]
     TooLarge {
@@ -128,17 +118,10 @@ impl Error {
         Self::input(printable(path), format!("expected {expected}"), hint)
     }
 
-    /// An error of the nouns about the data of `what` (an object, a file): broken promises are bad input, overflows
-    /// are limits.
+    /// An error of the nouns about the data of `what` (an object, a file).
     pub fn from_core(what: &str, error: splat_core::Error) -> Self {
         match error {
-            splat_core::Error::Overflow { what: buffer, needed, had } => Self::Limit {
-                what: format!("{what}: {buffer}"),
-                needed,
-                limit: had,
-                unit: "elements",
-                hint: "use a larger `spacing` or a smaller image".into(),
-            },
+            splat_core::Error::Limit(e) => Self::Limit(e.of(what, "use a larger `spacing` or a smaller image")),
             splat_core::Error::Cancelled => Self::Cancelled,
             other => Self::input(what, other.to_string(), ""),
         }
@@ -160,13 +143,11 @@ impl Error {
     pub fn from_convert(error: &convert::ConvertError) -> Self {
         use convert::ConvertError;
         match error {
-            ConvertError::TooMany { object, what, needed, limit } => Self::Limit {
-                what: format!("object '{}'", shown(object)),
-                needed: *needed as u64,
-                limit: *limit,
-                unit: what,
+            ConvertError::Limit(e) => Self::Limit(Exceeded {
+                what: shown(&e.what).into(),
                 hint: "use a larger spacing, or a larger --max-memory or render.max_points".into(),
-            },
+                ..e.clone()
+            }),
             ConvertError::Cancelled => Self::Cancelled,
             other => Self::input(Self::OF_SCENE, other.to_string(), ""),
         }
@@ -179,10 +160,13 @@ impl Error {
             Self::Input { what, message, hint } if what == Self::OF_SCENE => {
                 Self::Input { what: printable(file.unwrap_or(scene)), message, hint }
             }
-            Self::Limit { what, needed, limit, unit, hint } => {
-                let what = file.map_or_else(|| what.clone(), |file| format!("{}: {what}", printable(file)));
-                Self::Limit { what, needed, limit, unit, hint }
-            }
+            Self::Limit(e) => Self::Limit(match file {
+                Some(file) => {
+                    let hint = e.hint.clone();
+                    e.of(&printable(file), hint)
+                }
+                None => e,
+            }),
             other => other,
         }
     }
@@ -197,7 +181,7 @@ impl Error {
             Self::Usage { .. } => 2,
             Self::Scene { .. } | Self::Input { .. } => 3,
             Self::Io { .. } | Self::Output { .. } => 4,
-            Self::Limit { .. } | Self::TooLarge { .. } | Self::Unresolved { .. } => 5,
+            Self::Limit(_) | Self::TooLarge { .. } | Self::Unresolved { .. } => 5,
             Self::Gpu { .. } => 6,
             Self::Cancelled => 130,
         }
@@ -210,10 +194,10 @@ impl Error {
             | Self::Scene { hint, .. }
             | Self::Input { hint, .. }
             | Self::Output { hint, .. }
-            | Self::Limit { hint, .. }
             | Self::TooLarge { hint, .. }
             | Self::Unresolved { hint, .. }
             | Self::Gpu { hint, .. } => hint,
+            Self::Limit(exceeded) => &exceeded.hint,
             Self::Io { source, .. } if source.kind() == std::io::ErrorKind::StorageFull => "free some space",
             Self::Io { .. } | Self::Cancelled => "",
             Self::Internal(_) => "this is a bug in Organza, please report it",
@@ -250,7 +234,7 @@ impl From<organza_scene::Error> for Error {
             Scene::Usage { message, hint } => Self::Usage { message, hint },
             Scene::Scene { file, line, column, message, hint } => Self::Scene { file, line, column, message, hint },
             Scene::Io { path, action, source } => Self::Io { path, action, source },
-            Scene::Limit { what, needed, limit, unit, hint } => Self::Limit { what, needed, limit, unit, hint },
+            Scene::Limit(exceeded) => Self::Limit(exceeded),
             Scene::Internal(message) => Self::Internal(message),
             // The enum is open; a kind that is not known here is a gap of ours.
             other => Self::Internal(other.to_string()),

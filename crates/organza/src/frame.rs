@@ -6,6 +6,7 @@ mod light;
 mod on_device;
 mod splats;
 
+pub(crate) use on_device::Chained;
 pub use splats::Shaded;
 pub(crate) use splats::record;
 

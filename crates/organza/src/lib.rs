@@ -51,7 +51,7 @@ pub mod statistics;
 mod technique;
 mod work;
 
-pub use draw::draw_loaded;
+pub use draw::{Planned, draw_loaded};
 pub use error::Error;
 pub use frame::{Frame, Shaded};
 pub use load::Loaded;

@@ -7,7 +7,7 @@ use crate::scene::Scene;
 use glam::Vec3;
 use rayon::prelude::*;
 use splat_core::shade::ChannelLayout;
-use splat_core::{Camera, Cloud, DepthProfile, Grid, LayerSet};
+use splat_core::{Camera, Cloud, DepthProfile, Exceeded, Grid, LayerSet};
 
 /// Bytes of a render by what takes them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -124,12 +124,12 @@ pub(crate) fn check(what: &str, needed: u64, limit: u64) -> Result<(), Error> {
     if needed <= limit {
         return Ok(());
     }
-    Err(Error::Limit {
-        what: what.into(),
+    Err(Error::Limit(Exceeded {
+        what: what.to_owned().into(),
         needed,
-        limit,
+        limit: Some(limit),
         unit: "bytes",
         hint: "use fewer lights or samples of lights, a larger spacing, a smaller image, or a larger --max-memory"
             .into(),
-    })
+    }))
 }

@@ -1,7 +1,8 @@
 //! What a render may take, and how it treats doubtful input.
 
 use crate::device::Device;
-use convert::read::ReadLimits;
+use convert::read::ReadParams;
+use splat_core::Limits;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -42,7 +43,7 @@ impl Default for RenderOptions {
 
 impl RenderOptions {
     /// What a file may ask for when it is read.
-    pub fn read_limits(&self) -> ReadLimits {
-        ReadLimits { max_bytes: self.max_memory, drop_invalid: self.drop_invalid, strict: self.strict }
+    pub fn read_params(&self) -> ReadParams {
+        ReadParams { limits: Limits::bytes(self.max_memory), drop_invalid: self.drop_invalid, strict: self.strict }
     }
 }

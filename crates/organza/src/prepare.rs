@@ -11,7 +11,7 @@ use crate::scene::{Scene, SceneObject, Technique};
 use crate::statistics::Statistics;
 use crate::work::Translucent;
 use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, doubts, lights, shadows};
-use splat_core::Material;
+use splat_core::{Exceeded, Material};
 
 /// What a render would do, without doing it.
 #[derive(Debug, Clone, PartialEq)]
@@ -136,13 +136,13 @@ fn check_samples(scene: &Scene) -> Result<(), Error> {
     if needed <= limit {
         return Ok(());
     }
-    Err(Error::Limit {
+    Err(Error::Limit(Exceeded {
         what: "the longer side of the image".into(),
         needed,
-        limit,
+        limit: Some(limit),
         unit: "samples",
         hint: "use a smaller camera.size or render.antialias".into(),
-    })
+    }))
 }
 
 /// Reads every visible object, chooses its technique and form, and converts it.

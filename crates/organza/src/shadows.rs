@@ -4,7 +4,7 @@ use crate::Error;
 use crate::lights::LightPoint;
 use crate::load::Loaded;
 use crate::scene::{RenderSettings, ShadowMapping};
-use splat_core::Light;
+use splat_core::{Light, Limits};
 use tsm::{Deposits, Limit, Params};
 
 /// Share of the tolerance that the ends of lists may take, of all lights together. Absorbance grows with its logarithm only, so
@@ -76,7 +76,7 @@ fn params(settings: &RenderSettings, loaded: &Loaded, tolerance: f32, max_bytes:
         resolution: shadow.cells.map_or(tsm::Resolution::Auto, tsm::Resolution::Cells),
         tolerance,
         footprints: loaded.footprints.clone(),
-        max_bytes,
+        limits: Limits::bytes(max_bytes),
         ..Params::default()
     }
 }
@@ -157,7 +157,11 @@ fn tables_within(
         let light = &point.light;
         let tolerance = tolerance(settings, loaded, light, maps);
         let params = params(settings, loaded, tolerance, max_bytes);
-        let predicted = Deposits::predict(&loaded.cloud, &loaded.materials, &loaded.objects, light, &params);
+        let predicted = Deposits::predict(
+            &tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects: &loaded.objects },
+            light,
+            &params,
+        );
         let predicted = predicted.map_err(|e| shadow_error(point, &e))?;
         Ok(Some(ShadowTable {
             size: predicted.size,
@@ -176,14 +180,10 @@ fn tables_within(
 pub(crate) fn shadow_error(point: &LightPoint, error: &tsm::Error) -> Error {
     let what = format!("the shadow map of {}", point.name());
     match error {
-        tsm::Error::Memory { needed_bytes, limit_bytes, .. } => Error::Limit {
-            what,
-            needed: *needed_bytes,
-            limit: *limit_bytes,
-            unit: "bytes",
-            hint: "use fewer lights or samples of lights, fewer cells in render.shadow, or a larger --max-memory"
-                .into(),
-        },
+        tsm::Error::Limit(exceeded) => {
+            let hint = "use fewer lights or samples of lights, fewer cells in render.shadow, or a larger --max-memory";
+            Error::Limit(exceeded.clone().of(&what, hint))
+        }
         tsm::Error::Core(splat_core::Error::Cancelled) => Error::Cancelled,
         other => Error::input(what, other.to_string(), ""),
     }

@@ -1,11 +1,11 @@
 //! A translucent ball of glass-like surface around a cloud, cut by a plane: prints the opacity along a row, with its error.
 
 use pbsr::{
-    Appearance, Density, Ensemble, EnsembleParams, Error, FieldVolumeSampler, FoldParams, ImplicitSurface, LineSampler,
-    MeshSampler, Object, Renderer, Scene, SurfaceParams, finest_pixel_area,
+    Appearance, Density, Ensemble, EnsembleParams, Error, FieldVolumeParams, FieldVolumeSampler, FoldParams,
+    ImplicitSurface, LineParams, LineSampler, MeshSampler, Object, Renderer, Scene, SurfaceParams, finest_pixel_area,
 };
 use splat_core::glam::{DMat3, DVec3, Vec3};
-use splat_core::{Camera, DAabb, Mesh, Progress, Projection, ScalarField, Similarity};
+use splat_core::{Camera, DAabb, Mesh, Projection, ScalarField, Similarity};
 
 /// Distance to a sphere; outside minus inside of the cloud, too.
 struct Ball {
@@ -42,12 +42,16 @@ fn main() -> Result<(), Error> {
 
     let shell = Ball { radius: 1.0, sign: 1.0 };
     let surface = ImplicitSurface { field: &shell, level: 0.0, bounds, inside: None };
-    let ball = LineSampler::new(&surface, 24, &params(0.2, 1), None)?;
+    let ball = LineSampler::new(&surface, &LineParams { resolution: 24 }, &params(0.2, 1), None)?;
     println!("{:?}", ball.report());
 
     let fog = Ball { radius: 0.7, sign: -1.0 };
     let extinction = Density { field: &fog, max: 0.7 };
-    let cloud = FieldVolumeSampler::new(extinction, bounds, 24, cross_section, [1.0, 0.8, 0.6], 2)?;
+    let cloud = FieldVolumeSampler::new(
+        extinction,
+        bounds,
+        &FieldVolumeParams { resolution: 24, cross_section, color: [1.0, 0.8, 0.6], seed: 2 },
+    )?;
 
     let corner = |x: f32, z: f32| Vec3::new(x, -0.3, z);
     let position = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
@@ -67,7 +71,7 @@ fn main() -> Result<(), Error> {
     let mut ensemble = Ensemble::new(camera.size, &EnsembleParams::default())?;
     let mut renderer = Renderer::new();
     while ensemble.rms_error(&|_, _| [0.0; 3], None) > 0.02 {
-        let counts = renderer.fold(&scene, &mut ensemble, 50, &FoldParams::default(), &Progress::new())?;
+        let counts = renderer.fold(&scene, &mut ensemble, &FoldParams { levels: 50, ..FoldParams::default() }, None)?;
         println!("{} sets, {} particles more", ensemble.levels(), counts.particles);
     }
     let picture = ensemble.read(&|_, _| [0.0; 3], None);

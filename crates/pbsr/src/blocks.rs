@@ -41,7 +41,7 @@ impl Blocks {
     /// Tables for `elements` elements, of which `rate` gives the mean number of particles in a set, ≥ 0.
     ///
     /// # Errors
-    /// [`Error::TooMuch`] for more than 4·10⁹ particles a set, before lists are made of them; [`Error::Parameter`] where
+    /// [`Error::Limit`] for more than 4·10⁹ particles a set, before lists are made of them; [`Error::Parameter`] where
     /// rates are not numbers.
     pub(crate) fn new(elements: usize, rate: impl Fn(usize) -> f64 + Sync) -> Result<Self, Error> {
         let mut slots = vec![(0u32, 0u16); elements];
@@ -187,6 +187,7 @@ fn fill(slots: &mut [(u32, u16)], rates: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use splat_core::Exceeded;
 
     #[test]
     fn equal_rates_leave_nobody_out() {
@@ -209,7 +210,7 @@ mod tests {
     fn too_many_particles_are_refused_before_lists_are_made_of_them() {
         for rate in [1e7, 1e15, 1e300, f64::INFINITY] {
             let refused = Blocks::new(2000, |_| rate).err();
-            assert!(matches!(refused, Some(Error::TooMuch { unit: "particles", .. })), "{rate}: {refused:?}");
+            assert!(matches!(refused, Some(Error::Limit(Exceeded { unit: "particles", .. }))), "{rate}: {refused:?}");
         }
         for broken in [f64::NAN, f64::NEG_INFINITY] {
             let rate = |i: usize| if i == 1500 { broken } else { f64::INFINITY };

@@ -18,7 +18,9 @@ use crate::params::countable;
 use crate::particles::Steps;
 use crate::stream::{Stage, Stream, unit_or_zero};
 use crate::walk::Walk;
-use crate::{Error, ImplicitSurface, LineSampler, PackedNormal, Particles, Sampler, SurfaceParams, opacity};
+use crate::{
+    Error, ImplicitSurface, LineParams, LineSampler, PackedNormal, Particles, Sampler, SurfaceParams, opacity,
+};
 use glam::DVec3;
 use rayon::prelude::*;
 use splat_core::glam;
@@ -113,7 +115,7 @@ impl<'a> BrownianSampler<'a> {
             params: *params,
             walk: *walk,
             steps: Walk::new(surface, walk.step)?,
-            starts: LineSampler::new(surface, walk.resolution, params, None)?,
+            starts: LineSampler::new(surface, &LineParams { resolution: walk.resolution }, params, None)?,
             origin: surface.bounds.center(),
             number: f64::from(walk.pilot_particles),
             report: BrownianReport::default(),

@@ -37,14 +37,14 @@ impl Counts {
     }
 }
 
-/// Predicts the cost of `levels` sets of `scene`.
-pub fn predict(scene: &Scene<'_>, ensemble: &EnsembleParams, levels: u32, params: &FoldParams) -> Prediction {
+/// Predicts the cost of folding sets of `scene`.
+pub fn predict(scene: &Scene<'_>, ensemble: &EnsembleParams, params: &FoldParams) -> Prediction {
     let of_set: f64 = scene.objects.iter().map(|o| o.sampler.expected_particles()).sum();
-    let particles = of_set * f64::from(levels);
+    let particles = of_set * f64::from(params.levels);
     let in_batch = (params.batch_particles as f64).min(particles).max(of_set);
     Prediction {
         particles,
-        batch_bytes: ((in_batch * BYTES_IN_BATCH as f64) as u64).min(params.max_bytes),
+        batch_bytes: ((in_batch * BYTES_IN_BATCH as f64) as u64).min(params.limits.max_bytes),
         ensemble_bytes: ensemble.bytes(scene.camera.size.map(u64::from)),
     }
 }

@@ -1,5 +1,7 @@
 //! Errors of particle-based rendering.
 
+use splat_core::Exceeded;
+
 /// What can go wrong.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -15,19 +17,12 @@ pub enum Error {
         expected: &'static str,
     },
     /// More particles or more memory than allowed.
-    #[error(
-        "particles: {what} needs {needed} {unit}, the limit is {had}; use a larger particle cross-section or a smaller image"
-    )]
-    TooMuch {
-        /// What would be too large.
-        what: &'static str,
-        /// Amount needed.
-        needed: u64,
-        /// Amount allowed.
-        had: u64,
-        /// What is counted: `particles`, `bytes` …
-        unit: &'static str,
-    },
+    #[error("particles: {0}; {hint}", hint = .0.hint)]
+    Limit(Exceeded),
+    /// A recording has less room than it needs.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Overflow(#[from] splat_shaders::Overflow),
     /// There is nothing to sample: no surface in the box, no area, no extinction.
     #[error("particles: {what} is empty: {reason}")]
     Empty {
@@ -53,6 +48,12 @@ pub enum Error {
 }
 
 impl Error {
+    /// [`Error::Limit`] for sets of particles.
+    pub fn limit(what: &'static str, needed: u64, limit: u64, unit: &'static str) -> Self {
+        let hint = "use a larger particle cross-section or a smaller image".into();
+        Self::Limit(Exceeded { what: what.into(), needed, limit: Some(limit), unit, hint })
+    }
+
     /// Shorthand for [`Error::Parameter`].
     pub(crate) fn parameter(name: &'static str, found: impl std::fmt::Debug, expected: &'static str) -> Self {
         Self::Parameter { name, found: format!("{found:?}"), expected }

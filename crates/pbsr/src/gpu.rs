@@ -30,7 +30,7 @@ use crate::project::Projector;
 use crate::{Ensemble, EnsembleParams, Error, KeptSets, Object, Particles, Sampler, Scene};
 use splat_core::{Shading, glam, rng};
 use splat_shaders::layouts::{ParticleObject, ParticleView};
-use splat_shaders::{Adapter, BufferId, Groups, Recording, kernels};
+use splat_shaders::{Adapter, BufferId, Groups, Overflow, Recording, kernels};
 use std::borrow::Cow;
 
 /// Threads of a workgroup.
@@ -201,7 +201,7 @@ impl Recorded {
     /// Samples the sets `ensemble.levels()` and on, as many as the recording has levels, and puts them into bytes.
     ///
     /// # Errors
-    /// [`Error::TooMuch`] when the recording has too little room: record again with what is needed.
+    /// [`Error::Overflow`] when the recording has too little room: record again with what is needed.
     /// [`Error::Parameter`] for sizes that differ, for an object that is lit, or an ensemble that keeps more than beauty, where
     /// the recording was made for none.
     pub fn uploads(&self, scene: &Scene<'_>, ensemble: &Ensemble) -> Result<Uploads, Error> {
@@ -317,8 +317,7 @@ fn take_in(capacities: Capacities, sums: &[u8], ensemble: &mut Ensemble) -> Resu
 }
 
 fn room(what: &'static str, needed: usize, had: u32) -> Result<(), Error> {
-    let (needed, had) = (needed as u64, u64::from(had));
-    if needed > had { Err(Error::TooMuch { what, needed, had, unit: "records" }) } else { Ok(()) }
+    Ok(Overflow::check(what, needed as u64, had.into())?)
 }
 
 /// The particles of one object in a set, with the numbers that thin them out on the CPU.

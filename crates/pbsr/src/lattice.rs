@@ -50,14 +50,14 @@ impl<'a> LatticeSampler<'a> {
     ///
     /// # Errors
     /// [`Error::Parameter`] for numbers out of range, [`Error::Core`] for a grid that breaks a promise, [`Error::Empty`] for
-    /// a level that no cell has, [`Error::TooMuch`] for more than 4·10⁹ lattice points, or lines a set.
+    /// a level that no cell has, [`Error::Limit`] for more than 4·10⁹ lattice points, or lines a set.
     pub fn new(grid: &'a Grid, level: f32, params: &SurfaceParams) -> Result<Self, Error> {
         params.validate()?;
         grid.validate()?;
         crate::error::check(level.is_finite(), "level", level, "a finite number")?;
         if grid.values.len() > u32::MAX as usize {
             let needed = grid.values.len() as u64;
-            return Err(Error::TooMuch { what: "a volume", needed, had: u64::from(u32::MAX), unit: "lattice points" });
+            return Err(Error::limit("a volume", needed, u32::MAX.into(), "lattice points"));
         }
         let cells = passed(grid, level);
         if cells.is_empty() {

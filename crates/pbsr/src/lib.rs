@@ -8,10 +8,10 @@
 //! [`Sampler`] makes the sets, [`Renderer::fold`] adds them to an [`Ensemble`], which can be read after any number.
 //!
 //! ```
-//! use pbsr::{Appearance, Ensemble, EnsembleParams, FoldParams, ImplicitSurface, LineSampler, Object, Renderer, Scene};
-//! use pbsr::{SurfaceParams, pixel_area};
+//! use pbsr::{Appearance, Ensemble, EnsembleParams, FoldParams, ImplicitSurface, LineParams, LineSampler, Object};
+//! use pbsr::{Renderer, Scene, SurfaceParams, pixel_area};
 //! use splat_core::glam::DVec3;
-//! use splat_core::{Camera, DAabb, Progress, Projection, ScalarField, Similarity};
+//! use splat_core::{Camera, DAabb, Projection, ScalarField, Similarity};
 //!
 //! struct Ball;
 //! impl ScalarField for Ball {
@@ -28,14 +28,14 @@
 //! let bounds = DAabb::around(DVec3::ZERO, DVec3::splat(1.1));
 //! let ball = ImplicitSurface { field: &Ball, level: 0.0, bounds, inside: None };
 //! let params = SurfaceParams { opacity: 0.3, cross_section: pixel_area(&camera, DVec3::Z), ..SurfaceParams::default() };
-//! let sampler = LineSampler::new(&ball, 16, &params, None).unwrap();
+//! let sampler = LineSampler::new(&ball, &LineParams { resolution: 16 }, &params, None).unwrap();
 //!
 //! let objects = [Object { sampler: &sampler, transform: Similarity::default(), look: Appearance::default() }];
 //! let (objects, lights, camera) = (&objects[..], &[][..], &camera);
 //! let shadow_origin = DVec3::ZERO;
 //! let scene = Scene { objects, lights, shadow_origin, ambient: [1.0; 3], camera, occluder: None };
 //! let mut ensemble = Ensemble::new(camera.size, &EnsembleParams::default()).unwrap();
-//! Renderer::new().fold(&scene, &mut ensemble, 100, &FoldParams::default(), &Progress::new()).unwrap();
+//! Renderer::new().fold(&scene, &mut ensemble, &FoldParams { levels: 100, ..FoldParams::default() }, None).unwrap();
 //! let picture = ensemble.read(&|_, _| [0.0; 3], None);
 //! // Front and back: 1 − 0.7² = 0.51.
 //! let alpha = picture.scalar("alpha").unwrap()[24 * 48 + 24];
@@ -93,7 +93,7 @@ pub use ensemble::{Ensemble, EnsembleParams};
 pub use error::Error;
 pub use implicit::{CellCounts, ImplicitSurface};
 pub use lattice::LatticeSampler;
-pub use lines::{LineReport, LineSampler};
+pub use lines::{LineParams, LineReport, LineSampler};
 pub use mesh::MeshSampler;
 pub use metropolis::{MetropolisParams, MetropolisSampler};
 pub use params::{Density, SurfaceParams};
@@ -105,5 +105,5 @@ pub use shade::Appearance;
 pub use splat_core::shade::LitBy;
 pub use splats::{SplatParams, SplatSampler};
 pub use volume::{GridSampler, VolumeParams};
-pub use volume_field::FieldVolumeSampler;
+pub use volume_field::{FieldVolumeParams, FieldVolumeSampler};
 pub use walk::Walk;

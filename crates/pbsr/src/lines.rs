@@ -77,6 +77,19 @@ impl LineReport {
     }
 }
 
+/// How an implicit surface is looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LineParams {
+    /// Cells along the longest side of the surface's box, 1 to 1024; those in which it bends much are divided.
+    pub resolution: u32,
+}
+
+impl Default for LineParams {
+    fn default() -> Self {
+        Self { resolution: 24 }
+    }
+}
+
 /// Particles on an implicit surface, by random lines.
 pub struct LineSampler<'a> {
     surface: ImplicitSurface<'a>,
@@ -90,18 +103,18 @@ pub struct LineSampler<'a> {
 }
 
 impl<'a> LineSampler<'a> {
-    /// Finds the cells that hold the surface, `resolution` (1 to 1024) along the longest side of the box, divides those in
-    /// which it bends much, and surveys its roots.
+    /// Finds the cells that hold the surface, divides those in which it bends much, and surveys its roots.
     ///
     /// # Errors
     /// [`Error::Parameter`] for numbers out of range, [`Error::Field`] where the field is not finite, [`Error::Empty`] when
-    /// no line of the survey meets the surface, [`Error::TooMuch`] for more than 4·10⁹ lines a set.
+    /// no line of the survey meets the surface, [`Error::Limit`] for more than 4·10⁹ lines a set.
     pub fn new(
         surface: &ImplicitSurface<'a>,
-        resolution: u32,
+        lines: &LineParams,
         params: &SurfaceParams,
         density: Option<Density<'a>>,
     ) -> Result<Self, Error> {
+        let resolution = lines.resolution;
         params.validate()?;
         surface.validate()?;
         density.as_ref().map_or(Ok(()), Density::validate)?;

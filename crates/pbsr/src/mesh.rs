@@ -36,7 +36,7 @@ impl<'a> MeshSampler<'a> {
     ///
     /// # Errors
     /// [`Error::Parameter`] for numbers out of range, [`Error::Core`] for a mesh that breaks a promise, [`Error::Empty`]
-    /// for one without area, [`Error::TooMuch`] for more than 4·10⁹ particles a set.
+    /// for one without area, [`Error::Limit`] for more than 4·10⁹ particles a set.
     pub fn new(mesh: &'a Mesh, params: &SurfaceParams, density: Option<Density<'a>>) -> Result<Self, Error> {
         params.validate()?;
         mesh.validate()?;

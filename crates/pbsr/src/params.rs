@@ -78,8 +78,7 @@ pub(crate) fn countable(expected: f64) -> Result<(), Error> {
     if expected <= MAX_PARTICLES {
         return Ok(());
     }
-    let (needed, had) = (expected as u64, MAX_PARTICLES as u64);
-    Err(Error::TooMuch { what: "a set", needed, had, unit: "particles" })
+    Err(Error::limit("a set", expected as u64, MAX_PARTICLES as u64, "particles"))
 }
 
 /// A field that multiplies the mean number of particles from place to place, for surfaces and volumes alike.

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use splat_core::raster::OpaqueImage;
 use splat_core::shade::LitBy;
 use splat_core::shade::MAX_CHANNELS;
-use splat_core::{Camera, Progress, Shading, Similarity, glam};
+use splat_core::{Camera, Limits, Progress, Shading, Similarity, glam};
 
 /// One object of the scene.
 #[derive(Clone, Copy)]
@@ -52,14 +52,16 @@ pub struct Scene<'a> {
     pub occluder: Option<&'a OpaqueImage>,
 }
 
-/// What folding may take, and of what.
+/// How many sets are folded, of what, and what that may take.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FoldParams {
+    /// Sets to add: what one call adds to the repeat level.
+    pub levels: u32,
     /// Nearest and farthest view depth; particles before the first, or at the second or behind it, are left out. Averages of
     /// ranges that meet, one behind the other, are an average of everything: their particles are independent.
     pub depths: [f32; 2],
-    /// Bytes of the particles of one batch: 32 a particle. A set that needs more is refused.
-    pub max_bytes: u64,
+    /// Of the particles of one batch, 32 bytes each. A set that needs more is refused.
+    pub limits: Limits,
     /// Particles of a batch that are worth a pass over the image; more only takes memory.
     pub batch_particles: u64,
 }
@@ -67,13 +69,18 @@ pub struct FoldParams {
 impl FoldParams {
     /// Bytes of a batch of sets of few particles; a single set of more takes more.
     pub fn batch_bytes(&self) -> u64 {
-        self.batch_particles.saturating_mul(BYTES_IN_BATCH).min(self.max_bytes)
+        self.batch_particles.min(self.limits.max_elements).saturating_mul(BYTES_IN_BATCH).min(self.limits.max_bytes)
     }
 }
 
 impl Default for FoldParams {
     fn default() -> Self {
-        Self { depths: [f32::NEG_INFINITY, f32::INFINITY], max_bytes: 2 << 30, batch_particles: 4 << 20 }
+        Self {
+            levels: 100,
+            depths: [f32::NEG_INFINITY, f32::INFINITY],
+            limits: Limits::default(),
+            batch_particles: 4 << 20,
+        }
     }
 }
 
@@ -92,24 +99,25 @@ impl Renderer {
         Self::default()
     }
 
-    /// Adds `levels` sets to `ensemble`, from set `ensemble.levels()` on; ticks once a set (the caller announces
-    /// them). When it fails, the sets of
-    /// whole batches before are in, and the ensemble is valid.
+    /// Adds `params.levels` sets to `ensemble`, from set `ensemble.levels()` on. Sets are reported to `progress`, where the
+    /// caller announces them, who may ask for them in several calls; work stops where it is cancelled. When it fails, the
+    /// sets of whole batches before are in, and the ensemble is valid.
     ///
     /// # Errors
     /// [`Error::Parameter`] when the sizes of camera, ensemble and occluder differ, or levels overflow;
-    /// [`Error::TooMuch`] when one set needs more than `params.max_bytes`; [`Error::Core`] when cancelled.
+    /// [`Error::Limit`] when one set needs more than `params.limits`; [`Error::Core`] when cancelled.
     pub fn fold(
         &mut self,
         scene: &Scene<'_>,
         ensemble: &mut Ensemble,
-        levels: u32,
         params: &FoldParams,
-        progress: &Progress,
+        progress: Option<&Progress>,
     ) -> Result<Counts, Error> {
-        let plan = Plan::new(scene, ensemble, levels, params)?;
+        let quiet = Progress::new();
+        let progress = progress.unwrap_or(&quiet);
+        let plan = Plan::new(scene, ensemble, params)?;
         let mut counts = Counts::default();
-        let mut left = levels;
+        let mut left = params.levels;
         while left > 0 {
             let batch = left.min(plan.batch_levels);
             self.sample(scene, &plan, u64::from(ensemble.levels), batch, progress);
@@ -242,7 +250,8 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    fn new(scene: &Scene<'_>, ensemble: &Ensemble, levels: u32, params: &FoldParams) -> Result<Self, Error> {
+    fn new(scene: &Scene<'_>, ensemble: &Ensemble, params: &FoldParams) -> Result<Self, Error> {
+        let levels = params.levels;
         let size = ensemble.size();
         check(scene.camera.size == size, "camera size", scene.camera.size, "the size of the ensemble")?;
         if let Some(o) = scene.occluder {
@@ -254,10 +263,13 @@ impl Plan {
         check(ensemble.levels.checked_add(levels).is_some(), "levels", levels, "at most 2³² − 1 in all")?;
         let expected: f64 = scene.objects.iter().map(|o| o.sampler.expected_particles()).sum();
         let needed = (expected * BYTES_IN_BATCH as f64) as u64;
-        if needed > params.max_bytes {
-            return Err(Error::TooMuch { what: "one set of particles", needed, had: params.max_bytes, unit: "bytes" });
+        let Limits { max_bytes, max_elements } = params.limits;
+        for (needed, limit, unit) in [(needed, max_bytes, "bytes"), (expected as u64, max_elements, "particles")] {
+            if needed > limit {
+                return Err(Error::limit("one set of particles", needed, limit, unit));
+            }
         }
-        let budget = (params.max_bytes / BYTES_IN_BATCH).min(params.batch_particles) as f64;
+        let budget = (max_bytes / BYTES_IN_BATCH).min(params.batch_particles).min(max_elements) as f64;
         let axes = scene.camera.axes;
         let of_object = |(o, object): (usize, &Object<'_>)| {
             runs(object.sampler).into_iter().enumerate().map(move |(rank, run)| (o as u32, rank, run))

@@ -53,18 +53,19 @@ impl Line<'_> {
     /// Appends all roots between `a` and `b`, both ends open against being counted twice: f = c counts as above c.
     pub(crate) fn roots(&self, a: At, b: At, found: &mut Found) {
         if a.f.is_finite() && b.f.is_finite() {
-            self.search(a, b, None, None, 0, found);
+            self.search([a, b], [None; 2], 0, found);
         } else {
             found.broken += 1;
         }
     }
 
-    fn search(&self, a: At, b: At, ga: Option<f64>, gb: Option<f64>, depth: u32, found: &mut Found) {
+    /// `slopes` are those at both ends, where they are known.
+    fn search(&self, [a, b]: [At; 2], slopes: [Option<f64>; 2], depth: u32, found: &mut Found) {
         let crosses = (a.f < 0.0) != (b.f < 0.0);
         if !crosses && self.excluded(a.t, b.t) {
             return;
         }
-        let (ga, gb) = (ga.unwrap_or_else(|| self.slope(a.t)), gb.unwrap_or_else(|| self.slope(b.t)));
+        let [ga, gb] = [(slopes[0], a), (slopes[1], b)].map(|(slope, at)| slope.unwrap_or_else(|| self.slope(at.t)));
         let up = if b.f < 0.0 { -1.0 } else { 1.0 };
         if crosses {
             // Slopes of 0 to 3 times the chord's: the cubic through both ends rises or falls all the way.
@@ -77,7 +78,7 @@ impl Line<'_> {
                 return;
             }
         } else if ga * up < 0.0 && gb * up > 0.0 {
-            self.extremum(a, b, (ga, gb), up, depth, found);
+            self.extremum([a, b], [ga, gb], up, depth, found);
             return;
         } else if depth >= DEPTH {
             found.unproven += 1;
@@ -88,8 +89,8 @@ impl Line<'_> {
             found.broken += 1;
             return;
         }
-        self.search(a, m, Some(ga), None, depth + 1, found);
-        self.search(m, b, None, Some(gb), depth + 1, found);
+        self.search([a, m], [Some(ga), None], depth + 1, found);
+        self.search([m, b], [None, Some(gb)], depth + 1, found);
     }
 
     /// Whether the bound shows that f ≠ c between two places.
@@ -100,9 +101,9 @@ impl Line<'_> {
     }
 
     /// f runs towards c from both ends, on the side `up` of it: looks for the place where it turns.
-    fn extremum(&self, a: At, b: At, slopes: (f64, f64), up: f64, depth: u32, found: &mut Found) {
+    fn extremum(&self, [a, b]: [At; 2], slopes: [f64; 2], up: f64, depth: u32, found: &mut Found) {
         let (mut low, mut high) = (a.t, b.t);
-        let (mut g_low, mut g_high) = slopes;
+        let [mut g_low, mut g_high] = slopes;
         for step in 0..60 {
             // The root of the slope's chord, and the middle now and then so that the piece surely shrinks.
             let chord = low + (high - low) * (g_low / (g_low - g_high));
@@ -112,8 +113,8 @@ impl Line<'_> {
             }
             let m = self.at(t);
             if m.f * up < 0.0 {
-                for (p, q) in [(a, m), (m, b)] {
-                    self.search(p, q, None, None, depth.max(DEPTH - 1), found);
+                for piece in [[a, m], [m, b]] {
+                    self.search(piece, [None; 2], depth.max(DEPTH - 1), found);
                 }
                 return;
             }

@@ -71,7 +71,7 @@ impl<'a> SplatSampler<'a> {
     ///
     /// # Errors
     /// [`Error::Parameter`] for numbers out of range, [`Error::Core`] for a cloud that breaks a promise or a footprint id
-    /// out of range, [`Error::Empty`] for a cloud without cross-section, [`Error::TooMuch`] for more than 4·10⁹
+    /// out of range, [`Error::Empty`] for a cloud without cross-section, [`Error::Limit`] for more than 4·10⁹
     /// particles a set.
     pub fn new(cloud: &'a Cloud, params: &SplatParams) -> Result<Self, Error> {
         Self::of(Cow::Borrowed(cloud), params)

@@ -97,7 +97,7 @@ impl<'a> GridSampler<'a> {
     ///
     /// # Errors
     /// [`Error::Parameter`] for numbers out of range, [`Error::Core`] for a grid that breaks a promise, [`Error::Empty`]
-    /// for one without extinction, [`Error::TooMuch`] for more than 4·10⁹ lattice points, or particles a set.
+    /// for one without extinction, [`Error::Limit`] for more than 4·10⁹ lattice points, or particles a set.
     pub fn new(
         grid: &'a Grid,
         transfer: &'a TransferFunction,
@@ -109,7 +109,7 @@ impl<'a> GridSampler<'a> {
         density.as_ref().map_or(Ok(()), Density::validate)?;
         if grid.values.len() > u32::MAX as usize {
             let needed = grid.values.len() as u64;
-            return Err(Error::TooMuch { what: "a volume", needed, had: u64::from(u32::MAX), unit: "lattice points" });
+            return Err(Error::limit("a volume", needed, u32::MAX.into(), "lattice points"));
         }
         let [nx, ny, nz] = grid.dims;
         let pieces = Pieces::new(transfer);

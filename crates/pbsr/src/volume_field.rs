@@ -13,6 +13,25 @@ use crate::{Density, Error, PackedNormal, Particles};
 use glam::DVec3;
 use splat_core::{DAabb, glam};
 
+/// What a sampler of a field's medium needs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FieldVolumeParams {
+    /// Cells along each axis of the box, 1 to 512: each has a bound of its own.
+    pub resolution: u32,
+    /// Particle cross-section s: the area of one pixel in the medium, world units², > 0.
+    pub cross_section: f64,
+    /// Linear Rec.709 colour of every particle, each channel ≥ 0.
+    pub color: [f32; 3],
+    /// Seed of all sets.
+    pub seed: u64,
+}
+
+impl Default for FieldVolumeParams {
+    fn default() -> Self {
+        Self { resolution: 24, cross_section: 1e-4, color: [1.0; 3], seed: 1 }
+    }
+}
+
 /// Particles in the box of a field of extinction, 1/world unit.
 pub struct FieldVolumeSampler<'a> {
     extinction: Density<'a>,
@@ -26,28 +45,21 @@ pub struct FieldVolumeSampler<'a> {
 }
 
 impl<'a> FieldVolumeSampler<'a> {
-    /// `extinction` in a box, in `cells`³ cells (1 to 512 an axis). Where the field knows no
-    /// bound, `extinction.max` is taken, and values above it are cut.
+    /// `extinction` in a box. Where the field knows no bound, `extinction.max` is taken, and values above it are cut.
     ///
     /// # Errors
     /// [`Error::Parameter`] for numbers out of range, [`Error::Empty`] when the extinction is bounded by 0 everywhere,
-    /// [`Error::TooMuch`] for more than 4·10⁹ particles a set.
-    pub fn new(
-        extinction: Density<'a>,
-        bounds: DAabb,
-        cells: u32,
-        cross_section: f64,
-        tint: [f32; 3],
-        seed: u64,
-    ) -> Result<Self, Error> {
+    /// [`Error::Limit`] for more than 4·10⁹ particles a set.
+    pub fn new(extinction: Density<'a>, bounds: DAabb, params: &FieldVolumeParams) -> Result<Self, Error> {
+        let FieldVolumeParams { resolution, cross_section, color: tint, seed } = *params;
         extinction.validate()?;
         positive(cross_section, "cross_section")?;
         color(tint)?;
-        check((1..=512).contains(&cells), "cells", cells, "1 to 512")?;
+        check((1..=512).contains(&resolution), "resolution", resolution, "1 to 512 cells")?;
         let DAabb { min, max } = bounds;
         check(bounds.is_solid(), "box", (min, max), "two finite corners, the first less in all three")?;
-        let n = cells as usize;
-        let side = bounds.size() / f64::from(cells);
+        let n = resolution as usize;
+        let side = bounds.size() / f64::from(resolution);
         let radius = 0.5 * side.length() * (1.0 + 1e-12);
         let per_cell = side.element_product() / cross_section;
         let middle = |c: usize| min + side * (corner(c, n) + 0.5);

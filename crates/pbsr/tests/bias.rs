@@ -2,8 +2,8 @@
 
 use crate::common::*;
 use pbsr::{
-    Density, FieldVolumeSampler, GridSampler, MeshSampler, MetropolisParams, MetropolisSampler, Particles, Sampler,
-    SplatParams, SplatSampler, SurfaceParams, VolumeParams, pixel_area,
+    Density, FieldVolumeParams, FieldVolumeSampler, GridSampler, MeshSampler, MetropolisParams, MetropolisSampler,
+    Particles, Sampler, SplatParams, SplatSampler, SurfaceParams, VolumeParams, pixel_area,
 };
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
@@ -222,7 +222,12 @@ fn three_samplers_of_one_volume_agree() {
     let chains = MetropolisSampler::new(&grid, &transfer, &params, &chains).unwrap();
     let ramp = Density { field: &Field::Ramp, max: 1.0 };
     let [low, high] = [DVec3::new(0.0, -0.5, -0.5), DVec3::new(1.0, 0.5, 0.5)];
-    let field = FieldVolumeSampler::new(ramp, DAabb::new(low, high), 6, s, [1.0; 3], 3).unwrap();
+    let field = FieldVolumeSampler::new(
+        ramp,
+        DAabb::new(low, high),
+        &FieldVolumeParams { resolution: 6, cross_section: s, color: [1.0; 3], seed: 3 },
+    )
+    .unwrap();
     let samplers: [&dyn Sampler; 3] = [&cells, &chains, &field];
     for (name, sampler) in ["cells", "chains", "field"].iter().zip(samplers) {
         let found = bias(&render(&camera, &[sampler], 1500), &|x, y| {

@@ -1,7 +1,9 @@
 //! The paper's Brownian motion: stays on the surface, stays uniform, and counts what it must.
 
 use crate::common::*;
-use pbsr::{BrownianParams, BrownianSampler, Error, ImplicitSurface, LineSampler, SurfaceParams, Walk, pixel_area};
+use pbsr::{
+    BrownianParams, BrownianSampler, Error, ImplicitSurface, LineParams, LineSampler, SurfaceParams, Walk, pixel_area,
+};
 use rayon::prelude::*;
 use splat_core::glam::DVec3;
 use splat_core::{DAabb, ScalarField};
@@ -43,7 +45,7 @@ fn pb13_walkers_that_are_uniform_stay_so() {
         ..boxed(&field, 1.0)
     };
     let params = SurfaceParams { opacity: 0.5, cross_section: 6e-4, ..SurfaceParams::default() };
-    let starts = positions(&LineSampler::new(&surface, 24, &params, None).unwrap(), 0);
+    let starts = positions(&LineSampler::new(&surface, &LineParams { resolution: 24 }, &params, None).unwrap(), 0);
     assert!(starts.len() >= 20_000, "{}", starts.len());
     // A set lists its particles by place.
     let starts: Vec<DVec3> = (0..20_000).map(|i| starts[i * starts.len() / 20_000]).collect();

@@ -2,9 +2,9 @@
 
 use crate::common::*;
 use pbsr::{
-    BrownianParams, BrownianSampler, Density, FieldVolumeSampler, GridSampler, ImplicitSurface, LatticeSampler,
-    LineSampler, MeshSampler, MetropolisParams, MetropolisSampler, PackedColor, Particles, Sampler, SplatParams,
-    SplatSampler, SurfaceParams, VolumeParams, pixel_area,
+    BrownianParams, BrownianSampler, Density, FieldVolumeParams, FieldVolumeSampler, GridSampler, ImplicitSurface,
+    LatticeSampler, LineParams, LineSampler, MeshSampler, MetropolisParams, MetropolisSampler, PackedColor, Particles,
+    Sampler, SplatParams, SplatSampler, SurfaceParams, VolumeParams, pixel_area,
 };
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::{Cloud, DAabb, Grid, Splat, SplatKind, TransferFunction, TransferPoint, rng};
@@ -69,7 +69,7 @@ fn every_sampler_gives_its_colour_in_the_mean() {
     let samplers: [(&str, Box<dyn Sampler + '_>); 9] = [
         ("triangles", Box::new(MeshSampler::new(&mesh, &surface(), None).unwrap())),
         ("colours of vertices", Box::new(MeshSampler::new(&colored, &surface(), None).unwrap())),
-        ("lines", Box::new(LineSampler::new(&ball, 24, &fine, None).unwrap())),
+        ("lines", Box::new(LineSampler::new(&ball, &LineParams { resolution: 24 }, &fine, None).unwrap())),
         ("lattice lines", Box::new(LatticeSampler::new(&grid, 200.5, &surface()).unwrap())),
         ("walk", Box::new(BrownianSampler::new(&ball, &walk, &fine).unwrap())),
         ("cells", Box::new(GridSampler::new(&grid, &transfer, &volume, None).unwrap())),
@@ -78,7 +78,12 @@ fn every_sampler_gives_its_colour_in_the_mean() {
         (
             "field",
             Box::new(
-                FieldVolumeSampler::new(extinction, DAabb::new(DVec3::ZERO, DVec3::ONE), 4, 2e-6, COLOR, 1).unwrap(),
+                FieldVolumeSampler::new(
+                    extinction,
+                    DAabb::new(DVec3::ZERO, DVec3::ONE),
+                    &FieldVolumeParams { resolution: 4, cross_section: 2e-6, color: COLOR, seed: 1 },
+                )
+                .unwrap(),
             ),
         ),
     ];

@@ -8,7 +8,7 @@ use pbsr::{
 use splat_core::glam::{DQuat, DVec3, Vec3};
 use splat_core::raster::OpaqueImage;
 use splat_core::{
-    Light, LightShape, Material, Mesh, Progress, Projection, Receiver, Shading, Similarity, Transmittance,
+    Light, LightShape, Limits, Material, Mesh, Progress, Projection, Receiver, Shading, Similarity, Transmittance,
 };
 
 fn wall(z: f32) -> Mesh {
@@ -157,7 +157,8 @@ fn same_bits(camera: &splat_core::Camera, samplers: &[MeshSampler<'_>], full: &E
         let fold = FoldParams { batch_particles: batch, ..FoldParams::default() };
         for levels in steps {
             let scene = scene(camera, &objects);
-            pool.install(|| Renderer::new().fold(&scene, &mut ensemble, *levels, &fold, &Progress::new())).unwrap();
+            pool.install(|| Renderer::new().fold(&scene, &mut ensemble, &FoldParams { levels: *levels, ..fold }, None))
+                .unwrap();
             // Through a checkpoint each time.
             ensemble = Ensemble::from_bytes(&ensemble.to_bytes(&[1; 32]), &[1; 32]).unwrap();
         }
@@ -303,9 +304,9 @@ fn cost_is_predicted_and_work_can_be_cancelled() {
     let objects = objects(&[&sampler]);
     let scene = scene(&camera, &objects);
     let mut ensemble = Ensemble::new([64, 64], &EnsembleParams::default()).unwrap();
-    let fold = FoldParams { batch_particles: 20_000, ..FoldParams::default() };
-    let expected = predict(&scene, ensemble.params(), 50, &fold);
-    let counts = Renderer::new().fold(&scene, &mut ensemble, 50, &fold, &Progress::new()).unwrap();
+    let fold = FoldParams { levels: 50, batch_particles: 20_000, ..FoldParams::default() };
+    let expected = predict(&scene, ensemble.params(), &fold);
+    let counts = Renderer::new().fold(&scene, &mut ensemble, &fold, None).unwrap();
     assert!((counts.particles as f64 - expected.particles).abs() < 4.5 * expected.particles.sqrt(), "{counts:?}");
     assert!(counts.bytes <= expected.batch_bytes, "{counts:?} {expected:?}");
     assert_eq!(ensemble.bytes(), expected.ensemble_bytes);
@@ -313,14 +314,19 @@ fn cost_is_predicted_and_work_can_be_cancelled() {
     let progress = Progress::new();
     progress.cancel();
     let before = ensemble.clone();
-    let stopped = Renderer::new().fold(&scene, &mut ensemble, 50, &fold, &progress);
+    let stopped = Renderer::new().fold(&scene, &mut ensemble, &fold, Some(&progress));
     assert!(matches!(stopped, Err(Error::Core(splat_core::Error::Cancelled))));
     assert_eq!(ensemble, before);
-    let small = FoldParams { max_bytes: 1000, ..fold };
-    let refused = Renderer::new().fold(&scene, &mut ensemble, 1, &small, &Progress::new());
-    assert!(matches!(refused, Err(Error::TooMuch { .. })));
+    let small = FoldParams { limits: Limits::bytes(1000), ..fold };
+    let refused = Renderer::new().fold(&scene, &mut ensemble, &FoldParams { levels: 1, ..small }, None);
+    assert!(matches!(refused, Err(Error::Limit(_))));
     let other = front(32);
-    let refused = Renderer::new().fold(&Scene { camera: &other, ..scene }, &mut ensemble, 1, &fold, &Progress::new());
+    let refused = Renderer::new().fold(
+        &Scene { camera: &other, ..scene },
+        &mut ensemble,
+        &FoldParams { levels: 1, ..fold },
+        None,
+    );
     assert!(matches!(refused, Err(Error::Parameter { .. })));
 }
 
@@ -362,7 +368,9 @@ fn sums_gathered_by_tile_are_those_added_hit_by_hit() {
     let fold = |object: bool| {
         let params = EnsembleParams { object, ..EnsembleParams::default() };
         let mut ensemble = Ensemble::new(camera.size, &params).unwrap();
-        Renderer::new().fold(&scene, &mut ensemble, 300, &FoldParams::default(), &Progress::new()).unwrap();
+        Renderer::new()
+            .fold(&scene, &mut ensemble, &FoldParams { levels: 300, ..FoldParams::default() }, None)
+            .unwrap();
         ensemble.read(&|_, _| [0.25; 3], None)
     };
     let (gathered, one_by_one) = (fold(false), fold(true));

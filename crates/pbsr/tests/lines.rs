@@ -1,7 +1,7 @@
 //! Random lines on implicit surfaces: uniform, exact in opacity, and clear about what they could not find.
 
 use crate::common::*;
-use pbsr::{Density, Error, ImplicitSurface, LineSampler, Sampler, SurfaceParams, pixel_area};
+use pbsr::{Density, Error, ImplicitSurface, LineParams, LineSampler, Sampler, SurfaceParams, pixel_area};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::{DAabb, ScalarField};
 use std::f64::consts::PI;
@@ -17,7 +17,8 @@ fn params(opacity: f64, cross_section: f64) -> SurfaceParams {
 #[test]
 fn pb13_lines_are_uniform_on_spheres_and_ellipsoids() {
     // Equal heights cut equal areas from a sphere.
-    let sampler = LineSampler::new(&boxed(&Field::UNIT, 1.1), 32, &params(0.5, 1e-4), None).unwrap();
+    let sampler =
+        LineSampler::new(&boxed(&Field::UNIT, 1.1), &LineParams { resolution: 32 }, &params(0.5, 1e-4), None).unwrap();
     let all = positions(&sampler, 0);
     for axis in 0..3 {
         let mut bins = [0u64; 20];
@@ -33,7 +34,7 @@ fn pb13_lines_are_uniform_on_spheres_and_ellipsoids() {
         bounds: DAabb::new(DVec3::new(-1.1, -1.1, -3.1), DVec3::new(1.1, 1.1, 3.1)),
         ..boxed(&field, 1.0)
     };
-    let sampler = LineSampler::new(&surface, 48, &params(0.5, 1e-4), None).unwrap();
+    let sampler = LineSampler::new(&surface, &LineParams { resolution: 48 }, &params(0.5, 1e-4), None).unwrap();
     let below = |z: f64| {
         // ∫ √(1 + (e·z)²…): with k² = 8/81, area element ∝ √(1 − k²z²).
         let k = (8.0f64 / 81.0).sqrt();
@@ -52,7 +53,8 @@ fn pb13_lines_are_uniform_on_spheres_and_ellipsoids() {
 fn pb13_lines_are_uniform_on_tori_and_across_edges() {
     // The area of a torus below angle φ around its tube: φ + r/R·sin φ.
     let field = Field::Torus { large: 0.7, small: 0.3 };
-    let sampler = LineSampler::new(&boxed(&field, 1.1), 32, &params(0.5, 4e-5), None).unwrap();
+    let sampler =
+        LineSampler::new(&boxed(&field, 1.1), &LineParams { resolution: 32 }, &params(0.5, 4e-5), None).unwrap();
     let all = positions(&sampler, 0);
     let (mut tube, mut ring) = ([0u64; 40], [0u64; 40]);
     for p in &all {
@@ -70,7 +72,8 @@ fn pb13_lines_are_uniform_on_tori_and_across_edges() {
     let report = sampler.report();
     assert_eq!((report.graphs, report.missed()), (report.leaves, 0.0), "{report:?}");
     // The six faces of a cube, in rings of equal area around their middles: edges are where graphs end.
-    let sampler = LineSampler::new(&boxed(&Field::Cube, 0.8), 20, &params(0.5, 4e-5), None).unwrap();
+    let sampler =
+        LineSampler::new(&boxed(&Field::Cube, 0.8), &LineParams { resolution: 20 }, &params(0.5, 4e-5), None).unwrap();
     let all = positions(&sampler, 0);
     let mut bins = [0u64; 60];
     for p in &all {
@@ -91,7 +94,8 @@ fn planes_on_round_coordinates_are_counted_once() {
     for distance in [0.0, 0.25, 0.5, -0.75] {
         let field = Field::Plane { normal: DVec3::Z, distance };
         for resolution in [1, 8, 32] {
-            let sampler = LineSampler::new(&boxed(&field, 1.0), resolution, &params(0.5, 4e-5), None).unwrap();
+            let sampler =
+                LineSampler::new(&boxed(&field, 1.0), &LineParams { resolution }, &params(0.5, 4e-5), None).unwrap();
             let found = positions(&sampler, 0).len() as f64;
             let expected = 4.0 * 2f64.ln() / 4e-5;
             assert!(
@@ -107,7 +111,7 @@ fn opacity_of_a_sphere_grows_to_its_silhouette() {
     let camera = front(64);
     let s = pixel_area(&camera, DVec3::Z);
     let field = Field::Sphere { middle: DVec3::ZERO, radius: 0.8, scale: 1.0 };
-    let sampler = LineSampler::new(&boxed(&field, 1.0), 24, &params(0.2, s), None).unwrap();
+    let sampler = LineSampler::new(&boxed(&field, 1.0), &LineParams { resolution: 24 }, &params(0.2, s), None).unwrap();
     let ensemble = render(&camera, &[&sampler], 600);
     let share = s / (2.0 * PI * 0.8 * 0.8);
     let alpha = |x: u32, y: u32| {
@@ -139,7 +143,10 @@ fn opacity_of_a_sphere_grows_to_its_silhouette() {
 fn pb11_the_scale_of_the_field_changes_no_bit() {
     let at = |scale: f64| {
         let field = Field::Sphere { middle: DVec3::new(0.1, 0.2, -0.1), radius: 0.7, scale };
-        positions(&LineSampler::new(&boxed(&field, 1.0), 16, &params(0.5, 1e-3), None).unwrap(), 3)
+        positions(
+            &LineSampler::new(&boxed(&field, 1.0), &LineParams { resolution: 16 }, &params(0.5, 1e-3), None).unwrap(),
+            3,
+        )
     };
     let one = at(1.0);
     assert!(one.len() > 1000);
@@ -150,7 +157,9 @@ fn pb11_the_scale_of_the_field_changes_no_bit() {
 
 #[test]
 fn pb09_double_roots_are_found_where_lines_touch_them() {
-    let sampler = LineSampler::new(&boxed(&Field::Double, 1.1), 24, &params(0.5, 1e-4), None).unwrap();
+    let sampler =
+        LineSampler::new(&boxed(&Field::Double, 1.1), &LineParams { resolution: 24 }, &params(0.5, 1e-4), None)
+            .unwrap();
     let all = positions(&sampler, 0);
     assert!(all.iter().all(|p| (p.length() - 1.0).abs() < 1e-4), "all on the sphere");
     let expected = 4.0 * PI * 0.5f64.ln().abs() / 1e-4;
@@ -163,7 +172,8 @@ fn pb09_double_roots_are_found_where_lines_touch_them() {
 
 #[test]
 fn pb10_the_apex_of_a_cone_is_no_trouble() {
-    let sampler = LineSampler::new(&boxed(&Field::Cone, 1.0), 20, &params(0.5, 1e-3), None).unwrap();
+    let sampler =
+        LineSampler::new(&boxed(&Field::Cone, 1.0), &LineParams { resolution: 20 }, &params(0.5, 1e-3), None).unwrap();
     let all = positions(&sampler, 0);
     assert!(all.iter().all(|p| p.is_finite() && p.abs().max_element() <= 1.0));
     // Two cones of height 1 and slope 1: 2·π·√2 within the box, as its corners are out of their reach.
@@ -174,21 +184,23 @@ fn pb10_the_apex_of_a_cone_is_no_trouble() {
 fn pb12_components_get_particles_by_their_areas() {
     let field = Field::Two { radius: [0.3, 0.6], apart: 0.7 };
     let surface = ImplicitSurface { bounds: DAabb::new(DVec3::splat(-1.4), DVec3::splat(1.4)), ..boxed(&field, 1.0) };
-    let sampler = LineSampler::new(&surface, 32, &params(0.5, 1e-4), None).unwrap();
+    let sampler = LineSampler::new(&surface, &LineParams { resolution: 32 }, &params(0.5, 1e-4), None).unwrap();
     let all = positions(&sampler, 0);
     let left = all.iter().filter(|p| p.x < -0.2).count() as f64;
     let expected = all.len() as f64 * 0.2;
     assert!((left - expected).abs() < 4.5 * (expected * 2.0).sqrt(), "{left} for {expected}");
     // Two sheets far nearer to each other than a cell.
     let field = Field::Sheets { gap: 5e-4 };
-    let sampler = LineSampler::new(&boxed(&field, 1.0), 20, &params(0.5, 1e-3), None).unwrap();
+    let sampler =
+        LineSampler::new(&boxed(&field, 1.0), &LineParams { resolution: 20 }, &params(0.5, 1e-3), None).unwrap();
     assert!((sampler.report().area / 8.0 - 1.0).abs() < 0.05, "{:?}", sampler.report());
     assert!(sampler.report().missed() < 0.01, "{:?}", sampler.report());
 }
 
 #[test]
 fn pb14_sets_are_independent() {
-    let sampler = LineSampler::new(&boxed(&Field::UNIT, 1.1), 16, &params(0.5, 2e-3), None).unwrap();
+    let sampler =
+        LineSampler::new(&boxed(&Field::UNIT, 1.1), &LineParams { resolution: 16 }, &params(0.5, 2e-3), None).unwrap();
     // Counts of a cap in 600 sets: variance of a binomial, no correlation at any lag.
     const SETS: u64 = 600;
     let counts: Vec<f64> =
@@ -207,7 +219,7 @@ fn pb14_sets_are_independent() {
 fn open_surfaces_and_densities_take_their_share() {
     let upper = |p: DVec3| p.z > 0.0;
     let surface = ImplicitSurface { inside: Some(&upper), ..boxed(&Field::UNIT, 1.1) };
-    let sampler = LineSampler::new(&surface, 24, &params(0.5, 1e-4), None).unwrap();
+    let sampler = LineSampler::new(&surface, &LineParams { resolution: 24 }, &params(0.5, 1e-4), None).unwrap();
     let all = positions(&sampler, 0);
     assert!(all.iter().all(|p| p.z > 0.0));
     let expected = 2.0 * PI * 0.5f64.ln().abs() / 1e-4;
@@ -215,7 +227,9 @@ fn open_surfaces_and_densities_take_their_share() {
     assert!((all.len() as f64 - expected).abs() < 6.0 * expected.sqrt(), "{} for {expected}", all.len());
     // Density x, 0 for x < 0: the mean over the sphere is 1/4.
     let density = Density { field: &Field::Ramp, max: 1.0 };
-    let sampler = LineSampler::new(&boxed(&Field::UNIT, 1.1), 24, &params(0.5, 1e-4), Some(density)).unwrap();
+    let sampler =
+        LineSampler::new(&boxed(&Field::UNIT, 1.1), &LineParams { resolution: 24 }, &params(0.5, 1e-4), Some(density))
+            .unwrap();
     let all = positions(&sampler, 0);
     let expected = 4.0 * PI * 0.25 * 0.5f64.ln().abs() / 1e-4;
     assert!((all.len() as f64 - expected).abs() < 6.0 * expected.sqrt(), "{} for {expected}", all.len());
@@ -225,18 +239,25 @@ fn open_surfaces_and_densities_take_their_share() {
 
 #[test]
 fn what_cannot_be_sampled_says_why() {
-    let no = |field: &Field| LineSampler::new(&boxed(field, 1.1), 16, &params(0.5, 1e-3), None).err().unwrap();
+    let no = |field: &Field| {
+        LineSampler::new(&boxed(field, 1.1), &LineParams { resolution: 16 }, &params(0.5, 1e-3), None).err().unwrap()
+    };
     assert!(matches!(no(&Field::Nothing), Error::Empty { .. }));
     assert!(matches!(no(&Field::Broken), Error::Field { .. }));
     let flat =
         ImplicitSurface { bounds: DAabb::new(DVec3::splat(-1.1), DVec3::splat(-1.1)), ..boxed(&Field::UNIT, 1.1) };
-    assert!(matches!(LineSampler::new(&flat, 16, &params(0.5, 1e-3), None), Err(Error::Parameter { .. })));
     assert!(matches!(
-        LineSampler::new(&boxed(&Field::UNIT, 1.1), 16, &params(0.5, 1e-30), None),
-        Err(Error::TooMuch { .. })
+        LineSampler::new(&flat, &LineParams { resolution: 16 }, &params(0.5, 1e-3), None),
+        Err(Error::Parameter { .. })
+    ));
+    assert!(matches!(
+        LineSampler::new(&boxed(&Field::UNIT, 1.1), &LineParams { resolution: 16 }, &params(0.5, 1e-30), None),
+        Err(Error::Limit(_))
     ));
     // Without a bound everything is searched, and the report says so.
-    let sampler = LineSampler::new(&boxed(&Field::Unbounded, 1.1), 16, &params(0.5, 1e-3), None).unwrap();
+    let sampler =
+        LineSampler::new(&boxed(&Field::Unbounded, 1.1), &LineParams { resolution: 16 }, &params(0.5, 1e-3), None)
+            .unwrap();
     let report = sampler.report();
     assert_eq!(report.cells.unbounded, report.cells.active);
     assert!(report.missed() < 0.01, "{report:?}");
@@ -282,7 +303,7 @@ impl ScalarField for Needle {
 #[test]
 fn pieces_in_cubes_that_were_taken_for_empty_are_reported() {
     let needle = ImplicitSurface { field: &Needle, ..boxed(&Field::UNIT, 1.0) };
-    let sampler = LineSampler::new(&needle, 8, &params(0.5, 1e-3), None).unwrap();
+    let sampler = LineSampler::new(&needle, &LineParams { resolution: 8 }, &params(0.5, 1e-3), None).unwrap();
     let report = sampler.report();
     // Where the needle has the radius r = √(ln(1.8/(0.8 − z))/3000); its lateral area is near 0.13.
     assert!(report.missed() > 0.003 && (0.01..0.1).contains(&report.stray_area), "{report:?}");

@@ -3,9 +3,9 @@
 
 use crate::common::*;
 use pbsr::{
-    BrownianParams, BrownianSampler, Density, FieldVolumeSampler, GridSampler, ImplicitSurface, LatticeSampler,
-    LineSampler, MeshSampler, MetropolisParams, MetropolisSampler, Particles, Sampler, SplatParams, SplatSampler,
-    SurfaceParams, VolumeParams,
+    BrownianParams, BrownianSampler, Density, FieldVolumeParams, FieldVolumeSampler, GridSampler, ImplicitSurface,
+    LatticeSampler, LineParams, LineSampler, MeshSampler, MetropolisParams, MetropolisSampler, Particles, Sampler,
+    SplatParams, SplatSampler, SurfaceParams, VolumeParams,
 };
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::{Cloud, DAabb, Grid, Splat, SplatKind, TransferFunction, TransferPoint};
@@ -129,7 +129,11 @@ fn lattice(kind: SplatKind) -> &'static Cloud {
 
 #[test]
 fn pb13_pb14_lines() {
-    check(&|s| Box::new(LineSampler::new(&SPHERE, 24, &half(s), None).unwrap()), on_sphere, 3);
+    check(
+        &|s| Box::new(LineSampler::new(&SPHERE, &LineParams { resolution: 24 }, &half(s), None).unwrap()),
+        on_sphere,
+        3,
+    );
 }
 
 #[test]
@@ -176,7 +180,14 @@ fn pb13_pb14_fields() {
     let [low, high] = [DVec3::new(0.0, -0.5, -0.5), DVec3::new(1.0, 0.5, 0.5)];
     let make = |s| {
         let ramp = Density { field: &Field::Ramp, max: 1.0 };
-        Box::new(FieldVolumeSampler::new(ramp, DAabb::new(low, high), 6, s, [1.0; 3], 9).unwrap()) as Box<dyn Sampler>
+        Box::new(
+            FieldVolumeSampler::new(
+                ramp,
+                DAabb::new(low, high),
+                &FieldVolumeParams { resolution: 6, cross_section: s, color: [1.0; 3], seed: 9 },
+            )
+            .unwrap(),
+        ) as Box<dyn Sampler>
     };
     check(&make, by_ramp, 3);
 }

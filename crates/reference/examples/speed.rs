@@ -4,7 +4,7 @@
 
 use reference::{Density, Input, Lattice, LightSource, Medium, Order, PathSettings, Scene, composite, path_trace};
 use splat_core::glam::{DMat3, DVec3, Vec3};
-use splat_core::{Camera, Cloud, FootprintStack, Grid, Material, Progress, Projection, Splat, rng};
+use splat_core::{Camera, Cloud, FootprintStack, Grid, Material, Projection, Splat, rng};
 use std::time::Instant;
 
 const N: usize = 64;
@@ -59,7 +59,7 @@ fn paths(grid: &Grid) -> Result<(), splat_core::Error> {
         let settings = PathSettings { samples: 16, batch: 16, ..PathSettings::default() };
         let run = || -> Result<(f64, u64), splat_core::Error> {
             let start = seconds();
-            let image = path_trace(&scene, &camera([256; 2])?, &settings, &Progress::new())?;
+            let image = path_trace(&scene, &camera([256; 2])?, &settings, None)?;
             Ok((seconds() - start, image.bounces))
         };
         let runs: Result<Vec<_>, _> = (0..5).map(|_| run()).collect();
@@ -81,7 +81,7 @@ fn error(grid: &Grid, target: f64) -> Result<(), splat_core::Error> {
     let settings =
         PathSettings { samples: 20_000, batch: 64, target_relative_error: Some(target), ..PathSettings::default() };
     let start = seconds();
-    let image = path_trace(&scene, &camera([256; 2])?, &settings, &Progress::new())?;
+    let image = path_trace(&scene, &camera([256; 2])?, &settings, None)?;
     let (seconds, error) = (seconds() - start, 100.0 * image.relative_error());
     println!(
         "extinction 30, 256x256: {error:.2} % standard error after {} samples a pixel, {seconds:.1} core seconds",
@@ -105,16 +105,19 @@ fn points() -> Result<(), splat_core::Error> {
     let values: Vec<f32> = cloud.color.iter().flatten().copied().collect();
     let camera = camera([600, 500])?;
     let start = seconds();
-    let image = composite(&Input {
-        cloud: &cloud,
-        camera: &camera,
-        footprints: &FootprintStack::default(),
-        materials: &[Material::default()],
-        values: &values,
-        channels: 3,
-        resampling_sigma_px: 0.3,
-        order: Order::Fragment,
-    });
+    let image = composite(
+        &Input {
+            cloud: &cloud,
+            camera: &camera,
+            footprints: &FootprintStack::default(),
+            materials: &[Material::default()],
+            values: &values,
+            channels: 3,
+            resampling_sigma_px: 0.3,
+            order: Order::Fragment,
+        },
+        None,
+    )?;
     let seconds = seconds() - start;
     let mean = image.transmittance.iter().map(|t| t[0]).sum::<f64>() / image.transmittance.len() as f64;
     println!("exact compositor: {n} points, 600x500: {seconds:.1} core seconds (mean transmittance {mean:.4})");

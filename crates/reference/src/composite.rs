@@ -45,19 +45,14 @@ pub struct ExactImage {
 /// ε-z of opaque surfaces, part of the definition of an opaque splat.
 const EPSILON_Z: f64 = 0.5;
 
-/// Composites all splats of the input exactly, in f64.
-pub fn composite(input: &Input<'_>) -> ExactImage {
-    composite_with_progress(input, &Progress::new()).expect("invariant: nobody cancels")
-}
-
-/// [`composite`] that reports rows of pixels to `progress` and stops when that is cancelled; the caller adds the rows to the
-/// total.
+/// Composites all splats of the input exactly, in f64. Rows of pixels are reported to `progress`, and work stops where that is
+/// cancelled.
 ///
 /// # Errors
 /// [`Error::Cancelled`].
-pub fn composite_with_progress(input: &Input<'_>, progress: &Progress) -> Result<ExactImage, Error> {
+pub fn composite(input: &Input<'_>, progress: Option<&Progress>) -> Result<ExactImage, Error> {
     let splats = splats(input);
-    let pixels = by_pixel(input, &splats, progress, |ids, x, y| pixel(input, &splats, ids, x, y))?;
+    let pixels = by_pixel(input, &splats, |ids, x, y| pixel(input, &splats, ids, x, y), progress)?;
     let mut image = ExactImage { values: Vec::new(), transmittance: Vec::new() };
     for p in pixels {
         image.values.push(p.values);
@@ -81,15 +76,16 @@ pub struct Fragment {
 
 /// What becomes of the fragments of every pixel, sorted near to far: the way to composite the same splats exactly into anything.
 /// `solid` has for each pixel the view depth of an opaque surface, which hides what lies behind it, and +∞ where there is none;
-/// it may be empty. Opaque splats have no fragments. The caller adds the rows to the total of `progress`.
+/// it may be empty. Opaque splats have no fragments. Rows of pixels are reported to `progress`, and work stops where that is
+/// cancelled.
 ///
 /// # Errors
 /// [`Error::Cancelled`].
 pub fn fold_fragments<T: Send>(
     input: &Input<'_>,
     solid: &[f32],
-    progress: &Progress,
     fold: impl Fn(usize, &[Fragment]) -> T + Sync,
+    progress: Option<&Progress>,
 ) -> Result<Vec<T>, Error> {
     let width = input.camera.size[0] as usize;
     let splats = splats(input);
@@ -98,7 +94,7 @@ pub fn fold_fragments<T: Send>(
         let surface = solid.get(k).map_or(f64::INFINITY, |d| f64::from(*d));
         fold(k, &fragments(input, &splats, ids, [x, y], surface))
     };
-    by_pixel(input, &splats, progress, of_pixel)
+    by_pixel(input, &splats, of_pixel, progress)
 }
 
 fn splats(input: &Input<'_>) -> Vec<Option<Splat>> {
@@ -110,10 +106,13 @@ fn splats(input: &Input<'_>) -> Vec<Option<Splat>> {
 fn by_pixel<T: Send>(
     input: &Input<'_>,
     splats: &[Option<Splat>],
-    progress: &Progress,
     of_pixel: impl Fn(&[u32], usize, usize) -> T + Sync,
+    progress: Option<&Progress>,
 ) -> Result<Vec<T>, Error> {
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
     let [width, height] = input.camera.size.map(|s| s as usize);
+    progress.add_total(height as u64);
     let mut by_row: Vec<Vec<u32>> = vec![Vec::new(); height];
     for (i, splat) in splats.iter().enumerate() {
         if let Some(splat) = splat {

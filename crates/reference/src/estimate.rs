@@ -124,7 +124,8 @@ struct Pixel {
     transmittance: Running,
 }
 
-/// Path-traces a scene.
+/// Path-traces a scene. Rows of pixels are reported to `progress`, those of each batch of samples by themselves, and work stops
+/// where that is cancelled.
 ///
 /// # Errors
 /// As [`Scene::validate`]; [`Error::Invalid`] for fewer than two samples or no pixels; [`Error::Cancelled`].
@@ -132,8 +133,10 @@ pub fn path_trace(
     scene: &Scene<'_>,
     camera: &Camera,
     settings: &PathSettings,
-    progress: &Progress,
+    progress: Option<&Progress>,
 ) -> Result<Estimate, Error> {
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
     if settings.samples < 2 || settings.batch < 1 {
         let found = [settings.samples, settings.batch];
         return Err(Error::invalid("path settings", 0, "samples, batch", found, "at least 2 samples, batches of 1"));
@@ -152,10 +155,10 @@ pub fn path_trace(
             progress.tick(1)?;
             for (x, pixel) in row.iter_mut().enumerate() {
                 for sample in done..until {
-                    one_sample(&tracer, camera, settings, [x, y], (y * width + x) as u64, sample, pixel);
+                    one_sample(&tracer, camera, settings, [x, y], sample, pixel);
                 }
             }
-            Ok(())
+            Ok::<(), Error>(())
         };
         pixels.par_chunks_mut(width).enumerate().try_for_each(row)?;
         done = until;
@@ -172,10 +175,10 @@ fn one_sample(
     camera: &Camera,
     settings: &PathSettings,
     [x, y]: [usize; 2],
-    item: u64,
     sample: u32,
     pixel: &mut Pixel,
 ) {
+    let item = (y * camera.size[0] as usize + x) as u64;
     let mut rng = Stream::new(settings.seed, RADIANCE, item, u64::from(sample));
     let [dx, dy] = match settings.pixel {
         PixelSampling::Area => rng.pair(),

@@ -66,7 +66,8 @@ struct Crossing {
     hit: Option<Hit>,
 }
 
-/// Renders surfaces through the centres of pixels.
+/// Renders surfaces through the centres of pixels. Rows of pixels are reported to `progress`, and work stops where that is
+/// cancelled.
 ///
 /// # Errors
 /// [`Error::Invalid`] for a material, mesh or light that does not hold, an area light, or bounds that are not finite;
@@ -74,8 +75,10 @@ struct Crossing {
 pub fn composite_surfaces(
     scene: &SurfaceScene<'_>,
     camera: &Camera,
-    progress: &Progress,
+    progress: Option<&Progress>,
 ) -> Result<SurfaceImage, Error> {
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
     let renderer = Renderer::new(scene)?;
     let [width, height] = camera.size;
     progress.add_total(u64::from(height));

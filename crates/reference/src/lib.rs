@@ -14,7 +14,7 @@
 //! let image = composite(&Input {
 //!     cloud: &cloud, camera: &camera, footprints: &FootprintStack::default(), materials: &[Material::default()],
 //!     values: &[1.0, 0.5, 0.25], channels: 3, resampling_sigma_px: 0.0, order: Order::Centre,
-//! });
+//! }, None).unwrap();
 //! // The middle pixel is covered, the corner is not.
 //! assert!(image.transmittance[40][0] < 1.0 && image.transmittance[0][0] == 1.0);
 //! ```
@@ -25,12 +25,12 @@
 //!
 //! ```
 //! use reference::{Density, Medium, PathSettings, Scene, path_trace};
-//! use splat_core::{Camera, DAabb, Progress, Projection, glam::DVec3};
+//! use splat_core::{Camera, DAabb, Projection, glam::DVec3};
 //! let fog = Medium::new(Density::Box(DAabb::around(DVec3::ZERO, DVec3::ONE)), 0.5, 0.0);
 //! let scene = Scene { media: vec![fog], background: Some([1.0; 3]), ..Scene::default() };
 //! let camera = Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y,
 //!     Projection::Orthographic { height: 1.0 }, [4, 4]).unwrap();
-//! let image = path_trace(&scene, &camera, &PathSettings::default(), &Progress::new()).unwrap();
+//! let image = path_trace(&scene, &camera, &PathSettings::default(), None).unwrap();
 //! let (mean, error) = (image.radiance.mean[0][0], image.radiance.standard_error[0][0]);
 //! assert!((mean - (-1.0f64).exp()).abs() < 5.0 * error);
 //! ```
@@ -65,7 +65,7 @@ mod triangle;
 mod visibility;
 
 pub use classified::Classified;
-pub use composite::{ExactImage, Fragment, Input, Order, composite, composite_with_progress, fold_fragments};
+pub use composite::{ExactImage, Fragment, Input, Order, composite, fold_fragments};
 pub use density::{Density, Lattice};
 pub use dielectric::{
     CHANNEL_WAVELENGTHS_UM, Cauchy, Dielectric, fresnel_reflectance, reflect, refract, transmitted_cosine,

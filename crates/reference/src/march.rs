@@ -81,7 +81,7 @@ pub fn march(
 }
 
 /// Marches a ray through the centre of every pixel. The environment and the background are seen behind the media; they
-/// light nothing.
+/// light nothing. Rows of pixels are reported to `progress`, and work stops where that is cancelled.
 ///
 /// # Errors
 /// As [`Scene::validate`] and [`march`]; [`Error::Invalid`] for a scene with surfaces; [`Error::Cancelled`].
@@ -89,8 +89,10 @@ pub fn march_image(
     scene: &Scene<'_>,
     camera: &Camera,
     params: &MarchParams,
-    progress: &Progress,
+    progress: Option<&Progress>,
 ) -> Result<MarchedImage, Error> {
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
     scene.validate()?;
     scene.refuse_liberties()?;
     if !scene.surfaces.is_empty() {

@@ -98,7 +98,7 @@ impl<'a> Volume<'a> {
         } else {
             grid.walk(ray, t0, t1, rng, |t, cell, majorant, rng| {
                 let point = ray.at(t);
-                let medium = self.spectral_event(grid, cell, majorant, point, weight, rng);
+                let medium = self.spectral_event(grid.members(cell), majorant, point, weight, rng);
                 found = medium.map(|medium| Collision { point, medium });
                 found.is_some()
             });
@@ -128,11 +128,10 @@ impl<'a> Volume<'a> {
         chosen
     }
 
-    /// One tentative collision with weights: the medium, or `None` for a null collision.
+    /// One tentative collision with weights in a cell of these media: the medium, or `None` for a null collision.
     fn spectral_event(
         &self,
-        grid: &MajorantGrid,
-        cell: usize,
+        members: &[u32],
         majorant: f64,
         p: DVec3,
         weight: &mut [f64; 3],
@@ -140,7 +139,7 @@ impl<'a> Volume<'a> {
     ) -> Option<usize> {
         let (mut sum, mut total) = ([0.0; 3], 0.0);
         let (mut chosen, mut of_chosen, mut share_of_chosen) = (0, [0.0; 3], 0.0);
-        for &m in grid.members(cell) {
+        for &m in members {
             let medium = &self.media[m as usize];
             let density = medium.density.value(p);
             let own = medium.extinction.map(|e| e * density);

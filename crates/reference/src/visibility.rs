@@ -12,7 +12,7 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, builder::build_bvh2};
 use obvhs::ray::RayHit;
 use obvhs::{BvhBuildParams, ray};
-use splat_core::{DAabb, Error, Mesh};
+use splat_core::{DAabb, Error, Exceeded, Mesh};
 use std::time::Duration;
 
 /// Padding of f32 boxes in a scene of size one.
@@ -71,11 +71,12 @@ impl Visibility {
     /// Builds the hierarchy of some meshes.
     ///
     /// # Errors
-    /// As [`Mesh::validate`]; [`Error::Overflow`] for 2³¹ triangles or more.
+    /// As [`Mesh::validate`]; [`Error::Limit`] for 2³¹ triangles or more.
     pub fn new(meshes: &[&Mesh]) -> Result<Self, Error> {
         let total: u64 = meshes.iter().map(|m| m.triangles.len() as u64).sum();
         if total >= 1 << 31 {
-            return Err(Error::Overflow { what: "triangles", needed: total, had: 1 << 31 });
+            let (what, hint) = ("the meshes".into(), "use a coarser mesh".into());
+            return Err(Error::Limit(Exceeded { what, needed: total, limit: Some(1 << 31), unit: "triangles", hint }));
         }
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for mesh in meshes {

@@ -3,7 +3,9 @@
 use reference::{Input, Order, composite};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
-use splat_core::raster::{FoldInput, OpaqueImage, OpaqueInput, Params, fold, project, resolve_opaque};
+use splat_core::raster::{
+    Detail, FoldInput, OpaqueImage, OpaqueInput, Params, ProjectInput, fold, project, resolve_opaque,
+};
 use splat_core::{Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Projection, Splat, SplatKind, rng};
 
 const SIZE: [u32; 2] = [75, 50];
@@ -60,7 +62,14 @@ fn rasterize(cloud: &Cloud, camera: &Camera, materials: &[Material], planes: usi
     }
     let opaque: Vec<u32> = (0..cloud.len() as u32).filter(|i| cloud.kind[*i as usize] == SplatKind::Opaque).collect();
     let (footprints, params) = (FootprintStack::default(), Params { transmittance_cutoff: 0.0, ..Params::default() });
-    let projected = project(cloud, camera, &footprints, materials, &params);
+    let projected = project(&ProjectInput {
+        cloud,
+        camera,
+        footprints: &footprints,
+        materials,
+        params: &params,
+        detail: Detail::ALL,
+    });
     let values: Vec<f32> = cloud.color.iter().flatten().copied().collect();
     let solid = OpaqueInput { projected: &projected, ids: &opaque, values: &values, channels: 3, objects: false };
     let (solid, _) = resolve_opaque(&solid, None).unwrap();
@@ -95,16 +104,20 @@ fn finish(mut acc: Accumulator, solid: &OpaqueImage) -> Raster {
 
 fn largest_difference(raster: &Raster, cloud: &Cloud, camera: &Camera, materials: &[Material]) -> f64 {
     let values: Vec<f32> = cloud.color.iter().flatten().copied().collect();
-    let exact = composite(&Input {
-        cloud,
-        camera,
-        footprints: &FootprintStack::default(),
-        materials,
-        values: &values,
-        channels: 3,
-        resampling_sigma_px: Params::default().resampling_sigma_px,
-        order: Order::Centre,
-    });
+    let exact = composite(
+        &Input {
+            cloud,
+            camera,
+            footprints: &FootprintStack::default(),
+            materials,
+            values: &values,
+            channels: 3,
+            resampling_sigma_px: Params::default().resampling_sigma_px,
+            order: Order::Centre,
+        },
+        None,
+    )
+    .unwrap();
     let mut largest: f64 = 0.0;
     for k in 0..exact.values.len() {
         for c in 0..3 {

@@ -7,7 +7,7 @@ use reference::{
     Surface, SurfaceMaterial, march_image, path_trace,
 };
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Camera, DAabb, Progress};
+use splat_core::{Camera, DAabb};
 use std::f64::consts::PI;
 
 const ALBEDO: f64 = 0.5;
@@ -135,7 +135,7 @@ fn what_cannot_be_followed_is_refused() {
     };
     let camera = camera();
     let traced = |scene: &Scene<'_>, rules| {
-        path_trace(scene, &camera, &PathSettings { samples: 2, rules, ..PathSettings::default() }, &Progress::new())
+        path_trace(scene, &camera, &PathSettings { samples: 2, rules, ..PathSettings::default() }, None)
     };
     let bright = of(Liberty { gain: 2.0, ..Liberty::default() });
     assert!(traced(&bright, PathRules::default()).unwrap_err().to_string().contains("bounces"));
@@ -150,7 +150,7 @@ fn what_cannot_be_followed_is_refused() {
     let two = Scene { unshadowed: vec![true, false], ..of(Liberty::default()) };
     assert!(traced(&two, PathRules::default()).is_err());
     // The marcher follows nature alone.
-    let marched = |scene: &Scene<'_>| march_image(scene, &camera, &MarchParams::default(), &Progress::new());
+    let marched = |scene: &Scene<'_>| march_image(scene, &camera, &MarchParams::default(), None);
     assert!(marched(&of(Liberty::default())).is_ok());
     assert!(marched(&bright).is_err());
     assert!(marched(&Scene { unshadowed: vec![true], ..of(Liberty::default()) }).is_err());

@@ -7,7 +7,7 @@ use reference::{
     Scene, march_image,
 };
 use splat_core::glam::{DMat3, DVec3};
-use splat_core::{DAabb, Grid, Progress};
+use splat_core::{DAabb, Grid};
 use std::f64::consts::PI;
 
 const WIDE: f64 = 1e6;
@@ -71,7 +71,7 @@ fn homogeneous_ball_transmits_by_its_chords() {
         sigma.map(|s| (-2.0 * s * (1.0 - apart).max(0.0).sqrt()).exp())
     };
     assert_mean(&trace(&scene, &camera, &settings(2000, None)), truth, 4.5, "ball");
-    let marched = march_image(&scene, &camera, &MarchParams::default(), &Progress::new()).unwrap();
+    let marched = march_image(&scene, &camera, &MarchParams::default(), None).unwrap();
     for (k, t) in marched.transmittance.iter().enumerate() {
         (0..3).for_each(|c| assert!((t[c] - truth(k)[c]).abs() < 1e-13, "marched pixel {k}"));
     }
@@ -142,7 +142,7 @@ fn light_in_a_ball_once_scattered_agrees_with_quadrature_and_the_marcher() {
         [omega * sigma * 2.0 / (4.0 * PI * b) * sum * 2.0 * limit / f64::from(n); 3]
     };
     assert_mean(&trace(&scene, &camera, &settings(4000, Some(1))), truth, 4.0, "once scattered");
-    let marched = march_image(&scene, &camera, &MarchParams::default(), &Progress::new()).unwrap();
+    let marched = march_image(&scene, &camera, &MarchParams::default(), None).unwrap();
     for k in 0..36 {
         let (found, error) = (marched.radiance[k][0], marched.error[k][0]);
         assert!((found - truth(k)[0]).abs() <= error + 1e-7, "pixel {k}: {found} ± {error}, {}", truth(k)[0]);
@@ -191,7 +191,7 @@ fn thin_slab_scatters_parallel_light_once() {
         let l = omega * p * (-(-tau * (1.0 / mu + 1.0 / mu0)).exp_m1()) / (1.0 + mu / mu0);
         let truth = [1.0, 2.0, 3.0].map(|e| e * l);
         assert_mean(&trace(&scene, &camera, &settings(20_000, Some(1))), |_| truth, 4.0, "thin slab");
-        let marched = march_image(&scene, &camera, &MarchParams::default(), &Progress::new()).unwrap();
+        let marched = march_image(&scene, &camera, &MarchParams::default(), None).unwrap();
         (0..3).for_each(|c| assert!((marched.radiance[4][c] / truth[c] - 1.0).abs() < 2e-6, "marched, tau {tau}"));
     }
 }
@@ -257,7 +257,7 @@ fn single_scattering_in_a_volume_agrees_with_the_marcher() {
     ];
     let scene = Scene { media: vec![medium], lights, background: Some([0.2; 3]), ..Scene::default() };
     let camera = parallel(DVec3::new(0.5, 0.5, 3.0), DVec3::splat(0.5), 1.0, [6, 6]);
-    let marched = march_image(&scene, &camera, &MarchParams::default(), &Progress::new()).unwrap();
+    let marched = march_image(&scene, &camera, &MarchParams::default(), None).unwrap();
     let rules = PathRules { max_bounces: Some(1), emission_illuminates: false, ..PathRules::default() };
     let traced = trace(&scene, &camera, &PathSettings { rules, ..settings(3000, None) });
     assert_mean(&traced, |k| marched.radiance[k], 4.5, "volume");

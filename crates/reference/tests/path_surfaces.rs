@@ -282,7 +282,7 @@ fn cancelled_work_says_so() {
     let (scene, camera) = everything(&mesh, DVec3::ZERO, 1.0);
     let progress = Progress::new();
     progress.cancel();
-    assert_eq!(path_trace(&scene, &camera, &settings(8), &progress), Err(Error::Cancelled));
+    assert_eq!(path_trace(&scene, &camera, &settings(8), Some(&progress)), Err(Error::Cancelled));
 }
 
 #[test]
@@ -292,7 +292,7 @@ fn broken_input_is_refused() {
     let refused = |edit: &dyn Fn(&mut Scene<'_>)| {
         let (mut scene, _) = everything(&mesh, DVec3::ZERO, 1.0);
         edit(&mut scene);
-        path_trace(&scene, &camera, &settings(2), &Progress::new()).is_err()
+        path_trace(&scene, &camera, &settings(2), None).is_err()
     };
     assert!(!refused(&|_| ()));
     assert!(refused(&|s| s.media[0].extinction[1] = f64::NAN));

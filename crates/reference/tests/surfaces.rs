@@ -7,7 +7,7 @@ use reference::{
 };
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
-use splat_core::{DAabb, Mesh, Progress, ScalarField, rng};
+use splat_core::{DAabb, Mesh, ScalarField, rng};
 use std::f64::consts::PI;
 
 /// |p − center|² − r², with the exact bound over a ball.
@@ -56,7 +56,7 @@ fn nested_balls_composite_in_the_order_of_their_shells() {
         };
         let scene = SurfaceScene { implicits: (0..3).map(implicit).collect(), ..SurfaceScene::default() };
         let camera = parallel(DVec3::Z * 3.0, DVec3::ZERO, 2.2, [10, 10]);
-        let image = composite_surfaces(&scene, &camera, &Progress::new()).unwrap();
+        let image = composite_surfaces(&scene, &camera, None).unwrap();
         assert!(image.proven && image.unresolved == 0);
         for k in 0..100 {
             let at = |i: usize| ((i as f64 + 0.5) / 10.0 - 0.5) * 2.2;
@@ -90,7 +90,7 @@ fn opaque_ball_is_lit_by_lambert_and_shadows_itself() {
         let implicits = vec![implicit];
         let scene = SurfaceScene { implicits, lights: lights.clone(), shadows, ..SurfaceScene::default() };
         let camera = parallel(ball.center + DVec3::Z * 3.0, ball.center, 2.2, [9, 9]);
-        let image = composite_surfaces(&scene, &camera, &Progress::new()).unwrap();
+        let image = composite_surfaces(&scene, &camera, None).unwrap();
         for k in 0..81 {
             let at = |i: usize| ((i as f64 + 0.5) / 9.0 - 0.5) * 2.2;
             let (x, y) = (at(k % 9), -at(k / 9));
@@ -113,7 +113,7 @@ fn implicit_and_mesh_of_one_ball_agree() {
     let implicits = vec![ImplicitSurface { field: &ball, bounds: around(DVec3::ZERO, 1.1), color: [1.0; 3], material }];
     let of_field = SurfaceScene { implicits, ..SurfaceScene::default() };
     let of_mesh = SurfaceScene { meshes: vec![Surface { mesh: &mesh, material }], ..SurfaceScene::default() };
-    let render = |s: &SurfaceScene<'_>| composite_surfaces(s, &camera, &Progress::new()).unwrap();
+    let render = |s: &SurfaceScene<'_>| composite_surfaces(s, &camera, None).unwrap();
     let (a, b) = (render(&of_field), render(&of_mesh));
     // Away from the rim both cross the shell twice.
     assert!(a.crossings.iter().chain(&b.crossings).all(|c| *c == 2));
@@ -224,7 +224,7 @@ fn procedural_density_is_marched_within_its_stated_error() {
     let scene = Scene { media: vec![medium], ..Scene::default() };
     for tolerance in [1e-3, 1e-6, 1e-10] {
         let params = MarchParams { relative_tolerance: tolerance, ..MarchParams::default() };
-        let image = march_image(&scene, &camera, &params, &Progress::new()).unwrap();
+        let image = march_image(&scene, &camera, &params, None).unwrap();
         for k in 0..49 {
             let at = |i: usize| ((i as f64 + 0.5) / 7.0 - 0.5) * 0.4;
             let apart = at(k % 7).hypot(at(k / 7));

@@ -1,4 +1,4 @@
-//! Errors of the nouns: input that breaks a promise, buffers too small, work cancelled.
+//! Errors of the nouns: input that breaks a promise, too much of something, work cancelled.
 
 /// What can go wrong in this crate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -28,16 +28,13 @@ pub enum Error {
         /// The length of the table.
         expected: usize,
     },
-    /// A buffer would have to be larger than it may be.
-    #[error("{what} needs {needed} elements, the limit is {had}")]
-    Overflow {
-        /// The buffer.
-        what: &'static str,
-        /// Elements needed.
-        needed: u64,
-        /// Elements allowed.
-        had: u64,
-    },
+    /// More than there may be.
+    #[error("{0}")]
+    Limit(crate::Exceeded),
+    /// A recording has less room than it needs.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Overflow(#[from] splat_shaders::Overflow),
     /// The caller asked to stop, see [`crate::Progress`].
     #[error("cancelled")]
     Cancelled,

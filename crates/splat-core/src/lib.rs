@@ -7,6 +7,33 @@
 //!
 //! Conventions: right-handed, +Y up, the camera looks along −Z; positions are an f64 origin plus f32 offsets;
 //! colours are linear Rec.709; optical depth and absorbance are Napierian; view depth is linear and positive in front.
+//!
+//! Two splats, one behind the other, hide as much as their optical depths say, together:
+//!
+//! ```
+//! use splat_core::raster::{Detail, FoldInput, OpaqueImage, Params, ProjectInput, fold, project};
+//! use splat_core::{Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Projection, Splat, glam::{DVec3, Vec3}};
+//!
+//! let mut cloud = Cloud::new(DVec3::ZERO);
+//! for z in [0.5, -0.5] {
+//!     cloud.push(&Splat { position: Vec3::Z * z, radius: 1.0, cross_section: 0.5, ..Splat::default() });
+//! }
+//! let view = Projection::Orthographic { height: 3.0 };
+//! let camera = Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y, view, [65, 65]).unwrap();
+//! let (footprints, materials, opaque) = (FootprintStack::default(), [Material::default()], OpaqueImage::default());
+//! let params = &Params { resampling_sigma_px: 0.0, ..Params::default() };
+//! let (camera, materials, detail) = (&camera, &materials[..], Detail::ALL);
+//! let seen = ProjectInput { cloud: &cloud, camera, footprints: &footprints, materials, params, detail };
+//! let (projected, order, values, direction) = (&project(&seen), &[0, 1], &[1.0; 6], Direction::FrontToBack);
+//! let input = FoldInput { projected, order, values, materials, opaque: &opaque, direction, params };
+//! let mut picture = Accumulator::new(camera.size, 1, 3, false, false);
+//! fold(&input, &mut picture, None).unwrap();
+//!
+//! // In the middle: τ = K·norm/R²·w(0) of each, and what is blended of a colour of 1 is 1 − e^−τ of both.
+//! let footprint = footprints.layers()[0];
+//! let tau = 2.0 * 0.5 * footprint.norm() * footprint.profile(0.0);
+//! assert!((f64::from(picture.channels[0][32 * 65 + 32]) + (-tau).exp_m1()).abs() < 1e-6);
+//! ```
 #![forbid(unsafe_code)]
 
 mod camera;
@@ -20,6 +47,7 @@ mod footprint;
 mod grid;
 mod layers;
 mod light;
+mod limits;
 mod material;
 mod mesh;
 pub mod optics;
@@ -48,6 +76,7 @@ pub use glam;
 pub use grid::Grid;
 pub use layers::{ADDITIVE_LAYERS, Accumulator, LayerData, LayerSet, Layers, SHADED_EFFECTS};
 pub use light::{Light, LightShape};
+pub use limits::{Exceeded, Limits};
 pub use material::{Material, MaterialTable, Object, ObjectTable, Shading};
 pub use mesh::Mesh;
 pub use phase::henyey_greenstein;

@@ -26,9 +26,9 @@ mod shapes;
 pub mod tile;
 mod translucent;
 
-pub use finish::{Background, finish};
+pub use finish::{Background, FinishInput, finish};
 pub use opaque::{OpaqueImage, OpaqueInput, resolve_opaque};
-pub use project::{project, project_into};
+pub use project::{ProjectInput, project, project_into};
 pub use projected::{Detail, NearDisc, Projected, ProjectedDepth, ProjectedSplat};
 pub use pulp;
 pub use translucent::{FoldInput, fold};

@@ -1,7 +1,7 @@
 //! What half precision does to sums of many thin splats.
 
 use glam::DVec3;
-use splat_core::raster::{Accumulation, FoldInput, OpaqueImage, Params, fold, project};
+use splat_core::raster::{Accumulation, Detail, FoldInput, OpaqueImage, Params, ProjectInput, fold, project};
 use splat_core::{Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Projection, Splat};
 
 /// Optical depth and first channel after `count` splats of cross-section `k` over one pixel.
@@ -11,7 +11,14 @@ fn stack(k: f32, count: usize, accumulation: Accumulation) -> (f32, f32) {
     let view = Projection::Orthographic { height: 1.0 };
     let camera = Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y, view, [1, 1]).unwrap();
     let (materials, params) = ([Material::default()], Params { accumulation, ..Params::default() });
-    let projected = project(&cloud, &camera, &FootprintStack::default(), &materials, &params);
+    let projected = project(&ProjectInput {
+        cloud: &cloud,
+        camera: &camera,
+        footprints: &FootprintStack::default(),
+        materials: &materials,
+        params: &params,
+        detail: Detail::ALL,
+    });
     let mut acc = Accumulator::new([1, 1], 1, 3, false, false);
     let input = FoldInput {
         projected: &projected,

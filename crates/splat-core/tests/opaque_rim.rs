@@ -1,7 +1,7 @@
 //! Opaque surfaces at their silhouette: closed ones have no dark rim, open ones show their back.
 
 use glam::{DVec3, Vec3};
-use splat_core::raster::{OpaqueImage, OpaqueInput, Params, project, resolve_opaque};
+use splat_core::raster::{Detail, OpaqueImage, OpaqueInput, Params, ProjectInput, project, resolve_opaque};
 use splat_core::shade::{ChannelLayout, LitBy, ShadeInput, shade};
 use splat_core::{
     Camera, Cloud, Footprint, FootprintStack, LayerSet, Light, LightShape, Material, Object, Projection, Splat,
@@ -35,7 +35,14 @@ fn picture(cloud: &Cloud, to_light: DVec3) -> OpaqueImage {
     let camera = camera.unwrap();
     let (materials, footprints) = ([Material::default()], FootprintStack::default());
     let object = Object { name: "ball".into(), casts_shadow: false, shadow_coefficient: 0.0 };
-    let projected = project(cloud, &camera, &footprints, &materials, &Params::default());
+    let projected = project(&ProjectInput {
+        cloud,
+        camera: &camera,
+        footprints: &footprints,
+        materials: &materials,
+        params: &Params::default(),
+        detail: Detail::ALL,
+    });
     let shape = LightShape::Directional { direction: -to_light };
     let light = Light { shape, intensity: [std::f32::consts::PI; 3] };
     let input = ShadeInput {

@@ -2,10 +2,11 @@
 
 use glam::{DVec3, Vec3};
 use splat_core::raster::gpu::{AttributeRoom, Capacities, follow, project, record, resolve};
-use splat_core::raster::{self, Accumulation, OpaqueImage, Params, Projected};
+use splat_core::raster::{self, Accumulation, Detail, OpaqueImage, Params, ProjectInput, Projected};
 use splat_core::raster::{FoldInput, OpaqueInput};
 use splat_core::shade::{ChannelLayout, MAX_CHANNELS, gpu as shade};
 use splat_core::{Accumulator, Camera, Cloud, Direction, Error, FootprintStack, Material, Projection, Splat};
+use splat_shaders::Overflow;
 
 /// All effects, the normal and the shadow.
 const MOST: u32 = MAX_CHANNELS as u32;
@@ -62,7 +63,14 @@ fn projected() -> Projected {
     }
     let view = Projection::Orthographic { height: 2.0 };
     let camera = Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y, view, ROOM.size).unwrap();
-    raster::project(&cloud, &camera, &FootprintStack::default(), &[Material::default()], &Params::default())
+    raster::project(&ProjectInput {
+        cloud: &cloud,
+        camera: &camera,
+        footprints: &FootprintStack::default(),
+        materials: &[Material::default()],
+        params: &Params::default(),
+        detail: Detail::ALL,
+    })
 }
 
 fn input<'a>(projected: &'a Projected, params: &'a Params, opaque: &'a OpaqueImage) -> FoldInput<'a> {
@@ -89,12 +97,12 @@ fn what_does_not_fit_the_room_or_the_device_is_refused() {
         Capacities { footprints: 2, ..ROOM },
         Capacities { materials: 0, ..ROOM },
     ] {
-        assert!(matches!(uploads(room, &input, &plain), Err(Error::Overflow { .. })), "{room:?}");
+        assert!(matches!(uploads(room, &input, &plain), Err(Error::Overflow(_))), "{room:?}");
     }
     let wall = OpaqueImage { depth: vec![1.0; 640 * 360], ..OpaqueImage::default() };
     let hidden = FoldInput { opaque: &wall, ..input };
     let refused = uploads(Capacities { opaque: false, ..ROOM }, &hidden, &plain);
-    assert_eq!(refused, Err(Error::Overflow { what: "opaque images", needed: 1, had: 0 }));
+    assert_eq!(refused, Err(Error::Overflow(Overflow { what: "opaque images", needed: 1, had: 0 })));
     let short = OpaqueImage { depth: vec![1.0; 5], ..OpaqueImage::default() };
     for input in [FoldInput { values: &[0.5; 29], ..input }, FoldInput { opaque: &short, ..input }] {
         assert!(matches!(uploads(ROOM, &input, &plain), Err(Error::ColumnLength { .. })));
@@ -153,7 +161,7 @@ fn opaque_splats_are_recorded_without_fault_or_refused() {
         resolve::Capacities { listed: 1, ..room },
         resolve::Capacities { footprints: 2, ..room },
     ] {
-        assert!(matches!(uploads(small, &input), Err(Error::Overflow { .. })), "{small:?}");
+        assert!(matches!(uploads(small, &input), Err(Error::Overflow(_))), "{small:?}");
     }
     let mut nameless = projected.clone();
     nameless.objects.clear();
@@ -167,7 +175,10 @@ fn opaque_splats_are_recorded_without_fault_or_refused() {
     let (found, counts) = recorded.finish([&state(12), &image.concat()]).unwrap();
     let (depth, channels, object) = (vec![1.5, f32::INFINITY], vec![vec![2.5, 0.0]], vec![4, u32::MAX]);
     assert_eq!((found, counts.entries), (OpaqueImage { depth, channels, object }, 12));
-    assert!(matches!(recorded.finish([&state(101), &image.concat()]), Err(Error::Overflow { needed: 101, .. })));
+    assert!(matches!(
+        recorded.finish([&state(101), &image.concat()]),
+        Err(Error::Overflow(Overflow { needed: 101, .. }))
+    ));
     assert!(matches!(recorded.finish([&state(12), &[0; 20]]), Err(Error::ColumnLength { .. })));
 }
 
@@ -180,7 +191,7 @@ fn what_is_read_back_is_put_in_or_refused() {
     let counts = recorded.finish([&state(12, 0), &planes], &mut acc).unwrap();
     assert_eq!((counts.splats, counts.entries, counts.longest), (5, 12, 7));
     assert_eq!((&acc.optical_depth, &acc.channels), (&vec![vec![0.5, 1.5]], &vec![vec![2.5, 3.5]]));
-    let overflow = |needed| Err(Error::Overflow { what: "tile entries", needed, had: 300_000 });
+    let overflow = |needed| Err(Error::Overflow(Overflow { what: "tile entries", needed, had: 300_000 }));
     assert_eq!(recorded.finish([&state(300_001, 0), &planes], &mut acc), overflow(300_001));
     assert_eq!(recorded.finish([&state(1, 1), &planes], &mut acc), overflow((1 << 32) + 1));
     assert!(matches!(recorded.finish([&[], &planes], &mut acc), Err(Error::ColumnLength { .. })));

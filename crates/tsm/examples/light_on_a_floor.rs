@@ -2,7 +2,7 @@
 
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Cloud, Footprint, Light, LightShape, Receiver, Splat, SplatKind, Transmittance};
-use tsm::{Params, ShadowMap};
+use tsm::{Params, Scene, ShadowMap};
 
 fn main() -> Result<(), tsm::Error> {
     let mut cloud = Cloud::new(DVec3::ZERO);
@@ -21,7 +21,7 @@ fn main() -> Result<(), tsm::Error> {
         cloud.push(&Splat { position, radius, cross_section: h * h, kind, normal: Vec3::Y, ..Splat::default() });
     }
     let light = Light { shape: LightShape::Point { position: DVec3::new(0.0, 4.0, 0.0) }, intensity: [20.0; 3] };
-    let map = ShadowMap::build(&cloud, &[], &[], &light, &Params::default())?;
+    let map = ShadowMap::build(&Scene::from(&cloud), &light, &Params::default(), None)?;
     println!("{:?}", map.counts());
     for k in 0..20 {
         let position = Vec3::new(k as f32 * h, 0.0, 0.0);

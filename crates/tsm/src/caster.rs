@@ -1,8 +1,8 @@
 //! Casters: the splats of a cloud that throw shadows, in the light's frame.
 
-use crate::Params;
 use crate::frame::Frame;
 use crate::mapping::floor;
+use crate::{Params, Scene};
 use glam::Vec3;
 use splat_core::optics::{self, AbsorbanceModel, SurfaceOpacity};
 use splat_core::{Cloud, Footprint, FootprintStack, Material, Object, SplatKind, glam};
@@ -119,7 +119,8 @@ pub(crate) struct Casters<'a> {
 }
 
 impl<'a> Casters<'a> {
-    pub(crate) fn new(cloud: &'a Cloud, materials: &[Material], objects: &'a [Object], params: &'a Params) -> Self {
+    pub(crate) fn new(scene: &Scene<'a>, params: &'a Params) -> Self {
+        let Scene { cloud, materials, objects } = *scene;
         let extinctions: Vec<_> = materials.iter().map(Extinction::of).collect();
         let is_coloured = |e: &Extinction| e.rgb[0] != e.rgb[1] || e.rgb[1] != e.rgb[2];
         Self {

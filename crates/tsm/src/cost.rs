@@ -16,7 +16,7 @@ pub enum Limit {
     Cells,
     /// The most entries that so many splats make, see [`crate::Resolution::Auto`].
     Entries,
-    /// [`crate::Params::max_bytes`].
+    /// [`crate::Params::limits`].
     Memory,
 }
 

@@ -8,9 +8,9 @@ use crate::plan::{Plan, plan};
 use crate::shadow_map::{Absorbances, Matter, head};
 use crate::survey::{CHUNK, Survey};
 use crate::table::{Lists, Parted, Ranges};
-use crate::{Error, Params, Prediction, ShadowMap};
+use crate::{Error, Params, Prediction, Scene, ShadowMap};
 use rayon::prelude::*;
-use splat_core::{Cloud, Light, Material, Object, Progress, SplatKind};
+use splat_core::{Light, Limits, Progress, SplatKind};
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -38,25 +38,20 @@ pub(crate) enum Parts {
 }
 
 impl Deposits {
-    /// Looks at the casters, chooses the table and deposits their absorbance, telling the progress in splats; the
-    /// arguments are those of [`ShadowMap::build_with_progress`].
+    /// Looks at the casters, chooses the table and deposits their absorbance; the arguments are those of
+    /// [`ShadowMap::build`].
     ///
     /// # Errors
-    /// Those of [`ShadowMap::build_with_progress`].
-    pub fn new(
-        cloud: &Cloud,
-        materials: &[Material],
-        objects: &[Object],
-        light: &Light,
-        params: &Params,
-        progress: &Progress,
-    ) -> Result<Self, Error> {
+    /// Those of [`ShadowMap::build`].
+    pub fn new(scene: &Scene<'_>, light: &Light, params: &Params, progress: Option<&Progress>) -> Result<Self, Error> {
+        let quiet = Progress::new();
+        let progress = progress.unwrap_or(&quiet);
         params.validate()?;
         light.validate(0)?;
-        let casters = Casters::new(cloud, materials, objects, params);
+        let casters = Casters::new(scene, params);
         let survey = Survey::new(&casters);
         let plan = plan(&casters, &survey, light)?;
-        progress.add_total(cloud.len() as u64);
+        progress.add_total(scene.cloud.len() as u64);
         with_mapping!(&plan.table, m => Self::with_mapping(&casters, &survey, &plan, m, progress))
     }
 
@@ -64,16 +59,10 @@ impl Deposits {
     ///
     /// # Errors
     /// Those of [`ShadowMap::build`].
-    pub fn predict(
-        cloud: &Cloud,
-        materials: &[Material],
-        objects: &[Object],
-        light: &Light,
-        params: &Params,
-    ) -> Result<Prediction, Error> {
+    pub fn predict(scene: &Scene<'_>, light: &Light, params: &Params) -> Result<Prediction, Error> {
         params.validate()?;
         light.validate(0)?;
-        let casters = Casters::new(cloud, materials, objects, params);
+        let casters = Casters::new(scene, params);
         plan(&casters, &Survey::new(&casters), light).map(|plan| plan.prediction)
     }
 
@@ -152,7 +141,7 @@ fn deposit_all<M: Mapping, const C: usize>(
                 chunk,
             });
             let more = (scratch.media.len + scratch.surfaces.len) as u64;
-            check_memory::<C>(made.fetch_add(more, Ordering::Relaxed) + more, casters.params.max_bytes)?;
+            check_entries::<C>(made.fetch_add(more, Ordering::Relaxed) + more, &casters.params.limits)?;
             Ok((Parted::new(&scratch.media, ranges), Parted::new(&scratch.surfaces, ranges)))
         })
         .collect::<Result<_, Error>>()?;
@@ -160,10 +149,15 @@ fn deposit_all<M: Mapping, const C: usize>(
     Ok([media, surfaces])
 }
 
-pub(crate) fn check_memory<const C: usize>(entries: u64, limit_bytes: u64) -> Result<(), Error> {
-    let needed_bytes = entries * (2 * size_of::<[f32; C]>() as u64 + 12);
-    if entries > u64::from(u32::MAX) || needed_bytes > limit_bytes {
-        return Err(Error::Memory { what: "the lists", needed_bytes, limit_bytes });
+/// Holds the lists to what they may take.
+pub(crate) fn check_entries<const C: usize>(entries: u64, limits: &Limits) -> Result<(), Error> {
+    let most = limits.max_elements.min(u32::MAX.into());
+    if entries > most {
+        return Err(Error::limit("the lists", entries, most, "entries"));
+    }
+    let needed = entries * (2 * size_of::<[f32; C]>() as u64 + 12);
+    if needed > limits.max_bytes {
+        return Err(Error::limit("the lists", needed, limits.max_bytes, "bytes"));
     }
     Ok(())
 }

@@ -1,5 +1,7 @@
 //! Errors of translucent shadow maps.
 
+use splat_core::Exceeded;
+
 /// What can go wrong.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -14,27 +16,13 @@ pub enum Error {
         /// The accepted range, in words.
         expected: &'static str,
     },
-    /// The table would take more memory than it may.
-    #[error("shadow map: {what} needs {needed_bytes} bytes, the limit is {limit_bytes}; use a smaller resolution")]
-    Memory {
-        /// What would be too large.
-        what: &'static str,
-        /// Bytes needed.
-        needed_bytes: u64,
-        /// Bytes allowed.
-        limit_bytes: u64,
-    },
-    /// A recording has less room than it needs: record again with what it needs.
+    /// The map would take more than it may.
+    #[error("shadow map: {0}; {hint}", hint = .0.hint)]
+    Limit(Exceeded),
+    /// A recording has less room than it needs.
     #[cfg(feature = "gpu")]
-    #[error("room for {had} {what}, needed {needed}: record the lists again with that")]
-    Overflow {
-        /// What there is too little room for.
-        what: &'static str,
-        /// Room that is needed.
-        needed: u64,
-        /// Room that there was.
-        had: u64,
-    },
+    #[error(transparent)]
+    Overflow(#[from] splat_shaders::Overflow),
     /// What was read back is no result of the recording.
     #[cfg(feature = "gpu")]
     #[error("{found} bytes of {what} were read back, expected {expected}")]
@@ -60,4 +48,12 @@ pub enum Error {
     /// The light or the cloud breaks a promise, or the caller cancelled.
     #[error(transparent)]
     Core(#[from] splat_core::Error),
+}
+
+impl Error {
+    /// [`Error::Limit`] for a part of a map.
+    pub(crate) fn limit(what: &'static str, needed: u64, limit: u64, unit: &'static str) -> Self {
+        let hint = "use a smaller resolution".into();
+        Self::Limit(Exceeded { what: what.into(), needed, limit: Some(limit), unit, hint })
+    }
 }

@@ -33,8 +33,8 @@ mod shadow;
 use crate::table::stop_of;
 use crate::{Deposits, Error};
 use splat_shaders::layouts::{ListView, Scan, SortState};
-use splat_shaders::radix::{Scanned, sort_pass};
-use splat_shaders::{BufferId, Groups, Recording, kernels};
+use splat_shaders::radix::{Scanned, SortPass, sort_pass};
+use splat_shaders::{BufferId, Groups, Overflow, Recording, kernels};
 
 pub use batches::{Batch, Listed};
 pub use casting::Casting;
@@ -141,7 +141,16 @@ impl Sort {
     fn by_bits(&mut self, r: &mut Recording, bits: u32) {
         for shift in (0..bits).step_by(8) {
             let ([keys, sorted_keys], [places, sorted_places]) = (self.keys, self.places);
-            sort_pass(r, shift, self.state, [keys, places], [sorted_keys, sorted_places], self.digits);
+            sort_pass(
+                r,
+                SortPass {
+                    shift,
+                    state: self.state,
+                    from: [keys, places],
+                    to: [sorted_keys, sorted_places],
+                    digits: self.digits,
+                },
+            );
             self.keys.reverse();
             self.places.reverse();
         }
@@ -162,7 +171,7 @@ impl Recorded {
         ];
         for (what, needed, had) in room {
             if needed > u64::from(had) || (what == "channels" && needed != u64::from(had)) {
-                return Err(Error::Overflow { what, needed, had: had.into() });
+                return Err(Error::Overflow(Overflow { what, needed, had: had.into() }));
             }
         }
         let entries = batch.entries() as u32;

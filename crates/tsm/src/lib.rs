@@ -9,12 +9,12 @@
 //!
 //! ```
 //! use splat_core::{Cloud, Light, LightShape, Receiver, Splat, SplatKind, Transmittance, glam::{DVec3, Vec3}};
-//! use tsm::{Params, ShadowMap};
+//! use tsm::{Params, Scene, ShadowMap};
 //!
 //! let mut cloud = Cloud::new(DVec3::ZERO);
 //! cloud.push(&Splat { radius: 0.5, cross_section: 0.2, ..Splat::default() });
 //! let light = Light { shape: LightShape::Point { position: DVec3::new(0.0, 4.0, 0.0) }, intensity: [1.0; 3] };
-//! let map = ShadowMap::build(&cloud, &[], &[], &light, &Params::default()).unwrap();
+//! let map = ShadowMap::build(&Scene::from(&cloud), &light, &Params::default(), None).unwrap();
 //! let below = Receiver { position: Vec3::NEG_Y, normal: Vec3::ZERO, radius: 0.0, kind: SplatKind::Medium };
 //! let [through, ..] = map.transmittance(&below);
 //! assert!(through > 0.2 && through < 0.6, "{through}");
@@ -48,6 +48,7 @@ mod query;
 mod rays;
 pub mod reference;
 mod sampling;
+mod scene;
 mod shadow_map;
 mod shares;
 mod sort;
@@ -60,4 +61,5 @@ pub use deposits::Deposits;
 pub use error::Error;
 pub use params::{MappingChoice, Params, Resolution};
 pub use query::SurfacePoint;
+pub use scene::Scene;
 pub use shadow_map::ShadowMap;

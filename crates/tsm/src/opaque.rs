@@ -228,7 +228,7 @@ mod tests {
             });
         }
         let params = Params::default();
-        let casters = Casters::new(&cloud, &[], &[], &params);
+        let casters = Casters::new(&crate::Scene::from(&cloud), &params);
         let frame = Frame::new(DVec3::ZERO, [DVec3::X, DVec3::Y, DVec3::Z], 1.0);
         let cells = mapping.size()[0] as usize * mapping.size()[1] as usize;
         let [together, single] = [(); 2].map(|()| OpaqueDepth::new(cells));

@@ -1,8 +1,8 @@
 //! Parameters of a shadow map.
 
 use crate::Error;
-use splat_core::FootprintStack;
 use splat_core::optics::AbsorbanceModel;
+use splat_core::{FootprintStack, Limits};
 
 /// How directions become cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -25,7 +25,7 @@ pub enum MappingChoice {
 pub enum Resolution {
     /// Cells of half a splat spacing for up to some ten thousand splats; then cells that stay as they are while a volume's
     /// splats become finer, until splats overlap no more than [`Params::entries_per_splat`] cells each, and finer ones
-    /// again from there on. Coarser where [`Params::max_bytes`] would be exceeded. Finer splats never make coarser cells.
+    /// again from there on. Coarser where [`Params::limits`] would be exceeded. Finer splats never make coarser cells.
     #[default]
     Auto,
     /// Cells along the longer side of the table; ≥ 1. A polar table has this many rows over 180° of polar angle.
@@ -53,8 +53,8 @@ pub struct Params {
     pub bias: f32,
     /// Kernels by footprint id.
     pub footprints: FootprintStack,
-    /// Bytes that a map may take while it is built.
-    pub max_bytes: u64,
+    /// Bytes that a map may take while it is built, and entries that are deposited.
+    pub limits: Limits,
 }
 
 impl Default for Params {
@@ -68,7 +68,7 @@ impl Default for Params {
             opaque_dilation: 1.5,
             bias: 0.5,
             footprints: FootprintStack::default(),
-            max_bytes: 2 << 30,
+            limits: Limits::default(),
         }
     }
 }

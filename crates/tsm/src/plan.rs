@@ -8,7 +8,7 @@ use crate::mapping::{Mapping, Octahedral, Planar, PolarAzimuth, PolarRange, Tabl
 use crate::survey::Survey;
 use crate::{Error, MappingChoice, Resolution};
 use glam::{DVec3, Vec2};
-use splat_core::{Light, LightShape, glam};
+use splat_core::{Light, LightShape, Limits, glam};
 use std::f64::consts::PI;
 
 /// Sine of the half angle within which a point light is planar by default.
@@ -37,6 +37,9 @@ enum Kind {
     Parallel,
 }
 
+/// Cells are numbered with 31 bits, and their columns and rows are found exactly in single precision.
+const MOST_CELLS_OF_A_SIDE: u64 = 1 << 22;
+
 /// Chooses frame, kind and size.
 pub(crate) fn plan(casters: &Casters<'_>, survey: &Survey, light: &Light) -> Result<Plan, Error> {
     let (kind, frame) = frame_of(casters, survey, light)?;
@@ -53,15 +56,19 @@ pub(crate) fn plan(casters: &Casters<'_>, survey: &Survey, light: &Light) -> Res
         Resolution::Cells(n) => (shape.side / f64::from(n), Limit::Asked),
     };
     let prediction = cost::predict(&look, survey, cell, shape.size(cell), limit, shape.is_octahedral());
-    let limit_bytes = casters.params.max_bytes;
-    if prediction.bytes > limit_bytes {
-        return Err(Error::Memory { what: "the table", needed_bytes: prediction.bytes, limit_bytes });
+    let most_bytes = casters.params.limits.max_bytes;
+    if prediction.bytes > most_bytes {
+        return Err(Error::limit("the table", prediction.bytes, most_bytes, "bytes"));
     }
     let table = shape.table(cell);
     let cells = with_mapping!(&table, m => m.size()).map(u64::from);
-    if cells[0] * cells[1] > u64::from(i32::MAX as u32) || cells.iter().any(|n| *n > 1 << 22) {
-        let needed_bytes = cells[0].saturating_mul(cells[1]).saturating_mul(8);
-        return Err(Error::Memory { what: "the table", needed_bytes, limit_bytes });
+    for (needed, limit, unit) in [
+        (cells[0].max(cells[1]), MOST_CELLS_OF_A_SIDE, "cells along a side"),
+        (cells[0].saturating_mul(cells[1]), i32::MAX as u64, "cells"),
+    ] {
+        if needed > limit {
+            return Err(Error::limit("the table", needed, limit, unit));
+        }
     }
     Ok(Plan { frame, table, prediction })
 }
@@ -248,17 +255,20 @@ fn automatic_cell(casters: &Casters<'_>, survey: &Survey, look: &Appearance, ext
     let finest = (0.5 * spacing).min(extent.side);
     let most_cells = (4.0 * casters.cloud.len() as f64).clamp(65_536.0, 16_777_216.0);
     let most_entries = budget(casters, look.casters() as f64);
-    let most_bytes = casters.params.max_bytes;
+    let Limits { max_bytes, max_elements } = casters.params.limits;
     let has_cells = |cell: f64| cell >= extent.side / MAX_SIDE && extent.cells(cell) <= most_cells;
     let has_entries = |cell: f64| look.covered(cell, extent.cells(cell)) <= most_entries;
     let has_bytes = |cell: f64| {
         let size = extent.size(cell);
-        cost::predict(look, survey, cell, size, Limit::Memory, extent.is_octahedral()).bytes <= most_bytes
+        cost::predict(look, survey, cell, size, Limit::Memory, extent.is_octahedral()).bytes <= max_bytes
     };
+    // What is predicted may be half of what is deposited.
+    let has_elements = |cell: f64| look.covered(cell, extent.cells(cell)) <= 0.5 * max_elements as f64;
     [
         (least(finest, extent.side, has_cells), Limit::Cells),
         (least(finest, extent.side, has_entries), Limit::Entries),
         (least(finest, extent.side, has_bytes), Limit::Memory),
+        (least(finest, extent.side, has_elements), Limit::Memory),
     ]
     .into_iter()
     .fold((finest, Limit::Spacing), |found, next| if next.0 > found.0 { next } else { found })

@@ -8,10 +8,10 @@ use crate::opaque::{DiscBatches, OpaqueDepth};
 use crate::plan::Plan;
 use crate::survey::{CHUNK, Survey};
 use crate::table::Lists;
-use crate::{Deposits, Error, Params};
+use crate::{Deposits, Error, Params, Scene};
 use rayon::prelude::*;
 use splat_core::optics::AbsorbanceModel;
-use splat_core::{Cloud, Light, Material, Object, Progress, SplatKind};
+use splat_core::{Light, Progress, SplatKind};
 use std::ops::Range;
 
 /// Media, whose absorbance grows continuously, and surfaces, which are steps.
@@ -47,37 +47,19 @@ pub struct ShadowMap {
 }
 
 impl ShadowMap {
-    /// Builds the map of one light.
-    ///
-    /// `materials` and `objects` are the scene's tables; an id without an entry means the default material and an
-    /// object that casts shadows. Splats of objects that cast none, and splats of no cross-section, leave no trace.
+    /// Builds the map of one light. Splats are reported to `progress`, and work stops where that is cancelled.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for parameters out of range or a mapping that does not fit the light, [`Error::Memory`]
-    /// for a table beyond [`Params::max_bytes`], [`Error::Core`] for a light or splat that breaks a promise.
+    /// [`Error::Parameter`] for parameters out of range or a mapping that does not fit the light, [`Error::Limit`]
+    /// for a map beyond [`Params::limits`], [`Error::Core`] for a light or splat that breaks a promise, and
+    /// [`splat_core::Error::Cancelled`] in it.
     pub fn build(
-        cloud: &Cloud,
-        materials: &[Material],
-        objects: &[Object],
+        scene: &Scene<'_>,
         light: &Light,
         params: &Params,
+        progress: Option<&Progress>,
     ) -> Result<Self, Error> {
-        Self::build_with_progress(cloud, materials, objects, light, params, &Progress::new())
-    }
-
-    /// As [`ShadowMap::build`], telling its progress in splats.
-    ///
-    /// # Errors
-    /// Those of [`ShadowMap::build`], and [`splat_core::Error::Cancelled`].
-    pub fn build_with_progress(
-        cloud: &Cloud,
-        materials: &[Material],
-        objects: &[Object],
-        light: &Light,
-        params: &Params,
-        progress: &Progress,
-    ) -> Result<Self, Error> {
-        Deposits::new(cloud, materials, objects, light, params, progress).map(Deposits::into_map)
+        Deposits::new(scene, light, params, progress).map(Deposits::into_map)
     }
 
     /// 1 when all casters absorb every channel alike, else 3.

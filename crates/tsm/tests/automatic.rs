@@ -2,8 +2,8 @@
 
 use crate::common::*;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Cloud, Light, LightShape};
-use tsm::{Deposits, Limit, Params, Resolution};
+use splat_core::{Cloud, Light, LightShape, Limits};
+use tsm::{Deposits, Limit, Params, Resolution, Scene};
 
 fn scaled(cloud: &Cloud, light: &Light, s: f64) -> (Cloud, Light) {
     let (mut cloud, mut light, f) = (cloud.clone(), *light, s as f32);
@@ -95,7 +95,7 @@ fn ts16_finer_splats_have_better_shadows() {
 fn predictions_say_what_is_chosen_and_by_what() {
     let cloud = smooth_ball(0.06, 1.5, 1.0);
     for light in [point_light(DVec3::Z * 4.0), point_light(DVec3::ZERO), directional(DVec3::Z)] {
-        let of = |params: &Params| Deposits::predict(&cloud, &[], &[], &light, params).unwrap();
+        let of = |params: &Params| Deposits::predict(&Scene::from(&cloud), &light, params).unwrap();
         let free = of(&Params::default());
         let map = build(&cloud, &light, &Params::default());
         assert_eq!(free, map.prediction());
@@ -104,7 +104,7 @@ fn predictions_say_what_is_chosen_and_by_what() {
         assert!((0.6..1.4).contains(&ratio), "{:?}: {ratio}", light.shape);
         // Less memory, coarser cells that fit.
         let max_bytes = free.bytes / 3;
-        let less = of(&Params { max_bytes, ..Params::default() });
+        let less = of(&Params { limits: Limits::bytes(max_bytes), ..Params::default() });
         assert!(less.limit == Limit::Memory && less.bytes <= max_bytes && less.size[0] < free.size[0], "{less:?}");
         assert_eq!(of(&Params { resolution: Resolution::Cells(32), ..Params::default() }).limit, Limit::Asked);
     }

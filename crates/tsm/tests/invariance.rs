@@ -2,8 +2,8 @@
 
 use crate::common::*;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Cloud, Light, LightShape, SplatKind, Transmittance};
-use tsm::{Deposits, Error, MappingChoice, Params, Resolution, ShadowMap};
+use splat_core::{Cloud, Exceeded, Light, LightShape, Limits, SplatKind, Transmittance};
+use tsm::{Deposits, Error, MappingChoice, Params, Resolution, Scene, ShadowMap};
 
 fn lights() -> [Light; 4] {
     let position = DVec3::new(0.25, -0.5, 0.125);
@@ -129,9 +129,9 @@ fn ts14_one_cell_works_and_a_huge_table_is_refused_with_its_bytes() {
         let params = |n| Params { mapping, resolution: Resolution::Cells(n), ..Params::default() };
         let map = build(&cloud, &light, &params(1));
         assert!((0..cloud.len()).all(|i| (0.0..=1.0).contains(&map.transmittance(&receiver(&cloud, i))[0])));
-        let refused = ShadowMap::build(&cloud, &[], &[], &light, &params(65_536 * 4)).unwrap_err();
-        let Error::Memory { needed_bytes, limit_bytes, .. } = refused else { panic!("{refused}") };
-        assert!(needed_bytes > limit_bytes && refused.to_string().contains(&needed_bytes.to_string()));
+        let refused = ShadowMap::build(&Scene::from(&cloud), &light, &params(65_536 * 4), None).unwrap_err();
+        let Error::Limit(Exceeded { needed, limit, unit: "bytes", .. }) = &refused else { panic!("{refused}") };
+        assert!(Some(*needed) > *limit && refused.to_string().contains(&needed.to_string()));
     }
 }
 
@@ -140,7 +140,7 @@ fn what_maps_cost_together_is_known_before_any_is_built_and_held_while_they_are(
     let cloud = mixed(20_000, DVec3::ZERO);
     let (lights, params) = (lights(), Params::default());
     for light in &lights {
-        let predicted = Deposits::predict(&cloud, &[], &[], light, &params).unwrap();
+        let predicted = Deposits::predict(&Scene::from(&cloud), light, &params).unwrap();
         let map = build(&cloud, light, &params);
         assert_eq!(map.prediction(), predicted);
         let finished = map.counts().bytes;
@@ -148,9 +148,9 @@ fn what_maps_cost_together_is_known_before_any_is_built_and_held_while_they_are(
         // What deposits more than was predicted is held to the limit while it is made.
         let entries = map.counts().entries;
         let resolution = Resolution::Cells(predicted.size[0].max(predicted.size[1]) as u32);
-        let short = Params { resolution, max_bytes: 10 * entries, ..params.clone() };
-        let held = ShadowMap::build(&cloud, &[], &[], light, &short);
-        assert!(matches!(held, Err(Error::Memory { .. })));
+        let short = Params { resolution, limits: Limits::bytes(10 * entries), ..params.clone() };
+        let held = ShadowMap::build(&Scene::from(&cloud), light, &short, None);
+        assert!(matches!(held, Err(Error::Limit(_))));
     }
 }
 
@@ -167,11 +167,11 @@ fn bad_parameters_are_refused_by_name() {
         (Params { resolution: Resolution::Cells(0), ..Params::default() }, "resolution"),
         (Params { mapping: MappingChoice::Planar, ..Params::default() }, "mapping"),
     ] {
-        let error = ShadowMap::build(&cloud, &[], &[], &light, &params).unwrap_err();
+        let error = ShadowMap::build(&Scene::from(&cloud), &light, &params, None).unwrap_err();
         assert!(matches!(error, Error::Parameter { name: found, .. } if found == name), "{error}");
     }
     let broken = point_light(DVec3::new(f64::NAN, 0.0, 0.0));
-    assert!(matches!(ShadowMap::build(&cloud, &[], &[], &broken, &Params::default()), Err(Error::Core(_))));
+    assert!(matches!(ShadowMap::build(&Scene::from(&cloud), &broken, &Params::default(), None), Err(Error::Core(_))));
 }
 
 #[test]
@@ -185,7 +185,7 @@ fn empty_clouds_cast_no_shadow_and_cancelled_builds_stop() {
     let progress = splat_core::Progress::new();
     progress.cancel();
     let cloud = mixed(100, DVec3::ZERO);
-    let stopped = ShadowMap::build_with_progress(&cloud, &[], &[], &lights()[0], &Params::default(), &progress);
+    let stopped = ShadowMap::build(&Scene::from(&cloud), &lights()[0], &Params::default(), Some(&progress));
     assert_eq!(stopped.unwrap_err(), Error::Core(splat_core::Error::Cancelled));
 }
 

@@ -4,7 +4,7 @@ use crate::common::*;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::optics::AbsorbanceModel;
 use splat_core::{Cloud, Light, LightShape, Material, Object, Receiver, Splat, SplatKind, Transmittance};
-use tsm::{MappingChoice, Params, Resolution, ShadowMap};
+use tsm::{MappingChoice, Params, Resolution, Scene, ShadowMap};
 
 #[test]
 fn ts01_light_exactly_on_a_point() {
@@ -154,7 +154,13 @@ fn ts13_opaque_and_translucent_in_every_order() {
 fn ts13_objects_that_cast_no_shadow_leave_no_trace() {
     let cloud = plane(Vec3::Z * 2.0, Vec3::NEG_Z, 5, 0.05, SplatKind::Opaque, 1.0);
     let objects = [Object { name: "ghost".into(), casts_shadow: false, shadow_coefficient: 1.0 }];
-    let map = ShadowMap::build(&cloud, &[], &objects, &point_light(DVec3::ZERO), &Params::default()).unwrap();
+    let map = ShadowMap::build(
+        &Scene { cloud: &cloud, materials: &[], objects: &objects },
+        &point_light(DVec3::ZERO),
+        &Params::default(),
+        None,
+    )
+    .unwrap();
     assert_eq!(map.counts().casters, 0);
     assert_eq!(light_at(&map, Vec3::Z * 3.0), 1.0);
 }
@@ -299,7 +305,13 @@ fn inside_a_slab_light_falls_as_beers_law() {
 fn colours_are_absorbed_one_by_one() {
     let cloud = plane(Vec3::Z * 2.0, Vec3::NEG_Z, 30, 0.05, SplatKind::Surface, 1.0);
     let materials = [Material { extinction_rgb: [0.5, 1.0, 2.0], ..Material::default() }];
-    let map = ShadowMap::build(&cloud, &materials, &[], &point_light(DVec3::ZERO), &Params::default()).unwrap();
+    let map = ShadowMap::build(
+        &Scene { cloud: &cloud, materials: &materials, objects: &[] },
+        &point_light(DVec3::ZERO),
+        &Params::default(),
+        None,
+    )
+    .unwrap();
     assert_eq!(map.channels(), 3);
     let light = map.transmittance(&probe(Vec3::Z * 3.0));
     for (c, depth) in [0.5f32, 1.0, 2.0].into_iter().enumerate() {
@@ -327,7 +339,13 @@ fn thin_slabs_absorb_more_at_an_angle_and_crossings_do_not() {
         for spacing in [0.1, 0.02] {
             let cloud = plane(Vec3::ZERO, Vec3::new(0.0, 3f32.sqrt(), 1.0), 40, spacing, SplatKind::Surface, 0.4);
             let materials = [Material { surface_opacity, ..Material::default() }];
-            let map = ShadowMap::build(&cloud, &materials, &[], &directional(DVec3::Z), &Params::default()).unwrap();
+            let map = ShadowMap::build(
+                &Scene { cloud: &cloud, materials: &materials, objects: &[] },
+                &directional(DVec3::Z),
+                &Params::default(),
+                None,
+            )
+            .unwrap();
             let light = map.transmittance(&probe(Vec3::Z * 3.0))[0];
             assert!((light - (-0.4 * factor as f32).exp()).abs() < 3e-3, "{surface_opacity:?}: {light}");
         }
@@ -345,7 +363,12 @@ fn a_patch_casts_the_shadows_of_a_point_and_whole_lights_are_refused() {
         assert_eq!(of_patch.transmittance(&receiver), of_point.transmittance(&receiver), "{k}");
     }
     let whole = Light { shape: LightShape::Disk { center: position, normal, radius: 0.5 }, ..patch };
-    let refused = ShadowMap::build(&cloud, &[Material::default()], &[], &whole, &Params::default());
+    let refused = ShadowMap::build(
+        &Scene { cloud: &cloud, materials: &[Material::default()], objects: &[] },
+        &whole,
+        &Params::default(),
+        None,
+    );
     assert!(refused.is_err_and(|e| e.to_string().contains("Light::points")));
 }
 

@@ -1,9 +1,9 @@
 //! The recorded lists and look-ups, without a device: what they are, and what they refuse.
 
 use crate::common::{mixed, point_light};
-use splat_core::Progress;
 use splat_core::glam::DVec3;
 use splat_core::raster::gpu::AttributeRoom;
+use splat_shaders::Overflow;
 use tsm::gpu::{Capacities, CastRoom, Casting, Room, record, record_cast, record_look_up, record_map, record_shadow};
 use tsm::{Deposits, Error, Params};
 
@@ -11,7 +11,7 @@ const ROOM: Capacities = Capacities { entries: 200_000, cells: 2 * 120 * 120, ch
 
 fn deposits() -> Deposits {
     let light = point_light(DVec3::new(0.3, 2.5, 0.2));
-    Deposits::new(&mixed(4000, DVec3::ZERO), &[], &[], &light, &Params::default(), &Progress::new()).unwrap()
+    Deposits::new(&tsm::Scene::from(&mixed(4000, DVec3::ZERO)), &light, &Params::default(), None).unwrap()
 }
 
 #[test]
@@ -36,15 +36,18 @@ fn look_ups_refuse_what_they_have_no_room_for() {
     let room = Room::of(&map, 10).unwrap();
     let refused = |room| record_look_up(room).map(&map).unwrap_err();
     assert!(record_look_up(room).map(&map).is_ok());
-    assert!(matches!(refused(Room { cells: room.cells - 1, ..room }), Error::Overflow { what: "cells", .. }));
-    assert!(matches!(refused(Room { entries: room.entries - 1, ..room }), Error::Overflow { what: "entries", .. }));
-    assert!(matches!(refused(Room { opaque: false, ..room }), Error::Overflow { what: "opaque discs", .. }));
-    assert!(matches!(refused(Room { channels: 3, ..room }), Error::Overflow { what: "channels", .. }));
+    assert!(matches!(refused(Room { cells: room.cells - 1, ..room }), Error::Overflow(Overflow { what: "cells", .. })));
+    assert!(matches!(
+        refused(Room { entries: room.entries - 1, ..room }),
+        Error::Overflow(Overflow { what: "entries", .. })
+    ));
+    assert!(matches!(refused(Room { opaque: false, ..room }), Error::Overflow(Overflow { what: "opaque discs", .. })));
+    assert!(matches!(refused(Room { channels: 3, ..room }), Error::Overflow(Overflow { what: "channels", .. })));
     let recorded = record_look_up(room);
     let uploads = recorded.map(&map).unwrap();
     let receivers = [crate::common::probe(splat_core::glam::Vec3::X); 11];
     let refused = recorded.receivers(&map, &uploads, &receivers).unwrap_err();
-    assert_eq!(refused, Error::Overflow { what: "receivers", needed: 11, had: 10 });
+    assert_eq!(refused, Error::Overflow(Overflow { what: "receivers", needed: 11, had: 10 }));
     let own = recorded.receivers(&map, &uploads, &receivers[..10]).unwrap();
     assert_eq!(recorded.inputs(None, &own).len() + 5, recorded.inputs(Some(&uploads), &own).len());
     let short = recorded.transmittances(&[0; 36], &own).unwrap_err();
@@ -76,7 +79,8 @@ fn too_little_room_says_how_much() {
     assert_eq!(all.entries(), deposits.entries().iter().sum::<u64>());
     let (entries, cells) = (all.entries() as u32, all.cells() as u32);
     let refused = |room| record(room).uploads(&deposits, all).unwrap_err();
-    let overflow = |what, needed: u32, had: u32| Error::Overflow { what, needed: needed.into(), had: had.into() };
+    let overflow =
+        |what, needed: u32, had: u32| Error::Overflow(Overflow { what, needed: needed.into(), had: had.into() });
     let room = Capacities { entries, cells, channels: 1 };
     assert_eq!(refused(Capacities { entries: entries - 1, ..room }), overflow("entries", entries, entries - 1));
     assert_eq!(refused(Capacities { cells: cells - 1, ..room }), overflow("cells", cells, cells - 1));
@@ -95,7 +99,7 @@ fn batches_are_all_cells_in_order_and_small_enough() {
         assert_eq!(batches.iter().map(|b| b.entries()).sum::<u64>(), all);
     }
     let refused = deposits.batches(Capacities { entries: 3, cells: 1 << 30, channels: 1 });
-    assert!(matches!(refused, Err(Error::Overflow { what: "entries", had: 3, .. })), "{refused:?}");
+    assert!(matches!(refused, Err(Error::Overflow(Overflow { what: "entries", had: 3, .. }))), "{refused:?}");
 }
 
 #[test]
@@ -158,7 +162,7 @@ const CAST: CastRoom = CastRoom {
 
 fn casting(params: &Params) -> Result<Casting, Error> {
     let light = point_light(DVec3::new(0.3, 2.5, 0.2));
-    Casting::new(&mixed(4000, DVec3::ZERO), &[], &[], &light, params, &Progress::new())
+    Casting::new(&tsm::Scene::from(&mixed(4000, DVec3::ZERO)), &light, params, None)
 }
 
 #[test]
@@ -203,7 +207,7 @@ fn deposits_refuse_what_they_have_no_room_for() {
     let room = casting.room(attributes, casting.expected());
     assert!(casting.casters() > 1000 && casting.given() > 0 && room.opaque && room.planes);
     let refused = |room, ids: Option<&[u32]>| match record_cast(room).uploads(&casting, ids) {
-        Err(Error::Overflow { what, .. }) => what,
+        Err(Error::Overflow(Overflow { what, .. })) => what,
         other => panic!("{other:?}"),
     };
     assert!(record_cast(room).uploads(&casting, None).is_ok());
@@ -218,9 +222,12 @@ fn deposits_refuse_what_they_have_no_room_for() {
     assert_eq!(refused(CastRoom { attributes: few, ..room }, None), "casters among splats");
     assert_eq!(refused(room, Some(&[0, 1, 2])), "casters among splats");
     let shares = record_shadow(room, 0).uploads(&casting, None, &[1.0, 0.5]).unwrap_err();
-    assert_eq!(shares, Error::Overflow { what: "shares of shadows", needed: 2, had: 4000 });
+    assert_eq!(shares, Error::Overflow(Overflow { what: "shares of shadows", needed: 2, had: 4000 }));
     let recorded = record_cast(CastRoom { entries: 7, ..room });
-    assert_eq!(recorded.found(&8u32.to_ne_bytes()), Err(Error::Overflow { what: "entries", needed: 8, had: 7 }));
+    assert_eq!(
+        recorded.found(&8u32.to_ne_bytes()),
+        Err(Error::Overflow(Overflow { what: "entries", needed: 8, had: 7 }))
+    );
     assert_eq!(recorded.found(&7u32.to_ne_bytes()), Ok(7));
     assert_eq!(recorded.found(&[7]), Err(Error::ReadBack { what: "cast state", expected: 4, found: 1 }));
 }

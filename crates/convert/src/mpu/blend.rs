@@ -88,11 +88,12 @@ impl Octree {
     /// Range within `radius` of a place in the cube, as far as that lies in the cube.
     pub(super) fn over_ball(&self, p: DVec3, radius: f64) -> [f64; 2] {
         let mut range = EMPTY;
-        self.descend(0, self.center, self.half, p, radius, &mut range);
+        self.descend(0, (self.center, self.half), (p, radius), &mut range);
         range
     }
 
-    fn descend(&self, node: usize, center: DVec3, half: f64, p: DVec3, radius: f64, range: &mut [f64; 2]) {
+    /// Widens `range` by that of a node's cell within a ball.
+    fn descend(&self, node: usize, (center, half): (DVec3, f64), (p, radius): (DVec3, f64), range: &mut [f64; 2]) {
         let stored = self.range(node);
         let known = range[0] <= stored[0] && range[1] >= stored[1];
         let nearest = p.clamp(center - half, center + half);
@@ -104,7 +105,7 @@ impl Octree {
             _ if half <= radius => *range = union(*range, &stored),
             Node::Inner(first) => {
                 for c in 0..8 {
-                    self.descend(first + c, child_center(center, half, c), 0.5 * half, p, radius, range);
+                    self.descend(first + c, (child_center(center, half, c), 0.5 * half), (p, radius), range);
                 }
             }
             Node::Leaf(leaf) => {

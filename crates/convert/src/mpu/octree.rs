@@ -15,7 +15,10 @@ use super::fit::{Ball, Scratch};
 use super::quadric::{Joint, Quadric, Shape, shape_over_ball};
 use super::samples::SampleTree;
 use super::{MpuReport, Tolerances};
+use crate::ConvertError;
+use crate::convert_error::check_cancelled;
 use rayon::prelude::*;
+use splat_core::Progress;
 use splat_core::glam::DVec3;
 
 /// Levels whose children are built in parallel.
@@ -75,6 +78,7 @@ enum Part {
 struct Build<'a> {
     tree: &'a SampleTree,
     asked: &'a Tolerances,
+    progress: &'a Progress,
 }
 
 /// Middle of child `c` of a cell.
@@ -85,6 +89,9 @@ pub(super) fn child_center(center: DVec3, half: f64, c: usize) -> DVec3 {
 
 impl Build<'_> {
     fn cell(&self, center: DVec3, half: f64, depth: u32, scratch: &mut Scratch) -> Part {
+        if self.progress.is_cancelled() {
+            return Part::Inner(Vec::new());
+        }
         let before = self.asked.support * half * 12f64.sqrt();
         self.tree.within(center, before, &mut scratch.ids);
         let own = scratch.ids.len();
@@ -143,8 +150,16 @@ impl Octree {
     }
 
     /// Builds over a cube.
-    pub(super) fn new(tree: &SampleTree, center: DVec3, half: f64, asked: &Tolerances) -> (Self, MpuReport) {
-        let root = Build { tree, asked }.cell(center, half, 0, &mut Scratch::default());
+    pub(super) fn new(
+        tree: &SampleTree,
+        center: DVec3,
+        half: f64,
+        asked: &Tolerances,
+        progress: &Progress,
+    ) -> Result<(Self, MpuReport), ConvertError> {
+        let root = Build { tree, asked, progress }.cell(center, half, 0, &mut Scratch::default());
+        // Cells that were left out have no children.
+        check_cancelled(progress)?;
         let mut octree = Self {
             center,
             half,
@@ -173,7 +188,7 @@ impl Octree {
             }
         }
         report.listed = octree.list.len() as u64;
-        (octree, report)
+        Ok((octree, report))
     }
 
     /// Stores a part at `node`; leaves are numbered in the order of a descent.

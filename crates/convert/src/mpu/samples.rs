@@ -6,7 +6,7 @@
 use super::MpuParams;
 use crate::{ConvertError, RawPoints, SplatParams, SurfelParams, raw_to_surfels};
 use rayon::prelude::*;
-use splat_core::{DAabb, glam::DVec3};
+use splat_core::{DAabb, Progress, glam::DVec3};
 use std::cmp::Ordering;
 
 /// Samples in a leaf of the tree, at most.
@@ -26,11 +26,15 @@ fn order(a: &Sample, b: &Sample) -> Ordering {
 }
 
 /// Samples of `points` relative to the returned origin, sorted, without copies.
-pub(super) fn samples_of(points: &RawPoints, params: &MpuParams) -> Result<(DVec3, Vec<Sample>), ConvertError> {
+pub(super) fn samples_of(
+    points: &RawPoints,
+    params: &MpuParams,
+    progress: &Progress,
+) -> Result<(DVec3, Vec<Sample>), ConvertError> {
     let input = |source| ConvertError::Input { object: params.object_name.clone(), source };
     points.validate().map_err(input)?;
     let complete = points.normal.len() == points.len() && points.normal.iter().all(|n| n.length_squared() > 0.0);
-    let (origin, mut samples) = if complete { given(points) } else { estimated(points, params)? };
+    let (origin, mut samples) = if complete { given(points) } else { estimated(points, params, progress)? };
     samples.par_sort_unstable_by(order);
     samples.dedup();
     Ok((origin, samples))
@@ -50,11 +54,15 @@ fn given(points: &RawPoints) -> (DVec3, Vec<Sample>) {
     (origin, (0..points.len()).into_par_iter().with_min_len(4096).map(sample).collect())
 }
 
-fn estimated(points: &RawPoints, params: &MpuParams) -> Result<(DVec3, Vec<Sample>), ConvertError> {
+fn estimated(
+    points: &RawPoints,
+    params: &MpuParams,
+    progress: &Progress,
+) -> Result<(DVec3, Vec<Sample>), ConvertError> {
     let splat = SplatParams { object_name: params.object_name.clone(), ..SplatParams::default() };
     let surfels =
         SurfelParams { splat, orientation: params.orientation, merge_duplicates: true, ..SurfelParams::default() };
-    let (cloud, _) = raw_to_surfels(points, &surfels)?;
+    let (cloud, _) = raw_to_surfels(points, &surfels, Some(progress))?;
     let samples = cloud
         .position
         .iter()

@@ -1,6 +1,6 @@
 //! Bytes of a regular file from front to back, unpacked from gzip where they are packed, each within the limits.
 
-use super::ReadLimits;
+use super::ReadParams;
 use crate::error::{Place, ReadError};
 use flate2::bufread::MultiGzDecoder;
 use std::fs::File;
@@ -25,12 +25,12 @@ pub(super) struct Stream<'a> {
     length: Option<u64>,
     /// Bytes of the file itself, packed or not.
     stored: u64,
-    limits: ReadLimits,
+    params: ReadParams,
 }
 
 impl<'a> Stream<'a> {
     /// A regular file.
-    pub(super) fn open(path: &Path, limits: &ReadLimits) -> Result<Self, ReadError> {
+    pub(super) fn open(path: &Path, params: &ReadParams) -> Result<Self, ReadError> {
         let refused = |e: io::Error| refused(&e);
         // Asked before opening: opening a FIFO waits for its writer.
         let kind = std::fs::metadata(path).map_err(refused)?;
@@ -40,27 +40,27 @@ impl<'a> Stream<'a> {
         }
         let file = File::open(path).map_err(refused)?;
         let length = file.metadata().map_err(refused)?.len();
-        check_bytes("the file", length, limits)?;
-        Ok(Self::new(Measured { file, length, read: 0 }, Some(length), length, limits))
+        check_bytes("the file", length, params)?;
+        Ok(Self::new(Measured { file, length, read: 0 }, Some(length), length, params))
     }
 
     /// Bytes in memory.
-    pub(super) fn of(content: &'a [u8], limits: &ReadLimits) -> Self {
+    pub(super) fn of(content: &'a [u8], params: &ReadParams) -> Self {
         let length = content.len() as u64;
-        Self::new(content, Some(length), length, limits)
+        Self::new(content, Some(length), length, params)
     }
 
-    fn new(source: impl Read + 'a, length: Option<u64>, stored: u64, limits: &ReadLimits) -> Self {
-        Self { source: Box::new(source), head: Vec::new(), taken: 0, position: 0, length, stored, limits: *limits }
+    fn new(source: impl Read + 'a, length: Option<u64>, stored: u64, params: &ReadParams) -> Self {
+        Self { source: Box::new(source), head: Vec::new(), taken: 0, position: 0, length, stored, params: *params }
     }
 
     /// The unpacked bytes of what is left, which is gzip of one or several members. However often gzip is packed into
     /// gzip, the bytes of the file itself decide how much may come out.
     pub(super) fn gunzip(self) -> Stream<'a> {
-        let (stored, limits) = (self.stored, self.limits);
+        let (stored, params) = (self.stored, self.params);
         let counted = Counted { read: self.position, source: self };
         let decoder = MultiGzDecoder::new(BufReader::with_capacity(1 << 18, counted));
-        Stream::new(Unpacked { decoder, given: 0, stored, limits }, None, stored, &limits)
+        Stream::new(Unpacked { decoder, given: 0, stored, params }, None, stored, &params)
     }
 
     /// Up to `n` of the bytes to come, without taking them; fewer only at the end.
@@ -186,7 +186,7 @@ struct Unpacked<'a> {
     decoder: MultiGzDecoder<BufReader<Counted<'a>>>,
     given: u64,
     stored: u64,
-    limits: ReadLimits,
+    params: ReadParams,
 }
 
 impl Read for Unpacked<'_> {
@@ -200,7 +200,7 @@ impl Read for Unpacked<'_> {
             io::Error::other(e.downcast::<ReadError>().unwrap_or_else(damaged))
         })?;
         self.given += n as u64;
-        check_bytes("the decompressed file", self.given, &self.limits).map_err(io::Error::other)?;
+        check_bytes("the decompressed file", self.given, &self.params).map_err(io::Error::other)?;
         check_ratio(self.given, self.stored).map_err(io::Error::other)?;
         Ok(n)
     }
@@ -228,12 +228,12 @@ fn check_ratio(bytes: u64, stored: u64) -> Result<(), ReadError> {
 }
 
 /// Refuses sizes above the limit.
-pub(super) fn check_bytes(what: &str, bytes: u64, limits: &ReadLimits) -> Result<(), ReadError> {
-    if bytes <= limits.max_bytes {
+pub(super) fn check_bytes(what: &str, bytes: u64, params: &ReadParams) -> Result<(), ReadError> {
+    if bytes <= params.limits.max_bytes {
         return Ok(());
     }
     Err(ReadError::limit(
-        format!("at most {} bytes for {what}", limits.max_bytes),
+        format!("at most {} bytes for {what}", params.limits.max_bytes),
         format!("{bytes}"),
         "raise the memory limit, or thin out the data",
     ))

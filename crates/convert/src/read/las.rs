@@ -1,6 +1,6 @@
 //! LAS 1.0 to 1.4 and LAZ → raw points with colours, intensity as value, classes and their exact integers.
 
-use super::{Notes, ReadLimits, color::linear_from_srgb, input, laz};
+use super::{Notes, ReadParams, color::linear_from_srgb, input, laz};
 use crate::error::{Place, ReadError};
 use crate::raw_points::{PointLattice, RawPoints};
 use ::las::point::Format;
@@ -35,11 +35,11 @@ pub(super) struct Layout {
 }
 
 /// Reads a LAS or LAZ file.
-pub(super) fn read(content: Vec<u8>, limits: &ReadLimits, notes: &mut Notes) -> Result<RawPoints, ReadError> {
+pub(super) fn read(content: Vec<u8>, params: &ReadParams, notes: &mut Notes) -> Result<RawPoints, ReadError> {
     let layout = layout(&content)?;
     // What the file cannot hold is its fault, not the limit's.
     let plain = (!layout.compressed).then(|| plain_records(&content, &layout)).transpose()?;
-    input::check_bytes("the points", layout.count.saturating_mul(BYTES_PER_POINT), limits)?;
+    input::check_bytes("the points", layout.count.saturating_mul(BYTES_PER_POINT), params)?;
     notes.not_used(unused(&content, &layout).iter().map(String::as_bytes));
     let mut columns = Columns::default();
     let mut take = |records: Vec<u8>| {
@@ -48,7 +48,7 @@ pub(super) fn read(content: Vec<u8>, limits: &ReadLimits, notes: &mut Notes) -> 
     };
     match plain {
         Some(records) => records.chunks(BLOCK * layout.record as usize).try_for_each(|block| take(block.to_vec()))?,
-        None => laz::decompress(&content, &layout, limits, take)?,
+        None => laz::decompress(&content, &layout, params, take)?,
     }
     // Before the columns are converted: the file takes about as much as they do.
     drop(content);

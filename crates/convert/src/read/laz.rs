@@ -7,7 +7,7 @@
 mod gps_time;
 
 use super::las::{self, Layout, VariableRecord};
-use super::{ReadLimits, input};
+use super::{ReadParams, input};
 use crate::error::{Place, ReadError};
 use ::laz::laszip::{ChunkTable, ChunkTableEntry};
 use ::laz::record::{LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor};
@@ -33,7 +33,7 @@ const HINT: &str = "the file is truncated or damaged; fetch it again";
 pub(super) fn decompress(
     content: &[u8],
     layout: &Layout,
-    limits: &ReadLimits,
+    params: &ReadParams,
     mut take: impl FnMut(Vec<u8>) -> Result<(), ReadError>,
 ) -> Result<(), ReadError> {
     let (compressor, vlr) = laszip_record(content, layout)?;
@@ -52,7 +52,7 @@ pub(super) fn decompress(
     };
     let total = layout.count.saturating_mul(layout.record);
     let stored = chunks.iter().map(|c| c.bytes.len() as u64).sum::<u64>();
-    input::check_bytes("the decompressed points", total, limits)?;
+    input::check_bytes("the decompressed points", total, params)?;
     if total > FREE && total / MAX_RATIO > stored {
         return Err(ReadError::limit(
             format!("at most {MAX_RATIO} decompressed bytes for each byte of LAZ"),

@@ -5,7 +5,7 @@
 
 use super::input::Stream;
 use super::voxels::{self, Kind, Stored};
-use super::{ReadLimits, lattice};
+use super::{ReadParams, lattice};
 use crate::error::{Place, ReadError};
 use ::nifti::{NiftiHeader, NiftiType};
 use splat_core::Grid;
@@ -15,7 +15,7 @@ const HEADER: usize = 348;
 const HINT: &str = "the file is truncated, damaged or not NIfTI-1";
 
 /// Reads a volume.
-pub(super) fn read(mut stream: Stream<'_>, limits: &ReadLimits) -> Result<Grid, ReadError> {
+pub(super) fn read(mut stream: Stream<'_>, params: &ReadParams) -> Result<Grid, ReadError> {
     let (header, big_endian) = header(stream.peek(HEADER)?)?;
     let dims = dims(&header)?;
     let kind = header.data_type().ok().and_then(scalar).ok_or_else(|| {
@@ -26,7 +26,7 @@ pub(super) fn read(mut stream: Stream<'_>, limits: &ReadLimits) -> Result<Grid, 
     let (origin, axes) = affine(&header);
     lattice::check(origin, &axes, Place::Byte(252), HINT)?;
     let stored = Stored { kind, big_endian, dims: dims.map(|n| n as u64), scaling: scaling(&header)? };
-    let values = voxels::read(&mut stream, &stored, limits, HINT)?;
+    let values = voxels::read(&mut stream, &stored, params, HINT)?;
     Ok(Grid { origin, axes, dims, values })
 }
 

@@ -9,7 +9,7 @@ mod header;
 use super::input::{self, Stream};
 use super::text::Lines;
 use super::voxels::{self, Stored};
-use super::{Notes, ReadLimits};
+use super::{Notes, ReadParams};
 use crate::error::{Place, ReadError, escaped};
 use header::{Encoding, Header};
 use splat_core::Grid;
@@ -24,7 +24,7 @@ const MAX_HEADER: usize = 16 << 20;
 pub(super) fn read(
     mut stream: Stream<'_>,
     path: Option<&Path>,
-    limits: &ReadLimits,
+    params: &ReadParams,
     notes: &mut Notes,
 ) -> Result<Grid, ReadError> {
     let header = header::parse(header_bytes(&mut stream)?)?;
@@ -33,7 +33,7 @@ pub(super) fn read(
         let found = format!("{:?}", header.sizes);
         ReadError::input(header.place_of_sizes, "at most 2^40 voxels", found, HINT)
     })?;
-    input::check_bytes("the voxels", count * size_of::<f32>() as u64, limits)?;
+    input::check_bytes("the voxels", count * size_of::<f32>() as u64, params)?;
     if let Some(space) = header.converted_from {
         notes.remarks.push(format!("space: {space}, converted to right-anterior-superior"));
     }
@@ -42,16 +42,16 @@ pub(super) fn read(
             stream.skip(header.end as u64)?;
             (stream, header.lines)
         }
-        Some((name, place)) => (detached(name, *place, path, limits)?, 0),
+        Some((name, place)) => (detached(name, *place, path, params)?, 0),
     };
     skip_lines(&mut stream, header.line_skip)?;
     let (kind, big_endian, scaling) = (header.kind, header.big_endian, (1.0, 0.0));
     let stored = Stored { kind, big_endian, dims: header.sizes, scaling };
     let values = match header.encoding {
         Encoding::Text => text(&stream.rest()?, count, lines + header.line_skip)?,
-        Encoding::Raw if header.byte_skip == -1 => last(stream, &stored, limits)?,
-        Encoding::Raw => binary(stream, &header, &stored, limits)?,
-        Encoding::Gzip => binary(stream.gunzip(), &header, &stored, limits)?,
+        Encoding::Raw if header.byte_skip == -1 => last(stream, &stored, params)?,
+        Encoding::Raw => binary(stream, &header, &stored, params)?,
+        Encoding::Gzip => binary(stream.gunzip(), &header, &stored, params)?,
     };
     Ok(Grid { origin: header.origin, axes: header.axes, dims: header.sizes.map(|n| n as usize), values })
 }
@@ -78,27 +78,27 @@ fn binary(
     mut stream: Stream<'_>,
     header: &Header,
     stored: &Stored,
-    limits: &ReadLimits,
+    params: &ReadParams,
 ) -> Result<Vec<f32>, ReadError> {
     let skipped = match u64::try_from(header.byte_skip) {
         Ok(n) if stream.left().is_none_or(|left| n <= left) => stream.skip(n)? == n,
         _ => false,
     };
     if skipped {
-        return voxels::read(&mut stream, stored, limits, HINT);
+        return voxels::read(&mut stream, stored, params, HINT);
     }
     let found = format!("byte skip {}", header.byte_skip);
     Err(ReadError::input(Place::File, "a number of bytes before the voxels, within the data", found, HINT))
 }
 
 /// Voxels that the data ends with, whatever comes before.
-fn last(stream: Stream<'_>, stored: &Stored, limits: &ReadLimits) -> Result<Vec<f32>, ReadError> {
+fn last(stream: Stream<'_>, stored: &Stored, params: &ReadParams) -> Result<Vec<f32>, ReadError> {
     let data = stream.rest()?;
     let Some(start) = (data.len() as u64).checked_sub(stored.bytes()) else {
         let found = format!("{} bytes, byte skip -1", data.len());
         return Err(ReadError::input(Place::File, format!("{} bytes of voxels", stored.bytes()), found, HINT));
     };
-    voxels::read(&mut Stream::of(&data[start as usize..], limits), stored, limits, HINT)
+    voxels::read(&mut Stream::of(&data[start as usize..], params), stored, params, HINT)
 }
 
 /// Exactly `count` numbers in text, after so many lines of the file.
@@ -129,7 +129,7 @@ fn detached(
     name: &str,
     place: Place,
     header: Option<&Path>,
-    limits: &ReadLimits,
+    params: &ReadParams,
 ) -> Result<Stream<'static>, ReadError> {
     let shown = || format!("'{}'", escaped(name.as_bytes(), 60));
     let refused = |expected: &str| {
@@ -156,7 +156,7 @@ fn detached(
             return refused("a data file that is not the header itself");
         }
     }
-    Stream::open(&path, limits).map_err(|e| {
+    Stream::open(&path, params).map_err(|e| {
         let expected = format!("the data file {}: {}", shown(), e.expected);
         ReadError { expected, ..e }
     })

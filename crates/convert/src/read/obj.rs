@@ -4,7 +4,7 @@
 //! lines and materials are read over: no material file is ever opened, wherever `mtllib` points to. The parser is our
 //! own: lines, columns and checked indices are asked of it.
 
-use super::ReadLimits;
+use super::ReadParams;
 use super::polygon::{self, Polygon};
 use super::reading::{Fix, Reading};
 use super::text::{Line, Lines, Word};
@@ -95,8 +95,8 @@ impl Content {
                 let hint = "write the statement on one line";
                 Err(ReadError::input(line.place(), "vertices and faces on one line", "a line that goes on", hint))
             }
-            b"v" => self.vertex(keyword, words, reading.limits),
-            b"vn" => self.normal(keyword, words, reading.limits),
+            b"v" => self.vertex(keyword, words, reading.params),
+            b"vn" => self.normal(keyword, words, reading.params),
             b"f" => self.face(keyword, words, reading),
             other if READ_OVER.contains(&other) => Ok(()),
             _ => {
@@ -110,7 +110,7 @@ impl Content {
         &mut self,
         keyword: Word<'a>,
         words: impl Iterator<Item = Word<'a>>,
-        limits: &ReadLimits,
+        params: &ReadParams,
     ) -> Result<(), ReadError> {
         let words: Vec<Word<'a>> = words.collect();
         // x y z, x y z w, x y z r g b.
@@ -118,7 +118,7 @@ impl Content {
             let found = format!("{} numbers", words.len());
             return Err(ReadError::input(keyword.place(), "v X Y Z, or v X Y Z R G B", found, "complete the vertex"));
         }
-        input::check_bytes("the vertices", (self.positions.len() as u64 + 1) * BYTES_PER_VERTEX, limits)?;
+        input::check_bytes("the vertices", (self.positions.len() as u64 + 1) * BYTES_PER_VERTEX, params)?;
         let mut numbers = [0.0; 6];
         for (number, word) in numbers.iter_mut().zip(&words) {
             *number = word.number()?;
@@ -142,7 +142,7 @@ impl Content {
         &mut self,
         keyword: Word<'a>,
         words: impl Iterator<Item = Word<'a>>,
-        limits: &ReadLimits,
+        params: &ReadParams,
     ) -> Result<(), ReadError> {
         let words: Vec<Word<'a>> = words.collect();
         let [x, y, z] = words.as_slice() else {
@@ -150,7 +150,7 @@ impl Content {
             return Err(ReadError::input(keyword.place(), "vn X Y Z", found, "complete the normal"));
         };
         let n = DVec3::new(x.number()?, y.number()?, z.number()?);
-        input::check_bytes("the normals", (self.normals.len() as u64 + 1) * 12, limits)?;
+        input::check_bytes("the normals", (self.normals.len() as u64 + 1) * 12, params)?;
         input::reserve(&mut self.normals, 1)?;
         let largest = n.abs().max_element();
         // Scaled first, so that neither 1e-200 nor 1e200 is lost in the squares.
@@ -173,7 +173,7 @@ impl Content {
                 fan[corners] = corner;
             } else {
                 let bytes = (self.triangles.len() as u64 + 1) * BYTES_PER_TRIANGLE;
-                input::check_bytes("the triangles", bytes, reading.limits)?;
+                input::check_bytes("the triangles", bytes, reading.params)?;
                 input::reserve(&mut self.triangles, 1)?;
                 self.triangles.push([fan[0], fan[1], corner]);
                 fan[1] = corner;
@@ -211,7 +211,7 @@ impl Content {
         if let Some(&known) = self.of_corner.get(&key) {
             return Ok(known);
         }
-        input::check_bytes("the corners", (self.corners.len() as u64 + 1) * BYTES_PER_CORNER, reading.limits)?;
+        input::check_bytes("the corners", (self.corners.len() as u64 + 1) * BYTES_PER_CORNER, reading.params)?;
         input::reserve(&mut self.corners, 1)?;
         let new = self.corners.len() as u32;
         self.corners.push(key);

@@ -101,7 +101,7 @@ fn outcome(mesh: &Mesh, polygon: &Polygon, reading: &Reading<'_>) -> Result<Outc
     if is_strictly_convex(&flat) {
         return Ok(Outcome::Fan);
     }
-    input::check_bytes("the corners of a face", corners.len() as u64 * BYTES_PER_CORNER, reading.limits)?;
+    input::check_bytes("the corners of a face", corners.len() as u64 * BYTES_PER_CORNER, reading.params)?;
     let Some(flat) = Flat::new(&corners, flat, reading)? else { return Ok(Outcome::Fan) };
     Ok(match flat.by_parity() {
         Some(triangles) => Outcome::Triangles(triangles),

@@ -1,6 +1,6 @@
-//! What goes along while a file is read: its limits, who may stop it, and what was mended in it.
+//! What goes along while a file is read: its parameters, who may stop it, and what was mended in it.
 
-use super::ReadLimits;
+use super::ReadParams;
 #[cfg(any(feature = "ply", feature = "obj", feature = "xyz", feature = "las"))]
 use crate::error::escaped;
 use crate::error::{Place, ReadError};
@@ -107,24 +107,24 @@ impl Notes {
 
 /// A file that is being read.
 pub(super) struct Reading<'a> {
-    pub(super) limits: &'a ReadLimits,
-    progress: &'a Progress,
+    pub(super) params: &'a ReadParams,
+    progress: Option<&'a Progress>,
     pub(super) notes: Notes,
 }
 
 impl<'a> Reading<'a> {
-    pub(super) fn new(limits: &'a ReadLimits, progress: &'a Progress) -> Self {
-        Self { limits, progress, notes: Notes::default() }
+    pub(super) fn new(params: &'a ReadParams, progress: Option<&'a Progress>) -> Self {
+        Self { params, progress, notes: Notes::default() }
     }
 
-    /// Counts a fault that is mended; with [`ReadLimits::strict`] it is the error that it stands for.
+    /// Counts a fault that is mended; with [`ReadParams::strict`] it is the error that it stands for.
     #[cfg(any(feature = "ply", feature = "stl", feature = "obj"))]
     pub(super) fn mend(
         &mut self,
         (fix, place, face): (Fix, Place, Option<u64>),
         error: impl FnOnce() -> ReadError,
     ) -> Result<(), ReadError> {
-        if self.limits.strict {
+        if self.params.strict {
             return Err(error());
         }
         match self.notes.mended.iter_mut().find(|m| m.fix == fix) {
@@ -142,6 +142,6 @@ impl<'a> Reading<'a> {
 
     /// Looks whether the reader is to stop.
     pub(super) fn go_on(&self) -> Result<(), ReadError> {
-        if self.progress.is_cancelled() { Err(ReadError::cancelled()) } else { Ok(()) }
+        if self.progress.is_some_and(Progress::is_cancelled) { Err(ReadError::cancelled()) } else { Ok(()) }
     }
 }

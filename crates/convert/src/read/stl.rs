@@ -7,7 +7,7 @@
 
 use super::reading::{Fix, Reading};
 use super::text::{Line, Lines, Word};
-use super::{ReadLimits, input, origin};
+use super::{ReadParams, input, origin};
 use crate::error::{Place, ReadError};
 use splat_core::Mesh;
 use splat_core::glam::DVec3;
@@ -65,7 +65,7 @@ pub(super) fn is_text(content: &[u8]) -> bool {
 /// The facets after the header.
 fn binary(content: &[u8], reading: &Reading<'_>) -> Result<Mesh, ReadError> {
     let facets = content.as_chunks::<FACET>().0;
-    let mut corners = reserved(facets.len(), reading.limits)?;
+    let mut corners = reserved(facets.len(), reading.params)?;
     for (n, facet) in facets.iter().enumerate() {
         if n.is_multiple_of(LOOK) {
             reading.go_on()?;
@@ -84,8 +84,8 @@ fn binary(content: &[u8], reading: &Reading<'_>) -> Result<Mesh, ReadError> {
     mesh(&corners)
 }
 
-fn reserved(facets: usize, limits: &ReadLimits) -> Result<Vec<DVec3>, ReadError> {
-    input::check_bytes("the facets", facets as u64 * BYTES_PER_FACET, limits)?;
+fn reserved(facets: usize, params: &ReadParams) -> Result<Vec<DVec3>, ReadError> {
+    input::check_bytes("the facets", facets as u64 * BYTES_PER_FACET, params)?;
     let mut corners = Vec::new();
     input::reserve(&mut corners, 3 * facets)?;
     Ok(corners)
@@ -165,7 +165,7 @@ fn text(content: &[u8], reading: &Reading<'_>) -> Result<Mesh, ReadError> {
                 if corners.len().is_multiple_of(3 * LOOK) {
                     reading.go_on()?;
                 }
-                input::check_bytes("the facets", (corners.len() as u64 / 3 + 1) * BYTES_PER_FACET, reading.limits)?;
+                input::check_bytes("the facets", (corners.len() as u64 / 3 + 1) * BYTES_PER_FACET, reading.params)?;
                 input::reserve(&mut corners, 3)?;
                 facet_corners(&mut text, &mut corners)?;
             }

@@ -1,6 +1,6 @@
 //! Stored voxels of any number type → f32, block by block, so that a volume is not in memory twice.
 
-use super::ReadLimits;
+use super::ReadParams;
 use super::input::{self, Stream};
 use crate::error::{Place, ReadError};
 use rayon::prelude::*;
@@ -63,7 +63,7 @@ impl Stored {
 pub(super) fn read(
     stream: &mut Stream<'_>,
     stored: &Stored,
-    limits: &ReadLimits,
+    params: &ReadParams,
     hint: &'static str,
 ) -> Result<Vec<f32>, ReadError> {
     let (needed, at) = (stored.bytes(), stream.position());
@@ -75,7 +75,7 @@ pub(super) fn read(
     if let Some(left) = stream.left().filter(|left| *left != needed) {
         return wrong(left.to_string());
     }
-    input::check_bytes("the voxels", stored.count() * size_of::<f32>() as u64, limits)?;
+    input::check_bytes("the voxels", stored.count() * size_of::<f32>() as u64, params)?;
     stream.expect(needed)?;
     let mut values = Vec::new();
     input::reserve(&mut values, stored.count() as usize)?;

@@ -6,7 +6,7 @@
 //! nothing but a whole number before the first point is a count, which is checked.
 
 use super::text::{Line, Lines, Word};
-use super::{Notes, ReadLimits, color::linear_from_srgb, input, origin};
+use super::{Notes, ReadParams, color::linear_from_srgb, input, origin};
 use crate::error::{Place, ReadError};
 use crate::raw_points::RawPoints;
 use splat_core::glam::{DVec3, Vec3};
@@ -32,7 +32,7 @@ const VALUE: usize = 9;
 const BYTES_PER_POINT: u64 = 24 + 12 + 12 + 12 + 4;
 
 /// Reads points.
-pub(super) fn read(content: &[u8], limits: &ReadLimits, notes: &mut Notes) -> Result<RawPoints, ReadError> {
+pub(super) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Result<RawPoints, ReadError> {
     let mut lines = Lines::new(content);
     let mut columns: Option<Vec<Option<usize>>> = None;
     let (mut count, mut positions, mut points) = (None, Vec::new(), RawPoints::default());
@@ -61,9 +61,9 @@ pub(super) fn read(content: &[u8], limits: &ReadLimits, notes: &mut Notes) -> Re
             return Err(ReadError::input(line.place(), expected, found, "every line has the same columns"));
         }
         let bytes = (positions.len() as u64 + 1) * BYTES_PER_POINT;
-        input::check_bytes("the points", bytes, limits)?;
+        input::check_bytes("the points", bytes, params)?;
         input::reserve(&mut positions, 1)?;
-        point(&words, columns, limits, &mut positions, &mut points)?;
+        point(&words, columns, params, &mut positions, &mut points)?;
     }
     if let Some((announced, place)) = count
         && announced != positions.len() as u64 + points.dropped
@@ -148,7 +148,7 @@ fn guessed(line: Line<'_>, words: &[Word<'_>]) -> Result<Vec<Option<usize>>, Rea
 fn point(
     words: &[Word<'_>],
     columns: &[Option<usize>],
-    limits: &ReadLimits,
+    params: &ReadParams,
     positions: &mut Vec<DVec3>,
     points: &mut RawPoints,
 ) -> Result<(), ReadError> {
@@ -158,7 +158,7 @@ fn point(
         match word.number() {
             Ok(value) => values[role] = value,
             // Only what is a number, but not a finite one, may be dropped.
-            Err(_) if limits.drop_invalid && is_float(*word) => {
+            Err(_) if params.drop_invalid && is_float(*word) => {
                 points.dropped += 1;
                 return Ok(());
             }

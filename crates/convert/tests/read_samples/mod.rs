@@ -5,14 +5,14 @@
 pub(crate) mod oldest;
 
 use convert::ReadError;
-use convert::read::{Loaded, ReadLimits, bytes};
+use convert::read::{Loaded, ReadParams, bytes};
 use std::io::Write;
 
 /// Corners of a unit square; two of them carry colours that test the sRGB curve.
 pub(crate) const VERTICES: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.25], [1.0, 1.0, 0.0], [0.0, 1.0, -0.5]];
 
 pub(crate) fn load(name: &str, content: &[u8]) -> Result<Loaded, ReadError> {
-    bytes(name, content, &ReadLimits::default())
+    bytes(name, content, &ReadParams::default(), None).map(|read| read.0)
 }
 
 pub(crate) fn gzip(content: &[u8]) -> Vec<u8> {

@@ -9,6 +9,7 @@ use crate::slicing::Slicing;
 use crate::{Error, Params, ThicknessRule, thickness};
 use rayon::prelude::*;
 use splat_core::{Cloud, SliceOrder};
+use splat_shaders::Overflow;
 use splat_shaders::layouts::SortState;
 
 /// Keys that a part gives to find ranges of about equal size, each of which is merged by one task.
@@ -55,7 +56,7 @@ impl Recorded {
             bytemuck::pod_read_unaligned(state_bytes.ok_or(short("state", size_of::<SortState>(), state.len()))?);
         if state.kept > self.capacities.kept {
             let (needed, had) = (state.kept.into(), self.capacities.kept.into());
-            return Err(Error::Overflow { what: "splats in the view", needed, had });
+            return Err(Error::Overflow(Overflow { what: "splats in the view", needed, had }));
         }
         let splats = ids.map_or(cloud.len().min(cloud.radius.len()), <[u32]>::len);
         let kept = (state.kept as usize).min(splats);

@@ -1,10 +1,10 @@
 //! What is in a data file, without a scene.
 
 use convert::RawPoints;
-use convert::read::{Loaded, Mended, ReadLimits, UpAxis, up_axis};
+use convert::read::{Loaded, Mended, ReadParams, UpAxis, up_axis};
 use organza::Error;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Aabb, DAabb, Grid, Mesh, Progress};
+use splat_core::{Aabb, DAabb, Grid, Limits, Mesh};
 use std::path::Path;
 
 /// What a data file holds.
@@ -38,8 +38,8 @@ pub(super) struct FileInfo {
 /// [`Error::Io`] for the file system, [`Error::Input`] for a file that is not what its name says, [`Error::Limit`] for
 /// one that would take more than `max_bytes`.
 pub(super) fn contents(path: &Path, max_bytes: u64, strict: bool) -> Result<FileInfo, Error> {
-    let limits = ReadLimits { max_bytes, strict, ..ReadLimits::default() };
-    let read = convert::read::file_with_notes(path, &limits, &Progress::new());
+    let params = ReadParams { limits: Limits::bytes(max_bytes), strict, ..ReadParams::default() };
+    let read = convert::read::file(path, &params, None);
     let (data, notes) = read.map_err(|e| Error::from_read(path, &e))?;
     let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "cannot read", e))?.len();
     let info = match data {

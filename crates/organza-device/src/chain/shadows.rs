@@ -2,7 +2,7 @@
 
 use crate::Failure;
 use splat_core::raster::gpu::{AttributeBuffers, Attributes};
-use splat_shaders::{Joined, Recording, Run};
+use splat_shaders::{Joined, Overflow, Recording, Run};
 use tsm::gpu::{CastRoom, Casting, RecordedShadow, ShadowUploads, record_shadow};
 
 /// The recorded shadow of a light, and where it lies in the whole.
@@ -47,7 +47,9 @@ pub(super) fn had_room(shadows: &[Shadow], run: &Run, rooms: &mut [CastRoom]) ->
     let mut had = true;
     for ((shadow, joined), room) in shadows.iter().zip(rooms) {
         match shadow.cast.found(run.bytes(joined.of(shadow.cast.state))) {
-            Err(tsm::Error::Overflow { needed, .. }) if u32::try_from(needed).is_ok_and(|n| n > room.entries) => {
+            Err(tsm::Error::Overflow(Overflow { needed, .. }))
+                if u32::try_from(needed).is_ok_and(|n| n > room.entries) =>
+            {
                 (room.entries, had) = (needed as u32, false);
             }
             found => drop(found?),

@@ -8,7 +8,7 @@ use splat_core::raster::OpaqueImage;
 use splat_core::raster::gpu::{Attributes, Capacities, Counts, follow, project, record, resolve};
 use splat_core::shade::{ChannelLayout, ShadeInput, gpu as shade};
 use splat_core::{Accumulator, Error};
-use splat_shaders::{BufferId, Joined, Recording, Run};
+use splat_shaders::{BufferId, Joined, Overflow, Recording, Run};
 use tsm::gpu::CastRoom;
 
 /// The recordings of the stages as one.
@@ -126,12 +126,11 @@ impl Whole {
         Ok((Some(counts), opaque))
     }
 
-    /// Hands the inputs of all stages to `run`.
+    /// Hands the inputs of all stages to `run`: of all splats, their attributes, and what they receive.
     pub(super) fn with_inputs<T>(
         &self,
         splats: &Splats<'_>,
-        all: &[u32],
-        attributes: &Attributes,
+        (all, attributes): (&[u32], &Attributes),
         received: &[[f32; 3]],
         accumulator: &Accumulator,
         run: impl FnOnce(&[(BufferId, &[u8])]) -> Result<T, Failure>,
@@ -185,7 +184,7 @@ impl Whole {
 /// Whether there was room for what was counted; if not it gets what it needs.
 fn grown(counts: Result<Counts, Error>, room: &mut u32) -> Result<bool, Failure> {
     match counts {
-        Err(Error::Overflow { needed, .. }) if u32::try_from(needed).is_ok_and(|n| n > *room) => {
+        Err(Error::Overflow(Overflow { needed, .. })) if u32::try_from(needed).is_ok_and(|n| n > *room) => {
             *room = needed as u32;
             Ok(false)
         }

@@ -6,7 +6,7 @@ use crate::chain::{Splats, chain_on};
 use hbsort::{Scratch, slice_cloud};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::gpu::{Attributes, project, words};
-use splat_core::raster::{self, OpaqueImage, Params, Projected};
+use splat_core::raster::{self, Detail, OpaqueImage, Params, ProjectInput, Projected};
 use splat_core::shade::{ChannelLayout, LitBy, ShadeInput, gpu as shade};
 use splat_core::{
     Accumulator, Camera, Cloud, Direction, FootprintStack, Light, LightShape, Material, Object, Progress, Projection,
@@ -70,7 +70,14 @@ impl ChainInput {
             light(LightShape::Directional { direction }, [0.5, 0.4, 0.3]),
         ];
         let (footprints, params) = (FootprintStack::default(), Params::default());
-        let projected = raster::project(&cloud, &camera, &footprints, &materials, &params);
+        let projected = raster::project(&ProjectInput {
+            cloud: &cloud,
+            camera: &camera,
+            footprints: &footprints,
+            materials: &materials,
+            params: &params,
+            detail: Detail::ALL,
+        });
         let objects = [Object { name: String::new(), casts_shadow: true, shadow_coefficient: 0.8 }];
         Self { cloud, camera, materials, objects, lights, footprints, projected }
     }

@@ -4,7 +4,7 @@ use super::{Agreement, Failure, Found, SIZE};
 use splat_core::glam::DVec3;
 use splat_core::raster::FoldInput;
 use splat_core::raster::gpu::record;
-use splat_core::raster::{OpaqueImage, Params, fold, project};
+use splat_core::raster::{Detail, OpaqueImage, Params, ProjectInput, fold, project};
 use splat_core::{Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Projection, Splat, SplatKind, rng};
 use splat_shaders::Executor;
 
@@ -44,7 +44,14 @@ impl CompositeInput {
 
     pub(super) fn check(&self, device: &mut dyn Executor) -> Result<Found, Failure> {
         let (params, materials, opaque) = (Params::default(), [Material::default()], OpaqueImage::default());
-        let projected = project(&self.cloud, &self.camera, &FootprintStack::default(), &materials, &params);
+        let projected = project(&ProjectInput {
+            cloud: &self.cloud,
+            camera: &self.camera,
+            footprints: &FootprintStack::default(),
+            materials: &materials,
+            params: &params,
+            detail: Detail::ALL,
+        });
         let order: Vec<u32> = (0..SPLATS).collect();
         let (values, direction) = (&self.values[..], Direction::FrontToBack);
         let mut expected = Accumulator::new(SIZE, 1, 3, false, false);

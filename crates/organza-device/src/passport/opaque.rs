@@ -4,7 +4,7 @@ use super::{Agreement, Found, SIZE, composite::numbers};
 use crate::Failure;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::gpu::resolve::record;
-use splat_core::raster::{self, Detail, OpaqueImage, Params, Projected, project_into, resolve_opaque};
+use splat_core::raster::{self, Detail, OpaqueImage, Params, ProjectInput, Projected, project_into, resolve_opaque};
 use splat_core::{Camera, Cloud, FootprintStack, Material, Projection, Splat, SplatKind, rng};
 use splat_shaders::Executor;
 
@@ -38,7 +38,17 @@ impl OpaqueInput {
         let camera = Camera::look_at(eye, DVec3::ZERO, DVec3::Y, view, SIZE).expect("invariant: a view of its target");
         let (footprints, materials) = (FootprintStack::default(), [Material::default()]);
         let mut projected = Projected::default();
-        project_into(&mut projected, &cloud, &camera, &footprints, &materials, &Params::default(), Detail::ALL);
+        project_into(
+            &mut projected,
+            &ProjectInput {
+                cloud: &cloud,
+                camera: &camera,
+                footprints: &footprints,
+                materials: &materials,
+                params: &Params::default(),
+                detail: Detail::ALL,
+            },
+        );
         let values = (0..3 * u64::from(SPLATS)).map(|i| number(i, 7)).collect();
         Self { projected, ids: (0..SPLATS).collect(), values }
     }

@@ -1,7 +1,7 @@
 //! Sets of particles by both: uploaded and made by the device, shown as they are and lit through a shadow map.
 
 use super::{Agreement, Failure, Found, LEAST_SHARE, SIZE, ShadowInput};
-use crate::Folding;
+use crate::{Folding, Goal};
 use pbsr::{
     Appearance, Ensemble, EnsembleParams, FoldParams, LitBy, MeshSampler, Object, Renderer, Scene, SurfaceParams,
     pixel_area,
@@ -77,8 +77,15 @@ impl ParticlesInput {
         let scene = Scene { objects: &objects, lights, shadow_origin, ambient: [0.1; 3], camera, occluder: None };
         let empty = Ensemble::new(SIZE, &EnsembleParams { radiance_unit: 0.5, ..EnsembleParams::default() })?;
         let (mut expected, mut found, progress) = (empty.clone(), empty, Progress::default());
-        Renderer::new().fold(&scene, &mut expected, SETS, &FoldParams::default(), &progress)?;
-        if let Some(why) = folding.fold_on(device, &scene, &mut found, SETS, u64::MAX, &progress)? {
+        Renderer::new().fold(
+            &scene,
+            &mut expected,
+            &FoldParams { levels: SETS, ..FoldParams::default() },
+            Some(&progress),
+        )?;
+        if let Some(why) =
+            folding.fold_on(device, &scene, &mut found, Goal { until: SETS, max_bytes: u64::MAX }, &progress)?
+        {
             return Err(Failure::Left(why));
         }
         let Folding { particles, passes, .. } = folding;

@@ -47,8 +47,20 @@ impl ShadowInput {
         let materials = [Material::default()];
         let (params, progress) = (Params::default(), Progress::new());
         let valid = "invariant: generated splats and a lamp are valid, and fit";
-        let casting = Casting::new(&cloud, &materials, &[], &light, &params, &progress).expect(valid);
-        let deposits = Deposits::new(&cloud, &materials, &[], &light, &params, &progress).expect(valid);
+        let casting = Casting::new(
+            &tsm::Scene { cloud: &cloud, materials: &materials, objects: &[] },
+            &light,
+            &params,
+            Some(&progress),
+        )
+        .expect(valid);
+        let deposits = Deposits::new(
+            &tsm::Scene { cloud: &cloud, materials: &materials, objects: &[] },
+            &light,
+            &params,
+            Some(&progress),
+        )
+        .expect(valid);
         let map = deposits.clone().into_map();
         let receiver = |i: usize| Receiver {
             position: cloud.position[i],

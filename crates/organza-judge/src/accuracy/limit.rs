@@ -38,7 +38,7 @@ pub(super) fn converge(
     let (mut curves, mut refused) = (Vec::new(), Vec::new());
     for (knob, of_step) in sweep.knobs.iter().zip(&settings.of_step) {
         progress.begin(knob.name);
-        match curve(sweep, knob, of_step, settings, timed, floor, draw) {
+        match curve(sweep, (knob, of_step), settings, timed, floor, draw) {
             Ok(curve) => curves.extend(curve),
             Err(e) if is_resource_limit(&e) => refused.push(Skipped { knob: knob.name, reason: e.to_string() }),
             Err(e) => return Err(e),
@@ -52,8 +52,7 @@ pub(super) fn converge(
 /// The convergence of one knob against its end, the other knobs as in the scene; `None` for a choice.
 fn curve(
     sweep: &Sweep,
-    knob: &Knob,
-    of_step: &[usize],
+    (knob, of_step): (&Knob, &[usize]),
     settings: &Settings,
     timed: &[Timed],
     floor: f64,

@@ -2,7 +2,9 @@
 
 use super::{Facts, Request};
 use organza::scene::Scene;
-use organza::{CostRecord, Error, Loaded, Progress, RenderOptions, draw_loaded, load, plan_loaded, same_splats};
+use organza::{
+    CostRecord, Error, Loaded, Planned, Progress, RenderOptions, draw_loaded, load, plan_loaded, same_splats,
+};
 use reference::metrics::{Display, Errors, Image, Linear, Viewing, compare, epsilon_8_bit, flip, psnr};
 use splat_core::SplatKind;
 use std::time::Instant;
@@ -131,7 +133,7 @@ impl<'a> Renderer<'a> {
         let (loaded, convert_seconds) = self.load(&scene)?;
         let plan = plan_loaded(&scene, loaded, options)?;
         let mut cost = CostRecord::default();
-        let layers = draw_loaded(&scene, loaded, &plan, options, progress, &mut cost)?;
+        let layers = draw_loaded(&Planned { scene: &scene, loaded, plan: &plan, options }, progress, &mut cost)?;
         let beauty = layers.rgb("beauty").ok_or_else(|| Error::Internal("a render has no beauty layer".into()))?;
         let image = Image::from_layer(layers.size, beauty).map_err(|e| Error::Internal(e.to_string()))?;
         Ok(Frame {
@@ -183,7 +185,7 @@ impl<'a> Renderer<'a> {
         let options = self.options;
         let (loaded, _) = self.load(scene)?;
         match plan_loaded(scene, loaded, options) {
-            Err(e @ (Error::Input { .. } | Error::Limit { .. } | Error::TooLarge { .. })) => Ok(Some(e.to_string())),
+            Err(e @ (Error::Input { .. } | Error::Limit(_) | Error::TooLarge { .. })) => Ok(Some(e.to_string())),
             other => other.map(|_| None),
         }
     }

@@ -17,18 +17,27 @@ use reference::statistics::fit_order;
 /// Seeds of every setting; each is one timed repeat too.
 pub const SEEDS: usize = 5;
 
-/// Draws and judges by `limit`, that of a technique whose expectation is the same.
+/// What pictures of an expectation are judged by.
+#[derive(Debug)]
+pub struct Yardsticks<'a> {
+    /// The limit of a technique whose expectation is the same.
+    pub limit: &'a Limit,
+    /// The scene path-traced, or why there is none.
+    pub truth: Result<Truth, String>,
+}
+
+/// Draws and judges.
 ///
 /// # Errors
 /// Those of `draw`, but a setting that exceeds a limit of resources is noted and left out.
 pub fn random_study(
     sweep: &Sweep,
-    limit: &Limit,
-    truth: Result<Truth, String>,
+    yardsticks: Yardsticks<'_>,
     options: &Options,
     progress: &Progress,
     draw: &mut Draw<'_>,
 ) -> Result<Study, Error> {
+    let Yardsticks { limit, truth } = yardsticks;
     let settings = Settings::of(sweep);
     let mut timed = vec![Timed::default(); settings.list.len()];
     repeat_all(&settings, &mut timed, &Repeats { times: SEEDS, seeded: true, order: options.seed }, progress, draw)?;

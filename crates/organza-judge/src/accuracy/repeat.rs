@@ -66,5 +66,5 @@ pub(super) fn attempt(
 
 /// Whether a setting took more than it may, which is noted and no failure.
 pub(super) fn is_resource_limit(error: &Error) -> bool {
-    matches!(error, Error::Limit { .. } | Error::TooLarge { .. })
+    matches!(error, Error::Limit(_) | Error::TooLarge { .. })
 }

@@ -82,7 +82,8 @@ pub(super) fn body(
         Source::Implicit(i) => {
             let field = expression_field(&i.expression, object)?;
             let params = SplatParams { object_name: object.name.clone(), ..SplatParams::default() };
-            convert::field_to_mesh(&field, i.bounds, i.spacing * FINER, &params).map_err(|e| Error::from_convert(&e))?
+            convert::field_to_mesh(&field, i.bounds, i.spacing * FINER, &params, None)
+                .map_err(|e| Error::from_convert(&e))?
         }
         Source::Rectangle(r) => rectangle(r.center, r.u, r.v),
         Source::Medium(_) => return medium(scene, object, options).map(Ok),
@@ -188,7 +189,7 @@ fn shape(object: &SceneObject, options: &RenderOptions) -> Result<(Shape, f64), 
         }
         Source::Cloud(cloud) => {
             let params = SplatParams { object_name: object.name.clone(), ..SplatParams::default() };
-            let grid = convert::procedural_cloud(&cloud.shape(), cloud.spacing * FINER, &params);
+            let grid = convert::procedural_cloud(&cloud.shape(), cloud.spacing * FINER, &params, None);
             let mut grid = grid.map_err(|e| Error::from_convert(&e))?;
             grid.origin = t.apply(grid.origin);
             grid.axes = DMat3::from_quat(t.rotation) * grid.axes * t.scale;
@@ -279,7 +280,7 @@ fn surface(scene: &Scene, object: &SceneObject, mut mesh: Mesh) -> Body {
 }
 
 fn read(path: &Path, options: &RenderOptions) -> Result<FileData, Error> {
-    convert::read::file(path, &options.read_limits()).map_err(|e| Error::from_read(path, &e))
+    convert::read::file(path, &options.read_params(), None).map(|read| read.0).map_err(|e| Error::from_read(path, &e))
 }
 
 fn rectangle(center: DVec3, u: DVec3, v: DVec3) -> Mesh {

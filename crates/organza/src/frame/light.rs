@@ -43,8 +43,13 @@ impl<'a> Frame<'a> {
             let params = table.params(self.settings, self.loaded, left);
             let map = cost.measure(pass::SHADOW_MAP, |stage| {
                 let l = self.loaded;
-                let deposits = Deposits::new(&l.cloud, &l.materials, &l.objects, &point.light, &params, self.progress)
-                    .map_err(|e| shadow_error(point, &e))?;
+                let deposits = Deposits::new(
+                    &tsm::Scene { cloud: &l.cloud, materials: &l.materials, objects: &l.objects },
+                    &point.light,
+                    &params,
+                    Some(self.progress),
+                )
+                .map_err(|e| shadow_error(point, &e))?;
                 let helped = self.helper.and_then(|helper| device::shadow_map(helper, &deposits));
                 let map = helped.unwrap_or_else(|| deposits.into_map());
                 stage.items_in = l.cloud.len() as u64;

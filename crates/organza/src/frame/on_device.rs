@@ -11,6 +11,19 @@ use splat_core::{Accumulator, CostRecord, Direction, StageCost};
 use tsm::ShadowMap;
 use tsm::gpu::Casting;
 
+/// Splats that are composited by one recording.
+#[derive(Clone, Copy)]
+pub(crate) struct Chained<'a> {
+    pub(crate) lights: &'a [LitBy<'a>],
+    /// The shadow maps that the device makes, if it makes them.
+    pub(crate) castings: &'a [Casting],
+    /// Translucent splats.
+    pub(crate) ids: &'a [u32],
+    /// Opaque ones.
+    pub(crate) solid: &'a [u32],
+    pub(crate) sort: &'a hbsort::Params,
+}
+
 impl Frame<'_> {
     /// The opaque splats by a device, or `None` for the processor.
     pub(super) fn solid_by_device(&self, ids: &[u32], cost: &mut CostRecord) -> Result<Option<OpaqueImage>, Error> {
@@ -24,7 +37,8 @@ impl Frame<'_> {
         let mut stages = CostRecord::default();
         let params = hbsort::Params { exact: true, ..hbsort::Params::default() };
         let image = stages.measure(pass::OPAQUE, |stage| {
-            self.chain(helper, (&lights, &[]), [&[], ids], &params, &mut nothing, stage)
+            let chained = Chained { lights: &lights, castings: &[], ids: &[], solid: ids, sort: &params };
+            self.chain(helper, &chained, &mut nothing, stage)
         })?;
         if image.is_some() {
             cost.stages.extend(stages.stages);
@@ -42,12 +56,11 @@ impl Frame<'_> {
     pub(crate) fn chain(
         &self,
         helper: &Helper<'_>,
-        (lights, castings): (&[LitBy<'_>], &[Casting]),
-        [ids, solid]: [&[u32]; 2],
-        sort: &hbsort::Params,
+        chained: &Chained<'_>,
         accumulator: &mut Accumulator,
         stage: &mut StageCost,
     ) -> Result<Option<OpaqueImage>, Error> {
+        let Chained { lights, castings, ids, solid, sort } = *chained;
         let input = self.shading(lights);
         // What asks for half precision is composited elsewhere.
         let raster = raster::Params { accumulation: Accumulation::F32, ..self.raster_params() };

@@ -3,7 +3,9 @@
 use super::Frame;
 use crate::pass;
 use crate::{CostRecord, Error, stage};
-use splat_core::raster::{self, Background, Detail, OpaqueImage, OpaqueInput, Projected, RasterCounts};
+use splat_core::raster::{
+    self, Background, Detail, FinishInput, OpaqueImage, OpaqueInput, ProjectInput, Projected, RasterCounts,
+};
 use splat_core::shade::shade;
 use splat_core::{Accumulator, Cloud, Layers, SplatKind, StageCost};
 
@@ -72,7 +74,17 @@ impl Frame<'_> {
         let projected = cost.measure(pass::PROJECT, |stage| {
             let mut projected = Projected::default();
             let (params, detail) = (self.raster_params(), self.detail());
-            raster::project_into(&mut projected, cloud, &self.camera, &l.footprints, &l.materials, &params, detail);
+            raster::project_into(
+                &mut projected,
+                &ProjectInput {
+                    cloud,
+                    camera: &self.camera,
+                    footprints: &l.footprints,
+                    materials: &l.materials,
+                    params: &params,
+                    detail,
+                },
+            );
             stage.items_in = cloud.len() as u64;
             stage.items_out = projected.visible();
             stage.bytes = projected.bytes();
@@ -133,7 +145,14 @@ impl Frame<'_> {
             let [width, height] = accumulator.size;
             stage.items_in = u64::from(width) * u64::from(height);
             let antialias = self.settings.antialias;
-            Ok::<_, Error>(raster::finish(accumulator, opaque, &background, &self.layout(), &self.layers, antialias))
+            Ok::<_, Error>(raster::finish(&FinishInput {
+                accumulator,
+                opaque,
+                background: &background,
+                layout: &self.layout(),
+                layers: &self.layers,
+                antialias,
+            }))
         })
     }
 }

@@ -5,7 +5,7 @@ use crate::scene::{Scene, SceneObject, Source};
 use crate::{Error, RenderOptions};
 use convert::{Orientation, SplatParams, SurfelParams, VolumeParams};
 use glam::DVec3;
-use splat_core::{Progress, Shading};
+use splat_core::{Limits, Progress, Shading};
 use std::path::Path;
 
 /// Bytes that a splat takes from its conversion to the finished picture, at most.
@@ -49,7 +49,7 @@ impl Context<'_> {
             profile: self.scene.footprints.layers()[object.footprint as usize],
             transform: object.transform,
             color: object.color.unwrap_or(material.color),
-            max_splats: 0,
+            limits: Limits::NONE,
         };
         self.limit(&mut params);
         params
@@ -59,7 +59,7 @@ impl Context<'_> {
     fn limit(&self, params: &mut SplatParams) {
         let fits = self.options.max_memory.saturating_sub(self.used) / BYTES_PER_SPLAT;
         let asked = self.scene.render.max_points.map_or(u64::MAX, |most| most.saturating_sub(self.made));
-        params.max_splats = fits.min(asked).min(u64::from(u32::MAX));
+        params.limits = Limits::elements(fits.min(asked).min(u64::from(u32::MAX)));
     }
 
     /// The same attributes within what is left now.
@@ -91,12 +91,12 @@ impl Context<'_> {
     }
 
     pub(super) fn read(&self, path: &Path) -> Result<FileData, Error> {
-        self.files.read(path, &self.options.read_limits(), self.progress)
+        self.files.read(path, &self.options.read_params(), self.progress)
     }
 
     /// The same of a file that nothing but what is made from it needs.
     pub(super) fn read_once(&self, path: &Path) -> Result<FileData, Error> {
-        self.files.read_once(path, &self.options.read_limits(), self.progress)
+        self.files.read_once(path, &self.options.read_params(), self.progress)
     }
 
     /// Parameters of a volume: normals only where they are used.

@@ -1,7 +1,7 @@
 //! What was read from files, shared by all objects and frames that are made from it: a file is read once.
 
 use crate::Error;
-use convert::read::{Loaded, Mended, Notes, ReadLimits};
+use convert::read::{Loaded, Mended, Notes, ReadParams};
 use convert::{RawPoints, SharedField};
 use splat_core::{DAabb, Grid, Mesh, Progress};
 use std::cell::RefCell;
@@ -23,7 +23,7 @@ pub(super) type Fitted = (SharedField, DAabb);
 /// The files of a scene that were read.
 #[derive(Default)]
 pub(crate) struct Files {
-    read: RefCell<HashMap<PathBuf, (ReadLimits, FileData)>>,
+    read: RefCell<HashMap<PathBuf, (ReadParams, FileData)>>,
     /// What there is to say of them, one sentence each.
     notes: RefCell<Vec<String>>,
     /// Fits take longer than reading: with their tolerance and the bytes that they take.
@@ -34,7 +34,7 @@ pub(crate) struct Files {
 
 impl Files {
     /// Reads a file unless it was read with the same limits, and keeps what it holds.
-    pub(super) fn read(&self, path: &Path, limits: &ReadLimits, progress: &Progress) -> Result<FileData, Error> {
+    pub(super) fn read(&self, path: &Path, limits: &ReadParams, progress: &Progress) -> Result<FileData, Error> {
         if let Some(data) = self.known(path, limits) {
             return Ok(data);
         }
@@ -44,7 +44,7 @@ impl Files {
     }
 
     /// The same without keeping it: for whoever keeps what is made from it.
-    pub(super) fn read_once(&self, path: &Path, limits: &ReadLimits, progress: &Progress) -> Result<FileData, Error> {
+    pub(super) fn read_once(&self, path: &Path, limits: &ReadParams, progress: &Progress) -> Result<FileData, Error> {
         self.known(path, limits).map_or_else(|| self.read_anew(path, limits, progress), Ok)
     }
 
@@ -58,8 +58,8 @@ impl Files {
         self.mended.borrow().clone()
     }
 
-    fn read_anew(&self, path: &Path, limits: &ReadLimits, progress: &Progress) -> Result<FileData, Error> {
-        let read = convert::read::file_with_notes(path, limits, progress);
+    fn read_anew(&self, path: &Path, limits: &ReadParams, progress: &Progress) -> Result<FileData, Error> {
+        let read = convert::read::file(path, limits, Some(progress));
         let (data, noted) = read.map_err(|e| Error::from_read(path, &e))?;
         add(&self.mended, noted.mended.iter().map(Mended::to_string));
         add(&self.notes, sentences(path, &data, noted));
@@ -71,7 +71,7 @@ impl Files {
         }
     }
 
-    fn known(&self, path: &Path, limits: &ReadLimits) -> Option<FileData> {
+    fn known(&self, path: &Path, limits: &ReadParams) -> Option<FileData> {
         let read = self.read.borrow();
         read.get(path).filter(|(with, _)| with == limits).map(|(_, data)| data.clone())
     }

@@ -4,13 +4,13 @@ use super::context::Context;
 use super::files::{FileData, Fitted, grid_bytes, mesh_bytes, points_bytes};
 use crate::Error;
 use crate::scene::{
-    DensitySource, ImplicitSource, LevelSetSource, MediumShape, RectangleSource, SceneObject, Source, SurfaceSampler,
-    VolumeSource,
+    DensitySource, ImplicitSource, LevelSetSource, MediumShape, RectangleSource, SceneObject, SliceSource, Source,
+    SurfaceSampler, VolumeSource,
 };
 use crate::statistics::ObjectData;
 use convert::{
     ClippedField, CloudShape, Density, DensityParams, ExpressionField, GridField, Interpolation, MeshParams, MpuParams,
-    RawPoints, SharedField, SplatParams, SurfelParams, VolumeParams,
+    RawPoints, Section, SharedField, SplatParams, SurfelParams, VolumeParams,
 };
 use glam::DVec3;
 use pbsr::{BoundedExtinction, Matter};
@@ -140,7 +140,8 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
             Input::Volume(grid, transfer, context.volume_params(splat))
         }
         Source::Implicit(ImplicitSource { expression, bounds, spacing }) => {
-            surface(Arc::new(expression_field(expression, object)?), None, *bounds, *spacing, object, splat, opacity)?
+            let field = Arc::new(expression_field(expression, object)?);
+            surface(ZeroSet { field, trilinear: None, bounds: *bounds, step: *spacing }, object, splat, opacity)?
         }
         Source::Isosurface(source) => {
             let grid = read_grid(&source.path, context)?;
@@ -150,21 +151,14 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
             let field = GridField::new(grid, source.interpolation, source.level, source.inside)
                 .map_err(|e| refuse_data(&source.path, &e))?;
             let bounds = field.bounds();
-            surface(Arc::new(field), trilinear, bounds, step, object, splat, opacity)?
+            surface(ZeroSet { field: Arc::new(field), trilinear, bounds, step }, object, splat, opacity)?
         }
         Source::LevelSet(source) => {
             let (field, bounds) = level_set(source, object, context)?;
             let step = bounds.size().max_element() / LEVEL_SET_STEPS;
-            surface(field, None, bounds, step, object, splat, opacity)?
+            surface(ZeroSet { field, trilinear: None, bounds, step }, object, splat, opacity)?
         }
-        Source::Slice(source) => {
-            let grid = read_grid(&source.path, context)?;
-            let spacing = object.spacing.map_or_else(|| shortest_step(&grid), |s| s / splat.transform.scale);
-            let mesh = convert::volume_section(grid, &source.transfer, source.center, source.normal, spacing, &splat);
-            let mesh = mesh.map_err(|e| Error::from_convert(&e))?;
-            let density = Density::Spacing(spacing * splat.transform.scale);
-            Input::Mesh(crate::printable(&source.path), mesh.into(), MeshParams { splat, density, opacity })
-        }
+        Source::Slice(source) => slice(source, object, splat, opacity, context)?,
         Source::Density(DensitySource { expression, bounds, spacing, extinction }) => {
             let params = DensityParams {
                 density: Density::Spacing(spacing * splat.transform.scale),
@@ -177,6 +171,23 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
         Source::Medium(shape) => Input::Medium(*shape, splat),
         Source::Rectangle(r) => Input::Rectangle(*r, opacity, splat),
     })
+}
+
+/// A plane through a volume, with the volume's colours.
+fn slice<'a>(
+    source: &SliceSource,
+    object: &SceneObject,
+    splat: SplatParams,
+    opacity: f64,
+    context: &Context<'_>,
+) -> Result<Input<'a>, Error> {
+    let grid = read_grid(&source.path, context)?;
+    let spacing = object.spacing.map_or_else(|| shortest_step(&grid), |s| s / splat.transform.scale);
+    let section = Section { center: source.center, normal: source.normal, spacing };
+    let mesh = convert::volume_section(grid, &source.transfer, &section, &splat, Some(context.progress))
+        .map_err(|e| Error::from_convert(&e))?;
+    let density = Density::Spacing(spacing * splat.transform.scale);
+    Ok(Input::Mesh(crate::printable(&source.path), mesh.into(), MeshParams { splat, density, opacity }))
 }
 
 /// Data as it is, or as the object's spacing asks for it.
@@ -194,16 +205,19 @@ fn at_spacing<T>(
     }
 }
 
-/// A surface of a field; `step` is the distance of its splats where the object states none, object units.
-fn surface<'a>(
+/// A field whose zero set is drawn.
+struct ZeroSet {
     field: SharedField,
+    /// The lattice and the level that it comes of, where that is all.
     trilinear: Option<(Arc<Grid>, f32)>,
     bounds: DAabb,
+    /// Distance of its splats where the object states none, object units.
     step: f64,
-    object: &SceneObject,
-    splat: SplatParams,
-    opacity: f64,
-) -> Result<Input<'a>, Error> {
+}
+
+/// A surface of a field.
+fn surface<'a>(zero: ZeroSet, object: &SceneObject, splat: SplatParams, opacity: f64) -> Result<Input<'a>, Error> {
+    let ZeroSet { field, trilinear, bounds, step } = zero;
     let density = Density::Spacing(object.spacing.unwrap_or(step * splat.transform.scale));
     let field = if object.clip.is_empty() {
         field
@@ -233,7 +247,8 @@ fn level_set(source: &LevelSetSource, object: &SceneObject, context: &Context<'_
         let params =
             MpuParams { object_name: object.name.clone(), tolerance: source.tolerance, ..MpuParams::default() };
         let points = read_scattered(&source.path, context)?;
-        let (field, _) = convert::points_to_field(&points, &params).map_err(|e| Error::from_convert(&e))?;
+        let (field, _) =
+            convert::points_to_field(&points, &params, Some(context.progress)).map_err(|e| Error::from_convert(&e))?;
         let (bounds, bytes) = (field.bounds(), field.bytes());
         Ok(((Arc::new(field) as SharedField, bounds), bytes))
     })

@@ -8,7 +8,7 @@ use crate::form::PlannedObject;
 use crate::scene::{Scene, SceneObject};
 use crate::statistics::ObjectStatistics;
 use crate::{Error, Progress, RenderOptions, SplatCount, stage, work};
-use splat_core::Cloud;
+use splat_core::{Cloud, Exceeded};
 
 /// What loading reads.
 #[derive(Clone, Copy)]
@@ -149,11 +149,11 @@ fn check_total(
     }
     let most = splats.iter().max_by_key(|s| s.predicted);
     let named = most.map(|s| format!(", most of them '{}' with {}", crate::shown(&s.object), s.predicted));
-    Err(Error::Limit {
-        what: format!("the scene (before conversion{})", named.unwrap_or_default()),
+    Err(Error::Limit(Exceeded {
+        what: format!("the scene (before conversion{})", named.unwrap_or_default()).into(),
         needed,
-        limit,
+        limit: Some(limit),
         unit: "splats",
         hint: "use a larger spacing, or a larger --max-memory or render.max_points".into(),
-    })
+    }))
 }

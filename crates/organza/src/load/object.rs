@@ -4,7 +4,7 @@ use super::context::Context;
 use super::input::{Input, input};
 use super::own::{Body, Own, Search};
 use crate::Error;
-use crate::scene::{MediumShape, SceneObject, Source};
+use crate::scene::{MediumShape, RectangleSource, SceneObject, Source};
 use crate::statistics::ObjectStatistics;
 use convert::cost::{self, Prediction};
 use convert::{
@@ -13,7 +13,7 @@ use convert::{
 };
 use glam::DVec3;
 use pbsr::BoundedExtinction;
-use splat_core::{Cloud, Grid, Mesh, Object, Shading, Similarity, TransferFunction, TransferPoint};
+use splat_core::{Cloud, Exceeded, Grid, Mesh, Object, Shading, Similarity, TransferFunction, TransferPoint};
 use std::path::Path;
 
 /// Most operations of an expression on its way to splats: some minutes of two cores.
@@ -67,9 +67,9 @@ pub(super) fn prepare<'a>(
     };
     match predict(&input) {
         Ok(prediction) => Ok(Prepared { input, prediction, as_it_is, too_many: None, bounded, search }),
-        Err(ConvertError::TooMany { object, what, needed, limit }) => {
-            let prediction = Prediction { splats: needed as u64, ..Prediction::default() };
-            let too_many = Some(ConvertError::TooMany { object, what, needed, limit });
+        Err(ConvertError::Limit(exceeded)) => {
+            let prediction = Prediction { splats: exceeded.needed, ..Prediction::default() };
+            let too_many = Some(ConvertError::Limit(exceeded));
             Ok(Prepared { input, prediction, as_it_is, too_many, bounded, search })
         }
         Err(e) => Err(Error::from_convert(&e)),
@@ -93,13 +93,13 @@ fn check_work(object: &SceneObject, input: &Input<'_>) -> Result<(), Error> {
     if needed <= MOST_OPERATIONS {
         return Ok(());
     }
-    Err(Error::Limit {
-        what: format!("the expression of object '{}'", crate::escape_controls(&object.name)),
+    Err(Error::Limit(Exceeded {
+        what: format!("the expression of object '{}'", crate::escape_controls(&object.name)).into(),
         needed: needed as u64,
-        limit: MOST_OPERATIONS as u64,
+        limit: Some(MOST_OPERATIONS as u64),
         unit: "operations before anything is drawn",
         hint: "use a larger spacing or a smaller resolution, a smaller box, or an expression with a bound".into(),
-    })
+    }))
 }
 
 fn predict(input: &Input<'_>) -> Result<Prediction, ConvertError> {
@@ -116,7 +116,7 @@ fn predict(input: &Input<'_>) -> Result<Prediction, ConvertError> {
         Input::Medium(MediumShape::Ball { center, radius, extinction, spacing }, params) => {
             cost::medium_ball(*center, *radius, *extinction, *spacing, params)
         }
-        Input::Rectangle(r, opacity, params) => cost::rectangle(r.u, r.v, *opacity, r.spacing, params),
+        Input::Rectangle(r, opacity, params) => cost::rectangle(&flat(r, *opacity), params),
     }
 }
 
@@ -171,23 +171,23 @@ pub(super) fn convert(
         }
         Input::Volume(grid, transfer, params) => {
             let params = VolumeParams { splat: context.limited(&params.splat), ..params.clone() };
-            convert::volume_to_points_with_progress(grid, transfer, &params, progress).map(|c| c.0)
+            convert::volume_to_points(grid, transfer, &params, Some(progress)).map(|c| c.0)
         }
         Input::Surface(field, bounds, params, _) => {
             let params = MeshParams { splat: context.limited(&params.splat), ..params.clone() };
-            convert::surface_to_points_with_progress(field.as_ref(), *bounds, &params, progress)
+            convert::surface_to_points(field.as_ref(), *bounds, &params, Some(progress))
                 .map(|(cloud, _)| in_domain(cloud, field, &params.splat.transform))
         }
         Input::Density(field, bounds, params) => {
             let splat = context.limited(&params.volume.splat);
             let volume = VolumeParams { splat, ..params.volume.clone() };
             let params = DensityParams { volume, ..params.clone() };
-            convert::density_to_points_with_progress(field.as_ref(), *bounds, &params, progress).map(|c| c.0)
+            convert::density_to_points(field.as_ref(), *bounds, &params, Some(progress)).map(|c| c.0)
         }
         Input::Procedural(shape, spacing, params) => {
             let params = VolumeParams { splat: context.limited(&params.splat), ..params.clone() };
             let convert = |grid: &Grid, transfer: &TransferFunction| {
-                convert::volume_to_points_with_progress(grid, transfer, &params, progress).map(|c| c.0)
+                convert::volume_to_points(grid, transfer, &params, Some(progress)).map(|c| c.0)
             };
             match own.map(|o| &o.body) {
                 Some(Body::Cells { grid, transfer, .. }) => convert(grid, transfer),
@@ -195,9 +195,7 @@ pub(super) fn convert(
             }
         }
         Input::Medium(shape, params) => medium(shape, &context.limited(params)),
-        Input::Rectangle(r, opacity, params) => {
-            convert::rectangle(r.center, r.u, r.v, *opacity, r.spacing, &context.limited(params))
-        }
+        Input::Rectangle(r, opacity, params) => convert::rectangle(&flat(r, *opacity), &context.limited(params)),
     };
     cloud.map_err(|e| Error::from_convert(&e))
 }
@@ -218,7 +216,7 @@ fn mesh_splats(
     warnings: &mut Vec<String>,
 ) -> Result<Cloud, ConvertError> {
     let mut cloud = Cloud::default();
-    let report = convert::mesh_to_points_with_progress(mesh, params, &mut cloud, context.progress)?;
+    let report = convert::mesh_to_points_into(mesh, params, &mut cloud, Some(context.progress))?;
     if report.degenerate > 0 {
         warnings.push(format!("{name}: {} faces have no area", report.degenerate));
     }
@@ -232,7 +230,7 @@ fn surfels(
     context: &Context<'_>,
     warnings: &mut Vec<String>,
 ) -> Result<Cloud, ConvertError> {
-    let (cloud, report) = convert::raw_to_surfels_with_progress(points, params, context.progress)?;
+    let (cloud, report) = convert::raw_to_surfels(points, params, Some(context.progress))?;
     if report.duplicates > 0 && !params.merge_duplicates {
         let n = report.duplicates;
         warnings
@@ -248,7 +246,7 @@ pub(super) fn procedural(
     params: &SplatParams,
     context: &Context<'_>,
 ) -> Result<(Grid, TransferFunction), ConvertError> {
-    let lattice = convert::procedural_cloud_with_progress(shape, spacing, params, context.progress)?;
+    let lattice = convert::procedural_cloud(shape, spacing, params, Some(context.progress))?;
     Ok((lattice, as_it_is(shape.extinction, params)?))
 }
 
@@ -260,6 +258,12 @@ pub(super) fn as_it_is(most: f64, params: &SplatParams) -> Result<TransferFuncti
         points.push(point(most as f32));
     }
     TransferFunction::new(points).map_err(|source| ConvertError::Input { object: params.object_name.clone(), source })
+}
+
+/// A rectangle of a scene.
+fn flat(source: &RectangleSource, opacity: f64) -> convert::Rectangle {
+    let RectangleSource { center, u, v, spacing } = *source;
+    convert::Rectangle { center, u, v, opacity, spacing }
 }
 
 fn medium(shape: &MediumShape, params: &SplatParams) -> Result<Cloud, ConvertError> {

@@ -215,7 +215,8 @@ fn data(
         Input::Surface(field, bounds, params, lattice) => {
             let spacing = world_spacing(&params.density) / params.splat.transform.scale;
             if source == Form::Triangles {
-                let mesh = convert::surface_to_mesh(field.as_ref(), *bounds, spacing, &params.splat);
+                let mesh =
+                    convert::surface_to_mesh(field.as_ref(), *bounds, spacing, &params.splat, Some(context.progress));
                 return Ok(triangles(mesh.map_err(|e| Error::from_convert(&e))?, prepared.prediction.splats));
             }
             let bounds = prepared.search.as_ref().map_or(*bounds, |s| s.bounds);
@@ -260,7 +261,7 @@ fn density_lattice(
     let splat = &params.volume.splat;
     let spacing = world_spacing(&params.density) / splat.transform.scale;
     let mut grid =
-        convert::field_to_grid(field.as_ref(), bounds, spacing, splat).map_err(|e| Error::from_convert(&e))?;
+        convert::field_to_grid(field.as_ref(), bounds, spacing, splat, None).map_err(|e| Error::from_convert(&e))?;
     let extinction = params.extinction as f32;
     grid.values.iter_mut().for_each(|v| *v = (*v * extinction).max(0.0));
     let most = grid.values.iter().copied().fold(0.0, f32::max);

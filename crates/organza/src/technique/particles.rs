@@ -141,14 +141,11 @@ fn occluder(opaque: &OpaqueImage) -> Option<&OpaqueImage> {
 fn refuse(whose: &str, error: pbsr::Error) -> Error {
     match error {
         pbsr::Error::Core(splat_core::Error::Cancelled) => Error::Cancelled,
-        pbsr::Error::TooMuch { what, needed, had, unit } => Error::Limit {
-            what: format!("{whose}: {what}"),
-            needed,
-            limit: had,
-            unit,
-            hint: "use a lower extinction or opacity, a smaller image or render.antialias, or a larger --max-memory"
-                .into(),
-        },
+        pbsr::Error::Limit(exceeded) => {
+            let hint =
+                "use a lower extinction or opacity, a smaller image or render.antialias, or a larger --max-memory";
+            Error::Limit(exceeded.of(whose, hint))
+        }
         pbsr::Error::Field { .. } => Error::input(
             whose,
             error.to_string(),

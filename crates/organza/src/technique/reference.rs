@@ -70,7 +70,6 @@ impl Fold for Exact<'_> {
         };
         let range = f64::from(range.start)..f64::from(range.end);
         frame.progress.begin(stage::REFERENCE);
-        frame.progress.add_total(u64::from(frame.camera.size[1]));
         cost.measure(pass::REFERENCE, |stage| {
             let (begun, last) = (&*into, &self.pixels);
             let pixel = |k: usize, fragments: &[Fragment]| {
@@ -80,7 +79,8 @@ impl Fold for Exact<'_> {
                 fragments.iter().filter(|f| range.contains(&f.depth)).for_each(|f| pixel.add(&input, f, narrowing));
                 pixel
             };
-            let pixels = fold_fragments(&input, &opaque.depth, frame.progress, pixel).map_err(|_| Error::Cancelled)?;
+            let pixels =
+                fold_fragments(&input, &opaque.depth, pixel, Some(frame.progress)).map_err(|_| Error::Cancelled)?;
             stage.items_in = cloud.len() as u64;
             stage.items_out = pixels.len() as u64;
             stage.fragments = pixels.iter().map(|p| p.fragments).sum();

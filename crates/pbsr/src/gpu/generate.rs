@@ -225,7 +225,7 @@ impl Generated {
     /// What stays as it is from run to run: give it to the first.
     ///
     /// # Errors
-    /// [`Error::TooMuch`] and [`Error::Parameter`] as [`Recorded::uploads`].
+    /// [`Error::Overflow`] and [`Error::Parameter`] as [`Recorded::uploads`].
     pub fn tables<'a>(
         &self,
         sources: &'a Sources,
@@ -258,7 +258,7 @@ impl Generated {
     /// What a run of the next sets needs beside the tables: which they are, and the particles that the device does not make.
     ///
     /// # Errors
-    /// [`Error::TooMuch`] when there is too little room for those: record again with what is needed.
+    /// [`Error::Overflow`] when there is too little room for those: record again with what is needed.
     pub fn next(&self, sources: &Sources, scene: &Scene<'_>, ensemble: &Ensemble) -> Result<Inputs<'static>, Error> {
         let (first, levels) = (u64::from(ensemble.levels), self.capacities.levels);
         let of_object = |(twin, (buffer, _)): (&super::Twin, &(BufferId, Vec<BufferId>))| {
@@ -277,7 +277,7 @@ impl Generated {
     /// Adds what a run gave to the ensemble that its inputs were made for, and gives the number of its particles.
     ///
     /// # Errors
-    /// [`Error::TooMuch`] when there was too little room and nothing was folded: record again with what is needed.
+    /// [`Error::Overflow`] when there was too little room and nothing was folded: record again with what is needed.
     /// [`Error::Parameter`] for a run of another recording, or another ensemble.
     pub fn add(&self, run: &Run, ensemble: &mut Ensemble) -> Result<u64, Error> {
         let found = run.bytes(self.found).get(..size_of::<ParticlesFound>());

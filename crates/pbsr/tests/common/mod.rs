@@ -2,7 +2,7 @@
 
 use pbsr::{Appearance, Ensemble, EnsembleParams, FoldParams, Object, Renderer, Sampler, Scene};
 use splat_core::glam::{DMat3, DVec3, Vec3};
-use splat_core::{Camera, Material, Mesh, Progress, Projection, ScalarField, Shading, Similarity};
+use splat_core::{Camera, Material, Mesh, Projection, ScalarField, Shading, Similarity};
 
 /// Looks along −Z from `distance` away from the origin.
 pub(crate) fn camera(projection: Projection, distance: f64, size: [u32; 2]) -> Camera {
@@ -57,7 +57,7 @@ pub(crate) fn fold(scene: &Scene<'_>, levels: u32) -> Ensemble {
 }
 
 pub(crate) fn fold_into(scene: &Scene<'_>, ensemble: &mut Ensemble, levels: u32) {
-    Renderer::new().fold(scene, ensemble, levels, &FoldParams::default(), &Progress::new()).unwrap();
+    Renderer::new().fold(scene, ensemble, &FoldParams { levels, ..FoldParams::default() }, None).unwrap();
 }
 
 pub(crate) fn render(camera: &Camera, samplers: &[&dyn Sampler], levels: u32) -> Ensemble {

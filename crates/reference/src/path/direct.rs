@@ -8,6 +8,15 @@ use crate::ray::Ray;
 use crate::visibility::Filter;
 use glam::DVec3;
 
+/// Light on its way to a vertex.
+struct Arrival<'a> {
+    sample: LightSample,
+    /// Where it comes from; `None` is the environment.
+    lamp: Option<&'a Lamp>,
+    /// Probability that this light was chosen among all.
+    chosen: f64,
+}
+
 impl Tracer<'_> {
     /// Light that one of some lights sends to a vertex.
     pub(super) fn gather(&self, path: &mut Path, vertex: &Vertex, lights: &[Lamp], skip: u32, rng: &mut Stream) {
@@ -19,7 +28,8 @@ impl Tracer<'_> {
         let lamp = &lights[pick];
         let u = if lamp.source.is_area() { rng.pair() } else { [0.5; 2] };
         if let Some(sample) = lamp.source.sample(path.ray.origin, u) {
-            self.add_sample(path, vertex, &sample, Some(lamp), 1.0 / n as f64, skip, rng);
+            let arrival = Arrival { sample, lamp: Some(lamp), chosen: 1.0 / n as f64 };
+            self.add_sample(path, vertex, &arrival, skip, rng);
         }
     }
 
@@ -32,21 +42,13 @@ impl Tracer<'_> {
         if let Some((direction, radiance, density)) = environment.sample(rng.pair()) {
             let value = radiance.map(|l| l / density);
             let sample = LightSample { direction, distance: f64::INFINITY, value, density };
-            self.add_sample(path, vertex, &sample, None, 1.0, skip, rng);
+            self.add_sample(path, vertex, &Arrival { sample, lamp: None, chosen: 1.0 }, skip, rng);
         }
     }
 
     /// Adds a sample of a light, or of the environment.
-    fn add_sample(
-        &self,
-        path: &mut Path,
-        vertex: &Vertex,
-        s: &LightSample,
-        lamp: Option<&Lamp>,
-        chosen: f64,
-        skip: u32,
-        rng: &mut Stream,
-    ) {
+    fn add_sample(&self, path: &mut Path, vertex: &Vertex, arrival: &Arrival<'_>, skip: u32, rng: &mut Stream) {
+        let Arrival { sample: s, lamp, chosen } = arrival;
         let (share, density) = vertex.toward(s.direction);
         if share.iter().all(|v| *v == 0.0) {
             return;

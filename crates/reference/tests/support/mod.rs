@@ -2,7 +2,7 @@
 
 use reference::{Estimate, PathSettings, Scene, path_trace};
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Camera, Mesh, Progress, Projection};
+use splat_core::{Camera, Mesh, Projection};
 
 /// A parallel camera at `from` that looks at `to`, the image `height` high.
 pub(crate) fn parallel(from: DVec3, to: DVec3, height: f64, size: [u32; 2]) -> Camera {
@@ -10,7 +10,7 @@ pub(crate) fn parallel(from: DVec3, to: DVec3, height: f64, size: [u32; 2]) -> C
 }
 
 pub(crate) fn trace(scene: &Scene<'_>, camera: &Camera, settings: &PathSettings) -> Estimate {
-    path_trace(scene, camera, settings, &Progress::new()).unwrap()
+    path_trace(scene, camera, settings, None).unwrap()
 }
 
 /// An axis-aligned box as twelve triangles with outward normals.

@@ -25,18 +25,29 @@ struct Sample {
     object: u32,
 }
 
+/// Samples that are to become a picture.
+#[derive(Debug, Clone, Copy)]
+pub struct FinishInput<'a> {
+    /// What was composited.
+    pub accumulator: &'a Accumulator,
+    /// Nearest opaque surfaces; may be empty.
+    pub opaque: &'a OpaqueImage,
+    /// What is seen where nothing else is.
+    pub background: &'a Background,
+    /// What the accumulator's channels are.
+    pub layout: &'a ChannelLayout,
+    /// Layers to make.
+    pub layers: &'a LayerSet,
+    /// Samples along each side of a pixel, ≥ 1.
+    pub antialias: u32,
+}
+
 /// Turns an accumulator with `antialias`² samples a pixel into layers of `accumulator.size / antialias`.
 ///
 /// Colours, alpha, shadow and normal are box-filtered. `depth.first` is the least of the samples, the other depths are
 /// means over the samples where they are defined, and `object` is that of the first sample that has one.
-pub fn finish(
-    accumulator: &Accumulator,
-    opaque: &OpaqueImage,
-    background: &Background,
-    layout: &ChannelLayout,
-    layers: &LayerSet,
-    antialias: u32,
-) -> Layers {
+pub fn finish(input: &FinishInput<'_>) -> Layers {
+    let FinishInput { accumulator, opaque, background, layout, layers, antialias } = *input;
     let size = accumulator.size.map(|s| s / antialias);
     let bands: Vec<Output> = (0..size[1].div_ceil(BAND))
         .into_par_iter()

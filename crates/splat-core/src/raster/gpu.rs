@@ -59,7 +59,7 @@ use list::{List, ListRoom};
 use packed::SPLAT_WORDS;
 use rayon::prelude::*;
 use splat_shaders::layouts::{MOST_CHANNELS, SortState, SplatView};
-use splat_shaders::{BufferId, Groups, Recording, kernels};
+use splat_shaders::{BufferId, Groups, Overflow, Recording, kernels};
 
 /// Side of a tile, pixels.
 pub const TILE: u32 = 16;
@@ -457,5 +457,5 @@ fn equal_lengths(lengths: impl IntoIterator<Item = (&'static str, usize, usize)>
 
 fn fits(what: &'static str, needed: u64, had: u32) -> Result<(), Error> {
     let had = u64::from(had);
-    if needed > had { Err(Error::Overflow { what, needed, had }) } else { Ok(()) }
+    if needed > had { Err(Error::Overflow(Overflow { what, needed, had })) } else { Ok(()) }
 }

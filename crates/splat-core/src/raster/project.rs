@@ -39,38 +39,42 @@ const CORE_FILTER_PX: f32 = 1.0 / 32.0;
 /// Splats projected by one task.
 const CHUNK: usize = 4096;
 
-/// Projects all splats of `cloud` into fresh memory, with every detail; see [`project_into`].
+/// What is projected, and how.
+#[derive(Debug, Clone, Copy)]
+pub struct ProjectInput<'a> {
+    /// The splats.
+    pub cloud: &'a Cloud,
+    /// The viewer.
+    pub camera: &'a Camera,
+    /// Footprints by id.
+    pub footprints: &'a FootprintStack,
+    /// Materials by id.
+    pub materials: &'a [Material],
+    /// The resampling filter.
+    pub params: &'a Params,
+    /// What is kept of each splat beside its footprint.
+    pub detail: Detail,
+}
+
+/// Projects all splats into fresh memory; see [`project_into`].
 ///
 /// # Panics
 /// As [`project_into`].
-pub fn project(
-    cloud: &Cloud,
-    camera: &Camera,
-    footprints: &FootprintStack,
-    materials: &[Material],
-    params: &Params,
-) -> Projected {
+pub fn project(input: &ProjectInput<'_>) -> Projected {
     let mut out = Projected::default();
-    project_into(&mut out, cloud, camera, footprints, materials, params, Detail::ALL);
+    project_into(&mut out, input);
     out
 }
 
-/// Projects all splats of `cloud`; `out` may hold another frame's projection, whose memory is used again.
+/// Projects all splats; `out` may hold another frame's projection, whose memory is used again.
 ///
 /// In the order of ids, which is that of memory: splats in view order lie far apart, and gathering their attributes one
 /// column at a time would cost more than projecting those that turn out to be hidden.
 ///
 /// # Panics
 /// If a material or a footprint of the cloud is out of range; `Cloud::validate` and the tables promise it is not.
-pub fn project_into(
-    out: &mut Projected,
-    cloud: &Cloud,
-    camera: &Camera,
-    footprints: &FootprintStack,
-    materials: &[Material],
-    params: &Params,
-    detail: Detail,
-) {
+pub fn project_into(out: &mut Projected, input: &ProjectInput<'_>) {
+    let ProjectInput { cloud, camera, footprints, materials, params, detail } = *input;
     out.resize(cloud.len(), detail);
     out.objects.clear();
     if detail.object {

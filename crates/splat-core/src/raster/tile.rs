@@ -7,8 +7,9 @@
 //! What blends splats in another way than [`fold`](super::fold) does walks tiles by the same few names:
 //!
 //! ```
-//! use splat_core::raster::{Params, Projected, bins::{Bins, bin}, lanes::Lanes, project, pulp, tile::{AREA, Runs}};
-//! use splat_core::{Camera, Cloud, FootprintStack, Projection, Splat, glam::DVec3};
+//! use splat_core::raster::{Detail, Params, ProjectInput, Projected, project, pulp};
+//! use splat_core::raster::{bins::{Bins, bin}, lanes::Lanes, tile::{AREA, Runs}};
+//! use splat_core::{Camera, Cloud, FootprintStack, Material, Projection, Splat, glam::DVec3};
 //!
 //! /// The sum of all optical depths in a tile.
 //! struct Sum<'a>(&'a Projected, &'a Bins, usize);
@@ -36,7 +37,9 @@
 //! cloud.push(&Splat { radius: 0.5, cross_section: 0.2, ..Splat::default() });
 //! let view = Projection::Orthographic { height: 2.0 };
 //! let camera = Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, view, [64, 64]).unwrap();
-//! let projected = project(&cloud, &camera, &FootprintStack::default(), &[Default::default()], &Params::default());
+//! let (footprints, materials) = (&FootprintStack::default(), &[Material::default()]);
+//! let (cloud, camera, params, detail) = (&cloud, &camera, &Params::default(), Detail::ALL);
+//! let projected = project(&ProjectInput { cloud, camera, footprints, materials, params, detail });
 //! let bins = bin(&projected, &[0]);
 //! let sum: f32 = (0..bins.tiles()).map(|t| pulp::Arch::new().dispatch(Sum(&projected, &bins, t))).sum();
 //! // ∫τ dA is the cross-section, whatever the splat's size: 32 pixels are one unit of length.

@@ -26,7 +26,7 @@ use crate::{Error, Light, LightShape, Material, Progress, Shading};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use splat_shaders::layouts::ShadeView;
-use splat_shaders::{BufferId, Groups, Recording, kernels};
+use splat_shaders::{BufferId, Groups, Overflow, Recording, kernels};
 
 /// Splats that a workgroup shades.
 const BLOCK: u32 = 256;
@@ -225,7 +225,7 @@ impl Recorded {
             ("shadow maps", shadowed(input.lights).count(), room.shadows),
         ] {
             if needed as u64 > u64::from(had) {
-                return Err(Error::Overflow { what, needed: needed as u64, had: had.into() });
+                return Err(Error::Overflow(Overflow { what, needed: needed as u64, had: had.into() }));
             }
         }
         let tables: Vec<[f32; 4]> = input.materials.iter().flat_map(material).chain(lights(input)).collect();

@@ -10,6 +10,7 @@ use crate::shadow_map::{Absorbances, Matter};
 use crate::table::{Lists, Parted};
 use crate::{Deposits, Error, ShadowMap};
 use bytemuck::Pod;
+use splat_shaders::Overflow;
 use std::ops::Range;
 
 /// A run of a map's cells, those of media before those of surfaces, whose lists are made at once.
@@ -65,7 +66,7 @@ impl Deposits {
             let entries = self.entries_in(of, r);
             for (what, needed, had) in [("entries", entries, most.entries), ("cells", cells, most.cells)] {
                 if needed > u64::from(had) {
-                    return Err(Error::Overflow { what, needed, had: had.into() });
+                    return Err(Error::Overflow(Overflow { what, needed, had: had.into() }));
                 }
             }
             let fits =

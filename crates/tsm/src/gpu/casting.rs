@@ -7,17 +7,17 @@
 
 use crate::caster::Casters;
 use crate::deposit::{Deposit, Scratch};
-use crate::deposits::{check_memory, select};
+use crate::deposits::{check_entries, select};
 use crate::entries::Entries;
 use crate::gpu::MOST_ENTRIES;
 use crate::mapping::{Mapping, Table, with_mapping};
 use crate::plan::{Plan, plan};
 use crate::shadow_map::head;
 use crate::survey::{CHUNK, Survey};
-use crate::{Error, Params, ShadowMap};
+use crate::{Error, Params, Scene, ShadowMap};
 use rayon::prelude::*;
 use splat_core::optics::SurfaceOpacity;
-use splat_core::{Cloud, Light, Material, Object, Progress, SplatKind};
+use splat_core::{Light, Progress, SplatKind};
 use std::ops::{Range, RangeInclusive};
 
 /// Entries of a plain caster are fewer than this.
@@ -73,17 +73,12 @@ impl Casting {
     /// # Errors
     /// Those of [`crate::Deposits::new`], and [`Error::Processor`] for a table of polar angles, a scene of a size that
     /// single precision does not square, and more casters than can be counted.
-    pub fn new(
-        cloud: &Cloud,
-        materials: &[Material],
-        objects: &[Object],
-        light: &Light,
-        params: &Params,
-        progress: &Progress,
-    ) -> Result<Self, Error> {
+    pub fn new(scene: &Scene<'_>, light: &Light, params: &Params, progress: Option<&Progress>) -> Result<Self, Error> {
+        let quiet = Progress::new();
+        let progress = progress.unwrap_or(&quiet);
         params.validate()?;
         light.validate(0)?;
-        let casters = Casters::new(cloud, materials, objects, params);
+        let casters = Casters::new(scene, params);
         let survey = Survey::new(&casters);
         let plan = plan(&casters, &survey, light)?;
         let refused = |why| Err(Error::Processor { why });
@@ -93,10 +88,10 @@ impl Casting {
         if !UNITS.contains(&plan.frame.parts().2) {
             return refused("shadow maps of so large or small a scene are the processor's");
         }
-        if cloud.len() > (MOST_ENTRIES / MOST_OF_A_CASTER) as usize {
+        if scene.cloud.len() > (MOST_ENTRIES / MOST_OF_A_CASTER) as usize {
             return refused("shadow maps of so many splats are the processor's");
         }
-        progress.add_total(cloud.len() as u64);
+        progress.add_total(scene.cloud.len() as u64);
         with_mapping!(&plan.table, m => if survey.coloured {
             Self::with_mapping::<_, 3>(&casters, &survey, &plan, m, progress)
         } else {
@@ -129,7 +124,7 @@ impl Casting {
             plain.extend(of_chunk);
             given.append(entries);
         }
-        check_memory::<C>(given.cells.len() as u64, casters.params.max_bytes)?;
+        check_entries::<C>(given.cells.len() as u64, &casters.params.limits)?;
         let has_planes = C > 1 || survey.kinds[SplatKind::Surface as usize] > 0;
         let (tables, footprints) = (tables(casters), casters.kernels.len() as u32);
         let limit = casters.params.absorbance_limit();

@@ -18,7 +18,7 @@ use crate::table::stop_of;
 use splat_core::raster::gpu::{AttributeBuffers, AttributeRoom};
 use splat_shaders::layouts::{CastState, CastView, ListView, Scan, SortState};
 use splat_shaders::radix::{SCAN_BLOCK, Scanned};
-use splat_shaders::{BufferId, Groups, Recording, kernels};
+use splat_shaders::{BufferId, Groups, Overflow, Recording, kernels};
 
 /// Threads of a workgroup.
 const GROUP: u32 = 256;
@@ -206,12 +206,12 @@ impl RecordedCast {
         let names = ["casters", "entries", "cells", "directions", "tables", "opaque discs", "planes"];
         for ((what, needed), had) in names.into_iter().zip(of(&needed)).zip(of(&self.room)) {
             if needed > had {
-                return Err(Error::Overflow { what, needed: needed.into(), had: had.into() });
+                return Err(Error::Overflow(Overflow { what, needed: needed.into(), had: had.into() }));
             }
         }
         let (needed, had) = (needed.channels, self.room.channels);
         if needed != had {
-            return Err(Error::Overflow { what: "channels", needed: needed.into(), had: had.into() });
+            return Err(Error::Overflow(Overflow { what: "channels", needed: needed.into(), had: had.into() }));
         }
         Ok(())
     }
@@ -219,8 +219,9 @@ impl RecordedCast {
     /// Where plain casters lie among the splats.
     fn places(&self, casting: &Casting, ids: Option<&[u32]>) -> Result<Vec<u32>, Error> {
         let had = self.room.attributes.splats;
-        let strange =
-            |id: u32| Error::Overflow { what: "casters among splats", needed: u64::from(id) + 1, had: had.into() };
+        let strange = |id: u32| {
+            Error::Overflow(Overflow { what: "casters among splats", needed: u64::from(id) + 1, had: had.into() })
+        };
         let Some(ids) = ids else {
             return match casting.plain.iter().find(|id| **id >= had) {
                 Some(id) => Err(strange(*id)),
@@ -293,7 +294,7 @@ impl RecordedCast {
             super::batches::read::<CastState>("cast state", state, 1)?.iter().map(|state| state.entries).sum();
         let had = self.room.entries;
         if needed > had {
-            return Err(Error::Overflow { what: "entries", needed: needed.into(), had: had.into() });
+            return Err(Error::Overflow(Overflow { what: "entries", needed: needed.into(), had: had.into() }));
         }
         Ok(needed)
     }

@@ -18,7 +18,7 @@ use crate::{Error, ShadowMap};
 use rayon::prelude::*;
 use splat_core::{Receiver, SplatKind};
 use splat_shaders::layouts::ShadowView;
-use splat_shaders::{BufferId, Groups, Recording, kernels};
+use splat_shaders::{BufferId, Groups, Overflow, Recording, kernels};
 
 /// Threads of a workgroup.
 const GROUP: u32 = 256;
@@ -126,12 +126,12 @@ impl RecordedLookUp {
         let names = ["cells", "entries", "directions", "opaque discs"];
         for ((what, needed), had) in names.into_iter().zip(needed).zip(had) {
             if needed > had {
-                return Err(Error::Overflow { what, needed: needed.into(), had: had.into() });
+                return Err(Error::Overflow(Overflow { what, needed: needed.into(), had: had.into() }));
             }
         }
         let (had, needed) = (u64::from(self.room.channels), map.channels() as u64);
         if needed != had {
-            return Err(Error::Overflow { what: "channels", needed, had });
+            return Err(Error::Overflow(Overflow { what: "channels", needed, had }));
         }
         let (spans, distances, totals) = match &map.absorbances {
             Absorbances::Mono(matter) => joint(matter, map.cells() as usize),
@@ -163,7 +163,7 @@ impl RecordedLookUp {
     ) -> Result<ReceiverUploads, Error> {
         let (needed, had) = (receivers.len() as u64, u64::from(self.room.receivers));
         if needed > had {
-            return Err(Error::Overflow { what: "receivers", needed, had });
+            return Err(Error::Overflow(Overflow { what: "receivers", needed, had }));
         }
         let words = |receiver: &Receiver| -> [f32; 8] {
             let p = map.frame.position(receiver.position);

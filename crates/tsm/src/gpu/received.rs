@@ -9,7 +9,7 @@ use crate::{Error, ShadowMap};
 use splat_core::glam::DVec3;
 use splat_core::raster::gpu::{AttributeBuffers, AttributeRoom};
 use splat_shaders::layouts::{CastView, ShadowView};
-use splat_shaders::{BufferId, Groups, Recording, kernels};
+use splat_shaders::{BufferId, Groups, Overflow, Recording, kernels};
 
 /// Threads of a workgroup.
 const GROUP: u32 = 256;
@@ -87,7 +87,11 @@ impl RecordedReceived {
     ) -> Result<ReceivedUploads, Error> {
         let found = shares.len() as u64;
         if found > 1 && found != u64::from(self.splats) {
-            return Err(Error::Overflow { what: "shares of shadows", needed: found, had: self.splats.into() });
+            return Err(Error::Overflow(Overflow {
+                what: "shares of shadows",
+                needed: found,
+                had: self.splats.into(),
+            }));
         }
         let uploads = self.look_up.map(map)?;
         let view = ShadowView { receivers: self.splats, ..uploads.view };

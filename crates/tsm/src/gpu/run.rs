@@ -24,7 +24,7 @@ pub fn map_on(device: &mut dyn Executor, deposits: &Deposits) -> Result<Option<(
         Ok(device.prepare(&recorded.recording.by(lanes)).map(|ready| (batches, recorded, ready)))
     });
     let (batches, recorded, mut ready) = match prepared {
-        Err(Error::Overflow { .. }) => return Ok(None),
+        Err(Error::Overflow(_)) => return Ok(None),
         prepared => prepared??,
     };
     let mut passes = Vec::new();

@@ -15,7 +15,7 @@ use crate::shadow_map::Absorbances;
 use crate::{Error, ShadowMap};
 use splat_core::raster::gpu::AttributeBuffers;
 use splat_shaders::layouts::ShadowView;
-use splat_shaders::{BufferId, Recording};
+use splat_shaders::{BufferId, Overflow, Recording};
 
 /// Recorded deposits and lists, and the buffers that the caller meets.
 #[derive(Debug, Clone, PartialEq)]
@@ -131,7 +131,7 @@ impl RecordedShadow {
         let splats = self.cast.room.attributes.splats;
         let found = shares.len() as u64;
         if found != 1 && found != u64::from(splats) {
-            return Err(Error::Overflow { what: "shares of shadows", needed: found, had: splats.into() });
+            return Err(Error::Overflow(Overflow { what: "shares of shadows", needed: found, had: splats.into() }));
         }
         let mut cast = self.cast.uploads(casting, ids)?;
         cast.set_shares(shares.len() as u32);

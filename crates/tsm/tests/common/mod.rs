@@ -3,7 +3,7 @@
 
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Cloud, Footprint, Light, LightShape, Material, Receiver, Splat, SplatKind, Transmittance};
-use tsm::{Params, ShadowMap};
+use tsm::{Params, Scene, ShadowMap};
 
 pub(crate) fn point_light(position: DVec3) -> Light {
     Light { shape: LightShape::Point { position }, intensity: [1.0; 3] }
@@ -14,7 +14,7 @@ pub(crate) fn directional(direction: DVec3) -> Light {
 }
 
 pub(crate) fn build(cloud: &Cloud, light: &Light, params: &Params) -> ShadowMap {
-    ShadowMap::build(cloud, &[Material::default()], &[], light, params).unwrap()
+    ShadowMap::build(&Scene { cloud, materials: &[Material::default()], objects: &[] }, light, params, None).unwrap()
 }
 
 /// A bare point that is no part of any medium.

@@ -4,7 +4,7 @@ use gpu_conformance::open;
 use hbsort::Scratch;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::gpu::{Attributes, Capacities, follow, project as projection};
-use splat_core::raster::{FoldInput, OpaqueImage, Params, fold, project};
+use splat_core::raster::{Detail, FoldInput, OpaqueImage, Params, ProjectInput, fold, project};
 use splat_core::shade::{ChannelLayout, LitBy, ShadeInput, gpu as shading, shade};
 use splat_core::{
     Accumulator, Camera, Cloud, Direction, FootprintStack, Light, LightShape, Material, Object, Projection, Splat,
@@ -51,7 +51,14 @@ fn four_stages_in_one_submission_are_the_cpu_s_picture() {
     let mut device = open().unwrap();
     for direction in [Direction::FrontToBack, Direction::BackToFront] {
         let sort_params = hbsort::Params { direction, exact: true, margin_px: 2.0, ..hbsort::Params::default() };
-        let projected = &project(&cloud, &camera, &footprints, &materials, &params);
+        let projected = &project(&ProjectInput {
+            cloud: &cloud,
+            camera: &camera,
+            footprints: &footprints,
+            materials: &materials,
+            params: &params,
+            detail: Detail::ALL,
+        });
         let values = &shade(&input, projected, &layout, None).unwrap();
         let order = hbsort::slice_cloud(&cloud, None, &camera, &sort_params, &mut Scratch::new()).unwrap();
         assert!(order.culled > u64::from(SPLATS) / 20);

@@ -5,6 +5,7 @@ use splat_core::glam::{DVec3, Vec3};
 use splat_core::optics::{AbsorbanceModel, SurfaceOpacity};
 use splat_core::raster::gpu::Attributes;
 use splat_core::{Cloud, Light, LightShape, Material, Progress, Receiver, Splat, SplatKind, Transmittance, rng};
+use splat_shaders::Overflow;
 use tsm::gpu::{Casting, record_map, record_shadow};
 use tsm::{Deposits, Error, MappingChoice, Params, Resolution, ShadowMap};
 
@@ -73,8 +74,21 @@ struct Case {
 impl Case {
     fn new(cloud: Cloud, coloured: bool, light: &Light, params: &Params) -> Self {
         let (materials, progress) = (materials(coloured), Progress::new());
-        let casting = Casting::new(&cloud, &materials, &[], light, params, &progress).unwrap();
-        let expected = Deposits::new(&cloud, &materials, &[], light, params, &progress).unwrap().into_map();
+        let casting = Casting::new(
+            &tsm::Scene { cloud: &cloud, materials: &materials, objects: &[] },
+            light,
+            params,
+            Some(&progress),
+        )
+        .unwrap();
+        let expected = Deposits::new(
+            &tsm::Scene { cloud: &cloud, materials: &materials, objects: &[] },
+            light,
+            params,
+            Some(&progress),
+        )
+        .unwrap()
+        .into_map();
         Self { cloud, casting, expected }
     }
 
@@ -216,7 +230,7 @@ fn too_little_room_is_found_and_says_how_much() {
         // A driver that rounds otherwise may find some more or less.
         let slack = if is_loose() { needed / 10_000 + 1 } else { 0 };
         let is_told = |error: Error, room: u32| match error {
-            Error::Overflow { what: "entries", needed: n, had } => {
+            Error::Overflow(Overflow { what: "entries", needed: n, had }) => {
                 n.abs_diff(u64::from(needed)) <= u64::from(slack) && had == u64::from(room)
             }
             _ => false,

@@ -10,9 +10,10 @@ use pbsr::{
 use splat_core::glam::{DMat3, DQuat, DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
 use splat_core::{
-    Camera, Cloud, Grid, Material, Mesh, Progress, Projection, Shading, Similarity, Splat, SplatKind, TransferFunction,
+    Camera, Cloud, Grid, Material, Mesh, Projection, Shading, Similarity, Splat, SplatKind, TransferFunction,
     TransferPoint, rng,
 };
+use splat_shaders::Overflow;
 use std::collections::BTreeSet;
 
 pub(crate) const SIZE: [u32; 2] = [96, 64];
@@ -182,7 +183,7 @@ pub(crate) fn by_device(device: &mut Device, scene: &Scene<'_>, runs: u32) -> En
 
 pub(crate) fn by_processor(scene: &Scene<'_>, levels: u32) -> Ensemble {
     let mut ensemble = empty();
-    Renderer::new().fold(scene, &mut ensemble, levels, &FoldParams::default(), &Progress::default()).unwrap();
+    Renderer::new().fold(scene, &mut ensemble, &FoldParams { levels, ..FoldParams::default() }, None).unwrap();
     ensemble
 }
 
@@ -326,13 +327,13 @@ fn room_is_told(world: &World, samplers: [&dyn Sampler; 3]) {
             let sums_are_zero = done.bytes(generated.sums).iter().all(|byte| *byte == 0);
             (generated.add(&done, &mut ensemble), ensemble, sums_are_zero)
         };
-        let (Err(Error::TooMuch { what: "particles of one set", needed, had: 10, .. }), none, true) =
+        let (Err(Error::Overflow(Overflow { what: "particles of one set", needed, had: 10, .. })), none, true) =
             run(Capacities { of_set: 10, ..ROOM })
         else {
             panic!("room for 10 particles is enough")
         };
         assert_eq!(none, empty());
-        let (Err(Error::TooMuch { what: "particles", needed: all, had: 1000, .. }), none, true) =
+        let (Err(Error::Overflow(Overflow { what: "particles", needed: all, had: 1000, .. })), none, true) =
             run(Capacities { particles: 1000, ..ROOM })
         else {
             panic!("room for 1000 particles is enough")
@@ -341,10 +342,13 @@ fn room_is_told(world: &World, samplers: [&dyn Sampler; 3]) {
         let exactly = Capacities { of_set: needed as u32, particles: all as u32, ..ROOM };
         let (particles, ensemble, _) = run(exactly);
         assert_eq!((particles, ensemble.levels()), (Ok(all), ROOM.levels));
-        assert!(matches!(run(Capacities { of_set: needed as u32 - 1, ..exactly }).0, Err(Error::TooMuch { .. })));
-        assert!(matches!(run(Capacities { particles: all as u32 - 1, ..exactly }).0, Err(Error::TooMuch { .. })));
+        assert!(matches!(run(Capacities { of_set: needed as u32 - 1, ..exactly }).0, Err(Error::Overflow(_))));
+        assert!(matches!(run(Capacities { particles: all as u32 - 1, ..exactly }).0, Err(Error::Overflow(_))));
         let fewer = record_generated(Capacities { objects: 2, ..ROOM }, Nearest::Ranked, None, &sources).unwrap();
-        assert!(matches!(fewer.tables(&sources, scene, &empty()), Err(Error::TooMuch { what: "objects", .. })));
+        assert!(matches!(
+            fewer.tables(&sources, scene, &empty()),
+            Err(Error::Overflow(Overflow { what: "objects", .. }))
+        ));
         assert_eq!(device.take_messages(), [""; 0]);
     });
 }
@@ -405,7 +409,7 @@ fn what_has_no_twin_is_uploaded() {
             let few = Capacities { particles: 1000, ..ROOM };
             let generated = record_generated(few, Nearest::Ranked, None, &sources).unwrap();
             let refused = generated.next(&sources, scene, &empty());
-            assert!(matches!(refused, Err(Error::TooMuch { what: "particles", .. })), "{refused:?}");
+            assert!(matches!(refused, Err(Error::Overflow(Overflow { what: "particles", .. }))), "{refused:?}");
         });
     }
 }

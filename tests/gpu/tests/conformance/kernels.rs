@@ -3,7 +3,7 @@
 use gpu_conformance::{Device, adapter, bytes, open, words};
 use splat_core::rng;
 use splat_shaders::layouts::{Scan, SortState};
-use splat_shaders::radix::{SORT_BLOCK, Scanned, sort_pass};
+use splat_shaders::radix::{SORT_BLOCK, Scanned, SortPass, sort_pass};
 use splat_shaders::{DeviceError, Groups, Lanes, Recording, SubgroupOps, Validation, kernels};
 
 #[test]
@@ -47,7 +47,7 @@ fn sorted(device: &mut Device, lanes: Lanes, keys: &[u32], shift: u32, scans: bo
     let to = ["sorted", "their companions"].map(|name| r.scratch(name, 4 * u64::from(n)));
     let digits = Scanned::digits(&mut r, scan, n);
     if scans {
-        sort_pass(&mut r, shift, state, from, to, digits);
+        sort_pass(&mut r, SortPass { shift, state, from, to, digits });
     } else {
         let groups = Groups::cover(n.div_ceil(SORT_BLOCK));
         r.dispatch(&kernels::RADIX_HISTOGRAM, groups, &[state, from[0], digits.numbers], &[shift]);

@@ -8,9 +8,10 @@ use pbsr::{
 };
 use splat_core::glam::{DMat3, DQuat, DVec3, Vec3};
 use splat_core::{
-    Camera, Cloud, Grid, Light, LightShape, Material, Mesh, Progress, Projection, Shading, Similarity, Splat,
-    SplatKind, TransferFunction, TransferPoint, Transmittance, rng,
+    Camera, Cloud, Grid, Light, LightShape, Material, Mesh, Projection, Shading, Similarity, Splat, SplatKind,
+    TransferFunction, TransferPoint, Transmittance, rng,
 };
+use splat_shaders::Overflow;
 use tsm::gpu::{Room, record_received};
 use tsm::{Params, Resolution, ShadowMap};
 
@@ -96,7 +97,13 @@ impl World {
         let build = |light, extinction_rgb| {
             let tinted = Material { extinction_rgb, ..Material::default() };
             let materials = [Material::default(), tinted];
-            ShadowMap::build(&self.casters, &materials, &[], light, &params).unwrap()
+            ShadowMap::build(
+                &tsm::Scene { cloud: &self.casters, materials: &materials, objects: &[] },
+                light,
+                &params,
+                None,
+            )
+            .unwrap()
         };
         [build(&lamp, [1.0; 3]), build(&beam, [1.0, 0.4, 0.1])]
     }
@@ -197,7 +204,7 @@ fn by_device(
 
 fn by_processor(scene: &Scene<'_>, params: EnsembleParams, levels: u32) -> Ensemble {
     let mut ensemble = Ensemble::new(scene.camera.size, &params).unwrap();
-    Renderer::new().fold(scene, &mut ensemble, levels, &FoldParams::default(), &Progress::default()).unwrap();
+    Renderer::new().fold(scene, &mut ensemble, &FoldParams { levels, ..FoldParams::default() }, None).unwrap();
     ensemble
 }
 
@@ -419,7 +426,7 @@ fn too_little_room_and_other_lights_are_refused() {
         let run = device.run(&generated.recording, &inputs).unwrap();
         // Nothing is folded of what is incomplete.
         assert!(run.bytes(generated.sums).iter().all(|byte| *byte == 0));
-        assert!(matches!(generated.add(&run, &mut ensemble), Err(Error::TooMuch { had: 10, .. })));
+        assert!(matches!(generated.add(&run, &mut ensemble), Err(Error::Overflow(Overflow { had: 10, .. }))));
         assert_eq!((ensemble.levels(), device.take_messages()), (0, Vec::new()));
         let refused = |lighting: Lighting<'_>| {
             let recorded = record(ROOM, Nearest::Ranked, Some(&lighting))?;

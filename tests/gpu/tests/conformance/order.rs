@@ -5,7 +5,7 @@ use hbsort::gpu::{Capacities, join, record};
 use hbsort::{Direction, Error, Params, Scratch, SliceOrder, Thickness, slice_cloud};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Camera, Cloud, Projection, Splat, rng};
-use splat_shaders::{DeviceError, Lanes, Validation};
+use splat_shaders::{DeviceError, Lanes, Overflow, Validation};
 use std::time::Duration;
 
 fn cloud(n: u64, origin: DVec3) -> Cloud {
@@ -112,7 +112,7 @@ fn too_little_room_is_found_and_recording_again_cures_it() {
     for kept in [0, 1, 4000] {
         let room = Capacities { splats: 20_000, kept };
         let refused = on_device(&mut device, room, &cloud, None, &camera, &params);
-        let Err(Error::Overflow { needed, had, .. }) = refused else { panic!("{refused:?}") };
+        let Err(Error::Overflow(Overflow { needed, had, .. })) = refused else { panic!("{refused:?}") };
         assert_eq!((needed, had), (expected.input_from_sorted.len() as u64, u64::from(kept)));
         let room = Capacities { kept: needed as u32, ..room };
         assert_eq!(on_device(&mut device, room, &cloud, None, &camera, &params).unwrap(), expected);

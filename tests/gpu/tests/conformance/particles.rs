@@ -10,6 +10,7 @@ use splat_core::glam::{DQuat, DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
 use splat_core::raster::OpaqueImage;
 use splat_core::{Camera, Material, Mesh, Progress, Projection, Shading, Similarity};
+use splat_shaders::Overflow;
 
 const SIZE: [u32; 2] = [150, 90];
 const ROOM: Capacities = Capacities { size: SIZE, objects: 2, levels: 3, of_set: 200_000, particles: 600_000 };
@@ -36,7 +37,7 @@ fn both(scene: &Scene<'_>) -> [Ensemble; 2] {
     let empty = Ensemble::new(SIZE, &EnsembleParams { radiance_unit: 0.5, ..EnsembleParams::default() }).unwrap();
     let (mut cpu, mut gpu) = (empty.clone(), empty);
     let (params, progress) = (FoldParams::default(), Progress::default());
-    Renderer::new().fold(scene, &mut cpu, 2 * ROOM.levels, &params, &progress).unwrap();
+    Renderer::new().fold(scene, &mut cpu, &FoldParams { levels: 2 * ROOM.levels, ..params }, Some(&progress)).unwrap();
     let empty = gpu.clone();
     for way in ways {
         let recorded = record(ROOM, way, None).unwrap();
@@ -185,14 +186,17 @@ fn too_little_room_is_refused_with_what_is_needed() {
     };
     let ensemble = Ensemble::new(SIZE, &EnsembleParams::default()).unwrap();
     let uploads = |room| record(room, Nearest::Ranked, None).unwrap().uploads(&scene, &ensemble);
-    let Err(Error::TooMuch { what: "particles of one set", needed, had: 10, .. }) =
+    let Err(Error::Overflow(Overflow { what: "particles of one set", needed, had: 10, .. })) =
         uploads(Capacities { of_set: 10, ..ROOM })
     else {
         panic!("room for 10 particles is enough")
     };
     assert!(needed > 1000, "{needed}");
     assert!(uploads(Capacities { of_set: 2 * needed as u32, ..ROOM }).is_ok());
-    assert!(matches!(uploads(Capacities { objects: 0, ..ROOM }), Err(Error::TooMuch { what: "objects", .. })));
+    assert!(matches!(
+        uploads(Capacities { objects: 0, ..ROOM }),
+        Err(Error::Overflow(Overflow { what: "objects", .. }))
+    ));
     let lit = Object { look: Appearance::default(), ..objects[0] };
     let lit = Scene { objects: &[lit], ..scene };
     assert!(matches!(

@@ -5,7 +5,7 @@ use splat_core::glam::{DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
 use splat_core::raster::gpu::project::{Capacities, Input, record, visible};
 use splat_core::raster::gpu::{self, Attributes};
-use splat_core::raster::{Params, project};
+use splat_core::raster::{Detail, Params, ProjectInput, project};
 use splat_core::{Camera, Cloud, Error, FootprintStack, Material, Projection, Splat, SplatKind, rng};
 
 /// Most that a number of a footprint may differ by, as a share of the larger of its own size and of the largest of its
@@ -102,7 +102,14 @@ fn footprints_and_their_number_are_the_cpu_s() {
         for view in VIEWS {
             for depth in [false, true] {
                 let camera = camera(origin, view);
-                let twin = project(&cloud, &camera, &FootprintStack::default(), &materials(), &Params::default());
+                let twin = project(&ProjectInput {
+                    cloud: &cloud,
+                    camera: &camera,
+                    footprints: &FootprintStack::default(),
+                    materials: &materials(),
+                    params: &Params::default(),
+                    detail: Detail::ALL,
+                });
                 let expected = gpu::words(&twin, depth);
                 let (found, count) = on_device(&mut device, &cloud, None, &camera, depth);
                 assert_eq!(count, twin.visible(), "{n} {view:?}");
@@ -158,10 +165,10 @@ fn what_the_tables_do_not_have_is_refused() {
     };
     uploads(room, &materials).unwrap();
     assert!(matches!(uploads(room, &materials[..1]), Err(Error::Invalid { .. })));
-    assert!(matches!(uploads(Capacities { materials: 1, ..room }, &materials), Err(Error::Overflow { .. })));
+    assert!(matches!(uploads(Capacities { materials: 1, ..room }, &materials), Err(Error::Overflow(_))));
     let mut few = room;
     few.attributes.splats = 9;
-    assert!(matches!(uploads(few, &materials), Err(Error::Overflow { .. })));
+    assert!(matches!(uploads(few, &materials), Err(Error::Overflow(_))));
     few = room;
     few.attributes.frame_words = 3;
     assert!(matches!(uploads(few, &materials), Err(Error::ColumnLength { .. })));

@@ -6,8 +6,9 @@ use splat_core::glam::DVec3;
 use splat_core::raster::OpaqueInput;
 use splat_core::raster::gpu::Counts;
 use splat_core::raster::gpu::resolve::record;
-use splat_core::raster::{Detail, OpaqueImage, Params, Projected, project_into, resolve_opaque};
+use splat_core::raster::{Detail, OpaqueImage, Params, ProjectInput, Projected, project_into, resolve_opaque};
 use splat_core::{Camera, Cloud, Error, FootprintStack, Material, Projection, SplatKind, rng};
+use splat_shaders::Overflow;
 
 /// Most that a depth may differ by, as a share of the scene's extent, and a channel as a share of the largest value.
 const TOLERANCE: f32 = 1e-5;
@@ -34,7 +35,17 @@ fn projected(cloud: &Cloud, view: Projection, size: [u32; 2]) -> Projected {
     let camera = Camera::look_at(eye, cloud.origin, DVec3::Y, view, size).unwrap();
     let mut projected = Projected::default();
     let (footprints, materials) = (FootprintStack::default(), [Material::default()]);
-    project_into(&mut projected, cloud, &camera, &footprints, &materials, &Params::default(), Detail::ALL);
+    project_into(
+        &mut projected,
+        &ProjectInput {
+            cloud,
+            camera: &camera,
+            footprints: &footprints,
+            materials: &materials,
+            params: &Params::default(),
+            detail: Detail::ALL,
+        },
+    );
     projected
 }
 
@@ -110,7 +121,7 @@ fn any_size_no_splat_and_too_little_room_are_the_cpu_s() {
     let projected = projected(&cloud, VIEWS[0], SIZE);
     let input = OpaqueInput { projected: &projected, ids: &ids, values: &values, channels: 3, objects: false };
     let expected = on_device(&mut device, &input, 1 << 18).unwrap();
-    let Err(Error::Overflow { needed, had: 100, .. }) = on_device(&mut device, &input, 100) else {
+    let Err(Error::Overflow(Overflow { needed, had: 100, .. })) = on_device(&mut device, &input, 100) else {
         panic!("room for 100 entries is enough")
     };
     assert_eq!(needed, expected.1.entries);

@@ -3,7 +3,7 @@
 use gpu_conformance::{Device, open, words};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::gpu::Attributes;
-use splat_core::raster::{Params, project};
+use splat_core::raster::{Detail, Params, ProjectInput, project};
 use splat_core::shade::gpu::{Capacities, received, record, suits};
 use splat_core::shade::{ChannelLayout, LitBy, ShadeInput, shade};
 use splat_core::{
@@ -127,7 +127,14 @@ fn values_are_the_cpu_s() {
                 };
                 suits(&input).unwrap();
                 let layout = ChannelLayout::new(&set);
-                let projected = project(&cloud, camera, &FootprintStack::default(), &materials, &Params::default());
+                let projected = project(&ProjectInput {
+                    cloud: &cloud,
+                    camera,
+                    footprints: &FootprintStack::default(),
+                    materials: &materials,
+                    params: &Params::default(),
+                    detail: Detail::ALL,
+                });
                 let expected = shade(&input, &projected, &layout, None).unwrap();
                 let found = on_device(&mut device, &input, layout);
                 assert_eq!(found.len(), expected.len());
@@ -178,7 +185,7 @@ fn what_single_precision_does_not_resolve_is_said() {
         ambient: [0.0; 3],
         camera: &camera,
     };
-    assert!(matches!(record(room).uploads(&input, &attributes, &[]), Err(Error::Overflow { .. })));
+    assert!(matches!(record(room).uploads(&input, &attributes, &[]), Err(Error::Overflow(_))));
     let input = ShadeInput { lights: &two[..1], ..input };
     record(room).uploads(&input, &attributes, &[]).unwrap();
     assert!(matches!(record(room).uploads(&input, &attributes, &[[1.0; 3]]), Err(Error::ColumnLength { .. })));

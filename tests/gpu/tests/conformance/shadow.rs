@@ -3,7 +3,7 @@
 use gpu_conformance::{Device, open};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::optics::AbsorbanceModel;
-use splat_core::{Cloud, Light, LightShape, Material, Progress, Receiver, Splat, SplatKind, Transmittance, rng};
+use splat_core::{Cloud, Light, LightShape, Material, Receiver, Splat, SplatKind, Transmittance, rng};
 use tsm::gpu::{Capacities, Room, record, record_look_up};
 use tsm::{Deposits, MappingChoice, Params, Resolution, ShadowMap};
 
@@ -39,7 +39,7 @@ fn materials(coloured: bool) -> [Material; 2] {
 }
 
 fn deposits(cloud: &Cloud, coloured: bool, light: &Light, params: &Params) -> Deposits {
-    Deposits::new(cloud, &materials(coloured), &[], light, params, &Progress::new()).unwrap()
+    Deposits::new(&tsm::Scene { cloud, materials: &materials(coloured), objects: &[] }, light, params, None).unwrap()
 }
 
 /// The lists by the device, in batches of at most so many entries and cells.

@@ -4,10 +4,11 @@ use gpu_conformance::{Device, open};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::FoldInput;
 use splat_core::raster::gpu::{Counts, record};
-use splat_core::raster::{Detail, OpaqueImage, Params, Projected, fold, project_into};
+use splat_core::raster::{Detail, OpaqueImage, Params, ProjectInput, Projected, fold, project_into};
 use splat_core::{
     Accumulator, Camera, Cloud, Direction, Error, FootprintStack, Material, Projection, Splat, SplatKind, rng,
 };
+use splat_shaders::Overflow;
 
 /// Most that a channel may differ by, as a share of the largest value that a splat has, and transmittance.
 ///
@@ -63,7 +64,17 @@ impl Scene {
         let detail =
             Detail { depth: self.depths || self.objects || !self.opaque.depth.is_empty(), object: self.objects };
         let (camera, params) = (&self.camera, &self.params);
-        project_into(&mut projected, &self.cloud, camera, &self.footprints, &self.materials, params, detail);
+        project_into(
+            &mut projected,
+            &ProjectInput {
+                cloud: &self.cloud,
+                camera,
+                footprints: &self.footprints,
+                materials: &self.materials,
+                params,
+                detail,
+            },
+        );
         projected
     }
 
@@ -340,7 +351,7 @@ fn too_little_room_is_found_and_recording_again_cures_it() {
     let (order, begin) = (scene.order(), scene.accumulator());
     let expected = scene.both(&mut device, &order, &begin, 1 << 18).unwrap();
     for room in [0, 1, 4000] {
-        let Err(Error::Overflow { needed, had, .. }) = scene.both(&mut device, &order, &begin, room) else {
+        let Err(Error::Overflow(Overflow { needed, had, .. })) = scene.both(&mut device, &order, &begin, room) else {
             panic!("room for {room} entries is enough")
         };
         assert_eq!((needed, had), (expected.counts.entries, u64::from(room)));

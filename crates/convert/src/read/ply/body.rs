@@ -38,7 +38,7 @@ pub(super) fn read<S: Source>(mut source: S, header: &Header, reading: &mut Read
         return Err(ReadError::input(at_line(header.body_line - 1), "an element 'vertex'", "none", hint));
     };
     let mesh = named(b"face") || named(b"tristrips");
-    let mut columns = Columns::new(vertices, reading.limits.drop_invalid && !mesh)?;
+    let mut columns = Columns::new(vertices, reading.params.drop_invalid && !mesh)?;
     let mut faces = Faces::new(vertices.count);
     for element in &header.elements {
         check_count(&source, element)?;
@@ -89,7 +89,7 @@ fn read_vertices<S: Source>(
     columns: &mut Columns,
     reading: &Reading<'_>,
 ) -> Result<(), ReadError> {
-    input::check_bytes("the vertices", element.count.saturating_mul(columns.bytes_per_vertex()), reading.limits)?;
+    input::check_bytes("the vertices", element.count.saturating_mul(columns.bytes_per_vertex()), reading.params)?;
     columns.reserve(element.count as usize)?;
     for record in 0..element.count {
         look(record, reading)?;

@@ -58,7 +58,7 @@ impl Faces {
             return Err(ReadError::input(at_line(indices.line), "a list of integers", "another type", hint));
         }
         if form == Form::Polygons {
-            input::check_bytes("the faces", element.count.saturating_mul(12), reading.limits)?;
+            input::check_bytes("the faces", element.count.saturating_mul(12), reading.params)?;
             input::reserve(&mut self.triangles, element.count as usize)?;
             self.line = element.line;
         }
@@ -166,7 +166,7 @@ impl Faces {
     fn room(&mut self, more: u64, reading: &Reading<'_>) -> Result<(), ReadError> {
         let total = (self.triangles.len() as u64).saturating_add(more);
         let bytes = total.saturating_mul(12).saturating_add((self.polygons.len() * size_of::<Polygon>()) as u64);
-        input::check_bytes("the triangles", bytes, reading.limits)?;
+        input::check_bytes("the triangles", bytes, reading.params)?;
         input::reserve(&mut self.triangles, more as usize)
     }
 

@@ -3,14 +3,14 @@
 use super::checkpoint::Checkpoint;
 use super::parts::{Part, named};
 use super::{fault, refuse};
-use crate::device::{Folding, Helper};
+use crate::device::{Folding, Goal, Helper};
 use crate::frame::Frame;
 use crate::scene::ParticlesSettings;
 use crate::technique::Session;
 use crate::{Error, Progress, RenderOptions, stage};
 use pbsr::{Ensemble, EnsembleParams, FoldParams, LitBy, Object, Renderer};
 use splat_core::raster::OpaqueImage;
-use splat_core::{Camera, LayerSet, Light, Transmittance};
+use splat_core::{Camera, LayerSet, Light, Limits, Transmittance};
 use std::ops::Range;
 use tsm::ShadowMap;
 
@@ -58,7 +58,7 @@ pub(super) fn fold(
         let step = Step { until: average.ensemble.levels() + levels, helper, params, progress: frame.progress };
         let folded = step.fold(&mut renderer, &mut folding, &scene, &mut average.ensemble);
         let folded = folded.map_err(|e| match e {
-            pbsr::Error::TooMuch { .. } => refuse(&named(parts), e),
+            pbsr::Error::Limit(_) => refuse(&named(parts), e),
             other => fault(other),
         });
         match folded {
@@ -84,7 +84,7 @@ pub(super) fn fold(
 }
 
 fn fold_params(options: &RenderOptions) -> FoldParams {
-    FoldParams { max_bytes: options.max_memory / BATCH_SHARE, ..FoldParams::default() }
+    FoldParams { limits: Limits::bytes(options.max_memory / BATCH_SHARE), ..FoldParams::default() }
 }
 
 /// What an ensemble keeps for these layers.
@@ -146,12 +146,18 @@ impl Step<'_> {
         ensemble: &mut Ensemble,
     ) -> Result<u64, pbsr::Error> {
         let by_device = match self.helper {
-            Some(helper) => folding.fold(helper, scene, ensemble, self.until, self.params.max_bytes, self.progress)?,
+            Some(helper) => {
+                let goal = Goal { until: self.until, max_bytes: self.params.limits.max_bytes };
+                folding.fold(helper, scene, ensemble, goal, self.progress)?
+            }
             None => 0,
         };
         match self.until - ensemble.levels() {
             0 => Ok(by_device),
-            left => Ok(by_device + renderer.fold(scene, ensemble, left, &self.params, self.progress)?.particles),
+            left => {
+                let params = FoldParams { levels: left, ..self.params };
+                Ok(by_device + renderer.fold(scene, ensemble, &params, Some(self.progress))?.particles)
+            }
         }
     }
 }

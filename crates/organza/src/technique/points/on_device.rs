@@ -4,6 +4,7 @@
 use super::{Points, sort_params};
 use crate::Error;
 use crate::device::{Helper, keeps_shadows};
+use crate::frame::Chained;
 use crate::pass;
 use crate::scene::Technique;
 use crate::shadows::shadow_error;
@@ -88,7 +89,12 @@ impl Points<'_> {
             frame.tick()?;
             let made = cost.measure(pass::SHADOW_MAP, |stage| {
                 stage.items_in = l.cloud.len() as u64;
-                let casting = Casting::new(&l.cloud, &l.materials, &l.objects, light, &params, frame.progress);
+                let casting = Casting::new(
+                    &tsm::Scene { cloud: &l.cloud, materials: &l.materials, objects: &l.objects },
+                    light,
+                    &params,
+                    Some(frame.progress),
+                );
                 stage.items_out = casting.as_ref().map_or(0, |casting| casting.casters() + casting.given());
                 casting
             });
@@ -116,7 +122,9 @@ impl Points<'_> {
         let frame = self.frame;
         let (ids, solid) = (frame.translucent(frame.drawn(), Technique::Points), frame.solid_ids());
         let sort = sort_params(frame);
-        let done = stages.measure(pass::SPLAT, |stage| frame.chain(helper, lit, [&ids, &solid], &sort, into, stage))?;
+        let (lights, castings) = lit;
+        let chained = Chained { lights, castings, ids: &ids, solid: &solid, sort: &sort };
+        let done = stages.measure(pass::SPLAT, |stage| frame.chain(helper, &chained, into, stage))?;
         let Some(opaque) = done else { return Ok(false) };
         cost.stages.extend(stages.stages);
         frame.set_opaque(opaque);

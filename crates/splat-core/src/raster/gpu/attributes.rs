@@ -3,7 +3,7 @@
 use crate::{Cloud, Error};
 use glam::Vec3;
 use rayon::prelude::*;
-use splat_shaders::{BufferId, Joined, Recording};
+use splat_shaders::{BufferId, Joined, Overflow, Recording};
 
 /// Words of a splat's look: cross-section, ids and kind, colour.
 const LOOK_WORDS: usize = 5;
@@ -76,8 +76,8 @@ impl Attributes {
     /// [`Error::Overflow`] for more than 2³² splats, [`Error::Invalid`] for an id that no splat has.
     pub fn new(cloud: &Cloud, ids: Option<&[u32]>) -> Result<Self, Error> {
         let n = ids.map_or(cloud.len(), <[u32]>::len);
-        let splats =
-            u32::try_from(n).map_err(|_| Error::Overflow { what: "splats", needed: n as u64, had: u32::MAX.into() })?;
+        let splats = u32::try_from(n)
+            .map_err(|_| Error::Overflow(Overflow { what: "splats", needed: n as u64, had: u32::MAX.into() }))?;
         let wrong = ids.and_then(|ids| ids.iter().position(|&id| id as usize >= cloud.len()));
         if let (Some(at), Some(ids)) = (wrong, ids) {
             return Err(Error::invalid("place", at, "id", ids[at], "the id of a splat"));

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use splat_shaders::layouts::{Scan, SortState, SplatState};
-use splat_shaders::radix::{SCAN_BLOCK, SORT_BLOCK, Scanned, sort_pass};
+use splat_shaders::radix::{SCAN_BLOCK, SORT_BLOCK, Scanned, SortPass, sort_pass};
 use splat_shaders::{BufferId, Groups, Recording, kernels};
 
 /// Splats whose tiles a workgroup counts.
@@ -62,7 +62,16 @@ impl List {
         let passes = (tiles - 1).checked_ilog2().map_or(0, |top| top as usize / 8 + 1);
         for pass in 0..passes {
             let (from, to) = (pass % 2, 1 - pass % 2);
-            sort_pass(r, 8 * pass as u32, sort, [keys[from], ids[from]], [keys[to], ids[to]], digits);
+            sort_pass(
+                r,
+                SortPass {
+                    shift: 8 * pass as u32,
+                    state: sort,
+                    from: [keys[from], ids[from]],
+                    to: [keys[to], ids[to]],
+                    digits,
+                },
+            );
         }
         let (keys, ids) = (keys[passes % 2], ids[passes % 2]);
         let ranged = [view, sort, keys, starts, state];

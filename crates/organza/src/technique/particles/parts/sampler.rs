@@ -33,7 +33,8 @@ impl<'a> Source<'a> {
                     warnings.extend(self.doubtful_area(sampler.report()));
                     return Ok(Box::new(sampler));
                 }
-                let sampler = LineSampler::new(&surface, cells, &self.surface(own), None)?;
+                let sampler =
+                    LineSampler::new(&surface, &pbsr::LineParams { resolution: cells }, &self.surface(own), None)?;
                 warnings.extend(self.doubts(sampler.report()));
                 Box::new(sampler)
             }
@@ -87,7 +88,11 @@ impl<'a> Source<'a> {
     fn field<'b>(&self, own: &Own, field: &'b BoundedExtinction) -> Result<Box<dyn Sampler + 'b>, pbsr::Error> {
         let extinction = Density { field, max: field.max() };
         let (bounds, cells, color) = (field.bounds(), field.cells(), own.color);
-        Ok(Box::new(FieldVolumeSampler::new(extinction, bounds, cells, self.cross_section, color, self.seed)?))
+        Ok(Box::new(FieldVolumeSampler::new(
+            extinction,
+            bounds,
+            &pbsr::FieldVolumeParams { resolution: cells, cross_section: self.cross_section, color, seed: self.seed },
+        )?))
     }
 
     fn surface(&self, own: &Own) -> SurfaceParams {
