@@ -3,8 +3,9 @@
 use crate::classify::Classifier;
 use crate::counts::SheetCounts;
 use crate::error::cancelled;
+use crate::lattice::Lattice;
 use crate::rays::LatticeRays;
-use crate::ring::{Ring, Splatter};
+use crate::ring::{Ring, Splatter, Taper};
 use crate::sections::SectionTable;
 use crate::segments::Segments;
 use crate::sheets::Sheets;
@@ -23,9 +24,11 @@ use std::ops::Range;
 /// One volume, ready to be splatted.
 pub(crate) struct Prepared<'a> {
     pub(crate) volume: &'a Volume<'a>,
+    pub(crate) lattice: Lattice<'a>,
     pub(crate) viewed: Viewed,
     pub(crate) sections: SectionTable,
-    pub(crate) kernel: Kernel,
+    kernel: Kernel,
+    taper: Taper,
     pub(crate) classifier: Classifier,
     pub(crate) rays: LatticeRays,
     pub(crate) voxels: Voxels,
@@ -96,7 +99,7 @@ fn check_memory(input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [
     let threads = rayon::current_num_threads() as u64;
     let mut needed = threads * 4 * 4 * (TILE * TILE) as u64;
     for volume in input.volumes {
-        let dims = volume.grid.dims;
+        let dims = Lattice::new(volume.grid, [usize::MAX; 3]).dims;
         let reach = spacing_along(&view_axes(volume, input.camera)) * params.kernel.extent;
         let lines = u64::from(Ring::lines_for(crate::sections::touched(reach / slabs.width)));
         // Lists: four bytes for eight voxels, in two or three tiles each. Records: two of sixteen bytes a voxel of a tile.
@@ -112,14 +115,18 @@ impl<'a> Prepared<'a> {
         let (grid, camera) = (volume.grid, input.camera);
         let viewed = Viewed::new(volume, camera, slabs, params);
         let reach = viewed.lattice_reach(camera, slabs, volume.normals);
-        let voxels = Voxels::needed(grid, volume.transfer, reach);
-        let segments = Segments::new(&viewed, slabs, &voxels, grid.dims, tiles);
+        let lattice = Lattice::new(grid, reach);
+        let viewed = viewed.with_rim(lattice.rim);
+        let voxels = Voxels::needed(&lattice, volume.transfer, reach);
+        let segments = Segments::new(&viewed, slabs, &voxels, lattice.dims, tiles);
         let cutoff = params.kernel.extent / params.kernel.sigma;
         let (low, high) = extremes(&grid.values);
         let base = 0.5 * (f64::from(low) + f64::from(high));
         Self {
             volume,
+            lattice,
             sections: SectionTable::new(viewed.reach / slabs.width, 0.5 * cutoff * cutoff),
+            taper: Taper::new(0.5 * cutoff * cutoff),
             kernel: Kernel::new(&Footprint { cutoff: cutoff as f32 }),
             classifier: Classifier::new(volume.transfer, base),
             rays: LatticeRays::new(grid, camera, slabs),
@@ -132,7 +139,13 @@ impl<'a> Prepared<'a> {
     }
 
     pub(crate) fn splatter(&self) -> Splatter<'_> {
-        Splatter { viewed: &self.viewed, kernel: &self.kernel, sections: &self.sections, footprint: self.footprint }
+        Splatter {
+            viewed: &self.viewed,
+            kernel: &self.kernel,
+            taper: self.taper,
+            sections: &self.sections,
+            footprint: self.footprint,
+        }
     }
 
     /// Half the bounds of a footprint at `scale`, pixels.
@@ -158,7 +171,7 @@ impl Sheeted<'_> {
 
     /// Bytes of what was prepared.
     pub fn bytes(&self) -> u64 {
-        self.volumes.iter().map(|v| v.segments.bytes() + Voxels::bytes(v.volume.grid.dims) / 4).sum()
+        self.volumes.iter().map(|v| v.segments.bytes() + Voxels::bytes(v.lattice.dims) / 4).sum()
     }
 
     /// Folds what lies at view depths in `range`, front to back, behind all that `into` holds. Ranges that meet share nothing and

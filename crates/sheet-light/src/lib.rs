@@ -7,6 +7,7 @@ mod classify;
 mod counts;
 mod error;
 mod fold;
+mod lattice;
 mod params;
 mod picture;
 mod rays;

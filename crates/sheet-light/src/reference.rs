@@ -1,6 +1,7 @@
 //! The slow form in f64: the same sheets pixel by pixel and slab by slab, without tiles, vectors, rings, lists or skipped voxels.
 
 use crate::fold::slabs_of;
+use crate::lattice::Lattice;
 use crate::rays::LatticeRays;
 use crate::sections::{PHASES, sections};
 use crate::slabs::Slabs;
@@ -72,9 +73,11 @@ impl Sheets {
             size,
         };
         let viewed = Viewed::new(volume, camera, slabs, params);
-        let [nx, ny, nz] = volume.grid.dims;
+        let lattice = Lattice::new(volume.grid, viewed.lattice_reach(camera, slabs, volume.normals));
+        let viewed = viewed.with_rim(lattice.rim);
+        let [nx, ny, nz] = lattice.dims;
         for (k, j, i) in (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i)))) {
-            sheets.splat(&viewed, params, slabs, viewed.position(i, j, k), volume.grid.values[(k * ny + j) * nx + i]);
+            sheets.splat(&viewed, params, slabs, viewed.position(i, j, k), lattice.value(i, j, k));
         }
         sheets
     }

@@ -44,6 +44,8 @@ pub(crate) struct Ring {
     tags: Vec<[u64; SIDE]>,
     /// The footprint of one voxel, row by row.
     weights: Vec<f32>,
+    /// s and Gaussian of its rows.
+    rows: [[f32; STRIDE]; 2],
     is_clean: bool,
 }
 
@@ -52,9 +54,25 @@ pub(crate) struct Ring {
 pub(crate) struct Splatter<'a> {
     pub(crate) viewed: &'a Viewed,
     pub(crate) kernel: &'a Kernel,
+    pub(crate) taper: Taper,
     pub(crate) sections: &'a SectionTable,
     /// The footprint of all voxels, where rays are parallel.
     pub(crate) footprint: Option<PixelFootprint>,
+}
+
+/// What a Gaussian e^(−qs) loses so that it ends smoothly at s = 1: −e^(−q)·(1 + y + y²/2), y = q(1 − s), by powers of s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Taper {
+    sharpness: f32,
+    polynomial: [f32; 3],
+}
+
+impl Taper {
+    pub(crate) fn new(sharpness: f64) -> Self {
+        let (q, rim) = (sharpness, -libm::exp(-sharpness));
+        let powers = [1.0 + q + 0.5 * q * q, -q - q * q, 0.5 * q * q];
+        Self { sharpness: q as f32, polynomial: powers.map(|c| (rim * c) as f32) }
+    }
 }
 
 /// 0, 1, 2 …
@@ -73,6 +91,7 @@ impl Ring {
             count,
             tags: vec![[0; SIDE]; 2 * count as usize],
             weights: vec![0.0; SIDE * STRIDE],
+            rows: [[0.0; STRIDE]; 2],
             is_clean: true,
         }
     }
@@ -115,18 +134,10 @@ impl Ring {
         }
         let (first, last) = (record.place / PHASES, record.place / PHASES + of.sections.touched as u32 - 1);
         self.tag(first, last, y0..y1, span);
-        let [a, b, c] = footprint.conic;
-        let at = |v: f32| Lanes::splat(simd, v);
-        for y in y0..y1 {
-            let dy = y as f32 + 0.5 - record.center[1];
-            let mut x = x0;
-            while x < x1 {
-                let dx = at(x as f32 + 0.5 - record.center[0]) + Lanes::load(simd, &COUNTING);
-                let s = at(a).mul_add(dx, at(2.0 * b * dy)).mul_add(dx, at(c * dy * dy));
-                let weight = of.kernel.profile(simd, (at(1.0) - s).max(at(0.0)));
-                weight.store(&mut self.weights[(y - y0) * STRIDE + x - x0..]);
-                x += Lanes::<S>::COUNT;
-            }
+        if footprint.conic[1] == 0.0 {
+            self.upright(simd, of, record, &footprint, [x0, x1], [y0, y1]);
+        } else {
+            self.slanted(simd, of, record, &footprint, [x0, x1], [y0, y1]);
         }
         let mut line = first / SLABS;
         while line <= last / SLABS {
@@ -145,6 +156,70 @@ impl Ring {
             rows += u64::from(row & span != 0);
         }
         rows * (x1 - x0) as u64
+    }
+
+    /// A footprint whose axes are those of the image. The Gaussian is a product then, e^(−qs) = e^(−q·a·dx²)·e^(−q·c·dy²), and its
+    /// Taylor polynomial at the rim is one of degree 2 in s: six operations a row.
+    #[inline(always)]
+    fn upright<S: Simd>(
+        &mut self,
+        simd: S,
+        of: &Splatter<'_>,
+        record: &Record,
+        footprint: &PixelFootprint,
+        [x0, x1]: [usize; 2],
+        [y0, y1]: [usize; 2],
+    ) {
+        let at = |v: f32| Lanes::splat(simd, v);
+        let [a, _, c] = footprint.conic;
+        let (q, rim) = (at(of.taper.sharpness), of.taper.polynomial);
+        let mut y = y0;
+        while y < y1 {
+            let dy = at(y as f32 + 0.5 - record.center[1]) + Lanes::load(simd, &COUNTING);
+            let s = at(c) * dy * dy;
+            s.store(&mut self.rows[0][y - y0..]);
+            (q * s).exp_neg().store(&mut self.rows[1][y - y0..]);
+            y += Lanes::<S>::COUNT;
+        }
+        let mut x = x0;
+        while x < x1 {
+            let dx = at(x as f32 + 0.5 - record.center[0]) + Lanes::load(simd, &COUNTING);
+            let across = at(a) * dx * dx;
+            let gauss = (q * across).exp_neg();
+            for row in 0..y1 - y0 {
+                let s = across + at(self.rows[0][row]);
+                let taper = at(rim[2]).mul_add(s, at(rim[1])).mul_add(s, at(rim[0]));
+                let weight = gauss.mul_add(at(self.rows[1][row]), taper).max(at(0.0)).where_less(s, at(1.0));
+                weight.store(&mut self.weights[row * STRIDE + x - x0..]);
+            }
+            x += Lanes::<S>::COUNT;
+        }
+    }
+
+    /// Any other footprint.
+    #[inline(always)]
+    fn slanted<S: Simd>(
+        &mut self,
+        simd: S,
+        of: &Splatter<'_>,
+        record: &Record,
+        footprint: &PixelFootprint,
+        [x0, x1]: [usize; 2],
+        [y0, y1]: [usize; 2],
+    ) {
+        let [a, b, c] = footprint.conic;
+        let at = |v: f32| Lanes::splat(simd, v);
+        for y in y0..y1 {
+            let dy = y as f32 + 0.5 - record.center[1];
+            let mut x = x0;
+            while x < x1 {
+                let dx = at(x as f32 + 0.5 - record.center[0]) + Lanes::load(simd, &COUNTING);
+                let s = at(a).mul_add(dx, at(2.0 * b * dy)).mul_add(dx, at(c * dy * dy));
+                let weight = of.kernel.profile(simd, (at(1.0) - s).max(at(0.0)));
+                weight.store(&mut self.weights[(y - y0) * STRIDE + x - x0..]);
+                x += Lanes::<S>::COUNT;
+            }
+        }
     }
 
     #[inline(always)]

@@ -18,7 +18,7 @@ use splat_core::{Accumulator, Camera};
 use std::ops::Range;
 
 /// Side of a tile, pixels.
-pub(crate) const TILE: usize = 32;
+pub(crate) const TILE: usize = 48;
 
 /// Side with the rim of one pixel that gradients are taken from.
 pub(crate) const SIDE: usize = TILE + 2;
@@ -270,11 +270,12 @@ fn voxels(
     batches: &Range<u32>,
     records: &mut Vec<Record>,
 ) {
-    let (viewed, grid) = (&prepared.viewed, prepared.volume.grid);
+    let (viewed, lattice) = (&prepared.viewed, &prepared.lattice);
     let Segment { eighth, j, k } = segment;
     let first = eighth * SEGMENT;
     let start = viewed.position(first, j, k);
-    let values = &grid.values[(k * grid.dims[1] + j) * grid.dims[0] + first..];
+    let end = (first + SEGMENT).min(lattice.dims[0]);
+    let values = lattice.inside(first..end, j, k);
     let mut bits = prepared.voxels.eight(eighth, j, k);
     while bits != 0 {
         let i = bits.trailing_zeros() as usize;
@@ -290,7 +291,8 @@ fn voxels(
         let center = [x - (corner[0] as f32 - 1.0), y - (corner[1] as f32 - 1.0)];
         let inside = |a: usize| center[a] + half[a] > 0.5 && center[a] - half[a] < SIDE as f32 - 0.5;
         if inside(0) && inside(1) {
-            let value = crate::classify::relative(values[i], prepared.base);
+            let value = values.map_or_else(|| lattice.value(first + i, j, k), |values| values[i]);
+            let value = crate::classify::relative(value, prepared.base);
             records.push(Record { center, value, place });
         }
     }

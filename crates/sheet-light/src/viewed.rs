@@ -89,6 +89,12 @@ impl Viewed {
         }
     }
 
+    /// Counts lattice points from the corner of a rim around the lattice.
+    pub(crate) fn with_rim(self, rim: [usize; 3]) -> Self {
+        let steps = DVec3::from_array(rim.map(|n| n as f64));
+        Self { start: self.start - self.axes * steps, ..self }
+    }
+
     /// View position of lattice point (i, j, k), depth counted from the first slab.
     pub(crate) fn position(&self, i: usize, j: usize, k: usize) -> DVec3 {
         self.start + self.axes * DVec3::new(i as f64, j as f64, k as f64)

@@ -5,8 +5,9 @@
 //! inside one such interval, and a voxel is needed where a point of its neighbourhood is not hidden. Both are erosions of
 //! sets of voxels by a box, done on 64 voxels at once.
 
+use crate::lattice::Lattice;
 use rayon::prelude::*;
-use splat_core::{Grid, TransferFunction};
+use splat_core::TransferFunction;
 
 /// Intervals without extinction that are told apart; voxels in further ones count as shown.
 const MOST_INTERVALS: usize = 8;
@@ -21,20 +22,20 @@ pub(crate) struct Voxels {
 }
 
 impl Voxels {
-    /// The voxels of `grid` whose kernels may matter, each reaching `reach` steps along the axes.
-    pub(crate) fn needed(grid: &Grid, transfer: &TransferFunction, reach: [usize; 3]) -> Self {
+    /// The voxels of `lattice` whose kernels may matter, each reaching `reach` steps along the axes.
+    pub(crate) fn needed(lattice: &Lattice<'_>, transfer: &TransferFunction, reach: [usize; 3]) -> Self {
         let mut hidden: Option<Self> = None;
         for interval in without_extinction(transfer).into_iter().take(MOST_INTERVALS) {
-            let mut inside = Self::within(grid, interval);
+            let mut inside = Self::within(lattice, interval);
             inside.erode(reach);
             match &mut hidden {
                 None => hidden = Some(inside),
                 Some(hidden) => hidden.bits.iter_mut().zip(&inside.bits).for_each(|(h, i)| *h |= i),
             }
         }
-        let words = grid.dims[0].div_ceil(64);
         let Some(mut hidden) = hidden else {
-            return Self { dims: grid.dims, words, bits: vec![!0; words * grid.dims[1] * grid.dims[2]] };
+            let (dims, words) = (lattice.dims, lattice.dims[0].div_ceil(64));
+            return Self { dims, words, bits: vec![!0; words * dims[1] * dims[2]] };
         };
         hidden.erode(reach);
         hidden.bits.iter_mut().for_each(|word| *word = !*word);
@@ -65,17 +66,19 @@ impl Voxels {
         self.bits.par_chunks(self.words).with_min_len(1024).map(row).sum()
     }
 
-    fn within(grid: &Grid, [low, high]: [f32; 2]) -> Self {
-        let (nx, words) = (grid.dims[0], grid.dims[0].div_ceil(64));
-        let mut bits = vec![0u64; words * grid.dims[1] * grid.dims[2]];
-        bits.par_chunks_mut(words).zip(grid.values.par_chunks(nx)).with_min_len(1024).for_each(|(bits, row)| {
-            for (word, values) in bits.iter_mut().zip(row.chunks(64)) {
+    fn within(lattice: &Lattice<'_>, [low, high]: [f32; 2]) -> Self {
+        let (dims, words) = (lattice.dims, lattice.dims[0].div_ceil(64));
+        let mut bits = vec![0u64; words * dims[1] * dims[2]];
+        let rows = bits.par_chunks_mut(words).enumerate().with_min_len(256);
+        rows.for_each_init(Vec::new, |values: &mut Vec<f32>, (row, bits)| {
+            lattice.row(row % dims[1], row / dims[1], values);
+            for (word, values) in bits.iter_mut().zip(values.chunks(64)) {
                 *word = (values.iter().rev()).fold(0, |w, v| w << 1 | u64::from((*v >= low) & (*v <= high)));
                 // What lies outside hides nothing.
                 *word |= (!0u64).checked_shl(values.len() as u32).unwrap_or(0);
             }
         });
-        Self { dims: grid.dims, words, bits }
+        Self { dims, words, bits }
     }
 
     /// Leaves those whose whole neighbourhood, as far as the lattice goes, is in the set.
@@ -134,7 +137,7 @@ fn without_extinction(transfer: &TransferFunction) -> Vec<[f32; 2]> {
 mod tests {
     use super::*;
     use splat_core::glam::{DMat3, DVec3};
-    use splat_core::{TransferPoint, rng};
+    use splat_core::{Grid, TransferPoint, rng};
 
     fn transfer(points: &[(f32, f32)]) -> TransferFunction {
         let point = |&(value, extinction): &(f32, f32)| TransferPoint { value, color: [1.0; 3], extinction };
@@ -173,7 +176,7 @@ mod tests {
             let within = |[low, high]: [f32; 2]| around(c).all(|v| (low..=high).contains(&value(v)));
             without_extinction(&tf).into_iter().any(within)
         };
-        let found = Voxels::needed(&grid, &tf, reach);
+        let found = Voxels::needed(&Lattice { grid: &grid, rim: [0; 3], dims }, &tf, reach);
         let mut count = 0;
         for (k, j, i) in (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i)))) {
             let expected = around([i, j, k]).any(|c| !hidden(c));

@@ -5,8 +5,8 @@ use splat_core::glam::DVec3;
 use splat_core::shade::LitBy;
 use splat_core::{Camera, Grid, Material, TransferFunction};
 
-/// Most lattice points along one axis: a voxel's place in its row is kept in 16 bits.
-pub(crate) const MOST_A_SIDE: usize = 1 << 16;
+/// Most lattice points along one axis: a voxel's place in its row is kept in 16 bits, with a rim around the lattice.
+const MOST_A_SIDE: usize = (1 << 16) - 8;
 
 /// One volume.
 #[derive(Debug, Clone, Copy)]
@@ -46,7 +46,7 @@ impl SheetInput<'_> {
         for (volume, v) in self.volumes.iter().enumerate() {
             v.grid.validate().map_err(|source| Error::Volume { volume, source })?;
             if v.grid.dims.iter().any(|n| *n > MOST_A_SIDE) {
-                let source = splat_core::Error::invalid("grid", 0, "dims", v.grid.dims, "at most 65536 a side");
+                let source = splat_core::Error::invalid("grid", 0, "dims", v.grid.dims, "at most 65528 a side");
                 return Err(Error::Volume { volume, source });
             }
             if !(0.0..=1.0).contains(&v.shadow_coefficient) {

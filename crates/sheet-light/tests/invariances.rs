@@ -88,12 +88,12 @@ fn ia10_a_volume_that_turns_with_the_camera_looks_the_same() {
 #[test]
 fn ia05_ranges_of_depth_that_meet_are_one() {
     let (tf, material) = (transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 1.5)]), Material::default());
-    let grid = grid([18, 16, 16], cubic(0.5), noise);
+    let grid = grid([12, 12, 34], cubic(0.5), noise);
     let mut volumes = [volume(&grid, &tf, &material)];
     volumes[0].normals = true;
-    let (camera, lights) = (perspective([2.0, 3.0, 8.0], 60.0, [50, 40]), [sun()]);
+    let (camera, lights) = (perspective([2.0, 3.0, 12.0], 50.0, [50, 40]), [sun()]);
     let input = input(&volumes, &camera, &lights);
-    for slab_width in [None, Some(0.003)] {
+    for slab_width in [None, Some(0.004)] {
         let params = Params { slab_width, ..exact() };
         let sheeted = prepare(&input, &params, None).unwrap();
         assert!(slab_width.is_none() || sheeted.slabs().0 > 4096, "{:?}", sheeted.slabs());
@@ -102,7 +102,7 @@ fn ia05_ranges_of_depth_that_meet_are_one() {
             let mut out = Accumulator::new(camera.size, 1, 3, true, true);
             let mut near = f32::NEG_INFINITY;
             for part in 1..=parts {
-                let far = if part == parts { f32::INFINITY } else { 3.1 + 12.3 * part as f32 / parts as f32 };
+                let far = if part == parts { f32::INFINITY } else { 3.1 + 17.3 * part as f32 / parts as f32 };
                 sheeted.fold(near..far, &[], &BEAUTY, &mut out, None).unwrap();
                 near = far;
             }

@@ -45,16 +45,16 @@ fn unlit_sheets_are_those_of_the_twin() {
 
 #[test]
 fn voxels_that_are_skipped_change_nothing() {
-    // Thin shells in much that is hidden.
-    let (tf, material) = (transfer(&[(-2.3, 2.0), (-2.1, 0.0), (1.8, 0.0), (1.9, 3.0), (2.0, 0.0)]), unlit());
-    let grid = grid([40, 36, 30], cubic(0.2), smooth);
+    // A thin shell in much that is hidden.
+    let (tf, material) = (transfer(&[(0.6, 0.0), (0.65, 3.0), (0.75, 3.0), (0.8, 0.0)]), unlit());
+    let grid = grid([40, 44, 40], cubic(0.2), |p| (-p.length_squared()).exp());
     let volumes = [volume(&grid, &tf, &material)];
-    for camera in [parallel([3.0, 2.0, 8.0], 10.0, [50, 44]), perspective([2.0, 3.0, 6.0], 70.0, [50, 44])] {
+    for camera in [parallel([3.0, 2.0, 8.0], 2.5, [50, 44]), perspective([2.0, 3.0, 6.0], 20.0, [50, 44])] {
         let input = input(&volumes, &camera, &[]);
         let [tau, color] = differences(&input, &exact());
         assert!(tau < 2e-5 && color < 1e-5, "{tau:e} {color:e}");
         let (_, counts) = draw(&input, &exact()).unwrap();
-        assert!(counts.visible < counts.voxels * 9 / 10, "{counts:?}");
+        assert!(counts.visible < counts.voxels / 4, "{counts:?}");
     }
 }
 
