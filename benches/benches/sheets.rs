@@ -38,11 +38,8 @@ fn transfer(points: &[(f32, f32)]) -> TransferFunction {
 
 fn camera(grid: &Grid, pixels: u32, perspective: bool) -> Camera {
     let middle = grid.origin + grid.axes * DVec3::from_array(grid.dims.map(|n| 0.5 * n as f64));
-    let projection = if perspective {
-        Projection::Perspective { fov_y: 0.54 }
-    } else {
-        Projection::Orthographic { height: 240.0 }
-    };
+    let projection =
+        if perspective { Projection::Perspective { fov_y: 0.54 } } else { Projection::Orthographic { height: 240.0 } };
     let eye = middle + DVec3::new(-260.0, 260.0, 100.0);
     Camera::look_at(eye, middle, DVec3::Z, projection, [pixels; 2]).expect("a camera")
 }

@@ -105,7 +105,8 @@ fn check_memory(input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [
         // Lists: four bytes for eight voxels, in two or three tiles each. Records: two of sixteen bytes a voxel of a tile.
         let voxels = dims.iter().map(|n| *n as u64).product::<u64>();
         let of_a_tile = voxels.div_ceil((tiles[0] * tiles[1]) as u64) * 4;
-        needed += Voxels::bytes(dims) + 2 * voxels + threads * (lines * 64 * AREA as u64 + Sheets::bytes() + 32 * of_a_tile);
+        needed +=
+            Voxels::bytes(dims) + 2 * voxels + threads * (lines * 64 * AREA as u64 + Sheets::bytes() + 32 * of_a_tile);
     }
     if needed > params.max_bytes { Err(Error::Memory { needed, limit: params.max_bytes }) } else { Ok(()) }
 }
@@ -206,8 +207,7 @@ impl Sheeted<'_> {
             let work = FoldTile { of: self, layout, into: held, range: range.clone(), opaque, t, scratch };
             Some(pulp::Arch::new().dispatch(work))
         };
-        let done: Vec<_> =
-            (0..tiles).into_par_iter().map_init(|| Scratch::new(&self.volumes), fold).collect();
+        let done: Vec<_> = (0..tiles).into_par_iter().map_init(|| Scratch::new(&self.volumes), fold).collect();
         progress.tick(0).map_err(cancelled)?;
         let mut counts = self.counts();
         for (picture, of_tile) in done.into_iter().flatten() {

@@ -59,11 +59,6 @@ impl Params {
 
 impl Default for Params {
     fn default() -> Self {
-        Self {
-            slab_width: None,
-            kernel: KernelShape::default(),
-            transmittance_cutoff: 1e-3,
-            max_bytes: 4 << 30,
-        }
+        Self { slab_width: None, kernel: KernelShape::default(), transmittance_cutoff: 1e-3, max_bytes: 4 << 30 }
     }
 }

@@ -150,7 +150,8 @@ impl Picture {
         let (mut weights, mut before) = ([zero; 3], zero);
         for p in 0..self.planes {
             let plane = p * PIXELS + at;
-            let tau = zero.where_less_or(most, Lanes::splat(simd, self.cutoff), Lanes::load(simd, &of.optical_depth[p]));
+            let tau =
+                zero.where_less_or(most, Lanes::splat(simd, self.cutoff), Lanes::load(simd, &of.optical_depth[p]));
             let through = Lanes::load(simd, &self.transmittance[plane..]);
             let opacity = tau.opacity();
             weights[p] = through * opacity;

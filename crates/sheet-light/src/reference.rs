@@ -4,6 +4,7 @@ use crate::fold::slabs_of;
 use crate::lattice::Lattice;
 use crate::rays::LatticeRays;
 use crate::sections::{PHASES, sections};
+use crate::shade::{Seen, radiance};
 use crate::slabs::Slabs;
 use crate::viewed::Viewed;
 use crate::{Error, Params, SheetInput, Volume};
@@ -150,8 +151,8 @@ impl Sheets {
         let normal = if volume.normals { self.normal(input, slabs, slab, at, along) } else { Vec3::ZERO };
         let viewed = Viewed::new(volume, input.camera, slabs, params);
         let place = from + along * (slabs.origin + 0.5 * (near + far));
-        let radiance =
-            crate::shade::radiance(input, volume, viewed.reach as f32, place, along, class.color, normal).effects();
+        let seen = Seen::new(input.camera, place, along);
+        let radiance = radiance(input, volume, viewed.reach as f32, seen, class.color, normal).effects();
         (tau, [0, 1, 2].map(|c| radiance.iter().map(|effect| f64::from(effect[c])).sum()))
     }
 

@@ -240,9 +240,7 @@ impl Ring {
         let begin = (SLABS * line) as isize - first as isize;
         let mut out = [0.0; 16];
         let eight = sections.eight(phase, begin);
-        for s in 0..8 {
-            out[8 + s] = eight[s];
-        }
+        out[8..].copy_from_slice(eight);
         let next = begin + SLABS as isize;
         if self.count == 1 && next < sections.touched as isize {
             let eight = sections.eight(phase, next);
@@ -269,7 +267,7 @@ impl Ring {
             }
             let row = &mut self.lines[plane + y * SIDE..][..SIDE];
             let range = bits.trailing_zeros() as usize..64 - bits.leading_zeros() as usize;
-            if batch % 2 == 0 {
+            if batch.is_multiple_of(2) {
                 take::<0>(row, range.clone(), batch * BATCH, y, sheets);
             } else {
                 take::<4>(row, range.clone(), batch * BATCH, y, sheets);

@@ -46,7 +46,8 @@ pub(crate) struct Segment {
 impl Segments {
     /// Lists for an image of `tiles` columns and rows of tiles.
     pub(crate) fn new(viewed: &Viewed, slabs: &Slabs, voxels: &Voxels, dims: [usize; 3], tiles: [usize; 2]) -> Self {
-        let chunk = |c: usize| Chunk::new(viewed, slabs, voxels, dims, tiles, c * PLANES..dims[2].min((c + 1) * PLANES));
+        let chunk =
+            |c: usize| Chunk::new(viewed, slabs, voxels, dims, tiles, c * PLANES..dims[2].min((c + 1) * PLANES));
         Self { chunks: (0..dims[2].div_ceil(PLANES)).into_par_iter().map(chunk).collect(), rows: dims[1] }
     }
 
@@ -56,7 +57,11 @@ impl Segments {
         self.chunks.iter().enumerate().flat_map(move |(c, chunk)| {
             chunk.entries[chunk.starts[t] as usize..chunk.starts[t + 1] as usize].iter().map(move |entry| {
                 let row = (entry >> PLACE_BITS) as usize;
-                Segment { eighth: (entry & ((1 << PLACE_BITS) - 1)) as usize, j: row % rows, k: c * PLANES + row / rows }
+                Segment {
+                    eighth: (entry & ((1 << PLACE_BITS) - 1)) as usize,
+                    j: row % rows,
+                    k: c * PLANES + row / rows,
+                }
             })
         })
     }
@@ -82,7 +87,9 @@ impl Chunk {
         let visit = |each: &mut dyn FnMut(u32, usize)| {
             for (row, (k, j)) in rows().enumerate() {
                 for eighth in (0..dims[0].div_ceil(SEGMENT)).filter(|e| voxels.eight(*e, j, k) != 0) {
-                    let Some([first, last]) = tiles_of(viewed, slabs, Segment { eighth, j, k }, tiles) else { continue };
+                    let Some([first, last]) = tiles_of(viewed, slabs, Segment { eighth, j, k }, tiles) else {
+                        continue;
+                    };
                     let entry = (row as u32) << PLACE_BITS | eighth as u32;
                     for y in first[1]..=last[1] {
                         (first[0]..=last[0]).for_each(|x| each(entry, y * tiles[0] + x));

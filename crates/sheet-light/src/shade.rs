@@ -10,8 +10,8 @@ use crate::volume::{SheetInput, Volume};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
-use splat_core::shade::{ChannelLayout, MAX_CHANNELS, Point, Radiance, arriving, facing};
-use splat_core::{Receiver, Shading, SplatKind};
+use splat_core::shade::{ChannelLayout, LitBy, MAX_CHANNELS, Point, Radiance, arriving, facing};
+use splat_core::{Camera, LightShape, Receiver, Shading, SplatKind};
 
 /// Neighbouring pixels of one row, from column x of the tile with its rim on.
 #[derive(Debug, Clone, Copy)]
@@ -27,6 +27,9 @@ pub(crate) struct Shader<'a> {
     pub(crate) slabs: &'a Slabs,
     pub(crate) layout: &'a ChannelLayout,
     pub(crate) slopes: &'a Slopes,
+    /// The camera's, in single precision.
+    pub(crate) axes: [Vec3; 3],
+    pub(crate) is_lit_by_place: bool,
 }
 
 /// One volume of a tile, as shading reads it.
@@ -80,7 +83,8 @@ impl Shader<'_> {
             }
         } else {
             let normals = if of.volume.normals { self.normals(simd, of, place) } else { [Vec3::ZERO; MAX_LANES] };
-            self.light(simd, of, place, &medium, &tau, &normals, &mut values);
+            let open = picture.open[place.y] >> place.x;
+            self.light(simd, of, place, &medium, &tau, open, &normals, &mut values);
         }
         let extinction = of.volume.material.extinction_rgb;
         for p in 0..picture.planes {
@@ -137,7 +141,7 @@ impl Shader<'_> {
         for a in 0..3 {
             gradient[a].store(&mut parts[a]);
         }
-        let axes = self.input.camera.axes.map(|a| a.as_vec3());
+        let axes = self.axes;
         let mut out = [Vec3::ZERO; MAX_LANES];
         for lane in 0..Lanes::<S>::COUNT {
             let world = axes[0] * parts[0][lane] + axes[1] * parts[1][lane] + axes[2] * parts[2][lane];
@@ -190,6 +194,7 @@ impl Shader<'_> {
         place: Place,
         medium: &Medium<S>,
         tau: &[f32; MAX_LANES],
+        open: u64,
         normals: &[Vec3; MAX_LANES],
         values: &mut [[f32; MAX_LANES]; MAX_CHANNELS],
     ) {
@@ -199,10 +204,12 @@ impl Shader<'_> {
         }
         ((medium.near + medium.far) * Lanes::splat(simd, 0.5)).store(&mut middle);
         for lane in 0..Lanes::<S>::COUNT {
-            if tau[lane] > 0.0 {
-                let ray = self.slopes.ray(place.x + lane, place.y);
+            if tau[lane] > 0.0 && open >> lane & 1 == 1 {
                 let color = [color[0][lane], color[1][lane], color[2][lane]];
-                let out = self.radiance(of, ray, middle[lane], color, normals[lane]);
+                let seen = self.seen(place, lane, middle[lane]);
+                let mut out = [0.0; MAX_CHANNELS];
+                let radiance = radiance(self.input, of.volume, of.radius, seen, color, normals[lane]);
+                radiance.write(normals[lane], self.layout, &mut out);
                 for c in 0..self.layout.count() {
                     values[c][lane] = out[c];
                 }
@@ -210,43 +217,61 @@ impl Shader<'_> {
         }
     }
 
-    /// The channels of one point of a ray.
-    fn radiance(
-        &self,
-        of: &Reconstructed<'_>,
-        (from, along): (DVec3, DVec3),
-        depth: f32,
-        color: [f32; 3],
-        normal: Vec3,
-    ) -> [f32; MAX_CHANNELS] {
-        let at = from + along * (self.slabs.origin + f64::from(depth));
-        let radiance = radiance(self.input, of.volume, of.radius, at, along, color, normal);
-        let mut out = [0.0; MAX_CHANNELS];
-        radiance.write(normal, self.layout, &mut out);
-        out
+    /// What is seen of a ray at a depth. Where it lies is found out only where a light asks.
+    #[inline(always)]
+    fn seen(&self, place: Place, lane: usize, depth: f32) -> Seen {
+        let camera = self.input.camera;
+        if self.is_lit_by_place {
+            let (from, along) = self.slopes.ray(place.x + lane, place.y);
+            return Seen::new(camera, from + along * (self.slabs.origin + f64::from(depth)), along);
+        }
+        let [right, up, forward] = self.axes;
+        let slant = if camera.is_orthographic() {
+            Vec3::ZERO
+        } else {
+            right * self.slopes.u[place.x + lane] + up * self.slopes.v[place.y]
+        };
+        Seen { position: DVec3::ZERO, to_eye: -(forward + slant).normalize() }
     }
 }
 
-/// Radiance of one point of a volume at the view position `at`, seen along a ray of the view direction `along`.
+/// A point and the unit direction from it to the viewer.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Seen {
+    position: DVec3,
+    to_eye: Vec3,
+}
+
+impl Seen {
+    /// The view position `at`, on a ray of the view direction `along`.
+    pub(crate) fn new(camera: &Camera, at: DVec3, along: DVec3) -> Self {
+        let world = |v: DVec3| camera.axes[0] * v.x + camera.axes[1] * v.y + camera.axes[2] * v.z;
+        Self { position: camera.position + world(at), to_eye: -world(along).normalize().as_vec3() }
+    }
+}
+
+/// Whether light depends on where a point is.
+pub(crate) fn is_lit_by_place(input: &SheetInput<'_>) -> bool {
+    let by_place = |lit: &LitBy<'_>| lit.shadow.is_some() || !matches!(lit.light.shape, LightShape::Directional { .. });
+    input.lights.iter().any(by_place)
+}
+
+/// Radiance of one point of a volume.
+#[inline]
 pub(crate) fn radiance(
     input: &SheetInput<'_>,
     volume: &Volume<'_>,
     radius: f32,
-    at: DVec3,
-    along: DVec3,
+    Seen { position, to_eye }: Seen,
     color: [f32; 3],
     normal: Vec3,
 ) -> Radiance {
-    let axes = input.camera.axes;
-    let world = |v: DVec3| axes[0] * v.x + axes[1] * v.y + axes[2] * v.z;
-    let position = input.camera.position + world(at);
-    let to_eye = -world(along).normalize().as_vec3();
     let normal = facing(SplatKind::Medium, normal, normal, to_eye);
     let point = Point { position, radius, normal, to_eye, color, material: volume.material };
     let receiver =
-        Receiver { position: (position - input.shadow_origin).as_vec3(), normal, radius, kind: SplatKind::Medium };
+        || Receiver { position: (position - input.shadow_origin).as_vec3(), normal, radius, kind: SplatKind::Medium };
     point.radiance(input.ambient, input.lights.iter().map(|lit| &lit.light), |rank, irradiance| {
-        let shadow = input.lights[rank].shadow.map(|shadow| move || shadow.transmittance(&receiver));
+        let shadow = input.lights[rank].shadow.map(|shadow| move || shadow.transmittance(&receiver()));
         arriving(irradiance, volume.shadow_coefficient, shadow)
     })
 }

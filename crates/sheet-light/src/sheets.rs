@@ -106,12 +106,7 @@ impl Sheets {
 /// Difference over the neighbours of `value`, per step: central, one-sided where one of the two is no sample, 0 where both are.
 /// Each neighbour is its value and 1, or anything and 0.
 #[inline(always)]
-pub(crate) fn difference<S: Simd>(
-    simd: S,
-    value: Lanes<S>,
-    before: [Lanes<S>; 2],
-    after: [Lanes<S>; 2],
-) -> Lanes<S> {
+pub(crate) fn difference<S: Simd>(simd: S, value: Lanes<S>, before: [Lanes<S>; 2], after: [Lanes<S>; 2]) -> Lanes<S> {
     let half = Lanes::splat(simd, 0.5);
     let choose = |[v, is]: [Lanes<S>; 2]| v.where_less_or(half, is, value);
     let steps = (before[1] + after[1]).max(half);

@@ -31,13 +31,13 @@ impl Slabs {
     pub(crate) fn new(near: f64, far: f64, width: f64, reach: f64) -> Result<Self, Error> {
         let too_many = |what, needed, limit| Err(Error::Slabs { width, what, needed, limit });
         let touched = (2.0 * reach / width).ceil() + 1.0;
-        if !(touched <= f64::from(MOST_TOUCHED)) {
+        if touched.is_nan() || touched > f64::from(MOST_TOUCHED) {
             return too_many("slabs under one kernel", touched, MOST_TOUCHED);
         }
         // A kernel that ends in the first slab of a volume begins so far before it. One more, for that slab's neighbour.
         let before = (2.0 * reach / width).ceil() + 1.0;
         let needed = ((far - near) / width).ceil() + before + 2.0;
-        if !(needed <= f64::from(MOST_SLABS)) {
+        if needed.is_nan() || needed > f64::from(MOST_SLABS) {
             return too_many("slabs", needed, MOST_SLABS);
         }
         let count = (needed as u32).next_multiple_of(BATCH);

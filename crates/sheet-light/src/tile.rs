@@ -7,7 +7,7 @@ use crate::rays::{Crossings, Slopes};
 use crate::ring::{Record, Ring};
 use crate::sections::PHASES;
 use crate::segments::{SEGMENT, Segment};
-use crate::shade::{Place, Reconstructed, Shader};
+use crate::shade::{Place, Reconstructed, Shader, is_lit_by_place};
 use crate::sheets::Sheets;
 use crate::slabs::BATCH;
 use splat_core::glam::Vec3;
@@ -155,7 +155,14 @@ impl FoldTile<'_> {
         counts: &mut SheetCounts,
     ) {
         let of = self.of;
-        let shader = Shader { input: of.input, slabs: &of.slabs, layout: self.layout, slopes };
+        let shader = Shader {
+            input: of.input,
+            slabs: &of.slabs,
+            layout: self.layout,
+            slopes,
+            axes: of.input.camera.axes.map(|a| a.as_vec3()),
+            is_lit_by_place: is_lit_by_place(of.input),
+        };
         let behind = u32::from(of.has_gradients);
         // Sheets are shaded one later than they are finished where gradients need the one behind.
         let mut next = first;

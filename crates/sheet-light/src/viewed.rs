@@ -16,6 +16,9 @@ use splat_core::glam::{DMat3, DVec3, Vec3};
 /// Least standard deviation of a footprint in its narrow direction, pixels: none falls between pixels.
 const LEAST_SIGMA_PX: f64 = 0.5;
 
+/// Slant of a footprint, as a correlation, that is none.
+const UPRIGHT: f64 = 1e-9;
+
 /// Share of its reach that a voxel must lie before the eye: nearer ones have footprints without bounds.
 const NEAREST: f64 = 1.0 / 64.0;
 
@@ -38,6 +41,10 @@ pub(crate) struct Viewed {
     pub(crate) reach: f64,
     /// M across the view: xx, xy, yy, world units².
     extent: [f64; 3],
+    /// Its least eigenvalue.
+    smallest: f64,
+    /// The footprint of a pixel a world unit.
+    unit: PixelFootprint,
     /// Least eigenvalue of a footprint in pixels².
     least: f64,
     /// Pixels per unit of x/z, or per world unit.
@@ -67,20 +74,36 @@ pub(crate) fn corners(volume: &Volume<'_>, camera: &Camera) -> [DVec3; 8] {
     })
 }
 
+/// The footprint that is 1 at the rim of an ellipse.
+fn of_extent([xx, xy, yy]: [f64; 3]) -> PixelFootprint {
+    let norm = 1.0 / (xx * yy - xy * xy);
+    // No negative zero.
+    let conic = [yy, 0.0 - xy, xx].map(|c| (c * norm) as f32);
+    PixelFootprint { conic, half: [libm::sqrt(xx) as f32, libm::sqrt(yy) as f32] }
+}
+
 impl Viewed {
     pub(crate) fn new(volume: &Volume<'_>, camera: &Camera, slabs: &Slabs, params: &Params) -> Self {
         let axes = view_axes(volume, camera);
         let e2 = params.kernel.extent * params.kernel.extent;
         let m = axes * axes.transpose() * e2;
         let least_radius = LEAST_SIGMA_PX * params.kernel.extent / params.kernel.sigma;
+        let (xx, xy, yy) = (m.x_axis.x, m.x_axis.y, m.y_axis.y);
+        // Equal steps at right angles leave a rounding of a slant, and what is upright is drawn faster.
+        let slant = if xy.abs() > UPRIGHT * libm::sqrt(xx * yy) { xy } else { 0.0 };
+        // Rows of pixels run down.
+        let extent = [xx, -slant, yy];
+        let half = 0.5 * (extent[0] - extent[2]);
+        let smallest = 0.5 * (extent[0] + extent[2]) - libm::sqrt(half * half + extent[1] * extent[1]);
         let mut start = camera.view_from_world(volume.grid.origin);
         start.z -= slabs.origin;
         Self {
             start,
             axes,
             reach: libm::sqrt(m.z_axis.z),
-            // Rows of pixels run down.
-            extent: [m.x_axis.x, -m.x_axis.y, m.y_axis.y],
+            extent,
+            smallest,
+            unit: of_extent(extent),
             least: least_radius * least_radius,
             focal: camera.focal_px(),
             center: camera.size.map(|s| 0.5 * f64::from(s)),
@@ -132,21 +155,20 @@ impl Viewed {
     /// The footprint at `scale`; widened where it would fall between pixels.
     #[inline(always)]
     pub(crate) fn footprint(&self, scale: f64) -> PixelFootprint {
-        let [xx, xy, yy] = self.extent_px(scale);
-        let norm = 1.0 / (xx * yy - xy * xy);
-        PixelFootprint {
-            conic: [yy, -xy, xx].map(|c| (c * norm) as f32),
-            half: [libm::sqrt(xx) as f32, libm::sqrt(yy) as f32],
+        if self.smallest * scale * scale >= self.least {
+            let (scale, inverse) = (scale as f32, (1.0 / scale) as f32);
+            let PixelFootprint { conic: [a, b, c], half: [x, y] } = self.unit;
+            let square = inverse * inverse;
+            return PixelFootprint { conic: [a * square, b * square, c * square], half: [x * scale, y * scale] };
         }
+        of_extent(self.extent_px(scale))
     }
 
     /// Extent of a footprint in pixels²: xx, xy, yy.
     #[inline(always)]
     fn extent_px(&self, scale: f64) -> [f64; 3] {
         let [xx, xy, yy] = self.extent.map(|m| m * scale * scale);
-        let half = 0.5 * (xx - yy);
-        let smallest = 0.5 * (xx + yy) - libm::sqrt(half * half + xy * xy);
-        let wider = (self.least - smallest).max(0.0);
+        let wider = (self.least - self.smallest * scale * scale).max(0.0);
         [xx + wider, xy, yy + wider]
     }
 

@@ -122,7 +122,11 @@ fn ia03_a_voxel_that_crosses_a_face_keeps_its_weight() {
         let params = Params { slab_width: Some(1.0), ..exact() };
         if step % 32 == 0 || step < 4 {
             let (out, _) = draw(&input(&volumes, &camera, &[]), &params).unwrap();
-            assert!(out.optical_depth[0].iter().all(|tau| (tau - 0.5).abs() < 1e-6), "{step}: {:?}", out.optical_depth[0][0]);
+            assert!(
+                out.optical_depth[0].iter().all(|tau| (tau - 0.5).abs() < 1e-6),
+                "{step}: {:?}",
+                out.optical_depth[0][0]
+            );
         }
     }
 }

@@ -1,6 +1,8 @@
 //! Input that breaks naive sheets.
 
-use crate::common::{BEAUTY, apart, constant, cubic, draw, exact, grid, input, noise, parallel, perspective, transfer, unlit, volume};
+use crate::common::{
+    BEAUTY, apart, constant, cubic, draw, exact, grid, input, noise, parallel, perspective, transfer, unlit, volume,
+};
 use sheet_light::{Error, KernelShape, Params, prepare};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::shade::ChannelLayout;
@@ -145,10 +147,15 @@ fn extinction_by_channel_hides_each_channel_by_its_own() {
     let camera = parallel([0.0, 0.0, 10.0], 3.0, [24, 24]);
     let mut out = Accumulator::new(camera.size, 3, 3, false, false);
     let input = input(&volumes, &camera, &[]);
-    prepare(&input, &exact(), None).unwrap().fold(f32::NEG_INFINITY..f32::INFINITY, &[], &BEAUTY, &mut out, None).unwrap();
+    prepare(&input, &exact(), None)
+        .unwrap()
+        .fold(f32::NEG_INFINITY..f32::INFINITY, &[], &BEAUTY, &mut out, None)
+        .unwrap();
     for (c, factor) in [0.5f32, 1.0, 2.0].into_iter().enumerate() {
         let tau = 0.5 * 6.0 * factor;
-        assert!((out.optical_depth[c][300] - tau).abs() < 1e-5 && (out.channels[c][300] - 1.0 + (-tau).exp()).abs() < 1e-5);
+        assert!(
+            (out.optical_depth[c][300] - tau).abs() < 1e-5 && (out.channels[c][300] - 1.0 + (-tau).exp()).abs() < 1e-5
+        );
     }
 }
 

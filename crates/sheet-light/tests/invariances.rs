@@ -1,6 +1,8 @@
 //! What must not change a picture.
 
-use crate::common::{BEAUTY, apart, constant, cubic, draw, exact, grid, input, noise, parallel, perspective, transfer, unlit, volume};
+use crate::common::{
+    BEAUTY, apart, constant, cubic, draw, exact, grid, input, noise, parallel, perspective, transfer, unlit, volume,
+};
 use sheet_light::{Params, prepare};
 use splat_core::glam::{DMat3, DQuat, DVec3};
 use splat_core::shade::LitBy;
@@ -67,7 +69,8 @@ fn shift_a_place_far_from_the_origin_looks_the_same() {
 fn ia10_a_volume_that_turns_with_the_camera_looks_the_same() {
     let (tf, material) = (transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]), Material::default());
     let turned = |degrees: f64| {
-        let turn = DMat3::from_quat(DQuat::from_axis_angle(DVec3::new(0.3, 1.0, -0.5).normalize(), degrees.to_radians()));
+        let turn =
+            DMat3::from_quat(DQuat::from_axis_angle(DVec3::new(0.3, 1.0, -0.5).normalize(), degrees.to_radians()));
         let mut grid: Grid = grid([16, 16, 16], cubic(0.5), noise);
         grid.origin = turn * grid.origin;
         grid.axes = turn * grid.axes;
