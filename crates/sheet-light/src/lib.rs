@@ -54,6 +54,7 @@ mod fold;
 mod lattice;
 mod params;
 mod picture;
+mod queue;
 mod rays;
 pub mod reference;
 mod ring;

@@ -28,7 +28,7 @@ pub(crate) struct Fragments {
 /// The state of one tile.
 #[derive(Debug)]
 pub(crate) struct Picture {
-    corner: [usize; 2],
+    pub(crate) corner: [usize; 2],
     /// Columns and rows inside the image.
     inside: [usize; 2],
     pub(crate) planes: usize,

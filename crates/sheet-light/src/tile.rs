@@ -3,14 +3,12 @@
 use crate::counts::SheetCounts;
 use crate::fold::{Prepared, Sheeted};
 use crate::picture::{Fragments, Picture};
+use crate::queue::Queue;
 use crate::rays::{Crossings, Slopes};
-use crate::ring::{Record, Ring};
-use crate::sections::PHASES;
-use crate::segments::{SEGMENT, Segment};
+use crate::ring::Ring;
 use crate::shade::{Place, Reconstructed, Shader, is_lit_by_place};
 use crate::sheets::Sheets;
 use crate::slabs::BATCH;
-use splat_core::glam::Vec3;
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::{self, Simd};
 use splat_core::shade::{ChannelLayout, MAX_CHANNELS};
@@ -39,10 +37,7 @@ struct VolumeScratch {
     ring: Ring,
     sheets: Sheets,
     crossings: Crossings,
-    records: Vec<Record>,
-    /// By batch.
-    sorted: Vec<Record>,
-    starts: Vec<u32>,
+    queue: Queue,
 }
 
 impl Scratch {
@@ -51,9 +46,7 @@ impl Scratch {
             ring: Ring::new(v.sections.touched),
             sheets: Sheets::new(),
             crossings: Crossings::new(),
-            records: Vec::new(),
-            sorted: Vec::new(),
-            starts: Vec::new(),
+            queue: Queue::new(v),
         };
         Self {
             volumes: volumes.iter().map(of).collect(),
@@ -98,9 +91,9 @@ impl pulp::WithSimd for FoldTile<'_> {
         }
         let (shown, batches) = self.batches();
         for (prepared, scratch) in of.volumes.iter().zip(&mut self.scratch.volumes) {
-            counts.records += gather(prepared, scratch, self.t, corner, &batches);
+            scratch.queue.fill(prepared, self.t, &batches);
         }
-        if self.scratch.volumes.iter().all(|v| v.records.is_empty()) {
+        if self.scratch.volumes.iter().all(|v| v.queue.is_empty()) {
             counts.tiles_skipped = 1;
             return (None, counts);
         }
@@ -170,9 +163,9 @@ impl FoldTile<'_> {
             let wanted = picture.wanted(of.has_gradients);
             for (prepared, scratch) in of.volumes.iter().zip(&mut self.scratch.volumes) {
                 let splatter = prepared.splatter();
-                let at = (batch - batches.start) as usize;
-                let VolumeScratch { ring, sheets, sorted, starts, .. } = scratch;
-                for record in &sorted[starts[at] as usize..starts[at + 1] as usize] {
+                let VolumeScratch { ring, sheets, queue, .. } = scratch;
+                for record in queue.take(prepared, batch, picture.corner) {
+                    counts.records += 1;
                     let fragments = ring.splat(simd, &splatter, record, &wanted);
                     counts.fragments += fragments;
                     counts.hidden += u64::from(fragments == 0);
@@ -234,73 +227,6 @@ impl FoldTile<'_> {
                 }
                 x += Lanes::<S>::COUNT;
             }
-        }
-    }
-}
-
-/// The voxels of a tile, by the batch in which their kernels begin. How many.
-#[inline(always)]
-fn gather(
-    prepared: &Prepared<'_>,
-    scratch: &mut VolumeScratch,
-    t: usize,
-    corner: [usize; 2],
-    batches: &Range<u32>,
-) -> u64 {
-    let VolumeScratch { records, sorted, starts, .. } = scratch;
-    records.clear();
-    for segment in prepared.segments.tile(t) {
-        voxels(prepared, segment, corner, batches, records);
-    }
-    let count = batches.len();
-    starts.clear();
-    starts.resize(count + 2, 0);
-    let batch = |r: &Record| (r.place / (PHASES * BATCH) - batches.start) as usize;
-    records.iter().for_each(|r| starts[batch(r) + 2] += 1);
-    (2..starts.len()).for_each(|b| starts[b] += starts[b - 1]);
-    sorted.clear();
-    sorted.resize(records.len(), Record::default());
-    for record in records.iter() {
-        let at = &mut starts[batch(record) + 1];
-        sorted[*at as usize] = *record;
-        *at += 1;
-    }
-    records.len() as u64
-}
-
-/// The voxels of a segment that reach the tile.
-#[inline(always)]
-fn voxels(
-    prepared: &Prepared<'_>,
-    segment: Segment,
-    corner: [usize; 2],
-    batches: &Range<u32>,
-    records: &mut Vec<Record>,
-) {
-    let (viewed, lattice) = (&prepared.viewed, &prepared.lattice);
-    let Segment { eighth, j, k } = segment;
-    let first = eighth * SEGMENT;
-    let start = viewed.position(first, j, k);
-    let end = (first + SEGMENT).min(lattice.dims[0]);
-    let values = lattice.inside(first..end, j, k);
-    let mut bits = prepared.voxels.eight(eighth, j, k);
-    while bits != 0 {
-        let i = bits.trailing_zeros() as usize;
-        bits &= bits - 1;
-        let at = start + viewed.axes.x_axis * i as f64;
-        let Some(place) = viewed.place(at.z as f32) else { continue };
-        if !batches.contains(&(place / (PHASES * BATCH))) {
-            continue;
-        }
-        let Some(scale) = viewed.scale(viewed.depth(place)) else { continue };
-        let [x, y] = viewed.pixel(Vec3::new(at.x as f32, at.y as f32, 0.0), scale as f32);
-        let half = prepared.half(scale);
-        let center = [x - (corner[0] as f32 - 1.0), y - (corner[1] as f32 - 1.0)];
-        let inside = |a: usize| center[a] + half[a] > 0.5 && center[a] - half[a] < SIDE as f32 - 0.5;
-        if inside(0) && inside(1) {
-            let value = values.map_or_else(|| lattice.value(first + i, j, k), |values| values[i]);
-            let value = crate::classify::relative(value, prepared.base);
-            records.push(Record { center, value, place });
         }
     }
 }

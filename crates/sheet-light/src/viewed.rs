@@ -52,7 +52,7 @@ pub(crate) struct Viewed {
     center: [f64; 2],
     /// View depth of the first slab, for perspective.
     origin: Option<f64>,
-    width: f64,
+    pub(crate) width: f64,
 }
 
 /// Steps of a lattice in view space.
