@@ -4,12 +4,13 @@ use crate::repo::Repo;
 use crate::toml_lines::{lines, string};
 
 /// For each crate of the workspace, the crates of the workspace that it may depend on, tests and benches included.
-const MAY_KNOW: [(&str, &[&str]); 19] = [
+const MAY_KNOW: [(&str, &[&str]); 20] = [
     ("splat-core", &["splat-shaders"]),
     ("convert", &["splat-core"]),
     ("tsm", &["splat-core", "splat-shaders"]),
     ("hbsort", &["splat-core", "splat-shaders"]),
     ("pbsr", &["splat-core", "splat-shaders"]),
+    ("sheet-light", &["splat-core"]),
     ("reference", &["splat-core"]),
     ("splat-shaders", &[]),
     ("gpu-ash", &["splat-shaders"]),
@@ -42,6 +43,7 @@ const MAY_KNOW: [(&str, &[&str]); 19] = [
             "tsm",
             "hbsort",
             "pbsr",
+            "sheet-light",
             "reference",
             "splat-shaders",
             "gpu-ash",

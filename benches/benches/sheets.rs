@@ -1,0 +1,107 @@
+//! Image-aligned sheets of the MRI head: prepare and fold at 400² and 512², semi-transparent and opaque, unlit and shaded.
+//!
+//! A plain table of minima: other work on the machine only ever adds time. The second number of each part is the time of all
+//! threads on processors, which other work adds less to. `-- WORD` draws those whose name has it.
+#![allow(missing_docs, clippy::expect_used, reason = "a benchmark")]
+
+use convert::read::{self, Loaded, ReadLimits};
+use organza_benches::processor_ms;
+use sheet_light::{Params, SheetCounts, SheetInput, Volume, prepare};
+use splat_core::glam::DVec3;
+use splat_core::shade::{ChannelLayout, LitBy};
+use splat_core::{
+    Accumulator, Camera, Grid, LayerSet, Light, LightShape, Material, Projection, Shading, TransferFunction,
+    TransferPoint,
+};
+use std::path::Path;
+use std::time::Instant;
+
+/// Runs each part this often.
+const REPEATS: usize = 7;
+
+fn head() -> Grid {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/mni152/mni152_t1.nii.gz");
+    match read::file(&path, &ReadLimits::default()).expect("an asset of the repository") {
+        Loaded::Grid(grid) => grid,
+        _ => unreachable!("the head is a volume"),
+    }
+}
+
+/// Extinction in 1/mm at values of 0 to 255.
+fn transfer(points: &[(f32, f32)]) -> TransferFunction {
+    let point = |&(value, extinction): &(f32, f32)| {
+        let t = value / 255.0;
+        TransferPoint { value, color: [0.4 + 0.6 * t, 0.9 * t, 0.8 - 0.6 * t], extinction }
+    };
+    TransferFunction::new(points.iter().map(point).collect()).expect("values rise")
+}
+
+fn camera(grid: &Grid, pixels: u32, perspective: bool) -> Camera {
+    let middle = grid.origin + grid.axes * DVec3::from_array(grid.dims.map(|n| 0.5 * n as f64));
+    let projection =
+        if perspective { Projection::Perspective { fov_y: 0.54 } } else { Projection::Orthographic { height: 240.0 } };
+    let eye = middle + DVec3::new(-260.0, 260.0, 100.0);
+    Camera::look_at(eye, middle, DVec3::Z, projection, [pixels; 2]).expect("a camera")
+}
+
+fn main() {
+    let only = std::env::args().skip(1).find(|a| !a.starts_with('-')).unwrap_or_default();
+    let grid = head();
+    let semi = transfer(&[(30.0, 0.0), (80.0, 0.004), (150.0, 0.01), (200.0, 0.05), (255.0, 0.08)]);
+    let iso = transfer(&[(90.0, 0.0), (110.0, 2.0)]);
+    println!(
+        "{:>28} {:>12} {:>12} {:>7} {:>9} {:>7} {:>11} {:>10}",
+        "ms", "prepare", "fold", "M vox", "M splats", "M frag", "M frag/s", "M shaded"
+    );
+    for pixels in [400, 512] {
+        for (class, tf) in [("semi", &semi), ("iso", &iso)] {
+            for lit in [false, true] {
+                for perspective in [false, true] {
+                    let lens = if perspective { "pinhole" } else { "parallel" };
+                    let light = if lit { "shaded" } else { "unlit" };
+                    let name = format!("{pixels} {class} {light} {lens}");
+                    if name.contains(&only) {
+                        row(&name, &grid, tf, lit, &camera(&grid, pixels, perspective));
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn row(name: &str, grid: &Grid, transfer: &TransferFunction, lit: bool, camera: &Camera) {
+    let shading = if lit { Shading::Phong } else { Shading::Unlit };
+    let material = Material { shading, specular: 0.2, ..Material::default() };
+    let direction = DVec3::new(0.6, -0.5, -0.6).normalize();
+    let sun = Light { shape: LightShape::Directional { direction }, intensity: [3.0; 3] };
+    let lights = [LitBy { light: sun, shadow: None }];
+    let volumes = [Volume { grid, transfer, material: &material, normals: lit, object: 0, shadow_coefficient: 1.0 }];
+    let lights = if lit { &lights[..] } else { &[] };
+    let input = SheetInput { volumes: &volumes, camera, lights, shadow_origin: DVec3::ZERO, ambient: [0.1; 3] };
+    let params = Params { transmittance_cutoff: Params::PAPERS_CUTOFF, ..Params::default() };
+    let layout = ChannelLayout::new(&LayerSet::default());
+    let (mut best, mut counts) = ([[f64::INFINITY; 2]; 2], SheetCounts::default());
+    for _ in 0..REPEATS {
+        let (start, busy) = (Instant::now(), processor_ms());
+        let sheeted = prepare(&input, &params, None).expect("a volume that can be drawn");
+        let (middle, middle_busy) = (Instant::now(), processor_ms());
+        let mut out = Accumulator::new(camera.size, 1, 3, false, false);
+        let all = f32::NEG_INFINITY..f32::INFINITY;
+        counts = sheeted.fold(all, &[], &layout, &mut out, None).expect("nobody cancels");
+        let times = [(middle - start, middle_busy - busy), (middle.elapsed(), processor_ms() - middle_busy)];
+        for (best, (wall, busy)) in best.iter_mut().zip(times) {
+            best[0] = best[0].min(wall.as_secs_f64() * 1e3);
+            best[1] = best[1].min(busy);
+        }
+    }
+    let million = |n: u64| n as f64 * 1e-6;
+    let [prepared, folded] = best.map(|[wall, busy]| format!("{wall:.1} {busy:.0}"));
+    println!(
+        "{name:>28} {prepared:>12} {folded:>12} {:7.2} {:9.2} {:7.1} {:11.0} {:10.1}",
+        million(counts.visible),
+        million(counts.records),
+        million(counts.fragments),
+        million(counts.fragments) / best[1][0] * 1e3,
+        million(counts.shaded),
+    );
+}

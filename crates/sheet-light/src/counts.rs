@@ -1,0 +1,40 @@
+//! What sheets took: work counted, so that it can be compared where times cannot.
+
+/// Work of one fold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct SheetCounts {
+    /// Voxels of all volumes.
+    pub voxels: u64,
+    /// Voxels that the transfer functions may show, or that shape those.
+    pub visible: u64,
+    /// Voxels splatted, each as often as there are tiles that it reaches.
+    pub records: u64,
+    /// Of these, those that lay wholly under opaque pixels: early splat elimination.
+    pub hidden: u64,
+    /// Footprint numbers multiplied into pixels, each for all sections at once.
+    pub fragments: u64,
+    /// Pixels of sheets classified.
+    pub shaded: u64,
+    /// Tiles without any voxel, or opaque from the beginning.
+    pub tiles_skipped: u64,
+    /// Slabs between the nearest volume and the farthest, a few before and behind included.
+    pub slabs: u64,
+    /// Bytes of the buffers made.
+    pub bytes: u64,
+}
+
+impl SheetCounts {
+    pub(crate) fn add(self, other: Self) -> Self {
+        Self {
+            voxels: self.voxels + other.voxels,
+            visible: self.visible + other.visible,
+            records: self.records + other.records,
+            hidden: self.hidden + other.hidden,
+            fragments: self.fragments + other.fragments,
+            shaded: self.shaded + other.shaded,
+            tiles_skipped: self.tiles_skipped + other.tiles_skipped,
+            slabs: self.slabs + other.slabs,
+            bytes: self.bytes + other.bytes,
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! From volumes and a view to sheets, and their fold over a range of depths.
+
+use crate::classify::Classifier;
+use crate::counts::SheetCounts;
+use crate::error::cancelled;
+use crate::lattice::Lattice;
+use crate::rays::LatticeRays;
+use crate::ring::{Ring, Splatter, Taper};
+use crate::sections::SectionTable;
+use crate::segments::Segments;
+use crate::sheets::Sheets;
+use crate::slabs::Slabs;
+use crate::tile::{self, AREA, FoldTile, Scratch, TILE};
+use crate::viewed::{PixelFootprint, Viewed, corners, spacing_along, view_axes};
+use crate::visible::Voxels;
+use crate::{Error, Params, SheetInput, Volume};
+use rayon::prelude::*;
+use splat_core::raster::kernel::Kernel;
+use splat_core::raster::pulp;
+use splat_core::shade::ChannelLayout;
+use splat_core::{Accumulator, Footprint, Progress};
+use std::ops::Range;
+
+/// One volume, ready to be splatted.
+pub(crate) struct Prepared<'a> {
+    pub(crate) volume: &'a Volume<'a>,
+    pub(crate) lattice: Lattice<'a>,
+    pub(crate) viewed: Viewed,
+    pub(crate) sections: SectionTable,
+    kernel: Kernel,
+    taper: Taper,
+    pub(crate) classifier: Classifier,
+    pub(crate) rays: LatticeRays,
+    pub(crate) voxels: Voxels,
+    pub(crate) segments: Segments,
+    /// What values are taken relative to.
+    pub(crate) base: f64,
+    /// The footprint of all voxels, where rays are parallel.
+    footprint: Option<PixelFootprint>,
+}
+
+/// The sheets of some volumes in one view, ready to be folded.
+pub struct Sheeted<'a> {
+    pub(crate) input: &'a SheetInput<'a>,
+    pub(crate) params: Params,
+    pub(crate) slabs: Slabs,
+    pub(crate) volumes: Vec<Prepared<'a>>,
+    pub(crate) tiles: [usize; 2],
+    /// Slabs under the widest kernel.
+    pub(crate) touched: u32,
+    pub(crate) has_gradients: bool,
+}
+
+/// Finds the voxels that may be seen and lists them by tile.
+///
+/// # Errors
+/// [`Error::Parameter`], [`Error::Volume`], [`Error::Slabs`], [`Error::Memory`] before much is taken, or [`Error::Cancelled`].
+pub fn prepare<'a>(
+    input: &'a SheetInput<'a>,
+    params: &Params,
+    progress: Option<&Progress>,
+) -> Result<Sheeted<'a>, Error> {
+    params.check()?;
+    input.check()?;
+    let slabs = slabs_of(input, params)?;
+    let tiles = tile::tiles(input.camera);
+    check_memory(input, params, &slabs, tiles)?;
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
+    progress.add_total(input.volumes.len() as u64);
+    let mut volumes = Vec::with_capacity(input.volumes.len());
+    for volume in input.volumes {
+        volumes.push(Prepared::new(volume, input, params, &slabs, tiles));
+        progress.tick(1).map_err(cancelled)?;
+    }
+    let touched = volumes.iter().map(|v| v.sections.touched as u32).max().unwrap_or(1);
+    let has_gradients = input.volumes.iter().any(|v| v.normals);
+    Ok(Sheeted { input, params: *params, slabs, volumes, tiles, touched, has_gradients })
+}
+
+/// Slabs between the nearest corner of a volume before the eye and the farthest.
+pub(crate) fn slabs_of(input: &SheetInput<'_>, params: &Params) -> Result<Slabs, Error> {
+    let (mut near, mut far, mut spacing, mut reach) = (f64::INFINITY, 0.0f64, f64::INFINITY, 0.0f64);
+    for volume in input.volumes {
+        let along = spacing_along(&view_axes(volume, input.camera));
+        (spacing, reach) = (spacing.min(along), reach.max(along * params.kernel.extent));
+        for corner in corners(volume, input.camera) {
+            (near, far) = (near.min(corner.z.max(0.0)), far.max(corner.z));
+        }
+    }
+    if !near.is_finite() {
+        return Slabs::new(0.0, 0.0, 1.0, 1.0);
+    }
+    Slabs::new(near, far, params.slab_width.unwrap_or(spacing), reach)
+}
+
+/// Counts what will be taken before it is.
+fn check_memory(input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [usize; 2]) -> Result<(), Error> {
+    let threads = rayon::current_num_threads() as u64;
+    let mut needed = threads * 4 * 4 * (TILE * TILE) as u64;
+    for volume in input.volumes {
+        let dims = Lattice::new(volume.grid, [usize::MAX; 3]).dims;
+        let reach = spacing_along(&view_axes(volume, input.camera)) * params.kernel.extent;
+        let lines = u64::from(Ring::lines_for(crate::sections::touched(reach / slabs.width)));
+        // Lists: four bytes for eight voxels, in two or three tiles each. Records: two of sixteen bytes a voxel of a tile.
+        let voxels = dims.iter().map(|n| *n as u64).product::<u64>();
+        let of_a_tile = voxels.div_ceil((tiles[0] * tiles[1]) as u64) * 4;
+        needed +=
+            Voxels::bytes(dims) + 2 * voxels + threads * (lines * 64 * AREA as u64 + Sheets::bytes() + 32 * of_a_tile);
+    }
+    if needed > params.max_bytes { Err(Error::Memory { needed, limit: params.max_bytes }) } else { Ok(()) }
+}
+
+impl<'a> Prepared<'a> {
+    fn new(volume: &'a Volume<'a>, input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [usize; 2]) -> Self {
+        let (grid, camera) = (volume.grid, input.camera);
+        let viewed = Viewed::new(volume, camera, slabs, params);
+        let reach = viewed.lattice_reach(camera, slabs, volume.normals);
+        let lattice = Lattice::new(grid, reach);
+        let viewed = viewed.with_rim(lattice.rim);
+        let voxels = Voxels::needed(&lattice, volume.transfer, reach);
+        let segments = Segments::new(&viewed, slabs, &voxels, lattice.dims, tiles);
+        let cutoff = params.kernel.extent / params.kernel.sigma;
+        let (low, high) = extremes(&grid.values);
+        let base = 0.5 * (f64::from(low) + f64::from(high));
+        Self {
+            volume,
+            lattice,
+            sections: SectionTable::new(viewed.reach / slabs.width, 0.5 * cutoff * cutoff),
+            taper: Taper::new(0.5 * cutoff * cutoff),
+            kernel: Kernel::new(&Footprint { cutoff: cutoff as f32 }),
+            classifier: Classifier::new(volume.transfer, base),
+            rays: LatticeRays::new(grid, camera, slabs),
+            footprint: camera.is_orthographic().then(|| viewed.footprint(camera.focal_px())),
+            viewed,
+            voxels,
+            segments,
+            base,
+        }
+    }
+
+    pub(crate) fn splatter(&self) -> Splatter<'_> {
+        Splatter {
+            viewed: &self.viewed,
+            kernel: &self.kernel,
+            taper: self.taper,
+            sections: &self.sections,
+            footprint: self.footprint,
+        }
+    }
+
+    /// Half the bounds of a footprint at `scale`, pixels.
+    #[inline(always)]
+    pub(crate) fn half(&self, scale: f64) -> [f32; 2] {
+        self.footprint.unwrap_or_else(|| self.viewed.footprint(scale)).half
+    }
+}
+
+/// Least and greatest value.
+pub(crate) fn extremes(values: &[f32]) -> (f32, f32) {
+    let none = (f32::INFINITY, f32::NEG_INFINITY);
+    let join = |a: (f32, f32), b: (f32, f32)| (a.0.min(b.0), a.1.max(b.1));
+    let of = |chunk: &[f32]| chunk.iter().fold(none, |all, v| join(all, (*v, *v)));
+    values.par_chunks(1 << 16).map(of).reduce(|| none, join)
+}
+
+impl Sheeted<'_> {
+    /// Slabs, and their width in world units.
+    pub fn slabs(&self) -> (u32, f64) {
+        (self.slabs.count, self.slabs.width)
+    }
+
+    /// Bytes of what was prepared.
+    pub fn bytes(&self) -> u64 {
+        self.volumes.iter().map(|v| v.segments.bytes() + Voxels::bytes(v.lattice.dims) / 4).sum()
+    }
+
+    /// Folds what lies at view depths in `range`, front to back, behind all that `into` holds. Ranges that meet share nothing and
+    /// lose nothing, wherever in a slab they do. `opaque` has the view depth of what hides the volumes at each pixel, +∞ for
+    /// nothing; or it is empty. One tick a tile.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`]: the accumulator is of no use as a picture.
+    ///
+    /// # Panics
+    /// If the sizes of the camera's image, `into` and `opaque` disagree, or `into` has other channels than `layout`.
+    pub fn fold(
+        &self,
+        range: Range<f32>,
+        opaque: &[f32],
+        layout: &ChannelLayout,
+        into: &mut Accumulator,
+        progress: Option<&Progress>,
+    ) -> Result<SheetCounts, Error> {
+        assert_eq!(self.input.camera.size, into.size, "invariant: one image size");
+        assert_eq!(layout.count(), into.channels.len(), "invariant: one set of channels");
+        let pixels = into.size[0] as usize * into.size[1] as usize;
+        assert!(opaque.is_empty() || opaque.len() == pixels, "invariant: an opaque depth for each pixel");
+        let quiet = Progress::new();
+        let progress = progress.unwrap_or(&quiet);
+        let range = f64::from(range.start).max(f64::MIN)..f64::from(range.end).min(f64::MAX);
+        let tiles = self.tiles[0] * self.tiles[1];
+        progress.add_total(tiles as u64);
+        let held: &Accumulator = into;
+        let fold = |scratch: &mut Scratch, t: usize| {
+            progress.tick(1).ok()?;
+            let work = FoldTile { of: self, layout, into: held, range: range.clone(), opaque, t, scratch };
+            Some(pulp::Arch::new().dispatch(work))
+        };
+        let done: Vec<_> = (0..tiles).into_par_iter().map_init(|| Scratch::new(&self.volumes), fold).collect();
+        progress.tick(0).map_err(cancelled)?;
+        let mut counts = self.counts();
+        for (picture, of_tile) in done.into_iter().flatten() {
+            counts = counts.add(of_tile);
+            if let Some(picture) = picture {
+                picture.store(into);
+            }
+        }
+        Ok(counts)
+    }
+
+    /// What is known before anything is folded.
+    fn counts(&self) -> SheetCounts {
+        SheetCounts {
+            voxels: self.volumes.iter().map(|v| v.volume.grid.values.len() as u64).sum(),
+            visible: self.volumes.iter().map(|v| v.voxels.count()).sum(),
+            slabs: u64::from(self.slabs.count),
+            bytes: self.bytes(),
+            ..SheetCounts::default()
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! Image-aligned sheets: volumes splatted in slabs across the view, classified and shaded after reconstruction.
+//!
+//! N. Neophytou, K. Mueller, *GPU Accelerated Image Aligned Splatting*, 2005, here on the processor. Voxels are kernels. Each
+//! adds to every slab across the view that it touches, a section of itself (Figure 1) times its footprint; all sections at once, as
+//! the paper's four colours do (section 4.2). A slab that is complete is a sheet of values: it is classified, shaded with gradients
+//! from the sheets before and behind it, and composited front to back. Classification comes after reconstruction, so zooms show
+//! no blur, and slabs turn with the view, so nothing pops.
+//!
+//! | symbol | here |
+//! |---|---|
+//! | Δ_s | [`Params::slab_width`], world units |
+//! | extent of the basis function, 2.0 | [`KernelShape::extent`], spacings of the lattice |
+//! | weight\[i\], coeff\[0..255\] | [`sections::sections`], of 256 phases |
+//! | 0.98 | 1 − [`Params::transmittance_cutoff`], [`Params::PAPERS_CUTOFF`] |
+//! | effective splats (Table 1) | [`SheetCounts::visible`] |
+//!
+//! ```
+//! use sheet_light::{Params, SheetInput, Volume, prepare};
+//! use splat_core::{Accumulator, Camera, Grid, LayerSet, Material, Projection, Shading, TransferFunction, TransferPoint};
+//! use splat_core::{glam::{DMat3, DVec3}, shade::ChannelLayout};
+//!
+//! // Eight cells of 1/2 along the view: 4 units of a medium of extinction 0.25, which shines white.
+//! let axes = DMat3::from_diagonal(DVec3::splat(0.5));
+//! let grid = Grid { origin: DVec3::splat(-1.75), axes, dims: [8; 3], values: vec![7.0; 512] };
+//! let white = TransferPoint { value: 0.0, color: [1.0; 3], extinction: 0.25 };
+//! let transfer = TransferFunction::new(vec![white]).unwrap();
+//! let material = Material { shading: Shading::Unlit, ..Material::default() };
+//! let volume = Volume {
+//!     grid: &grid, transfer: &transfer, material: &material, normals: false, object: 0, shadow_coefficient: 1.0,
+//! };
+//! let view = Projection::Orthographic { height: 2.0 };
+//! let camera = Camera::look_at(DVec3::Z * 9.0, DVec3::ZERO, DVec3::Y, view, [16, 16]).unwrap();
+//! let (volumes, layout) = ([volume], ChannelLayout::new(&LayerSet::default()));
+//! let input = SheetInput {
+//!     volumes: &volumes, camera: &camera, lights: &[], shadow_origin: DVec3::ZERO, ambient: [0.0; 3],
+//! };
+//! let mut image = Accumulator::new([16, 16], 1, 3, false, false);
+//! let sheets = prepare(&input, &Params::default(), None).unwrap();
+//! let everywhere = f32::NEG_INFINITY..f32::INFINITY;
+//! let counts = sheets.fold(everywhere, &[], &layout, &mut image, None).unwrap();
+//! // τ = 0.25·4, and what is opaque of it is white.
+//! assert!(image.optical_depth[0].iter().all(|tau| (tau - 1.0).abs() < 1e-5));
+//! assert!(image.channels[0].iter().all(|c| (c - (1.0 - (-1f32).exp())).abs() < 1e-5));
+//! assert!(counts.fragments > 0 && counts.visible >= 512);
+//! ```
+//!
+//! The README says how it works and where it deviates from the paper, and why.
+#![forbid(unsafe_code)]
+
+mod classify;
+mod counts;
+mod error;
+mod fold;
+mod lattice;
+mod params;
+mod picture;
+mod queue;
+mod rays;
+pub mod reference;
+mod ring;
+pub mod sections;
+mod segments;
+mod shade;
+mod sheets;
+mod slabs;
+mod tile;
+mod viewed;
+mod visible;
+mod volume;
+
+pub use counts::SheetCounts;
+pub use error::Error;
+pub use fold::{Sheeted, prepare};
+pub use params::{KernelShape, Params};
+pub use volume::{SheetInput, Volume};

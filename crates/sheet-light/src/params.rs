@@ -1,0 +1,64 @@
+//! What the caller chooses: slab width, kernel, when a pixel is done, memory.
+
+use crate::Error;
+
+/// The reconstruction kernel, in spacings of the lattice: a Gaussian less its Taylor polynomial at the rim
+/// ([`splat_core::Footprint`]), across the view as a footprint, along it as sections.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KernelShape {
+    /// Cutoff radius, spacings; the paper's extent of the basis function.
+    pub extent: f64,
+    /// Standard deviation of the Gaussian, spacings. `extent / sigma` lies in \[1, 8\].
+    pub sigma: f64,
+}
+
+impl Default for KernelShape {
+    /// The paper's extent of 2.0, with the deviation that keeps sums over a lattice even.
+    fn default() -> Self {
+        Self { extent: 2.0, sigma: 0.7 }
+    }
+}
+
+/// Parameters of image-aligned sheets.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Params {
+    /// Slab width Δs, world units, > 0; `None` for the least spacing of the volumes along the view.
+    pub slab_width: Option<f64>,
+    /// The kernel.
+    pub kernel: KernelShape,
+    /// A pixel is done when its transmittance is below this, in \[0, 1): what is hidden errs by at most that times the radiance
+    /// behind it. So tolerance/L_max; [`Params::PAPERS_CUTOFF`] is the paper's.
+    pub transmittance_cutoff: f32,
+    /// The most memory that may be taken, bytes.
+    pub max_bytes: u64,
+}
+
+impl Params {
+    /// "Usually 0.98" opacity (section 4.4).
+    pub const PAPERS_CUTOFF: f32 = 0.02;
+
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let KernelShape { extent, sigma } = self.kernel;
+        if !(0.5..=8.0).contains(&extent) {
+            return Err(Error::parameter("kernel.extent", extent, "0.5 to 8 spacings"));
+        }
+        if !(1.0..=8.0).contains(&(extent / sigma)) {
+            return Err(Error::parameter("kernel.sigma", sigma, "an eighth of the extent to the whole"));
+        }
+        if !(0.0..1.0).contains(&self.transmittance_cutoff) {
+            return Err(Error::parameter("transmittance_cutoff", self.transmittance_cutoff, "0 to below 1"));
+        }
+        match self.slab_width {
+            Some(width) if !(width.is_finite() && width > 0.0) => {
+                Err(Error::parameter("slab_width", width, "a finite number > 0, world units"))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self { slab_width: None, kernel: KernelShape::default(), transmittance_cutoff: 1e-3, max_bytes: 4 << 30 }
+    }
+}

@@ -1,0 +1,115 @@
+//! The voxels of one tile in the order of the slabs in which their kernels begin (section 4.2: "arranged into arrays according to the
+//! first image aligned slab that they intersect").
+//!
+//! Segments of eight are put in order by counting, and become voxels only when the sweep comes to them: what lies behind opaque
+//! tiles never does.
+
+use crate::fold::Prepared;
+use crate::ring::Record;
+use crate::sections::PHASES;
+use crate::segments::{SEGMENT, Segment};
+use crate::slabs::BATCH;
+use crate::tile::SIDE;
+use splat_core::glam::Vec3;
+use std::ops::Range;
+
+/// Voxels waiting for their batch.
+#[derive(Debug)]
+pub(crate) struct Queue {
+    found: Vec<(u32, Segment)>,
+    /// Segments by the batch of their nearest voxel.
+    segments: Vec<Segment>,
+    starts: Vec<u32>,
+    first: u32,
+    /// Voxels by batch, modulo the batches that a segment may span.
+    voxels: Vec<Vec<Record>>,
+    /// Those of the batch that was taken last.
+    taken: Vec<Record>,
+}
+
+impl Queue {
+    pub(crate) fn new(of: &Prepared<'_>) -> Self {
+        let slabs = (SEGMENT - 1) as f64 * of.viewed.axes.x_axis.z.abs() / of.viewed.width;
+        let span = (slabs / f64::from(BATCH)) as usize + 3;
+        Self {
+            found: Vec::new(),
+            segments: Vec::new(),
+            starts: Vec::new(),
+            first: 0,
+            voxels: vec![Vec::new(); span],
+            taken: Vec::new(),
+        }
+    }
+
+    /// Whether there is nothing in the tile.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.segments.is_empty()
+    }
+
+    /// The segments of tile `t` that begin in `batches`.
+    pub(crate) fn fill(&mut self, of: &Prepared<'_>, t: usize, batches: &Range<u32>) {
+        self.first = batches.start;
+        self.voxels.iter_mut().for_each(Vec::clear);
+        self.found.clear();
+        self.starts.clear();
+        self.starts.resize(batches.len() + 2, 0);
+        for segment in of.segments.tile(t) {
+            let start = of.viewed.position(segment.eighth * SEGMENT, segment.j, segment.k);
+            let end = start + of.viewed.axes.x_axis * (SEGMENT - 1) as f64;
+            let batch = |z: f64| of.viewed.place(z as f32).map_or(0, |place| place / (PHASES * BATCH));
+            let nearest = batch(start.z.min(end.z)).max(batches.start);
+            if nearest < batches.end && batch(start.z.max(end.z)) >= batches.start {
+                self.starts[(nearest - batches.start) as usize + 2] += 1;
+                self.found.push((nearest - batches.start, segment));
+            }
+        }
+        (2..self.starts.len()).for_each(|b| self.starts[b] += self.starts[b - 1]);
+        self.segments.clear();
+        self.segments.resize(self.found.len(), Segment { eighth: 0, j: 0, k: 0 });
+        for (batch, segment) in &self.found {
+            let at = &mut self.starts[*batch as usize + 1];
+            self.segments[*at as usize] = *segment;
+            *at += 1;
+        }
+    }
+
+    /// The voxels whose kernels begin in `batch`; batches are taken one after the other.
+    pub(crate) fn take(&mut self, of: &Prepared<'_>, batch: u32, corner: [usize; 2]) -> &[Record] {
+        let at = (batch - self.first) as usize;
+        for n in self.starts[at]..self.starts[at + 1] {
+            self.expand(of, self.segments[n as usize], batch, corner);
+        }
+        let slot = batch as usize % self.voxels.len();
+        std::mem::swap(&mut self.taken, &mut self.voxels[slot]);
+        self.voxels[slot].clear();
+        &self.taken
+    }
+
+    /// The voxels of a segment that reach the tile.
+    fn expand(&mut self, of: &Prepared<'_>, segment: Segment, batch: u32, corner: [usize; 2]) {
+        let (viewed, lattice, slots) = (&of.viewed, &of.lattice, self.voxels.len());
+        let Segment { eighth, j, k } = segment;
+        let first = eighth * SEGMENT;
+        let start = viewed.position(first, j, k);
+        let end = (first + SEGMENT).min(lattice.dims[0]);
+        let values = lattice.inside(first..end, j, k);
+        let mut bits = of.voxels.eight(eighth, j, k);
+        while bits != 0 {
+            let i = bits.trailing_zeros() as usize;
+            bits &= bits - 1;
+            let at = start + viewed.axes.x_axis * i as f64;
+            let Some(place) = viewed.place(at.z as f32) else { continue };
+            let begins = place / (PHASES * BATCH);
+            let Some(scale) = viewed.scale(viewed.depth(place)).filter(|_| begins >= batch) else { continue };
+            let [x, y] = viewed.pixel(Vec3::new(at.x as f32, at.y as f32, 0.0), scale as f32);
+            let half = of.half(scale);
+            let center = [x - (corner[0] as f32 - 1.0), y - (corner[1] as f32 - 1.0)];
+            let inside = |a: usize| center[a] + half[a] > 0.5 && center[a] - half[a] < SIDE as f32 - 0.5;
+            if inside(0) && inside(1) {
+                let value = values.map_or_else(|| lattice.value(first + i, j, k), |values| values[i]);
+                let value = crate::classify::relative(value, of.base);
+                self.voxels[begins as usize % slots].push(Record { center, value, place });
+            }
+        }
+    }
+}

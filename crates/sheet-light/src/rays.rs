@@ -1,0 +1,107 @@
+//! The rays of one tile: where each enters and leaves a volume, how long it is per unit of view depth.
+//!
+//! What a pixel's ray has of the medium in a slab is the length of ray ∩ slab ∩ volume, the volume being a parallelepiped: three
+//! pairs of planes in lattice coordinates. Lengths of neighbouring slabs add up to that of the whole, so a constant volume has
+//! e^−τ at any slab width and through any lens.
+
+use crate::slabs::Slabs;
+use crate::tile::{AREA, SIDE};
+use splat_core::glam::{DMat3, DVec3};
+use splat_core::raster::lanes::MAX_LANES;
+use splat_core::{Camera, Grid};
+
+/// View depths between which each ray is inside, counted from the first slab; beyond each other where it is not. The rim of the
+/// tile is included.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Crossings {
+    pub(crate) near: Vec<f32>,
+    pub(crate) far: Vec<f32>,
+}
+
+/// A volume's lattice coordinates of a view ray: origin + direction·z.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LatticeRays {
+    lattice_from_view: DMat3,
+    start: DVec3,
+    highest: DVec3,
+    origin: f64,
+}
+
+impl LatticeRays {
+    pub(crate) fn new(grid: &Grid, camera: &Camera, slabs: &Slabs) -> Self {
+        let world_from_view = DMat3::from_cols(camera.axes[0], camera.axes[1], camera.axes[2]);
+        let inverse = grid.axes.inverse();
+        Self {
+            lattice_from_view: inverse * world_from_view,
+            start: inverse * (camera.position - grid.origin),
+            highest: DVec3::from_array(grid.dims.map(|n| n as f64 - 0.5)),
+            origin: slabs.origin,
+        }
+    }
+
+    /// Where a view ray is inside, counted from the first slab, not behind the eye.
+    pub(crate) fn crossing(&self, (from, along): (DVec3, DVec3)) -> [f64; 2] {
+        let (from, along) = (self.start + self.lattice_from_view * from, self.lattice_from_view * along);
+        let (mut near, mut far) = (0.0f64, f64::INFINITY);
+        for a in 0..3 {
+            let (to_low, to_high) = (-0.5 - from[a], self.highest[a] - from[a]);
+            if along[a] == 0.0 {
+                if to_low > 0.0 || to_high < 0.0 {
+                    return [f64::INFINITY, f64::NEG_INFINITY];
+                }
+                continue;
+            }
+            let (one, other) = (to_low / along[a], to_high / along[a]);
+            (near, far) = (near.max(one.min(other)), far.min(one.max(other)));
+        }
+        [near - self.origin, far - self.origin]
+    }
+}
+
+/// The rays of a tile with its rim: x and y per unit of view depth in perspective, or where they are if they are parallel.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Slopes {
+    /// By column.
+    pub(crate) u: [f32; SIDE + MAX_LANES],
+    /// By row.
+    pub(crate) v: [f32; SIDE],
+    x: [f64; SIDE],
+    y: [f64; SIDE],
+    is_parallel: bool,
+}
+
+impl Slopes {
+    pub(crate) fn new(camera: &Camera, corner: [usize; 2]) -> Self {
+        let is_parallel = camera.is_orthographic();
+        let at = |v: usize, a: usize| {
+            let px = (corner[a] + v) as f64 - 0.5;
+            let (from, along) = camera.view_ray(px, px);
+            (if is_parallel { from } else { along })[a]
+        };
+        let (x, y): ([f64; SIDE], [f64; SIDE]) = (std::array::from_fn(|v| at(v, 0)), std::array::from_fn(|v| at(v, 1)));
+        let column = |v: usize| x.get(v).map_or(0.0, |x| *x as f32);
+        Self { u: std::array::from_fn(column), v: y.map(|y| y as f32), x, y, is_parallel }
+    }
+
+    /// View-space origin and direction of a ray, as [`Camera::view_ray`] has them.
+    pub(crate) fn ray(&self, x: usize, y: usize) -> (DVec3, DVec3) {
+        let at = DVec3::new(self.x[x], self.y[y], 0.0);
+        if self.is_parallel { (at, DVec3::Z) } else { (DVec3::ZERO, at + DVec3::Z) }
+    }
+}
+
+impl Crossings {
+    pub(crate) fn new() -> Self {
+        Self { near: vec![0.0; AREA + MAX_LANES], far: vec![0.0; AREA + MAX_LANES] }
+    }
+
+    /// Those of a tile.
+    pub(crate) fn of_tile(&mut self, rays: &LatticeRays, slopes: &Slopes) {
+        for y in 0..SIDE {
+            for x in 0..SIDE {
+                let [near, far] = rays.crossing(slopes.ray(x, y));
+                (self.near[y * SIDE + x], self.far[y * SIDE + x]) = (near as f32, far as f32);
+            }
+        }
+    }
+}

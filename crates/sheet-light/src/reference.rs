@@ -1,0 +1,182 @@
+//! The slow form in f64: the same sheets pixel by pixel and slab by slab, without tiles, vectors, rings, lists or skipped voxels.
+
+use crate::fold::slabs_of;
+use crate::lattice::Lattice;
+use crate::rays::LatticeRays;
+use crate::sections::{PHASES, sections};
+use crate::shade::{Seen, radiance};
+use crate::slabs::Slabs;
+use crate::viewed::Viewed;
+use crate::{Error, Params, SheetInput, Volume};
+use splat_core::Footprint;
+use splat_core::glam::{DVec3, Vec3};
+
+/// What it draws.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// Optical depth of each pixel, green.
+    pub optical_depth: Vec<f64>,
+    /// Radiance of each pixel, linear Rec.709.
+    pub color: Vec<[f64; 3]>,
+}
+
+/// Sheets of one volume: by slab, by pixel.
+struct Sheets {
+    values: Vec<f64>,
+    weights: Vec<f64>,
+    /// Where each ray is inside.
+    crossings: Vec<[f64; 2]>,
+    size: [usize; 2],
+}
+
+/// Draws all of the volumes, green extinction for all channels. Time grows as voxels times pixels under a footprint times slabs
+/// under a kernel, memory as pixels times slabs.
+///
+/// # Errors
+/// [`Error::Parameter`], [`Error::Volume`] or [`Error::Slabs`].
+pub fn draw(input: &SheetInput<'_>, params: &Params) -> Result<Picture, Error> {
+    params.check()?;
+    input.check()?;
+    let slabs = slabs_of(input, params)?;
+    let sheets: Vec<Sheets> = input.volumes.iter().map(|v| Sheets::new(v, input, params, &slabs)).collect();
+    let [width, height] = input.camera.size.map(|s| s as usize);
+    let mut out = Picture { optical_depth: vec![0.0; width * height], color: vec![[0.0; 3]; width * height] };
+    for slab in 1..slabs.count - 1 {
+        for at in 0..width * height {
+            let (mut tau, mut color) = (0.0, [0.0; 3]);
+            for (volume, sheets) in input.volumes.iter().zip(&sheets) {
+                let (own, radiance) = sheets.fragment(input, volume, params, &slabs, slab, at);
+                tau += own;
+                (0..3).for_each(|c| color[c] += own * radiance[c]);
+            }
+            if tau > 0.0 {
+                let weight = libm::exp(-out.optical_depth[at]) * -libm::expm1(-tau);
+                (0..3).for_each(|c| out.color[at][c] += weight * color[c] / tau);
+                out.optical_depth[at] += tau;
+            }
+        }
+    }
+    Ok(out)
+}
+
+impl Sheets {
+    fn new(volume: &Volume<'_>, input: &SheetInput<'_>, params: &Params, slabs: &Slabs) -> Self {
+        let camera = input.camera;
+        let size = camera.size.map(|s| s as usize);
+        let rays = LatticeRays::new(volume.grid, camera, slabs);
+        let pixels = 0..size[0] * size[1];
+        let ray = |at: usize| camera.view_ray((at % size[0]) as f64 + 0.5, (at / size[0]) as f64 + 0.5);
+        let n = pixels.len() * slabs.count as usize;
+        let mut sheets = Self {
+            values: vec![0.0; n],
+            weights: vec![0.0; n],
+            crossings: pixels.map(|at| rays.crossing(ray(at))).collect(),
+            size,
+        };
+        let viewed = Viewed::new(volume, camera, slabs, params);
+        let lattice = Lattice::new(volume.grid, viewed.lattice_reach(camera, slabs, volume.normals));
+        let viewed = viewed.with_rim(lattice.rim);
+        let [nx, ny, nz] = lattice.dims;
+        for (k, j, i) in (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i)))) {
+            sheets.splat(&viewed, params, slabs, viewed.position(i, j, k), lattice.value(i, j, k));
+        }
+        sheets
+    }
+
+    /// Adds one voxel to every slab and pixel that it touches.
+    fn splat(&mut self, viewed: &Viewed, params: &Params, slabs: &Slabs, at: DVec3, value: f32) {
+        let Some(place) = viewed.place(at.z as f32) else { return };
+        let Some(scale) = viewed.scale(viewed.depth(place)) else { return };
+        let footprint = viewed.footprint(scale);
+        let [a, b, c] = footprint.conic.map(f64::from);
+        let [x0, y0] = viewed.pixel(Vec3::new(at.x as f32, at.y as f32, 0.0), scale as f32).map(f64::from);
+        let cutoff = params.kernel.extent / params.kernel.sigma;
+        let profile = Footprint { cutoff: cutoff as f32 };
+        let sections = sections(place % PHASES, viewed.reach / slabs.width, 0.5 * cutoff * cutoff);
+        let range = |center: f64, half: f32, n: usize| {
+            let half = f64::from(half) + 1.0;
+            (center - half).max(0.0) as usize..((center + half).max(0.0) as usize).min(n)
+        };
+        for y in range(y0, footprint.half[1], self.size[1]) {
+            for x in range(x0, footprint.half[0], self.size[0]) {
+                let (dx, dy) = (x as f64 + 0.5 - x0, y as f64 + 0.5 - y0);
+                let weight = profile.profile(a * dx * dx + 2.0 * b * dx * dy + c * dy * dy);
+                for (s, section) in sections.iter().enumerate() {
+                    let slab = (place / PHASES) as usize + s;
+                    let sheet = slab * self.size[0] * self.size[1] + y * self.size[0] + x;
+                    if let Some(sum) = self.weights.get_mut(sheet) {
+                        *sum += weight * section;
+                        self.values[sheet] += weight * section * f64::from(value);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Value of a pixel in a slab, where there is one.
+    fn value(&self, slab: u32, at: usize) -> Option<f64> {
+        let sheet = slab as usize * self.size[0] * self.size[1] + at;
+        (self.weights[sheet] > 1e-12).then(|| self.values[sheet] / self.weights[sheet])
+    }
+
+    /// Where a ray is inside, within a slab.
+    fn inside(&self, slabs: &Slabs, slab: u32, at: usize) -> Option<[f64; 2]> {
+        let [near, far] = self.crossings[at];
+        let (near, far) = (near.max(f64::from(slab) * slabs.width), far.min(f64::from(slab + 1) * slabs.width));
+        (far > near).then_some([near, far])
+    }
+
+    /// Optical depth of a pixel in a slab, and its radiance.
+    fn fragment(
+        &self,
+        input: &SheetInput<'_>,
+        volume: &Volume<'_>,
+        params: &Params,
+        slabs: &Slabs,
+        slab: u32,
+        at: usize,
+    ) -> (f64, [f64; 3]) {
+        let nothing = (0.0, [0.0; 3]);
+        let (Some(value), Some([near, far])) = (self.value(slab, at), self.inside(slabs, slab, at)) else {
+            return nothing;
+        };
+        let class = volume.transfer.at(value as f32);
+        if class.extinction == 0.0 {
+            return nothing;
+        }
+        let (x, y) = ((at % self.size[0]) as f64 + 0.5, (at / self.size[0]) as f64 + 0.5);
+        let (from, along) = input.camera.view_ray(x, y);
+        let extinction = f64::from(class.extinction) * f64::from(volume.material.extinction_rgb[1]);
+        let tau = extinction * (far - near) * along.length();
+        let normal = if volume.normals { self.normal(input, slabs, slab, at, along) } else { Vec3::ZERO };
+        let viewed = Viewed::new(volume, input.camera, slabs, params);
+        let place = from + along * (slabs.origin + 0.5 * (near + far));
+        let seen = Seen::new(input.camera, place, along);
+        let radiance = radiance(input, volume, viewed.reach as f32, seen, class.color, normal).effects();
+        (tau, [0, 1, 2].map(|c| radiance.iter().map(|effect| f64::from(effect[c])).sum()))
+    }
+
+    /// −∇v/|∇v| in world space, from the neighbours that are inside.
+    fn normal(&self, input: &SheetInput<'_>, slabs: &Slabs, slab: u32, at: usize, along: DVec3) -> Vec3 {
+        let (x, y) = (at % self.size[0], at / self.size[0]);
+        let sample = |slab: u32, at: usize| self.value(slab, at).filter(|_| self.inside(slabs, slab, at).is_some());
+        let here = self.value(slab, at).unwrap_or(0.0);
+        let difference = |before: Option<f64>, after: Option<f64>| {
+            let steps = f64::from(u8::from(before.is_some()) + u8::from(after.is_some()));
+            (after.unwrap_or(here) - before.unwrap_or(here)) / steps.max(1.0)
+        };
+        let pixel = |x: Option<usize>, y: Option<usize>| {
+            let (x, y) = (x.filter(|x| *x < self.size[0])?, y.filter(|y| *y < self.size[1])?);
+            sample(slab, y * self.size[0] + x)
+        };
+        let right = difference(pixel(x.checked_sub(1), Some(y)), pixel(Some(x + 1), Some(y)));
+        let down = difference(pixel(Some(x), y.checked_sub(1)), pixel(Some(x), Some(y + 1)));
+        let z = difference(sample(slab - 1, at), sample(slab + 1, at)) / slabs.width;
+        let camera = input.camera;
+        let depth = slabs.origin + (f64::from(slab) + 0.5) * slabs.width;
+        let scale = camera.focal_px() / if camera.is_orthographic() { 1.0 } else { depth.max(slabs.width * 1e-3) };
+        let (gx, gy) = (right * scale, -down * scale);
+        let gradient = camera.axes[0] * gx + camera.axes[1] * gy + camera.axes[2] * (z - along.x * gx - along.y * gy);
+        -(gradient * slabs.width).normalize_or_zero().as_vec3()
+    }
+}

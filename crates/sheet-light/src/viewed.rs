@@ -1,0 +1,199 @@
+//! A lattice as the view sees it: where its voxels are, how far their kernels reach, and their footprints.
+//!
+//! In lattice coordinates the kernel is round. In view space its extent is the ellipsoid M = e²·A·Aᵀ, A the steps of the lattice
+//! and e the extent; the kernel here is the product of the footprint of M across the view and of sections of M along it. On a
+//! lattice of equal steps at right angles that is the paper's kernel. On others it contains the ellipsoid: what a kernel's
+//! middle shifts from slab to slab there is not followed.
+//!
+//! In perspective the kernel is sheared along the ray through its voxel, so that one footprint serves all slabs.
+
+use crate::sections::PHASES;
+use crate::slabs::Slabs;
+use crate::{Params, Volume};
+use splat_core::Camera;
+use splat_core::glam::{DMat3, DVec3, Vec3};
+
+/// Least standard deviation of a footprint in its narrow direction, pixels: none falls between pixels.
+const LEAST_SIGMA_PX: f64 = 0.5;
+
+/// Slant of a footprint, as a correlation, that is none.
+const UPRIGHT: f64 = 1e-9;
+
+/// Share of its reach that a voxel must lie before the eye: nearer ones have footprints without bounds.
+const NEAREST: f64 = 1.0 / 64.0;
+
+/// A footprint in pixels: s = conic·(dx², 2·dx·dy, dy²), 1 at the rim.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PixelFootprint {
+    pub(crate) conic: [f32; 3],
+    /// Half the width and height of its bounds.
+    pub(crate) half: [f32; 2],
+}
+
+/// One lattice in view space.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Viewed {
+    /// View position of lattice point (0, 0, 0), its depth counted from the first slab.
+    pub(crate) start: DVec3,
+    /// Steps in view space.
+    pub(crate) axes: DMat3,
+    /// e·√M_zz: how far a kernel reaches along the view, world units.
+    pub(crate) reach: f64,
+    /// M across the view: xx, xy, yy, world units².
+    extent: [f64; 3],
+    /// Its least eigenvalue.
+    smallest: f64,
+    /// The footprint of a pixel a world unit.
+    unit: PixelFootprint,
+    /// Least eigenvalue of a footprint in pixels².
+    least: f64,
+    /// Pixels per unit of x/z, or per world unit.
+    focal: f64,
+    center: [f64; 2],
+    /// View depth of the first slab, for perspective.
+    origin: Option<f64>,
+    pub(crate) width: f64,
+}
+
+/// Steps of a lattice in view space.
+pub(crate) fn view_axes(volume: &Volume<'_>, camera: &Camera) -> DMat3 {
+    DMat3::from_cols(camera.axes[0], camera.axes[1], camera.axes[2]).transpose() * volume.grid.axes
+}
+
+/// Length of the row of view depths: the spacing of the lattice along the view.
+pub(crate) fn spacing_along(axes: &DMat3) -> f64 {
+    axes.row(2).length()
+}
+
+/// View positions of the corners of a volume.
+pub(crate) fn corners(volume: &Volume<'_>, camera: &Camera) -> [DVec3; 8] {
+    let grid = volume.grid;
+    std::array::from_fn(|c| {
+        let at = [0, 1, 2].map(|a| if c >> a & 1 == 1 { grid.dims[a] as f64 - 0.5 } else { -0.5 });
+        camera.view_from_world(grid.origin + grid.axes * DVec3::from_array(at))
+    })
+}
+
+/// The footprint that is 1 at the rim of an ellipse.
+fn of_extent([xx, xy, yy]: [f64; 3]) -> PixelFootprint {
+    let norm = 1.0 / (xx * yy - xy * xy);
+    // No negative zero.
+    let conic = [yy, 0.0 - xy, xx].map(|c| (c * norm) as f32);
+    PixelFootprint { conic, half: [libm::sqrt(xx) as f32, libm::sqrt(yy) as f32] }
+}
+
+impl Viewed {
+    pub(crate) fn new(volume: &Volume<'_>, camera: &Camera, slabs: &Slabs, params: &Params) -> Self {
+        let axes = view_axes(volume, camera);
+        let e2 = params.kernel.extent * params.kernel.extent;
+        let m = axes * axes.transpose() * e2;
+        let least_radius = LEAST_SIGMA_PX * params.kernel.extent / params.kernel.sigma;
+        let (xx, xy, yy) = (m.x_axis.x, m.x_axis.y, m.y_axis.y);
+        // Equal steps at right angles leave a rounding of a slant, and what is upright is drawn faster.
+        let slant = if xy.abs() > UPRIGHT * libm::sqrt(xx * yy) { xy } else { 0.0 };
+        // Rows of pixels run down.
+        let extent = [xx, -slant, yy];
+        let half = 0.5 * (extent[0] - extent[2]);
+        let smallest = 0.5 * (extent[0] + extent[2]) - libm::sqrt(half * half + extent[1] * extent[1]);
+        let mut start = camera.view_from_world(volume.grid.origin);
+        start.z -= slabs.origin;
+        Self {
+            start,
+            axes,
+            reach: libm::sqrt(m.z_axis.z),
+            extent,
+            smallest,
+            unit: of_extent(extent),
+            least: least_radius * least_radius,
+            focal: camera.focal_px(),
+            center: camera.size.map(|s| 0.5 * f64::from(s)),
+            origin: (!camera.is_orthographic()).then_some(slabs.origin),
+            width: slabs.width,
+        }
+    }
+
+    /// Counts lattice points from the corner of a rim around the lattice.
+    pub(crate) fn with_rim(self, rim: [usize; 3]) -> Self {
+        let steps = DVec3::from_array(rim.map(|n| n as f64));
+        Self { start: self.start - self.axes * steps, ..self }
+    }
+
+    /// View position of lattice point (i, j, k), depth counted from the first slab.
+    pub(crate) fn position(&self, i: usize, j: usize, k: usize) -> DVec3 {
+        self.start + self.axes * DVec3::new(i as f64, j as f64, k as f64)
+    }
+
+    /// Where the kernel of a voxel at this depth begins, in 256ths of a slab: the slab is the quotient by 256, the phase the
+    /// rest. Rounded, so that a lattice that lies evenly in the slabs stays clear of the edges of phases. `None` for a kernel that
+    /// begins before the first slab, and ends behind the eye.
+    #[inline(always)]
+    pub(crate) fn place(&self, depth: f32) -> Option<u32> {
+        let slabs = (f64::from(depth) - self.reach) / self.width;
+        (slabs >= 0.0).then_some((slabs * f64::from(PHASES) + 0.5) as u32)
+    }
+
+    /// The depth of the middle of a kernel that begins there.
+    #[inline(always)]
+    pub(crate) fn depth(&self, place: u32) -> f64 {
+        f64::from(place) * (self.width / f64::from(PHASES)) + self.reach
+    }
+
+    /// Pixels per world unit at a depth; `None` too near the eye.
+    #[inline(always)]
+    pub(crate) fn scale(&self, depth: f64) -> Option<f64> {
+        let Some(origin) = self.origin else { return Some(self.focal) };
+        let z = origin + depth;
+        (z >= NEAREST * self.reach).then(|| self.focal / z)
+    }
+
+    /// Pixel of a view position at `scale`.
+    #[inline(always)]
+    pub(crate) fn pixel(&self, at: Vec3, scale: f32) -> [f32; 2] {
+        [self.center[0] as f32 + at.x * scale, self.center[1] as f32 - at.y * scale]
+    }
+
+    /// The footprint at `scale`; widened where it would fall between pixels.
+    #[inline(always)]
+    pub(crate) fn footprint(&self, scale: f64) -> PixelFootprint {
+        if self.smallest * scale * scale >= self.least {
+            let (scale, inverse) = (scale as f32, (1.0 / scale) as f32);
+            let PixelFootprint { conic: [a, b, c], half: [x, y] } = self.unit;
+            let square = inverse * inverse;
+            return PixelFootprint { conic: [a * square, b * square, c * square], half: [x * scale, y * scale] };
+        }
+        of_extent(self.extent_px(scale))
+    }
+
+    /// Extent of a footprint in pixels²: xx, xy, yy.
+    #[inline(always)]
+    fn extent_px(&self, scale: f64) -> [f64; 3] {
+        let [xx, xy, yy] = self.extent.map(|m| m * scale * scale);
+        let wider = (self.least - self.smallest * scale * scale).max(0.0);
+        [xx + wider, xy, yy + wider]
+    }
+
+    /// Lattice steps along each axis within which lie all voxels whose kernels reach a point where a pixel's ray crosses a
+    /// slab, or the neighbours that a gradient is taken from.
+    pub(crate) fn lattice_reach(&self, camera: &Camera, slabs: &Slabs, gradient: bool) -> [usize; 3] {
+        let far = slabs.width * f64::from(slabs.count);
+        let scale = self.scale(far).unwrap_or(self.focal);
+        let neighbour = if gradient { 1.0 } else { 0.0 };
+        let [xx, xy, yy] = self.extent_px(scale).map(|m| m / (scale * scale));
+        let pixel = neighbour / scale;
+        // A sheet holds means over its slab, whose middle may lie beyond a volume's face.
+        let along = self.reach + (1.0 + neighbour) * slabs.width;
+        let [width, height] = camera.size.map(f64::from);
+        let corners = [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]];
+        let inverse = self.axes.inverse();
+        [0, 1, 2].map(|a| {
+            let row = inverse.row(a);
+            // Rows of pixels run down, view space up.
+            let across = libm::sqrt((row.x * row.x * xx - 2.0 * row.x * row.y * xy + row.y * row.y * yy).max(0.0));
+            let slant = |[x, y]: [f64; 2]| row.dot(camera.view_ray(x, y).1).abs();
+            let slanted = corners.into_iter().map(slant).fold(0.0, f64::max);
+            let steps = across + (row.x.abs() + row.y.abs()) * pixel + slanted * along;
+            // From any place of a cell.
+            (steps + 0.5).min(1e6) as usize
+        })
+    }
+}

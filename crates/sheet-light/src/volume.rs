@@ -1,0 +1,61 @@
+//! What is drawn: volumes with their own transfer functions, the lights, the view.
+
+use crate::Error;
+use splat_core::glam::DVec3;
+use splat_core::shade::LitBy;
+use splat_core::{Camera, Grid, Material, TransferFunction};
+
+/// Most lattice points along one axis: a voxel's place in its row is kept in 16 bits, with a rim around the lattice.
+const MOST_A_SIDE: usize = (1 << 16) - 8;
+
+/// One volume.
+#[derive(Debug, Clone, Copy)]
+pub struct Volume<'a> {
+    /// Values, with the lattice in world space. Every lattice point is the centre of its cell, so the volume is the
+    /// parallelepiped from −1/2 to n − 1/2 in lattice coordinates.
+    pub grid: &'a Grid,
+    /// Value → colour and extinction σ_t, 1/world unit; applied to what the sheets reconstruct.
+    pub transfer: &'a TransferFunction,
+    /// How light becomes radiance.
+    pub material: &'a Material,
+    /// Whether light is reflected about the gradient of the values, −∇v/|∇v| being the normal.
+    pub normals: bool,
+    /// Object id, for the object plane of an accumulator.
+    pub object: u32,
+    /// Share of shadows that it receives, in \[0, 1\].
+    pub shadow_coefficient: f32,
+}
+
+/// What sheets are made of.
+#[derive(Clone, Copy)]
+pub struct SheetInput<'a> {
+    /// Volumes; where they overlap extinctions add, and colours weigh by extinction.
+    pub volumes: &'a [Volume<'a>],
+    /// The view. Slabs lie across its axis.
+    pub camera: &'a Camera,
+    /// Lights, with their shadows.
+    pub lights: &'a [LitBy<'a>],
+    /// World position that receivers of shadows are relative to: the origin of the cloud that casts them.
+    pub shadow_origin: DVec3,
+    /// Ambient radiance, the same from everywhere.
+    pub ambient: [f32; 3],
+}
+
+impl SheetInput<'_> {
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        for (volume, v) in self.volumes.iter().enumerate() {
+            v.grid.validate().map_err(|source| Error::Volume { volume, source })?;
+            if v.grid.dims.iter().any(|n| *n > MOST_A_SIDE) {
+                let source = splat_core::Error::invalid("grid", 0, "dims", v.grid.dims, "at most 65528 a side");
+                return Err(Error::Volume { volume, source });
+            }
+            if !(0.0..=1.0).contains(&v.shadow_coefficient) {
+                let expected = "a number in [0, 1]";
+                let source =
+                    splat_core::Error::invalid("volume", volume, "shadow_coefficient", v.shadow_coefficient, expected);
+                return Err(Error::Volume { volume, source });
+            }
+        }
+        Ok(())
+    }
+}

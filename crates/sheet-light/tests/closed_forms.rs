@@ -1,0 +1,132 @@
+//! Constant volumes: e^−τ along every ray.
+
+use crate::common::{constant, cubic, draw, exact, grid, input, parallel, perspective, transfer, unlit, volume};
+use sheet_light::{KernelShape, Params, sections};
+use splat_core::glam::{DMat3, DVec3};
+use splat_core::{Camera, Grid};
+
+/// Length of a pixel's ray inside a lattice's cells, found by bisection of its ends, not by planes.
+fn length(grid: &Grid, camera: &Camera, x: usize, y: usize) -> f64 {
+    let (from, along) = camera.view_ray(x as f64 + 0.5, y as f64 + 0.5);
+    let world = |v: DVec3| camera.axes[0] * v.x + camera.axes[1] * v.y + camera.axes[2] * v.z;
+    let inverse = grid.axes.inverse();
+    let is_inside = |z: f64| {
+        let at = inverse * (camera.position + world(from + along * z) - grid.origin);
+        (0..3).all(|a| at[a] >= -0.5 && at[a] <= grid.dims[a] as f64 - 0.5)
+    };
+    let (far, n) = (200.0, 20_000);
+    let step = |i: usize| far * i as f64 / f64::from(n);
+    let Some(first) = (0..n as usize).find(|i| is_inside(step(*i))) else { return 0.0 };
+    let last = (first..n as usize).take_while(|i| is_inside(step(*i))).last().unwrap();
+    let border = |mut inside: f64, mut outside: f64| {
+        for _ in 0..60 {
+            let middle = 0.5 * (inside + outside);
+            *(if is_inside(middle) { &mut inside } else { &mut outside }) = middle;
+        }
+        inside
+    };
+    let near = if first == 0 { 0.0 } else { border(step(first), step(first - 1)) };
+    (border(step(last), step(last + 1)) - near) * along.length()
+}
+
+/// Every pixel of a constant volume has e^−τ and, being white, 1 − e^−τ; every 7th is held against the closed form.
+fn check(grid: &Grid, camera: &Camera, tau_per_length: f32, params: &Params) {
+    let (tf, material) = (constant(tau_per_length), unlit());
+    let volumes = [volume(grid, &tf, &material)];
+    let (out, counts) = draw(&input(&volumes, camera, &[]), params).unwrap();
+    let width = camera.size[0] as usize;
+    let mut seen = 0;
+    for at in (0..out.optical_depth[0].len()).step_by(7) {
+        let length = length(grid, camera, at % width, at / width);
+        if length < 0.03 {
+            // A corner that the search for the ends steps over.
+            assert!(out.optical_depth[0][at] < 0.03 * tau_per_length, "pixel {at}");
+            continue;
+        }
+        let expected = (-length * f64::from(tau_per_length)).exp();
+        let (found, light) = ((-f64::from(out.optical_depth[0][at])).exp(), f64::from(out.channels[0][at]));
+        assert!((found - expected).abs() < 1e-5, "pixel {at}: {found}, expected {expected}; {counts:?}");
+        assert!((light - (1.0 - expected)).abs() < 1e-5, "pixel {at}: {light}, expected {}", 1.0 - expected);
+        seen += 1;
+    }
+    assert!(seen > 50, "the volume is out of the picture");
+}
+
+#[test]
+fn hv05_opacity_does_not_depend_on_the_number_of_slabs() {
+    let grid = grid([20, 20, 16], cubic(0.5), |_| 3.0);
+    let camera = parallel([3.0, 4.0, 12.0], 14.0, [60, 50]);
+    for slab_width in [0.06, 0.13, 0.5, 0.77, 2.0, 40.0] {
+        for extinction in [0.00125, 0.125, 0.625] {
+            check(&grid, &camera, extinction, &Params { slab_width: Some(slab_width), ..exact() });
+        }
+    }
+}
+
+#[test]
+fn ia12_a_wide_lens_has_the_length_of_each_ray() {
+    let grid = grid([40, 40, 8], cubic(0.25), |_| -7.0);
+    for from in [[0.0, 0.0, 5.0], [2.0, 1.5, 3.0], [0.3, 0.2, 0.9]] {
+        check(&grid, &perspective(from, 90.0, [72, 64]), 0.5, &exact());
+    }
+}
+
+#[test]
+fn hv17_any_lattice_has_the_length_of_each_ray() {
+    let sheared = DMat3::from_cols(DVec3::new(0.5, 0.1, 0.0), DVec3::new(0.3, 0.6, -0.1), DVec3::new(-0.2, 0.1, -0.7));
+    let flat = DMat3::from_diagonal(DVec3::new(0.4, 0.4, 1.3));
+    for axes in [sheared, flat, -flat] {
+        let grid = grid([14, 12, 9], axes, |_| 1.0);
+        for params in [exact(), Params { kernel: KernelShape { extent: 3.0, sigma: 1.0 }, ..exact() }] {
+            check(&grid, &perspective([3.0, 5.0, 9.0], 50.0, [56, 60]), 0.4, &params);
+            check(&grid, &parallel([-5.0, 2.0, 6.0], 12.0, [56, 60]), 0.4, &params);
+        }
+    }
+}
+
+#[test]
+fn an_eye_in_the_volume_sees_what_lies_before_it() {
+    let grid = grid([24, 24, 24], cubic(0.5), |_| 1.0);
+    check(&grid, &perspective([0.1, 0.2, 0.3], 80.0, [64, 64]), 0.3, &exact());
+    check(&grid, &parallel([0.1, 0.2, 0.3], 4.0, [64, 64]), 0.3, &exact());
+}
+
+#[test]
+fn ia01_sections_of_every_phase_sum_to_one() {
+    for (reach, sharpness) in [(2.0, 4.08), (0.3, 4.5), (3.7, 12.5), (16.0, 4.08)] {
+        for phase in 0..sections::PHASES {
+            let sections = sections::sections(phase, reach, sharpness);
+            assert_eq!(sections.len(), sections::touched(reach));
+            assert!((sections.iter().sum::<f64>() - 1.0).abs() < 1e-12 && sections.iter().all(|w| *w >= 0.0));
+            // Its mean is the kernel's middle, but for the slabs being wide.
+            let mean: f64 = sections.iter().enumerate().map(|(i, w)| w * (i as f64 + 0.5)).sum();
+            let middle = f64::from(phase) / 256.0 + reach;
+            assert!((mean - middle).abs() < if reach < 1.0 { 0.5 } else { 0.02 }, "{reach} {phase}: {mean} {middle}");
+        }
+    }
+    // Five slabs, not the paper's four.
+    assert_eq!(sections::touched(2.0), 5);
+    assert!(sections::sections(128, 2.0, 4.08)[4] > 1e-3);
+}
+
+#[test]
+fn ia03_a_voxel_that_crosses_a_face_keeps_its_weight() {
+    // One voxel's cell, moved by 1/1024 of a slab: the mean over its own cell is its value at every place.
+    let (tf, material) = (transfer(&[(0.0, 0.0), (1.0, 1.0)]), unlit());
+    let camera = parallel([0.0, 0.0, 8.0], 1.0, [16, 16]);
+    for step in 0..1024 {
+        let mut one = grid([1, 1, 1], cubic(1.0), |_| 0.5);
+        one.origin.z += f64::from(step) / 1024.0;
+        let other = grid([1, 1, 1], cubic(0.001), |_| 0.0);
+        let volumes = [volume(&one, &tf, &material), volume(&other, &tf, &material)];
+        let params = Params { slab_width: Some(1.0), ..exact() };
+        if step % 32 == 0 || step < 4 {
+            let (out, _) = draw(&input(&volumes, &camera, &[]), &params).unwrap();
+            assert!(
+                out.optical_depth[0].iter().all(|tau| (tau - 0.5).abs() < 1e-6),
+                "{step}: {:?}",
+                out.optical_depth[0][0]
+            );
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! Volumes, views and pictures for the tests.
+
+use sheet_light::{Error, Params, SheetCounts, SheetInput, Volume, prepare};
+use splat_core::glam::{DMat3, DVec3};
+use splat_core::shade::{ChannelLayout, LitBy};
+use splat_core::{
+    Accumulator, Camera, Grid, LayerSet, Material, Projection, Shading, TransferFunction, TransferPoint, rng,
+};
+
+/// A lattice around the origin, its values by place in world space.
+pub(crate) fn grid(dims: [usize; 3], axes: DMat3, value: impl Fn(DVec3) -> f64) -> Grid {
+    let middle = DVec3::from_array(dims.map(|n| 0.5 * (n as f64 - 1.0)));
+    let origin = -(axes * middle);
+    let mut grid = Grid { origin, axes, dims, values: Vec::new() };
+    for (k, j, i) in (0..dims[2]).flat_map(|k| (0..dims[1]).flat_map(move |j| (0..dims[0]).map(move |i| (k, j, i)))) {
+        grid.values.push(value(grid.position(i, j, k)) as f32);
+    }
+    grid
+}
+
+/// Cubic cells of side `spacing`.
+pub(crate) fn cubic(spacing: f64) -> DMat3 {
+    DMat3::from_diagonal(DVec3::splat(spacing))
+}
+
+/// A value between 0 and 1 for each place, without any order.
+pub(crate) fn noise(p: DVec3) -> f64 {
+    let bits = [p.x, p.y, p.z].map(|v| (v * 1024.0).round() as i64 as u64 & 0xffff);
+    rng::unit(3, 0, bits[0] | bits[1] << 16 | bits[2] << 32, 0)
+}
+
+/// Control points (value, extinction), green turning to red.
+pub(crate) fn transfer(points: &[(f32, f32)]) -> TransferFunction {
+    let count = points.len() as f32;
+    let point = |(i, &(value, extinction)): (usize, &(f32, f32))| {
+        let t = (i as f32 + 0.5) / count;
+        TransferPoint { value, color: [t, 1.0 - t, 0.5], extinction }
+    };
+    TransferFunction::new(points.iter().enumerate().map(point).collect()).unwrap()
+}
+
+/// The same extinction for all values, white.
+pub(crate) fn constant(extinction: f32) -> TransferFunction {
+    TransferFunction::new(vec![TransferPoint { value: 0.0, color: [1.0; 3], extinction }]).unwrap()
+}
+
+pub(crate) fn unlit() -> Material {
+    Material { shading: Shading::Unlit, ..Material::default() }
+}
+
+pub(crate) fn volume<'a>(grid: &'a Grid, transfer: &'a TransferFunction, material: &'a Material) -> Volume<'a> {
+    Volume { grid, transfer, material, normals: false, object: 0, shadow_coefficient: 1.0 }
+}
+
+pub(crate) fn perspective(from: [f64; 3], fov_deg: f64, size: [u32; 2]) -> Camera {
+    let projection = Projection::Perspective { fov_y: fov_deg.to_radians() };
+    Camera::look_at(DVec3::from_array(from), DVec3::ZERO, DVec3::Y, projection, size).unwrap()
+}
+
+pub(crate) fn parallel(from: [f64; 3], height: f64, size: [u32; 2]) -> Camera {
+    let projection = Projection::Orthographic { height };
+    Camera::look_at(DVec3::from_array(from), DVec3::ZERO, DVec3::Y, projection, size).unwrap()
+}
+
+pub(crate) fn input<'a>(volumes: &'a [Volume<'a>], camera: &'a Camera, lights: &'a [LitBy<'a>]) -> SheetInput<'a> {
+    SheetInput { volumes, camera, lights, shadow_origin: DVec3::ZERO, ambient: [0.1; 3] }
+}
+
+pub(crate) const BEAUTY: ChannelLayout =
+    ChannelLayout::new(&LayerSet { effects: false, shadow: false, normal: false, depth: false, object: false });
+
+/// No pixel is done before its end.
+pub(crate) fn exact() -> Params {
+    Params { transmittance_cutoff: 0.0, ..Params::default() }
+}
+
+/// Beauty and one plane of optical depth.
+pub(crate) fn draw(input: &SheetInput<'_>, params: &Params) -> Result<(Accumulator, SheetCounts), Error> {
+    let mut out = Accumulator::new(input.camera.size, 1, 3, true, true);
+    let counts = prepare(input, params, None)?.fold(f32::NEG_INFINITY..f32::INFINITY, &[], &BEAUTY, &mut out, None)?;
+    Ok((out, counts))
+}
+
+/// Greatest difference of two planes.
+pub(crate) fn largest(a: &[f32], b: &[f32]) -> f32 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+}
+
+/// Greatest difference of two pictures' colours and transmittances.
+pub(crate) fn apart(a: &Accumulator, b: &Accumulator) -> f32 {
+    let through = |a: &Accumulator| a.optical_depth[0].iter().map(|t| (-t).exp()).collect::<Vec<f32>>();
+    let planes = a.channels.iter().zip(&b.channels).map(|(a, b)| largest(a, b));
+    planes.fold(largest(&through(a), &through(b)), f32::max)
+}

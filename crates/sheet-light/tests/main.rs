@@ -1,0 +1,8 @@
+//! Sheets against closed forms, invariances, their slow twin, and hard cases. One program: it is linked once.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod closed_forms;
+mod common;
+mod hard_cases;
+mod invariances;
+mod twin;
