@@ -4,7 +4,7 @@
 //! threads on processors, which other work adds less to. `-- WORD` draws those whose name has it.
 #![allow(missing_docs, clippy::expect_used, reason = "a benchmark")]
 
-use convert::read::{self, Loaded, ReadLimits};
+use convert::read::{self, Loaded, ReadParams};
 use organza_benches::processor_ms;
 use sheet_light::{Params, SheetCounts, SheetInput, Volume, prepare};
 use splat_core::glam::DVec3;
@@ -21,8 +21,8 @@ const REPEATS: usize = 7;
 
 fn head() -> Grid {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/mni152/mni152_t1.nii.gz");
-    match read::file(&path, &ReadLimits::default()).expect("an asset of the repository") {
-        Loaded::Grid(grid) => grid,
+    match read::file(&path, &ReadParams::default(), None).expect("an asset of the repository") {
+        (Loaded::Grid(grid), _) => grid,
         _ => unreachable!("the head is a volume"),
     }
 }

@@ -1,5 +1,7 @@
 //! Errors of sheets: parameters and volumes out of range, too many slabs, too much memory, cancelled.
 
+use splat_core::Exceeded;
+
 /// Why sheets were refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -22,26 +24,9 @@ pub enum Error {
         /// What is wrong.
         source: splat_core::Error,
     },
-    /// The depth of the volumes over the slab width gives too many slabs, or a kernel reaches through too many.
-    #[error("slabs {width} wide: {needed} {what}, the limit is {limit}; choose wider slabs")]
-    Slabs {
-        /// Slab width, world units.
-        width: f64,
-        /// What there are too many of.
-        what: &'static str,
-        /// How many there would be.
-        needed: f64,
-        /// How many there may be.
-        limit: u32,
-    },
-    /// More memory than [`crate::Params::max_bytes`] allows.
-    #[error("sheets need {needed} bytes, the limit is {limit}")]
-    Memory {
-        /// Bytes needed, estimated before any are taken.
-        needed: u64,
-        /// Bytes allowed.
-        limit: u64,
-    },
+    /// Too many slabs, in all or under one kernel, or more memory than [`crate::Params::limits`] allow.
+    #[error("{0}; {hint}", hint = .0.hint)]
+    Limit(Exceeded),
     /// The caller asked to stop, see [`splat_core::Progress`].
     #[error("cancelled")]
     Cancelled,
@@ -50,6 +35,10 @@ pub enum Error {
 impl Error {
     pub(crate) fn parameter(name: &'static str, found: impl std::fmt::Debug, expected: &'static str) -> Self {
         Self::Parameter { name, found: format!("{found:?}"), expected }
+    }
+
+    pub(crate) fn limit(what: &'static str, needed: u64, limit: u64, unit: &'static str, hint: String) -> Self {
+        Self::Limit(Exceeded { what: what.into(), needed, limit: Some(limit), unit, hint: hint.into() })
     }
 }
 

@@ -54,7 +54,7 @@ pub struct Sheeted<'a> {
 /// Finds the voxels that may be seen and lists them by tile.
 ///
 /// # Errors
-/// [`Error::Parameter`], [`Error::Volume`], [`Error::Slabs`], [`Error::Memory`] before much is taken, or [`Error::Cancelled`].
+/// [`Error::Parameter`], [`Error::Volume`], [`Error::Limit`] before much is taken, or [`Error::Cancelled`].
 pub fn prepare<'a>(
     input: &'a SheetInput<'a>,
     params: &Params,
@@ -108,7 +108,9 @@ fn check_memory(input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [
         needed +=
             Voxels::bytes(dims) + 2 * voxels + threads * (lines * 64 * AREA as u64 + Sheets::bytes() + 32 * of_a_tile);
     }
-    if needed > params.max_bytes { Err(Error::Memory { needed, limit: params.max_bytes }) } else { Ok(()) }
+    let limit = params.limits.max_bytes;
+    let hint = || "use fewer voxels or a smaller picture".to_owned();
+    if needed > limit { Err(Error::limit("sheets", needed, limit, "bytes", hint())) } else { Ok(()) }
 }
 
 impl<'a> Prepared<'a> {

@@ -1,6 +1,7 @@
 //! What the caller chooses: slab width, kernel, when a pixel is done, memory.
 
 use crate::Error;
+use splat_core::Limits;
 
 /// The reconstruction kernel, in spacings of the lattice: a Gaussian less its Taylor polynomial at the rim
 /// ([`splat_core::Footprint`]), across the view as a footprint, along it as sections.
@@ -29,8 +30,8 @@ pub struct Params {
     /// A pixel is done when its transmittance is below this, in \[0, 1): what is hidden errs by at most that times the radiance
     /// behind it. So tolerance/L_max; [`Params::PAPERS_CUTOFF`] is the paper's.
     pub transmittance_cutoff: f32,
-    /// The most memory that may be taken, bytes.
-    pub max_bytes: u64,
+    /// Bytes of lists, records and sheets, estimated before any is taken.
+    pub limits: Limits,
 }
 
 impl Params {
@@ -59,6 +60,6 @@ impl Params {
 
 impl Default for Params {
     fn default() -> Self {
-        Self { slab_width: None, kernel: KernelShape::default(), transmittance_cutoff: 1e-3, max_bytes: 4 << 30 }
+        Self { slab_width: None, kernel: KernelShape::default(), transmittance_cutoff: 1e-3, limits: Limits::default() }
     }
 }

@@ -15,6 +15,8 @@ const PIXELS: usize = TILE * TILE;
 /// What neighbouring pixels have of one slab.
 #[derive(Debug, Clone)]
 pub(crate) struct Fragments {
+    /// Whether any volume has optical depth here; what else they hold is of another place if none has.
+    pub(crate) any: bool,
     /// Optical depth by plane.
     pub(crate) optical_depth: [[f32; MAX_LANES]; 3],
     /// Radiance and the other channels.

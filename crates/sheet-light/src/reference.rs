@@ -33,19 +33,20 @@ struct Sheets {
 /// under a kernel, memory as pixels times slabs.
 ///
 /// # Errors
-/// [`Error::Parameter`], [`Error::Volume`] or [`Error::Slabs`].
+/// [`Error::Parameter`], [`Error::Volume`] or [`Error::Limit`].
 pub fn draw(input: &SheetInput<'_>, params: &Params) -> Result<Picture, Error> {
     params.check()?;
     input.check()?;
     let slabs = slabs_of(input, params)?;
     let sheets: Vec<Sheets> = input.volumes.iter().map(|v| Sheets::new(v, input, params, &slabs)).collect();
+    let view = View { input, params, slabs: &slabs };
     let [width, height] = input.camera.size.map(|s| s as usize);
     let mut out = Picture { optical_depth: vec![0.0; width * height], color: vec![[0.0; 3]; width * height] };
     for slab in 1..slabs.count - 1 {
         for at in 0..width * height {
             let (mut tau, mut color) = (0.0, [0.0; 3]);
             for (volume, sheets) in input.volumes.iter().zip(&sheets) {
-                let (own, radiance) = sheets.fragment(input, volume, params, &slabs, slab, at);
+                let (own, radiance) = sheets.fragment(&view, volume, slab, at);
                 tau += own;
                 (0..3).for_each(|c| color[c] += own * radiance[c]);
             }
@@ -57,6 +58,13 @@ pub fn draw(input: &SheetInput<'_>, params: &Params) -> Result<Picture, Error> {
         }
     }
     Ok(out)
+}
+
+/// What is drawn in which slabs.
+struct View<'a> {
+    input: &'a SheetInput<'a>,
+    params: &'a Params,
+    slabs: &'a Slabs,
 }
 
 impl Sheets {
@@ -127,15 +135,8 @@ impl Sheets {
     }
 
     /// Optical depth of a pixel in a slab, and its radiance.
-    fn fragment(
-        &self,
-        input: &SheetInput<'_>,
-        volume: &Volume<'_>,
-        params: &Params,
-        slabs: &Slabs,
-        slab: u32,
-        at: usize,
-    ) -> (f64, [f64; 3]) {
+    fn fragment(&self, of: &View<'_>, volume: &Volume<'_>, slab: u32, at: usize) -> (f64, [f64; 3]) {
+        let View { input, params, slabs } = *of;
         let nothing = (0.0, [0.0; 3]);
         let (Some(value), Some([near, far])) = (self.value(slab, at), self.inside(slabs, slab, at)) else {
             return nothing;

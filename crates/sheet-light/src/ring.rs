@@ -135,9 +135,9 @@ impl Ring {
         let (first, last) = (record.place / PHASES, record.place / PHASES + of.sections.touched as u32 - 1);
         self.tag(first, last, y0..y1, span);
         if footprint.conic[1] == 0.0 {
-            self.upright(simd, of, record, &footprint, [x0, x1], [y0, y1]);
+            self.upright(simd, of, record, &footprint, [x0, x1, y0, y1]);
         } else {
-            self.slanted(simd, of, record, &footprint, [x0, x1], [y0, y1]);
+            self.slanted(simd, of, record, &footprint, [x0, x1, y0, y1]);
         }
         let mut line = first / SLABS;
         while line <= last / SLABS {
@@ -167,8 +167,7 @@ impl Ring {
         of: &Splatter<'_>,
         record: &Record,
         footprint: &PixelFootprint,
-        [x0, x1]: [usize; 2],
-        [y0, y1]: [usize; 2],
+        [x0, x1, y0, y1]: [usize; 4],
     ) {
         let at = |v: f32| Lanes::splat(simd, v);
         let [a, _, c] = footprint.conic;
@@ -204,8 +203,7 @@ impl Ring {
         of: &Splatter<'_>,
         record: &Record,
         footprint: &PixelFootprint,
-        [x0, x1]: [usize; 2],
-        [y0, y1]: [usize; 2],
+        [x0, x1, y0, y1]: [usize; 4],
     ) {
         let [a, b, c] = footprint.conic;
         let at = |v: f32| Lanes::splat(simd, v);

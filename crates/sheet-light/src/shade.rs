@@ -5,7 +5,7 @@ use crate::picture::{Fragments, Picture};
 use crate::rays::{Crossings, Slopes};
 use crate::sheets::{LEAST_WEIGHT, Sheets, difference};
 use crate::slabs::Slabs;
-use crate::tile::SIDE;
+use crate::tile::{SIDE, TILE};
 use crate::volume::{SheetInput, Volume};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
@@ -40,6 +40,8 @@ pub(crate) struct Reconstructed<'a> {
     pub(crate) radius: f32,
     pub(crate) crossings: &'a Crossings,
     pub(crate) sheets: &'a Sheets,
+    /// View depths between which each pixel of the tile without its rim may have light, counted from the first slab.
+    pub(crate) limits: [&'a [f32]; 2],
 }
 
 /// What one volume has in neighbouring pixels of one slab.
@@ -51,20 +53,38 @@ struct Medium<S: Simd> {
     color: [Lanes<S>; 3],
 }
 
+/// Pixels to be lit.
+struct Lit {
+    /// Optical depth; 0 where nothing has to be lit.
+    tau: [f32; MAX_LANES],
+    normals: [Vec3; MAX_LANES],
+    color: [[f32; MAX_LANES]; 3],
+    /// View depths of the middle of the medium, counted from the first slab.
+    middle: [f32; MAX_LANES],
+}
+
+/// What one volume brings to neighbouring pixels.
+struct Shaded<'a> {
+    volume: &'a Volume<'a>,
+    tau: [f32; MAX_LANES],
+    values: Values,
+}
+
+/// A number for each channel of each pixel.
+type Values = [[f32; MAX_LANES]; MAX_CHANNELS];
+
 impl Shader<'_> {
-    /// The fragments of a volume; false where it has no optical depth in any of the pixels.
+    /// Adds a volume to the fragments; nothing where it has no optical depth in any of the pixels.
     #[inline(always)]
     pub(crate) fn add<S: Simd>(
         &self,
         simd: S,
         of: &Reconstructed<'_>,
         place: Place,
-        limits: [Lanes<S>; 2],
         picture: &Picture,
-        is_first: bool,
         fragments: &mut Fragments,
-    ) -> bool {
-        let medium = self.classify(simd, of, place, limits);
+    ) {
+        let medium = self.classify(simd, of, place);
         let secant = self.secants(simd, place);
         let mut tau = [0.0; MAX_LANES];
         (medium.depth * secant).store(&mut tau);
@@ -73,8 +93,10 @@ impl Shader<'_> {
             any |= tau[lane] > 0.0;
         }
         if !any {
-            return false;
+            return;
         }
+        let is_first = !fragments.any;
+        fragments.any = true;
         let mut values = [[0.0; MAX_LANES]; MAX_CHANNELS];
         let is_plain = of.volume.material.shading == Shading::Unlit && self.layout.count() == 3;
         if is_plain {
@@ -84,7 +106,17 @@ impl Shader<'_> {
         } else {
             let normals = if of.volume.normals { self.normals(simd, of, place) } else { [Vec3::ZERO; MAX_LANES] };
             let open = picture.open[place.y] >> place.x;
-            self.light(simd, of, place, &medium, &tau, open, &normals, &mut values);
+            let mut lit = Lit { tau, normals, color: [[0.0; MAX_LANES]; 3], middle: [0.0; MAX_LANES] };
+            for c in 0..3 {
+                medium.color[c].store(&mut lit.color[c]);
+            }
+            ((medium.near + medium.far) * Lanes::splat(simd, 0.5)).store(&mut lit.middle);
+            for lane in 0..Lanes::<S>::COUNT {
+                if open >> lane & 1 == 0 {
+                    lit.tau[lane] = 0.0;
+                }
+            }
+            self.light::<S>(of, place, &lit, &mut values);
         }
         let extinction = of.volume.material.extinction_rgb;
         for p in 0..picture.planes {
@@ -98,15 +130,15 @@ impl Shader<'_> {
             medium.far.store(&mut fragments.far);
             fragments.object = [of.volume.object; MAX_LANES];
         } else {
-            mix(simd, &tau, extinction, &values, of.volume.object, picture, &medium, fragments);
+            mix(simd, &Shaded { volume: of.volume, tau, values }, &medium, fragments, picture);
         }
-        true
     }
 
     /// The medium of a volume in a slab: its length within the limits, its class.
     #[inline(always)]
-    fn classify<S: Simd>(&self, simd: S, of: &Reconstructed<'_>, place: Place, limits: [Lanes<S>; 2]) -> Medium<S> {
+    fn classify<S: Simd>(&self, simd: S, of: &Reconstructed<'_>, place: Place) -> Medium<S> {
         let at = place.y * SIDE + place.x;
+        let limits = of.limits.map(|depths| Lanes::load(simd, &depths[(place.y - 1) * TILE + place.x - 1..]));
         let face = |slab: u32| Lanes::splat(simd, self.slabs.face(slab));
         let near = Lanes::load(simd, &of.crossings.near[at..]).max(limits[0]).max(face(place.slab));
         let far = Lanes::load(simd, &of.crossings.far[at..]).min(limits[1]).min(face(place.slab + 1));
@@ -187,29 +219,14 @@ impl Shader<'_> {
 
     /// Radiance of the pixels that have optical depth, by the function that shades every point.
     #[inline(always)]
-    fn light<S: Simd>(
-        &self,
-        simd: S,
-        of: &Reconstructed<'_>,
-        place: Place,
-        medium: &Medium<S>,
-        tau: &[f32; MAX_LANES],
-        open: u64,
-        normals: &[Vec3; MAX_LANES],
-        values: &mut [[f32; MAX_LANES]; MAX_CHANNELS],
-    ) {
-        let (mut color, mut middle) = ([[0.0; MAX_LANES]; 3], [0.0; MAX_LANES]);
-        for c in 0..3 {
-            medium.color[c].store(&mut color[c]);
-        }
-        ((medium.near + medium.far) * Lanes::splat(simd, 0.5)).store(&mut middle);
+    fn light<S: Simd>(&self, of: &Reconstructed<'_>, place: Place, lit: &Lit, values: &mut Values) {
         for lane in 0..Lanes::<S>::COUNT {
-            if tau[lane] > 0.0 && open >> lane & 1 == 1 {
-                let color = [color[0][lane], color[1][lane], color[2][lane]];
-                let seen = self.seen(place, lane, middle[lane]);
+            if lit.tau[lane] > 0.0 {
+                let color = lit.color.map(|channel| channel[lane]);
+                let seen = self.seen(place, lane, lit.middle[lane]);
                 let mut out = [0.0; MAX_CHANNELS];
-                let radiance = radiance(self.input, of.volume, of.radius, seen, color, normals[lane]);
-                radiance.write(normals[lane], self.layout, &mut out);
+                let radiance = radiance(self.input, of.volume, of.radius, seen, color, lit.normals[lane]);
+                radiance.write(lit.normals[lane], self.layout, &mut out);
                 for c in 0..self.layout.count() {
                     values[c][lane] = out[c];
                 }
@@ -278,16 +295,9 @@ pub(crate) fn radiance(
 
 /// Adds a volume to those before it: colours weigh by extinction.
 #[inline(always)]
-fn mix<S: Simd>(
-    simd: S,
-    tau: &[f32; MAX_LANES],
-    extinction: [f32; 3],
-    values: &[[f32; MAX_LANES]; MAX_CHANNELS],
-    object: u32,
-    picture: &Picture,
-    medium: &Medium<S>,
-    fragments: &mut Fragments,
-) {
+fn mix<S: Simd>(simd: S, own: &Shaded<'_>, medium: &Medium<S>, fragments: &mut Fragments, picture: &Picture) {
+    let Shaded { volume, tau, values } = own;
+    let (extinction, object) = (volume.material.extinction_rgb, volume.object);
     let of = |v: f32| Lanes::splat(simd, v);
     let tau_here = Lanes::load(simd, tau);
     for c in 0..picture.channels {

@@ -29,16 +29,20 @@ pub(crate) struct Slabs {
 impl Slabs {
     /// Slabs that hold view depths from `near` to `far`, for kernels of radius `reach`.
     pub(crate) fn new(near: f64, far: f64, width: f64, reach: f64) -> Result<Self, Error> {
-        let too_many = |what, needed, limit| Err(Error::Slabs { width, what, needed, limit });
+        let too_many = |what, needed: f64, limit| {
+            // What is no number is more than can be counted.
+            let needed = if needed.is_nan() { u64::MAX } else { needed as u64 };
+            Err(Error::limit(what, needed, u64::from(limit), "slabs", format!("choose slabs wider than {width}")))
+        };
         let touched = (2.0 * reach / width).ceil() + 1.0;
         if touched.is_nan() || touched > f64::from(MOST_TOUCHED) {
-            return too_many("slabs under one kernel", touched, MOST_TOUCHED);
+            return too_many("a kernel", touched, MOST_TOUCHED);
         }
         // A kernel that ends in the first slab of a volume begins so far before it. One more, for that slab's neighbour.
         let before = (2.0 * reach / width).ceil() + 1.0;
         let needed = ((far - near) / width).ceil() + before + 2.0;
         if needed.is_nan() || needed > f64::from(MOST_SLABS) {
-            return too_many("slabs", needed, MOST_SLABS);
+            return too_many("the depth of all volumes", needed, MOST_SLABS);
         }
         let count = (needed as u32).next_multiple_of(BATCH);
         Ok(Self { origin: near - before * width, width, count })

@@ -53,6 +53,7 @@ impl Scratch {
             near: vec![0.0; TILE * TILE],
             far: vec![0.0; TILE * TILE],
             fragments: Fragments {
+                any: false,
                 optical_depth: [[0.0; MAX_LANES]; 3],
                 values: [[0.0; MAX_LANES]; MAX_CHANNELS],
                 near: [0.0; MAX_LANES],
@@ -89,9 +90,9 @@ impl pulp::WithSimd for FoldTile<'_> {
             counts.tiles_skipped = 1;
             return (None, counts);
         }
-        let (shown, batches) = self.batches();
+        let span = self.span();
         for (prepared, scratch) in of.volumes.iter().zip(&mut self.scratch.volumes) {
-            scratch.queue.fill(prepared, self.t, &batches);
+            scratch.queue.fill(prepared, self.t, &span.batches);
         }
         if self.scratch.volumes.iter().all(|v| v.queue.is_empty()) {
             counts.tiles_skipped = 1;
@@ -104,19 +105,26 @@ impl pulp::WithSimd for FoldTile<'_> {
             scratch.sheets.clear();
         }
         self.limits(corner);
-        self.sweep(simd, &slopes, shown.start, batches, &mut picture, &mut counts);
+        self.sweep(simd, &slopes, &span, &mut picture, &mut counts);
         (Some(picture), counts)
     }
 }
 
+/// The slabs of a range of depths.
+struct Span {
+    /// The first one.
+    first: u32,
+    /// The batches that hold them, their neighbours, and the beginnings of all kernels that reach them.
+    batches: Range<u32>,
+}
+
 impl FoldTile<'_> {
-    /// Slabs of the range, and the batches that hold them, their neighbours, and the beginnings of all kernels that reach them.
-    fn batches(&self) -> (Range<u32>, Range<u32>) {
+    fn span(&self) -> Span {
         let slabs = &self.of.slabs;
         let slab = |z: f64| ((z - slabs.origin) / slabs.width).clamp(0.0, f64::from(slabs.count)) as u32;
         let (first, last) = (slab(self.range.start).max(1), (slab(self.range.end) + 2).min(slabs.count));
         let begin = first.saturating_sub(self.of.touched + 1);
-        (first..last, begin / BATCH..last.div_ceil(BATCH))
+        Span { first, batches: begin / BATCH..last.div_ceil(BATCH) }
     }
 
     /// Depths that each pixel may have light at.
@@ -142,8 +150,7 @@ impl FoldTile<'_> {
         &mut self,
         simd: S,
         slopes: &Slopes,
-        first: u32,
-        batches: Range<u32>,
+        span: &Span,
         picture: &mut Picture,
         counts: &mut SheetCounts,
     ) {
@@ -158,8 +165,8 @@ impl FoldTile<'_> {
         };
         let behind = u32::from(of.has_gradients);
         // Sheets are shaded one later than they are finished where gradients need the one behind.
-        let mut next = first;
-        for batch in batches.clone() {
+        let mut next = span.first;
+        for batch in span.batches.clone() {
             let wanted = picture.wanted(of.has_gradients);
             for (prepared, scratch) in of.volumes.iter().zip(&mut self.scratch.volumes) {
                 let splatter = prepared.splatter();
@@ -172,7 +179,8 @@ impl FoldTile<'_> {
                 }
                 ring.take_batch(simd, batch, sheets);
             }
-            let end = if batch + 1 == batches.end { (batch + 1) * BATCH - 1 } else { (batch + 1) * BATCH - behind };
+            let end =
+                if batch + 1 == span.batches.end { (batch + 1) * BATCH - 1 } else { (batch + 1) * BATCH - behind };
             for slab in next..end {
                 self.shade_slab(simd, &shader, slab, picture, counts);
             }
@@ -205,10 +213,8 @@ impl FoldTile<'_> {
             while x <= TILE {
                 if tags >> x & ((1 << Lanes::<S>::COUNT) - 1) != 0 {
                     counts.shaded += Lanes::<S>::COUNT as u64;
-                    let at = (y - 1) * TILE + x - 1;
-                    let limits =
-                        [Lanes::load(simd, &self.scratch.near[at..]), Lanes::load(simd, &self.scratch.far[at..])];
-                    let mut any = false;
+                    let fragments = &mut self.scratch.fragments;
+                    fragments.any = false;
                     for (prepared, scratch) in of.volumes.iter().zip(&self.scratch.volumes) {
                         let reconstructed = Reconstructed {
                             volume: prepared.volume,
@@ -216,13 +222,12 @@ impl FoldTile<'_> {
                             radius: prepared.viewed.reach as f32,
                             crossings: &scratch.crossings,
                             sheets: &scratch.sheets,
+                            limits: [&self.scratch.near, &self.scratch.far],
                         };
-                        let place = Place { slab, y, x };
-                        let fragments = &mut self.scratch.fragments;
-                        any |= shader.add(simd, &reconstructed, place, limits, picture, !any, fragments);
+                        shader.add(simd, &reconstructed, Place { slab, y, x }, picture, fragments);
                     }
-                    if any {
-                        picture.composite(simd, y - 1, x - 1, &self.scratch.fragments, of.slabs.origin);
+                    if fragments.any {
+                        picture.composite(simd, y - 1, x - 1, fragments, of.slabs.origin);
                     }
                 }
                 x += Lanes::<S>::COUNT;

@@ -6,7 +6,7 @@ use crate::common::{
 use sheet_light::{Error, KernelShape, Params, prepare};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::shade::ChannelLayout;
-use splat_core::{Accumulator, LayerSet, Material, Progress, TransferFunction, TransferPoint};
+use splat_core::{Accumulator, Exceeded, LayerSet, Limits, Material, Progress, TransferFunction, TransferPoint};
 
 #[test]
 fn ia06_pixels_that_are_done_err_by_no_more_than_what_they_hide() {
@@ -186,10 +186,16 @@ fn what_cannot_be_drawn_is_refused() {
         let refused = with(Params { slab_width: Some(slab_width), ..exact() });
         assert!(matches!(refused, Err(Error::Parameter { name: "slab_width", .. })), "{slab_width}: {refused:?}");
     }
-    assert!(matches!(with(Params { slab_width: Some(1e-9), ..exact() }), Err(Error::Slabs { .. })));
+    assert!(matches!(
+        with(Params { slab_width: Some(1e-9), ..exact() }),
+        Err(Error::Limit(Exceeded { unit: "slabs", .. }))
+    ));
     let kernel = KernelShape { extent: 2.0, sigma: 0.1 };
     assert!(matches!(with(Params { kernel, ..exact() }), Err(Error::Parameter { name: "kernel.sigma", .. })));
-    assert!(matches!(with(Params { max_bytes: 1000, ..exact() }), Err(Error::Memory { limit: 1000, .. })));
+    assert!(matches!(
+        with(Params { limits: Limits::bytes(1000), ..exact() }),
+        Err(Error::Limit(Exceeded { limit: Some(1000), .. }))
+    ));
     assert!(matches!(with(Params { transmittance_cutoff: f32::NAN, ..exact() }), Err(Error::Parameter { .. })));
     let mut bad = good.clone();
     bad.values[7] = f32::NAN;

@@ -153,11 +153,11 @@ fn deposit_all<M: Mapping, const C: usize>(
 pub(crate) fn check_entries<const C: usize>(entries: u64, limits: &Limits) -> Result<(), Error> {
     let most = limits.max_elements.min(u32::MAX.into());
     if entries > most {
-        return Err(Error::limit("the lists", entries, most, "entries"));
+        return Err(Error::limit("the set of lists", entries, most, "entries"));
     }
     let needed = entries * (2 * size_of::<[f32; C]>() as u64 + 12);
     if needed > limits.max_bytes {
-        return Err(Error::limit("the lists", needed, limits.max_bytes, "bytes"));
+        return Err(Error::limit("the set of lists", needed, limits.max_bytes, "bytes"));
     }
     Ok(())
 }
