@@ -298,7 +298,7 @@ fn a_small_picture_of_a_scene_is_the_processor_s() {
     // A lamp inside a cloud, a fountain, a tree of translucent leaves, opaque ground.
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/light-inside.toml");
     let mut scene = scene::parse(&path, &std::fs::read(&path).unwrap(), &Default::default()).unwrap();
-    scene.camera.size = [96, 72];
+    scene.camera.size = [192, 144];
     let alone = render_of(&scene, None);
     let device = DeviceChoice { backends: vec![backend().unwrap()], choice: adapter(), or_processor: false };
     let helped = render_of(&scene, Some(device));
