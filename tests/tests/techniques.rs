@@ -12,7 +12,7 @@ fn three(order: [usize; 3], apart: f64) -> String {
          rectangle = {{ center = [0, 0, {:?}], u = [2, 0, 0], v = [0, 2, 0], spacing = 0.1 }}\n\
          [[object]]\nname = 'slab'\ntechnique = 'reference'\n\
          medium_box = {{ min = [-2, -2, {:?}], max = [2, 2, {:?}], extinction = 0.5, spacing = 0.1 }}\n\
-         [render]\nantialias = 1\nparticles = {{ repeat_level = 100 }}\n",
+         [render]\nantialias = 1\ndepth_ranges = 6\nparticles = {{ repeat_level = 100 }}\n",
         parallel_view(2.0, 32),
         at(0) - 0.5,
         at(0) + 0.5,

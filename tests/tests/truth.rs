@@ -85,7 +85,7 @@ rectangle = { center = [0, 0, 0], u = [0, 0, 5], v = [5, 0, 0], spacing = 0.04 }
 color = [0.8, 0.7, 0.6]
 [[light]]
 intensity = [4, 4, 4]
-samples = 64
+samples = 25
 "#;
 
 /// The points of a light, shining to all sides alike.
