@@ -10,8 +10,8 @@ use sheet_light::{Params, SheetCounts, SheetInput, Volume, prepare};
 use splat_core::glam::DVec3;
 use splat_core::shade::{ChannelLayout, LitBy};
 use splat_core::{
-    Accumulator, Camera, Grid, LayerSet, Light, LightShape, Material, Projection, Shading, TransferFunction,
-    TransferPoint,
+    Accumulator, Camera, Grid, LayerSet, Light, LightShape, Material, Projection, Shading, Similarity,
+    TransferFunction, TransferPoint,
 };
 use std::path::Path;
 use std::time::Instant;
@@ -75,9 +75,9 @@ fn row(name: &str, grid: &Grid, transfer: &TransferFunction, lit: bool, camera: 
     let direction = DVec3::new(0.6, -0.5, -0.6).normalize();
     let sun = Light { shape: LightShape::Directional { direction }, intensity: [3.0; 3] };
     let lights = [LitBy { light: sun, shadow: None }];
-    let volumes = [Volume { grid, transfer, material: &material, normals: lit, object: 0, shadow_coefficient: 1.0 }];
+    let volumes = [Volume { grid, transform: Similarity::default(), transfer, material: &material, normals: lit, object: 0, shadow_coefficient: 1.0 }];
     let lights = if lit { &lights[..] } else { &[] };
-    let input = SheetInput { volumes: &volumes, camera, lights, shadow_origin: DVec3::ZERO, ambient: [0.1; 3] };
+    let input = SheetInput { volumes: &volumes, splats: None, camera, lights, shadow_origin: DVec3::ZERO, ambient: [0.1; 3] };
     let params = Params { transmittance_cutoff: Params::PAPERS_CUTOFF, ..Params::default() };
     let layout = ChannelLayout::new(&LayerSet::default());
     let (mut best, mut counts) = ([[f64::INFINITY; 2]; 2], SheetCounts::default());

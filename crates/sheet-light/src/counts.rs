@@ -13,6 +13,8 @@ pub struct SheetCounts {
     pub hidden: u64,
     /// Footprint numbers multiplied into pixels, each for all sections at once.
     pub fragments: u64,
+    /// Those of splats, each for one slab.
+    pub splat_fragments: u64,
     /// Pixels of sheets classified.
     pub shaded: u64,
     /// Tiles without any voxel, or opaque from the beginning.
@@ -31,6 +33,7 @@ impl SheetCounts {
             records: self.records + other.records,
             hidden: self.hidden + other.hidden,
             fragments: self.fragments + other.fragments,
+            splat_fragments: self.splat_fragments + other.splat_fragments,
             shaded: self.shaded + other.shaded,
             tiles_skipped: self.tiles_skipped + other.tiles_skipped,
             slabs: self.slabs + other.slabs,

@@ -13,8 +13,9 @@ use crate::slabs::Slabs;
 use crate::tile::{self, AREA, FoldTile, Scratch, TILE};
 use crate::viewed::{PixelFootprint, Viewed, corners, spacing_along, view_axes};
 use crate::visible::Voxels;
-use crate::{Error, Params, SheetInput, Volume};
+use crate::{Error, Params, SheetInput, Splats, Volume};
 use rayon::prelude::*;
+use splat_core::raster::bins::Bins;
 use splat_core::raster::kernel::Kernel;
 use splat_core::raster::pulp;
 use splat_core::shade::ChannelLayout;
@@ -45,6 +46,8 @@ pub struct Sheeted<'a> {
     pub(crate) params: Params,
     pub(crate) slabs: Slabs,
     pub(crate) volumes: Vec<Prepared<'a>>,
+    /// Lists of splats by square of the image.
+    pub(crate) bins: Option<Bins>,
     pub(crate) tiles: [usize; 2],
     /// Slabs under the widest kernel.
     pub(crate) touched: u32,
@@ -73,12 +76,13 @@ pub fn prepare<'a>(
         volumes.push(Prepared::new(volume, input, params, &slabs, tiles));
         progress.tick(1).map_err(cancelled)?;
     }
+    let bins = input.splats.as_ref().map(Splats::bin);
     let touched = volumes.iter().map(|v| v.sections.touched as u32).max().unwrap_or(1);
     let has_gradients = input.volumes.iter().any(|v| v.normals);
-    Ok(Sheeted { input, params: *params, slabs, volumes, tiles, touched, has_gradients })
+    Ok(Sheeted { input, params: *params, slabs, volumes, bins, tiles, touched, has_gradients })
 }
 
-/// Slabs between the nearest corner of a volume before the eye and the farthest.
+/// Slabs between the nearest corner of a volume, or the nearest splat, before the eye and the farthest.
 pub(crate) fn slabs_of(input: &SheetInput<'_>, params: &Params) -> Result<Slabs, Error> {
     let (mut near, mut far, mut spacing, mut reach) = (f64::INFINITY, 0.0f64, f64::INFINITY, 0.0f64);
     for volume in input.volumes {
@@ -86,6 +90,13 @@ pub(crate) fn slabs_of(input: &SheetInput<'_>, params: &Params) -> Result<Slabs,
         (spacing, reach) = (spacing.min(along), reach.max(along * params.kernel.extent));
         for corner in corners(volume, input.camera) {
             (near, far) = (near.min(corner.z.max(0.0)), far.max(corner.z));
+        }
+    }
+    if let Some(splats) = &input.splats {
+        let [nearest, farthest] = splats.reach();
+        (near, far) = (near.min(nearest.max(0.0)), far.max(farthest));
+        if spacing == f64::INFINITY {
+            spacing = splats.slab_width;
         }
     }
     if !near.is_finite() {
@@ -132,7 +143,7 @@ impl<'a> Prepared<'a> {
             taper: Taper::new(0.5 * cutoff * cutoff),
             kernel: Kernel::new(&Footprint { cutoff: cutoff as f32 }),
             classifier: Classifier::new(volume.transfer, base),
-            rays: LatticeRays::new(grid, camera, slabs),
+            rays: LatticeRays::new(volume, camera, slabs),
             footprint: camera.is_orthographic().then(|| viewed.footprint(camera.focal_px())),
             viewed,
             voxels,
@@ -174,7 +185,8 @@ impl Sheeted<'_> {
 
     /// Bytes of what was prepared.
     pub fn bytes(&self) -> u64 {
-        self.volumes.iter().map(|v| v.segments.bytes() + Voxels::bytes(v.lattice.dims) / 4).sum()
+        let volumes: u64 = self.volumes.iter().map(|v| v.segments.bytes() + Voxels::bytes(v.lattice.dims) / 4).sum();
+        volumes + self.bins.as_ref().map_or(0, Bins::bytes)
     }
 
     /// Folds what lies at view depths in `range`, front to back, behind all that `into` holds. Ranges that meet share nothing and

@@ -16,7 +16,7 @@
 //!
 //! ```
 //! use sheet_light::{Params, SheetInput, Volume, prepare};
-//! use splat_core::{Accumulator, Camera, Grid, LayerSet, Material, Projection, Shading, TransferFunction, TransferPoint};
+//! use splat_core::{Accumulator, Camera, Grid, LayerSet, Material, Projection, Shading, Similarity, TransferFunction, TransferPoint};
 //! use splat_core::{glam::{DMat3, DVec3}, shade::ChannelLayout};
 //!
 //! // Eight cells of 1/2 along the view: 4 units of a medium of extinction 0.25, which shines white.
@@ -26,13 +26,14 @@
 //! let transfer = TransferFunction::new(vec![white]).unwrap();
 //! let material = Material { shading: Shading::Unlit, ..Material::default() };
 //! let volume = Volume {
-//!     grid: &grid, transfer: &transfer, material: &material, normals: false, object: 0, shadow_coefficient: 1.0,
+//!     grid: &grid, transform: Similarity::default(), transfer: &transfer, material: &material,
+//!     normals: false, object: 0, shadow_coefficient: 1.0,
 //! };
 //! let view = Projection::Orthographic { height: 2.0 };
 //! let camera = Camera::look_at(DVec3::Z * 9.0, DVec3::ZERO, DVec3::Y, view, [16, 16]).unwrap();
 //! let (volumes, layout) = ([volume], ChannelLayout::new(&LayerSet::default()));
 //! let input = SheetInput {
-//!     volumes: &volumes, camera: &camera, lights: &[], shadow_origin: DVec3::ZERO, ambient: [0.0; 3],
+//!     volumes: &volumes, splats: None, camera: &camera, lights: &[], shadow_origin: DVec3::ZERO, ambient: [0.0; 3],
 //! };
 //! let mut image = Accumulator::new([16, 16], 1, 3, false, false);
 //! let sheets = prepare(&input, &Params::default(), None).unwrap();
@@ -63,6 +64,7 @@ mod segments;
 mod shade;
 mod sheets;
 mod slabs;
+mod splats;
 mod tile;
 mod viewed;
 mod visible;
@@ -72,4 +74,5 @@ pub use counts::SheetCounts;
 pub use error::Error;
 pub use fold::{Sheeted, prepare};
 pub use params::{KernelShape, Params};
+pub use splats::Splats;
 pub use volume::{SheetInput, Volume};

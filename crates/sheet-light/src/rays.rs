@@ -6,9 +6,10 @@
 
 use crate::slabs::Slabs;
 use crate::tile::{AREA, SIDE};
+use crate::volume::Volume;
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::raster::lanes::MAX_LANES;
-use splat_core::{Camera, Grid};
+use splat_core::Camera;
 
 /// View depths between which each ray is inside, counted from the first slab; beyond each other where it is not. The rim of the
 /// tile is included.
@@ -28,13 +29,13 @@ pub(crate) struct LatticeRays {
 }
 
 impl LatticeRays {
-    pub(crate) fn new(grid: &Grid, camera: &Camera, slabs: &Slabs) -> Self {
+    pub(crate) fn new(volume: &Volume<'_>, camera: &Camera, slabs: &Slabs) -> Self {
         let world_from_view = DMat3::from_cols(camera.axes[0], camera.axes[1], camera.axes[2]);
-        let inverse = grid.axes.inverse();
+        let inverse = volume.axes().inverse();
         Self {
             lattice_from_view: inverse * world_from_view,
-            start: inverse * (camera.position - grid.origin),
-            highest: DVec3::from_array(grid.dims.map(|n| n as f64 - 0.5)),
+            start: inverse * (camera.position - volume.origin()),
+            highest: DVec3::from_array(volume.grid.dims.map(|n| n as f64 - 0.5)),
             origin: slabs.origin,
         }
     }

@@ -1,4 +1,5 @@
-//! One tile from front to back: splat the voxels of a batch of slabs, finish its sheets, shade, composite (Figure 5).
+//! One tile from front to back: splat the voxels of a batch of slabs, finish its sheets, shade, add the splats of the slab,
+//! composite (Figure 5).
 
 use crate::counts::SheetCounts;
 use crate::fold::{Prepared, Sheeted};
@@ -9,6 +10,7 @@ use crate::ring::Ring;
 use crate::shade::{Place, Reconstructed, Shader, is_lit_by_place};
 use crate::sheets::Sheets;
 use crate::slabs::BATCH;
+use crate::splats::{Drawn, SplatSheet};
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::{self, Simd};
 use splat_core::shade::{ChannelLayout, MAX_CHANNELS};
@@ -27,6 +29,7 @@ pub(crate) const AREA: usize = SIDE * SIDE;
 /// What a thread keeps from tile to tile.
 pub(crate) struct Scratch {
     volumes: Vec<VolumeScratch>,
+    splats: SplatSheet,
     /// View depths between which there may be light, counted from the first slab.
     near: Vec<f32>,
     far: Vec<f32>,
@@ -50,6 +53,7 @@ impl Scratch {
         };
         Self {
             volumes: volumes.iter().map(of).collect(),
+            splats: SplatSheet::new(),
             near: vec![0.0; TILE * TILE],
             far: vec![0.0; TILE * TILE],
             fragments: Fragments {
@@ -94,7 +98,9 @@ impl pulp::WithSimd for FoldTile<'_> {
         for (prepared, scratch) in of.volumes.iter().zip(&mut self.scratch.volumes) {
             scratch.queue.fill(prepared, self.t, &span.batches);
         }
-        if self.scratch.volumes.iter().all(|v| v.queue.is_empty()) {
+        let has_splats =
+            self.drawn().is_some_and(|drawn| self.scratch.splats.begin(drawn, corner, &self.range, self.into));
+        if !has_splats && self.scratch.volumes.iter().all(|v| v.queue.is_empty()) {
             counts.tiles_skipped = 1;
             return (None, counts);
         }
@@ -118,13 +124,19 @@ struct Span {
     batches: Range<u32>,
 }
 
-impl FoldTile<'_> {
+impl<'a> FoldTile<'a> {
     fn span(&self) -> Span {
         let slabs = &self.of.slabs;
         let slab = |z: f64| ((z - slabs.origin) / slabs.width).clamp(0.0, f64::from(slabs.count)) as u32;
         let (first, last) = (slab(self.range.start).max(1), (slab(self.range.end) + 2).min(slabs.count));
         let begin = first.saturating_sub(self.of.touched + 1);
         Span { first, batches: begin / BATCH..last.div_ceil(BATCH) }
+    }
+
+    /// What the tile reads of splats, if there are any at all.
+    fn drawn(&self) -> Option<Drawn<'a>> {
+        let (splats, bins) = (self.of.input.splats.as_ref()?, self.of.bins.as_ref()?);
+        Some(Drawn { splats, bins, opaque: self.opaque })
     }
 
     /// Depths that each pixel may have light at.
@@ -203,8 +215,11 @@ impl FoldTile<'_> {
         counts: &mut SheetCounts,
     ) {
         let of = self.of;
+        if let Some(drawn) = self.drawn() {
+            counts.splat_fragments += self.scratch.splats.fill(simd, drawn, (&of.slabs, slab), picture);
+        }
         for y in 1..=TILE {
-            let mut tags = 0;
+            let mut tags = self.scratch.splats.sums.tags[y];
             for scratch in &self.scratch.volumes {
                 tags |= scratch.sheets.tags(slab, y);
             }
@@ -226,6 +241,7 @@ impl FoldTile<'_> {
                         };
                         shader.add(simd, &reconstructed, Place { slab, y, x }, picture, fragments);
                     }
+                    self.scratch.splats.sums.add(simd, [x - 1, y - 1], of.slabs.origin, picture, fragments);
                     if fragments.any {
                         picture.composite(simd, y - 1, x - 1, fragments, of.slabs.origin);
                     }

@@ -57,7 +57,7 @@ pub(crate) struct Viewed {
 
 /// Steps of a lattice in view space.
 pub(crate) fn view_axes(volume: &Volume<'_>, camera: &Camera) -> DMat3 {
-    DMat3::from_cols(camera.axes[0], camera.axes[1], camera.axes[2]).transpose() * volume.grid.axes
+    DMat3::from_cols(camera.axes[0], camera.axes[1], camera.axes[2]).transpose() * volume.axes()
 }
 
 /// Length of the row of view depths: the spacing of the lattice along the view.
@@ -67,10 +67,10 @@ pub(crate) fn spacing_along(axes: &DMat3) -> f64 {
 
 /// View positions of the corners of a volume.
 pub(crate) fn corners(volume: &Volume<'_>, camera: &Camera) -> [DVec3; 8] {
-    let grid = volume.grid;
+    let (dims, origin, axes) = (volume.grid.dims, volume.origin(), volume.axes());
     std::array::from_fn(|c| {
-        let at = [0, 1, 2].map(|a| if c >> a & 1 == 1 { grid.dims[a] as f64 - 0.5 } else { -0.5 });
-        camera.view_from_world(grid.origin + grid.axes * DVec3::from_array(at))
+        let at = [0, 1, 2].map(|a| if c >> a & 1 == 1 { dims[a] as f64 - 0.5 } else { -0.5 });
+        camera.view_from_world(origin + axes * DVec3::from_array(at))
     })
 }
 
@@ -95,7 +95,7 @@ impl Viewed {
         let extent = [xx, -slant, yy];
         let half = 0.5 * (extent[0] - extent[2]);
         let smallest = 0.5 * (extent[0] + extent[2]) - libm::sqrt(half * half + extent[1] * extent[1]);
-        let mut start = camera.view_from_world(volume.grid.origin);
+        let mut start = camera.view_from_world(volume.origin());
         start.z -= slabs.origin;
         Self {
             start,

@@ -1,9 +1,9 @@
-//! What is drawn: volumes with their own transfer functions, the lights, the view.
+//! What is drawn: volumes with their own transfer functions, splats beside them, the lights, the view.
 
-use crate::Error;
-use splat_core::glam::DVec3;
+use crate::{Error, Splats};
+use splat_core::glam::{DMat3, DVec3};
 use splat_core::shade::LitBy;
-use splat_core::{Camera, Grid, Material, TransferFunction};
+use splat_core::{Camera, Grid, Material, Similarity, TransferFunction};
 
 /// Most lattice points along one axis: a voxel's place in its row is kept in 16 bits, with a rim around the lattice.
 const MOST_A_SIDE: usize = (1 << 16) - 8;
@@ -11,9 +11,11 @@ const MOST_A_SIDE: usize = (1 << 16) - 8;
 /// One volume.
 #[derive(Debug, Clone, Copy)]
 pub struct Volume<'a> {
-    /// Values, with the lattice in world space. Every lattice point is the centre of its cell, so the volume is the
-    /// parallelepiped from −1/2 to n − 1/2 in lattice coordinates.
+    /// Values on a lattice. Every lattice point is the centre of its cell, so the volume is the parallelepiped from −1/2 to n − 1/2
+    /// in lattice coordinates.
     pub grid: &'a Grid,
+    /// From the grid's space to the world.
+    pub transform: Similarity,
     /// Value → colour and extinction σ_t, 1/world unit; applied to what the sheets reconstruct.
     pub transfer: &'a TransferFunction,
     /// How light becomes radiance.
@@ -31,6 +33,8 @@ pub struct Volume<'a> {
 pub struct SheetInput<'a> {
     /// Volumes; where they overlap extinctions add, and colours weigh by extinction.
     pub volumes: &'a [Volume<'a>],
+    /// Splats that share the slabs, shaded already.
+    pub splats: Option<Splats<'a>>,
     /// The view. Slabs lie across its axis.
     pub camera: &'a Camera,
     /// Lights, with their shadows.
@@ -41,8 +45,23 @@ pub struct SheetInput<'a> {
     pub ambient: [f32; 3],
 }
 
+impl Volume<'_> {
+    /// World position of the first lattice point.
+    pub(crate) fn origin(&self) -> DVec3 {
+        self.transform.apply(self.grid.origin)
+    }
+
+    /// Steps of the lattice in the world, by column.
+    pub(crate) fn axes(&self) -> DMat3 {
+        DMat3::from_quat(self.transform.rotation) * self.grid.axes * self.transform.scale
+    }
+}
+
 impl SheetInput<'_> {
     pub(crate) fn check(&self) -> Result<(), Error> {
+        if let Some(width) = self.splats.map(|s| s.slab_width).filter(|w| !(w.is_finite() && *w > 0.0)) {
+            return Err(Error::parameter("splats.slab_width", width, "a finite number > 0, world units"));
+        }
         for (volume, v) in self.volumes.iter().enumerate() {
             v.grid.validate().map_err(|source| Error::Volume { volume, source })?;
             if v.grid.dims.iter().any(|n| *n > MOST_A_SIDE) {

@@ -6,7 +6,10 @@ use crate::common::{
 use sheet_light::{Params, prepare};
 use splat_core::glam::{DMat3, DQuat, DVec3};
 use splat_core::shade::LitBy;
-use splat_core::{Accumulator, Camera, Grid, Light, LightShape, Material, Projection, TransferFunction, TransferPoint};
+use splat_core::{
+    Accumulator, Camera, Grid, Light, LightShape, Material, Projection, Similarity, TransferFunction,
+    TransferPoint,
+};
 
 fn sun<'a>() -> LitBy<'a> {
     let shape = LightShape::Directional { direction: DVec3::new(-1.0, -2.0, -1.5).normalize() };
@@ -63,6 +66,29 @@ fn scale2_a_power_of_two_changes_no_bit() {
 fn shift_a_place_far_from_the_origin_looks_the_same() {
     let difference = apart(&moved(0.0, 1.0), &moved(1e7, 1.0));
     assert!(difference < 2e-3, "{difference:e}");
+}
+
+#[test]
+fn a_transform_is_the_lattice_in_another_place() {
+    let (tf, material) = (transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]), Material::default());
+    let transform = Similarity {
+        scale: 2.0,
+        rotation: DQuat::from_axis_angle(DVec3::new(0.3, 1.0, -0.5).normalize(), 0.7),
+        translation: DVec3::new(0.5, -0.25, 1.0),
+    };
+    let here = grid([16, 16, 16], cubic(0.25), noise);
+    let mut there = here.clone();
+    there.origin = transform.apply(here.origin);
+    there.axes = DMat3::from_quat(transform.rotation) * here.axes * transform.scale;
+    let camera = perspective([2.0, 3.0, 9.0], 50.0, [60, 50]);
+    let drawn = |grid: &Grid, transform: Similarity| {
+        let mut volumes = [volume(grid, &tf, &material)];
+        (volumes[0].normals, volumes[0].transform) = (true, transform);
+        draw(&input(&volumes, &camera, &[sun()]), &exact()).unwrap().0
+    };
+    let (moved, written) = (drawn(&here, transform), drawn(&there, Similarity::default()));
+    assert_eq!(moved, written);
+    assert!(moved.channels[0].iter().any(|c| *c > 0.1));
 }
 
 #[test]

@@ -5,4 +5,5 @@ mod closed_forms;
 mod common;
 mod hard_cases;
 mod invariances;
+mod splats;
 mod twin;

@@ -6,8 +6,8 @@
 //! 3. [`fold`] composites translucent splats in a [`crate::SliceOrder`] in front of it.
 //! 4. [`finish`] adds the opaque surface and the background, and box-filters samples to pixels.
 //!
-//! What blends splats in another way walks the same tiles ([`tile`]) over the same lists ([`bins`]), on the same lanes ([`lanes`]) and with
-//! the same profiles ([`kernel`]).
+//! What blends splats in another way walks the same tiles ([`tile`]) over the same lists ([`bins`]), on the same lanes ([`lanes`]), with
+//! the same profiles ([`kernel`]) and fragments ([`source`]).
 //!
 //! Every pixel belongs to one task and its splats are visited in list order, so the result does not depend on threads.
 
@@ -23,6 +23,7 @@ mod opaque;
 mod project;
 mod projected;
 mod shapes;
+pub mod source;
 pub mod tile;
 mod translucent;
 

@@ -4,7 +4,8 @@ use sheet_light::{Error, Params, SheetCounts, SheetInput, Volume, prepare};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::shade::{ChannelLayout, LitBy};
 use splat_core::{
-    Accumulator, Camera, Grid, LayerSet, Material, Projection, Shading, TransferFunction, TransferPoint, rng,
+    Accumulator, Camera, Grid, LayerSet, Material, Projection, Shading, Similarity, TransferFunction, TransferPoint,
+    rng,
 };
 
 /// A lattice around the origin, its values by place in world space.
@@ -49,7 +50,7 @@ pub(crate) fn unlit() -> Material {
 }
 
 pub(crate) fn volume<'a>(grid: &'a Grid, transfer: &'a TransferFunction, material: &'a Material) -> Volume<'a> {
-    Volume { grid, transfer, material, normals: false, object: 0, shadow_coefficient: 1.0 }
+    Volume { grid, transform: Similarity::default(), transfer, material, normals: false, object: 0, shadow_coefficient: 1.0 }
 }
 
 pub(crate) fn perspective(from: [f64; 3], fov_deg: f64, size: [u32; 2]) -> Camera {
@@ -63,7 +64,7 @@ pub(crate) fn parallel(from: [f64; 3], height: f64, size: [u32; 2]) -> Camera {
 }
 
 pub(crate) fn input<'a>(volumes: &'a [Volume<'a>], camera: &'a Camera, lights: &'a [LitBy<'a>]) -> SheetInput<'a> {
-    SheetInput { volumes, camera, lights, shadow_origin: DVec3::ZERO, ambient: [0.1; 3] }
+    SheetInput { volumes, splats: None, camera, lights, shadow_origin: DVec3::ZERO, ambient: [0.1; 3] }
 }
 
 pub(crate) const BEAUTY: ChannelLayout =

@@ -8,9 +8,9 @@
 //! seam where a cloud meets the ground. A disc that reaches through the eye plane counts where its plane lies before the eye.
 
 use super::bins::{Bins, bin};
-use super::kernel::Kernel;
 use super::lanes::{Lanes, MAX_LANES, SMALL, exp_neg};
-use super::projected::{NearDisc, Projected, ProjectedDepth, ProjectedSplat};
+use super::projected::{Projected, ProjectedDepth, ProjectedSplat};
+use super::source::{Source, TileRays};
 use super::tile::{BATCH, BLOCKS, Line, PIXELS, Run, Runs, for_each_span, tile_of};
 use super::{Accumulation, OpaqueImage, Params, RasterCounts};
 use crate::depth_profile::DepthFragment;
@@ -30,11 +30,7 @@ struct Tile {
     /// Planes of optical depth, 1 or 3, and as many of transmittance.
     planes: usize,
     channels: usize,
-    /// 1/|d|² of each pixel's ray, 1 for parallel rays.
-    ray_factor: Vec<f32>,
-    perspective: bool,
-    /// Depth of the opaque surface, +∞ without; empty when no pixel has one.
-    opaque_depth: Vec<f32>,
+    rays: TileRays,
     /// Empty when not asked for, as is the next.
     depth: Vec<DepthProfile>,
     object: Vec<u32>,
@@ -151,13 +147,9 @@ impl pulp::WithSimd for FoldTile<'_> {
 }
 
 /// One splat as the fold reads it.
-struct Source<'a> {
-    splat: &'a ProjectedSplat,
-    /// Of a disc that reaches through the eye plane.
-    near: Option<&'a NearDisc>,
-    depth: ProjectedDepth,
+struct Splat<'a> {
+    source: Source<'a>,
     object: u32,
-    kernel: &'a Kernel,
     extinction: [f32; 3],
     /// Whether every τ of it is small.
     thin: bool,
@@ -191,14 +183,17 @@ impl FoldTile<'_> {
                         splat,
                         near: projected.near_disc(splat, j),
                         depth: depths[k],
-                        object: if deep { projected.object(j as usize) } else { u32::MAX },
                         kernel: &projected.kernels[splat.footprint as usize],
+                    };
+                    let splat = Splat {
+                        source,
+                        object: if deep { projected.object(j as usize) } else { u32::MAX },
                         extinction,
                         // A slab across the eye plane is met at many angles.
                         thin: splat.peak * most <= SMALL && !splat.is_near(),
                         value: &values[k * channels..][..channels],
                     };
-                    self.tile.splat::<S, FRONT, HALF, PLANES, CHANNELS>(simd, &source);
+                    self.tile.splat::<S, FRONT, HALF, PLANES, CHANNELS>(simd, &splat);
                 }
                 if FRONT && self.tile.is_done(params.transmittance_cutoff) {
                     return;
@@ -211,10 +206,6 @@ impl FoldTile<'_> {
 impl Tile {
     fn load(acc: &Accumulator, projected: &Projected, opaque: &OpaqueImage, bins: &Bins, t: usize) -> Self {
         let [x, y] = bins.corner(t);
-        let mut opaque_depth = tile_of(&opaque.depth, acc.size, [x, y], f32::INFINITY);
-        if opaque_depth.iter().all(|d| *d == f32::INFINITY) {
-            opaque_depth.clear();
-        }
         let depth = tile_of(&acc.depth, acc.size, [x, y], DepthProfile::default());
         let object = tile_of(&acc.object, acc.size, [x, y], u32::MAX);
         let (planes, channels) = (acc.optical_depth.len(), acc.channels.len());
@@ -225,9 +216,7 @@ impl Tile {
             lines: vec![Line([0.0; PIXELS]); BLOCKS * (2 * planes + channels)],
             planes,
             channels,
-            ray_factor: projected.ray_factors([x, y]),
-            perspective: projected.perspective.is_some(),
-            opaque_depth,
+            rays: TileRays::new(projected, &opaque.depth, [x, y]),
             depth,
             object,
             fragments: 0,
@@ -272,7 +261,7 @@ impl Tile {
 
     /// Whether splats need a depth, or an object, which are read from memory of their own.
     fn needs_depth(&self) -> bool {
-        !(self.opaque_depth.is_empty() && self.depth.is_empty() && self.object.is_empty())
+        !(self.rays.are_free() && self.depth.is_empty() && self.object.is_empty())
     }
 
     fn is_done(&self, cutoff: f32) -> bool {
@@ -284,66 +273,21 @@ impl Tile {
     fn splat<S: Simd, const FRONT: bool, const HALF: bool, const PLANES: usize, const CHANNELS: usize>(
         &mut self,
         simd: S,
-        source: &Source<'_>,
+        splat: &Splat<'_>,
     ) {
-        let runs = Runs::new(simd, source.splat, self.size, [self.x, self.y]);
+        let runs = Runs::new(simd, splat.source.splat, self.size, [self.x, self.y]);
         self.fragments += runs.pixels();
         for run in runs {
-            let tau = match source.near {
-                None => self.optical_depth(simd, source, run),
-                Some(near) => self.near_optical_depth(simd, source, run, near),
-            };
-            self.composite::<S, FRONT, HALF, PLANES, CHANNELS>(simd, source, run, tau);
+            let tau = splat.source.optical_depth(simd, run, &self.rays);
+            self.composite::<S, FRONT, HALF, PLANES, CHANNELS>(simd, splat, run, tau);
         }
-    }
-
-    /// τ of a run of pixels.
-    #[inline(always)]
-    fn optical_depth<S: Simd>(&self, simd: S, source: &Source<'_>, run: Run<S>) -> Lanes<S> {
-        let of = |v: f32| Lanes::splat(simd, v);
-        let medium = source.splat.kind == SplatKind::Medium;
-        let mut s = run.distance_sq(simd, source.splat);
-        if medium {
-            s = s * Lanes::load(simd, &self.ray_factor[run.pixel()..]);
-        }
-        let t = (of(1.0) - s).max(of(0.0));
-        let mut tau = of(source.splat.peak) * source.kernel.profile(simd, t);
-        if !self.opaque_depth.is_empty() {
-            let opaque = Lanes::load(simd, &self.opaque_depth[run.pixel()..]);
-            tau = if medium {
-                // What is seen is the part between the eye and the surface, as a share of all before the eye.
-                let [per_depth, per_front] = source.depth.slope;
-                let behind = of(1.0) - ((opaque - of(source.depth.center)) * of(per_depth)).share_in_front();
-                tau * behind.negate_mul_add(of(per_front), of(1.0)).max(of(0.0))
-            } else {
-                tau.where_less(run.depth(simd, &source.depth), opaque)
-            };
-        }
-        tau
-    }
-
-    /// τ of a run of pixels of a disc that reaches through the eye plane.
-    #[inline(always)]
-    fn near_optical_depth<S: Simd>(&self, simd: S, source: &Source<'_>, run: Run<S>, near: &NearDisc) -> Lanes<S> {
-        let of = |v: f32| Lanes::splat(simd, v);
-        let [s, depth] = run.meet(simd, source.splat, near, self.perspective);
-        let mut tau = of(source.splat.peak) * source.kernel.profile(simd, (of(1.0) - s).max(of(0.0)));
-        if near.slab[1] > 0.0 && self.perspective {
-            let w = of(near.center) / depth;
-            let ray = Lanes::load(simd, &self.ray_factor[run.pixel()..]).sqrt();
-            tau = tau * of(near.slab[1]) / ((of(near.slab[0]) * w).abs() * ray).max(of(1e-3));
-        }
-        if !self.opaque_depth.is_empty() {
-            tau = tau.where_less(depth, Lanes::load(simd, &self.opaque_depth[run.pixel()..]));
-        }
-        tau
     }
 
     #[inline(always)]
     fn composite<S: Simd, const FRONT: bool, const HALF: bool, const PLANES: usize, const CHANNELS: usize>(
         &mut self,
         simd: S,
-        source: &Source<'_>,
+        splat: &Splat<'_>,
         run: Run<S>,
         tau: Lanes<S>,
     ) {
@@ -353,7 +297,7 @@ impl Tile {
         let mut weight = [Lanes::splat(simd, 0.0); PLANES];
         let mut nearer = weight[0];
         for p in 0..PLANES {
-            let step = tau * Lanes::splat(simd, source.extinction[p]);
+            let step = tau * Lanes::splat(simd, splat.extinction[p]);
             let plane = &mut lines[p].0[run.lane..];
             let before = Lanes::load(simd, plane);
             if p == PLANES / 2 {
@@ -361,7 +305,7 @@ impl Tile {
             }
             let sum = rounded::<S, HALF>(before + step);
             sum.store(plane);
-            let opacity = if source.thin { step.opacity_of_small() } else { step.opacity() };
+            let opacity = if splat.thin { step.opacity_of_small() } else { step.opacity() };
             let plane = &mut lines[PLANES + p].0[run.lane..];
             let before = Lanes::load(simd, plane);
             let after = if HALF { sum.exp_neg() } else { opacity.negate_mul_add(before, before) };
@@ -374,14 +318,14 @@ impl Tile {
         }
         for c in 0..channels {
             let p = ChannelLayout::plane_of(c, channels, PLANES);
-            let value = Lanes::splat(simd, source.value[c]);
+            let value = Lanes::splat(simd, splat.value[c]);
             let sum = &mut lines[2 * PLANES + c].0[run.lane..];
             let before = Lanes::load(simd, sum);
             let added = if FRONT { value } else { value - before };
             rounded::<S, HALF>(weight[p].mul_add(added, before)).store(sum);
         }
         if !self.depth.is_empty() || !self.object.is_empty() {
-            self.extras::<S, FRONT, PLANES>(simd, source, run, nearer);
+            self.extras::<S, FRONT, PLANES>(simd, splat, run, nearer);
         }
     }
 
@@ -390,25 +334,19 @@ impl Tile {
     fn extras<S: Simd, const FRONT: bool, const PLANES: usize>(
         &mut self,
         simd: S,
-        source: &Source<'_>,
+        splat: &Splat<'_>,
         run: Run<S>,
         nearer: Lanes<S>,
     ) {
         let (mut before, mut z) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
         nearer.store(&mut before);
-        let medium = source.splat.kind == SplatKind::Medium;
-        let depth = match source.near {
-            Some(near) => run.meet(simd, source.splat, near, self.perspective)[1],
-            // A medium has its centre's, and nothing lies behind the eye.
-            None if medium => Lanes::splat(simd, source.depth.center.max(0.0)),
-            None => run.depth(simd, &source.depth),
-        };
-        depth.store(&mut z);
+        let source = &splat.source;
+        source.view_depth(simd, run, &self.rays).store(&mut z);
         let line = run.block * (2 * PLANES + self.channels) + PLANES / 2;
-        let thickness = if medium { source.depth.extent * source.kernel.spacing } else { 0.0 };
+        let thickness = source.thickness();
         let mut narrow = [1.0; MAX_LANES];
-        if medium && !self.depth.is_empty() {
-            let s = run.distance_sq(simd, source.splat) * Lanes::load(simd, &self.ray_factor[run.pixel()..]);
+        if source.splat.kind == SplatKind::Medium && !self.depth.is_empty() {
+            let s = run.distance_sq(simd, source.splat) * self.rays.factors(simd, run);
             let [constant, slope] = source.kernel.narrowing.map(|v| Lanes::splat(simd, v));
             slope.mul_add(s, constant).store(&mut narrow);
         }
@@ -421,7 +359,7 @@ impl Tile {
                 depth.add(&DepthFragment { depth: z[i], thickness, narrow: narrow[i], before: before[i], after });
             }
             if let Some(object) = self.object.get_mut(k).filter(|o| !FRONT || **o == u32::MAX) {
-                *object = source.object;
+                *object = splat.object;
             }
         }
     }

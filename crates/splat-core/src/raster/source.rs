@@ -1,0 +1,134 @@
+//! One splat as the rays of a tile meet it: the optical depth and the view depth of each fragment.
+
+use super::kernel::Kernel;
+use super::lanes::Lanes;
+use super::projected::{NearDisc, Projected, ProjectedDepth, ProjectedSplat};
+use super::tile::{Run, tile_of};
+use crate::SplatKind;
+use pulp::Simd;
+
+/// The rays of one tile, and where opaque surfaces end them.
+#[derive(Debug, Clone)]
+pub struct TileRays {
+    /// 1/|d|² of each pixel's ray, 1 for parallel rays.
+    factors: Vec<f32>,
+    is_perspective: bool,
+    /// Depth of the opaque surface, +∞ without; empty when no pixel has one.
+    opaque: Vec<f32>,
+}
+
+/// One splat, ready for fragments.
+#[derive(Clone, Copy)]
+pub struct Source<'a> {
+    /// Its footprint.
+    pub splat: &'a ProjectedSplat,
+    /// Of a disc that reaches through the eye plane.
+    pub(crate) near: Option<&'a NearDisc>,
+    /// Only defined where the projection has depths.
+    pub(crate) depth: ProjectedDepth,
+    pub(crate) kernel: &'a Kernel,
+}
+
+impl TileRays {
+    /// The rays of the tile whose first pixel is `corner`; `opaque` has the view depth of what hides splats at each pixel of the image,
+    /// or nothing.
+    pub fn new(projected: &Projected, opaque: &[f32], corner: [usize; 2]) -> Self {
+        let mut opaque = tile_of(opaque, projected.size, corner, f32::INFINITY);
+        if opaque.iter().all(|d| *d == f32::INFINITY) {
+            opaque.clear();
+        }
+        Self { factors: projected.ray_factors(corner), is_perspective: projected.is_perspective(), opaque }
+    }
+
+    /// Whether nothing opaque is in the tile.
+    pub(crate) fn are_free(&self) -> bool {
+        self.opaque.is_empty()
+    }
+
+    /// 1/|d|² of the pixels of a run.
+    #[inline(always)]
+    pub(crate) fn factors<S: Simd>(&self, simd: S, run: Run<S>) -> Lanes<S> {
+        Lanes::load(simd, &self.factors[run.pixel()..])
+    }
+}
+
+impl<'a> Source<'a> {
+    /// Splat `i` of a projection.
+    pub fn new(projected: &'a Projected, i: u32) -> Self {
+        let splat = &projected.splats[i as usize];
+        Self {
+            splat,
+            near: projected.near_disc(splat, i),
+            depth: projected.depths.get(i as usize).copied().unwrap_or_default(),
+            kernel: projected.kernel(splat),
+        }
+    }
+
+    /// τ of a run of pixels, before a material's factor for each channel. What lies behind an opaque surface does not count: of a
+    /// disc by its plane, of a medium by the share of its kernel.
+    #[inline(always)]
+    pub fn optical_depth<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays) -> Lanes<S> {
+        match self.near {
+            None => self.before_the_eye(simd, run, rays),
+            Some(near) => self.through_the_eye(simd, run, rays, near),
+        }
+    }
+
+    #[inline(always)]
+    fn before_the_eye<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays) -> Lanes<S> {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let medium = self.splat.kind == SplatKind::Medium;
+        let mut s = run.distance_sq(simd, self.splat);
+        if medium {
+            s = s * rays.factors(simd, run);
+        }
+        let t = (of(1.0) - s).max(of(0.0));
+        let mut tau = of(self.splat.peak) * self.kernel.profile(simd, t);
+        if !rays.opaque.is_empty() {
+            let opaque = Lanes::load(simd, &rays.opaque[run.pixel()..]);
+            tau = if medium {
+                // What is seen is the part between the eye and the surface, as a share of all before the eye.
+                let [per_depth, per_front] = self.depth.slope;
+                let behind = of(1.0) - ((opaque - of(self.depth.center)) * of(per_depth)).share_in_front();
+                tau * behind.negate_mul_add(of(per_front), of(1.0)).max(of(0.0))
+            } else {
+                tau.where_less(run.depth(simd, &self.depth), opaque)
+            };
+        }
+        tau
+    }
+
+    #[inline(always)]
+    fn through_the_eye<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays, near: &NearDisc) -> Lanes<S> {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let [s, depth] = run.meet(simd, self.splat, near, rays.is_perspective);
+        let mut tau = of(self.splat.peak) * self.kernel.profile(simd, (of(1.0) - s).max(of(0.0)));
+        if near.slab[1] > 0.0 && rays.is_perspective {
+            let w = of(near.center) / depth;
+            let ray = rays.factors(simd, run).sqrt();
+            tau = tau * of(near.slab[1]) / ((of(near.slab[0]) * w).abs() * ray).max(of(1e-3));
+        }
+        if !rays.opaque.is_empty() {
+            tau = tau.where_less(depth, Lanes::load(simd, &rays.opaque[run.pixel()..]));
+        }
+        tau
+    }
+
+    /// View depths of a run of pixels; a medium has its centre's, and nothing lies behind the eye.
+    ///
+    /// Defined where the projection was made with depths.
+    #[inline(always)]
+    pub fn view_depth<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays) -> Lanes<S> {
+        match self.near {
+            Some(near) => run.meet(simd, self.splat, near, rays.is_perspective)[1],
+            None if self.splat.kind == SplatKind::Medium => Lanes::splat(simd, self.depth.center.max(0.0)),
+            None => run.depth(simd, &self.depth),
+        }
+    }
+
+    /// How thick it is along a ray: a medium's cell, 0 for a surface. Defined where the projection was made with depths.
+    #[inline(always)]
+    pub fn thickness(&self) -> f32 {
+        if self.splat.kind == SplatKind::Medium { self.depth.extent * self.kernel.spacing } else { 0.0 }
+    }
+}
