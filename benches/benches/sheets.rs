@@ -75,15 +75,31 @@ fn row(name: &str, grid: &Grid, transfer: &TransferFunction, lit: bool, camera: 
     let direction = DVec3::new(0.6, -0.5, -0.6).normalize();
     let sun = Light { shape: LightShape::Directional { direction }, intensity: [3.0; 3] };
     let lights = [LitBy { light: sun, shadow: None }];
-    let volumes = [Volume { grid, transform: Similarity::default(), transfer, material: &material, normals: lit, object: 0, shadow_coefficient: 1.0 }];
-    let lights = if lit { &lights[..] } else { &[] };
-    let input = SheetInput { volumes: &volumes, splats: None, camera, lights, shadow_origin: DVec3::ZERO, ambient: [0.1; 3] };
+    let volume = Volume {
+        grid,
+        transform: Similarity::default(),
+        transfer,
+        extinction_scale: 1.0,
+        material: &material,
+        normals: lit,
+        object: 0,
+        shadow_coefficient: 1.0,
+    };
+    let lights = if lit { lights.to_vec() } else { Vec::new() };
+    let input = SheetInput {
+        volumes: vec![volume],
+        splats: None,
+        camera,
+        lights,
+        shadow_origin: DVec3::ZERO,
+        ambient: [0.1; 3],
+    };
     let params = Params { transmittance_cutoff: Params::PAPERS_CUTOFF, ..Params::default() };
     let layout = ChannelLayout::new(&LayerSet::default());
     let (mut best, mut counts) = ([[f64::INFINITY; 2]; 2], SheetCounts::default());
     for _ in 0..REPEATS {
         let (start, busy) = (Instant::now(), processor_ms());
-        let sheeted = prepare(&input, &params, None).expect("a volume that can be drawn");
+        let sheeted = prepare(input.clone(), &params, None).expect("a volume that can be drawn");
         let (middle, middle_busy) = (Instant::now(), processor_ms());
         let mut out = Accumulator::new(camera.size, 1, 3, false, false);
         let all = f32::NEG_INFINITY..f32::INFINITY;

@@ -86,7 +86,7 @@ pub use procedural::{CloudShape, Ellipsoid, procedural_cloud};
 pub use raw_points::{PointLattice, RawPoints};
 pub use resample::resampled;
 pub use section::{Section, volume_section};
-pub use shapes::{Rectangle, medium_ball, medium_box, rectangle};
+pub use shapes::{Rectangle, medium_ball, medium_ball_grid, medium_box, medium_box_grid, rectangle};
 pub use sobel::{sobel_gradient, sobel_gradient_into};
 #[cfg(feature = "surfels")]
 pub use surfels::{SurfelParams, SurfelReport, raw_to_surfels};

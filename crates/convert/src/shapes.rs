@@ -6,8 +6,8 @@
 use crate::borders::Borders;
 use crate::columns::Wanted;
 use crate::{ConvertError, SplatParams, mesh_points};
-use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Cloud, DAabb, Splat, SplatKind, optics};
+use splat_core::glam::{DMat3, DVec3, Vec3};
+use splat_core::{Cloud, DAabb, Grid, Splat, SplatKind, optics};
 
 /// Sub-samples along each axis of a cell that a ball's surface cuts.
 const SUBDIVISION: i32 = 8;
@@ -40,6 +40,35 @@ pub fn medium_ball(
     let correction = (extinction * volume / total) as f32;
     cloud.cross_section.iter_mut().for_each(|k| *k *= correction);
     Ok(cloud)
+}
+
+/// The medium of [`medium_box`] as a volume: its extinction (1/world unit) on a lattice of cells that fill the box, before the
+/// transform of `params`.
+///
+/// # Errors
+/// As [`medium_box`].
+pub fn medium_box_grid(
+    bounds: DAabb,
+    extinction: f64,
+    spacing: f64,
+    params: &SplatParams,
+) -> Result<Grid, ConvertError> {
+    Ok(Lattice::new(bounds, extinction, spacing, params)?.grid(|_| 1.0))
+}
+
+/// The medium of [`medium_ball`] as a volume: a cell that the ball's surface cuts has the share that lies inside.
+///
+/// # Errors
+/// As [`medium_box`].
+pub fn medium_ball_grid(
+    center: DVec3,
+    radius: f64,
+    extinction: f64,
+    spacing: f64,
+    params: &SplatParams,
+) -> Result<Grid, ConvertError> {
+    let lattice = Lattice::new(DAabb::around(center, DVec3::splat(radius)), extinction, spacing, params)?;
+    Ok(lattice.grid(|offset| share_in_ball(offset, radius, lattice.step)))
 }
 
 /// A flat parallelogram; its normal is u × v.
@@ -150,6 +179,21 @@ impl Lattice {
         Ok(Self { step, counts: counts.map(|n| n as u64), center: (min + max) * 0.5, extinction })
     }
 
+    /// The extinction of each cell at its middle, times `share(offset)`.
+    fn grid(&self, share: impl Fn(DVec3) -> f64) -> Grid {
+        let dims = self.counts.map(|n| n as usize);
+        let middle = DVec3::from_array(self.counts.map(|n| 0.5 * (n as f64 - 1.0)));
+        let [nx, ny, _] = dims;
+        let index = |at: usize| DVec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64);
+        let value = |at: usize| (self.extinction * share((index(at) - middle) * self.step)) as f32;
+        Grid {
+            origin: self.center - middle * self.step,
+            axes: DMat3::from_diagonal(self.step),
+            dims,
+            values: (0..dims.iter().product()).map(value).collect(),
+        }
+    }
+
     /// One splat a cell, its cross-section times `share(offset)`; cells without a share make none. Offsets are counted from
     /// the middle of the box, so a box far from 0 has the same ones.
     fn fill(&self, params: &SplatParams, share: impl Fn(DVec3) -> f64) -> Result<Cloud, ConvertError> {
@@ -212,6 +256,25 @@ mod tests {
         let ball = medium_ball(DVec3::ONE, 0.5, 2.0, 0.04, &p).unwrap();
         let exact = 2.0 * 4.0 / 3.0 * std::f64::consts::PI * 0.125;
         assert!((total(&ball) / exact - 1.0).abs() < 1e-6, "{}", total(&ball));
+    }
+
+    #[test]
+    fn a_volume_has_the_extinction_of_its_splats() {
+        let p = SplatParams::default();
+        let mass = |grid: &Grid| {
+            let cell = grid.axes.determinant();
+            grid.values.iter().map(|v| f64::from(*v) * cell).sum::<f64>()
+        };
+        let bounds = DAabb::new(DVec3::ZERO, DVec3::new(2.0, 1.0, 0.3));
+        let slab = medium_box_grid(bounds, 5.0, 0.07, &p).unwrap();
+        assert!((mass(&slab) / 3.0 - 1.0).abs() < 1e-6, "{}", mass(&slab));
+        // Cells fill the box.
+        assert!((slab.position(0, 0, 0) - 0.5 * slab.axes * DVec3::ONE).length() < 1e-12);
+        let ball = medium_ball_grid(DVec3::ONE, 0.5, 2.0, 0.04, &p).unwrap();
+        let exact = 2.0 * 4.0 / 3.0 * std::f64::consts::PI * 0.125;
+        assert!((mass(&ball) / exact - 1.0).abs() < 1e-3, "{}", mass(&ball));
+        let [nx, ny, nz] = ball.dims;
+        assert!((ball.position(0, 0, 0) + ball.position(nx - 1, ny - 1, nz - 1) - 2.0).length() < 1e-12);
     }
 
     #[test]

@@ -3,18 +3,19 @@
 use super::check::{At, LARGEST, SMALLEST};
 use super::de::suggest;
 use super::raw_render::{
-    Auto, RawAccumulation, RawDirection, RawMapping, RawParticles, RawPoints, RawRender, RawShadow, RawSurfaceSampler,
+    Auto, RawAccumulation, RawDirection, RawMapping, RawParticles, RawPoints, RawRender, RawShadow, RawSheets,
+    RawSurfaceSampler,
 };
 use super::{
     LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, RenderSettings, ShadowMapping, ShadowSettings,
-    SurfaceSampler, Technique,
+    SheetsSettings, SurfaceSampler, Technique,
 };
 use crate::{Error, shown};
 use splat_core::raster::Accumulation;
 use splat_core::{ADDITIVE_LAYERS, Direction};
 
 /// Techniques of the design that this version does not have.
-const LATER_TECHNIQUES: [&str; 2] = ["sheets", "surfels"];
+const LATER_TECHNIQUES: [&str; 1] = ["surfels"];
 
 /// Checks `[render]`.
 pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSettings, Error> {
@@ -39,6 +40,7 @@ pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSetting
         shadow: check_shadow(&at.key("shadow"), &raw.shadow)?,
         points: check_points(&at.key("points"), &raw.points)?,
         particles: check_particles(&at.key("particles"), &raw.particles)?,
+        sheets: check_sheets(&at.key("sheets"), &raw.sheets)?,
     })
 }
 
@@ -47,7 +49,7 @@ pub(super) fn check_technique(at: &At<'_>, name: &str) -> Result<Technique, Erro
     if let Some(known) = Technique::ALL.into_iter().find(|t| t.name() == name) {
         return Ok(known);
     }
-    const NAMES: &str = r#""auto", "points", "particles" or "reference""#;
+    const NAMES: &str = r#""auto", "points", "particles", "sheets" or "reference""#;
     let message = if LATER_TECHNIQUES.contains(&name) {
         format!("`technique`: this version does not have \"{}\"", shown(name))
     } else {
@@ -114,11 +116,6 @@ fn check_points(at: &At<'_>, raw: &RawPoints) -> Result<PointsSettings, Error> {
     if raw.first_slices == Some(0) {
         return Err(at.key("first_slices").error("`first_slices`: expected a whole number above 0, found 0", ""));
     }
-    let cutoff = raw.transmittance_cutoff.unwrap_or(1.0 / 1024.0);
-    if !(0.0..1.0).contains(&cutoff) {
-        let message = format!("`transmittance_cutoff`: expected a number from 0 to below 1, found {cutoff}");
-        return Err(at.key("transmittance_cutoff").error(message, "0 composites everything"));
-    }
     Ok(PointsSettings {
         slice_thickness,
         exact: raw.exact.unwrap_or(true),
@@ -127,12 +124,38 @@ fn check_points(at: &At<'_>, raw: &RawPoints) -> Result<PointsSettings, Error> {
             RawDirection::BackToFront => Direction::BackToFront,
         },
         first_slices: raw.first_slices,
-        transmittance_cutoff: cutoff,
+        transmittance_cutoff: check_cutoff(at, raw.transmittance_cutoff)?,
         resampling_filter: raw.resampling_filter.unwrap_or(true),
         accumulation: match raw.accumulation {
             RawAccumulation::F32 => Accumulation::F32,
             RawAccumulation::F16 => Accumulation::F16,
         },
+    })
+}
+
+/// The transmittance at which a pixel is finished.
+fn check_cutoff(at: &At<'_>, raw: Option<f64>) -> Result<f64, Error> {
+    let cutoff = raw.unwrap_or(1.0 / 1024.0);
+    if (0.0..1.0).contains(&cutoff) {
+        return Ok(cutoff);
+    }
+    let message = format!("`transmittance_cutoff`: expected a number from 0 to below 1, found {cutoff}");
+    Err(at.key("transmittance_cutoff").error(message, "0 composites everything"))
+}
+
+fn check_sheets(at: &At<'_>, raw: &RawSheets) -> Result<SheetsSettings, Error> {
+    let slab_width = match raw.slab_width {
+        None | Some(Auto::Auto) => None,
+        Some(Auto::Number(x)) => Some(at.length("slab_width", x)?),
+    };
+    let extent = at.number("kernel_extent", raw.kernel_extent.unwrap_or(2.0), 0.5..=8.0)?;
+    // As far from the rim as the default's, where only the extent is given.
+    let sigma = at.number("kernel_sigma", raw.kernel_sigma.unwrap_or(0.35 * extent), 0.125 * extent..=extent)?;
+    Ok(SheetsSettings {
+        slab_width,
+        kernel_extent: extent,
+        kernel_sigma: sigma,
+        transmittance_cutoff: check_cutoff(at, raw.transmittance_cutoff)?,
     })
 }
 

@@ -8,7 +8,7 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields, default, expecting = "a table")]
 #[schemars(rename = "Render")]
 pub(super) struct RawRender {
-    /// "auto", "points", "particles" or "reference"; default "auto", which is "points".
+    /// "auto", "points", "particles", "sheets" or "reference"; default "auto", which is "points".
     pub(super) technique: Option<String>,
     /// Samples along each side of a pixel, 1 to 8; default 2.
     pub(super) antialias: Option<u32>,
@@ -27,6 +27,7 @@ pub(super) struct RawRender {
     pub(super) shadow: RawShadow,
     pub(super) points: RawPoints,
     pub(super) particles: RawParticles,
+    pub(super) sheets: RawSheets,
 }
 
 /// Settings of the `particles` technique.
@@ -42,6 +43,21 @@ pub(super) struct RawParticles {
     pub(super) surface_sampler: RawSurfaceSampler,
     /// Step of "brownian" over the longest side of the surface's box, 0.0001 to 0.1; default 0.01.
     pub(super) brownian_step: Option<f64>,
+}
+
+/// Settings of the `sheets` technique.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default, expecting = "a table")]
+#[schemars(rename = "Sheets")]
+pub(super) struct RawSheets {
+    /// Width of a slab in world units, or "auto" (the default): the least step of the volumes along the view.
+    pub(super) slab_width: Option<Auto>,
+    /// Radius of a voxel's kernel in steps of its lattice, 0.5 to 8; default 2.
+    pub(super) kernel_extent: Option<f64>,
+    /// Standard deviation of the kernel in steps of the lattice, an eighth of the extent to the whole; default 0.35 of it.
+    pub(super) kernel_sigma: Option<f64>,
+    /// A pixel is finished when its transmittance is below this, from 0 to below 1; default 1/1024.
+    pub(super) transmittance_cutoff: Option<f64>,
 }
 
 /// How implicit surfaces are sampled.

@@ -29,6 +29,8 @@ pub struct RenderSettings {
     pub points: PointsSettings,
     /// Settings of the `particles` technique.
     pub particles: ParticlesSettings,
+    /// Settings of the `sheets` technique.
+    pub sheets: SheetsSettings,
 }
 
 /// What draws the picture.
@@ -41,13 +43,15 @@ pub enum Technique {
     Points,
     /// Opaque particles, averaged over many sets (Tanaka 2012).
     Particles,
+    /// Volumes in slabs across the view, classified after reconstruction (Neophytou and Mueller 2005).
+    Sheets,
     /// Every fragment of every pixel, sorted, in f64: exact and slow.
     Reference,
 }
 
 impl Technique {
     /// All that can be asked for.
-    pub const ALL: [Self; 4] = [Self::Auto, Self::Points, Self::Particles, Self::Reference];
+    pub const ALL: [Self; 5] = [Self::Auto, Self::Points, Self::Particles, Self::Sheets, Self::Reference];
 
     /// As scenes and reports name it.
     pub const fn name(self) -> &'static str {
@@ -55,6 +59,7 @@ impl Technique {
             Self::Auto => "auto",
             Self::Points => "points",
             Self::Particles => "particles",
+            Self::Sheets => "sheets",
             Self::Reference => "reference",
         }
     }
@@ -64,7 +69,7 @@ impl Technique {
     pub const fn own_layers(self) -> &'static [&'static str] {
         match self {
             Self::Particles => &["std_error"],
-            Self::Auto | Self::Points | Self::Reference => &[],
+            Self::Auto | Self::Points | Self::Sheets | Self::Reference => &[],
         }
     }
 }
@@ -78,6 +83,19 @@ pub struct ParticlesSettings {
     pub target_error: Option<f64>,
     /// How implicit surfaces are sampled.
     pub surface_sampler: SurfaceSampler,
+}
+
+/// Settings of the `sheets` technique.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SheetsSettings {
+    /// Width of a slab, world units; `None` takes the least step of the volumes along the view.
+    pub slab_width: Option<f64>,
+    /// Radius of a voxel's kernel, steps of its lattice, in [0.5, 8].
+    pub kernel_extent: f64,
+    /// Standard deviation of the kernel, steps of the lattice, in [extent/8, extent].
+    pub kernel_sigma: f64,
+    /// A pixel is finished when its transmittance falls below this, in [0, 1).
+    pub transmittance_cutoff: f64,
 }
 
 /// How the particles of implicit surfaces are found.

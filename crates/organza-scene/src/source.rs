@@ -195,4 +195,11 @@ impl MediumShape {
             Self::Box { spacing, .. } | Self::Ball { spacing, .. } => *spacing,
         }
     }
+
+    /// Extinction σ_t, 1/world unit.
+    pub fn extinction(&self) -> f64 {
+        match self {
+            Self::Box { extinction, .. } | Self::Ball { extinction, .. } => *extinction,
+        }
+    }
 }

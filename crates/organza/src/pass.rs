@@ -20,6 +20,8 @@ pub const SPLAT: &str = "splat";
 pub const SAMPLE: &str = "sample";
 /// Translucent objects become particles, which are projected and averaged.
 pub const PARTICLES: &str = "particles";
+/// Volumes and splats are composited in slabs.
+pub const SHEETS: &str = "sheets";
 /// Translucent splats are composited exactly, pixel by pixel, in f64.
 pub const REFERENCE: &str = "reference";
 /// Samples become pixels and layers.

@@ -16,6 +16,8 @@ pub(crate) const OPAQUE: &str = "opaque surfaces";
 pub(crate) const COMPOSITE: &str = "compositing";
 /// Sets of particles are drawn and averaged.
 pub(crate) const PARTICLES: &str = "particles";
+/// Volumes and splats are composited in slabs.
+pub(crate) const SHEETS: &str = "sheets";
 /// Translucent splats are composited exactly.
 pub(crate) const REFERENCE: &str = "exact compositing";
 /// Samples become pixels.

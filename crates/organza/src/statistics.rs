@@ -175,6 +175,12 @@ impl Statistics {
         }
     }
 
+    /// Whether a technique has translucent splats to draw, or nothing that would be there in their place.
+    pub fn may_have_splats(&self, technique: Technique) -> bool {
+        let counts = self.translucent_by.iter().find(|(t, _)| *t == technique).map(|t| t.1);
+        counts.is_none_or(|[splats, own]| splats > 0 || own == 0)
+    }
+
     /// What is translucent and drawn by a technique, in words; `None` for nothing.
     pub fn translucent_of(&self, technique: Technique) -> Option<String> {
         let [splats, own] = self.translucent_by.iter().find(|(t, _)| *t == technique)?.1;

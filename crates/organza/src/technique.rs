@@ -11,6 +11,7 @@
 pub(crate) mod particles;
 pub(crate) mod points;
 pub(crate) mod reference;
+pub(crate) mod sheets;
 
 use crate::form::{DRAWN, Form};
 use crate::frame::Frame;
@@ -112,7 +113,7 @@ pub(crate) struct Finished<'f> {
 }
 
 /// Every technique, the preferred first.
-pub(crate) static TABLE: [Row; 3] = [
+pub(crate) static TABLE: [Row; 4] = [
     Row {
         technique: Technique::Points,
         is_offered: true,
@@ -141,6 +142,19 @@ pub(crate) static TABLE: [Row; 3] = [
         is_random: true,
         bytes: particles::bytes,
         begin: particles::begin,
+    },
+    Row {
+        technique: Technique::Sheets,
+        is_offered: false,
+        how: "are composited in slabs across the view, volumes classified after reconstruction",
+        by_channel: None,
+        form: Some(sheets::form),
+        of_splats: DRAWN,
+        draws_splats: true,
+        steps: &[Step { pass: pass::SHEETS, stage: stage::SHEETS, seconds: sheets::seconds }],
+        is_random: false,
+        bytes: |_, _, _| 0,
+        begin: sheets::begin,
     },
     Row {
         technique: Technique::Reference,

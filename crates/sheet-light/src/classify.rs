@@ -28,11 +28,12 @@ pub(crate) struct Classifier {
 }
 
 impl Classifier {
-    pub(crate) fn new(transfer: &TransferFunction, base: f64) -> Self {
+    /// Extinction is multiplied by `scale`.
+    pub(crate) fn new(transfer: &TransferFunction, scale: f64, base: f64) -> Self {
         let points = transfer.points();
         let four = |i: usize| {
             let p = points[i];
-            [p.extinction, p.color[0], p.color[1], p.color[2]]
+            [(f64::from(p.extinction) * scale) as f32, p.color[0], p.color[1], p.color[2]]
         };
         let piece = |i: usize| {
             let (at, next) = (four(i), four((i + 1).min(points.len() - 1)));
@@ -117,7 +118,7 @@ mod tests {
             };
             let tf = TransferFunction::new((0..count).map(point).collect()).unwrap();
             for base in [0.0, 0.5, 0.123] {
-                let classifier = Classifier::new(&tf, base);
+                let classifier = Classifier::new(&tf, 1.0, base);
                 let at = |v: f32| pulp::Arch::new().dispatch(At(&classifier, relative(v, base)));
                 for p in tf.points() {
                     assert_eq!(at(p.value), [p.extinction, p.color[0], p.color[1], p.color[2]], "{p:?}");

@@ -8,6 +8,7 @@ use crate::rays::LatticeRays;
 use crate::ring::{Ring, Splatter, Taper};
 use crate::sections::SectionTable;
 use crate::segments::Segments;
+use crate::shadows::Shadows;
 use crate::sheets::Sheets;
 use crate::slabs::Slabs;
 use crate::tile::{self, AREA, FoldTile, Scratch, TILE};
@@ -24,7 +25,7 @@ use std::ops::Range;
 
 /// One volume, ready to be splatted.
 pub(crate) struct Prepared<'a> {
-    pub(crate) volume: &'a Volume<'a>,
+    pub(crate) volume: Volume<'a>,
     pub(crate) lattice: Lattice<'a>,
     pub(crate) viewed: Viewed,
     pub(crate) sections: SectionTable,
@@ -33,6 +34,7 @@ pub(crate) struct Prepared<'a> {
     pub(crate) classifier: Classifier,
     pub(crate) rays: LatticeRays,
     pub(crate) voxels: Voxels,
+    pub(crate) shadows: Option<Shadows>,
     pub(crate) segments: Segments,
     /// What values are taken relative to.
     pub(crate) base: f64,
@@ -42,7 +44,7 @@ pub(crate) struct Prepared<'a> {
 
 /// The sheets of some volumes in one view, ready to be folded.
 pub struct Sheeted<'a> {
-    pub(crate) input: &'a SheetInput<'a>,
+    pub(crate) input: SheetInput<'a>,
     pub(crate) params: Params,
     pub(crate) slabs: Slabs,
     pub(crate) volumes: Vec<Prepared<'a>>,
@@ -58,22 +60,22 @@ pub struct Sheeted<'a> {
 ///
 /// # Errors
 /// [`Error::Parameter`], [`Error::Volume`], [`Error::Limit`] before much is taken, or [`Error::Cancelled`].
-pub fn prepare<'a>(
-    input: &'a SheetInput<'a>,
-    params: &Params,
-    progress: Option<&Progress>,
-) -> Result<Sheeted<'a>, Error> {
+pub fn prepare<'a>(input: SheetInput<'a>, params: &Params, progress: Option<&Progress>) -> Result<Sheeted<'a>, Error> {
     params.check()?;
     input.check()?;
-    let slabs = slabs_of(input, params)?;
+    let slabs = slabs_of(&input, params)?;
     let tiles = tile::tiles(input.camera);
-    check_memory(input, params, &slabs, tiles)?;
+    check_memory(&input, params, &slabs, tiles)?;
     let quiet = Progress::new();
     let progress = progress.unwrap_or(&quiet);
     progress.add_total(input.volumes.len() as u64);
     let mut volumes = Vec::with_capacity(input.volumes.len());
-    for volume in input.volumes {
-        volumes.push(Prepared::new(volume, input, params, &slabs, tiles));
+    for volume in &input.volumes {
+        let mut prepared = Prepared::new(*volume, &input, params, &slabs, tiles);
+        let needed = Shadows::bytes(prepared.voxels.count(), &input.lights);
+        check(needed, params)?;
+        prepared.shadows = Shadows::new(&prepared, &input.lights, input.shadow_origin, progress)?;
+        volumes.push(prepared);
         progress.tick(1).map_err(cancelled)?;
     }
     let bins = input.splats.as_ref().map(Splats::bin);
@@ -85,7 +87,7 @@ pub fn prepare<'a>(
 /// Slabs between the nearest corner of a volume, or the nearest splat, before the eye and the farthest.
 pub(crate) fn slabs_of(input: &SheetInput<'_>, params: &Params) -> Result<Slabs, Error> {
     let (mut near, mut far, mut spacing, mut reach) = (f64::INFINITY, 0.0f64, f64::INFINITY, 0.0f64);
-    for volume in input.volumes {
+    for volume in &input.volumes {
         let along = spacing_along(&view_axes(volume, input.camera));
         (spacing, reach) = (spacing.min(along), reach.max(along * params.kernel.extent));
         for corner in corners(volume, input.camera) {
@@ -109,7 +111,7 @@ pub(crate) fn slabs_of(input: &SheetInput<'_>, params: &Params) -> Result<Slabs,
 fn check_memory(input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [usize; 2]) -> Result<(), Error> {
     let threads = rayon::current_num_threads() as u64;
     let mut needed = threads * 4 * 4 * (TILE * TILE) as u64;
-    for volume in input.volumes {
+    for volume in &input.volumes {
         let dims = Lattice::new(volume.grid, [usize::MAX; 3]).dims;
         let reach = spacing_along(&view_axes(volume, input.camera)) * params.kernel.extent;
         let lines = u64::from(Ring::lines_for(crate::sections::touched(reach / slabs.width)));
@@ -119,15 +121,19 @@ fn check_memory(input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [
         needed +=
             Voxels::bytes(dims) + 2 * voxels + threads * (lines * 64 * AREA as u64 + Sheets::bytes() + 32 * of_a_tile);
     }
+    check(needed, params)
+}
+
+fn check(needed: u64, params: &Params) -> Result<(), Error> {
     let limit = params.limits.max_bytes;
     let hint = || "use fewer voxels or a smaller picture".to_owned();
     if needed > limit { Err(Error::limit("sheets", needed, limit, "bytes", hint())) } else { Ok(()) }
 }
 
 impl<'a> Prepared<'a> {
-    fn new(volume: &'a Volume<'a>, input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [usize; 2]) -> Self {
+    fn new(volume: Volume<'a>, input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [usize; 2]) -> Self {
         let (grid, camera) = (volume.grid, input.camera);
-        let viewed = Viewed::new(volume, camera, slabs, params);
+        let viewed = Viewed::new(&volume, camera, slabs, params);
         let reach = viewed.lattice_reach(camera, slabs, volume.normals);
         let lattice = Lattice::new(grid, reach);
         let viewed = viewed.with_rim(lattice.rim);
@@ -142,11 +148,12 @@ impl<'a> Prepared<'a> {
             sections: SectionTable::new(viewed.reach / slabs.width, 0.5 * cutoff * cutoff),
             taper: Taper::new(0.5 * cutoff * cutoff),
             kernel: Kernel::new(&Footprint { cutoff: cutoff as f32 }),
-            classifier: Classifier::new(volume.transfer, base),
-            rays: LatticeRays::new(volume, camera, slabs),
+            classifier: Classifier::new(volume.transfer, volume.extinction_scale, base),
+            rays: LatticeRays::new(&volume, camera, slabs),
             footprint: camera.is_orthographic().then(|| viewed.footprint(camera.focal_px())),
             viewed,
             voxels,
+            shadows: None,
             segments,
             base,
         }
@@ -181,6 +188,11 @@ impl Sheeted<'_> {
     /// Slabs, and their width in world units.
     pub fn slabs(&self) -> (u32, f64) {
         (self.slabs.count, self.slabs.width)
+    }
+
+    /// Voxels of each volume that may be seen, or that shape those.
+    pub fn visible(&self) -> impl Iterator<Item = u64> {
+        self.volumes.iter().map(|v| v.voxels.count())
     }
 
     /// Bytes of what was prepared.
@@ -237,7 +249,7 @@ impl Sheeted<'_> {
     fn counts(&self) -> SheetCounts {
         SheetCounts {
             voxels: self.volumes.iter().map(|v| v.volume.grid.values.len() as u64).sum(),
-            visible: self.volumes.iter().map(|v| v.voxels.count()).sum(),
+            visible: self.visible().sum(),
             slabs: u64::from(self.slabs.count),
             bytes: self.bytes(),
             ..SheetCounts::default()

@@ -27,16 +27,16 @@
 //! let material = Material { shading: Shading::Unlit, ..Material::default() };
 //! let volume = Volume {
 //!     grid: &grid, transform: Similarity::default(), transfer: &transfer, material: &material,
-//!     normals: false, object: 0, shadow_coefficient: 1.0,
+//!     extinction_scale: 1.0, normals: false, object: 0, shadow_coefficient: 1.0,
 //! };
 //! let view = Projection::Orthographic { height: 2.0 };
 //! let camera = Camera::look_at(DVec3::Z * 9.0, DVec3::ZERO, DVec3::Y, view, [16, 16]).unwrap();
-//! let (volumes, layout) = ([volume], ChannelLayout::new(&LayerSet::default()));
+//! let layout = ChannelLayout::new(&LayerSet::default());
 //! let input = SheetInput {
-//!     volumes: &volumes, splats: None, camera: &camera, lights: &[], shadow_origin: DVec3::ZERO, ambient: [0.0; 3],
+//!     volumes: vec![volume], splats: None, camera: &camera, lights: Vec::new(), shadow_origin: DVec3::ZERO, ambient: [0.0; 3],
 //! };
 //! let mut image = Accumulator::new([16, 16], 1, 3, false, false);
-//! let sheets = prepare(&input, &Params::default(), None).unwrap();
+//! let sheets = prepare(input, &Params::default(), None).unwrap();
 //! let everywhere = f32::NEG_INFINITY..f32::INFINITY;
 //! let counts = sheets.fold(everywhere, &[], &layout, &mut image, None).unwrap();
 //! // τ = 0.25·4, and what is opaque of it is white.
@@ -62,6 +62,7 @@ mod ring;
 pub mod sections;
 mod segments;
 mod shade;
+mod shadows;
 mod sheets;
 mod slabs;
 mod splats;

@@ -7,9 +7,9 @@
 use crate::slabs::Slabs;
 use crate::tile::{AREA, SIDE};
 use crate::volume::Volume;
+use splat_core::Camera;
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::raster::lanes::MAX_LANES;
-use splat_core::Camera;
 
 /// View depths between which each ray is inside, counted from the first slab; beyond each other where it is not. The rim of the
 /// tile is included.
@@ -40,9 +40,14 @@ impl LatticeRays {
         }
     }
 
+    /// Lattice coordinates of a view position.
+    pub(crate) fn lattice(&self, at: DVec3) -> DVec3 {
+        self.start + self.lattice_from_view * at
+    }
+
     /// Where a view ray is inside, counted from the first slab, not behind the eye.
     pub(crate) fn crossing(&self, (from, along): (DVec3, DVec3)) -> [f64; 2] {
-        let (from, along) = (self.start + self.lattice_from_view * from, self.lattice_from_view * along);
+        let (from, along) = (self.lattice(from), self.lattice_from_view * along);
         let (mut near, mut far) = (0.0f64, f64::INFINITY);
         for a in 0..3 {
             let (to_low, to_high) = (-0.5 - from[a], self.highest[a] - from[a]);

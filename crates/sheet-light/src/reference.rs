@@ -4,7 +4,7 @@ use crate::fold::slabs_of;
 use crate::lattice::Lattice;
 use crate::rays::LatticeRays;
 use crate::sections::{PHASES, sections};
-use crate::shade::{Seen, radiance};
+use crate::shade::{Sample, Seen, radiance};
 use crate::slabs::Slabs;
 use crate::viewed::Viewed;
 use crate::{Error, Params, SheetInput, Volume};
@@ -147,13 +147,15 @@ impl Sheets {
         }
         let (x, y) = ((at % self.size[0]) as f64 + 0.5, (at / self.size[0]) as f64 + 0.5);
         let (from, along) = input.camera.view_ray(x, y);
-        let extinction = f64::from(class.extinction) * f64::from(volume.material.extinction_rgb[1]);
+        let extinction =
+            f64::from(class.extinction) * volume.extinction_scale * f64::from(volume.material.extinction_rgb[1]);
         let tau = extinction * (far - near) * along.length();
         let normal = if volume.normals { self.normal(input, slabs, slab, at, along) } else { Vec3::ZERO };
         let viewed = Viewed::new(volume, input.camera, slabs, params);
         let place = from + along * (slabs.origin + 0.5 * (near + far));
         let seen = Seen::new(input.camera, place, along);
-        let radiance = radiance(input, volume, viewed.reach as f32, seen, class.color, normal).effects();
+        let sample = Sample { volume, radius: viewed.reach as f32, seen, color: class.color, normal };
+        let radiance = radiance(input, &sample, |light| sample.transmittance(input, light)).effects();
         (tau, [0, 1, 2].map(|c| radiance.iter().map(|effect| f64::from(effect[c])).sum()))
     }
 

@@ -1,6 +1,6 @@
 //! Shading of finished sheets: classification, gradients, radiance, and the mix of volumes that share a slab.
 
-use crate::classify::Classifier;
+use crate::fold::Prepared;
 use crate::picture::{Fragments, Picture};
 use crate::rays::{Crossings, Slopes};
 use crate::sheets::{LEAST_WEIGHT, Sheets, difference};
@@ -34,10 +34,7 @@ pub(crate) struct Shader<'a> {
 
 /// One volume of a tile, as shading reads it.
 pub(crate) struct Reconstructed<'a> {
-    pub(crate) volume: &'a Volume<'a>,
-    pub(crate) classifier: &'a Classifier,
-    /// Radius of the kernel, world units.
-    pub(crate) radius: f32,
+    pub(crate) prepared: &'a Prepared<'a>,
     pub(crate) crossings: &'a Crossings,
     pub(crate) sheets: &'a Sheets,
     /// View depths between which each pixel of the tile without its rim may have light, counted from the first slab.
@@ -98,13 +95,13 @@ impl Shader<'_> {
         let is_first = !fragments.any;
         fragments.any = true;
         let mut values = [[0.0; MAX_LANES]; MAX_CHANNELS];
-        let is_plain = of.volume.material.shading == Shading::Unlit && self.layout.count() == 3;
+        let is_plain = of.prepared.volume.material.shading == Shading::Unlit && self.layout.count() == 3;
         if is_plain {
             for c in 0..3 {
-                (medium.color[c] + Lanes::splat(simd, of.volume.material.emission[c])).store(&mut values[c]);
+                (medium.color[c] + Lanes::splat(simd, of.prepared.volume.material.emission[c])).store(&mut values[c]);
             }
         } else {
-            let normals = if of.volume.normals { self.normals(simd, of, place) } else { [Vec3::ZERO; MAX_LANES] };
+            let normals = if of.prepared.volume.normals { self.normals(simd, of, place) } else { [Vec3::ZERO; MAX_LANES] };
             let open = picture.open[place.y] >> place.x;
             let mut lit = Lit { tau, normals, color: [[0.0; MAX_LANES]; 3], middle: [0.0; MAX_LANES] };
             for c in 0..3 {
@@ -118,7 +115,7 @@ impl Shader<'_> {
             }
             self.light::<S>(of, place, &lit, &mut values);
         }
-        let extinction = of.volume.material.extinction_rgb;
+        let extinction = of.prepared.volume.material.extinction_rgb;
         for p in 0..picture.planes {
             let own = Lanes::load(simd, &tau) * Lanes::splat(simd, extinction[p]);
             let all = if is_first { own } else { own + Lanes::load(simd, &fragments.optical_depth[p]) };
@@ -128,9 +125,9 @@ impl Shader<'_> {
             fragments.values = values;
             medium.near.store(&mut fragments.near);
             medium.far.store(&mut fragments.far);
-            fragments.object = [of.volume.object; MAX_LANES];
+            fragments.object = [of.prepared.volume.object; MAX_LANES];
         } else {
-            mix(simd, &Shaded { volume: of.volume, tau, values }, &medium, fragments, picture);
+            mix(simd, &Shaded { volume: &of.prepared.volume, tau, values }, &medium, fragments, picture);
         }
     }
 
@@ -144,7 +141,7 @@ impl Shader<'_> {
         let far = Lanes::load(simd, &of.crossings.far[at..]).min(limits[1]).min(face(place.slab + 1));
         let length = (far - near).max(Lanes::splat(simd, 0.0));
         let [value, weight] = of.sheets.load(simd, place.slab, place.y, place.x);
-        let [extinction, red, green, blue] = of.classifier.at(simd, value);
+        let [extinction, red, green, blue] = of.prepared.classifier.at(simd, value);
         let depth = (extinction * length).where_less(Lanes::splat(simd, LEAST_WEIGHT), weight);
         Medium { near, far, depth, color: [red, green, blue] }
     }
@@ -223,9 +220,14 @@ impl Shader<'_> {
         for lane in 0..Lanes::<S>::COUNT {
             if lit.tau[lane] > 0.0 {
                 let color = lit.color.map(|channel| channel[lane]);
-                let seen = self.seen(place, lane, lit.middle[lane]);
+                let (seen, at) = self.seen(place, lane, lit.middle[lane]);
                 let mut out = [0.0; MAX_CHANNELS];
-                let radiance = radiance(self.input, of.volume, of.radius, seen, color, lit.normals[lane]);
+                let Prepared { volume, viewed, shadows, voxels, lattice, rays, .. } = of.prepared;
+                let sample = Sample { volume, radius: viewed.reach as f32, seen, color, normal: lit.normals[lane] };
+                let radiance = radiance(self.input, &sample, |light| {
+                    let rim = DVec3::from_array(lattice.rim.map(|n| n as f64));
+                    shadows.as_ref()?.at(voxels, light, rays.lattice(at) + rim)
+                });
                 radiance.write(lit.normals[lane], self.layout, &mut out);
                 for c in 0..self.layout.count() {
                     values[c][lane] = out[c];
@@ -234,13 +236,14 @@ impl Shader<'_> {
         }
     }
 
-    /// What is seen of a ray at a depth. Where it lies is found out only where a light asks.
+    /// What is seen of a ray at a depth, and its view position. Where it lies is found out only where a light asks.
     #[inline(always)]
-    fn seen(&self, place: Place, lane: usize, depth: f32) -> Seen {
+    fn seen(&self, place: Place, lane: usize, depth: f32) -> (Seen, DVec3) {
         let camera = self.input.camera;
         if self.is_lit_by_place {
             let (from, along) = self.slopes.ray(place.x + lane, place.y);
-            return Seen::new(camera, from + along * (self.slabs.origin + f64::from(depth)), along);
+            let at = from + along * (self.slabs.origin + f64::from(depth));
+            return (Seen::new(camera, at, along), at);
         }
         let [right, up, forward] = self.axes;
         let slant = if camera.is_orthographic() {
@@ -248,7 +251,7 @@ impl Shader<'_> {
         } else {
             right * self.slopes.u[place.x + lane] + up * self.slopes.v[place.y]
         };
-        Seen { position: DVec3::ZERO, to_eye: -(forward + slant).normalize() }
+        (Seen { position: DVec3::ZERO, to_eye: -(forward + slant).normalize() }, DVec3::ZERO)
     }
 }
 
@@ -273,22 +276,38 @@ pub(crate) fn is_lit_by_place(input: &SheetInput<'_>) -> bool {
     input.lights.iter().any(by_place)
 }
 
-/// Radiance of one point of a volume.
+/// One point of a volume.
+pub(crate) struct Sample<'a> {
+    pub(crate) volume: &'a Volume<'a>,
+    /// Radius of the kernel, world units.
+    pub(crate) radius: f32,
+    pub(crate) seen: Seen,
+    pub(crate) color: [f32; 3],
+    pub(crate) normal: Vec3,
+}
+
+impl Sample<'_> {
+    /// What arrives of a light, looked up at the point itself.
+    pub(crate) fn transmittance(&self, input: &SheetInput<'_>, light: usize) -> Option<[f32; 3]> {
+        let position = (self.seen.position - input.shadow_origin).as_vec3();
+        let receiver = Receiver { position, normal: Vec3::ZERO, radius: self.radius, kind: SplatKind::Medium };
+        Some(input.lights[light].shadow?.transmittance(&receiver))
+    }
+}
+
+/// Radiance of one point of a volume; `transmittance` says what arrives of a light by its place in the list, `None` for all.
 #[inline]
 pub(crate) fn radiance(
     input: &SheetInput<'_>,
-    volume: &Volume<'_>,
-    radius: f32,
-    Seen { position, to_eye }: Seen,
-    color: [f32; 3],
-    normal: Vec3,
+    sample: &Sample<'_>,
+    transmittance: impl Fn(usize) -> Option<[f32; 3]>,
 ) -> Radiance {
+    let &Sample { volume, radius, seen: Seen { position, to_eye }, color, normal } = sample;
     let normal = facing(SplatKind::Medium, normal, normal, to_eye);
     let point = Point { position, radius, normal, to_eye, color, material: volume.material };
-    let receiver =
-        || Receiver { position: (position - input.shadow_origin).as_vec3(), normal, radius, kind: SplatKind::Medium };
     point.radiance(input.ambient, input.lights.iter().map(|lit| &lit.light), |rank, irradiance| {
-        let shadow = input.lights[rank].shadow.map(|shadow| move || shadow.transmittance(&receiver()));
+        let shadow = input.lights[rank].shadow.is_some();
+        let shadow = shadow.then_some(|| transmittance(rank).unwrap_or([1.0; 3]));
         arriving(irradiance, volume.shadow_coefficient, shadow)
     })
 }

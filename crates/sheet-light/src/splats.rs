@@ -18,14 +18,14 @@ use splat_core::{Accumulator, Material};
 use std::ops::Range;
 
 /// Splats, projected and shaded.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Splats<'a> {
     /// Footprints by id, with depths where something opaque hides them or depths are asked for, with objects where these are.
     pub projected: &'a Projected,
     /// View depths of the centres by id, world units.
-    pub depths: &'a [f32],
+    pub depths: Vec<f32>,
     /// The ids that are drawn, front to back.
-    pub order: &'a [u32],
+    pub order: Vec<u32>,
     /// As many numbers a splat as the accumulator has channels, by id.
     pub values: &'a [f32],
     /// Extinction per channel, by id of the material.
@@ -42,7 +42,7 @@ impl Splats<'_> {
     }
 
     pub(crate) fn bin(&self) -> Bins {
-        bins::bin(self.projected, self.order)
+        bins::bin(self.projected, &self.order)
     }
 }
 

@@ -168,12 +168,12 @@ impl<'a> FoldTile<'a> {
     ) {
         let of = self.of;
         let shader = Shader {
-            input: of.input,
+            input: &of.input,
             slabs: &of.slabs,
             layout: self.layout,
             slopes,
             axes: of.input.camera.axes.map(|a| a.as_vec3()),
-            is_lit_by_place: is_lit_by_place(of.input),
+            is_lit_by_place: is_lit_by_place(&of.input),
         };
         let behind = u32::from(of.has_gradients);
         // Sheets are shaded one later than they are finished where gradients need the one behind.
@@ -232,9 +232,7 @@ impl<'a> FoldTile<'a> {
                     fragments.any = false;
                     for (prepared, scratch) in of.volumes.iter().zip(&self.scratch.volumes) {
                         let reconstructed = Reconstructed {
-                            volume: prepared.volume,
-                            classifier: &prepared.classifier,
-                            radius: prepared.viewed.reach as f32,
+                            prepared,
                             crossings: &scratch.crossings,
                             sheets: &scratch.sheets,
                             limits: [&self.scratch.near, &self.scratch.far],

@@ -55,15 +55,49 @@ impl Voxels {
         (word >> (eighth % 8 * 8)) as u8 & (0xff >> (8 - inside))
     }
 
+    /// Voxels along each axis, with the rim.
+    pub(crate) fn dims(&self) -> [usize; 3] {
+        self.dims
+    }
+
+    /// Whether a voxel is one of them.
+    #[inline(always)]
+    pub(crate) fn has(&self, i: usize, j: usize, k: usize) -> bool {
+        self.bits[(k * self.dims[1] + j) * self.words + i / 64] >> (i % 64) & 1 != 0
+    }
+
+    /// How many there are before each word of 64.
+    pub(crate) fn ranks(&self) -> Vec<u64> {
+        let mut before = 0;
+        let rank = |(w, word): (usize, &u64)| {
+            let rank = before;
+            before += u64::from((word & self.inside(w)).count_ones());
+            rank
+        };
+        self.bits.iter().enumerate().map(rank).collect()
+    }
+
+    /// How many there are before a voxel that is one of them, row by row.
+    #[inline(always)]
+    pub(crate) fn rank(&self, ranks: &[u64], i: usize, j: usize, k: usize) -> Option<usize> {
+        if i >= self.dims[0] || j >= self.dims[1] || k >= self.dims[2] {
+            return None;
+        }
+        let at = (k * self.dims[1] + j) * self.words + i / 64;
+        let (word, bit) = (self.bits[at], i % 64);
+        (word >> bit & 1 != 0).then(|| ranks[at] as usize + (word & ((1 << bit) - 1)).count_ones() as usize)
+    }
+
+    /// The bits of a word that are voxels.
+    fn inside(&self, word: usize) -> u64 {
+        let last = self.dims[0] % 64;
+        if last == 0 || word % self.words + 1 < self.words { !0 } else { (1 << last) - 1 }
+    }
+
     /// How many there are.
     pub(crate) fn count(&self) -> u64 {
-        let last = self.dims[0] % 64;
-        let of_last = if last == 0 { !0 } else { (1u64 << last) - 1 };
-        let row = |row: &[u64]| {
-            let all: u32 = row.iter().map(|w| w.count_ones()).sum();
-            u64::from(all - (row[self.words - 1] & !of_last).count_ones())
-        };
-        self.bits.par_chunks(self.words).with_min_len(1024).map(row).sum()
+        let word = |(w, word): (usize, &u64)| u64::from((word & self.inside(w)).count_ones());
+        self.bits.par_iter().enumerate().with_min_len(1 << 14).map(word).sum()
     }
 
     fn within(lattice: &Lattice<'_>, [low, high]: [f32; 2]) -> Self {

@@ -16,8 +16,10 @@ pub struct Volume<'a> {
     pub grid: &'a Grid,
     /// From the grid's space to the world.
     pub transform: Similarity,
-    /// Value → colour and extinction σ_t, 1/world unit; applied to what the sheets reconstruct.
+    /// Value → colour and extinction σ_t; applied to what the sheets reconstruct.
     pub transfer: &'a TransferFunction,
+    /// From the transfer function's extinction to 1/world unit, > 0.
+    pub extinction_scale: f64,
     /// How light becomes radiance.
     pub material: &'a Material,
     /// Whether light is reflected about the gradient of the values, −∇v/|∇v| being the normal.
@@ -29,16 +31,16 @@ pub struct Volume<'a> {
 }
 
 /// What sheets are made of.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct SheetInput<'a> {
     /// Volumes; where they overlap extinctions add, and colours weigh by extinction.
-    pub volumes: &'a [Volume<'a>],
+    pub volumes: Vec<Volume<'a>>,
     /// Splats that share the slabs, shaded already.
     pub splats: Option<Splats<'a>>,
     /// The view. Slabs lie across its axis.
     pub camera: &'a Camera,
     /// Lights, with their shadows.
-    pub lights: &'a [LitBy<'a>],
+    pub lights: Vec<LitBy<'a>>,
     /// World position that receivers of shadows are relative to: the origin of the cloud that casts them.
     pub shadow_origin: DVec3,
     /// Ambient radiance, the same from everywhere.
@@ -59,13 +61,19 @@ impl Volume<'_> {
 
 impl SheetInput<'_> {
     pub(crate) fn check(&self) -> Result<(), Error> {
-        if let Some(width) = self.splats.map(|s| s.slab_width).filter(|w| !(w.is_finite() && *w > 0.0)) {
+        if let Some(width) = self.splats.as_ref().map(|s| s.slab_width).filter(|w| !(w.is_finite() && *w > 0.0)) {
             return Err(Error::parameter("splats.slab_width", width, "a finite number > 0, world units"));
         }
         for (volume, v) in self.volumes.iter().enumerate() {
             v.grid.validate().map_err(|source| Error::Volume { volume, source })?;
             if v.grid.dims.iter().any(|n| *n > MOST_A_SIDE) {
                 let source = splat_core::Error::invalid("grid", 0, "dims", v.grid.dims, "at most 65528 a side");
+                return Err(Error::Volume { volume, source });
+            }
+            if !(v.extinction_scale.is_finite() && v.extinction_scale > 0.0) {
+                let expected = "a finite number > 0";
+                let source =
+                    splat_core::Error::invalid("volume", volume, "extinction_scale", v.extinction_scale, expected);
                 return Err(Error::Volume { volume, source });
             }
             if !(0.0..=1.0).contains(&v.shadow_coefficient) {

@@ -37,7 +37,7 @@ fn ia07_a_ramp_has_the_same_normal_everywhere() {
         for camera in [parallel([0.0, 0.0, 12.0], 9.0, [60, 60]), perspective([0.0, 0.0, 12.0], 40.0, [60, 60])] {
             let input = input(&volumes, &camera, &[]);
             let mut out = Accumulator::new(camera.size, 1, layout.count(), false, false);
-            prepare(&input, &exact(), None)
+            prepare(input.clone(), &exact(), None)
                 .unwrap()
                 .fold(f32::NEG_INFINITY..f32::INFINITY, &[], &layout, &mut out, None)
                 .unwrap();
@@ -103,7 +103,7 @@ fn ia14_one_field_on_two_lattices_and_finer_ones() {
         let mut out = Accumulator::new(camera.size, 1, 3, false, false);
         // A range that lies in both.
         let sheeted = input(&volumes, &camera, &[]);
-        prepare(&sheeted, &params, None).unwrap().fold(9.3..11.3, &[], &BEAUTY, &mut out, None).unwrap();
+        prepare(sheeted.clone(), &params, None).unwrap().fold(9.3..11.3, &[], &BEAUTY, &mut out, None).unwrap();
         out
     };
     let rmse = |n: usize| {
@@ -147,7 +147,7 @@ fn extinction_by_channel_hides_each_channel_by_its_own() {
     let camera = parallel([0.0, 0.0, 10.0], 3.0, [24, 24]);
     let mut out = Accumulator::new(camera.size, 3, 3, false, false);
     let input = input(&volumes, &camera, &[]);
-    prepare(&input, &exact(), None)
+    prepare(input.clone(), &exact(), None)
         .unwrap()
         .fold(f32::NEG_INFINITY..f32::INFINITY, &[], &BEAUTY, &mut out, None)
         .unwrap();
@@ -204,8 +204,8 @@ fn what_cannot_be_drawn_is_refused() {
     let progress = Progress::new();
     progress.cancel();
     let input = input(&volumes[..1], &camera, &[]);
-    assert!(matches!(prepare(&input, &exact(), Some(&progress)), Err(Error::Cancelled)));
-    let sheeted = prepare(&input, &exact(), None).unwrap();
+    assert!(matches!(prepare(input.clone(), &exact(), Some(&progress)), Err(Error::Cancelled)));
+    let sheeted = prepare(input.clone(), &exact(), None).unwrap();
     let mut out = Accumulator::new(camera.size, 1, 3, false, false);
     let all = f32::NEG_INFINITY..f32::INFINITY;
     assert!(matches!(sheeted.fold(all, &[], &BEAUTY, &mut out, Some(&progress)), Err(Error::Cancelled)));

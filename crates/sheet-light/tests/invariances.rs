@@ -7,8 +7,7 @@ use sheet_light::{Params, prepare};
 use splat_core::glam::{DMat3, DQuat, DVec3};
 use splat_core::shade::LitBy;
 use splat_core::{
-    Accumulator, Camera, Grid, Light, LightShape, Material, Projection, Similarity, TransferFunction,
-    TransferPoint,
+    Accumulator, Camera, Grid, Light, LightShape, Material, Projection, Similarity, TransferFunction, TransferPoint,
 };
 
 fn sun<'a>() -> LitBy<'a> {
@@ -124,7 +123,7 @@ fn ia05_ranges_of_depth_that_meet_are_one() {
     let input = input(&volumes, &camera, &lights);
     for slab_width in [None, Some(0.004)] {
         let params = Params { slab_width, ..exact() };
-        let sheeted = prepare(&input, &params, None).unwrap();
+        let sheeted = prepare(input.clone(), &params, None).unwrap();
         assert!(slab_width.is_none() || sheeted.slabs().0 > 4096, "{:?}", sheeted.slabs());
         let whole = draw(&input, &params).unwrap().0;
         for parts in [2, 8] {
@@ -149,7 +148,7 @@ fn what_is_behind_an_opaque_surface_is_not_seen() {
     let input = input(&volumes, &camera, &[]);
     let opaque: Vec<f32> = (0..1600).map(|i| 15.0 + (i % 40) as f32 * 0.1).collect();
     let mut out = Accumulator::new(camera.size, 1, 3, true, true);
-    let sheeted = prepare(&input, &exact(), None).unwrap();
+    let sheeted = prepare(input.clone(), &exact(), None).unwrap();
     sheeted.fold(f32::NEG_INFINITY..f32::INFINITY, &opaque, &BEAUTY, &mut out, None).unwrap();
     for (tau, depth) in out.optical_depth[0].iter().zip(&opaque) {
         assert!((tau - 0.25 * (depth - 15.0)).abs() < 2e-6, "{tau} before {depth}");

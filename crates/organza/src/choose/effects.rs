@@ -128,7 +128,10 @@ fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<PlannedPass> {
         let before = row.steps.split_last().map_or(&[][..], |(_, before)| before);
         before.iter().for_each(|step| what.iter().for_each(|what| pass(step.pass, what.clone())));
     }
-    let as_they_are = |draws: &bool| statistics.techniques.iter().any(|t| row(*t).draws_splats == *draws);
+    let as_they_are = |draws: &bool| {
+        let of = |t: &Technique| row(*t).draws_splats == *draws && (!draws || statistics.may_have_splats(*t));
+        statistics.techniques.iter().any(of)
+    };
     // What is not drawn as splats is projected and shaded in the pass of its technique.
     let which = match [true, false].map(|draws| as_they_are(&draws)) {
         [true, true] => "drawn",

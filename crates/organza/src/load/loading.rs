@@ -94,7 +94,7 @@ impl<'a> Loading<'a> {
             let own = own.map_err(|e| self.named(&self.scene.objects[id], e))?;
             if own.is_none() {
                 let name = crate::shown(&self.scene.objects[id].name);
-                warnings.push(format!("object '{name}' has no particles: nothing of it was found"));
+                warnings.push(format!("object '{name}' shows nothing: nothing of it was found"));
             }
             all.extend(own);
         }

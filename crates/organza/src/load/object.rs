@@ -266,6 +266,18 @@ fn flat(source: &RectangleSource, opacity: f64) -> convert::Rectangle {
     convert::Rectangle { center, u, v, opacity, spacing }
 }
 
+/// The extinction of a homogeneous medium on a lattice.
+pub(super) fn medium_grid(shape: &MediumShape, params: &SplatParams) -> Result<Grid, ConvertError> {
+    match *shape {
+        MediumShape::Box { bounds, extinction, spacing } => {
+            convert::medium_box_grid(bounds, extinction, spacing, params)
+        }
+        MediumShape::Ball { center, radius, extinction, spacing } => {
+            convert::medium_ball_grid(center, radius, extinction, spacing, params)
+        }
+    }
+}
+
 fn medium(shape: &MediumShape, params: &SplatParams) -> Result<Cloud, ConvertError> {
     match *shape {
         MediumShape::Box { bounds, extinction, spacing } => convert::medium_box(bounds, extinction, spacing, params),

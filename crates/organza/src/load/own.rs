@@ -7,7 +7,7 @@ mod search;
 use super::context::Context;
 use super::files::{grid_bytes, mesh_bytes};
 use super::input::{Input, shortest_step};
-use super::object::{Prepared, as_it_is, procedural};
+use super::object::{Prepared, as_it_is, medium_grid, procedural};
 use crate::Error;
 use crate::form::Form;
 use crate::scene::{RectangleSource, SurfaceSampler};
@@ -90,7 +90,7 @@ impl Own {
         let splat = prepared.input.splat().clone();
         let factor = context.extinction_factor(&context.scene.objects[context.id]);
         let depth = factor * optics::optical_depth(prepared.input.opacity().unwrap_or(0.0));
-        let bounded = prepared.bounded.take();
+        let bounded = prepared.bounded.take().filter(|_| source == Form::Field);
         let Some((body, bounds, spacing)) = data(prepared, bounded, source, context)? else { return Ok(None) };
         let elements = elements(&body, bounds, prepared.prediction.splats);
         let radius = f64::from(splat.profile.cutoff) * f64::from(Footprint::SIGMA_OVER_SPACING) * spacing;
@@ -241,7 +241,11 @@ fn data(
             let (grid, transfer) = density_lattice(field, *bounds, params)?;
             cells(grid.into(), transfer, params.volume.normals)
         }
-        Input::Medium(..) => None,
+        Input::Medium(shape, params) => {
+            let grid = medium_grid(shape, params).map_err(|e| Error::from_convert(&e))?;
+            let transfer = as_it_is(shape.extinction(), params).map_err(|e| Error::from_convert(&e))?;
+            cells(grid.into(), transfer, false)
+        }
     })
 }
 

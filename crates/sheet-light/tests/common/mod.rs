@@ -50,7 +50,16 @@ pub(crate) fn unlit() -> Material {
 }
 
 pub(crate) fn volume<'a>(grid: &'a Grid, transfer: &'a TransferFunction, material: &'a Material) -> Volume<'a> {
-    Volume { grid, transform: Similarity::default(), transfer, material, normals: false, object: 0, shadow_coefficient: 1.0 }
+    Volume {
+        grid,
+        transform: Similarity::default(),
+        transfer,
+        extinction_scale: 1.0,
+        material,
+        normals: false,
+        object: 0,
+        shadow_coefficient: 1.0,
+    }
 }
 
 pub(crate) fn perspective(from: [f64; 3], fov_deg: f64, size: [u32; 2]) -> Camera {
@@ -64,6 +73,7 @@ pub(crate) fn parallel(from: [f64; 3], height: f64, size: [u32; 2]) -> Camera {
 }
 
 pub(crate) fn input<'a>(volumes: &'a [Volume<'a>], camera: &'a Camera, lights: &'a [LitBy<'a>]) -> SheetInput<'a> {
+    let (volumes, lights) = (volumes.to_vec(), lights.to_vec());
     SheetInput { volumes, splats: None, camera, lights, shadow_origin: DVec3::ZERO, ambient: [0.1; 3] }
 }
 
@@ -78,7 +88,8 @@ pub(crate) fn exact() -> Params {
 /// Beauty and one plane of optical depth.
 pub(crate) fn draw(input: &SheetInput<'_>, params: &Params) -> Result<(Accumulator, SheetCounts), Error> {
     let mut out = Accumulator::new(input.camera.size, 1, 3, true, true);
-    let counts = prepare(input, params, None)?.fold(f32::NEG_INFINITY..f32::INFINITY, &[], &BEAUTY, &mut out, None)?;
+    let counts =
+        prepare(input.clone(), params, None)?.fold(f32::NEG_INFINITY..f32::INFINITY, &[], &BEAUTY, &mut out, None)?;
     Ok((out, counts))
 }
 

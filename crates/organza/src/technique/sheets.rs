@@ -1,0 +1,203 @@
+//! The `sheets` technique (Neophytou and Mueller 2005): slabs across the view, front to back. Volumes are splatted value by value,
+//! and classified and shaded when a slab is complete, so zooms show no blur. What is no volume comes as splats, each in the slab of
+//! its centre, where extinctions add.
+//!
+//! Light comes from the same shadow maps as for all techniques.
+
+use crate::form::Form;
+use crate::frame::{Frame, Shaded};
+use crate::load::own::{Body, Own};
+use crate::pass;
+use crate::scene::{Scene, Technique};
+use crate::statistics::{ObjectData, ObjectStatistics};
+use crate::technique::{Fold, Session};
+use crate::work::{self, Translucent, cost};
+use crate::{CostRecord, Error, stage};
+use sheet_light::{KernelShape, Params, SheetInput, Sheeted, Splats, Volume, prepare};
+use splat_core::{Accumulator, Direction, Limits, SliceOrder};
+use std::ops::Range;
+
+/// Seconds of a sample of a picture of sheets, whatever is in them.
+const SHEETS: f64 = 2e-6;
+
+/// The form in which an object is taken.
+pub(crate) fn form(object: &ObjectStatistics) -> (Form, &'static str) {
+    if object.opaque {
+        return (Form::Opaque, "an opaque surface is drawn exactly");
+    }
+    match object.data {
+        ObjectData::Volume => (Form::Cells, "sheets classify what they reconstruct"),
+        ObjectData::Density { .. } => (Form::Cells, "sheets reconstruct it from a lattice"),
+        ObjectData::Points | ObjectData::Triangles | ObjectData::Surface { .. } => {
+            (Form::Splats, "a surface is splatted into the slabs that it lies in")
+        }
+    }
+}
+
+/// Seconds of one core, about.
+pub(crate) fn seconds(scene: &Scene, all: &Translucent) -> f64 {
+    let sheets = if all.any { SHEETS * work::samples(scene) } else { 0.0 };
+    sheets + cost::FRAGMENT * all.fragments
+}
+
+/// Begins a frame.
+pub(crate) fn begin<'a>(frame: &'a Frame<'a>) -> Box<dyn Fold + 'a> {
+    Box::new(Sheets { frame, sheeted: None })
+}
+
+/// What is drawn in slabs.
+struct Sheets<'a> {
+    frame: &'a Frame<'a>,
+    /// Once they were made.
+    sheeted: Option<Sheeted<'a>>,
+}
+
+impl Fold for Sheets<'_> {
+    fn fold(
+        &mut self,
+        range: Range<f32>,
+        into: &mut Accumulator,
+        session: &mut Session<'_>,
+        cost: &mut CostRecord,
+    ) -> Result<(), Error> {
+        let frame = self.frame;
+        let opaque = frame.opaque(cost)?;
+        if self.sheeted.is_none() {
+            self.sheeted = Some(sheeted(frame, session, cost)?);
+        }
+        let sheeted = self.sheeted.as_ref().expect("invariant: sheets were made above");
+        frame.progress.begin(stage::SHEETS);
+        frame.tick()?;
+        cost.measure(pass::SHEETS, |stage| {
+            let counts = sheeted.fold(range, &opaque.depth, &frame.layout(), into, Some(frame.progress));
+            let counts = counts.map_err(|e| refuse(frame, e))?;
+            stage.items_out = counts.shaded;
+            stage.fragments = counts.fragments + counts.splat_fragments;
+            stage.passes = u64::from(counts.slabs);
+            stage.bytes = counts.bytes;
+            Ok(())
+        })
+    }
+}
+
+/// The volumes and splats of a frame that are the technique's own.
+fn sheeted<'a>(
+    frame: &'a Frame<'a>,
+    session: &mut Session<'_>,
+    cost: &mut CostRecord,
+) -> Result<Sheeted<'a>, Error> {
+    let maps = frame.maps(cost)?;
+    let splats = splats(frame, cost)?;
+    frame.progress.begin(stage::SHEETS);
+    let own: Vec<&Own> = volumes(frame).collect();
+    let input = SheetInput {
+        volumes: own.iter().filter_map(|own| volume(frame, own)).collect(),
+        splats,
+        camera: &frame.camera,
+        lights: frame.lit_by(maps),
+        shadow_origin: frame.loaded.cloud.origin,
+        ambient: frame.scene.ambient,
+    };
+    let params = params(frame, session);
+    let sheeted = cost.measure(pass::SHEETS, |stage| {
+        stage.items_in = input.volumes.iter().map(|v| v.grid.values.len() as u64).sum();
+        let sheeted = prepare(input, &params, Some(frame.progress)).map_err(|e| refuse(frame, e))?;
+        stage.bytes = sheeted.bytes();
+        Ok::<_, Error>(sheeted)
+    })?;
+    for (own, _) in own.iter().zip(sheeted.visible()).filter(|(_, visible)| *visible == 0) {
+        let name = crate::shown(&frame.loaded.objects[own.object].name);
+        session.warnings.push(format!("object '{name}' shows nothing: its transfer function gives no value extinction"));
+    }
+    Ok(sheeted)
+}
+
+fn params(frame: &Frame<'_>, session: &Session<'_>) -> Params {
+    let settings = &frame.settings.sheets;
+    let unit = libm::exp2(f64::from(-frame.loaded.exponent));
+    Params {
+        slab_width: settings.slab_width.map(|width| width * unit),
+        kernel: KernelShape { extent: settings.kernel_extent, sigma: settings.kernel_sigma },
+        transmittance_cutoff: settings.transmittance_cutoff as f32,
+        limits: Limits::bytes(session.options.max_memory),
+    }
+}
+
+/// The objects that are drawn from lattices.
+fn volumes<'a>(frame: &'a Frame<'a>) -> impl Iterator<Item = &'a Own> {
+    let by = &frame.plan.by;
+    frame.loaded.own.iter().filter(|own| by[own.object] == Technique::Sheets && factor(frame, own) > 0.0)
+}
+
+/// The largest of a material's factors on extinction.
+fn factor(frame: &Frame<'_>, own: &Own) -> f64 {
+    let factors = frame.loaded.materials[own.material].extinction_rgb;
+    f64::from(factors.into_iter().fold(0.0, f32::max))
+}
+
+fn volume<'a>(frame: &Frame<'a>, own: &'a Own) -> Option<Volume<'a>> {
+    let Body::Cells { grid, transfer, normals } = &own.body else { return None };
+    Some(Volume {
+        grid,
+        transform: own.transform,
+        transfer,
+        // The scale holds the material's factor, and leads to units of the object.
+        extinction_scale: own.extinction_scale / (factor(frame, own) * own.transform.scale),
+        material: &frame.loaded.materials[own.material],
+        normals: *normals,
+        object: own.object as u32,
+        shadow_coefficient: frame.loaded.objects[own.object].shadow_coefficient,
+    })
+}
+
+/// The splats of a frame that are the technique's own, sorted; `None` without any.
+fn splats<'a>(frame: &'a Frame<'a>, cost: &mut CostRecord) -> Result<Option<Splats<'a>>, Error> {
+    let (cloud, camera) = (frame.drawn(), &frame.camera);
+    let translucent = frame.translucent(cloud, Technique::Sheets);
+    if translucent.is_empty() {
+        return Ok(None);
+    }
+    let Shaded { projected, values, .. } = frame.shaded(cost)?;
+    let params = hbsort::Params {
+        direction: Direction::FrontToBack,
+        exact: true,
+        margin_px: frame.filter_reach_px(),
+        ..hbsort::Params::default()
+    };
+    let order = hbsort::slice_cloud(cloud, Some(&translucent), camera, &params, &mut hbsort::Scratch::default());
+    let order = order.map_err(|e| Error::Internal(e.to_string()))?;
+    let place = camera.view_from_offset(cloud.origin);
+    Ok(Some(Splats {
+        projected,
+        depths: cloud.position.iter().map(|p| place.depth(*p)).collect(),
+        slab_width: slab_width(&order),
+        order: order.input_from_sorted,
+        values,
+        materials: &frame.loaded.materials,
+    }))
+}
+
+/// Slabs as wide as slices would be, but not so many that most are empty.
+fn slab_width(order: &SliceOrder) -> f64 {
+    /// Most slabs where nothing says how wide they are.
+    const MOST: f64 = 65536.0;
+    let whole = f64::from(order.far) - f64::from(order.near);
+    order.thickness.max(whole / MOST).max(f64::MIN_POSITIVE)
+}
+
+/// What went wrong with sheets: a limit, or a volume that they do not take.
+fn refuse<'a>(frame: &'a Frame<'a>, error: sheet_light::Error) -> Error {
+    match error {
+        sheet_light::Error::Cancelled => Error::Cancelled,
+        sheet_light::Error::Limit(exceeded) => {
+            let hint = "use a larger render.sheets.slab_width, a coarser volume or a larger --max-memory";
+            Error::Limit(exceeded.of("the scene", hint))
+        }
+        sheet_light::Error::Volume { volume, source } => {
+            let own = volumes(frame).nth(volume);
+            let name = own.map(|own| crate::shown(&frame.loaded.objects[own.object].name)).unwrap_or_default();
+            Error::input(format!("object '{name}'"), source.to_string(), "give it to another technique")
+        }
+        other => Error::Internal(other.to_string()),
+    }
+}
