@@ -255,7 +255,7 @@ fn an_object_has_exactly_one_source() {
 #[test]
 fn effects_of_later_versions_are_refused_by_name() {
     refused("opacity = 0.3", "ior = 1.4", "19:7: refraction needs the `surfels` technique");
-    refused("[render]", "[render]\ntechnique = \"sheets\"", "this version does not have \"sheets\"");
+    refused("[render]", "[render]\ntechnique = \"surfels\"", "this version does not have \"surfels\"");
     refused("[render]", "[background]\nenvironment = \"a.hdr\"\n[render]", "environment maps are not in this version");
 }
 

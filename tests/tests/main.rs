@@ -28,6 +28,7 @@ mod particle_layers;
 mod particles;
 mod progress;
 mod reading;
+mod sheets;
 mod slanted_slabs;
 mod techniques;
 mod truth;

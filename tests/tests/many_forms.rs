@@ -110,6 +110,14 @@ impl Object {
         draw_in(folder.path(), &scene, &[]).channel("shadow.A")
     }
 
+    /// [`Object::seen`] by the technique `sheets`.
+    fn seen_in_sheets(self) -> Vec<f64> {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = parallel_view(HEIGHT, self.size) + &self.source(folder.path(), [0.0, 0.0]);
+        let picture = draw_in(folder.path(), &scene, &["--technique", "sheets"]);
+        picture.channel("A").iter().map(|a| 1.0 - a).collect()
+    }
+
     /// [`Object::seen`] by the technique `particles`: transmittance and its standard error.
     fn seen_as_particles(self, seed: u32) -> (Vec<f64>, Vec<f64>) {
         let folder = tempfile::tempdir().unwrap();
@@ -217,6 +225,36 @@ fn compare_particles(shape: Shape, forms: &[Form], solid: bool) {
         let [(coarse, around), _, (fine, spread)] = errors[..] else { unreachable!() };
         assert!(fine - spread <= (coarse + around).max(0.0) / 16.0, "{shape:?} {form:?}: {errors:?}");
     }
+}
+
+/// Sheets come to the closed form as points do, and at the finest within 0.01 of points.
+fn compare_sheets(shape: Shape, forms: &[Form], solid: bool) {
+    for &form in forms {
+        let mut errors = Vec::new();
+        for size in SIZES {
+            let object = Object { shape, form, size };
+            let exact = squares(&shape.transmittance(solid, Rays::View, size), size);
+            let (sheets, points) = (squares(&object.seen_in_sheets(), size), squares(&object.seen(), size));
+            errors.push(rmse(&sheets, &exact));
+            let apart = rmse(&sheets, &points);
+            assert!(size < SIZES[2] || apart < 0.01, "{shape:?} {form:?} {size}: {apart} from points");
+        }
+        let order = 0.5 * (errors[0] / errors[2]).log2();
+        println!("{shape:?} {form:?} in sheets: RMSE {errors:.5?}, order {order:.2}");
+        assert!(order >= 1.0, "{shape:?} {form:?} in sheets: RMSE {errors:?}, order {order}");
+    }
+}
+
+#[test]
+fn sheets_of_shells() {
+    compare_sheets(Shape::Ball, &SHELLS, false);
+    compare_sheets(Shape::Gyroid, &[Form::Implicit], false);
+}
+
+#[test]
+fn sheets_of_solids() {
+    compare_sheets(Shape::Ball, &[Form::Lattice], true);
+    compare_sheets(Shape::Gyroid, &SOLIDS, true);
 }
 
 #[test]

@@ -74,6 +74,9 @@ fn what_lies_in_front_hides_what_lies_behind_whoever_draws_it() {
         ("reference", "points", 2e-4),
         ("points", "reference", 2e-4),
         ("reference", "reference", 2e-4),
+        ("sheets", "points", 2e-4),
+        ("points", "sheets", 2e-4),
+        ("sheets", "sheets", 2e-4),
         // 144 pixels of 4 samples of 200 sets: three standard errors of at most ½ / √115,200.
         ("points", "particles", 4.5e-3),
         ("particles", "points", 4.5e-3),
@@ -99,8 +102,8 @@ fn refusal(scene: &str) -> String {
 #[test]
 fn a_technique_that_is_not_there_is_refused_where_it_is_named() {
     let text = three([0, 1, 2], 1.0);
-    let refused = refusal(&text.replace("'particles'", "'sheets'"));
-    assert!(refused.contains("this version does not have \"sheets\""), "{refused}");
+    let refused = refusal(&text.replace("'particles'", "'surfels'"));
+    assert!(refused.contains("this version does not have \"surfels\""), "{refused}");
     let refused =
         refusal(&text.replace("antialias = 1", "antialias = 1\ntechnique = 'particles'\nlayers = ['std_error']"));
     assert!(refused.contains("a picture by several techniques has no layer `std_error`"), "{refused}");

@@ -101,7 +101,8 @@ impl Shader<'_> {
                 (medium.color[c] + Lanes::splat(simd, of.prepared.volume.material.emission[c])).store(&mut values[c]);
             }
         } else {
-            let normals = if of.prepared.volume.normals { self.normals(simd, of, place) } else { [Vec3::ZERO; MAX_LANES] };
+            let normals =
+                if of.prepared.volume.normals { self.normals(simd, of, place) } else { [Vec3::ZERO; MAX_LANES] };
             let open = picture.open[place.y] >> place.x;
             let mut lit = Lit { tau, normals, color: [[0.0; MAX_LANES]; 3], middle: [0.0; MAX_LANES] };
             for c in 0..3 {

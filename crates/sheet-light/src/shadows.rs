@@ -91,12 +91,8 @@ fn look_up(
     let share = |i: usize, row: usize| {
         let index = DVec3::new(i as f64, (row % ny) as f64, (row / ny) as f64) - DVec3::from_array(rim);
         let position = (start + axes * index).as_vec3();
-        let receiver = Receiver {
-            position,
-            normal: Default::default(),
-            radius: of.viewed.reach as f32,
-            kind: SplatKind::Medium,
-        };
+        let receiver =
+            Receiver { position, normal: Default::default(), radius: of.viewed.reach as f32, kind: SplatKind::Medium };
         shadow.transmittance(&receiver).map(|t| (t.clamp(0.0, 1.0) * WHOLE + 0.5) as u16)
     };
     let rows: Vec<usize> = (0..ny * nz).collect();

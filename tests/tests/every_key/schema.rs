@@ -94,6 +94,7 @@ pub(crate) fn heading(table: &str) -> &'static str {
         "render.points" => "`[render.points]`",
         "render.shadow" => "`[render.shadow]`",
         "render.particles" => "`[render.particles]`",
+        "render.sheets" => "`[render.sheets]`",
         "animation" | "animation.track" | "animation.track.keys" => "`[animation]`",
         _ if table.starts_with("light") => "`[[light]]`",
         _ if table.starts_with("object.") => "### Generated sources",

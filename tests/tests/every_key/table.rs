@@ -71,6 +71,7 @@ impl Which {
 const BOTH: &[&str] = &["points", "particles"];
 const POINTS: &[&str] = &["points"];
 const PARTICLES: &[&str] = &["particles"];
+const SHEETS: &[&str] = &["sheets"];
 
 impl Entry {
     pub(crate) fn applies_to(&self, source: &str) -> bool {
@@ -389,6 +390,13 @@ fn render() -> Vec<Entry> {
         one("render.particles.brownian_step", "render.particles.brownian_step=0.05")
             .by(PARTICLES)
             .with(&["render.particles.surface_sampler='brownian'"]),
+        of(BALL, "render.sheets", "render.sheets={slab_width=0.4}").by(SHEETS),
+        of(BALL, "render.sheets.slab_width", "render.sheets.slab_width=0.4").by(SHEETS),
+        of(BALL, "render.sheets.kernel_extent", "render.sheets.kernel_extent=3").by(SHEETS),
+        of(BALL, "render.sheets.kernel_sigma", "render.sheets.kernel_sigma=1").by(SHEETS),
+        of(BALL, "render.sheets.transmittance_cutoff", "render.sheets.transmittance_cutoff=0.9")
+            .by(SHEETS)
+            .with(&["object.it.transform.scale=4"]),
     ]
 }
 

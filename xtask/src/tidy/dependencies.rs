@@ -26,6 +26,7 @@ const MAY_KNOW: [(&str, &[&str]); 20] = [
             "tsm",
             "hbsort",
             "pbsr",
+            "sheet-light",
             "reference",
             "organza-scene",
             "organza-output",

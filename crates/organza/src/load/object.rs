@@ -266,16 +266,17 @@ fn flat(source: &RectangleSource, opacity: f64) -> convert::Rectangle {
     convert::Rectangle { center, u, v, opacity, spacing }
 }
 
-/// The extinction of a homogeneous medium on a lattice.
-pub(super) fn medium_grid(shape: &MediumShape, params: &SplatParams) -> Result<Grid, ConvertError> {
-    match *shape {
+/// The extinction of a homogeneous medium on a lattice, and the transfer function that takes it as it is.
+pub(super) fn medium_grid(shape: &MediumShape, params: &SplatParams) -> Result<(Grid, TransferFunction), ConvertError> {
+    let lattice = match *shape {
         MediumShape::Box { bounds, extinction, spacing } => {
-            convert::medium_box_grid(bounds, extinction, spacing, params)
+            convert::medium_box_grid(bounds, extinction, spacing, params)?
         }
         MediumShape::Ball { center, radius, extinction, spacing } => {
-            convert::medium_ball_grid(center, radius, extinction, spacing, params)
+            convert::medium_ball_grid(center, radius, extinction, spacing, params)?
         }
-    }
+    };
+    Ok((lattice, as_it_is(shape.extinction(), params)?))
 }
 
 fn medium(shape: &MediumShape, params: &SplatParams) -> Result<Cloud, ConvertError> {

@@ -242,8 +242,7 @@ fn data(
             cells(grid.into(), transfer, params.volume.normals)
         }
         Input::Medium(shape, params) => {
-            let grid = medium_grid(shape, params).map_err(|e| Error::from_convert(&e))?;
-            let transfer = as_it_is(shape.extinction(), params).map_err(|e| Error::from_convert(&e))?;
+            let (grid, transfer) = medium_grid(shape, params).map_err(|e| Error::from_convert(&e))?;
             cells(grid.into(), transfer, false)
         }
     })

@@ -81,11 +81,7 @@ impl Fold for Sheets<'_> {
 }
 
 /// The volumes and splats of a frame that are the technique's own.
-fn sheeted<'a>(
-    frame: &'a Frame<'a>,
-    session: &mut Session<'_>,
-    cost: &mut CostRecord,
-) -> Result<Sheeted<'a>, Error> {
+fn sheeted<'a>(frame: &'a Frame<'a>, session: &mut Session<'_>, cost: &mut CostRecord) -> Result<Sheeted<'a>, Error> {
     let maps = frame.maps(cost)?;
     let splats = splats(frame, cost)?;
     frame.progress.begin(stage::SHEETS);
@@ -107,7 +103,9 @@ fn sheeted<'a>(
     })?;
     for (own, _) in own.iter().zip(sheeted.visible()).filter(|(_, visible)| *visible == 0) {
         let name = crate::shown(&frame.loaded.objects[own.object].name);
-        session.warnings.push(format!("object '{name}' shows nothing: its transfer function gives no value extinction"));
+        session
+            .warnings
+            .push(format!("object '{name}' shows nothing: its transfer function gives no value extinction"));
     }
     Ok(sheeted)
 }

@@ -1,0 +1,139 @@
+//! The technique `sheets` through the whole command: closed forms, and what points show of the same scene.
+
+use organza_tests::{Picture, draw, draw_in, organza, parallel_view, window};
+
+fn in_sheets(scene: &str, arguments: &[&str]) -> Picture {
+    draw(scene, &[&["--technique", "sheets"], arguments].concat())
+}
+
+/// Largest difference from a number, over pixels.
+fn off(seen: &[f64], expected: f64) -> f64 {
+    seen.iter().map(|v| (v - expected).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_slab_of_fog_has_its_transmittance_at_any_width_of_slabs() {
+    for tau in [0.01f64, 1.0, 5.0] {
+        let scene = format!(
+            "{}[[object]]\nname = 'fog'\nmedium_box = {{ min = [-2, -2, -0.5], max = [2, 2, 0.5], \
+             extinction = {tau:?}, spacing = 0.1 }}\n[render.sheets]\ntransmittance_cutoff = 0\n",
+            parallel_view(2.0, 32)
+        );
+        for width in ["'auto'", "0.033", "0.7", "3"] {
+            let picture = in_sheets(&scene, &["--set", &format!("render.sheets.slab_width={width}")]);
+            let seen = window(&picture.channel("A"), 32, 4..28, 4..28);
+            let through: Vec<f64> = seen.iter().map(|a| 1.0 - a).collect();
+            assert!(off(&through, (-tau).exp()) < 1e-5, "{tau}, slabs {width}: {:e}", off(&through, (-tau).exp()));
+        }
+    }
+}
+
+#[test]
+fn rays_of_a_wide_lens_are_as_long_as_they_are() {
+    let scene = "version = 1\n[camera]\nposition = [0, 0, 3]\ntarget = [0, 0, 0]\nfov_y = 90\nsize = [32, 32]\n\
+                 [[object]]\nname = 'fog'\nmedium_box = { min = [-9, -9, -0.5], max = [9, 9, 0.5], \
+                 extinction = 0.6, spacing = 0.25 }\n[render]\nantialias = 1\n";
+    let alpha = in_sheets(scene, &[]).channel("A");
+    for (k, alpha) in alpha.iter().enumerate() {
+        let at = |i: usize| (i as f64 + 0.5) / 16.0 - 1.0;
+        let [x, y] = [at(k % 32), at(k / 32)];
+        let exact = (-0.6 * (1.0 + x * x + y * y).sqrt()).exp();
+        assert!((1.0 - alpha - exact).abs() < 1e-5, "{k}: {alpha}, expected {}", 1.0 - exact);
+    }
+}
+
+/// A translucent ball of glass, a cloud, a volume of values and raw points, which shadow each other and a wall.
+const MIXED: &str = "[[light]]\nkind = 'directional'\ndirection = [-0.4, -1, -0.6]\nirradiance = [2, 1.9, 1.8]\n\
+     [ambient]\ncolor = [0.1, 0.1, 0.12]\n\
+     [material.glass]\nopacity = 0.4\nextinction_rgb = [0.5, 1, 1]\n\
+     [material.smoke]\nmedium = { extinction = 1.5, albedo = 0.8 }\n\
+     [[object]]\nname = 'ball'\nmaterial = 'glass'\n\
+     implicit = { expression = '(x + 0.5)^2 + (y - 0.7)^2 + z^2 - 0.12', box = [[-1, 0.2, -0.5], [0, 1.2, 0.5]], spacing = 0.04 }\n\
+     [[object]]\nname = 'cloud'\nmaterial = 'smoke'\n\
+     density = { expression = 'exp(-6*((x - 0.4)^2 + y^2 + z^2))', box = [[-0.7, -1, -1], [1.4, 1, 1]], spacing = 0.05, extinction = 3 }\n\
+     [[object]]\nname = 'points'\npoints = 'points.xyz'\nopacity = 0.5\n\
+     [[object]]\nname = 'wall'\nrectangle = { center = [0, -0.9, -0.4], u = [1.4, 0, 0], v = [0, 0.3, -0.9], spacing = 0.04 }\n\
+     [render]\nlayers = ['effects', 'shadow']\n";
+
+/// A sheet of raw points.
+fn points() -> String {
+    let at = |i: u32| f64::from(i) * 0.04 - 0.5;
+    (0..625u32).map(|k| format!("{} {} {}\n", at(k % 25) - 0.3, 0.3 - 0.2 * at(k / 25), at(k / 25) + 0.4)).collect()
+}
+
+#[test]
+fn what_shadows_each_other_looks_as_by_points() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("points.xyz"), points()).unwrap();
+    let scene = parallel_view(2.4, 64) + MIXED;
+    let [points, sheets] = ["points", "sheets"].map(|t| draw_in(folder.path(), &scene, &["--technique", t]));
+    for channel in ["R", "G", "B", "A", "direct.R", "shadow.A"] {
+        let (a, b) = (points.channel(channel), sheets.channel(channel));
+        let square = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64;
+        let mean = a.iter().sum::<f64>() / a.len() as f64;
+        println!("{channel}: RMSE {:.5}, mean {mean:.4}", square.sqrt());
+        assert!(square.sqrt() < 0.01, "{channel}: RMSE {}", square.sqrt());
+        assert!(mean > 0.05, "{channel}: mean {mean}");
+    }
+}
+
+#[test]
+fn effects_sum_to_beauty_and_threads_change_no_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("points.xyz"), points()).unwrap();
+    let scene = parallel_view(2.4, 48) + MIXED;
+    let drawn = |threads: &str| draw_in(folder.path(), &scene, &["--technique", "sheets", "--threads", threads]);
+    let picture = drawn("1");
+    for channel in ["R", "G", "B"] {
+        let beauty = picture.channel(channel);
+        let mut sum = vec![0.0; beauty.len()];
+        for effect in ["background", "ambient", "emission", "direct", "scatter1"] {
+            let layer = picture.channel(&format!("{effect}.{channel}"));
+            sum.iter_mut().zip(layer).for_each(|(sum, v)| *sum += v);
+        }
+        let apart = beauty.iter().zip(&sum).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(apart < 1e-5, "{channel}: {apart:e}");
+    }
+    for threads in ["2", "3", "7"] {
+        for channel in ["R", "A", "direct.G", "shadow.A"] {
+            assert_eq!(drawn(threads).channel(channel), picture.channel(channel), "{threads} threads, {channel}");
+        }
+    }
+}
+
+#[test]
+fn a_volume_without_extinction_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let grid = "NRRD0004\ntype: float\ndimension: 3\nsizes: 4 4 4\nencoding: ascii\n\n".to_owned() + &"0.5 ".repeat(64);
+    std::fs::write(folder.path().join("grid.nrrd"), grid).unwrap();
+    let scene = parallel_view(6.0, 16)
+        + "[[object]]\nname = 'nothing'\nvolume = 'grid.nrrd'\ntransfer = [{ value = 0, color = [1, 1, 1], extinction = 0 }, \
+           { value = 0.6, color = [1, 1, 1], extinction = 0 }, { value = 1, color = [1, 1, 1], extinction = 2 }]\n";
+    std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    let mut command = organza();
+    command.args(["render", "scene.toml", "--technique", "sheets", "-o", "a.exr"]).current_dir(&folder);
+    let out = command.output().unwrap();
+    let said = String::from_utf8(out.stderr).unwrap();
+    assert!(out.status.success(), "{said}");
+    assert!(said.contains("object 'nothing' shows nothing: its transfer function gives no value extinction"), "{said}");
+}
+
+#[test]
+fn too_many_slabs_are_refused_with_what_to_change() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = parallel_view(2.0, 16)
+        + "[[object]]\nname = 'fog'\nmedium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 1, spacing = 0.2 }\n";
+    std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    let refused = |width: &str, code: i32, words: &str| {
+        let mut command = organza();
+        command.args(["render", "scene.toml", "--technique", "sheets", "-o", "a.exr", "--set"]);
+        let out = command.arg(format!("render.sheets.slab_width={width}")).current_dir(&folder).output().unwrap();
+        let said = String::from_utf8(out.stderr).unwrap();
+        assert_eq!(out.status.code(), Some(code), "{said}");
+        assert!(said.contains(words), "{said}");
+        assert!(!folder.path().join("a.exr").exists());
+    };
+    refused("1e-9", 5, "render.sheets.slab_width");
+    refused("0", 2, "slab_width");
+    refused("-1", 2, "slab_width");
+}
