@@ -334,6 +334,16 @@ fn the_command_writes_three_files_or_none() {
     assert!(
         settings.iter().all(|s| s["sampled"]["seeds"] == 5 && s["seconds_of_repeats"].as_array().unwrap().len() >= 5)
     );
+    // Sheets have a limit of their own, and stand beside the others by physical truth alone.
+    let sheets = &written["techniques"][2];
+    assert_eq!(sheets["technique"], "sheets", "{}", written["absent"]);
+    assert_ne!(sheets["limit"], technique["limit"]);
+    assert!(sheets["curves"].as_array().unwrap().iter().any(|c| c["knob"] == "slab width"));
+    let names = |frontier: &Value| -> Vec<String> {
+        frontier.as_array().unwrap().iter().map(|f| f["technique"].as_str().unwrap().to_owned()).collect()
+    };
+    assert!(!names(&written["frontier"]).contains(&"sheets".to_owned()));
+    assert!(!names(&written["frontier_by_truth"]).is_empty());
     let skipped = technique["skipped"].as_array().unwrap();
     assert!(skipped.iter().any(|s| s["knob"] == "footprint table size"));
     let html = fs::read_to_string(folder.path().join("r/accuracy.html")).unwrap();

@@ -13,8 +13,13 @@ use serde_json::json;
 use std::fmt::Write;
 
 /// Stages with their shares, about as long as they take for `scenes/mixed.toml`.
-const STAGES: [(&str, f64); 4] =
-    [("first look", 1.0), ("physical truth", 8.0), ("settings of points", 10.0), ("settings of particles", 10.0)];
+const STAGES: [(&str, f64); 5] = [
+    ("first look", 1.0),
+    ("physical truth", 8.0),
+    ("settings of points", 10.0),
+    ("settings of particles", 10.0),
+    ("settings of sheets", 20.0),
+];
 
 /// Sweeps the knobs, judges, writes the report. Whatever can be refused is refused before any work.
 pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
@@ -43,10 +48,16 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
             let points = accuracy::study(&sweep, truth, &options, progress, &mut |request| renderer.draw(request))?;
             progress.begin(STAGES[3].0);
             let particles = particles(&scene, &facts, &options, &points, &mut renderer, progress)?;
-            Ok(match particles {
-                Ok(particles) => (vec![points, particles], Vec::new()),
-                Err(absent) => (vec![points], vec![absent]),
-            })
+            progress.begin(STAGES[4].0);
+            let sheets = sheets(&scene, &facts, &options, &points, &mut renderer, progress)?;
+            let (mut studies, mut absent) = (vec![points], Vec::new());
+            for study in [particles, sheets] {
+                match study {
+                    Ok(study) => studies.push(study),
+                    Err(reason) => absent.push(reason),
+                }
+            }
+            Ok((studies, absent))
         })?;
         let report = Report::new(&scene, options, studies, absent);
         accuracy::write(&report, &targets)?;
@@ -98,6 +109,31 @@ fn particles(
     .map(Ok)
 }
 
+/// The study of `sheets`, by a limit of its own and the truth of `points`; or why there is none.
+fn sheets(
+    scene: &Scene,
+    facts: &Facts,
+    options: &Options,
+    points: &Study,
+    renderer: &mut Renderer<'_>,
+    progress: &Progress,
+) -> Result<Result<Study, Absent>, Error> {
+    let absent = |reason| Ok(Err(Absent { technique: "sheets", reason }));
+    let drawn = accuracy::in_sheets(scene);
+    if let Some(reason) = renderer.refused(&drawn)? {
+        return absent(reason);
+    }
+    let sweep = match accuracy::sheets(scene, renderer.slab_width(&drawn)?, facts, options) {
+        Ok(sweep) => sweep,
+        Err(reason) => return absent(reason),
+    };
+    match accuracy::study(&sweep, points.truth.clone(), options, progress, &mut |request| renderer.draw(request)) {
+        Ok(study) => Ok(Ok(study)),
+        Err(Error::Unresolved { message, .. }) => absent(message),
+        Err(other) => Err(other),
+    }
+}
+
 fn summary(report: &Report, files: &[Target], as_json: bool) -> String {
     if as_json {
         let files: Vec<String> = files.iter().map(|f| path_text(f.path())).collect();
@@ -113,7 +149,7 @@ fn summary(report: &Report, files: &[Target], as_json: bool) -> String {
         let _ = writeln!(text, "no technique {}: {}\n", absent.technique, absent.reason);
     }
     if report.studies.len() > 1 {
-        text += "frontier over all techniques, from the most accurate to the fastest\n";
+        text += "frontier over all techniques with one limit, from the most accurate to the fastest\n";
         for [study, setting] in &report.frontier {
             let study = &report.studies[*study];
             let _ = writeln!(text, "  {:>9}  {}", study.technique, outcome_text(&study.outcomes[*setting]));

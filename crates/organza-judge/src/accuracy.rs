@@ -9,7 +9,8 @@
 //! shows the order of convergence, undisturbed by the other knobs. The **error against the limit** compares with the
 //! picture whose knobs are all at their ends. Each reference states its own error (Richardson, from the fitted order),
 //! and no error below ten times that is drawn. A random technique without bias takes the limit of another, is drawn with
-//! several seeds, and shows intervals instead.
+//! several seeds, and shows intervals instead. A technique with a limit of its own stands beside the others where all are held against
+//! physical truth, and nowhere else.
 
 mod frontier;
 mod knob;
@@ -28,6 +29,7 @@ mod report_tables;
 mod resolve;
 mod sampled;
 mod settings;
+mod sheets;
 mod study;
 mod verdict;
 
@@ -42,6 +44,7 @@ pub use report::{Absent, Machine, Report, write};
 pub use resolve::{Curve, CurvePoint, Settled, settle};
 pub use sampled::Sampled;
 pub use settings::Setting;
+pub use sheets::{in_sheets, sheets};
 pub use study::{Draw, Outcome, Study, least_seconds, study};
 pub use verdict::verdict;
 

@@ -173,6 +173,19 @@ impl<'a> Renderer<'a> {
         })
     }
 
+    /// Width of the slabs that a scene by `sheets` has by its own setting, world units; `None` where nothing is translucent.
+    ///
+    /// # Errors
+    /// As [`Renderer::draw`].
+    pub fn slab_width(&mut self, scene: &Scene) -> Result<Option<f64>, Error> {
+        self.within_stage(|renderer| {
+            let (options, progress) = (renderer.options, renderer.progress);
+            let (loaded, _) = renderer.load(scene)?;
+            let plan = plan_loaded(scene, loaded, options)?;
+            organza::Frame::new(scene, loaded, &plan, progress).slab_width(options, &mut CostRecord::default())
+        })
+    }
+
     /// Why a scene cannot be drawn as its settings say, if it cannot.
     ///
     /// # Errors

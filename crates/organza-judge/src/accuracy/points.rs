@@ -56,16 +56,16 @@ pub fn points(scene: &Scene, facts: &Facts, options: &Options) -> Sweep {
     sweep
 }
 
-fn step(label: impl Into<String>, size: f64, value: f64) -> Step {
+pub(super) fn step(label: impl Into<String>, size: f64, value: f64) -> Step {
     Step { label: label.into(), size: Some(size), value }
 }
 
-fn choice(label: &str, value: f64) -> Step {
+pub(super) fn choice(label: &str, value: f64) -> Step {
     Step { label: label.into(), size: None, value }
 }
 
 /// How much finer ends are than by default.
-fn finer(options: &Options) -> f64 {
+pub(super) fn finer(options: &Options) -> f64 {
     f64::from(options.finer).exp2()
 }
 
@@ -120,7 +120,7 @@ fn order(facts: &Facts, options: &Options) -> Result<Knob, String> {
     })
 }
 
-fn cells(facts: &Facts, options: &Options) -> Result<Knob, String> {
+pub(super) fn cells(facts: &Facts, options: &Options) -> Result<Knob, String> {
     let own = f64::from(facts.cells.ok_or(NO_MAP)?);
     let parts: &[f64] = if options.quick { &[16.0, 8.0, 4.0] } else { &[32.0, 16.0, 8.0, 4.0, 2.0] };
     let count = move |part: f64| (own / part).round().clamp(1.0, MOST_CELLS);
@@ -165,7 +165,7 @@ fn mapping(scene: &Scene, facts: &Facts) -> Result<Knob, String> {
     })
 }
 
-fn absorbance_cut(facts: &Facts, options: &Options) -> Result<Knob, String> {
+pub(super) fn absorbance_cut(facts: &Facts, options: &Options) -> Result<Knob, String> {
     facts.cells.ok_or(NO_MAP)?;
     let cuts: &[f64] = if options.quick { &[1.0, 2.0, 4.0] } else { &[0.5, 1.0, 2.0, 3.0, 4.0, 6.0] };
     Ok(Knob {
@@ -186,10 +186,15 @@ fn absorbance_cut(facts: &Facts, options: &Options) -> Result<Knob, String> {
 
 fn transmittance_cut(facts: &Facts, options: &Options) -> Result<Knob, String> {
     facts.slice_thickness.ok_or(NO_TRANSLUCENT)?;
+    Ok(cutoffs(options))
+}
+
+/// Transmittances at which pixels are finished.
+pub(super) fn cutoffs(options: &Options) -> Knob {
     let cuts: &[f64] = if options.quick { &[0.1, 0.03, 0.01] } else { &[0.3, 0.1, 0.03, 0.01, 0.003, 0.001] };
     let mut steps: Vec<Step> = cuts.iter().map(|t| step(format!("T {t}"), *t, *t)).collect();
     steps.push(Step { label: "T 0".into(), size: None, value: 0.0 });
-    Ok(Knob {
+    Knob {
         name: "transmittance cut",
         size_meaning: "T_cut",
         set: |request, value| request.scene.render.points.transmittance_cutoff = value,
@@ -202,10 +207,10 @@ fn transmittance_cut(facts: &Facts, options: &Options) -> Result<Knob, String> {
             why: "what lies behind the cut is seen through at most T_cut: 1 where every pixel reaches it, more where few do",
         }),
         joint: true,
-    })
+    }
 }
 
-fn samples(options: &Options) -> Result<Knob, String> {
+pub(super) fn samples(options: &Options) -> Result<Knob, String> {
     let sides: &[f64] = if options.quick { &[1.0, 2.0, 4.0] } else { &[1.0, 2.0, 4.0, 8.0] };
     let label = |n: f64| format!("{n} x {n} a pixel");
     let end = 32.0 * finer(options);

@@ -1,6 +1,6 @@
 //! The files of a report.
 
-use super::study::candidates;
+use super::study::{candidates, candidates_by_truth};
 use super::{Options, Study, frontier, report_html, report_tables};
 use organza::output::{Target, Targets};
 use organza::scene::Scene;
@@ -50,8 +50,10 @@ pub struct Report {
     pub studies: Vec<Study>,
     /// Techniques that were left out.
     pub absent: Vec<Absent>,
-    /// The frontier over all techniques, from the most accurate to the fastest: study, setting.
+    /// The frontier over all techniques that share the first one's limit, from the most accurate to the fastest: study, setting.
     pub frontier: Vec<[usize; 2]>,
+    /// The frontier over all techniques by physical truth; empty where there is none.
+    pub frontier_by_truth: Vec<[usize; 2]>,
 }
 
 /// A technique that cannot show the scene, and why.
@@ -66,11 +68,16 @@ pub struct Absent {
 impl Report {
     /// A report of studies of a scene on this machine.
     pub fn new(scene: &Scene, options: Options, studies: Vec<Study>, absent: Vec<Absent>) -> Self {
-        let places: Vec<[usize; 2]> =
-            studies.iter().enumerate().flat_map(|(s, study)| (0..study.outcomes.len()).map(move |o| [s, o])).collect();
-        let on_it = frontier(&candidates(studies.iter().flat_map(|s| &s.outcomes)));
+        let places = |of: &[(usize, &Study)]| -> Vec<[usize; 2]> {
+            of.iter().flat_map(|(s, study)| (0..study.outcomes.len()).map(move |o| [*s, o])).collect()
+        };
+        let all: Vec<(usize, &Study)> = studies.iter().enumerate().collect();
+        let alike: Vec<_> = all.iter().copied().filter(|(_, s)| s.shares_limit_with(&studies[0])).collect();
+        let by_limit = frontier(&candidates(alike.iter().flat_map(|(_, s)| &s.outcomes)));
+        let by_truth = frontier(&candidates_by_truth(all.iter().flat_map(|(_, s)| &s.outcomes)));
         Self {
-            frontier: on_it.into_iter().map(|k| places[k]).collect(),
+            frontier: by_limit.into_iter().map(|k| places(&alike)[k]).collect(),
+            frontier_by_truth: by_truth.into_iter().map(|k| places(&all)[k]).collect(),
             absent,
             scene: printable(Path::new(scene.file.file_name().unwrap_or_default())),
             scene_sha256: scene.sha256.clone(),

@@ -1,7 +1,7 @@
 //! The part of the page that shows all techniques together: their settings in one plot, and one frontier.
 
 use super::plot::{COLORS, Mark, Plot, Series, escaped};
-use super::{Outcome, Report, least_seconds};
+use super::{Outcome, Report, Study, least_seconds};
 use std::fmt::Write;
 
 /// A bar that reaches below zero ends at this share of the mean.
@@ -23,7 +23,7 @@ pub(super) fn joint(html: &mut String, report: &Report) {
         return;
     }
     *html += "<h2>All techniques</h2>\n<p>Each dot is one setting of a technique. The pale line is the frontier over all of \
-              them. A bar is the 95 % interval of a random technique's mean error over its seeds.</p>\n<figure>";
+              them that are held against one limit; a technique with a limit of its own stands in the plot by physical truth. A bar is the 95 % interval of a random technique's mean error over its seeds.</p>\n<figure>";
     let limit = &report.studies[0].limit;
     let floor = Some((10.0 * limit.own_error, "ten times the limit's own error".to_owned()));
     *html += &plot(report, Against::Limit, "RMSE against the limit, linear radiance", floor).svg();
@@ -34,14 +34,18 @@ pub(super) fn joint(html: &mut String, report: &Report) {
         *html += "<p>The same against physical truth. No picture can come below the truth's own standard error.</p>\n<figure>";
         *html += &plot(report, Against::Truth, "RMSE against physical truth", floor).svg();
         legend(html, report);
+        named(html, report, "by physical truth", &report.frontier_by_truth);
     }
-    *html += "<p>On the frontier, from the most accurate to the fastest: ";
+    named(html, report, "by the limit", &report.frontier);
+}
+
+fn named(html: &mut String, report: &Report, by: &str, frontier: &[[usize; 2]]) {
     let name = |[study, setting]: &[usize; 2]| {
         let study = &report.studies[*study];
         format!("{}, {}", study.technique, escaped(&study.outcomes[*setting].setting.label))
     };
-    *html += &report.frontier.iter().map(name).collect::<Vec<_>>().join("; ");
-    *html += ".</p>\n";
+    let names = frontier.iter().map(name).collect::<Vec<_>>().join("; ");
+    let _ = writeln!(html, "<p>On the frontier {by}, from the most accurate to the fastest: {names}.</p>");
 }
 
 fn legend(html: &mut String, report: &Report) {
@@ -81,11 +85,12 @@ fn plot(report: &Report, against: Against, y_label: &str, floor: Option<(f64, St
         Some(([1e3 * s, e], format!("{}: {:.1} ms, RMSE {e:.2e}{interval}", o.setting.label, 1e3 * s)))
     };
     let mut series = Vec::new();
-    if against == Against::Limit {
-        let on_it = report.frontier.iter().rev().filter_map(|[s, o]| place(&report.studies[*s].outcomes[*o]));
-        series.push(Series { color: "var(--accent)".into(), mark: Mark::Steps, points: on_it.collect() });
-    }
-    for (k, study) in report.studies.iter().enumerate() {
+    let (limit, truth) = (&report.frontier, &report.frontier_by_truth);
+    let on_it = if against == Against::Limit { limit } else { truth };
+    let on_it = on_it.iter().rev().filter_map(|[s, o]| place(&report.studies[*s].outcomes[*o]));
+    series.push(Series { color: "var(--accent)".into(), mark: Mark::Steps, points: on_it.collect() });
+    let shown = |study: &Study| against == Against::Truth || study.shares_limit_with(&report.studies[0]);
+    for (k, study) in report.studies.iter().enumerate().filter(|(_, study)| shown(study)) {
         let color = COLORS[k % COLORS.len()];
         series.extend(study.outcomes.iter().filter_map(|o| bar(o, against, color)));
         let dots = study.outcomes.iter().filter_map(place);

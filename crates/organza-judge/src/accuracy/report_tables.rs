@@ -17,14 +17,20 @@ pub(super) fn json(report: &Report) -> Value {
         "finer": report.options.finer,
         "repeats": report.options.repeats(),
         "machine": { "cpu": report.machine.cpu, "system": report.machine.system, "threads": report.machine.threads },
-        "frontier": report.frontier.iter().map(|[s, o]| {
-            let study = &report.studies[*s];
-            json!({ "technique": study.technique, "setting": study.outcomes[*o].setting.label })
-        }).collect::<Value>(),
+        "frontier": frontier(report, &report.frontier),
+        "frontier_by_truth": frontier(report, &report.frontier_by_truth),
         "significant_ratio_of_times": TOLD_APART,
         "techniques": report.studies.iter().map(study).collect::<Value>(),
         "absent": report.absent.iter().map(|a| json!({ "technique": a.technique, "reason": a.reason })).collect::<Value>(),
     })
+}
+
+fn frontier(report: &Report, places: &[[usize; 2]]) -> Value {
+    let place = |[s, o]: &[usize; 2]| {
+        let study = &report.studies[*s];
+        json!({ "technique": study.technique, "setting": study.outcomes[*o].setting.label })
+    };
+    places.iter().map(place).collect()
 }
 
 fn study(study: &Study) -> Value {

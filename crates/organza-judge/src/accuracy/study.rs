@@ -60,6 +60,11 @@ pub struct Study {
 }
 
 impl Study {
+    /// Whether both are held against one limit, so that their errors can stand in one plot.
+    pub fn shares_limit_with(&self, other: &Self) -> bool {
+        self.limit.image == other.limit.image
+    }
+
     /// Whether its settings are random: they have intervals, and no error is too small to be shown.
     pub fn is_random(&self) -> bool {
         self.outcomes.iter().any(|o| o.sampled.is_some())
@@ -174,12 +179,22 @@ fn unresolved(message: impl Into<String>, hint: impl Into<String>) -> Error {
     Error::Unresolved { message: message.into(), hint: hint.into() }
 }
 
-/// What may be on a frontier; ids are places in `outcomes`.
+/// What may be on a frontier by the limit; ids are places in `outcomes`.
 pub(super) fn candidates<'a>(outcomes: impl Iterator<Item = &'a Outcome>) -> Vec<Candidate> {
-    let candidate = |(id, o): (usize, &Outcome)| {
-        let error = o.from_limit.as_ref().filter(|_| o.drawn)?.linear.rmse;
-        Some(Candidate { id, error, seconds: least_seconds(o)? })
-    };
+    let error = |o: &Outcome| Some(o.from_limit.as_ref().filter(|_| o.drawn)?.linear.rmse);
+    candidates_by(outcomes, error)
+}
+
+/// The same by physical truth.
+pub(super) fn candidates_by_truth<'a>(outcomes: impl Iterator<Item = &'a Outcome>) -> Vec<Candidate> {
+    candidates_by(outcomes, |o| Some(o.from_truth.as_ref()?.linear.rmse))
+}
+
+fn candidates_by<'a>(
+    outcomes: impl Iterator<Item = &'a Outcome>,
+    error: impl Fn(&Outcome) -> Option<f64>,
+) -> Vec<Candidate> {
+    let candidate = |(id, o): (usize, &Outcome)| Some(Candidate { id, error: error(o)?, seconds: least_seconds(o)? });
     outcomes.enumerate().filter_map(candidate).collect()
 }
 

@@ -12,7 +12,7 @@ use crate::scene::{Scene, Technique};
 use crate::statistics::{ObjectData, ObjectStatistics};
 use crate::technique::{Fold, Session};
 use crate::work::{self, Translucent, cost};
-use crate::{CostRecord, Error, stage};
+use crate::{CostRecord, Error, RenderOptions, stage};
 use sheet_light::{KernelShape, Params, SheetInput, Sheeted, Splats, Volume, prepare};
 use splat_core::{Accumulator, Direction, Limits, SliceOrder};
 use std::ops::Range;
@@ -63,7 +63,9 @@ impl Fold for Sheets<'_> {
         let frame = self.frame;
         let opaque = frame.opaque(cost)?;
         if self.sheeted.is_none() {
-            self.sheeted = Some(sheeted(frame, session, cost)?);
+            let sheeted = sheeted(frame, session.options, cost)?;
+            warn(frame, &sheeted, session.warnings);
+            self.sheeted = Some(sheeted);
         }
         let sheeted = self.sheeted.as_ref().expect("invariant: sheets were made above");
         frame.progress.begin(stage::SHEETS);
@@ -73,7 +75,7 @@ impl Fold for Sheets<'_> {
             let counts = counts.map_err(|e| refuse(frame, e))?;
             stage.items_out = counts.shaded;
             stage.fragments = counts.fragments + counts.splat_fragments;
-            stage.passes = u64::from(counts.slabs);
+            stage.passes = counts.slabs;
             stage.bytes = counts.bytes;
             Ok(())
         })
@@ -81,43 +83,55 @@ impl Fold for Sheets<'_> {
 }
 
 /// The volumes and splats of a frame that are the technique's own.
-fn sheeted<'a>(frame: &'a Frame<'a>, session: &mut Session<'_>, cost: &mut CostRecord) -> Result<Sheeted<'a>, Error> {
+fn sheeted<'a>(frame: &'a Frame<'a>, options: &RenderOptions, cost: &mut CostRecord) -> Result<Sheeted<'a>, Error> {
     let maps = frame.maps(cost)?;
     let splats = splats(frame, cost)?;
     frame.progress.begin(stage::SHEETS);
-    let own: Vec<&Own> = volumes(frame).collect();
     let input = SheetInput {
-        volumes: own.iter().filter_map(|own| volume(frame, own)).collect(),
+        volumes: volumes(frame).filter_map(|own| volume(frame, own)).collect(),
         splats,
         camera: &frame.camera,
         lights: frame.lit_by(maps),
         shadow_origin: frame.loaded.cloud.origin,
         ambient: frame.scene.ambient,
     };
-    let params = params(frame, session);
-    let sheeted = cost.measure(pass::SHEETS, |stage| {
+    let params = params(frame, options);
+    cost.measure(pass::SHEETS, |stage| {
         stage.items_in = input.volumes.iter().map(|v| v.grid.values.len() as u64).sum();
         let sheeted = prepare(input, &params, Some(frame.progress)).map_err(|e| refuse(frame, e))?;
         stage.bytes = sheeted.bytes();
-        Ok::<_, Error>(sheeted)
-    })?;
-    for (own, _) in own.iter().zip(sheeted.visible()).filter(|(_, visible)| *visible == 0) {
-        let name = crate::shown(&frame.loaded.objects[own.object].name);
-        session
-            .warnings
-            .push(format!("object '{name}' shows nothing: its transfer function gives no value extinction"));
-    }
-    Ok(sheeted)
+        Ok(sheeted)
+    })
 }
 
-fn params(frame: &Frame<'_>, session: &Session<'_>) -> Params {
+/// Names volumes that nothing is seen of.
+fn warn<'a>(frame: &'a Frame<'a>, sheeted: &Sheeted<'_>, warnings: &mut Vec<String>) {
+    for (own, _) in volumes(frame).zip(sheeted.visible()).filter(|(_, visible)| *visible == 0) {
+        let name = crate::shown(&frame.loaded.objects[own.object].name);
+        warnings.push(format!("object '{name}' shows nothing: its transfer function gives no value extinction"));
+    }
+}
+
+impl<'a> Frame<'a> {
+    /// Width of the slabs in which the technique `sheets` draws what is its own in the plan, world units of the scene; `None` for nothing.
+    ///
+    /// # Errors
+    /// Those of [`Frame::maps`]; [`Error::Limit`] where there would be too many slabs, or too much memory.
+    pub fn slab_width(&'a self, options: &RenderOptions, cost: &mut CostRecord) -> Result<Option<f64>, Error> {
+        let none = volumes(self).next().is_none() && self.translucent(self.drawn(), Technique::Sheets).is_empty();
+        let unit = libm::exp2(f64::from(self.loaded.exponent));
+        if none { Ok(None) } else { Ok(Some(sheeted(self, options, cost)?.slabs().1 * unit)) }
+    }
+}
+
+fn params(frame: &Frame<'_>, options: &RenderOptions) -> Params {
     let settings = &frame.settings.sheets;
     let unit = libm::exp2(f64::from(-frame.loaded.exponent));
     Params {
         slab_width: settings.slab_width.map(|width| width * unit),
         kernel: KernelShape { extent: settings.kernel_extent, sigma: settings.kernel_sigma },
         transmittance_cutoff: settings.transmittance_cutoff as f32,
-        limits: Limits::bytes(session.options.max_memory),
+        limits: Limits::bytes(options.max_memory),
     }
 }
 
