@@ -225,9 +225,13 @@ impl Shader<'_> {
                 let mut out = [0.0; MAX_CHANNELS];
                 let Prepared { volume, viewed, shadows, voxels, lattice, rays, .. } = of.prepared;
                 let sample = Sample { volume, radius: viewed.reach as f32, seen, color, normal: lit.normals[lane] };
-                let radiance = radiance(self.input, &sample, |light| {
+                let cell = shadows.as_ref().map(|shadows| {
                     let rim = DVec3::from_array(lattice.rim.map(|n| n as f64));
-                    shadows.as_ref()?.at(voxels, light, rays.lattice(at) + rim)
+                    (shadows, shadows.cell(voxels, rays.lattice(at) + rim))
+                });
+                let radiance = radiance(self.input, &sample, |light| {
+                    let (shadows, cell) = cell.as_ref()?;
+                    shadows.at(cell, light)
                 });
                 radiance.write(lit.normals[lane], self.layout, &mut out);
                 for c in 0..self.layout.count() {

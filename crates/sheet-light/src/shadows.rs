@@ -53,30 +53,55 @@ impl Shadows {
         Ok(Some(Self { of_lights, ranks: of.voxels.ranks() }))
     }
 
-    /// What arrives of a light at a place in lattice coordinates that count from the rim; `None` for a light without shadows.
-    pub(crate) fn at(&self, voxels: &Voxels, light: usize, place: DVec3) -> Option<[f32; 3]> {
-        let shares = self.of_lights[light].as_deref()?;
-        let [nx, ny, nz] = voxels.dims();
-        let cell = |v: f64, n: usize| {
-            let first = (v.max(0.0) as usize).min(n.saturating_sub(2));
-            (first, (v - first as f64).clamp(0.0, 1.0) as f32)
-        };
-        let [(i, x), (j, y), (k, z)] = [cell(place.x, nx), cell(place.y, ny), cell(place.z, nz)];
-        let (mut sum, mut whole) = ([0.0; 3], 0.0);
+    /// The needed voxels around a place in lattice coordinates that count from the rim.
+    #[inline]
+    pub(crate) fn cell(&self, voxels: &Voxels, place: DVec3) -> Cell {
+        let dims = voxels.dims();
+        let mut first = [0; 3];
+        let mut high = [0.0; 3];
+        for a in 0..3 {
+            first[a] = (place[a].max(0.0) as usize).min(dims[a].saturating_sub(2));
+            high[a] = (place[a] - first[a] as f64).clamp(0.0, 1.0) as f32;
+        }
+        let mut cell = Cell { ranks: [0; 8], weights: [0.0; 8], is_known: false };
+        let mut whole = 0.0;
         for corner in 0..8 {
-            let [a, b, c] = [corner & 1, corner >> 1 & 1, corner >> 2];
-            let weight = |high: usize, t: f32| if high == 1 { t } else { 1.0 - t };
-            let weight = weight(a, x) * weight(b, y) * weight(c, z);
-            if weight == 0.0 {
-                continue;
-            }
-            if let Some(rank) = voxels.rank(&self.ranks, i + a, j + b, k + c) {
-                (0..3).for_each(|c| sum[c] += weight * f32::from(shares[rank][c]));
-                whole += weight;
+            let steps = [corner & 1, corner >> 1 & 1, corner >> 2];
+            let share = |a: usize| if steps[a] == 1 { high[a] } else { 1.0 - high[a] };
+            let at = |a: usize| first[a] + steps[a];
+            if let Some(rank) = voxels.rank(&self.ranks, at(0), at(1), at(2)) {
+                cell.ranks[corner] = rank;
+                cell.weights[corner] = share(0) * share(1) * share(2);
+                whole += cell.weights[corner];
             }
         }
-        Some(if whole > 0.0 { sum.map(|s| s / (WHOLE * whole)) } else { [1.0; 3] })
+        if whole > 0.0 {
+            cell.is_known = true;
+            cell.weights.iter_mut().for_each(|w| *w /= WHOLE * whole);
+        }
+        cell
     }
+
+    /// What arrives of a light there; `None` for a light without shadows.
+    #[inline]
+    pub(crate) fn at(&self, cell: &Cell, light: usize) -> Option<[f32; 3]> {
+        let shares = self.of_lights[light].as_deref().filter(|_| cell.is_known)?;
+        let mut sum = [0.0; 3];
+        for (rank, weight) in cell.ranks.iter().zip(cell.weights) {
+            if weight > 0.0 {
+                (0..3).for_each(|c| sum[c] += weight * f32::from(shares[*rank][c]));
+            }
+        }
+        Some(sum)
+    }
+}
+
+/// Needed voxels around a place: which they are among all of them, and their shares over [`WHOLE`].
+pub(crate) struct Cell {
+    ranks: [usize; 8],
+    weights: [f32; 8],
+    /// Whether there are any.
+    is_known: bool,
 }
 
 fn look_up(

@@ -4,7 +4,7 @@ use crate::common::{cubic, draw, exact, grid, input, noise, parallel, perspectiv
 use sheet_light::{Params, SheetInput, reference};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::shade::LitBy;
-use splat_core::{Light, LightShape, Material};
+use splat_core::{Light, LightShape, Material, Receiver, Transmittance};
 
 /// Greatest differences from the twin: optical depth, colour.
 fn differences(input: &SheetInput<'_>, params: &Params) -> [f64; 2] {
@@ -76,6 +76,41 @@ fn lit_sheets_are_those_of_the_twin() {
             assert!(tau < 2e-5 && color < 2e-4, "normals {normals}: {tau:e} {color:e}");
         }
     }
+}
+
+/// Light that falls off along a line, red more than blue.
+struct Slope;
+
+impl Transmittance for Slope {
+    fn transmittance(&self, receiver: &Receiver) -> [f32; 3] {
+        let along = 0.5 + 0.04 * receiver.position.x + 0.06 * receiver.position.z;
+        [along, 0.5 + 0.5 * along, 0.9]
+    }
+}
+
+#[test]
+fn shadows_between_voxels_are_linear() {
+    let tf = transfer(&[(0.2, 0.0), (0.6, 0.8), (1.2, 0.1), (1.5, 3.0)]);
+    let material = Material::default();
+    let light = |shape, shadow| LitBy { light: Light { shape, intensity: [2.0, 1.5, 1.0] }, shadow };
+    let lights = [
+        light(LightShape::Directional { direction: DVec3::new(-1.0, -2.0, -1.5).normalize() }, Some(&Slope as _)),
+        light(LightShape::Point { position: DVec3::new(4.0, 1.0, 5.0) }, None),
+        light(LightShape::Point { position: DVec3::new(-4.0, 5.0, 1.0) }, Some(&Slope as _)),
+    ];
+    // 70 voxels a row: more than a word of 64.
+    let sheared =
+        DMat3::from_cols(DVec3::new(0.09, 0.01, 0.0), DVec3::new(0.1, 0.3, -0.05), DVec3::new(0.0, 0.1, -0.3));
+    let grid = grid([70, 18, 16], sheared, smooth);
+    let volumes = [volume(&grid, &tf, &material)];
+    let camera = perspective([2.0, 3.0, 8.0], 60.0, [60, 50]);
+    let input = input(&volumes, &camera, &lights);
+    let [tau, color] = differences(&input, &exact());
+    assert!(tau < 2e-5 && color < 1e-4, "{tau:e} {color:e}");
+    let mut unshadowed = input.clone();
+    unshadowed.lights.iter_mut().for_each(|lit| lit.shadow = None);
+    let apart = |a: &SheetInput<'_>| draw(a, &exact()).unwrap().0.channels[0].iter().sum::<f32>();
+    assert!(apart(&input) < 0.9 * apart(&unshadowed));
 }
 
 #[test]
