@@ -5,11 +5,11 @@
 pub struct SheetCounts {
     /// Voxels of all volumes.
     pub voxels: u64,
-    /// Voxels that the transfer functions may show, or that shape those.
+    /// Voxels that the transfer functions may show, or that shape those, with those of the rims around the volumes.
     pub visible: u64,
     /// Voxels splatted, each as often as there are tiles that it reaches.
     pub records: u64,
-    /// Of these, those that lay wholly under opaque pixels: early splat elimination.
+    /// Of these, those that no pixel wanted: under opaque pixels, which is early splat elimination, or beside the picture.
     pub hidden: u64,
     /// Footprint numbers multiplied into pixels, each for all sections at once.
     pub fragments: u64,

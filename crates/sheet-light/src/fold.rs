@@ -65,14 +65,15 @@ pub fn prepare<'a>(input: SheetInput<'a>, params: &Params, progress: Option<&Pro
     input.check()?;
     let slabs = slabs_of(&input, params)?;
     let tiles = tile::tiles(input.camera);
-    check_memory(&input, params, &slabs, tiles)?;
+    let mut needed = memory(&input, params, &slabs, tiles);
+    check(needed, params)?;
     let quiet = Progress::new();
     let progress = progress.unwrap_or(&quiet);
     progress.add_total(input.volumes.len() as u64);
     let mut volumes = Vec::with_capacity(input.volumes.len());
     for volume in &input.volumes {
         let mut prepared = Prepared::new(*volume, &input, params, &slabs, tiles);
-        let needed = Shadows::bytes(prepared.voxels.count(), &input.lights);
+        needed += Shadows::bytes(prepared.voxels.count(), &input.lights);
         check(needed, params)?;
         prepared.shadows = Shadows::new(&prepared, &input.lights, input.shadow_origin, progress)?;
         volumes.push(prepared);
@@ -107,8 +108,8 @@ pub(crate) fn slabs_of(input: &SheetInput<'_>, params: &Params) -> Result<Slabs,
     Slabs::new(near, far, params.slab_width.unwrap_or(spacing), reach)
 }
 
-/// Counts what will be taken before it is.
-fn check_memory(input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [usize; 2]) -> Result<(), Error> {
+/// Bytes of lists, records and sheets, counted before any is taken.
+fn memory(input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [usize; 2]) -> u64 {
     let threads = rayon::current_num_threads() as u64;
     let mut needed = threads * 4 * 4 * (TILE * TILE) as u64;
     for volume in &input.volumes {
@@ -121,7 +122,7 @@ fn check_memory(input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [
         needed +=
             Voxels::bytes(dims) + 2 * voxels + threads * (lines * 64 * AREA as u64 + Sheets::bytes() + 32 * of_a_tile);
     }
-    check(needed, params)
+    needed
 }
 
 fn check(needed: u64, params: &Params) -> Result<(), Error> {

@@ -10,7 +10,7 @@
 //! |---|---|
 //! | Δ_s | [`Params::slab_width`], world units |
 //! | extent of the basis function, 2.0 | [`KernelShape::extent`], spacings of the lattice |
-//! | weight\[i\], coeff\[0..255\] | [`sections::sections`], of 256 phases |
+//! | weight\[i\], coeff\[0..255\] | [`sections::sections`], of 256 phases a slab, four times the paper's |
 //! | 0.98 | 1 − [`Params::transmittance_cutoff`], [`Params::PAPERS_CUTOFF`] |
 //! | effective splats (Table 1) | [`SheetCounts::visible`] |
 //!
