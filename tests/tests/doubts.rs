@@ -21,7 +21,7 @@ const AMBIENT: &str = "[ambient]\ncolor = [0.2, 0.2, 0.2]\n";
 const LAMP: &str = "[[light]]\nkind = 'point'\nposition = [1, 2, 3]\nintensity = [9, 9, 9]\n";
 
 fn warnings(text: &str) -> Vec<String> {
-    ["points", "particles"]
+    ["points", "particles", "sheets"]
         .map(|technique| {
             let set = format!("render.technique='{technique}'");
             let overrides = vec![organza::scene::Override::parse(&set).unwrap()];

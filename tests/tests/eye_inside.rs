@@ -125,7 +125,7 @@ fn what_lies_behind_the_eye_is_not_seen() {
                medium_box = { min = [-1, -1, 1.5], max = [1, 1, 2], extinction = 3.0, spacing = 0.1 }\n";
     for (what, text) in [("wall", wall), ("pane", &glass), ("fog", fog)] {
         for parallel in [false, true] {
-            for technique in ["points", "particles"] {
+            for technique in ["points", "particles", "sheets"] {
                 let text = eye(1.0, parallel) + text;
                 let most = alpha(&draw(&text, &["--technique", technique])).into_iter().fold(0.0, f64::max);
                 assert_eq!(most, 0.0, "{what}, parallel {parallel}, {technique}");

@@ -111,7 +111,7 @@ fn frames_that_wait_take_little_memory() {
     let track = "[[animation.track]]\nset = \"object.fog.transform.translate\"\n\
                  keys = [{ frame = 0, value = [0, 0, 0] }, { frame = 9999, value = [1, 0, 0] }]\n";
     place.write("s.toml", format!("{}[animation]\nframes = 10000\n{track}", fog(0.25)));
-    for technique in ["points", "particles"] {
+    for technique in ["points", "particles", "sheets"] {
         let peak = |last: usize| {
             // All frames are checked before the first is drawn; the last one is refused.
             let name = format!("p.{last:04}.png");

@@ -34,13 +34,13 @@ fn stages(text: &str, technique: &str) -> Vec<(String, f64)> {
 #[test]
 fn it_rises_by_stages_and_is_whole_at_the_end_alone() {
     for text in [FOG_AND_WALL, GLASS] {
-        for technique in ["points", "particles"] {
+        for technique in ["points", "particles", "sheets"] {
             let stages = stages(text, technique);
             assert!(stages.windows(2).all(|s| s[0].1 <= s[1].1), "{stages:?}");
             let (last, before) = stages.split_last().unwrap();
             assert_eq!((last.0.as_str(), last.1), ("finishing", 1.0), "{stages:?}");
             assert!(before.iter().all(|s| s.1 < 1.0), "{stages:?}");
-            let drawn = if technique == "points" { "compositing" } else { "particles" };
+            let drawn = if technique == "points" { "compositing" } else { technique };
             let begin = before.iter().find(|s| s.0 == drawn).unwrap().1;
             let end = before.last().unwrap().1;
             assert!(begin < 0.98 && end > begin, "{technique}: {stages:?}");
