@@ -132,7 +132,7 @@ impl<'a> Prepared<'a> {
             taper: Taper::new(0.5 * cutoff * cutoff),
             kernel: Kernel::new(&Footprint { cutoff: cutoff as f32 }),
             classifier: Classifier::new(volume.transfer, base),
-            rays: LatticeRays::new(grid, camera, slabs),
+            rays: LatticeRays::new(grid, camera, slabs.origin),
             footprint: camera.is_orthographic().then(|| viewed.footprint(camera.focal_px())),
             viewed,
             voxels,

@@ -51,6 +51,7 @@ mod classify;
 mod counts;
 mod error;
 mod fold;
+pub mod half;
 mod lattice;
 mod params;
 mod picture;

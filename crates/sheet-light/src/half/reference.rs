@@ -1,0 +1,1 @@
+//! The slow form in f64.

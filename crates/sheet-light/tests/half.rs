@@ -1,0 +1,4 @@
+//! Half-vector sheets: closed forms, hard cases, invariances, the slow twin.
+
+mod closed_forms;
+mod common;
