@@ -8,11 +8,14 @@
 //! ∫₀¹ τ·e^(−τx)·e^(−g−(f−g)x) dx = τ·e^(−g)·φ(τ + f − g), φ(y) = (1 − e^(−y))/y,
 //!
 //! and the mean transmittance, which turns the opacity τ·φ(τ) into that, is e^(−min(g, f+τ))·φ(|τ + f − g|)/φ(τ). Seen from the
-//! light itself, f − g = τ, the first slab gives (1 − e^(−2τ))/2, however wide it is. The paper takes one value a slab.
+//! light itself, f − g = τ, the first slab gives (1 − e^(−2τ))/2, however wide it is. The paper takes one value a slab. Where light
+//! comes into the volume, or into the slab, through one face up to some place of the part and through another from there on, optical
+//! depth towards it has a bend, and the integral is that of the pieces.
 
 use super::frame::Frame;
 use super::light_buffer::LightBuffer;
 use super::serves::travel;
+use super::sheet::is_any;
 use crate::Volume;
 use splat_core::Light;
 use splat_core::glam::{DVec3, Mat3, Vec3};
@@ -37,8 +40,8 @@ pub(crate) struct LightPath {
     highest: Vec3,
     /// Lattice steps per unit of length, for directional light.
     direction: Vec3,
-    /// Length per depth across the slabs, for directional light.
-    stretch: f32,
+    /// Depth across the slabs per unit of length, for directional light.
+    across: f32,
     /// Slab and lattice coordinates of a lamp.
     lamp: Option<[Vec3; 2]>,
 }
@@ -59,49 +62,111 @@ impl LightPath {
             steps: steps.as_mat3(),
             highest: Vec3::from_array(volume.grid.dims.map(|n| n as f32 - 0.5)),
             direction: (inverse * direction).as_vec3(),
-            stretch: (1.0 / frame.direction(direction).z) as f32,
+            across: frame.direction(direction).z as f32,
             lamp: lamp.map(|p| [frame.point(p).as_vec3(), lattice(p).as_vec3()]),
         }
     }
 
-    /// Length of the way of light in the volume up to each place: before the slab that begins at depth `face`, and within it.
+    /// The ways of light in the volume up to each place, of which the slab begins at depth `face`.
     #[inline(always)]
-    pub(crate) fn lengths<S: Simd>(&self, simd: S, at: &Places<S>, face: f32) -> [Lanes<S>; 2] {
+    fn ways<S: Simd>(&self, simd: S, at: &Places<S>, face: f32) -> Ways<S> {
         let of = |v: f32| Lanes::splat(simd, v);
         let (zero, tiny) = (of(0.0), of(PARALLEL));
         let here: [Lanes<S>; 3] = std::array::from_fn(|a| {
             let row = self.steps.row(a);
             of(row.x).mul_add(at[0], of(row.y).mul_add(at[1], of(row.z).mul_add(at[2], of(self.start[a]))))
         });
-        let (length, towards, stretch) = self.ray(simd, at, &here);
+        let (length, towards, across) = self.ray(simd, at, &here);
         let steepest = towards[0].abs().max(towards[1].abs()).max(towards[2].abs());
-        // Distances back to where light enters and leaves.
-        let (mut enters, mut leaves) = (of(FAR), zero);
+        let (mut enters, mut leaves, mut depths, mut steps) = ([of(FAR); FACES], zero, [zero; FACES], [zero; FACES]);
         for a in 0..3 {
             let (above, below) = (here[a] - of(-0.5), of(self.highest[a]) - here[a]);
             let rate = length / towards[a].abs().max(tiny * steepest);
             let is_parallel = [towards[a].abs(), tiny * steepest];
             let inside = of(FAR).where_less_or(of(-ROUNDING), above.min(below), of(-FAR));
-            let enter = above.where_less_or(zero, towards[a], below) * rate;
+            (depths[a], steps[a]) = (above.where_less_or(zero, towards[a], below), towards[a].abs());
             let leave = (zero - below.where_less_or(zero, towards[a], above)) * rate;
-            enters = enters.min(inside.where_less_or(is_parallel[0], is_parallel[1], enter));
+            enters[a] = inside.where_less_or(is_parallel[0], is_parallel[1], depths[a] * rate);
             leaves = leaves.max(zero.where_less_or(is_parallel[0], is_parallel[1], leave));
         }
-        let own = (at[2] - of(face)).max(zero) * stretch;
-        let before = (enters - leaves.max(own)).max(zero);
-        [before, (enters.min(own) - leaves).max(zero)]
+        (depths[SLAB], steps[SLAB]) = ((at[2] - of(face)).max(zero), across);
+        enters[SLAB] = depths[SLAB] * length / across;
+        Ways { enters, depths, steps, leaves }
     }
 
-    /// Of the light's ray to each place: a length, the lattice steps on it, and length per depth across the slabs.
+    /// Of the light's ray to each place: a length, the lattice steps on it, and the depth across the slabs.
     #[inline(always)]
     fn ray<S: Simd>(&self, simd: S, at: &Places<S>, here: &Places<S>) -> (Lanes<S>, Places<S>, Lanes<S>) {
         let of = |v: f32| Lanes::splat(simd, v);
         let Some([slab, lattice]) = self.lamp else {
-            return (of(1.0), self.direction.to_array().map(of), of(self.stretch));
+            return (of(1.0), self.direction.to_array().map(of), of(self.across));
         };
         let from: [Lanes<S>; 3] = std::array::from_fn(|a| at[a] - of(slab[a]));
         let length = from[0].mul_add(from[0], from[1].mul_add(from[1], from[2] * from[2])).sqrt();
-        (length, std::array::from_fn(|a| here[a] - of(lattice[a])), length / from[2])
+        (length, std::array::from_fn(|a| here[a] - of(lattice[a])), from[2])
+    }
+}
+
+/// What light comes through on its way to a place: a face of each pair of a volume's, and the slab's.
+const FACES: usize = 4;
+
+/// Place of the slab's face among them.
+const SLAB: usize = 3;
+
+/// Pairs of them.
+const PAIRS: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, SLAB], [1, 2], [1, SLAB], [2, SLAB]];
+
+/// Distances back to where light comes through faces.
+#[derive(Clone, Copy)]
+struct Ways<S: Simd> {
+    /// Light is in the volume once it has come through a face of each pair.
+    enters: [Lanes<S>; FACES],
+    /// How far behind each face a place is, and how far light comes towards it on a way of one length for all.
+    depths: [Lanes<S>; FACES],
+    steps: [Lanes<S>; FACES],
+    /// Where light leaves the volume before this place, else 0.
+    leaves: Lanes<S>,
+}
+
+impl<S: Simd> Ways<S> {
+    #[inline(always)]
+    fn entered(&self) -> Lanes<S> {
+        self.enters[0].min(self.enters[1]).min(self.enters[2])
+    }
+
+    /// Length of the way in the volume before the slab, and within it.
+    #[inline(always)]
+    fn lengths(&self, simd: S) -> [Lanes<S>; 2] {
+        let (zero, own) = (Lanes::splat(simd, 0.0), self.enters[SLAB]);
+        let before = (self.entered() - self.leaves.max(own)).max(zero);
+        [before, (self.entered().min(own) - self.leaves).max(zero)]
+    }
+
+    /// Where between this place and another the faces that light comes through last may change, as shares of the way,
+    /// ascending; and 1 where they do, else 0.
+    #[inline(always)]
+    fn bends(&self, simd: S, other: &Self) -> ([Lanes<S>; BENDS], Lanes<S>) {
+        let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        let (here, there) = (self.entered(), other.entered());
+        // No face of the volume is the last one at both places, or only at one of them light comes into the slab later.
+        let mut does = one;
+        for f in 0..SLAB {
+            does = does.min(one.where_less(here, self.enters[f]).max(one.where_less(there, other.enters[f])));
+        }
+        let inside = [one.where_less(self.enters[SLAB], here), one.where_less(other.enters[SLAB], there)];
+        does = does.max((inside[0] - inside[1]).abs());
+        // Where depth_i/step_i − depth_k/step_k changes sign: times both steps it is linear, from wherever light comes.
+        let mut bends = PAIRS.map(|[i, k]| {
+            let lead = |w: &Self| w.depths[i] * w.steps[k] - w.depths[k] * w.steps[i];
+            let change = lead(self) - lead(other);
+            (lead(self) / change.where_less_or(zero, change.abs(), one)).max(zero).min(one)
+        });
+        for n in 1..BENDS {
+            for k in (0..n).rev() {
+                (bends[k], bends[k + 1]) = (bends[k].min(bends[k + 1]), bends[k].max(bends[k + 1]));
+            }
+        }
+        (bends, does)
     }
 }
 
@@ -136,42 +201,97 @@ impl Illumination<'_> {
     ) -> [[f32; MAX_LANES]; 3] {
         let of = |v: f32| Lanes::splat(simd, v);
         let [nearer, farther] = &asked.ends;
-        let middle: Places<S> = std::array::from_fn(|a| (nearer[a] + farther[a]) * of(0.5));
-        let mut coordinates = [[0.0; MAX_LANES]; 3];
-        (0..3).for_each(|a| middle[a].store(&mut coordinates[a]));
-        let mut optical = [[of(0.0); 2]; 3];
-        for (v, volume) in self.volumes.iter().enumerate() {
-            let mut mean = asked.extinction[v];
-            for lane in (0..Lanes::<S>::COUNT).filter(|lane| wanted[*lane] > 0.0) {
-                let at = Vec3::new(coordinates[0][lane], coordinates[1][lane], coordinates[2][lane]);
-                let [tau, length] = self.buffer.at(v, self.buffer.sight.pixel(at));
-                if length > 0.0 {
-                    mean[lane] = tau / length;
-                }
+        let between = |x: Lanes<S>| std::array::from_fn(|a| (farther[a] - nearer[a]).mul_add(x, nearer[a]));
+        let middle: Places<S> = between(of(0.5));
+        let means = |v: usize| self.means(simd, v, &middle, asked.extinction, wanted);
+        let add = |v: usize, ways: &Ways<S>, mean: Lanes<S>, to: &mut [[Lanes<S>; NODES]; 3], node: usize| {
+            let [before, within] = ways.lengths(simd);
+            let tau = mean.mul_add(before, Lanes::load(simd, &asked.extinction[v]) * within);
+            for p in 0..planes {
+                to[p][node] = tau.mul_add(of(self.volumes[v].material.extinction_rgb[p]), to[p][node]);
             }
-            let (mean, own) = (Lanes::load(simd, &mean), Lanes::load(simd, &asked.extinction[v]));
-            for (end, at) in asked.ends.iter().enumerate() {
-                let [before, within] = self.paths[v].lengths(simd, at, self.face);
-                let tau = mean.mul_add(before, own * within);
-                for p in 0..planes {
-                    optical[p][end] = tau.mul_add(of(volume.material.extinction_rgb[p]), optical[p][end]);
-                }
+        };
+        let (mut optical, mut bends, mut is_bent) = ([[of(0.0); NODES]; 3], [of(1.0); BENDS], of(0.0));
+        for v in 0..self.volumes.len() {
+            let mean = means(v);
+            let ways = [nearer, farther].map(|at| self.paths[v].ways(simd, at, self.face));
+            add(v, &ways[0], mean, &mut optical, 0);
+            add(v, &ways[1], mean, &mut optical, NODES - 1);
+            // The first volume that is seen and bends decides.
+            let (own, does) = ways[0].bends(simd, &ways[1]);
+            let does = does.where_less(of(0.0), Lanes::load(simd, &asked.extinction[v]));
+            (0..BENDS).for_each(|n| bends[n] = own[n].where_less_or(is_bent, does, bends[n]));
+            is_bent = is_bent.max(does);
+        }
+        let any_bent = is_any(is_bent);
+        for v in (0..self.volumes.len()).filter(|_| any_bent) {
+            let mean = means(v);
+            for n in 0..BENDS {
+                let ways = self.paths[v].ways(simd, &between(bends[n]), self.face);
+                add(v, &ways, mean, &mut optical, n + 1);
             }
         }
         let mut out = [[1.0; MAX_LANES]; 3];
         for p in 0..planes {
             let tau = Lanes::load(simd, &asked.optical_depth[p]);
-            mean_transmittance(simd, tau, optical[p]).store(&mut out[p]);
+            let mut mean = part(simd, tau, [optical[p][0], optical[p][NODES - 1]]);
+            if any_bent {
+                mean = bent(simd, tau, &bends, &optical[p]).where_less_or(of(0.0), is_bent, mean);
+            }
+            (mean / mean_of_exponential(simd, tau)).store(&mut out[p]);
         }
         out
     }
+
+    /// Mean extinction of a volume on the way of light to the present slab, about each place.
+    #[inline(always)]
+    fn means<S: Simd>(
+        &self,
+        simd: S,
+        v: usize,
+        at: &Places<S>,
+        extinction: &[[f32; MAX_LANES]],
+        wanted: &[f32; MAX_LANES],
+    ) -> Lanes<S> {
+        let mut places = [[0.0; MAX_LANES]; 3];
+        (0..3).for_each(|a| at[a].store(&mut places[a]));
+        // Where light has come no way before the slab, what is seen in it stands for what nearly does.
+        let mut means = extinction[v];
+        for lane in (0..Lanes::<S>::COUNT).filter(|lane| wanted[*lane] > 0.0) {
+            let at = Vec3::new(places[0][lane], places[1][lane], places[2][lane]);
+            let [tau, length] = self.buffer.at(v, self.buffer.sight.pixel(at));
+            if length > 0.0 {
+                means[lane] = tau / length;
+            }
+        }
+        Lanes::load(simd, &means)
+    }
 }
 
-/// e^(−min(g, f+τ))·φ(|τ + f − g|)/φ(τ).
+/// Places within a ray's part in a slab at which optical depth towards the light may bend.
+const BENDS: usize = PAIRS.len();
+
+/// Places at which it is known: these and the ends.
+const NODES: usize = BENDS + 2;
+
+/// ∫₀¹ e^(−τx)·e^(−g−(f−g)x) dx over a part without a bend: e^(−min(g, f+τ))·φ(|τ + f − g|).
 #[inline(always)]
-fn mean_transmittance<S: Simd>(simd: S, tau: Lanes<S>, [g, f]: [Lanes<S>; 2]) -> Lanes<S> {
+fn part<S: Simd>(simd: S, tau: Lanes<S>, [g, f]: [Lanes<S>; 2]) -> Lanes<S> {
     let behind = f + tau;
-    g.min(behind).exp_neg() * mean_of_exponential(simd, (behind - g).abs()) / mean_of_exponential(simd, tau)
+    g.min(behind).exp_neg() * mean_of_exponential(simd, (behind - g).abs())
+}
+
+/// The same over parts that meet at the shares `bends` of the way.
+#[inline(always)]
+fn bent<S: Simd>(simd: S, tau: Lanes<S>, bends: &[Lanes<S>; BENDS], optical: &[Lanes<S>; NODES]) -> Lanes<S> {
+    let (mut sum, mut from) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 0.0));
+    for n in 0..NODES - 1 {
+        let to = if n < BENDS { bends[n] } else { Lanes::splat(simd, 1.0) };
+        let own = part(simd, tau * (to - from), [optical[n], optical[n + 1]]);
+        sum = ((to - from) * (tau * from).exp_neg()).mul_add(own, sum);
+        from = to;
+    }
+    sum
 }
 
 /// φ(y) = (1 − e^(−y))/y, 1 at 0.

@@ -9,7 +9,14 @@ use std::f64::consts::PI;
 
 /// Greatest differences from the closed forms over every `step`-th pixel: transmittance, and scattered light as a share of what
 /// scatters where nothing attenuates.
-fn differences(grid: &Grid, sigma: f64, lit: &LitBy<'_>, camera: &Camera, params: &HalfParams, step: usize) -> [f64; 2] {
+fn differences(
+    grid: &Grid,
+    sigma: f64,
+    lit: &LitBy<'_>,
+    camera: &Camera,
+    params: &HalfParams,
+    step: usize,
+) -> [f64; 2] {
     let (tf, material) = (constant(sigma as f32), scattering());
     let (volumes, lights) = ([volume(grid, &tf, &material)], [*lit]);
     let (out, _) = draw(&input(&volumes, camera, &lights), params).unwrap();
@@ -20,7 +27,10 @@ fn differences(grid: &Grid, sigma: f64, lit: &LitBy<'_>, camera: &Camera, params
         let found = f64::from(out.optical_depth[0][at]);
         worst[0] = worst[0].max(((-found).exp() - (-tau).exp()).abs());
         let d = (f64::from(out.channels[0][at]) * 4.0 * PI - light).abs();
-        if d > worst[1] { at_worst = at; worst[1] = d; }
+        if d > worst[1] {
+            at_worst = at;
+            worst[1] = d;
+        }
         seen += usize::from(tau > 0.0);
     }
     assert!(seen > 20, "the volume is out of the picture");
@@ -32,7 +42,13 @@ fn differences(grid: &Grid, sigma: f64, lit: &LitBy<'_>, camera: &Camera, params
 fn hv05_first() {
     let grid = grid([12, 12, 12], cubic(0.5), |_| 3.0);
     for camera in [parallel([3.0, 4.0, 12.0], 12.0, [40, 40]), perspective([3.0, 4.0, 12.0], 50.0, [40, 40])] {
-        for light in [sun([1.0, 3.0, 2.0]), sun([-1.0, 2.0, -3.0]), sun([3.0, 4.0, 12.0]), lamp([12.0, 8.0, 3.0]), lamp([-3.0, -4.0, -12.0])] {
+        for light in [
+            sun([1.0, 3.0, 2.0]),
+            sun([-1.0, 2.0, -3.0]),
+            sun([3.0, 4.0, 12.0]),
+            lamp([12.0, 8.0, 3.0]),
+            lamp([-3.0, -4.0, -12.0]),
+        ] {
             for slab_width in [0.06, 0.5, 1.3, 40.0] {
                 for sigma in [0.01, 0.3, 1.0] {
                     eprintln!("{:?} {slab_width} {sigma} {:?}", camera.projection, light.light.shape);
