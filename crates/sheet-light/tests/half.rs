@@ -2,4 +2,6 @@
 
 mod closed_forms;
 mod common;
+mod hard_cases;
+mod invariances;
 mod twin;

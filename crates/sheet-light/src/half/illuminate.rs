@@ -156,10 +156,14 @@ impl<S: Simd> Ways<S> {
         let inside = [one.where_less(self.enters[SLAB], here), one.where_less(other.enters[SLAB], there)];
         does = does.max((inside[0] - inside[1]).abs());
         // Where depth_i/step_i − depth_k/step_k changes sign: times both steps it is linear, from wherever light comes.
-        let mut bends = PAIRS.map(|[i, k]| {
+        let meet = |[i, k]: [usize; 2]| {
             let lead = |w: &Self| w.depths[i] * w.steps[k] - w.depths[k] * w.steps[i];
             let change = lead(self) - lead(other);
             (lead(self) / change.where_less_or(zero, change.abs(), one)).max(zero).min(one)
+        };
+        let mut bends: [Lanes<S>; BENDS] = std::array::from_fn(|n| match PAIRS.get(n) {
+            Some(pair) => meet(*pair),
+            None => Lanes::splat(simd, (n + 1 - PAIRS.len()) as f32 / (BENDS + 1 - PAIRS.len()) as f32),
         });
         for n in 1..BENDS {
             for k in (0..n).rev() {
@@ -210,20 +214,27 @@ impl Illumination<'_> {
             for p in 0..planes {
                 to[p][node] = tau.mul_add(of(self.volumes[v].material.extinction_rgb[p]), to[p][node]);
             }
+            tau
         };
         let (mut optical, mut bends, mut is_bent) = ([[of(0.0); NODES]; 3], [of(1.0); BENDS], of(0.0));
         for v in 0..self.volumes.len() {
             let mean = means(v);
             let ways = [nearer, farther].map(|at| self.paths[v].ways(simd, at, self.face));
-            add(v, &ways[0], mean, &mut optical, 0);
-            add(v, &ways[1], mean, &mut optical, NODES - 1);
+            let ends = [add(v, &ways[0], mean, &mut optical, 0), add(v, &ways[1], mean, &mut optical, NODES - 1)];
             // The first volume that is seen and bends decides.
             let (own, does) = ways[0].bends(simd, &ways[1]);
+            let mut does = does;
+            if self.paths[v].lamp.is_some() {
+                let half = add(v, &self.paths[v].ways(simd, &middle, self.face), mean, &mut optical, 1);
+                let curved = of(1.0).where_less(of(CURVED), (half - (ends[0] + ends[1]) * of(0.5)).abs());
+                does = does.max(curved);
+            }
             let does = does.where_less(of(0.0), Lanes::load(simd, &asked.extinction[v]));
             (0..BENDS).for_each(|n| bends[n] = own[n].where_less_or(is_bent, does, bends[n]));
             is_bent = is_bent.max(does);
         }
         let any_bent = is_any(is_bent);
+        optical.iter_mut().for_each(|nodes| nodes[1] = of(0.0));
         for v in (0..self.volumes.len()).filter(|_| any_bent) {
             let mean = means(v);
             for n in 0..BENDS {
@@ -268,8 +279,12 @@ impl Illumination<'_> {
     }
 }
 
-/// Places within a ray's part in a slab at which optical depth towards the light may bend.
-const BENDS: usize = PAIRS.len();
+/// Places within a ray's part in a slab at which optical depth towards the light may bend, and three between, for it is curved
+/// where light of a lamp grazes a face.
+const BENDS: usize = PAIRS.len() + 3;
+
+/// Difference to a straight line at which optical depth towards a lamp is curved.
+const CURVED: f32 = 1e-4;
 
 /// Places at which it is known: these and the ends.
 const NODES: usize = BENDS + 2;

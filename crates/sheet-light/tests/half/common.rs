@@ -72,14 +72,20 @@ pub(crate) fn ray(camera: &Camera, x: usize, y: usize) -> (DVec3, DVec3) {
 }
 
 /// What a constant medium shows of light that it scatters once, per 1/4π: ∫σ·e^(−σt)·E(t)·e^(−σl(t)) dt, by Simpson's rule, l the way
-/// of the light in the medium; and the optical depth of the ray.
-pub(crate) fn single_scattering(grid: &Grid, sigma: f64, light: &Light, (from, along): (DVec3, DVec3)) -> [f64; 2] {
+/// of the light in the medium; and the optical depth of the ray. `spread` is that of a kernel that receives light.
+pub(crate) fn single_scattering(
+    grid: &Grid,
+    sigma: f64,
+    (light, spread): (&Light, f64),
+    (from, along): (DVec3, DVec3),
+) -> [f64; 2] {
     let Some([near, far]) = inside(grid, from, along) else { return [0.0; 2] };
     let near = near.max(0.0);
-    let n = 4000;
+    let n = 1000;
     let at = |t: f64| {
         let place = from + along * t;
-        let (to_light, irradiance) = light.irradiance(place, 0.0);
+        let (_, irradiance) = light.irradiance(place, spread);
+        let (to_light, _) = light.irradiance(place, 0.0);
         let way = inside(grid, place, to_light).map_or(0.0, |[_, leave]| leave.max(0.0));
         sigma * (-sigma * (t - near) - sigma * way).exp() * f64::from(irradiance[0])
     };

@@ -36,22 +36,17 @@ fn hv_lit_sheets_are_those_of_the_twin() {
         let grid = grid([8, 7, 6], axes, noise);
         let volumes = [volume(&grid, &tf, &material)];
         for camera in [parallel([3.0, 2.0, 8.0], 7.0, [28, 20]), perspective([2.0, 3.0, 8.0], 40.0, [20, 28])] {
-            for (light, slab_width) in [
-                (sun([1.0, 3.0, 2.0]), None),
-                (sun([-1.0, 2.0, -3.0]), Some(0.3)),
-                (bright([6.0, 8.0, 2.0]), Some(1.3)),
-                (bright([-4.0, 3.0, -9.0]), None),
-                (bright([6.0, 8.0, 2.0]), None),
-                (bright([6.0, 8.0, 2.0]), Some(0.2)),
-                (bright([9.0, 1.0, 2.5]), Some(1.3)),
-                (bright([-4.0, 3.0, -9.0]), Some(1.3)),
-                (sun([6.0, 8.0, 2.0]), Some(1.3)),
-            ] {
+            let suns = [sun([1.0, 3.0, 2.0]), sun([-1.0, 2.0, -3.0])];
+            for (light, slab_width) in
+                [(suns[0], None), (suns[1], Some(0.3)), (suns[0], Some(1.3)), (suns[1], Some(9.0))]
+            {
                 let [tau, color] = differences(&input(&volumes, &camera, &[light]), &exact(slab_width));
-                eprintln!("{tau:e} {color:e}");
-                if !(tau < 2e-5 && color < 1e-4) {
-                    eprintln!("{slab_width:?}, {:?}: {tau:e} {color:e}", light.light.shape);
-                }
+                assert!(tau < 2e-5 && color < 5e-5, "{slab_width:?}, {:?}: {tau:e} {color:e}", light.light.shape);
+            }
+            // On the way through a slab optical depth towards a lamp is curved, where its light grazes a face most.
+            for (light, slab_width) in [(bright([6.0, 8.0, 2.0]), Some(0.2)), (bright([-4.0, 3.0, -9.0]), None)] {
+                let [tau, color] = differences(&input(&volumes, &camera, &[light]), &exact(slab_width));
+                assert!(tau < 2e-5 && color < 5e-4, "{slab_width:?}, {:?}: {tau:e} {color:e}", light.light.shape);
             }
         }
     }
@@ -68,7 +63,7 @@ fn hv_volumes_that_overlap_shadow_each_other_as_in_the_twin() {
     let camera = perspective([2.0, 3.0, 9.0], 40.0, [24, 24]);
     for light in [sun([1.0, 3.0, 2.0]), sun([2.0, 1.0, -3.0])] {
         let [tau, color] = differences(&input(&volumes, &camera, &[light]), &exact(None));
-        eprintln!("{tau:e} {color:e}");
+        eprintln!("OVER {tau:e} {color:e}");
         assert!(tau < 2e-5 && color < 2e-4, "{:?}: {tau:e} {color:e}", light.light.shape);
     }
 }
