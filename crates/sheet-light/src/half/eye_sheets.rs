@@ -238,7 +238,7 @@ impl OneSlab<'_> {
         }
         let slabs = [self.slab.max(1) - 1, self.slab, (self.slab + 1).min(self.of.frame.slabs.count - 1)];
         let sheets = slabs.map(|slab| self.eye.sheet(v, slab));
-        self.of.gradients.normals(simd, sheets, self.eye.band.stride, chunk.k, [chunk.x, chunk.y])
+        self.of.gradients.normals(simd, sheets, self.eye.band.stride, chunk.k)
     }
 
     /// Mixes the radiance of one point of a volume, with its share of the optical depth so far, into a lane of the fragments.

@@ -14,7 +14,7 @@ use splat_core::glam::{DMat3, DVec3};
 pub(crate) struct Frame {
     center: DVec3,
     /// Rows: two unit vectors along the slabs, one across.
-    axes: [DVec3; 3],
+    pub(crate) axes: [DVec3; 3],
     pub(crate) slabs: Slabs,
     /// Whether the eye meets the last slab first.
     pub(crate) back_to_front: bool,

@@ -30,7 +30,7 @@ pub(crate) struct Sheet {
     pub(crate) near: Vec<f32>,
     pub(crate) far: Vec<f32>,
     /// a and b of the middle between them.
-    at: [Vec<f32>; 2],
+    pub(crate) at: [Vec<f32>; 2],
     /// Σ v·w, then their quotient.
     pub(crate) values: Vec<f32>,
     pub(crate) weights: Vec<f32>,

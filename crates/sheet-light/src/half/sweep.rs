@@ -68,7 +68,7 @@ impl<'a> Sweep<'a> {
             volumes,
             shapes: placed.iter().map(|p| sight.shape(&frame, p)).collect(),
             buckets: Vec::new(),
-            gradients: Gradients::new(&frame, camera),
+            gradients: Gradients::new(&frame),
             light,
             light_buffer: light
                 .map(|lit| LightBuffer::new(&frame, lamp::camera_of(volumes, &lit.light, params), volumes, &placed)),

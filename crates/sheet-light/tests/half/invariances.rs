@@ -89,7 +89,7 @@ fn hv05_thinner_slabs_converge_in_second_order() {
             let params = HalfParams { light_pixels: 3.0, ..exact(Some(width)) };
             draw(&input(&volumes, &camera, &lights), &params).unwrap().0
         };
-        let truth = with(0.0625);
+        let truth = with(0.03125);
         let rmse = |width: f64| {
             let squares = with(width).channels[1]
                 .iter()
@@ -98,7 +98,7 @@ fn hv05_thinner_slabs_converge_in_second_order() {
                 .sum::<f64>();
             squares.sqrt()
         };
-        let (coarse, fine) = (rmse(1.0), rmse(0.5));
+        let (coarse, fine) = (rmse(0.5), rmse(0.25));
         let order = (coarse / fine).log2();
         eprintln!("order {order} {coarse:e} {fine:e}");
         assert!(order > 1.9, "order {order}: {coarse:e} → {fine:e}");
