@@ -69,8 +69,11 @@ impl Pixels {
     /// The greatest transmittance of the pixels from `k` on.
     #[inline(always)]
     pub(crate) fn most<S: Simd>(&self, simd: S, k: usize) -> Lanes<S> {
-        let first = Lanes::load(simd, &self.transmittance[0][k..]);
-        self.transmittance[1..].iter().fold(first, |most, plane| most.max(Lanes::load(simd, &plane[k..])))
+        let mut most = Lanes::load(simd, &self.transmittance[0][k..]);
+        for plane in &self.transmittance[1..] {
+            most = most.max(Lanes::load(simd, &plane[k..]));
+        }
+        most
     }
 
     /// Optical depth so far, green.

@@ -140,7 +140,7 @@ impl OneSlab<'_> {
                 all[p] = tau.mul_add(of(self.of.volumes[v].material.extinction_rgb[p]), all[p]);
             }
             let sheet = self.eye.sheet(v, self.slab);
-            let [from, to] = [&sheet.near, &sheet.far].map(|plane| Lanes::load(simd, &plane[k..]));
+            let (from, to) = (Lanes::load(simd, &sheet.near[k..]), Lanes::load(simd, &sheet.far[k..]));
             near = near.min(from.where_less_or(of(0.0), tau, near));
             far = far.max(to.where_less_or(of(0.0), tau, far));
         }
@@ -149,7 +149,9 @@ impl OneSlab<'_> {
             return;
         }
         let mut fragments = Fragments::NONE;
-        (0..planes).for_each(|p| all[p].store(&mut fragments.optical_depth[p]));
+        for p in 0..planes {
+            all[p].store(&mut fragments.optical_depth[p]);
+        }
         // Lanes without any are of no meaning, but are numbers.
         let (near, far) = (near.where_less(of(0.0), most), far.where_less(of(0.0), most));
         if self.step == Step::Draw {
@@ -162,19 +164,24 @@ impl OneSlab<'_> {
     #[inline(always)]
     fn extinction<S: Simd>(&self, simd: S, v: usize, k: usize) -> Option<[Lanes<S>; 2]> {
         let (sheet, stride) = (self.eye.sheet(v, self.slab), self.eye.band.stride);
-        sheet.spans[k / stride].contains(&(k % stride)).then(|| {
-            let [extinction, ..] = sheet.classify(simd, &self.of.placed[v], k);
-            [extinction, sheet.depth(simd, k)]
-        })
+        // No closure: what is vectorised must be inlined.
+        if !sheet.spans[k / stride].contains(&(k % stride)) {
+            return None;
+        }
+        let [extinction, ..] = sheet.classify(simd, &self.of.placed[v], k);
+        Some([extinction, sheet.depth(simd, k)])
     }
 
     /// Slab coordinates of rays at a depth.
     #[inline(always)]
     fn places<S: Simd>(&self, simd: S, k: usize, depth: Lanes<S>) -> Places<S> {
         let band = &self.eye.band;
-        let along =
-            |a: usize| Lanes::load(simd, &band.slope[a][k..]).mul_add(depth, Lanes::load(simd, &band.place[a][k..]));
-        [along(0), along(1), depth]
+        let mut out = [depth; 3];
+        for a in 0..2 {
+            let slope = Lanes::load(simd, &band.slope[a][k..]);
+            out[a] = slope.mul_add(depth, Lanes::load(simd, &band.place[a][k..]));
+        }
+        out
     }
 
     /// Radiance of the pixels that have optical depth.
@@ -187,8 +194,9 @@ impl OneSlab<'_> {
         let ends = if of.frame.back_to_front { [far, near] } else { [near, far] };
         let mut arrives = [[1.0; MAX_LANES]; 3];
         if let Some(buffer) = &of.light_buffer {
+            let [nearer, farther] = ends;
             let asked = Asked {
-                ends: ends.map(|depth| self.places(simd, chunk.k, depth)),
+                ends: [self.places(simd, chunk.k, nearer), self.places(simd, chunk.k, farther)],
                 extinction: &self.eye.extinction,
                 optical_depth: &out.optical_depth,
             };
@@ -199,7 +207,9 @@ impl OneSlab<'_> {
         let middle = (near + far) * Lanes::splat(simd, 0.5);
         let mut places = [[0.0; MAX_LANES]; 3];
         let at = self.places(simd, chunk.k, middle);
-        (0..3).for_each(|a| at[a].store(&mut places[a]));
+        for a in 0..3 {
+            at[a].store(&mut places[a]);
+        }
         let stretch = Lanes::load(simd, &self.eye.band.stretch[chunk.k..]);
         let mut so_far = [[0.0; MAX_LANES]; 3];
         for (v, volume) in of.volumes.iter().enumerate() {
@@ -208,7 +218,9 @@ impl OneSlab<'_> {
             (extinction * depth * stretch).store(&mut tau);
             let [_, red, green, blue] = self.eye.sheet(v, self.slab).classify(simd, &of.placed[v], chunk.k);
             let mut color = [[0.0; MAX_LANES]; 3];
-            [red, green, blue].into_iter().zip(&mut color).for_each(|(from, to)| from.store(to));
+            red.store(&mut color[0]);
+            green.store(&mut color[1]);
+            blue.store(&mut color[2]);
             let normals = self.normals(simd, v, chunk);
             for lane in 0..Lanes::<S>::COUNT {
                 if wanted[lane] > 0.0 && tau[lane] > 0.0 {

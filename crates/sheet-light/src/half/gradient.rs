@@ -53,13 +53,16 @@ impl Gradients {
         let width = of(self.width);
         let determinant = ax * by - bx * ay;
         let inverse = width / of(1.0).where_less_or(determinant.abs(), of(f32::MIN_POSITIVE), determinant);
-        let is = |v: Lanes<S>| v.where_less(of(f32::MIN_POSITIVE), determinant.abs());
-        let (da, db) = (is((vx * by - vy * bx) * inverse), is((vy * ax - vx * ay) * inverse));
+        let (least, size) = (of(f32::MIN_POSITIVE), determinant.abs());
+        let da = ((vx * by - vy * bx) * inverse).where_less(least, size);
+        let db = ((vy * ax - vx * ay) * inverse).where_less(least, size);
         let steps = before[INSIDE] + after[INSIDE];
         let ds = (vs - (da * a + db * b) / width) / steps.max(of(0.5));
         let gradient = [da, db, ds.where_less(of(0.5), steps)];
         let mut parts = [[0.0; MAX_LANES]; 3];
-        (0..3).for_each(|n| gradient[n].store(&mut parts[n]));
+        for n in 0..3 {
+            gradient[n].store(&mut parts[n]);
+        }
         std::array::from_fn(|lane| {
             let [a, b, s] = parts.map(|part| part[lane]);
             -(self.axes[0] * a + self.axes[1] * b + self.axes[2] * s).normalize_or_zero()
@@ -71,22 +74,31 @@ impl Gradients {
 #[inline(always)]
 fn difference<S: Simd>(simd: S, own: &Sample<S>, before: &Sample<S>, after: &Sample<S>) -> [Lanes<S>; 3] {
     let half = Lanes::splat(simd, 0.5);
-    let choose = |s: &Sample<S>, n: usize| s[n].where_less_or(half, s[INSIDE], own[n]);
-    [0, 1, 2].map(|n| choose(after, n) - choose(before, n))
+    let mut out = [half; 3];
+    for n in 0..3 {
+        let high = after[n].where_less_or(half, after[INSIDE], own[n]);
+        out[n] = high - before[n].where_less_or(half, before[INSIDE], own[n]);
+    }
+    out
 }
 
 #[inline(always)]
 fn at<S: Simd>(simd: S, sheet: &Sheet, k: usize) -> Sample<S> {
-    sample(simd, |plane| Lanes::load(simd, &plane[k..]), sheet)
+    let Sheet { near, far, values, weights, at: [a, b], .. } = sheet;
+    sample(simd, [&near[k..], &far[k..], &weights[k..], &values[k..], &a[k..], &b[k..]])
 }
 
+/// Of near, far, kernel sum, value, a and b.
 #[inline(always)]
-fn sample<S: Simd>(simd: S, load: impl Fn(&[f32]) -> Lanes<S>, sheet: &Sheet) -> Sample<S> {
+fn sample<S: Simd>(simd: S, of: [&[f32]; 6]) -> Sample<S> {
     let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
-    let inside = one.where_less(load(&sheet.near), load(&sheet.far));
-    let inside = inside.where_less(Lanes::splat(simd, LEAST_WEIGHT), load(&sheet.weights));
-    let known = |plane: &[f32]| load(plane).where_less(zero, inside);
-    [known(&sheet.values), known(&sheet.at[0]), known(&sheet.at[1]), inside]
+    let inside = one.where_less(Lanes::load(simd, of[0]), Lanes::load(simd, of[1]));
+    let inside = inside.where_less(Lanes::splat(simd, LEAST_WEIGHT), Lanes::load(simd, of[2]));
+    let mut out = [inside; 4];
+    for n in 0..INSIDE {
+        out[n] = Lanes::load(simd, of[3 + n]).where_less(zero, inside);
+    }
+    out
 }
 
 /// The samples one pixel to the left; outside before the first of all.
@@ -95,11 +107,12 @@ fn left_of<S: Simd>(simd: S, sheet: &Sheet, k: usize) -> Sample<S> {
     if k > 0 {
         return at(simd, sheet, k - 1);
     }
-    let shifted = |plane: &[f32]| {
-        // Of the planes that tell, 0 is outside.
-        let mut out = [0.0; MAX_LANES];
-        out[1..].copy_from_slice(&plane[..MAX_LANES - 1]);
-        Lanes::load(simd, &out)
-    };
-    sample(simd, shifted, sheet)
+    let Sheet { near, far, values, weights, at: [a, b], .. } = sheet;
+    // Of the planes that tell, 0 is outside.
+    let mut shifted = [[0.0; MAX_LANES]; 6];
+    for (to, from) in shifted.iter_mut().zip([near, far, weights, values, a, b]) {
+        to[1..].copy_from_slice(&from[..MAX_LANES - 1]);
+    }
+    let [near, far, weights, values, a, b] = &shifted;
+    sample(simd, [near, far, weights, values, a, b])
 }

@@ -72,10 +72,12 @@ impl LightPath {
     fn ways<S: Simd>(&self, simd: S, at: &Places<S>, face: f32) -> Ways<S> {
         let of = |v: f32| Lanes::splat(simd, v);
         let (zero, tiny) = (of(0.0), of(PARALLEL));
-        let here: [Lanes<S>; 3] = std::array::from_fn(|a| {
+        // No closures around vectors: what is vectorised must be inlined.
+        let mut here = [zero; 3];
+        for a in 0..3 {
             let row = self.steps.row(a);
-            of(row.x).mul_add(at[0], of(row.y).mul_add(at[1], of(row.z).mul_add(at[2], of(self.start[a]))))
-        });
+            here[a] = of(row.x).mul_add(at[0], of(row.y).mul_add(at[1], of(row.z).mul_add(at[2], of(self.start[a]))));
+        }
         let (length, towards, across) = self.ray(simd, at, &here);
         let steepest = towards[0].abs().max(towards[1].abs()).max(towards[2].abs());
         let (mut enters, mut leaves, mut depths, mut steps) = ([of(FAR); FACES], zero, [zero; FACES], [zero; FACES]);
@@ -98,12 +100,16 @@ impl LightPath {
     #[inline(always)]
     fn ray<S: Simd>(&self, simd: S, at: &Places<S>, here: &Places<S>) -> (Lanes<S>, Places<S>, Lanes<S>) {
         let of = |v: f32| Lanes::splat(simd, v);
+        let [x, y, z] = self.direction.to_array();
         let Some([slab, lattice]) = self.lamp else {
-            return (of(1.0), self.direction.to_array().map(of), of(self.across));
+            return (of(1.0), [of(x), of(y), of(z)], of(self.across));
         };
-        let from: [Lanes<S>; 3] = std::array::from_fn(|a| at[a] - of(slab[a]));
+        let (mut from, mut towards) = ([of(0.0); 3], [of(0.0); 3]);
+        for a in 0..3 {
+            (from[a], towards[a]) = (at[a] - of(slab[a]), here[a] - of(lattice[a]));
+        }
         let length = from[0].mul_add(from[0], from[1].mul_add(from[1], from[2] * from[2])).sqrt();
-        (length, std::array::from_fn(|a| here[a] - of(lattice[a])), from[2])
+        (length, towards, from[2])
     }
 }
 
@@ -134,12 +140,25 @@ impl<S: Simd> Ways<S> {
         self.enters[0].min(self.enters[1]).min(self.enters[2])
     }
 
+    /// How much later light comes through the first face of a pair than through the other, times both steps.
+    #[inline(always)]
+    fn lead(&self, [i, k]: [usize; 2]) -> Lanes<S> {
+        self.depths[i] * self.steps[k] - self.depths[k] * self.steps[i]
+    }
+
     /// Length of the way in the volume before the slab, and within it.
     #[inline(always)]
     fn lengths(&self, simd: S) -> [Lanes<S>; 2] {
         let (zero, own) = (Lanes::splat(simd, 0.0), self.enters[SLAB]);
         let before = (self.entered() - self.leaves.max(own)).max(zero);
         [before, (self.entered().min(own) - self.leaves).max(zero)]
+    }
+
+    /// Optical depth towards the light, of one extinction before the slab and another within it.
+    #[inline(always)]
+    fn optical_depth(&self, simd: S, before: Lanes<S>, within: Lanes<S>) -> Lanes<S> {
+        let lengths = self.lengths(simd);
+        before.mul_add(lengths[0], within * lengths[1])
     }
 
     /// Where between this place and another the faces that light comes through last may change, as shares of the way,
@@ -156,15 +175,15 @@ impl<S: Simd> Ways<S> {
         let inside = [one.where_less(self.enters[SLAB], here), one.where_less(other.enters[SLAB], there)];
         does = does.max((inside[0] - inside[1]).abs());
         // Where depth_i/step_i − depth_k/step_k changes sign: times both steps it is linear, from wherever light comes.
-        let meet = |[i, k]: [usize; 2]| {
-            let lead = |w: &Self| w.depths[i] * w.steps[k] - w.depths[k] * w.steps[i];
-            let change = lead(self) - lead(other);
-            (lead(self) / change.where_less_or(zero, change.abs(), one)).max(zero).min(one)
-        };
-        let mut bends: [Lanes<S>; BENDS] = std::array::from_fn(|n| match PAIRS.get(n) {
-            Some(pair) => meet(*pair),
-            None => Lanes::splat(simd, (n + 1 - PAIRS.len()) as f32 / (BENDS + 1 - PAIRS.len()) as f32),
-        });
+        let mut bends = [one; BENDS];
+        for (bend, pair) in bends.iter_mut().zip(PAIRS) {
+            let lead = self.lead(pair);
+            let change = lead - other.lead(pair);
+            *bend = (lead / change.where_less_or(zero, change.abs(), one)).max(zero).min(one);
+        }
+        for n in PAIRS.len()..BENDS {
+            bends[n] = Lanes::splat(simd, (n + 1 - PAIRS.len()) as f32 / (BENDS + 1 - PAIRS.len()) as f32);
+        }
         for n in 1..BENDS {
             for k in (0..n).rev() {
                 (bends[k], bends[k + 1]) = (bends[k].min(bends[k + 1]), bends[k].max(bends[k + 1]));
@@ -182,6 +201,17 @@ pub(crate) struct Asked<'a, S: Simd> {
     pub(crate) extinction: &'a [[f32; MAX_LANES]],
     /// Optical depth of the part, by plane.
     pub(crate) optical_depth: &'a [[f32; MAX_LANES]; 3],
+}
+
+/// The place at a share of the way between the ends.
+#[inline(always)]
+fn between<S: Simd>(asked: &Asked<'_, S>, share: Lanes<S>) -> Places<S> {
+    let [nearer, farther] = &asked.ends;
+    let mut out = *nearer;
+    for a in 0..3 {
+        out[a] = (farther[a] - nearer[a]).mul_add(share, nearer[a]);
+    }
+    out
 }
 
 /// The light of one sweep as it arrives at a slab.
@@ -205,53 +235,71 @@ impl Illumination<'_> {
     ) -> [[f32; MAX_LANES]; 3] {
         let of = |v: f32| Lanes::splat(simd, v);
         let [nearer, farther] = &asked.ends;
-        let between = |x: Lanes<S>| std::array::from_fn(|a| (farther[a] - nearer[a]).mul_add(x, nearer[a]));
-        let middle: Places<S> = between(of(0.5));
-        let means = |v: usize| self.means(simd, v, &middle, asked.extinction, wanted);
-        let add = |v: usize, ways: &Ways<S>, mean: Lanes<S>, to: &mut [[Lanes<S>; NODES]; 3], node: usize| {
-            let [before, within] = ways.lengths(simd);
-            let tau = mean.mul_add(before, Lanes::load(simd, &asked.extinction[v]) * within);
-            for p in 0..planes {
-                to[p][node] = tau.mul_add(of(self.volumes[v].material.extinction_rgb[p]), to[p][node]);
-            }
-            tau
-        };
+        let middle = between(asked, of(0.5));
         let (mut optical, mut bends, mut is_bent) = ([[of(0.0); NODES]; 3], [of(1.0); BENDS], of(0.0));
         for v in 0..self.volumes.len() {
-            let mean = means(v);
-            let ways = [nearer, farther].map(|at| self.paths[v].ways(simd, at, self.face));
-            let ends = [add(v, &ways[0], mean, &mut optical, 0), add(v, &ways[1], mean, &mut optical, NODES - 1)];
+            let mean = self.means(simd, v, &middle, asked.extinction, wanted);
+            let ways = [self.paths[v].ways(simd, nearer, self.face), self.paths[v].ways(simd, farther, self.face)];
+            let own = Lanes::load(simd, &asked.extinction[v]);
+            let ends = [ways[0].optical_depth(simd, mean, own), ways[1].optical_depth(simd, mean, own)];
+            self.add(simd, ends[0], v, 0, &mut optical);
+            self.add(simd, ends[1], v, NODES - 1, &mut optical);
             // The first volume that is seen and bends decides.
-            let (own, does) = ways[0].bends(simd, &ways[1]);
-            let mut does = does;
-            if self.paths[v].lamp.is_some() {
-                let half = add(v, &self.paths[v].ways(simd, &middle, self.face), mean, &mut optical, 1);
-                let curved = of(1.0).where_less(of(CURVED), (half - (ends[0] + ends[1]) * of(0.5)).abs());
-                does = does.max(curved);
+            let (at, does) = ways[0].bends(simd, &ways[1]);
+            let mut does = does.where_less(of(0.0), own);
+            if self.paths[v].lamp.is_some() || self.volumes.len() > 1 {
+                let half = self.paths[v].ways(simd, &middle, self.face).optical_depth(simd, mean, own);
+                let line = (ends[0] + ends[1]) * of(0.5);
+                does = does.max(of(1.0).where_less(of(CURVED), (half - line).abs()));
             }
-            let does = does.where_less(of(0.0), Lanes::load(simd, &asked.extinction[v]));
-            (0..BENDS).for_each(|n| bends[n] = own[n].where_less_or(is_bent, does, bends[n]));
+            for n in 0..BENDS {
+                bends[n] = at[n].where_less_or(is_bent, does, bends[n]);
+            }
             is_bent = is_bent.max(does);
         }
-        let any_bent = is_any(is_bent);
-        optical.iter_mut().for_each(|nodes| nodes[1] = of(0.0));
-        for v in (0..self.volumes.len()).filter(|_| any_bent) {
-            let mean = means(v);
-            for n in 0..BENDS {
-                let ways = self.paths[v].ways(simd, &between(bends[n]), self.face);
-                add(v, &ways, mean, &mut optical, n + 1);
-            }
+        if is_any(is_bent) {
+            self.add_bends(simd, asked, &bends, wanted, &mut optical);
         }
         let mut out = [[1.0; MAX_LANES]; 3];
         for p in 0..planes {
             let tau = Lanes::load(simd, &asked.optical_depth[p]);
             let mut mean = part(simd, tau, [optical[p][0], optical[p][NODES - 1]]);
-            if any_bent {
+            if is_any(is_bent) {
                 mean = bent(simd, tau, &bends, &optical[p]).where_less_or(of(0.0), is_bent, mean);
             }
             (mean / mean_of_exponential(simd, tau)).store(&mut out[p]);
         }
         out
+    }
+
+    /// Adds the optical depths at bends.
+    #[inline(always)]
+    fn add_bends<S: Simd>(
+        &self,
+        simd: S,
+        asked: &Asked<'_, S>,
+        bends: &[Lanes<S>; BENDS],
+        wanted: &[f32; MAX_LANES],
+        to: &mut [[Lanes<S>; NODES]; 3],
+    ) {
+        let middle = between(asked, Lanes::splat(simd, 0.5));
+        for v in 0..self.volumes.len() {
+            let mean = self.means(simd, v, &middle, asked.extinction, wanted);
+            let own = Lanes::load(simd, &asked.extinction[v]);
+            for n in 0..BENDS {
+                let ways = self.paths[v].ways(simd, &between(asked, bends[n]), self.face);
+                self.add(simd, ways.optical_depth(simd, mean, own), v, n + 1, to);
+            }
+        }
+    }
+
+    /// Adds the optical depth of a volume at a node, by plane.
+    #[inline(always)]
+    fn add<S: Simd>(&self, simd: S, tau: Lanes<S>, v: usize, node: usize, to: &mut [[Lanes<S>; NODES]; 3]) {
+        for p in 0..3 {
+            let share = Lanes::splat(simd, self.volumes[v].material.extinction_rgb[p]);
+            to[p][node] = tau.mul_add(share, to[p][node]);
+        }
     }
 
     /// Mean extinction of a volume on the way of light to the present slab, about each place.
@@ -265,7 +313,9 @@ impl Illumination<'_> {
         wanted: &[f32; MAX_LANES],
     ) -> Lanes<S> {
         let mut places = [[0.0; MAX_LANES]; 3];
-        (0..3).for_each(|a| at[a].store(&mut places[a]));
+        for a in 0..3 {
+            at[a].store(&mut places[a]);
+        }
         // Where light has come no way before the slab, what is seen in it stands for what nearly does.
         let mut means = extinction[v];
         for lane in (0..Lanes::<S>::COUNT).filter(|lane| wanted[*lane] > 0.0) {

@@ -218,8 +218,7 @@ impl Sheet {
     /// Depth of what each ray from pixel `k` on has of slab and volume, 0 for none.
     #[inline(always)]
     pub(crate) fn depth<S: Simd>(&self, simd: S, k: usize) -> Lanes<S> {
-        let [near, far] = [&self.near, &self.far].map(|plane| Lanes::load(simd, &plane[k..]));
-        (far - near).max(Lanes::splat(simd, 0.0))
+        (Lanes::load(simd, &self.far[k..]) - Lanes::load(simd, &self.near[k..])).max(Lanes::splat(simd, 0.0))
     }
 }
 
