@@ -76,6 +76,12 @@ impl Pixels {
         most
     }
 
+    /// Whether nothing is seen through pixel `k` any more.
+    #[inline]
+    pub(crate) fn is_done(&self, k: usize, cutoff: f32) -> bool {
+        self.transmittance.iter().all(|plane| plane[k] < cutoff)
+    }
+
     /// Optical depth so far, green.
     #[inline(always)]
     pub(crate) fn so_far<S: Simd>(&self, simd: S, k: usize) -> Lanes<S> {

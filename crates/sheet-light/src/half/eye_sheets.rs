@@ -15,6 +15,9 @@ use splat_core::{Receiver, Shading, SplatKind};
 /// Sheets kept of a volume whose gradients are asked for: the present one and its neighbours.
 const KEPT: u32 = 3;
 
+/// Slabs after which pixels that are done are looked for.
+const CLOSING: u32 = 8;
+
 /// A band of the eye's image.
 #[derive(Debug, Clone)]
 pub(crate) struct EyeBand {
@@ -67,6 +70,19 @@ impl EyeBand {
         self.band.bytes() + sheets + self.pixels.bytes()
     }
 
+    /// Ends the rays of pixels that are done.
+    fn close(&mut self, cutoff: f32) {
+        let Self { band, pixels, .. } = self;
+        for y in 0..band.stored {
+            for k in y * band.stride..y * band.stride + band.width {
+                if pixels.is_done(k, cutoff) {
+                    band.crossings.iter_mut().for_each(|[_, far]| far[k] = f32::NEG_INFINITY);
+                }
+            }
+        }
+        band.find_hits();
+    }
+
     fn sheet(&self, volume: usize, slab: u32) -> &Sheet {
         let sheets = &self.sheets[volume];
         &sheets[slab as usize % sheets.len()]
@@ -80,6 +96,11 @@ impl pulp::WithSimd for OneSlab<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) -> u64 {
         let mut fragments = 0;
+        // What gradients are taken from is wanted beside pixels that are done.
+        let may_close = self.of.cutoff > 0.0 && !self.of.volumes.iter().any(|v| v.normals);
+        if may_close && !self.of.frame.back_to_front && self.slab.is_multiple_of(CLOSING) {
+            self.eye.close(self.of.cutoff);
+        }
         for v in 0..self.of.placed.len() {
             // Gradients need the sheet behind; the first one is made with it.
             let is_ahead = self.of.volumes[v].normals && self.step == Step::Draw;

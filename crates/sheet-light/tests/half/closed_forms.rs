@@ -81,7 +81,9 @@ fn slab(tau: f64, slabs: f64, from: [f64; 3]) -> [f64; 2] {
     let (tf, material) = (constant((tau / length) as f32), scattering());
     let (volumes, lights) = ([volume(&grid, &tf, &material)], [sun(from)]);
     let camera = parallel([0.0, 0.0, 10.0], 2.0, [9, 9]);
-    let out = draw(&input(&volumes, &camera, &lights), &exact(Some(length / slabs))).unwrap().0;
+    // A pixel of the light buffer is as wide as a step of the coarser lattice.
+    let params = HalfParams { light_pixels: spacing.z / spacing.x, ..exact(Some(length / slabs)) };
+    let out = draw(&input(&volumes, &camera, &lights), &params).unwrap().0;
     [(-f64::from(out.optical_depth[0][40])).exp(), 4.0 * PI * f64::from(out.channels[0][40])]
 }
 

@@ -42,17 +42,12 @@ fn turned(degrees: f64, slab_width: f64, light_pixels: f64) -> Accumulator {
 
 #[test]
 fn hv02_nothing_pops_where_the_slabs_turn_over() {
+    // In units of what is scattered where nothing attenuates.
     let bright = 4.0 * std::f32::consts::PI;
-    for pixels in [0.75, 1.5, 3.0, 6.0] {
-        let difference = |w: f64| bright * apart(&turned(90.0 - 1e-4, w, pixels), &turned(90.0 + 1e-4, w, pixels));
-        let still = bright * apart(&turned(80.0, 0.25, pixels), &turned(80.0 + 2e-4, 0.25, pixels));
-        eprintln!(
-            "hv02 {pixels}: {:e} {:e} {:e} still {still:e}",
-            difference(0.25),
-            difference(0.125),
-            difference(0.0625)
-        );
-    }
+    let jump = |w: f64, pixels: f64| bright * apart(&turned(90.0 - 1e-4, w, pixels), &turned(90.0 + 1e-4, w, pixels));
+    // Half-vectors before and after it are at right angles, so sheets differ by what slabs err by, and that is of second order.
+    let (coarse, half, fine) = (jump(0.25, 6.0), jump(0.125, 6.0), jump(0.0625, 6.0));
+    assert!(jump(0.25, 1.5) < 1.0 / 128.0 && half < 0.3 * coarse && fine < 5e-4, "{coarse:e} {half:e} {fine:e}");
 }
 
 #[test]
@@ -158,7 +153,9 @@ fn ia07_a_ramp_has_the_same_normal_everywhere() {
                 let first = layout.normal().unwrap();
                 for at in 0..3600 {
                     let opacity = 1.0 - (-out.optical_depth[0][at]).exp();
-                    if opacity > 0.2 {
+                    // At the picture's border differences are one-sided.
+                    let is_border = [at % 60, at / 60].into_iter().any(|v| v == 0 || v == 59);
+                    if opacity > 0.2 && !is_border {
                         let n = [0, 1, 2].map(|a| f64::from(out.channels[first + a][at] / opacity));
                         let off = (DVec3::from_array(n) + slope.normalize()).length();
                         assert!(off < 0.01, "{slope}, pixel {at}: {n:?}, off by {off}");
@@ -199,12 +196,9 @@ fn depths_are_those_of_slabs_across_the_view() {
         let half = draw(&input(&volumes, &camera, &[light]), &params).unwrap().0;
         for at in (0..576).filter(|at| view.optical_depth[0][*at] > 0.5) {
             let [one, other] = [&view, &half].map(|out| out.depth[at].depths(out.optical_depth[0][at], None));
-            let (from, along) = super::common::ray(&camera, at % 24, at / 24);
-            let entry = super::common::inside(&grid, from, along);
             for (a, b) in one.into_iter().zip(other) {
-                if !((a - b).abs() < 0.1 || a == b) {
-                    eprintln!("DEPTH {at}: {one:?} {other:?} {entry:?}");
-                }
+                // Within a slab.
+                assert!((a - b).abs() < 0.2 || a == b, "{at}: {one:?} {other:?}");
             }
         }
         assert_eq!(view.object, half.object);

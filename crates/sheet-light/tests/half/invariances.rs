@@ -72,7 +72,6 @@ fn scale2_a_power_of_two_changes_no_bit() {
 fn shift_a_place_far_from_the_origin_looks_the_same() {
     for shape in shapes() {
         let difference = apart(&moved(0.0, 1.0, shape), &moved(1e7, 1.0, shape));
-        eprintln!("shift {difference:e}");
         assert!(difference < 2e-3, "{shape:?}: {difference:e}");
     }
 }
@@ -80,9 +79,9 @@ fn shift_a_place_far_from_the_origin_looks_the_same() {
 #[test]
 fn hv05_thinner_slabs_converge_in_second_order() {
     let (tf, material) = (transfer(&[(-1.5, 0.0), (0.0, 0.3), (1.5, 0.9)]), scattering());
-    let grid = grid([16, 16, 16], cubic(0.5), |p| (0.9 * p.x + 0.3 * p.z).sin() + 0.4 * (0.7 * p.y - 0.8 * p.z).cos());
+    let grid = grid([10, 10, 10], cubic(0.5), |p| (0.9 * p.x + 0.3 * p.z).sin() + 0.4 * (0.7 * p.y - 0.8 * p.z).cos());
     let volumes = [volume(&grid, &tf, &material)];
-    let camera = parallel([0.0, 0.0, 12.0], 5.0, [24, 24]);
+    let camera = parallel([0.0, 0.0, 12.0], 5.0, [16, 16]);
     for light in [sun([1.0, 0.3, 2.0]), sun([1.0, 0.3, -2.0])] {
         let lights = [light];
         let with = |width: f64| {
@@ -100,7 +99,6 @@ fn hv05_thinner_slabs_converge_in_second_order() {
         };
         let (coarse, fine) = (rmse(0.5), rmse(0.25));
         let order = (coarse / fine).log2();
-        eprintln!("order {order} {coarse:e} {fine:e}");
         assert!(order > 1.9, "order {order}: {coarse:e} → {fine:e}");
     }
 }

@@ -63,7 +63,6 @@ fn hv_volumes_that_overlap_shadow_each_other_as_in_the_twin() {
     let camera = perspective([2.0, 3.0, 9.0], 40.0, [24, 24]);
     for light in [sun([1.0, 3.0, 2.0]), sun([2.0, 1.0, -3.0])] {
         let [tau, color] = differences(&input(&volumes, &camera, &[light]), &exact(Some(0.1)));
-        eprintln!("OVER {tau:e} {color:e}");
         assert!(tau < 2e-5 && color < 2e-4, "{:?}: {tau:e} {color:e}", light.light.shape);
     }
 }
