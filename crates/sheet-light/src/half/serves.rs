@@ -58,10 +58,10 @@ pub fn serves(volumes: &[Volume<'_>], camera: &Camera, light: &Light) -> Result<
     if light.shape.is_extended() {
         return Err(Reason::Extended);
     }
-    if let Some(position) = light.shape.place() {
-        if let Some(volume) = volumes.iter().position(|v| is_inside(v, position)) {
-            return Err(Reason::LampInside { volume, position });
-        }
+    if let Some(position) = light.shape.place()
+        && let Some(volume) = volumes.iter().position(|v| is_inside(v, position))
+    {
+        return Err(Reason::LampInside { volume, position });
     }
     let axis = axis_of(volumes, camera, light);
     // The light's image has an axis of its own, to the middle of the volumes.

@@ -71,7 +71,7 @@ impl Sheet {
     #[inline(always)]
     pub(crate) fn begin<S: Simd>(&mut self, simd: S, band: &Band, volume: usize, faces: [f32; 2]) {
         let middle = 0.5 * (faces[0] + faces[1]);
-        (self.rows, self.depths) = (usize::MAX..0, [middle; 2]);
+        (self.rows, self.depths) = (0..0, [middle; 2]);
         for y in 0..band.stored {
             let hit = &band.hits[volume][y];
             let is_met = hit.near < faces[1] && hit.far > faces[0];
@@ -83,13 +83,10 @@ impl Sheet {
                 continue;
             }
             let columns = hit.columns.start / count * count..hit.columns.end.next_multiple_of(count);
-            if self.begin_row(simd, band, volume, y * band.stride, columns.clone(), faces) {
+            if self.begin_row(simd, band, volume, [y, columns.start, columns.end], faces) {
                 self.spans[y] = columns;
-                self.rows = self.rows.start.min(y)..y + 1;
+                self.rows = if self.rows.is_empty() { y } else { self.rows.start }..y + 1;
             }
-        }
-        if self.rows.end == 0 {
-            self.rows = 0..0;
         }
     }
 
@@ -100,17 +97,16 @@ impl Sheet {
         simd: S,
         band: &Band,
         volume: usize,
-        row: usize,
-        columns: Range<usize>,
+        [y, start, end]: [usize; 3],
         faces: [f32; 2],
     ) -> bool {
         let of = |v: f32| Lanes::splat(simd, v);
         let (first, last, half, zero, one) = (of(faces[0]), of(faces[1]), of(0.5), of(0.0), of(1.0));
         let middle = of(0.5 * (faces[0] + faces[1]));
         let (mut any, mut partial) = (zero, zero);
-        let mut x = columns.start;
-        while x < columns.end {
-            let k = row + x;
+        let mut x = start;
+        while x < end {
+            let k = y * band.stride + x;
             let near = Lanes::load(simd, &band.crossings[volume][0][k..]).max(first);
             let far = Lanes::load(simd, &band.crossings[volume][1][k..]).min(last);
             near.store(&mut self.near[k..]);
@@ -150,7 +146,8 @@ impl Sheet {
                 ..to(bottom).saturating_sub(band.top).min(self.rows.end);
             let columns = from(left)..to(right).min(band.width);
             if !rows.is_empty() && !columns.is_empty() {
-                fragments += self.add(simd, of, band.stride, record, slab, [rows, columns]);
+                let section = of.placed.sections.one(record.place % PHASES, slab - record.place / PHASES);
+                fragments += self.add(simd, of, (band.stride, record, section), rows, columns);
             }
         }
         fragments
@@ -162,13 +159,11 @@ impl Sheet {
         &mut self,
         simd: S,
         of: &Splatter<'_>,
-        stride: usize,
-        record: &Record,
-        slab: u32,
-        [rows, columns]: [Range<usize>; 2],
+        (stride, record, section): (usize, &Record, f32),
+        rows: Range<usize>,
+        columns: Range<usize>,
     ) -> u64 {
         let at = |v: f32| Lanes::splat(simd, v);
-        let section = of.placed.sections.one(record.place % PHASES, slab - record.place / PHASES);
         let [aa, ab, bb] = of.shape.conic;
         let (aa, ab, bb, value, section) = (at(aa), at(2.0 * ab), at(bb), at(record.value), at(section));
         let (a, b, one, zero) = (at(record.at[0]), at(record.at[1]), at(1.0), at(0.0));
