@@ -18,6 +18,35 @@
 //! | 18: map each pixel to the shadow buffer | `illuminate.rs` |
 //! | 21: classify and composite into the shadow buffer | `light_buffer.rs` |
 //! | the loop over slabs | `sweep.rs` |
+//!
+//! ```
+//! use sheet_light::half::{HalfInput, HalfParams, fold};
+//! use sheet_light::{SheetInput, Volume};
+//! use splat_core::{Accumulator, Camera, Grid, LayerSet, Light, LightShape, Material, Projection, Shading};
+//! use splat_core::{TransferFunction, TransferPoint, glam::{DMat3, DVec3}, shade::{ChannelLayout, LitBy}};
+//!
+//! // A medium of τ = 1, lit from where it is seen: light comes in, is scattered, and goes out again.
+//! let axes = DMat3::from_diagonal(DVec3::splat(0.5));
+//! let grid = Grid { origin: DVec3::splat(-1.75), axes, dims: [8; 3], values: vec![7.0; 512] };
+//! let transfer = TransferFunction::new(vec![TransferPoint { value: 0.0, color: [1.0; 3], extinction: 0.25 }]).unwrap();
+//! let material = Material { shading: Shading::Phase, ..Material::default() };
+//! let volumes = [Volume {
+//!     grid: &grid, transfer: &transfer, material: &material, normals: false, object: 0, shadow_coefficient: 1.0,
+//! }];
+//! let view = Projection::Orthographic { height: 2.0 };
+//! let camera = Camera::look_at(DVec3::Z * 9.0, DVec3::ZERO, DVec3::Y, view, [16, 16]).unwrap();
+//! let shape = LightShape::Directional { direction: DVec3::NEG_Z };
+//! let lights = [LitBy { light: Light { shape, intensity: [1.0; 3] }, shadow: None }];
+//! let sheets = SheetInput {
+//!     volumes: &volumes, camera: &camera, lights: &lights, shadow_origin: DVec3::ZERO, ambient: [0.0; 3],
+//! };
+//! let mut image = Accumulator::new([16, 16], 1, 3, false, false);
+//! let layout = ChannelLayout::new(&LayerSet::default());
+//! fold(&HalfInput { sheets, opaque: &[] }, &HalfParams::default(), &layout, &mut image, None).unwrap();
+//! // (1 − e^(−2τ))/2 of what is scattered to all sides alike.
+//! let expected = 0.5 * (1.0 - (-2f32).exp()) / (4.0 * std::f32::consts::PI);
+//! assert!(image.channels[0].iter().all(|c| (c - expected).abs() < 1e-5));
+//! ```
 
 mod axis;
 mod band;
