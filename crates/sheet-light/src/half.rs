@@ -13,9 +13,9 @@
 //! | 3, 4: transform and bucket sort voxels | `buckets.rs` |
 //! | 12, 13: rasterize footprints | `sheet.rs` |
 //! | 16: gradients | `gradient.rs` |
-//! | 17, 19: classify, illuminate | `eye_sheets.rs` |
+//! | 17, 19: classify, illuminate | `eye_sheets.rs`, `shade.rs` |
 //! | 20: composite | `eye_buffer.rs` |
-//! | 18: map each pixel to the shadow buffer | `illuminate.rs` |
+//! | 18: map each pixel to the shadow buffer | `illuminate.rs`, `light_path.rs` |
 //! | 21: classify and composite into the shadow buffer | `light_buffer.rs` |
 //! | the loop over slabs | `sweep.rs` |
 //!
@@ -60,10 +60,12 @@ mod gradient;
 mod illuminate;
 mod lamp;
 mod light_buffer;
+mod light_path;
 mod params;
 mod placed;
 pub mod reference;
 mod serves;
+mod shade;
 mod sheet;
 mod sight;
 mod sweep;

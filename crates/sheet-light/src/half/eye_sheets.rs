@@ -2,15 +2,16 @@
 
 use super::band::Band;
 use super::eye_buffer::{Fragments, Pixels};
-use super::illuminate::{Asked, Illumination, Places};
+use super::illuminate::{Asked, Illumination};
+use super::light_path::Places;
+use super::shade::Lit;
 use super::sheet::{Sheet, Splatter, is_any};
 use super::sweep::Sweep;
 use crate::Volume;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::{self, Simd};
-use splat_core::shade::{ChannelLayout, Point, arriving};
-use splat_core::{Receiver, Shading, SplatKind};
+use splat_core::shade::{ChannelLayout, MAX_CHANNELS};
 
 /// Sheets kept of a volume whose gradients are asked for: the present one and its neighbours.
 const KEPT: u32 = 3;
@@ -258,7 +259,7 @@ impl OneSlab<'_> {
                         normal: normals[lane],
                         arrives: [0, 1, 2].map(|c| arrives[if planes == 3 { c } else { 0 }][lane]),
                     };
-                    self.shade(&lit, [chunk.x + lane, chunk.y], at, share, (lane, out));
+                    self.mix(&lit, [chunk.x + lane, chunk.y], at, share, (lane, out));
                 }
             }
         }
@@ -275,44 +276,9 @@ impl OneSlab<'_> {
     }
 
     /// Mixes the radiance of one point of a volume, with its share of the optical depth so far, into a lane of the fragments.
-    fn shade(
-        &self,
-        lit: &Lit<'_>,
-        pixel: [usize; 2],
-        at: DVec3,
-        share: [f32; 3],
-        (lane, out): (usize, &mut Fragments),
-    ) {
-        let of = self.of;
-        let position = if of.is_lit_by_place { of.frame.world(at) } else { DVec3::ZERO };
-        let point = Point {
-            position,
-            radius: lit.radius,
-            normal: lit.normal,
-            to_eye: of.to_eye(pixel),
-            color: lit.color,
-            material: lit.volume.material,
-        };
-        let light = of.light.map(|lit_by| lit_by.light);
-        let mut radiance = point.radiance(of.ambient, light.iter(), |_, irradiance| {
-            let others = of.light.and_then(|lit_by| lit_by.shadow);
-            let receiver = || Receiver {
-                position: (position - of.shadow_origin).as_vec3(),
-                normal: lit.normal,
-                radius: lit.radius,
-                kind: SplatKind::Medium,
-            };
-            let shadow = || {
-                let others = others.map_or([1.0; 3], |others| others.transmittance(&receiver()));
-                [0, 1, 2].map(|c| lit.arrives[c] * others[c])
-            };
-            arriving(irradiance, lit.volume.shadow_coefficient, Some(shadow))
-        });
-        if of.light_alone {
-            (radiance.ambient, radiance.emission) = ([0.0; 3], [0.0; 3]);
-        }
-        let mut values = [0.0; splat_core::shade::MAX_CHANNELS];
-        radiance.write(lit.normal, self.layout, &mut values);
+    fn mix(&self, lit: &Lit<'_>, pixel: [usize; 2], at: DVec3, share: [f32; 3], (lane, out): (usize, &mut Fragments)) {
+        let mut values = [0.0; MAX_CHANNELS];
+        lit.radiance(self.of, pixel, at).write(lit.normal, self.layout, &mut values);
         let (count, planes) = (self.layout.count(), self.eye.pixels.planes);
         for c in 0..count {
             let sum = &mut out.values[c][lane];
@@ -348,19 +314,4 @@ impl OneSlab<'_> {
             }
         }
     }
-}
-
-/// A point of a volume that is lit.
-struct Lit<'a> {
-    volume: &'a Volume<'a>,
-    radius: f32,
-    color: [f32; 3],
-    normal: Vec3,
-    /// Share of the light that the volumes let through.
-    arrives: [f32; 3],
-}
-
-/// Whether a material asks for light at all.
-pub(crate) fn is_lit(volume: &Volume<'_>) -> bool {
-    volume.material.shading != Shading::Unlit
 }
