@@ -3,10 +3,12 @@
 use super::common::{draw, exact, input, lamp, lit, scattering, sun};
 use crate::common::{BEAUTY, apart, constant, cubic, grid, noise, parallel, perspective, transfer, volume};
 use sheet_light::half::{HalfInput, HalfParams, HalfVector, LEAST_COSINE, Reason, fold, serves};
-use sheet_light::{Error, Params};
+use sheet_light::{Error, Params, Volume};
 use splat_core::glam::DVec3;
 use splat_core::shade::{ChannelLayout, LitBy};
-use splat_core::{Accumulator, Exceeded, LayerSet, LightShape, Limits, Material, Progress, rng};
+use splat_core::{
+    Accumulator, Exceeded, LayerSet, LightShape, Limits, Material, Progress, Receiver, Transmittance, rng,
+};
 
 #[test]
 fn hv01_no_pair_of_directions_is_without_an_axis() {
@@ -241,4 +243,37 @@ fn what_cannot_be_drawn_is_refused() {
     progress.cancel();
     let mut out = Accumulator::new(camera.size, 1, 3, false, false);
     assert_eq!(fold(&whole, &exact(None), &BEAUTY, &mut out, Some(&progress)), Err(Error::Cancelled));
+}
+
+/// Lets the same share of light through everywhere.
+struct Veil(f32);
+
+impl Transmittance for Veil {
+    fn transmittance(&self, _: &Receiver) -> [f32; 3] {
+        [self.0; 3]
+    }
+}
+
+static VEIL: Veil = Veil(0.25);
+
+#[test]
+fn what_else_casts_shadows_attenuates_the_light_as_far_as_it_is_received() {
+    let (tf, material) = (transfer(&[(0.2, 0.0), (0.5, 0.4), (0.9, 1.5)]), scattering());
+    let grid = grid([10, 10, 10], cubic(0.5), noise);
+    let camera = perspective([2.0, 3.0, 12.0], 40.0, [30, 30]);
+    for light in [sun([1.0, 2.0, 1.0]), lamp([-9.0, 3.0, -12.0])] {
+        let with = |shadow: Option<&'static Veil>, shadow_coefficient: f32| {
+            let shadow: Option<&dyn Transmittance> = shadow.map(|veil| veil as &dyn Transmittance);
+            let volumes = [Volume { shadow_coefficient, ..volume(&grid, &tf, &material) }];
+            draw(&input(&volumes, &camera, &[LitBy { shadow, ..light }]), &exact(None)).unwrap().0
+        };
+        let (open, veiled) = (with(None, 1.0), with(Some(&VEIL), 1.0));
+        assert!(open.channels[0].iter().any(|c| *c > 1e-4) && open.optical_depth == veiled.optical_depth);
+        for (open, veiled) in open.channels[0].iter().zip(&veiled.channels[0]) {
+            assert!((open * VEIL.0 - veiled).abs() <= 1e-6 * open, "{open} {veiled}");
+        }
+        // Who receives no shadow has none, neither his own nor another's.
+        assert_eq!(with(None, 0.0), with(Some(&VEIL), 0.0));
+        assert!(with(None, 0.0).channels[0].iter().zip(&open.channels[0]).all(|(lit, shadowed)| lit >= shadowed));
+    }
 }
