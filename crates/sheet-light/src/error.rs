@@ -24,6 +24,17 @@ pub enum Error {
         /// What is wrong.
         source: splat_core::Error,
     },
+    /// A light breaks a promise.
+    #[error("{0}")]
+    Light(splat_core::Error),
+    /// Half vectors cannot serve a light, see [`crate::half::serves`].
+    #[error("light {light}: {reason}")]
+    HalfVector {
+        /// Its place in the input.
+        light: usize,
+        /// Why.
+        reason: crate::half::Reason,
+    },
     /// Too many slabs, in all or under one kernel, or more memory than [`crate::Params::limits`] allow.
     #[error("{0}; {hint}", hint = .0.hint)]
     Limit(Exceeded),

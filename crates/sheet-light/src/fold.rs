@@ -150,7 +150,7 @@ impl<'a> Prepared<'a> {
             taper: Taper::new(0.5 * cutoff * cutoff),
             kernel: Kernel::new(&Footprint { cutoff: cutoff as f32 }),
             classifier: Classifier::new(volume.transfer, volume.extinction_scale, base),
-            rays: LatticeRays::new(&volume, camera, slabs),
+            rays: LatticeRays::new(&volume, camera, slabs.origin),
             footprint: camera.is_orthographic().then(|| viewed.footprint(camera.focal_px())),
             viewed,
             voxels,

@@ -1,4 +1,5 @@
-//! Image-aligned sheets: volumes splatted in slabs across the view, classified and shaded after reconstruction.
+//! Image-aligned sheets: volumes splatted in slabs across the view, classified and shaded after reconstruction. In [`half`]: slabs
+//! across the half vector of light and view, with translucent shadows.
 //!
 //! N. Neophytou, K. Mueller, *GPU Accelerated Image Aligned Splatting*, 2005, here on the processor. Voxels are kernels. Each
 //! adds to every slab across the view that it touches, a section of itself (Figure 1) times its footprint; all sections at once, as
@@ -52,6 +53,7 @@ mod classify;
 mod counts;
 mod error;
 mod fold;
+pub mod half;
 mod lattice;
 mod params;
 mod picture;

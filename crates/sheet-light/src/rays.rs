@@ -4,7 +4,6 @@
 //! pairs of planes in lattice coordinates. Lengths of neighbouring slabs add up to that of the whole, so a constant volume has
 //! e^−τ at any slab width and through any lens.
 
-use crate::slabs::Slabs;
 use crate::tile::{AREA, SIDE};
 use crate::volume::Volume;
 use splat_core::Camera;
@@ -29,14 +28,15 @@ pub(crate) struct LatticeRays {
 }
 
 impl LatticeRays {
-    pub(crate) fn new(volume: &Volume<'_>, camera: &Camera, slabs: &Slabs) -> Self {
+    /// Depths are counted from `origin`.
+    pub(crate) fn new(volume: &Volume<'_>, camera: &Camera, origin: f64) -> Self {
         let world_from_view = DMat3::from_cols(camera.axes[0], camera.axes[1], camera.axes[2]);
         let inverse = volume.axes().inverse();
         Self {
             lattice_from_view: inverse * world_from_view,
             start: inverse * (camera.position - volume.origin()),
             highest: DVec3::from_array(volume.grid.dims.map(|n| n as f64 - 0.5)),
-            origin: slabs.origin,
+            origin,
         }
     }
 
@@ -45,7 +45,7 @@ impl LatticeRays {
         self.start + self.lattice_from_view * at
     }
 
-    /// Where a view ray is inside, counted from the first slab, not behind the eye.
+    /// Where a view ray is inside, counted from the origin, not behind the eye.
     pub(crate) fn crossing(&self, (from, along): (DVec3, DVec3)) -> [f64; 2] {
         let (from, along) = (self.lattice(from), self.lattice_from_view * along);
         let (mut near, mut far) = (0.0f64, f64::INFINITY);

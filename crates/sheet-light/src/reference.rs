@@ -71,7 +71,7 @@ impl Sheets {
     fn new(volume: &Volume<'_>, input: &SheetInput<'_>, params: &Params, slabs: &Slabs) -> Self {
         let camera = input.camera;
         let size = camera.size.map(|s| s as usize);
-        let rays = LatticeRays::new(volume, camera, slabs);
+        let rays = LatticeRays::new(volume, camera, slabs.origin);
         let pixels = 0..size[0] * size[1];
         let ray = |at: usize| camera.view_ray((at % size[0]) as f64 + 0.5, (at / size[0]) as f64 + 0.5);
         let n = pixels.len() * slabs.count as usize;

@@ -68,6 +68,12 @@ impl SectionTable {
         let begin = phase as usize * self.stride + (8 + first) as usize;
         &self.weights[begin..begin + 8]
     }
+
+    /// The section of one slab, `slab` < touched behind the one in which the kernel begins.
+    #[inline(always)]
+    pub(crate) fn one(&self, phase: u32, slab: u32) -> f32 {
+        self.weights[phase as usize * self.stride + 8 + slab as usize]
+    }
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 
 mod closed_forms;
 mod common;
+mod half;
 mod hard_cases;
 mod invariances;
 mod splats;

@@ -1,0 +1,78 @@
+//! Half-vector sheets: slabs across the bisector of light and view, so that one sweep composites for the eye and attenuates for
+//! the light.
+//!
+//! C. Zhang, R. Crawfis, *Light Propagation for Mixed Polygonal and Volumetric Data*, section 4 and Figure 5. With E the unit
+//! direction from the volume to the eye and L the one to the light, slabs lie across E + L where E·L ≥ 0, and the eye meets them
+//! in the order in which light does; else across L − E, and the eye meets them the other way round. Slab after slab is
+//! reconstructed in the eye's image, lit by what the light buffer lets through, and composited; then it is reconstructed in the
+//! light's image, where it attenuates. A light has one buffer of two dimensions, whatever the number of slabs.
+//!
+//! | symbol, step of the pseudocode | here |
+//! |---|---|
+//! | half way vector | [`HalfVector`] |
+//! | 3, 4: transform and bucket sort voxels | `buckets.rs` |
+//! | 12, 13: rasterize footprints | `sheet.rs` |
+//! | 16: gradients | `gradient.rs` |
+//! | 17, 19: classify, illuminate | `eye_sheets.rs`, `shade.rs` |
+//! | 20: composite | `eye_buffer.rs` |
+//! | 18: map each pixel to the shadow buffer | `illuminate.rs`, `light_path.rs` |
+//! | 21: classify and composite into the shadow buffer | `light_buffer.rs` |
+//! | the loop over slabs | `sweep.rs` |
+//!
+//! ```
+//! use sheet_light::half::{HalfInput, HalfParams, fold};
+//! use sheet_light::{SheetInput, Volume};
+//! use splat_core::{Accumulator, Camera, Grid, LayerSet, Light, LightShape, Material, Projection, Shading};
+//! use splat_core::{Similarity, TransferFunction, TransferPoint, glam::{DMat3, DVec3}, shade::{ChannelLayout, LitBy}};
+//!
+//! // A medium of τ = 1, lit from where it is seen: light comes in, is scattered, and goes out again.
+//! let axes = DMat3::from_diagonal(DVec3::splat(0.5));
+//! let grid = Grid { origin: DVec3::splat(-1.75), axes, dims: [8; 3], values: vec![7.0; 512] };
+//! let transfer = TransferFunction::new(vec![TransferPoint { value: 0.0, color: [1.0; 3], extinction: 0.25 }]).unwrap();
+//! let material = Material { shading: Shading::Phase, ..Material::default() };
+//! let volume = Volume {
+//!     grid: &grid, transform: Similarity::default(), transfer: &transfer, extinction_scale: 1.0, material: &material,
+//!     normals: false, object: 0, shadow_coefficient: 1.0,
+//! };
+//! let view = Projection::Orthographic { height: 2.0 };
+//! let camera = Camera::look_at(DVec3::Z * 9.0, DVec3::ZERO, DVec3::Y, view, [16, 16]).unwrap();
+//! let shape = LightShape::Directional { direction: DVec3::NEG_Z };
+//! let lights = vec![LitBy { light: Light { shape, intensity: [1.0; 3] }, shadow: None }];
+//! let sheets = SheetInput {
+//!     volumes: vec![volume], splats: None, camera: &camera, lights, shadow_origin: DVec3::ZERO, ambient: [0.0; 3],
+//! };
+//! let mut image = Accumulator::new([16, 16], 1, 3, false, false);
+//! let layout = ChannelLayout::new(&LayerSet::default());
+//! fold(&HalfInput { sheets, opaque: &[] }, &HalfParams::default(), &layout, &mut image, None).unwrap();
+//! // (1 − e^(−2τ))/2 of what is scattered to all sides alike.
+//! let expected = 0.5 * (1.0 - (-2f32).exp()) / (4.0 * std::f32::consts::PI);
+//! assert!(image.channels[0].iter().all(|c| (c - expected).abs() < 1e-5));
+//! ```
+
+mod axis;
+mod band;
+mod buckets;
+mod counts;
+mod eye_buffer;
+mod eye_sheets;
+mod fold;
+mod frame;
+mod gradient;
+mod illuminate;
+mod lamp;
+mod light_buffer;
+mod light_path;
+mod params;
+mod placed;
+pub mod reference;
+mod serves;
+mod shade;
+mod sheet;
+mod sight;
+mod sweep;
+
+pub use axis::HalfVector;
+pub use counts::HalfCounts;
+pub use fold::fold;
+pub use params::{HalfInput, HalfParams};
+pub use serves::{LEAST_COSINE, Reason, serves};

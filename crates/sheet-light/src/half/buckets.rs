@@ -1,0 +1,111 @@
+//! Voxels by the slab in which their kernels begin, and by bands of an image: bucket sort, in linear time.
+//!
+//! A voxel has the bucket of its first slab and of the first band that it reaches in any of its slabs. What a band has of a slab
+//! lies in the buckets of the slabs before, as many as kernels touch, and of the bands before, as many as the largest footprint
+//! touches: ranges without gaps. In a bucket voxels keep the order of the lattice, whoever counts them.
+
+use super::band::ROWS;
+use super::frame::Frame;
+use super::placed::Placed;
+use super::sight::{Shape, Sight};
+use crate::lattice::Lattice;
+use crate::sections::PHASES;
+use crate::segments::SEGMENT;
+use crate::visible::Voxels;
+use rayon::prelude::*;
+
+/// A voxel on its way into sheets.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Record {
+    /// Slab coordinates along the slabs.
+    pub(crate) at: [f32; 2],
+    /// Value, less the volume's base.
+    pub(crate) value: f32,
+    /// Where its kernel begins, 256ths of a slab.
+    pub(crate) place: u32,
+}
+
+/// The visible voxels of a volume, in the order of the lattice, plane by plane.
+pub(crate) fn records(placed: &Placed<'_>, lattice: &Lattice<'_>, voxels: &Voxels) -> Vec<Vec<Record>> {
+    let [nx, ny, nz] = lattice.dims;
+    let plane = |k: usize| {
+        let mut out = Vec::new();
+        for (j, eighth) in (0..ny).flat_map(|j| (0..nx.div_ceil(SEGMENT)).map(move |e| (j, e))) {
+            let mut bits = voxels.eight(eighth, j, k);
+            while bits != 0 {
+                let i = eighth * SEGMENT + bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                let p = placed.position(lattice.rim, [i, j, k]);
+                let value = crate::classify::relative(lattice.value(i, j, k), placed.base);
+                out.push(Record { at: [p.x as f32, p.y as f32], value, place: placed.place(p.z) });
+            }
+        }
+        out
+    };
+    (0..nz).into_par_iter().map(plane).collect()
+}
+
+/// The voxels of one volume for one image.
+#[derive(Debug)]
+pub(crate) struct Buckets {
+    records: Vec<Record>,
+    /// By first slab and band.
+    starts: Vec<u32>,
+    bands: usize,
+    /// Bands under the largest footprint, less one.
+    span: usize,
+    /// Slabs under a kernel.
+    touched: usize,
+}
+
+impl Buckets {
+    pub(crate) fn new(of: &[Vec<Record>], placed: &Placed<'_>, frame: &Frame, sight: &Sight, shape: &Shape) -> Self {
+        let [width, height] = sight.camera.size.map(|s| s as usize);
+        let (bands, touched) = (height.div_ceil(ROWS), placed.sections.touched);
+        let bucket = |record: &Record| {
+            let first = (record.place / PHASES).min(frame.slabs.count - 1);
+            let ends = [frame.slabs.face(first), frame.slabs.face(first + touched as u32)];
+            let [left, right, top, bottom] = sight.bounds(shape, record.at, ends);
+            let is_outside = right < 0.0 || left > width as f32 || bottom < 0.0 || top > height as f32;
+            // Saturating casts: what lies before the image is 0.
+            let band = |row: f32| (row as usize / ROWS).min(bands - 1);
+            (!is_outside).then(|| (first as usize * bands + band(top), band(bottom) - band(top)))
+        };
+        let plane = |records: &Vec<Record>| records.iter().map(bucket).collect::<Vec<_>>();
+        let buckets: Vec<Vec<Option<(usize, usize)>>> = of.par_iter().map(plane).collect();
+        // starts[b + 2] first counts, then starts[b + 1] is the running end of bucket b.
+        let mut starts = vec![0u32; frame.slabs.count as usize * bands + 2];
+        let mut most = 0;
+        for (bucket, span) in buckets.iter().flatten().flatten() {
+            starts[bucket + 2] += 1;
+            most = most.max(*span);
+        }
+        (2..starts.len()).for_each(|b| starts[b] += starts[b - 1]);
+        let mut records = vec![Record::default(); starts.last().map_or(0, |n| *n as usize)];
+        for (record, bucket) in of.iter().flatten().zip(buckets.iter().flatten()) {
+            if let Some((bucket, _)) = bucket {
+                let at = &mut starts[bucket + 1];
+                records[*at as usize] = *record;
+                *at += 1;
+            }
+        }
+        starts.pop();
+        Self { records, starts, bands, span: most, touched }
+    }
+
+    /// Voxels that may reach `band` in `slab`, or a rim of up to a band around it, run by run.
+    pub(crate) fn of(&self, slab: u32, band: usize, has_rim: bool) -> impl Iterator<Item = &[Record]> {
+        let (slab, rim) = (slab as usize, usize::from(has_rim));
+        (slab.saturating_sub(self.touched - 1)..=slab).map(move |first| {
+            let row = first * self.bands;
+            let from = row + band.saturating_sub(self.span + rim);
+            let to = row + (band + 1 + rim).min(self.bands);
+            &self.records[self.starts[from] as usize..self.starts[to] as usize]
+        })
+    }
+
+    /// Bytes of all lists.
+    pub(crate) fn bytes(&self) -> u64 {
+        (self.records.len() * size_of::<Record>() + 4 * self.starts.len()) as u64
+    }
+}

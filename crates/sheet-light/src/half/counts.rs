@@ -1,0 +1,38 @@
+//! What half-vector sheets took: work counted, so that it can be compared where times cannot.
+
+/// Work of one fold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct HalfCounts {
+    /// Voxels of all volumes.
+    pub voxels: u64,
+    /// Voxels that the transfer functions may show, or that shape those.
+    pub visible: u64,
+    /// Sweeps: one a light.
+    pub sweeps: u64,
+    /// Slabs of all sweeps, a few before and behind the volumes included.
+    pub slabs: u64,
+    /// Footprint numbers added to the eye's sheets, whole vectors.
+    pub eye_fragments: u64,
+    /// The same of the light's.
+    pub light_fragments: u64,
+    /// Bytes of the light buffer of one sweep, the largest; they do not grow with slabs.
+    pub light_bytes: u64,
+    /// Bytes of everything that one sweep holds, the largest.
+    pub bytes: u64,
+}
+
+impl HalfCounts {
+    /// Those of one sweep more over the same volumes.
+    pub(crate) fn join(self, other: Self) -> Self {
+        Self {
+            voxels: self.voxels.max(other.voxels),
+            visible: self.visible.max(other.visible),
+            sweeps: self.sweeps + other.sweeps,
+            slabs: self.slabs + other.slabs,
+            eye_fragments: self.eye_fragments + other.eye_fragments,
+            light_fragments: self.light_fragments + other.light_fragments,
+            light_bytes: self.light_bytes.max(other.light_bytes),
+            bytes: self.bytes.max(other.bytes),
+        }
+    }
+}

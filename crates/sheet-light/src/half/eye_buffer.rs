@@ -1,0 +1,187 @@
+//! The eye's image: what is composited so far in a band, front to back or back to front (step 20 of the pseudocode).
+//!
+//! Front to back: weight = T·(1 − e^(−τ)), T ← T − weight, C ← C + weight·L. Back to front: C ← (1 − e^(−τ))·L + e^(−τ)·C. Optical
+//! depth is summed with its rounding error kept (Kahan), whichever way, so alpha does not know the order.
+
+use super::band::Band;
+use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::pulp::Simd;
+use splat_core::shade::{ChannelLayout, MAX_CHANNELS};
+use splat_core::{Accumulator, DepthFragment, DepthProfile};
+
+/// What neighbouring pixels have of one slab.
+#[derive(Debug, Clone)]
+pub(crate) struct Fragments {
+    /// Optical depth by plane.
+    pub(crate) optical_depth: [[f32; MAX_LANES]; 3],
+    /// Radiance and the other channels.
+    pub(crate) values: [[f32; MAX_LANES]; MAX_CHANNELS],
+    pub(crate) object: [u32; MAX_LANES],
+}
+
+impl Fragments {
+    pub(crate) const NONE: Self = Self {
+        optical_depth: [[0.0; MAX_LANES]; 3],
+        values: [[0.0; MAX_LANES]; MAX_CHANNELS],
+        object: [u32::MAX; MAX_LANES],
+    };
+}
+
+/// The pixels of a band; planes as those of the band.
+#[derive(Debug, Clone)]
+pub(crate) struct Pixels {
+    pub(crate) planes: usize,
+    pub(crate) channels: usize,
+    optical_depth: Vec<Vec<f32>>,
+    /// What the sums of optical depth are too large by.
+    excess: Vec<Vec<f32>>,
+    transmittance: Vec<Vec<f32>>,
+    values: Vec<Vec<f32>>,
+    pub(crate) depth: Vec<DepthProfile>,
+    pub(crate) object: Vec<u32>,
+}
+
+impl Pixels {
+    /// Nothing seen yet, in the form of `of`.
+    pub(crate) fn new(band: &Band, of: &Accumulator) -> Self {
+        let (n, planes, channels) = (band.stored * band.stride, of.optical_depth.len(), of.channels.len());
+        let plane = |fill: f32| vec![fill; n];
+        let has = |kept: bool| if kept { n } else { 0 };
+        Self {
+            planes,
+            channels,
+            optical_depth: vec![plane(0.0); planes],
+            excess: vec![plane(0.0); planes],
+            transmittance: vec![plane(1.0); planes],
+            values: vec![plane(0.0); channels],
+            depth: vec![DepthProfile::default(); has(!of.depth.is_empty())],
+            object: vec![u32::MAX; has(!of.object.is_empty())],
+        }
+    }
+
+    /// Bytes of the planes.
+    pub(crate) fn bytes(&self) -> u64 {
+        let floats: usize = self.optical_depth.iter().map(|p| 3 * p.len()).sum::<usize>()
+            + self.values.iter().map(Vec::len).sum::<usize>();
+        (4 * floats + self.depth.len() * size_of::<DepthProfile>() + 4 * self.object.len()) as u64
+    }
+
+    /// The greatest transmittance of the pixels from `k` on.
+    #[inline(always)]
+    pub(crate) fn most<S: Simd>(&self, simd: S, k: usize) -> Lanes<S> {
+        let mut most = Lanes::load(simd, &self.transmittance[0][k..]);
+        for plane in &self.transmittance[1..] {
+            most = most.max(Lanes::load(simd, &plane[k..]));
+        }
+        most
+    }
+
+    /// Whether nothing is seen through pixel `k` any more.
+    #[inline]
+    pub(crate) fn is_done(&self, k: usize, cutoff: f32) -> bool {
+        self.transmittance.iter().all(|plane| plane[k] < cutoff)
+    }
+
+    /// Optical depth so far, green.
+    #[inline(always)]
+    pub(crate) fn so_far<S: Simd>(&self, simd: S, k: usize) -> Lanes<S> {
+        Lanes::load(simd, &self.optical_depth[self.planes / 2][k..])
+    }
+
+    /// Puts a slab behind what is there.
+    #[inline(always)]
+    pub(crate) fn append<S: Simd>(&mut self, simd: S, k: usize, of: &Fragments) {
+        let mut weights = [Lanes::splat(simd, 0.0); 3];
+        for p in 0..self.planes {
+            let through = Lanes::load(simd, &self.transmittance[p][k..]);
+            let opacity = Lanes::load(simd, &of.optical_depth[p]).opacity();
+            weights[p] = through * opacity;
+            opacity.negate_mul_add(through, through).store(&mut self.transmittance[p][k..]);
+            self.sum(simd, p, k, of);
+        }
+        for c in 0..self.channels {
+            let weight = weights[ChannelLayout::plane_of(c, self.channels, self.planes)];
+            let sum = &mut self.values[c][k..];
+            weight.mul_add(Lanes::load(simd, &of.values[c]), Lanes::load(simd, sum)).store(sum);
+        }
+        self.add_objects(simd, k, of, false);
+    }
+
+    /// Puts a slab before what is there.
+    #[inline(always)]
+    pub(crate) fn prepend<S: Simd>(&mut self, simd: S, k: usize, of: &Fragments) {
+        let mut weights = [Lanes::splat(simd, 0.0); 3];
+        for p in 0..self.planes {
+            weights[p] = Lanes::load(simd, &of.optical_depth[p]).opacity();
+            self.sum(simd, p, k, of);
+        }
+        for c in 0..self.channels {
+            let weight = weights[ChannelLayout::plane_of(c, self.channels, self.planes)];
+            let sum = &mut self.values[c][k..];
+            let behind = Lanes::load(simd, sum);
+            (Lanes::load(simd, &of.values[c]) - behind).mul_add(weight, behind).store(sum);
+        }
+        self.add_objects(simd, k, of, true);
+    }
+
+    /// Adds to the optical depth of plane `p`.
+    #[inline(always)]
+    fn sum<S: Simd>(&mut self, simd: S, p: usize, k: usize, of: &Fragments) {
+        let sum = Lanes::load(simd, &self.optical_depth[p][k..]);
+        let term = Lanes::load(simd, &of.optical_depth[p]) - Lanes::load(simd, &self.excess[p][k..]);
+        let new = sum + term;
+        ((new - sum) - term).store(&mut self.excess[p][k..]);
+        new.store(&mut self.optical_depth[p][k..]);
+    }
+
+    #[inline(always)]
+    fn add_objects<S: Simd>(&mut self, _: S, k: usize, of: &Fragments, is_before: bool) {
+        if self.object.is_empty() {
+            return;
+        }
+        for lane in 0..Lanes::<S>::COUNT {
+            let object = &mut self.object[k + lane];
+            if of.optical_depth[self.planes / 2][lane] > 0.0 && (is_before || *object == u32::MAX) {
+                *object = of.object[lane];
+            }
+        }
+    }
+
+    /// Adds to the depths of pixel `k` a medium between two view depths, before which lies the optical depth `before`.
+    pub(crate) fn add_depth(&mut self, k: usize, [near, far]: [f64; 2], before: f32, own: f32) {
+        if let Some(depth) = self.depth.get_mut(k).filter(|_| own > 0.0) {
+            let (middle, thickness) = ((0.5 * (near + far)) as f32, (far - near) as f32);
+            depth.add(&DepthFragment { depth: middle, thickness, narrow: 1.0, before, after: before + own });
+        }
+    }
+
+    /// Writes the band's own rows.
+    pub(crate) fn store(&self, band: &Band, to: &mut Accumulator) {
+        let width = band.width;
+        for row in band.rows.clone() {
+            let (image, from) = (row * width..(row + 1) * width, (row - band.top) * band.stride);
+            let own = from..from + width;
+            let floats = to.optical_depth.iter_mut().zip(&self.optical_depth);
+            for (to, from) in floats.chain(to.channels.iter_mut().zip(&self.values)) {
+                to[image.clone()].copy_from_slice(&from[own.clone()]);
+            }
+            if !self.depth.is_empty() {
+                to.depth[image.clone()].copy_from_slice(&self.depth[own.clone()]);
+            }
+            if !self.object.is_empty() {
+                to.object[image].copy_from_slice(&self.object[own]);
+            }
+        }
+    }
+
+    /// Adds the first channels of the band's own rows.
+    pub(crate) fn add_colors(&self, band: &Band, colors: usize, to: &mut Accumulator) {
+        for row in band.rows.clone() {
+            let from = (row - band.top) * band.stride;
+            for (to, own) in to.channels.iter_mut().zip(&self.values).take(colors) {
+                let to = &mut to[row * band.width..][..band.width];
+                to.iter_mut().zip(&own[from..]).for_each(|(to, own)| *to += own);
+            }
+        }
+    }
+}

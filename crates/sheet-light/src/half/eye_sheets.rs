@@ -1,0 +1,317 @@
+//! The eye's sheets: a slab in a band of the eye's image, reconstructed, classified, lit (steps 10 to 19 of the pseudocode).
+
+use super::band::Band;
+use super::eye_buffer::{Fragments, Pixels};
+use super::illuminate::{Asked, Illumination};
+use super::light_path::Places;
+use super::shade::Lit;
+use super::sheet::{Sheet, Splatter, is_any};
+use super::sweep::Sweep;
+use crate::Volume;
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::pulp::{self, Simd};
+use splat_core::shade::{ChannelLayout, MAX_CHANNELS};
+
+/// Sheets kept of a volume whose gradients are asked for: the present one and its neighbours.
+const KEPT: u32 = 3;
+
+/// Slabs after which pixels that are done are looked for.
+const CLOSING: u32 = 8;
+
+/// A band of the eye's image.
+#[derive(Debug, Clone)]
+pub(crate) struct EyeBand {
+    pub(crate) band: Band,
+    /// By volume, the last slabs.
+    pub(crate) sheets: Vec<Vec<Sheet>>,
+    pub(crate) pixels: Pixels,
+    /// Extinction of the pixels that are being lit, by volume.
+    extinction: Vec<[f32; MAX_LANES]>,
+}
+
+/// What a band does with a slab.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Step {
+    /// Reconstructs, lights and composites.
+    Draw,
+    /// Reconstructs, and adds to depths alone.
+    Depths,
+}
+
+/// One band's work on one slab, in the form that [`pulp`] compiles once per instruction set.
+pub(crate) struct OneSlab<'a> {
+    pub(crate) of: &'a Sweep<'a>,
+    pub(crate) layout: &'a ChannelLayout,
+    pub(crate) index: usize,
+    pub(crate) slab: u32,
+    pub(crate) step: Step,
+    pub(crate) eye: &'a mut EyeBand,
+}
+
+/// Neighbouring pixels being lit.
+struct Chunk {
+    /// In the image.
+    x: usize,
+    y: usize,
+    /// In the planes of the band.
+    k: usize,
+}
+
+impl EyeBand {
+    pub(crate) fn new(band: Band, volumes: &[Volume<'_>], pixels: Pixels) -> Self {
+        let kept = |v: &Volume<'_>| if v.normals { KEPT } else { 1 };
+        let sheets = volumes.iter().map(|v| (0..kept(v)).map(|_| Sheet::new(&band)).collect()).collect();
+        Self { band, sheets, pixels, extinction: vec![[0.0; MAX_LANES]; volumes.len()] }
+    }
+
+    /// Bytes of all planes.
+    pub(crate) fn bytes(&self) -> u64 {
+        let sheets: u64 = self.sheets.iter().flatten().map(Sheet::bytes).sum();
+        self.band.bytes() + sheets + self.pixels.bytes()
+    }
+
+    /// Ends the rays of pixels that are done.
+    fn close(&mut self, cutoff: f32) {
+        let Self { band, pixels, .. } = self;
+        for y in 0..band.stored {
+            for k in y * band.stride..y * band.stride + band.width {
+                if pixels.is_done(k, cutoff) {
+                    band.crossings.iter_mut().for_each(|[_, far]| far[k] = f32::NEG_INFINITY);
+                }
+            }
+        }
+        band.find_hits();
+    }
+
+    fn sheet(&self, volume: usize, slab: u32) -> &Sheet {
+        let sheets = &self.sheets[volume];
+        &sheets[slab as usize % sheets.len()]
+    }
+}
+
+impl pulp::WithSimd for OneSlab<'_> {
+    /// Footprint numbers.
+    type Output = u64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) -> u64 {
+        let mut fragments = 0;
+        // What gradients are taken from is wanted beside pixels that are done.
+        let may_close = self.of.cutoff > 0.0 && !self.of.volumes.iter().any(|v| v.normals);
+        if may_close && !self.of.frame.back_to_front && self.slab.is_multiple_of(CLOSING) {
+            self.eye.close(self.of.cutoff);
+        }
+        for v in 0..self.of.placed.len() {
+            // Gradients need the sheet behind; the first one is made with it.
+            let is_ahead = self.of.volumes[v].normals && self.step == Step::Draw;
+            if !is_ahead || self.slab == 0 {
+                fragments += self.reconstruct(simd, v, self.slab);
+            }
+            if is_ahead && self.slab + 1 < self.of.frame.slabs.count {
+                fragments += self.reconstruct(simd, v, self.slab + 1);
+            }
+        }
+        let (top, own) = (self.eye.band.top, self.eye.band.rows.clone());
+        for y in own.start - top..own.end - top {
+            let spans = || (0..self.of.placed.len()).map(|v| &self.eye.sheet(v, self.slab).spans[y]);
+            let inside = || spans().filter(|span| !span.is_empty());
+            let (Some(first), Some(last)) = (inside().map(|s| s.start).min(), inside().map(|s| s.end).max()) else {
+                continue;
+            };
+            for x in (first..last).step_by(Lanes::<S>::COUNT) {
+                let k = y * self.eye.band.stride + x;
+                self.draw(simd, &Chunk { x, y: top + y, k });
+            }
+        }
+        fragments
+    }
+}
+
+impl OneSlab<'_> {
+    #[inline(always)]
+    fn reconstruct<S: Simd>(&mut self, simd: S, v: usize, slab: u32) -> u64 {
+        let Sweep { frame, placed, sight, shapes, buckets, .. } = self.of;
+        let EyeBand { band, sheets, .. } = &mut *self.eye;
+        let kept = sheets[v].len();
+        let sheet = &mut sheets[v][slab as usize % kept];
+        sheet.begin(simd, band, v, [frame.slabs.face(slab), frame.slabs.face(slab + 1)]);
+        let splatter = Splatter { placed: &placed[v], sight, shape: &shapes[v], buckets: &buckets[v] };
+        let fragments = sheet.splat(simd, &splatter, band, self.index, slab);
+        sheet.finish(simd, band.stride);
+        fragments
+    }
+
+    /// Lights and composites neighbouring pixels.
+    #[inline(always)]
+    fn draw<S: Simd>(&mut self, simd: S, chunk: &Chunk) {
+        let (k, of) = (chunk.k, |v: f32| Lanes::splat(simd, v));
+        let planes = self.eye.pixels.planes;
+        let closed = of(1.0).where_less_or(self.eye.pixels.most(simd, k), of(self.of.cutoff), of(0.0));
+        let stretch = Lanes::load(simd, &self.eye.band.stretch[k..]);
+        let mut all = [of(0.0); 3];
+        let (mut near, mut far) = (of(f32::INFINITY), of(f32::NEG_INFINITY));
+        for v in 0..self.of.placed.len() {
+            let Some([extinction, length]) = self.extinction(simd, v, k) else {
+                self.eye.extinction[v] = [0.0; MAX_LANES];
+                continue;
+            };
+            let tau = of(0.0).where_less_or(of(0.5), closed, extinction * length * stretch);
+            extinction.store(&mut self.eye.extinction[v]);
+            for p in 0..planes {
+                all[p] = tau.mul_add(of(self.of.volumes[v].material.extinction_rgb[p]), all[p]);
+            }
+            let sheet = self.eye.sheet(v, self.slab);
+            let (from, to) = (Lanes::load(simd, &sheet.near[k..]), Lanes::load(simd, &sheet.far[k..]));
+            near = near.min(from.where_less_or(of(0.0), tau, near));
+            far = far.max(to.where_less_or(of(0.0), tau, far));
+        }
+        let most = all[0].max(all[1]).max(all[2]);
+        if !is_any(most) {
+            return;
+        }
+        let mut fragments = Fragments::NONE;
+        for p in 0..planes {
+            all[p].store(&mut fragments.optical_depth[p]);
+        }
+        // Lanes without any are of no meaning, but are numbers.
+        let (near, far) = (near.where_less(of(0.0), most), far.where_less(of(0.0), most));
+        if self.step == Step::Draw {
+            self.light(simd, chunk, [near, far], most, &mut fragments);
+        }
+        self.composite(simd, chunk, [near, far], &fragments);
+    }
+
+    /// Extinction of a volume, and the depth that it has; `None` where it has no sheet.
+    #[inline(always)]
+    fn extinction<S: Simd>(&self, simd: S, v: usize, k: usize) -> Option<[Lanes<S>; 2]> {
+        let (sheet, stride) = (self.eye.sheet(v, self.slab), self.eye.band.stride);
+        // No closure: what is vectorised must be inlined.
+        if !sheet.spans[k / stride].contains(&(k % stride)) {
+            return None;
+        }
+        let [extinction, ..] = sheet.classify(simd, &self.of.placed[v], k);
+        Some([extinction, sheet.depth(simd, k)])
+    }
+
+    /// Slab coordinates of rays at a depth.
+    #[inline(always)]
+    fn places<S: Simd>(&self, simd: S, k: usize, depth: Lanes<S>) -> Places<S> {
+        let band = &self.eye.band;
+        let mut out = [depth; 3];
+        for a in 0..2 {
+            let slope = Lanes::load(simd, &band.slope[a][k..]);
+            out[a] = slope.mul_add(depth, Lanes::load(simd, &band.place[a][k..]));
+        }
+        out
+    }
+
+    /// Radiance of the pixels that have optical depth.
+    #[inline(always)]
+    fn light<S: Simd>(&self, simd: S, chunk: &Chunk, [near, far]: [Lanes<S>; 2], most: Lanes<S>, out: &mut Fragments) {
+        let of = self.of;
+        let mut wanted = [0.0; MAX_LANES];
+        most.store(&mut wanted);
+        let planes = self.eye.pixels.planes;
+        let ends = if of.frame.back_to_front { [far, near] } else { [near, far] };
+        let mut arrives = [[1.0; MAX_LANES]; 3];
+        if let Some(buffer) = &of.light_buffer {
+            let [nearer, farther] = ends;
+            let asked = Asked {
+                ends: [self.places(simd, chunk.k, nearer), self.places(simd, chunk.k, farther)],
+                extinction: &self.eye.extinction,
+                optical_depth: &out.optical_depth,
+            };
+            let illumination =
+                Illumination { buffer, paths: &of.paths, volumes: of.volumes, face: of.frame.slabs.face(self.slab) };
+            arrives = illumination.transmittance(simd, &asked, &wanted, planes);
+        }
+        let middle = (near + far) * Lanes::splat(simd, 0.5);
+        let mut places = [[0.0; MAX_LANES]; 3];
+        let at = self.places(simd, chunk.k, middle);
+        for a in 0..3 {
+            at[a].store(&mut places[a]);
+        }
+        let stretch = Lanes::load(simd, &self.eye.band.stretch[chunk.k..]);
+        let mut so_far = [[0.0; MAX_LANES]; 3];
+        for (v, volume) in of.volumes.iter().enumerate() {
+            let Some([extinction, depth]) = self.extinction(simd, v, chunk.k) else { continue };
+            let mut tau = [0.0; MAX_LANES];
+            (extinction * depth * stretch).store(&mut tau);
+            let [_, red, green, blue] = self.eye.sheet(v, self.slab).classify(simd, &of.placed[v], chunk.k);
+            let mut color = [[0.0; MAX_LANES]; 3];
+            red.store(&mut color[0]);
+            green.store(&mut color[1]);
+            blue.store(&mut color[2]);
+            let normals = self.normals(simd, v, chunk);
+            for lane in 0..Lanes::<S>::COUNT {
+                if wanted[lane] > 0.0 && tau[lane] > 0.0 {
+                    let share = [0, 1, 2].map(|p| {
+                        let own = tau[lane] * volume.material.extinction_rgb[p];
+                        so_far[p][lane] += own;
+                        own / so_far[p][lane].max(f32::MIN_POSITIVE)
+                    });
+                    let at = DVec3::new(places[0][lane].into(), places[1][lane].into(), places[2][lane].into());
+                    let lit = Lit {
+                        volume,
+                        radius: of.placed[v].reach as f32,
+                        color: color.map(|c| c[lane]),
+                        normal: normals[lane],
+                        arrives: [0, 1, 2].map(|c| arrives[if planes == 3 { c } else { 0 }][lane]),
+                    };
+                    self.mix(&lit, [chunk.x + lane, chunk.y], at, share, (lane, out));
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn normals<S: Simd>(&self, simd: S, v: usize, chunk: &Chunk) -> [Vec3; MAX_LANES] {
+        if !self.of.volumes[v].normals {
+            return [Vec3::ZERO; MAX_LANES];
+        }
+        let slabs = [self.slab.max(1) - 1, self.slab, (self.slab + 1).min(self.of.frame.slabs.count - 1)];
+        let sheets = slabs.map(|slab| self.eye.sheet(v, slab));
+        self.of.gradients.normals(simd, sheets, self.eye.band.stride, chunk.k)
+    }
+
+    /// Mixes the radiance of one point of a volume, with its share of the optical depth so far, into a lane of the fragments.
+    fn mix(&self, lit: &Lit<'_>, pixel: [usize; 2], at: DVec3, share: [f32; 3], (lane, out): (usize, &mut Fragments)) {
+        let mut values = [0.0; MAX_CHANNELS];
+        lit.radiance(self.of, pixel, at).write(lit.normal, self.layout, &mut values);
+        let (count, planes) = (self.layout.count(), self.eye.pixels.planes);
+        for c in 0..count {
+            let sum = &mut out.values[c][lane];
+            *sum += (values[c] - *sum) * share[ChannelLayout::plane_of(c, count, planes)];
+        }
+        // That of the first volume with any.
+        if share[planes / 2] >= 1.0 {
+            out.object[lane] = lit.volume.object;
+        }
+    }
+
+    #[inline(always)]
+    fn composite<S: Simd>(&mut self, simd: S, chunk: &Chunk, [near, far]: [Lanes<S>; 2], fragments: &Fragments) {
+        let (of, eye) = (self.of, &mut *self.eye);
+        let mut before = [0.0; MAX_LANES];
+        eye.pixels.so_far(simd, chunk.k).store(&mut before);
+        match (of.frame.back_to_front, self.step) {
+            (true, Step::Draw) => eye.pixels.prepend(simd, chunk.k, fragments),
+            _ => eye.pixels.append(simd, chunk.k, fragments),
+        }
+        if eye.pixels.depth.is_empty() || (of.frame.back_to_front && self.step == Step::Draw) {
+            return;
+        }
+        let mut ends = [[0.0; MAX_LANES]; 2];
+        near.store(&mut ends[0]);
+        far.store(&mut ends[1]);
+        let green = eye.pixels.planes / 2;
+        for lane in 0..Lanes::<S>::COUNT.min(eye.band.width.saturating_sub(chunk.x)) {
+            let own = fragments.optical_depth[green][lane];
+            if own > 0.0 {
+                let [one, other] = ends.map(|end| of.view_depth([chunk.x + lane, chunk.y], end[lane]));
+                eye.pixels.add_depth(chunk.k + lane, [one.min(other), one.max(other)], before[lane], own);
+            }
+        }
+    }
+}

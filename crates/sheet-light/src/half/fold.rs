@@ -1,0 +1,102 @@
+//! Half-vector sheets of some volumes under any number of lights: a sweep a light, one after the other.
+
+use super::band::ROWS;
+use super::counts::HalfCounts;
+use super::serves::serves;
+use super::sweep::Sweep;
+use super::{HalfInput, HalfParams};
+use crate::Error;
+use crate::lattice::Lattice;
+use crate::visible::Voxels;
+use splat_core::shade::{ChannelLayout, LitBy};
+use splat_core::{Accumulator, Progress};
+
+/// Draws all volumes in slabs across the half vector of each light, with the shadows that they cast on themselves and each other.
+/// `into` becomes a segment of its own, of all depths: what it held is gone, its planes and channels say what is kept, and the
+/// caller appends it behind what lies before. One tick a slab.
+///
+/// Each light is a sweep; their images add, and optical depth, depths, objects, normals and the share of shadow come from one. Sweeps
+/// are in an order of the lights' own, so the order of the input changes no bit. Without lights, or where no material asks for
+/// any, there is one sweep along the view.
+///
+/// # Errors
+/// [`Error::Parameter`], [`Error::Volume`], [`Error::Light`], [`Error::HalfVector`] for a light that half vectors cannot serve,
+/// [`Error::Limit`] before much is taken, or [`Error::Cancelled`]: then `into` is of no use as a picture.
+///
+/// # Panics
+/// If the sizes of the camera's image, `into` and the opaque depths disagree, or `into` has other channels than `layout`.
+pub fn fold(
+    input: &HalfInput<'_>,
+    params: &HalfParams,
+    layout: &ChannelLayout,
+    into: &mut Accumulator,
+    progress: Option<&Progress>,
+) -> Result<HalfCounts, Error> {
+    check(input, params)?;
+    let size = input.sheets.camera.size;
+    assert_eq!(size, into.size, "invariant: one image size");
+    assert_eq!(layout.count(), into.channels.len(), "invariant: one set of channels");
+    let pixels = size[0] as usize * size[1] as usize;
+    assert!(input.opaque.is_empty() || input.opaque.len() == pixels, "invariant: an opaque depth for each pixel");
+    let has = |kept: usize| kept > 0;
+    let (planes, depth, object) = (into.optical_depth.len(), has(into.depth.len()), has(into.object.len()));
+    *into = Accumulator::new(size, planes, layout.count(), depth, object);
+    if input.sheets.volumes.is_empty() {
+        return Ok(HalfCounts::default());
+    }
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
+    let mut lights: Vec<&LitBy<'_>> = input.sheets.lights.iter().collect();
+    lights.sort_by_key(|lit| lit.light.bits());
+    let first = Sweep::new(input, params, lights.first().copied(), false)?;
+    let is_lit = first.light.is_some();
+    progress.add_total(u64::from(first.frame.slabs.count));
+    let (bands, mut counts) = first.run(layout, into, progress)?;
+    bands.iter().for_each(|b| b.pixels.store(&b.band, into));
+    for light in lights.into_iter().skip(1).filter(|_| is_lit) {
+        let next = Sweep::new(input, params, Some(light), true)?;
+        progress.add_total(u64::from(next.frame.slabs.count));
+        let form = Accumulator { depth: Vec::new(), object: Vec::new(), ..into.clone() };
+        let (bands, more) = next.run(layout, &form, progress)?;
+        counts = counts.join(more);
+        bands.iter().for_each(|b| b.pixels.add_colors(&b.band, layout.colors(), into));
+    }
+    Ok(counts)
+}
+
+fn check(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
+    params.check()?;
+    input.sheets.check()?;
+    if let Some(splats) = &input.sheets.splats {
+        let found = format!("{} splats", splats.order.len());
+        return Err(Error::parameter("sheets.splats", found, "none: half-vector sheets are of volumes alone"));
+    }
+    for (light, lit) in input.sheets.lights.iter().enumerate() {
+        lit.light.validate(light).map_err(Error::Light)?;
+        serves(&input.sheets.volumes, input.sheets.camera, &lit.light)
+            .map_err(|reason| Error::HalfVector { light, reason })?;
+    }
+    check_memory(input, params)
+}
+
+/// Counts what one sweep will take before it does.
+fn check_memory(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
+    let volumes = &input.sheets.volumes;
+    let most = u64::from(params.most_light_pixels);
+    // Of a pixel: rays, sheets, sums; the light's square is an upper bound.
+    let of_a_pixel = 4 * (5 + 12 * volumes.len() as u64);
+    let [width, height] = input.sheets.camera.size.map(u64::from);
+    let sheets = if volumes.iter().any(|v| v.normals) { 3 } else { 1 };
+    let eye =
+        width * height * (of_a_pixel + 4 * 6 * sheets * volumes.len() as u64 + 160) * (ROWS as u64 + 2) / ROWS as u64;
+    let voxels = |v: &crate::Volume<'_>| {
+        let dims = Lattice::new(v.grid, [usize::MAX; 3]).dims;
+        // A record once in the order of the lattice and once for each image, with its bucket.
+        Voxels::bytes(dims) + dims.iter().map(|n| *n as u64).product::<u64>() * (3 * 16 + 24)
+    };
+    let lights = if input.sheets.lights.is_empty() { 0 } else { most * most * of_a_pixel };
+    let needed = eye + lights + volumes.iter().map(voxels).sum::<u64>();
+    let limit = params.sheets.limits.max_bytes;
+    let hint = || "use fewer voxels, a smaller picture or fewer pixels of the light buffer".to_owned();
+    if needed > limit { Err(Error::limit("half-vector sheets", needed, limit, "bytes", hint())) } else { Ok(()) }
+}

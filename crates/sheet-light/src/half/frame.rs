@@ -1,0 +1,104 @@
+//! Slab coordinates: two along the slabs, the third across them, counted from the first slab the way that light travels.
+//!
+//! They are taken from the middle of all volumes, subtracted in f64, so that single precision suffices wherever the scene lies.
+
+use super::axis::HalfVector;
+use crate::slabs::Slabs;
+use crate::viewed::spacing_along;
+use crate::{Error, Params, Volume};
+use splat_core::Camera;
+use splat_core::glam::{DMat3, DVec3};
+
+/// The coordinates of one sweep.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Frame {
+    center: DVec3,
+    /// Rows: two unit vectors along the slabs, one across.
+    pub(crate) axes: [DVec3; 3],
+    pub(crate) slabs: Slabs,
+    /// Whether the eye meets the last slab first.
+    pub(crate) back_to_front: bool,
+}
+
+/// A ray in slab coordinates: `from` + `along`·z, z the depth in its image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Ray {
+    pub(crate) from: DVec3,
+    pub(crate) along: DVec3,
+}
+
+/// World positions of the corners of a volume.
+pub(crate) fn world_corners(volume: &Volume<'_>) -> [DVec3; 8] {
+    let (dims, origin, axes) = (volume.grid.dims, volume.origin(), volume.axes());
+    std::array::from_fn(|c| {
+        let at = [0, 1, 2].map(|a| if c >> a & 1 == 1 { dims[a] as f64 - 0.5 } else { -0.5 });
+        origin + axes * DVec3::from_array(at)
+    })
+}
+
+/// Middle of the bounds of all volumes, of which there is at least one.
+pub(crate) fn middle(volumes: &[Volume<'_>]) -> DVec3 {
+    let all = || volumes.iter().flat_map(world_corners);
+    let low = all().fold(DVec3::INFINITY, DVec3::min);
+    low + 0.5 * (all().fold(DVec3::NEG_INFINITY, DVec3::max) - low)
+}
+
+impl Frame {
+    /// Slabs across `axis` that hold all volumes.
+    pub(crate) fn new(
+        volumes: &[Volume<'_>],
+        camera: &Camera,
+        params: &Params,
+        axis: &HalfVector,
+    ) -> Result<Self, Error> {
+        let across = axis.normal;
+        // Rows of pixels lie along the slabs as well as they can.
+        let [right, up, _] = camera.axes;
+        let along = if right.dot(across).abs() <= up.dot(across).abs() { right } else { up };
+        let first = (along - across * along.dot(across)).normalize();
+        let axes = [first, across.cross(first), across];
+        let nowhere = Slabs { origin: 0.0, width: 1.0, count: 0 };
+        let mut frame = Self { center: middle(volumes), axes, slabs: nowhere, back_to_front: axis.back_to_front };
+        let (mut near, mut far, mut spacing, mut reach) = (f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, 0.0f64);
+        for volume in volumes {
+            let along = spacing_along(&frame.steps(volume));
+            (spacing, reach) = (spacing.min(along), reach.max(along * params.kernel.extent));
+            for corner in world_corners(volume) {
+                let depth = frame.point(corner).z;
+                (near, far) = (near.min(depth), far.max(depth));
+            }
+        }
+        frame.slabs = Slabs::new(near, far, params.slab_width.unwrap_or(spacing), reach)?;
+        Ok(frame)
+    }
+
+    /// Slab coordinates of a world direction.
+    pub(crate) fn direction(&self, world: DVec3) -> DVec3 {
+        DVec3::new(self.axes[0].dot(world), self.axes[1].dot(world), self.axes[2].dot(world))
+    }
+
+    /// Slab coordinates of a world position.
+    pub(crate) fn point(&self, world: DVec3) -> DVec3 {
+        let mut point = self.direction(world - self.center);
+        point.z -= self.slabs.origin;
+        point
+    }
+
+    /// World position of slab coordinates.
+    pub(crate) fn world(&self, p: DVec3) -> DVec3 {
+        let [a, b, across] = self.axes;
+        self.center + a * p.x + b * p.y + across * (p.z + self.slabs.origin)
+    }
+
+    /// Steps of a lattice in slab coordinates.
+    pub(crate) fn steps(&self, volume: &Volume<'_>) -> DMat3 {
+        DMat3::from_cols(self.axes[0], self.axes[1], self.axes[2]).transpose() * volume.axes()
+    }
+
+    /// The ray through a place of an image, pixels.
+    pub(crate) fn ray(&self, camera: &Camera, x_px: f64, y_px: f64) -> Ray {
+        let (from, along) = camera.view_ray(x_px, y_px);
+        let world = |v: DVec3| camera.axes[0] * v.x + camera.axes[1] * v.y + camera.axes[2] * v.z;
+        Ray { from: self.point(camera.position + world(from)), along: self.direction(world(along)) }
+    }
+}

@@ -1,0 +1,183 @@
+//! The light buffer: what lies between the light and the present slab, in the light's own image.
+//!
+//! A pixel holds Στ of the slabs so far and the length Σl of its ray in the volume so far, both with their rounding errors kept
+//! (Kahan), so slabs by the hundred thousand cost no digits. Two numbers rather than one, because their quotient, the mean
+//! extinction on the way, interpolates: where light enters through a face that lies slanted to the slabs, τ has a kink at which
+//! neighbours mislead, while the length on the way to any place is known in closed form.
+
+use super::band::{Band, ROWS};
+use super::buckets::Buckets;
+use super::frame::Frame;
+use super::placed::Placed;
+use super::sheet::{Sheet, Splatter};
+use super::sight::{Shape, Sight};
+use crate::Volume;
+use rayon::prelude::*;
+use splat_core::Camera;
+use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::pulp::{self, Simd};
+
+/// Optical depth and length so far, then what these sums are too large by.
+type Sums = [f32; 4];
+
+/// The buffer of one light.
+pub(crate) struct LightBuffer {
+    pub(crate) sight: Sight,
+    shapes: Vec<Shape>,
+    buckets: Vec<Buckets>,
+    bands: Vec<LightBand>,
+    /// Row by row, volume by volume in a pixel.
+    sums: Vec<Sums>,
+    volumes: usize,
+}
+
+struct LightBand {
+    band: Band,
+    /// One sheet serves all volumes, one after the other.
+    sheet: Sheet,
+}
+
+impl LightBuffer {
+    pub(crate) fn new(frame: &Frame, camera: Camera, volumes: &[Volume<'_>], placed: &[Placed<'_>]) -> Self {
+        let sight = Sight::new(frame, camera);
+        let [width, height] = camera.size.map(|s| s as usize);
+        let band = |b: usize| {
+            let band = Band::new(b, 0, frame, &camera, volumes);
+            let sheet = Sheet::new(&band);
+            LightBand { band, sheet }
+        };
+        Self {
+            sight,
+            shapes: placed.iter().map(|p| sight.shape(frame, p)).collect(),
+            buckets: Vec::new(),
+            bands: (0..height.div_ceil(ROWS)).into_par_iter().map(band).collect(),
+            sums: vec![[0.0; 4]; width * height * volumes.len()],
+            volumes: volumes.len(),
+        }
+    }
+
+    /// Extents of the footprints along the slabs, by volume.
+    pub(crate) fn shape(&self, volume: usize) -> &Shape {
+        &self.shapes[volume]
+    }
+
+    /// Takes the voxels of the next volume.
+    pub(crate) fn push(&mut self, buckets: Buckets) {
+        self.buckets.push(buckets);
+    }
+
+    /// Bytes of the buffer itself, without lists of voxels.
+    pub(crate) fn bytes(&self) -> u64 {
+        let bands: u64 = self.bands.iter().map(|b| b.band.bytes() + b.sheet.bytes()).sum();
+        bands + (self.sums.len() * size_of::<Sums>()) as u64
+    }
+
+    /// Bytes of lists of voxels.
+    pub(crate) fn list_bytes(&self) -> u64 {
+        self.buckets.iter().map(Buckets::bytes).sum()
+    }
+
+    /// Reconstructs a slab in the light's image and attenuates by it (steps 11, 14 and 21 of the pseudocode). Number of footprint
+    /// numbers.
+    pub(crate) fn attenuate(&mut self, slab: u32, frame: &Frame, placed: &[Placed<'_>]) -> u64 {
+        let Self { sight, shapes, buckets, bands, sums, volumes } = self;
+        let row = sight.camera.size[0] as usize * *volumes;
+        let chunks = sums.par_chunks_mut(row * ROWS);
+        let of = Attenuate { slab, frame, placed, sight, shapes, buckets };
+        let band = |(index, (band, sums)): (usize, (&mut LightBand, &mut [Sums]))| {
+            pulp::Arch::new().dispatch(OneBand { of: &of, index, band, sums })
+        };
+        bands.par_iter_mut().zip(chunks).enumerate().map(band).sum()
+    }
+
+    /// Optical depth and length so far about a place of the image, pixels, bilinear; neighbours at a border are those inside.
+    #[inline]
+    pub(crate) fn at(&self, volume: usize, [x, y]: [f32; 2]) -> [f32; 2] {
+        let [width, height] = self.sight.camera.size.map(|s| s as usize);
+        let split = |v: f32, n: usize| {
+            let v = (v - 0.5).clamp(0.0, (n - 1) as f32);
+            let low = (v as usize).min(n.saturating_sub(2));
+            (low, (low + 1).min(n - 1), v - low as f32)
+        };
+        let ((x0, x1, u), (y0, y1, v)) = (split(x, width), split(y, height));
+        let sum = |x: usize, y: usize| &self.sums[(y * width + x) * self.volumes + volume];
+        let (a, b, c, d) = (sum(x0, y0), sum(x1, y0), sum(x0, y1), sum(x1, y1));
+        [0, 1].map(|n| {
+            let (upper, lower) = (a[n] + (b[n] - a[n]) * u, c[n] + (d[n] - c[n]) * u);
+            upper + (lower - upper) * v
+        })
+    }
+}
+
+/// What all bands of a slab share.
+struct Attenuate<'a> {
+    slab: u32,
+    frame: &'a Frame,
+    placed: &'a [Placed<'a>],
+    sight: &'a Sight,
+    shapes: &'a [Shape],
+    buckets: &'a [Buckets],
+}
+
+/// One band's work, in the form that [`pulp`] compiles once per instruction set.
+struct OneBand<'a> {
+    of: &'a Attenuate<'a>,
+    index: usize,
+    band: &'a mut LightBand,
+    sums: &'a mut [Sums],
+}
+
+impl pulp::WithSimd for OneBand<'_> {
+    type Output = u64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> u64 {
+        let Attenuate { slab, frame, placed, sight, shapes, buckets } = *self.of;
+        let LightBand { band, sheet } = self.band;
+        let faces = [frame.slabs.face(slab), frame.slabs.face(slab + 1)];
+        let mut fragments = 0;
+        for (v, placed) in placed.iter().enumerate() {
+            sheet.begin(simd, band, v, faces);
+            if sheet.is_empty() {
+                continue;
+            }
+            let splatter = Splatter { placed, sight, shape: &shapes[v], buckets: &buckets[v] };
+            fragments += sheet.splat(simd, &splatter, band, self.index, slab);
+            sheet.finish(simd, band.stride);
+            for y in 0..band.stored {
+                let mut x = sheet.spans[y].start;
+                while x < sheet.spans[y].end {
+                    let k = y * band.stride + x;
+                    let length = sheet.depth(simd, k) * Lanes::load(simd, &band.stretch[k..]);
+                    let tau = sheet.classify(simd, placed, k)[0] * length;
+                    let row = &mut self.sums[y * band.width * placed_count(self.of)..];
+                    let count = Lanes::<S>::COUNT.min(band.width.saturating_sub(x));
+                    add(tau, length, row, [x, count, v, placed_count(self.of)]);
+                    x += Lanes::<S>::COUNT;
+                }
+            }
+        }
+        fragments
+    }
+}
+
+fn placed_count(of: &Attenuate<'_>) -> usize {
+    of.placed.len()
+}
+
+/// Adds to `count` pixels of a row from `x` on, to volume `v` of `volumes`.
+#[inline(always)]
+fn add<S: Simd>(tau: Lanes<S>, length: Lanes<S>, row: &mut [Sums], [x, count, v, volumes]: [usize; 4]) {
+    let mut parts = [[0.0; MAX_LANES]; 2];
+    tau.store(&mut parts[0]);
+    length.store(&mut parts[1]);
+    for lane in 0..count {
+        let sums = &mut row[(x + lane) * volumes + v];
+        for n in 0..2 {
+            let term = parts[n][lane] - sums[2 + n];
+            let new = sums[n] + term;
+            sums[2 + n] = (new - sums[n]) - term;
+            sums[n] = new;
+        }
+    }
+}

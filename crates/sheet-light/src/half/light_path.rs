@@ -1,0 +1,188 @@
+//! Ways of light in a volume: what it comes through before it reaches a place, and where on a ray that changes.
+//!
+//! A volume is three pairs of faces, a slab has one more. Light that comes to a place has passed a face of each pair at a distance
+//! depth/step; it is in the volume since the least of the three, and in the slab since the fourth. Along a ray the quotients of two
+//! faces agree where depth_i·step_k − depth_k·step_i changes sign, which is linear there, wherever the light comes from.
+
+use super::frame::Frame;
+use super::serves::travel;
+use crate::Volume;
+use splat_core::Light;
+use splat_core::glam::{DVec3, Mat3, Vec3};
+use splat_core::raster::lanes::Lanes;
+use splat_core::raster::pulp::Simd;
+
+/// Share of the steepest direction below which light is parallel to a pair of faces.
+const PARALLEL: f32 = 1e-6;
+
+/// How far outside of parallel faces a place is still inside, cells.
+const ROUNDING: f32 = 1e-4;
+
+/// Farther than anything.
+const FAR: f32 = 1e30;
+
+/// The ways of light in one volume, a parallelepiped in lattice coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LightPath {
+    /// Lattice from slab coordinates.
+    start: Vec3,
+    steps: Mat3,
+    highest: Vec3,
+    /// Lattice steps per unit of length, for directional light.
+    direction: Vec3,
+    /// Depth across the slabs per unit of length, for directional light.
+    across: f32,
+    /// Slab and lattice coordinates of a lamp.
+    pub(crate) lamp: Option<[Vec3; 2]>,
+}
+
+/// Slab coordinates of neighbouring pixels.
+pub(crate) type Places<S> = [Lanes<S>; 3];
+
+impl LightPath {
+    pub(crate) fn new(volume: &Volume<'_>, light: &Light, frame: &Frame) -> Self {
+        let inverse = volume.axes().inverse();
+        let lattice = |world: DVec3| inverse * (world - volume.origin());
+        let start = lattice(frame.world(DVec3::ZERO));
+        let steps = frame.steps(volume).inverse();
+        let direction = travel(light, frame.world(DVec3::ZERO));
+        let lamp = light.shape.place();
+        Self {
+            start: start.as_vec3(),
+            steps: steps.as_mat3(),
+            highest: Vec3::from_array(volume.grid.dims.map(|n| n as f32 - 0.5)),
+            direction: (inverse * direction).as_vec3(),
+            across: frame.direction(direction).z as f32,
+            lamp: lamp.map(|p| [frame.point(p).as_vec3(), lattice(p).as_vec3()]),
+        }
+    }
+
+    /// The ways of light in the volume up to each place, of which the slab begins at depth `face`.
+    #[inline(always)]
+    pub(crate) fn ways<S: Simd>(&self, simd: S, at: &Places<S>, face: f32) -> Ways<S> {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let (zero, tiny) = (of(0.0), of(PARALLEL));
+        // No closures around vectors: what is vectorised must be inlined.
+        let mut here = [zero; 3];
+        for a in 0..3 {
+            let row = self.steps.row(a);
+            here[a] = of(row.x).mul_add(at[0], of(row.y).mul_add(at[1], of(row.z).mul_add(at[2], of(self.start[a]))));
+        }
+        let (length, towards, across) = self.ray(simd, at, &here);
+        let steepest = towards[0].abs().max(towards[1].abs()).max(towards[2].abs());
+        let (mut enters, mut leaves, mut depths, mut steps) = ([of(FAR); FACES], zero, [zero; FACES], [zero; FACES]);
+        for a in 0..3 {
+            let (above, below) = (here[a] - of(-0.5), of(self.highest[a]) - here[a]);
+            let rate = length / towards[a].abs().max(tiny * steepest);
+            let is_parallel = [towards[a].abs(), tiny * steepest];
+            let inside = of(FAR).where_less_or(of(-ROUNDING), above.min(below), of(-FAR));
+            (depths[a], steps[a]) = (above.where_less_or(zero, towards[a], below), towards[a].abs());
+            let leave = (zero - below.where_less_or(zero, towards[a], above)) * rate;
+            enters[a] = inside.where_less_or(is_parallel[0], is_parallel[1], depths[a] * rate);
+            leaves = leaves.max(zero.where_less_or(is_parallel[0], is_parallel[1], leave));
+        }
+        (depths[SLAB], steps[SLAB]) = ((at[2] - of(face)).max(zero), across);
+        enters[SLAB] = depths[SLAB] * length / across;
+        Ways { enters, depths, steps, leaves }
+    }
+
+    /// Of the light's ray to each place: a length, the lattice steps on it, and the depth across the slabs.
+    #[inline(always)]
+    fn ray<S: Simd>(&self, simd: S, at: &Places<S>, here: &Places<S>) -> (Lanes<S>, Places<S>, Lanes<S>) {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let [x, y, z] = self.direction.to_array();
+        let Some([slab, lattice]) = self.lamp else {
+            return (of(1.0), [of(x), of(y), of(z)], of(self.across));
+        };
+        let (mut from, mut towards) = ([of(0.0); 3], [of(0.0); 3]);
+        for a in 0..3 {
+            (from[a], towards[a]) = (at[a] - of(slab[a]), here[a] - of(lattice[a]));
+        }
+        let length = from[0].mul_add(from[0], from[1].mul_add(from[1], from[2] * from[2])).sqrt();
+        (length, towards, from[2])
+    }
+}
+
+/// What light comes through on its way to a place: a face of each pair of a volume's, and the slab's.
+const FACES: usize = 4;
+
+/// Place of the slab's face among them.
+const SLAB: usize = 3;
+
+/// Pairs of them.
+const PAIRS: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, SLAB], [1, 2], [1, SLAB], [2, SLAB]];
+
+/// Places within a ray's part in a slab at which optical depth towards the light may bend, and three between, for it is curved
+/// where light of a lamp grazes a face.
+pub(crate) const BENDS: usize = PAIRS.len() + 3;
+
+/// Distances back to where light comes through faces.
+#[derive(Clone, Copy)]
+pub(crate) struct Ways<S: Simd> {
+    /// Light is in the volume once it has come through a face of each pair.
+    enters: [Lanes<S>; FACES],
+    /// How far behind each face a place is, and how far light comes towards it on a way of one length for all.
+    depths: [Lanes<S>; FACES],
+    steps: [Lanes<S>; FACES],
+    /// Where light leaves the volume before this place, else 0.
+    leaves: Lanes<S>,
+}
+
+impl<S: Simd> Ways<S> {
+    #[inline(always)]
+    fn entered(&self) -> Lanes<S> {
+        self.enters[0].min(self.enters[1]).min(self.enters[2])
+    }
+
+    /// How much later light comes through the first face of a pair than through the other, times both steps.
+    #[inline(always)]
+    fn lead(&self, [i, k]: [usize; 2]) -> Lanes<S> {
+        self.depths[i] * self.steps[k] - self.depths[k] * self.steps[i]
+    }
+
+    /// Length of the way in the volume before the slab, and within it.
+    #[inline(always)]
+    fn lengths(&self, simd: S) -> [Lanes<S>; 2] {
+        let (zero, own) = (Lanes::splat(simd, 0.0), self.enters[SLAB]);
+        let before = (self.entered() - self.leaves.max(own)).max(zero);
+        [before, (self.entered().min(own) - self.leaves).max(zero)]
+    }
+
+    /// Optical depth towards the light, of one extinction before the slab and another within it.
+    #[inline(always)]
+    pub(crate) fn optical_depth(&self, simd: S, before: Lanes<S>, within: Lanes<S>) -> Lanes<S> {
+        let lengths = self.lengths(simd);
+        before.mul_add(lengths[0], within * lengths[1])
+    }
+
+    /// Where between this place and another the faces that light comes through last may change, as shares of the way,
+    /// ascending; and 1 where they do, else 0.
+    #[inline(always)]
+    pub(crate) fn bends(&self, simd: S, other: &Self) -> ([Lanes<S>; BENDS], Lanes<S>) {
+        let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        let (here, there) = (self.entered(), other.entered());
+        // No face of the volume is the last one at both places, or only at one of them light comes into the slab later.
+        let mut does = one;
+        for f in 0..SLAB {
+            does = does.min(one.where_less(here, self.enters[f]).max(one.where_less(there, other.enters[f])));
+        }
+        let inside = [one.where_less(self.enters[SLAB], here), one.where_less(other.enters[SLAB], there)];
+        does = does.max((inside[0] - inside[1]).abs());
+        // Where depth_i/step_i − depth_k/step_k changes sign: times both steps it is linear, from wherever light comes.
+        let mut bends = [one; BENDS];
+        for (bend, pair) in bends.iter_mut().zip(PAIRS) {
+            let lead = self.lead(pair);
+            let change = lead - other.lead(pair);
+            *bend = (lead / change.where_less_or(zero, change.abs(), one)).max(zero).min(one);
+        }
+        for n in PAIRS.len()..BENDS {
+            bends[n] = Lanes::splat(simd, (n + 1 - PAIRS.len()) as f32 / (BENDS + 1 - PAIRS.len()) as f32);
+        }
+        for n in 1..BENDS {
+            for k in (0..n).rev() {
+                (bends[k], bends[k + 1]) = (bends[k].min(bends[k + 1]), bends[k].max(bends[k + 1]));
+            }
+        }
+        (bends, does)
+    }
+}

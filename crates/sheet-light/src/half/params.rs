@@ -1,0 +1,44 @@
+//! What half-vector sheets are made of and what the caller chooses.
+
+use crate::{Error, Params, SheetInput};
+
+/// What is drawn.
+#[derive(Clone)]
+pub struct HalfInput<'a> {
+    /// Volumes, view, lights and ambient radiance. The shadow of a [`splat_core::shade::LitBy`] is that of everything but the
+    /// volumes here, which shadow themselves and each other by the light buffer; `None` for no shadow else. Materials take
+    /// [`crate::Volume::shadow_coefficient`] of both.
+    pub sheets: SheetInput<'a>,
+    /// View depth of what hides the volumes at each pixel, +∞ for nothing; or empty.
+    pub opaque: &'a [f32],
+}
+
+/// Parameters of half-vector sheets.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HalfParams {
+    /// Slab width, kernel, cutoff and memory. A width of `None` is the least spacing of the volumes along the half vector.
+    pub sheets: Params,
+    /// Pixels of the light buffer per least step of a lattice, at the middle of the volumes, > 0.
+    pub light_pixels: f64,
+    /// Most pixels of a light buffer along a side, 16 to 8192: its pixels grow where there would be more.
+    pub most_light_pixels: u32,
+}
+
+impl Default for HalfParams {
+    fn default() -> Self {
+        Self { sheets: Params::default(), light_pixels: 1.5, most_light_pixels: 2048 }
+    }
+}
+
+impl HalfParams {
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        self.sheets.check()?;
+        if !(self.light_pixels.is_finite() && self.light_pixels > 0.0) {
+            return Err(Error::parameter("light_pixels", self.light_pixels, "a finite number > 0"));
+        }
+        if !(16..=8192).contains(&self.most_light_pixels) {
+            return Err(Error::parameter("most_light_pixels", self.most_light_pixels, "16 to 8192"));
+        }
+        Ok(())
+    }
+}

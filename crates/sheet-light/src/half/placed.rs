@@ -1,0 +1,94 @@
+//! A lattice in slab coordinates, with what its kernels, its values and its classes need.
+
+use super::frame::Frame;
+use crate::classify::Classifier;
+use crate::fold::extremes;
+use crate::lattice::Lattice;
+use crate::sections::{PHASES, SectionTable};
+use crate::visible::Voxels;
+use crate::{Params, Volume};
+use splat_core::Footprint;
+use splat_core::glam::{DMat3, DVec3};
+use splat_core::raster::kernel::Kernel;
+
+/// One volume of a sweep.
+pub(crate) struct Placed<'a> {
+    pub(crate) volume: &'a Volume<'a>,
+    /// Slab coordinates of lattice point 0, without a rim.
+    pub(crate) start: DVec3,
+    /// Steps in slab coordinates.
+    pub(crate) axes: DMat3,
+    /// Extent of a kernel along the slabs, world units²: aa, ab, bb.
+    pub(crate) extent: [f64; 3],
+    /// How far it reaches across them.
+    pub(crate) reach: f64,
+    /// Cutoff radius over standard deviation.
+    pub(crate) cutoff: f64,
+    pub(crate) sections: SectionTable,
+    pub(crate) kernel: Kernel,
+    pub(crate) classifier: Classifier,
+    /// What values are taken relative to.
+    pub(crate) base: f64,
+    width: f64,
+}
+
+impl<'a> Placed<'a> {
+    pub(crate) fn new(volume: &'a Volume<'a>, frame: &Frame, params: &Params) -> Self {
+        let axes = frame.steps(volume);
+        let m = axes * axes.transpose() * (params.kernel.extent * params.kernel.extent);
+        let reach = libm::sqrt(m.z_axis.z);
+        let cutoff = params.kernel.extent / params.kernel.sigma;
+        let (low, high) = extremes(&volume.grid.values);
+        let base = 0.5 * (f64::from(low) + f64::from(high));
+        Self {
+            volume,
+            start: frame.point(volume.origin()),
+            axes,
+            extent: [m.x_axis.x, m.x_axis.y, m.y_axis.y],
+            reach,
+            cutoff,
+            sections: SectionTable::new(reach / frame.slabs.width, 0.5 * cutoff * cutoff),
+            kernel: Kernel::new(&Footprint { cutoff: cutoff as f32 }),
+            classifier: Classifier::new(volume.transfer, volume.extinction_scale, base),
+            base,
+            width: frame.slabs.width,
+        }
+    }
+
+    /// Where the kernel of a voxel at this depth begins, in 256ths of a slab. Rounded, so that a lattice that lies evenly in the
+    /// slabs stays clear of the edges of phases.
+    #[inline(always)]
+    pub(crate) fn place(&self, depth: f64) -> u32 {
+        // `Slabs` begin before the first kernel.
+        ((depth - self.reach) / self.width * f64::from(PHASES) + 0.5).max(0.0) as u32
+    }
+
+    /// Lattice steps along each axis within which lie all voxels that shape what a pixel has of a slab, for footprints of
+    /// `extent`; `gradient` adds the neighbours that gradients are taken from, a pixel being at most `pixel` wide in a slab.
+    pub(crate) fn lattice_reach(&self, extent: [f64; 3], pixel: f64) -> [usize; 3] {
+        let [aa, ab, bb] = extent;
+        let neighbour = if self.volume.normals { 1.0 } else { 0.0 };
+        // A sheet holds means over its slab.
+        let across = self.reach + (1.0 + neighbour) * self.width;
+        let inverse = self.axes.inverse();
+        [0, 1, 2].map(|axis| {
+            let row = inverse.row(axis);
+            let along = libm::sqrt((row.x * row.x * aa + 2.0 * row.x * row.y * ab + row.y * row.y * bb).max(0.0));
+            let steps = along + (row.x.abs() + row.y.abs()) * pixel * neighbour + row.z.abs() * across;
+            (steps + 0.5).min(1e6) as usize
+        })
+    }
+
+    /// The lattice with the rim that kernels reach, and the voxels of it that may matter.
+    pub(crate) fn voxels(&self, reach: [usize; 3]) -> (Lattice<'a>, Voxels) {
+        let lattice = Lattice::new(self.volume.grid, reach);
+        let voxels = Voxels::needed(&lattice, self.volume.transfer, reach);
+        (lattice, voxels)
+    }
+
+    /// Slab coordinates of a lattice point, counted from the corner of a rim.
+    pub(crate) fn position(&self, rim: [usize; 3], at: [usize; 3]) -> DVec3 {
+        let steps = [0, 1, 2].map(|a| at[a] as f64 - rim[a] as f64);
+        self.start + self.axes * DVec3::from_array(steps)
+    }
+}

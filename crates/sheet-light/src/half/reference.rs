@@ -1,0 +1,326 @@
+//! The slow form in f64: the same sheets pixel by pixel, voxel by voxel, without bands, buckets, vectors, bounds or skipped voxels,
+//! and light on the way through a slab summed step by step.
+//!
+//! Gradients are left out: volumes are lit as if they had no normals.
+
+use super::frame::{Frame, Ray};
+use super::placed::Placed;
+use super::serves::axis_of_view;
+use super::sight::{Shape, Sight};
+use super::{HalfInput, HalfParams, lamp};
+use crate::lattice::Lattice;
+use crate::reference::Picture;
+use crate::sections::{PHASES, sections};
+use crate::{Error, Volume};
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::shade::{LitBy, Point};
+use splat_core::{Camera, Footprint, Light};
+
+/// Steps on the way of a ray through a slab.
+const STEPS: usize = 200;
+
+/// A voxel: a, b, where its kernel begins, value.
+type Voxel = (f64, f64, u32, f64);
+
+/// What is the same for all slabs.
+struct View<'a> {
+    input: &'a HalfInput<'a>,
+    params: &'a HalfParams,
+    frame: Frame,
+    placed: Vec<Placed<'a>>,
+    voxels: Vec<Vec<Voxel>>,
+}
+
+/// One image: its camera, its footprints by volume.
+struct Image {
+    camera: Camera,
+    shapes: Vec<Shape>,
+}
+
+/// What a ray has of a volume in a slab.
+struct Part {
+    near: f64,
+    far: f64,
+    value: f64,
+}
+
+/// Optical depth and length so far, by volume and pixel of the light.
+type Sums = Vec<Vec<[f64; 2]>>;
+
+/// Draws all volumes under all lights, green extinction for all channels, without the shadows of others. Time grows as voxels times
+/// pixels times slabs under a kernel.
+///
+/// # Errors
+/// Those of [`super::fold`], but for memory.
+pub fn draw(input: &HalfInput<'_>, params: &HalfParams) -> Result<Picture, Error> {
+    params.check()?;
+    input.sheets.check()?;
+    let mut out: Option<Picture> = None;
+    for lit in &input.sheets.lights {
+        let own = View::new(input, params, lit)?.draw(lit, out.is_none());
+        match &mut out {
+            None => out = Some(own),
+            Some(all) => all.color.iter_mut().zip(own.color).for_each(|(to, own)| (0..3).for_each(|c| to[c] += own[c])),
+        }
+    }
+    let pixels = input.sheets.camera.size.map(|s| s as usize).iter().product();
+    Ok(out.unwrap_or(Picture { optical_depth: vec![0.0; pixels], color: vec![[0.0; 3]; pixels] }))
+}
+
+impl<'a> View<'a> {
+    fn new(input: &'a HalfInput<'a>, params: &'a HalfParams, lit: &LitBy<'_>) -> Result<Self, Error> {
+        let (volumes, camera) = (&input.sheets.volumes[..], input.sheets.camera);
+        let frame = Frame::new(volumes, camera, &params.sheets, &axis_of_view(volumes, camera, Some(&lit.light)))?;
+        let placed: Vec<Placed<'a>> = volumes.iter().map(|v| Placed::new(v, &frame, &params.sheets)).collect();
+        let of = |placed: &Placed<'_>| {
+            let lattice = Lattice::new(placed.volume.grid, [3; 3]);
+            let [nx, ny, nz] = lattice.dims;
+            let places = (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| [i, j, k])));
+            let voxel = |at: [usize; 3]| {
+                let p = placed.position(lattice.rim, at);
+                (p.x, p.y, placed.place(p.z), f64::from(lattice.value(at[0], at[1], at[2])))
+            };
+            places.map(voxel).collect()
+        };
+        let voxels = placed.iter().map(of).collect();
+        Ok(Self { input, params, frame, placed, voxels })
+    }
+
+    fn image(&self, camera: Camera) -> Image {
+        let sight = Sight::new(&self.frame, camera);
+        Image { camera, shapes: self.placed.iter().map(|p| sight.shape(&self.frame, p)).collect() }
+    }
+
+    fn draw(&self, lit: &LitBy<'_>, with_ambient: bool) -> Picture {
+        let camera = self.input.sheets.camera;
+        let eye = self.image(*camera);
+        let light = self.image(lamp::camera_of(&self.input.sheets.volumes, &lit.light, self.params));
+        let pixels = |camera: &Camera| camera.size.map(|s| s as usize).iter().product();
+        let mut sums: Sums = vec![vec![[0.0; 2]; pixels(&light.camera)]; self.placed.len()];
+        let n: usize = pixels(camera);
+        let mut out = Picture { optical_depth: vec![0.0; n], color: vec![[0.0; 3]; n] };
+        for slab in 0..self.frame.slabs.count {
+            let voxels = self.voxels_of(slab);
+            for at in 0..n {
+                let (tau, color) = self.fragment(&eye, &light, &voxels, &sums, (slab, at, lit, with_ambient));
+                let (through, opacity) = (libm::exp(-out.optical_depth[at]), -libm::expm1(-tau));
+                for c in 0..3 {
+                    let sum = &mut out.color[at][c];
+                    *sum = if self.frame.back_to_front {
+                        opacity * color[c] + libm::exp(-tau) * *sum
+                    } else {
+                        *sum + through * opacity * color[c]
+                    };
+                }
+                out.optical_depth[at] += tau;
+            }
+            for (v, sums) in sums.iter_mut().enumerate() {
+                for (at, sums) in sums.iter_mut().enumerate() {
+                    if let Some(part) = self.part(&light, &voxels[v], v, slab, at) {
+                        let length = (part.far - part.near) * self.stretch(&light.camera, at);
+                        *sums = [sums[0] + self.extinction(v, part.value) * length, sums[1] + length];
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// Voxels whose kernels reach a slab, with their sections there in the place of where they begin.
+    fn voxels_of(&self, slab: u32) -> Vec<Vec<(f64, f64, f64, f64)>> {
+        let cutoff = self.params.sheets.kernel.extent / self.params.sheets.kernel.sigma;
+        let of = |(placed, voxels): (&Placed<'_>, &Vec<Voxel>)| {
+            let section = |place: u32| {
+                let behind = slab.checked_sub(place / PHASES)?;
+                let all = sections(place % PHASES, placed.reach / self.frame.slabs.width, 0.5 * cutoff * cutoff);
+                all.get(behind as usize).copied()
+            };
+            voxels.iter().filter_map(|(a, b, place, v)| Some((*a, *b, section(*place)?, *v))).collect()
+        };
+        self.placed.iter().zip(&self.voxels).map(of).collect()
+    }
+
+    fn ray(&self, camera: &Camera, at: usize) -> Ray {
+        let width = camera.size[0] as usize;
+        self.frame.ray(camera, (at % width) as f64 + 0.5, (at / width) as f64 + 0.5)
+    }
+
+    /// Length of a pixel's ray per depth across the slabs.
+    fn stretch(&self, camera: &Camera, at: usize) -> f64 {
+        let ray = self.ray(camera, at);
+        (ray.along / ray.along.z).length()
+    }
+
+    fn extinction(&self, v: usize, value: f64) -> f64 {
+        let volume = self.placed[v].volume;
+        let own = f64::from(volume.transfer.at(value as f32).extinction) * volume.extinction_scale;
+        own * f64::from(volume.material.extinction_rgb[1])
+    }
+
+    /// Depths across the slabs between which a ray is in the cells of a volume, before the eye.
+    fn crossing(&self, volume: &Volume<'_>, camera: &Camera, at: usize) -> Option<[f64; 2]> {
+        let ray = self.ray(camera, at);
+        let inverse = self.frame.steps(volume).inverse();
+        let origin = self.frame.point(volume.origin());
+        let ends = clip(volume, inverse * (ray.from - origin), inverse * ray.along)?;
+        let [one, other] = ends.map(|z| ray.from.z + ray.along.z * z.max(0.0));
+        (ends[1] > 0.0).then(|| [one.min(other), one.max(other)])
+    }
+
+    /// What a pixel's ray has of a volume in a slab.
+    fn part(&self, image: &Image, voxels: &[(f64, f64, f64, f64)], v: usize, slab: u32, at: usize) -> Option<Part> {
+        let width = self.frame.slabs.width;
+        let [near, far] = self.crossing(self.placed[v].volume, &image.camera, at)?;
+        let (near, far) = (near.max(f64::from(slab) * width), far.min(f64::from(slab + 1) * width));
+        if far <= near {
+            return None;
+        }
+        let q = self.place(&image.camera, at, 0.5 * (near + far));
+        let footprint = Footprint { cutoff: self.placed[v].cutoff as f32 };
+        let [aa, ab, bb] = image.shapes[v].extent();
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for (a, b, section, value) in voxels {
+            let (da, db) = (q.x - a, q.y - b);
+            let s = (bb * da * da - 2.0 * ab * da * db + aa * db * db) / (aa * bb - ab * ab);
+            let weight = footprint.profile(s) * section;
+            (sum, weights) = (sum + weight * value, weights + weight);
+        }
+        (weights > 1e-12).then(|| Part { near, far, value: sum / weights })
+    }
+
+    /// Slab coordinates of a pixel's ray at a depth across the slabs.
+    fn place(&self, camera: &Camera, at: usize, depth: f64) -> DVec3 {
+        let ray = self.ray(camera, at);
+        ray.from + ray.along * ((depth - ray.from.z) / ray.along.z)
+    }
+
+    /// Optical depth of a pixel in a slab and its radiance.
+    fn fragment(
+        &self,
+        eye: &Image,
+        light: &Image,
+        voxels: &[Vec<(f64, f64, f64, f64)>],
+        sums: &Sums,
+        (slab, at, lit, with_ambient): (u32, usize, &LitBy<'_>, bool),
+    ) -> (f64, [f64; 3]) {
+        let parts: Vec<Option<Part>> =
+            (0..self.placed.len()).map(|v| self.part(eye, &voxels[v], v, slab, at)).collect();
+        let extinction: Vec<f64> = parts
+            .iter()
+            .enumerate()
+            .map(|(v, part)| part.as_ref().map_or(0.0, |part| self.extinction(v, part.value)))
+            .collect();
+        let shown = || parts.iter().zip(&extinction).filter(|(_, e)| **e > 0.0).filter_map(|(part, _)| part.as_ref());
+        let near = shown().map(|part| part.near).fold(f64::INFINITY, f64::min);
+        let far = shown().map(|part| part.far).fold(f64::NEG_INFINITY, f64::max);
+        if near >= far {
+            return (0.0, [0.0; 3]);
+        }
+        let stretch = self.stretch(&eye.camera, at);
+        let tau = |v: usize| parts[v].as_ref().map_or(0.0, |part| extinction[v] * (part.far - part.near) * stretch);
+        let all: f64 = (0..parts.len()).map(tau).sum();
+        let ends = if self.frame.back_to_front { [far, near] } else { [near, far] };
+        let [first, last] = ends.map(|depth| self.place(&eye.camera, at, depth));
+        let middle = 0.5 * (first + last);
+        let means = self.means(light, sums, middle, &extinction);
+        let mut arrives = 0.0;
+        for n in 0..STEPS {
+            let x = (n as f64 + 0.5) / STEPS as f64;
+            let way = self.light_depth(&lit.light, first + (last - first) * x, slab, &means, &extinction);
+            arrives += all * libm::exp(-all * x - way) / STEPS as f64;
+        }
+        let mean = arrives / -libm::expm1(-all);
+        let mut color = [0.0; 3];
+        for v in (0..parts.len()).filter(|v| tau(*v) > 0.0) {
+            let own = self.radiance(v, &parts[v], (middle, at), lit, (mean, with_ambient));
+            (0..3).for_each(|c| color[c] += own[c] * tau(v) / all);
+        }
+        (all, color)
+    }
+
+    /// Mean extinctions on the way of light to the present slab, by volume.
+    fn means(&self, light: &Image, sums: &Sums, at: DVec3, extinction: &[f64]) -> Vec<f64> {
+        let camera = &light.camera;
+        let view = camera.view_from_world(self.frame.world(at));
+        let scale = camera.focal_px() / if camera.is_orthographic() { 1.0 } else { view.z };
+        let [width, height] = camera.size.map(|s| s as usize);
+        let clamp = |v: f64, n: usize| (v - 0.5).clamp(0.0, n as f64 - 1.0);
+        let x = clamp(0.5 * width as f64 + view.x * scale, width);
+        let y = clamp(0.5 * height as f64 - view.y * scale, height);
+        let (i, j) = ((x as usize).min(width - 2), (y as usize).min(height - 2));
+        let (u, v) = (x - i as f64, y - j as f64);
+        let mean = |(sums, own): (&Vec<[f64; 2]>, &f64)| {
+            let at = |i: usize, j: usize, n: usize| sums[j * width + i][n];
+            let [tau, length] = [0, 1].map(|n| {
+                (at(i, j, n) * (1.0 - u) + at(i + 1, j, n) * u) * (1.0 - v)
+                    + (at(i, j + 1, n) * (1.0 - u) + at(i + 1, j + 1, n) * u) * v
+            });
+            if length > 0.0 { tau / length } else { *own }
+        };
+        sums.iter().zip(extinction).map(mean).collect()
+    }
+
+    /// Optical depth towards the light at a place in a slab.
+    fn light_depth(&self, light: &Light, at: DVec3, slab: u32, means: &[f64], extinction: &[f64]) -> f64 {
+        let world = self.frame.world(at);
+        let back = -super::serves::travel(light, world);
+        let own = (at.z - f64::from(slab) * self.frame.slabs.width).max(0.0) / -self.frame.direction(back).z;
+        let mut sum = 0.0;
+        for (v, placed) in self.placed.iter().enumerate() {
+            let volume = placed.volume;
+            let inverse = volume.axes().inverse();
+            let Some([leaves, enters]) = clip(volume, inverse * (world - volume.origin()), inverse * back) else {
+                continue;
+            };
+            let leaves = leaves.max(0.0);
+            sum += means[v] * (enters - leaves.max(own)).max(0.0);
+            sum += extinction[v] * (enters.min(own) - leaves).max(0.0);
+        }
+        sum
+    }
+
+    fn radiance(
+        &self,
+        v: usize,
+        part: &Option<Part>,
+        (at, pixel): (DVec3, usize),
+        lit: &LitBy<'_>,
+        (mean, with_ambient): (f64, bool),
+    ) -> [f64; 3] {
+        let (volume, camera) = (self.placed[v].volume, self.input.sheets.camera);
+        let value = part.as_ref().map_or(0.0, |part| part.value);
+        let [right, up, forward] = camera.axes;
+        let width = camera.size[0] as usize;
+        let (_, along) = camera.view_ray((pixel % width) as f64 + 0.5, (pixel / width) as f64 + 0.5);
+        let point = Point {
+            position: self.frame.world(at),
+            radius: self.placed[v].reach as f32,
+            normal: Vec3::ZERO,
+            to_eye: -(right * along.x + up * along.y + forward * along.z).normalize().as_vec3(),
+            color: volume.transfer.at(value as f32).color,
+            material: volume.material,
+        };
+        let share = (1.0 - f64::from(volume.shadow_coefficient) * (1.0 - mean)) as f32;
+        let radiance = point.radiance(self.input.sheets.ambient, [lit.light].iter(), |_, _| [share; 3]);
+        let [ambient, emission, direct, scatter] = radiance.effects();
+        let others = if with_ambient { 1.0 } else { 0.0 };
+        [0, 1, 2].map(|c| f64::from(others * (ambient[c] + emission[c]) + direct[c] + scatter[c]))
+    }
+}
+
+/// Between which multiples of `step` a line from `start`, in lattice coordinates, is in the cells of a volume.
+fn clip(volume: &Volume<'_>, start: DVec3, step: DVec3) -> Option<[f64; 2]> {
+    let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
+    for a in 0..3 {
+        let (low, high) = (-0.5 - start[a], volume.grid.dims[a] as f64 - 0.5 - start[a]);
+        if step[a].abs() < 1e-12 * step.length() {
+            if low > 1e-9 || high < -1e-9 {
+                return None;
+            }
+            continue;
+        }
+        let (one, other) = (low / step[a], high / step[a]);
+        (near, far) = (near.max(one.min(other)), far.min(one.max(other)));
+    }
+    (near < far).then_some([near, far])
+}

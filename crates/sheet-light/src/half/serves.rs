@@ -1,0 +1,139 @@
+//! Where half vectors cannot serve: rays that run along the slabs, or cross them backwards, and lamps inside the medium.
+
+use super::axis::HalfVector;
+use super::frame::{middle, world_corners};
+use crate::Volume;
+use splat_core::glam::DVec3;
+use splat_core::{Camera, Light, LightShape};
+
+/// Least cosine at which a ray of the eye or of the light may meet the slabs' normal: it crosses a slab of width w on a way of at
+/// most w/[`LEAST_COSINE`].
+pub const LEAST_COSINE: f64 = 0.2;
+
+/// Why half vectors cannot serve a light: it takes a shadow map instead.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Reason {
+    /// No direction bisects light and view for all of a volume around the lamp.
+    #[error("the lamp at {position} lies inside volume {volume}, expected outside")]
+    LampInside {
+        /// Place of the volume in the input.
+        volume: usize,
+        /// World position of the lamp.
+        position: DVec3,
+    },
+    /// Light of a near lamp runs along the slabs somewhere in the volumes, or crosses them backwards.
+    #[error(
+        "light meets the normal of the slabs at a cosine of {cosine:.3}, expected at least {LEAST_COSINE}: the lamp is too near"
+    )]
+    LightAlongSlabs {
+        /// The least cosine in the volumes.
+        cosine: f64,
+    },
+    /// View rays of a wide lens do.
+    #[error(
+        "view rays meet the normal of the slabs at a cosine of {cosine:.3}, expected at least {LEAST_COSINE}: the lens is too wide"
+    )]
+    ViewAlongSlabs {
+        /// The least cosine of what is in the picture.
+        cosine: f64,
+    },
+    /// Light of a sphere, a disk or a rectangle comes from many directions.
+    #[error("the light has an extent, expected a point of it: `Light::points` has them")]
+    Extended,
+}
+
+/// Whether the half vector of this light and this view can slice the volumes: whether every ray of the light to a volume, and
+/// every view ray that may meet one, crosses slabs in one sense, no flatter than [`LEAST_COSINE`] says. True without volumes.
+///
+/// Directions from one point to a convex body, and those of an image, are convex cones, and so are those within an angle of the
+/// normal: corners decide for all.
+///
+/// # Errors
+/// The first [`Reason`] that was found.
+pub fn serves(volumes: &[Volume<'_>], camera: &Camera, light: &Light) -> Result<(), Reason> {
+    if volumes.is_empty() {
+        return Ok(());
+    }
+    if light.shape.is_extended() {
+        return Err(Reason::Extended);
+    }
+    if let Some(position) = light.shape.place()
+        && let Some(volume) = volumes.iter().position(|v| is_inside(v, position))
+    {
+        return Err(Reason::LampInside { volume, position });
+    }
+    let axis = axis_of(volumes, camera, light);
+    // The light's image has an axis of its own, to the middle of the volumes.
+    let forward = travel(light, middle(volumes));
+    let of_light = |p: DVec3| [axis.normal, forward].map(|axis| axis.dot(travel(light, p)));
+    let cosine = least(volumes.iter().flat_map(world_corners).flat_map(of_light));
+    if cosine < LEAST_COSINE {
+        return Err(Reason::LightAlongSlabs { cosine });
+    }
+    let sense = if axis.back_to_front { -axis.normal } else { axis.normal };
+    let cosine = least_of_view(volumes, camera, sense);
+    if cosine < LEAST_COSINE { Err(Reason::ViewAlongSlabs { cosine }) } else { Ok(()) }
+}
+
+/// The half vector at the middle of the volumes, of which there is at least one.
+fn axis_of(volumes: &[Volume<'_>], camera: &Camera, light: &Light) -> HalfVector {
+    let middle = middle(volumes);
+    HalfVector::between(-seen_along(camera, middle), -travel(light, middle))
+}
+
+/// The half vector of a light, or the view's own axis without one.
+pub(crate) fn axis_of_view(volumes: &[Volume<'_>], camera: &Camera, light: Option<&Light>) -> HalfVector {
+    match light {
+        Some(light) => axis_of(volumes, camera, light),
+        None => HalfVector { normal: seen_along(camera, middle(volumes)), back_to_front: false },
+    }
+}
+
+/// Unit direction of travel of light that arrives at `p`; zero at the lamp itself.
+pub(crate) fn travel(light: &Light, p: DVec3) -> DVec3 {
+    match (light.shape, light.shape.place()) {
+        (LightShape::Directional { direction }, _) => direction.normalize_or_zero(),
+        (_, Some(place)) => (p - place).normalize_or_zero(),
+        _ => DVec3::ZERO,
+    }
+}
+
+fn least(cosines: impl Iterator<Item = f64>) -> f64 {
+    // What is no number serves nobody.
+    cosines.fold(1.0, |all, c| if c >= all { all } else { c })
+}
+
+fn is_inside(volume: &Volume<'_>, p: DVec3) -> bool {
+    let at = volume.axes().inverse() * (p - volume.origin());
+    (0..3).all(|a| at[a] >= -0.5 && at[a] <= volume.grid.dims[a] as f64 - 0.5)
+}
+
+fn world(camera: &Camera, v: DVec3) -> DVec3 {
+    camera.axes[0] * v.x + camera.axes[1] * v.y + camera.axes[2] * v.z
+}
+
+/// Unit direction of the view ray to `p`, or to the place of the picture that is nearest to it.
+fn seen_along(camera: &Camera, p: DVec3) -> DVec3 {
+    let view = camera.view_from_world(p);
+    if camera.is_orthographic() || view.z <= 0.0 {
+        return camera.axes[2];
+    }
+    let focal = camera.focal_px();
+    let [width, height] = camera.size.map(|s| 0.5 * f64::from(s) / focal);
+    let clamped = DVec3::new((view.x / view.z).clamp(-width, width), (view.y / view.z).clamp(-height, height), 1.0);
+    world(camera, clamped).normalize()
+}
+
+/// The least cosine of what is in the picture and in a volume: no less than that of either.
+fn least_of_view(volumes: &[Volume<'_>], camera: &Camera, normal: DVec3) -> f64 {
+    let [width, height] = camera.size.map(f64::from);
+    let corners = [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]];
+    let cosine = |direction: DVec3| normal.dot(direction.normalize_or_zero());
+    let picture = least(corners.into_iter().map(|[x, y]| cosine(world(camera, camera.view_ray(x, y).1))));
+    if camera.is_orthographic() {
+        return picture;
+    }
+    let volumes = least(volumes.iter().flat_map(world_corners).map(|p| cosine(p - camera.position)));
+    picture.max(volumes)
+}

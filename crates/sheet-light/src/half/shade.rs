@@ -1,0 +1,58 @@
+//! Radiance of a point of a volume under the light of one sweep (step 19 of the pseudocode).
+
+use super::sweep::Sweep;
+use crate::Volume;
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::shade::{Point, Radiance, arriving};
+use splat_core::{Receiver, Shading, SplatKind};
+
+/// A point of a volume that is lit.
+pub(crate) struct Lit<'a> {
+    pub(crate) volume: &'a Volume<'a>,
+    /// Cutoff radius of the kernels, world units.
+    pub(crate) radius: f32,
+    pub(crate) color: [f32; 3],
+    /// As gradients have it, or zero.
+    pub(crate) normal: Vec3,
+    /// Share of the light that the volumes let through.
+    pub(crate) arrives: [f32; 3],
+}
+
+impl Lit<'_> {
+    /// Radiance of the point at these slab coordinates towards the eye of a pixel.
+    pub(crate) fn radiance(&self, of: &Sweep<'_>, pixel: [usize; 2], at: DVec3) -> Radiance {
+        let position = if of.is_lit_by_place { of.frame.world(at) } else { DVec3::ZERO };
+        let point = Point {
+            position,
+            radius: self.radius,
+            normal: self.normal,
+            to_eye: of.to_eye(pixel),
+            color: self.color,
+            material: self.volume.material,
+        };
+        let light = of.light.map(|lit_by| lit_by.light);
+        let mut radiance = point.radiance(of.ambient, light.iter(), |_, irradiance| {
+            let others = of.light.and_then(|lit_by| lit_by.shadow);
+            let receiver = || Receiver {
+                position: (position - of.shadow_origin).as_vec3(),
+                normal: self.normal,
+                radius: self.radius,
+                kind: SplatKind::Medium,
+            };
+            let shadow = || {
+                let others = others.map_or([1.0; 3], |others| others.transmittance(&receiver()));
+                [0, 1, 2].map(|c| self.arrives[c] * others[c])
+            };
+            arriving(irradiance, self.volume.shadow_coefficient, Some(shadow))
+        });
+        if of.light_alone {
+            (radiance.ambient, radiance.emission) = ([0.0; 3], [0.0; 3]);
+        }
+        radiance
+    }
+}
+
+/// Whether a volume asks for light at all.
+pub(crate) fn is_lit(volume: &Volume<'_>) -> bool {
+    volume.material.shading != Shading::Unlit
+}

@@ -1,0 +1,226 @@
+//! A sheet in a band of an image: reconstructed values of one slab of one volume, each at its own pixel's place.
+//!
+//! v = Σ v_i·w_i / Σ w_i. The weight of a voxel is its footprint at the place of the pixel in the slab, times the section of its
+//! kernel in the slab. That place is the middle of what the pixel's ray has of slab and volume, so it never lies outside the
+//! volume, however wide and slanted slabs are.
+
+use super::band::Band;
+use super::buckets::{Buckets, Record};
+use super::placed::Placed;
+use super::sight::{Shape, Sight};
+use crate::sections::PHASES;
+use crate::sheets::LEAST_WEIGHT;
+use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::pulp::Simd;
+use std::ops::Range;
+
+/// What all voxels of a volume share in an image.
+#[derive(Clone, Copy)]
+pub(crate) struct Splatter<'a> {
+    pub(crate) placed: &'a Placed<'a>,
+    pub(crate) sight: &'a Sight,
+    pub(crate) shape: &'a Shape,
+    pub(crate) buckets: &'a Buckets,
+}
+
+/// One slab of one volume: planes as those of the band.
+#[derive(Debug, Clone)]
+pub(crate) struct Sheet {
+    /// Depths across the slabs between which rays are in slab and volume.
+    pub(crate) near: Vec<f32>,
+    pub(crate) far: Vec<f32>,
+    /// a and b of the middle between them.
+    pub(crate) at: [Vec<f32>; 2],
+    /// Σ v·w, then their quotient.
+    pub(crate) values: Vec<f32>,
+    pub(crate) weights: Vec<f32>,
+    /// By row: columns that may be inside, whole vectors.
+    pub(crate) spans: Vec<Range<usize>>,
+    /// Rows of which any is inside.
+    rows: Range<usize>,
+    /// Depths that the places lie between.
+    depths: [f32; 2],
+}
+
+impl Sheet {
+    pub(crate) fn new(band: &Band) -> Self {
+        let plane = || vec![0.0; band.stored * band.stride];
+        Self {
+            near: vec![f32::INFINITY; band.stored * band.stride],
+            far: vec![f32::NEG_INFINITY; band.stored * band.stride],
+            at: [plane(), plane()],
+            values: plane(),
+            weights: plane(),
+            spans: vec![0..0; band.stored],
+            rows: 0..0,
+            depths: [0.0; 2],
+        }
+    }
+
+    /// Bytes of the planes.
+    pub(crate) fn bytes(&self) -> u64 {
+        4 * 6 * self.near.len() as u64
+    }
+
+    /// Whether nothing is inside.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Begins the slab between two depths.
+    #[inline(always)]
+    pub(crate) fn begin<S: Simd>(&mut self, simd: S, band: &Band, volume: usize, faces: [f32; 2]) {
+        let middle = 0.5 * (faces[0] + faces[1]);
+        (self.rows, self.depths) = (0..0, [middle; 2]);
+        for y in 0..band.stored {
+            let hit = &band.hits[volume][y];
+            let is_met = hit.near < faces[1] && hit.far > faces[0];
+            let (old, count) = (self.spans[y].clone(), Lanes::<S>::COUNT);
+            // What other pixels ask of these is whether they are inside.
+            self.near[y * band.stride + old.start..y * band.stride + old.end].fill(f32::INFINITY);
+            self.spans[y] = 0..0;
+            if !is_met {
+                continue;
+            }
+            let columns = hit.columns.start / count * count..hit.columns.end.next_multiple_of(count);
+            if self.begin_row(simd, band, volume, [y, columns.start, columns.end], faces) {
+                self.spans[y] = columns;
+                self.rows = if self.rows.is_empty() { y } else { self.rows.start }..y + 1;
+            }
+        }
+    }
+
+    /// Places and ends of a row; whether any is inside.
+    #[inline(always)]
+    fn begin_row<S: Simd>(
+        &mut self,
+        simd: S,
+        band: &Band,
+        volume: usize,
+        [y, start, end]: [usize; 3],
+        faces: [f32; 2],
+    ) -> bool {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let (first, last, half, zero, one) = (of(faces[0]), of(faces[1]), of(0.5), of(0.0), of(1.0));
+        let middle = of(0.5 * (faces[0] + faces[1]));
+        let (mut any, mut partial) = (zero, zero);
+        let mut x = start;
+        while x < end {
+            let k = y * band.stride + x;
+            let near = Lanes::load(simd, &band.crossings[volume][0][k..]).max(first);
+            let far = Lanes::load(simd, &band.crossings[volume][1][k..]).min(last);
+            near.store(&mut self.near[k..]);
+            far.store(&mut self.far[k..]);
+            let inside = one.where_less(near, far);
+            any = any.max(inside);
+            partial = partial.max(inside.where_less(first, near)).max(inside.where_less(far, last));
+            let depth = ((near + far) * half).where_less_or(near, far, middle);
+            for a in 0..2 {
+                let slope = Lanes::load(simd, &band.slope[a][k..]);
+                slope.mul_add(depth, Lanes::load(simd, &band.place[a][k..])).store(&mut self.at[a][k..]);
+            }
+            zero.store(&mut self.values[k..]);
+            zero.store(&mut self.weights[k..]);
+            x += Lanes::<S>::COUNT;
+        }
+        if is_any(partial) {
+            self.depths = faces;
+        }
+        is_any(any)
+    }
+
+    /// Adds all voxels that reach the slab. Number of footprint numbers.
+    #[inline(always)]
+    pub(crate) fn splat<S: Simd>(&mut self, simd: S, of: &Splatter<'_>, band: &Band, index: usize, slab: u32) -> u64 {
+        let mut fragments = 0;
+        if self.rows.is_empty() {
+            return 0;
+        }
+        let has_rim = band.stored > band.rows.len();
+        for record in of.buckets.of(slab, index, has_rim).flatten() {
+            let [left, right, top, bottom] = of.sight.bounds(of.shape, record.at, self.depths);
+            // Saturating casts: what lies before the first pixel is 0.
+            let from = |edge: f32| (edge - 0.5).ceil() as usize;
+            let to = |edge: f32| (edge + 0.5).floor() as usize;
+            let rows = from(top).saturating_sub(band.top).max(self.rows.start)
+                ..to(bottom).saturating_sub(band.top).min(self.rows.end);
+            let columns = from(left)..to(right).min(band.width);
+            if !rows.is_empty() && !columns.is_empty() {
+                let section = of.placed.sections.one(record.place % PHASES, slab - record.place / PHASES);
+                fragments += self.add(simd, of, (band.stride, record, section), rows, columns);
+            }
+        }
+        fragments
+    }
+
+    /// Adds one voxel to the pixels of a rectangle.
+    #[inline(always)]
+    fn add<S: Simd>(
+        &mut self,
+        simd: S,
+        of: &Splatter<'_>,
+        (stride, record, section): (usize, &Record, f32),
+        rows: Range<usize>,
+        columns: Range<usize>,
+    ) -> u64 {
+        let at = |v: f32| Lanes::splat(simd, v);
+        let [aa, ab, bb] = of.shape.conic;
+        let (aa, ab, bb, value, section) = (at(aa), at(2.0 * ab), at(bb), at(record.value), at(section));
+        let (a, b, one, zero) = (at(record.at[0]), at(record.at[1]), at(1.0), at(0.0));
+        let mut fragments = 0;
+        for y in rows {
+            let span = &self.spans[y];
+            let (mut x, end) = (columns.start.max(span.start), columns.end.min(span.end));
+            while x < end {
+                let k = y * stride + x;
+                let da = Lanes::load(simd, &self.at[0][k..]) - a;
+                let db = Lanes::load(simd, &self.at[1][k..]) - b;
+                let s = aa.mul_add(da, ab * db).mul_add(da, bb * db * db);
+                let weight = of.placed.kernel.profile(simd, (one - s).max(zero)) * section;
+                let sums = &mut self.values[k..];
+                weight.mul_add(value, Lanes::load(simd, sums)).store(sums);
+                let sums = &mut self.weights[k..];
+                (weight + Lanes::load(simd, sums)).store(sums);
+                fragments += Lanes::<S>::COUNT as u64;
+                x += Lanes::<S>::COUNT;
+            }
+        }
+        fragments
+    }
+
+    /// Divides by kernel sums.
+    #[inline(always)]
+    pub(crate) fn finish<S: Simd>(&mut self, simd: S, stride: usize) {
+        for y in self.rows.clone() {
+            let mut x = self.spans[y].start;
+            while x < self.spans[y].end {
+                let k = y * stride + x;
+                let weight = Lanes::load(simd, &self.weights[k..]).max(Lanes::splat(simd, LEAST_WEIGHT));
+                (Lanes::load(simd, &self.values[k..]) / weight).store(&mut self.values[k..]);
+                x += Lanes::<S>::COUNT;
+            }
+        }
+    }
+
+    /// Extinction, where there is a value, and colour from pixel `k` on.
+    #[inline(always)]
+    pub(crate) fn classify<S: Simd>(&self, simd: S, of: &Placed<'_>, k: usize) -> [Lanes<S>; 4] {
+        let [extinction, red, green, blue] = of.classifier.at(simd, Lanes::load(simd, &self.values[k..]));
+        let weight = Lanes::load(simd, &self.weights[k..]);
+        [extinction.where_less(Lanes::splat(simd, LEAST_WEIGHT), weight), red, green, blue]
+    }
+
+    /// Depth of what each ray from pixel `k` on has of slab and volume, 0 for none.
+    #[inline(always)]
+    pub(crate) fn depth<S: Simd>(&self, simd: S, k: usize) -> Lanes<S> {
+        (Lanes::load(simd, &self.far[k..]) - Lanes::load(simd, &self.near[k..])).max(Lanes::splat(simd, 0.0))
+    }
+}
+
+/// Whether any lane is above 0.
+#[inline(always)]
+pub(crate) fn is_any<S: Simd>(lanes: Lanes<S>) -> bool {
+    let mut out = [0.0; MAX_LANES];
+    lanes.store(&mut out);
+    out[..Lanes::<S>::COUNT].iter().any(|v| *v > 0.0)
+}

@@ -1,0 +1,174 @@
+//! An image, the eye's or the light's, as slab coordinates see it: where places are in it, and how far kernels reach there.
+//!
+//! A kernel is a footprint along its slab times sections across it: in the slab's plane an ellipse s(q) = 1 about the voxel. A
+//! pixel has the value of the place q at which its own ray is in the midst of slab and volume, so the eye and the light see one
+//! and the same sheet, each at its own places.
+
+use super::frame::Frame;
+use super::placed::Placed;
+use splat_core::Camera;
+use splat_core::glam::{DMat2, DVec2, DVec3, Vec3};
+
+/// Least standard deviation of a footprint in its narrow direction, pixels: none falls between pixels.
+const LEAST_SIGMA_PX: f64 = 0.5;
+
+/// What rounding may move an edge by, pixels.
+const MARGIN: f32 = 0.05;
+
+/// One image in slab coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Sight {
+    pub(crate) camera: Camera,
+    /// Place of slab coordinates 0: x right, y down, z depth.
+    origin: Vec3,
+    /// What moves it per unit of the three.
+    steps: [Vec3; 3],
+    focal: f32,
+    center: [f32; 2],
+    is_parallel: bool,
+}
+
+/// The footprint of one volume in one image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Shape {
+    /// s = conic·(da², 2·da·db, db²), 1 at the rim.
+    pub(crate) conic: [f32; 3],
+    /// Extent of the ellipse in the slab, world units²: aa, ab, bb.
+    extent: [f64; 3],
+    /// For columns and for rows: extents of the image's two directions x and z, xx, xz, zz.
+    bounds: [[f32; 3]; 2],
+}
+
+impl Sight {
+    pub(crate) fn new(frame: &Frame, camera: Camera) -> Self {
+        let view = |p: DVec3| {
+            let v = camera.view_from_world(frame.world(p));
+            DVec3::new(v.x, -v.y, v.z)
+        };
+        let origin = view(DVec3::ZERO);
+        let [right, up, forward] = camera.axes.map(|axis| frame.direction(axis));
+        let step = |a: usize| Vec3::new(right[a] as f32, -up[a] as f32, forward[a] as f32);
+        Self {
+            camera,
+            origin: origin.as_vec3(),
+            steps: [0, 1, 2].map(step),
+            focal: camera.focal_px() as f32,
+            center: camera.size.map(|s| 0.5 * s as f32),
+            is_parallel: camera.is_orthographic(),
+        }
+    }
+
+    /// x, y and depth of slab coordinates, world units.
+    #[inline(always)]
+    fn image(&self, p: Vec3) -> Vec3 {
+        let [a, b, across] = self.steps;
+        self.origin + a * p.x + b * p.y + across * p.z
+    }
+
+    /// Pixel of slab coordinates before the image.
+    #[inline(always)]
+    pub(crate) fn pixel(&self, p: Vec3) -> [f32; 2] {
+        let at = self.image(p);
+        let scale = if self.is_parallel { self.focal } else { self.focal / at.z };
+        [self.center[0] + at.x * scale, self.center[1] + at.y * scale]
+    }
+
+    /// Columns and rows within which lie all pixels that see the kernel of a voxel at (a, b) in a slab from depth `low` to `high`:
+    /// from, to, from, to.
+    #[inline(always)]
+    pub(crate) fn bounds(&self, shape: &Shape, [a, b]: [f32; 2], [low, high]: [f32; 2]) -> [f32; 4] {
+        let one = self.bounds_at(shape, Vec3::new(a, b, low));
+        if low == high {
+            return one;
+        }
+        let other = self.bounds_at(shape, Vec3::new(a, b, high));
+        [one[0].min(other[0]), one[1].max(other[1]), one[2].min(other[2]), one[3].max(other[3])]
+    }
+
+    #[inline(always)]
+    fn bounds_at(&self, shape: &Shape, p: Vec3) -> [f32; 4] {
+        let at = self.image(p);
+        let [[xx, xz, zz], [yy, yz, _]] = shape.bounds;
+        let (x, y, half_x, half_y, scale) = if self.is_parallel {
+            (at.x, at.y, xx.sqrt(), yy.sqrt(), self.focal)
+        } else {
+            // The nearest place of the ellipse: |x/z − x₀/z₀| = |δx − (x₀/z₀)·δz|/z.
+            let nearest = at.z - zz.sqrt();
+            if nearest <= 1e-3 * zz.sqrt() {
+                return [f32::NEG_INFINITY, f32::INFINITY, f32::NEG_INFINITY, f32::INFINITY];
+            }
+            let (x, y) = (at.x / at.z, at.y / at.z);
+            let half = |v: f32, [vv, vz, zz]: [f32; 3]| (vv - 2.0 * v * vz + v * v * zz).max(0.0).sqrt() / nearest;
+            (x, y, half(x, [xx, xz, zz]), half(y, [yy, yz, zz]), self.focal)
+        };
+        let (cx, cy) = (self.center[0] + x * scale, self.center[1] + y * scale);
+        let (hx, hy) = (half_x * scale + MARGIN, half_y * scale + MARGIN);
+        [cx - hx, cx + hx, cy - hy, cy + hy]
+    }
+
+    /// The footprint of a volume whose ellipse has this extent along the slabs, widened where it would fall between pixels.
+    pub(crate) fn shape(&self, frame: &Frame, placed: &Placed<'_>) -> Shape {
+        let pixel = self.pixel_in_slab(frame, placed);
+        let inverse = pixel.inverse();
+        let [aa, ab, bb] = placed.extent;
+        let kernel = DMat2::from_cols(DVec2::new(aa, ab), DVec2::new(ab, bb));
+        let in_pixels = inverse * kernel * inverse.transpose();
+        let half = 0.5 * (in_pixels.x_axis.x - in_pixels.y_axis.y);
+        let slant = in_pixels.x_axis.y;
+        let smallest = 0.5 * (in_pixels.x_axis.x + in_pixels.y_axis.y) - libm::sqrt(half * half + slant * slant);
+        let least = LEAST_SIGMA_PX * placed.cutoff;
+        let wider = pixel * pixel.transpose() * (least * least - smallest).max(0.0);
+        Shape::new(self, [aa + wider.x_axis.x, ab + wider.x_axis.y, bb + wider.y_axis.y])
+    }
+
+    /// The longer side of a pixel in the slabs' plane, world units, at the farthest corner of a volume.
+    pub(crate) fn widest_pixel(&self, frame: &Frame, placed: &Placed<'_>) -> f64 {
+        let pixel = self.pixel_in_slab(frame, placed);
+        pixel.x_axis.length().max(pixel.y_axis.length())
+    }
+
+    /// What a pixel is in the slabs' plane, at the farthest corner of a volume: columns for a step right and one down.
+    fn pixel_in_slab(&self, frame: &Frame, placed: &Placed<'_>) -> DMat2 {
+        let depth = |p: DVec3| self.camera.view_from_world(p).z;
+        let middle = frame.world(DVec3::new(0.0, 0.0, -frame.slabs.origin));
+        let view = self.camera.view_from_world(middle);
+        let far = super::frame::world_corners(placed.volume).map(depth).into_iter().fold(view.z, f64::max);
+        let [x, y] = match self.is_parallel || view.z <= 0.0 {
+            true => self.center.map(f64::from),
+            false => {
+                let p = self.pixel(Vec3::new(0.0, 0.0, -frame.slabs.origin as f32));
+                [0, 1].map(|a| f64::from(p[a]).clamp(0.0, 2.0 * f64::from(self.center[a])))
+            }
+        };
+        let place = |x: f64, y: f64| {
+            let ray = frame.ray(&self.camera, x, y);
+            let z = (-frame.slabs.origin - ray.from.z) / ray.along.z;
+            (DVec2::new(ray.from.x + ray.along.x * z, ray.from.y + ray.along.y * z), z)
+        };
+        let (here, z) = place(x, y);
+        let scale = if self.is_parallel { 1.0 } else { far / z.abs().max(1e-9 * far) };
+        DMat2::from_cols(place(x + 1.0, y).0 - here, place(x, y + 1.0).0 - here) * scale
+    }
+}
+
+impl Shape {
+    fn new(of: &Sight, extent: [f64; 3]) -> Self {
+        let [aa, ab, bb] = extent;
+        let norm = 1.0 / (aa * bb - ab * ab);
+        let [a, b, _] = of.steps;
+        let product = |i: usize, k: usize| {
+            let (ai, bi, ak, bk) = (f64::from(a[i]), f64::from(b[i]), f64::from(a[k]), f64::from(b[k]));
+            (ai * ak * aa + (ai * bk + bi * ak) * ab + bi * bk * bb) as f32
+        };
+        Self {
+            conic: [bb, 0.0 - ab, aa].map(|c| (c * norm) as f32),
+            extent,
+            bounds: [0, 1].map(|i| [product(i, i), product(i, 2), product(2, 2)]),
+        }
+    }
+
+    /// Extent of the ellipse in the slab, world units²: aa, ab, bb.
+    pub(crate) fn extent(&self) -> [f64; 3] {
+        self.extent
+    }
+}

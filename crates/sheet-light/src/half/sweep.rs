@@ -1,0 +1,195 @@
+//! One light's sweep over all slabs: the eye's sheets, then the light's (the loop of the pseudocode, steps 9 to 24).
+
+use super::band::{Band, ROWS};
+use super::buckets::{Buckets, records};
+use super::counts::HalfCounts;
+use super::eye_buffer::Pixels;
+use super::eye_sheets::{EyeBand, OneSlab, Step};
+use super::frame::Frame;
+use super::gradient::Gradients;
+use super::light_buffer::LightBuffer;
+use super::light_path::LightPath;
+use super::placed::Placed;
+use super::serves::axis_of_view;
+use super::shade::is_lit;
+use super::sight::{Shape, Sight};
+use super::{HalfInput, HalfParams, lamp};
+use crate::error::cancelled;
+use crate::{Error, Volume};
+use rayon::prelude::*;
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::raster::pulp;
+use splat_core::shade::{ChannelLayout, LitBy};
+use splat_core::{Accumulator, LightShape, Progress};
+
+/// Everything that is the same for all slabs, and the light buffer.
+pub(crate) struct Sweep<'a> {
+    pub(crate) volumes: &'a [Volume<'a>],
+    pub(crate) placed: Vec<Placed<'a>>,
+    pub(crate) frame: Frame,
+    /// The eye's image.
+    pub(crate) sight: Sight,
+    pub(crate) shapes: Vec<Shape>,
+    pub(crate) buckets: Vec<Buckets>,
+    pub(crate) gradients: Gradients,
+    /// `None` for ambient and emitted light alone.
+    pub(crate) light: Option<&'a LitBy<'a>>,
+    pub(crate) light_buffer: Option<LightBuffer>,
+    /// By volume.
+    pub(crate) paths: Vec<LightPath>,
+    pub(crate) ambient: [f32; 3],
+    pub(crate) shadow_origin: DVec3,
+    pub(crate) cutoff: f32,
+    /// Whether light depends on where a point is.
+    pub(crate) is_lit_by_place: bool,
+    /// Whether ambient and emitted light belong to another sweep.
+    pub(crate) light_alone: bool,
+    input: &'a HalfInput<'a>,
+    visible: u64,
+}
+
+impl<'a> Sweep<'a> {
+    /// Prepares a sweep for one light that half vectors serve.
+    pub(crate) fn new(
+        input: &'a HalfInput<'a>,
+        params: &HalfParams,
+        light: Option<&'a LitBy<'a>>,
+        light_alone: bool,
+    ) -> Result<Self, Error> {
+        let sheets = &input.sheets;
+        let (volumes, camera) = (&sheets.volumes[..], sheets.camera);
+        let light = light.filter(|_| volumes.iter().any(is_lit));
+        let axis = axis_of_view(volumes, camera, light.map(|lit| &lit.light));
+        let frame = Frame::new(volumes, camera, &params.sheets, &axis)?;
+        let placed: Vec<Placed<'a>> = volumes.iter().map(|v| Placed::new(v, &frame, &params.sheets)).collect();
+        let sight = Sight::new(&frame, *camera);
+        let by_place =
+            |lit: &LitBy<'_>| lit.shadow.is_some() || !matches!(lit.light.shape, LightShape::Directional { .. });
+        let mut sweep = Self {
+            volumes,
+            shapes: placed.iter().map(|p| sight.shape(&frame, p)).collect(),
+            buckets: Vec::new(),
+            gradients: Gradients::new(&frame),
+            light,
+            light_buffer: light
+                .map(|lit| LightBuffer::new(&frame, lamp::camera_of(volumes, &lit.light, params), volumes, &placed)),
+            paths: light
+                .map_or_else(Vec::new, |lit| volumes.iter().map(|v| LightPath::new(v, &lit.light, &frame)).collect()),
+            ambient: sheets.ambient,
+            shadow_origin: sheets.shadow_origin,
+            cutoff: params.sheets.transmittance_cutoff,
+            is_lit_by_place: light.is_some_and(by_place),
+            light_alone,
+            input,
+            visible: 0,
+            placed,
+            frame,
+            sight,
+        };
+        sweep.sort_voxels();
+        Ok(sweep)
+    }
+
+    /// Finds the voxels that matter and sorts them for both images (steps 3 and 4).
+    fn sort_voxels(&mut self) {
+        for (v, placed) in self.placed.iter().enumerate() {
+            let shape = &self.shapes[v];
+            let mut reach = placed.lattice_reach(shape.extent(), self.sight.widest_pixel(&self.frame, placed));
+            if let Some(buffer) = &self.light_buffer {
+                let light = placed.lattice_reach(buffer.shape(v).extent(), 0.0);
+                (0..3).for_each(|a| reach[a] = reach[a].max(light[a]));
+            }
+            let (lattice, voxels) = placed.voxels(reach);
+            let records = records(placed, &lattice, &voxels);
+            self.visible += voxels.count();
+            self.buckets.push(Buckets::new(&records, placed, &self.frame, &self.sight, shape));
+            if let Some(buffer) = &mut self.light_buffer {
+                let lists = Buckets::new(&records, placed, &self.frame, &buffer.sight, buffer.shape(v));
+                buffer.push(lists);
+            }
+        }
+    }
+
+    /// Runs the sweep. One tick a slab.
+    pub(crate) fn run(
+        mut self,
+        layout: &ChannelLayout,
+        form: &Accumulator,
+        progress: &Progress,
+    ) -> Result<(Vec<EyeBand>, HalfCounts), Error> {
+        let mut bands = self.bands(form);
+        let mut counts = self.counts(&bands);
+        for slab in 0..self.frame.slabs.count {
+            progress.tick(1).map_err(cancelled)?;
+            counts.eye_fragments += self.pass(&mut bands, layout, slab, Step::Draw);
+            if let Some(buffer) = &mut self.light_buffer {
+                counts.light_fragments += buffer.attenuate(slab, &self.frame, &self.placed);
+            }
+        }
+        // Depths are summed from the eye on, so a sweep that comes towards it needs a second one for them.
+        if self.frame.back_to_front && !form.depth.is_empty() && !self.light_alone {
+            let mut depths = self.bands(&Accumulator { channels: Vec::new(), ..form.clone() });
+            for slab in (0..self.frame.slabs.count).rev() {
+                progress.tick(0).map_err(cancelled)?;
+                counts.eye_fragments += self.pass(&mut depths, layout, slab, Step::Depths);
+            }
+            for (band, depths) in bands.iter_mut().zip(depths) {
+                band.pixels.depth = depths.pixels.depth;
+            }
+        }
+        Ok((bands, counts))
+    }
+
+    /// One slab in the eye's image. Number of footprint numbers.
+    fn pass(&self, bands: &mut [EyeBand], layout: &ChannelLayout, slab: u32, step: Step) -> u64 {
+        let one = |(index, eye): (usize, &mut EyeBand)| {
+            pulp::Arch::new().dispatch(OneSlab { of: self, layout, index, slab, step, eye })
+        };
+        bands.par_iter_mut().enumerate().map(one).sum()
+    }
+
+    fn bands(&self, form: &Accumulator) -> Vec<EyeBand> {
+        let (camera, opaque) = (&self.sight.camera, self.input.opaque);
+        let rim = usize::from(self.volumes.iter().any(|v| v.normals));
+        let one = |b: usize| {
+            let mut band = Band::new(b, rim, &self.frame, camera, self.volumes);
+            if !opaque.is_empty() {
+                band.end_at(opaque, &self.frame, camera);
+            }
+            let pixels = Pixels::new(&band, form);
+            EyeBand::new(band, self.volumes, pixels)
+        };
+        (0..(camera.size[1] as usize).div_ceil(ROWS)).into_par_iter().map(one).collect()
+    }
+
+    fn counts(&self, bands: &[EyeBand]) -> HalfCounts {
+        let buffer = self.light_buffer.as_ref();
+        let light_bytes = buffer.map_or(0, LightBuffer::bytes);
+        let lists: u64 = self.buckets.iter().map(Buckets::bytes).sum();
+        let eye: u64 = bands.iter().map(EyeBand::bytes).sum();
+        HalfCounts {
+            voxels: self.volumes.iter().map(|v| v.grid.values.len() as u64).sum(),
+            visible: self.visible,
+            sweeps: 1,
+            slabs: self.frame.slabs.count.into(),
+            light_bytes,
+            bytes: light_bytes + lists + eye + buffer.map_or(0, LightBuffer::list_bytes),
+            ..HalfCounts::default()
+        }
+    }
+
+    /// Unit direction from what a pixel sees to the eye.
+    #[inline]
+    pub(crate) fn to_eye(&self, [x, y]: [usize; 2]) -> Vec3 {
+        let camera = &self.sight.camera;
+        let [right, up, forward] = camera.axes;
+        let (_, along) = camera.view_ray(x as f64 + 0.5, y as f64 + 0.5);
+        -(right * along.x + up * along.y + forward * along.z).normalize().as_vec3()
+    }
+
+    /// View depth of a pixel's ray at a depth across the slabs.
+    pub(crate) fn view_depth(&self, [x, y]: [usize; 2], depth: f32) -> f64 {
+        let ray = self.frame.ray(&self.sight.camera, x as f64 + 0.5, y as f64 + 0.5);
+        (f64::from(depth) - ray.from.z) / ray.along.z
+    }
+}

@@ -1,0 +1,7 @@
+//! Half-vector sheets: closed forms, hard cases, invariances, the slow twin.
+
+mod closed_forms;
+mod common;
+mod hard_cases;
+mod invariances;
+mod twin;

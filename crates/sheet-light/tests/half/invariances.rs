@@ -1,0 +1,104 @@
+//! Threads, place, scale, and slabs that become thin.
+
+use super::common::{draw, exact, input, lamp, scattering, sun};
+use crate::common::{apart, cubic, grid, noise, parallel, perspective, transfer, volume};
+use sheet_light::half::HalfParams;
+use splat_core::glam::DVec3;
+use splat_core::{Accumulator, Camera, Light, LightShape, Material, Projection, TransferFunction, TransferPoint};
+
+#[test]
+fn x1_any_number_of_threads_gives_the_same_bits() {
+    let (tf, material) = (transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]), Material::default());
+    let grid = grid([20, 20, 20], cubic(0.5), noise);
+    let mut volumes = [volume(&grid, &tf, &material)];
+    volumes[0].normals = true;
+    let camera = perspective([2.0, 3.0, 16.0], 50.0, [100, 80]);
+    for lights in [[sun([1.0, 2.0, 1.5]), lamp([9.0, 12.0, 4.0])], [sun([1.0, 2.0, -3.0]), lamp([0.0, 3.0, -14.0])]] {
+        let with = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| draw(&input(&volumes, &camera, &lights), &HalfParams::default()).unwrap())
+        };
+        let one = with(1);
+        assert!(one.0.channels[0].iter().any(|c| *c > 0.01));
+        for threads in [2, 3, 7] {
+            assert_eq!(with(threads), one, "{threads} threads");
+        }
+    }
+}
+
+/// A volume of noise moved by `shift` and scaled by `scale`, seen and lit the same way.
+fn moved(shift: f64, scale: f64, shape: LightShape) -> Accumulator {
+    let mut grid = grid([14, 13, 12], cubic(0.5), noise);
+    grid.origin = grid.origin * scale + DVec3::splat(shift);
+    grid.axes *= scale;
+    let points = [(0.3f32, 0.0f32), (0.5, 0.4), (0.9, 2.5)];
+    let point = |(value, extinction)| TransferPoint { value, color: [value; 3], extinction: extinction / scale as f32 };
+    let tf = TransferFunction::new(points.into_iter().map(point).collect()).unwrap();
+    let material = Material::default();
+    let mut volumes = [volume(&grid, &tf, &material)];
+    volumes[0].normals = true;
+    let eye = DVec3::new(2.0, 3.0, 11.0) * scale + DVec3::splat(shift);
+    let projection = Projection::Perspective { fov_y: 0.8 };
+    let camera = Camera::look_at(eye, DVec3::splat(shift), DVec3::Y, projection, [50, 40]).unwrap();
+    let mut lit = super::common::lit(match shape {
+        LightShape::Point { position } => LightShape::Point { position: position * scale + DVec3::splat(shift) },
+        other => other,
+    });
+    let bright = if shape.place().is_some() { 100.0 * (scale * scale) as f32 } else { 1.0 };
+    lit.light = Light { intensity: [bright; 3], ..lit.light };
+    draw(&input(&volumes, &camera, &[lit]), &exact(None)).unwrap().0
+}
+
+fn shapes() -> [LightShape; 3] {
+    let sun = |v: [f64; 3]| LightShape::Directional { direction: DVec3::from_array(v).normalize() };
+    [sun([-1.0, -2.0, -1.5]), sun([1.0, -1.0, 2.0]), LightShape::Point { position: DVec3::new(-6.0, 7.0, 9.0) }]
+}
+
+#[test]
+fn scale2_a_power_of_two_changes_no_bit() {
+    for shape in shapes() {
+        let one = moved(0.0, 1.0, shape);
+        assert!(one.channels[0].iter().any(|c| *c > 0.01));
+        for exponent in [-10, 10] {
+            let mut other = moved(0.0, 2f64.powi(exponent), shape);
+            assert_ne!(other.depth, one.depth);
+            other.depth.clone_from(&one.depth);
+            assert_eq!(other, one, "2^{exponent}, {shape:?}");
+        }
+    }
+}
+
+#[test]
+fn shift_a_place_far_from_the_origin_looks_the_same() {
+    for shape in shapes() {
+        let difference = apart(&moved(0.0, 1.0, shape), &moved(1e7, 1.0, shape));
+        assert!(difference < 2e-3, "{shape:?}: {difference:e}");
+    }
+}
+
+#[test]
+fn hv05_thinner_slabs_converge_in_second_order() {
+    let (tf, material) = (transfer(&[(-1.5, 0.0), (0.0, 0.3), (1.5, 0.9)]), scattering());
+    let grid = grid([10, 10, 10], cubic(0.5), |p| (0.9 * p.x + 0.3 * p.z).sin() + 0.4 * (0.7 * p.y - 0.8 * p.z).cos());
+    let volumes = [volume(&grid, &tf, &material)];
+    let camera = parallel([0.0, 0.0, 12.0], 5.0, [16, 16]);
+    for light in [sun([1.0, 0.3, 2.0]), sun([1.0, 0.3, -2.0])] {
+        let lights = [light];
+        let with = |width: f64| {
+            let params = HalfParams { light_pixels: 3.0, ..exact(Some(width)) };
+            draw(&input(&volumes, &camera, &lights), &params).unwrap().0
+        };
+        let truth = with(0.03125);
+        let rmse = |width: f64| {
+            let squares = with(width).channels[1]
+                .iter()
+                .zip(&truth.channels[1])
+                .map(|(a, b)| f64::from((a - b) * (a - b)))
+                .sum::<f64>();
+            squares.sqrt()
+        };
+        let (coarse, fine) = (rmse(0.5), rmse(0.25));
+        let order = (coarse / fine).log2();
+        assert!(order > 1.9, "order {order}: {coarse:e} → {fine:e}");
+    }
+}

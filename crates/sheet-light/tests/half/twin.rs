@@ -1,0 +1,68 @@
+//! Bands, buckets, bounds, lanes and closed forms of light against the slow form in f64.
+
+use super::common::{draw, exact, input, lamp, scattering, sun};
+use crate::common::{cubic, grid, noise, parallel, perspective, transfer, unlit, volume};
+use sheet_light::half::{HalfInput, HalfParams, reference};
+use splat_core::glam::{DMat3, DVec3};
+use splat_core::{Light, Material};
+
+/// Greatest differences from the twin: optical depth, colour times 4π.
+fn differences(input: &HalfInput<'_>, params: &HalfParams) -> [f64; 2] {
+    let (found, counts) = draw(input, params).unwrap();
+    let twin = reference::draw(input, params).unwrap();
+    let mut worst = [0.0f64; 2];
+    for (at, expected) in twin.optical_depth.iter().enumerate() {
+        worst[0] = worst[0].max((f64::from(found.optical_depth[0][at]) - expected).abs());
+        for c in 0..3 {
+            let difference = f64::from(found.channels[c][at]) - twin.color[at][c];
+            worst[1] = worst[1].max(difference.abs() * 4.0 * std::f64::consts::PI);
+        }
+    }
+    let seen = twin.optical_depth.iter().filter(|t| **t > 0.01).count();
+    assert!(seen > 100 && counts.eye_fragments > 0 && counts.light_fragments > 0, "{seen} pixels show anything");
+    worst
+}
+
+#[test]
+fn hv_lit_sheets_are_those_of_the_twin() {
+    let (tf, material) = (transfer(&[(0.2, 0.0), (0.5, 0.4), (0.8, 0.1), (0.9, 1.5)]), scattering());
+    let sheared = DMat3::from_cols(DVec3::new(0.5, 0.1, 0.0), DVec3::new(0.2, 0.6, -0.1), DVec3::new(-0.1, 0.1, -0.7));
+    let bright = |at: [f64; 3]| {
+        let mut lit = lamp(at);
+        lit.light = Light { intensity: [100.0; 3], ..lit.light };
+        lit
+    };
+    for axes in [cubic(0.5), sheared] {
+        let grid = grid([8, 7, 6], axes, noise);
+        let volumes = [volume(&grid, &tf, &material)];
+        for camera in [parallel([3.0, 2.0, 8.0], 7.0, [28, 20]), perspective([2.0, 3.0, 8.0], 40.0, [20, 28])] {
+            let suns = [sun([1.0, 3.0, 2.0]), sun([-1.0, 2.0, -3.0])];
+            for (light, slab_width) in
+                [(suns[0], None), (suns[1], Some(0.3)), (suns[0], Some(1.3)), (suns[1], Some(9.0))]
+            {
+                let [tau, color] = differences(&input(&volumes, &camera, &[light]), &exact(slab_width));
+                assert!(tau < 2e-5 && color < 5e-5, "{slab_width:?}, {:?}: {tau:e} {color:e}", light.light.shape);
+            }
+            // On the way through a slab optical depth towards a lamp is curved, where its light grazes a face most.
+            for (light, slab_width) in [(bright([6.0, 8.0, 2.0]), Some(0.2)), (bright([-4.0, 3.0, -9.0]), None)] {
+                let [tau, color] = differences(&input(&volumes, &camera, &[light]), &exact(slab_width));
+                assert!(tau < 2e-5 && color < 5e-4, "{slab_width:?}, {:?}: {tau:e} {color:e}", light.light.shape);
+            }
+        }
+    }
+}
+
+#[test]
+fn hv_volumes_that_overlap_shadow_each_other_as_in_the_twin() {
+    let (tf, other_tf) = (transfer(&[(0.2, 0.0), (0.7, 0.9)]), transfer(&[(300.0, 0.0), (900.0, 0.5), (1000.0, 0.0)]));
+    let (plain, glowing) = (scattering(), Material { emission: [0.02, 0.0, 0.1], ..unlit() });
+    let one = grid([9, 7, 6], cubic(0.5), noise);
+    let mut two = grid([5, 6, 5], cubic(0.6), |p| 1000.0 * noise(p));
+    two.origin += DVec3::new(1.0, 0.3, 0.8);
+    let volumes = [volume(&one, &tf, &plain), volume(&two, &other_tf, &glowing)];
+    let camera = perspective([2.0, 3.0, 9.0], 40.0, [24, 24]);
+    for light in [sun([1.0, 3.0, 2.0]), sun([2.0, 1.0, -3.0])] {
+        let [tau, color] = differences(&input(&volumes, &camera, &[light]), &exact(Some(0.1)));
+        assert!(tau < 2e-5 && color < 2e-4, "{:?}: {tau:e} {color:e}", light.light.shape);
+    }
+}
