@@ -95,17 +95,19 @@ fn steps(repo: &Repo) -> Vec<Step> {
         // All targets: examples, tests and benches compile here too.
         step("clippy", one(&format!("clippy --workspace --all-targets --features {FEATURES},{DRIVER} -- -D warnings"))),
         step("docs", docs),
-        step("alone", Work::Cargo(alone(repo), &[])),
+        step("alone", Work::Cargo(alone(repo, is_picked), &[])),
         step("tests", Work::Task(vulkan::tests)),
         step("vulkan", Work::Task(vulkan::beside_tests)),
     ]
 }
 
 /// What takes minutes and rarely breaks where [`run`] holds, to be run before a release: kernels compiled anew, where tests hold the
-/// hashes of what they were compiled from; recordings by every executor under every validation.
+/// hashes of what they were compiled from; the orchestrator's crates each without what the others ask of their dependencies;
+/// recordings by every executor under every validation.
 pub(crate) fn deep(repo: &Repo) -> Outcome {
     let steps = [
         Step { name: "shaders", work: Work::Task(|repo| shaders::run(repo, true)) },
+        Step { name: "alone", work: Work::Cargo(alone(repo, |folder| !is_picked(folder)), &[]) },
         Step { name: "vulkan", work: Work::Task(vulkan::run) },
     ];
     follow(&steps, repo)
@@ -115,12 +117,17 @@ pub(crate) fn split(line: &str) -> Vec<String> {
     line.split(' ').map(str::to_owned).collect()
 }
 
-/// Each library crate without its default features, then with each of its features alone.
-fn alone(repo: &Repo) -> Vec<Vec<String>> {
+/// Whether people take a crate by itself: the stages and what they stand on, not the parts of the orchestrator.
+fn is_picked(folder: &str) -> bool {
+    !folder.starts_with("crates/organza")
+}
+
+/// Each of these library crates without its default features, then with each of its features alone.
+fn alone(repo: &Repo, which: fn(&str) -> bool) -> Vec<Vec<String>> {
     let mut runs = Vec::new();
     // A command has no library.
     let is_library = |folder: &&str| repo.text(&format!("{folder}/src/main.rs")).is_none();
-    for folder in repo.crate_folders().into_iter().filter(is_library) {
+    for folder in repo.crate_folders().into_iter().filter(|folder| which(folder)).filter(is_library) {
         let name = folder.trim_start_matches("crates/");
         let bare = format!("check --package {name} --lib --no-default-features");
         let manifest = repo.text(&format!("{folder}/Cargo.toml")).unwrap_or_default();
@@ -138,10 +145,10 @@ mod tests {
     #[test]
     fn every_feature_is_checked_alone() {
         let manifest = "[features]\ndefault = [\"ply\"]\nply = [\"dep:x\"]\nlas = []\n[dependencies]\ny = \"1\"\n";
-        let command = [("crates/c/Cargo.toml", ""), ("crates/c/src/main.rs", "")];
+        let command = [("crates/c/Cargo.toml", ""), ("crates/c/src/main.rs", ""), ("crates/organza-d/Cargo.toml", "")];
         let repo =
             Repo::of(&[&[("crates/a/Cargo.toml", manifest), ("crates/b/Cargo.toml", "")], &command[..]].concat());
-        let found: Vec<_> = alone(&repo).iter().map(|words| words[2..].join(" ")).collect();
+        let found = |which| alone(&repo, which).iter().map(|words| words[2..].join(" ")).collect::<Vec<_>>();
         let bare = "--lib --no-default-features";
         let expected = [
             format!("a {bare}"),
@@ -149,7 +156,8 @@ mod tests {
             format!("a {bare} --features las"),
             format!("b {bare}"),
         ];
-        assert_eq!(found, expected);
+        assert_eq!(found(is_picked), expected);
+        assert_eq!(found(|folder| !is_picked(folder)), [format!("organza-d {bare}")]);
     }
 
     #[test]
