@@ -68,14 +68,18 @@ impl Which {
     }
 }
 
-const BOTH: &[&str] = &["points", "particles"];
+const EACH: &[&str] = &["points", "particles", "sheets"];
 const POINTS: &[&str] = &["points"];
 const PARTICLES: &[&str] = &["particles"];
 const SHEETS: &[&str] = &["sheets"];
+const BUT_POINTS: &[&str] = &["particles", "sheets"];
+const BUT_PARTICLES: &[&str] = &["points", "sheets"];
 
 impl Entry {
-    pub(crate) fn applies_to(&self, source: &str) -> bool {
-        self.sources.has(source)
+    /// Whether it is tried with a source by a technique. What is no medium is splats for sheets as for points: one such source
+    /// stands for all.
+    pub(crate) fn applies_to(&self, source: &str, technique: &str) -> bool {
+        self.sources.has(source) && (technique != "sheets" || Media.has(source) || source == "implicit")
     }
 
     pub(crate) fn expected(&self, source: &str, technique: &str) -> Expected {
@@ -100,7 +104,7 @@ impl Entry {
     }
 
     fn but(mut self, which: Which, expected: Expected) -> Self {
-        self.but.push((which, BOTH, expected));
+        self.but.push((which, EACH, expected));
         self
     }
 
@@ -113,7 +117,7 @@ impl Entry {
 /// A trial with some sources.
 fn of(sources: Which, key: &'static str, set: &'static str) -> Entry {
     let (with, but) = (&[][..], Vec::new());
-    Entry { key, set, with, look: Look::Picture, frame: None, techniques: BOTH, sources, but }
+    Entry { key, set, with, look: Look::Picture, frame: None, techniques: EACH, sources, but }
 }
 
 /// A trial with one source.
@@ -343,6 +347,8 @@ fn materials() -> Vec<Entry> {
 const BALL: Which = These(&["medium_ball"]);
 const POINTS_ONLY: Expected = Nothing("a setting of the technique `points`");
 const PARTICLES_ONLY: Expected = Nothing("a setting of the technique `particles`");
+const NO_VOXELS: Expected = Nothing("a surface comes as splats, which have footprints of their own");
+const BALL_AND_SURFACE: Which = These(&["medium_ball", "implicit"]);
 
 fn render() -> Vec<Entry> {
     vec![
@@ -353,9 +359,9 @@ fn render() -> Vec<Entry> {
         of(BALL, "render.tolerance", "render.tolerance=1").look(Look::Work).with(THIN),
         one("render.exposure", "render.exposure=1").look(Look::Displayed),
         one("render.layers", "render.layers=['depth']").look(Look::Layers),
-        one("render.seed", "render.seed=5").but_by(POINTS, Nothing("nothing of it is random")),
+        one("render.seed", "render.seed=5").but_by(BUT_PARTICLES, Nothing("nothing of it is random")),
         of(All, "render.max_points", "render.max_points=3").but(All, Refused(5, "max_points")),
-        of(BALL, "render.points", "render.points={first_slices=1}").but_by(PARTICLES, POINTS_ONLY),
+        of(BALL, "render.points", "render.points={first_slices=1}").but_by(BUT_POINTS, POINTS_ONLY),
         of(BALL, "render.points.slice_thickness", "render.points.slice_thickness=0.5")
             .by(POINTS)
             .with(&["render.points.exact=false"]),
@@ -380,7 +386,7 @@ fn render() -> Vec<Entry> {
         of(BALL, "render.shadow.mapping", "render.shadow.mapping='polar'"),
         of(BALL, "render.shadow.cells", "render.shadow.cells=4"),
         of(BALL, "render.shadow.absorbance_cut", "render.shadow.absorbance_cut=0.1"),
-        one("render.particles", "render.particles={repeat_level=7}").but_by(POINTS, PARTICLES_ONLY),
+        one("render.particles", "render.particles={repeat_level=7}").but_by(BUT_PARTICLES, PARTICLES_ONLY),
         one("render.particles.repeat_level", "render.particles.repeat_level=7").by(PARTICLES).look(Look::Sets),
         one("render.particles.target_error", "render.particles.target_error=100")
             .by(PARTICLES)
@@ -391,9 +397,13 @@ fn render() -> Vec<Entry> {
             .by(PARTICLES)
             .with(&["render.particles.surface_sampler='brownian'"]),
         of(BALL, "render.sheets", "render.sheets={slab_width=0.4}").by(SHEETS),
-        of(BALL, "render.sheets.slab_width", "render.sheets.slab_width=0.4").by(SHEETS),
-        of(BALL, "render.sheets.kernel_extent", "render.sheets.kernel_extent=3").by(SHEETS),
-        of(BALL, "render.sheets.kernel_sigma", "render.sheets.kernel_sigma=1").by(SHEETS),
+        of(BALL_AND_SURFACE, "render.sheets.slab_width", "render.sheets.slab_width=0.4").by(SHEETS),
+        of(BALL_AND_SURFACE, "render.sheets.kernel_extent", "render.sheets.kernel_extent=3")
+            .by(SHEETS)
+            .but(These(&["implicit"]), NO_VOXELS),
+        of(BALL_AND_SURFACE, "render.sheets.kernel_sigma", "render.sheets.kernel_sigma=1")
+            .by(SHEETS)
+            .but(These(&["implicit"]), NO_VOXELS),
         of(BALL, "render.sheets.transmittance_cutoff", "render.sheets.transmittance_cutoff=0.9")
             .by(SHEETS)
             .with(&["object.it.transform.scale=4"]),
