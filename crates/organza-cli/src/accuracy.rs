@@ -123,7 +123,11 @@ fn sheets(
     if let Some(reason) = renderer.refused(&drawn)? {
         return absent(reason);
     }
-    let sweep = match accuracy::sheets(scene, renderer.slab_width(&drawn)?, facts, options) {
+    let slab_width = match renderer.slab_width(&drawn) {
+        Err(limit @ Error::Limit(_)) => return absent(limit.to_string()),
+        found => found?,
+    };
+    let sweep = match accuracy::sheets(scene, slab_width, facts, options) {
         Ok(sweep) => sweep,
         Err(reason) => return absent(reason),
     };

@@ -1,6 +1,6 @@
 //! Light that arrives in a volume through the shadows of a light, looked up once for each voxel that is needed.
 //!
-//! A sheet asks for light in every pixel of every slab, often a hundred times a voxel, and a look-up in a shadow map takes far longer
+//! A sheet asks for light in every pixel of every slab, many times a voxel, and a look-up in a shadow map takes far longer
 //! than all else of a pixel. Shadows of translucent things are no sharper than the splats that cast them, so what lies between
 //! voxels is interpolated trilinearly, as the values are that it lights.
 

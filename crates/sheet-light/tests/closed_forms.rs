@@ -3,7 +3,7 @@
 use crate::common::{constant, cubic, draw, exact, grid, input, parallel, perspective, transfer, unlit, volume};
 use sheet_light::{KernelShape, Params, sections};
 use splat_core::glam::{DMat3, DVec3};
-use splat_core::{Camera, Grid};
+use splat_core::{Camera, Footprint, Grid};
 
 /// Length of a pixel's ray inside a lattice's cells, found by bisection of its ends, not by planes.
 fn length(grid: &Grid, camera: &Camera, x: usize, y: usize) -> f64 {
@@ -104,9 +104,28 @@ fn ia01_sections_of_every_phase_sum_to_one() {
             assert!((mean - middle).abs() < if reach < 1.0 { 0.5 } else { 0.02 }, "{reach} {phase}: {mean} {middle}");
         }
     }
-    // Five slabs, not the paper's four.
+    // Five slabs, not the paper's four, which lose what the first or the last holds.
     assert_eq!(sections::touched(2.0), 5);
-    assert!(sections::sections(128, 2.0, 4.08)[4] > 1e-3);
+    let KernelShape { extent, sigma } = KernelShape::default();
+    let sharpness = 0.5 * (extent / sigma).powi(2);
+    let fifth = |phase: u32| sections::sections(phase, extent, sharpness)[4];
+    let most = (0..sections::PHASES).map(fifth).fold(0.0, f64::max);
+    assert!((0.0435..0.0445).contains(&most), "{most}");
+}
+
+#[test]
+fn footprints_on_a_lattice_ripple_by_less_than_a_hundredth() {
+    let KernelShape { extent, sigma } = KernelShape::default();
+    let footprint = Footprint { cutoff: (extent / sigma) as f32 };
+    let sum = |x: f64, y: f64| -> f64 {
+        let steps = |i: i32| [x, y].map(|v| v - f64::from(i));
+        let at = |i: i32, j: i32| (steps(i)[0].powi(2) + steps(j)[1].powi(2)) / (extent * extent);
+        (-3..=4).flat_map(|i| (-3..=4).map(move |j| (i, j))).map(|(i, j)| footprint.profile(at(i, j))).sum()
+    };
+    let places = (0..=32).flat_map(|i| (0..=32).map(move |j| sum(f64::from(i) / 32.0, f64::from(j) / 32.0)));
+    let (least, most) = places.fold((f64::INFINITY, 0.0), |(l, m): (f64, f64), s| (l.min(s), m.max(s)));
+    let ripple = most / least - 1.0;
+    assert!((0.006..0.0075).contains(&ripple), "{ripple}");
 }
 
 #[test]

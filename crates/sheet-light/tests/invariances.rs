@@ -1,14 +1,13 @@
 //! What must not change a picture.
 
 use crate::common::{
-    BEAUTY, apart, constant, cubic, draw, exact, grid, input, noise, parallel, perspective, transfer, unlit, volume,
+    BEAUTY, apart, constant, cubic, draw, exact, grid, input, moved_noise, noise, parallel, perspective, transfer,
+    unlit, volume,
 };
 use sheet_light::{Params, prepare};
 use splat_core::glam::{DMat3, DQuat, DVec3};
 use splat_core::shade::LitBy;
-use splat_core::{
-    Accumulator, Camera, Grid, Light, LightShape, Material, Projection, Similarity, TransferFunction, TransferPoint,
-};
+use splat_core::{Accumulator, Camera, Grid, Light, LightShape, Material, Projection, Similarity};
 
 fn sun<'a>() -> LitBy<'a> {
     let shape = LightShape::Directional { direction: DVec3::new(-1.0, -2.0, -1.5).normalize() };
@@ -35,12 +34,7 @@ fn any_number_of_threads_gives_the_same_bits() {
 
 /// A volume of noise moved by `shift` and scaled by `scale`, seen the same way.
 fn moved(shift: f64, scale: f64) -> Accumulator {
-    let mut grid = grid([20, 18, 16], cubic(0.5), noise);
-    grid.origin = grid.origin * scale + DVec3::splat(shift);
-    grid.axes *= scale;
-    let points = [(0.3f32, 0.0f32), (0.5, 0.4), (0.9, 2.5)];
-    let point = |(value, extinction)| TransferPoint { value, color: [value; 3], extinction: extinction / scale as f32 };
-    let tf = TransferFunction::new(points.into_iter().map(point).collect()).unwrap();
+    let (grid, tf) = moved_noise([20, 18, 16], shift, scale);
     let material = Material::default();
     let mut volumes = [volume(&grid, &tf, &material)];
     volumes[0].normals = true;

@@ -30,6 +30,16 @@ pub(crate) fn noise(p: DVec3) -> f64 {
     rng::unit(3, 0, bits[0] | bits[1] << 16 | bits[2] << 32, 0)
 }
 
+/// A volume of noise moved by `shift` and scaled by `scale`, its optical depths kept.
+pub(crate) fn moved_noise(dims: [usize; 3], shift: f64, scale: f64) -> (Grid, TransferFunction) {
+    let mut grid = grid(dims, cubic(0.5), noise);
+    grid.origin = grid.origin * scale + DVec3::splat(shift);
+    grid.axes *= scale;
+    let points = [(0.3f32, 0.0f32), (0.5, 0.4), (0.9, 2.5)];
+    let point = |(value, extinction)| TransferPoint { value, color: [value; 3], extinction: extinction / scale as f32 };
+    (grid, TransferFunction::new(points.into_iter().map(point).collect()).unwrap())
+}
+
 /// Control points (value, extinction), green turning to red.
 pub(crate) fn transfer(points: &[(f32, f32)]) -> TransferFunction {
     let count = points.len() as f32;

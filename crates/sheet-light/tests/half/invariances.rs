@@ -1,10 +1,10 @@
 //! Threads, place, scale, and slabs that become thin.
 
 use super::common::{draw, exact, input, lamp, scattering, sun};
-use crate::common::{apart, cubic, grid, noise, parallel, perspective, transfer, volume};
+use crate::common::{apart, cubic, grid, moved_noise, noise, parallel, perspective, transfer, volume};
 use sheet_light::half::HalfParams;
 use splat_core::glam::DVec3;
-use splat_core::{Accumulator, Camera, Light, LightShape, Material, Projection, TransferFunction, TransferPoint};
+use splat_core::{Accumulator, Camera, Light, LightShape, Material, Projection};
 
 #[test]
 fn x1_any_number_of_threads_gives_the_same_bits() {
@@ -28,12 +28,7 @@ fn x1_any_number_of_threads_gives_the_same_bits() {
 
 /// A volume of noise moved by `shift` and scaled by `scale`, seen and lit the same way.
 fn moved(shift: f64, scale: f64, shape: LightShape) -> Accumulator {
-    let mut grid = grid([14, 13, 12], cubic(0.5), noise);
-    grid.origin = grid.origin * scale + DVec3::splat(shift);
-    grid.axes *= scale;
-    let points = [(0.3f32, 0.0f32), (0.5, 0.4), (0.9, 2.5)];
-    let point = |(value, extinction)| TransferPoint { value, color: [value; 3], extinction: extinction / scale as f32 };
-    let tf = TransferFunction::new(points.into_iter().map(point).collect()).unwrap();
+    let (grid, tf) = moved_noise([14, 13, 12], shift, scale);
     let material = Material::default();
     let mut volumes = [volume(&grid, &tf, &material)];
     volumes[0].normals = true;
