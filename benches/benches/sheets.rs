@@ -84,6 +84,7 @@ fn row(name: &str, grid: &Grid, transfer: &TransferFunction, lit: bool, camera: 
         normals: lit,
         object: 0,
         shadow_coefficient: 1.0,
+        casts_shadow: true,
     };
     let lights = if lit { lights.to_vec() } else { Vec::new() };
     let input = SheetInput {

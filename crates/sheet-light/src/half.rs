@@ -32,7 +32,7 @@
 //! let material = Material { shading: Shading::Phase, ..Material::default() };
 //! let volume = Volume {
 //!     grid: &grid, transform: Similarity::default(), transfer: &transfer, extinction_scale: 1.0, material: &material,
-//!     normals: false, object: 0, shadow_coefficient: 1.0,
+//!     normals: false, object: 0, shadow_coefficient: 1.0, casts_shadow: true,
 //! };
 //! let view = Projection::Orthographic { height: 2.0 };
 //! let camera = Camera::look_at(DVec3::Z * 9.0, DVec3::ZERO, DVec3::Y, view, [16, 16]).unwrap();
@@ -43,7 +43,7 @@
 //! };
 //! let mut image = Accumulator::new([16, 16], 1, 3, false, false);
 //! let layout = ChannelLayout::new(&LayerSet::default());
-//! fold(&HalfInput { sheets, opaque: &[] }, &HalfParams::default(), &layout, &mut image, None).unwrap();
+//! fold(&HalfInput { sheets, mapped: Vec::new(), opaque: &[] }, &HalfParams::default(), &layout, &mut image, None).unwrap();
 //! // (1 − e^(−2τ))/2 of what is scattered to all sides alike.
 //! let expected = 0.5 * (1.0 - (-2f32).exp()) / (4.0 * std::f32::consts::PI);
 //! assert!(image.channels[0].iter().all(|c| (c - expected).abs() < 1e-5));

@@ -28,6 +28,8 @@ pub struct Volume<'a> {
     pub object: u32,
     /// Share of shadows that it receives, in \[0, 1\].
     pub shadow_coefficient: f32,
+    /// Whether it attenuates light; of half-vector sheets alone, since shadows of image-aligned ones are known before.
+    pub casts_shadow: bool,
 }
 
 /// What sheets are made of.

@@ -159,6 +159,7 @@ fn volume<'a>(frame: &Frame<'a>, own: &'a Own) -> Option<Volume<'a>> {
         normals: *normals,
         object: own.object as u32,
         shadow_coefficient: frame.loaded.objects[own.object].shadow_coefficient,
+        casts_shadow: frame.loaded.objects[own.object].casts_shadow,
     })
 }
 

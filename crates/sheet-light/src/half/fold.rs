@@ -71,8 +71,11 @@ fn check(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
         let found = format!("{} splats", splats.order.len());
         return Err(Error::parameter("sheets.splats", found, "none: half-vector sheets are of volumes alone"));
     }
-    for (light, lit) in input.sheets.lights.iter().enumerate() {
+    let lights = &input.sheets.lights;
+    for (light, lit) in lights.iter().chain(&input.mapped).enumerate() {
         lit.light.validate(light).map_err(Error::Light)?;
+    }
+    for (light, lit) in lights.iter().enumerate() {
         serves(&input.sheets.volumes, input.sheets.camera, &lit.light)
             .map_err(|reason| Error::HalfVector { light, reason })?;
     }

@@ -123,6 +123,9 @@ impl Illumination<'_> {
     /// Adds the optical depth of a volume at a node, by plane.
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, tau: Lanes<S>, v: usize, node: usize, to: &mut [[Lanes<S>; NODES]; 3]) {
+        if !self.volumes[v].casts_shadow {
+            return;
+        }
         for p in 0..3 {
             let share = Lanes::splat(simd, self.volumes[v].material.extinction_rgb[p]);
             to[p][node] = tau.mul_add(share, to[p][node]);

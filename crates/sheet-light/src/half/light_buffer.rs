@@ -136,7 +136,7 @@ impl pulp::WithSimd for OneBand<'_> {
         let LightBand { band, sheet } = self.band;
         let faces = [frame.slabs.face(slab), frame.slabs.face(slab + 1)];
         let mut fragments = 0;
-        for (v, placed) in placed.iter().enumerate() {
+        for (v, placed) in placed.iter().enumerate().filter(|(_, p)| p.volume.casts_shadow) {
             sheet.begin(simd, band, v, faces);
             if sheet.is_empty() {
                 continue;

@@ -1,14 +1,18 @@
 //! What half-vector sheets are made of and what the caller chooses.
 
 use crate::{Error, Params, SheetInput};
+use splat_core::shade::LitBy;
 
 /// What is drawn.
 #[derive(Clone)]
 pub struct HalfInput<'a> {
-    /// Volumes, view, lights and ambient radiance. The shadow of a [`splat_core::shade::LitBy`] is that of everything but the
+    /// Volumes, view, lights and ambient radiance. The shadow of a [`LitBy`] is that of everything but the
     /// volumes here, which shadow themselves and each other by the light buffer; `None` for no shadow else. Materials take
     /// [`crate::Volume::shadow_coefficient`] of both.
     pub sheets: SheetInput<'a>,
+    /// Lights beside those of `sheets`, for which there is no sweep: their shadow, that of these volumes included, is known, or they
+    /// cast none.
+    pub mapped: Vec<LitBy<'a>>,
     /// View depth of what hides the volumes at each pixel, +∞ for nothing; or empty.
     pub opaque: &'a [f32],
 }

@@ -47,7 +47,7 @@ struct Part {
 /// Optical depth and length so far, by volume and pixel of the light.
 type Sums = Vec<Vec<[f64; 2]>>;
 
-/// Draws all volumes under all lights, green extinction for all channels, without the shadows of others. Time grows as voxels times
+/// Draws all volumes under all lights, green extinction for all channels, without the shadows of others and without [`HalfInput::mapped`]. Time grows as voxels times
 /// pixels times slabs under a kernel.
 ///
 /// # Errors
@@ -268,6 +268,9 @@ impl<'a> View<'a> {
         let mut sum = 0.0;
         for (v, placed) in self.placed.iter().enumerate() {
             let volume = placed.volume;
+            if !volume.casts_shadow {
+                continue;
+            }
             let inverse = volume.axes().inverse();
             let Some([leaves, enters]) = clip(volume, inverse * (world - volume.origin()), inverse * back) else {
                 continue;

@@ -30,9 +30,11 @@ impl Lit<'_> {
             color: self.color,
             material: self.volume.material,
         };
-        let light = of.light.map(|lit_by| lit_by.light);
-        let mut radiance = point.radiance(of.ambient, light.iter(), |_, irradiance| {
-            let others = of.light.and_then(|lit_by| lit_by.shadow);
+        let lights = || of.light.into_iter().chain(of.mapped);
+        let mut radiance = point.radiance(of.ambient, lights().map(|lit_by| &lit_by.light), |rank, irradiance| {
+            // The light of the sweep comes first.
+            let carried = if rank == 0 && of.light.is_some() { self.arrives } else { [1.0; 3] };
+            let others = lights().nth(rank).and_then(|lit_by| lit_by.shadow);
             let receiver = || Receiver {
                 position: (position - of.shadow_origin).as_vec3(),
                 normal: self.normal,
@@ -41,7 +43,7 @@ impl Lit<'_> {
             };
             let shadow = || {
                 let others = others.map_or([1.0; 3], |others| others.transmittance(&receiver()));
-                [0, 1, 2].map(|c| self.arrives[c] * others[c])
+                [0, 1, 2].map(|c| carried[c] * others[c])
             };
             arriving(irradiance, self.volume.shadow_coefficient, Some(shadow))
         });

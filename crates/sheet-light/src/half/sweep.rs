@@ -34,6 +34,8 @@ pub(crate) struct Sweep<'a> {
     pub(crate) gradients: Gradients,
     /// `None` for ambient and emitted light alone.
     pub(crate) light: Option<&'a LitBy<'a>>,
+    /// Lights that this sweep adds without carrying them.
+    pub(crate) mapped: &'a [LitBy<'a>],
     pub(crate) light_buffer: Option<LightBuffer>,
     /// By volume.
     pub(crate) paths: Vec<LightPath>,
@@ -58,7 +60,9 @@ impl<'a> Sweep<'a> {
     ) -> Result<Self, Error> {
         let sheets = &input.sheets;
         let (volumes, camera) = (&sheets.volumes[..], sheets.camera);
-        let light = light.filter(|_| volumes.iter().any(is_lit));
+        let is_lit = volumes.iter().any(is_lit);
+        let light = light.filter(|_| is_lit);
+        let mapped = if is_lit && !light_alone { &input.mapped[..] } else { &[] };
         let axis = axis_of_view(volumes, camera, light.map(|lit| &lit.light));
         let frame = Frame::new(volumes, camera, &params.sheets, &axis)?;
         let placed: Vec<Placed<'a>> = volumes.iter().map(|v| Placed::new(v, &frame, &params.sheets)).collect();
@@ -71,6 +75,7 @@ impl<'a> Sweep<'a> {
             buckets: Vec::new(),
             gradients: Gradients::new(&frame),
             light,
+            mapped,
             light_buffer: light
                 .map(|lit| LightBuffer::new(&frame, lamp::camera_of(volumes, &lit.light, params), volumes, &placed)),
             paths: light
@@ -78,7 +83,7 @@ impl<'a> Sweep<'a> {
             ambient: sheets.ambient,
             shadow_origin: sheets.shadow_origin,
             cutoff: params.sheets.transmittance_cutoff,
-            is_lit_by_place: light.is_some_and(by_place),
+            is_lit_by_place: light.into_iter().chain(mapped).any(by_place),
             light_alone,
             input,
             visible: 0,

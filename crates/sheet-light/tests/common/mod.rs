@@ -69,6 +69,7 @@ pub(crate) fn volume<'a>(grid: &'a Grid, transfer: &'a TransferFunction, materia
         normals: false,
         object: 0,
         shadow_coefficient: 1.0,
+        casts_shadow: true,
     }
 }
 

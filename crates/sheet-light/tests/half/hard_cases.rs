@@ -277,3 +277,31 @@ fn what_else_casts_shadows_attenuates_the_light_as_far_as_it_is_received() {
         assert!(with(None, 0.0).channels[0].iter().zip(&open.channels[0]).all(|(lit, shadowed)| lit >= shadowed));
     }
 }
+
+#[test]
+fn a_light_without_a_sweep_and_a_volume_without_a_shadow_take_nothing_of_the_light() {
+    let (tf, material) = (transfer(&[(0.5, 0.7)]), scattering());
+    let grid = grid([12, 12, 6], cubic(0.5), |_| 0.5);
+    let camera = parallel([0.0, 0.0, 9.0], 2.0, [12, 12]);
+    let volumes = [volume(&grid, &tf, &material)];
+    let see_through = [Volume { casts_shadow: false, ..volumes[0] }];
+    let sun = sun([0.4, 0.3, 1.0]);
+    let with = |volumes: &[Volume<'_>], lights: &[LitBy<'static>], mapped: &[LitBy<'static>]| {
+        let input = HalfInput { mapped: mapped.to_vec(), ..input(volumes, &camera, lights) };
+        draw(&input, &exact(None)).unwrap().0.channels[1].clone()
+    };
+    let near = |seen: &[f32], expected: &dyn Fn(usize) -> f32| {
+        let worst = seen.iter().enumerate().map(|(k, c)| (c - expected(k)).abs()).fold(0.0, f32::max);
+        assert!(worst < 1e-6, "{worst:e}");
+    };
+    // τ = 2.1, of which light is scattered alike everywhere.
+    let open = tf.at(0.5).color[1] * (1.0 - (-2.1f32).exp()) / (4.0 * std::f32::consts::PI);
+    near(&with(&volumes, &[], &[sun]), &|_| open);
+    near(&with(&see_through, &[sun], &[]), &|_| open);
+    let veiled = LitBy { shadow: Some(&VEIL), ..sun };
+    near(&with(&volumes, &[], &[veiled]), &|_| open * VEIL.0);
+    // Beside a sweep it adds up.
+    let carried = with(&volumes, &[sun], &[]);
+    assert!(carried.iter().all(|c| *c < 0.6 * open));
+    near(&with(&volumes, &[sun], &[sun, veiled]), &|k| carried[k] + open * (1.0 + VEIL.0));
+}
