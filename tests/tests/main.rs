@@ -13,6 +13,7 @@ mod every_key;
 mod every_scene;
 mod exact_particles;
 mod eye_inside;
+mod half_vector;
 mod interrupts;
 mod invariances;
 mod layers;

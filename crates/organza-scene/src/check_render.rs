@@ -4,11 +4,11 @@ use super::check::{At, LARGEST, SMALLEST};
 use super::de::suggest;
 use super::raw_render::{
     Auto, RawAccumulation, RawDirection, RawMapping, RawParticles, RawPoints, RawRender, RawShadow, RawSheets,
-    RawSurfaceSampler,
+    RawSlicing, RawSurfaceSampler,
 };
 use super::{
     LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, RenderSettings, ShadowMapping, ShadowSettings,
-    SheetsSettings, SurfaceSampler, Technique,
+    SheetsSettings, Slicing, SurfaceSampler, Technique,
 };
 use crate::{Error, shown};
 use splat_core::raster::Accumulation;
@@ -152,11 +152,29 @@ fn check_sheets(at: &At<'_>, raw: &RawSheets) -> Result<SheetsSettings, Error> {
     // As far from the rim as the default's, where only the extent is given.
     let sigma = at.number("kernel_sigma", raw.kernel_sigma.unwrap_or(0.35 * extent), 0.125 * extent..=extent)?;
     Ok(SheetsSettings {
+        slicing: check_slicing(at, raw)?,
         slab_width,
         kernel_extent: extent,
         kernel_sigma: sigma,
         transmittance_cutoff: check_cutoff(at, raw.transmittance_cutoff)?,
     })
+}
+
+fn check_slicing(at: &At<'_>, raw: &RawSheets) -> Result<Slicing, Error> {
+    if raw.slicing == RawSlicing::HalfVector {
+        return Ok(Slicing::HalfVector {
+            light_pixels: at.number("light_pixels", raw.light_pixels.unwrap_or(1.5), 0.1..=16.0)?,
+            most_light_pixels: at.whole("most_light_pixels", raw.most_light_pixels.unwrap_or(2048), 16..=8192)?,
+        });
+    }
+    let given = [("light_pixels", raw.light_pixels.is_some()), ("most_light_pixels", raw.most_light_pixels.is_some())];
+    match given.into_iter().find(|(_, is_given)| *is_given) {
+        None => Ok(Slicing::View),
+        Some((key, _)) => {
+            let message = format!("`{key}`: slabs across the view have no light buffers");
+            Err(at.key(key).error(message, "set slicing = \"half_vector\", or leave it out"))
+        }
+    }
 }
 
 fn check_shadow(at: &At<'_>, raw: &RawShadow) -> Result<ShadowSettings, Error> {

@@ -50,7 +50,13 @@ pub(super) struct RawParticles {
 #[serde(deny_unknown_fields, default, expecting = "a table")]
 #[schemars(rename = "Sheets")]
 pub(super) struct RawSheets {
-    /// Width of a slab in world units, or "auto" (the default): the least step of the volumes along the view.
+    /// What slabs lie across, "view" (default) or "half_vector", the bisector of light and view.
+    pub(super) slicing: RawSlicing,
+    /// With "half_vector": pixels of a light's buffer per step of the finest volume, 0.1 to 16; default 1.5.
+    pub(super) light_pixels: Option<f64>,
+    /// With "half_vector": most pixels of a light's buffer along a side, 16 to 8192; default 2048.
+    pub(super) most_light_pixels: Option<u32>,
+    /// Width of a slab in world units, or "auto" (the default): the least step of the volumes across the slabs.
     pub(super) slab_width: Option<Auto>,
     /// Radius of a voxel's kernel in steps of its lattice, 0.5 to 8; default 2.
     pub(super) kernel_extent: Option<f64>,
@@ -58,6 +64,16 @@ pub(super) struct RawSheets {
     pub(super) kernel_sigma: Option<f64>,
     /// A pixel is finished when its transmittance is below this, from 0 to below 1; default 1/1024.
     pub(super) transmittance_cutoff: Option<f64>,
+}
+
+/// What slabs lie across.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "Slicing")]
+pub(super) enum RawSlicing {
+    #[default]
+    View,
+    HalfVector,
 }
 
 /// How implicit surfaces are sampled.

@@ -88,7 +88,9 @@ pub struct ParticlesSettings {
 /// Settings of the `sheets` technique.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SheetsSettings {
-    /// Width of a slab, world units; `None` takes the least step of the volumes along the view.
+    /// What slabs lie across.
+    pub slicing: Slicing,
+    /// Width of a slab, world units; `None` takes the least step of the volumes across the slabs.
     pub slab_width: Option<f64>,
     /// Radius of a voxel's kernel, steps of its lattice, in [0.5, 8].
     pub kernel_extent: f64,
@@ -96,6 +98,20 @@ pub struct SheetsSettings {
     pub kernel_sigma: f64,
     /// A pixel is finished when its transmittance falls below this, in [0, 1).
     pub transmittance_cutoff: f64,
+}
+
+/// What the slabs of sheets lie across.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Slicing {
+    /// The view's axis; light comes through shadow maps (Neophytou and Mueller 2005).
+    View,
+    /// The bisector of light and view: each light comes through the same slabs (Zhang and Crawfis, section 4).
+    HalfVector {
+        /// Pixels of a light's buffer per least step of a lattice, in [0.1, 16].
+        light_pixels: f64,
+        /// Most pixels of a light's buffer along a side, 16 to 8192.
+        most_light_pixels: u32,
+    },
 }
 
 /// How the particles of implicit surfaces are found.

@@ -77,15 +77,7 @@ mod tests {
     }
 
     fn object(data: ObjectData) -> ObjectStatistics {
-        ObjectStatistics {
-            name: "a".into(),
-            data,
-            opaque: false,
-            by_gradient: false,
-            casts: true,
-            receives: true,
-            splats: 7,
-        }
+        ObjectStatistics { name: "a".into(), data, opaque: false, by_gradient: false, casts: true, receives: true }
     }
 
     const SUN: LightStatistics = LightStatistics { wants_shadow: true, is_dark: false, points: 1 };

@@ -205,8 +205,8 @@ impl View {
 }
 
 /// Shadow maps that memory made coarser.
-pub(crate) fn of_shadows(tables: &[Option<ShadowTable>]) -> Option<String> {
-    let coarse = tables.iter().flatten().filter(|table| table.limit == tsm::Limit::Memory).count();
+pub(crate) fn of_shadows<'a>(tables: impl Iterator<Item = &'a ShadowTable>) -> Option<String> {
+    let coarse = tables.filter(|table| table.limit == tsm::Limit::Memory).count();
     (coarse > 0).then(|| {
         let maps = if coarse == 1 { "a shadow map is" } else { "shadow maps are" };
         format!("{maps} coarser than the splats ask for, to fit the memory: a larger --max-memory makes them finer")

@@ -94,7 +94,7 @@ pub fn draw_loaded(planned: &Planned<'_>, progress: &Progress, cost: &mut CostRe
 /// Stages with their weights, after everything was loaded.
 fn stages(frame: &Frame<'_>) -> Stages {
     let (loaded, plan, scene) = (frame.loaded, frame.plan, frame.scene);
-    let maps = plan.shadow_tables.iter().flatten().count();
+    let maps = plan.tables().count();
     let all = loaded.cloud.len() as f64;
     let opaque = Count::of(frame, None);
     let of: Vec<(Technique, Count)> = plan.techniques.iter().map(|t| (*t, Count::of(frame, Some(*t)))).collect();

@@ -6,6 +6,7 @@ mod light;
 mod on_device;
 mod splats;
 
+use light::Maps;
 pub(crate) use on_device::Chained;
 pub use splats::Shaded;
 pub(crate) use splats::record;
@@ -13,6 +14,7 @@ pub(crate) use splats::record;
 use crate::device::Helper;
 use crate::lights::LightPoint;
 use crate::load::Loaded;
+use crate::matter::Matter;
 use crate::plan::Plan;
 use crate::scene::{RenderSettings, Scene, Technique};
 use crate::{Error, Progress};
@@ -20,7 +22,6 @@ use splat_core::raster::{self, OpaqueImage};
 use splat_core::shade::ChannelLayout;
 use splat_core::{Accumulator, Camera, Cloud, LayerSet, SplatKind};
 use std::cell::OnceCell;
-use tsm::ShadowMap;
 
 /// One frame of a loaded scene: what techniques read, each part made once, when it is first asked for.
 ///
@@ -42,7 +43,7 @@ pub struct Frame<'a> {
     /// `None` inside where all splats are drawn.
     drawn: OnceCell<Option<Cloud>>,
     light_points: OnceCell<Vec<LightPoint>>,
-    maps: OnceCell<Vec<Option<ShadowMap>>>,
+    maps: OnceCell<Maps>,
     shaded: OnceCell<Shaded>,
     opaque: OnceCell<OpaqueImage>,
 }
@@ -75,6 +76,12 @@ impl<'a> Frame<'a> {
         self.helper = device.map(|(helper, _)| helper);
         self.device_composites = device.is_some_and(|(_, composites)| composites);
         self
+    }
+
+    /// What techniques draw from objects' own data.
+    pub(crate) fn matter(&self) -> Matter<'_> {
+        let Self { scene, loaded, plan, .. } = self;
+        Matter { scene, own: &loaded.own, planned: &plan.objects, camera: &self.camera }
     }
 
     /// An interrupt, if there was one.

@@ -30,6 +30,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod carried;
 mod choose;
 mod doubts;
 mod draw;
@@ -38,6 +39,7 @@ mod form;
 mod frame;
 mod lights;
 mod load;
+mod matter;
 mod memory;
 mod options;
 pub mod pass;

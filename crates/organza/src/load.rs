@@ -66,6 +66,18 @@ impl Loaded {
     }
 }
 
+impl Loaded {
+    /// The objects, of which those that are drawn from their own data neither cast nor receive shadows.
+    pub(crate) fn objects_beside_own(&self) -> Vec<Object> {
+        let mut objects = self.objects.clone();
+        for own in &self.own {
+            let object = &mut objects[own.object];
+            (object.casts_shadow, object.shadow_coefficient) = (false, 0.0);
+        }
+        objects
+    }
+}
+
 fn scaled_thickness(scene: &Scene, exponent: i32) -> Option<f64> {
     scene.render.points.slice_thickness.map(|e| e * libm::exp2(f64::from(-exponent)))
 }
@@ -79,6 +91,11 @@ pub(crate) struct Inputs<'a> {
     /// What is known of each visible object, in the order of the scene.
     pub(crate) statistics: Vec<ObjectStatistics>,
 }
+
+/// Whether the splats of objects that are drawn from their own data are not needed: asked with these, how all objects are drawn, what
+/// is known of them, and the lights.
+pub(crate) type Spare<'a> =
+    dyn Fn(&[Own], &[PlannedObject], &[ObjectStatistics], &[SceneLight]) -> Result<bool, Error> + 'a;
 
 /// Reads every visible object once and counts its splats; `looks` says of which objects it is asked how they could be drawn from
 /// their own data.
@@ -109,21 +126,29 @@ impl Inputs<'_> {
         light_statistics(&self.lights)
     }
 
-    /// Converts every object to the form that was chosen for it, and to splats where they are needed; `sets` are the seconds of
-    /// what techniques will make beside splats.
+    /// Converts every object to the form that was chosen for it, and to splats where they are needed: `spare` is asked whether
+    /// those of objects that are drawn from their own data are. `sets` are the seconds of what techniques will make beside splats.
     pub(crate) fn convert(
         self,
-        planned: Vec<PlannedObject>,
+        mut planned: Vec<PlannedObject>,
+        spare: Option<&Spare<'_>>,
         sets: f64,
         cost: &mut CostRecord,
     ) -> Result<Loaded, Error> {
         let Self { loading, mut prepared, mut lights, mut warnings, statistics } = self;
         let Loading { scene, progress, files, .. } = loading;
+        let mut early = spare.map(|_| loading.own(&mut prepared, &planned, &mut warnings)).transpose()?;
+        if let (Some(own), Some(spare)) = (&mut early, spare)
+            && spare(own, &planned, &statistics, &lights)?
+        {
+            planned.iter_mut().filter(|p| p.form.is_own()).for_each(|p| p.splats = None);
+            own.iter_mut().for_each(|own| own.has_splats = false);
+        }
         let mut splats = loading.counts(&prepared, &planned)?;
         let materials = materials(scene, &prepared);
         let points = lights.iter().map(crate::lights::count).sum();
         progress.plan(work::of_counts(scene, &splats, &planned, points, sets));
-        let mut own = loading.own(&mut prepared, &planned, &mut warnings)?;
+        let mut own = early.map_or_else(|| loading.own(&mut prepared, &planned, &mut warnings), Ok)?;
         let converted = planned.iter().filter(|p| p.splats.is_some()).count();
         let mut cloud = Cloud::default();
         if converted > 0 || own.is_empty() {
@@ -135,13 +160,13 @@ impl Inputs<'_> {
                 Ok::<_, Error>(cloud)
             })?;
         }
-        if cloud.is_empty() && own.is_empty() {
-            warnings.push("the scene has no splats: only the background is drawn".into());
-        }
         let mut camera = scene.camera;
         let exponent = normalize(&mut cloud, &mut own, &mut camera, &mut lights);
         cloud.canonicalize();
         cloud.validate().map_err(|e| out_of_range(scene, &cloud, e))?;
+        if cloud.is_empty() && own.is_empty() {
+            warnings.push("the scene has no splats: only the background is drawn".into());
+        }
         Ok(Loaded {
             cloud,
             own,

@@ -50,6 +50,10 @@ pub struct Plan {
     /// For each point of each light, in the order of the frame's points: the table of its shadow map, if it gets one. Chosen by
     /// a look at the splats, when all else is planned.
     pub shadow_tables: Vec<Option<ShadowTable>>,
+    /// For each point of each light: whether a technique carries its light through what it draws by itself.
+    pub carried: Vec<bool>,
+    /// For each point whose light is carried: the table of its map of all other casters, if there are any. Empty where none is.
+    pub other_tables: Vec<Option<ShadowTable>>,
     /// Bytes that all shadow maps together may take.
     pub shadow_bytes: u64,
     /// What draws each visible object, and from what.
@@ -63,12 +67,28 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Takes the tables in that were chosen, one for each point of a light, and the bytes that their maps may take together.
+    /// All tables of shadow maps.
+    pub fn tables(&self) -> impl Iterator<Item = &ShadowTable> {
+        self.shadow_tables.iter().chain(&self.other_tables).flatten()
+    }
+
+    /// Takes the tables in that were chosen, one for each point of a light, then one more for each of casters that no light is
+    /// carried through, and the bytes that their maps may take together.
     pub(crate) fn set_shadow_tables(&mut self, points: &[LightPoint], tables: Vec<Option<ShadowTable>>, bytes: u64) {
-        let of_each = tables.iter().zip(points);
-        let made = of_each.filter_map(|(table, point)| Some(table.as_ref()?.describe(&point.name())));
-        let passes = self.passes.iter_mut().filter(|p| p.name == pass::SHADOW_MAP);
-        passes.zip(made).for_each(|(pass, reason)| pass.reason = reason);
-        (self.shadow_tables, self.shadow_bytes) = (tables, bytes);
+        let mut tables = tables;
+        let (others, beside) = (tables.split_off(points.len().min(tables.len())), ", of what is no volume");
+        let of = |tables: &[Option<ShadowTable>], beside: &str| -> Vec<PlannedPass> {
+            let one = |(table, point): (&Option<ShadowTable>, &LightPoint)| {
+                let reason = table.as_ref()?.describe(&(point.name() + beside));
+                Some(PlannedPass { name: pass::SHADOW_MAP.into(), reason })
+            };
+            tables.iter().zip(points).filter_map(one).collect()
+        };
+        let made = [of(&tables, ""), of(&others, beside)].concat();
+        if let Some(at) = self.passes.iter().position(|p| p.name == pass::SHADOW_MAP) {
+            self.passes.retain(|p| p.name != pass::SHADOW_MAP);
+            self.passes.splice(at..at, made);
+        }
+        (self.shadow_tables, self.other_tables, self.shadow_bytes) = (tables, others, bytes);
     }
 }

@@ -1,14 +1,17 @@
 //! From a scene to what drawing reads: read, choose, convert, plan.
 
+use crate::carried;
 use crate::choose::{choose, plan, row, same_forms, technique_of, techniques};
 use crate::form::PlannedObject;
 use crate::load::files::Files;
-use crate::load::{self, Loaded, light_statistics};
+use crate::load::own::Own;
+use crate::load::{self, Loaded, Spare, light_statistics};
+use crate::matter::Matter;
 use crate::memory::{self, Memory};
 use crate::pass;
 use crate::plan::Plan;
-use crate::scene::{Scene, SceneObject, Technique};
-use crate::statistics::Statistics;
+use crate::scene::{Scene, SceneLight, SceneObject, Technique};
+use crate::statistics::{ObjectStatistics, Statistics};
 use crate::work::Translucent;
 use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, doubts, lights, shadows};
 use splat_core::{Exceeded, Material};
@@ -38,7 +41,7 @@ pub struct Explanation {
 /// As [`crate::render`].
 pub fn explain(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Explanation, Error> {
     let (_, mut explanation, _) = prepare(scene, options, progress, &Files::default())?;
-    explanation.warnings.extend(doubts::of_shadows(&explanation.plan.shadow_tables));
+    explanation.warnings.extend(doubts::of_shadows(explanation.plan.tables()));
     progress.finish();
     Ok(explanation)
 }
@@ -71,6 +74,7 @@ pub fn same_splats(a: &Scene, b: &Scene) -> bool {
     // Layers decide whether volumes get normals, the most points whether a scene is refused.
     *a == other
         && a.objects.iter().zip(&b.objects).all(|(of_a, of_b)| same_forms(technique_of(of_a, a), technique_of(of_b, b)))
+        && a.render.sheets.slicing == b.render.sheets.slicing
         && a.render.particles.surface_sampler == b.render.particles.surface_sampler
         && a.render.layers == b.render.layers
         && a.render.max_points == b.render.max_points
@@ -99,6 +103,8 @@ fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Resu
     statistics.layers = scene.render.layers.names().map(str::to_owned).collect();
     statistics.tolerance = scene.render.tolerance;
     statistics = statistics.with_objects(&loaded.statistics, &planned, &made);
+    let unsplatted = loaded.own.iter().filter(|own| !own.has_splats && loaded.objects[own.object].casts_shadow);
+    unsplatted.for_each(|own| statistics.add_caster(own.optical_depth()));
     statistics.techniques = techniques(scene);
     // Those that draw something; where nothing is translucent, one that has nothing to do.
     let idle = |t: &Technique| statistics.translucent_of(*t).is_none();
@@ -122,9 +128,12 @@ fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Resu
     let left = options.max_memory - memory.total();
     // Shadow maps share what is left.
     let points = lights::points(&loaded.lights);
-    let tables = shadows::tables(&scene.render, loaded, &points, &plan.shadow_maps, left)?;
+    let others = loaded.objects_beside_own();
+    carried::plan(scene, loaded, &points, &mut plan)?;
+    let wanted = carried::wanted_maps(loaded, &points, &others, &plan);
+    let tables = shadows::tables(&scene.render, loaded, &wanted, left)?;
     plan.set_shadow_tables(&points, tables, left);
-    let memory = memory.with_maps(shadows::bytes(plan.shadow_tables.iter().flatten()));
+    let memory = memory.with_maps(shadows::bytes(plan.tables()));
     memory::check("rendering", memory.total(), options.max_memory)?;
     Ok((plan, memory))
 }
@@ -170,7 +179,12 @@ fn load_measured(
     let some = Translucent { splats: 0.0, fragments: 0.0, any: true };
     let steps = techniques(scene).into_iter().flat_map(|t| row(t).steps);
     let beside = steps.map(|step| (step.seconds)(scene, &some)).sum();
-    inputs.convert(planned, beside, cost)
+    let spare = carried::of_scene(scene).map(|carries| {
+        move |own: &[Own], planned: &[PlannedObject], statistics: &[ObjectStatistics], lights: &[SceneLight]| {
+            carried::is_all(carries, &Matter { scene, own, planned, camera: &scene.camera }, statistics, lights)
+        }
+    });
+    inputs.convert(planned, spare.as_ref().map(|spare| spare as &Spare<'_>), beside, cost)
 }
 
 fn visible(scene: &Scene) -> impl Iterator<Item = &SceneObject> + Clone {

@@ -105,7 +105,7 @@ pub(crate) fn render_keeping(
     if !doubtful {
         warnings.extend(doubts::of_picture(scene, &layers));
     }
-    warnings.extend(doubts::of_shadows(&plan.shadow_tables));
+    warnings.extend(doubts::of_shadows(plan.tables()));
     warnings.extend(helper.map(|helper| helper.said()).unwrap_or_default());
     Ok(Render { layers, cost, plan, sets, warnings, notes, backend })
 }

@@ -4,6 +4,7 @@ use crate::Error;
 use crate::lights::LightPoint;
 use crate::load::Loaded;
 use crate::scene::{RenderSettings, ShadowMapping};
+use splat_core::Object;
 use splat_core::{Light, Limits};
 use tsm::{Deposits, Limit, Params};
 
@@ -122,7 +123,10 @@ pub(crate) fn bytes<'a>(tables: impl Iterator<Item = &'a ShadowTable>) -> u64 {
     predicted.saturating_add(predicted / 2)
 }
 
-/// The table of each point of the lights `wanted`, where all maps together may take so many bytes: as fine as each would be alone,
+/// A point of a light, and the objects whose splats cast shadows of it.
+pub(crate) type Wanted<'a> = (&'a LightPoint, &'a [Object]);
+
+/// The table of each map that is wanted, where all together may take so many bytes: as fine as each would be alone,
 /// or, where that is too much, within an equal share of it.
 ///
 /// # Errors
@@ -130,38 +134,31 @@ pub(crate) fn bytes<'a>(tables: impl Iterator<Item = &'a ShadowTable>) -> u64 {
 pub(crate) fn tables(
     settings: &RenderSettings,
     loaded: &Loaded,
-    points: &[LightPoint],
-    wanted: &[bool],
+    wanted: &[Option<Wanted<'_>>],
     max_bytes: u64,
 ) -> Result<Vec<Option<ShadowTable>>, Error> {
-    let alone = tables_within(settings, loaded, points, wanted, max_bytes)?;
+    let alone = tables_within(settings, loaded, wanted, max_bytes)?;
     if bytes(alone.iter().flatten()) <= max_bytes {
         return Ok(alone);
     }
     let maps = alone.iter().flatten().count().max(1) as u64;
-    tables_within(settings, loaded, points, wanted, max_bytes / maps * 2 / 3)
+    tables_within(settings, loaded, wanted, max_bytes / maps * 2 / 3)
 }
 
 fn tables_within(
     settings: &RenderSettings,
     loaded: &Loaded,
-    points: &[LightPoint],
-    wanted: &[bool],
+    wanted: &[Option<Wanted<'_>>],
     max_bytes: u64,
 ) -> Result<Vec<Option<ShadowTable>>, Error> {
-    let maps = points.iter().filter(|point| wanted[point.of]).count().max(1) as u64;
-    let table = |point: &LightPoint| {
-        if !wanted[point.of] {
-            return Ok(None);
-        }
+    let maps = wanted.iter().flatten().count().max(1) as u64;
+    let table = |wanted: &Option<Wanted<'_>>| {
+        let Some((point, objects)) = wanted else { return Ok(None) };
         let light = &point.light;
         let tolerance = tolerance(settings, loaded, light, maps);
         let params = params(settings, loaded, tolerance, max_bytes);
-        let predicted = Deposits::predict(
-            &tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects: &loaded.objects },
-            light,
-            &params,
-        );
+        let scene = tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects };
+        let predicted = Deposits::predict(&scene, light, &params);
         let predicted = predicted.map_err(|e| shadow_error(point, &e))?;
         Ok(Some(ShadowTable {
             size: predicted.size,
@@ -173,7 +170,7 @@ fn tables_within(
             max_bytes,
         }))
     };
-    points.iter().map(table).collect()
+    wanted.iter().map(table).collect()
 }
 
 /// What went wrong with the map of a point of a light.

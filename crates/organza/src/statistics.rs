@@ -59,8 +59,6 @@ pub struct ObjectStatistics {
     pub casts: bool,
     /// Whether it could receive a shadow.
     pub receives: bool,
-    /// Splats that it would become, as predicted.
-    pub splats: u64,
 }
 
 /// Splats of one object.
@@ -98,9 +96,9 @@ pub struct Statistics {
     pub translucent: u64,
     /// Opaque splats.
     pub opaque: u64,
-    /// Splats that can receive a shadow: lit, with a shadow coefficient above 0.
+    /// Splats that can receive a shadow: lit, with a shadow coefficient above 0; and objects without splats that can.
     pub receivers: u64,
-    /// Splats that can cast a shadow.
+    /// Splats that can cast a shadow, and objects that cast one without splats.
     pub casters: u64,
     /// Opaque ones among them.
     pub opaque_casters: u64,
@@ -158,7 +156,7 @@ impl Statistics {
             let is_own = planned.form.is_own();
             if is_own {
                 self.translucent = self.translucent.saturating_sub(*made);
-                self.receivers += if *made == 0 && object.receives { object.splats } else { 0 };
+                self.receivers += u64::from(*made == 0 && object.receives);
             }
             if !object.opaque {
                 let counts = if is_own { [0, 1] } else { [*made, 0] };
@@ -166,6 +164,12 @@ impl Statistics {
             }
         }
         self
+    }
+
+    /// Takes in an object that casts shadows without splats, of which no ray has more optical depth.
+    pub fn add_caster(&mut self, optical_depth: f64) {
+        self.casters += 1;
+        self.caster_optical_depth += optical_depth;
     }
 
     fn add(&mut self, technique: Technique, counts: [u64; 2]) {

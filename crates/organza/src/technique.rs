@@ -15,6 +15,7 @@ pub(crate) mod sheets;
 
 use crate::form::{DRAWN, Form};
 use crate::frame::Frame;
+use crate::matter::CarriesLight;
 use crate::pass;
 use crate::scene::{Scene, Technique};
 use crate::stage;
@@ -51,6 +52,8 @@ pub(crate) struct Row {
     pub(crate) is_random: bool,
     /// Bytes that it takes beside what all techniques take.
     pub(crate) bytes: fn(&Scene, colored_extinction: bool, &RenderOptions) -> u64,
+    /// How it carries light through what it draws by itself, where a scene asks for that; `None` where shadow maps have all light.
+    pub(crate) carries: fn(&Scene) -> Option<CarriesLight>,
     /// Begins a frame.
     pub(crate) begin: for<'a> fn(&'a Frame<'a>) -> Box<dyn Fold + 'a>,
 }
@@ -128,6 +131,7 @@ pub(crate) static TABLE: [Row; 4] = [
         ],
         is_random: false,
         bytes: |_, _, _| 0,
+        carries: |_| None,
         begin: points::begin,
     },
     Row {
@@ -141,12 +145,13 @@ pub(crate) static TABLE: [Row; 4] = [
         steps: &[Step { pass: pass::PARTICLES, stage: stage::PARTICLES, seconds: particles::seconds }],
         is_random: true,
         bytes: particles::bytes,
+        carries: |_| None,
         begin: particles::begin,
     },
     Row {
         technique: Technique::Sheets,
         is_offered: false,
-        how: "are composited in slabs across the view, volumes classified after reconstruction",
+        how: "are composited in slabs, volumes classified after reconstruction",
         by_channel: None,
         form: Some(sheets::form),
         of_splats: DRAWN,
@@ -154,6 +159,7 @@ pub(crate) static TABLE: [Row; 4] = [
         steps: &[Step { pass: pass::SHEETS, stage: stage::SHEETS, seconds: sheets::seconds }],
         is_random: false,
         bytes: |_, _, _| 0,
+        carries: sheets::carries,
         begin: sheets::begin,
     },
     Row {
@@ -171,6 +177,7 @@ pub(crate) static TABLE: [Row; 4] = [
         }],
         is_random: false,
         bytes: reference::bytes,
+        carries: |_| None,
         begin: reference::begin,
     },
 ];

@@ -191,11 +191,6 @@ impl Sheeted<'_> {
         (self.slabs.count, self.slabs.width)
     }
 
-    /// Voxels of each volume that may be seen, or that shape those.
-    pub fn visible(&self) -> impl Iterator<Item = u64> {
-        self.volumes.iter().map(|v| v.voxels.count())
-    }
-
     /// Bytes of what was prepared.
     pub fn bytes(&self) -> u64 {
         let volumes: u64 = self.volumes.iter().map(|v| v.segments.bytes() + Voxels::bytes(v.lattice.dims) / 4).sum();
@@ -250,7 +245,7 @@ impl Sheeted<'_> {
     fn counts(&self) -> SheetCounts {
         SheetCounts {
             voxels: self.volumes.iter().map(|v| v.volume.grid.values.len() as u64).sum(),
-            visible: self.visible().sum(),
+            visible: self.volumes.iter().map(|v| v.voxels.count()).sum(),
             slabs: u64::from(self.slabs.count),
             bytes: self.bytes(),
             ..SheetCounts::default()

@@ -73,6 +73,6 @@ mod sweep;
 
 pub use axis::HalfVector;
 pub use counts::HalfCounts;
-pub use fold::fold;
+pub use fold::{fold, slab_width};
 pub use params::{HalfInput, HalfParams};
 pub use serves::{LEAST_COSINE, Reason, serves};

@@ -153,7 +153,7 @@ fn shifted(row: &[u64], w: usize, step: isize) -> u64 {
 }
 
 /// Maximal intervals of values at which there is no extinction, ascending.
-fn without_extinction(transfer: &TransferFunction) -> Vec<[f32; 2]> {
+pub(crate) fn without_extinction(transfer: &TransferFunction) -> Vec<[f32; 2]> {
     let points = transfer.points();
     let mut out: Vec<[f32; 2]> = Vec::new();
     for (i, p) in points.iter().enumerate().filter(|(_, p)| p.extinction == 0.0) {

@@ -1,5 +1,7 @@
 //! What is drawn: volumes with their own transfer functions, splats beside them, the lights, the view.
 
+use crate::fold::extremes;
+use crate::visible::without_extinction;
 use crate::{Error, Splats};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::shade::LitBy;
@@ -50,6 +52,13 @@ pub struct SheetInput<'a> {
 }
 
 impl Volume<'_> {
+    /// Whether anything of it can be seen: whether the transfer function gives extinction to some value between its least and its
+    /// greatest.
+    pub fn is_seen(&self) -> bool {
+        let (least, greatest) = extremes(&self.grid.values);
+        !without_extinction(self.transfer).iter().any(|[low, high]| *low <= least && greatest <= *high)
+    }
+
     /// World position of the first lattice point.
     pub(crate) fn origin(&self) -> DVec3 {
         self.transform.apply(self.grid.origin)

@@ -397,6 +397,9 @@ fn render() -> Vec<Entry> {
             .by(PARTICLES)
             .with(&["render.particles.surface_sampler='brownian'"]),
         of(BALL, "render.sheets", "render.sheets={slab_width=0.4}").by(SHEETS),
+        of(BALL, "render.sheets.slicing", "render.sheets.slicing='half_vector'").by(SHEETS),
+        of(BALL, "render.sheets.light_pixels", "render.sheets.light_pixels=0.4").by(SHEETS).with(HALF_VECTOR),
+        of(BALL, "render.sheets.most_light_pixels", "render.sheets.most_light_pixels=16").by(SHEETS).with(HALF_VECTOR),
         of(BALL_AND_SURFACE, "render.sheets.slab_width", "render.sheets.slab_width=0.4").by(SHEETS),
         of(BALL_AND_SURFACE, "render.sheets.kernel_extent", "render.sheets.kernel_extent=3")
             .by(SHEETS)
@@ -409,6 +412,8 @@ fn render() -> Vec<Entry> {
             .with(&["object.it.transform.scale=4"]),
     ]
 }
+
+const HALF_VECTOR: &[&str] = &["render.sheets.slicing='half_vector'"];
 
 const THIN: &[&str] = &[
     "material.m.medium.extinction=0.01",

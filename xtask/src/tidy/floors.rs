@@ -7,16 +7,17 @@ use crate::source::{code_only, line_of};
 const HOUSE: &str = "crates/organza/src/";
 
 /// The modules of each floor, from the ground up.
-const FLOORS: [&[&str]; 13] = [
+const FLOORS: [&[&str]; 14] = [
     &["error", "form", "lights", "pass", "stage"],
     &["statistics"],
     &["options", "work"],
     &["load"],
-    &["memory", "shadows"],
+    &["matter", "memory", "shadows"],
     &["plan"],
     &["doubts", "frame"],
     &["technique"],
     &["choose"],
+    &["carried"],
     &["draw", "prepare"],
     &["render"],
     &["sequence"],

@@ -2,7 +2,7 @@
 
 use super::points::{absorbance_cut, cells, choice, cutoffs, finer, samples, step};
 use super::{Facts, Knob, Options, Request, Skipped, Sweep, Theory};
-use organza::scene::{LayerChoice, Scene, Technique};
+use organza::scene::{LayerChoice, Scene, Slicing, Technique};
 
 /// Knobs of `sheets` in this scene, whose slabs are `slab_width` wide by its own setting; or why there are none.
 ///
@@ -29,6 +29,7 @@ pub fn sheets(scene: &Scene, slab_width: Option<f64>, facts: &Facts, options: &O
         ("shadow table cells", cells(facts, options)),
         ("absorbance cut", absorbance_cut(facts, options)),
         ("transmittance cut", Ok(transmittance_cut(options))),
+        ("light buffer", light_buffer(scene)),
         ("samples", samples(options)),
     ];
     for (name, knob) in knobs {
@@ -69,6 +70,27 @@ fn slabs(own: f64, options: &Options) -> Knob {
 
 fn transmittance_cut(options: &Options) -> Knob {
     Knob { set: |request, value| request.scene.render.sheets.transmittance_cutoff = value, ..cutoffs(options) }
+}
+
+/// Pixels of light buffers, where slabs have some.
+fn light_buffer(scene: &Scene) -> Result<Knob, String> {
+    if scene.render.sheets.slicing == Slicing::View {
+        return Err("slabs across the view have no light buffers".into());
+    }
+    Ok(Knob {
+        name: "light buffer",
+        size_meaning: "",
+        set: |request, value| {
+            if let Slicing::HalfVector { light_pixels, .. } = &mut request.scene.render.sheets.slicing {
+                *light_pixels = value;
+            }
+        },
+        steps: [0.5, 1.0, 1.5, 3.0].map(|n| choice(&format!("{n} pixels a step of the lattice"), n)).to_vec(),
+        ends: Vec::new(),
+        end_is_exact: false,
+        theory: None,
+        joint: false,
+    })
 }
 
 /// How far a kernel reaches with the deviation that it has.

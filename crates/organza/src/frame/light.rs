@@ -4,11 +4,25 @@ use super::Frame;
 use crate::device;
 use crate::lights::{self, LightPoint};
 use crate::pass;
-use crate::shadows::shadow_error;
+use crate::shadows::{ShadowTable, shadow_error};
 use crate::{CostRecord, Error, work};
 use splat_core::shade::{LitBy, ShadeInput};
-use splat_core::{Light, Transmittance};
+use splat_core::{Light, Object, Transmittance};
 use tsm::{Deposits, ShadowMap};
+
+/// The shadow maps of a frame, for each point of a light.
+pub(super) struct Maps {
+    /// Of all casters.
+    all: Vec<Option<ShadowMap>>,
+    /// Of those that no light is carried through.
+    of_others: Vec<Option<ShadowMap>>,
+}
+
+/// Maps that were built, and the bytes that are left for others.
+struct Done {
+    maps: usize,
+    left: u64,
+}
 
 impl<'a> Frame<'a> {
     /// The points of all lights, by which techniques light what they draw.
@@ -21,30 +35,47 @@ impl<'a> Frame<'a> {
     /// # Errors
     /// [`Error::Cancelled`]; [`Error::Limit`] where a map needs more bytes than the plan leaves for it.
     pub fn maps(&self, cost: &mut CostRecord) -> Result<&[Option<ShadowMap>], Error> {
+        Ok(&self.all_maps(cost)?.all)
+    }
+
+    /// The same of the casters that no light is carried through; empty where none is.
+    pub(crate) fn maps_of_others(&self, cost: &mut CostRecord) -> Result<&[Option<ShadowMap>], Error> {
+        Ok(&self.all_maps(cost)?.of_others)
+    }
+
+    fn all_maps(&self, cost: &mut CostRecord) -> Result<&Maps, Error> {
         if let Some(maps) = self.maps.get() {
             return Ok(maps);
         }
-        let maps = self.shadow_maps(cost)?;
-        Ok(self.maps.get_or_init(|| maps))
+        let (plan, others) = (self.plan, self.loaded.objects_beside_own());
+        let mut done = Done { maps: 0, left: plan.shadow_bytes };
+        let all = self.shadow_maps(&plan.shadow_tables, &self.loaded.objects, &mut done, cost)?;
+        let of_others = self.shadow_maps(&plan.other_tables, &others, &mut done, cost)?;
+        Ok(self.maps.get_or_init(|| Maps { all, of_others }))
     }
 
-    fn shadow_maps(&self, cost: &mut CostRecord) -> Result<Vec<Option<ShadowMap>>, Error> {
+    fn shadow_maps(
+        &self,
+        tables: &[Option<ShadowTable>],
+        objects: &[Object],
+        done: &mut Done,
+        cost: &mut CostRecord,
+    ) -> Result<Vec<Option<ShadowMap>>, Error> {
         let mut maps = Vec::new();
-        let mut left = self.plan.shadow_bytes;
-        let (mut made, count) = (0, self.plan.shadow_tables.iter().flatten().count());
-        for (point, table) in self.light_points().iter().zip(&self.plan.shadow_tables) {
+        let count = self.plan.tables().count();
+        for (point, table) in self.light_points().iter().zip(tables) {
             self.tick()?;
             let Some(table) = table else {
                 maps.push(None);
                 continue;
             };
-            made += 1;
-            self.progress.begin(&work::shadow_map(made, count));
-            let params = table.params(self.settings, self.loaded, left);
+            done.maps += 1;
+            self.progress.begin(&work::shadow_map(done.maps, count));
+            let params = table.params(self.settings, self.loaded, done.left);
             let map = cost.measure(pass::SHADOW_MAP, |stage| {
                 let l = self.loaded;
                 let deposits = Deposits::new(
-                    &tsm::Scene { cloud: &l.cloud, materials: &l.materials, objects: &l.objects },
+                    &tsm::Scene { cloud: &l.cloud, materials: &l.materials, objects },
                     &point.light,
                     &params,
                     Some(self.progress),
@@ -57,7 +88,7 @@ impl<'a> Frame<'a> {
                 stage.bytes = map.counts().bytes;
                 Ok::<_, Error>(map)
             })?;
-            left = left.saturating_sub(map.counts().bytes);
+            done.left = done.left.saturating_sub(map.counts().bytes);
             maps.push(Some(map));
         }
         Ok(maps)

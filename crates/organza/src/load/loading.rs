@@ -90,7 +90,7 @@ impl<'a> Loading<'a> {
             if !plan.form.is_own() {
                 continue;
             }
-            let own = Own::new(p, plan.form, &self.context(id, 0, 0));
+            let own = Own::new(p, plan, &self.context(id, 0, 0));
             let own = own.map_err(|e| self.named(&self.scene.objects[id], e))?;
             if own.is_none() {
                 let name = crate::shown(&self.scene.objects[id].name);

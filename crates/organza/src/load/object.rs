@@ -144,7 +144,6 @@ impl Prepared<'_> {
             by_gradient: self.input.by_gradient(),
             casts: object.casts_shadow && extinct,
             receives: !self.as_it_is && material.shading != Shading::Unlit && object.shadow_coefficient > 0.0,
-            splats: self.prediction.splats,
         }
     }
 }

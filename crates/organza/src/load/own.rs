@@ -9,8 +9,8 @@ use super::files::{grid_bytes, mesh_bytes};
 use super::input::{Input, shortest_step};
 use super::object::{Prepared, as_it_is, medium_grid, procedural};
 use crate::Error;
-use crate::form::Form;
-use crate::scene::{RectangleSource, SurfaceSampler};
+use crate::form::{Form, PlannedObject};
+use crate::scene::{RectangleSource, SurfaceSampler, Technique};
 use convert::{DensityParams, SharedField};
 use glam::DVec3;
 use pbsr::BoundedExtinction;
@@ -30,6 +30,8 @@ pub(crate) type Inside = Box<dyn Fn(DVec3) -> bool + Send + Sync>;
 pub(crate) struct Own {
     /// Rank of the object in the scene.
     pub(crate) object: usize,
+    /// What draws it.
+    pub(crate) technique: Technique,
     /// Its data.
     pub(crate) body: Body,
     /// Its material.
@@ -46,6 +48,8 @@ pub(crate) struct Own {
     pub(crate) bounds: DAabb,
     /// Radius that its splats have or would have, normalized world units.
     pub(crate) radius: f64,
+    /// Whether its splats are in the cloud too.
+    pub(crate) has_splats: bool,
     /// Elements that a sampler has tables of, about: cells with extinction, triangles, cubes that a surface meets.
     elements: u64,
 }
@@ -86,7 +90,12 @@ impl std::fmt::Debug for Own {
 impl Own {
     /// Takes the data of an object; its splats, if it has any, are made from the same. `None` for raw points, and where
     /// there is nothing to sample.
-    pub(super) fn new(prepared: &mut Prepared<'_>, source: Form, context: &Context<'_>) -> Result<Option<Self>, Error> {
+    pub(super) fn new(
+        prepared: &mut Prepared<'_>,
+        planned: &PlannedObject,
+        context: &Context<'_>,
+    ) -> Result<Option<Self>, Error> {
+        let source = planned.form;
         let splat = prepared.input.splat().clone();
         let factor = context.extinction_factor(&context.scene.objects[context.id]);
         let depth = factor * optics::optical_depth(prepared.input.opacity().unwrap_or(0.0));
@@ -96,6 +105,7 @@ impl Own {
         let radius = f64::from(splat.profile.cutoff) * f64::from(Footprint::SIGMA_OVER_SPACING) * spacing;
         Ok(Some(Self {
             object: context.id,
+            technique: planned.technique,
             material: usize::from(splat.material),
             opacity: optics::opacity(depth),
             extinction_scale: factor * splat.transform.scale,
@@ -109,6 +119,7 @@ impl Own {
             transform: splat.transform,
             bounds,
             radius: radius * splat.transform.scale,
+            has_splats: planned.splats.is_some(),
             elements,
         }))
     }
@@ -137,6 +148,13 @@ impl Own {
             Body::Field(field) => field.bytes(),
             Body::Surface { .. } => 0,
         }
+    }
+
+    /// Optical depth that no ray through its cells can exceed, of the channel that absorbs most; 0 for other bodies.
+    pub(crate) fn optical_depth(&self) -> f64 {
+        let Body::Cells { transfer, .. } = &self.body else { return 0.0 };
+        let most = transfer.points().iter().map(|p| p.extinction).fold(0.0, f32::max);
+        f64::from(most) * self.extinction_scale * self.bounds.diagonal()
     }
 
     /// A box in the world that holds the object.

@@ -2,11 +2,15 @@
 //! and classified and shaded when a slab is complete, so zooms show no blur. What is no volume comes as splats, each in the slab of
 //! its centre, where extinctions add.
 //!
-//! Light comes from the same shadow maps as for all techniques.
+//! Light comes from the same shadow maps as for all techniques; or, in slabs across the half vector of light and view, through these
+//! slabs themselves ([`half`]).
+
+mod half;
 
 use crate::form::Form;
 use crate::frame::{Frame, Shaded};
-use crate::load::own::{Body, Own};
+use crate::load::own::Body;
+use crate::matter::Matter;
 use crate::pass;
 use crate::scene::{Scene, Technique};
 use crate::statistics::{ObjectData, ObjectStatistics};
@@ -40,6 +44,8 @@ pub(crate) fn seconds(scene: &Scene, all: &Translucent) -> f64 {
     sheets + cost::FRAGMENT * all.fragments
 }
 
+pub(crate) use half::carries;
+
 /// Begins a frame.
 pub(crate) fn begin<'a>(frame: &'a Frame<'a>) -> Box<dyn Fold + 'a> {
     Box::new(Sheets { frame, sheeted: None })
@@ -61,10 +67,14 @@ impl Fold for Sheets<'_> {
         cost: &mut CostRecord,
     ) -> Result<(), Error> {
         let frame = self.frame;
+        if half::is_asked(frame.scene) {
+            return half::draw(frame, params(frame, session.options), into, session, cost);
+        }
         let opaque = frame.opaque(cost)?;
         if self.sheeted.is_none() {
             let sheeted = sheeted(frame, session.options, cost)?;
-            warn(frame, &sheeted, session.warnings);
+            let volumes: Vec<Volume<'_>> = volumes(&frame.matter()).collect();
+            warn(frame, &volumes, session.warnings);
             self.sheeted = Some(sheeted);
         }
         let sheeted = self.sheeted.as_ref().expect("invariant: sheets were made above");
@@ -88,7 +98,7 @@ fn sheeted<'a>(frame: &'a Frame<'a>, options: &RenderOptions, cost: &mut CostRec
     let splats = splats(frame, cost)?;
     frame.progress.begin(stage::SHEETS);
     let input = SheetInput {
-        volumes: volumes(frame).filter_map(|own| volume(frame, own)).collect(),
+        volumes: volumes(&frame.matter()).collect(),
         splats,
         camera: &frame.camera,
         lights: frame.lit_by(maps),
@@ -105,22 +115,28 @@ fn sheeted<'a>(frame: &'a Frame<'a>, options: &RenderOptions, cost: &mut CostRec
 }
 
 /// Names volumes that nothing is seen of.
-fn warn<'a>(frame: &'a Frame<'a>, sheeted: &Sheeted<'_>, warnings: &mut Vec<String>) {
-    for (own, _) in volumes(frame).zip(sheeted.visible()).filter(|(_, visible)| *visible == 0) {
-        let name = crate::shown(&frame.loaded.objects[own.object].name);
+fn warn(frame: &Frame<'_>, volumes: &[Volume<'_>], warnings: &mut Vec<String>) {
+    for volume in volumes.iter().filter(|volume| !volume.is_seen()) {
+        let name = crate::shown(&frame.loaded.objects[volume.object as usize].name);
         warnings.push(format!("object '{name}' shows nothing: its transfer function gives no value extinction"));
     }
 }
 
 impl<'a> Frame<'a> {
-    /// Width of the slabs in which the technique `sheets` draws what is its own in the plan, world units of the scene; `None` for nothing.
+    /// Width of the slabs in which the technique `sheets` draws what is its own in the plan, world units of the scene; `None` for
+    /// nothing. In half-vector slicing that of the first sweep.
     ///
     /// # Errors
     /// Those of [`Frame::maps`]; [`Error::Limit`] where there would be too many slabs, or too much memory.
     pub fn slab_width(&'a self, options: &RenderOptions, cost: &mut CostRecord) -> Result<Option<f64>, Error> {
-        let none = volumes(self).next().is_none() && self.translucent(self.drawn(), Technique::Sheets).is_empty();
+        let none =
+            volumes(&self.matter()).next().is_none() && self.translucent(self.drawn(), Technique::Sheets).is_empty();
         let unit = libm::exp2(f64::from(self.loaded.exponent));
-        if none { Ok(None) } else { Ok(Some(sheeted(self, options, cost)?.slabs().1 * unit)) }
+        Ok(match none {
+            true => None,
+            false if half::is_asked(self.scene) => Some(half::width(self, &params(self, options))? * unit),
+            false => Some(sheeted(self, options, cost)?.slabs().1 * unit),
+        })
     }
 }
 
@@ -135,31 +151,26 @@ fn params(frame: &Frame<'_>, options: &RenderOptions) -> Params {
     }
 }
 
-/// The objects that are drawn from lattices.
-fn volumes<'a>(frame: &'a Frame<'a>) -> impl Iterator<Item = &'a Own> {
-    let by = &frame.plan.by;
-    frame.loaded.own.iter().filter(|own| by[own.object] == Technique::Sheets && factor(frame, own) > 0.0)
-}
-
-/// The largest of a material's factors on extinction.
-fn factor(frame: &Frame<'_>, own: &Own) -> f64 {
-    let factors = frame.loaded.materials[own.material].extinction_rgb;
-    f64::from(factors.into_iter().fold(0.0, f32::max))
-}
-
-fn volume<'a>(frame: &Frame<'a>, own: &'a Own) -> Option<Volume<'a>> {
-    let Body::Cells { grid, transfer, normals } = &own.body else { return None };
-    Some(Volume {
-        grid,
-        transform: own.transform,
-        transfer,
-        // The scale holds the material's factor, and leads to units of the object.
-        extinction_scale: own.extinction_scale / (factor(frame, own) * own.transform.scale),
-        material: &frame.loaded.materials[own.material],
-        normals: *normals,
-        object: own.object as u32,
-        shadow_coefficient: frame.loaded.objects[own.object].shadow_coefficient,
-        casts_shadow: frame.loaded.objects[own.object].casts_shadow,
+/// The volumes that are the technique's own.
+fn volumes<'a>(matter: &Matter<'a>) -> impl Iterator<Item = Volume<'a>> + use<'a> {
+    let Matter { scene, own, .. } = *matter;
+    own.iter().filter_map(move |own| {
+        let object = &scene.objects[own.object];
+        let material = &scene.materials[own.material].material;
+        let factor = f64::from(material.extinction_rgb.into_iter().fold(0.0, f32::max));
+        let Body::Cells { grid, transfer, normals } = &own.body else { return None };
+        (own.technique == Technique::Sheets && factor > 0.0).then(|| Volume {
+            grid,
+            transform: own.transform,
+            transfer,
+            // The scale holds the material's factor, and leads to units of the object.
+            extinction_scale: own.extinction_scale / (factor * own.transform.scale),
+            material,
+            normals: *normals,
+            object: own.object as u32,
+            shadow_coefficient: object.shadow_coefficient,
+            casts_shadow: object.casts_shadow,
+        })
     })
 }
 
@@ -207,8 +218,8 @@ fn refuse<'a>(frame: &'a Frame<'a>, error: sheet_light::Error) -> Error {
             Error::Limit(exceeded.of("the scene", hint))
         }
         sheet_light::Error::Volume { volume, source } => {
-            let own = volumes(frame).nth(volume);
-            let name = own.map(|own| crate::shown(&frame.loaded.objects[own.object].name)).unwrap_or_default();
+            let volume = volumes(&frame.matter()).nth(volume);
+            let name = volume.map(|v| crate::shown(&frame.loaded.objects[v.object as usize].name)).unwrap_or_default();
             Error::input(format!("object '{name}'"), source.to_string(), "give it to another technique")
         }
         other => Error::Internal(other.to_string()),

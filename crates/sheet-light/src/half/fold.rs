@@ -2,14 +2,15 @@
 
 use super::band::ROWS;
 use super::counts::HalfCounts;
-use super::serves::serves;
+use super::frame::Frame;
+use super::serves::{axis_of_view, serves};
 use super::sweep::Sweep;
-use super::{HalfInput, HalfParams};
-use crate::Error;
+use super::{HalfInput, HalfParams, lamp};
 use crate::lattice::Lattice;
 use crate::visible::Voxels;
+use crate::{Error, Params, Volume};
 use splat_core::shade::{ChannelLayout, LitBy};
-use splat_core::{Accumulator, Progress};
+use splat_core::{Accumulator, Camera, Light, Progress};
 
 /// Draws all volumes in slabs across the half vector of each light, with the shadows that they cast on themselves and each other.
 /// `into` becomes a segment of its own, of all depths: what it held is gone, its planes and channels say what is kept, and the
@@ -64,6 +65,23 @@ pub fn fold(
     Ok(counts)
 }
 
+/// Width of the slabs of the sweep for `light`, or of that without one; world units. Infinite without volumes.
+///
+/// # Errors
+/// [`Error::Parameter`] or [`Error::Limit`] where there would be too many.
+pub fn slab_width(
+    volumes: &[Volume<'_>],
+    camera: &Camera,
+    light: Option<&Light>,
+    params: &Params,
+) -> Result<f64, Error> {
+    params.check()?;
+    if volumes.is_empty() {
+        return Ok(f64::INFINITY);
+    }
+    Ok(Frame::new(volumes, camera, params, &axis_of_view(volumes, camera, light))?.slabs.width)
+}
+
 fn check(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
     params.check()?;
     input.sheets.check()?;
@@ -85,19 +103,21 @@ fn check(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
 /// Counts what one sweep will take before it does.
 fn check_memory(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
     let volumes = &input.sheets.volumes;
-    let most = u64::from(params.most_light_pixels);
-    // Of a pixel: rays, sheets, sums; the light's square is an upper bound.
+    // Of a pixel: rays, sheets, sums.
     let of_a_pixel = 4 * (5 + 12 * volumes.len() as u64);
     let [width, height] = input.sheets.camera.size.map(u64::from);
     let sheets = if volumes.iter().any(|v| v.normals) { 3 } else { 1 };
     let eye =
         width * height * (of_a_pixel + 4 * 6 * sheets * volumes.len() as u64 + 160) * (ROWS as u64 + 2) / ROWS as u64;
-    let voxels = |v: &crate::Volume<'_>| {
+    let voxels = |v: &Volume<'_>| {
         let dims = Lattice::new(v.grid, [usize::MAX; 3]).dims;
         // A record once in the order of the lattice and once for each image, with its bucket.
         Voxels::bytes(dims) + dims.iter().map(|n| *n as u64).product::<u64>() * (3 * 16 + 24)
     };
-    let lights = if input.sheets.lights.is_empty() { 0 } else { most * most * of_a_pixel };
+    // Sweeps follow one another.
+    let pixels =
+        |lit: &LitBy<'_>| lamp::camera_of(volumes, &lit.light, params).size.into_iter().map(u64::from).product::<u64>();
+    let lights = of_a_pixel * input.sheets.lights.iter().map(pixels).max().unwrap_or(0);
     let needed = eye + lights + volumes.iter().map(voxels).sum::<u64>();
     let limit = params.sheets.limits.max_bytes;
     let hint = || "use fewer voxels, a smaller picture or fewer pixels of the light buffer".to_owned();

@@ -1,0 +1,84 @@
+//! Light that a technique carries through what it draws by itself: no shadow map need have that, and which maps are left to build.
+
+use crate::Error;
+use crate::choose::{row, techniques};
+use crate::form::PlannedObject;
+use crate::lights::{self, LightPoint};
+use crate::load::Loaded;
+use crate::matter::{CarriesLight, Matter};
+use crate::plan::{Effect, Plan};
+use crate::scene::{Scene, SceneLight};
+use crate::shadows::Wanted;
+use crate::statistics::{ObjectStatistics, Statistics};
+use splat_core::Object;
+
+/// How light is carried in a scene, if any technique of it does.
+pub(crate) fn of_scene(scene: &Scene) -> Option<CarriesLight> {
+    techniques(scene).into_iter().find_map(|technique| (row(technique).carries)(scene))
+}
+
+/// Whether nothing needs a shadow of what is drawn from its own data but that itself, through which all light is carried.
+pub(crate) fn is_all(
+    carries: CarriesLight,
+    matter: &Matter<'_>,
+    statistics: &[ObjectStatistics],
+    lights: &[SceneLight],
+) -> Result<bool, Error> {
+    let points = lights::points(lights);
+    let answers = carries(matter, &points)?;
+    let is_no_shadow = |point: &LightPoint| !lights[point.of].shadow || point.light.intensity == [0.0; 3];
+    let receives = |(o, planned): (&ObjectStatistics, &PlannedObject)| o.receives && !planned.form.is_own();
+    Ok(!statistics.iter().zip(matter.planned).any(receives)
+        && points.iter().zip(&answers).all(|(point, carries)| carries.is_ok() || is_no_shadow(point)))
+}
+
+/// Asks the techniques of a plan, and tells what they answer of each light whose shadow is called for.
+pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: &mut Plan) -> Result<(), Error> {
+    let Some(carries) = of_scene(scene) else { return Ok(()) };
+    let matter = Matter { scene, own: &loaded.own, planned: &plan.objects, camera: &loaded.camera };
+    let carries = carries(&matter, points)?;
+    let called_for = |point: &LightPoint| plan.shadow_maps[point.of];
+    plan.carried = points.iter().zip(&carries).map(|(point, carries)| called_for(point) && carries.is_ok()).collect();
+    let of_light = |light: usize| {
+        let own = || points.iter().zip(&carries).filter(move |(point, _)| point.of == light);
+        let carried = own().filter(|(_, carries)| carries.is_ok()).count();
+        let mut reason = match own().count() {
+            1 => String::new(),
+            all => format!("{carried} of {all} points; "),
+        };
+        reason += &match own().find_map(|(_, carries)| carries.as_ref().err()) {
+            None => "it comes through slabs that light and view share".to_owned(),
+            Some(why) => format!("a shadow map has it, scattered once: {why}"),
+        };
+        Effect { name: format!("light {light} through volumes"), called_for: carried > 0, reason, bound: 0.0 }
+    };
+    let lights = plan.shadow_maps.len();
+    let told: Vec<Effect> = (0..lights).filter(|light| plan.shadow_maps[*light]).map(of_light).collect();
+    plan.effects.splice(lights..lights, told);
+    Ok(())
+}
+
+/// The maps that are wanted: one for each point of a light, of all casters, and where light is carried one for each point, of
+/// `others`, the objects that it is not carried through.
+pub(crate) fn wanted_maps<'a>(
+    loaded: &'a Loaded,
+    points: &'a [LightPoint],
+    others: &'a [Object],
+    plan: &Plan,
+) -> Vec<Option<Wanted<'a>>> {
+    let called_for = |point: &LightPoint| plan.shadow_maps[point.of];
+    if !plan.carried.contains(&true) {
+        return points.iter().map(|point| called_for(point).then_some((point, &loaded.objects[..]))).collect();
+    }
+    // Who receives light beside what it is carried through, and who casts shadows there.
+    let beside = Statistics::of_cloud(&loaded.cloud, &loaded.materials, others, &loaded.footprints);
+    let all = points.iter().zip(&plan.carried).map(|(point, carried)| {
+        let wanted = called_for(point) && (!carried || beside.receivers > 0);
+        wanted.then_some((point, &loaded.objects[..]))
+    });
+    let of_others = points.iter().zip(&plan.carried).map(|(point, carried)| {
+        let wanted = *carried && beside.casters > 0;
+        wanted.then_some((point, others))
+    });
+    all.chain(of_others).collect()
+}

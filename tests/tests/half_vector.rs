@@ -1,0 +1,215 @@
+//! Half-vector slicing of the technique `sheets` through the whole command: closed forms, what slabs across the view show of the same
+//! scene, what is built for it, and what is refused.
+
+use organza_tests::{Picture, draw, draw_in, largest_difference, organza, parallel_view, sum_of_effects, window};
+use std::path::Path;
+
+const HALF: [&str; 4] = ["--technique", "sheets", "--set", "render.sheets.slicing='half_vector'"];
+
+fn in_half_vectors(scene: &str, arguments: &[&str]) -> Picture {
+    draw(scene, &[&HALF, arguments].concat())
+}
+
+fn rmse(a: &[f64], b: &[f64]) -> f64 {
+    (a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64).sqrt()
+}
+
+fn fog(tau: f64) -> String {
+    format!(
+        "[[object]]\nname = 'fog'\nmedium_box = {{ min = [-4, -4, -0.5], max = [4, 4, 0.5], extinction = {tau:?}, \
+         spacing = 0.1 }}\n[render.sheets]\ntransmittance_cutoff = 0\n"
+    )
+}
+
+fn sun(direction: &str) -> String {
+    format!("[[light]]\nkind = 'directional'\ndirection = {direction}\nirradiance = [1, 1, 1]\n")
+}
+
+fn bright(direction: &str) -> String {
+    sun(direction).replace("[1, 1, 1]", "[8, 7, 6]")
+}
+
+#[test]
+fn fog_lit_along_the_view_from_before_and_behind_has_its_closed_forms() {
+    for tau in [0.01f64, 1.0, 5.0] {
+        for width in ["'auto'", "0.033", "3"] {
+            let shown = |direction: &str| {
+                let scene = parallel_view(2.0, 24) + &sun(direction) + &fog(tau);
+                let picture = in_half_vectors(&scene, &["--set", &format!("render.sheets.slab_width={width}")]);
+                let middle = |channel: &str| window(&picture.channel(channel), 24, 8..16, 8..16);
+                (middle("R"), middle("A"))
+            };
+            // What comes in is scattered and goes out: ∫ e^(−2t)/4π dt; from behind all ways are as long as the slab.
+            let isotropic = 0.25 / std::f64::consts::PI;
+            let before = isotropic * 0.5 * -(-2.0 * tau).exp_m1();
+            let behind = isotropic * tau * (-tau).exp();
+            for (direction, expected) in [("[0, 0, -1]", before), ("[0, 0, 1]", behind)] {
+                let (color, alpha) = shown(direction);
+                let off = |seen: &[f64], expected: f64| seen.iter().map(|v| (v - expected).abs()).fold(0.0, f64::max);
+                assert!(off(&alpha, -(-tau).exp_m1()) < 1e-5, "{tau}, {width}: alpha {alpha:?}");
+                assert!(off(&color, expected) < 1e-6, "{tau}, {width}, {direction}: {color:?}, expected {expected}");
+            }
+        }
+    }
+}
+
+/// Two volumes that overlap, and two walls, one of which shadows them.
+const MIXED: &str = "[ambient]\ncolor = [0.1, 0.1, 0.12]\n\
+     [material.smoke]\nmedium = { extinction = 1.5, albedo = 0.8, asymmetry = 0.3 }\n\
+     [[object]]\nname = 'cloud'\nmaterial = 'smoke'\n\
+     density = { expression = 'exp(-6*((x - 0.3)^2 + y^2 + z^2))', box = [[-0.8, -1, -1], [1.3, 1, 1]], spacing = 0.05, extinction = 4 }\n\
+     [[object]]\nname = 'haze'\nmaterial = 'smoke'\n\
+     medium_ball = { center = [-0.5, 0.2, 0.1], radius = 0.5, extinction = 1, spacing = 0.05 }\n\
+     [[object]]\nname = 'wall'\nrectangle = { center = [0, -1, -0.4], u = [1.4, 0, 0], v = [0, 0.2, -0.9], spacing = 0.04 }\n\
+     [[object]]\nname = 'blind'\nrectangle = { center = [0.3, 1.2, 0.2], u = [0.3, 0, 0], v = [0, 0, 0.3], spacing = 0.03 }\n\
+     [render]\nlayers = ['effects', 'shadow']\n";
+
+const LAMP: &str = "[[light]]\nkind = 'point'\nposition = [0.5, 4, 1]\nintensity = [160, 150, 120]\n";
+
+#[test]
+fn volumes_and_walls_shadow_each_other_as_in_slabs_across_the_view() {
+    for light in [LAMP.to_owned(), bright("[-0.4, -1, -0.6]"), bright("[0.3, -0.8, 0.7]")] {
+        let scene = parallel_view(2.6, 64) + &light + MIXED;
+        let [view, half] = [draw(&scene, &HALF[..2]), in_half_vectors(&scene, &[])];
+        for channel in ["R", "G", "A", "scatter1.R", "direct.R", "shadow.A"] {
+            let (a, b) = (view.channel(channel), half.channel(channel));
+            let mean = a.iter().sum::<f64>() / a.len() as f64;
+            println!("{channel}: RMSE {:.5} of {mean:.4}", rmse(&a, &b));
+            assert!(rmse(&a, &b) < 0.01, "{channel}: RMSE {}", rmse(&a, &b));
+            assert!(mean > 0.03, "{channel}: mean {mean}");
+        }
+        let summed = largest_difference(&half.channel("G"), &sum_of_effects(&half, "G"));
+        assert!(summed < 1e-5, "{summed:e}");
+    }
+}
+
+#[test]
+fn threads_and_the_order_of_lights_change_no_bit() {
+    let (one, other) = (bright("[-0.4, -1, -0.6]"), bright("[0.3, -0.8, 0.7]"));
+    let scene = |lights: [&str; 2]| parallel_view(2.6, 40) + &lights.concat() + MIXED;
+    let picture = in_half_vectors(&scene([&one, &other]), &["--threads", "1"]);
+    let same = |with: &Picture| {
+        for channel in ["R", "B", "A", "scatter1.G", "shadow.A"] {
+            assert_eq!(with.channel(channel), picture.channel(channel), "{channel}");
+        }
+    };
+    same(&in_half_vectors(&scene([&other, &one]), &[]));
+    for threads in ["2", "3", "7"] {
+        same(&in_half_vectors(&scene([&one, &other]), &["--threads", threads]));
+    }
+}
+
+#[test]
+fn hv15_a_lamp_inside_has_a_shadow_map_and_both_slicings_agree() {
+    let lamp = "[[light]]\nkind = 'point'\nposition = [0.3, 0.1, 0.1]\nintensity = [4, 4, 4]\n";
+    let scene = parallel_view(2.6, 64) + lamp + &bright("[-0.4, -1, -0.6]") + MIXED;
+    let [view, half] = [draw(&scene, &HALF[..2]), in_half_vectors(&scene, &[])];
+    // Beside the lamp radiance has a peak, as high as kernels are small there.
+    let is_far = |k: usize| {
+        let at = |n: usize| (n as f64 + 0.5) / 64.0 * 2.6 - 1.3;
+        (at(k % 64) - 0.3).hypot(-at(k / 64) - 0.1) > 0.3
+    };
+    for channel in ["R", "A", "scatter1.G"] {
+        let [a, b] = [&view, &half].map(|p| p.channel(channel));
+        let far = |values: Vec<f64>| (0..values.len()).filter(|k| is_far(*k)).map(|k| values[k]).collect::<Vec<_>>();
+        let [a, b] = [far(a), far(b)];
+        let mean = a.iter().sum::<f64>() / a.len() as f64;
+        assert!(rmse(&a, &b) < 0.01 && mean > 0.03, "{channel}: RMSE {} of {mean}", rmse(&a, &b));
+    }
+    let said = explained(&scene, &[]);
+    assert!(said.contains("a shadow map has it, scattered once: the lamp lies inside object 'cloud'"), "{said}");
+    assert!(said.contains("it comes through slabs that light and view share"), "{said}");
+}
+
+/// What `organza explain` writes.
+fn explained(scene: &str, arguments: &[&str]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    let mut command = organza();
+    command.args(["explain", "scene.toml"]).args(HALF).args(arguments).current_dir(&folder);
+    String::from_utf8(command.output().unwrap().stdout).unwrap()
+}
+
+#[test]
+fn x7_no_map_of_volumes_is_built_that_nobody_else_receives() {
+    let maps = |scene: &str, arguments: &[&str]| explained(scene, arguments).matches("tsm build").count();
+    let fog = parallel_view(2.0, 16) + &bright("[-0.4, -1, -0.6]") + &fog(1.0);
+    assert_eq!(maps(&fog, &[]), 0);
+    // Nor does it become splats.
+    let of_fog = |arguments: &[&str]| {
+        let said = explained(&fog, arguments);
+        let counts = said.lines().rfind(|line| line.starts_with("fog ")).map(|line| line.split_whitespace().last());
+        counts.flatten().map(str::to_owned)
+    };
+    assert_eq!(of_fog(&[]).as_deref(), Some("0"));
+    assert_eq!(of_fog(&["--set", "render.sheets.slicing='view'"]).as_deref(), Some("64000"));
+    assert_eq!(maps(&fog, &["--set", "render.sheets.slicing='view'"]), 1);
+    // The wall receives the shadow of all, the volumes that of the walls.
+    let walls = parallel_view(2.6, 16) + &bright("[-0.4, -1, -0.6]") + MIXED;
+    assert_eq!(maps(&walls, &[]), 2);
+    assert_eq!(
+        maps(&walls, &["--set", "object.wall.casts_shadow=false", "--set", "object.blind.casts_shadow=false"]),
+        1
+    );
+    let deaf = ["--set", "object.wall.shadow_coefficient=0", "--set", "object.blind.shadow_coefficient=0"];
+    assert_eq!(maps(&walls, &deaf), 1);
+}
+
+#[test]
+fn what_a_volume_does_not_cast_or_does_not_receive_is_left_out() {
+    let scene = parallel_view(2.6, 48) + &bright("[-0.4, -1, -0.6]") + MIXED;
+    for key in ["object.cloud.casts_shadow=false", "object.cloud.shadow_coefficient=0.3"] {
+        let set = ["--set", key];
+        let [view, half] = [draw(&scene, &[&HALF[..2], &set].concat()), in_half_vectors(&scene, &set)];
+        let apart = rmse(&view.channel("scatter1.G"), &half.channel("scatter1.G"));
+        let changed = rmse(&half.channel("scatter1.G"), &in_half_vectors(&scene, &[]).channel("scatter1.G"));
+        assert!(apart < 0.01 && changed > 2.0 * apart, "{key}: {apart} of {changed}");
+    }
+}
+
+/// What is said of a scene that is refused with this exit code; no picture is left.
+fn refused(folder: &Path, scene: &str, arguments: &[&str], code: i32) -> String {
+    std::fs::write(folder.join("scene.toml"), scene).unwrap();
+    let mut command = organza();
+    command.args(["render", "scene.toml", "-o", "a.exr"]).args(arguments).current_dir(folder);
+    let out = command.output().unwrap();
+    let said = String::from_utf8(out.stderr).unwrap();
+    assert_eq!(out.status.code(), Some(code), "{said}");
+    assert!(!folder.join("a.exr").exists());
+    said
+}
+
+#[test]
+fn what_half_vectors_cannot_draw_is_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = parallel_view(2.6, 16) + &bright("[-0.4, -1, -0.6]") + MIXED;
+    let glass = refused(folder.path(), &scene, &[&HALF[..], &["--set", "object.wall.opacity=0.5"]].concat(), 3);
+    assert!(glass.contains("object 'wall'") && glass.contains("render.sheets.slicing = \"view\""), "{glass}");
+    let two = refused(folder.path(), &scene, &[&HALF[..], &["--set", "object.haze.technique='points'"]].concat(), 3);
+    assert!(two.contains("object 'haze': drawn by points"), "{two}");
+    let view = refused(folder.path(), &scene, &["--set", "render.sheets.light_pixels=2"], 2);
+    assert!(view.contains("`light_pixels`: slabs across the view have no light buffers"), "{view}");
+    let many = refused(folder.path(), &scene, &[&HALF[..], &["--set", "render.sheets.slab_width=1e-9"]].concat(), 5);
+    assert!(many.contains("render.sheets.slab_width"), "{many}");
+    // Without a wall no shadow map is refused before.
+    let fog = parallel_view(2.0, 16) + &sun("[-0.4, -1, -0.6]") + &fog(1.0);
+    let little = refused(
+        folder.path(),
+        &fog,
+        &[&HALF[..], &["--max-memory", "60M", "--set", "render.sheets.light_pixels=16"]].concat(),
+        5,
+    );
+    assert!(little.contains("half-vector sheets"), "{little}");
+}
+
+#[test]
+fn raw_points_beside_volumes_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("points.xyz"), "0 0 0\n0.1 0 0\n0 0.1 0\n0.1 0.1 0\n").unwrap();
+    let scene = parallel_view(2.0, 16)
+        + &fog(1.0).replace("[render", "[[object]]\nname = 'dust'\npoints = 'points.xyz'\nopacity = 0.3\n[render");
+    let said = refused(folder.path(), &scene, &HALF, 3);
+    assert!(said.contains("object 'dust'"), "{said}");
+    let opaque = draw_in(folder.path(), &scene.replace("opacity = 0.3", "opacity = 1"), &HALF);
+    assert!(opaque.channel("A").contains(&1.0));
+}
