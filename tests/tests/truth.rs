@@ -3,7 +3,7 @@
 use crate::many_forms::write;
 use organza::scene::{self, Scene, SceneLight};
 use organza::{Progress, RenderOptions, render};
-use organza_judge::truth::{Truth, truth, truth_of_all_orders};
+use organza_judge::truth::{AllOrders, Orders, Truth, truth};
 use splat_core::{Light, LightShape};
 use std::path::Path;
 
@@ -19,7 +19,7 @@ fn scene(size: [u32; 2]) -> Scene {
 }
 
 fn traced(scene: &Scene) -> Result<Truth, String> {
-    truth(scene, &RenderOptions::default(), SAMPLES, &Progress::new()).unwrap()
+    truth(scene, &RenderOptions::default(), Orders::One, SAMPLES, &Progress::new()).unwrap()
 }
 
 fn drawn(scene: &Scene) -> Vec<[f64; 3]> {
@@ -81,11 +81,11 @@ medium_ball = { center = [0.35, 0.35, 0], radius = 0.25, spacing = 0.03 }
 material = "fog"
 [[object]]
 name = "floor"
-rectangle = { center = [0, 0, 0], u = [0, 0, 5], v = [5, 0, 0], spacing = 0.04 }
+rectangle = { center = [0, 0, 0], u = [0, 0, 4], v = [4, 0, 0], spacing = 0.08 }
 color = [0.8, 0.7, 0.6]
 [[light]]
 intensity = [4, 4, 4]
-samples = 25
+samples = 16
 "#;
 
 /// The points of a light, shining to all sides alike.
@@ -240,12 +240,12 @@ fn what_has_no_truth_is_named() {
 }
 
 /// What one order of scattering leaves out of a scene of 16² pixels under a sun from the eye.
-fn left_out(objects: &str) -> organza_judge::truth::AllOrders {
+fn left_out(objects: &str) -> AllOrders {
     let head = "version = 1\n[camera]\nposition = [0, 0, 5]\ntarget = [0, 0, 0]\northographic = 1.0\nsize = [16, 16]\n\
                 [[light]]\nkind = 'directional'\ndirection = [0, 0, -1]\nirradiance = [3, 3, 3]\n";
     let text = head.to_owned() + objects;
     let scene = scene::parse(Path::new("s.toml"), text.as_bytes(), &Default::default()).unwrap();
-    let all = truth_of_all_orders(&scene, &RenderOptions::default(), SAMPLES, &Progress::new()).unwrap().unwrap();
+    let all = truth(&scene, &RenderOptions::default(), Orders::All, SAMPLES, &Progress::new()).unwrap().unwrap();
     assert!(all.method.contains("all orders"));
     traced(&scene).unwrap().beside(&all).unwrap()
 }
@@ -269,4 +269,42 @@ fn truth_of_all_orders_adds_what_is_scattered_again_and_nothing_else() {
     assert!((found.mean[0] / once - 1.0).abs() < 0.02, "{found:?}, expected {once}");
     assert!(found.mean[1] > 0.8 * most && found.mean[1] < 1.02 * most, "{found:?}, at most {most}");
     assert!((found.rmse / (found.mean[1] - found.mean[0]) - 1.0).abs() < 0.2, "{found:?}");
+}
+
+#[test]
+fn orders_by_media_leave_out_what_surfaces_and_media_do_to_each_other() {
+    let head = "version = 1\n[camera]\nposition = [0, 1.5, 5]\ntarget = [0, 0, 0]\northographic = 2.0\nsize = [24, 24]\n\
+                [[light]]\nkind = 'directional'\ndirection = [0, -1, -1]\nirradiance = [3, 3, 3]\n";
+    let fog = "[material.fog]\nshading = 'phase'\n[[object]]\nname = 'fog'\nmaterial = 'fog'\n\
+               medium_box = { min = [-1, 0, -1], max = [1, 0.8, 1], extinction = 4.0, spacing = 0.2 }\n";
+    let plane = "[[object]]\nname = 'plane'\nrectangle = { center = [0, -0.1, 0], u = [0, 0, 2], v = [2, 0, 0], spacing = 0.1 }\n";
+    let mean = |objects: &str, orders: Orders| {
+        let text = head.to_owned() + objects;
+        let scene = scene::parse(Path::new("s.toml"), text.as_bytes(), &Default::default()).unwrap();
+        let truth = truth(&scene, &RenderOptions::default(), orders, SAMPLES, &Progress::new()).unwrap().unwrap();
+        truth.image.pixels().iter().map(|p| p[1]).sum::<f64>() / truth.image.pixels().len() as f64
+    };
+    let near = |a: f64, b: f64| (a / b - 1.0).abs() < 0.01;
+    // Alone fog is the same by all orders, and a plane by one.
+    assert!(near(mean(fog, Orders::ByMedia), mean(fog, Orders::All)));
+    assert!(near(mean(plane, Orders::ByMedia), mean(plane, Orders::One)));
+    // Together there is light from fog on the plane and from the plane in the fog, which is neither's own.
+    let both = fog.to_owned() + plane;
+    let [one, by_media, all] = [Orders::One, Orders::ByMedia, Orders::All].map(|orders| mean(&both, orders));
+    println!("one {one}, by media {by_media}, all {all}");
+    let again = mean(fog, Orders::All) - mean(fog, Orders::One);
+    assert!(by_media > one + 0.3 * again && all > by_media + 0.3 * again, "{one} {by_media} {all}, again {again}");
+}
+
+#[test]
+fn colours_above_1_have_a_truth_of_one_order_alone() {
+    let text = "version = 1\n[camera]\nposition = [0, 0, 5]\ntarget = [0, 0, 0]\northographic = 2.0\nsize = [4, 4]\n\
+                [material.fog]\ncolor = [1.6, 1.5, 1.4]\nmedium = { extinction = 3 }\n[[object]]\nname = 'fog'\nmaterial = 'fog'\n\
+                medium_ball = { center = [0, 0, 0], radius = 0.7, spacing = 0.1 }\n";
+    let scene = scene::parse(Path::new("s.toml"), text.as_bytes(), &Default::default()).unwrap();
+    assert!(traced(&scene).is_ok());
+    for orders in [Orders::ByMedia, Orders::All] {
+        let reason = truth(&scene, &RenderOptions::default(), orders, 4, &Progress::new()).unwrap().unwrap_err();
+        assert!(reason.contains("colours above 1"), "{reason}");
+    }
 }

@@ -8,7 +8,7 @@ use organza::output::Target;
 use organza::scene::Scene;
 use organza::{Error, Progress, RenderOptions, printable};
 use organza_judge::accuracy::{self, Absent, Facts, Options, Outcome, Renderer, Report, Request, Study};
-use organza_judge::truth::{self, Truth};
+use organza_judge::truth::{self, Orders, Truth};
 use serde_json::json;
 use std::fmt::Write;
 
@@ -72,9 +72,9 @@ fn truth(
     options: &Options,
     progress: &Progress,
 ) -> Result<Result<Truth, String>, Error> {
-    let mut one = truth::truth(scene, render, options.truth_samples(), progress)?;
+    let mut one = truth::truth(scene, render, Orders::One, options.truth_samples(), progress)?;
     if let Ok(one) = &mut one
-        && let Ok(all) = truth::truth_of_all_orders(scene, render, options.truth_samples(), progress)?
+        && let Ok(all) = truth::truth(scene, render, Orders::All, options.truth_samples(), progress)?
     {
         one.all_orders = Some(one.beside(&all)?);
     }

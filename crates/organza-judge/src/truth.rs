@@ -1,8 +1,7 @@
 //! Physical truth of a scene: the same objects, materials and lights in the path tracer of `reference`, without splats.
 //!
-//! Light takes the paths that the `points` technique simulates: emission, one scattering or reflection, shadows that
-//! translucent things colour. [`truth_of_all_orders`] lets it go on as nature does, and [`Truth::beside`] says how much that
-//! is. What the scene asks otherwise than nature a path tracer can follow too (`reference::Liberty`):
+//! Light takes the paths of its [`Orders`]: those that the `points` technique simulates, emission, one scattering or reflection, shadows
+//! that translucent things colour; or more, as far as nature's, and [`Truth::beside`] says how much that is. What the scene asks otherwise than nature a path tracer can follow too (`reference::Liberty`):
 //! shadows that are turned off or weakened, and colours above 1, which scatter more light than arrives; the truth says so.
 //! What has no truth is named instead of being guessed at: raw points (nobody knows the surface that they sample), volumes
 //! shaded by their gradient, surfaces that scatter by a phase function.
@@ -60,39 +59,47 @@ impl Truth {
     }
 }
 
-/// Path-traces a scene with so many samples a pixel and one scattering or reflection; `Err` of the inner result says why the
-/// scene has no truth.
+/// How often light is scattered or reflected on its way to the eye. Emission and ambient light, which the scene adds to what is
+/// seen, light nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Orders {
+    /// Once.
+    One,
+    /// By media any number of times, or by a surface once.
+    ByMedia,
+    /// Any number of times, by media and surfaces in turn.
+    All,
+}
+
+impl Orders {
+    fn rules(self) -> PathRules {
+        PathRules {
+            max_bounces: (self == Self::One).then_some(1),
+            lights_visible: false,
+            emission_illuminates: false,
+            reflects_apart: self == Self::ByMedia,
+        }
+    }
+
+    /// In words.
+    const fn name(self) -> &'static str {
+        match self {
+            Self::One => "single scattering",
+            Self::ByMedia => "all orders of scattering by media, one of surfaces",
+            Self::All => "all orders of scattering",
+        }
+    }
+}
+
+/// Path-traces a scene with so many samples a pixel; `Err` of the inner result says why the scene has no truth.
 ///
 /// # Errors
 /// As [`organza::load`].
 pub fn truth(
     scene: &Scene,
     options: &RenderOptions,
+    orders: Orders,
     samples: u32,
-    progress: &Progress,
-) -> Result<Result<Truth, String>, Error> {
-    trace(scene, options, samples, Some(1), progress)
-}
-
-/// The same with light that is scattered and reflected any number of times. Emission and ambient light, which the scene
-/// adds to what is seen, light nothing here either.
-///
-/// # Errors
-/// As [`organza::load`].
-pub fn truth_of_all_orders(
-    scene: &Scene,
-    options: &RenderOptions,
-    samples: u32,
-    progress: &Progress,
-) -> Result<Result<Truth, String>, Error> {
-    trace(scene, options, samples, None, progress)
-}
-
-fn trace(
-    scene: &Scene,
-    options: &RenderOptions,
-    samples: u32,
-    max_bounces: Option<u32>,
     progress: &Progress,
 ) -> Result<Result<Truth, String>, Error> {
     let mut bodies = Vec::new();
@@ -119,10 +126,13 @@ fn trace(
         environment: Environment::default(),
         background: Some(scene.background.map(f64::from)),
     };
+    if orders != Orders::One && gains(&traced).any(|gain| gain > 1.0) {
+        return Ok(Err("colours above 1 scatter more light than arrives, which would go on for ever".into()));
+    }
     let settings = PathSettings {
         seed: scene.render.seed,
         samples: samples.max(2),
-        rules: PathRules { max_bounces, lights_visible: false, emission_illuminates: false },
+        rules: orders.rules(),
         pixel: PixelSampling::Area,
         ..PathSettings::default()
     };
@@ -134,22 +144,28 @@ fn trace(
     let image = Image::from_radiance(size, estimate.radiance.mean).map_err(|e| Error::Internal(e.to_string()))?;
     let method = format!(
         "path tracing without splats, {}, {} samples a pixel{}",
-        if max_bounces.is_some() { "single scattering" } else { "all orders of scattering" },
+        orders.name(),
         estimate.samples,
         liberties(scene, &traced)
     );
     Ok(Ok(Truth { method, image, standard_error: estimate.radiance.standard_error, all_orders: None }))
 }
 
+fn all_liberties<'a>(traced: &'a reference::Scene<'_>) -> impl Iterator<Item = &'a Liberty> {
+    traced.media.iter().map(|m| &m.liberty).chain(traced.surfaces.iter().map(|s| &s.material.liberty))
+}
+
+fn gains(traced: &reference::Scene<'_>) -> impl Iterator<Item = f64> {
+    all_liberties(traced).map(|liberty| liberty.gain)
+}
+
 /// What the scene asks otherwise than nature, in words.
 fn liberties(scene: &Scene, traced: &reference::Scene<'_>) -> String {
-    let surfaces = traced.surfaces.iter().map(|s| s.material.liberty);
-    let all: Vec<Liberty> = traced.media.iter().map(|m| m.liberty).chain(surfaces).collect();
     let mut text = String::new();
-    if all.iter().any(|l| l.gain > 1.0) {
+    if gains(traced).any(|gain| gain > 1.0) {
         text += "; colours above 1 scatter more light than arrives, as the scene asks";
     }
-    let weakened = all.iter().any(|l| !l.casts_shadow || l.shadow_coefficient != 1.0);
+    let weakened = all_liberties(traced).any(|l| !l.casts_shadow || l.shadow_coefficient != 1.0);
     if weakened || scene.lights.iter().any(|l| !l.shadow) {
         text += "; shadows are left out or weakened, as the scene asks";
     }

@@ -32,11 +32,13 @@ pub struct PathRules {
     pub lights_visible: bool,
     /// Whether emission of media and surfaces lights others; if not, only the eye sees it.
     pub emission_illuminates: bool,
+    /// Whether a path is either scattered by media or reflected once by a surface that the eye sees, and never both.
+    pub reflects_apart: bool,
 }
 
 impl Default for PathRules {
     fn default() -> Self {
-        Self { max_bounces: None, lights_visible: true, emission_illuminates: true }
+        Self { max_bounces: None, lights_visible: true, emission_illuminates: true, reflects_apart: false }
     }
 }
 
@@ -77,6 +79,8 @@ struct Path {
     /// Density of the ray's direction, 1/sr; `None` from the eye and behind dielectrics.
     density: Option<f64>,
     bounces: u32,
+    /// Whether nothing scatters it any more.
+    is_over: bool,
     events: u32,
     radiance: [f64; 3],
 }
@@ -186,6 +190,7 @@ impl<'a> Tracer<'a> {
             throughput: [1.0; 3],
             density: None,
             bounces: 0,
+            is_over: false,
             events: 0,
             radiance: [0.0; 3],
         };
@@ -194,7 +199,7 @@ impl<'a> Tracer<'a> {
     }
 
     fn may_scatter(&self, path: &Path) -> bool {
-        self.rules.max_bounces.is_none_or(|most| path.bounces < most)
+        !path.is_over && self.rules.max_bounces.is_none_or(|most| path.bounces < most)
     }
 
     /// Follows the path to its next event; false when it ends.
@@ -305,10 +310,11 @@ impl<'a> Tracer<'a> {
         if path.bounces == 0 || self.rules.emission_illuminates {
             path.add(surface.material.emitted(color), 1.0);
         }
-        if !self.may_scatter(path) {
+        if !self.may_scatter(path) || self.rules.reflects_apart && path.bounces > 0 {
             return false;
         }
         path.bounces += 1;
+        path.is_over = self.rules.reflects_apart;
         let response = surface.material.response(color, surface.normal(hit.triangle, hit.uv, geometric), -travel);
         let point = path.ray.at(hit.t);
         path.turn(point, travel, hit.id);

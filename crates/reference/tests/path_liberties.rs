@@ -13,7 +13,8 @@ use std::f64::consts::PI;
 const ALBEDO: f64 = 0.5;
 
 fn settings(samples: u32) -> PathSettings {
-    let rules = PathRules { max_bounces: Some(1), lights_visible: false, emission_illuminates: false };
+    let rules =
+        PathRules { max_bounces: Some(1), lights_visible: false, emission_illuminates: false, ..PathRules::default() };
     PathSettings { seed: 5, samples, batch: samples, rules, pixel: PixelSampling::Center, ..PathSettings::default() }
 }
 
