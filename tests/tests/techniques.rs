@@ -11,7 +11,7 @@ fn three(order: [usize; 3], apart: f64) -> String {
          [[object]]\nname = 'glass'\ntechnique = 'particles'\nopacity = 0.4\n\
          rectangle = {{ center = [0, 0, {:?}], u = [2, 0, 0], v = [0, 2, 0], spacing = 0.1 }}\n\
          [[object]]\nname = 'slab'\ntechnique = 'reference'\n\
-         medium_box = {{ min = [-2, -2, {:?}], max = [2, 2, {:?}], extinction = 0.5, spacing = 0.1 }}\n\
+         medium_box = {{ min = [-2, -2, {:?}], max = [2, 2, {:?}], extinction = 0.5, spacing = 0.2 }}\n\
          [render]\nantialias = 1\ndepth_ranges = 6\nparticles = {{ repeat_level = 100 }}\n",
         parallel_view(2.0, 32),
         at(0) - 0.5,

@@ -34,7 +34,7 @@ pub(crate) const SOURCES: [SourceCase; 14] = [
         "implicit = { expression = 'x^2 + y^2 + 2*z^2 - 0.3 + 0.2*x', box = [[-0.9, -0.9, -0.9], [0.9, 0.9, 0.9]], resolution = 12 }",
     ),
     case("isosurface", false, "isosurface = { volume = 'grid.nrrd', level = 0.85 }"),
-    case("level_set", false, "level_set = { points = 'ball.xyz' }\nspacing = 0.12"),
+    case("level_set", false, "level_set = { points = 'ball.xyz' }\nspacing = 0.2"),
     case(
         "slice",
         false,
