@@ -90,7 +90,7 @@ fn a_layout_with_multiple_scattering_has_room_for_it_and_no_other_has() {
         let [effects, normal, shadow] = [0, 1, 2].map(|bit| bits >> bit & 1 == 1);
         let plain = ChannelLayout::new(&LayerSet { effects, normal, shadow, ..LayerSet::default() });
         let layout = plain.with_multiple();
-        assert_eq!(plain.multiple(), None);
+        assert_eq!(plain.multiple(), (!effects).then_some(0));
         assert!(plain.count() <= MAX_SHADED_CHANNELS && layout.count() <= MAX_CHANNELS);
         let mut found = vec![f32::NAN; layout.count()];
         radiance.write(Vec3::Y, &layout, &mut found);

@@ -84,13 +84,14 @@ impl ChannelLayout {
         self.effects
     }
 
-    /// Whether light that is scattered more than once belongs to what is shown: then the first channel that it is added to.
+    /// The first channel that light is added to that is scattered more than once: its own, or beauty's; `None` where effects are
+    /// kept apart without it.
     #[inline]
     pub const fn multiple(&self) -> Option<usize> {
-        match (self.multiple, self.effects) {
+        match (self.effects, self.multiple) {
             (true, true) => Some(APART),
-            (true, false) => Some(0),
-            _ => None,
+            (true, false) => None,
+            _ => Some(0),
         }
     }
 
