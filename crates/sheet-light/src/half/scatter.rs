@@ -261,7 +261,8 @@ impl Scattered {
         let material = volume.material;
         let here = self.at(seen.world);
         let travel = super::serves::travel(light, seen.world).as_vec3();
-        let phase = henyey_greenstein(travel, seen.to_eye, material.asymmetry);
+        // What goes ahead was scattered before: twice is the phase function of g².
+        let phase = henyey_greenstein(travel, seen.to_eye, material.asymmetry * material.asymmetry.abs());
         let towards = self.grid.axes.map(|axis| axis.as_vec3().dot(seen.to_eye));
         let albedo = medium::albedo(volume, seen.color);
         [0, 1, 2].map(|c| {
