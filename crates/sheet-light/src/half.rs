@@ -65,6 +65,7 @@ mod light_path;
 mod params;
 mod placed;
 pub mod reference;
+mod scatter;
 mod serves;
 mod shade;
 mod sheet;
@@ -73,6 +74,7 @@ mod sweep;
 
 pub use axis::HalfVector;
 pub use counts::HalfCounts;
-pub use fold::{fold, slab_width};
-pub use params::{HalfInput, HalfParams};
+pub use fold::{balance, fold, slab_width};
+pub use params::{HalfInput, HalfParams, Scattering};
+pub use scatter::balance::Balance;
 pub use serves::{LEAST_COSINE, Reason, serves};

@@ -4,4 +4,6 @@ mod closed_forms;
 mod common;
 mod hard_cases;
 mod invariances;
+mod paths;
+mod scattering;
 mod twin;

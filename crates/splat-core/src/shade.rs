@@ -6,7 +6,7 @@ mod channels;
 pub mod gpu;
 mod point;
 
-pub use channels::{ChannelLayout, MAX_CHANNELS};
+pub use channels::{ChannelLayout, MAX_CHANNELS, MAX_SHADED_CHANNELS};
 pub use point::{Point, Radiance, arriving, facing};
 
 use crate::raster::Projected;

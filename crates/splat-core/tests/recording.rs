@@ -4,12 +4,12 @@ use glam::{DVec3, Vec3};
 use splat_core::raster::gpu::{AttributeRoom, Capacities, follow, project, record, resolve};
 use splat_core::raster::{self, Accumulation, Detail, OpaqueImage, Params, ProjectInput, Projected};
 use splat_core::raster::{FoldInput, OpaqueInput};
-use splat_core::shade::{ChannelLayout, MAX_CHANNELS, gpu as shade};
+use splat_core::shade::{ChannelLayout, MAX_SHADED_CHANNELS, gpu as shade};
 use splat_core::{Accumulator, Camera, Cloud, Direction, Error, FootprintStack, Material, Projection, Splat};
 use splat_shaders::Overflow;
 
 /// All effects, the normal and the shadow.
-const MOST: u32 = MAX_CHANNELS as u32;
+const MOST: u32 = MAX_SHADED_CHANNELS as u32;
 
 const ROOM: Capacities = Capacities {
     size: [640, 360],

@@ -1,7 +1,7 @@
 //! The radiance of one point: which effect light becomes, and where its numbers lie.
 
 use glam::{DVec3, Vec3};
-use splat_core::shade::{ChannelLayout, MAX_CHANNELS, Point, Radiance, arriving, facing};
+use splat_core::shade::{ChannelLayout, MAX_CHANNELS, MAX_SHADED_CHANNELS, Point, Radiance, arriving, facing};
 use splat_core::{ADDITIVE_LAYERS, LayerSet, Light, LightShape, Material, SHADED_EFFECTS, Shading, SplatKind};
 
 const AMBIENT: [f32; 3] = [0.1, 0.2, 0.3];
@@ -73,12 +73,40 @@ fn every_layout_has_its_numbers_in_a_row_without_gaps() {
         let mut found = vec![f32::NAN; layout.count()];
         radiance.write(normal, &layout, &mut found);
         assert_eq!(found, expected, "{layout:?}");
-        assert!(layout.count() <= MAX_CHANNELS);
+        assert!(layout.count() <= MAX_SHADED_CHANNELS);
         let names: Vec<(&str, usize)> = layout.effects().collect();
         if effects {
             assert_eq!(names, [("ambient", 0), ("emission", 3), ("direct", 6), ("scatter1", 9)]);
         } else {
             assert_eq!(names, [("beauty", 0)]);
+        }
+    }
+}
+
+#[test]
+fn a_layout_with_multiple_scattering_has_room_for_it_and_no_other_has() {
+    let radiance = radiance(Shading::Phong, Vec3::ZERO);
+    for bits in 0..8 {
+        let [effects, normal, shadow] = [0, 1, 2].map(|bit| bits >> bit & 1 == 1);
+        let plain = ChannelLayout::new(&LayerSet { effects, normal, shadow, ..LayerSet::default() });
+        let layout = plain.with_multiple();
+        assert_eq!(plain.multiple(), (!effects).then_some(0));
+        assert!(plain.count() <= MAX_SHADED_CHANNELS && layout.count() <= MAX_CHANNELS);
+        let mut found = vec![f32::NAN; layout.count()];
+        radiance.write(Vec3::Y, &layout, &mut found);
+        assert!(found.iter().all(|v| !v.is_nan()), "{layout:?}: {found:?}");
+        let at = layout.multiple().unwrap();
+        let names: Vec<(&str, usize)> = layout.effects().collect();
+        if effects {
+            assert_eq!((names.last(), names.len()), (Some(&("scatterN", at)), 5));
+            assert_eq!((&found[at..at + 3], layout.normal()), (&[0.0; 3][..], Some(at + 3)));
+        } else {
+            assert_eq!((names, layout.count()), (vec![("beauty", at)], plain.count()));
+        }
+        // Colours by their own plane, all else by green's.
+        for c in 0..layout.count() {
+            let expected = if c < layout.colors() { c % 3 } else { 1 };
+            assert_eq!(ChannelLayout::plane_of(c, layout.count(), 3), expected, "{layout:?}, channel {c}");
         }
     }
 }

@@ -15,7 +15,11 @@ pub struct HalfCounts {
     pub eye_fragments: u64,
     /// The same of the light's.
     pub light_fragments: u64,
-    /// Bytes of the light buffer of one sweep, the largest; they do not grow with slabs.
+    /// Cells of scattered light of one sweep, the most.
+    pub scatter_cells: u64,
+    /// Convolutions and corrections of scattered light; 0 where none is simulated.
+    pub scatter_passes: u64,
+    /// Bytes of the light buffer of one sweep and of its scattered light, the largest; they do not grow with slabs.
     pub light_bytes: u64,
     /// Bytes of everything that one sweep holds, the largest.
     pub bytes: u64,
@@ -31,6 +35,8 @@ impl HalfCounts {
             slabs: self.slabs + other.slabs,
             eye_fragments: self.eye_fragments + other.eye_fragments,
             light_fragments: self.light_fragments + other.light_fragments,
+            scatter_cells: self.scatter_cells.max(other.scatter_cells),
+            scatter_passes: self.scatter_passes + other.scatter_passes,
             light_bytes: self.light_bytes.max(other.light_bytes),
             bytes: self.bytes.max(other.bytes),
         }

@@ -279,6 +279,9 @@ impl OneSlab<'_> {
     fn mix(&self, lit: &Lit<'_>, pixel: [usize; 2], at: DVec3, share: [f32; 3], (lane, out): (usize, &mut Fragments)) {
         let mut values = [0.0; MAX_CHANNELS];
         lit.radiance(self.of, pixel, at).write(lit.normal, self.layout, &mut values);
+        if let (Some(first), Some(scattered)) = (self.layout.multiple(), lit.scattered(self.of, pixel, at)) {
+            (0..3).for_each(|c| values[first + c] += scattered[c]);
+        }
         let (count, planes) = (self.layout.count(), self.eye.pixels.planes);
         for c in 0..count {
             let sum = &mut out.values[c][lane];

@@ -3,9 +3,10 @@
 use super::band::ROWS;
 use super::counts::HalfCounts;
 use super::frame::Frame;
+use super::scatter::{self, Scattered, Scene, balance::Balance};
 use super::serves::{axis_of_view, serves};
 use super::sweep::Sweep;
-use super::{HalfInput, HalfParams, lamp};
+use super::{HalfInput, HalfParams, Scattering, lamp};
 use crate::lattice::Lattice;
 use crate::visible::Voxels;
 use crate::{Error, Params, Volume};
@@ -35,6 +36,10 @@ pub fn fold(
 ) -> Result<HalfCounts, Error> {
     check(input, params)?;
     let size = input.sheets.camera.size;
+    if params.scattering != Scattering::None && layout.multiple().is_none() {
+        let expected = "None, or a layout that has room for it: `ChannelLayout::with_multiple`";
+        return Err(Error::parameter("scattering", params.scattering, expected));
+    }
     assert_eq!(size, into.size, "invariant: one image size");
     assert_eq!(layout.count(), into.channels.len(), "invariant: one set of channels");
     let pixels = size[0] as usize * size[1] as usize;
@@ -82,6 +87,24 @@ pub fn slab_width(
     Ok(Frame::new(volumes, camera, params, &axis_of_view(volumes, camera, light))?.slabs.width)
 }
 
+/// Where the light of one lamp of the input stays, as its scattering among the volumes is simulated: in cells, by two streams, however
+/// the slabs lie. All 0 for a lamp that nothing scatters, or under [`Scattering::None`].
+///
+/// # Errors
+/// Those of [`fold`].
+///
+/// # Panics
+/// If there is no such lamp.
+pub fn balance(input: &HalfInput<'_>, params: &HalfParams, light: usize) -> Result<Balance, Error> {
+    check(input, params)?;
+    let (volumes, lit) = (&input.sheets.volumes[..], &input.sheets.lights[light]);
+    if !scatter::is_wanted(volumes, &lit.light, params) {
+        return Ok(Balance::default());
+    }
+    let scene = Scene::new(volumes, lit, params, input.sheets.shadow_origin);
+    Ok(Scattered::new(&scene, params.scattering).balance.scaled(lit.light.intensity))
+}
+
 fn check(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
     params.check()?;
     input.sheets.check()?;
@@ -114,11 +137,18 @@ fn check_memory(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error>
         // A record once in the order of the lattice and once for each image, with its bucket.
         Voxels::bytes(dims) + dims.iter().map(|n| *n as u64).product::<u64>() * (3 * 16 + 24)
     };
+    let cells: u64 = if params.scattering == Scattering::None {
+        0
+    } else {
+        // Media, two streams of one channel, what is kept of all.
+        let all: u64 = volumes.iter().map(|v| v.grid.values.len() as u64).sum();
+        2 * (all / u64::from(params.voxels_per_cell) + 1) * 350
+    };
     // Sweeps follow one another.
     let pixels =
         |lit: &LitBy<'_>| lamp::camera_of(volumes, &lit.light, params).size.into_iter().map(u64::from).product::<u64>();
     let lights = of_a_pixel * input.sheets.lights.iter().map(pixels).max().unwrap_or(0);
-    let needed = eye + lights + volumes.iter().map(voxels).sum::<u64>();
+    let needed = eye + lights + cells + volumes.iter().map(voxels).sum::<u64>();
     let limit = params.sheets.limits.max_bytes;
     let hint = || "use fewer voxels, a smaller picture or fewer pixels of the light buffer".to_owned();
     if needed > limit { Err(Error::limit("half-vector sheets", needed, limit, "bytes", hint())) } else { Ok(()) }

@@ -2,6 +2,7 @@
 
 use crate::{Error, Params, SheetInput};
 use splat_core::shade::LitBy;
+use std::f64::consts::FRAC_PI_2;
 
 /// What is drawn.
 #[derive(Clone)]
@@ -17,6 +18,18 @@ pub struct HalfInput<'a> {
     pub opaque: &'a [f32],
 }
 
+/// How often light is scattered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Scattering {
+    /// Once, exactly.
+    #[default]
+    None,
+    /// Ahead as often as it may be (Figure 2): what is scattered back is gone.
+    Forward,
+    /// Back and forth until it leaves or is absorbed (Figure 4).
+    ForwardAndBack,
+}
+
 /// Parameters of half-vector sheets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HalfParams {
@@ -26,11 +39,25 @@ pub struct HalfParams {
     pub light_pixels: f64,
     /// Most pixels of a light buffer along a side, 16 to 8192: its pixels grow where there would be more.
     pub most_light_pixels: u32,
+    /// How often light is scattered in media that scatter by a phase function.
+    pub scattering: Scattering,
+    /// Half angle of the cone that light spreads into where it is scattered ahead, radians, in \[0, π/2); `None` for that of the
+    /// mean cosine of what the media's phase functions leave ahead.
+    pub cone: Option<f64>,
+    /// Voxels for each cell of scattered light, 1 to 2²⁰.
+    pub voxels_per_cell: u32,
 }
 
 impl Default for HalfParams {
     fn default() -> Self {
-        Self { sheets: Params::default(), light_pixels: 1.5, most_light_pixels: 2048 }
+        Self {
+            sheets: Params::default(),
+            light_pixels: 1.5,
+            most_light_pixels: 2048,
+            scattering: Scattering::None,
+            cone: None,
+            voxels_per_cell: 32,
+        }
     }
 }
 
@@ -42,6 +69,12 @@ impl HalfParams {
         }
         if !(16..=8192).contains(&self.most_light_pixels) {
             return Err(Error::parameter("most_light_pixels", self.most_light_pixels, "16 to 8192"));
+        }
+        if !self.cone.is_none_or(|cone| (0.0..FRAC_PI_2).contains(&cone)) {
+            return Err(Error::parameter("cone", self.cone, "0 to below π/2 radians"));
+        }
+        if !(1..=1 << 20).contains(&self.voxels_per_cell) {
+            return Err(Error::parameter("voxels_per_cell", self.voxels_per_cell, "1 to 2^20"));
         }
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! Radiance of a point of a volume under the light of one sweep (step 19 of the pseudocode).
 
+use super::scatter::{Seen, medium};
 use super::sweep::Sweep;
 use crate::Volume;
 use splat_core::glam::{DVec3, Vec3};
@@ -51,6 +52,16 @@ impl Lit<'_> {
             (radiance.ambient, radiance.emission) = ([0.0; 3], [0.0; 3]);
         }
         radiance
+    }
+
+    /// What the point shows of light that is scattered more than once, where that is simulated.
+    pub(crate) fn scattered(&self, of: &Sweep<'_>, pixel: [usize; 2], at: DVec3) -> Option<[f32; 3]> {
+        let (scattered, light) = (of.scattered.as_ref()?, &of.light?.light);
+        if !medium::scatters(self.volume) {
+            return None;
+        }
+        let seen = Seen { world: of.frame.world(at), to_eye: of.to_eye(pixel), color: self.color };
+        Some(scattered.radiance(self.volume, light, &seen))
     }
 }
 

@@ -10,6 +10,7 @@ use super::gradient::Gradients;
 use super::light_buffer::LightBuffer;
 use super::light_path::LightPath;
 use super::placed::Placed;
+use super::scatter::{self, Scattered, Scene};
 use super::serves::axis_of_view;
 use super::shade::is_lit;
 use super::sight::{Shape, Sight};
@@ -37,6 +38,8 @@ pub(crate) struct Sweep<'a> {
     /// Lights that this sweep adds without carrying them.
     pub(crate) mapped: &'a [LitBy<'a>],
     pub(crate) light_buffer: Option<LightBuffer>,
+    /// Light that is scattered more than once, where it is asked for.
+    pub(crate) scattered: Option<Scattered>,
     /// By volume.
     pub(crate) paths: Vec<LightPath>,
     pub(crate) ambient: [f32; 3],
@@ -78,6 +81,7 @@ impl<'a> Sweep<'a> {
             mapped,
             light_buffer: light
                 .map(|lit| LightBuffer::new(&frame, lamp::camera_of(volumes, &lit.light, params), volumes, &placed)),
+            scattered: None,
             paths: light
                 .map_or_else(Vec::new, |lit| volumes.iter().map(|v| LightPath::new(v, &lit.light, &frame)).collect()),
             ambient: sheets.ambient,
@@ -92,6 +96,10 @@ impl<'a> Sweep<'a> {
             sight,
         };
         sweep.sort_voxels();
+        if let Some(lit) = light.filter(|lit| scatter::is_wanted(volumes, &lit.light, params)) {
+            let scene = Scene::new(volumes, lit, params, sheets.shadow_origin);
+            sweep.scattered = Some(Scattered::new(&scene, params.scattering));
+        }
         Ok(sweep)
     }
 
@@ -169,7 +177,8 @@ impl<'a> Sweep<'a> {
 
     fn counts(&self, bands: &[EyeBand]) -> HalfCounts {
         let buffer = self.light_buffer.as_ref();
-        let light_bytes = buffer.map_or(0, LightBuffer::bytes);
+        let scattered = self.scattered.as_ref();
+        let light_bytes = buffer.map_or(0, LightBuffer::bytes) + scattered.map_or(0, Scattered::bytes);
         let lists: u64 = self.buckets.iter().map(Buckets::bytes).sum();
         let eye: u64 = bands.iter().map(EyeBand::bytes).sum();
         HalfCounts {
@@ -177,6 +186,8 @@ impl<'a> Sweep<'a> {
             visible: self.visible,
             sweeps: 1,
             slabs: self.frame.slabs.count.into(),
+            scatter_cells: scattered.map_or(0, Scattered::cells),
+            scatter_passes: scattered.map_or(0, |s| s.passes),
             light_bytes,
             bytes: light_bytes + lists + eye + buffer.map_or(0, LightBuffer::list_bytes),
             ..HalfCounts::default()

@@ -53,7 +53,7 @@ use super::bins::TILE as TWIN_TILE;
 use super::kernel::{Kernel, TABLE};
 use super::projected::{Coverage, ProjectedSplat};
 use super::{Accumulation, FoldInput, OpaqueImage, Params, Projected};
-use crate::shade::{ChannelLayout, MAX_CHANNELS};
+use crate::shade::{ChannelLayout, MAX_SHADED_CHANNELS};
 use crate::{Accumulator, Direction, Error, Material};
 use list::{List, ListRoom};
 use packed::SPLAT_WORDS;
@@ -66,7 +66,8 @@ pub const TILE: u32 = 16;
 /// The widest image, pixels a side: what one workgroup counts then fits 32 bits.
 const WIDEST: u32 = 16_384;
 
-const _: () = assert!(MAX_CHANNELS == MOST_CHANNELS as usize, "kernels make room for every effect that shading gives");
+const _: () =
+    assert!(MAX_SHADED_CHANNELS == MOST_CHANNELS as usize, "kernels make room for every effect that shading gives");
 const _: () = assert!(TWIN_TILE == 32, "`composite.glsl` counts offsets from the corners of the CPU's tiles");
 
 /// What a recording makes room for.
@@ -76,7 +77,7 @@ pub struct Capacities {
     pub size: [u32; 2],
     /// Planes of optical depth, 1 or 3.
     pub planes: u32,
-    /// Channels, 1 to [`MAX_CHANNELS`].
+    /// Channels, 1 to [`MAX_SHADED_CHANNELS`].
     pub channels: u32,
     /// Splats by id.
     pub splats: u32,
@@ -129,7 +130,7 @@ fn check_image(size: [u32; 2], channels: u32) -> Result<(), Error> {
     if !size.iter().all(|s| (1..=WIDEST).contains(s)) {
         return refused("size", format!("{size:?}"), "1 to 16384 pixels a side");
     }
-    if !(1..=MAX_CHANNELS).contains(&(channels as usize)) {
+    if !(1..=MAX_SHADED_CHANNELS).contains(&(channels as usize)) {
         return refused("channels", channels.to_string(), "1 to as many as all effects, a normal and a shadow have");
     }
     Ok(())

@@ -5,17 +5,28 @@ use crate::{LayerSet, SHADED_EFFECTS};
 /// Channels of the effects where each is kept apart.
 const APART: usize = 3 * SHADED_EFFECTS.len();
 
-/// The most channels that a splat or a particle can have: all effects, the normal and the shadow.
-pub const MAX_CHANNELS: usize = APART + 3 + 1;
+/// Channels of the effects where light that is scattered many times is one of them.
+const WITH_MULTIPLE: usize = APART + 3;
+
+/// The most channels that shading gives to a splat or a particle: all of [`SHADED_EFFECTS`], the normal and the shadow. Kernels on
+/// the GPU have room for no more.
+pub const MAX_SHADED_CHANNELS: usize = APART + 3 + 1;
+
+/// The most channels of any layout: those, and `scatterN`.
+pub const MAX_CHANNELS: usize = WITH_MULTIPLE + 3 + 1;
 
 const _: () = assert!(APART > 3 + 3 + 1, "`colors_of` tells effects apart from beauty by the number of channels");
+const _: () =
+    assert!(WITH_MULTIPLE + 3 > MAX_SHADED_CHANNELS, "`colors_of` tells `scatterN` by the number of channels");
 
 /// Which numbers each splat carries through compositing, and where.
 ///
-/// First the effects: one beauty colour, or each of [`SHADED_EFFECTS`] apart. Then the normal, then the shadow.
+/// First the effects: one beauty colour, or each of [`SHADED_EFFECTS`] apart, and `scatterN` where
+/// [`ChannelLayout::with_multiple`] asks for it. Then the normal, then the shadow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ChannelLayout {
     effects: bool,
+    multiple: bool,
     normal: bool,
     shadow: bool,
 }
@@ -23,7 +34,16 @@ pub struct ChannelLayout {
 impl ChannelLayout {
     /// The channels that `layers` need.
     pub const fn new(layers: &LayerSet) -> Self {
-        Self { effects: layers.effects, normal: layers.normal, shadow: layers.shadow }
+        Self { effects: layers.effects, multiple: false, normal: layers.normal, shadow: layers.shadow }
+    }
+
+    /// The same, with light that is scattered more than once as an effect of its own, `scatterN`, where effects are kept apart;
+    /// in beauty it is one of the summands. For techniques that simulate it.
+    ///
+    /// Such a layout has a normal, asked for or not: so the number of channels tells what they are.
+    #[must_use]
+    pub const fn with_multiple(self) -> Self {
+        Self { multiple: true, normal: self.normal || self.effects, ..self }
     }
 
     /// Numbers a splat.
@@ -35,7 +55,11 @@ impl ChannelLayout {
     /// How many of them are red, green and blue, in threes; they come first.
     #[inline]
     pub const fn colors(&self) -> usize {
-        if self.effects { APART } else { 3 }
+        match (self.effects, self.multiple) {
+            (true, true) => WITH_MULTIPLE,
+            (true, false) => APART,
+            _ => 3,
+        }
     }
 
     /// How many of `count` channels in all are red, green and blue. The others, normal and shadow, are no colours: where
@@ -44,7 +68,8 @@ impl ChannelLayout {
         match count {
             0..3 => 0,
             3..APART => 3,
-            _ => APART,
+            APART..=MAX_SHADED_CHANNELS => APART,
+            _ => WITH_MULTIPLE,
         }
     }
 
@@ -60,10 +85,22 @@ impl ChannelLayout {
         self.effects
     }
 
-    /// Name and first channel of each colour: those of [`SHADED_EFFECTS`], or `beauty` alone.
+    /// The first channel that light is added to that is scattered more than once: its own, or beauty's; `None` where effects are
+    /// kept apart without it.
+    #[inline]
+    pub const fn multiple(&self) -> Option<usize> {
+        match (self.effects, self.multiple) {
+            (true, true) => Some(APART),
+            (true, false) => None,
+            _ => Some(0),
+        }
+    }
+
+    /// Name and first channel of each colour: those of [`SHADED_EFFECTS`] and `scatterN` where it is asked for, or `beauty` alone.
     pub fn effects(&self) -> impl Iterator<Item = (&'static str, usize)> + use<> {
         let names: &[&str] = if self.effects { &SHADED_EFFECTS } else { &["beauty"] };
-        names.iter().copied().zip((0..).step_by(3))
+        let more: &[&str] = if self.effects && self.multiple { &["scatterN"] } else { &[] };
+        names.iter().chain(more).copied().zip((0..).step_by(3))
     }
 
     /// First channel of the normal.

@@ -122,7 +122,7 @@ impl Radiance {
         [self.ambient, self.emission, self.direct, self.scatter1]
     }
 
-    /// Writes the channels of `layout`, with the normal that the point has.
+    /// Writes the channels of `layout`, with the normal that the point has; 0 for what is scattered more than once.
     ///
     /// # Panics
     /// If `out` has fewer numbers than the layout.
@@ -130,6 +130,7 @@ impl Radiance {
     pub fn write(&self, normal: Vec3, layout: &ChannelLayout, out: &mut [f32]) {
         let effects = self.effects();
         if layout.is_apart() {
+            out[3 * effects.len()..layout.colors()].fill(0.0);
             out[..3 * effects.len()].copy_from_slice(effects.as_flattened());
         } else {
             let [first, others @ ..] = effects;

@@ -37,7 +37,7 @@ use splat_shaders::{BufferId, Groups, Recording, kernels};
 pub struct Capacities {
     /// Width and height of the image, pixels, 1 to 16384 each.
     pub size: [u32; 2],
-    /// Channels, 1 to [`MAX_CHANNELS`](crate::shade::MAX_CHANNELS).
+    /// Channels, 1 to [`MAX_SHADED_CHANNELS`](crate::shade::MAX_SHADED_CHANNELS).
     pub channels: u32,
     /// Splats by id.
     pub splats: u32,

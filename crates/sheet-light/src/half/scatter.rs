@@ -1,0 +1,283 @@
+//! Light that is scattered more than once (Zhang and Crawfis, section 3, Eqs. 1 to 5): how much of it arrives where.
+//!
+//! The light buffer has what arrives unscattered, pixel by pixel. What is scattered is smooth, and is kept in cells larger than
+//! voxels, along the light's own rays ([`grid`]): they hold the same, however many slabs there are.
+//!
+//! | step | here |
+//! |---|---|
+//! | shares of the phase function | `phase.rs` |
+//! | means of the media in the cells | `medium.rs` |
+//! | Eqs. 3 and 5, forward: marched ahead, a convolution a layer | `beam.rs`, `blur.rs` |
+//! | Eq. 4, back and forth: two streams in a layer | `layer.rs` |
+//! | … in all columns | `streams.rs` |
+//! | … added from the far side to the light, and back | `adding.rs` |
+//! | where the power stays | `balance.rs` |
+//! | Eq. 2: radiance towards the eye | [`Scattered::radiance`] |
+
+pub(crate) mod adding;
+pub(crate) mod balance;
+pub(crate) mod beam;
+mod blur;
+pub(crate) mod grid;
+mod layer;
+pub(crate) mod medium;
+mod phase;
+pub(crate) mod streams;
+
+use super::{HalfParams, Scattering, lamp};
+use crate::Volume;
+use balance::Balance;
+use beam::{Beam, Path};
+use grid::LightGrid;
+use medium::Cell;
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::shade::LitBy;
+use splat_core::{Light, Receiver, SplatKind, henyey_greenstein};
+use std::f32::consts::PI;
+use streams::{Sources, Streams};
+
+/// Numbers of a face: by channel what was scattered ahead and the fluence φ; the net flux J along x, y and the light, by channel;
+/// and how much there is that scatters.
+pub(crate) const NUMBERS: usize = 16;
+
+/// Places of φ, J and the weight among them.
+const FLUENCE: usize = 3;
+const FLUX: usize = 6;
+const WEIGHT: usize = 15;
+
+/// Weight of a face at which nothing scatters: no mean divides by 0.
+const LEAST: f32 = 1e-6;
+
+/// Irradiance of a light of intensity 1 below which there is none.
+const END: f64 = 1e-24;
+
+/// What arrives at faces of cells, per unit of the light's intensity.
+pub(crate) struct Scattered {
+    grid: LightGrid,
+    /// By face, but for the weight times it.
+    faces: Vec<[f32; NUMBERS]>,
+    /// For a light of intensity 1.
+    pub(crate) balance: Balance,
+    /// Convolutions and corrections.
+    pub(crate) passes: u64,
+}
+
+/// The media, the light that falls on them, and what stands between.
+pub(crate) struct Scene {
+    pub(crate) grid: LightGrid,
+    pub(crate) cells: Vec<Cell>,
+    entering: Vec<f64>,
+    others: Vec<[f32; 3]>,
+    cone: f64,
+}
+
+/// Whether there is anything to do.
+pub(crate) fn is_wanted(volumes: &[Volume<'_>], light: &Light, params: &HalfParams) -> bool {
+    params.scattering != Scattering::None
+        && volumes.iter().any(medium::scatters)
+        && light.intensity.iter().any(|i| *i > 0.0)
+}
+
+impl Scene {
+    /// `shadow_origin`: what places of shadows are relative to.
+    pub(crate) fn new(volumes: &[Volume<'_>], lit: &LitBy<'_>, params: &HalfParams, shadow_origin: DVec3) -> Self {
+        let camera = lamp::camera_of(volumes, &lit.light, params);
+        let grid = LightGrid::new(volumes, &camera, params.voxels_per_cell);
+        let cells = medium::cells(&grid, volumes, params.scattering);
+        let ([width, height], layers) = (grid.columns, grid.layers);
+        let one = Light { intensity: [1.0; 3], ..lit.light };
+        let entering = (0..width * height).map(|at| {
+            let place = grid.world([(at % width) as f64, (at / width) as f64, 0.0]);
+            f64::from(one.irradiance(place, 0.0).1[0]) * grid.area(0.0)
+        });
+        let others = |shadow: &dyn splat_core::Transmittance| {
+            let face = |at: usize| {
+                let [x, y, face] = [at % width, at / (width * (layers + 1)), at / width % (layers + 1)];
+                let world = grid.world([x as f64, y as f64, face as f64]);
+                let position = (world - shadow_origin).as_vec3();
+                let radius = (0.5 * grid.depth) as f32;
+                shadow.transmittance(&Receiver { position, normal: Vec3::ZERO, radius, kind: SplatKind::Medium })
+            };
+            (0..width * height * (layers + 1)).map(face).collect()
+        };
+        Self {
+            entering: entering.collect(),
+            others: lit.shadow.map_or_else(Vec::new, others),
+            cone: params.cone.unwrap_or_else(|| phase::cone_of(params.scattering, medium::mean_asymmetry(&cells))),
+            cells,
+            grid,
+        }
+    }
+
+    fn path(&self) -> Path<'_> {
+        let Self { grid, cells, entering, others, cone } = self;
+        Path { grid, cells, entering, others, cone: *cone }
+    }
+
+    /// What all but the volumes let through, by cell; empty for all.
+    fn passing(&self, channel: usize) -> Vec<f64> {
+        if self.others.is_empty() {
+            return Vec::new();
+        }
+        let ([width, _], layers) = (self.grid.columns, self.grid.layers);
+        let cell = |at: usize| {
+            let node = [at % width, at / (width * layers)];
+            self.path().passing(at / width % layers, node, channel)
+        };
+        (0..self.grid.cells()).map(cell).collect()
+    }
+
+    /// The beam of a channel, and the equations of what it gives to two streams.
+    pub(crate) fn streams(&self, channel: usize) -> (Beam, Streams) {
+        let (beam, passing) = (self.path().march(channel), self.passing(channel));
+        let (grid, cells) = (&self.grid, &self.cells[..]);
+        let streams = Streams::new(&Sources { grid, cells, channel, incoming: &beam.incoming, passing: &passing });
+        (beam, streams)
+    }
+
+    /// Whether a channel is the same as another.
+    fn is_like(&self, channel: usize, other: usize) -> bool {
+        let same = |v: &[f32; 3]| v[channel] == v[other];
+        let cell = |c: &Cell| [&c.extinction, &c.scattering, &c.forward, &c.ahead].into_iter().all(same);
+        self.cells.iter().all(cell) && self.others.iter().all(same)
+    }
+}
+
+impl Scattered {
+    pub(crate) fn new(scene: &Scene, scattering: Scattering) -> Self {
+        let ([width, height], layers) = (scene.grid.columns, scene.grid.layers);
+        let mut out = Self {
+            grid: scene.grid,
+            faces: vec![[0.0; NUMBERS]; width * height * (layers + 1)],
+            balance: Balance::default(),
+            passes: 0,
+        };
+        for channel in 0..3 {
+            match (0..channel).find(|other| scene.is_like(channel, *other)) {
+                Some(other) => out.copy(other, channel),
+                None => out.fill(scene, scattering, channel),
+            }
+        }
+        out.weigh(&scene.cells);
+        out
+    }
+
+    /// Bytes of what is kept.
+    pub(crate) fn bytes(&self) -> u64 {
+        (self.faces.len() * size_of::<[f32; NUMBERS]>()) as u64
+    }
+
+    /// Cells.
+    pub(crate) fn cells(&self) -> u64 {
+        self.grid.cells() as u64
+    }
+
+    fn fill(&mut self, scene: &Scene, scattering: Scattering, channel: usize) {
+        let grid = &scene.grid;
+        let (beam, psi, streams) = if scattering == Scattering::Forward {
+            let beam = scene.path().march(channel);
+            self.balance.add_beam(channel, &beam);
+            self.balance.add_forward(channel, grid, &scene.cells, &beam);
+            (beam, Vec::new(), None)
+        } else {
+            let (beam, streams) = scene.streams(channel);
+            let solution = adding::solve(&streams);
+            self.passes += solution.passes;
+            self.balance.add_beam(channel, &beam);
+            self.balance.add_streams(channel, (grid, &scene.cells), &beam, &streams, &solution.psi);
+            (beam, solution.psi, Some(streams))
+        };
+        self.passes += beam.passes;
+        let [width, _] = grid.columns;
+        // What is less is no normal number, and slow.
+        let number = |v: f64| if v.abs() < END { 0.0 } else { v as f32 };
+        for (at, face) in self.faces.iter_mut().enumerate() {
+            face[channel] = number(beam.ahead[at] / grid.area((at / width % (grid.layers + 1)) as f64));
+            if let Some(streams) = &streams {
+                face[FLUENCE + channel] = number(2.0 * psi[at]);
+                let flux = streams.flux(grid, &psi, at);
+                (0..3).for_each(|a| face[FLUX + 3 * a + channel] = number(flux[a]));
+            }
+        }
+    }
+
+    /// A channel as another.
+    fn copy(&mut self, from: usize, to: usize) {
+        for face in &mut self.faces {
+            (0..5).for_each(|n| face[3 * n + to] = face[3 * n + from]);
+        }
+        let Balance { incident, reflected, transmitted, sides, absorbed } = &mut self.balance;
+        [incident, reflected, transmitted, sides, absorbed].into_iter().for_each(|v| v[to] = v[from]);
+    }
+
+    /// Multiplies by how much scatters at each face, so that what is in the open, where nothing arrives that counts, does not darken
+    /// what is beside it.
+    fn weigh(&mut self, cells: &[Cell]) {
+        let ([width, _], layers) = (self.grid.columns, self.grid.layers);
+        let length = self.grid.depth as f32;
+        for (at, face) in self.faces.iter_mut().enumerate() {
+            let ([x, level], y) = ([at % width, at / width % (layers + 1)], at / (width * (layers + 1)));
+            let share = |layer: usize| {
+                let cell = &cells[(y * layers + layer) * width + x];
+                let scattering = cell.scattering.iter().copied().fold(0.0, f32::max);
+                -libm::expm1f(-scattering * length)
+            };
+            let before = if level > 0 { share(level - 1) } else { 0.0 };
+            let behind = if level < layers { share(level) } else { 0.0 };
+            let weight = LEAST + before.max(behind);
+            face[..WEIGHT].iter_mut().for_each(|v| *v *= weight);
+            face[WEIGHT] = weight;
+        }
+    }
+
+    /// What arrives at a world position, weighted means of the faces about it.
+    fn at(&self, world: DVec3) -> [f32; NUMBERS] {
+        let place = self.grid.place(world);
+        let [width, height] = self.grid.columns;
+        let (counts, mut low, mut next, mut share) =
+            ([width, height, self.grid.layers + 1], [0; 3], [0; 3], [0.0f32; 3]);
+        for a in 0..3 {
+            let v = place[a].clamp(0.0, (counts[a] - 1) as f64);
+            low[a] = (v as usize).min(counts[a].saturating_sub(2));
+            next[a] = (low[a] + 1).min(counts[a] - 1);
+            share[a] = (v - low[a] as f64) as f32;
+        }
+        let mut out = [0.0; NUMBERS];
+        for corner in 0..8 {
+            let [x, y, z] =
+                [0, 1, 2].map(|a| if corner >> a & 1 == 0 { (low[a], 1.0 - share[a]) } else { (next[a], share[a]) });
+            let weight = x.1 * y.1 * z.1;
+            let face = &self.faces[(y.0 * counts[2] + z.0) * width + x.0];
+            for n in 0..NUMBERS {
+                out[n] += weight * face[n];
+            }
+        }
+        let weight = out[WEIGHT].recip();
+        out.map(|v| v * weight)
+    }
+
+    /// Radiance of light that is scattered more than once, towards the eye, of a point of a medium of which 1 is seen: Eq. 2, with the
+    /// phase function for what goes ahead, and (φ + 3gJ·v)/4π for what comes from all sides.
+    pub(crate) fn radiance(&self, volume: &Volume<'_>, light: &Light, seen: &Seen) -> [f32; 3] {
+        let material = volume.material;
+        let here = self.at(seen.world);
+        let travel = super::serves::travel(light, seen.world).as_vec3();
+        // What goes ahead was scattered before: twice is the phase function of g².
+        let phase = henyey_greenstein(travel, seen.to_eye, material.asymmetry * material.asymmetry.abs());
+        let towards = self.grid.axes.map(|axis| axis.as_vec3().dot(seen.to_eye));
+        let albedo = medium::albedo(volume, seen.color);
+        [0, 1, 2].map(|c| {
+            let flux: f32 = (0..3).map(|a| here[FLUX + 3 * a + c] * towards[a]).sum();
+            let diffuse = (here[FLUENCE + c] + 3.0 * material.asymmetry * flux).max(0.0) / (4.0 * PI);
+            light.intensity[c] * albedo[c] * (phase * here[c] + diffuse)
+        })
+    }
+}
+
+/// A point of a medium that is seen.
+pub(crate) struct Seen {
+    pub(crate) world: DVec3,
+    /// Unit direction.
+    pub(crate) to_eye: Vec3,
+    pub(crate) color: [f32; 3],
+}

@@ -1,0 +1,117 @@
+//! Cells of diffuse light: columns along the light's own rays, cut into layers across its axis.
+//!
+//! Diffuse light is smooth, so cells are larger than voxels, twice as wide as they are deep; their number follows from that of the
+//! voxels alone. Columns of a lamp are as wide as its rays are apart. Rows of cells lie together, layer by layer: what is swept along
+//! the light is one piece of memory for each row, and rows are tasks.
+
+use crate::Volume;
+use crate::half::frame::world_corners;
+use splat_core::Camera;
+use splat_core::glam::DVec3;
+
+/// Width of a cell in its depths.
+const FLATNESS: f64 = 2.0;
+
+/// Cells of one light. Layers are counted the way that light travels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LightGrid {
+    /// Right, up, and the way that light travels, world space.
+    pub(crate) axes: [DVec3; 3],
+    position: DVec3,
+    is_lamp: bool,
+    /// x and y of the first column's corner; per depth for a lamp.
+    corner: [f64; 2],
+    /// Width of a column along x and y; per depth for a lamp.
+    pub(crate) step: [f64; 2],
+    /// Depth of the first face.
+    pub(crate) near: f64,
+    /// Depth of a layer, world units.
+    pub(crate) depth: f64,
+    /// Columns of a row, rows.
+    pub(crate) columns: [usize; 2],
+    pub(crate) layers: usize,
+}
+
+impl LightGrid {
+    /// About the volumes, of which there is at least one, with at most one cell for `voxels` voxels but one layer of one column.
+    pub(crate) fn new(volumes: &[Volume<'_>], camera: &Camera, voxels: u32) -> Self {
+        let is_lamp = !camera.is_orthographic();
+        let views = || volumes.iter().flat_map(world_corners).map(|p| camera.view_from_world(p));
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for p in views() {
+            let spread = if is_lamp { p.z } else { 1.0 };
+            let p = DVec3::new(p.x / spread, p.y / spread, p.z);
+            (low, high) = (low.min(p), high.max(p));
+        }
+        let extent = high - low;
+        let middle = if is_lamp { 0.5 * (low.z + high.z) } else { 1.0 };
+        let all: f64 = volumes.iter().map(|v| v.grid.values.len() as f64).sum();
+        let size = extent.x * middle * extent.y * middle * extent.z;
+        // FLATNESS² · depth³ is a cell.
+        let depth = libm::cbrt(size * f64::from(voxels) / all) / libm::cbrt(FLATNESS * FLATNESS);
+        let most = (all / f64::from(voxels)).max(1.0);
+        // What is flatter than a cell is one layer.
+        let width = (FLATNESS * depth).max(middle * libm::sqrt(extent.x * extent.y / most));
+        let width = if depth > extent.z { width } else { FLATNESS * depth };
+        // Rounding a place down to a cell less would make pictures depend on it.
+        let count = |extent: f64| libm::floor((extent / width * (1.0 + 1e-9)).max(1.0));
+        let columns = [extent.x, extent.y].map(|e| count(e * middle));
+        let layers = libm::floor((most / (columns[0] * columns[1])).max(1.0)).min(libm::ceil(extent.z / depth));
+        Self {
+            axes: camera.axes,
+            position: camera.position,
+            is_lamp,
+            corner: [low.x, low.y],
+            step: [extent.x / columns[0], extent.y / columns[1]],
+            near: low.z,
+            depth: extent.z / layers,
+            columns: columns.map(|n| n as usize),
+            layers: layers as usize,
+        }
+    }
+
+    /// Number of cells.
+    pub(crate) fn cells(&self) -> usize {
+        self.columns[0] * self.columns[1] * self.layers
+    }
+
+    /// Columns, rows and faces about a world position: whole numbers at the middles of columns and at faces.
+    #[inline]
+    pub(crate) fn place(&self, world: DVec3) -> [f64; 3] {
+        let from = world - self.position;
+        let [x, y, z] = self.axes.map(|axis| axis.dot(from));
+        let spread = if self.is_lamp { z } else { 1.0 };
+        let along = |v: f64, a: usize| (v / spread - self.corner[a]) / self.step[a] - 0.5;
+        [along(x, 0), along(y, 1), (z - self.near) / self.depth]
+    }
+
+    /// World position of such a place.
+    pub(crate) fn world(&self, [x, y, face]: [f64; 3]) -> DVec3 {
+        let z = self.near + face * self.depth;
+        let spread = self.spread(face);
+        let along = |v: f64, a: usize| (self.corner[a] + (v + 0.5) * self.step[a]) * spread;
+        let [right, up, forward] = self.axes;
+        self.position + right * along(x, 0) + up * along(y, 1) + forward * z
+    }
+
+    /// Factor on the widths of columns at a face.
+    #[inline]
+    pub(crate) fn spread(&self, face: f64) -> f64 {
+        if self.is_lamp { self.near + face * self.depth } else { 1.0 }
+    }
+
+    /// Area of a column at a face, world units².
+    pub(crate) fn area(&self, face: f64) -> f64 {
+        self.step[0] * self.step[1] * self.spread(face) * self.spread(face)
+    }
+
+    /// Length of a column's ray in a layer, world units.
+    pub(crate) fn length(&self, [x, y]: [usize; 2]) -> f64 {
+        if !self.is_lamp {
+            return self.depth;
+        }
+        let along = |n: usize, a: usize| self.corner[a] + (n as f64 + 0.5) * self.step[a];
+        let (x, y) = (along(x, 0), along(y, 1));
+        self.depth * libm::sqrt(1.0 + x * x + y * y)
+    }
+}

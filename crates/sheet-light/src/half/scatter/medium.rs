@@ -1,0 +1,130 @@
+//! What the cells of diffuse light are filled with: means of extinction and scattering over places in each cell.
+//!
+//! Values are interpolated trilinearly between voxels and classified then, as in the sheets. Volumes that share a cell add: their
+//! extinctions, and their scattering with its own phase function, so media mix by how much they scatter.
+
+use super::grid::LightGrid;
+use super::phase::share_ahead;
+use crate::Volume;
+use crate::half::Scattering;
+use rayon::prelude::*;
+use splat_core::glam::{DMat3, DVec3};
+use splat_core::{Shading, TransferPoint};
+
+/// Places in a cell along its width, its height and its depth: one a voxel.
+const PLACES: [usize; 3] = [4, 4, 2];
+
+/// A cell; by channel, per world unit.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Cell {
+    /// σ_t.
+    pub(crate) extinction: [f32; 3],
+    /// σ_s.
+    pub(crate) scattering: [f32; 3],
+    /// σ_s·g.
+    pub(crate) forward: [f32; 3],
+    /// σ_s·f: what stays with the light that goes ahead.
+    pub(crate) ahead: [f32; 3],
+}
+
+/// Whether light that comes from all sides is scattered here by a phase function.
+pub(crate) fn scatters(volume: &Volume<'_>) -> bool {
+    let by_phase = match volume.material.shading {
+        Shading::Phase => true,
+        Shading::Phong => !volume.normals,
+        Shading::Unlit => false,
+    };
+    by_phase && volume.material.single_scattering_albedo > 0.0
+}
+
+/// Single-scattering albedo of a colour, by channel, in \[0, 1\].
+pub(crate) fn albedo(volume: &Volume<'_>, color: [f32; 3]) -> [f32; 3] {
+    color.map(|c| (c * volume.material.single_scattering_albedo).clamp(0.0, 1.0))
+}
+
+/// A volume and where its lattice lies.
+struct Lattice<'a> {
+    volume: &'a Volume<'a>,
+    inverse: DMat3,
+    origin: DVec3,
+    /// f.
+    ahead: f32,
+    scatters: bool,
+}
+
+impl<'a> Lattice<'a> {
+    fn new(volume: &'a Volume<'a>, scattering: Scattering) -> Self {
+        let ahead = share_ahead(scattering, volume.material.asymmetry) as f32;
+        let (inverse, origin) = (volume.axes().inverse(), volume.origin());
+        Self { volume, inverse, origin, ahead, scatters: scatters(volume) }
+    }
+
+    /// Classified value at a world position; `None` outside.
+    fn at(&self, world: DVec3) -> Option<TransferPoint> {
+        let at = self.inverse * (world - self.origin);
+        let dims = self.volume.grid.dims;
+        let mut low = [0; 3];
+        let mut share = [0.0; 3];
+        for a in 0..3 {
+            let last = dims[a] as f64 - 1.0;
+            if !(-0.5..=last + 0.5).contains(&at[a]) {
+                return None;
+            }
+            let v = at[a].clamp(0.0, last);
+            low[a] = (v as usize).min(dims[a].saturating_sub(2));
+            share[a] = (v - low[a] as f64) as f32;
+        }
+        let value = |i: usize, j: usize, k: usize| {
+            let at = [(low[0] + i).min(dims[0] - 1), (low[1] + j).min(dims[1] - 1), (low[2] + k).min(dims[2] - 1)];
+            self.volume.grid.values[(at[2] * dims[1] + at[1]) * dims[0] + at[0]]
+        };
+        let mix = |a: f32, b: f32, n: usize| a + (b - a) * share[n];
+        let row = |j: usize, k: usize| mix(value(0, j, k), value(1, j, k), 0);
+        let plane = |k: usize| mix(row(0, k), row(1, k), 1);
+        Some(self.volume.transfer.at(mix(plane(0), plane(1), 2)))
+    }
+}
+
+/// The cells of a light, row by row, layer by layer in a row.
+pub(crate) fn cells(grid: &LightGrid, volumes: &[Volume<'_>], scattering: Scattering) -> Vec<Cell> {
+    let lattices: Vec<Lattice<'_>> = volumes.iter().map(|volume| Lattice::new(volume, scattering)).collect();
+    let mut out = vec![Cell::default(); grid.cells()];
+    let row = grid.layers * grid.columns[0];
+    out.par_chunks_mut(row).enumerate().for_each(|(y, cells)| {
+        for (at, cell) in cells.iter_mut().enumerate() {
+            fill(cell, grid, &lattices, [at % grid.columns[0], y, at / grid.columns[0]]);
+        }
+    });
+    out
+}
+
+fn fill(cell: &mut Cell, grid: &LightGrid, lattices: &[Lattice<'_>], at: [usize; 3]) {
+    let share = 1.0 / PLACES.iter().product::<usize>() as f32;
+    let place = |n: usize, a: usize| at[a] as f64 + (n as f64 + 0.5) / PLACES[a] as f64;
+    for (i, j, k) in
+        (0..PLACES[2]).flat_map(|k| (0..PLACES[1]).flat_map(move |j| (0..PLACES[0]).map(move |i| (i, j, k))))
+    {
+        let world = grid.world([place(i, 0) - 0.5, place(j, 1) - 0.5, place(k, 2)]);
+        for lattice in lattices {
+            let Some(point) = lattice.at(world) else { continue };
+            let material = lattice.volume.material;
+            let own = point.extinction * lattice.volume.extinction_scale as f32 * share;
+            let albedo = if lattice.scatters { albedo(lattice.volume, point.color) } else { [0.0; 3] };
+            for c in 0..3 {
+                let extinction = own * material.extinction_rgb[c];
+                let scattering = extinction * albedo[c];
+                cell.extinction[c] += extinction;
+                cell.scattering[c] += scattering;
+                cell.forward[c] += scattering * material.asymmetry;
+                cell.ahead[c] += scattering * lattice.ahead;
+            }
+        }
+    }
+}
+
+/// Mean asymmetry of all that is scattered, 0 where nothing is.
+pub(crate) fn mean_asymmetry(cells: &[Cell]) -> f64 {
+    let sum = |of: fn(&Cell) -> [f32; 3]| cells.iter().flat_map(of).map(f64::from).sum::<f64>();
+    let scattering = sum(|cell| cell.scattering);
+    if scattering > 0.0 { sum(|cell| cell.forward) / scattering } else { 0.0 }
+}

@@ -1,0 +1,264 @@
+//! Diffuse light in the cells: two streams along the light, layers added column by column, and what flows sideways between columns.
+//!
+//! Each face of a column has ψ = F + B, the flux with the light plus that against it, per area. What arrives at a face leaves it:
+//! layers conduct and give as [`Layer`] says, the first and the last face let out ψ, and columns side by side exchange
+//! 2/(3σ_tr)·∇ψ, the diffusion that goes with two streams in Eddington's approximation. So there is one equation a face, and their
+//! sum is the balance of all power. Where a row of cells goes out into the open, light that comes from its last mean free path leaves by the side.
+
+use super::grid::LightGrid;
+use super::layer::{Layer, Optics};
+use super::medium::Cell;
+use rayon::prelude::*;
+
+/// Share of the grid's width that is the longest mean free path on which light flows between columns.
+const LONGEST_WAY: f64 = 0.5;
+
+/// Resistance of a mean free path to ψ: 3/2, of diffusion.
+const RESISTANCE: f64 = 1.5;
+
+/// Share of ψ that leaves from the last mean free path before the open, where that is cells deep: ψ then falls to 0 where it would beyond a
+/// face that light leaves by at once, 2/3 of a mean free path outside. With u = 1 − e^(−3τ/2) for the way into the medium,
+/// d/du[u(1 − u)·dψ/du] = s·ψ; its solution without a pole at 0 is a hypergeometric function, of which the logarithm at 1 has the
+/// constant −(digamma(a) + digamma(b) + 2γ), a + b = 1, ab = s. That is 1 for this s.
+const OPEN: f64 = 0.423;
+
+/// Beside a column: before it and behind it along x, along y.
+const SIDES: usize = 4;
+
+/// The equations of one channel. Faces: row by row, face by face in a row; cells and their faces likewise.
+pub(crate) struct Streams {
+    pub(crate) columns: [usize; 2],
+    pub(crate) layers: usize,
+    /// By cell: a and b times the area.
+    pub(crate) own: Vec<f64>,
+    pub(crate) through: Vec<f64>,
+    /// By face: to the next column along x, along y.
+    pub(crate) across: [Vec<f64>; 2],
+    /// By face: out by the sides.
+    pub(crate) open: Vec<[f64; SIDES]>,
+    /// By cell: power that the beam gives to its first face and to its last, s↑ and s↓ of all light.
+    pub(crate) given: Vec<[f64; 2]>,
+    /// By face: their sum.
+    pub(crate) source: Vec<f64>,
+    /// By face: all that leaves it for ψ = 1.
+    pub(crate) all: Vec<f64>,
+    /// Areas of the first face and of the last.
+    pub(crate) ends: [f64; 2],
+}
+
+/// What the equations are made of.
+pub(crate) struct Sources<'a> {
+    pub(crate) grid: &'a LightGrid,
+    pub(crate) cells: &'a [Cell],
+    pub(crate) channel: usize,
+    /// By cell: power of the beam that comes in.
+    pub(crate) incoming: &'a [f64],
+    /// By cell: share that all but the volumes let through; empty for all.
+    pub(crate) passing: &'a [f64],
+}
+
+/// The optics of a cell without what stays with the beam, for a way of `length`.
+pub(crate) fn optics(cell: &Cell, channel: usize, length: f64) -> Optics {
+    let [extinction, scattering, forward, ahead] =
+        [cell.extinction, cell.scattering, cell.forward, cell.ahead].map(|v| f64::from(v[channel]));
+    let (left, scattered) = (extinction - ahead, scattering - ahead);
+    Optics {
+        tau: left.max(0.0) * length,
+        omega: if left > 0.0 { (scattered / left).clamp(0.0, 1.0) } else { 0.0 },
+        asymmetry: if scattered > 0.0 { (forward - ahead) / scattered } else { 0.0 },
+    }
+}
+
+/// σ_tr = σ_t − σ_s·g.
+fn transport(cell: &Cell, channel: usize) -> f64 {
+    f64::from((cell.extinction[channel] - cell.forward[channel]).max(0.0))
+}
+
+impl Streams {
+    pub(crate) fn new(of: &Sources<'_>) -> Self {
+        let (grid, [width, height], layers) = (of.grid, of.grid.columns, of.grid.layers);
+        let (cells, faces) = (grid.cells(), width * height * (layers + 1));
+        let mut out = Self {
+            columns: grid.columns,
+            layers,
+            own: vec![0.0; cells],
+            through: vec![0.0; cells],
+            across: [vec![0.0; faces], vec![0.0; faces]],
+            open: vec![[0.0; SIDES]; faces],
+            given: vec![[0.0; 2]; cells],
+            source: vec![0.0; faces],
+            all: vec![0.0; faces],
+            ends: [0.0, layers as f64].map(|face| grid.area(face)),
+        };
+        out.add_layers(of);
+        out.add_sides(of);
+        out.add_up();
+        out
+    }
+
+    /// Fills in what goes along the columns.
+    fn add_layers(&mut self, of: &Sources<'_>) {
+        let (layers, width) = (self.layers, self.columns[0]);
+        let rows = self
+            .own
+            .par_chunks_mut(layers * width)
+            .zip(self.through.par_chunks_mut(layers * width))
+            .zip(self.given.par_chunks_mut(layers * width));
+        rows.enumerate().for_each(|(y, ((own, through), given))| {
+            for at in 0..layers * width {
+                let (cell, area) = (y * layers * width + at, of.grid.area((at / width) as f64 + 0.5));
+                let length = of.grid.length([at % width, y]);
+                let layer = Layer::new(&optics(&of.cells[cell], of.channel, length));
+                let passing = of.passing.get(cell).copied().unwrap_or(1.0);
+                (own[at], through[at]) = (layer.own * area, layer.through * area * passing);
+                // What is opaque stands at the far face of a layer.
+                given[at] = [layer.sources[0], layer.sources[1] * passing].map(|s| s * of.incoming[cell]);
+            }
+        });
+    }
+
+    /// Fills in what goes between columns and out by the sides.
+    fn add_sides(&mut self, of: &Sources<'_>) {
+        let ([width, height], layers) = (self.columns, self.layers);
+        for direction in 0..2 {
+            let (count, step) = if direction == 0 { (width, 1) } else { (height, layers * width) };
+            let lines = if direction == 0 { height } else { width };
+            let mut line = Line::default();
+            for (layer, n) in (0..layers).flat_map(|layer| (0..lines).map(move |n| (layer, n))) {
+                let start = layer * width + if direction == 0 { n * layers * width } else { n };
+                line.set(of, direction, [start, step, count]);
+                for i in 0..count {
+                    let [x, y] = if direction == 0 { [i, n] } else { [n, i] };
+                    // Half of a layer belongs to each of its faces.
+                    for face in [layer, layer + 1] {
+                        let at = (y * (layers + 1) + face) * width + x;
+                        self.across[direction][at] += 0.5 * line.across[i];
+                        self.open[at][2 * direction] += 0.5 * line.open[0][i];
+                        self.open[at][2 * direction + 1] += 0.5 * line.open[1][i];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Sums all that leaves each face.
+    fn add_up(&mut self) {
+        let ([width, height], layers) = (self.columns, self.layers);
+        let row = (layers + 1) * width;
+        for at in 0..row * height {
+            let ([x, face], y) = ([at % width, at / width % (layers + 1)], at / row);
+            let cell = (y * layers + face) * width + x;
+            let (before, down) =
+                if face == 0 { (self.ends[0], 0.0) } else { (self.own[cell - width], self.given[cell - width][1]) };
+            let (behind, up) = if face == layers { (self.ends[1], 0.0) } else { (self.own[cell], self.given[cell][0]) };
+            self.source[at] = down + up;
+            let [left, above] = [(x > 0, 1), (y > 0, row)];
+            let mut sum = before + behind + self.across[0][at] + self.across[1][at];
+            sum += if left.0 { self.across[0][at - left.1] } else { 0.0 };
+            sum += if above.0 { self.across[1][at - above.1] } else { 0.0 };
+            self.all[at] = sum + self.open[at].iter().sum::<f64>();
+        }
+    }
+
+    /// Number of faces.
+    pub(crate) fn faces(&self) -> usize {
+        self.all.len()
+    }
+
+    /// Net flux at a face per area: along x, along y, with the light.
+    pub(crate) fn flux(&self, grid: &LightGrid, psi: &[f64], at: usize) -> [f64; 3] {
+        let ([width, _], layers) = (self.columns, self.layers);
+        let row = (layers + 1) * width;
+        let ([x, face], y) = ([at % width, at / width % (layers + 1)], at / row);
+        let along = self.along(psi, [x, y, face]) / grid.area(face as f64);
+        let [mut right, mut up] = [0.0; 2];
+        let share = if face == 0 || face == layers { 0.5 } else { 1.0 };
+        let spread = grid.spread(face as f64) * grid.depth * share;
+        let has = [x > 0, x + 1 < width, y > 0, y + 1 < self.columns[1]];
+        let across = |direction: usize, at: usize, next: usize| self.across[direction][at] * (psi[at] - psi[next]);
+        let open = |side: usize| self.open[at][side] * psi[at];
+        right += if has[1] { across(0, at, at + 1) } else { 0.0 } + if has[0] { across(0, at - 1, at) } else { 0.0 };
+        up += if has[3] { across(1, at, at + row) } else { 0.0 } + if has[2] { across(1, at - row, at) } else { 0.0 };
+        right += open(1) - open(0);
+        up += open(3) - open(2);
+        [0.5 * right / (spread * grid.step[1]), 0.5 * up / (spread * grid.step[0]), along]
+    }
+
+    /// J at a face: the mean of what leaves the layer before and what enters the one behind; sideways flow is the difference.
+    fn along(&self, psi: &[f64], [x, y, face]: [usize; 3]) -> f64 {
+        let (width, layers) = (self.columns[0], self.layers);
+        let at = (y * (layers + 1) + face) * width + x;
+        let cell = (y * layers + face) * width + x;
+        let before = match face {
+            0 => -self.ends[0] * psi[at],
+            _ => {
+                let layer = cell - width;
+                self.through[layer] * psi[at - width] - self.own[layer] * psi[at] + self.given[layer][1]
+            }
+        };
+        let behind = match face {
+            _ if face == layers => self.ends[1] * psi[at],
+            _ => self.own[cell] * psi[at] - self.through[cell] * psi[at + width] - self.given[cell][0],
+        };
+        0.5 * (before + behind)
+    }
+}
+
+/// A line of cells along a row or across rows.
+#[derive(Default)]
+struct Line {
+    /// From each cell to the next.
+    across: Vec<f64>,
+    /// Out to the lower side and to the upper.
+    open: [Vec<f64>; 2],
+    optical: Vec<f64>,
+    beyond: [Vec<f64>; 2],
+}
+
+impl Line {
+    fn set(&mut self, of: &Sources<'_>, direction: usize, [start, step, count]: [usize; 3]) {
+        let grid = of.grid;
+        let layer = start / grid.columns[0] % grid.layers;
+        let spread = grid.spread(layer as f64 + 0.5);
+        let (along, height) = (grid.step[direction] * spread, grid.step[1 - direction] * spread * grid.depth);
+        let thinnest = along / (LONGEST_WAY * spread * grid.step[direction] * grid.columns[direction] as f64);
+        let tau = |i: usize| transport(&of.cells[start + i * step], of.channel) * along;
+        self.optical.clear();
+        self.optical.extend((0..count).map(tau));
+        let mut depth = 0.0;
+        self.beyond[0].clear();
+        for tau in &self.optical {
+            self.beyond[0].push(libm::exp(-RESISTANCE * depth));
+            depth += tau;
+        }
+        self.beyond[1].clear();
+        self.beyond[1].resize(count, 1.0);
+        depth = 0.0;
+        for i in (0..count).rev() {
+            self.beyond[1][i] = libm::exp(-RESISTANCE * depth);
+            depth += self.optical[i];
+        }
+        let optical = &self.optical;
+        let exchange = |i: usize| {
+            if i + 1 == count {
+                return 0.0;
+            }
+            // Light that is out in the open does not come back.
+            let inside = (1.0 - self.beyond[1][i]) * (1.0 - self.beyond[0][i + 1]);
+            height * inside / (RESISTANCE * 0.5 * (optical[i].max(thinnest) + optical[i + 1].max(thinnest)))
+        };
+        self.across.clear();
+        self.across.extend((0..count).map(exchange));
+        let thin = libm::exp(-0.5 * RESISTANCE * depth);
+        for side in 0..2 {
+            let leaves = |i: usize| {
+                let here = -libm::expm1(-RESISTANCE * optical[i]);
+                let open = here.max(thin);
+                let share = self.beyond[side][i] * here * (OPEN + (1.0 - OPEN) * open);
+                height * share / (1.0 + 0.5 * RESISTANCE * optical[i])
+            };
+            self.open[side].clear();
+            self.open[side].extend((0..count).map(leaves));
+        }
+    }
+}
