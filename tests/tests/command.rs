@@ -82,7 +82,7 @@ fn exit_2_is_for_the_command_line() {
             vec!["render", "s.toml", "--layers", "refraction"],
             "no technique of this version fills the layer `refraction`",
         ),
-        (vec!["render", "s.toml", "--layers", "effects,scatterN"], "fills the layer `scatterN`"),
+        (vec!["render", "s.toml", "--layers", "effects,reflection"], "fills the layer `reflection`"),
         (vec!["render", "s.toml", "--technique", "surfels"], "this version does not have \"surfels\""),
         (vec!["render", "s.toml", "--max-memory", "0"], "expected a number of bytes above 0"),
     ] {

@@ -1,6 +1,8 @@
 //! Half-vector slicing of the technique `sheets` through the whole command: closed forms, what slabs across the view show of the same
 //! scene, what is built for it, and what is refused.
 
+use organza::{Progress, RenderOptions, scene};
+use organza_judge::truth::{Orders, truth};
 use organza_tests::{Picture, draw, draw_in, largest_difference, organza, parallel_view, sum_of_effects, window};
 use std::path::Path;
 
@@ -188,7 +190,7 @@ fn what_half_vectors_cannot_draw_is_refused_by_name() {
     let two = refused(folder.path(), &scene, &[&HALF[..], &["--set", "object.haze.technique='points'"]].concat(), 3);
     assert!(two.contains("object 'haze': drawn by points"), "{two}");
     let view = refused(folder.path(), &scene, &["--set", "render.sheets.light_pixels=2"], 2);
-    assert!(view.contains("`light_pixels`: slabs across the view have no light buffers"), "{view}");
+    assert!(view.contains("`light_pixels`: slabs across the view do not carry light"), "{view}");
     let many = refused(folder.path(), &scene, &[&HALF[..], &["--set", "render.sheets.slab_width=1e-9"]].concat(), 5);
     assert!(many.contains("render.sheets.slab_width"), "{many}");
     // Without a wall no shadow map is refused before.
@@ -212,4 +214,91 @@ fn raw_points_beside_volumes_are_named() {
     assert!(said.contains("object 'dust'"), "{said}");
     let opaque = draw_in(folder.path(), &scene.replace("opacity = 0.3", "opacity = 1"), &HALF);
     assert!(opaque.channel("A").contains(&1.0));
+}
+
+/// Means over squares of 8² pixels of the green channel, and the same of what path tracing makes of all orders of scattering by media,
+/// with its standard error.
+fn beside_truth(text: &str, scattering: &str) -> (Vec<f64>, Vec<f64>, f64) {
+    const SIDE: usize = 8;
+    let overrides = [
+        "render.technique='sheets'",
+        "render.sheets.slicing='half_vector'",
+        &format!("render.sheets.scattering='{scattering}'"),
+    ];
+    let overrides = overrides.map(|o| scene::Override::parse(o).unwrap()).to_vec();
+    let load = scene::LoadOptions { overrides, ..Default::default() };
+    let scene = scene::parse(Path::new("s.toml"), text.as_bytes(), &load).unwrap();
+    let (options, progress) = (RenderOptions::default(), Progress::new());
+    let size = scene.camera.size.map(|s| s as usize);
+    let squares = |image: &dyn Fn(usize) -> f64| {
+        let across = size[0] / SIDE;
+        let mut out = vec![0.0; across * (size[1] / SIDE)];
+        for k in 0..size[0] * size[1] {
+            out[k / size[0] / SIDE * across + k % size[0] / SIDE] += image(k) / (SIDE * SIDE) as f64;
+        }
+        out
+    };
+    let drawn = organza::render(&scene, &options, &progress).unwrap();
+    let beauty = drawn.layers.rgb("beauty").unwrap();
+    let truth = truth(&scene, &options, Orders::ByMedia, 64, &progress).unwrap().unwrap();
+    let pixels = truth.image.pixels();
+    let noise = truth.rms_standard_error() / SIDE as f64;
+    (squares(&|k| f64::from(beauty[k][1])), squares(&|k| pixels[k][1]), noise)
+}
+
+#[test]
+fn clouds_that_scatter_again_and_again_come_near_path_tracing() {
+    for (name, direction) in [("front", "[0.3, -0.5, -1]"), ("side", "[-1, -0.4, -0.1]"), ("behind", "[0.3, -0.4, 1]")]
+    {
+        let text = format!(
+            "version = 1\n[camera]\nposition = [0, 0.3, 6]\ntarget = [0, 0, 0]\northographic = 2.4\nsize = [72, 48]\n\
+             [[light]]\nkind = 'directional'\ndirection = {direction}\nirradiance = [3, 3, 3]\n\
+             [material.cloud]\nmedium = {{ extinction = 6, albedo = 0.99, asymmetry = 0.6 }}\n\
+             [[object]]\nname = 'cloud'\nmaterial = 'cloud'\n\
+             density = {{ expression = '1.4 - 1.4*(x^2/1.5 + y^2/0.5 + z^2/0.8) + 0.25*sin(5*x)*sin(4*y + 1)*cos(5*z)', \
+             box = [[-1.4, -0.9, -1.1], [1.4, 0.9, 1.1]], spacing = 0.06 }}\n[render]\nantialias = 1\n"
+        );
+        let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+        let mut errors = Vec::new();
+        for scattering in ["once", "forward", "forward_and_back"] {
+            let (seen, exact, noise) = beside_truth(&text, scattering);
+            let (error, share) = (rmse(&seen, &exact), mean(&seen) / mean(&exact));
+            println!(
+                "{name}, {scattering}: {share:.3} of the light, RMSE {error:.4} ± {noise:.4}, mean {:.4}",
+                mean(&exact)
+            );
+            errors.push((error, share));
+        }
+        let [(once, dark), (forward, _), (both, share)] = errors[..] else { unreachable!() };
+        assert!(both < 0.3 * once && both < forward && forward < once, "{name}: RMSE {once} {forward} {both}");
+        assert!((0.75..1.1).contains(&share) && dark < 0.5, "{name}: shares {dark} {share}");
+    }
+}
+
+#[test]
+fn what_is_scattered_again_is_a_layer_of_its_own_and_sums_to_beauty() {
+    let scene = parallel_view(2.6, 48) + &bright("[-0.4, -1, -0.6]") + MIXED;
+    let again = ["--set", "render.sheets.scattering='forward_and_back'"];
+    let [once, many] = [in_half_vectors(&scene, &[]), in_half_vectors(&scene, &again)];
+    let more = many.channel("scatterN.G");
+    let (mean, least) = (more.iter().sum::<f64>() / more.len() as f64, more.iter().copied().fold(0.0, f64::min));
+    assert!(mean > 0.005 && least >= 0.0, "mean {mean}, least {least}");
+    for layer in ["scatter1.G", "direct.G", "ambient.G", "A", "shadow.A"] {
+        assert_eq!(once.channel(layer), many.channel(layer), "{layer}");
+    }
+    let sum: Vec<f64> = sum_of_effects(&many, "G").iter().zip(&more).map(|(a, b)| a + b).collect();
+    let off = largest_difference(&many.channel("G"), &sum);
+    assert!(off < 1e-5, "{off:e}");
+    // In beauty alone it is the same light.
+    let plain = in_half_vectors(&scene.replace("layers = ['effects', 'shadow']", ""), &again);
+    let off = largest_difference(&many.channel("G"), &plain.channel("G"));
+    assert!(off < 1e-5, "{off:e}");
+    let folder = tempfile::tempdir().unwrap();
+    let layers = ["--layers", "scatterN"];
+    let said = refused(folder.path(), &scene, &[&HALF[..], &layers].concat(), 2);
+    assert!(said.contains("set render.sheets.scattering"), "{said}");
+    let said = refused(folder.path(), &scene, &layers, 2);
+    assert!(said.contains("use technique = \"sheets\""), "{said}");
+    let said = refused(folder.path(), &scene, &[&HALF[..], &["--set", "render.sheets.voxels_per_cell=8"]].concat(), 2);
+    assert!(said.contains("light is scattered once"), "{said}");
 }

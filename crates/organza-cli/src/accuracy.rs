@@ -65,20 +65,20 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
     })
 }
 
-/// The scene's truth, and what its one order of scattering leaves out; or why there is none.
+/// The scene's truth, and what its orders of scattering leave out; or why there is none.
 fn truth(
     scene: &Scene,
     render: &RenderOptions,
     options: &Options,
     progress: &Progress,
 ) -> Result<Result<Truth, String>, Error> {
-    let mut one = truth::truth(scene, render, Orders::One, options.truth_samples(), progress)?;
-    if let Ok(one) = &mut one
+    let mut own = truth::truth(scene, render, Orders::of(scene), options.truth_samples(), progress)?;
+    if let Ok(own) = &mut own
         && let Ok(all) = truth::truth(scene, render, Orders::All, options.truth_samples(), progress)?
     {
-        one.all_orders = Some(one.beside(&all)?);
+        own.all_orders = Some(own.beside(&all)?);
     }
-    Ok(one)
+    Ok(own)
 }
 
 /// The study of `particles`, by the limit and the truth of `points`; or why there is none.

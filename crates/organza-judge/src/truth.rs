@@ -27,19 +27,19 @@ pub struct Truth {
     pub all_orders: Option<AllOrders>,
 }
 
-/// Light of all orders of scattering beside that of one.
+/// Light of all orders of scattering beside that of some.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AllOrders {
-    /// RMSE of the truth of one order against that of all, noise of both included.
+    /// RMSE of the truth of some orders against that of all, noise of both included.
     pub rmse: f64,
     /// Root of the mean squared standard error of the truth of all orders.
     pub rms_standard_error: f64,
-    /// Mean radiance of all pixels and channels with one order, and with all.
+    /// Mean radiance of all pixels and channels with some orders, and with all.
     pub mean: [f64; 2],
 }
 
 impl Truth {
-    /// What this truth of one order of scattering leaves out beside that of `all`.
+    /// What this truth of some orders of scattering leaves out beside that of `all`.
     ///
     /// # Errors
     /// [`Error::Internal`] for images of different sizes.
@@ -72,6 +72,11 @@ pub enum Orders {
 }
 
 impl Orders {
+    /// Those that a picture of the scene shows.
+    pub fn of(scene: &Scene) -> Self {
+        if scene.render.sheets.scattering().is_some() { Self::ByMedia } else { Self::One }
+    }
+
     fn rules(self) -> PathRules {
         PathRules {
             max_bounces: (self == Self::One).then_some(1),

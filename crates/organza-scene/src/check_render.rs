@@ -3,12 +3,12 @@
 use super::check::{At, LARGEST, SMALLEST};
 use super::de::suggest;
 use super::raw_render::{
-    Auto, RawAccumulation, RawDirection, RawMapping, RawParticles, RawPoints, RawRender, RawShadow, RawSheets,
-    RawSlicing, RawSurfaceSampler,
+    Auto, RawAccumulation, RawDirection, RawMapping, RawParticles, RawPoints, RawRender, RawScattering, RawShadow,
+    RawSheets, RawSlicing, RawSurfaceSampler,
 };
 use super::{
-    LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, RenderSettings, ShadowMapping, ShadowSettings,
-    SheetsSettings, Slicing, SurfaceSampler, Technique,
+    LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, RenderSettings, Scattering, ShadowMapping,
+    ShadowSettings, SheetsSettings, Slicing, SurfaceSampler, Technique,
 };
 use crate::{Error, shown};
 use splat_core::raster::Accumulation;
@@ -28,19 +28,20 @@ pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSetting
         return Err(at.key("max_points").error("`max_points`: expected a whole number above 0, found 0", ""));
     }
     let technique = check_technique(at, raw.technique.as_deref().unwrap_or("auto"))?;
+    let sheets = check_sheets(&at.key("sheets"), &raw.sheets)?;
     Ok(RenderSettings {
         technique,
         antialias: at.whole("antialias", raw.antialias.unwrap_or(2), 1..=8)?,
         tolerance,
         exposure: at.number("exposure", raw.exposure.unwrap_or(0.0), -60.0..=60.0)?,
         depth_ranges: at.whole("depth_ranges", raw.depth_ranges.unwrap_or(16), 1..=1024)?,
-        layers: check_layers(&at.key("layers"), &raw.layers, technique)?,
+        layers: check_layers(&at.key("layers"), &raw.layers, technique, &sheets)?,
         seed: raw.seed.unwrap_or(0),
         max_points: raw.max_points,
         shadow: check_shadow(&at.key("shadow"), &raw.shadow)?,
         points: check_points(&at.key("points"), &raw.points)?,
         particles: check_particles(&at.key("particles"), &raw.particles)?,
-        sheets: check_sheets(&at.key("sheets"), &raw.sheets)?,
+        sheets,
     })
 }
 
@@ -58,8 +59,17 @@ pub(super) fn check_technique(at: &At<'_>, name: &str) -> Result<Technique, Erro
     Err(at.key("technique").error(message, format!("use {NAMES}")))
 }
 
-fn check_layers(at: &At<'_>, names: &[String], technique: Technique) -> Result<LayerChoice, Error> {
+fn check_layers(
+    at: &At<'_>,
+    names: &[String],
+    technique: Technique,
+    sheets: &SheetsSettings,
+) -> Result<LayerChoice, Error> {
     let mut choice = LayerChoice::default();
+    let scatters_again = technique == Technique::Sheets && sheets.scattering().is_some();
+    if scatters_again && names.iter().any(|name| name == "effects") {
+        choice.add_scattered();
+    }
     for (i, name) in names.iter().enumerate() {
         if !choice.add(name) {
             if ADDITIVE_LAYERS.contains(&name.as_str()) {
@@ -71,6 +81,10 @@ fn check_layers(at: &At<'_>, names: &[String], technique: Technique) -> Result<L
     }
     let lacking = own_layers(&choice).find(|(owner, _)| *owner != technique);
     match lacking {
+        None if choice.names().any(|name| name == "scatterN") && !scatters_again => {
+            let message = "the layer `scatterN` is of light that is scattered more than once";
+            Err(at.error(message, "set render.sheets.scattering = \"forward_and_back\", or leave it out"))
+        }
         None => Ok(choice),
         Some((owner, layer)) => {
             let message = format!("the technique `{}` has no layer `{layer}`", technique.name());
@@ -165,16 +179,47 @@ fn check_slicing(at: &At<'_>, raw: &RawSheets) -> Result<Slicing, Error> {
         return Ok(Slicing::HalfVector {
             light_pixels: at.number("light_pixels", raw.light_pixels.unwrap_or(1.5), 0.1..=16.0)?,
             most_light_pixels: at.whole("most_light_pixels", raw.most_light_pixels.unwrap_or(2048), 16..=8192)?,
+            scattering: check_scattering(at, raw)?,
         });
     }
-    let given = [("light_pixels", raw.light_pixels.is_some()), ("most_light_pixels", raw.most_light_pixels.is_some())];
-    match given.into_iter().find(|(_, is_given)| *is_given) {
-        None => Ok(Slicing::View),
-        Some((key, _)) => {
-            let message = format!("`{key}`: slabs across the view have no light buffers");
-            Err(at.key(key).error(message, "set slicing = \"half_vector\", or leave it out"))
-        }
+    let given = [
+        ("light_pixels", raw.light_pixels.is_some()),
+        ("most_light_pixels", raw.most_light_pixels.is_some()),
+        ("scattering", raw.scattering != RawScattering::Once),
+    ];
+    if let Some((key, _)) = given.into_iter().find(|(_, is_given)| *is_given) {
+        let message = format!("`{key}`: slabs across the view do not carry light");
+        return Err(at.key(key).error(message, "set slicing = \"half_vector\", or leave it out"));
     }
+    check_scattering(at, raw).map(|_| Slicing::View)
+}
+
+fn check_scattering(at: &At<'_>, raw: &RawSheets) -> Result<Option<Scattering>, Error> {
+    let given =
+        [("scattering_cone", raw.scattering_cone.is_some()), ("voxels_per_cell", raw.voxels_per_cell.is_some())];
+    if raw.scattering == RawScattering::Once {
+        return match given.into_iter().find(|(_, is_given)| *is_given) {
+            None => Ok(None),
+            Some((key, _)) => {
+                let message = format!("`{key}`: light is scattered once");
+                Err(at.key(key).error(message, "set scattering = \"forward_and_back\", or leave it out"))
+            }
+        };
+    }
+    let cone = match raw.scattering_cone {
+        None | Some(Auto::Auto) => None,
+        Some(Auto::Number(degrees)) if (0.0..90.0).contains(&degrees) => Some(degrees.to_radians()),
+        Some(Auto::Number(degrees)) => {
+            let message =
+                format!("`scattering_cone`: expected degrees from 0 to below 90 or \"auto\", found {degrees}");
+            return Err(at.key("scattering_cone").error(message, ""));
+        }
+    };
+    Ok(Some(Scattering {
+        back: raw.scattering == RawScattering::ForwardAndBack,
+        cone,
+        voxels_per_cell: at.whole("voxels_per_cell", raw.voxels_per_cell.unwrap_or(32), 1..=1 << 20)?,
+    }))
 }
 
 fn check_shadow(at: &At<'_>, raw: &RawShadow) -> Result<ShadowSettings, Error> {

@@ -4,7 +4,7 @@ use splat_core::{ADDITIVE_LAYERS, LayerSet, Layers, SHADED_EFFECTS};
 use std::collections::BTreeSet;
 
 /// Every name that `layers` accepts. `effects` and `depth` stand for several; `beauty` and `alpha` are always kept.
-pub const LAYER_NAMES: [&str; 17] = [
+pub const LAYER_NAMES: [&str; 18] = [
     "beauty",
     "alpha",
     "effects",
@@ -13,6 +13,7 @@ pub const LAYER_NAMES: [&str; 17] = [
     "emission",
     "direct",
     "scatter1",
+    "scatterN",
     "shadow",
     "normal",
     "depth",
@@ -45,6 +46,11 @@ impl LayerChoice {
             },
         }
         true
+    }
+
+    /// Adds the layer of light that is scattered more than once.
+    pub(crate) fn add_scattered(&mut self) {
+        self.names.insert("scatterN");
     }
 
     /// What has to be accumulated so that these images can be made.

@@ -56,6 +56,12 @@ pub(super) struct RawSheets {
     pub(super) light_pixels: Option<f64>,
     /// With "half_vector": most pixels of a light's buffer along a side, 16 to 8192; default 2048.
     pub(super) most_light_pixels: Option<u32>,
+    /// With "half_vector": how often media scatter light, "once" (default), "forward", or "forward_and_back".
+    pub(super) scattering: RawScattering,
+    /// With scattering: half angle of the cone that light spreads into ahead, degrees from 0 to below 90, or "auto" (the default).
+    pub(super) scattering_cone: Option<Auto>,
+    /// With scattering: voxels for each cell of scattered light, 1 to 1048576; default 32.
+    pub(super) voxels_per_cell: Option<u32>,
     /// Width of a slab in world units, or "auto" (the default): the least step of the volumes across the slabs.
     pub(super) slab_width: Option<Auto>,
     /// Radius of a voxel's kernel in steps of its lattice, 0.5 to 8; default 2.
@@ -74,6 +80,17 @@ pub(super) enum RawSlicing {
     #[default]
     View,
     HalfVector,
+}
+
+/// How often media scatter light.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "Scattering")]
+pub(super) enum RawScattering {
+    #[default]
+    Once,
+    Forward,
+    ForwardAndBack,
 }
 
 /// How implicit surfaces are sampled.

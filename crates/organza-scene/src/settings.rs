@@ -69,7 +69,8 @@ impl Technique {
     pub const fn own_layers(self) -> &'static [&'static str] {
         match self {
             Self::Particles => &["std_error"],
-            Self::Auto | Self::Points | Self::Sheets | Self::Reference => &[],
+            Self::Sheets => &["scatterN"],
+            Self::Auto | Self::Points | Self::Reference => &[],
         }
     }
 }
@@ -100,6 +101,16 @@ pub struct SheetsSettings {
     pub transmittance_cutoff: f64,
 }
 
+impl SheetsSettings {
+    /// How light is scattered more than once, where it is.
+    pub const fn scattering(&self) -> Option<&Scattering> {
+        match &self.slicing {
+            Slicing::HalfVector { scattering: Some(scattering), .. } => Some(scattering),
+            _ => None,
+        }
+    }
+}
+
 /// What the slabs of sheets lie across.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Slicing {
@@ -111,7 +122,20 @@ pub enum Slicing {
         light_pixels: f64,
         /// Most pixels of a light's buffer along a side, 16 to 8192.
         most_light_pixels: u32,
+        /// How often light is scattered; `None` for once.
+        scattering: Option<Scattering>,
     },
+}
+
+/// Light that media scatter more than once (Zhang and Crawfis, section 3).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scattering {
+    /// Whether light that is scattered back is followed too.
+    pub back: bool,
+    /// Half angle of the cone that light spreads into where it is scattered ahead, radians, in [0, π/2); `None` for that of the media.
+    pub cone: Option<f64>,
+    /// Voxels for each cell of scattered light, 1 to 2²⁰.
+    pub voxels_per_cell: u32,
 }
 
 /// How the particles of implicit surfaces are found.

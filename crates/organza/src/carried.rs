@@ -5,7 +5,7 @@ use crate::choose::{row, techniques};
 use crate::form::PlannedObject;
 use crate::lights::{self, LightPoint};
 use crate::load::Loaded;
-use crate::matter::{CarriesLight, Matter};
+use crate::matter::{Carries, CarriesLight, Matter};
 use crate::plan::{Effect, Plan};
 use crate::scene::{Scene, SceneLight};
 use crate::shadows::Wanted;
@@ -25,7 +25,7 @@ pub(crate) fn is_all(
     lights: &[SceneLight],
 ) -> Result<bool, Error> {
     let points = lights::points(lights);
-    let answers = carries(matter, &points)?;
+    let answers = carries(matter, &points)?.points;
     let is_no_shadow = |point: &LightPoint| !lights[point.of].shadow || point.light.intensity == [0.0; 3];
     let receives = |(o, planned): (&ObjectStatistics, &PlannedObject)| o.receives && !planned.form.is_own();
     Ok(!statistics.iter().zip(matter.planned).any(receives)
@@ -36,9 +36,10 @@ pub(crate) fn is_all(
 pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: &mut Plan) -> Result<(), Error> {
     let Some(carries) = of_scene(scene) else { return Ok(()) };
     let matter = Matter { scene, own: &loaded.own, planned: &plan.objects, camera: &loaded.camera };
-    let carries = carries(&matter, points)?;
+    let Carries { points: carries, scatters_again } = carries(&matter, points)?;
     let called_for = |point: &LightPoint| plan.shadow_maps[point.of];
     plan.carried = points.iter().zip(&carries).map(|(point, carries)| called_for(point) && carries.is_ok()).collect();
+    plan.scatters_again = scatters_again;
     let of_light = |light: usize| {
         let own = || points.iter().zip(&carries).filter(move |(point, _)| point.of == light);
         let carried = own().filter(|(_, carries)| carries.is_ok()).count();
@@ -47,6 +48,9 @@ pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: 
             all => format!("{carried} of {all} points; "),
         };
         reason += &match own().find_map(|(_, carries)| carries.as_ref().err()) {
+            None if scatters_again => {
+                "it comes through slabs that light and view share, and is scattered there again and again".to_owned()
+            }
             None => "it comes through slabs that light and view share".to_owned(),
             Some(why) => format!("a shadow map has it, scattered once: {why}"),
         };

@@ -91,7 +91,8 @@ impl<'a> Frame<'a> {
 
     /// The numbers that a splat, or a hit, brings to a pixel.
     pub(crate) fn layout(&self) -> ChannelLayout {
-        ChannelLayout::new(&self.layers)
+        let layout = ChannelLayout::new(&self.layers);
+        if self.plan.scatters_again { layout.with_multiple() } else { layout }
     }
 
     /// An empty accumulator of the frame's samples, with the channels that its layers need.

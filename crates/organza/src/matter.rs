@@ -18,8 +18,13 @@ pub(crate) struct Matter<'a> {
     pub(crate) camera: &'a Camera,
 }
 
-/// For each point of a light: whether a technique carries its light through what it draws by itself, or why not.
-pub(crate) type Carries = Vec<Result<(), String>>;
+/// How a technique carries light through what it draws by itself.
+pub(crate) struct Carries {
+    /// For each point of a light: whether it does, or why not.
+    pub(crate) points: Vec<Result<(), String>>,
+    /// Whether light is scattered more than once on its way.
+    pub(crate) scatters_again: bool,
+}
 
-/// How a technique answers that; or it refuses what cannot be drawn so.
+/// How a technique is asked for that; it refuses what cannot be drawn so.
 pub(crate) type CarriesLight = fn(&Matter<'_>, &[LightPoint]) -> Result<Carries, Error>;

@@ -7,7 +7,7 @@ use crate::scene::Scene;
 use glam::Vec3;
 use rayon::prelude::*;
 use splat_core::shade::ChannelLayout;
-use splat_core::{Camera, Cloud, DepthProfile, Exceeded, Grid, LayerSet};
+use splat_core::{Camera, Cloud, DepthProfile, Exceeded, Grid};
 
 /// Bytes of a render by what takes them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -31,7 +31,7 @@ impl Memory {
         camera.size = camera.size.map(|s| s.saturating_mul(scene.render.antialias));
         Self {
             image: image_bytes(scene),
-            splats: splat_bytes(loaded, &camera, &scene.render.layers.set()),
+            splats: splat_bytes(loaded, &camera, layout(scene)),
             own: own_bytes(loaded),
             average,
             maps: 0,
@@ -49,12 +49,18 @@ impl Memory {
     }
 }
 
+/// The channels that a render has at most.
+fn layout(scene: &Scene) -> ChannelLayout {
+    let layout = ChannelLayout::new(&scene.render.layers.set());
+    if scene.render.sheets.scattering().is_some() { layout.with_multiple() } else { layout }
+}
+
 /// Bytes of the accumulators and layers.
 pub(crate) fn image_bytes(scene: &Scene) -> u64 {
     let set = scene.render.layers.set();
     let pixels = scene.camera.size.iter().map(|s| u64::from(*s)).product::<u64>();
     let samples = pixels * u64::from(scene.render.antialias).pow(2);
-    let channels = 4 * ChannelLayout::new(&set).count() as u64;
+    let channels = 4 * layout(scene).count() as u64;
     let profile = if set.depth { size_of::<DepthProfile>() as u64 } else { 0 };
     // Up to three optical depths, and an object.
     let accumulated = channels + 4 * 3 + profile + 4;
@@ -71,8 +77,8 @@ pub(crate) fn loading_bytes(loaded: &Loaded, inputs: u64) -> u64 {
 }
 
 /// Bytes of what is made for each splat: its attributes, order, footprint, tile entries and values.
-fn splat_bytes(loaded: &Loaded, camera: &Camera, layers: &LayerSet) -> u64 {
-    let values = 4 * ChannelLayout::new(layers).count() as u64;
+fn splat_bytes(loaded: &Loaded, camera: &Camera, layout: ChannelLayout) -> u64 {
+    let values = 4 * layout.count() as u64;
     loaded.cloud.bytes() + loaded.cloud.len() as u64 * (8 + 64 + values) + tile_bytes(&loaded.cloud, camera)
 }
 

@@ -50,6 +50,8 @@ pub struct Plan {
     /// For each point of each light, in the order of the frame's points: the table of its shadow map, if it gets one. Chosen by
     /// a look at the splats, when all else is planned.
     pub shadow_tables: Vec<Option<ShadowTable>>,
+    /// Whether light is scattered more than once.
+    pub scatters_again: bool,
     /// For each point of each light: whether a technique carries its light through what it draws by itself.
     pub carried: Vec<bool>,
     /// For each point whose light is carried: the table of its map of all other casters, if there are any. Empty where none is.

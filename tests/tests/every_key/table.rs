@@ -400,6 +400,11 @@ fn render() -> Vec<Entry> {
         of(BALL, "render.sheets.slicing", "render.sheets.slicing='half_vector'").by(SHEETS),
         of(BALL, "render.sheets.light_pixels", "render.sheets.light_pixels=0.4").by(SHEETS).with(HALF_VECTOR),
         of(BALL, "render.sheets.most_light_pixels", "render.sheets.most_light_pixels=16").by(SHEETS).with(HALF_VECTOR),
+        of(BALL, "render.sheets.scattering", "render.sheets.scattering='forward_and_back'")
+            .by(SHEETS)
+            .with(HALF_VECTOR),
+        of(BALL, "render.sheets.scattering_cone", "render.sheets.scattering_cone=70").by(SHEETS).with(SCATTERING),
+        of(BALL, "render.sheets.voxels_per_cell", "render.sheets.voxels_per_cell=256").by(SHEETS).with(SCATTERING),
         of(BALL_AND_SURFACE, "render.sheets.slab_width", "render.sheets.slab_width=0.4").by(SHEETS),
         of(BALL_AND_SURFACE, "render.sheets.kernel_extent", "render.sheets.kernel_extent=3")
             .by(SHEETS)
@@ -414,6 +419,8 @@ fn render() -> Vec<Entry> {
 }
 
 const HALF_VECTOR: &[&str] = &["render.sheets.slicing='half_vector'"];
+
+const SCATTERING: &[&str] = &["render.sheets.slicing='half_vector'", "render.sheets.scattering='forward_and_back'"];
 
 const THIN: &[&str] = &[
     "material.m.medium.extinction=0.01",

@@ -285,7 +285,7 @@ fn notes(html: &mut String, study: &Study) {
             ));
             if let Some(all) = t.all_orders {
                 note(format!(
-                    "Light scattered more than once is no part of that truth: from the truth of all orders it is {:.1e} away \
+                    "Light that is scattered or reflected more often is no part of that truth: from the truth of all orders it is {:.1e} away \
                      (RMSE; that truth's own standard error is {:.1e}), with a mean radiance of {:.4} for {:.4}.",
                     all.rmse, all.rms_standard_error, all.mean[0], all.mean[1]
                 ));

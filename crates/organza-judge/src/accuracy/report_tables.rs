@@ -50,7 +50,7 @@ fn study(study: &Study) -> Value {
                 "all_orders": t.all_orders.map(|all| json!({
                     "rmse": all.rmse,
                     "rms_standard_error": all.rms_standard_error,
-                    "mean_of_one": all.mean[0],
+                    "mean": all.mean[0],
                     "mean_of_all": all.mean[1],
                 })),
             }),

@@ -6,6 +6,7 @@ use crate::Error;
 use crate::device::{self, Helper, Splats};
 use crate::pass;
 use splat_core::raster::{self, Accumulation, OpaqueImage};
+use splat_core::shade::MAX_SHADED_CHANNELS;
 use splat_core::shade::{LitBy, gpu::suits};
 use splat_core::{Accumulator, CostRecord, Direction, StageCost};
 use tsm::ShadowMap;
@@ -29,6 +30,10 @@ impl Frame<'_> {
     pub(super) fn solid_by_device(&self, ids: &[u32], cost: &mut CostRecord) -> Result<Option<OpaqueImage>, Error> {
         let maps = self.maps(cost)?;
         let Some(helper) = self.helper.filter(|_| self.device_composites) else { return Ok(None) };
+        if self.layout().count() > MAX_SHADED_CHANNELS {
+            helper.leave("its kernels have no channel of light that is scattered more than once");
+            return Ok(None);
+        }
         if !self.suits(helper, maps) {
             return Ok(None);
         }

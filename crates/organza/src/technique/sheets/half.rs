@@ -8,10 +8,10 @@ use crate::frame::Frame;
 use crate::lights::LightPoint;
 use crate::matter::{Carries, CarriesLight, Matter};
 use crate::pass;
-use crate::scene::{Scene, Slicing, Technique};
+use crate::scene::{self, Scene, Slicing, Technique};
 use crate::technique::Session;
 use crate::{CostRecord, Error, stage};
-use sheet_light::half::{HalfInput, HalfParams, Reason, fold, serves, slab_width};
+use sheet_light::half::{HalfInput, HalfParams, Reason, Scattering, fold, serves, slab_width};
 use sheet_light::{Params, SheetInput, Volume};
 use splat_core::Accumulator;
 use splat_core::shade::LitBy;
@@ -51,7 +51,8 @@ fn points_served(matter: &Matter<'_>, points: &[LightPoint]) -> Result<Carries, 
         }
         other => other.to_string(),
     };
-    Ok(points.iter().map(|point| serves(&volumes, matter.camera, &point.light).map_err(words)).collect())
+    let points = points.iter().map(|point| serves(&volumes, matter.camera, &point.light).map_err(words)).collect();
+    Ok(Carries { points, scatters_again: matter.scene.render.sheets.scattering().is_some() })
 }
 
 /// Draws all volumes into a segment of its own.
@@ -118,8 +119,11 @@ fn half_params(frame: &Frame<'_>, sheets: Params) -> HalfParams {
     let plain = HalfParams { sheets, ..HalfParams::default() };
     match frame.settings.sheets.slicing {
         Slicing::View => plain,
-        Slicing::HalfVector { light_pixels, most_light_pixels } => {
-            HalfParams { light_pixels, most_light_pixels, ..plain }
+        Slicing::HalfVector { light_pixels, most_light_pixels, scattering } => {
+            let plain = HalfParams { light_pixels, most_light_pixels, ..plain };
+            let Some(scene::Scattering { back, cone, voxels_per_cell }) = scattering else { return plain };
+            let scattering = if back { Scattering::ForwardAndBack } else { Scattering::Forward };
+            HalfParams { scattering, cone, voxels_per_cell, ..plain }
         }
     }
 }
