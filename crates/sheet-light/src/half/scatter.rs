@@ -21,7 +21,7 @@ mod blur;
 pub(crate) mod grid;
 mod layer;
 pub(crate) mod medium;
-mod phase;
+pub(crate) mod phase;
 pub(crate) mod streams;
 
 use super::{HalfParams, Scattering, lamp};
