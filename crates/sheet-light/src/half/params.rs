@@ -46,7 +46,14 @@ pub struct HalfParams {
 
 impl Default for HalfParams {
     fn default() -> Self {
-        Self { sheets: Params::default(), light_pixels: 1.5, most_light_pixels: 2048, scattering: Scattering::None, cone: None, voxels_per_cell: 32 }
+        Self {
+            sheets: Params::default(),
+            light_pixels: 1.5,
+            most_light_pixels: 2048,
+            scattering: Scattering::None,
+            cone: None,
+            voxels_per_cell: 32,
+        }
     }
 }
 

@@ -66,7 +66,8 @@ pub const TILE: u32 = 16;
 /// The widest image, pixels a side: what one workgroup counts then fits 32 bits.
 const WIDEST: u32 = 16_384;
 
-const _: () = assert!(MAX_SHADED_CHANNELS == MOST_CHANNELS as usize, "kernels make room for every effect that shading gives");
+const _: () =
+    assert!(MAX_SHADED_CHANNELS == MOST_CHANNELS as usize, "kernels make room for every effect that shading gives");
 const _: () = assert!(TWIN_TILE == 32, "`composite.glsl` counts offsets from the corners of the CPU's tiles");
 
 /// What a recording makes room for.

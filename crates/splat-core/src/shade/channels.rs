@@ -16,7 +16,8 @@ pub const MAX_SHADED_CHANNELS: usize = APART + 3 + 1;
 pub const MAX_CHANNELS: usize = WITH_MULTIPLE + 3 + 1;
 
 const _: () = assert!(APART > 3 + 3 + 1, "`colors_of` tells effects apart from beauty by the number of channels");
-const _: () = assert!(WITH_MULTIPLE + 3 > MAX_SHADED_CHANNELS, "`colors_of` tells `scatterN` by the number of channels");
+const _: () =
+    assert!(WITH_MULTIPLE + 3 > MAX_SHADED_CHANNELS, "`colors_of` tells `scatterN` by the number of channels");
 
 /// Which numbers each splat carries through compositing, and where.
 ///

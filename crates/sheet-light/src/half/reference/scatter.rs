@@ -51,7 +51,8 @@ impl Diffuse {
         }
         let grid = LightGrid::new(volumes, &lamp::camera_of(volumes, &lit.light, params), params.voxels_per_cell);
         let cells = medium::cells(&grid, volumes, params.scattering);
-        let cone = params.cone.unwrap_or_else(|| scatter::phase::cone_of(params.scattering, medium::mean_asymmetry(&cells)));
+        let cone =
+            params.cone.unwrap_or_else(|| scatter::phase::cone_of(params.scattering, medium::mean_asymmetry(&cells)));
         let [width, height] = grid.columns;
         let mut out = Self { grid, cells, faces: vec![Face::default(); width * height * (grid.layers + 1)], cone };
         for channel in 0..3 {
@@ -61,6 +62,7 @@ impl Diffuse {
             }
         }
         out.weigh();
+        out.faces = out.softened();
         Some(out)
     }
 
@@ -141,8 +143,7 @@ impl Diffuse {
             slab.gives = slab.gives.map(|s| s * incoming[k][y * width + x]);
             slab
         };
-        let slabs: Vec<Vec<Slab>> =
-            self.columns().map(|(x, y)| (0..layers).map(|k| slab(x, y, k)).collect()).collect();
+        let slabs: Vec<Vec<Slab>> = self.columns().map(|(x, y)| (0..layers).map(|k| slab(x, y, k)).collect()).collect();
         let sides: Vec<Vec<[[f64; 2]; 4]>> =
             self.columns().map(|(x, y)| (0..=layers).map(|k| self.sides(x, y, k, c)).collect()).collect();
         let mut psi = vec![0.0; self.faces.len()];
@@ -256,11 +257,11 @@ impl Diffuse {
         let (here, count) = (if direction == 0 { x } else { y }, grid.columns[direction]);
         let before = |n: usize| libm::exp(-1.5 * (0..n).map(tau).sum::<f64>());
         let behind = |n: usize| libm::exp(-1.5 * (n + 1..count).map(tau).sum::<f64>());
-        let beyond = if side % 2 == 0 { before(here) } else { behind(here) };
+        let beyond = if side.is_multiple_of(2) { before(here) } else { behind(here) };
         let stops = 1.0 - libm::exp(-1.5 * tau(here));
         let thin = libm::exp(-0.75 * (0..count).map(tau).sum::<f64>());
         let open = wall * beyond * stops * (0.423 + 0.577 * stops.max(thin)) / (1.0 + 0.75 * tau(here));
-        let next = if side % 2 == 0 { here.checked_sub(1) } else { Some(here + 1).filter(|n| *n < count) };
+        let next = if side.is_multiple_of(2) { here.checked_sub(1) } else { Some(here + 1).filter(|n| *n < count) };
         let across = next.map_or(0.0, |next| {
             let (low, high) = (here.min(next), here.max(next));
             let thinnest = 2.0 / count as f64;
@@ -285,6 +286,33 @@ impl Diffuse {
         }
     }
 
+    /// Each face as the mean of the 27 about it, those beyond a border as those at it.
+    fn softened(&self) -> Vec<Face> {
+        let counts = [self.grid.columns[0], self.grid.columns[1], self.grid.layers + 1];
+        let near = |n: usize, step: usize, a: usize| (n + step).saturating_sub(1).min(counts[a] - 1);
+        let mut out = self.faces.clone();
+        for (x, y) in self.columns() {
+            for k in 0..counts[2] {
+                let mut sum = Face::default();
+                for step in 0..27 {
+                    let steps = [step % 3, step / 3 % 3, step / 9];
+                    let share: f64 = steps.iter().map(|n| [0.25, 0.5, 0.25][*n]).product();
+                    let of = &self.faces[self.face(near(x, steps[0], 0), near(y, steps[1], 1), near(k, steps[2], 2))];
+                    sum.weight += share * of.weight;
+                    for c in 0..3 {
+                        sum.ahead[c] += share * of.weight * of.ahead[c];
+                        sum.psi[c] += share * of.weight * of.psi[c];
+                        (0..3).for_each(|a| sum.flux[a][c] += share * of.weight * of.flux[a][c]);
+                    }
+                }
+                let whole = |v: [f64; 3]| v.map(|v| v / sum.weight);
+                let (ahead, psi, flux) = (whole(sum.ahead), whole(sum.psi), sum.flux.map(whole));
+                out[self.face(x, y, k)] = Face { ahead, psi, flux, weight: sum.weight };
+            }
+        }
+        out
+    }
+
     /// Radiance towards the eye of a point of a medium of which 1 is seen.
     pub(crate) fn radiance(
         &self,
@@ -297,7 +325,8 @@ impl Diffuse {
         if !medium::scatters(volume) {
             return [0.0; 3];
         }
-        let (counts, place) = ([self.grid.columns[0], self.grid.columns[1], self.grid.layers + 1], self.grid.place(world));
+        let (counts, place) =
+            ([self.grid.columns[0], self.grid.columns[1], self.grid.layers + 1], self.grid.place(world));
         let (mut sum, mut weights) = ([[0.0; 3]; 2], 0.0);
         let towards = self.grid.axes.map(|axis| axis.dot(to_eye.as_dvec3()));
         let g = f64::from(volume.material.asymmetry);

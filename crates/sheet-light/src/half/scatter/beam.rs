@@ -88,13 +88,7 @@ impl Path<'_> {
     }
 
     /// One layer; whether it scatters.
-    fn through(
-        &self,
-        channel: usize,
-        layer: usize,
-        [beam, ahead]: [&mut Vec<f64>; 2],
-        out: &mut Beam,
-    ) -> bool {
+    fn through(&self, channel: usize, layer: usize, [beam, ahead]: [&mut Vec<f64>; 2], out: &mut Beam) -> bool {
         let [width, _] = self.grid.columns;
         let mut is_any = false;
         for at in 0..beam.len() {

@@ -101,8 +101,8 @@ pub(crate) fn cells(grid: &LightGrid, volumes: &[Volume<'_>], scattering: Scatte
 fn fill(cell: &mut Cell, grid: &LightGrid, lattices: &[Lattice<'_>], at: [usize; 3]) {
     let share = 1.0 / PLACES.iter().product::<usize>() as f32;
     let place = |n: usize, a: usize| at[a] as f64 + (n as f64 + 0.5) / PLACES[a] as f64;
-    for (i, j, k) in (0..PLACES[2])
-        .flat_map(|k| (0..PLACES[1]).flat_map(move |j| (0..PLACES[0]).map(move |i| (i, j, k))))
+    for (i, j, k) in
+        (0..PLACES[2]).flat_map(|k| (0..PLACES[1]).flat_map(move |j| (0..PLACES[0]).map(move |i| (i, j, k))))
     {
         let world = grid.world([place(i, 0) - 0.5, place(j, 1) - 0.5, place(k, 2)]);
         for lattice in lattices {

@@ -148,7 +148,8 @@ impl Streams {
         for at in 0..row * height {
             let ([x, face], y) = ([at % width, at / width % (layers + 1)], at / row);
             let cell = (y * layers + face) * width + x;
-            let (before, down) = if face == 0 { (self.ends[0], 0.0) } else { (self.own[cell - width], self.given[cell - width][1]) };
+            let (before, down) =
+                if face == 0 { (self.ends[0], 0.0) } else { (self.own[cell - width], self.given[cell - width][1]) };
             let (behind, up) = if face == layers { (self.ends[1], 0.0) } else { (self.own[cell], self.given[cell][0]) };
             self.source[at] = down + up;
             let [left, above] = [(x > 0, 1), (y > 0, row)];
