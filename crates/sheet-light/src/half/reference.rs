@@ -1,7 +1,9 @@
 //! The slow form in f64: the same sheets pixel by pixel, voxel by voxel, without bands, buckets, vectors, bounds or skipped voxels,
 //! and light on the way through a slab summed step by step.
 //!
-//! Gradients are left out: volumes are lit as if they had no normals.
+//! Gradients are left out: volumes are lit as if they had no normals. Light that is scattered more than once is that of `scatter.rs`.
+
+mod scatter;
 
 use super::frame::{Frame, Ray};
 use super::placed::Placed;
@@ -29,6 +31,7 @@ struct View<'a> {
     frame: Frame,
     placed: Vec<Placed<'a>>,
     voxels: Vec<Vec<Voxel>>,
+    diffuse: Option<scatter::Diffuse>,
 }
 
 /// One image: its camera, its footprints by volume.
@@ -83,7 +86,7 @@ impl<'a> View<'a> {
             places.map(voxel).collect()
         };
         let voxels = placed.iter().map(of).collect();
-        Ok(Self { input, params, frame, placed, voxels })
+        Ok(Self { input, params, frame, placed, voxels, diffuse: scatter::Diffuse::new(volumes, lit, params) })
     }
 
     fn image(&self, camera: Camera) -> Image {
@@ -307,7 +310,9 @@ impl<'a> View<'a> {
         let radiance = point.radiance(self.input.sheets.ambient, [lit.light].iter(), |_, _| [share; 3]);
         let [ambient, emission, direct, scatter] = radiance.effects();
         let others = if with_ambient { 1.0 } else { 0.0 };
-        [0, 1, 2].map(|c| f64::from(others * (ambient[c] + emission[c]) + direct[c] + scatter[c]))
+        let more = |d: &scatter::Diffuse| d.radiance(volume, &lit.light, point.position, point.to_eye, point.color);
+        let more = self.diffuse.as_ref().map_or([0.0; 3], more);
+        [0, 1, 2].map(|c| f64::from(others * (ambient[c] + emission[c]) + direct[c] + scatter[c]) + more[c])
     }
 }
 

@@ -21,7 +21,7 @@ mod blur;
 pub(crate) mod grid;
 mod layer;
 pub(crate) mod medium;
-mod phase;
+pub(crate) mod phase;
 pub(crate) mod streams;
 
 use super::{HalfParams, Scattering, lamp};
@@ -159,6 +159,9 @@ impl Scattered {
             }
         }
         out.weigh(&scene.cells);
+        for axis in 0..3 {
+            out.soften(axis);
+        }
         out
     }
 
@@ -227,6 +230,23 @@ impl Scattered {
             let weight = LEAST + before.max(behind);
             face[..WEIGHT].iter_mut().for_each(|v| *v *= weight);
             face[WEIGHT] = weight;
+        }
+    }
+
+    /// Means over neighbours along an axis, 1/4, 1/2, 1/4: interpolated linearly they have no edges where cells meet.
+    fn soften(&mut self, axis: usize) {
+        let ([width, height], faces) = (self.grid.columns, self.grid.layers + 1);
+        let (count, step) = [(width, 1), (height, width * faces), (faces, width)][axis];
+        let mut line = Vec::with_capacity(count);
+        for start in (0..self.faces.len()).filter(|at| (at / step).is_multiple_of(count)) {
+            line.clear();
+            line.extend((0..count).map(|i| self.faces[start + i * step]));
+            for i in 0..count {
+                let (before, behind) = (&line[i.saturating_sub(1)], &line[(i + 1).min(count - 1)]);
+                let face = &mut self.faces[start + i * step];
+                // Both sides first: a mirrored cloud gives mirrored bits.
+                (0..NUMBERS).for_each(|n| face[n] = 0.5 * line[i][n] + 0.25 * (before[n] + behind[n]));
+            }
         }
     }
 

@@ -65,6 +65,49 @@ fn path(block: &Block, random: &mut Random) -> Option<usize> {
     }
 }
 
+/// Where a block is looked at, along the normal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Face {
+    /// That the light falls on.
+    Lit,
+    Side,
+    /// Where it comes out.
+    Far,
+}
+
+/// Mean radiance of a face of a box along its normal under an irradiance of 1: of light that was scattered once, and of all else.
+pub(crate) fn seen(block: &Block, face: Face, paths: u32, seed: u64) -> [f64; 2] {
+    let mut random = Random(seed);
+    let mut sums = [0.0; 2];
+    for _ in 0..paths {
+        let [u, v] = [block.width * random.unit(), block.width * random.unit()];
+        let (mut p, mut d) = match face {
+            Face::Lit => ([u, v, 0.0], [0.0, 0.0, 1.0]),
+            Face::Side => ([0.0, u, block.depth * v / block.width], [1.0, 0.0, 0.0]),
+            Face::Far => ([u, v, block.depth], [0.0, 0.0, -1.0]),
+        };
+        let mut weight = 1.0;
+        for scattered in 0.. {
+            let way = -(1.0 - random.unit()).ln();
+            (0..3).for_each(|a| p[a] += way * d[a]);
+            if left(block, p, d, false).is_some() || scattered > 100_000 {
+                break;
+            }
+            weight *= block.albedo;
+            // Backwards: light along +z that turns into −d.
+            sums[scattered.min(1)] += weight * phase(-d[2], block.asymmetry) * (-p[2]).exp();
+            d = turned(d, random.cosine(block.asymmetry), TAU * random.unit());
+        }
+    }
+    sums.map(|sum| sum / f64::from(paths))
+}
+
+/// Henyey and Greenstein's phase function.
+fn phase(cosine: f64, g: f64) -> f64 {
+    let d = 1.0 + g * g - 2.0 * g * cosine;
+    (1.0 - g * g) / (2.0 * TAU * d * d.sqrt())
+}
+
 /// The side by which a path that is at `p` has left.
 fn left(block: &Block, p: [f64; 3], d: [f64; 3], is_slab: bool) -> Option<usize> {
     let high = [block.width, block.width, block.depth];

@@ -2,7 +2,7 @@
 
 use super::common::{draw, exact, input, lamp, scattering, sun};
 use crate::common::{cubic, grid, noise, parallel, perspective, transfer, unlit, volume};
-use sheet_light::half::{HalfInput, HalfParams, reference};
+use sheet_light::half::{HalfInput, HalfParams, Scattering, reference};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::{Light, Material};
 
@@ -64,5 +64,34 @@ fn hv_volumes_that_overlap_shadow_each_other_as_in_the_twin() {
     for light in [sun([1.0, 3.0, 2.0]), sun([2.0, 1.0, -3.0])] {
         let [tau, color] = differences(&input(&volumes, &camera, &[light]), &exact(Some(0.1)));
         assert!(tau < 2e-5 && color < 2e-4, "{:?}: {tau:e} {color:e}", light.light.shape);
+    }
+}
+
+#[test]
+fn ms_scattered_light_is_that_of_the_twin() {
+    let tf = transfer(&[(0.2, 0.0), (0.5, 0.8), (0.8, 0.1), (0.9, 4.0)]);
+    let grid = grid([16, 14, 12], cubic(0.5), noise);
+    let camera = perspective([2.0, 3.0, 12.0], 40.0, [24, 20]);
+    let bright = {
+        let mut lit = lamp([6.0, 8.0, 9.0]);
+        lit.light = Light { intensity: [200.0, 100.0, 50.0], ..lit.light };
+        lit
+    };
+    for (asymmetry, albedo) in [(0.85, 1.0), (0.0, 0.7), (-0.4, 1.0)] {
+        let material = Material { asymmetry, single_scattering_albedo: albedo, ..scattering() };
+        let volumes = [volume(&grid, &tf, &material)];
+        for light in [sun([1.0, 3.0, 2.0]), sun([-1.0, 2.0, -3.0]), bright] {
+            for mode in [Scattering::Forward, Scattering::ForwardAndBack] {
+                let once = exact(Some(0.4));
+                let params = HalfParams { scattering: mode, voxels_per_cell: 12, ..once };
+                let lights = [light];
+                let input = input(&volumes, &camera, &lights);
+                let [tau, color] = differences(&input, &params);
+                assert!(tau < 2e-5 && color < 5e-4, "{mode:?}, g {asymmetry}, {:?}: {color:e}", light.light.shape);
+                let [one, more] = [once, params].map(|params| draw(&input, &params).unwrap().0);
+                let seen = |out: &splat_core::Accumulator| out.channels[1].iter().sum::<f32>();
+                assert!(seen(&more) > 1.01 * seen(&one), "{mode:?}, g {asymmetry}: nothing was scattered again");
+            }
+        }
     }
 }

@@ -135,6 +135,64 @@ mod tests {
         }
     }
 
+    /// Reflected and transmitted light of a beam of 1 on layers, scattered or not, and what two streams absorb.
+    fn lit(optics: &[Optics]) -> [f64; 3] {
+        let layers: Vec<Layer> = optics.iter().map(Layer::new).collect();
+        let n = layers.len();
+        let (mut beam, mut given) = (1.0, vec![0.0; n + 1]);
+        let mut absorbed = 0.0;
+        for (k, layer) in layers.iter().enumerate() {
+            given[k] += beam * layer.sources[0];
+            given[k + 1] += beam * layer.sources[1];
+            absorbed -= beam * (layer.sources[0] + layer.sources[1] + expm1(-optics[k].tau));
+            beam *= exp(-optics[k].tau);
+        }
+        let own = |k: Option<usize>| k.and_then(|k| layers.get(k)).map_or(1.0, |layer| layer.own);
+        let mut all: Vec<f64> = (0..=n).map(|k| own(k.checked_sub(1)) + own(Some(k))).collect();
+        for k in (0..n).rev() {
+            let share = layers[k].through / all[k + 1];
+            all[k] -= share * layers[k].through;
+            given[k] += share * given[k + 1];
+        }
+        let mut psi = vec![given[0] / all[0]];
+        for k in 0..n {
+            psi.push((given[k + 1] + layers[k].through * psi[k]) / all[k + 1]);
+        }
+        for (k, layer) in layers.iter().enumerate() {
+            absorbed += (layer.own - layer.through) * (psi[k] + psi[k + 1]);
+        }
+        [psi[0], psi[n] + beam, absorbed]
+    }
+
+    #[test]
+    fn ms02_energy_is_all_there_in_5_to_320_layers_and_what_comes_through_converges() {
+        for omega in [0.7, 1.0] {
+            // Means of a medium that changes on its way, τ 10 in all.
+            let medium = |n: u32| -> Vec<Optics> {
+                let depth = |z: f64| 10.0 * (z - 0.08 * libm::sin(8.0 * z) / 0.8) / (1.0 - 0.1 * libm::sin(8.0));
+                let layer = |k: u32| {
+                    let [near, far] = [k, k + 1].map(|k| f64::from(k) / f64::from(n));
+                    let omega = if omega == 1.0 { 1.0 } else { omega + 0.2 * libm::cos(5.0 * (near + far)) };
+                    Optics {
+                        tau: depth(far) - depth(near),
+                        omega,
+                        asymmetry: 0.2 + 0.2 * libm::sin(3.0 * (near + far)),
+                    }
+                };
+                (0..n).map(layer).collect()
+            };
+            let truth = lit(&medium(5120));
+            let found = [5, 10, 20, 40, 80, 160, 320].map(|n| lit(&medium(n)));
+            for all in found {
+                assert!((all.iter().sum::<f64>() - 1.0).abs() < 1e-9, "ω {omega}: {all:?}");
+                assert!(omega < 1.0 || all[2].abs() < 1e-9, "{all:?}");
+            }
+            let error = |n: usize| (found[n][1] - truth[1]).abs() + (found[n][0] - truth[0]).abs();
+            let order = libm::log2(error(1) / error(5)) / 4.0;
+            assert!(order > 0.9, "ω {omega}: order {order}, {found:?}, {truth:?}");
+        }
+    }
+
     #[test]
     fn layers_add_to_the_layer_of_their_thickness() {
         for omega in [0.0, 0.1, 0.5, 0.9, 0.999, 1.0] {
