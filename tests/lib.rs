@@ -122,9 +122,11 @@ pub fn mean_and_ripple(values: &[f64]) -> (f64, f64) {
 /// The layers that sum to beauty, of every technique that there is.
 pub const EFFECTS: [&str; 5] = ["background", "ambient", "emission", "direct", "scatter1"];
 
-/// The sum of [`EFFECTS`] in the channel `R`, `G` or `B`.
+/// The sum of [`EFFECTS`] in the channel `R`, `G` or `B`, and of `scatterN` where there is one.
 pub fn sum_of_effects(picture: &Picture, channel: &str) -> Vec<f64> {
-    let effects = EFFECTS.map(|effect| picture.channel(&format!("{effect}.{channel}")));
+    let names = EFFECTS.iter().chain(&["scatterN"]).map(|effect| format!("{effect}.{channel}"));
+    let kept = |name: &String| !name.starts_with("scatterN") || picture.channels.contains_key(name);
+    let effects: Vec<Vec<f64>> = names.filter(kept).map(|name| picture.channel(&name)).collect();
     (0..effects[0].len()).map(|k| effects.iter().map(|effect| effect[k]).sum()).collect()
 }
 

@@ -9,6 +9,9 @@ use rayon::prelude::*;
 use splat_core::shade::ChannelLayout;
 use splat_core::{Camera, Cloud, DepthProfile, Exceeded, Grid};
 
+/// Bytes that a point of a lattice that is made of an object is counted with.
+const BYTES_PER_LATTICE_POINT: u64 = 32;
+
 /// Bytes of a render by what takes them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Memory {
@@ -73,7 +76,10 @@ pub(crate) fn image_bytes(scene: &Scene) -> u64 {
 /// of each splat are there; before, each splat that was counted may take its most.
 pub(crate) fn loading_bytes(loaded: &Loaded, inputs: u64) -> u64 {
     let counted: u64 = loaded.splats.iter().map(|s| s.predicted.max(s.made)).sum();
-    inputs.saturating_add((2 * loaded.cloud.bytes()).max(counted.saturating_mul(BYTES_PER_SPLAT)))
+    // Lattices that are made of objects are held to as much as their splats could take.
+    let points = loaded.own.iter().filter_map(Own::grid).map(|grid| grid.values.len() as u64).max().unwrap_or(0);
+    let made = counted.saturating_mul(BYTES_PER_SPLAT).max(points.saturating_mul(BYTES_PER_LATTICE_POINT));
+    inputs.saturating_add((2 * loaded.cloud.bytes()).max(made))
 }
 
 /// Bytes of what is made for each splat: its attributes, order, footprint, tile entries and values.

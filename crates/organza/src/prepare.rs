@@ -122,12 +122,15 @@ fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Resu
     plan.draws = plan.by.iter().zip(&plan.is_own).map(|(by, own)| row(*by).draws_splats && !own).collect();
     let used = statistics.techniques.iter().filter(|t| statistics.translucent_of(**t).is_some());
     // They take turns, and each keeps what it has.
-    let own = used.map(|t| (row(*t).bytes)(scene, statistics.colored_extinction, options)).sum();
+    let points = lights::points(&loaded.lights);
+    let mut camera = loaded.camera;
+    camera.size = camera.size.map(|s| s.saturating_mul(scene.render.antialias));
+    let matter = Matter { scene, own: &loaded.own, planned: &plan.objects, camera: &camera };
+    let own = used.map(|t| (row(*t).bytes)(&matter, &points, statistics.colored_extinction, options)).sum();
     let memory = Memory::new(scene, loaded, own);
     memory::check("rendering", memory.total(), options.max_memory)?;
     let left = options.max_memory - memory.total();
     // Shadow maps share what is left.
-    let points = lights::points(&loaded.lights);
     let others = loaded.objects_beside_own();
     carried::plan(scene, loaded, &points, &mut plan)?;
     let wanted = carried::wanted_maps(loaded, &points, &others, &plan);

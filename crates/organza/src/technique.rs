@@ -15,7 +15,8 @@ pub(crate) mod sheets;
 
 use crate::form::{DRAWN, Form};
 use crate::frame::Frame;
-use crate::matter::CarriesLight;
+use crate::lights::LightPoint;
+use crate::matter::{CarriesLight, Matter};
 use crate::pass;
 use crate::scene::{Scene, Technique};
 use crate::stage;
@@ -51,7 +52,7 @@ pub(crate) struct Row {
     /// Whether its picture is an average of random sets, which a checkpoint can keep.
     pub(crate) is_random: bool,
     /// Bytes that it takes beside what all techniques take.
-    pub(crate) bytes: fn(&Scene, colored_extinction: bool, &RenderOptions) -> u64,
+    pub(crate) bytes: fn(&Matter<'_>, &[LightPoint], colored_extinction: bool, &RenderOptions) -> u64,
     /// How it carries light through what it draws by itself, where a scene asks for that; `None` where shadow maps have all light.
     pub(crate) carries: fn(&Scene) -> Option<CarriesLight>,
     /// Begins a frame.
@@ -130,7 +131,7 @@ pub(crate) static TABLE: [Row; 4] = [
             Step { pass: pass::SPLAT, stage: stage::COMPOSITE, seconds: |_, all| cost::FRAGMENT * all.fragments },
         ],
         is_random: false,
-        bytes: |_, _, _| 0,
+        bytes: |_, _, _, _| 0,
         carries: |_| None,
         begin: points::begin,
     },
@@ -144,7 +145,7 @@ pub(crate) static TABLE: [Row; 4] = [
         draws_splats: false,
         steps: &[Step { pass: pass::PARTICLES, stage: stage::PARTICLES, seconds: particles::seconds }],
         is_random: true,
-        bytes: particles::bytes,
+        bytes: |matter, _, colored, options| particles::bytes(matter.scene, colored, options),
         carries: |_| None,
         begin: particles::begin,
     },
@@ -158,7 +159,7 @@ pub(crate) static TABLE: [Row; 4] = [
         draws_splats: true,
         steps: &[Step { pass: pass::SHEETS, stage: stage::SHEETS, seconds: sheets::seconds }],
         is_random: false,
-        bytes: |_, _, _| 0,
+        bytes: sheets::bytes,
         carries: sheets::carries,
         begin: sheets::begin,
     },
@@ -176,7 +177,7 @@ pub(crate) static TABLE: [Row; 4] = [
             seconds: |_, all| cost::EXACT_FRAGMENT * all.fragments,
         }],
         is_random: false,
-        bytes: reference::bytes,
+        bytes: |matter, _, _, _| reference::bytes(matter.scene),
         carries: |_| None,
         begin: reference::begin,
     },

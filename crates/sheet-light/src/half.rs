@@ -74,7 +74,7 @@ mod sweep;
 
 pub use axis::HalfVector;
 pub use counts::HalfCounts;
-pub use fold::{balance, fold, slab_width};
+pub use fold::{balance, bytes, fold, slab_width};
 pub use params::{HalfInput, HalfParams, Scattering};
 pub use scatter::balance::Balance;
 pub use serves::{LEAST_COSINE, Reason, serves};

@@ -6,7 +6,7 @@ use crate::frame::{Frame, Shaded};
 use crate::pass;
 use crate::scene::{Scene, Technique};
 use crate::technique::{Fold, Session};
-use crate::{CostRecord, Error, RenderOptions, stage};
+use crate::{CostRecord, Error, stage};
 use reference::{Fragment, Input, Order, fold_fragments};
 use splat_core::shade::ChannelLayout;
 use splat_core::{Accumulator, Cloud, DepthFragment, DepthProfile, SplatKind};
@@ -16,7 +16,7 @@ use std::ops::Range;
 const SAMPLE_BYTES: u64 = 512;
 
 /// Bytes of the pixels of a row of tasks.
-pub(crate) fn bytes(scene: &Scene, _: bool, _: &RenderOptions) -> u64 {
+pub(crate) fn bytes(scene: &Scene) -> u64 {
     let samples = scene.camera.size.map(|s| u64::from(s) * u64::from(scene.render.antialias));
     SAMPLE_BYTES * samples[0] * samples[1]
 }

@@ -9,6 +9,7 @@ mod half;
 
 use crate::form::Form;
 use crate::frame::{Frame, Shaded};
+use crate::lights::LightPoint;
 use crate::load::own::Body;
 use crate::matter::Matter;
 use crate::pass;
@@ -46,6 +47,11 @@ pub(crate) fn seconds(scene: &Scene, all: &Translucent) -> f64 {
 
 pub(crate) use half::carries;
 
+/// Bytes of sheets of all slabs at once, and of lists of voxels; those across the view count theirs when they make them.
+pub(crate) fn bytes(matter: &Matter<'_>, points: &[LightPoint], _: bool, options: &RenderOptions) -> u64 {
+    if half::is_asked(matter.scene) { half::bytes(matter, points, options) } else { 0 }
+}
+
 /// Begins a frame.
 pub(crate) fn begin<'a>(frame: &'a Frame<'a>) -> Box<dyn Fold + 'a> {
     Box::new(Sheets { frame, sheeted: None })
@@ -68,7 +74,7 @@ impl Fold for Sheets<'_> {
     ) -> Result<(), Error> {
         let frame = self.frame;
         if half::is_asked(frame.scene) {
-            return half::draw(frame, params(frame, session.options), into, session, cost);
+            return half::draw(frame, into, session, cost);
         }
         let opaque = frame.opaque(cost)?;
         if self.sheeted.is_none() {
@@ -105,7 +111,7 @@ fn sheeted<'a>(frame: &'a Frame<'a>, options: &RenderOptions, cost: &mut CostRec
         shadow_origin: frame.loaded.cloud.origin,
         ambient: frame.scene.ambient,
     };
-    let params = params(frame, options);
+    let params = params(frame.scene, frame.loaded.exponent, options);
     cost.measure(pass::SHEETS, |stage| {
         stage.items_in = input.volumes.iter().map(|v| v.grid.values.len() as u64).sum();
         let sheeted = prepare(input, &params, Some(frame.progress)).map_err(|e| refuse(frame, e))?;
@@ -134,15 +140,18 @@ impl<'a> Frame<'a> {
         let unit = libm::exp2(f64::from(self.loaded.exponent));
         Ok(match none {
             true => None,
-            false if half::is_asked(self.scene) => Some(half::width(self, &params(self, options))? * unit),
+            false if half::is_asked(self.scene) => {
+                Some(half::width(self, &params(self.scene, self.loaded.exponent, options))? * unit)
+            }
             false => Some(sheeted(self, options, cost)?.slabs().1 * unit),
         })
     }
 }
 
-fn params(frame: &Frame<'_>, options: &RenderOptions) -> Params {
-    let settings = &frame.settings.sheets;
-    let unit = libm::exp2(f64::from(-frame.loaded.exponent));
+/// Parameters of sheets, for lengths that are a 2^`exponent`th of the scene's.
+fn params(scene: &Scene, exponent: i32, options: &RenderOptions) -> Params {
+    let settings = &scene.render.sheets;
+    let unit = libm::exp2(f64::from(-exponent));
     Params {
         slab_width: settings.slab_width.map(|width| width * unit),
         kernel: KernelShape { extent: settings.kernel_extent, sigma: settings.kernel_sigma },

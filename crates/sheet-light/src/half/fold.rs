@@ -9,7 +9,7 @@ use super::sweep::Sweep;
 use super::{HalfInput, HalfParams, Scattering, lamp};
 use crate::lattice::Lattice;
 use crate::visible::Voxels;
-use crate::{Error, Params, Volume};
+use crate::{Error, Params, SheetInput, Volume};
 use splat_core::shade::{ChannelLayout, LitBy};
 use splat_core::{Accumulator, Camera, Light, Progress};
 
@@ -123,12 +123,28 @@ fn check(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
     check_memory(input, params)
 }
 
-/// Counts what one sweep will take before it does.
+/// Refuses what takes more than it may, before it does.
 fn check_memory(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
-    let volumes = &input.sheets.volumes;
+    let SheetInput { volumes, camera, lights, .. } = &input.sheets;
+    let needed = bytes(volumes, camera, lights.iter().map(|lit| &lit.light), params);
+    let limit = params.sheets.limits.max_bytes;
+    let hint = || "use fewer voxels, a smaller picture or fewer pixels of the light buffer".to_owned();
+    if needed > limit { Err(Error::limit("half-vector sheets", needed, limit, "bytes", hint())) } else { Ok(()) }
+}
+
+/// Bytes that [`fold`] takes at most for such lights, of which sweeps follow one another.
+pub fn bytes<'l>(
+    volumes: &[Volume<'_>],
+    camera: &Camera,
+    lights: impl Iterator<Item = &'l Light>,
+    params: &HalfParams,
+) -> u64 {
+    if volumes.is_empty() {
+        return 0;
+    }
     // Of a pixel: rays, sheets, sums.
     let of_a_pixel = 4 * (5 + 12 * volumes.len() as u64);
-    let [width, height] = input.sheets.camera.size.map(u64::from);
+    let [width, height] = camera.size.map(u64::from);
     let sheets = if volumes.iter().any(|v| v.normals) { 3 } else { 1 };
     let eye =
         width * height * (of_a_pixel + 4 * 6 * sheets * volumes.len() as u64 + 160) * (ROWS as u64 + 2) / ROWS as u64;
@@ -144,12 +160,7 @@ fn check_memory(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error>
         let all: u64 = volumes.iter().map(|v| v.grid.values.len() as u64).sum();
         2 * (all / u64::from(params.voxels_per_cell) + 1) * 350
     };
-    // Sweeps follow one another.
     let pixels =
-        |lit: &LitBy<'_>| lamp::camera_of(volumes, &lit.light, params).size.into_iter().map(u64::from).product::<u64>();
-    let lights = of_a_pixel * input.sheets.lights.iter().map(pixels).max().unwrap_or(0);
-    let needed = eye + lights + cells + volumes.iter().map(voxels).sum::<u64>();
-    let limit = params.sheets.limits.max_bytes;
-    let hint = || "use fewer voxels, a smaller picture or fewer pixels of the light buffer".to_owned();
-    if needed > limit { Err(Error::limit("half-vector sheets", needed, limit, "bytes", hint())) } else { Ok(()) }
+        |light: &Light| lamp::camera_of(volumes, light, params).size.into_iter().map(u64::from).product::<u64>();
+    eye + of_a_pixel * lights.map(pixels).max().unwrap_or(0) + cells + volumes.iter().map(voxels).sum::<u64>()
 }

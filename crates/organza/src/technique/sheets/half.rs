@@ -2,7 +2,7 @@
 //!
 //! Light that no half vector serves has a shadow map, as in slabs across the view, and joins the first sweep.
 
-use super::{refuse, volumes};
+use super::{params, refuse, volumes};
 use crate::form::{Form, PlannedObject};
 use crate::frame::Frame;
 use crate::lights::LightPoint;
@@ -10,8 +10,8 @@ use crate::matter::{Carries, CarriesLight, Matter};
 use crate::pass;
 use crate::scene::{self, Scene, Slicing, Technique};
 use crate::technique::Session;
-use crate::{CostRecord, Error, stage};
-use sheet_light::half::{HalfInput, HalfParams, Reason, Scattering, fold, serves, slab_width};
+use crate::{CostRecord, Error, RenderOptions, stage};
+use sheet_light::half::{self, HalfInput, HalfParams, Reason, Scattering, fold, serves, slab_width};
 use sheet_light::{Params, SheetInput, Volume};
 use splat_core::Accumulator;
 use splat_core::shade::LitBy;
@@ -55,22 +55,31 @@ fn points_served(matter: &Matter<'_>, points: &[LightPoint]) -> Result<Carries, 
     Ok(Carries { points, scatters_again: matter.scene.render.sheets.scattering().is_some() })
 }
 
+/// Bytes of the largest sweep.
+pub(super) fn bytes(matter: &Matter<'_>, points: &[LightPoint], options: &RenderOptions) -> u64 {
+    let volumes: Vec<Volume<'_>> = volumes(matter).collect();
+    // Of counts alone: no length among the parameters plays a part.
+    let params = half_params(matter.scene, params(matter.scene, 0, options));
+    let served = points.iter().map(|point| &point.light).filter(|light| serves(&volumes, matter.camera, light).is_ok());
+    half::bytes(&volumes, matter.camera, served, &params)
+}
+
 /// Draws all volumes into a segment of its own.
 pub(super) fn draw(
     frame: &Frame<'_>,
-    params: Params,
     into: &mut Accumulator,
     session: &mut Session<'_>,
     cost: &mut CostRecord,
 ) -> Result<(), Error> {
     let opaque = frame.opaque(cost)?;
     let input = input(frame, &opaque.depth, cost)?;
+    let params = half_params(frame.scene, params(frame.scene, frame.loaded.exponent, session.options));
     super::warn(frame, &input.sheets.volumes, session.warnings);
     frame.progress.begin(stage::SHEETS);
     frame.tick()?;
     cost.measure(pass::SHEETS, |stage| {
         let mut segment = frame.accumulator();
-        let drawn = fold(&input, &half_params(frame, params), &frame.layout(), &mut segment, Some(frame.progress));
+        let drawn = fold(&input, &params, &frame.layout(), &mut segment, Some(frame.progress));
         let counts = drawn.map_err(|e| refuse(frame, e))?;
         stage.items_in = counts.voxels;
         stage.items_out = counts.visible;
@@ -115,9 +124,9 @@ fn input<'a>(frame: &'a Frame<'a>, opaque: &'a [f32], cost: &mut CostRecord) -> 
     Ok(HalfInput { sheets, mapped, opaque })
 }
 
-fn half_params(frame: &Frame<'_>, sheets: Params) -> HalfParams {
+fn half_params(scene: &Scene, sheets: Params) -> HalfParams {
     let plain = HalfParams { sheets, ..HalfParams::default() };
-    match frame.settings.sheets.slicing {
+    match scene.render.sheets.slicing {
         Slicing::View => plain,
         Slicing::HalfVector { light_pixels, most_light_pixels, scattering } => {
             let plain = HalfParams { light_pixels, most_light_pixels, ..plain };
