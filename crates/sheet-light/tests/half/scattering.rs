@@ -302,7 +302,7 @@ fn ms10_no_light_passes_an_opaque_wall() {
     let opaque = [9.0f32; 576];
     let seen = |n: usize| {
         let whole = input(&volumes, &camera, &lights[n..=n]);
-        let out = draw_apart(&HalfInput { sheets: whole.sheets, opaque: &opaque }, &params).0;
+        let out = draw_apart(&HalfInput { opaque: &opaque, ..whole }, &params).0;
         [ONCE, MORE].map(|c| out.channels[c].iter().copied().fold(0.0, f32::max))
     };
     assert_eq!(seen(0), [0.0; 2]);
