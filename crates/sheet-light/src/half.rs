@@ -18,6 +18,7 @@
 //! | 18: map each pixel to the shadow buffer | `illuminate.rs`, `light_path.rs` |
 //! | 21: classify and composite into the shadow buffer | `light_buffer.rs` |
 //! | the loop over slabs | `sweep.rs` |
+//! | section 3: light that is scattered more than once | `scatter.rs` |
 //!
 //! ```
 //! use sheet_light::half::{HalfInput, HalfParams, fold};

@@ -9,7 +9,7 @@
 //! | means of the media in the cells | `medium.rs` |
 //! | Eqs. 3 and 5, forward: marched ahead, a convolution a layer | `beam.rs`, `blur.rs` |
 //! | Eq. 4, back and forth: two streams in a layer | `layer.rs` |
-//! | … in all columns | `streams.rs` |
+//! | … in all columns | `streams.rs`, `slant.rs` |
 //! | … added from the far side to the light, and back | `adding.rs` |
 //! | where the power stays | `balance.rs` |
 //! | Eq. 2: radiance towards the eye | [`Scattered::radiance`] |
@@ -22,6 +22,7 @@ pub(crate) mod grid;
 mod layer;
 pub(crate) mod medium;
 pub(crate) mod phase;
+pub(crate) mod slant;
 pub(crate) mod streams;
 
 use super::{HalfParams, Scattering, lamp};

@@ -41,7 +41,7 @@ fn slabs_reflect_and_let_through_what_paths_do() {
                 let found = block(&slab, tau as f32 / 2.0, &material, &sun([0.0, 0.0, 1.0]), &params(BOTH));
                 let [back, through] = [found.reflected, found.transmitted].map(|v| v[0] / found.incident[0]);
                 let what = format!("τ {tau}, ω {albedo}, g {asymmetry}: {back} {through}, not {expected:?}");
-                assert!((back - expected[0]).abs() < 0.05 && (through - expected[1]).abs() < 0.05, "{what}");
+                assert!((back - expected[0]).abs() < 0.02 && (through - expected[1]).abs() < 0.02, "{what}");
             }
         }
     }
@@ -72,8 +72,8 @@ fn cubes_lose_by_the_sides_what_paths_do() {
             let found = block(&cube, tau as f32 / 8.0, &material, &sun([0.0, 0.0, 1.0]), &params(BOTH));
             let shares = [found.reflected, found.transmitted, found.sides].map(|v| v[0] / found.incident[0]);
             let worst = (0..3).map(|n| (shares[n] - expected[n]).abs()).fold(0.0, f64::max);
-            // Two streams along the light know little of thin cubes: an eighth is the worst, of what goes ahead.
-            assert!(worst < 0.125, "τ {tau}, ω {albedo}, g {asymmetry}: {shares:?}, not {expected:?}");
+            // Two streams along the light know little of thin cubes, and their edges are taken for slanted surfaces.
+            assert!(worst < 0.15, "τ {tau}, ω {albedo}, g {asymmetry}: {shares:?}, not {expected:?}");
         }
     }
 }
@@ -95,7 +95,7 @@ fn faces_of_a_cube_are_as_bright_as_by_paths() {
             let all = (mean(ONCE) + mean(MORE), expected[0] + expected[1]);
             let what = format!("τ {tau}, g {asymmetry}, {face:?}: {} and {}, not {expected:?}", mean(ONCE), mean(MORE));
             assert!((mean(ONCE) - expected[0]).abs() < 0.01 * all.1 + 1e-4, "{what}");
-            assert!((all.0 / all.1 - 1.0).abs() < 0.3, "{what}");
+            assert!((all.0 / all.1 - 1.0).abs() < 1.0 / 3.0, "{what}");
         }
     }
 }

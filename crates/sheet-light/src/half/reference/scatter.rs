@@ -260,7 +260,8 @@ impl Diffuse {
         let beyond = if side.is_multiple_of(2) { before(here) } else { behind(here) };
         let stops = 1.0 - libm::exp(-1.5 * tau(here));
         let thin = libm::exp(-0.75 * (0..count).map(tau).sum::<f64>());
-        let open = wall * beyond * stops * (0.423 + 0.577 * stops.max(thin)) / (1.0 + 0.75 * tau(here));
+        let open = self.slant([x, y, layer], c) * wall * beyond * stops * (0.423 + 0.577 * stops.max(thin))
+            / (1.0 + 0.75 * tau(here));
         let next = if side.is_multiple_of(2) { here.checked_sub(1) } else { Some(here + 1).filter(|n| *n < count) };
         let across = next.map_or(0.0, |next| {
             let (low, high) = (here.min(next), here.max(next));
@@ -269,6 +270,33 @@ impl Diffuse {
             wall * (1.0 - behind(low)) * (1.0 - before(high)) / (1.5 * optical)
         });
         [across, open]
+    }
+
+    /// Share of the stairs' area that is the surface's, by the gradient of the media about a cell.
+    fn slant(&self, at: [usize; 3], c: usize) -> f64 {
+        let grid = self.grid;
+        let counts = [grid.columns[0], grid.columns[1], grid.layers].map(|n| n as isize);
+        let mean = |at: [isize; 3]| {
+            let mut sum = 0.0;
+            for n in 0..27 {
+                let steps = [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1];
+                let next = [0, 1, 2].map(|a| at[a] + steps[a]);
+                if (0..3).all(|a| (0..counts[a]).contains(&next[a]) && (0..counts[a]).contains(&at[a])) {
+                    let weight: f64 = steps.iter().map(|n| scatter::slant::WEIGHTS[n.unsigned_abs()]).product();
+                    let cell = self.cell(next[0] as usize, next[1] as usize, next[2] as usize);
+                    sum += weight * f64::from((cell.extinction[c] - cell.forward[c]).max(0.0));
+                }
+            }
+            sum
+        };
+        let spread = grid.spread(at[2] as f64 + 0.5);
+        let sizes = [grid.step[0] * spread, grid.step[1] * spread, grid.depth];
+        let slope = |a: usize| {
+            let (mut before, mut behind) = (at.map(|n| n as isize), at.map(|n| n as isize));
+            (before[a], behind[a]) = (before[a] - 1, behind[a] + 1);
+            (mean(behind) - mean(before)) / sizes[a]
+        };
+        scatter::slant::of_normal([0, 1, 2].map(slope))
     }
 
     fn weigh(&mut self) {

@@ -87,7 +87,9 @@ impl<'a> Lattice<'a> {
 
 /// The cells of a light, row by row, layer by layer in a row.
 pub(crate) fn cells(grid: &LightGrid, volumes: &[Volume<'_>], scattering: Scattering) -> Vec<Cell> {
-    let lattices: Vec<Lattice<'_>> = volumes.iter().map(|volume| Lattice::new(volume, scattering)).collect();
+    // What casts no shadow takes no light that others would get.
+    let casters = volumes.iter().filter(|volume| volume.casts_shadow);
+    let lattices: Vec<Lattice<'_>> = casters.map(|volume| Lattice::new(volume, scattering)).collect();
     let mut out = vec![Cell::default(); grid.cells()];
     let row = grid.layers * grid.columns[0];
     out.par_chunks_mut(row).enumerate().for_each(|(y, cells)| {

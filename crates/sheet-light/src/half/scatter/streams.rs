@@ -8,6 +8,7 @@
 use super::grid::LightGrid;
 use super::layer::{Layer, Optics};
 use super::medium::Cell;
+use super::slant;
 use rayon::prelude::*;
 
 /// Share of the grid's width that is the longest mean free path on which light flows between columns.
@@ -70,7 +71,7 @@ pub(crate) fn optics(cell: &Cell, channel: usize, length: f64) -> Optics {
 }
 
 /// σ_tr = σ_t − σ_s·g.
-fn transport(cell: &Cell, channel: usize) -> f64 {
+pub(crate) fn transport(cell: &Cell, channel: usize) -> f64 {
     f64::from((cell.extinction[channel] - cell.forward[channel]).max(0.0))
 }
 
@@ -120,23 +121,30 @@ impl Streams {
     /// Fills in what goes between columns and out by the sides.
     fn add_sides(&mut self, of: &Sources<'_>) {
         let ([width, height], layers) = (self.columns, self.layers);
+        let mut open = vec![[0.0; SIDES]; self.own.len()];
+        let mut line = Line::default();
         for direction in 0..2 {
-            let (count, step) = if direction == 0 { (width, 1) } else { (height, layers * width) };
-            let lines = if direction == 0 { height } else { width };
-            let mut line = Line::default();
-            for (layer, n) in (0..layers).flat_map(|layer| (0..lines).map(move |n| (layer, n))) {
-                let start = layer * width + if direction == 0 { n * layers * width } else { n };
+            let (count, step) = [(width, 1), (height, layers * width)][direction];
+            for start in (0..self.own.len()).filter(|at| (at / step).is_multiple_of(count)) {
                 line.set(of, direction, [start, step, count]);
                 for i in 0..count {
-                    let [x, y] = if direction == 0 { [i, n] } else { [n, i] };
+                    let cell = start + i * step;
+                    open[cell][2 * direction] = line.open[0][i];
+                    open[cell][2 * direction + 1] = line.open[1][i];
                     // Half of a layer belongs to each of its faces.
-                    for face in [layer, layer + 1] {
-                        let at = (y * (layers + 1) + face) * width + x;
-                        self.across[direction][at] += 0.5 * line.across[i];
-                        self.open[at][2 * direction] += 0.5 * line.open[0][i];
-                        self.open[at][2 * direction + 1] += 0.5 * line.open[1][i];
-                    }
+                    let face = cell + cell / (layers * width) * width;
+                    self.across[direction][face] += 0.5 * line.across[i];
+                    self.across[direction][face + width] += 0.5 * line.across[i];
                 }
+            }
+        }
+        let shares = slant::shares(of);
+        for (cell, open) in open.iter().enumerate() {
+            let share = 0.5 * shares[cell];
+            let face = cell + cell / (layers * width) * width;
+            for side in 0..SIDES {
+                self.open[face][side] += share * open[side];
+                self.open[face + width][side] += share * open[side];
             }
         }
     }
@@ -221,7 +229,7 @@ impl Line {
         let layer = start / grid.columns[0] % grid.layers;
         let spread = grid.spread(layer as f64 + 0.5);
         let (along, height) = (grid.step[direction] * spread, grid.step[1 - direction] * spread * grid.depth);
-        let thinnest = along / (LONGEST_WAY * spread * grid.step[direction] * grid.columns[direction] as f64);
+        let thinnest = 1.0 / (LONGEST_WAY * count as f64);
         let tau = |i: usize| transport(&of.cells[start + i * step], of.channel) * along;
         self.optical.clear();
         self.optical.extend((0..count).map(tau));
