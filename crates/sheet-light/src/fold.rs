@@ -4,6 +4,7 @@ use crate::classify::Classifier;
 use crate::counts::SheetCounts;
 use crate::error::cancelled;
 use crate::lattice::Lattice;
+use crate::light::Lamp;
 use crate::rays::LatticeRays;
 use crate::ring::{Ring, Splatter, Taper};
 use crate::sections::SectionTable;
@@ -48,6 +49,7 @@ pub struct Sheeted<'a> {
     pub(crate) params: Params,
     pub(crate) slabs: Slabs,
     pub(crate) volumes: Vec<Prepared<'a>>,
+    pub(crate) lamps: Vec<Lamp>,
     /// Lists of splats by square of the image.
     pub(crate) bins: Option<Bins>,
     pub(crate) tiles: [usize; 2],
@@ -82,7 +84,8 @@ pub fn prepare<'a>(input: SheetInput<'a>, params: &Params, progress: Option<&Pro
     let bins = input.splats.as_ref().map(Splats::bin);
     let touched = volumes.iter().map(|v| v.sections.touched as u32).max().unwrap_or(1);
     let has_gradients = input.volumes.iter().any(|v| v.normals);
-    Ok(Sheeted { input, params: *params, slabs, volumes, bins, tiles, touched, has_gradients })
+    let lamps = Lamp::all(&input, slabs.origin);
+    Ok(Sheeted { input, params: *params, slabs, volumes, lamps, bins, tiles, touched, has_gradients })
 }
 
 /// Slabs between the nearest corner of a volume, or the nearest splat, before the eye and the farthest.

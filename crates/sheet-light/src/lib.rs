@@ -55,6 +55,7 @@ mod error;
 mod fold;
 pub mod half;
 mod lattice;
+mod light;
 mod params;
 mod picture;
 mod queue;

@@ -4,12 +4,12 @@ use crate::fold::slabs_of;
 use crate::lattice::Lattice;
 use crate::rays::LatticeRays;
 use crate::sections::{PHASES, sections};
-use crate::shade::{Sample, Seen, radiance};
 use crate::slabs::Slabs;
 use crate::viewed::Viewed;
 use crate::{Error, Params, SheetInput, Volume};
-use splat_core::Footprint;
 use splat_core::glam::{DVec3, Vec3};
+use splat_core::shade::{Point, arriving};
+use splat_core::{Footprint, Receiver, SplatKind};
 
 /// What it draws.
 #[derive(Debug, Clone, PartialEq)]
@@ -152,11 +152,17 @@ impl Sheets {
         let tau = extinction * (far - near) * along.length();
         let normal = if volume.normals { self.normal(input, slabs, slab, at, along) } else { Vec3::ZERO };
         let viewed = Viewed::new(volume, input.camera, slabs, params);
-        let place = from + along * (slabs.origin + 0.5 * (near + far));
-        let seen = Seen::new(input.camera, place, along);
-        let sample = Sample { volume, radius: viewed.reach as f32, seen, color: class.color, normal };
-        let radiance = radiance(input, &sample, |light| sample.transmittance(input, light)).effects();
-        (tau, [0, 1, 2].map(|c| radiance.iter().map(|effect| f64::from(effect[c])).sum()))
+        let axes = input.camera.axes;
+        let world = |v: DVec3| axes[0] * v.x + axes[1] * v.y + axes[2] * v.z;
+        let point = Point {
+            position: input.camera.position + world(from + along * (slabs.origin + 0.5 * (near + far))),
+            radius: viewed.reach as f32,
+            normal,
+            to_eye: -world(along).normalize().as_vec3(),
+            color: class.color,
+            material: volume.material,
+        };
+        (tau, radiance(input, volume, &point))
     }
 
     /// −∇v/|∇v| in world space, from the neighbours that are inside.
@@ -182,4 +188,19 @@ impl Sheets {
         let gradient = camera.axes[0] * gx + camera.axes[1] * gy + camera.axes[2] * (z - along.x * gx - along.y * gy);
         -(gradient * slabs.width).normalize_or_zero().as_vec3()
     }
+}
+
+/// Radiance of a point of a volume, all effects together.
+fn radiance(input: &SheetInput<'_>, volume: &Volume<'_>, point: &Point<'_>) -> [f64; 3] {
+    let lights = input.lights.iter().map(|lit| &lit.light);
+    let radiance = point.radiance(input.ambient, lights, |rank, irradiance| {
+        let shadow = input.lights[rank].shadow.map(|shadow| {
+            let position = (point.position - input.shadow_origin).as_vec3();
+            let kind = SplatKind::Medium;
+            move || shadow.transmittance(&Receiver { position, normal: Vec3::ZERO, radius: point.radius, kind })
+        });
+        arriving(irradiance, volume.shadow_coefficient, shadow)
+    });
+    let effects = radiance.effects();
+    [0, 1, 2].map(|c| effects.iter().map(|effect| f64::from(effect[c])).sum())
 }

@@ -7,7 +7,7 @@ use crate::picture::{Fragments, Picture};
 use crate::queue::Queue;
 use crate::rays::{Crossings, Slopes};
 use crate::ring::Ring;
-use crate::shade::{Place, Reconstructed, Shader, is_lit_by_place};
+use crate::shade::{Place, Reconstructed, Shader};
 use crate::sheets::Sheets;
 use crate::slabs::BATCH;
 use crate::splats::{Drawn, SplatSheet};
@@ -104,7 +104,7 @@ impl pulp::WithSimd for FoldTile<'_> {
             counts.tiles_skipped = 1;
             return (None, counts);
         }
-        let slopes = Slopes::new(of.input.camera, corner);
+        let slopes = Slopes::new(of.input.camera, corner, of.slabs.origin);
         for (prepared, scratch) in of.volumes.iter().zip(&mut self.scratch.volumes) {
             scratch.crossings.of_tile(&prepared.rays, &slopes);
             scratch.ring.clear();
@@ -173,7 +173,7 @@ impl<'a> FoldTile<'a> {
             layout: self.layout,
             slopes,
             axes: of.input.camera.axes.map(|a| a.as_vec3()),
-            is_lit_by_place: is_lit_by_place(&of.input),
+            lamps: &of.lamps,
         };
         let behind = u32::from(of.has_gradients);
         // Sheets are shaded one later than they are finished where gradients need the one behind.
