@@ -21,6 +21,8 @@ pub(crate) struct Queue {
     segments: Vec<Segment>,
     starts: Vec<u32>,
     first: u32,
+    /// Slabs that hold any of their kernels.
+    pub(crate) active: Range<u32>,
     /// Voxels by batch, modulo the batches that a segment may span.
     voxels: Vec<Vec<Record>>,
     /// Those of the batch that was taken last.
@@ -36,6 +38,7 @@ impl Queue {
             segments: Vec::new(),
             starts: Vec::new(),
             first: 0,
+            active: 0..0,
             voxels: vec![Vec::new(); span],
             taken: Vec::new(),
         }
@@ -53,12 +56,16 @@ impl Queue {
         self.found.clear();
         self.starts.clear();
         self.starts.resize(batches.len() + 2, 0);
+        self.active = u32::MAX..0;
         for segment in of.segments.tile(t) {
             let start = of.viewed.position(segment.eighth * SEGMENT, segment.j, segment.k);
             let end = start + of.viewed.axes.x_axis * (SEGMENT - 1) as f64;
-            let batch = |z: f64| of.viewed.place(z as f32).map_or(0, |place| place / (PHASES * BATCH));
-            let nearest = batch(start.z.min(end.z)).max(batches.start);
-            if nearest < batches.end && batch(start.z.max(end.z)) >= batches.start {
+            let slab = |z: f64| of.viewed.place(z as f32).map_or(0, |place| place / PHASES);
+            let [begin, last] = [slab(start.z.min(end.z)), slab(start.z.max(end.z))];
+            let nearest = (begin / BATCH).max(batches.start);
+            if nearest < batches.end && last / BATCH >= batches.start {
+                let end = last + of.sections.touched as u32;
+                self.active = self.active.start.min(begin)..self.active.end.max(end);
                 self.starts[(nearest - batches.start) as usize + 2] += 1;
                 self.found.push((nearest - batches.start, segment));
             }

@@ -1,11 +1,11 @@
 //! Shading of finished sheets: classification, gradients, radiance, and the mix of volumes that share a slab.
 
 use crate::fold::Prepared;
+use crate::kept::Kept;
 use crate::light::{Lamp, Lit, Reflector, Spots, dot};
 use crate::picture::{Fragments, Picture};
 use crate::rays::{Crossings, Slopes};
 use crate::sheets::{LEAST_WEIGHT, Sheets, difference};
-use crate::slabs::Slabs;
 use crate::tile::{SIDE, TILE};
 use crate::volume::{SheetInput, Volume};
 use splat_core::Shading;
@@ -17,15 +17,23 @@ use splat_core::shade::{ChannelLayout, MAX_CHANNELS};
 /// Neighbouring pixels of one row, from column x of the tile with its rim on.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Place {
+    /// Of the volume's own slabs.
     pub(crate) slab: u32,
     pub(crate) y: usize,
     pub(crate) x: usize,
 }
 
+impl Place {
+    /// Of the tile with its rim.
+    #[inline(always)]
+    pub(crate) fn pixel(self) -> usize {
+        self.y * SIDE + self.x
+    }
+}
+
 /// What shading reads beside the sheets.
 pub(crate) struct Shader<'a> {
     pub(crate) input: &'a SheetInput<'a>,
-    pub(crate) slabs: &'a Slabs,
     pub(crate) layout: &'a ChannelLayout,
     pub(crate) slopes: &'a Slopes,
     /// The camera's, in single precision.
@@ -40,14 +48,20 @@ pub(crate) struct Reconstructed<'a> {
     pub(crate) sheets: &'a Sheets,
     /// View depths between which each pixel of the tile without its rim may have light, counted from the first slab.
     pub(crate) limits: [&'a [f32]; 2],
+    /// Depths between which the volume is shaded, counted from the first slab.
+    pub(crate) faces: [f32; 2],
+    /// Whether that is not the whole of its own slab.
+    pub(crate) is_part: bool,
 }
 
-/// What one volume has in neighbouring pixels of one slab.
+/// What one volume has in neighbouring pixels between two depths.
 struct Medium<S: Simd> {
     near: Lanes<S>,
     far: Lanes<S>,
-    /// Extinction times the way along the view axis.
+    /// Optical depth.
     depth: Lanes<S>,
+    /// Length of each ray per unit of view depth.
+    secant: Lanes<S>,
     color: [Lanes<S>; 3],
 }
 
@@ -70,38 +84,34 @@ impl Shader<'_> {
         of: &Reconstructed<'_>,
         place: Place,
         picture: &Picture,
-        fragments: &mut Fragments,
+        (kept, fragments): (&mut Kept, &mut Fragments),
     ) {
-        let medium = self.classify(simd, of, place);
-        let secant = self.secants(simd, place);
-        let depth = medium.depth * secant;
-        let zero = Lanes::splat(simd, 0.0);
-        if !zero.any_less(depth) {
+        let medium = self.classify(simd, of, place, of.faces);
+        if !Lanes::splat(simd, 0.0).any_less(medium.depth) {
             return;
         }
-        let mut tau = [0.0; MAX_LANES];
-        depth.store(&mut tau);
         let is_first = !fragments.any;
         fragments.any = true;
-        let mut values = [[0.0; MAX_LANES]; MAX_CHANNELS];
+        let mut own = [[0.0; MAX_LANES]; MAX_CHANNELS];
+        let values = if is_first { &mut fragments.values } else { &mut own };
         let is_plain = of.prepared.volume.material.shading == Shading::Unlit && self.layout.count() == 3;
         if is_plain {
             for c in 0..3 {
                 (medium.color[c] + Lanes::splat(simd, of.prepared.volume.material.emission[c])).store(&mut values[c]);
             }
+        } else if !of.is_part {
+            self.light(simd, of, place, &medium, picture, values);
         } else {
-            let spots = self.spots(simd, of, place, &medium, secant);
-            let open = (picture.open[place.y] >> place.x) as u32;
-            let mut wanted = 0;
-            for lane in 0..Lanes::<S>::COUNT {
-                wanted |= u32::from(tau[lane] > 0.0) << lane;
+            if kept.is_new(place) {
+                let slabs = &of.prepared.slabs;
+                let whole = self.classify(simd, of, place, [slabs.face(place.slab), slabs.face(place.slab + 1)]);
+                self.light(simd, of, place, &whole, picture, values);
+                kept.keep::<S>(place, &values[..self.layout.count()]);
             }
-            self.light(simd, of, &spots, wanted & open, &mut values);
-            for c in 0..self.layout.count() {
-                // What is not seen may be no number.
-                Lanes::load(simd, &values[c]).where_less(zero, depth).store(&mut values[c]);
-            }
+            kept.recall::<S>(place, &mut values[..self.layout.count()]);
         }
+        let mut tau = [0.0; MAX_LANES];
+        medium.depth.store(&mut tau);
         let extinction = of.prepared.volume.material.extinction_rgb;
         for p in 0..picture.planes {
             let own = Lanes::load(simd, &tau) * Lanes::splat(simd, extinction[p]);
@@ -109,28 +119,27 @@ impl Shader<'_> {
             all.store(&mut fragments.optical_depth[p]);
         }
         if is_first {
-            fragments.values = values;
             medium.near.store(&mut fragments.near);
             medium.far.store(&mut fragments.far);
             fragments.object = [of.prepared.volume.object; MAX_LANES];
         } else {
-            mix(simd, &Shaded { volume: &of.prepared.volume, tau, values }, &medium, fragments, picture);
+            mix(simd, &Shaded { volume: &of.prepared.volume, tau, values: own }, &medium, fragments, picture);
         }
     }
 
-    /// The medium of a volume in a slab: its length within the limits, its class.
+    /// The medium of a volume between two depths in its slab: its length within the limits, its class.
     #[inline(always)]
-    fn classify<S: Simd>(&self, simd: S, of: &Reconstructed<'_>, place: Place) -> Medium<S> {
-        let at = place.y * SIDE + place.x;
+    fn classify<S: Simd>(&self, simd: S, of: &Reconstructed<'_>, place: Place, faces: [f32; 2]) -> Medium<S> {
+        let at = place.pixel();
         let limits = of.limits.map(|depths| Lanes::load(simd, &depths[(place.y - 1) * TILE + place.x - 1..]));
-        let face = |slab: u32| Lanes::splat(simd, self.slabs.face(slab));
-        let near = Lanes::load(simd, &of.crossings.near[at..]).max(limits[0]).max(face(place.slab));
-        let far = Lanes::load(simd, &of.crossings.far[at..]).min(limits[1]).min(face(place.slab + 1));
+        let near = Lanes::load(simd, &of.crossings.near[at..]).max(limits[0]).max(Lanes::splat(simd, faces[0]));
+        let far = Lanes::load(simd, &of.crossings.far[at..]).min(limits[1]).min(Lanes::splat(simd, faces[1]));
         let length = (far - near).max(Lanes::splat(simd, 0.0));
         let [value, weight] = of.sheets.load(simd, place.slab, place.y, place.x);
         let [extinction, red, green, blue] = of.prepared.classifier.at(simd, value);
-        let depth = (extinction * length).where_less(Lanes::splat(simd, LEAST_WEIGHT), weight);
-        Medium { near, far, depth, color: [red, green, blue] }
+        let secant = self.secants(simd, place);
+        let depth = (extinction * length * secant).where_less(Lanes::splat(simd, LEAST_WEIGHT), weight);
+        Medium { near, far, depth, secant, color: [red, green, blue] }
     }
 
     /// Length of each ray per unit of view depth.
@@ -151,18 +160,11 @@ impl Shader<'_> {
 
     /// Where light is asked for: the middle of the medium.
     #[inline(always)]
-    fn spots<S: Simd>(
-        &self,
-        simd: S,
-        of: &Reconstructed<'_>,
-        place: Place,
-        medium: &Medium<S>,
-        secant: Lanes<S>,
-    ) -> Spots<S> {
+    fn spots<S: Simd>(&self, simd: S, of: &Reconstructed<'_>, place: Place, medium: &Medium<S>) -> Spots<S> {
         let of_all = |v: f32| Lanes::splat(simd, v);
         let (zero, half) = (of_all(0.0), of_all(0.5));
         let middle = (medium.near + medium.far) * half;
-        let towards = of_all(-1.0) / secant;
+        let towards = of_all(-1.0) / medium.secant;
         let to_eye = if self.input.camera.is_orthographic() {
             [zero, zero, towards]
         } else {
@@ -185,13 +187,14 @@ impl Shader<'_> {
         let along = difference(simd, value, before, of_place(slab + 1, y, x));
         let right = difference(simd, value, of_place(slab, y, x - 1), of_place(slab, y, x + 1));
         let down = difference(simd, value, of_place(slab, y - 1, x), of_place(slab, y + 1, x));
-        let z = self.slabs.origin + (f64::from(slab) + 0.5) * self.slabs.width;
-        let pixels = self.input.camera.focal_px() * self.slabs.width;
+        let slabs = &of.prepared.slabs;
+        let z = slabs.origin + (f64::from(slab) + 0.5) * slabs.width;
+        let pixels = self.input.camera.focal_px() * slabs.width;
         if self.input.camera.is_orthographic() {
             let pixels = Lanes::splat(simd, pixels as f32);
             return [right * pixels, Lanes::splat(simd, 0.0) - down * pixels, along];
         }
-        let pixels = Lanes::splat(simd, (pixels / z.max(self.slabs.width * 1e-3)) as f32);
+        let pixels = Lanes::splat(simd, (pixels / z.max(slabs.width * 1e-3)) as f32);
         let (gx, gy) = (right * pixels, Lanes::splat(simd, 0.0) - down * pixels);
         let [u, v] = self.slopes(simd, place);
         [gx, gy, along - (u * gx + v * gy)]
@@ -200,9 +203,9 @@ impl Shader<'_> {
     /// Values of a sheet, with 1 where the ray is inside the volume there, else 0.
     #[inline(always)]
     fn sample<S: Simd>(&self, simd: S, of: &Reconstructed<'_>, place: Place) -> [Lanes<S>; 2] {
-        let at = place.y * SIDE + place.x;
+        let at = place.pixel();
         let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
-        let face = |slab: u32| Lanes::splat(simd, self.slabs.face(slab));
+        let face = |slab: u32| Lanes::splat(simd, of.prepared.slabs.face(slab));
         let near = Lanes::load(simd, &of.crossings.near[at..]).max(face(place.slab));
         let far = Lanes::load(simd, &of.crossings.far[at..]).min(face(place.slab + 1));
         let [value, weight] = of.sheets.load(simd, place.slab, place.y, place.x);
@@ -210,9 +213,34 @@ impl Shader<'_> {
         [value, inside.where_less(Lanes::splat(simd, LEAST_WEIGHT), weight)]
     }
 
+    /// All channels of a medium where it is seen, 0 elsewhere.
+    #[inline(always)]
+    fn light<S: Simd>(
+        &self,
+        simd: S,
+        of: &Reconstructed<'_>,
+        place: Place,
+        medium: &Medium<S>,
+        picture: &Picture,
+        values: &mut Values,
+    ) {
+        let mut tau = [0.0; MAX_LANES];
+        medium.depth.store(&mut tau);
+        let (open, mut wanted) = ((picture.open[place.y] >> place.x) as u32, 0);
+        for lane in 0..Lanes::<S>::COUNT {
+            wanted |= u32::from(tau[lane] > 0.0) << lane;
+        }
+        self.channels(simd, of, &self.spots(simd, of, place, medium), wanted & open, values);
+        for c in 0..self.layout.count() {
+            // What is not seen may be no number.
+            let zero = Lanes::splat(simd, 0.0);
+            Lanes::load(simd, &values[c]).where_less(zero, medium.depth).store(&mut values[c]);
+        }
+    }
+
     /// The channels of the spots: effects, normals, shadows. Of the lanes that are not `wanted` anything.
     #[inline(always)]
-    fn light<S: Simd>(&self, simd: S, of: &Reconstructed<'_>, spots: &Spots<S>, wanted: u32, values: &mut Values) {
+    fn channels<S: Simd>(&self, simd: S, of: &Reconstructed<'_>, spots: &Spots<S>, wanted: u32, values: &mut Values) {
         let volume = &of.prepared.volume;
         let radius = of.prepared.viewed.reach as f32 / 3.0;
         let reflector = Reflector {
