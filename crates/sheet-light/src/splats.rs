@@ -123,6 +123,11 @@ impl SplatSheet {
         any
     }
 
+    /// Whether none is left.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.squares.iter().all(|square| square.next == square.ids.len())
+    }
+
     /// The slab of the nearest splat that is not summed up yet.
     pub(crate) fn next_slab(&self, splats: &Splats<'_>, slabs: &Slabs) -> Option<u32> {
         let next = |square: &Square| Some(f64::from(splats.depths[*square.ids.get(square.next)? as usize]));

@@ -70,7 +70,10 @@ impl FoldTile<'_> {
         while slab < span.end {
             if self.needs_batch(slab) || steps % BATCH == 0 {
                 picture.find_open();
-                if picture.open.iter().all(|row| *row == 0) {
+                picture.find_lit(&self.scratch.far, of.slabs.face(slab));
+                // A splat behind what is opaque may reach before it.
+                let left = if self.scratch.splats.is_empty() { &picture.lit } else { &picture.open };
+                if left.iter().all(|row| *row == 0) {
                     return;
                 }
                 self.finish(simd, slab, picture, counts);
@@ -128,11 +131,11 @@ impl FoldTile<'_> {
         }
         let faces = [of.slabs.face(step.start), of.slabs.face(step.end)];
         for y in 1..=TILE {
-            let mut tags = splats.sums.tags[y];
+            let mut tags = 0;
             for (prepared, scratch) in of.volumes.iter().zip(volumes.iter()) {
                 tags |= scratch.own(prepared, step.start).map_or(0, |own| scratch.sheets.tags(own, y));
             }
-            tags &= picture.open[y];
+            let tags = tags & picture.lit[y] | splats.sums.tags[y] & picture.open[y];
             for x in (1..=TILE).step_by(Lanes::<S>::COUNT) {
                 if tags >> x & ((1 << Lanes::<S>::COUNT) - 1) == 0 {
                     continue;

@@ -99,8 +99,9 @@ impl pulp::WithSimd for FoldTile<'_> {
             return (None, counts);
         }
         let span = self.span();
+        let before = self.limits(corner);
         for (prepared, scratch) in of.volumes.iter().zip(&mut self.scratch.volumes) {
-            scratch.batches = batches(prepared, &span);
+            scratch.batches = batches(prepared, &(span.start..span.end.min(before)));
             scratch.queue.fill(prepared, self.t, &scratch.batches);
         }
         let has_splats =
@@ -113,7 +114,6 @@ impl pulp::WithSimd for FoldTile<'_> {
         for (prepared, scratch) in of.volumes.iter().zip(&mut self.scratch.volumes) {
             scratch.begin(prepared, &slopes);
         }
-        self.limits(corner);
         self.sweep(simd, &slopes, span, &mut picture, &mut counts);
         (Some(picture), counts)
     }
@@ -152,22 +152,25 @@ impl<'a> FoldTile<'a> {
         Some(Drawn { splats, bins, opaque: self.opaque })
     }
 
-    /// Depths that each pixel may have light at.
-    fn limits(&mut self, [left, top]: [usize; 2]) {
-        let origin = self.of.slabs.origin;
+    /// Depths that each pixel may have light at; the slab behind all that volumes may be seen in.
+    fn limits(&mut self, [left, top]: [usize; 2]) -> u32 {
+        let slabs = &self.of.slabs;
         let [width, height] = self.into.size.map(|s| s as usize);
-        self.scratch.near.fill((self.range.start - origin) as f32);
-        self.scratch.far.fill((self.range.end - origin) as f32);
+        self.scratch.near.fill((self.range.start - slabs.origin) as f32);
+        self.scratch.far.fill((self.range.end - slabs.origin) as f32);
         if self.opaque.is_empty() {
-            return;
+            return slabs.count;
         }
+        let mut farthest = f64::NEG_INFINITY;
         for y in 0..TILE.min(height - top) {
             for x in 0..TILE.min(width - left) {
-                let depth = f64::from(self.opaque[(top + y) * width + left + x]) - origin;
+                let depth = f64::from(self.opaque[(top + y) * width + left + x]);
+                farthest = farthest.max(depth);
                 let far = &mut self.scratch.far[y * TILE + x];
-                *far = far.min(depth as f32);
+                *far = far.min((depth - slabs.origin) as f32);
             }
         }
+        slabs.at(farthest) + 1
     }
 }
 
