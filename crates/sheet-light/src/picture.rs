@@ -134,14 +134,11 @@ impl Picture {
         }
     }
 
-    /// Finds the pixels in which something may lie behind a depth; `far` has the depth of what hides each, or its bounds.
-    pub(crate) fn find_lit(&mut self, far: &[f32], depth: f32) {
-        for (y, far) in far.chunks_exact(TILE).enumerate() {
-            let mut bits = 0;
-            for (x, far) in far.iter().enumerate() {
-                bits |= u64::from(*far > depth) << (x + 1);
-            }
-            self.lit[y + 1] = self.open[y + 1] & bits;
+    /// Closes to volumes the pixels in which all lies before a depth; `far` has the depth of what hides each, or its bounds.
+    pub(crate) fn close(&mut self, far: &[f32], depth: f32) {
+        for (row, far) in self.lit[1..].iter_mut().zip(far.chunks_exact(TILE)) {
+            let behind = far.iter().rev().fold(0, |bits, far| bits << 1 | u64::from(*far > depth));
+            *row &= behind << 1;
         }
     }
 

@@ -58,7 +58,7 @@ impl Queue {
         self.found.clear();
         self.starts.clear();
         self.starts.resize(batches.len() + 2, 0);
-        self.active = u32::MAX..0;
+        let mut active = [u32::MAX, 0];
         for segment in of.segments.tile(t) {
             let start = of.viewed.position(segment.eighth * SEGMENT, segment.j, segment.k);
             let end = start + of.viewed.axes.x_axis * (SEGMENT - 1) as f64;
@@ -67,11 +67,12 @@ impl Queue {
             let nearest = (begin / BATCH).max(batches.start);
             if nearest < batches.end && last / BATCH >= batches.start {
                 let end = last + of.sections.touched as u32;
-                self.active = self.active.start.min(begin)..self.active.end.max(end);
+                active = [active[0].min(begin), active[1].max(end)];
                 self.starts[(nearest - batches.start) as usize + 2] += 1;
                 self.found.push((nearest - batches.start, segment));
             }
         }
+        self.active = active[0]..active[1];
         (2..self.starts.len()).for_each(|b| self.starts[b] += self.starts[b - 1]);
         self.segments.clear();
         self.segments.resize(self.found.len(), Segment { eighth: 0, j: 0, k: 0 });

@@ -52,6 +52,8 @@ pub(crate) struct Reconstructed<'a> {
     pub(crate) faces: [f32; 2],
     /// Whether that is not the whole of its own slab.
     pub(crate) is_part: bool,
+    /// Pixels that are seen through, from the first one on, a bit each.
+    pub(crate) open: u32,
 }
 
 /// What one volume has in neighbouring pixels between two depths.
@@ -100,12 +102,12 @@ impl Shader<'_> {
                 (medium.color[c] + Lanes::splat(simd, of.prepared.volume.material.emission[c])).store(&mut values[c]);
             }
         } else if !of.is_part {
-            self.light(simd, of, place, &medium, picture, values);
+            self.light(simd, of, place, &medium, values);
         } else {
             if kept.is_new(place) {
                 let slabs = &of.prepared.slabs;
                 let whole = self.classify(simd, of, place, [slabs.face(place.slab), slabs.face(place.slab + 1)]);
-                self.light(simd, of, place, &whole, picture, values);
+                self.light(simd, of, place, &whole, values);
                 kept.keep::<S>(place, &values[..self.layout.count()]);
             }
             kept.recall::<S>(place, &mut values[..self.layout.count()]);
@@ -215,22 +217,14 @@ impl Shader<'_> {
 
     /// All channels of a medium where it is seen, 0 elsewhere.
     #[inline(always)]
-    fn light<S: Simd>(
-        &self,
-        simd: S,
-        of: &Reconstructed<'_>,
-        place: Place,
-        medium: &Medium<S>,
-        picture: &Picture,
-        values: &mut Values,
-    ) {
+    fn light<S: Simd>(&self, simd: S, of: &Reconstructed<'_>, place: Place, medium: &Medium<S>, values: &mut Values) {
         let mut tau = [0.0; MAX_LANES];
         medium.depth.store(&mut tau);
-        let (open, mut wanted) = ((picture.open[place.y] >> place.x) as u32, 0);
+        let mut wanted = 0;
         for lane in 0..Lanes::<S>::COUNT {
             wanted |= u32::from(tau[lane] > 0.0) << lane;
         }
-        self.channels(simd, of, &self.spots(simd, of, place, medium), wanted & open, values);
+        self.channels(simd, of, &self.spots(simd, of, place, medium), wanted & of.open, values);
         for c in 0..self.layout.count() {
             // What is not seen may be no number.
             let zero = Lanes::splat(simd, 0.0);

@@ -70,7 +70,10 @@ impl FoldTile<'_> {
         while slab < span.end {
             if self.needs_batch(slab) || steps % BATCH == 0 {
                 picture.find_open();
-                picture.find_lit(&self.scratch.far, of.slabs.face(slab));
+                picture.lit = picture.open;
+                if !self.opaque.is_empty() {
+                    picture.close(&self.scratch.far, of.slabs.face(slab));
+                }
                 // A splat behind what is opaque may reach before it.
                 let left = if self.scratch.splats.is_empty() { &picture.lit } else { &picture.open };
                 if left.iter().all(|row| *row == 0) {
@@ -147,7 +150,8 @@ impl FoldTile<'_> {
                     let VolumeScratch { sheets, crossings, kept, .. } = scratch;
                     let is_part = step.len() < prepared.stride as usize;
                     let limits = [&near[..], &far[..]];
-                    let reconstructed = Reconstructed { prepared, crossings, sheets, limits, faces, is_part };
+                    let open = (picture.open[y] >> x) as u32;
+                    let reconstructed = Reconstructed { prepared, crossings, sheets, limits, faces, is_part, open };
                     shader.add(simd, &reconstructed, Place { slab, y, x }, picture, (kept, fragments));
                 }
                 splats.sums.add(simd, [x - 1, y - 1], of.slabs.origin, picture, fragments);

@@ -227,11 +227,11 @@ const LN: [f32; 9] = [
     -0.166_680_58,
     0.200_007_15,
     -0.249_999_94,
-    0.333_333_31,
+    0.333_333_3,
 ];
 
 /// ln 2 in two parts, the first of few digits.
-const LN_2: [f32; 2] = [0.693_359_375, -2.121_944_4e-4];
+const LN_2: [f32; 2] = [0.693_359_4, -2.121_944_4e-4];
 
 /// Optical depth up to which a polynomial gives the opacity.
 pub(crate) const SMALL: f32 = 0.5;
