@@ -1,11 +1,11 @@
 """The rows of `--bench sheets` by VTK's vtkFixedPointVolumeRayCastMapper: the same head, transfer functions, views and sizes.
 
     pip install vtk numpy
-    python3 benches/peers/vtk_volume.py [THREADS]
+    python3 benches/peers/vtk_volume.py [THREADS [STEP [WORD]]]
 
-A ray is sampled every millimetre, the lattice's spacing; no antialiasing. Least times of several frames, the camera moved by
+A ray is sampled every STEP millimetres, 1 if nothing is said, the lattice's spacing; no antialiasing. Least times of several frames, the camera moved by
 nothing visible so that each is cast anew: by the clock, and of all threads on processors. The error is that to its own picture at a
-tenth of the step.
+twentieth of a millimetre. With WORD those rows whose name has it.
 """
 
 import pathlib
@@ -92,6 +92,8 @@ def picture(window, mapper, distance):
 
 def main():
     threads = int(sys.argv[1]) if len(sys.argv) > 1 else 2
+    step = float(sys.argv[2]) if len(sys.argv) > 2 else 1.0
+    word = sys.argv[3] if len(sys.argv) > 3 else ""
     reader = vtk.vtkNIFTIImageReader()
     reader.SetFileName(str(HEAD))
     reader.Update()
@@ -101,8 +103,12 @@ def main():
         for name, points in (("semi", SEMI), ("iso", ISO)):
             for lit in (False, True):
                 for perspective in (False, True):
+                    light, lens = "shaded" if lit else "unlit", "pinhole" if perspective else "parallel"
+                    label = f"{pixels} {name} {light} {lens}"
+                    if word not in label:
+                        continue
                     window, renderer, mapper = scene(reader, points, lit, perspective, pixels, threads)
-                    coarse = picture(window, mapper, 1.0)
+                    coarse = picture(window, mapper, step)
                     best, busy = float("inf"), float("inf")
                     for n in range(REPEATS):
                         renderer.GetActiveCamera().Azimuth(1e-4 * (-1) ** n)
@@ -110,10 +116,8 @@ def main():
                         window.Render()
                         best = min(best, time.perf_counter() - start)
                         busy = min(busy, time.process_time() - start_busy)
-                    fine = picture(window, mapper, 0.1)
+                    fine = picture(window, mapper, 0.05)
                     rmse = numpy.sqrt(numpy.mean((coarse - fine) ** 2))
-                    light, lens = "shaded" if lit else "unlit", "pinhole" if perspective else "parallel"
-                    label = f"{pixels} {name} {light} {lens}"
                     print(f"{label:>28} {best * 1e3:6.0f} {busy * 1e3:6.0f} ms, RMSE {rmse:.5f}, mean {fine.mean():.4f}", flush=True)
 
 

@@ -249,7 +249,7 @@ fn power<S: Simd>(simd: S, x: Lanes<S>, exponent: f32) -> Lanes<S> {
     if exponent == 0.0 {
         return of(1.0);
     }
-    let positive = (of(-exponent) * x.max(of(f32::MIN_POSITIVE)).ln()).exp_neg();
+    let positive = (of(-exponent) * x.max(of(f32::MIN_POSITIVE)).logarithm()).exp_neg();
     positive.where_less(of(0.0), x)
 }
 

@@ -144,7 +144,7 @@ impl<S: Simd> Lanes<S> {
 
     /// The natural logarithm of a normal number > 0: an error below 2·10⁻⁷ of it, or of 10⁻⁷ near 1.
     #[inline(always)]
-    pub fn ln(self) -> Self {
+    pub fn logarithm(self) -> Self {
         let (simd, of) = (self.simd, |v| Self::splat(self.simd, v));
         // Bits of 1/√2, so that what is left of the number lies around 1; 127 more make the exponent a natural number.
         let whole = |v: u32| simd.splat_u32s(v);
@@ -296,7 +296,7 @@ mod tests {
                 Function::Opacity => lanes.opacity(),
                 Function::ShareInFront => lanes.share_in_front(),
                 Function::ToHalf => lanes.to_half(),
-                Function::Ln => lanes.ln(),
+                Function::Ln => lanes.logarithm(),
             }
             .store(&mut out);
             out[..Lanes::<S>::COUNT].to_vec()
