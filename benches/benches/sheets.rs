@@ -1,7 +1,8 @@
 //! Image-aligned sheets of the MRI head: prepare and fold at 400² and 512², semi-transparent and opaque, unlit and shaded.
 //!
 //! A plain table of minima: other work on the machine only ever adds time. The second number of each part is the time of all
-//! threads on processors, which other work adds less to. `-- WORD` draws those whose name has it.
+//! threads on processors, which other work adds less to. The error is the RMSE of linear colours to slabs an eighth as wide and no
+//! pixel ever done. `-- WORD` draws those whose name has it. `benches/peers/vtk_volume.py` has the same rows by VTK.
 #![allow(missing_docs, clippy::expect_used, reason = "a benchmark")]
 
 use convert::read::{self, Loaded, ReadParams};
@@ -18,6 +19,9 @@ use std::time::Instant;
 
 /// Runs each part this often.
 const REPEATS: usize = 7;
+
+/// All depths.
+const ALL: std::ops::Range<f32> = f32::NEG_INFINITY..f32::INFINITY;
 
 fn head() -> Grid {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/mni152/mni152_t1.nii.gz");
@@ -50,8 +54,8 @@ fn main() {
     let semi = transfer(&[(30.0, 0.0), (80.0, 0.004), (150.0, 0.01), (200.0, 0.05), (255.0, 0.08)]);
     let iso = transfer(&[(90.0, 0.0), (110.0, 2.0)]);
     println!(
-        "{:>28} {:>12} {:>12} {:>7} {:>9} {:>7} {:>11} {:>10}",
-        "ms", "prepare", "fold", "M vox", "M splats", "M frag", "M frag/s", "M shaded"
+        "{:>28} {:>12} {:>12} {:>7} {:>9} {:>7} {:>11} {:>10} {:>8}",
+        "ms", "prepare", "fold", "M vox", "M splats", "M frag", "M frag/s", "M shaded", "RMSE"
     );
     for pixels in [400, 512] {
         for (class, tf) in [("semi", &semi), ("iso", &iso)] {
@@ -97,28 +101,41 @@ fn row(name: &str, grid: &Grid, transfer: &TransferFunction, lit: bool, camera: 
     };
     let params = Params { transmittance_cutoff: Params::PAPERS_CUTOFF, ..Params::default() };
     let layout = ChannelLayout::new(&LayerSet::default());
-    let (mut best, mut counts) = ([[f64::INFINITY; 2]; 2], SheetCounts::default());
+    let mut out = Accumulator::new(camera.size, 1, 3, false, false);
+    let (mut best, mut counts, mut width) = ([[f64::INFINITY; 2]; 2], SheetCounts::default(), 0.0);
     for _ in 0..REPEATS {
         let (start, busy) = (Instant::now(), processor_ms());
         let sheeted = prepare(input.clone(), &params, None).expect("a volume that can be drawn");
         let (middle, middle_busy) = (Instant::now(), processor_ms());
-        let mut out = Accumulator::new(camera.size, 1, 3, false, false);
-        let all = f32::NEG_INFINITY..f32::INFINITY;
-        counts = sheeted.fold(all, &[], &layout, &mut out, None).expect("nobody cancels");
+        out = Accumulator::new(camera.size, 1, 3, false, false);
+        counts = sheeted.fold(ALL, &[], &layout, &mut out, None).expect("nobody cancels");
+        width = sheeted.slabs().1;
         let times = [(middle - start, middle_busy - busy), (middle.elapsed(), processor_ms() - middle_busy)];
         for (best, (wall, busy)) in best.iter_mut().zip(times) {
             best[0] = best[0].min(wall.as_secs_f64() * 1e3);
             best[1] = best[1].min(busy);
         }
     }
+    let params = Params { slab_width: Some(0.125 * width), transmittance_cutoff: 0.0, ..params };
+    let mut fine = Accumulator::new(camera.size, 1, 3, false, false);
+    let sheeted = prepare(input, &params, None).expect("a volume that can be drawn");
+    sheeted.fold(ALL, &[], &layout, &mut fine, None).expect("nobody cancels");
     let million = |n: u64| n as f64 * 1e-6;
     let [prepared, folded] = best.map(|[wall, busy]| format!("{wall:.1} {busy:.0}"));
     println!(
-        "{name:>28} {prepared:>12} {folded:>12} {:7.2} {:9.2} {:7.1} {:11.0} {:10.1}",
+        "{name:>28} {prepared:>12} {folded:>12} {:7.2} {:9.2} {:7.1} {:11.0} {:10.1} {:8.5}",
         million(counts.visible),
         million(counts.records),
         million(counts.fragments),
         million(counts.fragments) / best[1][0] * 1e3,
         million(counts.shaded),
+        rmse(&out, &fine),
     );
+}
+
+/// Of all numbers of both pictures.
+fn rmse(a: &Accumulator, b: &Accumulator) -> f64 {
+    let pairs = a.channels.iter().flatten().zip(b.channels.iter().flatten());
+    let squares = pairs.map(|(a, b)| f64::from(a - b).powi(2));
+    (squares.sum::<f64>() / a.channels.iter().map(Vec::len).sum::<usize>() as f64).sqrt()
 }

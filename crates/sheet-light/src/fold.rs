@@ -3,14 +3,16 @@
 use crate::classify::Classifier;
 use crate::counts::SheetCounts;
 use crate::error::cancelled;
+use crate::kept::Kept;
 use crate::lattice::Lattice;
+use crate::light::Lamp;
 use crate::rays::LatticeRays;
 use crate::ring::{Ring, Splatter, Taper};
 use crate::sections::SectionTable;
 use crate::segments::Segments;
 use crate::shadows::Shadows;
 use crate::sheets::Sheets;
-use crate::slabs::Slabs;
+use crate::slabs::{Kernels, Slabs};
 use crate::tile::{self, AREA, FoldTile, Scratch, TILE};
 use crate::viewed::{PixelFootprint, Viewed, corners, spacing_along, view_axes};
 use crate::visible::Voxels;
@@ -26,6 +28,10 @@ use std::ops::Range;
 /// One volume, ready to be splatted.
 pub(crate) struct Prepared<'a> {
     pub(crate) volume: Volume<'a>,
+    /// Its own slabs.
+    pub(crate) slabs: Slabs,
+    /// How many of all volumes' slabs one of them is wide.
+    pub(crate) stride: u32,
     pub(crate) lattice: Lattice<'a>,
     pub(crate) viewed: Viewed,
     pub(crate) sections: SectionTable,
@@ -48,12 +54,10 @@ pub struct Sheeted<'a> {
     pub(crate) params: Params,
     pub(crate) slabs: Slabs,
     pub(crate) volumes: Vec<Prepared<'a>>,
+    pub(crate) lamps: Vec<Lamp>,
     /// Lists of splats by square of the image.
     pub(crate) bins: Option<Bins>,
     pub(crate) tiles: [usize; 2],
-    /// Slabs under the widest kernel.
-    pub(crate) touched: u32,
-    pub(crate) has_gradients: bool,
 }
 
 /// Finds the voxels that may be seen and lists them by tile.
@@ -80,17 +84,16 @@ pub fn prepare<'a>(input: SheetInput<'a>, params: &Params, progress: Option<&Pro
         progress.tick(1).map_err(cancelled)?;
     }
     let bins = input.splats.as_ref().map(Splats::bin);
-    let touched = volumes.iter().map(|v| v.sections.touched as u32).max().unwrap_or(1);
-    let has_gradients = input.volumes.iter().any(|v| v.normals);
-    Ok(Sheeted { input, params: *params, slabs, volumes, bins, tiles, touched, has_gradients })
+    let lamps = Lamp::all(&input, slabs.origin);
+    Ok(Sheeted { input, params: *params, slabs, volumes, lamps, bins, tiles })
 }
 
-/// Slabs between the nearest corner of a volume, or the nearest splat, before the eye and the farthest.
+/// Slabs between the nearest corner of a volume, or the nearest splat, before the eye and the farthest, as narrow as the finest
+/// volume needs them.
 pub(crate) fn slabs_of(input: &SheetInput<'_>, params: &Params) -> Result<Slabs, Error> {
-    let (mut near, mut far, mut spacing, mut reach) = (f64::INFINITY, 0.0f64, f64::INFINITY, 0.0f64);
+    let (mut near, mut far, mut spacing) = (f64::INFINITY, 0.0f64, f64::INFINITY);
     for volume in &input.volumes {
-        let along = spacing_along(&view_axes(volume, input.camera));
-        (spacing, reach) = (spacing.min(along), reach.max(along * params.kernel.extent));
+        spacing = spacing.min(spacing_along(&view_axes(volume, input.camera)));
         for corner in corners(volume, input.camera) {
             (near, far) = (near.min(corner.z.max(0.0)), far.max(corner.z));
         }
@@ -105,7 +108,24 @@ pub(crate) fn slabs_of(input: &SheetInput<'_>, params: &Params) -> Result<Slabs,
     if !near.is_finite() {
         return Slabs::new(0.0, 0.0, 1.0, 1.0);
     }
-    Slabs::new(near, far, params.slab_width.unwrap_or(spacing), reach)
+    let width = params.slab_width.unwrap_or(spacing);
+    let kernels = |v: &Volume<'_>| Kernels { reach: reach(v, input, params), stride: stride(v, input, params, width) };
+    Slabs::for_kernels(near, far, width, &input.volumes.iter().map(kernels).collect::<Vec<_>>())
+}
+
+/// Radius of a volume's kernels along the view.
+fn reach(volume: &Volume<'_>, input: &SheetInput<'_>, params: &Params) -> f64 {
+    spacing_along(&view_axes(volume, input.camera)) * params.kernel.extent
+}
+
+/// How many slabs of this width one of the volume's own has: as many as its spacing along the view has, where that chooses the width.
+pub(crate) fn stride(volume: &Volume<'_>, input: &SheetInput<'_>, params: &Params, width: f64) -> u32 {
+    /// Steps that are equal but for rounding are.
+    const EQUAL: f64 = 1.0 + 1e-6;
+    /// Most slabs in one.
+    const MOST: f64 = 65536.0;
+    let slabs = spacing_along(&view_axes(volume, input.camera)) / width * EQUAL;
+    if params.slab_width.is_some() { 1 } else { slabs.clamp(1.0, MOST) as u32 }
 }
 
 /// Bytes of lists, records and sheets, counted before any is taken.
@@ -114,13 +134,16 @@ fn memory(input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [usize;
     let mut needed = threads * 4 * 4 * (TILE * TILE) as u64;
     for volume in &input.volumes {
         let dims = Lattice::new(volume.grid, [usize::MAX; 3]).dims;
-        let reach = spacing_along(&view_axes(volume, input.camera)) * params.kernel.extent;
-        let lines = u64::from(Ring::lines_for(crate::sections::touched(reach / slabs.width)));
+        let stride = stride(volume, input, params, slabs.width);
+        let width = slabs.width * f64::from(stride);
+        let touched = crate::sections::touched(reach(volume, input, params) / width);
+        let lines = u64::from(Ring::lines_for(touched));
         // Lists: four bytes for eight voxels, in two or three tiles each. Records: two of sixteen bytes a voxel of a tile.
         let voxels = dims.iter().map(|n| *n as u64).product::<u64>();
         let of_a_tile = voxels.div_ceil((tiles[0] * tiles[1]) as u64) * 4;
         needed +=
             Voxels::bytes(dims) + 2 * voxels + threads * (lines * 64 * AREA as u64 + Sheets::bytes() + 32 * of_a_tile);
+        needed += threads * Kept::bytes(stride);
     }
     needed
 }
@@ -134,6 +157,8 @@ fn check(needed: u64, params: &Params) -> Result<(), Error> {
 impl<'a> Prepared<'a> {
     fn new(volume: Volume<'a>, input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [usize; 2]) -> Self {
         let (grid, camera) = (volume.grid, input.camera);
+        let stride = stride(&volume, input, params, slabs.width);
+        let slabs = &slabs.wider(stride);
         let viewed = Viewed::new(&volume, camera, slabs, params);
         let reach = viewed.lattice_reach(camera, slabs, volume.normals);
         let lattice = Lattice::new(grid, reach);
@@ -145,6 +170,8 @@ impl<'a> Prepared<'a> {
         let base = 0.5 * (f64::from(low) + f64::from(high));
         Self {
             volume,
+            slabs: *slabs,
+            stride,
             lattice,
             sections: SectionTable::new(viewed.reach / slabs.width, 0.5 * cutoff * cutoff),
             taper: Taper::new(0.5 * cutoff * cutoff),

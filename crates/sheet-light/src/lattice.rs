@@ -70,6 +70,19 @@ impl<'a> Lattice<'a> {
         })
     }
 
+    /// Values in a row from place `first` on, as far as the row goes.
+    #[inline(always)]
+    pub(crate) fn eight(&self, first: usize, j: usize, k: usize, out: &mut [f32; 8]) {
+        let end = (first + 8).min(self.dims[0]);
+        match self.inside(first..end, j, k) {
+            Some(values) => match values.first_chunk() {
+                Some(eight) => *out = *eight,
+                None => out.iter_mut().zip(values).for_each(|(to, from)| *to = *from),
+            },
+            None => (first..end).for_each(|i| out[i - first] = self.value(i, j, k)),
+        }
+    }
+
     /// The values of a row with its rim.
     pub(crate) fn row(&self, j: usize, k: usize, out: &mut Vec<f32>) {
         out.clear();

@@ -45,6 +45,8 @@ pub(crate) struct Picture {
     cutoff: f32,
     /// Pixels of each row of the tile with its rim that are seen through.
     pub(crate) open: [u64; SIDE],
+    /// Of these, those where volumes may be seen: what is opaque lies behind.
+    pub(crate) lit: [u64; SIDE],
 }
 
 impl Picture {
@@ -66,6 +68,7 @@ impl Picture {
             object: if from.object.is_empty() { Vec::new() } else { vec![u32::MAX; PIXELS] },
             cutoff,
             open: [0; SIDE],
+            lit: [0; SIDE],
         };
         for (image, at) in tile.rows(from.size[0]) {
             for (p, plane) in from.optical_depth.iter().enumerate() {
@@ -131,12 +134,20 @@ impl Picture {
         }
     }
 
-    /// Pixels that are seen through, and with `rim` their neighbours.
+    /// Closes to volumes the pixels in which all lies before a depth; `far` has the depth of what hides each, or its bounds.
+    pub(crate) fn close(&mut self, far: &[f32], depth: f32) {
+        for (row, far) in self.lit[1..].iter_mut().zip(far.chunks_exact(TILE)) {
+            let behind = far.iter().rev().fold(0, |bits, far| bits << 1 | u64::from(*far > depth));
+            *row &= behind << 1;
+        }
+    }
+
+    /// Pixels where volumes may be seen, and with `rim` their neighbours.
     pub(crate) fn wanted(&self, rim: bool) -> [u64; SIDE] {
         if !rim {
-            return self.open;
+            return self.lit;
         }
-        let row = |y: usize| self.open.get(y).copied().unwrap_or(0);
+        let row = |y: usize| self.lit.get(y).copied().unwrap_or(0);
         std::array::from_fn(|y| row(y) | row(y) << 1 | row(y) >> 1 | row(y.wrapping_sub(1)) | row(y + 1))
     }
 

@@ -10,8 +10,10 @@ use crate::sections::PHASES;
 use crate::segments::{SEGMENT, Segment};
 use crate::slabs::BATCH;
 use crate::tile::SIDE;
-use splat_core::glam::Vec3;
 use std::ops::Range;
+
+/// Segments whose values are asked for together.
+const AT_ONCE: usize = 32;
 
 /// Voxels waiting for their batch.
 #[derive(Debug)]
@@ -21,6 +23,8 @@ pub(crate) struct Queue {
     segments: Vec<Segment>,
     starts: Vec<u32>,
     first: u32,
+    /// Slabs that hold any of their kernels.
+    pub(crate) active: Range<u32>,
     /// Voxels by batch, modulo the batches that a segment may span.
     voxels: Vec<Vec<Record>>,
     /// Those of the batch that was taken last.
@@ -36,6 +40,7 @@ impl Queue {
             segments: Vec::new(),
             starts: Vec::new(),
             first: 0,
+            active: 0..0,
             voxels: vec![Vec::new(); span],
             taken: Vec::new(),
         }
@@ -53,16 +58,21 @@ impl Queue {
         self.found.clear();
         self.starts.clear();
         self.starts.resize(batches.len() + 2, 0);
+        let mut active = [u32::MAX, 0];
         for segment in of.segments.tile(t) {
             let start = of.viewed.position(segment.eighth * SEGMENT, segment.j, segment.k);
             let end = start + of.viewed.axes.x_axis * (SEGMENT - 1) as f64;
-            let batch = |z: f64| of.viewed.place(z as f32).map_or(0, |place| place / (PHASES * BATCH));
-            let nearest = batch(start.z.min(end.z)).max(batches.start);
-            if nearest < batches.end && batch(start.z.max(end.z)) >= batches.start {
+            let slab = |z: f64| of.viewed.place(z as f32).map_or(0, |place| place / PHASES);
+            let [begin, last] = [slab(start.z.min(end.z)), slab(start.z.max(end.z))];
+            let nearest = (begin / BATCH).max(batches.start);
+            if nearest < batches.end && last / BATCH >= batches.start {
+                let end = last + of.sections.touched as u32;
+                active = [active[0].min(begin), active[1].max(end)];
                 self.starts[(nearest - batches.start) as usize + 2] += 1;
                 self.found.push((nearest - batches.start, segment));
             }
         }
+        self.active = active[0]..active[1];
         (2..self.starts.len()).for_each(|b| self.starts[b] += self.starts[b - 1]);
         self.segments.clear();
         self.segments.resize(self.found.len(), Segment { eighth: 0, j: 0, k: 0 });
@@ -74,10 +84,19 @@ impl Queue {
     }
 
     /// The voxels whose kernels begin in `batch`; batches are taken one after the other.
+    #[inline(always)]
     pub(crate) fn take(&mut self, of: &Prepared<'_>, batch: u32, corner: [usize; 2]) -> &[Record] {
         let at = (batch - self.first) as usize;
-        for n in self.starts[at]..self.starts[at + 1] {
-            self.expand(of, self.segments[n as usize], batch, corner);
+        let mut values = [[0.0; SEGMENT]; AT_ONCE];
+        for begin in (self.starts[at]..self.starts[at + 1]).step_by(AT_ONCE) {
+            let segments = begin as usize..(begin as usize + AT_ONCE).min(self.starts[at + 1] as usize);
+            // Values lie anywhere in memory: they are asked for together, so that one is not waited for after the other.
+            for (segment, values) in self.segments[segments.clone()].iter().zip(&mut values) {
+                of.lattice.eight(segment.eighth * SEGMENT, segment.j, segment.k, values);
+            }
+            for (n, values) in segments.zip(&values) {
+                self.expand(of, self.segments[n], (batch, values), corner);
+            }
         }
         let slot = batch as usize % self.voxels.len();
         std::mem::swap(&mut self.taken, &mut self.voxels[slot]);
@@ -86,28 +105,31 @@ impl Queue {
     }
 
     /// The voxels of a segment that reach the tile.
-    fn expand(&mut self, of: &Prepared<'_>, segment: Segment, batch: u32, corner: [usize; 2]) {
-        let (viewed, lattice, slots) = (&of.viewed, &of.lattice, self.voxels.len());
-        let Segment { eighth, j, k } = segment;
-        let first = eighth * SEGMENT;
-        let start = viewed.position(first, j, k);
-        let end = (first + SEGMENT).min(lattice.dims[0]);
-        let values = lattice.inside(first..end, j, k);
-        let mut bits = of.voxels.eight(eighth, j, k);
+    #[inline(always)]
+    fn expand(
+        &mut self,
+        of: &Prepared<'_>,
+        segment: Segment,
+        (batch, values): (u32, &[f32; SEGMENT]),
+        corner: [usize; 2],
+    ) {
+        let slots = self.voxels.len();
+        let mut bits = of.voxels.eight(segment.eighth, segment.j, segment.k);
+        let start = of.viewed.position(segment.eighth * SEGMENT, segment.j, segment.k);
+        let eight = of.viewed.eight(start);
         while bits != 0 {
             let i = bits.trailing_zeros() as usize;
             bits &= bits - 1;
-            let at = start + viewed.axes.x_axis * i as f64;
-            let Some(place) = viewed.place(at.z as f32) else { continue };
+            let place = eight.places[i] as u32;
             let begins = place / (PHASES * BATCH);
-            let Some(scale) = viewed.scale(viewed.depth(place)).filter(|_| begins >= batch) else { continue };
-            let [x, y] = viewed.pixel(Vec3::new(at.x as f32, at.y as f32, 0.0), scale as f32);
-            let half = of.half(scale);
-            let center = [x - (corner[0] as f32 - 1.0), y - (corner[1] as f32 - 1.0)];
+            if !eight.is_before_the_eye[i] || begins < batch {
+                continue;
+            }
+            let half = of.half(eight.scales[i]);
+            let center = [eight.x[i] - (corner[0] as f32 - 1.0), eight.y[i] - (corner[1] as f32 - 1.0)];
             let inside = |a: usize| center[a] + half[a] > 0.5 && center[a] - half[a] < SIDE as f32 - 0.5;
             if inside(0) && inside(1) {
-                let value = values.map_or_else(|| lattice.value(first + i, j, k), |values| values[i]);
-                let value = crate::classify::relative(value, of.base);
+                let value = crate::classify::relative(values[i], of.base);
                 self.voxels[begins as usize % slots].push(Record { center, value, place });
             }
         }

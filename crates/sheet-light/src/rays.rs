@@ -8,7 +8,8 @@ use crate::tile::{AREA, SIDE};
 use crate::volume::Volume;
 use splat_core::Camera;
 use splat_core::glam::{DMat3, DVec3};
-use splat_core::raster::lanes::MAX_LANES;
+use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::pulp::Simd;
 
 /// View depths between which each ray is inside, counted from the first slab; beyond each other where it is not. The rim of the
 /// tile is included.
@@ -40,8 +41,17 @@ impl LatticeRays {
         }
     }
 
+    /// Rows of what leads from view positions, depths counted from the origin, to lattice coordinates.
+    pub(crate) fn rows(&self) -> [[f64; 4]; 3] {
+        let start = self.lattice(DVec3::Z * self.origin);
+        [0, 1, 2].map(|a| {
+            let row = self.lattice_from_view.row(a);
+            [row.x, row.y, row.z, start[a]]
+        })
+    }
+
     /// Lattice coordinates of a view position.
-    pub(crate) fn lattice(&self, at: DVec3) -> DVec3 {
+    fn lattice(&self, at: DVec3) -> DVec3 {
         self.start + self.lattice_from_view * at
     }
 
@@ -73,11 +83,14 @@ pub(crate) struct Slopes {
     pub(crate) v: [f32; SIDE],
     x: [f64; SIDE],
     y: [f64; SIDE],
+    /// Where rays cross the first slab, by column and by row.
+    start: [[f32; SIDE + MAX_LANES]; 2],
     is_parallel: bool,
 }
 
 impl Slopes {
-    pub(crate) fn new(camera: &Camera, corner: [usize; 2]) -> Self {
+    /// Those of the tile at `corner`, the first slab at a view depth of `origin`.
+    pub(crate) fn new(camera: &Camera, corner: [usize; 2], origin: f64) -> Self {
         let is_parallel = camera.is_orthographic();
         let at = |v: usize, a: usize| {
             let px = (corner[a] + v) as f64 - 0.5;
@@ -86,7 +99,20 @@ impl Slopes {
         };
         let (x, y): ([f64; SIDE], [f64; SIDE]) = (std::array::from_fn(|v| at(v, 0)), std::array::from_fn(|v| at(v, 1)));
         let column = |v: usize| x.get(v).map_or(0.0, |x| *x as f32);
-        Self { u: std::array::from_fn(column), v: y.map(|y| y as f32), x, y, is_parallel }
+        let reach = if is_parallel { 1.0 } else { origin };
+        let start = [&x, &y].map(|at| std::array::from_fn(|v| at.get(v).map_or(0.0, |at| (at * reach) as f32)));
+        Self { u: std::array::from_fn(column), v: y.map(|y| y as f32), x, y, start, is_parallel }
+    }
+
+    /// View positions on neighbouring rays, depths counted from the first slab.
+    #[inline(always)]
+    pub(crate) fn places<S: Simd>(&self, simd: S, [x, y]: [usize; 2], depth: Lanes<S>) -> [Lanes<S>; 3] {
+        let start = [Lanes::load(simd, &self.start[0][x..]), Lanes::splat(simd, self.start[1][y])];
+        if self.is_parallel {
+            return [start[0], start[1], depth];
+        }
+        let [u, v] = [Lanes::load(simd, &self.u[x..]), Lanes::splat(simd, self.v[y])];
+        [u.mul_add(depth, start[0]), v.mul_add(depth, start[1]), depth]
     }
 
     /// View-space origin and direction of a ray, as [`Camera::view_ray`] has them.

@@ -1,15 +1,15 @@
 //! The slow form in f64: the same sheets pixel by pixel and slab by slab, without tiles, vectors, rings, lists or skipped voxels.
 
-use crate::fold::slabs_of;
+use crate::fold::{slabs_of, stride};
 use crate::lattice::Lattice;
 use crate::rays::LatticeRays;
 use crate::sections::{PHASES, sections};
-use crate::shade::{Sample, Seen, radiance};
 use crate::slabs::Slabs;
 use crate::viewed::Viewed;
 use crate::{Error, Params, SheetInput, Volume};
-use splat_core::Footprint;
 use splat_core::glam::{DVec3, Vec3};
+use splat_core::shade::{Point, arriving};
+use splat_core::{Footprint, Receiver, SplatKind};
 
 /// What it draws.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,8 +20,11 @@ pub struct Picture {
     pub color: Vec<[f64; 3]>,
 }
 
-/// Sheets of one volume: by slab, by pixel.
+/// Sheets of one volume: by slab of its own, by pixel.
 struct Sheets {
+    slabs: Slabs,
+    /// Slabs of all volumes in one of its own.
+    stride: u32,
     values: Vec<f64>,
     weights: Vec<f64>,
     /// Where each ray is inside.
@@ -39,14 +42,14 @@ pub fn draw(input: &SheetInput<'_>, params: &Params) -> Result<Picture, Error> {
     input.check()?;
     let slabs = slabs_of(input, params)?;
     let sheets: Vec<Sheets> = input.volumes.iter().map(|v| Sheets::new(v, input, params, &slabs)).collect();
-    let view = View { input, params, slabs: &slabs };
+    let view = View { input, params };
     let [width, height] = input.camera.size.map(|s| s as usize);
     let mut out = Picture { optical_depth: vec![0.0; width * height], color: vec![[0.0; 3]; width * height] };
     for slab in 1..slabs.count - 1 {
         for at in 0..width * height {
             let (mut tau, mut color) = (0.0, [0.0; 3]);
             for (volume, sheets) in input.volumes.iter().zip(&sheets) {
-                let (own, radiance) = sheets.fragment(&view, volume, slab, at);
+                let (own, radiance) = sheets.fragment(&view, volume, (&slabs, slab), at);
                 tau += own;
                 (0..3).for_each(|c| color[c] += own * radiance[c]);
             }
@@ -60,22 +63,25 @@ pub fn draw(input: &SheetInput<'_>, params: &Params) -> Result<Picture, Error> {
     Ok(out)
 }
 
-/// What is drawn in which slabs.
+/// What is drawn.
 struct View<'a> {
     input: &'a SheetInput<'a>,
     params: &'a Params,
-    slabs: &'a Slabs,
 }
 
 impl Sheets {
     fn new(volume: &Volume<'_>, input: &SheetInput<'_>, params: &Params, slabs: &Slabs) -> Self {
         let camera = input.camera;
+        let stride = stride(volume, input, params, slabs.width);
+        let slabs = &slabs.wider(stride);
         let size = camera.size.map(|s| s as usize);
         let rays = LatticeRays::new(volume, camera, slabs.origin);
         let pixels = 0..size[0] * size[1];
         let ray = |at: usize| camera.view_ray((at % size[0]) as f64 + 0.5, (at / size[0]) as f64 + 0.5);
         let n = pixels.len() * slabs.count as usize;
         let mut sheets = Self {
+            slabs: *slabs,
+            stride,
             values: vec![0.0; n],
             weights: vec![0.0; n],
             crossings: pixels.map(|at| rays.crossing(ray(at))).collect(),
@@ -134,13 +140,14 @@ impl Sheets {
         (far > near).then_some([near, far])
     }
 
-    /// Optical depth of a pixel in a slab, and its radiance.
-    fn fragment(&self, of: &View<'_>, volume: &Volume<'_>, slab: u32, at: usize) -> (f64, [f64; 3]) {
-        let View { input, params, slabs } = *of;
-        let nothing = (0.0, [0.0; 3]);
-        let (Some(value), Some([near, far])) = (self.value(slab, at), self.inside(slabs, slab, at)) else {
+    /// Optical depth of a pixel in a slab, and the radiance of the volume's own slab, in the middle of what lies there.
+    fn fragment(&self, of: &View<'_>, volume: &Volume<'_>, (slabs, slab): (&Slabs, u32), at: usize) -> (f64, [f64; 3]) {
+        let View { input, params } = *of;
+        let (nothing, own) = ((0.0, [0.0; 3]), slab / self.stride);
+        let (Some(value), Some([near, far])) = (self.value(own, at), self.inside(slabs, slab, at)) else {
             return nothing;
         };
+        let [begin, end] = self.inside(&self.slabs, own, at).unwrap_or([near, far]);
         let class = volume.transfer.at(value as f32);
         if class.extinction == 0.0 {
             return nothing;
@@ -150,17 +157,24 @@ impl Sheets {
         let extinction =
             f64::from(class.extinction) * volume.extinction_scale * f64::from(volume.material.extinction_rgb[1]);
         let tau = extinction * (far - near) * along.length();
-        let normal = if volume.normals { self.normal(input, slabs, slab, at, along) } else { Vec3::ZERO };
-        let viewed = Viewed::new(volume, input.camera, slabs, params);
-        let place = from + along * (slabs.origin + 0.5 * (near + far));
-        let seen = Seen::new(input.camera, place, along);
-        let sample = Sample { volume, radius: viewed.reach as f32, seen, color: class.color, normal };
-        let radiance = radiance(input, &sample, |light| sample.transmittance(input, light)).effects();
-        (tau, [0, 1, 2].map(|c| radiance.iter().map(|effect| f64::from(effect[c])).sum()))
+        let normal = if volume.normals { self.normal(input, own, at, along) } else { Vec3::ZERO };
+        let viewed = Viewed::new(volume, input.camera, &self.slabs, params);
+        let axes = input.camera.axes;
+        let world = |v: DVec3| axes[0] * v.x + axes[1] * v.y + axes[2] * v.z;
+        let point = Point {
+            position: input.camera.position + world(from + along * (slabs.origin + 0.5 * (begin + end))),
+            radius: viewed.reach as f32,
+            normal,
+            to_eye: -world(along).normalize().as_vec3(),
+            color: class.color,
+            material: volume.material,
+        };
+        (tau, radiance(input, volume, &point))
     }
 
     /// −∇v/|∇v| in world space, from the neighbours that are inside.
-    fn normal(&self, input: &SheetInput<'_>, slabs: &Slabs, slab: u32, at: usize, along: DVec3) -> Vec3 {
+    fn normal(&self, input: &SheetInput<'_>, slab: u32, at: usize, along: DVec3) -> Vec3 {
+        let slabs = &self.slabs;
         let (x, y) = (at % self.size[0], at / self.size[0]);
         let sample = |slab: u32, at: usize| self.value(slab, at).filter(|_| self.inside(slabs, slab, at).is_some());
         let here = self.value(slab, at).unwrap_or(0.0);
@@ -182,4 +196,19 @@ impl Sheets {
         let gradient = camera.axes[0] * gx + camera.axes[1] * gy + camera.axes[2] * (z - along.x * gx - along.y * gy);
         -(gradient * slabs.width).normalize_or_zero().as_vec3()
     }
+}
+
+/// Radiance of a point of a volume, all effects together.
+fn radiance(input: &SheetInput<'_>, volume: &Volume<'_>, point: &Point<'_>) -> [f64; 3] {
+    let lights = input.lights.iter().map(|lit| &lit.light);
+    let radiance = point.radiance(input.ambient, lights, |rank, irradiance| {
+        let shadow = input.lights[rank].shadow.map(|shadow| {
+            let position = (point.position - input.shadow_origin).as_vec3();
+            let kind = SplatKind::Medium;
+            move || shadow.transmittance(&Receiver { position, normal: Vec3::ZERO, radius: point.radius, kind })
+        });
+        arriving(irradiance, volume.shadow_coefficient, shadow)
+    });
+    let effects = radiance.effects();
+    [0, 1, 2].map(|c| effects.iter().map(|effect| f64::from(effect[c])).sum())
 }

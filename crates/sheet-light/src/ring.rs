@@ -125,11 +125,8 @@ impl Ring {
             return 0;
         }
         let span = (!0u64 >> (64 - (x1 - x0))) << x0;
-        let mut any = 0;
-        for row in &wanted[y0..y1] {
-            any |= row & span;
-        }
-        if any == 0 {
+        let wanted = &wanted[y0..y1];
+        if wanted.iter().fold(0, |any, row| any | row) & span == 0 {
             return 0;
         }
         let (first, last) = (record.place / PHASES, record.place / PHASES + of.sections.touched as u32 - 1);
@@ -139,21 +136,14 @@ impl Ring {
         } else {
             self.slanted(simd, of, record, &footprint, [x0, x1, y0, y1]);
         }
+        let mut rows = 0;
         let mut line = first / SLABS;
         while line <= last / SLABS {
             let (sums, plane) = self.line(of.sections, record, line);
-            for y in y0..y1 {
-                if wanted[y] & span != 0 {
-                    let to = &mut self.lines[plane + y * SIDE + x0..plane + y * SIDE + x1];
-                    add_line(simd, to, &self.weights[(y - y0) * STRIDE..], &sums);
-                }
-            }
+            let lines = &mut self.lines[plane + y0 * SIDE + x0..plane + (y1 - 1) * SIDE + x1];
+            rows = Covered { lines, weights: &self.weights, wanted, span }.add(simd, &sums, x1 - x0);
             // With one line a pixel, what runs over its end went on at its beginning.
             line += if self.count == 1 { 2 } else { 1 };
-        }
-        let mut rows = 0;
-        for row in &wanted[y0..y1] {
-            rows += u64::from(row & span != 0);
         }
         rows * (x1 - x0) as u64
     }
@@ -296,19 +286,77 @@ fn pixels(center: f32, half: f32) -> [usize; 2] {
     [low.max(0.0) as usize, (high as usize).min(SIDE)]
 }
 
-/// Adds weight times `sums` to each pixel's line.
-#[inline(always)]
-fn add_line<S: Simd>(simd: S, lines: &mut [Line], weights: &[f32], sums: &[f32; 16]) {
-    let count = 16 / Lanes::<S>::COUNT;
-    let mut parts = [Lanes::splat(simd, 0.0); 16];
-    for p in 0..count {
-        parts[p] = Lanes::load(simd, &sums[p * Lanes::<S>::COUNT..]);
-    }
-    for (to, weight) in lines.iter_mut().zip(weights) {
-        let weight = Lanes::splat(simd, *weight);
-        for p in 0..count {
-            let to = &mut to.0[p * Lanes::<S>::COUNT..];
-            weight.mul_add(parts[p], Lanes::load(simd, to)).store(to);
+/// The part of the lines that a footprint covers, row by row.
+struct Covered<'a> {
+    lines: &'a mut [Line],
+    weights: &'a [f32],
+    /// Pixels of each row that are wanted, and those of the footprint, a bit each.
+    wanted: &'a [u64],
+    span: u64,
+}
+
+impl Covered<'_> {
+    /// Adds weight times `sums` to the lines of the rows of which any pixel is wanted. Rows.
+    #[inline(always)]
+    fn add<S: Simd>(self, simd: S, sums: &[f32; 16], width: usize) -> u64 {
+        let mut parts = [Lanes::splat(simd, 0.0); 16];
+        for p in 0..16 / Lanes::<S>::COUNT {
+            parts[p] = Lanes::load(simd, &sums[p * Lanes::<S>::COUNT..]);
         }
+        // Footprints of some pixels have rows of two lengths or so: no loop whose end has to be guessed at each of them.
+        match width {
+            5 => self.rows::<S, 5>(simd, &parts),
+            6 => self.rows::<S, 6>(simd, &parts),
+            7 => self.rows::<S, 7>(simd, &parts),
+            8 => self.rows::<S, 8>(simd, &parts),
+            9 => self.rows::<S, 9>(simd, &parts),
+            10 => self.rows::<S, 10>(simd, &parts),
+            11 => self.rows::<S, 11>(simd, &parts),
+            12 => self.rows::<S, 12>(simd, &parts),
+            _ => self.any_rows(simd, &parts, width),
+        }
+    }
+
+    #[inline(always)]
+    fn rows<S: Simd, const WIDTH: usize>(self, simd: S, parts: &[Lanes<S>; 16]) -> u64 {
+        let mut rows = 0;
+        for (y, wanted) in self.wanted.iter().enumerate() {
+            let (lines, weights) = (&mut self.lines[y * SIDE..], &self.weights[y * STRIDE..]);
+            let (Some(lines), Some(weights)) = (lines.first_chunk_mut::<WIDTH>(), weights.first_chunk::<WIDTH>())
+            else {
+                break;
+            };
+            if wanted & self.span != 0 {
+                rows += 1;
+                for x in 0..WIDTH {
+                    add_line(simd, &mut lines[x], weights[x], parts);
+                }
+            }
+        }
+        rows
+    }
+
+    #[inline(always)]
+    fn any_rows<S: Simd>(self, simd: S, parts: &[Lanes<S>; 16], width: usize) -> u64 {
+        let mut rows = 0;
+        for (y, wanted) in self.wanted.iter().enumerate() {
+            if wanted & self.span != 0 {
+                rows += 1;
+                let lines = &mut self.lines[y * SIDE..][..width];
+                for (line, weight) in lines.iter_mut().zip(&self.weights[y * STRIDE..]) {
+                    add_line(simd, line, *weight, parts);
+                }
+            }
+        }
+        rows
+    }
+}
+
+#[inline(always)]
+fn add_line<S: Simd>(simd: S, line: &mut Line, weight: f32, parts: &[Lanes<S>; 16]) {
+    let weight = Lanes::splat(simd, weight);
+    for p in 0..16 / Lanes::<S>::COUNT {
+        let to = &mut line.0[p * Lanes::<S>::COUNT..];
+        weight.mul_add(parts[p], Lanes::load(simd, to)).store(to);
     }
 }

@@ -10,6 +10,8 @@ use crate::fold::Prepared;
 use crate::visible::Voxels;
 use rayon::prelude::*;
 use splat_core::glam::DVec3;
+use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::pulp::Simd;
 use splat_core::shade::LitBy;
 use splat_core::{Progress, Receiver, SplatKind, Transmittance};
 
@@ -19,23 +21,36 @@ const ROWS: usize = 64;
 /// Transmittances of one volume's needed voxels.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Shadows {
-    /// By light; `None` for one without shadows.
+    /// By light, two more at the end; `None` for one without shadows.
     of_lights: Vec<Option<Vec<Share>>>,
     /// Needed voxels before each word of 64.
     ranks: Vec<u64>,
+    /// From view positions, depths counted from the first slab, to lattice coordinates that count from the rim.
+    lattice_from_view: [[f32; 4]; 3],
 }
 
-/// A transmittance per channel, as parts of 65535.
-type Share = [u16; 3];
+/// A transmittance per channel, as parts of [`WHOLE`], then [`WHOLE`], whose mean is the weight of all that is known.
+type Share = [u16; 4];
 
 /// One as a share.
-const WHOLE: f32 = 65535.0;
+const WHOLE: u16 = u16::MAX;
+
+/// 2²³, from which on floats are natural numbers.
+const NATURAL: f32 = 8_388_608.0;
+
+/// Needed voxels around places: by lane, row by row of two voxels, which they are among all of them, and their weights.
+pub(crate) struct Cells {
+    ranks: [[usize; 4]; MAX_LANES],
+    weights: [[[f32; 2]; 4]; MAX_LANES],
+    /// Lanes that are asked for, a bit each.
+    wanted: u32,
+}
 
 impl Shadows {
     /// Bytes of those of so many voxels.
     pub(crate) fn bytes(voxels: u64, lights: &[LitBy<'_>]) -> u64 {
         let shadows = lights.iter().filter(|lit| lit.shadow.is_some()).count() as u64;
-        if shadows == 0 { 0 } else { shadows * 6 * voxels + voxels / 8 }
+        if shadows == 0 { 0 } else { shadows * 8 * voxels + voxels / 8 }
     }
 
     /// Looks them up; `None` where no light has shadows, or the volume takes none.
@@ -48,60 +63,114 @@ impl Shadows {
         if lights.iter().all(|lit| lit.shadow.is_none()) || of.volume.shadow_coefficient == 0.0 {
             return Ok(None);
         }
+        assert!(of.voxels.dims().iter().all(|n| *n >= 2), "invariant: a lattice has a rim");
         let one = |lit: &LitBy<'_>| lit.shadow.map(|shadow| look_up(of, shadow, origin, progress)).transpose();
         let of_lights = lights.iter().map(one).collect::<Result<_, _>>()?;
-        Ok(Some(Self { of_lights, ranks: of.voxels.ranks() }))
+        let mut rows = of.rays.rows();
+        (0..3).for_each(|a| rows[a][3] += of.lattice.rim[a] as f64);
+        let lattice_from_view = rows.map(|row| row.map(|v| v as f32));
+        Ok(Some(Self { of_lights, ranks: of.voxels.ranks(), lattice_from_view }))
     }
 
-    /// The needed voxels around a place in lattice coordinates that count from the rim.
-    #[inline]
-    pub(crate) fn cell(&self, voxels: &Voxels, place: DVec3) -> Cell {
-        let dims = voxels.dims();
-        let mut first = [0; 3];
-        let mut high = [0.0; 3];
+    /// The needed voxels around view positions.
+    #[inline(always)]
+    pub(crate) fn cells<S: Simd>(&self, simd: S, voxels: &Voxels, at: &[Lanes<S>; 3], wanted: u32) -> Cells {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let (zero, one) = (of(0.0), of(1.0));
+        let (mut first, mut parts) = ([[0.0; MAX_LANES]; 3], [[[0.0; MAX_LANES]; 2]; 4]);
+        let mut high = [zero; 3];
         for a in 0..3 {
-            first[a] = (place[a].max(0.0) as usize).min(dims[a].saturating_sub(2));
-            high[a] = (place[a] - first[a] as f64).clamp(0.0, 1.0) as f32;
+            let [x, y, z, start] = self.lattice_from_view[a];
+            let place = at[0].mul_add(of(x), at[1].mul_add(of(y), at[2].mul_add(of(z), of(start))));
+            // Half a step less, rounded: the voxel before, and for a place at a voxel that or the one before it.
+            let last = of(NATURAL + (voxels.dims()[a] - 2) as f32);
+            let natural = ((place - of(0.5)) + of(NATURAL)).max(of(NATURAL)).min(last);
+            high[a] = (place - (natural - of(NATURAL))).max(zero).min(one);
+            natural.store(&mut first[a]);
         }
-        let mut cell = Cell { ranks: [0; 8], weights: [0.0; 8], is_known: false };
-        let mut whole = 0.0;
-        for corner in 0..8 {
-            let steps = [corner & 1, corner >> 1 & 1, corner >> 2];
-            let share = |a: usize| if steps[a] == 1 { high[a] } else { 1.0 - high[a] };
-            let at = |a: usize| first[a] + steps[a];
-            if let Some(rank) = voxels.rank(&self.ranks, at(0), at(1), at(2)) {
-                cell.ranks[corner] = rank;
-                cell.weights[corner] = share(0) * share(1) * share(2);
-                whole += cell.weights[corner];
-            }
+        let low = [one - high[0], one - high[1], one - high[2]];
+        let rows = [low[1] * low[2], high[1] * low[2], low[1] * high[2], high[1] * high[2]];
+        for row in 0..4 {
+            (rows[row] * low[0]).store(&mut parts[row][0]);
+            (rows[row] * high[0]).store(&mut parts[row][1]);
         }
-        if whole > 0.0 {
-            cell.is_known = true;
-            cell.weights.iter_mut().for_each(|w| *w /= WHOLE * whole);
-        }
-        cell
+        self.find(voxels, &first, &parts, wanted & ((1 << Lanes::<S>::COUNT) - 1))
     }
 
-    /// What arrives of a light there; `None` for a light without shadows.
-    #[inline]
-    pub(crate) fn at(&self, cell: &Cell, light: usize) -> Option<[f32; 3]> {
-        let shares = self.of_lights[light].as_deref().filter(|_| cell.is_known)?;
-        let mut sum = [0.0; 3];
-        for (rank, weight) in cell.ranks.iter().zip(cell.weights) {
-            if weight > 0.0 {
-                (0..3).for_each(|c| sum[c] += weight * f32::from(shares[*rank][c]));
+    /// Which the voxels are, lane by lane.
+    #[inline(always)]
+    fn find(
+        &self,
+        voxels: &Voxels,
+        first: &[[f32; MAX_LANES]; 3],
+        parts: &[[[f32; MAX_LANES]; 2]; 4],
+        wanted: u32,
+    ) -> Cells {
+        let mut cells = Cells { ranks: [[0; 4]; MAX_LANES], weights: [[[0.0; 2]; 4]; MAX_LANES], wanted };
+        for lane in lanes(wanted) {
+            let [i, j, k] = [0, 1, 2].map(|a: usize| (first[a][lane].to_bits() - NATURAL.to_bits()) as usize);
+            for row in 0..4 {
+                let (rank, known) = voxels.pair(&self.ranks, i, j + row % 2, k + row / 2);
+                let [here, next] = [parts[row][0][lane], parts[row][1][lane]];
+                cells.ranks[lane][row] = rank;
+                cells.weights[lane][row] = match known {
+                    3 => [here, next],
+                    // The next one has the rank of the one that is missing.
+                    2 => [next, 0.0],
+                    1 => [here, 0.0],
+                    _ => [0.0; 2],
+                };
             }
         }
-        Some(sum)
+        cells
+    }
+
+    /// What arrives of a light there; all of one without shadows, and where no voxel is known.
+    #[inline(always)]
+    pub(crate) fn at<S: Simd>(&self, simd: S, cells: &Cells, light: usize) -> [Lanes<S>; 3] {
+        let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        let Some(shares) = self.of_lights[light].as_deref() else { return [one; 3] };
+        let mut sums = [[0.0; MAX_LANES]; 4];
+        for lane in lanes(cells.wanted) {
+            let sum = mean(shares, &cells.ranks[lane], &cells.weights[lane]);
+            for c in 0..4 {
+                sums[c][lane] = sum[c];
+            }
+        }
+        let whole = Lanes::load(simd, &sums[3]);
+        let inverse = one / whole.max(Lanes::splat(simd, f32::MIN_POSITIVE));
+        let through = [Lanes::load(simd, &sums[0]), Lanes::load(simd, &sums[1]), Lanes::load(simd, &sums[2])];
+        [
+            (through[0] * inverse).where_less_or(zero, whole, one),
+            (through[1] * inverse).where_less_or(zero, whole, one),
+            (through[2] * inverse).where_less_or(zero, whole, one),
+        ]
     }
 }
 
-/// Needed voxels around a place: which they are among all of them, and their shares over [`WHOLE`].
-pub(crate) struct Cell {
-    ranks: [usize; 8],
-    weights: [f32; 8],
-    /// Whether there are any.
-    is_known: bool,
+/// Weighted sums over the voxels of a cell: two neighbours are one vector.
+#[inline(always)]
+fn mean(shares: &[Share], ranks: &[usize; 4], weights: &[[f32; 2]; 4]) -> [f32; 4] {
+    let mut sum = [0.0; 8];
+    for row in 0..4 {
+        let pair = shares[ranks[row]..ranks[row] + 2].as_flattened();
+        for e in 0..8 {
+            sum[e] += weights[row][e / 4] * f32::from(pair[e]);
+        }
+    }
+    [sum[0] + sum[4], sum[1] + sum[5], sum[2] + sum[6], sum[3] + sum[7]]
+}
+
+/// The set bits.
+#[inline(always)]
+fn lanes(mut wanted: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = wanted.trailing_zeros() as usize;
+        (wanted != 0).then(|| {
+            wanted &= wanted - 1;
+            lane
+        })
+    })
 }
 
 fn look_up(
@@ -118,7 +187,9 @@ fn look_up(
         let position = (start + axes * index).as_vec3();
         let receiver =
             Receiver { position, normal: Default::default(), radius: of.viewed.reach as f32, kind: SplatKind::Medium };
-        shadow.transmittance(&receiver).map(|t| (t.clamp(0.0, 1.0) * WHOLE + 0.5) as u16)
+        let [red, green, blue] =
+            shadow.transmittance(&receiver).map(|t| (t.clamp(0.0, 1.0) * f32::from(WHOLE) + 0.5) as u16);
+        [red, green, blue, WHOLE]
     };
     let rows: Vec<usize> = (0..ny * nz).collect();
     let of_rows = |rows: &[usize]| {
@@ -127,5 +198,8 @@ fn look_up(
         Ok(rows.iter().flat_map(|row| needed(*row).map(|i| share(i, *row))).collect::<Vec<Share>>())
     };
     let parts = rows.par_chunks(ROWS).map(of_rows).collect::<Result<Vec<_>, Error>>()?;
-    Ok(parts.concat())
+    let mut shares = parts.concat();
+    // Voxels are read by two, and one that is missing has the rank of the next.
+    shares.extend([[0; 4]; 2]);
+    Ok(shares)
 }

@@ -26,21 +26,40 @@ pub(crate) struct Slabs {
     pub(crate) count: u32,
 }
 
+/// Kernels of one volume.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Kernels {
+    /// Radius along the view, world units.
+    pub(crate) reach: f64,
+    /// Slabs that one of the volume's own is wide.
+    pub(crate) stride: u32,
+}
+
 impl Slabs {
     /// Slabs that hold view depths from `near` to `far`, for kernels of radius `reach`.
     pub(crate) fn new(near: f64, far: f64, width: f64, reach: f64) -> Result<Self, Error> {
+        Self::for_kernels(near, far, width, &[Kernels { reach, stride: 1 }])
+    }
+
+    /// Slabs that hold view depths from `near` to `far`, and the slabs of all volumes, each of which is some of these.
+    pub(crate) fn for_kernels(near: f64, far: f64, width: f64, kernels: &[Kernels]) -> Result<Self, Error> {
         let too_many = |what, needed: f64, limit| {
             // What is no number is more than can be counted.
             let needed = if needed.is_nan() { u64::MAX } else { needed as u64 };
             Err(Error::limit(what, needed, u64::from(limit), "slabs", format!("choose slabs wider than {width}")))
         };
-        let touched = (2.0 * reach / width).ceil() + 1.0;
-        if touched.is_nan() || touched > f64::from(MOST_TOUCHED) {
-            return too_many("a kernel", touched, MOST_TOUCHED);
+        let (mut before, mut behind) = (1.0f64, 1.0f64);
+        for Kernels { reach, stride } in kernels {
+            let stride = f64::from(*stride);
+            let touched = (2.0 * reach / (width * stride)).ceil() + 1.0;
+            if touched.is_nan() || touched > f64::from(MOST_TOUCHED) {
+                return too_many("a kernel", touched, MOST_TOUCHED);
+            }
+            // A kernel that ends in the first slab of a volume begins so far before it. One more, for that slab's neighbour.
+            before = before.max((2.0 * reach / width).ceil() + stride);
+            behind = behind.max(stride);
         }
-        // A kernel that ends in the first slab of a volume begins so far before it. One more, for that slab's neighbour.
-        let before = (2.0 * reach / width).ceil() + 1.0;
-        let needed = ((far - near) / width).ceil() + before + 2.0;
+        let needed = ((far - near) / width).ceil() + before + behind + 1.0;
         if needed.is_nan() || needed > f64::from(MOST_SLABS) {
             return too_many("the depth of all volumes", needed, MOST_SLABS);
         }
@@ -48,8 +67,19 @@ impl Slabs {
         Ok(Self { origin: near - before * width, width, count })
     }
 
+    /// Slabs that are `stride` of these wide each.
+    pub(crate) fn wider(&self, stride: u32) -> Self {
+        let count = self.count.div_ceil(stride).next_multiple_of(BATCH);
+        Self { origin: self.origin, width: self.width * f64::from(stride), count }
+    }
+
     /// Near face of a slab, counted from the first.
     pub(crate) fn face(&self, slab: u32) -> f32 {
         (f64::from(slab) * self.width) as f32
+    }
+
+    /// The slab at a view depth, or the first or the one behind the last.
+    pub(crate) fn at(&self, depth: f64) -> u32 {
+        ((depth - self.origin) / self.width).clamp(0.0, f64::from(self.count)) as u32
     }
 }

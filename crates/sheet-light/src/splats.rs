@@ -123,6 +123,17 @@ impl SplatSheet {
         any
     }
 
+    /// Whether none is left.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.squares.iter().all(|square| square.next == square.ids.len())
+    }
+
+    /// The slab of the nearest splat that is not summed up yet.
+    pub(crate) fn next_slab(&self, splats: &Splats<'_>, slabs: &Slabs) -> Option<u32> {
+        let next = |square: &Square| Some(f64::from(splats.depths[*square.ids.get(square.next)? as usize]));
+        self.squares.iter().filter_map(next).map(|depth| slabs.at(depth)).min()
+    }
+
     /// Sums up the splats of a slab, with those before it that no slab had. Fragments.
     #[inline(always)]
     pub(crate) fn fill<S: Simd>(

@@ -1,17 +1,16 @@
-//! One tile from front to back: splat the voxels of a batch of slabs, finish its sheets, shade, add the splats of the slab,
-//! composite (Figure 5).
+//! One tile of the image: what lies in it, and what a thread keeps from tile to tile.
 
 use crate::counts::SheetCounts;
 use crate::fold::{Prepared, Sheeted};
+use crate::kept::Kept;
 use crate::picture::{Fragments, Picture};
 use crate::queue::Queue;
 use crate::rays::{Crossings, Slopes};
 use crate::ring::Ring;
-use crate::shade::{Place, Reconstructed, Shader, is_lit_by_place};
 use crate::sheets::Sheets;
 use crate::slabs::BATCH;
 use crate::splats::{Drawn, SplatSheet};
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::MAX_LANES;
 use splat_core::raster::pulp::{self, Simd};
 use splat_core::shade::{ChannelLayout, MAX_CHANNELS};
 use splat_core::{Accumulator, Camera};
@@ -28,19 +27,22 @@ pub(crate) const AREA: usize = SIDE * SIDE;
 
 /// What a thread keeps from tile to tile.
 pub(crate) struct Scratch {
-    volumes: Vec<VolumeScratch>,
-    splats: SplatSheet,
+    pub(crate) volumes: Vec<VolumeScratch>,
+    pub(crate) splats: SplatSheet,
     /// View depths between which there may be light, counted from the first slab.
-    near: Vec<f32>,
-    far: Vec<f32>,
-    fragments: Fragments,
+    pub(crate) near: Vec<f32>,
+    pub(crate) far: Vec<f32>,
+    pub(crate) fragments: Fragments,
 }
 
-struct VolumeScratch {
-    ring: Ring,
-    sheets: Sheets,
-    crossings: Crossings,
-    queue: Queue,
+pub(crate) struct VolumeScratch {
+    pub(crate) ring: Ring,
+    pub(crate) sheets: Sheets,
+    pub(crate) crossings: Crossings,
+    pub(crate) queue: Queue,
+    pub(crate) kept: Kept,
+    /// Batches of its own slabs that are not finished yet.
+    pub(crate) batches: Range<u32>,
 }
 
 impl Scratch {
@@ -50,6 +52,8 @@ impl Scratch {
             sheets: Sheets::new(),
             crossings: Crossings::new(),
             queue: Queue::new(v),
+            kept: Kept::new(v.stride),
+            batches: 0..0,
         };
         Self {
             volumes: volumes.iter().map(of).collect(),
@@ -95,8 +99,10 @@ impl pulp::WithSimd for FoldTile<'_> {
             return (None, counts);
         }
         let span = self.span();
+        let before = self.limits(corner);
         for (prepared, scratch) in of.volumes.iter().zip(&mut self.scratch.volumes) {
-            scratch.queue.fill(prepared, self.t, &span.batches);
+            scratch.batches = batches(prepared, &(span.start..span.end.min(before)));
+            scratch.queue.fill(prepared, self.t, &scratch.batches);
         }
         let has_splats =
             self.drawn().is_some_and(|drawn| self.scratch.splats.begin(drawn, corner, &self.range, self.into));
@@ -104,149 +110,67 @@ impl pulp::WithSimd for FoldTile<'_> {
             counts.tiles_skipped = 1;
             return (None, counts);
         }
-        let slopes = Slopes::new(of.input.camera, corner);
+        let slopes = Slopes::new(of.input.camera, corner, of.slabs.origin);
         for (prepared, scratch) in of.volumes.iter().zip(&mut self.scratch.volumes) {
-            scratch.crossings.of_tile(&prepared.rays, &slopes);
-            scratch.ring.clear();
-            scratch.sheets.clear();
+            scratch.begin(prepared, &slopes);
         }
-        self.limits(corner);
-        self.sweep(simd, &slopes, &span, &mut picture, &mut counts);
+        self.sweep(simd, &slopes, span, &mut picture, &mut counts);
         (Some(picture), counts)
     }
 }
 
-/// The slabs of a range of depths.
-struct Span {
-    /// The first one.
-    first: u32,
-    /// The batches that hold them, their neighbours, and the beginnings of all kernels that reach them.
-    batches: Range<u32>,
+impl VolumeScratch {
+    /// Forgets the tile before.
+    fn begin(&mut self, of: &Prepared<'_>, slopes: &Slopes) {
+        self.crossings.of_tile(&of.rays, slopes);
+        self.ring.clear();
+        self.sheets.clear();
+        self.kept.clear();
+        // Nothing begins before.
+        self.batches.start = self.batches.start.max(self.queue.active.start / BATCH);
+    }
+}
+
+/// The batches of a volume's own slabs that lie in a range of slabs, with their neighbours, and the beginnings of all kernels that
+/// reach them.
+fn batches(of: &Prepared<'_>, span: &Range<u32>) -> Range<u32> {
+    let (first, last) = (span.start / of.stride, span.end.saturating_sub(1) / of.stride);
+    let begin = first.saturating_sub(of.sections.touched as u32 + 1);
+    begin / BATCH..(last + 2).min(of.slabs.count).div_ceil(BATCH)
 }
 
 impl<'a> FoldTile<'a> {
-    fn span(&self) -> Span {
+    /// The slabs of the range of depths.
+    fn span(&self) -> Range<u32> {
         let slabs = &self.of.slabs;
-        let slab = |z: f64| ((z - slabs.origin) / slabs.width).clamp(0.0, f64::from(slabs.count)) as u32;
-        let (first, last) = (slab(self.range.start).max(1), (slab(self.range.end) + 2).min(slabs.count));
-        let begin = first.saturating_sub(self.of.touched + 1);
-        Span { first, batches: begin / BATCH..last.div_ceil(BATCH) }
+        slabs.at(self.range.start).max(1)..(slabs.at(self.range.end) + 1).min(slabs.count - 1)
     }
 
     /// What the tile reads of splats, if there are any at all.
-    fn drawn(&self) -> Option<Drawn<'a>> {
+    pub(crate) fn drawn(&self) -> Option<Drawn<'a>> {
         let (splats, bins) = (self.of.input.splats.as_ref()?, self.of.bins.as_ref()?);
         Some(Drawn { splats, bins, opaque: self.opaque })
     }
 
-    /// Depths that each pixel may have light at.
-    fn limits(&mut self, [left, top]: [usize; 2]) {
-        let origin = self.of.slabs.origin;
+    /// Depths that each pixel may have light at; the slab behind all that volumes may be seen in.
+    fn limits(&mut self, [left, top]: [usize; 2]) -> u32 {
+        let slabs = &self.of.slabs;
         let [width, height] = self.into.size.map(|s| s as usize);
-        self.scratch.near.fill((self.range.start - origin) as f32);
-        self.scratch.far.fill((self.range.end - origin) as f32);
+        self.scratch.near.fill((self.range.start - slabs.origin) as f32);
+        self.scratch.far.fill((self.range.end - slabs.origin) as f32);
         if self.opaque.is_empty() {
-            return;
+            return slabs.count;
         }
+        let mut farthest = f64::NEG_INFINITY;
         for y in 0..TILE.min(height - top) {
             for x in 0..TILE.min(width - left) {
-                let depth = f64::from(self.opaque[(top + y) * width + left + x]) - origin;
+                let depth = f64::from(self.opaque[(top + y) * width + left + x]);
+                farthest = farthest.max(depth);
                 let far = &mut self.scratch.far[y * TILE + x];
-                *far = far.min(depth as f32);
+                *far = far.min((depth - slabs.origin) as f32);
             }
         }
-    }
-
-    #[inline(always)]
-    fn sweep<S: Simd>(
-        &mut self,
-        simd: S,
-        slopes: &Slopes,
-        span: &Span,
-        picture: &mut Picture,
-        counts: &mut SheetCounts,
-    ) {
-        let of = self.of;
-        let shader = Shader {
-            input: &of.input,
-            slabs: &of.slabs,
-            layout: self.layout,
-            slopes,
-            axes: of.input.camera.axes.map(|a| a.as_vec3()),
-            is_lit_by_place: is_lit_by_place(&of.input),
-        };
-        let behind = u32::from(of.has_gradients);
-        // Sheets are shaded one later than they are finished where gradients need the one behind.
-        let mut next = span.first;
-        for batch in span.batches.clone() {
-            let wanted = picture.wanted(of.has_gradients);
-            for (prepared, scratch) in of.volumes.iter().zip(&mut self.scratch.volumes) {
-                let splatter = prepared.splatter();
-                let VolumeScratch { ring, sheets, queue, .. } = scratch;
-                for record in queue.take(prepared, batch, picture.corner) {
-                    counts.records += 1;
-                    let fragments = ring.splat(simd, &splatter, record, &wanted);
-                    counts.fragments += fragments;
-                    counts.hidden += u64::from(fragments == 0);
-                }
-                ring.take_batch(simd, batch, sheets);
-            }
-            let end =
-                if batch + 1 == span.batches.end { (batch + 1) * BATCH - 1 } else { (batch + 1) * BATCH - behind };
-            for slab in next..end {
-                self.shade_slab(simd, &shader, slab, picture, counts);
-            }
-            next = end.max(next);
-            picture.find_open();
-            if picture.open.iter().all(|row| *row == 0) {
-                return;
-            }
-        }
-    }
-
-    /// Shades and composites one sheet of every volume.
-    #[inline(always)]
-    fn shade_slab<S: Simd>(
-        &mut self,
-        simd: S,
-        shader: &Shader<'_>,
-        slab: u32,
-        picture: &mut Picture,
-        counts: &mut SheetCounts,
-    ) {
-        let of = self.of;
-        if let Some(drawn) = self.drawn() {
-            counts.splat_fragments += self.scratch.splats.fill(simd, drawn, (&of.slabs, slab), picture);
-        }
-        for y in 1..=TILE {
-            let mut tags = self.scratch.splats.sums.tags[y];
-            for scratch in &self.scratch.volumes {
-                tags |= scratch.sheets.tags(slab, y);
-            }
-            tags &= picture.open[y];
-            let mut x = 1;
-            while x <= TILE {
-                if tags >> x & ((1 << Lanes::<S>::COUNT) - 1) != 0 {
-                    counts.shaded += Lanes::<S>::COUNT as u64;
-                    let fragments = &mut self.scratch.fragments;
-                    fragments.any = false;
-                    for (prepared, scratch) in of.volumes.iter().zip(&self.scratch.volumes) {
-                        let reconstructed = Reconstructed {
-                            prepared,
-                            crossings: &scratch.crossings,
-                            sheets: &scratch.sheets,
-                            limits: [&self.scratch.near, &self.scratch.far],
-                        };
-                        shader.add(simd, &reconstructed, Place { slab, y, x }, picture, fragments);
-                    }
-                    self.scratch.splats.sums.add(simd, [x - 1, y - 1], of.slabs.origin, picture, fragments);
-                    if fragments.any {
-                        picture.composite(simd, y - 1, x - 1, fragments, of.slabs.origin);
-                    }
-                }
-                x += Lanes::<S>::COUNT;
-            }
-        }
+        slabs.at(farthest) + 1
     }
 }
 

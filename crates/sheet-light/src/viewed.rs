@@ -30,6 +30,20 @@ pub(crate) struct PixelFootprint {
     pub(crate) half: [f32; 2],
 }
 
+/// Eight voxels in a row.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Eight {
+    /// Where their kernels begin, 256ths of a slab.
+    pub(crate) places: [f64; 8],
+    /// Whether kernels begin behind the first face and end before the eye.
+    pub(crate) is_before_the_eye: [bool; 8],
+    /// Pixels per world unit.
+    pub(crate) scales: [f64; 8],
+    /// Pixels of the picture.
+    pub(crate) x: [f32; 8],
+    pub(crate) y: [f32; 8],
+}
+
 /// One lattice in view space.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Viewed {
@@ -136,6 +150,25 @@ impl Viewed {
     #[inline(always)]
     pub(crate) fn depth(&self, place: u32) -> f64 {
         f64::from(place) * (self.width / f64::from(PHASES)) + self.reach
+    }
+
+    /// Eight voxels in a row, the first at a view position: [`Viewed::place`], [`Viewed::scale`] and [`Viewed::pixel`] of each.
+    #[inline(always)]
+    pub(crate) fn eight(&self, start: DVec3) -> Eight {
+        let mut out = Eight::default();
+        let (center, origin) = (self.center.map(|c| c as f32), self.origin.unwrap_or(0.0));
+        for i in 0..8 {
+            let at = start + self.axes.x_axis * i as f64;
+            let slabs = (f64::from(at.z as f32) - self.reach) / self.width;
+            out.places[i] = (slabs * f64::from(PHASES) + 0.5).trunc();
+            let z = origin + out.places[i] * (self.width / f64::from(PHASES)) + self.reach;
+            let is_near = self.origin.is_some() && z < NEAREST * self.reach;
+            out.is_before_the_eye[i] = slabs >= 0.0 && !is_near;
+            out.scales[i] = if self.origin.is_some() { self.focal / z } else { self.focal };
+            let scale = out.scales[i] as f32;
+            (out.x[i], out.y[i]) = (center[0] + at.x as f32 * scale, center[1] - at.y as f32 * scale);
+        }
+        out
     }
 
     /// Pixels per world unit at a depth; `None` too near the eye.

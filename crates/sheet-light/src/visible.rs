@@ -77,15 +77,13 @@ impl Voxels {
         self.bits.iter().enumerate().map(rank).collect()
     }
 
-    /// How many there are before a voxel that is one of them, row by row.
+    /// How many there are before voxel i of a row, and, a bit each, whether it and the next one are of them. It is not the last one.
     #[inline(always)]
-    pub(crate) fn rank(&self, ranks: &[u64], i: usize, j: usize, k: usize) -> Option<usize> {
-        if i >= self.dims[0] || j >= self.dims[1] || k >= self.dims[2] {
-            return None;
-        }
+    pub(crate) fn pair(&self, ranks: &[u64], i: usize, j: usize, k: usize) -> (usize, u64) {
         let at = (k * self.dims[1] + j) * self.words + i / 64;
         let (word, bit) = (self.bits[at], i % 64);
-        (word >> bit & 1 != 0).then(|| ranks[at] as usize + (word & ((1 << bit) - 1)).count_ones() as usize)
+        let next = if bit == 63 { self.bits[at + 1] << 1 } else { 0 };
+        (ranks[at] as usize + (word & ((1 << bit) - 1)).count_ones() as usize, (word >> bit | next) & 3)
     }
 
     /// The bits of a word that are voxels.

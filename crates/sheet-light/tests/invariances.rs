@@ -148,3 +148,33 @@ fn what_is_behind_an_opaque_surface_is_not_seen() {
         assert!((tau - 0.25 * (depth - 15.0)).abs() < 2e-6, "{tau} before {depth}");
     }
 }
+
+#[test]
+fn what_is_hidden_is_not_splatted_and_nothing_else_changes() {
+    let (tf, material) = (transfer(&[(0.3, 0.0), (0.5, 0.1), (0.9, 0.3)]), Material::default());
+    let grid = grid([30, 26, 40], cubic(0.3), noise);
+    let mut volumes = [volume(&grid, &tf, &material)];
+    volumes[0].normals = true;
+    let (camera, lights) = (perspective([1.0, 2.0, 14.0], 40.0, [100, 80]), [sun()]);
+    let sheeted = prepare(input(&volumes, &camera, &lights), &exact(), None).unwrap();
+    let fold = |end: f32, opaque: &[f32]| {
+        let mut out = Accumulator::new(camera.size, 1, 3, true, true);
+        let counts = sheeted.fold(f32::NEG_INFINITY..end, opaque, &BEAUTY, &mut out, None).unwrap();
+        (out, counts)
+    };
+    // Pixels of one column lie before a nearer wall than those of the next one.
+    let walls = [11.0, 14.0];
+    let opaque: Vec<f32> = (0..8000).map(|at| walls[at / 10 % 2]).collect();
+    let (found, counts) = fold(f32::INFINITY, &opaque);
+    let parts = walls.map(|wall| fold(wall, &[]).0);
+    for (at, wall) in opaque.iter().enumerate() {
+        let part = &parts[usize::from(*wall == walls[1])];
+        assert!((found.optical_depth[0][at] - part.optical_depth[0][at]).abs() < 1e-6, "pixel {at}");
+        for c in 0..3 {
+            assert!((found.channels[c][at] - part.channels[c][at]).abs() < 1e-6, "pixel {at}");
+        }
+    }
+    let all = fold(f32::INFINITY, &[]).1;
+    assert!(counts.records * 4 < all.records * 3 && counts.fragments * 5 < all.fragments * 4, "{counts:?} of {all:?}");
+    assert!(counts.shaded * 3 < all.shaded * 2, "{counts:?} of {all:?}");
+}

@@ -7,4 +7,5 @@ mod half;
 mod hard_cases;
 mod invariances;
 mod splats;
+mod strides;
 mod twin;

@@ -1,0 +1,124 @@
+"""The rows of `--bench sheets` by VTK's vtkFixedPointVolumeRayCastMapper: the same head, transfer functions, views and sizes.
+
+    pip install vtk numpy
+    python3 benches/peers/vtk_volume.py [THREADS [STEP [WORD]]]
+
+A ray is sampled every STEP millimetres, 1 if nothing is said, the lattice's spacing; no antialiasing. Least times of several
+frames, the camera moved by nothing visible so that each is cast anew: by the clock, and of all threads on processors. The error
+is that to its own picture at a quarter of a millimetre; finer steps lose digits of its fixed-point opacities. With WORD those rows whose name has it.
+"""
+
+import pathlib
+import sys
+import time
+
+import numpy
+import vtk
+from vtk.util.numpy_support import vtk_to_numpy
+
+HEAD = pathlib.Path(__file__).parents[2] / "assets/mni152/mni152_t1.nii.gz"
+SEMI = [(30, 0.0), (80, 0.004), (150, 0.01), (200, 0.05), (255, 0.08)]
+ISO = [(90, 0.0), (110, 2.0)]
+REPEATS = 7
+
+
+def transfer(points, volume):
+    """Extinction per millimetre, entry by entry: opacities between entries would not be those of their extinctions."""
+    opacity, color = vtk.vtkPiecewiseFunction(), vtk.vtkColorTransferFunction()
+    values, extinctions = zip(*points)
+    for value in range(256):
+        extinction = numpy.interp(value, values, extinctions)
+        opacity.AddPoint(value, 1.0 - numpy.exp(-extinction))
+        t = numpy.clip(value, values[0], values[-1]) / 255.0
+        color.AddRGBPoint(value, 0.4 + 0.6 * t, 0.9 * t, 0.8 - 0.6 * t)
+    volume.SetScalarOpacity(opacity)
+    volume.SetColor(color)
+    volume.SetScalarOpacityUnitDistance(1.0)
+    volume.SetInterpolationTypeToLinear()
+
+
+def scene(reader, points, lit, perspective, pixels, threads):
+    mapper = vtk.vtkFixedPointVolumeRayCastMapper()
+    mapper.SetInputConnection(reader.GetOutputPort())
+    mapper.SetAutoAdjustSampleDistances(False)
+    mapper.SetLockSampleDistanceToInputSpacing(False)
+    mapper.SetImageSampleDistance(1.0)
+    mapper.SetNumberOfThreads(threads)
+    volume = vtk.vtkVolume()
+    volume.SetMapper(mapper)
+    transfer(points, volume.GetProperty())
+    look = volume.GetProperty()
+    look.SetShade(lit)
+    look.SetAmbient(0.1)
+    look.SetDiffuse(0.9)
+    look.SetSpecular(0.2)
+    look.SetSpecularPower(32.0)
+    renderer = vtk.vtkRenderer()
+    renderer.AddVolume(volume)
+    renderer.RemoveAllLights()
+    renderer.AutomaticLightCreationOff()
+    sun = vtk.vtkLight()
+    sun.SetPosition(-0.6, 0.5, 0.6)
+    sun.SetFocalPoint(0.0, 0.0, 0.0)
+    renderer.AddLight(sun)
+    middle = numpy.array(volume.GetCenter())
+    camera = renderer.GetActiveCamera()
+    camera.SetFocalPoint(*middle)
+    camera.SetPosition(*(middle + [-260.0, 260.0, 100.0]))
+    camera.SetViewUp(0.0, 0.0, 1.0)
+    if perspective:
+        camera.SetViewAngle(numpy.degrees(0.54))
+    else:
+        camera.ParallelProjectionOn()
+        camera.SetParallelScale(120.0)
+    renderer.ResetCameraClippingRange()
+    window = vtk.vtkRenderWindow()
+    window.SetOffScreenRendering(True)
+    window.SetMultiSamples(0)
+    window.SetSize(pixels, pixels)
+    window.AddRenderer(renderer)
+    return window, renderer, mapper
+
+
+def picture(window, mapper, distance):
+    mapper.SetSampleDistance(distance)
+    window.Render()
+    grab = vtk.vtkWindowToImageFilter()
+    grab.SetInput(window)
+    grab.ReadFrontBufferOff()
+    grab.Update()
+    return vtk_to_numpy(grab.GetOutput().GetPointData().GetScalars()).astype(float) / 255.0
+
+
+def main():
+    threads = int(sys.argv[1]) if len(sys.argv) > 1 else 2
+    step = float(sys.argv[2]) if len(sys.argv) > 2 else 1.0
+    word = sys.argv[3] if len(sys.argv) > 3 else ""
+    reader = vtk.vtkNIFTIImageReader()
+    reader.SetFileName(str(HEAD))
+    reader.Update()
+    data = reader.GetOutput()
+    print(f"VTK {vtk.vtkVersion().GetVTKVersion()}, {threads} threads, {data.GetDimensions()}, {data.GetScalarTypeAsString()}")
+    for pixels in (400, 512):
+        for name, points in (("semi", SEMI), ("iso", ISO)):
+            for lit in (False, True):
+                for perspective in (False, True):
+                    light, lens = "shaded" if lit else "unlit", "pinhole" if perspective else "parallel"
+                    label = f"{pixels} {name} {light} {lens}"
+                    if word not in label:
+                        continue
+                    window, renderer, mapper = scene(reader, points, lit, perspective, pixels, threads)
+                    coarse = picture(window, mapper, step)
+                    best, busy = float("inf"), float("inf")
+                    for n in range(REPEATS):
+                        renderer.GetActiveCamera().Azimuth(1e-4 * (-1) ** n)
+                        start, start_busy = time.perf_counter(), time.process_time()
+                        window.Render()
+                        best = min(best, time.perf_counter() - start)
+                        busy = min(busy, time.process_time() - start_busy)
+                    fine = picture(window, mapper, 0.25)
+                    rmse = numpy.sqrt(numpy.mean((coarse - fine) ** 2))
+                    print(f"{label:>28} {best * 1e3:6.0f} {busy * 1e3:6.0f} ms, RMSE {rmse:.5f}, mean {fine.mean():.4f}", flush=True)
+
+
+main()

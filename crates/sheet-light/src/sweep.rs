@@ -1,0 +1,164 @@
+//! A tile from front to back: splat the voxels of a batch of slabs, finish its sheets, shade, add the splats of the slab,
+//! composite (Figure 5).
+//!
+//! Each volume has slabs of its own, some of all volumes' slabs each. The sweep goes from face to face of what is there: of the
+//! volumes that have kernels at a depth, and of slabs that hold splats. So a coarse volume costs its own slabs where it is alone,
+//! and where it shares them its values and its light are those of its own slab, over the length of each part.
+
+use crate::counts::SheetCounts;
+use crate::fold::Prepared;
+use crate::picture::Picture;
+use crate::rays::Slopes;
+use crate::shade::{Place, Reconstructed, Shader};
+use crate::slabs::BATCH;
+use crate::tile::{FoldTile, Scratch, TILE, VolumeScratch};
+use splat_core::raster::lanes::Lanes;
+use splat_core::raster::pulp::Simd;
+use std::ops::Range;
+
+impl VolumeScratch {
+    /// The volume's own slab at a slab, if any kernel reaches it.
+    #[inline(always)]
+    fn own(&self, of: &Prepared<'_>, slab: u32) -> Option<u32> {
+        let own = slab / of.stride;
+        self.queue.active.contains(&own).then_some(own)
+    }
+
+    /// Whether the sheet there, or the next one where gradients are taken from it, is not finished.
+    #[inline(always)]
+    fn needs(&self, of: &Prepared<'_>, slab: u32) -> bool {
+        let behind = u32::from(of.volume.normals);
+        let is_behind = |own| !self.batches.is_empty() && self.batches.start * BATCH <= own + behind;
+        self.own(of, slab).is_some_and(is_behind)
+    }
+
+    /// Splats and finishes the next batch of sheets.
+    #[inline(always)]
+    fn finish<S: Simd>(&mut self, simd: S, of: &Prepared<'_>, picture: &Picture, counts: &mut SheetCounts) {
+        let batch = self.batches.start;
+        self.batches.start += 1;
+        let (splatter, wanted) = (of.splatter(), picture.wanted(of.volume.normals));
+        for record in self.queue.take(of, batch, picture.corner) {
+            counts.records += 1;
+            let fragments = self.ring.splat(simd, &splatter, record, &wanted);
+            counts.fragments += fragments;
+            counts.hidden += u64::from(fragments == 0);
+        }
+        self.ring.take_batch(simd, batch, &mut self.sheets);
+    }
+}
+
+impl FoldTile<'_> {
+    #[inline(always)]
+    pub(crate) fn sweep<S: Simd>(
+        &mut self,
+        simd: S,
+        slopes: &Slopes,
+        span: Range<u32>,
+        picture: &mut Picture,
+        counts: &mut SheetCounts,
+    ) {
+        let of = self.of;
+        let shader = Shader {
+            input: &of.input,
+            layout: self.layout,
+            slopes,
+            axes: of.input.camera.axes.map(|a| a.as_vec3()),
+            lamps: &of.lamps,
+        };
+        let (mut slab, mut steps) = (span.start, 0);
+        while slab < span.end {
+            if self.needs_batch(slab) || steps % BATCH == 0 {
+                picture.find_open();
+                picture.lit = picture.open;
+                if !self.opaque.is_empty() {
+                    picture.close(&self.scratch.far, of.slabs.face(slab));
+                }
+                // A splat behind what is opaque may reach before it.
+                let left = if self.scratch.splats.is_empty() { &picture.lit } else { &picture.open };
+                if left.iter().all(|row| *row == 0) {
+                    return;
+                }
+                self.finish(simd, slab, picture, counts);
+            }
+            let end = self.next_face(slab, span.end);
+            self.shade(simd, &shader, slab..end, picture, counts);
+            (slab, steps) = (end, steps + 1);
+        }
+    }
+
+    /// Whether a sheet of this slab, or one that a gradient there needs, is not finished.
+    fn needs_batch(&self, slab: u32) -> bool {
+        self.of.volumes.iter().zip(&self.scratch.volumes).any(|(prepared, scratch)| scratch.needs(prepared, slab))
+    }
+
+    /// Finishes the sheets that are needed.
+    #[inline(always)]
+    fn finish<S: Simd>(&mut self, simd: S, slab: u32, picture: &Picture, counts: &mut SheetCounts) {
+        for (prepared, scratch) in self.of.volumes.iter().zip(&mut self.scratch.volumes) {
+            while scratch.needs(prepared, slab) {
+                scratch.finish(simd, prepared, picture, counts);
+            }
+        }
+    }
+
+    /// Where what is there changes next: a face of a volume's own slabs, or the slab of a splat.
+    fn next_face(&self, slab: u32, end: u32) -> u32 {
+        let mut next = end;
+        for (prepared, scratch) in self.of.volumes.iter().zip(&self.scratch.volumes) {
+            let (own, active) = (slab / prepared.stride, &scratch.queue.active);
+            if own < active.end {
+                next = next.min(active.start.max(own + 1).saturating_mul(prepared.stride));
+            }
+        }
+        if let Some(splat) = self.drawn().and_then(|of| self.scratch.splats.next_slab(of.splats, &self.of.slabs)) {
+            next = next.min(splat.max(slab + 1));
+        }
+        next
+    }
+
+    /// Shades and composites what all volumes and splats have between two faces.
+    #[inline(always)]
+    fn shade<S: Simd>(
+        &mut self,
+        simd: S,
+        shader: &Shader<'_>,
+        step: Range<u32>,
+        picture: &mut Picture,
+        counts: &mut SheetCounts,
+    ) {
+        let (of, drawn) = (self.of, self.drawn());
+        let Scratch { volumes, splats, near, far, fragments } = &mut *self.scratch;
+        if let Some(drawn) = drawn {
+            counts.splat_fragments += splats.fill(simd, drawn, (&of.slabs, step.end - 1), picture);
+        }
+        let faces = [of.slabs.face(step.start), of.slabs.face(step.end)];
+        for y in 1..=TILE {
+            let mut tags = 0;
+            for (prepared, scratch) in of.volumes.iter().zip(volumes.iter()) {
+                tags |= scratch.own(prepared, step.start).map_or(0, |own| scratch.sheets.tags(own, y));
+            }
+            let tags = tags & picture.lit[y] | splats.sums.tags[y] & picture.open[y];
+            for x in (1..=TILE).step_by(Lanes::<S>::COUNT) {
+                if tags >> x & ((1 << Lanes::<S>::COUNT) - 1) == 0 {
+                    continue;
+                }
+                counts.shaded += Lanes::<S>::COUNT as u64;
+                fragments.any = false;
+                for (prepared, scratch) in of.volumes.iter().zip(volumes.iter_mut()) {
+                    let Some(slab) = scratch.own(prepared, step.start) else { continue };
+                    let VolumeScratch { sheets, crossings, kept, .. } = scratch;
+                    let is_part = step.len() < prepared.stride as usize;
+                    let limits = [&near[..], &far[..]];
+                    let open = (picture.open[y] >> x) as u32;
+                    let reconstructed = Reconstructed { prepared, crossings, sheets, limits, faces, is_part, open };
+                    shader.add(simd, &reconstructed, Place { slab, y, x }, picture, (kept, fragments));
+                }
+                splats.sums.add(simd, [x - 1, y - 1], of.slabs.origin, picture, fragments);
+                if fragments.any {
+                    picture.composite(simd, y - 1, x - 1, fragments, of.slabs.origin);
+                }
+            }
+        }
+    }
+}
