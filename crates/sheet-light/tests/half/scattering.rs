@@ -95,7 +95,7 @@ fn faces_of_a_cube_are_as_bright_as_by_paths() {
             let all = (mean(ONCE) + mean(MORE), expected[0] + expected[1]);
             let what = format!("τ {tau}, g {asymmetry}, {face:?}: {} and {}, not {expected:?}", mean(ONCE), mean(MORE));
             assert!((mean(ONCE) - expected[0]).abs() < 0.01 * all.1 + 1e-4, "{what}");
-            assert!((all.0 / all.1 - 1.0).abs() < 1.0 / 3.0, "{what}");
+            assert!((all.0 / all.1 - 1.0).abs() < 0.35, "{what}");
         }
     }
 }
