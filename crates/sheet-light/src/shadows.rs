@@ -148,7 +148,7 @@ impl Shadows {
     }
 }
 
-/// Weighted sums over the voxels of a cell: two neighbours are one vector.
+/// Weighted sums over the voxels of a cell: two neighbours lie beside each other.
 #[inline(always)]
 fn mean(shares: &[Share], ranks: &[usize; 4], weights: &[[f32; 2]; 4]) -> [f32; 4] {
     let mut sum = [0.0; 8];
