@@ -288,16 +288,20 @@ fn what_is_scattered_again_is_a_layer_of_its_own_and_sums_to_beauty() {
     }
     let off = largest_difference(&many.channel("G"), &sum_of_effects(&many, "G"));
     assert!(off < 1e-5, "{off:e}");
+    // Where the volumes alone are drawn by sheets, too.
+    let objects = ["object.cloud.technique='sheets'", "object.haze.technique='sheets'", HALF[3], again[1]];
+    let set: Vec<&str> = objects.iter().flat_map(|set| ["--set", set]).collect();
+    assert_eq!(draw(&scene, &set).channel("scatterN.G"), more);
     // In beauty alone it is the same light.
     let plain = in_half_vectors(&scene.replace("layers = ['effects', 'shadow']", ""), &again);
     let off = largest_difference(&many.channel("G"), &plain.channel("G"));
     assert!(off < 1e-5, "{off:e}");
     let folder = tempfile::tempdir().unwrap();
     let layers = ["--layers", "scatterN"];
-    let said = refused(folder.path(), &scene, &[&HALF[..], &layers].concat(), 2);
-    assert!(said.contains("set render.sheets.scattering"), "{said}");
-    let said = refused(folder.path(), &scene, &layers, 2);
-    assert!(said.contains("use technique = \"sheets\""), "{said}");
+    for arguments in [&HALF[..], &HALF[..2], &[]] {
+        let said = refused(folder.path(), &scene, &[arguments, &layers].concat(), 2);
+        assert!(said.contains("the layer `scatterN` is of light that the technique `sheets` scatters"), "{said}");
+    }
     let said = refused(folder.path(), &scene, &[&HALF[..], &["--set", "render.sheets.voxels_per_cell=8"]].concat(), 2);
     assert!(said.contains("light is scattered once"), "{said}");
 }

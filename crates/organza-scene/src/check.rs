@@ -8,7 +8,7 @@ use super::check_render::{check_render, own_layers};
 use super::paths::Paths;
 use super::raw::{RawCamera, RawColor, RawScene};
 use super::tree::{Document, Step};
-use super::{RenderSettings, Scene, SceneObject};
+use super::{RenderSettings, Scene, SceneObject, Technique};
 use crate::Error;
 use glam::DVec3;
 use splat_core::{Camera, Footprint, FootprintStack, Projection};
@@ -176,8 +176,9 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
         };
         objects.push(check_object(&at, object, material, &named)?);
     }
-    let render = check_render(&at.key("render"), &raw.render)?;
+    let mut render = check_render(&at.key("render"), &raw.render)?;
     check_one_technique(&at_objects, &objects, &render)?;
+    check_scattered(&at.key("render").key("layers"), &raw.render.layers, &objects, &mut render)?;
     let at_lights = at.key("light");
     let lights = raw.light.iter().enumerate().map(|(i, l)| check_light(&at_lights.index(i), l));
     Ok(Scene {
@@ -203,6 +204,27 @@ fn check_one_technique(at: &At<'_>, objects: &[SceneObject], render: &RenderSett
         let message = format!("a picture by several techniques has no layer `{layer}`");
         Err(at.index(i).key("technique").error(message, "leave the layer or this key out"))
     })
+}
+
+/// `scatterN` is one of the effects where light is scattered more than once, and else it is refused.
+fn check_scattered(
+    at: &At<'_>,
+    layers: &[String],
+    objects: &[SceneObject],
+    render: &mut RenderSettings,
+) -> Result<(), Error> {
+    let by_sheets = |o: &SceneObject| o.visible && o.technique.unwrap_or(render.technique) == Technique::Sheets;
+    let scatters_again = render.sheets.scattering().is_some() && objects.iter().any(by_sheets);
+    if scatters_again && layers.iter().any(|layer| layer == "effects") {
+        render.layers.add_scattered();
+    }
+    if !scatters_again && render.layers.names().any(|layer| layer == "scatterN") {
+        let message = "the layer `scatterN` is of light that the technique `sheets` scatters more than once";
+        let hint = "use technique = \"sheets\" with render.sheets.slicing = \"half_vector\" and \
+                    render.sheets.scattering = \"forward_and_back\", or leave it out";
+        return Err(at.error(message, hint));
+    }
+    Ok(())
 }
 
 fn at_materials<'a>(at: &At<'a>) -> At<'a> {

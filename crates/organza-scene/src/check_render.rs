@@ -28,20 +28,19 @@ pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSetting
         return Err(at.key("max_points").error("`max_points`: expected a whole number above 0, found 0", ""));
     }
     let technique = check_technique(at, raw.technique.as_deref().unwrap_or("auto"))?;
-    let sheets = check_sheets(&at.key("sheets"), &raw.sheets)?;
     Ok(RenderSettings {
         technique,
         antialias: at.whole("antialias", raw.antialias.unwrap_or(2), 1..=8)?,
         tolerance,
         exposure: at.number("exposure", raw.exposure.unwrap_or(0.0), -60.0..=60.0)?,
         depth_ranges: at.whole("depth_ranges", raw.depth_ranges.unwrap_or(16), 1..=1024)?,
-        layers: check_layers(&at.key("layers"), &raw.layers, technique, &sheets)?,
+        layers: check_layers(&at.key("layers"), &raw.layers, technique)?,
         seed: raw.seed.unwrap_or(0),
         max_points: raw.max_points,
         shadow: check_shadow(&at.key("shadow"), &raw.shadow)?,
         points: check_points(&at.key("points"), &raw.points)?,
         particles: check_particles(&at.key("particles"), &raw.particles)?,
-        sheets,
+        sheets: check_sheets(&at.key("sheets"), &raw.sheets)?,
     })
 }
 
@@ -59,17 +58,8 @@ pub(super) fn check_technique(at: &At<'_>, name: &str) -> Result<Technique, Erro
     Err(at.key("technique").error(message, format!("use {NAMES}")))
 }
 
-fn check_layers(
-    at: &At<'_>,
-    names: &[String],
-    technique: Technique,
-    sheets: &SheetsSettings,
-) -> Result<LayerChoice, Error> {
+fn check_layers(at: &At<'_>, names: &[String], technique: Technique) -> Result<LayerChoice, Error> {
     let mut choice = LayerChoice::default();
-    let scatters_again = technique == Technique::Sheets && sheets.scattering().is_some();
-    if scatters_again && names.iter().any(|name| name == "effects") {
-        choice.add_scattered();
-    }
     for (i, name) in names.iter().enumerate() {
         if !choice.add(name) {
             if ADDITIVE_LAYERS.contains(&name.as_str()) {
@@ -81,10 +71,6 @@ fn check_layers(
     }
     let lacking = own_layers(&choice).find(|(owner, _)| *owner != technique);
     match lacking {
-        None if choice.names().any(|name| name == "scatterN") && !scatters_again => {
-            let message = "the layer `scatterN` is of light that is scattered more than once";
-            Err(at.error(message, "set render.sheets.scattering = \"forward_and_back\", or leave it out"))
-        }
         None => Ok(choice),
         Some((owner, layer)) => {
             let message = format!("the technique `{}` has no layer `{layer}`", technique.name());

@@ -69,8 +69,7 @@ impl Technique {
     pub const fn own_layers(self) -> &'static [&'static str] {
         match self {
             Self::Particles => &["std_error"],
-            Self::Sheets => &["scatterN"],
-            Self::Auto | Self::Points | Self::Reference => &[],
+            Self::Auto | Self::Points | Self::Sheets | Self::Reference => &[],
         }
     }
 }
