@@ -292,6 +292,11 @@ fn what_is_scattered_again_is_a_layer_of_its_own_and_sums_to_beauty() {
     let objects = ["object.cloud.technique='sheets'", "object.haze.technique='sheets'", HALF[3], again[1]];
     let set: Vec<&str> = objects.iter().flat_map(|set| ["--set", set]).collect();
     assert_eq!(draw(&scene, &set).channel("scatterN.G"), more);
+    // A light without shadows goes through all as if it were not there.
+    let free = parallel_view(2.6, 48) + &bright("[-0.4, -1, -0.6]") + "shadow = false\n" + MIXED;
+    assert!(in_half_vectors(&free, &again).channel("scatterN.G").iter().all(|v| *v == 0.0));
+    let said = explained(&free, &again);
+    assert!(said.contains("its shadow is left out, and so it is scattered once"), "{said}");
     // In beauty alone it is the same light.
     let plain = in_half_vectors(&scene.replace("layers = ['effects', 'shadow']", ""), &again);
     let off = largest_difference(&many.channel("G"), &plain.channel("G"));

@@ -40,26 +40,40 @@ pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: 
     let called_for = |point: &LightPoint| plan.shadow_maps[point.of];
     plan.carried = points.iter().zip(&carries).map(|(point, carries)| called_for(point) && carries.is_ok()).collect();
     plan.scatters_again = scatters_again;
-    let of_light = |light: usize| {
-        let own = || points.iter().zip(&carries).filter(move |(point, _)| point.of == light);
-        let carried = own().filter(|(_, carries)| carries.is_ok()).count();
-        let mut reason = match own().count() {
-            1 => String::new(),
-            all => format!("{carried} of {all} points; "),
-        };
-        reason += &match own().find_map(|(_, carries)| carries.as_ref().err()) {
-            None if scatters_again => {
-                "it comes through slabs that light and view share, and is scattered there again and again".to_owned()
-            }
-            None => "it comes through slabs that light and view share".to_owned(),
-            Some(why) => format!("a shadow map has it, scattered once: {why}"),
-        };
-        Effect { name: format!("light {light} through volumes"), called_for: carried > 0, reason, bound: 0.0 }
-    };
+    let missing = loaded.own.iter().any(|own| !own.has_splats && loaded.objects[own.object].casts_shadow);
+    if missing && points.iter().zip(&carries).any(|(point, carries)| called_for(point) && carries.is_err()) {
+        return Err(Error::Internal("splats that a shadow map needs were not made".into()));
+    }
+    let told = |light: usize| plan.shadow_maps[light] || scatters_again;
+    let effects: Vec<Effect> = (0..plan.shadow_maps.len())
+        .filter(|light| told(*light))
+        .map(|light| {
+            let own: Vec<_> =
+                points.iter().zip(&carries).filter(|(point, _)| point.of == light).map(|(_, c)| c).collect();
+            let (called_for, reason) = way(&own, plan.shadow_maps[light], scatters_again);
+            Effect { name: format!("light {light} through volumes"), called_for, reason, bound: 0.0 }
+        })
+        .collect();
     let lights = plan.shadow_maps.len();
-    let told: Vec<Effect> = (0..lights).filter(|light| plan.shadow_maps[*light]).map(of_light).collect();
-    plan.effects.splice(lights..lights, told);
+    plan.effects.splice(lights..lights, effects);
     Ok(())
+}
+
+/// Whether any of the points of a light is carried, and how its light comes through volumes, in words.
+fn way(points: &[&Result<(), String>], has_shadow: bool, scatters_again: bool) -> (bool, String) {
+    if !has_shadow {
+        return (false, "its shadow is left out, and so it is scattered once".into());
+    }
+    let carried = points.iter().filter(|carries| carries.is_ok()).count();
+    let of_all = if points.len() > 1 { format!("{carried} of {} points; ", points.len()) } else { String::new() };
+    let reason = match points.iter().find_map(|carries| carries.as_ref().err()) {
+        Some(why) => format!("a shadow map has it, scattered once: {why}"),
+        None if scatters_again => {
+            "it comes through slabs that light and view share, and is scattered there again and again".into()
+        }
+        None => "it comes through slabs that light and view share".into(),
+    };
+    (carried > 0, of_all + &reason)
 }
 
 /// The maps that are wanted: one for each point of a light, of all casters, and where light is carried one for each point, of
