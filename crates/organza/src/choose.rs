@@ -54,7 +54,11 @@ pub(crate) fn choose<'a>(
     let shadows = shining && objects.clone().any(|(o, _)| o.receives);
     let one = |(object, technique): (&ObjectStatistics, Technique)| {
         let row = row(technique);
-        let (form, reason) = row.form.map_or((Form::Splats, DRAWN), |form| form(object));
+        let (form, reason) = match row.form {
+            _ if object.opaque => (Form::Opaque, "an opaque surface is drawn exactly"),
+            Some(form) => form(object),
+            None => (Form::Splats, DRAWN),
+        };
         let splats = match form {
             Form::Opaque => Some(DRAWN),
             Form::Splats => Some(row.of_splats),

@@ -27,9 +27,6 @@ const SHEETS: f64 = 2e-6;
 
 /// The form in which an object is taken.
 pub(crate) fn form(object: &ObjectStatistics) -> (Form, &'static str) {
-    if object.opaque {
-        return (Form::Opaque, "an opaque surface is drawn exactly");
-    }
     match object.data {
         ObjectData::Volume => (Form::Cells, "sheets classify what they reconstruct"),
         ObjectData::Density { .. } => (Form::Cells, "sheets reconstruct it from a lattice"),

@@ -72,8 +72,9 @@ fn cubes_lose_by_the_sides_what_paths_do() {
             let found = block(&cube, tau as f32 / 8.0, &material, &sun([0.0, 0.0, 1.0]), &params(BOTH));
             let shares = [found.reflected, found.transmitted, found.sides].map(|v| v[0] / found.incident[0]);
             let worst = (0..3).map(|n| (shares[n] - expected[n]).abs()).fold(0.0, f64::max);
+            println!("τ {tau}, ω {albedo}, g {asymmetry}: off by {worst:.3}");
             // Two streams along the light know little of thin cubes, and their edges are taken for slanted surfaces.
-            assert!(worst < 0.15, "τ {tau}, ω {albedo}, g {asymmetry}: {shares:?}, not {expected:?}");
+            assert!(worst < 0.125, "τ {tau}, ω {albedo}, g {asymmetry}: {shares:?}, not {expected:?}");
         }
     }
 }
@@ -95,7 +96,8 @@ fn faces_of_a_cube_are_as_bright_as_by_paths() {
             let all = (mean(ONCE) + mean(MORE), expected[0] + expected[1]);
             let what = format!("τ {tau}, g {asymmetry}, {face:?}: {} and {}, not {expected:?}", mean(ONCE), mean(MORE));
             assert!((mean(ONCE) - expected[0]).abs() < 0.01 * all.1 + 1e-4, "{what}");
-            assert!((all.0 / all.1 - 1.0).abs() < 0.35, "{what}");
+            println!("{what}: {:.3} of it", all.0 / all.1);
+            assert!((all.0 / all.1 - 1.0).abs() < 1.0 / 3.0, "{what}");
         }
     }
 }

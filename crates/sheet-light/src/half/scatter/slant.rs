@@ -3,6 +3,10 @@
 //! What is open to the sides is the area of cells' faces. A surface of normal n has, of an area of 1, |n_x| + |n_y| + |n_z| of such faces:
 //! a ball has half as much again as its surface, and would lose half as much light again. Along the light streams leave without
 //! stairs, |n_z|, so the sides are left with (1 − |n_z|)/(|n_x| + |n_y|) of theirs. The normal is the gradient of the media about a cell.
+//!
+//! Streams and diffusion keep light in for too long besides, so the root of that share is taken, which is what paths say: with the whole
+//! of it clouds are 9 to 30 % too bright, with none 3 to 22 % too dark
+//! (`clouds_that_scatter_again_and_again_come_near_path_tracing`).
 
 use super::streams::{Sources, transport};
 
@@ -41,12 +45,12 @@ pub(super) fn shares(of: &Sources<'_>) -> Vec<f64> {
     (0..media.len()).map(share).collect()
 }
 
-/// (1 − |n_z|)/(|n_x| + |n_y|) for a gradient; 1 without any.
+/// √((1 − |n_z|)/(|n_x| + |n_y|)) for a gradient; 1 without any.
 pub(crate) fn of_normal(gradient: [f64; 3]) -> f64 {
     let [x, y, z] = gradient.map(f64::abs);
     let (length, sides) = (libm::sqrt(x * x + y * y + z * z), x + y);
     // √(x² + y² + z²) − z without the digits that cancel.
-    if sides > 0.0 { (x * x + y * y) / ((length + z) * sides) } else { 1.0 }
+    if sides > 0.0 { libm::sqrt((x * x + y * y) / ((length + z) * sides)) } else { 1.0 }
 }
 
 #[cfg(test)]
@@ -57,8 +61,9 @@ mod tests {
     fn faces_along_the_cells_keep_their_area_and_stairs_lose_what_is_not_the_surface_s() {
         assert_eq!((of_normal([3.0, 0.0, 0.0]), of_normal([0.0, -1.0, 0.0]), of_normal([0.0; 3])), (1.0, 1.0, 1.0));
         let root = 2f64.sqrt();
-        assert!((of_normal([1.0, 1.0, 0.0]) - 1.0 / root).abs() < 1e-12);
-        assert!((of_normal([1.0, 0.0, 1.0]) - (root - 1.0)).abs() < 1e-12);
-        assert!((of_normal([1e-9, 0.0, 1.0]) - 0.5e-9).abs() < 1e-15);
+        let square = |gradient: [f64; 3]| of_normal(gradient).powi(2);
+        assert!((square([1.0, 1.0, 0.0]) - 1.0 / root).abs() < 1e-12);
+        assert!((square([1.0, 0.0, 1.0]) - (root - 1.0)).abs() < 1e-12);
+        assert!((square([1e-9, 0.0, 1.0]) - 0.5e-9).abs() < 1e-15);
     }
 }
