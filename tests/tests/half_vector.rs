@@ -2,6 +2,7 @@
 //! scene, what is built for it, and what is refused.
 
 use organza::{Progress, RenderOptions, scene};
+use organza_judge::accuracy;
 use organza_judge::truth::{Orders, truth};
 use organza_tests::{Picture, draw, draw_in, largest_difference, organza, parallel_view, sum_of_effects, window};
 use std::path::Path;
@@ -119,6 +120,13 @@ fn hv15_a_lamp_inside_has_a_shadow_map_and_both_slicings_agree() {
         assert!(rmse(&a, &b) < 0.01 && mean > 0.03, "{channel}: RMSE {} of {mean}", rmse(&a, &b));
     }
     let said = explained(&scene, &[]);
+    assert!(!said.contains("scattered once, though"), "{said}");
+    let again = ["explain", "scene.toml", "--set", "render.sheets.scattering='forward'"];
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("scene.toml"), &scene).unwrap();
+    let out = organza().args(again).args(HALF).current_dir(&folder).output().unwrap();
+    let warned = String::from_utf8_lossy(&out.stdout) + String::from_utf8_lossy(&out.stderr);
+    assert!(warned.contains("a light is scattered once, though render.sheets.scattering asks for more"), "{warned}");
     assert!(said.contains("a shadow map has it, scattered once: the lamp lies inside object 'cloud'"), "{said}");
     assert!(said.contains("it comes through slabs that light and view share"), "{said}");
 }
@@ -309,4 +317,20 @@ fn what_is_scattered_again_is_a_layer_of_its_own_and_sums_to_beauty() {
     }
     let said = refused(folder.path(), &scene, &[&HALF[..], &["--set", "render.sheets.voxels_per_cell=8"]].concat(), 2);
     assert!(said.contains("light is scattered once"), "{said}");
+}
+
+#[test]
+fn what_points_are_judged_by_is_known_of_scenes_that_make_no_splats_for_sheets() {
+    let set = ["render.technique='sheets'", "render.sheets.slicing='half_vector'"];
+    let overrides = set.map(|o| scene::Override::parse(o).unwrap()).to_vec();
+    let text = parallel_view(2.0, 16) + &sun("[-0.4, -1, -0.6]") + &fog(1.0);
+    let load = scene::LoadOptions { overrides, ..Default::default() };
+    let scene = scene::parse(Path::new("s.toml"), text.as_bytes(), &load).unwrap();
+    let (options, progress) = (RenderOptions::default(), Progress::new());
+    let mut renderer = accuracy::Renderer::new(&options, &progress);
+    let points = renderer.facts(&accuracy::in_points(&scene)).unwrap();
+    assert!(points.slice_thickness.is_some() && points.cells.is_some(), "{points:?}");
+    // Half vectors need no map, so no knob of one is turned.
+    let sheets = renderer.facts(&accuracy::in_sheets(&scene)).unwrap();
+    assert_eq!(sheets.cells, None);
 }

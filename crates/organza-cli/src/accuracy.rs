@@ -40,7 +40,7 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
             progress.plan(STAGES);
             let mut renderer = Renderer::new(&render, progress);
             progress.begin(STAGES[0].0);
-            let facts = renderer.facts(&scene)?;
+            let facts = renderer.facts(&accuracy::in_points(&scene))?;
             let sweep = accuracy::points(&scene, &facts, &options);
             progress.begin(STAGES[1].0);
             let truth = truth(&scene, &render, &options, progress)?;
@@ -49,7 +49,7 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
             progress.begin(STAGES[3].0);
             let particles = particles(&scene, &facts, &options, &points, &mut renderer, progress)?;
             progress.begin(STAGES[4].0);
-            let sheets = sheets(&scene, &facts, &options, &points, &mut renderer, progress)?;
+            let sheets = sheets(&scene, &options, &points, &mut renderer, progress)?;
             let (mut studies, mut absent) = (vec![points], Vec::new());
             for study in [particles, sheets] {
                 match study {
@@ -112,7 +112,6 @@ fn particles(
 /// The study of `sheets`, by a limit of its own and the truth of `points`; or why there is none.
 fn sheets(
     scene: &Scene,
-    facts: &Facts,
     options: &Options,
     points: &Study,
     renderer: &mut Renderer<'_>,
@@ -127,7 +126,8 @@ fn sheets(
         Err(limit @ Error::Limit(_)) => return absent(limit.to_string()),
         found => found?,
     };
-    let sweep = match accuracy::sheets(scene, slab_width, facts, options) {
+    let facts = renderer.facts(&drawn)?;
+    let sweep = match accuracy::sheets(scene, slab_width, &facts, options) {
         Ok(sweep) => sweep,
         Err(reason) => return absent(reason),
     };

@@ -38,7 +38,7 @@ pub use knob::{Knob, Request, Skipped, Step, Sweep, Theory};
 pub use limit::Limit;
 pub use measure::{Distance, Frame, Renderer, Timed};
 pub use particles::particles;
-pub use points::{Facts, points};
+pub use points::{Facts, in_points, points};
 pub use random::{SEEDS, Yardsticks, random_study};
 pub use report::{Absent, Machine, Report, write};
 pub use resolve::{Curve, CurvePoint, Settled, settle};

@@ -44,6 +44,10 @@ pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: 
     if missing && points.iter().zip(&carries).any(|(point, carries)| called_for(point) && carries.is_err()) {
         return Err(Error::Internal("splats that a shadow map needs were not made".into()));
     }
+    let is_left = |light: usize| {
+        plan.shadow_maps[light] && points.iter().zip(&carries).any(|(point, c)| point.of == light && c.is_err())
+    };
+    plan.scattered_once = if scatters_again { (0..plan.shadow_maps.len()).filter(|l| is_left(*l)).count() } else { 0 };
     let told = |light: usize| plan.shadow_maps[light] || scatters_again;
     let effects: Vec<Effect> = (0..plan.shadow_maps.len())
         .filter(|light| told(*light))

@@ -3,6 +3,7 @@
 
 use crate::load::{Loaded, own::Own};
 use crate::output::displayed;
+use crate::plan::Plan;
 use crate::scene::{Scene, SceneLight, SceneObject};
 use crate::{Layers, ShadowTable, escape_controls};
 use glam::DVec3;
@@ -202,6 +203,16 @@ impl View {
         };
         middle.z + radius > 0.0 && inside(x, self.half[0]) && inside(y, self.half[1])
     }
+}
+
+/// Lights that are not scattered as often as was asked for.
+pub(crate) fn of_scattering(plan: &Plan) -> Option<String> {
+    let lights = match plan.scattered_once {
+        0 => return None,
+        1 => "a light is".to_owned(),
+        n => format!("{n} lights are"),
+    };
+    Some(format!("{lights} scattered once, though render.sheets.scattering asks for more: `organza explain` says why"))
 }
 
 /// Shadow maps that memory made coarser.

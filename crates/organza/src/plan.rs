@@ -52,6 +52,8 @@ pub struct Plan {
     pub shadow_tables: Vec<Option<ShadowTable>>,
     /// Whether light is scattered more than once.
     pub scatters_again: bool,
+    /// Lights that are scattered once all the same, because a technique cannot carry the light of some of their points.
+    pub scattered_once: usize,
     /// For each point of each light: whether a technique carries its light through what it draws by itself.
     pub carried: Vec<bool>,
     /// For each point whose light is carried: the table of its map of all other casters, if there are any. Empty where none is.

@@ -42,6 +42,7 @@ pub struct Explanation {
 pub fn explain(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Explanation, Error> {
     let (_, mut explanation, _) = prepare(scene, options, progress, &Files::default())?;
     explanation.warnings.extend(doubts::of_shadows(explanation.plan.tables()));
+    explanation.warnings.extend(doubts::of_scattering(&explanation.plan));
     progress.finish();
     Ok(explanation)
 }

@@ -106,6 +106,7 @@ pub(crate) fn render_keeping(
         warnings.extend(doubts::of_picture(scene, &layers));
     }
     warnings.extend(doubts::of_shadows(plan.tables()));
+    warnings.extend(doubts::of_scattering(&plan));
     warnings.extend(helper.map(|helper| helper.said()).unwrap_or_default());
     Ok(Render { layers, cost, plan, sets, warnings, notes, backend })
 }

@@ -145,7 +145,7 @@ impl<'a> Renderer<'a> {
         })
     }
 
-    /// What the knobs of `points` need to know of a scene.
+    /// What the knobs of a technique need to know of a scene that it draws.
     ///
     /// # Errors
     /// As [`Renderer::draw`].

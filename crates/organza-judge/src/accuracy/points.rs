@@ -21,8 +21,7 @@ const MOST_ANTIALIAS: f64 = 8.0;
 
 /// Knobs of `points` in this scene.
 pub fn points(scene: &Scene, facts: &Facts, options: &Options) -> Sweep {
-    let mut base = Request { scene: scene.clone(), oversample: 1 };
-    base.scene.render.technique = Technique::Points;
+    let base = Request { scene: in_points(scene), oversample: 1 };
     let joint_levels = if options.quick { 2 } else { 5 };
     let mut sweep = Sweep {
         technique: "points",
@@ -71,6 +70,13 @@ pub(super) fn finer(options: &Options) -> f64 {
 
 const NO_TRANSLUCENT: &str = "no splat is translucent";
 const NO_MAP: &str = "no light gets a shadow map";
+
+/// The scene by this technique.
+pub fn in_points(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    scene.render.technique = Technique::Points;
+    scene
+}
 
 fn slices(facts: &Facts, options: &Options) -> Result<Knob, String> {
     let own = facts.slice_thickness.ok_or(NO_TRANSLUCENT)?;
