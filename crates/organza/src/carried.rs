@@ -1,8 +1,8 @@
-//! Light that a technique carries through what it draws by itself: no shadow map need have that, and which maps are left to build.
+//! Light that a technique carries through what it draws: no shadow map need have that, and which maps are left to build.
 
 use crate::Error;
 use crate::choose::{row, techniques};
-use crate::form::PlannedObject;
+use crate::form::{Form, PlannedObject};
 use crate::lights::{self, LightPoint};
 use crate::load::Loaded;
 use crate::matter::{Carries, CarriesLight, Matter};
@@ -17,13 +17,17 @@ pub(crate) fn of_scene(scene: &Scene) -> Option<CarriesLight> {
     techniques(scene).into_iter().find_map(|technique| (row(technique).carries)(scene))
 }
 
-/// Whether nothing needs a shadow of what is drawn from its own data but that itself, through which all light is carried.
+/// Whether nothing needs a shadow of what is drawn from its own data but that itself, through which all light is carried. Beside
+/// translucent splats that is not known before they are made.
 pub(crate) fn is_all(
     carries: CarriesLight,
     matter: &Matter<'_>,
     statistics: &[ObjectStatistics],
     lights: &[SceneLight],
 ) -> Result<bool, Error> {
+    if matter.planned.iter().any(|planned| planned.form == Form::Splats) {
+        return Ok(false);
+    }
     let points = lights::points(lights);
     let answers = carries(matter, &points)?.points;
     let is_no_shadow = |point: &LightPoint| !lights[point.of].shadow || point.light.intensity == [0.0; 3];
@@ -35,7 +39,8 @@ pub(crate) fn is_all(
 /// Asks the techniques of a plan, and tells what they answer of each light whose shadow is called for.
 pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: &mut Plan) -> Result<(), Error> {
     let Some(carries) = of_scene(scene) else { return Ok(()) };
-    let matter = Matter { scene, own: &loaded.own, planned: &plan.objects, camera: &loaded.camera };
+    let cloud = Some(&loaded.cloud);
+    let matter = Matter { scene, own: &loaded.own, planned: &plan.objects, cloud, camera: &loaded.camera };
     let Carries { points: carries, scatters_again } = carries(&matter, points)?;
     let called_for = |point: &LightPoint| plan.shadow_maps[point.of];
     plan.carried = points.iter().zip(&carries).map(|(point, carries)| called_for(point) && carries.is_ok()).collect();

@@ -104,7 +104,8 @@ fn stages(frame: &Frame<'_>) -> Stages {
     let mut last = Vec::new();
     for (technique, count) in of {
         let row = row(technique);
-        drawn += if row.draws_splats { count.splats } else { 0.0 };
+        let is_drawn = plan.by.iter().zip(&plan.draws).any(|(by, draws)| *by == technique && *draws);
+        drawn += if is_drawn { count.splats } else { 0.0 };
         let any = plan.passes.iter().any(|p| row.steps.last().is_some_and(|step| step.pass == p.name));
         let translucent = Translucent { splats: count.splats, fragments: count.fragments, any };
         let mut steps: Vec<(&str, f64)> =

@@ -78,10 +78,11 @@ impl<'a> Frame<'a> {
         self
     }
 
-    /// What techniques draw from objects' own data.
+    /// What techniques draw.
     pub(crate) fn matter(&self) -> Matter<'_> {
         let Self { scene, loaded, plan, .. } = self;
-        Matter { scene, own: &loaded.own, planned: &plan.objects, camera: &self.camera }
+        let cloud = Some(&loaded.cloud);
+        Matter { scene, own: &loaded.own, planned: &plan.objects, cloud, camera: &self.camera }
     }
 
     /// An interrupt, if there was one.

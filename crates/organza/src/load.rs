@@ -19,7 +19,7 @@ use loading::Loading;
 use normalize::normalize;
 use object::Prepared;
 use own::Own;
-use splat_core::{Camera, Cloud, FootprintStack, Material, Object, Shading};
+use splat_core::{Camera, Cloud, FootprintStack, Material, Object, Shading, SplatKind};
 use std::cmp::Ordering;
 
 /// A scene in memory, normalized by a power of two (see [`Loaded::exponent`]) and ready for a technique.
@@ -67,13 +67,14 @@ impl Loaded {
 }
 
 impl Loaded {
-    /// The objects, of which those that are drawn from their own data neither cast nor receive shadows.
-    pub(crate) fn objects_beside_own(&self) -> Vec<Object> {
+    /// The objects, of which those that are not opaque neither cast nor receive shadows.
+    pub(crate) fn opaque_objects(&self) -> Vec<Object> {
         let mut objects = self.objects.clone();
-        for own in &self.own {
-            let object = &mut objects[own.object];
-            (object.casts_shadow, object.shadow_coefficient) = (false, 0.0);
-        }
+        let mut hide =
+            |object: usize| (objects[object].casts_shadow, objects[object].shadow_coefficient) = (false, 0.0);
+        self.own.iter().for_each(|own| hide(own.object));
+        let kinds = self.cloud.kind.iter().zip(&self.cloud.object);
+        kinds.filter(|(kind, _)| **kind != SplatKind::Opaque).for_each(|(_, object)| hide(*object as usize));
         objects
     }
 }

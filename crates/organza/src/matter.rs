@@ -1,24 +1,26 @@
-//! What techniques draw from objects' own data, as far as it says where light comes through it: known before splats are made.
+//! What techniques draw, as far as it says where light comes through it.
 
 use crate::Error;
 use crate::form::PlannedObject;
 use crate::lights::LightPoint;
 use crate::load::own::Own;
 use crate::scene::Scene;
-use splat_core::Camera;
+use splat_core::{Camera, Cloud};
 
-/// What techniques draw from objects' own data.
+/// What techniques draw.
 #[derive(Clone, Copy)]
 pub(crate) struct Matter<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) own: &'a [Own],
     /// How each visible object is drawn.
     pub(crate) planned: &'a [PlannedObject],
+    /// The splats of all objects, once they are made.
+    pub(crate) cloud: Option<&'a Cloud>,
     /// In the unit of `own`.
     pub(crate) camera: &'a Camera,
 }
 
-/// How a technique carries light through what it draws by itself.
+/// How a technique carries light through what it draws.
 pub(crate) struct Carries {
     /// For each point of a light: whether it does, or why not.
     pub(crate) points: Vec<Result<(), String>>,

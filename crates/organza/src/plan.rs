@@ -66,7 +66,7 @@ pub struct Plan {
     pub by: Vec<Technique>,
     /// For each object, by its rank: whether it is drawn from its own data.
     pub is_own: Vec<bool>,
-    /// For each object, by its rank: whether its translucent splats are drawn as they are.
+    /// For each object, by its rank: whether its translucent splats are drawn as they are, with the radiance that the frame gives them.
     pub draws: Vec<bool>,
 }
 
@@ -80,7 +80,7 @@ impl Plan {
     /// carried through, and the bytes that their maps may take together.
     pub(crate) fn set_shadow_tables(&mut self, points: &[LightPoint], tables: Vec<Option<ShadowTable>>, bytes: u64) {
         let mut tables = tables;
-        let (others, beside) = (tables.split_off(points.len().min(tables.len())), ", of what is no volume");
+        let (others, beside) = (tables.split_off(points.len().min(tables.len())), ", of what is opaque");
         let of = |tables: &[Option<ShadowTable>], beside: &str| -> Vec<PlannedPass> {
             let one = |(table, point): (&Option<ShadowTable>, &LightPoint)| {
                 let reason = table.as_ref()?.describe(&(point.name() + beside));

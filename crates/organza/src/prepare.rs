@@ -116,23 +116,26 @@ fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Resu
     let materials = loaded.own.iter().map(|o| &loaded.materials[scene.objects[o.object].material]);
     let unequal = |m: &Material| m.extinction_rgb.iter().any(|e| *e != m.extinction_rgb[0]);
     statistics.colored_extinction |= materials.into_iter().any(unequal);
+    statistics.lit_as_drawn = carried::of_scene(scene).is_some();
     let mut plan = plan(&statistics);
     plan.by = scene.objects.iter().map(|o| technique_of(o, scene)).collect();
     plan.is_own = vec![false; scene.objects.len()];
     loaded.own.iter().for_each(|own| plan.is_own[own.object] = true);
-    plan.draws = plan.by.iter().zip(&plan.is_own).map(|(by, own)| row(*by).draws_splats && !own).collect();
+    let draws = |by: &Technique| row(*by).draws_splats && !statistics.lit_as_drawn;
+    plan.draws = plan.by.iter().zip(&plan.is_own).map(|(by, own)| draws(by) && !own).collect();
     let used = statistics.techniques.iter().filter(|t| statistics.translucent_of(**t).is_some());
     // They take turns, and each keeps what it has.
     let points = lights::points(&loaded.lights);
     let mut camera = loaded.camera;
     camera.size = camera.size.map(|s| s.saturating_mul(scene.render.antialias));
-    let matter = Matter { scene, own: &loaded.own, planned: &plan.objects, camera: &camera };
+    let matter =
+        Matter { scene, own: &loaded.own, planned: &plan.objects, cloud: Some(&loaded.cloud), camera: &camera };
     let own = used.map(|t| (row(*t).bytes)(&matter, &points, statistics.colored_extinction, options)).sum();
     let memory = Memory::new(scene, loaded, own);
     memory::check("rendering", memory.total(), options.max_memory)?;
     let left = options.max_memory - memory.total();
     // Shadow maps share what is left.
-    let others = loaded.objects_beside_own();
+    let others = loaded.opaque_objects();
     carried::plan(scene, loaded, &points, &mut plan)?;
     let wanted = carried::wanted_maps(loaded, &points, &others, &plan);
     let tables = shadows::tables(&scene.render, loaded, &wanted, left)?;
@@ -185,7 +188,12 @@ fn load_measured(
     let beside = steps.map(|step| (step.seconds)(scene, &some)).sum();
     let spare = carried::of_scene(scene).map(|carries| {
         move |own: &[Own], planned: &[PlannedObject], statistics: &[ObjectStatistics], lights: &[SceneLight]| {
-            carried::is_all(carries, &Matter { scene, own, planned, camera: &scene.camera }, statistics, lights)
+            carried::is_all(
+                carries,
+                &Matter { scene, own, planned, cloud: None, camera: &scene.camera },
+                statistics,
+                lights,
+            )
         }
     });
     inputs.convert(planned, spare.as_ref().map(|spare| spare as &Spare<'_>), beside, cost)

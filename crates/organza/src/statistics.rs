@@ -108,6 +108,8 @@ pub struct Statistics {
     pub colored_extinction: bool,
     /// Whether normals were computed for volumes.
     pub normals_needed: bool,
+    /// Whether splats are lit as they are drawn, not before.
+    pub lit_as_drawn: bool,
     /// Lights, whole.
     pub lights: Vec<LightStatistics>,
     /// Layers asked for beside beauty and alpha.

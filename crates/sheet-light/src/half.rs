@@ -17,6 +17,7 @@
 //! | 20: composite | `eye_buffer.rs` |
 //! | 18: map each pixel to the shadow buffer | `illuminate.rs`, `light_path.rs` |
 //! | 21: classify and composite into the shadow buffer | `light_buffer.rs` |
+//! | 22, 23: polygons, as discs, for eye and light | `splats.rs`, `splat_light.rs` |
 //! | the loop over slabs | `sweep.rs` |
 //! | section 3: light that is scattered more than once | `scatter.rs` |
 //!
@@ -44,7 +45,7 @@
 //! };
 //! let mut image = Accumulator::new([16, 16], 1, 3, false, false);
 //! let layout = ChannelLayout::new(&LayerSet::default());
-//! fold(&HalfInput { sheets, mapped: Vec::new(), opaque: &[] }, &HalfParams::default(), &layout, &mut image, None).unwrap();
+//! fold(&HalfInput { sheets, splats: None, mapped: Vec::new(), opaque: &[] }, &HalfParams::default(), &layout, &mut image, None).unwrap();
 //! // (1 − e^(−2τ))/2 of what is scattered to all sides alike.
 //! let expected = 0.5 * (1.0 - (-2f32).exp()) / (4.0 * std::f32::consts::PI);
 //! assert!(image.channels[0].iter().all(|c| (c - expected).abs() < 1e-5));
@@ -52,6 +53,7 @@
 
 mod axis;
 mod band;
+mod bodies;
 mod buckets;
 mod counts;
 mod eye_buffer;
@@ -71,11 +73,16 @@ mod serves;
 mod shade;
 mod sheet;
 mod sight;
+mod splat_light;
+mod splat_squares;
+mod splats;
 mod sweep;
 
 pub use axis::HalfVector;
+pub use bodies::{Bodies, SplatBounds};
 pub use counts::HalfCounts;
 pub use fold::{balance, bytes, fold, slab_width};
 pub use params::{HalfInput, HalfParams, Scattering};
 pub use scatter::balance::Balance;
 pub use serves::{LEAST_COSINE, Reason, serves};
+pub use splats::HalfSplats;

@@ -57,6 +57,7 @@ pub mod half;
 mod kept;
 mod lattice;
 mod light;
+mod lines;
 mod params;
 mod picture;
 mod queue;

@@ -4,6 +4,7 @@
 //! A splat has no sections: what is a surface is thinner than a slab, and a medium's kernel is met whole by every ray. Within a slab
 //! extinctions add, those of volumes too, and colours weigh by extinction.
 
+use crate::lines::{BLOCK, Lines, Shown};
 use crate::picture::{Fragments, Picture};
 use crate::slabs::Slabs;
 use crate::tile::{SIDE, TILE};
@@ -12,8 +13,7 @@ use splat_core::raster::bins::{self, Bins};
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use splat_core::raster::source::{Source, TileRays};
-use splat_core::raster::tile::{Line, PIXELS, Runs, position};
-use splat_core::shade::ChannelLayout;
+use splat_core::raster::tile::{PIXELS, Runs, position};
 use splat_core::{Accumulator, Material};
 use std::ops::Range;
 
@@ -46,8 +46,6 @@ impl Splats<'_> {
     }
 }
 
-/// Side of a block of pixels.
-const BLOCK: usize = 4;
 /// Blocks in a row of a tile.
 const COLUMNS: usize = TILE / BLOCK;
 
@@ -68,13 +66,7 @@ struct Square {
 
 /// Sums over the splats of one slab.
 pub(crate) struct Sums {
-    /// For each block of pixels, by line: optical depths and the channels times them; then, where depths are asked for, view depth and
-    /// thickness times the optical depth.
-    lines: Vec<Line>,
-    stride: usize,
-    has_depths: bool,
-    /// The first object of each pixel, block by block.
-    objects: Vec<u32>,
+    lines: Lines,
     /// Pixels of each row of the tile with its rim that have any.
     pub(crate) tags: [u64; SIDE],
     is_empty: bool,
@@ -91,14 +83,7 @@ pub(crate) struct Drawn<'a> {
 
 impl SplatSheet {
     pub(crate) fn new() -> Self {
-        let sums = Sums {
-            lines: Vec::new(),
-            stride: 0,
-            has_depths: false,
-            objects: Vec::new(),
-            tags: [0; SIDE],
-            is_empty: true,
-        };
+        let sums = Sums { lines: Lines::default(), tags: [0; SIDE], is_empty: true };
         Self { squares: Vec::new(), sums }
     }
 
@@ -161,20 +146,14 @@ impl SplatSheet {
 
 impl Sums {
     fn resize(&mut self, blocks: usize, into: &Accumulator) {
-        self.has_depths = !into.depth.is_empty();
-        self.stride = into.optical_depth.len() + into.channels.len() + if self.has_depths { 2 } else { 0 };
-        self.lines.clear();
-        self.lines.resize(blocks * self.stride, Line([0.0; PIXELS]));
-        self.objects.clear();
-        self.objects.resize(if into.object.is_empty() { 0 } else { blocks * PIXELS }, u32::MAX);
+        self.lines.resize(blocks, COLUMNS, into);
         (self.tags, self.is_empty) = ([0; SIDE], true);
     }
 
     /// Forgets the splats of the slab before.
     fn clear(&mut self) {
         if !self.is_empty {
-            self.lines.fill(Line([0.0; PIXELS]));
-            self.objects.fill(u32::MAX);
+            self.lines.clear();
             (self.tags, self.is_empty) = ([0; SIDE], true);
         }
     }
@@ -189,11 +168,11 @@ impl Sums {
         (rays, corner): (&TileRays, [usize; 2]),
         picture: &Picture,
     ) -> u64 {
-        let source = Source::new(of.projected, i);
-        let extinction = of.materials[source.splat.material as usize].extinction_rgb;
         let values = &of.values[i as usize * picture.channels..][..picture.channels];
+        let object = of.projected.objects.get(i as usize).copied().unwrap_or_default();
+        let shown = Shown { source: Source::new(of.projected, i), values, object };
         let mut fragments = 0;
-        for run in Runs::new(simd, source.splat, of.projected.size, corner) {
+        for run in Runs::new(simd, shown.source.splat, of.projected.size, corner) {
             let [x, y] = position(run.block * PIXELS, corner[0], corner[1]);
             // The square reaches beyond the tile.
             let (x, y) = (x.wrapping_sub(picture.corner[0]), y.wrapping_sub(picture.corner[1]));
@@ -207,92 +186,22 @@ impl Sums {
             self.tags[rows].iter_mut().for_each(|row| *row |= bits);
             self.is_empty = false;
             fragments += Lanes::<S>::COUNT as u64;
-            let block = y / BLOCK * COLUMNS + x / BLOCK;
-            let tau = source.optical_depth(simd, run, rays);
-            let lines = &mut self.lines[block * self.stride..][..self.stride];
-            let mut add = |line: usize, v: Lanes<S>| {
-                let to = &mut lines[line].0[run.lane..];
-                (Lanes::load(simd, to) + v).store(to);
-            };
-            let of_plane = |p: usize| tau * Lanes::splat(simd, extinction[p]);
-            (0..picture.planes).for_each(|p| add(p, of_plane(p)));
-            for (c, value) in values.iter().enumerate() {
-                let p = ChannelLayout::plane_of(c, picture.channels, picture.planes);
-                add(picture.planes + c, of_plane(p) * Lanes::splat(simd, *value));
-            }
-            if self.has_depths {
-                let (green, line) = (of_plane(picture.planes / 2), picture.planes + picture.channels);
-                add(line, green * source.view_depth(simd, run, rays));
-                add(line + 1, green * Lanes::splat(simd, source.thickness()));
-            }
-            if !self.objects.is_empty() {
-                self.name::<S>(of.projected.objects[i as usize], block * PIXELS + run.lane, tau);
-            }
+            self.lines.add(simd, &shown, of.materials, (run, rays), [x / BLOCK, y / BLOCK]);
         }
         fragments
     }
 
-    /// Names the pixels that a splat is the first to hide something of.
-    #[inline(always)]
-    fn name<S: Simd>(&mut self, object: u32, at: usize, tau: Lanes<S>) {
-        let mut hidden = [0.0; MAX_LANES];
-        tau.store(&mut hidden);
-        for (to, tau) in self.objects[at..].iter_mut().zip(&hidden[..Lanes::<S>::COUNT]) {
-            if *tau > 0.0 && *to == u32::MAX {
-                *to = object;
-            }
-        }
-    }
-
-    /// The pixels from (x, y) of the tile on, of one line.
-    #[inline(always)]
-    fn row<S: Simd>(&self, simd: S, line: usize, [x, y]: [usize; 2]) -> Lanes<S> {
-        let mut row = [0.0; MAX_LANES];
-        for group in 0..Lanes::<S>::COUNT / BLOCK {
-            let block = y / BLOCK * COLUMNS + x / BLOCK + group;
-            let from = &self.lines[block * self.stride + line].0[y % BLOCK * BLOCK..][..BLOCK];
-            row[group * BLOCK..][..BLOCK].copy_from_slice(from);
-        }
-        Lanes::load(simd, &row)
-    }
-
     /// Adds the splats of the pixels from (x, y) on to what volumes have there; nothing where there are none.
     #[inline(always)]
-    pub(crate) fn add<S: Simd>(
-        &self,
-        simd: S,
-        [x, y]: [usize; 2],
-        origin: f64,
-        picture: &Picture,
-        fragments: &mut Fragments,
-    ) {
-        let bits = ((1 << Lanes::<S>::COUNT) - 1) << (x + 1);
-        if self.tags[y + 1] & bits == 0 {
+    pub(crate) fn add<S: Simd>(&self, simd: S, at: [usize; 2], origin: f64, fragments: &mut Fragments) {
+        let bits = ((1 << Lanes::<S>::COUNT) - 1) << (at[0] + 1);
+        if self.tags[at[1] + 1] & bits == 0 {
             return;
         }
-        let zero = Lanes::splat(simd, 0.0);
-        let mut before = [zero; 3];
-        if fragments.any {
-            (0..picture.planes).for_each(|p| before[p] = Lanes::load(simd, &fragments.optical_depth[p]));
-        }
-        let least = Lanes::splat(simd, f32::MIN_POSITIVE);
-        let mut inverse = [zero; 3];
-        for p in 0..picture.planes {
-            let all = before[p] + self.row(simd, p, [x, y]);
-            all.store(&mut fragments.optical_depth[p]);
-            inverse[p] = Lanes::splat(simd, 1.0) / all.max(least);
-        }
-        for c in 0..picture.channels {
-            let p = ChannelLayout::plane_of(c, picture.channels, picture.planes);
-            let own = self.row(simd, picture.planes + c, [x, y]);
-            let volumes = if fragments.any { before[p] * Lanes::load(simd, &fragments.values[c]) } else { zero };
-            ((own + volumes) * inverse[p]).store(&mut fragments.values[c]);
-        }
-        if self.has_depths || !self.objects.is_empty() {
-            let green = picture.planes / 2;
-            let mut share = [0.0; MAX_LANES];
-            (self.row(simd, green, [x, y]) * inverse[green]).store(&mut share);
-            self.extras::<S>(simd, [x, y], (&share, origin), picture, fragments);
+        let Fragments { any, optical_depth, values, .. } = fragments;
+        let share = self.lines.blend(simd, at, *any, optical_depth, values);
+        if self.lines.has_extras() {
+            self.extras::<S>(simd, at, (&share, origin), fragments);
         }
         fragments.any = true;
     }
@@ -304,33 +213,18 @@ impl Sums {
         simd: S,
         [x, y]: [usize; 2],
         (share, origin): (&[f32; MAX_LANES], f64),
-        picture: &Picture,
         fragments: &mut Fragments,
     ) {
-        let (green, line) = (picture.planes / 2, picture.planes + picture.channels);
-        let (mut depth, mut thickness) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
-        let mut tau = [0.0; MAX_LANES];
-        self.row(simd, green, [x, y]).store(&mut tau);
-        if self.has_depths {
-            self.row(simd, line, [x, y]).store(&mut depth);
-            self.row(simd, line + 1, [x, y]).store(&mut thickness);
-        }
-        for lane in 0..Lanes::<S>::COUNT {
-            if tau[lane] <= 0.0 {
-                continue;
-            }
-            if self.has_depths {
-                let middle = (f64::from(depth[lane] / tau[lane]) - origin) as f32;
-                let half = 0.5 * thickness[lane] / tau[lane];
-                let mix = |volumes: f32, own: f32| {
-                    if share[lane] >= 1.0 || !fragments.any { own } else { volumes + (own - volumes) * share[lane] }
-                };
-                fragments.near[lane] = mix(fragments.near[lane], middle - half);
-                fragments.far[lane] = mix(fragments.far[lane], middle + half);
-            }
-            if !self.objects.is_empty() && (share[lane] > 0.5 || !fragments.any) {
-                let block = y / BLOCK * COLUMNS + (x + lane) / BLOCK;
-                fragments.object[lane] = self.objects[block * PIXELS + y % BLOCK * BLOCK + (x + lane) % BLOCK];
+        let [tau, depth, thickness] = self.lines.depths(simd, [x, y]);
+        for lane in (0..Lanes::<S>::COUNT).filter(|lane| tau[*lane] > 0.0) {
+            let (middle, half) = ((f64::from(depth[lane]) - origin) as f32, 0.5 * thickness[lane]);
+            let mix = |volumes: f32, own: f32| {
+                if share[lane] >= 1.0 || !fragments.any { own } else { volumes + (own - volumes) * share[lane] }
+            };
+            fragments.near[lane] = mix(fragments.near[lane], middle - half);
+            fragments.far[lane] = mix(fragments.far[lane], middle + half);
+            if let Some(object) = self.lines.object([x + lane, y]).filter(|_| share[lane] > 0.5 || !fragments.any) {
+                fragments.object[lane] = object;
             }
         }
     }

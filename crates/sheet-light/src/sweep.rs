@@ -154,7 +154,7 @@ impl FoldTile<'_> {
                     let reconstructed = Reconstructed { prepared, crossings, sheets, limits, faces, is_part, open };
                     shader.add(simd, &reconstructed, Place { slab, y, x }, picture, (kept, fragments));
                 }
-                splats.sums.add(simd, [x - 1, y - 1], of.slabs.origin, picture, fragments);
+                splats.sums.add(simd, [x - 1, y - 1], of.slabs.origin, fragments);
                 if fragments.any {
                     picture.composite(simd, y - 1, x - 1, fragments, of.slabs.origin);
                 }

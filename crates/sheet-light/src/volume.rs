@@ -59,6 +59,24 @@ impl Volume<'_> {
         !without_extinction(self.transfer).iter().any(|[low, high]| *low <= least && greatest <= *high)
     }
 
+    /// Extinction about a world position, of trilinear values, 1/world unit; 0 outside.
+    pub(crate) fn extinction_at(&self, world: DVec3) -> f64 {
+        let at = self.axes().inverse() * (world - self.origin());
+        let highest = DVec3::from_array(self.grid.dims.map(|n| n as f64 - 0.5));
+        if at.cmplt(DVec3::splat(-0.5)).any() || at.cmpgt(highest).any() {
+            return 0.0;
+        }
+        let (low, part) = (at.floor(), (at - at.floor()).as_vec3());
+        let [i, j, k] = low.to_array().map(|v| v as isize);
+        let along = |j: isize, k: isize| {
+            let [a, b] = [0, 1].map(|n| self.grid.at_clamped(i + n, j, k));
+            a + (b - a) * part.x
+        };
+        let across = |k: isize| along(j, k) + (along(j + 1, k) - along(j, k)) * part.y;
+        let value = across(k) + (across(k + 1) - across(k)) * part.z;
+        f64::from(self.transfer.at(value).extinction) * self.extinction_scale
+    }
+
     /// World position of the first lattice point.
     pub(crate) fn origin(&self) -> DVec3 {
         self.transform.apply(self.grid.origin)

@@ -60,7 +60,6 @@ pub fn shade(
     let progress = progress.unwrap_or(&quiet);
     assert_eq!(projected.splats.len(), input.cloud.len(), "invariant: one footprint a splat");
     let channels = layout.count();
-    let eye = (input.camera.position - input.cloud.origin).as_vec3();
     let mut values = vec![0.0; input.cloud.len() * channels];
     progress.add_total(input.cloud.len().div_ceil(CHUNK) as u64);
     values.par_chunks_mut(CHUNK * channels).enumerate().for_each(|(chunk, values)| {
@@ -70,13 +69,22 @@ pub fn shade(
         for (k, out) in values.chunks_exact_mut(channels).enumerate() {
             let i = chunk * CHUNK + k;
             if projected.is_visible(i) {
-                let splat = LitSplat::new(input, i, eye);
-                splat.shade(input).write(splat.point.normal, layout, out);
+                let (radiance, normal) = shade_splat(input, i);
+                radiance.write(normal, layout, out);
             }
         }
     });
     progress.tick(0)?;
     Ok(values)
+}
+
+/// Radiance of splat `i` towards the viewer, and the unit normal that it was shaded by: for who knows its light only when it is drawn.
+///
+/// # Panics
+/// If there is no such splat, or its material or object is out of range.
+pub fn shade_splat(input: &ShadeInput<'_>, i: usize) -> (Radiance, Vec3) {
+    let splat = LitSplat::new(input, i);
+    (splat.shade(input), splat.point.normal)
 }
 
 /// How much of a shadow splat `i` takes.
@@ -94,9 +102,10 @@ struct LitSplat<'a> {
 }
 
 impl<'a> LitSplat<'a> {
-    fn new(input: &ShadeInput<'a>, i: usize, eye: Vec3) -> Self {
+    fn new(input: &ShadeInput<'a>, i: usize) -> Self {
         let cloud = input.cloud;
         let position = cloud.position[i];
+        let eye = (input.camera.position - cloud.origin).as_vec3();
         let to_eye = if input.camera.is_orthographic() {
             -input.camera.axes[2].as_vec3()
         } else {

@@ -129,7 +129,8 @@ fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<PlannedPass> {
         before.iter().for_each(|step| what.iter().for_each(|what| pass(step.pass, what.clone())));
     }
     let as_they_are = |draws: &bool| {
-        let of = |t: &Technique| row(*t).draws_splats == *draws && (!draws || statistics.may_have_splats(*t));
+        let shaded = |t: &Technique| row(*t).draws_splats && !statistics.lit_as_drawn;
+        let of = |t: &Technique| shaded(t) == *draws && (!draws || statistics.may_have_splats(*t));
         statistics.techniques.iter().any(of)
     };
     // What is not drawn as splats is projected and shaded in the pass of its technique.

@@ -47,7 +47,7 @@ impl<'a> Frame<'a> {
         if let Some(maps) = self.maps.get() {
             return Ok(maps);
         }
-        let (plan, others) = (self.plan, self.loaded.objects_beside_own());
+        let (plan, others) = (self.plan, self.loaded.opaque_objects());
         let mut done = Done { maps: 0, left: plan.shadow_bytes };
         let all = self.shadow_maps(&plan.shadow_tables, &self.loaded.objects, &mut done, cost)?;
         let of_others = self.shadow_maps(&plan.other_tables, &others, &mut done, cost)?;

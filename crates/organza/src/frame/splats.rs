@@ -61,7 +61,7 @@ impl Frame<'_> {
     }
 
     /// Depths are for opaque splats and what they hide, for depth layers, and for telling objects apart.
-    fn detail(&self) -> Detail {
+    pub(crate) fn detail(&self) -> Detail {
         let opaque = self.drawn().kind.contains(&SplatKind::Opaque);
         Detail { depth: opaque || self.layers.depth || self.layers.object, object: self.layers.object }
     }

@@ -2,12 +2,14 @@
 
 use super::band::Band;
 use super::eye_buffer::{Fragments, Pixels};
-use super::illuminate::{Asked, Illumination};
+use super::illuminate::Asked;
 use super::light_path::Places;
 use super::shade::Lit;
 use super::sheet::{Sheet, Splatter, is_any};
+use super::splats::SplatSheets;
 use super::sweep::Sweep;
 use crate::Volume;
+use crate::lines::Lines;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::{self, Simd};
@@ -43,11 +45,16 @@ pub(crate) enum Step {
 pub(crate) struct OneSlab<'a> {
     pub(crate) of: &'a Sweep<'a>,
     pub(crate) layout: &'a ChannelLayout,
+    /// Those of the slab.
+    pub(crate) splats: Option<&'a SplatSheets<'a>>,
     pub(crate) index: usize,
     pub(crate) slab: u32,
     pub(crate) step: Step,
     pub(crate) eye: &'a mut EyeBand,
 }
+
+/// Splats of neighbouring pixels: their sums, and the place there.
+type Splatted<'a> = Option<(&'a Lines, [usize; 2])>;
 
 /// Neighbouring pixels being lit.
 struct Chunk {
@@ -115,11 +122,13 @@ impl pulp::WithSimd for OneSlab<'_> {
         let (top, own) = (self.eye.band.top, self.eye.band.rows.clone());
         for y in own.start - top..own.end - top {
             let spans = || (0..self.of.placed.len()).map(|v| &self.eye.sheet(v, self.slab).spans[y]);
-            let inside = || spans().filter(|span| !span.is_empty());
+            let splats = self.splats.and_then(|splats| splats.squares.span(top + y));
+            let inside = || spans().filter(|span| !span.is_empty()).chain(&splats);
             let (Some(first), Some(last)) = (inside().map(|s| s.start).min(), inside().map(|s| s.end).max()) else {
                 continue;
             };
-            for x in (first..last).step_by(Lanes::<S>::COUNT) {
+            let count = Lanes::<S>::COUNT;
+            for x in (first / count * count..last).step_by(count) {
                 let k = y * self.eye.band.stride + x;
                 self.draw(simd, &Chunk { x, y: top + y, k });
             }
@@ -167,7 +176,9 @@ impl OneSlab<'_> {
             far = far.max(to.where_less_or(of(0.0), tau, far));
         }
         let most = all[0].max(all[1]).max(all[2]);
-        if !is_any(most) {
+        let splats = self.splats.and_then(|splats| splats.squares.at([chunk.x, chunk.y], Lanes::<S>::COUNT));
+        let is_medium = is_any(most);
+        if !is_medium && splats.is_none() {
             return;
         }
         let mut fragments = Fragments::NONE;
@@ -176,10 +187,10 @@ impl OneSlab<'_> {
         }
         // Lanes without any are of no meaning, but are numbers.
         let (near, far) = (near.where_less(of(0.0), most), far.where_less(of(0.0), most));
-        if self.step == Step::Draw {
+        if is_medium && self.step == Step::Draw {
             self.light(simd, chunk, [near, far], most, &mut fragments);
         }
-        self.composite(simd, chunk, [near, far], &fragments);
+        self.composite(simd, chunk, [near, far], splats, &mut fragments);
     }
 
     /// Extinction of a volume, and the depth that it has; `None` where it has no sheet.
@@ -222,8 +233,7 @@ impl OneSlab<'_> {
                 extinction: &self.eye.extinction,
                 optical_depth: &out.optical_depth,
             };
-            let illumination =
-                Illumination { buffer, paths: &of.paths, volumes: of.volumes, face: of.frame.slabs.face(self.slab) };
+            let illumination = of.illumination(buffer, self.slab, self.splats.and_then(|splats| splats.light.as_ref()));
             arrives = illumination.transmittance(simd, &asked, &wanted, planes);
         }
         let middle = (near + far) * Lanes::splat(simd, 0.5);
@@ -293,11 +303,27 @@ impl OneSlab<'_> {
         }
     }
 
+    /// Composites what volumes have between two depths across the slabs, with the splats there.
     #[inline(always)]
-    fn composite<S: Simd>(&mut self, simd: S, chunk: &Chunk, [near, far]: [Lanes<S>; 2], fragments: &Fragments) {
+    fn composite<S: Simd>(
+        &mut self,
+        simd: S,
+        chunk: &Chunk,
+        [near, far]: [Lanes<S>; 2],
+        splats: Splatted<'_>,
+        fragments: &mut Fragments,
+    ) {
         let (of, eye) = (self.of, &mut *self.eye);
         let mut before = [0.0; MAX_LANES];
         eye.pixels.so_far(simd, chunk.k).store(&mut before);
+        let mut share = [0.0; MAX_LANES];
+        if let Some((lines, at)) = splats {
+            let Fragments { optical_depth, values, object } = fragments;
+            share = lines.blend(simd, at, true, optical_depth, values);
+            for lane in (0..Lanes::<S>::COUNT).filter(|lane| share[*lane] > 0.5) {
+                object[lane] = lines.object([at[0] + lane, at[1]]).unwrap_or(object[lane]);
+            }
+        }
         match (of.frame.back_to_front, self.step) {
             (true, Step::Draw) => eye.pixels.prepend(simd, chunk.k, fragments),
             _ => eye.pixels.append(simd, chunk.k, fragments),
@@ -308,12 +334,23 @@ impl OneSlab<'_> {
         let mut ends = [[0.0; MAX_LANES]; 2];
         near.store(&mut ends[0]);
         far.store(&mut ends[1]);
-        let green = eye.pixels.planes / 2;
+        let (green, mut splatted) = (eye.pixels.planes / 2, [[0.0; MAX_LANES]; 3]);
+        if let Some((lines, at)) = splats {
+            splatted = lines.depths(simd, at);
+        }
         for lane in 0..Lanes::<S>::COUNT.min(eye.band.width.saturating_sub(chunk.x)) {
             let own = fragments.optical_depth[green][lane];
             if own > 0.0 {
-                let [one, other] = ends.map(|end| of.view_depth([chunk.x + lane, chunk.y], end[lane]));
-                eye.pixels.add_depth(chunk.k + lane, [one.min(other), one.max(other)], before[lane], own);
+                let ends = ends.map(|end| of.view_depth([chunk.x + lane, chunk.y], end[lane]));
+                let [depth, half] = [f64::from(splatted[1][lane]), 0.5 * f64::from(splatted[2][lane])];
+                let mix = |volumes: f64, own: f64| match share[lane] {
+                    // What has no part is of no meaning.
+                    0.0 => volumes,
+                    1.0.. => own,
+                    share => volumes + (own - volumes) * f64::from(share),
+                };
+                let ends = [mix(ends[0].min(ends[1]), depth - half), mix(ends[0].max(ends[1]), depth + half)];
+                eye.pixels.add_depth(chunk.k + lane, ends, before[lane], own);
             }
         }
     }

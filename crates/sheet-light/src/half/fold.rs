@@ -1,16 +1,17 @@
 //! Half-vector sheets of some volumes under any number of lights: a sweep a light, one after the other.
 
 use super::band::ROWS;
+use super::bodies::Bodies;
 use super::counts::HalfCounts;
 use super::frame::Frame;
 use super::scatter::{self, Scattered, Scene, balance::Balance};
 use super::serves::{axis_of_view, serves};
 use super::sweep::Sweep;
-use super::{HalfInput, HalfParams, Scattering, lamp};
+use super::{HalfInput, HalfParams, HalfSplats, Scattering, lamp};
 use crate::lattice::Lattice;
 use crate::visible::Voxels;
 use crate::{Error, Params, SheetInput, Volume};
-use splat_core::shade::{ChannelLayout, LitBy};
+use splat_core::shade::{ChannelLayout, LitBy, MAX_CHANNELS};
 use splat_core::{Accumulator, Camera, Light, Progress};
 
 /// Draws all volumes in slabs across the half vector of each light, with the shadows that they cast on themselves and each other.
@@ -47,7 +48,8 @@ pub fn fold(
     let has = |kept: usize| kept > 0;
     let (planes, depth, object) = (into.optical_depth.len(), has(into.depth.len()), has(into.object.len()));
     *into = Accumulator::new(size, planes, layout.count(), depth, object);
-    if input.sheets.volumes.is_empty() {
+    let bodies = input.bodies();
+    if bodies.is_empty() {
         return Ok(HalfCounts::default());
     }
     let quiet = Progress::new();
@@ -70,21 +72,16 @@ pub fn fold(
     Ok(counts)
 }
 
-/// Width of the slabs of the sweep for `light`, or of that without one; world units. Infinite without volumes.
+/// Width of the slabs of the sweep for `light`, or of that without one; world units. Infinite without bodies.
 ///
 /// # Errors
 /// [`Error::Parameter`] or [`Error::Limit`] where there would be too many.
-pub fn slab_width(
-    volumes: &[Volume<'_>],
-    camera: &Camera,
-    light: Option<&Light>,
-    params: &Params,
-) -> Result<f64, Error> {
+pub fn slab_width(bodies: &Bodies<'_>, camera: &Camera, light: Option<&Light>, params: &Params) -> Result<f64, Error> {
     params.check()?;
-    if volumes.is_empty() {
+    if bodies.is_empty() {
         return Ok(f64::INFINITY);
     }
-    Ok(Frame::new(volumes, camera, params, &axis_of_view(volumes, camera, light))?.slabs.width)
+    Ok(Frame::new(bodies, camera, params, &axis_of_view(bodies, camera, light))?.slabs.width)
 }
 
 /// Where the light of one lamp of the input stays, as its scattering among the volumes is simulated: in cells, by two streams, however
@@ -110,23 +107,51 @@ fn check(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
     input.sheets.check()?;
     if let Some(splats) = &input.sheets.splats {
         let found = format!("{} splats", splats.order.len());
-        return Err(Error::parameter("sheets.splats", found, "none: half-vector sheets are of volumes alone"));
+        return Err(Error::parameter(
+            "sheets.splats",
+            found,
+            "none: `HalfInput::splats` has those of half-vector sheets",
+        ));
+    }
+    if let Some(splats) = &input.splats {
+        check_splats(input, splats, params)?;
     }
     let lights = &input.sheets.lights;
     for (light, lit) in lights.iter().chain(&input.mapped).enumerate() {
         lit.light.validate(light).map_err(Error::Light)?;
     }
     for (light, lit) in lights.iter().enumerate() {
-        serves(&input.sheets.volumes, input.sheets.camera, &lit.light)
+        serves(&input.bodies(), input.sheets.camera, &lit.light)
             .map_err(|reason| Error::HalfVector { light, reason })?;
     }
     check_memory(input, params)
 }
 
+/// Bytes of a splat in one sweep: its footprint in the light's image, places, slabs, and lists of squares.
+const BYTES_A_SPLAT: u64 = 160;
+
+/// Refuses splats that sweeps cannot take.
+fn check_splats(input: &HalfInput<'_>, splats: &HalfSplats<'_>, params: &HalfParams) -> Result<(), Error> {
+    if let Some(opaque) = splats.opaque() {
+        return Err(Error::parameter("splats", format!("splat {opaque} is opaque"), "surfaces and media"));
+    }
+    if !(splats.slab_width.is_finite() && splats.slab_width > 0.0) {
+        return Err(Error::parameter("splats.slab_width", splats.slab_width, "a finite number > 0, world units"));
+    }
+    if splats.cloud.origin != input.sheets.shadow_origin {
+        return Err(Error::parameter("sheets.shadow_origin", input.sheets.shadow_origin, "the origin of the splats"));
+    }
+    if params.scattering != Scattering::None {
+        let expected = "None beside splats, which shadow no light that is scattered more than once";
+        return Err(Error::parameter("scattering", params.scattering, expected));
+    }
+    Ok(())
+}
+
 /// Refuses what takes more than it may, before it does.
 fn check_memory(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
-    let SheetInput { volumes, camera, lights, .. } = &input.sheets;
-    let needed = bytes(volumes, camera, lights.iter().map(|lit| &lit.light), params);
+    let SheetInput { camera, lights, .. } = &input.sheets;
+    let needed = bytes(&input.bodies(), camera, lights.iter().map(|lit| &lit.light), params);
     let limit = params.sheets.limits.max_bytes;
     let hint = || "use fewer voxels, a smaller picture or fewer pixels of the light buffer".to_owned();
     if needed > limit { Err(Error::limit("half-vector sheets", needed, limit, "bytes", hint())) } else { Ok(()) }
@@ -134,16 +159,18 @@ fn check_memory(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error>
 
 /// Bytes that [`fold`] takes at most for such lights, of which sweeps follow one another.
 pub fn bytes<'l>(
-    volumes: &[Volume<'_>],
+    bodies: &Bodies<'_>,
     camera: &Camera,
     lights: impl Iterator<Item = &'l Light>,
     params: &HalfParams,
 ) -> u64 {
-    if volumes.is_empty() {
+    if bodies.is_empty() {
         return 0;
     }
-    // Of a pixel: rays, sheets, sums.
-    let of_a_pixel = 4 * (5 + 12 * volumes.len() as u64);
+    let volumes = bodies.volumes;
+    // Of a pixel: rays, sheets, sums; and sums of splats, as many as there are channels at most.
+    let of_splats = bodies.splats.map_or(0, |_| 4 * (3 + MAX_CHANNELS as u64));
+    let of_a_pixel = 4 * (5 + 12 * volumes.len() as u64) + of_splats;
     let [width, height] = camera.size.map(u64::from);
     let sheets = if volumes.iter().any(|v| v.normals) { 3 } else { 1 };
     let eye =
@@ -160,7 +187,8 @@ pub fn bytes<'l>(
         let all: u64 = volumes.iter().map(|v| v.grid.values.len() as u64).sum();
         2 * (all / u64::from(params.voxels_per_cell) + 1) * 350
     };
+    let splats = bodies.splats.map_or(0, |splats| splats.count * BYTES_A_SPLAT);
     let pixels =
-        |light: &Light| lamp::camera_of(volumes, light, params).size.into_iter().map(u64::from).product::<u64>();
-    eye + of_a_pixel * lights.map(pixels).max().unwrap_or(0) + cells + volumes.iter().map(voxels).sum::<u64>()
+        |light: &Light| lamp::camera_of(bodies, light, params).size.into_iter().map(u64::from).product::<u64>();
+    eye + of_a_pixel * lights.map(pixels).max().unwrap_or(0) + cells + splats + volumes.iter().map(voxels).sum::<u64>()
 }

@@ -3,6 +3,7 @@
 //! They are taken from the middle of all volumes, subtracted in f64, so that single precision suffices wherever the scene lies.
 
 use super::axis::HalfVector;
+use super::bodies::Bodies;
 use crate::slabs::Slabs;
 use crate::viewed::spacing_along;
 use crate::{Error, Params, Volume};
@@ -36,21 +37,9 @@ pub(crate) fn world_corners(volume: &Volume<'_>) -> [DVec3; 8] {
     })
 }
 
-/// Middle of the bounds of all volumes, of which there is at least one.
-pub(crate) fn middle(volumes: &[Volume<'_>]) -> DVec3 {
-    let all = || volumes.iter().flat_map(world_corners);
-    let low = all().fold(DVec3::INFINITY, DVec3::min);
-    low + 0.5 * (all().fold(DVec3::NEG_INFINITY, DVec3::max) - low)
-}
-
 impl Frame {
-    /// Slabs across `axis` that hold all volumes.
-    pub(crate) fn new(
-        volumes: &[Volume<'_>],
-        camera: &Camera,
-        params: &Params,
-        axis: &HalfVector,
-    ) -> Result<Self, Error> {
+    /// Slabs across `axis` that hold all bodies.
+    pub(crate) fn new(bodies: &Bodies<'_>, camera: &Camera, params: &Params, axis: &HalfVector) -> Result<Self, Error> {
         let across = axis.normal;
         // Rows of pixels lie along the slabs as well as they can.
         let [right, up, _] = camera.axes;
@@ -58,16 +47,17 @@ impl Frame {
         let first = (along - across * along.dot(across)).normalize();
         let axes = [first, across.cross(first), across];
         let nowhere = Slabs { origin: 0.0, width: 1.0, count: 0 };
-        let mut frame = Self { center: middle(volumes), axes, slabs: nowhere, back_to_front: axis.back_to_front };
-        let (mut near, mut far, mut spacing, mut reach) = (f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, 0.0f64);
-        for volume in volumes {
+        let mut frame = Self { center: bodies.middle(), axes, slabs: nowhere, back_to_front: axis.back_to_front };
+        let (mut spacing, mut reach) = (f64::INFINITY, 0.0f64);
+        for volume in bodies.volumes {
             let along = spacing_along(&frame.steps(volume));
             (spacing, reach) = (spacing.min(along), reach.max(along * params.kernel.extent));
-            for corner in world_corners(volume) {
-                let depth = frame.point(corner).z;
-                (near, far) = (near.min(depth), far.max(depth));
-            }
         }
+        if let Some(splats) = bodies.splats.filter(|_| bodies.volumes.is_empty()) {
+            spacing = splats.slab_width;
+        }
+        let depths = || bodies.corners().map(|corner| frame.point(corner).z);
+        let (near, far) = (depths().fold(f64::INFINITY, f64::min), depths().fold(f64::NEG_INFINITY, f64::max));
         frame.slabs = Slabs::new(near, far, params.slab_width.unwrap_or(spacing), reach)?;
         Ok(frame)
     }

@@ -12,13 +12,15 @@
 //! comes into the volume, or into the slab, through one face up to some place of the part and through another from there on, optical
 //! depth towards it has a bend, and the integral is that of the pieces.
 
+use super::frame::Frame;
 use super::light_buffer::LightBuffer;
 use super::light_path::{BENDS, LightPath, Places};
 use super::sheet::is_any;
+use super::splat_light::SplatLight;
 use crate::Volume;
 use splat_core::glam::Vec3;
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
-use splat_core::raster::pulp::Simd;
+use splat_core::raster::pulp::{self, Simd};
 
 /// What neighbouring pixels ask of the light.
 pub(crate) struct Asked<'a, S: Simd> {
@@ -46,8 +48,12 @@ pub(crate) struct Illumination<'a> {
     pub(crate) buffer: &'a LightBuffer,
     pub(crate) paths: &'a [LightPath],
     pub(crate) volumes: &'a [Volume<'a>],
+    /// Splats before the volumes, and among them.
+    pub(crate) splats: Option<&'a SplatLight<'a>>,
     /// Near face of the slab.
     pub(crate) face: f32,
+    /// Width of the slabs.
+    pub(crate) width: f32,
 }
 
 impl Illumination<'_> {
@@ -87,6 +93,9 @@ impl Illumination<'_> {
         if is_any(is_bent) {
             self.add_bends(simd, asked, &bends, wanted, &mut optical);
         }
+        if let Some(splats) = self.splats {
+            self.add_splats(simd, splats, &middle, wanted, &mut optical);
+        }
         let mut out = [[1.0; MAX_LANES]; 3];
         for p in 0..planes {
             let tau = Lanes::load(simd, &asked.optical_depth[p]);
@@ -120,6 +129,28 @@ impl Illumination<'_> {
         }
     }
 
+    /// Adds what splats have about the middle.
+    #[inline(always)]
+    fn add_splats<S: Simd>(
+        &self,
+        simd: S,
+        splats: &SplatLight<'_>,
+        middle: &Places<S>,
+        wanted: &[f32; MAX_LANES],
+        to: &mut [[Lanes<S>; NODES]; 3],
+    ) {
+        let (places, mut own) = (stored(middle), [[0.0; MAX_LANES]; 3]);
+        for lane in (0..Lanes::<S>::COUNT).filter(|lane| wanted[*lane] > 0.0) {
+            let at = Vec3::new(places[0][lane], places[1][lane], places[2][lane]);
+            let tau = splats.optical_depth(self.buffer.sight.pixel(at), (at.z - self.face) / self.width);
+            (0..3).for_each(|p| own[p][lane] = tau[p]);
+        }
+        for p in 0..3 {
+            let own = Lanes::load(simd, &own[p]);
+            (0..NODES).for_each(|n| to[p][n] = to[p][n] + own);
+        }
+    }
+
     /// Adds the optical depth of a volume at a node, by plane.
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, tau: Lanes<S>, v: usize, node: usize, to: &mut [[Lanes<S>; NODES]; 3]) {
@@ -142,10 +173,7 @@ impl Illumination<'_> {
         extinction: &[[f32; MAX_LANES]],
         wanted: &[f32; MAX_LANES],
     ) -> Lanes<S> {
-        let mut places = [[0.0; MAX_LANES]; 3];
-        for a in 0..3 {
-            at[a].store(&mut places[a]);
-        }
+        let places = stored(at);
         // Where light has come no way before the slab, what is seen in it stands for what nearly does.
         let mut means = extinction[v];
         for lane in (0..Lanes::<S>::COUNT).filter(|lane| wanted[*lane] > 0.0) {
@@ -156,6 +184,56 @@ impl Illumination<'_> {
             }
         }
         Lanes::load(simd, &means)
+    }
+}
+
+#[inline(always)]
+fn stored<S: Simd>(of: &Places<S>) -> [[f32; MAX_LANES]; 3] {
+    let mut out = [[0.0; MAX_LANES]; 3];
+    for a in 0..3 {
+        of[a].store(&mut out[a]);
+    }
+    out
+}
+
+/// What volumes let through to places in a slab, by channel, in the form that [`pulp`] compiles once per instruction set.
+pub(crate) struct ThroughVolumes<'a> {
+    pub(crate) of: &'a Illumination<'a>,
+    pub(crate) frame: &'a Frame,
+    /// Slab coordinates.
+    pub(crate) places: &'a [Vec3],
+    pub(crate) out: &'a mut [[f32; 3]],
+}
+
+impl pulp::WithSimd for ThroughVolumes<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { of, frame, places, out } = self;
+        let mut extinction = vec![[0.0; MAX_LANES]; of.volumes.len()];
+        for (places, out) in places.chunks(Lanes::<S>::COUNT).zip(out.chunks_mut(Lanes::<S>::COUNT)) {
+            let (mut at, mut wanted) = ([[0.0; MAX_LANES]; 3], [0.0; MAX_LANES]);
+            for (lane, place) in places.iter().enumerate() {
+                (0..3).for_each(|a| at[a][lane] = place[a]);
+                wanted[lane] = 1.0;
+                let world = frame.world(place.as_dvec3());
+                extinction.iter_mut().zip(of.volumes).for_each(|(e, v)| e[lane] = v.extinction_at(world) as f32);
+            }
+            let at = [Lanes::load(simd, &at[0]), Lanes::load(simd, &at[1]), Lanes::load(simd, &at[2])];
+            let mut optical = [[Lanes::splat(simd, 0.0); NODES]; 3];
+            for v in 0..of.volumes.len() {
+                let mean = of.means(simd, v, &at, &extinction, &wanted);
+                let own = Lanes::load(simd, &extinction[v]);
+                let ways = of.paths[v].ways(simd, &at, of.face);
+                of.add(simd, ways.optical_depth(simd, mean, own), v, 0, &mut optical);
+            }
+            for p in 0..3 {
+                let mut through = [0.0; MAX_LANES];
+                optical[p][0].exp_neg().store(&mut through);
+                out.iter_mut().zip(through).for_each(|(out, through)| out[p] = through);
+            }
+        }
     }
 }
 

@@ -1,27 +1,25 @@
-//! The light's image: a camera at the lamp that sees all volumes.
+//! The light's image: a camera at the lamp that sees all that casts shadows.
 
 use super::HalfParams;
-use super::frame::{middle, world_corners};
+use super::bodies::Bodies;
 use super::serves::travel;
-use crate::Volume;
 use splat_core::glam::DVec3;
 use splat_core::{Camera, Light, Projection};
 
-/// Pixels around the volumes, so that a look-up finds neighbours.
+/// Pixels around the bodies, so that a look-up finds neighbours.
 const RIM: f64 = 3.0;
 
 /// The camera of a light that half vectors serve: parallel for directional light, else a pinhole at the lamp.
-pub(crate) fn camera_of(volumes: &[Volume<'_>], light: &Light, params: &HalfParams) -> Camera {
-    let middle = middle(volumes);
+pub(crate) fn camera_of(bodies: &Bodies<'_>, light: &Light, params: &HalfParams) -> Camera {
+    let middle = bodies.middle();
     let forward = travel(light, middle);
     let up = if forward.y.abs() < 0.9 { DVec3::Y } else { DVec3::NEG_Z };
     let right = forward.cross(up).normalize();
     let axes = [right, right.cross(forward), forward];
     let projection = Projection::Orthographic { height: 1.0 };
     let camera = Camera { position: light.shape.place().unwrap_or(middle), axes, projection, size: [1, 1] };
-    let step = volumes.iter().map(Volume::axes).flat_map(|axes| [axes.x_axis, axes.y_axis, axes.z_axis]);
-    let pixel = step.map(DVec3::length).fold(f64::INFINITY, f64::min) / params.light_pixels;
-    let corners = volumes.iter().flat_map(world_corners).map(|p| camera.view_from_world(p));
+    let pixel = bodies.least_step() / params.light_pixels;
+    let corners = bodies.corners().map(|p| camera.view_from_world(p));
     if light.shape.place().is_some() {
         let half = corners.fold(DVec3::ZERO, |half, p| half.max((p / p.z).abs()));
         let focal = camera.view_from_world(middle).z / pixel;

@@ -81,6 +81,9 @@ impl LightBuffer {
     /// numbers.
     pub(crate) fn attenuate(&mut self, slab: u32, frame: &Frame, placed: &[Placed<'_>]) -> u64 {
         let Self { sight, shapes, buckets, bands, sums, volumes } = self;
+        if *volumes == 0 {
+            return 0;
+        }
         let row = sight.camera.size[0] as usize * *volumes;
         let chunks = sums.par_chunks_mut(row * ROWS);
         let of = Attenuate { slab, frame, placed, sight, shapes, buckets };

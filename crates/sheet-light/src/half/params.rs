@@ -1,5 +1,6 @@
 //! What half-vector sheets are made of and what the caller chooses.
 
+use super::{Bodies, HalfSplats};
 use crate::{Error, Params, SheetInput};
 use splat_core::shade::LitBy;
 use std::f64::consts::FRAC_PI_2;
@@ -11,11 +12,22 @@ pub struct HalfInput<'a> {
     /// volumes here, which shadow themselves and each other by the light buffer; `None` for no shadow else. Materials take
     /// [`crate::Volume::shadow_coefficient`] of both.
     pub sheets: SheetInput<'a>,
+    /// Splats among the volumes: they shadow them and each other, and take shadows of them. Those of `sheets` are refused, for their
+    /// light is known.
+    pub splats: Option<HalfSplats<'a>>,
     /// Lights beside those of `sheets`, for which there is no sweep: their shadow, that of these volumes included, is known, or they
     /// cast none.
     pub mapped: Vec<LitBy<'a>>,
-    /// View depth of what hides the volumes at each pixel, +∞ for nothing; or empty.
+    /// View depth of what hides all that at each pixel, +∞ for nothing; or empty.
     pub opaque: &'a [f32],
+}
+
+impl HalfInput<'_> {
+    /// What there is, as far as it says how slabs lie.
+    pub fn bodies(&self) -> Bodies<'_> {
+        let splats = self.splats.as_ref().and_then(HalfSplats::bounds);
+        Bodies { volumes: &self.sheets.volumes, splats }
+    }
 }
 
 /// How often light is scattered.

@@ -72,8 +72,8 @@ pub fn draw(input: &HalfInput<'_>, params: &HalfParams) -> Result<Picture, Error
 
 impl<'a> View<'a> {
     fn new(input: &'a HalfInput<'a>, params: &'a HalfParams, lit: &LitBy<'_>) -> Result<Self, Error> {
-        let (volumes, camera) = (&input.sheets.volumes[..], input.sheets.camera);
-        let frame = Frame::new(volumes, camera, &params.sheets, &axis_of_view(volumes, camera, Some(&lit.light)))?;
+        let (volumes, camera, bodies) = (&input.sheets.volumes[..], input.sheets.camera, &input.bodies());
+        let frame = Frame::new(bodies, camera, &params.sheets, &axis_of_view(bodies, camera, Some(&lit.light)))?;
         let placed: Vec<Placed<'a>> = volumes.iter().map(|v| Placed::new(v, &frame, &params.sheets)).collect();
         let of = |placed: &Placed<'_>| {
             let lattice = Lattice::new(placed.volume.grid, [3; 3]);
@@ -97,7 +97,7 @@ impl<'a> View<'a> {
     fn draw(&self, lit: &LitBy<'_>, with_ambient: bool) -> Picture {
         let camera = self.input.sheets.camera;
         let eye = self.image(*camera);
-        let light = self.image(lamp::camera_of(&self.input.sheets.volumes, &lit.light, self.params));
+        let light = self.image(lamp::camera_of(&self.input.bodies(), &lit.light, self.params));
         let pixels = |camera: &Camera| camera.size.map(|s| s as usize).iter().product();
         let mut sums: Sums = vec![vec![[0.0; 2]; pixels(&light.camera)]; self.placed.len()];
         let n: usize = pixels(camera);

@@ -25,7 +25,7 @@ pub(crate) mod phase;
 pub(crate) mod slant;
 pub(crate) mod streams;
 
-use super::{HalfParams, Scattering, lamp};
+use super::{Bodies, HalfParams, Scattering, lamp};
 use crate::Volume;
 use balance::Balance;
 use beam::{Beam, Path};
@@ -82,7 +82,7 @@ pub(crate) fn is_wanted(volumes: &[Volume<'_>], light: &Light, params: &HalfPara
 impl Scene {
     /// `shadow_origin`: what places of shadows are relative to.
     pub(crate) fn new(volumes: &[Volume<'_>], lit: &LitBy<'_>, params: &HalfParams, shadow_origin: DVec3) -> Self {
-        let camera = lamp::camera_of(volumes, &lit.light, params);
+        let camera = lamp::camera_of(&Bodies::volumes(volumes), &lit.light, params);
         let grid = LightGrid::new(volumes, &camera, params.voxels_per_cell);
         let cells = medium::cells(&grid, volumes, params.scattering);
         let ([width, height], layers) = (grid.columns, grid.layers);

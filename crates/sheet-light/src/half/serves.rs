@@ -1,7 +1,7 @@
 //! Where half vectors cannot serve: rays that run along the slabs, or cross them backwards, and lamps inside the medium.
 
 use super::axis::HalfVector;
-use super::frame::{middle, world_corners};
+use super::bodies::Bodies;
 use crate::Volume;
 use splat_core::glam::DVec3;
 use splat_core::{Camera, Light, LightShape};
@@ -19,6 +19,12 @@ pub enum Reason {
     LampInside {
         /// Place of the volume in the input.
         volume: usize,
+        /// World position of the lamp.
+        position: DVec3,
+    },
+    /// The same, where the lamp lies in the bounds of the splats.
+    #[error("the lamp at {position} lies among the splats, expected outside of their bounds")]
+    LampAmong {
         /// World position of the lamp.
         position: DVec3,
     },
@@ -43,50 +49,54 @@ pub enum Reason {
     Extended,
 }
 
-/// Whether the half vector of this light and this view can slice the volumes: whether every ray of the light to a volume, and
-/// every view ray that may meet one, crosses slabs in one sense, no flatter than [`LEAST_COSINE`] says. True without volumes.
+/// Whether the half vector of this light and this view can slice what there is: whether every ray of the light to a volume or to the
+/// bounds of the splats, and every view ray that may meet one, crosses slabs in one sense, no flatter than [`LEAST_COSINE`] says. True
+/// without any.
 ///
 /// Directions from one point to a convex body, and those of an image, are convex cones, and so are those within an angle of the
 /// normal: corners decide for all.
 ///
 /// # Errors
 /// The first [`Reason`] that was found.
-pub fn serves(volumes: &[Volume<'_>], camera: &Camera, light: &Light) -> Result<(), Reason> {
-    if volumes.is_empty() {
+pub fn serves(bodies: &Bodies<'_>, camera: &Camera, light: &Light) -> Result<(), Reason> {
+    if bodies.is_empty() {
         return Ok(());
     }
     if light.shape.is_extended() {
         return Err(Reason::Extended);
     }
-    if let Some(position) = light.shape.place()
-        && let Some(volume) = volumes.iter().position(|v| is_inside(v, position))
-    {
-        return Err(Reason::LampInside { volume, position });
+    if let Some(position) = light.shape.place() {
+        if let Some(volume) = bodies.volumes.iter().position(|v| is_inside(v, position)) {
+            return Err(Reason::LampInside { volume, position });
+        }
+        if bodies.splats.is_some_and(|splats| splats.bounds.contains(position)) {
+            return Err(Reason::LampAmong { position });
+        }
     }
-    let axis = axis_of(volumes, camera, light);
-    // The light's image has an axis of its own, to the middle of the volumes.
-    let forward = travel(light, middle(volumes));
+    let axis = axis_of(bodies, camera, light);
+    // The light's image has an axis of its own, to the middle of all.
+    let forward = travel(light, bodies.middle());
     let of_light = |p: DVec3| [axis.normal, forward].map(|axis| axis.dot(travel(light, p)));
-    let cosine = least(volumes.iter().flat_map(world_corners).flat_map(of_light));
+    let cosine = least(bodies.corners().flat_map(of_light));
     if cosine < LEAST_COSINE {
         return Err(Reason::LightAlongSlabs { cosine });
     }
     let sense = if axis.back_to_front { -axis.normal } else { axis.normal };
-    let cosine = least_of_view(volumes, camera, sense);
+    let cosine = least_of_view(bodies, camera, sense);
     if cosine < LEAST_COSINE { Err(Reason::ViewAlongSlabs { cosine }) } else { Ok(()) }
 }
 
-/// The half vector at the middle of the volumes, of which there is at least one.
-fn axis_of(volumes: &[Volume<'_>], camera: &Camera, light: &Light) -> HalfVector {
-    let middle = middle(volumes);
+/// The half vector at the middle of the bodies, of which there is at least one.
+fn axis_of(bodies: &Bodies<'_>, camera: &Camera, light: &Light) -> HalfVector {
+    let middle = bodies.middle();
     HalfVector::between(-seen_along(camera, middle), -travel(light, middle))
 }
 
 /// The half vector of a light, or the view's own axis without one.
-pub(crate) fn axis_of_view(volumes: &[Volume<'_>], camera: &Camera, light: Option<&Light>) -> HalfVector {
+pub(crate) fn axis_of_view(bodies: &Bodies<'_>, camera: &Camera, light: Option<&Light>) -> HalfVector {
     match light {
-        Some(light) => axis_of(volumes, camera, light),
-        None => HalfVector { normal: seen_along(camera, middle(volumes)), back_to_front: false },
+        Some(light) => axis_of(bodies, camera, light),
+        None => HalfVector { normal: seen_along(camera, bodies.middle()), back_to_front: false },
     }
 }
 
@@ -125,8 +135,8 @@ fn seen_along(camera: &Camera, p: DVec3) -> DVec3 {
     world(camera, clamped).normalize()
 }
 
-/// The least cosine of what is in the picture and in a volume: no less than that of either.
-fn least_of_view(volumes: &[Volume<'_>], camera: &Camera, normal: DVec3) -> f64 {
+/// The least cosine of what is in the picture and in a body: no less than that of either.
+fn least_of_view(bodies: &Bodies<'_>, camera: &Camera, normal: DVec3) -> f64 {
     let [width, height] = camera.size.map(f64::from);
     let corners = [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]];
     let cosine = |direction: DVec3| normal.dot(direction.normalize_or_zero());
@@ -134,6 +144,6 @@ fn least_of_view(volumes: &[Volume<'_>], camera: &Camera, normal: DVec3) -> f64 
     if camera.is_orthographic() {
         return picture;
     }
-    let volumes = least(volumes.iter().flat_map(world_corners).map(|p| cosine(p - camera.position)));
-    picture.max(volumes)
+    let bodies = least(bodies.corners().map(|p| cosine(p - camera.position)));
+    picture.max(bodies)
 }

@@ -7,6 +7,7 @@ use super::eye_buffer::Pixels;
 use super::eye_sheets::{EyeBand, OneSlab, Step};
 use super::frame::Frame;
 use super::gradient::Gradients;
+use super::illuminate::Illumination;
 use super::light_buffer::LightBuffer;
 use super::light_path::LightPath;
 use super::placed::Placed;
@@ -14,6 +15,8 @@ use super::scatter::{self, Scattered, Scene};
 use super::serves::axis_of_view;
 use super::shade::is_lit;
 use super::sight::{Shape, Sight};
+use super::splat_light::SplatLight;
+use super::splats::{Lamps, SplatSheets};
 use super::{HalfInput, HalfParams, lamp};
 use crate::error::cancelled;
 use crate::{Error, Volume};
@@ -62,12 +65,12 @@ impl<'a> Sweep<'a> {
         light_alone: bool,
     ) -> Result<Self, Error> {
         let sheets = &input.sheets;
-        let (volumes, camera) = (&sheets.volumes[..], sheets.camera);
-        let is_lit = volumes.iter().any(is_lit);
+        let (bodies, volumes, camera) = (&input.bodies(), &sheets.volumes[..], sheets.camera);
+        let is_lit = volumes.iter().any(is_lit) || input.splats.is_some_and(|splats| splats.are_lit());
         let light = light.filter(|_| is_lit);
         let mapped = if is_lit && !light_alone { &input.mapped[..] } else { &[] };
-        let axis = axis_of_view(volumes, camera, light.map(|lit| &lit.light));
-        let frame = Frame::new(volumes, camera, &params.sheets, &axis)?;
+        let axis = axis_of_view(bodies, camera, light.map(|lit| &lit.light));
+        let frame = Frame::new(bodies, camera, &params.sheets, &axis)?;
         let placed: Vec<Placed<'a>> = volumes.iter().map(|v| Placed::new(v, &frame, &params.sheets)).collect();
         let sight = Sight::new(&frame, *camera);
         let by_place =
@@ -80,7 +83,7 @@ impl<'a> Sweep<'a> {
             light,
             mapped,
             light_buffer: light
-                .map(|lit| LightBuffer::new(&frame, lamp::camera_of(volumes, &lit.light, params), volumes, &placed)),
+                .map(|lit| LightBuffer::new(&frame, lamp::camera_of(bodies, &lit.light, params), volumes, &placed)),
             scattered: None,
             paths: light
                 .map_or_else(Vec::new, |lit| volumes.iter().map(|v| LightPath::new(v, &lit.light, &frame)).collect()),
@@ -131,20 +134,33 @@ impl<'a> Sweep<'a> {
         progress: &Progress,
     ) -> Result<(Vec<EyeBand>, HalfCounts), Error> {
         let mut bands = self.bands(form);
+        let mut splats = self.splats(form);
         let mut counts = self.counts(&bands);
         for slab in 0..self.frame.slabs.count {
             progress.tick(1).map_err(cancelled)?;
-            counts.eye_fragments += self.pass(&mut bands, layout, slab, Step::Draw);
+            if let Some(splats) = &mut splats {
+                let volumes = self.light_buffer.as_ref().map(|buffer| self.illumination(buffer, slab, None));
+                let [eye, light] = splats.enter(slab, &self.lamps(), volumes.as_ref(), layout);
+                (counts.eye_fragments, counts.light_fragments) =
+                    (counts.eye_fragments + eye, counts.light_fragments + light);
+            }
+            counts.eye_fragments += self.pass(&mut bands, layout, (slab, Step::Draw), splats.as_ref());
             if let Some(buffer) = &mut self.light_buffer {
                 counts.light_fragments += buffer.attenuate(slab, &self.frame, &self.placed);
             }
+            if let Some(splats) = &mut splats {
+                splats.leave();
+            }
         }
+        counts.bytes += splats.as_ref().map_or(0, SplatSheets::bytes);
         // Depths are summed from the eye on, so a sweep that comes towards it needs a second one for them.
         if self.frame.back_to_front && !form.depth.is_empty() && !self.light_alone {
-            let mut depths = self.bands(&Accumulator { channels: Vec::new(), ..form.clone() });
+            let form = Accumulator { channels: Vec::new(), ..form.clone() };
+            let (mut depths, mut splats) = (self.bands(&form), self.splats(&form));
             for slab in (0..self.frame.slabs.count).rev() {
                 progress.tick(0).map_err(cancelled)?;
-                counts.eye_fragments += self.pass(&mut depths, layout, slab, Step::Depths);
+                counts.eye_fragments += splats.as_mut().map_or(0, |splats| splats.draw(slab));
+                counts.eye_fragments += self.pass(&mut depths, layout, (slab, Step::Depths), splats.as_ref());
             }
             for (band, depths) in bands.iter_mut().zip(depths) {
                 band.pixels.depth = depths.pixels.depth;
@@ -154,11 +170,40 @@ impl<'a> Sweep<'a> {
     }
 
     /// One slab in the eye's image. Number of footprint numbers.
-    fn pass(&self, bands: &mut [EyeBand], layout: &ChannelLayout, slab: u32, step: Step) -> u64 {
+    fn pass(
+        &self,
+        bands: &mut [EyeBand],
+        layout: &ChannelLayout,
+        (slab, step): (u32, Step),
+        splats: Option<&SplatSheets<'_>>,
+    ) -> u64 {
         let one = |(index, eye): (usize, &mut EyeBand)| {
-            pulp::Arch::new().dispatch(OneSlab { of: self, layout, index, slab, step, eye })
+            pulp::Arch::new().dispatch(OneSlab { of: self, layout, splats, index, slab, step, eye })
         };
         bands.par_iter_mut().enumerate().map(one).sum()
+    }
+
+    /// The splats of the sweep, if there are any.
+    fn splats(&self, form: &Accumulator) -> Option<SplatSheets<'a>> {
+        let of = self.input.splats.as_ref().filter(|splats| !splats.cloud.is_empty())?;
+        Some(SplatSheets::new(of, &self.frame, self.light_buffer.as_ref(), self.input.opaque, form))
+    }
+
+    fn lamps(&self) -> Lamps<'a> {
+        let Self { light: carried, mapped, ambient, light_alone, .. } = *self;
+        Lamps { carried, mapped, ambient, camera: self.input.sheets.camera, light_alone }
+    }
+
+    /// The light of the sweep at a slab, behind splats and among them.
+    pub(crate) fn illumination<'b>(
+        &'b self,
+        buffer: &'b LightBuffer,
+        slab: u32,
+        splats: Option<&'b SplatLight<'b>>,
+    ) -> Illumination<'b> {
+        let (paths, volumes) = (&self.paths[..], self.volumes);
+        let (face, width) = (self.frame.slabs.face(slab), self.frame.slabs.width as f32);
+        Illumination { buffer, paths, volumes, splats, face, width }
     }
 
     fn bands(&self, form: &Accumulator) -> Vec<EyeBand> {

@@ -2,7 +2,7 @@
 
 use super::common::{draw, exact, input, lamp, lit, scattering, sun};
 use crate::common::{BEAUTY, apart, constant, cubic, grid, noise, parallel, perspective, transfer, volume};
-use sheet_light::half::{HalfInput, HalfParams, HalfVector, LEAST_COSINE, Reason, fold, serves};
+use sheet_light::half::{Bodies, HalfInput, HalfParams, HalfVector, LEAST_COSINE, Reason, fold, serves};
 use sheet_light::{Error, Params, Volume};
 use splat_core::glam::DVec3;
 use splat_core::shade::{ChannelLayout, LitBy};
@@ -76,7 +76,7 @@ fn hv14_hv15_light_and_lens_that_cross_slabs_backwards_are_refused() {
     let grid = grid([12, 12, 12], cubic(0.5), |_| 1.0);
     let volumes = [volume(&grid, &tf, &material)];
     let camera = perspective([0.0, 0.0, 12.0], 50.0, [24, 24]);
-    let why = |light: LitBy<'_>| serves(&volumes, &camera, &light.light);
+    let why = |light: LitBy<'_>| serves(&Bodies::volumes(&volumes), &camera, &light.light);
     assert_eq!(why(sun([1.0, 1.0, 1.0])), Ok(()));
     assert_eq!(why(lamp([8.0, 8.0, 8.0])), Ok(()));
     // Inside, on a face, and just outside of one.
@@ -87,7 +87,7 @@ fn hv14_hv15_light_and_lens_that_cross_slabs_backwards_are_refused() {
     assert!(matches!(near, Err(Reason::LightAlongSlabs { cosine }) if cosine < LEAST_COSINE), "{near:?}");
     // Half of a volume beside a wide lens.
     let wide = perspective([0.0, 0.0, 3.5], 120.0, [24, 24]);
-    let flat = serves(&volumes, &wide, &sun([1.0, 0.0, 0.1]).light);
+    let flat = serves(&Bodies::volumes(&volumes), &wide, &sun([1.0, 0.0, 0.1]).light);
     assert!(matches!(flat, Err(Reason::ViewAlongSlabs { cosine }) if cosine < LEAST_COSINE), "{flat:?}");
     let sphere = lit(LightShape::Sphere { center: DVec3::splat(20.0), radius: 1.0 });
     assert_eq!(why(sphere), Err(Reason::Extended));

@@ -131,7 +131,6 @@ pub fn suits(input: &ShadeInput<'_>) -> Result<(), &'static str> {
 pub fn received(input: &ShadeInput<'_>, ids: &[u32], progress: Option<&Progress>) -> Result<Vec<[f32; 3]>, Error> {
     let quiet = Progress::new();
     let progress = progress.unwrap_or(&quiet);
-    let eye = (input.camera.position - input.cloud.origin).as_vec3();
     let mut all = Vec::new();
     for lit in shadowed(input.lights) {
         let mut column = vec![[0.0; 3]; ids.len()];
@@ -140,7 +139,7 @@ pub fn received(input: &ShadeInput<'_>, ids: &[u32], progress: Option<&Progress>
                 return;
             }
             for (to, &i) in to.iter_mut().zip(ids) {
-                let splat = LitSplat::new(input, i as usize, eye);
+                let splat = LitSplat::new(input, i as usize);
                 let (_, irradiance) = splat.point.irradiance(&lit.light);
                 *to = splat.transmittance(lit.shadow, irradiance);
             }

@@ -1,4 +1,4 @@
-//! Half-vector slicing of the technique `sheets` (Zhang and Crawfis, section 4): one sweep a light through all volumes.
+//! Half-vector slicing of the technique `sheets` (Zhang and Crawfis, section 4): one sweep a light through all that is translucent.
 //!
 //! Light that no half vector serves has a shadow map, as in slabs across the view, and joins the first sweep.
 
@@ -11,10 +11,14 @@ use crate::pass;
 use crate::scene::{self, Scene, Slicing, Technique};
 use crate::technique::Session;
 use crate::{CostRecord, Error, RenderOptions, stage};
-use sheet_light::half::{self, HalfInput, HalfParams, Reason, Scattering, fold, serves, slab_width};
-use sheet_light::{Params, SheetInput, Volume};
-use splat_core::Accumulator;
+use sheet_light::half::{
+    self, Bodies, HalfInput, HalfParams, HalfSplats, Reason, Scattering, SplatBounds, fold, serves, slab_width,
+};
+use sheet_light::{Params, SheetInput};
+use splat_core::glam::Vec3;
+use splat_core::raster::{self, ProjectInput, Projected};
 use splat_core::shade::LitBy;
+use splat_core::{Aabb, Accumulator, Cloud, DAabb, SplatKind};
 
 /// What a user can do where half vectors cannot.
 const HINT: &str = "use render.sheets.slicing = \"view\"";
@@ -39,11 +43,13 @@ fn points_served(matter: &Matter<'_>, points: &[LightPoint]) -> Result<Carries, 
             format!("drawn by {}, where half-vector sheets draw alone what is translucent", other.technique.name());
         return refuse(other, &message, "");
     }
-    if let Some(splats) = translucent().find(|o| o.form == Form::Splats) {
-        let message = "translucent, but no volume, density, cloud or medium, which half-vector sheets are of";
-        return refuse(splats, message, ", or make it opaque");
+    let scatters_again = matter.scene.render.sheets.scattering().is_some();
+    if let Some(splats) = translucent().find(|o| o.form == Form::Splats && scatters_again) {
+        let message = "a translucent surface, whose shadow light that is scattered more than once does not have";
+        return refuse(splats, message, ", make it opaque, or leave render.sheets.scattering out");
     }
-    let volumes: Vec<Volume<'_>> = volumes(matter).collect();
+    let (volumes, splats) = (volumes(matter).collect::<Vec<_>>(), splat_bounds(matter));
+    let bodies = Bodies { volumes: &volumes, splats };
     let words = |reason: Reason| match reason {
         Reason::LampInside { volume, .. } => {
             let name = &matter.scene.objects[volumes[volume].object as usize].name;
@@ -51,20 +57,21 @@ fn points_served(matter: &Matter<'_>, points: &[LightPoint]) -> Result<Carries, 
         }
         other => other.to_string(),
     };
-    let points = points.iter().map(|point| serves(&volumes, matter.camera, &point.light).map_err(words)).collect();
-    Ok(Carries { points, scatters_again: matter.scene.render.sheets.scattering().is_some() })
+    let points = points.iter().map(|point| serves(&bodies, matter.camera, &point.light).map_err(words)).collect();
+    Ok(Carries { points, scatters_again })
 }
 
 /// Bytes of the largest sweep.
 pub(super) fn bytes(matter: &Matter<'_>, points: &[LightPoint], options: &RenderOptions) -> u64 {
-    let volumes: Vec<Volume<'_>> = volumes(matter).collect();
+    let (volumes, splats) = (volumes(matter).collect::<Vec<_>>(), splat_bounds(matter));
+    let bodies = Bodies { volumes: &volumes, splats };
     // Of counts alone: no length among the parameters plays a part.
     let params = half_params(matter.scene, params(matter.scene, 0, options));
-    let served = points.iter().map(|point| &point.light).filter(|light| serves(&volumes, matter.camera, light).is_ok());
-    half::bytes(&volumes, matter.camera, served, &params)
+    let served = points.iter().map(|point| &point.light).filter(|light| serves(&bodies, matter.camera, light).is_ok());
+    half::bytes(&bodies, matter.camera, served, &params)
 }
 
-/// Draws all volumes into a segment of its own.
+/// Draws all that is translucent into a segment of its own.
 pub(super) fn draw(
     frame: &Frame<'_>,
     into: &mut Accumulator,
@@ -72,7 +79,9 @@ pub(super) fn draw(
     cost: &mut CostRecord,
 ) -> Result<(), Error> {
     let opaque = frame.opaque(cost)?;
-    let input = input(frame, &opaque.depth, cost)?;
+    let splats = OwnSplats::of(frame);
+    let mut input = input(frame, &opaque.depth, cost)?;
+    input.splats = splats.as_ref().map(|splats| splats.input(frame));
     let params = half_params(frame.scene, params(frame.scene, frame.loaded.exponent, session.options));
     super::warn(frame, &input.sheets.volumes, session.warnings);
     frame.progress.begin(stage::SHEETS);
@@ -81,8 +90,9 @@ pub(super) fn draw(
         let mut segment = frame.accumulator();
         let drawn = fold(&input, &params, &frame.layout(), &mut segment, Some(frame.progress));
         let counts = drawn.map_err(|e| refuse(frame, e))?;
-        stage.items_in = counts.voxels;
-        stage.items_out = counts.visible;
+        let splats = splats.as_ref().map_or(0, |splats| splats.cloud.len() as u64);
+        stage.items_in = counts.voxels + splats;
+        stage.items_out = counts.visible + splats;
         stage.fragments = counts.eye_fragments + counts.light_fragments;
         stage.passes = counts.slabs;
         stage.bytes = counts.bytes;
@@ -93,10 +103,11 @@ pub(super) fn draw(
 
 /// Width of the slabs of the first sweep.
 pub(super) fn width(frame: &Frame<'_>, params: &Params) -> Result<f64, Error> {
-    let volumes: Vec<Volume<'_>> = volumes(&frame.matter()).collect();
+    let (volumes, splats) = (volumes(&frame.matter()).collect::<Vec<_>>(), splat_bounds(&frame.matter()));
+    let bodies = Bodies { volumes: &volumes, splats };
     let carried = frame.light_points().iter().zip(&frame.plan.carried).find(|(_, carried)| **carried);
     let light = carried.map(|(point, _)| &point.light);
-    slab_width(&volumes, &frame.camera, light, params).map_err(|e| refuse(frame, e))
+    slab_width(&bodies, &frame.camera, light, params).map_err(|e| refuse(frame, e))
 }
 
 /// The volumes, the lights that come through them in sweeps, and those that do not.
@@ -121,7 +132,65 @@ fn input<'a>(frame: &'a Frame<'a>, opaque: &'a [f32], cost: &mut CostRecord) -> 
         shadow_origin: frame.loaded.cloud.origin,
         ambient: frame.scene.ambient,
     };
-    Ok(HalfInput { sheets, mapped, opaque })
+    Ok(HalfInput { sheets, splats: None, mapped, opaque })
+}
+
+/// Most slabs where splats alone say how wide they are.
+const MOST_SLABS: f64 = 65536.0;
+
+/// Where the splats are that sweeps draw; `None` without any, and before they are made.
+fn splat_bounds(matter: &Matter<'_>) -> Option<SplatBounds> {
+    let cloud = matter.cloud?;
+    let (mut all, mut radii, mut count) = (Aabb::EMPTY, 0.0f64, 0u64);
+    for id in own_splats(matter) {
+        let (at, radius) = (cloud.position[id as usize], cloud.radius[id as usize]);
+        all = all.union(Aabb { min: at, max: at });
+        (radii, count) = (radii + f64::from(radius), count + 1);
+    }
+    let place = |p: Vec3| cloud.origin + p.as_dvec3();
+    let bounds = (count > 0).then(|| DAabb::new(place(all.min), place(all.max)))?;
+    // Neighbours are about half a radius apart.
+    let least = (bounds.diagonal() / MOST_SLABS).max(f64::MIN_POSITIVE);
+    Some(SplatBounds { bounds, slab_width: (0.5 * radii / count as f64).max(least), count })
+}
+
+/// Ids of the translucent splats of objects that become nothing else.
+fn own_splats<'a>(matter: &Matter<'a>) -> impl Iterator<Item = u32> + use<'a> {
+    let mut is_own = vec![false; matter.scene.objects.len()];
+    matter.own.iter().for_each(|own| is_own[own.object] = true);
+    let kinds = matter.cloud.into_iter().flat_map(|cloud| cloud.kind.iter().zip(&cloud.object));
+    let is_one = move |kind: SplatKind, object: u32| kind != SplatKind::Opaque && !is_own[object as usize];
+    (0..).zip(kinds).filter_map(move |(id, (kind, object))| is_one(*kind, *object).then_some(id))
+}
+
+/// The translucent splats of a frame, for which it has no radiance: theirs is found in sweeps.
+struct OwnSplats {
+    cloud: Cloud,
+    projected: Projected,
+    slab_width: f64,
+}
+
+impl OwnSplats {
+    fn of(frame: &Frame<'_>) -> Option<Self> {
+        let slab_width = splat_bounds(&frame.matter())?.slab_width;
+        let cloud = frame.loaded.cloud.gather(&own_splats(&frame.matter()).collect::<Vec<u32>>());
+        let projected = raster::project(&ProjectInput {
+            cloud: &cloud,
+            camera: &frame.camera,
+            footprints: &frame.loaded.footprints,
+            materials: &frame.loaded.materials,
+            params: &frame.raster_params(),
+            detail: frame.detail(),
+        });
+        Some(Self { cloud, projected, slab_width })
+    }
+
+    fn input<'a>(&'a self, frame: &'a Frame<'_>) -> HalfSplats<'a> {
+        let Self { cloud, projected, slab_width } = self;
+        let (materials, objects) = (&frame.loaded.materials, &frame.loaded.objects);
+        let footprints = &frame.loaded.footprints;
+        HalfSplats { cloud, materials, objects, footprints, projected, slab_width: *slab_width }
+    }
 }
 
 fn half_params(scene: &Scene, sheets: Params) -> HalfParams {

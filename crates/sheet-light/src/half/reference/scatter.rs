@@ -6,7 +6,7 @@
 use super::super::scatter::grid::LightGrid;
 use super::super::scatter::medium::{self, Cell};
 use super::super::scatter::{self};
-use super::super::{HalfParams, Scattering, lamp, serves};
+use super::super::{Bodies, HalfParams, Scattering, lamp, serves};
 use crate::Volume;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::shade::LitBy;
@@ -49,7 +49,11 @@ impl Diffuse {
         if !scatter::is_wanted(volumes, &lit.light, params) {
             return None;
         }
-        let grid = LightGrid::new(volumes, &lamp::camera_of(volumes, &lit.light, params), params.voxels_per_cell);
+        let grid = LightGrid::new(
+            volumes,
+            &lamp::camera_of(&Bodies::volumes(volumes), &lit.light, params),
+            params.voxels_per_cell,
+        );
         let cells = medium::cells(&grid, volumes, params.scattering);
         let cone =
             params.cone.unwrap_or_else(|| scatter::phase::cone_of(params.scattering, medium::mean_asymmetry(&cells)));

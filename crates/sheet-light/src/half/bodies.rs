@@ -1,0 +1,57 @@
+//! What slabs hold, as far as it says how they lie.
+
+use super::frame::world_corners;
+use crate::Volume;
+use splat_core::DAabb;
+use splat_core::glam::DVec3;
+
+/// What slabs hold.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Bodies<'a> {
+    /// Volumes.
+    pub volumes: &'a [Volume<'a>],
+    /// Where splats lie; `None` without any.
+    pub splats: Option<SplatBounds>,
+}
+
+/// Where splats lie.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SplatBounds {
+    /// A box that holds them, world.
+    pub bounds: DAabb,
+    /// Width of the slabs where neither the parameters nor a volume give one, world units, > 0.
+    pub slab_width: f64,
+    /// How many there are.
+    pub count: u64,
+}
+
+impl<'a> Bodies<'a> {
+    /// Volumes alone.
+    pub fn volumes(volumes: &'a [Volume<'a>]) -> Self {
+        Self { volumes, splats: None }
+    }
+
+    /// Whether there is nothing.
+    pub fn is_empty(&self) -> bool {
+        self.volumes.is_empty() && self.splats.is_none()
+    }
+
+    /// Corners that all of them lie between, world.
+    pub(crate) fn corners(&self) -> impl Iterator<Item = DVec3> + Clone + use<'a> {
+        let splats = self.splats.into_iter().flat_map(|splats| splats.bounds.corners());
+        self.volumes.iter().flat_map(world_corners).chain(splats)
+    }
+
+    /// Middle of the bounds of all, of which there is at least one.
+    pub(crate) fn middle(&self) -> DVec3 {
+        let low = self.corners().fold(DVec3::INFINITY, DVec3::min);
+        low + 0.5 * (self.corners().fold(DVec3::NEG_INFINITY, DVec3::max) - low)
+    }
+
+    /// The least step of a lattice and distance of splats, world units.
+    pub(crate) fn least_step(&self) -> f64 {
+        let axes = self.volumes.iter().map(Volume::axes).flat_map(|axes| [axes.x_axis, axes.y_axis, axes.z_axis]);
+        let splats = self.splats.map(|splats| splats.slab_width);
+        axes.map(DVec3::length).chain(splats).fold(f64::INFINITY, f64::min)
+    }
+}

@@ -1,0 +1,187 @@
+//! Light among splats: the optical depth of those before the present slab in the light's own image, and what arrives at each splat.
+//!
+//! Within a slab, light has come through as much as it would if all that a pixel has there lay spread over a slab's width about its mean
+//! depth. So it makes no difference whether a layer of splats lies in the midst of a slab or on a face, and a slab of many layers
+//! is a ramp.
+
+use super::frame::Frame;
+use super::sight::Sight;
+use super::splat_squares::{BySlab, Slab, Squares};
+use super::splats::HalfSplats;
+use crate::lines::Lines;
+use rayon::prelude::*;
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::raster::Projected;
+use splat_core::raster::bins::TILE;
+use splat_core::shade::ChannelLayout;
+use splat_core::{Accumulator, Camera, SplatKind};
+
+/// The splats of one light.
+pub(crate) struct SplatLight<'a> {
+    of: &'a HalfSplats<'a>,
+    sight: Sight,
+    projected: Projected,
+    /// Those that cast shadows; the present slab.
+    squares: Squares,
+    /// Slabs before, by square.
+    sums: Vec<Lines>,
+    columns: usize,
+    planes: usize,
+    slab_width: f32,
+    /// For each splat the depth across the slabs, in slabs, at which it asks for light; and the ids by that slab.
+    asks: Vec<f32>,
+    by_slab: BySlab,
+    /// Share of the light that splats let through, by id.
+    through: Vec<[f32; 3]>,
+}
+
+impl<'a> SplatLight<'a> {
+    /// `places` are slab coordinates of the centres; `order` has the ids slab by slab.
+    pub(crate) fn new(
+        of: &'a HalfSplats<'a>,
+        frame: &Frame,
+        sight: &Sight,
+        (places, order): (&[Vec3], &[u32]),
+        planes: usize,
+    ) -> Self {
+        let projected = of.seen_by(&sight.camera);
+        let casts = |id: &u32| of.objects[of.cloud.object[*id as usize] as usize].casts_shadow;
+        let casters: Vec<u32> = order.iter().copied().filter(casts).collect();
+        let form = Accumulator::new([1, 1], planes, 1, false, false);
+        let squares = Squares::new(&projected, &casters, &[], &form);
+        let last = frame.slabs.count - 1;
+        let asks: Vec<f32> =
+            (0..places.len()).into_par_iter().map(|i| asks_at(of, frame, &sight.camera, i, places[i])).collect();
+        let slabs: Vec<u32> = asks.iter().map(|slab| (*slab as u32).min(last)).collect();
+        Self {
+            of,
+            sight: *sight,
+            columns: (sight.camera.size[0] as usize).div_ceil(TILE),
+            sums: vec![Lines::default(); squares.lines().count()],
+            squares,
+            projected,
+            planes,
+            slab_width: frame.slabs.width as f32,
+            asks,
+            by_slab: BySlab::new(&slabs, frame.slabs.count),
+            through: vec![[1.0; 3]; places.len()],
+        }
+    }
+
+    /// Share of the light that splats let through to each, by id; known once the sweep has come to its slab.
+    pub(crate) fn through(&self) -> &[[f32; 3]] {
+        &self.through
+    }
+
+    /// Bytes of lists and sums.
+    pub(crate) fn bytes(&self) -> u64 {
+        let sums: u64 = self.sums.iter().map(Lines::bytes).sum();
+        self.squares.bytes() + sums + self.projected.bytes() + 20 * self.asks.len() as u64
+    }
+
+    /// Begins a slab, of these splats: takes them up, and finds what arrives at those that ask here. Fragments.
+    pub(crate) fn enter(&mut self, slab: u32, ids: &[u32], slabs: &[u32], places: &[Vec3]) -> u64 {
+        let (projected, materials) = (&self.projected, self.of.materials);
+        // A surface asks before it, so this is where it lies, whoever it is.
+        let values: Vec<f32> = ids.iter().map(|id| places[*id as usize].z / self.slab_width - slab as f32).collect();
+        let fragments = self.squares.fill(Slab { projected, materials, slabs, slab, ids, values: &values });
+        let arrives = |id: &u32| {
+            let place = places[*id as usize];
+            // What is a surface lets through nothing or all of a slab's others.
+            let is_medium = self.of.cloud.kind[*id as usize] == SplatKind::Medium;
+            let depth = if is_medium { self.asks[*id as usize] - slab as f32 } else { f32::NEG_INFINITY };
+            (*id, self.transmittance(self.sight.pixel(place), depth))
+        };
+        let found: Vec<(u32, [f32; 3])> = self.by_slab.of(slab).par_iter().map(arrives).collect();
+        found.into_iter().for_each(|(id, share)| self.through[id as usize] = share);
+        fragments
+    }
+
+    /// Ends a slab: its splats lie before all that comes.
+    pub(crate) fn leave(&mut self) {
+        for (sum, own) in self.sums.iter_mut().zip(self.squares.lines()) {
+            if let Some(own) = own {
+                sum.join(own);
+            }
+        }
+    }
+
+    /// Optical depth by plane, at a pixel, of the splats of all slabs before and of the present one up to a depth, in slabs.
+    #[inline]
+    fn of_pixel(&self, [x, y]: [usize; 2], depth: f32) -> [f32; 3] {
+        let (square, at) = (y / TILE * self.columns + x / TILE, [x % TILE, y % TILE]);
+        let own = self.squares.at([x, y], 1).map(|(lines, at)| {
+            let of = lines.pixel(ChannelLayout::plane_of(0, 1, self.planes), at).max(f32::MIN_POSITIVE);
+            let mean = lines.pixel(self.planes, at) / of;
+            (lines, at, (depth - mean + 0.5).clamp(0.0, 1.0))
+        });
+        [0, 1, 2].map(|p| {
+            let p = p.min(self.planes - 1);
+            self.sums[square].pixel(p, at) + own.map_or(0.0, |(lines, at, share)| share * lines.pixel(p, at))
+        })
+    }
+
+    /// The four pixels about a place, and their weights; those at a border are those inside.
+    #[inline]
+    fn patch(&self, [x, y]: [f32; 2]) -> [([usize; 2], f32); 4] {
+        let [width, height] = self.sight.camera.size.map(|s| s as usize);
+        let split = |v: f32, n: usize| {
+            let v = (v - 0.5).clamp(0.0, (n - 1) as f32);
+            let low = (v as usize).min(n.saturating_sub(2));
+            (low, (low + 1).min(n - 1), v - low as f32)
+        };
+        let ((x0, x1, u), (y0, y1, v)) = (split(x, width), split(y, height));
+        let (left, upper) = (1.0 - u, 1.0 - v);
+        [([x0, y0], left * upper), ([x1, y0], u * upper), ([x0, y1], left * v), ([x1, y1], u * v)]
+    }
+
+    /// Mean optical depth by plane about a place of the light's image, up to a depth in the present slab, in slabs.
+    #[inline]
+    pub(crate) fn optical_depth(&self, pixel: [f32; 2], depth: f32) -> [f32; 3] {
+        let mut sum = [0.0; 3];
+        for (at, weight) in self.patch(pixel) {
+            let tau = self.of_pixel(at, depth);
+            (0..3).for_each(|p| sum[p] += weight * tau[p]);
+        }
+        sum
+    }
+
+    /// Mean transmittance about a place of the light's image, up to a depth in the present slab, in slabs.
+    fn transmittance(&self, pixel: [f32; 2], depth: f32) -> [f32; 3] {
+        let mut sum = [0.0; 3];
+        for (at, weight) in self.patch(pixel) {
+            let tau = self.of_pixel(at, depth);
+            (0..3).for_each(|p| sum[p] += weight * libm::expf(-tau[p]));
+        }
+        sum
+    }
+}
+
+/// Reach of the resampling filter, pixels.
+const FILTER_PX: f64 = 1.5;
+
+/// Least cosine by which pixels on a surface are widened: one that light grazes gets next to none.
+const LEAST_COSINE: f64 = 0.3;
+
+/// Where a splat asks for light, in slabs: a medium at its centre; a surface before the centres of all discs that cover a pixel about it, if
+/// the surface is flat.
+fn asks_at(of: &HalfSplats<'_>, frame: &Frame, camera: &Camera, i: usize, place: Vec3) -> f32 {
+    let lift = if of.cloud.kind[i] == SplatKind::Medium {
+        0.0
+    } else {
+        let normal = of.cloud.normal_of(i).as_dvec3();
+        let view = camera.view_from_world(of.cloud.origin + of.cloud.position[i].as_dvec3());
+        let [pixel, to_light] = if camera.is_orthographic() {
+            [1.0 / camera.focal_px(), camera.axes[2].dot(normal)]
+        } else {
+            let [right, up, forward] = camera.axes.map(|axis| axis.dot(normal));
+            [view.z / camera.focal_px(), DVec3::new(right, up, forward).dot(view) / view.length()]
+        };
+        let across = frame.axes[2].dot(normal);
+        // A pixel on the surface: what the filter reaches, and as far again as a look-up does.
+        let pixel = pixel / to_light.abs().max(LEAST_COSINE);
+        let reach = f64::from(of.cloud.radius[i]).hypot(FILTER_PX * pixel) + pixel;
+        reach * (1.0 - across * across).max(0.0).sqrt()
+    };
+    ((f64::from(place.z) - lift) / frame.slabs.width).max(0.0) as f32
+}

@@ -1,0 +1,210 @@
+//! Splats in the slabs of a sweep: surfaces and media that are classified already, each whole in the slab of its centre, for the eye
+//! as for the light.
+//!
+//! What arrives at a splat is looked up when the sweep has come to it. A surface is not shadowed by itself: its discs overlap, and of
+//! one that lies slanted to the slabs, neighbours come first. So it asks before the slabs in which they may lie. A medium shadows
+//! itself, by what of its slab the light has come through at its place.
+
+use super::bodies::SplatBounds;
+use super::frame::Frame;
+use super::illuminate::{Illumination, ThroughVolumes};
+use super::light_buffer::LightBuffer;
+use super::splat_light::SplatLight;
+use super::splat_squares::{BySlab, Slab, Squares};
+use rayon::prelude::*;
+use splat_core::glam::Vec3;
+use splat_core::raster::{Detail, Params, ProjectInput, Projected, project, pulp};
+use splat_core::shade::{ChannelLayout, LitBy, ShadeInput, shade_splat};
+use splat_core::{
+    Accumulator, Camera, Cloud, DAabb, FootprintStack, Material, Object, Receiver, Shading, SplatKind, Transmittance,
+};
+
+/// Splats shaded by one task.
+const CHUNK: usize = 256;
+
+/// Splats of the input.
+#[derive(Clone, Copy)]
+pub struct HalfSplats<'a> {
+    /// The splats, all of which are drawn and none of which is opaque. Shadows of lights lie relative to its origin.
+    pub cloud: &'a Cloud,
+    /// Materials by id.
+    pub materials: &'a [Material],
+    /// Objects by id: who casts shadows, and how much of one each receives.
+    pub objects: &'a [Object],
+    /// Footprints by id.
+    pub footprints: &'a FootprintStack,
+    /// Their footprints in the eye's image, with depths where something opaque hides them or depths are asked for, with objects where these are.
+    pub projected: &'a Projected,
+    /// Width of the slabs where neither the parameters nor a volume give one, world units, > 0.
+    pub slab_width: f64,
+}
+
+impl HalfSplats<'_> {
+    /// Where they lie; `None` without any.
+    pub fn bounds(&self) -> Option<SplatBounds> {
+        let all = self.cloud.bounds();
+        let place = |p: Vec3| self.cloud.origin + p.as_dvec3();
+        let bounds = DAabb::new(place(all.min), place(all.max));
+        let Self { slab_width, .. } = *self;
+        (!all.is_empty()).then_some(SplatBounds { bounds, slab_width, count: self.cloud.len() as u64 })
+    }
+
+    /// Whether any asks for light.
+    pub(crate) fn are_lit(&self) -> bool {
+        let is_lit: Vec<bool> = self.materials.iter().map(|m| m.shading != Shading::Unlit).collect();
+        self.cloud.material.iter().any(|m| is_lit[usize::from(*m)])
+    }
+
+    /// The first that is opaque.
+    pub(crate) fn opaque(&self) -> Option<usize> {
+        self.cloud.kind.iter().position(|kind| *kind == SplatKind::Opaque)
+    }
+
+    /// Their footprints in another image.
+    pub(crate) fn seen_by(&self, camera: &Camera) -> Projected {
+        let Self { cloud, footprints, materials, .. } = *self;
+        let (params, detail) = (&Params::default(), Detail { depth: false, object: false });
+        project(&ProjectInput { cloud, camera, footprints, materials, params, detail })
+    }
+}
+
+/// The splats of a sweep, and what those of the present slab show.
+pub(crate) struct SplatSheets<'a> {
+    of: &'a HalfSplats<'a>,
+    frame: Frame,
+    /// Slab coordinates of the centres, and their slabs.
+    places: Vec<Vec3>,
+    slabs: Vec<u32>,
+    drawn: BySlab,
+    /// The eye's image.
+    pub(crate) squares: Squares,
+    pub(crate) light: Option<SplatLight<'a>>,
+    /// Radiance of those of the present slab, and whatever else a pixel keeps.
+    values: Vec<f32>,
+}
+
+/// The lights of a sweep, for splats.
+pub(crate) struct Lamps<'a> {
+    /// The one that is carried.
+    pub(crate) carried: Option<&'a LitBy<'a>>,
+    /// Those whose shadows are known.
+    pub(crate) mapped: &'a [LitBy<'a>],
+    pub(crate) ambient: [f32; 3],
+    pub(crate) camera: &'a Camera,
+    /// Whether ambient and emitted light belong to another sweep.
+    pub(crate) light_alone: bool,
+}
+
+impl<'a> SplatSheets<'a> {
+    /// Those of a sweep, for what `form` keeps; `opaque` has depths of what hides them from the eye, or nothing.
+    pub(crate) fn new(
+        of: &'a HalfSplats<'a>,
+        frame: &Frame,
+        buffer: Option<&LightBuffer>,
+        opaque: &[f32],
+        form: &Accumulator,
+    ) -> Self {
+        let place = |p: &Vec3| frame.point(of.cloud.origin + p.as_dvec3()).as_vec3();
+        let places: Vec<Vec3> = of.cloud.position.par_iter().map(place).collect();
+        let last = frame.slabs.count - 1;
+        let slab = |depth: f32| ((depth / frame.slabs.width as f32) as u32).min(last);
+        let slabs: Vec<u32> = places.iter().map(|p| slab(p.z)).collect();
+        let drawn = BySlab::new(&slabs, frame.slabs.count);
+        let planes = form.optical_depth.len();
+        let light = |buffer: &LightBuffer| SplatLight::new(of, frame, &buffer.sight, (&places, &drawn.ids), planes);
+        Self {
+            light: buffer.map(light),
+            squares: Squares::new(of.projected, &drawn.ids, opaque, form),
+            of,
+            frame: *frame,
+            slabs,
+            drawn,
+            places,
+            values: Vec::new(),
+        }
+    }
+
+    /// Bytes of lists and sums.
+    pub(crate) fn bytes(&self) -> u64 {
+        let light = self.light.as_ref().map_or(0, SplatLight::bytes);
+        self.squares.bytes() + light + 24 * self.places.len() as u64
+    }
+
+    /// Takes the splats of a slab up for eye and light, the latter behind the volumes of the slabs before, if light comes through any. Fragments
+    /// of both.
+    pub(crate) fn enter(
+        &mut self,
+        slab: u32,
+        lamps: &Lamps<'_>,
+        volumes: Option<&Illumination<'_>>,
+        layout: &ChannelLayout,
+    ) -> [u64; 2] {
+        let light =
+            self.light.as_mut().map_or(0, |light| light.enter(slab, self.drawn.of(slab), &self.slabs, &self.places));
+        self.shade(slab, lamps, volumes, layout);
+        [self.draw(slab), light]
+    }
+
+    /// Takes those of a slab up for the eye, with the values that were found before, if there are any. Fragments.
+    pub(crate) fn draw(&mut self, slab: u32) -> u64 {
+        let (projected, materials, values) = (self.of.projected, self.of.materials, &self.values[..]);
+        self.squares.fill(Slab { projected, materials, slabs: &self.slabs, slab, ids: self.drawn.of(slab), values })
+    }
+
+    /// Ends a slab.
+    pub(crate) fn leave(&mut self) {
+        if let Some(light) = &mut self.light {
+            light.leave();
+        }
+    }
+
+    /// Finds the radiance of the splats of a slab.
+    fn shade(&mut self, slab: u32, lamps: &Lamps<'_>, volumes: Option<&Illumination<'_>>, layout: &ChannelLayout) {
+        let (of, ids, channels) = (self.of, self.drawn.of(slab), layout.count());
+        self.values.clear();
+        self.values.resize(ids.len() * channels, 0.0);
+        let chunks = self.values.par_chunks_mut(CHUNK * channels).zip(ids.par_chunks(CHUNK));
+        let HalfSplats { cloud, materials, objects, .. } = *of;
+        let Lamps { ambient, camera, .. } = *lamps;
+        let (light, places, frame) = (&self.light, &self.places, &self.frame);
+        chunks.for_each(|(values, ids)| {
+            let through = light.as_ref().map_or(&[][..], SplatLight::through);
+            let places: Vec<Vec3> = ids.iter().map(|id| places[*id as usize]).collect();
+            let mut volumes_let = vec![[1.0; 3]; ids.len()];
+            if let Some(of) = volumes {
+                pulp::Arch::new().dispatch(ThroughVolumes { of, frame, places: &places, out: &mut volumes_let });
+            }
+            for (k, (id, values)) in ids.iter().zip(values.chunks_exact_mut(channels)).enumerate() {
+                let i = *id as usize;
+                if !of.projected.is_visible(i) {
+                    continue;
+                }
+                let share = through.get(i).map(|through| [0, 1, 2].map(|c| through[c] * volumes_let[k][c]));
+                let arrives = lamps.carried.map(|lit| Arrives { share: share.unwrap_or([1.0; 3]), others: lit.shadow });
+                let carried =
+                    lamps.carried.zip(arrives.as_ref()).map(|(lit, a)| LitBy { light: lit.light, shadow: Some(a) });
+                let lights: Vec<LitBy<'_>> = carried.into_iter().chain(lamps.mapped.iter().copied()).collect();
+                let input = ShadeInput { cloud, materials, objects, lights: &lights, ambient, camera };
+                let (mut radiance, normal) = shade_splat(&input, i);
+                if lamps.light_alone {
+                    (radiance.ambient, radiance.emission) = ([0.0; 3], [0.0; 3]);
+                }
+                radiance.write(normal, layout, values);
+            }
+        });
+    }
+}
+
+/// What arrives at one splat.
+struct Arrives<'a> {
+    share: [f32; 3],
+    /// Shadows of all that is not carried.
+    others: Option<&'a dyn Transmittance>,
+}
+
+impl Transmittance for Arrives<'_> {
+    fn transmittance(&self, receiver: &Receiver) -> [f32; 3] {
+        let others = self.others.map_or([1.0; 3], |others| others.transmittance(receiver));
+        [0, 1, 2].map(|c| self.share[c] * others[c])
+    }
+}
