@@ -11,7 +11,7 @@ use sheet_light::{Params, SheetCounts, SheetInput, Volume, prepare};
 use splat_core::glam::DVec3;
 use splat_core::shade::{ChannelLayout, LitBy};
 use splat_core::{
-    Accumulator, Camera, Grid, LayerSet, Light, LightShape, Material, Projection, Shading, Similarity,
+    Accumulator, Camera, Grid, LayerSet, Light, LightShape, Material, Packing, Projection, Shading, Similarity,
     TransferFunction, TransferPoint,
 };
 use std::path::Path;
@@ -81,6 +81,7 @@ fn row(name: &str, grid: &Grid, transfer: &TransferFunction, lit: bool, camera: 
     let lights = [LitBy { light: sun, shadow: None }];
     let volume = Volume {
         grid,
+        packing: Packing::Cartesian,
         transform: Similarity::default(),
         transfer,
         extinction_scale: 1.0,

@@ -14,7 +14,7 @@ use crate::shadows::Shadows;
 use crate::sheets::Sheets;
 use crate::slabs::{Kernels, Slabs};
 use crate::tile::{self, AREA, FoldTile, Scratch, TILE};
-use crate::viewed::{PixelFootprint, Viewed, corners, spacing_along, view_axes};
+use crate::viewed::{PixelFootprint, Viewed, corners, spacing_along, view_steps};
 use crate::visible::Voxels;
 use crate::{Error, Params, SheetInput, Splats, Volume};
 use rayon::prelude::*;
@@ -66,7 +66,7 @@ pub struct Sheeted<'a> {
 /// [`Error::Parameter`], [`Error::Volume`], [`Error::Limit`] before much is taken, or [`Error::Cancelled`].
 pub fn prepare<'a>(input: SheetInput<'a>, params: &Params, progress: Option<&Progress>) -> Result<Sheeted<'a>, Error> {
     params.check()?;
-    input.check()?;
+    input.check_any_lattice()?;
     let slabs = slabs_of(&input, params)?;
     let tiles = tile::tiles(input.camera);
     let mut needed = memory(&input, params, &slabs, tiles);
@@ -93,7 +93,7 @@ pub fn prepare<'a>(input: SheetInput<'a>, params: &Params, progress: Option<&Pro
 pub(crate) fn slabs_of(input: &SheetInput<'_>, params: &Params) -> Result<Slabs, Error> {
     let (mut near, mut far, mut spacing) = (f64::INFINITY, 0.0f64, f64::INFINITY);
     for volume in &input.volumes {
-        spacing = spacing.min(spacing_along(&view_axes(volume, input.camera)));
+        spacing = spacing.min(spacing_along(&view_steps(volume, input.camera)));
         for corner in corners(volume, input.camera) {
             (near, far) = (near.min(corner.z.max(0.0)), far.max(corner.z));
         }
@@ -115,7 +115,7 @@ pub(crate) fn slabs_of(input: &SheetInput<'_>, params: &Params) -> Result<Slabs,
 
 /// Radius of a volume's kernels along the view.
 fn reach(volume: &Volume<'_>, input: &SheetInput<'_>, params: &Params) -> f64 {
-    spacing_along(&view_axes(volume, input.camera)) * params.kernel.extent
+    spacing_along(&view_steps(volume, input.camera)) * params.kernel.extent
 }
 
 /// How many slabs of this width one of the volume's own has: as many as its spacing along the view has, where that chooses the width.
@@ -124,7 +124,7 @@ pub(crate) fn stride(volume: &Volume<'_>, input: &SheetInput<'_>, params: &Param
     const EQUAL: f64 = 1.0 + 1e-6;
     /// Most slabs in one.
     const MOST: f64 = 65536.0;
-    let slabs = spacing_along(&view_axes(volume, input.camera)) / width * EQUAL;
+    let slabs = spacing_along(&view_steps(volume, input.camera)) / width * EQUAL;
     if params.slab_width.is_some() { 1 } else { slabs.clamp(1.0, MOST) as u32 }
 }
 
@@ -133,7 +133,7 @@ fn memory(input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [usize;
     let threads = rayon::current_num_threads() as u64;
     let mut needed = threads * 4 * 4 * (TILE * TILE) as u64;
     for volume in &input.volumes {
-        let dims = Lattice::new(volume.grid, [usize::MAX; 3]).dims;
+        let dims = Lattice::packed(volume.grid, volume.packing, [usize::MAX; 3]).dims;
         let stride = stride(volume, input, params, slabs.width);
         let width = slabs.width * f64::from(stride);
         let touched = crate::sections::touched(reach(volume, input, params) / width);
@@ -161,7 +161,7 @@ impl<'a> Prepared<'a> {
         let slabs = &slabs.wider(stride);
         let viewed = Viewed::new(&volume, camera, slabs, params);
         let reach = viewed.lattice_reach(camera, slabs, volume.normals);
-        let lattice = Lattice::new(grid, reach);
+        let lattice = Lattice::packed(grid, volume.packing, reach);
         let viewed = viewed.with_rim(lattice.rim);
         let voxels = Voxels::needed(&lattice, volume.transfer, reach);
         let segments = Segments::new(&viewed, slabs, &voxels, lattice.dims, tiles);

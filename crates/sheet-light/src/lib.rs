@@ -17,8 +17,8 @@
 //!
 //! ```
 //! use sheet_light::{Params, SheetInput, Volume, prepare};
-//! use splat_core::{Accumulator, Camera, Grid, LayerSet, Material, Projection, Shading, Similarity, TransferFunction, TransferPoint};
-//! use splat_core::{glam::{DMat3, DVec3}, shade::ChannelLayout};
+//! use splat_core::{Accumulator, Camera, Grid, LayerSet, Material, Packing, Projection, Shading, Similarity};
+//! use splat_core::{TransferFunction, TransferPoint, glam::{DMat3, DVec3}, shade::ChannelLayout};
 //!
 //! // Eight cells of 1/2 along the view: 4 units of a medium of extinction 0.25, which shines white.
 //! let axes = DMat3::from_diagonal(DVec3::splat(0.5));
@@ -27,7 +27,7 @@
 //! let transfer = TransferFunction::new(vec![white]).unwrap();
 //! let material = Material { shading: Shading::Unlit, ..Material::default() };
 //! let volume = Volume {
-//!     grid: &grid, transform: Similarity::default(), transfer: &transfer, material: &material,
+//!     grid: &grid, packing: Packing::Cartesian, transform: Similarity::default(), transfer: &transfer, material: &material,
 //!     extinction_scale: 1.0, normals: false, object: 0, shadow_coefficient: 1.0, casts_shadow: true,
 //! };
 //! let view = Projection::Orthographic { height: 2.0 };

@@ -24,6 +24,7 @@ pub(crate) struct Crossings {
 pub(crate) struct LatticeRays {
     lattice_from_view: DMat3,
     start: DVec3,
+    lowest: DVec3,
     highest: DVec3,
     origin: f64,
 }
@@ -32,11 +33,12 @@ impl LatticeRays {
     /// Depths are counted from `origin`.
     pub(crate) fn new(volume: &Volume<'_>, camera: &Camera, origin: f64) -> Self {
         let world_from_view = DMat3::from_cols(camera.axes[0], camera.axes[1], camera.axes[2]);
-        let inverse = volume.axes().inverse();
+        let (inverse, lowest) = (volume.axes().inverse(), volume.packing.lowest());
         Self {
             lattice_from_view: inverse * world_from_view,
             start: inverse * (camera.position - volume.origin()),
-            highest: DVec3::from_array(volume.grid.dims.map(|n| n as f64 - 0.5)),
+            lowest,
+            highest: lowest + DVec3::from_array(volume.grid.dims.map(|n| n as f64)),
             origin,
         }
     }
@@ -60,7 +62,7 @@ impl LatticeRays {
         let (from, along) = (self.lattice(from), self.lattice_from_view * along);
         let (mut near, mut far) = (0.0f64, f64::INFINITY);
         for a in 0..3 {
-            let (to_low, to_high) = (-0.5 - from[a], self.highest[a] - from[a]);
+            let (to_low, to_high) = (self.lowest[a] - from[a], self.highest[a] - from[a]);
             if along[a] == 0.0 {
                 if to_low > 0.0 || to_high < 0.0 {
                     return [f64::INFINITY, f64::NEG_INFINITY];

@@ -39,7 +39,7 @@ struct Sheets {
 /// [`Error::Parameter`], [`Error::Volume`] or [`Error::Limit`].
 pub fn draw(input: &SheetInput<'_>, params: &Params) -> Result<Picture, Error> {
     params.check()?;
-    input.check()?;
+    input.check_any_lattice()?;
     let slabs = slabs_of(input, params)?;
     let sheets: Vec<Sheets> = input.volumes.iter().map(|v| Sheets::new(v, input, params, &slabs)).collect();
     let view = View { input, params };
@@ -88,7 +88,8 @@ impl Sheets {
             size,
         };
         let viewed = Viewed::new(volume, camera, slabs, params);
-        let lattice = Lattice::new(volume.grid, viewed.lattice_reach(camera, slabs, volume.normals));
+        let reach = viewed.lattice_reach(camera, slabs, volume.normals);
+        let lattice = Lattice::packed(volume.grid, volume.packing, reach);
         let viewed = viewed.with_rim(lattice.rim);
         let [nx, ny, nz] = lattice.dims;
         for (k, j, i) in (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i)))) {

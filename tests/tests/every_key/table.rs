@@ -210,6 +210,9 @@ fn objects() -> Vec<Entry> {
         of(All, "object.color", "object.it.color=[0.1, 0.9, 0.3]").but(These(&["volume", "slice"]), OF_THE_TRANSFER),
         of(All, "object.spacing", "object.it.spacing=0.16")
             .but(These(&["density", "cloud", "rectangle", "medium_box", "medium_ball"]), OWN_SPACING),
+        of(These(&["volume"]), "object.lattice", "object.it.lattice='bcc'")
+            .but_by(&["points", "particles"], Refused(2, "draws no body-centred lattice")),
+        one("object.lattice", "object.it.lattice='bcc'").but(All, Refused(2, "`lattice` belongs to a `volume`")),
         of(All, "object.shadow_coefficient", "object.it.shadow_coefficient=0.2"),
         one("object.technique", "object.it.technique='reference'"),
         of(All, "object.casts_shadow", "object.it.casts_shadow=false"),

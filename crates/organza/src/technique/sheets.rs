@@ -19,7 +19,7 @@ use crate::technique::{Fold, Session};
 use crate::work::{self, Translucent, cost};
 use crate::{CostRecord, Error, RenderOptions, stage};
 use sheet_light::{KernelShape, Params, SheetInput, Sheeted, Splats, Volume, prepare};
-use splat_core::{Accumulator, Direction, Limits, SliceOrder};
+use splat_core::{Accumulator, Direction, Limits, Packing, SliceOrder};
 use std::ops::Range;
 
 /// Seconds of a sample of a picture of sheets, whatever is in them.
@@ -164,9 +164,14 @@ fn volumes<'a>(matter: &Matter<'a>) -> impl Iterator<Item = Volume<'a>> + use<'a
         let object = &scene.objects[own.object];
         let material = &scene.materials[own.material].material;
         let factor = f64::from(material.extinction_rgb.into_iter().fold(0.0, f32::max));
-        let Body::Cells { grid, transfer, normals } = &own.body else { return None };
+        let Body::Cells { grid, transfer, normals, body_centred } = &own.body else { return None };
+        let (grid, packing) = match body_centred {
+            Some(bcc) => (&bcc.planes, Packing::BodyCentred),
+            None => (&**grid, Packing::Cartesian),
+        };
         (own.technique == Technique::Sheets && factor > 0.0).then(|| Volume {
             grid,
+            packing,
             transform: own.transform,
             transfer,
             // The scale holds the material's factor, and leads to units of the object.

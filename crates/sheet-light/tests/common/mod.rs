@@ -4,8 +4,8 @@ use sheet_light::{Error, Params, SheetCounts, SheetInput, Volume, prepare};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::shade::{ChannelLayout, LitBy};
 use splat_core::{
-    Accumulator, Camera, Grid, LayerSet, Material, Projection, Shading, Similarity, TransferFunction, TransferPoint,
-    rng,
+    Accumulator, BccGrid, Camera, Grid, LayerSet, Material, Packing, Projection, Shading, Similarity, TransferFunction,
+    TransferPoint, rng,
 };
 
 /// A lattice around the origin, its values by place in world space.
@@ -17,6 +17,18 @@ pub(crate) fn grid(dims: [usize; 3], axes: DMat3, value: impl Fn(DVec3) -> f64) 
         grid.values.push(value(grid.position(i, j, k)) as f32);
     }
     grid
+}
+
+/// A body-centred lattice that fills a cube around the origin.
+pub(crate) fn body_centred(dims: [usize; 3], side: f64, value: impl Fn(DVec3) -> f64) -> BccGrid {
+    let axes = DMat3::from_diagonal(DVec3::from_array(dims.map(|n| side / n as f64)));
+    let origin = DVec3::splat(-0.5 * side) - axes * Packing::BodyCentred.lowest();
+    let [nx, ny, _] = dims;
+    let mut bcc = BccGrid { planes: Grid { origin, axes, dims, values: Vec::new() } };
+    for n in 0..dims.iter().product() {
+        bcc.planes.values.push(value(bcc.position(n % nx, n / nx % ny, n / (nx * ny))) as f32);
+    }
+    bcc
 }
 
 /// Cubic cells of side `spacing`.
@@ -62,6 +74,7 @@ pub(crate) fn unlit() -> Material {
 pub(crate) fn volume<'a>(grid: &'a Grid, transfer: &'a TransferFunction, material: &'a Material) -> Volume<'a> {
     Volume {
         grid,
+        packing: Packing::Cartesian,
         transform: Similarity::default(),
         transfer,
         extinction_scale: 1.0,
@@ -71,6 +84,10 @@ pub(crate) fn volume<'a>(grid: &'a Grid, transfer: &'a TransferFunction, materia
         shadow_coefficient: 1.0,
         casts_shadow: true,
     }
+}
+
+pub(crate) fn bcc_volume<'a>(bcc: &'a BccGrid, transfer: &'a TransferFunction, material: &'a Material) -> Volume<'a> {
+    Volume { packing: Packing::BodyCentred, ..volume(&bcc.planes, transfer, material) }
 }
 
 pub(crate) fn perspective(from: [f64; 3], fov_deg: f64, size: [u32; 2]) -> Camera {
