@@ -49,6 +49,7 @@
 //! The README says how it works and where it deviates from the paper, and why.
 #![forbid(unsafe_code)]
 
+mod aligned;
 mod classify;
 mod counts;
 mod error;
@@ -59,6 +60,7 @@ mod lattice;
 mod light;
 mod params;
 mod picture;
+mod preclassified;
 mod queue;
 mod rays;
 pub mod reference;
@@ -79,6 +81,6 @@ mod volume;
 pub use counts::SheetCounts;
 pub use error::Error;
 pub use fold::{Sheeted, prepare};
-pub use params::{KernelShape, Params};
+pub use params::{Aligned, Classify, KernelShape, Params};
 pub use splats::Splats;
 pub use volume::{SheetInput, Volume};

@@ -9,6 +9,8 @@
 //!
 //! In perspective the kernel is sheared along the ray through its voxel, so that one footprint serves all slabs.
 
+use crate::aligned::{Slant, plane_step};
+use crate::params::Aligned;
 use crate::sections::PHASES;
 use crate::slabs::Slabs;
 use crate::{Params, Volume};
@@ -108,27 +110,40 @@ fn of_extent([xx, xy, yy]: [f64; 3]) -> PixelFootprint {
 }
 
 impl Viewed {
-    pub(crate) fn new(volume: &Volume<'_>, camera: &Camera, slabs: &Slabs, params: &Params) -> Self {
-        let axes = view_axes(volume, camera);
+    pub(crate) fn new(volume: &Volume<'_>, camera: &Camera, slabs: &Slabs, params: &Params, slant: Slant) -> Self {
+        let upright = view_axes(volume, camera);
+        let axes = if slant.is_any() {
+            DMat3::from_cols(
+                slant.sheared(upright.x_axis),
+                slant.sheared(upright.y_axis),
+                slant.sheared(upright.z_axis),
+            )
+        } else {
+            upright
+        };
         let e2 = params.kernel.extent * params.kernel.extent;
         let steps = volume.packing.equivalent_steps(axes);
         let m = steps * steps.transpose() * e2;
         let least_radius = LEAST_SIGMA_PX * params.kernel.extent / params.kernel.sigma;
         let (xx, xy, yy) = (m.x_axis.x, m.x_axis.y, m.y_axis.y);
         // Equal steps at right angles leave a rounding of a slant, and what is upright is drawn faster.
-        let slant = if xy.abs() > UPRIGHT * libm::sqrt(xx * yy) { xy } else { 0.0 };
+        let tilt = if xy.abs() > UPRIGHT * libm::sqrt(xx * yy) { xy } else { 0.0 };
         // Rows of pixels run down.
-        let extent = [xx, -slant, yy];
+        let extent = [xx, -tilt, yy];
         let half = 0.5 * (extent[0] - extent[2]);
         let smallest = 0.5 * (extent[0] + extent[2]) - libm::sqrt(half * half + extent[1] * extent[1]);
-        let mut start = camera.view_from_world(volume.origin());
+        let mut start = slant.sheared(camera.view_from_world(volume.origin()));
         start.z -= slabs.origin;
         Self {
             start,
             axes,
             shift: (volume.packing == Packing::BodyCentred).then(|| (axes.x_axis + axes.y_axis) * 0.5),
             is_first_shifted: false,
-            reach: libm::sqrt(m.z_axis.z),
+            reach: match params.aligned {
+                Aligned::View => libm::sqrt(m.z_axis.z),
+                // All of it in the slab of its plane.
+                Aligned::Axis => 0.5 * plane_step(volume, camera),
+            },
             extent,
             smallest,
             unit: of_extent(extent),

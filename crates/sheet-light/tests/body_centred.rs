@@ -1,7 +1,7 @@
 //! Body-centred cubic lattices: what Cartesian ones of the same spectrum show, with 1/√2 of the points.
 
 use crate::common::{
-    bcc_volume, body_centred, constant, cubic, draw, exact, grid, input, largest, noise, parallel, perspective,
+    bcc_volume, body_centred, constant, cubic, draw, exact, grid, in_box, input, largest, noise, parallel, perspective,
     transfer, unlit, volume,
 };
 use crate::twin::{Slope, differences};
@@ -32,11 +32,7 @@ fn truth(camera: &Camera, tf: &TransferFunction, side: f64) -> Vec<[f64; 4]> {
         let (from, along) = camera.view_ray((at % width) as f64 + 0.5, (at / width) as f64 + 0.5);
         let world = |v: DVec3| camera.axes[0] * v.x + camera.axes[1] * v.y + camera.axes[2] * v.z;
         let (from, along) = (camera.position + world(from), world(along));
-        let (mut near, mut far) = (0.0f64, f64::INFINITY);
-        for a in (0..3).filter(|a| along[*a] != 0.0) {
-            let [one, other] = [-0.5, 0.5].map(|face| (face * side - from[a]) / along[a]);
-            (near, far) = (near.max(one.min(other)), far.min(one.max(other)));
-        }
+        let [near, far] = in_box(camera, DVec3::splat(side), at);
         let (n, mut tau, mut color) = (2000, 0.0, [0.0; 3]);
         let step = (far - near).max(0.0) / f64::from(n);
         for i in 0..n {

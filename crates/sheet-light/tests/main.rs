@@ -7,6 +7,7 @@ mod common;
 mod half;
 mod hard_cases;
 mod invariances;
+mod modes;
 mod splats;
 mod strides;
 mod twin;

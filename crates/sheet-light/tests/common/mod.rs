@@ -52,6 +52,20 @@ pub(crate) fn moved_noise(dims: [usize; 3], shift: f64, scale: f64) -> (Grid, Tr
     (grid, TransferFunction::new(points.into_iter().map(point).collect()).unwrap())
 }
 
+/// View depths between which a pixel's ray is inside the box of these sides around the origin.
+pub(crate) fn in_box(camera: &Camera, sides: DVec3, at: usize) -> [f64; 2] {
+    let [x, y] = [at % camera.size[0] as usize, at / camera.size[0] as usize].map(|v| v as f64 + 0.5);
+    let (from, along) = camera.view_ray(x, y);
+    let world = |v: DVec3| camera.axes[0] * v.x + camera.axes[1] * v.y + camera.axes[2] * v.z;
+    let (from, along) = (camera.position + world(from), world(along));
+    let (mut near, mut far) = (0.0f64, f64::INFINITY);
+    for a in (0..3).filter(|a| along[*a] != 0.0) {
+        let [one, other] = [-0.5, 0.5].map(|face| (face * sides[a] - from[a]) / along[a]);
+        (near, far) = (near.max(one.min(other)), far.min(one.max(other)));
+    }
+    [near, far]
+}
+
 /// Control points (value, extinction), green turning to red.
 pub(crate) fn transfer(points: &[(f32, f32)]) -> TransferFunction {
     let count = points.len() as f32;
