@@ -8,7 +8,7 @@ use super::check_render::{check_render, own_layers};
 use super::paths::Paths;
 use super::raw::{RawCamera, RawColor, RawScene};
 use super::tree::{Document, Step};
-use super::{RenderSettings, Scene, SceneObject, Slicing, Technique};
+use super::{Aligned, RenderSettings, Scene, SceneObject, Slicing, Technique};
 use crate::Error;
 use glam::DVec3;
 use splat_core::{Camera, Footprint, FootprintStack, Packing, Projection};
@@ -180,13 +180,22 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
     check_one_technique(&at_objects, &objects, &render)?;
     check_lattices(&at_objects, &objects, &render)?;
     check_scattered(&at.key("render").key("layers"), &raw.render.layers, &objects, &mut render)?;
+    let camera = check_camera(&at.key("camera"), &raw.camera)?;
+    if render.sheets.aligned == Aligned::Axis && !camera.is_orthographic() {
+        let message = "`aligned`: slabs along a lattice are seen by parallel rays alone";
+        return Err(at
+            .key("render")
+            .key("sheets")
+            .key("aligned")
+            .error(message, "set camera.orthographic, or \"view\""));
+    }
     let at_lights = at.key("light");
     let lights = raw.light.iter().enumerate().map(|(i, l)| check_light(&at_lights.index(i), l));
     Ok(Scene {
         file: document.file.to_owned(),
         sha256,
         frames: raw.animation.as_ref().map(|a| check_animation(&at.key("animation"), a)).transpose()?,
-        camera: check_camera(&at.key("camera"), &raw.camera)?,
+        camera,
         background: check_color(&at.key("background"), &raw.background)?,
         ambient: check_color(&at.key("ambient"), &raw.ambient)?,
         lights: lights.collect::<Result<_, _>>()?,

@@ -13,12 +13,12 @@ use crate::lights::LightPoint;
 use crate::load::own::Body;
 use crate::matter::Matter;
 use crate::pass;
-use crate::scene::{Scene, Technique};
+use crate::scene::{self, Scene, Technique};
 use crate::statistics::{ObjectData, ObjectStatistics};
 use crate::technique::{Fold, Session};
 use crate::work::{self, Translucent, cost};
 use crate::{CostRecord, Error, RenderOptions, stage};
-use sheet_light::{KernelShape, Params, SheetInput, Sheeted, Splats, Volume, prepare};
+use sheet_light::{Aligned, Classify, KernelShape, Params, SheetInput, Sheeted, Splats, Volume, prepare};
 use splat_core::{Accumulator, Direction, Limits, Packing, SliceOrder};
 use std::ops::Range;
 
@@ -151,6 +151,14 @@ fn params(scene: &Scene, exponent: i32, options: &RenderOptions) -> Params {
     let unit = libm::exp2(f64::from(-exponent));
     Params {
         slab_width: settings.slab_width.map(|width| width * unit),
+        classify: match settings.classify {
+            scene::Classify::After => Classify::After,
+            scene::Classify::Before => Classify::Before,
+        },
+        aligned: match settings.aligned {
+            scene::Aligned::View => Aligned::View,
+            scene::Aligned::Axis => Aligned::Axis,
+        },
         kernel: KernelShape { extent: settings.kernel_extent, sigma: settings.kernel_sigma },
         transmittance_cutoff: settings.transmittance_cutoff as f32,
         limits: Limits::bytes(options.max_memory),
@@ -232,6 +240,10 @@ fn refuse<'a>(frame: &'a Frame<'a>, error: sheet_light::Error) -> Error {
             let volume = volumes(&frame.matter()).nth(volume);
             let name = volume.map(|v| crate::shown(&frame.loaded.objects[v.object as usize].name)).unwrap_or_default();
             Error::input(format!("object '{name}'"), source.to_string(), "give it to another technique")
+        }
+        sheet_light::Error::Parameter { name: "aligned", expected, .. } => {
+            let hint = "use render.sheets.aligned = \"view\", or another technique for all but one volume";
+            Error::input("render.sheets.aligned = \"axis\"", format!("expected {expected}"), hint)
         }
         other => Error::Internal(other.to_string()),
     }
