@@ -30,6 +30,23 @@ struct Method<'a> {
     aligned: Aligned,
 }
 
+impl<'a> Method<'a> {
+    fn volume(&self, transfer: &'a TransferFunction, material: &'a Material, normals: bool) -> Volume<'a> {
+        Volume {
+            grid: self.grid,
+            packing: self.packing,
+            transform: Similarity::default(),
+            transfer,
+            extinction_scale: 1.0,
+            material,
+            normals,
+            object: 0,
+            shadow_coefficient: 1.0,
+            casts_shadow: true,
+        }
+    }
+}
+
 /// All depths.
 const ALL: std::ops::Range<f32> = f32::NEG_INFINITY..f32::INFINITY;
 
@@ -112,18 +129,7 @@ fn row(name: &str, [method, paper]: [&Method<'_>; 2], transfer: &TransferFunctio
     let direction = DVec3::new(0.6, -0.5, -0.6).normalize();
     let sun = Light { shape: LightShape::Directional { direction }, intensity: [3.0; 3] };
     let lights = [LitBy { light: sun, shadow: None }];
-    let volume = Volume {
-        grid: method.grid,
-        packing: method.packing,
-        transform: Similarity::default(),
-        transfer,
-        extinction_scale: 1.0,
-        material: &material,
-        normals: lit,
-        object: 0,
-        shadow_coefficient: 1.0,
-        casts_shadow: true,
-    };
+    let volume = method.volume(transfer, &material, lit);
     let lights = if lit { lights.to_vec() } else { Vec::new() };
     let input = SheetInput {
         volumes: vec![volume],
@@ -154,8 +160,7 @@ fn row(name: &str, [method, paper]: [&Method<'_>; 2], transfer: &TransferFunctio
             best[1] = best[1].min(busy);
         }
     }
-    let volume = Volume { grid: paper.grid, packing: paper.packing, ..volume };
-    let fine = fine(SheetInput { volumes: vec![volume], ..input }, &layout);
+    let fine = fine(SheetInput { volumes: vec![paper.volume(transfer, &material, lit)], ..input }, &layout);
     let million = |n: u64| n as f64 * 1e-6;
     let [prepared, folded] = best.map(|[wall, busy]| format!("{wall:.1} {busy:.0}"));
     println!(

@@ -11,7 +11,7 @@ use super::object::{Prepared, as_it_is, medium_grid, procedural};
 use crate::Error;
 use crate::form::{Form, PlannedObject};
 use crate::scene::{RectangleSource, SurfaceSampler, Technique};
-use convert::{DensityParams, SharedField, SplatParams};
+use convert::{DensityParams, SharedField, VolumeParams};
 use glam::DVec3;
 use pbsr::BoundedExtinction;
 use rayon::prelude::*;
@@ -254,13 +254,7 @@ fn data(
             };
             Some((Body::Surface { field: field.clone(), inside, spacing, step }, bounds, spacing))
         }
-        Input::Volume(grid, transfer, params) => {
-            let mut cells = cells(grid.clone(), (*transfer).clone(), params.normals);
-            if let Some((Body::Cells { body_centred, .. }, ..)) = &mut cells {
-                *body_centred = on_body_centred(grid, &params.splat, context)?;
-            }
-            cells
-        }
+        Input::Volume(grid, transfer, params) => Some(volume(grid, transfer, params, context)?),
         Input::Procedural(shape, spacing, params) => {
             let (grid, transfer) =
                 procedural(shape, *spacing, &params.splat, context).map_err(|e| Error::from_convert(&e))?;
@@ -277,11 +271,19 @@ fn data(
     })
 }
 
-/// A volume on a body-centred lattice, where the scene asks for one.
-fn on_body_centred(grid: &Grid, splat: &SplatParams, context: &Context<'_>) -> Result<Option<BccGrid>, Error> {
-    let is_asked = context.scene.objects[context.id].packing == Packing::BodyCentred;
-    let made = is_asked.then(|| convert::body_centred(grid, splat));
-    made.transpose().map_err(|e| Error::from_convert(&e))
+/// A volume, and on a body-centred lattice where the scene asks for one.
+fn volume(
+    grid: &Arc<Grid>,
+    transfer: &TransferFunction,
+    params: &VolumeParams,
+    context: &Context<'_>,
+) -> Result<Data, Error> {
+    let is_packed = context.scene.objects[context.id].packing == Packing::BodyCentred;
+    let packed = is_packed.then(|| convert::body_centred(grid, &params.splat)).transpose();
+    let body_centred = packed.map_err(|e| Error::from_convert(&e))?;
+    let (bounds, spacing) = (cell_bounds(grid, transfer), shortest_step(grid));
+    let body = Body::Cells { grid: grid.clone(), transfer: transfer.clone(), normals: params.normals, body_centred };
+    Ok((body, bounds, spacing))
 }
 
 fn world_spacing(density: &convert::Density) -> f64 {
