@@ -11,7 +11,7 @@ use sheet_light::{Params, SheetInput, Volume, prepare};
 use splat_core::glam::DVec3;
 use splat_core::shade::{ChannelLayout, LitBy};
 use splat_core::{
-    Accumulator, Camera, Grid, LayerSet, Light, LightShape, Material, Projection, Shading, Similarity,
+    Accumulator, Camera, Grid, LayerSet, Light, LightShape, Material, Packing, Projection, Shading, Similarity,
     TransferFunction, TransferPoint,
 };
 use std::time::Instant;
@@ -60,6 +60,7 @@ impl Setting {
     fn input<'a>(&'a self, grid: &'a Grid, lights: Vec<LitBy<'a>>) -> SheetInput<'a> {
         let volume = Volume {
             grid,
+            packing: Packing::Cartesian,
             transform: Similarity::default(),
             transfer: &self.transfer,
             extinction_scale: 1.0,

@@ -2,16 +2,17 @@
 //!
 //! A plain table of minima: other work on the machine only ever adds time. The second number of each part is the time of all
 //! threads on processors, which other work adds less to. The error is the RMSE of linear colours to slabs an eighth as wide and no
-//! pixel ever done. `-- WORD` draws those whose name has it. `benches/peers/vtk_volume.py` has the same rows by VTK.
+//! pixel ever done, of the file's lattice and by the paper's method whatever the row has. `-- WORD` draws those whose name has it. `benches/peers/vtk_volume.py` has the same rows by VTK.
 #![allow(missing_docs, clippy::expect_used, reason = "a benchmark")]
 
 use convert::read::{self, Loaded, ReadParams};
+use convert::{SplatParams, body_centred};
 use organza_benches::processor_ms;
-use sheet_light::{Params, SheetCounts, SheetInput, Volume, prepare};
+use sheet_light::{Aligned, Classify, Params, SheetCounts, SheetInput, Volume, prepare};
 use splat_core::glam::DVec3;
 use splat_core::shade::{ChannelLayout, LitBy};
 use splat_core::{
-    Accumulator, Camera, Grid, LayerSet, Light, LightShape, Material, Projection, Shading, Similarity,
+    Accumulator, Camera, Grid, LayerSet, Light, LightShape, Material, Packing, Projection, Shading, Similarity,
     TransferFunction, TransferPoint,
 };
 use std::path::Path;
@@ -19,6 +20,32 @@ use std::time::Instant;
 
 /// Runs each part this often.
 const REPEATS: usize = 7;
+
+/// What a row splats, and how.
+struct Method<'a> {
+    name: &'static str,
+    grid: &'a Grid,
+    packing: Packing,
+    classify: Classify,
+    aligned: Aligned,
+}
+
+impl<'a> Method<'a> {
+    fn volume(&self, transfer: &'a TransferFunction, material: &'a Material, normals: bool) -> Volume<'a> {
+        Volume {
+            grid: self.grid,
+            packing: self.packing,
+            transform: Similarity::default(),
+            transfer,
+            extinction_scale: 1.0,
+            material,
+            normals,
+            object: 0,
+            shadow_coefficient: 1.0,
+            casts_shadow: true,
+        }
+    }
+}
 
 /// All depths.
 const ALL: std::ops::Range<f32> = f32::NEG_INFINITY..f32::INFINITY;
@@ -53,6 +80,27 @@ fn main() {
     let grid = head();
     let semi = transfer(&[(30.0, 0.0), (80.0, 0.004), (150.0, 0.01), (200.0, 0.05), (255.0, 0.08)]);
     let iso = transfer(&[(90.0, 0.0), (110.0, 2.0)]);
+    let start = Instant::now();
+    let bcc = body_centred(&grid, &SplatParams::default()).expect("a volume");
+    let share = bcc.planes.values.len() as f64 / grid.values.len() as f64;
+    println!(
+        "{:?} resampled to {:?}, {share:.4} of the points, in {:.0?}",
+        grid.dims,
+        bcc.planes.dims,
+        start.elapsed()
+    );
+    let paper = Method {
+        name: "",
+        grid: &grid,
+        packing: Packing::Cartesian,
+        classify: Classify::After,
+        aligned: Aligned::View,
+    };
+    let methods = [
+        Method { name: " bcc", grid: &bcc.planes, packing: Packing::BodyCentred, ..paper },
+        Method { name: " before", classify: Classify::Before, ..paper },
+        Method { name: " axis", aligned: Aligned::Axis, ..paper },
+    ];
     println!(
         "{:>28} {:>12} {:>12} {:>7} {:>9} {:>7} {:>11} {:>10} {:>8}",
         "ms", "prepare", "fold", "M vox", "M splats", "M frag", "M frag/s", "M shaded", "RMSE"
@@ -63,9 +111,11 @@ fn main() {
                 for perspective in [false, true] {
                     let lens = if perspective { "pinhole" } else { "parallel" };
                     let light = if lit { "shaded" } else { "unlit" };
-                    let name = format!("{pixels} {class} {light} {lens}");
-                    if name.contains(&only) {
-                        row(&name, &grid, tf, lit, &camera(&grid, pixels, perspective));
+                    for method in std::iter::once(&paper).chain(&methods) {
+                        let name = format!("{pixels} {class} {light} {lens}{}", method.name);
+                        if name.contains(&only) && !(perspective && method.aligned == Aligned::Axis) {
+                            row(&name, [method, &paper], tf, lit, &camera(&grid, pixels, perspective));
+                        }
                     }
                 }
             }
@@ -73,23 +123,13 @@ fn main() {
     }
 }
 
-fn row(name: &str, grid: &Grid, transfer: &TransferFunction, lit: bool, camera: &Camera) {
+fn row(name: &str, [method, paper]: [&Method<'_>; 2], transfer: &TransferFunction, lit: bool, camera: &Camera) {
     let shading = if lit { Shading::Phong } else { Shading::Unlit };
     let material = Material { shading, specular: 0.2, ..Material::default() };
     let direction = DVec3::new(0.6, -0.5, -0.6).normalize();
     let sun = Light { shape: LightShape::Directional { direction }, intensity: [3.0; 3] };
     let lights = [LitBy { light: sun, shadow: None }];
-    let volume = Volume {
-        grid,
-        transform: Similarity::default(),
-        transfer,
-        extinction_scale: 1.0,
-        material: &material,
-        normals: lit,
-        object: 0,
-        shadow_coefficient: 1.0,
-        casts_shadow: true,
-    };
+    let volume = method.volume(transfer, &material, lit);
     let lights = if lit { lights.to_vec() } else { Vec::new() };
     let input = SheetInput {
         volumes: vec![volume],
@@ -99,27 +139,28 @@ fn row(name: &str, grid: &Grid, transfer: &TransferFunction, lit: bool, camera: 
         shadow_origin: DVec3::ZERO,
         ambient: [0.1; 3],
     };
-    let params = Params { transmittance_cutoff: Params::PAPERS_CUTOFF, ..Params::default() };
+    let params = Params {
+        classify: method.classify,
+        aligned: method.aligned,
+        transmittance_cutoff: Params::PAPERS_CUTOFF,
+        ..Params::default()
+    };
     let layout = ChannelLayout::new(&LayerSet::default());
     let mut out = Accumulator::new(camera.size, 1, 3, false, false);
-    let (mut best, mut counts, mut width) = ([[f64::INFINITY; 2]; 2], SheetCounts::default(), 0.0);
+    let (mut best, mut counts) = ([[f64::INFINITY; 2]; 2], SheetCounts::default());
     for _ in 0..REPEATS {
         let (start, busy) = (Instant::now(), processor_ms());
         let sheeted = prepare(input.clone(), &params, None).expect("a volume that can be drawn");
         let (middle, middle_busy) = (Instant::now(), processor_ms());
         out = Accumulator::new(camera.size, 1, 3, false, false);
         counts = sheeted.fold(ALL, &[], &layout, &mut out, None).expect("nobody cancels");
-        width = sheeted.slabs().1;
         let times = [(middle - start, middle_busy - busy), (middle.elapsed(), processor_ms() - middle_busy)];
         for (best, (wall, busy)) in best.iter_mut().zip(times) {
             best[0] = best[0].min(wall.as_secs_f64() * 1e3);
             best[1] = best[1].min(busy);
         }
     }
-    let params = Params { slab_width: Some(0.125 * width), transmittance_cutoff: 0.0, ..params };
-    let mut fine = Accumulator::new(camera.size, 1, 3, false, false);
-    let sheeted = prepare(input, &params, None).expect("a volume that can be drawn");
-    sheeted.fold(ALL, &[], &layout, &mut fine, None).expect("nobody cancels");
+    let fine = fine(SheetInput { volumes: vec![paper.volume(transfer, &material, lit)], ..input }, &layout);
     let million = |n: u64| n as f64 * 1e-6;
     let [prepared, folded] = best.map(|[wall, busy]| format!("{wall:.1} {busy:.0}"));
     println!(
@@ -131,6 +172,17 @@ fn row(name: &str, grid: &Grid, transfer: &TransferFunction, lit: bool, camera: 
         million(counts.shaded),
         rmse(&out, &fine),
     );
+}
+
+/// Slabs an eighth as wide as the lattice's steps, and no pixel ever done.
+fn fine(input: SheetInput<'_>, layout: &ChannelLayout) -> Accumulator {
+    let exact = Params { transmittance_cutoff: 0.0, ..Params::default() };
+    let width = prepare(input.clone(), &exact, None).expect("a volume that can be drawn").slabs().1;
+    let params = Params { slab_width: Some(0.125 * width), ..exact };
+    let mut fine = Accumulator::new(input.camera.size, 1, 3, false, false);
+    let sheeted = prepare(input, &params, None).expect("a volume that can be drawn");
+    sheeted.fold(ALL, &[], layout, &mut fine, None).expect("nobody cancels");
+    fine
 }
 
 /// Of all numbers of both pictures.

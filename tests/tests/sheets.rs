@@ -137,3 +137,69 @@ fn too_many_slabs_are_refused_with_what_to_change() {
     refused("0", 2, "slab_width");
     refused("-1", 2, "slab_width");
 }
+
+/// A smooth volume of 34³ voxels that fills a cube of side 2, with an object of it.
+fn volume(folder: &std::path::Path) -> String {
+    let mut grid = "NRRD0004\ntype: float\ndimension: 3\nspace: 3D-right-handed\nsizes: 34 34 34\n\
+        space directions: (0.0588235294,0,0) (0,0.0588235294,0) (0,0,0.0588235294)\n\
+        space origin: (-0.970588235,-0.970588235,-0.970588235)\nencoding: ascii\n\n"
+        .to_owned();
+    for n in 0..34 * 34 * 34 {
+        let at = |i: i32| 0.0588235294 * f64::from(i) - 0.970588235;
+        let (x, y, z) = (at(n % 34), at(n / 34 % 34), at(n / (34 * 34)));
+        let value = 0.5 + 0.2 * ((7.0 * x).sin() * (5.0 * y).cos() + (6.0 * z + 3.0 * x).sin());
+        grid += &format!("{value:.6}\n");
+    }
+    std::fs::write(folder.join("grid.nrrd"), grid).unwrap();
+    "[[light]]\nkind = 'directional'\ndirection = [-0.4, -1, -0.6]\nirradiance = [2, 1.9, 1.8]\n\
+     [[object]]\nname = 'it'\nvolume = 'grid.nrrd'\ntransfer = [{ value = 0.4, color = [1, 0.5, 0.2], extinction = 0 }, \
+     { value = 0.6, color = [0.2, 0.6, 1], extinction = 2 }, { value = 0.9, color = [1, 1, 1], extinction = 1 }]\n\
+     [render]\nantialias = 1\ntechnique = 'sheets'\n"
+        .to_owned()
+}
+
+#[test]
+fn a_volume_on_a_body_centred_lattice_shows_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = parallel_view(2.6, 64) + &volume(folder.path());
+    let turn = ["--set", "object.it.transform.rotate=[20, 30, 0]"];
+    let bcc = ["--set", "object.it.lattice='bcc'"];
+    let drawn = |arguments: &[&str]| draw_in(folder.path(), &scene, &[&turn, arguments].concat());
+    let (cartesian, body_centred) = (drawn(&[]), drawn(&bcc));
+    for channel in ["R", "G", "B", "A"] {
+        let (a, b) = (cartesian.channel(channel), body_centred.channel(channel));
+        let square = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64;
+        println!("{channel}: RMSE {:.5}", square.sqrt());
+        assert!(square.sqrt() < 0.005 && a != b, "{channel}: RMSE {}", square.sqrt());
+        assert!(a.iter().sum::<f64>() / a.len() as f64 > 0.01, "{channel}");
+    }
+}
+
+#[test]
+fn what_the_older_methods_and_body_centred_lattices_do_not_draw_is_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = parallel_view(2.6, 16)
+        + &volume(folder.path())
+        + "[[object]]\nname = 'fog'\nvisible = false\nmedium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 1, spacing = 0.2 }\n";
+    std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    let refused = |set: &[&str], code: i32, words: &str| {
+        let mut command = organza();
+        command.args(["render", "scene.toml", "-o", "a.exr"]).current_dir(&folder);
+        set.iter().for_each(|set| _ = command.args(["--set", set]));
+        let out = command.output().unwrap();
+        let said = String::from_utf8(out.stderr).unwrap();
+        assert_eq!(out.status.code(), Some(code), "{set:?}: {said}");
+        assert!(said.contains(words), "{set:?}: {said}");
+        assert!(!folder.path().join("a.exr").exists());
+    };
+    let (bcc, axis) = ("object.it.lattice='bcc'", "render.sheets.aligned='axis'");
+    let half = "render.sheets.slicing='half_vector'";
+    refused(&[bcc, "render.technique='points'"], 2, "the technique `points` draws no body-centred lattice");
+    refused(&[bcc, half], 2, "slabs across half vectors take no body-centred lattice");
+    refused(&["object.fog.lattice='bcc'"], 2, "`lattice` belongs to a `volume`");
+    refused(&["render.sheets.classify='before'", half], 2, "slabs across half vectors have no such choice");
+    refused(&[axis, half], 2, "slabs across half vectors have no such choice");
+    refused(&[axis, "render.sheets.slab_width=0.1"], 2, "as wide as its planes are apart");
+    refused(&[axis, "camera={position=[0, 0, 4], target=[0, 0, 0], size=[16, 16]}"], 2, "parallel rays alone");
+    refused(&[axis, "object.fog.visible=true"], 3, "one volume and nothing beside it");
+}

@@ -15,6 +15,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod body_centred;
 mod borders;
 mod classify;
 mod columns;
@@ -64,6 +65,7 @@ mod thin;
 mod vertex_normals;
 mod volume_points;
 
+pub use body_centred::body_centred;
 pub use combine::{Clip, ClippedField, CombinedField, SharedField};
 pub use convert_error::ConvertError;
 #[cfg(feature = "read")]

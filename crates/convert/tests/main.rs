@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod bad_inputs;
+mod body_centred;
 mod combined_fields;
 mod convert_bunny;
 mod convert_cost;

@@ -8,10 +8,10 @@ use super::check_render::{check_render, own_layers};
 use super::paths::Paths;
 use super::raw::{RawCamera, RawColor, RawScene};
 use super::tree::{Document, Step};
-use super::{RenderSettings, Scene, SceneObject, Technique};
+use super::{Aligned, RenderSettings, Scene, SceneObject, Slicing, Technique};
 use crate::Error;
 use glam::DVec3;
-use splat_core::{Camera, Footprint, FootprintStack, Projection};
+use splat_core::{Camera, Footprint, FootprintStack, Packing, Projection};
 use std::collections::HashMap;
 use std::ops::RangeInclusive;
 
@@ -178,14 +178,24 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
     }
     let mut render = check_render(&at.key("render"), &raw.render)?;
     check_one_technique(&at_objects, &objects, &render)?;
+    check_lattices(&at_objects, &objects, &render)?;
     check_scattered(&at.key("render").key("layers"), &raw.render.layers, &objects, &mut render)?;
+    let camera = check_camera(&at.key("camera"), &raw.camera)?;
+    if render.sheets.aligned == Aligned::Axis && !camera.is_orthographic() {
+        let message = "`aligned`: slabs along a lattice are seen by parallel rays alone";
+        return Err(at
+            .key("render")
+            .key("sheets")
+            .key("aligned")
+            .error(message, "set camera.orthographic, or \"view\""));
+    }
     let at_lights = at.key("light");
     let lights = raw.light.iter().enumerate().map(|(i, l)| check_light(&at_lights.index(i), l));
     Ok(Scene {
         file: document.file.to_owned(),
         sha256,
         frames: raw.animation.as_ref().map(|a| check_animation(&at.key("animation"), a)).transpose()?,
-        camera: check_camera(&at.key("camera"), &raw.camera)?,
+        camera,
         background: check_color(&at.key("background"), &raw.background)?,
         ambient: check_color(&at.key("ambient"), &raw.ambient)?,
         lights: lights.collect::<Result<_, _>>()?,
@@ -204,6 +214,24 @@ fn check_one_technique(at: &At<'_>, objects: &[SceneObject], render: &RenderSett
         let message = format!("a picture by several techniques has no layer `{layer}`");
         Err(at.index(i).key("technique").error(message, "leave the layer or this key out"))
     })
+}
+
+/// Refuses body-centred lattices wherever they are not splatted in slabs across the view.
+fn check_lattices(at: &At<'_>, objects: &[SceneObject], render: &RenderSettings) -> Result<(), Error> {
+    let body_centred = objects.iter().enumerate().filter(|(_, o)| o.visible && o.packing == Packing::BodyCentred);
+    for (i, object) in body_centred {
+        let technique = object.technique.unwrap_or(render.technique);
+        let refuse = |message: &str, hint| Err(at.index(i).key("lattice").error(message, hint));
+        if technique != Technique::Sheets {
+            let message = format!("`lattice`: the technique `{}` draws no body-centred lattice", technique.name());
+            return refuse(&message, "use technique = \"sheets\", or leave it out");
+        }
+        if render.sheets.slicing != Slicing::View {
+            let message = "`lattice`: slabs across half vectors take no body-centred lattice";
+            return refuse(message, "use render.sheets.slicing = \"view\", or leave it out");
+        }
+    }
+    Ok(())
 }
 
 /// `scatterN` is one of the effects where light is scattered more than once, and else it is refused.

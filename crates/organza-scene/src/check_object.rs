@@ -5,12 +5,12 @@ use super::check_field::check_clip;
 use super::check_render::check_technique;
 use super::check_source::check_source;
 use super::paths::Paths;
-use super::raw_object::{RawObject, RawTransform, RawUp};
+use super::raw_object::{RawLattice, RawObject, RawTransform, RawUp};
 use super::{SceneMaterial, SceneObject, Source, Technique, Up};
 use crate::Error;
 use convert::read::{UpAxis, up_axis};
 use glam::{DQuat, DVec3};
-use splat_core::{FootprintStack, Similarity};
+use splat_core::{FootprintStack, Packing, Similarity};
 
 /// What objects refer to.
 pub(super) struct Named<'a> {
@@ -52,6 +52,10 @@ pub(super) fn check_object(
         material,
         color: raw.color.map(|c| at.color("color", c)).transpose()?,
         opacity: raw.opacity.map(|a| at.number("opacity", a, 0.0..=1.0)).transpose()?,
+        packing: match raw.lattice {
+            None | Some(RawLattice::Cartesian) => Packing::Cartesian,
+            Some(RawLattice::Bcc) => Packing::BodyCentred,
+        },
         clip: raw
             .clip
             .iter()
@@ -100,6 +104,9 @@ fn refuse_what_does_not_apply(at: &At<'_>, raw: &RawObject, source: &Source) -> 
     }
     if raw.points.is_none() && raw.merge_duplicates {
         return Err(at.key("merge_duplicates").error("`merge_duplicates` belongs to `points`", ""));
+    }
+    if raw.volume.is_none() && raw.lattice.is_some() {
+        return Err(at.key("lattice").error("`lattice` belongs to a `volume`", ""));
     }
     if raw.volume.is_none() && raw.slice.is_none() {
         for (key, on) in [("transfer", raw.transfer.is_some()), ("unit_length", raw.unit_length.is_some())] {

@@ -3,12 +3,12 @@
 use super::check::{At, LARGEST, SMALLEST};
 use super::de::suggest;
 use super::raw_render::{
-    Auto, RawAccumulation, RawDirection, RawMapping, RawParticles, RawPoints, RawRender, RawScattering, RawShadow,
-    RawSheets, RawSlicing, RawSurfaceSampler,
+    Auto, RawAccumulation, RawAligned, RawClassify, RawDirection, RawMapping, RawParticles, RawPoints, RawRender,
+    RawScattering, RawShadow, RawSheets, RawSlicing, RawSurfaceSampler,
 };
 use super::{
-    LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, RenderSettings, Scattering, ShadowMapping,
-    ShadowSettings, SheetsSettings, Slicing, SurfaceSampler, Technique,
+    Aligned, Classify, LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, RenderSettings, Scattering,
+    ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SurfaceSampler, Technique,
 };
 use crate::{Error, shown};
 use splat_core::raster::Accumulation;
@@ -153,6 +153,11 @@ fn check_sheets(at: &At<'_>, raw: &RawSheets) -> Result<SheetsSettings, Error> {
     let sigma = at.number("kernel_sigma", raw.kernel_sigma.unwrap_or(0.35 * extent), 0.125 * extent..=extent)?;
     Ok(SheetsSettings {
         slicing: check_slicing(at, raw)?,
+        classify: match raw.classify {
+            None | Some(RawClassify::After) => Classify::After,
+            Some(RawClassify::Before) => Classify::Before,
+        },
+        aligned: check_aligned(at, raw, slab_width)?,
         slab_width,
         kernel_extent: extent,
         kernel_sigma: sigma,
@@ -160,8 +165,24 @@ fn check_sheets(at: &At<'_>, raw: &RawSheets) -> Result<SheetsSettings, Error> {
     })
 }
 
+fn check_aligned(at: &At<'_>, raw: &RawSheets, slab_width: Option<f64>) -> Result<Aligned, Error> {
+    if raw.aligned != Some(RawAligned::Axis) {
+        return Ok(Aligned::View);
+    }
+    if slab_width.is_some() {
+        let message = "`slab_width`: slabs along a lattice are as wide as its planes are apart";
+        return Err(at.key("slab_width").error(message, "leave it out, or set aligned = \"view\""));
+    }
+    Ok(Aligned::Axis)
+}
+
 fn check_slicing(at: &At<'_>, raw: &RawSheets) -> Result<Slicing, Error> {
     if raw.slicing == RawSlicing::HalfVector {
+        let given = [("classify", raw.classify.is_some()), ("aligned", raw.aligned.is_some())];
+        if let Some((key, _)) = given.into_iter().find(|(_, is_given)| *is_given) {
+            let message = format!("`{key}`: slabs across half vectors have no such choice");
+            return Err(at.key(key).error(message, "set slicing = \"view\", or leave it out"));
+        }
         return Ok(Slicing::HalfVector {
             light_pixels: at.number("light_pixels", raw.light_pixels.unwrap_or(1.5), 0.1..=16.0)?,
             most_light_pixels: at.whole("most_light_pixels", raw.most_light_pixels.unwrap_or(2048), 16..=8192)?,

@@ -3,7 +3,7 @@
 use super::{RenderSettings, SceneLight, Source, Technique};
 use convert::Clip;
 use convert::read::UpAxis;
-use splat_core::{Camera, FootprintStack, Material, Similarity};
+use splat_core::{Camera, FootprintStack, Material, Packing, Similarity};
 use std::path::{Path, PathBuf};
 
 /// A whole scene. Made by [`super::load()`] or [`super::parse`] alone, so that every number in it is finite and in range.
@@ -58,6 +58,8 @@ pub struct SceneObject {
     pub color: Option<[f32; 3]>,
     /// Opacity of one crossing that replaces the material's, in \[0, 1\]; surfaces and raw points.
     pub opacity: Option<f64>,
+    /// How the planes of the lattice lie that a volume is drawn on: of the file's, or of the body-centred one of the same spectrum.
+    pub packing: Packing,
     /// Regions outside of which a surface of a field ends, before the object's transform.
     pub clip: Vec<Clip>,
     /// Distance between splats, world units; `None` means that it is chosen from the data and the camera.

@@ -46,6 +46,8 @@ pub(super) struct RawObject {
     pub(super) transfer: Option<Vec<RawTransferPoint>>,
     /// World length that opacities of `transfer` refer to.
     pub(super) unit_length: Option<f64>,
+    /// What a `volume` is drawn on, "cartesian" (default), the file's, or "bcc", a body-centred cubic lattice; `sheets` alone has that.
+    pub(super) lattice: Option<RawLattice>,
     #[serde(default)]
     pub(super) transform: RawTransform,
     /// Name of a material.
@@ -70,6 +72,15 @@ pub(super) struct RawObject {
     /// Make splats at one place one; default false.
     #[serde(default)]
     pub(super) merge_duplicates: bool,
+}
+
+/// What a volume is drawn on.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(rename = "Lattice")]
+pub(super) enum RawLattice {
+    Cartesian,
+    Bcc,
 }
 
 /// Turns `up`, then scales, rotates and translates.

@@ -52,6 +52,10 @@ pub(super) struct RawParticles {
 pub(super) struct RawSheets {
     /// What slabs lie across, "view" (default) or "half_vector", the bisector of light and view.
     pub(super) slicing: RawSlicing,
+    /// With "view": when values become colours, "after" (default) they are reconstructed, or "before" they are splatted.
+    pub(super) classify: Option<RawClassify>,
+    /// With "view": what slabs lie along, "view" (default), or "axis", the lattice of the only volume, seen by parallel rays.
+    pub(super) aligned: Option<RawAligned>,
     /// With "half_vector": pixels of a light's buffer per step of the finest volume, 0.1 to 16; default 1.5.
     pub(super) light_pixels: Option<f64>,
     /// With "half_vector": most pixels of a light's buffer along a side, 16 to 8192; default 2048.
@@ -80,6 +84,24 @@ pub(super) enum RawSlicing {
     #[default]
     View,
     HalfVector,
+}
+
+/// When values become colours.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "Classify")]
+pub(super) enum RawClassify {
+    After,
+    Before,
+}
+
+/// What slabs lie along.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "Aligned")]
+pub(super) enum RawAligned {
+    View,
+    Axis,
 }
 
 /// How often media scatter light.

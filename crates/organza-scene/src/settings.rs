@@ -90,6 +90,10 @@ pub struct ParticlesSettings {
 pub struct SheetsSettings {
     /// What slabs lie across.
     pub slicing: Slicing,
+    /// When values become colours; after they are reconstructed in half-vector slicing.
+    pub classify: Classify,
+    /// What slabs lie along; the view in half-vector slicing. Slabs along a lattice take parallel rays and no width.
+    pub aligned: Aligned,
     /// Width of a slab, world units; `None` takes the least step of the volumes across the slabs.
     pub slab_width: Option<f64>,
     /// Radius of a voxel's kernel, steps of its lattice, in [0.5, 8].
@@ -108,6 +112,24 @@ impl SheetsSettings {
             _ => None,
         }
     }
+}
+
+/// When values become colours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Classify {
+    /// When they are reconstructed.
+    After,
+    /// At the voxels, before they are splatted.
+    Before,
+}
+
+/// What slabs across the view lie along.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Aligned {
+    /// The image.
+    View,
+    /// The planes of the lattice that lie most nearly across the view (Westover 1990).
+    Axis,
 }
 
 /// What the slabs of sheets lie across.

@@ -68,19 +68,19 @@ impl Classifier {
         let (mut values, mut out) = ([0.0; MAX_LANES], [[0.0; MAX_LANES]; 4]);
         value.store(&mut values);
         for lane in 0..Lanes::<S>::COUNT {
-            let v = values[lane];
-            let upper = self.pieces.partition_point(|p| p.value <= v);
-            for c in 0..4 {
-                out[c][lane] = match upper.checked_sub(1) {
-                    None => self.first[c],
-                    Some(i) => {
-                        let piece = &self.pieces[i];
-                        piece.slope[c].mul_add(v - piece.value, piece.at[c]).max(0.0)
-                    }
-                };
-            }
+            let class = self.one(values[lane]);
+            (0..4).for_each(|c| out[c][lane] = class[c]);
         }
         [0, 1, 2, 3].map(|c| Lanes::load(simd, &out[c]))
+    }
+
+    /// Extinction, red, green and blue of one value.
+    #[inline(always)]
+    pub(crate) fn one(&self, value: f32) -> [f32; 4] {
+        let upper = self.pieces.partition_point(|p| p.value <= value);
+        let Some(i) = upper.checked_sub(1) else { return self.first };
+        let piece = &self.pieces[i];
+        std::array::from_fn(|c| piece.slope[c].mul_add(value - piece.value, piece.at[c]).max(0.0))
     }
 }
 

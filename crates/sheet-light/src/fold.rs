@@ -1,11 +1,14 @@
 //! From volumes and a view to sheets, and their fold over a range of depths.
 
+use crate::aligned::{Slant, plane_step};
 use crate::classify::Classifier;
 use crate::counts::SheetCounts;
 use crate::error::cancelled;
 use crate::kept::Kept;
 use crate::lattice::Lattice;
 use crate::light::Lamp;
+use crate::params::{Aligned, Classify};
+use crate::preclassified::Preclassified;
 use crate::rays::LatticeRays;
 use crate::ring::{Ring, Splatter, Taper};
 use crate::sections::SectionTable;
@@ -14,7 +17,7 @@ use crate::shadows::Shadows;
 use crate::sheets::Sheets;
 use crate::slabs::{Kernels, Slabs};
 use crate::tile::{self, AREA, FoldTile, Scratch, TILE};
-use crate::viewed::{PixelFootprint, Viewed, corners, spacing_along, view_axes};
+use crate::viewed::{PixelFootprint, Viewed, corners, spacing_along, view_steps};
 use crate::visible::Voxels;
 use crate::{Error, Params, SheetInput, Splats, Volume};
 use rayon::prelude::*;
@@ -37,6 +40,7 @@ pub(crate) struct Prepared<'a> {
     pub(crate) sections: SectionTable,
     kernel: Kernel,
     taper: Taper,
+    pub(crate) classify: Classify,
     pub(crate) classifier: Classifier,
     pub(crate) rays: LatticeRays,
     pub(crate) voxels: Voxels,
@@ -53,6 +57,7 @@ pub struct Sheeted<'a> {
     pub(crate) input: SheetInput<'a>,
     pub(crate) params: Params,
     pub(crate) slabs: Slabs,
+    pub(crate) slant: Slant,
     pub(crate) volumes: Vec<Prepared<'a>>,
     pub(crate) lamps: Vec<Lamp>,
     /// Lists of splats by square of the image.
@@ -65,9 +70,10 @@ pub struct Sheeted<'a> {
 /// # Errors
 /// [`Error::Parameter`], [`Error::Volume`], [`Error::Limit`] before much is taken, or [`Error::Cancelled`].
 pub fn prepare<'a>(input: SheetInput<'a>, params: &Params, progress: Option<&Progress>) -> Result<Sheeted<'a>, Error> {
-    params.check()?;
-    input.check()?;
-    let slabs = slabs_of(&input, params)?;
+    params.check_any_mode()?;
+    input.check_any_lattice()?;
+    let slant = Slant::new(&input, params)?;
+    let slabs = slabs_of(&input, params, slant)?;
     let tiles = tile::tiles(input.camera);
     let mut needed = memory(&input, params, &slabs, tiles);
     check(needed, params)?;
@@ -76,7 +82,7 @@ pub fn prepare<'a>(input: SheetInput<'a>, params: &Params, progress: Option<&Pro
     progress.add_total(input.volumes.len() as u64);
     let mut volumes = Vec::with_capacity(input.volumes.len());
     for volume in &input.volumes {
-        let mut prepared = Prepared::new(*volume, &input, params, &slabs, tiles);
+        let mut prepared = Prepared::new(*volume, &input, params, (&slabs, slant), tiles);
         needed += Shadows::bytes(prepared.voxels.count(), &input.lights);
         check(needed, params)?;
         prepared.shadows = Shadows::new(&prepared, &input.lights, input.shadow_origin, progress)?;
@@ -85,17 +91,19 @@ pub fn prepare<'a>(input: SheetInput<'a>, params: &Params, progress: Option<&Pro
     }
     let bins = input.splats.as_ref().map(Splats::bin);
     let lamps = Lamp::all(&input, slabs.origin);
-    Ok(Sheeted { input, params: *params, slabs, volumes, lamps, bins, tiles })
+    Ok(Sheeted { input, params: *params, slabs, slant, volumes, lamps, bins, tiles })
 }
 
 /// Slabs between the nearest corner of a volume, or the nearest splat, before the eye and the farthest, as narrow as the finest
 /// volume needs them.
-pub(crate) fn slabs_of(input: &SheetInput<'_>, params: &Params) -> Result<Slabs, Error> {
+pub(crate) fn slabs_of(input: &SheetInput<'_>, params: &Params, slant: Slant) -> Result<Slabs, Error> {
     let (mut near, mut far, mut spacing) = (f64::INFINITY, 0.0f64, f64::INFINITY);
     for volume in &input.volumes {
-        spacing = spacing.min(spacing_along(&view_axes(volume, input.camera)));
+        spacing = spacing.min(spacing_of(volume, input, params));
         for corner in corners(volume, input.camera) {
-            (near, far) = (near.min(corner.z.max(0.0)), far.max(corner.z));
+            // Slabs along a lattice may lie behind the eye in some pixels alone.
+            let z = if slant.is_any() { slant.sheared(corner).z } else { corner.z.max(0.0) };
+            (near, far) = (near.min(z), far.max(z));
         }
     }
     if let Some(splats) = &input.splats {
@@ -113,9 +121,18 @@ pub(crate) fn slabs_of(input: &SheetInput<'_>, params: &Params) -> Result<Slabs,
     Slabs::for_kernels(near, far, width, &input.volumes.iter().map(kernels).collect::<Vec<_>>())
 }
 
+/// Steps of a volume along the view.
+fn spacing_of(volume: &Volume<'_>, input: &SheetInput<'_>, params: &Params) -> f64 {
+    match params.aligned {
+        Aligned::View => spacing_along(&view_steps(volume, input.camera)),
+        Aligned::Axis => plane_step(volume, input.camera),
+    }
+}
+
 /// Radius of a volume's kernels along the view.
 fn reach(volume: &Volume<'_>, input: &SheetInput<'_>, params: &Params) -> f64 {
-    spacing_along(&view_axes(volume, input.camera)) * params.kernel.extent
+    let extent = if params.aligned == Aligned::View { params.kernel.extent } else { 0.5 };
+    spacing_of(volume, input, params) * extent
 }
 
 /// How many slabs of this width one of the volume's own has: as many as its spacing along the view has, where that chooses the width.
@@ -124,7 +141,7 @@ pub(crate) fn stride(volume: &Volume<'_>, input: &SheetInput<'_>, params: &Param
     const EQUAL: f64 = 1.0 + 1e-6;
     /// Most slabs in one.
     const MOST: f64 = 65536.0;
-    let slabs = spacing_along(&view_axes(volume, input.camera)) / width * EQUAL;
+    let slabs = spacing_of(volume, input, params) / width * EQUAL;
     if params.slab_width.is_some() { 1 } else { slabs.clamp(1.0, MOST) as u32 }
 }
 
@@ -132,8 +149,9 @@ pub(crate) fn stride(volume: &Volume<'_>, input: &SheetInput<'_>, params: &Param
 fn memory(input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [usize; 2]) -> u64 {
     let threads = rayon::current_num_threads() as u64;
     let mut needed = threads * 4 * 4 * (TILE * TILE) as u64;
+    let sums = if params.classify == Classify::Before { 1 + Preclassified::times() } else { 1 };
     for volume in &input.volumes {
-        let dims = Lattice::new(volume.grid, [usize::MAX; 3]).dims;
+        let dims = Lattice::packed(volume.grid, volume.packing, [usize::MAX; 3]).dims;
         let stride = stride(volume, input, params, slabs.width);
         let width = slabs.width * f64::from(stride);
         let touched = crate::sections::touched(reach(volume, input, params) / width);
@@ -141,8 +159,9 @@ fn memory(input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [usize;
         // Lists: four bytes for eight voxels, in two or three tiles each. Records: two of sixteen bytes a voxel of a tile.
         let voxels = dims.iter().map(|n| *n as u64).product::<u64>();
         let of_a_tile = voxels.div_ceil((tiles[0] * tiles[1]) as u64) * 4;
-        needed +=
-            Voxels::bytes(dims) + 2 * voxels + threads * (lines * 64 * AREA as u64 + Sheets::bytes() + 32 * of_a_tile);
+        needed += Voxels::bytes(dims)
+            + 2 * voxels
+            + threads * (sums * (lines * 64 * AREA as u64 + Sheets::bytes()) + 32 * of_a_tile);
         needed += threads * Kept::bytes(stride);
     }
     needed
@@ -155,13 +174,19 @@ fn check(needed: u64, params: &Params) -> Result<(), Error> {
 }
 
 impl<'a> Prepared<'a> {
-    fn new(volume: Volume<'a>, input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [usize; 2]) -> Self {
+    fn new(
+        volume: Volume<'a>,
+        input: &SheetInput<'_>,
+        params: &Params,
+        (slabs, slant): (&Slabs, Slant),
+        tiles: [usize; 2],
+    ) -> Self {
         let (grid, camera) = (volume.grid, input.camera);
         let stride = stride(&volume, input, params, slabs.width);
         let slabs = &slabs.wider(stride);
-        let viewed = Viewed::new(&volume, camera, slabs, params);
+        let viewed = Viewed::new(&volume, camera, slabs, params, slant);
         let reach = viewed.lattice_reach(camera, slabs, volume.normals);
-        let lattice = Lattice::new(grid, reach);
+        let lattice = Lattice::packed(grid, volume.packing, reach);
         let viewed = viewed.with_rim(lattice.rim);
         let voxels = Voxels::needed(&lattice, volume.transfer, reach);
         let segments = Segments::new(&viewed, slabs, &voxels, lattice.dims, tiles);
@@ -176,6 +201,7 @@ impl<'a> Prepared<'a> {
             sections: SectionTable::new(viewed.reach / slabs.width, 0.5 * cutoff * cutoff),
             taper: Taper::new(0.5 * cutoff * cutoff),
             kernel: Kernel::new(&Footprint { cutoff: cutoff as f32 }),
+            classify: params.classify,
             classifier: Classifier::new(volume.transfer, volume.extinction_scale, base),
             rays: LatticeRays::new(&volume, camera, slabs.origin),
             footprint: camera.is_orthographic().then(|| viewed.footprint(camera.focal_px())),

@@ -24,7 +24,7 @@
 //! ```
 //! use sheet_light::half::{HalfInput, HalfParams, fold};
 //! use sheet_light::{SheetInput, Volume};
-//! use splat_core::{Accumulator, Camera, Grid, LayerSet, Light, LightShape, Material, Projection, Shading};
+//! use splat_core::{Accumulator, Camera, Grid, LayerSet, Light, LightShape, Material, Packing, Projection, Shading};
 //! use splat_core::{Similarity, TransferFunction, TransferPoint, glam::{DMat3, DVec3}, shade::{ChannelLayout, LitBy}};
 //!
 //! // A medium of τ = 1, lit from where it is seen: light comes in, is scattered, and goes out again.
@@ -33,8 +33,8 @@
 //! let transfer = TransferFunction::new(vec![TransferPoint { value: 0.0, color: [1.0; 3], extinction: 0.25 }]).unwrap();
 //! let material = Material { shading: Shading::Phase, ..Material::default() };
 //! let volume = Volume {
-//!     grid: &grid, transform: Similarity::default(), transfer: &transfer, extinction_scale: 1.0, material: &material,
-//!     normals: false, object: 0, shadow_coefficient: 1.0, casts_shadow: true,
+//!     grid: &grid, packing: Packing::Cartesian, transform: Similarity::default(), transfer: &transfer,
+//!     extinction_scale: 1.0, material: &material, normals: false, object: 0, shadow_coefficient: 1.0, casts_shadow: true,
 //! };
 //! let view = Projection::Orthographic { height: 2.0 };
 //! let camera = Camera::look_at(DVec3::Z * 9.0, DVec3::ZERO, DVec3::Y, view, [16, 16]).unwrap();

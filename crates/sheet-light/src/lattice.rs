@@ -4,15 +4,20 @@
 //! wrong there. So the lattice goes on for as many voxels as kernels reach, v(−m) = 2·v(0) − v(m) along each axis: a linear field
 //! stays linear up to its faces, and a constant one constant. The volume itself does not grow.
 
-use splat_core::Grid;
+use splat_core::{Grid, Packing};
 
 /// Most voxels of the rim along an axis.
 const MOST_RIM: usize = 3;
+
+/// Most planes of it where they lie half a cell apart.
+const MOST_PLANES: usize = 2 * MOST_RIM;
 
 /// A grid with its rim; indices count from the rim's corner.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lattice<'a> {
     pub(crate) grid: &'a Grid,
+    /// Which planes continue which.
+    pub(crate) packing: Packing,
     /// Voxels before and behind the grid, by axis.
     pub(crate) rim: [usize; 3],
     /// Lattice points with the rim.
@@ -25,8 +30,14 @@ type Term = (f64, usize);
 impl<'a> Lattice<'a> {
     /// With a rim for kernels that reach so many steps along the axes.
     pub(crate) fn new(grid: &'a Grid, reach: [usize; 3]) -> Self {
-        let rim = reach.map(|r| r.min(MOST_RIM));
-        Self { grid, rim, dims: [0, 1, 2].map(|a| grid.dims[a] + 2 * rim[a]) }
+        Self::packed(grid, Packing::Cartesian, reach)
+    }
+
+    /// The same of planes that lie like that. Planes of the two lattices of a body-centred one go on each by itself.
+    pub(crate) fn packed(grid: &'a Grid, packing: Packing, reach: [usize; 3]) -> Self {
+        let most = [MOST_RIM, MOST_RIM, if packing == Packing::Cartesian { MOST_RIM } else { MOST_PLANES }];
+        let rim = [0, 1, 2].map(|a| reach[a].min(most[a]));
+        Self { grid, packing, rim, dims: [0, 1, 2].map(|a| grid.dims[a] + 2 * rim[a]) }
     }
 
     /// What the place `i` along an axis is made of.
@@ -37,7 +48,15 @@ impl<'a> Lattice<'a> {
         if (0..n).contains(&i) {
             return [(1.0, i as usize), (0.0, 0)];
         }
-        let (face, inside) = if i < 0 { (0, (-i).min(last)) } else { (last, (2 * last - i).max(0)) };
+        let (face, inside) = if self.packing == Packing::BodyCentred && axis == 2 {
+            // The outermost plane of the same lattice; mirrored there by whole cells.
+            let [first, last] = [i & 1, last - 1 + (i & 1)];
+            if i < 0 { (first, (2 * first - i).min(last)) } else { (last, (2 * last - i).max(first)) }
+        } else if i < 0 {
+            (0, (-i).min(last))
+        } else {
+            (last, (2 * last - i).max(0))
+        };
         [(2.0, face as usize), (-1.0, inside as usize)]
     }
 
@@ -118,6 +137,29 @@ mod tests {
             for (i, found) in row.iter().enumerate() {
                 let expected = at([i as f64 - 3.0, j as f64 - 2.0, k as f64 - 3.0]) as f32;
                 assert_eq!((*found, lattice.value(i, j, k)), (expected, expected), "{i} {j} {k}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_linear_field_goes_on_between_the_planes_of_a_body_centred_lattice() {
+        let at = |[i, j, k]: [f64; 3]| 3.0 + 2.0 * i - j + 0.5 * k;
+        let packing = Packing::BodyCentred;
+        let place = |n: usize| {
+            let shift = packing.shift(n / 20);
+            [(n % 5) as f64 + shift, (n / 5 % 4) as f64 + shift, (n / 20) as f64]
+        };
+        for planes in [2, 8] {
+            let values = (0..20 * planes).map(|n| at(place(n)) as f32).collect();
+            let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [5, 4, planes], values };
+            let lattice = Lattice::packed(&grid, packing, [2, 3, 9]);
+            assert_eq!((lattice.rim, lattice.dims), ([2, 3, 6], [9, 10, planes + 12]));
+            // Two planes say nothing of how values rise from plane to plane of one lattice.
+            for (k, j, i) in (0..planes + 12).flat_map(|k| (0..10).flat_map(move |j| (0..9).map(move |i| (k, j, i)))) {
+                let shift = packing.shift(k);
+                let up = if planes == 2 { (k % 2) as f64 } else { k as f64 - 6.0 };
+                let expected = at([i as f64 - 2.0 + shift, j as f64 - 3.0 + shift, up]) as f32;
+                assert_eq!(lattice.value(i, j, k), expected, "{planes}: {i} {j} {k}");
             }
         }
     }

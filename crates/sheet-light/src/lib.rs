@@ -17,8 +17,8 @@
 //!
 //! ```
 //! use sheet_light::{Params, SheetInput, Volume, prepare};
-//! use splat_core::{Accumulator, Camera, Grid, LayerSet, Material, Projection, Shading, Similarity, TransferFunction, TransferPoint};
-//! use splat_core::{glam::{DMat3, DVec3}, shade::ChannelLayout};
+//! use splat_core::{Accumulator, Camera, Grid, LayerSet, Material, Packing, Projection, Shading, Similarity};
+//! use splat_core::{TransferFunction, TransferPoint, glam::{DMat3, DVec3}, shade::ChannelLayout};
 //!
 //! // Eight cells of 1/2 along the view: 4 units of a medium of extinction 0.25, which shines white.
 //! let axes = DMat3::from_diagonal(DVec3::splat(0.5));
@@ -27,7 +27,7 @@
 //! let transfer = TransferFunction::new(vec![white]).unwrap();
 //! let material = Material { shading: Shading::Unlit, ..Material::default() };
 //! let volume = Volume {
-//!     grid: &grid, transform: Similarity::default(), transfer: &transfer, material: &material,
+//!     grid: &grid, packing: Packing::Cartesian, transform: Similarity::default(), transfer: &transfer, material: &material,
 //!     extinction_scale: 1.0, normals: false, object: 0, shadow_coefficient: 1.0, casts_shadow: true,
 //! };
 //! let view = Projection::Orthographic { height: 2.0 };
@@ -49,6 +49,7 @@
 //! The README says how it works and where it deviates from the paper, and why.
 #![forbid(unsafe_code)]
 
+mod aligned;
 mod classify;
 mod counts;
 mod error;
@@ -60,6 +61,7 @@ mod light;
 mod lines;
 mod params;
 mod picture;
+mod preclassified;
 mod queue;
 mod rays;
 pub mod reference;
@@ -80,6 +82,6 @@ mod volume;
 pub use counts::SheetCounts;
 pub use error::Error;
 pub use fold::{Sheeted, prepare};
-pub use params::{KernelShape, Params};
+pub use params::{Aligned, Classify, KernelShape, Params};
 pub use splats::Splats;
 pub use volume::{SheetInput, Volume};

@@ -20,6 +20,27 @@ impl Default for KernelShape {
     }
 }
 
+/// When values become colours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Classify {
+    /// When they are reconstructed, so that zooms show no blur (Mueller, Möller, Crawfis 1999; the paper).
+    #[default]
+    After,
+    /// At the voxels, before they are splatted (Westover 1990): four more sums, and a transfer function that is blurred by the kernel.
+    Before,
+}
+
+/// What slabs lie along.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Aligned {
+    /// The image (Mueller, Crawfis 1998; the paper).
+    #[default]
+    View,
+    /// The planes of the lattice that lie most nearly across the view, a slab for each, into which its kernels go whole (Westover 1990):
+    /// pictures pop where other planes do. Parallel rays and one volume alone.
+    Axis,
+}
+
 /// Parameters of image-aligned sheets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Params {
@@ -27,6 +48,10 @@ pub struct Params {
     pub slab_width: Option<f64>,
     /// The kernel.
     pub kernel: KernelShape,
+    /// When values become colours; of slabs across the view alone.
+    pub classify: Classify,
+    /// What slabs lie along; of slabs across the view alone.
+    pub aligned: Aligned,
     /// A pixel is done when its transmittance is below this, in \[0, 1): what is hidden errs by at most that times the radiance
     /// behind it. So tolerance/L_max; [`Params::PAPERS_CUTOFF`] is the paper's.
     pub transmittance_cutoff: f32,
@@ -38,7 +63,19 @@ impl Params {
     /// "Usually 0.98" opacity (section 4.4).
     pub const PAPERS_CUTOFF: f32 = 0.02;
 
+    /// What [`Params::check_any_mode`] does, and that no mode but the paper's is asked for.
     pub(crate) fn check(&self) -> Result<(), Error> {
+        self.check_any_mode()?;
+        if self.classify != Classify::After {
+            return Err(Error::parameter("classify", self.classify, "After in half-vector sheets"));
+        }
+        if self.aligned != Aligned::View {
+            return Err(Error::parameter("aligned", self.aligned, "View in half-vector sheets"));
+        }
+        Ok(())
+    }
+
+    pub(crate) fn check_any_mode(&self) -> Result<(), Error> {
         let KernelShape { extent, sigma } = self.kernel;
         if !(0.5..=8.0).contains(&extent) {
             return Err(Error::parameter("kernel.extent", extent, "0.5 to 8 spacings"));
@@ -48,6 +85,13 @@ impl Params {
         }
         if !(0.0..1.0).contains(&self.transmittance_cutoff) {
             return Err(Error::parameter("transmittance_cutoff", self.transmittance_cutoff, "0 to below 1"));
+        }
+        if let (Aligned::Axis, Some(width)) = (self.aligned, self.slab_width) {
+            return Err(Error::parameter(
+                "slab_width",
+                width,
+                "none for slabs along a lattice, which has a plane for each",
+            ));
         }
         match self.slab_width {
             Some(width) if !(width.is_finite() && width > 0.0) => {
@@ -60,6 +104,13 @@ impl Params {
 
 impl Default for Params {
     fn default() -> Self {
-        Self { slab_width: None, kernel: KernelShape::default(), transmittance_cutoff: 1e-3, limits: Limits::default() }
+        Self {
+            slab_width: None,
+            kernel: KernelShape::default(),
+            classify: Classify::default(),
+            aligned: Aligned::default(),
+            transmittance_cutoff: 1e-3,
+            limits: Limits::default(),
+        }
     }
 }

@@ -4,7 +4,9 @@
 //! pairs of planes in lattice coordinates. Lengths of neighbouring slabs add up to that of the whole, so a constant volume has
 //! e^−τ at any slab width and through any lens.
 
-use crate::tile::{AREA, SIDE};
+use crate::aligned::Slant;
+use crate::slabs::Slabs;
+use crate::tile::{AREA, SIDE, TILE};
 use crate::volume::Volume;
 use splat_core::Camera;
 use splat_core::glam::{DMat3, DVec3};
@@ -24,6 +26,7 @@ pub(crate) struct Crossings {
 pub(crate) struct LatticeRays {
     lattice_from_view: DMat3,
     start: DVec3,
+    lowest: DVec3,
     highest: DVec3,
     origin: f64,
 }
@@ -32,11 +35,12 @@ impl LatticeRays {
     /// Depths are counted from `origin`.
     pub(crate) fn new(volume: &Volume<'_>, camera: &Camera, origin: f64) -> Self {
         let world_from_view = DMat3::from_cols(camera.axes[0], camera.axes[1], camera.axes[2]);
-        let inverse = volume.axes().inverse();
+        let (inverse, lowest) = (volume.axes().inverse(), volume.packing.lowest());
         Self {
             lattice_from_view: inverse * world_from_view,
             start: inverse * (camera.position - volume.origin()),
-            highest: DVec3::from_array(volume.grid.dims.map(|n| n as f64 - 0.5)),
+            lowest,
+            highest: lowest + DVec3::from_array(volume.grid.dims.map(|n| n as f64)),
             origin,
         }
     }
@@ -60,7 +64,7 @@ impl LatticeRays {
         let (from, along) = (self.lattice(from), self.lattice_from_view * along);
         let (mut near, mut far) = (0.0f64, f64::INFINITY);
         for a in 0..3 {
-            let (to_low, to_high) = (-0.5 - from[a], self.highest[a] - from[a]);
+            let (to_low, to_high) = (self.lowest[a] - from[a], self.highest[a] - from[a]);
             if along[a] == 0.0 {
                 if to_low > 0.0 || to_high < 0.0 {
                     return [f64::INFINITY, f64::NEG_INFINITY];
@@ -86,11 +90,13 @@ pub(crate) struct Slopes {
     /// Where rays cross the first slab, by column and by row.
     start: [[f32; SIDE + MAX_LANES]; 2],
     is_parallel: bool,
+    /// Of slabs that do not lie across the view; rays are parallel then.
+    pub(crate) slant: Slant,
 }
 
 impl Slopes {
     /// Those of the tile at `corner`, the first slab at a view depth of `origin`.
-    pub(crate) fn new(camera: &Camera, corner: [usize; 2], origin: f64) -> Self {
+    pub(crate) fn new(camera: &Camera, corner: [usize; 2], origin: f64, slant: Slant) -> Self {
         let is_parallel = camera.is_orthographic();
         let at = |v: usize, a: usize| {
             let px = (corner[a] + v) as f64 - 0.5;
@@ -101,18 +107,45 @@ impl Slopes {
         let column = |v: usize| x.get(v).map_or(0.0, |x| *x as f32);
         let reach = if is_parallel { 1.0 } else { origin };
         let start = [&x, &y].map(|at| std::array::from_fn(|v| at.get(v).map_or(0.0, |at| (at * reach) as f32)));
-        Self { u: std::array::from_fn(column), v: y.map(|y| y as f32), x, y, start, is_parallel }
+        Self { u: std::array::from_fn(column), v: y.map(|y| y as f32), x, y, start, is_parallel, slant }
     }
 
     /// View positions on neighbouring rays, depths counted from the first slab.
     #[inline(always)]
     pub(crate) fn places<S: Simd>(&self, simd: S, [x, y]: [usize; 2], depth: Lanes<S>) -> [Lanes<S>; 3] {
         let start = [Lanes::load(simd, &self.start[0][x..]), Lanes::splat(simd, self.start[1][y])];
+        if self.slant.is_any() {
+            let [sx, sy] = self.slant.single().map(|s| Lanes::splat(simd, s));
+            return [start[0], start[1], depth - (sx * start[0] + sy * start[1])];
+        }
         if self.is_parallel {
             return [start[0], start[1], depth];
         }
         let [u, v] = [Lanes::load(simd, &self.u[x..]), Lanes::splat(simd, self.v[y])];
         [u.mul_add(depth, start[0]), v.mul_add(depth, start[1]), depth]
+    }
+
+    /// From view depths to depths of slabs, of a ray.
+    pub(crate) fn offset(&self, x: usize, y: usize) -> f64 {
+        self.slant.offset(self.x[x], self.y[y])
+    }
+
+    /// Makes view depths of the tile's pixels, without its rim, depths of slabs.
+    pub(crate) fn shear(&self, depths: [&mut [f32]; 2]) {
+        for depths in depths {
+            for (at, depth) in depths.iter_mut().enumerate() {
+                *depth += self.offset(at % TILE + 1, at / TILE + 1) as f32;
+            }
+        }
+    }
+
+    /// Makes depths of slabs of neighbouring pixels, the first at (x, y) of the tile with its rim, view depths.
+    pub(crate) fn unshear(&self, [x, y]: [usize; 2], depths: [&mut [f32; MAX_LANES]; 2]) {
+        for depths in depths {
+            for (lane, depth) in depths.iter_mut().enumerate().take_while(|(lane, _)| x + lane < SIDE) {
+                *depth -= self.offset(x + lane, y) as f32;
+            }
+        }
     }
 
     /// View-space origin and direction of a ray, as [`Camera::view_ray`] has them.
@@ -127,11 +160,13 @@ impl Crossings {
         Self { near: vec![0.0; AREA + MAX_LANES], far: vec![0.0; AREA + MAX_LANES] }
     }
 
-    /// Those of a tile.
-    pub(crate) fn of_tile(&mut self, rays: &LatticeRays, slopes: &Slopes) {
+    /// Those of a tile, in the slabs of a volume.
+    pub(crate) fn of_tile(&mut self, rays: &LatticeRays, slopes: &Slopes, slabs: &Slabs) {
         for y in 0..SIDE {
             for x in 0..SIDE {
-                let [near, far] = rays.crossing(slopes.ray(x, y));
+                let offset = slopes.offset(x, y);
+                let crossing = rays.crossing(slopes.ray(x, y));
+                let [near, far] = crossing.map(|depth| slopes.slant.snapped(depth + offset, slabs));
                 (self.near[y * SIDE + x], self.far[y * SIDE + x]) = (near as f32, far as f32);
             }
         }

@@ -1,7 +1,9 @@
 //! The slow form in f64: the same sheets pixel by pixel and slab by slab, without tiles, vectors, rings, lists or skipped voxels.
 
+use crate::aligned::Slant;
 use crate::fold::{slabs_of, stride};
 use crate::lattice::Lattice;
+use crate::params::Classify;
 use crate::rays::LatticeRays;
 use crate::sections::{PHASES, sections};
 use crate::slabs::Slabs;
@@ -27,6 +29,8 @@ struct Sheets {
     stride: u32,
     values: Vec<f64>,
     weights: Vec<f64>,
+    /// Extinction and colours times it, where voxels are classified before they are splatted.
+    classes: Vec<[f64; 4]>,
     /// Where each ray is inside.
     crossings: Vec<[f64; 2]>,
     size: [usize; 2],
@@ -38,11 +42,12 @@ struct Sheets {
 /// # Errors
 /// [`Error::Parameter`], [`Error::Volume`] or [`Error::Limit`].
 pub fn draw(input: &SheetInput<'_>, params: &Params) -> Result<Picture, Error> {
-    params.check()?;
-    input.check()?;
-    let slabs = slabs_of(input, params)?;
-    let sheets: Vec<Sheets> = input.volumes.iter().map(|v| Sheets::new(v, input, params, &slabs)).collect();
-    let view = View { input, params };
+    params.check_any_mode()?;
+    input.check_any_lattice()?;
+    let slant = Slant::new(input, params)?;
+    let slabs = slabs_of(input, params, slant)?;
+    let view = View { input, params, slant };
+    let sheets: Vec<Sheets> = input.volumes.iter().map(|v| Sheets::new(v, &view, &slabs)).collect();
     let [width, height] = input.camera.size.map(|s| s as usize);
     let mut out = Picture { optical_depth: vec![0.0; width * height], color: vec![[0.0; 3]; width * height] };
     for slab in 1..slabs.count - 1 {
@@ -67,10 +72,12 @@ pub fn draw(input: &SheetInput<'_>, params: &Params) -> Result<Picture, Error> {
 struct View<'a> {
     input: &'a SheetInput<'a>,
     params: &'a Params,
+    slant: Slant,
 }
 
 impl Sheets {
-    fn new(volume: &Volume<'_>, input: &SheetInput<'_>, params: &Params, slabs: &Slabs) -> Self {
+    fn new(volume: &Volume<'_>, of: &View<'_>, slabs: &Slabs) -> Self {
+        let View { input, params, slant } = *of;
         let camera = input.camera;
         let stride = stride(volume, input, params, slabs.width);
         let slabs = &slabs.wider(stride);
@@ -78,27 +85,38 @@ impl Sheets {
         let rays = LatticeRays::new(volume, camera, slabs.origin);
         let pixels = 0..size[0] * size[1];
         let ray = |at: usize| camera.view_ray((at % size[0]) as f64 + 0.5, (at / size[0]) as f64 + 0.5);
+        let crossing = |ray: (DVec3, DVec3)| {
+            // Of parallel rays; where they are not slabs lie across the view.
+            rays.crossing(ray).map(|depth| slant.snapped(depth + slant.offset(ray.0.x, ray.0.y), slabs))
+        };
         let n = pixels.len() * slabs.count as usize;
         let mut sheets = Self {
             slabs: *slabs,
             stride,
             values: vec![0.0; n],
             weights: vec![0.0; n],
-            crossings: pixels.map(|at| rays.crossing(ray(at))).collect(),
+            classes: vec![[0.0; 4]; if params.classify == Classify::Before { n } else { 0 }],
+            crossings: pixels.map(|at| crossing(ray(at))).collect(),
             size,
         };
-        let viewed = Viewed::new(volume, camera, slabs, params);
-        let lattice = Lattice::new(volume.grid, viewed.lattice_reach(camera, slabs, volume.normals));
+        let viewed = Viewed::new(volume, camera, slabs, params, slant);
+        let reach = viewed.lattice_reach(camera, slabs, volume.normals);
+        let lattice = Lattice::packed(volume.grid, volume.packing, reach);
         let viewed = viewed.with_rim(lattice.rim);
         let [nx, ny, nz] = lattice.dims;
         for (k, j, i) in (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i)))) {
-            sheets.splat(&viewed, params, slabs, viewed.position(i, j, k), lattice.value(i, j, k));
+            let value = lattice.value(i, j, k);
+            let class = volume.transfer.at(value);
+            let extinction = f64::from(class.extinction);
+            let [red, green, blue] = class.color.map(|c| extinction * f64::from(c));
+            let sums = [f64::from(value), extinction, red, green, blue];
+            sheets.splat(&viewed, params, slabs, viewed.position(i, j, k), sums);
         }
         sheets
     }
 
     /// Adds one voxel to every slab and pixel that it touches.
-    fn splat(&mut self, viewed: &Viewed, params: &Params, slabs: &Slabs, at: DVec3, value: f32) {
+    fn splat(&mut self, viewed: &Viewed, params: &Params, slabs: &Slabs, at: DVec3, [value, class @ ..]: [f64; 5]) {
         let Some(place) = viewed.place(at.z as f32) else { return };
         let Some(scale) = viewed.scale(viewed.depth(place)) else { return };
         let footprint = viewed.footprint(scale);
@@ -120,7 +138,10 @@ impl Sheets {
                     let sheet = slab * self.size[0] * self.size[1] + y * self.size[0] + x;
                     if let Some(sum) = self.weights.get_mut(sheet) {
                         *sum += weight * section;
-                        self.values[sheet] += weight * section * f64::from(value);
+                        self.values[sheet] += weight * section * value;
+                        if let Some(sums) = self.classes.get_mut(sheet) {
+                            (0..4).for_each(|c| sums[c] += weight * section * class[c]);
+                        }
                     }
                 }
             }
@@ -133,6 +154,16 @@ impl Sheets {
         (self.weights[sheet] > 1e-12).then(|| self.values[sheet] / self.weights[sheet])
     }
 
+    /// Extinction and colour of a pixel in a slab.
+    fn class(&self, volume: &Volume<'_>, slab: u32, at: usize, value: f64) -> (f64, [f32; 3]) {
+        let sheet = slab as usize * self.size[0] * self.size[1] + at;
+        let Some([extinction, colors @ ..]) = self.classes.get(sheet) else {
+            let class = volume.transfer.at(value as f32);
+            return (f64::from(class.extinction), class.color);
+        };
+        (extinction / self.weights[sheet], colors.map(|c| (c / extinction.max(f64::MIN_POSITIVE)) as f32))
+    }
+
     /// Where a ray is inside, within a slab.
     fn inside(&self, slabs: &Slabs, slab: u32, at: usize) -> Option<[f64; 2]> {
         let [near, far] = self.crossings[at];
@@ -142,39 +173,39 @@ impl Sheets {
 
     /// Optical depth of a pixel in a slab, and the radiance of the volume's own slab, in the middle of what lies there.
     fn fragment(&self, of: &View<'_>, volume: &Volume<'_>, (slabs, slab): (&Slabs, u32), at: usize) -> (f64, [f64; 3]) {
-        let View { input, params } = *of;
+        let View { input, params, slant } = *of;
         let (nothing, own) = ((0.0, [0.0; 3]), slab / self.stride);
         let (Some(value), Some([near, far])) = (self.value(own, at), self.inside(slabs, slab, at)) else {
             return nothing;
         };
         let [begin, end] = self.inside(&self.slabs, own, at).unwrap_or([near, far]);
-        let class = volume.transfer.at(value as f32);
-        if class.extinction == 0.0 {
+        let (class, color) = self.class(volume, own, at, value);
+        if class == 0.0 {
             return nothing;
         }
         let (x, y) = ((at % self.size[0]) as f64 + 0.5, (at / self.size[0]) as f64 + 0.5);
         let (from, along) = input.camera.view_ray(x, y);
-        let extinction =
-            f64::from(class.extinction) * volume.extinction_scale * f64::from(volume.material.extinction_rgb[1]);
+        let extinction = class * volume.extinction_scale * f64::from(volume.material.extinction_rgb[1]);
         let tau = extinction * (far - near) * along.length();
-        let normal = if volume.normals { self.normal(input, own, at, along) } else { Vec3::ZERO };
-        let viewed = Viewed::new(volume, input.camera, &self.slabs, params);
+        let normal = if volume.normals { self.normal(of, own, at, along) } else { Vec3::ZERO };
+        let viewed = Viewed::new(volume, input.camera, &self.slabs, params, slant);
+        let depth = slabs.origin + 0.5 * (begin + end) - slant.offset(from.x, from.y);
         let axes = input.camera.axes;
         let world = |v: DVec3| axes[0] * v.x + axes[1] * v.y + axes[2] * v.z;
         let point = Point {
-            position: input.camera.position + world(from + along * (slabs.origin + 0.5 * (begin + end))),
+            position: input.camera.position + world(from + along * depth),
             radius: viewed.reach as f32,
             normal,
             to_eye: -world(along).normalize().as_vec3(),
-            color: class.color,
+            color,
             material: volume.material,
         };
         (tau, radiance(input, volume, &point))
     }
 
     /// −∇v/|∇v| in world space, from the neighbours that are inside.
-    fn normal(&self, input: &SheetInput<'_>, slab: u32, at: usize, along: DVec3) -> Vec3 {
-        let slabs = &self.slabs;
+    fn normal(&self, of: &View<'_>, slab: u32, at: usize, along: DVec3) -> Vec3 {
+        let (camera, slabs) = (of.input.camera, &self.slabs);
         let (x, y) = (at % self.size[0], at / self.size[0]);
         let sample = |slab: u32, at: usize| self.value(slab, at).filter(|_| self.inside(slabs, slab, at).is_some());
         let here = self.value(slab, at).unwrap_or(0.0);
@@ -189,10 +220,10 @@ impl Sheets {
         let right = difference(pixel(x.checked_sub(1), Some(y)), pixel(Some(x + 1), Some(y)));
         let down = difference(pixel(Some(x), y.checked_sub(1)), pixel(Some(x), Some(y + 1)));
         let z = difference(sample(slab - 1, at), sample(slab + 1, at)) / slabs.width;
-        let camera = input.camera;
         let depth = slabs.origin + (f64::from(slab) + 0.5) * slabs.width;
         let scale = camera.focal_px() / if camera.is_orthographic() { 1.0 } else { depth.max(slabs.width * 1e-3) };
-        let (gx, gy) = (right * scale, -down * scale);
+        // Along a slab that does not lie across the view depth changes, too.
+        let (gx, gy) = (right * scale + z * of.slant.offset(1.0, 0.0), -down * scale + z * of.slant.offset(0.0, 1.0));
         let gradient = camera.axes[0] * gx + camera.axes[1] * gy + camera.axes[2] * (z - along.x * gx - along.y * gy);
         -(gradient * slabs.width).normalize_or_zero().as_vec3()
     }

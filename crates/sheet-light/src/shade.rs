@@ -4,6 +4,7 @@ use crate::fold::Prepared;
 use crate::kept::Kept;
 use crate::light::{Lamp, Lit, Reflector, Spots, dot};
 use crate::picture::{Fragments, Picture};
+use crate::preclassified::Preclassified;
 use crate::rays::{Crossings, Slopes};
 use crate::sheets::{LEAST_WEIGHT, Sheets, difference};
 use crate::tile::{SIDE, TILE};
@@ -46,6 +47,8 @@ pub(crate) struct Reconstructed<'a> {
     pub(crate) prepared: &'a Prepared<'a>,
     pub(crate) crossings: &'a Crossings,
     pub(crate) sheets: &'a Sheets,
+    /// Classes, where voxels have them.
+    pub(crate) preclassified: Option<&'a Preclassified>,
     /// View depths between which each pixel of the tile without its rim may have light, counted from the first slab.
     pub(crate) limits: [&'a [f32]; 2],
     /// Depths between which the volume is shaded, counted from the first slab.
@@ -138,7 +141,10 @@ impl Shader<'_> {
         let far = Lanes::load(simd, &of.crossings.far[at..]).min(limits[1]).min(Lanes::splat(simd, faces[1]));
         let length = (far - near).max(Lanes::splat(simd, 0.0));
         let [value, weight] = of.sheets.load(simd, place.slab, place.y, place.x);
-        let [extinction, red, green, blue] = of.prepared.classifier.at(simd, value);
+        let [extinction, red, green, blue] = match of.preclassified {
+            None => of.prepared.classifier.at(simd, value),
+            Some(classes) => classes.load(simd, place.slab, place.y, place.x),
+        };
         let secant = self.secants(simd, place);
         let depth = (extinction * length * secant).where_less(Lanes::splat(simd, LEAST_WEIGHT), weight);
         Medium { near, far, depth, secant, color: [red, green, blue] }
@@ -194,7 +200,13 @@ impl Shader<'_> {
         let pixels = self.input.camera.focal_px() * slabs.width;
         if self.input.camera.is_orthographic() {
             let pixels = Lanes::splat(simd, pixels as f32);
-            return [right * pixels, Lanes::splat(simd, 0.0) - down * pixels, along];
+            let (right, up) = (right * pixels, Lanes::splat(simd, 0.0) - down * pixels);
+            if !self.slopes.slant.is_any() {
+                return [right, up, along];
+            }
+            // Along a slab depth changes, too.
+            let [sx, sy] = self.slopes.slant.single().map(|s| Lanes::splat(simd, s));
+            return [right + sx * along, up + sy * along, along];
         }
         let pixels = Lanes::splat(simd, (pixels / z.max(slabs.width * 1e-3)) as f32);
         let (gx, gy) = (right * pixels, Lanes::splat(simd, 0.0) - down * pixels);

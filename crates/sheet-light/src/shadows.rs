@@ -13,7 +13,7 @@ use splat_core::glam::DVec3;
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use splat_core::shade::LitBy;
-use splat_core::{Progress, Receiver, SplatKind, Transmittance};
+use splat_core::{Packing, Progress, Receiver, SplatKind, Transmittance};
 
 /// Rows of voxels that are looked up together.
 const ROWS: usize = 64;
@@ -25,6 +25,8 @@ pub(crate) struct Shadows {
     of_lights: Vec<Option<Vec<Share>>>,
     /// Needed voxels before each word of 64.
     ranks: Vec<u64>,
+    /// Of a body-centred lattice: whether the first plane, that of the rim, is a shifted one.
+    is_first_shifted: Option<bool>,
     /// From view positions, depths counted from the first slab, to lattice coordinates that count from the rim.
     lattice_from_view: [[f32; 4]; 3],
 }
@@ -69,12 +71,16 @@ impl Shadows {
         let mut rows = of.rays.rows();
         (0..3).for_each(|a| rows[a][3] += of.lattice.rim[a] as f64);
         let lattice_from_view = rows.map(|row| row.map(|v| v as f32));
-        Ok(Some(Self { of_lights, ranks: of.voxels.ranks(), lattice_from_view }))
+        let is_first_shifted = (of.volume.packing == Packing::BodyCentred).then_some(of.lattice.rim[2] % 2 == 1);
+        Ok(Some(Self { of_lights, ranks: of.voxels.ranks(), is_first_shifted, lattice_from_view }))
     }
 
     /// The needed voxels around view positions.
     #[inline(always)]
     pub(crate) fn cells<S: Simd>(&self, simd: S, voxels: &Voxels, at: &[Lanes<S>; 3], wanted: u32) -> Cells {
+        if let Some(is_first_shifted) = self.is_first_shifted {
+            return self.cells_between_shifted_planes(simd, voxels, at, (wanted, is_first_shifted));
+        }
         let of = |v: f32| Lanes::splat(simd, v);
         let (zero, one) = (of(0.0), of(1.0));
         let (mut first, mut parts) = ([[0.0; MAX_LANES]; 3], [[[0.0; MAX_LANES]; 2]; 4]);
@@ -106,20 +112,46 @@ impl Shadows {
         parts: &[[[f32; MAX_LANES]; 2]; 4],
         wanted: u32,
     ) -> Cells {
-        let mut cells = Cells { ranks: [[0; 4]; MAX_LANES], weights: [[[0.0; 2]; 4]; MAX_LANES], wanted };
+        let mut cells = Cells::none(wanted);
         for lane in lanes(wanted) {
             let [i, j, k] = [0, 1, 2].map(|a: usize| (first[a][lane].to_bits() - NATURAL.to_bits()) as usize);
             for row in 0..4 {
-                let (rank, known) = voxels.pair(&self.ranks, i, j + row % 2, k + row / 2);
-                let [here, next] = [parts[row][0][lane], parts[row][1][lane]];
-                cells.ranks[lane][row] = rank;
-                cells.weights[lane][row] = match known {
-                    3 => [here, next],
-                    // The next one has the rank of the one that is missing.
-                    2 => [next, 0.0],
-                    1 => [here, 0.0],
-                    _ => [0.0; 2],
-                };
+                let found = voxels.pair(&self.ranks, i, j + row % 2, k + row / 2);
+                cells.set(lane, row, found, [parts[row][0][lane], parts[row][1][lane]]);
+            }
+        }
+        cells
+    }
+
+    /// The needed voxels around places in a body-centred lattice: bilinear in the plane before and in the one behind, linear between
+    /// them, lane by lane.
+    #[inline(always)]
+    fn cells_between_shifted_planes<S: Simd>(
+        &self,
+        simd: S,
+        voxels: &Voxels,
+        at: &[Lanes<S>; 3],
+        (wanted, is_first_shifted): (u32, bool),
+    ) -> Cells {
+        let (mut places, dims) = ([[0.0; MAX_LANES]; 3], voxels.dims());
+        for (place, [x, y, z, start]) in places.iter_mut().zip(self.lattice_from_view) {
+            let of = |v: f32| Lanes::splat(simd, v);
+            at[0].mul_add(of(x), at[1].mul_add(of(y), at[2].mul_add(of(z), of(start)))).store(place);
+        }
+        let cell = |place: f32, n: usize| {
+            let low = (place.max(0.0) as usize).min(n - 2);
+            (low, (place - low as f32).clamp(0.0, 1.0))
+        };
+        let mut cells = Cells::none(wanted & ((1 << Lanes::<S>::COUNT) - 1));
+        for lane in lanes(cells.wanted) {
+            let (k, w) = cell(places[2][lane], dims[2]);
+            for (k, depth) in [(k, 1.0 - w), (k + 1, w)] {
+                let shift = if (k % 2 == 1) != is_first_shifted { 0.5 } else { 0.0 };
+                let ((i, u), (j, v)) = (cell(places[0][lane] - shift, dims[0]), cell(places[1][lane] - shift, dims[1]));
+                for (row, (j, height)) in [(j, 1.0 - v), (j + 1, v)].into_iter().enumerate() {
+                    let (found, share) = (voxels.pair(&self.ranks, i, j, k), depth * height);
+                    cells.set(lane, row + 2 * (k % 2), found, [share * (1.0 - u), share * u]);
+                }
             }
         }
         cells
@@ -145,6 +177,25 @@ impl Shadows {
             (through[1] * inverse).where_less_or(zero, whole, one),
             (through[2] * inverse).where_less_or(zero, whole, one),
         ]
+    }
+}
+
+impl Cells {
+    fn none(wanted: u32) -> Self {
+        Self { ranks: [[0; 4]; MAX_LANES], weights: [[[0.0; 2]; 4]; MAX_LANES], wanted }
+    }
+
+    /// Two neighbours of a row: the rank of the first, which of them are known, and their weights.
+    #[inline(always)]
+    fn set(&mut self, lane: usize, row: usize, (rank, known): (usize, u64), [here, next]: [f32; 2]) {
+        self.ranks[lane][row] = rank;
+        self.weights[lane][row] = match known {
+            3 => [here, next],
+            // The next one has the rank of the one that is missing.
+            2 => [next, 0.0],
+            1 => [here, 0.0],
+            _ => [0.0; 2],
+        };
     }
 }
 
@@ -182,9 +233,11 @@ fn look_up(
     let [nx, ny, nz] = of.voxels.dims();
     let (start, axes) = (of.volume.origin() - origin, of.volume.axes());
     let rim = of.lattice.rim.map(|n| n as f64);
+    let shifts = [0, 1].map(|k| of.volume.packing.shift(k + of.lattice.rim[2] % 2));
     let share = |i: usize, row: usize| {
-        let index = DVec3::new(i as f64, (row % ny) as f64, (row / ny) as f64) - DVec3::from_array(rim);
-        let position = (start + axes * index).as_vec3();
+        let shift = shifts[row / ny % 2];
+        let index = DVec3::new(i as f64 + shift, (row % ny) as f64 + shift, (row / ny) as f64);
+        let position = (start + axes * (index - DVec3::from_array(rim))).as_vec3();
         let receiver =
             Receiver { position, normal: Default::default(), radius: of.viewed.reach as f32, kind: SplatKind::Medium };
         let [red, green, blue] =

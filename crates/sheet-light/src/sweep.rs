@@ -43,8 +43,14 @@ impl VolumeScratch {
             let fragments = self.ring.splat(simd, &splatter, record, &wanted);
             counts.fragments += fragments;
             counts.hidden += u64::from(fragments == 0);
+            if let Some(preclassified) = &mut self.preclassified {
+                counts.fragments += preclassified.splat(simd, (&splatter, &of.classifier), record, &wanted);
+            }
         }
         self.ring.take_batch(simd, batch, &mut self.sheets);
+        if let Some(preclassified) = &mut self.preclassified {
+            preclassified.take_batch(simd, batch);
+        }
     }
 }
 
@@ -147,15 +153,20 @@ impl FoldTile<'_> {
                 fragments.any = false;
                 for (prepared, scratch) in of.volumes.iter().zip(volumes.iter_mut()) {
                     let Some(slab) = scratch.own(prepared, step.start) else { continue };
-                    let VolumeScratch { sheets, crossings, kept, .. } = scratch;
+                    let VolumeScratch { sheets, crossings, kept, preclassified, .. } = scratch;
                     let is_part = step.len() < prepared.stride as usize;
                     let limits = [&near[..], &far[..]];
                     let open = (picture.open[y] >> x) as u32;
-                    let reconstructed = Reconstructed { prepared, crossings, sheets, limits, faces, is_part, open };
+                    let preclassified = preclassified.as_deref();
+                    let reconstructed =
+                        Reconstructed { prepared, crossings, sheets, preclassified, limits, faces, is_part, open };
                     shader.add(simd, &reconstructed, Place { slab, y, x }, picture, (kept, fragments));
                 }
                 splats.sums.add(simd, [x - 1, y - 1], of.slabs.origin, fragments);
                 if fragments.any {
+                    if of.slant.is_any() {
+                        shader.slopes.unshear([x, y], [&mut fragments.near, &mut fragments.far]);
+                    }
                     picture.composite(simd, y - 1, x - 1, fragments, of.slabs.origin);
                 }
             }

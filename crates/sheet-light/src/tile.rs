@@ -3,7 +3,9 @@
 use crate::counts::SheetCounts;
 use crate::fold::{Prepared, Sheeted};
 use crate::kept::Kept;
+use crate::params::Classify;
 use crate::picture::{Fragments, Picture};
+use crate::preclassified::Preclassified;
 use crate::queue::Queue;
 use crate::rays::{Crossings, Slopes};
 use crate::ring::Ring;
@@ -41,6 +43,8 @@ pub(crate) struct VolumeScratch {
     pub(crate) crossings: Crossings,
     pub(crate) queue: Queue,
     pub(crate) kept: Kept,
+    /// Where voxels are classified before they are splatted.
+    pub(crate) preclassified: Option<Box<Preclassified>>,
     /// Batches of its own slabs that are not finished yet.
     pub(crate) batches: Range<u32>,
 }
@@ -53,6 +57,7 @@ impl Scratch {
             crossings: Crossings::new(),
             queue: Queue::new(v),
             kept: Kept::new(v.stride),
+            preclassified: (v.classify == Classify::Before).then(|| Box::new(Preclassified::new(v.sections.touched))),
             batches: 0..0,
         };
         Self {
@@ -110,7 +115,10 @@ impl pulp::WithSimd for FoldTile<'_> {
             counts.tiles_skipped = 1;
             return (None, counts);
         }
-        let slopes = Slopes::new(of.input.camera, corner, of.slabs.origin);
+        let slopes = Slopes::new(of.input.camera, corner, of.slabs.origin, of.slant);
+        if of.slant.is_any() {
+            slopes.shear([&mut self.scratch.near, &mut self.scratch.far]);
+        }
         for (prepared, scratch) in of.volumes.iter().zip(&mut self.scratch.volumes) {
             scratch.begin(prepared, &slopes);
         }
@@ -122,10 +130,11 @@ impl pulp::WithSimd for FoldTile<'_> {
 impl VolumeScratch {
     /// Forgets the tile before.
     fn begin(&mut self, of: &Prepared<'_>, slopes: &Slopes) {
-        self.crossings.of_tile(&of.rays, slopes);
+        self.crossings.of_tile(&of.rays, slopes, &of.slabs);
         self.ring.clear();
         self.sheets.clear();
         self.kept.clear();
+        self.preclassified.iter_mut().for_each(|p| p.clear());
         // Nothing begins before.
         self.batches.start = self.batches.start.max(self.queue.active.start / BATCH);
     }
@@ -143,6 +152,10 @@ impl<'a> FoldTile<'a> {
     /// The slabs of the range of depths.
     fn span(&self) -> Range<u32> {
         let slabs = &self.of.slabs;
+        if self.of.slant.is_any() {
+            // Any depth of the view is in any of them.
+            return 1..slabs.count - 1;
+        }
         slabs.at(self.range.start).max(1)..(slabs.at(self.range.end) + 1).min(slabs.count - 1)
     }
 
@@ -170,7 +183,7 @@ impl<'a> FoldTile<'a> {
                 *far = far.min((depth - slabs.origin) as f32);
             }
         }
-        slabs.at(farthest) + 1
+        if self.of.slant.is_any() { slabs.count } else { slabs.at(farthest) + 1 }
     }
 }
 

@@ -5,13 +5,17 @@
 //! lattice of equal steps at right angles that is the paper's kernel. On others it contains the ellipsoid: what a kernel's
 //! middle shifts from slab to slab there is not followed.
 //!
+//! On a body-centred lattice A are the steps of the Cartesian one that holds the same spectrum: a kernel is round and as wide as there.
+//!
 //! In perspective the kernel is sheared along the ray through its voxel, so that one footprint serves all slabs.
 
+use crate::aligned::{Slant, plane_step};
+use crate::params::Aligned;
 use crate::sections::PHASES;
 use crate::slabs::Slabs;
 use crate::{Params, Volume};
-use splat_core::Camera;
 use splat_core::glam::{DMat3, DVec3, Vec3};
+use splat_core::{Camera, Packing};
 
 /// Least standard deviation of a footprint in its narrow direction, pixels: none falls between pixels.
 const LEAST_SIGMA_PX: f64 = 0.5;
@@ -51,6 +55,10 @@ pub(crate) struct Viewed {
     pub(crate) start: DVec3,
     /// Steps in view space.
     pub(crate) axes: DMat3,
+    /// How far the planes of the second lattice of a body-centred one are shifted.
+    shift: Option<DVec3>,
+    /// Whether the first plane, that of the rim, is one of these.
+    is_first_shifted: bool,
     /// e·√M_zz: how far a kernel reaches along the view, world units.
     pub(crate) reach: f64,
     /// M across the view: xx, xy, yy, world units².
@@ -74,6 +82,11 @@ pub(crate) fn view_axes(volume: &Volume<'_>, camera: &Camera) -> DMat3 {
     DMat3::from_cols(camera.axes[0], camera.axes[1], camera.axes[2]).transpose() * volume.axes()
 }
 
+/// Steps that kernels and slabs are measured by, in view space: those of the Cartesian lattice of the same spectrum.
+pub(crate) fn view_steps(volume: &Volume<'_>, camera: &Camera) -> DMat3 {
+    volume.packing.equivalent_steps(view_axes(volume, camera))
+}
+
 /// Length of the row of view depths: the spacing of the lattice along the view.
 pub(crate) fn spacing_along(axes: &DMat3) -> f64 {
     axes.row(2).length()
@@ -81,9 +94,9 @@ pub(crate) fn spacing_along(axes: &DMat3) -> f64 {
 
 /// View positions of the corners of a volume.
 pub(crate) fn corners(volume: &Volume<'_>, camera: &Camera) -> [DVec3; 8] {
-    let (dims, origin, axes) = (volume.grid.dims, volume.origin(), volume.axes());
+    let (dims, origin, axes, low) = (volume.grid.dims, volume.origin(), volume.axes(), volume.packing.lowest());
     std::array::from_fn(|c| {
-        let at = [0, 1, 2].map(|a| if c >> a & 1 == 1 { dims[a] as f64 - 0.5 } else { -0.5 });
+        let at = [0, 1, 2].map(|a| if c >> a & 1 == 1 { low[a] + dims[a] as f64 } else { low[a] });
         camera.view_from_world(origin + axes * DVec3::from_array(at))
     })
 }
@@ -97,24 +110,40 @@ fn of_extent([xx, xy, yy]: [f64; 3]) -> PixelFootprint {
 }
 
 impl Viewed {
-    pub(crate) fn new(volume: &Volume<'_>, camera: &Camera, slabs: &Slabs, params: &Params) -> Self {
-        let axes = view_axes(volume, camera);
+    pub(crate) fn new(volume: &Volume<'_>, camera: &Camera, slabs: &Slabs, params: &Params, slant: Slant) -> Self {
+        let upright = view_axes(volume, camera);
+        let axes = if slant.is_any() {
+            DMat3::from_cols(
+                slant.sheared(upright.x_axis),
+                slant.sheared(upright.y_axis),
+                slant.sheared(upright.z_axis),
+            )
+        } else {
+            upright
+        };
         let e2 = params.kernel.extent * params.kernel.extent;
-        let m = axes * axes.transpose() * e2;
+        let steps = volume.packing.equivalent_steps(axes);
+        let m = steps * steps.transpose() * e2;
         let least_radius = LEAST_SIGMA_PX * params.kernel.extent / params.kernel.sigma;
         let (xx, xy, yy) = (m.x_axis.x, m.x_axis.y, m.y_axis.y);
         // Equal steps at right angles leave a rounding of a slant, and what is upright is drawn faster.
-        let slant = if xy.abs() > UPRIGHT * libm::sqrt(xx * yy) { xy } else { 0.0 };
+        let tilt = if xy.abs() > UPRIGHT * libm::sqrt(xx * yy) { xy } else { 0.0 };
         // Rows of pixels run down.
-        let extent = [xx, -slant, yy];
+        let extent = [xx, -tilt, yy];
         let half = 0.5 * (extent[0] - extent[2]);
         let smallest = 0.5 * (extent[0] + extent[2]) - libm::sqrt(half * half + extent[1] * extent[1]);
-        let mut start = camera.view_from_world(volume.origin());
+        let mut start = slant.sheared(camera.view_from_world(volume.origin()));
         start.z -= slabs.origin;
         Self {
             start,
             axes,
-            reach: libm::sqrt(m.z_axis.z),
+            shift: (volume.packing == Packing::BodyCentred).then(|| (axes.x_axis + axes.y_axis) * 0.5),
+            is_first_shifted: false,
+            reach: match params.aligned {
+                Aligned::View => libm::sqrt(m.z_axis.z),
+                // All of it in the slab of its plane.
+                Aligned::Axis => 0.5 * plane_step(volume, camera),
+            },
             extent,
             smallest,
             unit: of_extent(extent),
@@ -129,12 +158,16 @@ impl Viewed {
     /// Counts lattice points from the corner of a rim around the lattice.
     pub(crate) fn with_rim(self, rim: [usize; 3]) -> Self {
         let steps = DVec3::from_array(rim.map(|n| n as f64));
-        Self { start: self.start - self.axes * steps, ..self }
+        Self { start: self.start - self.axes * steps, is_first_shifted: rim[2] % 2 == 1, ..self }
     }
 
     /// View position of lattice point (i, j, k), depth counted from the first slab.
     pub(crate) fn position(&self, i: usize, j: usize, k: usize) -> DVec3 {
-        self.start + self.axes * DVec3::new(i as f64, j as f64, k as f64)
+        let at = self.start + self.axes * DVec3::new(i as f64, j as f64, k as f64);
+        match self.shift {
+            Some(shift) if (k % 2 == 1) != self.is_first_shifted => at + shift,
+            _ => at,
+        }
     }
 
     /// Where the kernel of a voxel at this depth begins, in 256ths of a slab: the slab is the quotient by 256, the phase the
@@ -225,8 +258,9 @@ impl Viewed {
             let slant = |[x, y]: [f64; 2]| row.dot(camera.view_ray(x, y).1).abs();
             let slanted = corners.into_iter().map(slant).fold(0.0, f64::max);
             let steps = across + (row.x.abs() + row.y.abs()) * pixel + slanted * along;
-            // From any place of a cell.
-            (steps + 0.5).min(1e6) as usize
+            // From any place of a cell; half a step more between planes that are shifted and such that are not.
+            let shift = if self.shift.is_some() && a < 2 { 0.5 } else { 0.0 };
+            (steps + 0.5 + shift).min(1e6) as usize
         })
     }
 }

@@ -169,7 +169,7 @@ pub(crate) fn without_extinction(transfer: &TransferFunction) -> Vec<[f32; 2]> {
 mod tests {
     use super::*;
     use splat_core::glam::{DMat3, DVec3};
-    use splat_core::{Grid, TransferPoint, rng};
+    use splat_core::{Grid, Packing, TransferPoint, rng};
 
     fn transfer(points: &[(f32, f32)]) -> TransferFunction {
         let point = |&(value, extinction): &(f32, f32)| TransferPoint { value, color: [1.0; 3], extinction };
@@ -208,7 +208,8 @@ mod tests {
             let within = |[low, high]: [f32; 2]| around(c).all(|v| (low..=high).contains(&value(v)));
             without_extinction(&tf).into_iter().any(within)
         };
-        let found = Voxels::needed(&Lattice { grid: &grid, rim: [0; 3], dims }, &tf, reach);
+        let found =
+            Voxels::needed(&Lattice { grid: &grid, packing: Packing::Cartesian, rim: [0; 3], dims }, &tf, reach);
         let mut count = 0;
         for (k, j, i) in (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i)))) {
             let expected = around([i, j, k]).any(|c| !hidden(c));

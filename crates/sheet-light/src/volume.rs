@@ -5,7 +5,7 @@ use crate::visible::without_extinction;
 use crate::{Error, Splats};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::shade::LitBy;
-use splat_core::{Camera, Grid, Material, Similarity, TransferFunction};
+use splat_core::{Camera, Grid, Material, Packing, Similarity, TransferFunction};
 
 /// Most lattice points along one axis: a voxel's place in its row is kept in 16 bits, with a rim around the lattice.
 const MOST_A_SIDE: usize = (1 << 16) - 8;
@@ -16,6 +16,9 @@ pub struct Volume<'a> {
     /// Values on a lattice. Every lattice point is the centre of its cell, so the volume is the parallelepiped from −1/2 to n − 1/2
     /// in lattice coordinates.
     pub grid: &'a Grid,
+    /// How the planes of `grid` lie: [`Packing::BodyCentred`] for those of a [`splat_core::BccGrid`], which fill the parallelepiped
+    /// from −1/4 to n − 1/4 along i and j. Half-vector sheets take Cartesian ones alone.
+    pub packing: Packing,
     /// From the grid's space to the world.
     pub transform: Similarity,
     /// Value → colour and extinction σ_t; applied to what the sheets reconstruct.
@@ -89,12 +92,31 @@ impl Volume<'_> {
 }
 
 impl SheetInput<'_> {
+    /// What [`SheetInput::check_any_lattice`] does, and that all lattices are Cartesian.
     pub(crate) fn check(&self) -> Result<(), Error> {
+        self.check_any_lattice()?;
+        let other = self.volumes.iter().position(|v| v.packing != Packing::Cartesian);
+        other.map_or(Ok(()), |volume| {
+            let expected = "a Cartesian lattice: half-vector sheets take no body-centred one";
+            let found = self.volumes[volume].packing;
+            Err(Error::Volume {
+                volume,
+                source: splat_core::Error::invalid("volume", volume, "packing", found, expected),
+            })
+        })
+    }
+
+    pub(crate) fn check_any_lattice(&self) -> Result<(), Error> {
         if let Some(width) = self.splats.as_ref().map(|s| s.slab_width).filter(|w| !(w.is_finite() && *w > 0.0)) {
             return Err(Error::parameter("splats.slab_width", width, "a finite number > 0, world units"));
         }
         for (volume, v) in self.volumes.iter().enumerate() {
             v.grid.validate().map_err(|source| Error::Volume { volume, source })?;
+            if v.packing == Packing::BodyCentred && !v.grid.dims[2].is_multiple_of(2) {
+                let expected = "an even number of planes of a body-centred lattice";
+                let source = splat_core::Error::invalid("grid", 0, "dims", v.grid.dims, expected);
+                return Err(Error::Volume { volume, source });
+            }
             if v.grid.dims.iter().any(|n| *n > MOST_A_SIDE) {
                 let source = splat_core::Error::invalid("grid", 0, "dims", v.grid.dims, "at most 65528 a side");
                 return Err(Error::Volume { volume, source });

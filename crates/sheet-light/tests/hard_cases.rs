@@ -1,12 +1,62 @@
 //! Input that breaks naive sheets.
 
 use crate::common::{
-    BEAUTY, apart, constant, cubic, draw, exact, grid, input, noise, parallel, perspective, transfer, unlit, volume,
+    BEAUTY, apart, bcc_volume, body_centred, constant, cubic, draw, exact, grid, input, noise, parallel, perspective,
+    transfer, unlit, volume,
 };
 use sheet_light::{Error, KernelShape, Params, prepare};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::shade::ChannelLayout;
 use splat_core::{Accumulator, Exceeded, LayerSet, Limits, Material, Progress, TransferFunction, TransferPoint};
+
+#[test]
+fn ia02_a_flat_field_is_flat() {
+    // Sums of kernels ripple by some percent, and colour and extinction follow the value: what is left of it shows.
+    let (tf, material) = (transfer(&[(0.0, 0.0), (1.0, 0.5), (2.0, 0.1)]), unlit());
+    let camera = parallel([1.0, 2.0, 12.0], 2.0, [64, 64]);
+    let (cartesian, bcc) = (grid([16; 3], cubic(0.5), |_| 0.6), body_centred([11, 11, 22], 8.0, |_| 0.6));
+    for volume in [volume(&cartesian, &tf, &material), bcc_volume(&bcc, &tf, &material)] {
+        for sigma in [0.5, 0.7, 1.0] {
+            let params = Params { kernel: KernelShape { extent: 2.0, sigma }, ..exact() };
+            let (out, _) = draw(&input(&[volume], &camera, &[]), &params).unwrap();
+            for plane in out.channels.iter().chain(&out.optical_depth) {
+                let (least, most) = plane.iter().fold((f32::INFINITY, 0.0f32), |(l, m), v| (l.min(*v), m.max(*v)));
+                assert!(most > 0.1 && most - least < 3e-6 * most, "{:?}, {sigma}: {least} to {most}", volume.packing);
+            }
+        }
+    }
+}
+
+#[test]
+fn ia11_five_thousand_slabs_front_to_back_are_those_back_to_front() {
+    let (tf, material) = (transfer(&[(0.1, 0.0), (0.5, 0.0008), (0.9, 0.002)]), unlit());
+    let grid = grid([4, 4, 1250], cubic(1.0), noise);
+    let (camera, count) = (parallel([0.0, 0.0, 700.0], 2.0, [6, 6]), 5000u16);
+    let volumes = [volume(&grid, &tf, &material)];
+    let sheeted = prepare(input(&volumes, &camera, &[]), &Params { slab_width: Some(0.25), ..exact() }, None).unwrap();
+    let fold = |range: std::ops::Range<f32>| {
+        let mut out = Accumulator::new([6, 6], 1, 3, false, false);
+        sheeted.fold(range, &[], &BEAUTY, &mut out, None).unwrap();
+        out
+    };
+    let front_to_back = fold(f32::NEG_INFINITY..f32::INFINITY);
+    let mut back_to_front = vec![[0.0f64; 3]; 36];
+    for slab in (0..count).rev() {
+        let near = 75.0 + 0.25 * f32::from(slab);
+        let layer = fold(near..near + 0.25);
+        for (at, color) in back_to_front.iter_mut().enumerate() {
+            let through = f64::exp(-f64::from(layer.optical_depth[0][at]));
+            (0..3).for_each(|c| color[c] = f64::from(layer.channels[c][at]) + through * color[c]);
+        }
+    }
+    let limit = 2.0 * f64::from(count) * f64::from(f32::EPSILON);
+    for (at, expected) in back_to_front.iter().enumerate() {
+        for c in 0..3 {
+            let off = (f64::from(front_to_back.channels[c][at]) - expected[c]).abs();
+            assert!(off < limit.min(1e-5) && expected[c] > 0.1, "{at}: {off:e} of {}", expected[c]);
+        }
+    }
+}
 
 #[test]
 fn ia06_pixels_that_are_done_err_by_no_more_than_what_they_hide() {

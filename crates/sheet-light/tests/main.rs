@@ -1,11 +1,13 @@
 //! Sheets against closed forms, invariances, their slow twin, and hard cases. One program: it is linked once.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod body_centred;
 mod closed_forms;
 mod common;
 mod half;
 mod hard_cases;
 mod invariances;
+mod modes;
 mod splats;
 mod strides;
 mod twin;

@@ -7,7 +7,7 @@ use splat_core::shade::LitBy;
 use splat_core::{Light, LightShape, Material, Receiver, Transmittance};
 
 /// Greatest differences from the twin: optical depth, colour.
-fn differences(input: &SheetInput<'_>, params: &Params) -> [f64; 2] {
+pub(crate) fn differences(input: &SheetInput<'_>, params: &Params) -> [f64; 2] {
     let (found, counts) = draw(input, params).unwrap();
     let twin = reference::draw(input, params).unwrap();
     let mut worst = [0.0f64; 2];
@@ -79,7 +79,7 @@ fn lit_sheets_are_those_of_the_twin() {
 }
 
 /// Light that falls off along a line, red more than blue.
-struct Slope;
+pub(crate) struct Slope;
 
 impl Transmittance for Slope {
     fn transmittance(&self, receiver: &Receiver) -> [f32; 3] {

@@ -1,7 +1,8 @@
-//! Regular volumes.
+//! Regular volumes, on Cartesian and on body-centred cubic lattices.
 
 use crate::Error;
 use glam::{DMat3, DVec3};
+use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
 /// A volume of scalars on a regular lattice, x fastest.
 ///
@@ -52,5 +53,116 @@ impl Grid {
             return Err(Error::invalid("voxel", i, "value", self.values[i], "a finite number"));
         }
         Ok(())
+    }
+}
+
+/// How the planes of a lattice lie, k = 0, 1, 2 …
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Packing {
+    /// Each like the one before it.
+    #[default]
+    Cartesian,
+    /// Every second one, k = 1, 3, 5 …, half a step further along i and along j: with steps of a, a and a/2 at right angles the
+    /// body-centred cubic lattice of cell edge a.
+    BodyCentred,
+}
+
+impl Packing {
+    /// How far plane k lies along i and along j, steps.
+    pub const fn shift(self, k: usize) -> f64 {
+        match self {
+            Self::BodyCentred if k % 2 == 1 => 0.5,
+            _ => 0.0,
+        }
+    }
+
+    /// The lowest corner of what a lattice fills, lattice coordinates; the highest one lies as many steps further as there are points.
+    /// Every point has the same share of it.
+    pub const fn lowest(self) -> DVec3 {
+        match self {
+            Self::Cartesian => DVec3::splat(-0.5),
+            Self::BodyCentred => DVec3::new(-0.25, -0.25, -0.5),
+        }
+    }
+
+    /// Steps of the Cartesian lattice that holds the same spectrum as one with steps `axes`, columns: the nearest copies of the
+    /// spectrum are as far away. A body-centred cubic lattice of cell edge a does what a Cartesian one of spacing a/√2 does
+    /// with 1/√2 of the points (Theußl, Möller, Gröller 2001, "Optimal regular volume sampling").
+    pub fn equivalent_steps(self, axes: DMat3) -> DMat3 {
+        match self {
+            Self::Cartesian => axes,
+            Self::BodyCentred => axes * DMat3::from_diagonal(DVec3::new(FRAC_1_SQRT_2, FRAC_1_SQRT_2, SQRT_2)),
+        }
+    }
+}
+
+/// A volume of scalars on a body-centred lattice: two Cartesian ones, each with its points in the middles of the other's cells.
+///
+/// It is stored as planes, those of one lattice and of the other in turns. Nothing but what asks for [`Packing::BodyCentred`] may read
+/// the planes as a [`Grid`], hence a type of its own.
+///
+/// ```
+/// use splat_core::{BccGrid, Grid, glam::{DMat3, DVec3}};
+/// // Cells of edge 2: planes a distance of 1 apart.
+/// let axes = DMat3::from_diagonal(DVec3::new(2.0, 2.0, 1.0));
+/// let bcc = BccGrid { planes: Grid { origin: DVec3::ZERO, axes, dims: [4, 4, 8], values: vec![0.0; 128] } };
+/// bcc.validate().unwrap();
+/// assert_eq!(bcc.position(1, 0, 2), DVec3::new(2.0, 0.0, 2.0));
+/// // The middle of a cell.
+/// assert_eq!(bcc.position(1, 0, 3), DVec3::new(3.0, 1.0, 3.0));
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct BccGrid {
+    /// Values plane by plane, as [`Packing::BodyCentred`] has them.
+    pub planes: Grid,
+}
+
+impl BccGrid {
+    /// World position of lattice point (i, j, k).
+    pub fn position(&self, i: usize, j: usize, k: usize) -> DVec3 {
+        let shift = Packing::BodyCentred.shift(k);
+        self.planes.origin + self.planes.axes * DVec3::new(i as f64 + shift, j as f64 + shift, k as f64)
+    }
+
+    /// Checks what [`Grid::validate`] does, and that there are as many planes of each lattice.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] or [`Error::ColumnLength`] for the first that does not hold.
+    pub fn validate(&self) -> Result<(), Error> {
+        if !self.planes.dims[2].is_multiple_of(2) {
+            let expected = "an even number of planes, as many of each lattice";
+            return Err(Error::invalid("body-centred grid", 0, "dims", self.planes.dims, expected));
+        }
+        self.planes.validate()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_body_centred_lattice_has_eight_neighbours_in_its_corners_and_six_behind_them() {
+        let edge = 2.0;
+        let axes = DMat3::from_diagonal(DVec3::new(edge, edge, 0.5 * edge));
+        let planes = Grid { origin: DVec3::ONE, axes, dims: [5, 5, 10], values: vec![0.0; 250] };
+        let bcc = BccGrid { planes };
+        for k in [4, 5] {
+            let here = bcc.position(2, 2, k);
+            let all = (0..250).map(|n| bcc.position(n % 5, n / 5 % 5, n / 25).distance(here)).filter(|d| *d > 0.0);
+            let near: Vec<f64> = all.filter(|d| *d < 1.01 * edge).collect();
+            let corners = near.iter().filter(|d| (*d - 0.75f64.sqrt() * edge).abs() < 1e-12).count();
+            let faces = near.iter().filter(|d| (*d - edge).abs() < 1e-12).count();
+            assert_eq!((corners, faces, near.len()), (8, 6, 14), "plane {k}");
+        }
+        // 1/√2 of the points of the Cartesian lattice of the same spectrum, which is cubic.
+        let steps = Packing::BodyCentred.equivalent_steps(axes);
+        assert!((axes.determinant() / steps.determinant() - SQRT_2).abs() < 1e-12, "{steps}");
+        assert!(
+            (steps - DMat3::from_diagonal(DVec3::splat(edge / SQRT_2))).to_cols_array().iter().all(|d| d.abs() < 1e-12)
+        );
+        assert!(bcc.validate().is_ok());
+        let odd = Grid { dims: [5, 10, 5], ..bcc.planes };
+        assert!(matches!(BccGrid { planes: odd }.validate(), Err(Error::Invalid { .. })));
     }
 }

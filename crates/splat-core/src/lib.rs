@@ -73,7 +73,7 @@ pub use error::Error;
 pub use field::ScalarField;
 pub use footprint::{Footprint, FootprintStack};
 pub use glam;
-pub use grid::Grid;
+pub use grid::{BccGrid, Grid, Packing};
 pub use layers::{ADDITIVE_LAYERS, Accumulator, LayerData, LayerSet, Layers, SHADED_EFFECTS};
 pub use light::{Light, LightShape};
 pub use limits::{Exceeded, Limits};

@@ -210,6 +210,9 @@ fn objects() -> Vec<Entry> {
         of(All, "object.color", "object.it.color=[0.1, 0.9, 0.3]").but(These(&["volume", "slice"]), OF_THE_TRANSFER),
         of(All, "object.spacing", "object.it.spacing=0.16")
             .but(These(&["density", "cloud", "rectangle", "medium_box", "medium_ball"]), OWN_SPACING),
+        of(VOLUME, "object.lattice", "object.it.lattice='bcc'")
+            .but_by(&["points", "particles"], Refused(2, "draws no body-centred lattice")),
+        one("object.lattice", "object.it.lattice='bcc'").but(All, Refused(2, "`lattice` belongs to a `volume`")),
         of(All, "object.shadow_coefficient", "object.it.shadow_coefficient=0.2"),
         one("object.technique", "object.it.technique='reference'"),
         of(All, "object.casts_shadow", "object.it.casts_shadow=false"),
@@ -398,6 +401,8 @@ fn render() -> Vec<Entry> {
             .with(&["render.particles.surface_sampler='brownian'"]),
         of(BALL, "render.sheets", "render.sheets={slab_width=0.4}").by(SHEETS),
         of(BALL, "render.sheets.slicing", "render.sheets.slicing='half_vector'").by(SHEETS),
+        of(VOLUME, "render.sheets.classify", "render.sheets.classify='before'").by(SHEETS),
+        of(VOLUME, "render.sheets.aligned", "render.sheets.aligned='axis'").by(SHEETS).with(&["camera.orthographic=2"]),
         of(BALL, "render.sheets.light_pixels", "render.sheets.light_pixels=0.4").by(SHEETS).with(HALF_VECTOR),
         of(BALL, "render.sheets.most_light_pixels", "render.sheets.most_light_pixels=16").by(SHEETS).with(HALF_VECTOR),
         of(BALL, "render.sheets.scattering", "render.sheets.scattering='forward_and_back'")

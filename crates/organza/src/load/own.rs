@@ -11,13 +11,13 @@ use super::object::{Prepared, as_it_is, medium_grid, procedural};
 use crate::Error;
 use crate::form::{Form, PlannedObject};
 use crate::scene::{RectangleSource, SurfaceSampler, Technique};
-use convert::{DensityParams, SharedField};
+use convert::{DensityParams, SharedField, VolumeParams};
 use glam::DVec3;
 use pbsr::BoundedExtinction;
 use rayon::prelude::*;
 pub(super) use search::Search;
 use search::cell_bounds;
-use splat_core::{DAabb, Footprint, Grid, Mesh, Similarity, SplatKind, TransferFunction, optics};
+use splat_core::{BccGrid, DAabb, Footprint, Grid, Mesh, Packing, Similarity, SplatKind, TransferFunction, optics};
 use std::sync::Arc;
 
 /// Cells along an object in which lines look for roots.
@@ -76,6 +76,8 @@ pub(crate) enum Body {
         transfer: TransferFunction,
         /// Whether particles get normals.
         normals: bool,
+        /// The same values on the body-centred lattice of the same spectrum, where the scene asks for that.
+        body_centred: Option<BccGrid>,
     },
     /// A field of extinction.
     Field(BoundedExtinction),
@@ -144,7 +146,10 @@ impl Own {
     pub(crate) fn bytes(&self) -> u64 {
         match &self.body {
             Body::Triangles(mesh) => mesh_bytes(mesh),
-            Body::Cells { grid, .. } | Body::Lattice { grid, .. } => grid_bytes(grid),
+            Body::Cells { grid, body_centred, .. } => {
+                grid_bytes(grid) + body_centred.as_ref().map_or(0, |bcc| grid_bytes(&bcc.planes))
+            }
+            Body::Lattice { grid, .. } => grid_bytes(grid),
             Body::Field(field) => field.bytes(),
             Body::Surface { .. } => 0,
         }
@@ -224,7 +229,7 @@ fn data(
     }
     let cells = |grid: Arc<Grid>, transfer: TransferFunction, normals: bool| {
         let (bounds, spacing) = (cell_bounds(&grid, &transfer), shortest_step(&grid));
-        Some((Body::Cells { grid, transfer, normals }, bounds, spacing))
+        Some((Body::Cells { grid, transfer, normals, body_centred: None }, bounds, spacing))
     };
     Ok(match &prepared.input {
         Input::Points(..) => None,
@@ -249,7 +254,7 @@ fn data(
             };
             Some((Body::Surface { field: field.clone(), inside, spacing, step }, bounds, spacing))
         }
-        Input::Volume(grid, transfer, params) => cells(grid.clone(), (*transfer).clone(), params.normals),
+        Input::Volume(grid, transfer, params) => Some(volume(grid, transfer, params, context)?),
         Input::Procedural(shape, spacing, params) => {
             let (grid, transfer) =
                 procedural(shape, *spacing, &params.splat, context).map_err(|e| Error::from_convert(&e))?;
@@ -264,6 +269,21 @@ fn data(
             cells(grid.into(), transfer, false)
         }
     })
+}
+
+/// A volume, and on a body-centred lattice where the scene asks for one.
+fn volume(
+    grid: &Arc<Grid>,
+    transfer: &TransferFunction,
+    params: &VolumeParams,
+    context: &Context<'_>,
+) -> Result<Data, Error> {
+    let is_packed = context.scene.objects[context.id].packing == Packing::BodyCentred;
+    let packed = is_packed.then(|| convert::body_centred(grid, &params.splat)).transpose();
+    let body_centred = packed.map_err(|e| Error::from_convert(&e))?;
+    let (bounds, spacing) = (cell_bounds(grid, transfer), shortest_step(grid));
+    let body = Body::Cells { grid: grid.clone(), transfer: transfer.clone(), normals: params.normals, body_centred };
+    Ok((body, bounds, spacing))
 }
 
 fn world_spacing(density: &convert::Density) -> f64 {

@@ -13,13 +13,13 @@ use crate::lights::LightPoint;
 use crate::load::own::Body;
 use crate::matter::Matter;
 use crate::pass;
-use crate::scene::{Scene, Technique};
+use crate::scene::{self, Scene, Technique};
 use crate::statistics::{ObjectData, ObjectStatistics};
 use crate::technique::{Fold, Session};
 use crate::work::{self, Translucent, cost};
 use crate::{CostRecord, Error, RenderOptions, stage};
-use sheet_light::{KernelShape, Params, SheetInput, Sheeted, Splats, Volume, prepare};
-use splat_core::{Accumulator, Direction, Limits, SliceOrder};
+use sheet_light::{Aligned, Classify, KernelShape, Params, SheetInput, Sheeted, Splats, Volume, prepare};
+use splat_core::{Accumulator, Direction, Limits, Packing, SliceOrder};
 use std::ops::Range;
 
 /// Seconds of a sample of a picture of sheets, whatever is in them.
@@ -151,6 +151,14 @@ fn params(scene: &Scene, exponent: i32, options: &RenderOptions) -> Params {
     let unit = libm::exp2(f64::from(-exponent));
     Params {
         slab_width: settings.slab_width.map(|width| width * unit),
+        classify: match settings.classify {
+            scene::Classify::After => Classify::After,
+            scene::Classify::Before => Classify::Before,
+        },
+        aligned: match settings.aligned {
+            scene::Aligned::View => Aligned::View,
+            scene::Aligned::Axis => Aligned::Axis,
+        },
         kernel: KernelShape { extent: settings.kernel_extent, sigma: settings.kernel_sigma },
         transmittance_cutoff: settings.transmittance_cutoff as f32,
         limits: Limits::bytes(options.max_memory),
@@ -164,9 +172,14 @@ fn volumes<'a>(matter: &Matter<'a>) -> impl Iterator<Item = Volume<'a>> + use<'a
         let object = &scene.objects[own.object];
         let material = &scene.materials[own.material].material;
         let factor = f64::from(material.extinction_rgb.into_iter().fold(0.0, f32::max));
-        let Body::Cells { grid, transfer, normals } = &own.body else { return None };
+        let Body::Cells { grid, transfer, normals, body_centred } = &own.body else { return None };
+        let (grid, packing) = match body_centred {
+            Some(bcc) => (&bcc.planes, Packing::BodyCentred),
+            None => (&**grid, Packing::Cartesian),
+        };
         (own.technique == Technique::Sheets && factor > 0.0).then(|| Volume {
             grid,
+            packing,
             transform: own.transform,
             transfer,
             // The scale holds the material's factor, and leads to units of the object.
@@ -227,6 +240,10 @@ fn refuse<'a>(frame: &'a Frame<'a>, error: sheet_light::Error) -> Error {
             let volume = volumes(&frame.matter()).nth(volume);
             let name = volume.map(|v| crate::shown(&frame.loaded.objects[v.object as usize].name)).unwrap_or_default();
             Error::input(format!("object '{name}'"), source.to_string(), "give it to another technique")
+        }
+        sheet_light::Error::Parameter { name: "aligned", expected, .. } => {
+            let hint = "use render.sheets.aligned = \"view\", or another technique for all but one volume";
+            Error::input("render.sheets.aligned = \"axis\"", format!("expected {expected}"), hint)
         }
         other => Error::Internal(other.to_string()),
     }

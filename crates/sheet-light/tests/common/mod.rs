@@ -4,8 +4,8 @@ use sheet_light::{Error, Params, SheetCounts, SheetInput, Volume, prepare};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::shade::{ChannelLayout, LitBy};
 use splat_core::{
-    Accumulator, Camera, Grid, LayerSet, Material, Projection, Shading, Similarity, TransferFunction, TransferPoint,
-    rng,
+    Accumulator, BccGrid, Camera, Grid, LayerSet, Material, Packing, Projection, Shading, Similarity, TransferFunction,
+    TransferPoint, rng,
 };
 
 /// A lattice around the origin, its values by place in world space.
@@ -17,6 +17,18 @@ pub(crate) fn grid(dims: [usize; 3], axes: DMat3, value: impl Fn(DVec3) -> f64) 
         grid.values.push(value(grid.position(i, j, k)) as f32);
     }
     grid
+}
+
+/// A body-centred lattice that fills a cube around the origin.
+pub(crate) fn body_centred(dims: [usize; 3], side: f64, value: impl Fn(DVec3) -> f64) -> BccGrid {
+    let axes = DMat3::from_diagonal(DVec3::from_array(dims.map(|n| side / n as f64)));
+    let origin = DVec3::splat(-0.5 * side) - axes * Packing::BodyCentred.lowest();
+    let [nx, ny, _] = dims;
+    let mut bcc = BccGrid { planes: Grid { origin, axes, dims, values: Vec::new() } };
+    for n in 0..dims.iter().product() {
+        bcc.planes.values.push(value(bcc.position(n % nx, n / nx % ny, n / (nx * ny))) as f32);
+    }
+    bcc
 }
 
 /// Cubic cells of side `spacing`.
@@ -38,6 +50,20 @@ pub(crate) fn moved_noise(dims: [usize; 3], shift: f64, scale: f64) -> (Grid, Tr
     let points = [(0.3f32, 0.0f32), (0.5, 0.4), (0.9, 2.5)];
     let point = |(value, extinction)| TransferPoint { value, color: [value; 3], extinction: extinction / scale as f32 };
     (grid, TransferFunction::new(points.into_iter().map(point).collect()).unwrap())
+}
+
+/// View depths between which a pixel's ray is inside the box of these sides around the origin.
+pub(crate) fn in_box(camera: &Camera, sides: DVec3, at: usize) -> [f64; 2] {
+    let [x, y] = [at % camera.size[0] as usize, at / camera.size[0] as usize].map(|v| v as f64 + 0.5);
+    let (from, along) = camera.view_ray(x, y);
+    let world = |v: DVec3| camera.axes[0] * v.x + camera.axes[1] * v.y + camera.axes[2] * v.z;
+    let (from, along) = (camera.position + world(from), world(along));
+    let (mut near, mut far) = (0.0f64, f64::INFINITY);
+    for a in (0..3).filter(|a| along[*a] != 0.0) {
+        let [one, other] = [-0.5, 0.5].map(|face| (face * sides[a] - from[a]) / along[a]);
+        (near, far) = (near.max(one.min(other)), far.min(one.max(other)));
+    }
+    [near, far]
 }
 
 /// Control points (value, extinction), green turning to red.
@@ -62,6 +88,7 @@ pub(crate) fn unlit() -> Material {
 pub(crate) fn volume<'a>(grid: &'a Grid, transfer: &'a TransferFunction, material: &'a Material) -> Volume<'a> {
     Volume {
         grid,
+        packing: Packing::Cartesian,
         transform: Similarity::default(),
         transfer,
         extinction_scale: 1.0,
@@ -71,6 +98,10 @@ pub(crate) fn volume<'a>(grid: &'a Grid, transfer: &'a TransferFunction, materia
         shadow_coefficient: 1.0,
         casts_shadow: true,
     }
+}
+
+pub(crate) fn bcc_volume<'a>(bcc: &'a BccGrid, transfer: &'a TransferFunction, material: &'a Material) -> Volume<'a> {
+    Volume { packing: Packing::BodyCentred, ..volume(&bcc.planes, transfer, material) }
 }
 
 pub(crate) fn perspective(from: [f64; 3], fov_deg: f64, size: [u32; 2]) -> Camera {

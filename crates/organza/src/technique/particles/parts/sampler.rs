@@ -40,7 +40,7 @@ impl<'a> Source<'a> {
             }
             Body::Lattice { grid, level } => Box::new(LatticeSampler::new(grid, *level, &self.surface(own))?),
             Body::Triangles(mesh) => Box::new(MeshSampler::new(mesh, &self.surface(own), None)?),
-            Body::Cells { grid, transfer, normals } => {
+            Body::Cells { grid, transfer, normals, .. } => {
                 let params = VolumeParams {
                     cross_section: self.cross_section,
                     extinction_scale: own.extinction_scale,
