@@ -104,7 +104,7 @@ fn half_vectors(name: &str, grid: &Grid, direction: Option<[f64; 3]>, scattering
         LitBy { light: Light { shape, intensity: [3.0; 3] }, shadow: None }
     };
     let sheets = setting.input(grid, direction.map(sun).into_iter().collect());
-    let input = HalfInput { sheets, mapped: Vec::new(), opaque: &[] };
+    let input = HalfInput { sheets, extended: Vec::new(), mapped: Vec::new(), opaque: &[] };
     let params = HalfParams { scattering, ..HalfParams::default() };
     let layout = ChannelLayout::new(&LayerSet::default());
     let (best, counts) = least(|| {

@@ -18,6 +18,7 @@
 //! | 18: map each pixel to the shadow buffer | `illuminate.rs`, `light_path.rs` |
 //! | 21: classify and composite into the shadow buffer | `light_buffer.rs` |
 //! | the loop over slabs | `sweep.rs` |
+//! | section 5: soft shadows | `penumbra.rs`, `moved.rs`, `soft_buffer.rs` |
 //! | section 3: light that is scattered more than once | `scatter.rs` |
 //!
 //! ```
@@ -44,7 +45,7 @@
 //! };
 //! let mut image = Accumulator::new([16, 16], 1, 3, false, false);
 //! let layout = ChannelLayout::new(&LayerSet::default());
-//! fold(&HalfInput { sheets, mapped: Vec::new(), opaque: &[] }, &HalfParams::default(), &layout, &mut image, None).unwrap();
+//! fold(&HalfInput { sheets, extended: Vec::new(), mapped: Vec::new(), opaque: &[] }, &HalfParams::default(), &layout, &mut image, None).unwrap();
 //! // (1 − e^(−2τ))/2 of what is scattered to all sides alike.
 //! let expected = 0.5 * (1.0 - (-2f32).exp()) / (4.0 * std::f32::consts::PI);
 //! assert!(image.channels[0].iter().all(|c| (c - expected).abs() < 1e-5));
@@ -63,7 +64,9 @@ mod illuminate;
 mod lamp;
 mod light_buffer;
 mod light_path;
+mod moved;
 mod params;
+mod penumbra;
 mod placed;
 pub mod reference;
 mod scatter;
@@ -71,11 +74,12 @@ mod serves;
 mod shade;
 mod sheet;
 mod sight;
+mod soft_buffer;
 mod sweep;
 
 pub use axis::HalfVector;
 pub use counts::HalfCounts;
 pub use fold::{balance, bytes, fold, slab_width};
-pub use params::{HalfInput, HalfParams, Scattering};
+pub use params::{Extended, HalfInput, HalfParams, MOST_SAMPLES, Scattering};
 pub use scatter::balance::Balance;
-pub use serves::{LEAST_COSINE, Reason, serves};
+pub use serves::{LEAST_COSINE, Reason, serves, serves_extended};

@@ -6,4 +6,5 @@ mod hard_cases;
 mod invariances;
 mod paths;
 mod scattering;
+mod soft;
 mod twin;

@@ -3,10 +3,13 @@
 use super::band::ROWS;
 use super::counts::HalfCounts;
 use super::frame::Frame;
+use super::light_buffer::planes;
+use super::penumbra::Penumbra;
 use super::scatter::{self, Scattered, Scene, balance::Balance};
-use super::serves::{axis_of_view, serves};
+use super::serves::{axis_of_view, serves, serves_extended};
+use super::soft_buffer::SoftBuffer;
 use super::sweep::Sweep;
-use super::{HalfInput, HalfParams, Scattering, lamp};
+use super::{HalfInput, HalfParams, MOST_SAMPLES, Scattering, lamp};
 use crate::lattice::Lattice;
 use crate::visible::Voxels;
 use crate::{Error, Params, SheetInput, Volume};
@@ -52,8 +55,8 @@ pub fn fold(
     }
     let quiet = Progress::new();
     let progress = progress.unwrap_or(&quiet);
-    let mut lights: Vec<&LitBy<'_>> = input.sheets.lights.iter().collect();
-    lights.sort_by_key(|lit| lit.light.bits());
+    let mut lights: Vec<(&LitBy<'_>, u32)> = carried(input).collect();
+    lights.sort_by_key(|(lit, samples)| (lit.light.bits(), *samples));
     let first = Sweep::new(input, params, lights.first().copied(), false)?;
     let is_lit = first.light.is_some();
     progress.add_total(u64::from(first.frame.slabs.count));
@@ -87,7 +90,7 @@ pub fn slab_width(
     Ok(Frame::new(volumes, camera, params, &axis_of_view(volumes, camera, light))?.slabs.width)
 }
 
-/// Where the light of one lamp of the input stays, as its scattering among the volumes is simulated: in cells, by two streams, however
+/// Where the light of one lamp of [`HalfInput::sheets`] stays, as its scattering among the volumes is simulated: in cells, by two streams, however
 /// the slabs lie. All 0 for a lamp that nothing scatters, or under [`Scattering::None`].
 ///
 /// # Errors
@@ -105,6 +108,12 @@ pub fn balance(input: &HalfInput<'_>, params: &HalfParams, light: usize) -> Resu
     Ok(Scattered::new(&scene, params.scattering).balance.scaled(lit.light.intensity))
 }
 
+/// Lights that have a sweep, each with the points that stand for it.
+fn carried<'a>(input: &'a HalfInput<'a>) -> impl Iterator<Item = (&'a LitBy<'a>, u32)> {
+    let points = input.sheets.lights.iter().map(|lit| (lit, 1));
+    points.chain(input.extended.iter().map(|extended| (&extended.lit, extended.samples)))
+}
+
 fn check(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
     params.check()?;
     input.sheets.check()?;
@@ -112,31 +121,39 @@ fn check(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
         let found = format!("{} splats", splats.order.len());
         return Err(Error::parameter("sheets.splats", found, "none: half-vector sheets are of volumes alone"));
     }
-    let lights = &input.sheets.lights;
-    for (light, lit) in lights.iter().chain(&input.mapped).enumerate() {
+    for (light, lit) in carried(input).map(|(lit, _)| lit).chain(&input.mapped).enumerate() {
         lit.light.validate(light).map_err(Error::Light)?;
     }
-    for (light, lit) in lights.iter().enumerate() {
-        serves(&input.sheets.volumes, input.sheets.camera, &lit.light)
-            .map_err(|reason| Error::HalfVector { light, reason })?;
+    if let Some(samples) = input.extended.iter().map(|e| e.samples).find(|n| !(1..=MOST_SAMPLES).contains(n)) {
+        return Err(Error::parameter("extended.samples", samples, "1 to 1024"));
+    }
+    let (volumes, camera) = (&input.sheets.volumes[..], input.sheets.camera);
+    let points = input.sheets.lights.iter().map(|lit| serves(volumes, camera, &lit.light));
+    let extended = input.extended.iter().map(|e| serves_extended(volumes, camera, &e.lit.light, e.samples));
+    for (light, served) in points.chain(extended).enumerate() {
+        served.map_err(|reason| Error::HalfVector { light, reason })?;
     }
     check_memory(input, params)
 }
 
 /// Refuses what takes more than it may, before it does.
 fn check_memory(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
-    let SheetInput { volumes, camera, lights, .. } = &input.sheets;
-    let needed = bytes(volumes, camera, lights.iter().map(|lit| &lit.light), params);
+    let SheetInput { volumes, camera, .. } = &input.sheets;
+    let needed = bytes(volumes, camera, carried(input).map(|(lit, samples)| (&lit.light, samples)), params);
     let limit = params.sheets.limits.max_bytes;
-    let hint = || "use fewer voxels, a smaller picture or fewer pixels of the light buffer".to_owned();
+    let hint = || {
+        "use fewer voxels, a smaller picture, fewer pixels of the light buffer or fewer points of an extended light"
+            .to_owned()
+    };
     if needed > limit { Err(Error::limit("half-vector sheets", needed, limit, "bytes", hint())) } else { Ok(()) }
 }
 
-/// Bytes that [`fold`] takes at most for such lights, of which sweeps follow one another.
+/// Bytes that [`fold`] takes at most for such lights, of which sweeps follow one another: each with the points that stand for it, 1 for
+/// one without an extent.
 pub fn bytes<'l>(
     volumes: &[Volume<'_>],
     camera: &Camera,
-    lights: impl Iterator<Item = &'l Light>,
+    lights: impl Iterator<Item = (&'l Light, u32)>,
     params: &HalfParams,
 ) -> u64 {
     if volumes.is_empty() {
@@ -160,7 +177,26 @@ pub fn bytes<'l>(
         let all: u64 = volumes.iter().map(|v| v.grid.values.len() as u64).sum();
         2 * (all / u64::from(params.voxels_per_cell) + 1) * 350
     };
-    let pixels =
-        |light: &Light| lamp::camera_of(volumes, light, params).size.into_iter().map(u64::from).product::<u64>();
-    eye + of_a_pixel * lights.map(pixels).max().unwrap_or(0) + cells + volumes.iter().map(voxels).sum::<u64>()
+    let light = |(light, samples): (&Light, u32)| {
+        let image = lamp::camera_of(volumes, light, params);
+        let pixels: u64 = image.size.into_iter().map(u64::from).product();
+        of_a_pixel * pixels + soft_bytes((volumes, camera), (light, samples), &image, params)
+    };
+    eye + lights.map(light).max().unwrap_or(0) + cells + volumes.iter().map(voxels).sum::<u64>()
+}
+
+/// Bytes of the images of an extended light's points.
+fn soft_bytes(
+    (volumes, camera): (&[Volume<'_>], &Camera),
+    light: (&Light, u32),
+    image: &Camera,
+    params: &HalfParams,
+) -> u64 {
+    let sheets = Params { slab_width: None, ..params.sheets };
+    let frame = Frame::new(volumes, camera, &sheets, &axis_of_view(volumes, camera, Some(light.0)));
+    let penumbra = frame.ok().and_then(|frame| Penumbra::new(&frame, volumes, light, image, params.most_light_pixels));
+    penumbra.map_or(0, |penumbra| {
+        let planes = planes(volumes) as u64;
+        SoftBuffer::bytes_of(&penumbra, planes) + 4 * planes * image.size.into_iter().map(u64::from).product::<u64>()
+    })
 }

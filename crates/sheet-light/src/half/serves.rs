@@ -39,7 +39,7 @@ pub enum Reason {
         cosine: f64,
     },
     /// Light of a sphere, a disk or a rectangle comes from many directions.
-    #[error("the light has an extent, expected a point of it: `Light::points` has them")]
+    #[error("the light has an extent, expected a point of it, or `HalfInput::extended`")]
     Extended,
 }
 
@@ -58,19 +58,42 @@ pub fn serves(volumes: &[Volume<'_>], camera: &Camera, light: &Light) -> Result<
     if light.shape.is_extended() {
         return Err(Reason::Extended);
     }
+    let axis = axis_of(volumes, camera, light);
+    light_serves(volumes, light, &axis)?;
+    view_serves(volumes, camera, &axis)
+}
+
+/// Whether the half vector of the centre of a light with an extent can slice the volumes for all of its points, so that one sweep
+/// carries its light. As [`serves`] for one without an extent.
+///
+/// # Errors
+/// The first [`Reason`] that was found.
+pub fn serves_extended(volumes: &[Volume<'_>], camera: &Camera, light: &Light, samples: u32) -> Result<(), Reason> {
+    if volumes.is_empty() {
+        return Ok(());
+    }
+    let axis = axis_of(volumes, camera, light);
+    light_serves(volumes, light, &axis)?;
+    light.points(samples).iter().try_for_each(|point| light_serves(volumes, point, &axis))?;
+    view_serves(volumes, camera, &axis)
+}
+
+/// Whether the light of a point, or of the centre of a light, meets slabs well.
+fn light_serves(volumes: &[Volume<'_>], light: &Light, axis: &HalfVector) -> Result<(), Reason> {
     if let Some(position) = light.shape.place()
         && let Some(volume) = volumes.iter().position(|v| is_inside(v, position))
     {
         return Err(Reason::LampInside { volume, position });
     }
-    let axis = axis_of(volumes, camera, light);
     // The light's image has an axis of its own, to the middle of the volumes.
     let forward = travel(light, middle(volumes));
     let of_light = |p: DVec3| [axis.normal, forward].map(|axis| axis.dot(travel(light, p)));
     let cosine = least(volumes.iter().flat_map(world_corners).flat_map(of_light));
-    if cosine < LEAST_COSINE {
-        return Err(Reason::LightAlongSlabs { cosine });
-    }
+    if cosine < LEAST_COSINE { Err(Reason::LightAlongSlabs { cosine }) } else { Ok(()) }
+}
+
+/// Whether view rays do.
+fn view_serves(volumes: &[Volume<'_>], camera: &Camera, axis: &HalfVector) -> Result<(), Reason> {
     let sense = if axis.back_to_front { -axis.normal } else { axis.normal };
     let cosine = least_of_view(volumes, camera, sense);
     if cosine < LEAST_COSINE { Err(Reason::ViewAlongSlabs { cosine }) } else { Ok(()) }

@@ -9,6 +9,7 @@ use super::frame::Frame;
 use super::gradient::Gradients;
 use super::light_buffer::LightBuffer;
 use super::light_path::LightPath;
+use super::penumbra::Penumbra;
 use super::placed::Placed;
 use super::scatter::{self, Scattered, Scene};
 use super::serves::axis_of_view;
@@ -54,17 +55,18 @@ pub(crate) struct Sweep<'a> {
 }
 
 impl<'a> Sweep<'a> {
-    /// Prepares a sweep for one light that half vectors serve.
+    /// Prepares a sweep for one light that half vectors serve, and as many points of it as are asked for.
     pub(crate) fn new(
         input: &'a HalfInput<'a>,
         params: &HalfParams,
-        light: Option<&'a LitBy<'a>>,
+        carried: Option<(&'a LitBy<'a>, u32)>,
         light_alone: bool,
     ) -> Result<Self, Error> {
         let sheets = &input.sheets;
         let (volumes, camera) = (&sheets.volumes[..], sheets.camera);
         let is_lit = volumes.iter().any(is_lit);
-        let light = light.filter(|_| is_lit);
+        let carried = carried.filter(|_| is_lit);
+        let light = carried.map(|(lit, _)| lit);
         let mapped = if is_lit && !light_alone { &input.mapped[..] } else { &[] };
         let axis = axis_of_view(volumes, camera, light.map(|lit| &lit.light));
         let frame = Frame::new(volumes, camera, &params.sheets, &axis)?;
@@ -79,8 +81,7 @@ impl<'a> Sweep<'a> {
             gradients: Gradients::new(&frame),
             light,
             mapped,
-            light_buffer: light
-                .map(|lit| LightBuffer::new(&frame, lamp::camera_of(volumes, &lit.light, params), volumes, &placed)),
+            light_buffer: carried.map(|carried| light_buffer(&frame, params, &placed, volumes, carried)),
             scattered: None,
             paths: light
                 .map_or_else(Vec::new, |lit| volumes.iter().map(|v| LightPath::new(v, &lit.light, &frame)).collect()),
@@ -134,11 +135,16 @@ impl<'a> Sweep<'a> {
         let mut counts = self.counts(&bands);
         for slab in 0..self.frame.slabs.count {
             progress.tick(1).map_err(cancelled)?;
+            if let Some(buffer) = &mut self.light_buffer {
+                buffer.arrive(slab, &self.frame);
+            }
             counts.eye_fragments += self.pass(&mut bands, layout, slab, Step::Draw);
             if let Some(buffer) = &mut self.light_buffer {
                 counts.light_fragments += buffer.attenuate(slab, &self.frame, &self.placed);
             }
         }
+        counts.soft_passes =
+            self.light_buffer.as_ref().and_then(|buffer| buffer.soft.as_ref()).map_or(0, |soft| soft.passes);
         // Depths are summed from the eye on, so a sweep that comes towards it needs a second one for them.
         if self.frame.back_to_front && !form.depth.is_empty() && !self.light_alone {
             let mut depths = self.bands(&Accumulator { channels: Vec::new(), ..form.clone() });
@@ -208,4 +214,20 @@ impl<'a> Sweep<'a> {
         let ray = self.frame.ray(&self.sight.camera, x as f64 + 0.5, y as f64 + 0.5);
         (f64::from(depth) - ray.from.z) / ray.along.z
     }
+}
+
+/// The light's image, and those of its points where it has an extent.
+fn light_buffer(
+    frame: &Frame,
+    params: &HalfParams,
+    placed: &[Placed<'_>],
+    volumes: &[Volume<'_>],
+    (lit, samples): (&LitBy<'_>, u32),
+) -> LightBuffer {
+    let camera = lamp::camera_of(volumes, &lit.light, params);
+    let mut buffer = LightBuffer::new(frame, camera, volumes, placed);
+    if let Some(penumbra) = Penumbra::new(frame, volumes, (&lit.light, samples), &camera, params.most_light_pixels) {
+        buffer.soften(penumbra, volumes);
+    }
+    buffer
 }
