@@ -19,7 +19,6 @@ const COUNTING: [f32; MAX_LANES] = {
     out
 };
 
-thread_local! { static NEAREST: bool = std::env::var("NN").is_ok(); }
 /// One row of an image as a shift has it: the two rows that it lies between, padded, and the share of the second.
 #[derive(Clone, Copy)]
 pub(crate) struct Moved<'a> {
@@ -65,18 +64,6 @@ impl Moved<'_> {
         // What is only just beside a pixel has no more than rounding of it.
         let first = (ends[0].min(ends[1])).floor() as i64;
         let last = (ends[0].max(ends[1])).floor() as i64 + 1;
-        if NEAREST.with(|v| *v) {
-            let mut out = of(0.0);
-            let row = if self.share < 0.5 { self.rows[0] } else { self.rows[1] };
-            for step in first..=last {
-                let k = (x as i64 + step + PAD as i64).clamp(0, (self.rows[0].len() - count) as i64) as usize;
-                let m = (of(x as f32) + Lanes::load(simd, &COUNTING)).mul_add(of(self.scale), of(self.start)) - of(step as f32);
-                let one = of(1.0).where_less(m, of(0.5)) * of(1.0).where_less_or(m, of(-0.5), of(0.0));
-                let w = of(1.0).where_less(m, of(0.5)) - one;
-                out = w.mul_add(Lanes::load(simd, &row[k..]), out);
-            }
-            return out;
-        }
         let move_by = (of(x as f32) + Lanes::load(simd, &COUNTING)).mul_add(of(self.scale), of(self.start));
         let (one, zero, share) = (of(1.0), of(0.0), of(self.share));
         let mut out = zero;

@@ -48,6 +48,10 @@ pub(crate) struct Penumbra {
     center: DVec3,
     /// Slab coordinates of the points.
     points: Vec<DVec3>,
+    /// Share of each in what the middle of the volumes receives where nothing attenuates.
+    pub(crate) shares: Vec<f32>,
+    /// What all give there over what the centre gives.
+    pub(crate) gain: f64,
     /// Corners of the volumes, and depths that they lie between.
     corners: Vec<[DVec3; 8]>,
     ends: [f64; 2],
@@ -74,15 +78,17 @@ impl Penumbra {
             return None;
         }
         let center = frame.point(light.shape.place()?);
-        let points: Vec<DVec3> =
-            light.points(samples).iter().filter_map(|p| p.shape.place()).map(|p| frame.point(p)).collect();
+        let all = Light { intensity: [1.0; 3], ..*light }.points(samples);
+        let points: Vec<DVec3> = all.iter().filter_map(|p| p.shape.place()).map(|p| frame.point(p)).collect();
+        let (shares, gain) = received(light, &all, middle(volumes));
         let corners: Vec<[DVec3; 8]> = volumes.iter().map(|v| world_corners(v).map(|p| frame.point(p))).collect();
         let depths = || corners.iter().flatten().map(|p| p.z);
         let ends = [depths().fold(f64::INFINITY, f64::min), depths().fold(f64::NEG_INFINITY, f64::max)];
         let [near, far] = ends.map(|z| z - center.z);
         // Rays move as much before the reference as behind it.
         let reference = center.z + 2.0 / (near.recip() + far.recip());
-        let mut own = Self { center, points, corners, ends, reference, low: DVec2::ZERO, pixel: 1.0, size: [1, 1] };
+        let mut own =
+            Self { center, points, shares, gain, corners, ends, reference, low: DVec2::ZERO, pixel: 1.0, size: [1, 1] };
         let (low, high, shift) = own.reach();
         let extent = high - low;
         let way = frame.point(middle(volumes)) - center;
@@ -189,5 +195,18 @@ impl Penumbra {
             ..end(x1, self.size[0]).next_multiple_of(MAX_LANES).min(self.size[0]);
         let rows = end(y0, self.size[1])..end(y1, self.size[1]);
         (low.x <= high.x && !columns.is_empty() && !rows.is_empty()).then_some([columns, rows])
+    }
+}
+
+/// Share of each point of a light in what a place receives of it, and all of that over what the centre gives alone.
+fn received(light: &Light, points: &[Light], place: DVec3) -> (Vec<f32>, f64) {
+    let of = |light: &Light| f64::from(light.irradiance(place, 0.0).1[0]);
+    let (each, centre): (Vec<f64>, f64) =
+        (points.iter().map(of).collect(), of(&Light { intensity: [1.0; 3], ..*light }));
+    let all: f64 = each.iter().sum();
+    if all > 0.0 && centre > 0.0 {
+        (each.iter().map(|e| (e / all) as f32).collect(), all / centre)
+    } else {
+        (vec![1.0 / points.len() as f32; points.len()], 1.0)
     }
 }

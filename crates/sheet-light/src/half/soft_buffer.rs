@@ -35,7 +35,7 @@ struct Source {
 
 /// The images of one extended light.
 pub(crate) struct SoftBuffer {
-    penumbra: Penumbra,
+    pub(crate) penumbra: Penumbra,
     planes: usize,
     sources: Vec<Option<Source>>,
     /// The present slab, row by row, plane by plane.
@@ -321,19 +321,22 @@ impl SoftBuffer {
             hard[x] = (1.0 + right * right + down * down).sqrt() as f32;
         }
         soft[part.columns.clone()].fill(0.0);
-        for (point, shift) in part.shifts.iter().enumerate() {
+        let mut all = 0.0;
+        for (point, (shift, own)) in part.shifts.iter().zip(&self.penumbra.shares).enumerate() {
+            all += own;
             let back = shift.inverse();
             let (row, share) = between(&back, y);
             let rows = [self.sum_row(row, point + 1, p), self.sum_row(row + 1, point + 1, p)];
             let moved = Moved { rows, share, scale: back.scale as f32, start: back.start[0] as f32 };
             for x in columns() {
                 let optical = moved.at(simd, x) * Lanes::load(simd, &hard[x..]);
-                (optical.exp_neg() + Lanes::load(simd, &soft[x..])).store(&mut soft[x..]);
+                let sum = optical.exp_neg() * of(*own) + Lanes::load(simd, &soft[x..]);
+                sum.store(&mut soft[x..]);
             }
         }
         let centre = &self.sum_row(y as i64, 0, p)[PAD..];
         for x in columns() {
-            let mean = Lanes::load(simd, &soft[x..]) / of(part.shifts.len() as f32);
+            let mean = Lanes::load(simd, &soft[x..]) / of(all);
             (of(0.0) - mean.max(of(LEAST)).logarithm()).max(of(0.0)).store(&mut soft[x..]);
             (Lanes::load(simd, &centre[x..]) * Lanes::load(simd, &hard[x..])).store(&mut hard[x..]);
         }

@@ -22,7 +22,7 @@ use rayon::prelude::*;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::pulp;
 use splat_core::shade::{ChannelLayout, LitBy};
-use splat_core::{Accumulator, LightShape, Progress};
+use splat_core::{Accumulator, Light, LightShape, Progress};
 
 /// Everything that is the same for all slabs, and the light buffer.
 pub(crate) struct Sweep<'a> {
@@ -34,8 +34,8 @@ pub(crate) struct Sweep<'a> {
     pub(crate) shapes: Vec<Shape>,
     pub(crate) buckets: Vec<Buckets>,
     pub(crate) gradients: Gradients,
-    /// `None` for ambient and emitted light alone.
-    pub(crate) light: Option<&'a LitBy<'a>>,
+    /// `None` for ambient and emitted light alone. One with an extent gives at its centre what all its points give.
+    pub(crate) light: Option<LitBy<'a>>,
     /// Lights that this sweep adds without carrying them.
     pub(crate) mapped: &'a [LitBy<'a>],
     pub(crate) light_buffer: Option<LightBuffer>,
@@ -66,14 +66,19 @@ impl<'a> Sweep<'a> {
         let (volumes, camera) = (&sheets.volumes[..], sheets.camera);
         let is_lit = volumes.iter().any(is_lit);
         let carried = carried.filter(|_| is_lit);
-        let light = carried.map(|(lit, _)| lit);
         let mapped = if is_lit && !light_alone { &input.mapped[..] } else { &[] };
-        let axis = axis_of_view(volumes, camera, light.map(|lit| &lit.light));
+        let axis = axis_of_view(volumes, camera, carried.map(|(lit, _)| &lit.light));
         let frame = Frame::new(volumes, camera, &params.sheets, &axis)?;
         let placed: Vec<Placed<'a>> = volumes.iter().map(|v| Placed::new(v, &frame, &params.sheets)).collect();
         let sight = Sight::new(&frame, *camera);
         let by_place =
             |lit: &LitBy<'_>| lit.shadow.is_some() || !matches!(lit.light.shape, LightShape::Directional { .. });
+        let light_buffer = carried.map(|carried| light_buffer(&frame, params, &placed, volumes, carried));
+        let gain = light_buffer.as_ref().and_then(|b| b.soft.as_ref()).map(|soft| soft.penumbra.gain);
+        let light = carried.map(|(lit, _)| match gain {
+            Some(gain) => LitBy { light: brighter(&lit.light, gain), ..*lit },
+            None => *lit,
+        });
         let mut sweep = Self {
             volumes,
             shapes: placed.iter().map(|p| sight.shape(&frame, p)).collect(),
@@ -81,14 +86,15 @@ impl<'a> Sweep<'a> {
             gradients: Gradients::new(&frame),
             light,
             mapped,
-            light_buffer: carried.map(|carried| light_buffer(&frame, params, &placed, volumes, carried)),
+            light_buffer,
             scattered: None,
             paths: light
+                .as_ref()
                 .map_or_else(Vec::new, |lit| volumes.iter().map(|v| LightPath::new(v, &lit.light, &frame)).collect()),
             ambient: sheets.ambient,
             shadow_origin: sheets.shadow_origin,
             cutoff: params.sheets.transmittance_cutoff,
-            is_lit_by_place: light.into_iter().chain(mapped).any(by_place),
+            is_lit_by_place: light.iter().chain(mapped).any(by_place),
             light_alone,
             input,
             visible: 0,
@@ -97,7 +103,7 @@ impl<'a> Sweep<'a> {
             sight,
         };
         sweep.sort_voxels();
-        if let Some(lit) = light.filter(|lit| scatter::is_wanted(volumes, &lit.light, params)) {
+        if let Some(lit) = light.as_ref().filter(|lit| scatter::is_wanted(volumes, &lit.light, params)) {
             let scene = Scene::new(volumes, lit, params, sheets.shadow_origin);
             sweep.scattered = Some(Scattered::new(&scene, params.scattering));
         }
@@ -230,4 +236,8 @@ fn light_buffer(
         buffer.soften(penumbra, volumes);
     }
     buffer
+}
+
+fn brighter(light: &Light, gain: f64) -> Light {
+    Light { intensity: light.intensity.map(|i| (f64::from(i) * gain) as f32), ..*light }
 }

@@ -135,7 +135,9 @@ fn hv09a_occluders_at_two_distances_cast_penumbras_of_their_own() {
     let blocks = [block([-1.7, -0.6, 0.98], [0.0, 0.6, 1.02], 0.2), block([-1.3, -0.6, 2.98], [0.0, 0.6, 3.02], 0.2)];
     let (seen, _) = profile(&light, &blocks, &views()[0], &fine(100.0));
     let worst = seen.iter().map(|[x, t]| (t - beside_two_edges(*x, 0.6)).abs()).fold(0.0, f64::max);
-    for [x, t] in &seen { println!("  {x:.3} {t:.3} {:.3}", beside_two_edges(*x, 0.6)); }
+    for [x, t] in &seen {
+        println!("  {x:.3} {t:.3} {:.3}", beside_two_edges(*x, 0.6));
+    }
     assert!(worst < 0.08, "{worst}");
 }
 
@@ -247,15 +249,60 @@ fn against_points(light: &Extended<'static>, points: u32, camera: &Camera) -> [f
     let volumes = [volume(&grid, &tf, &material)];
     let sw: Option<f64> = std::env::var("SW").ok().map(|v| v.parse().unwrap());
     let lp: f64 = std::env::var("LP").map_or(1.5, |v| v.parse().unwrap());
-    let (found, _) = draw(&soft(&volumes, camera, vec![*light]), &HalfParams{light_pixels: lp, ..exact(sw)}).unwrap();
+    let (found, _) =
+        draw(&soft(&volumes, camera, vec![*light]), &HalfParams { light_pixels: lp, ..exact(sw) }).unwrap();
     let (truth, _) = draw(&input(&volumes, camera, &as_points(light, points)), &exact(sw)).unwrap();
     let n = truth.channels[1].len() as f64;
     let (same, _) = draw(&input(&volumes, camera, &as_points(light, light.samples)), &exact(sw)).unwrap();
-    let (center, _) = draw(&input(&volumes, camera, &[LitBy{light: splat_core::Light{shape: if light.lit.light.shape.normal().is_some() { LightShape::Patch{position: light.lit.light.shape.place().unwrap(), normal: light.lit.light.shape.normal().unwrap()} } else { LightShape::Point{position: light.lit.light.shape.place().unwrap()} }, ..light.lit.light}, shadow: None}]), &exact(sw)).unwrap();
-    let stat = |a: &splat_core::Accumulator, b: &splat_core::Accumulator| {let d = || a.channels[1].iter().zip(&b.channels[1]).map(|(a, b)| f64::from(a - b)); let m = truth.channels[1].iter().map(|v| f64::from(*v)).sum::<f64>(); ((d().map(|v| v*v).sum::<f64>()/n).sqrt()/m*n, d().sum::<f64>()/m)};
-    let worst = (0..truth.channels[1].len()).max_by(|a, b| (found.channels[1][*a] - same.channels[1][*a]).abs().total_cmp(&(found.channels[1][*b] - same.channels[1][*b]).abs())).unwrap();
-    println!("worst at {} {}: {:e} {:e} {:e}", worst % 48, worst / 48, found.channels[1][worst], same.channels[1][worst], center.channels[1][worst]);
-    println!("soft-truth {:?} soft-same {:?} hard-truth {:?} same-truth {:?}", stat(&found,&truth), stat(&found,&same), stat(&center,&truth), stat(&same,&truth));
+    let (center, _) = draw(
+        &input(
+            &volumes,
+            camera,
+            &[LitBy {
+                light: splat_core::Light {
+                    shape: if light.lit.light.shape.normal().is_some() {
+                        LightShape::Patch {
+                            position: light.lit.light.shape.place().unwrap(),
+                            normal: light.lit.light.shape.normal().unwrap(),
+                        }
+                    } else {
+                        LightShape::Point { position: light.lit.light.shape.place().unwrap() }
+                    },
+                    ..light.lit.light
+                },
+                shadow: None,
+            }],
+        ),
+        &exact(sw),
+    )
+    .unwrap();
+    let stat = |a: &splat_core::Accumulator, b: &splat_core::Accumulator| {
+        let d = || a.channels[1].iter().zip(&b.channels[1]).map(|(a, b)| f64::from(a - b));
+        let m = truth.channels[1].iter().map(|v| f64::from(*v)).sum::<f64>();
+        ((d().map(|v| v * v).sum::<f64>() / n).sqrt() / m * n, d().sum::<f64>() / m)
+    };
+    let worst = (0..truth.channels[1].len())
+        .max_by(|a, b| {
+            (found.channels[1][*a] - same.channels[1][*a])
+                .abs()
+                .total_cmp(&(found.channels[1][*b] - same.channels[1][*b]).abs())
+        })
+        .unwrap();
+    println!(
+        "worst at {} {}: {:e} {:e} {:e}",
+        worst % 48,
+        worst / 48,
+        found.channels[1][worst],
+        same.channels[1][worst],
+        center.channels[1][worst]
+    );
+    println!(
+        "soft-truth {:?} soft-same {:?} hard-truth {:?} same-truth {:?}",
+        stat(&found, &truth),
+        stat(&found, &same),
+        stat(&center, &truth),
+        stat(&same, &truth)
+    );
     let squares: f64 = found.channels[1].iter().zip(&truth.channels[1]).map(|(a, b)| f64::from(a - b).powi(2)).sum();
     [(squares / n).sqrt(), truth.channels[1].iter().map(|v| f64::from(*v)).sum::<f64>() / n]
 }
@@ -272,7 +319,11 @@ fn a_cloud_under_an_extended_light_is_that_under_many_points_of_it() {
             LightShape::Rect { center, u, v: toward(at).cross(u) },
         ];
         for shape in shapes {
-            let [rmse, mean] = against_points(&extended(shape, std::env::var("NS").map_or(32, |v| v.parse().unwrap())), 64, &perspective([1.0, 2.0, 12.0], 24.0, [48, 48]));
+            let [rmse, mean] = against_points(
+                &extended(shape, std::env::var("NS").map_or(32, |v| v.parse().unwrap())),
+                64,
+                &perspective([1.0, 2.0, 12.0], 24.0, [48, 48]),
+            );
             println!("{rmse:e} of {mean:e}: {shape:?}");
             assert!(rmse < 0.2 * mean, "{rmse:e} of {mean:e}: {shape:?}");
         }
