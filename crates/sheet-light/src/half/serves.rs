@@ -78,6 +78,20 @@ pub fn serves_extended(volumes: &[Volume<'_>], camera: &Camera, light: &Light, s
     view_serves(volumes, camera, &axis)
 }
 
+/// How wide the penumbra of a light is at the middle of the volumes over the distance to what casts it, far from the light: 2R/d, R the
+/// radius or the longer half-axis. 0 for a light without an extent, and without volumes.
+pub fn penumbra_widening(volumes: &[Volume<'_>], light: &Light) -> f64 {
+    let radius = match light.shape {
+        LightShape::Sphere { radius, .. } | LightShape::Disk { radius, .. } => radius,
+        LightShape::Rect { u, v, .. } => u.length().max(v.length()),
+        _ => return 0.0,
+    };
+    match light.shape.place() {
+        Some(place) if !volumes.is_empty() => 2.0 * radius / (middle(volumes) - place).length(),
+        _ => 0.0,
+    }
+}
+
 /// Whether the light of a point, or of the centre of a light, meets slabs well.
 fn light_serves(volumes: &[Volume<'_>], light: &Light, axis: &HalfVector) -> Result<(), Reason> {
     if let Some(position) = light.shape.place()
