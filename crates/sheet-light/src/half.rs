@@ -82,4 +82,4 @@ pub use counts::HalfCounts;
 pub use fold::{balance, bytes, fold, slab_width};
 pub use params::{Extended, HalfInput, HalfParams, MOST_SAMPLES, Scattering};
 pub use scatter::balance::Balance;
-pub use serves::{LEAST_COSINE, Reason, penumbra_widening, serves, serves_extended};
+pub use serves::{LEAST_COSINE, MOST_DEPTH, Reason, penumbra_widening, serves, serves_extended};

@@ -10,6 +10,9 @@ use splat_core::{Camera, Light, LightShape};
 /// most w/[`LEAST_COSINE`].
 pub const LEAST_COSINE: f64 = 0.2;
 
+/// How far a point of a light may lie from its centre across the slabs, of the centre's distance to the nearest volume.
+pub const MOST_DEPTH: f64 = 0.4;
+
 /// Why half vectors cannot serve a light: it takes a shadow map instead.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -37,6 +40,14 @@ pub enum Reason {
     ViewAlongSlabs {
         /// The least cosine of what is in the picture.
         cosine: f64,
+    },
+    /// Points of a light with an extent lie too unequally far from the slabs.
+    #[error(
+        "the light's points lie up to {share:.2} of its distance nearer to the slabs or farther, expected at most {MOST_DEPTH}"
+    )]
+    TooLarge {
+        /// The farthest point's distance to the centre across the slabs over that of the centre to the nearest volume.
+        share: f64,
     },
     /// Light of a sphere, a disk or a rectangle comes from many directions.
     #[error("the light has an extent, expected a point of it, or `HalfInput::extended`")]
@@ -74,7 +85,14 @@ pub fn serves_extended(volumes: &[Volume<'_>], camera: &Camera, light: &Light, s
     }
     let axis = axis_of(volumes, camera, light);
     light_serves(volumes, light, &axis)?;
-    light.points(samples).iter().try_for_each(|point| light_serves(volumes, point, &axis))?;
+    let points = light.points(samples);
+    points.iter().try_for_each(|point| light_serves(volumes, point, &axis))?;
+    let from_center = |p: DVec3| light.shape.place().map_or(0.0, |center| axis.normal.dot(p - center));
+    let near = volumes.iter().flat_map(world_corners).map(from_center).fold(f64::INFINITY, f64::min);
+    let depth = points.iter().filter_map(|p| p.shape.place()).map(|p| from_center(p).abs()).fold(0.0, f64::max);
+    if depth > MOST_DEPTH * near {
+        return Err(Reason::TooLarge { share: depth / near });
+    }
     view_serves(volumes, camera, &axis)
 }
 

@@ -11,7 +11,7 @@
 use super::band::ROWS;
 use super::light_buffer::LightBand;
 use super::light_path::Places;
-use super::moved::{Moved, PAD, between, columns_for, rows_for};
+use super::moved::{PAD, columns_for, moved, rows_for};
 use super::penumbra::{Penumbra, Shift};
 use super::sight::Sight;
 use rayon::prelude::*;
@@ -264,18 +264,20 @@ impl pulp::WithSimd for Add<'_> {
         let ([width, height], planes, stride) = (of.penumbra.size, of.planes, of.stride());
         let each = (part.shifts.len() + 1) * planes * stride;
         let still = Shift { scale: 0.0, start: [0.0; 2] };
+        let mut moved_to = [Lanes::splat(simd, 0.0); ROWS];
         for (point, shift) in std::iter::once(&still).chain(&part.shifts).enumerate() {
             let columns = columns_for(shift, &part.columns, width);
             let own = rows_for(shift, &part.rows, height);
-            for y in own.start.max(first)..own.end.min(first + rows.len() / each) {
-                let (row, share) = between(shift, y);
-                for p in 0..planes {
-                    let beside = [of.slab_row(row, p), of.slab_row(row + 1, p)];
-                    let moved = Moved { rows: beside, share, scale: shift.scale as f32, start: shift.start[0] as f32 };
-                    let to = &mut rows[(y - first) * each + (point * planes + p) * stride + PAD..];
-                    for x in columns.clone().step_by(Lanes::<S>::COUNT) {
-                        let to = &mut to[x..];
-                        (moved.at(simd, x) + Lanes::load(simd, to)).store(to);
+            let own = own.start.max(first)..own.end.min(first + rows.len() / each);
+            if own.is_empty() {
+                continue;
+            }
+            for p in 0..planes {
+                for x in columns.clone().step_by(Lanes::<S>::COUNT) {
+                    moved(simd, |y| of.slab_row(y, p), shift, (x, own.clone()), &mut moved_to);
+                    for (y, more) in own.clone().zip(&moved_to) {
+                        let to = &mut rows[(y - first) * each + (point * planes + p) * stride + PAD + x..];
+                        (*more + Lanes::load(simd, to)).store(to);
                     }
                 }
             }
@@ -299,46 +301,62 @@ impl pulp::WithSimd for Arrive<'_> {
         let Self { of, part, first, rows } = self;
         let (width, planes) = (of.penumbra.size[0], of.planes);
         let each = 2 * planes * width;
-        for y in part.rows.start.max(first)..part.rows.end.min(first + rows.len() / each) {
-            for (p, to) in rows[(y - first) * each..][..each].chunks_exact_mut(2 * width).enumerate() {
-                let (soft, hard) = to.split_at_mut(width);
-                of.arrive_row(simd, part, [y, p], soft, hard);
+        let own = part.rows.start.max(first)..part.rows.end.min(first + rows.len() / each);
+        for p in (0..planes).filter(|_| !own.is_empty()) {
+            for x in part.columns.clone().step_by(Lanes::<S>::COUNT) {
+                for (y, arriving) in own.clone().zip(of.arriving_at(simd, part, (x, own.clone()), p)) {
+                    for (which, optical) in arriving.into_iter().enumerate() {
+                        optical.store(&mut rows[(y - first) * each + (2 * p + which) * width + x..]);
+                    }
+                }
             }
         }
     }
 }
 
 impl SoftBuffer {
+    /// Optical depths of what arrives at pixels `x`.. of some rows and of the centre's light alone.
     #[inline(always)]
-    fn arrive_row<S: Simd>(&self, simd: S, part: &Part, [y, p]: [usize; 2], soft: &mut [f32], hard: &mut [f32]) {
+    fn arriving_at<S: Simd>(
+        &self,
+        simd: S,
+        part: &Part,
+        (x, rows): (usize, Range<usize>),
+        plane: usize,
+    ) -> [[Lanes<S>; 2]; ROWS] {
         let of = |v: f32| Lanes::splat(simd, v);
-        let columns = || part.columns.clone().step_by(Lanes::<S>::COUNT);
-        // Length per depth of the centre's rays, for now.
-        let (slope, step) = self.penumbra.slopes();
-        let down = slope.y + step * y as f64;
-        for x in part.columns.clone() {
-            let right = slope.x + step * x as f64;
-            hard[x] = (1.0 + right * right + down * down).sqrt() as f32;
+        // Soft light so far, and length per depth of the centre's rays.
+        let mut out = [[of(0.0), self.length(simd, [x, 0])]; ROWS];
+        for (y, out) in rows.clone().zip(&mut out) {
+            out[1] = self.length(simd, [x, y]);
         }
-        soft[part.columns.clone()].fill(0.0);
-        let mut all = 0.0;
-        for (point, (shift, own)) in part.shifts.iter().zip(&self.penumbra.shares).enumerate() {
-            all += own;
-            let back = shift.inverse();
-            let (row, share) = between(&back, y);
-            let rows = [self.sum_row(row, point + 1, p), self.sum_row(row + 1, point + 1, p)];
-            let moved = Moved { rows, share, scale: back.scale as f32, start: back.start[0] as f32 };
-            for x in columns() {
-                let optical = moved.at(simd, x) * Lanes::load(simd, &hard[x..]);
-                let sum = optical.exp_neg() * of(*own) + Lanes::load(simd, &soft[x..]);
-                sum.store(&mut soft[x..]);
+        let (mut own, mut all) = ([of(0.0); ROWS], 0.0);
+        for (point, (shift, share)) in part.shifts.iter().zip(&self.penumbra.shares).enumerate() {
+            all += share;
+            let row = |y: i64| self.sum_row(y, point + 1, plane);
+            moved(simd, row, &shift.inverse(), (x, rows.clone()), &mut own);
+            for (optical, [soft, length]) in own[..rows.len()].iter().zip(&mut out) {
+                *soft = *soft + (*optical * *length).max(of(0.0)).exp_neg() * of(*share);
             }
         }
-        let centre = &self.sum_row(y as i64, 0, p)[PAD..];
-        for x in columns() {
-            let mean = Lanes::load(simd, &soft[x..]) / of(all);
-            (of(0.0) - mean.max(of(LEAST)).logarithm()).max(of(0.0)).store(&mut soft[x..]);
-            (Lanes::load(simd, &centre[x..]) * Lanes::load(simd, &hard[x..])).store(&mut hard[x..]);
+        for (y, [soft, length]) in rows.zip(&mut out) {
+            let mean = *soft / of(all);
+            *soft = (of(0.0) - mean.max(of(LEAST)).logarithm()).max(of(0.0));
+            *length = *length * Lanes::load(simd, &self.sum_row(y as i64, 0, plane)[PAD + x..]);
         }
+        out
+    }
+
+    /// Length per depth of the centre's rays.
+    #[inline(always)]
+    fn length<S: Simd>(&self, simd: S, [x, y]: [usize; 2]) -> Lanes<S> {
+        let (slope, step) = self.penumbra.slopes();
+        let mut out = [0.0; MAX_LANES];
+        let down = slope.y + step * y as f64;
+        for (n, out) in out.iter_mut().enumerate().take(Lanes::<S>::COUNT) {
+            let right = slope.x + step * (x + n) as f64;
+            *out = (1.0 + right * right + down * down).sqrt() as f32;
+        }
+        Lanes::load(simd, &out)
     }
 }
