@@ -284,7 +284,7 @@ fn a_cloud_under_an_extended_light_is_that_under_many_points_of_it() {
             LightShape::Rect { center, u, v: toward(at).cross(u) },
         ];
         for shape in shapes.into_iter().skip(usize::from(most < 0.1)) {
-            let camera = perspective([1.0, 2.0, 12.0], 24.0, [40, 40]);
+            let camera = perspective([1.0, 2.0, 12.0], 24.0, [32, 32]);
             let [rmse, hard, mean] = against_points(&extended(shape, 32), 64, &camera);
             assert!(rmse < most * mean && rmse < 0.9 * hard, "{rmse:e} and {hard:e} of {mean:e}: {shape:?}");
         }
@@ -302,13 +302,15 @@ fn soft_light_is_that_of_the_twin() {
         (parallel([3.0, 2.0, 8.0], 5.0, [20, 16]), [2.0, 9.0, 6.0]),
         (perspective([2.0, 3.0, 8.0], 40.0, [16, 20]), [-2.0, 4.0, -9.0]),
     ] {
-        let light = extended(LightShape::Sphere { center: DVec3::from_array(at), radius: 1.5 }, 8);
+        let light = extended(LightShape::Sphere { center: DVec3::from_array(at), radius: 1.0 }, 8);
         let input = soft(&volumes, &camera, vec![light]);
         let found = draw(&input, &params).unwrap().0;
         let twin = reference::draw(&input, &params).unwrap();
         let worst = (0..320).map(|at| (f64::from(found.channels[0][at]) - twin.color[at][0]).abs()).fold(0.0, f64::max);
         let brightest = twin.color.iter().map(|c| c[0]).fold(0.0, f64::max);
-        assert!(worst < 0.04 * brightest, "{worst:e} of {brightest:e}");
+        let squares = (0..320).map(|at| (f64::from(found.channels[0][at]) - twin.color[at][0]).powi(2)).sum::<f64>();
+        let rmse = (squares / 320.0).sqrt();
+        assert!(worst < 0.06 * brightest && rmse < 0.015 * brightest, "{worst:e} {rmse:e} of {brightest:e}");
     }
 }
 
