@@ -1,12 +1,12 @@
-//! Half-vector sheets of a procedural cloud at 400², the sun before and behind it: without light, with shadows, scattered ahead, and
-//! back and forth; beside image-aligned sheets without light.
+//! Half-vector sheets of a procedural cloud at 400², the sun before and behind it: without light, with shadows, scattered ahead,
+//! back and forth, and under a disk in one sweep; beside image-aligned sheets without light.
 //!
 //! A plain table of minima, as that of `sheets`: by the clock and in processor time of all threads.
 #![allow(missing_docs, clippy::expect_used, reason = "a benchmark")]
 
 use convert::{CloudShape, SplatParams, procedural_cloud};
 use organza_benches::processor_ms;
-use sheet_light::half::{HalfInput, HalfParams, Scattering, fold};
+use sheet_light::half::{Extended, HalfInput, HalfParams, Scattering, fold};
 use sheet_light::{Params, SheetInput, Volume, prepare};
 use splat_core::glam::DVec3;
 use splat_core::shade::{ChannelLayout, LitBy};
@@ -35,6 +35,7 @@ fn main() {
             {
                 half_vectors(&format!("{how}, sun {from}"), &grid, Some(direction), scattering);
             }
+            soft(&format!("soft, disk {from}"), &grid, direction);
         }
     }
 }
@@ -105,12 +106,26 @@ fn half_vectors(name: &str, grid: &Grid, direction: Option<[f64; 3]>, scattering
         LitBy { light: Light { shape, intensity: [3.0; 3] }, shadow: None }
     };
     let sheets = setting.input(grid, direction.map(sun).into_iter().collect());
-    let input = HalfInput { sheets, splats: None, mapped: Vec::new(), opaque: &[] };
+    sweep(name, &HalfInput { sheets, splats: None, extended: Vec::new(), mapped: Vec::new(), opaque: &[] }, scattering);
+}
+
+/// Sixteen points of a disk as wide as the cloud is high, in one sweep.
+fn soft(name: &str, grid: &Grid, direction: [f64; 3]) {
+    let setting = Setting::new(Shading::Phase);
+    let normal = DVec3::from_array(direction).normalize();
+    let shape = LightShape::Disk { center: DVec3::Y * 0.5 - normal * 10.0, normal, radius: 0.6 };
+    let lit = LitBy { light: Light { shape, intensity: [300.0; 3] }, shadow: None };
+    let extended = vec![Extended { lit, samples: 16 }];
+    let sheets = setting.input(grid, Vec::new());
+    sweep(name, &HalfInput { sheets, splats: None, extended, mapped: Vec::new(), opaque: &[] }, Scattering::None);
+}
+
+fn sweep(name: &str, input: &HalfInput<'_>, scattering: Scattering) {
     let params = HalfParams { scattering, ..HalfParams::default() };
     let layout = ChannelLayout::new(&LayerSet::default());
     let (best, counts) = least(|| {
         let mut out = Accumulator::new(SIZE, 1, 3, false, false);
-        fold(&input, &params, &layout, &mut out, None).expect("half vectors serve it")
+        fold(input, &params, &layout, &mut out, None).expect("half vectors serve it")
     });
     row(name, best, [counts.visible, counts.eye_fragments, counts.light_fragments]);
 }

@@ -86,6 +86,34 @@ fn volumes_and_walls_shadow_each_other_as_in_slabs_across_the_view() {
     }
 }
 
+const AREA: &str = "[[light]]\nkind = 'disk'\nposition = [0.9, 4, 1.6]\nnormal = [-0.2, -1, -0.4]\nradius = 0.8\nintensity = [160, 150, 120]\nsamples = 12\n";
+
+const ONE_SWEEP: [&str; 2] = ["--set", "render.sheets.soft_shadows='one_sweep'"];
+
+#[test]
+fn an_area_light_in_one_sweep_is_that_of_its_points() {
+    let scene = parallel_view(2.6, 48) + AREA + MIXED;
+    let [points, soft] = [in_half_vectors(&scene, &[]), in_half_vectors(&scene, &ONE_SWEEP)];
+    for channel in ["R", "G", "A", "scatter1.R", "direct.R", "shadow.A"] {
+        let (a, b) = (points.channel(channel), soft.channel(channel));
+        let mean = a.iter().sum::<f64>() / a.len() as f64;
+        println!("{channel}: RMSE {:.5} of {mean:.4}", rmse(&a, &b));
+        assert!(rmse(&a, &b) < 0.01, "{channel}: RMSE {}", rmse(&a, &b));
+        assert!(mean > 0.03, "{channel}: mean {mean}");
+    }
+    let summed = largest_difference(&soft.channel("G"), &sum_of_effects(&soft, "G"));
+    assert!(summed < 1e-5, "{summed:e}");
+    let threads = in_half_vectors(&scene, &[&ONE_SWEEP[..], &["--threads", "1"]].concat());
+    assert_eq!(threads.channel("R"), soft.channel("R"));
+    let said = explained(&scene, &ONE_SWEEP);
+    assert!(said.contains("softness of light 0") && said.contains("one sweep sees each slab from 12 points"), "{said}");
+    let said = explained(&scene, &[]);
+    assert!(said.contains("a sweep for each of 12 points of it; penumbras widen by 0.3"), "{said}");
+    // What no sweep carries has its maps, as ever.
+    let inside = scene.replace("[0.9, 4, 1.6]", "[0.3, 0.9, 0.3]");
+    assert!(explained(&inside, &ONE_SWEEP).contains("a shadow map for each of 12 points of it"));
+}
+
 #[test]
 fn threads_and_the_order_of_lights_change_no_bit() {
     let (one, other) = (bright("[-0.4, -1, -0.6]"), bright("[0.3, -0.8, 0.7]"));

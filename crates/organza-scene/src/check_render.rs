@@ -4,11 +4,11 @@ use super::check::{At, LARGEST, SMALLEST};
 use super::de::suggest;
 use super::raw_render::{
     Auto, RawAccumulation, RawAligned, RawClassify, RawDirection, RawMapping, RawParticles, RawPoints, RawRender,
-    RawScattering, RawShadow, RawSheets, RawSlicing, RawSurfaceSampler,
+    RawScattering, RawShadow, RawSheets, RawSlicing, RawSoftShadows, RawSurfaceSampler,
 };
 use super::{
     Aligned, Classify, LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, RenderSettings, Scattering,
-    ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SurfaceSampler, Technique,
+    ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler, Technique,
 };
 use crate::{Error, shown};
 use splat_core::raster::Accumulation;
@@ -187,12 +187,17 @@ fn check_slicing(at: &At<'_>, raw: &RawSheets) -> Result<Slicing, Error> {
             light_pixels: at.number("light_pixels", raw.light_pixels.unwrap_or(1.5), 0.1..=16.0)?,
             most_light_pixels: at.whole("most_light_pixels", raw.most_light_pixels.unwrap_or(2048), 16..=8192)?,
             scattering: check_scattering(at, raw)?,
+            soft_shadows: match raw.soft_shadows {
+                RawSoftShadows::Points => SoftShadows::Points,
+                RawSoftShadows::OneSweep => SoftShadows::OneSweep,
+            },
         });
     }
     let given = [
         ("light_pixels", raw.light_pixels.is_some()),
         ("most_light_pixels", raw.most_light_pixels.is_some()),
         ("scattering", raw.scattering != RawScattering::Once),
+        ("soft_shadows", raw.soft_shadows != RawSoftShadows::Points),
     ];
     if let Some((key, _)) = given.into_iter().find(|(_, is_given)| *is_given) {
         let message = format!("`{key}`: slabs across the view do not carry light");

@@ -60,6 +60,8 @@ pub(super) struct RawSheets {
     pub(super) light_pixels: Option<f64>,
     /// With "half_vector": most pixels of a light's buffer along a side, 16 to 8192; default 2048.
     pub(super) most_light_pixels: Option<u32>,
+    /// With "half_vector": how a light with an extent is carried, "points" (default), a sweep for each of its points, or "one_sweep".
+    pub(super) soft_shadows: RawSoftShadows,
     /// With "half_vector": how often media scatter light, "once" (default), "forward", or "forward_and_back".
     pub(super) scattering: RawScattering,
     /// With scattering: half angle of the cone that light spreads into ahead, degrees from 0 to below 90, or "auto" (the default).
@@ -102,6 +104,16 @@ pub(super) enum RawClassify {
 pub(super) enum RawAligned {
     View,
     Axis,
+}
+
+/// How a light with an extent is carried.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "SoftShadows")]
+pub(super) enum RawSoftShadows {
+    #[default]
+    Points,
+    OneSweep,
 }
 
 /// How often media scatter light.

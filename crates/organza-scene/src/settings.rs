@@ -145,7 +145,19 @@ pub enum Slicing {
         most_light_pixels: u32,
         /// How often light is scattered; `None` for once.
         scattering: Option<Scattering>,
+        /// How a light with an extent is carried.
+        soft_shadows: SoftShadows,
     },
+}
+
+/// How half-vector sheets carry the light of a sphere, a disk or a rectangle.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub enum SoftShadows {
+    /// A sweep for each of its points.
+    #[default]
+    Points,
+    /// One sweep, in which each slab is seen from all of its points (Zhang and Crawfis, section 5).
+    OneSweep,
 }
 
 /// Light that media scatter more than once (Zhang and Crawfis, section 3).

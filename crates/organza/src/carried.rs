@@ -41,26 +41,29 @@ pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: 
     let Some(carries) = of_scene(scene) else { return Ok(()) };
     let cloud = Some(&loaded.cloud);
     let matter = Matter { scene, own: &loaded.own, planned: &plan.objects, cloud, camera: &loaded.camera };
-    let Carries { points: carries, scatters_again } = carries(&matter, points)?;
+    let asked = carries(&matter, points)?;
+    let Carries { points: carries, scatters_again, .. } = &asked;
+    let scatters_again = *scatters_again;
     let called_for = |point: &LightPoint| plan.shadow_maps[point.of];
-    plan.carried = points.iter().zip(&carries).map(|(point, carries)| called_for(point) && carries.is_ok()).collect();
+    plan.carried = points.iter().zip(carries).map(|(point, carries)| called_for(point) && carries.is_ok()).collect();
     plan.scatters_again = scatters_again;
     let missing = loaded.own.iter().any(|own| !own.has_splats && loaded.objects[own.object].casts_shadow);
-    if missing && points.iter().zip(&carries).any(|(point, carries)| called_for(point) && carries.is_err()) {
+    if missing && points.iter().zip(carries).any(|(point, carries)| called_for(point) && carries.is_err()) {
         return Err(Error::Internal("splats that a shadow map needs were not made".into()));
     }
     let is_left = |light: usize| {
-        plan.shadow_maps[light] && points.iter().zip(&carries).any(|(point, c)| point.of == light && c.is_err())
+        plan.shadow_maps[light] && points.iter().zip(carries).any(|(point, c)| point.of == light && c.is_err())
     };
     plan.scattered_once = if scatters_again { (0..plan.shadow_maps.len()).filter(|l| is_left(*l)).count() } else { 0 };
     let told = |light: usize| plan.shadow_maps[light] || scatters_again;
     let effects: Vec<Effect> = (0..plan.shadow_maps.len())
         .filter(|light| told(*light))
-        .map(|light| {
+        .flat_map(|light| {
             let own: Vec<_> =
-                points.iter().zip(&carries).filter(|(point, _)| point.of == light).map(|(_, c)| c).collect();
+                points.iter().zip(carries).filter(|(point, _)| point.of == light).map(|(_, c)| c).collect();
             let (called_for, reason) = way(&own, plan.shadow_maps[light], scatters_again);
-            Effect { name: format!("light {light} through volumes"), called_for, reason, bound: 0.0 }
+            let through = Effect { name: format!("light {light} through volumes"), called_for, reason, bound: 0.0 };
+            std::iter::once(through).chain(softness(light, points, &asked, called_for))
         })
         .collect();
     let lights = plan.shadow_maps.len();
@@ -83,6 +86,19 @@ fn way(points: &[&Result<(), String>], has_shadow: bool, scatters_again: bool) -
         None => "it comes through slabs that light and view share".into(),
     };
     (carried > 0, of_all + &reason)
+}
+
+/// Whether the shadow of a light with an extent is soft, and how, in words; `None` for a light without one.
+fn softness(light: usize, points: &[LightPoint], asked: &Carries, is_carried: bool) -> Option<Effect> {
+    let k = points.iter().position(|point| point.of == light && point.whole.shape.is_extended())?;
+    let [_, all] = points[k].rank;
+    let way = match (is_carried, asked.together) {
+        (true, true) => format!("one sweep sees each slab from {all} points of it"),
+        (true, false) => format!("a sweep for each of {all} points of it"),
+        (false, _) => format!("a shadow map for each of {all} points of it"),
+    };
+    let reason = format!("{way}; penumbras widen by {:.3} of the distance to what casts them", asked.widening[k]);
+    Some(Effect { name: format!("softness of light {light}"), called_for: all > 1, reason, bound: 0.0 })
 }
 
 /// The maps that are wanted: one for each point of a light, of all casters, and where light is carried one for each point, of

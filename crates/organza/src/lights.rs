@@ -8,10 +8,12 @@ use splat_core::Light;
 pub(crate) struct LightPoint {
     /// What it gives.
     pub(crate) light: Light,
+    /// The light that it is of.
+    pub(crate) whole: Light,
     /// The place of its whole light in [`Loaded::lights`](crate::Loaded::lights).
     pub(crate) of: usize,
     /// Which of its points it is, and how many there are.
-    rank: [usize; 2],
+    pub(crate) rank: [usize; 2],
 }
 
 impl LightPoint {
@@ -26,8 +28,8 @@ impl LightPoint {
 pub(crate) fn points(lights: &[SceneLight]) -> Vec<LightPoint> {
     let of_light = |(of, light): (usize, &SceneLight)| {
         let points = light.light.points(light.samples);
-        let all = points.len();
-        points.into_iter().enumerate().map(move |(k, light)| LightPoint { light, of, rank: [k, all] })
+        let (all, whole) = (points.len(), light.light);
+        points.into_iter().enumerate().map(move |(k, light)| LightPoint { light, whole, of, rank: [k, all] })
     };
     let mut all: Vec<LightPoint> = lights.iter().enumerate().flat_map(of_light).collect();
     all.sort_by_cached_key(|point| (point.light.bits(), lights[point.of].shadow));

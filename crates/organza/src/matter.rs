@@ -26,6 +26,11 @@ pub(crate) struct Carries {
     pub(crate) points: Vec<Result<(), String>>,
     /// Whether light is scattered more than once on its way.
     pub(crate) scatters_again: bool,
+    /// Whether the points of a light with an extent go through it together.
+    pub(crate) together: bool,
+    /// For each point of a light: how wide penumbras of the whole light become per distance behind what casts them, among what is
+    /// drawn so; 0 for a light without an extent.
+    pub(crate) widening: Vec<f64>,
 }
 
 /// How a technique is asked for that; it refuses what cannot be drawn so.

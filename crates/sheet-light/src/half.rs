@@ -19,6 +19,7 @@
 //! | 21: classify and composite into the shadow buffer | `light_buffer.rs` |
 //! | 22, 23: polygons, as discs, for eye and light | `splats.rs`, `splat_light.rs` |
 //! | the loop over slabs | `sweep.rs` |
+//! | section 5: soft shadows | `penumbra.rs`, `moved.rs`, `soft_buffer.rs` |
 //! | section 3: light that is scattered more than once | `scatter.rs` |
 //!
 //! ```
@@ -45,7 +46,7 @@
 //! };
 //! let mut image = Accumulator::new([16, 16], 1, 3, false, false);
 //! let layout = ChannelLayout::new(&LayerSet::default());
-//! fold(&HalfInput { sheets, splats: None, mapped: Vec::new(), opaque: &[] }, &HalfParams::default(), &layout, &mut image, None).unwrap();
+//! fold(&HalfInput { sheets, splats: None, extended: Vec::new(), mapped: Vec::new(), opaque: &[] }, &HalfParams::default(), &layout, &mut image, None).unwrap();
 //! // (1 − e^(−2τ))/2 of what is scattered to all sides alike.
 //! let expected = 0.5 * (1.0 - (-2f32).exp()) / (4.0 * std::f32::consts::PI);
 //! assert!(image.channels[0].iter().all(|c| (c - expected).abs() < 1e-5));
@@ -65,7 +66,9 @@ mod illuminate;
 mod lamp;
 mod light_buffer;
 mod light_path;
+mod moved;
 mod params;
+mod penumbra;
 mod placed;
 pub mod reference;
 mod scatter;
@@ -73,6 +76,7 @@ mod serves;
 mod shade;
 mod sheet;
 mod sight;
+mod soft_buffer;
 mod splat_light;
 mod splat_squares;
 mod splats;
@@ -82,7 +86,7 @@ pub use axis::HalfVector;
 pub use bodies::{Bodies, SplatBounds};
 pub use counts::HalfCounts;
 pub use fold::{balance, bytes, fold, slab_width};
-pub use params::{HalfInput, HalfParams, Scattering};
+pub use params::{Extended, HalfInput, HalfParams, MOST_SAMPLES, Scattering};
 pub use scatter::balance::Balance;
-pub use serves::{LEAST_COSINE, Reason, serves};
+pub use serves::{LEAST_COSINE, MOST_DEPTH, Reason, penumbra_widening, serves, serves_extended};
 pub use splats::HalfSplats;

@@ -6,5 +6,6 @@ mod hard_cases;
 mod invariances;
 mod paths;
 mod scattering;
+mod soft;
 mod splats;
 mod twin;

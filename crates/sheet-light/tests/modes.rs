@@ -196,7 +196,13 @@ fn what_older_methods_do_not_draw_is_refused() {
     refused(&volumes[..1], &view, Params { slab_width: Some(0.5), ..ALONG }, "slab_width");
     let layout = ChannelLayout::new(&LayerSet::default());
     for (sheets, name) in [(BEFORE, "classify"), (ALONG, "aligned")] {
-        let half = HalfInput { sheets: input(&volumes, &view, &[]), mapped: Vec::new(), opaque: &[] };
+        let half = HalfInput {
+            sheets: input(&volumes, &view, &[]),
+            splats: None,
+            extended: Vec::new(),
+            mapped: Vec::new(),
+            opaque: &[],
+        };
         let mut out = Accumulator::new([8, 8], 1, layout.count(), false, false);
         let refused = fold(&half, &HalfParams { sheets, ..HalfParams::default() }, &layout, &mut out, None);
         assert!(matches!(&refused, Err(Error::Parameter { name: n, .. }) if *n == name), "{name}: {refused:?}");

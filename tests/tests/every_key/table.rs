@@ -405,6 +405,7 @@ fn render() -> Vec<Entry> {
         of(VOLUME, "render.sheets.aligned", "render.sheets.aligned='axis'").by(SHEETS).with(&["camera.orthographic=2"]),
         of(BALL, "render.sheets.light_pixels", "render.sheets.light_pixels=0.4").by(SHEETS).with(HALF_VECTOR),
         of(BALL, "render.sheets.most_light_pixels", "render.sheets.most_light_pixels=16").by(SHEETS).with(HALF_VECTOR),
+        of(BALL, "render.sheets.soft_shadows", "render.sheets.soft_shadows='one_sweep'").by(SHEETS).with(SOFT),
         of(BALL, "render.sheets.scattering", "render.sheets.scattering='forward_and_back'")
             .by(SHEETS)
             .with(HALF_VECTOR),
@@ -424,6 +425,11 @@ fn render() -> Vec<Entry> {
 }
 
 const HALF_VECTOR: &[&str] = &["render.sheets.slicing='half_vector'"];
+
+const SOFT: &[&str] = &[
+    "render.sheets.slicing='half_vector'",
+    "light=[{kind='sphere', position=[2, 3, 2], radius=0.3, intensity=[20, 18, 16], samples=4}]",
+];
 
 const SCATTERING: &[&str] = &["render.sheets.slicing='half_vector'", "render.sheets.scattering='forward_and_back'"];
 

@@ -19,6 +19,8 @@ pub struct HalfCounts {
     pub scatter_cells: u64,
     /// Convolutions and corrections of scattered light; 0 where none is simulated.
     pub scatter_passes: u64,
+    /// Images of a slab or of light that were moved for soft shadows, two a slab and point of a light; 0 where shadows are hard.
+    pub soft_passes: u64,
     /// Bytes of the light buffer of one sweep and of its scattered light, the largest; they do not grow with slabs.
     pub light_bytes: u64,
     /// Bytes of everything that one sweep holds, the largest.
@@ -37,6 +39,7 @@ impl HalfCounts {
             light_fragments: self.light_fragments + other.light_fragments,
             scatter_cells: self.scatter_cells.max(other.scatter_cells),
             scatter_passes: self.scatter_passes + other.scatter_passes,
+            soft_passes: self.soft_passes + other.soft_passes,
             light_bytes: self.light_bytes.max(other.light_bytes),
             bytes: self.bytes.max(other.bytes),
         }

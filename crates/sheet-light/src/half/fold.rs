@@ -4,13 +4,16 @@ use super::band::ROWS;
 use super::bodies::Bodies;
 use super::counts::HalfCounts;
 use super::frame::Frame;
+use super::light_buffer::planes;
+use super::penumbra::Penumbra;
 use super::scatter::{self, Scattered, Scene, balance::Balance};
-use super::serves::{axis_of_view, serves};
+use super::serves::{axis_of_view, serves, serves_extended};
+use super::soft_buffer::SoftBuffer;
 use super::sweep::Sweep;
-use super::{HalfInput, HalfParams, HalfSplats, Scattering, lamp};
+use super::{HalfInput, HalfParams, HalfSplats, MOST_SAMPLES, Scattering, lamp};
 use crate::lattice::Lattice;
 use crate::visible::Voxels;
-use crate::{Error, Params, SheetInput, Volume};
+use crate::{Error, Params, Volume};
 use splat_core::shade::{ChannelLayout, LitBy, MAX_CHANNELS};
 use splat_core::{Accumulator, Camera, Light, Progress};
 
@@ -54,8 +57,8 @@ pub fn fold(
     }
     let quiet = Progress::new();
     let progress = progress.unwrap_or(&quiet);
-    let mut lights: Vec<&LitBy<'_>> = input.sheets.lights.iter().collect();
-    lights.sort_by_key(|lit| lit.light.bits());
+    let mut lights: Vec<(&LitBy<'_>, u32)> = carried(input).collect();
+    lights.sort_by_key(|(lit, samples)| (lit.light.bits(), *samples));
     let first = Sweep::new(input, params, lights.first().copied(), false)?;
     let is_lit = first.light.is_some();
     progress.add_total(u64::from(first.frame.slabs.count));
@@ -84,7 +87,7 @@ pub fn slab_width(bodies: &Bodies<'_>, camera: &Camera, light: Option<&Light>, p
     Ok(Frame::new(bodies, camera, params, &axis_of_view(bodies, camera, light))?.slabs.width)
 }
 
-/// Where the light of one lamp of the input stays, as its scattering among the volumes is simulated: in cells, by two streams, however
+/// Where the light of one lamp of [`HalfInput::sheets`] stays, as its scattering among the volumes is simulated: in cells, by two streams, however
 /// the slabs lie. All 0 for a lamp that nothing scatters, or under [`Scattering::None`].
 ///
 /// # Errors
@@ -102,6 +105,12 @@ pub fn balance(input: &HalfInput<'_>, params: &HalfParams, light: usize) -> Resu
     Ok(Scattered::new(&scene, params.scattering).balance.scaled(lit.light.intensity))
 }
 
+/// Lights that have a sweep, each with the points that stand for it.
+fn carried<'a>(input: &'a HalfInput<'a>) -> impl Iterator<Item = (&'a LitBy<'a>, u32)> {
+    let points = input.sheets.lights.iter().map(|lit| (lit, 1));
+    points.chain(input.extended.iter().map(|extended| (&extended.lit, extended.samples)))
+}
+
 fn check(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
     params.check()?;
     input.sheets.check()?;
@@ -116,13 +125,17 @@ fn check(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
     if let Some(splats) = &input.splats {
         check_splats(input, splats, params)?;
     }
-    let lights = &input.sheets.lights;
-    for (light, lit) in lights.iter().chain(&input.mapped).enumerate() {
+    for (light, lit) in carried(input).map(|(lit, _)| lit).chain(&input.mapped).enumerate() {
         lit.light.validate(light).map_err(Error::Light)?;
     }
-    for (light, lit) in lights.iter().enumerate() {
-        serves(&input.bodies(), input.sheets.camera, &lit.light)
-            .map_err(|reason| Error::HalfVector { light, reason })?;
+    if let Some(samples) = input.extended.iter().map(|e| e.samples).find(|n| !(1..=MOST_SAMPLES).contains(n)) {
+        return Err(Error::parameter("extended.samples", samples, "1 to 1024"));
+    }
+    let (bodies, camera) = (&input.bodies(), input.sheets.camera);
+    let points = input.sheets.lights.iter().map(|lit| serves(bodies, camera, &lit.light));
+    let extended = input.extended.iter().map(|e| serves_extended(bodies, camera, &e.lit.light, e.samples));
+    for (light, served) in points.chain(extended).enumerate() {
+        served.map_err(|reason| Error::HalfVector { light, reason })?;
     }
     check_memory(input, params)
 }
@@ -141,6 +154,11 @@ fn check_splats(input: &HalfInput<'_>, splats: &HalfSplats<'_>, params: &HalfPar
     if splats.cloud.origin != input.sheets.shadow_origin {
         return Err(Error::parameter("sheets.shadow_origin", input.sheets.shadow_origin, "the origin of the splats"));
     }
+    if !input.extended.is_empty() {
+        let found = format!("{} lights", input.extended.len());
+        let expected = "none beside splats, whose shadows are those of points: `Light::points` has them";
+        return Err(Error::parameter("extended", found, expected));
+    }
     if params.scattering != Scattering::None {
         let expected = "None beside splats, which shadow no light that is scattered more than once";
         return Err(Error::parameter("scattering", params.scattering, expected));
@@ -150,18 +168,22 @@ fn check_splats(input: &HalfInput<'_>, splats: &HalfSplats<'_>, params: &HalfPar
 
 /// Refuses what takes more than it may, before it does.
 fn check_memory(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
-    let SheetInput { camera, lights, .. } = &input.sheets;
-    let needed = bytes(&input.bodies(), camera, lights.iter().map(|lit| &lit.light), params);
+    let camera = input.sheets.camera;
+    let needed = bytes(&input.bodies(), camera, carried(input).map(|(lit, samples)| (&lit.light, samples)), params);
     let limit = params.sheets.limits.max_bytes;
-    let hint = || "use fewer voxels, a smaller picture or fewer pixels of the light buffer".to_owned();
+    let hint = || {
+        "use fewer voxels, a smaller picture, fewer pixels of the light buffer or fewer points of an extended light"
+            .to_owned()
+    };
     if needed > limit { Err(Error::limit("half-vector sheets", needed, limit, "bytes", hint())) } else { Ok(()) }
 }
 
-/// Bytes that [`fold`] takes at most for such lights, of which sweeps follow one another.
+/// Bytes that [`fold`] takes at most for such lights, of which sweeps follow one another: each with the points that stand for it, 1 for
+/// one without an extent.
 pub fn bytes<'l>(
     bodies: &Bodies<'_>,
     camera: &Camera,
-    lights: impl Iterator<Item = &'l Light>,
+    lights: impl Iterator<Item = (&'l Light, u32)>,
     params: &HalfParams,
 ) -> u64 {
     if bodies.is_empty() {
@@ -188,7 +210,26 @@ pub fn bytes<'l>(
         2 * (all / u64::from(params.voxels_per_cell) + 1) * 350
     };
     let splats = bodies.splats.map_or(0, |splats| splats.count * BYTES_A_SPLAT);
-    let pixels =
-        |light: &Light| lamp::camera_of(bodies, light, params).size.into_iter().map(u64::from).product::<u64>();
-    eye + of_a_pixel * lights.map(pixels).max().unwrap_or(0) + cells + splats + volumes.iter().map(voxels).sum::<u64>()
+    let light = |(light, samples): (&Light, u32)| {
+        let image = lamp::camera_of(bodies, light, params);
+        let pixels: u64 = image.size.into_iter().map(u64::from).product();
+        of_a_pixel * pixels + soft_bytes((bodies, camera), (light, samples), &image, params)
+    };
+    eye + lights.map(light).max().unwrap_or(0) + cells + splats + volumes.iter().map(voxels).sum::<u64>()
+}
+
+/// Bytes of the images of an extended light's points.
+fn soft_bytes(
+    (bodies, camera): (&Bodies<'_>, &Camera),
+    light: (&Light, u32),
+    image: &Camera,
+    params: &HalfParams,
+) -> u64 {
+    let sheets = Params { slab_width: None, ..params.sheets };
+    let frame = Frame::new(bodies, camera, &sheets, &axis_of_view(bodies, camera, Some(light.0)));
+    let penumbra = frame.ok().and_then(|frame| Penumbra::new(&frame, bodies, light, image, params.most_light_pixels));
+    penumbra.map_or(0, |penumbra| {
+        let planes = planes(bodies.volumes) as u64;
+        SoftBuffer::bytes_of(&penumbra, planes) + 4 * planes * image.size.into_iter().map(u64::from).product::<u64>()
+    })
 }

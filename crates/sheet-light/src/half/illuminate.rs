@@ -14,8 +14,9 @@
 
 use super::frame::Frame;
 use super::light_buffer::LightBuffer;
-use super::light_path::{BENDS, LightPath, Places};
+use super::light_path::{BENDS, LightPath, Places, Ways};
 use super::sheet::is_any;
+use super::soft_buffer::Soft;
 use super::splat_light::SplatLight;
 use crate::Volume;
 use splat_core::glam::Vec3;
@@ -69,14 +70,15 @@ impl Illumination<'_> {
         let of = |v: f32| Lanes::splat(simd, v);
         let [nearer, farther] = &asked.ends;
         let middle = between(asked, of(0.5));
+        let soft = self.buffer.soft.as_ref().map(|soft| soft.at(simd, &middle, wanted));
         let (mut optical, mut bends, mut is_bent) = ([[of(0.0); NODES]; 3], [of(1.0); BENDS], of(0.0));
         for v in 0..self.volumes.len() {
             let mean = self.means(simd, v, &middle, asked.extinction, wanted);
             let ways = [self.paths[v].ways(simd, nearer, self.face), self.paths[v].ways(simd, farther, self.face)];
             let own = Lanes::load(simd, &asked.extinction[v]);
             let ends = [ways[0].optical_depth(simd, mean, own), ways[1].optical_depth(simd, mean, own)];
-            self.add(simd, ends[0], v, 0, &mut optical);
-            self.add(simd, ends[1], v, NODES - 1, &mut optical);
+            self.add(simd, (&ways[0], mean, own), &soft, [v, 0], &mut optical);
+            self.add(simd, (&ways[1], mean, own), &soft, [v, NODES - 1], &mut optical);
             // The first volume that is seen and bends decides.
             let (at, does) = ways[0].bends(simd, &ways[1]);
             let mut does = does.where_less(of(0.0), own);
@@ -91,7 +93,14 @@ impl Illumination<'_> {
             is_bent = is_bent.max(does);
         }
         if is_any(is_bent) {
-            self.add_bends(simd, asked, &bends, wanted, &mut optical);
+            self.add_bends(simd, asked, &bends, wanted, (&soft, &mut optical));
+        }
+        if let Some(soft) = &soft {
+            for p in 0..planes {
+                for node in &mut optical[p] {
+                    *node = *node + soft.rest[p];
+                }
+            }
         }
         if let Some(splats) = self.splats {
             self.add_splats(simd, splats, &middle, wanted, &mut optical);
@@ -116,7 +125,7 @@ impl Illumination<'_> {
         asked: &Asked<'_, S>,
         bends: &[Lanes<S>; BENDS],
         wanted: &[f32; MAX_LANES],
-        to: &mut [[Lanes<S>; NODES]; 3],
+        (soft, to): (&Option<Soft<S>>, &mut [[Lanes<S>; NODES]; 3]),
     ) {
         let middle = between(asked, Lanes::splat(simd, 0.5));
         for v in 0..self.volumes.len() {
@@ -124,7 +133,7 @@ impl Illumination<'_> {
             let own = Lanes::load(simd, &asked.extinction[v]);
             for n in 0..BENDS {
                 let ways = self.paths[v].ways(simd, &between(asked, bends[n]), self.face);
-                self.add(simd, ways.optical_depth(simd, mean, own), v, n + 1, to);
+                self.add(simd, (&ways, mean, own), soft, [v, n + 1], to);
             }
         }
     }
@@ -153,11 +162,22 @@ impl Illumination<'_> {
 
     /// Adds the optical depth of a volume at a node, by plane.
     #[inline(always)]
-    fn add<S: Simd>(&self, simd: S, tau: Lanes<S>, v: usize, node: usize, to: &mut [[Lanes<S>; NODES]; 3]) {
+    fn add<S: Simd>(
+        &self,
+        simd: S,
+        (ways, mean, own): (&Ways<S>, Lanes<S>, Lanes<S>),
+        soft: &Option<Soft<S>>,
+        [v, node]: [usize; 2],
+        to: &mut [[Lanes<S>; NODES]; 3],
+    ) {
         if !self.volumes[v].casts_shadow {
             return;
         }
         for p in 0..3 {
+            let tau = match soft {
+                None => ways.optical_depth(simd, mean, own),
+                Some(soft) => ways.optical_depth(simd, mean * soft.share[p], own),
+            };
             let share = Lanes::splat(simd, self.volumes[v].material.extinction_rgb[p]);
             to[p][node] = tau.mul_add(share, to[p][node]);
         }
@@ -226,7 +246,7 @@ impl pulp::WithSimd for ThroughVolumes<'_> {
                 let mean = of.means(simd, v, &at, &extinction, &wanted);
                 let own = Lanes::load(simd, &extinction[v]);
                 let ways = of.paths[v].ways(simd, &at, of.face);
-                of.add(simd, ways.optical_depth(simd, mean, own), v, 0, &mut optical);
+                of.add(simd, (&ways, mean, own), &None, [v, 0], &mut optical);
             }
             for p in 0..3 {
                 let mut through = [0.0; MAX_LANES];

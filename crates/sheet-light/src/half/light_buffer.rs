@@ -8,9 +8,11 @@
 use super::band::{Band, ROWS};
 use super::buckets::Buckets;
 use super::frame::Frame;
+use super::penumbra::Penumbra;
 use super::placed::Placed;
 use super::sheet::{Sheet, Splatter};
 use super::sight::{Shape, Sight};
+use super::soft_buffer::SoftBuffer;
 use crate::Volume;
 use rayon::prelude::*;
 use splat_core::Camera;
@@ -29,12 +31,17 @@ pub(crate) struct LightBuffer {
     /// Row by row, volume by volume in a pixel.
     sums: Vec<Sums>,
     volumes: usize,
+    /// Where the light has an extent.
+    pub(crate) soft: Option<SoftBuffer>,
 }
 
-struct LightBand {
-    band: Band,
+/// A band of the light's image.
+pub(crate) struct LightBand {
+    pub(crate) band: Band,
     /// One sheet serves all volumes, one after the other.
     sheet: Sheet,
+    /// For soft shadows: extinction times depth of the present slab, plane by plane in a pixel; else empty.
+    pub(crate) slab: Vec<f32>,
 }
 
 impl LightBuffer {
@@ -44,7 +51,7 @@ impl LightBuffer {
         let band = |b: usize| {
             let band = Band::new(b, 0, frame, &camera, volumes);
             let sheet = Sheet::new(&band);
-            LightBand { band, sheet }
+            LightBand { band, sheet, slab: Vec::new() }
         };
         Self {
             sight,
@@ -53,6 +60,23 @@ impl LightBuffer {
             bands: (0..height.div_ceil(ROWS)).into_par_iter().map(band).collect(),
             sums: vec![[0.0; 4]; width * height * volumes.len()],
             volumes: volumes.len(),
+            soft: None,
+        }
+    }
+
+    /// Gives the light an extent.
+    pub(crate) fn soften(&mut self, penumbra: Penumbra, volumes: &[Volume<'_>]) {
+        let planes = planes(volumes);
+        for LightBand { band, slab, .. } in &mut self.bands {
+            *slab = vec![0.0; band.rows.len() * band.width * planes];
+        }
+        self.soft = Some(SoftBuffer::new(penumbra, planes, &self.sight));
+    }
+
+    /// Finds what arrives at a slab, where that is not what the sums have.
+    pub(crate) fn arrive(&mut self, slab: u32, frame: &Frame) {
+        if let Some(soft) = &mut self.soft {
+            soft.arrive([frame.slabs.face(slab), frame.slabs.face(slab + 1)]);
         }
     }
 
@@ -68,8 +92,8 @@ impl LightBuffer {
 
     /// Bytes of the buffer itself, without lists of voxels.
     pub(crate) fn bytes(&self) -> u64 {
-        let bands: u64 = self.bands.iter().map(|b| b.band.bytes() + b.sheet.bytes()).sum();
-        bands + (self.sums.len() * size_of::<Sums>()) as u64
+        let bands: u64 = self.bands.iter().map(|b| b.band.bytes() + b.sheet.bytes() + 4 * b.slab.len() as u64).sum();
+        bands + (self.sums.len() * size_of::<Sums>()) as u64 + self.soft.as_ref().map_or(0, SoftBuffer::bytes)
     }
 
     /// Bytes of lists of voxels.
@@ -80,7 +104,7 @@ impl LightBuffer {
     /// Reconstructs a slab in the light's image and attenuates by it (steps 11, 14 and 21 of the pseudocode). Number of footprint
     /// numbers.
     pub(crate) fn attenuate(&mut self, slab: u32, frame: &Frame, placed: &[Placed<'_>]) -> u64 {
-        let Self { sight, shapes, buckets, bands, sums, volumes } = self;
+        let Self { sight, shapes, buckets, bands, sums, volumes, soft } = self;
         if *volumes == 0 {
             return 0;
         }
@@ -90,7 +114,11 @@ impl LightBuffer {
         let band = |(index, (band, sums)): (usize, (&mut LightBand, &mut [Sums]))| {
             pulp::Arch::new().dispatch(OneBand { of: &of, index, band, sums })
         };
-        bands.par_iter_mut().zip(chunks).enumerate().map(band).sum()
+        let fragments = bands.par_iter_mut().zip(chunks).enumerate().map(band).sum();
+        if let Some(soft) = soft {
+            soft.add([frame.slabs.face(slab), frame.slabs.face(slab + 1)], bands);
+        }
+        fragments
     }
 
     /// Optical depth and length so far about a place of the image, pixels, bilinear; neighbours at a border are those inside.
@@ -136,7 +164,9 @@ impl pulp::WithSimd for OneBand<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> u64 {
         let Attenuate { slab, frame, placed, sight, shapes, buckets } = *self.of;
-        let LightBand { band, sheet } = self.band;
+        let LightBand { band, sheet, slab: depths } = self.band;
+        depths.fill(0.0);
+        let planes = depths.len() / (band.rows.len() * band.width);
         let faces = [frame.slabs.face(slab), frame.slabs.face(slab + 1)];
         let mut fragments = 0;
         for (v, placed) in placed.iter().enumerate().filter(|(_, p)| p.volume.casts_shadow) {
@@ -151,17 +181,41 @@ impl pulp::WithSimd for OneBand<'_> {
                 let mut x = sheet.spans[y].start;
                 while x < sheet.spans[y].end {
                     let k = y * band.stride + x;
-                    let length = sheet.depth(simd, k) * Lanes::load(simd, &band.stretch[k..]);
-                    let tau = sheet.classify(simd, placed, k)[0] * length;
+                    let depth = sheet.depth(simd, k);
+                    let length = depth * Lanes::load(simd, &band.stretch[k..]);
+                    let extinction = sheet.classify(simd, placed, k)[0];
+                    let tau = extinction * length;
                     let row = &mut self.sums[y * band.width * placed_count(self.of)..];
                     let count = Lanes::<S>::COUNT.min(band.width.saturating_sub(x));
                     add(tau, length, row, [x, count, v, placed_count(self.of)]);
+                    if planes > 0 {
+                        let to = &mut depths[(y * band.width + x) * planes..];
+                        add_depth(extinction * depth, to, [count, planes], placed.volume.material.extinction_rgb);
+                    }
                     x += Lanes::<S>::COUNT;
                 }
             }
         }
         fragments
     }
+}
+
+/// Adds extinction times depth to `count` pixels, by plane.
+#[inline(always)]
+fn add_depth<S: Simd>(own: Lanes<S>, to: &mut [f32], [count, planes]: [usize; 2], factors: [f32; 3]) {
+    let mut of_each = [0.0; MAX_LANES];
+    own.store(&mut of_each);
+    for lane in 0..count {
+        for p in 0..planes {
+            to[lane * planes + p] += of_each[lane] * factors[p];
+        }
+    }
+}
+
+/// Channels of extinction that differ: one where all volumes attenuate all alike.
+pub(crate) fn planes(volumes: &[Volume<'_>]) -> usize {
+    let is_alike = |v: &Volume<'_>| v.material.extinction_rgb.windows(2).all(|w| w[0] == w[1]);
+    if volumes.iter().all(is_alike) { 1 } else { 3 }
 }
 
 fn placed_count(of: &Attenuate<'_>) -> usize {

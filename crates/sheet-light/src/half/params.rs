@@ -15,7 +15,9 @@ pub struct HalfInput<'a> {
     /// Splats among the volumes: they shadow them and each other, and take shadows of them. Those of `sheets` are refused, for their
     /// light is known.
     pub splats: Option<HalfSplats<'a>>,
-    /// Lights beside those of `sheets`, for which there is no sweep: their shadow, that of these volumes included, is known, or they
+    /// Lights with an extent, a sweep each, whose shadows are soft.
+    pub extended: Vec<Extended<'a>>,
+    /// Lights beside those, for which there is no sweep: their shadow, that of these volumes included, is known, or they
     /// cast none.
     pub mapped: Vec<LitBy<'a>>,
     /// View depth of what hides all that at each pixel, +∞ for nothing; or empty.
@@ -29,6 +31,21 @@ impl HalfInput<'_> {
         Bodies { volumes: &self.sheets.volumes, splats }
     }
 }
+
+/// A light with an extent: a sphere, a disk, a rectangle.
+///
+/// One sweep attenuates along the rays of each of its points. Unattenuated, it lights as its centre does, by
+/// [`splat_core::Light::irradiance`]; and so it is scattered more than once.
+#[derive(Clone, Copy)]
+pub struct Extended<'a> {
+    /// The light, and the shadow of everything but the volumes, its mean over the light. One without an extent is a point.
+    pub lit: LitBy<'a>,
+    /// Points that stand for it, those of [`splat_core::Light::points`], 1 to [`MOST_SAMPLES`].
+    pub samples: u32,
+}
+
+/// Most points of an extended light.
+pub const MOST_SAMPLES: u32 = 1024;
 
 /// How often light is scattered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

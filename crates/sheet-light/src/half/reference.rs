@@ -9,7 +9,7 @@ use super::frame::{Frame, Ray};
 use super::placed::Placed;
 use super::serves::axis_of_view;
 use super::sight::{Shape, Sight};
-use super::{HalfInput, HalfParams, lamp};
+use super::{Extended, HalfInput, HalfParams, lamp};
 use crate::lattice::Lattice;
 use crate::reference::Picture;
 use crate::sections::{PHASES, sections};
@@ -50,7 +50,7 @@ struct Part {
 /// Optical depth and length so far, by volume and pixel of the light.
 type Sums = Vec<Vec<[f64; 2]>>;
 
-/// Draws all volumes under all lights, green extinction for all channels, without the shadows of others and without [`HalfInput::mapped`]. Time grows as voxels times
+/// Draws all volumes under all lights, extended ones as that many points, green extinction for all channels, without the shadows of others and without [`HalfInput::mapped`]. Time grows as voxels times
 /// pixels times slabs under a kernel.
 ///
 /// # Errors
@@ -59,7 +59,7 @@ pub fn draw(input: &HalfInput<'_>, params: &HalfParams) -> Result<Picture, Error
     params.check()?;
     input.sheets.check()?;
     let mut out: Option<Picture> = None;
-    for lit in &input.sheets.lights {
+    for lit in &lights(input) {
         let own = View::new(input, params, lit)?.draw(lit, out.is_none());
         match &mut out {
             None => out = Some(own),
@@ -68,6 +68,15 @@ pub fn draw(input: &HalfInput<'_>, params: &HalfParams) -> Result<Picture, Error
     }
     let pixels = input.sheets.camera.size.map(|s| s as usize).iter().product();
     Ok(out.unwrap_or(Picture { optical_depth: vec![0.0; pixels], color: vec![[0.0; 3]; pixels] }))
+}
+
+/// All lights that have sweeps, point by point.
+fn lights<'a>(input: &HalfInput<'a>) -> Vec<LitBy<'a>> {
+    let points = |e: &Extended<'a>| {
+        let shadow = e.lit.shadow;
+        e.lit.light.points(e.samples).into_iter().map(move |light| LitBy { light, shadow })
+    };
+    input.sheets.lights.iter().copied().chain(input.extended.iter().flat_map(points)).collect()
 }
 
 impl<'a> View<'a> {

@@ -10,6 +10,9 @@ use splat_core::{Camera, Light, LightShape};
 /// most w/[`LEAST_COSINE`].
 pub const LEAST_COSINE: f64 = 0.2;
 
+/// How far a point of a light may lie from its centre across the slabs, of the centre's distance to the nearest volume.
+pub const MOST_DEPTH: f64 = 0.4;
+
 /// Why half vectors cannot serve a light: it takes a shadow map instead.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -44,8 +47,16 @@ pub enum Reason {
         /// The least cosine of what is in the picture.
         cosine: f64,
     },
+    /// Points of a light with an extent lie too unequally far from the slabs.
+    #[error(
+        "the light's points lie up to {share:.2} of its distance nearer to the slabs or farther, expected at most {MOST_DEPTH}"
+    )]
+    TooLarge {
+        /// The farthest point's distance to the centre across the slabs over that of the centre to the nearest volume.
+        share: f64,
+    },
     /// Light of a sphere, a disk or a rectangle comes from many directions.
-    #[error("the light has an extent, expected a point of it: `Light::points` has them")]
+    #[error("the light has an extent, expected a point of it, or `HalfInput::extended`")]
     Extended,
 }
 
@@ -65,6 +76,49 @@ pub fn serves(bodies: &Bodies<'_>, camera: &Camera, light: &Light) -> Result<(),
     if light.shape.is_extended() {
         return Err(Reason::Extended);
     }
+    let axis = axis_of(bodies, camera, light);
+    light_serves(bodies, light, &axis)?;
+    view_serves(bodies, camera, &axis)
+}
+
+/// Whether the half vector of the centre of a light with an extent can slice the volumes for all of its points, so that one sweep
+/// carries its light. As [`serves`] for one without an extent.
+///
+/// # Errors
+/// The first [`Reason`] that was found.
+pub fn serves_extended(bodies: &Bodies<'_>, camera: &Camera, light: &Light, samples: u32) -> Result<(), Reason> {
+    if bodies.is_empty() {
+        return Ok(());
+    }
+    let axis = axis_of(bodies, camera, light);
+    light_serves(bodies, light, &axis)?;
+    let points = light.points(samples);
+    points.iter().try_for_each(|point| light_serves(bodies, point, &axis))?;
+    let from_center = |p: DVec3| light.shape.place().map_or(0.0, |center| axis.normal.dot(p - center));
+    let near = bodies.corners().map(from_center).fold(f64::INFINITY, f64::min);
+    let depth = points.iter().filter_map(|p| p.shape.place()).map(|p| from_center(p).abs()).fold(0.0, f64::max);
+    if depth > MOST_DEPTH * near {
+        return Err(Reason::TooLarge { share: depth / near });
+    }
+    view_serves(bodies, camera, &axis)
+}
+
+/// How wide the penumbra of a light is at the middle of the volumes over the distance to what casts it, far from the light: 2R/d, R the
+/// radius or the longer half-axis. 0 for a light without an extent, and without volumes.
+pub fn penumbra_widening(bodies: &Bodies<'_>, light: &Light) -> f64 {
+    let radius = match light.shape {
+        LightShape::Sphere { radius, .. } | LightShape::Disk { radius, .. } => radius,
+        LightShape::Rect { u, v, .. } => u.length().max(v.length()),
+        _ => return 0.0,
+    };
+    match light.shape.place() {
+        Some(place) if !bodies.is_empty() => 2.0 * radius / (bodies.middle() - place).length(),
+        _ => 0.0,
+    }
+}
+
+/// Whether the light of a point, or of the centre of a light, meets slabs well.
+fn light_serves(bodies: &Bodies<'_>, light: &Light, axis: &HalfVector) -> Result<(), Reason> {
     if let Some(position) = light.shape.place() {
         if let Some(volume) = bodies.volumes.iter().position(|v| is_inside(v, position)) {
             return Err(Reason::LampInside { volume, position });
@@ -73,14 +127,15 @@ pub fn serves(bodies: &Bodies<'_>, camera: &Camera, light: &Light) -> Result<(),
             return Err(Reason::LampAmong { position });
         }
     }
-    let axis = axis_of(bodies, camera, light);
     // The light's image has an axis of its own, to the middle of all.
     let forward = travel(light, bodies.middle());
     let of_light = |p: DVec3| [axis.normal, forward].map(|axis| axis.dot(travel(light, p)));
     let cosine = least(bodies.corners().flat_map(of_light));
-    if cosine < LEAST_COSINE {
-        return Err(Reason::LightAlongSlabs { cosine });
-    }
+    if cosine < LEAST_COSINE { Err(Reason::LightAlongSlabs { cosine }) } else { Ok(()) }
+}
+
+/// Whether view rays do.
+fn view_serves(bodies: &Bodies<'_>, camera: &Camera, axis: &HalfVector) -> Result<(), Reason> {
     let sense = if axis.back_to_front { -axis.normal } else { axis.normal };
     let cosine = least_of_view(bodies, camera, sense);
     if cosine < LEAST_COSINE { Err(Reason::ViewAlongSlabs { cosine }) } else { Ok(()) }

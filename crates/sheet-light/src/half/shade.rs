@@ -31,7 +31,7 @@ impl Lit<'_> {
             color: self.color,
             material: self.volume.material,
         };
-        let lights = || of.light.into_iter().chain(of.mapped);
+        let lights = || of.light.iter().chain(of.mapped);
         let mut radiance = point.radiance(of.ambient, lights().map(|lit_by| &lit_by.light), |rank, irradiance| {
             // The light of the sweep comes first.
             let carried = if rank == 0 && of.light.is_some() { self.arrives } else { [1.0; 3] };
@@ -56,7 +56,7 @@ impl Lit<'_> {
 
     /// What the point shows of light that is scattered more than once, where that is simulated.
     pub(crate) fn scattered(&self, of: &Sweep<'_>, pixel: [usize; 2], at: DVec3) -> Option<[f32; 3]> {
-        let (scattered, light) = (of.scattered.as_ref()?, &of.light?.light);
+        let (scattered, light) = (of.scattered.as_ref()?, &of.light.as_ref()?.light);
         if !medium::scatters(self.volume) {
             return None;
         }

@@ -86,7 +86,7 @@ pub(crate) struct SplatSheets<'a> {
 /// The lights of a sweep, for splats.
 pub(crate) struct Lamps<'a> {
     /// The one that is carried.
-    pub(crate) carried: Option<&'a LitBy<'a>>,
+    pub(crate) carried: Option<LitBy<'a>>,
     /// Those whose shadows are known.
     pub(crate) mapped: &'a [LitBy<'a>],
     pub(crate) ambient: [f32; 3],

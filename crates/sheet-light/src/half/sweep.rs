@@ -1,6 +1,7 @@
 //! One light's sweep over all slabs: the eye's sheets, then the light's (the loop of the pseudocode, steps 9 to 24).
 
 use super::band::{Band, ROWS};
+use super::bodies::Bodies;
 use super::buckets::{Buckets, records};
 use super::counts::HalfCounts;
 use super::eye_buffer::Pixels;
@@ -10,6 +11,7 @@ use super::gradient::Gradients;
 use super::illuminate::Illumination;
 use super::light_buffer::LightBuffer;
 use super::light_path::LightPath;
+use super::penumbra::Penumbra;
 use super::placed::Placed;
 use super::scatter::{self, Scattered, Scene};
 use super::serves::axis_of_view;
@@ -24,7 +26,7 @@ use rayon::prelude::*;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::pulp;
 use splat_core::shade::{ChannelLayout, LitBy};
-use splat_core::{Accumulator, LightShape, Progress};
+use splat_core::{Accumulator, Light, LightShape, Progress};
 
 /// Everything that is the same for all slabs, and the light buffer.
 pub(crate) struct Sweep<'a> {
@@ -36,8 +38,8 @@ pub(crate) struct Sweep<'a> {
     pub(crate) shapes: Vec<Shape>,
     pub(crate) buckets: Vec<Buckets>,
     pub(crate) gradients: Gradients,
-    /// `None` for ambient and emitted light alone.
-    pub(crate) light: Option<&'a LitBy<'a>>,
+    /// `None` for ambient and emitted light alone. One with an extent gives at its centre what all its points give.
+    pub(crate) light: Option<LitBy<'a>>,
     /// Lights that this sweep adds without carrying them.
     pub(crate) mapped: &'a [LitBy<'a>],
     pub(crate) light_buffer: Option<LightBuffer>,
@@ -57,24 +59,30 @@ pub(crate) struct Sweep<'a> {
 }
 
 impl<'a> Sweep<'a> {
-    /// Prepares a sweep for one light that half vectors serve.
+    /// Prepares a sweep for one light that half vectors serve, and as many points of it as are asked for.
     pub(crate) fn new(
         input: &'a HalfInput<'a>,
         params: &HalfParams,
-        light: Option<&'a LitBy<'a>>,
+        carried: Option<(&'a LitBy<'a>, u32)>,
         light_alone: bool,
     ) -> Result<Self, Error> {
         let sheets = &input.sheets;
         let (bodies, volumes, camera) = (&input.bodies(), &sheets.volumes[..], sheets.camera);
         let is_lit = volumes.iter().any(is_lit) || input.splats.is_some_and(|splats| splats.are_lit());
-        let light = light.filter(|_| is_lit);
+        let carried = carried.filter(|_| is_lit);
         let mapped = if is_lit && !light_alone { &input.mapped[..] } else { &[] };
-        let axis = axis_of_view(bodies, camera, light.map(|lit| &lit.light));
+        let axis = axis_of_view(bodies, camera, carried.map(|(lit, _)| &lit.light));
         let frame = Frame::new(bodies, camera, &params.sheets, &axis)?;
         let placed: Vec<Placed<'a>> = volumes.iter().map(|v| Placed::new(v, &frame, &params.sheets)).collect();
         let sight = Sight::new(&frame, *camera);
         let by_place =
             |lit: &LitBy<'_>| lit.shadow.is_some() || !matches!(lit.light.shape, LightShape::Directional { .. });
+        let light_buffer = carried.map(|carried| light_buffer(&frame, params, &placed, bodies, carried));
+        let gain = light_buffer.as_ref().and_then(|b| b.soft.as_ref()).map(|soft| soft.penumbra.gain);
+        let light = carried.map(|(lit, _)| match gain {
+            Some(gain) => LitBy { light: brighter(&lit.light, gain), ..*lit },
+            None => *lit,
+        });
         let mut sweep = Self {
             volumes,
             shapes: placed.iter().map(|p| sight.shape(&frame, p)).collect(),
@@ -82,15 +90,15 @@ impl<'a> Sweep<'a> {
             gradients: Gradients::new(&frame),
             light,
             mapped,
-            light_buffer: light
-                .map(|lit| LightBuffer::new(&frame, lamp::camera_of(bodies, &lit.light, params), volumes, &placed)),
+            light_buffer,
             scattered: None,
             paths: light
+                .as_ref()
                 .map_or_else(Vec::new, |lit| volumes.iter().map(|v| LightPath::new(v, &lit.light, &frame)).collect()),
             ambient: sheets.ambient,
             shadow_origin: sheets.shadow_origin,
             cutoff: params.sheets.transmittance_cutoff,
-            is_lit_by_place: light.into_iter().chain(mapped).any(by_place),
+            is_lit_by_place: light.iter().chain(mapped).any(by_place),
             light_alone,
             input,
             visible: 0,
@@ -99,7 +107,7 @@ impl<'a> Sweep<'a> {
             sight,
         };
         sweep.sort_voxels();
-        if let Some(lit) = light.filter(|lit| scatter::is_wanted(volumes, &lit.light, params)) {
+        if let Some(lit) = light.as_ref().filter(|lit| scatter::is_wanted(volumes, &lit.light, params)) {
             let scene = Scene::new(volumes, lit, params, sheets.shadow_origin);
             sweep.scattered = Some(Scattered::new(&scene, params.scattering));
         }
@@ -138,6 +146,9 @@ impl<'a> Sweep<'a> {
         let mut counts = self.counts(&bands);
         for slab in 0..self.frame.slabs.count {
             progress.tick(1).map_err(cancelled)?;
+            if let Some(buffer) = &mut self.light_buffer {
+                buffer.arrive(slab, &self.frame);
+            }
             if let Some(splats) = &mut splats {
                 let volumes = self.light_buffer.as_ref().map(|buffer| self.illumination(buffer, slab, None));
                 let [eye, light] = splats.enter(slab, &self.lamps(), volumes.as_ref(), layout);
@@ -153,6 +164,8 @@ impl<'a> Sweep<'a> {
             }
         }
         counts.bytes += splats.as_ref().map_or(0, SplatSheets::bytes);
+        counts.soft_passes =
+            self.light_buffer.as_ref().and_then(|buffer| buffer.soft.as_ref()).map_or(0, |soft| soft.passes);
         // Depths are summed from the eye on, so a sweep that comes towards it needs a second one for them.
         if self.frame.back_to_front && !form.depth.is_empty() && !self.light_alone {
             let form = Accumulator { channels: Vec::new(), ..form.clone() };
@@ -253,4 +266,24 @@ impl<'a> Sweep<'a> {
         let ray = self.frame.ray(&self.sight.camera, x as f64 + 0.5, y as f64 + 0.5);
         (f64::from(depth) - ray.from.z) / ray.along.z
     }
+}
+
+/// The light's image, and those of its points where it has an extent.
+fn light_buffer(
+    frame: &Frame,
+    params: &HalfParams,
+    placed: &[Placed<'_>],
+    bodies: &Bodies<'_>,
+    (lit, samples): (&LitBy<'_>, u32),
+) -> LightBuffer {
+    let (camera, volumes) = (lamp::camera_of(bodies, &lit.light, params), bodies.volumes);
+    let mut buffer = LightBuffer::new(frame, camera, volumes, placed);
+    if let Some(penumbra) = Penumbra::new(frame, bodies, (&lit.light, samples), &camera, params.most_light_pixels) {
+        buffer.soften(penumbra, volumes);
+    }
+    buffer
+}
+
+fn brighter(light: &Light, gain: f64) -> Light {
+    Light { intensity: light.intensity.map(|i| (f64::from(i) * gain) as f32), ..*light }
 }

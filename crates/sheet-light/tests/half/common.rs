@@ -36,7 +36,7 @@ pub(crate) fn exact(slab_width: Option<f64>) -> HalfParams {
 pub(crate) fn input<'a>(volumes: &'a [Volume<'a>], camera: &'a Camera, lights: &'a [LitBy<'a>]) -> HalfInput<'a> {
     let (volumes, lights) = (volumes.to_vec(), lights.to_vec());
     let sheets = SheetInput { volumes, splats: None, camera, lights, shadow_origin: DVec3::ZERO, ambient: [0.0; 3] };
-    HalfInput { sheets, splats: None, mapped: Vec::new(), opaque: &[] }
+    HalfInput { sheets, splats: None, extended: Vec::new(), mapped: Vec::new(), opaque: &[] }
 }
 
 /// Beauty, depths, objects and one plane of optical depth.

@@ -1,13 +1,14 @@
 //! Splats in half-vector slabs: closed forms of what shadows what, and the limits of other ways to composite them.
 
-use super::common::{draw, exact, input, lamp, scattering, sun};
+use super::common::{draw, exact, input, lamp, lit, scattering, sun};
 use crate::common::{BEAUTY, constant, cubic, grid, largest, parallel, perspective, volume};
-use sheet_light::half::{HalfInput, HalfParams, HalfSplats, Scattering, fold};
+use sheet_light::half::{Extended, HalfInput, HalfParams, HalfSplats, Scattering, fold};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::{self, Detail, FoldInput, OpaqueImage, ProjectInput, Projected, project};
 use splat_core::shade::LitBy;
 use splat_core::{
-    Accumulator, Camera, Cloud, Direction, Footprint, FootprintStack, Material, Object, Shading, Splat, SplatKind, rng,
+    Accumulator, Camera, Cloud, Direction, Footprint, FootprintStack, LightShape, Material, Object, Shading, Splat,
+    SplatKind, rng,
 };
 use std::f64::consts::PI;
 
@@ -300,4 +301,9 @@ fn splats_that_sweeps_cannot_take_are_refused() {
     let layout = BEAUTY.with_multiple();
     let refused = fold(&with(&of, input(&[], &camera, &lights)), &again, &layout, &mut out, None).err().unwrap();
     assert!(refused.to_string().contains("beside splats"), "{refused}");
+    let shape = LightShape::Disk { center: DVec3::Z * 9.0, normal: DVec3::NEG_Z, radius: 0.5 };
+    let extended = vec![Extended { lit: lit(shape), samples: 4 }];
+    let input = HalfInput { extended, ..with(&of, input(&[], &camera, &[])) };
+    let refused = draw(&input, &exact(None)).err().unwrap();
+    assert!(refused.to_string().contains("none beside splats"), "{refused}");
 }

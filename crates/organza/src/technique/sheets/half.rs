@@ -8,17 +8,19 @@ use crate::frame::Frame;
 use crate::lights::LightPoint;
 use crate::matter::{Carries, CarriesLight, Matter};
 use crate::pass;
-use crate::scene::{self, Scene, Slicing, Technique};
+use crate::scene::{self, Scene, Slicing, SoftShadows, Technique};
 use crate::technique::Session;
 use crate::{CostRecord, Error, RenderOptions, stage};
 use sheet_light::half::{
-    self, Bodies, HalfInput, HalfParams, HalfSplats, Reason, Scattering, SplatBounds, fold, serves, slab_width,
+    self, Bodies, Extended, HalfInput, HalfParams, HalfSplats, MOST_SAMPLES, Reason, Scattering, SplatBounds, fold,
+    penumbra_widening, serves, serves_extended, slab_width,
 };
 use sheet_light::{Params, SheetInput};
 use splat_core::glam::Vec3;
 use splat_core::raster::{self, ProjectInput, Projected};
 use splat_core::shade::LitBy;
-use splat_core::{Aabb, Accumulator, Cloud, DAabb, SplatKind};
+use splat_core::{Aabb, Accumulator, Cloud, DAabb, Light, Receiver, SplatKind, Transmittance};
+use tsm::ShadowMap;
 
 /// What a user can do where half vectors cannot.
 const HINT: &str = "use render.sheets.slicing = \"view\"";
@@ -44,6 +46,12 @@ fn points_served(matter: &Matter<'_>, points: &[LightPoint]) -> Result<Carries, 
         return refuse(other, &message, "");
     }
     let scatters_again = matter.scene.render.sheets.scattering().is_some();
+    if let Some(splats) = translucent().find(|o| o.form == Form::Splats)
+        && points.iter().any(|point| is_whole(matter.scene, point))
+    {
+        let message = "a translucent surface, whose shadow of a light with an extent is that of points";
+        return refuse(splats, message, ", make it opaque, or use render.sheets.soft_shadows = \"points\"");
+    }
     if let Some(splats) = translucent().find(|o| o.form == Form::Splats && scatters_again) {
         let message = "a translucent surface, whose shadow light that is scattered more than once does not have";
         return refuse(splats, message, ", make it opaque, or leave render.sheets.scattering out");
@@ -57,8 +65,41 @@ fn points_served(matter: &Matter<'_>, points: &[LightPoint]) -> Result<Carries, 
         }
         other => other.to_string(),
     };
-    let points = points.iter().map(|point| serves(&bodies, matter.camera, &point.light).map_err(words)).collect();
-    Ok(Carries { points, scatters_again })
+    let is_served = |point: &LightPoint| match is_whole(matter.scene, point) {
+        true if samples(point) > MOST_SAMPLES => {
+            Err(format!("it has {} points, expected at most {MOST_SAMPLES} in one sweep", samples(point)))
+        }
+        true => serves_extended(&bodies, matter.camera, &point.whole, samples(point)).map_err(words),
+        false => serves(&bodies, matter.camera, &point.light).map_err(words),
+    };
+    Ok(Carries {
+        widening: points.iter().map(|point| penumbra_widening(&bodies, &point.whole)).collect(),
+        points: points.iter().map(is_served).collect(),
+        scatters_again,
+        together: is_one_sweep(matter.scene),
+    })
+}
+
+fn is_one_sweep(scene: &Scene) -> bool {
+    matches!(scene.render.sheets.slicing, Slicing::HalfVector { soft_shadows: SoftShadows::OneSweep, .. })
+}
+
+/// Whether the light of a point goes through the volumes with that of all the others of its light.
+fn is_whole(scene: &Scene, point: &LightPoint) -> bool {
+    is_one_sweep(scene) && point.whole.shape.is_extended()
+}
+
+/// How many points a light has.
+fn samples(point: &LightPoint) -> u32 {
+    point.rank[1] as u32
+}
+
+/// What is swept for a point: its whole light and the points of that, once for all of them, or the point itself.
+fn swept<'p>(scene: &Scene, point: &'p LightPoint) -> Option<(&'p Light, u32)> {
+    match is_whole(scene, point) {
+        true => (point.rank[0] == 0).then(|| (&point.whole, samples(point))),
+        false => Some((&point.light, 1)),
+    }
 }
 
 /// Bytes of the largest sweep.
@@ -67,7 +108,11 @@ pub(super) fn bytes(matter: &Matter<'_>, points: &[LightPoint], options: &Render
     let bodies = Bodies { volumes: &volumes, splats };
     // Of counts alone: no length among the parameters plays a part.
     let params = half_params(matter.scene, params(matter.scene, 0, options));
-    let served = points.iter().map(|point| &point.light).filter(|light| serves(&bodies, matter.camera, light).is_ok());
+    let is_served = |(light, samples): &(&Light, u32)| match light.shape.is_extended() {
+        true => serves_extended(&bodies, matter.camera, light, *samples).is_ok(),
+        false => serves(&bodies, matter.camera, light).is_ok(),
+    };
+    let served = points.iter().filter_map(|point| swept(matter.scene, point)).filter(is_served);
     half::bytes(&bodies, matter.camera, served, &params)
 }
 
@@ -79,8 +124,8 @@ pub(super) fn draw(
     cost: &mut CostRecord,
 ) -> Result<(), Error> {
     let opaque = frame.opaque(cost)?;
-    let splats = OwnSplats::of(frame);
-    let mut input = input(frame, &opaque.depth, cost)?;
+    let (means, splats) = (mean_shadows(frame, cost)?, OwnSplats::of(frame));
+    let mut input = input(frame, &opaque.depth, &means, cost)?;
     input.splats = splats.as_ref().map(|splats| splats.input(frame));
     let params = half_params(frame.scene, params(frame.scene, frame.loaded.exponent, session.options));
     super::warn(frame, &input.sheets.volumes, session.warnings);
@@ -105,24 +150,63 @@ pub(super) fn draw(
 pub(super) fn width(frame: &Frame<'_>, params: &Params) -> Result<f64, Error> {
     let (volumes, splats) = (volumes(&frame.matter()).collect::<Vec<_>>(), splat_bounds(&frame.matter()));
     let bodies = Bodies { volumes: &volumes, splats };
-    let carried = frame.light_points().iter().zip(&frame.plan.carried).find(|(_, carried)| **carried);
-    let light = carried.map(|(point, _)| &point.light);
+    let carried = frame.light_points().iter().zip(&frame.plan.carried).filter(|(_, carried)| **carried);
+    let light = carried.filter_map(|(point, _)| swept(frame.scene, point)).map(|(light, _)| light).next();
     slab_width(&bodies, &frame.camera, light, params).map_err(|e| refuse(frame, e))
 }
 
+/// The shadows of what no light is carried through, for each light that is carried whole: by the place of the light.
+fn mean_shadows<'a>(frame: &'a Frame<'a>, cost: &mut CostRecord) -> Result<Vec<(usize, MeanShadow<'a>)>, Error> {
+    let maps = frame.maps_of_others(cost)?;
+    let mut means: Vec<(usize, MeanShadow<'a>)> = Vec::new();
+    let points = frame.light_points().iter().zip(&frame.plan.carried).zip(maps);
+    for ((point, _), map) in points.filter(|((point, carried), _)| **carried && is_whole(frame.scene, point)) {
+        let Some(map) = map else { continue };
+        match means.iter_mut().find(|(of, _)| *of == point.of) {
+            Some((_, mean)) => mean.0.push(map),
+            None => means.push((point.of, MeanShadow(vec![map]))),
+        }
+    }
+    Ok(means)
+}
+
+/// Mean transmittance to the points of a light.
+struct MeanShadow<'a>(Vec<&'a ShadowMap>);
+
+impl Transmittance for MeanShadow<'_> {
+    fn transmittance(&self, receiver: &Receiver) -> [f32; 3] {
+        let sum = self.0.iter().fold([0.0; 3], |sum, map| {
+            let own = map.transmittance(receiver);
+            [0, 1, 2].map(|c| sum[c] + own[c])
+        });
+        sum.map(|v: f32| v / self.0.len() as f32)
+    }
+}
+
 /// The volumes, the lights that come through them in sweeps, and those that do not.
-fn input<'a>(frame: &'a Frame<'a>, opaque: &'a [f32], cost: &mut CostRecord) -> Result<HalfInput<'a>, Error> {
+fn input<'a>(
+    frame: &'a Frame<'a>,
+    opaque: &'a [f32],
+    means: &'a [(usize, MeanShadow<'a>)],
+    cost: &mut CostRecord,
+) -> Result<HalfInput<'a>, Error> {
     let maps = frame.maps(cost)?;
     let of_others = frame.maps_of_others(cost)?;
-    let carried = frame.plan.carried.iter().enumerate();
-    let of_each = carried.map(|(k, carried)| {
+    let (mut lights, mut extended, mut mapped) = (Vec::new(), Vec::new(), Vec::new());
+    let points = frame.light_points().iter().zip(&frame.plan.carried).enumerate();
+    for (k, (point, carried)) in points.filter(|(_, (point, _))| point.light.intensity != [0.0; 3]) {
         let map = if *carried { of_others.get(k) } else { maps.get(k) };
-        (*carried, map.and_then(Option::as_ref))
-    });
-    let (mut lights, mut mapped) = (Vec::new(), Vec::new());
-    for (light, (carried, map)) in frame.with_light(of_each) {
-        let lit = LitBy { light, shadow: map.map(|map| map as _) };
-        if carried { &mut lights } else { &mut mapped }.push(lit);
+        let lit = LitBy { light: point.light, shadow: map.and_then(Option::as_ref).map(|map| map as _) };
+        match (carried, is_whole(frame.scene, point)) {
+            (false, _) => mapped.push(lit),
+            (true, false) => lights.push(lit),
+            (true, true) if point.rank[0] == 0 => {
+                let mean = means.iter().find(|(of, _)| *of == point.of);
+                let lit = LitBy { light: point.whole, shadow: mean.map(|(_, mean)| mean as _) };
+                extended.push(Extended { lit, samples: samples(point) });
+            }
+            (true, true) => {}
+        }
     }
     let sheets = SheetInput {
         volumes: volumes(&frame.matter()).collect(),
@@ -132,7 +216,7 @@ fn input<'a>(frame: &'a Frame<'a>, opaque: &'a [f32], cost: &mut CostRecord) -> 
         shadow_origin: frame.loaded.cloud.origin,
         ambient: frame.scene.ambient,
     };
-    Ok(HalfInput { sheets, splats: None, mapped, opaque })
+    Ok(HalfInput { sheets, splats: None, extended, mapped, opaque })
 }
 
 /// Most slabs where splats alone say how wide they are.
@@ -197,7 +281,7 @@ fn half_params(scene: &Scene, sheets: Params) -> HalfParams {
     let plain = HalfParams { sheets, ..HalfParams::default() };
     match scene.render.sheets.slicing {
         Slicing::View => plain,
-        Slicing::HalfVector { light_pixels, most_light_pixels, scattering } => {
+        Slicing::HalfVector { light_pixels, most_light_pixels, scattering, .. } => {
             let plain = HalfParams { light_pixels, most_light_pixels, ..plain };
             let Some(scene::Scattering { back, cone, voxels_per_cell }) = scattering else { return plain };
             let scattering = if back { Scattering::ForwardAndBack } else { Scattering::Forward };
