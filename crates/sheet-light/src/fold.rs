@@ -13,7 +13,7 @@ use crate::rays::LatticeRays;
 use crate::ring::{Ring, Splatter, Taper};
 use crate::sections::SectionTable;
 use crate::segments::Segments;
-use crate::shadows::Shadows;
+use crate::shadows::{Receivers, Shadows};
 use crate::sheets::Sheets;
 use crate::slabs::{Kernels, Slabs};
 use crate::tile::{self, AREA, FoldTile, Scratch, TILE};
@@ -85,7 +85,7 @@ pub fn prepare<'a>(input: SheetInput<'a>, params: &Params, progress: Option<&Pro
         let mut prepared = Prepared::new(*volume, &input, params, (&slabs, slant), tiles);
         needed += Shadows::bytes(prepared.voxels.count(), &input.lights);
         check(needed, params)?;
-        prepared.shadows = Shadows::new(&prepared, &input.lights, input.shadow_origin, progress)?;
+        prepared.shadows = Shadows::new(&prepared.receivers(), &input.lights, input.shadow_origin, progress)?;
         volumes.push(prepared);
         progress.tick(1).map_err(cancelled)?;
     }
@@ -210,6 +210,16 @@ impl<'a> Prepared<'a> {
             shadows: None,
             segments,
             base,
+        }
+    }
+
+    fn receivers(&self) -> Receivers<'_> {
+        Receivers {
+            volume: &self.volume,
+            voxels: &self.voxels,
+            rim: self.lattice.rim,
+            radius: self.viewed.reach as f32,
+            rows: self.rays.rows(),
         }
     }
 

@@ -5,8 +5,8 @@
 //! voxels is interpolated trilinearly, as the values are that it lights.
 
 use crate::Error;
+use crate::Volume;
 use crate::error::cancelled;
-use crate::fold::Prepared;
 use crate::visible::Voxels;
 use rayon::prelude::*;
 use splat_core::glam::DVec3;
@@ -27,8 +27,20 @@ pub(crate) struct Shadows {
     ranks: Vec<u64>,
     /// Of a body-centred lattice: whether the first plane, that of the rim, is a shifted one.
     is_first_shifted: Option<bool>,
-    /// From view positions, depths counted from the first slab, to lattice coordinates that count from the rim.
-    lattice_from_view: [[f32; 4]; 3],
+    /// From the places that are asked for to lattice coordinates that count from the rim.
+    lattice_from_place: [[f32; 4]; 3],
+}
+
+/// What receives them.
+pub(crate) struct Receivers<'a> {
+    pub(crate) volume: &'a Volume<'a>,
+    /// Those that are needed, with a rim around the lattice.
+    pub(crate) voxels: &'a Voxels,
+    pub(crate) rim: [usize; 3],
+    /// Cutoff radius of the kernels, world units.
+    pub(crate) radius: f32,
+    /// Rows of what leads from places, as they will be asked for, to lattice coordinates.
+    pub(crate) rows: [[f64; 4]; 3],
 }
 
 /// A transmittance per channel, as parts of [`WHOLE`], then [`WHOLE`], whose mean is the weight of all that is known.
@@ -57,7 +69,7 @@ impl Shadows {
 
     /// Looks them up; `None` where no light has shadows, or the volume takes none.
     pub(crate) fn new(
-        of: &Prepared<'_>,
+        of: &Receivers<'_>,
         lights: &[LitBy<'_>],
         origin: DVec3,
         progress: &Progress,
@@ -68,14 +80,14 @@ impl Shadows {
         assert!(of.voxels.dims().iter().all(|n| *n >= 2), "invariant: a lattice has a rim");
         let one = |lit: &LitBy<'_>| lit.shadow.map(|shadow| look_up(of, shadow, origin, progress)).transpose();
         let of_lights = lights.iter().map(one).collect::<Result<_, _>>()?;
-        let mut rows = of.rays.rows();
-        (0..3).for_each(|a| rows[a][3] += of.lattice.rim[a] as f64);
-        let lattice_from_view = rows.map(|row| row.map(|v| v as f32));
-        let is_first_shifted = (of.volume.packing == Packing::BodyCentred).then_some(of.lattice.rim[2] % 2 == 1);
-        Ok(Some(Self { of_lights, ranks: of.voxels.ranks(), is_first_shifted, lattice_from_view }))
+        let mut rows = of.rows;
+        (0..3).for_each(|a| rows[a][3] += of.rim[a] as f64);
+        let lattice_from_place = rows.map(|row| row.map(|v| v as f32));
+        let is_first_shifted = (of.volume.packing == Packing::BodyCentred).then_some(of.rim[2] % 2 == 1);
+        Ok(Some(Self { of_lights, ranks: of.voxels.ranks(), is_first_shifted, lattice_from_place }))
     }
 
-    /// The needed voxels around view positions.
+    /// The needed voxels around places.
     #[inline(always)]
     pub(crate) fn cells<S: Simd>(&self, simd: S, voxels: &Voxels, at: &[Lanes<S>; 3], wanted: u32) -> Cells {
         if let Some(is_first_shifted) = self.is_first_shifted {
@@ -86,7 +98,7 @@ impl Shadows {
         let (mut first, mut parts) = ([[0.0; MAX_LANES]; 3], [[[0.0; MAX_LANES]; 2]; 4]);
         let mut high = [zero; 3];
         for a in 0..3 {
-            let [x, y, z, start] = self.lattice_from_view[a];
+            let [x, y, z, start] = self.lattice_from_place[a];
             let place = at[0].mul_add(of(x), at[1].mul_add(of(y), at[2].mul_add(of(z), of(start))));
             // Half a step less, rounded: the voxel before, and for a place at a voxel that or the one before it.
             let last = of(NATURAL + (voxels.dims()[a] - 2) as f32);
@@ -134,7 +146,7 @@ impl Shadows {
         (wanted, is_first_shifted): (u32, bool),
     ) -> Cells {
         let (mut places, dims) = ([[0.0; MAX_LANES]; 3], voxels.dims());
-        for (place, [x, y, z, start]) in places.iter_mut().zip(self.lattice_from_view) {
+        for (place, [x, y, z, start]) in places.iter_mut().zip(self.lattice_from_place) {
             let of = |v: f32| Lanes::splat(simd, v);
             at[0].mul_add(of(x), at[1].mul_add(of(y), at[2].mul_add(of(z), of(start)))).store(place);
         }
@@ -225,21 +237,20 @@ fn lanes(mut wanted: u32) -> impl Iterator<Item = usize> {
 }
 
 fn look_up(
-    of: &Prepared<'_>,
+    of: &Receivers<'_>,
     shadow: &dyn Transmittance,
     origin: DVec3,
     progress: &Progress,
 ) -> Result<Vec<Share>, Error> {
     let [nx, ny, nz] = of.voxels.dims();
     let (start, axes) = (of.volume.origin() - origin, of.volume.axes());
-    let rim = of.lattice.rim.map(|n| n as f64);
-    let shifts = [0, 1].map(|k| of.volume.packing.shift(k + of.lattice.rim[2] % 2));
+    let rim = of.rim.map(|n| n as f64);
+    let shifts = [0, 1].map(|k| of.volume.packing.shift(k + of.rim[2] % 2));
     let share = |i: usize, row: usize| {
         let shift = shifts[row / ny % 2];
         let index = DVec3::new(i as f64 + shift, (row % ny) as f64 + shift, (row / ny) as f64);
         let position = (start + axes * (index - DVec3::from_array(rim))).as_vec3();
-        let receiver =
-            Receiver { position, normal: Default::default(), radius: of.viewed.reach as f32, kind: SplatKind::Medium };
+        let receiver = Receiver { position, normal: Default::default(), radius: of.radius, kind: SplatKind::Medium };
         let [red, green, blue] =
             shadow.transmittance(&receiver).map(|t| (t.clamp(0.0, 1.0) * f32::from(WHOLE) + 0.5) as u16);
         [red, green, blue, WHOLE]

@@ -4,7 +4,7 @@ use super::band::Band;
 use super::eye_buffer::{Fragments, Pixels};
 use super::illuminate::Asked;
 use super::light_path::Places;
-use super::shade::Lit;
+use super::shade::{Lit, Through};
 use super::sheet::{Sheet, Splatter, is_any};
 use super::splats::SplatSheets;
 use super::sweep::Sweep;
@@ -30,6 +30,8 @@ pub(crate) struct EyeBand {
     pub(crate) pixels: Pixels,
     /// Extinction of the pixels that are being lit, by volume.
     extinction: Vec<[f32; MAX_LANES]>,
+    /// What all else lets through to them, by light.
+    others: Vec<Through>,
 }
 
 /// What a band does with a slab.
@@ -69,7 +71,7 @@ impl EyeBand {
     pub(crate) fn new(band: Band, volumes: &[Volume<'_>], pixels: Pixels) -> Self {
         let kept = |v: &Volume<'_>| if v.normals { KEPT } else { 1 };
         let sheets = volumes.iter().map(|v| (0..kept(v)).map(|_| Sheet::new(&band)).collect()).collect();
-        Self { band, sheets, pixels, extinction: vec![[0.0; MAX_LANES]; volumes.len()] }
+        Self { band, sheets, pixels, extinction: vec![[0.0; MAX_LANES]; volumes.len()], others: Vec::new() }
     }
 
     /// Bytes of all planes.
@@ -219,7 +221,14 @@ impl OneSlab<'_> {
 
     /// Radiance of the pixels that have optical depth.
     #[inline(always)]
-    fn light<S: Simd>(&self, simd: S, chunk: &Chunk, [near, far]: [Lanes<S>; 2], most: Lanes<S>, out: &mut Fragments) {
+    fn light<S: Simd>(
+        &mut self,
+        simd: S,
+        chunk: &Chunk,
+        [near, far]: [Lanes<S>; 2],
+        most: Lanes<S>,
+        out: &mut Fragments,
+    ) {
         let of = self.of;
         let mut wanted = [0.0; MAX_LANES];
         most.store(&mut wanted);
@@ -243,6 +252,7 @@ impl OneSlab<'_> {
             at[a].store(&mut places[a]);
         }
         let stretch = Lanes::load(simd, &self.eye.band.stretch[chunk.k..]);
+        let mut others = std::mem::take(&mut self.eye.others);
         let mut so_far = [[0.0; MAX_LANES]; 3];
         for (v, volume) in of.volumes.iter().enumerate() {
             let Some([extinction, depth]) = self.extinction(simd, v, chunk.k) else { continue };
@@ -254,6 +264,7 @@ impl OneSlab<'_> {
             green.store(&mut color[1]);
             blue.store(&mut color[2]);
             let normals = self.normals(simd, v, chunk);
+            self.find_others(simd, v, &at, &wanted, &mut others);
             for lane in 0..Lanes::<S>::COUNT {
                 if wanted[lane] > 0.0 && tau[lane] > 0.0 {
                     let share = [0, 1, 2].map(|p| {
@@ -268,10 +279,37 @@ impl OneSlab<'_> {
                         color: color.map(|c| c[lane]),
                         normal: normals[lane],
                         arrives: [0, 1, 2].map(|c| arrives[if planes == 3 { c } else { 0 }][lane]),
+                        others: &others,
+                        lane,
                     };
                     self.mix(&lit, [chunk.x + lane, chunk.y], at, share, (lane, out));
                 }
             }
+        }
+        self.eye.others = others;
+    }
+
+    /// What lets light through to a volume beside what the sweep carries it through.
+    #[inline(always)]
+    fn find_others<S: Simd>(
+        &self,
+        simd: S,
+        v: usize,
+        at: &Places<S>,
+        wanted: &[f32; MAX_LANES],
+        others: &mut Vec<Through>,
+    ) {
+        others.clear();
+        let Some((voxels, shadows)) = &self.of.shadows[v] else { return };
+        let lanes = wanted.iter().enumerate().filter(|(_, wanted)| **wanted > 0.0);
+        let cells = shadows.cells(simd, voxels, at, lanes.fold(0, |bits, (lane, _)| bits | 1 << lane));
+        for light in 0..self.of.light.iter().len() + self.of.mapped.len() {
+            let through = shadows.at(simd, &cells, light);
+            let mut own = [[0.0; MAX_LANES]; 3];
+            for c in 0..3 {
+                through[c].store(&mut own[c]);
+            }
+            others.push(own);
         }
     }
 

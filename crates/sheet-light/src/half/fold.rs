@@ -59,13 +59,13 @@ pub fn fold(
     let progress = progress.unwrap_or(&quiet);
     let mut lights: Vec<(&LitBy<'_>, u32)> = carried(input).collect();
     lights.sort_by_key(|(lit, samples)| (lit.light.bits(), *samples));
-    let first = Sweep::new(input, params, lights.first().copied(), false)?;
+    let first = Sweep::new(input, params, lights.first().copied(), false, progress)?;
     let is_lit = first.light.is_some();
     progress.add_total(u64::from(first.frame.slabs.count));
     let (bands, mut counts) = first.run(layout, into, progress)?;
     bands.iter().for_each(|b| b.pixels.store(&b.band, into));
     for light in lights.into_iter().skip(1).filter(|_| is_lit) {
-        let next = Sweep::new(input, params, Some(light), true)?;
+        let next = Sweep::new(input, params, Some(light), true, progress)?;
         progress.add_total(u64::from(next.frame.slabs.count));
         let form = Accumulator { depth: Vec::new(), object: Vec::new(), ..into.clone() };
         let (bands, more) = next.run(layout, &form, progress)?;
@@ -169,7 +169,13 @@ fn check_splats(input: &HalfInput<'_>, splats: &HalfSplats<'_>, params: &HalfPar
 /// Refuses what takes more than it may, before it does.
 fn check_memory(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
     let camera = input.sheets.camera;
-    let needed = bytes(&input.bodies(), camera, carried(input).map(|(lit, samples)| (&lit.light, samples)), params);
+    let needed = bytes(
+        &input.bodies(),
+        camera,
+        carried(input).map(|(lit, samples)| (&lit.light, samples)),
+        input.mapped.len(),
+        params,
+    );
     let limit = params.sheets.limits.max_bytes;
     let hint = || {
         "use fewer voxels, a smaller picture, fewer pixels of the light buffer or fewer points of an extended light"
@@ -179,11 +185,12 @@ fn check_memory(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error>
 }
 
 /// Bytes that [`fold`] takes at most for such lights, of which sweeps follow one another: each with the points that stand for it, 1 for
-/// one without an extent.
+/// one without an extent; and `mapped` others, whose shadows are known.
 pub fn bytes<'l>(
     bodies: &Bodies<'_>,
     camera: &Camera,
     lights: impl Iterator<Item = (&'l Light, u32)>,
+    mapped: usize,
     params: &HalfParams,
 ) -> u64 {
     if bodies.is_empty() {
@@ -200,7 +207,9 @@ pub fn bytes<'l>(
     let voxels = |v: &Volume<'_>| {
         let dims = Lattice::new(v.grid, [usize::MAX; 3]).dims;
         // A record once in the order of the lattice and once for each image, with its bucket.
-        Voxels::bytes(dims) + dims.iter().map(|n| *n as u64).product::<u64>() * (3 * 16 + 24)
+        // The shadows of what is not carried, of the light of a sweep and of those without one.
+        let of_a_voxel = 3 * 16 + 24 + 8 * (1 + mapped as u64);
+        Voxels::bytes(dims) + dims.iter().map(|n| *n as u64).product::<u64>() * of_a_voxel
     };
     let cells: u64 = if params.scattering == Scattering::None {
         0

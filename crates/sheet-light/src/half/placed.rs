@@ -5,6 +5,7 @@ use crate::classify::Classifier;
 use crate::fold::extremes;
 use crate::lattice::Lattice;
 use crate::sections::{PHASES, SectionTable};
+use crate::shadows::Receivers;
 use crate::visible::Voxels;
 use crate::{Params, Volume};
 use splat_core::Footprint;
@@ -84,6 +85,14 @@ impl<'a> Placed<'a> {
         let lattice = Lattice::new(self.volume.grid, reach);
         let voxels = Voxels::needed(&lattice, self.volume.transfer, reach);
         (lattice, voxels)
+    }
+
+    /// Who receives shadows there: places are slab coordinates.
+    pub(crate) fn receivers<'b>(&'b self, voxels: &'b Voxels, rim: [usize; 3]) -> Receivers<'b> {
+        let inverse = self.axes.inverse();
+        let start = inverse * -self.start;
+        let rows = [0, 1, 2].map(|a| [inverse.row(a).x, inverse.row(a).y, inverse.row(a).z, start[a]]);
+        Receivers { volume: self.volume, voxels, rim, radius: self.reach as f32, rows }
     }
 
     /// Slab coordinates of a lattice point, counted from the corner of a rim.

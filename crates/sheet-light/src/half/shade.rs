@@ -3,9 +3,10 @@
 use super::scatter::{Seen, medium};
 use super::sweep::Sweep;
 use crate::Volume;
+use splat_core::Shading;
 use splat_core::glam::{DVec3, Vec3};
+use splat_core::raster::lanes::MAX_LANES;
 use splat_core::shade::{Point, Radiance, arriving};
-use splat_core::{Receiver, Shading, SplatKind};
 
 /// A point of a volume that is lit.
 pub(crate) struct Lit<'a> {
@@ -15,9 +16,16 @@ pub(crate) struct Lit<'a> {
     pub(crate) color: [f32; 3],
     /// As gradients have it, or zero.
     pub(crate) normal: Vec3,
-    /// Share of the light that the volumes let through.
+    /// Share of the light of the sweep that volumes and splats let through.
     pub(crate) arrives: [f32; 3],
+    /// Share of each light that all else lets through, of neighbouring pixels, of which this is one; nothing where nothing else casts
+    /// shadows.
+    pub(crate) others: &'a [Through],
+    pub(crate) lane: usize,
 }
+
+/// Transmittance by channel of neighbouring pixels.
+pub(crate) type Through = [[f32; MAX_LANES]; 3];
 
 impl Lit<'_> {
     /// Radiance of the point at these slab coordinates towards the eye of a pixel.
@@ -35,16 +43,9 @@ impl Lit<'_> {
         let mut radiance = point.radiance(of.ambient, lights().map(|lit_by| &lit_by.light), |rank, irradiance| {
             // The light of the sweep comes first.
             let carried = if rank == 0 && of.light.is_some() { self.arrives } else { [1.0; 3] };
-            let others = lights().nth(rank).and_then(|lit_by| lit_by.shadow);
-            let receiver = || Receiver {
-                position: (position - of.shadow_origin).as_vec3(),
-                normal: self.normal,
-                radius: self.radius,
-                kind: SplatKind::Medium,
-            };
             let shadow = || {
-                let others = others.map_or([1.0; 3], |others| others.transmittance(&receiver()));
-                [0, 1, 2].map(|c| carried[c] * others[c])
+                let others = self.others.get(rank);
+                [0, 1, 2].map(|c| carried[c] * others.map_or(1.0, |through| through[c][self.lane]))
             };
             arriving(irradiance, self.volume.shadow_coefficient, Some(shadow))
         });

@@ -21,9 +21,11 @@ use super::splat_light::SplatLight;
 use super::splats::{Lamps, SplatSheets};
 use super::{HalfInput, HalfParams, lamp};
 use crate::error::cancelled;
+use crate::shadows::Shadows;
+use crate::visible::Voxels;
 use crate::{Error, Volume};
 use rayon::prelude::*;
-use splat_core::glam::{DVec3, Vec3};
+use splat_core::glam::Vec3;
 use splat_core::raster::pulp;
 use splat_core::shade::{ChannelLayout, LitBy};
 use splat_core::{Accumulator, Light, LightShape, Progress};
@@ -47,8 +49,9 @@ pub(crate) struct Sweep<'a> {
     pub(crate) scattered: Option<Scattered>,
     /// By volume.
     pub(crate) paths: Vec<LightPath>,
+    /// By volume: shadows of what light is not carried through, of the lights that have any, at the voxels that matter.
+    pub(crate) shadows: Vec<Option<(Voxels, Shadows)>>,
     pub(crate) ambient: [f32; 3],
-    pub(crate) shadow_origin: DVec3,
     pub(crate) cutoff: f32,
     /// Whether light depends on where a point is.
     pub(crate) is_lit_by_place: bool,
@@ -65,6 +68,7 @@ impl<'a> Sweep<'a> {
         params: &HalfParams,
         carried: Option<(&'a LitBy<'a>, u32)>,
         light_alone: bool,
+        progress: &Progress,
     ) -> Result<Self, Error> {
         let sheets = &input.sheets;
         let (bodies, volumes, camera) = (&input.bodies(), &sheets.volumes[..], sheets.camera);
@@ -95,8 +99,8 @@ impl<'a> Sweep<'a> {
             paths: light
                 .as_ref()
                 .map_or_else(Vec::new, |lit| volumes.iter().map(|v| LightPath::new(v, &lit.light, &frame)).collect()),
+            shadows: Vec::new(),
             ambient: sheets.ambient,
-            shadow_origin: sheets.shadow_origin,
             cutoff: params.sheets.transmittance_cutoff,
             is_lit_by_place: light.iter().chain(mapped).any(by_place),
             light_alone,
@@ -106,7 +110,7 @@ impl<'a> Sweep<'a> {
             frame,
             sight,
         };
-        sweep.sort_voxels();
+        sweep.sort_voxels(progress)?;
         if let Some(lit) = light.as_ref().filter(|lit| scatter::is_wanted(volumes, &lit.light, params)) {
             let scene = Scene::new(volumes, lit, params, sheets.shadow_origin);
             sweep.scattered = Some(Scattered::new(&scene, params.scattering));
@@ -114,8 +118,9 @@ impl<'a> Sweep<'a> {
         Ok(sweep)
     }
 
-    /// Finds the voxels that matter and sorts them for both images (steps 3 and 4).
-    fn sort_voxels(&mut self) {
+    /// Finds the voxels that matter, with the shadows there that are known, and sorts them for both images (steps 3 and 4).
+    fn sort_voxels(&mut self, progress: &Progress) -> Result<(), Error> {
+        let lights: Vec<LitBy<'_>> = self.light.iter().chain(self.mapped).copied().collect();
         for (v, placed) in self.placed.iter().enumerate() {
             let shape = &self.shapes[v];
             let mut reach = placed.lattice_reach(shape.extent(), self.sight.widest_pixel(&self.frame, placed));
@@ -124,6 +129,8 @@ impl<'a> Sweep<'a> {
                 (0..3).for_each(|a| reach[a] = reach[a].max(light[a]));
             }
             let (lattice, voxels) = placed.voxels(reach);
+            let receivers = placed.receivers(&voxels, lattice.rim);
+            let shadows = Shadows::new(&receivers, &lights, self.input.sheets.shadow_origin, progress)?;
             let records = records(placed, &lattice, &voxels);
             self.visible += voxels.count();
             self.buckets.push(Buckets::new(&records, placed, &self.frame, &self.sight, shape));
@@ -131,7 +138,9 @@ impl<'a> Sweep<'a> {
                 let lists = Buckets::new(&records, placed, &self.frame, &buffer.sight, buffer.shape(v));
                 buffer.push(lists);
             }
+            self.shadows.push(shadows.map(|shadows| (voxels, shadows)));
         }
+        Ok(())
     }
 
     /// Runs the sweep. One tick a slab.

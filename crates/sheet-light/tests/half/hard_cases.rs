@@ -254,7 +254,8 @@ impl Transmittance for Veil {
     }
 }
 
-static VEIL: Veil = Veil(0.25);
+/// A share that the 16 bits of a voxel hold.
+static VEIL: Veil = Veil(1.0 / 3.0);
 
 #[test]
 fn what_else_casts_shadows_attenuates_the_light_as_far_as_it_is_received() {

@@ -113,7 +113,8 @@ pub(super) fn bytes(matter: &Matter<'_>, points: &[LightPoint], options: &Render
         false => serves(&bodies, matter.camera, light).is_ok(),
     };
     let served = points.iter().filter_map(|point| swept(matter.scene, point)).filter(is_served);
-    half::bytes(&bodies, matter.camera, served, &params)
+    let mapped = points.iter().filter_map(|point| swept(matter.scene, point)).filter(|light| !is_served(light)).count();
+    half::bytes(&bodies, matter.camera, served, mapped, &params)
 }
 
 /// Draws all that is translucent into a segment of its own.
