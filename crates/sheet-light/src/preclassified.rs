@@ -44,8 +44,12 @@ impl Preclassified {
     ) -> u64 {
         let [extinction, red, green, blue] = classifier.one(record.value);
         let sums = [extinction, extinction * red, extinction * green, extinction * blue];
-        let each = self.rings.iter_mut().zip(sums);
-        each.map(|(ring, value)| ring.splat(simd, of, &Record { value, ..*record }, wanted)).sum()
+        let mut fragments = 0;
+        // No closure: it would not be compiled for the vectors of its caller.
+        for (ring, value) in self.rings.iter_mut().zip(sums) {
+            fragments += ring.splat(simd, of, &Record { value, ..*record }, wanted);
+        }
+        fragments
     }
 
     #[inline(always)]
@@ -58,7 +62,10 @@ impl Preclassified {
     /// Extinction, red, green and blue.
     #[inline(always)]
     pub(crate) fn load<S: Simd>(&self, simd: S, slab: u32, y: usize, x: usize) -> [Lanes<S>; 4] {
-        let [extinction, red, green, blue] = [0, 1, 2, 3].map(|sum: usize| self.sheets[sum].load(simd, slab, y, x)[0]);
+        let [first, second, third, fourth] = &self.sheets;
+        let [extinction, _] = first.load(simd, slab, y, x);
+        let ([red, _], [green, _], [blue, _]) =
+            (second.load(simd, slab, y, x), third.load(simd, slab, y, x), fourth.load(simd, slab, y, x));
         let inverse = Lanes::splat(simd, 1.0) / extinction.max(Lanes::splat(simd, f32::MIN_POSITIVE));
         [extinction, red * inverse, green * inverse, blue * inverse]
     }
