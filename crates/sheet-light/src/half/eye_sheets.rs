@@ -232,19 +232,7 @@ impl OneSlab<'_> {
         let of = self.of;
         let mut wanted = [0.0; MAX_LANES];
         most.store(&mut wanted);
-        let planes = self.eye.pixels.planes;
-        let ends = if of.frame.back_to_front { [far, near] } else { [near, far] };
-        let mut arrives = [[1.0; MAX_LANES]; 3];
-        if let Some(buffer) = &of.light_buffer {
-            let [nearer, farther] = ends;
-            let asked = Asked {
-                ends: [self.places(simd, chunk.k, nearer), self.places(simd, chunk.k, farther)],
-                extinction: &self.eye.extinction,
-                optical_depth: &out.optical_depth,
-            };
-            let illumination = of.illumination(buffer, self.slab, self.splats.and_then(|splats| splats.light.as_ref()));
-            arrives = illumination.transmittance(simd, &asked, &wanted, planes);
-        }
+        let (planes, arrives) = (self.eye.pixels.planes, self.arrives(simd, chunk.k, [near, far], &wanted, out));
         let middle = (near + far) * Lanes::splat(simd, 0.5);
         let mut places = [[0.0; MAX_LANES]; 3];
         let at = self.places(simd, chunk.k, middle);
@@ -287,6 +275,27 @@ impl OneSlab<'_> {
             }
         }
         self.eye.others = others;
+    }
+
+    /// Share of the light of the sweep that comes through volumes and splats to what rays have between two depths, by plane.
+    #[inline(always)]
+    fn arrives<S: Simd>(
+        &self,
+        simd: S,
+        k: usize,
+        [near, far]: [Lanes<S>; 2],
+        wanted: &[f32; MAX_LANES],
+        of: &Fragments,
+    ) -> [[f32; MAX_LANES]; 3] {
+        let Some(buffer) = &self.of.light_buffer else { return [[1.0; MAX_LANES]; 3] };
+        let [nearer, farther] = if self.of.frame.back_to_front { [far, near] } else { [near, far] };
+        let asked = Asked {
+            ends: [self.places(simd, k, nearer), self.places(simd, k, farther)],
+            extinction: &self.eye.extinction,
+            optical_depth: &of.optical_depth,
+        };
+        let splats = self.splats.and_then(|splats| splats.light.as_ref());
+        self.of.illumination(buffer, self.slab, splats).transmittance(simd, &asked, wanted, self.eye.pixels.planes)
     }
 
     /// What lets light through to a volume beside what the sweep carries it through.

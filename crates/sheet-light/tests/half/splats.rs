@@ -62,7 +62,7 @@ fn plane(cloud: &mut Cloud, (at, normal): (DVec3, DVec3), half: f64, tau: f64, l
             radius: (step * f64::from(Footprint::SIGMA_OVER_SPACING * Footprint::default().cutoff)) as f32,
             cross_section: (tau * step * step) as f32,
             kind: SplatKind::Surface,
-            ..like.clone()
+            ..*like
         });
     }
 }
