@@ -151,7 +151,7 @@ mod tests {
                 }
             }
         }
-        assert!((0..4).map(|n| cubic(0.3 + 1.0 - n as f32)).sum::<f32>() - 1.0 < 1e-6);
+        assert!(((0..4).map(|n| cubic(0.3 + 1.0 - n as f32)).sum::<f32>() - 1.0).abs() < 1e-6);
     }
 
     #[test]
