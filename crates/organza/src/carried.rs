@@ -42,8 +42,7 @@ pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: 
     let cloud = Some(&loaded.cloud);
     let matter = Matter { scene, own: &loaded.own, planned: &plan.objects, cloud, camera: &loaded.camera };
     let asked = carries(&matter, points)?;
-    let Carries { points: carries, scatters_again, .. } = &asked;
-    let scatters_again = *scatters_again;
+    let (carries, scatters_again) = (&asked.points, asked.scatters_again);
     let called_for = |point: &LightPoint| plan.shadow_maps[point.of];
     plan.carried = points.iter().zip(carries).map(|(point, carries)| called_for(point) && carries.is_ok()).collect();
     plan.scatters_again = scatters_again;

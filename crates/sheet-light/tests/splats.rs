@@ -1,11 +1,11 @@
 //! Splats in sheets, beside volumes and alone.
 
-use crate::common::{apart, constant, cubic, exact, grid, largest, parallel, perspective, unlit, volume};
+use crate::common::{apart, constant, cubic, exact, grid, largest, parallel, perspective, projected, unlit, volume};
 use sheet_light::{Params, SheetInput, Splats, prepare};
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::raster::{self, Detail, FoldInput, OpaqueImage, ProjectInput, Projected, project};
+use splat_core::raster::{self, FoldInput, OpaqueImage, Projected};
 use splat_core::shade::ChannelLayout;
-use splat_core::{Accumulator, Camera, Cloud, Direction, FootprintStack, LayerSet, Material, Splat, SplatKind, rng};
+use splat_core::{Accumulator, Camera, Cloud, Direction, LayerSet, Material, Splat, SplatKind, rng};
 
 const EVERYWHERE: std::ops::Range<f32> = f32::NEG_INFINITY..f32::INFINITY;
 const LAYERS: LayerSet = LayerSet { effects: false, shadow: false, normal: false, depth: true, object: true };
@@ -22,16 +22,7 @@ struct Shown {
 
 impl Shown {
     fn new(cloud: Cloud, camera: &Camera, materials: Vec<Material>) -> Self {
-        let (footprints, params) = (FootprintStack::default(), raster::Params::default());
-        let detail = Detail::ALL;
-        let projected = project(&ProjectInput {
-            cloud: &cloud,
-            camera,
-            footprints: &footprints,
-            materials: &materials,
-            params: &params,
-            detail,
-        });
+        let projected = projected(&cloud, camera, &materials);
         let place = camera.view_from_offset(cloud.origin);
         let depths: Vec<f32> = cloud.position.iter().map(|p| place.depth(*p)).collect();
         let mut order: Vec<u32> = (0..cloud.len() as u32).collect();

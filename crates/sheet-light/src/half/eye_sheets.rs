@@ -3,7 +3,7 @@
 use super::band::Band;
 use super::eye_buffer::{Fragments, Pixels};
 use super::illuminate::Asked;
-use super::light_path::Places;
+use super::light_path::{Places, stored};
 use super::shade::{Lit, Through};
 use super::sheet::{Sheet, Splatter, is_any};
 use super::splats::SplatSheets;
@@ -234,11 +234,8 @@ impl OneSlab<'_> {
         most.store(&mut wanted);
         let (planes, arrives) = (self.eye.pixels.planes, self.arrives(simd, chunk.k, [near, far], &wanted, out));
         let middle = (near + far) * Lanes::splat(simd, 0.5);
-        let mut places = [[0.0; MAX_LANES]; 3];
         let at = self.places(simd, chunk.k, middle);
-        for a in 0..3 {
-            at[a].store(&mut places[a]);
-        }
+        let places = stored(&at);
         let stretch = Lanes::load(simd, &self.eye.band.stretch[chunk.k..]);
         let mut others = std::mem::take(&mut self.eye.others);
         let mut so_far = [[0.0; MAX_LANES]; 3];
@@ -247,10 +244,7 @@ impl OneSlab<'_> {
             let mut tau = [0.0; MAX_LANES];
             (extinction * depth * stretch).store(&mut tau);
             let [_, red, green, blue] = self.eye.sheet(v, self.slab).classify(simd, &of.placed[v], chunk.k);
-            let mut color = [[0.0; MAX_LANES]; 3];
-            red.store(&mut color[0]);
-            green.store(&mut color[1]);
-            blue.store(&mut color[2]);
+            let color = stored(&[red, green, blue]);
             let normals = self.normals(simd, v, chunk);
             self.find_others(simd, v, &at, &wanted, &mut others);
             for lane in 0..Lanes::<S>::COUNT {
@@ -313,12 +307,7 @@ impl OneSlab<'_> {
         let lanes = wanted.iter().enumerate().filter(|(_, wanted)| **wanted > 0.0);
         let cells = shadows.cells(simd, voxels, at, lanes.fold(0, |bits, (lane, _)| bits | 1 << lane));
         for light in 0..self.of.light.iter().len() + self.of.mapped.len() {
-            let through = shadows.at(simd, &cells, light);
-            let mut own = [[0.0; MAX_LANES]; 3];
-            for c in 0..3 {
-                through[c].store(&mut own[c]);
-            }
-            others.push(own);
+            others.push(stored(&shadows.at(simd, &cells, light)));
         }
     }
 

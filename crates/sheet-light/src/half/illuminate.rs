@@ -14,7 +14,7 @@
 
 use super::frame::Frame;
 use super::light_buffer::LightBuffer;
-use super::light_path::{BENDS, LightPath, Places, Ways};
+use super::light_path::{BENDS, LightPath, Places, Ways, stored};
 use super::sheet::is_any;
 use super::soft_buffer::Soft;
 use super::splat_light::SplatLight;
@@ -205,15 +205,6 @@ impl Illumination<'_> {
         }
         Lanes::load(simd, &means)
     }
-}
-
-#[inline(always)]
-fn stored<S: Simd>(of: &Places<S>) -> [[f32; MAX_LANES]; 3] {
-    let mut out = [[0.0; MAX_LANES]; 3];
-    for a in 0..3 {
-        of[a].store(&mut out[a]);
-    }
-    out
 }
 
 /// What volumes let through to places in a slab, by channel, in the form that [`pulp`] compiles once per instruction set.

@@ -123,14 +123,9 @@ impl LightBuffer {
 
     /// Optical depth and length so far about a place of the image, pixels, bilinear; neighbours at a border are those inside.
     #[inline]
-    pub(crate) fn at(&self, volume: usize, [x, y]: [f32; 2]) -> [f32; 2] {
-        let [width, height] = self.sight.camera.size.map(|s| s as usize);
-        let split = |v: f32, n: usize| {
-            let v = (v - 0.5).clamp(0.0, (n - 1) as f32);
-            let low = (v as usize).min(n.saturating_sub(2));
-            (low, (low + 1).min(n - 1), v - low as f32)
-        };
-        let ((x0, x1, u), (y0, y1, v)) = (split(x, width), split(y, height));
+    pub(crate) fn at(&self, volume: usize, place: [f32; 2]) -> [f32; 2] {
+        let ([[x0, x1], [y0, y1]], [u, v]) = self.sight.around(place);
+        let width = self.sight.camera.size[0] as usize;
         let sum = |x: usize, y: usize| &self.sums[(y * width + x) * self.volumes + volume];
         let (a, b, c, d) = (sum(x0, y0), sum(x1, y0), sum(x0, y1), sum(x1, y1));
         [0, 1].map(|n| {

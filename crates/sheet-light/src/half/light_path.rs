@@ -9,7 +9,7 @@ use super::serves::travel;
 use crate::Volume;
 use splat_core::Light;
 use splat_core::glam::{DVec3, Mat3, Vec3};
-use splat_core::raster::lanes::Lanes;
+use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 
 /// Share of the steepest direction below which light is parallel to a pair of faces.
@@ -38,6 +38,16 @@ pub(crate) struct LightPath {
 
 /// Slab coordinates of neighbouring pixels.
 pub(crate) type Places<S> = [Lanes<S>; 3];
+
+/// Three numbers a pixel, lane by lane.
+#[inline(always)]
+pub(crate) fn stored<S: Simd>(of: &[Lanes<S>; 3]) -> [[f32; MAX_LANES]; 3] {
+    let mut out = [[0.0; MAX_LANES]; 3];
+    for a in 0..3 {
+        of[a].store(&mut out[a]);
+    }
+    out
+}
 
 impl LightPath {
     pub(crate) fn new(volume: &Volume<'_>, light: &Light, frame: &Frame) -> Self {

@@ -73,6 +73,19 @@ impl Sight {
         [self.center[0] + at.x * scale, self.center[1] + at.y * scale]
     }
 
+    /// The pixels about a place: the columns, the rows, and the shares of the second of each; those at a border are those inside.
+    #[inline(always)]
+    pub(crate) fn around(&self, place: [f32; 2]) -> ([[usize; 2]; 2], [f32; 2]) {
+        let (mut pixels, mut shares) = ([[0; 2]; 2], [0.0; 2]);
+        for a in 0..2 {
+            let n = self.camera.size[a] as usize;
+            let v = (place[a] - 0.5).clamp(0.0, (n - 1) as f32);
+            let low = (v as usize).min(n.saturating_sub(2));
+            (pixels[a], shares[a]) = ([low, (low + 1).min(n - 1)], v - low as f32);
+        }
+        (pixels, shares)
+    }
+
     /// Columns and rows within which lie all pixels that see the kernel of a voxel at (a, b) in a slab from depth `low` to `high`:
     /// from, to, from, to.
     #[inline(always)]

@@ -31,7 +31,7 @@ pub(crate) struct SplatLight<'a> {
     /// For each splat the depth across the slabs, in slabs, at which it asks for light; and the ids by that slab.
     asks: Vec<f32>,
     by_slab: BySlab,
-    /// Share of the light that splats let through, by id.
+    /// Share of the light that is let through, by id.
     through: Vec<[f32; 3]>,
 }
 
@@ -68,9 +68,17 @@ impl<'a> SplatLight<'a> {
         }
     }
 
-    /// Share of the light that splats let through to each, by id; known once the sweep has come to its slab.
+    /// Share of the light that is let through to each, by id; known once the sweep has come to its slab.
     pub(crate) fn through(&self) -> &[[f32; 3]] {
         &self.through
+    }
+
+    /// Attenuates what some of them get by what volumes let through.
+    pub(crate) fn attenuate(&mut self, ids: &[u32], volumes: &[[f32; 3]]) {
+        for (id, own) in ids.iter().zip(volumes) {
+            let through = &mut self.through[*id as usize];
+            (0..3).for_each(|c| through[c] *= own[c]);
+        }
     }
 
     /// Bytes of lists and sums.
@@ -82,7 +90,7 @@ impl<'a> SplatLight<'a> {
     /// Begins a slab, of these splats: takes them up, and finds what arrives at those that ask here. Fragments.
     pub(crate) fn enter(&mut self, slab: u32, ids: &[u32], slabs: &[u32], places: &[Vec3]) -> u64 {
         let (projected, materials) = (&self.projected, self.of.materials);
-        // A surface asks before it, so this is where it lies, whoever it is.
+        // Depths in the slab, for the mean depth of a pixel.
         let values: Vec<f32> = ids.iter().map(|id| places[*id as usize].z / self.slab_width - slab as f32).collect();
         let fragments = self.squares.fill(Slab { projected, materials, slabs, slab, ids, values: &values });
         let arrives = |id: &u32| {
@@ -123,14 +131,8 @@ impl<'a> SplatLight<'a> {
 
     /// The four pixels about a place, and their weights; those at a border are those inside.
     #[inline]
-    fn patch(&self, [x, y]: [f32; 2]) -> [([usize; 2], f32); 4] {
-        let [width, height] = self.sight.camera.size.map(|s| s as usize);
-        let split = |v: f32, n: usize| {
-            let v = (v - 0.5).clamp(0.0, (n - 1) as f32);
-            let low = (v as usize).min(n.saturating_sub(2));
-            (low, (low + 1).min(n - 1), v - low as f32)
-        };
-        let ((x0, x1, u), (y0, y1, v)) = (split(x, width), split(y, height));
+    fn patch(&self, place: [f32; 2]) -> [([usize; 2], f32); 4] {
+        let ([[x0, x1], [y0, y1]], [u, v]) = self.sight.around(place);
         let (left, upper) = (1.0 - u, 1.0 - v);
         [([x0, y0], left * upper), ([x1, y0], u * upper), ([x0, y1], left * v), ([x1, y1], u * v)]
     }

@@ -139,10 +139,18 @@ impl<'a> SplatSheets<'a> {
         volumes: Option<&Illumination<'_>>,
         layout: &ChannelLayout,
     ) -> [u64; 2] {
-        let light =
-            self.light.as_mut().map_or(0, |light| light.enter(slab, self.drawn.of(slab), &self.slabs, &self.places));
-        self.shade(slab, lamps, volumes, layout);
-        [self.draw(slab), light]
+        let (ids, mut fragments) = (self.drawn.of(slab), 0);
+        if let (Some(light), Some(of)) = (&mut self.light, volumes) {
+            fragments = light.enter(slab, ids, &self.slabs, &self.places);
+            let mut volumes = vec![[1.0; 3]; ids.len()];
+            volumes.par_chunks_mut(CHUNK).zip(ids.par_chunks(CHUNK)).for_each(|(out, ids)| {
+                let places: Vec<Vec3> = ids.iter().map(|id| self.places[*id as usize]).collect();
+                pulp::Arch::new().dispatch(ThroughVolumes { of, frame: &self.frame, places: &places, out });
+            });
+            light.attenuate(ids, &volumes);
+        }
+        self.shade(slab, lamps, layout);
+        [self.draw(slab), fragments]
     }
 
     /// Takes those of a slab up for the eye, with the values that were found before, if there are any. Fragments.
@@ -159,32 +167,24 @@ impl<'a> SplatSheets<'a> {
     }
 
     /// Finds the radiance of the splats of a slab.
-    fn shade(&mut self, slab: u32, lamps: &Lamps<'_>, volumes: Option<&Illumination<'_>>, layout: &ChannelLayout) {
+    fn shade(&mut self, slab: u32, lamps: &Lamps<'_>, layout: &ChannelLayout) {
         let (of, ids, channels) = (self.of, self.drawn.of(slab), layout.count());
         self.values.clear();
         self.values.resize(ids.len() * channels, 0.0);
-        let chunks = self.values.par_chunks_mut(CHUNK * channels).zip(ids.par_chunks(CHUNK));
+        let through = self.light.as_ref().map_or(&[][..], SplatLight::through);
+        let arrives = lamps.carried.map(|lit| Arrives { through, others: lit.shadow });
+        let carried = lamps.carried.zip(arrives.as_ref()).map(|(lit, shadow)| LitBy { shadow: Some(shadow), ..lit });
+        let lights: Vec<LitBy<'_>> = carried.into_iter().chain(lamps.mapped.iter().copied()).collect();
         let HalfSplats { cloud, materials, objects, .. } = *of;
         let Lamps { ambient, camera, .. } = *lamps;
-        let (light, places, frame) = (&self.light, &self.places, &self.frame);
+        let input = ShadeInput { cloud, materials, objects, lights: &lights, ambient, camera };
+        let chunks = self.values.par_chunks_mut(CHUNK * channels).zip(ids.par_chunks(CHUNK));
         chunks.for_each(|(values, ids)| {
-            let through = light.as_ref().map_or(&[][..], SplatLight::through);
-            let places: Vec<Vec3> = ids.iter().map(|id| places[*id as usize]).collect();
-            let mut volumes_let = vec![[1.0; 3]; ids.len()];
-            if let Some(of) = volumes {
-                pulp::Arch::new().dispatch(ThroughVolumes { of, frame, places: &places, out: &mut volumes_let });
-            }
-            for (k, (id, values)) in ids.iter().zip(values.chunks_exact_mut(channels)).enumerate() {
+            for (id, values) in ids.iter().zip(values.chunks_exact_mut(channels)) {
                 let i = *id as usize;
                 if !of.projected.is_visible(i) {
                     continue;
                 }
-                let share = through.get(i).map(|through| [0, 1, 2].map(|c| through[c] * volumes_let[k][c]));
-                let arrives = lamps.carried.map(|lit| Arrives { share: share.unwrap_or([1.0; 3]), others: lit.shadow });
-                let carried =
-                    lamps.carried.zip(arrives.as_ref()).map(|(lit, a)| LitBy { light: lit.light, shadow: Some(a) });
-                let lights: Vec<LitBy<'_>> = carried.into_iter().chain(lamps.mapped.iter().copied()).collect();
-                let input = ShadeInput { cloud, materials, objects, lights: &lights, ambient, camera };
                 let (mut radiance, normal) = shade_splat(&input, i);
                 if lamps.light_alone {
                     (radiance.ambient, radiance.emission) = ([0.0; 3], [0.0; 3]);
@@ -195,16 +195,21 @@ impl<'a> SplatSheets<'a> {
     }
 }
 
-/// What arrives at one splat.
+/// What arrives at splats of the light of a sweep.
 struct Arrives<'a> {
-    share: [f32; 3],
+    /// Share that is carried to each, by id.
+    through: &'a [[f32; 3]],
     /// Shadows of all that is not carried.
     others: Option<&'a dyn Transmittance>,
 }
 
 impl Transmittance for Arrives<'_> {
     fn transmittance(&self, receiver: &Receiver) -> [f32; 3] {
-        let others = self.others.map_or([1.0; 3], |others| others.transmittance(receiver));
-        [0, 1, 2].map(|c| self.share[c] * others[c])
+        self.others.map_or([1.0; 3], |others| others.transmittance(receiver))
+    }
+
+    fn at_splat(&self, splat: usize, receiver: &Receiver) -> [f32; 3] {
+        let others = self.transmittance(receiver);
+        [0, 1, 2].map(|c| self.through[splat][c] * others[c])
     }
 }

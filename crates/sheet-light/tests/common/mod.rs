@@ -2,10 +2,11 @@
 
 use sheet_light::{Error, Params, SheetCounts, SheetInput, Volume, prepare};
 use splat_core::glam::{DMat3, DVec3};
+use splat_core::raster::{self, Detail, ProjectInput, Projected, project};
 use splat_core::shade::{ChannelLayout, LitBy};
 use splat_core::{
-    Accumulator, BccGrid, Camera, Grid, LayerSet, Material, Packing, Projection, Shading, Similarity, TransferFunction,
-    TransferPoint, rng,
+    Accumulator, BccGrid, Camera, Cloud, FootprintStack, Grid, LayerSet, Material, Packing, Projection, Shading,
+    Similarity, TransferFunction, TransferPoint, rng,
 };
 
 /// A lattice around the origin, its values by place in world space.
@@ -146,4 +147,10 @@ pub(crate) fn apart(a: &Accumulator, b: &Accumulator) -> f32 {
     let through = |a: &Accumulator| a.optical_depth[0].iter().map(|t| (-t).exp()).collect::<Vec<f32>>();
     let planes = a.channels.iter().zip(&b.channels).map(|(a, b)| largest(a, b));
     planes.fold(largest(&through(a), &through(b)), f32::max)
+}
+
+/// All that is known of splats in a camera's image, by default footprints.
+pub(crate) fn projected(cloud: &Cloud, camera: &Camera, materials: &[Material]) -> Projected {
+    let (footprints, params) = (&FootprintStack::default(), &raster::Params::default());
+    project(&ProjectInput { cloud, camera, footprints, materials, params, detail: Detail::ALL })
 }

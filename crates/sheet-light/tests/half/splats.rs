@@ -1,10 +1,10 @@
 //! Splats in half-vector slabs: closed forms of what shadows what, and the limits of other ways to composite them.
 
 use super::common::{draw, exact, input, lamp, lit, scattering, sun};
-use crate::common::{BEAUTY, constant, cubic, grid, largest, parallel, perspective, volume};
+use crate::common::{BEAUTY, constant, cubic, grid, largest, parallel, perspective, projected, volume};
 use sheet_light::half::{Extended, HalfInput, HalfParams, HalfSplats, Scattering, fold};
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::raster::{self, Detail, FoldInput, OpaqueImage, ProjectInput, Projected, project};
+use splat_core::raster::{self, FoldInput, OpaqueImage, Projected};
 use splat_core::shade::LitBy;
 use splat_core::{
     Accumulator, Camera, Cloud, Direction, Footprint, FootprintStack, LightShape, Material, Object, Shading, Splat,
@@ -24,15 +24,7 @@ struct Shown {
 
 impl Shown {
     fn new(cloud: Cloud, camera: &Camera, materials: Vec<Material>, slab_width: f64) -> Self {
-        let (footprints, params) = (FootprintStack::default(), raster::Params::default());
-        let projected = project(&ProjectInput {
-            cloud: &cloud,
-            camera,
-            footprints: &footprints,
-            materials: &materials,
-            params: &params,
-            detail: Detail::ALL,
-        });
+        let (footprints, projected) = (FootprintStack::default(), projected(&cloud, camera, &materials));
         let objects =
             (0..4).map(|i| Object { name: i.to_string(), shadow_coefficient: 1.0, casts_shadow: true }).collect();
         Self { cloud, projected, footprints, materials, objects, slab_width }
@@ -295,6 +287,14 @@ fn splats_that_sweeps_cannot_take_are_refused() {
     for width in [0.0, f64::NAN, f64::INFINITY] {
         assert!(refused(&shown(SplatKind::Surface, width), &exact(None)).contains("splats.slab_width"));
     }
+    let lamp = lamp([0.05, 0.0, 0.0]);
+    let mut cloud = Cloud::new(DVec3::ZERO);
+    for x in [-1.0, 1.0] {
+        cloud.push(&Splat { position: Vec3::splat(x), kind: SplatKind::Surface, ..Splat::default() });
+    }
+    let pair = Shown::new(cloud, &camera, vec![lambert()], 1.0);
+    let among = draw(&with(&pair, input(&[], &camera, &[lamp])), &exact(None)).err().unwrap().to_string();
+    assert!(among.contains("lies among the splats"), "{among}");
     let again = HalfParams { scattering: Scattering::Forward, ..exact(None) };
     let of = shown(SplatKind::Surface, 1.0);
     let mut out = Accumulator::new(camera.size, 1, 6, false, false);

@@ -2,6 +2,8 @@
 //!
 //! Light that no half vector serves has a shadow map, as in slabs across the view, and joins the first sweep.
 
+mod splats;
+
 use super::{params, refuse, volumes};
 use crate::form::{Form, PlannedObject};
 use crate::frame::Frame;
@@ -12,14 +14,13 @@ use crate::scene::{self, Scene, Slicing, SoftShadows, Technique};
 use crate::technique::Session;
 use crate::{CostRecord, Error, RenderOptions, stage};
 use sheet_light::half::{
-    self, Bodies, Extended, HalfInput, HalfParams, HalfSplats, MOST_SAMPLES, Reason, Scattering, SplatBounds, fold,
-    penumbra_widening, serves, serves_extended, slab_width,
+    self, Bodies, Extended, HalfInput, HalfParams, MOST_SAMPLES, Reason, Scattering, fold, penumbra_widening, serves,
+    serves_extended, slab_width,
 };
 use sheet_light::{Params, SheetInput};
-use splat_core::glam::Vec3;
-use splat_core::raster::{self, ProjectInput, Projected};
 use splat_core::shade::LitBy;
-use splat_core::{Aabb, Accumulator, Cloud, DAabb, Light, Receiver, SplatKind, Transmittance};
+use splat_core::{Accumulator, Camera, Light, Receiver, Transmittance};
+use splats::{OwnSplats, splat_bounds};
 use tsm::ShadowMap;
 
 /// What a user can do where half vectors cannot.
@@ -65,12 +66,11 @@ fn points_served(matter: &Matter<'_>, points: &[LightPoint]) -> Result<Carries, 
         }
         other => other.to_string(),
     };
-    let is_served = |point: &LightPoint| match is_whole(matter.scene, point) {
-        true if samples(point) > MOST_SAMPLES => {
-            Err(format!("it has {} points, expected at most {MOST_SAMPLES} in one sweep", samples(point)))
+    let is_served = |point: &LightPoint| match lamp(matter.scene, point) {
+        (_, samples) if samples > MOST_SAMPLES => {
+            Err(format!("it has {samples} points, expected at most {MOST_SAMPLES} in one sweep"))
         }
-        true => serves_extended(&bodies, matter.camera, &point.whole, samples(point)).map_err(words),
-        false => serves(&bodies, matter.camera, &point.light).map_err(words),
+        lamp => serve(&bodies, matter.camera, lamp).map_err(words),
     };
     Ok(Carries {
         widening: points.iter().map(|point| penumbra_widening(&bodies, &point.whole)).collect(),
@@ -89,16 +89,21 @@ fn is_whole(scene: &Scene, point: &LightPoint) -> bool {
     is_one_sweep(scene) && point.whole.shape.is_extended()
 }
 
-/// How many points a light has.
-fn samples(point: &LightPoint) -> u32 {
-    point.rank[1] as u32
+/// What lights for a point: its whole light and how many points that has, or the point itself.
+fn lamp<'p>(scene: &Scene, point: &'p LightPoint) -> (&'p Light, u32) {
+    if is_whole(scene, point) { (&point.whole, point.rank[1] as u32) } else { (&point.light, 1) }
 }
 
-/// What is swept for a point: its whole light and the points of that, once for all of them, or the point itself.
+/// The same once for each sweep.
 fn swept<'p>(scene: &Scene, point: &'p LightPoint) -> Option<(&'p Light, u32)> {
-    match is_whole(scene, point) {
-        true => (point.rank[0] == 0).then(|| (&point.whole, samples(point))),
-        false => Some((&point.light, 1)),
+    (!is_whole(scene, point) || point.rank[0] == 0).then(|| lamp(scene, point))
+}
+
+/// Whether half vectors serve a light with so many points.
+fn serve(bodies: &Bodies<'_>, camera: &Camera, (light, samples): (&Light, u32)) -> Result<(), Reason> {
+    match light.shape.is_extended() {
+        true => serves_extended(bodies, camera, light, samples),
+        false => serves(bodies, camera, light),
     }
 }
 
@@ -108,13 +113,9 @@ pub(super) fn bytes(matter: &Matter<'_>, points: &[LightPoint], options: &Render
     let bodies = Bodies { volumes: &volumes, splats };
     // Of counts alone: no length among the parameters plays a part.
     let params = half_params(matter.scene, params(matter.scene, 0, options));
-    let is_served = |(light, samples): &(&Light, u32)| match light.shape.is_extended() {
-        true => serves_extended(&bodies, matter.camera, light, *samples).is_ok(),
-        false => serves(&bodies, matter.camera, light).is_ok(),
-    };
-    let served = points.iter().filter_map(|point| swept(matter.scene, point)).filter(is_served);
-    let mapped = points.iter().filter_map(|point| swept(matter.scene, point)).filter(|light| !is_served(light)).count();
-    half::bytes(&bodies, matter.camera, served, mapped, &params)
+    let lamps = points.iter().filter_map(|point| swept(matter.scene, point));
+    let (served, mapped): (Vec<_>, Vec<_>) = lamps.partition(|lamp| serve(&bodies, matter.camera, *lamp).is_ok());
+    half::bytes(&bodies, matter.camera, served.into_iter(), mapped.len(), &params)
 }
 
 /// Draws all that is translucent into a segment of its own.
@@ -204,7 +205,7 @@ fn input<'a>(
             (true, true) if point.rank[0] == 0 => {
                 let mean = means.iter().find(|(of, _)| *of == point.of);
                 let lit = LitBy { light: point.whole, shadow: mean.map(|(_, mean)| mean as _) };
-                extended.push(Extended { lit, samples: samples(point) });
+                extended.push(Extended { lit, samples: lamp(frame.scene, point).1 });
             }
             (true, true) => {}
         }
@@ -218,64 +219,6 @@ fn input<'a>(
         ambient: frame.scene.ambient,
     };
     Ok(HalfInput { sheets, splats: None, extended, mapped, opaque })
-}
-
-/// Most slabs where splats alone say how wide they are.
-const MOST_SLABS: f64 = 65536.0;
-
-/// Where the splats are that sweeps draw; `None` without any, and before they are made.
-fn splat_bounds(matter: &Matter<'_>) -> Option<SplatBounds> {
-    let cloud = matter.cloud?;
-    let (mut all, mut radii, mut count) = (Aabb::EMPTY, 0.0f64, 0u64);
-    for id in own_splats(matter) {
-        let (at, radius) = (cloud.position[id as usize], cloud.radius[id as usize]);
-        all = all.union(Aabb { min: at, max: at });
-        (radii, count) = (radii + f64::from(radius), count + 1);
-    }
-    let place = |p: Vec3| cloud.origin + p.as_dvec3();
-    let bounds = (count > 0).then(|| DAabb::new(place(all.min), place(all.max)))?;
-    // Neighbours are about half a radius apart.
-    let least = (bounds.diagonal() / MOST_SLABS).max(f64::MIN_POSITIVE);
-    Some(SplatBounds { bounds, slab_width: (0.5 * radii / count as f64).max(least), count })
-}
-
-/// Ids of the translucent splats of objects that become nothing else.
-fn own_splats<'a>(matter: &Matter<'a>) -> impl Iterator<Item = u32> + use<'a> {
-    let mut is_own = vec![false; matter.scene.objects.len()];
-    matter.own.iter().for_each(|own| is_own[own.object] = true);
-    let kinds = matter.cloud.into_iter().flat_map(|cloud| cloud.kind.iter().zip(&cloud.object));
-    let is_one = move |kind: SplatKind, object: u32| kind != SplatKind::Opaque && !is_own[object as usize];
-    (0..).zip(kinds).filter_map(move |(id, (kind, object))| is_one(*kind, *object).then_some(id))
-}
-
-/// The translucent splats of a frame, for which it has no radiance: theirs is found in sweeps.
-struct OwnSplats {
-    cloud: Cloud,
-    projected: Projected,
-    slab_width: f64,
-}
-
-impl OwnSplats {
-    fn of(frame: &Frame<'_>) -> Option<Self> {
-        let slab_width = splat_bounds(&frame.matter())?.slab_width;
-        let cloud = frame.loaded.cloud.gather(&own_splats(&frame.matter()).collect::<Vec<u32>>());
-        let projected = raster::project(&ProjectInput {
-            cloud: &cloud,
-            camera: &frame.camera,
-            footprints: &frame.loaded.footprints,
-            materials: &frame.loaded.materials,
-            params: &frame.raster_params(),
-            detail: frame.detail(),
-        });
-        Some(Self { cloud, projected, slab_width })
-    }
-
-    fn input<'a>(&'a self, frame: &'a Frame<'_>) -> HalfSplats<'a> {
-        let Self { cloud, projected, slab_width } = self;
-        let (materials, objects) = (&frame.loaded.materials, &frame.loaded.objects);
-        let footprints = &frame.loaded.footprints;
-        HalfSplats { cloud, materials, objects, footprints, projected, slab_width: *slab_width }
-    }
 }
 
 fn half_params(scene: &Scene, sheets: Params) -> HalfParams {

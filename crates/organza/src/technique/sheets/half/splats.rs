@@ -1,0 +1,66 @@
+//! Translucent splats that are swept with the volumes.
+
+use crate::frame::Frame;
+use crate::matter::Matter;
+use sheet_light::half::{HalfSplats, SplatBounds};
+use splat_core::glam::Vec3;
+use splat_core::raster::{self, ProjectInput, Projected};
+use splat_core::{Aabb, Cloud, DAabb, SplatKind};
+
+/// Most slabs where splats alone say how wide they are.
+const MOST_SLABS: f64 = 65536.0;
+
+/// Where the splats are that sweeps draw; `None` without any, and before they are made.
+pub(super) fn splat_bounds(matter: &Matter<'_>) -> Option<SplatBounds> {
+    let cloud = matter.cloud?;
+    let (mut all, mut radii, mut count) = (Aabb::EMPTY, 0.0f64, 0u64);
+    for id in own_splats(matter) {
+        let (at, radius) = (cloud.position[id as usize], cloud.radius[id as usize]);
+        all = all.union(Aabb { min: at, max: at });
+        (radii, count) = (radii + f64::from(radius), count + 1);
+    }
+    let place = |p: Vec3| cloud.origin + p.as_dvec3();
+    let bounds = (count > 0).then(|| DAabb::new(place(all.min), place(all.max)))?;
+    // Neighbours are about half a radius apart.
+    let least = (bounds.diagonal() / MOST_SLABS).max(f64::MIN_POSITIVE);
+    Some(SplatBounds { bounds, slab_width: (0.5 * radii / count as f64).max(least), count })
+}
+
+/// Ids of the translucent splats of objects that become nothing else.
+fn own_splats<'a>(matter: &Matter<'a>) -> impl Iterator<Item = u32> + use<'a> {
+    let mut is_own = vec![false; matter.scene.objects.len()];
+    matter.own.iter().for_each(|own| is_own[own.object] = true);
+    let kinds = matter.cloud.into_iter().flat_map(|cloud| cloud.kind.iter().zip(&cloud.object));
+    let is_one = move |kind: SplatKind, object: u32| kind != SplatKind::Opaque && !is_own[object as usize];
+    (0..).zip(kinds).filter_map(move |(id, (kind, object))| is_one(*kind, *object).then_some(id))
+}
+
+/// The translucent splats of a frame, for which it has no radiance: theirs is found in sweeps.
+pub(super) struct OwnSplats {
+    pub(super) cloud: Cloud,
+    projected: Projected,
+    slab_width: f64,
+}
+
+impl OwnSplats {
+    pub(super) fn of(frame: &Frame<'_>) -> Option<Self> {
+        let slab_width = splat_bounds(&frame.matter())?.slab_width;
+        let cloud = frame.loaded.cloud.gather(&own_splats(&frame.matter()).collect::<Vec<u32>>());
+        let projected = raster::project(&ProjectInput {
+            cloud: &cloud,
+            camera: &frame.camera,
+            footprints: &frame.loaded.footprints,
+            materials: &frame.loaded.materials,
+            params: &frame.raster_params(),
+            detail: frame.detail(),
+        });
+        Some(Self { cloud, projected, slab_width })
+    }
+
+    pub(super) fn input<'a>(&'a self, frame: &'a Frame<'_>) -> HalfSplats<'a> {
+        let Self { cloud, projected, slab_width } = self;
+        let (materials, objects) = (&frame.loaded.materials, &frame.loaded.objects);
+        let footprints = &frame.loaded.footprints;
+        HalfSplats { cloud, materials, objects, footprints, projected, slab_width: *slab_width }
+    }
+}
