@@ -285,6 +285,16 @@ fn translucent_surfaces_volumes_and_raw_points_shadow_each_other_as_by_points() 
     };
     assert!(said.contains("it comes through slabs that light and view share"), "{said}");
     assert!(said.contains("of what is opaque"), "{said}");
+    // Before the volumes, but among the rest.
+    let inside = "[[light]]\nkind = 'point'\nposition = [0, 0.4, 1.15]\nintensity = [4, 4, 4]\n";
+    std::fs::write(folder.path().join("scene.toml"), scene(inside)).unwrap();
+    let out = organza().args(["explain", "scene.toml"]).args(HALF).current_dir(&folder).output().unwrap();
+    let said = String::from_utf8(out.stdout).unwrap();
+    assert!(said.contains("the lamp lies within the bounds of translucent surfaces or points"), "{said}");
+    let [points, half] =
+        [draw_in(folder.path(), &scene(inside), &HALF[..0]), draw_in(folder.path(), &scene(inside), &HALF)];
+    let apart = rmse(&points.channel("G"), &half.channel("G"));
+    assert!(apart < 0.01, "{apart}");
 }
 
 /// Means over squares of 8² pixels of the green channel, and the same of what path tracing makes of all orders of scattering by media,

@@ -64,6 +64,8 @@ fn points_served(matter: &Matter<'_>, points: &[LightPoint]) -> Result<Carries, 
             let name = &matter.scene.objects[volumes[volume].object as usize].name;
             format!("the lamp lies inside object '{}'", crate::shown(name))
         }
+        // Positions are normalized here, not the scene's.
+        Reason::LampAmong { .. } => "the lamp lies within the bounds of translucent surfaces or points".into(),
         other => other.to_string(),
     };
     let is_served = |point: &LightPoint| match lamp(matter.scene, point) {
