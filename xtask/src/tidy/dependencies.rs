@@ -4,13 +4,14 @@ use crate::repo::Repo;
 use crate::toml_lines::{lines, string};
 
 /// For each crate of the workspace, the crates of the workspace that it may depend on, tests and benches included.
-const MAY_KNOW: [(&str, &[&str]); 20] = [
+const MAY_KNOW: [(&str, &[&str]); 21] = [
     ("splat-core", &["splat-shaders"]),
     ("convert", &["splat-core"]),
     ("tsm", &["splat-core", "splat-shaders"]),
     ("hbsort", &["splat-core", "splat-shaders"]),
     ("pbsr", &["splat-core", "splat-shaders"]),
     ("sheet-light", &["splat-core"]),
+    ("deferred-blend", &["splat-core"]),
     ("reference", &["splat-core"]),
     ("splat-shaders", &[]),
     ("gpu-ash", &["splat-shaders"]),
@@ -27,6 +28,7 @@ const MAY_KNOW: [(&str, &[&str]); 20] = [
             "hbsort",
             "pbsr",
             "sheet-light",
+            "deferred-blend",
             "reference",
             "organza-scene",
             "organza-output",
@@ -45,6 +47,7 @@ const MAY_KNOW: [(&str, &[&str]); 20] = [
             "hbsort",
             "pbsr",
             "sheet-light",
+            "deferred-blend",
             "reference",
             "splat-shaders",
             "gpu-ash",
