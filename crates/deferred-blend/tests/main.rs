@@ -1,1 +1,3 @@
 //! Tests of deferred blending.
+
+mod grouping;
