@@ -19,6 +19,8 @@ pub(crate) struct Wanted {
     pub(crate) tangent: bool,
     /// Physical values.
     pub(crate) value: bool,
+    /// Optical depths of one crossing, for translucent surfaces.
+    pub(crate) crossing_depth: bool,
 }
 
 impl Wanted {
@@ -27,7 +29,8 @@ impl Wanted {
         let required = size_of::<Vec3>() + 2 * size_of::<f32>() + size_of::<[f32; 3]>();
         let ids = size_of::<SplatKind>() + size_of::<u16>() + size_of::<u8>() + size_of::<u32>();
         let vectors = [self.normal, self.shading_normal, self.tangent].map(usize::from).iter().sum::<usize>();
-        let optional = vectors * size_of::<Vec3>() + usize::from(self.value) * size_of::<f32>();
+        let numbers = usize::from(self.value) + usize::from(self.crossing_depth);
+        let optional = vectors * size_of::<Vec3>() + numbers * size_of::<f32>();
         (required + ids + optional) as u64
     }
 }
@@ -51,6 +54,7 @@ pub(crate) fn size_columns(
     sized(&mut cloud.shading_normal, if wanted.shading_normal { n } else { 0 }).map_err(full)?;
     sized(&mut cloud.tangent, if wanted.tangent { n } else { 0 }).map_err(full)?;
     sized(&mut cloud.value, if wanted.value { n } else { 0 }).map_err(full)?;
+    sized(&mut cloud.crossing_depth, if wanted.crossing_depth { n } else { 0 }).map_err(full)?;
     constant(&mut cloud.kind, n, kind);
     constant(&mut cloud.material, n, params.material);
     constant(&mut cloud.footprint, n, params.footprint);

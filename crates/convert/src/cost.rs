@@ -118,7 +118,8 @@ pub fn surface<F: ScalarField + ?Sized>(
     let coarse = if params.opacity > 0.0 { coarse_mesh(field, bounds, &params.splat)? } else { Mesh::default() };
     let spacing = surface_spacing(field, bounds, params)?;
     // As if it were smooth.
-    let wanted = Wanted { tangent: params.opacity >= 1.0 && !open_edges(&coarse).is_empty(), ..mesh_points::WANTED };
+    let tangent = params.opacity >= 1.0 && !open_edges(&coarse).is_empty();
+    let wanted = Wanted { tangent, ..mesh_points::wanted(params.opacity) };
     Ok(Prediction::new(ZERO_SET_EXCESS * area(&coarse) / (spacing * spacing), None, wanted))
 }
 

@@ -18,6 +18,7 @@ use rayon::prelude::*;
 use splat_core::{
     Cloud, Mesh, Progress, SplatKind,
     glam::{DVec3, Vec3},
+    optics,
 };
 
 /// How a mesh becomes splats.
@@ -39,8 +40,10 @@ impl Default for MeshParams {
     }
 }
 
-/// Splats of a mesh have normals at least.
-pub(crate) const WANTED: Wanted = Wanted { normal: true, shading_normal: false, tangent: false, value: false };
+/// Columns of the splats of a mesh of some opacity, but for those that not all meshes need.
+pub(crate) fn wanted(opacity: f64) -> Wanted {
+    Wanted { normal: true, crossing_depth: opacity < 1.0, ..Wanted::default() }
+}
 
 /// What the conversion of a mesh did.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -120,6 +123,9 @@ pub fn mesh_to_points_into(
     if report.splats > 0 {
         let pieces = Pieces::new(mesh, params, &plan);
         pieces.emit(cloud, progress)?;
+        if plan.wanted.crossing_depth {
+            cloud.crossing_depth.fill(optics::optical_depth(params.opacity) as f32);
+        }
         if plan.wanted.tangent {
             Borders::new(plan.borders.iter().map(|edge| pieces.place(edge))).clip(cloud);
         }
@@ -170,7 +176,7 @@ pub(crate) fn plan(mesh: &Mesh, params: &MeshParams) -> Result<Plan, ConvertErro
     report.normals_computed = mesh.normal.is_empty();
     let normal = if report.normals_computed { vertex_normals(mesh) } else { mesh.normal.clone() };
     let borders = if params.opacity < 1.0 { Vec::new() } else { open_edges(mesh) };
-    let wanted = Wanted { tangent: !borders.is_empty(), ..WANTED };
+    let wanted = Wanted { tangent: !borders.is_empty(), ..wanted(params.opacity) };
     let mut plan = Plan { measures, starts, normal, borders, wanted, report };
     let triangles = (0..mesh.triangles.len()).into_par_iter().with_min_len(4096);
     plan.wanted.shading_normal = triangles.any(|i| plan.is_flat(mesh, i, plane(mesh, i)));

@@ -109,6 +109,7 @@ pub fn rectangle(rectangle: &Rectangle, params: &SplatParams) -> Result<Cloud, C
     let splat = Splat {
         radius: params.radius(step) as f32,
         cross_section: if opacity < 1.0 { area * optics::optical_depth(opacity) } else { area } as f32,
+        crossing_depth: if opacity < 1.0 { optics::optical_depth(opacity) as f32 } else { 0.0 },
         kind: if opacity < 1.0 { SplatKind::Surface } else { SplatKind::Opaque },
         normal: params.transform.rotate(normal.normalize()).as_vec3().normalize(),
         ..template(params)
@@ -136,7 +137,7 @@ pub(crate) fn rectangle_counts(u: DVec3, v: DVec3, spacing: f64) -> [f64; 2] {
 
 /// Columns of a parallelogram's cloud.
 pub(crate) fn rectangle_columns(opacity: f64) -> Wanted {
-    Wanted { tangent: opacity >= 1.0, ..mesh_points::WANTED }
+    Wanted { tangent: opacity >= 1.0, ..mesh_points::wanted(opacity) }
 }
 
 fn template(params: &SplatParams) -> Splat {

@@ -236,7 +236,8 @@ impl Sorted {
 
 /// Which columns surfels fill.
 pub(crate) fn wanted(points: &RawPoints, params: &SurfelParams) -> Wanted {
-    Wanted { normal: true, value: params.values && !points.value.is_empty(), ..Wanted::default() }
+    let value = params.values && !points.value.is_empty();
+    Wanted { normal: true, value, crossing_depth: params.opacity < 1.0, ..Wanted::default() }
 }
 
 fn emit(
@@ -249,7 +250,8 @@ fn emit(
     let surfels = sorted.surfels(params.merge_duplicates);
     report.splats = surfels.len() as u64;
     let opaque = params.opacity >= 1.0;
-    let tau = if opaque { 1.0 } else { optics::optical_depth(params.opacity) } * t.scale * t.scale;
+    let crossing = if opaque { 1.0 } else { optics::optical_depth(params.opacity) };
+    let tau = crossing * t.scale * t.scale;
     let mut cloud = Cloud::new(t.apply(points.origin));
     let wanted = wanted(points, params);
     let kind = if opaque { SplatKind::Opaque } else { SplatKind::Surface };
@@ -268,6 +270,7 @@ fn emit(
             *color = points.color.get(i).filter(|_| params.colors).copied().unwrap_or(params.splat.color);
         },
     );
+    cloud.crossing_depth.fill(crossing as f32);
     cloud.value.iter_mut().zip(&surfels).for_each(|(v, s)| *v = points.value[s.1 as usize]);
     Ok(cloud)
 }

@@ -5,7 +5,16 @@
 //! into groups whose members do not overlap, so that within a group only the second blend is left.
 #![forbid(unsafe_code)]
 
+mod blend;
+mod disc;
 mod error;
+mod fragments;
 pub mod grouping;
+mod layers;
+mod params;
+pub mod reference;
 
+pub use blend::{BlendCounts, BlendInput, blend};
+pub use disc::{DiscInput, Discs};
 pub use error::Error;
+pub use params::Params;

@@ -1,3 +1,5 @@
 //! Tests of deferred blending.
 
+mod blend;
 mod grouping;
+mod scenes;

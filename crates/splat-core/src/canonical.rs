@@ -61,7 +61,7 @@ fn compare_splats(cloud: &Cloud, a: usize, b: usize) -> Ordering {
             (vector(s.position), s.radius.to_bits(), s.cross_section.to_bits(), s.color.map(f32::to_bits)),
             (s.kind, s.material, s.footprint, s.object),
             (vector(s.normal), vector(s.shading_normal), vector(s.tangent)),
-            (s.shadow_coefficient.to_bits(), s.value.to_bits()),
+            (s.shadow_coefficient.to_bits(), s.value.to_bits(), s.crossing_depth.to_bits()),
         )
     };
     bits(a).cmp(&bits(b))

@@ -49,6 +49,9 @@ pub struct Splat {
     pub shadow_coefficient: f32,
     /// The physical value that the splat was made from (density, temperature, intensity …), any finite number.
     pub value: f32,
+    /// Optical depth of one crossing of the translucent surface that a disc is a piece of, ≥ 0; 0 where it is not known. The area
+    /// that the disc stands for is `cross_section` over it. It tells the opacity of a layer where discs are blended before layers are.
+    pub crossing_depth: f32,
 }
 
 impl Default for Splat {
@@ -67,13 +70,14 @@ impl Default for Splat {
             tangent: Vec3::ZERO,
             shadow_coefficient: 1.0,
             value: 0.0,
+            crossing_depth: 0.0,
         }
     }
 }
 
 macro_rules! columns {
     (required: $($(#[$rm:meta])* $r:ident: $rt:ty,)* ; optional: $($(#[$om:meta])* $o:ident: $ot:ty = $od:expr,)*) => {
-        /// Splats as columns. The last five columns may be empty, which means their default for every splat.
+        /// Splats as columns. The last six columns may be empty, which means their default for every splat.
         ///
         /// The id of a splat is its rank; [`Cloud::canonicalize`] makes that independent of the order of the input.
         ///
@@ -201,6 +205,8 @@ columns! {
     shadow_coefficient: f32 = 1.0,
     /// Physical values; may be empty.
     value: f32 = 0.0,
+    /// Optical depths of one crossing, see [`Splat::crossing_depth`]; may be empty, which means that none is known.
+    crossing_depth: f32 = 0.0,
 }
 
 impl Cloud {
@@ -232,6 +238,13 @@ impl Cloud {
     /// Shadow coefficient of splat `i`.
     pub fn shadow_coefficient_of(&self, i: usize) -> f32 {
         self.shadow_coefficient.get(i).copied().unwrap_or(1.0)
+    }
+
+    /// Optical depth of one crossing of the surface that disc `i` is a piece of. Where it is not known the disc stands for the cell of
+    /// a square lattice whose discs have the `spacing` of its footprint.
+    pub fn crossing_depth_of(&self, i: usize, spacing: f32) -> f32 {
+        let known = self.crossing_depth.get(i).copied().filter(|tau| *tau > 0.0);
+        known.unwrap_or_else(|| self.cross_section[i] / (spacing * spacing))
     }
 
     /// Bounds of the centres, relative to the origin; empty bounds for an empty cloud.
@@ -279,6 +292,9 @@ impl Cloud {
             }
             if !(0.0..=1.0).contains(&s.shadow_coefficient) {
                 return bad(i, "shadow_coefficient", s.shadow_coefficient.to_string(), "a number in [0, 1]");
+            }
+            if !(s.crossing_depth.is_finite() && s.crossing_depth >= 0.0) {
+                return bad(i, "crossing_depth", s.crossing_depth.to_string(), "a finite number ≥ 0");
             }
             if !s.value.is_finite() {
                 return bad(i, "value", s.value.to_string(), "a finite number");

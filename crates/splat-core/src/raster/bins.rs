@@ -74,42 +74,70 @@ impl Bins {
 /// # Panics
 /// If an id is not below the number of projected splats.
 pub fn bin(projected: &Projected, ids: &[u32]) -> Bins {
-    let columns = (projected.size[0] as usize).div_ceil(TILE);
-    let rows = (projected.size[1] as usize).div_ceil(TILE);
-    let chunks = ids.par_chunks(CHUNK).map(|ids| bin_chunk(projected, ids, columns, columns * rows)).collect();
+    let bounds = |id: u32| projected.splats[id as usize].bounds(projected.size);
+    bin_by(projected.size, ids, |id| projected.coverage[id as usize], bounds)
+}
+
+/// Bins what lies in rectangles of pixels [x0, x1, y0, y1) of an image of `size`, given by id; an empty rectangle is in no tile.
+pub fn bin_rectangles(size: [u32; 2], ids: &[u32], rectangle: impl Fn(u32) -> [u32; 4] + Sync) -> Bins {
+    bin_by(size, ids, |id| Coverage::of(rectangle(id)), &rectangle)
+}
+
+fn bin_by(
+    size: [u32; 2],
+    ids: &[u32],
+    coverage: impl Fn(u32) -> Coverage + Sync,
+    bounds: impl Fn(u32) -> [u32; 4] + Sync,
+) -> Bins {
+    let [columns, rows] = size.map(|s| (s as usize).div_ceil(TILE));
+    let chunk = |ids: &[u32]| {
+        // One loop that waits for nothing but memory: the splats lie far apart.
+        let coverage: Vec<Coverage> = ids.iter().map(|&i| coverage(i)).collect();
+        bin_chunk(ids, &coverage, columns, columns * rows, &bounds)
+    };
+    let chunks = ids.par_chunks(CHUNK).map(chunk).collect();
     Bins { columns, rows, chunks }
 }
 
-fn bin_chunk(projected: &Projected, ids: &[u32], columns: usize, tiles: usize) -> ChunkLists {
-    // One loop that waits for nothing but memory: the splats lie far apart.
-    let coverage: Vec<Coverage> = ids.iter().map(|&i| projected.coverage[i as usize]).collect();
+fn bin_chunk(
+    ids: &[u32],
+    coverage: &[Coverage],
+    columns: usize,
+    tiles: usize,
+    bounds: &impl Fn(u32) -> [u32; 4],
+) -> ChunkLists {
     // starts[t + 1] first counts, then is the end of the tile before, then the running end of tile t.
     let mut starts = vec![0u32; tiles + 2];
     let mut splats = 0;
     for (&coverage, &id) in coverage.iter().zip(ids) {
         splats += u64::from(coverage != Coverage::NONE);
-        for_each_tile(projected, coverage, id, columns, |t| starts[t + 2] += 1);
+        for_each_tile(coverage, || bounds(id), columns, |t| starts[t + 2] += 1);
     }
     for t in 2..starts.len() {
         starts[t] += starts[t - 1];
     }
     let mut entries = vec![0u32; starts[tiles + 1] as usize];
     for (&coverage, &id) in coverage.iter().zip(ids) {
-        for_each_tile(projected, coverage, id, columns, |t| {
-            entries[starts[t + 1] as usize] = id;
-            starts[t + 1] += 1;
-        });
+        for_each_tile(
+            coverage,
+            || bounds(id),
+            columns,
+            |t| {
+                entries[starts[t + 1] as usize] = id;
+                starts[t + 1] += 1;
+            },
+        );
     }
     starts.pop();
     ChunkLists { starts, entries, splats }
 }
 
 #[inline(always)]
-fn for_each_tile(projected: &Projected, coverage: Coverage, id: u32, columns: usize, mut visit: impl FnMut(usize)) {
+fn for_each_tile(coverage: Coverage, bounds: impl FnOnce() -> [u32; 4], columns: usize, mut visit: impl FnMut(usize)) {
     if coverage == Coverage::NONE {
         return;
     }
-    let [first, last] = coverage.tiles(|| projected.splats[id as usize].bounds(projected.size));
+    let [first, last] = coverage.tiles(bounds);
     for row in first[1]..=last[1] {
         for column in first[0]..=last[0] {
             visit(row * columns + column);

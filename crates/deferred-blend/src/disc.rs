@@ -1,0 +1,280 @@
+//! Discs as the rays of an image meet them, exactly in perspective.
+//!
+//! A disc has the centre c, the unit normal n and the semi-axes a and b. The ray of a pixel that lies (dx, dy) from the image of the
+//! centre has the direction d = c/c_z + e with e = (dx/f, −dy/f, 0), so that its z is view depth. It meets the disc's plane at the
+//! depth z = (n·c)/(n·d), and there, in units of the semi-axes, at
+//!
+//! (c_z/N)·(m·(e·a) − (N − m)·(c·a)/c_z)/|a|² along a, with m = n·c/c_z and N = n·d = m + n·e,
+//!
+//! and likewise along b. Numerators and N are linear in (dx, dy), and the numerators vanish at the centre, so nothing cancels in
+//! f32; no number is divided by m, which is 0 for a disc that is seen edge-on. Of a disc that reaches through the eye plane the
+//! image's middle takes the place of the centre: there both numerators have a constant, (n·c)·a_z − (a·c)·n_z over |a|². Parallel
+//! rays have N = n_z everywhere and a depth that is linear in (dx, dy).
+
+use crate::Params;
+use rayon::prelude::*;
+use splat_core::glam::{DMat3, DVec3};
+use splat_core::optics::{self, SurfaceOpacity};
+use splat_core::raster::kernel::Kernel;
+use splat_core::{Camera, Cloud, FootprintStack, Material, SplatKind};
+
+/// Discs projected by one task.
+const CHUNK: usize = 4096;
+
+/// One disc in the image.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Disc {
+    /// Image position of the centre, pixels; of a disc through the eye plane the image's middle.
+    pub(crate) center: [f32; 2],
+    /// Place on the disc's plane along its semi-axes, times N, there, and its change per pixel.
+    pub(crate) along: [f32; 2],
+    pub(crate) along_slope: [[f32; 2]; 2],
+    /// N there, and its change per pixel.
+    pub(crate) facing: f32,
+    pub(crate) facing_slope: [f32; 2],
+    /// Depth times N there, and its change per pixel.
+    pub(crate) depth: f32,
+    pub(crate) depth_slope: [f32; 2],
+    /// Geometric mean of the semi-axes, world units.
+    pub(crate) radius: f32,
+    /// Pixels [x0, x1, y0, y1) that may see it.
+    pub(crate) pixels: [u32; 4],
+}
+
+/// What discs are projected from.
+#[derive(Debug, Clone, Copy)]
+pub struct DiscInput<'a> {
+    /// The splats.
+    pub cloud: &'a Cloud,
+    /// Places in the cloud of the discs that are blended, translucent or opaque; near ones first is fastest.
+    pub ids: &'a [u32],
+    /// The viewer.
+    pub camera: &'a Camera,
+    /// Footprints by id: the weights w of Eq. 1.
+    pub footprints: &'a FootprintStack,
+    /// Materials by id.
+    pub materials: &'a [Material],
+}
+
+/// Discs of one view.
+#[derive(Debug, Clone)]
+pub struct Discs {
+    /// Image size, pixels.
+    pub(crate) size: [u32; 2],
+    pub(crate) discs: Vec<Disc>,
+    /// Places in the cloud.
+    pub(crate) ids: Vec<u32>,
+    pub(crate) looks: Vec<Look>,
+    pub(crate) kernels: Vec<Kernel>,
+    /// Focal length, pixels; `None` for parallel rays.
+    focal: Option<f32>,
+}
+
+/// What one disc shows, beside its values.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Look {
+    /// Of one crossing, by channel: the opacity, or for a slab the optical depth at right angles.
+    pub(crate) crossing: [f32; 3],
+    pub(crate) is_slab: bool,
+    pub(crate) footprint: u8,
+    pub(crate) object: u32,
+}
+
+impl Look {
+    /// Opacity of one crossing in a channel, by a ray at some |cosine| to the normal.
+    #[inline]
+    pub(crate) fn opacity(&self, channel: usize, cosine: f32) -> f32 {
+        if self.is_slab {
+            let factor = SurfaceOpacity::ThinSlab.optical_depth_factor(cosine);
+            -libm::expm1f(-self.crossing[channel] * factor)
+        } else {
+            self.crossing[channel]
+        }
+    }
+}
+
+impl Discs {
+    /// Projects discs; those that no ray meets are kept, and are in no pixel.
+    ///
+    /// # Panics
+    /// If an id, a material or a footprint is out of range, or a splat is a piece of a medium.
+    pub fn project(input: &DiscInput<'_>, params: &Params) -> Self {
+        let view = View::new(input);
+        let chunks = input.ids.par_chunks(CHUNK);
+        let parts: Vec<Vec<(Disc, Look)>> =
+            chunks.map(|ids| ids.iter().map(|&i| view.disc(i as usize, params)).collect()).collect();
+        let (discs, looks) = parts.into_iter().flatten().unzip();
+        let kernels = input.footprints.layers().iter().map(Kernel::new).collect();
+        let focal = (!view.parallel).then_some(view.focal as f32);
+        Self { size: input.camera.size, discs, ids: input.ids.to_vec(), looks, kernels, focal }
+    }
+
+    /// |d| of the ray of a pixel, whose z is 1.
+    pub(crate) fn ray_length(&self, [x, y]: [usize; 2]) -> f32 {
+        let Some(focal) = self.focal else { return 1.0 };
+        let offset = |at: usize, size: u32| (at as f32 + 0.5 - 0.5 * size as f32) / focal;
+        let (u, v) = (offset(x, self.size[0]), offset(y, self.size[1]));
+        (1.0 + u * u + v * v).sqrt()
+    }
+
+    /// Number of discs that some pixel may see.
+    pub fn visible(&self) -> u64 {
+        self.discs.par_iter().with_min_len(CHUNK).filter(|d| d.is_in_view()).count() as u64
+    }
+
+    /// Bytes of all discs.
+    pub fn bytes(&self) -> u64 {
+        (size_of_val(&*self.discs) + size_of_val(&*self.ids) + size_of_val(&*self.looks)) as u64
+    }
+}
+
+impl Disc {
+    fn is_in_view(&self) -> bool {
+        let [x0, x1, y0, y1] = self.pixels;
+        x0 < x1 && y0 < y1
+    }
+}
+
+/// The camera's side of a projection.
+struct View<'a> {
+    input: &'a DiscInput<'a>,
+    rotation: DMat3,
+    /// From the cloud's origin to the eye.
+    shift: DVec3,
+    focal: f64,
+    half: [f64; 2],
+    parallel: bool,
+}
+
+impl<'a> View<'a> {
+    fn new(input: &'a DiscInput<'a>) -> Self {
+        let camera = input.camera;
+        let [right, up, forward] = camera.axes;
+        Self {
+            input,
+            rotation: DMat3::from_cols(right, up, forward).transpose(),
+            shift: input.cloud.origin - camera.position,
+            focal: camera.focal_px(),
+            half: camera.size.map(|s| 0.5 * f64::from(s)),
+            parallel: camera.is_orthographic(),
+        }
+    }
+
+    fn disc(&self, i: usize, params: &Params) -> (Disc, Look) {
+        let DiscInput { cloud, materials, .. } = *self.input;
+        assert_ne!(cloud.kind[i], SplatKind::Medium, "invariant: discs alone are blended");
+        let center = self.rotation * (cloud.position[i].as_dvec3() + self.shift);
+        let normal = self.rotation * cloud.normal_of(i).as_dvec3();
+        let axes = axes(cloud, i, f64::from(params.disc_scale)).map(|a| self.rotation * a);
+        let disc =
+            if self.parallel { self.parallel(center, normal, axes) } else { self.perspective(center, normal, axes) };
+        (disc, self.look(i, &materials[cloud.material[i] as usize]))
+    }
+
+    fn look(&self, i: usize, material: &Material) -> Look {
+        let cloud = self.input.cloud;
+        let footprint = &self.input.footprints.layers()[cloud.footprint[i] as usize];
+        let is_slab = material.surface_opacity == SurfaceOpacity::ThinSlab;
+        let tau = f64::from(cloud.crossing_depth_of(i, footprint.spacing_for_radius(cloud.radius[i])));
+        let crossing = material.extinction_rgb.map(|factor| {
+            let tau = tau * f64::from(factor);
+            (if is_slab { tau } else { optics::opacity(tau) }) as f32
+        });
+        Look { crossing, is_slab, footprint: cloud.footprint[i], object: cloud.object[i] }
+    }
+
+    /// Rays from the eye.
+    fn perspective(&self, center: DVec3, normal: DVec3, axes: [DVec3; 2]) -> Disc {
+        let z = center.z;
+        let reach = squares(axes, 2).sqrt();
+        let crosses = z <= reach;
+        // Where the disc is seen by any pixel each fragment tells which.
+        let ranges = if crosses { [[f64::NEG_INFINITY, f64::INFINITY]; 2] } else { self.touching(center, axes) };
+        let toward = if crosses { DVec3::Z } else { center / z };
+        let (facing, distance) = (normal.dot(toward), normal.dot(center));
+        let facing_slope = [normal.x / self.focal, -normal.y / self.focal];
+        let of_axis = |a: DVec3| {
+            let (own, scale) = (a.dot(center), 1.0 / a.length_squared());
+            let at = if crosses { (distance * a.z - own * normal.z) * scale } else { 0.0 };
+            let slope = |e: f64, n: f64| ((distance * e - own * n) * scale) as f32;
+            (at as f32, [slope(a.x / self.focal, facing_slope[0]), slope(-a.y / self.focal, facing_slope[1])])
+        };
+        let along = axes.map(of_axis);
+        Disc {
+            center: [self.half[0] + self.focal * toward.x, self.half[1] - self.focal * toward.y].map(|v| v as f32),
+            along: along.map(|a| a.0),
+            along_slope: along.map(|a| a.1),
+            facing: facing as f32,
+            facing_slope: facing_slope.map(|v| v as f32),
+            depth: distance as f32,
+            depth_slope: [0.0; 2],
+            radius: mean_radius(axes),
+            pixels: if z + reach > 0.0 { self.pixels(ranges) } else { [0; 4] },
+        }
+    }
+
+    /// Columns and rows between the planes through the eye that touch an ellipse: (c_x − u·c_z)² = (a_x − u·a_z)² + (b_x − u·b_z)².
+    fn touching(&self, center: DVec3, axes: [DVec3; 2]) -> [[f64; 2]; 2] {
+        let range = |axis: usize| {
+            let square = center.z * center.z - squares(axes, 2);
+            let mixed = center[axis] * center.z - axes[0][axis] * axes[0].z - axes[1][axis] * axes[1].z;
+            let other = center[axis] * center[axis] - squares(axes, axis);
+            let root = (mixed * mixed - square * other).max(0.0).sqrt();
+            [(mixed - root) / square, (mixed + root) / square]
+        };
+        let ([left, right], [down, up]) = (range(0), range(1));
+        let place = |axis: usize, v: f64| self.half[axis] + self.focal * v;
+        [[place(0, left), place(0, right)], [place(1, -up), place(1, -down)]]
+    }
+
+    /// Rays along the view.
+    fn parallel(&self, center: DVec3, normal: DVec3, axes: [DVec3; 2]) -> Disc {
+        let facing = normal.z;
+        let slope = [-normal.x / self.focal, normal.y / self.focal];
+        let along = axes.map(|a| {
+            let scale = 1.0 / a.length_squared();
+            let part = |e: f64, z: f64| ((facing * e + a.z * z) * scale) as f32;
+            [part(a.x / self.focal, slope[0]), part(-a.y / self.focal, slope[1])]
+        });
+        let at = [self.half[0] + self.focal * center.x, self.half[1] - self.focal * center.y];
+        let range = |axis: usize| {
+            let reach = self.focal * squares(axes, axis).sqrt();
+            [at[axis] - reach, at[axis] + reach]
+        };
+        Disc {
+            center: at.map(|v| v as f32),
+            along: [0.0; 2],
+            along_slope: along,
+            facing: facing as f32,
+            facing_slope: [0.0; 2],
+            depth: (center.z * facing) as f32,
+            depth_slope: slope.map(|v| v as f32),
+            radius: mean_radius(axes),
+            pixels: self.pixels([range(0), range(1)]),
+        }
+    }
+
+    /// Pixels whose centres may lie in a rectangle of the image, with one pixel around for rounding.
+    fn pixels(&self, ranges: [[f64; 2]; 2]) -> [u32; 4] {
+        let clamp = |v: f64, axis: usize| v.clamp(0.0, 2.0 * self.half[axis]) as u32;
+        let [x, y] = ranges;
+        [clamp(x[0] - 1.0, 0), clamp(x[1] + 1.0, 0), clamp(y[0] - 1.0, 1), clamp(y[1] + 1.0, 1)]
+    }
+}
+
+/// Semi-axes of a disc, in the cloud's space.
+pub(crate) fn axes(cloud: &Cloud, i: usize, scale: f64) -> [DVec3; 2] {
+    let normal = cloud.normal_of(i).as_dvec3().normalize_or(DVec3::Z);
+    let (tangent, radius) = (cloud.tangent_of(i).as_dvec3(), f64::from(cloud.radius[i]) * scale);
+    let first = if tangent == DVec3::ZERO { normal.any_orthonormal_vector() * radius } else { tangent * scale };
+    let across = normal.cross(first).normalize_or(normal.any_orthonormal_vector());
+    [first, across * radius]
+}
+
+fn squares(axes: [DVec3; 2], axis: usize) -> f64 {
+    axes[0][axis] * axes[0][axis] + axes[1][axis] * axes[1][axis]
+}
+
+fn mean_radius(axes: [DVec3; 2]) -> f32 {
+    (axes[0].length() * axes[1].length()).sqrt() as f32
+}

@@ -1,0 +1,134 @@
+//! Every ray with every disc, in f64: slow, and what the rest is judged by. It shares the gap rule's formula with
+//! [`blend`](crate::blend()), not its code, and none of its projection.
+
+use crate::disc::axes;
+use crate::{DiscInput, Params};
+use splat_core::optics::{self, SurfaceOpacity};
+use splat_core::shade::ChannelLayout;
+use splat_core::{Camera, Footprint, glam::DVec3};
+
+/// One layer of a pixel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layer {
+    /// View depth: the discs' average by weight.
+    pub depth: f64,
+    /// Opacity by channel.
+    pub opacity: [f64; 3],
+    /// Σwαv/Σw of each value: values times opacity.
+    pub values: Vec<f64>,
+}
+
+/// Where a ray meets a disc.
+#[derive(Debug, Clone, Copy)]
+struct Hit {
+    depth: f64,
+    id: usize,
+    weight: f64,
+    distance_sq: f64,
+    /// |n·d|, d with a z of 1.
+    facing: f64,
+    radius: f64,
+}
+
+/// The layers of the pixel at (x, y), near to far. `planes` is 1 or 3, `channels` the number of values a splat in `values`, which are by
+/// place in the cloud.
+pub fn layers(
+    input: &DiscInput<'_>,
+    params: &Params,
+    [x, y]: [u32; 2],
+    values: &[f32],
+    [planes, channels]: [usize; 2],
+) -> Vec<Layer> {
+    let (origin, direction) = world_ray(input.camera, x, y);
+    let hits = hits(input, params, origin, direction);
+    let core = f64::from(Footprint::CORE / params.disc_scale).powi(2);
+    let mut layers = Vec::new();
+    let mut begin = 0;
+    for end in 1..=hits.len() {
+        if end < hits.len() && joins(&hits[end - 1], &hits[end], f64::from(params.gap)) {
+            continue;
+        }
+        if hits[begin..end].iter().any(|h| h.distance_sq < core) {
+            layers.push(blend(&hits[begin..end], input, direction.length(), values, [planes, channels]));
+        }
+        begin = end;
+    }
+    layers
+}
+
+/// Beauty and transmittance by plane of layers in order.
+pub fn composite(layers: &[Layer], planes: usize, channels: usize) -> (Vec<f64>, Vec<f64>) {
+    let (mut sums, mut through) = (vec![0.0; channels], vec![1.0; planes]);
+    for layer in layers {
+        for (c, sum) in sums.iter_mut().enumerate() {
+            *sum += through[ChannelLayout::plane_of(c, channels, planes)] * layer.values[c];
+        }
+        through.iter_mut().zip(layer.opacity).for_each(|(t, opacity)| *t *= 1.0 - opacity);
+    }
+    (sums, through)
+}
+
+/// From the eye, or a place of the eye's plane, along the view: the part along the camera's axis is 1.
+fn world_ray(camera: &Camera, x: u32, y: u32) -> (DVec3, DVec3) {
+    let (from, along) = camera.view_ray(f64::from(x) + 0.5, f64::from(y) + 0.5);
+    let world = |v: DVec3| camera.axes[0] * v.x + camera.axes[1] * v.y + camera.axes[2] * v.z;
+    (camera.position + world(from), world(along))
+}
+
+fn hits(input: &DiscInput<'_>, params: &Params, origin: DVec3, direction: DVec3) -> Vec<Hit> {
+    let cloud = input.cloud;
+    let origin = origin - cloud.origin;
+    let mut hits: Vec<Hit> = Vec::new();
+    for &id in input.ids {
+        let i = id as usize;
+        let (center, normal) = (cloud.position[i].as_dvec3(), cloud.normal_of(i).as_dvec3());
+        let depth = normal.dot(center - origin) / normal.dot(direction);
+        let at = origin + direction * depth - center;
+        let axes = axes(cloud, i, f64::from(params.disc_scale));
+        let distance_sq: f64 = axes.iter().map(|a| (at.dot(*a) / a.length_squared()).powi(2)).sum();
+        let profile = input.footprints.layers()[cloud.footprint[i] as usize];
+        if depth > 0.0 && distance_sq < 1.0 {
+            hits.push(Hit {
+                depth,
+                id: i,
+                weight: profile.profile(distance_sq),
+                distance_sq,
+                facing: normal.dot(direction).abs(),
+                radius: (axes[0].length() * axes[1].length()).sqrt(),
+            });
+        }
+    }
+    hits.sort_by(|a, b| a.depth.total_cmp(&b.depth).then(a.id.cmp(&b.id)));
+    hits
+}
+
+fn joins(near: &Hit, far: &Hit, gap: f64) -> bool {
+    let facing = (0.5 * (near.facing + far.facing)).max(0.25);
+    (far.depth - near.depth) * facing < gap * 0.5 * (near.radius + far.radius)
+}
+
+fn blend(hits: &[Hit], input: &DiscInput<'_>, ray: f64, values: &[f32], [planes, channels]: [usize; 2]) -> Layer {
+    let cloud = input.cloud;
+    let weights: f64 = hits.iter().map(|h| h.weight).sum();
+    let mut layer = Layer { depth: 0.0, opacity: [0.0; 3], values: vec![0.0; channels] };
+    for hit in hits {
+        let share = hit.weight / weights;
+        layer.depth += share * hit.depth;
+        let material = &input.materials[cloud.material[hit.id] as usize];
+        let spacing =
+            input.footprints.layers()[cloud.footprint[hit.id] as usize].spacing_for_radius(cloud.radius[hit.id]);
+        let slab = match material.surface_opacity {
+            SurfaceOpacity::PerCrossing => 1.0,
+            SurfaceOpacity::ThinSlab => 1.0 / (hit.facing / ray).max(1e-3),
+        };
+        let tau = f64::from(cloud.crossing_depth_of(hit.id, spacing)) * slab;
+        let opacity: [f64; 3] =
+            std::array::from_fn(|p| share * optics::opacity(tau * f64::from(material.extinction_rgb[p])));
+        layer.opacity.iter_mut().zip(opacity).take(planes).for_each(|(sum, own)| *sum += own);
+        for (c, sum) in layer.values.iter_mut().enumerate() {
+            let plane = ChannelLayout::plane_of(c, channels, planes);
+            *sum += opacity[plane] * f64::from(values[hit.id * channels + c]);
+        }
+    }
+    layer
+}
