@@ -3,7 +3,7 @@
 
 use crate::disc::Discs;
 use crate::fragments::{BlockLists, Fragment, WalkTile};
-use crate::layers::GapRule;
+use crate::layers::{GapRule, mean_depth};
 use crate::{Error, Params};
 use rayon::prelude::*;
 use splat_core::raster::bins::bin_rectangles;
@@ -71,7 +71,11 @@ pub fn blend(
             lists.fill(discs, &bins, t);
             let corner = bins.corner(t);
             let mut tile = Tile::load(accumulator, input, corner);
-            let visit = |k: usize, fragments: &[Fragment]| tile.pixel(k, fragments, input, rule, params);
+            let mut layers = Vec::new();
+            let visit = |k: usize, fragments: &mut [Fragment]| {
+                rule.split(discs, fragments, &mut layers);
+                tile.pixel(k, layers.iter().map(|layer| &fragments[layer.clone()]), input, params);
+            };
             let fragments = pulp::Arch::new().dispatch(WalkTile { discs, lists, corner, visit });
             tile.fragments = fragments;
             tile
@@ -118,11 +122,17 @@ impl Tile {
         }
     }
 
-    fn pixel(&mut self, k: usize, fragments: &[Fragment], input: &BlendInput<'_>, rule: GapRule, params: &Params) {
+    fn pixel<'f>(
+        &mut self,
+        k: usize,
+        layers: impl Iterator<Item = &'f [Fragment]>,
+        input: &BlendInput<'_>,
+        params: &Params,
+    ) {
         let limit = self.opaque.get(k).copied().unwrap_or(f32::INFINITY);
         let [x, y] = self.corner;
         let ray = input.discs.ray_length(position(k, x, y));
-        for layer in rule.layers(input.discs, fragments) {
+        for layer in layers {
             let planes = self.optical_depth.len();
             let least = self.optical_depth.iter().map(|plane| plane[k]).fold(f32::INFINITY, f32::min);
             if exp_neg(least) < params.transmittance_cutoff {
@@ -133,7 +143,7 @@ impl Tile {
                 return;
             }
             if input.range.contains(&blended.depth) {
-                self.add(k, &blended, input.discs.looks[layer[0].disc as usize].object);
+                self.add(k, &blended, layer[0].object);
                 self.layers += 1;
             }
         }
@@ -193,12 +203,11 @@ impl Layer {
         let optics = |f: &Fragment, p: usize| input.discs.looks[f.disc as usize].opacity(p, f.facing / ray);
         let values = |f: &Fragment| &input.values[input.discs.ids[f.disc as usize] as usize * channels..][..channels];
         let (first, mut weights, mut shares) = (&fragments[0], 0.0, [0.0; 3]);
-        let mut layer = Self { depth: 0.0, opacity: [0.0; 3], values: [0.0; MAX_CHANNELS] };
+        let mut layer = Self { depth: mean_depth(fragments), opacity: [0.0; 3], values: [0.0; MAX_CHANNELS] };
         let own: [f32; 3] = std::array::from_fn(|p| if p < planes { optics(first, p) } else { 0.0 });
         for fragment in fragments {
             let weight = fragment.weight;
             weights += weight;
-            layer.depth += weight * (fragment.depth - first.depth);
             let mut share = [0.0; 3];
             for p in 0..planes {
                 let opacity = optics(fragment, p);
@@ -210,7 +219,6 @@ impl Layer {
                 layer.values[c] += share[ChannelLayout::plane_of(c, channels, planes)] * (value - from);
             }
         }
-        layer.depth = layer.depth / weights + first.depth;
         for p in 0..planes {
             layer.opacity[p] = (layer.opacity[p] / weights + own[p]).clamp(0.0, 1.0);
         }

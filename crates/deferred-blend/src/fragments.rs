@@ -1,4 +1,4 @@
-//! All fragments of a pixel, near to far: tiles of the image, blocks of a tile, pixels of a block.
+//! All fragments of a pixel: tiles of the image, blocks of a tile, pixels of a block.
 //!
 //! A block has 16 pixels, so its fragments fit into the nearest cache however many layers there are, and memory does not grow with
 //! the number of discs that lie at one place times the image.
@@ -22,6 +22,8 @@ pub(crate) struct Fragment {
     pub(crate) depth: f32,
     /// Rank among the discs.
     pub(crate) disc: u32,
+    /// Whose surface it is on.
+    pub(crate) object: u32,
     /// w of Eq. 1.
     pub(crate) weight: f32,
     /// ρ²/R², R the radius within which the disc counts.
@@ -77,7 +79,7 @@ fn for_each_block(disc: &Disc, corner: [usize; 2], mut visit: impl FnMut(usize))
     }
 }
 
-/// One tile, in the form that [`pulp`] compiles once per instruction set: every pixel's fragments, near to far, are handed to a
+/// One tile, in the form that [`pulp`] compiles once per instruction set: every pixel's fragments, in any order, are handed to a
 /// visitor, with the pixel's place in a plane of the tile.
 pub(crate) struct WalkTile<'a, V> {
     pub(crate) discs: &'a Discs,
@@ -86,7 +88,7 @@ pub(crate) struct WalkTile<'a, V> {
     pub(crate) visit: V,
 }
 
-impl<V: FnMut(usize, &[Fragment])> pulp::WithSimd for WalkTile<'_, V> {
+impl<V: FnMut(usize, &mut [Fragment])> pulp::WithSimd for WalkTile<'_, V> {
     /// Fragments.
     type Output = u64;
 
@@ -107,18 +109,11 @@ impl<V: FnMut(usize, &[Fragment])> pulp::WithSimd for WalkTile<'_, V> {
                     continue;
                 }
                 count += fragments.len() as u64;
-                sort(discs, fragments);
                 visit(pixel, fragments);
             }
         }
         count
     }
-}
-
-/// Near to far; of several at one depth by their places in the cloud, so the order of the discs does not matter.
-fn sort(discs: &Discs, fragments: &mut [Fragment]) {
-    let id = |f: &Fragment| discs.ids[f.disc as usize];
-    fragments.sort_unstable_by(|a, b| a.depth.total_cmp(&b.depth).then_with(|| id(a).cmp(&id(b))));
 }
 
 /// The fragments of a disc in a block.
@@ -152,7 +147,7 @@ fn meet_block<S: Simd>(
             // Depths beyond the largest number lie behind everything that could be seen.
             if hits[0][k] > 0.0 && hits[1][k] < f32::INFINITY {
                 let [weight, depth, distance_sq, facing] = hits.map(|h| h[k]);
-                pixels[lane + k].push(Fragment { depth, disc: i, weight, distance_sq, facing });
+                pixels[lane + k].push(Fragment { depth, disc: i, object: look.object, weight, distance_sq, facing });
             }
         }
     }

@@ -45,7 +45,9 @@ pub fn layers(
     let mut layers = Vec::new();
     let mut begin = 0;
     for end in 1..=hits.len() {
-        if end < hits.len() && joins(&hits[end - 1], &hits[end], f64::from(params.gap)) {
+        let same_object = |a: &Hit, b: &Hit| input.cloud.object[a.id] == input.cloud.object[b.id];
+        let joined = |a: &Hit, b: &Hit| same_object(a, b) && joins(a, b, f64::from(params.gap));
+        if end < hits.len() && joined(&hits[end - 1], &hits[end]) {
             continue;
         }
         if hits[begin..end].iter().any(|h| h.distance_sq < core) {
@@ -53,6 +55,7 @@ pub fn layers(
         }
         begin = end;
     }
+    layers.sort_by(|a: &Layer, b| a.depth.total_cmp(&b.depth));
     layers
 }
 
@@ -98,7 +101,8 @@ fn hits(input: &DiscInput<'_>, params: &Params, origin: DVec3, direction: DVec3)
             });
         }
     }
-    hits.sort_by(|a, b| a.depth.total_cmp(&b.depth).then(a.id.cmp(&b.id)));
+    let object = |hit: &Hit| cloud.object[hit.id];
+    hits.sort_by(|a, b| object(a).cmp(&object(b)).then(a.depth.total_cmp(&b.depth)).then(a.id.cmp(&b.id)));
     hits
 }
 

@@ -107,7 +107,8 @@ pub(crate) fn soup(count: u64, extent: f32) -> Cloud {
         let normal = around(0).normalize_or(Vec3::Z);
         let one = disc(2.0 * extent * around(3) - cloud.origin.as_vec3(), normal, 0.05 + 0.1 * u(6), 0.1 + 0.8 * u(7));
         let tangent = if k % 3 == 0 { normal.any_orthonormal_vector() * (0.5 * one.radius) } else { Vec3::ZERO };
-        cloud.push(&Splat { tangent, color: [u(8), u(9), u(10)], ..one });
+        let object = u32::from(u(11) < 0.3);
+        cloud.push(&Splat { tangent, object, color: [u(8), u(9), u(10)], ..one });
     }
     cloud
 }

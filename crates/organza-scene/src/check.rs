@@ -179,6 +179,7 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
     let mut render = check_render(&at.key("render"), &raw.render)?;
     check_one_technique(&at_objects, &objects, &render)?;
     check_lattices(&at_objects, &objects, &render)?;
+    check_surfels(&at_objects, &objects, &render)?;
     check_scattered(&at.key("render").key("layers"), &raw.render.layers, &objects, &mut render)?;
     let camera = check_camera(&at.key("camera"), &raw.camera)?;
     if render.sheets.aligned == Aligned::Axis && !camera.is_orthographic() {
@@ -232,6 +233,18 @@ fn check_lattices(at: &At<'_>, objects: &[SceneObject], render: &RenderSettings)
         }
     }
     Ok(())
+}
+
+/// Refuses media that would be drawn as discs of surfaces.
+fn check_surfels(at: &At<'_>, objects: &[SceneObject], render: &RenderSettings) -> Result<(), Error> {
+    let by_surfels = |o: &SceneObject| o.technique.unwrap_or(render.technique) == Technique::Surfels;
+    let medium = objects.iter().position(|o| o.visible && o.source.is_medium() && by_surfels(o));
+    medium.map_or(Ok(()), |i| {
+        let name = crate::shown(&objects[i].name);
+        let message = format!("`{name}` is a medium, and the technique `surfels` draws surfaces alone");
+        let hint = format!("set object.{name}.technique = \"sheets\", or \"points\"");
+        Err(at.index(i).error(message, hint))
+    })
 }
 
 /// `scatterN` is one of the effects where light is scattered more than once, and else it is refused.

@@ -81,8 +81,7 @@ fn check_own_technique(at: &At<'_>, name: Option<&str>) -> Result<Option<Techniq
 
 /// A key that would silently do nothing is an error.
 fn refuse_what_does_not_apply(at: &At<'_>, raw: &RawObject, source: &Source) -> Result<(), Error> {
-    let is_medium = matches!(source, Source::Volume(_) | Source::Density(_) | Source::Cloud(_) | Source::Medium(_));
-    if is_medium && raw.opacity.is_some() {
+    if source.is_medium() && raw.opacity.is_some() {
         return Err(at.key("opacity").error("a medium has no `opacity`", "use its extinction"));
     }
     let has_own_spacing =

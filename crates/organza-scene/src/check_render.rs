@@ -4,18 +4,15 @@ use super::check::{At, LARGEST, SMALLEST};
 use super::de::suggest;
 use super::raw_render::{
     Auto, RawAccumulation, RawAligned, RawClassify, RawDirection, RawMapping, RawParticles, RawPoints, RawRender,
-    RawScattering, RawShadow, RawSheets, RawSlicing, RawSoftShadows, RawSurfaceSampler,
+    RawScattering, RawShadow, RawSheets, RawSlicing, RawSoftShadows, RawSurfaceSampler, RawSurfels,
 };
 use super::{
     Aligned, Classify, LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, RenderSettings, Scattering,
-    ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler, Technique,
+    ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler, SurfelsSettings, Technique,
 };
 use crate::{Error, shown};
 use splat_core::raster::Accumulation;
 use splat_core::{ADDITIVE_LAYERS, Direction};
-
-/// Techniques of the design that this version does not have.
-const LATER_TECHNIQUES: [&str; 1] = ["surfels"];
 
 /// Checks `[render]`.
 pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSettings, Error> {
@@ -41,6 +38,7 @@ pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSetting
         points: check_points(&at.key("points"), &raw.points)?,
         particles: check_particles(&at.key("particles"), &raw.particles)?,
         sheets: check_sheets(&at.key("sheets"), &raw.sheets)?,
+        surfels: check_surfels(&at.key("surfels"), &raw.surfels)?,
     })
 }
 
@@ -49,12 +47,8 @@ pub(super) fn check_technique(at: &At<'_>, name: &str) -> Result<Technique, Erro
     if let Some(known) = Technique::ALL.into_iter().find(|t| t.name() == name) {
         return Ok(known);
     }
-    const NAMES: &str = r#""auto", "points", "particles", "sheets" or "reference""#;
-    let message = if LATER_TECHNIQUES.contains(&name) {
-        format!("`technique`: this version does not have \"{}\"", shown(name))
-    } else {
-        format!("`technique`: expected {NAMES}, found \"{}\"", shown(name))
-    };
+    const NAMES: &str = r#""auto", "points", "particles", "sheets", "surfels" or "reference""#;
+    let message = format!("`technique`: expected {NAMES}, found \"{}\"", shown(name));
     Err(at.key("technique").error(message, format!("use {NAMES}")))
 }
 
@@ -141,6 +135,14 @@ fn check_cutoff(at: &At<'_>, raw: Option<f64>) -> Result<f64, Error> {
     }
     let message = format!("`transmittance_cutoff`: expected a number from 0 to below 1, found {cutoff}");
     Err(at.key("transmittance_cutoff").error(message, "0 composites everything"))
+}
+
+fn check_surfels(at: &At<'_>, raw: &RawSurfels) -> Result<SurfelsSettings, Error> {
+    Ok(SurfelsSettings {
+        disc_scale: at.number("disc_scale", raw.disc_scale.unwrap_or(0.6), 0.45..=1.0)?,
+        gap: at.number("gap", raw.gap.unwrap_or(0.5), 1.0 / 1024.0..=4.0)?,
+        transmittance_cutoff: check_cutoff(at, raw.transmittance_cutoff)?,
+    })
 }
 
 fn check_sheets(at: &At<'_>, raw: &RawSheets) -> Result<SheetsSettings, Error> {

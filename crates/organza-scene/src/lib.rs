@@ -49,7 +49,7 @@ pub use model::{Scene, SceneMaterial, SceneObject, Up};
 pub use overrides::Override;
 pub use settings::{
     Aligned, Classify, ParticlesSettings, PointsSettings, RenderSettings, Scattering, ShadowMapping, ShadowSettings,
-    SheetsSettings, Slicing, SoftShadows, SurfaceSampler, Technique,
+    SheetsSettings, Slicing, SoftShadows, SurfaceSampler, SurfelsSettings, Technique,
 };
 pub use shown::{escape_controls, printable, shown};
 pub use source::{

@@ -56,7 +56,7 @@ pub(super) struct RawObject {
     pub(super) opacity: Option<f64>,
     /// Colour, linear Rec.709, instead of the data's and the material's.
     pub(super) color: Option<[f64; 3]>,
-    /// What draws it where it is translucent, "points", "particles", "sheets" or "reference"; default the technique of `render`.
+    /// What draws it where it is translucent, "points", "particles", "sheets", "surfels" or "reference"; default the technique of `render`.
     pub(super) technique: Option<String>,
     /// Distance between splats, world units; default from the data and the camera.
     pub(super) spacing: Option<f64>,

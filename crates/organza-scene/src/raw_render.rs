@@ -8,7 +8,7 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields, default, expecting = "a table")]
 #[schemars(rename = "Render")]
 pub(super) struct RawRender {
-    /// "auto", "points", "particles", "sheets" or "reference"; default "auto", which is "points".
+    /// "auto", "points", "particles", "sheets", "surfels" or "reference"; default "auto", which is "points".
     pub(super) technique: Option<String>,
     /// Samples along each side of a pixel, 1 to 8; default 2.
     pub(super) antialias: Option<u32>,
@@ -28,6 +28,20 @@ pub(super) struct RawRender {
     pub(super) points: RawPoints,
     pub(super) particles: RawParticles,
     pub(super) sheets: RawSheets,
+    pub(super) surfels: RawSurfels,
+}
+
+/// Settings of the `surfels` technique.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default, expecting = "a table")]
+#[schemars(rename = "Surfels")]
+pub(super) struct RawSurfels {
+    /// Radius within which a disc is blended, over its cut-off radius, 0.45 to 1; default 0.6.
+    pub(super) disc_scale: Option<f64>,
+    /// ε: planes of discs that lie nearer to one another than this share of their radius are one layer, 1/1024 to 4; default 0.5.
+    pub(super) gap: Option<f64>,
+    /// A pixel is finished when its transmittance is below this, from 0 to below 1; default 1/1024.
+    pub(super) transmittance_cutoff: Option<f64>,
 }
 
 /// Settings of the `particles` technique.

@@ -31,6 +31,8 @@ pub struct RenderSettings {
     pub particles: ParticlesSettings,
     /// Settings of the `sheets` technique.
     pub sheets: SheetsSettings,
+    /// Settings of the `surfels` technique.
+    pub surfels: SurfelsSettings,
 }
 
 /// What draws the picture.
@@ -45,13 +47,16 @@ pub enum Technique {
     Particles,
     /// Volumes in slabs across the view, classified after reconstruction (Neophytou and Mueller 2005).
     Sheets,
+    /// Discs of surfaces, blended before layers are (Zhang and Pajarola 2007).
+    Surfels,
     /// Every fragment of every pixel, sorted, in f64: exact and slow.
     Reference,
 }
 
 impl Technique {
     /// All that can be asked for.
-    pub const ALL: [Self; 5] = [Self::Auto, Self::Points, Self::Particles, Self::Sheets, Self::Reference];
+    pub const ALL: [Self; 6] =
+        [Self::Auto, Self::Points, Self::Particles, Self::Sheets, Self::Surfels, Self::Reference];
 
     /// As scenes and reports name it.
     pub const fn name(self) -> &'static str {
@@ -60,6 +65,7 @@ impl Technique {
             Self::Points => "points",
             Self::Particles => "particles",
             Self::Sheets => "sheets",
+            Self::Surfels => "surfels",
             Self::Reference => "reference",
         }
     }
@@ -69,7 +75,7 @@ impl Technique {
     pub const fn own_layers(self) -> &'static [&'static str] {
         match self {
             Self::Particles => &["std_error"],
-            Self::Auto | Self::Points | Self::Sheets | Self::Reference => &[],
+            Self::Auto | Self::Points | Self::Sheets | Self::Surfels | Self::Reference => &[],
         }
     }
 }
@@ -112,6 +118,17 @@ impl SheetsSettings {
             _ => None,
         }
     }
+}
+
+/// Settings of the `surfels` technique.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfelsSettings {
+    /// Radius within which a disc is blended, over its cut-off radius, in [0.45, 1].
+    pub disc_scale: f64,
+    /// ε: planes of discs that lie nearer to one another than this share of their radius are one layer; in [2⁻¹⁰, 4].
+    pub gap: f64,
+    /// A pixel is finished when its transmittance falls below this, in [0, 1).
+    pub transmittance_cutoff: f64,
 }
 
 /// When values become colours.

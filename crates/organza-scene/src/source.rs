@@ -33,6 +33,11 @@ pub enum Source {
 }
 
 impl Source {
+    /// Whether it is a participating medium, which no ray crosses at one place.
+    pub fn is_medium(&self) -> bool {
+        matches!(self, Self::Volume(_) | Self::Density(_) | Self::Cloud(_) | Self::Medium(_))
+    }
+
     /// The file that it reads.
     pub fn path(&self) -> Option<&Path> {
         match self {

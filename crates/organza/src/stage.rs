@@ -18,6 +18,8 @@ pub(crate) const COMPOSITE: &str = "compositing";
 pub(crate) const PARTICLES: &str = "particles";
 /// Volumes and splats are composited in slabs.
 pub(crate) const SHEETS: &str = "sheets";
+/// Discs are blended to layers.
+pub(crate) const SURFELS: &str = "surfels";
 /// Translucent splats are composited exactly.
 pub(crate) const REFERENCE: &str = "exact compositing";
 /// Samples become pixels.

@@ -12,6 +12,7 @@ pub(crate) mod particles;
 pub(crate) mod points;
 pub(crate) mod reference;
 pub(crate) mod sheets;
+pub(crate) mod surfels;
 
 use crate::form::{DRAWN, Form};
 use crate::frame::Frame;
@@ -117,7 +118,7 @@ pub(crate) struct Finished<'f> {
 }
 
 /// Every technique, the preferred first.
-pub(crate) static TABLE: [Row; 4] = [
+pub(crate) static TABLE: [Row; 5] = [
     Row {
         technique: Technique::Points,
         is_offered: true,
@@ -162,6 +163,23 @@ pub(crate) static TABLE: [Row; 4] = [
         bytes: sheets::bytes,
         carries: sheets::carries,
         begin: sheets::begin,
+    },
+    Row {
+        technique: Technique::Surfels,
+        is_offered: false,
+        how: "are discs, which are averaged in each layer of a surface, and layers are composited in order",
+        by_channel: None,
+        form: None,
+        of_splats: DRAWN,
+        draws_splats: true,
+        steps: &[
+            Step { pass: pass::SORT, stage: stage::SORT, seconds: |_, all| cost::SORT * all.splats },
+            Step { pass: pass::SURFELS, stage: stage::SURFELS, seconds: |_, all| cost::FRAGMENT * all.fragments },
+        ],
+        is_random: false,
+        bytes: surfels::bytes,
+        carries: |_| None,
+        begin: surfels::begin,
     },
     Row {
         technique: Technique::Reference,

@@ -41,7 +41,11 @@ impl Fold for Points<'_> {
         }
         frame.maps(cost)?;
         if self.order.is_none() {
-            self.order = Some(sorted(frame, Technique::Points, cost)?);
+            let order = sorted(frame, Technique::Points, &sort_params(frame), cost)?;
+            self.order = Some(match frame.settings.points.first_slices {
+                Some(n) => order.first_slices(usize::try_from(n).unwrap_or(usize::MAX)),
+                None => order,
+            });
         }
         frame.shaded(cost)?;
         frame.opaque(cost)?;
@@ -51,7 +55,12 @@ impl Fold for Points<'_> {
 }
 
 /// Slices of the translucent splats of a technique; an empty order without any.
-fn sorted(frame: &Frame<'_>, technique: Technique, cost: &mut CostRecord) -> Result<SliceOrder, Error> {
+pub(super) fn sorted(
+    frame: &Frame<'_>,
+    technique: Technique,
+    params: &hbsort::Params,
+    cost: &mut CostRecord,
+) -> Result<SliceOrder, Error> {
     let (cloud, camera) = (frame.drawn(), &frame.camera);
     let translucent: Vec<u32> = frame.translucent(cloud, technique);
     if translucent.is_empty() {
@@ -59,22 +68,17 @@ fn sorted(frame: &Frame<'_>, technique: Technique, cost: &mut CostRecord) -> Res
     }
     frame.progress.begin(stage::SORT);
     frame.tick()?;
-    let params = sort_params(frame);
-    let order = cost.measure(pass::SORT, |stage| {
-        let helped = frame.helper.and_then(|helper| device::order(helper, cloud, &translucent, camera, &params));
+    cost.measure(pass::SORT, |stage| {
+        let helped = frame.helper.and_then(|helper| device::order(helper, cloud, &translucent, camera, params));
         let order = helped.map_or_else(
-            || hbsort::slice_cloud(cloud, Some(&translucent), camera, &params, &mut hbsort::Scratch::default()),
+            || hbsort::slice_cloud(cloud, Some(&translucent), camera, params, &mut hbsort::Scratch::default()),
             Ok,
         );
         let order = order.map_err(|e| Error::Internal(e.to_string()))?;
         stage.items_in = translucent.len() as u64;
         stage.items_out = order.input_from_sorted.len() as u64;
         stage.bytes = order.bytes();
-        Ok::<_, Error>(order)
-    })?;
-    Ok(match frame.settings.points.first_slices {
-        Some(n) => order.first_slices(usize::try_from(n).unwrap_or(usize::MAX)),
-        None => order,
+        Ok(order)
     })
 }
 
