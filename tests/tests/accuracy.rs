@@ -339,6 +339,9 @@ fn the_command_writes_three_files_or_none() {
     assert_eq!(sheets["technique"], "sheets", "{}", written["absent"]);
     assert_ne!(sheets["limit"], technique["limit"]);
     assert!(sheets["curves"].as_array().unwrap().iter().any(|c| c["knob"] == "slab width"));
+    // Surfels draw surfaces, and the only one here is opaque.
+    let absent = written["absent"].as_array().unwrap();
+    assert!(absent.iter().any(|a| a["technique"] == "surfels" && a["reason"].as_str().unwrap().contains("no surface")));
     let names = |frontier: &Value| -> Vec<String> {
         frontier.as_array().unwrap().iter().map(|f| f["technique"].as_str().unwrap().to_owned()).collect()
     };
@@ -413,4 +416,25 @@ fn the_samplers_of_implicit_surfaces_are_knobs_of_particles() {
     let mut draw = |step: &Step| renderer.draw(&quick.turned(&quick.knobs[1], step)).unwrap().image;
     let images: Vec<_> = quick.knobs[1].steps.iter().map(&mut draw).collect();
     assert!(images[0] != images[1] && images[1] != images[2] && images[0] != images[2]);
+}
+
+#[test]
+fn surfels_are_judged_by_a_limit_of_their_own_with_media_by_points_beside_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let pane = "[[object]]\nname = 'pane'\nopacity = 0.4\n\
+                rectangle = { center = [0, 0, 1], u = [0.5, 0, 0.3], v = [0, 0.6, 0], spacing = 0.1 }\n";
+    fs::write(folder.path().join("s.toml"), SCENE.to_owned() + pane).unwrap();
+    let out = organza().args(["accuracy", "s.toml", "--quick", "--out", "r"]).current_dir(&folder).output().unwrap();
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let written: Value = serde_json::from_slice(&fs::read(folder.path().join("r/accuracy.json")).unwrap()).unwrap();
+    let of = |name: &str| {
+        let techniques = written["techniques"].as_array().unwrap();
+        techniques.iter().find(|t| t["technique"] == name).unwrap_or_else(|| panic!("{}", written["absent"]))
+    };
+    let surfels = of("surfels");
+    assert_ne!(surfels["limit"], of("points")["limit"]);
+    let settings = surfels["settings"].as_array().unwrap();
+    for knob in ["disc scale", "gap"] {
+        assert!(settings.iter().any(|s| s["knob"] == knob), "{knob}");
+    }
 }

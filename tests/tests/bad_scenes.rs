@@ -254,8 +254,7 @@ fn an_object_has_exactly_one_source() {
 
 #[test]
 fn effects_of_later_versions_are_refused_by_name() {
-    refused("opacity = 0.3", "ior = 1.4", "19:7: refraction needs the `surfels` technique");
-    refused("[render]", "[render]\ntechnique = \"surfels\"", "this version does not have \"surfels\"");
+    refused("opacity = 0.3", "ior = 1.4", "19:7: surfaces that bend light are not in this version");
     refused("[render]", "[background]\nenvironment = \"a.hdr\"\n[render]", "environment maps are not in this version");
 }
 

@@ -83,7 +83,7 @@ fn exit_2_is_for_the_command_line() {
             "no technique of this version fills the layer `refraction`",
         ),
         (vec!["render", "s.toml", "--layers", "effects,reflection"], "fills the layer `reflection`"),
-        (vec!["render", "s.toml", "--technique", "surfels"], "this version does not have \"surfels\""),
+        (vec!["render", "s.toml", "--technique", "splats"], "found \"splats\""),
         (vec!["render", "s.toml", "--max-memory", "0"], "expected a number of bytes above 0"),
     ] {
         place.expect(2, &arguments, stderr);

@@ -31,5 +31,6 @@ mod progress;
 mod reading;
 mod sheets;
 mod slanted_slabs;
+mod surfels;
 mod techniques;
 mod truth;

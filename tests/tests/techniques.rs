@@ -102,8 +102,8 @@ fn refusal(scene: &str) -> String {
 #[test]
 fn a_technique_that_is_not_there_is_refused_where_it_is_named() {
     let text = three([0, 1, 2], 1.0);
-    let refused = refusal(&text.replace("'particles'", "'surfels'"));
-    assert!(refused.contains("this version does not have \"surfels\""), "{refused}");
+    let refused = refusal(&text.replace("'particles'", "'splats'"));
+    assert!(refused.contains("found \"splats\""), "{refused}");
     let refused =
         refusal(&text.replace("antialias = 1", "antialias = 1\ntechnique = 'particles'\nlayers = ['std_error']"));
     assert!(refused.contains("a picture by several techniques has no layer `std_error`"), "{refused}");

@@ -7,18 +7,19 @@ use super::session::{in_folder, load_scene, path_text, processor_only, render_op
 use organza::output::Target;
 use organza::scene::Scene;
 use organza::{Error, Progress, RenderOptions, printable};
-use organza_judge::accuracy::{self, Absent, Facts, Options, Outcome, Renderer, Report, Request, Study};
+use organza_judge::accuracy::{self, Absent, Facts, Options, Outcome, Renderer, Report, Request, Study, Sweep};
 use organza_judge::truth::{self, Orders, Truth};
 use serde_json::json;
 use std::fmt::Write;
 
 /// Stages with their shares, about as long as they take for `scenes/mixed.toml`.
-const STAGES: [(&str, f64); 5] = [
+const STAGES: [(&str, f64); 6] = [
     ("first look", 1.0),
     ("physical truth", 8.0),
     ("settings of points", 10.0),
     ("settings of particles", 10.0),
     ("settings of sheets", 20.0),
+    ("settings of surfels", 10.0),
 ];
 
 /// Sweeps the knobs, judges, writes the report. Whatever can be refused is refused before any work.
@@ -50,8 +51,10 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
             let particles = particles(&scene, &facts, &options, &points, &mut renderer, progress)?;
             progress.begin(STAGES[4].0);
             let sheets = sheets(&scene, &options, &points, &mut renderer, progress)?;
+            progress.begin(STAGES[5].0);
+            let surfels = surfels(&scene, &options, &points, &mut renderer, progress)?;
             let (mut studies, mut absent) = (vec![points], Vec::new());
-            for study in [particles, sheets] {
+            for study in [particles, sheets, surfels] {
                 match study {
                     Ok(study) => studies.push(study),
                     Err(reason) => absent.push(reason),
@@ -127,13 +130,43 @@ fn sheets(
         found => found?,
     };
     let facts = renderer.facts(&drawn)?;
-    let sweep = match accuracy::sheets(scene, slab_width, &facts, options) {
-        Ok(sweep) => sweep,
-        Err(reason) => return absent(reason),
-    };
-    match accuracy::study(&sweep, points.truth.clone(), options, progress, &mut |request| renderer.draw(request)) {
+    match accuracy::sheets(scene, slab_width, &facts, options) {
+        Ok(sweep) => by_own_limit(&sweep, options, points, renderer, progress),
+        Err(reason) => absent(reason),
+    }
+}
+
+/// The study of `surfels`, by a limit of its own and the truth of `points`; or why there is none.
+fn surfels(
+    scene: &Scene,
+    options: &Options,
+    points: &Study,
+    renderer: &mut Renderer<'_>,
+    progress: &Progress,
+) -> Result<Result<Study, Absent>, Error> {
+    let absent = |reason| Ok(Err(Absent { technique: "surfels", reason }));
+    let drawn = accuracy::in_surfels(scene);
+    if let Some(reason) = renderer.refused(&drawn)? {
+        return absent(reason);
+    }
+    if !renderer.runs(&drawn, organza::pass::SURFELS)? {
+        return absent("no surface is translucent: the picture is that of `points`".into());
+    }
+    let facts = renderer.facts(&drawn)?;
+    by_own_limit(&accuracy::surfels(scene, &facts, options), options, points, renderer, progress)
+}
+
+/// A study whose limit is the technique's own, and whose truth is that of `points`.
+fn by_own_limit(
+    sweep: &Sweep,
+    options: &Options,
+    points: &Study,
+    renderer: &mut Renderer<'_>,
+    progress: &Progress,
+) -> Result<Result<Study, Absent>, Error> {
+    match accuracy::study(sweep, points.truth.clone(), options, progress, &mut |request| renderer.draw(request)) {
         Ok(study) => Ok(Ok(study)),
-        Err(Error::Unresolved { message, .. }) => absent(message),
+        Err(Error::Unresolved { message, .. }) => Ok(Err(Absent { technique: sweep.technique, reason: message })),
         Err(other) => Err(other),
     }
 }

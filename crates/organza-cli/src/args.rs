@@ -58,7 +58,7 @@ pub(super) struct SceneArguments {
     /// Change a value of the scene before it is checked, such as render.points.exact=true or object.cloud.visible=false
     #[arg(long = "set", value_name = "PATH=VALUE")]
     pub(super) set: Vec<String>,
-    /// Technique: auto, points, particles, sheets or reference
+    /// Technique: auto, points, particles, sheets, surfels or reference
     #[arg(long, value_name = "NAME")]
     pub(super) technique: Option<String>,
     /// What computes; `render` alone takes another than cpu

@@ -31,6 +31,7 @@ mod sampled;
 mod settings;
 mod sheets;
 mod study;
+mod surfels;
 mod verdict;
 
 pub use frontier::{Candidate, Hold, TOLD_APART, frontier, hold};
@@ -46,6 +47,7 @@ pub use sampled::Sampled;
 pub use settings::Setting;
 pub use sheets::{in_sheets, sheets};
 pub use study::{Draw, Outcome, Study, least_seconds, study};
+pub use surfels::{in_surfels, surfels};
 pub use verdict::verdict;
 
 pub(crate) use plot::escaped;

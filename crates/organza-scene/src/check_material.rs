@@ -47,7 +47,7 @@ pub(super) fn unknown_material(at: &At<'_>, at_materials: &At<'_>, name: &str, m
 
 fn check_material(at: &At<'_>, name: &str, raw: &RawMaterial) -> Result<SceneMaterial, Error> {
     if raw.ior.is_some() {
-        let message = "refraction needs the `surfels` technique, which this version does not have";
+        let message = "surfaces that bend light are not in this version";
         return Err(at.key("ior").error(message, "leave `ior` out"));
     }
     let unit = |key, value: Option<f64>, default: f64| at.number(key, value.unwrap_or(default), 0.0..=1.0);

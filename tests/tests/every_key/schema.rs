@@ -95,6 +95,7 @@ pub(crate) fn heading(table: &str) -> &'static str {
         "render.shadow" => "`[render.shadow]`",
         "render.particles" => "`[render.particles]`",
         "render.sheets" => "`[render.sheets]`",
+        "render.surfels" => "`[render.surfels]`",
         "animation" | "animation.track" | "animation.track.keys" => "`[animation]`",
         _ if table.starts_with("light") => "`[[light]]`",
         _ if table.starts_with("object.") => "### Generated sources",

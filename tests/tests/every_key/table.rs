@@ -68,18 +68,24 @@ impl Which {
     }
 }
 
-const EACH: &[&str] = &["points", "particles", "sheets"];
+const EACH: &[&str] = &["points", "particles", "sheets", "surfels"];
 const POINTS: &[&str] = &["points"];
 const PARTICLES: &[&str] = &["particles"];
 const SHEETS: &[&str] = &["sheets"];
-const BUT_POINTS: &[&str] = &["particles", "sheets"];
-const BUT_PARTICLES: &[&str] = &["points", "sheets"];
+const SURFELS: &[&str] = &["surfels"];
+const BUT_POINTS: &[&str] = &["particles", "sheets", "surfels"];
+const BUT_PARTICLES: &[&str] = &["points", "sheets", "surfels"];
 
 impl Entry {
-    /// Whether it is tried with a source by a technique. What is no medium is splats for sheets as for points: one such source
-    /// stands for all.
+    /// Whether it is tried with a source by a technique. What is no medium is splats for sheets and surfels as for points: one such
+    /// source stands for all. Surfels refuse media.
     pub(crate) fn applies_to(&self, source: &str, technique: &str) -> bool {
-        self.sources.has(source) && (technique != "sheets" || Media.has(source) || source == "implicit")
+        let by_technique = match technique {
+            "sheets" => Media.has(source) || source == "implicit",
+            "surfels" => source == "implicit" || source == "plain points",
+            _ => true,
+        };
+        self.sources.has(source) && by_technique
     }
 
     pub(crate) fn expected(&self, source: &str, technique: &str) -> Expected {
@@ -421,6 +427,10 @@ fn render() -> Vec<Entry> {
         of(BALL, "render.sheets.transmittance_cutoff", "render.sheets.transmittance_cutoff=0.9")
             .by(SHEETS)
             .with(&["object.it.transform.scale=4"]),
+        of(OPEN, "render.surfels", "render.surfels={disc_scale=1}").by(SURFELS),
+        of(OPEN, "render.surfels.disc_scale", "render.surfels.disc_scale=1").by(SURFELS),
+        of(OPEN, "render.surfels.gap", "render.surfels.gap=4").by(SURFELS),
+        of(OPEN, "render.surfels.transmittance_cutoff", "render.surfels.transmittance_cutoff=0.9").by(SURFELS),
     ]
 }
 

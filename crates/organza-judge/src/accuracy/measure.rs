@@ -186,6 +186,18 @@ impl<'a> Renderer<'a> {
         })
     }
 
+    /// Whether a pass of [`organza::pass`] would run for a scene.
+    ///
+    /// # Errors
+    /// As [`Renderer::draw`].
+    pub fn runs(&mut self, scene: &Scene, pass: &str) -> Result<bool, Error> {
+        self.within_stage(|renderer| {
+            let options = renderer.options;
+            let (loaded, _) = renderer.load(scene)?;
+            Ok(plan_loaded(scene, loaded, options)?.passes.iter().any(|p| p.name == pass))
+        })
+    }
+
     /// Why a scene cannot be drawn as its settings say, if it cannot.
     ///
     /// # Errors

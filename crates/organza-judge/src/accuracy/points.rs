@@ -269,7 +269,7 @@ fn accumulation(facts: &Facts) -> Result<Knob, String> {
     })
 }
 
-fn spacing(scene: &Scene, options: &Options) -> Result<Knob, String> {
+pub(super) fn spacing(scene: &Scene, options: &Options) -> Result<Knob, String> {
     let mut probe = scene.clone();
     scale_spacings(&mut probe, 2.0);
     if probe.objects == scene.objects {
