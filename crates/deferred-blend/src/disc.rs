@@ -13,7 +13,7 @@
 
 use crate::Params;
 use rayon::prelude::*;
-use splat_core::glam::{DMat3, DVec3};
+use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::optics::{self, SurfaceOpacity};
 use splat_core::raster::kernel::Kernel;
 use splat_core::{Camera, Cloud, FootprintStack, Material, SplatKind};
@@ -66,8 +66,31 @@ pub struct Discs {
     pub(crate) ids: Vec<u32>,
     pub(crate) looks: Vec<Look>,
     pub(crate) kernels: Vec<Kernel>,
-    /// Focal length, pixels; `None` for parallel rays.
-    focal: Option<f32>,
+    /// Normals that light is bent about, in the camera's space; empty where no material bounds matter.
+    pub(crate) normals: Vec<Vec3>,
+    /// By id.
+    pub(crate) materials: Vec<Material>,
+    /// Focal length, pixels, or pixels in a unit of the cloud for parallel rays.
+    focal: f32,
+    parallel: bool,
+}
+
+/// The ray of a pixel, in the camera's space.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ray {
+    /// The eye, or a place of its plane.
+    pub(crate) from: Vec3,
+    /// Unit length.
+    pub(crate) along: Vec3,
+    /// Distance along it over view depth.
+    pub(crate) length: f32,
+}
+
+impl Ray {
+    /// Its place at a view depth.
+    pub(crate) fn at(&self, depth: f32) -> Vec3 {
+        self.from + self.along * (depth * self.length)
+    }
 }
 
 /// What one disc shows, beside its values.
@@ -77,6 +100,7 @@ pub(crate) struct Look {
     pub(crate) crossing: [f32; 3],
     pub(crate) is_slab: bool,
     pub(crate) footprint: u8,
+    pub(crate) material: u16,
     pub(crate) object: u32,
 }
 
@@ -105,16 +129,30 @@ impl Discs {
             chunks.map(|ids| ids.iter().map(|&i| view.disc(i as usize, params)).collect()).collect();
         let (discs, looks) = parts.into_iter().flatten().unzip();
         let kernels = input.footprints.layers().iter().map(Kernel::new).collect();
-        let focal = (!view.parallel).then_some(view.focal as f32);
-        Self { size: input.camera.size, discs, ids: input.ids.to_vec(), looks, kernels, focal }
+        let bends = input.materials.iter().any(Material::bounds_matter);
+        let normal = |&i: &u32| (view.rotation * input.cloud.shading_normal_of(i as usize).as_dvec3()).as_vec3();
+        Self {
+            size: input.camera.size,
+            discs,
+            ids: input.ids.to_vec(),
+            looks,
+            kernels,
+            normals: if bends { input.ids.par_iter().map(normal).collect() } else { Vec::new() },
+            materials: input.materials.to_vec(),
+            focal: view.focal as f32,
+            parallel: view.parallel,
+        }
     }
 
-    /// |d| of the ray of a pixel, whose z is 1.
-    pub(crate) fn ray_length(&self, [x, y]: [usize; 2]) -> f32 {
-        let Some(focal) = self.focal else { return 1.0 };
-        let offset = |at: usize, size: u32| (at as f32 + 0.5 - 0.5 * size as f32) / focal;
-        let (u, v) = (offset(x, self.size[0]), offset(y, self.size[1]));
-        (1.0 + u * u + v * v).sqrt()
+    /// The ray of a pixel.
+    pub(crate) fn ray(&self, [x, y]: [usize; 2]) -> Ray {
+        let offset = |at: usize, size: u32| (at as f32 + 0.5 - 0.5 * size as f32) / self.focal;
+        let at = Vec3::new(offset(x, self.size[0]), -offset(y, self.size[1]), 0.0);
+        if self.parallel {
+            return Ray { from: at, along: Vec3::Z, length: 1.0 };
+        }
+        let length = (1.0 + at.length_squared()).sqrt();
+        Ray { from: Vec3::ZERO, along: (at + Vec3::Z) / length, length }
     }
 
     /// Number of discs that some pixel may see.
@@ -124,7 +162,8 @@ impl Discs {
 
     /// Bytes of all discs.
     pub fn bytes(&self) -> u64 {
-        (size_of_val(&*self.discs) + size_of_val(&*self.ids) + size_of_val(&*self.looks)) as u64
+        let normals = size_of_val(&*self.normals);
+        (size_of_val(&*self.discs) + size_of_val(&*self.ids) + size_of_val(&*self.looks) + normals) as u64
     }
 }
 
@@ -149,11 +188,11 @@ struct View<'a> {
 impl<'a> View<'a> {
     fn new(input: &'a DiscInput<'a>) -> Self {
         let camera = input.camera;
-        let [right, up, forward] = camera.axes;
+        let (rotation, shift) = into_view(input);
         Self {
             input,
-            rotation: DMat3::from_cols(right, up, forward).transpose(),
-            shift: input.cloud.origin - camera.position,
+            rotation,
+            shift,
             focal: camera.focal_px(),
             half: camera.size.map(|s| 0.5 * f64::from(s)),
             parallel: camera.is_orthographic(),
@@ -180,7 +219,7 @@ impl<'a> View<'a> {
             let tau = tau * f64::from(factor);
             (if is_slab { tau } else { optics::opacity(tau) }) as f32
         });
-        Look { crossing, is_slab, footprint: cloud.footprint[i], object: cloud.object[i] }
+        Look { crossing, is_slab, footprint: cloud.footprint[i], material: cloud.material[i], object: cloud.object[i] }
     }
 
     /// Rays from the eye.
@@ -260,6 +299,12 @@ impl<'a> View<'a> {
         let [x, y] = ranges;
         [clamp(x[0] - 1.0, 0), clamp(x[1] + 1.0, 0), clamp(y[0] - 1.0, 1), clamp(y[1] + 1.0, 1)]
     }
+}
+
+/// What turns the cloud's space into the camera's, x right, y up, z along the view: after this vector was added, this turn.
+pub(crate) fn into_view(input: &DiscInput<'_>) -> (DMat3, DVec3) {
+    let [right, up, forward] = input.camera.axes;
+    (DMat3::from_cols(right, up, forward).transpose(), input.cloud.origin - input.camera.position)
 }
 
 /// Semi-axes of a disc, in the cloud's space.

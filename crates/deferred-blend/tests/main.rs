@@ -1,5 +1,6 @@
 //! Tests of deferred blending.
 
 mod blend;
+mod glass;
 mod grouping;
 mod scenes;

@@ -1,6 +1,6 @@
 //! Discs whose pictures are known.
 
-use deferred_blend::{BlendInput, DiscInput, Discs, Params, blend};
+use deferred_blend::{BlendInput, DiscInput, Discs, Glass, GlassImage, Params, blend};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Accumulator, Camera, Cloud, FootprintStack, Material, Projection, Splat, SplatKind, optics, rng};
 
@@ -38,10 +38,20 @@ impl Scene {
         accumulator
     }
 
+    /// The picture, with what was mirrored and bent.
+    pub(crate) fn draw_glass(&self, params: &Params, glass: Glass<'_>, opaque: &[f32]) -> (Accumulator, GlassImage) {
+        let mut accumulator = Accumulator::new(self.camera.size, 3, 3, false, false);
+        let discs = Discs::project(&self.input(), params);
+        let glass = Some(glass);
+        let input = BlendInput { discs: &discs, values: &self.values, opaque, range: 0.0..f32::INFINITY, glass };
+        let made = blend(&input, params, &mut accumulator, None).expect("nobody cancels");
+        (accumulator, made.glass.expect("asked for"))
+    }
+
     /// The same before something opaque, behind what is there.
     pub(crate) fn draw_into(&self, params: &Params, opaque: &[f32], accumulator: &mut Accumulator) {
         let discs = Discs::project(&self.input(), params);
-        let input = BlendInput { discs: &discs, values: &self.values, opaque, range: 0.0..f32::INFINITY };
+        let input = BlendInput { discs: &discs, values: &self.values, opaque, range: 0.0..f32::INFINITY, glass: None };
         blend(&input, params, accumulator, None).expect("nobody cancels");
     }
 }

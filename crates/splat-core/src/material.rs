@@ -40,6 +40,10 @@ pub struct Material {
     pub extinction_rgb: [f32; 3],
     /// How the opacity of a translucent surface grows at grazing angles.
     pub surface_opacity: crate::optics::SurfaceOpacity,
+    /// Refractive index of the matter that a surface bounds, by channel, > 0; 1 bends no light. Around it the index is 1.
+    pub index: [f32; 3],
+    /// What that matter absorbs, by channel, 1 / world unit, ≥ 0.
+    pub absorption_inside: [f32; 3],
 }
 
 impl Default for Material {
@@ -56,11 +60,18 @@ impl Default for Material {
             emission: [0.0; 3],
             extinction_rgb: [1.0; 3],
             surface_opacity: crate::optics::SurfaceOpacity::PerCrossing,
+            index: [1.0; 3],
+            absorption_inside: [0.0; 3],
         }
     }
 }
 
 impl Material {
+    /// Whether its surfaces bend light, or bound matter that absorbs.
+    pub fn bounds_matter(&self) -> bool {
+        self.index != [1.0; 3] || self.absorption_inside != [0.0; 3]
+    }
+
     /// Reflection of a surface per unit irradiance on a plane that faces the light: the factor on its colour, and what is
     /// specular; 1/sr, unit vectors away from the surface, the normal on the viewer's side.
     ///

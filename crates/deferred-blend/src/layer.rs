@@ -1,0 +1,82 @@
+//! One layer of a pixel: its discs, averaged (Eq. 1).
+
+use crate::BlendInput;
+use crate::fragments::Fragment;
+use crate::layers::mean_depth;
+use splat_core::Material;
+use splat_core::glam::Vec3;
+use splat_core::shade::{ChannelLayout, MAX_CHANNELS};
+
+/// One layer of a pixel, its discs averaged.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Layer {
+    pub(crate) depth: f32,
+    pub(crate) opacity: [f32; 3],
+    /// Averages by weight and opacity, times opacity.
+    pub(crate) values: [f32; MAX_CHANNELS],
+}
+
+impl Layer {
+    /// Eq. 1 for depth and opacity, and for values, whose weights are w times the opacity. All are averaged as differences from the
+    /// nearest disc's, so what is constant stays so to the last bit.
+    pub(crate) fn of(fragments: &[Fragment], input: &BlendInput<'_>, ray: f32, [planes, channels]: [usize; 2]) -> Self {
+        let optics = |f: &Fragment, p: usize| input.discs.looks[f.disc as usize].opacity(p, f.facing / ray);
+        let values = |f: &Fragment| &input.values[input.discs.ids[f.disc as usize] as usize * channels..][..channels];
+        let (first, mut weights, mut shares) = (&fragments[0], 0.0, [0.0; 3]);
+        let mut layer = Self { depth: mean_depth(fragments), opacity: [0.0; 3], values: [0.0; MAX_CHANNELS] };
+        let own: [f32; 3] = std::array::from_fn(|p| if p < planes { optics(first, p) } else { 0.0 });
+        for fragment in fragments {
+            let weight = fragment.weight;
+            weights += weight;
+            let mut share = [0.0; 3];
+            for p in 0..planes {
+                let opacity = optics(fragment, p);
+                share[p] = weight * opacity;
+                shares[p] += share[p];
+                layer.opacity[p] += weight * (opacity - own[p]);
+            }
+            for (c, (value, from)) in values(fragment).iter().zip(values(first)).enumerate() {
+                layer.values[c] += share[ChannelLayout::plane_of(c, channels, planes)] * (value - from);
+            }
+        }
+        for p in 0..planes {
+            layer.opacity[p] = (layer.opacity[p] / weights + own[p]).clamp(0.0, 1.0);
+        }
+        for (c, from) in values(first).iter().enumerate() {
+            let p = ChannelLayout::plane_of(c, channels, planes);
+            let mean = if shares[p] > 0.0 { layer.values[c] / shares[p] + from } else { 0.0 };
+            layer.values[c] = layer.opacity[p] * mean;
+        }
+        layer
+    }
+}
+
+impl Layer {
+    /// Another opacity, with the values that it shows.
+    pub(crate) fn set_opacity(&mut self, opacity: [f32; 3], [planes, channels]: [usize; 2]) {
+        if opacity == self.opacity {
+            return;
+        }
+        for c in 0..channels {
+            let p = ChannelLayout::plane_of(c, channels, planes);
+            self.values[c] *= if self.opacity[p] > 0.0 { opacity[p] / self.opacity[p] } else { 0.0 };
+        }
+        self.opacity = opacity;
+    }
+}
+
+/// The material of a layer, if it bounds matter.
+pub(crate) fn bound_matter<'a>(fragments: &[Fragment], input: &BlendInput<'a>) -> Option<&'a Material> {
+    let material = &input.discs.materials[input.discs.looks[fragments[0].disc as usize].material as usize];
+    material.bounds_matter().then_some(material)
+}
+
+/// The normal of a layer: the average by weight of normals that point to the nearest disc's side, which stays where they cancel. Of
+/// unit length, in the camera's space.
+pub(crate) fn normal(fragments: &[Fragment], input: &BlendInput<'_>) -> Vec3 {
+    let of = |f: &Fragment| input.discs.normals[f.disc as usize];
+    let first = of(&fragments[0]);
+    let side = |n: Vec3| if n.dot(first) < 0.0 { -n } else { n };
+    let sum: Vec3 = fragments.iter().map(|f| side(of(f)) * f.weight).sum();
+    sum.try_normalize().unwrap_or(first)
+}

@@ -1,0 +1,178 @@
+//! A tile of the accumulator, and layers that are composited into it.
+
+use crate::BlendInput;
+use crate::Params;
+use crate::fragments::Fragment;
+use crate::glass::{Bound, Glass, GlassImage, Passage, Path, STRAIGHT};
+use crate::layer::{Layer, bound_matter, normal};
+use crate::layers::mean_depth;
+use splat_core::raster::lanes::exp_neg;
+use splat_core::raster::tile::{AREA, for_each_span, position, tile_of};
+use splat_core::shade::ChannelLayout;
+use splat_core::{Accumulator, DepthFragment, DepthProfile};
+use std::ops::Range;
+
+/// Optical depth of a layer that lets nothing through: e^−87 is the least normal number.
+const OPAQUE: f32 = 87.0;
+
+/// Planes of `AREA` numbers.
+pub(crate) struct Tile {
+    corner: [usize; 2],
+    optical_depth: Vec<Vec<f32>>,
+    channels: Vec<Vec<f32>>,
+    /// Empty when not asked for, as is the next.
+    depth: Vec<DepthProfile>,
+    object: Vec<u32>,
+    /// Depth of what hides layers; empty without.
+    opaque: Vec<f32>,
+    /// As in [`GlassImage`]; empty without glass.
+    mirrored: Vec<[f32; 3]>,
+    behind: Vec<[f32; 3]>,
+    pub(crate) fragments: u64,
+    pub(crate) layers: u64,
+}
+
+impl Tile {
+    pub(crate) fn load(from: &Accumulator, input: &BlendInput<'_>, corner: [usize; 2]) -> Self {
+        let planes = |planes: &[Vec<f32>]| planes.iter().map(|p| tile_of(p, from.size, corner, 0.0)).collect();
+        let glass = |value: [f32; 3]| if input.glass.is_some() { vec![value; AREA] } else { Vec::new() };
+        Self {
+            corner,
+            optical_depth: planes(&from.optical_depth),
+            channels: planes(&from.channels),
+            depth: tile_of(&from.depth, from.size, corner, DepthProfile::default()),
+            object: tile_of(&from.object, from.size, corner, u32::MAX),
+            opaque: tile_of(input.opaque, from.size, corner, f32::INFINITY),
+            mirrored: glass([0.0; 3]),
+            behind: glass(STRAIGHT),
+            fragments: 0,
+            layers: 0,
+        }
+    }
+
+    /// Composites the layers of a pixel, which are ranges of its fragments.
+    pub(crate) fn pixel(
+        &mut self,
+        k: usize,
+        fragments: &[Fragment],
+        layers: &[Range<usize>],
+        (input, params): (&BlendInput<'_>, &Params),
+    ) {
+        let limit = self.opaque.get(k).copied().unwrap_or(f32::INFINITY);
+        let [x, y] = self.corner;
+        let ray = input.discs.ray(position(k, x, y));
+        let sizes = [self.optical_depth.len(), self.channels.len()];
+        let mut way = input.glass.as_ref().map(|glass| (glass, Path::begin(ray.along)));
+        for layer in layers {
+            let least = self.optical_depth.iter().map(|plane| plane[k]).fold(f32::INFINITY, f32::min);
+            if exp_neg(least) < params.transmittance_cutoff {
+                return;
+            }
+            let own = &fragments[layer.clone()];
+            let mut blended = Layer::of(own, input, ray.length, sizes);
+            if blended.depth >= limit {
+                break;
+            }
+            let mut passage = Passage::CLEAR;
+            if let Some((glass, path)) = &mut way
+                && let Some(material) = bound_matter(own, input)
+            {
+                let (rank, of_object) = count(own[0].object, layer.start, limit, (fragments, layers));
+                let (place, distance) = (ray.at(blended.depth), ray.length * blended.depth);
+                let (normal, object) = (normal(own, input), own[0].object);
+                let bound = Bound { material, object, rank, layers: of_object, normal, place, distance };
+                path.cross(&bound, glass, &mut passage);
+                blended.set_opacity(path.opacity(object, blended.opacity, glass.bending), sizes);
+            }
+            if input.range.contains(&blended.depth) {
+                self.add(k, &blended, &passage, own[0].object);
+                self.layers += 1;
+            }
+        }
+        if let Some((glass, path)) = way {
+            self.end(k, glass, &path, (limit, ray.length), &input.range);
+        }
+    }
+
+    /// What a ray sees that has come through all layers: matter before an opaque surface absorbs, and where the ray was bent
+    /// something else is seen.
+    fn end(&mut self, k: usize, glass: &Glass<'_>, path: &Path<'_>, (limit, ray): (f32, f32), range: &Range<f32>) {
+        if limit.is_finite() && range.contains(&limit) {
+            let depth = path.absorbed_before(limit * ray, glass);
+            let planes = self.optical_depth.len();
+            for (p, plane) in self.optical_depth.iter_mut().enumerate() {
+                plane[k] += depth[channel_of(p, planes)];
+            }
+        }
+        if range.end == f32::INFINITY {
+            self.behind[k] = path.behind(glass, limit.is_finite()).unwrap_or(STRAIGHT);
+        }
+    }
+
+    /// A layer behind all so far.
+    fn add(&mut self, k: usize, layer: &Layer, passage: &Passage, object: u32) {
+        let (count, planes) = (self.channels.len(), self.optical_depth.len());
+        let before = self.optical_depth[planes / 2][k];
+        for (p, plane) in self.optical_depth.iter_mut().enumerate() {
+            plane[k] += passage.inside[channel_of(p, planes)];
+        }
+        let through: [f32; 3] = std::array::from_fn(|p| self.optical_depth.get(p).map_or(0.0, |a| exp_neg(a[k])));
+        if let Some(mirrored) = self.mirrored.get_mut(k) {
+            for (c, sum) in mirrored.iter_mut().enumerate() {
+                *sum += through[if planes == 3 { c } else { 0 }] * passage.mirrored[c];
+            }
+        }
+        let enters: [f32; 3] =
+            std::array::from_fn(|p| through[p] * (1.0 - passage.reflectance[channel_of(p, planes)]));
+        for (c, plane) in self.channels.iter_mut().enumerate() {
+            plane[k] += enters[ChannelLayout::plane_of(c, count, planes)] * layer.values[c];
+        }
+        for (p, plane) in self.optical_depth.iter_mut().enumerate() {
+            let of = |share: f32| (-libm::log1pf(-share)).min(OPAQUE);
+            plane[k] += of(layer.opacity[p]) + of(passage.reflectance[channel_of(p, planes)]);
+        }
+        let after = self.optical_depth[planes / 2][k];
+        if after <= before {
+            return;
+        }
+        if let Some(profile) = self.depth.get_mut(k) {
+            profile.add(&DepthFragment { depth: layer.depth, thickness: 0.0, narrow: 1.0, before, after });
+        }
+        if let Some(first) = self.object.get_mut(k).filter(|first| **first == u32::MAX) {
+            *first = object;
+        }
+    }
+
+    pub(crate) fn store(self, to: &mut Accumulator, glass: Option<&mut GlassImage>) {
+        let [x, y] = self.corner;
+        let planes = to.optical_depth.iter_mut().chain(&mut to.channels);
+        for (plane, own) in planes.zip(self.optical_depth.iter().chain(&self.channels)) {
+            for_each_span(to.size, x, y, |tile, image| plane[image].copy_from_slice(&own[tile]));
+        }
+        if !self.depth.is_empty() {
+            for_each_span(to.size, x, y, |tile, image| to.depth[image].copy_from_slice(&self.depth[tile]));
+        }
+        if !self.object.is_empty() {
+            for_each_span(to.size, x, y, |tile, image| to.object[image].copy_from_slice(&self.object[tile]));
+        }
+        if let Some(glass) = glass {
+            for_each_span(to.size, x, y, |tile, image| {
+                glass.mirrored[image.clone()].copy_from_slice(&self.mirrored[tile.clone()]);
+                glass.behind[image].copy_from_slice(&self.behind[tile]);
+            });
+        }
+    }
+}
+
+/// How many layers of an object lie before the one that starts at a fragment, and how many before an opaque surface.
+fn count(object: u32, start: usize, limit: f32, (fragments, layers): (&[Fragment], &[Range<usize>])) -> (u32, u32) {
+    let of_object = layers.iter().filter(|l| fragments[l.start].object == object);
+    let rank = of_object.clone().take_while(|l| l.start != start).count() as u32;
+    let all = of_object.take_while(|l| mean_depth(&fragments[(*l).clone()]) < limit).count() as u32;
+    (rank, all)
+}
+
+/// The channel that stands for a plane of optical depth.
+const fn channel_of(plane: usize, planes: usize) -> usize {
+    if planes == 3 { plane } else { 1 }
+}
