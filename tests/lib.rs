@@ -122,11 +122,13 @@ pub fn mean_and_ripple(values: &[f64]) -> (f64, f64) {
 /// The layers that sum to beauty, of every technique that there is.
 pub const EFFECTS: [&str; 5] = ["background", "ambient", "emission", "direct", "scatter1"];
 
-/// The sum of [`EFFECTS`] in the channel `R`, `G` or `B`, and of `scatterN` where there is one.
+/// The sum of [`EFFECTS`] in the channel `R`, `G` or `B`, and of those effects that not every scene has.
 pub fn sum_of_effects(picture: &Picture, channel: &str) -> Vec<f64> {
-    let names = EFFECTS.iter().chain(&["scatterN"]).map(|effect| format!("{effect}.{channel}"));
-    let kept = |name: &String| !name.starts_with("scatterN") || picture.channels.contains_key(name);
-    let effects: Vec<Vec<f64>> = names.filter(kept).map(|name| picture.channel(&name)).collect();
+    const OF_SOME: [&str; 3] = ["scatterN", "reflection", "refraction"];
+    let name = |effect: &str| format!("{effect}.{channel}");
+    let some = OF_SOME.map(name).into_iter().filter(|name| picture.channels.contains_key(name));
+    let names = EFFECTS.map(name).into_iter().chain(some);
+    let effects: Vec<Vec<f64>> = names.map(|name| picture.channel(&name)).collect();
     (0..effects[0].len()).map(|k| effects.iter().map(|effect| effect[k]).sum()).collect()
 }
 

@@ -253,8 +253,20 @@ fn an_object_has_exactly_one_source() {
 }
 
 #[test]
+fn what_bounds_matter_is_checked() {
+    let opacity = "opacity = 0.3";
+    refused(opacity, "ior = 0", "19:7: `ior`: expected a number from 0.1 to 10, found 0");
+    refused(opacity, "ior = -1.5", "`ior`: expected a number from 0.1 to 10");
+    refused(opacity, "ior = nan", "19:7: expected a finite number, found nan");
+    refused(opacity, "ior = 1.5\ncauchy = { a = 1.5, b = 0.004 }", "expected one of `ior` and `cauchy`, found both");
+    refused(opacity, "cauchy = { a = 1.5, b = -1 }", "`b`: expected a number from 0 to 1, found -1");
+    refused(opacity, "cauchy = { a = 1.5 }", "expected a key `b` here");
+    refused(opacity, "absorption_inside = [0, -1, 0]", "`absorption_inside`: expected numbers from 0");
+    refused(opacity, "ior = 1.5\nopacity = 1", "nothing passes a surface whose opacity is 1");
+}
+
+#[test]
 fn effects_of_later_versions_are_refused_by_name() {
-    refused("opacity = 0.3", "ior = 1.4", "19:7: surfaces that bend light are not in this version");
     refused("[render]", "[background]\nenvironment = \"a.hdr\"\n[render]", "environment maps are not in this version");
 }
 

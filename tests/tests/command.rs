@@ -80,9 +80,9 @@ fn exit_2_is_for_the_command_line() {
         (vec!["render", "s.toml", "--layers", "depth,norml"], "there is no layer `norml`"),
         (
             vec!["render", "s.toml", "--layers", "refraction"],
-            "no technique of this version fills the layer `refraction`",
+            "the layer `refraction` is of light that surfaces mirror and bend, and none does",
         ),
-        (vec!["render", "s.toml", "--layers", "effects,reflection"], "fills the layer `reflection`"),
+        (vec!["render", "s.toml", "--layers", "effects,reflection"], "the layer `reflection` is of light"),
         (vec!["render", "s.toml", "--technique", "splats"], "found \"splats\""),
         (vec!["render", "s.toml", "--max-memory", "0"], "expected a number of bytes above 0"),
     ] {

@@ -128,3 +128,75 @@ fn media_are_refused_by_name() {
     assert!(said.contains("technique = \"sheets\""), "{said}");
     assert!(!folder.path().join("a.exr").exists());
 }
+
+/// A ball of clear glass before a background.
+const GLASS_BALL: &str = "[background]\ncolor = [0.4, 0.5, 0.7]\n[material.glass]\nior = 1.5\n\
+     [[object]]\nname = 'ball'\nmaterial = 'glass'\n\
+     implicit = { expression = 'x^2 + y^2 + z^2 - 0.25', box = [[-0.6, -0.6, -0.6], [0.6, 0.6, 0.6]], spacing = 0.04 }\n";
+
+#[test]
+fn clear_glass_before_one_color_is_not_seen_and_its_effects_are() {
+    let scene = parallel_view(1.6, 40) + GLASS_BALL + "[render]\nlayers = ['effects']\n";
+    for set in ["bending='each_layer'", "bending='power'", "bending='nearest'", "behind='straight'"] {
+        let set = format!("render.surfels.{set}");
+        for index in ["ior=1.5", "cauchy={ a = 1.4, b = 0.05 }"] {
+            let index = format!("material.glass.{index}");
+            let cleared = if index.contains("cauchy") { "material.glass.ior" } else { "material.glass.cauchy" };
+            let scene = if cleared.ends_with("ior") { scene.replace("ior = 1.5\n", "") } else { scene.clone() };
+            let picture = draw(&scene, &["--set", &set, "--set", &index]);
+            for (channel, expected) in [("R", 0.4), ("G", 0.5), ("B", 0.7)] {
+                assert!(off(&picture.channel(channel), expected) < 1e-6, "{set}, {index}, {channel}");
+            }
+            let [mirrored, bent] = ["reflection.G", "refraction.G"].map(|c| picture.channel(c).iter().sum::<f64>());
+            assert!(mirrored > 1.0 && bent > 10.0 * mirrored, "{set}, {index}: {mirrored} {bent}");
+        }
+    }
+}
+
+#[test]
+fn a_ball_of_glass_turns_what_is_behind_it_upside_down() {
+    // Red above, blue below: seen through the ball the other way round.
+    let walls = |y: f64, name: &str, color: &str| {
+        format!(
+            "[[object]]\nname = '{name}'\nmaterial = '{name}'\n\
+             rectangle = {{ center = [0, {y:?}, -2], u = [3, 0, 0], v = [0, 2, 0], spacing = 0.05 }}\n\
+             [material.{name}]\nshading = 'unlit'\ncolor = {color}\n"
+        )
+    };
+    let scene = "version = 1\n[camera]\nposition = [0, 0, 4]\ntarget = [0, 0, 0]\nfov_y = 25\nsize = [60, 60]\n"
+        .to_owned()
+        + GLASS_BALL
+        + &walls(2.0, "above", "[1, 0, 0]")
+        + &walls(-2.0, "below", "[0, 0, 1]");
+    let seen = |set: &[&str]| {
+        let picture = draw(&scene, set);
+        // Pixels above and below the middle, within the ball and beside it.
+        [(30, 24), (30, 35), (3, 24), (3, 35)].map(|(x, y)| ["R", "B"].map(|c| picture.channel(c)[y * 60 + x]))
+    };
+    let [above, below, beside_above, beside_below] = seen(&[]);
+    assert!(beside_above[0] > 0.9 && beside_below[1] > 0.9, "{beside_above:?} {beside_below:?}");
+    assert!(above[1] > 0.8 && above[0] < 0.15, "{above:?}");
+    assert!(below[0] > 0.8 && below[1] < 0.15, "{below:?}");
+    let [above, below, ..] = seen(&["--set", "render.surfels.behind='straight'"]);
+    assert!(above[0] > 0.8 && below[1] > 0.8, "{above:?} {below:?}");
+}
+
+#[test]
+fn a_technique_that_does_not_bend_light_says_so_and_auto_takes_one_that_does() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("scene.toml"), parallel_view(1.6, 24) + GLASS_BALL).unwrap();
+    let drawn = |technique: &str| {
+        let arguments = ["render", "scene.toml", "--technique", technique, "-o", "a.exr", "--force"];
+        let out = organza().args(arguments).current_dir(&folder).output().unwrap();
+        assert!(out.status.success());
+        String::from_utf8(out.stderr).unwrap()
+    };
+    for technique in ["points", "particles", "sheets", "reference"] {
+        let said = drawn(technique);
+        assert!(said.contains(&format!("which `{technique}` leaves out: use `surfels`")), "{said}");
+    }
+    assert!(!drawn("auto").contains("leaves out"));
+    let out = organza().args(["explain", "scene.toml"]).current_dir(&folder).output().unwrap();
+    let said = String::from_utf8(out.stdout).unwrap();
+    assert!(said.contains("technique: surfels") && said.contains("surfaces of 'ball' bound matter"), "{said}");
+}

@@ -115,7 +115,7 @@ pub fn surface<F: ScalarField + ?Sized>(
     params: &MeshParams,
 ) -> Result<Prediction, ConvertError> {
     params.splat.check()?;
-    let coarse = if params.opacity > 0.0 { coarse_mesh(field, bounds, &params.splat)? } else { Mesh::default() };
+    let coarse = if params.shows() { coarse_mesh(field, bounds, &params.splat)? } else { Mesh::default() };
     let spacing = surface_spacing(field, bounds, params)?;
     // As if it were smooth.
     let tangent = params.opacity >= 1.0 && !open_edges(&coarse).is_empty();

@@ -40,6 +40,13 @@ impl Default for MeshParams {
     }
 }
 
+impl MeshParams {
+    /// Whether there is anything to show.
+    pub(crate) fn shows(&self) -> bool {
+        self.opacity > 0.0 || self.splat.keep_clear
+    }
+}
+
 /// Columns of the splats of a mesh of some opacity, but for those that not all meshes need.
 pub(crate) fn wanted(opacity: f64) -> Wanted {
     Wanted { normal: true, crossing_depth: opacity < 1.0, ..Wanted::default() }
@@ -165,7 +172,7 @@ pub(crate) fn plan(mesh: &Mesh, params: &MeshParams) -> Result<Plan, ConvertErro
         area,
         ..MeshReport::default()
     };
-    if area == 0.0 || params.opacity == 0.0 {
+    if area == 0.0 || !params.shows() {
         return Ok(Plan { measures, report, ..Plan::default() });
     }
     let spacing = p.check_spacing(spacing(mesh, &measures, params, &report))?;

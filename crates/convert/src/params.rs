@@ -26,6 +26,8 @@ pub struct SplatParams {
     pub color: [f32; 3],
     /// Splats that this object may become, 2³² − 1 at most, and the bytes of their cloud.
     pub limits: Limits,
+    /// Whether surfaces of opacity 0 become splats too: the matter that they bound may bend light.
+    pub keep_clear: bool,
 }
 
 impl Default for SplatParams {
@@ -39,6 +41,7 @@ impl Default for SplatParams {
             transform: Similarity::default(),
             color: [1.0; 3],
             limits: Limits::default(),
+            keep_clear: false,
         }
     }
 }

@@ -29,7 +29,7 @@ pub struct SurfelParams {
     pub splat: SplatParams,
     /// Whether surfels keep the points' colours.
     pub colors: bool,
-    /// Opacity of one crossing, in (0, 1\]; 1 makes the surface opaque.
+    /// Opacity of one crossing, in \[0, 1\]; 1 makes the surface opaque.
     pub opacity: f64,
     /// Neighbours that normals and areas come from, 3 to 32.
     pub neighbours: usize,
@@ -126,8 +126,8 @@ pub(crate) fn check(points: &RawPoints, params: &SurfelParams) -> Result<(), Con
     p.check()?;
     points.validate().map_err(|e| p.input(e))?;
     p.check_count(points.len() as f64)?;
-    if !(params.opacity > 0.0 && params.opacity <= 1.0) {
-        return Err(p.bad("opacity", params.opacity, "a number in (0, 1]"));
+    if !(0.0..=1.0).contains(&params.opacity) {
+        return Err(p.bad("opacity", params.opacity, "a number in [0, 1]"));
     }
     if !(3..=MAX_NEIGHBOURS).contains(&params.neighbours) {
         return Err(p.bad("neighbours", params.neighbours, "3 to 32"));

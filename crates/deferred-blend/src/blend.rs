@@ -3,11 +3,12 @@
 
 use crate::disc::Discs;
 use crate::fragments::{BlockLists, Fragment, WalkTile};
-use crate::glass::{Glass, GlassImage};
+use crate::glass::Glass;
 use crate::layers::GapRule;
 use crate::tile::Tile;
 use crate::{Error, Params};
 use rayon::prelude::*;
+use splat_core::raster::GlassImage;
 use splat_core::raster::bins::bin_rectangles;
 use splat_core::raster::pulp;
 use splat_core::{Accumulator, Progress};

@@ -65,27 +65,6 @@ pub(crate) struct Bound<'m> {
     pub(crate) distance: f32,
 }
 
-/// Light that was mirrored and bent, by pixel.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct GlassImage {
-    /// Radiance that layers mirror, through all that lies before them.
-    pub mirrored: Vec<[f32; 3]>,
-    /// Radiance that is seen behind everything, in the place of what lies straight on; [`STRAIGHT`] where nothing was bent. It is not
-    /// weighted by the transmittance. Filled by the range of depths that ends at infinity.
-    pub behind: Vec<[f32; 3]>,
-}
-
-/// Where what lies straight on is seen.
-pub const STRAIGHT: [f32; 3] = [f32::NAN; 3];
-
-impl GlassImage {
-    /// Nothing mirrored, nothing bent.
-    pub(crate) fn new(size: [u32; 2]) -> Self {
-        let pixels = size[0] as usize * size[1] as usize;
-        Self { mirrored: vec![[0.0; 3]; pixels], behind: vec![STRAIGHT; pixels] }
-    }
-}
-
 /// What a layer does to light beside its own opacity, by channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Passage {
@@ -120,7 +99,14 @@ pub(crate) struct Path<'m> {
 impl<'m> Path<'m> {
     /// Begins at the eye, or the plane of parallel rays, along the unit vector of the pixel.
     pub(crate) fn begin(along: Vec3) -> Self {
-        Self { along: [along; 3], place: [Vec3::ZERO; 3], straight: Vec3::ZERO, inside: Vec::new(), nearest: Vec::new(), bent: false }
+        Self {
+            along: [along; 3],
+            place: [Vec3::ZERO; 3],
+            straight: Vec3::ZERO,
+            inside: Vec::new(),
+            nearest: Vec::new(),
+            bent: false,
+        }
     }
 
     /// Through a layer.
@@ -148,11 +134,8 @@ impl<'m> Path<'m> {
             };
             let crossing = cross(self.along[ray], layer.normal, ratio);
             let share = crossing.reflectance;
-            let seen = if share > 0.0 {
-                glass.surroundings.radiance(self.place[ray], crossing.mirrored)
-            } else {
-                [0.0; 3]
-            };
+            let seen =
+                if share > 0.0 { glass.surroundings.radiance(self.place[ray], crossing.mirrored) } else { [0.0; 3] };
             for c in if rays == 1 { 0..3 } else { ray..ray + 1 } {
                 self.along[c] = crossing.bent;
                 passage.reflectance[c] = share;

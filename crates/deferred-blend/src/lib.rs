@@ -22,6 +22,6 @@ mod tile;
 pub use blend::{BlendCounts, BlendInput, Blended, blend};
 pub use disc::{DiscInput, Discs};
 pub use error::Error;
-pub use glass::{Bending, Glass, GlassImage, STRAIGHT, Surroundings};
+pub use glass::{Bending, Glass, Surroundings};
 pub use params::Params;
 pub use solids::Solids;

@@ -1,11 +1,11 @@
 //! Opaque discs as rays meet them that were bent or mirrored, and so come from elsewhere than the eye.
 
-use crate::disc::{axes, into_view};
 use crate::DiscInput;
+use crate::disc::{axes, into_view};
+use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, builder::build_bvh2};
 use obvhs::ray::{Ray, RayHit};
-use obvhs::BvhBuildParams;
 use rayon::prelude::*;
 use splat_core::glam::Vec3;
 use splat_core::shade::ChannelLayout;
@@ -28,7 +28,7 @@ const FACES_AWAY: f32 = 1.0 / 256.0;
 pub struct Solids<'a> {
     bvh: Option<Bvh2>,
     discs: Vec<Solid>,
-    footprints: &'a FootprintStack,
+    footprints: FootprintStack,
     values: &'a [f32],
     layout: ChannelLayout,
     largest: f32,
@@ -56,7 +56,7 @@ struct Hit {
 
 impl<'a> Solids<'a> {
     /// Of the discs `input.ids`, which are opaque; `values` are by place in the cloud, as `layout` says.
-    pub fn new(input: &DiscInput<'a>, values: &'a [f32], layout: ChannelLayout) -> Self {
+    pub fn new(input: &DiscInput<'_>, values: &'a [f32], layout: ChannelLayout) -> Self {
         let (rotation, shift) = into_view(input);
         let solid = |&id: &u32| {
             let (cloud, i) = (input.cloud, id as usize);
@@ -72,7 +72,7 @@ impl<'a> Solids<'a> {
         let params = BvhBuildParams { max_prims_per_leaf: 4, ..BvhBuildParams::fast_build() };
         let bvh = (!boxes.is_empty()).then(|| build_bvh2(&boxes, params, &mut Duration::default()));
         let largest = discs.iter().map(|d| d.radius).fold(0.0, f32::max);
-        Self { bvh, discs, footprints: input.footprints, values, layout, largest }
+        Self { bvh, discs, footprints: input.footprints.clone(), values, layout, largest }
     }
 
     /// Bytes that discs and their hierarchy take.

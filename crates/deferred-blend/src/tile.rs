@@ -3,9 +3,10 @@
 use crate::BlendInput;
 use crate::Params;
 use crate::fragments::Fragment;
-use crate::glass::{Bound, Glass, GlassImage, Passage, Path, STRAIGHT};
+use crate::glass::{Bound, Glass, Passage, Path};
 use crate::layer::{Layer, bound_matter, normal};
 use crate::layers::mean_depth;
+use splat_core::raster::GlassImage;
 use splat_core::raster::lanes::exp_neg;
 use splat_core::raster::tile::{AREA, for_each_span, position, tile_of};
 use splat_core::shade::ChannelLayout;
@@ -44,7 +45,7 @@ impl Tile {
             object: tile_of(&from.object, from.size, corner, u32::MAX),
             opaque: tile_of(input.opaque, from.size, corner, f32::INFINITY),
             mirrored: glass([0.0; 3]),
-            behind: glass(STRAIGHT),
+            behind: glass(GlassImage::STRAIGHT),
             fragments: 0,
             layers: 0,
         }
@@ -105,7 +106,7 @@ impl Tile {
             }
         }
         if range.end == f32::INFINITY {
-            self.behind[k] = path.behind(glass, limit.is_finite()).unwrap_or(STRAIGHT);
+            self.behind[k] = path.behind(glass, limit.is_finite()).unwrap_or(GlassImage::STRAIGHT);
         }
     }
 
@@ -122,8 +123,7 @@ impl Tile {
                 *sum += through[if planes == 3 { c } else { 0 }] * passage.mirrored[c];
             }
         }
-        let enters: [f32; 3] =
-            std::array::from_fn(|p| through[p] * (1.0 - passage.reflectance[channel_of(p, planes)]));
+        let enters: [f32; 3] = std::array::from_fn(|p| through[p] * (1.0 - passage.reflectance[channel_of(p, planes)]));
         for (c, plane) in self.channels.iter_mut().enumerate() {
             plane[k] += enters[ChannelLayout::plane_of(c, count, planes)] * layer.values[c];
         }

@@ -1,7 +1,8 @@
 //! Discs whose pictures are known.
 
-use deferred_blend::{BlendInput, DiscInput, Discs, Glass, GlassImage, Params, blend};
+use deferred_blend::{BlendInput, DiscInput, Discs, Glass, Params, blend};
 use splat_core::glam::{DVec3, Vec3};
+use splat_core::raster::GlassImage;
 use splat_core::{Accumulator, Camera, Cloud, FootprintStack, Material, Projection, Splat, SplatKind, optics, rng};
 
 /// Discs and what they are seen by.

@@ -115,7 +115,7 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
         progress.enter();
         let mut accumulator = frame.accumulator();
         frame.composite(&order, &mut accumulator, &mut cost)?;
-        let layers = frame.finish(&accumulator, &mut cost)?;
+        let layers = frame.finish(&accumulator, None, &mut cost)?;
         progress.leave();
         let mut disorder = rays.disorder(&ranks(&order, loaded.cloud.len()));
         disorder.worst_backtrack *= world;

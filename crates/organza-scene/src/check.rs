@@ -8,7 +8,7 @@ use super::check_render::{check_render, own_layers};
 use super::paths::Paths;
 use super::raw::{RawCamera, RawColor, RawScene};
 use super::tree::{Document, Step};
-use super::{Aligned, RenderSettings, Scene, SceneObject, Slicing, Technique};
+use super::{Aligned, RenderSettings, Scene, SceneMaterial, SceneObject, Slicing, Technique};
 use crate::Error;
 use glam::DVec3;
 use splat_core::{Camera, Footprint, FootprintStack, Packing, Projection};
@@ -180,7 +180,9 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
     check_one_technique(&at_objects, &objects, &render)?;
     check_lattices(&at_objects, &objects, &render)?;
     check_surfels(&at_objects, &objects, &render)?;
+    check_bounds(&at_objects, &objects, &materials)?;
     check_scattered(&at.key("render").key("layers"), &raw.render.layers, &objects, &mut render)?;
+    check_bent(&at.key("render").key("layers"), &raw.render.layers, &objects, (&materials, &mut render))?;
     let camera = check_camera(&at.key("camera"), &raw.camera)?;
     if render.sheets.aligned == Aligned::Axis && !camera.is_orthographic() {
         let message = "`aligned`: slabs along a lattice are seen by parallel rays alone";
@@ -247,6 +249,55 @@ fn check_surfels(at: &At<'_>, objects: &[SceneObject], render: &RenderSettings) 
     })
 }
 
+/// Whether an object bends light: `surfels` draw it, and `auto` gives it to them.
+fn is_bent(object: &SceneObject, materials: &[SceneMaterial], technique: Technique) -> bool {
+    let by_surfels = matches!(object.technique.unwrap_or(technique), Technique::Auto | Technique::Surfels);
+    object.visible && by_surfels && materials[object.material].material.index != [1.0; 3]
+}
+
+/// `reflection` and `refraction` are two of the effects where rays are bent, and else they are refused.
+fn check_bent(
+    at: &At<'_>,
+    layers: &[String],
+    objects: &[SceneObject],
+    (materials, render): (&[SceneMaterial], &mut RenderSettings),
+) -> Result<(), Error> {
+    const LAYERS: [&str; 2] = ["reflection", "refraction"];
+    let bends = objects.iter().any(|o| is_bent(o, materials, render.technique));
+    if bends && layers.iter().any(|layer| layer == "effects") {
+        render.layers.add_effects(LAYERS);
+    }
+    match render.layers.names().find(|name| LAYERS.contains(name)) {
+        Some(name) if !bends => {
+            let message = format!("the layer `{name}` is of light that surfaces mirror and bend, and none does");
+            let hint = "give an object a material with an `ior` and technique = \"surfels\", or leave it out";
+            Err(at.error(message, hint))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Refuses materials that bound matter where there is no surface, or one that nothing passes.
+fn check_bounds(at: &At<'_>, objects: &[SceneObject], materials: &[SceneMaterial]) -> Result<(), Error> {
+    for (i, object) in objects.iter().enumerate() {
+        let material = &materials[object.material];
+        if !material.material.bounds_matter() {
+            continue;
+        }
+        let of = format!("material `{}` has an index or `absorption_inside`", crate::shown(&material.name));
+        let at = at.index(i);
+        if object.source.is_medium() {
+            let message = format!("{of}, which surfaces bound, and this is a medium");
+            return Err(at.error(message, "use another material, or a surface"));
+        }
+        if object.opacity.unwrap_or(material.opacity) >= 1.0 {
+            let message = format!("{of}, and nothing passes a surface whose opacity is 1");
+            return Err(at.error(message, "set an `opacity` below 1; 0 is clear glass"));
+        }
+    }
+    Ok(())
+}
+
 /// `scatterN` is one of the effects where light is scattered more than once, and else it is refused.
 fn check_scattered(
     at: &At<'_>,
@@ -257,7 +308,7 @@ fn check_scattered(
     let by_sheets = |o: &SceneObject| o.visible && o.technique.unwrap_or(render.technique) == Technique::Sheets;
     let scatters_again = render.sheets.scattering().is_some() && objects.iter().any(by_sheets);
     if scatters_again && layers.iter().any(|layer| layer == "effects") {
-        render.layers.add_scattered();
+        render.layers.add_effects(["scatterN"]);
     }
     if !scatters_again && render.layers.names().any(|layer| layer == "scatterN") {
         let message = "the layer `scatterN` is of light that the technique `sheets` scatters more than once";

@@ -46,10 +46,6 @@ pub(super) fn unknown_material(at: &At<'_>, at_materials: &At<'_>, name: &str, m
 }
 
 fn check_material(at: &At<'_>, name: &str, raw: &RawMaterial) -> Result<SceneMaterial, Error> {
-    if raw.ior.is_some() {
-        let message = "surfaces that bend light are not in this version";
-        return Err(at.key("ior").error(message, "leave `ior` out"));
-    }
     let unit = |key, value: Option<f64>, default: f64| at.number(key, value.unwrap_or(default), 0.0..=1.0);
     let (extinction, extinction_rgb) = check_extinction(at, raw)?;
     let medium = raw.medium.as_ref();
@@ -81,14 +77,34 @@ fn check_material(at: &At<'_>, name: &str, raw: &RawMaterial) -> Result<SceneMat
             RawSurfaceOpacity::PerCrossing => SurfaceOpacity::PerCrossing,
             RawSurfaceOpacity::ThinSlab => SurfaceOpacity::ThinSlab,
         },
+        index: check_index(at, raw)?,
+        absorption_inside: at.color("absorption_inside", raw.absorption_inside.unwrap_or_default())?,
     };
+    // Matter that bends light is clear where nothing else is said.
+    let opacity = if material.bounds_matter() { 0.0 } else { 1.0 };
     Ok(SceneMaterial {
         name: name.to_owned(),
         material,
         color: at.color("color", raw.color.unwrap_or([1.0; 3]))?,
-        opacity: unit("opacity", raw.opacity, 1.0)?,
+        opacity: unit("opacity", raw.opacity, opacity)?,
         extinction,
     })
+}
+
+/// Dominant wavelengths of the primaries of Rec.709, µm.
+const WAVELENGTHS: [f64; 3] = [0.6114, 0.5491, 0.4642];
+
+/// The refractive index per channel.
+fn check_index(at: &At<'_>, raw: &RawMaterial) -> Result<[f32; 3], Error> {
+    let Some(cauchy) = &raw.cauchy else {
+        return Ok([at.number("ior", raw.ior.unwrap_or(1.0), 0.1..=10.0)? as f32; 3]);
+    };
+    if raw.ior.is_some() {
+        return Err(at.key("ior").error("expected one of `ior` and `cauchy`, found both", "`cauchy` gives the index"));
+    }
+    let at = at.key("cauchy");
+    let (a, b) = (at.number("a", cauchy.a, 0.1..=10.0)?, at.number("b", cauchy.b, 0.0..=1.0)?);
+    Ok(WAVELENGTHS.map(|wavelength| (a + b / (wavelength * wavelength)) as f32))
 }
 
 /// Extinction of a medium, and its ratio per channel.

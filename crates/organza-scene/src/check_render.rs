@@ -3,16 +3,18 @@
 use super::check::{At, LARGEST, SMALLEST};
 use super::de::suggest;
 use super::raw_render::{
-    Auto, RawAccumulation, RawAligned, RawClassify, RawDirection, RawMapping, RawParticles, RawPoints, RawRender,
-    RawScattering, RawShadow, RawSheets, RawSlicing, RawSoftShadows, RawSurfaceSampler, RawSurfels,
+    Auto, RawAccumulation, RawAligned, RawBehind, RawBending, RawClassify, RawDirection, RawMapping, RawParticles,
+    RawPoints, RawRender, RawScattering, RawShadow, RawSheets, RawSlicing, RawSoftShadows, RawSurfaceSampler,
+    RawSurfels,
 };
 use super::{
-    Aligned, Classify, LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, RenderSettings, Scattering,
-    ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler, SurfelsSettings, Technique,
+    Aligned, Bending, Classify, LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, RenderSettings,
+    Scattering, ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler, SurfelsSettings,
+    Technique,
 };
 use crate::{Error, shown};
+use splat_core::Direction;
 use splat_core::raster::Accumulation;
-use splat_core::{ADDITIVE_LAYERS, Direction};
 
 /// Checks `[render]`.
 pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSettings, Error> {
@@ -56,10 +58,6 @@ fn check_layers(at: &At<'_>, names: &[String], technique: Technique) -> Result<L
     let mut choice = LayerChoice::default();
     for (i, name) in names.iter().enumerate() {
         if !choice.add(name) {
-            if ADDITIVE_LAYERS.contains(&name.as_str()) {
-                let message = format!("no technique of this version fills the layer `{name}`");
-                return Err(at.index(i).error(message, "leave it out; `effects` keeps those that are filled"));
-            }
             return Err(at.index(i).error(format!("there is no layer `{}`", shown(name)), suggest(name, &LAYER_NAMES)));
         }
     }
@@ -142,6 +140,12 @@ fn check_surfels(at: &At<'_>, raw: &RawSurfels) -> Result<SurfelsSettings, Error
         disc_scale: at.number("disc_scale", raw.disc_scale.unwrap_or(0.6), 0.45..=1.0)?,
         gap: at.number("gap", raw.gap.unwrap_or(0.5), 1.0 / 1024.0..=4.0)?,
         transmittance_cutoff: check_cutoff(at, raw.transmittance_cutoff)?,
+        bending: match raw.bending {
+            RawBending::EachLayer => Bending::EachLayer,
+            RawBending::Power => Bending::Power,
+            RawBending::Nearest => Bending::Nearest,
+        },
+        bent_behind: matches!(raw.behind, RawBehind::Bent),
     })
 }
 

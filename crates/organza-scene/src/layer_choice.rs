@@ -4,7 +4,7 @@ use splat_core::{ADDITIVE_LAYERS, LayerSet, Layers, SHADED_EFFECTS};
 use std::collections::BTreeSet;
 
 /// Every name that `layers` accepts. `effects` and `depth` stand for several; `beauty` and `alpha` are always kept.
-pub const LAYER_NAMES: [&str; 18] = [
+pub const LAYER_NAMES: [&str; 20] = [
     "beauty",
     "alpha",
     "effects",
@@ -14,6 +14,8 @@ pub const LAYER_NAMES: [&str; 18] = [
     "direct",
     "scatter1",
     "scatterN",
+    "reflection",
+    "refraction",
     "shadow",
     "normal",
     "depth",
@@ -48,9 +50,9 @@ impl LayerChoice {
         true
     }
 
-    /// Adds the layer of light that is scattered more than once.
-    pub(crate) fn add_scattered(&mut self) {
-        self.names.insert("scatterN");
+    /// Adds effects that not every scene has, by their names in [`LAYER_NAMES`].
+    pub(crate) fn add_effects(&mut self, names: impl IntoIterator<Item = &'static str>) {
+        self.names.extend(names);
     }
 
     /// What has to be accumulated so that these images can be made.

@@ -48,8 +48,8 @@ pub use load::{LoadOptions, MAX_SCENE_BYTES, MAX_SCENE_DEPTH, load, parse, read,
 pub use model::{Scene, SceneMaterial, SceneObject, Up};
 pub use overrides::Override;
 pub use settings::{
-    Aligned, Classify, ParticlesSettings, PointsSettings, RenderSettings, Scattering, ShadowMapping, ShadowSettings,
-    SheetsSettings, Slicing, SoftShadows, SurfaceSampler, SurfelsSettings, Technique,
+    Aligned, Bending, Classify, ParticlesSettings, PointsSettings, RenderSettings, Scattering, ShadowMapping,
+    ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler, SurfelsSettings, Technique,
 };
 pub use shown::{escape_controls, printable, shown};
 pub use source::{

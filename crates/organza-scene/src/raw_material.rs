@@ -54,9 +54,23 @@ pub(super) struct RawMaterial {
     pub(super) surface_opacity: RawSurfaceOpacity,
     /// What the matter of a medium does.
     pub(super) medium: Option<RawMedium>,
-    /// Refraction is not in this version.
-    #[schemars(skip)]
+    /// Refractive index of the matter that a surface bounds, from 0.1 to 10; default none, which bends no light.
     pub(super) ior: Option<f64>,
+    /// The index by wavelength, instead of `ior`.
+    pub(super) cauchy: Option<RawCauchy>,
+    /// What the matter that a surface bounds absorbs, per channel, 1/world unit; default [0, 0, 0].
+    pub(super) absorption_inside: Option<[f64; 3]>,
+}
+
+/// The refractive index a + b/λ², λ in µm (Cauchy).
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(rename = "Cauchy")]
+pub(super) struct RawCauchy {
+    /// From 0.1 to 10.
+    pub(super) a: f64,
+    /// µm², from 0 to 1.
+    pub(super) b: f64,
 }
 
 /// Extinction 4πκ/λ per channel (Gunjee 2007, Eq. 7).

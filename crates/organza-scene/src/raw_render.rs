@@ -42,6 +42,32 @@ pub(super) struct RawSurfels {
     pub(super) gap: Option<f64>,
     /// A pixel is finished when its transmittance is below this, from 0 to below 1; default 1/1024.
     pub(super) transmittance_cutoff: Option<f64>,
+    /// Where surfaces bend rays: at "each_layer", by the "power" of the index that layers are counted for, or at the "nearest"; default
+    /// "each_layer".
+    pub(super) bending: RawBending,
+    /// What is opaque is seen along "bent" rays, or "straight" on; default "bent".
+    pub(super) behind: RawBehind,
+}
+
+/// Where surfaces bend rays.
+#[derive(Debug, Default, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "Bending")]
+pub(super) enum RawBending {
+    #[default]
+    EachLayer,
+    Power,
+    Nearest,
+}
+
+/// How opaque surfaces are seen behind what bends rays.
+#[derive(Debug, Default, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "Behind")]
+pub(super) enum RawBehind {
+    #[default]
+    Bent,
+    Straight,
 }
 
 /// Settings of the `particles` technique.

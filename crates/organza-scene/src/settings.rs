@@ -129,6 +129,21 @@ pub struct SurfelsSettings {
     pub gap: f64,
     /// A pixel is finished when its transmittance falls below this, in [0, 1).
     pub transmittance_cutoff: f64,
+    /// Where surfaces bend rays.
+    pub bending: Bending,
+    /// Whether opaque surfaces are seen along bent rays; else straight on.
+    pub bent_behind: bool,
+}
+
+/// Where surfaces bend rays (Zhang and Pajarola 2007, section 5.2.3).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bending {
+    /// At each layer, in and out by turns.
+    EachLayer,
+    /// At the nearest, by the power of the index that layers are counted for (Eqs. 15 and 16).
+    Power,
+    /// At the nearest, once.
+    Nearest,
 }
 
 /// When values become colours.

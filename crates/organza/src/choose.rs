@@ -7,20 +7,19 @@ mod effects;
 
 pub(crate) use effects::plan;
 
+use crate::escape_controls;
 use crate::form::{DRAWN, Form, PlannedObject};
 use crate::scene::{Scene, SceneObject, Technique};
 use crate::statistics::{LightStatistics, ObjectStatistics};
 use crate::technique::{Row, TABLE};
 
-/// The technique that draws an object: its own, or the scene's, or the first of the table that `auto` may choose.
+/// The technique that draws an object: its own, or the scene's; `auto` takes the first of the table that offers itself.
 pub(crate) fn technique_of(object: &SceneObject, scene: &Scene) -> Technique {
-    resolved(object.technique.unwrap_or(scene.render.technique))
-}
-
-/// `auto` resolved.
-pub(crate) fn resolved(technique: Technique) -> Technique {
-    match technique {
-        Technique::Auto => TABLE.iter().find(|row| row.is_offered).map_or(Technique::Points, |row| row.technique),
+    match object.technique.unwrap_or(scene.render.technique) {
+        Technique::Auto => {
+            let offered = TABLE.iter().find(|row| (row.is_offered)(&scene.materials[object.material].material));
+            offered.map_or(Technique::Points, |row| row.technique)
+        }
         named => named,
     }
 }
@@ -30,12 +29,24 @@ pub(crate) fn techniques(scene: &Scene) -> Vec<Technique> {
     let visible = || scene.objects.iter().filter(|o| o.visible);
     let draws = |row: &&Row| visible().any(|o| technique_of(o, scene) == row.technique);
     let used: Vec<Technique> = TABLE.iter().filter(draws).map(|row| row.technique).collect();
-    if used.is_empty() { vec![resolved(scene.render.technique)] } else { used }
+    let named = || TABLE.iter().find(|row| row.technique == scene.render.technique).unwrap_or(&TABLE[0]).technique;
+    if used.is_empty() { vec![named()] } else { used }
+}
+
+/// Objects whose surfaces bound matter and whose technique cannot show that: a sentence each.
+pub(crate) fn unbent(scene: &Scene) -> impl Iterator<Item = String> + '_ {
+    let bounds = |o: &&SceneObject| o.visible && scene.materials[o.material].material.bounds_matter();
+    let objects = scene.objects.iter().filter(bounds).map(|o| (o, row(technique_of(o, scene))));
+    objects.filter(|(_, row)| !row.bends).map(|(object, row)| {
+        let able = TABLE.iter().find(|row| row.bends).map_or("", |row| row.technique.name());
+        let (name, own) = (escape_controls(&object.name), row.technique.name());
+        format!("object '{name}' bounds matter that bends light or absorbs, which `{own}` leaves out: use `{able}`")
+    })
 }
 
 /// What a technique states.
 pub(crate) fn row(technique: Technique) -> &'static Row {
-    let known = TABLE.iter().find(|row| row.technique == resolved(technique));
+    let known = TABLE.iter().find(|row| row.technique == technique);
     known.expect("invariant: every technique of a scene has a row")
 }
 

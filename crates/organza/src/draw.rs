@@ -42,7 +42,8 @@ pub(crate) fn draw_ranges(
     for technique in &frame.plan.techniques {
         row(*technique).steps.last().into_iter().for_each(|step| join(cost, step.pass));
     }
-    let layers = frame.finish(&accumulator, cost)?;
+    let glass = folds.iter_mut().find_map(|fold| fold.glass());
+    let layers = frame.finish(&accumulator, glass.as_ref(), cost)?;
     let mut finished = Finished { layers, opaque: Some(frame.opaque(cost)?) };
     folds.iter_mut().for_each(|fold| fold.finish(&mut finished));
     let mut layers = finished.layers;

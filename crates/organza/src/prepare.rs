@@ -1,7 +1,7 @@
 //! From a scene to what drawing reads: read, choose, convert, plan.
 
 use crate::carried;
-use crate::choose::{choose, plan, row, same_forms, technique_of, techniques};
+use crate::choose::{choose, plan, row, same_forms, technique_of, techniques, unbent};
 use crate::form::PlannedObject;
 use crate::load::files::Files;
 use crate::load::own::Own;
@@ -61,6 +61,7 @@ pub(crate) fn prepare(
     let (splats, notes) = (loaded.splats.clone(), loaded.notes.clone());
     let mut warnings = loaded.warnings.clone();
     warnings.extend(doubts::of_scene(scene, &loaded));
+    warnings.extend(unbent(scene));
     let inputs = cost.stages.iter().filter(|s| s.name == pass::READ).map(|s| s.bytes).sum();
     let most = memory.total().max(memory::loading_bytes(&loaded, inputs));
     Ok((loaded, Explanation { plan, cost, memory: most, splats, warnings, notes }, memory))
@@ -116,6 +117,9 @@ fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Resu
     let materials = loaded.own.iter().map(|o| &loaded.materials[scene.objects[o.object].material]);
     let unequal = |m: &Material| m.extinction_rgb.iter().any(|e| *e != m.extinction_rgb[0]);
     statistics.colored_extinction |= materials.into_iter().any(unequal);
+    for object in visible(scene).filter(|o| row(technique_of(o, scene)).bends) {
+        statistics.add_bound(&object.name, &loaded.materials[object.material]);
+    }
     statistics.lit_as_drawn = carried::of_scene(scene).is_some();
     let mut plan = plan(&statistics);
     plan.by = scene.objects.iter().map(|o| technique_of(o, scene)).collect();

@@ -106,6 +106,14 @@ pub struct Statistics {
     pub caster_optical_depth: f64,
     /// Whether a material absorbs the three channels unequally.
     pub colored_extinction: bool,
+    /// Objects whose surfaces mirror and bend light, by name, and which techniques draw that can.
+    pub bent: Vec<String>,
+    /// Whether one of them bends red, green and blue apart.
+    pub disperses: bool,
+    /// Objects that bound matter which absorbs, drawn by such a technique, by name.
+    pub absorbing: Vec<String>,
+    /// Whether that absorbs the three channels unequally.
+    pub absorbs_colors: bool,
     /// Whether normals were computed for volumes.
     pub normals_needed: bool,
     /// Whether splats are lit as they are drawn, not before.
@@ -166,6 +174,19 @@ impl Statistics {
             }
         }
         self
+    }
+
+    /// Takes in an object whose surfaces bound matter, drawn by a technique that bends light.
+    pub fn add_bound(&mut self, name: &str, material: &Material) {
+        let unequal = |of: [f32; 3]| of != [of[0]; 3];
+        if material.index != [1.0; 3] {
+            self.bent.push(name.to_owned());
+            self.disperses |= unequal(material.index);
+        }
+        if material.absorption_inside != [0.0; 3] {
+            self.absorbing.push(name.to_owned());
+            self.absorbs_colors |= unequal(material.absorption_inside);
+        }
     }
 
     /// Takes in an object that casts shadows without splats, of which no ray has more optical depth.

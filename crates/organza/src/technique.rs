@@ -25,8 +25,8 @@ use crate::statistics::ObjectStatistics;
 use crate::work::{Translucent, cost};
 use crate::{CostRecord, Error, Layers, RenderOptions};
 pub(crate) use particles::{Checkpoint, Kept};
-use splat_core::Accumulator;
-use splat_core::raster::OpaqueImage;
+use splat_core::raster::{GlassImage, OpaqueImage};
+use splat_core::{Accumulator, Material};
 use std::ops::Range;
 
 /// The form in which a technique takes an object, and why.
@@ -36,8 +36,8 @@ type FormOf = fn(&ObjectStatistics) -> (Form, &'static str);
 pub(crate) struct Row {
     /// As scenes name it.
     pub(crate) technique: Technique,
-    /// Whether `auto` may choose it: it takes the first that it may.
-    pub(crate) is_offered: bool,
+    /// Whether `auto` may choose it for what is made of a material.
+    pub(crate) is_offered: fn(&Material) -> bool,
     /// What becomes of translucent things, in words.
     pub(crate) how: &'static str,
     /// What it does where extinction differs by channel, in words; `None` where that goes without saying.
@@ -46,6 +46,8 @@ pub(crate) struct Row {
     pub(crate) form: Option<FormOf>,
     /// What it makes of splats, in words.
     pub(crate) of_splats: &'static str,
+    /// Whether it mirrors and bends light where surfaces bound matter, and that absorbs.
+    pub(crate) bends: bool,
     /// Whether it draws translucent splats as they are: they get footprints and radiance.
     pub(crate) draws_splats: bool,
     /// Its passes; the last one comes behind opaque surfaces, those before it come before footprints.
@@ -80,6 +82,11 @@ pub(crate) trait Fold {
         session: &mut Session<'_>,
         cost: &mut CostRecord,
     ) -> Result<(), Error>;
+
+    /// Light that it has mirrored and bent, once it has folded all depths.
+    fn glass(&mut self) -> Option<GlassImage> {
+        None
+    }
 
     /// Adds the layers that it alone can make to a finished picture, which it drew by itself.
     fn finish(&mut self, _: &mut Finished<'_>) {}
@@ -121,11 +128,12 @@ pub(crate) struct Finished<'f> {
 pub(crate) static TABLE: [Row; 5] = [
     Row {
         technique: Technique::Points,
-        is_offered: true,
+        is_offered: |material| !material.bounds_matter(),
         how: "are composited in order",
         by_channel: None,
         form: None,
         of_splats: DRAWN,
+        bends: false,
         draws_splats: true,
         steps: &[
             Step { pass: pass::SORT, stage: stage::SORT, seconds: |_, all| cost::SORT * all.splats },
@@ -138,11 +146,12 @@ pub(crate) static TABLE: [Row; 5] = [
     },
     Row {
         technique: Technique::Particles,
-        is_offered: false,
+        is_offered: |_| false,
         how: "become particles",
         by_channel: Some("a particle hides each channel by chance"),
         form: Some(particles::form),
         of_splats: "particles are sampled from them",
+        bends: false,
         draws_splats: false,
         steps: &[Step { pass: pass::PARTICLES, stage: stage::PARTICLES, seconds: particles::seconds }],
         is_random: true,
@@ -152,11 +161,12 @@ pub(crate) static TABLE: [Row; 5] = [
     },
     Row {
         technique: Technique::Sheets,
-        is_offered: false,
+        is_offered: |_| false,
         how: "are composited in slabs, volumes classified after reconstruction",
         by_channel: None,
         form: Some(sheets::form),
         of_splats: DRAWN,
+        bends: false,
         draws_splats: true,
         steps: &[Step { pass: pass::SHEETS, stage: stage::SHEETS, seconds: sheets::seconds }],
         is_random: false,
@@ -166,11 +176,12 @@ pub(crate) static TABLE: [Row; 5] = [
     },
     Row {
         technique: Technique::Surfels,
-        is_offered: false,
+        is_offered: Material::bounds_matter,
         how: "are discs, which are averaged in each layer of a surface, and layers are composited in order",
         by_channel: None,
         form: None,
         of_splats: DRAWN,
+        bends: true,
         draws_splats: true,
         steps: &[
             Step { pass: pass::SORT, stage: stage::SORT, seconds: |_, all| cost::SORT * all.splats },
@@ -183,11 +194,12 @@ pub(crate) static TABLE: [Row; 5] = [
     },
     Row {
         technique: Technique::Reference,
-        is_offered: false,
+        is_offered: |_| false,
         how: "are sorted pixel by pixel, exactly, which is slow",
         by_channel: None,
         form: None,
         of_splats: DRAWN,
+        bends: false,
         draws_splats: true,
         steps: &[Step {
             pass: pass::REFERENCE,

@@ -27,7 +27,7 @@ pub mod source;
 pub mod tile;
 mod translucent;
 
-pub use finish::{Background, FinishInput, finish};
+pub use finish::{Background, FinishInput, GlassImage, finish};
 pub use opaque::{OpaqueImage, OpaqueInput, resolve_opaque};
 pub use project::{ProjectInput, project, project_into};
 pub use projected::{Detail, NearDisc, Projected, ProjectedDepth, ProjectedSplat};

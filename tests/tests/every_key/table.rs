@@ -350,8 +350,18 @@ fn materials() -> Vec<Entry> {
         of(Media, "material.absorption.kappa", "material.m.absorption.kappa=[0.05, 0.02, 0.03]").with(ABSORPTION),
         of(Media, "material.absorption.wavelength", "material.m.absorption.wavelength=[0.2, 0.3, 0.4]")
             .with(ABSORPTION),
+        of(OPEN, "material.ior", "material.m.ior=1.5").but_by(BUT_SURFELS, UNBENT),
+        of(OPEN, "material.cauchy", "material.m.cauchy={a=1.3, b=0.1}").but_by(BUT_SURFELS, UNBENT),
+        of(OPEN, "material.cauchy.a", "material.m.cauchy.a=1.5").by(SURFELS).with(CAUCHY),
+        of(OPEN, "material.cauchy.b", "material.m.cauchy.b=0").by(SURFELS).with(CAUCHY),
+        of(OPEN, "material.absorption_inside", "material.m.absorption_inside=[1, 2, 3]").but_by(BUT_SURFELS, UNBENT),
     ]
 }
+
+const BUT_SURFELS: &[&str] = &["points", "particles", "sheets"];
+const UNBENT: Expected = Nothing("this technique draws surfaces without the matter that they bound, and warns");
+const CAUCHY: &[&str] = &["material.m.cauchy={a=1.3, b=0.1}"];
+const GLASS: &[&str] = &["material.m.ior=1.5"];
 
 const BALL: Which = These(&["medium_ball"]);
 const POINTS_ONLY: Expected = Nothing("a setting of the technique `points`");
@@ -431,6 +441,8 @@ fn render() -> Vec<Entry> {
         of(OPEN, "render.surfels.disc_scale", "render.surfels.disc_scale=1").by(SURFELS),
         of(OPEN, "render.surfels.gap", "render.surfels.gap=4").by(SURFELS),
         of(OPEN, "render.surfels.transmittance_cutoff", "render.surfels.transmittance_cutoff=0.9").by(SURFELS),
+        of(OPEN, "render.surfels.bending", "render.surfels.bending='power'").by(SURFELS).with(GLASS),
+        of(OPEN, "render.surfels.behind", "render.surfels.behind='straight'").by(SURFELS).with(GLASS),
     ]
 }
 

@@ -6,6 +6,7 @@ use crate::pass;
 use crate::plan::{Effect, Plan, PlannedPass};
 use crate::scene::Technique;
 use crate::shadows::CUT_SHARE;
+use crate::shown;
 use crate::statistics::{LightStatistics, Statistics};
 use crate::technique::Row;
 
@@ -27,12 +28,16 @@ pub(crate) fn plan(statistics: &Statistics) -> Plan {
         plan.effects.push(effect);
     }
     plan.effects.push(colored_extinction(statistics));
+    plan.effects.push(bending(statistics));
+    plan.effects.push(dispersion(statistics));
+    plan.effects.push(absorption_inside(statistics));
     plan.effects.push(normals(statistics));
     plan.effects.push(translucency(statistics));
     plan.effects.push(opaque_surfaces(statistics));
     plan.effects.push(kept_layers(statistics));
     plan.objects = statistics.planned.clone();
-    plan.optical_depth_planes = if statistics.colored_extinction { 3 } else { 1 };
+    let by_channel = statistics.colored_extinction || statistics.disperses || statistics.absorbs_colors;
+    plan.optical_depth_planes = if by_channel { 3 } else { 1 };
     plan.passes = passes(statistics, &plan.shadow_maps);
     plan
 }
@@ -76,6 +81,34 @@ fn colored_extinction(statistics: &Statistics) -> Effect {
     } else {
         effect("transmittance per channel", false, "all materials absorb red, green and blue alike")
     }
+}
+
+fn bending(statistics: &Statistics) -> Effect {
+    let name = "reflection and refraction";
+    match statistics.bent.as_slice() {
+        [] => effect(name, false, "no surface that bends light is drawn by a technique that can"),
+        of => effect(name, true, format!("surfaces of {} bound matter with an index", named(of))),
+    }
+}
+
+fn dispersion(statistics: &Statistics) -> Effect {
+    if statistics.disperses {
+        effect("dispersion", true, "an index differs by channel: each has a ray of its own")
+    } else {
+        effect("dispersion", false, "no index differs by channel")
+    }
+}
+
+fn absorption_inside(statistics: &Statistics) -> Effect {
+    match statistics.absorbing.as_slice() {
+        [] => effect("absorption inside", false, "no surface bounds matter that absorbs"),
+        of => effect("absorption inside", true, format!("surfaces of {} bound matter that absorbs", named(of))),
+    }
+}
+
+/// Names of objects, as they are shown.
+fn named(names: &[String]) -> String {
+    names.iter().map(|name| format!("'{}'", shown(name))).collect::<Vec<_>>().join(", ")
 }
 
 fn normals(statistics: &Statistics) -> Effect {

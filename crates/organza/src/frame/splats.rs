@@ -4,7 +4,7 @@ use super::Frame;
 use crate::pass;
 use crate::{CostRecord, Error, stage};
 use splat_core::raster::{
-    self, Background, Detail, FinishInput, OpaqueImage, OpaqueInput, ProjectInput, Projected, RasterCounts,
+    self, Background, Detail, FinishInput, GlassImage, OpaqueImage, OpaqueInput, ProjectInput, Projected, RasterCounts,
 };
 use splat_core::shade::shade;
 use splat_core::{Accumulator, Cloud, Layers, SplatKind, StageCost};
@@ -137,7 +137,12 @@ impl Frame<'_> {
     ///
     /// # Errors
     /// [`Error::Cancelled`], and those of [`Frame::maps`].
-    pub fn finish(&self, accumulator: &Accumulator, cost: &mut CostRecord) -> Result<Layers, Error> {
+    pub fn finish(
+        &self,
+        accumulator: &Accumulator,
+        glass: Option<&GlassImage>,
+        cost: &mut CostRecord,
+    ) -> Result<Layers, Error> {
         let opaque = self.opaque(cost)?;
         self.progress.begin(stage::FINISH);
         cost.measure(pass::FINISH, |stage| {
@@ -149,6 +154,7 @@ impl Frame<'_> {
                 accumulator,
                 opaque,
                 background: &background,
+                glass,
                 layout: &self.layout(),
                 layers: &self.layers,
                 antialias,

@@ -50,6 +50,7 @@ impl Context<'_> {
             transform: object.transform,
             color: object.color.unwrap_or(material.color),
             limits: Limits::NONE,
+            keep_clear: material.material.bounds_matter(),
         };
         self.limit(&mut params);
         params

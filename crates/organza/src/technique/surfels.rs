@@ -5,24 +5,32 @@ use crate::frame::{Frame, Shaded};
 use crate::lights::LightPoint;
 use crate::matter::Matter;
 use crate::pass;
-use crate::scene::Technique;
+use crate::scene::{self, SceneObject, Technique};
 use crate::technique::{Fold, Session, points};
 use crate::{CostRecord, Error, RenderOptions, stage};
-use deferred_blend::{BlendInput, DiscInput, Discs, Params, blend};
-use splat_core::{Accumulator, Direction};
+use deferred_blend::{Bending, BlendInput, Blended, DiscInput, Discs, Glass, Params, Solids, Surroundings, blend};
+use splat_core::raster::GlassImage;
+use splat_core::{Accumulator, Direction, SplatKind, StageCost};
 use std::ops::Range;
 
-/// Bytes of a disc: where rays meet it, what it shows, its place, and an entry in the lists of two tiles.
-const DISC_BYTES: u64 = 96 + 24 + 4 + 2 * 4;
+/// Bytes of a disc: where rays meet it, what it shows, its normal and place, and an entry in the lists of two tiles.
+const DISC_BYTES: u64 = 96 + 28 + 12 + 4 + 2 * 4;
 
-/// Bytes of the discs.
+/// Bytes of a sample of what is mirrored and bent.
+const GLASS_BYTES: u64 = 24;
+
+/// Bytes of the discs, and of what bent rays meet and see.
 pub(crate) fn bytes(matter: &Matter<'_>, _: &[LightPoint], _: bool, _: &RenderOptions) -> u64 {
-    matter.cloud.map_or(0, |cloud| DISC_BYTES * cloud.len() as u64)
+    let discs = matter.cloud.map_or(0, |cloud| cloud.len() as u64);
+    let bounds = matter.scene.materials.iter().any(|m| m.material.bounds_matter());
+    let samples = matter.camera.size.iter().map(|s| u64::from(*s)).product::<u64>();
+    let glass = if bounds { Solids::bytes(discs) + GLASS_BYTES * samples } else { 0 };
+    DISC_BYTES * discs + glass
 }
 
 /// Begins a frame.
 pub(crate) fn begin<'a>(frame: &'a Frame<'a>) -> Box<dyn Fold + 'a> {
-    Box::new(Surfels { frame, discs: None })
+    Box::new(Surfels { frame, discs: None, solids: None, glass: None })
 }
 
 /// The discs of a frame that are the technique's own.
@@ -30,9 +38,13 @@ struct Surfels<'a> {
     frame: &'a Frame<'a>,
     /// Once they were projected.
     discs: Option<Discs>,
+    /// What is opaque, where bent rays may meet it.
+    solids: Option<Solids<'a>>,
+    /// Light that was mirrored and bent so far.
+    glass: Option<GlassImage>,
 }
 
-impl Fold for Surfels<'_> {
+impl<'a> Fold for Surfels<'a> {
     fn fold(
         &mut self,
         range: Range<f32>,
@@ -48,19 +60,81 @@ impl Fold for Surfels<'_> {
         }
         let Shaded { values, .. } = frame.shaded(cost)?;
         let opaque = &frame.opaque(cost)?.depth;
+        let bounds = bounds_matter(frame);
+        if self.solids.is_none() && bounds && frame.settings.surfels.bent_behind {
+            self.solids = Some(cost.measure(pass::SURFELS, |stage| Ok::<_, Error>(solids(frame, values, stage)))?);
+        }
         let discs = self.discs.as_ref().expect("invariant: discs were projected above");
+        let background = frame.scene.background;
+        let surroundings = Surroundings { sky: &|_| background, solids: self.solids.as_ref() };
+        let glass = bounds.then(|| Glass { bending: bending(frame), surroundings, unit: unit(frame) });
         frame.progress.begin(stage::SURFELS);
         frame.tick()?;
-        cost.measure(pass::SURFELS, |stage| {
-            let counts = blend(&BlendInput { discs, values, opaque, range }, &params, into, Some(frame.progress));
-            let counts = counts.map_err(refuse)?;
+        let image = cost.measure(pass::SURFELS, |stage| {
+            let input = BlendInput { discs, values, opaque, range, glass };
+            let Blended { counts, glass } = blend(&input, &params, into, Some(frame.progress)).map_err(refuse)?;
             stage.items_in = counts.discs;
             stage.items_out = counts.layers;
             stage.fragments = counts.fragments;
             stage.bytes = counts.bytes;
-            Ok(())
-        })
+            Ok::<_, Error>(glass)
+        })?;
+        self.keep(image);
+        Ok(())
     }
+
+    fn glass(&mut self) -> Option<GlassImage> {
+        self.glass.take()
+    }
+}
+
+impl Surfels<'_> {
+    /// Adds what a range of depths has mirrored; what is behind everything comes with the last one.
+    fn keep(&mut self, image: Option<GlassImage>) {
+        self.glass = match (self.glass.take(), image) {
+            (Some(before), Some(mut image)) => {
+                for (sum, own) in image.mirrored.iter_mut().zip(before.mirrored) {
+                    sum.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+                }
+                Some(image)
+            }
+            (before, image) => image.or(before),
+        };
+    }
+}
+
+/// Whether surfaces that the technique draws bound matter.
+fn bounds_matter(frame: &Frame<'_>) -> bool {
+    let objects = frame.scene.objects.iter().zip(&frame.plan.by).filter(|(o, _)| o.visible);
+    let material = |o: &SceneObject| &frame.loaded.materials[o.material];
+    objects.into_iter().any(|(o, by)| *by == Technique::Surfels && material(o).bounds_matter())
+}
+
+/// World units in a unit of the cloud.
+fn unit(frame: &Frame<'_>) -> f32 {
+    libm::exp2(f64::from(frame.loaded.exponent)) as f32
+}
+
+fn bending(frame: &Frame<'_>) -> Bending {
+    match frame.settings.surfels.bending {
+        scene::Bending::EachLayer => Bending::EachLayer,
+        scene::Bending::Power => Bending::Power,
+        scene::Bending::Nearest => Bending::Nearest,
+    }
+}
+
+/// Opaque surfaces, where rays from anywhere can meet them.
+fn solids<'a>(frame: &'a Frame<'a>, values: &'a [f32], stage: &mut StageCost) -> Solids<'a> {
+    let cloud = frame.drawn();
+    let ids: Vec<u32> = (0..cloud.len() as u32).filter(|i| cloud.kind[*i as usize] == SplatKind::Opaque).collect();
+    stage.bytes = Solids::bytes(ids.len() as u64);
+    Solids::new(&disc_input(frame, &ids), values, frame.layout())
+}
+
+/// Some discs of what is drawn.
+fn disc_input<'a>(frame: &'a Frame<'a>, ids: &'a [u32]) -> DiscInput<'a> {
+    let (loaded, cloud) = (frame.loaded, frame.drawn());
+    DiscInput { cloud, ids, camera: &frame.camera, footprints: &loaded.footprints, materials: &loaded.materials }
 }
 
 fn params(frame: &Frame<'_>) -> Params {
@@ -76,18 +150,10 @@ fn params(frame: &Frame<'_>) -> Params {
 fn project(frame: &Frame<'_>, params: &Params, cost: &mut CostRecord) -> Result<Discs, Error> {
     let near_first = hbsort::Params { direction: Direction::FrontToBack, ..hbsort::Params::default() };
     let order = points::sorted(frame, Technique::Surfels, &near_first, cost)?;
-    let loaded = frame.loaded;
     frame.progress.begin(stage::SURFELS);
     frame.tick()?;
     cost.measure(pass::SURFELS, |stage| {
-        let input = DiscInput {
-            cloud: frame.drawn(),
-            ids: &order.input_from_sorted,
-            camera: &frame.camera,
-            footprints: &loaded.footprints,
-            materials: &loaded.materials,
-        };
-        let discs = Discs::project(&input, params);
+        let discs = Discs::project(&disc_input(frame, &order.input_from_sorted), params);
         stage.bytes = discs.bytes();
         Ok(discs)
     })

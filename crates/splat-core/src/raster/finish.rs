@@ -16,10 +16,37 @@ pub struct Background {
     pub color: [f32; 3],
 }
 
+/// Light that was mirrored or bent on its way to the eye, by sample: it comes from elsewhere than straight ahead.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct GlassImage {
+    /// Radiance that surfaces mirror, through all that lies before them.
+    pub mirrored: Vec<[f32; 3]>,
+    /// Radiance that is seen behind everything in the place of what lies straight ahead, before anything weakens it;
+    /// [`GlassImage::STRAIGHT`] where no ray was bent.
+    pub behind: Vec<[f32; 3]>,
+}
+
+impl GlassImage {
+    /// Where what lies straight ahead is seen.
+    pub const STRAIGHT: [f32; 3] = [f32::NAN; 3];
+
+    /// Nothing mirrored, nothing bent.
+    pub fn new(size: [u32; 2]) -> Self {
+        let pixels = size[0] as usize * size[1] as usize;
+        Self { mirrored: vec![[0.0; 3]; pixels], behind: vec![Self::STRAIGHT; pixels] }
+    }
+
+    fn bent(&self, k: usize) -> Option<[f32; 3]> {
+        Some(self.behind[k]).filter(|b| !b[0].is_nan())
+    }
+}
+
 /// One sample with everything behind it added.
 struct Sample {
     transmittance: [f32; 3],
     background: [f32; 3],
+    /// `reflection` and `refraction`.
+    glass: [[f32; 3]; 2],
     values: [f32; MAX_CHANNELS],
     depth: [f32; 4],
     object: u32,
@@ -34,6 +61,8 @@ pub struct FinishInput<'a> {
     pub opaque: &'a OpaqueImage,
     /// What is seen where nothing else is.
     pub background: &'a Background,
+    /// What was mirrored and bent, if something was: the effects `reflection` and `refraction`.
+    pub glass: Option<&'a GlassImage>,
     /// What the accumulator's channels are.
     pub layout: &'a ChannelLayout,
     /// Layers to make.
@@ -47,20 +76,20 @@ pub struct FinishInput<'a> {
 /// Colours, alpha, shadow and normal are box-filtered. `depth.first` is the least of the samples, the other depths are
 /// means over the samples where they are defined, and `object` is that of the first sample that has one.
 pub fn finish(input: &FinishInput<'_>) -> Layers {
-    let FinishInput { accumulator, opaque, background, layout, layers, antialias } = *input;
+    let FinishInput { accumulator, glass, layout, layers, antialias, .. } = *input;
     let size = accumulator.size.map(|s| s / antialias);
     let bands: Vec<Output> = (0..size[1].div_ceil(BAND))
         .into_par_iter()
         .map(|band| {
             let rows = band * BAND..size[1].min((band + 1) * BAND);
-            let mut out = Output::new(rows.len() * size[0] as usize, layout.count());
+            let mut out = Output::new(rows.len() * size[0] as usize, layout.count(), glass.is_some());
             let mut samples = Vec::with_capacity((antialias * antialias) as usize);
             for (k, (y, x)) in rows.flat_map(|y| (0..size[0]).map(move |x| (y, x))).enumerate() {
                 samples.clear();
                 for sy in y * antialias..(y + 1) * antialias {
                     for sx in x * antialias..(x + 1) * antialias {
                         let at = sy as usize * accumulator.size[0] as usize + sx as usize;
-                        samples.push(sample(accumulator, opaque, background, at));
+                        samples.push(sample(input, at));
                     }
                 }
                 out.pixel(k, &samples);
@@ -68,21 +97,24 @@ pub fn finish(input: &FinishInput<'_>) -> Layers {
             out
         })
         .collect();
-    let mut out = Output::new(0, layout.count());
+    let mut out = Output::new(0, layout.count(), glass.is_some());
     bands.into_iter().for_each(|band| out.append(band));
     out.into_layers(size, layout, layers)
 }
 
-fn sample(acc: &Accumulator, opaque: &OpaqueImage, background: &Background, k: usize) -> Sample {
+fn sample(input: &FinishInput<'_>, k: usize) -> Sample {
+    let FinishInput { accumulator: acc, opaque, background, .. } = *input;
     let planes = acc.optical_depth.len();
     let transmittance: [f32; 3] =
         std::array::from_fn(|c| exp_neg(acc.optical_depth[if planes == 3 { c } else { 0 }][k]));
     let solid = opaque.depth.get(k).copied().filter(|d| d.is_finite());
+    let bent = input.glass.and_then(|glass| glass.bent(k));
     let count = acc.channels.len();
     let mut values = [0.0; MAX_CHANNELS];
     for (c, (value, plane)) in values.iter_mut().zip(&acc.channels).enumerate() {
         *value = plane[k];
-        if solid.is_some() {
+        // Of what lies straight ahead a bent ray shows nothing; what is no light, its normal and shadow, is still told.
+        if solid.is_some() && (bent.is_none() || c >= input.layout.colors()) {
             *value += transmittance[ChannelLayout::plane_of(c, count, 3)] * opaque.channels[c][k];
         }
     }
@@ -90,7 +122,11 @@ fn sample(acc: &Accumulator, opaque: &OpaqueImage, background: &Background, k: u
     let unseen = acc.object.get(k).is_none_or(|o| *o == u32::MAX);
     Sample {
         transmittance: through,
-        background: std::array::from_fn(|c| through[c] * background.color[c]),
+        background: std::array::from_fn(|c| if bent.is_none() { through[c] * background.color[c] } else { 0.0 }),
+        glass: [
+            input.glass.map_or([0.0; 3], |glass| glass.mirrored[k]),
+            bent.map_or([0.0; 3], |behind| std::array::from_fn(|c| transmittance[c] * behind[c])),
+        ],
         values,
         depth: acc.depth.get(k).map_or([f32::INFINITY; 4], |d| d.depths(acc.optical_depth[planes / 2][k], solid)),
         object: if unseen { opaque.object.get(k).copied().unwrap_or(u32::MAX) } else { acc.object[k] },
@@ -101,6 +137,8 @@ fn sample(acc: &Accumulator, opaque: &OpaqueImage, background: &Background, k: u
 struct Output {
     alpha: Vec<f32>,
     background: Vec<[f32; 3]>,
+    /// `reflection` and `refraction`; empty without.
+    glass: [Vec<[f32; 3]>; 2],
     /// Channel planes.
     values: Vec<Vec<f32>>,
     depth: [Vec<f32>; 4],
@@ -108,10 +146,11 @@ struct Output {
 }
 
 impl Output {
-    fn new(n: usize, channels: usize) -> Self {
+    fn new(n: usize, channels: usize, glass: bool) -> Self {
         Self {
             alpha: vec![0.0; n],
             background: vec![[0.0; 3]; n],
+            glass: std::array::from_fn(|_| if glass { vec![[0.0; 3]; n] } else { Vec::new() }),
             values: vec![vec![0.0; n]; channels],
             depth: std::array::from_fn(|_| vec![f32::INFINITY; n]),
             object: vec![u32::MAX; n],
@@ -122,6 +161,7 @@ impl Output {
     fn append(&mut self, band: Self) {
         self.alpha.extend(band.alpha);
         self.background.extend(band.background);
+        self.glass.iter_mut().zip(band.glass).for_each(|(to, from)| to.extend(from));
         self.values.iter_mut().zip(band.values).for_each(|(to, from)| to.extend(from));
         self.depth.iter_mut().zip(band.depth).for_each(|(to, from)| to.extend(from));
         self.object.extend(band.object);
@@ -133,6 +173,9 @@ impl Output {
             self.alpha[k] += share * (1.0 - (s.transmittance[0] + s.transmittance[1] + s.transmittance[2]) / 3.0);
             for c in 0..3 {
                 self.background[k][c] += share * s.background[c];
+                for (plane, effect) in self.glass.iter_mut().zip(&s.glass) {
+                    plane.get_mut(k).into_iter().for_each(|sum| sum[c] += share * effect[c]);
+                }
             }
             for (plane, value) in self.values.iter_mut().zip(&s.values) {
                 plane[k] += share * value;
@@ -163,8 +206,20 @@ impl Output {
                 }
             }
         }
+        for effect in &self.glass {
+            for (sum, part) in beauty.iter_mut().zip(effect) {
+                for c in 0..3 {
+                    sum[c] += part[c];
+                }
+            }
+        }
         layers.insert("beauty", LayerData::Rgb(beauty));
         if set.effects {
+            for (name, effect) in ["reflection", "refraction"].into_iter().zip(self.glass) {
+                if !effect.is_empty() {
+                    layers.insert(name, LayerData::Rgb(effect));
+                }
+            }
             layers.insert("background", LayerData::Rgb(self.background.clone()));
             for (name, at) in layout.effects() {
                 layers.insert(name, LayerData::Rgb(rgb(at)));
