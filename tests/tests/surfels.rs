@@ -137,7 +137,7 @@ const GLASS_BALL: &str = "[background]\ncolor = [0.4, 0.5, 0.7]\n[material.glass
 #[test]
 fn clear_glass_before_one_color_is_not_seen_and_its_effects_are() {
     let scene = parallel_view(1.6, 40) + GLASS_BALL + "[render]\nlayers = ['effects']\n";
-    for set in ["bending='each_layer'", "bending='power'", "bending='nearest'", "behind='straight'"] {
+    for set in ["bending='traced'", "bending='power'", "bending='nearest'", "behind='straight'"] {
         let set = format!("render.surfels.{set}");
         for index in ["ior=1.5", "cauchy={ a = 1.4, b = 0.05 }"] {
             let index = format!("material.glass.{index}");

@@ -200,26 +200,14 @@ impl<'a> View<'a> {
     }
 
     fn disc(&self, i: usize, params: &Params) -> (Disc, Look) {
-        let DiscInput { cloud, materials, .. } = *self.input;
+        let cloud = self.input.cloud;
         assert_ne!(cloud.kind[i], SplatKind::Medium, "invariant: discs alone are blended");
         let center = self.rotation * (cloud.position[i].as_dvec3() + self.shift);
         let normal = self.rotation * cloud.normal_of(i).as_dvec3();
         let axes = axes(cloud, i, f64::from(params.disc_scale)).map(|a| self.rotation * a);
         let disc =
             if self.parallel { self.parallel(center, normal, axes) } else { self.perspective(center, normal, axes) };
-        (disc, self.look(i, &materials[cloud.material[i] as usize]))
-    }
-
-    fn look(&self, i: usize, material: &Material) -> Look {
-        let cloud = self.input.cloud;
-        let footprint = &self.input.footprints.layers()[cloud.footprint[i] as usize];
-        let is_slab = material.surface_opacity == SurfaceOpacity::ThinSlab;
-        let tau = f64::from(cloud.crossing_depth_of(i, footprint.spacing_for_radius(cloud.radius[i])));
-        let crossing = material.extinction_rgb.map(|factor| {
-            let tau = tau * f64::from(factor);
-            (if is_slab { tau } else { optics::opacity(tau) }) as f32
-        });
-        Look { crossing, is_slab, footprint: cloud.footprint[i], material: cloud.material[i], object: cloud.object[i] }
+        (disc, look(self.input, i))
     }
 
     /// Rays from the eye.
@@ -299,6 +287,20 @@ impl<'a> View<'a> {
         let [x, y] = ranges;
         [clamp(x[0] - 1.0, 0), clamp(x[1] + 1.0, 0), clamp(y[0] - 1.0, 1), clamp(y[1] + 1.0, 1)]
     }
+}
+
+/// What a disc shows.
+pub(crate) fn look(input: &DiscInput<'_>, i: usize) -> Look {
+    let cloud = input.cloud;
+    let material = &input.materials[cloud.material[i] as usize];
+    let footprint = &input.footprints.layers()[cloud.footprint[i] as usize];
+    let is_slab = material.surface_opacity == SurfaceOpacity::ThinSlab;
+    let tau = f64::from(cloud.crossing_depth_of(i, footprint.spacing_for_radius(cloud.radius[i])));
+    let crossing = material.extinction_rgb.map(|factor| {
+        let tau = tau * f64::from(factor);
+        (if is_slab { tau } else { optics::opacity(tau) }) as f32
+    });
+    Look { crossing, is_slab, footprint: cloud.footprint[i], material: cloud.material[i], object: cloud.object[i] }
 }
 
 /// What turns the cloud's space into the camera's, x right, y up, z along the view: after this vector was added, this turn.

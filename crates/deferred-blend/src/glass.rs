@@ -1,37 +1,28 @@
-//! Matter that surfaces bound: rays are mirrored and bent at each layer, and what is inside absorbs (section 5.2.3, Eqs. 15-16).
+//! Matter that surfaces bound: light is mirrored and bent where it meets them, and what is inside absorbs (section 5.2.3).
 //!
-//! The paper counts the layers l of a pixel, bends the ray once, at the nearest, by η^l, and lets (1 − α)^l through. Here every layer
-//! has its own normal and its own opacity, so by default each bends by what it is: into the matter and out of it by turns. Both take
-//! layers from the straight ray, for a bent one meets others that were not gathered.
+//! The paper counts the layers l of a pixel, bends the ray once, at the nearest, by η^l, and lets (1 − α)^l through (Eqs. 15 and 16).
+//! That is here as a mode. Otherwise the ray goes on from the nearest layer as light does, and meets what it meets.
 
 use crate::interface::cross;
-use crate::solids::Solids;
+use crate::surfaces::{Surfaces, Wanted};
+use crate::trace::{Inside, trace};
 use splat_core::Material;
 use splat_core::glam::Vec3;
 
-/// Largest power of a ratio of indices, and least.
+/// Largest power of a ratio of indices; one over it is the least.
 const MOST_RATIO: f32 = 1e15;
 
 /// Where rays are bent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Bending {
-    /// At each layer by its own normal, in and out by turns; light is mirrored at each.
+    /// At every surface that the bent ray meets.
     #[default]
-    EachLayer,
-    /// At the nearest layer of an object by η^l, l the number of its layers, each of which has the opacity of the nearest (Eqs. 15
-    /// and 16).
+    Traced,
+    /// At the nearest layer of an object by η^l, l the number of its layers along the straight ray, each of which has the opacity of
+    /// the nearest (Eqs. 15 and 16).
     Power,
     /// At the nearest layer of an object, once.
     Nearest,
-}
-
-/// What rays see that were bent or mirrored.
-#[derive(Clone, Copy)]
-pub struct Surroundings<'a> {
-    /// Radiance from infinitely far, by a unit vector of the camera's space.
-    pub sky: &'a (dyn Fn(Vec3) -> [f32; 3] + Sync),
-    /// Opaque surfaces; without, they are seen straight on, as in the paper.
-    pub solids: Option<&'a Solids<'a>>,
 }
 
 /// How matter that surfaces bound is drawn.
@@ -39,16 +30,28 @@ pub struct Surroundings<'a> {
 pub struct Glass<'a> {
     /// Where rays are bent.
     pub bending: Bending,
-    /// What they see.
-    pub surroundings: Surroundings<'a>,
+    /// Radiance from infinitely far, by a unit vector of the camera's space.
+    pub sky: &'a (dyn Fn(Vec3) -> [f32; 3] + Sync),
+    /// What bent and mirrored rays may meet: opaque discs, and for [`Bending::Traced`] those that bound matter.
+    pub surfaces: &'a Surfaces<'a>,
+    /// Whether opaque surfaces are seen straight on, as in the paper; then they should not be among `surfaces`.
+    pub straight: bool,
     /// World units in a unit of the cloud, for what is absorbed.
     pub unit: f32,
 }
 
-impl Surroundings<'_> {
-    /// Radiance along a ray.
-    fn radiance(&self, from: Vec3, along: Vec3) -> [f32; 3] {
-        self.solids.and_then(|solids| solids.radiance(from, along)).unwrap_or_else(|| (self.sky)(along))
+impl Glass<'_> {
+    /// Radiance along a ray that nothing bends any more.
+    pub(crate) fn seen(&self, from: Vec3, along: Vec3) -> [f32; 3] {
+        match self.surfaces.nearest(from, along, Wanted::Opaque) {
+            Some(met) => met.radiance,
+            None => (self.sky)(along),
+        }
+    }
+
+    /// Optical depth of matter along a distance, by channel.
+    pub(crate) fn absorbed(&self, material: &Material, distance: f32) -> [f32; 3] {
+        material.absorption_inside.map(|a| a * (distance * self.unit).max(0.0))
     }
 }
 
@@ -83,71 +86,72 @@ impl Passage {
 
 /// The way of a pixel's ray through its layers.
 pub(crate) struct Path<'m> {
-    /// Unit direction by channel.
-    along: [Vec3; 3],
-    /// Where it was bent last, by channel.
-    place: [Vec3; 3],
-    /// Where the straight ray was then.
-    straight: Vec3,
+    along: Vec3,
     /// Objects that were entered and not left, and how far along the straight ray.
     inside: Vec<(u32, &'m Material, f32)>,
     /// The opacity of the nearest layer of each object that was met.
     nearest: Vec<(u32, [f32; 3])>,
-    bent: bool,
+    bent: Option<Bent<'m>>,
+}
+
+/// Rays that no longer go straight on, by channel.
+struct Bent<'m> {
+    along: [Vec3; 3],
+    place: Vec3,
+    inside: Inside<'m>,
 }
 
 impl<'m> Path<'m> {
-    /// Begins at the eye, or the plane of parallel rays, along the unit vector of the pixel.
+    /// Begins along the unit vector of the pixel.
     pub(crate) fn begin(along: Vec3) -> Self {
-        Self {
-            along: [along; 3],
-            place: [Vec3::ZERO; 3],
-            straight: Vec3::ZERO,
-            inside: Vec::new(),
-            nearest: Vec::new(),
-            bent: false,
-        }
+        Self { along, inside: Vec::new(), nearest: Vec::new(), bent: None }
     }
 
-    /// Through a layer.
+    /// Whether a layer that bounds matter is met by the bent ray, where it lies there, and not by the straight one.
+    pub(crate) fn leaves_out(&self, glass: &Glass<'_>) -> bool {
+        glass.bending == Bending::Traced && self.bent.is_some()
+    }
+
+    /// Through a layer, one after the other from the eye.
     pub(crate) fn cross(&mut self, layer: &Bound<'m>, glass: &Glass<'_>, passage: &mut Passage) {
-        let entered = self.inside.iter().position(|(object, ..)| *object == layer.object);
-        match entered {
+        match self.inside.iter().position(|(object, ..)| *object == layer.object) {
             Some(at) => {
                 let (_, material, from) = self.inside.swap_remove(at);
-                passage.inside = absorbed(material, (layer.distance - from) * glass.unit);
+                passage.inside = glass.absorbed(material, layer.distance - from);
             }
             None => self.inside.push((layer.object, layer.material, layer.distance)),
         }
         let index = layer.material.index;
-        if index == [1.0; 3] || (glass.bending != Bending::EachLayer && layer.rank > 0) {
+        if index == [1.0; 3] || layer.rank > 0 {
             return;
         }
-        self.follow(layer);
+        let before = self.bent.as_ref().map_or([self.along; 3], |bent| bent.along);
+        let mut along = before;
         // Rays of all channels go the same way until something disperses them.
-        let rays = if index == [index[0]; 3] && self.are_one() { 1 } else { 3 };
+        let rays = if index == [index[0]; 3] && before == [before[0]; 3] { 1 } else { 3 };
         for ray in 0..rays {
             let ratio = match glass.bending {
-                Bending::EachLayer if entered.is_some() => index[ray],
-                Bending::EachLayer | Bending::Nearest => 1.0 / index[ray],
+                Bending::Traced | Bending::Nearest => 1.0 / index[ray],
                 Bending::Power => power(1.0 / index[ray], layer.layers),
             };
-            let crossing = cross(self.along[ray], layer.normal, ratio);
+            let crossing = cross(before[ray], layer.normal, ratio);
             let share = crossing.reflectance;
-            let seen =
-                if share > 0.0 { glass.surroundings.radiance(self.place[ray], crossing.mirrored) } else { [0.0; 3] };
+            let seen = if share > 0.0 { glass.seen(layer.place, crossing.mirrored) } else { [0.0; 3] };
             for c in if rays == 1 { 0..3 } else { ray..ray + 1 } {
-                self.along[c] = crossing.bent;
+                along[c] = crossing.bent;
                 passage.reflectance[c] = share;
                 passage.mirrored[c] = share * seen[c];
             }
         }
-        self.bent = true;
-    }
-
-    /// Whether the rays of all channels are the same.
-    fn are_one(&self) -> bool {
-        self.along == [self.along[0]; 3] && self.place == [self.place[0]; 3]
+        if glass.bending == Bending::Traced {
+            // What lies around this object has absorbed up to here.
+            for (_, material, from) in self.inside.iter().filter(|(object, ..)| *object != layer.object) {
+                let own = glass.absorbed(material, layer.distance - from);
+                passage.inside.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+            }
+        }
+        let inside = Inside::of(self.inside.iter().map(|(object, material, _)| (*object, *material)));
+        self.bent = Some(Bent { along, place: layer.place, inside });
     }
 
     /// Opacity of a layer: where layers are counted, that of the nearest of its object (Eq. 15).
@@ -164,44 +168,29 @@ impl<'m> Path<'m> {
         }
     }
 
-    /// Brings the bent rays to the plane of a layer: they meet it beside the straight one. At most twice as far as that has gone, where they
-    /// run nearly along it.
-    fn follow(&mut self, layer: &Bound<'_>) {
-        let gap = (layer.place - self.straight).length();
-        for (place, along) in self.place.iter_mut().zip(self.along) {
-            *place = if self.bent {
-                let distance = layer.normal.dot(layer.place - *place) / layer.normal.dot(along);
-                *place + along * if distance > 0.0 { distance.min(2.0 * gap) } else { 0.0 }
-            } else {
-                layer.place
-            };
-        }
-        self.straight = layer.place;
-    }
-
-    /// Optical depth of matter that was entered and is seen up to an opaque surface at a distance along the ray.
+    /// Optical depth of matter that was entered and is seen up to an opaque surface at a distance along the straight ray.
     pub(crate) fn absorbed_before(&self, distance: f32, glass: &Glass<'_>) -> [f32; 3] {
-        let of = |(_, material, from): &(u32, &Material, f32)| absorbed(material, (distance - from) * glass.unit);
+        if self.leaves_out(glass) {
+            return [0.0; 3];
+        }
+        let of = |(_, material, from): &(u32, &Material, f32)| glass.absorbed(material, distance - from);
         self.inside.iter().map(of).fold([0.0; 3], |sum, own| std::array::from_fn(|c| sum[c] + own[c]))
     }
 
-    /// What is seen behind all layers where the ray has gone another way than straight on. `hits` tells whether an opaque surface lies
-    /// straight on: without [`Surroundings::solids`] it is seen there.
+    /// What is seen behind all layers where the ray was bent. `hits` tells whether an opaque surface lies straight on.
     pub(crate) fn behind(&self, glass: &Glass<'_>, hits: bool) -> Option<[f32; 3]> {
-        if !self.bent || (hits && glass.surroundings.solids.is_none()) {
+        let Bent { along, place, inside } = self.bent.as_ref()?;
+        if hits && glass.straight {
             return None;
         }
-        let first = glass.surroundings.radiance(self.place[0], self.along[0]);
-        if self.are_one() {
-            return Some(first);
-        }
-        let of = |c: usize| glass.surroundings.radiance(self.place[c], self.along[c])[c];
-        Some([first[0], of(1), of(2)])
+        let seen = |c: usize| match glass.bending {
+            Bending::Traced => trace(glass, *place, along[c], (inside.clone(), c)),
+            Bending::Power | Bending::Nearest => glass.seen(*place, along[c]),
+        };
+        let first = seen(0);
+        let alike = *along == [along[0]; 3] && !glass.surfaces.disperses();
+        Some(if alike { first } else { [first[0], seen(1)[1], seen(2)[2]] })
     }
-}
-
-fn absorbed(material: &Material, distance: f32) -> [f32; 3] {
-    material.absorption_inside.map(|a| a * distance.max(0.0))
 }
 
 /// η^l, between numbers whose squares are no infinities.

@@ -16,12 +16,13 @@ mod layer;
 mod layers;
 mod params;
 pub mod reference;
-mod solids;
+mod surfaces;
 mod tile;
+mod trace;
 
 pub use blend::{BlendCounts, BlendInput, Blended, blend};
 pub use disc::{DiscInput, Discs};
 pub use error::Error;
-pub use glass::{Bending, Glass, Surroundings};
+pub use glass::{Bending, Glass};
 pub use params::Params;
-pub use solids::Solids;
+pub use surfaces::Surfaces;

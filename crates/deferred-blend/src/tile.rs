@@ -78,6 +78,9 @@ impl Tile {
             if let Some((glass, path)) = &mut way
                 && let Some(material) = bound_matter(own, input)
             {
+                if path.leaves_out(glass) {
+                    continue;
+                }
                 let (rank, of_object) = count(own[0].object, layer.start, limit, (fragments, layers));
                 let (place, distance) = (ray.at(blended.depth), ray.length * blended.depth);
                 let (normal, object) = (normal(own, input), own[0].object);

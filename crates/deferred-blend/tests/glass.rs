@@ -1,18 +1,17 @@
 //! Matter that surfaces bound: what is mirrored, bent and absorbed.
 
-use crate::scenes::{Scene, camera, disc, parallel, plane, sphere};
-use deferred_blend::{Bending, DiscInput, Glass, Params, Solids, Surroundings};
+use crate::scenes::{Asked, Scene, camera, disc, parallel, plane, sphere};
+use deferred_blend::{Bending, Params};
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::shade::ChannelLayout;
-use splat_core::{Accumulator, Cloud, LayerSet, Material, Splat};
+use splat_core::{Accumulator, Cloud, Material, Splat, SplatKind};
 
-const MODES: [Bending; 3] = [Bending::EachLayer, Bending::Power, Bending::Nearest];
+const MODES: [Bending; 3] = [Bending::Traced, Bending::Power, Bending::Nearest];
 
 /// Everything is composited.
 const WHOLE: Params = Params { disc_scale: 0.6, gap: 0.5, transmittance_cutoff: 0.0 };
 
-fn in_sky(bending: Bending, sky: &(dyn Fn(Vec3) -> [f32; 3] + Sync)) -> Glass<'_> {
-    Glass { bending, surroundings: Surroundings { sky, solids: None }, unit: 1.0 }
+fn in_sky(bending: Bending, sky: &(dyn Fn(Vec3) -> [f32; 3] + Sync)) -> Asked<'_> {
+    Asked { bending, sky, straight: false, unit: 1.0 }
 }
 
 /// Clear discs of some index.
@@ -43,13 +42,19 @@ fn through(picture: &Accumulator, channel: usize, k: usize) -> f64 {
     libm::exp(-f64::from(picture.optical_depth[channel][k]))
 }
 
+/// The share of unpolarised light that is mirrored, by the sine of the angle and the ratio of the sine beyond to it.
+fn fresnel(eta: f64, sine: f64) -> f64 {
+    let (c, t) = ((1.0 - sine * sine).sqrt(), (1.0 - (eta * sine).powi(2)).sqrt());
+    0.5 * (((eta * c - t) / (eta * c + t)).powi(2) + ((c - eta * t) / (c + eta * t)).powi(2))
+}
+
 #[test]
 fn clear_glass_in_a_white_world_is_not_seen() {
     let view = camera(DVec3::new(0.3, 0.4, 4.0), [48, 36]);
     for index in [[1.01; 3], [1.5; 3], [2.4; 3], [0.7; 3], [1.4, 1.45, 1.5]] {
         for bending in MODES {
             let scene = clear(ball(0.0), index, view);
-            let (picture, glass) = scene.draw_glass(&WHOLE, in_sky(bending, &|_| [1.0; 3]), &[]);
+            let (picture, glass) = scene.draw_glass(&WHOLE, &in_sky(bending, &|_| [1.0; 3]), &[]);
             let mut mirrored = 0.0;
             for k in 0..48 * 36 {
                 for c in 0..3 {
@@ -77,7 +82,7 @@ fn an_index_of_one_changes_no_bit() {
         let mut scene = Scene::new(ball(0.4), view);
         // Another material bends, so that the way of each ray is followed.
         scene.materials = vec![Material::default(), Material { index: [1.5; 3], ..Material::default() }];
-        let (picture, glass) = scene.draw_glass(&WHOLE, in_sky(bending, &|_| [7.0; 3]), &[]);
+        let (picture, glass) = scene.draw_glass(&WHOLE, &in_sky(bending, &|_| [7.0; 3]), &[]);
         assert_eq!((&picture.optical_depth, &picture.channels), (&plain.optical_depth, &plain.channels));
         assert!(glass.behind.iter().all(|b| b[0].is_nan()) && glass.mirrored.iter().all(|m| *m == [0.0; 3]));
     }
@@ -88,11 +93,19 @@ fn a_slab_shifts_rays_and_leaves_their_direction() {
     let size = [32, 24];
     let view = camera(DVec3::new(0.0, 0.0, 3.0), size);
     let scene = clear(slab(0.5, 40, 0.0), [1.5; 3], view);
-    let (_, glass) = scene.draw_glass(&WHOLE, in_sky(Bending::EachLayer, &|d| d.into()), &[]);
+    let (_, glass) = scene.draw_glass(&WHOLE, &in_sky(Bending::Traced, &|d| d.into()), &[]);
     for (k, behind) in glass.behind.iter().enumerate() {
         let (from, along) = view.view_ray((k % 32) as f64 + 0.5, (k / 32) as f64 + 0.5);
         assert_eq!(from, DVec3::ZERO);
-        let apart = (Vec3::from(*behind) - along.normalize().as_vec3()).length();
+        let along = along.normalize();
+        // At the second surface a part is mirrored, and is told what the sky has where it goes inside.
+        let sine = along.x.hypot(along.y);
+        let within = DVec3::new(along.x / 1.5, along.y / 1.5, (1.0 - (sine / 1.5).powi(2)).sqrt());
+        let share = fresnel(1.5, sine / 1.5);
+        // The camera looks along −z; its own space has z ahead.
+        let [direct, mirrored] = [along, within].map(|d| DVec3::new(d.x, d.y, d.z.abs()));
+        let expected = direct * (1.0 - share) + mirrored * DVec3::new(1.0, 1.0, -1.0) * share;
+        let apart = (Vec3::from(*behind) - expected.as_vec3()).length();
         assert!(apart < 1e-5, "pixel {k}: {apart:e}");
     }
 }
@@ -108,7 +121,7 @@ fn layers_of_the_paper_bend_by_a_power() {
         }
         let mut scene = Scene::new(cloud, view);
         scene.materials = vec![Material { index: [index; 3], ..Material::default() }];
-        let (picture, glass) = scene.draw_glass(&WHOLE, in_sky(Bending::Power, &|d| d.into()), &[]);
+        let (picture, glass) = scene.draw_glass(&WHOLE, &in_sky(Bending::Power, &|d| d.into()), &[]);
         for (k, behind) in glass.behind.iter().enumerate() {
             let (_, along) = view.view_ray((k % 33) as f64 + 0.5, (k / 33) as f64 + 0.5);
             let along = along.normalize();
@@ -116,9 +129,7 @@ fn layers_of_the_paper_bend_by_a_power() {
             let found = f64::from(behind[0]).hypot(f64::from(behind[1]));
             assert!((found - eta * sine).abs() < 1e-5, "{index} {layers} pixel {k}: {found} for {}", eta * sine);
             // Eq. 15, and what is mirrored at the nearest layer.
-            let (c, t) = ((1.0 - sine * sine).sqrt(), (1.0 - (eta * sine).powi(2)).sqrt());
-            let share = 0.5 * (((eta * c - t) / (eta * c + t)).powi(2) + ((c - eta * t) / (c + eta * t)).powi(2));
-            let passes = 0.7f64.powi(layers) * (1.0 - share);
+            let passes = 0.7f64.powi(layers) * (1.0 - fresnel(eta, sine));
             assert!((through(&picture, 1, k) - passes).abs() < 1e-5, "{index} {layers} pixel {k}");
         }
     }
@@ -134,8 +145,8 @@ fn opacities_of_one_object_are_those_of_its_nearest_layer_by_power_alone() {
     cloud.cross_section[half..].fill(0.0);
     let mut scene = Scene::new(cloud, view);
     scene.materials = vec![Material { index: [1.0; 3], absorption_inside: [1e-9; 3], ..Material::default() }];
-    for (bending, expected) in [(Bending::EachLayer, 0.7), (Bending::Nearest, 0.7), (Bending::Power, 0.49)] {
-        let (picture, _) = scene.draw_glass(&WHOLE, in_sky(bending, &|_| [1.0; 3]), &[]);
+    for (bending, expected) in [(Bending::Traced, 0.7), (Bending::Nearest, 0.7), (Bending::Power, 0.49)] {
+        let (picture, _) = scene.draw_glass(&WHOLE, &in_sky(bending, &|_| [1.0; 3]), &[]);
         assert!((through(&picture, 1, 27) - expected).abs() < 1e-6, "{bending:?}: {}", through(&picture, 1, 27));
     }
 }
@@ -147,8 +158,8 @@ fn matter_absorbs_between_its_surfaces_and_before_what_is_opaque() {
     let mut scene = clear(slab(0.5, 40, 0.0), [1.0; 3], view);
     scene.materials[0].absorption_inside = [0.2, 1.0, 3.0];
     for (opaque, depth) in [(vec![], 0.5), (vec![3.2; 16 * 12], 0.2)] {
-        let glass = Glass { unit: 2.0, ..in_sky(Bending::EachLayer, &|_| [1.0; 3]) };
-        let (picture, _) = scene.draw_glass(&WHOLE, glass, &opaque);
+        let glass = Asked { unit: 2.0, ..in_sky(Bending::Traced, &|_| [1.0; 3]) };
+        let (picture, _) = scene.draw_glass(&WHOLE, &glass, &opaque);
         for k in 0..16 * 12 {
             let (_, along) = view.view_ray((k % 16) as f64 + 0.5, (k / 16) as f64 + 0.5);
             for (c, absorption) in [0.2, 1.0, 3.0].into_iter().enumerate() {
@@ -166,7 +177,7 @@ fn db13_glass_is_the_same_whichever_way_its_normals_point() {
     let drawn = |every: usize| {
         let mut cloud = ball(0.0);
         cloud.normal.iter_mut().step_by(every).for_each(|n| *n = -*n);
-        clear(cloud, [1.5; 3], view).draw_glass(&WHOLE, in_sky(Bending::EachLayer, &|d| (d + Vec3::ONE).into()), &[]).1
+        clear(cloud, [1.5; 3], view).draw_glass(&WHOLE, &in_sky(Bending::Traced, &|d| (d + Vec3::ONE).into()), &[]).1
     };
     let (all, third) = (drawn(1), drawn(3));
     for (a, b) in all.behind.iter().zip(&third.behind).filter(|(a, _)| !a[0].is_nan()) {
@@ -174,24 +185,26 @@ fn db13_glass_is_the_same_whichever_way_its_normals_point() {
     }
 }
 
+/// A slab before a wall whose colour is its place, seen from the front.
+fn slab_before_a_wall(view: splat_core::Camera) -> Scene {
+    let mut cloud = slab(0.5, 40, 0.0);
+    let glass = cloud.len();
+    let wall = Splat { kind: SplatKind::Opaque, object: 1, ..disc(Vec3::ZERO, Vec3::Z, 0.05, 0.9) };
+    plane(&mut cloud, Vec3::Z * -1.5, Vec3::Z, 80, &wall);
+    for i in glass..cloud.len() {
+        cloud.color[i] = [cloud.position[i].x + 9.0, cloud.position[i].y + 9.0, 1.0];
+    }
+    clear(cloud, [1.5; 3], view)
+}
+
 #[test]
 fn a_wall_behind_glass_is_seen_where_the_bent_ray_meets_it() {
     let size = [40, 30];
     let view = camera(DVec3::new(0.0, 0.0, 3.0), size);
-    let glass = clear(slab(0.5, 40, 0.0), [1.5; 3], view);
-    // A wall whose colour is its place.
-    let mut wall = Cloud::new(DVec3::ZERO);
-    plane(&mut wall, Vec3::Z * -1.5, Vec3::Z, 60, &disc(Vec3::ZERO, Vec3::Z, 0.05, 0.9));
-    for i in 0..wall.len() {
-        wall.color[i] = [wall.position[i].x, wall.position[i].y, 1.0];
-    }
-    let values: Vec<f32> = wall.color.iter().flatten().copied().collect();
-    let ids: Vec<u32> = (0..wall.len() as u32).collect();
-    let input = DiscInput { cloud: &wall, ids: &ids, ..glass.input() };
-    let solids = Solids::new(&input, &values, ChannelLayout::new(&LayerSet::default()));
-    let surroundings = Surroundings { sky: &|_| [9.0; 3], solids: Some(&solids) };
-    let (_, seen) =
-        glass.draw_glass(&WHOLE, Glass { bending: Bending::EachLayer, surroundings, unit: 1.0 }, &[4.5; 40 * 30]);
+    let scene = slab_before_a_wall(view);
+    let opaque = [4.5; 40 * 30];
+    let (_, seen) = scene.draw_glass(&WHOLE, &in_sky(Bending::Traced, &|_| [9.0; 3]), &opaque);
+    let (mut worst, mut straight) = (0.0f64, f64::INFINITY);
     for (k, behind) in seen.behind.iter().enumerate() {
         let (_, along) = view.view_ray((k % 40) as f64 + 0.5, (k / 40) as f64 + 0.5);
         let unit = along.normalize();
@@ -200,32 +213,76 @@ fn a_wall_behind_glass_is_seen_where_the_bent_ray_meets_it() {
         let (outside, inside) = (sine / (1.0 - sine * sine).sqrt(), sine / 1.5 / (1.0 - (sine / 1.5).powi(2)).sqrt());
         let off = outside * (3.0 + 1.0) + inside * 0.5;
         let expected = [along.x, along.y].map(|v| off * v / along.x.hypot(along.y));
-        // Colours are blended over discs, which lie 0.05 apart, jittered: a straight line through them keeps the mean.
-        let apart = (f64::from(behind[0]) - expected[0]).hypot(f64::from(behind[1]) - expected[1]);
-        let straight = (along.x.hypot(along.y) * 4.5 - off).abs();
-        assert!(apart < 0.02 && behind[2] > 0.999, "pixel {k}: {behind:?} for {expected:?}, straight {straight}");
+        // What is mirrored at the second surface sees the sky, which is 9 as the middle of the wall.
+        let share = fresnel(1.5, sine / 1.5);
+        assert!((f64::from(behind[2]) - (1.0 + 8.0 * share)).abs() < 1e-5, "pixel {k}: {behind:?}");
+        let own = [0, 1].map(|c| (f64::from(behind[c]) - 9.0) / (1.0 - share));
+        worst = worst.max((own[0] - expected[0]).hypot(own[1] - expected[1]));
+        straight = straight.min(if sine > 0.3 { (along.x.hypot(along.y) * 4.5 - off).abs() } else { f64::INFINITY });
     }
+    // Colours are blended over discs that lie 0.05 apart, jittered: half of that.
+    assert!(worst < 0.025 && straight > 0.05, "{worst}, a straight ray is {straight} off");
     // The paper's way: opaque surfaces straight on.
-    let surroundings = Surroundings { sky: &|_| [9.0; 3], solids: None };
-    let (_, seen) =
-        glass.draw_glass(&WHOLE, Glass { bending: Bending::EachLayer, surroundings, unit: 1.0 }, &[4.5; 40 * 30]);
+    let asked = Asked { straight: true, ..in_sky(Bending::Traced, &|_| [9.0; 3]) };
+    let (_, seen) = scene.draw_glass(&WHOLE, &asked, &opaque);
     assert!(seen.behind.iter().all(|b| b[0].is_nan()));
 }
 
 #[test]
-fn solids_hide_what_is_behind_them_and_end() {
+fn opaque_surfaces_hide_what_is_behind_them_and_end() {
     let view = camera(DVec3::new(0.0, 0.0, 3.0), [40, 30]);
-    let mut cloud = Cloud::new(DVec3::ZERO);
-    let near = Splat { color: [0.0, 1.0, 0.0], ..disc(Vec3::ZERO, Vec3::Z, 0.05, 0.9) };
+    let mut cloud = slab(0.2, 40, 0.0);
+    let near =
+        Splat { color: [0.0, 1.0, 0.0], kind: SplatKind::Opaque, object: 1, ..disc(Vec3::ZERO, Vec3::Z, 0.05, 0.9) };
     plane(&mut cloud, Vec3::Z * -1.0, Vec3::Z, 6, &near);
-    plane(&mut cloud, Vec3::Z * -2.0, Vec3::Z, 12, &Splat { color: [1.0, 0.0, 0.0], ..near });
-    let walls = Scene::new(cloud, view);
-    let solids = Solids::new(&walls.input(), &walls.values, ChannelLayout::new(&LayerSet::default()));
-    let pane = clear(slab(0.2, 40, 0.0), [1.0001; 3], view);
-    let surroundings = Surroundings { sky: &|_| [0.0, 0.0, 1.0], solids: Some(&solids) };
-    let (_, seen) = pane.draw_glass(&WHOLE, Glass { bending: Bending::EachLayer, surroundings, unit: 1.0 }, &[]);
-    let at = |x: usize, y: usize| seen.behind[y * 40 + x];
+    plane(&mut cloud, Vec3::Z * -2.0, Vec3::Z, 12, &Splat { color: [1.0, 0.0, 0.0], object: 2, ..near });
+    let pane = clear(cloud, [1.0001; 3], view);
+    let (_, seen) = pane.draw_glass(&WHOLE, &in_sky(Bending::Traced, &|_| [0.0, 0.0, 1.0]), &[]);
+    let at = |x: usize, y: usize| seen.behind[y * 40 + x].map(|v| (v * 1e4).round() / 1e4);
     assert_eq!(at(20, 15), [0.0, 1.0, 0.0]);
     assert_eq!(at(24, 15), [1.0, 0.0, 0.0], "beside the near wall");
     assert_eq!(at(36, 15), [0.0, 0.0, 1.0], "beside both");
+}
+
+/// Where a ray leaves a ball of glass, by the laws of Snell and Fresnel alone.
+fn through_a_ball(from: DVec3, along: DVec3, index: f64) -> Option<DVec3> {
+    let along = along.normalize();
+    let b = from.dot(along);
+    let root = (b * b - from.length_squared() + 1.0).sqrt();
+    let normal = (!root.is_nan()).then(|| from + along * (-b - root))?;
+    let bend = |along: DVec3, normal: DVec3, ratio: f64| {
+        let cosine = -along.dot(normal);
+        let beyond = (1.0 - ratio * ratio * (1.0 - cosine * cosine)).sqrt();
+        ratio * along + (ratio * cosine - beyond) * normal
+    };
+    let within = bend(along, normal, 1.0 / index);
+    let leaves = normal - 2.0 * within.dot(normal) * within;
+    Some(bend(within, -leaves, index))
+}
+
+#[test]
+fn rays_leave_a_ball_where_they_do() {
+    let size = [48, 36];
+    let view = camera(DVec3::new(0.0, 0.0, 4.0), size);
+    let mut cloud = Cloud::new(DVec3::ZERO);
+    sphere(&mut cloud, Vec3::ZERO, 1.0, 20_000, 0.0);
+    let scene = clear(cloud, [1.5; 3], view);
+    let sky = |d: Vec3| [d.x, d.y, d.z];
+    let (_, seen) = scene.draw_glass(&WHOLE, &in_sky(Bending::Traced, &sky), &[]);
+    let (mut met, mut worst) = (0, 0.0f64);
+    for (k, behind) in seen.behind.iter().enumerate() {
+        let (_, along) = view.view_ray((k % 48) as f64 + 0.5, (k / 48) as f64 + 0.5);
+        let miss = (DVec3::Z * -4.0).cross(along.normalize()).length();
+        let Some(expected) = through_a_ball(DVec3::Z * -4.0, along, 1.5) else { continue };
+        // Near the rim discs of the front and the back are one layer.
+        if miss > 0.9 || behind[0].is_nan() {
+            continue;
+        }
+        // A part is mirrored inside, by the angle within, and is told the sky there.
+        let share = fresnel(1.5, miss / 1.5);
+        let apart = DVec3::new(f64::from(behind[0]), f64::from(behind[1]), 0.0) - expected.with_z(0.0) * (1.0 - share);
+        worst = worst.max(apart.length() - share);
+        met += 1;
+    }
+    assert!(met > 250 && worst < 0.03, "{met} pixels, {worst}");
 }

@@ -1,9 +1,20 @@
 //! Discs whose pictures are known.
 
-use deferred_blend::{BlendInput, DiscInput, Discs, Glass, Params, blend};
+use deferred_blend::{Bending, BlendInput, DiscInput, Discs, Glass, Params, Surfaces, blend};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::GlassImage;
-use splat_core::{Accumulator, Camera, Cloud, FootprintStack, Material, Projection, Splat, SplatKind, optics, rng};
+use splat_core::shade::ChannelLayout;
+use splat_core::{
+    Accumulator, Camera, Cloud, FootprintStack, LayerSet, Material, Projection, Splat, SplatKind, optics, rng,
+};
+
+/// How glass is drawn.
+pub(crate) struct Asked<'a> {
+    pub(crate) bending: Bending,
+    pub(crate) sky: &'a (dyn Fn(Vec3) -> [f32; 3] + Sync),
+    pub(crate) straight: bool,
+    pub(crate) unit: f32,
+}
 
 /// Discs and what they are seen by.
 pub(crate) struct Scene {
@@ -21,7 +32,7 @@ impl Scene {
     pub(crate) fn new(cloud: Cloud, camera: Camera) -> Self {
         cloud.validate().expect("a cloud that keeps its promises");
         let values = cloud.color.iter().flatten().copied().collect();
-        let ids = (0..cloud.len() as u32).collect();
+        let ids = (0..cloud.len() as u32).filter(|i| cloud.kind[*i as usize] != SplatKind::Opaque).collect();
         let (footprints, materials) = (FootprintStack::default(), vec![Material::default()]);
         Self { cloud, camera, footprints, materials, values, ids }
     }
@@ -40,10 +51,15 @@ impl Scene {
     }
 
     /// The picture, with what was mirrored and bent.
-    pub(crate) fn draw_glass(&self, params: &Params, glass: Glass<'_>, opaque: &[f32]) -> (Accumulator, GlassImage) {
+    pub(crate) fn draw_glass(&self, params: &Params, glass: &Asked<'_>, opaque: &[f32]) -> (Accumulator, GlassImage) {
         let mut accumulator = Accumulator::new(self.camera.size, 3, 3, false, false);
         let discs = Discs::project(&self.input(), params);
-        let glass = Some(glass);
+        let is_met = |i: &u32| self.cloud.kind[*i as usize] != SplatKind::Opaque || !glass.straight;
+        let met: Vec<u32> = (0..self.cloud.len() as u32).filter(is_met).collect();
+        let layout = ChannelLayout::new(&LayerSet::default());
+        let surfaces = Surfaces::new(&DiscInput { ids: &met, ..self.input() }, &self.values, layout);
+        let Asked { bending, sky, straight, unit } = *glass;
+        let glass = Some(Glass { bending, sky, surfaces: &surfaces, straight, unit });
         let input = BlendInput { discs: &discs, values: &self.values, opaque, range: 0.0..f32::INFINITY, glass };
         let made = blend(&input, params, &mut accumulator, None).expect("nobody cancels");
         (accumulator, made.glass.expect("asked for"))

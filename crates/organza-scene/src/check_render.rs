@@ -141,7 +141,7 @@ fn check_surfels(at: &At<'_>, raw: &RawSurfels) -> Result<SurfelsSettings, Error
         gap: at.number("gap", raw.gap.unwrap_or(0.5), 1.0 / 1024.0..=4.0)?,
         transmittance_cutoff: check_cutoff(at, raw.transmittance_cutoff)?,
         bending: match raw.bending {
-            RawBending::EachLayer => Bending::EachLayer,
+            RawBending::Traced => Bending::Traced,
             RawBending::Power => Bending::Power,
             RawBending::Nearest => Bending::Nearest,
         },

@@ -42,8 +42,8 @@ pub(super) struct RawSurfels {
     pub(super) gap: Option<f64>,
     /// A pixel is finished when its transmittance is below this, from 0 to below 1; default 1/1024.
     pub(super) transmittance_cutoff: Option<f64>,
-    /// Where surfaces bend rays: at "each_layer", by the "power" of the index that layers are counted for, or at the "nearest"; default
-    /// "each_layer".
+    /// How rays are bent: "traced" from surface to surface, by the "power" of the index that layers are counted for, or at the
+    /// "nearest" layer; default "traced".
     pub(super) bending: RawBending,
     /// What is opaque is seen along "bent" rays, or "straight" on; default "bent".
     pub(super) behind: RawBehind,
@@ -55,7 +55,7 @@ pub(super) struct RawSurfels {
 #[schemars(rename = "Bending")]
 pub(super) enum RawBending {
     #[default]
-    EachLayer,
+    Traced,
     Power,
     Nearest,
 }

@@ -138,8 +138,8 @@ pub struct SurfelsSettings {
 /// Where surfaces bend rays (Zhang and Pajarola 2007, section 5.2.3).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bending {
-    /// At each layer, in and out by turns.
-    EachLayer,
+    /// At every surface that the bent ray meets.
+    Traced,
     /// At the nearest, by the power of the index that layers are counted for (Eqs. 15 and 16).
     Power,
     /// At the nearest, once.

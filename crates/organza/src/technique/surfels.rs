@@ -8,7 +8,7 @@ use crate::pass;
 use crate::scene::{self, SceneObject, Technique};
 use crate::technique::{Fold, Session, points};
 use crate::{CostRecord, Error, RenderOptions, stage};
-use deferred_blend::{Bending, BlendInput, Blended, DiscInput, Discs, Glass, Params, Solids, Surroundings, blend};
+use deferred_blend::{Bending, BlendInput, Blended, DiscInput, Discs, Glass, Params, Surfaces, blend};
 use splat_core::raster::GlassImage;
 use splat_core::{Accumulator, Direction, SplatKind, StageCost};
 use std::ops::Range;
@@ -24,13 +24,13 @@ pub(crate) fn bytes(matter: &Matter<'_>, _: &[LightPoint], _: bool, _: &RenderOp
     let discs = matter.cloud.map_or(0, |cloud| cloud.len() as u64);
     let bounds = matter.scene.materials.iter().any(|m| m.material.bounds_matter());
     let samples = matter.camera.size.iter().map(|s| u64::from(*s)).product::<u64>();
-    let glass = if bounds { Solids::bytes(discs) + GLASS_BYTES * samples } else { 0 };
+    let glass = if bounds { Surfaces::bytes(discs) + GLASS_BYTES * samples } else { 0 };
     DISC_BYTES * discs + glass
 }
 
 /// Begins a frame.
 pub(crate) fn begin<'a>(frame: &'a Frame<'a>) -> Box<dyn Fold + 'a> {
-    Box::new(Surfels { frame, discs: None, solids: None, glass: None })
+    Box::new(Surfels { frame, discs: None, surfaces: None, glass: None })
 }
 
 /// The discs of a frame that are the technique's own.
@@ -38,8 +38,8 @@ struct Surfels<'a> {
     frame: &'a Frame<'a>,
     /// Once they were projected.
     discs: Option<Discs>,
-    /// What is opaque, where bent rays may meet it.
-    solids: Option<Solids<'a>>,
+    /// What bent rays may meet.
+    surfaces: Option<Surfaces<'a>>,
     /// Light that was mirrored and bent so far.
     glass: Option<GlassImage>,
 }
@@ -60,14 +60,15 @@ impl<'a> Fold for Surfels<'a> {
         }
         let Shaded { values, .. } = frame.shaded(cost)?;
         let opaque = &frame.opaque(cost)?.depth;
-        let bounds = bounds_matter(frame);
-        if self.solids.is_none() && bounds && frame.settings.surfels.bent_behind {
-            self.solids = Some(cost.measure(pass::SURFELS, |stage| Ok::<_, Error>(solids(frame, values, stage)))?);
+        if self.surfaces.is_none() && bounds_matter(frame) {
+            let made = cost.measure(pass::SURFELS, |stage| Ok::<_, Error>(surfaces(frame, values, stage)))?;
+            self.surfaces = Some(made);
         }
         let discs = self.discs.as_ref().expect("invariant: discs were projected above");
         let background = frame.scene.background;
-        let surroundings = Surroundings { sky: &|_| background, solids: self.solids.as_ref() };
-        let glass = bounds.then(|| Glass { bending: bending(frame), surroundings, unit: unit(frame) });
+        let sky = |_| background;
+        let (bending, unit, straight) = (bending(frame), unit(frame), !frame.settings.surfels.bent_behind);
+        let glass = self.surfaces.as_ref().map(|surfaces| Glass { bending, sky: &sky, surfaces, straight, unit });
         frame.progress.begin(stage::SURFELS);
         frame.tick()?;
         let image = cost.measure(pass::SURFELS, |stage| {
@@ -117,18 +118,29 @@ fn unit(frame: &Frame<'_>) -> f32 {
 
 fn bending(frame: &Frame<'_>) -> Bending {
     match frame.settings.surfels.bending {
-        scene::Bending::EachLayer => Bending::EachLayer,
+        scene::Bending::Traced => Bending::Traced,
         scene::Bending::Power => Bending::Power,
         scene::Bending::Nearest => Bending::Nearest,
     }
 }
 
-/// Opaque surfaces, where rays from anywhere can meet them.
-fn solids<'a>(frame: &'a Frame<'a>, values: &'a [f32], stage: &mut StageCost) -> Solids<'a> {
-    let cloud = frame.drawn();
-    let ids: Vec<u32> = (0..cloud.len() as u32).filter(|i| cloud.kind[*i as usize] == SplatKind::Opaque).collect();
-    stage.bytes = Solids::bytes(ids.len() as u64);
-    Solids::new(&disc_input(frame, &ids), values, frame.layout())
+/// Opaque surfaces, and those that bound matter where rays are followed: rays from anywhere can meet them.
+fn surfaces<'a>(frame: &'a Frame<'a>, values: &'a [f32], stage: &mut StageCost) -> Surfaces<'a> {
+    let (cloud, settings) = (frame.drawn(), &frame.settings.surfels);
+    let follows = settings.bending == scene::Bending::Traced;
+    let is_met = |&i: &u32| {
+        let (i, bounds) = (i as usize, |m: u16| frame.loaded.materials[m as usize].bounds_matter());
+        match cloud.kind[i] {
+            SplatKind::Opaque => settings.bent_behind,
+            SplatKind::Surface => {
+                follows && bounds(cloud.material[i]) && frame.plan.by[cloud.object[i] as usize] == Technique::Surfels
+            }
+            SplatKind::Medium => false,
+        }
+    };
+    let ids: Vec<u32> = (0..cloud.len() as u32).filter(is_met).collect();
+    stage.bytes = Surfaces::bytes(ids.len() as u64);
+    Surfaces::new(&disc_input(frame, &ids), values, frame.layout())
 }
 
 /// Some discs of what is drawn.

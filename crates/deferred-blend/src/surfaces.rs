@@ -1,0 +1,221 @@
+//! Discs as rays meet them that were bent or mirrored, and so come from elsewhere than the eye.
+
+use crate::DiscInput;
+use crate::disc::{Look, axes, into_view, look};
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::{Bvh2, builder::build_bvh2};
+use obvhs::ray::{Ray, RayHit};
+use rayon::prelude::*;
+use splat_core::glam::Vec3;
+use splat_core::shade::ChannelLayout;
+use splat_core::{Footprint, FootprintStack, Material, SplatKind};
+use std::time::Duration;
+
+/// Radius within which a disc is blended, over its cut-off radius: as little as leaves it smooth, for rays test all discs that they come
+/// near to.
+const DISC_SCALE: f32 = 0.6;
+
+/// ρ²/R² within which a disc is solid, R the radius within which it is blended.
+const CORE: f32 = (Footprint::CORE / DISC_SCALE) * (Footprint::CORE / DISC_SCALE);
+
+/// How near to the nearest disc others belong to the same surface, in radii across their planes.
+const SAME: f32 = 0.5;
+
+/// |cosine| below which planes count as if they were met at it.
+const LEAST_FACING: f32 = 0.25;
+
+/// Weight of an opaque disc that faces away: behind a silhouette it is lit on the inside.
+const FACES_AWAY: f32 = 1.0 / 256.0;
+
+/// Discs of a view, in the space of its camera: x right, y up, z along the view, the eye at the origin.
+pub struct Surfaces<'a> {
+    bvh: Option<Bvh2>,
+    discs: Vec<Surface>,
+    footprints: FootprintStack,
+    materials: Vec<Material>,
+    values: &'a [f32],
+    layout: ChannelLayout,
+    /// Largest radius by object.
+    largest: Vec<f32>,
+}
+
+/// One disc.
+#[derive(Debug, Clone, Copy)]
+struct Surface {
+    center: Vec3,
+    normal: Vec3,
+    /// What light is bent about.
+    shading_normal: Vec3,
+    /// Semi-axes over their squared lengths.
+    dual: [Vec3; 2],
+    radius: f32,
+    id: u32,
+    is_opaque: bool,
+    look: Look,
+}
+
+/// Where a ray meets a disc's plane.
+struct Hit {
+    along: f32,
+    distance_sq: f32,
+    /// Cosine of the angle to the normal; above 0 where it faces away.
+    cosine: f32,
+}
+
+/// What a ray may meet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Wanted {
+    /// Opaque surfaces alone.
+    Opaque,
+    /// All, but not the layer that the ray leaves, which is of this object.
+    AllBut(u32),
+}
+
+/// A layer of a surface that a ray meets: its discs averaged by weight, as Eq. 1.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Met<'a> {
+    /// Along the ray.
+    pub(crate) distance: f32,
+    pub(crate) object: u32,
+    pub(crate) is_opaque: bool,
+    pub(crate) material: &'a Material,
+    /// Unit length; it may point to either side.
+    pub(crate) normal: Vec3,
+    /// By channel.
+    pub(crate) opacity: [f32; 3],
+    /// All effects of its colours times its opacity.
+    pub(crate) radiance: [f32; 3],
+}
+
+impl<'a> Surfaces<'a> {
+    /// Of the discs `input.ids`; `values` are by place in the cloud, as `layout` says.
+    pub fn new(input: &DiscInput<'_>, values: &'a [f32], layout: ChannelLayout) -> Self {
+        let (rotation, shift) = into_view(input);
+        let surface = |&id: &u32| {
+            let (cloud, i) = (input.cloud, id as usize);
+            let [a, b] = axes(cloud, i, f64::from(DISC_SCALE)).map(|a| rotation * a);
+            let center = (rotation * (cloud.position[i].as_dvec3() + shift)).as_vec3();
+            let reach = Vec3::from((a * a + b * b).to_array().map(|s| s.sqrt() as f32));
+            let surface = Surface {
+                center,
+                normal: (rotation * cloud.normal_of(i).as_dvec3()).as_vec3(),
+                shading_normal: (rotation * cloud.shading_normal_of(i).as_dvec3()).as_vec3(),
+                dual: [a, b].map(|a| (a / a.length_squared()).as_vec3()),
+                radius: DISC_SCALE * cloud.radius[i],
+                id,
+                is_opaque: cloud.kind[i] == SplatKind::Opaque,
+                look: look(input, i),
+            };
+            (surface, Aabb::new((center - reach).into(), (center + reach).into()))
+        };
+        let (discs, boxes): (Vec<Surface>, Vec<Aabb>) = input.ids.par_iter().map(surface).unzip();
+        let params = BvhBuildParams { max_prims_per_leaf: 4, ..BvhBuildParams::medium_build() };
+        let bvh = (!boxes.is_empty()).then(|| build_bvh2(&boxes, params, &mut Duration::default()));
+        let objects = discs.iter().map(|d| d.look.object as usize + 1).max().unwrap_or(0);
+        let mut largest = vec![0.0f32; objects];
+        for disc in &discs {
+            let most = &mut largest[disc.look.object as usize];
+            *most = most.max(disc.radius);
+        }
+        let (footprints, materials) = (input.footprints.clone(), input.materials.to_vec());
+        Self { bvh, discs, footprints, materials, values, layout, largest }
+    }
+
+    /// Bytes that discs and their hierarchy take.
+    pub const fn bytes(discs: u64) -> u64 {
+        // A binary tree of boxes has twice as many nodes as leaves.
+        discs * (size_of::<Surface>() + size_of::<Aabb>() + 2 * 32 + 4) as u64
+    }
+
+    /// Whether an index differs by channel.
+    pub(crate) fn disperses(&self) -> bool {
+        self.materials.iter().any(|m| m.index != [m.index[0]; 3])
+    }
+
+    /// The nearest layer from a place along a unit vector; `None` where there is none.
+    pub(crate) fn nearest(&self, from: Vec3, along: Vec3, wanted: Wanted) -> Option<Met<'_>> {
+        let bvh = self.bvh.as_ref()?;
+        let mut nearest: Option<(f32, usize)> = None;
+        bvh.ray_traverse(Ray::new(from.into(), along.into(), 0.0, f32::INFINITY), &mut RayHit::none(), |_, i| {
+            let k = bvh.primitive_indices[i] as usize;
+            let hit = self.discs[k].meet(from, along);
+            let nearer = nearest.is_none_or(|(t, of)| (hit.along, k) < (t, of));
+            if hit.along > 0.0 && hit.distance_sq < CORE && nearer && self.counts(k, &hit, wanted) {
+                nearest = Some((hit.along, k));
+            }
+            nearest.map_or(f32::INFINITY, |(t, _)| t)
+        });
+        nearest.map(|(t, k)| self.average(from, along, wanted, (t, k)))
+    }
+
+    fn counts(&self, k: usize, hit: &Hit, wanted: Wanted) -> bool {
+        let disc = &self.discs[k];
+        match wanted {
+            Wanted::Opaque => disc.is_opaque,
+            Wanted::AllBut(object) => {
+                disc.look.object != object || hit.along * hit.cosine.abs().max(LEAST_FACING) >= SAME * disc.radius
+            }
+        }
+    }
+
+    /// The layer that a disc belongs to, which a ray meets at some distance.
+    fn average(&self, from: Vec3, along: Vec3, wanted: Wanted, (nearest, first): (f32, usize)) -> Met<'_> {
+        let bvh = self.bvh.as_ref().expect("invariant: something was met");
+        let first = &self.discs[first];
+        let reach = SAME / LEAST_FACING * self.largest[first.look.object as usize];
+        let ray = Ray::new(from.into(), along.into(), (nearest - reach).max(0.0), nearest + reach);
+        let (mut weights, mut distance, mut normal) = (0.0, 0.0, Vec3::ZERO);
+        let (mut opacity, mut radiance) = ([0.0; 3], [0.0; 3]);
+        bvh.ray_traverse_anyhit(ray, |_, i| {
+            let k = bvh.primitive_indices[i] as usize;
+            let disc = &self.discs[k];
+            let hit = disc.meet(from, along);
+            let apart = (hit.along - nearest).abs() * hit.cosine.abs().max(LEAST_FACING);
+            let same = disc.look.object == first.look.object && disc.is_opaque == first.is_opaque;
+            if !(same && hit.along > 0.0 && hit.distance_sq < 1.0 && apart < SAME * disc.radius)
+                || !self.counts(k, &hit, wanted)
+            {
+                return;
+            }
+            let profile = self.footprints.layers()[disc.look.footprint as usize].profile(f64::from(hit.distance_sq));
+            let weight = profile as f32 * if disc.is_opaque && hit.cosine > 0.0 { FACES_AWAY } else { 1.0 };
+            let side = if disc.shading_normal.dot(first.shading_normal) < 0.0 { -weight } else { weight };
+            let own = self.color(disc.id as usize);
+            weights += weight;
+            distance += weight * (hit.along - nearest);
+            normal += side * disc.shading_normal;
+            for c in 0..3 {
+                let share = if disc.is_opaque { 1.0 } else { disc.look.opacity(c, hit.cosine.abs()) };
+                opacity[c] += weight * share;
+                radiance[c] += weight * share * own[c];
+            }
+        });
+        Met {
+            distance: nearest + distance / weights,
+            object: first.look.object,
+            is_opaque: first.is_opaque,
+            material: &self.materials[first.look.material as usize],
+            normal: normal.try_normalize().unwrap_or(first.shading_normal),
+            opacity: opacity.map(|sum| (sum / weights).min(1.0)),
+            radiance: radiance.map(|sum| sum / weights),
+        }
+    }
+
+    /// All effects of a splat.
+    fn color(&self, id: usize) -> [f32; 3] {
+        let own = &self.values[id * self.layout.count()..][..self.layout.colors()];
+        own.chunks_exact(3).fold([0.0; 3], |sum, effect| std::array::from_fn(|c| sum[c] + effect[c]))
+    }
+}
+
+impl Surface {
+    #[inline]
+    fn meet(&self, from: Vec3, along: Vec3) -> Hit {
+        let (to, cosine) = (self.center - from, self.normal.dot(along));
+        let t = self.normal.dot(to) / cosine;
+        let place = along * t - to;
+        let [u, v] = self.dual.map(|axis| place.dot(axis));
+        Hit { along: t, distance_sq: u * u + v * v, cosine }
+    }
+}
