@@ -3,17 +3,32 @@
 use super::OpaqueImage;
 use super::lanes::exp_neg;
 use crate::shade::{ChannelLayout, MAX_CHANNELS};
-use crate::{Accumulator, LayerData, LayerSet, Layers};
+use crate::{Accumulator, Camera, Environment, LayerData, LayerSet, Layers};
 use rayon::prelude::*;
 
 /// Pixel rows handled by one task.
 const BAND: u32 = 16;
 
 /// What is seen where nothing else is.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Background {
-    /// Linear Rec.709 radiance.
-    pub color: [f32; 3],
+#[derive(Debug, Clone, Copy)]
+pub enum Background<'a> {
+    /// The same radiance everywhere, linear Rec.709.
+    Color([f32; 3]),
+    /// An environment, by the camera whose pixels are the samples.
+    Environment(&'a Environment, &'a Camera),
+}
+
+impl Background<'_> {
+    /// Mean radiance behind sample (x, y), counted from the top left.
+    pub fn radiance(&self, x: u32, y: u32) -> [f32; 3] {
+        match self {
+            Self::Color(color) => *color,
+            Self::Environment(environment, camera) => {
+                let (direction, solid_angle) = camera.direction(f64::from(x) + 0.5, f64::from(y) + 0.5);
+                environment.radiance(direction, solid_angle)
+            }
+        }
+    }
 }
 
 /// One sample with everything behind it added.
@@ -33,7 +48,7 @@ pub struct FinishInput<'a> {
     /// Nearest opaque surfaces; may be empty.
     pub opaque: &'a OpaqueImage,
     /// What is seen where nothing else is.
-    pub background: &'a Background,
+    pub background: Background<'a>,
     /// What the accumulator's channels are.
     pub layout: &'a ChannelLayout,
     /// Layers to make.
@@ -59,8 +74,7 @@ pub fn finish(input: &FinishInput<'_>) -> Layers {
                 samples.clear();
                 for sy in y * antialias..(y + 1) * antialias {
                     for sx in x * antialias..(x + 1) * antialias {
-                        let at = sy as usize * accumulator.size[0] as usize + sx as usize;
-                        samples.push(sample(accumulator, opaque, background, at));
+                        samples.push(sample(accumulator, opaque, background, [sx, sy]));
                     }
                 }
                 out.pixel(k, &samples);
@@ -73,7 +87,8 @@ pub fn finish(input: &FinishInput<'_>) -> Layers {
     out.into_layers(size, layout, layers)
 }
 
-fn sample(acc: &Accumulator, opaque: &OpaqueImage, background: &Background, k: usize) -> Sample {
+fn sample(acc: &Accumulator, opaque: &OpaqueImage, background: Background<'_>, [x, y]: [u32; 2]) -> Sample {
+    let k = y as usize * acc.size[0] as usize + x as usize;
     let planes = acc.optical_depth.len();
     let transmittance: [f32; 3] =
         std::array::from_fn(|c| exp_neg(acc.optical_depth[if planes == 3 { c } else { 0 }][k]));
@@ -87,10 +102,12 @@ fn sample(acc: &Accumulator, opaque: &OpaqueImage, background: &Background, k: u
         }
     }
     let through = if solid.is_some() { [0.0; 3] } else { transmittance };
+    // What is hidden is not looked up.
+    let behind = if through == [0.0; 3] { [0.0; 3] } else { background.radiance(x, y) };
     let unseen = acc.object.get(k).is_none_or(|o| *o == u32::MAX);
     Sample {
         transmittance: through,
-        background: std::array::from_fn(|c| through[c] * background.color[c]),
+        background: std::array::from_fn(|c| through[c] * behind[c]),
         values,
         depth: acc.depth.get(k).map_or([f32::INFINITY; 4], |d| d.depths(acc.optical_depth[planes / 2][k], solid)),
         object: if unseen { opaque.object.get(k).copied().unwrap_or(u32::MAX) } else { acc.object[k] },
