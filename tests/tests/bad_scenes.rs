@@ -272,7 +272,11 @@ fn an_environment_stands_in_the_place_of_a_colour_and_inside_the_root_folder() {
     refused("[render]", &with("environment = \"\""), "expected a path");
     refused("[render]", "[ambient]\nenvironment = \"a.hdr\"\n[render]", "unknown key `environment`");
     let outside = with("environment = \"../../a.hdr\"");
-    let error = parse(Path::new("/r/scenes/s.toml"), SCENE.replacen("[render]", &outside, 1).as_bytes(), &LoadOptions::default());
+    let error = parse(
+        Path::new("/r/scenes/s.toml"),
+        SCENE.replacen("[render]", &outside, 1).as_bytes(),
+        &LoadOptions::default(),
+    );
     assert!(error.unwrap_err().to_string().contains("lies outside the scene's root folder /r"));
     let text = SCENE.replacen("[render]", &sky("rotate = -90\nscale = 2"), 1);
     let scene = try_toml(&text).unwrap();

@@ -40,7 +40,8 @@ fn db15_a_constant_map_is_that_colour_bit_for_bit_in_every_technique() {
     // 0.5, 0.25 and 1.25.
     std::fs::write(folder.path().join("constant.hdr"), hdr([16, 8], |_, _| [64, 32, 160, 129])).unwrap();
     for technique in TECHNIQUES {
-        let arguments = ["--technique", technique, "--layers", "effects,object", "--set", "render.particles.repeat_level=20"];
+        let arguments =
+            ["--technique", technique, "--layers", "effects,object", "--set", "render.particles.repeat_level=20"];
         let by = |background: &str| drawn(folder.path(), background, OBJECTS, &arguments);
         let (color, map) = (by("color = [0.5, 0.25, 1.25]"), by("environment = 'constant.hdr'\nrotate = 77"));
         assert_eq!(map, color, "{technique}");
@@ -56,7 +57,8 @@ fn varied(folder: &Path) -> RadianceImage {
     let size = [32, 16];
     let pixel = |x: u32, y: u32| [7 * x as u8 + 20, 15 * y as u8, if x % 5 == 0 { 250 } else { 90 }, 129];
     std::fs::write(folder.join("varied.hdr"), hdr(size, pixel)).unwrap();
-    let radiance = |k: u32| pixel(k % size[0], k / size[0])[..3].iter().map(|m| f32::from(*m) / 128.0).collect::<Vec<_>>();
+    let radiance =
+        |k: u32| pixel(k % size[0], k / size[0])[..3].iter().map(|m| f32::from(*m) / 128.0).collect::<Vec<_>>();
     let pixels = (0..size[0] * size[1]).map(|k| radiance(k).try_into().unwrap()).collect();
     RadianceImage { size, pixels }
 }
@@ -86,7 +88,8 @@ fn each_pixel_sees_its_own_direction_with_its_footprint() {
 fn db15_whole_turns_give_the_same_bits_and_the_seam_is_not_seen() {
     let folder = tempfile::tempdir().unwrap();
     varied(folder.path());
-    let by = |rotate: f64| drawn(folder.path(), &format!("environment = 'varied.hdr'\nrotate = {rotate:?}"), OBJECTS, &[]);
+    let by =
+        |rotate: f64| drawn(folder.path(), &format!("environment = 'varied.hdr'\nrotate = {rotate:?}"), OBJECTS, &[]);
     assert_eq!(by(360.0), by(0.0));
     assert_eq!(by(-11.25), by(348.75));
     assert_ne!(by(11.25), by(0.0));

@@ -22,10 +22,10 @@ mod nifti;
 mod nrrd;
 #[cfg(feature = "obj")]
 mod obj;
-#[cfg(any(feature = "ply", feature = "stl", feature = "obj", feature = "xyz"))]
-mod origin;
 #[cfg(feature = "exr")]
 mod openexr;
+#[cfg(any(feature = "ply", feature = "stl", feature = "obj", feature = "xyz"))]
+mod origin;
 #[cfg(feature = "ply")]
 mod ply;
 #[cfg(any(feature = "ply", feature = "obj"))]

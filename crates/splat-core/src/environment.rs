@@ -38,7 +38,13 @@ impl RadianceImage {
     pub fn validate(&self) -> Result<(), Error> {
         let [width, height] = self.size.map(|s| s as usize);
         if self.pixels.is_empty() || width.checked_mul(height) != Some(self.pixels.len()) {
-            return Err(Error::invalid("image", 0, "size", self.size, "as many pixels as width times height, at least 1"));
+            return Err(Error::invalid(
+                "image",
+                0,
+                "size",
+                self.size,
+                "as many pixels as width times height, at least 1",
+            ));
         }
         let is_bad = |p: &[f32; 3]| !p.iter().all(|v| v.is_finite() && *v >= 0.0);
         match self.pixels.iter().position(is_bad) {
@@ -88,7 +94,13 @@ impl Environment {
         let brightest = image.pixels.iter().flatten().fold(0.0f32, |most, v| most.max(*v));
         let is_finite = scale >= 0.0 && ((f64::from(brightest) * scale) as f32).is_finite();
         if !(scale.is_finite() && is_finite) {
-            return Err(Error::invalid("environment", 0, "scale", scale, "a number ≥ 0 that leaves every pixel finite"));
+            return Err(Error::invalid(
+                "environment",
+                0,
+                "scale",
+                scale,
+                "a number ≥ 0 that leaves every pixel finite",
+            ));
         }
         let [width, height] = image.size.map(|s| s as usize);
         let texels = turns.rem_euclid(1.0) * width as f64;

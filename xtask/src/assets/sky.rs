@@ -4,7 +4,7 @@
 //! that fades into the haze of the horizon. It imitates no measured sky.
 
 /// Width and height, pixels.
-const SIZE: [usize; 2] = [192, 96];
+const SIZE: [usize; 2] = [256, 128];
 /// Towards the sun, a unit vector.
 const SUN: [f64; 3] = [0.48, 0.6, 0.64];
 /// Cosine of the angle that the sun's disc fills, 2 degrees, and its radiance.

@@ -1,9 +1,9 @@
 //! OpenEXR (`.exr`): the first part with channels R, G and B, in 16 or 32 bits, by scanlines or tiles; of images of several
 //! resolutions the largest.
 
+use super::check_image;
 use super::input::{check_packed, reserve};
 use super::reading::Reading;
-use super::check_image;
 use crate::error::{Place, ReadError, escaped};
 use ::exr::math::Vec2;
 use ::exr::meta::MetaData;
@@ -42,14 +42,18 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Radiance
         .map_err(damaged)?;
     let (width, pixels) = image.layer_data.channel_data.pixels;
     if [width, pixels.len()] != [size[0] as usize, size[0] as usize * size[1] as usize] {
-        return Err(refused(format!("{} x {} pixels", size[0], size[1]), format!("{} in rows of {width}", pixels.len())));
+        return Err(refused(
+            format!("{} x {} pixels", size[0], size[1]),
+            format!("{} in rows of {width}", pixels.len()),
+        ));
     }
     let image = RadianceImage { size, pixels };
     check_radiance(&image)?;
     Ok(image)
 }
 
-const DAMAGED: &str = "the file is truncated or damaged, or written in another way; save it anew, by scanlines, as ZIP or uncompressed";
+const DAMAGED: &str =
+    "the file is truncated or damaged, or written in another way; save it anew, by scanlines, as ZIP or uncompressed";
 
 fn refused(expected: impl Into<String>, found: impl Into<String>) -> ReadError {
     ReadError::input(Place::File, expected, found, DAMAGED)
@@ -61,17 +65,21 @@ fn damaged(error: ::exr::error::Error) -> ReadError {
 
 /// The first part that is an image of colours.
 fn first_in_color(meta: &MetaData) -> Result<&Header, ReadError> {
+    if meta.requirements.has_deep_data || meta.headers.iter().any(|h| h.deep) {
+        return Err(ReadError::input(Place::File, "one colour a pixel", "a deep image", "flatten it first"));
+    }
     let names = |h: &Header| -> Vec<String> { h.channels.list.iter().map(|c| c.name.to_string()).collect() };
     let in_color = |h: &&Header| CHANNELS.iter().all(|c| names(h).iter().any(|n| n == c));
     let Some(header) = meta.headers.iter().find(in_color) else {
         let all: Vec<String> = meta.headers.iter().flat_map(names).collect();
         let found = format!("'{}'", escaped(all.join(" ").as_bytes(), 60));
-        return Err(ReadError::input(Place::File, "channels R, G and B", found, "save it as RGB, without names of layers"));
+        return Err(ReadError::input(
+            Place::File,
+            "channels R, G and B",
+            found,
+            "save it as RGB, without names of layers",
+        ));
     };
-    if header.deep || meta.headers.iter().any(|h| h.deep) {
-        let hint = "flatten it first";
-        return Err(ReadError::input(Place::File, "one colour a pixel", "a deep image", hint));
-    }
     Ok(header)
 }
 

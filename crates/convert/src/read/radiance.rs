@@ -39,7 +39,12 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Radiance
             if !radiance.iter().all(|v| v.is_finite()) {
                 let found = format!("{radiance:?} at pixel ({x}, {y}), of the scanline that begins here");
                 let hint = "its exposure or exponents are wrong; write the image anew";
-                return Err(ReadError::input(Place::Byte(begin as u64), "radiance that fits 32-bit floats", found, hint));
+                return Err(ReadError::input(
+                    Place::Byte(begin as u64),
+                    "radiance that fits 32-bit floats",
+                    found,
+                    hint,
+                ));
             }
             pixels.push(radiance);
         }
@@ -71,7 +76,12 @@ fn header(content: &[u8], reading: &mut Reading<'_>) -> Result<Header, ReadError
         let rest = &content[at..];
         let Some(length) = rest.iter().position(|b| *b == b'\n') else {
             let expected = "a header, an empty line and a line of the size";
-            return Err(ReadError::input(Place::Byte(content.len() as u64), expected, "the end of the file", TRUNCATED));
+            return Err(ReadError::input(
+                Place::Byte(content.len() as u64),
+                expected,
+                "the end of the file",
+                TRUNCATED,
+            ));
         };
         at += length + 1;
         line += 1;
@@ -91,7 +101,8 @@ fn header(content: &[u8], reading: &mut Reading<'_>) -> Result<Header, ReadError
 /// A line `NAME=VALUE` of the header; comments and commands have no part in the picture.
 fn statement(text: &[u8], line: u64, exposure: &mut [f64; 3], reading: &mut Reading<'_>) -> Result<(), ReadError> {
     let place = Place::Line { line, column: 0 };
-    let refused = |expected: &str, hint| Err(ReadError::input(place, expected, format!("'{}'", escaped(text, 60)), hint));
+    let refused =
+        |expected: &str, hint| Err(ReadError::input(place, expected, format!("'{}'", escaped(text, 60)), hint));
     let Some(split) = text.iter().position(|b| *b == b'=').filter(|_| text[0] != b'#') else { return Ok(()) };
     let (name, value) = (text[..split].trim_ascii(), String::from_utf8_lossy(&text[split + 1..]));
     let numbers: Vec<f64> = value.split_ascii_whitespace().map_while(|word| word.parse().ok()).collect();
@@ -101,7 +112,9 @@ fn statement(text: &[u8], line: u64, exposure: &mut [f64; 3], reading: &mut Read
             return refused("FORMAT=32-bit_rle_rgbe", "convert it to RGB, by pvalue or ra_xyze -r for instance");
         }
         b"EXPOSURE" if !are_factors(1) => return refused("EXPOSURE= and a number above 0", "correct the header"),
-        b"COLORCORR" if !are_factors(3) => return refused("COLORCORR= and three numbers above 0", "correct the header"),
+        b"COLORCORR" if !are_factors(3) => {
+            return refused("COLORCORR= and three numbers above 0", "correct the header");
+        }
         b"EXPOSURE" => exposure.iter_mut().for_each(|e| *e *= numbers[0]),
         b"COLORCORR" => exposure.iter_mut().zip(&numbers).for_each(|(e, n)| *e *= n),
         // Colours are taken as linear Rec.709, whose primaries nearly all files have.
@@ -192,7 +205,8 @@ impl Scanlines<'_> {
                 // Wider images than 2^24 pixels are not read.
                 let run = usize::from(pixel[3]) << shift;
                 if x == 0 || shift > 16 || x + run > row.len() {
-                    let expected = if x == 0 { "a first pixel".to_owned() } else { format!("at most {} pixels", row.len() - x) };
+                    let expected =
+                        if x == 0 { "a first pixel".to_owned() } else { format!("at most {} pixels", row.len() - x) };
                     return Err(self.fault(4, expected, format!("a run of {run}")));
                 }
                 shift += 8;

@@ -18,7 +18,8 @@ fn rows() -> impl Iterator<Item = Vec<[u8; 4]>> {
 /// A Radiance HDR file with these lines in its header.
 pub(crate) fn hdr_of(lines: &str, scanlines: &[u8]) -> Vec<u8> {
     let [width, height] = SIZE;
-    let mut out = format!("#?RADIANCE\n# a test\n{lines}FORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n").into_bytes();
+    let mut out =
+        format!("#?RADIANCE\n# a test\n{lines}FORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n").into_bytes();
     out.extend(scanlines);
     out
 }

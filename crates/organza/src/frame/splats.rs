@@ -3,9 +3,7 @@
 use super::Frame;
 use crate::pass;
 use crate::{CostRecord, Error, stage};
-use splat_core::raster::{
-    self, Detail, FinishInput, OpaqueImage, OpaqueInput, ProjectInput, Projected, RasterCounts,
-};
+use splat_core::raster::{self, Detail, FinishInput, OpaqueImage, OpaqueInput, ProjectInput, Projected, RasterCounts};
 use splat_core::shade::shade;
 use splat_core::{Accumulator, Cloud, Layers, SplatKind, StageCost};
 

@@ -18,7 +18,8 @@ impl Loading<'_> {
         let file = crate::printable(&source.path);
         let (needed, limit) = (image.bytes() + Environment::bytes_of(image.size), self.options.max_memory);
         if needed > limit {
-            let (what, hint) = (format!("{file} as an environment").into(), "use a smaller image, or a larger --max-memory");
+            let (what, hint) =
+                (format!("{file} as an environment").into(), "use a smaller image, or a larger --max-memory");
             return Err(Error::Limit(Exceeded { what, needed, limit: Some(limit), unit: "bytes", hint: hint.into() }));
         }
         let made = Environment::new(&image, source.turns, source.scale);

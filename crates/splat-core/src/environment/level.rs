@@ -77,7 +77,8 @@ impl Level {
                 let polar = PI * y as f64 / height as f64;
                 libm::sin(polar) - polar * libm::cos(polar)
             };
-            let (sine, cosine) = libm::sincos(0.5 * (PI * (y as f64 + 0.5) / height as f64 + (moment(y + 1) - moment(y)) / weight));
+            let (sine, cosine) =
+                libm::sincos(0.5 * (PI * (y as f64 + 0.5) / height as f64 + (moment(y + 1) - moment(y)) / weight));
             Row { sine, cosine, weight }
         };
         let column = |j: usize| {

@@ -76,10 +76,14 @@ fn look_ups_in_the_finest_image_are_their_definition() {
         let texel = (PI / f64::from(size[1])).max(2.0 * PI / f64::from(size[0]));
         for d in directions(300).chain([DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z]) {
             for share in [0.0, 0.25, 0.5] {
-                let (found, exact) = (sky.radiance(d, share * texel * texel), by_definition(&image, d, share * texel * texel));
+                let (found, exact) =
+                    (sky.radiance(d, share * texel * texel), by_definition(&image, d, share * texel * texel));
                 for c in 0..3 {
                     // The rounding of f32.
-                    assert!((f64::from(found[c]) - exact[c]).abs() <= 1e-7 * exact[c], "{size:?} {d}: {found:?} {exact:?}");
+                    assert!(
+                        (f64::from(found[c]) - exact[c]).abs() <= 1e-7 * exact[c],
+                        "{size:?} {d}: {found:?} {exact:?}"
+                    );
                 }
             }
         }
@@ -176,7 +180,8 @@ fn turns_by_whole_texels_are_exact_and_a_whole_turn_is_none() {
     for turns in [0.25, 0.25 + 0.013, 0.777] {
         let turned = Environment::new(&image, turns, 1.0).unwrap();
         for (turn, polar) in [(0.11, 0.9), (0.74, 2.0)] {
-            let [a, b] = [turned.radiance(direction(turn - turns, polar), 0.1), still.radiance(direction(turn, polar), 0.1)];
+            let [a, b] =
+                [turned.radiance(direction(turn - turns, polar), 0.1), still.radiance(direction(turn, polar), 0.1)];
             assert!((0..3).all(|c| (a[c] / b[c] - 1.0).abs() < 0.05), "{turns}: {a:?} {b:?}");
         }
     }
@@ -193,7 +198,8 @@ fn image_with_one_bright_texel() -> RadianceImage {
 #[test]
 fn what_is_no_radiance_is_refused() {
     let good = noise([4, 2]);
-    let refused = |image: &RadianceImage, turns: f64, scale: f64| Environment::new(image, turns, scale).unwrap_err().to_string();
+    let refused =
+        |image: &RadianceImage, turns: f64, scale: f64| Environment::new(image, turns, scale).unwrap_err().to_string();
     for value in [f32::NAN, f32::INFINITY, -1e-30] {
         let mut image = good.clone();
         image.pixels[5][1] = value;
