@@ -262,12 +262,12 @@ fn effects_of_later_versions_are_refused_by_name() {
 fn an_environment_stands_in_the_place_of_a_colour_and_inside_the_root_folder() {
     let with = |keys: &str| format!("[background]\n{keys}\n[render]");
     let both = with("environment = \"a.hdr\"\ncolor = [1, 1, 1]");
-    refused("[render]", &both, "21:1: expected one of `color` and `environment`, found both");
+    refused("[render]", &both, "21:15: expected one of `color` and `environment`, found both");
     for key in ["rotate", "scale"] {
-        refused("[render]", &with(&format!("{key} = 1")), &format!("21:1: `{key}` belongs to an `environment`"));
+        refused("[render]", &with(&format!("{key} = 1")), &format!(": `{key}` belongs to an `environment`"));
     }
     let sky = |key: &str| with(&format!("environment = \"a.hdr\"\n{key}"));
-    refused("[render]", &sky("scale = -1"), "22:1: `scale`: expected a number from 0 to 1e18, found -1");
+    refused("[render]", &sky("scale = -1"), "22:9: `scale`: expected a number from 0 to 1e18, found -1");
     refused("[render]", &sky("rotate = nan"), "`rotate`: expected a number");
     refused("[render]", &with("environment = \"\""), "expected a path");
     refused("[render]", "[ambient]\nenvironment = \"a.hdr\"\n[render]", "unknown key `environment`");

@@ -115,11 +115,11 @@ pub(crate) fn read<'a>(
     let loading = Loading { scene, options, progress, files };
     let (prepared, environment) = cost.measure(pass::READ, |stage| {
         let prepared = loading.prepare(looks)?;
-        let environment = loading.environment()?;
+        let (environment, of_environment) = loading.environment()?.unzip();
         stage.items_in = prepared.len() as u64;
         stage.items_out = stage.items_in;
         let of_objects: u64 = prepared.iter().map(|p| p.input.bytes()).sum();
-        stage.bytes = of_objects + environment.as_ref().map_or(0, Environment::bytes);
+        stage.bytes = of_objects + of_environment.unwrap_or(0);
         Ok::<_, Error>((prepared, environment))
     })?;
     let lights = lights(scene);

@@ -6,8 +6,8 @@ use crate::{Error, work};
 use splat_core::{Environment, Exceeded};
 
 impl Loading<'_> {
-    /// The environment that the scene names, if it does.
-    pub(super) fn environment(&self) -> Result<Option<Environment>, Error> {
+    /// The environment that the scene names, if it does, and the bytes of it and of its image.
+    pub(super) fn environment(&self) -> Result<Option<(Environment, u64)>, Error> {
         let Some(source) = &self.scene.environment else { return Ok(None) };
         self.progress.begin(&work::reading_file(&source.path));
         let data = self.files.read(&source.path, &self.options.read_params(), self.progress)?;
@@ -23,6 +23,7 @@ impl Loading<'_> {
             return Err(Error::Limit(Exceeded { what, needed, limit: Some(limit), unit: "bytes", hint: hint.into() }));
         }
         let made = Environment::new(&image, source.turns, source.scale);
-        made.map(Some).map_err(|e| Error::input(file, e.to_string(), "use a smaller background.scale"))
+        made.map(|made| Some((made, needed)))
+            .map_err(|e| Error::input(file, e.to_string(), "use a smaller background.scale"))
     }
 }
