@@ -86,6 +86,13 @@ pub fn picture_of(image: &Path) -> Picture {
     }
 }
 
+/// A Radiance HDR image of these mantissas and exponents, by column and row.
+pub fn hdr(size: [u32; 2], pixel: impl Fn(u32, u32) -> [u8; 4]) -> Vec<u8> {
+    let header = format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {} +X {}\n", size[1], size[0]);
+    let pixels = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (x, y)));
+    header.into_bytes().into_iter().chain(pixels.flat_map(|(x, y)| pixel(x, y))).collect()
+}
+
 /// Head of a scene seen by parallel rays along −z: `height` world units in `size` pixels squared.
 pub fn parallel_view(height: f64, size: u32) -> String {
     format!(

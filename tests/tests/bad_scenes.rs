@@ -266,8 +266,30 @@ fn what_bounds_matter_is_checked() {
 }
 
 #[test]
-fn effects_of_later_versions_are_refused_by_name() {
-    refused("[render]", "[background]\nenvironment = \"a.hdr\"\n[render]", "environment maps are not in this version");
+fn an_environment_stands_in_the_place_of_a_colour_and_inside_the_root_folder() {
+    let with = |keys: &str| format!("[background]\n{keys}\n[render]");
+    let both = with("environment = \"a.hdr\"\ncolor = [1, 1, 1]");
+    refused("[render]", &both, "21:15: expected one of `color` and `environment`, found both");
+    for key in ["rotate", "scale"] {
+        refused("[render]", &with(&format!("{key} = 1")), &format!(": `{key}` belongs to an `environment`"));
+    }
+    let sky = |key: &str| with(&format!("environment = \"a.hdr\"\n{key}"));
+    refused("[render]", &sky("scale = -1"), "22:9: `scale`: expected a number from 0 to 1e18, found -1");
+    refused("[render]", &sky("rotate = nan"), "`rotate`: expected a number");
+    refused("[render]", &with("environment = \"\""), "expected a path");
+    refused("[render]", "[ambient]\nenvironment = \"a.hdr\"\n[render]", "unknown key `environment`");
+    let outside = with("environment = \"../../a.hdr\"");
+    let error = parse(
+        Path::new("/r/scenes/s.toml"),
+        SCENE.replacen("[render]", &outside, 1).as_bytes(),
+        &LoadOptions::default(),
+    );
+    assert!(error.unwrap_err().to_string().contains("lies outside the scene's root folder /r"));
+    let text = SCENE.replacen("[render]", &sky("rotate = -90\nscale = 2"), 1);
+    let scene = try_toml(&text).unwrap();
+    let environment = scene.environment.as_ref().unwrap();
+    assert_eq!((environment.turns, environment.scale), (-0.25, 2.0));
+    assert_eq!(scene.files().last().unwrap(), Path::new("a.hdr"));
 }
 
 #[test]

@@ -8,6 +8,7 @@ mod borders;
 mod closed_forms;
 mod command;
 mod doubts;
+mod environment;
 mod every_key;
 #[cfg(target_os = "linux")]
 mod every_scene;

@@ -1,5 +1,7 @@
 //! `cargo xtask assets`: what lies under `assets/`, and where the larger inputs of the benchmarks come from.
 
+mod sky;
+
 use crate::repo::{Outcome, Repo};
 use crate::tidy::{MAX_BYTES, credit_of, in_assets};
 
@@ -31,6 +33,13 @@ pub(crate) fn run(repo: &Repo) -> Outcome {
         return Err(format!("assets break a rule (cargo xtask tidy names it)\n{said}"));
     }
     Ok(said)
+}
+
+/// Writes the environment that is made by formula.
+pub(crate) fn write_sky(repo: &Repo) -> Outcome {
+    let (path, bytes) = (repo.root.join("assets/environment/sky.hdr"), sky::hdr());
+    std::fs::write(&path, &bytes).map_err(|e| format!("{}: {e}", path.display()))?;
+    Ok(format!("{} bytes in {}", bytes.len(), path.display()))
 }
 
 #[cfg(test)]

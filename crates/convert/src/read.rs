@@ -1,5 +1,5 @@
-//! Reading files: meshes (PLY, STL, OBJ), point clouds (PLY, OBJ, XYZ, CSV, LAS, LAZ) and volumes (NIfTI, NRRD), each also
-//! inside gzip.
+//! Reading files: meshes (PLY, STL, OBJ), point clouds (PLY, OBJ, XYZ, CSV, LAS, LAZ), volumes (NIfTI, NRRD) and images of radiance
+//! (Radiance HDR, OpenEXR), each also inside gzip.
 //!
 //! No input makes a reader panic or take memory that the file does not stand for: sizes that a header announces are
 //! checked against the length of the file before anything is allocated.
@@ -22,12 +22,16 @@ mod nifti;
 mod nrrd;
 #[cfg(feature = "obj")]
 mod obj;
+#[cfg(feature = "exr")]
+mod openexr;
 #[cfg(any(feature = "ply", feature = "stl", feature = "obj", feature = "xyz"))]
 mod origin;
 #[cfg(feature = "ply")]
 mod ply;
 #[cfg(any(feature = "ply", feature = "obj"))]
 mod polygon;
+#[cfg(feature = "hdr")]
+mod radiance;
 mod reading;
 #[cfg(feature = "obj")]
 mod statements;
@@ -50,7 +54,7 @@ use crate::error::{Place, ReadError, escaped, escaped_path};
 use crate::raw_points::RawPoints;
 use input::Stream;
 use reading::Reading;
-use splat_core::{Grid, Limits, Mesh, Progress};
+use splat_core::{Grid, Limits, Mesh, Progress, RadianceImage};
 use std::path::Path;
 
 /// How much a file may ask for, and what happens to what is wrong in it.
@@ -82,6 +86,8 @@ pub enum Loaded {
     Points(RawPoints),
     /// A regular volume.
     Grid(Grid),
+    /// An image of radiance.
+    Image(RadianceImage),
 }
 
 /// Reads a regular file, and says what there is to say of it; its first bytes tell the format, its extension only words the
@@ -184,6 +190,10 @@ fn parse(
         Some(Format::Las) => las::read(stream.rest()?, params, &mut reading.notes).map(Loaded::Points),
         #[cfg(feature = "nifti")]
         Some(Format::Nifti) => nifti::read(stream, params).map(Loaded::Grid),
+        #[cfg(feature = "hdr")]
+        Some(Format::Hdr) => radiance::read(&stream.rest()?, reading).map(Loaded::Image),
+        #[cfg(feature = "exr")]
+        Some(Format::Exr) => openexr::read(&stream.rest()?, reading).map(Loaded::Image),
         #[allow(unreachable_patterns, reason = "reached where a reader is not compiled in")]
         Some(format) => Err(ReadError::input(
             Place::File,
@@ -193,11 +203,28 @@ fn parse(
         )),
         None => Err(ReadError::input(
             Place::Byte(0),
-            "'ply', 'LASF', 'NRRD', a NIfTI-1 header, or the extension of a format without a mark",
+            "'ply', 'LASF', 'NRRD', '#?', a NIfTI-1 or OpenEXR header, or the extension of a format without a mark",
             format!("'{}'", escaped(&head[..head.len().min(16)], 16)),
-            "PLY, STL, OBJ, XYZ, CSV, LAS, LAZ, NIfTI and NRRD files are read, each also inside gzip",
+            "PLY, STL, OBJ, XYZ, CSV, LAS, LAZ, NIfTI, NRRD, Radiance HDR and OpenEXR files are read, each also inside gzip",
         )),
     }
+}
+
+/// Longest side of an image, pixels.
+#[cfg(any(feature = "hdr", feature = "exr"))]
+const LONGEST_SIDE: u32 = 65536;
+
+/// Bytes of an image of a size that may be read.
+#[cfg(any(feature = "hdr", feature = "exr"))]
+fn check_image(size: [u32; 2], params: &ReadParams) -> Result<u64, ReadError> {
+    if !size.iter().all(|side| (1..=LONGEST_SIDE).contains(side)) {
+        let expected = format!("an image of 1 to {LONGEST_SIDE} pixels a side");
+        let found = format!("{} x {}", size[0], size[1]);
+        return Err(ReadError::input(Place::File, expected, found, "the header is damaged, or make the image smaller"));
+    }
+    let bytes = size.iter().map(|s| u64::from(*s)).product::<u64>() * size_of::<[f32; 3]>() as u64;
+    input::check_bytes("the image", bytes, params)?;
+    Ok(bytes)
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -209,6 +236,8 @@ enum Format {
     Nrrd,
     Las,
     Nifti,
+    Hdr,
+    Exr,
 }
 
 fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
@@ -221,6 +250,12 @@ fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
     }
     if content.starts_with(b"NRRD000") {
         return Some(Format::Nrrd);
+    }
+    if content.starts_with(b"#?") {
+        return Some(Format::Hdr);
+    }
+    if content.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+        return Some(Format::Exr);
     }
     if content.get(344..347).is_some_and(|magic| magic == b"n+1" || magic == b"ni1") {
         return Some(Format::Nifti);

@@ -10,6 +10,8 @@
     feature = "nrrd",
     feature = "nifti",
     feature = "las",
+    feature = "hdr",
+    feature = "exr",
     unix
 ))]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
@@ -17,8 +19,9 @@
 mod read_samples;
 
 use convert::read::Loaded;
+use exr::prelude::{Blocks, Compression, Vec2};
 use read_samples::oldest::laz_oldest;
-use read_samples::{NIFTI_F32, gzip, las, load, nifti, nrrd, obj, ply_ascii, ply_binary, stl, text_points};
+use read_samples::{NIFTI_F32, gzip, images, las, load, nifti, nrrd, obj, ply_ascii, ply_binary, stl, text_points};
 use std::process::Command;
 
 const LIMITED: &str = "CONVERT_TEST_LIMITED";
@@ -55,6 +58,7 @@ fn valid(loaded: &Loaded) {
         Loaded::Mesh(mesh) => mesh.validate().unwrap(),
         Loaded::Points(points) => points.validate().unwrap(),
         Loaded::Grid(grid) => grid.validate().unwrap(),
+        Loaded::Image(image) => image.validate().unwrap(),
         _ => panic!("unknown kind"),
     }
 }
@@ -77,6 +81,11 @@ fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("raw.nrrd", nrrd("raw")),
         ("gz.nrrd", nrrd("gzip")),
         ("packed.nrrd.gz", gzip(&nrrd("gzip"))),
+        ("newer.hdr", images::hdr_of("EXPOSURE=0.5\n", &images::newer())),
+        ("older.hdr", images::hdr_of("", &images::older())),
+        ("lines.exr", images::exr(Compression::ZIP16, Blocks::ScanLines)),
+        ("tiles.exr", images::exr(Compression::PIZ, Blocks::Tiles(Vec2(8, 4)))),
+        ("plain.exr", images::exr(Compression::Uncompressed, Blocks::ScanLines)),
     ]
 }
 

@@ -14,6 +14,8 @@ mod grid_fields;
 mod marching_cubes;
 mod mpu_fields;
 mod read_assets;
+#[cfg(all(feature = "hdr", feature = "exr"))]
+mod read_images;
 mod read_las;
 mod read_mended;
 mod read_more;

@@ -12,7 +12,7 @@ use object::Body;
 use organza::scene::Scene;
 use organza::{Error, Progress, RenderOptions};
 use reference::metrics::{Image, Linear, compare};
-use reference::{Environment, Liberty, PathRules, PathSettings, PixelSampling, path_trace};
+use reference::{Environment, LatLong, Liberty, PathRules, PathSettings, PixelSampling, path_trace};
 
 /// An unbiased estimate of what is seen, with its error.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,8 +59,8 @@ impl Truth {
     }
 }
 
-/// How often light is scattered or reflected on its way to the eye. Emission and ambient light, which the scene adds to what is
-/// seen, light nothing.
+/// How often light is scattered or reflected on its way to the eye. Emission, ambient light and an environment,
+/// which the scene adds to what is seen, light nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Orders {
     /// Once.
@@ -82,6 +82,7 @@ impl Orders {
             max_bounces: (self == Self::One).then_some(1),
             lights_visible: false,
             emission_illuminates: false,
+            environment_illuminates: false,
             reflects_apart: self == Self::ByMedia,
         }
     }
@@ -119,6 +120,7 @@ pub fn truth(
         let known = reference::LightSource::from_light(&light.light);
         lights.push(known.ok_or_else(|| Error::Internal(format!("the reference knows no light such as {light:?}")))?);
     }
+    let environment = environment(scene, options)?;
     let fault = |e: splat_core::Error| match e {
         splat_core::Error::Cancelled => Error::Cancelled,
         other => Error::Internal(other.to_string()),
@@ -128,8 +130,8 @@ pub fn truth(
         surfaces: bodies.iter().filter_map(Body::surface).collect(),
         lights,
         unshadowed: scene.lights.iter().map(|l| !l.shadow).collect(),
-        environment: Environment::default(),
-        background: Some(scene.background.map(f64::from)),
+        environment: environment.clone().unwrap_or_default(),
+        background: environment.is_none().then(|| scene.background.map(f64::from)),
     };
     if orders != Orders::One && gains(&traced).any(|gain| gain > 1.0) {
         return Ok(Err("colours above 1 scatter more light than arrives, which would go on for ever".into()));
@@ -154,6 +156,20 @@ pub fn truth(
         liberties(scene, &traced)
     );
     Ok(Ok(Truth { method, image, standard_error: estimate.radiance.standard_error, all_orders: None }))
+}
+
+/// The environment of the scene, if it has one.
+fn environment(scene: &Scene, options: &RenderOptions) -> Result<Option<Environment>, Error> {
+    let Some(source) = &scene.environment else { return Ok(None) };
+    let (data, _) = convert::read::file(&source.path, &options.read_params(), None)
+        .map_err(|e| Error::from_read(&source.path, &e))?;
+    let convert::read::Loaded::Image(image) = data else {
+        return Err(Error::wrong_kind(&source.path, "an image of radiance", "name a Radiance HDR or OpenEXR file"));
+    };
+    let pixels = image.pixels.iter().map(|p| p.map(|v| f64::from(v) * source.scale)).collect();
+    let made = LatLong::new(image.size.map(|s| s as usize), pixels).and_then(|sky| sky.turned(source.turns));
+    made.map(|sky| Some(Environment::Image(sky)))
+        .map_err(|e| Error::input(organza::printable(&source.path), e.to_string(), "use a smaller background.scale"))
 }
 
 fn all_liberties<'a>(traced: &'a reference::Scene<'_>) -> impl Iterator<Item = &'a Liberty> {

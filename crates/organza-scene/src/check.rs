@@ -1,12 +1,13 @@
 //! Raw tables → checked scene: what the whole file shares, and the tools of the other `check_…` files.
 
 use super::animation::check_animation;
+use super::check_background::check_background;
 use super::check_light::check_light;
 use super::check_material::{check_materials, unknown_material};
 use super::check_object::{Named, check_object};
 use super::check_render::{check_render, own_layers};
 use super::paths::Paths;
-use super::raw::{RawCamera, RawColor, RawScene};
+use super::raw::{RawCamera, RawScene};
 use super::tree::{Document, Step};
 use super::{Aligned, RenderSettings, Scene, SceneMaterial, SceneObject, Slicing, Technique};
 use crate::Error;
@@ -192,6 +193,7 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
             .key("aligned")
             .error(message, "set camera.orthographic, or \"view\""));
     }
+    let (background, environment) = check_background(&at.key("background"), &raw.background, &paths)?;
     let at_lights = at.key("light");
     let lights = raw.light.iter().enumerate().map(|(i, l)| check_light(&at_lights.index(i), l));
     Ok(Scene {
@@ -199,8 +201,9 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
         sha256,
         frames: raw.animation.as_ref().map(|a| check_animation(&at.key("animation"), a)).transpose()?,
         camera,
-        background: check_color(&at.key("background"), &raw.background)?,
-        ambient: check_color(&at.key("ambient"), &raw.ambient)?,
+        background,
+        environment,
+        ambient: at.key("ambient").color("color", raw.ambient.color)?,
         lights: lights.collect::<Result<_, _>>()?,
         objects,
         render,
@@ -334,14 +337,6 @@ fn check_footprints(at: &At<'_>, cutoffs: Option<Vec<f64>>) -> Result<FootprintS
     let layers = cutoffs.iter().map(|c| Footprint { cutoff: *c as f32 }).collect();
     let found = cutoffs.len();
     FootprintStack::new(layers).map_err(|_| at.error(format!("expected 1 to 256 footprints, found {found}"), ""))
-}
-
-fn check_color(at: &At<'_>, raw: &RawColor) -> Result<[f32; 3], Error> {
-    if raw.environment.is_some() {
-        let message = "environment maps are not in this version";
-        return Err(at.key("environment").error(message, "use `color`"));
-    }
-    at.color("color", raw.color)
 }
 
 fn check_camera(at: &At<'_>, raw: &RawCamera) -> Result<Camera, Error> {

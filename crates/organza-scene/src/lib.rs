@@ -12,6 +12,7 @@
 
 mod animation;
 mod check;
+mod check_background;
 mod check_field;
 mod check_light;
 mod check_material;
@@ -45,7 +46,7 @@ pub use error::Error;
 pub use layer_choice::{LAYER_NAMES, LayerChoice};
 pub use lights::SceneLight;
 pub use load::{LoadOptions, MAX_SCENE_BYTES, MAX_SCENE_DEPTH, load, parse, read, schema};
-pub use model::{Scene, SceneMaterial, SceneObject, Up};
+pub use model::{EnvironmentSource, Scene, SceneMaterial, SceneObject, Up};
 pub use overrides::Override;
 pub use settings::{
     Aligned, Bending, Classify, ParticlesSettings, PointsSettings, RenderSettings, Scattering, ShadowMapping,

@@ -17,8 +17,10 @@ pub struct Scene {
     pub frames: Option<u32>,
     /// The camera with the image size.
     pub camera: Camera,
-    /// Radiance behind everything, linear Rec.709.
+    /// Radiance behind everything, linear Rec.709; black where there is an environment.
     pub background: [f32; 3],
+    /// What is seen behind everything in the place of a colour.
+    pub environment: Option<EnvironmentSource>,
     /// Ambient radiance, the same from all directions.
     pub ambient: [f32; 3],
     /// Lights in file order.
@@ -37,8 +39,20 @@ impl Scene {
     /// Every file that the scene is made of, its own first.
     pub fn files(&self) -> Vec<PathBuf> {
         let data = self.objects.iter().filter_map(|o| o.source.path().map(Path::to_owned));
-        std::iter::once(self.file.clone()).chain(data).collect()
+        let environment = self.environment.iter().map(|environment| environment.path.clone());
+        std::iter::once(self.file.clone()).chain(data).chain(environment).collect()
     }
+}
+
+/// An environment: the file of its image, and how it is turned.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EnvironmentSource {
+    /// The file.
+    pub path: PathBuf,
+    /// Rotation about +Y, turns; right-handed.
+    pub turns: f64,
+    /// Factor on its radiance, ≥ 0.
+    pub scale: f64,
 }
 
 /// One object of the scene.

@@ -17,7 +17,7 @@ pub(super) struct RawScene {
     pub(super) version: u32,
     pub(super) camera: RawCamera,
     #[serde(default)]
-    pub(super) background: RawColor,
+    pub(super) background: RawBackground,
     /// Radiance that comes from all directions alike and is not shadowed.
     #[serde(default)]
     pub(super) ambient: RawColor,
@@ -118,7 +118,20 @@ fn up() -> [f64; 3] {
 pub(super) struct RawColor {
     /// Radiance per channel, each ≥ 0; default black.
     pub(super) color: [f64; 3],
-    /// Environment maps are not in this version.
-    #[schemars(skip)]
+}
+
+/// What lies behind everything: a colour or an environment.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default, expecting = "a table")]
+#[schemars(rename = "Background")]
+pub(super) struct RawBackground {
+    /// Radiance per channel, linear Rec.709, each ≥ 0; default black.
+    pub(super) color: Option<[f64; 3]>,
+    /// Path of a Radiance HDR or OpenEXR image of all directions by latitude and longitude, +Y up, its middle towards +Z; in the place
+    /// of `color`. It is seen and lights nothing.
     pub(super) environment: Option<String>,
+    /// Degrees by which the environment is turned about +Y; default 0.
+    pub(super) rotate: Option<f64>,
+    /// Factor on the environment's radiance, ≥ 0; default 1.
+    pub(super) scale: Option<f64>,
 }

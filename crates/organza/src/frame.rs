@@ -18,7 +18,7 @@ use crate::matter::Matter;
 use crate::plan::Plan;
 use crate::scene::{RenderSettings, Scene, Technique};
 use crate::{Error, Progress};
-use splat_core::raster::{self, OpaqueImage};
+use splat_core::raster::{self, Background, OpaqueImage};
 use splat_core::shade::ChannelLayout;
 use splat_core::{Accumulator, Camera, Cloud, LayerSet, SplatKind};
 use std::cell::OnceCell;
@@ -119,6 +119,14 @@ impl<'a> Frame<'a> {
     pub fn filter_reach_px(&self) -> f64 {
         let widest = self.loaded.footprints.layers().iter().map(|f| f.cutoff).fold(0.0, f32::max);
         f64::from(widest * self.raster_params().resampling_sigma_px)
+    }
+
+    /// What is seen behind everything.
+    pub fn background(&self) -> Background<'_> {
+        match &self.loaded.environment {
+            Some(environment) => Background::Environment(environment, &self.camera),
+            None => Background::Color(self.scene.background),
+        }
     }
 
     /// Ids of the translucent ones of some splats that a technique draws or samples, ascending; not those of objects that are

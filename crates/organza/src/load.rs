@@ -1,6 +1,7 @@
 //! The objects of a scene become one cloud in canonical order, with its tables.
 
 mod context;
+mod environment;
 pub(crate) mod files;
 pub(crate) mod input;
 mod loading;
@@ -19,7 +20,7 @@ use loading::Loading;
 use normalize::normalize;
 use object::Prepared;
 use own::Own;
-use splat_core::{Camera, Cloud, FootprintStack, Material, Object, Shading, SplatKind};
+use splat_core::{Camera, Cloud, Environment, FootprintStack, Material, Object, Shading, SplatKind};
 use std::cmp::Ordering;
 
 /// A scene in memory, normalized by a power of two (see [`Loaded::exponent`]) and ready for a technique.
@@ -41,6 +42,8 @@ pub struct Loaded {
     pub footprints: FootprintStack,
     /// The camera.
     pub camera: Camera,
+    /// What is seen behind everything in the place of a colour.
+    pub environment: Option<Environment>,
     /// Lights, whole, in an order that does not depend on the file's.
     pub lights: Vec<SceneLight>,
     /// Slice thickness asked for, in the scale of the cloud.
@@ -87,6 +90,7 @@ fn scaled_thickness(scene: &Scene, exponent: i32) -> Option<f64> {
 pub(crate) struct Inputs<'a> {
     loading: Loading<'a>,
     prepared: Vec<Prepared<'a>>,
+    environment: Option<Environment>,
     lights: Vec<SceneLight>,
     warnings: Vec<String>,
     /// What is known of each visible object, in the order of the scene.
@@ -109,16 +113,18 @@ pub(crate) fn read<'a>(
     cost: &mut CostRecord,
 ) -> Result<Inputs<'a>, Error> {
     let loading = Loading { scene, options, progress, files };
-    let prepared = cost.measure(pass::READ, |stage| {
+    let (prepared, environment) = cost.measure(pass::READ, |stage| {
         let prepared = loading.prepare(looks)?;
+        let (environment, of_environment) = loading.environment()?.unzip();
         stage.items_in = prepared.len() as u64;
         stage.items_out = stage.items_in;
-        stage.bytes = prepared.iter().map(|p| p.input.bytes()).sum();
-        Ok::<_, Error>(prepared)
+        let of_objects: u64 = prepared.iter().map(|p| p.input.bytes()).sum();
+        stage.bytes = of_objects + of_environment.unwrap_or(0);
+        Ok::<_, Error>((prepared, environment))
     })?;
     let lights = lights(scene);
     let statistics = loading.statistics(&prepared);
-    Ok(Inputs { loading, prepared, lights, warnings: files.mended(), statistics })
+    Ok(Inputs { loading, prepared, environment, lights, warnings: files.mended(), statistics })
 }
 
 impl Inputs<'_> {
@@ -136,7 +142,7 @@ impl Inputs<'_> {
         sets: f64,
         cost: &mut CostRecord,
     ) -> Result<Loaded, Error> {
-        let Self { loading, mut prepared, mut lights, mut warnings, statistics } = self;
+        let Self { loading, mut prepared, environment, mut lights, mut warnings, statistics } = self;
         let Loading { scene, progress, files, .. } = loading;
         let mut early = spare.map(|_| loading.own(&mut prepared, &planned, &mut warnings)).transpose()?;
         if let (Some(own), Some(spare)) = (&mut early, spare)
@@ -177,6 +183,7 @@ impl Inputs<'_> {
             objects: scene.objects.iter().map(object::entry).collect(),
             footprints: scene.footprints.clone(),
             camera,
+            environment,
             lights,
             slice_thickness: scaled_thickness(scene, exponent),
             normals: scene.objects.iter().any(|o| o.visible && context::needs_gradients(o, scene)),

@@ -7,7 +7,7 @@ use crate::scene::Scene;
 use glam::Vec3;
 use rayon::prelude::*;
 use splat_core::shade::ChannelLayout;
-use splat_core::{Camera, Cloud, DepthProfile, Exceeded, Grid};
+use splat_core::{Camera, Cloud, DepthProfile, Environment, Exceeded, Grid};
 
 /// Bytes that a point of a lattice that is made of an object is counted with.
 const BYTES_PER_LATTICE_POINT: u64 = 32;
@@ -21,6 +21,8 @@ pub(crate) struct Memory {
     pub(crate) splats: u64,
     /// Objects that particles are sampled from as they are.
     pub(crate) own: u64,
+    /// The environment.
+    pub(crate) environment: u64,
     /// Averaging sets of particles.
     pub(crate) average: u64,
     /// All shadow maps, the largest of them being built.
@@ -36,6 +38,7 @@ impl Memory {
             image: image_bytes(scene),
             splats: splat_bytes(loaded, &camera, layout(scene)),
             own: own_bytes(loaded),
+            environment: loaded.environment.as_ref().map_or(0, Environment::bytes),
             average,
             maps: 0,
         }
@@ -48,7 +51,8 @@ impl Memory {
 
     /// All of it.
     pub(crate) fn total(&self) -> u64 {
-        [self.splats, self.own, self.average, self.maps].into_iter().fold(self.image, u64::saturating_add)
+        let others = [self.splats, self.own, self.environment, self.average, self.maps];
+        others.into_iter().fold(self.image, u64::saturating_add)
     }
 }
 
@@ -67,8 +71,10 @@ pub(crate) fn image_bytes(scene: &Scene) -> u64 {
     let profile = if set.depth { size_of::<DepthProfile>() as u64 } else { 0 };
     // Up to three optical depths, and an object.
     let accumulated = channels + 4 * 3 + profile + 4;
+    // What lies behind, where particles are averaged until their error is small.
+    let behind = if scene.render.particles.target_error.is_some() { 12 } else { 0 };
     // The opaque image and its depths, the accumulator, and a second one: a copy in tiles, or a segment of particles.
-    let sample = channels + 4 * 2 + 2 * accumulated;
+    let sample = channels + 4 * 2 + 2 * accumulated + behind;
     samples * sample + pixels * (2 * channels + 4 * 10)
 }
 

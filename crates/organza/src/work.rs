@@ -5,6 +5,7 @@
 use crate::form::PlannedObject;
 use crate::scene::{Scene, SceneObject};
 use crate::{SplatCount, escape_controls, printable, stage};
+use std::path::Path;
 
 /// Seconds a byte of a file.
 const BYTE: f64 = 2e-8;
@@ -34,7 +35,12 @@ pub(crate) type Stages = Vec<(String, f64)>;
 
 /// The stage of reading an object; `None` for one that reads no file.
 pub(crate) fn reading(object: &SceneObject) -> Option<String> {
-    object.source.path().map(|path| format!("reading {}", printable(path)))
+    object.source.path().map(reading_file)
+}
+
+/// The stage of reading a file.
+pub(crate) fn reading_file(path: &Path) -> String {
+    format!("reading {}", printable(path))
 }
 
 /// The stage of converting an object.
@@ -51,12 +57,12 @@ pub(crate) fn shadow_map(k: usize, of: usize) -> String {
 pub(crate) fn of_scene(scene: &Scene) -> Stages {
     let objects = || scene.objects.iter().filter(|o| o.visible);
     let generated = objects().filter(|o| o.source.path().is_none()).count() as f64 * LOOK;
-    let bytes = |o: &SceneObject| {
-        let path = o.source.path()?;
-        Some(std::fs::metadata(path).map_or(0.0, |m| m.len() as f64))
-    };
+    let length = |path: &Path| std::fs::metadata(path).map_or(0.0, |m| m.len() as f64);
+    let bytes = |o: &SceneObject| Some(length(o.source.path()?));
     let mut stages = vec![(stage::READ.to_owned(), generated)];
     stages.extend(objects().filter_map(|o| Some((reading(o)?, BYTE * bytes(o)?))));
+    let environment = scene.environment.iter().map(|e| (reading_file(&e.path), BYTE * length(&e.path)));
+    stages.extend(environment);
     let reading: f64 = stages.iter().map(|s| s.1).sum();
     stages.push((stage::DRAW.to_owned(), 2.0 * reading + samples(scene) * SAMPLE));
     stages

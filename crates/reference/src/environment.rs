@@ -23,9 +23,11 @@ impl Default for Environment {
 }
 
 /// An image by latitude and longitude: the first row is around +Y, a row turns from −Z over +X to +Z and −X; constant
-/// over each pixel.
+/// over each pixel. It may be turned about +Y, see [`LatLong::turned`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct LatLong {
+    /// Rotation about +Y, turns.
+    turns: f64,
     size: [usize; 2],
     pixels: Vec<[f64; 3]>,
     /// Cumulative probability of rows, and of pixels within each row; each ends with 1.
@@ -51,7 +53,7 @@ impl LatLong {
         if let Some(i) = pixels.iter().position(|p| !p.iter().all(|v| v.is_finite() && *v >= 0.0)) {
             return Err(Error::invalid("environment", i, "pixel", pixels[i], "three finite numbers ≥ 0"));
         }
-        let mut out = Self { size, pixels, rows: Vec::new(), columns: Vec::new(), total: 0.0 };
+        let mut out = Self { turns: 0.0, size, pixels, rows: Vec::new(), columns: Vec::new(), total: 0.0 };
         for y in 0..size[1] {
             let mut sum = 0.0;
             for x in 0..size[0] {
@@ -68,6 +70,17 @@ impl LatLong {
         Ok(out)
     }
 
+    /// The same image turned about +Y by so many turns, right-handed: 0.25 takes what is seen towards −Z to −X.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for a number that is not finite.
+    pub fn turned(self, turns: f64) -> Result<Self, Error> {
+        if !turns.is_finite() {
+            return Err(Error::invalid("environment", 0, "rotation", turns, "a finite number of turns"));
+        }
+        Ok(Self { turns: (self.turns + turns).rem_euclid(1.0), ..self })
+    }
+
     /// Cosine of the polar angle at the upper edge of a row.
     fn edge(&self, y: usize) -> f64 {
         (PI * y as f64 / self.size[1] as f64).cos()
@@ -80,7 +93,7 @@ impl LatLong {
 
     fn pixel_of(&self, d: DVec3) -> (usize, usize) {
         let polar = d.y.clamp(-1.0, 1.0).acos() / PI;
-        let turn = (d.x.atan2(-d.z) / (2.0 * PI)).rem_euclid(1.0);
+        let turn = (d.x.atan2(-d.z) / (2.0 * PI) + self.turns).rem_euclid(1.0);
         let at = |v: f64, n: usize| ((v * n as f64) as usize).min(n - 1);
         (at(turn, self.size[0]), at(polar, self.size[1]))
     }
@@ -99,7 +112,7 @@ impl LatLong {
         let (x, fx) = find(&self.columns[y * self.size[0]..][..self.size[0]], u[0]);
         let cosine = self.edge(y) + fy * (self.edge(y + 1) - self.edge(y));
         let sine = ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt();
-        let (s, c) = (2.0 * PI * (x as f64 + fx) / self.size[0] as f64).sin_cos();
+        let (s, c) = (2.0 * PI * ((x as f64 + fx) / self.size[0] as f64 - self.turns)).sin_cos();
         (DVec3::new(s * sine, cosine, -c * sine), self.pixels[y * self.size[0] + x], self.density_of(x, y))
     }
 }
@@ -182,6 +195,22 @@ mod tests {
         let error = ((square - mean * mean) / f64::from(n)).sqrt();
         // Two-sided 1e-4: 3.9 standard errors.
         assert!((mean - exact).abs() < 3.9 * error, "{mean} ± {error}, exactly {exact}");
+    }
+
+    #[test]
+    fn a_turned_image_is_seen_and_sampled_where_it_lies() {
+        let mut pixels = vec![[0.0; 3]; 8 * 5];
+        (pixels[2 * 8], pixels[2 * 8 + 7]) = ([1.0; 3], [1.0; 3]);
+        let image = LatLong::new([8, 5], pixels).expect("a sky");
+        let sky = Environment::Image(image.turned(0.25).expect("finite"));
+        assert_eq!(sky.radiance(DVec3::NEG_X), [1.0; 3]);
+        assert_eq!(sky.radiance(DVec3::NEG_Z), [0.0; 3]);
+        let mut rng = Stream::new(3, 0, 0, 0);
+        for _ in 0..100 {
+            let (d, radiance, density) = sky.sample(rng.pair()).expect("a bright sky");
+            assert!(d.x < -0.7 && sky.radiance(d) == radiance && sky.density(d) == density);
+        }
+        assert!(self::sky().turned(f64::NAN).is_err());
     }
 
     #[test]

@@ -32,13 +32,22 @@ pub struct PathRules {
     pub lights_visible: bool,
     /// Whether emission of media and surfaces lights others; if not, only the eye sees it.
     pub emission_illuminates: bool,
+    /// Whether the environment lights what scatters; if not, only the eye sees it, straight or by reflection and refraction at
+    /// dielectrics.
+    pub environment_illuminates: bool,
     /// Whether a path is either scattered by media or reflected once by a surface that the eye sees, and never both.
     pub reflects_apart: bool,
 }
 
 impl Default for PathRules {
     fn default() -> Self {
-        Self { max_bounces: None, lights_visible: true, emission_illuminates: true, reflects_apart: false }
+        Self {
+            max_bounces: None,
+            lights_visible: true,
+            emission_illuminates: true,
+            environment_illuminates: true,
+            reflects_apart: false,
+        }
     }
 }
 
@@ -257,6 +266,9 @@ impl<'a> Tracer<'a> {
 
     fn escape(&self, path: &mut Path) {
         let environment = &self.scene.environment;
+        if path.bounces > 0 && !self.rules.environment_illuminates {
+            return;
+        }
         match (path.density, self.scene.background) {
             (None, Some(background)) if path.events == 0 => path.add(background, 1.0),
             (Some(density), _) if environment.is_sampled() => {

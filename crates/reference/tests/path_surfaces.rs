@@ -144,6 +144,38 @@ fn environment_image_lights_a_plane_by_its_closed_form() {
 }
 
 #[test]
+fn an_environment_that_lights_nothing_is_seen_straight_and_by_dielectrics_alone() {
+    let mesh = ball_mesh(Vec3::ZERO, 1.0, 3);
+    let inner = box_mesh(Vec3::splat(-0.3), Vec3::splat(0.3));
+    let camera = parallel(DVec3::new(0.2, 0.1, 4.0), DVec3::ZERO, 0.4, [4, 4]);
+    let settings =
+        PathSettings { rules: PathRules { environment_illuminates: false, ..PathRules::default() }, ..settings(400) };
+    let pane = SurfaceKind::Translucent { opacity: [0.2, 0.5, 0.9], law: SurfaceOpacity::PerCrossing };
+    let glass = SurfaceKind::Dielectric(Dielectric::clear(1.5));
+    for environment in skies() {
+        let seen = |surfaces: Vec<Surface<'_>>| {
+            trace(&Scene { surfaces, environment: environment.clone(), ..Scene::default() }, &camera, &settings)
+        };
+        let of = |kind: SurfaceKind| Surface { mesh: &mesh, material: white(kind) };
+        assert_mean(&seen(vec![of(glass)]), |_| [1.0; 3], 4.5, "glass");
+        // Two crossings, and nothing reflected.
+        assert_mean(&seen(vec![of(pane)]), |_| [0.64, 0.25, 0.01], 4.5, "pane");
+        // A white box inside of the glass is not lit by what comes through it.
+        let inside = Surface { mesh: &inner, material: white(SurfaceKind::Opaque) };
+        for surfaces in [vec![of(SurfaceKind::Opaque)], vec![inside]] {
+            assert!(seen(surfaces).radiance.mean.iter().flatten().all(|m| *m == 0.0));
+        }
+        let reflected = seen(vec![of(glass), inside]);
+        let r: f64 = 0.04;
+        assert!(
+            reflected.radiance.mean.iter().flatten().all(|m| *m > 0.2 * r && *m < 0.2),
+            "{:?}",
+            reflected.radiance.mean
+        );
+    }
+}
+
+#[test]
 fn translucent_shadow_passes_the_product_of_the_opacities() {
     let ground = quad([(-9.0, -9.0), (-9.0, 9.0), (9.0, 9.0), (9.0, -9.0)].map(|(x, z)| Vec3::new(x, 0.0, z)));
     let lid = box_mesh(Vec3::new(-8.0, 1.0, -8.0), Vec3::new(8.0, 2.0, 8.0));

@@ -141,6 +141,19 @@ impl Camera {
             Projection::Orthographic { .. } => (DVec3::new(u, v, 0.0), DVec3::Z),
         }
     }
+
+    /// The ray through image position (x, y), pixels from the top left corner: its unit direction in world space, and the solid angle
+    /// of a pixel there, sr; 0 where rays are parallel.
+    pub fn direction(&self, x_px: f64, y_px: f64) -> (DVec3, f64) {
+        let (_, ray) = self.view_ray(x_px, y_px);
+        let direction = (self.axes[0] * ray.x + self.axes[1] * ray.y + self.axes[2] * ray.z).normalize();
+        if self.is_orthographic() {
+            return (direction, 0.0);
+        }
+        // A pixel of side 1/f at distance 1 along the view, seen at an angle whose cosine is 1/|ray|.
+        let length_sq = ray.length_squared();
+        (direction, 1.0 / (self.focal_px().powi(2) * length_sq * length_sq.sqrt()))
+    }
 }
 
 fn normalize(v: DVec3) -> Option<DVec3> {

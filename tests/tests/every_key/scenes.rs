@@ -1,6 +1,7 @@
 //! A small scene for every source, with its data.
 
 use organza::scene::{LoadOptions, Override, Scene, load};
+use organza_tests::hdr;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -59,6 +60,8 @@ impl Folder {
     pub(crate) fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+        let sky = hdr([8, 4], |x, y| [20 * x as u8 + 9, 60, 40 * y as u8, 128]);
+        std::fs::write(folder.path().join("sky.hdr"), sky).unwrap();
         write("colored.ply", &ply(true, 0.7));
         write("plain.ply", &ply(false, 0.7));
         write("other.ply", &ply(true, 0.4));

@@ -147,12 +147,17 @@ fn scene() -> Vec<Entry> {
         one("camera.size", "camera.size=[30, 18]"),
         one("background", "background={color=[1, 0, 0]}"),
         one("background.color", "background.color=[1, 0, 0]"),
+        one("background.environment", "background={environment='sky.hdr'}"),
+        one("background.rotate", "background.rotate=90").with(SKY),
+        one("background.scale", "background.scale=2").with(SKY),
         one("ambient", "ambient={color=[1, 0, 0]}"),
         one("ambient.color", "ambient.color=[1, 0, 0]"),
         of(All, "footprints", "footprints=[2]"),
         one("material", "material={m={opacity=0.9}}"),
     ]
 }
+
+const SKY: &[&str] = &["background={environment='sky.hdr'}"];
 
 const SPOT: &[&str] =
     &["light=[{kind='spot', position=[2, 3, 2], target=[0, 0, 0], outer=20, intensity=[20, 18, 16]}]"];

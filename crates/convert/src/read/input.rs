@@ -217,11 +217,16 @@ fn failed(e: io::Error) -> ReadError {
 
 /// Refuses more bytes than gzip of `stored` bytes may stand for.
 fn check_ratio(bytes: u64, stored: u64) -> Result<(), ReadError> {
+    check_packed(bytes, stored, "gzip")
+}
+
+/// Refuses more bytes than `stored` bytes of something packed may stand for.
+pub(super) fn check_packed(bytes: u64, stored: u64, packed: &str) -> Result<(), ReadError> {
     if bytes <= FREE || bytes / MAX_RATIO <= stored {
         return Ok(());
     }
     Err(ReadError::limit(
-        format!("at most {MAX_RATIO} decompressed bytes for each byte of gzip"),
+        format!("at most {MAX_RATIO} decompressed bytes for each byte of {packed}"),
         format!("{bytes} from {stored}"),
         "decompress the file yourself if it is to be trusted",
     ))

@@ -1,6 +1,8 @@
 //! Small valid files of every format, made in memory.
 #![allow(dead_code, reason = "each test file uses some of them")]
 
+#[cfg(all(feature = "hdr", feature = "exr"))]
+pub(crate) mod images;
 #[cfg(feature = "las")]
 pub(crate) mod oldest;
 

@@ -4,23 +4,24 @@ use convert::RawPoints;
 use convert::read::{Loaded, Mended, ReadParams, UpAxis, up_axis};
 use organza::Error;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Aabb, DAabb, Grid, Limits, Mesh};
+use splat_core::{Aabb, DAabb, Grid, Limits, Mesh, RadianceImage};
 use std::path::Path;
 
 /// What a data file holds.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct FileInfo {
-    /// `mesh`, `volume` or `points`.
+    /// `mesh`, `volume`, `points` or `image`.
     pub(super) kind: &'static str,
     /// Length of the file.
     pub(super) bytes: u64,
-    /// How many there are of what: `vertices`, `triangles`, `points`, or `x`, `y`, `z` of a volume's lattice.
+    /// How many there are of what: `vertices`, `triangles`, `points`, `x`, `y`, `z` of a volume's lattice, or
+    /// `columns` and `rows` of an image.
     pub(super) counts: Vec<(&'static str, u64)>,
     /// Attributes beside positions: `normal`, `color`, `value`, `classification`.
     pub(super) attributes: Vec<&'static str>,
     /// In the file's own coordinates; `None` for an empty file.
     pub(super) bounds: Option<DAabb>,
-    /// Lowest and highest value of a volume.
+    /// Lowest and highest value of a volume or an image.
     pub(super) range: Option<[f32; 2]>,
     /// Columns, fields and statements of the file that are not used, as the file names them.
     pub(super) unused: Vec<String>,
@@ -46,6 +47,7 @@ pub(super) fn contents(path: &Path, max_bytes: u64, strict: bool) -> Result<File
         Loaded::Mesh(mesh) => of_mesh(&mesh),
         Loaded::Points(points) => of_points(&points),
         Loaded::Grid(grid) => of_grid(&grid),
+        Loaded::Image(image) => of_image(&image),
         _ => return Err(Error::Internal("a reader gave data of no known kind".into())),
     };
     let remarks = notes.remarks.into_iter().chain(info.remarks).collect();
@@ -103,6 +105,17 @@ fn of_grid(grid: &Grid) -> FileInfo {
         counts: vec![("x", x as u64), ("y", y as u64), ("z", z as u64)],
         bounds: Some(DAabb::of_points(corners)),
         range: (!grid.values.is_empty()).then_some(range),
+        ..FileInfo::default()
+    }
+}
+
+fn of_image(image: &RadianceImage) -> FileInfo {
+    let values = image.pixels.iter().flatten();
+    let range = values.fold([f32::INFINITY, f32::NEG_INFINITY], |r, v| [r[0].min(*v), r[1].max(*v)]);
+    FileInfo {
+        kind: "image",
+        counts: vec![("columns", u64::from(image.size[0])), ("rows", u64::from(image.size[1]))],
+        range: Some(range),
         ..FileInfo::default()
     }
 }

@@ -4,7 +4,7 @@ use super::Frame;
 use crate::pass;
 use crate::{CostRecord, Error, stage};
 use splat_core::raster::{
-    self, Background, Detail, FinishInput, GlassImage, OpaqueImage, OpaqueInput, ProjectInput, Projected, RasterCounts,
+    self, Detail, FinishInput, GlassImage, OpaqueImage, OpaqueInput, ProjectInput, Projected, RasterCounts,
 };
 use splat_core::shade::shade;
 use splat_core::{Accumulator, Cloud, Layers, SplatKind, StageCost};
@@ -146,14 +146,13 @@ impl Frame<'_> {
         let opaque = self.opaque(cost)?;
         self.progress.begin(stage::FINISH);
         cost.measure(pass::FINISH, |stage| {
-            let background = Background { color: self.scene.background };
             let [width, height] = accumulator.size;
             stage.items_in = u64::from(width) * u64::from(height);
             let antialias = self.settings.antialias;
             Ok::<_, Error>(raster::finish(&FinishInput {
                 accumulator,
                 opaque,
-                background: &background,
+                background: self.background(),
                 glass,
                 layout: &self.layout(),
                 layers: &self.layers,

@@ -3,7 +3,7 @@
 use crate::Error;
 use convert::read::{Loaded, Mended, Notes, ReadParams};
 use convert::{RawPoints, SharedField};
-use splat_core::{DAabb, Grid, Mesh, Progress};
+use splat_core::{DAabb, Grid, Mesh, Progress, RadianceImage};
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -15,6 +15,7 @@ pub(super) enum FileData {
     Mesh(Arc<Mesh>),
     Points(Arc<RawPoints>),
     Grid(Arc<Grid>),
+    Image(Arc<RadianceImage>),
 }
 
 /// The level set of scattered points, and its bounds.
@@ -67,6 +68,7 @@ impl Files {
             Loaded::Mesh(mesh) => Ok(FileData::Mesh(mesh.into())),
             Loaded::Points(points) => Ok(FileData::Points(points.into())),
             Loaded::Grid(grid) => Ok(FileData::Grid(grid.into())),
+            Loaded::Image(image) => Ok(FileData::Image(image.into())),
             _ => Err(Error::Internal("a kind of file that scenes do not know".into())),
         }
     }
@@ -131,6 +133,7 @@ impl FileData {
             Self::Mesh(mesh) => mesh_bytes(mesh),
             Self::Points(points) => points_bytes(points),
             Self::Grid(grid) => grid_bytes(grid),
+            Self::Image(image) => image.bytes(),
         }
     }
 }

@@ -9,6 +9,7 @@ use crate::scene::{self, SceneObject, Technique};
 use crate::technique::{Fold, Session, points};
 use crate::{CostRecord, Error, RenderOptions, stage};
 use deferred_blend::{Bending, BlendInput, Blended, DiscInput, Discs, Glass, Params, Surfaces, blend};
+use splat_core::glam::Vec3;
 use splat_core::raster::GlassImage;
 use splat_core::{Accumulator, Direction, SplatKind, StageCost};
 use std::ops::Range;
@@ -65,8 +66,12 @@ impl<'a> Fold for Surfels<'a> {
             self.surfaces = Some(made);
         }
         let discs = self.discs.as_ref().expect("invariant: discs were projected above");
-        let background = frame.scene.background;
-        let sky = |_| background;
+        let (background, [right, up, ahead]) = (frame.background(), frame.camera.axes);
+        let (_, solid_angle) = frame.camera.direction(0.5 * f64::from(into.size[0]), 0.5 * f64::from(into.size[1]));
+        let sky = |d: Vec3| {
+            let [x, y, z] = d.as_dvec3().to_array();
+            background.toward(right * x + up * y + ahead * z, solid_angle)
+        };
         let (bending, unit, straight) = (bending(frame), unit(frame), !frame.settings.surfels.bent_behind);
         let glass = self.surfaces.as_ref().map(|surfaces| Glass { bending, sky: &sky, surfaces, straight, unit });
         frame.progress.begin(stage::SURFELS);

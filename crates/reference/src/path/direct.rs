@@ -36,7 +36,7 @@ impl Tracer<'_> {
     /// Light that a bright environment sends to a vertex.
     pub(super) fn gather_environment(&self, path: &mut Path, vertex: &Vertex, skip: u32, rng: &mut Stream) {
         let environment = &self.scene.environment;
-        if !environment.is_sampled() {
+        if !self.rules.environment_illuminates || !environment.is_sampled() {
             return;
         }
         if let Some((direction, radiance, density)) = environment.sample(rng.pair()) {

@@ -3,17 +3,41 @@
 use super::OpaqueImage;
 use super::lanes::exp_neg;
 use crate::shade::{ChannelLayout, MAX_CHANNELS};
-use crate::{Accumulator, LayerData, LayerSet, Layers};
+use crate::{Accumulator, Camera, Environment, LayerData, LayerSet, Layers};
+use glam::DVec3;
 use rayon::prelude::*;
 
 /// Pixel rows handled by one task.
 const BAND: u32 = 16;
 
 /// What is seen where nothing else is.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Background {
-    /// Linear Rec.709 radiance.
-    pub color: [f32; 3],
+#[derive(Debug, Clone, Copy)]
+pub enum Background<'a> {
+    /// The same radiance everywhere, linear Rec.709.
+    Color([f32; 3]),
+    /// An environment, by the camera whose pixels are the samples.
+    Environment(&'a Environment, &'a Camera),
+}
+
+impl Background<'_> {
+    /// Mean radiance over a solid angle around a direction, a unit vector of the world.
+    pub fn toward(&self, direction: DVec3, solid_angle: f64) -> [f32; 3] {
+        match self {
+            Self::Color(color) => *color,
+            Self::Environment(environment, _) => environment.radiance(direction, solid_angle),
+        }
+    }
+
+    /// Mean radiance behind sample (x, y), counted from the top left.
+    pub fn radiance(&self, x: u32, y: u32) -> [f32; 3] {
+        match self {
+            Self::Color(color) => *color,
+            Self::Environment(environment, camera) => {
+                let (direction, solid_angle) = camera.direction(f64::from(x) + 0.5, f64::from(y) + 0.5);
+                environment.radiance(direction, solid_angle)
+            }
+        }
+    }
 }
 
 /// Light that was mirrored or bent on its way to the eye, by sample: it comes from elsewhere than straight ahead.
@@ -60,7 +84,7 @@ pub struct FinishInput<'a> {
     /// Nearest opaque surfaces; may be empty.
     pub opaque: &'a OpaqueImage,
     /// What is seen where nothing else is.
-    pub background: &'a Background,
+    pub background: Background<'a>,
     /// What was mirrored and bent, if something was: the effects `reflection` and `refraction`.
     pub glass: Option<&'a GlassImage>,
     /// What the accumulator's channels are.
@@ -88,8 +112,7 @@ pub fn finish(input: &FinishInput<'_>) -> Layers {
                 samples.clear();
                 for sy in y * antialias..(y + 1) * antialias {
                     for sx in x * antialias..(x + 1) * antialias {
-                        let at = sy as usize * accumulator.size[0] as usize + sx as usize;
-                        samples.push(sample(input, at));
+                        samples.push(sample(input, [sx, sy]));
                     }
                 }
                 out.pixel(k, &samples);
@@ -102,8 +125,9 @@ pub fn finish(input: &FinishInput<'_>) -> Layers {
     out.into_layers(size, layout, layers)
 }
 
-fn sample(input: &FinishInput<'_>, k: usize) -> Sample {
+fn sample(input: &FinishInput<'_>, [x, y]: [u32; 2]) -> Sample {
     let FinishInput { accumulator: acc, opaque, background, .. } = *input;
+    let k = y as usize * acc.size[0] as usize + x as usize;
     let planes = acc.optical_depth.len();
     let transmittance: [f32; 3] =
         std::array::from_fn(|c| exp_neg(acc.optical_depth[if planes == 3 { c } else { 0 }][k]));
@@ -119,10 +143,12 @@ fn sample(input: &FinishInput<'_>, k: usize) -> Sample {
         }
     }
     let through = if solid.is_some() { [0.0; 3] } else { transmittance };
+    // What is hidden is not looked up.
+    let behind = if through == [0.0; 3] || bent.is_some() { [0.0; 3] } else { background.radiance(x, y) };
     let unseen = acc.object.get(k).is_none_or(|o| *o == u32::MAX);
     Sample {
         transmittance: through,
-        background: std::array::from_fn(|c| if bent.is_none() { through[c] * background.color[c] } else { 0.0 }),
+        background: std::array::from_fn(|c| through[c] * behind[c]),
         glass: [
             input.glass.map_or([0.0; 3], |glass| glass.mirrored[k]),
             bent.map_or([0.0; 3], |behind| std::array::from_fn(|c| transmittance[c] * behind[c])),

@@ -9,6 +9,7 @@ use crate::scene::ParticlesSettings;
 use crate::technique::Session;
 use crate::{Error, Progress, RenderOptions, stage};
 use pbsr::{Ensemble, EnsembleParams, FoldParams, LitBy, Object, Renderer};
+use rayon::prelude::*;
 use splat_core::raster::OpaqueImage;
 use splat_core::{Camera, LayerSet, Light, Limits, Transmittance};
 use std::ops::Range;
@@ -48,7 +49,10 @@ pub(super) fn fold(
     let mut average = Average { ensemble, particles: 0, interrupted: false };
     let params = FoldParams { depths: [range.start, range.end], ..fold_params(session.options) };
     let settings = &frame.settings.particles;
-    let background = |_, _| frame.scene.background;
+    // Looked up once, for the error is asked for again and again.
+    let behind = settings.target_error.map(|_| behind(frame));
+    let width = frame.camera.size[0] as usize;
+    let background = |x: u32, y: u32| behind.as_ref().map_or([0.0; 3], |image| image[y as usize * width + x as usize]);
     let (mut renderer, mut folding) =
         (Renderer::new(), Folding::new(shining.iter().filter_map(|(_, map)| Some(((*map)?, origin))).collect()));
     let helper = helper(frame, checkpoint.is_some());
@@ -81,6 +85,13 @@ pub(super) fn fold(
         checkpoint.write(&average.ensemble)?;
     }
     Ok(average)
+}
+
+/// Radiance behind every sample, row by row.
+fn behind(frame: &Frame<'_>) -> Vec<[f32; 3]> {
+    let (background, [width, height]) = (frame.background(), frame.camera.size);
+    let row = |y: u32| (0..width).map(move |x| background.radiance(x, y));
+    (0..height).into_par_iter().flat_map_iter(row).collect()
 }
 
 fn fold_params(options: &RenderOptions) -> FoldParams {

@@ -57,8 +57,8 @@ pub(super) fn of_hits(ensemble: &Ensemble, parts: &[&Part<'_>], segment: &mut Ac
 
 /// Standard error of each pixel's luminance.
 pub(super) fn std_error(ensemble: &Ensemble, occluder: Option<&OpaqueImage>, frame: &Frame<'_>) -> LayerData {
-    let background = frame.scene.background;
-    let samples = ensemble.read(&|_, _| background, occluder);
+    let background = frame.background();
+    let samples = ensemble.read(&|x, y| background.radiance(x, y), occluder);
     error(&PixelSamples { size: ensemble.size(), antialias: frame.settings.antialias }, &samples)
 }
 
