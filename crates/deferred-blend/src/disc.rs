@@ -12,6 +12,7 @@
 //! rays have N = n_z everywhere and a depth that is linear in (dx, dy).
 
 use crate::Params;
+use crate::cone::Cone;
 use rayon::prelude::*;
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::optics::{self, SurfaceOpacity};
@@ -84,6 +85,8 @@ pub(crate) struct Ray {
     pub(crate) along: Vec3,
     /// Distance along it over view depth.
     pub(crate) length: f32,
+    /// At its start.
+    pub(crate) cone: Cone,
 }
 
 impl Ray {
@@ -149,10 +152,12 @@ impl Discs {
         let offset = |at: usize, size: u32| (at as f32 + 0.5 - 0.5 * size as f32) / self.focal;
         let at = Vec3::new(offset(x, self.size[0]), -offset(y, self.size[1]), 0.0);
         if self.parallel {
-            return Ray { from: at, along: Vec3::Z, length: 1.0 };
+            let cone = Cone { width: 1.0 / self.focal, spread: 0.0 };
+            return Ray { from: at, along: Vec3::Z, length: 1.0, cone };
         }
         let length = (1.0 + at.length_squared()).sqrt();
-        Ray { from: Vec3::ZERO, along: (at + Vec3::Z) / length, length }
+        let cone = Cone { width: 0.0, spread: 1.0 / (self.focal * length * length) };
+        Ray { from: Vec3::ZERO, along: (at + Vec3::Z) / length, length, cone }
     }
 
     /// Number of discs that some pixel may see.

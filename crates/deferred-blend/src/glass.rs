@@ -3,6 +3,7 @@
 //! The paper counts the layers l of a pixel, bends the ray once, at the nearest, by η^l, and lets (1 − α)^l through (Eqs. 15 and 16).
 //! That is here as a mode. Otherwise the ray goes on from the nearest layer as light does, and meets what it meets.
 
+use crate::cone::{Cone, onward};
 use crate::interface::cross;
 use crate::surfaces::{Surfaces, Wanted};
 use crate::trace::{Inside, trace};
@@ -30,8 +31,8 @@ pub enum Bending {
 pub struct Glass<'a> {
     /// Where rays are bent.
     pub bending: Bending,
-    /// Radiance from infinitely far, by a unit vector of the camera's space.
-    pub sky: &'a (dyn Fn(Vec3) -> [f32; 3] + Sync),
+    /// Radiance from infinitely far, by a unit vector of the camera's space and the solid angle around it.
+    pub sky: &'a (dyn Fn(Vec3, f32) -> [f32; 3] + Sync),
     /// What bent and mirrored rays may meet: opaque discs, and for [`Bending::Traced`] those that bound matter.
     pub surfaces: &'a Surfaces<'a>,
     /// Whether opaque surfaces are seen straight on, as in the paper; then they should not be among `surfaces`.
@@ -42,10 +43,10 @@ pub struct Glass<'a> {
 
 impl Glass<'_> {
     /// Radiance along a ray that nothing bends any more.
-    pub(crate) fn seen(&self, from: Vec3, along: Vec3) -> [f32; 3] {
+    pub(crate) fn seen(&self, from: Vec3, along: Vec3, cone: Cone) -> [f32; 3] {
         match self.surfaces.nearest(from, along, Wanted::Opaque) {
             Some(met) => met.radiance,
-            None => (self.sky)(along),
+            None => (self.sky)(along, cone.solid_angle()),
         }
     }
 
@@ -63,6 +64,10 @@ pub(crate) struct Bound<'m> {
     pub(crate) rank: u32,
     pub(crate) layers: u32,
     pub(crate) normal: Vec3,
+    /// One over a length.
+    pub(crate) curvature: f32,
+    /// Of the pixel's ray there.
+    pub(crate) cone: Cone,
     /// Where the straight ray meets it, and how far along the ray that is.
     pub(crate) place: Vec3,
     pub(crate) distance: f32,
@@ -97,6 +102,7 @@ pub(crate) struct Path<'m> {
 /// Rays that no longer go straight on, by channel.
 struct Bent<'m> {
     along: [Vec3; 3],
+    cone: Cone,
     place: Vec3,
     inside: Inside<'m>,
 }
@@ -126,7 +132,7 @@ impl<'m> Path<'m> {
             return;
         }
         let before = self.bent.as_ref().map_or([self.along; 3], |bent| bent.along);
-        let mut along = before;
+        let (mut along, mut cone) = (before, layer.cone);
         // Rays of all channels go the same way until something disperses them.
         let rays = if index == [index[0]; 3] && before == [before[0]; 3] { 1 } else { 3 };
         for ray in 0..rays {
@@ -136,7 +142,9 @@ impl<'m> Path<'m> {
             };
             let crossing = cross(before[ray], layer.normal, ratio);
             let share = crossing.reflectance;
-            let seen = if share > 0.0 { glass.seen(layer.place, crossing.mirrored) } else { [0.0; 3] };
+            let [passes, mirrored] = onward(layer.cone, layer.curvature, ratio, &crossing);
+            cone = passes;
+            let seen = if share > 0.0 { glass.seen(layer.place, crossing.mirrored, mirrored) } else { [0.0; 3] };
             for c in if rays == 1 { 0..3 } else { ray..ray + 1 } {
                 along[c] = crossing.bent;
                 passage.reflectance[c] = share;
@@ -151,7 +159,7 @@ impl<'m> Path<'m> {
             }
         }
         let inside = Inside::of(self.inside.iter().map(|(object, material, _)| (*object, *material)));
-        self.bent = Some(Bent { along, place: layer.place, inside });
+        self.bent = Some(Bent { along, cone, place: layer.place, inside });
     }
 
     /// Opacity of a layer: where layers are counted, that of the nearest of its object (Eq. 15).
@@ -179,13 +187,13 @@ impl<'m> Path<'m> {
 
     /// What is seen behind all layers where the ray was bent. `hits` tells whether an opaque surface lies straight on.
     pub(crate) fn behind(&self, glass: &Glass<'_>, hits: bool) -> Option<[f32; 3]> {
-        let Bent { along, place, inside } = self.bent.as_ref()?;
+        let Bent { along, cone, place, inside } = self.bent.as_ref()?;
         if hits && glass.straight {
             return None;
         }
         let seen = |c: usize| match glass.bending {
-            Bending::Traced => trace(glass, *place, along[c], (inside.clone(), c)),
-            Bending::Power | Bending::Nearest => glass.seen(*place, along[c]),
+            Bending::Traced => trace(glass, (*place, along[c], *cone), (inside.clone(), c)),
+            Bending::Power | Bending::Nearest => glass.seen(*place, along[c], *cone),
         };
         let first = seen(0);
         let alike = *along == [along[0]; 3] && !glass.surfaces.disperses();

@@ -1,6 +1,7 @@
 //! One layer of a pixel: its discs, averaged (Eq. 1).
 
 use crate::BlendInput;
+use crate::cone::curvature;
 use crate::fragments::Fragment;
 use crate::layers::mean_depth;
 use splat_core::Material;
@@ -72,11 +73,13 @@ pub(crate) fn bound_matter<'a>(fragments: &[Fragment], input: &BlendInput<'a>) -
 }
 
 /// The normal of a layer: the average by weight of normals that point to the nearest disc's side, which stays where they cancel. Of
-/// unit length, in the camera's space.
-pub(crate) fn normal(fragments: &[Fragment], input: &BlendInput<'_>) -> Vec3 {
+/// unit length, in the camera's space. With it the curvature, one over a length.
+pub(crate) fn normal(fragments: &[Fragment], input: &BlendInput<'_>) -> (Vec3, f32) {
     let of = |f: &Fragment| input.discs.normals[f.disc as usize];
     let first = of(&fragments[0]);
     let side = |n: Vec3| if n.dot(first) < 0.0 { -n } else { n };
     let sum: Vec3 = fragments.iter().map(|f| side(of(f)) * f.weight).sum();
-    sum.try_normalize().unwrap_or(first)
+    let weights: f32 = fragments.iter().map(|f| f.weight).sum();
+    let radius = input.discs.discs[fragments[0].disc as usize].radius;
+    (sum.try_normalize().unwrap_or(first), curvature(sum, weights, radius))
 }

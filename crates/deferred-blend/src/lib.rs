@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 mod blend;
+mod cone;
 mod disc;
 mod error;
 mod fragments;

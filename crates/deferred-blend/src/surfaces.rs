@@ -1,6 +1,7 @@
 //! Discs as rays meet them that were bent or mirrored, and so come from elsewhere than the eye.
 
 use crate::DiscInput;
+use crate::cone::curvature;
 use crate::disc::{Look, axes, into_view, look};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
@@ -82,6 +83,8 @@ pub(crate) struct Met<'a> {
     pub(crate) material: &'a Material,
     /// Unit length; it may point to either side.
     pub(crate) normal: Vec3,
+    /// One over a length.
+    pub(crate) curvature: f32,
     /// By channel.
     pub(crate) opacity: [f32; 3],
     /// All effects of its colours times its opacity.
@@ -197,6 +200,7 @@ impl<'a> Surfaces<'a> {
             is_opaque: first.is_opaque,
             material: &self.materials[first.look.material as usize],
             normal: normal.try_normalize().unwrap_or(first.shading_normal),
+            curvature: curvature(normal, weights, first.radius),
             opacity: opacity.map(|sum| (sum / weights).min(1.0)),
             radiance: radiance.map(|sum| sum / weights),
         }

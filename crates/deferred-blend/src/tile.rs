@@ -83,8 +83,9 @@ impl Tile {
                 }
                 let (rank, of_object) = count(own[0].object, layer.start, limit, (fragments, layers));
                 let (place, distance) = (ray.at(blended.depth), ray.length * blended.depth);
-                let (normal, object) = (normal(own, input), own[0].object);
-                let bound = Bound { material, object, rank, layers: of_object, normal, place, distance };
+                let ((normal, curvature), object, cone) = (normal(own, input), own[0].object, ray.cone.after(distance));
+                let layers = of_object;
+                let bound = Bound { material, object, rank, layers, normal, curvature, cone, place, distance };
                 path.cross(&bound, glass, &mut passage);
                 blended.set_opacity(path.opacity(object, blended.opacity, glass.bending), sizes);
             }

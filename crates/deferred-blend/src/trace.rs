@@ -4,6 +4,7 @@
 //! Shares of light that pass and that are mirrored add up to 1 at every surface, so a world of one colour is that colour, whatever
 //! stands in it.
 
+use crate::cone::{Cone, onward};
 use crate::glass::Glass;
 use crate::interface::cross;
 use crate::surfaces::{Met, Wanted};
@@ -44,15 +45,14 @@ impl<'m> Inside<'m> {
 /// are those of a ray that goes the same way.
 pub(crate) fn trace<'m>(
     glass: &'m Glass<'_>,
-    mut from: Vec3,
-    mut along: Vec3,
+    (mut from, mut along, mut cone): (Vec3, Vec3, Cone),
     (mut inside, channel): (Inside<'m>, usize),
 ) -> [f32; 3] {
     let (mut sum, mut share) = ([0.0; 3], [1.0f32; 3]);
     let mut leaves = inside.0.last().map_or(u32::MAX, |(object, _)| *object);
     for _ in 0..MOST_SURFACES {
         let Some(met) = glass.surfaces.nearest(from, along, Wanted::AllBut(leaves)) else {
-            add(&mut sum, share, (glass.sky)(along));
+            add(&mut sum, share, (glass.sky)(along, cone.solid_angle()));
             return sum;
         };
         for (_, material) in inside.0.iter().rev().take(1) {
@@ -64,32 +64,35 @@ pub(crate) fn trace<'m>(
             return sum;
         }
         from += along * met.distance;
+        cone = cone.after(met.distance);
         leaves = met.object;
         let beyond = inside.crossed(met.object, met.material);
-        let crossing = cross(along, met.normal, inside.index(channel) / beyond.index(channel));
+        let ratio = inside.index(channel) / beyond.index(channel);
+        let crossing = cross(along, met.normal, ratio);
+        let [passing, thrown] = onward(cone, met.curvature, ratio, &crossing);
         let mirrored = crossing.reflectance;
         let passes = share.map(|s| s * (1.0 - mirrored));
         if mirrored > 0.5 {
             if mirrored < 1.0 {
                 let (own, left) = through(&met, passes);
                 add(&mut sum, [1.0; 3], own);
-                add(&mut sum, left, glass.seen(from, crossing.bent));
+                add(&mut sum, left, glass.seen(from, crossing.bent, passing));
             }
             share = share.map(|s| s * mirrored);
-            along = crossing.mirrored;
+            (along, cone) = (crossing.mirrored, thrown);
         } else {
             if mirrored > 0.0 {
-                add(&mut sum, share.map(|s| s * mirrored), glass.seen(from, crossing.mirrored));
+                add(&mut sum, share.map(|s| s * mirrored), glass.seen(from, crossing.mirrored, thrown));
             }
             let (own, left) = through(&met, passes);
             add(&mut sum, [1.0; 3], own);
-            (share, along, inside) = (left, crossing.bent, beyond);
+            (share, along, cone, inside) = (left, crossing.bent, passing, beyond);
         }
         if share.iter().all(|s| *s < LEAST_SHARE) {
             return sum;
         }
     }
-    add(&mut sum, share, glass.seen(from, along));
+    add(&mut sum, share, glass.seen(from, along, cone));
     sum
 }
 

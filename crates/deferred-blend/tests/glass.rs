@@ -10,7 +10,7 @@ const MODES: [Bending; 3] = [Bending::Traced, Bending::Power, Bending::Nearest];
 /// Everything is composited.
 const WHOLE: Params = Params { disc_scale: 0.6, gap: 0.5, transmittance_cutoff: 0.0 };
 
-fn in_sky(bending: Bending, sky: &(dyn Fn(Vec3) -> [f32; 3] + Sync)) -> Asked<'_> {
+fn in_sky(bending: Bending, sky: &(dyn Fn(Vec3, f32) -> [f32; 3] + Sync)) -> Asked<'_> {
     Asked { bending, sky, straight: false, unit: 1.0 }
 }
 
@@ -54,7 +54,7 @@ fn clear_glass_in_a_white_world_is_not_seen() {
     for index in [[1.01; 3], [1.5; 3], [2.4; 3], [0.7; 3], [1.4, 1.45, 1.5]] {
         for bending in MODES {
             let scene = clear(ball(0.0), index, view);
-            let (picture, glass) = scene.draw_glass(&WHOLE, &in_sky(bending, &|_| [1.0; 3]), &[]);
+            let (picture, glass) = scene.draw_glass(&WHOLE, &in_sky(bending, &|_, _| [1.0; 3]), &[]);
             let mut mirrored = 0.0;
             for k in 0..48 * 36 {
                 for c in 0..3 {
@@ -82,7 +82,7 @@ fn an_index_of_one_changes_no_bit() {
         let mut scene = Scene::new(ball(0.4), view);
         // Another material bends, so that the way of each ray is followed.
         scene.materials = vec![Material::default(), Material { index: [1.5; 3], ..Material::default() }];
-        let (picture, glass) = scene.draw_glass(&WHOLE, &in_sky(bending, &|_| [7.0; 3]), &[]);
+        let (picture, glass) = scene.draw_glass(&WHOLE, &in_sky(bending, &|_, _| [7.0; 3]), &[]);
         assert_eq!((&picture.optical_depth, &picture.channels), (&plain.optical_depth, &plain.channels));
         assert!(glass.behind.iter().all(|b| b[0].is_nan()) && glass.mirrored.iter().all(|m| *m == [0.0; 3]));
     }
@@ -93,7 +93,7 @@ fn a_slab_shifts_rays_and_leaves_their_direction() {
     let size = [32, 24];
     let view = camera(DVec3::new(0.0, 0.0, 3.0), size);
     let scene = clear(slab(0.5, 40, 0.0), [1.5; 3], view);
-    let (_, glass) = scene.draw_glass(&WHOLE, &in_sky(Bending::Traced, &|d| d.into()), &[]);
+    let (_, glass) = scene.draw_glass(&WHOLE, &in_sky(Bending::Traced, &|d, _| d.into()), &[]);
     for (k, behind) in glass.behind.iter().enumerate() {
         let (from, along) = view.view_ray((k % 32) as f64 + 0.5, (k / 32) as f64 + 0.5);
         assert_eq!(from, DVec3::ZERO);
@@ -121,7 +121,7 @@ fn layers_of_the_paper_bend_by_a_power() {
         }
         let mut scene = Scene::new(cloud, view);
         scene.materials = vec![Material { index: [index; 3], ..Material::default() }];
-        let (picture, glass) = scene.draw_glass(&WHOLE, &in_sky(Bending::Power, &|d| d.into()), &[]);
+        let (picture, glass) = scene.draw_glass(&WHOLE, &in_sky(Bending::Power, &|d, _| d.into()), &[]);
         for (k, behind) in glass.behind.iter().enumerate() {
             let (_, along) = view.view_ray((k % 33) as f64 + 0.5, (k / 33) as f64 + 0.5);
             let along = along.normalize();
@@ -146,7 +146,7 @@ fn opacities_of_one_object_are_those_of_its_nearest_layer_by_power_alone() {
     let mut scene = Scene::new(cloud, view);
     scene.materials = vec![Material { index: [1.0; 3], absorption_inside: [1e-9; 3], ..Material::default() }];
     for (bending, expected) in [(Bending::Traced, 0.7), (Bending::Nearest, 0.7), (Bending::Power, 0.49)] {
-        let (picture, _) = scene.draw_glass(&WHOLE, &in_sky(bending, &|_| [1.0; 3]), &[]);
+        let (picture, _) = scene.draw_glass(&WHOLE, &in_sky(bending, &|_, _| [1.0; 3]), &[]);
         assert!((through(&picture, 1, 27) - expected).abs() < 1e-6, "{bending:?}: {}", through(&picture, 1, 27));
     }
 }
@@ -158,7 +158,7 @@ fn matter_absorbs_between_its_surfaces_and_before_what_is_opaque() {
     let mut scene = clear(slab(0.5, 40, 0.0), [1.0; 3], view);
     scene.materials[0].absorption_inside = [0.2, 1.0, 3.0];
     for (opaque, depth) in [(vec![], 0.5), (vec![3.2; 16 * 12], 0.2)] {
-        let glass = Asked { unit: 2.0, ..in_sky(Bending::Traced, &|_| [1.0; 3]) };
+        let glass = Asked { unit: 2.0, ..in_sky(Bending::Traced, &|_, _| [1.0; 3]) };
         let (picture, _) = scene.draw_glass(&WHOLE, &glass, &opaque);
         for k in 0..16 * 12 {
             let (_, along) = view.view_ray((k % 16) as f64 + 0.5, (k / 16) as f64 + 0.5);
@@ -177,7 +177,7 @@ fn db13_glass_is_the_same_whichever_way_its_normals_point() {
     let drawn = |every: usize| {
         let mut cloud = ball(0.0);
         cloud.normal.iter_mut().step_by(every).for_each(|n| *n = -*n);
-        clear(cloud, [1.5; 3], view).draw_glass(&WHOLE, &in_sky(Bending::Traced, &|d| (d + Vec3::ONE).into()), &[]).1
+        clear(cloud, [1.5; 3], view).draw_glass(&WHOLE, &in_sky(Bending::Traced, &|d, _| (d + Vec3::ONE).into()), &[]).1
     };
     let (all, third) = (drawn(1), drawn(3));
     for (a, b) in all.behind.iter().zip(&third.behind).filter(|(a, _)| !a[0].is_nan()) {
@@ -203,7 +203,7 @@ fn a_wall_behind_glass_is_seen_where_the_bent_ray_meets_it() {
     let view = camera(DVec3::new(0.0, 0.0, 3.0), size);
     let scene = slab_before_a_wall(view);
     let opaque = [4.5; 40 * 30];
-    let (_, seen) = scene.draw_glass(&WHOLE, &in_sky(Bending::Traced, &|_| [9.0; 3]), &opaque);
+    let (_, seen) = scene.draw_glass(&WHOLE, &in_sky(Bending::Traced, &|_, _| [9.0; 3]), &opaque);
     let (mut worst, mut straight) = (0.0f64, f64::INFINITY);
     for (k, behind) in seen.behind.iter().enumerate() {
         let (_, along) = view.view_ray((k % 40) as f64 + 0.5, (k / 40) as f64 + 0.5);
@@ -223,7 +223,7 @@ fn a_wall_behind_glass_is_seen_where_the_bent_ray_meets_it() {
     // Colours are blended over discs that lie 0.05 apart, jittered: half of that.
     assert!(worst < 0.025 && straight > 0.05, "{worst}, a straight ray is {straight} off");
     // The paper's way: opaque surfaces straight on.
-    let asked = Asked { straight: true, ..in_sky(Bending::Traced, &|_| [9.0; 3]) };
+    let asked = Asked { straight: true, ..in_sky(Bending::Traced, &|_, _| [9.0; 3]) };
     let (_, seen) = scene.draw_glass(&WHOLE, &asked, &opaque);
     assert!(seen.behind.iter().all(|b| b[0].is_nan()));
 }
@@ -237,7 +237,7 @@ fn opaque_surfaces_hide_what_is_behind_them_and_end() {
     plane(&mut cloud, Vec3::Z * -1.0, Vec3::Z, 6, &near);
     plane(&mut cloud, Vec3::Z * -2.0, Vec3::Z, 12, &Splat { color: [1.0, 0.0, 0.0], object: 2, ..near });
     let pane = clear(cloud, [1.0001; 3], view);
-    let (_, seen) = pane.draw_glass(&WHOLE, &in_sky(Bending::Traced, &|_| [0.0, 0.0, 1.0]), &[]);
+    let (_, seen) = pane.draw_glass(&WHOLE, &in_sky(Bending::Traced, &|_, _| [0.0, 0.0, 1.0]), &[]);
     let at = |x: usize, y: usize| seen.behind[y * 40 + x].map(|v| (v * 1e4).round() / 1e4);
     assert_eq!(at(20, 15), [0.0, 1.0, 0.0]);
     assert_eq!(at(24, 15), [1.0, 0.0, 0.0], "beside the near wall");
@@ -267,7 +267,7 @@ fn rays_leave_a_ball_where_they_do() {
     let mut cloud = Cloud::new(DVec3::ZERO);
     sphere(&mut cloud, Vec3::ZERO, 1.0, 20_000, 0.0);
     let scene = clear(cloud, [1.5; 3], view);
-    let sky = |d: Vec3| [d.x, d.y, d.z];
+    let sky = |d: Vec3, _: f32| [d.x, d.y, d.z];
     let (_, seen) = scene.draw_glass(&WHOLE, &in_sky(Bending::Traced, &sky), &[]);
     let (mut met, mut worst) = (0, 0.0f64);
     for (k, behind) in seen.behind.iter().enumerate() {

@@ -11,7 +11,7 @@ use splat_core::{
 /// How glass is drawn.
 pub(crate) struct Asked<'a> {
     pub(crate) bending: Bending,
-    pub(crate) sky: &'a (dyn Fn(Vec3) -> [f32; 3] + Sync),
+    pub(crate) sky: &'a (dyn Fn(Vec3, f32) -> [f32; 3] + Sync),
     pub(crate) straight: bool,
     pub(crate) unit: f32,
 }

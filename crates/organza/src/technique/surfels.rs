@@ -67,10 +67,9 @@ impl<'a> Fold for Surfels<'a> {
         }
         let discs = self.discs.as_ref().expect("invariant: discs were projected above");
         let (background, [right, up, ahead]) = (frame.background(), frame.camera.axes);
-        let (_, solid_angle) = frame.camera.direction(0.5 * f64::from(into.size[0]), 0.5 * f64::from(into.size[1]));
-        let sky = |d: Vec3| {
+        let sky = |d: Vec3, solid_angle: f32| {
             let [x, y, z] = d.as_dvec3().to_array();
-            background.toward(right * x + up * y + ahead * z, solid_angle)
+            background.toward(right * x + up * y + ahead * z, f64::from(solid_angle))
         };
         let (bending, unit, straight) = (bending(frame), unit(frame), !frame.settings.surfels.bent_behind);
         let glass = self.surfaces.as_ref().map(|surfaces| Glass { bending, sky: &sky, surfaces, straight, unit });
