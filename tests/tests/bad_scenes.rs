@@ -275,7 +275,7 @@ fn an_environment_stands_in_the_place_of_a_colour_and_inside_the_root_folder() {
     }
     let sky = |key: &str| with(&format!("environment = \"a.hdr\"\n{key}"));
     refused("[render]", &sky("scale = -1"), "22:9: `scale`: expected a number from 0 to 1e18, found -1");
-    refused("[render]", &sky("rotate = nan"), "`rotate`: expected a number");
+    refused("[render]", &sky("rotate = nan"), "22:10: expected a finite number, found nan");
     refused("[render]", &with("environment = \"\""), "expected a path");
     refused("[render]", "[ambient]\nenvironment = \"a.hdr\"\n[render]", "unknown key `environment`");
     let outside = with("environment = \"../../a.hdr\"");

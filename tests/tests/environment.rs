@@ -55,7 +55,7 @@ fn db15_a_constant_map_is_that_colour_bit_for_bit_in_every_technique() {
 /// An image with a colour for every direction, and its file.
 fn varied(folder: &Path) -> RadianceImage {
     let size = [32, 16];
-    let pixel = |x: u32, y: u32| [7 * x as u8 + 20, 15 * y as u8, if x % 5 == 0 { 250 } else { 90 }, 129];
+    let pixel = |x: u32, y: u32| [7 * x as u8 + 20, 15 * y as u8, if x.is_multiple_of(5) { 250 } else { 90 }, 129];
     std::fs::write(folder.join("varied.hdr"), hdr(size, pixel)).unwrap();
     let radiance =
         |k: u32| pixel(k % size[0], k / size[0])[..3].iter().map(|m| f32::from(*m) / 128.0).collect::<Vec<_>>();

@@ -185,14 +185,7 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
     check_scattered(&at.key("render").key("layers"), &raw.render.layers, &objects, &mut render)?;
     check_bent(&at.key("render").key("layers"), &raw.render.layers, &objects, (&materials, &mut render))?;
     let camera = check_camera(&at.key("camera"), &raw.camera)?;
-    if render.sheets.aligned == Aligned::Axis && !camera.is_orthographic() {
-        let message = "`aligned`: slabs along a lattice are seen by parallel rays alone";
-        return Err(at
-            .key("render")
-            .key("sheets")
-            .key("aligned")
-            .error(message, "set camera.orthographic, or \"view\""));
-    }
+    check_aligned(&at.key("render").key("sheets").key("aligned"), &camera, &render)?;
     let (background, environment) = check_background(&at.key("background"), &raw.background, &paths)?;
     let at_lights = at.key("light");
     let lights = raw.light.iter().enumerate().map(|(i, l)| check_light(&at_lights.index(i), l));
@@ -238,6 +231,15 @@ fn check_lattices(at: &At<'_>, objects: &[SceneObject], render: &RenderSettings)
         }
     }
     Ok(())
+}
+
+/// Refuses slabs along a lattice that are seen in perspective.
+fn check_aligned(at: &At<'_>, camera: &Camera, render: &RenderSettings) -> Result<(), Error> {
+    if render.sheets.aligned != Aligned::Axis || camera.is_orthographic() {
+        return Ok(());
+    }
+    let message = "`aligned`: slabs along a lattice are seen by parallel rays alone";
+    Err(at.error(message, "set camera.orthographic, or \"view\""))
 }
 
 /// Refuses media that would be drawn as discs of surfaces.

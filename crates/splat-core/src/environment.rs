@@ -148,7 +148,3 @@ impl Environment {
         sizes.map(level::bytes_of).sum()
     }
 }
-
-#[cfg(test)]
-#[path = "environment/tests.rs"]
-mod tests;

@@ -1,7 +1,8 @@
-//! Footprints, opaque rims, shaded points and recordings. One program: it is linked once, and its tests share all cores.
+//! Footprints, opaque rims, shaded points, environments and recordings. One program: it is linked once, and its tests share all cores.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod accumulation;
+mod environment;
 mod extended_lights;
 mod opaque_rim;
 #[cfg(feature = "gpu")]

@@ -49,10 +49,7 @@ pub(super) fn fold(
     let mut average = Average { ensemble, particles: 0, interrupted: false };
     let params = FoldParams { depths: [range.start, range.end], ..fold_params(session.options) };
     let settings = &frame.settings.particles;
-    // Looked up once, for the error is asked for again and again.
-    let behind = settings.target_error.map(|_| behind(frame));
-    let width = frame.camera.size[0] as usize;
-    let background = |x: u32, y: u32| behind.as_ref().map_or([0.0; 3], |image| image[y as usize * width + x as usize]);
+    let background = settings.target_error.map(|_| behind(frame));
     let (mut renderer, mut folding) =
         (Renderer::new(), Folding::new(shining.iter().filter_map(|(_, map)| Some(((*map)?, origin))).collect()));
     let helper = helper(frame, checkpoint.is_some());
@@ -75,7 +72,8 @@ pub(super) fn fold(
             checkpoint.write_if_due(&average.ensemble)?;
         }
         let reached = |target: f64| {
-            average.ensemble.rms_error(&background, occluder) / f64::from(frame.settings.antialias) <= target
+            let behind = |x: u32, y: u32| background.as_ref().map_or([0.0; 3], |image| image[y as usize][x as usize]);
+            average.ensemble.rms_error(&behind, occluder) / f64::from(frame.settings.antialias) <= target
         };
         if average.interrupted || settings.target_error.is_some_and(reached) {
             break;
@@ -87,11 +85,11 @@ pub(super) fn fold(
     Ok(average)
 }
 
-/// Radiance behind every sample, row by row.
-fn behind(frame: &Frame<'_>) -> Vec<[f32; 3]> {
+/// Radiance behind every sample, by rows: looked up once, for the error is asked for again and again.
+fn behind(frame: &Frame<'_>) -> Vec<Vec<[f32; 3]>> {
     let (background, [width, height]) = (frame.background(), frame.camera.size);
-    let row = |y: u32| (0..width).map(move |x| background.radiance(x, y));
-    (0..height).into_par_iter().flat_map_iter(row).collect()
+    let row = |y: u32| (0..width).map(|x| background.radiance(x, y)).collect();
+    (0..height).into_par_iter().map(row).collect()
 }
 
 fn fold_params(options: &RenderOptions) -> FoldParams {

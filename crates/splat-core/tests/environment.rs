@@ -1,5 +1,8 @@
-use super::*;
-use crate::rng::unit;
+//! Look-ups in environments: constants, the seam, poles and peaks, turns, and what is refused.
+
+use splat_core::glam::DVec3;
+use splat_core::rng::unit;
+use splat_core::{Environment, RadianceImage};
 use std::f64::consts::PI;
 
 const PEAK: f32 = 6496.0;
