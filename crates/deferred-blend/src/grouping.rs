@@ -32,6 +32,7 @@
 
 mod area;
 mod cells;
+pub mod extended;
 mod graph;
 mod hash;
 mod minimum;

@@ -17,28 +17,12 @@ use std::ops::Range;
 const NODES: usize = 8;
 
 /// cos(kπ/9) for k = 1 … 8.
-const COSINES: [f64; NODES] = [
-    0.939_692_620_785_908_4,
-    0.766_044_443_118_978,
-    0.5,
-    0.173_648_177_666_930_35,
-    -0.173_648_177_666_930_35,
-    -0.5,
-    -0.766_044_443_118_978,
-    -0.939_692_620_785_908_4,
-];
+const COSINES: [f32; NODES] =
+    [0.939_692_6, 0.766_044_44, 0.5, 0.173_648_18, -0.173_648_18, -0.5, -0.766_044_44, -0.939_692_6];
 
 /// π/9·sin(kπ/9) for k = 1 … 8.
-const WEIGHTS: [f64; NODES] = [
-    0.119_386_546_306_054_42,
-    0.224_372_952_493_493_87,
-    0.302_299_894_039_036_3,
-    0.343_759_498_799_548_35,
-    0.343_759_498_799_548_35,
-    0.302_299_894_039_036_3,
-    0.224_372_952_493_493_87,
-    0.119_386_546_306_054_42,
-];
+const WEIGHTS: [f32; NODES] =
+    [0.119_387_55, 0.224_375_2, 0.302_299_9, 0.343_762_76, 0.343_762_76, 0.302_299_9, 0.224_375_2, 0.119_387_55];
 
 /// Coefficients of conics seen edge-on, which would be 0, in units of the disc.
 const LEAST: f64 = 1e-12;
@@ -48,7 +32,7 @@ pub(crate) const WHOLE: f64 = 65535.0;
 
 /// Chords of an ellipse, A·s² + 2(b₁t + b₀)s + (c₂t² + c₁t + c₀) ≤ 0.
 struct Chords {
-    /// −b/A.
+    /// −b/A, by rising powers of t.
     middle: [f64; 2],
     /// (b² − A·c)/A², by rising powers of t.
     half_squared: [f64; 3],
@@ -56,48 +40,66 @@ struct Chords {
 
 impl Chords {
     /// Chords along `s` of the projection onto a disc's plane; `offset` is its centre, lengths are in some unit.
-    fn new(disc: &Surfel, [s, t, offset]: [DVec3; 3], unit: f64) -> Self {
-        let form = form(disc, unit);
-        let [of_s, of_t, of_offset] = [s, t, offset].map(form);
-        let a = s.dot(of_s).max(LEAST);
-        let b = [-s.dot(of_offset), s.dot(of_t)];
-        let c = [offset.dot(of_offset) - 1.0, -2.0 * t.dot(of_offset), t.dot(of_t)];
-        let per = 1.0 / (a * a);
+    fn new(disc: &Surfel, axes: &[DVec3; 3], unit: f64) -> Self {
+        if disc.is_circle() { Self::circle(disc, axes, unit) } else { Self::ellipse(disc, axes, unit) }
+    }
+
+    /// The squared distance from the centre of a circle's projection is vᵀ(1 − n·nᵀ)v.
+    fn circle(disc: &Surfel, [s, t, offset]: &[DVec3; 3], unit: f64) -> Self {
+        let normal = disc.normal.as_dvec3();
+        let [of_s, of_t, of_offset] = [normal.dot(*s), normal.dot(*t), normal.dot(*offset)];
+        let radius = f64::from(disc.across) / unit;
+        // In units of the radius squared; s is a unit vector across the offset.
+        Self::of_form(
+            1.0 - of_s * of_s,
+            [of_s * of_offset, -of_s * of_t],
+            [
+                offset.length_squared() - of_offset * of_offset - radius * radius,
+                -2.0 * (t.dot(*offset) - of_t * of_offset),
+                1.0 - of_t * of_t,
+            ],
+        )
+    }
+
+    /// That of an ellipse is the sum of squares along its semi-axes, each in its own unit.
+    fn ellipse(disc: &Surfel, directions: &[DVec3; 3], unit: f64) -> Self {
+        let axes = disc.axes().map(|a| a * (unit / a.length_squared()));
+        let [s, t, offset] = directions.map(|v| axes.map(|a| a.dot(v)));
+        let product = |v: [f64; 2], w: [f64; 2]| v[0] * w[0] + v[1] * w[1];
+        Self::of_form(
+            product(s, s),
+            [-product(s, offset), product(s, t)],
+            [product(offset, offset) - 1.0, -2.0 * product(t, offset), product(t, t)],
+        )
+    }
+
+    fn of_form(a: f64, b: [f64; 2], c: [f64; 3]) -> Self {
+        let a = a.max(LEAST);
+        let per = 1.0 / a;
+        let square = (b[1] * b[1] - a * c[2]) * per * per;
         Self {
-            middle: b.map(|b| -b / a),
+            middle: b.map(|b| -b * per),
             half_squared: [
-                (b[0] * b[0] - a * c[0]) * per,
-                (2.0 * b[0] * b[1] - a * c[1]) * per,
-                ((b[1] * b[1] - a * c[2]) * per).min(-LEAST),
+                (b[0] * b[0] - a * c[0]) * per * per,
+                (2.0 * b[0] * b[1] - a * c[1]) * per * per,
+                square.min(-LEAST),
             ],
         }
     }
 
-    /// Where there are chords; reversed where there are none.
-    fn extent(&self) -> [f64; 2] {
+    /// Where there are chords; `None` where there are none.
+    fn extent(&self) -> Option<[f64; 2]> {
         let [constant, linear, square] = self.half_squared;
         let (center, inside) = (-0.5 * linear / square, 0.25 * linear * linear - square * constant);
         let half = inside.max(0.0).sqrt() / -square;
-        if inside > 0.0 { [center - half, center + half] } else { [1.0, -1.0] }
+        (inside > 0.0).then_some([center - half, center + half])
     }
 
-    fn at(&self, t: f64) -> [f64; 2] {
-        let [constant, linear, square] = self.half_squared;
-        let middle = self.middle[0] + self.middle[1] * t;
+    fn at(&self, t: f32) -> [f32; 2] {
+        let [constant, linear, square] = self.half_squared.map(|v| v as f32);
+        let middle = self.middle[0] as f32 + self.middle[1] as f32 * t;
         let half = (constant + t * (linear + t * square)).max(0.0).sqrt();
         [middle - half, middle + half]
-    }
-}
-
-/// v ↦ M·v with vᵀMv the squared distance from the centre of the projection, in units of the semi-axes.
-fn form(disc: &Surfel, unit: f64) -> impl Fn(DVec3) -> DVec3 {
-    let normal = disc.normal.as_dvec3();
-    let across = f64::from(disc.across) / unit;
-    let per = 1.0 / (across * across);
-    let axes = (!disc.is_circle()).then(|| disc.axes().map(|a| a * (unit / a.length_squared())));
-    move |v| match axes {
-        Some([a, b]) => a * a.dot(v) + b * b.dot(v),
-        None => (v - normal * normal.dot(v)) * per,
     }
 }
 
@@ -109,33 +111,44 @@ pub(crate) fn covered_share(disc: &Surfel, other: &Surfel, epsilon: f64) -> f64 
     let within = offset - normal * normal.dot(offset);
     let t = within.try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
     let s = normal.cross(t);
-    let own = Chords::new(disc, [s, t, DVec3::ZERO], unit);
-    let theirs = Chords::new(other, [s, t, offset], unit);
-    let (mine, yours) = (own.extent(), theirs.extent());
+    let own = Chords::new(disc, &[s, t, DVec3::ZERO], unit);
+    let theirs = Chords::new(other, &[s, t, offset], unit);
+    let (Some(mine), Some(yours)) = (own.extent(), theirs.extent()) else { return 0.0 };
     let (low, high) = (mine[0].max(yours[0]), mine[1].min(yours[1]));
     if low >= high {
         return 0.0;
     }
     // d₁ at (s, t): distance[0] + distance[1]·t + slope·s.
-    let distance = [-facing.dot(offset), facing.dot(t)];
     let slope = facing.dot(s);
-    let per = 1.0 / if slope.abs() < LEAST { LEAST } else { slope };
-    let reach = (epsilon / unit * per).abs();
+    let per = -1.0 / if slope.abs() < LEAST { LEAST } else { slope };
+    let strip = Strip {
+        center: [-facing.dot(offset) * per, facing.dot(t) * per].map(|v| v as f32),
+        reach: (epsilon / unit * per).abs() as f32,
+    };
     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
-    let area: f64 = COSINES
-        .iter()
-        .zip(WEIGHTS)
-        .map(|(cosine, weight)| {
-            let t = middle + half * cosine;
-            let (mine, yours) = (own.at(t), theirs.at(t));
-            let center = -(distance[0] + distance[1] * t) * per;
-            let from = mine[0].max(yours[0]).max(center - reach);
-            let to = mine[1].min(yours[1]).min(center + reach);
-            weight * (to - from).max(0.0)
-        })
-        .sum();
+    let area = half * common_length([middle as f32, half as f32], [&own, &theirs], &strip);
     let radius = disc.mean_radius() / unit;
-    (half * area / (PI * radius * radius)).min(1.0)
+    (area / (PI * radius * radius)).min(1.0)
+}
+
+/// Where |d₁| < ε along a line of constant t.
+struct Strip {
+    /// By rising powers of t.
+    center: [f32; 2],
+    reach: f32,
+}
+
+/// Quadrature over \[middle − half, middle + half\], per half, of what chords and strip share; in f32, of which vectors hold more.
+fn common_length([middle, half]: [f32; 2], [own, theirs]: [&Chords; 2], strip: &Strip) -> f64 {
+    let lengths = COSINES.map(|cosine| {
+        let t = middle + half * cosine;
+        let (mine, yours) = (own.at(t), theirs.at(t));
+        let center = strip.center[0] + strip.center[1] * t;
+        let from = mine[0].max(yours[0]).max(center - strip.reach);
+        let to = mine[1].min(yours[1]).min(center + strip.reach);
+        (to - from).max(0.0)
+    });
+    f64::from(lengths.iter().zip(WEIGHTS).map(|(length, weight)| length * weight).sum::<f32>())
 }
 
 /// ε of Eq. 8 for two discs: a share of the mean of their reaches.
@@ -161,7 +174,8 @@ pub(crate) fn mutual_shares(graph: &OverlapGraph, gap: f32) -> Vec<u16> {
         let epsilon = epsilon_of(a, b, gap);
         (0.5 * (covered_share(a, b, epsilon) + covered_share(b, a, epsilon)) * WHOLE + 0.5) as u16
     });
-    let rank = |node: usize, n: usize| graph.row(node).start + graph.neighbors(node).partition_point(|&m| (m as usize) < n);
+    let rank =
+        |node: usize, n: usize| graph.row(node).start + graph.neighbors(node).partition_point(|&m| (m as usize) < n);
     fill(graph, |node, n| later[if n < node { rank(n, node) } else { rank(node, n) }])
 }
 

@@ -1,8 +1,8 @@
 //! The overlap graph: nodes are discs, edges join those that overlap (Eq. 5), less what may share a group all the same.
 
+use super::Groups;
 use super::cells::{self, Cells, Finder};
 use super::surfels::{self, CHUNK, Surfel};
-use super::Groups;
 use crate::Error;
 use rayon::prelude::*;
 use splat_core::{Cloud, Exceeded, Progress};

@@ -74,8 +74,7 @@ impl Surfel {
     pub(crate) fn axes(&self) -> [DVec3; 2] {
         let (normal, across) = (self.normal.as_dvec3(), f64::from(self.across));
         let unit = normal.normalize_or(DVec3::Z);
-        let first =
-            if self.is_circle() { unit.any_orthonormal_vector() * across } else { self.first.as_dvec3() };
+        let first = if self.is_circle() { unit.any_orthonormal_vector() * across } else { self.first.as_dvec3() };
         [first, unit.cross(first).normalize_or(unit.any_orthonormal_vector()) * across]
     }
 
