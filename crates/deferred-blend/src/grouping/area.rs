@@ -166,6 +166,7 @@ pub(crate) fn covered_shares(graph: &OverlapGraph, gap: f32) -> Vec<u16> {
 }
 
 /// For each entry the mean of the shares that both discs cover of one another, over 1/65535; the same from both sides.
+/// No edge has less than 1: discs that overlap by Eq. 5 alone should not share a group either where others may.
 pub(crate) fn mutual_shares(graph: &OverlapGraph, gap: f32) -> Vec<u16> {
     let later = fill(graph, |node, n| {
         if n < node {
@@ -173,7 +174,7 @@ pub(crate) fn mutual_shares(graph: &OverlapGraph, gap: f32) -> Vec<u16> {
         }
         let (a, b) = (graph.surfel(node), graph.surfel(n));
         let epsilon = epsilon_of(a, b, gap);
-        (0.5 * (covered_share(a, b, epsilon) + covered_share(b, a, epsilon)) * WHOLE + 0.5) as u16
+        ((0.5 * (covered_share(a, b, epsilon) + covered_share(b, a, epsilon)) * WHOLE + 0.5) as u16).max(1)
     });
     let rank =
         |node: usize, n: usize| graph.row(node).start + graph.neighbors(node).partition_point(|&m| (m as usize) < n);

@@ -27,6 +27,9 @@ const SAMPLES: usize = 32;
 /// Most iterations of Eq. 13.
 const ITERATIONS: u32 = 20;
 
+/// Fewer groups have the bound of these on their radii, √50/4.
+const LEAST_GROUPS: u32 = 8;
+
 /// Change of a radius, as a share of it, that ends the iteration.
 const SETTLED: f64 = 1e-3;
 
@@ -110,7 +113,7 @@ pub struct Enlarged {
 /// For each group the factor on its radii with which it should cover the surface (Eqs. 11-13), and how much it does cover. `disc_scale`
 /// is the radius over the cut-off radius, `gap` ε of Eq. 8 as a share of the discs' radius.
 ///
-/// The factor is at most [`covering_factor`], and at most 20 iterations are done. An empty group has the factor 1 and covers nothing.
+/// The factor is at least 1 and at most [`covering_factor`], for fewer than eight groups that of eight, and at most 20 iterations are done. An empty group has the factor 1 and covers nothing.
 ///
 /// # Errors
 /// [`Error::Parameter`] and [`Error::Cloud`] for bad input, groups of another number of discs among it; [`Error::Limit`] for more
@@ -126,7 +129,7 @@ pub fn enlarged_radii(
     if groups.of().len() != surfels.len() {
         return Err(Error::parameter("number of grouped discs", groups.of().len(), "that of the cloud"));
     }
-    let most = covering_factor(groups.count())?;
+    let most = covering_factor(groups.count().max(LEAST_GROUPS))?;
     let search = |factor| Search { factor, max_bytes: params.max_bytes, progress };
     let all = OverlapGraph::with_edges(&surfels, &search(1.0), |a, b| a.overlaps(b, 1.0))?;
     let surface = Cover::new(&all, params.gap).area(1.0);

@@ -46,7 +46,7 @@ fn db12_enlarged_radii_end_and_cover() {
         let (_, groups) = four(&cloud);
         let enlarged = enlarged_radii(&cloud, &groups, &EnlargeParams::default(), None).expect("in range");
         assert_eq!(enlarged.len(), 4);
-        let most = covering_factor(4).expect("in range");
+        let most = covering_factor(8).expect("in range");
         for of_group in enlarged {
             assert!(of_group.factor > 1.0 && of_group.factor <= most, "{of_group:?}");
             assert!(of_group.covered > 0.9, "{of_group:?}");
