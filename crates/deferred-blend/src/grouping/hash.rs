@@ -11,7 +11,7 @@
 
 use super::graph::{OverlapGraph, Search};
 use super::surfels::{self, CHUNK, Surfel};
-use super::{Groups, MOST_GROUPS, check_count};
+use super::{Groups, check_count};
 use crate::Error;
 use rayon::prelude::*;
 use splat_core::glam::DVec3;
@@ -230,11 +230,12 @@ fn resolve(
     let search = Search { factor: 1.0, max_bytes: params.max_bytes, progress };
     let wanted = |surfel: &Surfel| waits[surfel.place as usize];
     let graph = OverlapGraph::of_some(surfels, &search, wanted, |a, b| a.overlaps(b, 1.0))?;
+    let mut overlap = vec![0u64; params.groups as usize];
     for node in 0..graph.nodes() {
         if !waits[graph.place(node)] {
             continue;
         }
-        let mut overlap = [0u64; MOST_GROUPS as usize];
+        overlap.fill(0);
         for &n in graph.neighbors(node) {
             let n = n as usize;
             // Those that wait have no group yet.
@@ -242,7 +243,7 @@ fn resolve(
                 overlap[usize::from(groups.of[graph.place(n)])] += measure(graph.surfel(node), graph.surfel(n));
             }
         }
-        let least = (0..params.groups as usize).min_by_key(|&group| overlap[group]).unwrap_or(0);
+        let least = (0..overlap.len()).min_by_key(|&group| overlap[group]).unwrap_or(0);
         groups.of[graph.place(node)] = least as u8;
         waits[graph.place(node)] = false;
     }

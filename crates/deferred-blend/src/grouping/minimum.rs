@@ -63,7 +63,22 @@ fn largest_first(graph: &OverlapGraph) -> Vec<u32> {
 }
 
 /// The least colour that no neighbour has; 256 where there is none.
+#[inline]
 fn least_free(neighbors: &[u32], colors: &[u16]) -> u16 {
+    // Nearly always all colours are below 64: one word, and a look at whether there were others.
+    let (mut taken, mut seen) = (0u64, 0u16);
+    for &n in neighbors {
+        let color = colors[n as usize];
+        seen |= color;
+        taken |= u64::from(color < 64) << (color & 63);
+    }
+    if seen & 0xc0 == 0 && taken != u64::MAX {
+        return taken.trailing_ones() as u16;
+    }
+    least_free_of_many(neighbors, colors)
+}
+
+fn least_free_of_many(neighbors: &[u32], colors: &[u16]) -> u16 {
     // One bit a colour, and one more for nodes without.
     let mut taken = [0u64; MOST_GROUPS as usize / 64 + 1];
     for &n in neighbors {

@@ -18,15 +18,12 @@
 use super::area::{WHOLE, covered_share, epsilon_of, mutual_shares};
 use super::graph::OverlapGraph;
 use super::surfels::CHUNK;
-use super::{Groups, MOST_GROUPS, check_count};
+use super::{Groups, check_count};
 use crate::Error;
 use rayon::prelude::*;
 
 /// 1 − n_i·n_j of discs of one plane.
 const FLAT: f64 = 1.0 / 1024.0;
-
-/// Group of a vertex without one.
-const NONE: u16 = MOST_GROUPS as u16;
 
 /// How a weighted colouring is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,7 +69,7 @@ pub(crate) fn check_gap(gap: f32) -> Result<(), Error> {
 pub fn weighted_coloring(graph: &OverlapGraph, params: &WeightedParams) -> Result<Groups, Error> {
     params.check()?;
     let shares = mutual_shares(graph, params.gap);
-    let mut vertices = Vertices { graph, shares: &shares, group: vec![NONE; graph.nodes()], count: params.groups };
+    let mut vertices = Vertices::new(graph, &shares, params.groups);
     vertices.initialize();
     vertices.optimize(params);
     let of_node: Vec<u8> = vertices.group.iter().map(|&group| group as u8).collect();
@@ -112,11 +109,17 @@ struct Vertices<'a> {
     graph: &'a OverlapGraph,
     /// By entry, ½(A_ij + A_ji) over 1/65535.
     shares: &'a [u16],
+    /// The number of groups for those without one.
     group: Vec<u16>,
-    count: u32,
+    /// By group, and last for those without.
+    overlap: Vec<u64>,
 }
 
-impl Vertices<'_> {
+impl<'a> Vertices<'a> {
+    fn new(graph: &'a OverlapGraph, shares: &'a [u16], groups: u32) -> Self {
+        Self { graph, shares, group: vec![groups as u16; graph.nodes()], overlap: vec![0; groups as usize + 1] }
+    }
+
     /// Neighbours with what they share.
     fn edges(&self, node: usize) -> impl Iterator<Item = (usize, u16)> {
         let row = self.graph.row(node);
@@ -169,12 +172,15 @@ impl Vertices<'_> {
     }
 
     /// The paper's function: the group of the least overlap with a vertex, and that overlap.
-    fn minimize_overlap(&self, node: usize) -> (u16, u64) {
-        // The last one is of those without a group.
-        let mut overlap = [0u64; MOST_GROUPS as usize + 1];
-        self.edges(node).for_each(|(n, share)| overlap[usize::from(self.group[n])] += u64::from(share));
-        let best = (0..self.count as usize).min_by_key(|&group| overlap[group]).unwrap_or(0);
-        (best as u16, overlap[best])
+    fn minimize_overlap(&mut self, node: usize) -> (u16, u64) {
+        let row = self.graph.row(node);
+        self.overlap.fill(0);
+        for (&n, &share) in self.graph.neighbors(node).iter().zip(&self.shares[row]) {
+            self.overlap[usize::from(self.group[n as usize])] += u64::from(share);
+        }
+        let groups = &self.overlap[..self.overlap.len() - 1];
+        let best = (0..groups.len()).min_by_key(|&group| groups[group]).unwrap_or(0);
+        (best as u16, groups[best])
     }
 
     fn own_overlap(&self, node: usize) -> u64 {
