@@ -1,7 +1,7 @@
 //! Groups that cover the surface each by itself, as transparent drawing needs (section 4.4.2).
 //!
 //! Two ways: [`duplicates`] adds discs of other groups where they are little covered, [`enlarged_radii`] makes the discs of a group
-//! larger (Eqs. 11-13). Where only a hash table is known, [`covering_factor`](super::covering_factor) tells a radius.
+//! larger (Eqs. 11-13). Where only a hash table is known, [`covering_factor`] tells a radius.
 //!
 //! Deviations: the paper takes splats in descending order of their clipped area and yet wants little overlap; here the least clipped
 //! comes first, which also lets a stale priority stand for the least. Eq. 11 with the area of overlap taken from both discs would take
