@@ -3,13 +3,9 @@
 //! Nodes are coloured in the order of falling degree, each with the least colour that none of its neighbours has. So there are never
 //! more colours than the greatest degree plus one. The least number, the chromatic number, is NP-hard to find.
 
-use super::graph::OverlapGraph;
+use super::graph::{FETCHED, OverlapGraph};
 use super::{Groups, MOST_GROUPS, check_count};
 use crate::Error;
-use std::hint::black_box;
-
-/// Nodes whose lists are fetched together.
-const BATCH: usize = 32;
 
 /// Colour of a node without one.
 const NONE: u16 = MOST_GROUPS as u16;
@@ -37,11 +33,8 @@ pub fn minimum_coloring(graph: &OverlapGraph, most_groups: u32) -> Result<Colori
     let mut count = 0;
     let mut overlaps = 0;
     let order = largest_first(graph);
-    for batch in order.chunks(BATCH) {
-        // Lists of one degree lie anywhere: asked for together they arrive together.
-        black_box(
-            batch.iter().fold(0, |all, &node| all ^ graph.neighbors(node as usize).first().copied().unwrap_or(0)),
-        );
+    for batch in order.chunks(FETCHED) {
+        graph.fetch(batch);
         for &node in batch {
             let neighbors = graph.neighbors(node as usize);
             let mut color = least_free(neighbors, &colors);

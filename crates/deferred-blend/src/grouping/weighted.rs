@@ -16,7 +16,7 @@
 //! groups falls with every change.
 
 use super::area::{WHOLE, covered_share, epsilon_of, mutual_shares};
-use super::graph::OverlapGraph;
+use super::graph::{FETCHED, OverlapGraph};
 use super::surfels::CHUNK;
 use super::{Groups, check_count};
 use crate::Error;
@@ -135,8 +135,11 @@ impl<'a> Vertices<'a> {
     fn initialize(&mut self) {
         let greatest = |node: usize| self.edges(node).map(|(n, share)| self.weight(node, n, share)).fold(0.0, f64::max);
         let nodes: Vec<u32> = (0..self.graph.nodes() as u32).collect();
-        for node in by_falling(&nodes, greatest) {
-            self.group[node as usize] = self.minimize_overlap(node as usize).0;
+        for batch in by_falling(&nodes, greatest).chunks(FETCHED) {
+            self.graph.fetch(batch);
+            for &node in batch {
+                self.group[node as usize] = self.minimize_overlap(node as usize).0;
+            }
         }
     }
 
