@@ -1,6 +1,53 @@
-//! Groups of discs that do not overlap.
+//! Groups of discs that do not overlap (Zhang and Pajarola 2007, section 4).
+//!
+//! Discs that share a group are drawn into one image, so they should not overlap. Three methods separate them:
+//!
+//! | method | paper | number of groups K | overlap that is left |
+//! |---|---|---|---|
+//! | [`minimum_coloring`] | section 4.1, MGC | found | none beyond the [`Relaxation`] of the graph |
+//! | [`weighted_coloring`] | section 4.2, WGC, Eqs. 6-8 | given | little |
+//! | [`hash_grouping`] | section 4.3, Eq. 9 | given | more, at a fraction of the time |
+//!
+//! The colourings work on an [`OverlapGraph`] (Eq. 5). Groups hold for every view. [`extended`] covers the surface by each group
+//! alone (section 4.4).
+//!
+//! No method depends on the order of the cloud, on the number of threads, on the cloud's origin, or on a scale by a power of two:
+//! ties are broken by the canonical order of the cloud ([`Cloud::canonical_order`](splat_core::Cloud::canonical_order)).
+//!
+//! ```
+//! use deferred_blend::grouping::{GraphParams, OverlapGraph, minimum_coloring};
+//! use splat_core::{Cloud, Splat, SplatKind, glam::{DVec3, Vec3}};
+//!
+//! let mut cloud = Cloud::new(DVec3::new(1.0e7, 0.0, 0.0));
+//! for x in [0.0, 1.5, 3.0, 4.5] {
+//!     let position = Vec3::new(x, 0.0, 0.0);
+//!     cloud.push(&Splat { position, normal: Vec3::Y, kind: SplatKind::Opaque, ..Splat::default() });
+//! }
+//! let graph = OverlapGraph::build(&cloud, &GraphParams::default(), None)?;
+//! assert_eq!(graph.edges(), 3);
+//! let coloring = minimum_coloring(&graph, 256)?;
+//! assert_eq!(coloring.groups.count(), 2);
+//! # Ok::<(), deferred_blend::Error>(())
+//! ```
+
+mod area;
+mod cells;
+pub mod extended;
+mod graph;
+mod hash;
+mod minimum;
+mod surfels;
+mod weighted;
+
+pub use graph::{Coplanar, GraphParams, OverlapGraph, Relaxation};
+pub use hash::{Collisions, HashParams, covering_factor, hash_grouping};
+pub use minimum::{Coloring, minimum_coloring};
+pub use weighted::{WeightedParams, weighted_coloring, weighted_cost};
 
 use crate::Error;
+
+/// Most groups: a disc's group takes one byte.
+pub const MOST_GROUPS: u32 = 256;
 
 /// For each disc, the group that it is a member of.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -15,9 +62,7 @@ impl Groups {
     /// # Errors
     /// [`Error::Parameter`] for a count outside 1..=256 and for a disc whose group is not below the count.
     pub fn new(count: u32, of: Vec<u8>) -> Result<Self, Error> {
-        if !(1..=256).contains(&count) {
-            return Err(Error::parameter("number of groups", count, "between 1 and 256"));
-        }
+        check_count(count)?;
         if let Some(group) = of.iter().find(|&&group| u32::from(group) >= count) {
             return Err(Error::parameter("group of a disc", group, "below the number of groups"));
         }
@@ -33,4 +78,11 @@ impl Groups {
     pub fn of(&self) -> &[u8] {
         &self.of
     }
+}
+
+fn check_count(count: u32) -> Result<(), Error> {
+    if !(1..=MOST_GROUPS).contains(&count) {
+        return Err(Error::parameter("number of groups", count, "between 1 and 256"));
+    }
+    Ok(())
 }

@@ -2,17 +2,18 @@
 
 use super::animation::check_animation;
 use super::check_background::check_background;
+use super::check_drawn::check_drawn;
 use super::check_light::check_light;
 use super::check_material::{check_materials, unknown_material};
 use super::check_object::{Named, check_object};
-use super::check_render::{check_render, own_layers};
+use super::check_render::check_render;
 use super::paths::Paths;
 use super::raw::{RawCamera, RawScene};
 use super::tree::{Document, Step};
-use super::{Aligned, RenderSettings, Scene, SceneMaterial, SceneObject, Slicing, Technique};
+use super::{Aligned, RenderSettings, Scene, SceneObject};
 use crate::Error;
 use glam::DVec3;
-use splat_core::{Camera, Footprint, FootprintStack, Packing, Projection};
+use splat_core::{Camera, Footprint, FootprintStack, Projection};
 use std::collections::HashMap;
 use std::ops::RangeInclusive;
 
@@ -178,12 +179,8 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
         objects.push(check_object(&at, object, material, &named)?);
     }
     let mut render = check_render(&at.key("render"), &raw.render)?;
-    check_one_technique(&at_objects, &objects, &render)?;
-    check_lattices(&at_objects, &objects, &render)?;
-    check_surfels(&at_objects, &objects, &render)?;
-    check_bounds(&at_objects, &objects, &materials)?;
-    check_scattered(&at.key("render").key("layers"), &raw.render.layers, &objects, &mut render)?;
-    check_bent(&at.key("render").key("layers"), &raw.render.layers, &objects, (&materials, &mut render))?;
+    let layers = (&at.key("render").key("layers"), raw.render.layers.as_slice());
+    check_drawn(&at_objects, &objects, &materials, layers, &mut render)?;
     let camera = check_camera(&at.key("camera"), &raw.camera)?;
     check_aligned(&at.key("render").key("sheets").key("aligned"), &camera, &render)?;
     let (background, environment) = check_background(&at.key("background"), &raw.background, &paths)?;
@@ -205,34 +202,6 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
     })
 }
 
-/// Refuses what a picture has only if one technique draws all of it.
-fn check_one_technique(at: &At<'_>, objects: &[SceneObject], render: &RenderSettings) -> Result<(), Error> {
-    let Some((_, layer)) = own_layers(&render.layers).next() else { return Ok(()) };
-    let other = objects.iter().position(|o| o.visible && o.technique.is_some_and(|t| t != render.technique));
-    other.map_or(Ok(()), |i| {
-        let message = format!("a picture by several techniques has no layer `{layer}`");
-        Err(at.index(i).key("technique").error(message, "leave the layer or this key out"))
-    })
-}
-
-/// Refuses body-centred lattices wherever they are not splatted in slabs across the view.
-fn check_lattices(at: &At<'_>, objects: &[SceneObject], render: &RenderSettings) -> Result<(), Error> {
-    let body_centred = objects.iter().enumerate().filter(|(_, o)| o.visible && o.packing == Packing::BodyCentred);
-    for (i, object) in body_centred {
-        let technique = object.technique.unwrap_or(render.technique);
-        let refuse = |message: &str, hint| Err(at.index(i).key("lattice").error(message, hint));
-        if technique != Technique::Sheets {
-            let message = format!("`lattice`: the technique `{}` draws no body-centred lattice", technique.name());
-            return refuse(&message, "use technique = \"sheets\", or leave it out");
-        }
-        if render.sheets.slicing != Slicing::View {
-            let message = "`lattice`: slabs across half vectors take no body-centred lattice";
-            return refuse(message, "use render.sheets.slicing = \"view\", or leave it out");
-        }
-    }
-    Ok(())
-}
-
 /// Refuses slabs along a lattice that are seen in perspective.
 fn check_aligned(at: &At<'_>, camera: &Camera, render: &RenderSettings) -> Result<(), Error> {
     if render.sheets.aligned != Aligned::Axis || camera.is_orthographic() {
@@ -240,88 +209,6 @@ fn check_aligned(at: &At<'_>, camera: &Camera, render: &RenderSettings) -> Resul
     }
     let message = "`aligned`: slabs along a lattice are seen by parallel rays alone";
     Err(at.error(message, "set camera.orthographic, or \"view\""))
-}
-
-/// Refuses media that would be drawn as discs of surfaces.
-fn check_surfels(at: &At<'_>, objects: &[SceneObject], render: &RenderSettings) -> Result<(), Error> {
-    let by_surfels = |o: &SceneObject| o.technique.unwrap_or(render.technique) == Technique::Surfels;
-    let medium = objects.iter().position(|o| o.visible && o.source.is_medium() && by_surfels(o));
-    medium.map_or(Ok(()), |i| {
-        let name = crate::shown(&objects[i].name);
-        let message = format!("`{name}` is a medium, and the technique `surfels` draws surfaces alone");
-        let hint = format!("set object.{name}.technique = \"sheets\", or \"points\"");
-        Err(at.index(i).error(message, hint))
-    })
-}
-
-/// Whether an object bends light: `surfels` draw it, and `auto` gives it to them.
-fn is_bent(object: &SceneObject, materials: &[SceneMaterial], technique: Technique) -> bool {
-    let by_surfels = matches!(object.technique.unwrap_or(technique), Technique::Auto | Technique::Surfels);
-    object.visible && by_surfels && materials[object.material].material.index != [1.0; 3]
-}
-
-/// `reflection` and `refraction` are two of the effects where rays are bent, and else they are refused.
-fn check_bent(
-    at: &At<'_>,
-    layers: &[String],
-    objects: &[SceneObject],
-    (materials, render): (&[SceneMaterial], &mut RenderSettings),
-) -> Result<(), Error> {
-    const LAYERS: [&str; 2] = ["reflection", "refraction"];
-    let bends = objects.iter().any(|o| is_bent(o, materials, render.technique));
-    if bends && layers.iter().any(|layer| layer == "effects") {
-        render.layers.add_effects(LAYERS);
-    }
-    match render.layers.names().find(|name| LAYERS.contains(name)) {
-        Some(name) if !bends => {
-            let message = format!("the layer `{name}` is of light that surfaces mirror and bend, and none does");
-            let hint = "give an object a material with an `ior` and technique = \"surfels\", or leave it out";
-            Err(at.error(message, hint))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// Refuses materials that bound matter where there is no surface, or one that nothing passes.
-fn check_bounds(at: &At<'_>, objects: &[SceneObject], materials: &[SceneMaterial]) -> Result<(), Error> {
-    for (i, object) in objects.iter().enumerate() {
-        let material = &materials[object.material];
-        if !material.material.bounds_matter() {
-            continue;
-        }
-        let of = format!("material `{}` has an index or `absorption_inside`", crate::shown(&material.name));
-        let at = at.index(i);
-        if object.source.is_medium() {
-            let message = format!("{of}, which surfaces bound, and this is a medium");
-            return Err(at.error(message, "use another material, or a surface"));
-        }
-        if object.opacity.unwrap_or(material.opacity) >= 1.0 {
-            let message = format!("{of}, and nothing passes a surface whose opacity is 1");
-            return Err(at.error(message, "set an `opacity` below 1; 0 is clear glass"));
-        }
-    }
-    Ok(())
-}
-
-/// `scatterN` is one of the effects where light is scattered more than once, and else it is refused.
-fn check_scattered(
-    at: &At<'_>,
-    layers: &[String],
-    objects: &[SceneObject],
-    render: &mut RenderSettings,
-) -> Result<(), Error> {
-    let by_sheets = |o: &SceneObject| o.visible && o.technique.unwrap_or(render.technique) == Technique::Sheets;
-    let scatters_again = render.sheets.scattering().is_some() && objects.iter().any(by_sheets);
-    if scatters_again && layers.iter().any(|layer| layer == "effects") {
-        render.layers.add_effects(["scatterN"]);
-    }
-    if !scatters_again && render.layers.names().any(|layer| layer == "scatterN") {
-        let message = "the layer `scatterN` is of light that the technique `sheets` scatters more than once";
-        let hint = "use technique = \"sheets\" with render.sheets.slicing = \"half_vector\" and \
-                    render.sheets.scattering = \"forward_and_back\", or leave it out";
-        return Err(at.error(message, hint));
-    }
-    Ok(())
 }
 
 fn at_materials<'a>(at: &At<'a>) -> At<'a> {

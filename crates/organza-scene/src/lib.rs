@@ -13,6 +13,7 @@
 mod animation;
 mod check;
 mod check_background;
+mod check_drawn;
 mod check_field;
 mod check_light;
 mod check_material;

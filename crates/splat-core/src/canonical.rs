@@ -10,10 +10,15 @@ use std::cmp::Ordering;
 const BITS: u32 = 21;
 
 impl Cloud {
-    /// Puts the splats in canonical order: by the Morton code of their position within the cloud's bounds, then by
-    /// the bits of all attributes. Shuffled input gives the same cloud bit by bit; identical splats are
-    /// interchangeable.
+    /// Puts the splats in canonical order, see [`Cloud::canonical_order`].
     pub fn canonicalize(&mut self) {
+        *self = self.gather(&self.canonical_order());
+    }
+
+    /// Places of the splats in canonical order: by the Morton code of their position within the cloud's bounds, then by
+    /// the bits of all attributes. Shuffled input gives the same splats in this order bit by bit; identical splats are
+    /// interchangeable.
+    pub fn canonical_order(&self) -> Vec<u32> {
         let bounds = self.bounds();
         let mut keys: Vec<(u64, u32)> = self
             .position
@@ -25,8 +30,7 @@ impl Cloud {
         keys.par_sort_unstable_by(|a, b| {
             a.0.cmp(&b.0).then_with(|| compare_splats(self, a.1 as usize, b.1 as usize)).then(a.1.cmp(&b.1))
         });
-        let ids: Vec<u32> = keys.into_iter().map(|(_, i)| i).collect();
-        *self = self.gather(&ids);
+        keys.into_iter().map(|(_, i)| i).collect()
     }
 }
 
