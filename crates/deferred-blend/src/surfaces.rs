@@ -176,9 +176,8 @@ impl<'a> Surfaces<'a> {
             let hit = disc.meet(from, along);
             let apart = (hit.along - nearest).abs() * hit.cosine.abs().max(LEAST_FACING);
             let same = disc.look.object == first.look.object && disc.is_opaque == first.is_opaque;
-            if !(same && hit.along > 0.0 && hit.distance_sq < 1.0 && apart < SAME * disc.radius)
-                || !self.counts(k, &hit, wanted)
-            {
+            let near = hit.along > 0.0 && hit.distance_sq < 1.0 && apart < SAME * disc.radius;
+            if !(same && near && self.counts(k, &hit, wanted)) {
                 return;
             }
             let profile = self.footprints.layers()[disc.look.footprint as usize].profile(f64::from(hit.distance_sq));
