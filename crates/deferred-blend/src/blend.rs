@@ -2,6 +2,7 @@
 //! opacities, near to far, without a limit to their number.
 
 use crate::disc::Discs;
+use crate::floored::{Floor, Layering};
 use crate::fragments::{BlockLists, Fragment, WalkTile};
 use crate::glass::Glass;
 use crate::layers::GapRule;
@@ -25,7 +26,9 @@ pub struct BlendInput<'a> {
     pub opaque: &'a [f32],
     /// View depths of the layers that are composited; the others are left out.
     pub range: Range<f32>,
-    /// How matter is drawn that surfaces bound; `None` where no material bounds any.
+    /// How discs become layers.
+    pub layering: Layering<'a>,
+    /// How matter is drawn that surfaces bound, by [`Layering::Gaps`] and [`Layering::Peeled`]; `None` where no material bounds any.
     pub glass: Option<Glass<'a>>,
 }
 
@@ -65,6 +68,7 @@ pub fn blend(
     progress: Option<&Progress>,
 ) -> Result<Blended, Error> {
     params.check()?;
+    input.layering.check()?;
     let quiet = Progress::new();
     let (progress, discs) = (progress.unwrap_or(&quiet), input.discs);
     assert_eq!(discs.size, accumulator.size, "invariant: one image size");
@@ -72,6 +76,8 @@ pub fn blend(
     let bins = bin_rectangles(discs.size, &ranks, |i| discs.discs[i as usize].pixels);
     progress.add_total(bins.tiles() as u64);
     let rule = GapRule::new(params);
+    let most = if let Layering::Peeled(most) = input.layering { most as usize } else { usize::MAX };
+    let floor = Floor::new(&input.layering, discs.depths);
     let done: Vec<Tile> = (0..bins.tiles())
         .into_par_iter()
         .filter(|&t| progress.tick(1).is_ok() && !bins.is_empty(t))
@@ -82,7 +88,10 @@ pub fn blend(
             let mut layers = Vec::new();
             let visit = |k: usize, fragments: &mut [Fragment]| {
                 rule.split(discs, fragments, &mut layers);
-                tile.pixel(k, fragments, &layers, (input, params));
+                match &floor {
+                    Some(floor) => tile.floored(k, fragments, input, (floor, rule)),
+                    None => tile.pixel(k, fragments, &layers[..most.min(layers.len())], (input, params)),
+                }
             };
             let fragments = pulp::Arch::new().dispatch(WalkTile { discs, lists, corner, visit });
             tile.fragments = fragments;

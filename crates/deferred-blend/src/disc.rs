@@ -71,6 +71,8 @@ pub struct Discs {
     pub(crate) normals: Vec<Vec3>,
     /// By id.
     pub(crate) materials: Vec<Material>,
+    /// View depths of the nearest and the farthest disc before the eye.
+    pub(crate) depths: [f32; 2],
     /// Focal length, pixels, or pixels in a unit of the cloud for parallel rays.
     focal: f32,
     parallel: bool,
@@ -128,6 +130,8 @@ impl Discs {
     pub fn project(input: &DiscInput<'_>, params: &Params) -> Self {
         let view = View::new(input);
         let chunks = input.ids.par_chunks(CHUNK);
+        let depths = |ids: &[u32]| ids.iter().map(|&i| view.depths(i as usize, params)).fold(NO_DEPTHS, wider);
+        let depths = chunks.clone().map(depths).reduce(|| NO_DEPTHS, wider).map(|d| d as f32);
         let parts: Vec<Vec<(Disc, Look)>> =
             chunks.map(|ids| ids.iter().map(|&i| view.disc(i as usize, params)).collect()).collect();
         let (discs, looks) = parts.into_iter().flatten().unzip();
@@ -142,6 +146,7 @@ impl Discs {
             kernels,
             normals: if bends { input.ids.par_iter().map(normal).collect() } else { Vec::new() },
             materials: input.materials.to_vec(),
+            depths,
             focal: view.focal as f32,
             parallel: view.parallel,
         }
@@ -170,6 +175,13 @@ impl Discs {
         let normals = size_of_val(&*self.normals);
         (size_of_val(&*self.discs) + size_of_val(&*self.ids) + size_of_val(&*self.looks) + normals) as u64
     }
+}
+
+/// Of no disc.
+const NO_DEPTHS: [f64; 2] = [f64::INFINITY, 0.0];
+
+fn wider(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0].min(b[0]), a[1].max(b[1])]
 }
 
 impl Disc {
@@ -202,6 +214,14 @@ impl<'a> View<'a> {
             half: camera.size.map(|s| 0.5 * f64::from(s)),
             parallel: camera.is_orthographic(),
         }
+    }
+
+    /// Nearest and farthest depth of a disc, cut at the eye plane.
+    fn depths(&self, i: usize, params: &Params) -> [f64; 2] {
+        let cloud = self.input.cloud;
+        let depth = (self.rotation * (cloud.position[i].as_dvec3() + self.shift)).z;
+        let reach = squares(axes(cloud, i, f64::from(params.disc_scale)).map(|a| self.rotation * a), 2).sqrt();
+        if depth + reach > 0.0 { [(depth - reach).max(0.0), depth + reach] } else { NO_DEPTHS }
     }
 
     fn disc(&self, i: usize, params: &Params) -> (Disc, Look) {

@@ -29,7 +29,7 @@ impl GapRule {
 
     /// Whether of two neighbours along a ray the farther belongs to the layer of the nearer.
     #[inline]
-    fn joins(self, discs: &Discs, near: &Fragment, far: &Fragment) -> bool {
+    pub(crate) fn joins(self, discs: &Discs, near: &Fragment, far: &Fragment) -> bool {
         if near.object != far.object {
             return false;
         }

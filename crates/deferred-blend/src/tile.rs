@@ -2,10 +2,11 @@
 
 use crate::BlendInput;
 use crate::Params;
+use crate::floored::Floor;
 use crate::fragments::Fragment;
 use crate::glass::{Bound, Glass, Passage, Path};
 use crate::layer::{Layer, bound_matter, normal};
-use crate::layers::mean_depth;
+use crate::layers::{GapRule, mean_depth};
 use splat_core::raster::GlassImage;
 use splat_core::raster::lanes::exp_neg;
 use splat_core::raster::tile::{AREA, for_each_span, position, tile_of};
@@ -97,6 +98,29 @@ impl Tile {
         if let Some((glass, path)) = way {
             self.end(k, glass, &path, (limit, ray.length), &input.range);
         }
+    }
+
+    /// A pixel as the paper has it, of whose fragments those that are hidden or lie outside the range are left out.
+    pub(crate) fn floored(
+        &mut self,
+        k: usize,
+        fragments: &mut [Fragment],
+        input: &BlendInput<'_>,
+        (floor, rule): (&Floor<'_>, GapRule),
+    ) {
+        let limit = self.opaque.get(k).copied().unwrap_or(f32::INFINITY);
+        let [x, y] = self.corner;
+        let ray = input.discs.ray(position(k, x, y)).length;
+        let sizes = [self.optical_depth.len(), self.channels.len()];
+        fragments.sort_by(|a, b| a.depth.total_cmp(&b.depth));
+        let seen = |f: &&Fragment| f.depth < limit && input.range.contains(&f.depth);
+        let own: Vec<Fragment> = fragments.iter().filter(seen).copied().collect();
+        let Some(nearest) = own.first() else { return };
+        let blended = floor.blend(&own, input, rule, (ray, sizes));
+        let opacity = blended.through.map(|t| (1.0 - t).clamp(0.0, 1.0));
+        let layer = Layer { depth: nearest.depth, opacity, values: blended.values };
+        self.add(k, &layer, &Passage::CLEAR, nearest.object);
+        self.layers += 1;
     }
 
     /// What a ray sees that has come through all layers: matter before an opaque surface absorbs, and where the ray was bent

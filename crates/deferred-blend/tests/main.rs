@@ -1,6 +1,7 @@
 //! Tests of deferred blending.
 
 mod blend;
+mod floored;
 mod glass;
 mod grouping;
 mod scenes;

@@ -1,6 +1,6 @@
 //! Discs whose pictures are known.
 
-use deferred_blend::{Bending, BlendInput, DiscInput, Discs, Glass, Params, Surfaces, blend};
+use deferred_blend::{Bending, BlendInput, DiscInput, Discs, Error, Glass, Layering, Params, Surfaces, blend};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::GlassImage;
 use splat_core::shade::ChannelLayout;
@@ -60,16 +60,29 @@ impl Scene {
         let surfaces = Surfaces::new(&DiscInput { ids: &met, ..self.input() }, &self.values, layout);
         let Asked { bending, sky, straight, unit } = *glass;
         let glass = Some(Glass { bending, sky, surfaces: &surfaces, straight, unit });
-        let input = BlendInput { discs: &discs, values: &self.values, opaque, range: 0.0..f32::INFINITY, glass };
+        let (range, layering) = (0.0..f32::INFINITY, Layering::Gaps);
+        let input = BlendInput { discs: &discs, values: &self.values, opaque, range, layering, glass };
         let made = blend(&input, params, &mut accumulator, None).expect("nobody cancels");
         (accumulator, made.glass.expect("asked for"))
     }
 
     /// The same before something opaque, behind what is there.
     pub(crate) fn draw_into(&self, params: &Params, opaque: &[f32], accumulator: &mut Accumulator) {
+        self.draw_by(params, Layering::Gaps, opaque, accumulator).expect("nobody cancels");
+    }
+
+    /// The same by some way to tell layers apart.
+    pub(crate) fn draw_by(
+        &self,
+        params: &Params,
+        layering: Layering<'_>,
+        opaque: &[f32],
+        accumulator: &mut Accumulator,
+    ) -> Result<(), Error> {
         let discs = Discs::project(&self.input(), params);
-        let input = BlendInput { discs: &discs, values: &self.values, opaque, range: 0.0..f32::INFINITY, glass: None };
-        blend(&input, params, accumulator, None).expect("nobody cancels");
+        let range = 0.0..f32::INFINITY;
+        let input = BlendInput { discs: &discs, values: &self.values, opaque, range, layering, glass: None };
+        blend(&input, params, accumulator, None).map(|_| ())
     }
 }
 

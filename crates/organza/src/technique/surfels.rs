@@ -8,7 +8,7 @@ use crate::pass;
 use crate::scene::{self, SceneObject, Technique};
 use crate::technique::{Fold, Session, points};
 use crate::{CostRecord, Error, RenderOptions, stage};
-use deferred_blend::{Bending, BlendInput, Blended, DiscInput, Discs, Glass, Params, Surfaces, blend};
+use deferred_blend::{Bending, BlendInput, Blended, DiscInput, Discs, Glass, Layering, Params, Surfaces, blend};
 use splat_core::glam::Vec3;
 use splat_core::raster::GlassImage;
 use splat_core::{Accumulator, Direction, SplatKind, StageCost};
@@ -76,7 +76,7 @@ impl<'a> Fold for Surfels<'a> {
         frame.progress.begin(stage::SURFELS);
         frame.tick()?;
         let image = cost.measure(pass::SURFELS, |stage| {
-            let input = BlendInput { discs, values, opaque, range, glass };
+            let input = BlendInput { discs, values, opaque, range, layering: Layering::Gaps, glass };
             let Blended { counts, glass } = blend(&input, &params, into, Some(frame.progress)).map_err(refuse)?;
             stage.items_in = counts.discs;
             stage.items_out = counts.layers;
