@@ -308,3 +308,56 @@ fn colours_above_1_have_a_truth_of_one_order_alone() {
         assert!(reason.contains("colours above 1"), "{reason}");
     }
 }
+
+/// A ball of glass before two walls that are shown as they are.
+const GLASS: &str = r#"version = 1
+[camera]
+position = [0.3, 0.2, 4]
+target = [0, 0, 0]
+fov_y = 25
+size = [64, 64]
+[background]
+color = [0.4, 0.5, 0.7]
+[material.glass]
+ior = 1.5
+absorption_inside = [0.3, 0.1, 0.6]
+[[object]]
+name = "ball"
+material = "glass"
+implicit = { expression = "x^2 + y^2 + z^2 - 0.25", box = [[-0.6, -0.6, -0.6], [0.6, 0.6, 0.6]], spacing = 0.02 }
+[material.red]
+shading = "unlit"
+color = [1, 0.1, 0]
+[[object]]
+name = "above"
+material = "red"
+rectangle = { center = [0, 1, -2], u = [1.5, 0, 0], v = [0, 1, 0], spacing = 0.03 }
+[material.blue]
+shading = "unlit"
+color = [0, 0.2, 1]
+[[object]]
+name = "below"
+material = "blue"
+rectangle = { center = [0, -1, -2], u = [1.5, 0, 0], v = [0, 1, 0], spacing = 0.03 }
+"#;
+
+#[test]
+fn traced_glass_is_nearer_to_path_tracing_than_the_papers_heuristics() {
+    let size = [64, 64];
+    let scene_of = |set: &str| {
+        let overrides = vec![scene::Override::parse(set).unwrap()];
+        let options = scene::LoadOptions { overrides, ..Default::default() };
+        scene::parse("glass.toml".as_ref(), GLASS.as_bytes(), &options).unwrap()
+    };
+    let truth = traced(&scene_of("render.antialias=4")).unwrap();
+    let exact = squares(truth.image.pixels(), size);
+    let errors = ["traced", "power", "nearest"].map(|bending| {
+        let scene = scene_of(&format!("render.surfels.bending='{bending}'"));
+        rmse(&squares(&drawn(&scene), size), &exact)
+    });
+    println!("RMSE from path tracing: traced, power, nearest {errors:.4?}");
+    assert!(errors[0] < 0.02 && errors[1] > 3.0 * errors[0] && errors[2] > 3.0 * errors[0], "{errors:?}");
+    // What has an opacity of its own, too, has no truth.
+    let both = scene_of("object.ball.opacity=0.2");
+    assert!(traced(&both).unwrap_err().contains("an opacity of their own"));
+}

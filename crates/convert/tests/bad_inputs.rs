@@ -58,7 +58,11 @@ fn ba02_empty_one_byte_and_header_only() {
     refused_with("a.ply", b"p", "a.ply@0: expected 'ply' at byte 0, found 'p'");
     refused_with("a.nii", b"", "a.nii@0: expected a header of 348 bytes, found 0 bytes");
     refused_with("a.laz", b"L", "a.laz@0: expected 'LASF'");
-    refused_with("a.dat", b"1 2 3", "a.dat@0: expected 'ply', 'LASF', 'NRRD', a NIfTI-1 header, or the extension of a");
+    refused_with(
+        "a.dat",
+        b"1 2 3",
+        "a.dat@0: expected 'ply', 'LASF', 'NRRD', '#?', a NIfTI-1 or OpenEXR header, or the extension of a",
+    );
     let text = ply_ascii();
     let header = text.split_inclusive("end_header\n").next().unwrap();
     refused_with("a.ply", header.as_bytes(), "a.ply:4: expected at most");

@@ -6,7 +6,8 @@ use glam::{DMat3, DQuat, DVec3, Vec3};
 use organza::scene::{MediumShape, Scene, SceneMaterial, SceneObject, Source, VolumeSource};
 use organza::{Error, RenderOptions, expression_field, printable};
 use reference::{
-    Classified, ColorAt, Density, Lattice, Liberty, Medium, Placed, Surface, SurfaceKind, SurfaceMaterial, TurnedBox,
+    Classified, ColorAt, Density, Dielectric, Lattice, Liberty, Medium, Placed, Surface, SurfaceKind, SurfaceMaterial,
+    TurnedBox,
 };
 use splat_core::{DAabb, Grid, Mesh, ScalarField, Shading, Similarity, optics};
 use std::path::Path;
@@ -57,7 +58,11 @@ pub(super) fn body(
     options: &RenderOptions,
 ) -> Result<Result<Body, String>, Error> {
     let no = |reason: &str| Ok(Err(reason.to_owned()));
-    let shading = scene.materials[object.material].material.shading;
+    let material = &scene.materials[object.material];
+    let shading = material.material.shading;
+    if material.material.bounds_matter() && object.opacity.unwrap_or(material.opacity) > 0.0 {
+        return no("surfaces that bound matter and have an opacity of their own are not path-traced");
+    }
     let mesh = match &object.source {
         Source::Points(_) => {
             return no(
@@ -248,11 +253,16 @@ fn surface(scene: &Scene, object: &SceneObject, mut mesh: Mesh) -> Body {
         mesh.color = vec![tint; mesh.position.len()];
     }
     let brightest = mesh.color.iter().flatten().fold(0.0, |most, c| f32::max(most, *c));
-    let liberty = liberty(object, m.shading, f64::from(brightest));
+    let mut liberty = liberty(object, m.shading, f64::from(brightest));
+    // Shadows are those of opacity, and glass has none.
+    liberty.casts_shadow &= !m.bounds_matter();
     let scale = liberty.gain.recip();
     mesh.color.iter_mut().for_each(|c| *c = c.map(|v| (f64::from(v) * scale) as f32));
     let opacity = object.opacity.unwrap_or(material.opacity);
-    let kind = if opacity < 1.0 {
+    let kind = if m.bounds_matter() {
+        let (eta, absorption) = (m.index.map(f64::from), m.absorption_inside.map(f64::from));
+        SurfaceKind::Dielectric(Dielectric { eta, absorption })
+    } else if opacity < 1.0 {
         let tau = optics::optical_depth(opacity);
         let opacity = m.extinction_rgb.map(|e| -libm::expm1(-tau * f64::from(e)));
         SurfaceKind::Translucent { opacity, law: m.surface_opacity }
