@@ -130,8 +130,8 @@ pub fn truth(
         surfaces: bodies.iter().filter_map(Body::surface).collect(),
         lights,
         unshadowed: scene.lights.iter().map(|l| !l.shadow).collect(),
-        environment: environment.clone().unwrap_or_default(),
-        background: environment.is_none().then(|| scene.background.map(f64::from)),
+        environment,
+        background: None,
     };
     if orders != Orders::One && gains(&traced).any(|gain| gain > 1.0) {
         return Ok(Err("colours above 1 scatter more light than arrives, which would go on for ever".into()));
@@ -158,9 +158,9 @@ pub fn truth(
     Ok(Ok(Truth { method, image, standard_error: estimate.radiance.standard_error, all_orders: None }))
 }
 
-/// The environment of the scene, if it has one.
-fn environment(scene: &Scene, options: &RenderOptions) -> Result<Option<Environment>, Error> {
-    let Some(source) = &scene.environment else { return Ok(None) };
+/// What is seen behind everything, by mirrored and bent rays too.
+fn environment(scene: &Scene, options: &RenderOptions) -> Result<Environment, Error> {
+    let Some(source) = &scene.environment else { return Ok(Environment::Constant(scene.background.map(f64::from))) };
     let (data, _) = convert::read::file(&source.path, &options.read_params(), None)
         .map_err(|e| Error::from_read(&source.path, &e))?;
     let convert::read::Loaded::Image(image) = data else {
@@ -168,7 +168,7 @@ fn environment(scene: &Scene, options: &RenderOptions) -> Result<Option<Environm
     };
     let pixels = image.pixels.iter().map(|p| p.map(|v| f64::from(v) * source.scale)).collect();
     let made = LatLong::new(image.size.map(|s| s as usize), pixels).and_then(|sky| sky.turned(source.turns));
-    made.map(|sky| Some(Environment::Image(sky)))
+    made.map(Environment::Image)
         .map_err(|e| Error::input(organza::printable(&source.path), e.to_string(), "use a smaller background.scale"))
 }
 

@@ -1,0 +1,112 @@
+//! A translucent dragon of 0.44 M discs at 1024² (Zhang and Pajarola 2007, Fig. 17): discs met by rays, layers by gaps, depth peeling,
+//! Algorithms 1 and 2, and the same dragon of glass in a white world.
+#![allow(missing_docs, clippy::expect_used, reason = "a benchmark")]
+
+use convert::read::{self, Loaded, ReadParams};
+use convert::{Density, MeshParams, SplatParams, mesh_to_points};
+use criterion::{Criterion, SamplingMode, criterion_group, criterion_main};
+use deferred_blend::grouping::{Collisions, HashParams, hash_grouping};
+use deferred_blend::{
+    Bending, BlendCounts, BlendInput, DiscInput, Discs, Floors, Glass, Layering, Params, Surfaces, blend,
+};
+use organza_benches::processor_ms;
+use splat_core::glam::DVec3;
+use splat_core::shade::ChannelLayout;
+use splat_core::{Accumulator, Camera, Cloud, FootprintStack, LayerSet, Material, Projection};
+
+/// Of the dragon in Fig. 17.
+const DISCS: u64 = 437_645;
+const SIZE: [u32; 2] = [1024, 1024];
+
+fn dragon(opacity: f64) -> Cloud {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/stanford-dragon/dragon_res3.ply.gz");
+    let (loaded, _) = read::file(file.as_ref(), &ReadParams::default(), None).expect("the dragon");
+    let Loaded::Mesh(mesh) = loaded else { panic!("a mesh") };
+    let splat = SplatParams { keep_clear: true, ..SplatParams::default() };
+    let params = MeshParams { density: Density::Splats(DISCS), opacity, splat };
+    let (mut cloud, _) = mesh_to_points(&mesh, &params, None).expect("discs of the dragon");
+    cloud.canonicalize();
+    cloud
+}
+
+fn view() -> Camera {
+    let (eye, target) = (DVec3::new(0.05, 0.16, 0.36), DVec3::new(0.0, 0.12, 0.0));
+    Camera::look_at(eye, target, DVec3::Y, Projection::Perspective { fov_y: 0.6 }, SIZE).expect("a view")
+}
+
+/// Discs of a view, near ones first.
+struct Scene {
+    cloud: Cloud,
+    camera: Camera,
+    ids: Vec<u32>,
+    values: Vec<f32>,
+    footprints: FootprintStack,
+    materials: Vec<Material>,
+}
+
+impl Scene {
+    fn new(opacity: f64, index: f32) -> Self {
+        let (cloud, camera) = (dragon(opacity), view());
+        let params = hbsort::Params { direction: splat_core::Direction::FrontToBack, ..hbsort::Params::default() };
+        let order = hbsort::slice_cloud(&cloud, None, &camera, &params, &mut hbsort::Scratch::default());
+        let ids = order.expect("an order").input_from_sorted;
+        let values = cloud.normal.iter().flat_map(|n| (*n * 0.5 + 0.5).to_array()).collect();
+        let materials = vec![Material { index: [index; 3], ..Material::default() }];
+        Self { cloud, camera, ids, values, footprints: FootprintStack::default(), materials }
+    }
+
+    fn input(&self) -> DiscInput<'_> {
+        let Self { cloud, camera, ids, footprints, materials, .. } = self;
+        DiscInput { cloud, ids, camera, footprints, materials }
+    }
+
+    fn blend(&self, discs: &Discs, layering: Layering<'_>, glass: Option<Glass<'_>>) -> BlendCounts {
+        let mut picture = Accumulator::new(SIZE, 1, 3, false, false);
+        let range = 0.0..f32::INFINITY;
+        let input = BlendInput { discs, values: &self.values, opaque: &[], range, layering, glass };
+        let params = Params { transmittance_cutoff: 1.0 / 1024.0, ..Params::default() };
+        blend(&input, &params, &mut picture, None).expect("nobody cancels").counts
+    }
+}
+
+fn surfels(criterion: &mut Criterion) {
+    let scene = Scene::new(0.3, 1.0);
+    let discs = Discs::project(&scene.input(), &Params::default());
+    let counts = scene.blend(&discs, Layering::Gaps, None);
+    println!(
+        "{} discs, {} fragments, {} layers, {} bytes",
+        counts.discs, counts.fragments, counts.layers, counts.bytes
+    );
+    let params = HashParams { groups: 8, collisions: Collisions::Resolve, ..HashParams::default() };
+    let groups = hash_grouping(&scene.cloud, &params, None).expect("groups");
+    let floors = Floors { groups: &groups, steps: 256 };
+    let mut group = criterion.benchmark_group("a translucent dragon");
+    group.sample_size(10).sampling_mode(SamplingMode::Flat);
+    let mut bench = |name: &str, work: &dyn Fn()| {
+        group.bench_function(name, |b| b.iter(work));
+        let before = processor_ms();
+        work();
+        println!("{name}: {:.0} ms of processor time", processor_ms() - before);
+    };
+    bench("discs", &|| drop(Discs::project(&scene.input(), &Params::default())));
+    for (name, layering) in [
+        ("gaps", Layering::Gaps),
+        ("8 layers", Layering::Peeled(8)),
+        ("3 layers", Layering::Peeled(3)),
+        ("Algorithm 1", Layering::Algorithm1(floors)),
+        ("Algorithm 2", Layering::Algorithm2(floors)),
+    ] {
+        bench(name, &|| _ = scene.blend(&discs, layering, None));
+    }
+    let clear = Scene::new(0.0, 1.5);
+    let discs = Discs::project(&clear.input(), &Params::default());
+    let layout = ChannelLayout::new(&LayerSet::default());
+    bench("hierarchy of glass", &|| drop(Surfaces::new(&clear.input(), &clear.values, layout)));
+    let surfaces = Surfaces::new(&clear.input(), &clear.values, layout);
+    let sky = |_, _| [1.0; 3];
+    let glass = Glass { bending: Bending::Traced, sky: &sky, surfaces: &surfaces, straight: false, unit: 1.0 };
+    bench("glass", &|| _ = clear.blend(&discs, Layering::Gaps, Some(glass)));
+}
+
+criterion_group!(benches, surfels);
+criterion_main!(benches);
