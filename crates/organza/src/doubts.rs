@@ -53,8 +53,12 @@ pub(crate) fn of_picture(scene: &Scene, layers: &Layers) -> Option<String> {
 }
 
 fn without_light(scene: &Scene) -> Option<String> {
-    let drawn = || scene.objects.iter().filter(|o| o.visible);
     let material = |o: &SceneObject| &scene.materials[o.material].material;
+    // Clear glass shows what is around it, and reflects nothing of its own.
+    let is_clear = |o: &SceneObject| {
+        material(o).bounds_matter() && o.opacity.unwrap_or(scene.materials[o.material].opacity) == 0.0
+    };
+    let drawn = || scene.objects.iter().filter(|o| o.visible && !is_clear(o));
     let shines =
         drawn().any(|o| material(o).shading == Shading::Unlit || material(o).emission.iter().any(|e| *e > 0.0));
     let reflects = drawn().any(|o| match material(o).shading {

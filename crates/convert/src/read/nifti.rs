@@ -12,7 +12,7 @@ use splat_core::Grid;
 use splat_core::glam::{DMat3, DVec3};
 
 const HEADER: usize = 348;
-const HINT: &str = "the file is truncated, damaged or not NIfTI-1";
+const HINT: &str = "the file is truncated, damaged or not NIfTI-1; a Radiance image of this name begins with '#?'";
 
 /// Reads a volume.
 pub(super) fn read(mut stream: Stream<'_>, params: &ReadParams) -> Result<Grid, ReadError> {
