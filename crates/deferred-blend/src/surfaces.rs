@@ -5,6 +5,7 @@ use crate::cone::curvature;
 use crate::disc::{Look, axes, into_view, look};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
+use obvhs::bvh2::node::Bvh2Node;
 use obvhs::bvh2::{Bvh2, builder::build_bvh2};
 use obvhs::ray::{Ray, RayHit};
 use rayon::prelude::*;
@@ -99,8 +100,7 @@ impl<'a> Surfaces<'a> {
             let (cloud, i) = (input.cloud, id as usize);
             let [a, b] = axes(cloud, i, f64::from(DISC_SCALE)).map(|a| rotation * a);
             let center = (rotation * (cloud.position[i].as_dvec3() + shift)).as_vec3();
-            let reach = Vec3::from((a * a + b * b).to_array().map(|s| s.sqrt() as f32));
-            let surface = Surface {
+            Surface {
                 center,
                 normal: (rotation * cloud.normal_of(i).as_dvec3()).as_vec3(),
                 shading_normal: (rotation * cloud.shading_normal_of(i).as_dvec3()).as_vec3(),
@@ -109,10 +109,10 @@ impl<'a> Surfaces<'a> {
                 id,
                 is_opaque: cloud.kind[i] == SplatKind::Opaque,
                 look: look(input, i),
-            };
-            (surface, Aabb::new((center - reach).into(), (center + reach).into()))
+            }
         };
-        let (discs, boxes): (Vec<Surface>, Vec<Aabb>) = input.ids.par_iter().map(surface).unzip();
+        let discs: Vec<Surface> = input.ids.par_iter().map(surface).collect();
+        let boxes: Vec<Aabb> = discs.par_iter().map(Surface::bounds).collect();
         let params = BvhBuildParams { max_prims_per_leaf: 4, ..BvhBuildParams::medium_build() };
         let bvh = (!boxes.is_empty()).then(|| build_bvh2(&boxes, params, &mut Duration::default()));
         let objects = discs.iter().map(|d| d.look.object as usize + 1).max().unwrap_or(0);
@@ -125,10 +125,11 @@ impl<'a> Surfaces<'a> {
         Self { bvh, discs, footprints, materials, values, layout, largest }
     }
 
-    /// Bytes that discs and their hierarchy take.
+    /// Bytes that discs and their hierarchy take while that is built.
     pub const fn bytes(discs: u64) -> u64 {
-        // A binary tree of boxes has twice as many nodes as leaves.
-        discs * (size_of::<Surface>() + size_of::<Aabb>() + 2 * 32 + 4) as u64
+        // A binary tree of boxes has twice as many nodes as leaves; it is built from lists of nodes of each round, and of their order.
+        const NODE: usize = size_of::<Bvh2Node>();
+        discs * (size_of::<Surface>() + size_of::<Aabb>() + 6 * NODE + 32) as u64
     }
 
     /// Whether an index differs by channel.
@@ -213,6 +214,12 @@ impl<'a> Surfaces<'a> {
 }
 
 impl Surface {
+    fn bounds(&self) -> Aabb {
+        let [a, b] = self.dual.map(|d| d / d.length_squared());
+        let reach = (a * a + b * b).map(f32::sqrt);
+        Aabb::new((self.center - reach).into(), (self.center + reach).into())
+    }
+
     #[inline]
     fn meet(&self, from: Vec3, along: Vec3) -> Hit {
         let (to, cosine) = (self.center - from, self.normal.dot(along));
