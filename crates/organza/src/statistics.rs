@@ -106,7 +106,7 @@ pub struct Statistics {
     pub caster_optical_depth: f64,
     /// Whether a material absorbs the three channels unequally.
     pub colored_extinction: bool,
-    /// Objects whose surfaces mirror and bend light, by name, and which techniques draw that can.
+    /// Objects whose surfaces mirror and bend light, drawn by a technique that can, by name.
     pub bent: Vec<String>,
     /// Whether one of them bends red, green and blue apart.
     pub disperses: bool,
