@@ -65,7 +65,7 @@ impl RadianceImage {
 ///
 /// ```
 /// use splat_core::{Environment, RadianceImage, glam::DVec3};
-/// let sky = RadianceImage { size: [4, 2], pixels: [[[0.5, 0.6, 0.9]; 4], [[0.2, 0.1, 0.1]; 4]].concat() };
+/// let sky = RadianceImage { size: [16, 8], pixels: [[[0.5, 0.6, 0.9]; 64], [[0.2, 0.1, 0.1]; 64]].concat() };
 /// let sky = Environment::new(&sky, 0.0, 2.0).unwrap();
 /// assert_eq!(sky.radiance(DVec3::Y, 0.0), [1.0, 1.2, 1.8]);
 /// ```
