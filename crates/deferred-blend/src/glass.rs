@@ -108,9 +108,15 @@ struct Bent<'m> {
 }
 
 impl<'m> Path<'m> {
-    /// Begins along the unit vector of the pixel.
-    pub(crate) fn begin(along: Vec3) -> Self {
-        Self { along, inside: Vec::new(), nearest: Vec::new(), bent: None }
+    /// Begins along the unit vector of the pixel, within the objects that the eye lies in.
+    pub(crate) fn begin(along: Vec3, glass: &Glass<'m>) -> Self {
+        let inside = glass.surfaces.around_eye().map(|(object, material)| (object, material, 0.0)).collect();
+        Self { along, inside, nearest: Vec::new(), bent: None }
+    }
+
+    /// The index where the ray is.
+    fn index(&self, channel: usize) -> f32 {
+        self.inside.last().map_or(1.0, |(_, material, _)| material.index[channel])
     }
 
     /// Whether a layer that bounds matter is met by the bent ray, where it lies there, and not by the straight one.
@@ -120,9 +126,10 @@ impl<'m> Path<'m> {
 
     /// Through a layer, one after the other from the eye.
     pub(crate) fn cross(&mut self, layer: &Bound<'m>, glass: &Glass<'_>, passage: &mut Passage) {
+        let before_index: [f32; 3] = std::array::from_fn(|c| self.index(c));
         match self.inside.iter().position(|(object, ..)| *object == layer.object) {
             Some(at) => {
-                let (_, material, from) = self.inside.swap_remove(at);
+                let (_, material, from) = self.inside.remove(at);
                 passage.inside = glass.absorbed(material, layer.distance - from);
             }
             None => self.inside.push((layer.object, layer.material, layer.distance)),
@@ -137,7 +144,8 @@ impl<'m> Path<'m> {
         let rays = if index == [index[0]; 3] && before == [before[0]; 3] { 1 } else { 3 };
         for ray in 0..rays {
             let ratio = match glass.bending {
-                Bending::Traced | Bending::Nearest => 1.0 / index[ray],
+                Bending::Traced => before_index[ray] / self.index(ray),
+                Bending::Nearest => 1.0 / index[ray],
                 Bending::Power => power(1.0 / index[ray], layer.layers),
             };
             let crossing = cross(before[ray], layer.normal, ratio);

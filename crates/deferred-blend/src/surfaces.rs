@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use splat_core::glam::Vec3;
 use splat_core::shade::ChannelLayout;
 use splat_core::{Footprint, FootprintStack, Material, SplatKind};
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 /// Radius within which a disc is blended, over its cut-off radius: as little as leaves it smooth, for rays test all discs that they come
@@ -27,6 +28,13 @@ const SAME: f32 = 0.5;
 /// |cosine| below which planes count as if they were met at it.
 const LEAST_FACING: f32 = 0.25;
 
+/// Rays that tell what a place lies in, and most surfaces that each of them is followed through.
+const WAYS: usize = 15;
+const MOST_CROSSINGS: usize = 64;
+
+/// Turn between one of these rays and the next, radians.
+const GOLDEN_ANGLE: f32 = 2.399_963_2;
+
 /// Weight of an opaque disc that faces away: behind a silhouette it is lit on the inside.
 const FACES_AWAY: f32 = 1.0 / 256.0;
 
@@ -40,6 +48,8 @@ pub struct Surfaces<'a> {
     layout: ChannelLayout,
     /// Largest radius by object.
     largest: Vec<f32>,
+    /// Objects that the eye lies in, with their materials; none for parallel rays, which have no eye.
+    around: Vec<(u32, u16)>,
 }
 
 /// One disc.
@@ -82,6 +92,7 @@ pub(crate) struct Met<'a> {
     pub(crate) object: u32,
     pub(crate) is_opaque: bool,
     pub(crate) material: &'a Material,
+    material_id: u16,
     /// Unit length; it may point to either side.
     pub(crate) normal: Vec3,
     /// One over a length.
@@ -122,7 +133,46 @@ impl<'a> Surfaces<'a> {
             *most = most.max(disc.radius);
         }
         let (footprints, materials) = (input.footprints.clone(), input.materials.to_vec());
-        Self { bvh, discs, footprints, materials, values, layout, largest }
+        let mut made = Self { bvh, discs, footprints, materials, values, layout, largest, around: Vec::new() };
+        if !input.camera.is_orthographic() {
+            made.around = made.around(Vec3::ZERO);
+        }
+        made
+    }
+
+    /// Objects that the eye lies in.
+    pub(crate) fn around_eye(&self) -> impl Iterator<Item = (u32, &Material)> {
+        self.around.iter().map(|(object, material)| (*object, &self.materials[*material as usize]))
+    }
+
+    /// Translucent objects that a place lies in: those whose surfaces most rays from there cross an odd number of times, whichever way
+    /// normals point.
+    fn around(&self, place: Vec3) -> Vec<(u32, u16)> {
+        let mut odd: BTreeMap<(u32, u16), usize> = BTreeMap::new();
+        for way in 0..WAYS {
+            let (z, turn) = (1.0 - (2 * way + 1) as f32 / WAYS as f32, way as f32 * GOLDEN_ANGLE);
+            let across = (1.0 - z * z).sqrt();
+            let along = Vec3::new(across * libm::cosf(turn), across * libm::sinf(turn), z);
+            for (object, count) in self.crossings(place, along) {
+                *odd.entry(object).or_default() += count % 2;
+            }
+        }
+        odd.into_iter().filter(|(_, ways)| 2 * ways > WAYS).map(|(object, _)| object).collect()
+    }
+
+    /// How often a ray crosses each translucent object.
+    fn crossings(&self, mut from: Vec3, along: Vec3) -> BTreeMap<(u32, u16), usize> {
+        let mut counts = BTreeMap::new();
+        let mut wanted = Wanted::AllBut(u32::MAX);
+        for _ in 0..MOST_CROSSINGS {
+            let Some(met) = self.nearest(from, along, wanted) else { break };
+            if !met.is_opaque {
+                *counts.entry((met.object, met.material_id)).or_default() += 1;
+            }
+            from += along * met.distance;
+            wanted = Wanted::AllBut(met.object);
+        }
+        counts
     }
 
     /// Bytes that discs and their hierarchy take while that is built.
@@ -199,6 +249,7 @@ impl<'a> Surfaces<'a> {
             object: first.look.object,
             is_opaque: first.is_opaque,
             material: &self.materials[first.look.material as usize],
+            material_id: first.look.material,
             normal: normal.try_normalize().unwrap_or(first.shading_normal),
             curvature: curvature(normal, weights, first.radius),
             opacity: opacity.map(|sum| (sum / weights).min(1.0)),

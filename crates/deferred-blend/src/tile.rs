@@ -64,7 +64,7 @@ impl Tile {
         let [x, y] = self.corner;
         let ray = input.discs.ray(position(k, x, y));
         let sizes = [self.optical_depth.len(), self.channels.len()];
-        let mut way = input.glass.as_ref().map(|glass| (glass, Path::begin(ray.along)));
+        let mut way = input.glass.as_ref().map(|glass| (glass, Path::begin(ray.along, glass)));
         for layer in layers {
             let least = self.optical_depth.iter().map(|plane| plane[k]).fold(f32::INFINITY, f32::min);
             if exp_neg(least) < params.transmittance_cutoff {

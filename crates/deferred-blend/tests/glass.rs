@@ -198,6 +198,35 @@ fn slab_before_a_wall(view: splat_core::Camera) -> Scene {
 }
 
 #[test]
+fn from_within_a_ball_its_matter_absorbs_and_its_surface_is_left() {
+    let size = [24, 18];
+    let view = camera(DVec3::new(0.0, 0.0, 1e-3), size);
+    let drawn = |flip: bool| {
+        let mut cloud = Cloud::new(DVec3::ZERO);
+        sphere(&mut cloud, Vec3::ZERO, 1.0, 20_000, 0.0);
+        cloud.normal.iter_mut().step_by(if flip { 2 } else { usize::MAX }).for_each(|n| *n = -*n);
+        let mut scene = clear(cloud, [1.5; 3], view);
+        scene.materials[0].absorption_inside = [0.2, 1.0, 3.0];
+        scene.draw_glass(&WHOLE, &in_sky(Bending::Traced, &|d, _| [d.x + 1.0, d.y + 1.0, 1.0]), &[])
+    };
+    for (picture, glass) in [drawn(false), drawn(true)] {
+        for k in 0..24 * 18 {
+            let (_, along) = view.view_ray((k % 24) as f64 + 0.5, (k / 24) as f64 + 0.5);
+            let along = along.normalize();
+            // Rays from the middle meet the surface head-on: 4 % are mirrored, the rest goes straight on.
+            for (c, absorption) in [0.2f64, 1.0, 3.0].into_iter().enumerate() {
+                let expected = 0.96 * (-absorption).exp();
+                let found = through(&picture, c, k);
+                assert!((found / expected - 1.0).abs() < 0.02, "channel {c} pixel {k}: {found} for {expected}");
+            }
+            let behind = glass.behind[k];
+            let apart = (f64::from(behind[0]) - 1.0 - along.x).hypot(f64::from(behind[1]) - 1.0 - along.y);
+            assert!(apart < 0.05, "pixel {k}: {behind:?} for {along}");
+        }
+    }
+}
+
+#[test]
 fn a_wall_behind_glass_is_seen_where_the_bent_ray_meets_it() {
     let size = [40, 30];
     let view = camera(DVec3::new(0.0, 0.0, 3.0), size);
