@@ -106,7 +106,11 @@ fn half_vectors(name: &str, grid: &Grid, direction: Option<[f64; 3]>, scattering
         LitBy { light: Light { shape, intensity: [3.0; 3] }, shadow: None }
     };
     let sheets = setting.input(grid, direction.map(sun).into_iter().collect());
-    sweep(name, &HalfInput { sheets, splats: None, extended: Vec::new(), mapped: Vec::new(), opaque: &[] }, scattering);
+    sweep(
+        name,
+        &HalfInput { sheets, splats: None, polygons: &[], extended: Vec::new(), mapped: Vec::new(), opaque: &[] },
+        scattering,
+    );
 }
 
 /// Sixteen points of a disk as wide as the cloud is high, in one sweep.
@@ -117,7 +121,11 @@ fn soft(name: &str, grid: &Grid, direction: [f64; 3]) {
     let lit = LitBy { light: Light { shape, intensity: [300.0; 3] }, shadow: None };
     let extended = vec![Extended { lit, samples: 16 }];
     let sheets = setting.input(grid, Vec::new());
-    sweep(name, &HalfInput { sheets, splats: None, extended, mapped: Vec::new(), opaque: &[] }, Scattering::None);
+    sweep(
+        name,
+        &HalfInput { sheets, splats: None, polygons: &[], extended, mapped: Vec::new(), opaque: &[] },
+        Scattering::None,
+    );
 }
 
 fn sweep(name: &str, input: &HalfInput<'_>, scattering: Scattering) {
@@ -125,7 +133,7 @@ fn sweep(name: &str, input: &HalfInput<'_>, scattering: Scattering) {
     let layout = ChannelLayout::new(&LayerSet::default());
     let (best, counts) = least(|| {
         let mut out = Accumulator::new(SIZE, 1, 3, false, false);
-        fold(input, &params, &layout, &mut out, None).expect("half vectors serve it")
+        fold(input, &params, &layout, &mut out, None).expect("half vectors serve it").counts
     });
     row(name, best, [counts.visible, counts.eye_fragments, counts.light_fragments]);
 }

@@ -1,13 +1,16 @@
 //! A translucent dragon of 0.44 M discs at 1024² (Zhang and Pajarola 2007, Fig. 17): discs met by rays, layers by gaps, depth peeling,
-//! Algorithms 1 and 2, and the same dragon of glass in a white world.
+//! Algorithms 1 and 2, and the same dragon of glass in a white world. Opaque dragons of 0.14 to 2 M discs in 1+1 and 2+1 passes (Table 4).
 #![allow(missing_docs, clippy::expect_used, reason = "a benchmark")]
 
 use convert::read::{self, Loaded, ReadParams};
 use convert::{Density, MeshParams, SplatParams, mesh_to_points};
 use criterion::{Criterion, SamplingMode, criterion_group, criterion_main};
-use deferred_blend::grouping::{Collisions, HashParams, hash_grouping};
+use deferred_blend::grouping::{
+    Collisions, GraphParams, Groups, HashParams, OverlapGraph, Relaxation, hash_grouping, minimum_coloring,
+};
 use deferred_blend::{
-    Bending, BlendCounts, BlendInput, DiscInput, Discs, Floors, Glass, Layering, Params, Surfaces, blend,
+    Bending, BlendCounts, BlendInput, DiscInput, Discs, Floors, Glass, Layering, Opaque, OpaqueInput, Params, Passes,
+    Surfaces, blend, resolve_opaque,
 };
 use organza_benches::processor_ms;
 use splat_core::glam::DVec3;
@@ -17,13 +20,15 @@ use splat_core::{Accumulator, Camera, Cloud, FootprintStack, LayerSet, Material,
 /// Of the dragon in Fig. 17.
 const DISCS: u64 = 437_645;
 const SIZE: [u32; 2] = [1024, 1024];
+/// Numbers of points in Table 4, and that of Fig. 17.
+const TABLE_4: [u64; 5] = [137_000, 303_000, DISCS, 1_100_000, 2_000_000];
 
-fn dragon(opacity: f64) -> Cloud {
+fn dragon(discs: u64, opacity: f64) -> Cloud {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/stanford-dragon/dragon_res3.ply.gz");
     let (loaded, _) = read::file(file.as_ref(), &ReadParams::default(), None).expect("the dragon");
     let Loaded::Mesh(mesh) = loaded else { panic!("a mesh") };
     let splat = SplatParams { keep_clear: true, ..SplatParams::default() };
-    let params = MeshParams { density: Density::Splats(DISCS), opacity, splat };
+    let params = MeshParams { density: Density::Splats(discs), opacity, splat };
     let (mut cloud, _) = mesh_to_points(&mesh, &params, None).expect("discs of the dragon");
     cloud.canonicalize();
     cloud
@@ -45,8 +50,8 @@ struct Scene {
 }
 
 impl Scene {
-    fn new(opacity: f64, index: f32) -> Self {
-        let (cloud, camera) = (dragon(opacity), view());
+    fn new(discs: u64, opacity: f64, index: f32) -> Self {
+        let (cloud, camera) = (dragon(discs, opacity), view());
         let params = hbsort::Params { direction: splat_core::Direction::FrontToBack, ..hbsort::Params::default() };
         let order = hbsort::slice_cloud(&cloud, None, &camera, &params, &mut hbsort::Scratch::default());
         let ids = order.expect("an order").input_from_sorted;
@@ -67,10 +72,57 @@ impl Scene {
         let params = Params { transmittance_cutoff: 1.0 / 1024.0, ..Params::default() };
         blend(&input, &params, &mut picture, None).expect("nobody cancels").counts
     }
+
+    /// Groups of the discs as large as they are drawn.
+    fn groups(&self, factor: f32) -> Groups {
+        let relaxation = Relaxation { factor, ..Relaxation::default() };
+        let params = GraphParams { disc_scale: Params::default().disc_scale, relaxation, ..GraphParams::default() };
+        let graph = OverlapGraph::build(&self.cloud, &params, None).expect("a graph");
+        minimum_coloring(&graph, 256).expect("in range").groups
+    }
+
+    fn resolve(&self, discs: &Discs, passes: Passes<'_>) -> Opaque {
+        let (values, max_bytes) = (&self.values, 1 << 32);
+        let input = OpaqueInput { discs, values, channels: 3, objects: false, passes, max_bytes };
+        resolve_opaque(&input, &Params::default(), None).expect("nobody cancels")
+    }
+}
+
+/// The root of the mean squared difference of two pictures, and the share of pixels that differ by more than 1/255.
+fn compare(a: &Opaque, b: &Opaque) -> (f64, f64) {
+    let apart = |k: usize| (0..3).map(move |c| a.image.channels[c][k] - b.image.channels[c][k]).map(f32::abs);
+    let seen: Vec<f64> =
+        (0..a.disc.len()).filter(|&k| a.disc[k] != u32::MAX).map(|k| f64::from(apart(k).fold(0.0, f32::max))).collect();
+    let mean = |of: &dyn Fn(f64) -> f64| seen.iter().map(|d| of(*d)).sum::<f64>() / seen.len() as f64;
+    (mean(&|d| d * d).sqrt(), mean(&|d| f64::from(u8::from(d > 1.0 / 255.0))))
+}
+
+fn opaque(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("an opaque dragon");
+    group.sample_size(10).sampling_mode(SamplingMode::Flat);
+    for count in TABLE_4 {
+        let mut scene = Scene::new(count, 1.0, 1.0);
+        scene.ids.sort_unstable();
+        let discs = Discs::project(&scene.input(), &Params::default());
+        let [most, few] = [0.8, 0.4].map(|factor| scene.groups(factor));
+        let all = scene.resolve(&discs, Passes::TwoPlusOne);
+        for (name, passes) in [
+            ("2+1".into(), Passes::TwoPlusOne),
+            (format!("1+1, K = {}", most.count()), Passes::OnePlusOne { groups: &most, voronoi: false }),
+            (format!("1+1, K = {}, Eq. 14", few.count()), Passes::OnePlusOne { groups: &few, voronoi: true }),
+        ] {
+            let name = format!("{count}, {name}");
+            group.bench_function(&name, |b| b.iter(|| scene.resolve(&discs, passes)));
+            let before = processor_ms();
+            let picture = scene.resolve(&discs, passes);
+            let (time, (error, share)) = (processor_ms() - before, compare(&all, &picture));
+            println!("{name}: {time:.0} ms of processor time, RMSE {error:.1e}, {:.2} % over 1/255", 100.0 * share);
+        }
+    }
 }
 
 fn surfels(criterion: &mut Criterion) {
-    let scene = Scene::new(0.3, 1.0);
+    let scene = Scene::new(DISCS, 0.3, 1.0);
     let discs = Discs::project(&scene.input(), &Params::default());
     let counts = scene.blend(&discs, Layering::Gaps, None);
     println!(
@@ -98,7 +150,7 @@ fn surfels(criterion: &mut Criterion) {
     ] {
         bench(name, &|| _ = scene.blend(&discs, layering, None));
     }
-    let clear = Scene::new(0.0, 1.5);
+    let clear = Scene::new(DISCS, 0.0, 1.5);
     let discs = Discs::project(&clear.input(), &Params::default());
     let layout = ChannelLayout::new(&LayerSet::default());
     bench("hierarchy of glass", &|| drop(Surfaces::new(&clear.input(), &clear.values, layout)));
@@ -108,5 +160,5 @@ fn surfels(criterion: &mut Criterion) {
     bench("glass", &|| _ = clear.blend(&discs, Layering::Gaps, Some(glass)));
 }
 
-criterion_group!(benches, surfels);
+criterion_group!(benches, surfels, opaque);
 criterion_main!(benches);

@@ -23,6 +23,8 @@ const float FACING_AWAY = 0.00390625;
 const float LEAST_DEPTH = 0.03125;
 // The filter of what is solid, pixels.
 const float CORE_FILTER_PX = 0.03125;
+// Vectors of a footprint in the tables.
+const uint FOOTPRINT_VECTORS = 3u;
 // Half an extent that leaves nothing out.
 const float EVERYWHERE = 3.4028235e38;
 // Marks a disc that reaches through the eye plane: the sign of its first half extent.
@@ -38,8 +40,10 @@ struct Splat {
     uint look;
     // 1/integral of the profile for R = 1.
     float norm;
-    // Half the width of the share before a plane, for R = 1.
-    float depth;
+    // Half the width of the share before a plane, for R = 1, and the terms of that share.
+    float half_width;
+    vec4 low_terms;
+    vec2 high_terms;
     vec3 normal;
     vec3 tangent;
 };
@@ -140,19 +144,20 @@ Shape medium(Splat s, Center c) {
     precise float scale = 1.0 / reach_sq;
     precise float x_sq = 1.0 + c.u * c.u;
     precise float y_sq = 1.0 + c.v * c.v;
-    precise float depth = s.radius * s.depth;
-    float front = c.before < depth ? share_in_front(c.before / depth) : 1.0;
+    precise float per_depth = 1.0 / (s.radius * s.half_width);
+    precise float distance = c.before * per_depth;
+    float front = distance < 1.0 ? share_before(s.low_terms, s.high_terms, distance) : 1.0;
     precise float a = y_sq * scale;
     precise float b = 2.0 * (c.u * c.v * scale);
     precise float d = x_sq * scale;
-    precise float peak = s.cross_section * s.norm / radius_sq * front;
+    precise float whole = s.cross_section * s.norm / radius_sq;
+    precise float peak = whole * front;
     vec2 half_extent = vec2(sqrt(reach_sq));
     if (view.orthographic == 0u) {
         precise float ratio_sq = reach_sq / (view.focal * view.focal);
         half_extent = vec2(extent_of_ball(c.u, x_sq, ratio_sq), extent_of_ball(c.v, y_sq, ratio_sq));
         peak = in_view(c, sqrt(radius_sq)) ? peak : 0.0;
     }
-    precise float per_depth = 1.0 / depth;
     precise float per_front = 1.0 / front;
     return Shape(vec3(a, b, d), vec3(0.0), peak, half_extent, vec2(per_depth, per_front), false);
 }
@@ -218,7 +223,7 @@ Shape disc(Splat s, Center c) {
     }
     uint kind = s.look >> 24;
     // First number behind the footprints: 1 for a slab whose optical depth grows at grazing angles.
-    if (kind == SURFACE && tables[view.footprints + (s.look & 0xffffu)].x > 0.0) {
+    if (kind == SURFACE && tables[FOOTPRINT_VECTORS * view.footprints + (s.look & 0xffffu)].x > 0.0) {
         peak = peak / max(abs(along) / length_d, 1.0e-3);
     }
     // The side of the plane that the eye is on: for a centre behind the eye `along` has the other sign.
@@ -266,9 +271,12 @@ bool project(uint i) {
     if (view.frame_words > TANGENT_WORD) {
         s.tangent = vec3(frames[at + 3u], frames[at + 4u], frames[at + 5u]);
     }
-    vec4 footprint = tables[(s.look >> 16) & 255u];
+    uint at_footprint = FOOTPRINT_VECTORS * ((s.look >> 16) & 255u);
+    vec4 footprint = tables[at_footprint];
     s.norm = footprint.x;
-    s.depth = footprint.z;
+    s.half_width = footprint.z;
+    s.low_terms = tables[at_footprint + 1u];
+    s.high_terms = tables[at_footprint + 2u].xy;
     vec3 offset = vec3(positions[3u * i], positions[3u * i + 1u], positions[3u * i + 2u]);
     Center c = center_of(offset, footprint.y, s.radius);
     Shape shape;

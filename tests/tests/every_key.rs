@@ -5,6 +5,7 @@
 
 mod scenes;
 mod schema;
+mod surfels;
 mod table;
 
 use scenes::{Folder, SOURCES};

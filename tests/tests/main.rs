@@ -10,7 +10,7 @@ mod command;
 mod doubts;
 mod environment;
 mod every_key;
-#[cfg(target_os = "linux")]
+#[cfg(all(target_os = "linux", feature = "deep"))]
 mod every_scene;
 mod exact_particles;
 mod eye_inside;
@@ -32,6 +32,7 @@ mod progress;
 mod reading;
 mod sheets;
 mod slanted_slabs;
+mod surfel_layers;
 mod surfels;
 mod techniques;
 mod truth;

@@ -29,6 +29,13 @@ pub(crate) const FEATURES: &str = "hbsort/gpu,pbsr/gpu,splat-core/gpu,tsm/gpu";
 /// The feature that asks for a Vulkan driver.
 pub(crate) const DRIVER: &str = "gpu-conformance/driver";
 
+/// The feature of the end-to-end tests that take long.
+const DEEP: &str = "organza-tests/deep";
+
+/// The end-to-end tests that are compiled with [`DEEP`] alone.
+const DEEP_TESTS: &str =
+    "test --package organza-tests --features organza-tests/deep --test end-to-end -- every_scene:: gyroid";
+
 /// Jobs that need more than the pinned toolchain: named, so that nobody believes that they ran.
 const SKIPPED: [&str; 1] =
     ["skipped: miri (needs a nightly toolchain; the only unsafe code, in gpu-ash, calls Vulkan, which miri cannot)"];
@@ -92,8 +99,7 @@ fn steps(repo: &Repo) -> Vec<Step> {
         step("fmt", one("fmt --all --check")),
         step("tidy", Work::Task(tidy::run)),
         step("papers", Work::Task(papers::check)),
-        // All targets: examples, tests and benches compile here too.
-        step("clippy", one(&format!("clippy --workspace --all-targets --features {FEATURES},{DRIVER} -- -D warnings"))),
+        step("clippy", one(&clippy())),
         step("docs", docs),
         step("alone", Work::Cargo(alone(repo, is_picked), &[])),
         step("tests", Work::Task(vulkan::tests)),
@@ -101,14 +107,20 @@ fn steps(repo: &Repo) -> Vec<Step> {
     ]
 }
 
+/// All targets: examples, tests and benches compile here too.
+pub(crate) fn clippy() -> String {
+    format!("clippy --workspace --all-targets --features {FEATURES},{DRIVER},{DEEP} -- -D warnings")
+}
+
 /// What takes minutes and rarely breaks where [`run`] holds, to be run before a release: kernels compiled anew, where tests hold the
 /// hashes of what they were compiled from; the orchestrator's crates each without what the others ask of their dependencies;
-/// recordings by every executor under every validation.
+/// recordings by every executor under every validation; every scene drawn, and forms that take long.
 pub(crate) fn deep(repo: &Repo) -> Outcome {
     let steps = [
         Step { name: "shaders", work: Work::Task(|repo| shaders::run(repo, true)) },
         Step { name: "alone", work: Work::Cargo(alone(repo, |folder| !is_picked(folder)), &[]) },
         Step { name: "vulkan", work: Work::Task(vulkan::run) },
+        Step { name: "scenes", work: Work::Cargo(vec![split(DEEP_TESTS)], &[]) },
     ];
     follow(&steps, repo)
 }

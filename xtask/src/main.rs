@@ -18,7 +18,7 @@ const HELP: &str = "\
 usage: cargo xtask COMMAND
 
   ci               everything that must hold before a merge, step by step; stops at the first failure
-  deep             what takes minutes and rarely breaks: kernels compiled anew, GPU work under every validation
+  deep             what takes minutes and rarely breaks: kernels compiled anew, GPU work under every validation, every scene drawn
   quick            format, rules, clippy, and the tests of the crates that changed since main
   tidy             the rules that the compiler does not know: heads, sizes, dependency direction, assets
   papers           writes docs/papers.md from docs/papers/*.toml

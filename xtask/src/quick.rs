@@ -3,7 +3,7 @@
 //! Format, rules and clippy of everything, and the tests of the crates that differ from main, in the working tree too. Tests of
 //! the whole command and of devices are `cargo xtask ci`'s, unless they changed themselves.
 
-use crate::ci::{DRIVER, FEATURES, Step, Work, follow, split};
+use crate::ci::{FEATURES, Step, Work, clippy, follow, split};
 use crate::repo::{Outcome, Repo};
 use crate::toml_lines::{lines, string};
 use crate::{papers, tidy};
@@ -19,12 +19,11 @@ pub(crate) fn run(repo: &Repo) -> Outcome {
 
 fn steps(packages: &BTreeSet<String>) -> Vec<Step> {
     let cargo = |line: String| Work::Cargo(vec![split(&line)], &[]);
-    let clippy = format!("clippy --workspace --all-targets --features {FEATURES},{DRIVER} -- -D warnings");
     let mut steps = vec![
         Step { name: "fmt", work: cargo("fmt --all --check".to_owned()) },
         Step { name: "tidy", work: Work::Task(tidy::run) },
         Step { name: "papers", work: Work::Task(papers::check) },
-        Step { name: "clippy", work: cargo(clippy) },
+        Step { name: "clippy", work: cargo(clippy()) },
     ];
     if !packages.is_empty() {
         let mut line = "test".to_owned();

@@ -115,8 +115,8 @@ pub fn surface<F: ScalarField + ?Sized>(
     params: &MeshParams,
 ) -> Result<Prediction, ConvertError> {
     params.splat.check()?;
-    let coarse = if params.shows() { coarse_mesh(field, bounds, &params.splat)? } else { Mesh::default() };
     let spacing = surface_spacing(field, bounds, params)?;
+    let coarse = if params.shows() { coarse_mesh(field, bounds, spacing, &params.splat)? } else { Mesh::default() };
     // As if it were smooth.
     let tangent = params.opacity >= 1.0 && !open_edges(&coarse).is_empty();
     let wanted = Wanted { tangent, ..mesh_points::wanted(params.opacity) };

@@ -131,19 +131,21 @@ pub(crate) fn surface_spacing<F: ScalarField + ?Sized>(
         Density::Spacing(h) => p.check_spacing(h)? / p.transform.scale,
         Density::Auto => longest / AUTO_CELLS,
         Density::Splats(n) => {
-            let area = area(&coarse_mesh(field, bounds, p)?);
+            let area = area(&coarse_mesh(field, bounds, 0.0, p)?);
             if area > 0.0 { (area / n.max(1) as f64).sqrt() } else { longest / AUTO_CELLS }
         }
     })
 }
 
-/// A zero set by a first look, object space.
+/// A zero set by a first look, object space: no finer than the lattice of splats `spacing` apart.
 pub(crate) fn coarse_mesh<F: ScalarField + ?Sized>(
     field: &F,
     bounds: DAabb,
+    spacing: f64,
     splat: &SplatParams,
 ) -> Result<Mesh, ConvertError> {
-    field_to_mesh(field, bounds, bounds.size().max_element() / COARSE_CELLS, splat, None)
+    let cell = (bounds.size().max_element() / COARSE_CELLS).max(spacing * CELL_OVER_SPACING);
+    field_to_mesh(field, bounds, cell, splat, None)
 }
 
 pub(crate) fn area(mesh: &Mesh) -> f64 {
@@ -236,6 +238,36 @@ pub fn field_to_grid<F: ScalarField + ?Sized>(
     progress: Option<&Progress>,
 ) -> Result<Grid, ConvertError> {
     sample(field, &lattice(bounds, spacing, splat)?, splat, progress.unwrap_or(&Progress::new()))
+}
+
+/// A density as extinction, 1/world unit, at the middles of cells that fill its box, and the transfer function that takes it as
+/// it is: the same medium as [`density_to_points`], for who draws volumes.
+///
+/// # Errors
+/// As [`density_to_points`].
+pub fn density_to_grid<F: ScalarField + ?Sized>(
+    field: &F,
+    bounds: DAabb,
+    params: &DensityParams,
+) -> Result<(Grid, TransferFunction), ConvertError> {
+    let splat = &params.volume.splat;
+    let mut grid = sample(field, &density_lattice(bounds, params)?, splat, &Progress::new())?;
+    let extinction = params.extinction as f32;
+    grid.values.iter_mut().for_each(|v| *v = (*v * extinction).max(0.0));
+    let most = grid.values.iter().copied().fold(0.0, f32::max);
+    let transfer = extinction_as_it_is(f64::from(most), splat)?;
+    Ok((grid, transfer))
+}
+
+/// The transfer function that takes values up to `most` as extinction, 1/world unit, in the splats' colour.
+///
+/// # Errors
+/// [`ConvertError::Input`] for what is no finite number.
+pub fn extinction_as_it_is(most: f64, params: &SplatParams) -> Result<TransferFunction, ConvertError> {
+    let point = |value: f32| TransferPoint { value, color: params.color, extinction: value };
+    let most = (most as f32 > 0.0).then_some(most as f32);
+    let points = std::iter::once(0.0).chain(most).map(point).collect();
+    TransferFunction::new(points).map_err(|source| ConvertError::Input { object: params.object_name.clone(), source })
 }
 
 /// The field at the middles of a lattice's cells.

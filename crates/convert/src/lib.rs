@@ -51,6 +51,7 @@ mod raw_points;
 pub mod read;
 pub mod reference;
 mod resample;
+mod search;
 mod section;
 mod shapes;
 mod sobel;
@@ -73,7 +74,8 @@ pub use error::{Fault, Place, ReadError, escaped_path};
 #[cfg(feature = "expression")]
 pub use expression::{ExpressionError, ExpressionField};
 pub use field_points::{
-    DensityParams, density_to_points, field_to_grid, field_to_mesh, surface_to_mesh, surface_to_points,
+    DensityParams, density_to_grid, density_to_points, extinction_as_it_is, field_to_grid, field_to_mesh,
+    surface_to_mesh, surface_to_points,
 };
 pub use grid_field::{GridField, Inside, Interpolation};
 pub use marching_cubes::isosurface_to_mesh;
@@ -87,6 +89,7 @@ pub use params::{Density, SplatParams};
 pub use procedural::{CloudShape, Ellipsoid, procedural_cloud};
 pub use raw_points::{PointLattice, RawPoints};
 pub use resample::resampled;
+pub use search::{ZeroSearch, extinct_bounds};
 pub use section::{Section, volume_section};
 pub use shapes::{Rectangle, medium_ball, medium_ball_grid, medium_box, medium_box_grid, rectangle};
 pub use sobel::{sobel_gradient, sobel_gradient_into};

@@ -129,9 +129,7 @@ mod tests {
         let (center, splat) = (DVec3::splat(1.75), SplatParams::default());
         let mesh =
             volume_section(grid.into(), &transfer, &Section { center, normal, spacing: 0.2 }, &splat, None).unwrap();
-        let corner = |v: u32| mesh.position[v as usize].as_dvec3();
-        let area = |t: &[u32; 3]| 0.5 * (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).length();
-        let total: f64 = mesh.triangles.iter().map(area).sum();
+        let total = mesh.area();
         assert!((total - 1.5 * 1.5 * 2f64.sqrt()).abs() < 1e-5, "{total}");
         for (p, color) in mesh.position.iter().zip(&mesh.color) {
             let p = mesh.origin + p.as_dvec3();

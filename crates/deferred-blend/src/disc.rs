@@ -13,10 +13,13 @@
 
 use crate::Params;
 use crate::cone::Cone;
+use crate::grouping::Membership;
 use rayon::prelude::*;
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::optics::{self, SurfaceOpacity};
 use splat_core::raster::kernel::Kernel;
+use splat_core::raster::lanes::Lanes;
+use splat_core::raster::pulp::Simd;
 use splat_core::{Camera, Cloud, FootprintStack, Material, SplatKind};
 
 /// Discs projected by one task.
@@ -128,7 +131,15 @@ impl Discs {
     /// # Panics
     /// If an id, a material or a footprint is out of range, or a splat is a piece of a medium.
     pub fn project(input: &DiscInput<'_>, params: &Params) -> Self {
-        let view = View::new(input);
+        Self::project_members(input, params, None)
+    }
+
+    /// The same with discs as large as their groups draw them.
+    ///
+    /// # Panics
+    /// As [`Discs::project`], and if `members` are not of the input's cloud.
+    pub fn project_members(input: &DiscInput<'_>, params: &Params, members: Option<&Membership>) -> Self {
+        let view = View::new(input, members);
         let chunks = input.ids.par_chunks(CHUNK);
         let depths = |ids: &[u32]| ids.iter().map(|&i| view.depths(i as usize, params)).fold(NO_DEPTHS, wider);
         let depths = chunks.clone().map(depths).reduce(|| NO_DEPTHS, wider).map(|d| d as f32);
@@ -150,6 +161,17 @@ impl Discs {
             focal: view.focal as f32,
             parallel: view.parallel,
         }
+    }
+
+    /// n of Eq. 10 for which a step of depth is as long as ε: the gap of the parameters, times the mean radius of the discs.
+    pub fn depth_steps(&self, params: &Params) -> u32 {
+        let of_chunk = |discs: &[Disc]| discs.iter().map(|disc| f64::from(disc.radius)).sum::<f64>();
+        // Chunk by chunk in order, so that the sum does not depend on threads.
+        let sums: Vec<f64> = self.discs.par_chunks(CHUNK).map(of_chunk).collect();
+        let radius = sums.iter().sum::<f64>() / self.discs.len().max(1) as f64;
+        let [near, far] = self.depths.map(f64::from);
+        let steps = ((far - near) / (f64::from(params.gap) * radius)).ceil();
+        if steps.is_finite() { steps.clamp(1.0, f64::from(u32::MAX)) as u32 } else { 1 }
     }
 
     /// The ray of a pixel.
@@ -184,7 +206,31 @@ fn wider(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
 
+/// Where the rays of some pixels meet a disc's plane.
+pub(crate) struct Meeting<S: Simd> {
+    /// N, and one over it.
+    pub(crate) facing: Lanes<S>,
+    pub(crate) inverse: Lanes<S>,
+    /// ρ²/R², R the radius within which the disc counts; not below 1, or no number, where the ray lies in the plane.
+    pub(crate) distance_sq: Lanes<S>,
+    pub(crate) depth: Lanes<S>,
+}
+
 impl Disc {
+    /// The rays of pixels at some offsets from [`Disc::center`].
+    #[inline(always)]
+    pub(crate) fn meet<S: Simd>(&self, simd: S, [dx, dy]: [Lanes<S>; 2]) -> Meeting<S> {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let linear = |at: f32, slope: [f32; 2]| of(slope[1]).mul_add(dy, of(slope[0]).mul_add(dx, of(at)));
+        let facing = linear(self.facing, self.facing_slope);
+        let inverse = of(1.0) / facing;
+        // Not by a map of an array: the compiler does not inline that, and calls a function for every instruction.
+        let u = linear(self.along[0], self.along_slope[0]) * inverse;
+        let v = linear(self.along[1], self.along_slope[1]) * inverse;
+        let depth = linear(self.depth, self.depth_slope) * inverse;
+        Meeting { facing, inverse, distance_sq: u * u + v * v, depth }
+    }
+
     fn is_in_view(&self) -> bool {
         let [x0, x1, y0, y1] = self.pixels;
         x0 < x1 && y0 < y1
@@ -194,6 +240,7 @@ impl Disc {
 /// The camera's side of a projection.
 struct View<'a> {
     input: &'a DiscInput<'a>,
+    members: Option<&'a Membership>,
     rotation: DMat3,
     /// From the cloud's origin to the eye.
     shift: DVec3,
@@ -203,11 +250,12 @@ struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    fn new(input: &'a DiscInput<'a>) -> Self {
+    fn new(input: &'a DiscInput<'a>, members: Option<&'a Membership>) -> Self {
         let camera = input.camera;
         let (rotation, shift) = into_view(input);
         Self {
             input,
+            members,
             rotation,
             shift,
             focal: camera.focal_px(),
@@ -216,11 +264,17 @@ impl<'a> View<'a> {
         }
     }
 
+    /// Semi-axes of a disc, in the camera's space.
+    fn axes(&self, i: usize, params: &Params) -> [DVec3; 2] {
+        let reach = self.members.map_or(1.0, |members| f64::from(members.reach(i)));
+        axes(self.input.cloud, i, f64::from(params.disc_scale) * reach).map(|a| self.rotation * a)
+    }
+
     /// Nearest and farthest depth of a disc, cut at the eye plane.
     fn depths(&self, i: usize, params: &Params) -> [f64; 2] {
         let cloud = self.input.cloud;
         let depth = (self.rotation * (cloud.position[i].as_dvec3() + self.shift)).z;
-        let reach = squares(axes(cloud, i, f64::from(params.disc_scale)).map(|a| self.rotation * a), 2).sqrt();
+        let reach = squares(self.axes(i, params), 2).sqrt();
         if depth + reach > 0.0 { [(depth - reach).max(0.0), depth + reach] } else { NO_DEPTHS }
     }
 
@@ -229,7 +283,7 @@ impl<'a> View<'a> {
         assert_ne!(cloud.kind[i], SplatKind::Medium, "invariant: discs alone are blended");
         let center = self.rotation * (cloud.position[i].as_dvec3() + self.shift);
         let normal = self.rotation * cloud.normal_of(i).as_dvec3();
-        let axes = axes(cloud, i, f64::from(params.disc_scale)).map(|a| self.rotation * a);
+        let axes = self.axes(i, params);
         let disc =
             if self.parallel { self.parallel(center, normal, axes) } else { self.perspective(center, normal, axes) };
         (disc, look(self.input, i))

@@ -132,7 +132,7 @@ fn algorithm_1(
     for group in 0..count {
         let mut image = Blended::NOTHING;
         let mut last = f32::INFINITY;
-        let own = |f: &&Fragment| u32::from(floor.groups.of()[input.discs.ids[f.disc as usize] as usize]) == group;
+        let own = |f: &&Fragment| floor.groups.has(input.discs.ids[f.disc as usize] as usize, group);
         for fragment in fragments.iter().filter(own).rev() {
             let step = floor.step(fragment.depth);
             if step < last {

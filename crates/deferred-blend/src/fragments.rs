@@ -3,7 +3,7 @@
 //! A block has 16 pixels, so its fragments fit into the nearest cache however many layers there are, and memory does not grow with
 //! the number of discs that lie at one place times the image.
 
-use crate::disc::{Disc, Discs};
+use crate::disc::{Disc, Discs, Meeting};
 use splat_core::raster::bins::Bins;
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::{self, Simd};
@@ -61,7 +61,8 @@ impl BlockLists {
         }
     }
 
-    fn block(&self, b: usize) -> &[u32] {
+    /// The discs that touch a block.
+    pub(crate) fn block(&self, b: usize) -> &[u32] {
         &self.discs[self.starts[b] as usize..self.starts[b + 1] as usize]
     }
 }
@@ -128,16 +129,9 @@ fn meet_block<S: Simd>(
     let of = |v: f32| Lanes::splat(simd, v);
     let (disc, look) = (&discs.discs[i as usize], &discs.looks[i as usize]);
     let kernel = &discs.kernels[look.footprint as usize];
-    let [x, y] = position(b * PIXELS, corner[0], corner[1]);
-    let from = [x as f32 + 0.5 - disc.center[0], y as f32 + 0.5 - disc.center[1]];
+    let first = position(b * PIXELS, corner[0], corner[1]);
     for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
-        let (dx, dy) = (of(from[0]) + Lanes::load(simd, &X[lane..]), of(from[1]) + Lanes::load(simd, &Y[lane..]));
-        let linear = |at: f32, slope: [f32; 2]| of(slope[1]).mul_add(dy, of(slope[0]).mul_add(dx, of(at)));
-        let facing = linear(disc.facing, disc.facing_slope);
-        let inverse = of(1.0) / facing;
-        let [u, v] = [0, 1].map(|k| linear(disc.along[k], disc.along_slope[k]) * inverse);
-        let distance_sq = u * u + v * v;
-        let depth = linear(disc.depth, disc.depth_slope) * inverse;
+        let Meeting { facing, distance_sq, depth, .. } = disc.meet(simd, offsets(simd, disc, first, lane));
         let weight = kernel.profile(simd, (of(1.0) - distance_sq).max(of(0.0)).where_less(distance_sq, of(1.0)));
         let mut hits = [[0.0; MAX_LANES]; 4];
         for (value, to) in [weight.where_less(of(0.0), depth), depth, distance_sq, facing.abs()].iter().zip(&mut hits) {
@@ -151,6 +145,13 @@ fn meet_block<S: Simd>(
             }
         }
     }
+}
+
+/// Offsets from a disc's centre of the pixels from `lane` on of the block whose first pixel is `first`.
+#[inline(always)]
+pub(crate) fn offsets<S: Simd>(simd: S, disc: &Disc, first: [usize; 2], lane: usize) -> [Lanes<S>; 2] {
+    let from = |axis: usize| Lanes::splat(simd, first[axis] as f32 + 0.5 - disc.center[axis]);
+    [from(0) + Lanes::load(simd, &X[lane..]), from(1) + Lanes::load(simd, &Y[lane..])]
 }
 
 /// Offsets of the pixels of a block from its first.

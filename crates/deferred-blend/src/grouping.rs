@@ -9,7 +9,7 @@
 //! | [`hash_grouping`] | section 4.3, Eq. 9 | given | more, at a fraction of the time |
 //!
 //! The colourings work on an [`OverlapGraph`] (Eq. 5). Groups hold for every view. [`extended`] covers the surface by each group
-//! alone (section 4.4).
+//! alone (section 4.4). A [`Recipe`] makes groups and their coverage in one go, a [`KeptGroups`] finds them again when an object has moved.
 //!
 //! No method depends on the order of the cloud, on the number of threads, on the cloud's origin, or on a scale by a power of two:
 //! ties are broken by the canonical order of the cloud ([`Cloud::canonical_order`](splat_core::Cloud::canonical_order)).
@@ -35,13 +35,19 @@ mod cells;
 pub mod extended;
 mod graph;
 mod hash;
+mod kept;
+mod membership;
 mod minimum;
+mod recipe;
 mod surfels;
 mod weighted;
 
 pub use graph::{Coplanar, GraphParams, OverlapGraph, Relaxation};
 pub use hash::{Collisions, HashParams, covering_factor, hash_grouping};
+pub use kept::KeptGroups;
+pub use membership::Membership;
 pub use minimum::{Coloring, minimum_coloring};
+pub use recipe::{Coverage, Method, Recipe};
 pub use weighted::{WeightedParams, weighted_coloring, weighted_cost};
 
 use crate::Error;
@@ -49,11 +55,19 @@ use crate::Error;
 /// Most groups: a disc's group takes one byte.
 pub const MOST_GROUPS: u32 = 256;
 
-/// For each disc, the group that it is a member of.
+/// For each disc, the group that it is a member of, and further ones that it was added to.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Groups {
     count: u32,
     of: Vec<u8>,
+    further: Further,
+}
+
+/// Groups of each disc beside its own, as compressed rows; empty where no disc has any.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+struct Further {
+    starts: Vec<u32>,
+    groups: Vec<u8>,
 }
 
 impl Groups {
@@ -66,7 +80,24 @@ impl Groups {
         if let Some(group) = of.iter().find(|&&group| u32::from(group) >= count) {
             return Err(Error::parameter("group of a disc", group, "below the number of groups"));
         }
-        Ok(Self { count, of })
+        Ok(Self::of_each(count, of))
+    }
+
+    /// Groups that were made here.
+    fn of_each(count: u32, of: Vec<u8>) -> Self {
+        Self { count, of, further: Further::default() }
+    }
+
+    /// The same groups with discs added to them, such as [`extended::duplicates`]: for each group the places of those in the cloud.
+    ///
+    /// # Panics
+    /// If a place is out of range.
+    pub fn with_further(self, added: &[Vec<u32>]) -> Self {
+        let mut rows: Vec<Vec<u8>> = vec![Vec::new(); self.of.len()];
+        for (group, places) in (0u8..).zip(added) {
+            places.iter().for_each(|&place| rows[place as usize].push(group));
+        }
+        Self { further: Further::of(rows.iter().map(Vec::as_slice)), ..self }
     }
 
     /// Number of groups K; a group may be empty.
@@ -77,6 +108,39 @@ impl Groups {
     /// Group of each disc, by its place in the cloud, less than [`Groups::count`].
     pub fn of(&self) -> &[u8] {
         &self.of
+    }
+
+    /// Groups that the disc at a place was added to.
+    ///
+    /// # Panics
+    /// If the place is out of range.
+    pub fn further(&self, place: usize) -> &[u8] {
+        let starts = &self.further.starts;
+        if starts.is_empty() { &[] } else { &self.further.groups[starts[place] as usize..starts[place + 1] as usize] }
+    }
+
+    /// Whether the disc at a place is a member of a group, by itself or because it was added.
+    #[inline]
+    pub fn has(&self, place: usize, group: u32) -> bool {
+        u32::from(self.of[place]) == group || self.further(place).iter().any(|g| u32::from(*g) == group)
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> u64 {
+        let Further { starts, groups } = &self.further;
+        (size_of_val(&*self.of) + size_of_val(&**starts) + size_of_val(&**groups)) as u64
+    }
+}
+
+impl Further {
+    /// Rows in the order of the discs; all empty ones are none.
+    fn of<'a>(rows: impl Iterator<Item = &'a [u8]>) -> Self {
+        let mut all = Self { starts: vec![0], groups: Vec::new() };
+        for row in rows {
+            all.groups.extend_from_slice(row);
+            all.starts.push(all.groups.len() as u32);
+        }
+        if all.groups.is_empty() { Self::default() } else { all }
     }
 }
 

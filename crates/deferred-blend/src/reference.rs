@@ -1,11 +1,20 @@
 //! Every ray with every disc, in f64: slow, and what the rest is judged by. It shares the gap rule's formula with
 //! [`blend`](crate::blend()), not its code, and none of its projection.
 
+mod opaque;
+
+pub use opaque::{Seen, opaque};
+
 use crate::disc::axes;
 use crate::{DiscInput, Params};
+use rayon::prelude::*;
 use splat_core::optics::{self, SurfaceOpacity};
 use splat_core::shade::ChannelLayout;
 use splat_core::{Camera, Footprint, glam::DVec3};
+use std::ops::Range;
+
+/// Pixels along a side of the squares whose discs are looked for together.
+const SIDE: u32 = 8;
 
 /// One layer of a pixel.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,7 +48,7 @@ pub fn layers(
     values: &[f32],
     [planes, channels]: [usize; 2],
 ) -> Vec<Layer> {
-    let (origin, direction) = world_ray(input.camera, x, y);
+    let (origin, direction) = world_ray(input.camera, f64::from(x) + 0.5, f64::from(y) + 0.5);
     let hits = hits(input, params, origin, direction);
     let core = f64::from(Footprint::CORE / params.disc_scale).powi(2);
     let mut layers = Vec::new();
@@ -59,6 +68,55 @@ pub fn layers(
     layers
 }
 
+/// What a pixel shows, and what it lets through, of the layers nearer than its entry in `opaque`, which is empty where nothing is:
+/// pixels in rows, each as [`composite`] has it. `sizes` are those of [`layers`].
+///
+/// A square of pixels asks the discs whose balls its rays may meet.
+pub fn picture(
+    input: &DiscInput<'_>,
+    params: &Params,
+    values: &[f32],
+    sizes: [usize; 2],
+    opaque: &[f32],
+) -> Vec<(Vec<f64>, Vec<f64>)> {
+    let [width, height] = input.camera.size;
+    let columns = width.div_ceil(SIDE);
+    let mut squares: Vec<Vec<u32>> = vec![Vec::new(); (columns * height.div_ceil(SIDE)) as usize];
+    for &id in input.ids {
+        let [x, y] = squares_of(input, id, params);
+        y.for_each(|y| x.clone().for_each(|x| squares[(y * columns + x) as usize].push(id)));
+    }
+    let one = |k: u32| {
+        let (x, y) = (k % width, k / width);
+        let ids = &squares[(y / SIDE * columns + x / SIDE) as usize];
+        let limit = opaque.get(k as usize).map_or(f64::INFINITY, |depth| f64::from(*depth));
+        let mut layers = layers(&DiscInput { ids, ..*input }, params, [x, y], values, sizes);
+        layers.retain(|layer| layer.depth < limit);
+        composite(&layers, sizes[0], sizes[1])
+    };
+    (0..width * height).into_par_iter().map(one).collect()
+}
+
+/// Columns and rows of squares in which the ball around a disc may lie.
+fn squares_of(input: &DiscInput<'_>, id: u32, params: &Params) -> [Range<u32>; 2] {
+    let DiscInput { cloud, camera, .. } = input;
+    let i = id as usize;
+    let reach = axes(cloud, i, f64::from(params.disc_scale)).iter().map(|a| a.length()).fold(0.0, f64::max);
+    let center = camera.view_from_world(cloud.origin + cloud.position[i].as_dvec3());
+    let crosses = !camera.is_orthographic() && center.z <= reach;
+    let range = |middle: f64, size: u32| {
+        if crosses {
+            return 0..size.div_ceil(SIDE);
+        }
+        let depths = if camera.is_orthographic() { [1.0; 2] } else { [center.z - reach, center.z + reach] };
+        let places = depths.into_iter().flat_map(|z| [(middle - reach) / z, (middle + reach) / z]);
+        let (low, high) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        let pixel = |v: f64| (0.5 * f64::from(size) + camera.focal_px() * v).clamp(0.0, f64::from(size));
+        pixel(low) as u32 / SIDE..(pixel(high).ceil() as u32).div_ceil(SIDE)
+    };
+    [range(center.x, camera.size[0]), range(-center.y, camera.size[1])]
+}
+
 /// Beauty and transmittance by plane of layers in order.
 pub fn composite(layers: &[Layer], planes: usize, channels: usize) -> (Vec<f64>, Vec<f64>) {
     let (mut sums, mut through) = (vec![0.0; channels], vec![1.0; planes]);
@@ -72,8 +130,8 @@ pub fn composite(layers: &[Layer], planes: usize, channels: usize) -> (Vec<f64>,
 }
 
 /// From the eye, or a place of the eye's plane, along the view: the part along the camera's axis is 1.
-fn world_ray(camera: &Camera, x: u32, y: u32) -> (DVec3, DVec3) {
-    let (from, along) = camera.view_ray(f64::from(x) + 0.5, f64::from(y) + 0.5);
+fn world_ray(camera: &Camera, x: f64, y: f64) -> (DVec3, DVec3) {
+    let (from, along) = camera.view_ray(x, y);
     let world = |v: DVec3| camera.axes[0] * v.x + camera.axes[1] * v.y + camera.axes[2] * v.z;
     (camera.position + world(from), world(along))
 }

@@ -16,7 +16,7 @@ fn draw(scene: &Scene, layering: Layering<'_>) -> Accumulator {
 }
 
 /// Each disc a group of its own, by turns of K.
-fn by_turns(cloud: &Cloud, count: u32) -> Groups {
+pub(crate) fn by_turns(cloud: &Cloud, count: u32) -> Groups {
     Groups::new(count, (0..cloud.len()).map(|i| (i % count as usize) as u8).collect()).expect("below the count")
 }
 

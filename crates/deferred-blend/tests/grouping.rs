@@ -10,6 +10,8 @@ mod hash;
 mod invariance;
 #[path = "grouping/minimum.rs"]
 mod minimum;
+#[path = "grouping/recipe.rs"]
+mod recipe;
 #[path = "grouping/weighted.rs"]
 mod weighted;
 

@@ -4,4 +4,6 @@ mod blend;
 mod floored;
 mod glass;
 mod grouping;
+mod hard_cases;
+mod opaque;
 mod scenes;

@@ -3,8 +3,10 @@
 //! Splats are lit once; then the translucent ones are composited in each order, with nothing cut off, and compared with the
 //! picture in which the fragments of every pixel are sorted by their own depth, in f64. Opaque surfaces enter as in any
 //! render. So the order is all that differs. The technique `particles` stands beside them: it orders nothing; here its
-//! particles are sampled from the same splats, and its pictures of several seeds are judged by the same truth.
+//! particles are sampled from the same splats, and its pictures of several seeds are judged by the same truth. So do the ways in which
+//! `surfels` tells layers apart, which have a truth of their own.
 
+mod layers;
 mod report;
 mod sorter;
 
@@ -31,6 +33,7 @@ const LOAD: &str = "first look";
 const ORDERS: &str = "orders";
 const TRUTH: &str = "exact truth";
 const SETS_OF_PARTICLES: &str = "particles";
+const LAYERS: &str = "layers";
 
 /// About as many rays are looked at for wrong pairs.
 const RAYS: f64 = 20_000.0;
@@ -58,6 +61,8 @@ pub struct Ordered {
     pub bytes: u64,
     /// What the seeds of a random technique say together, by the truth as limit.
     pub sampled: Option<Sampled>,
+    /// Whether it averages the discs of a layer, and is judged by [`Comparison::layers`].
+    pub of_layers: bool,
 }
 
 /// Pictures by every ordering, and the truth.
@@ -73,6 +78,8 @@ pub struct Comparison {
     pub splats: u64,
     /// Why `particles`, which need no order, cannot show the scene; `None` where they do.
     pub without_particles: Option<String>,
+    /// The discs of each layer averaged, all layers composited, in f64; or why there are none.
+    pub layers: Result<Image<Linear>, String>,
 }
 
 /// Draws a scene by every ordering. `scene.render` counts but for what concerns order, cut-offs and layers.
@@ -81,7 +88,7 @@ pub struct Comparison {
 /// As [`organza::render`]; [`Error::Input`] for a scene without translucent splats.
 pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Comparison, Error> {
     let scene = by_slices_alone(scene);
-    progress.plan([(LOAD, 2.0), (ORDERS, 8.0), (TRUTH, 8.0), (SETS_OF_PARTICLES, 8.0)]);
+    progress.plan([(LOAD, 2.0), (ORDERS, 8.0), (TRUTH, 8.0), (SETS_OF_PARTICLES, 8.0), (LAYERS, 8.0)]);
     progress.begin(LOAD);
     progress.enter();
     let loaded = load(&scene, options, progress)?;
@@ -102,9 +109,7 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
         return Err(Error::input("scene", message, ""));
     }
     let auto = auto.thickness;
-    let input = exact_input(&loaded, &camera, shaded, frame.raster_params().resampling_sigma_px);
-    let pixels = f64::from(camera.size[0]) * f64::from(camera.size[1]);
-    let rays = Rays::new(&input, (pixels / RAYS).sqrt().ceil() as usize);
+    let rays = rays(&exact_input(&loaded, &camera, shaded, frame.raster_params().resampling_sigma_px));
     let world = libm::exp2(f64::from(loaded.exponent));
     let sliced = THICKER.map(|f| Ordering::Slices(f * auto));
     let all = [&[Ordering::Exact][..], &sliced, &[Ordering::Centre, Ordering::Distance, Ordering::Unsorted]].concat();
@@ -122,7 +127,7 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
         progress.tick(0).map_err(|_| Error::Cancelled)?;
         let (name, thickness) = (ordering.name(auto), ordering.thickness().map(|t| t * world));
         let (image, disorder) = (image(&layers)?, Some(disorder));
-        Ok::<_, Error>(Ordered { name, thickness, image, disorder, seconds, bytes, sampled: None })
+        Ok::<_, Error>(Ordered { name, thickness, image, disorder, seconds, bytes, sampled: None, of_layers: false })
     };
     let stages = all.iter().map(|ordering| (ordering.name(auto), 1.0));
     let drawn = progress.within(ORDERS, stages, || all.iter().map(|o| draw(*o)).collect::<Result<Vec<_>, _>>());
@@ -135,8 +140,10 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
     let unordered = particles(&scene, &loaded, &truth, options, progress)?;
     let without_particles = unordered.as_ref().err().cloned();
     orderings.extend(unordered);
+    progress.begin(LAYERS);
+    let layers = layers::ways(&scene, &loaded, &mut orderings, options, progress)?;
     let splats = sorter.translucent.len() as u64;
-    Ok(Comparison { orderings, truth, truth_seconds, splats, without_particles })
+    Ok(Comparison { orderings, truth, truth_seconds, splats, without_particles, layers })
 }
 
 /// The scene by points without cut-offs and layers, front to back, in the order of slices.
@@ -163,6 +170,12 @@ fn exact_input<'a>(loaded: &'a Loaded, camera: &'a Camera, shaded: &'a Shaded, s
         resampling_sigma_px: sigma_px,
         order: Order::Fragment,
     }
+}
+
+/// Rays that are looked at, of all pixels.
+fn rays(input: &Input<'_>) -> Rays {
+    let pixels = f64::from(input.camera.size[0]) * f64::from(input.camera.size[1]);
+    Rays::new(input, (pixels / RAYS).sqrt().ceil() as usize)
 }
 
 /// The picture of a loaded scene by one technique.
@@ -218,7 +231,7 @@ fn particles(
     let sampled = Sampled::of(&images, truth, 0.0, None)?;
     let name = format!("particles, {SETS} sets: none needed");
     let image = images.swap_remove(0);
-    Ok(Ok(Ordered { name, thickness: None, image, disorder: None, seconds: None, bytes: 0, sampled }))
+    Ok(Ok(Ordered { name, thickness: None, image, disorder: None, seconds: None, bytes: 0, sampled, of_layers: false }))
 }
 
 fn image(layers: &Layers) -> Result<Image<Linear>, Error> {

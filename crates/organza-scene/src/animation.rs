@@ -34,6 +34,19 @@ pub(super) fn check_animation(at: &At<'_>, raw: &RawAnimation) -> Result<u32, Er
     at.whole("frames", raw.frames, 1..=MOST_FRAMES)
 }
 
+/// Keys of an object that leave its shape as it is.
+const LOOKS: [&str; 8] =
+    ["transform", "material", "opacity", "color", "technique", "shadow_coefficient", "casts_shadow", "visible"];
+
+/// Whether a track changes the shape of the object of this rank and name.
+pub(super) fn deforms(raw: &RawAnimation, rank: usize, name: &str) -> bool {
+    let changes = |path: Vec<String>| {
+        let of_object = path.get(1).is_none_or(|of| of == name || *of == rank.to_string());
+        path[0] == "object" && of_object && path.get(2).is_none_or(|key| !LOOKS.contains(&key.as_str()))
+    };
+    raw.track.iter().filter_map(|track| path_of(track).ok()).any(changes)
+}
+
 /// Puts the values of a frame into the tree.
 pub(super) fn apply(document: &mut Document<'_>, frame: u32) -> Result<(), Error> {
     let Some(node) = entry(&document.root, "animation").cloned() else { return Ok(()) };

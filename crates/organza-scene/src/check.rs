@@ -1,6 +1,6 @@
 //! Raw tables → checked scene: what the whole file shares, and the tools of the other `check_…` files.
 
-use super::animation::check_animation;
+use super::animation::{check_animation, deforms};
 use super::check_background::check_background;
 use super::check_drawn::check_drawn;
 use super::check_light::check_light;
@@ -176,7 +176,8 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
                 None => return Err(unknown_material(&at, &at_materials(&at_objects), name, &materials)),
             },
         };
-        objects.push(check_object(&at, object, material, &named)?);
+        let deforms = raw.animation.as_ref().is_some_and(|animation| deforms(animation, i, &object.name));
+        objects.push(SceneObject { deforms, ..check_object(&at, object, material, &named)? });
     }
     let mut render = check_render(&at.key("render"), &raw.render)?;
     let layers = (&at.key("render").key("layers"), raw.render.layers.as_slice());

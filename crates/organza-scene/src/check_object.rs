@@ -69,6 +69,7 @@ pub(super) fn check_object(
         footprint: raw.footprint as u8,
         merge_duplicates: raw.merge_duplicates,
         technique: check_own_technique(at, raw.technique.as_deref())?,
+        deforms: false,
         name: raw.name,
     })
 }

@@ -1,16 +1,15 @@
 //! Checks of the render settings.
 
 use super::check::{At, LARGEST, SMALLEST};
+use super::check_surfels::check_surfels;
 use super::de::suggest;
 use super::raw_render::{
-    Auto, RawAccumulation, RawAligned, RawBehind, RawBending, RawClassify, RawDirection, RawMapping, RawParticles,
-    RawPoints, RawRender, RawScattering, RawShadow, RawSheets, RawSlicing, RawSoftShadows, RawSurfaceSampler,
-    RawSurfels,
+    Auto, RawAccumulation, RawAligned, RawClassify, RawDirection, RawMapping, RawParticles, RawPoints, RawRender,
+    RawScattering, RawShadow, RawSheets, RawSlicing, RawSoftShadows, RawSurfaceSampler,
 };
 use super::{
-    Aligned, Bending, Classify, LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, RenderSettings,
-    Scattering, ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler, SurfelsSettings,
-    Technique,
+    Aligned, Classify, LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, RenderSettings, Scattering,
+    ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler, Technique,
 };
 use crate::{Error, shown};
 use splat_core::Direction;
@@ -126,27 +125,13 @@ fn check_points(at: &At<'_>, raw: &RawPoints) -> Result<PointsSettings, Error> {
 }
 
 /// The transmittance at which a pixel is finished.
-fn check_cutoff(at: &At<'_>, raw: Option<f64>) -> Result<f64, Error> {
+pub(super) fn check_cutoff(at: &At<'_>, raw: Option<f64>) -> Result<f64, Error> {
     let cutoff = raw.unwrap_or(1.0 / 1024.0);
     if (0.0..1.0).contains(&cutoff) {
         return Ok(cutoff);
     }
     let message = format!("`transmittance_cutoff`: expected a number from 0 to below 1, found {cutoff}");
     Err(at.key("transmittance_cutoff").error(message, "0 composites everything"))
-}
-
-fn check_surfels(at: &At<'_>, raw: &RawSurfels) -> Result<SurfelsSettings, Error> {
-    Ok(SurfelsSettings {
-        disc_scale: at.number("disc_scale", raw.disc_scale.unwrap_or(0.6), 0.45..=1.0)?,
-        gap: at.number("gap", raw.gap.unwrap_or(0.5), 1.0 / 1024.0..=4.0)?,
-        transmittance_cutoff: check_cutoff(at, raw.transmittance_cutoff)?,
-        bending: match raw.bending {
-            RawBending::Traced => Bending::Traced,
-            RawBending::Power => Bending::Power,
-            RawBending::Nearest => Bending::Nearest,
-        },
-        bent_behind: matches!(raw.behind, RawBehind::Bent),
-    })
 }
 
 fn check_sheets(at: &At<'_>, raw: &RawSheets) -> Result<SheetsSettings, Error> {

@@ -20,6 +20,7 @@ mod check_material;
 mod check_object;
 mod check_render;
 mod check_source;
+mod check_surfels;
 mod check_transfer;
 mod de;
 mod error;
@@ -35,6 +36,7 @@ mod raw_material;
 mod raw_object;
 mod raw_render;
 mod raw_source;
+mod raw_surfels;
 mod read_json;
 mod read_toml;
 mod settings;
@@ -50,8 +52,9 @@ pub use load::{LoadOptions, MAX_SCENE_BYTES, MAX_SCENE_DEPTH, load, parse, read,
 pub use model::{EnvironmentSource, Scene, SceneMaterial, SceneObject, Up};
 pub use overrides::Override;
 pub use settings::{
-    Aligned, Bending, Classify, ParticlesSettings, PointsSettings, RenderSettings, Scattering, ShadowMapping,
-    ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler, SurfelsSettings, Technique,
+    Aligned, Bending, Classify, Collisions, Coverage, Grouping, ParticlesSettings, PointsSettings, RenderSettings,
+    Scattering, ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler, SurfelGroups,
+    SurfelLayers, SurfelsSettings, Technique,
 };
 pub use shown::{escape_controls, printable, shown};
 pub use source::{

@@ -90,6 +90,8 @@ pub struct SceneObject {
     pub merge_duplicates: bool,
     /// What draws it where it is translucent; `None` for the technique of the scene.
     pub technique: Option<Technique>,
+    /// Whether a track of the animation changes more of it than its place, its looks, and what draws it.
+    pub deforms: bool,
 }
 
 /// The axis of a source that points up.

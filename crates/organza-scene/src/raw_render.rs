@@ -1,5 +1,6 @@
 //! Settings of a render as they are written.
 
+use super::raw_surfels::RawSurfels;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -29,45 +30,6 @@ pub(super) struct RawRender {
     pub(super) particles: RawParticles,
     pub(super) sheets: RawSheets,
     pub(super) surfels: RawSurfels,
-}
-
-/// Settings of the `surfels` technique.
-#[derive(Debug, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default, expecting = "a table")]
-#[schemars(rename = "Surfels")]
-pub(super) struct RawSurfels {
-    /// Radius within which a disc is blended, over its cut-off radius, 0.45 to 1; default 0.6.
-    pub(super) disc_scale: Option<f64>,
-    /// ε: planes of discs that lie nearer to one another than this share of their radius are one layer, 1/1024 to 4; default 0.5.
-    pub(super) gap: Option<f64>,
-    /// A pixel is finished when its transmittance is below this, from 0 to below 1; default 1/1024.
-    pub(super) transmittance_cutoff: Option<f64>,
-    /// How rays are bent: "traced" from surface to surface, by the "power" of the index that layers are counted for, or at the
-    /// "nearest" layer; default "traced".
-    pub(super) bending: RawBending,
-    /// What is opaque is seen along "bent" rays, or "straight" on; default "bent".
-    pub(super) behind: RawBehind,
-}
-
-/// Where surfaces bend rays.
-#[derive(Debug, Default, Clone, Copy, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-#[schemars(rename = "Bending")]
-pub(super) enum RawBending {
-    #[default]
-    Traced,
-    Power,
-    Nearest,
-}
-
-/// How opaque surfaces are seen behind what bends rays.
-#[derive(Debug, Default, Clone, Copy, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-#[schemars(rename = "Behind")]
-pub(super) enum RawBehind {
-    #[default]
-    Bent,
-    Straight,
 }
 
 /// Settings of the `particles` technique.

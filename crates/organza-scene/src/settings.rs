@@ -133,6 +133,101 @@ pub struct SurfelsSettings {
     pub bending: Bending,
     /// Whether opaque surfaces are seen along bent rays; else straight on.
     pub bent_behind: bool,
+    /// How the discs of a pixel become layers.
+    pub layers: SurfelLayers,
+}
+
+/// How the discs of a pixel become layers (Zhang and Pajarola 2007, section 5.2).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SurfelLayers {
+    /// Told apart by gaps in depth, all of them.
+    Gaps,
+    /// The same for so many nearest layers, 1 to 1024: depth peeling.
+    Peeled(u32),
+    /// Algorithm 1: in each group discs are composited, one a step of depth; the images of all groups are averaged.
+    Algorithm1(SurfelGroups),
+    /// Algorithm 2: the nearest layer is averaged by weight, before the rest as Algorithm 1 has it.
+    Algorithm2(SurfelGroups),
+}
+
+impl SurfelLayers {
+    /// The groups of the discs, where the mode has some.
+    pub const fn groups(&self) -> Option<&SurfelGroups> {
+        match self {
+            Self::Gaps | Self::Peeled(_) => None,
+            Self::Algorithm1(groups) | Self::Algorithm2(groups) => Some(groups),
+        }
+    }
+
+    /// The same.
+    pub const fn groups_mut(&mut self) -> Option<&mut SurfelGroups> {
+        match self {
+            Self::Gaps | Self::Peeled(_) => None,
+            Self::Algorithm1(groups) | Self::Algorithm2(groups) => Some(groups),
+        }
+    }
+}
+
+/// Groups of discs that hardly overlap (Zhang and Pajarola 2007, section 4).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfelGroups {
+    /// Number of groups K, 1 to 256; the most of them by [`Grouping::Minimum`].
+    pub count: u32,
+    /// How they are found.
+    pub grouping: Grouping,
+    /// How each comes to cover the surface.
+    pub coverage: Coverage,
+    /// n of Eq. 10, ≥ 1; `None` for steps as long as ε.
+    pub depth_steps: Option<u32>,
+}
+
+impl Default for SurfelGroups {
+    /// Four groups, which the paper finds enough (section 6.3).
+    fn default() -> Self {
+        Self { count: 4, grouping: Grouping::Auto, coverage: Coverage::Auto, depth_steps: None }
+    }
+}
+
+/// How groups of discs are found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Grouping {
+    /// Weighted colouring; a hash table for an object whose shape the animation changes.
+    Auto,
+    /// As few groups as are found (MGC).
+    Minimum {
+        /// c: radii are so much shorter when overlaps are found, in (0, 1].
+        factor: f64,
+    },
+    /// Weighted colouring (WGC).
+    Weighted,
+    /// By a hash table.
+    Hash(Collisions),
+}
+
+/// What is done with discs that a hash table puts into one cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Collisions {
+    /// Nothing.
+    Keep,
+    /// Each takes the group whose discs overlap it least.
+    Resolve,
+    /// The same for discs within a distance of the eye, world units.
+    Near(f64),
+}
+
+/// How each group of discs comes to cover the surface (Zhang and Pajarola 2007, section 4.4.2).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Coverage {
+    /// By discs of other groups; by a bound on radii where a hash table makes groups.
+    Auto,
+    /// It does not.
+    Partial,
+    /// Discs of other groups are added.
+    Duplicates,
+    /// Radii are enlarged (Eqs. 11-13).
+    Enlarged,
+    /// Radii are enlarged by the bound of the hash table (Figure 10).
+    Bound,
 }
 
 /// Where surfaces bend rays (Zhang and Pajarola 2007, section 5.2.3).

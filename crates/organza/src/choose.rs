@@ -10,7 +10,7 @@ pub(crate) use effects::plan;
 use crate::escape_controls;
 use crate::form::{DRAWN, Form, PlannedObject};
 use crate::scene::{Scene, SceneObject, Technique};
-use crate::statistics::{LightStatistics, ObjectStatistics};
+use crate::statistics::{LightStatistics, ObjectData, ObjectStatistics};
 use crate::technique::{Row, TABLE};
 
 /// The technique that draws an object: its own, or the scene's; `auto` takes the first of the table that offers itself.
@@ -36,11 +36,11 @@ pub(crate) fn techniques(scene: &Scene) -> Vec<Technique> {
 /// Objects whose surfaces bound matter and whose technique cannot show that: a sentence each.
 pub(crate) fn unbent(scene: &Scene) -> impl Iterator<Item = String> + '_ {
     let bounds = |o: &&SceneObject| o.visible && scene.materials[o.material].material.bounds_matter();
-    let objects = scene.objects.iter().filter(bounds).map(|o| (o, row(technique_of(o, scene))));
-    objects.filter(|(_, row)| !row.bends).map(|(object, row)| {
-        let able = TABLE.iter().find(|row| row.bends).map_or("", |row| row.technique.name());
+    scene.objects.iter().filter(bounds).filter_map(|object| {
+        let row = row(technique_of(object, scene));
+        let instead = (row.bends)(scene).err()?;
         let (name, own) = (escape_controls(&object.name), row.technique.name());
-        format!("object '{name}' bounds matter that bends light or absorbs, which `{own}` leaves out: use `{able}`")
+        Some(format!("object '{name}' bounds matter that bends light or absorbs, which `{own}` leaves out: {instead}"))
     })
 }
 
@@ -56,16 +56,22 @@ pub(crate) fn same_forms(a: Technique, b: Technique) -> bool {
 }
 
 /// The form in which its technique takes each of these visible objects, and whether it becomes splats: only where splats are
-/// drawn, or are what there is, or where a shadow map may need them.
+/// drawn, or are what there is, or where a shadow map may need them. `keeps_polygons` says whether opaque
+/// triangles stay triangles.
 pub(crate) fn choose<'a>(
     objects: impl Iterator<Item = (&'a ObjectStatistics, Technique)> + Clone,
     lights: &[LightStatistics],
+    keeps_polygons: impl Fn(&Row) -> bool,
 ) -> Vec<PlannedObject> {
     let shining = lights.iter().any(|l| l.wants_shadow && !l.is_dark);
     let shadows = shining && objects.clone().any(|(o, _)| o.receives);
     let one = |(object, technique): (&ObjectStatistics, Technique)| {
         let row = row(technique);
+        let is_mesh = object.data == ObjectData::Triangles;
         let (form, reason) = match row.form {
+            _ if object.opaque && is_mesh && keeps_polygons(row) => {
+                (Form::Polygons, "opaque triangles end light and view rays where they are")
+            }
             _ if object.opaque => (Form::Opaque, "an opaque surface is drawn exactly"),
             Some(form) => form(object),
             None => (Form::Splats, DRAWN),
@@ -85,10 +91,9 @@ pub(crate) fn choose<'a>(
 mod tests {
     use super::*;
     use crate::scene::SurfaceSampler;
-    use crate::statistics::ObjectData;
 
     fn chosen(objects: &[ObjectStatistics], lights: &[LightStatistics]) -> Vec<PlannedObject> {
-        choose(objects.iter().map(|o| (o, Technique::Particles)), lights)
+        choose(objects.iter().map(|o| (o, Technique::Particles)), lights, |_| false)
     }
 
     fn object(data: ObjectData) -> ObjectStatistics {

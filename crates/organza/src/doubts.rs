@@ -8,7 +8,7 @@ use crate::scene::{Scene, SceneLight, SceneObject};
 use crate::{Layers, ShadowTable, escape_controls};
 use glam::DVec3;
 use rayon::prelude::*;
-use splat_core::{Camera, DAabb, Shading};
+use splat_core::{DAabb, Shading};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// Most objects outside the view that are told one by one.
@@ -147,14 +147,14 @@ fn place(p: DVec3) -> String {
 /// For each object whether some of it lies in the view.
 fn seen(loaded: &Loaded) -> Vec<AtomicBool> {
     let seen: Vec<AtomicBool> = loaded.objects.iter().map(|_| AtomicBool::new(false)).collect();
-    let view = View::new(&loaded.camera);
+    let view = &loaded.camera;
     for own in &loaded.own {
         let bounds = own.world_box();
-        let middle = loaded.camera.view_from_world(bounds.center());
+        let middle = view.view_from_world(bounds.center());
         seen[own.object].store(view.may_see(middle, 0.5 * bounds.diagonal()), Relaxed);
     }
     let cloud = &loaded.cloud;
-    let place = loaded.camera.view_from_offset(cloud.origin);
+    let place = view.view_from_offset(cloud.origin);
     let splats =
         cloud.object.par_chunks(CHUNK).zip(cloud.position.par_chunks(CHUNK)).zip(cloud.radius.par_chunks(CHUNK));
     splats.for_each(|((objects, positions), radii)| {
@@ -186,29 +186,6 @@ fn bounds(loaded: &Loaded, seen: &[AtomicBool]) -> Vec<(usize, DAabb)> {
     of.into_iter().enumerate().filter(|(_, b)| !b.is_empty()).collect()
 }
 
-/// The pyramid, or the box, that a camera sees.
-struct View {
-    /// Half width and height of the picture: at depth 1, or at all depths for parallel rays.
-    half: [f64; 2],
-    parallel: bool,
-}
-
-impl View {
-    fn new(camera: &Camera) -> Self {
-        let focal = camera.focal_px();
-        Self { half: camera.size.map(|s| 0.5 * f64::from(s) / focal), parallel: camera.is_orthographic() }
-    }
-
-    /// Whether a ball in view space may reach into it; wrong only beside edges, where it says yes.
-    fn may_see(&self, middle: DVec3, radius: f64) -> bool {
-        let [x, y] = [middle.x.abs(), middle.y.abs()];
-        let inside = |at: f64, half: f64| {
-            if self.parallel { at - radius <= half } else { at - half * middle.z <= radius * libm::hypot(half, 1.0) }
-        };
-        middle.z + radius > 0.0 && inside(x, self.half[0]) && inside(y, self.half[1])
-    }
-}
-
 /// Lights that are not scattered as often as was asked for.
 pub(crate) fn of_scattering(plan: &Plan) -> Option<String> {
     let lights = match plan.scattered_once {
@@ -231,19 +208,6 @@ pub(crate) fn of_shadows<'a>(tables: impl Iterator<Item = &'a ShadowTable>) -> O
 #[cfg(test)]
 mod tests {
     use super::*;
-    use splat_core::Projection;
-
-    #[test]
-    fn a_ball_is_seen_as_soon_as_it_touches_the_pyramid() {
-        let projection = Projection::Perspective { fov_y: std::f64::consts::FRAC_PI_2 };
-        let camera = Camera::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, projection, [20, 10]).expect("a camera");
-        let view = View::new(&camera);
-        // The upper side is y = z, which a ball at (0, 2, 1) is √½ away from.
-        assert!(!view.may_see(DVec3::new(0.0, 2.0, 1.0), 0.70));
-        assert!(view.may_see(DVec3::new(0.0, 2.0, 1.0), 0.71));
-        assert!(view.may_see(DVec3::new(1.9, 0.0, 1.0), 0.0) && !view.may_see(DVec3::new(2.1, 0.0, 1.0), 0.0));
-        assert!(!view.may_see(DVec3::new(0.0, 0.0, -1.0), 0.9));
-    }
 
     #[test]
     fn places_have_four_digits() {

@@ -19,6 +19,8 @@ pub enum Form {
     Cells,
     /// A field of extinction.
     Field,
+    /// Opaque triangles, which their technique lights itself.
+    Polygons,
     /// Splats.
     Splats,
 }
@@ -34,6 +36,7 @@ impl Form {
             Self::Triangles => "triangles",
             Self::Cells => "cells",
             Self::Field => "field",
+            Self::Polygons => "polygons",
             Self::Splats => "splats",
         }
     }

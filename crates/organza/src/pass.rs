@@ -22,6 +22,8 @@ pub const SAMPLE: &str = "sample";
 pub const PARTICLES: &str = "particles";
 /// Volumes and splats are composited in slabs.
 pub const SHEETS: &str = "sheets";
+/// Discs are parted into groups that hardly overlap.
+pub const GROUP: &str = "group";
 /// Discs are blended to layers, which are composited.
 pub const SURFELS: &str = "surfels";
 /// Translucent splats are composited exactly, pixel by pixel, in f64.

@@ -12,6 +12,7 @@ use crate::pass;
 use crate::plan::Plan;
 use crate::scene::{Scene, SceneLight, SceneObject, Technique};
 use crate::statistics::{ObjectStatistics, Statistics};
+use crate::technique::Row;
 use crate::work::Translucent;
 use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, doubts, lights, shadows};
 use splat_core::{Exceeded, Material};
@@ -117,12 +118,14 @@ fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Resu
     let materials = loaded.own.iter().map(|o| &loaded.materials[scene.objects[o.object].material]);
     let unequal = |m: &Material| m.extinction_rgb.iter().any(|e| *e != m.extinction_rgb[0]);
     statistics.colored_extinction |= materials.into_iter().any(unequal);
-    for object in visible(scene).filter(|o| row(technique_of(o, scene)).bends) {
+    for object in visible(scene).filter(|o| (row(technique_of(o, scene)).bends)(scene).is_ok()) {
         statistics.add_bound(&object.name, &loaded.materials[object.material]);
     }
     statistics.lit_as_drawn = carried::of_scene(scene).is_some();
     let mut plan = plan(&statistics);
     plan.by = scene.objects.iter().map(|o| technique_of(o, scene)).collect();
+    let draws = |t: &&Technique| statistics.translucent_of(**t).is_some();
+    statistics.techniques.iter().filter(draws).for_each(|t| (row(*t).plans)(scene, &mut plan));
     plan.is_own = vec![false; scene.objects.len()];
     loaded.own.iter().for_each(|own| plan.is_own[own.object] = true);
     let draws = |by: &Technique| row(*by).draws_splats && !statistics.lit_as_drawn;
@@ -185,7 +188,8 @@ fn load_measured(
     let looks = |object: &SceneObject| row(technique_of(object, scene)).form.is_some();
     let inputs = load::read(scene, options, progress, files, &looks, cost)?;
     let by = visible(scene).map(|o| technique_of(o, scene));
-    let planned = choose(inputs.statistics.iter().zip(by), &inputs.light_statistics());
+    let keeps = |row: &Row| (row.polygons)(scene);
+    let planned = choose(inputs.statistics.iter().zip(by), &inputs.light_statistics(), keeps);
     // Of what comes beside splats nothing is known but that there is some.
     let some = Translucent { splats: 0.0, fragments: 0.0, any: true };
     let steps = techniques(scene).into_iter().flat_map(|t| row(t).steps);

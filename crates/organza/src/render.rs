@@ -8,7 +8,7 @@ use crate::load::files::Files;
 use crate::plan::Plan;
 use crate::prepare::{Explanation, prepare};
 use crate::scene::Scene;
-use crate::technique::{Checkpoint, Kept, Session, Sets};
+use crate::technique::{Checkpoint, Kept, Session, Sets, surfels};
 use crate::{CostRecord, Error, Layers, Progress, RenderOptions, doubts};
 use std::path::PathBuf;
 
@@ -46,6 +46,7 @@ pub fn render(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Re
 pub(crate) struct Left {
     pub(crate) files: Files,
     pub(crate) sets: Kept,
+    pub(crate) groups: surfels::Kept,
 }
 
 impl Left {
@@ -97,8 +98,9 @@ pub(crate) fn render_keeping(
     }
     let device = helper.as_ref().map(|helper| (helper, options.device_composites));
     let frame = Frame::new(scene, &loaded, &plan, progress).helped_by(device);
-    let kept = left.map(|left| &mut left.sets);
-    let mut session = Session { options, checkpoint: checkpoint.as_mut(), kept, warnings: &mut warnings, sets: None };
+    let (kept, groups) = left.map(|left| (&mut left.sets, &mut left.groups)).unzip();
+    let checkpoint = checkpoint.as_mut();
+    let mut session = Session { options, checkpoint, kept, groups, warnings: &mut warnings, sets: None };
     let layers = draw(&frame, &mut session, &mut cost)?;
     let sets = session.sets;
     let backend = helper.as_ref().map_or_else(|| "cpu".to_owned(), |helper| helper.name());

@@ -88,7 +88,7 @@ pub struct Statistics {
     pub planned: Vec<PlannedObject>,
     /// Techniques that draw, in the order of their table.
     pub techniques: Vec<Technique>,
-    /// By technique: translucent splats that it draws or samples, and objects that it draws from their own data.
+    /// By technique: translucent splats that it draws or samples, and objects that it draws from their own data, opaque ones among them.
     pub translucent_by: Vec<(Technique, [u64; 2])>,
     /// All splats.
     pub splats: u64,
@@ -165,10 +165,11 @@ impl Statistics {
         for ((object, planned), made) in objects.iter().zip(planned).zip(made) {
             let is_own = planned.form.is_own();
             if is_own {
-                self.translucent = self.translucent.saturating_sub(*made);
+                let drawn = if object.opaque { &mut self.opaque } else { &mut self.translucent };
+                *drawn = drawn.saturating_sub(*made);
                 self.receivers += u64::from(*made == 0 && object.receives);
             }
-            if !object.opaque {
+            if !object.opaque || is_own {
                 let counts = if is_own { [0, 1] } else { [*made, 0] };
                 self.add(planned.technique, counts);
             }
@@ -208,14 +209,14 @@ impl Statistics {
         counts.is_none_or(|[splats, own]| splats > 0 || own == 0)
     }
 
-    /// What is translucent and drawn by a technique, in words; `None` for nothing.
+    /// What is translucent and drawn by a technique, or from its own data, in words; `None` for nothing.
     pub fn translucent_of(&self, technique: Technique) -> Option<String> {
         let [splats, own] = self.translucent_by.iter().find(|(t, _)| *t == technique)?.1;
         match (splats, own) {
             (0, 0) => None,
             (n, 0) => Some(format!("{n} translucent splats")),
-            (0, own) => Some(format!("{own} translucent objects by their own data")),
-            (n, own) => Some(format!("{n} translucent splats and {own} translucent objects by their own data")),
+            (0, own) => Some(format!("{own} objects by their own data")),
+            (n, own) => Some(format!("{n} translucent splats and {own} objects by their own data")),
         }
     }
 }

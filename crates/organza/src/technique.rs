@@ -19,6 +19,7 @@ use crate::frame::Frame;
 use crate::lights::LightPoint;
 use crate::matter::{CarriesLight, Matter};
 use crate::pass;
+use crate::plan::Plan;
 use crate::scene::{Scene, Technique};
 use crate::stage;
 use crate::statistics::ObjectStatistics;
@@ -44,10 +45,12 @@ pub(crate) struct Row {
     pub(crate) by_channel: Option<&'static str>,
     /// The form in which it takes an object, and why; `None` for splats, whatever an object is.
     pub(crate) form: Option<FormOf>,
+    /// Whether opaque triangles stay what they are in a scene: it draws and lights them, and light that it carries ends at them.
+    pub(crate) polygons: fn(&Scene) -> bool,
     /// What it makes of splats, in words.
     pub(crate) of_splats: &'static str,
-    /// Whether it mirrors and bends light where surfaces bound matter, and that absorbs.
-    pub(crate) bends: bool,
+    /// Whether it mirrors and bends light where surfaces bound matter, and that absorbs; or what to do so that this is shown.
+    pub(crate) bends: fn(&Scene) -> Result<(), &'static str>,
     /// Whether it draws translucent splats as they are: they get footprints and radiance.
     pub(crate) draws_splats: bool,
     /// Its passes; the last one comes behind opaque surfaces, those before it come before footprints.
@@ -58,6 +61,8 @@ pub(crate) struct Row {
     pub(crate) bytes: fn(&Matter<'_>, &[LightPoint], colored_extinction: bool, &RenderOptions) -> u64,
     /// How it carries light through what it draws by itself, where a scene asks for that; `None` where shadow maps have all light.
     pub(crate) carries: fn(&Scene) -> Option<CarriesLight>,
+    /// Adds effects and passes of its own to the plan of a scene that it draws.
+    pub(crate) plans: fn(&Scene, &mut Plan),
     /// Begins a frame.
     pub(crate) begin: for<'a> fn(&'a Frame<'a>) -> Box<dyn Fold + 'a>,
 }
@@ -102,6 +107,8 @@ pub(crate) struct Session<'s> {
     pub(crate) checkpoint: Option<&'s mut Checkpoint>,
     /// Sets that serve all frames of an animation.
     pub(crate) kept: Option<&'s mut Kept>,
+    /// Groups of discs that do.
+    pub(crate) groups: Option<&'s mut surfels::Kept>,
     pub(crate) warnings: &'s mut Vec<String>,
     /// Sets that were averaged, where some were.
     pub(crate) sets: Option<Sets>,
@@ -124,26 +131,9 @@ pub(crate) struct Finished<'f> {
     pub(crate) opaque: Option<&'f OpaqueImage>,
 }
 
-/// Every technique, the preferred first.
+/// Every technique, the preferred first; each states where it differs from `points`.
 pub(crate) static TABLE: [Row; 5] = [
-    Row {
-        technique: Technique::Points,
-        is_offered: |material| !material.bounds_matter(),
-        how: "are composited in order",
-        by_channel: None,
-        form: None,
-        of_splats: DRAWN,
-        bends: false,
-        draws_splats: true,
-        steps: &[
-            Step { pass: pass::SORT, stage: stage::SORT, seconds: |_, all| cost::SORT * all.splats },
-            Step { pass: pass::SPLAT, stage: stage::COMPOSITE, seconds: |_, all| cost::FRAGMENT * all.fragments },
-        ],
-        is_random: false,
-        bytes: |_, _, _, _| 0,
-        carries: |_| None,
-        begin: points::begin,
-    },
+    POINTS,
     Row {
         technique: Technique::Particles,
         is_offered: |_| false,
@@ -151,64 +141,70 @@ pub(crate) static TABLE: [Row; 5] = [
         by_channel: Some("a particle hides each channel by chance"),
         form: Some(particles::form),
         of_splats: "particles are sampled from them",
-        bends: false,
         draws_splats: false,
         steps: &[Step { pass: pass::PARTICLES, stage: stage::PARTICLES, seconds: particles::seconds }],
         is_random: true,
         bytes: |matter, _, colored, options| particles::bytes(matter.scene, colored, options),
-        carries: |_| None,
         begin: particles::begin,
+        ..POINTS
     },
     Row {
         technique: Technique::Sheets,
         is_offered: |_| false,
         how: "are composited in slabs, volumes classified after reconstruction",
-        by_channel: None,
         form: Some(sheets::form),
-        of_splats: DRAWN,
-        bends: false,
-        draws_splats: true,
+        polygons: sheets::keeps_polygons,
         steps: &[Step { pass: pass::SHEETS, stage: stage::SHEETS, seconds: sheets::seconds }],
-        is_random: false,
         bytes: sheets::bytes,
         carries: sheets::carries,
         begin: sheets::begin,
+        ..POINTS
     },
     Row {
         technique: Technique::Surfels,
         is_offered: Material::bounds_matter,
         how: "are discs, which are averaged in each layer of a surface, and layers are composited in order",
-        by_channel: None,
-        form: None,
-        of_splats: DRAWN,
-        bends: true,
-        draws_splats: true,
-        steps: &[
-            Step { pass: pass::SORT, stage: stage::SORT, seconds: |_, all| cost::SORT * all.splats },
-            Step { pass: pass::SURFELS, stage: stage::SURFELS, seconds: |_, all| cost::FRAGMENT * all.fragments },
-        ],
-        is_random: false,
+        bends: surfels::bends,
+        steps: &[SORT, Step { pass: pass::SURFELS, stage: stage::SURFELS, ..FOLD }],
         bytes: surfels::bytes,
-        carries: |_| None,
+        plans: surfels::plans,
         begin: surfels::begin,
+        ..POINTS
     },
     Row {
         technique: Technique::Reference,
         is_offered: |_| false,
         how: "are sorted pixel by pixel, exactly, which is slow",
-        by_channel: None,
-        form: None,
-        of_splats: DRAWN,
-        bends: false,
-        draws_splats: true,
         steps: &[Step {
             pass: pass::REFERENCE,
             stage: stage::REFERENCE,
             seconds: |_, all| cost::EXACT_FRAGMENT * all.fragments,
         }],
-        is_random: false,
         bytes: |matter, _, _, _| reference::bytes(matter.scene),
-        carries: |_| None,
         begin: reference::begin,
+        ..POINTS
     },
 ];
+
+const SORT: Step = Step { pass: pass::SORT, stage: stage::SORT, seconds: |_, all| cost::SORT * all.splats };
+
+const FOLD: Step =
+    Step { pass: pass::SPLAT, stage: stage::COMPOSITE, seconds: |_, all| cost::FRAGMENT * all.fragments };
+
+const POINTS: Row = Row {
+    technique: Technique::Points,
+    is_offered: |material| !material.bounds_matter(),
+    how: "are composited in order",
+    by_channel: None,
+    form: None,
+    polygons: |_| false,
+    of_splats: DRAWN,
+    bends: |_| Err("use `surfels`"),
+    draws_splats: true,
+    steps: &[SORT, FOLD],
+    is_random: false,
+    bytes: |_, _, _, _| 0,
+    carries: |_| None,
+    plans: |_, _| {},
+    begin: points::begin,
+};

@@ -28,8 +28,6 @@ pub(crate) struct Splat {
     center: DVec3,
     center_px: DVec2,
     cutoff_sq_half: f64,
-    /// Half the width of the share before a plane.
-    share_depth: f64,
     /// K·n/R'², or area·n/R² for an opaque disc.
     peak: f64,
     shape: Shape,
@@ -93,7 +91,6 @@ impl Splat {
             center_px,
             cutoff_sq_half: q,
             peak: 0.0,
-            share_depth: 3.0 * radius * deviation(q),
             shape: Shape::Ball { radius_sq: 0.0 },
             reach_px: DVec2::ZERO,
         };
@@ -170,7 +167,7 @@ impl Splat {
 
     /// How much of a medium is seen between the eye and a surface at view depth `depth`.
     pub(crate) fn share_before(&self, depth: f64) -> f64 {
-        let at = |depth: f64| share_in_front((depth - self.depth) / self.share_depth);
+        let at = |depth: f64| share_before((depth - self.depth) / self.radius, self.cutoff_sq_half);
         (at(depth) - at(0.0)).max(0.0)
     }
 
@@ -230,15 +227,14 @@ fn profile(s: f64, q: f64) -> f64 {
     (-q * s).exp() - (-q).exp() * (1.0 + x + 0.5 * x * x)
 }
 
-/// Share of a medium before a plane at t half widths behind its centre: ∫ 35/32·(1 − u²)³ du from −1 to t.
-fn share_in_front(t: f64) -> f64 {
-    let t = t.clamp(-1.0, 1.0);
-    0.5 + 35.0 / 32.0 * (t - t.powi(3) + 0.6 * t.powi(5) - t.powi(7) / 7.0)
-}
-
-/// Standard deviation of the kernel along one direction for R = 1, by numerical integration: half the mean of ρ².
-fn deviation(q: f64) -> f64 {
-    (0.5 * simpson(|s| s * profile(s, q)) / simpson(|s| profile(s, q))).sqrt()
+/// Share of a medium before a plane across the ray at x = distance/R behind its centre: ∫w(u²) du from −1 to x over that to 1.
+fn share_before(x: f64, q: f64) -> f64 {
+    let x = x.clamp(-1.0, 1.0);
+    let gauss = |x: f64| 0.5 * (PI / q).sqrt() * libm::erf(q.sqrt() * x);
+    // ∫(1 + y + y²/2) du, y = q(1 − u²).
+    let taper = |x: f64| x + q * (x - x.powi(3) / 3.0) + 0.5 * q * q * (x - 2.0 * x.powi(3) / 3.0 + x.powi(5) / 5.0);
+    let half = |x: f64| gauss(x) - (-q).exp() * taper(x);
+    0.5 + 0.5 * half(x) / half(1.0)
 }
 
 /// n = 1/∫w dA of each footprint for R = 1, by numerical integration: shares no closed form with the fast path.

@@ -71,7 +71,9 @@ impl Classifier {
             let class = self.one(values[lane]);
             (0..4).for_each(|c| out[c][lane] = class[c]);
         }
-        [0, 1, 2, 3].map(|c| Lanes::load(simd, &out[c]))
+        let load = |c: usize| Lanes::load(simd, &out[c]);
+        // Not `map`, which is not compiled into code for vectors.
+        [load(0), load(1), load(2), load(3)]
     }
 
     /// Extinction, red, green and blue of one value.

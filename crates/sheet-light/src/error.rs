@@ -27,6 +27,9 @@ pub enum Error {
     /// A light breaks a promise.
     #[error("{0}")]
     Light(splat_core::Error),
+    /// A mesh of polygons breaks a promise.
+    #[error("polygons: {0}")]
+    Polygons(splat_core::Error),
     /// Half vectors cannot serve a light, see [`crate::half::serves`].
     #[error("light {light}: {reason}")]
     HalfVector {
@@ -46,6 +49,11 @@ pub enum Error {
 impl Error {
     pub(crate) fn parameter(name: &'static str, found: impl std::fmt::Debug, expected: &'static str) -> Self {
         Self::Parameter { name, found: format!("{found:?}"), expected }
+    }
+
+    /// What is wrong with polygons, or that nobody waits for them.
+    pub(crate) fn of_polygons(error: splat_core::Error) -> Self {
+        if error == splat_core::Error::Cancelled { Self::Cancelled } else { Self::Polygons(error) }
     }
 
     pub(crate) fn limit(what: &'static str, needed: u64, limit: u64, unit: &'static str, hint: String) -> Self {

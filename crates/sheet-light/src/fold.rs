@@ -191,6 +191,7 @@ impl<'a> Prepared<'a> {
         let voxels = Voxels::needed(&lattice, volume.transfer, reach);
         let segments = Segments::new(&viewed, slabs, &voxels, lattice.dims, tiles);
         let cutoff = params.kernel.extent / params.kernel.sigma;
+        let footprint = Footprint { cutoff: cutoff as f32 };
         let (low, high) = extremes(&grid.values);
         let base = 0.5 * (f64::from(low) + f64::from(high));
         Self {
@@ -198,9 +199,9 @@ impl<'a> Prepared<'a> {
             slabs: *slabs,
             stride,
             lattice,
-            sections: SectionTable::new(viewed.reach / slabs.width, 0.5 * cutoff * cutoff),
+            sections: SectionTable::new(viewed.reach / slabs.width, &footprint),
             taper: Taper::new(0.5 * cutoff * cutoff),
-            kernel: Kernel::new(&Footprint { cutoff: cutoff as f32 }),
+            kernel: Kernel::new(&footprint),
             classify: params.classify,
             classifier: Classifier::new(volume.transfer, volume.extinction_scale, base),
             rays: LatticeRays::new(&volume, camera, slabs.origin),

@@ -17,7 +17,9 @@
 //! | 20: composite | `eye_buffer.rs` |
 //! | 18: map each pixel to the shadow buffer | `illuminate.rs`, `light_path.rs` |
 //! | 21: classify and composite into the shadow buffer | `light_buffer.rs` |
-//! | 22, 23: polygons, as discs, for eye and light | `splats.rs`, `splat_light.rs` |
+//! | 1, 2: polygons with respect to the eye and to the light | `polygons.rs`, `light_depth.rs`, `light_views.rs` |
+//! | 7, 22, 25: light on polygons of the three regions | `polygon_light.rs` |
+//! | 22, 23: translucent polygons, as discs, for eye and light | `splats.rs`, `splat_light.rs` |
 //! | the loop over slabs | `sweep.rs` |
 //! | section 5: soft shadows | `penumbra.rs`, `moved.rs`, `soft_buffer.rs` |
 //! | section 3: light that is scattered more than once | `scatter.rs` |
@@ -46,7 +48,8 @@
 //! };
 //! let mut image = Accumulator::new([16, 16], 1, 3, false, false);
 //! let layout = ChannelLayout::new(&LayerSet::default());
-//! fold(&HalfInput { sheets, splats: None, extended: Vec::new(), mapped: Vec::new(), opaque: &[] }, &HalfParams::default(), &layout, &mut image, None).unwrap();
+//! let input = HalfInput { sheets, splats: None, polygons: &[], extended: Vec::new(), mapped: Vec::new(), opaque: &[] };
+//! fold(&input, &HalfParams::default(), &layout, &mut image, None).unwrap();
 //! // (1 − e^(−2τ))/2 of what is scattered to all sides alike.
 //! let expected = 0.5 * (1.0 - (-2f32).exp()) / (4.0 * std::f32::consts::PI);
 //! assert!(image.channels[0].iter().all(|c| (c - expected).abs() < 1e-5));
@@ -65,11 +68,16 @@ mod gradient;
 mod illuminate;
 mod lamp;
 mod light_buffer;
+mod light_depth;
 mod light_path;
+mod light_views;
+mod lit_part;
 mod moved;
 mod params;
 mod penumbra;
 mod placed;
+mod polygon_light;
+mod polygons;
 pub mod reference;
 mod scatter;
 mod serves;
@@ -85,8 +93,9 @@ mod sweep;
 pub use axis::HalfVector;
 pub use bodies::{Bodies, SplatBounds};
 pub use counts::HalfCounts;
-pub use fold::{balance, bytes, fold, slab_width};
+pub use fold::{Drawn, balance, bytes, fold, polygon_bytes, slab_width};
 pub use params::{Extended, HalfInput, HalfParams, MOST_SAMPLES, Scattering};
+pub use polygons::Polygons;
 pub use scatter::balance::Balance;
 pub use serves::{LEAST_COSINE, MOST_DEPTH, Reason, penumbra_widening, serves, serves_extended};
 pub use splats::HalfSplats;

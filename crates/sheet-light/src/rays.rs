@@ -115,7 +115,8 @@ impl Slopes {
     pub(crate) fn places<S: Simd>(&self, simd: S, [x, y]: [usize; 2], depth: Lanes<S>) -> [Lanes<S>; 3] {
         let start = [Lanes::load(simd, &self.start[0][x..]), Lanes::splat(simd, self.start[1][y])];
         if self.slant.is_any() {
-            let [sx, sy] = self.slant.single().map(|s| Lanes::splat(simd, s));
+            let [sx, sy] = self.slant.single();
+            let [sx, sy] = [Lanes::splat(simd, sx), Lanes::splat(simd, sy)];
             return [start[0], start[1], depth - (sx * start[0] + sy * start[1])];
         }
         if self.is_parallel {

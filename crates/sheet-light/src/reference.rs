@@ -124,7 +124,7 @@ impl Sheets {
         let [x0, y0] = viewed.pixel(Vec3::new(at.x as f32, at.y as f32, 0.0), scale as f32).map(f64::from);
         let cutoff = params.kernel.extent / params.kernel.sigma;
         let profile = Footprint { cutoff: cutoff as f32 };
-        let sections = sections(place % PHASES, viewed.reach / slabs.width, 0.5 * cutoff * cutoff);
+        let sections = sections(place % PHASES, viewed.reach / slabs.width, &profile);
         let range = |center: f64, half: f32, n: usize| {
             let half = f64::from(half) + 1.0;
             (center - half).max(0.0) as usize..((center + half).max(0.0) as usize).min(n)

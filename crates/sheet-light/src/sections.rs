@@ -1,43 +1,31 @@
 //! Kernel sections: a kernel along the view, cut into slabs (Figure 1b).
 //!
-//! The kernel along the view is h(x) = e^(−qs) − e^(−q)·(1 + y + y²/2), s = x²/R², y = q(1 − s), normalised: the profile of
-//! the footprints, so value, slope and curvature vanish at the rim. A section is its integral over a slab,
-//!
-//! H(x) = R/2·√(π/q)·erf(√q·x/R) − e^(−q)·(x(1 + q + q²/2) − (q + q²)·x³/3R² + q²·x⁵/10R⁴),
-//!
-//! a difference of H at the slab's faces. Sections of one kernel sum to 1 at each of 256 phases, the places where a kernel may
-//! begin within its first slab. Every slab that it touches gets its section: 5 for the paper's extent of 2.0 slabs, which it
-//! writes 4 of.
+//! The kernel along the view is the profile of the footprints, so value, slope and curvature vanish at the rim. A section is
+//! its integral over a slab, a difference of [`Footprint::share_before`] at the slab's faces. Sections of one kernel sum to 1 at
+//! each of 256 phases, the places where a kernel may begin within its first slab. Every slab that it touches gets its section: 5
+//! for the paper's extent of 2.0 slabs, which it writes 4 of.
+
+use splat_core::Footprint;
 
 /// Places within a slab at which a kernel may begin.
 pub const PHASES: u32 = 256;
 
 /// Sections of one kernel, front to back, `touched` many, for a kernel that begins `phase`/256 slabs behind the near face of
-/// its first slab. `reach` is the cutoff radius R over the slab width, `sharpness` q = (R/σ)²/2.
-pub fn sections(phase: u32, reach: f64, sharpness: f64) -> Vec<f64> {
+/// its first slab. `reach` is the cutoff radius R over the slab width.
+pub fn sections(phase: u32, reach: f64, footprint: &Footprint) -> Vec<f64> {
     let count = touched(reach);
     // The far face of slab i, from the kernel's centre, in units of R.
     let face = |i: usize| {
         let slabs = i as f64 - f64::from(phase) / f64::from(PHASES);
-        integral((slabs / reach - 1.0).clamp(-1.0, 1.0), sharpness)
+        footprint.share_before(slabs / reach - 1.0)
     };
     let faces: Vec<f64> = (0..=count).map(face).collect();
-    let whole = faces[count] - faces[0];
-    faces.windows(2).map(|f| (f[1] - f[0]) / whole).collect()
+    faces.windows(2).map(|f| f[1] - f[0]).collect()
 }
 
 /// The most slabs that a kernel touches: it begins in the first and is 2R long.
 pub fn touched(reach: f64) -> usize {
     (2.0 * reach).ceil() as usize + 1
-}
-
-/// H for R = 1, but for a constant.
-fn integral(x: f64, q: f64) -> f64 {
-    let root = libm::sqrt(q);
-    let gauss = 0.5 * libm::sqrt(std::f64::consts::PI) / root * libm::erf(root * x);
-    let x2 = x * x;
-    let taper = x * ((1.0 + q + 0.5 * q * q) - x2 * ((q + q * q) / 3.0 - x2 * (0.1 * q * q)));
-    gauss - libm::exp(-q) * taper
 }
 
 /// The sections of all phases as voxels read them: zeros, the sections, zeros.
@@ -50,12 +38,12 @@ pub(crate) struct SectionTable {
 }
 
 impl SectionTable {
-    pub(crate) fn new(reach: f64, sharpness: f64) -> Self {
+    pub(crate) fn new(reach: f64, footprint: &Footprint) -> Self {
         let touched = touched(reach);
         let stride = 8 + touched.next_multiple_of(8) + 8;
         let mut weights = vec![0.0; stride * PHASES as usize];
         for (phase, row) in weights.chunks_exact_mut(stride).enumerate() {
-            let sections = sections(phase as u32, reach, sharpness);
+            let sections = sections(phase as u32, reach, footprint);
             row[8..].iter_mut().zip(sections).for_each(|(to, from)| *to = from as f32);
         }
         Self { weights, stride, touched }
@@ -82,13 +70,12 @@ mod tests {
 
     #[test]
     fn sections_are_integrals_of_the_profile() {
-        let footprint = splat_core::Footprint { cutoff: 2.5 };
-        let q = f64::from(footprint.sharpness());
+        let footprint = Footprint { cutoff: 2.5 };
         let n = 200_000;
         let at = |i: usize| (i as f64 + 0.5) / n as f64 * 2.0 - 1.0;
         let all: f64 = (0..n).map(|i| footprint.profile(at(i) * at(i))).sum();
         // Slabs a quarter of the kernel long, which begins half a slab behind a face.
-        let found = sections(128, 2.0, q);
+        let found = sections(128, 2.0, &footprint);
         let ends = [-0.75, -0.25, 0.25, 0.75, 1.0];
         for (k, section) in found.iter().enumerate() {
             let part = (0..n).filter(|i| at(*i) < ends[k] && (k == 0 || at(*i) >= ends[k - 1]));
@@ -99,8 +86,9 @@ mod tests {
 
     #[test]
     fn eight_slabs_in_a_row_begin_anywhere() {
-        let table = SectionTable::new(2.0, 4.0);
-        let all = sections(77, 2.0, 4.0);
+        let footprint = Footprint { cutoff: 2.8 };
+        let table = SectionTable::new(2.0, &footprint);
+        let all = sections(77, 2.0, &footprint);
         for first in -7..table.touched as isize {
             let expected = (first..first + 8).map(|i| all.get(i as usize).map_or(0.0, |w| *w as f32));
             assert_eq!(table.eight(77, first), expected.collect::<Vec<f32>>());

@@ -136,9 +136,10 @@ impl Shader<'_> {
     #[inline(always)]
     fn classify<S: Simd>(&self, simd: S, of: &Reconstructed<'_>, place: Place, faces: [f32; 2]) -> Medium<S> {
         let at = place.pixel();
-        let limits = of.limits.map(|depths| Lanes::load(simd, &depths[(place.y - 1) * TILE + place.x - 1..]));
-        let near = Lanes::load(simd, &of.crossings.near[at..]).max(limits[0]).max(Lanes::splat(simd, faces[0]));
-        let far = Lanes::load(simd, &of.crossings.far[at..]).min(limits[1]).min(Lanes::splat(simd, faces[1]));
+        let limit = |depths: &[f32]| Lanes::load(simd, &depths[(place.y - 1) * TILE + place.x - 1..]);
+        let near =
+            Lanes::load(simd, &of.crossings.near[at..]).max(limit(of.limits[0])).max(Lanes::splat(simd, faces[0]));
+        let far = Lanes::load(simd, &of.crossings.far[at..]).min(limit(of.limits[1])).min(Lanes::splat(simd, faces[1]));
         let length = (far - near).max(Lanes::splat(simd, 0.0));
         let [value, weight] = of.sheets.load(simd, place.slab, place.y, place.x);
         let [extinction, red, green, blue] = match of.preclassified {
@@ -205,7 +206,8 @@ impl Shader<'_> {
                 return [right, up, along];
             }
             // Along a slab depth changes, too.
-            let [sx, sy] = self.slopes.slant.single().map(|s| Lanes::splat(simd, s));
+            let [sx, sy] = self.slopes.slant.single();
+            let [sx, sy] = [Lanes::splat(simd, sx), Lanes::splat(simd, sy)];
             return [right + sx * along, up + sy * along, along];
         }
         let pixels = Lanes::splat(simd, (pixels / z.max(slabs.width * 1e-3)) as f32);
@@ -277,8 +279,8 @@ impl Shader<'_> {
         }
         if let Some(first) = self.layout.normal() {
             for a in 0..3 {
-                let axis = [self.axes[0][a], self.axes[1][a], self.axes[2][a]].map(|v| Lanes::splat(simd, v));
-                dot(&spots.normal, &axis).store(&mut values[first + a]);
+                let along = |axis: usize| Lanes::splat(simd, self.axes[axis][a]);
+                dot(&spots.normal, &[along(0), along(1), along(2)]).store(&mut values[first + a]);
             }
         }
         if let Some(at) = self.layout.shadow() {

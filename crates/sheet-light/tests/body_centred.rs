@@ -151,7 +151,7 @@ fn what_no_body_centred_lattice_is_is_refused_and_half_vectors_take_none() {
     let sheets: SheetInput<'_> = input(&volumes, &camera, &[]);
     let layout = ChannelLayout::new(&LayerSet::default());
     let mut out = Accumulator::new(camera.size, 1, layout.count(), false, false);
-    let half = HalfInput { sheets, splats: None, extended: Vec::new(), mapped: Vec::new(), opaque: &[] };
+    let half = HalfInput { sheets, splats: None, polygons: &[], extended: Vec::new(), mapped: Vec::new(), opaque: &[] };
     let refused = fold(&half, &HalfParams::default(), &layout, &mut out, None);
     assert!(matches!(&refused, Err(e @ Error::Volume { volume: 0, .. }) if e.to_string().contains("half-vector")));
 }

@@ -93,9 +93,9 @@ fn an_eye_in_the_volume_sees_what_lies_before_it() {
 
 #[test]
 fn ia01_sections_of_every_phase_sum_to_one() {
-    for (reach, sharpness) in [(2.0, 4.08), (0.3, 4.5), (3.7, 12.5), (16.0, 4.08)] {
+    for (reach, cutoff) in [(2.0, 2.857), (0.3, 3.0), (3.7, 5.0), (16.0, 2.857)] {
         for phase in 0..sections::PHASES {
-            let sections = sections::sections(phase, reach, sharpness);
+            let sections = sections::sections(phase, reach, &Footprint { cutoff });
             assert_eq!(sections.len(), sections::touched(reach));
             assert!((sections.iter().sum::<f64>() - 1.0).abs() < 1e-12 && sections.iter().all(|w| *w >= 0.0));
             // Its mean is the kernel's middle, but for the slabs being wide.
@@ -107,8 +107,8 @@ fn ia01_sections_of_every_phase_sum_to_one() {
     // Five slabs, not the paper's four, which lose what the first or the last holds.
     assert_eq!(sections::touched(2.0), 5);
     let KernelShape { extent, sigma } = KernelShape::default();
-    let sharpness = 0.5 * (extent / sigma).powi(2);
-    let fifth = |phase: u32| sections::sections(phase, extent, sharpness)[4];
+    let footprint = Footprint { cutoff: (extent / sigma) as f32 };
+    let fifth = |phase: u32| sections::sections(phase, extent, &footprint)[4];
     let most = (0..sections::PHASES).map(fifth).fold(0.0, f64::max);
     assert!((0.0435..0.0445).contains(&most), "{most}");
 }

@@ -5,6 +5,7 @@ mod common;
 mod hard_cases;
 mod invariances;
 mod paths;
+mod polygons;
 mod scattering;
 mod soft;
 mod splats;

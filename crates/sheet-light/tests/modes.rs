@@ -199,6 +199,7 @@ fn what_older_methods_do_not_draw_is_refused() {
         let half = HalfInput {
             sheets: input(&volumes, &view, &[]),
             splats: None,
+            polygons: &[],
             extended: Vec::new(),
             mapped: Vec::new(),
             opaque: &[],

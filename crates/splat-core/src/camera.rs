@@ -142,6 +142,21 @@ impl Camera {
         }
     }
 
+    /// Whether a ball in view space may reach into the pyramid, or the box, that the camera sees; wrong only beside edges, where it
+    /// says yes.
+    pub fn may_see(&self, middle: DVec3, radius: f64) -> bool {
+        let focal = self.focal_px();
+        let half = self.size.map(|s| 0.5 * f64::from(s) / focal);
+        let inside = |at: f64, half: f64| {
+            if self.is_orthographic() {
+                at - radius <= half
+            } else {
+                at - half * middle.z <= radius * libm::hypot(half, 1.0)
+            }
+        };
+        middle.z + radius > 0.0 && inside(middle.x.abs(), half[0]) && inside(middle.y.abs(), half[1])
+    }
+
     /// The ray through image position (x, y), pixels from the top left corner: its unit direction in world space, and the solid angle
     /// of a pixel there, sr; 0 where rays are parallel.
     pub fn direction(&self, x_px: f64, y_px: f64) -> (DVec3, f64) {
@@ -196,5 +211,16 @@ mod tests {
         let near_zero = look(DVec3::ZERO).view_from_offset(DVec3::ZERO).depth(offset);
         let shifted = look(far).view_from_offset(far).depth(offset);
         assert_eq!(near_zero, shifted);
+    }
+
+    #[test]
+    fn a_ball_is_seen_as_soon_as_it_touches_the_pyramid() {
+        let projection = Projection::Perspective { fov_y: std::f64::consts::FRAC_PI_2 };
+        let camera = Camera::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, projection, [20, 10]).expect("a camera");
+        // The upper side is y = z, which a ball at (0, 2, 1) is √½ away from.
+        assert!(!camera.may_see(DVec3::new(0.0, 2.0, 1.0), 0.70));
+        assert!(camera.may_see(DVec3::new(0.0, 2.0, 1.0), 0.71));
+        assert!(camera.may_see(DVec3::new(1.9, 0.0, 1.0), 0.0) && !camera.may_see(DVec3::new(2.1, 0.0, 1.0), 0.0));
+        assert!(!camera.may_see(DVec3::new(0.0, 0.0, -1.0), 0.9));
     }
 }

@@ -68,6 +68,7 @@ impl Footprint {
     }
 
     /// ∫sⁿ·w ds over \[0, 1\] for n = 0, 1, 2, from w = e^−q·Σ_{k≥3} (qt)^k/k!, t = 1 − s, whose terms are all positive.
+    #[cfg(feature = "raster")]
     pub(crate) fn moments(&self) -> [f64; 3] {
         let q = f64::from(self.sharpness());
         let mut sums = [0.0; 3];
@@ -84,11 +85,21 @@ impl Footprint {
         sums
     }
 
-    /// Standard deviation of the kernel along any one direction, as a share of R: of the splat's cross-section, how much lies
-    /// before a plane across the ray is told by this deviation. A little below 1/cutoff, for the tail is cut.
-    pub fn deviation(&self) -> f64 {
-        let [all, first, _] = self.moments();
-        (0.5 * first / all).sqrt()
+    /// Share of the kernel before a plane across the ray, x = distance/R behind its centre: 0 up to x = −1, 1 from x = 1 on.
+    /// The kernel along the ray is the profile w(x²), whose integral is
+    ///
+    /// H(x) = ½·√(π/q)·erf(√q·x) − e^(−q)·(x(1 + q + q²/2) − (q + q²)·x³/3 + q²·x⁵/10)
+    ///
+    /// so the parts of a kernel between planes sum to 1, and those of a lattice along the ray to a constant as its footprints do.
+    pub fn share_before(&self, x: f64) -> f64 {
+        let q = f64::from(self.sharpness());
+        let integral = |x: f64| {
+            let (root, x2) = (libm::sqrt(q), x * x);
+            let gauss = 0.5 * libm::sqrt(PI) / root * libm::erf(root * x);
+            let taper = x * ((1.0 + q + 0.5 * q * q) - x2 * ((q + q * q) / 3.0 - x2 * (0.1 * q * q)));
+            gauss - libm::exp(-q) * taper
+        };
+        0.5 + 0.5 * integral(x.clamp(-1.0, 1.0)) / integral(1.0)
     }
 
     /// 1/∫w dA for R = 1: the factor that makes the footprint integrate to 1 over its plane is `norm()/R²`.
@@ -148,15 +159,28 @@ mod tests {
     }
 
     #[test]
-    fn deviation_is_that_of_the_profile() {
+    fn shares_before_planes_are_integrals_of_the_profile() {
         for cutoff in [1.0, 2.0, 3.0, 5.0, 8.0] {
             let f = Footprint { cutoff };
             let n = 200_000;
-            let at = |i: i32| (f64::from(i) + 0.5) / f64::from(n);
-            let sum: f64 = (0..n).map(|i| f.profile(at(i))).sum();
-            // The square of one of two coordinates is half of ρ² on average.
-            let squares: f64 = (0..n).map(|i| 0.5 * at(i) * f.profile(at(i))).sum();
-            assert!((f.deviation() / (squares / sum).sqrt() - 1.0).abs() < 1e-6, "cutoff {cutoff}");
+            let at = |i: i32| (f64::from(i) + 0.5) / f64::from(n) * 2.0 - 1.0;
+            let all: f64 = (0..n).map(|i| f.profile(at(i) * at(i))).sum();
+            for x in [-1.5, -1.0, -0.6, -0.1, 0.0, 0.3, 0.9, 1.0, 2.0] {
+                let before: f64 = (0..n).filter(|i| at(*i) < x).map(|i| f.profile(at(i) * at(i))).sum();
+                assert!((f.share_before(x) - before / all).abs() < 2e-5, "cutoff {cutoff}, {x}");
+                assert!((f.share_before(x) + f.share_before(-x) - 1.0).abs() < 1e-14);
+            }
+        }
+    }
+
+    #[test]
+    fn a_lattice_before_a_plane_grows_evenly() {
+        let f = Footprint::default();
+        let radius = f64::from(f.radius_for_spacing(1.0));
+        let before = |plane: f64| (-8..=8).map(|k| f.share_before((plane - f64::from(k)) / radius)).sum::<f64>();
+        for i in 0..64 {
+            let plane = f64::from(i) / 64.0;
+            assert!((before(plane) - before(0.0) - plane).abs() < 2e-4, "{plane}: {}", before(plane) - before(0.0));
         }
     }
 

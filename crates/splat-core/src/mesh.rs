@@ -1,6 +1,6 @@
 //! Triangle meshes.
 
-use crate::Error;
+use crate::{DAabb, Error};
 use glam::{DVec3, Vec3};
 
 /// Indexed triangles; vertices relative to an f64 origin.
@@ -19,6 +19,30 @@ pub struct Mesh {
 }
 
 impl Mesh {
+    /// The parallelogram about `center` with half-axes u and v, its normals along u × v.
+    pub fn rectangle(center: DVec3, u: DVec3, v: DVec3) -> Self {
+        let corner = |s: f64, t: f64| (u * s + v * t).as_vec3();
+        Self {
+            origin: center,
+            position: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
+            normal: vec![u.cross(v).normalize_or_zero().as_vec3(); 4],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            ..Self::default()
+        }
+    }
+
+    /// Area of all triangles.
+    pub fn area(&self) -> f64 {
+        let corner = |v: u32| self.position[v as usize].as_dvec3();
+        let area = |t: &[u32; 3]| 0.5 * (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).length();
+        self.triangles.iter().map(area).sum()
+    }
+
+    /// A box in the world around all vertices that triangles use.
+    pub fn bounds(&self) -> DAabb {
+        DAabb::of_points(self.triangles.iter().flatten().map(|v| self.origin + self.position[*v as usize].as_dvec3()))
+    }
+
     /// Checks column lengths, finite positions and index range.
     ///
     /// # Errors

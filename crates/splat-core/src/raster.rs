@@ -9,6 +9,8 @@
 //! What blends splats in another way walks the same tiles ([`tile`]) over the same lists ([`bins`]), on the same lanes ([`lanes`]), with
 //! the same profiles ([`kernel`]) and fragments ([`source`]).
 //!
+//! Meshes whose triangles stay triangles have a rasterizer of their own ([`triangles`]), for the eye and for lights.
+//!
 //! Every pixel belongs to one task and its splats are visited in list order, so the result does not depend on threads.
 
 mod append;
@@ -26,6 +28,7 @@ mod shapes;
 pub mod source;
 pub mod tile;
 mod translucent;
+pub mod triangles;
 
 pub use finish::{Background, FinishInput, GlassImage, finish};
 pub use opaque::{OpaqueImage, OpaqueInput, resolve_opaque};

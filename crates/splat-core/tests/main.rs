@@ -8,3 +8,4 @@ mod opaque_rim;
 #[cfg(feature = "gpu")]
 mod recording;
 mod shaded_points;
+mod triangles;

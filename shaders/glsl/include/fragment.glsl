@@ -4,7 +4,7 @@
 const uint TWIN_TILE = 32u;
 
 // Vectors of a footprint in the tables.
-const uint FOOTPRINT_VECTORS = 4u;
+const uint FOOTPRINT_VECTORS = 5u;
 
 const uint MEDIUM = 0u;
 
@@ -18,7 +18,7 @@ struct Pixel {
 };
 
 // Of a splat: offset of the twin's corner from the centre, first numbers of the conic; its last, peak, depth of the centre,
-// extent; slope of the depth, for a medium 1/D of its share before a plane and one over its share before the eye; footprint |
+// extent; slope of the depth, for a medium one over half the width of its share before a plane and one over its share before the eye; footprint |
 // kind << 8.
 struct Shape {
     vec4 conic;
@@ -74,6 +74,14 @@ precise float amount_of(Shape s, float distance) {
     return s.peak.y * profile(low, high, sharp, max(1.0 - distance, 0.0));
 }
 
+// Share of a medium before a plane.
+precise float medium_before(Shape s, float distance) {
+    uint footprint = FOOTPRINT_VECTORS * (s.look & 255u);
+    vec4 begin = uintBitsToFloat(tables[footprint + 3u]);
+    vec4 end = uintBitsToFloat(tables[footprint + 4u]);
+    return share_before(vec4(begin.zw, end.xy), end.zw, distance);
+}
+
 // Optical depth on the pixel.
 precise float optical_depth(Shape s, Pixel pixel) {
     bool medium = is_medium(s);
@@ -84,7 +92,7 @@ precise float optical_depth(Shape s, Pixel pixel) {
     if (pixel.hidden) {
         if (medium) {
             // The part between the eye and the surface, as a share of all before the eye.
-            precise float behind = 1.0 - share_in_front((pixel.solid - s.peak.z) * s.slope.x);
+            precise float behind = 1.0 - medium_before(s, (pixel.solid - s.peak.z) * s.slope.x);
             tau *= max(fma(-behind, s.slope.y, 1.0), 0.0);
         } else {
             tau = depth_of(s, d) < pixel.solid ? tau : 0.0;

@@ -23,14 +23,17 @@ precise float opacity_of(float x) {
     return 1.0 - exp_neg(x);
 }
 
-// Share of a medium kernel before a plane at distance / D behind its centre, D three deviations of the kernel.
-precise float share_in_front(float distance) {
+// Share of a medium's kernel before a plane, `distance` behind its centre in half widths; a footprint's terms of it.
+precise float share_before(vec4 low, vec2 high, float distance) {
     precise float t = clamp(distance, -1.0, 1.0);
-    // By powers of what lies before the plane: a small share keeps its digits.
-    precise float before = 1.0 + t;
-    precise float square = before * before;
-    precise float rest = 0.5 - t * (0.90625 - t * (0.625 - t * 0.15625));
-    return square * square * rest;
+    precise float before = (1.0 + t) * (1.0 + t);
+    precise float behind = (1.0 - t) * (1.0 - t);
+    precise float square = t * t;
+    precise float tail = low.w + square * (high.x + square * high.y);
+    precise float correction = low.x + square * (low.y + square * (low.z + square * tail));
+    precise float triweight = 0.5 - t * (0.90625 - t * (0.625 - t * 0.15625));
+    precise float share = before * before * (triweight + t * (behind * behind) * correction);
+    return share;
 }
 
 // The profile at t = max(1 - s, 0). Words of a footprint: the polynomial (8), q, e^-q, whether the polynomial holds.

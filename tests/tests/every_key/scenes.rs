@@ -97,7 +97,7 @@ impl Folder {
              [material.m]\n{material}\n[material.other]\nopacity = 0.8\n\
              medium = {{ extinction = 1, albedo = 0.3 }}\n\
              [[object]]\nname = 'wall'\n\
-             rectangle = {{ center = [0, 0, -1.2], u = [2, 0, 0], v = [0, 2, 0], spacing = 0.12 }}\n\
+             rectangle = {{ center = [0, 0, -1.2], u = [2, 0, 0], v = [0, 2, 0], spacing = 0.2 }}\n\
              [[object]]\nname = 'blocker'\nrectangle = {{ center = [0.67, 0.64, 1.5], u = [0.15, -0.1, 0], \
              v = [0.1, 0.15, -0.108], spacing = 0.05 }}\n\
              [[object]]\nname = 'it'\nmaterial = 'm'\n{}\n{transfer}\n\

@@ -1,6 +1,7 @@
 //! A value for every key that must change what is seen, and where it must not, with the reason.
 
 use super::scenes::SOURCES;
+use super::surfels;
 
 /// Where a change is looked for.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -72,7 +73,7 @@ const EACH: &[&str] = &["points", "particles", "sheets", "surfels"];
 const POINTS: &[&str] = &["points"];
 const PARTICLES: &[&str] = &["particles"];
 const SHEETS: &[&str] = &["sheets"];
-const SURFELS: &[&str] = &["surfels"];
+pub(super) const SURFELS: &[&str] = &["surfels"];
 const BUT_POINTS: &[&str] = &["particles", "sheets", "surfels"];
 const BUT_PARTICLES: &[&str] = &["points", "sheets", "surfels"];
 
@@ -93,7 +94,7 @@ impl Entry {
         self.but.iter().find(of).map_or(Expected::Changes, |b| b.2)
     }
 
-    fn with(self, with: &'static [&'static str]) -> Self {
+    pub(super) fn with(self, with: &'static [&'static str]) -> Self {
         Self { with, ..self }
     }
 
@@ -101,7 +102,7 @@ impl Entry {
         Self { look, ..self }
     }
 
-    fn by(self, techniques: &'static [&'static str]) -> Self {
+    pub(super) fn by(self, techniques: &'static [&'static str]) -> Self {
         Self { techniques, ..self }
     }
 
@@ -121,18 +122,21 @@ impl Entry {
 }
 
 /// A trial with some sources.
-fn of(sources: Which, key: &'static str, set: &'static str) -> Entry {
+pub(super) fn of(sources: Which, key: &'static str, set: &'static str) -> Entry {
     let (with, but) = (&[][..], Vec::new());
     Entry { key, set, with, look: Look::Picture, frame: None, techniques: EACH, sources, but }
 }
 
 /// A trial with one source.
-fn one(key: &'static str, set: &'static str) -> Entry {
+pub(super) fn one(key: &'static str, set: &'static str) -> Entry {
     of(These(&["implicit"]), key, set)
 }
 
 pub(crate) fn entries() -> Vec<Entry> {
-    [scene(), lights(), objects(), sources(), materials(), render(), animation()].into_iter().flatten().collect()
+    [scene(), lights(), objects(), sources(), materials(), render(), surfels::entries(), animation()]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 fn scene() -> Vec<Entry> {
@@ -205,7 +209,7 @@ const NOT_OF_POINTS: Expected = Refused(2, "`merge_duplicates` belongs to `point
 const NO_CLIP: Expected = Refused(2, "`clip` belongs to");
 const OWN_SPACING: Expected = Refused(2, "states its own spacing");
 const NO_TRANSFER: Expected = Refused(2, "belongs to a `volume` or `slice`");
-const OPEN: Which = These(&["implicit", "isosurface", "level_set"]);
+pub(super) const OPEN: Which = These(&["implicit", "isosurface", "level_set"]);
 
 fn objects() -> Vec<Entry> {
     vec![
@@ -366,7 +370,6 @@ fn materials() -> Vec<Entry> {
 const BUT_SURFELS: &[&str] = &["points", "particles", "sheets"];
 const UNBENT: Expected = Nothing("this technique draws surfaces without the matter that they bound, and warns");
 const CAUCHY: &[&str] = &["material.m.cauchy={a=1.3, b=0.1}"];
-const GLASS: &[&str] = &["material.m.ior=1.5"];
 
 const BALL: Which = These(&["medium_ball"]);
 const POINTS_ONLY: Expected = Nothing("a setting of the technique `points`");
@@ -442,12 +445,6 @@ fn render() -> Vec<Entry> {
         of(BALL, "render.sheets.transmittance_cutoff", "render.sheets.transmittance_cutoff=0.9")
             .by(SHEETS)
             .with(&["object.it.transform.scale=4"]),
-        of(OPEN, "render.surfels", "render.surfels={disc_scale=1}").by(SURFELS),
-        of(OPEN, "render.surfels.disc_scale", "render.surfels.disc_scale=1").by(SURFELS),
-        of(OPEN, "render.surfels.gap", "render.surfels.gap=4").by(SURFELS),
-        of(OPEN, "render.surfels.transmittance_cutoff", "render.surfels.transmittance_cutoff=0.9").by(SURFELS),
-        of(OPEN, "render.surfels.bending", "render.surfels.bending='power'").by(SURFELS).with(GLASS),
-        of(OPEN, "render.surfels.behind", "render.surfels.behind='straight'").by(SURFELS).with(GLASS),
     ]
 }
 

@@ -35,7 +35,7 @@ const MAY_KNOW: [(&str, &[&str]); 21] = [
             "organza-device",
         ],
     ),
-    ("organza-judge", &["splat-core", "convert", "tsm", "hbsort", "reference", "organza"]),
+    ("organza-judge", &["splat-core", "convert", "tsm", "hbsort", "deferred-blend", "reference", "organza"]),
     ("organza-cli", &["splat-core", "convert", "organza", "organza-judge"]),
     ("organza-tests", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza", "organza-judge"]),
     (

@@ -101,7 +101,7 @@ pub fn hash_grouping(cloud: &Cloud, params: &HashParams, progress: Option<&Progr
     };
     let mut by_place = vec![0; groups.len()];
     surfels.iter().zip(&groups).for_each(|(surfel, &group)| by_place[surfel.place as usize] = group);
-    let mut groups = Groups { count: params.groups, of: by_place };
+    let mut groups = Groups::of_each(params.groups, by_place);
     if chooses.contains(&true) {
         resolve(&surfels, &chooses, params, progress, &mut groups)?;
     }

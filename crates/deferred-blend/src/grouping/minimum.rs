@@ -48,7 +48,7 @@ pub fn minimum_coloring(graph: &OverlapGraph, most_groups: u32) -> Result<Colori
         }
     }
     let of_node: Vec<u8> = colors.into_iter().map(|color| color as u8).collect();
-    Ok(Coloring { groups: Groups { count: count.max(1), of: graph.by_place(&of_node) }, overlaps })
+    Ok(Coloring { groups: Groups::of_each(count.max(1), graph.by_place(&of_node)), overlaps })
 }
 
 /// Nodes by falling degree, then ascending.

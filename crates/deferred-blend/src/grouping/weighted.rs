@@ -73,7 +73,7 @@ pub fn weighted_coloring(graph: &OverlapGraph, params: &WeightedParams) -> Resul
     vertices.initialize();
     vertices.optimize(params);
     let of_node: Vec<u8> = vertices.group.iter().map(|&group| group as u8).collect();
-    Ok(Groups { count: params.groups, of: graph.by_place(&of_node) })
+    Ok(Groups::of_each(params.groups, graph.by_place(&of_node)))
 }
 
 /// The cost L(G, K) of Eq. 6 in f64: Σ ½(A_ij + A_ji)·(1 − n_i·n_j) over edges within a group, areas as shares of their discs.

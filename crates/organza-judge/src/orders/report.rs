@@ -6,7 +6,7 @@ use crate::accuracy::{data_uri, difference, escaped, png};
 use organza::output::{Target, Targets};
 use organza::scene::Scene;
 use organza::{Error, printable};
-use reference::metrics::{Display, Image};
+use reference::metrics::{Display, Image, Linear};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -30,7 +30,7 @@ impl OrdersReport {
     /// [`Error::Internal`] for pictures of unequal sizes.
     pub fn new(scene: &Scene, comparison: Comparison) -> Result<Self, Error> {
         let exposure = scene.render.exposure;
-        let distance = |o: &Ordered| Distance::between(&o.image, &comparison.truth, exposure);
+        let distance = |o: &Ordered| Distance::between(&o.image, truth(o, &comparison), exposure);
         let distances = comparison.orderings.iter().map(distance).collect::<Result<_, _>>()?;
         Ok(Self {
             scene: printable(Path::new(scene.file.file_name().unwrap_or_default())),
@@ -70,6 +70,7 @@ impl OrdersReport {
                 "max": d.linear.max,
                 "flip": d.flip,
                 "epsilon_8_bit": d.epsilon,
+                "of_layers": o.of_layers,
                 "sort_seconds": o.seconds.map(|s| json!({ "median": s.median, "min": s.min, "max": s.max })),
                 "bytes": o.bytes,
                 "sampled": o.sampled.map(|s| json!({
@@ -89,6 +90,7 @@ impl OrdersReport {
             "translucent_splats": self.comparison.splats,
             "rays": self.comparison.orderings.iter().find_map(|o| o.disorder).map(|d| d.rays),
             "without_particles": self.comparison.without_particles,
+            "without_layers": self.comparison.layers.as_ref().err(),
             "truth": { "method": "fragments sorted per pixel, f64", "seconds": self.comparison.truth_seconds },
             "orderings": self.rows().map(row).collect::<Value>(),
         });
@@ -99,13 +101,13 @@ impl OrdersReport {
     pub fn csv(&self) -> String {
         let mut text = String::from(
             "ordering,slice_thickness,wrong_pairs_per_ray,pairs_per_ray,worst_backtrack,rmse,max,flip,sort_ms,bytes,\
-             rmse_half_width_95,rms_bias\n",
+             rmse_half_width_95,rms_bias,epsilon_8_bit,of_layers\n",
         );
         let cell = |v: Option<f64>| v.map_or_else(String::new, |v| format!("{v:.6e}"));
         for (o, d) in self.rows() {
             let _ = writeln!(
                 text,
-                "\"{}\",{},{},{},{},{:.6e},{:.6e},{:.6e},{},{},{},{}",
+                "\"{}\",{},{},{},{},{:.6e},{:.6e},{:.6e},{},{},{},{},{:.6e},{}",
                 o.name,
                 cell(o.thickness),
                 cell(o.disorder.map(|d| d.wrong_pairs_per_ray)),
@@ -118,6 +120,8 @@ impl OrdersReport {
                 o.bytes,
                 cell(o.sampled.map(|s| s.from_limit.half_width)),
                 cell(o.sampled.and_then(|s| s.bias)),
+                d.epsilon,
+                o.of_layers,
             );
         }
         text
@@ -126,18 +130,19 @@ impl OrdersReport {
     /// The comparison as lines of text.
     pub fn text(&self) -> String {
         let mut text = format!(
-            "{:>12} {:>12} {:>10} {:>10} {:>9} {:>11}  ordering\n",
-            "wrong pairs", "backtrack", "RMSE", "max", "ms", "bytes"
+            "{:>12} {:>12} {:>10} {:>10} {:>8} {:>9} {:>11}  ordering\n",
+            "wrong pairs", "backtrack", "RMSE", "max", "ε", "ms", "bytes"
         );
         for (o, d) in self.rows() {
             let ms = o.seconds.map_or_else(|| "-".into(), |s| format!("{:.2}", 1e3 * s.median));
             let _ = writeln!(
                 text,
-                "{:>12} {:>12} {:>10.2e} {:>10.2e} {ms:>9} {:>11}  {}{}",
+                "{:>12} {:>12} {:>10.2e} {:>10.2e} {:>8.3} {ms:>9} {:>11}  {}{}",
                 o.disorder.map_or_else(|| "-".into(), |d| format!("{:.3}", d.wrong_pairs_per_ray)),
                 o.disorder.map_or_else(|| "-".into(), |d| format!("{:.4}", d.worst_backtrack)),
                 d.linear.rmse,
                 d.linear.max,
+                d.epsilon,
                 o.bytes,
                 o.name,
                 seeds(o)
@@ -145,6 +150,15 @@ impl OrdersReport {
         }
         if let Some(reason) = &self.comparison.without_particles {
             let _ = writeln!(text, "no particles: {reason}");
+        }
+        match &self.comparison.layers {
+            Ok(_) => {
+                text +=
+                    "layers are held against all layers, each averaged, in f64; other orderings against all fragments\n"
+            }
+            Err(reason) => {
+                let _ = writeln!(text, "no layers: {reason}");
+            }
         }
         text
     }
@@ -155,14 +169,14 @@ impl OrdersReport {
 
     /// Pictures in a row, their differences from the truth below; the truth comes first.
     fn contact_sheet(&self) -> Result<Vec<u8>, Error> {
-        let truth = self.comparison.truth.display(self.exposure);
-        let mut columns = vec![(truth.clone(), difference(&truth, &truth)?.0)];
+        let exact = self.comparison.truth.display(self.exposure);
+        let mut columns = vec![(exact.clone(), difference(&exact, &exact)?.0)];
         for o in &self.comparison.orderings {
             let shown = self.shown(o);
-            let apart = difference(&shown, &truth)?.0;
+            let apart = difference(&shown, &truth(o, &self.comparison).display(self.exposure))?.0;
             columns.push((shown, apart));
         }
-        let [width, height] = truth.size();
+        let [width, height] = exact.size();
         let per_row = 3;
         let blocks = columns.len().div_ceil(per_row);
         let size = [per_row * width, 2 * blocks * height];
@@ -180,13 +194,13 @@ impl OrdersReport {
     }
 
     fn html(&self) -> Result<String, Error> {
-        let truth = self.comparison.truth.display(self.exposure);
+        let exact = self.comparison.truth.display(self.exposure);
         let mut html = format!(
             "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" \
              content=\"width=device-width\"><title>Orders: {0}</title>\n<style>\n{1}</style></head>\n<body><main>\n<h1>Orders: \
              {0}</h1>\n<p class=\"soft\">{2} translucent splats; truth: fragments sorted per pixel in f64 ({3:.1} s). {4} \
              threads on {5}.<br>Scene SHA-256 <code>{6}</code></p>\n<div class=\"wide\"><table><tr><th>ordering</th>\
-             <th>wrong pairs a ray</th><th>worst backtrack</th><th>RMSE</th><th>max</th><th>FLIP</th><th>sort ms</th>\
+             <th>wrong pairs a ray</th><th>worst backtrack</th><th>RMSE</th><th>max</th><th>FLIP</th><th>ε</th><th>sort ms</th>\
              <th>bytes</th></tr>\n",
             escaped(&self.scene),
             include_str!("../accuracy/report.css"),
@@ -203,7 +217,7 @@ impl OrdersReport {
             let ms = o.seconds.map_or_else(|| "–".into(), |s| format!("{:.2}", 1e3 * s.median));
             let _ = writeln!(
                 html,
-                "<tr><td>{}{}</td><td>{pairs}</td><td>{}</td><td>{:.2e}</td><td>{:.2e}</td><td>{:.4}</td><td>{ms}</td>\
+                "<tr><td>{}{}</td><td>{pairs}</td><td>{}</td><td>{:.2e}</td><td>{:.2e}</td><td>{:.4}</td><td>{:.3}</td><td>{ms}</td>\
                  <td>{}</td></tr>",
                 o.name,
                 seeds(o),
@@ -211,30 +225,48 @@ impl OrdersReport {
                 d.linear.rmse,
                 d.linear.max,
                 d.flip,
+                d.epsilon,
                 o.bytes
             );
         }
         let _ = writeln!(
             html,
             "</table></div>\n<h2>Pictures</h2>\n<p>Click a picture to flip between the ordering, the truth and their \
-             difference.</p>\n<img hidden id=\"truth\" alt=\"\" src=\"{}\"><div class=\"grid\">",
-            data_uri(&truth)?
+             difference.</p>\n<img hidden id=\"truth\" alt=\"\" src=\"{}\">",
+            data_uri(&exact)?
         );
-        for (k, o) in self.comparison.orderings.iter().enumerate() {
-            let shown = self.shown(o);
-            let (apart, gain) = difference(&shown, &truth)?;
-            let (a, d, name) = (data_uri(&shown)?, data_uri(&apart)?, &o.name);
-            let _ = writeln!(
-                html,
-                "<figure class=\"flip\"><img src=\"{a}\" alt=\"{name}\"><h3>{name}</h3><button \
-                 aria-pressed=\"true\">ordering</button><button data-of=\"truth\" aria-pressed=\"false\">truth</button><button \
-                 data-of=\"d{k}\" aria-pressed=\"false\">difference x {gain}</button><img hidden id=\"d{k}\" alt=\"\" src=\"{d}\"></figure>"
-            );
+        if let Ok(layers) = &self.comparison.layers {
+            let all = data_uri(&layers.display(self.exposure))?;
+            let _ = write!(html, "<img hidden id=\"layers\" alt=\"\" src=\"{all}\">");
         }
+        html += "<div class=\"grid\">";
+        self.figures(&mut html)?;
         let _ =
             write!(html, "</div></main>\n<script>\n{}</script></body></html>\n", include_str!("../accuracy/report.js"));
         Ok(html)
     }
+
+    /// Each picture, which flips to what it is judged by and to their difference.
+    fn figures(&self, html: &mut String) -> Result<(), Error> {
+        for (k, o) in self.comparison.orderings.iter().enumerate() {
+            let shown = self.shown(o);
+            let (apart, gain) = difference(&shown, &truth(o, &self.comparison).display(self.exposure))?;
+            let of = if o.of_layers { "layers" } else { "truth" };
+            let (a, d, name) = (data_uri(&shown)?, data_uri(&apart)?, &o.name);
+            let _ = writeln!(
+                html,
+                "<figure class=\"flip\"><img src=\"{a}\" alt=\"{name}\"><h3>{name}</h3><button \
+                 aria-pressed=\"true\">ordering</button><button data-of=\"{of}\" aria-pressed=\"false\">truth</button><button \
+                 data-of=\"d{k}\" aria-pressed=\"false\">difference x {gain}</button><img hidden id=\"d{k}\" alt=\"\" src=\"{d}\"></figure>"
+            );
+        }
+        Ok(())
+    }
+}
+
+/// What an ordering is judged by.
+fn truth<'a>(o: &Ordered, comparison: &'a Comparison) -> &'a Image<Linear> {
+    comparison.layers.as_ref().ok().filter(|_| o.of_layers).unwrap_or(&comparison.truth)
 }
 
 /// What the seeds of a random technique say, beside its name: the picture and its measures are those of the first one.

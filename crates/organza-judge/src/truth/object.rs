@@ -90,7 +90,7 @@ pub(super) fn body(
             convert::field_to_mesh(&field, i.bounds, i.spacing * FINER, &params, None)
                 .map_err(|e| Error::from_convert(&e))?
         }
-        Source::Rectangle(r) => rectangle(r.center, r.u, r.v),
+        Source::Rectangle(r) => Mesh::rectangle(r.center, r.u, r.v),
         Source::Medium(_) => return medium(scene, object, options).map(Ok),
         Source::Volume(_) | Source::Density(_) | Source::Cloud(_) => {
             // Without lights nothing is shaded by its gradient.
@@ -291,16 +291,6 @@ fn surface(scene: &Scene, object: &SceneObject, mut mesh: Mesh) -> Body {
 
 fn read(path: &Path, options: &RenderOptions) -> Result<FileData, Error> {
     convert::read::file(path, &options.read_params(), None).map(|read| read.0).map_err(|e| Error::from_read(path, &e))
-}
-
-fn rectangle(center: DVec3, u: DVec3, v: DVec3) -> Mesh {
-    let corner = |s: f64, t: f64| (u * s + v * t).as_vec3();
-    Mesh {
-        origin: center,
-        position: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        ..Mesh::default()
-    }
 }
 
 /// Moves a mesh into the world; without normals it gets smooth ones, as its splats do.

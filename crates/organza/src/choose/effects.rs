@@ -2,6 +2,7 @@
 //! them.
 
 use super::row;
+use crate::form::Form;
 use crate::pass;
 use crate::plan::{Effect, Plan, PlannedPass};
 use crate::scene::Technique;
@@ -129,12 +130,14 @@ fn translucency(statistics: &Statistics) -> Effect {
 }
 
 fn opaque_surfaces(statistics: &Statistics) -> Effect {
-    let n = statistics.opaque;
-    if n > 0 {
-        effect("opaque surfaces", true, format!("{n} opaque splats hide what lies behind"))
-    } else {
-        effect("opaque surfaces", false, "no splat is opaque")
+    let meshes = statistics.planned.iter().filter(|object| object.form == Form::Polygons).count();
+    let of = |count: u64, what: &str| (count > 0).then(|| format!("{count} {what}"));
+    let kinds = [of(statistics.opaque, "opaque splats"), of(meshes as u64, "opaque meshes, which stay triangles,")];
+    let all: Vec<String> = kinds.into_iter().flatten().collect();
+    if all.is_empty() {
+        return effect("opaque surfaces", false, "no splat is opaque");
     }
+    effect("opaque surfaces", true, format!("{} hide what lies behind", all.join(" and ")))
 }
 
 fn kept_layers(statistics: &Statistics) -> Effect {

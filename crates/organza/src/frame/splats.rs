@@ -26,7 +26,7 @@ impl Frame<'_> {
         let some = self.drawn.get_or_init(|| {
             let is_drawn = |i: &u32| {
                 let (kind, object) = (cloud.kind[*i as usize], cloud.object[*i as usize] as usize);
-                kind == SplatKind::Opaque || self.plan.draws[object]
+                (kind == SplatKind::Opaque && !self.plan.is_own[object]) || self.plan.draws[object]
             };
             let drawn: Vec<u32> = (0..cloud.len() as u32).filter(is_drawn).collect();
             (drawn.len() < cloud.len()).then(|| cloud.gather(&drawn))
@@ -100,11 +100,20 @@ impl Frame<'_> {
         (0..kinds.len() as u32).filter(|&i| kinds[i as usize] == SplatKind::Opaque).collect()
     }
 
-    /// The nearest opaque surface of every sample; an empty image where nothing is opaque.
-    pub(crate) fn opaque(&self, cost: &mut CostRecord) -> Result<&OpaqueImage, Error> {
-        if let Some(opaque) = self.opaque.get() {
-            return Ok(opaque);
+    /// The nearest opaque surface of every sample; an empty image where nothing is opaque. The passes that were run for it are added
+    /// to `cost`.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`], and those of [`Frame::maps`].
+    pub fn opaque(&self, cost: &mut CostRecord) -> Result<&OpaqueImage, Error> {
+        if self.opaque.get().is_none() {
+            self.set_opaque(self.solid(cost)?);
         }
+        Ok(self.opaque.get().expect("invariant: it was set above"))
+    }
+
+    /// The same of opaque splats alone, for a technique that adds polygons to it.
+    pub(crate) fn solid(&self, cost: &mut CostRecord) -> Result<OpaqueImage, Error> {
         let ids = self.solid_ids();
         // Beside translucent splats they have been shaded already.
         let alone = self.shaded.get().is_none() && !ids.is_empty();
@@ -123,10 +132,10 @@ impl Frame<'_> {
                 Ok::<_, Error>(image)
             })?;
         }
-        Ok(self.opaque.get_or_init(|| image))
+        Ok(image)
     }
 
-    /// Takes the opaque image that a device has made.
+    /// Takes the opaque image that a device or a technique has made.
     pub(crate) fn set_opaque(&self, image: OpaqueImage) {
         // One that is there already is the same.
         let _ = self.opaque.set(image);

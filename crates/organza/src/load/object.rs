@@ -2,18 +2,18 @@
 
 use super::context::Context;
 use super::input::{Input, input};
-use super::own::{Body, Own, Search};
+use super::own::{Body, Own};
 use crate::Error;
 use crate::scene::{MediumShape, RectangleSource, SceneObject, Source};
 use crate::statistics::ObjectStatistics;
 use convert::cost::{self, Prediction};
 use convert::{
     CloudShape, ConvertError, Density, DensityParams, MeshParams, RawPoints, SharedField, SplatParams, SurfelParams,
-    VolumeParams,
+    VolumeParams, ZeroSearch,
 };
 use glam::DVec3;
 use pbsr::BoundedExtinction;
-use splat_core::{Cloud, Exceeded, Grid, Mesh, Object, Shading, Similarity, TransferFunction, TransferPoint};
+use splat_core::{Cloud, Exceeded, Grid, Mesh, Object, Shading, Similarity, TransferFunction};
 use std::path::Path;
 
 /// Most operations of an expression on its way to splats: some minutes of two cores.
@@ -30,7 +30,7 @@ pub(super) struct Prepared<'a> {
     /// Extinction, where particles could be sampled from a field of it.
     pub(super) bounded: Option<BoundedExtinction>,
     /// Where a surface may lie, where particles could be sampled from it.
-    pub(super) search: Option<Search>,
+    pub(super) search: Option<ZeroSearch>,
 }
 
 /// The object's row of the object table.
@@ -62,7 +62,7 @@ pub(super) fn prepare<'a>(
     };
     let bounded = if sampled { input.bounded(context.extinction_factor(object)) } else { None };
     let search = match &input {
-        Input::Surface(field, bounds, ..) if sampled => Some(Search::new(field, *bounds)),
+        Input::Surface(field, bounds, ..) if sampled => Some(ZeroSearch::new(field, *bounds)),
         _ => None,
     };
     match predict(&input) {
@@ -246,17 +246,7 @@ pub(super) fn procedural(
     context: &Context<'_>,
 ) -> Result<(Grid, TransferFunction), ConvertError> {
     let lattice = convert::procedural_cloud(shape, spacing, params, Some(context.progress))?;
-    Ok((lattice, as_it_is(shape.extinction, params)?))
-}
-
-/// Values up to `most` as extinction, 1/world unit.
-pub(super) fn as_it_is(most: f64, params: &SplatParams) -> Result<TransferFunction, ConvertError> {
-    let point = |value: f32| TransferPoint { value, color: params.color, extinction: value };
-    let mut points = vec![point(0.0)];
-    if most as f32 > 0.0 {
-        points.push(point(most as f32));
-    }
-    TransferFunction::new(points).map_err(|source| ConvertError::Input { object: params.object_name.clone(), source })
+    Ok((lattice, convert::extinction_as_it_is(shape.extinction, params)?))
 }
 
 /// A rectangle of a scene.
@@ -275,7 +265,7 @@ pub(super) fn medium_grid(shape: &MediumShape, params: &SplatParams) -> Result<(
             convert::medium_ball_grid(center, radius, extinction, spacing, params)?
         }
     };
-    Ok((lattice, as_it_is(shape.extinction(), params)?))
+    Ok((lattice, convert::extinction_as_it_is(shape.extinction(), params)?))
 }
 
 fn medium(shape: &MediumShape, params: &SplatParams) -> Result<Cloud, ConvertError> {

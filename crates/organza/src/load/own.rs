@@ -2,21 +2,17 @@
 //!
 //! Lengths and places are the object's own, so nothing is rounded where it lies far away; a transform leads to the world.
 
-mod search;
-
 use super::context::Context;
 use super::files::{grid_bytes, mesh_bytes};
 use super::input::{Input, shortest_step};
-use super::object::{Prepared, as_it_is, medium_grid, procedural};
+use super::object::{Prepared, medium_grid, procedural};
 use crate::Error;
 use crate::form::{Form, PlannedObject};
-use crate::scene::{RectangleSource, SurfaceSampler, Technique};
-use convert::{DensityParams, SharedField, VolumeParams};
+use crate::scene::{SurfaceSampler, Technique};
+use convert::{SharedField, VolumeParams, extinct_bounds};
 use glam::DVec3;
 use pbsr::BoundedExtinction;
 use rayon::prelude::*;
-pub(super) use search::Search;
-use search::cell_bounds;
 use splat_core::{BccGrid, DAabb, Footprint, Grid, Mesh, Packing, Similarity, SplatKind, TransferFunction, optics};
 use std::sync::Arc;
 
@@ -155,8 +151,16 @@ impl Own {
         }
     }
 
-    /// Optical depth that no ray through its cells can exceed, of the channel that absorbs most; 0 for other bodies.
+    /// Whether it lets no light through.
+    pub(crate) fn is_opaque(&self) -> bool {
+        self.opacity >= 1.0
+    }
+
+    /// Optical depth that no ray through its cells can exceed, of the channel that absorbs most; that of opaque polygons; 0 for other bodies.
     pub(crate) fn optical_depth(&self) -> f64 {
+        if self.is_opaque() {
+            return f64::INFINITY;
+        }
         let Body::Cells { transfer, .. } = &self.body else { return 0.0 };
         let most = transfer.points().iter().map(|p| p.extinction).fold(0.0, f32::max);
         f64::from(most) * self.extinction_scale * self.bounds.diagonal()
@@ -217,30 +221,23 @@ fn data(
     context: &Context<'_>,
 ) -> Result<Option<Data>, Error> {
     if let Some(field) = bounded {
-        let spacing = match &prepared.input {
-            Input::Density(_, _, params) => world_spacing(&params.density) / params.volume.splat.transform.scale,
-            Input::Medium(shape, _) => shape.spacing(),
-            _ => 0.0,
-        };
-        let (seen, side) = field.seen();
-        let bounds = seen.fold(DAabb::EMPTY, |all, p| all.union(DAabb::around(p, 0.5 * side)));
-        let some = field.max() > 0.0;
-        return Ok(some.then_some((Body::Field(field), bounds, spacing)));
+        return Ok(field_data(prepared, field));
     }
     let cells = |grid: Arc<Grid>, transfer: TransferFunction, normals: bool| {
-        let (bounds, spacing) = (cell_bounds(&grid, &transfer), shortest_step(&grid));
+        let (bounds, spacing) = (extinct_bounds(&grid, &transfer), shortest_step(&grid));
         Some((Body::Cells { grid, transfer, normals, body_centred: None }, bounds, spacing))
     };
+    let meshed = |mesh: Mesh| triangles(mesh, prepared.prediction.splats, source);
     Ok(match &prepared.input {
         Input::Points(..) => None,
-        Input::Mesh(_, mesh, _) => triangles(Mesh::clone(mesh), prepared.prediction.splats),
-        Input::Rectangle(r, ..) => triangles(rectangle(r), prepared.prediction.splats),
+        Input::Mesh(_, mesh, _) => meshed(Mesh::clone(mesh)),
+        Input::Rectangle(r, ..) => meshed(Mesh::rectangle(r.center, r.u, r.v)),
         Input::Surface(field, bounds, params, lattice) => {
             let spacing = world_spacing(&params.density) / params.splat.transform.scale;
             if source == Form::Triangles {
                 let mesh =
                     convert::surface_to_mesh(field.as_ref(), *bounds, spacing, &params.splat, Some(context.progress));
-                return Ok(triangles(mesh.map_err(|e| Error::from_convert(&e))?, prepared.prediction.splats));
+                return Ok(meshed(mesh.map_err(|e| Error::from_convert(&e))?));
             }
             let bounds = prepared.search.as_ref().map_or(*bounds, |s| s.bounds);
             if let (Form::Lattice, Some((grid, level))) = (source, lattice) {
@@ -261,7 +258,8 @@ fn data(
             cells(grid.into(), transfer, params.normals)
         }
         Input::Density(field, bounds, params) => {
-            let (grid, transfer) = density_lattice(field, *bounds, params)?;
+            let (grid, transfer) =
+                convert::density_to_grid(field.as_ref(), *bounds, params).map_err(|e| Error::from_convert(&e))?;
             cells(grid.into(), transfer, params.volume.normals)
         }
         Input::Medium(shape, params) => {
@@ -269,6 +267,19 @@ fn data(
             cells(grid.into(), transfer, false)
         }
     })
+}
+
+/// A field of extinction, if there is any.
+fn field_data(prepared: &Prepared<'_>, field: BoundedExtinction) -> Option<Data> {
+    let spacing = match &prepared.input {
+        Input::Density(_, _, params) => world_spacing(&params.density) / params.volume.splat.transform.scale,
+        Input::Medium(shape, _) => shape.spacing(),
+        _ => 0.0,
+    };
+    let (seen, side) = field.seen();
+    let bounds = seen.fold(DAabb::EMPTY, |all, p| all.union(DAabb::around(p, 0.5 * side)));
+    let some = field.max() > 0.0;
+    some.then_some((Body::Field(field), bounds, spacing))
 }
 
 /// A volume, and on a body-centred lattice where the scene asks for one.
@@ -281,7 +292,7 @@ fn volume(
     let is_packed = context.scene.objects[context.id].packing == Packing::BodyCentred;
     let packed = is_packed.then(|| convert::body_centred(grid, &params.splat)).transpose();
     let body_centred = packed.map_err(|e| Error::from_convert(&e))?;
-    let (bounds, spacing) = (cell_bounds(grid, transfer), shortest_step(grid));
+    let (bounds, spacing) = (extinct_bounds(grid, transfer), shortest_step(grid));
     let body = Body::Cells { grid: grid.clone(), transfer: transfer.clone(), normals: params.normals, body_centred };
     Ok((body, bounds, spacing))
 }
@@ -293,46 +304,16 @@ fn world_spacing(density: &convert::Density) -> f64 {
     }
 }
 
-/// A density on a lattice whose voxels fill its box, values as extinction in 1/world unit.
-fn density_lattice(
-    field: &SharedField,
-    bounds: DAabb,
-    params: &DensityParams,
-) -> Result<(Grid, TransferFunction), Error> {
-    let splat = &params.volume.splat;
-    let spacing = world_spacing(&params.density) / splat.transform.scale;
-    let mut grid =
-        convert::field_to_grid(field.as_ref(), bounds, spacing, splat, None).map_err(|e| Error::from_convert(&e))?;
-    let extinction = params.extinction as f32;
-    grid.values.iter_mut().for_each(|v| *v = (*v * extinction).max(0.0));
-    let most = grid.values.iter().copied().fold(0.0, f32::max);
-    let transfer = as_it_is(f64::from(most), splat).map_err(|e| Error::from_convert(&e))?;
-    Ok((grid, transfer))
-}
-
 /// A mesh with normals; smooth ones where the file has none, as its splats have.
-fn triangles(mut mesh: Mesh, splats: u64) -> Option<Data> {
+fn triangles(mut mesh: Mesh, splats: u64, form: Form) -> Option<Data> {
     if mesh.normal.is_empty() {
         mesh.normal = convert::vertex_normals(&mesh);
     }
-    let corner = |v: u32| mesh.position[v as usize].as_dvec3();
-    let area = |t: &[u32; 3]| 0.5 * (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).length();
-    let area: f64 = mesh.triangles.iter().map(area).sum();
-    let used = DAabb::of_points(mesh.triangles.iter().flatten().map(|v| corner(*v)));
-    let bounds = DAabb::new(mesh.origin + used.min, mesh.origin + used.max);
+    let (area, bounds) = (mesh.area(), mesh.bounds());
     // Particles are thinned by the angle at which they are seen: of faces, not of normals that lean from them.
     let piece = area / splats.max(1) as f64;
-    convert::flatten_leaning(&mut mesh, piece);
-    (area > 0.0).then_some((Body::Triangles(mesh), bounds, piece.sqrt()))
-}
-
-fn rectangle(r: &RectangleSource) -> Mesh {
-    let corner = |s: f64, t: f64| (r.u * s + r.v * t).as_vec3();
-    Mesh {
-        origin: r.center,
-        position: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
-        normal: vec![r.u.cross(r.v).normalize().as_vec3(); 4],
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        ..Mesh::default()
+    if form == Form::Triangles {
+        convert::flatten_leaning(&mut mesh, piece);
     }
+    (area > 0.0).then_some((Body::Triangles(mesh), bounds, piece.sqrt()))
 }

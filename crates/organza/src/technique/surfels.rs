@@ -1,17 +1,23 @@
 //! The `surfels` technique (Zhang and Pajarola 2007): translucent surfaces as discs that are averaged in each layer, by rays that meet
 //! them exactly, and layers that are composited in order.
 
+mod glass;
+mod grouped;
+
 use crate::frame::{Frame, Shaded};
 use crate::lights::LightPoint;
 use crate::matter::Matter;
 use crate::pass;
-use crate::scene::{self, SceneObject, Technique};
+use crate::scene::{Scene, SurfelGroups, SurfelLayers, Technique};
 use crate::technique::{Fold, Session, points};
 use crate::{CostRecord, Error, RenderOptions, stage};
-use deferred_blend::{Bending, BlendInput, Blended, DiscInput, Discs, Glass, Layering, Params, Surfaces, blend};
+use deferred_blend::grouping::Membership;
+use deferred_blend::{BlendInput, Blended, DiscInput, Discs, Floors, Glass, Layering, Params, Surfaces, blend};
+use glass::{bending, bounds_matter, surfaces, unit};
+pub(crate) use grouped::{Kept, plans};
 use splat_core::glam::Vec3;
 use splat_core::raster::GlassImage;
-use splat_core::{Accumulator, Direction, SplatKind, StageCost};
+use splat_core::{Accumulator, Direction};
 use std::ops::Range;
 
 /// Bytes of a disc: where rays meet it, what it shows, its normal and place, and an entry in the lists of two tiles.
@@ -23,20 +29,31 @@ const GLASS_BYTES: u64 = 24;
 /// Bytes of the discs, and of what bent rays meet and see.
 pub(crate) fn bytes(matter: &Matter<'_>, _: &[LightPoint], _: bool, _: &RenderOptions) -> u64 {
     let discs = matter.cloud.map_or(0, |cloud| cloud.len() as u64);
-    let bounds = matter.scene.materials.iter().any(|m| m.material.bounds_matter());
+    let bounds = bends(matter.scene).is_ok() && matter.scene.materials.iter().any(|m| m.material.bounds_matter());
     let samples = matter.camera.size.iter().map(|s| u64::from(*s)).product::<u64>();
     let glass = if bounds { Surfaces::bytes(discs) + GLASS_BYTES * samples } else { 0 };
-    DISC_BYTES * discs + glass
+    let groups = grouped::bytes(matter.scene, discs, matter.cloud.map_or(0, |cloud| cloud.bytes()));
+    DISC_BYTES * discs + glass + groups
+}
+
+/// Whether light is mirrored and bent, or what to set so that it is.
+pub(crate) fn bends(scene: &Scene) -> Result<(), &'static str> {
+    match scene.render.surfels.layers {
+        SurfelLayers::Gaps | SurfelLayers::Peeled(_) => Ok(()),
+        SurfelLayers::Algorithm1(_) | SurfelLayers::Algorithm2(_) => Err("set render.surfels.layers = \"gaps\""),
+    }
 }
 
 /// Begins a frame.
 pub(crate) fn begin<'a>(frame: &'a Frame<'a>) -> Box<dyn Fold + 'a> {
-    Box::new(Surfels { frame, discs: None, surfaces: None, glass: None })
+    Box::new(Surfels { frame, members: None, discs: None, surfaces: None, glass: None })
 }
 
 /// The discs of a frame that are the technique's own.
 struct Surfels<'a> {
     frame: &'a Frame<'a>,
+    /// Their groups, where the scene asks for some.
+    members: Option<Membership>,
     /// Once they were projected.
     discs: Option<Discs>,
     /// What bent rays may meet.
@@ -50,14 +67,15 @@ impl<'a> Fold for Surfels<'a> {
         &mut self,
         range: Range<f32>,
         into: &mut Accumulator,
-        _: &mut Session<'_>,
+        session: &mut Session<'_>,
         cost: &mut CostRecord,
     ) -> Result<(), Error> {
         let frame = self.frame;
         let params = params(frame);
         frame.maps(cost)?;
         if self.discs.is_none() {
-            self.discs = Some(project(frame, &params, cost)?);
+            self.members = grouped::members(frame, session.groups.as_deref_mut(), cost)?;
+            self.discs = Some(project(frame, &params, self.members.as_ref(), cost)?);
         }
         let Shaded { values, .. } = frame.shaded(cost)?;
         let opaque = &frame.opaque(cost)?.depth;
@@ -73,10 +91,11 @@ impl<'a> Fold for Surfels<'a> {
         };
         let (bending, unit, straight) = (bending(frame), unit(frame), !frame.settings.surfels.bent_behind);
         let glass = self.surfaces.as_ref().map(|surfaces| Glass { bending, sky: &sky, surfaces, straight, unit });
+        let layering = layering(&frame.settings.surfels.layers, self.members.as_ref(), (discs, &params));
         frame.progress.begin(stage::SURFELS);
         frame.tick()?;
         let image = cost.measure(pass::SURFELS, |stage| {
-            let input = BlendInput { discs, values, opaque, range, layering: Layering::Gaps, glass };
+            let input = BlendInput { discs, values, opaque, range, layering, glass };
             let Blended { counts, glass } = blend(&input, &params, into, Some(frame.progress)).map_err(refuse)?;
             stage.items_in = counts.discs;
             stage.items_out = counts.layers;
@@ -108,45 +127,6 @@ impl Surfels<'_> {
     }
 }
 
-/// Whether surfaces that the technique draws bound matter.
-fn bounds_matter(frame: &Frame<'_>) -> bool {
-    let objects = frame.scene.objects.iter().zip(&frame.plan.by).filter(|(o, _)| o.visible);
-    let material = |o: &SceneObject| &frame.loaded.materials[o.material];
-    objects.into_iter().any(|(o, by)| *by == Technique::Surfels && material(o).bounds_matter())
-}
-
-/// World units in a unit of the cloud.
-fn unit(frame: &Frame<'_>) -> f32 {
-    libm::exp2(f64::from(frame.loaded.exponent)) as f32
-}
-
-fn bending(frame: &Frame<'_>) -> Bending {
-    match frame.settings.surfels.bending {
-        scene::Bending::Traced => Bending::Traced,
-        scene::Bending::Power => Bending::Power,
-        scene::Bending::Nearest => Bending::Nearest,
-    }
-}
-
-/// Opaque surfaces, and those that bound matter where rays are followed: rays from anywhere can meet them.
-fn surfaces<'a>(frame: &'a Frame<'a>, values: &'a [f32], stage: &mut StageCost) -> Surfaces<'a> {
-    let (cloud, settings) = (frame.drawn(), &frame.settings.surfels);
-    let follows = settings.bending == scene::Bending::Traced;
-    let is_met = |&i: &u32| {
-        let (i, bounds) = (i as usize, |m: u16| frame.loaded.materials[m as usize].bounds_matter());
-        match cloud.kind[i] {
-            SplatKind::Opaque => settings.bent_behind,
-            SplatKind::Surface => {
-                follows && bounds(cloud.material[i]) && frame.plan.by[cloud.object[i] as usize] == Technique::Surfels
-            }
-            SplatKind::Medium => false,
-        }
-    };
-    let ids: Vec<u32> = (0..cloud.len() as u32).filter(is_met).collect();
-    stage.bytes = Surfaces::bytes(ids.len() as u64);
-    Surfaces::new(&disc_input(frame, &ids), values, frame.layout())
-}
-
 /// Some discs of what is drawn.
 fn disc_input<'a>(frame: &'a Frame<'a>, ids: &'a [u32]) -> DiscInput<'a> {
     let (loaded, cloud) = (frame.loaded, frame.drawn());
@@ -162,14 +142,37 @@ fn params(frame: &Frame<'_>) -> Params {
     }
 }
 
-/// The discs, near ones first.
-fn project(frame: &Frame<'_>, params: &Params, cost: &mut CostRecord) -> Result<Discs, Error> {
+/// How the scene tells layers apart.
+fn layering<'a>(
+    asked: &SurfelLayers,
+    members: Option<&'a Membership>,
+    (discs, params): (&Discs, &Params),
+) -> Layering<'a> {
+    let floors = |asked: &SurfelGroups| {
+        let groups = members.expect("invariant: what needs groups has some").groups();
+        Floors { groups, steps: asked.depth_steps.unwrap_or_else(|| discs.depth_steps(params)) }
+    };
+    match asked {
+        SurfelLayers::Gaps => Layering::Gaps,
+        SurfelLayers::Peeled(most) => Layering::Peeled(*most),
+        SurfelLayers::Algorithm1(groups) => Layering::Algorithm1(floors(groups)),
+        SurfelLayers::Algorithm2(groups) => Layering::Algorithm2(floors(groups)),
+    }
+}
+
+/// The discs, near ones first, as large as their groups draw them.
+fn project(
+    frame: &Frame<'_>,
+    params: &Params,
+    members: Option<&Membership>,
+    cost: &mut CostRecord,
+) -> Result<Discs, Error> {
     let near_first = hbsort::Params { direction: Direction::FrontToBack, ..hbsort::Params::default() };
     let order = points::sorted(frame, Technique::Surfels, &near_first, cost)?;
     frame.progress.begin(stage::SURFELS);
     frame.tick()?;
     cost.measure(pass::SURFELS, |stage| {
-        let discs = Discs::project(&disc_input(frame, &order.input_from_sorted), params);
+        let discs = Discs::project_members(&disc_input(frame, &order.input_from_sorted), params, members);
         stage.bytes = discs.bytes();
         Ok(discs)
     })

@@ -21,6 +21,8 @@ pub struct HalfCounts {
     pub scatter_passes: u64,
     /// Images of a slab or of light that were moved for soft shadows, two a slab and point of a light; 0 where shadows are hard.
     pub soft_passes: u64,
+    /// Pixels that show polygons before all that is in slabs, among it and behind it, of the first sweep (Figure 6).
+    pub polygon_pixels: [u64; 3],
     /// Bytes of the light buffer of one sweep and of its scattered light, the largest; they do not grow with slabs.
     pub light_bytes: u64,
     /// Bytes of everything that one sweep holds, the largest.
@@ -40,6 +42,7 @@ impl HalfCounts {
             scatter_cells: self.scatter_cells.max(other.scatter_cells),
             scatter_passes: self.scatter_passes + other.scatter_passes,
             soft_passes: self.soft_passes + other.soft_passes,
+            polygon_pixels: self.polygon_pixels,
             light_bytes: self.light_bytes.max(other.light_bytes),
             bytes: self.bytes.max(other.bytes),
         }

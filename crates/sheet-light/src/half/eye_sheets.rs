@@ -3,7 +3,9 @@
 use super::band::Band;
 use super::eye_buffer::{Fragments, Pixels};
 use super::illuminate::Asked;
+use super::light_depth::LightDepths;
 use super::light_path::{Places, stored};
+use super::lit_part::LitPart;
 use super::shade::{Lit, Through};
 use super::sheet::{Sheet, Splatter, is_any};
 use super::splats::SplatSheets;
@@ -49,6 +51,8 @@ pub(crate) struct OneSlab<'a> {
     pub(crate) layout: &'a ChannelLayout,
     /// Those of the slab.
     pub(crate) splats: Option<&'a SplatSheets<'a>>,
+    /// Polygons in the way of the light.
+    pub(crate) depths: Option<&'a LightDepths>,
     pub(crate) index: usize,
     pub(crate) slab: u32,
     pub(crate) step: Step,
@@ -283,13 +287,20 @@ impl OneSlab<'_> {
     ) -> [[f32; MAX_LANES]; 3] {
         let Some(buffer) = &self.of.light_buffer else { return [[1.0; MAX_LANES]; 3] };
         let [nearer, farther] = if self.of.frame.back_to_front { [far, near] } else { [near, far] };
-        let asked = Asked {
-            ends: [self.places(simd, k, nearer), self.places(simd, k, farther)],
-            extinction: &self.eye.extinction,
-            optical_depth: &of.optical_depth,
-        };
+        let ends = [self.places(simd, k, nearer), self.places(simd, k, farther)];
+        let (extinction, planes) = (&self.eye.extinction[..], self.eye.pixels.planes);
         let splats = self.splats.and_then(|splats| splats.light.as_ref());
-        self.of.illumination(buffer, self.slab, splats).transmittance(simd, &asked, wanted, self.eye.pixels.planes)
+        let light = self.of.illumination(buffer, self.slab, splats);
+        let part = self.depths.and_then(|depths| LitPart::new(simd, (depths, &self.of.frame), &ends, wanted));
+        let Some(part) = part else {
+            let asked = Asked { ends, extinction, optical_depth: &of.optical_depth };
+            return light.transmittance(simd, &asked, wanted, planes);
+        };
+        let optical_depth = &part.optical_depth(&of.optical_depth);
+        let asked = Asked { ends: part.ends(simd, &ends), extinction, optical_depth };
+        let mut through = light.transmittance(simd, &asked, wanted, planes);
+        part.weigh(&of.optical_depth, &mut through);
+        through
     }
 
     /// What lets light through to a volume beside what the sweep carries it through.

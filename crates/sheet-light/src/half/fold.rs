@@ -5,28 +5,43 @@ use super::bodies::Bodies;
 use super::counts::HalfCounts;
 use super::frame::Frame;
 use super::light_buffer::planes;
+use super::light_depth::LightDepths;
 use super::penumbra::Penumbra;
+use super::polygon_light::{PolygonImage, PolygonLight};
+use super::polygons::EyePolygons;
 use super::scatter::{self, Scattered, Scene, balance::Balance};
 use super::serves::{axis_of_view, serves, serves_extended};
 use super::soft_buffer::SoftBuffer;
+use super::splats::Lamps;
 use super::sweep::Sweep;
 use super::{HalfInput, HalfParams, HalfSplats, MOST_SAMPLES, Scattering, lamp};
 use crate::lattice::Lattice;
 use crate::visible::Voxels;
 use crate::{Error, Params, Volume};
+use splat_core::raster::OpaqueImage;
 use splat_core::shade::{ChannelLayout, LitBy, MAX_CHANNELS};
 use splat_core::{Accumulator, Camera, Light, Progress};
 
+/// What [`fold`] did.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Drawn {
+    /// Work.
+    pub counts: HalfCounts,
+    /// What is seen of [`HalfInput::polygons`], behind all that was composited; without any pixel where there are none.
+    pub polygons: OpaqueImage,
+}
+
 /// Draws all volumes in slabs across the half vector of each light, with the shadows that they cast on themselves and each other.
 /// `into` becomes a segment of its own, of all depths: what it held is gone, its planes and channels say what is kept, and the
-/// caller appends it behind what lies before. One tick a slab.
+/// caller appends it behind what lies before. Polygons end the rays that meet them, and are a picture of their own. One tick a slab, and
+/// one for each band of rows of polygons.
 ///
 /// Each light is a sweep; their images add, and optical depth, depths, objects, normals and the share of shadow come from one. Sweeps
 /// are in an order of the lights' own, so the order of the input changes no bit. Without lights, or where no material asks for
 /// any, there is one sweep along the view.
 ///
 /// # Errors
-/// [`Error::Parameter`], [`Error::Volume`], [`Error::Light`], [`Error::HalfVector`] for a light that half vectors cannot serve,
+/// [`Error::Parameter`], [`Error::Volume`], [`Error::Polygons`], [`Error::Light`], [`Error::HalfVector`] for a light that half vectors cannot serve,
 /// [`Error::Limit`] before much is taken, or [`Error::Cancelled`]: then `into` is of no use as a picture.
 ///
 /// # Panics
@@ -37,7 +52,7 @@ pub fn fold(
     layout: &ChannelLayout,
     into: &mut Accumulator,
     progress: Option<&Progress>,
-) -> Result<HalfCounts, Error> {
+) -> Result<Drawn, Error> {
     check(input, params)?;
     let size = input.sheets.camera.size;
     if params.scattering != Scattering::None && layout.multiple().is_none() {
@@ -51,28 +66,89 @@ pub fn fold(
     let has = |kept: usize| kept > 0;
     let (planes, depth, object) = (into.optical_depth.len(), has(into.depth.len()), has(into.object.len()));
     *into = Accumulator::new(size, planes, layout.count(), depth, object);
-    let bodies = input.bodies();
-    if bodies.is_empty() {
-        return Ok(HalfCounts::default());
-    }
     let quiet = Progress::new();
     let progress = progress.unwrap_or(&quiet);
+    let eye = EyePolygons::new(input, progress)?;
+    let mut image = eye.as_ref().map(|eye| PolygonImage::new(eye, layout));
+    let opaque = eye.as_ref().map_or(input.opaque, |eye| &eye.opaque);
+    let input = &HalfInput { opaque, ..input.clone() };
     let mut lights: Vec<(&LitBy<'_>, u32)> = carried(input).collect();
     lights.sort_by_key(|(lit, samples)| (lit.light.bits(), *samples));
-    let first = Sweep::new(input, params, lights.first().copied(), false, progress)?;
+    let mut counts = HalfCounts::default();
+    if !input.bodies().is_empty() {
+        counts = sweeps(input, params, (&lights, eye.as_ref()), (layout, into, image.as_mut()), progress)?;
+    } else if let (Some(eye), Some(image)) = (&eye, &mut image) {
+        counts.polygon_pixels[0] = eye.pixels.len() as u64;
+        in_the_open(input, params, (&lights, eye), image, progress)?;
+    }
+    let polygons = eye.as_ref().zip(image).map(|(eye, image)| {
+        counts.bytes += image.bytes() + polygon_bytes(input.sheets.camera, params);
+        image.finish(eye, into)
+    });
+    Ok(Drawn { counts, polygons: polygons.unwrap_or_default() })
+}
+
+/// What a sweep adds to: what is kept of a pixel, the picture, and what polygons show.
+type Into<'i> = (&'i ChannelLayout, &'i mut Accumulator, Option<&'i mut PolygonImage>);
+
+/// A sweep for each light.
+fn sweeps<'a>(
+    input: &'a HalfInput<'a>,
+    params: &HalfParams,
+    (lights, eye): (&[(&'a LitBy<'a>, u32)], Option<&'a EyePolygons<'a>>),
+    (layout, into, mut image): Into<'_>,
+    progress: &Progress,
+) -> Result<HalfCounts, Error> {
+    let first = Sweep::new(input, params, (lights.first().copied(), eye), false, progress)?;
     let is_lit = first.light.is_some();
     progress.add_total(u64::from(first.frame.slabs.count));
-    let (bands, mut counts) = first.run(layout, into, progress)?;
+    let (bands, mut counts) = first.run(layout, into, image.as_deref_mut(), progress)?;
     bands.iter().for_each(|b| b.pixels.store(&b.band, into));
-    for light in lights.into_iter().skip(1).filter(|_| is_lit) {
-        let next = Sweep::new(input, params, Some(light), true, progress)?;
+    for light in lights.iter().skip(1).filter(|_| is_lit) {
+        let next = Sweep::new(input, params, (Some(*light), eye), true, progress)?;
         progress.add_total(u64::from(next.frame.slabs.count));
         let form = Accumulator { depth: Vec::new(), object: Vec::new(), ..into.clone() };
-        let (bands, more) = next.run(layout, &form, progress)?;
+        let (bands, more) = next.run(layout, &form, image.as_deref_mut(), progress)?;
         counts = counts.join(more);
         bands.iter().for_each(|b| b.pixels.add_colors(&b.band, layout.colors(), into));
     }
     Ok(counts)
+}
+
+/// Light on polygons where there is nothing else (Table 1: the z-buffer alone).
+fn in_the_open<'a>(
+    input: &'a HalfInput<'a>,
+    params: &HalfParams,
+    (lights, eye): (&[(&'a LitBy<'a>, u32)], &'a EyePolygons<'a>),
+    image: &mut PolygonImage,
+    progress: &Progress,
+) -> Result<(), Error> {
+    let sheets = &input.sheets;
+    let lights: Vec<Option<LitBy<'a>>> = match lights {
+        [] => vec![None],
+        lights => lights.iter().map(|(lit, _)| Some(**lit)).collect(),
+    };
+    for (n, carried) in lights.into_iter().enumerate() {
+        let depths = light_depths(input, params, (carried.as_ref(), eye), progress)?;
+        let mapped = if n == 0 { &input.mapped[..] } else { &[] };
+        let lamps = Lamps { carried, mapped, ambient: sheets.ambient, camera: sheets.camera, light_alone: n > 0 };
+        PolygonLight::new(eye, sheets.camera, depths.as_ref()).shade(&lamps, sheets.shadow_origin, image);
+    }
+    Ok(())
+}
+
+/// What a light sees of the polygons that cast shadows, for all that receives its light; `None` where there is no light or no such
+/// polygon.
+pub(crate) fn light_depths(
+    input: &HalfInput<'_>,
+    params: &HalfParams,
+    (lit, eye): (Option<&LitBy<'_>>, &EyePolygons<'_>),
+    progress: &Progress,
+) -> Result<Option<LightDepths>, Error> {
+    let Some(lit) = lit else { return Ok(None) };
+    let mut receivers = eye.places(input.sheets.camera);
+    receivers.extend(input.bodies().corners());
+    LightDepths::new(&eye.casters(), &lit.light, &receivers, params.most_light_pixels, progress)
 }
 
 /// Width of the slabs of the sweep for `light`, or of that without one; world units. Infinite without bodies.
@@ -137,7 +213,26 @@ fn check(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
     for (light, served) in points.chain(extended).enumerate() {
         served.map_err(|reason| Error::HalfVector { light, reason })?;
     }
+    check_polygons(input)?;
     check_memory(input, params)
+}
+
+/// Refuses polygons that sweeps cannot take.
+fn check_polygons(input: &HalfInput<'_>) -> Result<(), Error> {
+    for (index, polygons) in input.polygons.iter().enumerate() {
+        polygons.placed.mesh.validate().map_err(Error::Polygons)?;
+        let share = polygons.shadow_coefficient;
+        if !(0.0..=1.0).contains(&share) {
+            let error = splat_core::Error::invalid("mesh", index, "shadow_coefficient", share, "a number in [0, 1]");
+            return Err(Error::Polygons(error));
+        }
+    }
+    if !input.polygons.is_empty() && !input.extended.is_empty() {
+        let found = format!("{} lights", input.extended.len());
+        let expected = "none beside polygons, whose shadows are those of points: `Light::points` has them";
+        return Err(Error::parameter("extended", found, expected));
+    }
+    Ok(())
 }
 
 /// Bytes of a splat in one sweep: its footprint in the light's image, places, slabs, and lists of squares.
@@ -176,6 +271,7 @@ fn check_memory(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error>
         input.mapped.len(),
         params,
     );
+    let needed = needed + if input.polygons.is_empty() { 0 } else { polygon_bytes(camera, params) };
     let limit = params.sheets.limits.max_bytes;
     let hint = || {
         "use fewer voxels, a smaller picture, fewer pixels of the light buffer or fewer points of an extended light"
@@ -225,6 +321,15 @@ pub fn bytes<'l>(
         of_a_pixel * pixels + soft_bytes((bodies, camera), (light, samples), &image, params)
     };
     eye + lights.map(light).max().unwrap_or(0) + cells + splats + volumes.iter().map(voxels).sum::<u64>()
+}
+
+/// Bytes that [`fold`] takes at most for polygons beside [`bytes`]: buffers of the eye and of one light.
+pub fn polygon_bytes(camera: &Camera, params: &HalfParams) -> u64 {
+    let pixels: u64 = camera.size.into_iter().map(u64::from).product();
+    // Depths, hits, the picture; lists, places, and sums of what is seen.
+    pixels * (28 + 4 * (MAX_CHANNELS as u64 + 2))
+        + pixels * (60 + 4 * MAX_CHANNELS as u64)
+        + LightDepths::bytes_of(params.most_light_pixels)
 }
 
 /// Bytes of the images of an extended light's points.

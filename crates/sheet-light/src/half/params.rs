@@ -1,6 +1,6 @@
 //! What half-vector sheets are made of and what the caller chooses.
 
-use super::{Bodies, HalfSplats};
+use super::{Bodies, HalfSplats, Polygons};
 use crate::{Error, Params, SheetInput};
 use splat_core::shade::LitBy;
 use std::f64::consts::FRAC_PI_2;
@@ -15,12 +15,15 @@ pub struct HalfInput<'a> {
     /// Splats among the volumes: they shadow them and each other, and take shadows of them. Those of `sheets` are refused, for their
     /// light is known.
     pub splats: Option<HalfSplats<'a>>,
+    /// Opaque polygons, anywhere: before, among and behind all that. They hide what is behind them, for the eye and for the lights of
+    /// `sheets`, and are lit by what comes through to them.
+    pub polygons: &'a [Polygons<'a>],
     /// Lights with an extent, a sweep each, whose shadows are soft.
     pub extended: Vec<Extended<'a>>,
     /// Lights beside those, for which there is no sweep: their shadow, that of these volumes included, is known, or they
     /// cast none.
     pub mapped: Vec<LitBy<'a>>,
-    /// View depth of what hides all that at each pixel, +∞ for nothing; or empty.
+    /// View depth of what else hides all that at each pixel, +∞ for nothing; or empty.
     pub opaque: &'a [f32],
 }
 

@@ -39,6 +39,7 @@ impl<'a> Placed<'a> {
         let m = axes * axes.transpose() * (params.kernel.extent * params.kernel.extent);
         let reach = libm::sqrt(m.z_axis.z);
         let cutoff = params.kernel.extent / params.kernel.sigma;
+        let footprint = Footprint { cutoff: cutoff as f32 };
         let (low, high) = extremes(&volume.grid.values);
         let base = 0.5 * (f64::from(low) + f64::from(high));
         Self {
@@ -48,8 +49,8 @@ impl<'a> Placed<'a> {
             extent: [m.x_axis.x, m.x_axis.y, m.y_axis.y],
             reach,
             cutoff,
-            sections: SectionTable::new(reach / frame.slabs.width, 0.5 * cutoff * cutoff),
-            kernel: Kernel::new(&Footprint { cutoff: cutoff as f32 }),
+            sections: SectionTable::new(reach / frame.slabs.width, &footprint),
+            kernel: Kernel::new(&footprint),
             classifier: Classifier::new(volume.transfer, volume.extinction_scale, base),
             base,
             width: frame.slabs.width,

@@ -140,11 +140,12 @@ impl<'a> View<'a> {
 
     /// Voxels whose kernels reach a slab, with their sections there in the place of where they begin.
     fn voxels_of(&self, slab: u32) -> Vec<Vec<(f64, f64, f64, f64)>> {
-        let cutoff = self.params.sheets.kernel.extent / self.params.sheets.kernel.sigma;
+        let kernel = self.params.sheets.kernel;
+        let footprint = Footprint { cutoff: (kernel.extent / kernel.sigma) as f32 };
         let of = |(placed, voxels): (&Placed<'_>, &Vec<Voxel>)| {
             let section = |place: u32| {
                 let behind = slab.checked_sub(place / PHASES)?;
-                let all = sections(place % PHASES, placed.reach / self.frame.slabs.width, 0.5 * cutoff * cutoff);
+                let all = sections(place % PHASES, placed.reach / self.frame.slabs.width, &footprint);
                 all.get(behind as usize).copied()
             };
             voxels.iter().filter_map(|(a, b, place, v)| Some((*a, *b, section(*place)?, *v))).collect()

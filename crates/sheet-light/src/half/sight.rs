@@ -73,6 +73,13 @@ impl Sight {
         [self.center[0] + at.x * scale, self.center[1] + at.y * scale]
     }
 
+    /// Whether slab coordinates lie within the image.
+    pub(crate) fn shows(&self, p: Vec3) -> bool {
+        let pixel = self.pixel(p);
+        let is_before = self.is_parallel || self.image(p).z > 0.0;
+        is_before && (0..2).all(|a| pixel[a] >= 0.0 && pixel[a] <= self.camera.size[a] as f32)
+    }
+
     /// The pixels about a place: the columns, the rows, and the shares of the second of each; those at a border are those inside.
     #[inline(always)]
     pub(crate) fn around(&self, place: [f32; 2]) -> ([[usize; 2]; 2], [f32; 2]) {

@@ -148,6 +148,11 @@ impl<'a> SplatLight<'a> {
         sum
     }
 
+    /// Mean transmittance at slab coordinates, up to a depth in the present slab, in slabs; 1 where the light's image does not show them.
+    pub(crate) fn transmittance_at(&self, place: Vec3, depth: f32) -> [f32; 3] {
+        if self.sight.shows(place) { self.transmittance(self.sight.pixel(place), depth) } else { [1.0; 3] }
+    }
+
     /// Mean transmittance about a place of the light's image, up to a depth in the present slab, in slabs.
     fn transmittance(&self, pixel: [f32; 2], depth: f32) -> [f32; 3] {
         let mut sum = [0.0; 3];

@@ -9,6 +9,7 @@ use super::bodies::SplatBounds;
 use super::frame::Frame;
 use super::illuminate::{Illumination, ThroughVolumes};
 use super::light_buffer::LightBuffer;
+use super::light_depth::LightDepths;
 use super::splat_light::SplatLight;
 use super::splat_squares::{BySlab, Slab, Squares};
 use rayon::prelude::*;
@@ -130,22 +131,26 @@ impl<'a> SplatSheets<'a> {
         self.squares.bytes() + light + 24 * self.places.len() as u64
     }
 
-    /// Takes the splats of a slab up for eye and light, the latter behind the volumes of the slabs before, if light comes through any. Fragments
+    /// Takes the splats of a slab up for eye and light, the latter behind the volumes of the slabs before and behind polygons, if there is any. Fragments
     /// of both.
     pub(crate) fn enter(
         &mut self,
         slab: u32,
         lamps: &Lamps<'_>,
-        volumes: Option<&Illumination<'_>>,
+        volumes: Option<(&Illumination<'_>, Option<&LightDepths>)>,
         layout: &ChannelLayout,
     ) -> [u64; 2] {
         let (ids, mut fragments) = (self.drawn.of(slab), 0);
-        if let (Some(light), Some(of)) = (&mut self.light, volumes) {
+        if let (Some(light), Some((of, depths))) = (&mut self.light, volumes) {
             fragments = light.enter(slab, ids, &self.slabs, &self.places);
             let mut volumes = vec![[1.0; 3]; ids.len()];
             volumes.par_chunks_mut(CHUNK).zip(ids.par_chunks(CHUNK)).for_each(|(out, ids)| {
                 let places: Vec<Vec3> = ids.iter().map(|id| self.places[*id as usize]).collect();
                 pulp::Arch::new().dispatch(ThroughVolumes { of, frame: &self.frame, places: &places, out });
+                for (out, place) in out.iter_mut().zip(places).filter(|_| depths.is_some()) {
+                    let visible = depths.map_or(1.0, |of| of.visibility(self.frame.world(place.as_dvec3()), None));
+                    *out = out.map(|t| t * visible);
+                }
             });
             light.attenuate(ids, &volumes);
         }

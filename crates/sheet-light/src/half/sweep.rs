@@ -10,16 +10,19 @@ use super::frame::Frame;
 use super::gradient::Gradients;
 use super::illuminate::Illumination;
 use super::light_buffer::LightBuffer;
+use super::light_depth::{Beside, LightDepths};
 use super::light_path::LightPath;
 use super::penumbra::Penumbra;
 use super::placed::Placed;
+use super::polygon_light::{PolygonImage, PolygonLight, PolygonSlabs};
+use super::polygons::EyePolygons;
 use super::scatter::{self, Scattered, Scene};
 use super::serves::axis_of_view;
 use super::shade::is_lit;
 use super::sight::{Shape, Sight};
 use super::splat_light::SplatLight;
 use super::splats::{Lamps, SplatSheets};
-use super::{HalfInput, HalfParams, lamp};
+use super::{HalfInput, HalfParams, fold, lamp};
 use crate::error::cancelled;
 use crate::shadows::Shadows;
 use crate::visible::Voxels;
@@ -28,7 +31,7 @@ use rayon::prelude::*;
 use splat_core::glam::Vec3;
 use splat_core::raster::pulp;
 use splat_core::shade::{ChannelLayout, LitBy};
-use splat_core::{Accumulator, Light, LightShape, Progress};
+use splat_core::{Accumulator, Light, LightShape, Progress, Transmittance};
 
 /// Everything that is the same for all slabs, and the light buffer.
 pub(crate) struct Sweep<'a> {
@@ -49,6 +52,9 @@ pub(crate) struct Sweep<'a> {
     pub(crate) scattered: Option<Scattered>,
     /// By volume.
     pub(crate) paths: Vec<LightPath>,
+    polygons: Option<&'a EyePolygons<'a>>,
+    /// Polygons that keep the light of the sweep from others.
+    pub(crate) depths: Option<LightDepths>,
     /// By volume: shadows of what light is not carried through, of the lights that have any, at the voxels that matter.
     pub(crate) shadows: Vec<Option<(Voxels, Shadows)>>,
     pub(crate) ambient: [f32; 3],
@@ -66,13 +72,15 @@ impl<'a> Sweep<'a> {
     pub(crate) fn new(
         input: &'a HalfInput<'a>,
         params: &HalfParams,
-        carried: Option<(&'a LitBy<'a>, u32)>,
+        (carried, polygons): (Option<(&'a LitBy<'a>, u32)>, Option<&'a EyePolygons<'a>>),
         light_alone: bool,
         progress: &Progress,
     ) -> Result<Self, Error> {
         let sheets = &input.sheets;
         let (bodies, volumes, camera) = (&input.bodies(), &sheets.volumes[..], sheets.camera);
-        let is_lit = volumes.iter().any(is_lit) || input.splats.is_some_and(|splats| splats.are_lit());
+        let is_lit = volumes.iter().any(is_lit)
+            || input.splats.is_some_and(|splats| splats.are_lit())
+            || polygons.is_some_and(EyePolygons::are_lit);
         let carried = carried.filter(|_| is_lit);
         let mapped = if is_lit && !light_alone { &input.mapped[..] } else { &[] };
         let axis = axis_of_view(bodies, camera, carried.map(|(lit, _)| &lit.light));
@@ -99,6 +107,8 @@ impl<'a> Sweep<'a> {
             paths: light
                 .as_ref()
                 .map_or_else(Vec::new, |lit| volumes.iter().map(|v| LightPath::new(v, &lit.light, &frame)).collect()),
+            polygons,
+            depths: None,
             shadows: Vec::new(),
             ambient: sheets.ambient,
             cutoff: params.sheets.transmittance_cutoff,
@@ -111,11 +121,21 @@ impl<'a> Sweep<'a> {
             sight,
         };
         sweep.sort_voxels(progress)?;
-        if let Some(lit) = light.as_ref().filter(|lit| scatter::is_wanted(volumes, &lit.light, params)) {
-            let scene = Scene::new(volumes, lit, params, sheets.shadow_origin);
-            sweep.scattered = Some(Scattered::new(&scene, params.scattering));
+        if let Some(eye) = polygons {
+            sweep.depths = fold::light_depths(input, params, (sweep.light.as_ref(), eye), progress)?;
         }
+        sweep.scattered = sweep.scatter(params);
         Ok(sweep)
+    }
+
+    /// Light of the sweep that is scattered more than once, where it is asked for: polygons and what casts shadows keep it off.
+    fn scatter(&self, params: &HalfParams) -> Option<Scattered> {
+        let lit = self.light.as_ref().filter(|lit| scatter::is_wanted(self.volumes, &lit.light, params))?;
+        let origin = self.input.sheets.shadow_origin;
+        let beside = self.depths.as_ref().map(|depths| Beside { depths, others: lit.shadow, origin });
+        let shadow = beside.as_ref().map(|beside| beside as &dyn Transmittance).or(lit.shadow);
+        let scene = Scene::new(self.volumes, &LitBy { shadow, ..*lit }, params, origin);
+        Some(Scattered::new(&scene, params.scattering))
     }
 
     /// Finds the voxels that matter, with the shadows there that are known, and sorts them for both images (steps 3 and 4).
@@ -148,11 +168,19 @@ impl<'a> Sweep<'a> {
         mut self,
         layout: &ChannelLayout,
         form: &Accumulator,
+        image: Option<&mut PolygonImage>,
         progress: &Progress,
     ) -> Result<(Vec<EyeBand>, HalfCounts), Error> {
         let mut bands = self.bands(form);
         let mut splats = self.splats(form);
         let mut counts = self.counts(&bands);
+        let depths = self.depths.take();
+        let mut polygons = self.polygons.map(|of| {
+            let slabs = PolygonSlabs::new(of, &self.frame, self.input.sheets.camera, self.inside());
+            counts.polygon_pixels = slabs.regions;
+            counts.bytes += slabs.bytes() + depths.as_ref().map_or(0, LightDepths::bytes);
+            (PolygonLight::new(of, self.input.sheets.camera, depths.as_ref()), slabs)
+        });
         for slab in 0..self.frame.slabs.count {
             progress.tick(1).map_err(cancelled)?;
             if let Some(buffer) = &mut self.light_buffer {
@@ -160,11 +188,16 @@ impl<'a> Sweep<'a> {
             }
             if let Some(splats) = &mut splats {
                 let volumes = self.light_buffer.as_ref().map(|buffer| self.illumination(buffer, slab, None));
-                let [eye, light] = splats.enter(slab, &self.lamps(), volumes.as_ref(), layout);
+                let through = volumes.as_ref().map(|volumes| (volumes, depths.as_ref()));
+                let [eye, light] = splats.enter(slab, &self.lamps(), through, layout);
                 (counts.eye_fragments, counts.light_fragments) =
                     (counts.eye_fragments + eye, counts.light_fragments + light);
             }
-            counts.eye_fragments += self.pass(&mut bands, layout, (slab, Step::Draw), splats.as_ref());
+            counts.eye_fragments +=
+                self.pass(&mut bands, layout, (slab, Step::Draw), (splats.as_ref(), depths.as_ref()));
+            if let Some(polygons) = &mut polygons {
+                self.light_polygons(polygons, slab, splats.as_ref());
+            }
             if let Some(buffer) = &mut self.light_buffer {
                 counts.light_fragments += buffer.attenuate(slab, &self.frame, &self.placed);
             }
@@ -172,23 +205,60 @@ impl<'a> Sweep<'a> {
                 splats.leave();
             }
         }
+        if let (Some(mut polygons), Some(image)) = (polygons, image) {
+            self.light_polygons(&mut polygons, self.frame.slabs.count, splats.as_ref());
+            polygons.0.shade(&self.lamps(), self.input.sheets.shadow_origin, image);
+        }
         counts.bytes += splats.as_ref().map_or(0, SplatSheets::bytes);
         counts.soft_passes =
             self.light_buffer.as_ref().and_then(|buffer| buffer.soft.as_ref()).map_or(0, |soft| soft.passes);
         // Depths are summed from the eye on, so a sweep that comes towards it needs a second one for them.
         if self.frame.back_to_front && !form.depth.is_empty() && !self.light_alone {
-            let form = Accumulator { channels: Vec::new(), ..form.clone() };
-            let (mut depths, mut splats) = (self.bands(&form), self.splats(&form));
-            for slab in (0..self.frame.slabs.count).rev() {
-                progress.tick(0).map_err(cancelled)?;
-                counts.eye_fragments += splats.as_mut().map_or(0, |splats| splats.draw(slab));
-                counts.eye_fragments += self.pass(&mut depths, layout, (slab, Step::Depths), splats.as_ref());
-            }
-            for (band, depths) in bands.iter_mut().zip(depths) {
-                band.pixels.depth = depths.pixels.depth;
-            }
+            counts.eye_fragments += self.sum_depths(&mut bands, layout, form, progress)?;
         }
         Ok((bands, counts))
+    }
+
+    /// Sums depths in a sweep from the last slab to the first. Number of footprint numbers.
+    fn sum_depths(
+        &self,
+        bands: &mut [EyeBand],
+        layout: &ChannelLayout,
+        form: &Accumulator,
+        progress: &Progress,
+    ) -> Result<u64, Error> {
+        let form = Accumulator { channels: Vec::new(), ..form.clone() };
+        let (mut drawn, mut splats, mut fragments) = (self.bands(&form), self.splats(&form), 0);
+        for slab in (0..self.frame.slabs.count).rev() {
+            progress.tick(0).map_err(cancelled)?;
+            fragments += splats.as_mut().map_or(0, |splats| splats.draw(slab));
+            fragments += self.pass(&mut drawn, layout, (slab, Step::Depths), (splats.as_ref(), None));
+        }
+        for (band, drawn) in bands.iter_mut().zip(drawn) {
+            band.pixels.depth = drawn.pixels.depth;
+        }
+        Ok(fragments)
+    }
+
+    /// Light of the sweep on the polygons of a slab, or of what is behind the last.
+    fn light_polygons(
+        &self,
+        (light, slabs): &mut (PolygonLight<'_>, PolygonSlabs),
+        slab: u32,
+        splats: Option<&SplatSheets<'_>>,
+    ) {
+        if let Some(buffer) = &self.light_buffer {
+            let splats = splats.and_then(|splats| splats.light.as_ref());
+            light.enter(slabs, slab, &self.frame, (&self.illumination(buffer, slab, None), splats));
+        }
+    }
+
+    /// Depths across the slabs between which all bodies lie.
+    fn inside(&self) -> [f32; 2] {
+        let depths = || self.input.bodies().corners().map(|corner| self.frame.point(corner).z).collect::<Vec<f64>>();
+        let (near, far) =
+            depths().into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(n, f), z| (n.min(z), f.max(z)));
+        [near as f32, far as f32]
     }
 
     /// One slab in the eye's image. Number of footprint numbers.
@@ -197,10 +267,10 @@ impl<'a> Sweep<'a> {
         bands: &mut [EyeBand],
         layout: &ChannelLayout,
         (slab, step): (u32, Step),
-        splats: Option<&SplatSheets<'_>>,
+        (splats, depths): (Option<&SplatSheets<'_>>, Option<&LightDepths>),
     ) -> u64 {
         let one = |(index, eye): (usize, &mut EyeBand)| {
-            pulp::Arch::new().dispatch(OneSlab { of: self, layout, splats, index, slab, step, eye })
+            pulp::Arch::new().dispatch(OneSlab { of: self, layout, splats, depths, index, slab, step, eye })
         };
         bands.par_iter_mut().enumerate().map(one).sum()
     }

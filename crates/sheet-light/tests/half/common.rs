@@ -36,14 +36,14 @@ pub(crate) fn exact(slab_width: Option<f64>) -> HalfParams {
 pub(crate) fn input<'a>(volumes: &'a [Volume<'a>], camera: &'a Camera, lights: &'a [LitBy<'a>]) -> HalfInput<'a> {
     let (volumes, lights) = (volumes.to_vec(), lights.to_vec());
     let sheets = SheetInput { volumes, splats: None, camera, lights, shadow_origin: DVec3::ZERO, ambient: [0.0; 3] };
-    HalfInput { sheets, splats: None, extended: Vec::new(), mapped: Vec::new(), opaque: &[] }
+    HalfInput { sheets, splats: None, polygons: &[], extended: Vec::new(), mapped: Vec::new(), opaque: &[] }
 }
 
 /// Beauty, depths, objects and one plane of optical depth.
 pub(crate) fn draw(input: &HalfInput<'_>, params: &HalfParams) -> Result<(Accumulator, HalfCounts), Error> {
     let mut out = Accumulator::new(input.sheets.camera.size, 1, 3, true, true);
-    let counts = fold(input, params, &BEAUTY, &mut out, None)?;
-    Ok((out, counts))
+    let drawn = fold(input, params, &BEAUTY, &mut out, None)?;
+    Ok((out, drawn.counts))
 }
 
 /// A ray's part in the cells of a lattice, as places in world space; `None` for less than a thousandth of a step.

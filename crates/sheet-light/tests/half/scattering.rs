@@ -58,7 +58,7 @@ const MORE: usize = 12;
 
 fn draw_apart(input: &HalfInput<'_>, params: &HalfParams) -> (Accumulator, HalfCounts) {
     let mut out = Accumulator::new(input.sheets.camera.size, 1, APART.count(), false, false);
-    let counts = fold(input, params, &APART, &mut out, None).unwrap();
+    let counts = fold(input, params, &APART, &mut out, None).unwrap().counts;
     (out, counts)
 }
 

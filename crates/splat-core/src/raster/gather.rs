@@ -26,7 +26,7 @@ pub(crate) struct Attributes {
     pub(crate) norm: Column,
     pub(crate) cutoff: Column,
     /// Half the width of the share before a plane, for R = 1.
-    pub(crate) depth: Column,
+    pub(crate) half_width: Column,
     pub(crate) normal: [Column; 3],
     pub(crate) tangent: [Column; 3],
     /// −1 for a medium, 1 for a disc.
@@ -53,7 +53,7 @@ impl Attributes {
             self.radius[l] = cloud.radius[i];
             self.cross_section[l] = cloud.cross_section[i];
             let kernel = &columns.kernels[cloud.footprint[i] as usize];
-            (self.norm[l], self.cutoff[l], self.depth[l]) = (kernel.norm, kernel.cutoff, kernel.depth);
+            (self.norm[l], self.cutoff[l], self.half_width[l]) = (kernel.norm, kernel.cutoff, kernel.half_width);
             let medium = cloud.kind[i] == SplatKind::Medium;
             self.any_medium |= medium;
             self.any_disc |= !medium;

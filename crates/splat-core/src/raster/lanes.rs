@@ -198,19 +198,6 @@ impl<S: Simd> Lanes<S> {
         let tiny = (self + of(0.75)) - of(0.75);
         tiny.where_less_or(self.abs(), of(1.0 / 16384.0), normal).min(of(65504.0)).max(of(-65504.0))
     }
-
-    /// Share of a medium kernel before a plane at t = distance/D behind its centre: the distribution function of the
-    /// triweight density 35/32·(1 − t²)³. D is three deviations of the kernel, [`Kernel::depth`](super::kernel::Kernel) · R.
-    #[inline(always)]
-    pub(crate) fn share_in_front(self) -> Self {
-        let of = |v| Self::splat(self.simd, v);
-        let t = self.max(of(-1.0)).min(of(1.0));
-        // By powers of what lies before the plane: a small share keeps its digits.
-        let before = of(1.0) + t;
-        let square = before * before;
-        let rest = of(0.5) - t * (of(0.906_25) - t * (of(0.625) - t * of(0.156_25)));
-        square * square * rest
-    }
 }
 
 /// Coefficients of 2^f on [−½, ½]: Taylor series of e^(f ln 2) to degree 6, relative error below 2·10⁻⁸.
@@ -277,7 +264,6 @@ mod tests {
     enum Function {
         ExpNeg,
         Opacity,
-        ShareInFront,
         ToHalf,
         Ln,
     }
@@ -294,7 +280,6 @@ mod tests {
             match self.1 {
                 Function::ExpNeg => lanes.exp_neg(),
                 Function::Opacity => lanes.opacity(),
-                Function::ShareInFront => lanes.share_in_front(),
                 Function::ToHalf => lanes.to_half(),
                 Function::Ln => lanes.logarithm(),
             }
@@ -310,11 +295,9 @@ mod tests {
             for lane in pulp::Arch::new().dispatch(Apply(x, Function::ExpNeg)) {
                 assert_eq!(lane.to_bits(), exp_neg(x).to_bits(), "x {x}");
             }
-            for function in [Function::Opacity, Function::ShareInFront] {
-                let scalar = pulp::Arch::Scalar.dispatch(Apply(x * 0.01, function))[0];
-                for lane in pulp::Arch::new().dispatch(Apply(x * 0.01, function)) {
-                    assert_eq!(lane.to_bits(), scalar.to_bits(), "x {x}");
-                }
+            let scalar = pulp::Arch::Scalar.dispatch(Apply(x * 0.01, Function::Opacity))[0];
+            for lane in pulp::Arch::new().dispatch(Apply(x * 0.01, Function::Opacity)) {
+                assert_eq!(lane.to_bits(), scalar.to_bits(), "x {x}");
             }
         }
     }
@@ -377,16 +360,5 @@ mod tests {
             assert!((f64::from(opacity(x)) / exact - 1.0).abs() < 3e-7, "x {x:e}: {:e}", opacity(x));
         }
         assert_eq!((opacity(0.0), opacity(1e9)), (0.0, 1.0));
-    }
-
-    #[test]
-    fn share_in_front_runs_from_none_to_all() {
-        let share = |t: f32| pulp::Arch::new().dispatch(Apply(t, Function::ShareInFront))[0];
-        assert!(share(-2.0).abs() < 1e-6 && (share(2.0) - 1.0).abs() < 1e-6);
-        assert_eq!(share(0.0), 0.5);
-        // Near the end it is 35/16·(1 + t)⁴, with all its digits.
-        assert!((share(-0.999) / (35.0 / 16.0 * 1e-12) - 1.0).abs() < 2e-3, "{}", share(-0.999));
-        // Its slope at 0 is the density there.
-        assert!(((share(1e-3) - share(-1e-3)) / 2e-3 - 35.0 / 32.0).abs() < 1e-3);
     }
 }

@@ -31,6 +31,29 @@ pub struct OpaqueImage {
     pub object: Vec<u32>,
 }
 
+impl OpaqueImage {
+    /// The nearer one of two images of the same pixels and channels; this one where they are equally near.
+    ///
+    /// # Panics
+    /// If both have surfaces, but not the same pixels and channels.
+    #[must_use]
+    pub fn joined(mut self, other: Self) -> Self {
+        if self.depth.is_empty() {
+            return other;
+        }
+        for k in 0..other.depth.len() {
+            if other.depth[k] < self.depth[k] {
+                self.depth[k] = other.depth[k];
+                self.channels.iter_mut().zip(&other.channels).for_each(|(to, from)| to[k] = from[k]);
+                if let (Some(to), Some(from)) = (self.object.get_mut(k), other.object.get(k)) {
+                    *to = *from;
+                }
+            }
+        }
+        self
+    }
+}
+
 /// One opaque splat.
 #[derive(Clone, Copy, Default)]
 struct Disc {

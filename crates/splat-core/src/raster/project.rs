@@ -145,6 +145,9 @@ impl pulp::WithSimd for ProjectChunk<'_> {
         for begin in (0..self.splats.len()).step_by(lanes) {
             attributes.read(&projector.columns, self.first + begin, lanes);
             projector.project(simd, &attributes, &mut image);
+            if attributes.any_medium {
+                projector.before_the_eye(simd, self.first + begin, &attributes, &mut image);
+            }
             let end = self.splats.len().min(begin + lanes);
             let splats = &mut self.splats[begin..end];
             projector.write(self.first + begin, &image, splats, &mut self.coverage[begin..end]);
@@ -252,9 +255,7 @@ impl Projector<'_> {
         let reach_sq = px_per_world * px_per_world * radius_sq;
         let scale = of(1.0) / reach_sq;
         let (x_sq, y_sq) = (of(1.0) + u * u, of(1.0) + v * v);
-        let depth = radius * load(&attributes.depth);
-        let front = (centers.before / depth).share_in_front().where_less_or(centers.before, depth, of(1.0));
-        let mut peak = load(&attributes.cross_section) * load(&attributes.norm) / radius_sq * front;
+        let mut peak = load(&attributes.cross_section) * load(&attributes.norm) / radius_sq;
         let mut half_extent = [reach_sq.sqrt(); 2];
         if !self.orthographic {
             let ratio_sq = reach_sq / of(self.focal * self.focal);
@@ -266,10 +267,30 @@ impl Projector<'_> {
             conic: [y_sq * scale, of(2.0) * (u * v * scale), x_sq * scale],
             peak,
             half_extent,
-            slope: [of(1.0) / depth, of(1.0) / front],
+            slope: [of(1.0) / (radius * load(&attributes.half_width)), of(1.0)],
             core: [of(0.0); 3],
             near: of(-1.0),
         }
+    }
+
+    /// Of media through the eye plane only the share before it is seen.
+    #[inline(always)]
+    fn before_the_eye<S: Simd>(&self, simd: S, first: usize, attributes: &Attributes, image: &mut Image) {
+        for l in 0..Lanes::<S>::COUNT {
+            let distance = image.depth[l] * image.slope[0][l];
+            // Comparisons with NaN are false.
+            if attributes.disc[l] < 0.0 && distance < 1.0 && image.peak[l] > 0.0 {
+                let mut front = Column::default();
+                self.kernel_of(first + l).share_before(simd, Lanes::splat(simd, distance)).store(&mut front);
+                image.peak[l] *= front[0];
+                image.slope[1][l] = 1.0 / front[0];
+            }
+        }
+    }
+
+    fn kernel_of(&self, i: usize) -> &Kernel {
+        let cloud = self.columns.cloud;
+        &self.columns.kernels[cloud.footprint[i.min(cloud.len() - 1)] as usize]
     }
 
     /// Half the extent of the image of a ball about that of its centre, pixels: `slope` is x/z, `length_sq` 1 + (x/z)², and

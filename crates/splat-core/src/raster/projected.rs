@@ -32,7 +32,7 @@ pub struct ProjectedSplat {
 pub struct ProjectedDepth {
     /// View depth of the centre.
     pub center: f32,
-    /// Change per pixel across a disc. Of a medium, 1/D of its share before a plane, and one over the share of it that lies
+    /// Change per pixel across a disc. Of a medium, one over half the width of its share before a plane, and one over the share that lies
     /// before the eye.
     pub slope: [f32; 2],
     /// Largest distance in depth between a fragment and the centre: R.

@@ -89,7 +89,8 @@ impl<'a> Source<'a> {
             tau = if medium {
                 // What is seen is the part between the eye and the surface, as a share of all before the eye.
                 let [per_depth, per_front] = self.depth.slope;
-                let behind = of(1.0) - ((opaque - of(self.depth.center)) * of(per_depth)).share_in_front();
+                let distance = (opaque - of(self.depth.center)) * of(per_depth);
+                let behind = of(1.0) - self.kernel.share_before(simd, distance);
                 tau * behind.negate_mul_add(of(per_front), of(1.0)).max(of(0.0))
             } else {
                 tau.where_less(run.depth(simd, &self.depth), opaque)

@@ -347,7 +347,8 @@ impl Tile {
         let mut narrow = [1.0; MAX_LANES];
         if source.splat.kind == SplatKind::Medium && !self.depth.is_empty() {
             let s = run.distance_sq(simd, source.splat) * self.rays.factors(simd, run);
-            let [constant, slope] = source.kernel.narrowing.map(|v| Lanes::splat(simd, v));
+            let [constant, slope] = source.kernel.narrowing;
+            let [constant, slope] = [Lanes::splat(simd, constant), Lanes::splat(simd, slope)];
             slope.mul_add(s, constant).store(&mut narrow);
         }
         for i in 0..Lanes::<S>::COUNT {

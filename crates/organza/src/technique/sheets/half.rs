@@ -2,6 +2,7 @@
 //!
 //! Light that no half vector serves has a shadow map, as in slabs across the view, and joins the first sweep.
 
+mod polygons;
 mod splats;
 
 use super::{params, refuse, volumes};
@@ -14,8 +15,8 @@ use crate::scene::{self, Scene, Slicing, SoftShadows, Technique};
 use crate::technique::Session;
 use crate::{CostRecord, Error, RenderOptions, stage};
 use sheet_light::half::{
-    self, Bodies, Extended, HalfInput, HalfParams, MOST_SAMPLES, Reason, Scattering, fold, penumbra_widening, serves,
-    serves_extended, slab_width,
+    self, Bodies, Drawn, Extended, HalfInput, HalfParams, MOST_SAMPLES, Reason, Scattering, fold, penumbra_widening,
+    polygon_bytes, serves, serves_extended, slab_width,
 };
 use sheet_light::{Params, SheetInput};
 use splat_core::shade::LitBy;
@@ -25,6 +26,11 @@ use tsm::ShadowMap;
 
 /// What a user can do where half vectors cannot.
 const HINT: &str = "use render.sheets.slicing = \"view\"";
+
+/// Whether opaque triangles stay triangles. Light with an extent that goes through slabs in one sweep knows them by shadow maps of its points.
+pub(crate) fn keeps_polygons(scene: &Scene) -> bool {
+    is_asked(scene) && !is_one_sweep(scene)
+}
 
 /// How light is carried where a scene asks for half vectors.
 pub(crate) fn carries(scene: &Scene) -> Option<CarriesLight> {
@@ -37,7 +43,7 @@ pub(super) fn is_asked(scene: &Scene) -> bool {
 
 /// For each point of a light: whether half vectors serve it, or why not.
 fn points_served(matter: &Matter<'_>, points: &[LightPoint]) -> Result<Carries, Error> {
-    let translucent = || matter.planned.iter().filter(|o| o.form != Form::Opaque);
+    let translucent = || matter.planned.iter().filter(|o| !matches!(o.form, Form::Opaque | Form::Polygons));
     let refuse = |o: &PlannedObject, message: &str, or: &str| {
         Err(Error::input(format!("object '{}'", crate::shown(&o.object)), message, format!("{HINT}{or}")))
     };
@@ -117,7 +123,8 @@ pub(super) fn bytes(matter: &Matter<'_>, points: &[LightPoint], options: &Render
     let params = half_params(matter.scene, params(matter.scene, 0, options));
     let lamps = points.iter().filter_map(|point| swept(matter.scene, point));
     let (served, mapped): (Vec<_>, Vec<_>) = lamps.partition(|lamp| serve(&bodies, matter.camera, *lamp).is_ok());
-    half::bytes(&bodies, matter.camera, served.into_iter(), mapped.len(), &params)
+    let polygons = if polygons::any(matter) { polygon_bytes(matter.camera, &params) } else { 0 };
+    polygons + half::bytes(&bodies, matter.camera, served.into_iter(), mapped.len(), &params)
 }
 
 /// Draws all that is translucent into a segment of its own.
@@ -127,18 +134,20 @@ pub(super) fn draw(
     session: &mut Session<'_>,
     cost: &mut CostRecord,
 ) -> Result<(), Error> {
-    let opaque = frame.opaque(cost)?;
+    let polygons = polygons::polygons(frame);
+    let solid = polygons::opaque(frame, !polygons.is_empty(), cost)?;
     let (means, splats) = (mean_shadows(frame, cost)?, OwnSplats::of(frame));
-    let mut input = input(frame, &opaque.depth, &means, cost)?;
+    let mut input = input(frame, &solid.depth, &means, cost)?;
+    input.polygons = &polygons;
     input.splats = splats.as_ref().map(|splats| splats.input(frame));
     let params = half_params(frame.scene, params(frame.scene, frame.loaded.exponent, session.options));
     super::warn(frame, &input.sheets.volumes, session.warnings);
     frame.progress.begin(stage::SHEETS);
     frame.tick()?;
-    cost.measure(pass::SHEETS, |stage| {
+    let seen = cost.measure(pass::SHEETS, |stage| {
         let mut segment = frame.accumulator();
         let drawn = fold(&input, &params, &frame.layout(), &mut segment, Some(frame.progress));
-        let counts = drawn.map_err(|e| refuse(frame, e))?;
+        let Drawn { counts, polygons } = drawn.map_err(|e| refuse(frame, e))?;
         let splats = splats.as_ref().map_or(0, |splats| splats.cloud.len() as u64);
         stage.items_in = counts.voxels + splats;
         stage.items_out = counts.visible + splats;
@@ -146,8 +155,13 @@ pub(super) fn draw(
         stage.passes = counts.slabs;
         stage.bytes = counts.bytes;
         into.append(&segment);
-        Ok(())
-    })
+        Ok::<_, Error>(polygons)
+    })?;
+    drop(input);
+    if !polygons.is_empty() {
+        frame.set_opaque(solid.joined(seen));
+    }
+    Ok(())
 }
 
 /// Width of the slabs of the first sweep.
@@ -220,7 +234,7 @@ fn input<'a>(
         shadow_origin: frame.loaded.cloud.origin,
         ambient: frame.scene.ambient,
     };
-    Ok(HalfInput { sheets, splats: None, extended, mapped, opaque })
+    Ok(HalfInput { sheets, splats: None, polygons: &[], extended, mapped, opaque })
 }
 
 fn half_params(scene: &Scene, sheets: Params) -> HalfParams {

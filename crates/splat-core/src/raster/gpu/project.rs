@@ -22,13 +22,16 @@ use super::attributes::{AttributeBuffers, AttributeRoom, Attributes};
 use super::{SPLAT_WORDS, fits};
 use crate::optics::SurfaceOpacity;
 use crate::raster::Params;
-use crate::raster::kernel::depth_of;
-use crate::{Camera, Error, FootprintStack, Material};
+use crate::raster::kernel::{half_width, share_terms};
+use crate::{Camera, Error, Footprint, FootprintStack, Material};
 use splat_shaders::layouts::{ProjectState, ProjectView};
 use splat_shaders::{BufferId, Groups, Recording, kernels};
 
 /// Splats that a workgroup projects.
 const BLOCK: u32 = 256;
+
+/// Vectors of a footprint in the tables.
+const FOOTPRINT_VECTORS: u64 = 3;
 
 /// What a recording makes room for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,7 +100,7 @@ pub fn record(capacities: Capacities) -> Result<Recorded, Error> {
     let r = &mut recording;
     let view = r.input("project view", size_of::<ProjectView>() as u64);
     let attributes = AttributeBuffers::record(r, room);
-    let tables = r.input("project tables", 16 * (u64::from(footprints) + u64::from(materials)));
+    let tables = r.input("project tables", 16 * (FOOTPRINT_VECTORS * u64::from(footprints) + u64::from(materials)));
     let words = u64::from(SPLAT_WORDS[usize::from(depth)]);
     let splats = r.scratch("splats", 4 * words * u64::from(room.splats));
     let state = r.scratch("projected", size_of::<ProjectState>() as u64);
@@ -139,7 +142,11 @@ impl Recorded {
             footprints: footprints.len() as u32,
             unused: 0,
         };
-        let footprints = footprints.iter().map(|f| [f.norm() as f32, f.cutoff, depth_of(f), 0.0]);
+        let of = |f: &Footprint| {
+            let [a, b, c, d, e, g] = share_terms(f);
+            [[f.norm() as f32, f.cutoff, half_width(f), 0.0], [a, b, c, d], [e, g, 0.0, 0.0]]
+        };
+        let footprints = footprints.iter().flat_map(of);
         let slab = |m: &Material| f32::from(u8::from(m.surface_opacity == SurfaceOpacity::ThinSlab));
         let tables: Vec<[f32; 4]> =
             footprints.chain(input.materials.iter().map(|m| [slab(m), 0.0, 0.0, 0.0])).collect();

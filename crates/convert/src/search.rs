@@ -1,22 +1,24 @@
 //! Where in a box there is something: zeros of a field, extinction of a volume.
 
-use convert::SharedField;
-use glam::DVec3;
+use crate::SharedField;
+use splat_core::glam::DVec3;
 use splat_core::{DAabb, Grid, TransferFunction};
 
 /// Cells along the longest side of a box, in which an implicit surface is looked for.
 const SURFACE_CELLS: f64 = 32.0;
 
-/// Where in a box a field may be zero.
-pub(in crate::load) struct Search {
+/// Where in a box a field may be zero, told by the field's own bound.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ZeroSearch {
     /// The part of the box; the whole box where the field knows no bound.
-    pub(super) bounds: DAabb,
+    pub bounds: DAabb,
     /// Cells that may hold a zero times the area of a cell's side; infinite where the field knows no bound.
-    pub(in crate::load) area: f64,
+    pub area: f64,
 }
 
-impl Search {
-    pub(in crate::load) fn new(field: &SharedField, whole: DAabb) -> Self {
+impl ZeroSearch {
+    /// Asks the field for its bound on each of at most 32³ cells of the box.
+    pub fn new(field: &SharedField, whole: DAabb) -> Self {
         let cells = Cells::new(whole, SURFACE_CELLS);
         let (mut found, mut n) = (DAabb::EMPTY, 0.0);
         for k in 0..cells.count() {
@@ -35,9 +37,9 @@ impl Search {
     }
 }
 
-/// Bounds of the lattice points with extinction and one cell around them, no farther than voxels reach; those of the voxels
-/// where there are none.
-pub(super) fn cell_bounds(grid: &Grid, transfer: &TransferFunction) -> DAabb {
+/// Bounds of the lattice points to which a transfer function gives extinction, and one cell around them, no farther than voxels
+/// reach; those of all voxels where there are none.
+pub fn extinct_bounds(grid: &Grid, transfer: &TransferFunction) -> DAabb {
     let [nx, ny, _] = grid.dims;
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for (row, values) in grid.values.chunks(nx).enumerate() {

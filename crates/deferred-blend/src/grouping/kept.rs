@@ -1,0 +1,84 @@
+//! Groups that hold for every view: kept by the places of the discs on their object, and found again when the object has moved.
+
+use super::Membership;
+use splat_core::glam::DVec3;
+
+/// Share of its radius by which a disc may have moved on its object, by rounding, and is still the same.
+const NEAR: f64 = 1.0 / 64.0;
+
+/// Along which discs are sorted: of unit length, and such that planes of a lattice do not lie across it.
+const ALONG: DVec3 = DVec3::new(0.754_877_666, 0.569_840_291, 0.324_717_957);
+
+/// A disc on its object.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Place {
+    along: f64,
+    at: DVec3,
+    /// Rank among the discs that the groups are of.
+    disc: u32,
+}
+
+/// The groups of an object's discs.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct KeptGroups {
+    /// By rising `along`.
+    places: Vec<Place>,
+    /// Of the smallest disc.
+    radius: f64,
+    membership: Membership,
+}
+
+impl KeptGroups {
+    /// Keeps groups of discs that lie at these places of their object; `radius` is that of the smallest disc, in the same unit.
+    ///
+    /// # Panics
+    /// If there are not as many places as discs.
+    pub fn new(places: &[DVec3], radius: f64, membership: Membership) -> Self {
+        assert_eq!(places.len(), membership.discs(), "invariant: one place a disc");
+        Self { places: sorted(places), radius, membership }
+    }
+
+    /// The groups of the same discs in another order, or `None` where they are not the same.
+    ///
+    /// Discs that lie nearer to one another than a 64th of the radius may take one another's groups.
+    pub fn of(&self, places: &[DVec3], radius: f64) -> Option<Membership> {
+        let near = NEAR * self.radius;
+        if places.len() != self.places.len() || (radius - self.radius).abs() > near {
+            return None;
+        }
+        let (mut first, mut is_taken) = (0, vec![false; self.places.len()]);
+        let mut from = vec![0; places.len()];
+        for wanted in sorted(places) {
+            while first < is_taken.len() && (is_taken[first] || self.places[first].along < wanted.along - near) {
+                first += 1;
+            }
+            let reach = self.places[first..].iter().take_while(|place| place.along <= wanted.along + near);
+            let free = (first..).zip(reach).filter(|(k, _)| !is_taken[*k]);
+            let distance = |place: &Place| place.at.distance_squared(wanted.at);
+            let (k, nearest) = free.min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)))?;
+            if distance(nearest) > near * near {
+                return None;
+            }
+            is_taken[k] = true;
+            from[wanted.disc as usize] = nearest.disc;
+        }
+        Some(self.membership.rearranged(&from))
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> u64 {
+        self.membership.bytes() + size_of_val(&*self.places) as u64
+    }
+
+    /// Bytes of the places of so many discs, kept and looked for.
+    pub const fn place_bytes(discs: u64) -> u64 {
+        discs * (2 * size_of::<Place>() as u64 + size_of::<DVec3>() as u64 + 5)
+    }
+}
+
+fn sorted(places: &[DVec3]) -> Vec<Place> {
+    let place = |(disc, at): (u32, &DVec3)| Place { along: at.dot(ALONG), at: *at, disc };
+    let mut sorted: Vec<Place> = (0..).zip(places).map(place).collect();
+    sorted.sort_unstable_by(|a, b| a.along.total_cmp(&b.along).then(a.disc.cmp(&b.disc)));
+    sorted
+}

@@ -1,0 +1,209 @@
+//! Sixteen pixels: what discs hide there, and sums over those that nothing hides.
+
+use super::picture::Tile;
+use super::{OpaqueInput, Passes};
+use crate::Params;
+use crate::disc::{Disc, Meeting};
+use crate::fragments::offsets;
+use splat_core::raster::kernel::Kernel;
+use splat_core::raster::lanes::Lanes;
+use splat_core::raster::pulp::Simd;
+use splat_core::raster::tile::{AREA, Line, PIXELS, position};
+
+/// 1/|cosine| beyond which ε along the ray grows no more.
+const MOST_OBLIQUE: f32 = 4.0;
+
+/// ε is at least this share of the depth, eight units in its last place: discs of one plane, far away, do not hide one another.
+const LEAST_EPSILON: f32 = 1.0 / (1 << 20) as f32;
+
+/// Least weight of a disc that a ray meets, below any that can be seen beside another: where sharp kernels end in zero, Σw does not.
+const LEAST_WEIGHT: f32 = 1.0 / (1u64 << 60) as f32;
+
+/// Numbers of 16 pixels that are all the same.
+pub(super) const fn line(value: f32) -> Line {
+    Line([value; PIXELS])
+}
+
+/// Where rays meet a disc.
+pub(super) struct Hit<S: Simd> {
+    /// View depth, infinite where a ray misses.
+    pub(super) depth: Lanes<S>,
+    /// z + ε: what lies behind is hidden.
+    pub(super) limit: Lanes<S>,
+    /// ρ²/R², below 1 where a ray hits.
+    pub(super) distance_sq: Lanes<S>,
+}
+
+/// How discs hide one another.
+pub(super) struct Rules {
+    gap: f32,
+    /// For Eq. 14, the depth at which the first step of Eq. 10 begins, and steps in a unit of depth.
+    pub(super) floor: Option<[f32; 2]>,
+}
+
+impl Rules {
+    pub(super) fn new(input: &OpaqueInput<'_>, params: &Params) -> Self {
+        let floor = || {
+            let [near, far] = input.discs.depths;
+            // More steps than depths can be told apart by would part the discs of a plane.
+            let steps = (input.discs.depth_steps(params) as f32).min(1.0 / LEAST_EPSILON);
+            [near, if far > near { steps / (far - near) } else { 0.0 }]
+        };
+        let voronoi = matches!(input.passes, Passes::OnePlusOne { voronoi: true, .. });
+        Self { gap: params.gap, floor: voronoi.then(floor) }
+    }
+
+    /// A disc met by pixels from `lane` on of the block whose first pixel is `first`.
+    #[inline(always)]
+    pub(super) fn hit<S: Simd>(&self, simd: S, disc: &Disc, first: [usize; 2], lane: usize) -> Hit<S> {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let Meeting { inverse, distance_sq, depth, .. } = disc.meet(simd, offsets(simd, disc, first, lane));
+        let far = of(f32::INFINITY);
+        let depth = depth.where_less_or(distance_sq, of(1.0), far);
+        let depth = depth.where_less_or(of(0.0), depth, far);
+        let across = of(self.gap * disc.radius) * inverse.abs().min(of(MOST_OBLIQUE));
+        Hit { depth, limit: depth + across.max(depth * of(LEAST_EPSILON)), distance_sq }
+    }
+}
+
+/// w of Eq. 1 where a ray hits.
+#[inline(always)]
+pub(super) fn weight<S: Simd>(simd: S, kernel: &Kernel, distance_sq: Lanes<S>) -> Lanes<S> {
+    let of = |v: f32| Lanes::splat(simd, v);
+    kernel.profile(simd, (of(1.0) - distance_sq).max(of(0.0))).max(of(LEAST_WEIGHT))
+}
+
+/// Sums of 16 pixels.
+pub(super) struct Block {
+    first: [usize; 2],
+    /// Least z + ε.
+    limit: Line,
+    /// Depth and, as bits, rank of the nearest disc.
+    near: Line,
+    disc: Line,
+    weight: Line,
+    /// Σw·(z − nearest): relative, so that far surfaces keep their digits.
+    depth: Line,
+    /// Values of the nearest disc, and Σw·(v − nearest), by channel: so what is constant stays so to the last bit.
+    nearest: Vec<Line>,
+    sums: Vec<Line>,
+}
+
+impl Block {
+    pub(super) fn new(channels: usize) -> Self {
+        let (zero, lines) = (line(0.0), vec![line(0.0); channels]);
+        let (limit, near, disc, weight, depth) = (zero, zero, zero, zero, zero);
+        Self { first: [0; 2], limit, near, disc, weight, depth, nearest: lines.clone(), sums: lines }
+    }
+
+    /// Of one.
+    pub(super) fn bytes(channels: usize) -> u64 {
+        ((5 + 2 * channels) * size_of::<Line>()) as u64
+    }
+
+    /// Begins block `b` of the tile at `corner`.
+    pub(super) fn clear(&mut self, b: usize, corner: [usize; 2]) {
+        self.first = position(b * PIXELS, corner[0], corner[1]);
+        [self.limit, self.near] = [line(f32::INFINITY); 2];
+        [self.weight, self.depth] = [line(0.0); 2];
+        self.sums.fill(line(0.0));
+    }
+
+    /// Image position of its first pixel.
+    pub(super) fn first(&self) -> [usize; 2] {
+        self.first
+    }
+
+    /// Discs, one a lane, of which the nearest so far and what hides most are kept; of several at one depth the first.
+    #[inline(always)]
+    pub(super) fn hide<S: Simd>(&mut self, simd: S, lane: usize, [depth, limit, disc]: [Lanes<S>; 3]) {
+        let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
+        let near = at(&self.near);
+        at(&self.limit).min(limit).store(&mut self.limit.0[lane..]);
+        disc.where_less_or(depth, near, at(&self.disc)).store(&mut self.disc.0[lane..]);
+        near.min(depth).store(&mut self.near.0[lane..]);
+    }
+
+    /// Reads the values of the nearest discs, when all are known.
+    #[inline(always)]
+    pub(super) fn begin_sums(&mut self, input: &OpaqueInput<'_>) {
+        let seen = self.near.0.map(|depth| if depth < f32::INFINITY { 1.0 } else { 0.0 });
+        for_each_disc(&self.disc, seen, |disc, own| {
+            for (line, value) in self.nearest.iter_mut().zip(values_of(input, disc)) {
+                for (nearest, own) in line.0.iter_mut().zip(own) {
+                    *nearest = if *own > 0.0 { *value } else { *nearest };
+                }
+            }
+        });
+    }
+
+    /// Least z + ε.
+    #[inline(always)]
+    pub(super) fn limit<S: Simd>(&self, simd: S, lane: usize) -> Lanes<S> {
+        Lanes::load(simd, &self.limit.0[lane..])
+    }
+
+    /// Adds discs, one a lane, to Σw and Σwz. Returns their weights, 0 for those that are hidden.
+    #[inline(always)]
+    pub(super) fn weigh<S: Simd>(&mut self, simd: S, lane: usize, depth: Lanes<S>, weight: Lanes<S>) -> Lanes<S> {
+        let limit = self.limit(simd, lane);
+        let weight = weight.where_less(depth, limit);
+        let behind = (depth - Lanes::load(simd, &self.near.0[lane..])).where_less(depth, limit);
+        add(simd, &mut self.weight.0[lane..], weight);
+        add(simd, &mut self.depth.0[lane..], weight * behind);
+        weight
+    }
+
+    /// Adds the values of one disc.
+    #[inline(always)]
+    pub(super) fn add<S: Simd>(&mut self, simd: S, lane: usize, weight: Lanes<S>, values: &[f32]) {
+        for ((sum, nearest), value) in self.sums.iter_mut().zip(&self.nearest).zip(values) {
+            let difference = Lanes::splat(simd, *value) - Lanes::load(simd, &nearest.0[lane..]);
+            add(simd, &mut sum.0[lane..], weight * difference);
+        }
+    }
+
+    /// Eq. 1.
+    #[inline(always)]
+    pub(super) fn normalize<S: Simd>(&self, simd: S, b: usize, tile: &mut Tile) {
+        for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
+            let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
+            let (near, weight, far) = (at(&self.near), at(&self.weight), Lanes::splat(simd, f32::INFINITY));
+            let pixel = b * PIXELS + lane;
+            (near + at(&self.depth) / weight).where_less_or(near, far, far).store(&mut tile.depth[pixel..]);
+            let channels = tile.channels.chunks_exact_mut(AREA).zip(&self.nearest).zip(&self.sums);
+            for ((plane, nearest), sum) in channels {
+                (at(nearest) + at(sum) / weight).where_less(near, far).store(&mut plane[pixel..]);
+            }
+        }
+        for (k, disc) in tile.disc[b * PIXELS..][..PIXELS].iter_mut().enumerate() {
+            *disc = if self.near.0[k] < f32::INFINITY { self.disc.0[k].to_bits() } else { u32::MAX };
+        }
+    }
+}
+
+/// Calls once for each disc that some pixels show, with the weights of the pixels that show it, 0 for others. Neighbours mostly show one.
+#[inline(always)]
+pub(super) fn for_each_disc(discs: &Line, mut weights: [f32; PIXELS], mut visit: impl FnMut(f32, &[f32; PIXELS])) {
+    while let Some(first) = weights.iter().position(|weight| *weight > 0.0) {
+        let (disc, mut own) = (discs.0[first], [0.0; PIXELS]);
+        for ((rest, own), other) in weights.iter_mut().zip(&mut own).zip(&discs.0) {
+            let is_own = other.to_bits() == disc.to_bits();
+            *own = if is_own { *rest } else { 0.0 };
+            *rest = if is_own { 0.0 } else { *rest };
+        }
+        visit(disc, &own);
+    }
+}
+
+/// Values of a disc, whose rank is given as bits.
+#[inline(always)]
+pub(super) fn values_of<'a>(input: &OpaqueInput<'a>, disc: f32) -> &'a [f32] {
+    let channels = input.channels as usize;
+    &input.values[input.discs.ids[disc.to_bits() as usize] as usize * channels..][..channels]
+}
+
+#[inline(always)]
+fn add<S: Simd>(simd: S, plane: &mut [f32], v: Lanes<S>) {
+    (Lanes::load(simd, plane) + v).store(plane);
+}

@@ -1,0 +1,157 @@
+//! 1+1 passes: a depth-colour image of each group (Fig. 11), by the depth of Eq. 14, and their composition (Fig. 6).
+//!
+//! Eq. 14 adds to a depth of n steps the distance from the disc's centre, as a share of a step. Added up in one number, a share
+//! loses its digits where n is large; here both are kept, and compared one after the other. In place of its colour an image
+//! keeps the disc, so the time of the walk does not grow with the number of channels.
+
+use super::OpaqueInput;
+use super::block::{Block, Hit, Rules, for_each_disc, line, values_of, weight};
+use crate::disc::Discs;
+use crate::grouping::{Groups, MOST_GROUPS};
+use splat_core::raster::lanes::Lanes;
+use splat_core::raster::pulp::Simd;
+use splat_core::raster::tile::{Line, PIXELS};
+
+/// 1.5·2²³: adding it to a number below 2²² rounds that.
+const TO_WHOLE: f32 = 12_582_912.0;
+
+/// What a group shows in a block.
+#[derive(Clone, Copy)]
+struct GroupImage {
+    /// The two parts of Eq. 14, where it is used: a step of depth, and ρ²/R².
+    step: Line,
+    place: Line,
+    /// Infinite where the group has no disc, as are the next and the step.
+    depth: Line,
+    /// z + ε.
+    limit: Line,
+    weight: Line,
+    /// Rank, as bits.
+    disc: Line,
+}
+
+/// The images of all groups in a block.
+pub(super) struct GroupImages {
+    images: Vec<GroupImage>,
+    /// A bit for each group that has an image.
+    met: [u64; MOST_GROUPS as usize / 64],
+}
+
+impl GroupImages {
+    pub(super) fn new(count: usize) -> Self {
+        let zero = line(0.0);
+        let image = GroupImage { step: zero, place: zero, depth: zero, limit: zero, weight: zero, disc: zero };
+        Self { images: vec![image; count], met: Default::default() }
+    }
+
+    /// Of so many.
+    pub(super) fn bytes(count: usize) -> u64 {
+        (count * size_of::<GroupImage>()) as u64
+    }
+
+    /// The image of a group, empty if it was not met.
+    #[inline(always)]
+    fn of(&mut self, group: u8) -> &mut GroupImage {
+        let (word, bit) = (&mut self.met[usize::from(group / 64)], 1 << (group % 64));
+        let image = &mut self.images[usize::from(group)];
+        if *word & bit == 0 {
+            *word |= bit;
+            [image.step, image.depth, image.limit] = [line(f32::INFINITY); 3];
+        }
+        image
+    }
+
+    /// Calls for each image of a group that was met.
+    #[inline(always)]
+    fn for_each(&self, mut visit: impl FnMut(&GroupImage)) {
+        for (word, mut bits) in self.met.into_iter().enumerate() {
+            while bits != 0 {
+                visit(&self.images[64 * word + bits.trailing_zeros() as usize]);
+                bits &= bits - 1;
+            }
+        }
+    }
+}
+
+/// The walk over the discs of a list: each is kept where it is before what its group has; of equals the first.
+#[inline(always)]
+pub(super) fn keep<S: Simd>(
+    simd: S,
+    list: &[u32],
+    (discs, groups): (&Discs, &Groups),
+    (rules, first): (&Rules, [usize; 2]),
+    images: &mut GroupImages,
+) {
+    let of = |v: f32| Lanes::splat(simd, v);
+    images.met = Default::default();
+    for &i in list {
+        let disc = &discs.discs[i as usize];
+        let image = images.of(groups.of()[discs.ids[i as usize] as usize]);
+        for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
+            let Hit { depth, limit, distance_sq } = rules.hit(simd, disc, first, lane);
+            let behind = match rules.floor {
+                Some(floor) => behind(simd, image, lane, [floored(simd, floor, depth), distance_sq]),
+                None => depth - Lanes::load(simd, &image.depth.0[lane..]),
+            };
+            if !behind.any_less(of(0.0)) {
+                continue;
+            }
+            let kernel = &discs.kernels[discs.looks[i as usize].footprint as usize];
+            let keep = |line: &mut Line, new: Lanes<S>| {
+                new.where_less_or(behind, of(0.0), Lanes::load(simd, &line.0[lane..])).store(&mut line.0[lane..]);
+            };
+            if let Some(floor) = rules.floor {
+                keep(&mut image.step, floored(simd, floor, depth));
+                keep(&mut image.place, distance_sq);
+            }
+            keep(&mut image.depth, depth);
+            keep(&mut image.limit, limit);
+            keep(&mut image.weight, weight(simd, kernel, distance_sq));
+            keep(&mut image.disc, of(f32::from_bits(i)));
+        }
+    }
+}
+
+/// By Eq. 14: below 0 where a disc is before an image. Steps are whole or the same, places differ by less than 1, so the sign is that of
+/// the first difference that is not 0.
+#[inline(always)]
+fn behind<S: Simd>(simd: S, image: &GroupImage, lane: usize, [step, place]: [Lanes<S>; 2]) -> Lanes<S> {
+    let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
+    (step - at(&image.step)).mul_add(Lanes::splat(simd, 4.0), place - at(&image.place))
+}
+
+/// Eq. 10, in steps.
+#[inline(always)]
+fn floored<S: Simd>(simd: S, [near, per_depth]: [f32; 2], depth: Lanes<S>) -> Lanes<S> {
+    let of = |v: f32| Lanes::splat(simd, v);
+    let steps = (depth - of(near)) * of(per_depth);
+    let whole = (steps + of(TO_WHOLE)) - of(TO_WHOLE);
+    whole - of(1.0).where_less(steps, whole)
+}
+
+/// Fig. 6: of all images those discs are summed that no other hides.
+#[inline(always)]
+pub(super) fn composite<S: Simd>(simd: S, input: &OpaqueInput<'_>, images: &GroupImages, block: &mut Block) {
+    images.for_each(|image| {
+        for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
+            let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
+            block.hide(simd, lane, [at(&image.depth), at(&image.limit), at(&image.disc)]);
+        }
+    });
+    block.begin_sums(input);
+    images.for_each(|image| {
+        let mut weights = [0.0; PIXELS];
+        for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
+            let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
+            let depth = at(&image.depth);
+            if depth.any_less(block.limit(simd, lane)) {
+                block.weigh(simd, lane, depth, at(&image.weight)).store(&mut weights[lane..]);
+            }
+        }
+        for_each_disc(&image.disc, weights, |disc, own| {
+            for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
+                block.add(simd, lane, Lanes::load(simd, &own[lane..]), values_of(input, disc));
+            }
+        });
+    });
+}

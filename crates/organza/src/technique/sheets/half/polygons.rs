@@ -1,0 +1,38 @@
+//! Opaque triangles that stay triangles.
+
+use crate::form::Form;
+use crate::frame::Frame;
+use crate::load::own::Body;
+use crate::matter::Matter;
+use crate::{CostRecord, Error};
+use sheet_light::half::Polygons;
+use splat_core::raster::OpaqueImage;
+use splat_core::raster::triangles::PlacedMesh;
+
+/// Whether there are any.
+pub(super) fn any(matter: &Matter<'_>) -> bool {
+    matter.planned.iter().any(|object| object.form == Form::Polygons)
+}
+
+/// Those of a frame.
+pub(super) fn polygons<'a>(frame: &'a Frame<'_>) -> Vec<Polygons<'a>> {
+    let one = |own: &'a crate::load::own::Own| {
+        let Body::Triangles(mesh) = &own.body else { return None };
+        let object = &frame.loaded.objects[own.object];
+        own.is_opaque().then(|| Polygons {
+            placed: PlacedMesh { mesh, transform: own.transform },
+            material: &frame.loaded.materials[own.material],
+            color: own.color,
+            object: own.object as u32,
+            shadow_coefficient: object.shadow_coefficient,
+            casts_shadow: object.casts_shadow,
+            radius: if own.has_splats { own.radius as f32 } else { 0.0 },
+        })
+    };
+    frame.loaded.own.iter().filter_map(one).collect()
+}
+
+/// Opaque splats as the eye sees them, which polygons are added to, if there are any.
+pub(super) fn opaque(frame: &Frame<'_>, has_polygons: bool, cost: &mut CostRecord) -> Result<OpaqueImage, Error> {
+    if has_polygons { frame.solid(cost) } else { frame.opaque(cost).cloned() }
+}

@@ -1,0 +1,49 @@
+//! What surfaces that bound matter mirror and bend.
+
+use super::disc_input;
+use crate::frame::Frame;
+use crate::scene::{self, SceneObject, Technique};
+use deferred_blend::{Bending, Surfaces};
+use splat_core::{SplatKind, StageCost};
+
+/// Whether surfaces that the technique draws bound matter.
+pub(super) fn bounds_matter(frame: &Frame<'_>) -> bool {
+    if super::bends(frame.scene).is_err() {
+        return false;
+    }
+    let objects = frame.scene.objects.iter().zip(&frame.plan.by).filter(|(o, _)| o.visible);
+    let material = |o: &SceneObject| &frame.loaded.materials[o.material];
+    objects.into_iter().any(|(o, by)| *by == Technique::Surfels && material(o).bounds_matter())
+}
+
+/// World units in a unit of the cloud.
+pub(super) fn unit(frame: &Frame<'_>) -> f32 {
+    libm::exp2(f64::from(frame.loaded.exponent)) as f32
+}
+
+pub(super) fn bending(frame: &Frame<'_>) -> Bending {
+    match frame.settings.surfels.bending {
+        scene::Bending::Traced => Bending::Traced,
+        scene::Bending::Power => Bending::Power,
+        scene::Bending::Nearest => Bending::Nearest,
+    }
+}
+
+/// Opaque surfaces, and those that bound matter where rays are followed: rays from anywhere can meet them.
+pub(super) fn surfaces<'a>(frame: &'a Frame<'a>, values: &'a [f32], stage: &mut StageCost) -> Surfaces<'a> {
+    let (cloud, settings) = (frame.drawn(), &frame.settings.surfels);
+    let follows = settings.bending == scene::Bending::Traced;
+    let is_met = |&i: &u32| {
+        let (i, bounds) = (i as usize, |m: u16| frame.loaded.materials[m as usize].bounds_matter());
+        match cloud.kind[i] {
+            SplatKind::Opaque => settings.bent_behind,
+            SplatKind::Surface => {
+                follows && bounds(cloud.material[i]) && frame.plan.by[cloud.object[i] as usize] == Technique::Surfels
+            }
+            SplatKind::Medium => false,
+        }
+    };
+    let ids: Vec<u32> = (0..cloud.len() as u32).filter(is_met).collect();
+    stage.bytes = Surfaces::bytes(ids.len() as u64);
+    Surfaces::new(&disc_input(frame, &ids), values, frame.layout())
+}

@@ -1,0 +1,185 @@
+//! Light of one sweep on polygons, slab by slab (steps 7, 22 and 25 of the pseudocode, Table 1).
+//!
+//! Before the first slab there is nothing but polygons between a place and the light; among the slabs what lies before the present one is known
+//! by the light buffer, and its own slab counts as far as light has come in it; behind the last slab all of them count. A polygon
+//! that lies on the face of a slab belongs to the slab behind it, for the eye as for the light.
+
+use super::frame::Frame;
+use super::illuminate::{Illumination, ThroughVolumes};
+use super::light_depth::LightDepths;
+use super::polygons::{EyePolygons, Seen};
+use super::splat_light::SplatLight;
+use super::splat_squares::BySlab;
+use super::splats::Lamps;
+use rayon::prelude::*;
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::raster::{OpaqueImage, pulp};
+use splat_core::shade::{ChannelLayout, LitBy, MAX_CHANNELS, arriving};
+use splat_core::{Accumulator, Camera};
+
+/// Pixels of one task.
+const CHUNK: usize = 256;
+
+/// What of a light reaches the pixels that show polygons.
+pub(crate) struct PolygonLight<'a> {
+    of: &'a EyePolygons<'a>,
+    camera: &'a Camera,
+    /// By pixel: share by channel; all of it before the sweep comes to it.
+    through: Vec<[f32; 3]>,
+}
+
+/// The pixels that show polygons by the slab that these lie in.
+pub(crate) struct PolygonSlabs {
+    places: Vec<Vec3>,
+    /// Those behind the last slab are in one more.
+    by_slab: BySlab,
+    /// Pixels before the first body, among them, and behind the last.
+    pub(crate) regions: [u64; 3],
+}
+
+impl PolygonSlabs {
+    pub(crate) fn new(of: &EyePolygons<'_>, frame: &Frame, camera: &Camera, [near, far]: [f32; 2]) -> Self {
+        let place = |world: DVec3| frame.point(world).as_vec3();
+        let places: Vec<Vec3> = of.places(camera).into_par_iter().map(place).collect();
+        let (count, width) = (frame.slabs.count, frame.slabs.width as f32);
+        let slabs: Vec<u32> = places.iter().map(|p| ((p.z / width) as u32).min(count)).collect();
+        let mut regions = [0; 3];
+        places.iter().for_each(|p| regions[if p.z < near { 0 } else { usize::from(p.z >= far) + 1 }] += 1);
+        Self { places, by_slab: BySlab::new(&slabs, count + 1), regions }
+    }
+
+    /// Bytes of the lists.
+    pub(crate) fn bytes(&self) -> u64 {
+        16 * self.places.len() as u64
+    }
+}
+
+impl<'a> PolygonLight<'a> {
+    /// Light that comes to all of them, but for polygons in its way.
+    pub(crate) fn new(of: &'a EyePolygons<'a>, camera: &'a Camera, depths: Option<&LightDepths>) -> Self {
+        let mut through = vec![[1.0; 3]; of.pixels.len()];
+        if let Some(depths) = depths {
+            through.par_iter_mut().zip(&of.pixels).for_each(|(through, pixel)| {
+                let Seen { world, face, .. } = of.seen(*pixel, camera);
+                *through = [depths.visibility(world, Some(face)); 3];
+            });
+        }
+        Self { of, camera, through }
+    }
+
+    /// Takes up the polygons of a slab, or those behind the last, behind the volumes and the splats before them.
+    pub(crate) fn enter(
+        &mut self,
+        slabs: &PolygonSlabs,
+        slab: u32,
+        frame: &Frame,
+        (volumes, splats): (&Illumination<'_>, Option<&SplatLight<'_>>),
+    ) {
+        let ranks = slabs.by_slab.of(slab);
+        let mut found = vec![[1.0; 3]; ranks.len()];
+        found.par_chunks_mut(CHUNK).zip(ranks.par_chunks(CHUNK)).for_each(|(out, ranks)| {
+            let places: Vec<Vec3> = ranks.iter().map(|rank| slabs.places[*rank as usize]).collect();
+            pulp::Arch::new().dispatch(ThroughVolumes { of: volumes, frame, places: &places, out });
+            let Some(splats) = splats else { return };
+            for (out, place) in out.iter_mut().zip(&places) {
+                let own = splats.transmittance_at(*place, place.z / frame.slabs.width as f32 - slab as f32);
+                (0..3).for_each(|c| out[c] *= own[c]);
+            }
+        });
+        for (rank, found) in ranks.iter().zip(found) {
+            let through = &mut self.through[*rank as usize];
+            (0..3).for_each(|c| through[c] *= found[c]);
+        }
+    }
+
+    /// Adds what polygons show of the lights of the sweep.
+    pub(crate) fn shade(&self, lamps: &Lamps<'_>, origin: DVec3, image: &mut PolygonImage) {
+        let lights: Vec<LitBy<'_>> = lamps.carried.iter().chain(lamps.mapped).copied().collect();
+        let (layout, channels) = (image.layout, image.layout.count());
+        let chunks = image.values.par_chunks_mut(CHUNK * channels).zip(image.received.par_chunks_mut(CHUNK));
+        chunks.enumerate().for_each(|(chunk, (values, received))| {
+            for (k, (values, received)) in values.chunks_exact_mut(channels).zip(received).enumerate() {
+                let rank = chunk * CHUNK + k;
+                let seen = self.of.seen(self.of.pixels[rank], self.camera);
+                self.add(&seen, rank, (lamps, &lights, origin), (&layout, values, received));
+            }
+        });
+    }
+
+    /// Adds what one pixel shows, and green light that it receives of how much.
+    fn add(
+        &self,
+        seen: &Seen<'_>,
+        rank: usize,
+        (lamps, lights, origin): (&Lamps<'_>, &[LitBy<'_>], DVec3),
+        (layout, values, received): (&ChannelLayout, &mut [f32], &mut [f32; 2]),
+    ) {
+        let (point, is_carried) = (seen.point(), lamps.carried.is_some());
+        let mut radiance = point.radiance(lamps.ambient, lights.iter().map(|lit| &lit.light), |light, irradiance| {
+            let own = if is_carried && light == 0 { self.through[rank] } else { [1.0; 3] };
+            let shadow = || {
+                let others = lights[light].shadow.map(|shadow| shadow.transmittance(&seen.receiver(origin)));
+                [0, 1, 2].map(|c| own[c] * others.map_or(1.0, |others| others[c]))
+            };
+            arriving(irradiance, seen.of.shadow_coefficient, Some(shadow))
+        });
+        if seen.of.is_lit() {
+            let all: f32 = lights.iter().map(|lit| point.irradiance(&lit.light).1[1]).sum();
+            *received = [received[0] + radiance.shadow * all, received[1] + all];
+        }
+        if lamps.light_alone {
+            (radiance.ambient, radiance.emission) = ([0.0; 3], [0.0; 3]);
+        }
+        let mut own = [0.0; MAX_CHANNELS];
+        radiance.write(point.normal, layout, &mut own);
+        let colors = layout.colors();
+        (0..colors).for_each(|c| values[c] += own[c]);
+        // The normal is the same under all lights, and the shadow is found at the end.
+        values[colors..].copy_from_slice(&own[colors..layout.count()]);
+    }
+}
+
+/// What polygons show, of all lights so far.
+pub(crate) struct PolygonImage {
+    layout: ChannelLayout,
+    /// Channels of each pixel that shows a polygon, one pixel after the other.
+    values: Vec<f32>,
+    /// Green light that each receives, and what it would without shadows.
+    received: Vec<[f32; 2]>,
+}
+
+impl PolygonImage {
+    pub(crate) fn new(of: &EyePolygons<'_>, layout: &ChannelLayout) -> Self {
+        let pixels = of.pixels.len();
+        Self { layout: *layout, values: vec![0.0; pixels * layout.count()], received: vec![[0.0; 2]; pixels] }
+    }
+
+    /// Bytes of the sums.
+    pub(crate) fn bytes(&self) -> u64 {
+        4 * (self.values.len() + 2 * self.received.len()) as u64
+    }
+
+    /// The picture, with objects where `form` keeps them.
+    pub(crate) fn finish(self, of: &EyePolygons<'_>, form: &Accumulator) -> OpaqueImage {
+        let (pixels, channels) = (of.opaque.len(), self.layout.count());
+        let keeps = !form.object.is_empty();
+        let mut image = OpaqueImage {
+            depth: vec![f32::INFINITY; pixels],
+            channels: vec![vec![0.0; pixels]; channels],
+            object: if keeps { vec![u32::MAX; pixels] } else { Vec::new() },
+        };
+        for (rank, pixel) in of.pixels.iter().enumerate() {
+            let k = *pixel as usize;
+            image.depth[k] = of.depth(*pixel);
+            (0..channels).for_each(|c| image.channels[c][k] = self.values[rank * channels + c]);
+            if let Some(shadow) = self.layout.shadow() {
+                let [received, all] = self.received[rank];
+                image.channels[shadow][k] = if all > 0.0 { received / all } else { 1.0 };
+            }
+            if keeps {
+                image.object[k] = of.object(*pixel);
+            }
+        }
+        image
+    }
+}

@@ -1,0 +1,97 @@
+//! Bands of rows: each has the list of the pieces that it meets, and a depth buffer of its own.
+
+use super::crossing::{Crossing, Plane};
+use super::piece::Piece;
+use super::view::Meshes;
+use crate::{Error, Progress};
+use rayon::prelude::*;
+
+/// Rows of a band.
+const ROWS: usize = 16;
+
+/// Triangles that are clipped by one task.
+const CHUNK: usize = 1 << 12;
+
+/// Depth of each pixel, and what `keep` makes of the nearest triangle there; +∞ and `none` where there is none.
+pub(super) fn resolve<T: Copy + Send>(
+    of: &Meshes<'_>,
+    none: T,
+    keep: impl Fn(u32, u32, &Crossing) -> T + Sync,
+    progress: Option<&Progress>,
+) -> Result<(Vec<f32>, Vec<T>), Error> {
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
+    let [width, height] = of.camera.size.map(|s| s as usize);
+    let pieces = pieces(of);
+    let lists = Lists::new(&pieces, of.camera.size[1]);
+    progress.add_total(height.div_ceil(ROWS) as u64);
+    let (mut depth, mut kept) = (vec![f32::INFINITY; width * height], vec![none; width * height]);
+    let bands = depth.par_chunks_mut(width * ROWS).zip(kept.par_chunks_mut(width * ROWS)).enumerate();
+    bands.for_each(|(b, (depth, kept))| {
+        if progress.tick(1).is_err() {
+            return;
+        }
+        let mut nearest = vec![f64::INFINITY; depth.len()];
+        for piece in lists.of(b).iter().map(|id| &pieces[*id as usize]) {
+            let plane = Plane::new(of, of.triangle(piece.mesh, piece.triangle));
+            let rows = piece.rows(of.camera.size[1]);
+            for y in rows.start.max(b * ROWS)..rows.end.min((b + 1) * ROWS) {
+                for x in piece.span(y, of.camera.size[0]) {
+                    let (k, at) = ((y - b * ROWS) * width + x, plane.at([x, y]));
+                    if at.depth < nearest[k] {
+                        (nearest[k], kept[k]) = (at.depth, keep(piece.mesh, piece.triangle, &at));
+                    }
+                }
+            }
+        }
+        depth.iter_mut().zip(nearest).for_each(|(to, nearest)| *to = nearest as f32);
+    });
+    progress.tick(0)?;
+    Ok((depth, kept))
+}
+
+/// All pieces of all triangles, in their order.
+fn pieces(of: &Meshes<'_>) -> Vec<Piece> {
+    let mut all = Vec::new();
+    for (mesh, triangles) in of.triangles.iter().enumerate() {
+        let chunk = |(chunk, triangles): (usize, &[[u32; 3]])| {
+            let mut own = Vec::new();
+            (0..triangles.len()).for_each(|k| Piece::push(of, mesh as u32, (chunk * CHUNK + k) as u32, &mut own));
+            own
+        };
+        let chunks: Vec<Vec<Piece>> = triangles.par_chunks(CHUNK).enumerate().map(chunk).collect();
+        chunks.into_iter().for_each(|mut own| all.append(&mut own));
+    }
+    all
+}
+
+/// Pieces by band, in their order.
+struct Lists {
+    starts: Vec<usize>,
+    ids: Vec<u32>,
+}
+
+impl Lists {
+    fn new(pieces: &[Piece], height: u32) -> Self {
+        let bands = |piece: &Piece| {
+            let rows = piece.rows(height);
+            rows.start / ROWS..(rows.end - 1) / ROWS + 1
+        };
+        // starts[b + 1] first counts, then is the running end of band b.
+        let mut starts = vec![0; (height as usize).div_ceil(ROWS) + 2];
+        pieces.iter().flat_map(bands).for_each(|b| starts[b + 2] += 1);
+        (2..starts.len()).for_each(|b| starts[b] += starts[b - 1]);
+        let mut ids = vec![0; starts[starts.len() - 1]];
+        for (id, piece) in (0..).zip(pieces) {
+            for b in bands(piece) {
+                ids[starts[b + 1]] = id;
+                starts[b + 1] += 1;
+            }
+        }
+        Self { starts, ids }
+    }
+
+    fn of(&self, band: usize) -> &[u32] {
+        &self.ids[self.starts[band]..self.starts[band + 1]]
+    }
+}
