@@ -28,6 +28,7 @@ mod orders;
 mod output;
 mod particle_layers;
 mod particles;
+mod point_opacity;
 mod progress;
 mod reading;
 mod sheets;

@@ -16,6 +16,8 @@ pub struct RawPoints {
     pub color: Vec<[f32; 3]>,
     /// Physical values (intensity, temperature …), any finite number.
     pub value: Vec<f32>,
+    /// Opacities of one crossing of the surface that the points are samples of, in \[0, 1\]; 1 is opaque.
+    pub opacity: Vec<f32>,
     /// Classes as the file numbers them (LAS: 2 is ground, 5 high vegetation …).
     pub classification: Vec<u8>,
     /// The integers that the positions were made from, where the file stores integers.
@@ -46,6 +48,11 @@ impl RawPoints {
         self.position.is_empty()
     }
 
+    /// The least opacity of a point; 1 where the file has none, and without points.
+    pub fn least_opacity(&self) -> f32 {
+        self.opacity.iter().copied().fold(1.0, f32::min)
+    }
+
     /// Position of point `i` in f64: from the file's integers where it has them, else from the f32 offset.
     ///
     /// # Panics
@@ -67,6 +74,7 @@ impl RawPoints {
             ("normal", self.normal.len()),
             ("color", self.color.len()),
             ("value", self.value.len()),
+            ("opacity", self.opacity.len()),
             ("classification", self.classification.len()),
             ("lattice", self.lattice.as_ref().map_or(0, |l| l.steps.len())),
         ];
@@ -89,6 +97,9 @@ impl RawPoints {
         }
         if let Some(i) = self.value.iter().position(|v| !v.is_finite()) {
             return Err(Error::invalid("point", i, "value", self.value[i], "a finite number"));
+        }
+        if let Some(i) = self.opacity.iter().position(|a| !(0.0..=1.0).contains(a)) {
+            return Err(Error::invalid("point", i, "opacity", self.opacity[i], "a number in [0, 1]"));
         }
         Ok(())
     }

@@ -5,6 +5,9 @@
 //! R = cutoff·0.8·h with h = √2 times the cell's farthest corner, between √a and 2√a: on a square lattice that is the
 //! lattice's spacing, among scattered points it bridges the gaps.
 //!
+//! Points may bring an opacity each. It is multiplied by that of the surface; a point of which 1 comes is an opaque disc, for which
+//! τ₁ is infinite, beside the translucent discs of the others.
+//!
 //! Points at one place share the area of that place, so duplicates neither darken it nor shrink radii to 0.
 
 use crate::columns::{self, CHUNK, Wanted};
@@ -29,7 +32,7 @@ pub struct SurfelParams {
     pub splat: SplatParams,
     /// Whether surfels keep the points' colours.
     pub colors: bool,
-    /// Opacity of one crossing, in \[0, 1\]; 1 makes the surface opaque.
+    /// Opacity of one crossing, in \[0, 1\]; 1 makes the surface opaque. Points with opacities of their own have these times it.
     pub opacity: f64,
     /// Neighbours that normals and areas come from, 3 to 32.
     pub neighbours: usize,
@@ -159,7 +162,8 @@ pub(crate) fn compare(points: &RawPoints, a: usize, b: usize) -> Ordering {
     let place = |i: usize| points.position[i].to_array().map(|c| (c + 0.0).to_bits());
     let attributes = |i: usize| {
         let color = points.color.get(i).map(|c| c.map(f32::to_bits));
-        (points.normal.get(i).map(|n| bits(*n)), color, points.value.get(i).map(|v| v.to_bits()))
+        let number = |column: &[f32]| column.get(i).map(|v| v.to_bits());
+        (points.normal.get(i).map(|n| bits(*n)), color, number(&points.value), number(&points.opacity))
     };
     place(a).cmp(&place(b)).then_with(|| attributes(a).cmp(&attributes(b))).then(a.cmp(&b))
 }
@@ -237,7 +241,17 @@ impl Sorted {
 /// Which columns surfels fill.
 pub(crate) fn wanted(points: &RawPoints, params: &SurfelParams) -> Wanted {
     let value = params.values && !points.value.is_empty();
-    Wanted { normal: true, value, crossing_depth: params.opacity < 1.0, ..Wanted::default() }
+    Wanted { normal: true, value, crossing_depth: !is_opaque(points, params), ..Wanted::default() }
+}
+
+/// Whether every disc is opaque.
+fn is_opaque(points: &RawPoints, params: &SurfelParams) -> bool {
+    params.opacity * f64::from(points.least_opacity()) >= 1.0
+}
+
+/// The optical depth of one crossing of a surface; `None` for an opaque one.
+fn crossing_depth(opacity: f64) -> Option<f64> {
+    (opacity < 1.0).then(|| optics::optical_depth(opacity))
 }
 
 fn emit(
@@ -248,13 +262,15 @@ fn emit(
 ) -> Result<Cloud, ConvertError> {
     let t = &params.splat.transform;
     let surfels = sorted.surfels(params.merge_duplicates);
+    let of_surface = crossing_depth(params.opacity);
+    let crossing = |point: u32| match points.opacity.get(point as usize) {
+        Some(own) => crossing_depth(params.opacity * f64::from(*own)),
+        None => of_surface,
+    };
     report.splats = surfels.len() as u64;
-    let opaque = params.opacity >= 1.0;
-    let crossing = if opaque { 1.0 } else { optics::optical_depth(params.opacity) };
-    let tau = crossing * t.scale * t.scale;
     let mut cloud = Cloud::new(t.apply(points.origin));
     let wanted = wanted(points, params);
-    let kind = if opaque { SplatKind::Opaque } else { SplatKind::Surface };
+    let kind = if wanted.crossing_depth { SplatKind::Surface } else { SplatKind::Opaque };
     columns::size_columns(&mut cloud, surfels.len(), kind, wanted, &params.splat)?;
     let columns =
         (&mut cloud.position, &mut cloud.normal, &mut cloud.radius, &mut cloud.cross_section, &mut cloud.color);
@@ -266,11 +282,16 @@ fn emit(
             let n = if given == Vec3::ZERO { sorted.normals[place as usize] } else { given.as_dvec3() };
             *normal = t.rotate(n).as_vec3();
             *radius = params.splat.radius(known.spacing * t.scale) as f32;
+            let tau = crossing(point).unwrap_or(1.0) * t.scale * t.scale;
             *cross_section = (tau * known.area / f64::from(sharers)) as f32;
             *color = points.color.get(i).filter(|_| params.colors).copied().unwrap_or(params.splat.color);
         },
     );
-    cloud.crossing_depth.fill(crossing as f32);
+    let optics = (&mut cloud.crossing_depth, &mut cloud.kind).into_par_iter().zip(&surfels).with_min_len(CHUNK);
+    optics.for_each(|((depth, kind), &(_, point, _))| match crossing(point) {
+        Some(tau) => *depth = tau as f32,
+        None => (*depth, *kind) = (0.0, SplatKind::Opaque),
+    });
     cloud.value.iter_mut().zip(&surfels).for_each(|(v, s)| *v = points.value[s.1 as usize]);
     Ok(cloud)
 }

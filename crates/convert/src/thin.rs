@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use splat_core::glam::{DVec3, Vec3};
 
 /// Points that lie about `spacing` apart, units of the file, where the given ones lie closer: those of each cell of a
-/// lattice with that step become one with their mean place, normal, colour and value, and the class of the first. The
+/// lattice with that step become one with their mean place, normal, colour, value and opacity, and the class of the first. The
 /// lattice has a point at zero of the file's coordinates, so nothing depends on the order of the points.
 ///
 /// ```
@@ -32,14 +32,18 @@ pub fn thinned(points: &RawPoints, spacing: f64, params: &SplatParams) -> Result
         if column.is_empty() { Vec::new() } else { ranges.par_iter().with_min_len(CHUNK).map(of).collect() }
     };
     let color: Vec<Vec3> = points.color.iter().map(|c| Vec3::from_array(*c)).collect();
-    let value: Vec<Vec3> = points.value.iter().map(|v| Vec3::splat(*v)).collect();
+    let numbers = |column: &[f32]| -> Vec<f32> {
+        let column: Vec<Vec3> = column.iter().map(|v| Vec3::splat(*v)).collect();
+        mean(&column).into_iter().map(|v| v.x).collect()
+    };
     let first = |r: &&[([f64; 3], u32)]| points.classification[r[0].1 as usize];
     Ok(RawPoints {
         origin: points.origin,
         position: mean(&points.position),
         normal: mean(&points.normal).into_iter().map(Vec3::normalize_or_zero).collect(),
         color: mean(&color).into_iter().map(|c| c.to_array()).collect(),
-        value: mean(&value).into_iter().map(|v| v.x).collect(),
+        value: numbers(&points.value),
+        opacity: numbers(&points.opacity),
         classification: if points.classification.is_empty() { Vec::new() } else { ranges.iter().map(first).collect() },
         lattice: None,
         dropped: points.dropped,
@@ -73,7 +77,8 @@ mod tests {
     fn points(position: Vec<Vec3>) -> RawPoints {
         let color = position.iter().map(|p| [p.x.abs(), 0.5, 0.25]).collect();
         let value = position.iter().map(|p| p.y).collect();
-        RawPoints { position, color, value, ..RawPoints::default() }
+        let opacity = position.iter().map(|p| p.y.abs().min(1.0)).collect();
+        RawPoints { position, color, value, opacity, ..RawPoints::default() }
     }
 
     #[test]
@@ -83,6 +88,8 @@ mod tests {
         assert_eq!(thin.len(), 16);
         assert_eq!(thin.position[0], Vec3::new(-3.5, -3.5, 0.0));
         assert_eq!((thin.color[0], thin.value[0]), ([3.5, 0.5, 0.25], -3.5));
+        // Of the cells from y = 0 to 2 half of the points have none.
+        assert_eq!((thin.opacity[0], thin.opacity[2]), (1.0, 0.5));
     }
 
     #[test]

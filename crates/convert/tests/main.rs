@@ -13,6 +13,7 @@ mod convert_volume;
 mod grid_fields;
 mod marching_cubes;
 mod mpu_fields;
+mod point_opacity;
 mod read_assets;
 #[cfg(all(feature = "hdr", feature = "exr"))]
 mod read_images;

@@ -9,8 +9,9 @@ use crate::matter::{Carries, CarriesLight, Matter};
 use crate::plan::{Effect, Plan};
 use crate::scene::{Scene, SceneLight};
 use crate::shadows::Wanted;
+use crate::shown;
 use crate::statistics::{ObjectStatistics, Statistics};
-use splat_core::Object;
+use splat_core::{Object, SplatKind};
 
 /// How light is carried in a scene, if any technique of it does.
 pub(crate) fn of_scene(scene: &Scene) -> Option<CarriesLight> {
@@ -98,6 +99,18 @@ fn softness(light: usize, points: &[LightPoint], asked: &Carries, is_carried: bo
     };
     let reason = format!("{way}; penumbras widen by {:.3} of the distance to what casts them", asked.widening[k]);
     Some(Effect { name: format!("softness of light {light}"), called_for: all > 1, reason, bound: 0.0 })
+}
+
+/// Objects with opaque discs beside translucent ones: where light is carried through these, maps of opaque objects leave both out.
+pub(crate) fn unshadowed(scene: &Scene, loaded: &Loaded) -> impl Iterator<Item = String> {
+    let mut has = vec![[false; 2]; loaded.objects.len()];
+    if of_scene(scene).is_some() && !loaded.lights.is_empty() {
+        let splats = loaded.cloud.kind.iter().zip(&loaded.cloud.object);
+        splats.for_each(|(kind, object)| has[*object as usize][usize::from(*kind == SplatKind::Opaque)] = true);
+    }
+    let mixed = loaded.objects.iter().zip(has).filter(|(_, has)| *has == [true; 2]).map(|(object, _)| &object.name);
+    let what = "opaque points beside translucent ones, which neither cast nor receive shadows where slabs carry light";
+    mixed.map(move |name| format!("object '{}' has {what}: put them into a file of their own", shown(name)))
 }
 
 /// The maps that are wanted: one for each point of a light, of all casters, and where light is carried one for each point, of

@@ -63,6 +63,7 @@ pub(crate) fn prepare(
     let mut warnings = loaded.warnings.clone();
     warnings.extend(doubts::of_scene(scene, &loaded));
     warnings.extend(unbent(scene));
+    warnings.extend(carried::unshadowed(scene, &loaded));
     let inputs = cost.stages.iter().filter(|s| s.name == pass::READ).map(|s| s.bytes).sum();
     let most = memory.total().max(memory::loading_bytes(&loaded, inputs));
     Ok((loaded, Explanation { plan, cost, memory: most, splats, warnings, notes }, memory))

@@ -36,7 +36,10 @@ pub(super) fn unused(content: &[u8]) -> Result<Vec<Vec<u8>>, ReadError> {
     for element in &header.elements {
         let all = element.properties.iter().map(|p| p.name.as_slice());
         match element.name.as_slice() {
-            b"vertex" => names.extend(columns::Columns::new(element, false)?.unused(element).map(<[u8]>::to_vec)),
+            b"vertex" => {
+                let columns = columns::Columns::new(element, header.is_mesh(), false)?;
+                names.extend(columns.unused(element).map(<[u8]>::to_vec));
+            }
             b"tristrips" => {}
             b"face" => names.extend(all.filter(|n| !is_index(n)).map(|n| [b"face.", n].concat())),
             other => names.extend(all.map(|n| [other, b".", n].concat())),

@@ -11,8 +11,8 @@ use crate::error::{Place, ReadError};
 use crate::raw_points::RawPoints;
 use splat_core::glam::{DVec3, Vec3};
 
-/// Roles of columns: x y z, normal, colour, value; and their names, lower case.
-const ROLES: [&[&str]; 10] = [
+/// Roles of columns: x y z, normal, colour, value, opacity; and their names, lower case.
+const ROLES: [&[&str]; 11] = [
     &["x", "x_coordinate", "easting"],
     &["y", "y_coordinate", "northing"],
     &["z", "z_coordinate", "height", "elevation"],
@@ -23,13 +23,15 @@ const ROLES: [&[&str]; 10] = [
     &["g", "green"],
     &["b", "blue"],
     &["value", "intensity", "scalar", "i"],
+    &["opacity", "alpha"],
 ];
 const NORMAL: usize = 3;
 const COLOR: usize = 6;
 const VALUE: usize = 9;
+const OPACITY: usize = 10;
 
 /// Bytes that a point takes while it is read and converted.
-const BYTES_PER_POINT: u64 = 24 + 12 + 12 + 12 + 4;
+const BYTES_PER_POINT: u64 = 24 + 12 + 12 + 12 + 4 + 4;
 
 /// Reads points.
 pub(super) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Result<RawPoints, ReadError> {
@@ -152,8 +154,8 @@ fn point(
     positions: &mut Vec<DVec3>,
     points: &mut RawPoints,
 ) -> Result<(), ReadError> {
-    let mut values = [0.0; 10];
-    let mut has = [false; 10];
+    let mut values = [0.0; 11];
+    let mut has = [false; 11];
     for (word, role) in words.iter().zip(columns).filter_map(|(w, c)| c.map(|role| (w, role))) {
         match word.number() {
             Ok(value) => values[role] = value,
@@ -171,6 +173,10 @@ fn point(
             let expected = "a value that fits a 32-bit float";
             return Err(ReadError::input(word.place(), expected, word.shown(), "scale the values"));
         }
+        if role == OPACITY && !(0.0..=1.0).contains(&values[role]) {
+            let hint = "opacities are 0 to 1; or rename the column";
+            return Err(ReadError::input(word.place(), "an opacity from 0 to 1", word.shown(), hint));
+        }
         has[role] = true;
     }
     positions.push(DVec3::new(values[0], values[1], values[2]));
@@ -184,6 +190,9 @@ fn point(
     }
     if has[VALUE] {
         points.value.push(values[VALUE] as f32);
+    }
+    if has[OPACITY] {
+        points.opacity.push(values[OPACITY] as f32);
     }
     Ok(())
 }

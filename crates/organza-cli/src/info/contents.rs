@@ -82,6 +82,7 @@ fn of_points(points: &RawPoints) -> FileInfo {
             ("normal", !points.normal.is_empty()),
             ("color", !points.color.is_empty()),
             ("value", !points.value.is_empty()),
+            ("opacity", !points.opacity.is_empty()),
             ("classification", !points.classification.is_empty()),
         ]),
         remarks: if points.color.is_empty() {

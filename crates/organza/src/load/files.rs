@@ -49,6 +49,12 @@ impl Files {
         self.known(path, limits).map_or_else(|| self.read_anew(path, limits, progress), Ok)
     }
 
+    /// A level set of these points does not use the opacities that they bring.
+    pub(super) fn note_level_set(&self, path: &Path) {
+        let file = crate::printable(path);
+        add(&self.notes, [format!("{file}: `level_set` does not use opacities: it has that of its object")]);
+    }
+
     /// What the files hold that is not drawn, and what was made of them, one sentence each.
     pub(super) fn notes(&self) -> Vec<String> {
         self.notes.borrow().clone()
@@ -147,7 +153,7 @@ pub(super) fn mesh_bytes(mesh: &Mesh) -> u64 {
     bytes as u64
 }
 
-/// Bytes of raw points: position, normal, colour, value, class and integers at most.
+/// Bytes of raw points: position, normal, colour, value, opacity, class and integers at most.
 pub(super) fn points_bytes(points: &RawPoints) -> u64 {
     64 * points.len() as u64
 }

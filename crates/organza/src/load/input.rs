@@ -68,11 +68,11 @@ impl Input<'_> {
         }
     }
 
-    /// Opacity of one crossing; `None` for a medium.
+    /// Opacity of one crossing, the least of it; `None` for a medium.
     pub(super) fn opacity(&self) -> Option<f64> {
         match self {
             Self::Mesh(_, _, params) | Self::Surface(_, _, params, _) => Some(params.opacity),
-            Self::Points(_, _, params) => Some(params.opacity),
+            Self::Points(_, points, params) => Some(params.opacity * f64::from(points.least_opacity())),
             Self::Rectangle(_, opacity, _) => Some(*opacity),
             Self::Volume(..) | Self::Procedural(..) | Self::Density(..) | Self::Medium(..) => None,
         }
@@ -257,7 +257,12 @@ fn level_set(source: &LevelSetSource, object: &SceneObject, context: &Context<'_
 /// Scattered points with normals where the file has some; of a mesh its vertices.
 fn read_scattered(path: &Path, context: &Context<'_>) -> Result<Arc<RawPoints>, Error> {
     match context.read_once(path)? {
-        FileData::Points(points) => Ok(points),
+        FileData::Points(points) => {
+            if !points.opacity.is_empty() {
+                context.files.note_level_set(path);
+            }
+            Ok(points)
+        }
         FileData::Mesh(mesh) => {
             mesh.validate().map_err(|e| refuse_data(path, &e))?;
             let normal = if mesh.normal.is_empty() { convert::vertex_normals(&mesh) } else { mesh.normal.clone() };

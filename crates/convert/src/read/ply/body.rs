@@ -32,13 +32,12 @@ const LOOK: u64 = 1 << 14;
 
 /// Reads every element.
 pub(super) fn read<S: Source>(mut source: S, header: &Header, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
-    let named = |name: &[u8]| header.elements.iter().any(|e| e.name == name && e.count > 0);
     let Some(vertices) = header.elements.iter().find(|e| e.name == b"vertex") else {
         let hint = "only meshes and point clouds are read";
         return Err(ReadError::input(at_line(header.body_line - 1), "an element 'vertex'", "none", hint));
     };
-    let mesh = named(b"face") || named(b"tristrips");
-    let mut columns = Columns::new(vertices, reading.params.drop_invalid && !mesh)?;
+    let mesh = header.is_mesh();
+    let mut columns = Columns::new(vertices, mesh, reading.params.drop_invalid && !mesh)?;
     let mut faces = Faces::new(vertices.count);
     for element in &header.elements {
         check_count(&source, element)?;

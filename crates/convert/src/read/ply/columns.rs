@@ -7,8 +7,8 @@ use crate::read::{color::linear_from_srgb, input, origin};
 use splat_core::Mesh;
 use splat_core::glam::{DVec3, Vec3};
 
-/// Names of the kept properties by role: x y z, normal, colour, value. The first name of a role that is there wins.
-const ROLES: [&[&str]; 10] = [
+/// Names of the kept properties by role: x y z, normal, colour, value, opacity. The first name of a role that is there wins.
+const ROLES: [&[&str]; 11] = [
     &["x"],
     &["y"],
     &["z"],
@@ -19,11 +19,13 @@ const ROLES: [&[&str]; 10] = [
     &["green", "g", "diffuse_green"],
     &["blue", "b", "diffuse_blue"],
     &["value", "intensity", "scalar_Intensity", "scalar", "quality"],
+    &["opacity", "alpha"],
 ];
 const POSITION: usize = 0;
 const NORMAL: usize = 3;
 const COLOR: usize = 6;
 const VALUE: usize = 9;
+const OPACITY: usize = 10;
 
 /// The kept columns; a column that the file lacks stays empty.
 pub(super) struct Columns {
@@ -31,10 +33,10 @@ pub(super) struct Columns {
     kept: Vec<Option<(usize, Type)>>,
     /// The last property that is kept: with it a record is complete.
     last: usize,
-    /// Whether normals, colours and values are kept.
-    has: [bool; 3],
+    /// Whether normals, colours, values and opacities are kept.
+    has: [bool; 4],
     /// The kept numbers of the record, by role; 0 for the others.
-    record: [f64; 10],
+    record: [f64; 11],
     positions: Vec<DVec3>,
     points: RawPoints,
     drop_invalid: bool,
@@ -42,11 +44,13 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// Decides which properties of `vertex` to keep.
-    pub(super) fn new(vertex: &Element, drop_invalid: bool) -> Result<Self, ReadError> {
+    /// Decides which properties of `vertex` to keep, for the corners of a `mesh` or for points.
+    pub(super) fn new(vertex: &Element, mesh: bool, drop_invalid: bool) -> Result<Self, ReadError> {
         let mut kept = vec![None; vertex.properties.len()];
-        let mut found = [false; 10];
-        for (role, names) in ROLES.iter().enumerate() {
+        let mut found = [false; 11];
+        // A mesh has the opacity that its object states.
+        let roles = ROLES.iter().enumerate().filter(|(role, _)| !(mesh && *role == OPACITY));
+        for (role, names) in roles {
             let of = |name: &&str| vertex.properties.iter().position(|p| p.name == name.as_bytes());
             let Some(index) = names.iter().find_map(of) else { continue };
             match vertex.properties[index] {
@@ -73,8 +77,8 @@ impl Columns {
             *slot = slot.filter(|(role, _)| whole(*role));
         }
         let last = kept.iter().rposition(Option::is_some).unwrap_or(0);
-        let has = [NORMAL, COLOR, VALUE].map(|role| kept.iter().flatten().any(|(r, _)| *r == role));
-        let (record, positions, points) = ([0.0; 10], Vec::new(), RawPoints::default());
+        let has = [NORMAL, COLOR, VALUE, OPACITY].map(|role| kept.iter().flatten().any(|(r, _)| *r == role));
+        let (record, positions, points) = ([0.0; 11], Vec::new(), RawPoints::default());
         Ok(Self { kept, last, has, record, positions, points, drop_invalid, line: vertex.line })
     }
 
@@ -85,16 +89,17 @@ impl Columns {
 
     /// Bytes that a vertex takes while it is read and converted.
     pub(super) fn bytes_per_vertex(&self) -> u64 {
-        let more = self.has.iter().zip([12, 12, 4]).filter(|(has, _)| **has).map(|(_, bytes)| bytes);
+        let more = self.has.iter().zip([12, 12, 4, 4]).filter(|(has, _)| **has).map(|(_, bytes)| bytes);
         24 + 12 + more.sum::<u64>()
     }
 
     pub(super) fn reserve(&mut self, vertices: usize) -> Result<(), ReadError> {
-        let [normals, colors, values] = self.has.map(|has| if has { vertices } else { 0 });
+        let [normals, colors, values, opacities] = self.has.map(|has| if has { vertices } else { 0 });
         input::reserve(&mut self.positions, vertices)?;
         input::reserve(&mut self.points.normal, normals)?;
         input::reserve(&mut self.points.color, colors)?;
-        input::reserve(&mut self.points.value, values)
+        input::reserve(&mut self.points.value, values)?;
+        input::reserve(&mut self.points.opacity, opacities)
     }
 
     /// Takes the value of property `index`; `Err` is what was expected, and a hint.
@@ -102,17 +107,16 @@ impl Columns {
         let Some((role, kind)) = self.kept[index] else { return Ok(()) };
         let value = match role {
             COLOR..VALUE => {
-                let top = match kind {
-                    Type::F32 | Type::F64 => 1.0,
-                    Type::U16 => 65_535.0,
-                    _ => 255.0,
-                };
-                if !(0.0..=top).contains(&value) {
-                    return Err((format!("a colour from 0 to {top}"), "colours are 0 to 255, or 0.0 to 1.0 as float"));
-                }
+                let share = share(value, kind, "a colour", "colours are 0 to 255, or 0.0 to 1.0 as float")?;
                 // Stored floats are linear already; stored integers are sRGB.
-                if kind.integer_range().is_some() { f64::from(linear_from_srgb(value / top)) } else { value }
+                if kind.integer_range().is_some() { f64::from(linear_from_srgb(share)) } else { share }
             }
+            _ if role == OPACITY => share(
+                value,
+                kind,
+                "an opacity",
+                "opacities are 0 to 255, or 0.0 to 1.0 as float; or rename the column",
+            )?,
             _ if !value.is_finite() && !self.drop_invalid => {
                 return Err(("a finite number".to_owned(), "remove the record, or ask to drop invalid points"));
             }
@@ -130,7 +134,7 @@ impl Columns {
             return Ok(());
         }
         self.positions.push(of(POSITION));
-        let [has_normal, has_color, has_value] = self.has;
+        let [has_normal, has_color, has_value, has_opacity] = self.has;
         if has_normal {
             self.points.normal.push(unit(of(NORMAL)));
         }
@@ -143,6 +147,9 @@ impl Columns {
                 return Err(("a value that fits a 32-bit float".to_owned(), "scale the values"));
             }
             self.points.value.push(value);
+        }
+        if has_opacity {
+            self.points.opacity.push(self.record[OPACITY] as f32);
         }
         Ok(())
     }
@@ -167,6 +174,16 @@ impl Columns {
         })?;
         Ok(RawPoints { origin, position, ..points })
     }
+}
+
+/// A stored colour or opacity over what 1 is stored as.
+fn share(value: f64, kind: Type, what: &str, hint: &'static str) -> Result<f64, (String, &'static str)> {
+    let top = match kind {
+        Type::F32 | Type::F64 => 1.0,
+        Type::U16 => 65_535.0,
+        _ => 255.0,
+    };
+    if (0.0..=top).contains(&value) { Ok(value / top) } else { Err((format!("{what} from 0 to {top}"), hint)) }
 }
 
 /// `n` with length 1; zero stays zero. Scaled first, so that neither 1e-200 nor 1e200 is lost in the squares.

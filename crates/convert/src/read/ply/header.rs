@@ -107,6 +107,11 @@ pub(super) struct Header {
 const OF_SPLATS: [&[u8]; 4] = [b"f_dc_0", b"scale_0", b"rot_0", b"opacity"];
 
 impl Header {
+    /// Whether there are faces: else vertices are points.
+    pub(super) fn is_mesh(&self) -> bool {
+        self.elements.iter().any(|e| matches!(e.name.as_slice(), b"face" | b"tristrips") && e.count > 0)
+    }
+
     /// Refuses 3D Gaussian splats: without what makes them one, they would be drawn as white points.
     fn refuse_splats(&self) -> Result<(), ReadError> {
         let has = |e: &Element, name: &[u8]| e.properties.iter().any(|p| p.name == name);
