@@ -241,7 +241,7 @@ fn what_follows_a_sort_reads_how_many_splats_it_left() {
     let plain = Accumulator::new(ROOM.size, 1, 3, false, false);
     let uploads = follow::uploads(&follows, &input, &plain).unwrap();
     let given: Vec<usize> = follows.inputs(&uploads).iter().map(|(_, bytes)| bytes.len()).collect();
-    assert_eq!(given, [80, 0, 0, 0, 16 * (4 * footprints.layers().len() + 1), 0, 0]);
+    assert_eq!(given, [80, 0, 0, 0, 16 * (5 * footprints.layers().len() + 1), 0, 0]);
     let other = Accumulator::new([8, 8], 1, 3, false, false);
     assert!(matches!(follow::uploads(&follows, &input, &other), Err(Error::ColumnLength { .. })));
 }
