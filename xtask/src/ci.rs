@@ -5,6 +5,7 @@
 
 use crate::repo::{Outcome, Repo};
 use crate::toml_lines::lines;
+use crate::vulkan::TESTS;
 use crate::{papers, shaders, tidy, vulkan};
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -31,10 +32,6 @@ pub(crate) const DRIVER: &str = "gpu-conformance/driver";
 
 /// The feature of the end-to-end tests that take long.
 const DEEP: &str = "organza-tests/deep";
-
-/// The end-to-end tests that are compiled with [`DEEP`] alone.
-const DEEP_TESTS: &str =
-    "test --package organza-tests --features organza-tests/deep --test end-to-end -- every_scene:: gyroid";
 
 /// Jobs that need more than the pinned toolchain: named, so that nobody believes that they ran.
 const SKIPPED: [&str; 1] =
@@ -116,11 +113,13 @@ pub(crate) fn clippy() -> String {
 /// hashes of what they were compiled from; the orchestrator's crates each without what the others ask of their dependencies;
 /// recordings by every executor under every validation; every scene drawn, and forms that take long.
 pub(crate) fn deep(repo: &Repo) -> Outcome {
+    // Of the whole workspace, so that what other steps have compiled serves this one.
+    let slow = format!("{TESTS} --features {FEATURES},{DRIVER},{DEEP} --test end-to-end -- every_scene:: gyroid");
     let steps = [
         Step { name: "shaders", work: Work::Task(|repo| shaders::run(repo, true)) },
         Step { name: "alone", work: Work::Cargo(alone(repo, |folder| !is_picked(folder)), &[]) },
         Step { name: "vulkan", work: Work::Task(vulkan::run) },
-        Step { name: "scenes", work: Work::Cargo(vec![split(DEEP_TESTS)], &[]) },
+        Step { name: "scenes", work: Work::Cargo(vec![split(&slow)], &[]) },
     ];
     follow(&steps, repo)
 }

@@ -15,7 +15,7 @@ const ROOTS: [&str; 4] = ["/usr/share/vulkan", "/usr/local/share/vulkan", "/etc/
 const PACKAGES: [&str; 4] = ["libvulkan1", "mesa-vulkan-drivers", "vulkan-validationlayers", "spirv-tools"];
 
 /// Benchmarks have no tests, and peers that take minutes to compile.
-const TESTS: &str = "test --workspace --exclude organza-benches";
+pub(crate) const TESTS: &str = "test --workspace --exclude organza-benches";
 
 /// What the conformance tests run with.
 #[derive(Debug, PartialEq)]
