@@ -66,7 +66,7 @@ fn shadow_effect(i: usize, light: &LightStatistics, statistics: &Statistics, all
     let called_for = bound > allowance;
     let reason = if called_for {
         let from = if light.points > 1 { format!(", from {} points", light.points) } else { String::new() };
-        format!("{} splats or volumes cast and {} receive it{from}", statistics.casters, statistics.receivers)
+        format!("{} splats or whole objects cast and {} receive it{from}", statistics.casters, statistics.receivers)
     } else {
         format!("no ray could lose more than {bound:.1e} of its light")
     };

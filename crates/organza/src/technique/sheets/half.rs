@@ -135,7 +135,12 @@ pub(super) fn draw(
     cost: &mut CostRecord,
 ) -> Result<(), Error> {
     let polygons = polygons::polygons(frame);
-    let solid = polygons::opaque(frame, !polygons.is_empty(), cost)?;
+    // Opaque splats alone, where polygons are added to them.
+    let alone = (!polygons.is_empty()).then(|| frame.solid(cost)).transpose()?;
+    let solid = match &alone {
+        Some(alone) => alone,
+        None => frame.opaque(cost)?,
+    };
     let (means, splats) = (mean_shadows(frame, cost)?, OwnSplats::of(frame));
     let mut input = input(frame, &solid.depth, &means, cost)?;
     input.polygons = &polygons;
@@ -158,8 +163,8 @@ pub(super) fn draw(
         Ok::<_, Error>(polygons)
     })?;
     drop(input);
-    if !polygons.is_empty() {
-        frame.set_opaque(solid.joined(seen));
+    if let Some(alone) = alone {
+        frame.set_opaque(alone.joined(seen));
     }
     Ok(())
 }

@@ -4,9 +4,7 @@ use crate::form::Form;
 use crate::frame::Frame;
 use crate::load::own::Body;
 use crate::matter::Matter;
-use crate::{CostRecord, Error};
 use sheet_light::half::Polygons;
-use splat_core::raster::OpaqueImage;
 use splat_core::raster::triangles::PlacedMesh;
 
 /// Whether there are any.
@@ -30,9 +28,4 @@ pub(super) fn polygons<'a>(frame: &'a Frame<'_>) -> Vec<Polygons<'a>> {
         })
     };
     frame.loaded.own.iter().filter_map(one).collect()
-}
-
-/// Opaque splats as the eye sees them, which polygons are added to, if there are any.
-pub(super) fn opaque(frame: &Frame<'_>, has_polygons: bool, cost: &mut CostRecord) -> Result<OpaqueImage, Error> {
-    if has_polygons { frame.solid(cost) } else { frame.opaque(cost).cloned() }
 }
