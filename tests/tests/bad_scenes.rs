@@ -387,7 +387,7 @@ fn accept_or_refuse(file: &str, bytes: &[u8]) -> bool {
         Ok(_) => true,
         Err(error) => {
             assert_eq!(error.exit_code(), 3, "{error}");
-            assert!(matches!(error, Error::Scene { line: 1.., column: 1.., .. }), "{error:?}");
+            assert!(matches!(error, Error::Scene(scene::Error::Scene { line: 1.., column: 1.., .. })), "{error:?}");
             false
         }
     }

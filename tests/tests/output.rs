@@ -25,6 +25,7 @@ fn layers() -> Layers {
 fn metadata() -> Metadata {
     Metadata {
         scene_sha256: "ab".repeat(32),
+        scene: "version = 1\n".into(),
         technique: "points".into(),
         seed: u64::MAX,
         backend: "cpu".into(),
@@ -39,7 +40,12 @@ fn write(
     path: &Path,
     half: bool,
 ) -> std::result::Result<WriteReport, organza::Error> {
-    Ok(output::write(layers, metadata, &Target::new(path, true)?, half)?)
+    Ok(output::write(
+        layers,
+        metadata,
+        &Target::new(path, true)?,
+        &output::Params { half, ..output::Params::default() },
+    )?)
 }
 
 /// Writes to a place, whatever is there.

@@ -122,6 +122,7 @@ impl Job<'_> {
     fn metadata(&self, render: &Render) -> Metadata {
         Metadata {
             scene_sha256: self.scene.sha256.clone(),
+            scene: String::new(),
             technique: render.plan.technique.clone(),
             seed: self.scene.render.seed,
             backend: render.backend.clone(),
@@ -140,7 +141,12 @@ impl Job<'_> {
         let mut written = Vec::with_capacity(self.places.outputs.len());
         for target in &self.places.outputs {
             let path = target.path();
-            let report = output::write(&render.layers, &metadata, target, half)?;
+            let report = output::write(
+                &render.layers,
+                &metadata,
+                target,
+                &output::Params { half, ..output::Params::default() },
+            )?;
             if report.clamped > 0 {
                 warnings.push(format!(
                     "{}: {} values were cut to the format's largest",

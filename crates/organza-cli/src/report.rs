@@ -51,8 +51,9 @@ pub(super) fn plan_json(plan: &Plan) -> Value {
 }
 
 fn table_json(t: &ShadowTable) -> Value {
+    let p = &t.predicted;
     json!({
-        "columns": t.size[0], "rows": t.size[1], "cells": t.why(), "entries": t.entries, "bytes": t.bytes,
+        "columns": p.size[0], "rows": p.size[1], "cells": p.limit.to_string(), "entries": p.entries as u64, "bytes": p.bytes,
         "absorbance_cut": t.absorbance_cut(),
     })
 }

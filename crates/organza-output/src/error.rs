@@ -41,6 +41,16 @@ pub enum Error {
 }
 
 impl Error {
+    /// What to do about it; may be empty.
+    pub fn hint(&self) -> &str {
+        match self {
+            Self::Usage { hint, .. } | Self::Output { hint, .. } => hint,
+            Self::Io { source, .. } if source.kind() == std::io::ErrorKind::StorageFull => "free some space",
+            Self::Io { .. } => "",
+            Self::Internal(_) => "this is a bug in Organza, please report it",
+        }
+    }
+
     pub(crate) fn io(path: &Path, action: &'static str, source: std::io::Error) -> Self {
         Self::Io { path: path.to_owned(), action, source }
     }

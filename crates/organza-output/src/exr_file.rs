@@ -7,15 +7,15 @@
 //! | shadow | shadow.A | | object | object.id (u32) |
 //! | direct … | direct.R direct.G direct.B | | | |
 
-use super::{Metadata, WriteReport};
+use super::{Metadata, WriteReport, texts};
 use crate::Error;
 use exr::prelude::*;
 use splat_core::{LayerData, Layers};
 
 /// Largest finite f16.
 const LARGEST_HALF: f32 = 65504.0;
-/// Longest text attribute, bytes.
-const LONGEST_TEXT: usize = 255;
+/// Type of a text in the file layout of OpenEXR, which limits neither its length nor its bytes.
+const TEXT: &str = "string";
 
 /// The bytes of the EXR file.
 pub(super) fn encode(
@@ -30,8 +30,8 @@ pub(super) fn encode(
     }
     let fail = |e: exr::error::Error| Error::Internal(format!("EXR encoder: {e}"));
     let mut attributes = LayerAttributes::default();
-    for (name, value) in texts(metadata) {
-        attributes.other.insert(Text::from(name), AttributeValue::Text(Text::from(value.as_str())));
+    for (name, value) in texts::of(metadata) {
+        attributes.other.insert(Text::from(name), text(&value));
     }
     let size = Vec2(layers.size[0] as usize, layers.size[1] as usize);
     let layer = Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, AnyChannels::sort(channels));
@@ -42,21 +42,9 @@ pub(super) fn encode(
     Ok(bytes)
 }
 
-/// Metadata as attributes; the encoder takes Latin text of limited length alone.
-fn texts(metadata: &Metadata) -> Vec<(&'static str, String)> {
-    let ascii = |text: &str| -> String {
-        let visible = |c: char| if c.is_ascii_graphic() || c == ' ' { c } else { '?' };
-        text.chars().take(LONGEST_TEXT).map(visible).collect()
-    };
-    let mut texts = vec![
-        ("organza:version", ascii(env!("CARGO_PKG_VERSION"))),
-        ("organza:scene_sha256", ascii(&metadata.scene_sha256)),
-        ("organza:technique", ascii(&metadata.technique)),
-        ("organza:seed", metadata.seed.to_string()),
-        ("organza:backend", ascii(&metadata.backend)),
-    ];
-    texts.extend(metadata.sets.map(|sets| ("organza:sets", sets.to_string())));
-    texts
+/// A text as an attribute, in UTF-8: the encoder's own texts are Latin, and of 255 bytes at most.
+fn text(text: &str) -> AttributeValue {
+    AttributeValue::Custom { kind: Text::from(TEXT), bytes: text.as_bytes().into() }
 }
 
 type Channels = SmallVec<[AnyChannel<FlatSamples>; 4]>;
@@ -176,9 +164,16 @@ mod tests {
 
     #[test]
     fn the_same_layers_give_the_same_bytes_and_any_text_is_taken() {
-        let metadata = Metadata { technique: "ügly\n".repeat(100), backend: "雪".into(), ..Metadata::default() };
+        let metadata = Metadata { scene: "ügly\n".repeat(1000), backend: "雪".into(), ..Metadata::default() };
         let encoded = || encode(&tiny(), &metadata, false, &mut WriteReport::default()).unwrap();
         let first = encoded();
         assert!((0..8).all(|_| encoded() == first));
+        let has = |text: &str| first.windows(text.len()).any(|bytes| bytes == text.as_bytes());
+        assert!(has(&metadata.scene) && has(&metadata.backend));
+        let image =
+            read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
+        let image = image.from_buffered(std::io::Cursor::new(first)).unwrap();
+        let told = &image.layer_data.attributes.other[&Text::from("organza:seed")];
+        assert_eq!(*told, AttributeValue::Text(Text::from("0")));
     }
 }

@@ -4,7 +4,7 @@
 //! replaced. [`write()`] makes the file in memory and gives it its name last.
 //!
 //! ```
-//! use organza_output::{Metadata, Target, write};
+//! use organza_output::{Metadata, Params, Target, write};
 //! use splat_core::{LayerData, Layers};
 //!
 //! let mut layers = Layers { size: [2, 1], ..Layers::default() };
@@ -12,7 +12,7 @@
 //! layers.insert("alpha", LayerData::Scalar(vec![1.0; 2]));
 //! let folder = tempfile::tempdir().unwrap();
 //! let target = Target::new(&folder.path().join("two.exr"), false).unwrap();
-//! let report = write(&layers, &Metadata::default(), &target, false).unwrap();
+//! let report = write(&layers, &Metadata::default(), &target, &Params::default()).unwrap();
 //! assert_eq!(report.bytes, std::fs::metadata(target.path()).unwrap().len());
 //! // It is there now, and is not replaced unasked.
 //! assert!(Target::new(target.path(), false).is_err());
@@ -25,6 +25,7 @@ mod exr_file;
 mod png_file;
 mod target;
 mod targets;
+mod texts;
 
 pub use doubt::doubt;
 pub use error::Error;
@@ -40,6 +41,9 @@ use std::path::Path;
 pub struct Metadata {
     /// SHA-256 of the scene, lower-case hex.
     pub scene_sha256: String,
+    /// Text of the scene, so that the picture can be drawn anew from what it says; empty where that is not told, and left out of the file
+    /// above 64 KiB.
+    pub scene: String,
     /// Name of the technique that drew it.
     pub technique: String,
     /// Seed of everything random.
@@ -50,6 +54,18 @@ pub struct Metadata {
     pub sets: Option<u32>,
     /// Exposure of the displayed picture in stops; only PNG applies it.
     pub exposure: f64,
+}
+
+/// How files store a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Params {
+    /// Whether an EXR file has its colours, alpha and shadow in 16 bits.
+    pub half: bool,
+    /// Whether a PNG file has 16 bits a channel, not 8.
+    pub deep: bool,
+    /// Whether a PNG file has the opacity of its pixels (straight alpha) in the place of what lies behind everything: the layer
+    /// `background` is taken off.
+    pub transparent: bool,
 }
 
 /// What had to be changed so that the file is valid.
@@ -90,7 +106,7 @@ impl Format {
     }
 }
 
-/// Writes layers to a place in the format of its extension. `half` stores the colours of an EXR file in 16 bits.
+/// Writes layers to a place in the format of its extension.
 ///
 /// The file appears whole or not at all: it is made in memory, written under another name in the same folder, and
 /// gets its own name last. NaN is never written.
@@ -98,11 +114,11 @@ impl Format {
 /// # Errors
 /// [`Error::Usage`] for an unknown extension, [`Error::Io`] and [`Error::Output`] for the file system; a file that was
 /// there before is then unchanged.
-pub fn write(layers: &Layers, metadata: &Metadata, target: &Target, half: bool) -> Result<WriteReport, Error> {
+pub fn write(layers: &Layers, metadata: &Metadata, target: &Target, params: &Params) -> Result<WriteReport, Error> {
     let mut report = WriteReport::default();
     let bytes = match Format::of_path(target.path())? {
-        Format::Exr => exr_file::encode(layers, metadata, half, &mut report)?,
-        Format::Png => png_file::encode(layers, metadata, &mut report)?,
+        Format::Exr => exr_file::encode(layers, metadata, params.half, &mut report)?,
+        Format::Png => png_file::encode(layers, metadata, params, &mut report)?,
     };
     report.bytes = bytes.len() as u64;
     target.write(&bytes)?;

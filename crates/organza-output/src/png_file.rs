@@ -1,39 +1,100 @@
-//! The displayed picture as an 8-bit PNG: exposure, clamp, sRGB.
+//! The displayed picture as a PNG: exposure, clamp, sRGB, in 8 or 16 bits, with its background or without.
 
-use super::{Metadata, WriteReport};
+use super::{Metadata, Params, WriteReport, texts};
 use crate::Error;
-use image::codecs::png::PngEncoder;
-use image::{ExtendedColorType, ImageEncoder};
+use png::{BitDepth, ColorType, Encoder, EncodingError, SrgbRenderingIntent};
 use splat_core::Layers;
 
 /// The bytes of the PNG file.
-pub(super) fn encode(layers: &Layers, metadata: &Metadata, report: &mut WriteReport) -> Result<Vec<u8>, Error> {
-    let beauty = layers.rgb("beauty").ok_or_else(|| Error::Internal("a render has no beauty layer".into()))?;
+pub(super) fn encode(
+    layers: &Layers,
+    metadata: &Metadata,
+    params: &Params,
+    report: &mut WriteReport,
+) -> Result<Vec<u8>, Error> {
     let gain = libm::exp2(metadata.exposure) as f32;
-    let mut pixels = Vec::with_capacity(beauty.len() * 3);
-    for channel in beauty.iter().flatten() {
-        report.not_a_number += u64::from(channel.is_nan());
-        pixels.push(displayed(channel * gain));
-    }
+    let (samples, color) = match params.transparent {
+        true => (transparent(layers, gain, report)?, ColorType::Rgba),
+        false => (opaque(layers, gain, report)?, ColorType::Rgb),
+    };
+    let depth = if params.deep { BitDepth::Sixteen } else { BitDepth::Eight };
     let mut bytes = Vec::new();
-    let [width, height] = layers.size;
-    PngEncoder::new(&mut bytes)
-        .write_image(&pixels, width, height, ExtendedColorType::Rgb8)
+    written(&mut bytes, layers.size, (color, depth), &quantized(&samples, depth), metadata)
         .map_err(|e| Error::Internal(format!("PNG encoder: {e}")))?;
     Ok(bytes)
 }
 
-/// Linear radiance → sRGB (IEC 61966-2-1) in 8 bits; NaN gives 0.
-pub fn displayed(linear: f32) -> u8 {
+fn written(
+    bytes: &mut Vec<u8>,
+    [width, height]: [u32; 2],
+    (color, depth): (ColorType, BitDepth),
+    pixels: &[u8],
+    metadata: &Metadata,
+) -> Result<(), EncodingError> {
+    let mut encoder = Encoder::new(bytes, width, height);
+    encoder.set_color(color);
+    encoder.set_depth(depth);
+    encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
+    for (name, text) in texts::of(metadata) {
+        encoder.add_itxt_chunk(name.to_owned(), text)?;
+    }
+    encoder.write_header()?.write_image_data(pixels)
+}
+
+fn layer<'a>(layers: &'a Layers, name: &str) -> Result<&'a [[f32; 3]], Error> {
+    layers.rgb(name).ok_or_else(|| Error::Internal(format!("a render has no {name} layer")))
+}
+
+/// Displayed colours, 0 to 1.
+fn opaque(layers: &Layers, gain: f32, report: &mut WriteReport) -> Result<Vec<f32>, Error> {
+    let beauty = layer(layers, "beauty")?;
+    report.not_a_number += beauty.iter().flatten().filter(|v| v.is_nan()).count() as u64;
+    Ok(beauty.iter().flatten().map(|v| encoded(v * gain)).collect())
+}
+
+/// Displayed colours with the opacity of each pixel, not multiplied by it, of what lies before the background.
+fn transparent(layers: &Layers, gain: f32, report: &mut WriteReport) -> Result<Vec<f32>, Error> {
+    let (beauty, behind) = (layer(layers, "beauty")?, layer(layers, "background")?);
+    let alpha = layers.scalar("alpha").ok_or_else(|| Error::Internal("a render has no alpha layer".into()))?;
+    let mut samples = Vec::with_capacity(4 * beauty.len());
+    for ((beauty, behind), alpha) in beauty.iter().zip(behind).zip(alpha) {
+        report.not_a_number += beauty.iter().filter(|v| v.is_nan()).count() as u64;
+        let straight = gain / alpha.max(f32::MIN_POSITIVE);
+        let seen = alpha.is_finite() && *alpha > 0.0;
+        samples.extend([0, 1, 2].map(|c| if seen { encoded((beauty[c] - behind[c]) * straight) } else { 0.0 }));
+        samples.push(if seen { alpha.min(1.0) } else { 0.0 });
+    }
+    Ok(samples)
+}
+
+/// Samples from 0 to 1 as a PNG file has them, those of 16 bits with the high byte first.
+fn quantized(samples: &[f32], depth: BitDepth) -> Vec<u8> {
+    match depth {
+        BitDepth::Sixteen => samples.iter().flat_map(|v| ((v * 65535.0 + 0.5) as u16).to_be_bytes()).collect(),
+        _ => samples.iter().map(|v| byte(*v)).collect(),
+    }
+}
+
+fn byte(sample: f32) -> u8 {
+    (sample * 255.0 + 0.5) as u8
+}
+
+/// Linear radiance → sRGB (IEC 61966-2-1), 0 to 1; NaN gives 0.
+fn encoded(linear: f32) -> f32 {
     // Before the curve: its power is undefined below 0. NaN.max(0) is 0, where NaN.clamp would stay NaN.
     let x = linear.max(0.0).clamp(0.0, 1.0);
-    let encoded = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * libm::powf(x, 1.0 / 2.4) - 0.055 };
-    (encoded * 255.0 + 0.5) as u8
+    if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * libm::powf(x, 1.0 / 2.4) - 0.055 }
+}
+
+/// Linear radiance → sRGB (IEC 61966-2-1) in 8 bits; NaN gives 0.
+pub fn displayed(linear: f32) -> u8 {
+    byte(encoded(linear))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::displayed;
+    use super::*;
+    use splat_core::LayerData;
 
     #[test]
     fn ou4_hostile_values_are_displayable() {
@@ -43,5 +104,55 @@ mod tests {
         }
         // 18 % grey is 117.6 in sRGB.
         assert_eq!(displayed(0.18), 118);
+    }
+
+    /// Two pixels before a background of 0.5: one that hides a quarter of it and adds light, one of which nothing is seen.
+    fn layers() -> Layers {
+        let mut layers = Layers { size: [2, 1], ..Layers::default() };
+        layers.insert("beauty", LayerData::Rgb(vec![[0.375 + 0.25 * 0.18, 0.375, 0.375 + 0.25], [0.5; 3]]));
+        layers.insert("background", LayerData::Rgb(vec![[0.375; 3], [0.5; 3]]));
+        layers.insert("alpha", LayerData::Scalar(vec![0.25, 0.0]));
+        layers
+    }
+
+    fn read(bytes: &[u8]) -> (png::Info<'static>, Vec<u8>) {
+        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut pixels).unwrap();
+        (reader.info().clone(), pixels)
+    }
+
+    fn encode_with(params: &Params) -> (png::Info<'static>, Vec<u8>) {
+        let metadata = Metadata { technique: "points".into(), scene: "π = \"3\"\n".repeat(99), ..Metadata::default() };
+        read(&encode(&layers(), &metadata, params, &mut WriteReport::default()).unwrap())
+    }
+
+    #[test]
+    fn without_its_background_a_picture_has_straight_colours_and_opacity() {
+        let (info, pixels) = encode_with(&Params { transparent: true, ..Params::default() });
+        assert_eq!((info.color_type, info.bit_depth), (ColorType::Rgba, BitDepth::Eight));
+        assert_eq!(pixels, [118, 0, 255, 64, 0, 0, 0, 0]);
+    }
+
+    #[test]
+    fn sixteen_bits_tell_apart_what_eight_do_not() {
+        let (info, pixels) = encode_with(&Params { deep: true, ..Params::default() });
+        assert_eq!((info.color_type, info.bit_depth), (ColorType::Rgb, BitDepth::Sixteen));
+        let samples: Vec<u16> = pixels.chunks(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect();
+        // sRGB of a half is 0.735 357.
+        assert_eq!(samples[3..], [48192; 3]);
+        assert_eq!((u32::from(samples[1]) + 128) / 257, u32::from(displayed(0.375)));
+    }
+
+    #[test]
+    fn a_picture_tells_what_made_it() {
+        let (info, _) = encode_with(&Params::default());
+        let text = |name: &str| {
+            let chunk = info.utf8_text.iter().find(|chunk| chunk.keyword == name).unwrap();
+            chunk.get_text().unwrap()
+        };
+        assert_eq!((text("organza:technique"), text("organza:seed")), ("points".to_owned(), "0".to_owned()));
+        assert_eq!(text("organza:scene"), "π = \"3\"\n".repeat(99));
+        assert!(info.srgb.is_some());
     }
 }

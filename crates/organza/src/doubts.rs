@@ -162,7 +162,7 @@ pub(crate) fn of_scattering(plan: &Plan) -> Option<String> {
 
 /// Shadow maps that memory made coarser.
 pub(crate) fn of_shadows<'a>(tables: impl Iterator<Item = &'a ShadowTable>) -> Option<String> {
-    let coarse = tables.filter(|table| table.limit == tsm::Limit::Memory).count();
+    let coarse = tables.filter(|table| table.predicted.limit == tsm::Limit::Memory).count();
     (coarse > 0).then(|| {
         let maps = if coarse == 1 { "a shadow map is" } else { "shadow maps are" };
         format!("{maps} coarser than the splats ask for, to fit the memory: a larger --max-memory makes them finer")

@@ -10,8 +10,8 @@ use crate::scene::{Scene, Technique};
 use crate::technique::{Finished, Fold, Session};
 use crate::work::{self, Stages, Translucent, cost};
 use crate::{CostRecord, Error, Layers, Progress, RenderOptions, stage};
+use splat_core::SplatKind;
 use splat_core::raster::{self, Expected};
-use splat_core::{LayerData, SplatKind};
 use std::ops::Range;
 
 /// Runs the planned passes of a frame, and keeps the layers that its scene asks for.
@@ -38,31 +38,17 @@ pub(crate) fn draw_ranges(
         }
     }
     for technique in &frame.plan.techniques {
-        row(*technique).steps.last().into_iter().for_each(|step| join(cost, step.pass));
+        row(*technique).steps.last().into_iter().for_each(|step| cost.join(step.pass));
     }
     let glass = folds.iter_mut().find_map(|fold| fold.glass());
     let layers = frame.finish(&accumulator, glass.as_ref(), cost)?;
     let mut finished = Finished { layers, opaque: Some(frame.opaque(cost)?) };
     folds.iter_mut().for_each(|fold| fold.finish(&mut finished));
     let mut layers = finished.layers;
-    restore_depths(&mut layers, frame.loaded.exponent);
+    // Back into the scene's unit.
+    layers.scale_depths(libm::exp2(f64::from(frame.loaded.exponent)) as f32);
     frame.settings.layers.keep(&mut layers);
     Ok(layers)
-}
-
-/// Makes one entry of those that a pass has left, one a range.
-fn join(cost: &mut CostRecord, pass: &str) {
-    let (of_pass, others): (Vec<_>, Vec<_>) = cost.stages.drain(..).partition(|stage| stage.name == pass);
-    cost.stages = others;
-    cost.stages.extend(of_pass.into_iter().reduce(|mut sum, stage| {
-        sum.seconds += stage.seconds;
-        sum.items_in += stage.items_in;
-        sum.items_out += stage.items_out;
-        sum.fragments += stage.fragments;
-        sum.passes += stage.passes;
-        sum.bytes = sum.bytes.max(stage.bytes);
-        sum
-    }));
 }
 
 /// A scene that was loaded and planned.
@@ -130,21 +116,12 @@ fn expected(frame: &Frame<'_>, technique: Option<Technique>) -> Expected {
     })
 }
 
-/// Depths back into the scene's unit.
-fn restore_depths(layers: &mut Layers, exponent: i32) {
-    let scale = libm::exp2(f64::from(exponent)) as f32;
-    for (name, data) in &mut layers.images {
-        if let (true, LayerData::Scalar(depth)) = (name.starts_with("depth."), data) {
-            depth.iter_mut().for_each(|d| *d *= scale);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::prepare::{load, plan_loaded};
     use crate::scene::{LoadOptions, parse};
+    use splat_core::LayerData;
 
     /// Fog, a pane and a wall behind them, in every layer.
     const SCENE: &[u8] = br#"

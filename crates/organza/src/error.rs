@@ -16,20 +16,9 @@ pub enum Error {
         /// What to do; may be empty.
         hint: String,
     },
-    /// The scene file is wrong at one place. Exit code 3.
-    #[error("{}:{line}:{column}: {message}", printable(file))]
-    Scene {
-        /// The scene file.
-        file: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// Column in characters, from 1.
-        column: usize,
-        /// What was found and what was expected.
-        message: String,
-        /// What to do; may be empty.
-        hint: String,
-    },
+    /// A scene file gives no scene. Exit code 3, but for what lies in the command line (2), the file system (4) or its size (5).
+    #[error(transparent)]
+    Scene(#[from] organza_scene::Error),
     /// An input file, or data made from it, is wrong. Exit code 3.
     #[error("{what}: {message}")]
     Input {
@@ -50,16 +39,9 @@ pub enum Error {
         /// The system's answer.
         source: std::io::Error,
     },
-    /// An output may not be written where it was asked for. Exit code 4.
-    #[error("{}: {message}", printable(path))]
-    Output {
-        /// The file.
-        path: PathBuf,
-        /// Why not.
-        message: String,
-        /// What to do; may be empty.
-        hint: String,
-    },
+    /// An output was not written. Exit code 4, or 2 where its name says nothing of its format.
+    #[error(transparent)]
+    Output(#[from] organza_output::Error),
     /// The work would take more than it may. Exit code 5.
     #[error("{0}")]
     Limit(Exceeded),
@@ -162,11 +144,13 @@ impl Error {
 
     /// The exit code of the command.
     pub fn exit_code(&self) -> u8 {
+        use {organza_output::Error as Output, organza_scene::Error as Scene};
         match self {
-            Self::Internal(_) => 1,
-            Self::Usage { .. } => 2,
-            Self::Scene { .. } | Self::Input { .. } => 3,
-            Self::Io { .. } | Self::Output { .. } => 4,
+            Self::Internal(_) | Self::Scene(Scene::Internal(_)) | Self::Output(Output::Internal(_)) => 1,
+            Self::Usage { .. } | Self::Scene(Scene::Usage { .. }) | Self::Output(Output::Usage { .. }) => 2,
+            Self::Scene(Scene::Limit(_)) => 5,
+            Self::Io { .. } | Self::Output(_) | Self::Scene(Scene::Io { .. }) => 4,
+            Self::Scene(_) | Self::Input { .. } => 3,
             Self::Limit(_) | Self::TooLarge { .. } | Self::Unresolved { .. } => 5,
             Self::Gpu { .. } => 6,
             Self::Cancelled => 130,
@@ -176,15 +160,14 @@ impl Error {
     /// What to do about it; may be empty.
     pub fn hint(&self) -> &str {
         match self {
+            Self::Scene(error) => error.hint(),
+            Self::Output(error) => error.hint(),
             Self::Usage { hint, .. }
-            | Self::Scene { hint, .. }
             | Self::Input { hint, .. }
-            | Self::Output { hint, .. }
             | Self::TooLarge { hint, .. }
             | Self::Unresolved { hint, .. }
             | Self::Gpu { hint, .. } => hint,
             Self::Limit(exceeded) => &exceeded.hint,
-            Self::Io { source, .. } if source.kind() == std::io::ErrorKind::StorageFull => "free some space",
             Self::Io { .. } | Self::Cancelled => "",
             Self::Internal(_) => "this is a bug in Organza, please report it",
         }
@@ -207,39 +190,9 @@ impl From<convert::ConvertError> for Error {
     }
 }
 
-/// An error of an output, variant by variant.
-impl From<organza_output::Error> for Error {
-    fn from(error: organza_output::Error) -> Self {
-        use organza_output::Error as Output;
-        match error {
-            Output::Usage { message, hint } => Self::Usage { message, hint },
-            Output::Io { path, action, source } => Self::Io { path, action, source },
-            Output::Output { path, message, hint } => Self::Output { path, message, hint },
-            Output::Internal(message) => Self::Internal(message),
-            other => Self::Internal(other.to_string()),
-        }
-    }
-}
-
 impl From<organza_device::Error> for Error {
     fn from(error: organza_device::Error) -> Self {
         let hint = "`organza devices` lists what there is; --backend cpu needs none".into();
         Self::Gpu { message: error.to_string(), hint }
-    }
-}
-
-/// An error of a scene file, variant by variant: it is said and counted as one of the house.
-impl From<organza_scene::Error> for Error {
-    fn from(error: organza_scene::Error) -> Self {
-        use organza_scene::Error as Scene;
-        match error {
-            Scene::Usage { message, hint } => Self::Usage { message, hint },
-            Scene::Scene { file, line, column, message, hint } => Self::Scene { file, line, column, message, hint },
-            Scene::Io { path, action, source } => Self::Io { path, action, source },
-            Scene::Limit(exceeded) => Self::Limit(exceeded),
-            Scene::Internal(message) => Self::Internal(message),
-            // The enum is open; a kind that is not known here is a gap of ours.
-            other => Self::Internal(other.to_string()),
-        }
     }
 }

@@ -4,31 +4,20 @@ use crate::Error;
 use crate::lights::LightPoint;
 use crate::load::Loaded;
 use crate::scene::{RenderSettings, ShadowMapping};
-use splat_core::Object;
-use splat_core::{Light, Limits};
-use tsm::{Deposits, Limit, Params};
+use splat_core::{Light, Limits, Object};
+use tsm::{Deposits, Params};
 
 /// Share of the tolerance that the ends of lists may take, of all lights together. Absorbance grows with its logarithm only, so
 /// a small share costs little.
 pub(crate) const CUT_SHARE: f64 = 1.0 / 16.0;
 /// Largest slope of a displayed value by radiance, at black: sRGB's.
 const DISPLAY_SLOPE: f64 = 12.92;
-/// Standard deviation of a splat over its radius, at least.
-const LEAST_DEVIATION: f64 = 0.25;
 
 /// The table of one light's shadow map, as it was chosen before any work.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShadowTable {
-    /// Columns and rows.
-    pub size: [u64; 2],
-    /// What the size of its cells follows from.
-    pub limit: Limit,
-    /// Entries that splats will deposit.
-    pub entries: u64,
-    /// Bytes that it takes while it is built.
-    pub bytes: u64,
-    /// Bytes of the finished map among them.
-    pub map_bytes: u64,
+    /// Its size and work.
+    pub predicted: tsm::Prediction,
     /// Transmittance at which lists stop.
     pub tolerance: f32,
     /// Bytes within which its cells were chosen.
@@ -46,22 +35,11 @@ impl ShadowTable {
         -libm::log(f64::from(self.tolerance))
     }
 
-    /// What the size of the cells follows from, in words.
-    pub fn why(&self) -> &'static str {
-        match self.limit {
-            Limit::Asked => "as asked for",
-            Limit::Spacing => "of half a spacing",
-            Limit::Cells => "coarser by their number",
-            Limit::Entries => "coarser by the number of entries",
-            Limit::Memory => "coarser by memory",
-        }
-    }
-
     /// In words.
     pub(crate) fn describe(&self, light: &str) -> String {
-        let ([columns, rows], entries) = (self.size, self.entries);
-        let (why, cut) = (self.why(), self.absorbance_cut());
-        format!("{light}: {columns}x{rows} cells, {why}, {entries} entries up to an absorbance of {cut:.1}")
+        let tsm::Prediction { size: [columns, rows], limit, entries, .. } = self.predicted;
+        let (entries, cut) = (entries as u64, self.absorbance_cut());
+        format!("{light}: {columns}x{rows} cells, {limit}, {entries} entries up to an absorbance of {cut:.1}")
     }
 }
 
@@ -86,29 +64,12 @@ fn params(settings: &RenderSettings, loaded: &Loaded, tolerance: f32, max_bytes:
 /// displayed value by more than the lamp's part of the tolerance.
 fn tolerance(settings: &RenderSettings, loaded: &Loaded, light: &Light, maps: u64) -> f32 {
     let of_lights = || {
-        let gain = DISPLAY_SLOPE * libm::exp2(settings.exposure) * brightest(loaded, light).max(f64::MIN_POSITIVE);
+        let gain =
+            DISPLAY_SLOPE * libm::exp2(settings.exposure) * light.brightest_on(&loaded.cloud).max(f64::MIN_POSITIVE);
         CUT_SHARE * settings.tolerance / (gain * maps as f64)
     };
     let asked = settings.shadow.absorbance_cut.map(|cut| libm::exp(-cut));
     asked.unwrap_or_else(of_lights).clamp(f64::from(f32::MIN_POSITIVE), 0.5) as f32
-}
-
-/// The most light that any splat could receive unshadowed, W/m²: at the place of the splats' bounds nearest to the lamp, by their
-/// least radius.
-fn brightest(loaded: &Loaded, light: &Light) -> f64 {
-    let intensity = light.intensity.into_iter().map(f64::from).fold(0.0, f64::max);
-    let Some(position) = light.shape.place() else { return intensity };
-    let bounds = loaded.cloud.bounds();
-    if bounds.is_empty() {
-        return intensity;
-    }
-    // Relative to the cloud's origin, so that a moved scene has the same bits.
-    let position = position - loaded.cloud.origin;
-    let [low, high] = [bounds.min, bounds.max].map(|p| p.as_dvec3());
-    let least = loaded.cloud.radius.iter().copied().fold(f32::INFINITY, f32::min);
-    let spread = LEAST_DEVIATION * f64::from(least);
-    let square = position.distance_squared(position.clamp(low, high)) + spread * spread;
-    if square > 0.0 { intensity / square } else { f64::INFINITY }
 }
 
 /// Bytes of shadow maps, which live at once: all finished, and what building one takes beside it. With a half more, for casters that
@@ -116,8 +77,9 @@ fn brightest(loaded: &Loaded, light: &Light) -> f64 {
 pub(crate) fn bytes<'a>(tables: impl Iterator<Item = &'a ShadowTable>) -> u64 {
     let (mut finished, mut building) = (0u64, 0);
     for table in tables {
-        finished = finished.saturating_add(table.map_bytes);
-        building = building.max(table.bytes - table.map_bytes);
+        let tsm::Prediction { bytes, map_bytes, .. } = table.predicted;
+        finished = finished.saturating_add(map_bytes);
+        building = building.max(bytes - map_bytes);
     }
     let predicted = finished.saturating_add(building);
     predicted.saturating_add(predicted / 2)
@@ -158,17 +120,8 @@ fn tables_within(
         let tolerance = tolerance(settings, loaded, light, maps);
         let params = params(settings, loaded, tolerance, max_bytes);
         let scene = tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects };
-        let predicted = Deposits::predict(&scene, light, &params);
-        let predicted = predicted.map_err(|e| shadow_error(point, &e))?;
-        Ok(Some(ShadowTable {
-            size: predicted.size,
-            limit: predicted.limit,
-            entries: predicted.entries as u64,
-            bytes: predicted.bytes,
-            map_bytes: predicted.map_bytes,
-            tolerance,
-            max_bytes,
-        }))
+        let predicted = Deposits::predict(&scene, light, &params).map_err(|e| shadow_error(point, &e))?;
+        Ok(Some(ShadowTable { predicted, tolerance, max_bytes }))
     };
     wanted.iter().map(table).collect()
 }

@@ -39,4 +39,19 @@ impl CostRecord {
         self.stages.push(stage);
         Ok(out)
     }
+
+    /// Makes one entry of all that a stage has left, as if it had run once: times and counts add, buffers are the largest.
+    pub fn join(&mut self, name: &str) {
+        let (of_stage, others): (Vec<_>, Vec<_>) = self.stages.drain(..).partition(|stage| stage.name == name);
+        self.stages = others;
+        self.stages.extend(of_stage.into_iter().reduce(|mut sum, stage| {
+            sum.seconds += stage.seconds;
+            sum.items_in += stage.items_in;
+            sum.items_out += stage.items_out;
+            sum.fragments += stage.fragments;
+            sum.passes += stage.passes;
+            sum.bytes = sum.bytes.max(stage.bytes);
+            sum
+        }));
+    }
 }

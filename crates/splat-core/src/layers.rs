@@ -75,6 +75,15 @@ impl Layers {
     pub fn insert(&mut self, name: &'static str, data: LayerData) {
         self.images.insert(name, data);
     }
+
+    /// Multiplies all depths by `scale`.
+    pub fn scale_depths(&mut self, scale: f32) {
+        for (name, data) in &mut self.images {
+            if let (true, LayerData::Scalar(depth)) = (name.starts_with("depth."), data) {
+                depth.iter_mut().for_each(|d| *d *= scale);
+            }
+        }
+    }
 }
 
 /// What a technique folds into, per pixel: colours weighted by absorbed share, optical depth so far, depths.

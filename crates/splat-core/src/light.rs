@@ -3,6 +3,7 @@
 //! A sphere, a disk and a rectangle are lights of their own: each stays whole until somebody needs points of it and asks
 //! [`Light::points`]. What is flat shines to one side, with the cosine.
 
+mod brightest;
 mod points;
 
 use crate::Error;

@@ -4,6 +4,7 @@ use crate::appearance::Appearance;
 use crate::mapping::Octahedral;
 use crate::survey::Survey;
 use splat_core::SplatKind;
+use std::fmt;
 
 /// What the size of a table's cells follows from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,6 +19,19 @@ pub enum Limit {
     Entries,
     /// [`crate::Params::limits`].
     Memory,
+}
+
+/// In words, said of cells.
+impl fmt::Display for Limit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Asked => "as asked for",
+            Self::Spacing => "of half a spacing",
+            Self::Cells => "coarser by their number",
+            Self::Entries => "coarser by the number of entries",
+            Self::Memory => "coarser by memory",
+        })
+    }
 }
 
 /// Work and memory predicted from the casters' apparent sizes.

@@ -112,17 +112,10 @@ impl Folder {
 
     /// The displayed picture.
     pub(crate) fn png(&self, render: &organza::Render, exposure: f64) -> String {
-        let metadata = organza::output::Metadata {
-            scene_sha256: String::new(),
-            technique: String::new(),
-            seed: 0,
-            backend: String::new(),
-            sets: None,
-            exposure,
-        };
+        let metadata = organza::output::Metadata { exposure, ..Default::default() };
         let path = self.0.path().join("picture.png");
         let target = organza::output::Target::new(&path, false).unwrap();
-        organza::output::write(&render.layers, &metadata, &target, false).unwrap();
+        organza::output::write(&render.layers, &metadata, &target, &organza::output::Params::default()).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         std::fs::remove_file(&path).unwrap();
         format!("{bytes:?}")

@@ -7,9 +7,9 @@ use crate::pass;
 use crate::scene::{Scene, Technique};
 use crate::technique::{Fold, Session};
 use crate::{CostRecord, Error, stage};
-use reference::{Fragment, Input, Order, fold_fragments};
+use reference::{Fragment, Input, Order, PixelSum, fold_fragments};
 use splat_core::shade::ChannelLayout;
-use splat_core::{Accumulator, Cloud, DepthFragment, DepthProfile, SplatKind};
+use splat_core::{Accumulator, Cloud, DepthFragment, SplatKind};
 use std::ops::Range;
 
 /// Bytes of a sample: its list of splats, and what it sums up in f64.
@@ -72,9 +72,9 @@ impl Fold for Exact<'_> {
         cost.measure(pass::REFERENCE, |stage| {
             let (begun, last) = (&*into, &self.pixels);
             let pixel = |k: usize, fragments: &[Fragment]| {
-                let known = last.get(k).filter(|pixel| pixel.is_rounded_in(begun, k));
-                let mut pixel = known.cloned().unwrap_or_else(|| Pixel::of(begun, k));
-                pixel.fragments = 0;
+                let known = last.get(k).filter(|pixel| pixel.sum.is_rounded_in(begun, k));
+                let sum = known.map_or_else(|| PixelSum::of(begun, k), |pixel| pixel.sum.clone());
+                let mut pixel = Pixel { sum, fragments: 0 };
                 fragments.iter().filter(|f| range.contains(&f.depth)).for_each(|f| pixel.add(&input, f, narrowing));
                 pixel
             };
@@ -84,83 +84,42 @@ impl Fold for Exact<'_> {
             stage.items_out = pixels.len() as u64;
             stage.fragments = pixels.iter().map(|p| p.fragments).sum();
             stage.bytes = SAMPLE_BYTES * pixels.len() as u64;
-            pixels.iter().enumerate().for_each(|(k, pixel)| pixel.store(into, k));
+            pixels.iter().enumerate().for_each(|(k, pixel)| pixel.sum.store(into, k));
             self.pixels = pixels;
             Ok(())
         })
     }
 }
 
-/// What a pixel has so far, in f64.
+/// A pixel, and how many fragments the last range gave it.
 #[derive(Debug, Clone)]
 struct Pixel {
-    /// One, or three.
-    optical_depth: Vec<f64>,
-    channels: Vec<f64>,
-    depth: Option<DepthProfile>,
-    object: Option<u32>,
+    sum: PixelSum,
     fragments: u64,
 }
 
 impl Pixel {
-    fn of(accumulator: &Accumulator, k: usize) -> Self {
-        let at = |planes: &[Vec<f32>]| planes.iter().map(|plane| f64::from(plane[k])).collect();
-        Self {
-            optical_depth: at(&accumulator.optical_depth),
-            channels: at(&accumulator.channels),
-            depth: accumulator.depth.get(k).copied(),
-            object: accumulator.object.get(k).copied(),
-            fragments: 0,
-        }
-    }
-
     /// A fragment behind all so far.
     fn add(&mut self, input: &Input<'_>, fragment: &Fragment, narrowing: &[[f32; 2]]) {
-        let (i, count, planes) = (fragment.splat as usize, self.channels.len(), self.optical_depth.len());
-        let extinction = input.materials[input.cloud.material[i] as usize].extinction_rgb;
-        let own = |plane: usize| fragment.optical_depth * f64::from(extinction[plane]);
-        for (c, sum) in self.channels.iter_mut().enumerate() {
-            let plane = ChannelLayout::plane_of(c, count, planes);
-            let weight = libm::exp(-self.optical_depth[plane]) * -libm::expm1(-own(plane));
-            *sum += weight * f64::from(input.values[i * count + c]);
-        }
-        let before = self.optical_depth[planes / 2];
-        self.optical_depth.iter_mut().enumerate().for_each(|(plane, sum)| *sum += own(plane));
-        let after = self.optical_depth[planes / 2];
+        let (cloud, i, planes) = (input.cloud, fragment.splat as usize, self.sum.planes());
+        let extinction = input.materials[cloud.material[i] as usize].extinction_rgb;
+        let is_medium = cloud.kind[i] == SplatKind::Medium;
+        let id = cloud.footprint[i] as usize;
+        let thickness = || input.footprints.layers()[id].spacing_for_radius(cloud.radius[i]);
+        let narrow = || narrowing[id][0] + narrowing[id][1] * fragment.distance_sq as f32;
         self.fragments += 1;
-        if after <= before {
-            return;
-        }
-        let medium = input.cloud.kind[i] == SplatKind::Medium;
-        let footprint = &input.footprints.layers()[input.cloud.footprint[i] as usize];
-        let [constant, slope] = narrowing[input.cloud.footprint[i] as usize];
-        if let Some(depth) = &mut self.depth {
-            depth.add(&DepthFragment {
+        self.sum.add(
+            extinction.map(|e| fragment.optical_depth * f64::from(e)),
+            &input.values[i * input.channels..][..input.channels],
+            |channel| ChannelLayout::plane_of(channel, input.channels, planes),
+            cloud.object[i],
+            |[before, after]| DepthFragment {
                 depth: fragment.depth.max(0.0) as f32,
-                thickness: if medium { footprint.spacing_for_radius(input.cloud.radius[i]) } else { 0.0 },
-                narrow: if medium { constant + slope * fragment.distance_sq as f32 } else { 1.0 },
-                before: before as f32,
-                after: after as f32,
-            });
-        }
-        if let Some(object) = self.object.as_mut().filter(|o| **o == u32::MAX) {
-            *object = input.cloud.object[i];
-        }
-    }
-
-    /// Whether an accumulator has what was stored of it.
-    fn is_rounded_in(&self, accumulator: &Accumulator, k: usize) -> bool {
-        let same = |planes: &[Vec<f32>], own: &[f64]| planes.iter().zip(own).all(|(plane, v)| plane[k] == *v as f32);
-        same(&accumulator.optical_depth, &self.optical_depth) && same(&accumulator.channels, &self.channels)
-    }
-
-    fn store(&self, accumulator: &mut Accumulator, k: usize) {
-        let store = |planes: &mut [Vec<f32>], own: &[f64]| {
-            planes.iter_mut().zip(own).for_each(|(plane, v)| plane[k] = *v as f32);
-        };
-        store(&mut accumulator.optical_depth, &self.optical_depth);
-        store(&mut accumulator.channels, &self.channels);
-        accumulator.depth.get_mut(k).into_iter().zip(self.depth).for_each(|(to, from)| *to = from);
-        accumulator.object.get_mut(k).into_iter().zip(self.object).for_each(|(to, from)| *to = from);
+                thickness: if is_medium { thickness() } else { 0.0 },
+                narrow: if is_medium { narrow() } else { 1.0 },
+                before,
+                after,
+            },
+        );
     }
 }
