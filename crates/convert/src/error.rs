@@ -44,6 +44,17 @@ pub enum Place {
     Byte(u64),
 }
 
+impl Place {
+    /// The same without a column.
+    #[cfg(any(feature = "off", feature = "obj"))]
+    pub(crate) fn whole_line(self) -> Self {
+        match self {
+            Self::Line { line, .. } => Self::Line { line, column: 0 },
+            other => other,
+        }
+    }
+}
+
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -38,7 +38,7 @@ mod mpu;
 mod neighbours;
 #[cfg(feature = "surfels")]
 mod orient;
-#[cfg(any(feature = "ply", feature = "stl", feature = "obj"))]
+#[cfg(any(feature = "ply", feature = "stl", feature = "obj", feature = "off", feature = "gltf"))]
 mod outwards;
 mod params;
 mod pieces;

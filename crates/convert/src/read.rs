@@ -1,13 +1,37 @@
-//! Reading files: meshes (PLY, STL, OBJ), point clouds (PLY, OBJ, XYZ, CSV, LAS, LAZ), volumes (NIfTI, NRRD) and images of radiance
-//! (Radiance HDR, OpenEXR), each also inside gzip.
+//! Reading files: meshes (PLY, STL, OBJ, OFF, glTF), point clouds (PLY, OBJ, OFF, PCD, glTF, XYZ, CSV, LAS, LAZ), volumes (NIfTI,
+//! NRRD) and images of radiance (Radiance HDR, OpenEXR), each also inside gzip.
 //!
 //! No input makes a reader panic or take memory that the file does not stand for: sizes that a header announces are
 //! checked against the length of the file before anything is allocated.
 
-#[cfg(any(feature = "ply", feature = "las", feature = "xyz"))]
+#[cfg(any(feature = "obj", feature = "gltf"))]
+mod beside;
+#[cfg(any(
+    feature = "ply",
+    feature = "obj",
+    feature = "off",
+    feature = "pcd",
+    feature = "gltf",
+    feature = "las",
+    feature = "xyz"
+))]
 mod color;
-#[cfg(any(feature = "ply", feature = "stl", feature = "obj", feature = "xyz", feature = "nrrd"))]
+#[cfg(any(
+    feature = "ply",
+    feature = "stl",
+    feature = "obj",
+    feature = "off",
+    feature = "pcd",
+    feature = "xyz",
+    feature = "nrrd"
+))]
 mod decimal;
+#[cfg(any(feature = "ply", feature = "obj", feature = "off", feature = "pcd", feature = "gltf", feature = "xyz"))]
+mod direction;
+#[cfg(any(feature = "obj", feature = "off"))]
+mod fans;
+#[cfg(feature = "gltf")]
+mod gltf;
 #[cfg_attr(not(feature = "ply"), allow(dead_code, reason = "each format uses a part of it"))]
 mod input;
 #[cfg(feature = "las")]
@@ -16,19 +40,35 @@ mod las;
 mod lattice;
 #[cfg(feature = "las")]
 mod laz;
+#[cfg(feature = "obj")]
+mod mtl;
 #[cfg(feature = "nifti")]
 mod nifti;
 #[cfg(feature = "nrrd")]
 mod nrrd;
 #[cfg(feature = "obj")]
 mod obj;
+#[cfg(feature = "off")]
+mod off;
 #[cfg(feature = "exr")]
 mod openexr;
-#[cfg(any(feature = "ply", feature = "stl", feature = "obj", feature = "xyz"))]
+#[cfg(any(
+    feature = "ply",
+    feature = "stl",
+    feature = "obj",
+    feature = "off",
+    feature = "pcd",
+    feature = "gltf",
+    feature = "xyz"
+))]
 mod origin;
+#[cfg(any(feature = "obj", feature = "gltf"))]
+mod paint;
+#[cfg(feature = "pcd")]
+mod pcd;
 #[cfg(feature = "ply")]
 mod ply;
-#[cfg(any(feature = "ply", feature = "obj"))]
+#[cfg(any(feature = "ply", feature = "obj", feature = "off"))]
 mod polygon;
 #[cfg(feature = "hdr")]
 mod radiance;
@@ -37,8 +77,11 @@ mod reading;
 mod statements;
 #[cfg(feature = "stl")]
 mod stl;
-#[cfg(any(feature = "stl", feature = "obj", feature = "xyz", feature = "nrrd"))]
+#[cfg(any(feature = "stl", feature = "obj", feature = "off", feature = "pcd", feature = "xyz", feature = "nrrd"))]
 mod text;
+#[cfg(any(feature = "obj", feature = "gltf"))]
+mod texture;
+mod unread;
 mod up;
 #[cfg(any(feature = "nrrd", feature = "nifti"))]
 mod voxels;
@@ -128,7 +171,7 @@ fn whole(
     reading: &mut Reading<'_>,
 ) -> Result<Loaded, ReadError> {
     let loaded = parse(path, stream, place, reading)?;
-    #[cfg(any(feature = "ply", feature = "stl", feature = "obj"))]
+    #[cfg(any(feature = "ply", feature = "stl", feature = "obj", feature = "off", feature = "gltf"))]
     if let Loaded::Mesh(mut mesh) = loaded {
         for _ in 0..crate::outwards::turn_outwards(&mut mesh) {
             reading.mend((Fix::InsideOut, Place::File, None), || {
@@ -144,10 +187,10 @@ fn whole(
 /// Bytes that tell the format.
 const MARK: usize = 512;
 
-/// `place` is where the file lies, for headers that name another one.
+/// `place` is where the file lies, for those that name another one.
 #[cfg_attr(
     not(feature = "nrrd"),
-    allow(unused_variables, unused_mut, reason = "no other format has detached headers, some have nothing to note")
+    allow(unused_variables, unused_mut, reason = "few formats name other files, some have nothing to note")
 )]
 fn parse(
     path: &Path,
@@ -162,6 +205,9 @@ fn parse(
     }
     let head = stream.peek(MARK)?;
     let format = format_of(path, head);
+    if let Some(error) = unread::by_mark(path, head) {
+        return Err(error);
+    }
     if head.is_empty() && matches!(format, Some(Format::Obj | Format::Xyz)) {
         let hint = "the file is truncated, or was never written";
         return Err(ReadError::input(Place::Byte(0), "vertices or points", "an empty file", hint));
@@ -180,8 +226,14 @@ fn parse(
         Some(Format::Obj) => {
             let content = stream.rest()?;
             reading.notes.not_used(statements::unused(&content));
-            obj::read(&content, reading)
+            obj::read(&content, place, reading)
         }
+        #[cfg(feature = "off")]
+        Some(Format::Off) => off::read(&stream.rest()?, reading),
+        #[cfg(feature = "gltf")]
+        Some(Format::Gltf) => gltf::read(&stream.rest()?, place, reading),
+        #[cfg(feature = "pcd")]
+        Some(Format::Pcd) => pcd::read(&stream.rest()?, reading).map(Loaded::Points),
         #[cfg(feature = "xyz")]
         Some(Format::Xyz) => xyz::read(&stream.rest()?, params, &mut reading.notes).map(Loaded::Points),
         #[cfg(feature = "nrrd")]
@@ -201,21 +253,16 @@ fn parse(
             format!("{format:?}"),
             "build with the feature of that name",
         )),
-        None => Err(ReadError::input(
-            Place::Byte(0),
-            "'ply', 'LASF', 'NRRD', '#?', a NIfTI-1 or OpenEXR header, or the extension of a format without a mark",
-            format!("'{}'", escaped(&head[..head.len().min(16)], 16)),
-            "PLY, STL, OBJ, XYZ, CSV, LAS, LAZ, NIfTI, NRRD, Radiance HDR and OpenEXR files are read, each also inside gzip",
-        )),
+        None => Err(unread::refused(path, head)),
     }
 }
 
 /// Longest side of an image, pixels.
-#[cfg(any(feature = "hdr", feature = "exr"))]
+#[cfg(any(feature = "hdr", feature = "exr", feature = "obj", feature = "gltf"))]
 const LONGEST_SIDE: u32 = 65536;
 
 /// Bytes of an image of a size that may be read.
-#[cfg(any(feature = "hdr", feature = "exr"))]
+#[cfg(any(feature = "hdr", feature = "exr", feature = "obj", feature = "gltf"))]
 fn check_image(size: [u32; 2], params: &ReadParams) -> Result<u64, ReadError> {
     if !size.iter().all(|side| (1..=LONGEST_SIDE).contains(side)) {
         let expected = format!("an image of 1 to {LONGEST_SIDE} pixels a side");
@@ -232,6 +279,9 @@ enum Format {
     Ply,
     Stl,
     Obj,
+    Off,
+    Gltf,
+    Pcd,
     Xyz,
     Nrrd,
     Las,
@@ -257,6 +307,12 @@ fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
     if content.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
         return Some(Format::Exr);
     }
+    if content.starts_with(b"glTF") {
+        return Some(Format::Gltf);
+    }
+    if content.starts_with(b"# .PCD") {
+        return Some(Format::Pcd);
+    }
     if content.get(344..347).is_some_and(|magic| magic == b"n+1" || magic == b"ni1") {
         return Some(Format::Nifti);
     }
@@ -280,6 +336,9 @@ fn by_name(path: &Path) -> Option<Format> {
         "ply" => Some(Format::Ply),
         "stl" => Some(Format::Stl),
         "obj" => Some(Format::Obj),
+        "off" => Some(Format::Off),
+        "gltf" | "glb" => Some(Format::Gltf),
+        "pcd" => Some(Format::Pcd),
         "xyz" | "csv" | "txt" | "pts" | "asc" => Some(Format::Xyz),
         "nrrd" | "nhdr" => Some(Format::Nrrd),
         "las" | "laz" => Some(Format::Las),

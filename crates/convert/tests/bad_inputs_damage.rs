@@ -6,6 +6,9 @@
     feature = "ply",
     feature = "stl",
     feature = "obj",
+    feature = "off",
+    feature = "pcd",
+    feature = "gltf",
     feature = "xyz",
     feature = "nrrd",
     feature = "nifti",
@@ -20,8 +23,10 @@ mod read_samples;
 
 use convert::read::Loaded;
 use exr::prelude::{Blocks, Compression, Vec2};
+use image::ImageFormat;
 use read_samples::oldest::laz_oldest;
 use read_samples::{NIFTI_F32, gzip, images, las, load, nifti, nrrd, obj, ply_ascii, ply_binary, stl, text_points};
+use read_samples::{image, off, pcd, plain_glb, square_glb, square_gltf};
 use std::process::Command;
 
 const LIMITED: &str = "CONVERT_TEST_LIMITED";
@@ -78,6 +83,11 @@ fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("f7.laz", las(7, 20, true)),
         ("old.laz", laz_oldest(1, 20)),
         ("b.stl", stl(true)),
+        ("a.off", off()),
+        ("text.pcd", pcd("ascii")),
+        ("bytes.pcd", pcd("binary")),
+        ("packed.pcd", pcd("binary_compressed")),
+        ("plain.glb", plain_glb()),
         ("raw.nrrd", nrrd("raw")),
         ("gz.nrrd", nrrd("gzip")),
         ("packed.nrrd.gz", gzip(&nrrd("gzip"))),
@@ -87,6 +97,12 @@ fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("tiles.exr", images::exr(Compression::PIZ, Blocks::Tiles(Vec2(8, 4)))),
         ("plain.exr", images::exr(Compression::Uncompressed, Blocks::ScanLines)),
     ]
+}
+
+/// Files that hold an image, and its bytes.
+fn textured() -> Vec<(&'static str, Vec<u8>, Vec<u8>)> {
+    let [png, jpeg] = [ImageFormat::Png, ImageFormat::Jpeg];
+    vec![("png.glb", square_glb(png), image(4, png)), ("jpeg.glb", square_glb(jpeg), image(4, jpeg))]
 }
 
 /// Files of which a part may be a file too.
@@ -105,7 +121,8 @@ fn ba05_every_truncation_is_refused() {
     if !limited("ba05_every_truncation_is_refused") {
         return;
     }
-    for (name, content) in samples() {
+    let textured = textured().into_iter().map(|(name, content, _)| (name, content));
+    for (name, content) in samples().into_iter().chain(textured).chain([("text.gltf", square_gltf())]) {
         let whole = load(name, &content).unwrap();
         for length in 0..content.len() {
             match load(name, &content[..length]) {
@@ -144,6 +161,24 @@ fn every_flipped_bit_gives_an_error_or_a_valid_object() {
         accepted.push(format!("{name}: {ok} of {} accepted", content.len() * 8));
     }
     println!("{}", accepted.join("\n"));
+}
+
+#[test]
+fn every_flipped_bit_of_a_texture_gives_an_error_or_a_valid_object() {
+    if !limited("every_flipped_bit_of_a_texture_gives_an_error_or_a_valid_object") {
+        return;
+    }
+    for (name, content, image) in textured() {
+        let start = content.windows(image.len()).position(|w| w == image).unwrap();
+        let mut damaged = content.clone();
+        for bit in start * 8..(start + image.len()) * 8 {
+            damaged[bit / 8] ^= 1 << (bit % 8);
+            if let Ok(loaded) = load(name, &damaged) {
+                valid(&loaded);
+            }
+            damaged[bit / 8] = content[bit / 8];
+        }
+    }
 }
 
 /// Damage beyond one bit: a byte of every place set to each of some values, in the formats with the most trust in them.

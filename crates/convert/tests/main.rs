@@ -15,17 +15,26 @@ mod marching_cubes;
 mod mpu_fields;
 mod point_opacity;
 mod read_assets;
+#[cfg(all(feature = "off", feature = "pcd", feature = "gltf"))]
+mod read_gltf;
 #[cfg(all(feature = "hdr", feature = "exr"))]
 mod read_images;
 mod read_las;
+#[cfg(feature = "obj")]
+mod read_materials;
 mod read_mended;
 mod read_more;
 mod read_nifti;
 mod read_notes;
 mod read_numbers;
+#[cfg(all(feature = "off", feature = "pcd", feature = "gltf"))]
+mod read_off;
+#[cfg(all(feature = "off", feature = "pcd", feature = "gltf"))]
+mod read_pcd;
 mod read_ply;
 mod read_polygons;
 #[cfg(feature = "read")]
 mod read_samples;
 mod read_spaces;
+mod read_unread;
 mod readme;

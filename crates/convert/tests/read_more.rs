@@ -204,20 +204,6 @@ fn ba11_obj_indices_are_checked() {
 }
 
 #[test]
-fn ba12_material_files_of_an_obj_are_never_opened() {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("ba12");
-    std::fs::create_dir_all(&folder).unwrap();
-    let pipe = folder.join("pipe.mtl");
-    let _ = std::fs::remove_file(&pipe);
-    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-    for library in ["../../etc/passwd", "/etc/passwd", "https://example.org/a.mtl", "pipe.mtl", "missing.mtl"] {
-        std::fs::write(folder.join("a.obj"), OBJ.replace("../../etc/passwd", library)).unwrap();
-        // Opening the pipe would wait for ever.
-        assert!(file(&folder.join("a.obj"), &ReadParams::default(), None).is_ok());
-    }
-}
-
-#[test]
 fn points_as_text_with_and_without_names() {
     let p = points("a.xyz", "# made by hand\n1 2 3\n4\t5  6\n");
     assert_eq!(p.position, [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)]);

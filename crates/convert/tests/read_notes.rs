@@ -17,7 +17,7 @@ fn every_column_that_is_not_used_is_named() {
     let names = "x,y,z,nx,\"return number\",t\n".replace(' ', "_");
     assert_eq!(unused("a.csv", &text_points(",", &names)), ["nx", "return_number", "t"]);
     assert!(unused("a.xyz", &text_points(" ", "")).is_empty());
-    assert_eq!(unused("a.obj", &obj()), ["vt", "usemtl", "mtllib"]);
+    assert_eq!(unused("a.obj", &obj()), ["usemtl", "vt"]);
     let always = ["return_number", "number_of_returns", "flags", "scan_angle", "user_data", "point_source_id"];
     for compressed in [false, true] {
         assert_eq!(unused("a.las", &las(0, 3, compressed)), always);

@@ -1,11 +1,15 @@
 //! Wavefront OBJ → a mesh where there are faces, else raw points.
 //!
-//! Read are `v` (with linear colours after the coordinates, if all have them), `vn` and `f`; texture coordinates, groups,
-//! lines and materials are read over: no material file is ever opened, wherever `mtllib` points to. The parser is our
-//! own: lines, columns and checked indices are asked of it.
+//! Read are `v` (with linear colours after the coordinates, if all have them), `vn`, `vt`, `f`, and of materials the diffuse
+//! colour and its texture (see `mtl.rs`), unless vertices have colours of their own. Vertices are split where materials
+//! meet. Groups, lines and curves are read over. The parser is our own: lines, columns and checked indices are asked of it.
+
+mod painted;
 
 use super::ReadParams;
-use super::polygon::{self, Polygon};
+use super::direction::unit;
+use super::fans::Fans;
+use super::mtl::Materials;
 use super::reading::{Fix, Reading};
 use super::text::{Line, Lines, Word};
 use super::{Loaded, input, origin};
@@ -14,22 +18,19 @@ use crate::raw_points::RawPoints;
 use splat_core::Mesh;
 use splat_core::glam::{DVec3, Vec3};
 use std::collections::HashMap;
+use std::path::Path;
 
-/// Bytes that a vertex, a corner and a triangle take while they are read and converted.
+/// Bytes that a vertex and a corner take while they are read and converted.
 const BYTES_PER_VERTEX: u64 = 24 + 12 + 12 + 12;
-const BYTES_PER_CORNER: u64 = 32;
-const BYTES_PER_TRIANGLE: u64 = 12;
+const BYTES_PER_CORNER: u64 = 56;
 
 /// Statements without a meaning here.
-pub(super) const READ_OVER: [&[u8]; 22] = [
-    b"vt",
+pub(super) const READ_OVER: [&[u8]; 19] = [
     b"vp",
     b"g",
     b"o",
     b"s",
     b"mg",
-    b"usemtl",
-    b"mtllib",
     b"l",
     b"p",
     b"usemap",
@@ -46,21 +47,24 @@ pub(super) const READ_OVER: [&[u8]; 22] = [
     b"csh",
 ];
 
-#[derive(Default)]
-struct Content {
+/// A vertex of the mesh: position, normal, place in its texture, paint; `NONE` where a corner has none.
+type Corner = [u32; 4];
+
+struct Content<'a> {
     positions: Vec<DVec3>,
     colors: Vec<[f32; 3]>,
     normals: Vec<Vec3>,
-    /// Position and normal of each vertex of the mesh; the normal is `NONE` where the corner has none.
-    corners: Vec<[u32; 2]>,
-    of_corner: HashMap<[u32; 2], u32>,
-    triangles: Vec<[u32; 3]>,
-    polygons: Vec<Polygon>,
-    /// Lines of the polygons.
-    lines: Vec<u64>,
+    /// NaN where they are no numbers, which matters only where they are used.
+    places: Vec<[f32; 2]>,
+    corners: Vec<Corner>,
+    of_corner: HashMap<Corner, u32>,
+    fans: Fans,
     faces: u64,
+    /// The corners of the current face.
+    face: Vec<u32>,
     /// The first corner that names a normal before there is any.
     without_normal: Option<ReadError>,
+    materials: Materials<'a>,
 }
 
 const NONE: u32 = u32::MAX;
@@ -68,10 +72,22 @@ const NONE: u32 = u32::MAX;
 /// Lines between two looks at whether to stop.
 const LOOK: u64 = 1 << 14;
 
-/// Reads an OBJ file.
-pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+/// Reads an OBJ file, which lies at `place` if it is no part of memory.
+pub(super) fn read(content: &[u8], place: Option<&Path>, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
     let mut lines = Lines::new(content);
-    let mut found = Content::default();
+    let mut found = Content {
+        positions: Vec::new(),
+        colors: Vec::new(),
+        normals: Vec::new(),
+        places: Vec::new(),
+        corners: Vec::new(),
+        of_corner: HashMap::new(),
+        fans: Fans::default(),
+        faces: 0,
+        face: Vec::new(),
+        without_normal: None,
+        materials: Materials::new(place),
+    };
     let mut continued = false;
     while let Some(line) = lines.next()? {
         // A backslash joins lines; only statements that are read over are written so.
@@ -86,7 +102,7 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Loaded, 
     found.finish(reading)
 }
 
-impl Content {
+impl Content<'_> {
     fn statement(&mut self, line: Line<'_>, continued: bool, reading: &mut Reading<'_>) -> Result<(), ReadError> {
         let mut words = line.words(false).take_while(|w| !w.text.starts_with(b"#"));
         let Some(keyword) = words.next() else { return Ok(()) };
@@ -97,7 +113,10 @@ impl Content {
             }
             b"v" => self.vertex(keyword, words, reading.params),
             b"vn" => self.normal(keyword, words, reading.params),
+            b"vt" => self.texture_place(words, reading.params),
             b"f" => self.face(keyword, words, reading),
+            b"mtllib" => self.materials.library(line, reading),
+            b"usemtl" => self.materials.choose(line, reading),
             other if READ_OVER.contains(&other) => Ok(()),
             _ => {
                 let hint = "is this a Wavefront OBJ file?";
@@ -152,54 +171,49 @@ impl Content {
         let n = DVec3::new(x.number()?, y.number()?, z.number()?);
         input::check_bytes("the normals", (self.normals.len() as u64 + 1) * 12, params)?;
         input::reserve(&mut self.normals, 1)?;
-        let largest = n.abs().max_element();
-        // Scaled first, so that neither 1e-200 nor 1e200 is lost in the squares.
-        self.normals.push(if largest > 0.0 { (n / largest).normalize().as_vec3() } else { Vec3::ZERO });
+        self.normals.push(unit(n));
+        Ok(())
+    }
+
+    fn texture_place<'a>(
+        &mut self,
+        mut words: impl Iterator<Item = Word<'a>>,
+        params: &ReadParams,
+    ) -> Result<(), ReadError> {
+        let mut number = |missing| words.next().map_or(Some(missing), Word::decimal).unwrap_or(f64::NAN) as f32;
+        let (u, v) = (number(f64::NAN), number(0.0));
+        input::check_bytes("the texture coordinates", (self.places.len() as u64 + 1) * 8, params)?;
+        input::reserve(&mut self.places, 1)?;
+        // Rows of an image are counted from the top.
+        self.places.push([u, 1.0 - v]);
         Ok(())
     }
 
     fn face<'a>(
         &mut self,
         keyword: Word<'a>,
-        words: impl Iterator<Item = Word<'a>>,
+        words: impl Iterator<Item = Word<'a>> + Clone,
         reading: &mut Reading<'_>,
     ) -> Result<(), ReadError> {
-        let mut fan = [0; 2];
-        let mut corners = 0;
-        let first = self.triangles.len();
+        let has_place = |w: Word<'_>| w.text.split(|b| *b == b'/').nth(1).is_some_and(|part| !part.is_empty());
+        let is_textured = self.materials.has_texture() && words.clone().all(has_place);
+        self.face.clear();
         for word in words {
-            let corner = self.corner(word, reading)?;
-            if corners < 2 {
-                fan[corners] = corner;
-            } else {
-                let bytes = (self.triangles.len() as u64 + 1) * BYTES_PER_TRIANGLE;
-                input::check_bytes("the triangles", bytes, reading.params)?;
-                input::reserve(&mut self.triangles, 1)?;
-                self.triangles.push([fan[0], fan[1], corner]);
-                fan[1] = corner;
-            }
-            corners += 1;
+            let corner = self.corner(word, is_textured, reading)?;
+            self.face.push(corner);
         }
         self.faces += 1;
-        if corners < 3 {
-            return reading.mend((Fix::TooFewCorners, keyword.place(), Some(self.faces)), || {
-                let expected = format!("3 or more corners of face {}", self.faces);
-                ReadError::input(keyword.place(), expected, corners.to_string(), "remove degenerate faces")
-            });
-        }
-        if corners > 3 {
-            let Place::Line { line, .. } = keyword.place() else { return Ok(()) };
-            self.polygons.push(Polygon { face: self.faces, first, count: corners - 2 });
-            self.lines.push(line);
-        }
-        Ok(())
+        self.fans.add(self.faces, &self.face, keyword.place(), reading)
     }
 
     /// The vertex of the mesh for `v`, `v/vt`, `v//vn` or `v/vt/vn`.
-    fn corner(&mut self, word: Word<'_>, reading: &mut Reading<'_>) -> Result<u32, ReadError> {
+    fn corner(&mut self, word: Word<'_>, is_textured: bool, reading: &mut Reading<'_>) -> Result<u32, ReadError> {
         let mut parts = word.text.split(|b| *b == b'/');
         let position = index(word, parts.next().unwrap_or_default(), self.positions.len(), "vertices")?;
-        let _texture = parts.next();
+        let place = match parts.next() {
+            Some(part) if is_textured => self.place_index(word, part)?,
+            _ => NONE,
+        };
         let normal = match parts.next() {
             None | Some(b"") => NONE,
             Some(part) => self.normal_index(word, part, reading)?,
@@ -207,7 +221,7 @@ impl Content {
         if parts.next().is_some() {
             return Err(ReadError::input(word.place(), "v, v/vt, v//vn or v/vt/vn", word.shown(), "repair the face"));
         }
-        let key = [position, normal];
+        let key = [position, normal, place, self.materials.paint(is_textured)];
         if let Some(&known) = self.of_corner.get(&key) {
             return Ok(known);
         }
@@ -217,6 +231,16 @@ impl Content {
         self.corners.push(key);
         self.of_corner.insert(key, new);
         Ok(new)
+    }
+
+    /// The texture coordinates of a corner whose material has a texture.
+    fn place_index(&self, word: Word<'_>, part: &[u8]) -> Result<u32, ReadError> {
+        let place = index(word, part, self.places.len(), "texture coordinates")?;
+        if self.places[place as usize].iter().all(|c| c.is_finite()) {
+            return Ok(place);
+        }
+        let hint = "repair the statement vt, or remove the material's texture";
+        Err(ReadError::input(word.place(), "texture coordinates that are finite numbers", word.shown(), hint))
     }
 
     /// The normal of a corner. Where the file has none so far that is an error only if it gets some later: exporters write
@@ -238,29 +262,33 @@ impl Content {
         if let Some(error) = self.without_normal.filter(|_| !self.normals.is_empty()) {
             return Err(error);
         }
-        let (origin, offsets) = origin::split(&self.positions).map_err(|i| {
-            let found = format!("{} at vertex {}", self.positions[i], i + 1);
-            let expected = "coordinates that fit 32-bit floats once the middle is subtracted";
-            ReadError::input(Place::File, expected, found, "scale the data, or remove outliers")
-        })?;
+        let (origin, offsets) = origin::relative(&self.positions, Place::File, |i| format!("vertex {}", i + 1))?;
         let colored = self.colors.len() == self.positions.len();
+        if !self.places.is_empty() && (colored || self.materials.textures.is_empty()) {
+            reading.notes.not_used([&b"vt"[..]]);
+        }
         if self.faces == 0 {
             let color = if colored { self.colors } else { Vec::new() };
             return Ok(Loaded::Points(RawPoints { origin, position: offsets, color, ..RawPoints::default() }));
         }
-        let of = |c: &[u32; 2]| self.normals.get(c[1] as usize).copied().unwrap_or(Vec3::ZERO);
+        let of = |c: &Corner| self.normals.get(c[1] as usize).copied().unwrap_or(Vec3::ZERO);
         let normals: Vec<Vec3> = self.corners.iter().map(of).collect();
-        let mut mesh = Mesh {
+        let vertices = Mesh {
             origin,
             position: self.corners.iter().map(|c| offsets[c[0] as usize]).collect(),
             // Normals of which one is missing are to be computed anew.
             normal: if normals.contains(&Vec3::ZERO) { Vec::new() } else { normals },
             color: if colored { self.corners.iter().map(|c| self.colors[c[0] as usize]).collect() } else { Vec::new() },
-            triangles: self.triangles,
+            triangles: Vec::new(),
         };
-        let at = |rank: usize| Place::Line { line: self.lines[rank], column: 0 };
-        polygon::triangulate(&mut mesh, &self.polygons, reading, at)?;
-        Ok(Loaded::Mesh(mesh))
+        let mesh = self.fans.into_mesh(vertices, reading)?;
+        if self.materials.is_used && colored {
+            reading.notes.not_used([&b"Kd"[..]]);
+        }
+        if colored || !self.materials.is_used {
+            return Ok(Loaded::Mesh(mesh));
+        }
+        painted::painted(mesh, &self.corners, &self.places, self.materials, reading).map(Loaded::Mesh)
     }
 }
 

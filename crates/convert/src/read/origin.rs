@@ -1,5 +1,6 @@
 //! f64 coordinates → an f64 origin and f32 offsets.
 
+use crate::error::{Place, ReadError};
 use splat_core::glam::{DVec3, Vec3};
 
 /// How many diagonals away from zero points may lie before they get an origin of their own.
@@ -9,7 +10,7 @@ const FAR: f64 = 4.0;
 ///
 /// Points near zero keep their coordinates; points that lie farther from zero than [`FAR`] times their diagonal are
 /// taken relative to the middle of their bounds. The rule has no absolute length, so it scales with the input.
-pub(super) fn split(positions: &[DVec3]) -> Result<(DVec3, Vec<Vec3>), usize> {
+fn split(positions: &[DVec3]) -> Result<(DVec3, Vec<Vec3>), usize> {
     let Some(&first) = positions.first() else { return Ok((DVec3::ZERO, Vec::new())) };
     let (min, max) = positions.iter().fold((first, first), |(lo, hi), p| (lo.min(*p), hi.max(*p)));
     let extent = max - min;
@@ -20,6 +21,19 @@ pub(super) fn split(positions: &[DVec3]) -> Result<(DVec3, Vec<Vec3>), usize> {
         Some(i) => Err(i),
         None => Ok((origin, offsets)),
     }
+}
+
+/// [`split`], with the words for the point that fits no f32: `named` says which it is.
+pub(super) fn relative(
+    positions: &[DVec3],
+    place: Place,
+    named: impl FnOnce(usize) -> String,
+) -> Result<(DVec3, Vec<Vec3>), ReadError> {
+    split(positions).map_err(|i| {
+        let expected = "coordinates that fit 32-bit floats once the middle is subtracted";
+        let found = format!("{} at {}", positions[i], named(i));
+        ReadError::input(place, expected, found, "scale the data, or remove outliers")
+    })
 }
 
 #[cfg(test)]

@@ -1,7 +1,16 @@
 //! What goes along while a file is read: its parameters, who may stop it, and what was mended in it.
 
 use super::ReadParams;
-#[cfg(any(feature = "ply", feature = "obj", feature = "xyz", feature = "las", feature = "hdr"))]
+#[cfg(any(
+    feature = "ply",
+    feature = "obj",
+    feature = "off",
+    feature = "gltf",
+    feature = "pcd",
+    feature = "xyz",
+    feature = "las",
+    feature = "hdr"
+))]
 use crate::error::escaped;
 use crate::error::{Place, ReadError};
 use splat_core::Progress;
@@ -92,7 +101,16 @@ pub struct Notes {
     pub mended: Vec<Mended>,
 }
 
-#[cfg(any(feature = "ply", feature = "obj", feature = "xyz", feature = "las", feature = "hdr"))]
+#[cfg(any(
+    feature = "ply",
+    feature = "obj",
+    feature = "off",
+    feature = "gltf",
+    feature = "pcd",
+    feature = "xyz",
+    feature = "las",
+    feature = "hdr"
+))]
 impl Notes {
     /// Adds names that are not used, each once, with what would steer a terminal escaped.
     pub(super) fn not_used<'a>(&mut self, names: impl IntoIterator<Item = &'a [u8]>) {
@@ -118,7 +136,7 @@ impl<'a> Reading<'a> {
     }
 
     /// Counts a fault that is mended; with [`ReadParams::strict`] it is the error that it stands for.
-    #[cfg(any(feature = "ply", feature = "stl", feature = "obj"))]
+    #[cfg(any(feature = "ply", feature = "stl", feature = "obj", feature = "off", feature = "gltf"))]
     pub(super) fn mend(
         &mut self,
         (fix, place, face): (Fix, Place, Option<u64>),

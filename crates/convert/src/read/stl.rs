@@ -92,11 +92,7 @@ fn reserved(facets: usize, params: &ReadParams) -> Result<Vec<DVec3>, ReadError>
 }
 
 fn mesh(corners: &[DVec3]) -> Result<Mesh, ReadError> {
-    let (origin, position) = origin::split(corners).map_err(|i| {
-        let found = format!("{} in facet {}", corners[i], i / 3);
-        let expected = "coordinates that fit 32-bit floats once the middle is subtracted";
-        ReadError::input(Place::File, expected, found, "scale the data, or remove outliers")
-    })?;
+    let (origin, position) = origin::relative(corners, Place::File, |i| format!("a corner of facet {}", i / 3))?;
     let triangles = (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
     Ok(Mesh { origin, position, triangles, ..Mesh::default() })
 }

@@ -41,13 +41,13 @@ impl<'a> Lines<'a> {
     }
 
     /// The same behind so many lines of a header.
-    #[cfg(feature = "nrrd")]
+    #[cfg(any(feature = "nrrd", feature = "pcd"))]
     pub(super) fn after(content: &'a [u8], lines: u64) -> Self {
         Self { number: lines, ..Self::new(content) }
     }
 
     /// Number of the line that was read last.
-    #[cfg(feature = "nrrd")]
+    #[cfg(any(feature = "nrrd", feature = "pcd"))]
     pub(super) fn number(&self) -> u64 {
         self.number
     }
@@ -70,13 +70,13 @@ impl<'a> Lines<'a> {
     }
 
     /// Bytes read.
-    #[cfg(feature = "nrrd")]
+    #[cfg(any(feature = "nrrd", feature = "pcd"))]
     pub(super) fn offset(&self) -> usize {
         self.at.min(self.content.len())
     }
 
     /// The place after the last line.
-    #[cfg(any(feature = "stl", feature = "nrrd"))]
+    #[cfg(any(feature = "stl", feature = "nrrd", feature = "off", feature = "pcd"))]
     pub(super) fn end(&self) -> Place {
         Place::Line { line: self.number + 1, column: 0 }
     }
@@ -84,7 +84,7 @@ impl<'a> Lines<'a> {
 
 impl<'a> Line<'a> {
     /// Words between blanks and, if `separators`, between single commas or semicolons.
-    pub(super) fn words(self, separators: bool) -> impl Iterator<Item = Word<'a>> {
+    pub(super) fn words(self, separators: bool) -> impl Iterator<Item = Word<'a>> + Clone {
         let parts = move |b: &u8| b.is_ascii_whitespace() || *b == 0x0b || separators && matches!(b, b',' | b';');
         let mut at = 0;
         self.text.split(parts).filter_map(move |text| {
@@ -106,14 +106,25 @@ impl Word<'_> {
         Place::Line { line: self.line, column: self.column }
     }
 
+    /// The word without its first bytes.
+    #[cfg(feature = "off")]
+    pub(super) fn after(self, bytes: usize) -> Self {
+        Self { text: &self.text[bytes..], column: self.column + bytes as u64, ..self }
+    }
+
     /// The word as it may be shown.
     pub(super) fn shown(self) -> String {
         format!("'{}'", escaped(self.text, 40))
     }
 
+    /// A decimal number, NaN and infinities too, as [`decimal`] reads it.
+    pub(super) fn decimal(self) -> Option<f64> {
+        decimal(self.text, self.open)
+    }
+
     /// A finite decimal number, whatever the system's language.
     pub(super) fn number(self) -> Result<f64, ReadError> {
-        match decimal(self.text, self.open) {
+        match self.decimal() {
             Some(value) if value.is_finite() => Ok(value),
             _ => {
                 let hint = "numbers are written with a point; NaN and infinity are not coordinates";

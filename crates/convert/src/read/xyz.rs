@@ -5,11 +5,12 @@
 //! colours from 0 to 255) or seven (value before colours, as .pts files have it). `#` and `//` begin comments. A line with
 //! nothing but a whole number before the first point is a count, which is checked.
 
+use super::direction::unit;
 use super::text::{Line, Lines, Word};
 use super::{Notes, ReadParams, color::linear_from_srgb, input, origin};
 use crate::error::{Place, ReadError};
 use crate::raw_points::RawPoints;
-use splat_core::glam::{DVec3, Vec3};
+use splat_core::glam::DVec3;
 
 /// Roles of columns: x y z, normal, colour, value, opacity; and their names, lower case.
 const ROLES: [&[&str]; 11] = [
@@ -78,11 +79,7 @@ pub(super) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Re
             "the file is truncated",
         ));
     }
-    let (origin, position) = origin::split(&positions).map_err(|i| {
-        let found = format!("{} at point {i}", positions[i]);
-        let expected = "coordinates that fit 32-bit floats once the middle is subtracted";
-        ReadError::input(Place::File, expected, found, "scale the data, or remove outliers")
-    })?;
+    let (origin, position) = origin::relative(&positions, Place::File, |i| format!("point {i}"))?;
     Ok(RawPoints { origin, position, ..points })
 }
 
@@ -181,9 +178,7 @@ fn point(
     }
     positions.push(DVec3::new(values[0], values[1], values[2]));
     if has[NORMAL] {
-        let n = DVec3::new(values[3], values[4], values[5]);
-        let largest = n.abs().max_element();
-        points.normal.push(if largest > 0.0 { (n / largest).normalize().as_vec3() } else { Vec3::ZERO });
+        points.normal.push(unit(DVec3::from_slice(&values[NORMAL..])));
     }
     if has[COLOR] {
         points.color.push([6, 7, 8].map(|i| linear_from_srgb(values[i] / 255.0)));

@@ -3,8 +3,13 @@
 
 #[cfg(all(feature = "hdr", feature = "exr"))]
 pub(crate) mod images;
+#[cfg(all(feature = "off", feature = "pcd", feature = "gltf"))]
+pub(crate) mod meshes;
 #[cfg(feature = "las")]
 pub(crate) mod oldest;
+
+#[cfg(all(feature = "off", feature = "pcd", feature = "gltf"))]
+pub(crate) use meshes::*;
 
 use convert::ReadError;
 use convert::read::{Loaded, ReadParams, bytes};

@@ -3,7 +3,7 @@
 use super::header::{Element, Property, Shape, Type, at_line};
 use crate::error::ReadError;
 use crate::raw_points::RawPoints;
-use crate::read::{color::linear_from_srgb, input, origin};
+use crate::read::{color::linear_from_srgb, direction::unit, input, origin};
 use splat_core::Mesh;
 use splat_core::glam::{DVec3, Vec3};
 
@@ -164,14 +164,7 @@ impl Columns {
     /// The columns as points.
     pub(super) fn into_points(self) -> Result<RawPoints, ReadError> {
         let Self { positions, points, line, .. } = self;
-        let (origin, position) = origin::split(&positions).map_err(|i| {
-            ReadError::input(
-                at_line(line),
-                "coordinates that fit 32-bit floats once the middle is subtracted",
-                format!("{} at vertex {i}", positions[i]),
-                "scale the data, or remove outliers",
-            )
-        })?;
+        let (origin, position) = origin::relative(&positions, at_line(line), |i| format!("vertex {i}"))?;
         Ok(RawPoints { origin, position, ..points })
     }
 }
@@ -184,10 +177,4 @@ fn share(value: f64, kind: Type, what: &str, hint: &'static str) -> Result<f64, 
         _ => 255.0,
     };
     if (0.0..=top).contains(&value) { Ok(value / top) } else { Err((format!("{what} from 0 to {top}"), hint)) }
-}
-
-/// `n` with length 1; zero stays zero. Scaled first, so that neither 1e-200 nor 1e200 is lost in the squares.
-fn unit(n: DVec3) -> Vec3 {
-    let largest = n.abs().max_element();
-    if largest > 0.0 { (n / largest).normalize().as_vec3() } else { Vec3::ZERO }
 }

@@ -1,0 +1,67 @@
+//! Files that a file names: they are opened only where they lie in its folder or below, links followed.
+
+use super::ReadParams;
+use super::input::Stream;
+use crate::error::{Place, ReadError, escaped};
+use std::path::{Component, Path};
+
+/// Where a file lies that names others.
+pub(super) struct Beside<'a> {
+    /// `None` for a file that was read from memory.
+    file: Option<&'a Path>,
+}
+
+impl<'a> Beside<'a> {
+    pub(super) fn new(file: Option<&'a Path>) -> Self {
+        Self { file }
+    }
+
+    /// The content of the file of this name; `what` says what it is for.
+    pub(super) fn open(&self, name: &str, what: &str, params: &ReadParams) -> Result<Stream<'static>, ReadError> {
+        let shown = || format!("'{}'", escaped(name.as_bytes(), 60));
+        let refused = |expected: &str| {
+            let hint = "put the file into the same folder and name it without others";
+            Err(ReadError::input(Place::File, format!("{what}: {expected}"), shown(), hint))
+        };
+        let within = |c: Component<'_>| matches!(c, Component::Normal(_) | Component::CurDir);
+        if name.contains("://") || !Path::new(name).components().all(within) {
+            return refused("a file in the same folder or below");
+        }
+        let Some(file) = self.file else {
+            return refused("in the file itself, as it was read from memory");
+        };
+        let folder = file.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let path = folder.join(name);
+        // Links are followed before they are judged.
+        if let (Ok(data), Ok(root)) = (path.canonicalize(), folder.canonicalize())
+            && !data.starts_with(&root)
+        {
+            return refused("a file in the same folder or below, links followed");
+        }
+        Stream::open(&path, params).map_err(|e| {
+            let expected = format!("{what} {}: {}", shown(), e.expected);
+            ReadError { expected, ..e }
+        })
+    }
+}
+
+/// The path that a relative uri stands for: %20 is a blank.
+#[cfg(feature = "gltf")]
+pub(super) fn from_uri(uri: &str) -> String {
+    let bytes = uri.as_bytes();
+    let digit = |at: usize| bytes.get(at).and_then(|b| char::from(*b).to_digit(16));
+    let (mut out, mut at) = (Vec::with_capacity(bytes.len()), 0);
+    while at < bytes.len() {
+        match (bytes[at], digit(at + 1), digit(at + 2)) {
+            (b'%', Some(high), Some(low)) => {
+                out.push((16 * high + low) as u8);
+                at += 3;
+            }
+            (byte, ..) => {
+                out.push(byte);
+                at += 1;
+            }
+        }
+    }
+    String::from_utf8_lossy(&out).into_owned()
+}

@@ -1,0 +1,211 @@
+//! Primitives: their triangles, and what their vertices have.
+
+use super::accessor::{Buffers, missing};
+use super::document::Primitive;
+use super::material::Paints;
+use super::{HINT, wrong};
+use crate::error::{Place, ReadError};
+use crate::read::direction::unit;
+use crate::read::input;
+use crate::read::paint::Painting;
+use crate::read::reading::Reading;
+use splat_core::glam::{DMat3, DMat4, DVec3, Vec3};
+
+pub(super) const POINTS: u32 = 0;
+const TRIANGLES: u32 = 4;
+const STRIP: u32 = 5;
+const FAN: u32 = 6;
+
+/// Bytes that a vertex and a triangle take while they are read and converted.
+const BYTES_PER_VERTEX: u64 = 24 + 12 + 12 + 4 + 16 + 8 + 12;
+const BYTES_PER_TRIANGLE: u64 = 12;
+
+/// All triangles or points of a scene, in its coordinates.
+#[derive(Default)]
+pub(super) struct Surface {
+    pub(super) position: Vec<DVec3>,
+    pub(super) normal: Vec<Vec3>,
+    pub(super) triangles: Vec<[u32; 3]>,
+    pub(super) painting: Painting,
+    /// Whether a vertex has a colour of its own.
+    pub(super) is_tinted: bool,
+}
+
+/// What the vertices of one primitive have.
+struct Vertices {
+    position: Vec<DVec3>,
+    normal: Option<Vec<Vec3>>,
+    tint: Option<Vec<[f32; 4]>>,
+    place: Option<Vec<[f32; 2]>>,
+    paint: u32,
+}
+
+impl Surface {
+    /// Appends a primitive of triangles, or the points of one.
+    pub(super) fn add(
+        &mut self,
+        primitive: &Primitive,
+        scene_from_mesh: &DMat4,
+        buffers: &Buffers<'_>,
+        paints: &mut Paints<'_>,
+        reading: &mut Reading<'_>,
+    ) -> Result<(), ReadError> {
+        let vertices = vertices(primitive, scene_from_mesh, buffers, paints, reading)?;
+        let mode = primitive.mode.unwrap_or(TRIANGLES);
+        let count = vertices.position.len();
+        let indices = match primitive.indices {
+            Some(index) => buffers.indices(index, reading)?,
+            None => (0..count as u32).collect(),
+        };
+        if let Some(beyond) = indices.iter().find(|i| **i as usize >= count) {
+            return Err(missing("vertex", *beyond as usize, count));
+        }
+        if mode == POINTS {
+            let all: Vec<u32> = indices;
+            return self.append(&vertices, all.into_iter(), reading).map(|_| ());
+        }
+        let mut triangles = triangles(&indices, mode)?;
+        if scene_from_mesh.determinant() < 0.0 {
+            // Mirrored, it would be inside out.
+            triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        }
+        let room = (self.triangles.len() + triangles.len()) as u64 * BYTES_PER_TRIANGLE;
+        input::check_bytes("the triangles", room, reading.params)?;
+        input::reserve(&mut self.triangles, triangles.len())?;
+        if vertices.normal.is_some() {
+            let first = self.append(&vertices, 0..count as u32, reading)?;
+            self.triangles.extend(triangles.iter().map(|t| t.map(|v| first + v)));
+            return Ok(());
+        }
+        // Without normals each triangle is flat, with corners of its own.
+        let first = self.append(&vertices, triangles.iter().flatten().copied(), reading)?;
+        for (t, corners) in self.position[first as usize..].as_chunks::<3>().0.iter().enumerate() {
+            let across = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+            let flat = if across.length_squared() > 0.0 { unit(across) } else { Vec3::Z };
+            let at = first as usize + 3 * t;
+            self.normal[at..at + 3].fill(flat);
+            self.triangles.push([0, 1, 2].map(|k| (at + k) as u32));
+        }
+        Ok(())
+    }
+
+    /// Appends these vertices in this order; gives the number of the first.
+    fn append(
+        &mut self,
+        vertices: &Vertices,
+        order: impl Iterator<Item = u32> + Clone,
+        reading: &Reading<'_>,
+    ) -> Result<u32, ReadError> {
+        let first = self.position.len();
+        let count = order.clone().count();
+        input::check_bytes("the vertices", (first + count) as u64 * BYTES_PER_VERTEX, reading.params)?;
+        if first + count > u32::MAX as usize {
+            return Err(wrong("fewer than 2^32 vertices".into(), (first + count).to_string()));
+        }
+        let Self { position, normal, painting, .. } = self;
+        input::reserve(position, count)?;
+        input::reserve(normal, count)?;
+        input::reserve(&mut painting.tint, count)?;
+        input::reserve(&mut painting.place, count)?;
+        input::reserve(&mut painting.paint_of, count)?;
+        position.extend(order.clone().map(|v| vertices.position[v as usize]));
+        let at = |v: u32| vertices.normal.as_ref().map_or(Vec3::ZERO, |n| n[v as usize]);
+        normal.extend(order.clone().map(at));
+        let at = |v: u32| vertices.tint.as_ref().map_or([1.0; 4], |t| t[v as usize]);
+        painting.tint.extend(order.clone().map(at));
+        let at = |v: u32| vertices.place.as_ref().map_or([0.0; 2], |p| p[v as usize]);
+        painting.place.extend(order.map(at));
+        painting.paint_of.resize(first + count, vertices.paint);
+        self.is_tinted |= vertices.tint.is_some();
+        Ok(first as u32)
+    }
+}
+
+fn vertices(
+    primitive: &Primitive,
+    scene_from_mesh: &DMat4,
+    buffers: &Buffers<'_>,
+    paints: &mut Paints<'_>,
+    reading: &mut Reading<'_>,
+) -> Result<Vertices, ReadError> {
+    let attribute = |name: &str| primitive.attributes.get(name).copied();
+    let of_position = attribute("POSITION").ok_or_else(|| wrong("POSITION of a primitive".into(), "none".into()))?;
+    let (paint, coordinates) = paints.of(primitive.material, reading)?;
+    let set = coordinates.map(|c| format!("TEXCOORD_{}", c.set));
+    let used = ["POSITION", "NORMAL", "COLOR_0"];
+    let unused = primitive.attributes.keys().filter(|k| !used.contains(&k.as_str()) && Some(*k) != set.as_ref());
+    reading.notes.not_used(unused.map(String::as_bytes));
+    let stored = buffers.vectors::<3>(of_position, "POSITION", reading)?;
+    let place_of = |p: &[f32; 3]| scene_from_mesh.transform_point3(Vec3::from(*p).as_dvec3());
+    let position: Vec<DVec3> = stored.iter().map(place_of).collect();
+    if let Some(i) = position.iter().position(|p| !p.is_finite()) {
+        return Err(wrong("finite coordinates".into(), format!("{} at vertex {i}", position[i])));
+    }
+    let count = position.len();
+    let alike = |found: usize, name: &str| {
+        if found == count { Ok(()) } else { Err(wrong(format!("{count} entries of {name}"), found.to_string())) }
+    };
+    let mut normal = None;
+    if let Some(index) = attribute("NORMAL") {
+        let stored = buffers.vectors::<3>(index, "NORMAL", reading)?;
+        alike(stored.len(), "NORMAL")?;
+        let turned = normals_turn(scene_from_mesh);
+        let all: Vec<Vec3> = stored.iter().map(|n| unit(turned * Vec3::from(*n).as_dvec3())).collect();
+        // Normals of which one is none are left out: the surface is flat.
+        normal = all.iter().all(|n| n.is_finite() && *n != Vec3::ZERO).then_some(all);
+    }
+    let tint = attribute("COLOR_0").map(|index| colors(index, buffers, reading)).transpose()?;
+    if let Some(tint) = &tint {
+        alike(tint.len(), "COLOR_0")?;
+    }
+    let mut place = None;
+    if let (Some(coordinates), Some(set)) = (coordinates, set) {
+        let index = attribute(&set).ok_or_else(|| wrong(format!("{set}, which the texture goes by"), "none".into()))?;
+        let stored = buffers.vectors::<2>(index, &set, reading)?;
+        alike(stored.len(), &set)?;
+        let all: Vec<[f32; 2]> = stored.into_iter().map(|p| coordinates.place(p)).collect();
+        if !all.iter().flatten().all(|c| c.is_finite()) {
+            return Err(wrong(format!("finite {set}"), "another number".into()));
+        }
+        place = Some(all);
+    }
+    Ok(Vertices { position, normal, tint, place, paint })
+}
+
+/// The map of normals: cofactors, which exist for flat transforms too; the length does not matter.
+fn normals_turn(scene_from_mesh: &DMat4) -> DMat3 {
+    let m = DMat3::from_mat4(*scene_from_mesh);
+    let cofactors = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+    if m.determinant() < 0.0 { cofactors * -1.0 } else { cofactors }
+}
+
+/// Linear colours of vertices, with their opacity or 1.
+fn colors(index: usize, buffers: &Buffers<'_>, reading: &Reading<'_>) -> Result<Vec<[f32; 4]>, ReadError> {
+    let all: Vec<[f32; 4]> = if buffers.width(index)? == 3 {
+        buffers.vectors::<3>(index, "COLOR_0", reading)?.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect()
+    } else {
+        buffers.vectors::<4>(index, "COLOR_0", reading)?
+    };
+    if let Some(color) = all.iter().flatten().find(|c| !(c.is_finite() && **c >= 0.0)) {
+        return Err(wrong("colours from 0 to 1 in COLOR_0".into(), color.to_string()));
+    }
+    Ok(all.into_iter().map(|color| color.map(|c| c.min(1.0))).collect())
+}
+
+/// Triangles of a list, a strip or a fan. Those with a corner twice join strips and are nothing by themselves.
+fn triangles(indices: &[u32], mode: u32) -> Result<Vec<[u32; 3]>, ReadError> {
+    let mut all: Vec<[u32; 3]> = match mode {
+        TRIANGLES => indices.as_chunks::<3>().0.to_vec(),
+        STRIP => {
+            let turned = |(i, t): (usize, &[u32])| if i % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] };
+            indices.windows(3).enumerate().map(turned).collect()
+        }
+        FAN => indices.windows(2).skip(1).map(|pair| [indices[0], pair[0], pair[1]]).collect(),
+        _ => {
+            let expected = "a mode from 0 to 6".to_owned();
+            return Err(ReadError::input(Place::File, expected, mode.to_string(), HINT));
+        }
+    };
+    all.retain(|[a, b, c]| a != b && b != c && a != c);
+    Ok(all)
+}

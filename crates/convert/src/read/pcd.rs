@@ -1,0 +1,87 @@
+//! PCD (Point Cloud Library), text, binary and compressed → raw points.
+//!
+//! Kept are `x y z`, `normal_x normal_y normal_z`, `rgb` or `rgba`, `intensity` and `opacity`; other fields are named. The
+//! parser is our own: counts of a header are checked against the file before anything is allocated, and places down to
+//! the column are asked of it. Points without a place, which depth cameras write as NaN where they see nothing, are left
+//! out and counted; an infinite coordinate is refused.
+
+mod body;
+mod columns;
+mod header;
+mod lzf;
+
+use super::input;
+use super::reading::Reading;
+use crate::error::{Place, ReadError};
+use crate::raw_points::RawPoints;
+use body::{Bytes, Text};
+use columns::Columns;
+use header::{Data, Header};
+
+const TRUNCATED: &str = "the file is truncated or damaged; fetch it again";
+
+/// Reads a PCD file.
+pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoints, ReadError> {
+    let header = header::parse(content)?;
+    let mut columns = Columns::new(&header, reading)?;
+    let body = &content[header.body..];
+    match header.data {
+        Data::Text => Text::new(content, &header).read(&header, &mut columns, reading)?,
+        Data::Binary => {
+            let (record, needed) = (header.record(), header.bytes()?);
+            if body.len() as u64 != needed {
+                return Err(other_length(&header, needed, body.len()));
+            }
+            let layout = header.fields.iter().map(|f| [f.offset, record]).collect();
+            Bytes::new(body, header.body, layout).read(&header, &mut columns, reading)?;
+        }
+        Data::Compressed => {
+            let unpacked = unpacked(body, &header, reading)?;
+            // One field after the other, each of all points.
+            let points = header.points as usize;
+            let layout = header.fields.iter().map(|f| [f.offset * points, f.size * f.count]).collect();
+            Bytes::new(&unpacked, header.body, layout).read(&header, &mut columns, reading)?;
+        }
+    }
+    columns.into_points(reading)
+}
+
+fn other_length(header: &Header, needed: u64, found: usize) -> ReadError {
+    let expected = format!("{needed} bytes, {} points of {} each", header.points, header.record());
+    ReadError::input(Place::Byte(header.body as u64), expected, found.to_string(), TRUNCATED)
+}
+
+/// The bytes of all points out of their compressed form: its length, that of the points, then LZF.
+fn unpacked(body: &[u8], header: &Header, reading: &Reading<'_>) -> Result<Vec<u8>, ReadError> {
+    let at = Place::Byte(header.body as u64);
+    let number = |i: usize| body.get(i..)?.first_chunk().map(|b| u64::from(u32::from_le_bytes(*b)));
+    let (Some(stored), Some(announced)) = (number(0), number(4)) else {
+        return Err(ReadError::input(at, "two lengths of 4 bytes", format!("{} bytes", body.len()), TRUNCATED));
+    };
+    let needed = header.bytes()?;
+    if announced != needed {
+        let expected = format!("{needed} bytes unpacked, {} points of {} each", header.points, header.record());
+        return Err(ReadError::input(at, expected, announced.to_string(), TRUNCATED));
+    }
+    let packed = &body[8..];
+    if packed.len() as u64 != stored {
+        let expected = format!("{stored} bytes, as announced");
+        return Err(ReadError::input(at, expected, packed.len().to_string(), TRUNCATED));
+    }
+    // An empty cloud may be written without anything.
+    if needed == 0 {
+        return Ok(Vec::new());
+    }
+    if needed > stored.saturating_mul(lzf::MAX_RATIO) {
+        let expected = format!("at most {} bytes unpacked from each", lzf::MAX_RATIO);
+        return Err(ReadError::input(at, expected, format!("{needed} from {stored}"), TRUNCATED));
+    }
+    input::check_bytes("the unpacked points", needed, reading.params)?;
+    let mut unpacked = Vec::new();
+    input::reserve(&mut unpacked, needed as usize)?;
+    lzf::unpack(packed, &mut unpacked, needed as usize).map_err(|byte| {
+        let place = Place::Byte((header.body + 8 + byte) as u64);
+        ReadError::input(place, format!("LZF of {needed} bytes"), "something else", TRUNCATED)
+    })?;
+    Ok(unpacked)
+}

@@ -1,0 +1,107 @@
+//! Textures: PNG and JPEG images as linear colours between their texels.
+
+use super::color::linear_from_srgb;
+use super::reading::Reading;
+use super::{check_image, input};
+use crate::error::{Place, ReadError};
+use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
+use std::io::Cursor;
+use std::sync::LazyLock;
+
+/// What lies beyond the border.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Wrap {
+    Repeat,
+    Clamp,
+    Mirror,
+}
+
+/// An image that surfaces are painted with.
+pub(super) struct Texture {
+    size: [u32; 2],
+    /// sRGB and opacity, row by row from the top.
+    texels: Vec<[u8; 4]>,
+    wrap: [Wrap; 2],
+    /// Whether texels are squares of one colour.
+    is_nearest: bool,
+}
+
+static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb(i as f64 / 255.0)));
+
+impl Texture {
+    /// Decodes a PNG or JPEG image; `what` names it in messages.
+    pub(super) fn decode(content: &[u8], what: &str, reading: &Reading<'_>) -> Result<Self, ReadError> {
+        reading.go_on()?;
+        let wrong = |found: String| {
+            let hint = "save the texture anew as PNG or JPEG";
+            ReadError::input(Place::File, format!("a whole PNG or JPEG image as {what}"), found, hint)
+        };
+        let format = match image::guess_format(content) {
+            Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg)) => format,
+            Ok(other) => return Err(wrong(format!("{other:?}"))),
+            Err(_) => return Err(wrong("another format".to_owned())),
+        };
+        let mut reader = ImageReader::with_format(Cursor::new(content), format);
+        let mut limits = Limits::default();
+        limits.max_alloc = Some(reading.params.limits.max_bytes);
+        reader.limits(limits);
+        let decoder = reader.into_decoder().map_err(|e| wrong(e.to_string()))?;
+        let (width, height) = decoder.dimensions();
+        check_image([width, height], reading.params)?;
+        // A damaged size is not made room for.
+        input::check_packed(decoder.total_bytes(), content.len() as u64, "an image")?;
+        let decoded = image::DynamicImage::from_decoder(decoder).map_err(|e| wrong(e.to_string()))?;
+        let texels = decoded.into_rgba8().into_raw();
+        let texels = bytemuck::allocation::cast_vec(texels);
+        Ok(Self { size: [width, height], texels, wrap: [Wrap::Repeat; 2], is_nearest: false })
+    }
+
+    /// The same with other rules of what lies beyond its border and between its texels.
+    pub(super) fn sampled(self, wrap: [Wrap; 2], is_nearest: bool) -> Self {
+        Self { wrap, is_nearest, ..self }
+    }
+
+    /// Columns and rows.
+    pub(super) fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// Linear colour and opacity at a place; (0, 0) is the upper left corner of the image, (1, 1) its lower right.
+    ///
+    /// Places up to the border have the colours within it: a vertex that lies on the border belongs to what it encloses, and
+    /// not to the other side of the image, to which repetition would lead.
+    pub(super) fn at(&self, place: [f32; 2]) -> [f32; 4] {
+        let wrap = [0, 1].map(|a| if (0.0..=1.0).contains(&place[a]) { Wrap::Clamp } else { self.wrap[a] });
+        let [x, y] = [0, 1].map(|a| f64::from(place[a]) * f64::from(self.size[a]));
+        if self.is_nearest {
+            return self.texel([x, y].map(|c| c.floor() as i64), wrap);
+        }
+        // Colours are those of the middles of texels.
+        let low = [x, y].map(|c| (c - 0.5).floor());
+        let share = [x - 0.5 - low[0], y - 0.5 - low[1]].map(|s| s as f32);
+        let [i, j] = low.map(|c| c as i64);
+        let row = |j: i64| {
+            let (a, b) = (self.texel([i, j], wrap), self.texel([i.saturating_add(1), j], wrap));
+            std::array::from_fn::<f32, 4, _>(|c| a[c] + (b[c] - a[c]) * share[0])
+        };
+        let (a, b) = (row(j), row(j.saturating_add(1)));
+        std::array::from_fn(|c| a[c] + (b[c] - a[c]) * share[1])
+    }
+
+    fn texel(&self, at: [i64; 2], wrap: [Wrap; 2]) -> [f32; 4] {
+        let [i, j] = [0, 1].map(|a| {
+            let n = i64::from(self.size[a]);
+            match wrap[a] {
+                Wrap::Repeat => at[a].rem_euclid(n),
+                Wrap::Clamp => at[a].clamp(0, n - 1),
+                Wrap::Mirror => {
+                    let there = at[a].rem_euclid(2 * n);
+                    there.min(2 * n - 1 - there)
+                }
+            }
+        });
+        let [r, g, b, alpha] = self.texels[j as usize * self.size[0] as usize + i as usize];
+        let [r, g, b] = [r, g, b].map(|c| LINEAR[usize::from(c)]);
+        [r, g, b, f32::from(alpha) / 255.0]
+    }
+}
