@@ -1,7 +1,16 @@
 //! What goes along while a file is read: its parameters, who may stop it, and what was mended in it.
 
 use super::ReadParams;
-#[cfg(any(feature = "ply", feature = "obj", feature = "xyz", feature = "las", feature = "hdr"))]
+#[cfg(any(
+    feature = "ply",
+    feature = "obj",
+    feature = "xyz",
+    feature = "las",
+    feature = "hdr",
+    feature = "metaimage",
+    feature = "vti",
+    feature = "vtk"
+))]
 use crate::error::escaped;
 use crate::error::{Place, ReadError};
 use splat_core::Progress;
@@ -92,7 +101,16 @@ pub struct Notes {
     pub mended: Vec<Mended>,
 }
 
-#[cfg(any(feature = "ply", feature = "obj", feature = "xyz", feature = "las", feature = "hdr"))]
+#[cfg(any(
+    feature = "ply",
+    feature = "obj",
+    feature = "xyz",
+    feature = "las",
+    feature = "hdr",
+    feature = "metaimage",
+    feature = "vti",
+    feature = "vtk"
+))]
 impl Notes {
     /// Adds names that are not used, each once, with what would steer a terminal escaped.
     pub(super) fn not_used<'a>(&mut self, names: impl IntoIterator<Item = &'a [u8]>) {

@@ -5,6 +5,8 @@
 pub(crate) mod images;
 #[cfg(feature = "las")]
 pub(crate) mod oldest;
+#[cfg(feature = "vti")]
+pub(crate) mod volumes;
 
 use convert::ReadError;
 use convert::read::{Loaded, ReadParams, bytes};
