@@ -89,6 +89,29 @@ fn info_says_what_becomes_of_colours_and_of_spaces() {
     assert_eq!(remarks("a.nrrd"), json!(["space: left-posterior-superior, converted to right-anterior-superior"]));
 }
 
+#[test]
+fn the_frame_of_a_series_is_told_and_one_that_is_not_there_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let series =
+        "NRRD0004\ntype: uchar\ndimension: 4\nsizes: 1 1 1 2\nkinds: space space space time\nencoding: raw\n\nxy";
+    fs::write(folder.path().join("a.nrrd"), series).unwrap();
+    let info: Value = serde_json::from_slice(&run(folder.path(), &["info", "a.nrrd", "--json"]).stdout).unwrap();
+    assert_eq!(info["remarks"], json!(["frame 0 of 2; `frame` chooses another"]));
+    let transfer =
+        "[{ value = 0, color = [1, 1, 1], extinction = 0 }, { value = 200, color = [1, 1, 1], extinction = 1 }]";
+    let object = format!("[[object]]\nname = 'it'\nvolume = 'a.nrrd'\ntransfer = {transfer}\n");
+    fs::write(folder.path().join("s.toml"), parallel_view(2.0, 16) + &object).unwrap();
+    let told = run(folder.path(), &["explain", "s.toml", "--set", "object.it.frame=1"]);
+    assert!(errors(&told).contains("a.nrrd: frame 1 of 2; `frame` chooses another"), "{}", errors(&told));
+    let refused = run(folder.path(), &["render", "s.toml", "--set", "object.it.frame=2"]);
+    assert_eq!(refused.status.code(), Some(3));
+    assert!(
+        errors(&refused).contains("expected a `frame` from 0 to 1, as the file has 2 volumes"),
+        "{}",
+        errors(&refused)
+    );
+}
+
 /// 3D Gaussian splats were drawn as white discs.
 #[test]
 fn exit_3_gaussian_splats_are_refused_by_name() {

@@ -1,5 +1,5 @@
 //! Reading files: meshes (PLY, STL, OBJ, OFF, glTF), point clouds (PLY, OBJ, OFF, PCD, glTF, XYZ, CSV, LAS, LAZ), volumes (NIfTI,
-//! NRRD) and images of radiance (Radiance HDR, OpenEXR), each also inside gzip.
+//! NRRD, MetaImage, VTK, raw) and images of radiance (Radiance HDR, OpenEXR), each also inside gzip.
 //!
 //! No input makes a reader panic or take memory that the file does not stand for: sizes that a header announces are
 //! checked against the length of the file before anything is allocated.
@@ -23,23 +23,32 @@ mod color;
     feature = "off",
     feature = "pcd",
     feature = "xyz",
-    feature = "nrrd"
+    feature = "nrrd",
+    feature = "metaimage",
+    feature = "vti",
+    feature = "vtk"
 ))]
 mod decimal;
+#[cfg(any(feature = "nrrd", feature = "metaimage"))]
+mod detached;
 #[cfg(any(feature = "ply", feature = "obj", feature = "off", feature = "pcd", feature = "gltf", feature = "xyz"))]
 mod direction;
 #[cfg(any(feature = "obj", feature = "off"))]
 mod fans;
 #[cfg(feature = "gltf")]
 mod gltf;
+#[cfg(any(feature = "metaimage", feature = "vti"))]
+mod inflate;
 #[cfg_attr(not(feature = "ply"), allow(dead_code, reason = "each format uses a part of it"))]
 mod input;
 #[cfg(feature = "las")]
 mod las;
-#[cfg(any(feature = "nrrd", feature = "nifti"))]
+#[cfg(any(feature = "nrrd", feature = "nifti", feature = "metaimage", feature = "vti", feature = "vtk"))]
 mod lattice;
 #[cfg(feature = "las")]
 mod laz;
+#[cfg(feature = "metaimage")]
+mod metaimage;
 #[cfg(feature = "obj")]
 mod mtl;
 #[cfg(feature = "nifti")]
@@ -72,19 +81,52 @@ mod ply;
 mod polygon;
 #[cfg(feature = "hdr")]
 mod radiance;
+#[cfg(feature = "raw")]
+mod raw;
 mod reading;
+#[cfg(any(
+    feature = "nrrd",
+    feature = "nifti",
+    feature = "metaimage",
+    feature = "raw",
+    feature = "vti",
+    feature = "vtk"
+))]
+mod selection;
 #[cfg(feature = "obj")]
 mod statements;
 #[cfg(feature = "stl")]
 mod stl;
-#[cfg(any(feature = "stl", feature = "obj", feature = "off", feature = "pcd", feature = "xyz", feature = "nrrd"))]
+#[cfg(any(
+    feature = "stl",
+    feature = "obj",
+    feature = "off",
+    feature = "pcd",
+    feature = "xyz",
+    feature = "nrrd",
+    feature = "metaimage",
+    feature = "vti",
+    feature = "vtk"
+))]
 mod text;
 #[cfg(any(feature = "obj", feature = "gltf"))]
 mod texture;
+mod unpacked;
 mod unread;
 mod up;
-#[cfg(any(feature = "nrrd", feature = "nifti"))]
+#[cfg(any(
+    feature = "nrrd",
+    feature = "nifti",
+    feature = "metaimage",
+    feature = "raw",
+    feature = "vti",
+    feature = "vtk"
+))]
 mod voxels;
+#[cfg(feature = "vti")]
+mod vti;
+#[cfg(feature = "vtk")]
+mod vtk;
 #[cfg(feature = "xyz")]
 mod xyz;
 
@@ -110,12 +152,14 @@ pub struct ReadParams {
     pub drop_invalid: bool,
     /// Whether a file with a fault that could be mended (see [`Fix`]) is refused instead.
     pub strict: bool,
+    /// Which volume of a series is read, from 0; other files have a frame 0 alone.
+    pub frame: u64,
 }
 
 impl Default for ReadParams {
-    /// 4 GiB, nothing dropped, what can be mended is mended.
+    /// 4 GiB, nothing dropped, what can be mended is mended, the first of a series.
     fn default() -> Self {
-        Self { limits: Limits::bytes(4 << 30), drop_invalid: false, strict: false }
+        Self { limits: Limits::bytes(4 << 30), drop_invalid: false, strict: false, frame: 0 }
     }
 }
 
@@ -171,6 +215,10 @@ fn whole(
     reading: &mut Reading<'_>,
 ) -> Result<Loaded, ReadError> {
     let loaded = parse(path, stream, place, reading)?;
+    if reading.params.frame > 0 && !matches!(loaded, Loaded::Grid(_)) {
+        let (expected, found) = ("a series of volumes", "a file of another kind");
+        return Err(ReadError::input(Place::File, expected, found, "leave out `frame`"));
+    }
     #[cfg(any(feature = "ply", feature = "stl", feature = "obj", feature = "off", feature = "gltf"))]
     if let Loaded::Mesh(mut mesh) = loaded {
         for _ in 0..crate::outwards::turn_outwards(&mut mesh) {
@@ -200,7 +248,7 @@ fn parse(
 ) -> Result<Loaded, ReadError> {
     reading.go_on()?;
     let params = reading.params;
-    if stream.peek(2)? == [0x1f, 0x8b] {
+    if stream.peek(2)? == [0x1f, 0x8b] && !is_raw(path) {
         stream = stream.gunzip();
     }
     let head = stream.peek(MARK)?;
@@ -241,7 +289,15 @@ fn parse(
         #[cfg(feature = "las")]
         Some(Format::Las) => las::read(stream.rest()?, params, &mut reading.notes).map(Loaded::Points),
         #[cfg(feature = "nifti")]
-        Some(Format::Nifti) => nifti::read(stream, params).map(Loaded::Grid),
+        Some(Format::Nifti) => nifti::read(stream, params, &mut reading.notes).map(Loaded::Grid),
+        #[cfg(feature = "metaimage")]
+        Some(Format::MetaImage) => metaimage::read(stream, place, params, &mut reading.notes).map(Loaded::Grid),
+        #[cfg(feature = "vti")]
+        Some(Format::Vti) => vti::read(&stream.rest()?, params, &mut reading.notes).map(Loaded::Grid),
+        #[cfg(feature = "vtk")]
+        Some(Format::Vtk) => vtk::read(&stream.rest()?, params, &mut reading.notes).map(Loaded::Grid),
+        #[cfg(feature = "raw")]
+        Some(Format::Raw) => raw::read(stream, path, params, &mut reading.notes).map(Loaded::Grid),
         #[cfg(feature = "hdr")]
         Some(Format::Hdr) => radiance::read(&stream.rest()?, reading).map(Loaded::Image),
         #[cfg(feature = "exr")]
@@ -286,11 +342,20 @@ enum Format {
     Nrrd,
     Las,
     Nifti,
+    MetaImage,
+    Vti,
+    Vtk,
+    Raw,
     Hdr,
     Exr,
 }
 
 fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
+    let named = by_name(path);
+    // No byte of nothing but voxels is a mark.
+    if matches!(named, Some(Format::Raw)) {
+        return named;
+    }
     let content = content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(content);
     if content.starts_with(b"ply") {
         return Some(Format::Ply);
@@ -316,7 +381,20 @@ fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
     if content.get(344..347).is_some_and(|magic| magic == b"n+1" || magic == b"ni1") {
         return Some(Format::Nifti);
     }
-    by_name(path).or_else(|| is_stl_text(content).then_some(Format::Stl))
+    // NIfTI-2, which its reader names.
+    if content.get(4..7).is_some_and(|magic| magic == b"n+2" || magic == b"ni2") {
+        return Some(Format::Nifti);
+    }
+    if content.starts_with(b"# vtk DataFile Version") {
+        return Some(Format::Vtk);
+    }
+    if content.windows(8).any(|window| window == b"<VTKFile") {
+        return Some(Format::Vti);
+    }
+    if is_metaimage(content) {
+        return Some(Format::MetaImage);
+    }
+    named.or_else(|| is_stl_text(content).then_some(Format::Stl))
 }
 
 #[cfg(feature = "stl")]
@@ -327,6 +405,17 @@ fn is_stl_text(content: &[u8]) -> bool {
 #[cfg(not(feature = "stl"))]
 fn is_stl_text(_content: &[u8]) -> bool {
     false
+}
+
+/// It has no mark, but begins with one of two fields.
+fn is_metaimage(content: &[u8]) -> bool {
+    let field = content.iter().position(|b| *b == b'=').map_or(&[][..], |end| content[..end].trim_ascii_end());
+    [&b"ObjectType"[..], b"NDims"].contains(&field)
+}
+
+/// Whether a file is nothing but voxels by its name, not even packed.
+fn is_raw(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("raw"))
 }
 
 fn by_name(path: &Path) -> Option<Format> {
@@ -343,6 +432,10 @@ fn by_name(path: &Path) -> Option<Format> {
         "nrrd" | "nhdr" => Some(Format::Nrrd),
         "las" | "laz" => Some(Format::Las),
         "nii" | "hdr" => Some(Format::Nifti),
+        "mha" | "mhd" => Some(Format::MetaImage),
+        "vti" => Some(Format::Vti),
+        "vtk" => Some(Format::Vtk),
+        "raw" => Some(Format::Raw),
         _ => None,
     }
 }

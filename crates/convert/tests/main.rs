@@ -23,6 +23,7 @@ mod read_las;
 #[cfg(feature = "obj")]
 mod read_materials;
 mod read_mended;
+mod read_metaimage;
 mod read_more;
 mod read_nifti;
 mod read_notes;
@@ -33,8 +34,13 @@ mod read_off;
 mod read_pcd;
 mod read_ply;
 mod read_polygons;
+mod read_raw;
 #[cfg(feature = "read")]
 mod read_samples;
+mod read_series;
 mod read_spaces;
 mod read_unread;
+mod read_volumes;
+mod read_vti;
+mod read_vtk;
 mod readme;

@@ -281,10 +281,10 @@ fn ba14_nrrd_sizes_are_checked_against_the_data() {
         refused("a.nrrd", bad("2 3 1", sizes), "a.nrrd:5: expected three sizes above 0");
     }
     let huge = "4294967296 4294967296 4294967296";
-    refused("a.nrrd", bad("2 3 1", huge), "a.nrrd:5: expected at most 2^40 voxels, found [4294967296,");
+    refused("a.nrrd", bad("2 3 1", huge), "a.nrrd:5: expected at most 2^45 voxels, found [4294967296,");
     let large = load("a.nrrd", &bad("2 3 1", "100000 100000 100")).unwrap_err();
     assert_eq!(large.fault, Fault::Limit, "{large}");
-    refused("a.nrrd", bad("dimension: 3", "dimension: 4"), "a.nrrd:4: expected dimension: 3, found 4");
+    refused("a.nrrd", bad("dimension: 3", "dimension: 5"), "a.nrrd:4: expected dimension: 3 or 4, found 5");
     refused("a.nrrd", bad("uint16", "block"), "a.nrrd:3: expected a type of real scalars");
     refused("a.nrrd", bad("encoding: raw", "encoding: bzip2"), "a.nrrd:10: expected encoding raw, gzip or text");
     refused("a.nrrd", bad("endian: big\n", ""), "a.nrrd:12: expected a field 'endian', found none");

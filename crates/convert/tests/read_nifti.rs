@@ -72,12 +72,28 @@ fn slope_zero_or_nan_means_no_scaling() {
 }
 
 #[test]
-fn a_series_is_refused_and_a_fourth_dimension_of_one_accepted() {
+fn a_fourth_dimension_of_one_is_accepted_and_of_two_is_held_against_the_file() {
     let mut content = nifti(NIFTI_U8, false);
     content[40..42].copy_from_slice(&4i16.to_le_bytes());
     assert_eq!(grid(&content).dims, [3, 2, 2]);
     content[44..46].copy_from_slice(&1i16.to_le_bytes());
     content[48..50].copy_from_slice(&2i16.to_le_bytes());
+    assert_eq!((grid(&content).dims, grid(&content).values.len()), ([3, 1, 2], 6));
+    content[48..50].copy_from_slice(&3i16.to_le_bytes());
     let error = load("v.nii", &content).unwrap_err().to_string();
-    assert!(error.starts_with("v.nii@40: expected one 3D volume"), "{error}");
+    assert!(
+        error.starts_with("v.nii@352: expected 18 bytes of voxels (3 x 1 x 2 x 3 frames x 1 bytes), found 12"),
+        "{error}"
+    );
+}
+
+#[test]
+fn nifti_2_is_named() {
+    for (name, big) in [("a.nii", false), ("a.file", true)] {
+        let mut content = vec![0; 600];
+        content[..4].copy_from_slice(&if big { 540i32.to_be_bytes() } else { 540i32.to_le_bytes() });
+        content[4..12].copy_from_slice(b"n+2\0\r\n\x1a\n");
+        let error = load(name, &content).unwrap_err().to_string();
+        assert!(error.contains("expected a NIfTI-1 header, found a NIfTI-2 header"), "{error}");
+    }
 }

@@ -12,6 +12,7 @@ use splat_core::TransferFunction;
 pub(super) fn check_isosurface(at: &At<'_>, raw: &RawIsosurface, paths: &Paths) -> Result<IsosurfaceSource, Error> {
     Ok(IsosurfaceSource {
         path: paths.resolve(&at.key("volume"), &raw.volume)?,
+        frame: raw.frame.into(),
         level: at.number("level", raw.level, -LARGEST..=LARGEST)?,
         interpolation: match raw.interpolation {
             RawInterpolation::Trilinear => Interpolation::Trilinear,
@@ -41,6 +42,7 @@ pub(super) fn check_slice(
 ) -> Result<SliceSource, Error> {
     Ok(SliceSource {
         path: paths.resolve(&at.key("volume"), &raw.volume)?,
+        frame: raw.frame.into(),
         transfer,
         center: at.vector("center", raw.center)?,
         normal: at.direction("normal", raw.normal)?,

@@ -105,8 +105,10 @@ fn refuse_what_does_not_apply(at: &At<'_>, raw: &RawObject, source: &Source) -> 
     if raw.points.is_none() && raw.merge_duplicates {
         return Err(at.key("merge_duplicates").error("`merge_duplicates` belongs to `points`", ""));
     }
-    if raw.volume.is_none() && raw.lattice.is_some() {
-        return Err(at.key("lattice").error("`lattice` belongs to a `volume`", ""));
+    for (key, on) in [("lattice", raw.lattice.is_some()), ("frame", raw.frame.is_some())] {
+        if raw.volume.is_none() && on {
+            return Err(at.key(key).error(format!("`{key}` belongs to a `volume`"), ""));
+        }
     }
     if raw.volume.is_none() && raw.slice.is_none() {
         for (key, on) in [("transfer", raw.transfer.is_some()), ("unit_length", raw.unit_length.is_some())] {

@@ -72,7 +72,8 @@ pub(super) fn check_source(
     }
     if let Some(path) = &raw.volume {
         let path = paths.resolve(&at_source, path)?;
-        return Ok(Source::Volume(VolumeSource { path, transfer: check_transfer(at, raw, false)? }));
+        let frame = raw.frame.unwrap_or(0).into();
+        return Ok(Source::Volume(VolumeSource { path, frame, transfer: check_transfer(at, raw, false)? }));
     }
     if let Some(implicit) = &raw.implicit {
         return check_implicit(&at_source, implicit).map(Source::Implicit);

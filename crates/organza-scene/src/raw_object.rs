@@ -19,6 +19,8 @@ pub(super) struct RawObject {
     pub(super) mesh: Option<String>,
     /// Path of a regular volume; needs `transfer`.
     pub(super) volume: Option<String>,
+    /// Which volume of a series `volume` is, from 0; default 0.
+    pub(super) frame: Option<u32>,
     /// Path of a raw point cloud.
     pub(super) points: Option<String>,
     /// The zero set of an expression.

@@ -26,6 +26,9 @@ pub(super) struct RawImplicit {
 pub(super) struct RawIsosurface {
     /// Path of a regular volume.
     pub(super) volume: String,
+    /// Which volume of a series, from 0; default 0.
+    #[serde(default)]
+    pub(super) frame: u32,
     /// Physical value.
     pub(super) level: f64,
     /// Values between lattice points; default "trilinear".
@@ -74,6 +77,9 @@ pub(super) struct RawLevelSet {
 pub(super) struct RawSlice {
     /// Path of a regular volume.
     pub(super) volume: String,
+    /// Which volume of a series, from 0; default 0.
+    #[serde(default)]
+    pub(super) frame: u32,
     /// A point of the plane, in the volume's own coordinates.
     pub(super) center: [f64; 3],
     /// Across the plane, any length.

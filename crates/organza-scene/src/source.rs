@@ -56,6 +56,8 @@ impl Source {
 pub struct VolumeSource {
     /// The file.
     pub path: PathBuf,
+    /// Which volume of a series, from 0.
+    pub frame: u64,
     /// Value → colour and extinction, 1/world unit (after the object's transform).
     pub transfer: TransferFunction,
 }
@@ -76,6 +78,8 @@ pub struct ImplicitSource {
 pub struct IsosurfaceSource {
     /// The file.
     pub path: PathBuf,
+    /// Which volume of a series, from 0.
+    pub frame: u64,
     /// Physical value.
     pub level: f64,
     /// Values between lattice points.
@@ -98,6 +102,8 @@ pub struct LevelSetSource {
 pub struct SliceSource {
     /// The file.
     pub path: PathBuf,
+    /// Which volume of a series, from 0.
+    pub frame: u64,
     /// Value → colour; the extinctions are 0.
     pub transfer: TransferFunction,
     /// A point of the plane.

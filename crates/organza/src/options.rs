@@ -44,6 +44,7 @@ impl Default for RenderOptions {
 impl RenderOptions {
     /// What a file may ask for when it is read.
     pub fn read_params(&self) -> ReadParams {
-        ReadParams { limits: Limits::bytes(self.max_memory), drop_invalid: self.drop_invalid, strict: self.strict }
+        let limits = Limits::bytes(self.max_memory);
+        ReadParams { limits, drop_invalid: self.drop_invalid, strict: self.strict, ..ReadParams::default() }
     }
 }

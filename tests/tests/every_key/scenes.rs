@@ -72,6 +72,7 @@ impl Folder {
         write("larger.xyz", &ball(0.75));
         write("grid.nrrd", &nrrd("", 1.0));
         write("other.nrrd", &nrrd("", 0.6));
+        write("series.nrrd", &series());
         write("body.nrrd", &nrrd("space: right-anterior-superior\n", 1.0));
         Self(folder)
     }
@@ -177,10 +178,23 @@ fn ball(radius: f64) -> String {
 
 /// A lopsided blob of 6³ values from 0 to 1 on cells of 0.2.
 fn nrrd(space: &str, most: f64) -> String {
-    let mut text = format!(
+    let text = format!(
         "NRRD0004\ntype: float\ndimension: 3\n{space}sizes: 6 6 6\nspace directions: (0.2,0,0) (0,0.2,0) (0,0,0.2)\n\
          space origin: (-0.5,-0.5,-0.5)\nencoding: ascii\n\n"
     );
+    text + &blob(most)
+}
+
+/// The blob and a fainter one as a series.
+fn series() -> String {
+    let header = nrrd("kinds: domain domain domain time\n", 1.0).split_once("\n\n").unwrap().0.to_owned();
+    let header = header.replace("dimension: 3", "dimension: 4").replace("6 6 6", "6 6 6 2");
+    header.replace("(0,0,0.2)", "(0,0,0.2) none") + "\n\n" + &blob(1.0) + &blob(0.9)
+}
+
+/// The values of the blob, a line each.
+fn blob(most: f64) -> String {
+    let mut text = String::new();
     for k in 0..216 {
         let at = |n: i32| 0.2 * f64::from(n) - 0.5;
         let (x, y, z) = (at(k % 6), at(k / 6 % 6), at(k / 36));

@@ -228,6 +228,8 @@ fn objects() -> Vec<Entry> {
         of(VOLUME, "object.lattice", "object.it.lattice='bcc'")
             .but_by(&["points", "particles"], Refused(2, "draws no body-centred lattice")),
         one("object.lattice", "object.it.lattice='bcc'").but(All, Refused(2, "`lattice` belongs to a `volume`")),
+        of(VOLUME, "object.frame", "object.it.frame=1").with(&["object.it.volume='series.nrrd'"]),
+        one("object.frame", "object.it.frame=1").but(All, Refused(2, "`frame` belongs to a `volume`")),
         of(All, "object.shadow_coefficient", "object.it.shadow_coefficient=0.2"),
         one("object.technique", "object.it.technique='reference'"),
         of(All, "object.casts_shadow", "object.it.casts_shadow=false"),
@@ -277,6 +279,8 @@ fn sources() -> Vec<Entry> {
         one("object.implicit.spacing", "object.it.implicit.spacing=0.15").with(&["object.it.implicit={expression='x^2 + y^2 + 2*z^2 - 0.3', box=[[-0.9, -0.9, -0.9], [0.9, 0.9, 0.9]], spacing=0.1}"]),
         of(These(&["isosurface"]), "object.isosurface", "object.it.isosurface={volume='grid.nrrd', level=0.75}"),
         of(These(&["isosurface"]), "object.isosurface.volume", "object.it.isosurface.volume='other.nrrd'"),
+        of(These(&["isosurface"]), "object.isosurface.frame", "object.it.isosurface.frame=1")
+            .with(&["object.it.isosurface.volume='series.nrrd'"]),
         of(These(&["isosurface"]), "object.isosurface.level", "object.it.isosurface.level=0.75"),
         of(These(&["isosurface"]), "object.isosurface.interpolation", "object.it.isosurface.interpolation='catmull-rom'"),
         of(These(&["isosurface"]), "object.isosurface.inside", "object.it.isosurface.inside='below'"),
@@ -285,6 +289,8 @@ fn sources() -> Vec<Entry> {
         of(These(&["level_set"]), "object.level_set.tolerance", "object.it.level_set.tolerance=0.05"),
         of(These(&["slice"]), "object.slice", "object.it.slice={volume='grid.nrrd', center=[0, 0, 0.2], normal=[0, 0, 1]}"),
         of(These(&["slice"]), "object.slice.volume", "object.it.slice.volume='other.nrrd'"),
+        of(These(&["slice"]), "object.slice.frame", "object.it.slice.frame=1")
+            .with(&["object.it.slice.volume='series.nrrd'"]),
         of(These(&["slice"]), "object.slice.center", "object.it.slice.center=[0, 0, 0.2]"),
         of(These(&["slice"]), "object.slice.normal", "object.it.slice.normal=[0.5, 0.3, 1]"),
         of(These(&["density"]), "object.density", "object.it.density={expression='1', box=[[-0.6, -0.6, -0.6], [0.6, 0.6, 0.6]], resolution=10}"),

@@ -1,10 +1,12 @@
 //! Bytes of a regular file from front to back, unpacked from gzip where they are packed, each within the limits.
 
 use super::ReadParams;
+use super::unpacked::Unpacked;
 use crate::error::{Place, ReadError};
-use flate2::bufread::MultiGzDecoder;
 use std::fs::File;
-use std::io::{self, BufReader, Read};
+use std::io::{self, Read};
+#[cfg(any(feature = "vti", feature = "vtk"))]
+use std::ops::Range;
 use std::path::Path;
 
 /// Most bytes asked from the allocator at once.
@@ -12,6 +14,9 @@ const STEP: usize = 64 << 20;
 /// Most decompressed bytes per compressed byte, past the first [`FREE`] bytes.
 const MAX_RATIO: u64 = 1000;
 const FREE: u64 = 16 << 20;
+/// Longest header in text; real ones have some hundred bytes.
+#[cfg(any(feature = "nrrd", feature = "metaimage"))]
+const MAX_HEADER: usize = 16 << 20;
 
 /// Bytes in the order of the file. What was looked at by [`Stream::peek`] is given once more.
 pub(super) struct Stream<'a> {
@@ -50,6 +55,13 @@ impl<'a> Stream<'a> {
         Self::new(content, Some(length), length, params)
     }
 
+    /// A part of a file in memory, whose places are those of the file.
+    #[cfg(any(feature = "vti", feature = "vtk"))]
+    pub(super) fn of_part(content: &'a [u8], part: Range<usize>, params: &ReadParams) -> Self {
+        let length = content.len() as u64;
+        Self { position: part.start as u64, ..Self::new(&content[part.clone()], Some(part.end as u64), length, params) }
+    }
+
     fn new(source: impl Read + 'a, length: Option<u64>, stored: u64, params: &ReadParams) -> Self {
         Self { source: Box::new(source), head: Vec::new(), taken: 0, position: 0, length, stored, params: *params }
     }
@@ -58,9 +70,14 @@ impl<'a> Stream<'a> {
     /// gzip, the bytes of the file itself decide how much may come out.
     pub(super) fn gunzip(self) -> Stream<'a> {
         let (stored, params) = (self.stored, self.params);
-        let counted = Counted { read: self.position, source: self };
-        let decoder = MultiGzDecoder::new(BufReader::with_capacity(1 << 18, counted));
-        Stream::new(Unpacked { decoder, given: 0, stored, params }, None, stored, &params)
+        Stream::new(Unpacked::gzip(self, stored, params), None, stored, &params)
+    }
+
+    /// The same of one zlib stream.
+    #[cfg(feature = "metaimage")]
+    pub(super) fn inflate(self) -> Stream<'a> {
+        let (stored, params) = (self.stored, self.params);
+        Stream::new(Unpacked::zlib(self, stored, params), None, stored, &params)
     }
 
     /// Up to `n` of the bytes to come, without taking them; fewer only at the end.
@@ -76,8 +93,37 @@ impl<'a> Stream<'a> {
         Ok(&ahead[..n.min(ahead.len())])
     }
 
+    /// What is to come up to where `ends` finds the end of a header, and some more; all of it where there is none.
+    #[cfg(any(feature = "nrrd", feature = "metaimage"))]
+    pub(super) fn peek_until(
+        &mut self,
+        ends: impl Fn(&[u8]) -> bool,
+        what: &str,
+        hint: &'static str,
+    ) -> Result<&[u8], ReadError> {
+        let mut length = 1 << 12;
+        loop {
+            let head = self.peek(length)?;
+            if head.len() < length || ends(head) {
+                return self.peek(length);
+            }
+            if length >= MAX_HEADER {
+                let expected = format!("{what} of at most {MAX_HEADER} bytes");
+                return Err(ReadError::input(Place::Byte(0), expected, "a longer one", hint));
+            }
+            length *= 4;
+        }
+    }
+
     /// Fills `target` as far as there are bytes; gives how many.
-    #[cfg(any(feature = "nrrd", feature = "nifti"))]
+    #[cfg(any(
+        feature = "nrrd",
+        feature = "nifti",
+        feature = "metaimage",
+        feature = "raw",
+        feature = "vti",
+        feature = "vtk"
+    ))]
     pub(super) fn fill(&mut self, target: &mut [u8]) -> Result<usize, ReadError> {
         let mut filled = 0;
         while filled < target.len() {
@@ -90,7 +136,14 @@ impl<'a> Stream<'a> {
     }
 
     /// Passes over `n` bytes; gives how many there were.
-    #[cfg(any(feature = "nrrd", feature = "nifti"))]
+    #[cfg(any(
+        feature = "nrrd",
+        feature = "nifti",
+        feature = "metaimage",
+        feature = "raw",
+        feature = "vti",
+        feature = "vtk"
+    ))]
     pub(super) fn skip(&mut self, n: u64) -> Result<u64, ReadError> {
         io::copy(&mut self.by_ref().take(n), &mut io::sink()).map_err(failed)
     }
@@ -108,7 +161,6 @@ impl<'a> Stream<'a> {
     }
 
     /// Bytes taken so far.
-    #[cfg(any(feature = "nrrd", feature = "nifti"))]
     pub(super) fn position(&self) -> u64 {
         self.position
     }
@@ -119,7 +171,14 @@ impl<'a> Stream<'a> {
     }
 
     /// Refuses what cannot come, before memory is taken for it.
-    #[cfg(any(feature = "nrrd", feature = "nifti"))]
+    #[cfg(any(
+        feature = "nrrd",
+        feature = "nifti",
+        feature = "metaimage",
+        feature = "raw",
+        feature = "vti",
+        feature = "vtk"
+    ))]
     pub(super) fn expect(&self, bytes: u64) -> Result<(), ReadError> {
         if self.length.is_none() { check_ratio(bytes, self.stored) } else { Ok(()) }
     }
@@ -167,45 +226,6 @@ impl Read for Measured {
     }
 }
 
-/// Tells how far a source was read.
-struct Counted<'a> {
-    source: Stream<'a>,
-    read: u64,
-}
-
-impl Read for Counted<'_> {
-    fn read(&mut self, target: &mut [u8]) -> io::Result<usize> {
-        let n = self.source.read(target)?;
-        self.read += n as u64;
-        Ok(n)
-    }
-}
-
-/// What comes out of gzip.
-struct Unpacked<'a> {
-    decoder: MultiGzDecoder<BufReader<Counted<'a>>>,
-    given: u64,
-    stored: u64,
-    params: ReadParams,
-}
-
-impl Read for Unpacked<'_> {
-    fn read(&mut self, target: &mut [u8]) -> io::Result<usize> {
-        let n = self.decoder.read(target).map_err(|e| {
-            let source = self.decoder.get_ref();
-            let at = source.get_ref().read - source.buffer().len() as u64;
-            let hint = "the file is truncated or damaged; fetch it again";
-            let damaged =
-                |e: io::Error| ReadError::input(Place::Byte(at), "a complete gzip stream", e.to_string(), hint);
-            io::Error::other(e.downcast::<ReadError>().unwrap_or_else(damaged))
-        })?;
-        self.given += n as u64;
-        check_bytes("the decompressed file", self.given, &self.params).map_err(io::Error::other)?;
-        check_ratio(self.given, self.stored).map_err(io::Error::other)?;
-        Ok(n)
-    }
-}
-
 fn refused(e: &io::Error) -> ReadError {
     ReadError::file_system("a file that can be read", e.to_string(), "check the path and its permissions")
 }
@@ -216,7 +236,7 @@ fn failed(e: io::Error) -> ReadError {
 }
 
 /// Refuses more bytes than gzip of `stored` bytes may stand for.
-fn check_ratio(bytes: u64, stored: u64) -> Result<(), ReadError> {
+pub(super) fn check_ratio(bytes: u64, stored: u64) -> Result<(), ReadError> {
     check_packed(bytes, stored, "gzip")
 }
 

@@ -1,11 +1,13 @@
-//! NIfTI-1 in one file (`.nii`, `.nii.gz`) → a volume of scalars in the file's world coordinates (millimetres mostly).
+//! NIfTI-1 in one file (`.nii`, `.nii.gz`) → a volume of scalars in the file's world coordinates (millimetres mostly), of a series
+//! one frame, of colours their luma.
 //!
 //! Affine: sform if its code is positive, else qform, else the voxel size alone (NIfTI-1 methods 3, 2 and 1).
 //! Values: stored · scl_slope + scl_inter, as they are where the slope is 0 or NaN.
 
 use super::input::Stream;
+use super::selection::Selection;
 use super::voxels::{self, Kind, Stored};
-use super::{ReadParams, lattice};
+use super::{Notes, ReadParams, lattice};
 use crate::error::{Place, ReadError};
 use ::nifti::{NiftiHeader, NiftiType};
 use splat_core::Grid;
@@ -15,17 +17,26 @@ const HEADER: usize = 348;
 const HINT: &str = "the file is truncated, damaged or not NIfTI-1; a Radiance image of this name begins with '#?'";
 
 /// Reads a volume.
-pub(super) fn read(mut stream: Stream<'_>, params: &ReadParams) -> Result<Grid, ReadError> {
+pub(super) fn read(mut stream: Stream<'_>, params: &ReadParams, notes: &mut Notes) -> Result<Grid, ReadError> {
     let (header, big_endian) = header(stream.peek(HEADER)?)?;
-    let dims = dims(&header)?;
-    let kind = header.data_type().ok().and_then(scalar).ok_or_else(|| {
-        let expected = "a datatype of real scalars: 8- to 64-bit integers, 32- or 64-bit floats";
+    let (dims, frames) = dims(&header)?;
+    let (kind, numbers) = header.data_type().ok().and_then(numbers).ok_or_else(|| {
+        let expected =
+            "a datatype of real scalars or colours: 8- to 64-bit integers, 32- or 64-bit floats, RGB24, RGBA32";
         ReadError::input(Place::Byte(70), expected, format!("code {}", header.datatype), "convert the volume first")
     })?;
+    let selection = Selection::of_frames(frames, Place::Byte(40), params, notes)?.with_numbers(
+        (numbers, kind, true),
+        Place::Byte(70),
+        notes,
+    )?;
+    // The standard scales no colours.
+    let scaling = if numbers == 1 { scaling(&header)? } else { (1.0, 0.0) };
+    let stored = Stored { kind, big_endian, dims: dims.map(|n| n as u64), selection, scaling };
+    stored.check(Place::Byte(40), HINT)?;
     to_voxels(&mut stream, header.vox_offset)?;
     let (origin, axes) = affine(&header);
     lattice::check(origin, &axes, Place::Byte(252), HINT)?;
-    let stored = Stored { kind, big_endian, dims: dims.map(|n| n as u64), scaling: scaling(&header)? };
     let values = voxels::read(&mut stream, &stored, params, HINT)?;
     Ok(Grid { origin, axes, dims, values })
 }
@@ -65,9 +76,10 @@ fn header(content: &[u8]) -> Result<(NiftiHeader, bool), ReadError> {
     Ok((header, big_endian))
 }
 
-fn dims(header: &NiftiHeader) -> Result<[usize; 3], ReadError> {
+/// Sizes of a volume, and how many there are.
+fn dims(header: &NiftiHeader) -> Result<([usize; 3], u64), ReadError> {
     let wrong = |expected: &str| {
-        let hint = "extract one 3D volume from the series first";
+        let hint = "write one volume of scalars, or a series of them in four dimensions";
         Err(ReadError::input(Place::Byte(40), expected, format!("{:?}", header.dim), hint))
     };
     let rank = usize::from(header.dim[0]);
@@ -77,14 +89,18 @@ fn dims(header: &NiftiHeader) -> Result<[usize; 3], ReadError> {
     if header.dim[1..=rank].iter().any(|d| !(1..=i16::MAX as u16).contains(d)) {
         return wrong("dimensions from 1 to 32767");
     }
-    if header.dim[4..=rank.max(3)].iter().any(|d| *d != 1) {
-        return wrong("one 3D volume of one value a voxel");
+    if header.dim.iter().take(rank + 1).skip(5).any(|d| *d != 1) {
+        return wrong("3D volumes of one value a voxel");
     }
-    Ok([1, 2, 3].map(|i| usize::from(header.dim[i])))
+    let frames = if rank > 3 { header.dim[4] } else { 1 };
+    Ok(([1, 2, 3].map(|i| usize::from(header.dim[i])), frames.into()))
 }
 
-fn scalar(kind: NiftiType) -> Option<Kind> {
-    Some(match kind {
+/// The numbers of a voxel: their type, and how many there are.
+fn numbers(kind: NiftiType) -> Option<(Kind, u64)> {
+    let scalar = match kind {
+        NiftiType::Rgb24 => return Some((Kind::U8, 3)),
+        NiftiType::Rgba32 => return Some((Kind::U8, 4)),
         NiftiType::Uint8 => Kind::U8,
         NiftiType::Int8 => Kind::I8,
         NiftiType::Uint16 => Kind::U16,
@@ -96,7 +112,8 @@ fn scalar(kind: NiftiType) -> Option<Kind> {
         NiftiType::Float32 => Kind::F32,
         NiftiType::Float64 => Kind::F64,
         _ => return None,
-    })
+    };
+    Some((scalar, 1))
 }
 
 /// Passes over the header and what may follow it before the voxels.

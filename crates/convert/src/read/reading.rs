@@ -9,7 +9,10 @@ use super::ReadParams;
     feature = "pcd",
     feature = "xyz",
     feature = "las",
-    feature = "hdr"
+    feature = "hdr",
+    feature = "metaimage",
+    feature = "vti",
+    feature = "vtk"
 ))]
 use crate::error::escaped;
 use crate::error::{Place, ReadError};
@@ -109,7 +112,10 @@ pub struct Notes {
     feature = "pcd",
     feature = "xyz",
     feature = "las",
-    feature = "hdr"
+    feature = "hdr",
+    feature = "metaimage",
+    feature = "vti",
+    feature = "vtk"
 ))]
 impl Notes {
     /// Adds names that are not used, each once, with what would steer a terminal escaped.

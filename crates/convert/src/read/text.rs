@@ -34,6 +34,15 @@ pub(super) struct Word<'a> {
     open: bool,
 }
 
+/// The words of a text between blanks, commas or semicolons, however long its lines are.
+#[cfg(any(feature = "nrrd", feature = "metaimage", feature = "vti", feature = "vtk"))]
+pub(super) struct Words<'a> {
+    content: &'a [u8],
+    at: usize,
+    line: u64,
+    line_start: usize,
+}
+
 impl<'a> Lines<'a> {
     pub(super) fn new(content: &'a [u8]) -> Self {
         let at = if content.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
@@ -47,7 +56,7 @@ impl<'a> Lines<'a> {
     }
 
     /// Number of the line that was read last.
-    #[cfg(any(feature = "nrrd", feature = "pcd"))]
+    #[cfg(any(feature = "nrrd", feature = "pcd", feature = "metaimage"))]
     pub(super) fn number(&self) -> u64 {
         self.number
     }
@@ -70,13 +79,25 @@ impl<'a> Lines<'a> {
     }
 
     /// Bytes read.
-    #[cfg(any(feature = "nrrd", feature = "pcd"))]
+    #[cfg(any(feature = "nrrd", feature = "pcd", feature = "metaimage", feature = "vtk"))]
     pub(super) fn offset(&self) -> usize {
         self.at.min(self.content.len())
     }
 
+    /// The words behind the lines that were read.
+    #[cfg(feature = "vtk")]
+    pub(super) fn words(&self) -> Words<'a> {
+        Words::new(self.content, self.at.min(self.content.len()), self.number + 1)
+    }
+
+    /// Goes on at a byte of the line of this number.
+    #[cfg(feature = "vtk")]
+    pub(super) fn go_to(&mut self, at: usize, line: u64) {
+        (self.at, self.number) = (at, line - 1);
+    }
+
     /// The place after the last line.
-    #[cfg(any(feature = "stl", feature = "nrrd", feature = "off", feature = "pcd"))]
+    #[cfg(any(feature = "stl", feature = "nrrd", feature = "off", feature = "pcd", feature = "metaimage", feature = "vtk"))]
     pub(super) fn end(&self) -> Place {
         Place::Line { line: self.number + 1, column: 0 }
     }
@@ -98,6 +119,46 @@ impl<'a> Line<'a> {
     /// The place of the whole line.
     pub(super) fn place(self) -> Place {
         Place::Line { line: self.number, column: 0 }
+    }
+}
+
+#[cfg(any(feature = "nrrd", feature = "metaimage", feature = "vti", feature = "vtk"))]
+impl<'a> Words<'a> {
+    /// Those from a byte on, which lies in the line of this number.
+    pub(super) fn new(content: &'a [u8], at: usize, line: u64) -> Self {
+        Self { content, at, line, line_start: at }
+    }
+
+    /// Bytes to come.
+    pub(super) fn left(&self) -> usize {
+        self.content.len() - self.at
+    }
+
+    /// The byte behind the last word, and the number of its line.
+    #[cfg(feature = "vtk")]
+    pub(super) fn end(&self) -> (usize, u64) {
+        (self.at, self.line)
+    }
+}
+
+#[cfg(any(feature = "nrrd", feature = "metaimage", feature = "vti", feature = "vtk"))]
+impl<'a> Iterator for Words<'a> {
+    type Item = Word<'a>;
+
+    fn next(&mut self) -> Option<Word<'a>> {
+        let separates = |b: &u8| b.is_ascii_whitespace() || matches!(b, 0x0b | b',' | b';');
+        while let Some(byte) = self.content.get(self.at).filter(|b| separates(b)) {
+            self.at += 1;
+            if *byte == b'\n' || *byte == b'\r' && self.content.get(self.at) != Some(&b'\n') {
+                self.line += 1;
+                self.line_start = self.at;
+            }
+        }
+        let rest = &self.content[self.at..];
+        let text = &rest[..rest.iter().position(separates).unwrap_or(rest.len())];
+        let column = (self.at - self.line_start) as u64 + 1;
+        self.at += text.len();
+        (!text.is_empty()).then_some(Word { text, line: self.line, column, open: self.left() == 0 })
     }
 }
 

@@ -15,7 +15,7 @@ pub enum UpAxis {
     /// As meshes mostly have it, and for formats that say nothing.
     #[default]
     Y,
-    /// Elevation in LAS and LAZ; superior in NIfTI and in an NRRD whose `space` is one of a body.
+    /// Elevation in LAS and LAZ; superior in NIfTI, in MetaImage and in an NRRD whose `space` is one of a body.
     Z,
 }
 
@@ -53,7 +53,7 @@ fn beginning(path: &Path) -> Option<Vec<u8>> {
 
 fn of_content(path: &Path, content: &[u8]) -> UpAxis {
     match format_of(path, content) {
-        Some(Format::Las | Format::Nifti) => UpAxis::Z,
+        Some(Format::Las | Format::Nifti | Format::MetaImage) => UpAxis::Z,
         Some(Format::Nrrd) if is_of_a_body(content) => UpAxis::Z,
         _ => UpAxis::Y,
     }
@@ -85,6 +85,9 @@ mod tests {
         assert_eq!(of("a.stl", b"solid a\n"), UpAxis::Y);
         assert_eq!(of("a.xyz", b"0 0 0\n"), UpAxis::Y);
         assert_eq!(of("a.nii", &[0; 348]), UpAxis::Z);
+        assert_eq!(of("a", b"ObjectType = Image\nNDims = 3\n"), UpAxis::Z);
+        assert_eq!(of("a.vti", b"<VTKFile type=\"ImageData\">"), UpAxis::Y);
+        assert_eq!(of("a.raw", b"LASF"), UpAxis::Y);
         assert_eq!(of("a.nrrd", b"NRRD0004\ntype: float\n\nspace: RAS\n"), UpAxis::Y);
         for (space, up) in [
             ("RAS", UpAxis::Z),

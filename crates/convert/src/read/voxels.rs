@@ -2,15 +2,20 @@
 
 use super::ReadParams;
 use super::input::{self, Stream};
+use super::selection::Selection;
+#[cfg(any(feature = "nrrd", feature = "metaimage", feature = "vti", feature = "vtk"))]
+use super::text::Words;
 use crate::error::{Place, ReadError};
 use rayon::prelude::*;
 
 /// Voxels converted by one task.
 const CHUNK: usize = 1 << 16;
-/// Bytes read at once; a multiple of every size.
-const BLOCK: usize = 8 << 20;
+/// Bytes read at once, about.
+const BLOCK: u64 = 8 << 20;
+/// Most numbers in a file.
+const MAX_NUMBERS: u64 = 1 << 45;
 
-/// Type of one stored voxel.
+/// Type of one stored number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     I8,
@@ -26,7 +31,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// Bytes of a voxel.
+    /// Bytes of a number.
     pub(super) fn size(self) -> u64 {
         match self {
             Self::I8 | Self::U8 => 1,
@@ -43,19 +48,57 @@ pub(super) struct Stored {
     pub(super) kind: Kind,
     pub(super) big_endian: bool,
     pub(super) dims: [u64; 3],
+    pub(super) selection: Selection,
     /// Slope and intercept of the values; (1, 0) for none.
     pub(super) scaling: (f64, f64),
 }
 
 impl Stored {
-    /// Voxels; callers have checked that it is at most 2^45.
+    /// Refuses sizes whose product is out of reach; the other methods ask for this first.
+    pub(super) fn check(&self, place: Place, hint: &'static str) -> Result<(), ReadError> {
+        let Selection { frames, numbers, .. } = self.selection;
+        let sizes = self.dims.into_iter().chain([frames, numbers]);
+        if sizes.into_iter().try_fold(1u64, |n, s| n.checked_mul(s)).is_none_or(|n| n > MAX_NUMBERS) {
+            let found = format!("{:?}, {frames} times, {numbers} numbers each", self.dims);
+            return Err(ReadError::input(place, "at most 2^45 voxels", found, hint));
+        }
+        Ok(())
+    }
+
+    /// Voxels of the volume.
     pub(super) fn count(&self) -> u64 {
         self.dims.iter().product()
     }
 
-    /// Bytes of all voxels.
+    /// Bytes of one frame.
+    fn frame_bytes(&self) -> u64 {
+        self.count() * self.voxel_bytes()
+    }
+
+    /// Bytes of one voxel.
+    fn voxel_bytes(&self) -> u64 {
+        self.selection.numbers * self.kind.size()
+    }
+
+    /// Bytes of all numbers.
     pub(super) fn bytes(&self) -> u64 {
-        self.count() * self.kind.size()
+        self.frame_bytes() * self.selection.frames
+    }
+
+    /// The value of a voxel with these numbers.
+    fn value(&self, number: impl Fn(usize) -> f64) -> f32 {
+        let value = self.selection.value.of(number);
+        match self.scaling {
+            (1.0, 0.0) => value as f32,
+            (slope, intercept) => (value * slope + intercept) as f32,
+        }
+    }
+
+    /// Its sizes in words.
+    fn shown(&self) -> String {
+        let ([x, y, z], Selection { frames, numbers, .. }) = (self.dims, self.selection);
+        let times = |n: u64, what: &str| if n == 1 { String::new() } else { format!(" x {n} {what}") };
+        format!("{x} x {y} x {z}{}{}", times(numbers, "numbers"), times(frames, "frames"))
     }
 }
 
@@ -68,34 +111,30 @@ pub(super) fn read(
 ) -> Result<Vec<f32>, ReadError> {
     let (needed, at) = (stored.bytes(), stream.position());
     let wrong = |found: String| {
-        let [x, y, z] = stored.dims;
-        let expected = format!("{needed} bytes of voxels ({x} x {y} x {z} x {} bytes)", stored.kind.size());
+        let expected = format!("{needed} bytes of voxels ({} x {} bytes)", stored.shown(), stored.kind.size());
         Err(ReadError::input(Place::Byte(at), expected, found, hint))
     };
     if let Some(left) = stream.left().filter(|left| *left != needed) {
         return wrong(left.to_string());
     }
-    input::check_bytes("the voxels", stored.count() * size_of::<f32>() as u64, params)?;
+    let mut values = room(stored, params)?;
     stream.expect(needed)?;
-    let mut values = Vec::new();
-    input::reserve(&mut values, stored.count() as usize)?;
-    let mut block = vec![0; (needed as usize).min(BLOCK)];
-    let mut left = needed as usize;
-    while left > 0 {
-        let part = &mut block[..left.min(BLOCK)];
-        let got = stream.fill(part)?;
-        if got < part.len() {
-            return wrong((needed as usize - left + got).to_string());
-        }
-        append(&mut values, part, stored);
-        left -= got;
+    let start = stored.frame_bytes() * stored.selection.frame;
+    let mut got = stream.skip(start)?;
+    if got == start {
+        got += frame(stream, stored, &mut values)?;
     }
-    // One byte more is too much already, however many there are.
-    if stream.fill(&mut [0])? > 0 {
-        return wrong(format!("more than {needed}"));
+    // Of the frames behind it only the length matters; one byte more is too much already, however many there are.
+    if got == start + stored.frame_bytes() {
+        got += stream.skip(needed - got + 1)?;
+    }
+    match got {
+        n if n < needed => return wrong(n.to_string()),
+        n if n > needed => return wrong(format!("more than {needed}")),
+        _ => {}
     }
     if let Some(i) = values.par_iter().position_first(|v| !v.is_finite()) {
-        let place = Place::Byte(at + i as u64 * stored.kind.size());
+        let place = Place::Byte(at + start + i as u64 * stored.voxel_bytes());
         let found = format!("{} at voxel {i}", values[i]);
         let hint = "replace NaN by the background value first";
         return Err(ReadError::input(place, "finite values that fit 32-bit floats", found, hint));
@@ -103,17 +142,74 @@ pub(super) fn read(
     Ok(values)
 }
 
+/// Reads the voxels behind so many bytes, with which the stream has to end; −1 for whatever comes before.
+#[cfg(any(feature = "nrrd", feature = "metaimage"))]
+pub(super) fn behind(
+    mut stream: Stream<'_>,
+    skip: i64,
+    stored: &Stored,
+    params: &ReadParams,
+    hint: &'static str,
+) -> Result<Vec<f32>, ReadError> {
+    if skip == -1 {
+        let data = stream.rest()?;
+        let Some(start) = (data.len() as u64).checked_sub(stored.bytes()) else {
+            let expected = format!("{} bytes of voxels at the end of the data", stored.bytes());
+            return Err(ReadError::input(Place::File, expected, format!("{} bytes", data.len()), hint));
+        };
+        return read(&mut Stream::of(&data[start as usize..], params), stored, params, hint);
+    }
+    let inside = |n: u64| stream.left().is_none_or(|left| n <= left);
+    match u64::try_from(skip).ok().filter(|n| inside(*n)) {
+        Some(n) if stream.skip(n)? == n => read(&mut stream, stored, params, hint),
+        _ => {
+            let expected = "a number of bytes before the voxels, within the data";
+            Err(ReadError::input(Place::File, expected, skip.to_string(), hint))
+        }
+    }
+}
+
+/// Room for the values of the volume.
+fn room(stored: &Stored, params: &ReadParams) -> Result<Vec<f32>, ReadError> {
+    let mut values = Vec::new();
+    input::check_bytes("the voxels", stored.count() * size_of::<f32>() as u64, params)?;
+    input::reserve(&mut values, stored.count() as usize)?;
+    Ok(values)
+}
+
+/// Reads one frame; gives how many bytes of it there were.
+fn frame(stream: &mut Stream<'_>, stored: &Stored, values: &mut Vec<f32>) -> Result<u64, ReadError> {
+    let (bytes, voxel) = (stored.frame_bytes(), stored.voxel_bytes());
+    let most = (BLOCK / voxel).max(1) * voxel;
+    let mut block = vec![0; bytes.min(most) as usize];
+    let mut got = 0;
+    while got < bytes {
+        let part = &mut block[..(bytes - got).min(most) as usize];
+        let filled = stream.fill(part)?;
+        got += filled as u64;
+        if filled < part.len() {
+            break;
+        }
+        append(values, part, stored);
+    }
+    Ok(got)
+}
+
 fn append(values: &mut Vec<f32>, raw: &[u8], stored: &Stored) {
     macro_rules! decode {
-        ($t:ty) => {
-            convert(values, raw, |b: [u8; size_of::<$t>()]| {
-                let value = if stored.big_endian { <$t>::from_be_bytes(b) } else { <$t>::from_le_bytes(b) };
-                match stored.scaling {
-                    (1.0, 0.0) => value as f32,
-                    (slope, intercept) => (value as f64 * slope + intercept) as f32,
+        ($t:ty) => {{
+            let (numbers, _) = raw.as_chunks::<{ size_of::<$t>() }>();
+            let number = |b| if stored.big_endian { <$t>::from_be_bytes(b) } else { <$t>::from_le_bytes(b) };
+            match (stored.selection.numbers, stored.scaling) {
+                (1, (1.0, 0.0)) => {
+                    values.par_extend(numbers.par_iter().with_min_len(CHUNK).map(|b| number(*b) as f32));
                 }
-            })
-        };
+                (many, _) => {
+                    let voxels = numbers.par_chunks_exact(many as usize).with_min_len(CHUNK);
+                    values.par_extend(voxels.map(|voxel| stored.value(|i| number(voxel[i]) as f64)));
+                }
+            }
+        }};
     }
     match stored.kind {
         Kind::I8 => decode!(i8),
@@ -129,6 +225,56 @@ fn append(values: &mut Vec<f32>, raw: &[u8], stored: &Stored) {
     }
 }
 
-fn convert<const N: usize>(values: &mut Vec<f32>, raw: &[u8], decode: impl Fn([u8; N]) -> f32 + Sync) {
-    values.par_extend(raw.as_chunks::<N>().0.par_iter().with_min_len(CHUNK).map(|b| decode(*b)));
+/// Reads the voxels from a text, as many as there have to be; `hint` says what is wrong if there are fewer.
+#[cfg(any(feature = "nrrd", feature = "metaimage", feature = "vti", feature = "vtk"))]
+pub(super) fn text(
+    words: &mut Words<'_>,
+    stored: &Stored,
+    params: &ReadParams,
+    hint: &'static str,
+) -> Result<Vec<f32>, ReadError> {
+    let Selection { frames, frame, numbers, .. } = stored.selection;
+    let needed = stored.count() * numbers * frames;
+    let wrong = |found: usize| {
+        let what = if needed == stored.count() { String::new() } else { format!(" ({})", stored.shown()) };
+        Err(ReadError::input(Place::File, format!("{needed} voxels{what}"), found.to_string(), hint))
+    };
+    // A digit and a blank each, but for the last one: the text cannot hold more, whatever the header says.
+    if needed > (words.left() as u64).div_ceil(2) {
+        return wrong(words.count());
+    }
+    let mut values = room(stored, params)?;
+    let mut voxel = Vec::new();
+    for i in 0..needed {
+        let Some(word) = words.next() else { return wrong(i as usize) };
+        voxel.push(word.number()?);
+        if (voxel.len() as u64) < numbers {
+            continue;
+        }
+        if i / (stored.count() * numbers) == frame {
+            let value = stored.value(|i| voxel[i]);
+            if !value.is_finite() {
+                let expected = "a value that fits a 32-bit float";
+                return Err(ReadError::input(word.place(), expected, word.shown(), "scale the values"));
+            }
+            values.push(value);
+        }
+        voxel.clear();
+    }
+    Ok(values)
+}
+
+/// The same of a text in which nothing else follows.
+#[cfg(any(feature = "nrrd", feature = "metaimage", feature = "vti"))]
+pub(super) fn whole_text(
+    mut words: Words<'_>,
+    stored: &Stored,
+    params: &ReadParams,
+    hint: &'static str,
+) -> Result<Vec<f32>, ReadError> {
+    let values = text(&mut words, stored, params, hint)?;
+    match words.next() {
+        None => Ok(values),
+        Some(word) => Err(ReadError::input(word.place(), "the end of the voxels", word.shown(), hint)),
+    }
 }

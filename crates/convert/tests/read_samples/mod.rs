@@ -7,6 +7,8 @@ pub(crate) mod images;
 pub(crate) mod meshes;
 #[cfg(feature = "las")]
 pub(crate) mod oldest;
+#[cfg(feature = "vti")]
+pub(crate) mod volumes;
 
 #[cfg(all(feature = "off", feature = "pcd", feature = "gltf"))]
 pub(crate) use meshes::*;

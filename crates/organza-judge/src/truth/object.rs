@@ -1,6 +1,6 @@
 //! One object as the path tracer takes it: a density or a mesh in the world.
 
-use convert::read::Loaded as FileData;
+use convert::read::{Loaded as FileData, ReadParams};
 use convert::{ExpressionField, SplatParams};
 use glam::{DMat3, DQuat, DVec3, Vec3};
 use organza::scene::{Scene, SceneMaterial, SceneObject, Source, VolumeSource};
@@ -74,7 +74,7 @@ pub(super) fn body(
             return no("surfaces of measured fields are not path-traced");
         }
         Source::Implicit(_) if !object.clip.is_empty() => return no("open surfaces are not path-traced"),
-        Source::Mesh(path) => match read(path, options)? {
+        Source::Mesh(path) => match read(path, 0, options)? {
             FileData::Mesh(mesh) => mesh,
             _ => {
                 return Err(Error::wrong_kind(
@@ -208,8 +208,8 @@ fn shape(object: &SceneObject, options: &RenderOptions) -> Result<(Shape, f64), 
             let majorant = majorant(&field, bounds);
             (Shape::Field { field, bounds, majorant }, d.extinction)
         }
-        Source::Volume(VolumeSource { path, transfer }) => {
-            let FileData::Grid(grid) = read(path, options)? else {
+        Source::Volume(VolumeSource { path, frame, transfer }) => {
+            let FileData::Grid(grid) = read(path, *frame, options)? else {
                 return Err(Error::wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file"));
             };
             grid.validate().map_err(|e| Error::input(printable(path), e.to_string(), ""))?;
@@ -291,8 +291,10 @@ fn surface(scene: &Scene, object: &SceneObject, mut mesh: Mesh) -> Body {
     Body::Surface(mesh, material)
 }
 
-fn read(path: &Path, options: &RenderOptions) -> Result<FileData, Error> {
-    convert::read::file(path, &options.read_params(), None).map(|read| read.0).map_err(|e| Error::from_read(path, &e))
+/// The data of a file; of a series of volumes that of one frame.
+fn read(path: &Path, frame: u64, options: &RenderOptions) -> Result<FileData, Error> {
+    let params = ReadParams { frame, ..options.read_params() };
+    convert::read::file(path, &params, None).map(|read| read.0).map_err(|e| Error::from_read(path, &e))
 }
 
 /// Moves a mesh into the world; without normals it gets smooth ones, as its splats do.

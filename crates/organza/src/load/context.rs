@@ -3,6 +3,7 @@
 use super::files::{FileData, Files};
 use crate::scene::{Scene, SceneObject, Source};
 use crate::{Error, RenderOptions};
+use convert::read::ReadParams;
 use convert::{Orientation, SplatParams, SurfelParams, VolumeParams};
 use glam::DVec3;
 use splat_core::{Limits, Progress, Shading};
@@ -93,6 +94,11 @@ impl Context<'_> {
 
     pub(super) fn read(&self, path: &Path) -> Result<FileData, Error> {
         self.files.read(path, &self.options.read_params(), self.progress)
+    }
+
+    /// The same of one volume of a series.
+    pub(super) fn read_frame(&self, path: &Path, frame: u64) -> Result<FileData, Error> {
+        self.files.read(path, &ReadParams { frame, ..self.options.read_params() }, self.progress)
     }
 
     /// The same of a file that nothing but what is made from it needs.

@@ -24,7 +24,8 @@ pub(super) type Fitted = (SharedField, DAabb);
 /// The files of a scene that were read.
 #[derive(Default)]
 pub(crate) struct Files {
-    read: RefCell<HashMap<PathBuf, (ReadParams, FileData)>>,
+    /// By path and frame.
+    read: RefCell<HashMap<(PathBuf, u64), (ReadParams, FileData)>>,
     /// What there is to say of them, one sentence each.
     notes: RefCell<Vec<String>>,
     /// Fits take longer than reading: with their tolerance and the bytes that they take.
@@ -40,7 +41,7 @@ impl Files {
             return Ok(data);
         }
         let data = self.read_anew(path, limits, progress)?;
-        self.read.borrow_mut().insert(path.to_owned(), (*limits, data.clone()));
+        self.read.borrow_mut().insert((path.to_owned(), limits.frame), (*limits, data.clone()));
         Ok(data)
     }
 
@@ -81,7 +82,7 @@ impl Files {
 
     fn known(&self, path: &Path, limits: &ReadParams) -> Option<FileData> {
         let read = self.read.borrow();
-        read.get(path).filter(|(with, _)| with == limits).map(|(_, data)| data.clone())
+        read.get(&(path.to_owned(), limits.frame)).filter(|(with, _)| with == limits).map(|(_, data)| data.clone())
     }
 
     /// The level set of a file's points unless it was fitted with the same tolerance; `fit` also says how many bytes it takes.

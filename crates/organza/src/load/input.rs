@@ -132,8 +132,8 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
             let points = at_spacing(read_points(path, context)?, object, &splat, convert::thinned)?;
             Input::Points(path, points, context.surfel_params(object, splat))
         }
-        Source::Volume(VolumeSource { path, transfer }) => {
-            let grid = at_spacing(read_grid(path, context)?, object, &splat, convert::resampled)?;
+        Source::Volume(VolumeSource { path, frame, transfer }) => {
+            let grid = at_spacing(read_grid(path, *frame, context)?, object, &splat, convert::resampled)?;
             Input::Volume(grid, transfer, context.volume_params(splat))
         }
         Source::Implicit(ImplicitSource { expression, bounds, spacing }) => {
@@ -141,7 +141,7 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
             surface(ZeroSet { field, trilinear: None, bounds: *bounds, step: *spacing }, object, splat, opacity)?
         }
         Source::Isosurface(source) => {
-            let grid = read_grid(&source.path, context)?;
+            let grid = read_grid(&source.path, source.frame, context)?;
             let step = grid.shortest_step();
             let trilinear =
                 (source.interpolation == Interpolation::Trilinear).then(|| (grid.clone(), source.level as f32));
@@ -178,7 +178,7 @@ fn slice<'a>(
     opacity: f64,
     context: &Context<'_>,
 ) -> Result<Input<'a>, Error> {
-    let grid = read_grid(&source.path, context)?;
+    let grid = read_grid(&source.path, source.frame, context)?;
     let spacing = object.spacing.map_or_else(|| grid.shortest_step(), |s| s / splat.transform.scale);
     let section = Section { center: source.center, normal: source.normal, spacing };
     let mesh = convert::volume_section(grid, &source.transfer, &section, &splat, Some(context.progress))?;
@@ -274,8 +274,8 @@ fn read_points(path: &Path, context: &Context<'_>) -> Result<Arc<RawPoints>, Err
     }
 }
 
-fn read_grid(path: &Path, context: &Context<'_>) -> Result<Arc<Grid>, Error> {
-    match context.read(path)? {
+fn read_grid(path: &Path, frame: u64, context: &Context<'_>) -> Result<Arc<Grid>, Error> {
+    match context.read_frame(path, frame)? {
         FileData::Grid(grid) => Ok(grid),
         _ => Err(Error::wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file")),
     }

@@ -1,0 +1,104 @@
+//! Which of a file's numbers are the volume: one frame of a series, and one number for each voxel.
+
+use super::voxels::Kind;
+use super::{Notes, ReadParams};
+use crate::error::{Place, ReadError};
+
+/// Weights of red, green and blue in the luma of ITU-R BT.709.
+const LUMA: [f64; 3] = [0.2126, 0.7152, 0.0722];
+
+/// What of a voxel's numbers, which lie side by side, is its value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Value {
+    /// One of them, counted from 0.
+    Number(u64),
+    /// The luma of the first three, as they are stored: of one grey it is the number that stands for it.
+    Luma,
+}
+
+impl Value {
+    /// The value of a voxel with these numbers.
+    pub(super) fn of(self, number: impl Fn(usize) -> f64) -> f64 {
+        match self {
+            Self::Number(i) => number(i as usize),
+            Self::Luma => LUMA.iter().enumerate().map(|(i, weight)| weight * number(i)).sum(),
+        }
+    }
+}
+
+/// The part of the stored numbers that is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Selection {
+    /// Volumes that lie one behind the other.
+    pub(super) frames: u64,
+    /// Which of them, from 0.
+    pub(super) frame: u64,
+    /// Numbers of a voxel.
+    pub(super) numbers: u64,
+    pub(super) value: Value,
+}
+
+impl Selection {
+    /// The frame that `params` ask for, of so many volumes one behind the other; 1 where the format has no series.
+    pub(super) fn of_frames(
+        frames: u64,
+        place: Place,
+        params: &ReadParams,
+        notes: &mut Notes,
+    ) -> Result<Self, ReadError> {
+        let frame = chosen(frames, place, params, notes)?;
+        Ok(Self { frames, frame, numbers: 1, value: Value::Number(0) })
+    }
+
+    /// The same of a series whose voxels have the numbers of all frames side by side.
+    #[cfg(feature = "nrrd")]
+    pub(super) fn of_mingled_frames(
+        frames: u64,
+        place: Place,
+        params: &ReadParams,
+        notes: &mut Notes,
+    ) -> Result<Self, ReadError> {
+        let frame = chosen(frames, place, params, notes)?;
+        Ok(Self { frames: 1, frame: 0, numbers: frames, value: Value::Number(frame) })
+    }
+
+    /// The same with `numbers` a voxel, which is a colour if they are three or four and `declared` to be one, or unsigned
+    /// integers of 8 or 16 bits; other vectors are refused.
+    pub(super) fn with_numbers(
+        self,
+        (numbers, kind, declared): (u64, Kind, bool),
+        place: Place,
+        notes: &mut Notes,
+    ) -> Result<Self, ReadError> {
+        if numbers == 1 {
+            return Ok(self);
+        }
+        let stands_for_color = declared || matches!(kind, Kind::U8 | Kind::U16);
+        if !(matches!(numbers, 3 | 4) && stands_for_color) {
+            let expected = "one number a voxel, or a colour: three or four unsigned integers of 8 or 16 bits";
+            let found = format!("{numbers} numbers of {} bytes a voxel", kind.size());
+            let hint = "write one component, or the length of the vectors, as a volume of its own";
+            return Err(ReadError::input(place, expected, found, hint));
+        }
+        let alpha = if numbers == 4 { "; alpha is not used" } else { "" };
+        let luma = "colours: read is their luma, 0.2126 R + 0.7152 G + 0.0722 B of the numbers as they are stored";
+        notes.remarks.push(format!("{luma}{alpha}"));
+        Ok(Self { numbers, value: Value::Luma, ..self })
+    }
+}
+
+/// The frame that is read of so many; says which, if there are several.
+fn chosen(frames: u64, place: Place, params: &ReadParams, notes: &mut Notes) -> Result<u64, ReadError> {
+    let frame = params.frame;
+    if frame >= frames {
+        let expected = match frames {
+            1 => "`frame` 0, as the file has one volume".to_owned(),
+            _ => format!("a `frame` from 0 to {}, as the file has {frames} volumes", frames.saturating_sub(1)),
+        };
+        return Err(ReadError::input(place, expected, format!("`frame` {frame}"), "choose another `frame`"));
+    }
+    if frames > 1 {
+        notes.remarks.push(format!("frame {frame} of {frames}; `frame` chooses another"));
+    }
+    Ok(frame)
+}

@@ -1,0 +1,208 @@
+//! The arrays of a legacy VTK file: where they lie, without reading them.
+
+use super::{HINT, next, wrong};
+use crate::error::{Place, ReadError, escaped};
+use crate::read::text::{Line, Lines, Word};
+use crate::read::voxels::Kind;
+use std::ops::Range;
+
+/// What an array belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Of {
+    Points,
+    Cells,
+    /// Nothing in particular.
+    File,
+}
+
+/// An array of numbers.
+#[derive(Debug, Clone)]
+pub(super) struct Array {
+    pub(super) name: String,
+    pub(super) of: Of,
+    /// Numbers of one point or cell, and how many there are of those.
+    pub(super) numbers: u64,
+    pub(super) tuples: u64,
+    pub(super) kind: Kind,
+    /// Where it is announced.
+    pub(super) place: Place,
+    /// Its bytes, which begin in the line of this number.
+    pub(super) data: Range<usize>,
+    pub(super) line: u64,
+    role: Role,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Role {
+    Scalars,
+    /// Scalars of bytes, which stand in a text as shares of 255.
+    Colors,
+    Field,
+    Other,
+}
+
+impl Array {
+    /// Whether a text has shares of 255 in the place of its numbers.
+    pub(super) fn is_of_shares(&self) -> bool {
+        self.role == Role::Colors
+    }
+}
+
+/// The arrays found so far.
+pub(super) struct Arrays<'a> {
+    content: &'a [u8],
+    is_binary: bool,
+    of: Of,
+    tuples: u64,
+    found: Vec<Array>,
+}
+
+impl<'a> Arrays<'a> {
+    pub(super) fn new(content: &'a [u8], is_binary: bool) -> Self {
+        Self { content, is_binary, of: Of::File, tuples: 0, found: Vec::new() }
+    }
+
+    pub(super) fn all(&self) -> impl Iterator<Item = &Array> {
+        self.found.iter()
+    }
+
+    /// The array that is read.
+    pub(super) fn chosen(&self) -> Option<&Array> {
+        let of = |of: Of| self.found.iter().filter(move |array| array.of == of);
+        [Of::Points, Of::Cells].into_iter().find_map(|data| {
+            let scalars = of(data).find(|array| matches!(array.role, Role::Scalars | Role::Colors));
+            scalars.or_else(|| of(data).find(|array| array.role == Role::Field))
+        })
+    }
+
+    /// Takes a line, and passes over the arrays that it announces.
+    pub(super) fn take(&mut self, line: Line<'a>, lines: &mut Lines<'a>) -> Result<(), ReadError> {
+        let words: Vec<Word<'_>> = line.words(false).collect();
+        let whole = |i: usize| whole(words.get(i), line);
+        let keyword = words.first().map(|w| w.text.to_ascii_uppercase()).unwrap_or_default();
+        let (role, numbers) = match keyword.as_slice() {
+            b"POINT_DATA" | b"CELL_DATA" => {
+                self.of = if keyword == b"POINT_DATA" { Of::Points } else { Of::Cells };
+                self.tuples = whole(1)?;
+                return Ok(());
+            }
+            b"METADATA" => {
+                while lines.next()?.is_some_and(|line| !line.text.trim_ascii().is_empty()) {}
+                return Ok(());
+            }
+            b"FIELD" => return self.field(whole(2)?, lines),
+            b"LOOKUP_TABLE" => return self.pass((&words, line), Kind::U8, (4, whole(2)?), Role::Other, lines),
+            // What VTK writes of bytes.
+            b"COLOR_SCALARS" => {
+                return self.pass((&words, line), Kind::U8, (whole(2)?, self.tuples), Role::Colors, lines);
+            }
+            b"SCALARS" => (Role::Scalars, if words.len() > 3 { whole(3)? } else { 1 }),
+            b"VECTORS" | b"NORMALS" => (Role::Other, 3),
+            b"TENSORS" => (Role::Other, 9),
+            b"TENSORS6" => (Role::Other, 6),
+            b"TEXTURE_COORDINATES" => (Role::Other, whole(2)?),
+            b"GLOBAL_IDS" | b"PEDIGREE_IDS" | b"EDGE_FLAGS" => (Role::Other, 1),
+            _ => return Err(wrong(line, "SCALARS, FIELD or another keyword of structured points")),
+        };
+        let kind = kind(words.get(if keyword == b"TEXTURE_COORDINATES" { 3 } else { 2 }), line)?;
+        if keyword == b"SCALARS" {
+            self.pass_table_name(lines)?;
+        }
+        self.pass((&words, line), kind, (numbers, self.tuples), role, lines)
+    }
+
+    /// The arrays of a field.
+    fn field(&mut self, arrays: u64, lines: &mut Lines<'a>) -> Result<(), ReadError> {
+        let mut left = arrays;
+        while left > 0 {
+            let Some(line) = next(lines)? else {
+                return Err(ReadError::input(lines.end(), format!("{left} more arrays"), "the end of the file", HINT));
+            };
+            if line.text.trim_ascii().eq_ignore_ascii_case(b"METADATA") {
+                self.take(line, lines)?;
+                continue;
+            }
+            let words: Vec<Word<'_>> = line.words(false).collect();
+            let size = (whole(words.get(1), line)?, whole(words.get(2), line)?);
+            // The name stands where other arrays have their keyword.
+            let named = [&words[..1], &words].concat();
+            self.pass((&named, line), kind(words.get(3), line)?, size, Role::Field, lines)?;
+            left -= 1;
+        }
+        Ok(())
+    }
+
+    /// `LOOKUP_TABLE NAME` belongs to the scalars before it; old files leave it out.
+    fn pass_table_name(&self, lines: &mut Lines<'a>) -> Result<(), ReadError> {
+        let name = b"LOOKUP_TABLE";
+        let next = &self.content[lines.offset()..];
+        if next.get(..name.len()).is_some_and(|word| word.eq_ignore_ascii_case(name)) {
+            lines.next()?;
+        }
+        Ok(())
+    }
+
+    /// Passes over an array of so many numbers a tuple and so many tuples, whose name is the second word.
+    fn pass(
+        &mut self,
+        (words, line): (&[Word<'_>], Line<'_>),
+        kind: Kind,
+        (numbers, tuples): (u64, u64),
+        role: Role,
+        lines: &mut Lines<'a>,
+    ) -> Result<(), ReadError> {
+        let mut data = lines.words();
+        let (start, first) = data.end();
+        let count = numbers.checked_mul(tuples).filter(|n| *n <= self.content.len() as u64);
+        let bytes = count.and_then(|n| n.checked_mul(if self.is_binary { kind.size() } else { 1 }));
+        let Some((count, bytes)) = count.zip(bytes).filter(|(_, bytes)| *bytes <= data.left() as u64) else {
+            let expected = format!("at most {} bytes of data", data.left());
+            let found = format!("{tuples} times {numbers} numbers of {} bytes", kind.size());
+            return Err(ReadError::input(line.place(), expected, found, HINT));
+        };
+        let (end, last) = if self.is_binary {
+            (start + bytes as usize, first)
+        } else {
+            for passed in 0..count {
+                if !data.next().is_some_and(|word| may_be_number(word.text)) {
+                    let (expected, found) = (format!("{count} numbers"), passed.to_string());
+                    return Err(ReadError::input(line.place(), expected, found, HINT));
+                }
+            }
+            data.end()
+        };
+        lines.go_to(end, last);
+        let name = words.get(1).map(|w| escaped(w.text, 40)).unwrap_or_default();
+        let (of, place) = (self.of, line.place());
+        self.found.push(Array { name, of, numbers, tuples, kind, place, data: start..end, line: first, role });
+        Ok(())
+    }
+}
+
+/// Whether a word is none of those that keywords are; a reader of the numbers looks closer.
+fn may_be_number(word: &[u8]) -> bool {
+    let letters = &word[..word.iter().take_while(|b| b.is_ascii_alphabetic()).count()];
+    letters.is_empty() || [&b"nan"[..], b"inf", b"infinity"].iter().any(|name| letters.eq_ignore_ascii_case(name))
+}
+
+fn whole(word: Option<&Word<'_>>, line: Line<'_>) -> Result<u64, ReadError> {
+    let number = word.and_then(|w| std::str::from_utf8(w.text).ok()?.parse().ok());
+    number.ok_or_else(|| wrong(line, "a whole number of values or components"))
+}
+
+/// The type of a number by its name.
+fn kind(word: Option<&Word<'_>>, line: Line<'_>) -> Result<Kind, ReadError> {
+    Ok(match word.map(|w| w.text.to_ascii_lowercase()).unwrap_or_default().as_slice() {
+        b"unsigned_char" => Kind::U8,
+        b"char" | b"signed_char" => Kind::I8,
+        b"unsigned_short" => Kind::U16,
+        b"short" => Kind::I16,
+        b"unsigned_int" => Kind::U32,
+        b"int" | b"vtkidtype" => Kind::I32,
+        b"unsigned_long" | b"vtktypeuint64" | b"unsigned_long_long" => Kind::U64,
+        b"long" | b"vtktypeint64" | b"long_long" => Kind::I64,
+        b"float" => Kind::F32,
+        b"double" => Kind::F64,
+        _ => return Err(wrong(line, "a type of numbers, from unsigned_char to double (neither bit nor string)")),
+    })
+}
