@@ -1,10 +1,10 @@
 //! Reading files: meshes (PLY, STL, OBJ), point clouds (PLY, OBJ, XYZ, CSV, LAS, LAZ), volumes (NIfTI, NRRD) and images of radiance
-//! (Radiance HDR, OpenEXR), each also inside gzip.
+//! (Radiance HDR, OpenEXR, PNG), each also inside gzip.
 //!
 //! No input makes a reader panic or take memory that the file does not stand for: sizes that a header announces are
 //! checked against the length of the file before anything is allocated.
 
-#[cfg(any(feature = "ply", feature = "las", feature = "xyz"))]
+#[cfg(any(feature = "ply", feature = "las", feature = "xyz", feature = "png"))]
 mod color;
 #[cfg(any(feature = "ply", feature = "stl", feature = "obj", feature = "xyz", feature = "nrrd"))]
 mod decimal;
@@ -28,6 +28,8 @@ mod openexr;
 mod origin;
 #[cfg(feature = "ply")]
 mod ply;
+#[cfg(feature = "png")]
+mod png;
 #[cfg(any(feature = "ply", feature = "obj"))]
 mod polygon;
 #[cfg(feature = "hdr")]
@@ -194,6 +196,8 @@ fn parse(
         Some(Format::Hdr) => radiance::read(&stream.rest()?, reading).map(Loaded::Image),
         #[cfg(feature = "exr")]
         Some(Format::Exr) => openexr::read(&stream.rest()?, reading).map(Loaded::Image),
+        #[cfg(feature = "png")]
+        Some(Format::Png) => png::read(&stream.rest()?, reading).map(Loaded::Image),
         #[allow(unreachable_patterns, reason = "reached where a reader is not compiled in")]
         Some(format) => Err(ReadError::input(
             Place::File,
@@ -203,19 +207,19 @@ fn parse(
         )),
         None => Err(ReadError::input(
             Place::Byte(0),
-            "'ply', 'LASF', 'NRRD', '#?', a NIfTI-1 or OpenEXR header, or the extension of a format without a mark",
+            "'ply', 'LASF', 'NRRD', '#?', a NIfTI-1, OpenEXR or PNG header, or the extension of a format without a mark",
             format!("'{}'", escaped(&head[..head.len().min(16)], 16)),
-            "PLY, STL, OBJ, XYZ, CSV, LAS, LAZ, NIfTI, NRRD, Radiance HDR and OpenEXR files are read, each also inside gzip",
+            "PLY, STL, OBJ, XYZ, CSV, LAS, LAZ, NIfTI, NRRD, Radiance HDR, OpenEXR and PNG files are read, each also inside gzip",
         )),
     }
 }
 
 /// Longest side of an image, pixels.
-#[cfg(any(feature = "hdr", feature = "exr"))]
+#[cfg(any(feature = "hdr", feature = "exr", feature = "png"))]
 const LONGEST_SIDE: u32 = 65536;
 
 /// Bytes of an image of a size that may be read.
-#[cfg(any(feature = "hdr", feature = "exr"))]
+#[cfg(any(feature = "hdr", feature = "exr", feature = "png"))]
 fn check_image(size: [u32; 2], params: &ReadParams) -> Result<u64, ReadError> {
     if !size.iter().all(|side| (1..=LONGEST_SIDE).contains(side)) {
         let expected = format!("an image of 1 to {LONGEST_SIDE} pixels a side");
@@ -238,6 +242,7 @@ enum Format {
     Nifti,
     Hdr,
     Exr,
+    Png,
 }
 
 fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
@@ -256,6 +261,9 @@ fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
     }
     if content.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
         return Some(Format::Exr);
+    }
+    if content.starts_with(b"\x89PNG\r\n\x1a\n") {
+        return Some(Format::Png);
     }
     if content.get(344..347).is_some_and(|magic| magic == b"n+1" || magic == b"ni1") {
         return Some(Format::Nifti);

@@ -5,7 +5,7 @@ use crate::lights::LightPoint;
 use crate::load::Loaded;
 use crate::scene::{RenderSettings, ShadowMapping};
 use splat_core::Object;
-use splat_core::{Light, Limits};
+use splat_core::Limits;
 use tsm::{Deposits, Limit, Params};
 
 /// Share of the tolerance that the ends of lists may take, of all lights together. Absorbance grows with its logarithm only, so
@@ -84,9 +84,9 @@ fn params(settings: &RenderSettings, loaded: &Loaded, tolerance: f32, max_bytes:
 
 /// Transmittance e^(−A_cut) below which the light of one lamp is lost in the picture: its brightest light times that changes no
 /// displayed value by more than the lamp's part of the tolerance.
-fn tolerance(settings: &RenderSettings, loaded: &Loaded, light: &Light, maps: u64) -> f32 {
+fn tolerance(settings: &RenderSettings, loaded: &Loaded, point: &LightPoint, maps: u64) -> f32 {
     let of_lights = || {
-        let gain = DISPLAY_SLOPE * libm::exp2(settings.exposure) * brightest(loaded, light).max(f64::MIN_POSITIVE);
+        let gain = DISPLAY_SLOPE * libm::exp2(settings.exposure) * brightest(loaded, point).max(f64::MIN_POSITIVE);
         CUT_SHARE * settings.tolerance / (gain * maps as f64)
     };
     let asked = settings.shadow.absorbance_cut.map(|cut| libm::exp(-cut));
@@ -95,8 +95,10 @@ fn tolerance(settings: &RenderSettings, loaded: &Loaded, light: &Light, maps: u6
 
 /// The most light that any splat could receive unshadowed, W/m²: at the place of the splats' bounds nearest to the lamp, by their
 /// least radius.
-fn brightest(loaded: &Loaded, light: &Light) -> f64 {
-    let intensity = light.intensity.into_iter().map(f64::from).fold(0.0, f64::max);
+fn brightest(loaded: &Loaded, point: &LightPoint) -> f64 {
+    let (light, slide) = (&point.light, &loaded.slides[point.of]);
+    let passing = slide.as_ref().map_or(1.0, |slide| f64::from(slide.brightest()));
+    let intensity = passing * light.intensity.into_iter().map(f64::from).fold(0.0, f64::max);
     let Some(position) = light.shape.place() else { return intensity };
     let bounds = loaded.cloud.bounds();
     if bounds.is_empty() {
@@ -155,7 +157,7 @@ fn tables_within(
     let table = |wanted: &Option<Wanted<'_>>| {
         let Some((point, objects)) = wanted else { return Ok(None) };
         let light = &point.light;
-        let tolerance = tolerance(settings, loaded, light, maps);
+        let tolerance = tolerance(settings, loaded, point, maps);
         let params = params(settings, loaded, tolerance, max_bytes);
         let scene = tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects };
         let predicted = Deposits::predict(&scene, light, &params);

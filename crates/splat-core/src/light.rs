@@ -4,6 +4,9 @@
 //! [`Light::points`]. What is flat shines to one side, with the cosine.
 
 mod points;
+mod slide;
+
+pub use slide::{Framing, Slide, SlideProjection};
 
 use crate::Error;
 use glam::DVec3;
