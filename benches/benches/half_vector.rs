@@ -103,7 +103,7 @@ fn half_vectors(name: &str, grid: &Grid, direction: Option<[f64; 3]>, scattering
     let setting = Setting::new(if direction.is_some() { Shading::Phase } else { Shading::Unlit });
     let sun = |d: [f64; 3]| {
         let shape = LightShape::Directional { direction: DVec3::from_array(d).normalize() };
-        LitBy { light: Light { shape, intensity: [3.0; 3] }, shadow: None }
+        LitBy { slide: None, light: Light { shape, intensity: [3.0; 3] }, shadow: None }
     };
     let sheets = setting.input(grid, direction.map(sun).into_iter().collect());
     sweep(
@@ -118,7 +118,7 @@ fn soft(name: &str, grid: &Grid, direction: [f64; 3]) {
     let setting = Setting::new(Shading::Phase);
     let normal = DVec3::from_array(direction).normalize();
     let shape = LightShape::Disk { center: DVec3::Y * 0.5 - normal * 10.0, normal, radius: 0.6 };
-    let lit = LitBy { light: Light { shape, intensity: [300.0; 3] }, shadow: None };
+    let lit = LitBy { slide: None, light: Light { shape, intensity: [300.0; 3] }, shadow: None };
     let extended = vec![Extended { lit, samples: 16 }];
     let sheets = setting.input(grid, Vec::new());
     sweep(

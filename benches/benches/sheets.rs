@@ -128,7 +128,7 @@ fn row(name: &str, [method, paper]: [&Method<'_>; 2], transfer: &TransferFunctio
     let material = Material { shading, specular: 0.2, ..Material::default() };
     let direction = DVec3::new(0.6, -0.5, -0.6).normalize();
     let sun = Light { shape: LightShape::Directional { direction }, intensity: [3.0; 3] };
-    let lights = [LitBy { light: sun, shadow: None }];
+    let lights = [LitBy { slide: None, light: sun, shadow: None }];
     let volume = method.volume(transfer, &material, lit);
     let lights = if lit { lights.to_vec() } else { Vec::new() };
     let input = SheetInput {

@@ -92,7 +92,7 @@ samples = 16
 fn without_cosine(whole: &SceneLight) -> Vec<SceneLight> {
     let bare = |point: Light| {
         let shape = LightShape::Point { position: point.shape.place().unwrap() };
-        SceneLight { light: Light { shape, ..point }, samples: 1, shadow: true }
+        SceneLight { light: Light { shape, ..point }, slide: None, samples: 1, shadow: true }
     };
     whole.light.points(whole.samples).into_iter().map(bare).collect()
 }

@@ -1,5 +1,5 @@
 //! Reading files: meshes (PLY, STL, OBJ, OFF, glTF), point clouds (PLY, OBJ, OFF, PCD, glTF, XYZ, CSV, LAS, LAZ), volumes (NIfTI,
-//! NRRD, MetaImage, VTK, raw) and images of radiance (Radiance HDR, OpenEXR), each also inside gzip.
+//! NRRD, MetaImage, VTK, raw) and images of radiance (Radiance HDR, OpenEXR, PNG), each also inside gzip.
 //!
 //! No input makes a reader panic or take memory that the file does not stand for: sizes that a header announces are
 //! checked against the length of the file before anything is allocated.
@@ -13,7 +13,8 @@ mod beside;
     feature = "pcd",
     feature = "gltf",
     feature = "las",
-    feature = "xyz"
+    feature = "xyz",
+    feature = "png"
 ))]
 mod color;
 #[cfg(any(
@@ -77,6 +78,8 @@ mod paint;
 mod pcd;
 #[cfg(feature = "ply")]
 mod ply;
+#[cfg(feature = "png")]
+mod png;
 #[cfg(any(feature = "ply", feature = "obj", feature = "off"))]
 mod polygon;
 #[cfg(feature = "hdr")]
@@ -302,6 +305,8 @@ fn parse(
         Some(Format::Hdr) => radiance::read(&stream.rest()?, reading).map(Loaded::Image),
         #[cfg(feature = "exr")]
         Some(Format::Exr) => openexr::read(&stream.rest()?, reading).map(Loaded::Image),
+        #[cfg(feature = "png")]
+        Some(Format::Png) => png::read(&stream.rest()?, reading).map(Loaded::Image),
         #[allow(unreachable_patterns, reason = "reached where a reader is not compiled in")]
         Some(format) => Err(ReadError::input(
             Place::File,
@@ -314,11 +319,11 @@ fn parse(
 }
 
 /// Longest side of an image, pixels.
-#[cfg(any(feature = "hdr", feature = "exr", feature = "obj", feature = "gltf"))]
+#[cfg(any(feature = "hdr", feature = "exr", feature = "png", feature = "obj", feature = "gltf"))]
 const LONGEST_SIDE: u32 = 65536;
 
 /// Bytes of an image of a size that may be read.
-#[cfg(any(feature = "hdr", feature = "exr", feature = "obj", feature = "gltf"))]
+#[cfg(any(feature = "hdr", feature = "exr", feature = "png", feature = "obj", feature = "gltf"))]
 fn check_image(size: [u32; 2], params: &ReadParams) -> Result<u64, ReadError> {
     if !size.iter().all(|side| (1..=LONGEST_SIDE).contains(side)) {
         let expected = format!("an image of 1 to {LONGEST_SIDE} pixels a side");
@@ -348,6 +353,7 @@ enum Format {
     Raw,
     Hdr,
     Exr,
+    Png,
 }
 
 fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
@@ -371,6 +377,9 @@ fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
     }
     if content.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
         return Some(Format::Exr);
+    }
+    if content.starts_with(b"\x89PNG\r\n\x1a\n") {
+        return Some(Format::Png);
     }
     if content.starts_with(b"glTF") {
         return Some(Format::Gltf);

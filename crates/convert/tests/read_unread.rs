@@ -21,7 +21,7 @@ fn formats_that_are_not_read_are_named_with_what_to_do() {
         ("a.h5", b"\x89HDF\r\n\x1a\n", "HDF5", "convert it to NRRD"),
         ("a.dcm", &dicom, "DICOM", "convert it to NRRD"),
         ("a.jpg", b"\xff\xd8\xff\xe0", "a JPEG image", "convert the image"),
-        ("a.png", b"\x89PNG\r\n\x1a\n", "a PNG image", "convert the image"),
+        ("a.jpg", b"\xff\xd8\xff", "a JPEG image", "convert the image"),
         ("a.zip", b"PK\x03\x04", "a zip archive", "extract"),
         ("a.tar.gz", &tar, "a tar archive", "extract"),
         ("a.splat", b"\0\0\0\0", "3D Gaussian splats", "use a mesh or a point cloud"),
@@ -29,7 +29,7 @@ fn formats_that_are_not_read_are_named_with_what_to_do() {
         ("a.mtl", b"newmtl a", "OBJ materials", "give the OBJ file"),
         ("scene.toml", b"[camera]", "a scene", "organza render"),
         // The content counts, whatever the name says.
-        ("a.obj", b"\x89PNG\r\n\x1a\n", "a PNG image", "convert the image"),
+        ("a.obj", b"\xff\xd8\xff", "a JPEG image", "convert the image"),
         ("a", b"PK\x03\x04", "a zip archive", "extract"),
     ] {
         let error = load(name, content).unwrap_err();

@@ -42,10 +42,15 @@ fn scene_document(scene: &Scene) -> Value {
             "visible": o.visible,
         })
     });
-    let lights = scene
-        .lights
-        .iter()
-        .map(|l| json!({ "kind": light_name(&l.light.shape), "intensity": l.light.intensity, "points": l.samples, "shadow": l.shadow }));
+    let lights = scene.lights.iter().map(|l| {
+        json!({
+            "kind": light_name(&l.light.shape),
+            "intensity": l.light.intensity,
+            "points": l.samples,
+            "shadow": l.shadow,
+            "texture": l.slide.as_ref().map(|slide| shown(&slide.path.to_string_lossy())),
+        })
+    });
     json!({
         "kind": "scene",
         "sha256": scene.sha256,

@@ -9,10 +9,12 @@
 mod object;
 
 use object::Body;
-use organza::scene::Scene;
+use organza::scene::{Scene, SceneLight};
 use organza::{Error, Progress, RenderOptions};
 use reference::metrics::{Image, Linear, compare};
 use reference::{Environment, LatLong, Liberty, PathRules, PathSettings, PixelSampling, path_trace};
+use splat_core::RadianceImage;
+use std::path::Path;
 
 /// An unbiased estimate of what is seen, with its error.
 #[derive(Debug, Clone, PartialEq)]
@@ -115,10 +117,11 @@ pub fn truth(
             Err(reason) => return Ok(Err(format!("object '{}': {reason}", organza::shown(&object.name)))),
         }
     }
-    let mut lights = Vec::new();
+    let (mut lights, mut slides) = (Vec::new(), Vec::new());
     for light in &scene.lights {
         let known = reference::LightSource::from_light(&light.light);
         lights.push(known.ok_or_else(|| Error::Internal(format!("the reference knows no light such as {light:?}")))?);
+        slides.push(slide(light, options)?);
     }
     let environment = environment(scene, options)?;
     let fault = |e: splat_core::Error| match e {
@@ -130,6 +133,7 @@ pub fn truth(
         surfaces: bodies.iter().filter_map(Body::surface).collect(),
         lights,
         unshadowed: scene.lights.iter().map(|l| !l.shadow).collect(),
+        slides,
         environment,
         background: None,
     };
@@ -161,15 +165,28 @@ pub fn truth(
 /// What is seen behind everything, by mirrored and bent rays too.
 fn environment(scene: &Scene, options: &RenderOptions) -> Result<Environment, Error> {
     let Some(source) = &scene.environment else { return Ok(Environment::Constant(scene.background.map(f64::from))) };
-    let (data, _) = convert::read::file(&source.path, &options.read_params(), None)
-        .map_err(|e| Error::from_read(&source.path, &e))?;
-    let convert::read::Loaded::Image(image) = data else {
-        return Err(Error::wrong_kind(&source.path, "an image of radiance", "name a Radiance HDR or OpenEXR file"));
-    };
+    let image = image(&source.path, options)?;
     let pixels = image.pixels.iter().map(|p| p.map(|v| f64::from(v) * source.scale)).collect();
     let made = LatLong::new(image.size.map(|s| s as usize), pixels).and_then(|sky| sky.turned(source.turns));
     made.map(Environment::Image)
         .map_err(|e| Error::input(organza::printable(&source.path), e.to_string(), "use a smaller background.scale"))
+}
+
+/// What a light shines through, if anything.
+fn slide(light: &SceneLight, options: &RenderOptions) -> Result<Option<reference::Slide>, Error> {
+    let Some(source) = &light.slide else { return Ok(None) };
+    let made = splat_core::Slide::new(&image(&source.path, options)?, &light.light.shape, &source.framing);
+    made.map(|slide| Some(reference::Slide::from_slide(&slide)))
+        .map_err(|e| Error::input(organza::printable(&source.path), e.to_string(), "place it in another way"))
+}
+
+fn image(path: &Path, options: &RenderOptions) -> Result<RadianceImage, Error> {
+    let (data, _) =
+        convert::read::file(path, &options.read_params(), None).map_err(|e| Error::from_read(path, &e))?;
+    let convert::read::Loaded::Image(image) = data else {
+        return Err(Error::wrong_kind(path, "an image", "name a Radiance HDR, OpenEXR or PNG file"));
+    };
+    Ok(image)
 }
 
 fn all_liberties<'a>(traced: &'a reference::Scene<'_>) -> impl Iterator<Item = &'a Liberty> {

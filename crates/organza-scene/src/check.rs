@@ -186,7 +186,7 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
     check_aligned(&at.key("render").key("sheets").key("aligned"), &camera, &render)?;
     let (background, environment) = check_background(&at.key("background"), &raw.background, &paths)?;
     let at_lights = at.key("light");
-    let lights = raw.light.iter().enumerate().map(|(i, l)| check_light(&at_lights.index(i), l));
+    let lights = raw.light.iter().enumerate().map(|(i, l)| check_light(&at_lights.index(i), l, &paths));
     Ok(Scene {
         file: document.file.to_owned(),
         sha256,

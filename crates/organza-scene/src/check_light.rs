@@ -2,6 +2,8 @@
 
 use super::SceneLight;
 use super::check::{At, LARGEST};
+use super::check_slide::{SlideKeys, check_slide};
+use super::paths::Paths;
 use super::raw_light::RawLight;
 use crate::Error;
 use glam::DVec3;
@@ -11,8 +13,8 @@ use splat_core::{Light, LightShape};
 const MOST_LIGHT_SAMPLES: u32 = 1_000_000;
 
 /// Checks one light.
-pub(super) fn check_light(at: &At<'_>, raw: &RawLight) -> Result<SceneLight, Error> {
-    let of = |shape, intensity, shadow| SceneLight { light: Light { shape, intensity }, samples: 1, shadow };
+pub(super) fn check_light(at: &At<'_>, raw: &RawLight, paths: &Paths) -> Result<SceneLight, Error> {
+    let of = |shape, intensity, shadow| SceneLight { light: Light { shape, intensity }, slide: None, samples: 1, shadow };
     let extended = |shape, intensity, samples, shadow| {
         let samples = at.whole("samples", samples, 1..=MOST_LIGHT_SAMPLES)?;
         Ok(SceneLight { samples, ..of(shape, at.color("intensity", intensity)?, shadow) })
@@ -22,12 +24,15 @@ pub(super) fn check_light(at: &At<'_>, raw: &RawLight) -> Result<SceneLight, Err
             let position = at.vector("position", position)?;
             Ok(of(LightShape::Point { position }, at.color("intensity", intensity)?, shadow))
         }
-        RawLight::Directional { direction, irradiance, shadow } => {
-            let direction = at.direction("direction", direction)?;
-            Ok(of(LightShape::Directional { direction }, at.color("irradiance", irradiance)?, shadow))
+        RawLight::Directional { direction, irradiance, shadow, .. } => {
+            let shape = LightShape::Directional { direction: at.direction("direction", direction)? };
+            let slide = check_slide(at, &slide_keys(raw), &shape, paths)?;
+            Ok(SceneLight { slide, ..of(shape, at.color("irradiance", irradiance)?, shadow) })
         }
         RawLight::Spot { intensity, shadow, .. } => {
-            Ok(of(spot_shape(at, raw)?, at.color("intensity", intensity)?, shadow))
+            let shape = spot_shape(at, raw)?;
+            let slide = check_slide(at, &slide_keys(raw), &shape, paths)?;
+            Ok(SceneLight { slide, ..of(shape, at.color("intensity", intensity)?, shadow) })
         }
         RawLight::Sphere { position, radius, intensity, samples, shadow } => {
             let (center, radius) = (at.vector("position", position)?, at.length("radius", radius)?);
@@ -44,6 +49,19 @@ pub(super) fn check_light(at: &At<'_>, raw: &RawLight) -> Result<SceneLight, Err
             extended(LightShape::Rect { center, u, v }, intensity, samples, shadow)
         }
     }
+}
+
+fn slide_keys(raw: &RawLight) -> SlideKeys<'_> {
+    let (texture, up, width, center) = match raw {
+        RawLight::Spot { texture, texture_up, texture_angle, .. } => {
+            (texture, *texture_up, ("texture_angle", *texture_angle), None)
+        }
+        RawLight::Directional { texture, texture_up, texture_width, texture_center, .. } => {
+            (texture, *texture_up, ("texture_width", *texture_width), *texture_center)
+        }
+        _ => (&None, None, ("texture_width", None), None),
+    };
+    SlideKeys { texture: texture.as_deref(), up, width, center }
 }
 
 fn spot_shape(at: &At<'_>, raw: &RawLight) -> Result<LightShape, Error> {

@@ -1,14 +1,26 @@
 //! Lights of a scene.
 
-use splat_core::Light;
+use splat_core::{Framing, Light};
+use std::path::PathBuf;
 
 /// One light of the scene, whole.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct SceneLight {
     /// Where it comes from and how strong it is.
     pub light: Light,
+    /// What it shines through; spots and parallel light alone.
+    pub slide: Option<SlideSource>,
     /// Points that a technique which lights by points takes an extended light for, ≥ 1; 1 for any other.
     pub samples: u32,
     /// Whether it casts shadows.
     pub shadow: bool,
+}
+
+/// The picture that a light shines through: its file, and how it lies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SlideSource {
+    /// The file.
+    pub path: PathBuf,
+    /// Where the picture lies before the light.
+    pub framing: Framing,
 }

@@ -42,9 +42,14 @@ pub struct Scene {
 impl Scene {
     /// Every file that the scene is made of, its own first.
     pub fn files(&self) -> Vec<PathBuf> {
-        let data = self.objects.iter().filter_map(|o| o.source.path().map(Path::to_owned));
-        let environment = self.environment.iter().map(|environment| environment.path.clone());
-        std::iter::once(self.file.clone()).chain(data).chain(environment).collect()
+        let data = self.objects.iter().filter_map(|o| o.source.path());
+        std::iter::once(&*self.file).chain(data).chain(self.images()).map(Path::to_owned).collect()
+    }
+
+    /// The files of its environment and of what lights shine through.
+    pub fn images(&self) -> impl Iterator<Item = &Path> {
+        let slides = self.lights.iter().filter_map(|light| Some(&*light.slide.as_ref()?.path));
+        self.environment.iter().map(|environment| &*environment.path).chain(slides)
     }
 
     /// SHA-256 of the bytes of all files that the scene reads, without its own.

@@ -33,6 +33,14 @@ pub(super) enum RawLight {
         direction: [f64; 3],
         /// Irradiance per channel on a plane that faces the light, W/m² or relative.
         irradiance: [f64; 3],
+        /// Path of a picture that the light shines through: PNG, Radiance HDR or OpenEXR.
+        texture: Option<String>,
+        /// World direction that is upwards in the picture; default +Y, +Z for light along the Y axis.
+        texture_up: Option<[f64; 3]>,
+        /// Width of the picture, world units.
+        texture_width: Option<f64>,
+        /// World point that the middle of the picture falls on; default the origin.
+        texture_center: Option<[f64; 3]>,
         /// Whether it casts shadows; default true.
         #[serde(default = "yes")]
         shadow: bool,
@@ -52,6 +60,12 @@ pub(super) enum RawLight {
         outer: f64,
         /// Radiant intensity on the axis per channel, W/sr or relative.
         intensity: [f64; 3],
+        /// Path of a picture that the light shines through: PNG, Radiance HDR or OpenEXR.
+        texture: Option<String>,
+        /// World direction that is upwards in the picture; default +Y, +Z for light along the Y axis.
+        texture_up: Option<[f64; 3]>,
+        /// Angle across the width of the picture, degrees, below 180; default such that the shorter side is as wide as the cone.
+        texture_angle: Option<f64>,
         /// Whether it casts shadows; default true.
         #[serde(default = "yes")]
         shadow: bool,

@@ -1,8 +1,8 @@
 //! The objects of a scene become one cloud in canonical order, with its tables.
 
 mod context;
-mod environment;
 pub(crate) mod files;
+mod images;
 pub(crate) mod input;
 mod loading;
 mod normalize;
@@ -20,7 +20,7 @@ use loading::Loading;
 use normalize::normalize;
 use object::Prepared;
 use own::Own;
-use splat_core::{Camera, Cloud, Environment, FootprintStack, Material, Object, Shading, SplatKind};
+use splat_core::{Camera, Cloud, Environment, FootprintStack, Material, Object, Shading, Slide, SplatKind};
 use std::cmp::Ordering;
 
 /// A scene in memory, normalized by a power of two (see [`Loaded::exponent`]) and ready for a technique.
@@ -46,6 +46,8 @@ pub struct Loaded {
     pub environment: Option<Environment>,
     /// Lights, whole, in an order that does not depend on the file's.
     pub lights: Vec<SceneLight>,
+    /// What each of them shines through.
+    pub slides: Vec<Option<Slide>>,
     /// Slice thickness asked for, in the scale of the cloud.
     pub slice_thickness: Option<f64>,
     /// Whether normals were computed from the gradients of some volume.
@@ -92,6 +94,7 @@ pub(crate) struct Inputs<'a> {
     prepared: Vec<Prepared<'a>>,
     environment: Option<Environment>,
     lights: Vec<SceneLight>,
+    slides: Vec<Option<Slide>>,
     warnings: Vec<String>,
     /// What is known of each visible object, in the order of the scene.
     pub(crate) statistics: Vec<ObjectStatistics>,
@@ -113,18 +116,19 @@ pub(crate) fn read<'a>(
     cost: &mut CostRecord,
 ) -> Result<Inputs<'a>, Error> {
     let loading = Loading { scene, options, progress, files };
-    let (prepared, environment) = cost.measure(pass::READ, |stage| {
+    let lights = lights(scene);
+    let (prepared, environment, slides) = cost.measure(pass::READ, |stage| {
         let prepared = loading.prepare(looks)?;
         let (environment, of_environment) = loading.environment()?.unzip();
+        let (slides, of_slides) = loading.slides(&lights)?;
         stage.items_in = prepared.len() as u64;
         stage.items_out = stage.items_in;
         let of_objects: u64 = prepared.iter().map(|p| p.input.bytes()).sum();
-        stage.bytes = of_objects + of_environment.unwrap_or(0);
-        Ok::<_, Error>((prepared, environment))
+        stage.bytes = of_objects + of_environment.unwrap_or(0) + of_slides;
+        Ok::<_, Error>((prepared, environment, slides))
     })?;
-    let lights = lights(scene);
     let statistics = loading.statistics(&prepared);
-    Ok(Inputs { loading, prepared, environment, lights, warnings: files.mended(), statistics })
+    Ok(Inputs { loading, prepared, environment, lights, slides, warnings: files.mended(), statistics })
 }
 
 impl Inputs<'_> {
@@ -142,7 +146,7 @@ impl Inputs<'_> {
         sets: f64,
         cost: &mut CostRecord,
     ) -> Result<Loaded, Error> {
-        let Self { loading, mut prepared, environment, mut lights, mut warnings, statistics } = self;
+        let Self { loading, mut prepared, environment, mut lights, mut slides, mut warnings, statistics } = self;
         let Loading { scene, progress, files, .. } = loading;
         let mut early = spare.map(|_| loading.own(&mut prepared, &planned, &mut warnings)).transpose()?;
         if let (Some(own), Some(spare)) = (&mut early, spare)
@@ -168,7 +172,7 @@ impl Inputs<'_> {
             })?;
         }
         let mut camera = scene.camera;
-        let exponent = normalize(&mut cloud, &mut own, &mut camera, &mut lights);
+        let exponent = normalize(&mut cloud, &mut own, &mut camera, (&mut lights, &mut slides));
         cloud.canonicalize();
         cloud.validate().map_err(|e| out_of_range(scene, &cloud, e))?;
         if cloud.is_empty() && own.is_empty() {
@@ -185,6 +189,7 @@ impl Inputs<'_> {
             camera,
             environment,
             lights,
+            slides,
             slice_thickness: scaled_thickness(scene, exponent),
             normals: scene.objects.iter().any(|o| o.visible && context::needs_gradients(o, scene)),
             exponent,
@@ -236,6 +241,6 @@ fn merge(clouds: Vec<Cloud>) -> Cloud {
 /// All lights, sorted by their bits so that the order of the file does not matter.
 fn lights(scene: &Scene) -> Vec<SceneLight> {
     let mut all = scene.lights.clone();
-    all.sort_by_cached_key(|l| (l.light.bits(), l.shadow, l.samples));
+    all.sort_by_cached_key(|l| (l.light.bits(), l.shadow, l.samples, format!("{:?}", l.slide)));
     all
 }

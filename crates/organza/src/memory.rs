@@ -6,7 +6,7 @@ use crate::load::{BYTES_PER_SPLAT, Loaded};
 use crate::scene::Scene;
 use splat_core::raster;
 use splat_core::shade::ChannelLayout;
-use splat_core::{Camera, DepthProfile, Environment, Exceeded, Grid};
+use splat_core::{Camera, DepthProfile, Environment, Exceeded, Grid, Slide};
 
 /// Bytes that a point of a lattice that is made of an object is counted with.
 const BYTES_PER_LATTICE_POINT: u64 = 32;
@@ -20,8 +20,8 @@ pub(crate) struct Memory {
     pub(crate) splats: u64,
     /// Objects that particles are sampled from as they are.
     pub(crate) own: u64,
-    /// The environment.
-    pub(crate) environment: u64,
+    /// The environment, and what lights shine through.
+    pub(crate) images: u64,
     /// Averaging sets of particles.
     pub(crate) average: u64,
     /// All shadow maps, the largest of them being built.
@@ -36,7 +36,7 @@ impl Memory {
             image: image_bytes(scene),
             splats: splat_bytes(loaded, &camera, layout(scene)),
             own: own_bytes(loaded),
-            environment: loaded.environment.as_ref().map_or(0, Environment::bytes),
+            images: images_bytes(loaded),
             average,
             maps: 0,
         }
@@ -49,7 +49,7 @@ impl Memory {
 
     /// All of it.
     pub(crate) fn total(&self) -> u64 {
-        let others = [self.splats, self.own, self.environment, self.average, self.maps];
+        let others = [self.splats, self.own, self.images, self.average, self.maps];
         others.into_iter().fold(self.image, u64::saturating_add)
     }
 }
@@ -58,6 +58,12 @@ impl Memory {
 fn layout(scene: &Scene) -> ChannelLayout {
     let layout = ChannelLayout::new(&scene.render.layers.set());
     if scene.render.sheets.scattering().is_some() { layout.with_multiple() } else { layout }
+}
+
+/// Bytes of the environment and of slides.
+fn images_bytes(loaded: &Loaded) -> u64 {
+    let slides = loaded.slides.iter().flatten().map(Slide::bytes);
+    loaded.environment.as_ref().map_or(0, Environment::bytes) + slides.sum::<u64>()
 }
 
 /// Bytes of the accumulators and layers.

@@ -4,7 +4,7 @@ use crate::Error;
 use crate::lights::LightPoint;
 use crate::load::Loaded;
 use crate::scene::{RenderSettings, ShadowMapping};
-use splat_core::{Light, Limits, Object};
+use splat_core::{Limits, Object};
 use tsm::{Deposits, Params};
 
 /// Share of the tolerance that the ends of lists may take, of all lights together. Absorbance grows with its logarithm only, so
@@ -62,10 +62,11 @@ fn params(settings: &RenderSettings, loaded: &Loaded, tolerance: f32, max_bytes:
 
 /// Transmittance e^(−A_cut) below which the light of one lamp is lost in the picture: its brightest light times that changes no
 /// displayed value by more than the lamp's part of the tolerance.
-fn tolerance(settings: &RenderSettings, loaded: &Loaded, light: &Light, maps: u64) -> f32 {
+fn tolerance(settings: &RenderSettings, loaded: &Loaded, point: &LightPoint, maps: u64) -> f32 {
     let of_lights = || {
-        let gain =
-            DISPLAY_SLOPE * libm::exp2(settings.exposure) * light.brightest_on(&loaded.cloud).max(f64::MIN_POSITIVE);
+        let passing = loaded.slides[point.of].as_ref().map_or(1.0, |slide| f64::from(slide.brightest()));
+        let brightest = passing * point.light.brightest_on(&loaded.cloud);
+        let gain = DISPLAY_SLOPE * libm::exp2(settings.exposure) * brightest.max(f64::MIN_POSITIVE);
         CUT_SHARE * settings.tolerance / (gain * maps as f64)
     };
     let asked = settings.shadow.absorbance_cut.map(|cut| libm::exp(-cut));
@@ -117,7 +118,7 @@ fn tables_within(
     let table = |wanted: &Option<Wanted<'_>>| {
         let Some((point, objects)) = wanted else { return Ok(None) };
         let light = &point.light;
-        let tolerance = tolerance(settings, loaded, light, maps);
+        let tolerance = tolerance(settings, loaded, point, maps);
         let params = params(settings, loaded, tolerance, max_bytes);
         let scene = tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects };
         let predicted = Deposits::predict(&scene, light, &params).map_err(|e| shadow_error(point, &e))?;

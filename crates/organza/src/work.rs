@@ -61,8 +61,7 @@ pub(crate) fn of_scene(scene: &Scene) -> Stages {
     let bytes = |o: &SceneObject| Some(length(o.source.path()?));
     let mut stages = vec![(stage::READ.to_owned(), generated)];
     stages.extend(objects().filter_map(|o| Some((reading(o)?, BYTE * bytes(o)?))));
-    let environment = scene.environment.iter().map(|e| (reading_file(&e.path), BYTE * length(&e.path)));
-    stages.extend(environment);
+    stages.extend(scene.images().map(|path| (reading_file(path), BYTE * length(path))));
     let reading: f64 = stages.iter().map(|s| s.1).sum();
     stages.push((stage::DRAW.to_owned(), 2.0 * reading + samples(scene) * SAMPLE));
     stages

@@ -64,8 +64,7 @@ impl Shader<'_> {
             color: seen.color,
             material: &look.material,
         };
-        let lights = self.lights.iter().map(|lit| &lit.light);
-        let radiance = point.radiance(self.ambient, lights, |rank, irradiance| {
+        let radiance = point.radiance(self.ambient, self.lights.iter(), |rank, irradiance| {
             let shadow = self.lights[rank].shadow.map(|map| {
                 move || {
                     let position = (point.position - self.shadow_origin).as_vec3();

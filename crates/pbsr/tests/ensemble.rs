@@ -270,7 +270,7 @@ fn light_and_shadow_make_the_radiance_of_a_lambertian() {
     let sampler = MeshSampler::new(&mesh, &surface, None).unwrap();
     let direction = DVec3::new(0.6, 0.0, -0.8);
     let light = Light { shape: LightShape::Directional { direction }, intensity: [3.0; 3] };
-    let lights = [LitBy { light, shadow: Some(&Half) }];
+    let lights = [LitBy { slide: None, light, shadow: Some(&Half) }];
     let look = pbsr::Appearance { material: Material::default(), ..unlit() };
     let objects = [Object { look, ..object(&sampler) }];
     let lit = Scene { lights: &lights, ambient: [0.1; 3], ..scene(&camera, &objects) };

@@ -75,6 +75,8 @@ pub(crate) struct Tracer<'a> {
 #[derive(Clone, Copy)]
 struct Lamp {
     source: LightSource,
+    /// Its place among the lights.
+    rank: usize,
     shadowed: bool,
 }
 
@@ -163,6 +165,7 @@ impl<'a> Tracer<'a> {
         let lit = |l: &LightSource| l.intensity(DVec3::ZERO).iter().any(|i| *i > 0.0) || l.pole().is_some();
         let lamp = |(i, source): (usize, &LightSource)| Lamp {
             source: *source,
+            rank: i,
             shadowed: !scene.unshadowed.get(i).copied().unwrap_or(false),
         };
         let lamps = scene.lights.iter().enumerate().filter(|(_, l)| lit(l)).map(lamp);

@@ -3,7 +3,9 @@
 use crate::environment::Environment;
 use crate::lights::LightSource;
 use crate::medium::Medium;
+use crate::slide::Slide;
 use crate::surface::Surface;
+use glam::DVec3;
 use splat_core::Error;
 
 /// Media, meshes and lights.
@@ -17,6 +19,8 @@ pub struct Scene<'a> {
     pub lights: Vec<LightSource>,
     /// For each light whether nothing dims it; empty where all lights cast shadows.
     pub unshadowed: Vec<bool>,
+    /// For each light what it shines through, which area lights cannot; empty where no light has any.
+    pub slides: Vec<Option<Slide>>,
     /// Light from beyond the scene.
     pub environment: Environment,
     /// What an eye ray that meets nothing sees; `None` for the environment.
@@ -31,10 +35,18 @@ impl Scene<'_> {
             || self.surfaces.iter().any(|s| s.material.liberty.touches_shadows())
     }
 
+    /// Factor on a light that arrives at a point, per channel.
+    pub(crate) fn passing(&self, light: usize, p: DVec3) -> [f64; 3] {
+        self.slides.get(light).and_then(Option::as_ref).map_or([1.0; 3], |slide| slide.passing(p))
+    }
+
     /// Refuses what only the path tracer follows.
     pub(crate) fn refuse_liberties(&self) -> Result<(), Error> {
         if let Some(i) = self.unshadowed.iter().position(|u| *u) {
             return Err(Error::invalid("light", i, "unshadowed", true, "shadows; ask the path tracer"));
+        }
+        if let Some(i) = self.slides.iter().position(Option::is_some) {
+            return Err(Error::invalid("light", i, "slide", "one", "none; ask the path tracer"));
         }
         self.media.iter().enumerate().try_for_each(|(i, m)| m.liberty.refuse("medium", i))?;
         self.surfaces.iter().enumerate().try_for_each(|(i, s)| s.material.liberty.refuse("surface", i))
@@ -56,8 +68,15 @@ impl Scene<'_> {
             let found = self.unshadowed.len();
             return Err(Error::invalid("scene", 0, "unshadowed", found, "none, or as many as there are lights"));
         }
+        if !self.slides.is_empty() && self.slides.len() != self.lights.len() {
+            let found = self.slides.len();
+            return Err(Error::invalid("scene", 0, "slides", found, "none, or as many as there are lights"));
+        }
         for (i, light) in self.lights.iter().enumerate() {
             light.validate(i)?;
+            if light.is_area() && self.slides.get(i).is_some_and(Option::is_some) {
+                return Err(Error::invalid("light", i, "slide", "one", "none before an area light"));
+            }
         }
         self.environment.validate()?;
         match self.background {

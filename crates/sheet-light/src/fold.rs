@@ -59,7 +59,7 @@ pub struct Sheeted<'a> {
     pub(crate) slabs: Slabs,
     pub(crate) slant: Slant,
     pub(crate) volumes: Vec<Prepared<'a>>,
-    pub(crate) lamps: Vec<Lamp>,
+    pub(crate) lamps: Vec<Lamp<'a>>,
     /// Lists of splats by square of the image.
     pub(crate) bins: Option<Bins>,
     pub(crate) tiles: [usize; 2],

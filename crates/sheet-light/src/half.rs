@@ -42,7 +42,7 @@
 //! let view = Projection::Orthographic { height: 2.0 };
 //! let camera = Camera::look_at(DVec3::Z * 9.0, DVec3::ZERO, DVec3::Y, view, [16, 16]).unwrap();
 //! let shape = LightShape::Directional { direction: DVec3::NEG_Z };
-//! let lights = vec![LitBy { light: Light { shape, intensity: [1.0; 3] }, shadow: None }];
+//! let lights = vec![LitBy { slide: None, light: Light { shape, intensity: [1.0; 3] }, shadow: None }];
 //! let sheets = SheetInput {
 //!     volumes: vec![volume], splats: None, camera: &camera, lights, shadow_origin: DVec3::ZERO, ambient: [0.0; 3],
 //! };

@@ -5,18 +5,29 @@
 
 use crate::volume::SheetInput;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::raster::lanes::Lanes;
+use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use splat_core::shade::LitBy;
-use splat_core::{LightShape, Material, SHADED_EFFECTS, Shading};
+use splat_core::{LightShape, Material, SHADED_EFFECTS, Shading, Slide, SlideProjection};
 use std::f32::consts::PI;
 
 /// A light as lanes read it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Lamp {
+pub(crate) struct Lamp<'a> {
     shape: Shape,
     intensity: [f32; 3],
+    slide: Option<SlideInView<'a>>,
     pub(crate) has_shadow: bool,
+}
+
+/// A slide, with its projection in view space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct SlideInView<'a> {
+    slide: &'a Slide,
+    origin: Vec3,
+    axis: Option<Vec3>,
+    across: Vec3,
+    down: Vec3,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,13 +80,13 @@ pub(crate) struct Reflector<'a> {
     pub(crate) shadow_coefficient: f32,
 }
 
-impl Lamp {
+impl<'a> Lamp<'a> {
     /// The lights, in their order.
-    pub(crate) fn all(input: &SheetInput<'_>, origin: f64) -> Vec<Self> {
+    pub(crate) fn all(input: &SheetInput<'a>, origin: f64) -> Vec<Self> {
         input.lights.iter().map(|lit| Self::new(lit, input, origin)).collect()
     }
 
-    fn new(lit: &LitBy<'_>, input: &SheetInput<'_>, origin: f64) -> Self {
+    fn new(lit: &LitBy<'a>, input: &SheetInput<'a>, origin: f64) -> Self {
         let axes = input.camera.axes;
         let turned = |v: DVec3| DVec3::new(axes[0].dot(v), axes[1].dot(v), axes[2].dot(v)).as_vec3();
         let placed = |p: DVec3| (input.camera.view_from_world(p) - DVec3::Z * origin).as_vec3();
@@ -91,7 +102,12 @@ impl Lamp {
                 Shape::From(placed(shape.place().unwrap_or_default()), beam)
             }
         };
-        Self { shape, intensity: lit.light.intensity, has_shadow: lit.shadow.is_some() }
+        let slide = lit.slide.map(|slide| {
+            let SlideProjection { origin, axis, across, down } = *slide.projection();
+            let (origin, axis) = (placed(origin), axis.map(turned));
+            SlideInView { slide, origin, axis, across: turned(across), down: turned(down) }
+        });
+        Self { shape, intensity: lit.light.intensity, slide, has_shadow: lit.shadow.is_some() }
     }
 
     /// Directions to the light, and which share of its intensity is irradiance there without shadow.
@@ -123,21 +139,48 @@ impl Lamp {
     }
 }
 
+impl SlideInView<'_> {
+    /// What it lets through, as [`Slide::passing`] has it: places by lanes, look-ups one by one.
+    fn passing<S: Simd>(&self, simd: S, at: &[Lanes<S>; 3], spread: f32) -> [Lanes<S>; 3] {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let way = [at[0] - of(self.origin.x), at[1] - of(self.origin.y), at[2] - of(self.origin.z)];
+        let depth = self.axis.map_or(of(1.0), |axis| dot(&way, &all(simd, axis)));
+        let half = of(0.5);
+        let mut numbers = [[0.0; MAX_LANES]; 3];
+        let sides = [dot(&way, &all(simd, self.across)), dot(&way, &all(simd, self.down)), depth];
+        numbers.iter_mut().zip([sides[0] / depth + half, sides[1] / depth + half, depth]).for_each(|(to, v)| v.store(to));
+        let per = f64::from(spread.sqrt() * self.across.length());
+        let mut passing = [[0.0; MAX_LANES]; 3];
+        for lane in 0..Lanes::<S>::COUNT {
+            let [u, v, depth] = numbers.map(|n| f64::from(n[lane]));
+            if depth > 0.0 {
+                let seen = self.slide.look_up([u, v], per / depth);
+                (0..3).for_each(|c| passing[c][lane] = seen[c]);
+            }
+        }
+        [Lanes::load(simd, &passing[0]), Lanes::load(simd, &passing[1]), Lanes::load(simd, &passing[2])]
+    }
+}
+
 impl Reflector<'_> {
     /// Adds a lamp, of which the share `through` passes by what casts shadows.
     #[inline(always)]
     pub(crate) fn add<S: Simd>(
         &self,
         simd: S,
-        lamp: &Lamp,
+        lamp: &Lamp<'_>,
         spots: &Spots<S>,
         through: &[Lanes<S>; 3],
         lit: &mut Lit<S>,
     ) {
         let (to_light, share) = lamp.arriving(simd, &spots.at, self.spread);
         let (factor, specular) = self.factors(simd, spots, &to_light);
+        let passing = lamp.slide.as_ref().map(|slide| slide.passing(simd, &spots.at, self.spread));
         for c in 0..3 {
-            let irradiance = share * Lanes::splat(simd, lamp.intensity[c]);
+            let mut irradiance = share * Lanes::splat(simd, lamp.intensity[c]);
+            if let Some(passing) = &passing {
+                irradiance = irradiance * passing[c];
+            }
             let arrives = if lamp.has_shadow { irradiance * self.taken(simd, through[c]) } else { irradiance };
             lit.radiance[c] = arrives.mul_add(spots.color[c].mul_add(factor, specular), lit.radiance[c]);
             if c == 1 {
@@ -276,10 +319,9 @@ fn difference<S: Simd>(a: &[Lanes<S>; 3], b: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use splat_core::raster::lanes::MAX_LANES;
     use splat_core::raster::pulp;
     use splat_core::shade::Point;
-    use splat_core::{Camera, Light, Projection, rng};
+    use splat_core::{Camera, Framing, Light, Projection, RadianceImage, rng};
 
     /// Numbers in \[−1, 1) of one trial.
     struct Trial(u64, u64);
@@ -315,7 +357,7 @@ mod tests {
             }
         }
 
-        fn lights(&mut self) -> Vec<LitBy<'static>> {
+        fn lights<'a>(&mut self) -> Vec<LitBy<'a>> {
             let mut place = || 2.0 * self.vector();
             let positions = [place(), place(), place()];
             let (direction, normal) = (self.vector().normalize(), self.vector().normalize());
@@ -326,14 +368,21 @@ mod tests {
                 LightShape::Spot { position: positions[1], direction: normal, inner, outer: inner + 0.3 },
                 LightShape::Patch { position: positions[2], normal },
             ];
-            let light = |shape| LitBy { light: Light { shape, intensity: [2.0, 1.0, 0.5] }, shadow: None };
+            let light = |shape| LitBy { slide: None, light: Light { shape, intensity: [2.0, 1.0, 0.5] }, shadow: None };
             shapes.map(light).to_vec()
+        }
+
+        /// A slide that a light shines through, of 5 by 3 texels.
+        fn slide(&mut self, light: &LightShape) -> Slide {
+            let image = RadianceImage { size: [5, 3], pixels: (0..15).map(|_| [0; 3].map(|_| self.share())).collect() };
+            let framing = Framing { up: self.vector(), width: Some(4.0), center: self.vector() };
+            Slide::new(&image, light, &framing).unwrap()
         }
     }
 
     /// All effects and the shadow of one point by lanes.
     struct ByLanes<'a> {
-        lamps: &'a [Lamp],
+        lamps: &'a [Lamp<'a>],
         reflector: Reflector<'a>,
         at: Vec3,
         to_eye: Vec3,
@@ -377,12 +426,16 @@ mod tests {
             let camera = Camera::look_at(eye, target, DVec3::Y, view, [8, 8]).unwrap();
             let (material, mut lights, position) = (trial.material(), trial.lights(), trial.vector());
             lights.iter_mut().for_each(|lit| lit.light.validate(0).unwrap());
+            let slides = [0, 2].map(|k: usize| trial.slide(&lights[k].light.shape));
+            if n.is_multiple_of(2) {
+                (lights[0].slide, lights[2].slide) = (Some(&slides[0]), Some(&slides[1]));
+            }
             let normal = if n.is_multiple_of(7) { Vec3::ZERO } else { trial.vector().normalize().as_vec3() };
             let through: Vec<[f32; 3]> = lights.iter().map(|_| [trial.share(), trial.share(), 0.0]).collect();
             let to_eye = (eye - position).normalize().as_vec3();
             let (coefficient, color, radius) = (trial.share(), [0.9, 0.5, 1.2], 0.3);
             let point = Point { position, radius, normal, to_eye, color, material: &material };
-            let exact = point.radiance([0.1, 0.2, 0.3], lights.iter().map(|lit| &lit.light), |rank, _| {
+            let exact = point.radiance([0.1, 0.2, 0.3], lights.iter(), |rank, _| {
                 through[rank].map(|t| 1.0 - coefficient * (1.0 - t))
             });
             let mut input = SheetInput {

@@ -231,8 +231,7 @@ impl Sheets {
 
 /// Radiance of a point of a volume, all effects together.
 fn radiance(input: &SheetInput<'_>, volume: &Volume<'_>, point: &Point<'_>) -> [f64; 3] {
-    let lights = input.lights.iter().map(|lit| &lit.light);
-    let radiance = point.radiance(input.ambient, lights, |rank, irradiance| {
+    let radiance = point.radiance(input.ambient, input.lights.iter(), |rank, irradiance| {
         let shadow = input.lights[rank].shadow.map(|shadow| {
             let position = (point.position - input.shadow_origin).as_vec3();
             let kind = SplatKind::Medium;

@@ -39,7 +39,7 @@ pub(crate) struct Shader<'a> {
     pub(crate) slopes: &'a Slopes,
     /// The camera's, in single precision.
     pub(crate) axes: [Vec3; 3],
-    pub(crate) lamps: &'a [Lamp],
+    pub(crate) lamps: &'a [Lamp<'a>],
 }
 
 /// One volume of a tile, as shading reads it.

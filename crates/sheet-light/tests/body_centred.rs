@@ -99,7 +99,7 @@ fn light_in_a_body_centred_lattice_is_that_of_the_twin() {
     let tf = transfer(&[(0.2, 0.0), (0.6, 0.8), (1.2, 0.1), (1.5, 3.0)]);
     let material = Material::default();
     let sun = LightShape::Directional { direction: DVec3::new(-1.0, -2.0, -1.5).normalize() };
-    let light = |shape, shadow| LitBy { light: Light { shape, intensity: [2.0, 1.5, 1.0] }, shadow };
+    let light = |shape, shadow| LitBy { slide: None, light: Light { shape, intensity: [2.0, 1.5, 1.0] }, shadow };
     // Shadows that are linear are linear between voxels, too.
     let lamp = LightShape::Point { position: DVec3::new(4.0, 1.0, 5.0) };
     let lights = [light(sun, Some(&Slope as _)), light(lamp, None)];

@@ -11,7 +11,7 @@ use splat_core::{Accumulator, Camera, Grid, Light, LightShape, Material, Project
 
 fn sun<'a>() -> LitBy<'a> {
     let shape = LightShape::Directional { direction: DVec3::new(-1.0, -2.0, -1.5).normalize() };
-    LitBy { light: Light { shape, intensity: [2.0, 1.5, 1.0] }, shadow: None }
+    LitBy { slide: None, light: Light { shape, intensity: [2.0, 1.5, 1.0] }, shadow: None }
 }
 
 #[test]
@@ -99,7 +99,7 @@ fn ia10_a_volume_that_turns_with_the_camera_looks_the_same() {
         let projection = Projection::Perspective { fov_y: 1.0 };
         let camera = Camera::look_at(eye, DVec3::ZERO, turn * DVec3::Y, projection, [60, 50]).unwrap();
         let shape = LightShape::Directional { direction: turn * DVec3::new(-1.0, -2.0, -1.5).normalize() };
-        let lights = [LitBy { light: Light { shape, intensity: [2.0, 1.5, 1.0] }, shadow: None }];
+        let lights = [LitBy { slide: None, light: Light { shape, intensity: [2.0, 1.5, 1.0] }, shadow: None }];
         draw(&input(&volumes, &camera, &lights), &exact()).unwrap().0
     };
     let still = turned(0.0);

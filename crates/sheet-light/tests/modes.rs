@@ -60,7 +60,7 @@ fn older_methods_are_those_of_the_twin() {
 fn lit_older_methods_are_those_of_the_twin() {
     let tf = transfer(&[(0.2, 0.0), (0.6, 0.8), (1.2, 0.1), (1.5, 3.0)]);
     let material = Material { specular: 0.3, shininess: 12.0, ..Material::default() };
-    let light = |shape, shadow| LitBy { light: Light { shape, intensity: [2.0, 1.5, 1.0] }, shadow };
+    let light = |shape, shadow| LitBy { slide: None, light: Light { shape, intensity: [2.0, 1.5, 1.0] }, shadow };
     let sun = LightShape::Directional { direction: DVec3::new(-1.0, -2.0, -1.5).normalize() };
     let lamp = LightShape::Point { position: DVec3::new(4.0, 1.0, 5.0) };
     let lights = [light(sun, Some(&Slope as _)), light(lamp, None)];

@@ -31,7 +31,7 @@ impl Transmittance for Slope {
 }
 
 fn lights<'a>() -> [LitBy<'a>; 2] {
-    let light = |shape, shadow| LitBy { light: Light { shape, intensity: [2.0, 1.5, 1.0] }, shadow };
+    let light = |shape, shadow| LitBy { slide: None, light: Light { shape, intensity: [2.0, 1.5, 1.0] }, shadow };
     let direction = DVec3::new(-1.0, -2.0, -1.5).normalize();
     [
         light(LightShape::Directional { direction }, Some(&Slope as _)),

@@ -67,7 +67,7 @@ fn voxels_that_are_skipped_change_nothing() {
 fn lit_sheets_are_those_of_the_twin() {
     let tf = transfer(&[(0.2, 0.0), (0.6, 0.8), (1.2, 0.1), (1.5, 3.0)]);
     let material = Material { specular: 0.3, shininess: 12.0, ..Material::default() };
-    let light = |shape| LitBy { light: Light { shape, intensity: [2.0, 1.5, 1.0] }, shadow: None };
+    let light = |shape| LitBy { slide: None, light: Light { shape, intensity: [2.0, 1.5, 1.0] }, shadow: None };
     let lights = [
         light(LightShape::Directional { direction: DVec3::new(-1.0, -2.0, -1.5).normalize() }),
         light(LightShape::Point { position: DVec3::new(4.0, 1.0, 5.0) }),
@@ -97,7 +97,7 @@ impl Transmittance for Slope {
 fn shadows_between_voxels_are_linear() {
     let tf = transfer(&[(0.2, 0.0), (0.6, 0.8), (1.2, 0.1), (1.5, 3.0)]);
     let material = Material::default();
-    let light = |shape, shadow| LitBy { light: Light { shape, intensity: [2.0, 1.5, 1.0] }, shadow };
+    let light = |shape, shadow| LitBy { slide: None, light: Light { shape, intensity: [2.0, 1.5, 1.0] }, shadow };
     let lights = [
         light(LightShape::Directional { direction: DVec3::new(-1.0, -2.0, -1.5).normalize() }, Some(&Slope as _)),
         light(LightShape::Point { position: DVec3::new(4.0, 1.0, 5.0) }, None),

@@ -77,7 +77,7 @@ pub use footprint::{Footprint, FootprintStack};
 pub use glam;
 pub use grid::{BccGrid, Grid, Packing};
 pub use layers::{ADDITIVE_LAYERS, Accumulator, LayerData, LayerSet, Layers, SHADED_EFFECTS};
-pub use light::{Light, LightShape};
+pub use light::{Framing, Light, LightShape, Slide, SlideProjection};
 pub use limits::{Exceeded, Limits};
 pub use material::{Material, MaterialTable, Object, ObjectTable, Shading};
 pub use mesh::Mesh;

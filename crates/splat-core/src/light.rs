@@ -5,6 +5,9 @@
 
 mod brightest;
 mod points;
+mod slide;
+
+pub use slide::{Framing, Slide, SlideProjection};
 
 use crate::Error;
 use glam::DVec3;

@@ -10,21 +10,34 @@ pub use channels::{ChannelLayout, MAX_CHANNELS, MAX_SHADED_CHANNELS};
 pub use point::{Point, Radiance, arriving, facing};
 
 use crate::raster::Projected;
-use crate::{Camera, Cloud, Error, Light, Material, Object, Progress, Receiver, Transmittance};
-use glam::Vec3;
+use crate::{Camera, Cloud, Error, Light, Material, Object, Progress, Receiver, Slide, Transmittance};
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 /// Splats shaded by one task.
 const CHUNK: usize = 4096;
 
-/// A light with its shadow map, if it has one.
+/// A light with what it shines through and its shadow map, if it has them.
 #[derive(Clone, Copy)]
 pub struct LitBy<'a> {
     /// The light.
     pub light: Light,
+    /// The picture that it shines through.
+    pub slide: Option<&'a Slide>,
     /// Its transmittance to any point, relative to the origin of the cloud that casts; `None` when nothing casts or receives its
     /// shadow.
     pub shadow: Option<&'a dyn Transmittance>,
+}
+
+impl LitBy<'_> {
+    /// Direction to the light, and the unshadowed irradiance per channel, as [`Light::irradiance`] has them, behind the slide: the one
+    /// place where light arrives, whoever asks.
+    #[inline]
+    pub fn irradiance(&self, p: DVec3, spread: f64) -> (DVec3, [f32; 3]) {
+        let (to_light, irradiance) = self.light.irradiance(p, spread);
+        let passing = self.slide.map_or([1.0; 3], |slide| slide.passing(p, spread));
+        (to_light, std::array::from_fn(|c| irradiance[c] * passing[c]))
+    }
 }
 
 /// What shading reads beside the splats.
@@ -125,8 +138,7 @@ impl<'a> LitSplat<'a> {
     }
 
     fn shade(&self, input: &ShadeInput<'_>) -> Radiance {
-        let lights = input.lights.iter().map(|lit| &lit.light);
-        self.point.radiance(input.ambient, lights, |rank, irradiance| {
+        self.point.radiance(input.ambient, input.lights.iter(), |rank, irradiance| {
             self.transmittance(input.lights[rank].shadow, irradiance)
         })
     }

@@ -49,7 +49,7 @@ fn picture(cloud: &Cloud, to_light: DVec3) -> OpaqueImage {
         cloud,
         materials: &materials,
         objects: &[object],
-        lights: &[LitBy { light, shadow: None }],
+        lights: &[LitBy { slide: None, light, shadow: None }],
         ambient: [0.0; 3],
         camera: &camera,
     };

@@ -1,7 +1,7 @@
 //! The radiance of one point: which effect light becomes, and where its numbers lie.
 
 use glam::{DVec3, Vec3};
-use splat_core::shade::{ChannelLayout, MAX_CHANNELS, MAX_SHADED_CHANNELS, Point, Radiance, arriving, facing};
+use splat_core::shade::{ChannelLayout, LitBy, MAX_CHANNELS, MAX_SHADED_CHANNELS, Point, Radiance, arriving, facing};
 use splat_core::{ADDITIVE_LAYERS, LayerSet, Light, LightShape, Material, SHADED_EFFECTS, Shading, SplatKind};
 
 const AMBIENT: [f32; 3] = [0.1, 0.2, 0.3];
@@ -19,7 +19,7 @@ fn radiance(shading: Shading, normal: Vec3) -> Radiance {
     let material = Material { shading, emission: EMISSION, single_scattering_albedo: 0.5, ..Material::default() };
     let (position, to_eye) = (DVec3::new(1e7, 0.0, 0.0), Vec3::Z);
     let point = Point { position, radius: 0.1, normal, to_eye, color: COLOR, material: &material };
-    point.radiance(AMBIENT, lights().iter(), |_, _| [SHARE; 3])
+    point.radiance(AMBIENT, lights().map(|light| LitBy { slide: None, light, shadow: None }).iter(), |_, _| [SHARE; 3])
 }
 
 /// Whether all are within rounding.

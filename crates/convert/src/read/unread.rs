@@ -19,7 +19,7 @@ const TO_NRRD: &str = "convert it to NRRD or NIfTI, such as with 3D Slicer or Pa
 const TO_STL: &str = "save its surface as PLY, STL or OBJ, such as with ParaView";
 const EXTRACT: &str = "extract the files in it; one file inside gzip is read as it is";
 const IMAGE: &str =
-    "an environment is read from Radiance HDR or OpenEXR, a texture from what names it; convert the image";
+    "an environment is read from Radiance HDR or OpenEXR, a light's texture from PNG too; convert the image";
 const SPLATS: &str = "3D Gaussian splats are not read: use a mesh or a point cloud of the same scene";
 const SCENE: &str = "it is a scene, not data: give it to `organza render`";
 
@@ -27,7 +27,7 @@ const fn by_extension(name: &'static str, extensions: &'static [&'static str], h
     Unread { name, marks: &[], extensions, hint }
 }
 
-const UNREAD: [Unread; 46] = [
+const UNREAD: [Unread; 45] = [
     Unread { name: "FBX", marks: &[(0, b"Kaydara FBX Binary"), (0, b"; FBX ")], extensions: &["fbx"], hint: TO_GLTF },
     Unread {
         name: "USD",
@@ -79,7 +79,6 @@ const UNREAD: [Unread; 46] = [
     Unread { name: "NumPy", marks: &[(0, b"\x93NUMPY")], extensions: &["npy", "npz"], hint: TO_NRRD },
     by_extension("VTK polygons or cells", &["vtp", "vtu", "vts", "vtr", "vtm", "pvd", "pvtu", "pvtp"], TO_STL),
     Unread { name: "a JPEG image", marks: &[(0, b"\xff\xd8\xff")], extensions: &["jpg", "jpeg"], hint: IMAGE },
-    Unread { name: "a PNG image", marks: &[(0, b"\x89PNG\r\n\x1a\n")], extensions: &["png"], hint: IMAGE },
     Unread { name: "a TIFF image", marks: &[(0, b"II*\0"), (0, b"MM\0*")], extensions: &["tif", "tiff"], hint: IMAGE },
     by_extension("an image", &["webp", "bmp", "gif", "tga", "ktx2", "avif"], IMAGE),
     Unread { name: "a zip archive", marks: &[(0, b"PK\x03\x04")], extensions: &["zip"], hint: EXTRACT },
@@ -91,8 +90,8 @@ const UNREAD: [Unread; 46] = [
     by_extension("a scene", &["toml", "json"], SCENE),
 ];
 
-const READ: &str = "PLY, STL, OBJ, OFF, glTF, GLB, PCD, XYZ, CSV, LAS, LAZ, NIfTI, NRRD, Radiance HDR and OpenEXR files are read, \
-    each also inside gzip";
+const READ: &str = "PLY, STL, OBJ, OFF, glTF, GLB, PCD, XYZ, CSV, LAS, LAZ, NIfTI, NRRD, MetaImage, VTK images, raw voxels, \
+    Radiance HDR, OpenEXR and PNG files are read, each also inside gzip";
 
 fn error(unread: &Unread) -> ReadError {
     let found = format!("{}, which is not read", unread.name);
@@ -118,7 +117,7 @@ pub(super) fn refused(path: &Path, head: &[u8]) -> ReadError {
     by_name(path).map(error).unwrap_or_else(|| {
         ReadError::input(
             Place::Byte(0),
-            "'ply', 'LASF', 'NRRD', 'glTF', '# .PCD', '#?', a NIfTI-1 or OpenEXR header, or the extension of a \
+            "'ply', 'LASF', 'NRRD', 'glTF', '# .PCD', '#?', a NIfTI-1, OpenEXR or PNG header, or the extension of a \
             format without a mark",
             format!("'{}'", escaped(&head[..head.len().min(16)], 16)),
             READ,

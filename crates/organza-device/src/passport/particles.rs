@@ -46,7 +46,7 @@ impl ParticlesInput {
     /// Lit by the lamp of a shadow map; none is widened, so that places within pixels are the same.
     pub(super) fn check_lit(&self, device: &mut dyn Executor, shadow: &ShadowInput) -> Result<Found, Failure> {
         let (map, light) = shadow.lamp();
-        let lit = LitBy { light, shadow: Some(map) };
+        let lit = LitBy { slide: None, light, shadow: Some(map) };
         let material = Material { specular: 0.2, shininess: 20.0, ..Material::default() };
         self.check_in(device, Folding::new(vec![(map, DVec3::ZERO)]), (material, 0.6), &[lit])
     }

@@ -7,7 +7,7 @@ use crate::pass;
 use crate::shadows::{ShadowTable, shadow_error};
 use crate::{CostRecord, Error, work};
 use splat_core::shade::{LitBy, ShadeInput};
-use splat_core::{Light, Object, Transmittance};
+use splat_core::{Object, Transmittance};
 use tsm::{Deposits, ShadowMap};
 
 /// The shadow maps of a frame, for each point of a light.
@@ -97,7 +97,7 @@ impl<'a> Frame<'a> {
     /// The points of lights that have an intensity, with their maps.
     pub(crate) fn lit_by<'b>(&'b self, maps: &'b [Option<ShadowMap>]) -> Vec<LitBy<'b>> {
         let shadow = |map: Option<&'b ShadowMap>| map.map(|map| map as &dyn Transmittance);
-        self.shining(maps).map(|(light, map)| LitBy { light, shadow: shadow(map) }).collect()
+        self.shining(maps).map(|(lit, map)| LitBy { shadow: shadow(map), ..lit }).collect()
     }
 
     /// What shading the drawn splats reads.
@@ -108,17 +108,22 @@ impl<'a> Frame<'a> {
         ShadeInput { cloud: self.drawn(), materials, objects, lights, ambient, camera }
     }
 
-    /// The points of lights that have an intensity, with their shadow maps.
+    /// The points of lights that have an intensity, with their shadow maps beside them.
     pub(crate) fn shining<'b>(
         &'b self,
         maps: &'b [Option<ShadowMap>],
-    ) -> impl Iterator<Item = (Light, Option<&'b ShadowMap>)> {
+    ) -> impl Iterator<Item = (LitBy<'b>, Option<&'b ShadowMap>)> {
         self.with_light(maps.iter().map(Option::as_ref))
     }
 
-    /// Points of lights that have an intensity, each with what is there for it.
-    pub(crate) fn with_light<T>(&self, of_each: impl Iterator<Item = T>) -> impl Iterator<Item = (Light, T)> {
-        let all = self.light_points().iter().zip(of_each);
-        all.map(|(point, of)| (point.light, of)).filter(|(light, _)| light.intensity != [0.0; 3])
+    /// Points of lights that have an intensity, without shadows, each with what is there for it.
+    pub(crate) fn with_light<T>(&self, of_each: impl Iterator<Item = T>) -> impl Iterator<Item = (LitBy<'_>, T)> {
+        let all = self.light_points().iter().zip(of_each).filter(|(point, _)| point.light.intensity != [0.0; 3]);
+        all.map(|(point, of)| (self.lit(point), of))
+    }
+
+    /// A point of a light behind its slide, without shadows.
+    pub(crate) fn lit(&self, point: &LightPoint) -> LitBy<'_> {
+        LitBy { light: point.light, slide: self.loaded.slides[point.of].as_ref(), shadow: None }
     }
 }

@@ -3,12 +3,17 @@
 
 use super::own::Own;
 use crate::scene::SceneLight;
-use splat_core::{Camera, Cloud, DAabb};
+use splat_core::{Camera, Cloud, DAabb, Slide};
 
 /// Scales everything by 2^−e, where 2^e is the size of the bounds of all splats and objects, and returns e.
 ///
 /// Lengths scale with 2^−e, cross-sections and point intensities with 2^−2e; directional irradiance stays.
-pub(super) fn normalize(cloud: &mut Cloud, own: &mut [Own], camera: &mut Camera, lights: &mut [SceneLight]) -> i32 {
+pub(super) fn normalize(
+    cloud: &mut Cloud,
+    own: &mut [Own],
+    camera: &mut Camera,
+    (lights, slides): (&mut [SceneLight], &mut [Option<Slide>]),
+) -> i32 {
     let diagonal = diagonal(cloud, own);
     if !(diagonal.is_finite() && diagonal > 0.0) {
         return 0;
@@ -21,6 +26,7 @@ pub(super) fn normalize(cloud: &mut Cloud, own: &mut [Own], camera: &mut Camera,
     for light in lights {
         light.light = light.light.scaled(scale);
     }
+    slides.iter_mut().flatten().for_each(|slide| slide.scale_world(scale));
     exponent
 }
 

@@ -27,7 +27,9 @@ impl Tracer<'_> {
         let pick = if n == 1 { 0 } else { ((rng.unit() * n as f64) as usize).min(n - 1) };
         let lamp = &lights[pick];
         let u = if lamp.source.is_area() { rng.pair() } else { [0.5; 2] };
-        if let Some(sample) = lamp.source.sample(path.ray.origin, u) {
+        if let Some(mut sample) = lamp.source.sample(path.ray.origin, u) {
+            let passing = self.scene.passing(lamp.rank, path.ray.origin);
+            (0..3).for_each(|c| sample.value[c] *= passing[c]);
             let arrival = Arrival { sample, lamp: Some(lamp), chosen: 1.0 / n as f64 };
             self.add_sample(path, vertex, &arrival, skip, rng);
         }
@@ -90,11 +92,11 @@ impl Tracer<'_> {
         let distance = to_light.length();
         let shadow = Ray { origin: point, direction: to_light / distance };
         let arrives = if lamp.shadowed { self.through(&shadow, distance, u32::MAX, true, rng) } else { [1.0; 3] };
-        let intensity = lamp.source.intensity(point);
+        let (intensity, passing) = (lamp.source.intensity(point), self.scene.passing(lamp.rank, point));
         // 1/density · 1/d²: the squares cancel but for rounding, apart² + (t − middle)² = d².
         let factor = n as f64 * (b - a) / apart;
         let lit = |c: usize| scattered[c] - dimmed[c] * (1.0 - arrives[c]);
-        path.add(std::array::from_fn(|c| lit(c) * intensity[c] * seen[c]), factor);
+        path.add(std::array::from_fn(|c| lit(c) * intensity[c] * passing[c] * seen[c]), factor);
     }
 
     /// Σ over media of extinction · albedo · phase towards a light, per channel; all, and the share that shadows dim.

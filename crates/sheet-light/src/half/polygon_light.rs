@@ -115,7 +115,7 @@ impl<'a> PolygonLight<'a> {
         (layout, values, received): (&ChannelLayout, &mut [f32], &mut [f32; 2]),
     ) {
         let (point, is_carried) = (seen.point(), lamps.carried.is_some());
-        let mut radiance = point.radiance(lamps.ambient, lights.iter().map(|lit| &lit.light), |light, irradiance| {
+        let mut radiance = point.radiance(lamps.ambient, lights.iter(), |light, irradiance| {
             let own = if is_carried && light == 0 { self.through[rank] } else { [1.0; 3] };
             let shadow = || {
                 let others = lights[light].shadow.map(|shadow| shadow.transmittance(&seen.receiver(origin)));
@@ -124,7 +124,7 @@ impl<'a> PolygonLight<'a> {
             arriving(irradiance, seen.of.shadow_coefficient, Some(shadow))
         });
         if seen.of.is_lit() {
-            let all: f32 = lights.iter().map(|lit| point.irradiance(&lit.light).1[1]).sum();
+            let all: f32 = lights.iter().map(|lit| point.irradiance(lit).1[1]).sum();
             *received = [received[0] + radiance.shadow * all, received[1] + all];
         }
         if lamps.light_alone {

@@ -74,7 +74,7 @@ pub fn draw(input: &HalfInput<'_>, params: &HalfParams) -> Result<Picture, Error
 fn lights<'a>(input: &HalfInput<'a>) -> Vec<LitBy<'a>> {
     let points = |e: &Extended<'a>| {
         let shadow = e.lit.shadow;
-        e.lit.light.points(e.samples).into_iter().map(move |light| LitBy { light, shadow })
+        e.lit.light.points(e.samples).into_iter().map(move |light| LitBy { slide: None, light, shadow })
     };
     input.sheets.lights.iter().copied().chain(input.extended.iter().flat_map(points)).collect()
 }
@@ -317,7 +317,7 @@ impl<'a> View<'a> {
             material: volume.material,
         };
         let share = (1.0 - f64::from(volume.shadow_coefficient) * (1.0 - mean)) as f32;
-        let radiance = point.radiance(self.input.sheets.ambient, [lit.light].iter(), |_, _| [share; 3]);
+        let radiance = point.radiance(self.input.sheets.ambient, std::iter::once(lit), |_, _| [share; 3]);
         let [ambient, emission, direct, scatter] = radiance.effects();
         let others = if with_ambient { 1.0 } else { 0.0 };
         let more = |d: &scatter::Diffuse| d.radiance(volume, &lit.light, point.position, point.to_eye, point.color);

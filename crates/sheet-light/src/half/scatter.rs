@@ -67,7 +67,8 @@ pub(crate) struct Scattered {
 pub(crate) struct Scene {
     pub(crate) grid: LightGrid,
     pub(crate) cells: Vec<Cell>,
-    entering: Vec<f64>,
+    /// Power that enters each column, by channel, of a light of intensity 1.
+    entering: [Vec<f64>; 3],
     others: Vec<[f32; 3]>,
     cone: f64,
 }
@@ -79,6 +80,14 @@ pub(crate) fn is_wanted(volumes: &[Volume<'_>], light: &Light, params: &HalfPara
         && light.intensity.iter().any(|i| *i > 0.0)
 }
 
+/// Power per channel that enters a column of this area at its first face.
+pub(crate) fn entering(lit: &LitBy<'_>, place: DVec3, area: f64) -> [f64; 3] {
+    let irradiance = lit.light.irradiance(place, 0.0).1;
+    // A column of even width has this deviation.
+    let passing = lit.slide.map_or([1.0; 3], |slide| slide.passing(place, (area / 12.0).sqrt()));
+    [0, 1, 2].map(|c| f64::from(irradiance[c] * passing[c]) * area)
+}
+
 impl Scene {
     /// `shadow_origin`: what places of shadows are relative to.
     pub(crate) fn new(volumes: &[Volume<'_>], lit: &LitBy<'_>, params: &HalfParams, shadow_origin: DVec3) -> Self {
@@ -87,10 +96,14 @@ impl Scene {
         let cells = medium::cells(&grid, volumes, params.scattering);
         let ([width, height], layers) = (grid.columns, grid.layers);
         let one = Light { intensity: [1.0; 3], ..lit.light };
-        let entering = (0..width * height).map(|at| {
-            let place = grid.world([(at % width) as f64, (at / width) as f64, 0.0]);
-            f64::from(one.irradiance(place, 0.0).1[0]) * grid.area(0.0)
-        });
+        let (area, lit_by_one) = (grid.area(0.0), LitBy { light: one, ..*lit });
+        let entering = |channel: usize| {
+            let column = |at: usize| {
+                let place = grid.world([(at % width) as f64, (at / width) as f64, 0.0]);
+                entering(&lit_by_one, place, area)[channel]
+            };
+            (0..width * height).map(column).collect()
+        };
         let others = |shadow: &dyn splat_core::Transmittance| {
             let face = |at: usize| {
                 let [x, y, face] = [at % width, at / (width * (layers + 1)), at / width % (layers + 1)];
@@ -102,7 +115,7 @@ impl Scene {
             (0..width * height * (layers + 1)).map(face).collect()
         };
         Self {
-            entering: entering.collect(),
+            entering: [0, 1, 2].map(entering),
             others: lit.shadow.map_or_else(Vec::new, others),
             cone: params.cone.unwrap_or_else(|| phase::cone_of(params.scattering, medium::mean_asymmetry(&cells))),
             cells,
@@ -140,7 +153,7 @@ impl Scene {
     fn is_like(&self, channel: usize, other: usize) -> bool {
         let same = |v: &[f32; 3]| v[channel] == v[other];
         let cell = |c: &Cell| [&c.extinction, &c.scattering, &c.forward, &c.ahead].into_iter().all(same);
-        self.cells.iter().all(cell) && self.others.iter().all(same)
+        self.entering[channel] == self.entering[other] && self.cells.iter().all(cell) && self.others.iter().all(same)
     }
 }
 

@@ -39,8 +39,7 @@ impl Lit<'_> {
             color: self.color,
             material: self.volume.material,
         };
-        let lights = || of.light.iter().chain(of.mapped);
-        let mut radiance = point.radiance(of.ambient, lights().map(|lit_by| &lit_by.light), |rank, irradiance| {
+        let mut radiance = point.radiance(of.ambient, of.light.iter().chain(of.mapped), |rank, irradiance| {
             // The light of the sweep comes first.
             let carried = if rank == 0 && of.light.is_some() { self.arrives } else { [1.0; 3] };
             let shadow = || {

@@ -87,8 +87,10 @@ impl<'a> Sweep<'a> {
         let frame = Frame::new(bodies, camera, &params.sheets, &axis)?;
         let placed: Vec<Placed<'a>> = volumes.iter().map(|v| Placed::new(v, &frame, &params.sheets)).collect();
         let sight = Sight::new(&frame, *camera);
-        let by_place =
-            |lit: &LitBy<'_>| lit.shadow.is_some() || !matches!(lit.light.shape, LightShape::Directional { .. });
+        let by_place = |lit: &LitBy<'_>| {
+            let is_parallel = matches!(lit.light.shape, LightShape::Directional { .. });
+            lit.shadow.is_some() || lit.slide.is_some() || !is_parallel
+        };
         let light_buffer = carried.map(|carried| light_buffer(&frame, params, &placed, bodies, carried));
         let gain = light_buffer.as_ref().and_then(|b| b.soft.as_ref()).map(|soft| soft.penumbra.gain);
         let light = carried.map(|(lit, _)| match gain {

@@ -13,7 +13,7 @@ pub(crate) fn scattering() -> Material {
 }
 
 pub(crate) fn lit(shape: LightShape) -> LitBy<'static> {
-    LitBy { light: Light { shape, intensity: [1.0; 3] }, shadow: None }
+    LitBy { slide: None, light: Light { shape, intensity: [1.0; 3] }, shadow: None }
 }
 
 /// Light that comes from a direction.

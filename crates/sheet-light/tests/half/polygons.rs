@@ -339,6 +339,7 @@ fn what_is_no_mesh_and_what_is_not_there_yet_is_refused_by_name() {
     let said = refused(&HalfInput { polygons: &shy, ..input(&[], &camera, &[]) });
     assert!(said.contains("shadow_coefficient is NaN"), "{said}");
     let lit = LitBy {
+        slide: None,
         light: splat_core::Light {
             shape: LightShape::Sphere { center: DVec3::Y * 9.0, radius: 1.0 },
             intensity: [1.0; 3],

@@ -21,7 +21,7 @@ fn extended(shape: LightShape, samples: u32) -> Extended<'static> {
 
 /// The same light as that many points, a sweep each.
 fn as_points(light: &Extended<'static>, samples: u32) -> Vec<LitBy<'static>> {
-    light.lit.light.points(samples).into_iter().map(|light| LitBy { light, shadow: None }).collect()
+    light.lit.light.points(samples).into_iter().map(|light| LitBy { slide: None, light, shadow: None }).collect()
 }
 
 /// A constant block between two corners.
@@ -161,7 +161,7 @@ fn hv07_hv08_what_is_constant_stays_so_after_a_thousand_slabs_and_at_borders() {
     let (thin, material) = (constant(0.5), scattering());
     let camera = parallel([0.0, 0.0, 9.0], 5.6, [32, 32]);
     let disk = extended(LightShape::Disk { center: DVec3::Z * 1e3, normal: DVec3::NEG_Z, radius: 30.0 }, 16);
-    let point = LitBy { light: Light { shape: lamp([0.0, 0.0, 1e3]).light.shape, ..disk.lit.light }, shadow: None };
+    let point = LitBy { slide: None, light: Light { shape: lamp([0.0, 0.0, 1e3]).light.shape, ..disk.lit.light }, shadow: None };
     let with = |casts_shadow: bool, is_soft: bool| {
         let volumes = [Volume { casts_shadow, ..volume(&grid, &thin, &material) }];
         let (extended, lights) = if is_soft { (vec![disk], vec![]) } else { (vec![], vec![point]) };
@@ -252,7 +252,7 @@ fn against_points(light: &Extended<'static>, points: u32, camera: &Camera) -> [f
     let of = |input: HalfInput<'_>| draw(&input, &exact(None)).unwrap().0.channels[1].clone();
     let truth = of(input(&volumes, camera, &as_points(light, points)));
     let found = of(soft(&volumes, camera, vec![*light]));
-    let centre = Extended { samples: 1, lit: LitBy { light: central(&light.lit.light), shadow: None } };
+    let centre = Extended { samples: 1, lit: LitBy { slide: None, light: central(&light.lit.light), shadow: None } };
     let hard = of(soft(&volumes, camera, vec![centre]));
     let rmse = |a: &[f32]| {
         let squares: f64 = a.iter().zip(&truth).map(|(a, b)| f64::from(a - b).powi(2)).sum();

@@ -117,6 +117,9 @@ pub fn suits(input: &ShadeInput<'_>) -> Result<(), &'static str> {
     if input.lights.iter().any(|lit| narrow(&lit.light)) {
         return Err("a spot with a sharp rim is shaded by the processor");
     }
+    if input.lights.iter().any(|lit| lit.slide.is_some()) {
+        return Err("light through a slide is shaded by the processor");
+    }
     Ok(())
 }
 
@@ -140,7 +143,7 @@ pub fn received(input: &ShadeInput<'_>, ids: &[u32], progress: Option<&Progress>
             }
             for (to, &i) in to.iter_mut().zip(ids) {
                 let splat = LitSplat::new(input, i as usize);
-                let (_, irradiance) = splat.point.irradiance(&lit.light);
+                let (_, irradiance) = splat.point.irradiance(lit);
                 *to = splat.transmittance(lit.shadow, irradiance);
             }
         });

@@ -5,8 +5,8 @@
 //! Media: L = ω·c·p(θ)·E, single scattering, or the surface form when they have a normal and ask for Phong.
 //! E is the irradiance of a light times its transmittance; ambient radiance adds ρ·L_ambient.
 
-use super::ChannelLayout;
-use crate::{Light, Material, SHADED_EFFECTS, Shading, SplatKind, henyey_greenstein};
+use super::{ChannelLayout, LitBy};
+use crate::{Material, SHADED_EFFECTS, Shading, SplatKind, henyey_greenstein};
 use glam::{DVec3, Vec3};
 
 /// One point being shaded.
@@ -61,19 +61,19 @@ pub fn arriving(irradiance: [f32; 3], coefficient: f32, shadow: Option<impl FnOn
 impl Point<'_> {
     /// Direction to a light, and its irradiance here without shadow.
     #[inline]
-    pub fn irradiance(&self, light: &Light) -> (Vec3, [f32; 3]) {
+    pub fn irradiance(&self, lit: &LitBy<'_>) -> (Vec3, [f32; 3]) {
         // σ = R/3 at the default cutoff.
-        let (to_light, irradiance) = light.irradiance(self.position, f64::from(self.radius) / 3.0);
+        let (to_light, irradiance) = lit.irradiance(self.position, f64::from(self.radius) / 3.0);
         (to_light.as_vec3(), irradiance)
     }
 
     /// Radiance towards the viewer under `lights` and the same ambient radiance from everywhere; `transmittance` gives the
     /// share that arrives of the light of this rank and irradiance.
     #[inline]
-    pub fn radiance<'l>(
+    pub fn radiance<'l, 'a: 'l>(
         &self,
         ambient: [f32; 3],
-        lights: impl Iterator<Item = &'l Light>,
+        lights: impl Iterator<Item = &'l LitBy<'a>>,
         transmittance: impl Fn(usize, [f32; 3]) -> [f32; 3],
     ) -> Radiance {
         let m = self.material;
@@ -88,8 +88,8 @@ impl Point<'_> {
         out.ambient = std::array::from_fn(|c| ambient[c] * self.color[c] * reflectance * m.ambient);
         let mut lit = dark;
         let (mut received, mut unshadowed) = (0.0, 0.0);
-        for (rank, light) in lights.enumerate() {
-            let (to_light, irradiance) = self.irradiance(light);
+        for (rank, lit_by) in lights.enumerate() {
+            let (to_light, irradiance) = self.irradiance(lit_by);
             let (diffuse, specular) =
                 if by_phase { (self.scatter(to_light), 0.0) } else { m.reflect(self.normal, to_light, self.to_eye) };
             let transmittance = transmittance(rank, irradiance);

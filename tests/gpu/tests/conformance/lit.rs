@@ -250,7 +250,7 @@ const ALL: EnsembleParams = EnsembleParams {
 /// The two lights with maps, and the one without.
 fn lit<'a>(lights: &[Light; 3], maps: &'a [ShadowMap; 2]) -> Vec<LitBy<'a>> {
     let shadow = |k: usize| maps.get(k).map(|map| map as &dyn Transmittance);
-    lights.iter().enumerate().map(|(k, light)| LitBy { light: *light, shadow: shadow(k) }).collect()
+    lights.iter().enumerate().map(|(k, light)| LitBy { slide: None, light: *light, shadow: shadow(k) }).collect()
 }
 
 /// Whether every access of a kernel is looked at: that takes minutes, and few sets show all accesses.
@@ -294,7 +294,7 @@ fn lit_sets_are_the_cpu_s() {
 #[test]
 fn ambient_light_alone_and_lights_without_maps() {
     let (mut device, world) = (open().unwrap(), World::new(DVec3::ZERO));
-    let lights = world.lights().map(|light| LitBy { light, shadow: None });
+    let lights = world.lights().map(|light| LitBy { slide: None, light, shadow: None });
     for lights in [&lights[..0], &lights[..]] {
         world.with(VIEWS[0], 0.7, false, |objects, camera| {
             let scene =
@@ -413,7 +413,7 @@ fn a_large_image_goes_in_parts() {
 fn too_little_room_and_other_lights_are_refused() {
     let (mut device, world) = (open().unwrap(), World::new(DVec3::ZERO));
     world.with(VIEWS[0], 0.7, false, |objects, camera| {
-        let lights = world.lights().map(|light| LitBy { light, shadow: None });
+        let lights = world.lights().map(|light| LitBy { slide: None, light, shadow: None });
         let scene =
             Scene { objects, lights: &lights, shadow_origin: world.origin, ambient: [0.1; 3], camera, occluder: None };
         let (sources, mut ensemble) = (Sources::new(&scene).unwrap(), Ensemble::new(SIZE, &ALL).unwrap());

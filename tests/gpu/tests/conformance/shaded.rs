@@ -105,7 +105,7 @@ fn values_are_the_cpu_s() {
         let (cloud, lights) = (cloud(n, origin, n % 2 == 0), lights(origin));
         let veiled = |(k, light): (usize, &Light)| {
             let shadow = (k % 2 == 0).then_some(&Veil as &dyn Transmittance);
-            LitBy { light: *light, shadow }
+            LitBy { slide: None, light: *light, shadow }
         };
         let lit: Vec<LitBy<'_>> = lights.iter().enumerate().map(veiled).collect();
         for view in VIEWS {
@@ -163,7 +163,7 @@ fn what_single_precision_does_not_resolve_is_said() {
     let camera = Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, VIEWS[0], [8, 8]).unwrap();
     let spot = |inner, outer| LightShape::Spot { position: DVec3::Y, direction: DVec3::NEG_Y, inner, outer };
     let asks = |shape, shininess| {
-        let lights = [LitBy { light: Light { shape, intensity: [1.0; 3] }, shadow: None }];
+        let lights = [LitBy { slide: None, light: Light { shape, intensity: [1.0; 3] }, shadow: None }];
         let materials = vec![Material { specular: 0.1, shininess, ..Material::default() }; 4];
         let (cloud, objects, ambient) = (&cloud, &objects[..], [0.0; 3]);
         let input = ShadeInput { cloud, materials: &materials, objects, lights: &lights, ambient, camera: &camera };
@@ -175,7 +175,7 @@ fn what_single_precision_does_not_resolve_is_said() {
     let room = asks(spot(0.3, 0.6), 1.0).1;
     assert_eq!((room.lights, room.shadows, room.materials), (1, 0, 4));
     let attributes = Attributes::new(&cloud, None).unwrap();
-    let lit = || LitBy { light: Light { shape: spot(0.1, 0.5), intensity: [1.0; 3] }, shadow: None };
+    let lit = || LitBy { slide: None, light: Light { shape: spot(0.1, 0.5), intensity: [1.0; 3] }, shadow: None };
     let (materials, two) = (vec![Material::default(); 4], [lit(), lit()]);
     let input = ShadeInput {
         cloud: &cloud,

@@ -11,7 +11,7 @@ use crate::{Error, Progress, RenderOptions, stage};
 use pbsr::{Ensemble, EnsembleParams, FoldParams, LitBy, Object, Renderer};
 use rayon::prelude::*;
 use splat_core::raster::OpaqueImage;
-use splat_core::{Camera, LayerSet, Light, Limits, Transmittance};
+use splat_core::{Camera, LayerSet, Limits, Transmittance};
 use std::ops::Range;
 use tsm::ShadowMap;
 
@@ -33,10 +33,10 @@ pub(super) fn fold(
 ) -> Result<Average, Error> {
     let objects: Vec<Object<'_>> = parts.iter().map(|part| part.object()).collect();
     let origin = frame.loaded.cloud.origin;
-    let shining: Vec<(Light, Option<&ShadowMap>)> = frame.shining(maps).collect();
+    let shining: Vec<(LitBy<'_>, Option<&ShadowMap>)> = frame.shining(maps).collect();
     let shadow = |map| -> Option<&dyn Transmittance> { Some(map? as &ShadowMap) };
     let lights: Vec<LitBy<'_>> =
-        shining.iter().map(|(light, map)| LitBy { light: *light, shadow: shadow(*map) }).collect();
+        shining.iter().map(|(lit, map)| LitBy { shadow: shadow(*map), ..*lit }).collect();
     let (camera, ambient) = (&frame.camera, frame.scene.ambient);
     let scene = pbsr::Scene { objects: &objects, lights: &lights, shadow_origin: origin, ambient, camera, occluder };
     let colored = frame.plan.optical_depth_planes == 3;

@@ -67,7 +67,7 @@ impl Points<'_> {
     fn lit_on_device(&self) -> Vec<LitBy<'_>> {
         let tables = self.frame.plan.shadow_tables.iter();
         let shadows = tables.map(|table| table.is_some().then_some(&OnDevice as &dyn Transmittance));
-        self.frame.with_light(shadows).map(|(light, shadow)| LitBy { light, shadow }).collect()
+        self.frame.with_light(shadows).map(|(lit, shadow)| LitBy { shadow, ..lit }).collect()
     }
 
     /// What throws the shadow of each light that has one, or `None` where no light has, and where a device does not make all of

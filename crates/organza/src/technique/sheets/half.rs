@@ -219,13 +219,13 @@ fn input<'a>(
     let points = frame.light_points().iter().zip(&frame.plan.carried).enumerate();
     for (k, (point, carried)) in points.filter(|(_, (point, _))| point.light.intensity != [0.0; 3]) {
         let map = if *carried { of_others.get(k) } else { maps.get(k) };
-        let lit = LitBy { light: point.light, shadow: map.and_then(Option::as_ref).map(|map| map as _) };
+        let lit = LitBy { shadow: map.and_then(Option::as_ref).map(|map| map as _), ..frame.lit(point) };
         match (carried, is_whole(frame.scene, point)) {
             (false, _) => mapped.push(lit),
             (true, false) => lights.push(lit),
             (true, true) if point.rank[0] == 0 => {
                 let mean = means.iter().find(|(of, _)| *of == point.of);
-                let lit = LitBy { light: point.whole, shadow: mean.map(|(_, mean)| mean as _) };
+                let lit = LitBy { light: point.whole, slide: None, shadow: mean.map(|(_, mean)| mean as _) };
                 extended.push(Extended { lit, samples: lamp(frame.scene, point).1 });
             }
             (true, true) => {}

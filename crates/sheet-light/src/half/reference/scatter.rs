@@ -60,7 +60,7 @@ impl Diffuse {
         let [width, height] = grid.columns;
         let mut out = Self { grid, cells, faces: vec![Face::default(); width * height * (grid.layers + 1)], cone };
         for channel in 0..3 {
-            let incoming = out.march(&lit.light, channel);
+            let incoming = out.march(lit, channel);
             if params.scattering == Scattering::ForwardAndBack {
                 out.relax(&incoming, channel);
             }
@@ -84,11 +84,11 @@ impl Diffuse {
     }
 
     /// Light ahead; power of the beam that comes into each layer of each column.
-    fn march(&mut self, light: &Light, c: usize) -> Vec<Vec<f64>> {
-        let one = Light { intensity: [1.0; 3], ..*light };
+    fn march(&mut self, lit: &LitBy<'_>, c: usize) -> Vec<Vec<f64>> {
+        let one = LitBy { light: Light { intensity: [1.0; 3], ..lit.light }, ..*lit };
         let enters = |(x, y): (usize, usize)| {
             let place = self.grid.world([x as f64, y as f64, 0.0]);
-            f64::from(one.irradiance(place, 0.0).1[0]) * self.grid.area(0.0)
+            scatter::entering(&one, place, self.grid.area(0.0))[c]
         };
         let entering: Vec<f64> = self.columns().map(enters).collect();
         let (mut beam, mut ahead) = (entering.clone(), vec![0.0; entering.len()]);

@@ -32,8 +32,8 @@ pub(crate) struct Beam {
 pub(crate) struct Path<'a> {
     pub(crate) grid: &'a LightGrid,
     pub(crate) cells: &'a [Cell],
-    /// Power that enters each column.
-    pub(crate) entering: &'a [f64],
+    /// Power that enters each column, by channel.
+    pub(crate) entering: &'a [Vec<f64>; 3],
     /// Transmittance of all but the volumes at each face, by channel; empty where nothing casts shadows.
     pub(crate) others: &'a [[f32; 3]],
     /// Half angle of the cone that light ahead spreads into, radians.
@@ -60,10 +60,10 @@ impl Path<'_> {
         let mut out = Beam {
             ahead: vec![0.0; n * (layers + 1)],
             incoming: vec![0.0; n * layers],
-            incident: self.entering.iter().sum(),
+            incident: self.entering[channel].iter().sum(),
             ..Beam::default()
         };
-        let first = |at: usize| self.entering[at] * self.others_at(0, [at % width, at / width], channel);
+        let first = |at: usize| self.entering[channel][at] * self.others_at(0, [at % width, at / width], channel);
         let mut beam: Vec<f64> = (0..n).map(first).collect();
         out.blocked = out.incident - beam.iter().sum::<f64>();
         let mut ahead = vec![0.0; n];

@@ -1,0 +1,39 @@
+//! PNG (`.png`): pictures of 8 or 16 bits, grey or in colour, as displays show them (sRGB); they become linear radiance, 1 for white.
+
+use super::color::linear_from_srgb;
+use super::input::{check_packed, reserve};
+use super::reading::Reading;
+use super::check_image;
+use crate::error::{Place, ReadError, escaped};
+use image::codecs::png::PngDecoder;
+use image::{DynamicImage, ImageDecoder};
+use splat_core::RadianceImage;
+use std::io::Cursor;
+
+const DAMAGED: &str = "the file is truncated or damaged; save it anew, as PNG of 8 or 16 bits";
+
+pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RadianceImage, ReadError> {
+    let mut decoder = PngDecoder::new(Cursor::new(content)).map_err(damaged)?;
+    let (width, height) = decoder.dimensions();
+    check_packed(check_image([width, height], reading.params)?, content.len() as u64, "the packed image")?;
+    let mut pixels = Vec::new();
+    reserve(&mut pixels, width as usize * height as usize)?;
+    reading.go_on()?;
+    if decoder.icc_profile().map_err(damaged)?.is_some() {
+        reading.notes.not_used([b"iCCP".as_slice()]);
+    }
+    let decoded = DynamicImage::from_decoder(decoder).map_err(damaged)?;
+    reading.go_on()?;
+    let is_whole = !decoded.color().has_alpha() || decoded.to_rgba16().pixels().all(|p| p.0[3] == u16::MAX);
+    if !is_whole {
+        let hint = "an image of radiance hides nothing: flatten it onto a colour first";
+        return Err(ReadError::input(Place::File, "opaque pixels", "some that are translucent", hint));
+    }
+    let linear: Vec<f32> = (0..=u16::MAX).map(|v| linear_from_srgb(f64::from(v) / f64::from(u16::MAX))).collect();
+    pixels.extend(decoded.into_rgb16().pixels().map(|p| p.0.map(|v| linear[v as usize])));
+    Ok(RadianceImage { size: [width, height], pixels })
+}
+
+fn damaged(error: image::ImageError) -> ReadError {
+    ReadError::input(Place::File, "a complete PNG image", escaped(error.to_string().as_bytes(), 120), DAMAGED)
+}
