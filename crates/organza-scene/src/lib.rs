@@ -26,6 +26,7 @@ mod de;
 mod error;
 mod layer_choice;
 mod lights;
+mod lit;
 mod load;
 mod model;
 mod overrides;
@@ -58,8 +59,7 @@ pub use settings::{
 };
 pub use shown::{escape_controls, printable, shown};
 pub use source::{
-    CloudSource, DensitySource, ImplicitSource, IsosurfaceSource, LevelSetSource, MediumShape, RectangleSource,
-    SliceSource, Source, VolumeSource,
+    CloudSource, DensitySource, ImplicitSource, IsosurfaceSource, LevelSetSource, SliceSource, Source, VolumeSource,
 };
 
 /// The page's example compiles and holds.
