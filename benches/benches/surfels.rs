@@ -10,7 +10,7 @@ use deferred_blend::grouping::{
 };
 use deferred_blend::{
     Bending, BlendCounts, BlendInput, DiscInput, Discs, Floors, Glass, Layering, Opaque, OpaqueInput, Params, Passes,
-    Surfaces, blend, resolve_opaque,
+    Shown, Surfaces, blend, resolve_opaque,
 };
 use organza_benches::processor_ms;
 use splat_core::glam::DVec3;
@@ -68,7 +68,8 @@ impl Scene {
     fn blend(&self, discs: &Discs, layering: Layering<'_>, glass: Option<Glass<'_>>) -> BlendCounts {
         let mut picture = Accumulator::new(SIZE, 1, 3, false, false);
         let range = 0.0..f32::INFINITY;
-        let input = BlendInput { discs, values: &self.values, opaque: &[], range, layering, glass };
+        let shown = Shown::Discs(&self.values);
+        let input = BlendInput { discs, shown, opaque: &[], range, layering, glass };
         let params = Params { transmittance_cutoff: 1.0 / 1024.0, ..Params::default() };
         blend(&input, &params, &mut picture, None).expect("nobody cancels").counts
     }
@@ -82,8 +83,8 @@ impl Scene {
     }
 
     fn resolve(&self, discs: &Discs, passes: Passes<'_>) -> Opaque {
-        let (values, max_bytes) = (&self.values, 1 << 32);
-        let input = OpaqueInput { discs, values, channels: 3, objects: false, passes, max_bytes };
+        let (shown, max_bytes) = (Shown::Discs(&self.values), 1 << 32);
+        let input = OpaqueInput { discs, shown, channels: 3, objects: false, passes, max_bytes };
         resolve_opaque(&input, &Params::default(), None).expect("nobody cancels")
     }
 }

@@ -7,7 +7,7 @@
 use convert::read::{self, Loaded, ReadParams};
 use convert::{RawPoints, SurfelParams, raw_to_surfels};
 use deferred_blend::grouping::{GraphParams, OverlapGraph, Relaxation, minimum_coloring};
-use deferred_blend::{DiscInput, Discs, Opaque, OpaqueInput, Params, Passes, resolve_opaque};
+use deferred_blend::{DiscInput, Discs, Opaque, OpaqueInput, Params, Passes, Shown, resolve_opaque};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Camera, Cloud, FootprintStack, Material, Projection};
 
@@ -40,8 +40,8 @@ fn main() {
     let toward = |(n, p): (&Vec3, &Vec3)| if n.dot(seen_from - *p) < 0.0 { -*n } else { *n };
     let values: Vec<f32> = cloud.normal.iter().zip(&cloud.position).flat_map(|at| toward(at).to_array()).collect();
     let resolve = |passes: Passes<'_>| {
-        let (values, max_bytes) = (&values, 1 << 30);
-        let input = OpaqueInput { discs: &discs, values, channels: 3, objects: false, passes, max_bytes };
+        let (shown, max_bytes) = (Shown::Discs(&values), 1 << 30);
+        let input = OpaqueInput { discs: &discs, shown, channels: 3, objects: false, passes, max_bytes };
         resolve_opaque(&input, &params, None).expect("a picture")
     };
     let plain = Passes::OnePlusOne { groups, voronoi: false };

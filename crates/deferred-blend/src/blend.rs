@@ -6,6 +6,7 @@ use crate::floored::{Floor, Layering};
 use crate::fragments::{BlockLists, Fragment, WalkTile};
 use crate::glass::Glass;
 use crate::layers::GapRule;
+use crate::shade::Shown;
 use crate::tile::Tile;
 use crate::{Error, Params};
 use rayon::prelude::*;
@@ -20,8 +21,8 @@ use std::ops::Range;
 pub struct BlendInput<'a> {
     /// The discs of a view.
     pub discs: &'a Discs,
-    /// As many numbers a splat as the accumulator has channels, by place in the cloud.
-    pub values: &'a [f32],
+    /// What they show: as many numbers as the accumulator has channels.
+    pub shown: Shown<'a>,
     /// View depth of what hides layers, by pixel; empty where nothing does.
     pub opaque: &'a [f32],
     /// View depths of the layers that are composited; the others are left out.
@@ -60,7 +61,7 @@ pub struct BlendCounts {
 /// [`Error::Parameter`]; [`Error::Cancelled`], after which the accumulator is of no use as a picture.
 ///
 /// # Panics
-/// If sizes of the image, the accumulator, `opaque` and `values` disagree.
+/// If sizes of the image, the accumulator, `opaque` and what is shown disagree.
 pub fn blend(
     input: &BlendInput<'_>,
     params: &Params,

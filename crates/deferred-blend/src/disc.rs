@@ -76,6 +76,8 @@ pub struct Discs {
     pub(crate) materials: Vec<Material>,
     /// View depths of the nearest and the farthest disc before the eye.
     pub(crate) depths: [f32; 2],
+    /// Into the camera's space from the cloud's, see [`into_view`].
+    pub(crate) view: (DMat3, DVec3),
     /// Focal length, pixels, or pixels in a unit of the cloud for parallel rays.
     focal: f32,
     parallel: bool,
@@ -158,6 +160,7 @@ impl Discs {
             normals: if bends { input.ids.par_iter().map(normal).collect() } else { Vec::new() },
             materials: input.materials.to_vec(),
             depths,
+            view: (view.rotation, view.shift),
             focal: view.focal as f32,
             parallel: view.parallel,
         }
@@ -185,6 +188,11 @@ impl Discs {
         let length = (1.0 + at.length_squared()).sqrt();
         let cone = Cone { width: 0.0, spread: 1.0 / (self.focal * length * length) };
         Ray { from: Vec3::ZERO, along: (at + Vec3::Z) / length, length, cone }
+    }
+
+    /// Width of a pixel at a view depth.
+    pub(crate) fn pixel_width(&self, depth: f32) -> f32 {
+        if self.parallel { 1.0 / self.focal } else { depth / self.focal }
     }
 
     /// Number of discs that some pixel may see.

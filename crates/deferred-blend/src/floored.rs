@@ -4,6 +4,7 @@
 //! farther one was drawn first, and the nearer fails the depth test: it is in the way of nothing, but shows nothing either. A surface
 //! that crosses the end of a step attenuates twice there.
 
+use crate::disc::Ray;
 use crate::fragments::Fragment;
 use crate::grouping::Groups;
 use crate::layer::Layer;
@@ -104,7 +105,7 @@ impl<'a> Floor<'a> {
         fragments: &[Fragment],
         input: &BlendInput<'_>,
         rule: GapRule,
-        (ray, sizes): (f32, [usize; 2]),
+        (ray, sizes): (&Ray, [usize; 2]),
     ) -> Blended {
         let Some(nearest) = fragments.first().filter(|_| self.smooths_nearest) else {
             return algorithm_1(fragments, input, self, (ray, sizes));
@@ -124,7 +125,7 @@ fn algorithm_1(
     fragments: &[Fragment],
     input: &BlendInput<'_>,
     floor: &Floor<'_>,
-    (ray, sizes): (f32, [usize; 2]),
+    (ray, sizes): (&Ray, [usize; 2]),
 ) -> Blended {
     let [planes, channels] = sizes;
     let count = floor.groups.count();
@@ -137,8 +138,8 @@ fn algorithm_1(
             let step = floor.step(fragment.depth);
             if step < last {
                 last = step;
-                let (values, opacity) = shown(fragment, input, ray, sizes);
-                image.behind(&values, opacity, sizes);
+                let shown = Layer::of(std::slice::from_ref(fragment), input, ray, sizes);
+                image.behind(&shown.values, shown.opacity, sizes);
             }
         }
         sum.values.iter_mut().zip(image.values).take(channels).for_each(|(sum, v)| *sum += v);
@@ -146,22 +147,4 @@ fn algorithm_1(
     }
     let share = 1.0 / count as f32;
     Blended { values: sum.values.map(|v| v * share), through: sum.through.map(|t| t * share) }
-}
-
-/// Values times opacity of one disc, and its opacity.
-fn shown(
-    fragment: &Fragment,
-    input: &BlendInput<'_>,
-    ray: f32,
-    [planes, channels]: [usize; 2],
-) -> ([f32; MAX_CHANNELS], [f32; 3]) {
-    let look = &input.discs.looks[fragment.disc as usize];
-    let opacity: [f32; 3] =
-        std::array::from_fn(|p| if p < planes { look.opacity(p, fragment.facing / ray) } else { 0.0 });
-    let own = &input.values[input.discs.ids[fragment.disc as usize] as usize * channels..][..channels];
-    let mut values = [0.0; MAX_CHANNELS];
-    for (c, (value, own)) in values.iter_mut().zip(own).enumerate() {
-        *value = opacity[ChannelLayout::plane_of(c, channels, planes)] * own;
-    }
-    (values, opacity)
 }

@@ -2,8 +2,10 @@
 
 use crate::BlendInput;
 use crate::cone::curvature;
+use crate::disc::Ray;
 use crate::fragments::Fragment;
 use crate::layers::mean_depth;
+use crate::shade::{Place, Shown};
 use splat_core::Material;
 use splat_core::glam::Vec3;
 use splat_core::shade::{ChannelLayout, MAX_CHANNELS};
@@ -18,41 +20,49 @@ pub(crate) struct Layer {
 }
 
 impl Layer {
-    /// Eq. 1 for depth and opacity, and for values, whose weights are w times the opacity. All are averaged as differences from the
+    /// Eq. 1 for depth and opacity, and for what is shown, whose weights are w times the opacity. All are averaged as differences from the
     /// nearest disc's, so what is constant stays so to the last bit.
-    pub(crate) fn of(fragments: &[Fragment], input: &BlendInput<'_>, ray: f32, [planes, channels]: [usize; 2]) -> Self {
-        let optics = |f: &Fragment, p: usize| input.discs.looks[f.disc as usize].opacity(p, f.facing / ray);
-        let values = |f: &Fragment| &input.values[input.discs.ids[f.disc as usize] as usize * channels..][..channels];
-        let (first, mut weights, mut shares) = (&fragments[0], 0.0, [0.0; 3]);
+    pub(crate) fn of(
+        fragments: &[Fragment],
+        input: &BlendInput<'_>,
+        ray: &Ray,
+        [planes, channels]: [usize; 2],
+    ) -> Self {
+        let optics = |f: &Fragment, p: usize| input.discs.looks[f.disc as usize].opacity(p, f.facing / ray.length);
+        let (first, mut weights) = (&fragments[0], 0.0);
         let mut layer = Self { depth: mean_depth(fragments), opacity: [0.0; 3], values: [0.0; MAX_CHANNELS] };
         let own: [f32; 3] = std::array::from_fn(|p| if p < planes { optics(first, p) } else { 0.0 });
         for fragment in fragments {
-            let weight = fragment.weight;
-            weights += weight;
-            let mut share = [0.0; 3];
+            weights += fragment.weight;
             for p in 0..planes {
-                let opacity = optics(fragment, p);
-                share[p] = weight * opacity;
-                shares[p] += share[p];
-                layer.opacity[p] += weight * (opacity - own[p]);
-            }
-            for (c, (value, from)) in values(fragment).iter().zip(values(first)).enumerate() {
-                layer.values[c] += share[ChannelLayout::plane_of(c, channels, planes)] * (value - from);
+                layer.opacity[p] += fragment.weight * (optics(fragment, p) - own[p]);
             }
         }
         for p in 0..planes {
             layer.opacity[p] = (layer.opacity[p] / weights + own[p]).clamp(0.0, 1.0);
         }
-        for (c, from) in values(first).iter().enumerate() {
-            let p = ChannelLayout::plane_of(c, channels, planes);
-            let mean = if shares[p] > 0.0 { layer.values[c] / shares[p] + from } else { 0.0 };
-            layer.values[c] = layer.opacity[p] * mean;
+        if layer.opacity == [0.0; 3] {
+            return layer;
+        }
+        let share = |f: &Fragment| std::array::from_fn(|p| if p < planes { f.weight * optics(f, p) } else { 0.0 });
+        let plane = |c: usize| ChannelLayout::plane_of(c, channels, planes);
+        match input.shown {
+            Shown::Discs(values) => {
+                let of = |f: &Fragment| &values[input.discs.ids[f.disc as usize] as usize * channels..][..channels];
+                mean_values(fragments, of, (&share, &plane), &mut layer.values);
+            }
+            Shown::Pixels(light) => {
+                let disc = input.discs.ids[first.disc as usize] as usize;
+                let place = Place { discs: input.discs, ray, depth: layer.depth, disc };
+                light.on_layer(fragments, &place, (&share, &plane), &mut layer.values);
+            }
+        }
+        for (c, value) in layer.values.iter_mut().enumerate().take(channels) {
+            *value *= layer.opacity[plane(c)];
         }
         layer
     }
-}
 
-impl Layer {
     /// Another opacity, with the values that it shows.
     pub(crate) fn set_opacity(&mut self, opacity: [f32; 3], [planes, channels]: [usize; 2]) {
         if opacity == self.opacity {
@@ -63,6 +73,30 @@ impl Layer {
             self.values[c] *= if self.opacity[p] > 0.0 { opacity[p] / self.opacity[p] } else { 0.0 };
         }
         self.opacity = opacity;
+    }
+}
+
+/// What a disc has of the sum of each plane's weights, and the plane of each channel.
+pub(crate) type Shares<'a> = (&'a dyn Fn(&Fragment) -> [f32; 3], &'a dyn Fn(usize) -> usize);
+
+/// Averages of the discs' values by their shares.
+fn mean_values<'v>(
+    fragments: &[Fragment],
+    of: impl Fn(&Fragment) -> &'v [f32],
+    (share, plane): Shares<'_>,
+    means: &mut [f32; MAX_CHANNELS],
+) {
+    let (first, mut sums) = (of(&fragments[0]), [0.0; 3]);
+    for fragment in fragments {
+        let shares = share(fragment);
+        (0..3).for_each(|p| sums[p] += shares[p]);
+        for (c, (value, from)) in of(fragment).iter().zip(first).enumerate() {
+            means[c] += shares[plane(c)] * (value - from);
+        }
+    }
+    for (c, from) in first.iter().enumerate() {
+        let sum = sums[plane(c)];
+        means[c] = if sum > 0.0 { means[c] / sum + from } else { 0.0 };
     }
 }
 

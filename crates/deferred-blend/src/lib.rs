@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 mod blend;
+mod bump;
 mod cone;
 mod disc;
 mod error;
@@ -19,6 +20,7 @@ mod layers;
 mod opaque;
 mod params;
 pub mod reference;
+mod shade;
 mod surfaces;
 mod tile;
 mod trace;
@@ -30,4 +32,5 @@ pub use floored::{Floors, Layering};
 pub use glass::{Bending, Glass};
 pub use opaque::{Opaque, OpaqueInput, Passes, resolve_opaque};
 pub use params::Params;
+pub use shade::{Light, Shown};
 pub use surfaces::Surfaces;

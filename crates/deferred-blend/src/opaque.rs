@@ -6,15 +6,17 @@
 //! | 1+1 | each group keeps the nearest disc of a pixel | those of all groups that nothing hides are averaged (Figs. 6 and 11) |
 //! | 2+1 | what the discs hide; then the sums over those that nothing hides | sums are divided by Σw |
 //!
-//! A disc that a ray meets at the depth z hides what lies behind z + ε. ε is [`Params::gap`] of the disc's radius across its plane, so
-//! it has no unit; where the disc is seen nearly edge-on, it is at most four times that along the ray. A pixel is the
-//! average by weight (Eq. 1) of all discs that nothing hides there.
+//! A disc whose core a ray meets at the depth z hides what lies behind z + ε. ε is [`Params::gap`] of the disc's radius across its plane,
+//! so it has no unit; where the disc is seen nearly edge-on, it is at most four times that along the ray. A pixel is the
+//! average by weight (Eq. 1) of all discs that nothing hides there; a rim that no core is near to, such as one over a silhouette, is not
+//! seen. The core is [`Footprint::CORE`](splat_core::Footprint::CORE) of the cut-off radius, and ends where the surface does.
 //!
 //! The images of groups hold 16 pixels, those of a block, and only groups that a block meets are cleared and composited: neither
 //! time nor memory grows with the number of groups times the image.
 
 mod block;
 mod groups;
+mod lit;
 mod memory;
 mod picture;
 mod visibility;
@@ -22,6 +24,7 @@ mod visibility;
 use crate::disc::Discs;
 use crate::fragments::BlockLists;
 use crate::grouping::Groups;
+use crate::shade::Shown;
 use crate::{Error, Params};
 use block::{Block, Rules};
 use groups::GroupImages;
@@ -48,13 +51,13 @@ pub enum Passes<'a> {
 }
 
 /// What is resolved.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub struct OpaqueInput<'a> {
     /// The discs of a view, all of them opaque.
     pub discs: &'a Discs,
-    /// As many numbers a splat as there are channels, by place in the cloud.
-    pub values: &'a [f32],
-    /// Number of channels.
+    /// What they show.
+    pub shown: Shown<'a>,
+    /// How many numbers that is; those of its layout for light on pixels.
     pub channels: u32,
     /// Whether objects are kept.
     pub objects: bool,
@@ -62,6 +65,19 @@ pub struct OpaqueInput<'a> {
     pub passes: Passes<'a>,
     /// Most bytes to take beside the discs, which is about what the picture takes twice.
     pub max_bytes: u64,
+}
+
+/// Numbers of discs that are averaged.
+#[derive(Clone, Copy)]
+struct Averaged<'a> {
+    discs: &'a Discs,
+    values: &'a [f32],
+    /// Whether these are by rank among the discs; else by place in the cloud.
+    by_rank: bool,
+    channels: u32,
+    objects: bool,
+    passes: Passes<'a>,
+    max_bytes: u64,
 }
 
 /// The opaque surfaces of a view.
@@ -79,7 +95,7 @@ pub struct Opaque {
 ///
 /// ```
 /// use deferred_blend::grouping::Groups;
-/// use deferred_blend::{DiscInput, Discs, OpaqueInput, Params, Passes, resolve_opaque};
+/// use deferred_blend::{DiscInput, Discs, OpaqueInput, Params, Passes, Shown, resolve_opaque};
 /// use splat_core::glam::{DVec3, Vec3};
 /// use splat_core::{Camera, Cloud, FootprintStack, Material, Projection, Splat, SplatKind};
 ///
@@ -94,7 +110,7 @@ pub struct Opaque {
 /// let discs = Discs::project(&DiscInput { cloud: &cloud, ids: &[0, 1], camera: &camera, footprints, materials }, params);
 /// let passes = Passes::OnePlusOne { groups: &Groups::new(2, vec![0, 1])?, voronoi: true };
 /// let (values, max_bytes) = (&[0.2, 0.4], 1 << 30);
-/// let input = OpaqueInput { discs: &discs, values, channels: 1, objects: false, passes, max_bytes };
+/// let input = OpaqueInput { discs: &discs, shown: Shown::Discs(values), channels: 1, objects: false, passes, max_bytes };
 /// let seen = resolve_opaque(&input, params, None)?;
 /// let middle = 32 * 64 + 36;
 /// assert!((seen.image.depth[middle] - 3.0).abs() < 1e-6 && (seen.image.channels[0][middle] - 0.3).abs() < 1e-6);
@@ -106,12 +122,25 @@ pub struct Opaque {
 /// [`Error::Parameter`], also for groups of fewer discs than the cloud has; [`Error::Limit`]; [`Error::Cancelled`].
 ///
 /// # Panics
-/// If `values` lacks numbers of a disc.
+/// If numbers of a disc are missing, or the layout of light has other channels.
 pub fn resolve_opaque(input: &OpaqueInput<'_>, params: &Params, progress: Option<&Progress>) -> Result<Opaque, Error> {
+    let OpaqueInput { discs, shown, channels, objects, passes, max_bytes } = *input;
+    match shown {
+        Shown::Discs(values) => {
+            let averaged = Averaged { discs, values, by_rank: false, channels, objects, passes, max_bytes };
+            average(&averaged, params, progress)
+        }
+        Shown::Pixels(light) => lit::resolve(input, &light, params, progress),
+    }
+}
+
+/// Eq. 1 of any numbers.
+fn average(input: &Averaged<'_>, params: &Params, progress: Option<&Progress>) -> Result<Opaque, Error> {
     params.check()?;
     let discs = input.discs;
     let Some(last) = discs.ids.par_iter().max() else { return Ok(Opaque::default()) };
-    assert!(input.values.len() >= (*last as usize + 1) * input.channels as usize, "invariant: values of every disc");
+    let rows = if input.by_rank { discs.ids.len() } else { *last as usize + 1 };
+    assert!(input.values.len() >= rows * input.channels as usize, "invariant: values of every disc");
     if let Passes::OnePlusOne { groups, .. } = input.passes
         && groups.of().len() <= *last as usize
     {
@@ -150,24 +179,24 @@ struct Scratch {
 }
 
 impl Scratch {
-    fn new(input: &OpaqueInput<'_>) -> Self {
+    fn new(input: &Averaged<'_>) -> Self {
         let (block, images) = (Block::new(input.channels as usize), GroupImages::new(group_count(input)));
         Self { lists: BlockLists::default(), block, images }
     }
 
     /// Of one, without its lists.
-    fn bytes(input: &OpaqueInput<'_>) -> u64 {
+    fn bytes(input: &Averaged<'_>) -> u64 {
         GroupImages::bytes(group_count(input)) + Block::bytes(input.channels as usize)
     }
 }
 
-fn group_count(input: &OpaqueInput<'_>) -> usize {
+fn group_count(input: &Averaged<'_>) -> usize {
     if let Passes::OnePlusOne { groups, .. } = input.passes { groups.count() as usize } else { 0 }
 }
 
 /// One tile's work, in the form that [`pulp`] compiles once per instruction set.
 struct ResolveTile<'a> {
-    input: &'a OpaqueInput<'a>,
+    input: &'a Averaged<'a>,
     rules: &'a Rules,
     corner: [usize; 2],
     scratch: &'a mut Scratch,
@@ -189,7 +218,7 @@ impl pulp::WithSimd for ResolveTile<'_> {
             block.clear(b, corner);
             let passes = match input.passes {
                 Passes::OnePlusOne { groups, .. } => {
-                    groups::keep(simd, list, (input.discs, groups), (rules, block.first()), images);
+                    groups::keep(simd, list, (input.discs, groups), (rules, &mut *block), images);
                     groups::composite(simd, input, images, block);
                     1
                 }

@@ -34,7 +34,7 @@ struct Hit {
     id: usize,
     weight: f64,
     distance_sq: f64,
-    /// |n·d|, d with a z of 1.
+    /// n·d, d with a z of 1: above 0 where the disc faces away.
     facing: f64,
     radius: f64,
 }
@@ -154,7 +154,7 @@ fn hits(input: &DiscInput<'_>, params: &Params, origin: DVec3, direction: DVec3)
                 id: i,
                 weight: profile.profile(distance_sq),
                 distance_sq,
-                facing: normal.dot(direction).abs(),
+                facing: normal.dot(direction),
                 radius: (axes[0].length() * axes[1].length()).sqrt(),
             });
         }
@@ -165,7 +165,7 @@ fn hits(input: &DiscInput<'_>, params: &Params, origin: DVec3, direction: DVec3)
 }
 
 fn joins(near: &Hit, far: &Hit, gap: f64) -> bool {
-    let facing = (0.5 * (near.facing + far.facing)).max(0.25);
+    let facing = (0.5 * (near.facing.abs() + far.facing.abs())).max(0.25);
     (far.depth - near.depth) * facing < gap * 0.5 * (near.radius + far.radius)
 }
 
@@ -181,7 +181,7 @@ fn blend(hits: &[Hit], input: &DiscInput<'_>, ray: f64, values: &[f32], [planes,
             input.footprints.layers()[cloud.footprint[hit.id] as usize].spacing_for_radius(cloud.radius[hit.id]);
         let slab = match material.surface_opacity {
             SurfaceOpacity::PerCrossing => 1.0,
-            SurfaceOpacity::ThinSlab => 1.0 / (hit.facing / ray).max(1e-3),
+            SurfaceOpacity::ThinSlab => 1.0 / (hit.facing.abs() / ray).max(1e-3),
         };
         let tau = f64::from(cloud.crossing_depth_of(hit.id, spacing)) * slab;
         let opacity: [f64; 3] =

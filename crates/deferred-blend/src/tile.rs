@@ -71,7 +71,7 @@ impl Tile {
                 return;
             }
             let own = &fragments[layer.clone()];
-            let mut blended = Layer::of(own, input, ray.length, sizes);
+            let mut blended = Layer::of(own, input, &ray, sizes);
             if blended.depth >= limit {
                 break;
             }
@@ -110,13 +110,13 @@ impl Tile {
     ) {
         let limit = self.opaque.get(k).copied().unwrap_or(f32::INFINITY);
         let [x, y] = self.corner;
-        let ray = input.discs.ray(position(k, x, y)).length;
+        let ray = input.discs.ray(position(k, x, y));
         let sizes = [self.optical_depth.len(), self.channels.len()];
         fragments.sort_by(|a, b| a.depth.total_cmp(&b.depth));
         let seen = |f: &&Fragment| f.depth < limit && input.range.contains(&f.depth);
         let own: Vec<Fragment> = fragments.iter().filter(seen).copied().collect();
         let Some(nearest) = own.first() else { return };
-        let blended = floor.blend(&own, input, rule, (ray, sizes));
+        let blended = floor.blend(&own, input, rule, (&ray, sizes));
         let opacity = blended.through.map(|t| (1.0 - t).clamp(0.0, 1.0));
         let layer = Layer { depth: nearest.depth, opacity, values: blended.values };
         self.add(k, &layer, &Passage::CLEAR, nearest.object);

@@ -1,6 +1,6 @@
 //! Discs whose pictures are known.
 
-use deferred_blend::{Bending, BlendInput, DiscInput, Discs, Error, Glass, Layering, Params, Surfaces, blend};
+use deferred_blend::{Bending, BlendInput, DiscInput, Discs, Error, Glass, Layering, Params, Shown, Surfaces, blend};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::GlassImage;
 use splat_core::shade::ChannelLayout;
@@ -61,7 +61,7 @@ impl Scene {
         let Asked { bending, sky, straight, unit } = *glass;
         let glass = Some(Glass { bending, sky, surfaces: &surfaces, straight, unit });
         let (range, layering) = (0.0..f32::INFINITY, Layering::Gaps);
-        let input = BlendInput { discs: &discs, values: &self.values, opaque, range, layering, glass };
+        let input = BlendInput { discs: &discs, shown: Shown::Discs(&self.values), opaque, range, layering, glass };
         let made = blend(&input, params, &mut accumulator, None).expect("nobody cancels");
         (accumulator, made.glass.expect("asked for"))
     }
@@ -81,7 +81,7 @@ impl Scene {
     ) -> Result<(), Error> {
         let discs = Discs::project(&self.input(), params);
         let range = 0.0..f32::INFINITY;
-        let input = BlendInput { discs: &discs, values: &self.values, opaque, range, layering, glass: None };
+        let input = BlendInput { discs: &discs, shown: Shown::Discs(&self.values), opaque, range, layering, glass: None };
         blend(&input, params, accumulator, None).map(|_| ())
     }
 }

@@ -3,10 +3,10 @@
 use super::SceneMaterial;
 use super::check::{At, LARGEST, SMALLEST};
 use super::de::suggest;
-use super::raw_material::{RawMaterial, RawShading, RawSurfaceOpacity};
+use super::raw_material::{RawBump, RawMaterial, RawShading, RawSurfaceOpacity};
 use crate::{Error, shown};
 use splat_core::optics::{SurfaceOpacity, absorption_coefficient};
-use splat_core::{Material, Shading};
+use splat_core::{Bump, Material, Shading};
 use std::collections::BTreeMap;
 
 /// The default material, then all of the file in order of name.
@@ -79,6 +79,7 @@ fn check_material(at: &At<'_>, name: &str, raw: &RawMaterial) -> Result<SceneMat
         },
         index: check_index(at, raw)?,
         absorption_inside: at.color("absorption_inside", raw.absorption_inside.unwrap_or_default())?,
+        bump: raw.bump.as_ref().map_or(Ok(Bump::default()), |bump| check_bump(&at.key("bump"), bump))?,
     };
     // Matter that bends light is clear where nothing else is said.
     let opacity = if material.bounds_matter() { 0.0 } else { 1.0 };
@@ -88,6 +89,15 @@ fn check_material(at: &At<'_>, name: &str, raw: &RawMaterial) -> Result<SceneMat
         color: at.color("color", raw.color.unwrap_or([1.0; 3]))?,
         opacity: unit("opacity", raw.opacity, opacity)?,
         extinction,
+    })
+}
+
+fn check_bump(at: &At<'_>, raw: &RawBump) -> Result<Bump, Error> {
+    Ok(Bump {
+        height: at.number("height", raw.height, 0.0..=LARGEST)? as f32,
+        size: at.length("size", raw.size)? as f32,
+        octaves: at.whole("octaves", raw.octaves.unwrap_or(4), 1..=12)?,
+        seed: raw.seed.unwrap_or(0).into(),
     })
 }
 

@@ -3,8 +3,11 @@
 use super::check::{At, SMALLEST};
 use super::check_render::check_cutoff;
 use super::raw_render::Auto;
-use super::raw_surfels::{RawBehind, RawBending, RawCollisions, RawCoverage, RawGrouping, RawSurfelLayers, RawSurfels};
-use super::{Bending, Collisions, Coverage, Grouping, SurfelGroups, SurfelLayers, SurfelsSettings};
+use super::raw_surfels::{
+    RawBehind, RawBending, RawCollisions, RawCoverage, RawGrouping, RawOpaque, RawSurfelLayers, RawSurfelShading,
+    RawSurfels,
+};
+use super::{Bending, Collisions, Coverage, Grouping, OpaqueSurfels, SurfelGroups, SurfelLayers, SurfelsSettings};
 use crate::Error;
 
 /// Most steps of depth: neighbours among them are still told apart in f32.
@@ -22,19 +25,37 @@ pub(super) fn check_surfels(at: &At<'_>, raw: &RawSurfels) -> Result<SurfelsSett
         },
         bent_behind: matches!(raw.behind, RawBehind::Bent),
         layers: check_layers(at, raw)?,
+        lights_pixels: raw.shading == RawSurfelShading::Pixels,
+        opaque: check_opaque(at, raw)?,
     })
+}
+
+fn check_opaque(at: &At<'_>, raw: &RawSurfels) -> Result<OpaqueSurfels, Error> {
+    if raw.opaque == RawOpaque::TwoPass {
+        return Ok(OpaqueSurfels::TwoPass);
+    }
+    // Where nothing is said, as many groups as discs need that do not overlap.
+    let any = raw.groups.is_none() && matches!(raw.grouping, None | Some(RawGrouping::Auto));
+    let groups = match any {
+        true => SurfelGroups { count: 256, grouping: Grouping::Minimum { factor: 1.0 }, ..SurfelGroups::default() },
+        false => check_groups(at, raw)?,
+    };
+    Ok(OpaqueSurfels::OnePass { groups, voronoi: raw.voronoi.unwrap_or(true) })
 }
 
 fn check_layers(at: &At<'_>, raw: &RawSurfels) -> Result<SurfelLayers, Error> {
     let algorithms = matches!(raw.layers, RawSurfelLayers::Algorithm1 | RawSurfelLayers::Algorithm2);
+    let one_pass = raw.opaque == RawOpaque::OnePass;
+    let grouped = algorithms || one_pass;
     let [peeled, minimum] = [raw.layers == RawSurfelLayers::Peeled, raw.grouping == Some(RawGrouping::Mgc)];
     let hash = raw.grouping == Some(RawGrouping::Hash);
     let near = raw.collisions == Some(RawCollisions::Near);
     // Keys that mean nothing beside what else is chosen: given, in place, otherwise.
     let keys = [
         ("peeled_layers", raw.peeled_layers.is_some(), peeled, "layers = \"peeled\""),
-        ("groups", raw.groups.is_some(), algorithms, "layers = \"algorithm1\" or \"algorithm2\""),
-        ("grouping", raw.grouping.is_some(), algorithms, "layers = \"algorithm1\" or \"algorithm2\""),
+        ("voronoi", raw.voronoi.is_some(), one_pass, "opaque = \"one_pass\""),
+        ("groups", raw.groups.is_some(), grouped, "layers = \"algorithm1\" or \"algorithm2\", or opaque = \"one_pass\""),
+        ("grouping", raw.grouping.is_some(), grouped, "layers = \"algorithm1\" or \"algorithm2\", or opaque = \"one_pass\""),
         ("coverage", raw.coverage.is_some(), algorithms, "layers = \"algorithm1\" or \"algorithm2\""),
         ("depth_steps", raw.depth_steps.is_some(), algorithms, "layers = \"algorithm1\" or \"algorithm2\""),
         ("overlap_factor", raw.overlap_factor.is_some(), minimum, "grouping = \"mgc\""),

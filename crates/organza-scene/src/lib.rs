@@ -56,7 +56,7 @@ pub use overrides::Override;
 pub use settings::{
     Aligned, Bending, Classify, Collisions, Coverage, Grouping, ParticlesSettings, PointsSettings, RenderSettings,
     Scattering, ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler, SurfelGroups,
-    SurfelLayers, SurfelsSettings, Technique,
+    OpaqueSurfels, SurfelLayers, SurfelsSettings, Technique,
 };
 pub use shown::{escape_controls, printable, shown};
 pub use source::{

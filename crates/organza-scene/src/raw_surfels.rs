@@ -20,14 +20,20 @@ pub(super) struct RawSurfels {
     pub(super) bending: RawBending,
     /// What is opaque is seen along "bent" rays, or "straight" on; default "bent".
     pub(super) behind: RawBehind,
+    /// When light falls on surfaces: on "pixels", once a layer, or on "discs", before they are averaged; default "pixels".
+    pub(super) shading: RawSurfelShading,
+    /// How opaque discs are drawn: "two_pass" (default) or "one_pass", into an image of each group.
+    pub(super) opaque: RawOpaque,
+    /// With "one_pass": whether of two discs of a group in one step of depth the one is kept whose centre is nearer; default true.
+    pub(super) voronoi: Option<bool>,
     /// How the discs of a pixel become layers: told apart by "gaps" in depth (default), so many nearest of these, "peeled", or as the
     /// paper has it, "algorithm1" or "algorithm2".
     pub(super) layers: RawSurfelLayers,
     /// With "peeled": how many layers, 1 to 1024; default 8.
     pub(super) peeled_layers: Option<u32>,
-    /// With the algorithms: number of groups, with "mgc" the most of them, 1 to 256; default 4.
+    /// With the algorithms and "one_pass": number of groups, with "mgc" the most of them, 1 to 256; default 4, by "one_pass" 256.
     pub(super) groups: Option<u32>,
-    /// With the algorithms: how groups are found, "auto" (default), "mgc", "wgc" or "hash".
+    /// With the algorithms and "one_pass": how groups are found, "auto" (default), "mgc", "wgc" or "hash".
     pub(super) grouping: Option<RawGrouping>,
     /// With "mgc": factor on radii when overlaps are found, above 0 to 1; default 1.
     pub(super) overlap_factor: Option<f64>,
@@ -39,6 +45,26 @@ pub(super) struct RawSurfels {
     pub(super) coverage: Option<RawCoverage>,
     /// With the algorithms: steps between the least depth and the greatest, 1 to 16777216, or "auto" (default), as long as `gap`.
     pub(super) depth_steps: Option<Auto>,
+}
+
+/// When light falls on surfaces.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "SurfelShading")]
+pub(super) enum RawSurfelShading {
+    #[default]
+    Pixels,
+    Discs,
+}
+
+/// How often opaque discs are walked over.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "OpaqueSurfels")]
+pub(super) enum RawOpaque {
+    #[default]
+    TwoPass,
+    OnePass,
 }
 
 /// How discs become layers.

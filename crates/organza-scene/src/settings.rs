@@ -135,6 +135,24 @@ pub struct SurfelsSettings {
     pub bent_behind: bool,
     /// How the discs of a pixel become layers.
     pub layers: SurfelLayers,
+    /// Whether light falls on what was averaged, once a layer; else on each disc, before.
+    pub lights_pixels: bool,
+    /// How opaque discs are drawn.
+    pub opaque: OpaqueSurfels,
+}
+
+/// How often opaque discs are walked over (Zhang and Pajarola 2007, sections 3.1 and 5.1).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum OpaqueSurfels {
+    /// For what they hide, and for what is seen.
+    TwoPass,
+    /// Once, into an image of each group.
+    OnePass {
+        /// The groups; neither coverage nor steps of depth play a part.
+        groups: SurfelGroups,
+        /// Whether of two discs in one step of depth the one is kept whose centre is nearer (Eq. 14).
+        voronoi: bool,
+    },
 }
 
 /// How the discs of a pixel become layers (Zhang and Pajarola 2007, section 5.2).

@@ -79,7 +79,7 @@ pub use grid::{BccGrid, Grid, Packing};
 pub use layers::{ADDITIVE_LAYERS, Accumulator, LayerData, LayerSet, Layers, SHADED_EFFECTS};
 pub use light::{Framing, Light, LightShape, Slide, SlideProjection};
 pub use limits::{Exceeded, Limits};
-pub use material::{Material, MaterialTable, Object, ObjectTable, Shading};
+pub use material::{Bump, Material, MaterialTable, Object, ObjectTable, Shading};
 pub use mesh::Mesh;
 pub use phase::henyey_greenstein;
 pub use pixel_samples::PixelSamples;

@@ -44,6 +44,21 @@ pub struct Material {
     pub index: [f32; 3],
     /// What that matter absorbs, by channel, 1 / world unit, ≥ 0.
     pub absorption_inside: [f32; 3],
+    /// How its surfaces are rough to light.
+    pub bump: Bump,
+}
+
+/// Noise as heights over a surface, whose slopes tilt the normals that light falls on.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Bump {
+    /// Of the largest bumps, in the object's own unit, ≥ 0; 0 is smooth.
+    pub height: f32,
+    /// Length of the largest bumps, in that unit, > 0 where there are some.
+    pub size: f32,
+    /// How many sizes there are, each half as large and as high as the one before.
+    pub octaves: u32,
+    /// Of the noise.
+    pub seed: u64,
 }
 
 impl Default for Material {
@@ -62,6 +77,7 @@ impl Default for Material {
             surface_opacity: crate::optics::SurfaceOpacity::PerCrossing,
             index: [1.0; 3],
             absorption_inside: [0.0; 3],
+            bump: Bump::default(),
         }
     }
 }

@@ -1,10 +1,11 @@
 //! Sixteen pixels: what discs hide there, and sums over those that nothing hides.
 
 use super::picture::Tile;
-use super::{OpaqueInput, Passes};
+use super::{Averaged, Passes};
 use crate::Params;
 use crate::disc::{Disc, Meeting};
 use crate::fragments::offsets;
+use splat_core::Footprint;
 use splat_core::raster::kernel::Kernel;
 use splat_core::raster::lanes::Lanes;
 use splat_core::raster::pulp::Simd;
@@ -19,6 +20,13 @@ const LEAST_EPSILON: f32 = 1.0 / (1 << 20) as f32;
 /// Least weight of a disc that a ray meets, below any that can be seen beside another: where sharp kernels end in zero, Σw does not.
 const LEAST_WEIGHT: f32 = 1.0 / (1u64 << 60) as f32;
 
+/// Weight of a disc that faces away beside one that faces the viewer. Discs behind the silhouette of a closed surface stick out
+/// over it, lit on the inside. Where nothing faces the viewer the factor cancels, and a back is seen as it is.
+const FACING_AWAY: f32 = 1.0 / 256.0;
+
+/// Below any sum of weights.
+const NO_WEIGHT: f32 = LEAST_WEIGHT * FACING_AWAY * FACING_AWAY;
+
 /// Numbers of 16 pixels that are all the same.
 pub(super) const fn line(value: f32) -> Line {
     Line([value; PIXELS])
@@ -32,17 +40,21 @@ pub(super) struct Hit<S: Simd> {
     pub(super) limit: Lanes<S>,
     /// ρ²/R², below 1 where a ray hits.
     pub(super) distance_sq: Lanes<S>,
+    /// Above 0 where the disc's normal points away from the viewer.
+    pub(super) facing: Lanes<S>,
 }
 
 /// How discs hide one another.
 pub(super) struct Rules {
     gap: f32,
+    /// ρ²/R² within which a disc hides: rims alone stick out beyond silhouettes and borders.
+    core: f32,
     /// For Eq. 14, the depth at which the first step of Eq. 10 begins, and steps in a unit of depth.
     pub(super) floor: Option<[f32; 2]>,
 }
 
 impl Rules {
-    pub(super) fn new(input: &OpaqueInput<'_>, params: &Params) -> Self {
+    pub(super) fn new(input: &Averaged<'_>, params: &Params) -> Self {
         let floor = || {
             let [near, far] = input.discs.depths;
             // More steps than depths can be told apart by would part the discs of a plane.
@@ -50,27 +62,31 @@ impl Rules {
             [near, if far > near { steps / (far - near) } else { 0.0 }]
         };
         let voronoi = matches!(input.passes, Passes::OnePlusOne { voronoi: true, .. });
-        Self { gap: params.gap, floor: voronoi.then(floor) }
+        let core = Footprint::CORE / params.disc_scale;
+        Self { gap: params.gap, core: core * core, floor: voronoi.then(floor) }
     }
 
     /// A disc met by pixels from `lane` on of the block whose first pixel is `first`.
     #[inline(always)]
     pub(super) fn hit<S: Simd>(&self, simd: S, disc: &Disc, first: [usize; 2], lane: usize) -> Hit<S> {
         let of = |v: f32| Lanes::splat(simd, v);
-        let Meeting { inverse, distance_sq, depth, .. } = disc.meet(simd, offsets(simd, disc, first, lane));
+        let Meeting { facing, inverse, distance_sq, depth } = disc.meet(simd, offsets(simd, disc, first, lane));
         let far = of(f32::INFINITY);
         let depth = depth.where_less_or(distance_sq, of(1.0), far);
         let depth = depth.where_less_or(of(0.0), depth, far);
         let across = of(self.gap * disc.radius) * inverse.abs().min(of(MOST_OBLIQUE));
-        Hit { depth, limit: depth + across.max(depth * of(LEAST_EPSILON)), distance_sq }
+        Hit { depth, limit: depth + across.max(depth * of(LEAST_EPSILON)), distance_sq, facing }
     }
 }
 
-/// w of Eq. 1 where a ray hits.
-#[inline(always)]
-pub(super) fn weight<S: Simd>(simd: S, kernel: &Kernel, distance_sq: Lanes<S>) -> Lanes<S> {
-    let of = |v: f32| Lanes::splat(simd, v);
-    kernel.profile(simd, (of(1.0) - distance_sq).max(of(0.0))).max(of(LEAST_WEIGHT))
+impl<S: Simd> Hit<S> {
+    /// w of Eq. 1 where a ray hits.
+    #[inline(always)]
+    pub(super) fn weight(&self, simd: S, kernel: &Kernel) -> Lanes<S> {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let weight = kernel.profile(simd, (of(1.0) - self.distance_sq).max(of(0.0))).max(of(LEAST_WEIGHT));
+        (weight * of(FACING_AWAY)).where_less_or(of(0.0), self.facing, weight)
+    }
 }
 
 /// Sums of 16 pixels.
@@ -114,19 +130,21 @@ impl Block {
         self.first
     }
 
-    /// Discs, one a lane, of which the nearest so far and what hides most are kept; of several at one depth the first.
+    /// The core of a disc hides: the nearest so far and what hides most are kept; of several at one depth the first.
     #[inline(always)]
-    pub(super) fn hide<S: Simd>(&mut self, simd: S, lane: usize, [depth, limit, disc]: [Lanes<S>; 3]) {
+    pub(super) fn hide<S: Simd>(&mut self, simd: S, lane: usize, hit: &Hit<S>, (rules, rank): (&Rules, u32)) {
         let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
-        let near = at(&self.near);
-        at(&self.limit).min(limit).store(&mut self.limit.0[lane..]);
-        disc.where_less_or(depth, near, at(&self.disc)).store(&mut self.disc.0[lane..]);
+        let of = |v: f32| Lanes::splat(simd, v);
+        let solid = |v: Lanes<S>| v.where_less_or(hit.distance_sq, of(rules.core), of(f32::INFINITY));
+        let (near, depth) = (at(&self.near), solid(hit.depth));
+        at(&self.limit).min(solid(hit.limit)).store(&mut self.limit.0[lane..]);
+        of(f32::from_bits(rank)).where_less_or(depth, near, at(&self.disc)).store(&mut self.disc.0[lane..]);
         near.min(depth).store(&mut self.near.0[lane..]);
     }
 
     /// Reads the values of the nearest discs, when all are known.
     #[inline(always)]
-    pub(super) fn begin_sums(&mut self, input: &OpaqueInput<'_>) {
+    pub(super) fn begin_sums(&mut self, input: &Averaged<'_>) {
         let seen = self.near.0.map(|depth| if depth < f32::INFINITY { 1.0 } else { 0.0 });
         for_each_disc(&self.disc, seen, |disc, own| {
             for (line, value) in self.nearest.iter_mut().zip(values_of(input, disc)) {
@@ -143,12 +161,19 @@ impl Block {
         Lanes::load(simd, &self.limit.0[lane..])
     }
 
-    /// Adds discs, one a lane, to Σw and Σwz. Returns their weights, 0 for those that are hidden.
+    /// Adds discs at some depth and limit, one a lane, to Σw and Σwz. Returns their weights, 0 for those that are hidden, and for rims of
+    /// nearer surfaces, which lie farther than their ε before what hides.
     #[inline(always)]
-    pub(super) fn weigh<S: Simd>(&mut self, simd: S, lane: usize, depth: Lanes<S>, weight: Lanes<S>) -> Lanes<S> {
-        let limit = self.limit(simd, lane);
-        let weight = weight.where_less(depth, limit);
-        let behind = (depth - Lanes::load(simd, &self.near.0[lane..])).where_less(depth, limit);
+    pub(super) fn weigh<S: Simd>(
+        &mut self,
+        simd: S,
+        lane: usize,
+        [depth, own_limit]: [Lanes<S>; 2],
+        weight: Lanes<S>,
+    ) -> Lanes<S> {
+        let (limit, near) = (self.limit(simd, lane), Lanes::load(simd, &self.near.0[lane..]));
+        let weight = weight.where_less(depth, limit).where_less(near, own_limit);
+        let behind = (depth - near).where_less(depth, limit).where_less(near, own_limit);
         add(simd, &mut self.weight.0[lane..], weight);
         add(simd, &mut self.depth.0[lane..], weight * behind);
         weight
@@ -168,7 +193,9 @@ impl Block {
     pub(super) fn normalize<S: Simd>(&self, simd: S, b: usize, tile: &mut Tile) {
         for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
             let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
-            let (near, weight, far) = (at(&self.near), at(&self.weight), Lanes::splat(simd, f32::INFINITY));
+            let of = |v: f32| Lanes::splat(simd, v);
+            // Where groups have kept none of what is seen the nearest disc stands for all.
+            let (near, weight, far) = (at(&self.near), at(&self.weight).max(of(NO_WEIGHT)), of(f32::INFINITY));
             let pixel = b * PIXELS + lane;
             (near + at(&self.depth) / weight).where_less_or(near, far, far).store(&mut tile.depth[pixel..]);
             let channels = tile.channels.chunks_exact_mut(AREA).zip(&self.nearest).zip(&self.sums);
@@ -198,9 +225,10 @@ pub(super) fn for_each_disc(discs: &Line, mut weights: [f32; PIXELS], mut visit:
 
 /// Values of a disc, whose rank is given as bits.
 #[inline(always)]
-pub(super) fn values_of<'a>(input: &OpaqueInput<'a>, disc: f32) -> &'a [f32] {
-    let channels = input.channels as usize;
-    &input.values[input.discs.ids[disc.to_bits() as usize] as usize * channels..][..channels]
+pub(super) fn values_of<'a>(input: &Averaged<'a>, disc: f32) -> &'a [f32] {
+    let (channels, rank) = (input.channels as usize, disc.to_bits() as usize);
+    let row = if input.by_rank { rank } else { input.discs.ids[rank] as usize };
+    &input.values[row * channels..][..channels]
 }
 
 #[inline(always)]

@@ -4,8 +4,8 @@
 //! loses its digits where n is large; here both are kept, and compared one after the other. In place of its colour an image
 //! keeps the disc, so the time of the walk does not grow with the number of channels.
 
-use super::OpaqueInput;
-use super::block::{Block, Hit, Rules, for_each_disc, line, values_of, weight};
+use super::Averaged;
+use super::block::{Block, Hit, Rules, for_each_disc, line, values_of};
 use crate::disc::Discs;
 use crate::grouping::{Groups, MOST_GROUPS};
 use splat_core::raster::lanes::Lanes;
@@ -73,13 +73,14 @@ impl GroupImages {
     }
 }
 
-/// The walk over the discs of a list: each is kept where it is before what its group has; of equals the first.
+/// The walk over the discs of a list: each hides what lies behind its core, and is kept where it is before what its group has; of equals
+/// the first.
 #[inline(always)]
 pub(super) fn keep<S: Simd>(
     simd: S,
     list: &[u32],
     (discs, groups): (&Discs, &Groups),
-    (rules, first): (&Rules, [usize; 2]),
+    (rules, block): (&Rules, &mut Block),
     images: &mut GroupImages,
 ) {
     let of = |v: f32| Lanes::splat(simd, v);
@@ -88,7 +89,9 @@ pub(super) fn keep<S: Simd>(
         let disc = &discs.discs[i as usize];
         let image = images.of(groups.of()[discs.ids[i as usize] as usize]);
         for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
-            let Hit { depth, limit, distance_sq } = rules.hit(simd, disc, first, lane);
+            let hit = rules.hit(simd, disc, block.first(), lane);
+            block.hide(simd, lane, &hit, (rules, i));
+            let Hit { depth, limit, distance_sq, .. } = hit;
             let behind = match rules.floor {
                 Some(floor) => behind(simd, image, lane, [floored(simd, floor, depth), distance_sq]),
                 None => depth - Lanes::load(simd, &image.depth.0[lane..]),
@@ -106,7 +109,7 @@ pub(super) fn keep<S: Simd>(
             }
             keep(&mut image.depth, depth);
             keep(&mut image.limit, limit);
-            keep(&mut image.weight, weight(simd, kernel, distance_sq));
+            keep(&mut image.weight, hit.weight(simd, kernel));
             keep(&mut image.disc, of(f32::from_bits(i)));
         }
     }
@@ -131,13 +134,7 @@ fn floored<S: Simd>(simd: S, [near, per_depth]: [f32; 2], depth: Lanes<S>) -> La
 
 /// Fig. 6: of all images those discs are summed that no other hides.
 #[inline(always)]
-pub(super) fn composite<S: Simd>(simd: S, input: &OpaqueInput<'_>, images: &GroupImages, block: &mut Block) {
-    images.for_each(|image| {
-        for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
-            let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
-            block.hide(simd, lane, [at(&image.depth), at(&image.limit), at(&image.disc)]);
-        }
-    });
+pub(super) fn composite<S: Simd>(simd: S, input: &Averaged<'_>, images: &GroupImages, block: &mut Block) {
     block.begin_sums(input);
     images.for_each(|image| {
         let mut weights = [0.0; PIXELS];
@@ -145,7 +142,7 @@ pub(super) fn composite<S: Simd>(simd: S, input: &OpaqueInput<'_>, images: &Grou
             let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
             let depth = at(&image.depth);
             if depth.any_less(block.limit(simd, lane)) {
-                block.weigh(simd, lane, depth, at(&image.weight)).store(&mut weights[lane..]);
+                block.weigh(simd, lane, [depth, at(&image.limit)], at(&image.weight)).store(&mut weights[lane..]);
             }
         }
         for_each_disc(&image.disc, weights, |disc, own| {

@@ -1,6 +1,6 @@
 //! What a picture takes, told before it is taken.
 
-use super::{OpaqueInput, Scratch};
+use super::{Averaged, Scratch};
 use crate::Error;
 use crate::disc::Disc;
 use rayon::prelude::*;
@@ -9,7 +9,7 @@ use splat_core::raster::bins::{Bins, TILE, bin_rectangles};
 use splat_core::raster::tile::{AREA, BLOCKS};
 
 /// Lists of tiles, if there is memory for all that follows.
-pub(super) fn bin(input: &OpaqueInput<'_>) -> Result<Bins, Error> {
+pub(super) fn bin(input: &Averaged<'_>) -> Result<Bins, Error> {
     let discs = input.discs;
     let tiles = |low: u32, high: u32| u64::from(high.div_ceil(TILE as u32).saturating_sub(low / TILE as u32));
     let of = |disc: &Disc| {
@@ -29,7 +29,7 @@ pub(super) fn bin(input: &OpaqueInput<'_>) -> Result<Bins, Error> {
 }
 
 /// Bytes of all that is made.
-pub(super) fn bytes(input: &OpaqueInput<'_>, bins: &Bins) -> u64 {
+pub(super) fn bytes(input: &Averaged<'_>, bins: &Bins) -> u64 {
     picture_bytes(input) + lists_bytes(bins)
 }
 
@@ -40,7 +40,7 @@ fn lists_bytes(bins: &Bins) -> u64 {
 }
 
 /// The picture, its tiles, and the images of groups in every thread.
-fn picture_bytes(input: &OpaqueInput<'_>) -> u64 {
+fn picture_bytes(input: &Averaged<'_>) -> u64 {
     let [width, height] = input.discs.size.map(u64::from);
     let tiles = width.div_ceil(TILE as u64) * height.div_ceil(TILE as u64);
     let planes = u64::from(input.channels) + 2;
@@ -48,7 +48,7 @@ fn picture_bytes(input: &OpaqueInput<'_>) -> u64 {
     picture + rayon::current_num_threads() as u64 * Scratch::bytes(input)
 }
 
-fn afford(input: &OpaqueInput<'_>, lists: u64) -> Result<(), Error> {
+fn afford(input: &Averaged<'_>, lists: u64) -> Result<(), Error> {
     let needed = picture_bytes(input) + lists;
     if needed <= input.max_bytes {
         return Ok(());

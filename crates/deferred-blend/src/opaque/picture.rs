@@ -1,6 +1,6 @@
 //! Tiles, and the picture that they make.
 
-use super::{Opaque, OpaqueInput, memory};
+use super::{Opaque, Averaged, memory};
 use rayon::prelude::*;
 use splat_core::raster::bins::{Bins, TILE};
 use splat_core::raster::tile::{AREA, for_each_span};
@@ -25,7 +25,7 @@ impl Tile {
 }
 
 /// The picture of all tiles.
-pub(super) fn assemble(input: &OpaqueInput<'_>, tiles: &[Option<Tile>], bins: &Bins) -> Opaque {
+pub(super) fn assemble(input: &Averaged<'_>, tiles: &[Option<Tile>], bins: &Bins) -> Opaque {
     let discs = input.discs;
     let pixels = discs.size.iter().map(|s| *s as usize).product();
     let mut depth = vec![f32::INFINITY; pixels];

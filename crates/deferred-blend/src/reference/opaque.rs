@@ -3,7 +3,7 @@
 use super::{Hit, hits, world_ray};
 use crate::disc::axes;
 use crate::{DiscInput, Params, Passes};
-use splat_core::glam::DVec3;
+use splat_core::{Footprint, glam::DVec3};
 
 /// What a pixel shows of opaque discs.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,6 +28,12 @@ pub fn opaque(
     let (origin, direction) = world_ray(input.camera, x, y);
     let mut hits = hits(input, params, origin, direction);
     hits.sort_by_key(|hit| hit.id);
+    let epsilon =
+        |hit: &Hit| (f64::from(params.gap) * hit.radius / hit.facing.abs().max(0.25)).max(hit.depth * 2f64.powi(-20));
+    let core = f64::from(Footprint::CORE / params.disc_scale).powi(2);
+    let hiding = || hits.iter().filter(|hit| hit.distance_sq < core);
+    let limit = hiding().map(|hit| hit.depth + epsilon(hit)).fold(f64::INFINITY, f64::min);
+    let nearest = *hiding().min_by(|a, b| a.depth.total_cmp(&b.depth))?;
     if let Passes::OnePlusOne { groups, voronoi } = passes {
         let floor = voronoi.then(|| floor(input, params));
         let key = |hit: &Hit| match floor {
@@ -44,16 +50,15 @@ pub fn opaque(
         }
         hits = kept;
     }
-    let epsilon =
-        |hit: &Hit| (f64::from(params.gap) * hit.radius / hit.facing.max(0.25)).max(hit.depth * 2f64.powi(-20));
-    let limit = hits.iter().map(|hit| hit.depth + epsilon(hit)).fold(f64::INFINITY, f64::min);
-    let nearest = hits.iter().min_by(|a, b| a.depth.total_cmp(&b.depth))?.id;
-    hits.retain(|hit| hit.depth < limit);
-    let weight = |hit: &Hit| hit.weight.max(2f64.powi(-60));
+    hits.retain(|hit| hit.depth < limit && nearest.depth < hit.depth + epsilon(hit));
+    if hits.is_empty() {
+        hits.push(nearest);
+    }
+    let weight = |hit: &Hit| hit.weight.max(2f64.powi(-60)) * if hit.facing > 0.0 { 1.0 / 256.0 } else { 1.0 };
     let weights: f64 = hits.iter().map(weight).sum();
     let mean = |of: &dyn Fn(&Hit) -> f64| hits.iter().map(|hit| weight(hit) * of(hit)).sum::<f64>() / weights;
     let value = |c: usize| mean(&|hit| f64::from(values[hit.id * channels + c]));
-    Some(Seen { depth: mean(&|hit| hit.depth), values: (0..channels).map(value).collect(), disc: nearest })
+    Some(Seen { depth: mean(&|hit| hit.depth), values: (0..channels).map(value).collect(), disc: nearest.id })
 }
 
 /// Where the steps of Eq. 10 begin, and how long one is.

@@ -1,0 +1,173 @@
+//! Shading after blending (section 5.2.4): in each pixel places, normals and colours of a layer's discs are averaged, and light falls on
+//! that once. A disc that was shaded before it was blended has one radiance, so highlights and the ends of shadows show single discs.
+
+use crate::bump;
+use crate::disc::{Discs, Ray};
+use crate::fragments::Fragment;
+use crate::layer::Shares;
+use splat_core::glam::{DAffine3, DVec3, Vec3};
+use splat_core::shade::{ChannelLayout, MAX_CHANNELS, Point, ShadeInput, arriving, facing};
+use splat_core::{Cloud, Receiver};
+
+/// What discs show.
+#[derive(Clone, Copy)]
+pub enum Shown<'a> {
+    /// Numbers of each disc, which was shaded before it is blended: as many as there are channels, by place in the cloud.
+    Discs(&'a [f32]),
+    /// Light on what was averaged.
+    Pixels(Light<'a>),
+}
+
+/// Light, and what it falls on.
+#[derive(Clone, Copy)]
+pub struct Light<'a> {
+    /// Lights and tables, with the cloud of the discs.
+    pub input: &'a ShadeInput<'a>,
+    /// The numbers that it gives.
+    pub layout: ChannelLayout,
+    /// Into the space of each object, by id, where bumps are; empty where no material has any.
+    pub object_from_world: &'a [DAffine3],
+}
+
+/// Numbers of [`Attributes`].
+pub(crate) const ATTRIBUTES: usize = 10;
+
+/// What is averaged of discs.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Attributes {
+    /// The normal that the surface lies across.
+    pub(crate) face: Vec3,
+    /// The one that light is reflected about.
+    pub(crate) normal: Vec3,
+    pub(crate) color: [f32; 3],
+    pub(crate) radius: f32,
+}
+
+impl Attributes {
+    fn of(cloud: &Cloud, i: usize) -> Self {
+        let (face, normal) = (cloud.normal_of(i), cloud.shading_normal_of(i));
+        Self { face, normal, color: cloud.color[i], radius: cloud.radius[i] }
+    }
+
+    fn to_array(self) -> [f32; ATTRIBUTES] {
+        let ([a, b, c], [d, e, f], [g, h, i]) = (self.face.to_array(), self.normal.to_array(), self.color);
+        [a, b, c, d, e, f, g, h, i, self.radius]
+    }
+
+    fn from_array([a, b, c, d, e, f, g, h, i, radius]: [f32; ATTRIBUTES]) -> Self {
+        Self { face: Vec3::new(a, b, c), normal: Vec3::new(d, e, f), color: [g, h, i], radius }
+    }
+}
+
+impl Light<'_> {
+    /// What each disc of the cloud brings to an average, its normals on the viewer's side; by place in the cloud.
+    pub(crate) fn attributes(&self, i: usize) -> [f32; ATTRIBUTES] {
+        let cloud = self.input.cloud;
+        let own = Attributes::of(cloud, i);
+        let to_eye = self.to_eye(cloud.position[i]);
+        let side = |n: Vec3| if own.face.dot(to_eye) < 0.0 { -n } else { n };
+        Attributes { face: side(own.face), normal: side(own.normal), ..own }.to_array()
+    }
+
+    /// Of an opaque pixel, from averages of [`Light::attributes`].
+    pub(crate) fn on_averages(&self, averages: [f32; ATTRIBUTES], place: &Place<'_>, out: &mut [f32; MAX_CHANNELS]) {
+        self.on(&Attributes::from_array(averages), place, out);
+    }
+
+    /// Of a layer. Normals are averaged by weight on the side of the nearest disc's, colours by shares.
+    pub(crate) fn on_layer(
+        &self,
+        fragments: &[Fragment],
+        place: &Place<'_>,
+        (share, plane): Shares<'_>,
+        out: &mut [f32; MAX_CHANNELS],
+    ) {
+        let of = |f: &Fragment| Attributes::of(self.input.cloud, place.discs.ids[f.disc as usize] as usize);
+        let first = of(&fragments[0]);
+        let mut sum = Attributes { face: Vec3::ZERO, normal: Vec3::ZERO, color: [0.0; 3], radius: 0.0 };
+        let (mut weights, mut shares) = (0.0, [0.0; 3]);
+        for fragment in fragments {
+            let own = of(fragment);
+            let side = if own.face.dot(first.face) < 0.0 { -fragment.weight } else { fragment.weight };
+            sum.face += own.face * side;
+            sum.normal += own.normal * side;
+            sum.radius += (own.radius - first.radius) * fragment.weight;
+            weights += fragment.weight;
+            let own_share = share(fragment);
+            for c in 0..3 {
+                sum.color[c] += own_share[plane(c)] * (own.color[c] - first.color[c]);
+                shares[c] += own_share[plane(c)];
+            }
+        }
+        let color = |c: usize| if shares[c] > 0.0 { sum.color[c] / shares[c] } else { 0.0 } + first.color[c];
+        let mean = Attributes {
+            face: sum.face.try_normalize().unwrap_or(first.face),
+            normal: sum.normal.try_normalize().unwrap_or(first.normal),
+            color: [0, 1, 2].map(color),
+            radius: sum.radius / weights + first.radius,
+        };
+        self.on(&mean, place, out);
+    }
+
+    /// Writes the channels of the layout.
+    fn on(&self, mean: &Attributes, place: &Place<'_>, out: &mut [f32; MAX_CHANNELS]) {
+        let ShadeInput { cloud, materials, objects, lights, ambient, .. } = *self.input;
+        let (position, i) = (place.position(), place.disc);
+        let (kind, object) = (cloud.kind[i], cloud.object[i] as usize);
+        let (material, to_eye) = (&materials[cloud.material[i] as usize], self.to_eye(position));
+        let face = mean.face.normalize_or_zero();
+        let mut normal = facing(kind, face, mean.normal.normalize_or_zero(), to_eye);
+        if material.bump.height > 0.0 {
+            let slope = self.slope(place, position);
+            normal = (normal - (slope - normal * slope.dot(normal))).normalize_or(normal);
+        }
+        let world = cloud.origin + position.as_dvec3();
+        let point = Point { position: world, radius: mean.radius, normal, to_eye, color: mean.color, material };
+        let coefficient = cloud.shadow_coefficient_of(i) * objects[object].shadow_coefficient;
+        let receiver = Receiver { position, normal: face, radius: mean.radius, kind };
+        let radiance = point.radiance(ambient, lights.iter().map(|lit| &lit.light), |rank, irradiance| {
+            let shadow = lights[rank].shadow.map(|shadow| move || shadow.transmittance(&receiver));
+            arriving(irradiance, coefficient, shadow)
+        });
+        radiance.write(normal, &self.layout, out);
+    }
+
+    /// ∇h of bumps.
+    fn slope(&self, place: &Place<'_>, position: Vec3) -> Vec3 {
+        let cloud = self.input.cloud;
+        let to_object = self.object_from_world[cloud.object[place.disc] as usize];
+        let at = to_object.transform_point3(cloud.origin + position.as_dvec3());
+        // Objects are scaled alike in all directions.
+        let scale = to_object.matrix3.col(0).length();
+        let bump = &self.input.materials[cloud.material[place.disc] as usize].bump;
+        let slope = bump::slope(bump, at, f64::from(place.discs.pixel_width(place.depth)) * scale);
+        (to_object.matrix3.transpose() * slope / scale).as_vec3()
+    }
+
+    fn to_eye(&self, position: Vec3) -> Vec3 {
+        let camera = self.input.camera;
+        if camera.is_orthographic() {
+            return -camera.axes[2].as_vec3();
+        }
+        ((camera.position - self.input.cloud.origin).as_vec3() - position).normalize_or_zero()
+    }
+}
+
+/// Where a surface is seen.
+pub(crate) struct Place<'a> {
+    pub(crate) discs: &'a Discs,
+    pub(crate) ray: &'a Ray,
+    /// View depth.
+    pub(crate) depth: f32,
+    /// The nearest disc, as a place in the cloud: material, object and share of shadows are its.
+    pub(crate) disc: usize,
+}
+
+impl Place<'_> {
+    /// Relative to the cloud's origin.
+    fn position(&self) -> Vec3 {
+        let (rotation, shift) = self.discs.view;
+        let seen: DVec3 = self.ray.at(self.depth).as_dvec3();
+        (rotation.transpose() * seen - shift).as_vec3()
+    }
+}
