@@ -2,6 +2,7 @@
 
 mod context;
 mod environment;
+mod fit;
 pub(crate) mod files;
 pub(crate) mod input;
 mod loading;
@@ -15,6 +16,7 @@ use crate::statistics::{LightStatistics, ObjectStatistics};
 use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, pass, work};
 pub(crate) use context::BYTES_PER_SPLAT;
 use files::Files;
+pub use fit::fitted;
 use glam::DVec3;
 use loading::Loading;
 use normalize::normalize;
