@@ -17,7 +17,7 @@ use crate::field_points::{area, coarse_mesh, density_lattice, surface_lattice, s
 use crate::keep::Keep;
 #[cfg(feature = "noise")]
 use crate::procedural::CloudShape;
-use crate::shapes::{Lattice, Rectangle, rectangle_columns, rectangle_counts};
+use crate::shapes::{HomogeneousMedium, Lattice, MediumBody, Rectangle, rectangle_columns, rectangle_counts};
 use crate::volume_points::lattice_factors;
 use crate::{ConvertError, DensityParams, MeshParams, SplatParams, VolumeParams, mesh_points, resample, surface_nets};
 #[cfg(feature = "surfels")]
@@ -175,45 +175,29 @@ pub fn procedural(shape: &CloudShape, spacing: f64, params: &VolumeParams) -> Re
     Ok(sampled(positive, shape.bounds().min, DVec3::splat(spacing), dims, params))
 }
 
-/// Of [`crate::medium_box`].
+/// Of [`crate::medium`].
 ///
 /// # Errors
 /// As the conversion.
-pub fn medium_box(
-    bounds: DAabb,
-    extinction: f64,
-    spacing: f64,
-    params: &SplatParams,
-) -> Result<Prediction, ConvertError> {
-    let counts = Lattice::new(bounds, extinction, spacing, params)?.counts;
-    let cells = if extinction > 0.0 { counts.iter().product::<u64>() as f64 } else { 0.0 };
-    Ok(Prediction::exact(cells, Wanted::default()))
-}
-
-/// Of [`crate::medium_ball`].
-///
-/// # Errors
-/// As the conversion.
-pub fn medium_ball(
-    center: DVec3,
-    radius: f64,
-    extinction: f64,
-    spacing: f64,
-    params: &SplatParams,
-) -> Result<Prediction, ConvertError> {
-    let bounds = DAabb::around(center, DVec3::splat(radius));
-    let cells = medium_box(bounds, extinction, spacing, params)?.splats as f64;
-    // Cells that the surface cuts count whole: a shell of about half a cell.
-    let inside = std::f64::consts::PI / 6.0 * (libm::cbrt(cells) + 1.0).powi(3);
-    Ok(Prediction::new(inside.min(cells), Some(cells), Wanted::default()))
+pub fn medium(medium: &HomogeneousMedium, params: &SplatParams) -> Result<Prediction, ConvertError> {
+    let counts = Lattice::new(medium, params)?.counts;
+    let cells = if medium.extinction > 0.0 { counts.iter().product::<u64>() as f64 } else { 0.0 };
+    Ok(match medium.body {
+        MediumBody::Box(_) => Prediction::exact(cells, Wanted::default()),
+        MediumBody::Ball { .. } => {
+            // Cells that the surface cuts count whole: a shell of about half a cell.
+            let inside = std::f64::consts::PI / 6.0 * (libm::cbrt(cells) + 1.0).powi(3);
+            Prediction::new(inside.min(cells), Some(cells), Wanted::default())
+        }
+    })
 }
 
 /// Of [`crate::rectangle`].
 ///
 /// # Errors
 /// As the conversion.
-pub fn rectangle(rectangle: &Rectangle, params: &SplatParams) -> Result<Prediction, ConvertError> {
-    let Rectangle { u, v, opacity, spacing, .. } = *rectangle;
+pub fn rectangle(rectangle: &Rectangle, opacity: f64, params: &SplatParams) -> Result<Prediction, ConvertError> {
+    let Rectangle { u, v, spacing, .. } = *rectangle;
     params.check()?;
     params.check_spacing(spacing * params.transform.scale)?;
     let splats = rectangle_counts(u, v, spacing).iter().product();

@@ -12,7 +12,7 @@ use crate::volume_points::{check_lattice, volume_to_points};
 use crate::{ConvertError, MeshParams, MeshReport, VolumeParams, VolumeReport, subdivide};
 use rayon::prelude::*;
 use splat_core::{
-    Cloud, DAabb, Grid, Mesh, Progress, ScalarField, TransferFunction, TransferPoint,
+    Cloud, DAabb, Grid, Mesh, Progress, ScalarField, Similarity, TransferFunction, TransferPoint,
     glam::{DMat3, DVec3},
 };
 
@@ -107,7 +107,15 @@ pub fn surface_to_points<F: ScalarField + ?Sized>(
     let mesh_params = MeshParams { density, ..params.clone() };
     let mut cloud = Cloud::default();
     let report = mesh_to_points_into(&mesh, &mesh_params, &mut cloud, Some(progress))?;
-    Ok((cloud, report))
+    Ok((in_domain(cloud, field, &p.transform), report))
+}
+
+/// Without the splats beyond the border of an open surface.
+fn in_domain<F: ScalarField + ?Sized>(cloud: Cloud, field: &F, transform: &Similarity) -> Cloud {
+    let local = |p: DVec3| transform.rotation.inverse() * (p - transform.translation) / transform.scale;
+    let belongs = |i: &u32| field.in_domain(local(cloud.origin + cloud.position[*i as usize].as_dvec3()));
+    let kept: Vec<u32> = (0..cloud.len() as u32).filter(belongs).collect();
+    if kept.len() == cloud.len() { cloud } else { cloud.gather(&kept) }
 }
 
 /// The lattice that a zero set is looked for on.

@@ -91,7 +91,7 @@ pub use raw_points::{PointLattice, RawPoints};
 pub use resample::resampled;
 pub use search::{ZeroSearch, extinct_bounds};
 pub use section::{Section, volume_section};
-pub use shapes::{Rectangle, medium_ball, medium_ball_grid, medium_box, medium_box_grid, rectangle};
+pub use shapes::{HomogeneousMedium, MediumBody, Rectangle, medium, medium_to_grid, rectangle};
 pub use sobel::{sobel_gradient, sobel_gradient_into};
 #[cfg(feature = "surfels")]
 pub use surfels::{SurfelParams, SurfelReport, raw_to_surfels};

@@ -1,7 +1,8 @@
 //! Points as a scanner or a file gives them: no radius, perhaps no normal.
 
-use splat_core::Error;
+use crate::vertex_normals::vertex_normals;
 use splat_core::glam::{DVec3, Vec3};
+use splat_core::{Error, Mesh};
 
 /// Raw points as columns; all but the positions may be empty.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -46,6 +47,27 @@ impl RawPoints {
     /// True without points.
     pub fn is_empty(&self) -> bool {
         self.position.is_empty()
+    }
+
+    /// The vertices of a mesh that triangles use, with their normals: those of the file, or smooth ones.
+    ///
+    /// # Panics
+    /// If an index is out of range, which [`Mesh::validate`] tells.
+    pub fn of_vertices(mesh: &Mesh) -> Self {
+        let normal = if mesh.normal.is_empty() { vertex_normals(mesh) } else { mesh.normal.clone() };
+        // A vertex without a triangle has no normal, and says nothing of the surface.
+        let known: Vec<usize> = (0..normal.len()).filter(|i| normal[*i] != Vec3::ZERO).collect();
+        Self {
+            origin: mesh.origin,
+            position: known.iter().map(|i| mesh.position[*i]).collect(),
+            normal: known.iter().map(|i| normal[*i]).collect(),
+            ..Self::default()
+        }
+    }
+
+    /// Bytes held by the columns, all of them counted: position, normal, colour, value, opacity, class and integers.
+    pub fn bytes(&self) -> u64 {
+        64 * self.len() as u64
     }
 
     /// The least opacity of a point; 1 where the file has none, and without points.

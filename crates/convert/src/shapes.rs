@@ -12,63 +12,68 @@ use splat_core::{Cloud, DAabb, Grid, Splat, SplatKind, optics};
 /// Sub-samples along each axis of a cell that a ball's surface cuts.
 const SUBDIVISION: i32 = 8;
 
-/// A homogeneous medium of extinction σ_t (1/world unit) in a box, lattice points about `spacing` apart; lengths are before the transform of `params`.
+/// A homogeneous medium. Lengths are object units, before the transform of [`SplatParams`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HomogeneousMedium {
+    /// What it fills.
+    pub body: MediumBody,
+    /// Extinction σ_t, 1/world unit, ≥ 0.
+    pub extinction: f64,
+    /// Distance of the lattice points, about, > 0.
+    pub spacing: f64,
+}
+
+/// What a homogeneous medium fills.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum MediumBody {
+    /// A box along the axes.
+    Box(DAabb),
+    /// A ball.
+    Ball {
+        /// Centre.
+        center: DVec3,
+        /// Radius, > 0.
+        radius: f64,
+    },
+}
+
+impl MediumBody {
+    /// The box, or the one around the ball.
+    pub fn bounds(&self) -> DAabb {
+        match *self {
+            Self::Box(bounds) => bounds,
+            Self::Ball { center, radius } => DAabb::around(center, DVec3::splat(radius)),
+        }
+    }
+}
+
+/// A homogeneous medium as splats. Cells that the surface of a ball cuts count with the share of their volume inside, and all
+/// together with the volume 4/3·πr³ exactly.
 ///
 /// # Errors
 /// [`ConvertError::Parameter`] for an empty box, a spacing or an extinction out of range, [`ConvertError::Limit`].
-pub fn medium_box(bounds: DAabb, extinction: f64, spacing: f64, params: &SplatParams) -> Result<Cloud, ConvertError> {
-    let lattice = Lattice::new(bounds, extinction, spacing, params)?;
-    lattice.fill(params, |_| 1.0)
-}
-
-/// A homogeneous medium of extinction σ_t (1/world unit) in a ball; cells that its surface cuts count with the share
-/// of their volume inside, and all together with the volume 4/3·πr³ exactly.
-///
-/// # Errors
-/// As [`medium_box`].
-pub fn medium_ball(
-    center: DVec3,
-    radius: f64,
-    extinction: f64,
-    spacing: f64,
-    params: &SplatParams,
-) -> Result<Cloud, ConvertError> {
-    let lattice = Lattice::new(DAabb::around(center, DVec3::splat(radius)), extinction, spacing, params)?;
+pub fn medium(medium: &HomogeneousMedium, params: &SplatParams) -> Result<Cloud, ConvertError> {
+    let lattice = Lattice::new(medium, params)?;
+    let MediumBody::Ball { radius, .. } = medium.body else { return lattice.fill(params, |_| 1.0) };
     let mut cloud = lattice.fill(params, |offset| share_in_ball(offset, radius, lattice.step))?;
     let total: f64 = cloud.cross_section.iter().map(|k| f64::from(*k)).sum();
     let volume = 4.0 / 3.0 * std::f64::consts::PI * (radius * params.transform.scale).powi(3);
-    let correction = (extinction * volume / total) as f32;
+    let correction = (medium.extinction * volume / total) as f32;
     cloud.cross_section.iter_mut().for_each(|k| *k *= correction);
     Ok(cloud)
 }
 
-/// The medium of [`medium_box`] as a volume: its extinction (1/world unit) on a lattice of cells that fill the box, before the
-/// transform of `params`.
+/// The same as a volume: its extinction (1/world unit) on a lattice of cells that fill its bounds, before the transform of
+/// `params`. A cell that the surface of a ball cuts has the share that lies inside.
 ///
 /// # Errors
-/// As [`medium_box`].
-pub fn medium_box_grid(
-    bounds: DAabb,
-    extinction: f64,
-    spacing: f64,
-    params: &SplatParams,
-) -> Result<Grid, ConvertError> {
-    Ok(Lattice::new(bounds, extinction, spacing, params)?.grid(|_| 1.0))
-}
-
-/// The medium of [`medium_ball`] as a volume: a cell that the ball's surface cuts has the share that lies inside.
-///
-/// # Errors
-/// As [`medium_box`].
-pub fn medium_ball_grid(
-    center: DVec3,
-    radius: f64,
-    extinction: f64,
-    spacing: f64,
-    params: &SplatParams,
-) -> Result<Grid, ConvertError> {
-    let lattice = Lattice::new(DAabb::around(center, DVec3::splat(radius)), extinction, spacing, params)?;
-    Ok(lattice.grid(|offset| share_in_ball(offset, radius, lattice.step)))
+/// As [`medium`].
+pub fn medium_to_grid(medium: &HomogeneousMedium, params: &SplatParams) -> Result<Grid, ConvertError> {
+    let lattice = Lattice::new(medium, params)?;
+    Ok(match medium.body {
+        MediumBody::Box(_) => lattice.grid(|_| 1.0),
+        MediumBody::Ball { radius, .. } => lattice.grid(|offset| share_in_ball(offset, radius, lattice.step)),
+    })
 }
 
 /// A flat parallelogram; its normal is u × v.
@@ -80,18 +85,16 @@ pub struct Rectangle {
     pub u: DVec3,
     /// The other; not parallel to the first.
     pub v: DVec3,
-    /// Opacity of one crossing, in [0, 1]; 1 is an opaque surface.
-    pub opacity: f64,
     /// Distance of the splats, about, object units.
     pub spacing: f64,
 }
 
-/// A flat parallelogram as surface splats.
+/// A flat parallelogram as splats of a surface, `opacity` that of one crossing, in [0, 1]; 1 is an opaque surface.
 ///
 /// # Errors
-/// As [`medium_box`]; [`ConvertError::Parameter`] for parallel half-axes.
-pub fn rectangle(rectangle: &Rectangle, params: &SplatParams) -> Result<Cloud, ConvertError> {
-    let Rectangle { center, u, v, opacity, spacing } = *rectangle;
+/// As [`medium`]; [`ConvertError::Parameter`] for parallel half-axes or another opacity.
+pub fn rectangle(rectangle: &Rectangle, opacity: f64, params: &SplatParams) -> Result<Cloud, ConvertError> {
+    let Rectangle { center, u, v, spacing } = *rectangle;
     params.check()?;
     let scale = params.transform.scale;
     params.check_spacing(spacing * scale)?;
@@ -159,12 +162,9 @@ pub(crate) struct Lattice {
 }
 
 impl Lattice {
-    pub(crate) fn new(
-        bounds: DAabb,
-        extinction: f64,
-        spacing: f64,
-        params: &SplatParams,
-    ) -> Result<Self, ConvertError> {
+    pub(crate) fn new(medium: &HomogeneousMedium, params: &SplatParams) -> Result<Self, ConvertError> {
+        let HomogeneousMedium { extinction, spacing, .. } = *medium;
+        let bounds = medium.body.bounds();
         params.check()?;
         params.check_spacing(spacing * params.transform.scale)?;
         let (DAabb { min, max }, extent) = (bounds, bounds.size());
@@ -245,6 +245,18 @@ fn share_in_ball(p: DVec3, radius: f64, step: DVec3) -> f64 {
 mod tests {
     use super::*;
 
+    const SLAB: HomogeneousMedium = HomogeneousMedium {
+        body: MediumBody::Box(DAabb::new(DVec3::ZERO, DVec3::new(2.0, 1.0, 0.3))),
+        extinction: 5.0,
+        spacing: 0.07,
+    };
+
+    const BALL: HomogeneousMedium = HomogeneousMedium {
+        body: MediumBody::Ball { center: DVec3::ONE, radius: 0.5 },
+        extinction: 2.0,
+        spacing: 0.04,
+    };
+
     fn total(cloud: &Cloud) -> f64 {
         cloud.cross_section.iter().map(|k| f64::from(*k)).sum()
     }
@@ -252,9 +264,9 @@ mod tests {
     #[test]
     fn cross_sections_sum_to_extinction_times_volume() {
         let p = SplatParams::default();
-        let slab = medium_box(DAabb::new(DVec3::ZERO, DVec3::new(2.0, 1.0, 0.3)), 5.0, 0.07, &p).unwrap();
+        let slab = medium(&SLAB, &p).unwrap();
         assert!((total(&slab) / 3.0 - 1.0).abs() < 1e-6, "{}", total(&slab));
-        let ball = medium_ball(DVec3::ONE, 0.5, 2.0, 0.04, &p).unwrap();
+        let ball = medium(&BALL, &p).unwrap();
         let exact = 2.0 * 4.0 / 3.0 * std::f64::consts::PI * 0.125;
         assert!((total(&ball) / exact - 1.0).abs() < 1e-6, "{}", total(&ball));
     }
@@ -266,12 +278,11 @@ mod tests {
             let cell = grid.axes.determinant();
             grid.values.iter().map(|v| f64::from(*v) * cell).sum::<f64>()
         };
-        let bounds = DAabb::new(DVec3::ZERO, DVec3::new(2.0, 1.0, 0.3));
-        let slab = medium_box_grid(bounds, 5.0, 0.07, &p).unwrap();
+        let slab = medium_to_grid(&SLAB, &p).unwrap();
         assert!((mass(&slab) / 3.0 - 1.0).abs() < 1e-6, "{}", mass(&slab));
         // Cells fill the box.
         assert!((slab.position(0, 0, 0) - 0.5 * slab.axes * DVec3::ONE).length() < 1e-12);
-        let ball = medium_ball_grid(DVec3::ONE, 0.5, 2.0, 0.04, &p).unwrap();
+        let ball = medium_to_grid(&BALL, &p).unwrap();
         let exact = 2.0 * 4.0 / 3.0 * std::f64::consts::PI * 0.125;
         assert!((mass(&ball) / exact - 1.0).abs() < 1e-3, "{}", mass(&ball));
         let [nx, ny, nz] = ball.dims;
@@ -281,11 +292,8 @@ mod tests {
     #[test]
     fn rectangle_carries_the_optical_depth_of_its_area() {
         let p = SplatParams::default();
-        let plane = rectangle(
-            &Rectangle { center: DVec3::ZERO, u: DVec3::X, v: DVec3::Z * 2.0, opacity: 0.75, spacing: 0.05 },
-            &p,
-        )
-        .unwrap();
+        let flat = Rectangle { center: DVec3::ZERO, u: DVec3::X, v: DVec3::Z * 2.0, spacing: 0.05 };
+        let plane = rectangle(&flat, 0.75, &p).unwrap();
         assert!((total(&plane) / (8.0 * 4.0_f64.ln()) - 1.0).abs() < 1e-6);
         assert_eq!(plane.normal[0], Vec3::NEG_Y);
         plane.validate().unwrap();
@@ -295,8 +303,9 @@ mod tests {
     fn cv10_a_spacing_beyond_the_budget_is_refused() {
         let p = SplatParams { limits: splat_core::Limits::elements(1000), ..SplatParams::default() };
         for spacing in [1e-9, 0.0, f64::INFINITY, f64::NAN] {
-            assert!(medium_box(DAabb::new(DVec3::ZERO, DVec3::ONE), 1.0, spacing, &p).is_err(), "{spacing}");
+            assert!(medium(&HomogeneousMedium { spacing, ..SLAB }, &p).is_err(), "{spacing}");
         }
-        assert!(medium_box(DAabb::new(DVec3::ONE, DVec3::ZERO), 1.0, 0.5, &p).is_err());
+        let body = MediumBody::Box(DAabb::new(DVec3::ONE, DVec3::ZERO));
+        assert!(medium(&HomogeneousMedium { body, ..BALL }, &SplatParams::default()).is_err());
     }
 }

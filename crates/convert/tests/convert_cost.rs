@@ -102,22 +102,19 @@ fn split_volumes_fields_and_clouds_are_predicted_closely() {
 fn closed_shapes_are_counted() {
     let p = SplatParams::default();
     let (low, high) = (DVec3::ZERO, DVec3::new(2.0, 1.0, 0.3));
-    exact(
-        cost::medium_box(DAabb::new(low, high), 5.0, 0.07, &p).unwrap(),
-        &medium_box(DAabb::new(low, high), 5.0, 0.07, &p).unwrap(),
-    );
-    exact(
-        cost::medium_box(DAabb::new(low, high), 0.0, 0.07, &p).unwrap(),
-        &medium_box(DAabb::new(low, high), 0.0, 0.07, &p).unwrap(),
-    );
+    for extinction in [5.0, 0.0] {
+        let slab = HomogeneousMedium { body: MediumBody::Box(DAabb::new(low, high)), extinction, spacing: 0.07 };
+        exact(cost::medium(&slab, &p).unwrap(), &medium(&slab, &p).unwrap());
+    }
     let (u, v) = (DVec3::X, DVec3::Z * 2.0);
     for opacity in [0.75, 1.0] {
-        let flat = Rectangle { center: low, u, v, opacity, spacing: 0.05 };
-        exact(cost::rectangle(&flat, &p).unwrap(), &rectangle(&flat, &p).unwrap());
+        let flat = Rectangle { center: low, u, v, spacing: 0.05 };
+        exact(cost::rectangle(&flat, opacity, &p).unwrap(), &rectangle(&flat, opacity, &p).unwrap());
     }
     for spacing in [0.03, 0.1] {
-        let ball = medium_ball(DVec3::ONE, 0.8, 2.0, spacing, &p).unwrap();
-        close(cost::medium_ball(DVec3::ONE, 0.8, 2.0, spacing, &p).unwrap(), &ball, 0.06);
+        let ball =
+            HomogeneousMedium { body: MediumBody::Ball { center: DVec3::ONE, radius: 0.8 }, extinction: 2.0, spacing };
+        close(cost::medium(&ball, &p).unwrap(), &medium(&ball, &p).unwrap(), 0.06);
     }
 }
 

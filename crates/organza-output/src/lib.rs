@@ -19,12 +19,14 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod doubt;
 mod error;
 mod exr_file;
 mod png_file;
 mod target;
 mod targets;
 
+pub use doubt::doubt;
 pub use error::Error;
 pub use png_file::displayed;
 pub use target::{Target, abandon};

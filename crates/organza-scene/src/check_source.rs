@@ -7,9 +7,9 @@ use super::check_transfer::check_transfer;
 use super::paths::Paths;
 use super::raw_object::RawObject;
 use super::raw_source::{RawCloud, RawDensity, RawImplicit, RawMediumBall, RawMediumBox, RawRectangle};
-use super::{CloudSource, DensitySource, ImplicitSource, MediumShape, RectangleSource, Source, VolumeSource};
+use super::{CloudSource, DensitySource, ImplicitSource, Source, VolumeSource};
 use crate::{Error, shown};
-use convert::ExpressionField;
+use convert::{ExpressionField, HomogeneousMedium, MediumBody, Rectangle};
 use glam::DVec3;
 use splat_core::DAabb;
 
@@ -113,25 +113,25 @@ fn check_extinction(at: &At<'_>, extinction: Option<f64>) -> Result<f64, Error> 
     }
 }
 
-fn check_rectangle(at: &At<'_>, raw: &RawRectangle) -> Result<RectangleSource, Error> {
+fn check_rectangle(at: &At<'_>, raw: &RawRectangle) -> Result<Rectangle, Error> {
     let (u, v) = check_half_axes(at, raw.u, raw.v)?;
     let spacing = at.spacing("spacing", raw.spacing, 2.0 * u.length().max(v.length()))?;
-    Ok(RectangleSource { center: at.vector("center", raw.center)?, u, v, spacing })
+    Ok(Rectangle { center: at.vector("center", raw.center)?, u, v, spacing })
 }
 
-fn check_medium_box(at: &At<'_>, raw: &RawMediumBox, fallback: Option<f64>) -> Result<MediumShape, Error> {
+fn check_medium_box(at: &At<'_>, raw: &RawMediumBox, fallback: Option<f64>) -> Result<HomogeneousMedium, Error> {
     let bounds = check_box(at, "min", "max", raw.min, raw.max)?;
     let spacing = at.spacing("spacing", raw.spacing, bounds.size().max_element())?;
     let extinction = check_extinction(at, raw.extinction.or(fallback))?;
-    Ok(MediumShape::Box { bounds, extinction, spacing })
+    Ok(HomogeneousMedium { body: MediumBody::Box(bounds), extinction, spacing })
 }
 
-fn check_medium_ball(at: &At<'_>, raw: &RawMediumBall, fallback: Option<f64>) -> Result<MediumShape, Error> {
+fn check_medium_ball(at: &At<'_>, raw: &RawMediumBall, fallback: Option<f64>) -> Result<HomogeneousMedium, Error> {
     let radius = at.length("radius", raw.radius)?;
     let spacing = at.spacing("spacing", raw.spacing, 2.0 * radius)?;
     let center = at.vector("center", raw.center)?;
     let extinction = check_extinction(at, raw.extinction.or(fallback))?;
-    Ok(MediumShape::Ball { center, radius, extinction, spacing })
+    Ok(HomogeneousMedium { body: MediumBody::Ball { center, radius }, extinction, spacing })
 }
 
 /// A box between two corners, the lowest and the highest.

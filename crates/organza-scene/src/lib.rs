@@ -28,6 +28,7 @@ mod error;
 mod fit;
 mod layer_choice;
 mod lights;
+mod lit;
 mod load;
 mod model;
 mod overrides;
@@ -63,8 +64,7 @@ pub use settings::{
 };
 pub use shown::{escape_controls, printable, shown};
 pub use source::{
-    CloudSource, DensitySource, ImplicitSource, IsosurfaceSource, LevelSetSource, MediumShape, RectangleSource,
-    SliceSource, Source, VolumeSource,
+    CloudSource, DensitySource, ImplicitSource, IsosurfaceSource, LevelSetSource, SliceSource, Source, VolumeSource,
 };
 
 /// The page's example compiles and holds.

@@ -1,10 +1,14 @@
 //! The checked scene: everything a render needs, in radians and f64 world units.
 
 use super::{CameraFit, RenderSettings, SceneLight, Source, Technique};
+use crate::Error;
 use convert::Clip;
 use convert::read::UpAxis;
 use glam::DVec3;
+use sha2::{Digest, Sha256};
 use splat_core::{Camera, FootprintStack, Material, Packing, Similarity};
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// A whole scene. Made by [`super::load()`] or [`super::parse`] alone, so that every number in it is finite and in range.
@@ -46,6 +50,27 @@ impl Scene {
         let data = self.objects.iter().filter_map(|o| o.source.path().map(Path::to_owned));
         let environment = self.environment.iter().map(|environment| environment.path.clone());
         std::iter::once(self.file.clone()).chain(data).chain(environment).collect()
+    }
+
+    /// SHA-256 of the bytes of all files that the scene reads, without its own.
+    ///
+    /// # Errors
+    /// [`Error::Io`] for one that cannot be read.
+    pub fn digest_of_data(&self) -> Result<[u8; 32], Error> {
+        let mut hasher = Sha256::new();
+        for path in self.files().into_iter().skip(1) {
+            let copied = File::open(&path).and_then(|mut file| {
+                let mut buffer = vec![0; 1 << 20];
+                loop {
+                    match file.read(&mut buffer)? {
+                        0 => return Ok(()),
+                        n => hasher.update(&buffer[..n]),
+                    }
+                }
+            });
+            copied.map_err(|source| Error::Io { path, action: "cannot read", source })?;
+        }
+        Ok(hasher.finalize().into())
     }
 }
 

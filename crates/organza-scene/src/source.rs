@@ -1,6 +1,6 @@
 //! Where an object's data comes from, checked: files, expressions and shapes.
 
-use convert::{CloudShape, Ellipsoid, Inside, Interpolation};
+use convert::{CloudShape, Ellipsoid, HomogeneousMedium, Inside, Interpolation, Rectangle};
 use glam::DVec3;
 use splat_core::{DAabb, TransferFunction};
 use std::path::{Path, PathBuf};
@@ -27,9 +27,9 @@ pub enum Source {
     /// A procedural cloud.
     Cloud(CloudSource),
     /// A plane.
-    Rectangle(RectangleSource),
+    Rectangle(Rectangle),
     /// A homogeneous medium.
-    Medium(MediumShape),
+    Medium(HomogeneousMedium),
 }
 
 impl Source {
@@ -151,60 +151,6 @@ impl CloudSource {
             extinction: self.extinction,
             base: None,
             ..CloudShape::default()
-        }
-    }
-}
-
-/// A flat parallelogram. Lengths are before the object's transform.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RectangleSource {
-    /// Centre.
-    pub center: DVec3,
-    /// First half-axis.
-    pub u: DVec3,
-    /// Second half-axis, not parallel to the first.
-    pub v: DVec3,
-    /// Distance between splats.
-    pub spacing: f64,
-}
-
-/// A homogeneous medium. Lengths are before the object's transform.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum MediumShape {
-    /// An axis-aligned box.
-    Box {
-        /// The box.
-        bounds: DAabb,
-        /// Extinction σ_t, 1/world unit.
-        extinction: f64,
-        /// Distance between splats.
-        spacing: f64,
-    },
-    /// A ball.
-    Ball {
-        /// Centre.
-        center: DVec3,
-        /// Radius, > 0.
-        radius: f64,
-        /// Extinction σ_t, 1/world unit.
-        extinction: f64,
-        /// Distance between splats.
-        spacing: f64,
-    },
-}
-
-impl MediumShape {
-    /// Distance between splats.
-    pub fn spacing(&self) -> f64 {
-        match self {
-            Self::Box { spacing, .. } | Self::Ball { spacing, .. } => *spacing,
-        }
-    }
-
-    /// Extinction σ_t, 1/world unit.
-    pub fn extinction(&self) -> f64 {
-        match self {
-            Self::Box { extinction, .. } | Self::Ball { extinction, .. } => *extinction,
         }
     }
 }

@@ -2,21 +2,18 @@
 //! colour. None is an error, and none is said of an [animation]: there things come into view and fade.
 
 use crate::load::{Loaded, own::Own};
-use crate::output::displayed;
 use crate::plan::Plan;
-use crate::scene::{Scene, SceneLight, SceneObject};
+use crate::scene::{Scene, SceneLight};
 use crate::{Layers, ShadowTable, escape_controls};
 use glam::DVec3;
 use rayon::prelude::*;
-use splat_core::{DAabb, Shading};
+use splat_core::DAabb;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// Most objects outside the view that are told one by one.
 const TOLD: usize = 4;
 /// Splats that are looked at together.
 const CHUNK: usize = 1 << 14;
-/// Middle grey, which an exposure is proposed for.
-const GREY: f64 = 0.18;
 
 /// What can be told of a scene before it is drawn, one sentence each.
 pub(crate) fn of_scene(scene: &Scene, loaded: &Loaded) -> Vec<String> {
@@ -29,45 +26,12 @@ pub(crate) fn of_scene(scene: &Scene, loaded: &Loaded) -> Vec<String> {
 
 /// What a finished picture shows too little of.
 pub(crate) fn of_picture(scene: &Scene, layers: &Layers) -> Option<String> {
-    let beauty = layers.rgb("beauty").filter(|b| scene.frames.is_none() && !b.is_empty())?;
-    let gain = libm::exp2(scene.render.exposure) as f32;
-    let all =
-        |byte: u8| beauty.par_chunks(CHUNK).all(|part| part.iter().flatten().all(|v| displayed(v * gain) == byte));
-    let stops = |radiance: f32| libm::log2(GREY / f64::from(radiance)).round();
-    if all(0) {
-        let brightest = beauty.iter().flatten().fold(0.0, |most, v| f32::max(most, *v));
-        return Some(if brightest > 0.0 {
-            let stops = stops(brightest);
-            format!("the picture is all black: its brightest radiance is {brightest:.1e}; try --exposure {stops}")
-        } else {
-            "the picture is all black: no light comes from what the camera sees; move or strengthen a [[light]], or add \
-             [ambient]"
-                .to_owned()
-        });
-    }
-    all(255).then(|| {
-        let darkest = beauty.iter().flatten().fold(f32::INFINITY, |least, v| f32::min(least, *v));
-        let stops = if darkest.is_finite() { stops(darkest) } else { -60.0 };
-        format!("the picture is all white: its darkest radiance is {darkest:.1e}; try --exposure {stops}")
-    })
+    let beauty = layers.rgb("beauty").filter(|_| scene.frames.is_none())?;
+    crate::output::doubt(beauty, scene.render.exposure)
 }
 
 fn without_light(scene: &Scene) -> Option<String> {
-    let material = |o: &SceneObject| &scene.materials[o.material].material;
-    // Clear glass shows what is around it, and reflects nothing of its own.
-    let is_clear = |o: &SceneObject| {
-        material(o).bounds_matter() && o.opacity.unwrap_or(scene.materials[o.material].opacity) == 0.0
-    };
-    let drawn = || scene.objects.iter().filter(|o| o.visible && !is_clear(o));
-    let shines =
-        drawn().any(|o| material(o).shading == Shading::Unlit || material(o).emission.iter().any(|e| *e > 0.0));
-    let reflects = drawn().any(|o| match material(o).shading {
-        Shading::Phase => material(o).single_scattering_albedo > 0.0,
-        _ => material(o).diffuse > 0.0 || material(o).specular > 0.0 || material(o).transmission > 0.0,
-    });
-    let lit = scene.lights.iter().any(|l| l.light.intensity.iter().any(|i| *i > 0.0))
-        || scene.ambient.iter().any(|a| *a > 0.0) && drawn().any(|o| material(o).ambient > 0.0);
-    (reflects && !shines && !lit).then(|| {
+    scene.lacks_light().then(|| {
         "the scene has no light: add a [[light]], a `color` in [ambient], or a material with `emission` or shading = \
          \"unlit\""
             .to_owned()

@@ -10,11 +10,9 @@ use crate::scene::{Scene, Technique};
 use crate::technique::{Finished, Fold, Session};
 use crate::work::{self, Stages, Translucent, cost};
 use crate::{CostRecord, Error, Layers, Progress, RenderOptions, stage};
+use splat_core::raster::{self, Expected};
 use splat_core::{LayerData, SplatKind};
 use std::ops::Range;
-
-/// Splats whose footprints stand for all.
-const LOOKED_AT: usize = 4096;
 
 /// Runs the planned passes of a frame, and keeps the layers that its scene asks for.
 pub(crate) fn draw(frame: &Frame<'_>, session: &mut Session<'_>, cost: &mut CostRecord) -> Result<Layers, Error> {
@@ -98,8 +96,8 @@ fn stages(frame: &Frame<'_>) -> Stages {
     let (loaded, plan, scene) = (frame.loaded, frame.plan, frame.scene);
     let maps = plan.tables().count();
     let all = loaded.cloud.len() as f64;
-    let opaque = Count::of(frame, None);
-    let of: Vec<(Technique, Count)> = plan.techniques.iter().map(|t| (*t, Count::of(frame, Some(*t)))).collect();
+    let opaque = expected(frame, None);
+    let of: Vec<(Technique, Expected)> = plan.techniques.iter().map(|t| (*t, expected(frame, Some(*t)))).collect();
     let mut stages: Stages = (1..=maps).map(|k| (work::shadow_map(k, maps), cost::CAST * all)).collect();
     let mut add = |name: &str, seconds: f64| stages.push((name.to_owned(), seconds));
     let mut drawn = opaque.splats;
@@ -123,40 +121,15 @@ fn stages(frame: &Frame<'_>) -> Stages {
     stages
 }
 
-/// Splats of a kind and the fragments of their footprints.
-struct Count {
-    splats: f64,
-    fragments: f64,
+/// The opaque splats in view, or the translucent ones of a technique, and the fragments of their footprints, about.
+fn expected(frame: &Frame<'_>, technique: Option<Technique>) -> Expected {
+    let cloud = &frame.loaded.cloud;
+    raster::expected(cloud, &frame.camera, |i| match technique {
+        None => cloud.kind[i] == SplatKind::Opaque,
+        Some(t) => cloud.kind[i] != SplatKind::Opaque && frame.plan.by[cloud.object[i] as usize] == t,
+    })
 }
 
-impl Count {
-    /// The opaque ones, or the translucent ones of a technique; from splats at even distances in the list.
-    fn of(frame: &Frame<'_>, technique: Option<Technique>) -> Self {
-        let (cloud, camera) = (&frame.loaded.cloud, &frame.camera);
-        let is_one = |i: &usize| match technique {
-            None => cloud.kind[*i] == SplatKind::Opaque,
-            Some(t) => cloud.kind[*i] != SplatKind::Opaque && frame.plan.by[cloud.object[*i] as usize] == t,
-        };
-        let (place, focal) = (camera.view_from_offset(cloud.origin), camera.focal_px());
-        let picture = camera.size.iter().map(|s| f64::from(*s)).product::<f64>();
-        let footprint = |i: usize| {
-            let p = place.apply(cloud.position[i]).as_dvec3();
-            let near = if camera.is_orthographic() { 1.0 } else { p.z.max(f64::from(cloud.radius[i])) };
-            let radius = focal * f64::from(cloud.radius[i]) / near;
-            let at = |v: f64| (focal * v / near).abs() - radius;
-            let half = camera.size.map(|s| 0.5 * f64::from(s));
-            let seen = p.z > 0.0 && at(p.x) < half[0] && at(p.y) < half[1];
-            if seen { (std::f64::consts::PI * radius * radius).clamp(4.0, picture) } else { 0.0 }
-        };
-        let stride = cloud.len().div_ceil(LOOKED_AT).max(1);
-        let (mut splats, mut fragments) = (0.0, 0.0);
-        for i in (0..cloud.len()).step_by(stride).filter(is_one) {
-            splats += stride as f64;
-            fragments += stride as f64 * footprint(i);
-        }
-        Self { splats, fragments }
-    }
-}
 /// Depths back into the scene's unit.
 fn restore_depths(layers: &mut Layers, exponent: i32) {
     let scale = libm::exp2(f64::from(exponent)) as f32;

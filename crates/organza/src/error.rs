@@ -139,20 +139,6 @@ impl Error {
         }
     }
 
-    /// An error of a conversion; it knows the object, but not the file that the object came from.
-    pub fn from_convert(error: &convert::ConvertError) -> Self {
-        use convert::ConvertError;
-        match error {
-            ConvertError::Limit(e) => Self::Limit(Exceeded {
-                what: shown(&e.what).into(),
-                hint: "use a larger spacing, or a larger --max-memory or render.max_points".into(),
-                ..e.clone()
-            }),
-            ConvertError::Cancelled => Self::Cancelled,
-            other => Self::input(Self::OF_SCENE, other.to_string(), ""),
-        }
-    }
-
     /// The same error, naming the file of an object where it names no more than the scene: errors of conversions know the
     /// object and its element, but not where the data came from.
     pub(crate) fn in_object(self, scene: &Path, file: Option<&Path>) -> Self {
@@ -201,6 +187,22 @@ impl Error {
             Self::Io { source, .. } if source.kind() == std::io::ErrorKind::StorageFull => "free some space",
             Self::Io { .. } | Self::Cancelled => "",
             Self::Internal(_) => "this is a bug in Organza, please report it",
+        }
+    }
+}
+
+/// An error of a conversion; it knows the object, but not the file that the object came from.
+impl From<convert::ConvertError> for Error {
+    fn from(error: convert::ConvertError) -> Self {
+        use convert::ConvertError;
+        match error {
+            ConvertError::Limit(e) => Self::Limit(Exceeded {
+                what: shown(&e.what).into(),
+                hint: "use a larger spacing, or a larger --max-memory or render.max_points".into(),
+                ..e
+            }),
+            ConvertError::Cancelled => Self::Cancelled,
+            other => Self::input(Self::OF_SCENE, other.to_string(), ""),
         }
     }
 }

@@ -51,15 +51,13 @@ pub struct Frame<'a> {
 impl<'a> Frame<'a> {
     /// A frame by the processor, with nothing made yet. `plan` is that of [`plan_loaded`](crate::plan_loaded) for the same scene.
     pub fn new(scene: &'a Scene, loaded: &'a Loaded, plan: &'a Plan, progress: &'a Progress) -> Self {
-        let mut camera = loaded.camera;
-        camera.size = camera.size.map(|s| s * scene.render.antialias);
         Self {
             scene,
             settings: &scene.render,
             loaded,
             plan,
             layers: scene.render.layers.set(),
-            camera,
+            camera: loaded.camera.with_samples(scene.render.antialias),
             helper: None,
             device_composites: false,
             progress,

@@ -4,10 +4,9 @@ use crate::Error;
 use crate::load::own::Own;
 use crate::load::{BYTES_PER_SPLAT, Loaded};
 use crate::scene::Scene;
-use glam::Vec3;
-use rayon::prelude::*;
+use splat_core::raster;
 use splat_core::shade::ChannelLayout;
-use splat_core::{Camera, Cloud, DepthProfile, Environment, Exceeded, Grid};
+use splat_core::{Camera, DepthProfile, Environment, Exceeded, Grid};
 
 /// Bytes that a point of a lattice that is made of an object is counted with.
 const BYTES_PER_LATTICE_POINT: u64 = 32;
@@ -32,8 +31,7 @@ pub(crate) struct Memory {
 impl Memory {
     /// That of a loaded scene without shadow maps, `average` by its particles.
     pub(crate) fn new(scene: &Scene, loaded: &Loaded, average: u64) -> Self {
-        let mut camera = loaded.camera;
-        camera.size = camera.size.map(|s| s.saturating_mul(scene.render.antialias));
+        let camera = loaded.camera.with_samples(scene.render.antialias);
         Self {
             image: image_bytes(scene),
             splats: splat_bytes(loaded, &camera, layout(scene)),
@@ -65,8 +63,7 @@ fn layout(scene: &Scene) -> ChannelLayout {
 /// Bytes of the accumulators and layers.
 pub(crate) fn image_bytes(scene: &Scene) -> u64 {
     let set = scene.render.layers.set();
-    let pixels = scene.camera.size.iter().map(|s| u64::from(*s)).product::<u64>();
-    let samples = pixels * u64::from(scene.render.antialias).pow(2);
+    let (pixels, samples) = (scene.camera.pixels(), scene.camera.with_samples(scene.render.antialias).pixels());
     let channels = 4 * layout(scene).count() as u64;
     let profile = if set.depth { size_of::<DepthProfile>() as u64 } else { 0 };
     // Up to three optical depths, and an object.
@@ -91,35 +88,7 @@ pub(crate) fn loading_bytes(loaded: &Loaded, inputs: u64) -> u64 {
 /// Bytes of what is made for each splat: its attributes, order, footprint, tile entries and values.
 fn splat_bytes(loaded: &Loaded, camera: &Camera, layout: ChannelLayout) -> u64 {
     let values = 4 * layout.count() as u64;
-    loaded.cloud.bytes() + loaded.cloud.len() as u64 * (8 + 64 + values) + tile_bytes(&loaded.cloud, camera)
-}
-
-/// Bytes of the lists of splats by tile: how many tiles a splat reaches depends on how near it is.
-fn tile_bytes(cloud: &Cloud, camera: &Camera) -> u64 {
-    /// Side of a tile, pixels.
-    const TILE: f32 = 32.0;
-    /// Splats that are listed, and counted, together.
-    const CHUNK: usize = 1 << 15;
-    let [columns, rows] = camera.size.map(|s| (s as f32 / TILE).ceil());
-    let (view, focal) = (camera.view_from_offset(cloud.origin), camera.focal_px() as f32);
-    let tiles = |(position, radius): (&Vec3, &f32)| {
-        let nearest = view.depth(*position) - radius;
-        let radius_px = if camera.is_orthographic() {
-            radius * focal
-        } else if nearest > 0.0 {
-            radius * focal / nearest
-        } else {
-            f32::INFINITY
-        };
-        // A footprint begins anywhere in a tile.
-        let side = 2.0 * radius_px / TILE + 1.0;
-        let behind = !camera.is_orthographic() && nearest + 2.0 * radius <= 0.0;
-        if behind { 0.0 } else { f64::from(side.min(columns) * side.min(rows)) }
-    };
-    let lists = cloud.position.par_chunks(CHUNK).zip(cloud.radius.par_chunks(CHUNK));
-    let entries: Vec<f64> = lists.map(|(p, r)| p.iter().zip(r).map(tiles).sum()).collect();
-    let starts = entries.len() as f64 * f64::from(columns * rows);
-    (4.0 * (entries.into_iter().sum::<f64>() + starts)) as u64
+    loaded.cloud.bytes() + loaded.cloud.len() as u64 * (8 + 64 + values) + raster::tile_bytes(&loaded.cloud, camera)
 }
 
 /// Bytes of what particles are sampled from, files that objects share once, and of the tables for that.

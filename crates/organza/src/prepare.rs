@@ -151,8 +151,7 @@ fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Resu
     let used = statistics.techniques.iter().filter(|t| statistics.translucent_of(**t).is_some());
     // They take turns, and each keeps what it has.
     let points = lights::points(&loaded.lights);
-    let mut camera = loaded.camera;
-    camera.size = camera.size.map(|s| s.saturating_mul(scene.render.antialias));
+    let camera = loaded.camera.with_samples(scene.render.antialias);
     let matter =
         Matter { scene, own: &loaded.own, planned: &plan.objects, cloud: Some(&loaded.cloud), camera: &camera };
     let own = used.map(|t| (row(*t).bytes)(&matter, &points, statistics.colored_extinction, options)).sum();

@@ -86,7 +86,7 @@ pub(crate) fn of_counts(
 
 /// Samples of the picture.
 pub(crate) fn samples(scene: &Scene) -> f64 {
-    scene.camera.size.iter().map(|s| f64::from(*s * scene.render.antialias)).product()
+    scene.camera.with_samples(scene.render.antialias).pixels() as f64
 }
 
 /// What is translucent of a technique.

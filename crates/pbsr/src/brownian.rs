@@ -85,6 +85,23 @@ pub struct BrownianReport {
     pub refused: f64,
 }
 
+/// Relative error of a counted area up to which nothing is said; that of the area by lines is a few percent.
+const MISCOUNTED: f64 = 0.1;
+
+impl BrownianReport {
+    /// Where counting spheres count another area than there is, in words.
+    pub fn doubt(&self) -> Option<String> {
+        let more = self.area / self.area_by_lines - 1.0;
+        (more.abs() > MISCOUNTED).then(|| {
+            format!(
+                "its Brownian motion counts {:+.0} % of area, and is that much too dense, for borders or bends lie within a \
+                 counting sphere",
+                100.0 * more
+            )
+        })
+    }
+}
+
 /// Particles on an implicit surface, by Brownian motion.
 pub struct BrownianSampler<'a> {
     surface: ImplicitSurface<'a>,

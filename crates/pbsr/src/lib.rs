@@ -79,6 +79,7 @@ pub mod reference;
 mod render;
 mod roots;
 mod sampler;
+mod segment;
 mod shade;
 mod splats;
 mod stream;

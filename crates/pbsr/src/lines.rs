@@ -75,7 +75,20 @@ impl LineReport {
         let unseen = self.fine_roots.saturating_sub(self.roots) as f64 / self.fine_roots.max(1) as f64;
         unseen + self.stray_area / (self.area + self.stray_area).max(f64::MIN_POSITIVE)
     }
+
+    /// What the survey could not settle, in words.
+    pub fn doubts(&self) -> impl Iterator<Item = String> {
+        let broken = (self.broken > 0)
+            .then(|| format!("its field is not finite on {} pieces of {} lines", self.broken, self.lines));
+        let percent = 100.0 * self.missed();
+        let missed = (self.missed() > MISSED)
+            .then(|| format!("lines miss {percent:.2} % of its surface, which has no bound or a fine fold"));
+        broken.into_iter().chain(missed)
+    }
 }
+
+/// Share of the roots of a surface that may be missed before it is said.
+const MISSED: f64 = 1e-3;
 
 /// How an implicit surface is looked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

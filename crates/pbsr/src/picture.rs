@@ -107,7 +107,7 @@ impl Ensemble {
         let behind = solid.unwrap_or_else(|| background(x as u32, y as u32)).map(f64::from);
         let open = hits.map(|hits| (levels - hits) / levels);
         let mean = |c: usize| self.sum(at, c) / levels;
-        let mut pixel = Pixel { std_error: self.std_error(at, behind) as f32, object: u32::MAX, ..Pixel::default() };
+        let mut pixel = Pixel { std_error: self.error_at(at, behind) as f32, object: u32::MAX, ..Pixel::default() };
         let effects = self.params.light_channels() / 3;
         for c in 0..3 {
             pixel.behind[c] = (behind[c] * open[c]) as f32;
@@ -142,7 +142,7 @@ impl Ensemble {
     }
 
     /// Standard error of the luminance of one pixel in tile order; infinite below two sets.
-    fn std_error(&self, at: usize, behind: [f64; 3]) -> f64 {
+    fn error_at(&self, at: usize, behind: [f64; 3]) -> f64 {
         if self.levels < 2 {
             return f64::INFINITY;
         }
@@ -181,7 +181,7 @@ impl Ensemble {
             for x in 0..w {
                 let solid = occluder.and_then(|o| self.solid(o, y * w + x));
                 let behind = solid.unwrap_or_else(|| background(x as u32, y as u32)).map(f64::from);
-                sum += self.std_error(self.tiling.index(x, y), behind).powi(2);
+                sum += self.error_at(self.tiling.index(x, y), behind).powi(2);
             }
         }
         (sum / (w * h) as f64).sqrt()

@@ -104,6 +104,26 @@ impl Camera {
         Ok(Self { position, axes: [right, right.cross(forward), forward], projection, size })
     }
 
+    /// The same view with `antialias` times the pixels along each side, a sample each.
+    #[must_use]
+    pub fn with_samples(mut self, antialias: u32) -> Self {
+        self.size = self.size.map(|s| s.saturating_mul(antialias));
+        self
+    }
+
+    /// Number of pixels.
+    pub fn pixels(&self) -> u64 {
+        u64::from(self.size[0]) * u64::from(self.size[1])
+    }
+
+    /// Multiplies all lengths by `scale`: the same picture of a world that is scaled alike.
+    pub fn scale_world(&mut self, scale: f64) {
+        self.position *= scale;
+        if let Projection::Orthographic { height } = &mut self.projection {
+            *height *= scale;
+        }
+    }
+
     /// View position of a world position: x right, y up, z depth.
     pub fn view_from_world(&self, p: DVec3) -> DVec3 {
         let d = p - self.position;

@@ -252,6 +252,16 @@ impl Cloud {
         Aabb::of_points(&self.position)
     }
 
+    /// Multiplies all lengths by `scale`, cross-sections by its square.
+    pub fn scale_world(&mut self, scale: f64) {
+        let (length, area) = (scale as f32, (scale * scale) as f32);
+        self.origin *= scale;
+        self.position.iter_mut().for_each(|p| *p *= length);
+        self.radius.iter_mut().for_each(|r| *r *= length);
+        self.tangent.iter_mut().for_each(|t| *t *= length);
+        self.cross_section.iter_mut().for_each(|k| *k *= area);
+    }
+
     /// Checks every promise that the stages rely on: equal column lengths, finite values, radii > 0, K ≥ 0, unit or
     /// zero normals, coefficients in \[0, 1\].
     ///

@@ -36,6 +36,16 @@ impl Grid {
         self.axes.determinant().abs()
     }
 
+    /// Bytes held by the values.
+    pub fn bytes(&self) -> u64 {
+        size_of_val(self.values.as_slice()) as u64
+    }
+
+    /// Length of the shortest step along a side of a cell.
+    pub fn shortest_step(&self) -> f64 {
+        [self.axes.x_axis, self.axes.y_axis, self.axes.z_axis].iter().fold(f64::INFINITY, |s, a| s.min(a.length()))
+    }
+
     /// Checks dimensions against the values, finite values and a lattice that spans space.
     ///
     /// # Errors

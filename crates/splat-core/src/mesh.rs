@@ -43,6 +43,12 @@ impl Mesh {
         DAabb::of_points(self.triangles.iter().flatten().map(|v| self.origin + self.position[*v as usize].as_dvec3()))
     }
 
+    /// Bytes held by vertices and indices.
+    pub fn bytes(&self) -> u64 {
+        let vertices = size_of_val(self.position.as_slice()) + size_of_val(self.normal.as_slice());
+        (vertices + size_of_val(self.color.as_slice()) + size_of_val(self.triangles.as_slice())) as u64
+    }
+
     /// Checks column lengths, finite positions and index range.
     ///
     /// # Errors

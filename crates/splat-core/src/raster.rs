@@ -15,6 +15,7 @@
 
 mod append;
 pub mod bins;
+mod cost;
 mod finish;
 mod gather;
 #[cfg(feature = "gpu")]
@@ -30,6 +31,7 @@ pub mod tile;
 mod translucent;
 pub mod triangles;
 
+pub use cost::{Expected, expected, tile_bytes};
 pub use finish::{Background, FinishInput, GlassImage, finish};
 pub use opaque::{OpaqueImage, OpaqueInput, resolve_opaque};
 pub use project::{ProjectInput, project, project_into};

@@ -1,7 +1,7 @@
 //! The knobs of the technique `points` (Gunjee 2007).
 
 use super::{Knob, Options, Request, Skipped, Step, Sweep, Theory};
-use organza::scene::{MediumShape, Scene, SceneObject, ShadowMapping, Source, Technique};
+use organza::scene::{Scene, SceneObject, ShadowMapping, Source, Technique};
 use splat_core::{LightShape, raster::Accumulation};
 
 /// What has to be known of a loaded scene to choose the steps.
@@ -313,7 +313,7 @@ fn spacing_of(object: &mut SceneObject) -> Option<&mut f64> {
         Source::Density(density) => Some(&mut density.spacing),
         Source::Cloud(cloud) => Some(&mut cloud.spacing),
         Source::Rectangle(rectangle) => Some(&mut rectangle.spacing),
-        Source::Medium(MediumShape::Box { spacing, .. } | MediumShape::Ball { spacing, .. }) => Some(spacing),
+        Source::Medium(medium) => Some(&mut medium.spacing),
         // What lies between points is no field that finer ones would approach.
         Source::Points(_) => None,
     }

@@ -3,7 +3,7 @@
 use convert::read::Loaded as FileData;
 use convert::{ExpressionField, SplatParams};
 use glam::{DMat3, DQuat, DVec3, Vec3};
-use organza::scene::{MediumShape, Scene, SceneMaterial, SceneObject, Source, VolumeSource};
+use organza::scene::{Scene, SceneMaterial, SceneObject, Source, VolumeSource};
 use organza::{Error, RenderOptions, expression_field, printable};
 use reference::{
     Classified, ColorAt, Density, Dielectric, Lattice, Liberty, Medium, Placed, Surface, SurfaceKind, SurfaceMaterial,
@@ -87,8 +87,7 @@ pub(super) fn body(
         Source::Implicit(i) => {
             let field = expression_field(&i.expression, object)?;
             let params = SplatParams { object_name: object.name.clone(), ..SplatParams::default() };
-            convert::field_to_mesh(&field, i.bounds, i.spacing * FINER, &params, None)
-                .map_err(|e| Error::from_convert(&e))?
+            convert::field_to_mesh(&field, i.bounds, i.spacing * FINER, &params, None)?
         }
         Source::Rectangle(r) => Mesh::rectangle(r.center, r.u, r.v),
         Source::Medium(_) => return medium(scene, object, options).map(Ok),
@@ -180,22 +179,25 @@ fn medium(scene: &Scene, object: &SceneObject, options: &RenderOptions) -> Resul
 fn shape(object: &SceneObject, options: &RenderOptions) -> Result<(Shape, f64), Error> {
     let t = object.transform;
     Ok(match &object.source {
-        Source::Medium(MediumShape::Ball { center, radius, extinction, .. }) => {
-            (Shape::Ball { center: t.apply(*center), radius: radius * t.scale }, *extinction)
-        }
-        Source::Medium(MediumShape::Box { bounds: own, extinction, .. }) => {
-            let bounds = DAabb::of_points(own.corners().map(|p| t.apply(p)));
-            let shape = if t.rotation == DQuat::IDENTITY {
-                Shape::Box(bounds)
-            } else {
-                Shape::Turned { field: TurnedBox::new(*own, t), bounds }
+        Source::Medium(medium) => {
+            let shape = match medium.body {
+                convert::MediumBody::Ball { center, radius } => {
+                    Shape::Ball { center: t.apply(center), radius: radius * t.scale }
+                }
+                convert::MediumBody::Box(own) => {
+                    let bounds = DAabb::of_points(own.corners().map(|p| t.apply(p)));
+                    if t.rotation == DQuat::IDENTITY {
+                        Shape::Box(bounds)
+                    } else {
+                        Shape::Turned { field: TurnedBox::new(own, t), bounds }
+                    }
+                }
             };
-            (shape, *extinction)
+            (shape, medium.extinction)
         }
         Source::Cloud(cloud) => {
             let params = SplatParams { object_name: object.name.clone(), ..SplatParams::default() };
-            let grid = convert::procedural_cloud(&cloud.shape(), cloud.spacing * FINER, &params, None);
-            let mut grid = grid.map_err(|e| Error::from_convert(&e))?;
+            let mut grid = convert::procedural_cloud(&cloud.shape(), cloud.spacing * FINER, &params, None)?;
             grid.origin = t.apply(grid.origin);
             grid.axes = DMat3::from_quat(t.rotation) * grid.axes * t.scale;
             (Shape::Grid(grid), 1.0)

@@ -155,8 +155,7 @@ impl Frame<'_> {
         let opaque = self.opaque(cost)?;
         self.progress.begin(stage::FINISH);
         cost.measure(pass::FINISH, |stage| {
-            let [width, height] = accumulator.size;
-            stage.items_in = u64::from(width) * u64::from(height);
+            stage.items_in = self.camera.pixels();
             let antialias = self.settings.antialias;
             Ok::<_, Error>(raster::finish(&FinishInput {
                 accumulator,

@@ -143,29 +143,10 @@ fn add(all: &RefCell<Vec<String>>, sentences: impl IntoIterator<Item = String>) 
 impl FileData {
     fn bytes(&self) -> u64 {
         match self {
-            Self::Mesh(mesh) => mesh_bytes(mesh),
-            Self::Points(points) => points_bytes(points),
-            Self::Grid(grid) => grid_bytes(grid),
+            Self::Mesh(mesh) => mesh.bytes(),
+            Self::Points(points) => points.bytes(),
+            Self::Grid(grid) => grid.bytes(),
             Self::Image(image) => image.bytes(),
         }
     }
-}
-
-/// Bytes of a mesh.
-pub(super) fn mesh_bytes(mesh: &Mesh) -> u64 {
-    let bytes = size_of_val(mesh.position.as_slice())
-        + size_of_val(mesh.normal.as_slice())
-        + size_of_val(mesh.color.as_slice())
-        + size_of_val(mesh.triangles.as_slice());
-    bytes as u64
-}
-
-/// Bytes of raw points: position, normal, colour, value, opacity, class and integers at most.
-pub(super) fn points_bytes(points: &RawPoints) -> u64 {
-    64 * points.len() as u64
-}
-
-/// Bytes of a volume.
-pub(super) fn grid_bytes(grid: &Grid) -> u64 {
-    size_of_val(grid.values.as_slice()) as u64
 }

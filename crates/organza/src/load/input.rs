@@ -1,18 +1,16 @@
 //! What an object is made from: files read, formulas parsed, with the parameters of the conversion.
 
 use super::context::Context;
-use super::files::{FileData, Fitted, grid_bytes, mesh_bytes, points_bytes};
+use super::files::{FileData, Fitted};
 use crate::Error;
 use crate::scene::{
-    DensitySource, ImplicitSource, LevelSetSource, MediumShape, RectangleSource, SceneObject, SliceSource, Source,
-    SurfaceSampler, VolumeSource,
+    DensitySource, ImplicitSource, LevelSetSource, SceneObject, SliceSource, Source, SurfaceSampler, VolumeSource,
 };
 use crate::statistics::ObjectData;
 use convert::{
-    ClippedField, CloudShape, Density, DensityParams, ExpressionField, GridField, Interpolation, MeshParams, MpuParams,
-    RawPoints, Section, SharedField, SplatParams, SurfelParams, VolumeParams,
+    ClippedField, CloudShape, Density, DensityParams, ExpressionField, GridField, HomogeneousMedium, Interpolation,
+    MediumBody, MeshParams, MpuParams, RawPoints, Section, SharedField, SplatParams, SurfelParams, VolumeParams,
 };
-use glam::DVec3;
 use pbsr::{BoundedExtinction, Matter};
 use splat_core::{DAabb, Grid, Mesh, TransferFunction};
 use std::path::Path;
@@ -31,17 +29,17 @@ pub(super) enum Input<'a> {
     Surface(SharedField, DAabb, MeshParams, Option<(Arc<Grid>, f32)>),
     Density(SharedField, DAabb, DensityParams),
     Procedural(CloudShape, f64, VolumeParams),
-    Medium(MediumShape, SplatParams),
-    Rectangle(RectangleSource, f64, SplatParams),
+    Medium(HomogeneousMedium, SplatParams),
+    Rectangle(convert::Rectangle, f64, SplatParams),
 }
 
 impl Input<'_> {
     /// Bytes that it holds.
     pub(super) fn bytes(&self) -> u64 {
         match self {
-            Self::Mesh(_, mesh, _) => mesh_bytes(mesh),
-            Self::Points(_, points, _) => points_bytes(points),
-            Self::Volume(grid, ..) => grid_bytes(grid),
+            Self::Mesh(_, mesh, _) => mesh.bytes(),
+            Self::Points(_, points, _) => points.bytes(),
+            Self::Volume(grid, ..) => grid.bytes(),
             _ => 0,
         }
     }
@@ -94,13 +92,12 @@ impl Input<'_> {
             Self::Density(field, bounds, params) if !params.volume.normals => {
                 BoundedExtinction::new(Matter::Density(field.clone()), params.extinction * scale, *bounds)
             }
-            Self::Medium(MediumShape::Box { bounds, extinction, .. }, _) => {
-                BoundedExtinction::new(Matter::Everywhere, extinction * scale, *bounds)
-            }
-            Self::Medium(MediumShape::Ball { center, radius, extinction, .. }, _) => {
-                let matter = Matter::Ball { center: *center, radius: *radius };
-                let bounds = DAabb::around(*center, DVec3::splat(*radius));
-                BoundedExtinction::new(matter, extinction * scale, bounds)
+            Self::Medium(medium, _) => {
+                let matter = match medium.body {
+                    MediumBody::Box(_) => Matter::Everywhere,
+                    MediumBody::Ball { center, radius } => Matter::Ball { center, radius },
+                };
+                BoundedExtinction::new(matter, medium.extinction * scale, medium.body.bounds())
             }
             _ => None,
         }
@@ -145,7 +142,7 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
         }
         Source::Isosurface(source) => {
             let grid = read_grid(&source.path, context)?;
-            let step = shortest_step(&grid);
+            let step = grid.shortest_step();
             let trilinear =
                 (source.interpolation == Interpolation::Trilinear).then(|| (grid.clone(), source.level as f32));
             let field = GridField::new(grid, source.interpolation, source.level, source.inside)
@@ -168,7 +165,7 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
             Input::Density(Arc::new(expression_field(expression, object)?), *bounds, params)
         }
         Source::Cloud(cloud) => Input::Procedural(cloud.shape(), cloud.spacing, context.volume_params(splat)),
-        Source::Medium(shape) => Input::Medium(*shape, splat),
+        Source::Medium(medium) => Input::Medium(*medium, splat),
         Source::Rectangle(r) => Input::Rectangle(*r, opacity, splat),
     })
 }
@@ -182,10 +179,9 @@ fn slice<'a>(
     context: &Context<'_>,
 ) -> Result<Input<'a>, Error> {
     let grid = read_grid(&source.path, context)?;
-    let spacing = object.spacing.map_or_else(|| shortest_step(&grid), |s| s / splat.transform.scale);
+    let spacing = object.spacing.map_or_else(|| grid.shortest_step(), |s| s / splat.transform.scale);
     let section = Section { center: source.center, normal: source.normal, spacing };
-    let mesh = convert::volume_section(grid, &source.transfer, &section, &splat, Some(context.progress))
-        .map_err(|e| Error::from_convert(&e))?;
+    let mesh = convert::volume_section(grid, &source.transfer, &section, &splat, Some(context.progress))?;
     let density = Density::Spacing(spacing * splat.transform.scale);
     Ok(Input::Mesh(crate::printable(&source.path), mesh.into(), MeshParams { splat, density, opacity }))
 }
@@ -198,9 +194,7 @@ fn at_spacing<T>(
     change: impl Fn(&T, f64, &SplatParams) -> Result<T, convert::ConvertError>,
 ) -> Result<Arc<T>, Error> {
     match object.spacing {
-        Some(spacing) => {
-            change(&data, spacing / splat.transform.scale, splat).map(Arc::new).map_err(|e| Error::from_convert(&e))
-        }
+        Some(spacing) => Ok(change(&data, spacing / splat.transform.scale, splat)?.into()),
         None => Ok(data),
     }
 }
@@ -233,10 +227,6 @@ fn surface<'a>(zero: ZeroSet, object: &SceneObject, splat: SplatParams, opacity:
     ))
 }
 
-pub(super) fn shortest_step(grid: &Grid) -> f64 {
-    [grid.axes.x_axis, grid.axes.y_axis, grid.axes.z_axis].iter().fold(f64::INFINITY, |s, a| s.min(a.length()))
-}
-
 fn refuse_data(path: &Path, error: &splat_core::Error) -> Error {
     Error::input(crate::printable(path), error.to_string(), "")
 }
@@ -247,8 +237,7 @@ fn level_set(source: &LevelSetSource, object: &SceneObject, context: &Context<'_
         let params =
             MpuParams { object_name: object.name.clone(), tolerance: source.tolerance, ..MpuParams::default() };
         let points = read_scattered(&source.path, context)?;
-        let (field, _) =
-            convert::points_to_field(&points, &params, Some(context.progress)).map_err(|e| Error::from_convert(&e))?;
+        let (field, _) = convert::points_to_field(&points, &params, Some(context.progress))?;
         let (bounds, bytes) = (field.bounds(), field.bytes());
         Ok(((Arc::new(field) as SharedField, bounds), bytes))
     })
@@ -265,16 +254,7 @@ fn read_scattered(path: &Path, context: &Context<'_>) -> Result<Arc<RawPoints>, 
         }
         FileData::Mesh(mesh) => {
             mesh.validate().map_err(|e| refuse_data(path, &e))?;
-            let normal = if mesh.normal.is_empty() { convert::vertex_normals(&mesh) } else { mesh.normal.clone() };
-            // A vertex without a triangle has no normal, and says nothing of the surface.
-            let known: Vec<usize> = (0..normal.len()).filter(|i| normal[*i] != glam::Vec3::ZERO).collect();
-            let points = RawPoints {
-                origin: mesh.origin,
-                position: known.iter().map(|i| mesh.position[*i]).collect(),
-                normal: known.iter().map(|i| normal[*i]).collect(),
-                ..RawPoints::default()
-            };
-            Ok(points.into())
+            Ok(RawPoints::of_vertices(&mesh).into())
         }
         _ => Err(Error::wrong_kind(path, "points", "use `volume = ` or `isosurface = ` for this file")),
     }

@@ -3,7 +3,7 @@
 
 use super::own::Own;
 use crate::scene::SceneLight;
-use splat_core::{Camera, Cloud, DAabb, Projection};
+use splat_core::{Camera, Cloud, DAabb};
 
 /// Scales everything by 2^−e, where 2^e is the size of the bounds of all splats and objects, and returns e.
 ///
@@ -15,17 +15,9 @@ pub(super) fn normalize(cloud: &mut Cloud, own: &mut [Own], camera: &mut Camera,
     }
     let exponent = libm::log2(diagonal).floor() as i32;
     let scale = libm::exp2(f64::from(exponent)).recip();
-    let (length, area) = (scale as f32, (scale * scale) as f32);
-    cloud.origin *= scale;
-    cloud.position.iter_mut().for_each(|p| *p *= length);
-    cloud.radius.iter_mut().for_each(|r| *r *= length);
-    cloud.tangent.iter_mut().for_each(|t| *t *= length);
-    cloud.cross_section.iter_mut().for_each(|k| *k *= area);
+    cloud.scale_world(scale);
+    camera.scale_world(scale);
     own.iter_mut().for_each(|o| o.scale_world(scale));
-    camera.position *= scale;
-    if let Projection::Orthographic { height } = &mut camera.projection {
-        *height *= scale;
-    }
     for light in lights {
         light.light = light.light.scaled(scale);
     }

@@ -4,16 +4,15 @@ use super::context::Context;
 use super::input::{Input, input};
 use super::own::{Body, Own};
 use crate::Error;
-use crate::scene::{MediumShape, RectangleSource, SceneObject, Source};
+use crate::scene::{SceneObject, Source};
 use crate::statistics::ObjectStatistics;
 use convert::cost::{self, Prediction};
 use convert::{
-    CloudShape, ConvertError, Density, DensityParams, MeshParams, RawPoints, SharedField, SplatParams, SurfelParams,
-    VolumeParams, ZeroSearch,
+    CloudShape, ConvertError, Density, DensityParams, MeshParams, RawPoints, SplatParams, SurfelParams, VolumeParams,
+    ZeroSearch,
 };
-use glam::DVec3;
 use pbsr::BoundedExtinction;
-use splat_core::{Cloud, Exceeded, Grid, Mesh, Object, Shading, Similarity, TransferFunction};
+use splat_core::{Cloud, Exceeded, Grid, Mesh, Object, Shading, TransferFunction};
 use std::path::Path;
 
 /// Most operations of an expression on its way to splats: some minutes of two cores.
@@ -72,7 +71,7 @@ pub(super) fn prepare<'a>(
             let too_many = Some(ConvertError::Limit(exceeded));
             Ok(Prepared { input, prediction, as_it_is, too_many, bounded, search })
         }
-        Err(e) => Err(Error::from_convert(&e)),
+        Err(e) => Err(e.into()),
     }
 }
 
@@ -110,13 +109,8 @@ fn predict(input: &Input<'_>) -> Result<Prediction, ConvertError> {
         Input::Surface(field, bounds, params, _) => cost::surface(field.as_ref(), *bounds, params),
         Input::Density(field, bounds, params) => cost::density(field.as_ref(), *bounds, params),
         Input::Procedural(shape, spacing, params) => cost::procedural(shape, *spacing, params),
-        Input::Medium(MediumShape::Box { bounds, extinction, spacing }, params) => {
-            cost::medium_box(*bounds, *extinction, *spacing, params)
-        }
-        Input::Medium(MediumShape::Ball { center, radius, extinction, spacing }, params) => {
-            cost::medium_ball(*center, *radius, *extinction, *spacing, params)
-        }
-        Input::Rectangle(r, opacity, params) => cost::rectangle(&flat(r, *opacity), params),
+        Input::Medium(medium, params) => cost::medium(medium, params),
+        Input::Rectangle(r, opacity, params) => cost::rectangle(r, *opacity, params),
     }
 }
 
@@ -156,7 +150,7 @@ pub(super) fn convert(
     warnings: &mut Vec<String>,
 ) -> Result<Cloud, Error> {
     if let Some(too_many) = &prepared.too_many {
-        return Err(Error::from_convert(too_many));
+        return Err(too_many.clone().into());
     }
     let progress = context.progress;
     let cloud = match &prepared.input {
@@ -174,8 +168,7 @@ pub(super) fn convert(
         }
         Input::Surface(field, bounds, params, _) => {
             let params = MeshParams { splat: context.limited(&params.splat), ..params.clone() };
-            convert::surface_to_points(field.as_ref(), *bounds, &params, Some(progress))
-                .map(|(cloud, _)| in_domain(cloud, field, &params.splat.transform))
+            convert::surface_to_points(field.as_ref(), *bounds, &params, Some(progress)).map(|c| c.0)
         }
         Input::Density(field, bounds, params) => {
             let splat = context.limited(&params.volume.splat);
@@ -193,18 +186,10 @@ pub(super) fn convert(
                 _ => procedural(shape, *spacing, &params.splat, context).and_then(|(grid, tf)| convert(&grid, &tf)),
             }
         }
-        Input::Medium(shape, params) => medium(shape, &context.limited(params)),
-        Input::Rectangle(r, opacity, params) => convert::rectangle(&flat(r, *opacity), &context.limited(params)),
+        Input::Medium(medium, params) => convert::medium(medium, &context.limited(params)),
+        Input::Rectangle(r, opacity, params) => convert::rectangle(r, *opacity, &context.limited(params)),
     };
-    cloud.map_err(|e| Error::from_convert(&e))
-}
-
-/// Without the splats beyond the border of an open surface.
-fn in_domain(cloud: Cloud, field: &SharedField, transform: &Similarity) -> Cloud {
-    let local = |p: DVec3| transform.rotation.inverse() * (p - transform.translation) / transform.scale;
-    let belongs = |i: &u32| field.in_domain(local(cloud.origin + cloud.position[*i as usize].as_dvec3()));
-    let kept: Vec<u32> = (0..cloud.len() as u32).filter(belongs).collect();
-    if kept.len() == cloud.len() { cloud } else { cloud.gather(&kept) }
+    Ok(cloud?)
 }
 
 fn mesh_splats(
@@ -247,32 +232,4 @@ pub(super) fn procedural(
 ) -> Result<(Grid, TransferFunction), ConvertError> {
     let lattice = convert::procedural_cloud(shape, spacing, params, Some(context.progress))?;
     Ok((lattice, convert::extinction_as_it_is(shape.extinction, params)?))
-}
-
-/// A rectangle of a scene.
-fn flat(source: &RectangleSource, opacity: f64) -> convert::Rectangle {
-    let RectangleSource { center, u, v, spacing } = *source;
-    convert::Rectangle { center, u, v, opacity, spacing }
-}
-
-/// The extinction of a homogeneous medium on a lattice, and the transfer function that takes it as it is.
-pub(super) fn medium_grid(shape: &MediumShape, params: &SplatParams) -> Result<(Grid, TransferFunction), ConvertError> {
-    let lattice = match *shape {
-        MediumShape::Box { bounds, extinction, spacing } => {
-            convert::medium_box_grid(bounds, extinction, spacing, params)?
-        }
-        MediumShape::Ball { center, radius, extinction, spacing } => {
-            convert::medium_ball_grid(center, radius, extinction, spacing, params)?
-        }
-    };
-    Ok((lattice, convert::extinction_as_it_is(shape.extinction(), params)?))
-}
-
-fn medium(shape: &MediumShape, params: &SplatParams) -> Result<Cloud, ConvertError> {
-    match *shape {
-        MediumShape::Box { bounds, extinction, spacing } => convert::medium_box(bounds, extinction, spacing, params),
-        MediumShape::Ball { center, radius, extinction, spacing } => {
-            convert::medium_ball(center, radius, extinction, spacing, params)
-        }
-    }
 }

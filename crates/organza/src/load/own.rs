@@ -3,9 +3,8 @@
 //! Lengths and places are the object's own, so nothing is rounded where it lies far away; a transform leads to the world.
 
 use super::context::Context;
-use super::files::{grid_bytes, mesh_bytes};
-use super::input::{Input, shortest_step};
-use super::object::{Prepared, medium_grid, procedural};
+use super::input::Input;
+use super::object::{Prepared, procedural};
 use crate::Error;
 use crate::form::{Form, PlannedObject};
 use crate::scene::{SurfaceSampler, Technique};
@@ -141,11 +140,11 @@ impl Own {
     /// Bytes of the data.
     pub(crate) fn bytes(&self) -> u64 {
         match &self.body {
-            Body::Triangles(mesh) => mesh_bytes(mesh),
+            Body::Triangles(mesh) => mesh.bytes(),
             Body::Cells { grid, body_centred, .. } => {
-                grid_bytes(grid) + body_centred.as_ref().map_or(0, |bcc| grid_bytes(&bcc.planes))
+                grid.bytes() + body_centred.as_ref().map_or(0, |bcc| bcc.planes.bytes())
             }
-            Body::Lattice { grid, .. } => grid_bytes(grid),
+            Body::Lattice { grid, .. } => grid.bytes(),
             Body::Field(field) => field.bytes(),
             Body::Surface { .. } => 0,
         }
@@ -224,7 +223,7 @@ fn data(
         return Ok(field_data(prepared, field));
     }
     let cells = |grid: Arc<Grid>, transfer: TransferFunction, normals: bool| {
-        let (bounds, spacing) = (extinct_bounds(&grid, &transfer), shortest_step(&grid));
+        let (bounds, spacing) = (extinct_bounds(&grid, &transfer), grid.shortest_step());
         Some((Body::Cells { grid, transfer, normals, body_centred: None }, bounds, spacing))
     };
     let meshed = |mesh: Mesh| triangles(mesh, prepared.prediction.splats, source);
@@ -237,7 +236,7 @@ fn data(
             if source == Form::Triangles {
                 let mesh =
                     convert::surface_to_mesh(field.as_ref(), *bounds, spacing, &params.splat, Some(context.progress));
-                return Ok(meshed(mesh.map_err(|e| Error::from_convert(&e))?));
+                return Ok(meshed(mesh?));
             }
             let bounds = prepared.search.as_ref().map_or(*bounds, |s| s.bounds);
             if let (Form::Lattice, Some((grid, level))) = (source, lattice) {
@@ -253,18 +252,16 @@ fn data(
         }
         Input::Volume(grid, transfer, params) => Some(volume(grid, transfer, params, context)?),
         Input::Procedural(shape, spacing, params) => {
-            let (grid, transfer) =
-                procedural(shape, *spacing, &params.splat, context).map_err(|e| Error::from_convert(&e))?;
+            let (grid, transfer) = procedural(shape, *spacing, &params.splat, context)?;
             cells(grid.into(), transfer, params.normals)
         }
         Input::Density(field, bounds, params) => {
-            let (grid, transfer) =
-                convert::density_to_grid(field.as_ref(), *bounds, params).map_err(|e| Error::from_convert(&e))?;
+            let (grid, transfer) = convert::density_to_grid(field.as_ref(), *bounds, params)?;
             cells(grid.into(), transfer, params.volume.normals)
         }
-        Input::Medium(shape, params) => {
-            let (grid, transfer) = medium_grid(shape, params).map_err(|e| Error::from_convert(&e))?;
-            cells(grid.into(), transfer, false)
+        Input::Medium(medium, params) => {
+            let grid = convert::medium_to_grid(medium, params)?;
+            cells(grid.into(), convert::extinction_as_it_is(medium.extinction, params)?, false)
         }
     })
 }
@@ -273,7 +270,7 @@ fn data(
 fn field_data(prepared: &Prepared<'_>, field: BoundedExtinction) -> Option<Data> {
     let spacing = match &prepared.input {
         Input::Density(_, _, params) => world_spacing(&params.density) / params.volume.splat.transform.scale,
-        Input::Medium(shape, _) => shape.spacing(),
+        Input::Medium(medium, _) => medium.spacing,
         _ => 0.0,
     };
     let (seen, side) = field.seen();
@@ -290,9 +287,8 @@ fn volume(
     context: &Context<'_>,
 ) -> Result<Data, Error> {
     let is_packed = context.scene.objects[context.id].packing == Packing::BodyCentred;
-    let packed = is_packed.then(|| convert::body_centred(grid, &params.splat)).transpose();
-    let body_centred = packed.map_err(|e| Error::from_convert(&e))?;
-    let (bounds, spacing) = (extinct_bounds(grid, transfer), shortest_step(grid));
+    let body_centred = is_packed.then(|| convert::body_centred(grid, &params.splat)).transpose()?;
+    let (bounds, spacing) = (extinct_bounds(grid, transfer), grid.shortest_step());
     let body = Body::Cells { grid: grid.clone(), transfer: transfer.clone(), normals: params.normals, body_centred };
     Ok((body, bounds, spacing))
 }

@@ -13,7 +13,6 @@ mod checkpoint;
 mod ensemble;
 mod form;
 mod kept;
-mod layers;
 mod parts;
 
 use crate::frame::Frame;
@@ -25,7 +24,6 @@ pub(crate) use checkpoint::Checkpoint;
 use ensemble::{Average, average_bytes, fold};
 pub(crate) use form::form;
 pub(crate) use kept::Kept;
-use layers::{accumulate, of_hits, std_error};
 use parts::{Part, sources};
 use splat_core::raster::OpaqueImage;
 use splat_core::{Accumulator, LayerData};
@@ -79,7 +77,6 @@ impl Fold for Particles<'_> {
         if inside.is_empty() {
             return Ok(());
         }
-        let layout = frame.layout();
         let occluder = occluder(opaque);
         let maps = frame.maps(cost)?;
         let average = cost.measure(pass::PARTICLES, |stage| {
@@ -93,8 +90,8 @@ impl Fold for Particles<'_> {
         let (averaged, interrupted) = (average.ensemble.levels(), average.interrupted);
         session.sets = Some(Sets { averaged, asked, interrupted });
         let mut segment = frame.accumulator();
-        accumulate(&average.ensemble, &layout, &mut segment);
-        of_hits(&average.ensemble, &inside, &mut segment);
+        let objects: Vec<u32> = inside.iter().map(|part| part.of).collect();
+        average.ensemble.accumulate(&frame.layout(), &objects, &mut segment);
         into.append(&segment);
         self.average = (range == EVERYWHERE).then_some(average);
         Ok(())
@@ -108,7 +105,8 @@ impl Fold for Particles<'_> {
         let none = || LayerData::Scalar(vec![0.0; finished.layers.size.iter().map(|s| *s as usize).product()]);
         let error = self.average.as_ref().map_or_else(none, |average| {
             let occluder = finished.opaque.and_then(occluder);
-            std_error(&average.ensemble, occluder, self.frame)
+            let background = self.frame.background();
+            average.ensemble.std_error(&|x, y| background.radiance(x, y), occluder, self.frame.settings.antialias)
         });
         finished.layers.insert("std_error", error);
     }

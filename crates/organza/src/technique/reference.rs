@@ -17,8 +17,7 @@ const SAMPLE_BYTES: u64 = 512;
 
 /// Bytes of the pixels of a row of tasks.
 pub(crate) fn bytes(scene: &Scene) -> u64 {
-    let samples = scene.camera.size.map(|s| u64::from(s) * u64::from(scene.render.antialias));
-    SAMPLE_BYTES * samples[0] * samples[1]
+    SAMPLE_BYTES * scene.camera.with_samples(scene.render.antialias).pixels()
 }
 
 /// Begins a frame.

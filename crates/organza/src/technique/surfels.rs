@@ -30,8 +30,7 @@ const GLASS_BYTES: u64 = 24;
 pub(crate) fn bytes(matter: &Matter<'_>, _: &[LightPoint], _: bool, _: &RenderOptions) -> u64 {
     let discs = matter.cloud.map_or(0, |cloud| cloud.len() as u64);
     let bounds = bends(matter.scene).is_ok() && matter.scene.materials.iter().any(|m| m.material.bounds_matter());
-    let samples = matter.camera.size.iter().map(|s| u64::from(*s)).product::<u64>();
-    let glass = if bounds { Surfaces::bytes(discs) + GLASS_BYTES * samples } else { 0 };
+    let glass = if bounds { Surfaces::bytes(discs) + GLASS_BYTES * matter.camera.pixels() } else { 0 };
     let groups = grouped::bytes(matter.scene, discs, matter.cloud.map_or(0, |cloud| cloud.bytes()));
     DISC_BYTES * discs + glass + groups
 }

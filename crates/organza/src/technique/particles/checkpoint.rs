@@ -10,8 +10,7 @@ use crate::scene::{RenderSettings, Scene};
 use crate::{Error, RenderOptions, printable};
 use pbsr::Ensemble;
 use sha2::{Digest, Sha256};
-use std::fs::File;
-use std::io::{self, BufRead, BufReader};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -85,18 +84,6 @@ fn tag(scene: &Scene, options: &RenderOptions, kept: Option<&Kept>) -> Result<[u
     hasher.update(format!("{same:?} {} {}", options.drop_invalid, options.merge_duplicates));
     // Particles that serve many frames are as fine as the finest needs them.
     hasher.update(kept.map(Kept::views).unwrap_or_default());
-    for path in scene.files().iter().skip(1) {
-        let fail = |e| Error::io(path, "cannot read", e);
-        let mut file = BufReader::with_capacity(1 << 20, File::open(path).map_err(fail)?);
-        loop {
-            let bytes = file.fill_buf().map_err(fail)?;
-            if bytes.is_empty() {
-                break;
-            }
-            hasher.update(bytes);
-            let n = bytes.len();
-            file.consume(n);
-        }
-    }
+    hasher.update(scene.digest_of_data()?);
     Ok(hasher.finalize().into())
 }

@@ -40,10 +40,8 @@ struct Entry {
 impl Kept {
     /// Keeps how a frame that samples objects sees them.
     pub(crate) fn add(&mut self, scene: &Scene) {
-        let mut camera = scene.camera;
-        camera.size = camera.size.map(|s| s.saturating_mul(scene.render.antialias));
-        let mut view =
-            View { camera, transforms: scene.objects.iter().map(|o| o.visible.then_some(o.transform)).collect() };
+        let transforms = scene.objects.iter().map(|o| o.visible.then_some(o.transform)).collect();
+        let mut view = View { camera: scene.camera.with_samples(scene.render.antialias), transforms };
         match self.views.last() {
             Some(last) if *last == view => return,
             Some(last) if last.transforms == view.transforms => view.transforms = Arc::clone(&last.transforms),

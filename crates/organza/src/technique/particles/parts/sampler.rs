@@ -3,16 +3,12 @@
 use super::Source;
 use crate::load::own::{Body, Own, line_cells};
 use pbsr::{
-    BoundedExtinction, BrownianParams, BrownianReport, BrownianSampler, Density, FieldVolumeSampler, GridSampler,
-    ImplicitSurface, LatticeSampler, LineReport, LineSampler, MeshSampler, Sampler, SurfaceParams, VolumeParams,
+    BoundedExtinction, BrownianParams, BrownianSampler, Density, FieldVolumeSampler, GridSampler, ImplicitSurface,
+    LatticeSampler, LineSampler, MeshSampler, Sampler, SurfaceParams, VolumeParams,
 };
 
 /// Optical depth of a surface that is not quite opaque, at most.
 const DEEPEST: f64 = 64.0;
-/// Relative error of a counted area up to which no warning is given; that of the area by lines is a few percent.
-const MISCOUNTED: f64 = 0.1;
-/// Share of the roots of a surface that may be missed before a warning is given.
-const MISSED: f64 = 1e-3;
 
 impl<'a> Source<'a> {
     pub(super) fn sampler(
@@ -20,6 +16,7 @@ impl<'a> Source<'a> {
         own: &'a Own,
         warnings: &mut Vec<String>,
     ) -> Result<Box<dyn Sampler + 'a>, pbsr::Error> {
+        let named = |doubt: String| format!("object '{}': {doubt}", crate::shown(&self.name));
         Ok(match &own.body {
             Body::Surface { field, inside, spacing, step } => {
                 let bounds = own.bounds;
@@ -30,12 +27,12 @@ impl<'a> Source<'a> {
                     let paper = BrownianParams::for_width(width);
                     let walk = BrownianParams { step: step * width, resolution: cells, ..paper };
                     let sampler = BrownianSampler::new(&surface, &walk, &self.surface(own))?;
-                    warnings.extend(self.doubtful_area(sampler.report()));
+                    warnings.extend(sampler.report().doubt().map(named));
                     return Ok(Box::new(sampler));
                 }
                 let sampler =
                     LineSampler::new(&surface, &pbsr::LineParams { resolution: cells }, &self.surface(own), None)?;
-                warnings.extend(self.doubts(sampler.report()));
+                warnings.extend(sampler.report().doubts().map(named));
                 Box::new(sampler)
             }
             Body::Lattice { grid, level } => Box::new(LatticeSampler::new(grid, *level, &self.surface(own))?),
@@ -51,38 +48,6 @@ impl<'a> Source<'a> {
             }
             Body::Field(field) => self.field(own, field)?,
         })
-    }
-
-    /// Where the spheres of a Brownian motion count another area than there is.
-    fn doubtful_area(&self, report: &BrownianReport) -> Option<String> {
-        let more = report.area / report.area_by_lines - 1.0;
-        let (name, percent) = (crate::shown(&self.name), 100.0 * more);
-        (more.abs() > MISCOUNTED).then(|| {
-            format!(
-                "object '{name}': its Brownian motion counts {percent:+.0} % of area, and is that much too dense, for borders \
-                 or bends lie within a counting sphere"
-            )
-        })
-    }
-
-    /// What a survey of the surface could not settle.
-    fn doubts(&self, report: &LineReport) -> Vec<String> {
-        let name = crate::shown(&self.name);
-        let mut doubts = Vec::new();
-        if report.broken > 0 {
-            let what = format!(
-                "object '{name}': its field is not finite on {} pieces of {} lines",
-                report.broken, report.lines
-            );
-            doubts.push(what);
-        }
-        if report.missed() > MISSED {
-            let percent = 100.0 * report.missed();
-            doubts.push(format!(
-                "object '{name}': lines miss {percent:.2} % of its surface, which has no bound or a fine fold"
-            ));
-        }
-        doubts
     }
 
     fn field<'b>(&self, own: &Own, field: &'b BoundedExtinction) -> Result<Box<dyn Sampler + 'b>, pbsr::Error> {
