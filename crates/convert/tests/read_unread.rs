@@ -21,7 +21,6 @@ fn formats_that_are_not_read_are_named_with_what_to_do() {
         ("a.h5", b"\x89HDF\r\n\x1a\n", "HDF5", "convert it to NRRD"),
         ("a.dcm", &dicom, "DICOM", "convert it to NRRD"),
         ("a.jpg", b"\xff\xd8\xff\xe0", "a JPEG image", "convert the image"),
-        ("a.jpg", b"\xff\xd8\xff", "a JPEG image", "convert the image"),
         ("a.zip", b"PK\x03\x04", "a zip archive", "extract"),
         ("a.tar.gz", &tar, "a tar archive", "extract"),
         ("a.splat", b"\0\0\0\0", "3D Gaussian splats", "use a mesh or a point cloud"),

@@ -34,6 +34,12 @@ pub(super) fn check_animation(at: &At<'_>, raw: &RawAnimation) -> Result<u32, Er
     at.whole("frames", raw.frames, 1..=MOST_FRAMES)
 }
 
+/// Whether a track changes a key of a table, or the whole table.
+pub(super) fn moves(raw: &RawAnimation, table: &str, key: &str) -> bool {
+    let changes = |path: Vec<String>| path[0] == table && path.get(1).is_none_or(|of| of == key);
+    raw.track.iter().filter_map(|track| path_of(track).ok()).any(changes)
+}
+
 /// Keys of an object that leave its shape as it is.
 const LOOKS: [&str; 8] =
     ["transform", "material", "opacity", "color", "technique", "shadow_coefficient", "casts_shadow", "visible"];

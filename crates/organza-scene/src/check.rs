@@ -1,19 +1,21 @@
 //! Raw tables → checked scene: what the whole file shares, and the tools of the other `check_…` files.
 
-use super::animation::{check_animation, deforms};
+use super::animation::{check_animation, deforms, moves};
 use super::check_background::check_background;
+use super::check_camera::check_camera;
 use super::check_drawn::check_drawn;
 use super::check_light::check_light;
 use super::check_material::{check_materials, unknown_material};
 use super::check_object::{Named, check_object};
 use super::check_render::check_render;
-use super::paths::Paths;
-use super::raw::{RawCamera, RawScene};
+use super::paths::{Paths, ROOT_KEY};
+use super::load::Turn;
+use super::raw::RawScene;
 use super::tree::{Document, Step};
 use super::{Aligned, RenderSettings, Scene, SceneObject};
 use crate::Error;
 use glam::DVec3;
-use splat_core::{Camera, Footprint, FootprintStack, Projection};
+use splat_core::{Camera, Footprint, FootprintStack};
 use std::collections::HashMap;
 use std::ops::RangeInclusive;
 
@@ -23,8 +25,6 @@ pub(super) const LARGEST: f64 = 1e18;
 const LARGEST_INTENSITY: f64 = 1e30;
 /// Smallest length that a scene may state.
 pub(super) const SMALLEST: f64 = 1e-18;
-/// Vertical angle of view of a camera that states none, degrees.
-const DEFAULT_FOV_Y: f64 = 35.0;
 /// Most samples along one side of a region.
 const MOST_SAMPLES: f64 = 65536.0;
 
@@ -147,7 +147,13 @@ impl<'a> At<'a> {
 }
 
 /// Checks everything.
-pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sha256: String) -> Result<Scene, Error> {
+pub(super) fn scene(
+    document: &Document<'_>,
+    raw: RawScene,
+    allow_path: bool,
+    turn: Option<Turn>,
+    sha256: String,
+) -> Result<Scene, Error> {
     let at = At::of(document);
     if raw.version != 1 {
         let message = format!("`version`: expected 1, found {}", raw.version);
@@ -155,7 +161,7 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
     }
     let footprints = check_footprints(&at, raw.footprints)?;
     let materials = check_materials(&at.key("material"), &raw.material)?;
-    let paths = Paths::new(document.file, allow_path)?;
+    let paths = Paths::new(&at.key(ROOT_KEY), document.file, raw.root.as_deref(), allow_path)?;
     let named = Named { materials: &materials, footprints: &footprints, paths: &paths };
     let named_materials: HashMap<&str, usize> =
         materials.iter().enumerate().skip(1).map(|(i, m)| (m.name.as_str(), i)).collect();
@@ -182,16 +188,22 @@ pub(super) fn scene(document: &Document<'_>, raw: RawScene, allow_path: bool, sh
     let mut render = check_render(&at.key("render"), &raw.render)?;
     let layers = (&at.key("render").key("layers"), raw.render.layers.as_slice());
     check_drawn(&at_objects, &objects, &materials, layers, &mut render)?;
-    let camera = check_camera(&at.key("camera"), &raw.camera)?;
-    check_aligned(&at.key("render").key("sheets").key("aligned"), &camera, &render)?;
+    let goes_around = raw.animation.as_ref().is_some_and(|animation| moves(animation, "camera", "azimuth"));
+    let seen = check_camera(&at.key("camera"), &raw.camera, turn, goes_around)?;
+    check_aligned(&at.key("render").key("sheets").key("aligned"), &seen.camera, &render)?;
     let (background, environment) = check_background(&at.key("background"), &raw.background, &paths)?;
     let at_lights = at.key("light");
     let lights = raw.light.iter().enumerate().map(|(i, l)| check_light(&at_lights.index(i), l, &paths));
     Ok(Scene {
         file: document.file.to_owned(),
         sha256,
-        frames: raw.animation.as_ref().map(|a| check_animation(&at.key("animation"), a)).transpose()?,
-        camera,
+        frames: match turn {
+            Some(turn) => Some(turn.frames),
+            None => raw.animation.as_ref().map(|a| check_animation(&at.key("animation"), a)).transpose()?,
+        },
+        camera: seen.camera,
+        target: seen.target,
+        fit: seen.fit,
         background,
         environment,
         ambient: at.key("ambient").color("color", raw.ambient.color)?,
@@ -227,38 +239,4 @@ fn check_footprints(at: &At<'_>, cutoffs: Option<Vec<f64>>) -> Result<FootprintS
     let layers = cutoffs.iter().map(|c| Footprint { cutoff: *c as f32 }).collect();
     let found = cutoffs.len();
     FootprintStack::new(layers).map_err(|_| at.error(format!("expected 1 to 256 footprints, found {found}"), ""))
-}
-
-fn check_camera(at: &At<'_>, raw: &RawCamera) -> Result<Camera, Error> {
-    let projection = match (raw.fov_y, raw.orthographic) {
-        (Some(fov_y), None) => {
-            if !(fov_y > 0.0 && fov_y < 180.0) {
-                let message = format!("`fov_y`: expected degrees between 0 and 180, found {fov_y}");
-                return Err(at.key("fov_y").error(message, ""));
-            }
-            Projection::Perspective { fov_y: fov_y.to_radians() }
-        }
-        (None, Some(height)) => Projection::Orthographic { height: at.length("orthographic", height)? },
-        (Some(_), Some(_)) => {
-            let message = "expected one of `fov_y` and `orthographic`, found both";
-            return Err(at.key("orthographic").error(message, ""));
-        }
-        (None, None) => Projection::Perspective { fov_y: DEFAULT_FOV_Y.to_radians() },
-    };
-    for (i, side) in raw.size.into_iter().enumerate() {
-        if !(1..=65536).contains(&side) {
-            let message = format!("`size`: expected 1 to 65536 pixels a side, found {side}");
-            return Err(at.key("size").index(i).error(message, ""));
-        }
-    }
-    let position = at.vector("position", raw.position)?;
-    let target = at.vector("target", raw.target)?;
-    let up = at.vector("up", raw.up)?;
-    Camera::look_at(position, target, up, projection, raw.size).map_err(|e| match e {
-        splat_core::Error::Invalid { attribute, found, expected, .. } => {
-            let key = if attribute == "target" { "target" } else { "position" };
-            at.key(key).error(format!("`{attribute}`: expected {expected}, found {found}"), "")
-        }
-        other => at.error(other.to_string(), ""),
-    })
 }

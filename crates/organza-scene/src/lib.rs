@@ -13,6 +13,7 @@
 mod animation;
 mod check;
 mod check_background;
+mod check_camera;
 mod check_drawn;
 mod check_field;
 mod check_light;
@@ -25,6 +26,7 @@ mod check_surfels;
 mod check_transfer;
 mod de;
 mod error;
+mod fit;
 mod layer_choice;
 mod lights;
 mod lit;
@@ -33,6 +35,7 @@ mod model;
 mod overrides;
 mod paths;
 mod raw;
+mod raw_camera;
 mod raw_light;
 mod raw_material;
 mod raw_object;
@@ -48,11 +51,13 @@ mod tree;
 
 pub use convert::read::UpAxis;
 pub use error::Error;
+pub use fit::{CameraFit, DEFAULT_AZIMUTH, DEFAULT_FILL, DEFAULT_SIZE, EachPoint, FoundCamera};
 pub use layer_choice::{LAYER_NAMES, LayerChoice};
 pub use lights::{SceneLight, SlideSource};
 pub use load::{LoadOptions, MAX_SCENE_BYTES, MAX_SCENE_DEPTH, load, parse, read, schema};
 pub use model::{EnvironmentSource, Scene, SceneMaterial, SceneObject, Up};
 pub use overrides::Override;
+pub use paths::{ROOT_KEY, relative_path, root_for};
 pub use settings::{
     Aligned, Bending, Classify, Collisions, Coverage, Grouping, ParticlesSettings, PointsSettings, RenderSettings,
     Scattering, ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler, SurfelGroups,

@@ -3,7 +3,7 @@
 use super::overrides::{self, Override};
 use super::raw::RawScene;
 use super::tree::{Document, error_at};
-use super::{Scene, animation, check, de, read_json, read_toml};
+use super::{Scene, animation, check, de, raw_camera, read_json, read_toml};
 use crate::Error;
 use sha2::{Digest, Sha256};
 use splat_core::Exceeded;
@@ -26,6 +26,25 @@ pub struct LoadOptions {
     pub overrides: Vec<Override>,
     /// The frame of the scene's animation; `None` loads the scene as it is written.
     pub frame: Option<u32>,
+    /// Frames of a turntable, which take the place of an animation: in frame k of n the camera has gone k/n of a circle about +Y
+    /// through its target, or through the middle of all that is seen.
+    pub turntable: Option<u32>,
+}
+
+/// A frame of a turntable.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Turn {
+    /// Frames of the whole circle.
+    pub(super) frames: u32,
+    /// This one.
+    pub(super) frame: u32,
+}
+
+impl Turn {
+    /// How far the camera has gone, radians.
+    pub(super) fn angle(self) -> f64 {
+        std::f64::consts::TAU * f64::from(self.frame) / f64::from(self.frames)
+    }
 }
 
 /// Reads and checks a scene file; JSON if its name ends in `.json`, else TOML. Of data files that are drawn
@@ -73,12 +92,20 @@ pub fn parse(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Scene, 
     let is_json = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
     let root = if is_json { read_json::read_json(file, text)? } else { read_toml::read_toml(file, text)? };
     let mut document = Document { file, text, flags: Vec::new(), root };
+    raw_camera::expand(&mut document.root);
     overrides::apply(&mut document, &options.overrides)?;
-    if let Some(frame) = options.frame {
+    let turn = options.turntable.map(|frames| Turn { frames: frames.max(1), frame: options.frame.unwrap_or(0) });
+    if let (Some(frame), None) = (options.frame, turn) {
         animation::apply(&mut document, frame)?;
     }
+    // An option or a track may have said it anew.
+    raw_camera::expand(&mut document.root);
     let raw: RawScene = de::from_document(&document)?;
-    check::scene(&document, raw, options.allow_path, hash(bytes, options))
+    if turn.is_some() && raw.animation.is_some() {
+        let message = format!("--turntable: {} has an animation of its own", crate::printable(file));
+        return Err(Error::usage(message, "draw it with --frames"));
+    }
+    check::scene(&document, raw, options.allow_path, turn, hash(bytes, options))
 }
 
 fn decode<'a>(file: &Path, bytes: &'a [u8]) -> Result<&'a str, Error> {
@@ -99,6 +126,9 @@ fn hash(bytes: &[u8], options: &LoadOptions) -> String {
     }
     if let Some(frame) = options.frame {
         hasher.update(format!("\n--frames {frame}"));
+    }
+    if let Some(frames) = options.turntable {
+        hasher.update(format!("\n--turntable {frames}"));
     }
     hasher.finalize().iter().map(|b| format!("{b:02x}")).collect()
 }

@@ -1,9 +1,10 @@
 //! The checked scene: everything a render needs, in radians and f64 world units.
 
-use super::{RenderSettings, SceneLight, Source, Technique};
+use super::{CameraFit, RenderSettings, SceneLight, Source, Technique};
 use crate::Error;
 use convert::Clip;
 use convert::read::UpAxis;
+use glam::DVec3;
 use sha2::{Digest, Sha256};
 use splat_core::{Camera, FootprintStack, Material, Packing, Similarity};
 use std::fs::File;
@@ -19,8 +20,12 @@ pub struct Scene {
     pub sha256: String,
     /// Number of frames of its animation, if it has one.
     pub frames: Option<u32>,
-    /// The camera with the image size.
+    /// The camera with the image size; where [`Self::fit`] is there, its place is still to be found.
     pub camera: Camera,
+    /// The point in the middle of the picture that the scene names, or that was found.
+    pub target: DVec3,
+    /// How the camera is to be placed, where the scene leaves that to the data.
+    pub fit: Option<CameraFit>,
     /// Radiance behind everything, linear Rec.709; black where there is an environment.
     pub background: [f32; 3],
     /// What is seen behind everything in the place of a colour.

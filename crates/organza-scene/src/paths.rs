@@ -1,8 +1,11 @@
-//! Paths of data: relative to the scene file, inside the scene's root folder unless allowed.
+//! Paths of data: relative to the scene file, inside the scene's root folder, or inside the one that it names, unless allowed.
 
 use super::check::At;
 use crate::{Error, printable, shown};
 use std::path::{Component, Path, PathBuf};
+
+/// The key of a scene that names a further folder for data.
+pub const ROOT_KEY: &str = "root";
 
 /// Where data may lie.
 pub(super) struct Paths {
@@ -10,49 +13,135 @@ pub(super) struct Paths {
     folder: PathBuf,
     /// The root folder, absolute; `None` allows everything.
     root: Option<PathBuf>,
+    /// The folder that the scene names, as the system knows it.
+    named: Option<PathBuf>,
 }
 
 impl Paths {
     /// The root is the folder above the scene's folder, or the scene's folder where that would be the root of the file
-    /// system.
-    pub(super) fn new(scene_file: &Path, allow_path: bool) -> Result<Self, Error> {
-        let folder = scene_file.parent().unwrap_or(Path::new("")).to_owned();
-        if allow_path {
-            return Ok(Self { folder, root: None });
-        }
-        let here = Path::new(".").join(&folder);
-        let absolute = std::path::absolute(&here).map_err(|e| Error::io(&here, "cannot find the folder", e))?;
-        let absolute = without_dots(&absolute);
-        let above = absolute.parent().filter(|above| above.parent().is_some());
-        let root = above.unwrap_or(&absolute).to_owned();
-        Ok(Self { folder, root: Some(root) })
+    /// system; `named` is a further one, relative to the scene's.
+    pub(super) fn new(
+        at_named: &At<'_>,
+        scene_file: &Path,
+        named: Option<&str>,
+        allow_path: bool,
+    ) -> Result<Self, Error> {
+        let folder = folder_of(scene_file);
+        let named = named.map(|named| check_named(at_named, &folder, named)).transpose()?;
+        let root = if allow_path { None } else { Some(default_root(&folder)?) };
+        Ok(Self { folder, root, named })
     }
 
     /// The path of a file named in the scene.
     pub(super) fn resolve(&self, at: &At<'_>, text: &str) -> Result<PathBuf, Error> {
-        if text.is_empty() || text.contains('\0') {
-            return Err(at.error(format!("expected a path, found \"{}\"", shown(text)), ""));
-        }
-        if text.contains("://") {
-            return Err(
-                at.error(format!("expected a path, found the address \"{}\"", shown(text)), "fetch the file first")
-            );
-        }
+        check_text(at, text)?;
         let path = self.folder.join(text);
         let Some(root) = &self.root else { return Ok(path) };
         let absolute = std::path::absolute(&path).map_err(|e| at.error(format!("\"{}\": {e}", shown(text)), ""))?;
         // A link that leads out is caught as well; a file that does not exist is reported when it is read.
-        let real = |p: &Path| p.canonicalize().ok();
-        let outside_by_link = match (real(&absolute), real(root)) {
+        let real = absolute.canonicalize().ok();
+        let outside_by_link = match (&real, root.canonicalize().ok()) {
             (Some(file), Some(root)) => !file.starts_with(root),
             _ => false,
         };
-        if !without_dots(&absolute).starts_with(root) || outside_by_link {
-            let message = format!("\"{}\" lies outside the scene's root folder {}", shown(text), printable(root));
-            return Err(at.error(message, "allow it with --allow-path"));
+        let lexical = without_dots(&absolute);
+        let is_in_root = lexical.starts_with(root) && !outside_by_link;
+        let place = real.as_deref().unwrap_or(&lexical);
+        if is_in_root || self.named.as_ref().is_some_and(|named| place.starts_with(named)) {
+            return Ok(path);
         }
-        Ok(path)
+        let message = format!("\"{}\" lies outside the scene's root folder {}", shown(text), printable(root));
+        Err(at.error(message, self.hint(place)))
     }
+
+    /// What would allow a file that lies outside.
+    fn hint(&self, place: &Path) -> String {
+        let (folder, above) = (self.folder.canonicalize(), place.parent().unwrap_or(place));
+        // Another named folder is in the way of this one: both lie in what is above them.
+        let above = self.named.as_deref().map_or(above.to_owned(), |named| common(named, above));
+        let way = folder.ok().and_then(|folder| relative_path(&folder, &above)).unwrap_or(above);
+        let line = format!("{ROOT_KEY} = {}", toml_text(&way.to_string_lossy()));
+        format!("allow it with the line {} before the first table of the scene, or with --allow-path", shown(&line))
+    }
+}
+
+/// A text in TOML's quotes, which are JSON's.
+fn toml_text(text: &str) -> String {
+    serde_json::Value::from(text).to_string()
+}
+
+fn check_text(at: &At<'_>, text: &str) -> Result<(), Error> {
+    if text.is_empty() || text.contains('\0') {
+        return Err(at.error(format!("expected a path, found \"{}\"", shown(text)), ""));
+    }
+    if text.contains("://") {
+        return Err(at.error(format!("expected a path, found the address \"{}\"", shown(text)), "fetch the file first"));
+    }
+    Ok(())
+}
+
+/// The folder that a scene names for its data.
+fn check_named(at: &At<'_>, folder: &Path, named: &str) -> Result<PathBuf, Error> {
+    check_text(at, named)?;
+    let path = Path::new(".").join(folder).join(named);
+    let fail = |found: String| {
+        let message = format!("`{ROOT_KEY}`: expected a folder, found \"{}\", {found}", shown(named));
+        at.error(message, "a folder in which data may lie, relative to the scene file")
+    };
+    let real = path.canonicalize().map_err(|e| fail(format!("which cannot be opened: {e}")))?;
+    if !real.is_dir() {
+        return Err(fail("a file".to_owned()));
+    }
+    Ok(real)
+}
+
+fn folder_of(scene_file: &Path) -> PathBuf {
+    scene_file.parent().unwrap_or(Path::new("")).to_owned()
+}
+
+fn default_root(folder: &Path) -> Result<PathBuf, Error> {
+    let here = Path::new(".").join(folder);
+    let absolute = std::path::absolute(&here).map_err(|e| Error::io(&here, "cannot find the folder", e))?;
+    let absolute = without_dots(&absolute);
+    let above = absolute.parent().filter(|above| above.parent().is_some());
+    Ok(above.unwrap_or(&absolute).to_owned())
+}
+
+/// The value that the key `root` of a scene needs so that it may read these files: the deepest folder that holds all that lie outside
+/// the scene's root folder, relative to the scene's where there is a way. `None` where all lie inside.
+///
+/// # Errors
+/// [`Error::Io`] for what is not there.
+pub fn root_for<'p>(scene_file: &Path, files: impl IntoIterator<Item = &'p Path>) -> Result<Option<PathBuf>, Error> {
+    let folder = Path::new(".").join(folder_of(scene_file));
+    let real = |path: &Path| path.canonicalize().map_err(|e| Error::io(path, "cannot find", e));
+    let (folder, root) = (real(&folder)?, real(&default_root(&folder)?)?);
+    let mut all: Option<PathBuf> = None;
+    for file in files {
+        let file = real(file)?;
+        if !file.starts_with(&root) {
+            let above = file.parent().unwrap_or(&file);
+            all = Some(all.map_or(above.to_owned(), |all| common(&all, above)));
+        }
+    }
+    Ok(all.map(|all| relative_path(&folder, &all).unwrap_or(all)))
+}
+
+/// The way from a folder to a file or folder, both as the system knows them; `None` where there is none, as between drives.
+pub fn relative_path(folder: &Path, to: &Path) -> Option<PathBuf> {
+    let shared = common(folder, to);
+    if shared.as_os_str().is_empty() {
+        return None;
+    }
+    let up = folder.strip_prefix(&shared).ok()?.components().map(|_| Component::ParentDir.as_os_str());
+    let down = to.strip_prefix(&shared).ok()?.components().map(Component::as_os_str);
+    let path: PathBuf = up.chain(down).collect();
+    Some(if path.as_os_str().is_empty() { PathBuf::from(".") } else { path })
+}
+
+/// The deepest folder above both.
+fn common(a: &Path, b: &Path) -> PathBuf {
+    a.components().zip(b.components()).take_while(|(a, b)| a == b).map(|(a, _)| a.as_os_str()).collect()
 }
 
 /// An absolute path with `.` and `..` resolved by name.
@@ -66,4 +155,18 @@ fn without_dots(path: &Path) -> PathBuf {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_way_between_folders_goes_up_and_down() {
+        let way = |from: &str, to: &str| relative_path(from.as_ref(), to.as_ref()).unwrap();
+        assert_eq!(way("/a/b", "/a/b/c.ply"), Path::new("c.ply"));
+        assert_eq!(way("/a/b/c", "/a/x/y.ply"), Path::new("../../x/y.ply"));
+        assert_eq!(way("/a", "/a"), Path::new("."));
+        assert_eq!(common("/a/bc".as_ref(), "/a/bd".as_ref()), Path::new("/a"));
+    }
 }

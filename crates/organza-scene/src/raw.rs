@@ -1,5 +1,6 @@
 //! The scene file as it is written: degrees, names and nothing checked but types. Source of the JSON Schema.
 
+use super::raw_camera::RawCamera;
 use super::raw_light::RawLight;
 use super::raw_material::RawMaterial;
 use super::raw_object::RawObject;
@@ -15,6 +16,10 @@ use std::collections::BTreeMap;
 pub(super) struct RawScene {
     /// Version of the schema: 1.
     pub(super) version: u32,
+    /// A folder, relative to the scene file, in which data may lie beside the folder above the scene's.
+    pub(super) root: Option<String>,
+    /// The camera, or "auto" for one that sees all objects.
+    #[schemars(schema_with = "super::raw_camera::schema")]
     pub(super) camera: RawCamera,
     #[serde(default)]
     pub(super) background: RawBackground,
@@ -85,30 +90,6 @@ pub(super) enum Blend {
     Linear,
     /// A cubic without corners at the keys.
     Smooth,
-}
-
-/// The camera.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, expecting = "a table")]
-#[schemars(rename = "Camera")]
-pub(super) struct RawCamera {
-    /// World position of the eye.
-    pub(super) position: [f64; 3],
-    /// A point in the middle of the picture.
-    pub(super) target: [f64; 3],
-    /// What points up in the picture; default [0, 1, 0].
-    #[serde(default = "up")]
-    pub(super) up: [f64; 3],
-    /// Full vertical angle of view, degrees, between 0 and 180; default 35.
-    pub(super) fov_y: Option<f64>,
-    /// Height of the picture in world units, for parallel rays; instead of `fov_y`.
-    pub(super) orthographic: Option<f64>,
-    /// Width and height of the picture, pixels.
-    pub(super) size: [u32; 2],
-}
-
-fn up() -> [f64; 3] {
-    [0.0, 1.0, 0.0]
 }
 
 /// A colour, linear Rec.709.

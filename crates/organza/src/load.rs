@@ -1,6 +1,7 @@
 //! The objects of a scene become one cloud in canonical order, with its tables.
 
 mod context;
+mod fit;
 pub(crate) mod files;
 mod images;
 pub(crate) mod input;
@@ -15,6 +16,7 @@ use crate::statistics::{LightStatistics, ObjectStatistics};
 use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, pass, work};
 pub(crate) use context::BYTES_PER_SPLAT;
 use files::Files;
+pub use fit::fitted;
 use glam::DVec3;
 use loading::Loading;
 use normalize::normalize;

@@ -5,12 +5,12 @@ use crate::choose::{choose, plan, row, same_forms, technique_of, techniques, unb
 use crate::form::PlannedObject;
 use crate::load::files::Files;
 use crate::load::own::Own;
-use crate::load::{self, Loaded, Spare, light_statistics};
+use crate::load::{self, Loaded, Spare, fitted, light_statistics};
 use crate::matter::Matter;
 use crate::memory::{self, Memory};
 use crate::pass;
 use crate::plan::Plan;
-use crate::scene::{Scene, SceneLight, SceneObject, Technique};
+use crate::scene::{FoundCamera, Scene, SceneLight, SceneObject, Technique};
 use crate::statistics::{ObjectStatistics, Statistics};
 use crate::technique::Row;
 use crate::work::Translucent;
@@ -34,6 +34,8 @@ pub struct Explanation {
     pub warnings: Vec<String>,
     /// What files hold that a picture does not show, and what was made of them.
     pub notes: Vec<String>,
+    /// The camera that was placed, where the scene leaves that to the data.
+    pub found: Option<FoundCamera>,
 }
 
 /// Loads a scene and plans its render.
@@ -41,7 +43,22 @@ pub struct Explanation {
 /// # Errors
 /// As [`crate::render`].
 pub fn explain(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Explanation, Error> {
-    let (_, mut explanation, _) = prepare(scene, options, progress, &Files::default())?;
+    explain_from(scene, options, progress, &Files::default())
+}
+
+/// [`explain`] from files of which some were read before.
+///
+/// # Errors
+/// As [`crate::render`].
+pub fn explain_from(
+    scene: &Scene,
+    options: &RenderOptions,
+    progress: &Progress,
+    files: &Files,
+) -> Result<Explanation, Error> {
+    let (scene, found) = fitted(scene, options, progress, files)?;
+    let (_, mut explanation, _) = prepare(&scene, options, progress, files)?;
+    explanation.found = found;
     explanation.warnings.extend(doubts::of_shadows(explanation.plan.tables()));
     explanation.warnings.extend(doubts::of_scattering(&explanation.plan));
     progress.finish();
@@ -66,7 +83,7 @@ pub(crate) fn prepare(
     warnings.extend(carried::unshadowed(scene, &loaded));
     let inputs = cost.stages.iter().filter(|s| s.name == pass::READ).map(|s| s.bytes).sum();
     let most = memory.total().max(memory::loading_bytes(&loaded, inputs));
-    Ok((loaded, Explanation { plan, cost, memory: most, splats, warnings, notes }, memory))
+    Ok((loaded, Explanation { plan, cost, memory: most, splats, warnings, notes, found: None }, memory))
 }
 
 /// Whether what is loaded of one scene serves the other, after [`Loaded::retarget`]: whether they differ in the size of the
@@ -173,7 +190,9 @@ fn check_samples(scene: &Scene) -> Result<(), Error> {
 /// # Errors
 /// See [`crate::render`].
 pub fn load(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Loaded, Error> {
-    load_measured(scene, options, progress, &Files::default(), &mut CostRecord::default())
+    let files = Files::default();
+    let (scene, _) = fitted(scene, options, progress, &files)?;
+    load_measured(&scene, options, progress, &files, &mut CostRecord::default())
 }
 
 /// [`load`] with what was read before, and with entries in the cost record: reading, and conversion where something is

@@ -5,9 +5,10 @@ use crate::device::Helper;
 use crate::draw::draw;
 use crate::frame::Frame;
 use crate::load::files::Files;
+use crate::load::fitted;
 use crate::plan::Plan;
 use crate::prepare::{Explanation, prepare};
-use crate::scene::Scene;
+use crate::scene::{FoundCamera, Scene};
 use crate::technique::{Checkpoint, Kept, Session, Sets, surfels};
 use crate::{CostRecord, Error, Layers, Progress, RenderOptions, doubts};
 use std::path::PathBuf;
@@ -27,6 +28,8 @@ pub struct Render {
     pub warnings: Vec<String>,
     /// What files hold that the picture does not show, and what was made of them, one sentence each.
     pub notes: Vec<String>,
+    /// The camera that was placed for it, where the scene leaves that to the data.
+    pub found: Option<FoundCamera>,
     /// What drew it: `cpu`, or the interface and the device that helped.
     pub backend: String,
 }
@@ -38,7 +41,44 @@ pub struct Render {
 /// [`Error::Input`] and [`Error::Io`] for data, [`Error::Limit`] before more memory is taken than allowed,
 /// [`Error::Cancelled`] after `progress.cancel()`.
 pub fn render(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Render, Error> {
-    render_keeping(scene, options, progress, None)
+    render_from(scene, options, progress, Files::default())
+}
+
+/// [`render`] from files of which some were read before.
+///
+/// # Errors
+/// As [`render`].
+pub fn render_from(
+    scene: &Scene,
+    options: &RenderOptions,
+    progress: &Progress,
+    files: Files,
+) -> Result<Render, Error> {
+    render_keeping(scene, options, progress, Begun::Still(files))
+}
+
+/// What a render begins with.
+pub(crate) enum Begun<'l> {
+    /// Files that may be let go once they are converted.
+    Still(Files),
+    /// What other frames of the scene have left.
+    Frame(&'l mut Left),
+}
+
+impl Begun<'_> {
+    fn files(&self) -> &Files {
+        match self {
+            Self::Still(files) => files,
+            Self::Frame(left) => &left.files,
+        }
+    }
+
+    fn left(&self) -> Option<&Left> {
+        match self {
+            Self::Still(_) => None,
+            Self::Frame(left) => Some(left),
+        }
+    }
 }
 
 /// What the frames of an animation leave for the next.
@@ -69,25 +109,29 @@ impl Left {
     }
 }
 
-/// [`render`] with what other frames of the scene have left.
+/// [`render`] with what there is already.
 pub(crate) fn render_keeping(
     scene: &Scene,
     options: &RenderOptions,
     progress: &Progress,
-    mut left: Option<&mut Left>,
+    begun: Begun<'_>,
 ) -> Result<Render, Error> {
+    let (scene, found) = fitted(scene, options, progress, begun.files())?;
+    let scene = &*scene;
     let open = |path: &PathBuf| {
         if !matches!(techniques(scene)[..], [only] if row(only).is_random) {
             let message = "only the technique `particles` is drawn in sets that a checkpoint can keep";
             return Err(Error::usage(message, "use --technique particles, or no --checkpoint"));
         }
-        Checkpoint::open(path, scene, options, left.as_ref().map(|left| &left.sets))
+        Checkpoint::open(path, scene, options, begun.left().map(|left| &left.sets))
     };
     let mut checkpoint = options.checkpoint.as_ref().map(open).transpose()?;
     let helper = options.device.as_deref().map(Helper::new);
-    let (loaded, explanation, memory) = match &left {
-        Some(left) => prepare(scene, options, progress, &left.files)?,
-        None => prepare(scene, options, progress, &Files::default())?,
+    let (loaded, explanation, memory) = prepare(scene, options, progress, begun.files())?;
+    let mut left = match begun {
+        // What was read is converted.
+        Begun::Still(_) => None,
+        Begun::Frame(left) => Some(left),
     };
     let Explanation { plan, mut cost, mut warnings, notes, .. } = explanation;
     // A reason that is told already is enough.
@@ -110,5 +154,5 @@ pub(crate) fn render_keeping(
     warnings.extend(doubts::of_shadows(plan.tables()));
     warnings.extend(doubts::of_scattering(&plan));
     warnings.extend(helper.map(|helper| helper.said()).unwrap_or_default());
-    Ok(Render { layers, cost, plan, sets, warnings, notes, backend })
+    Ok(Render { layers, cost, plan, sets, warnings, notes, found, backend })
 }

@@ -1,6 +1,7 @@
 //! Frames of one scene, one after the other: what was sampled for one serves the next.
 
-use crate::render::{Left, render_keeping};
+use crate::load::files::Files;
+use crate::render::{Begun, Left, render_keeping};
 use crate::scene::Scene;
 use crate::{Error, Progress, Render, RenderOptions};
 
@@ -55,7 +56,20 @@ impl Sequence {
         sequence
     }
 
-    /// Also a frame that will be drawn: all are added before the first is drawn. Little is kept of it.
+    /// Begins with files that were read before.
+    pub fn of_files(files: Files) -> Self {
+        let mut sequence = Self::default();
+        sequence.left.files = files;
+        sequence
+    }
+
+    /// The files that were read so far.
+    pub fn files(&self) -> &Files {
+        &self.left.files
+    }
+
+    /// Also a frame that will be drawn: all are added before the first is drawn, with the camera that [`crate::fitted`] finds. Little is
+    /// kept of it.
     pub fn add(&mut self, frame: &Scene) {
         self.left.add(frame);
     }
@@ -65,6 +79,6 @@ impl Sequence {
     /// # Errors
     /// As [`crate::render`].
     pub fn render(&mut self, frame: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Render, Error> {
-        render_keeping(frame, options, progress, Some(&mut self.left))
+        render_keeping(frame, options, progress, Begun::Frame(&mut self.left))
     }
 }

@@ -11,19 +11,23 @@ use std::sync::Arc;
 
 /// What a file holds.
 #[derive(Debug, Clone)]
-pub(super) enum FileData {
+pub enum FileData {
+    /// Triangles.
     Mesh(Arc<Mesh>),
+    /// Points without faces.
     Points(Arc<RawPoints>),
+    /// A regular volume.
     Grid(Arc<Grid>),
+    /// An image of radiance.
     Image(Arc<RadianceImage>),
 }
 
 /// The level set of scattered points, and its bounds.
 pub(super) type Fitted = (SharedField, DAabb);
 
-/// The files of a scene that were read.
+/// The files of a scene that were read, so that whoever looked at them before can hand them to [`crate::render_from`].
 #[derive(Default)]
-pub(crate) struct Files {
+pub struct Files {
     /// By path and frame.
     read: RefCell<HashMap<(PathBuf, u64), (ReadParams, FileData)>>,
     /// What there is to say of them, one sentence each.
@@ -36,7 +40,10 @@ pub(crate) struct Files {
 
 impl Files {
     /// Reads a file unless it was read with the same limits, and keeps what it holds.
-    pub(super) fn read(&self, path: &Path, limits: &ReadParams, progress: &Progress) -> Result<FileData, Error> {
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Input`] or [`Error::TooLarge`] as its reader has them.
+    pub fn read(&self, path: &Path, limits: &ReadParams, progress: &Progress) -> Result<FileData, Error> {
         if let Some(data) = self.known(path, limits) {
             return Ok(data);
         }

@@ -2,6 +2,7 @@
 
 use super::context::{BYTES_PER_SPLAT, Context};
 use super::files::Files;
+use super::input::{Input, input};
 use super::object::{self, Prepared};
 use super::own::Own;
 use crate::form::PlannedObject;
@@ -46,6 +47,15 @@ impl<'a> Loading<'a> {
                 self.progress.begin(&reading);
             }
             object::prepare(object, &self.context(id, 0, 0), looks(object)).map_err(|e| self.named(object, e))
+        };
+        self.visible().map(one).collect()
+    }
+
+    /// Reads every visible object.
+    pub(super) fn inputs(&self) -> Result<Vec<Input<'a>>, Error> {
+        let one = |(id, object): (usize, &'a SceneObject)| {
+            self.progress.tick(0).map_err(|_| Error::Cancelled)?;
+            input(object, &self.context(id, 0, 0)).map_err(|e| self.named(object, e))
         };
         self.visible().map(one).collect()
     }

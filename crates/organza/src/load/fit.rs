@@ -1,0 +1,94 @@
+//! Where the camera is that sees all of a scene: known once the data is read, before anything is converted.
+
+use super::files::Files;
+use super::input::{Input, input};
+use super::loading::Loading;
+use crate::scene::{FoundCamera, MediumShape, Scene};
+use crate::{Error, Progress, RenderOptions};
+use convert::extinct_bounds;
+use glam::DVec3;
+use rayon::prelude::*;
+use splat_core::{DAabb, Grid, TransferFunction};
+use std::borrow::Cow;
+
+/// Share of the largest extinction below which a voxel is not looked for by a camera.
+const FAINT: f32 = 0.02;
+
+/// The scene with a camera that sees all visible objects, where it leaves the camera's place to the data, and that camera; else the scene
+/// as it is. `files` keeps what is read for this.
+///
+/// # Errors
+/// As [`crate::render`] for data that cannot be read.
+pub fn fitted<'s>(
+    scene: &'s Scene,
+    options: &RenderOptions,
+    progress: &Progress,
+    files: &Files,
+) -> Result<(Cow<'s, Scene>, Option<FoundCamera>), Error> {
+    let Some(fit) = scene.fit else { return Ok((Cow::Borrowed(scene), None)) };
+    let inputs = Loading { scene, options, progress, files }.inputs()?;
+    let outlines: Vec<Outline<'_>> = inputs.iter().map(Outline::of).collect();
+    let found = fit.camera(&scene.camera, &|add| outlines.iter().for_each(|outline| outline.each(add)));
+    let Some(found) = found else {
+        let message = "`camera`: there is nothing to see for a camera that is placed by itself";
+        return Err(Error::input(crate::printable(&scene.file), message, "add a visible object, or give the camera a position"));
+    };
+    let scene = Scene { camera: found.camera, target: found.target, fit: None, ..scene.clone() };
+    Ok((Cow::Owned(scene), Some(found)))
+}
+
+/// Points around what is seen of an object.
+struct Outline<'i> {
+    input: &'i Input<'i>,
+    /// In the object, where they are not the data's own points.
+    points: Vec<DVec3>,
+}
+
+impl<'i> Outline<'i> {
+    fn of(input: &'i Input<'i>) -> Self {
+        let corners = |bounds: DAabb| bounds.corners().to_vec();
+        let points = match input {
+            Input::Mesh(..) | Input::Points(..) => Vec::new(),
+            Input::Volume(grid, transfer, _) => visible_ends(grid, transfer),
+            Input::Surface(_, bounds, ..) | Input::Density(_, bounds, _) => corners(*bounds),
+            Input::Procedural(shape, ..) => {
+                shape.ellipsoids.iter().flat_map(|e| corners(DAabb::around(e.center, e.radii))).collect()
+            }
+            Input::Medium(MediumShape::Box { bounds, .. }, _) => corners(*bounds),
+            Input::Medium(MediumShape::Ball { center, radius, .. }, _) => {
+                corners(DAabb::around(*center, DVec3::splat(*radius)))
+            }
+            Input::Rectangle(r, ..) => {
+                [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(s, t)| r.center + r.u * s + r.v * t).to_vec()
+            }
+        };
+        Self { input, points }
+    }
+
+    fn each(&self, add: &mut dyn FnMut(DVec3)) {
+        let transform = self.input.splat().transform;
+        match self.input {
+            Input::Mesh(_, mesh, _) => {
+                let corners = mesh.triangles.iter().flatten();
+                corners.for_each(|v| add(transform.apply(mesh.origin + mesh.position[*v as usize].as_dvec3())));
+            }
+            Input::Points(_, points, _) => {
+                points.position.iter().for_each(|p| add(transform.apply(points.origin + p.as_dvec3())));
+            }
+            _ => self.points.iter().for_each(|p| add(transform.apply(*p))),
+        }
+    }
+}
+
+/// The first and the last voxel of every row that shows something, and of a volume that shows nothing its corners.
+fn visible_ends(grid: &Grid, transfer: &TransferFunction) -> Vec<DVec3> {
+    let most = transfer.points().iter().fold(0.0, |most: f32, p| most.max(p.extinction));
+    let seen = |v: &f32| transfer.at(*v).extinction > FAINT * most;
+    let [nx, ny, _] = grid.dims;
+    let row = |(row, values): (usize, &[f32])| {
+        let (first, last) = (values.iter().position(seen)?, values.iter().rposition(seen)?);
+        Some([first, last].map(|i| grid.position(i, row % ny, row / ny)))
+    };
+    let ends: Vec<DVec3> = grid.values.par_chunks(nx).enumerate().filter_map(row).flatten_iter().collect();
+    if ends.is_empty() { extinct_bounds(grid, transfer).corners().to_vec() } else { ends }
+}
