@@ -29,8 +29,14 @@ pub(crate) fn plain(groups: &Groups) -> Passes<'_> {
 /// The picture with three channels.
 pub(crate) fn resolve(scene: &Scene, params: &Params, passes: Passes<'_>) -> Opaque {
     let discs = Discs::project(&scene.input(), params);
-    let input =
-        OpaqueInput { discs: &discs, shown: Shown::Discs(&scene.values), channels: 3, objects: true, passes, max_bytes: 1 << 30 };
+    let input = OpaqueInput {
+        discs: &discs,
+        shown: Shown::Discs(&scene.values),
+        channels: 3,
+        objects: true,
+        passes,
+        max_bytes: 1 << 30,
+    };
     resolve_opaque(&input, params, None).expect("in range")
 }
 
@@ -245,7 +251,14 @@ fn any_number_of_channels_is_taken_and_two_passes_meet_twice_as_many_fragments()
         for channels in [0, 1, 17] {
             let values: Vec<f32> = scene.values.chunks(3).flat_map(|v| (0..channels).map(move |c| v[c % 3])).collect();
             let (channels, max_bytes) = (channels as u32, 1 << 24);
-            let input = OpaqueInput { discs: &discs, shown: Shown::Discs(&values), channels, objects: false, passes, max_bytes };
+            let input = OpaqueInput {
+                discs: &discs,
+                shown: Shown::Discs(&values),
+                channels,
+                objects: false,
+                passes,
+                max_bytes,
+            };
             let image = resolve_opaque(&input, &params, None).expect("in range").image;
             assert_eq!((image.depth, image.object.len()), (one.image.depth.clone(), 0));
             assert_eq!(image.channels.len(), channels as usize);
@@ -297,7 +310,14 @@ fn what_is_too_much_is_refused_and_what_is_wrong_is_named() {
     let discs = Discs::project(&scene.input(), &params);
     let groups = by_turns(&scene.cloud, 4);
     let (passes, max_bytes) = (voronoi(&groups), 1 << 24);
-    let input = OpaqueInput { discs: &discs, shown: Shown::Discs(&scene.values), channels: 3, objects: false, passes, max_bytes };
+    let input = OpaqueInput {
+        discs: &discs,
+        shown: Shown::Discs(&scene.values),
+        channels: 3,
+        objects: false,
+        passes,
+        max_bytes,
+    };
     let counts = resolve_opaque(&input, &params, None).expect("in range").counts;
     let enough = OpaqueInput { max_bytes: counts.bytes, ..input };
     assert!(resolve_opaque(&enough, &params, None).is_ok());

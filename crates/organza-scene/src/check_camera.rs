@@ -20,12 +20,7 @@ pub(super) struct Seen {
 }
 
 /// Checks the camera at a turn of a turntable; `goes_around` where a track of the animation takes it around.
-pub(super) fn check_camera(
-    at: &At<'_>,
-    raw: &RawCamera,
-    turn: Option<Turn>,
-    goes_around: bool,
-) -> Result<Seen, Error> {
+pub(super) fn check_camera(at: &At<'_>, raw: &RawCamera, turn: Option<Turn>, goes_around: bool) -> Result<Seen, Error> {
     refuse_what_does_not_apply(at, raw)?;
     let (projection, size) = (check_projection(at, raw)?, check_size(at, raw)?);
     let angle = turn.map_or(0.0, Turn::angle);
@@ -69,7 +64,8 @@ pub(super) fn check_camera(
 /// A key that would silently do nothing is an error.
 fn refuse_what_does_not_apply(at: &At<'_>, raw: &RawCamera) -> Result<(), Error> {
     let given = [("position", raw.position), ("target", raw.target), ("up", raw.up)].map(|(k, v)| (k, v.is_some()));
-    let found = [("azimuth", raw.azimuth), ("elevation", raw.elevation), ("fit", raw.fit)].map(|(k, v)| (k, v.is_some()));
+    let found =
+        [("azimuth", raw.azimuth), ("elevation", raw.elevation), ("fit", raw.fit)].map(|(k, v)| (k, v.is_some()));
     let (keys, message, hint) = if raw.auto {
         (given, "is not for a camera with `auto`, whose place is found", "leave it or `auto` out")
     } else {

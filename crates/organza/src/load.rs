@@ -1,8 +1,8 @@
 //! The objects of a scene become one cloud in canonical order, with its tables.
 
 mod context;
-mod fit;
 pub(crate) mod files;
+mod fit;
 mod images;
 pub(crate) mod input;
 mod loading;

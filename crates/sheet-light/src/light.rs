@@ -148,7 +148,10 @@ impl SlideInView<'_> {
         let half = of(0.5);
         let mut numbers = [[0.0; MAX_LANES]; 3];
         let sides = [dot(&way, &all(simd, self.across)), dot(&way, &all(simd, self.down)), depth];
-        numbers.iter_mut().zip([sides[0] / depth + half, sides[1] / depth + half, depth]).for_each(|(to, v)| v.store(to));
+        numbers
+            .iter_mut()
+            .zip([sides[0] / depth + half, sides[1] / depth + half, depth])
+            .for_each(|(to, v)| v.store(to));
         let per = f64::from(spread.sqrt() * self.across.length());
         let mut passing = [[0.0; MAX_LANES]; 3];
         for lane in 0..Lanes::<S>::COUNT {

@@ -97,7 +97,14 @@ impl<'a> Lines<'a> {
     }
 
     /// The place after the last line.
-    #[cfg(any(feature = "stl", feature = "nrrd", feature = "off", feature = "pcd", feature = "metaimage", feature = "vtk"))]
+    #[cfg(any(
+        feature = "stl",
+        feature = "nrrd",
+        feature = "off",
+        feature = "pcd",
+        feature = "metaimage",
+        feature = "vtk"
+    ))]
     pub(super) fn end(&self) -> Place {
         Place::Line { line: self.number + 1, column: 0 }
     }

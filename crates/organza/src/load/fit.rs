@@ -31,7 +31,11 @@ pub fn fitted<'s>(
     let found = fit.camera(&scene.camera, &|add| outlines.iter().for_each(|outline| outline.each(add)));
     let Some(found) = found else {
         let message = "`camera`: there is nothing to see for a camera that is placed by itself";
-        return Err(Error::input(crate::printable(&scene.file), message, "add a visible object, or give the camera a position"));
+        return Err(Error::input(
+            crate::printable(&scene.file),
+            message,
+            "add a visible object, or give the camera a position",
+        ));
     };
     let scene = Scene { camera: found.camera, target: found.target, fit: None, ..scene.clone() };
     Ok((Cow::Owned(scene), Some(found)))
