@@ -125,7 +125,7 @@ impl Light<'_> {
         let point = Point { position: world, radius: mean.radius, normal, to_eye, color: mean.color, material };
         let coefficient = cloud.shadow_coefficient_of(i) * objects[object].shadow_coefficient;
         let receiver = Receiver { position, normal: face, radius: mean.radius, kind };
-        let radiance = point.radiance(ambient, lights.iter().map(|lit| &lit.light), |rank, irradiance| {
+        let radiance = point.radiance(ambient, lights.iter(), |rank, irradiance| {
             let shadow = lights[rank].shadow.map(|shadow| move || shadow.transmittance(&receiver));
             arriving(irradiance, coefficient, shadow)
         });
