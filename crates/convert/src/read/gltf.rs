@@ -20,7 +20,7 @@ use crate::error::{Place, ReadError, escaped};
 use crate::raw_points::RawPoints;
 use accessor::{Buffers, missing};
 use document::{Document, Primitive};
-use material::{Paints, note};
+use material::Paints;
 use nodes::Instance;
 use primitive::{POINTS, Surface};
 use splat_core::Mesh;
@@ -153,6 +153,6 @@ fn name_unused(document: &Document, instances: &[Instance<'_>], reading: &mut Re
     let primitives = instances.iter().filter_map(|i| document.meshes.get(i.mesh)).flat_map(|m| &m.primitives);
     reading.notes.not_used(primitives.flat_map(|p| p.extensions.keys()).map(String::as_bytes));
     if instances.is_empty() {
-        note(reading, "the default scene has no mesh".to_owned());
+        reading.notes.remark("the default scene has no mesh");
     }
 }

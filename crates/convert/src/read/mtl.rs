@@ -91,10 +91,7 @@ impl<'a> Materials<'a> {
             Ok(stream) => stream.rest().map(Some),
             Err(error) if error.fault == Fault::Limit => Err(error),
             Err(error) => {
-                let remark = format!("{}, found {}: it is left out", error.expected, error.found);
-                if !reading.notes.remarks.contains(&remark) {
-                    reading.notes.remarks.push(remark);
-                }
+                reading.notes.remark(format!("{}, found {}: it is left out", error.expected, error.found));
                 Ok(None)
             }
         }

@@ -196,7 +196,11 @@ impl Content<'_> {
         reading: &mut Reading<'_>,
     ) -> Result<(), ReadError> {
         let has_place = |w: Word<'_>| w.text.split(|b| *b == b'/').nth(1).is_some_and(|part| !part.is_empty());
-        let is_textured = self.materials.has_texture() && words.clone().all(has_place);
+        let has_texture = self.materials.has_texture();
+        let is_textured = has_texture && words.clone().all(has_place);
+        if has_texture && !is_textured {
+            reading.notes.remark("faces without texture coordinates have the Kd of their material alone");
+        }
         self.face.clear();
         for word in words {
             let corner = self.corner(word, is_textured, reading)?;

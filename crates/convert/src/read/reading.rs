@@ -118,6 +118,15 @@ pub struct Notes {
     feature = "vtk"
 ))]
 impl Notes {
+    /// Adds a remark, once.
+    #[cfg(any(feature = "obj", feature = "gltf"))]
+    pub(super) fn remark(&mut self, remark: impl Into<String>) {
+        let remark = remark.into();
+        if !self.remarks.contains(&remark) {
+            self.remarks.push(remark);
+        }
+    }
+
     /// Adds names that are not used, each once, with what would steer a terminal escaped.
     pub(super) fn not_used<'a>(&mut self, names: impl IntoIterator<Item = &'a [u8]>) {
         for name in names {

@@ -50,7 +50,7 @@ impl<'a> Paints<'a> {
         Self { document, buffers, beside, paints, textures, known: BTreeMap::new(), decoded: BTreeMap::new() }
     }
 
-    /// Rank of the paint of a material, and the coordinates of its texture.
+    /// Rank of the paint of a material, which the same without its texture follows; and the coordinates of the texture.
     pub(super) fn of(
         &mut self,
         material: Option<usize>,
@@ -81,14 +81,15 @@ impl<'a> Paints<'a> {
             Some("MASK") => Some(stated.alpha_cutoff.unwrap_or(0.5) as f32),
             Some("BLEND") => {
                 let remark = "alphaMode BLEND: surfaces have the opacity of their object, not that of their material";
-                note(reading, remark.to_owned());
+                reading.notes.remark(remark);
                 None
             }
             _ => None,
         };
         name_unused(stated, reading);
         let rank = self.paints.len() as u32;
-        self.paints.push(Paint { factor: factor.map(|f| f as f32), texture, cutoff });
+        let textured = Paint { factor: factor.map(|f| f as f32), texture, cutoff };
+        self.paints.extend([textured, Paint { texture: None, ..textured }]);
         self.known.insert(material, (rank, coordinates));
         Ok((rank, coordinates))
     }
@@ -103,7 +104,9 @@ impl<'a> Paints<'a> {
         let found = match texture.source {
             Some(image) => self.image(image, reading)?,
             None => {
-                note(reading, format!("texture {index} is in no format that is read (PNG, JPEG): it is left out"));
+                reading
+                    .notes
+                    .remark(format!("texture {index} is in no format that is read (PNG, JPEG): it is left out"));
                 None
             }
         };
@@ -133,7 +136,7 @@ impl<'a> Paints<'a> {
             (Some(uri), None) => match fetch(uri, &what, self.beside, reading) {
                 Ok(content) => Texture::decode(&content, &what, reading)?,
                 Err(error) if error.fault == Fault::FileSystem => {
-                    note(reading, format!("{} ({}): the texture is left out", error.expected, error.found));
+                    reading.notes.remark(format!("{} ({}): the texture is left out", error.expected, error.found));
                     return Ok(None);
                 }
                 Err(error) => return Err(error),
@@ -141,13 +144,6 @@ impl<'a> Paints<'a> {
             (None, None) => return Err(wrong(format!("bytes of {what}"), "neither a uri nor a buffer view".into())),
         };
         Ok(Some(decoded))
-    }
-}
-
-/// Adds a remark that is not there yet.
-pub(super) fn note(reading: &mut Reading<'_>, remark: String) {
-    if !reading.notes.remarks.contains(&remark) {
-        reading.notes.remarks.push(remark);
     }
 }
 

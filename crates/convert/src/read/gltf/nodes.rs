@@ -23,10 +23,11 @@ pub(super) fn instances(document: &Document) -> Result<Vec<Instance<'_>>, ReadEr
         }
         None => {
             let mut is_child = vec![false; nodes.len()];
-            nodes
-                .iter()
-                .flat_map(|n| &n.children)
-                .for_each(|c| is_child.iter_mut().skip(*c).take(1).for_each(|i| *i = true));
+            for child in nodes.iter().flat_map(|n| &n.children) {
+                if let Some(is_child) = is_child.get_mut(*child) {
+                    *is_child = true;
+                }
+            }
             (0..nodes.len()).filter(|i| !is_child[*i]).collect()
         }
     };

@@ -2,7 +2,7 @@
 
 use super::accessor::{Buffers, missing};
 use super::document::Primitive;
-use super::material::Paints;
+use super::material::{Coordinates, Paints};
 use super::{HINT, wrong};
 use crate::error::{Place, ReadError};
 use crate::read::direction::unit;
@@ -61,8 +61,7 @@ impl Surface {
             return Err(missing("vertex", *beyond as usize, count));
         }
         if mode == POINTS {
-            let all: Vec<u32> = indices;
-            return self.append(&vertices, all.into_iter(), reading).map(|_| ());
+            return self.append(&vertices, indices.iter().copied(), reading).map(|_| ());
         }
         let mut triangles = triangles(&indices, mode)?;
         if scene_from_mesh.determinant() < 0.0 {
@@ -145,31 +144,60 @@ fn vertices(
     let alike = |found: usize, name: &str| {
         if found == count { Ok(()) } else { Err(wrong(format!("{count} entries of {name}"), found.to_string())) }
     };
-    let mut normal = None;
-    if let Some(index) = attribute("NORMAL") {
-        let stored = buffers.vectors::<3>(index, "NORMAL", reading)?;
-        alike(stored.len(), "NORMAL")?;
-        let turned = normals_turn(scene_from_mesh);
-        let all: Vec<Vec3> = stored.iter().map(|n| unit(turned * Vec3::from(*n).as_dvec3())).collect();
-        // Normals of which one is none are left out: the surface is flat.
-        normal = all.iter().all(|n| n.is_finite() && *n != Vec3::ZERO).then_some(all);
+    let normal =
+        attribute("NORMAL").map(|index| normals(index, scene_from_mesh, buffers, reading)).transpose()?.flatten();
+    if let Some(normal) = &normal {
+        alike(normal.len(), "NORMAL")?;
     }
     let tint = attribute("COLOR_0").map(|index| colors(index, buffers, reading)).transpose()?;
     if let Some(tint) = &tint {
         alike(tint.len(), "COLOR_0")?;
     }
-    let mut place = None;
-    if let (Some(coordinates), Some(set)) = (coordinates, set) {
-        let index = attribute(&set).ok_or_else(|| wrong(format!("{set}, which the texture goes by"), "none".into()))?;
-        let stored = buffers.vectors::<2>(index, &set, reading)?;
-        alike(stored.len(), &set)?;
-        let all: Vec<[f32; 2]> = stored.into_iter().map(|p| coordinates.place(p)).collect();
-        if !all.iter().flatten().all(|c| c.is_finite()) {
-            return Err(wrong(format!("finite {set}"), "another number".into()));
-        }
-        place = Some(all);
+    let place = coordinates.map(|c| places(c, attribute, buffers, reading)).transpose()?.flatten();
+    if let Some(place) = &place {
+        alike(place.len(), "texture coordinates")?;
     }
+    let paint = if coordinates.is_some() && place.is_none() { paint + 1 } else { paint };
     Ok(Vertices { position, normal, tint, place, paint })
+}
+
+/// Places in the texture; `None` for a primitive without such coordinates, which a remark says.
+fn places(
+    coordinates: Coordinates,
+    attribute: impl Fn(&str) -> Option<usize>,
+    buffers: &Buffers<'_>,
+    reading: &mut Reading<'_>,
+) -> Result<Option<Vec<[f32; 2]>>, ReadError> {
+    let set = format!("TEXCOORD_{}", coordinates.set);
+    let Some(index) = attribute(&set) else {
+        reading
+            .notes
+            .remark(format!("a primitive has no {set}, which its texture goes by: it has its baseColorFactor"));
+        return Ok(None);
+    };
+    let stored = buffers.vectors::<2>(index, &set, reading)?;
+    let all: Vec<[f32; 2]> = stored.into_iter().map(|p| coordinates.place(p)).collect();
+    if all.iter().flatten().all(|c| c.is_finite()) {
+        return Ok(Some(all));
+    }
+    Err(wrong(format!("finite {set}"), "another number".into()))
+}
+
+/// Unit normals in the scene; `None` where one of them has no direction, which a remark says.
+fn normals(
+    index: usize,
+    scene_from_mesh: &DMat4,
+    buffers: &Buffers<'_>,
+    reading: &mut Reading<'_>,
+) -> Result<Option<Vec<Vec3>>, ReadError> {
+    let stored = buffers.vectors::<3>(index, "NORMAL", reading)?;
+    let turned = normals_turn(scene_from_mesh);
+    let all: Vec<Vec3> = stored.iter().map(|n| unit(turned * Vec3::from(*n).as_dvec3())).collect();
+    if all.iter().all(|n| n.is_finite() && *n != Vec3::ZERO) {
+        return Ok(Some(all));
+    }
+    reading.notes.remark("a primitive has a normal without a direction: its triangles are flat");
+    Ok(None)
 }
 
 /// The map of normals: cofactors, which exist for flat transforms too; the length does not matter.
