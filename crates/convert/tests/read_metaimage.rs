@@ -101,6 +101,8 @@ fn what_is_wrong_in_a_header_is_named_with_its_line() {
     ] {
         refused(&with(from, to), beginning);
     }
+    let many: String = (0..400_000).map(|i| format!("f{i} = 0\n")).collect();
+    refused(metaimage_header(&many).as_bytes(), "a.mha:4097: expected at most 4096 fields, found 'f4087'");
     refused(metaimage_header("").replace("ElementDataFile", "Element").as_bytes(), "a.mha:11: expected a field Elem");
     let mut nan = metaimage("raw", false);
     let at = nan.len() - 40;

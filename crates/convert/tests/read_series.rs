@@ -132,6 +132,9 @@ fn a_series_whose_axes_are_not_told_apart_is_refused() {
         let error = read("a.nrrd", &nrrd_of(fields, &frames(false)), 0).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}");
     }
+    let wide = "sizes: 8388609 1 1 1\nspace directions: none (1,0,0) (0,1,0) (0,0,1)";
+    let error = read("a.nrrd", &nrrd_of(wide, &frames(false)), 0).unwrap_err().to_string();
+    assert!(error.contains("expected at most 8388608 bytes a voxel, found 8388609"), "{error}");
     let turned = String::from_utf8(metaimage_of("2 1 1 3", b"")).unwrap().replace("0 -1 0 0 1", "0 -1 0 1 1");
     let error = read("a.mha", &[turned.as_bytes(), &frames(false)].concat(), 0).unwrap_err().to_string();
     assert!(error.contains("expected axes of space that do not lead along the series"), "{error}");

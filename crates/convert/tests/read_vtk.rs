@@ -113,6 +113,8 @@ fn what_is_wrong_in_a_file_is_named() {
     ] {
         refused(&with(from, to), expected);
     }
+    let many = with("FIELD more 1\n", &format!("FIELD more 400000\n{}", "a 0 0 int\n".repeat(400_000)));
+    refused(&many, "a.vtk:4108: expected at most 4096 arrays");
     refused(b"# vtk DataFile Version 3.0\n", "expected ASCII or BINARY, found the end of the file");
     let scalars = vtk(true);
     let at = scalars.windows(48).position(|w| w == raw(true)).unwrap();

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 /// Voxels converted by one task.
 const CHUNK: usize = 1 << 16;
-/// Bytes read at once, about.
+/// Bytes read at once, about, and the most of one voxel.
 const BLOCK: u64 = 8 << 20;
 /// Most numbers in a file.
 const MAX_NUMBERS: u64 = 1 << 45;
@@ -61,6 +61,10 @@ impl Stored {
         if sizes.into_iter().try_fold(1u64, |n, s| n.checked_mul(s)).is_none_or(|n| n > MAX_NUMBERS) {
             let found = format!("{:?}, {frames} times, {numbers} numbers each", self.dims);
             return Err(ReadError::input(place, "at most 2^45 voxels", found, hint));
+        }
+        if self.voxel_bytes() > BLOCK {
+            let expected = format!("at most {BLOCK} bytes a voxel");
+            return Err(ReadError::input(place, expected, self.voxel_bytes().to_string(), hint));
         }
         Ok(())
     }
@@ -117,8 +121,8 @@ pub(super) fn read(
     if let Some(left) = stream.left().filter(|left| *left != needed) {
         return wrong(left.to_string());
     }
-    let mut values = room(stored, params)?;
     stream.expect(needed)?;
+    let mut values = room(stored, params)?;
     let start = stored.frame_bytes() * stored.selection.frame;
     let mut got = stream.skip(start)?;
     if got == start {

@@ -17,7 +17,7 @@ use splat_core::glam::{DMat3, DVec3};
 const HINT: &str = "the file is truncated or damaged, or its header states other sizes";
 
 /// Most elements, attributes and texts of a file; real ones have some dozens.
-const MAX_NODES: u32 = 100_000;
+const MAX_NODES: u32 = 10_000;
 
 /// Reads a volume.
 pub(super) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Result<Grid, ReadError> {

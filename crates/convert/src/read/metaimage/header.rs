@@ -9,6 +9,9 @@ use splat_core::glam::{DMat3, DVec3};
 /// The field with which a header ends.
 const LAST: &str = "ElementDataFile";
 
+/// Most fields, each of which is held against all others; real headers have a dozen, or hundreds with those of DICOM.
+const MAX_FIELDS: usize = 4096;
+
 /// Names of one field each.
 const BYTE_ORDER: [&str; 2] = ["BinaryDataByteOrderMSB", "ElementByteOrderMSB"];
 const OFFSET: [&str; 3] = ["Offset", "Position", "Origin"];
@@ -138,6 +141,9 @@ impl Fields {
         let one = [&BYTE_ORDER[..], &OFFSET, &MATRIX].into_iter().find(|names| names.contains(&name));
         if self.find(one.unwrap_or(&[name])).is_some() {
             return Err(wrong(place, "each field once", name));
+        }
+        if self.found.len() == MAX_FIELDS {
+            return Err(wrong(place, &format!("at most {MAX_FIELDS} fields"), name));
         }
         self.found.push((name.to_owned(), value.to_owned(), place));
         Ok(())

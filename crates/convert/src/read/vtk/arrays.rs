@@ -6,6 +6,9 @@ use crate::read::text::{Line, Lines, Word};
 use crate::read::voxels::Kind;
 use std::ops::Range;
 
+/// Most arrays, each name of which is held against all others; real files have some dozens.
+const MAX_ARRAYS: usize = 4096;
+
 /// What an array belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Of {
@@ -171,6 +174,9 @@ impl<'a> Arrays<'a> {
             }
             data.end()
         };
+        if self.found.len() == MAX_ARRAYS {
+            return Err(wrong(line, &format!("at most {MAX_ARRAYS} arrays")));
+        }
         lines.go_to(end, last);
         let name = words.get(1).map(|w| escaped(w.text, 40)).unwrap_or_default();
         let (of, place) = (self.of, line.place());
