@@ -15,7 +15,7 @@ mod marching_cubes;
 mod mpu_fields;
 mod point_opacity;
 mod read_assets;
-#[cfg(all(feature = "hdr", feature = "exr"))]
+#[cfg(all(feature = "hdr", feature = "exr", feature = "png"))]
 mod read_images;
 mod read_las;
 mod read_mended;

@@ -14,7 +14,8 @@ const MOST_LIGHT_SAMPLES: u32 = 1_000_000;
 
 /// Checks one light.
 pub(super) fn check_light(at: &At<'_>, raw: &RawLight, paths: &Paths) -> Result<SceneLight, Error> {
-    let of = |shape, intensity, shadow| SceneLight { light: Light { shape, intensity }, slide: None, samples: 1, shadow };
+    let of =
+        |shape, intensity, shadow| SceneLight { light: Light { shape, intensity }, slide: None, samples: 1, shadow };
     let extended = |shape, intensity, samples, shadow| {
         let samples = at.whole("samples", samples, 1..=MOST_LIGHT_SAMPLES)?;
         Ok(SceneLight { samples, ..of(shape, at.color("intensity", intensity)?, shadow) })

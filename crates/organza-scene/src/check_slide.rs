@@ -31,7 +31,9 @@ pub(super) fn check_slide(
         let of_texture =
             [("texture_up", keys.up.is_some()), (name, width.is_some()), ("texture_center", keys.center.is_some())];
         return match of_texture.iter().find(|(_, is_there)| *is_there) {
-            Some((key, _)) => Err(at.key(key).error(format!("`{key}` belongs to a `texture`"), "name one, or leave it out")),
+            Some((key, _)) => {
+                Err(at.key(key).error(format!("`{key}` belongs to a `texture`"), "name one, or leave it out"))
+            }
             None => Ok(None),
         };
     };

@@ -49,8 +49,12 @@ mod tests {
 
     #[test]
     fn points_do_not_depend_on_the_order_of_lights_and_know_theirs() {
-        let light =
-            |shape, samples, shadow| SceneLight { light: Light { shape, intensity: [6.0; 3] }, slide: None, samples, shadow };
+        let light = |shape, samples, shadow| SceneLight {
+            light: Light { shape, intensity: [6.0; 3] },
+            slide: None,
+            samples,
+            shadow,
+        };
         let disk = LightShape::Disk { center: DVec3::Y, normal: DVec3::NEG_Y, radius: 0.5 };
         let lamp = LightShape::Point { position: DVec3::Y };
         let lights = [light(disk, 3, true), light(lamp, 1, true), light(lamp, 1, false)];

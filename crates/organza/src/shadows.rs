@@ -4,8 +4,8 @@ use crate::Error;
 use crate::lights::LightPoint;
 use crate::load::Loaded;
 use crate::scene::{RenderSettings, ShadowMapping};
-use splat_core::Object;
 use splat_core::Limits;
+use splat_core::Object;
 use tsm::{Deposits, Limit, Params};
 
 /// Share of the tolerance that the ends of lists may take, of all lights together. Absorbance grows with its logarithm only, so

@@ -148,7 +148,10 @@ impl SlideInView<'_> {
         let half = of(0.5);
         let mut numbers = [[0.0; MAX_LANES]; 3];
         let sides = [dot(&way, &all(simd, self.across)), dot(&way, &all(simd, self.down)), depth];
-        numbers.iter_mut().zip([sides[0] / depth + half, sides[1] / depth + half, depth]).for_each(|(to, v)| v.store(to));
+        numbers
+            .iter_mut()
+            .zip([sides[0] / depth + half, sides[1] / depth + half, depth])
+            .for_each(|(to, v)| v.store(to));
         let per = f64::from(spread.sqrt() * self.across.length());
         let mut passing = [[0.0; MAX_LANES]; 3];
         for lane in 0..Lanes::<S>::COUNT {
@@ -426,7 +429,7 @@ mod tests {
             let camera = Camera::look_at(eye, target, DVec3::Y, view, [8, 8]).unwrap();
             let (material, mut lights, position) = (trial.material(), trial.lights(), trial.vector());
             lights.iter_mut().for_each(|lit| lit.light.validate(0).unwrap());
-            let slides = [0, 2].map(|k: usize| trial.slide(&lights[k].light.shape));
+            let slides = [0, 2].map(|k: usize| Trial(n + 10_000 * (1 + k as u64), 0).slide(&lights[k].light.shape));
             if n.is_multiple_of(2) {
                 (lights[0].slide, lights[2].slide) = (Some(&slides[0]), Some(&slides[1]));
             }

@@ -85,7 +85,11 @@ impl ChainInput {
     /// What shading reads, handed to `work`.
     fn lit<T>(&self, work: impl FnOnce(&ShadeInput<'_>) -> T) -> T {
         let veil: Option<&dyn Transmittance> = Some(&Veil);
-        let lit = [(self.lights[0], veil), (self.lights[1], None)].map(|(light, shadow)| LitBy { slide: None, light, shadow });
+        let lit = [(self.lights[0], veil), (self.lights[1], None)].map(|(light, shadow)| LitBy {
+            slide: None,
+            light,
+            shadow,
+        });
         let (cloud, materials, objects) = (&self.cloud, &self.materials[..], &self.objects[..]);
         work(&ShadeInput { cloud, materials, objects, lights: &lit, ambient: [0.05; 3], camera: &self.camera })
     }

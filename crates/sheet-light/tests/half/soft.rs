@@ -161,7 +161,11 @@ fn hv07_hv08_what_is_constant_stays_so_after_a_thousand_slabs_and_at_borders() {
     let (thin, material) = (constant(0.5), scattering());
     let camera = parallel([0.0, 0.0, 9.0], 5.6, [32, 32]);
     let disk = extended(LightShape::Disk { center: DVec3::Z * 1e3, normal: DVec3::NEG_Z, radius: 30.0 }, 16);
-    let point = LitBy { slide: None, light: Light { shape: lamp([0.0, 0.0, 1e3]).light.shape, ..disk.lit.light }, shadow: None };
+    let point = LitBy {
+        slide: None,
+        light: Light { shape: lamp([0.0, 0.0, 1e3]).light.shape, ..disk.lit.light },
+        shadow: None,
+    };
     let with = |casts_shadow: bool, is_soft: bool| {
         let volumes = [Volume { casts_shadow, ..volume(&grid, &thin, &material) }];
         let (extended, lights) = if is_soft { (vec![disk], vec![]) } else { (vec![], vec![point]) };

@@ -35,8 +35,7 @@ pub(super) fn fold(
     let origin = frame.loaded.cloud.origin;
     let shining: Vec<(LitBy<'_>, Option<&ShadowMap>)> = frame.shining(maps).collect();
     let shadow = |map| -> Option<&dyn Transmittance> { Some(map? as &ShadowMap) };
-    let lights: Vec<LitBy<'_>> =
-        shining.iter().map(|(lit, map)| LitBy { shadow: shadow(*map), ..*lit }).collect();
+    let lights: Vec<LitBy<'_>> = shining.iter().map(|(lit, map)| LitBy { shadow: shadow(*map), ..*lit }).collect();
     let (camera, ambient) = (&frame.camera, frame.scene.ambient);
     let scene = pbsr::Scene { objects: &objects, lights: &lights, shadow_origin: origin, ambient, camera, occluder };
     let colored = frame.plan.optical_depth_planes == 3;
