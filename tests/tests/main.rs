@@ -36,4 +36,5 @@ mod slanted_slabs;
 mod surfel_layers;
 mod surfels;
 mod techniques;
+mod textured_lights;
 mod truth;

@@ -19,6 +19,7 @@
     feature = "las",
     feature = "hdr",
     feature = "exr",
+    feature = "png",
     unix
 ))]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
@@ -114,6 +115,7 @@ fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("lines.exr", images::exr(Compression::ZIP16, Blocks::ScanLines)),
         ("tiles.exr", images::exr(Compression::PIZ, Blocks::Tiles(Vec2(8, 4)))),
         ("plain.exr", images::exr(Compression::Uncompressed, Blocks::ScanLines)),
+        ("a.png", images::png(image::ExtendedColorType::Rgb8, &images::png_bytes(3))),
     ]
 }
 

@@ -17,7 +17,7 @@ mod point_opacity;
 mod read_assets;
 #[cfg(all(feature = "off", feature = "pcd", feature = "gltf"))]
 mod read_gltf;
-#[cfg(all(feature = "hdr", feature = "exr"))]
+#[cfg(all(feature = "hdr", feature = "exr", feature = "png"))]
 mod read_images;
 mod read_las;
 #[cfg(feature = "obj")]

@@ -1,10 +1,11 @@
 //! Images of radiance: what they hold, against another decoder, and what is refused in them.
 
-use crate::read_samples::images::{SIZE, exr, exr_of, hdr_of, layer_of, newer, older, plain, radiance};
+use crate::read_samples::images::{SIZE, exr, exr_of, hdr_of, layer_of, newer, older, plain, png, png_bytes, radiance};
 use crate::read_samples::{gzip, load};
 use convert::read::{Loaded, ReadParams, bytes};
 use convert::{Fault, ReadError};
 use exr::prelude::{Blocks, Compression, Vec2};
+use image::ExtendedColorType;
 use splat_core::{Limits, RadianceImage};
 
 fn image(name: &str, content: &[u8]) -> RadianceImage {
@@ -149,4 +150,45 @@ fn bi36_openexr_without_colours_deep_cropped_or_with_what_is_no_radiance() {
     refused("a.exr", b"v/1\x01", "a.exr: expected a complete OpenEXR image");
     let little = ReadParams { limits: Limits::bytes(700), ..ReadParams::default() };
     assert_eq!(bytes("a.exr", &exr(lines.0, lines.1), &little, None).unwrap_err().fault, Fault::Limit);
+}
+
+#[test]
+fn png_of_a_display_becomes_linear_radiance() {
+    // IEC 61966-2-1.
+    let linear = |v: f64| if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
+    let eight = png_bytes(3);
+    let read = image("a.png", &png(ExtendedColorType::Rgb8, &eight));
+    assert_eq!(read.size, SIZE);
+    for (found, stored) in read.pixels.as_flattened().iter().zip(&eight) {
+        assert!((f64::from(*found) - linear(f64::from(*stored) / 255.0)).abs() < 1e-7, "{stored}: {found}");
+    }
+    let sixteen = png_bytes(2);
+    let read = image("b.png", &gzip(&png(ExtendedColorType::L16, &sixteen)));
+    for (found, stored) in read.pixels.iter().zip(sixteen.chunks_exact(2)) {
+        let expected = linear(f64::from(u16::from_ne_bytes([stored[0], stored[1]])) / 65535.0);
+        assert!(found.iter().all(|v| (f64::from(*v) - expected).abs() < 1e-7), "{stored:?}: {found:?}");
+    }
+    let opaque: Vec<u8> = eight.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], 255]).collect();
+    let with_alpha = image("c.png", &png(ExtendedColorType::Rgba8, &opaque));
+    assert_eq!(with_alpha, image("a.png", &png(ExtendedColorType::Rgb8, &eight)));
+}
+
+#[test]
+fn bi36_png_that_is_translucent_damaged_or_longer_than_it_says() {
+    let good = png(ExtendedColorType::Rgb8, &png_bytes(3));
+    let translucent = png(ExtendedColorType::Rgba8, &png_bytes(4));
+    refused("a.png", &translucent, "a.png: expected opaque pixels, found some that are translucent");
+    refused("a.png", &good[..20], "a.png: expected a complete PNG image");
+    let [short, long] = [good[..good.len() - 12].to_vec(), [&good[..], b"x"].concat()];
+    let beginning =
+        format!("a.png@{}: expected a whole chunk, the last one IEND, found the end of the file", short.len());
+    refused("a.png", &short, &beginning);
+    let beginning = format!("a.png@{}: expected the end of the file after IEND, found 1 bytes more", good.len());
+    refused("a.png", &long, &beginning);
+    let gamma =
+        [&good[..33], &[0, 0, 0, 4][..], b"gAMA", &[0, 0, 0xb1, 0x8f, 0x0b, 0xfc, 0x61, 0x05], &good[33..]].concat();
+    let (_, notes) = bytes("a.png", &gamma, &ReadParams::default(), None).unwrap();
+    assert_eq!(notes.unused, ["gAMA"]);
+    let little = ReadParams { limits: Limits::bytes(700), ..ReadParams::default() };
+    assert_eq!(bytes("a.png", &good, &little, None).unwrap_err().fault, Fault::Limit);
 }

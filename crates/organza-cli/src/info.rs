@@ -48,7 +48,7 @@ fn scene_document(scene: &Scene) -> Value {
             "intensity": l.light.intensity,
             "points": l.samples,
             "shadow": l.shadow,
-            "texture": l.slide.as_ref().map(|slide| shown(&slide.path.to_string_lossy())),
+            "texture": l.slide.as_ref().map(|slide| path_text(&slide.path)),
         })
     });
     json!({

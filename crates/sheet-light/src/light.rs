@@ -429,7 +429,7 @@ mod tests {
             let camera = Camera::look_at(eye, target, DVec3::Y, view, [8, 8]).unwrap();
             let (material, mut lights, position) = (trial.material(), trial.lights(), trial.vector());
             lights.iter_mut().for_each(|lit| lit.light.validate(0).unwrap());
-            let slides = [0, 2].map(|k: usize| trial.slide(&lights[k].light.shape));
+            let slides = [0, 2].map(|k: usize| Trial(n + 10_000 * (1 + k as u64), 0).slide(&lights[k].light.shape));
             if n.is_multiple_of(2) {
                 (lights[0].slide, lights[2].slide) = (Some(&slides[0]), Some(&slides[1]));
             }

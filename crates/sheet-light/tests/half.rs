@@ -6,6 +6,7 @@ mod hard_cases;
 mod invariances;
 mod paths;
 mod polygons;
+mod polygons_scattered;
 mod scattering;
 mod soft;
 mod splats;

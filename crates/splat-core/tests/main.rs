@@ -1,4 +1,4 @@
-//! Footprints, opaque rims, shaded points, environments and recordings. One program: it is linked once, and its tests share all cores.
+//! Footprints, opaque rims, shaded points, environments, slides and recordings. One program: it is linked once, and its tests share all cores.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod accumulation;
@@ -8,4 +8,5 @@ mod opaque_rim;
 #[cfg(feature = "gpu")]
 mod recording;
 mod shaded_points;
+mod slides;
 mod triangles;

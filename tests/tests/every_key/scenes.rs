@@ -62,6 +62,8 @@ impl Folder {
         let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
         let sky = hdr([8, 4], |x, y| [20 * x as u8 + 9, 60, 40 * y as u8, 128]);
         std::fs::write(folder.path().join("sky.hdr"), sky).unwrap();
+        let bright = hdr([4, 4], |x, y| [90, 50 * x as u8, 60 * y as u8, 129]);
+        std::fs::write(folder.path().join("bright.hdr"), bright).unwrap();
         write("colored.ply", &ply(true, 0.7));
         write("plain.ply", &ply(false, 0.7));
         write("other.ply", &ply(true, 0.4));

@@ -168,6 +168,12 @@ const SPOT: &[&str] =
 const AIMED: &[&str] =
     &["light=[{kind='spot', position=[2, 3, 2], direction=[-2, -3, -2], outer=20, intensity=[20, 18, 16]}]"];
 const SUN: &[&str] = &["light=[{kind='directional', direction=[-2, -3, -2], irradiance=[2, 1.8, 1.6]}]"];
+const SLIDE: &[&str] = &[
+    "light=[{kind='spot', position=[2, 3, 2], target=[0, 0, 0], outer=20, intensity=[20, 18, 16], texture='sky.hdr'}]",
+];
+const SUN_SLIDE: &[&str] = &[
+    "light=[{kind='directional', direction=[-2, -3, -2], irradiance=[2, 1.8, 1.6], texture='sky.hdr', texture_width=5}]",
+];
 const SPHERE: &[&str] = &["light=[{kind='sphere', position=[2, 3, 2], radius=0.3, intensity=[20, 18, 16], samples=4}]"];
 const DISK: &[&str] =
     &["light=[{kind='disk', position=[2, 3, 2], normal=[-1, -1, -1], radius=0.3, intensity=[20, 18, 16], samples=4}]"];
@@ -185,6 +191,13 @@ fn lights() -> Vec<Entry> {
         one("light.directional.direction", "light.0.direction=[-2, -3, -1]").with(SUN),
         one("light.directional.irradiance", "light.0.irradiance=[1, 1, 1]").with(SUN),
         one("light.directional.shadow", "light.0.shadow=false").with(SUN),
+        one("light.spot.texture", "light.0.texture='sky.hdr'").with(SPOT),
+        one("light.spot.texture_up", "light.0.texture_up=[1, 0, 0]").with(SLIDE),
+        one("light.spot.texture_angle", "light.0.texture_angle=60").with(SLIDE),
+        one("light.directional.texture", "light.0.texture='bright.hdr'").with(SUN_SLIDE),
+        one("light.directional.texture_up", "light.0.texture_up=[1, 0, 0]").with(SUN_SLIDE),
+        one("light.directional.texture_width", "light.0.texture_width=6").with(SUN_SLIDE),
+        one("light.directional.texture_center", "light.0.texture_center=[0.3, 0.2, 0]").with(SUN_SLIDE),
         one("light.disk.normal", "light.0.normal=[-1, 0, 0]").with(DISK),
         one("light.rect.u", "light.0.u=[0.1, 0, -0.6]").with(RECT),
         one("light.rect.v", "light.0.v=[0.6, -0.2, 0]").with(RECT),

@@ -10,18 +10,21 @@ use image::{DynamicImage, ImageDecoder};
 use splat_core::RadianceImage;
 use std::io::Cursor;
 
+/// Chunks that say other colours, or other pictures, than are read.
+const NOT_USED: [&[u8]; 5] = [b"gAMA", b"cHRM", b"iCCP", b"cICP", b"acTL"];
+const MARK: usize = 8;
+
 const DAMAGED: &str = "the file is truncated or damaged; save it anew, as PNG of 8 or 16 bits";
 
 pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RadianceImage, ReadError> {
-    let mut decoder = PngDecoder::new(Cursor::new(content)).map_err(damaged)?;
+    let decoder = PngDecoder::new(Cursor::new(content)).map_err(damaged)?;
     let (width, height) = decoder.dimensions();
     check_packed(check_image([width, height], reading.params)?, content.len() as u64, "the packed image")?;
     let mut pixels = Vec::new();
     reserve(&mut pixels, width as usize * height as usize)?;
     reading.go_on()?;
-    if decoder.icc_profile().map_err(damaged)?.is_some() {
-        reading.notes.not_used([b"iCCP".as_slice()]);
-    }
+    let chunks = chunks(content)?;
+    reading.notes.not_used(NOT_USED.into_iter().filter(|name| chunks.contains(name)));
     let decoded = DynamicImage::from_decoder(decoder).map_err(damaged)?;
     reading.go_on()?;
     let is_whole = !decoded.color().has_alpha() || decoded.to_rgba16().pixels().all(|p| p.0[3] == u16::MAX);
@@ -32,6 +35,26 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Radiance
     let linear: Vec<f32> = (0..=u16::MAX).map(|v| linear_from_srgb(f64::from(v) / f64::from(u16::MAX))).collect();
     pixels.extend(decoded.into_rgb16().pixels().map(|p| p.0.map(|v| linear[v as usize])));
     Ok(RadianceImage { size: [width, height], pixels })
+}
+
+/// Names of the chunks, of which the file is made up to the last byte.
+fn chunks(content: &[u8]) -> Result<Vec<&[u8]>, ReadError> {
+    let (mut at, mut names) = (MARK, Vec::new());
+    while names.last() != Some(&b"IEND".as_slice()) {
+        let head = content.get(at..at + 8).and_then(|head| head.split_first_chunk::<4>());
+        let next = head.map(|(length, name)| (at as u64 + 12 + u64::from(u32::from_be_bytes(*length)), name));
+        let Some((next, name)) = next.filter(|(next, _)| *next <= content.len() as u64) else {
+            let found = "the end of the file";
+            return Err(ReadError::input(Place::Byte(at as u64), "a whole chunk, the last one IEND", found, DAMAGED));
+        };
+        names.push(name);
+        at = next as usize;
+    }
+    if at < content.len() {
+        let (found, hint) = (format!("{} bytes more", content.len() - at), "something was added to the file");
+        return Err(ReadError::input(Place::Byte(at as u64), "the end of the file after IEND", found, hint));
+    }
+    Ok(names)
 }
 
 fn damaged(error: image::ImageError) -> ReadError {

@@ -77,3 +77,16 @@ pub(crate) fn radiance(x: usize, y: usize) -> [f32; 3] {
     let [r, g, b, e] = pixel(x, y);
     [r, g, b].map(|m| f32::from(m) * 2.0f32.powi(i32::from(e) - 136))
 }
+
+/// A PNG file of [`SIZE`] with these samples.
+pub(crate) fn png(color: image::ExtendedColorType, samples: &[u8]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let encoder = image::codecs::png::PngEncoder::new(&mut bytes);
+    image::ImageEncoder::write_image(encoder, samples, SIZE[0], SIZE[1], color).unwrap();
+    bytes
+}
+
+/// So many bytes for each pixel, all of them different from their neighbours.
+pub(crate) fn png_bytes(a_pixel: usize) -> Vec<u8> {
+    (0..SIZE[0] as usize * SIZE[1] as usize * a_pixel).map(|k| (k * 37 % 256) as u8).collect()
+}

@@ -45,7 +45,7 @@ impl Loading<'_> {
         self.progress.begin(&work::reading_file(path));
         let FileData::Image(image) = self.files.read(path, &self.options.read_params(), self.progress)? else {
             let hint = "name a Radiance HDR, OpenEXR or PNG file";
-            return Err(Error::wrong_kind(path, "an image", hint));
+            return Err(Error::wrong_kind(path, "an image of radiance", hint));
         };
         let (needed, limit) = (image.bytes().saturating_add(bytes_of(image.size)), self.options.max_memory);
         if needed > limit {

@@ -132,7 +132,7 @@ fn in_the_open<'a>(
         let depths = light_depths(input, params, (carried.as_ref(), eye), progress)?;
         let mapped = if n == 0 { &input.mapped[..] } else { &[] };
         let lamps = Lamps { carried, mapped, ambient: sheets.ambient, camera: sheets.camera, light_alone: n > 0 };
-        PolygonLight::new(eye, sheets.camera, depths.as_ref()).shade(&lamps, sheets.shadow_origin, image);
+        PolygonLight::new(eye, sheets.camera, depths.as_ref()).shade(&lamps, sheets.shadow_origin, None, image);
     }
     Ok(())
 }
@@ -178,7 +178,7 @@ pub fn balance(input: &HalfInput<'_>, params: &HalfParams, light: usize) -> Resu
         return Ok(Balance::default());
     }
     let scene = Scene::new(volumes, lit, params, input.sheets.shadow_origin);
-    Ok(Scattered::new(&scene, params.scattering).balance.scaled(lit.light.intensity))
+    Ok(Scattered::new(&scene, params.scattering, false).balance.scaled(lit.light.intensity))
 }
 
 /// Lights that have a sweep, each with the points that stand for it.
@@ -310,9 +310,9 @@ pub fn bytes<'l>(
     let cells: u64 = if params.scattering == Scattering::None {
         0
     } else {
-        // Media, two streams of one channel, what is kept of all.
+        // Media, two streams of one channel, what is kept of all, for media and for polygons.
         let all: u64 = volumes.iter().map(|v| v.grid.values.len() as u64).sum();
-        2 * (all / u64::from(params.voxels_per_cell) + 1) * 350
+        2 * (all / u64::from(params.voxels_per_cell) + 1) * 480
     };
     let splats = bodies.splats.map_or(0, |splats| splats.count * BYTES_A_SPLAT);
     let light = |(light, samples): (&Light, u32)| {

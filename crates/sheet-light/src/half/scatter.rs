@@ -7,12 +7,14 @@
 //! |---|---|
 //! | shares of the phase function | `phase.rs` |
 //! | means of the media in the cells | `medium.rs` |
+//! | light that falls on them, and what stands between | `scene.rs` |
 //! | Eqs. 3 and 5, forward: marched ahead, a convolution a layer | `beam.rs`, `blur.rs` |
 //! | Eq. 4, back and forth: two streams in a layer | `layer.rs` |
 //! | … in all columns | `streams.rs`, `slant.rs` |
 //! | … added from the far side to the light, and back | `adding.rs` |
 //! | where the power stays | `balance.rs` |
 //! | Eq. 2: radiance towards the eye | [`Scattered::radiance`] |
+//! | … towards polygons | `surface.rs` |
 
 pub(crate) mod adding;
 pub(crate) mod balance;
@@ -22,20 +24,21 @@ pub(crate) mod grid;
 mod layer;
 pub(crate) mod medium;
 pub(crate) mod phase;
+pub(crate) mod scene;
 pub(crate) mod slant;
 pub(crate) mod streams;
+mod surface;
 
-use super::{Bodies, HalfParams, Scattering, lamp};
+use super::{HalfParams, Scattering};
 use crate::Volume;
 use balance::Balance;
-use beam::{Beam, Path};
 use grid::LightGrid;
 use medium::Cell;
+pub(crate) use scene::{Scene, entering};
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::shade::LitBy;
-use splat_core::{Light, Receiver, SplatKind, henyey_greenstein};
+use splat_core::{Light, henyey_greenstein};
 use std::f32::consts::PI;
-use streams::{Sources, Streams};
+pub(crate) use surface::SurfaceLight;
 
 /// Numbers of a face: by channel what was scattered ahead and the fluence φ; the net flux J along x, y and the light, by channel;
 /// and how much there is that scatters.
@@ -57,20 +60,12 @@ pub(crate) struct Scattered {
     grid: LightGrid,
     /// By face, but for the weight times it.
     faces: Vec<[f32; NUMBERS]>,
+    /// The same for polygons, where there are any to light.
+    pub(crate) at_surfaces: Option<SurfaceLight>,
     /// For a light of intensity 1.
     pub(crate) balance: Balance,
     /// Convolutions and corrections.
     pub(crate) passes: u64,
-}
-
-/// The media, the light that falls on them, and what stands between.
-pub(crate) struct Scene {
-    pub(crate) grid: LightGrid,
-    pub(crate) cells: Vec<Cell>,
-    /// Power that enters each column, by channel, of a light of intensity 1.
-    entering: [Vec<f64>; 3],
-    others: Vec<[f32; 3]>,
-    cone: f64,
 }
 
 /// Whether there is anything to do.
@@ -80,98 +75,27 @@ pub(crate) fn is_wanted(volumes: &[Volume<'_>], light: &Light, params: &HalfPara
         && light.intensity.iter().any(|i| *i > 0.0)
 }
 
-/// Power per channel that enters a column of this area at its first face.
-pub(crate) fn entering(lit: &LitBy<'_>, place: DVec3, area: f64) -> [f64; 3] {
-    let irradiance = lit.light.irradiance(place, 0.0).1;
-    // A column of even width has this deviation.
-    let passing = lit.slide.map_or([1.0; 3], |slide| slide.passing(place, (area / 12.0).sqrt()));
-    [0, 1, 2].map(|c| f64::from(irradiance[c] * passing[c]) * area)
-}
-
-impl Scene {
-    /// `shadow_origin`: what places of shadows are relative to.
-    pub(crate) fn new(volumes: &[Volume<'_>], lit: &LitBy<'_>, params: &HalfParams, shadow_origin: DVec3) -> Self {
-        let camera = lamp::camera_of(&Bodies::volumes(volumes), &lit.light, params);
-        let grid = LightGrid::new(volumes, &camera, params.voxels_per_cell);
-        let cells = medium::cells(&grid, volumes, params.scattering);
-        let ([width, height], layers) = (grid.columns, grid.layers);
-        let one = Light { intensity: [1.0; 3], ..lit.light };
-        let (area, lit_by_one) = (grid.area(0.0), LitBy { light: one, ..*lit });
-        let entering = |channel: usize| {
-            let column = |at: usize| {
-                let place = grid.world([(at % width) as f64, (at / width) as f64, 0.0]);
-                entering(&lit_by_one, place, area)[channel]
-            };
-            (0..width * height).map(column).collect()
-        };
-        let others = |shadow: &dyn splat_core::Transmittance| {
-            let face = |at: usize| {
-                let [x, y, face] = [at % width, at / (width * (layers + 1)), at / width % (layers + 1)];
-                let world = grid.world([x as f64, y as f64, face as f64]);
-                let position = (world - shadow_origin).as_vec3();
-                let radius = (0.5 * grid.depth) as f32;
-                shadow.transmittance(&Receiver { position, normal: Vec3::ZERO, radius, kind: SplatKind::Medium })
-            };
-            (0..width * height * (layers + 1)).map(face).collect()
-        };
-        Self {
-            entering: [0, 1, 2].map(entering),
-            others: lit.shadow.map_or_else(Vec::new, others),
-            cone: params.cone.unwrap_or_else(|| phase::cone_of(params.scattering, medium::mean_asymmetry(&cells))),
-            cells,
-            grid,
-        }
-    }
-
-    fn path(&self) -> Path<'_> {
-        let Self { grid, cells, entering, others, cone } = self;
-        Path { grid, cells, entering, others, cone: *cone }
-    }
-
-    /// What all but the volumes let through, by cell; empty for all.
-    fn passing(&self, channel: usize) -> Vec<f64> {
-        if self.others.is_empty() {
-            return Vec::new();
-        }
-        let ([width, _], layers) = (self.grid.columns, self.grid.layers);
-        let cell = |at: usize| {
-            let node = [at % width, at / (width * layers)];
-            self.path().passing(at / width % layers, node, channel)
-        };
-        (0..self.grid.cells()).map(cell).collect()
-    }
-
-    /// The beam of a channel, and the equations of what it gives to two streams.
-    pub(crate) fn streams(&self, channel: usize) -> (Beam, Streams) {
-        let (beam, passing) = (self.path().march(channel), self.passing(channel));
-        let (grid, cells) = (&self.grid, &self.cells[..]);
-        let streams = Streams::new(&Sources { grid, cells, channel, incoming: &beam.incoming, passing: &passing });
-        (beam, streams)
-    }
-
-    /// Whether a channel is the same as another.
-    fn is_like(&self, channel: usize, other: usize) -> bool {
-        let same = |v: &[f32; 3]| v[channel] == v[other];
-        let cell = |c: &Cell| [&c.extinction, &c.scattering, &c.forward, &c.ahead].into_iter().all(same);
-        self.entering[channel] == self.entering[other] && self.cells.iter().all(cell) && self.others.iter().all(same)
-    }
-}
-
 impl Scattered {
-    pub(crate) fn new(scene: &Scene, scattering: Scattering) -> Self {
+    pub(crate) fn new(scene: &Scene, scattering: Scattering, lights_surfaces: bool) -> Self {
         let ([width, height], layers) = (scene.grid.columns, scene.grid.layers);
         let mut out = Self {
             grid: scene.grid,
             faces: vec![[0.0; NUMBERS]; width * height * (layers + 1)],
+            at_surfaces: None,
             balance: Balance::default(),
             passes: 0,
         };
+        let mut sources = vec![[0.0; 3]; if lights_surfaces { scene.grid.cells() } else { 0 }];
         for channel in 0..3 {
             match (0..channel).find(|other| scene.is_like(channel, *other)) {
-                Some(other) => out.copy(other, channel),
-                None => out.fill(scene, scattering, channel),
+                Some(other) => {
+                    out.copy(other, channel);
+                    sources.iter_mut().for_each(|source| source[channel] = source[other]);
+                }
+                None => out.fill(scene, scattering, channel, &mut sources),
             }
         }
+        out.at_surfaces = lights_surfaces.then(|| SurfaceLight::new(scene, &out.faces, &sources));
         out.weigh(&scene.cells);
         for axis in 0..3 {
             out.soften(axis);
@@ -181,7 +105,7 @@ impl Scattered {
 
     /// Bytes of what is kept.
     pub(crate) fn bytes(&self) -> u64 {
-        (self.faces.len() * size_of::<[f32; NUMBERS]>()) as u64
+        size_of_val(self.faces.as_slice()) as u64 + self.at_surfaces.as_ref().map_or(0, SurfaceLight::bytes)
     }
 
     /// Cells.
@@ -189,7 +113,8 @@ impl Scattered {
         self.grid.cells() as u64
     }
 
-    fn fill(&mut self, scene: &Scene, scattering: Scattering, channel: usize) {
+    /// One channel, and what cells give to two streams there, per volume, where that is kept.
+    fn fill(&mut self, scene: &Scene, scattering: Scattering, channel: usize, sources: &mut [[f64; 3]]) {
         let grid = &scene.grid;
         let (beam, psi, streams) = if scattering == Scattering::Forward {
             let beam = scene.path().march(channel);
@@ -202,6 +127,11 @@ impl Scattered {
             self.passes += solution.passes;
             self.balance.add_beam(channel, &beam);
             self.balance.add_streams(channel, (grid, &scene.cells), &beam, &streams, &solution.psi);
+            for (at, source) in sources.iter_mut().enumerate() {
+                let (lost, omega) = balance::lost(grid, &scene.cells[at], (at, channel), &beam);
+                let layer = (at / grid.columns[0] % grid.layers) as f64 + 0.5;
+                source[channel] = lost * omega / (grid.area(layer) * grid.depth);
+            }
             (beam, solution.psi, Some(streams))
         };
         self.passes += beam.passes;

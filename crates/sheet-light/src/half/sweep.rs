@@ -137,7 +137,7 @@ impl<'a> Sweep<'a> {
         let beside = self.depths.as_ref().map(|depths| Beside { depths, others: lit.shadow, origin });
         let shadow = beside.as_ref().map(|beside| beside as &dyn Transmittance).or(lit.shadow);
         let scene = Scene::new(self.volumes, &LitBy { shadow, ..*lit }, params, origin);
-        Some(Scattered::new(&scene, params.scattering))
+        Some(Scattered::new(&scene, params.scattering, self.polygons.is_some_and(EyePolygons::are_lit)))
     }
 
     /// Finds the voxels that matter, with the shadows there that are known, and sorts them for both images (steps 3 and 4).
@@ -209,7 +209,8 @@ impl<'a> Sweep<'a> {
         }
         if let (Some(mut polygons), Some(image)) = (polygons, image) {
             self.light_polygons(&mut polygons, self.frame.slabs.count, splats.as_ref());
-            polygons.0.shade(&self.lamps(), self.input.sheets.shadow_origin, image);
+            let diffuse = self.scattered.as_ref().and_then(|scattered| scattered.at_surfaces.as_ref());
+            polygons.0.shade(&self.lamps(), self.input.sheets.shadow_origin, diffuse, image);
         }
         counts.bytes += splats.as_ref().map_or(0, SplatSheets::bytes);
         counts.soft_passes =

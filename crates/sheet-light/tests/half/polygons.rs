@@ -11,18 +11,18 @@ use splat_core::{Accumulator, LightShape, Material, Mesh, Similarity};
 use std::f64::consts::PI;
 
 /// Reflects all light alike in all directions.
-fn white() -> Material {
+pub(super) fn white() -> Material {
     Material { ambient: 0.0, diffuse: 1.0, specular: 0.0, ..Material::default() }
 }
 
 /// A parallelogram about a place.
-fn wall(center: [f64; 3], u: [f32; 3], v: [f32; 3]) -> Mesh {
+pub(super) fn wall(center: [f64; 3], u: [f32; 3], v: [f32; 3]) -> Mesh {
     let corner = |s: f32, t: f32| Vec3::from(u) * s + Vec3::from(v) * t;
     let position = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
     Mesh { origin: DVec3::from_array(center), position, triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() }
 }
 
-fn polygons<'a>(mesh: &'a Mesh, material: &'a Material) -> Polygons<'a> {
+pub(super) fn polygons<'a>(mesh: &'a Mesh, material: &'a Material) -> Polygons<'a> {
     let placed = PlacedMesh { mesh, transform: Similarity::default() };
     let (color, object) = ([1.0; 3], 7);
     Polygons { placed, material, color, object, shadow_coefficient: 1.0, casts_shadow: true, radius: 0.0 }

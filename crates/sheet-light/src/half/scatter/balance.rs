@@ -86,7 +86,7 @@ impl Balance {
 }
 
 /// Power that a cell takes from its beam, and the share of it that is scattered.
-fn lost(grid: &LightGrid, cell: &Cell, (at, channel): (usize, usize), beam: &Beam) -> (f64, f64) {
+pub(super) fn lost(grid: &LightGrid, cell: &Cell, (at, channel): (usize, usize), beam: &Beam) -> (f64, f64) {
     let [width, _] = grid.columns;
     let optics = optics(cell, channel, grid.length([at % width, at / (width * grid.layers)]));
     (-beam.incoming[at] * libm::expm1(-optics.tau), optics.omega)

@@ -111,9 +111,12 @@ impl Streams {
                 let length = of.grid.length([at % width, y]);
                 let layer = Layer::new(&optics(&of.cells[cell], of.channel, length));
                 let passing = of.passing.get(cell).copied().unwrap_or(1.0);
-                (own[at], through[at]) = (layer.own * area, layer.through * area * passing);
-                // What is opaque stands at the far face of a layer.
-                given[at] = [layer.sources[0], layer.sources[1] * passing].map(|s| s * of.incoming[cell]);
+                // What is opaque stands at the far face of a layer and sends nothing back: ψ is J there, so that
+                // ψ' = (through·ψ + s↓)/(1 + own), and what the layer gives back to its first face is less by that.
+                let back = (1.0 - passing) * layer.through / (1.0 + layer.own);
+                (own[at], through[at]) = ((layer.own - back * layer.through) * area, layer.through * area * passing);
+                let [up, down] = layer.sources;
+                given[at] = [up + back * down, down * passing].map(|s| s * of.incoming[cell]);
             }
         });
     }
