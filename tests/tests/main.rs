@@ -35,5 +35,6 @@ mod sheets;
 mod slanted_slabs;
 mod surfel_layers;
 mod surfels;
+mod surfels_opaque;
 mod techniques;
 mod truth;

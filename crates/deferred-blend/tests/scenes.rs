@@ -81,7 +81,8 @@ impl Scene {
     ) -> Result<(), Error> {
         let discs = Discs::project(&self.input(), params);
         let range = 0.0..f32::INFINITY;
-        let input = BlendInput { discs: &discs, shown: Shown::Discs(&self.values), opaque, range, layering, glass: None };
+        let input =
+            BlendInput { discs: &discs, shown: Shown::Discs(&self.values), opaque, range, layering, glass: None };
         blend(&input, params, accumulator, None).map(|_| ())
     }
 }

@@ -54,8 +54,18 @@ fn check_layers(at: &At<'_>, raw: &RawSurfels) -> Result<SurfelLayers, Error> {
     let keys = [
         ("peeled_layers", raw.peeled_layers.is_some(), peeled, "layers = \"peeled\""),
         ("voronoi", raw.voronoi.is_some(), one_pass, "opaque = \"one_pass\""),
-        ("groups", raw.groups.is_some(), grouped, "layers = \"algorithm1\" or \"algorithm2\", or opaque = \"one_pass\""),
-        ("grouping", raw.grouping.is_some(), grouped, "layers = \"algorithm1\" or \"algorithm2\", or opaque = \"one_pass\""),
+        (
+            "groups",
+            raw.groups.is_some(),
+            grouped,
+            "layers = \"algorithm1\" or \"algorithm2\", or opaque = \"one_pass\"",
+        ),
+        (
+            "grouping",
+            raw.grouping.is_some(),
+            grouped,
+            "layers = \"algorithm1\" or \"algorithm2\", or opaque = \"one_pass\"",
+        ),
         ("coverage", raw.coverage.is_some(), algorithms, "layers = \"algorithm1\" or \"algorithm2\""),
         ("depth_steps", raw.depth_steps.is_some(), algorithms, "layers = \"algorithm1\" or \"algorithm2\""),
         ("overlap_factor", raw.overlap_factor.is_some(), minimum, "grouping = \"mgc\""),

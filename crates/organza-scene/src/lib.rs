@@ -53,9 +53,9 @@ pub use load::{LoadOptions, MAX_SCENE_BYTES, MAX_SCENE_DEPTH, load, parse, read,
 pub use model::{EnvironmentSource, Scene, SceneMaterial, SceneObject, Up};
 pub use overrides::Override;
 pub use settings::{
-    Aligned, Bending, Classify, Collisions, Coverage, Grouping, ParticlesSettings, PointsSettings, RenderSettings,
-    Scattering, ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler, SurfelGroups,
-    OpaqueSurfels, SurfelLayers, SurfelsSettings, Technique,
+    Aligned, Bending, Classify, Collisions, Coverage, Grouping, OpaqueSurfels, ParticlesSettings, PointsSettings,
+    RenderSettings, Scattering, ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler,
+    SurfelGroups, SurfelLayers, SurfelsSettings, Technique,
 };
 pub use shown::{escape_controls, printable, shown};
 pub use source::{

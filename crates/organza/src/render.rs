@@ -8,8 +8,9 @@ use crate::load::files::Files;
 use crate::plan::Plan;
 use crate::prepare::{Explanation, prepare};
 use crate::scene::Scene;
-use crate::technique::{Checkpoint, Kept, Session, Sets, surfels};
+use crate::technique::{Checkpoint, Kept, Session, Sets};
 use crate::{CostRecord, Error, Layers, Progress, RenderOptions, doubts};
+use deferred_blend::grouping::GroupsOfObjects;
 use std::path::PathBuf;
 
 /// A finished render.
@@ -46,7 +47,7 @@ pub fn render(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Re
 pub(crate) struct Left {
     pub(crate) files: Files,
     pub(crate) sets: Kept,
-    pub(crate) groups: surfels::Kept,
+    pub(crate) groups: GroupsOfObjects,
 }
 
 impl Left {

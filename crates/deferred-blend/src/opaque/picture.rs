@@ -1,6 +1,6 @@
 //! Tiles, and the picture that they make.
 
-use super::{Opaque, Averaged, memory};
+use super::{Averaged, Opaque, memory};
 use rayon::prelude::*;
 use splat_core::raster::bins::{Bins, TILE};
 use splat_core::raster::tile::{AREA, for_each_span};
