@@ -68,9 +68,9 @@ fn grouping(criterion: &mut Criterion) {
         println!("{name}: {:.0} ms of processor time", processor_ms() - before);
     };
     bench("overlap graph", &|| drop(build(&cloud, scale, 1.0)));
-    bench("MGC", &|| drop(minimum_coloring(&graph, 256)));
-    bench("WGC, K = 8", &|| drop(weighted_coloring(&graph, &WeightedParams::default())));
-    let weighted = weighted_coloring(&graph, &WeightedParams::default()).expect("invariant: in range");
+    bench("MGC", &|| drop(minimum_coloring(&graph, 256, None)));
+    bench("WGC, K = 8", &|| drop(weighted_coloring(&graph, &WeightedParams::default(), None)));
+    let weighted = weighted_coloring(&graph, &WeightedParams::default(), None).expect("invariant: in range");
     println!("WGC: mean overlap {:.3}", graph.mean_overlap(&weighted));
     let eye = cloud.origin + cloud.position[0].as_dvec3();
     let bounds = cloud.bounds();
@@ -89,7 +89,7 @@ fn grouping(criterion: &mut Criterion) {
 fn table_1(cloud: &Cloud, scale: f32, whole: &OverlapGraph) {
     for factor in [1.0, 0.8, 0.6, 0.4] {
         let graph = build(cloud, scale, factor);
-        let groups = minimum_coloring(&graph, 256).expect("invariant: in range").groups;
+        let groups = minimum_coloring(&graph, 256, None).expect("invariant: in range").groups;
         let (most, mean, overlap) = (graph.max_degree(), mean_degree(&graph), whole.mean_overlap(&groups));
         println!("c = {factor}: K = {}, degrees {most} and {mean:.1}, mean overlap {overlap:.3}", groups.count());
     }

@@ -79,7 +79,7 @@ impl Scene {
         let relaxation = Relaxation { factor, ..Relaxation::default() };
         let params = GraphParams { disc_scale: Params::default().disc_scale, relaxation, ..GraphParams::default() };
         let graph = OverlapGraph::build(&self.cloud, &params, None).expect("a graph");
-        minimum_coloring(&graph, 256).expect("in range").groups
+        minimum_coloring(&graph, 256, None).expect("in range").groups
     }
 
     fn resolve(&self, discs: &Discs, passes: Passes<'_>) -> Opaque {

@@ -32,7 +32,7 @@ fn main() {
     let relaxation = Relaxation { factor: FACTOR, ..Relaxation::default() };
     let graph = GraphParams { disc_scale: params.disc_scale, relaxation, ..GraphParams::default() };
     let graph = OverlapGraph::build(&cloud, &graph, None).expect("a graph");
-    let groups = &minimum_coloring(&graph, 256).expect("groups").groups;
+    let groups = &minimum_coloring(&graph, 256, None).expect("groups").groups;
     println!("{} discs in {} groups", cloud.len(), groups.count());
 
     // A scan does not know which way its normals point.

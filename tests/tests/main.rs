@@ -35,6 +35,7 @@ mod sheets;
 mod slanted_slabs;
 mod surfel_layers;
 mod surfels;
+mod surfels_opaque;
 mod techniques;
 mod textured_lights;
 mod truth;

@@ -42,6 +42,23 @@ pub struct Blended {
     pub glass: Option<GlassImage>,
 }
 
+impl Blended {
+    /// Adds what nearer ranges of depth have mirrored; what is behind everything comes with the last one.
+    #[must_use]
+    pub fn behind(mut self, before: Option<GlassImage>) -> Self {
+        match (&mut self.glass, before) {
+            (Some(image), Some(before)) => {
+                for (sum, own) in image.mirrored.iter_mut().zip(before.mirrored) {
+                    sum.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+                }
+            }
+            (None, before) => self.glass = before,
+            (Some(_), None) => {}
+        }
+        self
+    }
+}
+
 /// Work that was done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct BlendCounts {

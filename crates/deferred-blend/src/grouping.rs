@@ -25,7 +25,7 @@
 //! }
 //! let graph = OverlapGraph::build(&cloud, &GraphParams::default(), None)?;
 //! assert_eq!(graph.edges(), 3);
-//! let coloring = minimum_coloring(&graph, 256)?;
+//! let coloring = minimum_coloring(&graph, 256, None)?;
 //! assert_eq!(coloring.groups.count(), 2);
 //! # Ok::<(), deferred_blend::Error>(())
 //! ```
@@ -44,13 +44,14 @@ mod weighted;
 
 pub use graph::{Coplanar, GraphParams, OverlapGraph, Relaxation};
 pub use hash::{Collisions, HashParams, covering_factor, hash_grouping};
-pub use kept::KeptGroups;
+pub use kept::{GroupsOfObjects, KeptGroups};
 pub use membership::Membership;
 pub use minimum::{Coloring, minimum_coloring};
 pub use recipe::{Coverage, Method, Recipe};
 pub use weighted::{WeightedParams, weighted_coloring, weighted_cost};
 
 use crate::Error;
+use splat_core::Progress;
 
 /// Most groups: a disc's group takes one byte.
 pub const MOST_GROUPS: u32 = 256;
@@ -142,6 +143,10 @@ impl Further {
         }
         if all.groups.is_empty() { Self::default() } else { all }
     }
+}
+
+fn check_cancelled(progress: Option<&Progress>) -> Result<(), Error> {
+    if progress.is_some_and(Progress::is_cancelled) { Err(Error::Cancelled) } else { Ok(()) }
 }
 
 fn check_count(count: u32) -> Result<(), Error> {

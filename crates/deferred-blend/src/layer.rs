@@ -49,12 +49,12 @@ impl Layer {
         match input.shown {
             Shown::Discs(values) => {
                 let of = |f: &Fragment| &values[input.discs.ids[f.disc as usize] as usize * channels..][..channels];
-                mean_values(fragments, of, (&share, &plane), &mut layer.values);
+                mean_values(fragments, of, (share, plane), &mut layer.values);
             }
             Shown::Pixels(light) => {
                 let disc = input.discs.ids[first.disc as usize] as usize;
                 let place = Place { discs: input.discs, ray, depth: layer.depth, disc };
-                light.on_layer(fragments, &place, (&share, &plane), &mut layer.values);
+                light.on_layer(fragments, &place, (share, plane), &mut layer.values);
             }
         }
         for (c, value) in layer.values.iter_mut().enumerate().take(channels) {
@@ -76,14 +76,11 @@ impl Layer {
     }
 }
 
-/// What a disc has of the sum of each plane's weights, and the plane of each channel.
-pub(crate) type Shares<'a> = (&'a dyn Fn(&Fragment) -> [f32; 3], &'a dyn Fn(usize) -> usize);
-
-/// Averages of the discs' values by their shares.
+/// Averages of the discs' values by what each has of the sum of a plane's weights.
 fn mean_values<'v>(
     fragments: &[Fragment],
     of: impl Fn(&Fragment) -> &'v [f32],
-    (share, plane): Shares<'_>,
+    (share, plane): (impl Fn(&Fragment) -> [f32; 3], impl Fn(usize) -> usize),
     means: &mut [f32; MAX_CHANNELS],
 ) {
     let (first, mut sums) = (of(&fragments[0]), [0.0; 3]);

@@ -4,10 +4,9 @@
 use crate::bump;
 use crate::disc::{Discs, Ray};
 use crate::fragments::Fragment;
-use crate::layer::Shares;
-use splat_core::glam::{DAffine3, DVec3, Vec3};
+use splat_core::glam::{DVec3, Vec3};
 use splat_core::shade::{ChannelLayout, MAX_CHANNELS, Point, ShadeInput, arriving, facing};
-use splat_core::{Cloud, Receiver};
+use splat_core::{Cloud, Receiver, Similarity};
 
 /// What discs show.
 #[derive(Clone, Copy)]
@@ -25,8 +24,8 @@ pub struct Light<'a> {
     pub input: &'a ShadeInput<'a>,
     /// The numbers that it gives.
     pub layout: ChannelLayout,
-    /// Into the space of each object, by id, where bumps are; empty where no material has any.
-    pub object_from_world: &'a [DAffine3],
+    /// Of each object, by id: bumps lie in its own space.
+    pub transforms: &'a [Similarity],
 }
 
 /// Numbers of [`Attributes`].
@@ -74,12 +73,13 @@ impl Light<'_> {
         self.on(&Attributes::from_array(averages), place, out);
     }
 
-    /// Of a layer. Normals are averaged by weight on the side of the nearest disc's, colours by shares.
+    /// Of a layer. Normals are averaged by weight on the side of the nearest disc's, colours by what each disc has of the sum of a
+    /// plane's weights.
     pub(crate) fn on_layer(
         &self,
         fragments: &[Fragment],
         place: &Place<'_>,
-        (share, plane): Shares<'_>,
+        (share, plane): (impl Fn(&Fragment) -> [f32; 3], impl Fn(usize) -> usize),
         out: &mut [f32; MAX_CHANNELS],
     ) {
         let of = |f: &Fragment| Attributes::of(self.input.cloud, place.discs.ids[f.disc as usize] as usize);
@@ -135,13 +135,11 @@ impl Light<'_> {
     /// ∇h of bumps.
     fn slope(&self, place: &Place<'_>, position: Vec3) -> Vec3 {
         let cloud = self.input.cloud;
-        let to_object = self.object_from_world[cloud.object[place.disc] as usize];
-        let at = to_object.transform_point3(cloud.origin + position.as_dvec3());
-        // Objects are scaled alike in all directions.
-        let scale = to_object.matrix3.col(0).length();
+        let Similarity { scale, rotation, translation } = self.transforms[cloud.object[place.disc] as usize];
+        let at = rotation.inverse() * (cloud.origin + position.as_dvec3() - translation) / scale;
         let bump = &self.input.materials[cloud.material[place.disc] as usize].bump;
-        let slope = bump::slope(bump, at, f64::from(place.discs.pixel_width(place.depth)) * scale);
-        (to_object.matrix3.transpose() * slope / scale).as_vec3()
+        let slope = bump::slope(bump, at, f64::from(place.discs.pixel_width(place.depth)) / scale);
+        (rotation * slope).as_vec3()
     }
 
     fn to_eye(&self, position: Vec3) -> Vec3 {

@@ -16,9 +16,13 @@ mod recipe;
 mod weighted;
 
 use crate::scenes::{disc, plane, soup, sphere};
-use deferred_blend::{Error, grouping::Groups};
+use deferred_blend::Error;
+use deferred_blend::grouping::extended::{DuplicateParams, duplicates};
+use deferred_blend::grouping::{
+    GraphParams, Groups, OverlapGraph, WeightedParams, minimum_coloring, weighted_coloring,
+};
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Cloud, Splat};
+use splat_core::{Cloud, Progress, Splat};
 
 /// Discs on a ball, regular, of few curved neighbours each.
 pub(crate) fn ball() -> Cloud {
@@ -77,4 +81,16 @@ fn groups_told_from_outside_are_checked() {
     assert!(matches!(Groups::new(0, vec![]), Err(Error::Parameter { .. })));
     assert!(matches!(Groups::new(257, vec![]), Err(Error::Parameter { .. })));
     assert!(matches!(Groups::new(2, vec![0, 2]), Err(Error::Parameter { .. })));
+}
+
+#[test]
+fn whoever_cancels_gets_no_groups() {
+    let graph = OverlapGraph::build(&ball(), &GraphParams::default(), None).expect("a valid cloud");
+    let groups = minimum_coloring(&graph, 256, None).expect("in range").groups;
+    let (progress, weighted, added) = (Progress::new(), WeightedParams::default(), DuplicateParams::default());
+    progress.cancel();
+    let progress = Some(&progress);
+    assert_eq!(minimum_coloring(&graph, 256, progress).err(), Some(Error::Cancelled));
+    assert_eq!(weighted_coloring(&graph, &weighted, progress).err(), Some(Error::Cancelled));
+    assert_eq!(duplicates(&graph, &groups, &added, progress).err(), Some(Error::Cancelled));
 }

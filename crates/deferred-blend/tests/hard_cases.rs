@@ -55,7 +55,7 @@ fn db10_edges_and_groups_far_away_are_those_at_hand() {
     assert!(far.origin.length() > 9e6);
     let graph = |cloud: &Cloud| OverlapGraph::build(cloud, &GraphParams::default(), None).expect("a valid cloud");
     let [at_hand, away] = [&near, &far].map(graph);
-    let [groups, same] = [&at_hand, &away].map(|graph| minimum_coloring(graph, 256).expect("in range").groups);
+    let [groups, same] = [&at_hand, &away].map(|graph| minimum_coloring(graph, 256, None).expect("in range").groups);
     assert_eq!(groups, same);
     assert_eq!(at_hand.edges(), away.edges());
     let place = |i: usize| far.origin + far.position[i].as_dvec3();

@@ -7,3 +7,4 @@ mod grouping;
 mod hard_cases;
 mod opaque;
 mod scenes;
+mod shade;

@@ -155,6 +155,16 @@ pub enum OpaqueSurfels {
     },
 }
 
+impl OpaqueSurfels {
+    /// The groups, where there are some.
+    pub const fn groups(&self) -> Option<&SurfelGroups> {
+        match self {
+            Self::TwoPass => None,
+            Self::OnePass { groups, .. } => Some(groups),
+        }
+    }
+}
+
 /// How the discs of a pixel become layers (Zhang and Pajarola 2007, section 5.2).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SurfelLayers {
@@ -197,6 +207,19 @@ pub struct SurfelGroups {
     pub coverage: Coverage,
     /// n of Eq. 10, ≥ 1; `None` for steps as long as ε.
     pub depth_steps: Option<u32>,
+}
+
+impl SurfelGroups {
+    /// Number and method in words; whether the animation changes the shape of an object.
+    pub fn describe(&self, deforms: bool) -> String {
+        let (most, how) = match self.grouping {
+            Grouping::Auto if deforms => ("", "weighted colouring, where the animation changes a shape by hashing"),
+            Grouping::Auto | Grouping::Weighted => ("", "weighted colouring"),
+            Grouping::Minimum { .. } => ("at most ", "minimum colouring"),
+            Grouping::Hash(_) => ("", "hashing"),
+        };
+        format!("{most}{} groups by {how}", self.count)
+    }
 }
 
 impl Default for SurfelGroups {

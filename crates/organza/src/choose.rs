@@ -33,14 +33,20 @@ pub(crate) fn techniques(scene: &Scene) -> Vec<Technique> {
     if used.is_empty() { vec![named()] } else { used }
 }
 
-/// Objects whose surfaces bound matter and whose technique cannot show that: a sentence each.
-pub(crate) fn unbent(scene: &Scene) -> impl Iterator<Item = String> + '_ {
-    let bounds = |o: &&SceneObject| o.visible && scene.materials[o.material].material.bounds_matter();
-    scene.objects.iter().filter(bounds).filter_map(|object| {
+/// What materials of visible objects have and their techniques cannot show: a sentence each.
+pub(crate) fn unshown(scene: &Scene) -> impl Iterator<Item = String> + '_ {
+    scene.objects.iter().filter(|o| o.visible).flat_map(move |object| {
+        let material = &scene.materials[object.material].material;
         let row = row(technique_of(object, scene));
-        let instead = (row.bends)(scene).err()?;
+        let all = [
+            (material.bounds_matter(), "bounds matter that bends light or absorbs", row.bends),
+            (material.bump.height > 0.0, "has bumps", row.bumps),
+        ];
         let (name, own) = (escape_controls(&object.name), row.technique.name());
-        Some(format!("object '{name}' bounds matter that bends light or absorbs, which `{own}` leaves out: {instead}"))
+        all.into_iter().filter(|(has, ..)| *has).filter_map(move |(_, what, shows)| {
+            let instead = shows(scene).err()?;
+            Some(format!("object '{name}' {what}, which `{own}` leaves out: {instead}"))
+        })
     })
 }
 

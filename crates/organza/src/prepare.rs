@@ -1,7 +1,7 @@
 //! From a scene to what drawing reads: read, choose, convert, plan.
 
 use crate::carried;
-use crate::choose::{choose, plan, row, same_forms, technique_of, techniques, unbent};
+use crate::choose::{choose, plan, row, same_forms, technique_of, techniques, unshown};
 use crate::form::PlannedObject;
 use crate::load::files::Files;
 use crate::load::own::Own;
@@ -79,7 +79,7 @@ pub(crate) fn prepare(
     let (splats, notes) = (loaded.splats.clone(), loaded.notes.clone());
     let mut warnings = loaded.warnings.clone();
     warnings.extend(doubts::of_scene(scene, &loaded));
-    warnings.extend(unbent(scene));
+    warnings.extend(unshown(scene));
     warnings.extend(carried::unshadowed(scene, &loaded));
     let inputs = cost.stages.iter().filter(|s| s.name == pass::READ).map(|s| s.bytes).sum();
     let most = memory.total().max(memory::loading_bytes(&loaded, inputs));
@@ -142,13 +142,13 @@ fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Resu
     statistics.lit_as_drawn = carried::of_scene(scene).is_some();
     let mut plan = plan(&statistics);
     plan.by = scene.objects.iter().map(|o| technique_of(o, scene)).collect();
-    let draws = |t: &&Technique| statistics.translucent_of(**t).is_some();
-    statistics.techniques.iter().filter(draws).for_each(|t| (row(*t).plans)(scene, &mut plan));
     plan.is_own = vec![false; scene.objects.len()];
     loaded.own.iter().for_each(|own| plan.is_own[own.object] = true);
     let draws = |by: &Technique| row(*by).draws_splats && !statistics.lit_as_drawn;
     plan.draws = plan.by.iter().zip(&plan.is_own).map(|(by, own)| draws(by) && !own).collect();
-    let used = statistics.techniques.iter().filter(|t| statistics.translucent_of(**t).is_some());
+    let all = techniques(scene);
+    all.iter().for_each(|t| (row(*t).plans)(scene, loaded, &mut plan));
+    let used = all.iter().filter(|t| statistics.translucent_of(**t).is_some() || row(**t).opaque.is_some());
     // They take turns, and each keeps what it has.
     let points = lights::points(&loaded.lights);
     let camera = loaded.camera.with_samples(scene.render.antialias);

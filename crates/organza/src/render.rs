@@ -9,8 +9,9 @@ use crate::load::fitted;
 use crate::plan::Plan;
 use crate::prepare::{Explanation, prepare};
 use crate::scene::{FoundCamera, Scene};
-use crate::technique::{Checkpoint, Kept, Session, Sets, surfels};
+use crate::technique::{Checkpoint, Kept, Session, Sets};
 use crate::{CostRecord, Error, Layers, Progress, RenderOptions, doubts};
+use deferred_blend::grouping::GroupsOfObjects;
 use std::path::PathBuf;
 
 /// A finished render.
@@ -81,7 +82,7 @@ impl Begun<'_> {
 pub(crate) struct Left {
     pub(crate) files: Files,
     pub(crate) sets: Kept,
-    pub(crate) groups: surfels::Kept,
+    pub(crate) groups: GroupsOfObjects,
 }
 
 impl Left {

@@ -17,6 +17,7 @@ pub(crate) mod surfels;
 use crate::form::{DRAWN, Form};
 use crate::frame::Frame;
 use crate::lights::LightPoint;
+use crate::load::Loaded;
 use crate::matter::{CarriesLight, Matter};
 use crate::pass;
 use crate::plan::Plan;
@@ -25,6 +26,7 @@ use crate::stage;
 use crate::statistics::ObjectStatistics;
 use crate::work::{Translucent, cost};
 use crate::{CostRecord, Error, Layers, RenderOptions};
+use deferred_blend::grouping::GroupsOfObjects;
 pub(crate) use particles::{Checkpoint, Kept};
 use splat_core::raster::{GlassImage, OpaqueImage};
 use splat_core::{Accumulator, Material};
@@ -51,8 +53,12 @@ pub(crate) struct Row {
     pub(crate) of_splats: &'static str,
     /// Whether it mirrors and bends light where surfaces bound matter, and that absorbs; or what to do so that this is shown.
     pub(crate) bends: fn(&Scene) -> Result<(), &'static str>,
+    /// Whether light falls on bumps; or what to do so that it does.
+    pub(crate) bumps: fn(&Scene) -> Result<(), &'static str>,
     /// Whether it draws translucent splats as they are: they get footprints and radiance.
     pub(crate) draws_splats: bool,
+    /// How it draws opaque splats of its objects, by their places; `None` where the frame does.
+    pub(crate) opaque: Option<fn(&Frame<'_>, &[u32], &mut CostRecord) -> Result<OpaqueImage, Error>>,
     /// Its passes; the last one comes behind opaque surfaces, those before it come before footprints.
     pub(crate) steps: &'static [Step],
     /// Whether its picture is an average of random sets, which a checkpoint can keep.
@@ -61,8 +67,8 @@ pub(crate) struct Row {
     pub(crate) bytes: fn(&Matter<'_>, &[LightPoint], colored_extinction: bool, &RenderOptions) -> u64,
     /// How it carries light through what it draws by itself, where a scene asks for that; `None` where shadow maps have all light.
     pub(crate) carries: fn(&Scene) -> Option<CarriesLight>,
-    /// Adds effects and passes of its own to the plan of a scene that it draws.
-    pub(crate) plans: fn(&Scene, &mut Plan),
+    /// Adds effects and passes of its own to the plan of a scene that it draws, and takes out what it does not need.
+    pub(crate) plans: fn(&Scene, &Loaded, &mut Plan),
     /// Begins a frame.
     pub(crate) begin: for<'a> fn(&'a Frame<'a>) -> Box<dyn Fold + 'a>,
 }
@@ -108,7 +114,7 @@ pub(crate) struct Session<'s> {
     /// Sets that serve all frames of an animation.
     pub(crate) kept: Option<&'s mut Kept>,
     /// Groups of discs that do.
-    pub(crate) groups: Option<&'s mut surfels::Kept>,
+    pub(crate) groups: Option<&'s mut GroupsOfObjects>,
     pub(crate) warnings: &'s mut Vec<String>,
     /// Sets that were averaged, where some were.
     pub(crate) sets: Option<Sets>,
@@ -165,6 +171,8 @@ pub(crate) static TABLE: [Row; 5] = [
         is_offered: Material::bounds_matter,
         how: "are discs, which are averaged in each layer of a surface, and layers are composited in order",
         bends: surfels::bends,
+        bumps: surfels::bumps,
+        opaque: Some(surfels::opaque),
         steps: &[SORT, Step { pass: pass::SURFELS, stage: stage::SURFELS, ..FOLD }],
         bytes: surfels::bytes,
         plans: surfels::plans,
@@ -200,11 +208,13 @@ const POINTS: Row = Row {
     polygons: |_| false,
     of_splats: DRAWN,
     bends: |_| Err("use `surfels`"),
+    bumps: |_| Err("use `surfels`"),
     draws_splats: true,
+    opaque: None,
     steps: &[SORT, FOLD],
     is_random: false,
     bytes: |_, _, _, _| 0,
     carries: |_| None,
-    plans: |_, _| {},
+    plans: |_, _, _| {},
     begin: points::begin,
 };

@@ -152,6 +152,12 @@ impl Similarity {
         self.rotation * (p * self.scale) + self.translation
     }
 
+    /// The same into a world whose lengths are `factor` times as long.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self { scale: self.scale * factor, translation: self.translation * factor, ..*self }
+    }
+
     /// World direction of `d`, length kept.
     pub fn rotate(&self, d: DVec3) -> DVec3 {
         self.rotation * d

@@ -89,7 +89,9 @@ pub(crate) fn heading(table: &str) -> &'static str {
         "object.transform" => "`transform`",
         "object.transfer" => "`transfer`",
         "object.isosurface" | "object.level_set" | "object.slice" | "object.clip" => "### Surfaces of fields",
-        "material" | "material.medium" | "material.absorption" | "material.cauchy" => "`[material.NAME]`",
+        "material" | "material.medium" | "material.absorption" | "material.cauchy" | "material.bump" => {
+            "`[material.NAME]`"
+        }
         "render" => "## `[render]`",
         "render.points" => "`[render.points]`",
         "render.shadow" => "`[render.shadow]`",

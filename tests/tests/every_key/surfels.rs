@@ -10,6 +10,9 @@ pub(crate) fn entries() -> Vec<Entry> {
         of(OPEN, "render.surfels.transmittance_cutoff", "render.surfels.transmittance_cutoff=0.9").by(SURFELS),
         of(OPEN, "render.surfels.bending", "render.surfels.bending='power'").by(SURFELS).with(GLASS),
         of(OPEN, "render.surfels.behind", "render.surfels.behind='straight'").by(SURFELS).with(GLASS),
+        of(OPEN, "render.surfels.shading", "render.surfels.shading='discs'").by(SURFELS),
+        one("render.surfels.opaque", "render.surfels={opaque='one_pass', groups=2}").by(SURFELS),
+        one("render.surfels.voronoi", "render.surfels.voronoi=false").by(SURFELS).with(ONE_PASS),
         of(OPEN, "render.surfels.layers", "render.surfels.layers='algorithm1'").by(SURFELS),
         one("render.surfels.peeled_layers", "render.surfels.peeled_layers=1").by(SURFELS).with(PEELED),
         of(OPEN, "render.surfels.groups", "render.surfels.groups=9").by(SURFELS).with(GROUPED),
@@ -27,6 +30,8 @@ const GLASS: &[&str] = &["material.m.ior=1.5"];
 const PEELED: &[&str] = &["render.surfels.layers='peeled'"];
 
 const GROUPED: &[&str] = &["render.surfels.layers='algorithm1'"];
+
+const ONE_PASS: &[&str] = &["render.surfels={opaque='one_pass', groups=1}"];
 
 const COVERED: &[&str] = &["render.surfels.layers='algorithm1'", "render.surfels.groups=16"];
 

@@ -383,11 +383,18 @@ fn materials() -> Vec<Entry> {
         of(OPEN, "material.cauchy.a", "material.m.cauchy.a=1.5").by(SURFELS).with(CAUCHY),
         of(OPEN, "material.cauchy.b", "material.m.cauchy.b=0").by(SURFELS).with(CAUCHY),
         of(OPEN, "material.absorption_inside", "material.m.absorption_inside=[1, 2, 3]").but_by(BUT_SURFELS, UNBENT),
+        of(OPEN, "material.bump", "material.m.bump={height=0.1, size=0.5}").but_by(BUT_SURFELS, SMOOTH),
+        of(OPEN, "material.bump.height", "material.m.bump.height=0.2").by(SURFELS).with(BUMPY),
+        of(OPEN, "material.bump.size", "material.m.bump.size=1").by(SURFELS).with(BUMPY),
+        of(OPEN, "material.bump.octaves", "material.m.bump.octaves=1").by(SURFELS).with(BUMPY),
+        of(OPEN, "material.bump.seed", "material.m.bump.seed=9").by(SURFELS).with(BUMPY),
     ]
 }
 
 const BUT_SURFELS: &[&str] = &["points", "particles", "sheets"];
 const UNBENT: Expected = Nothing("this technique draws surfaces without the matter that they bound, and warns");
+const SMOOTH: Expected = Nothing("this technique draws surfaces without bumps, and warns");
+const BUMPY: &[&str] = &["material.m.bump={height=0.1, size=0.5}"];
 const CAUCHY: &[&str] = &["material.m.cauchy={a=1.3, b=0.1}"];
 
 const BALL: Which = These(&["medium_ball"]);

@@ -12,7 +12,7 @@ use super::area::{WHOLE, covered_shares, epsilon_of};
 use super::graph::{OverlapGraph, Search};
 use super::surfels::{self, CHUNK, Surfel};
 use super::weighted::check_gap;
-use super::{Groups, covering_factor};
+use super::{Groups, check_cancelled, covering_factor};
 use crate::Error;
 use rayon::prelude::*;
 use splat_core::glam::DVec3;
@@ -53,21 +53,27 @@ impl Default for DuplicateParams {
 /// The graph should be one of all overlaps ([`Relaxation::default`](super::Relaxation)).
 ///
 /// # Errors
-/// [`Error::Parameter`] for a parameter out of its range.
+/// [`Error::Parameter`] for a parameter out of its range; [`Error::Cancelled`].
 ///
 /// # Panics
 /// If `groups` are not of the graph's cloud.
-pub fn duplicates(graph: &OverlapGraph, groups: &Groups, params: &DuplicateParams) -> Result<Vec<Vec<u32>>, Error> {
+pub fn duplicates(
+    graph: &OverlapGraph,
+    groups: &Groups,
+    params: &DuplicateParams,
+    progress: Option<&Progress>,
+) -> Result<Vec<Vec<u32>>, Error> {
     check_gap(params.gap)?;
     if !(0.0..1.0).contains(&params.most_clipped) {
         return Err(Error::parameter("most_clipped", params.most_clipped, "at least 0 and below 1"));
     }
     let shares = covered_shares(graph, params.gap);
     let most = (f64::from(params.most_clipped) * WHOLE) as u64;
-    Ok((0..groups.count())
-        .into_par_iter()
-        .map(|group| added(graph, &shares, groups, [u64::from(group), most]))
-        .collect())
+    let of_group = |group: u32| {
+        check_cancelled(progress)?;
+        Ok(added(graph, &shares, groups, [u64::from(group), most]))
+    };
+    (0..groups.count()).into_par_iter().map(of_group).collect()
 }
 
 /// The two steps of the paper for one group.

@@ -1,8 +1,8 @@
 //! The overlap graph: nodes are discs, edges join those that overlap (Eq. 5), less what may share a group all the same.
 
-use super::Groups;
 use super::cells::{self, Cells, Finder};
 use super::surfels::{self, CHUNK, Surfel};
+use super::{Groups, check_cancelled};
 use crate::Error;
 use rayon::prelude::*;
 use splat_core::{Cloud, Exceeded, Progress};
@@ -339,9 +339,7 @@ impl Search<'_> {
 
     /// Counts what was found, and stops where that is too much.
     fn count(&self, found: &AtomicU64, entries: u64) -> Result<(), Error> {
-        if self.progress.is_some_and(Progress::is_cancelled) {
-            return Err(Error::Cancelled);
-        }
+        check_cancelled(self.progress)?;
         if found.fetch_add(entries, Ordering::Relaxed) + entries > self.most_entries() {
             // The search ends here, so how many there would be is not known.
             return Err(self.exceeded(u64::MAX));

@@ -1,7 +1,10 @@
 //! Groups that hold for every view: kept by the places of the discs on their object, and found again when the object has moved.
 
-use super::Membership;
-use splat_core::glam::DVec3;
+use super::{Membership, Recipe};
+use crate::Error;
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::{Cloud, Progress, Similarity};
+use std::collections::BTreeMap;
 
 /// Share of its radius by which a disc may have moved on its object, by rounding, and is still the same.
 const NEAR: f64 = 1.0 / 64.0;
@@ -73,6 +76,37 @@ impl KeptGroups {
     /// Bytes of the places of so many discs, kept and looked for.
     pub const fn place_bytes(discs: u64) -> u64 {
         discs * (2 * size_of::<Place>() as u64 + size_of::<DVec3>() as u64 + 5)
+    }
+}
+
+/// Groups of objects by their ranks, and how they were made: for pictures that follow one another.
+#[derive(Debug, Clone, Default)]
+pub struct GroupsOfObjects(BTreeMap<usize, (Recipe, KeptGroups)>);
+
+impl GroupsOfObjects {
+    /// The groups of the discs of object `rank`, which `transform` has brought into the world, and whether they are new: those that were
+    /// kept, where the object has only moved, or new ones, which are kept.
+    ///
+    /// # Errors
+    /// As [`Recipe::group`].
+    pub fn members(
+        &mut self,
+        rank: usize,
+        (cloud, transform): (&Cloud, &Similarity),
+        recipe: &Recipe,
+        progress: Option<&Progress>,
+    ) -> Result<(Membership, bool), Error> {
+        let Similarity { scale, rotation, translation } = *transform;
+        let place = |p: &Vec3| rotation.inverse() * (cloud.origin + p.as_dvec3() - translation) / scale;
+        let places: Vec<DVec3> = cloud.position.iter().map(place).collect();
+        let radius = f64::from(cloud.radius.iter().copied().fold(f32::INFINITY, f32::min)) / scale;
+        let kept = self.0.get(&rank).filter(|(of, _)| of == recipe);
+        if let Some(found) = kept.and_then(|(_, groups)| groups.of(&places, radius)) {
+            return Ok((found, false));
+        }
+        let members = recipe.group(cloud, progress)?;
+        self.0.insert(rank, (*recipe, KeptGroups::new(&places, radius, members.clone())));
+        Ok((members, true))
     }
 }
 

@@ -4,8 +4,9 @@
 //! more colours than the greatest degree plus one. The least number, the chromatic number, is NP-hard to find.
 
 use super::graph::{FETCHED, OverlapGraph};
-use super::{Groups, MOST_GROUPS, check_count};
+use super::{Groups, MOST_GROUPS, check_cancelled, check_count};
 use crate::Error;
+use splat_core::Progress;
 
 /// Colour of a node without one.
 const NONE: u16 = MOST_GROUPS as u16;
@@ -26,14 +27,19 @@ pub struct Coloring {
 /// [`Coloring::overlaps`] counts what is left; so ten thousand discs at one place take as many groups as there may be.
 ///
 /// # Errors
-/// [`Error::Parameter`] for a number of groups outside 1..=256.
-pub fn minimum_coloring(graph: &OverlapGraph, most_groups: u32) -> Result<Coloring, Error> {
+/// [`Error::Parameter`] for a number of groups outside 1..=256; [`Error::Cancelled`].
+pub fn minimum_coloring(
+    graph: &OverlapGraph,
+    most_groups: u32,
+    progress: Option<&Progress>,
+) -> Result<Coloring, Error> {
     check_count(most_groups)?;
     let mut colors = vec![NONE; graph.nodes()];
     let mut count = 0;
     let mut overlaps = 0;
     let order = largest_first(graph);
     for batch in order.chunks(FETCHED) {
+        check_cancelled(progress)?;
         graph.fetch(batch);
         for &node in batch {
             let neighbors = graph.neighbors(node as usize);

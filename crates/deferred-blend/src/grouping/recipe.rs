@@ -72,14 +72,14 @@ impl Recipe {
         let groups = match self.method {
             Method::Minimum { factor } => {
                 let relaxed = all(Relaxation { factor, ..Relaxation::default() })?;
-                let groups = minimum_coloring(&relaxed, self.groups)?.groups;
+                let groups = minimum_coloring(&relaxed, self.groups, progress)?.groups;
                 graph = (factor == 1.0).then_some(relaxed);
                 groups
             }
             Method::Weighted => {
                 let graph = graph.insert(all(Relaxation::default())?);
                 let params = WeightedParams { groups: self.groups, gap: self.gap, ..WeightedParams::default() };
-                weighted_coloring(graph, &params)?
+                weighted_coloring(graph, &params, progress)?
             }
             Method::Hash(collisions) => {
                 let params = HashParams { groups: self.groups, disc_scale: self.disc_scale, collisions, max_bytes };
@@ -102,7 +102,8 @@ impl Recipe {
             Coverage::Duplicates => {
                 let params = GraphParams { disc_scale, max_bytes, ..GraphParams::default() };
                 let graph = graph.map_or_else(|| OverlapGraph::build(cloud, &params, progress), Ok)?;
-                let added = duplicates(&graph, &groups, &DuplicateParams { gap, ..DuplicateParams::default() })?;
+                let params = DuplicateParams { gap, ..DuplicateParams::default() };
+                let added = duplicates(&graph, &groups, &params, progress)?;
                 return Ok(groups.with_further(&added).into());
             }
             Coverage::Enlarged => {

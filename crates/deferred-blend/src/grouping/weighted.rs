@@ -18,9 +18,10 @@
 use super::area::{WHOLE, covered_share, epsilon_of, mutual_shares};
 use super::graph::{FETCHED, OverlapGraph};
 use super::surfels::CHUNK;
-use super::{Groups, check_count};
+use super::{Groups, check_cancelled, check_count};
 use crate::Error;
 use rayon::prelude::*;
+use splat_core::Progress;
 
 /// 1 − n_i·n_j of discs of one plane.
 const FLAT: f64 = 1.0 / 1024.0;
@@ -65,13 +66,17 @@ pub(crate) fn check_gap(gap: f32) -> Result<(), Error> {
 /// Parts the discs of an overlap graph into K groups with little overlap.
 ///
 /// # Errors
-/// [`Error::Parameter`] for a parameter out of its range.
-pub fn weighted_coloring(graph: &OverlapGraph, params: &WeightedParams) -> Result<Groups, Error> {
+/// [`Error::Parameter`] for a parameter out of its range; [`Error::Cancelled`].
+pub fn weighted_coloring(
+    graph: &OverlapGraph,
+    params: &WeightedParams,
+    progress: Option<&Progress>,
+) -> Result<Groups, Error> {
     params.check()?;
     let shares = mutual_shares(graph, params.gap);
     let mut vertices = Vertices::new(graph, &shares, params.groups);
-    vertices.initialize();
-    vertices.optimize(params);
+    vertices.initialize(progress)?;
+    vertices.optimize(params, progress)?;
     let of_node: Vec<u8> = vertices.group.iter().map(|&group| group as u8).collect();
     Ok(Groups::of_each(params.groups, graph.by_place(&of_node)))
 }
@@ -132,19 +137,21 @@ impl<'a> Vertices<'a> {
     }
 
     /// Step 1: vertices in the order in which the queue of edges reaches them.
-    fn initialize(&mut self) {
+    fn initialize(&mut self, progress: Option<&Progress>) -> Result<(), Error> {
         let greatest = |node: usize| self.edges(node).map(|(n, share)| self.weight(node, n, share)).fold(0.0, f64::max);
         let nodes: Vec<u32> = (0..self.graph.nodes() as u32).collect();
         for batch in by_falling(&nodes, greatest).chunks(FETCHED) {
+            check_cancelled(progress)?;
             self.graph.fetch(batch);
             for &node in batch {
                 self.group[node as usize] = self.minimize_overlap(node as usize).0;
             }
         }
+        Ok(())
     }
 
     /// Step 2: vertices that overlap others of their group change to the best one.
-    fn optimize(&mut self, params: &WeightedParams) {
+    fn optimize(&mut self, params: &WeightedParams, progress: Option<&Progress>) -> Result<(), Error> {
         let threshold = (f64::from(params.threshold) * WHOLE) as u64;
         let mut waits = vec![true; self.graph.nodes()];
         for _ in 0..params.rounds {
@@ -152,13 +159,15 @@ impl<'a> Vertices<'a> {
             let wait = |node: &&u32| waits[**node as usize] && self.own_overlap(**node as usize) > threshold;
             let queue: Vec<u32> = nodes.par_iter().with_min_len(CHUNK).filter(wait).copied().collect();
             if queue.is_empty() {
-                return;
+                break;
             }
             waits.fill(false);
-            for node in by_falling(&queue, |node| self.own_weight(node)) {
-                self.improve(node as usize, &mut waits);
+            for batch in by_falling(&queue, |node| self.own_weight(node)).chunks(FETCHED) {
+                check_cancelled(progress)?;
+                batch.iter().for_each(|&node| self.improve(node as usize, &mut waits));
             }
         }
+        Ok(())
     }
 
     /// Moves a vertex to a group with less overlap, if there is one; those that it overlaps there come into the queue.

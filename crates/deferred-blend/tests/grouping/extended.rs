@@ -8,7 +8,7 @@ use splat_core::Cloud;
 
 fn four(cloud: &Cloud) -> (OverlapGraph, Groups) {
     let graph = OverlapGraph::build(cloud, &GraphParams::default(), None).expect("a valid cloud");
-    let groups = weighted_coloring(&graph, &WeightedParams { groups: 4, ..WeightedParams::default() });
+    let groups = weighted_coloring(&graph, &WeightedParams { groups: 4, ..WeightedParams::default() }, None);
     (graph, groups.expect("in range"))
 }
 
@@ -17,7 +17,7 @@ fn every_disc_that_a_group_leaves_open_joins_it() {
     let cloud = ball();
     let (graph, groups) = four(&cloud);
     let params = DuplicateParams::default();
-    let added = duplicates(&graph, &groups, &params).expect("in range");
+    let added = duplicates(&graph, &groups, &params, None).expect("in range");
     assert_eq!(added.len(), 4);
     for (group, places) in (0u8..).zip(&added) {
         assert!(places.iter().all(|&place| groups.of()[place as usize] != group));
@@ -26,7 +26,7 @@ fn every_disc_that_a_group_leaves_open_joins_it() {
     let all: usize = added.iter().map(Vec::len).sum();
     assert!(all > 0 && all < 2 * cloud.len(), "{all}");
     let none = DuplicateParams { most_clipped: 0.0, ..params };
-    let fewer: usize = duplicates(&graph, &groups, &none).expect("in range").iter().map(Vec::len).sum();
+    let fewer: usize = duplicates(&graph, &groups, &none, None).expect("in range").iter().map(Vec::len).sum();
     assert!(fewer < all, "{fewer} of {all}");
 }
 
@@ -36,7 +36,7 @@ fn discs_that_overlap_nothing_join_every_group() {
     let cloud = ball().gather(&[0, 2999]);
     let graph = OverlapGraph::build(&cloud, &GraphParams::default(), None).expect("a valid cloud");
     let groups = Groups::new(2, vec![0, 1]).expect("below the count");
-    let added = duplicates(&graph, &groups, &DuplicateParams { most_clipped: 0.0, ..DuplicateParams::default() });
+    let added = duplicates(&graph, &groups, &DuplicateParams { most_clipped: 0.0, ..DuplicateParams::default() }, None);
     assert_eq!(added, Ok(vec![vec![1], vec![0]]));
 }
 
@@ -71,7 +71,7 @@ fn empty_groups_and_clouds_are_taken() {
         let enlarged = enlarged_radii(&cloud, &groups, &EnlargeParams::default(), None).expect("in range");
         assert_eq!((enlarged[0].factor, enlarged[0].covered), (1.0, 0.0));
         let graph = OverlapGraph::build(&cloud, &GraphParams::default(), None).expect("a valid cloud");
-        let added = duplicates(&graph, &groups, &DuplicateParams::default()).expect("in range");
+        let added = duplicates(&graph, &groups, &DuplicateParams::default(), None).expect("in range");
         assert_eq!(added.iter().map(Vec::len).sum::<usize>(), cloud.len());
     }
 }
@@ -85,7 +85,7 @@ fn parameters_are_checked() {
         DuplicateParams { most_clipped: 1.0, ..DuplicateParams::default() },
         DuplicateParams { most_clipped: f32::NAN, ..DuplicateParams::default() },
     ] {
-        assert!(matches!(duplicates(&graph, &groups, &params), Err(Error::Parameter { .. })), "{params:?}");
+        assert!(matches!(duplicates(&graph, &groups, &params, None), Err(Error::Parameter { .. })), "{params:?}");
     }
     let bad = EnlargeParams { gap: f32::NAN, ..EnlargeParams::default() };
     assert!(matches!(enlarged_radii(&cloud, &groups, &bad, None), Err(Error::Parameter { .. })));

@@ -23,10 +23,10 @@ struct Everything {
 /// `unit` is the length that a unit of the cloud is now.
 fn everything(cloud: &Cloud, unit: f64) -> Everything {
     let graph = OverlapGraph::build(cloud, &GraphParams::default(), None).expect("a valid cloud");
-    let minimum = minimum_coloring(&graph, 256).expect("in range").groups;
+    let minimum = minimum_coloring(&graph, 256, None).expect("in range").groups;
     let weighted = |groups| {
         let params = WeightedParams { groups, ..WeightedParams::default() };
-        weighted_coloring(&graph, &params).expect("in range")
+        weighted_coloring(&graph, &params, None).expect("in range")
     };
     let four = weighted(4);
     let near = Collisions::ResolveNear { eye: cloud.origin, distance: unit };
@@ -36,7 +36,7 @@ fn everything(cloud: &Cloud, unit: f64) -> Everything {
     };
     Everything {
         edges: edges(&graph),
-        added: duplicates(&graph, &four, &DuplicateParams::default()).expect("in range"),
+        added: duplicates(&graph, &four, &DuplicateParams::default(), None).expect("in range"),
         enlarged: enlarged_radii(cloud, &four, &EnlargeParams::default(), None).expect("in range"),
         groups: [
             minimum.of().to_vec(),

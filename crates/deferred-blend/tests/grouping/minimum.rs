@@ -17,7 +17,7 @@ fn no_edge_lies_within_a_group() {
         let mut fewer = u32::MAX;
         for factor in [1.0, 0.8, 0.6, 0.4] {
             let graph = graph(&cloud, factor);
-            let coloring = minimum_coloring(&graph, 256).expect("in range");
+            let coloring = minimum_coloring(&graph, 256, None).expect("in range");
             let groups = &coloring.groups;
             assert!(edges(&graph).iter().all(|&[i, j]| groups.of()[i] != groups.of()[j]));
             assert_eq!((coloring.overlaps, graph.overlaps(groups).len()), (0, 0));
@@ -33,7 +33,7 @@ fn no_edge_lies_within_a_group() {
 #[test]
 fn colors_are_those_of_largest_first() {
     let graph = graph(&mixed(800), 1.0);
-    let groups = minimum_coloring(&graph, 256).expect("in range").groups;
+    let groups = minimum_coloring(&graph, 256, None).expect("in range").groups;
     let mut order: Vec<usize> = (0..graph.nodes()).collect();
     order.sort_by_key(|&node| std::cmp::Reverse(graph.degree(node)));
     let mut colors = vec![None; graph.nodes()];
@@ -48,7 +48,7 @@ fn colors_are_those_of_largest_first() {
 fn a_capped_number_of_groups_is_kept_and_what_is_left_is_told() {
     for most in [1, 2, 5] {
         let graph = graph(&ball(), 1.0);
-        let coloring = minimum_coloring(&graph, most).expect("in range");
+        let coloring = minimum_coloring(&graph, most, None).expect("in range");
         let left = graph.overlaps(&coloring.groups).len() as u64;
         assert_eq!((coloring.groups.count(), coloring.overlaps), (most, left));
         assert!(left > 0);
@@ -58,7 +58,7 @@ fn a_capped_number_of_groups_is_kept_and_what_is_left_is_told() {
 #[test]
 fn db9_ten_thousand_discs_at_one_place_take_as_many_groups_as_there_may_be() {
     let graph = graph(&one_place(10_000), 1.0);
-    let coloring = minimum_coloring(&graph, 256).expect("in range");
+    let coloring = minimum_coloring(&graph, 256, None).expect("in range");
     assert_eq!(coloring.groups.count(), 256);
     // 10,000 = 16·40 + 240·39.
     assert_eq!(coloring.overlaps, 16 * (40 * 39 / 2) + 240 * (39 * 38 / 2));
@@ -67,7 +67,7 @@ fn db9_ten_thousand_discs_at_one_place_take_as_many_groups_as_there_may_be() {
 #[test]
 fn nothing_and_a_single_disc_are_one_group() {
     for cloud in least() {
-        let coloring = minimum_coloring(&graph(&cloud, 1.0), 256).expect("in range");
+        let coloring = minimum_coloring(&graph(&cloud, 1.0), 256, None).expect("in range");
         assert_eq!((coloring.groups.count(), coloring.groups.of().len()), (1, cloud.len()));
     }
 }
@@ -76,6 +76,6 @@ fn nothing_and_a_single_disc_are_one_group() {
 fn the_number_of_groups_is_checked() {
     let graph = graph(&flat(), 1.0);
     for most in [0, 257] {
-        assert!(matches!(minimum_coloring(&graph, most), Err(Error::Parameter { .. })));
+        assert!(matches!(minimum_coloring(&graph, most, None), Err(Error::Parameter { .. })));
     }
 }

@@ -20,7 +20,7 @@ fn with(groups: u32) -> WeightedParams {
 fn cost_and_overlap_are_far_below_those_of_random_groups_and_of_hashing() {
     for cloud in [ball(), mixed(2000)] {
         let graph = graph(&cloud);
-        let groups = weighted_coloring(&graph, &with(4)).expect("in range");
+        let groups = weighted_coloring(&graph, &with(4), None).expect("in range");
         let random = (0..cloud.len() as u64).map(|i| (rng::bits(1, 2, i, 3) % 4) as u8).collect();
         let random = Groups::new(4, random).expect("below the count");
         let hashed =
@@ -37,8 +37,8 @@ fn cost_and_overlap_are_far_below_those_of_random_groups_and_of_hashing() {
 #[test]
 fn with_as_many_groups_as_colors_suffice_nothing_overlaps() {
     let graph = graph(&ball());
-    let enough = minimum_coloring(&graph, 256).expect("in range").groups.count() + 4;
-    let groups = weighted_coloring(&graph, &with(enough)).expect("in range");
+    let enough = minimum_coloring(&graph, 256, None).expect("in range").groups.count() + 4;
+    let groups = weighted_coloring(&graph, &with(enough), None).expect("in range");
     assert_eq!(graph.overlaps(&groups).len(), 0);
     assert_eq!(weighted_cost(&graph, &groups, 0.5), Ok(0.0));
 }
@@ -47,7 +47,7 @@ fn with_as_many_groups_as_colors_suffice_nothing_overlaps() {
 fn the_optimization_lowers_the_overlap() {
     let graph = graph(&ball());
     let overlap = |rounds| {
-        let groups = weighted_coloring(&graph, &WeightedParams { rounds, ..with(4) }).expect("in range");
+        let groups = weighted_coloring(&graph, &WeightedParams { rounds, ..with(4) }, None).expect("in range");
         graph.mean_overlap(&groups)
     };
     assert!(overlap(8) < 0.99 * overlap(0), "{} {}", overlap(8), overlap(0));
@@ -57,7 +57,7 @@ fn the_optimization_lowers_the_overlap() {
 #[test]
 fn coplanar_discs_are_parted_by_areas() {
     let graph = graph(&flat());
-    let groups = weighted_coloring(&graph, &with(8)).expect("in range");
+    let groups = weighted_coloring(&graph, &with(8), None).expect("in range");
     assert_eq!(weighted_cost(&graph, &groups, 0.5), Ok(0.0), "normals are equal");
     assert!(graph.mean_overlap(&groups) < 0.08, "{}", graph.mean_overlap(&groups));
 }
@@ -65,7 +65,7 @@ fn coplanar_discs_are_parted_by_areas() {
 #[test]
 fn db9_discs_at_one_place_fill_all_groups_alike() {
     let graph = graph(&one_place(1000));
-    let groups = weighted_coloring(&graph, &with(8)).expect("in range");
+    let groups = weighted_coloring(&graph, &with(8), None).expect("in range");
     for group in 0..8 {
         assert_eq!(groups.of().iter().filter(|&&of| of == group).count(), 125);
     }
@@ -74,7 +74,7 @@ fn db9_discs_at_one_place_fill_all_groups_alike() {
 #[test]
 fn nothing_and_a_single_disc_are_grouped() {
     for cloud in least() {
-        let groups = weighted_coloring(&graph(&cloud), &with(8)).expect("in range");
+        let groups = weighted_coloring(&graph(&cloud), &with(8), None).expect("in range");
         assert_eq!((groups.count(), groups.of()), (8, vec![0; cloud.len()].as_slice()));
     }
 }
@@ -90,8 +90,8 @@ fn parameters_are_checked() {
         WeightedParams { threshold: -1.0, ..with(8) },
         WeightedParams { threshold: f32::NAN, ..with(8) },
     ] {
-        assert!(matches!(weighted_coloring(&graph, &params), Err(Error::Parameter { .. })), "{params:?}");
+        assert!(matches!(weighted_coloring(&graph, &params, None), Err(Error::Parameter { .. })), "{params:?}");
     }
-    let groups = weighted_coloring(&graph, &with(8)).expect("in range");
+    let groups = weighted_coloring(&graph, &with(8), None).expect("in range");
     assert!(matches!(weighted_cost(&graph, &groups, f32::INFINITY), Err(Error::Parameter { .. })));
 }

@@ -29,6 +29,8 @@ pub(super) fn ways(
     scene.render.layers = LayerChoice::default();
     let groups = scene.render.surfels.layers.groups().copied().unwrap_or_default();
     scene.render.surfels.transmittance_cutoff = 0.0;
+    // All ways show the same light.
+    scene.render.surfels.lights_pixels = false;
     let mut draw = |name: String, layers: SurfelLayers| {
         scene.render.surfels.layers = layers;
         let image = by_technique(Technique::Surfels, &scene, loaded, options, progress)?;

@@ -183,8 +183,7 @@ impl Own {
 
     /// Scales the world, not the object.
     pub(crate) fn scale_world(&mut self, scale: f64) {
-        self.transform.scale *= scale;
-        self.transform.translation *= scale;
+        self.transform = self.transform.scaled(scale);
         self.radius *= scale;
     }
 }

@@ -3,8 +3,10 @@
 
 mod glass;
 mod grouped;
+mod opaque;
+mod plans;
 
-use crate::frame::{Frame, Shaded};
+use crate::frame::Frame;
 use crate::lights::LightPoint;
 use crate::matter::Matter;
 use crate::pass;
@@ -12,16 +14,22 @@ use crate::scene::{Scene, SurfelGroups, SurfelLayers, Technique};
 use crate::technique::{Fold, Session, points};
 use crate::{CostRecord, Error, RenderOptions, stage};
 use deferred_blend::grouping::Membership;
-use deferred_blend::{BlendInput, Blended, DiscInput, Discs, Floors, Glass, Layering, Params, Surfaces, blend};
+use deferred_blend::{
+    BlendInput, Blended, DiscInput, Discs, Floors, Glass, Layering, Light, Params, Shown, Surfaces, blend,
+};
 use glass::{bending, bounds_matter, surfaces, unit};
-pub(crate) use grouped::{Kept, plans};
+pub(crate) use opaque::opaque;
+pub(crate) use plans::plans;
 use splat_core::glam::Vec3;
 use splat_core::raster::GlassImage;
-use splat_core::{Accumulator, Direction};
+use splat_core::{Accumulator, Cloud, Direction, Similarity, SplatKind};
 use std::ops::Range;
 
 /// Bytes of a disc: where rays meet it, what it shows, its normal and place, and an entry in the lists of two tiles.
 const DISC_BYTES: u64 = 96 + 28 + 12 + 4 + 2 * 4;
+
+/// Bytes of a sample of opaque discs: what light falls on, in tiles and as a picture.
+const OPAQUE_BYTES: u64 = 4 * 2 * (10 + 2);
 
 /// Bytes of a sample of what is mirrored and bent.
 const GLASS_BYTES: u64 = 24;
@@ -32,7 +40,9 @@ pub(crate) fn bytes(matter: &Matter<'_>, _: &[LightPoint], _: bool, _: &RenderOp
     let bounds = bends(matter.scene).is_ok() && matter.scene.materials.iter().any(|m| m.material.bounds_matter());
     let glass = if bounds { Surfaces::bytes(discs) + GLASS_BYTES * matter.camera.pixels() } else { 0 };
     let groups = grouped::bytes(matter.scene, discs, matter.cloud.map_or(0, |cloud| cloud.bytes()));
-    DISC_BYTES * discs + glass + groups
+    let is_solid = |cloud: &Cloud| cloud.kind.contains(&SplatKind::Opaque);
+    let opaque = if matter.cloud.is_some_and(is_solid) { OPAQUE_BYTES * matter.camera.pixels() } else { 0 };
+    DISC_BYTES * discs + glass + groups + opaque
 }
 
 /// Whether light is mirrored and bent, or what to set so that it is.
@@ -41,6 +51,11 @@ pub(crate) fn bends(scene: &Scene) -> Result<(), &'static str> {
         SurfelLayers::Gaps | SurfelLayers::Peeled(_) => Ok(()),
         SurfelLayers::Algorithm1(_) | SurfelLayers::Algorithm2(_) => Err("set render.surfels.layers = \"gaps\""),
     }
+}
+
+/// Whether light falls on bumps, or what to set so that it does.
+pub(crate) fn bumps(scene: &Scene) -> Result<(), &'static str> {
+    scene.render.surfels.lights_pixels.then_some(()).ok_or("set render.surfels.shading = \"pixels\"")
 }
 
 /// Begins a frame.
@@ -71,14 +86,17 @@ impl<'a> Fold for Surfels<'a> {
     ) -> Result<(), Error> {
         let frame = self.frame;
         let params = params(frame);
-        frame.maps(cost)?;
         if self.discs.is_none() {
-            self.members = grouped::members(frame, session.groups.as_deref_mut(), cost)?;
+            if let Some(groups) = frame.settings.surfels.layers.groups() {
+                let ids = frame.translucent(frame.drawn(), Technique::Surfels);
+                let members = grouped::members(frame, groups, &ids, session.groups.as_deref_mut(), cost)?;
+                self.members = Some(members);
+            }
             self.discs = Some(project(frame, &params, self.members.as_ref(), cost)?);
         }
-        let Shaded { values, .. } = frame.shaded(cost)?;
         let opaque = &frame.opaque(cost)?.depth;
         if self.surfaces.is_none() && bounds_matter(frame) {
+            let values = &frame.shaded(cost)?.values;
             let made = cost.measure(pass::SURFELS, |stage| Ok::<_, Error>(surfaces(frame, values, stage)))?;
             self.surfaces = Some(made);
         }
@@ -90,19 +108,22 @@ impl<'a> Fold for Surfels<'a> {
         };
         let (bending, unit, straight) = (bending(frame), unit(frame), !frame.settings.surfels.bent_behind);
         let glass = self.surfaces.as_ref().map(|surfaces| Glass { bending, sky: &sky, surfaces, straight, unit });
+        let before = self.glass.take();
         let layering = layering(&frame.settings.surfels.layers, self.members.as_ref(), (discs, &params));
-        frame.progress.begin(stage::SURFELS);
-        frame.tick()?;
-        let image = cost.measure(pass::SURFELS, |stage| {
-            let input = BlendInput { discs, values, opaque, range, layering, glass };
-            let Blended { counts, glass } = blend(&input, &params, into, Some(frame.progress)).map_err(refuse)?;
-            stage.items_in = counts.discs;
-            stage.items_out = counts.layers;
-            stage.fragments = counts.fragments;
-            stage.bytes = counts.bytes;
-            Ok::<_, Error>(glass)
+        self.glass = with_shown(frame, cost, |shown, cost| {
+            frame.progress.begin(stage::SURFELS);
+            frame.tick()?;
+            cost.measure(pass::SURFELS, |stage| {
+                let input = BlendInput { discs, shown, opaque, range, layering, glass };
+                let made = blend(&input, &params, into, Some(frame.progress)).map_err(refuse)?;
+                let Blended { counts, glass } = made.behind(before);
+                stage.items_in = counts.discs;
+                stage.items_out = counts.layers;
+                stage.fragments = counts.fragments;
+                stage.bytes = counts.bytes;
+                Ok(glass)
+            })
         })?;
-        self.keep(image);
         Ok(())
     }
 
@@ -111,19 +132,25 @@ impl<'a> Fold for Surfels<'a> {
     }
 }
 
-impl Surfels<'_> {
-    /// Adds what a range of depths has mirrored; what is behind everything comes with the last one.
-    fn keep(&mut self, image: Option<GlassImage>) {
-        self.glass = match (self.glass.take(), image) {
-            (Some(before), Some(mut image)) => {
-                for (sum, own) in image.mirrored.iter_mut().zip(before.mirrored) {
-                    sum.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
-                }
-                Some(image)
-            }
-            (before, image) => image.or(before),
-        };
+/// Hands on what discs show: light on pixels, or what shading has given to each.
+fn with_shown<T>(
+    frame: &Frame<'_>,
+    cost: &mut CostRecord,
+    draw: impl FnOnce(Shown<'_>, &mut CostRecord) -> Result<T, Error>,
+) -> Result<T, Error> {
+    if !frame.settings.surfels.lights_pixels {
+        let values = &frame.shaded(cost)?.values;
+        return draw(Shown::Discs(values), cost);
     }
+    let lights = frame.lit_by(frame.maps(cost)?);
+    let (input, layout, transforms) = (&frame.shading(&lights), frame.layout(), &transforms(frame));
+    draw(Shown::Pixels(Light { input, layout, transforms }), cost)
+}
+
+/// From each object into the world, in the cloud's unit.
+fn transforms(frame: &Frame<'_>) -> Vec<Similarity> {
+    let unit = libm::exp2(f64::from(-frame.loaded.exponent));
+    frame.scene.objects.iter().map(|object| object.transform.scaled(unit)).collect()
 }
 
 /// Some discs of what is drawn.

@@ -58,6 +58,8 @@ impl Points<'_> {
             Some("the first slices alone (render.points.first_slices) are composited by the processor")
         } else if points.accumulation != Accumulation::F32 {
             Some("splats are composited in half precision by the processor")
+        } else if !self.frame.draws_all_solid() {
+            Some("opaque discs of `surfels`, and what lies before them, are drawn by the processor")
         } else {
             None
         }
