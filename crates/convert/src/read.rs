@@ -263,6 +263,7 @@ fn parse(
         let hint = "the file is truncated, or was never written";
         return Err(ReadError::input(Place::Byte(0), "vertices or points", "an empty file", hint));
     }
+    reading.notes.format = format.map_or_else(String::new, |format| format!("{format:?}"));
     match format {
         #[cfg(feature = "ply")]
         Some(Format::Ply) => {

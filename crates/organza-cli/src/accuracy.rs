@@ -3,7 +3,7 @@
 use super::args::AccuracyArguments;
 use super::bar::with_bar;
 use super::console;
-use super::session::{in_folder, load_scene, path_text, processor_only, render_options, start_threads};
+use super::session::{in_folder, load_scene, path_text, processor_only, render_options};
 use organza::output::Target;
 use organza::scene::Scene;
 use organza::{Error, Progress, RenderOptions, printable};
@@ -32,7 +32,6 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
     }
     in_folder(&arguments.out, || {
         let targets = Report::check(&arguments.out, arguments.force, &scene.files())?;
-        start_threads(arguments.scene.threads)?;
         let mut render = render_options(&arguments.scene);
         if arguments.scene.max_memory.is_none() {
             render.max_memory = render.max_memory.min(options.memory());

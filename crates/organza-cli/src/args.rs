@@ -1,14 +1,24 @@
 //! The arguments, as the user writes them.
 
+mod parse;
+
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use parse::{parse_bytes, parse_device, parse_finite, parse_frames, parse_size};
 use std::path::PathBuf;
 
 /// Most threads that are worth a try.
 const MOST_THREADS: u64 = 1024;
 
+/// What a first look at the command shows.
+const EXAMPLES: &str = "Examples:
+  organza render bunny.ply -o bunny.png      a picture of a data file
+  organza init bunny.ply -o scene.toml       a scene of it, ready to edit
+  organza render scene.toml -o picture.png   the same picture
+  organza info bunny.ply                     what the file holds";
+
 /// Renders mixed, translucent 3D data by splatting.
 #[derive(Debug, Parser)]
-#[command(name = "organza", version, disable_help_subcommand = true)]
+#[command(name = "organza", version, disable_help_subcommand = true, after_help = EXAMPLES)]
 pub(super) struct Arguments {
     #[command(subcommand)]
     pub(super) command: Command,
@@ -16,21 +26,40 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
-    /// Renders a scene to EXR or PNG files.
+    /// Renders a scene, or data files as they are, to EXR or PNG files.
+    #[command(
+        after_help = "Examples:\n  organza render bunny.ply -o bunny.png\n  organza render head.nii.gz --preset mri --azimuth 200 -o head.png\n  organza render ground.laz bunny.ply --ground -o both.png\n  organza render scene.toml -o picture.exr -o picture.png --layers effects,depth\n  organza render bunny.ply -o around.png --turntable 36\n  organza render scene.toml --set object.bunny.opacity=0.4 --technique surfels -o glass.png"
+    )]
     Render(RenderArguments),
+    /// Writes a first scene of data files, with comments, ready to edit.
+    #[command(
+        after_help = "Examples:\n  organza init bunny.ply -o scene.toml\n  organza init head.nii.gz --preset ct-bone -o head.toml\n  organza init ground.laz bunny.ply --ground --elevation 35"
+    )]
+    Init(InitArguments),
     /// Says what a render would simulate, what not, and why.
+    #[command(
+        after_help = "Examples:\n  organza explain scene.toml\n  organza explain scene.toml --measure --json\n  organza explain bunny.ply"
+    )]
     Explain(ExplainArguments),
     /// Measures what each approximation costs in accuracy and saves in time; writes a report.
+    #[command(after_help = "Examples:\n  organza accuracy scene.toml --quick -o report")]
     Accuracy(AccuracyArguments),
     /// Draws a scene by every ordering there is; writes a comparison.
+    #[command(after_help = "Examples:\n  organza orders scene.toml -o orders")]
     Orders(OrdersArguments),
     /// Describes a data file or a scene.
+    #[command(
+        after_help = "Examples:\n  organza info bunny.ply\n  organza info head.nii.gz --json\n  organza info scene.toml"
+    )]
     Info(InfoArguments),
     /// Lists the GPUs that --backend can use, and the drivers that play one.
+    #[command(after_help = "Examples:\n  organza devices\n  organza devices --json")]
     Devices(DevicesArguments),
     /// Runs every GPU recording on every device and compares with the processor.
+    #[command(after_help = "Examples:\n  organza passport\n  organza passport --device llvmpipe")]
     Passport(PassportArguments),
     /// Prints the JSON Schema of scene files.
+    #[command(after_help = "Examples:\n  organza schema > scene.schema.json")]
     Schema,
 }
 
@@ -39,6 +68,7 @@ impl Command {
     pub(super) fn wants_json(&self) -> bool {
         match self {
             Self::Render(a) => a.scene.json,
+            Self::Init(a) => a.json,
             Self::Explain(a) => a.scene.json,
             Self::Accuracy(a) => a.scene.json,
             Self::Orders(a) => a.scene.json,
@@ -50,11 +80,34 @@ impl Command {
     }
 }
 
+/// How data files without a scene are to be seen.
+#[derive(Debug, Args)]
+pub(super) struct FirstArguments {
+    /// Where the eye is, degrees about the axis that points up [default: 30; 150 for scans of bodies]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = parse_finite)]
+    pub(super) azimuth: Option<f64>,
+    /// Degrees above the horizon [default: 15 to 40, the flatter the data the higher]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = parse_finite)]
+    pub(super) elevation: Option<f64>,
+    /// Share of the picture's width or height that is filled, above 0, at most 1 [default: 0.9]
+    #[arg(long, value_name = "SHARE", value_parser = parse_finite)]
+    pub(super) fit: Option<f64>,
+    /// Look of volumes: ct-bone, ct-skin, mri, cloud, viridis, magma, inferno, plasma, cividis, turbo, grey, or a .json preset of ParaView
+    #[arg(long, value_name = "NAME")]
+    pub(super) preset: Option<String>,
+    /// Stand all of it on a ground
+    #[arg(long)]
+    pub(super) ground: bool,
+}
+
 /// What all commands on a scene share.
 #[derive(Debug, Args)]
 pub(super) struct SceneArguments {
-    /// Scene file: TOML, or JSON if its name ends in .json
-    pub(super) scene: PathBuf,
+    /// Scene file, .toml or .json; or data files, drawn as `organza init` writes them
+    #[arg(required = true, value_name = "SCENE|FILE")]
+    pub(super) inputs: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(super) first: FirstArguments,
     /// Change a value of the scene before it is checked, such as render.points.exact=true or object.cloud.visible=false
     #[arg(long = "set", value_name = "PATH=VALUE")]
     pub(super) set: Vec<String>,
@@ -128,6 +181,9 @@ pub(super) struct RenderArguments {
     #[arg(long, value_name = "FIRST-LAST", num_args = 0..=1, require_equals = true, default_missing_value = "all",
           value_parser = parse_frames)]
     pub(super) frames: Option<Frames>,
+    /// Draw so many frames in a circle around all, to numbered files
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub(super) turntable: Option<u32>,
     /// Store colours, alpha and shadow of EXR files in 16 bits
     #[arg(long)]
     pub(super) half: bool,
@@ -137,6 +193,39 @@ pub(super) struct RenderArguments {
     /// Replace outputs that exist
     #[arg(long)]
     pub(super) force: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct InitArguments {
+    /// Data files: meshes, points and volumes
+    #[arg(required = true, value_name = "FILE")]
+    pub(super) inputs: Vec<PathBuf>,
+    /// Scene file, .toml [default: the text goes to stdout, for a scene in this folder]
+    #[arg(short, long = "output", value_name = "SCENE.toml")]
+    pub(super) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) first: FirstArguments,
+    /// Size of the picture, pixels
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub(super) size: Option<[i64; 2]>,
+    /// Threads; 0 takes one for each core
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=MOST_THREADS))]
+    pub(super) threads: u64,
+    /// Bytes that the files may take, such as 8G [default: three quarters of the memory]
+    #[arg(long, value_name = "BYTES", value_parser = parse_bytes)]
+    pub(super) max_memory: Option<u64>,
+    /// Leave out points that are not finite instead of refusing their file
+    #[arg(long)]
+    pub(super) drop_invalid: bool,
+    /// Refuse files with faults that could be mended
+    #[arg(long)]
+    pub(super) strict: bool,
+    /// Replace a scene that exists
+    #[arg(long)]
+    pub(super) force: bool,
+    /// Print one JSON document on stdout
+    #[arg(long)]
+    pub(super) json: bool,
 }
 
 #[derive(Debug, Args)]
@@ -244,45 +333,6 @@ pub(super) enum Frames {
     Range(u32, u32),
 }
 
-fn parse_frames(text: &str) -> Result<Frames, String> {
-    if text == "all" {
-        return Ok(Frames::All);
-    }
-    let (first, last) = text.split_once('-').unwrap_or((text, text));
-    match (first.parse(), last.parse()) {
-        (Ok(first), Ok(last)) if first <= last => Ok(Frames::Range(first, last)),
-        _ => Err("expected FIRST-LAST, such as 0-47, or one frame".into()),
-    }
-}
-
-fn parse_size(text: &str) -> Result<[i64; 2], String> {
-    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
-    sides.ok_or_else(|| "expected WIDTHxHEIGHT, such as 960x540".into())
-}
-
-/// Part of the name of a device, which drivers give 256 bytes at most.
-fn parse_device(text: &str) -> Result<String, String> {
-    let fits = text.len() <= 200;
-    fits.then(|| text.to_owned()).ok_or_else(|| "expected a part of a device's name, of 200 bytes at most".into())
-}
-
-fn parse_finite(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| "expected a finite number".into())
-}
-
-/// A number of bytes with an optional K, M, G or T (powers of 1024).
-fn parse_bytes(text: &str) -> Result<u64, String> {
-    let (digits, shift) = match text.chars().last().map(|c| c.to_ascii_uppercase()) {
-        Some('K') => (&text[..text.len() - 1], 10),
-        Some('M') => (&text[..text.len() - 1], 20),
-        Some('G') => (&text[..text.len() - 1], 30),
-        Some('T') => (&text[..text.len() - 1], 40),
-        _ => (text, 0),
-    };
-    let bytes = digits.parse::<u64>().ok().and_then(|n| n.checked_mul(1 << shift)).filter(|n| *n > 0);
-    bytes.ok_or_else(|| "expected a number of bytes above 0, such as 500M or 8G".into())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -294,14 +344,11 @@ mod tests {
     }
 
     #[test]
-    fn sizes_and_bytes_are_read() {
-        assert_eq!(parse_size("960x540"), Ok([960, 540]));
-        assert!(["", "960", "x", "9x9x9", "1e3x2", " 9x9"].iter().all(|t| parse_size(t).is_err()));
-        assert_eq!(parse_bytes("8G"), Ok(8 << 30));
-        assert_eq!(parse_frames("all"), Ok(Frames::All));
-        assert_eq!([parse_frames("0-47"), parse_frames("9")], [Ok(Frames::Range(0, 47)), Ok(Frames::Range(9, 9))]);
-        assert!(["", "-", "5-", "-1", "5-4", "1..4", "a"].iter().all(|t| parse_frames(t).is_err()));
-        assert_eq!(parse_bytes("123"), Ok(123));
-        assert!(["", "0", "-1", "G", "1.5G", "99999999999T", "1ü"].iter().all(|t| parse_bytes(t).is_err()));
+    fn the_help_of_every_command_has_examples_of_it() {
+        for command in Arguments::command().get_subcommands() {
+            let (name, help) = (command.get_name(), command.get_after_help().map(ToString::to_string));
+            let example = format!("organza {name}");
+            assert!(help.is_some_and(|help| help.contains(&example)), "{name}");
+        }
     }
 }

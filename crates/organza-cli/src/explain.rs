@@ -2,7 +2,8 @@
 
 use super::args::ExplainArguments;
 use super::bar::with_bar;
-use super::session::{load_scene, path_text, processor_only, render_options, start_threads};
+use super::given::given;
+use super::session::{parse_scene, path_text, processor_only, render_options};
 use super::{console, report};
 use organza::scene::{Scene, SceneObject};
 use organza::{Error, escape_controls};
@@ -11,17 +12,17 @@ use serde_json::{Value, json};
 /// Prints the plan; with `--measure` renders too and prints what it cost.
 pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
     processor_only(&arguments.scene)?;
-    let scene = load_scene(&arguments.scene)?;
-    start_threads(arguments.scene.threads)?;
+    let (given, files) = given(&arguments.scene)?;
+    let scene = parse_scene(&arguments.scene, &given, None, None)?;
     let options = render_options(&arguments.scene);
-    let (plan, cost, prepared, (warnings, notes)) = with_bar(|progress| {
+    let (plan, cost, prepared, (warnings, notes, found)) = with_bar(|progress| {
         if arguments.measure {
-            let render = organza::render(&scene, &options, progress)?;
-            return Ok((render.plan, render.cost, None, (render.warnings, render.notes)));
+            let render = organza::render_from(&scene, &options, progress, files)?;
+            return Ok((render.plan, render.cost, None, (render.warnings, render.notes, render.found)));
         }
-        let explanation = organza::explain(&scene, &options, progress)?;
-        let organza::Explanation { plan, cost, memory, splats, warnings, notes } = explanation;
-        Ok((plan, cost, Some((memory, splats)), (warnings, notes)))
+        let explanation = organza::explain_from(&scene, &options, progress, &files)?;
+        let organza::Explanation { plan, cost, memory, splats, warnings, notes, found } = explanation;
+        Ok((plan, cost, Some((memory, splats)), (warnings, notes, found)))
     })?;
     for warning in &warnings {
         console::warn(warning);
@@ -29,7 +30,8 @@ pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
     notes.iter().for_each(|note| console::remark(note));
     if arguments.scene.json {
         let document = json!({
-            "scene": path_text(&scene.file),
+            "scene": arguments.scene.inputs.first().map(|path| path_text(path)),
+            "camera": report::camera_json(&scene, found.as_ref()),
             "plan": report::plan_json(&plan),
             "cost": report::cost_json(&cost),
             "memory_bytes": prepared.as_ref().map(|p| p.0),
@@ -44,6 +46,9 @@ pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
     text.push('\n');
     text += &report::cost_text(&cost);
     text += &up_text(&scene);
+    if let Some(found) = &found {
+        text += &format!("\n{}", report::camera_text(found));
+    }
     if let Some((memory, splats)) = prepared {
         text += &format!("\n{}\n", report::splats_text(&splats));
         text += &format!("rendering takes at most {memory} bytes\n");

@@ -1,34 +1,30 @@
 //! `organza info`.
 
-mod contents;
+mod text;
 
 use super::args::InfoArguments;
+use super::given::is_scene;
 use super::session::path_text;
 use super::{console, memory};
-use contents::{FileInfo, contents};
+use organza::Error;
 use organza::scene::{self, LoadOptions, Scene, Source};
-use organza::{Error, escape_controls};
+use organza_survey::{Facts, Histogram, facts};
 use serde_json::{Value, json};
 use splat_core::LightShape;
 
-/// Describes a scene (`.toml`, `.json`) or a data file.
+/// Describes a scene or a data file.
 pub(super) fn run(arguments: &InfoArguments) -> Result<(), Error> {
-    let is_scene =
-        arguments.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml") || e.eq_ignore_ascii_case("json"));
-    let document = if is_scene {
+    if is_scene(&arguments.file) {
         let options = LoadOptions { allow_path: arguments.allow_path, ..LoadOptions::default() };
-        scene_document(&scene::load(&arguments.file, &options)?)
-    } else {
-        let info = contents(&arguments.file, memory::default_limit(), arguments.strict)?;
-        info.mended.iter().for_each(|line| console::warn(line));
-        file_document(&info)
-    };
-    if arguments.json {
-        return console::out(&format!("{document:#}\n"));
+        let document = scene_document(&scene::load(&arguments.file, &options)?);
+        return console::out(&if arguments.json { format!("{document:#}\n") } else { text::lines(&document) });
     }
-    let mut text = String::new();
-    lines(&document, "", &mut text);
-    console::out(&text)
+    let facts = facts(&arguments.file, memory::default_limit(), arguments.strict)?;
+    facts.mended.iter().for_each(|line| console::warn(line));
+    if arguments.json {
+        return console::out(&format!("{:#}\n", file_document(&facts)));
+    }
+    console::out(&text::of_facts(&arguments.file, &facts))
 }
 
 fn scene_document(scene: &Scene) -> Value {
@@ -92,40 +88,38 @@ fn light_name(shape: &LightShape) -> &'static str {
     }
 }
 
-fn file_document(info: &FileInfo) -> Value {
+fn file_document(facts: &Facts) -> Value {
+    let histogram = |h: &Histogram| json!({ "low": h.low, "high": h.high, "counts": h.counts });
+    let faults = facts.faults.map(|f| {
+        json!({
+            "open_edges": f.open_edges,
+            "holes": f.holes,
+            "crowded_edges": f.crowded_edges,
+            "duplicate_triangles": f.duplicates,
+            "degenerate_triangles": f.degenerate,
+            "isolated_vertices": f.isolated,
+        })
+    });
     json!({
-        "kind": info.kind,
-        "bytes": info.bytes,
-        "counts": info.counts.iter().map(|(name, n)| ((*name).to_owned(), json!(n))).collect::<Value>(),
-        "attributes": info.attributes,
-        "bounds": info.bounds.map(|b| [b.min.to_array(), b.max.to_array()]),
-        "range": info.range,
-        "not_used": info.unused,
-        "remarks": info.remarks,
-        "mended": info.mended,
-        "up": info.up.name(),
+        "kind": facts.kind,
+        "format": facts.format,
+        "bytes": facts.bytes,
+        "counts": facts.counts.iter().map(|(name, n)| ((*name).to_owned(), json!(n))).collect::<Value>(),
+        "attributes": facts.attributes,
+        "bounds": facts.bounds.map(|b| [b.min.to_array(), b.max.to_array()]),
+        "size": facts.bounds.map(|b| b.size().to_array()),
+        "distance_from_origin_over_size": facts.far(),
+        "spacing": facts.spacing,
+        "duplicate_points": facts.duplicates,
+        "steps": facts.steps.map(|steps| steps.map(|s| s.to_array())),
+        "range": facts.range,
+        "histogram": facts.histogram.as_ref().map(histogram),
+        "quantiles": facts.quantiles.iter().map(|(share, value)| json!([share, value])).collect::<Value>(),
+        "columns": facts.columns.iter().map(|(name, range)| ((*name).to_owned(), json!(range))).collect::<Value>(),
+        "faults": faults,
+        "not_used": facts.unused,
+        "remarks": facts.remarks,
+        "mended": facts.mended,
+        "up": facts.up.name(),
     })
-}
-
-/// A document as indented lines; null and empty values are left out.
-fn lines(value: &Value, indent: &str, text: &mut String) {
-    let Value::Object(fields) = value else { return };
-    for (key, value) in fields {
-        match value {
-            Value::Null => {}
-            Value::Array(items) if items.is_empty() => {}
-            Value::Object(_) => {
-                *text += &format!("{indent}{key}:\n");
-                lines(value, &format!("{indent}  "), text);
-            }
-            Value::Array(items) if items.iter().all(Value::is_object) => {
-                for (i, item) in items.iter().enumerate() {
-                    *text += &format!("{indent}{key} {i}:\n");
-                    lines(item, &format!("{indent}  "), text);
-                }
-            }
-            Value::String(s) => *text += &format!("{indent}{key}: {}\n", escape_controls(s)),
-            other => *text += &format!("{indent}{key}: {other}\n"),
-        }
-    }
 }

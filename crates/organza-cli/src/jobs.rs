@@ -2,10 +2,11 @@
 //! others need of it: an animation may have a million.
 
 use super::args::{Frames, RenderArguments};
-use super::session::{parse_scene, read_scene};
+use super::given::{Given, given};
+use super::session::{parse_scene, render_options};
 use organza::output::{self, Format, Target, Targets};
-use organza::scene::Scene;
-use organza::{Error, Sequence, printable};
+use organza::scene::{FoundCamera, Scene};
+use organza::{Error, Files, Progress, Render, RenderOptions, Sequence, printable};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -15,8 +16,8 @@ const DIGITS: usize = 4;
 /// All pictures of a run.
 pub(super) struct Jobs<'a> {
     arguments: &'a RenderArguments,
-    /// The scene's file, read once: what was checked is what is drawn.
-    bytes: Vec<u8>,
+    /// The scene, read or made once: what was checked is what is drawn.
+    given: Given,
     /// The scene as it is written.
     still: Scene,
     outputs: Vec<PathBuf>,
@@ -32,13 +33,24 @@ pub(super) struct Places {
 }
 
 impl<'a> Jobs<'a> {
-    /// Reads the scene.
-    pub(super) fn new(arguments: &'a RenderArguments) -> Result<Self, Error> {
+    /// Reads the scene, or makes one of data files, which are among the files then.
+    pub(super) fn new(arguments: &'a RenderArguments) -> Result<(Self, Files), Error> {
         let outputs = outputs(arguments)?;
-        let bytes = read_scene(&arguments.scene)?;
-        let still = parse_scene(&arguments.scene, &bytes, None)?;
-        let frames = arguments.frames.map(|frames| range(frames, &still)).transpose()?;
-        Ok(Self { arguments, bytes, still, outputs, frames })
+        let is_numbered = arguments.frames.is_some() || arguments.turntable.is_some();
+        // Data takes long to read: an output that is in the way is told before.
+        for output in outputs.iter().filter(|_| !is_numbered) {
+            Target::new(output, arguments.force)?;
+        }
+        let (given, files) = given(&arguments.scene)?;
+        let still = parse_scene(&arguments.scene, &given, None, arguments.turntable)?;
+        let asked = arguments.frames.or(arguments.turntable.map(|_| Frames::All));
+        let frames = asked.map(|frames| range(frames, &still)).transpose()?;
+        Ok((Self { arguments, given, still, outputs, frames }, files))
+    }
+
+    /// The scene's file, or the data files that one was made of.
+    pub(super) fn inputs(&self) -> &[PathBuf] {
+        &self.arguments.scene.inputs
     }
 
     /// The frames, or `None` alone for the scene as it is written.
@@ -52,27 +64,40 @@ impl<'a> Jobs<'a> {
         self.frames.is_none()
     }
 
-    /// Checks scenes and outputs of all frames; gives what draws them where there are frames.
-    pub(super) fn check(&self) -> Result<Option<Sequence>, Error> {
+    /// Checks scenes and outputs of all frames; gives what draws them, from the files that were read.
+    pub(super) fn check(&self, files: Files) -> Result<Drawing, Error> {
         let mut targets = Targets::default();
-        let mut sequence = Sequence::default();
+        if self.is_still() {
+            targets.add_inputs(&self.still.files());
+            self.places(None, |path, replace| targets.add(path, replace))?;
+            return Ok(Drawing::Still(files));
+        }
+        let mut sequence = Sequence::of_files(files);
         for frame in self.frames() {
-            let scene = self.scene(frame)?;
+            let (scene, _) = self.scene(frame, Some(&sequence))?;
             targets.add_inputs(&scene.files());
             sequence.add(&scene);
         }
         for frame in self.frames() {
             self.places(frame, |path, replace| targets.add(path, replace))?;
         }
-        Ok((!self.is_still()).then_some(sequence))
+        Ok(Drawing::Frames(Box::new(sequence)))
     }
 
-    /// The scene at a frame.
-    pub(super) fn scene(&self, frame: Option<u32>) -> Result<Cow<'_, Scene>, Error> {
-        match frame {
-            Some(_) => parse_scene(&self.arguments.scene, &self.bytes, frame).map(Cow::Owned),
-            None => Ok(Cow::Borrowed(&self.still)),
-        }
+    /// The scene at a frame, and the camera that was placed for it from the files of a sequence.
+    pub(super) fn scene(
+        &self,
+        frame: Option<u32>,
+        sequence: Option<&Sequence>,
+    ) -> Result<(Cow<'_, Scene>, Option<FoundCamera>), Error> {
+        let scene = match frame {
+            Some(_) => parse_scene(&self.arguments.scene, &self.given, frame, self.arguments.turntable)?,
+            None => return Ok((Cow::Borrowed(&self.still), None)),
+        };
+        let Some(sequence) = sequence else { return Ok((Cow::Owned(scene), None)) };
+        let options = render_options(&self.arguments.scene);
+        let (fitted, found) = organza::fitted(&scene, &options, &Progress::new(), sequence.files())?;
+        Ok((Cow::Owned(fitted.into_owned()), found))
     }
 
     /// Where the picture of a frame goes, each place made by `target` of a path and whether a file there may be replaced.
@@ -90,6 +115,37 @@ impl<'a> Jobs<'a> {
             // One that is there is gone on from; the library refuses a file that is something else.
             checkpoint: checkpoint.as_ref().map(|path| target(&name(path), true)).transpose()?,
         })
+    }
+}
+
+/// What draws the pictures of a run.
+pub(super) enum Drawing {
+    /// One picture, from files of which some were read.
+    Still(Files),
+    /// Frames, of which each takes from the others what it can.
+    Frames(Box<Sequence>),
+}
+
+impl Drawing {
+    /// What frames take from each other.
+    pub(super) fn sequence(&self) -> Option<&Sequence> {
+        match self {
+            Self::Still(_) => None,
+            Self::Frames(sequence) => Some(sequence),
+        }
+    }
+
+    /// Draws one picture.
+    pub(super) fn render(
+        &mut self,
+        scene: &Scene,
+        options: &RenderOptions,
+        progress: &Progress,
+    ) -> Result<Render, Error> {
+        match self {
+            Self::Still(files) => organza::render_from(scene, options, progress, std::mem::take(files)),
+            Self::Frames(sequence) => sequence.render(scene, options, progress),
+        }
     }
 }
 
@@ -126,8 +182,14 @@ fn numbered(path: &Path, frame: u32, digits: usize) -> PathBuf {
 fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Error> {
     let mut outputs = arguments.output.clone();
     if outputs.is_empty() {
-        let stem = arguments.scene.scene.file_stem().unwrap_or("picture".as_ref());
-        outputs.push(Path::new(stem).with_added_extension("exr"));
+        let name = arguments.scene.inputs.first().and_then(|path| path.file_name()).unwrap_or("picture".as_ref());
+        let name = Path::new(name);
+        let name = if name.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) {
+            name.with_extension("")
+        } else {
+            name.to_owned()
+        };
+        outputs.push(Path::new(name.file_stem().unwrap_or("picture".as_ref())).with_added_extension("exr"));
     }
     for (i, path) in outputs.iter().enumerate() {
         Format::of_path(path)?;

@@ -1,8 +1,8 @@
 //! The command `organza`: arguments → library calls → text or JSON, with one exit code for each kind of error.
 //!
 //! ```text
-//! args ─► session (overrides, scene, threads, memory) ─► render explain accuracy orders ─► report ─► console
-//!                                                        info devices passport
+//! args ─► given (a scene, or one made of data files) ─► session (overrides, memory) ─► render explain accuracy orders ─► report ─► console
+//!         init info devices passport
 //! ```
 #![forbid(unsafe_code)]
 
@@ -12,7 +12,9 @@ mod bar;
 mod console;
 mod devices;
 mod explain;
+mod given;
 mod info;
+mod init;
 mod jobs;
 mod memory;
 mod orders;
@@ -59,6 +61,7 @@ fn without_floods(message: &str) -> String {
 fn run(command: Command) -> Result<u8, Error> {
     match command {
         Command::Render(arguments) => return render::run(&arguments),
+        Command::Init(arguments) => init::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
         Command::Accuracy(arguments) => accuracy::run(&arguments),
         Command::Orders(arguments) => orders::run(&arguments),

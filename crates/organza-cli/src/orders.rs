@@ -3,7 +3,7 @@
 use super::args::OrdersArguments;
 use super::bar::with_bar;
 use super::console;
-use super::session::{in_folder, load_scene, path_text, processor_only, render_options, start_threads};
+use super::session::{in_folder, load_scene, path_text, processor_only, render_options};
 use organza::{Error, printable};
 use organza_judge::accuracy;
 use organza_judge::orders::{self, OrdersReport};
@@ -18,7 +18,6 @@ pub(super) fn run(arguments: &OrdersArguments) -> Result<(), Error> {
     }
     in_folder(&arguments.out, || {
         let targets = OrdersReport::check(&arguments.out, arguments.force, &scene.files())?;
-        start_threads(arguments.scene.threads)?;
         let options = render_options(&arguments.scene);
         let comparison = with_bar(|progress| orders::compare(&scene, &options, progress))?;
         let report = OrdersReport::new(&scene, comparison)?;

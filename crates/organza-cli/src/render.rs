@@ -2,14 +2,14 @@
 
 use super::args::RenderArguments;
 use super::bar::with_bar;
-use super::jobs::{Jobs, Places};
-use super::session::{open_device, path_text, render_options, start_threads};
+use super::jobs::{Drawing, Jobs, Places};
+use super::session::{open_device, path_text, render_options};
 use super::{console, report};
 use organza::output::{self, Metadata, Target, WriteReport};
-use organza::scene::Scene;
-use organza::{Error, Progress, Render, RenderOptions, Sequence, Sets, printable};
+use organza::scene::{FoundCamera, Scene};
+use organza::{Error, Progress, Render, RenderOptions, Sets, printable};
 use serde_json::{Value, json};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Stages of a picture; those of the first have names of their own.
 const DRAWING: &str = "";
@@ -21,6 +21,10 @@ const LATER: &str = "later frames";
 struct Job<'a> {
     frame: Option<u32>,
     scene: &'a Scene,
+    /// What it is drawn of, as it was named.
+    inputs: &'a [PathBuf],
+    /// The camera that was placed for it.
+    found: Option<FoundCamera>,
     places: &'a Places,
 }
 
@@ -35,20 +39,20 @@ struct Done {
 
 /// Renders and writes, and gives the exit code. Whatever can be refused is refused before any work.
 pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
-    let jobs = Jobs::new(arguments)?;
-    let mut sequence = jobs.check()?;
-    start_threads(arguments.scene.threads)?;
+    let (jobs, files) = Jobs::new(arguments)?;
+    let mut drawing = jobs.check(files)?;
     let options = RenderOptions { device: open_device(&arguments.scene)?, ..render_options(&arguments.scene) };
     let mut done: Vec<Done> = Vec::new();
     let outcome = with_bar(|progress| {
         let count = jobs.frames().count();
         for (at, frame) in jobs.frames().enumerate() {
-            let (scene, places) = (jobs.scene(frame)?, jobs.places(frame, Target::new)?);
-            let job = Job { frame, scene: &scene, places: &places };
+            let (scene, found) = jobs.scene(frame, drawing.sequence())?;
+            let places = jobs.places(frame, Target::new)?;
+            let job = Job { frame, scene: &scene, inputs: jobs.inputs(), found, places: &places };
             progress.plan([(job.stage(), 1.0), (LATER.to_owned(), (count - at - 1) as f64)]);
             progress.begin(&job.stage());
             progress.enter();
-            let one = job.run(arguments, &options, sequence.as_mut(), progress)?;
+            let one = job.run(arguments, &options, &mut drawing, progress)?;
             progress.leave();
             let interrupted = one.sets.is_some_and(|s| s.interrupted);
             done.push(one);
@@ -95,7 +99,7 @@ impl Job<'_> {
         &self,
         arguments: &RenderArguments,
         options: &RenderOptions,
-        sequence: Option<&mut Sequence>,
+        drawing: &mut Drawing,
         progress: &Progress,
     ) -> Result<Done, Error> {
         let checkpoint = self.places.checkpoint.as_ref().map(|target| target.path().to_owned());
@@ -103,10 +107,7 @@ impl Job<'_> {
         progress.plan([(DRAWING, 0.95), (WRITING, 0.05)]);
         progress.begin(DRAWING);
         progress.enter();
-        let render = match sequence {
-            Some(sequence) => sequence.render(self.scene, &options, progress)?,
-            None => organza::render(self.scene, &options, progress)?,
-        };
+        let render = drawing.render(self.scene, &options, progress)?;
         progress.leave();
         progress.begin(WRITING);
         let mut warnings = render.warnings.clone();
@@ -169,6 +170,9 @@ impl Job<'_> {
         if let Some(Sets { averaged, asked, .. }) = render.sets {
             text += &format!("averaged {averaged} of {asked} sets\n");
         }
+        if let Some(found) = render.found.or(self.found) {
+            text += &report::camera_text(&found);
+        }
         for (path, report) in written {
             text += &format!("wrote {} ({} bytes)\n", printable(path), report.bytes);
         }
@@ -183,7 +187,9 @@ impl Job<'_> {
         });
         let sets = |s: Sets| json!({ "averaged": s.averaged, "asked": s.asked, "interrupted": s.interrupted });
         let mut document = json!({
-            "scene": path_text(&self.scene.file),
+            "scene": self.inputs.first().map(|path| path_text(path)),
+            "inputs": self.inputs.iter().map(|path| path_text(path)).collect::<Value>(),
+            "camera": report::camera_json(self.scene, render.found.or(self.found).as_ref()),
             "scene_sha256": self.scene.sha256,
             "size": self.scene.camera.size,
             "seed": self.scene.render.seed,

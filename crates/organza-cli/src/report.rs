@@ -1,8 +1,10 @@
 //! Plans and costs as tables and as JSON.
 
 use organza::plan::{Plan, PlannedObject};
+use organza::scene::{FoundCamera, Scene};
 use organza::{CostRecord, ShadowTable, SplatCount};
 use serde_json::{Value, json};
+use splat_core::glam::DVec3;
 use std::fmt::Write;
 
 /// The cost record as JSON, a list of stages.
@@ -14,6 +16,25 @@ pub(super) fn cost_json(cost: &CostRecord) -> Value {
         })
     };
     cost.stages.iter().map(stage).collect()
+}
+
+/// Where the camera is, and whether it was placed by itself.
+pub(super) fn camera_json(scene: &Scene, found: Option<&FoundCamera>) -> Value {
+    let (camera, target) = found.map_or((&scene.camera, scene.target), |found| (&found.camera, found.target));
+    json!({
+        "auto": found.is_some(),
+        "position": camera.position.to_array(),
+        "target": target.to_array(),
+        "forward": camera.axes[2].to_array(),
+        "up": camera.axes[1].to_array(),
+    })
+}
+
+/// The camera that was placed by itself, as a scene would say it.
+pub(super) fn camera_text(found: &FoundCamera) -> String {
+    let unit = 1e-4 * found.camera.position.distance(found.target);
+    let list = |v: DVec3| v.to_array().map(|x| organza_survey::rounded(x, unit)).join(", ");
+    format!("camera = auto: position = [{}], target = [{}]\n", list(found.camera.position), list(found.target))
 }
 
 /// Splats by object as JSON.

@@ -1,29 +1,31 @@
 //! What all commands on a scene do first: options become overrides, the scene is loaded, the threads start.
 
 use super::args::{Backend, SceneArguments};
+use super::given::{Given, camera_overrides, given};
 use super::memory;
 use organza::device::{Choice, Device, DeviceChoice};
 use organza::scene::{self, LoadOptions, Override, Scene};
-use organza::{Error, RenderOptions, printable};
+use organza::{Error, Progress, RenderOptions, printable};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Loads the scene with the options of the command line.
+/// The scene, or a first scene of data files, with the options of the command line and a camera that has its place.
 pub(super) fn load_scene(arguments: &SceneArguments) -> Result<Scene, Error> {
-    parse_scene(arguments, &read_scene(arguments)?, None)
+    let (given, files) = given(arguments)?;
+    let scene = parse_scene(arguments, &given, None, None)?;
+    Ok(organza::fitted(&scene, &render_options(arguments), &Progress::new(), &files)?.0.into_owned())
 }
 
-/// The bytes of the scene's file.
-pub(super) fn read_scene(arguments: &SceneArguments) -> Result<Vec<u8>, Error> {
-    check_backend(arguments)?;
-    Ok(scene::read(&arguments.scene)?)
-}
-
-/// The scene of these bytes with the options of the command line, as it is written or at a frame of its animation.
-pub(super) fn parse_scene(arguments: &SceneArguments, bytes: &[u8], frame: Option<u32>) -> Result<Scene, Error> {
-    let overrides = overrides(arguments)?;
-    let options = LoadOptions { allow_path: arguments.allow_path, overrides, frame };
-    Ok(scene::parse(&arguments.scene, bytes, &options)?)
+/// The scene with the options of the command line, as it is written, at a frame of its animation, or at one of a turntable.
+pub(super) fn parse_scene(
+    arguments: &SceneArguments,
+    given: &Given,
+    frame: Option<u32>,
+    turntable: Option<u32>,
+) -> Result<Scene, Error> {
+    let overrides = overrides(arguments, given.is_made)?;
+    let options = LoadOptions { allow_path: arguments.allow_path, overrides, frame, turntable };
+    Ok(scene::parse(&given.file, &given.bytes, &options)?)
 }
 
 /// What the render may take and how it treats doubtful input, by the processor.
@@ -74,7 +76,8 @@ fn device(arguments: &SceneArguments) -> Option<DeviceChoice> {
     }
 }
 
-fn check_backend(arguments: &SceneArguments) -> Result<(), Error> {
+/// Refuses options of a GPU where none is asked for.
+pub(super) fn check_backend(arguments: &SceneArguments) -> Result<(), Error> {
     match (arguments.backend, &arguments.device) {
         (Backend::Cpu, Some(_)) => {
             Err(Error::usage("--device names a GPU, and the processor was asked for", "add --backend auto"))
@@ -97,13 +100,13 @@ pub(super) fn processor_only(arguments: &SceneArguments) -> Result<(), Error> {
     }
 }
 
-/// Options that stand for a value of the scene, then `--set` in order.
-fn overrides(a: &SceneArguments) -> Result<Vec<Override>, Error> {
+/// Options that stand for a value of the scene, then `--set` in order. A scene that was made of data files has the first of them already.
+fn overrides(a: &SceneArguments, is_made: bool) -> Result<Vec<Override>, Error> {
     let mut options: Vec<(String, &str, String)> = Vec::new();
     if let Some(name) = &a.technique {
         options.push((format!("--technique {name}"), "render.technique", quote(name)));
     }
-    if let Some([w, h]) = a.size {
+    if let Some([w, h]) = a.size.filter(|_| !is_made) {
         options.push((format!("--size {w}x{h}"), "camera.size", format!("[{w}, {h}]")));
     }
     if let Some(seed) = a.seed {
@@ -126,7 +129,11 @@ fn overrides(a: &SceneArguments) -> Result<Vec<Override>, Error> {
         options.push((format!("--layers {}", layers.join(",")), "render.layers", format!("[{list}]")));
     }
     let options = options.into_iter().map(|(flag, path, value)| Override::from_option(flag, path, &value));
-    Ok(options.chain(a.set.iter().map(|text| Override::parse(text))).collect::<Result<_, _>>()?)
+    let mut all = if is_made { Vec::new() } else { camera_overrides(&a.first)? };
+    for change in options.chain(a.set.iter().map(|text| Override::parse(text))) {
+        all.push(change?);
+    }
+    Ok(all)
 }
 
 /// A text as TOML, which takes JSON's quotes and escapes.

@@ -10,7 +10,7 @@ mod object;
 
 use object::Body;
 use organza::scene::{Scene, SceneLight};
-use organza::{Error, Progress, RenderOptions};
+use organza::{Error, Files, Progress, RenderOptions};
 use reference::metrics::{Image, Linear, compare};
 use reference::{Environment, LatLong, Liberty, PathRules, PathSettings, PixelSampling, path_trace};
 use splat_core::RadianceImage;
@@ -110,6 +110,8 @@ pub fn truth(
     samples: u32,
     progress: &Progress,
 ) -> Result<Result<Truth, String>, Error> {
+    let (scene, _) = organza::fitted(scene, options, progress, &Files::default())?;
+    let scene = &*scene;
     let mut bodies = Vec::new();
     for object in scene.objects.iter().filter(|o| o.visible) {
         match object::body(scene, object, options)? {

@@ -149,6 +149,11 @@ fn scene() -> Vec<Entry> {
         one("camera.fov_y", "camera.fov_y=50"),
         one("camera.orthographic", "camera.orthographic=2"),
         one("camera.size", "camera.size=[30, 18]"),
+        one("camera.auto", "camera={auto=true, size=[24, 18]}"),
+        one("camera.azimuth", "camera.azimuth=80").with(AUTO),
+        one("camera.elevation", "camera.elevation=60").with(AUTO),
+        one("camera.fit", "camera.fit=0.5").with(AUTO),
+        one("root", "root='nowhere'").but(All, Refused(2, "expected a folder")),
         one("background", "background={color=[1, 0, 0]}"),
         one("background.color", "background.color=[1, 0, 0]"),
         one("background.environment", "background={environment='sky.hdr'}"),
@@ -161,6 +166,7 @@ fn scene() -> Vec<Entry> {
     ]
 }
 
+const AUTO: &[&str] = &["camera={auto=true, size=[24, 18]}"];
 const SKY: &[&str] = &["background={environment='sky.hdr'}"];
 
 const SPOT: &[&str] =

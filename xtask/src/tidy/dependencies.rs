@@ -4,7 +4,7 @@ use crate::repo::Repo;
 use crate::toml_lines::{lines, string};
 
 /// For each crate of the workspace, the crates of the workspace that it may depend on, tests and benches included.
-const MAY_KNOW: [(&str, &[&str]); 21] = [
+const MAY_KNOW: [(&str, &[&str]); 22] = [
     ("splat-core", &["splat-shaders"]),
     ("convert", &["splat-core"]),
     ("tsm", &["splat-core", "splat-shaders"]),
@@ -36,8 +36,12 @@ const MAY_KNOW: [(&str, &[&str]); 21] = [
         ],
     ),
     ("organza-judge", &["splat-core", "convert", "tsm", "hbsort", "deferred-blend", "reference", "organza"]),
-    ("organza-cli", &["splat-core", "convert", "organza", "organza-judge"]),
-    ("organza-tests", &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza", "organza-judge"]),
+    ("organza-survey", &["splat-core", "convert", "organza"]),
+    ("organza-cli", &["splat-core", "convert", "organza", "organza-judge", "organza-survey"]),
+    (
+        "organza-tests",
+        &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza", "organza-judge", "organza-survey"],
+    ),
     (
         "organza-benches",
         &[

@@ -96,6 +96,8 @@ impl fmt::Display for Mended {
 /// What a reader has to say of a file beside its data.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Notes {
+    /// The reader that read it, by the name of its format.
+    pub format: String,
     /// Columns, fields and statements of the file that are not used, as the file names them.
     pub unused: Vec<String>,
     /// What was made of the data that its user should know, one sentence without a full stop each.

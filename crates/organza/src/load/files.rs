@@ -69,7 +69,7 @@ impl Files {
     }
 
     /// What was mended in the files, one sentence a kind of fault.
-    pub(super) fn mended(&self) -> Vec<String> {
+    pub fn mended(&self) -> Vec<String> {
         self.mended.borrow().clone()
     }
 

@@ -1,9 +1,9 @@
 //! Where the camera is that sees all of a scene: known once the data is read, before anything is converted.
 
 use super::files::Files;
-use super::input::{Input, input};
+use super::input::Input;
 use super::loading::Loading;
-use crate::scene::{FoundCamera, MediumShape, Scene};
+use crate::scene::{FoundCamera, Scene};
 use crate::{Error, Progress, RenderOptions};
 use convert::extinct_bounds;
 use glam::DVec3;
@@ -58,10 +58,7 @@ impl<'i> Outline<'i> {
             Input::Procedural(shape, ..) => {
                 shape.ellipsoids.iter().flat_map(|e| corners(DAabb::around(e.center, e.radii))).collect()
             }
-            Input::Medium(MediumShape::Box { bounds, .. }, _) => corners(*bounds),
-            Input::Medium(MediumShape::Ball { center, radius, .. }, _) => {
-                corners(DAabb::around(*center, DVec3::splat(*radius)))
-            }
+            Input::Medium(medium, _) => corners(medium.body.bounds()),
             Input::Rectangle(r, ..) => {
                 [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(s, t)| r.center + r.u * s + r.v * t).to_vec()
             }

@@ -1,0 +1,85 @@
+//! A data file as a first scene takes it: what it holds, and the name of its object.
+
+use convert::read::UpAxis;
+use organza::{Error, FileData, Files, Progress, RenderOptions, printable};
+use std::path::{Path, PathBuf};
+
+/// A data file that was read.
+#[derive(Debug, Clone)]
+pub struct DataFile {
+    /// The file, as it was named.
+    pub path: PathBuf,
+    /// What it holds.
+    pub data: FileData,
+    /// Which of its axes points up.
+    pub up: UpAxis,
+}
+
+impl DataFile {
+    /// Reads a file, or takes it from those that were read before; refuses what a scene shows nothing of.
+    ///
+    /// # Errors
+    /// As [`Files::read`]; [`Error::Input`] for a file without points or faces, and for an image.
+    pub fn read(path: &Path, files: &Files, options: &RenderOptions, progress: &Progress) -> Result<Self, Error> {
+        let data = files.read(path, &options.read_params(), progress)?;
+        let refuse = |message: &str, hint: &str| Err(Error::input(printable(path), message, hint));
+        match &data {
+            FileData::Mesh(mesh) if mesh.triangles.is_empty() => refuse("expected at least one face, found none", ""),
+            FileData::Points(points) if points.is_empty() => refuse("expected at least one point, found none", ""),
+            FileData::Image(_) => {
+                let message = "an image of radiance is an environment, and not a thing to look at";
+                refuse(message, "name it in a scene: [background] environment = \"FILE\"")
+            }
+            _ => Ok(Self { path: path.to_owned(), data, up: convert::read::up_axis(path) }),
+        }
+    }
+
+    /// A name for its object: that of the file, with what would part a path of `--set` replaced.
+    pub(crate) fn name(&self) -> String {
+        const LONGEST: usize = 60;
+        let name = self.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let stem = name.strip_suffix(".gz").unwrap_or(&name);
+        let stem = stem.rsplit_once('.').map_or(stem, |(stem, _)| stem);
+        let fits = |c: char| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '-' };
+        let name: String = stem.chars().take(LONGEST).map(fits).collect();
+        if name.trim_matches('-').is_empty() { "object".to_owned() } else { name }
+    }
+
+    /// Whether its data has colours of its own.
+    pub(crate) fn is_colored(&self) -> bool {
+        match &self.data {
+            FileData::Mesh(mesh) => !mesh.color.is_empty(),
+            FileData::Points(points) => !points.color.is_empty(),
+            _ => false,
+        }
+    }
+
+    /// Mean luminance of its own colours.
+    pub(crate) fn luminance(&self) -> Option<f64> {
+        let colors = match &self.data {
+            FileData::Mesh(mesh) => &mesh.color,
+            FileData::Points(points) => &points.color,
+            _ => return None,
+        };
+        let luminance = |c: &[f32; 3]| f64::from(0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]);
+        (!colors.is_empty()).then(|| colors.iter().map(luminance).sum::<f64>() / colors.len() as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use convert::RawPoints;
+
+    #[test]
+    fn objects_are_named_after_files_without_what_parts_paths() {
+        let name = |path: &str| {
+            let data = FileData::Points(RawPoints::default().into());
+            DataFile { path: path.into(), data, up: UpAxis::Y }.name()
+        };
+        assert_eq!(name("a/bun_zipper.ply.gz"), "bun_zipper");
+        assert_eq!(name("head v1.2.nii"), "head-v1-2");
+        assert_eq!([name("...."), name("a/..")], ["object", "object"]);
+        assert_eq!(name("grün.las"), "grün");
+    }
+}

@@ -1,0 +1,208 @@
+//! What is in a data file, measured: for `organza info`.
+
+use crate::histogram::Histogram;
+use crate::mesh_faults::{MeshFaults, mesh_faults};
+use crate::spacing::{duplicates, median_spacing};
+use convert::RawPoints;
+use convert::read::{Loaded, Mended, ReadParams, UpAxis, up_axis};
+use organza::Error;
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::{Aabb, DAabb, Grid, Limits, Mesh, RadianceImage};
+use std::path::Path;
+
+/// Bins of a histogram of values.
+const BINS: usize = 16;
+/// Bins by which shares of the values are found.
+const FINE_BINS: usize = 4096;
+/// Shares of the values whose bounds are told.
+const SHARES: [f64; 5] = [0.01, 0.25, 0.5, 0.75, 0.99];
+
+/// What a data file holds.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Facts {
+    /// `mesh`, `volume`, `points` or `image`.
+    pub kind: &'static str,
+    /// Which reader read it.
+    pub format: String,
+    /// Length of the file.
+    pub bytes: u64,
+    /// How many there are of what: `vertices`, `triangles`, `points`, `x`, `y`, `z` of a volume's lattice, or
+    /// `columns` and `rows` of an image.
+    pub counts: Vec<(&'static str, u64)>,
+    /// Attributes beside positions: `normal`, `color`, `value`, `classification`.
+    pub attributes: Vec<&'static str>,
+    /// In the file's own coordinates; `None` for an empty file.
+    pub bounds: Option<DAabb>,
+    /// Median distance of a point to its nearest neighbour, of a sample of 1000.
+    pub spacing: Option<f64>,
+    /// Points that lie where another one lies.
+    pub duplicates: Option<u64>,
+    /// Columns: the steps of a volume along i, j and k.
+    pub steps: Option<[DVec3; 3]>,
+    /// Lowest and highest value of a volume or an image.
+    pub range: Option<[f32; 2]>,
+    /// Values of a volume.
+    pub histogram: Option<Histogram>,
+    /// Shares of the values, and the value below which each lies.
+    pub quantiles: Vec<(f64, f64)>,
+    /// Name, lowest and highest value of columns beside positions.
+    pub columns: Vec<(&'static str, [f32; 2])>,
+    /// Faults of a mesh.
+    pub faults: Option<MeshFaults>,
+    /// Columns, fields and statements of the file that are not used, as the file names them.
+    pub unused: Vec<String>,
+    /// What was made of the data, one sentence each.
+    pub remarks: Vec<String>,
+    /// What was mended in the file or left out of it, one sentence a kind of fault.
+    pub mended: Vec<String>,
+    /// The axis that points up where a scene says `up = "auto"`.
+    pub up: UpAxis,
+}
+
+/// Reads a data file of at most `max_bytes` and measures it; `strict` refuses a file with a fault that could be mended.
+///
+/// # Errors
+/// [`Error::Io`] for the file system, [`Error::Input`] for a file that is not what its name says, [`Error::Limit`] for
+/// one that would take more than `max_bytes`.
+pub fn facts(path: &Path, max_bytes: u64, strict: bool) -> Result<Facts, Error> {
+    let params = ReadParams { limits: Limits::bytes(max_bytes), strict, ..ReadParams::default() };
+    let read = convert::read::file(path, &params, None);
+    let (data, notes) = read.map_err(|e| Error::from_read(path, &e))?;
+    let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "cannot read", e))?.len();
+    let facts = match data {
+        Loaded::Mesh(mesh) => of_mesh(&mesh),
+        Loaded::Points(points) => of_points(&points),
+        Loaded::Grid(grid) => of_grid(&grid),
+        Loaded::Image(image) => of_image(&image),
+        _ => return Err(Error::Internal("a reader gave data of no known kind".into())),
+    };
+    let remarks = notes.remarks.into_iter().chain(facts.remarks).collect();
+    let mended = notes.mended.iter().map(Mended::to_string).collect();
+    Ok(Facts { bytes, format: notes.format, unused: notes.unused, remarks, mended, up: up_axis(path), ..facts })
+}
+
+impl Facts {
+    /// Distance of the data from the origin over its size; `None` without bounds or size.
+    pub fn far(&self) -> Option<f64> {
+        let bounds = self.bounds.filter(|b| b.diagonal() > 0.0)?;
+        Some(bounds.center().length() / bounds.diagonal())
+    }
+}
+
+fn present(columns: &[(&'static str, bool)]) -> Vec<&'static str> {
+    columns.iter().filter(|(_, on)| *on).map(|(name, _)| *name).collect()
+}
+
+fn bounds_of(origin: DVec3, positions: &[Vec3]) -> Option<DAabb> {
+    let bounds = Aabb::of_points(positions);
+    (!bounds.is_empty()).then(|| DAabb::new(origin + bounds.min.as_dvec3(), origin + bounds.max.as_dvec3()))
+}
+
+fn range_of(values: impl Iterator<Item = f32>) -> [f32; 2] {
+    values.fold([f32::INFINITY, f32::NEG_INFINITY], |r, v| [r[0].min(v), r[1].max(v)])
+}
+
+/// The ranges of columns that are there.
+fn ranges<const N: usize>(columns: [(&'static str, Vec<f32>); N]) -> Vec<(&'static str, [f32; 2])> {
+    let there = columns.into_iter().filter(|(_, values)| !values.is_empty());
+    there.map(|(name, values)| (name, range_of(values.into_iter()))).collect()
+}
+
+fn of_mesh(mesh: &Mesh) -> Facts {
+    Facts {
+        kind: "mesh",
+        counts: vec![("vertices", mesh.position.len() as u64), ("triangles", mesh.triangles.len() as u64)],
+        attributes: present(&[("normal", !mesh.normal.is_empty()), ("color", !mesh.color.is_empty())]),
+        bounds: bounds_of(mesh.origin, &mesh.position),
+        columns: ranges([("color", mesh.color.iter().flatten().copied().collect())]),
+        faults: Some(mesh_faults(mesh)),
+        ..Facts::default()
+    }
+}
+
+fn of_points(points: &RawPoints) -> Facts {
+    Facts {
+        kind: "points",
+        counts: vec![("points", points.position.len() as u64)],
+        attributes: present(&[
+            ("normal", !points.normal.is_empty()),
+            ("color", !points.color.is_empty()),
+            ("value", !points.value.is_empty()),
+            ("opacity", !points.opacity.is_empty()),
+            ("classification", !points.classification.is_empty()),
+        ]),
+        remarks: if points.color.is_empty() {
+            Vec::new()
+        } else {
+            vec!["colours are drawn as they are, without light, unless the scene names a material".to_owned()]
+        },
+        bounds: bounds_of(points.origin, &points.position),
+        spacing: median_spacing(&points.position),
+        duplicates: Some(duplicates(&points.position)),
+        columns: ranges([
+            ("color", points.color.iter().flatten().copied().collect()),
+            ("value", points.value.clone()),
+            ("opacity", points.opacity.clone()),
+            ("classification", points.classification.iter().map(|c| f32::from(*c)).collect()),
+        ]),
+        ..Facts::default()
+    }
+}
+
+fn of_grid(grid: &Grid) -> Facts {
+    let [x, y, z] = grid.dims;
+    // The corners of the lattice bound it, sheared or not.
+    let last = |bit: usize, n: usize| if bit == 0 { 0 } else { n.saturating_sub(1) };
+    let corners = (0..8).map(|c| grid.position(last(c & 1, x), last(c & 2, y), last(c & 4, z)));
+    let range = range_of(grid.values.iter().copied());
+    let wide = (range[1] > range[0]).then(|| range.map(f64::from));
+    let fine = wide.map(|range| Histogram::new(&grid.values, range, FINE_BINS));
+    Facts {
+        kind: "volume",
+        counts: vec![("x", x as u64), ("y", y as u64), ("z", z as u64)],
+        bounds: Some(DAabb::of_points(corners)),
+        steps: Some([grid.axes.x_axis, grid.axes.y_axis, grid.axes.z_axis]),
+        range: (!grid.values.is_empty()).then_some(range),
+        histogram: wide.map(|range| Histogram::new(&grid.values, range, BINS)),
+        quantiles: fine.iter().flat_map(|f| SHARES.map(|share| (share, f.quantile(share)))).collect(),
+        ..Facts::default()
+    }
+}
+
+fn of_image(image: &RadianceImage) -> Facts {
+    Facts {
+        kind: "image",
+        counts: vec![("columns", u64::from(image.size[0])), ("rows", u64::from(image.size[1]))],
+        range: Some(range_of(image.pixels.iter().flatten().copied())),
+        ..Facts::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splat_core::glam::DMat3;
+
+    #[test]
+    fn a_mirrored_volume_has_ordered_bounds() {
+        let axes = DMat3::from_diagonal(DVec3::new(-1.0, 2.0, 3.0));
+        let grid = Grid { origin: DVec3::ONE, axes, dims: [2, 2, 1], values: vec![3.0, -1.0, 2.0, 0.0] };
+        let facts = of_grid(&grid);
+        assert_eq!(facts.bounds, Some(DAabb::new(DVec3::new(0.0, 1.0, 1.0), DVec3::new(1.0, 3.0, 1.0))));
+        assert_eq!(facts.range, Some([-1.0, 3.0]));
+        assert_eq!(facts.histogram.map(|h| h.total()), Some(4));
+    }
+
+    #[test]
+    fn an_empty_mesh_has_no_bounds_and_one_at_a_place_is_near_or_far() {
+        assert_eq!(of_mesh(&Mesh::default()).bounds, None);
+        assert_eq!(of_mesh(&Mesh::default()).far(), None);
+        let points = RawPoints {
+            origin: DVec3::new(3e6, 0.0, 4e6),
+            position: vec![Vec3::new(-0.5, 0.0, 0.0), Vec3::new(0.5, 0.0, 0.0)],
+            ..RawPoints::default()
+        };
+        let facts = of_points(&points);
+        assert_eq!((facts.far(), facts.spacing, facts.duplicates), (Some(5e6), Some(1.0), Some(0)));
+    }
+}

@@ -1,0 +1,148 @@
+//! Data files → the text of a scene that shows them.
+//!
+//! The text is made twice: first with a camera that is placed by itself, so that the place is found as for every scene; then with
+//! the numbers of that place, light that comes from beside it, and the ground below what it sees.
+
+mod look;
+
+use crate::data_file::DataFile;
+use crate::lamps::lamps;
+use crate::number::{color, list, rounded};
+use crate::preset::Wish;
+use look::{Object, objects};
+use organza::scene::{DEFAULT_AZIMUTH, FoundCamera, LoadOptions, ROOT_KEY, parse, relative_path, root_for};
+use organza::{Error, FileData, Files, Progress, RenderOptions, printable};
+use splat_core::glam::DVec3;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// Vertical angle of view, degrees: nearer to what a person sees of a thing before them than a wide lens.
+const FOV_Y: f64 = 30.0;
+/// From where a body is seen that was scanned, degrees: its face, which looks along −Z once it stands.
+const BEFORE_A_FACE: f64 = 150.0;
+/// What is behind everything: dark, and bright for what is dark itself.
+const DARK: [f32; 3] = [0.03, 0.033, 0.04];
+const BRIGHT: [f32; 3] = [0.4, 0.43, 0.47];
+/// Mean luminance below which what is seen is dark.
+const IS_DARK: f64 = 0.04;
+/// Half side of the ground over the size of what stands on it, and steps along it.
+const GROUND: f64 = 4.0;
+const GROUND_STEPS: f64 = 320.0;
+const GROUND_COLOR: [f32; 3] = [0.32, 0.32, 0.33];
+
+/// A scene that was written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Written {
+    /// Its text, TOML.
+    pub text: String,
+    /// Where its camera is.
+    pub found: FoundCamera,
+}
+
+/// Writes a first scene of data files, as the text of `scene_file`, which paths are relative to. `files` are those that were read.
+///
+/// # Errors
+/// [`Error::Input`] for a name that a scene cannot write, or data that cannot be seen; as [`organza::render`] for what cannot be read.
+pub fn first_scene(
+    data: &[DataFile],
+    scene_file: &Path,
+    wish: &Wish,
+    (files, options, progress): (&Files, &RenderOptions, &Progress),
+) -> Result<Written, Error> {
+    let folder = folder_of(scene_file)?;
+    let paths: Vec<String> = data.iter().map(|d| written_path(&d.path, &folder)).collect::<Result<_, _>>()?;
+    let root = root_for(scene_file, data.iter().map(|d| d.path.as_path()))?;
+    let root = root.map(|root| text_of(&root)).transpose()?;
+    let objects = objects(data, &paths, wish.preset.as_ref());
+    let azimuth = wish.azimuth.unwrap_or_else(|| default_azimuth(data));
+    let head = |camera: &str| {
+        let root =
+            root.as_ref().map(|root| format!("{ROOT_KEY} = {}     # data may lie in this folder\n", quoted(root)));
+        format!("version = 1\n{}\n[camera]\n{camera}", root.unwrap_or_default())
+    };
+    let mut camera = format!("auto = true\nazimuth = {azimuth:?}\nfit = {:?}\nfov_y = {FOV_Y:?}\n", wish.fill);
+    if let Some(elevation) = wish.elevation {
+        let _ = writeln!(camera, "elevation = {elevation:?}");
+    }
+    let _ = writeln!(camera, "size = {:?}", wish.size);
+    let seen: String = objects.iter().map(Object::material).chain(objects.iter().map(Object::text)).collect();
+    let first = head(&camera) + &seen;
+    let scene = parse(scene_file, first.as_bytes(), &LoadOptions::default())?;
+    let found = organza::fitted(&scene, options, progress, files)?.1;
+    let found = found.ok_or_else(|| Error::Internal("a camera that was to be placed has no place".into()))?;
+    let camera = camera_text(&found, azimuth);
+    let mut text =
+        format!("# A first scene, written by `organza init`. Every key: docs/scene.md of Organza.\n{}", head(&camera));
+    let background = if data.iter().filter_map(DataFile::luminance).any(|l| l < IS_DARK) { BRIGHT } else { DARK };
+    let _ = write!(text, "\n[background]\ncolor = {}\n\n{}", color(background), lamps(&found));
+    text += &seen;
+    if wish.ground {
+        text += &ground(&found);
+    }
+    Ok(Written { text, found })
+}
+
+/// Scanned bodies look away from where everything else is seen.
+fn default_azimuth(data: &[DataFile]) -> f64 {
+    let is_body = |d: &DataFile| matches!(d.data, FileData::Grid(_)) && d.up == convert::read::UpAxis::Z;
+    if data.iter().all(is_body) { BEFORE_A_FACE } else { DEFAULT_AZIMUTH }
+}
+
+fn camera_text(found: &FoundCamera, azimuth: f64) -> String {
+    let FoundCamera { camera, target, elevation, bounds } = found;
+    let unit = 1e-4 * bounds.diagonal().max(1e-300).max(camera.position.distance(*target) * 0.1);
+    let [width, height] = camera.size;
+    let mut text = format!(
+        "# All is seen from an azimuth of {}° and {}° above; `auto = true` in the place of the next two lines finds that anew.\n\
+         position = {}\ntarget = {}\n",
+        rounded(azimuth, 0.1),
+        rounded(elevation.to_degrees(), 0.1),
+        list(camera.position.to_array(), unit),
+        list(target.to_array(), unit),
+    );
+    if elevation.to_degrees().abs() > 80.0 {
+        let _ = writeln!(text, "up = {}", list(camera.axes[1].to_array(), 1e-6));
+    }
+    let _ = writeln!(text, "fov_y = {FOV_Y:?}\nsize = [{width}, {height}]");
+    text
+}
+
+/// A plane below all that is seen.
+fn ground(found: &FoundCamera) -> String {
+    let (bounds, size) = (found.bounds, found.bounds.diagonal());
+    let (half, unit) = (GROUND * size, 1e-4 * size);
+    let center = DVec3::new(bounds.center().x, bounds.min.y, bounds.center().z);
+    format!(
+        "\n[[object]]\nname = \"ground\"\n\
+         rectangle = {{ center = {}, u = {}, v = {}, spacing = {} }}\ncolor = {}\n",
+        list(center.to_array(), unit),
+        list([half, 0.0, 0.0], unit),
+        list([0.0, 0.0, -half], unit),
+        rounded(2.0 * half / GROUND_STEPS, 1e-3 * 2.0 * half / GROUND_STEPS),
+        color(GROUND_COLOR),
+    )
+}
+
+/// The folder of a scene file, as the system knows it.
+fn folder_of(scene_file: &Path) -> Result<PathBuf, Error> {
+    let folder = Path::new(".").join(scene_file.parent().unwrap_or(Path::new("")));
+    folder.canonicalize().map_err(|e| Error::io(&folder, "cannot find the folder", e))
+}
+
+/// A data file as a scene in `folder` names it.
+fn written_path(path: &Path, folder: &Path) -> Result<String, Error> {
+    let real = path.canonicalize().map_err(|e| Error::io(path, "cannot find", e))?;
+    text_of(&relative_path(folder, &real).unwrap_or(real))
+}
+
+fn text_of(path: &Path) -> Result<String, Error> {
+    path.to_str().map(str::to_owned).ok_or_else(|| {
+        let message = "this name is no UTF-8, in which scenes are written";
+        Error::input(printable(path), message, "give the file another name, or a link to it")
+    })
+}
+
+/// A text in TOML's quotes, which are JSON's but for one character.
+pub(crate) fn quoted(text: &str) -> String {
+    serde_json::Value::from(text).to_string().replace('\u{7f}', "\\u007f")
+}

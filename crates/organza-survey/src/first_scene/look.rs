@@ -1,0 +1,178 @@
+//! How an object looks whose data has not been seen before: its tables in a scene.
+
+use super::quoted;
+use crate::data_file::DataFile;
+use crate::matter::Matter;
+use crate::number::{color, grouped, rounded, significant};
+use crate::preset::{Look, Preset};
+use crate::transfer::Transfer;
+use organza::FileData;
+use splat_core::{DAabb, Grid, optics};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// Colours of surfaces that have none, in turns.
+const CLAYS: [[f32; 3]; 5] =
+    [[0.68, 0.64, 0.59], [0.42, 0.53, 0.64], [0.70, 0.52, 0.33], [0.47, 0.58, 0.44], [0.62, 0.45, 0.50]];
+
+/// Voxels up to which a volume is drawn on its own lattice.
+const MOST_VOXELS: f64 = 24e6;
+
+/// Part of the size of a volume that opacities refer to.
+const UNIT: f64 = 0.02;
+
+/// Least extinction over the largest that is written.
+const DIGITS: f64 = 1e-4;
+
+/// One object of a first scene.
+pub(super) struct Object {
+    /// What is said of its data.
+    about: String,
+    name: String,
+    /// `mesh`, `points` or `volume`, and the path.
+    source: (&'static str, String),
+    /// Name and keys of its material; of several objects alike the first has it.
+    material: Option<(&'static str, &'static str, bool)>,
+    /// Further keys.
+    keys: String,
+}
+
+impl Object {
+    /// Its table.
+    pub(super) fn text(&self) -> String {
+        let Self { about, name, source: (key, path), keys, .. } = self;
+        let material = self.material.map_or_else(String::new, |(name, ..)| format!("material = \"{name}\"\n"));
+        format!("\n[[object]]\nname = {}\n# {about}\n{key} = {}\n{material}{keys}", quoted(name), quoted(path))
+    }
+
+    /// The table of its material, where it is the first that has it.
+    pub(super) fn material(&self) -> String {
+        match self.material {
+            Some((name, keys, true)) => format!("\n[material.{name}]\n{keys}"),
+            _ => String::new(),
+        }
+    }
+}
+
+const CLAY: (&str, &str) = ("clay", "specular = 0.04\nshininess = 24\n");
+const TISSUE: (&str, &str) = ("tissue", "shading = \"phong\"\nspecular = 0.06\nshininess = 24\n");
+const DROPLETS: (&str, &str) = ("droplets", "ambient = 0.6\nmedium = { albedo = 0.98, asymmetry = 0.3 }\n");
+
+/// The objects of all files, each with a name of its own.
+pub(super) fn objects(data: &[DataFile], paths: &[String], preset: Option<&Preset>) -> Vec<Object> {
+    let mut names: BTreeMap<String, usize> = BTreeMap::new();
+    let mut materials: Vec<&str> = Vec::new();
+    let mut clays = CLAYS.iter().cycle();
+    let mut one = |(file, path): (&DataFile, &String)| {
+        let mut name = file.name();
+        let count = names.entry(name.clone()).or_insert(0);
+        *count += 1;
+        if *count > 1 {
+            name = format!("{name}-{count}");
+        }
+        let bare = if file.is_colored() { None } else { clays.next() };
+        let mut object = object(file, preset);
+        if let (Some(clay), false) = (bare, matches!(file.data, FileData::Grid(_))) {
+            object.keys = format!("color = {}\n{}", color(*clay), object.keys);
+        }
+        if let Some((material, _, first)) = &mut object.material {
+            *first = !materials.contains(material);
+            materials.push(material);
+        }
+        Object { name, source: (object.source.0, path.clone()), ..object }
+    };
+    data.iter().zip(paths).map(&mut one).collect()
+}
+
+fn object(file: &DataFile, preset: Option<&Preset>) -> Object {
+    let clay = Some((CLAY.0, CLAY.1, false));
+    let of = |key, about, material, keys| Object {
+        about,
+        name: String::new(),
+        source: (key, String::new()),
+        material,
+        keys,
+    };
+    match &file.data {
+        FileData::Mesh(mesh) => {
+            let about = format!(
+                "{} triangles between {} vertices; {}",
+                grouped(mesh.triangles.len() as u64),
+                grouped(mesh.position.len() as u64),
+                sides(mesh.bounds())
+            );
+            of("mesh", about, clay, String::new())
+        }
+        FileData::Points(points) => {
+            let all = points.position.iter().map(|p| points.origin + p.as_dvec3());
+            let about = format!("{} points; {}", grouped(points.len() as u64), sides(DAabb::of_points(all)));
+            let as_they_are = "# Colours of a photograph hold its light: they are shown as they are; name a material to light them.\n";
+            match points.color.is_empty() {
+                true => of("points", about, clay, String::new()),
+                false => of("points", about, None, as_they_are.to_owned()),
+            }
+        }
+        FileData::Grid(grid) => {
+            let look = preset.map(|p| &p.0);
+            let material = if look == Some(&Look::Cloud) { DROPLETS } else { TISSUE };
+            let about =
+                format!("{} × {} × {} voxels; {}", grid.dims[0], grid.dims[1], grid.dims[2], sides(extent(grid)));
+            of("volume", about, Some((material.0, material.1, false)), volume_keys(grid, look))
+        }
+        // Images are refused when they are read.
+        FileData::Image(_) => of("environment", String::new(), None, String::new()),
+    }
+}
+
+/// The lengths of a box's sides.
+fn sides(bounds: DAabb) -> String {
+    let size = bounds.size().to_array();
+    let largest = size.iter().copied().fold(0.0, f64::max);
+    format!("{} world units", size.map(|s| rounded(s, 1e-3 * largest.max(1e-300))).join(" × "))
+}
+
+fn extent(grid: &Grid) -> DAabb {
+    let n = grid.dims.map(|n| n as f64);
+    let corner = |k: usize| {
+        let index =
+            splat_core::glam::DVec3::from_array(std::array::from_fn(
+                |a| if k >> a & 1 == 0 { -0.5 } else { n[a] - 0.5 },
+            ));
+        grid.origin + grid.axes * index
+    };
+    DAabb::of_points((0..8).map(corner))
+}
+
+/// `unit_length` and `transfer`, and a coarser lattice for a large volume.
+fn volume_keys(grid: &Grid, look: Option<&Look>) -> String {
+    let matter = Matter::of(grid);
+    let transfer = Transfer::new(grid, matter.as_ref(), look);
+    let unit = significant(UNIT * extent(grid).diagonal(), 2);
+    let unit_length: f64 = unit.parse().unwrap_or(UNIT * extent(grid).diagonal());
+    let mut text = String::new();
+    let voxels: f64 = grid.dims.iter().map(|n| *n as f64).product();
+    if voxels > MOST_VOXELS {
+        let spacing = (grid.cell_volume() * voxels / MOST_VOXELS).cbrt();
+        let _ = writeln!(
+            text,
+            "spacing = {}     # coarser than the file, for speed; leave it out for all voxels",
+            significant(spacing, 3)
+        );
+    }
+    if let Some(air) = matter.as_ref().and_then(|m| m.air) {
+        let _ = writeln!(text, "# Around it the values are about {}.", significant(air, 3));
+    }
+    let _ = writeln!(
+        text,
+        "unit_length = {unit}     # opacities below are over this length: a smaller one makes all denser\ntransfer = ["
+    );
+    let step = matter.as_ref().map_or(1.0, |m| 1e-4 * (m.last - m.first).abs());
+    for point in &transfer.points {
+        // Nothing is written that would be read as a whole wall.
+        let opacity = optics::opacity(transfer.extinction * point.weight * unit_length).min(0.9999);
+        let opacity = if point.weight < DIGITS { "0".to_owned() } else { significant(opacity, 3) };
+        let value = rounded(point.value, step.max(1e-300));
+        let _ = writeln!(text, "  {{ value = {value}, color = {}, opacity = {opacity} }},", color(point.color));
+    }
+    text + "]\n"
+}

@@ -1,0 +1,34 @@
+//! Data files surveyed: what they hold, for people, and a first scene of them, ready to edit.
+//!
+//! ```text
+//! files ─ read ─┬─► facts: counts, bounds, spacing, histogram, faults            (`organza info`)
+//!               └─► first scene: camera, light, materials, transfer functions    (`organza init`, `organza render FILE`)
+//! ```
+//! A first scene is text in TOML, with comments. Nothing about a picture is decided but by that text: who draws it draws the text.
+#![forbid(unsafe_code)]
+
+mod color_map;
+mod data_file;
+mod facts;
+mod first_scene;
+mod histogram;
+mod lamps;
+mod matter;
+mod mesh_faults;
+mod number;
+mod paraview;
+mod preset;
+mod spacing;
+mod transfer;
+
+pub use data_file::DataFile;
+pub use facts::{Facts, facts};
+pub use first_scene::{Written, first_scene};
+pub use histogram::Histogram;
+pub use number::{grouped, rounded};
+pub use preset::{Preset, Wish};
+
+/// The page's example compiles and holds.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Page;

@@ -1,0 +1,68 @@
+//! Numbers for people: no more digits than say something.
+
+/// `x` to a whole number of steps of about `unit`, as TOML writes it.
+pub fn rounded(x: f64, unit: f64) -> String {
+    let digits = (exponent(x) - exponent(unit)).clamp(0, 16) as usize;
+    let near: f64 = format!("{x:.digits$e}").parse().unwrap_or(x);
+    // No minus before nothing.
+    let near = if near.abs() < unit { 0.0 } else { near };
+    let text = format!("{near:?}");
+    text.strip_suffix(".0").map(str::to_owned).unwrap_or(text)
+}
+
+/// `x` with so many digits that say something.
+pub(crate) fn significant(x: f64, digits: i32) -> String {
+    rounded(x, 10f64.powi(exponent(x) + 1 - digits))
+}
+
+/// A vector as a list in TOML.
+pub(crate) fn list<const N: usize>(values: [f64; N], unit: f64) -> String {
+    format!("[{}]", values.map(|x| rounded(x, unit)).join(", "))
+}
+
+/// A colour as a list in TOML.
+pub(crate) fn color(values: [f32; 3]) -> String {
+    list(values.map(f64::from), 1e-3)
+}
+
+/// Power of ten of the first digit.
+fn exponent(x: f64) -> i32 {
+    let text = format!("{:e}", x.abs());
+    text.split_once('e').and_then(|(_, power)| power.parse().ok()).unwrap_or(0)
+}
+
+/// A count with a comma after every third digit.
+pub fn grouped(count: u64) -> String {
+    let digits = count.to_string();
+    let mut text = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_the_digits_of_their_unit() {
+        assert_eq!(rounded(1234.567_89, 0.01), "1234.57");
+        assert_eq!(rounded(637_012.239_87, 0.001), "637012.24");
+        assert_eq!(rounded(1e7 + 0.25, 0.01), "10000000.25");
+        assert_eq!(rounded(-0.000_01, 0.001), "0");
+        assert_eq!(rounded(1.5e-9, 1e-12), "1.5e-9");
+        assert_eq!(rounded(123_456.0, 1000.0), "123000");
+        assert_eq!(significant(0.001_234_56, 3), "0.00123");
+        assert_eq!(significant(0.0, 3), "0");
+        assert_eq!(list([1.0, -2.5, 0.0], 0.1), "[1, -2.5, 0]");
+    }
+
+    #[test]
+    fn counts_have_commas() {
+        assert_eq!([0, 999, 1000, 1_234_567].map(grouped), ["0", "999", "1,000", "1,234,567"]);
+    }
+}

@@ -1,0 +1,84 @@
+//! What a user may wish of a first scene.
+
+use crate::color_map::{CIVIDIS, ColorMap, GREY, INFERNO, MAGMA, PLASMA, TURBO, VIRIDIS};
+use crate::paraview::Sampled;
+use organza::Error;
+use organza::scene::{DEFAULT_FILL, DEFAULT_SIZE};
+use std::path::Path;
+
+/// How a volume is to look.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Preset(pub(crate) Look);
+
+/// The looks that there are.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Look {
+    /// Bones of a computed tomogram, without what is soft.
+    CtBone,
+    /// Its outer surface, as a body is seen.
+    CtSkin,
+    /// Tissue of a magnetic resonance image.
+    Mri,
+    /// White droplets that scatter light.
+    Cloud,
+    /// The colours of a map over the body of the values.
+    Map(ColorMap),
+    /// Colours, and opacities where there are some, of a preset of ParaView.
+    Sampled(Sampled),
+}
+
+/// The looks that have a name.
+const NAMED: [(&str, Look); 11] = [
+    ("ct-bone", Look::CtBone),
+    ("ct-skin", Look::CtSkin),
+    ("mri", Look::Mri),
+    ("cloud", Look::Cloud),
+    ("viridis", Look::Map(VIRIDIS)),
+    ("magma", Look::Map(MAGMA)),
+    ("inferno", Look::Map(INFERNO)),
+    ("plasma", Look::Map(PLASMA)),
+    ("cividis", Look::Map(CIVIDIS)),
+    ("turbo", Look::Map(TURBO)),
+    ("grey", Look::Map(GREY)),
+];
+
+impl Preset {
+    /// A preset by its name, or from a JSON file of ParaView by its path.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a name that there is not, [`Error::Io`] and [`Error::Input`] for a file.
+    pub fn named(name: &str) -> Result<Self, Error> {
+        if let Some((_, look)) = NAMED.iter().find(|(known, _)| *known == name) {
+            return Ok(Self(look.clone()));
+        }
+        if Path::new(name).extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
+            return Sampled::read(Path::new(name)).map(|sampled| Self(Look::Sampled(sampled)));
+        }
+        let message = format!("--preset {}: there is no such preset", organza::shown(name));
+        let names: Vec<&str> = NAMED.iter().map(|(name, _)| *name).collect();
+        Err(Error::usage(message, format!("there are {}, or the path of a .json preset of ParaView", names.join(", "))))
+    }
+}
+
+/// What a user may say of a first scene; the rest follows from the data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wish {
+    /// Where the eye is, degrees about +Y from +Z towards +X.
+    pub azimuth: Option<f64>,
+    /// Degrees above the horizon.
+    pub elevation: Option<f64>,
+    /// Share of the picture that is filled, in (0, 1].
+    pub fill: f64,
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+    /// How volumes look.
+    pub preset: Option<Preset>,
+    /// Whether everything stands on a ground.
+    pub ground: bool,
+}
+
+impl Default for Wish {
+    fn default() -> Self {
+        Self { azimuth: None, elevation: None, fill: DEFAULT_FILL, size: DEFAULT_SIZE, preset: None, ground: false }
+    }
+}

@@ -1,0 +1,304 @@
+//! Pictures of data files without a scene, the scenes that are written of them, and cameras that are placed by themselves.
+
+use organza_tests::{Place, SMALL_SCENE, picture_of};
+use serde_json::Value;
+use std::fmt::Write;
+
+/// A folder with a mesh, points, and a volume: a ball each, in three units and places.
+fn data() -> Place {
+    let place = Place::new("");
+    place.write("mesh.obj", ball_mesh(1.0, 0.0));
+    place.write("far.obj", ball_mesh(1.0, 1e7));
+    place.write("scan.xyz", ball_points(40.0, ""));
+    place.write("colored.xyz", ball_points(40.0, " 200 120 40"));
+    place.write("head.nrrd", ball_volume(|distance| (200.0 - 25.0 * distance).max(0.0)));
+    place
+}
+
+/// Rings of a ball about a place on the x axis.
+fn ball_mesh(radius: f64, x: f64) -> String {
+    let (rings, around) = (8, 12);
+    let mut text = String::new();
+    for i in 0..=rings {
+        for k in 0..around {
+            let (theta, phi) = (std::f64::consts::PI * f64::from(i) / 8.0, std::f64::consts::TAU * f64::from(k) / 12.0);
+            let p = [theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin()].map(|c| radius * c);
+            writeln!(text, "v {:.6} {:.6} {:.6}", x + p[0], p[1], p[2]).unwrap();
+        }
+    }
+    for (i, k) in (0..rings).flat_map(|i| (0..around).map(move |k| (i, k))) {
+        let v = |i: i32, k: i32| i * around + k % around + 1;
+        writeln!(text, "f {} {} {}", v(i, k), v(i + 1, k + 1), v(i + 1, k)).unwrap();
+        writeln!(text, "f {} {} {}", v(i, k), v(i, k + 1), v(i + 1, k + 1)).unwrap();
+    }
+    text
+}
+
+fn ball_points(radius: f64, color: &str) -> String {
+    let mut text = String::from(if color.is_empty() { "x y z\n" } else { "x y z red green blue\n" });
+    for i in 0..300 {
+        let (y, angle) = (1.0 - (2.0 * f64::from(i) + 1.0) / 300.0, 2.399_963_229_728_653 * f64::from(i));
+        let r = (1.0 - y * y).sqrt();
+        writeln!(text, "{} {} {}{color}", radius * r * angle.cos(), radius * y, radius * r * angle.sin()).unwrap();
+    }
+    text
+}
+
+/// 16³ values by their distance from the middle.
+fn ball_volume(value: impl Fn(f64) -> f64) -> String {
+    let mut text = String::from(
+        "NRRD0004\ntype: float\ndimension: 3\nsizes: 16 16 16\n\
+         space directions: (0.1,0,0) (0,0.1,0) (0,0,0.1)\nspace origin: (0,0,0)\nencoding: ascii\n\n",
+    );
+    for i in 0..16 * 16 * 16 {
+        let distance = [i % 16, i / 16 % 16, i / 256].map(|c| (f64::from(c) - 7.5).powi(2)).iter().sum::<f64>().sqrt();
+        writeln!(text, "{}", value(distance)).unwrap();
+    }
+    text
+}
+
+const SIZE: [&str; 2] = ["--size", "60x40"];
+
+#[test]
+fn the_scene_that_init_writes_gives_the_bytes_that_render_gives_of_the_file() {
+    let place = data();
+    for (name, files, options) in [
+        ("mesh", &["mesh.obj"][..], &[][..]),
+        ("far", &["far.obj"], &["--ground"]),
+        ("scan", &["scan.xyz"], &["--azimuth", "-70", "--elevation", "85"]),
+        ("head", &["head.nrrd"], &["--preset", "inferno", "--fit", "0.6"]),
+        ("all", &["mesh.obj", "mesh.obj", "colored.xyz", "head.nrrd"], &[]),
+    ] {
+        let scene = format!("{name}.toml");
+        place.expect(0, &[&["init"], files, &SIZE, options, &["-o", &scene]].concat(), "");
+        let outputs = |kind: &str| [format!("{name}-{kind}.exr"), format!("{name}-{kind}.png")];
+        let [from_scene, from_file] = [outputs("scene"), outputs("file")];
+        place.expect(0, &["render", &scene, "-o", &from_scene[0], "-o", &from_scene[1]], "");
+        let of_file = [&["render"], files, &SIZE, options, &["-o", &from_file[0], "-o", &from_file[1]]].concat();
+        place.expect(0, &of_file, "");
+        for (a, b) in from_scene.iter().zip(&from_file) {
+            assert!(place.bytes(a) == place.bytes(b), "{a} and {b}");
+        }
+    }
+}
+
+/// Rows and columns beside which nothing is seen, as shares of the picture.
+fn reach(picture: &organza_tests::Picture) -> [f64; 2] {
+    let alpha = picture.channel("A");
+    let (width, height) = (picture.size[0] as usize, picture.size[1] as usize);
+    let seen = |i: &usize| alpha[*i] > 0.05;
+    let from_middle = |at: usize, n: usize| ((at as f64 + 0.5) / n as f64 - 0.5).abs() * 2.0;
+    (0..alpha.len()).filter(seen).fold([0.0; 2], |most: [f64; 2], i| {
+        [most[0].max(from_middle(i % width, width)), most[1].max(from_middle(i / width, height))]
+    })
+}
+
+#[test]
+fn every_kind_of_data_is_seen_whole_large_in_the_middle_and_neither_black_nor_white() {
+    let place = data();
+    for file in ["mesh.obj", "far.obj", "scan.xyz", "colored.xyz", "head.nrrd"] {
+        let out =
+            place.expect(0, &[&["render", file, "-o", "a.exr", "-o", "a.png", "--force"], &SIZE[..]].concat(), "");
+        assert!(!String::from_utf8_lossy(&out.stderr).contains("warning"), "{file}");
+        let picture = picture_of(&place.path("a.exr"));
+        let [x, y] = reach(&picture);
+        let most = x.max(y);
+        assert!((0.7..0.99).contains(&most), "{file}: {x} {y}");
+        let (green, alpha) = (picture.channel("G"), picture.channel("A"));
+        let solid: Vec<f64> = green.iter().zip(&alpha).filter(|(_, a)| **a > 0.9).map(|(g, _)| *g).collect();
+        assert!(solid.len() > 100, "{file}: {} solid pixels", solid.len());
+        let mean = solid.iter().sum::<f64>() / solid.len() as f64;
+        assert!((0.08..0.8).contains(&mean), "{file}: mean {mean}");
+    }
+}
+
+#[test]
+fn files_that_no_picture_can_be_made_of_are_refused_with_a_reason() {
+    let place = data();
+    place.write("empty.xyz", "x y z\n");
+    place.write("nothing.ply", "");
+    place.write("other.dat", "what is this");
+    place.write("nan.xyz", "0 0 0\n1 0 nan\n0 1 0\n");
+    place.write("old.png", "old");
+    place.write("old.toml", "version = 1\n");
+    std::fs::create_dir(place.path("folder")).unwrap();
+    for (code, arguments, stderr) in [
+        (
+            4,
+            &["render", "missing.ply", "-o", "a.png"][..],
+            "missing.ply: cannot read: expected a file that can be read",
+        ),
+        (4, &["render", "folder", "-o", "a.png"], "folder: cannot read: expected a regular file, found a directory"),
+        (3, &["render", "other.dat", "-o", "a.png"], "other.dat: expected"),
+        (3, &["render", "nothing.ply", "-o", "a.png"], "nothing.ply: expected"),
+        (3, &["render", "empty.xyz", "-o", "a.png"], "empty.xyz"),
+        (3, &["render", "nan.xyz", "-o", "a.png"], "nan.xyz:2"),
+        (4, &["render", "mesh.obj", "-o", "old.png"], "old.png: this file exists already"),
+        (
+            4,
+            &["init", "mesh.obj", "-o", "old.toml"],
+            "old.toml: this file exists already\nhint: replace it with --force",
+        ),
+        (4, &["init", "mesh.obj", "-o", "nowhere/s.toml"], "nowhere/s.toml: cannot write here"),
+        (2, &["init", "mesh.obj", "-o", "s.json"], "s.json: expected a name that ends in .toml"),
+        (2, &["init", "old.toml"], "old.toml is a scene already"),
+        (2, &["render", "s.toml", "mesh.obj"], "s.toml is a scene, and 2 files are given"),
+        (2, &["render", "s.toml", "--ground"], "--ground is for data files, and a scene is given"),
+        (
+            2,
+            &["render", "mesh.obj", "--preset", "bone"],
+            "--preset bone: there is no such preset\nhint: there are ct-bone",
+        ),
+        (4, &["render", "mesh.obj", "--preset", "bone.json"], "bone.json: cannot read the preset"),
+        (2, &["render", "mesh.obj", "--fit", "0"], "--fit 0: expected a number from 0.01 to 1"),
+        (2, &["render", "mesh.obj", "--size", "0x9"], "--size 0x9: `size`: expected 1 to 65536 pixels a side, found 0"),
+        (2, &["render", "mesh.obj", "--turntable", "0"], "0 is not in 1..=100000"),
+    ] {
+        place.expect(code, arguments, stderr);
+    }
+    assert_eq!(place.bytes("old.png"), b"old");
+    assert_eq!(place.bytes("old.toml"), b"version = 1\n");
+    assert!(!place.path("a.png").exists());
+    place.expect(0, &["render", "nan.xyz", "-o", "a.png", "--drop-invalid", "--size", "8x6"], "");
+}
+
+#[test]
+fn data_without_extent_is_drawn_all_the_same() {
+    let place = data();
+    place.write("one.xyz", "3 4 5\n");
+    place.write("same.xyz", "3 4 5\n".repeat(9));
+    place.write("line.xyz", "0 0 0\n1 0 0\n2 0 0\n3 0 0\n");
+    place.write("plane.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n");
+    place.write("flat.nrrd", ball_volume(|_| 7.0));
+    for file in ["one.xyz", "same.xyz", "line.xyz", "plane.obj", "flat.nrrd"] {
+        place.expect(0, &["render", file, "-o", "a.exr", "--force", "--size", "30x20"], "");
+        let seen = picture_of(&place.path("a.exr")).channel("A").iter().filter(|a| **a > 0.3).count();
+        assert!((10..600).contains(&seen), "{file}: {seen} pixels");
+    }
+}
+
+const MESH: &str = "[[object]]\nname = \"ball\"\nmesh = \"mesh.obj\"\n";
+
+fn auto(camera: &str) -> String {
+    let light = &SMALL_SCENE[SMALL_SCENE.find("[background]").unwrap()..];
+    format!("version = 1\n{camera}\n{light}{MESH}")
+}
+
+#[test]
+fn a_camera_of_a_scene_places_itself_and_says_where() {
+    let place = data();
+    place.write("s.toml", auto("camera = \"auto\""));
+    place.write("table.toml", auto("[camera]\nauto = true\nfit = 0.9"));
+    let text = format!(
+        "{:#}",
+        serde_json::json!({
+            "version": 1, "camera": "auto", "background": { "color": [0.25, 0.5, 1.0] },
+            "light": [{ "kind": "point", "position": [2, 4, 1], "intensity": [20, 20, 20] }],
+            "object": [{ "name": "ball", "mesh": "mesh.obj" }],
+        })
+    );
+    place.write("s.json", text);
+    let out = |scene: &str, output: &str| {
+        let out = place.expect(0, &["render", scene, "--size", "60x40", "--json", "-o", output], "");
+        serde_json::from_slice::<Value>(&out.stdout).unwrap()
+    };
+    let document = out("s.toml", "a.png");
+    out("table.toml", "b.png");
+    out("s.json", "c.png");
+    assert_eq!(place.bytes("a.png"), place.bytes("b.png"));
+    assert_eq!(place.bytes("a.png"), place.bytes("c.png"));
+    assert_eq!(document["camera"]["auto"], true);
+    let explained = place.expect(0, &["explain", "s.toml", "--size", "60x40", "--json"], "");
+    let explained: Value = serde_json::from_slice(&explained.stdout).unwrap();
+    assert_eq!(explained["camera"], document["camera"]);
+    // The numbers that were found give the picture.
+    let [position, target] = ["position", "target"].map(|key| document["camera"][key].to_string());
+    place.write("s.toml", auto(&format!("[camera]\nposition = {position}\ntarget = {target}\nsize = [60, 40]")));
+    place.expect(0, &["render", "s.toml", "-o", "d.png"], "");
+    assert_eq!(place.bytes("a.png"), place.bytes("d.png"));
+}
+
+#[test]
+fn a_camera_that_places_itself_refuses_what_it_cannot_use() {
+    let place = data();
+    for (camera, stderr) in [
+        ("camera = \"atuo\"", "expected a table"),
+        ("[camera]\nauto = true\nposition = [0, 0, 1]", "`position` is not for a camera with `auto`"),
+        ("[camera]\nauto = true\northographic = 3", "`orthographic`: the height"),
+        ("[camera]\nauto = true\nfit = 1.5", "`fit`: expected a number above 0, at most 1, found 1.5"),
+        ("[camera]\nauto = true\nelevation = 91", "`elevation`: expected a number from -90 to 90"),
+        (
+            "[camera]\nposition = [0, 0, 4]\ntarget = [0, 0, 0]\nsize = [8, 8]\nazimuth = 3",
+            "`azimuth` belongs to a camera with `auto",
+        ),
+        ("[camera]\nfov_y = 30", "expected a key `position` here, found none\nhint: or say `auto = true`"),
+    ] {
+        place.write("s.toml", auto(camera));
+        // Sizes come first only where there are none.
+        let out = place.run(&["render", "s.toml", "--size", "8x8"]);
+        let said = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(out.status.code() == Some(3) && said.contains(stderr), "{camera}: {said}");
+    }
+    place.write("s.toml", auto("camera = \"auto\"").replace(MESH, ""));
+    place.expect(3, &["render", "s.toml"], "there is nothing to see for a camera that is placed by itself");
+}
+
+#[test]
+fn a_turntable_is_numbered_frames_around_what_is_seen() {
+    let place = data();
+    place.write("s.toml", auto("[camera]\nposition = [0, 1, 5]\ntarget = [0, 0, 0]\nsize = [24, 16]"));
+    place.expect(0, &["render", "s.toml", "-o", "t.png", "--turntable", "4"], "");
+    place.expect(0, &["render", "s.toml", "-o", "still.png"], "");
+    assert_eq!(place.bytes("t.0000.png"), place.bytes("still.png"));
+    place.expect(0, &["render", "s.toml", "-o", "quarter.png", "--set", "camera.position=[5, 1, 0]"], "");
+    assert_eq!(place.bytes("t.0001.png"), place.bytes("quarter.png"));
+    place.expect(0, &["render", "mesh.obj", "-o", "f.exr", "--turntable", "3", "--frames=1-2", "--size", "24x16"], "");
+    assert!(!place.path("f.0000.exr").exists() && place.path("f.0002.exr").exists());
+    let moving = format!("{}[animation]\nframes = 2\n", auto("camera = \"auto\""));
+    place.write("s.toml", moving);
+    place.expect(2, &["render", "s.toml", "--turntable", "3"], "--turntable: s.toml has an animation of its own");
+}
+
+#[test]
+fn data_outside_the_root_folder_needs_the_line_that_the_error_offers_and_init_writes() {
+    let place = data();
+    for folder in ["a/b", "data"] {
+        std::fs::create_dir_all(place.path(folder)).unwrap();
+    }
+    std::fs::copy(place.path("mesh.obj"), place.path("data/mesh.obj")).unwrap();
+    let scene = auto("camera = \"auto\"").replace("mesh.obj", "../../data/mesh.obj");
+    place.write("a/b/s.toml", &scene);
+    let arguments = ["render", "a/b/s.toml", "--size", "8x6", "-o", "a.png", "--force"];
+    place.expect(
+        3,
+        &arguments,
+        "hint: allow it with the line root = \"../../data\" before the first table of the scene",
+    );
+    place.write("a/b/s.toml", scene.replace("version = 1", "version = 1\nroot = \"../../data\""));
+    place.expect(0, &arguments, "");
+    place.write("a/b/s.toml", scene.replace("version = 1", "version = 1\nroot = \"../../nowhere\""));
+    place.expect(3, &arguments, "`root`: expected a folder, found \"../../nowhere\"");
+    place.expect(0, &["init", "data/mesh.obj", "-o", "a/b/first.toml", "--size", "8x6"], "");
+    let text = String::from_utf8(place.bytes("a/b/first.toml")).unwrap();
+    assert!(text.contains("root = \"../../data\"") && text.contains("mesh = \"../../data/mesh.obj\""), "{text}");
+    place.expect(0, &["render", "a/b/first.toml", "-o", "a.png", "--force"], "");
+}
+
+#[test]
+fn info_says_what_a_file_holds_for_people_and_for_programs() {
+    let place = data();
+    let text = |file: &str| String::from_utf8(place.expect(0, &["info", file], "").stdout).unwrap();
+    let mesh = text("mesh.obj");
+    assert!(mesh.contains("mesh, read as Obj") && mesh.contains("triangles 192"), "{mesh}");
+    // The poles are rings of triangles without area.
+    assert!(mesh.contains("24 triangles without area"), "{mesh}");
+    let head = text("head.nrrd");
+    assert!(head.contains("0.1 × 0.1 × 0.1") && head.lines().filter(|l| l.contains('#')).count() > 8, "{head}");
+    assert!(text("far.obj").contains("times its size from the origin"));
+    let points = place.expect(0, &["info", "scan.xyz", "--json"], "");
+    let points: Value = serde_json::from_slice(&points.stdout).unwrap();
+    // Points of a Fibonacci lattice on a ball of radius 40 lie about √(4π/300)·40 apart.
+    let spacing = points["spacing"].as_f64().unwrap();
+    assert!((5.0..10.0).contains(&spacing), "{spacing}");
+    assert_eq!((&points["duplicate_points"], &points["format"]), (&Value::from(0), &Value::from("Xyz")));
+}
