@@ -5,8 +5,9 @@
 #![allow(clippy::expect_used, reason = "an example")]
 
 use organza::scene::{LoadOptions, Override, Scene, parse};
-use organza::{LayerData, Progress, RenderOptions, render};
+use organza::{Progress, RenderOptions, render};
 use organza_judge::truth::{Orders, truth};
+use splat_core::LayerData;
 use std::fmt::Write;
 
 /// Pixels along a side; four samples each.

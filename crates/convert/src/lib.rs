@@ -89,7 +89,7 @@ pub use params::{Density, SplatParams};
 pub use procedural::{CloudShape, Ellipsoid, procedural_cloud};
 pub use raw_points::{PointLattice, RawPoints};
 pub use resample::resampled;
-pub use search::{ZeroSearch, extinct_bounds};
+pub use search::{ZeroSearch, extinct_bounds, visible_ends};
 pub use section::{Section, volume_section};
 pub use shapes::{HomogeneousMedium, MediumBody, Rectangle, medium, medium_to_grid, rectangle};
 pub use sobel::{sobel_gradient, sobel_gradient_into};

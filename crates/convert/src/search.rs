@@ -1,6 +1,7 @@
 //! Where in a box there is something: zeros of a field, extinction of a volume.
 
 use crate::SharedField;
+use rayon::prelude::*;
 use splat_core::glam::DVec3;
 use splat_core::{DAabb, Grid, TransferFunction};
 
@@ -53,6 +54,20 @@ pub fn extinct_bounds(grid: &Grid, transfer: &TransferFunction) -> DAabb {
     let (low, high) =
         if low.cmple(high).all() { ((low - 1.0).max(first), (high + 1.0).min(last)) } else { (first, last) };
     DAabb::of_points(DAabb::new(low, high).corners().map(|index| grid.origin + grid.axes * index))
+}
+
+/// The first and the last lattice point of every row to which a transfer function gives extinction above a `share` of its largest;
+/// where it gives none, the corners of [`extinct_bounds`].
+pub fn visible_ends(grid: &Grid, transfer: &TransferFunction, share: f32) -> Vec<DVec3> {
+    let most = transfer.points().iter().fold(0.0, |most: f32, p| most.max(p.extinction));
+    let seen = |v: &f32| transfer.at(*v).extinction > share * most;
+    let [nx, ny, _] = grid.dims;
+    let row = |(row, values): (usize, &[f32])| {
+        let (first, last) = (values.iter().position(seen)?, values.iter().rposition(seen)?);
+        Some([first, last].map(|i| grid.position(i, row % ny, row / ny)))
+    };
+    let ends: Vec<DVec3> = grid.values.par_chunks(nx).enumerate().filter_map(row).flatten_iter().collect();
+    if ends.is_empty() { extinct_bounds(grid, transfer).corners().to_vec() } else { ends }
 }
 
 /// Cells that fill a box.

@@ -31,7 +31,7 @@ impl<'a> Sunny<'a> {
         let ids = (0..cloud.len() as u32).collect();
         let scene = Scene { materials: vec![material], ids, ..Scene::new(cloud, view) };
         let transforms = vec![Similarity::default(); objects];
-        Self { scene, lights: vec![LitBy { light, shadow }], objects: vec![one; objects], transforms }
+        Self { scene, lights: vec![LitBy { slide: None, light, shadow }], objects: vec![one; objects], transforms }
     }
 
     fn input(&self) -> ShadeInput<'_> {

@@ -63,7 +63,7 @@ pub use settings::{
     RenderSettings, Scattering, ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler,
     SurfelGroups, SurfelLayers, SurfelsSettings, Technique,
 };
-pub use shown::{escape_controls, printable, shown};
+pub use shown::{escape_controls, place, printable, shown};
 pub use source::{
     CloudSource, DensitySource, ImplicitSource, IsosurfaceSource, LevelSetSource, SliceSource, Source, VolumeSource,
 };

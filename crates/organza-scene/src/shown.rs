@@ -1,5 +1,6 @@
 //! What was given, as messages repeat it: no more than can be read, and nothing that steers a terminal.
 
+use glam::DVec3;
 use std::borrow::Cow;
 use std::path::Path;
 
@@ -32,6 +33,16 @@ pub fn printable(path: &Path) -> String {
         characters.splice(half..characters.len() - half + 1, ["…".to_owned()]);
     }
     characters.concat()
+}
+
+/// A place or a direction for a message: four digits are enough to find it.
+pub fn place(p: DVec3) -> String {
+    let digits = |v: f64| {
+        let unit = 10f64.powi(3 - libm::log10(v.abs().max(1e-300)).floor() as i32);
+        let rounded = (v * unit).round() / unit;
+        if rounded.is_finite() { rounded } else { v }
+    };
+    format!("{:?}", p.to_array().map(digits))
 }
 
 /// `text` with control characters and marks that change the direction of writing escaped, so that a name in a file can
@@ -80,5 +91,10 @@ mod tests {
         use std::os::unix::ffi::OsStrExt;
         let path = Path::new(std::ffi::OsStr::from_bytes(b"a\xff\nb.toml"));
         assert_eq!(printable(path), "a\\xff\\nb.toml");
+    }
+
+    #[test]
+    fn places_have_four_digits() {
+        assert_eq!(place(DVec3::new(1234.56, -0.000_123_456, 0.0)), "[1235.0, -0.0001235, 0.0]");
     }
 }

@@ -10,7 +10,8 @@ use crate::plan::{Effect, Plan};
 use crate::scene::{Scene, SceneLight};
 use crate::shadows::Wanted;
 use crate::shown;
-use crate::statistics::{ObjectStatistics, Statistics};
+use crate::statistics::ObjectStatistics;
+use splat_core::shade::Census;
 use splat_core::{Object, SplatKind};
 
 /// How light is carried in a scene, if any technique of it does.
@@ -126,7 +127,7 @@ pub(crate) fn wanted_maps<'a>(
         return points.iter().map(|point| called_for(point).then_some((point, &loaded.objects[..]))).collect();
     }
     // Who receives light beside what it is carried through, and who casts shadows there.
-    let beside = Statistics::of_cloud(&loaded.cloud, &loaded.materials, others, &loaded.footprints);
+    let beside = Census::of(&loaded.cloud, &loaded.materials, others, &loaded.footprints);
     let all = points.iter().zip(&plan.carried).map(|(point, carried)| {
         let wanted = called_for(point) && (!carried || beside.receivers > 0);
         wanted.then_some((point, &loaded.objects[..]))

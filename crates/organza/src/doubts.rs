@@ -3,17 +3,15 @@
 
 use crate::load::{Loaded, own::Own};
 use crate::plan::Plan;
+use crate::scene::place;
 use crate::scene::{Scene, SceneLight};
 use crate::{Layers, ShadowTable, escape_controls};
 use glam::DVec3;
-use rayon::prelude::*;
 use splat_core::DAabb;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use splat_core::raster::objects_in_view;
 
 /// Most objects outside the view that are told one by one.
 const TOLD: usize = 4;
-/// Splats that are looked at together.
-const CHUNK: usize = 1 << 14;
 
 /// What can be told of a scene before it is drawn, one sentence each.
 pub(crate) fn of_scene(scene: &Scene, loaded: &Loaded) -> Vec<String> {
@@ -47,12 +45,12 @@ fn turned_away(loaded: &Loaded) -> Vec<String> {
     let unit = libm::exp2(f64::from(loaded.exponent));
     let one = |light: &SceneLight| {
         let shape = &light.light.shape;
-        let (place, normal) = (shape.place()?, shape.normal()?);
+        let (at, normal) = (shape.place()?, shape.normal()?);
         // The corner of a box that lies farthest along the normal.
         let farthest = |b: &DAabb| DVec3::select(normal.cmpgt(DVec3::ZERO), b.max, b.min);
-        let is_lit = boxes.iter().any(|b| (farthest(b) - place).dot(normal) > 0.0);
+        let is_lit = boxes.iter().any(|b| (farthest(b) - at).dot(normal) > 0.0);
         (!is_lit && !boxes.is_empty()).then(|| {
-            let (at, along) = (self::place(place * unit), self::place(normal));
+            let (at, along) = (place(at * unit), place(normal));
             format!(
                 "the flat light at {at} shines along {along}, away from all objects: turn its `normal`, or exchange `u` and `v`"
             )
@@ -70,7 +68,7 @@ fn outside(scene: &Scene, loaded: &Loaded) -> Vec<String> {
     lost.iter_mut().for_each(|(_, b)| *b = DAabb::new(b.min * unit, b.max * unit));
     let camera = &scene.camera;
     let looks = format!("the camera at {} looks along {}", place(camera.position), place(camera.axes[2]));
-    if !lost.is_empty() && !seen.iter().any(|s| s.load(Relaxed)) {
+    if !lost.is_empty() && !seen.contains(&true) {
         let all = lost.iter().fold(DAabb::EMPTY, |all, (_, b)| all.union(*b));
         return vec![format!(
             "the camera sees nothing: all objects lie from {} to {}, and {looks}; set camera.target to {}",
@@ -98,45 +96,21 @@ fn lights(loaded: &Loaded) -> impl Iterator<Item = DVec3> {
     loaded.lights.iter().filter_map(|light| light.light.shape.place())
 }
 
-/// Four digits are enough to find a place.
-fn place(p: DVec3) -> String {
-    let digits = |v: f64| {
-        let unit = 10f64.powi(3 - libm::log10(v.abs().max(1e-300)).floor() as i32);
-        let rounded = (v * unit).round() / unit;
-        if rounded.is_finite() { rounded } else { v }
-    };
-    format!("{:?}", p.to_array().map(digits))
-}
-
 /// For each object whether some of it lies in the view.
-fn seen(loaded: &Loaded) -> Vec<AtomicBool> {
-    let seen: Vec<AtomicBool> = loaded.objects.iter().map(|_| AtomicBool::new(false)).collect();
+fn seen(loaded: &Loaded) -> Vec<bool> {
     let view = &loaded.camera;
+    let mut seen = objects_in_view(&loaded.cloud, view, loaded.objects.len());
     for own in &loaded.own {
         let bounds = own.world_box();
-        let middle = view.view_from_world(bounds.center());
-        seen[own.object].store(view.may_see(middle, 0.5 * bounds.diagonal()), Relaxed);
+        seen[own.object] |= view.may_see(view.view_from_world(bounds.center()), 0.5 * bounds.diagonal());
     }
-    let cloud = &loaded.cloud;
-    let place = view.view_from_offset(cloud.origin);
-    let splats =
-        cloud.object.par_chunks(CHUNK).zip(cloud.position.par_chunks(CHUNK)).zip(cloud.radius.par_chunks(CHUNK));
-    splats.for_each(|((objects, positions), radii)| {
-        for ((object, position), radius) in objects.iter().zip(positions).zip(radii) {
-            let known = &seen[*object as usize];
-            // Most objects are found at their first splat.
-            if !known.load(Relaxed) && view.may_see(place.apply(*position).as_dvec3(), f64::from(*radius)) {
-                known.store(true, Relaxed);
-            }
-        }
-    });
     seen
 }
 
 /// The objects that are not seen and not empty, with their bounds in the normalized world.
-fn bounds(loaded: &Loaded, seen: &[AtomicBool]) -> Vec<(usize, DAabb)> {
+fn bounds(loaded: &Loaded, seen: &[bool]) -> Vec<(usize, DAabb)> {
     let mut of = vec![DAabb::EMPTY; seen.len()];
-    let unseen = |id: usize| !seen[id].load(Relaxed);
+    let unseen = |id: usize| !seen[id];
     if !(0..seen.len()).any(unseen) {
         return Vec::new();
     }
@@ -167,14 +141,4 @@ pub(crate) fn of_shadows<'a>(tables: impl Iterator<Item = &'a ShadowTable>) -> O
         let maps = if coarse == 1 { "a shadow map is" } else { "shadow maps are" };
         format!("{maps} coarser than the splats ask for, to fit the memory: a larger --max-memory makes them finer")
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn places_have_four_digits() {
-        assert_eq!(place(DVec3::new(1234.56, -0.000_123_456, 0.0)), "[1235.0, -0.0001235, 0.0]");
-    }
 }

@@ -107,7 +107,7 @@ fn own_bytes(loaded: &Loaded) -> u64 {
             grids.push(at);
             known
         });
-        own.table_bytes() + if known { 0 } else { own.bytes() }
+        own.table_bytes + if known { 0 } else { own.bytes() }
     };
     loaded.own.iter().map(of).sum()
 }

@@ -15,6 +15,7 @@ use crate::statistics::{ObjectStatistics, Statistics};
 use crate::technique::Row;
 use crate::work::Translucent;
 use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, doubts, lights, shadows};
+use splat_core::shade::Census;
 use splat_core::{Exceeded, Material};
 
 /// What a render would do, without doing it.
@@ -118,7 +119,8 @@ fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Resu
         .map(|(object, planned)| PlannedObject { technique: technique_of(object, scene), ..planned.clone() })
         .collect();
     let made: Vec<u64> = loaded.splats.iter().map(|s| s.made).collect();
-    let mut statistics = Statistics::of_cloud(&loaded.cloud, &loaded.materials, &loaded.objects, &loaded.footprints);
+    let counts = Census::of(&loaded.cloud, &loaded.materials, &loaded.objects, &loaded.footprints);
+    let mut statistics = Statistics { counts, ..Statistics::default() };
     statistics.lights = light_statistics(&loaded.lights);
     statistics.normals_needed = loaded.normals;
     statistics.layers = scene.render.layers.names().map(str::to_owned).collect();
@@ -135,7 +137,7 @@ fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Resu
     }
     let materials = loaded.own.iter().map(|o| &loaded.materials[scene.objects[o.object].material]);
     let unequal = |m: &Material| m.extinction_rgb.iter().any(|e| *e != m.extinction_rgb[0]);
-    statistics.colored_extinction |= materials.into_iter().any(unequal);
+    statistics.counts.colored_extinction |= materials.into_iter().any(unequal);
     for object in visible(scene).filter(|o| (row(technique_of(o, scene)).bends)(scene).is_ok()) {
         statistics.add_bound(&object.name, &loaded.materials[object.material]);
     }
@@ -154,7 +156,7 @@ fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Resu
     let camera = loaded.camera.with_samples(scene.render.antialias);
     let matter =
         Matter { scene, own: &loaded.own, planned: &plan.objects, cloud: Some(&loaded.cloud), camera: &camera };
-    let own = used.map(|t| (row(*t).bytes)(&matter, &points, statistics.colored_extinction, options)).sum();
+    let own = used.map(|t| (row(*t).bytes)(&matter, &points, statistics.counts.colored_extinction, options)).sum();
     let memory = Memory::new(scene, loaded, own);
     memory::check("rendering", memory.total(), options.max_memory)?;
     let left = options.max_memory - memory.total();

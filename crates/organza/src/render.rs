@@ -50,31 +50,7 @@ pub fn render(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Re
 /// # Errors
 /// As [`render`].
 pub fn render_from(scene: &Scene, options: &RenderOptions, progress: &Progress, files: Files) -> Result<Render, Error> {
-    render_keeping(scene, options, progress, Begun::Still(files))
-}
-
-/// What a render begins with.
-pub(crate) enum Begun<'l> {
-    /// Files that may be let go once they are converted.
-    Still(Files),
-    /// What other frames of the scene have left.
-    Frame(&'l mut Left),
-}
-
-impl Begun<'_> {
-    fn files(&self) -> &Files {
-        match self {
-            Self::Still(files) => files,
-            Self::Frame(left) => &left.files,
-        }
-    }
-
-    fn left(&self) -> Option<&Left> {
-        match self {
-            Self::Still(_) => None,
-            Self::Frame(left) => Some(left),
-        }
-    }
+    render_keeping(scene, options, progress, &mut Left { files, is_still: true, ..Left::default() })
 }
 
 /// What the frames of an animation leave for the next.
@@ -83,6 +59,8 @@ pub(crate) struct Left {
     pub(crate) files: Files,
     pub(crate) sets: Kept,
     pub(crate) groups: GroupsOfObjects,
+    /// Whether no other frame comes.
+    is_still: bool,
 }
 
 impl Left {
@@ -96,9 +74,10 @@ impl Left {
     /// Share of the allowed memory that files may take.
     const FILES: u64 = 4;
 
-    /// Lets files go that take more than their share, or than is left beside `other` bytes; sets may take what is then left.
+    /// Lets files go that take more than their share, or than is left beside `other` bytes, or that no frame needs; sets may take what
+    /// is then left.
     fn fit(&mut self, max_memory: u64, other: u64) {
-        if self.files.bytes() > (max_memory / Self::FILES).min(max_memory.saturating_sub(other)) {
+        if self.is_still || self.files.bytes() > (max_memory / Self::FILES).min(max_memory.saturating_sub(other)) {
             self.files = Files::default();
         }
         self.sets.allow(max_memory, other + self.files.bytes());
@@ -110,35 +89,28 @@ pub(crate) fn render_keeping(
     scene: &Scene,
     options: &RenderOptions,
     progress: &Progress,
-    begun: Begun<'_>,
+    left: &mut Left,
 ) -> Result<Render, Error> {
-    let (scene, found) = fitted(scene, options, progress, begun.files())?;
+    let (scene, found) = fitted(scene, options, progress, &left.files)?;
     let scene = &*scene;
     let open = |path: &PathBuf| {
         if !matches!(techniques(scene)[..], [only] if row(only).is_random) {
             let message = "only the technique `particles` is drawn in sets that a checkpoint can keep";
             return Err(Error::usage(message, "use --technique particles, or no --checkpoint"));
         }
-        Checkpoint::open(path, scene, options, begun.left().map(|left| &left.sets))
+        Checkpoint::open(path, scene, options, (!left.is_still).then_some(&left.sets))
     };
     let mut checkpoint = options.checkpoint.as_ref().map(open).transpose()?;
     let helper = options.device.as_deref().map(Helper::new);
-    let (loaded, explanation, memory) = prepare(scene, options, progress, begun.files())?;
-    let mut left = match begun {
-        // What was read is converted.
-        Begun::Still(_) => None,
-        Begun::Frame(left) => Some(left),
-    };
+    let (loaded, explanation, memory) = prepare(scene, options, progress, &left.files)?;
+    left.fit(options.max_memory, memory.total());
     let Explanation { plan, mut cost, mut warnings, notes, .. } = explanation;
     // A reason that is told already is enough.
     let is_empty = loaded.cloud.is_empty() && loaded.own.is_empty();
     let doubtful = is_empty || warnings.len() > loaded.warnings.len();
-    if let Some(left) = left.as_deref_mut() {
-        left.fit(options.max_memory, memory.total());
-    }
     let device = helper.as_ref().map(|helper| (helper, options.device_composites));
     let frame = Frame::new(scene, &loaded, &plan, progress).helped_by(device);
-    let (kept, groups) = left.map(|left| (&mut left.sets, &mut left.groups)).unzip();
+    let (kept, groups) = (!left.is_still).then_some((&mut left.sets, &mut left.groups)).unzip();
     let checkpoint = checkpoint.as_mut();
     let mut session = Session { options, checkpoint, kept, groups, warnings: &mut warnings, sets: None };
     let layers = draw(&frame, &mut session, &mut cost)?;

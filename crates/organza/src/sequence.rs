@@ -1,7 +1,7 @@
 //! Frames of one scene, one after the other: what was sampled for one serves the next.
 
 use crate::load::files::Files;
-use crate::render::{Begun, Left, render_keeping};
+use crate::render::{Left, render_keeping};
 use crate::scene::Scene;
 use crate::{Error, Progress, Render, RenderOptions};
 
@@ -79,6 +79,6 @@ impl Sequence {
     /// # Errors
     /// As [`crate::render`].
     pub fn render(&mut self, frame: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Render, Error> {
-        render_keeping(frame, options, progress, Begun::Frame(&mut self.left))
+        render_keeping(frame, options, progress, &mut self.left)
     }
 }

@@ -4,7 +4,8 @@ use crate::form::PlannedObject;
 use crate::lights;
 use crate::scene::{SceneLight, SurfaceSampler, Technique};
 use convert::cost::Prediction;
-use splat_core::{Cloud, FootprintStack, Material, Object, Shading, SplatKind};
+use splat_core::Material;
+use splat_core::shade::Census;
 
 /// What the planner knows of one light.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -90,22 +91,9 @@ pub struct Statistics {
     pub techniques: Vec<Technique>,
     /// By technique: translucent splats that it draws or samples, and objects that it draws from their own data, opaque ones among them.
     pub translucent_by: Vec<(Technique, [u64; 2])>,
-    /// All splats.
-    pub splats: u64,
-    /// Translucent splats that are drawn: media and surfaces.
-    pub translucent: u64,
-    /// Opaque splats.
-    pub opaque: u64,
-    /// Splats that can receive a shadow: lit, with a shadow coefficient above 0; and objects without splats that can.
-    pub receivers: u64,
-    /// Splats that can cast a shadow, and objects that cast one without splats.
-    pub casters: u64,
-    /// Opaque ones among them.
-    pub opaque_casters: u64,
-    /// An optical depth that no light ray through all translucent casters can exceed.
-    pub caster_optical_depth: f64,
-    /// Whether a material absorbs the three channels unequally.
-    pub colored_extinction: bool,
+    /// The splats, translucent ones as far as they are drawn; and among those that cast and receive shadows whole objects that have no
+    /// splats.
+    pub counts: Census,
     /// Objects whose surfaces mirror and bend light, drawn by a technique that can, by name.
     pub bent: Vec<String>,
     /// Whether one of them bends red, green and blue apart.
@@ -127,32 +115,6 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// Counts over the splats and their tables; lights, layers and tolerance are the caller's.
-    pub fn of_cloud(cloud: &Cloud, materials: &[Material], objects: &[Object], footprints: &FootprintStack) -> Self {
-        let norms: Vec<f64> = footprints.layers().iter().map(|f| f.norm()).collect();
-        let mut s = Self { splats: cloud.len() as u64, ..Self::default() };
-        for i in 0..cloud.len() {
-            let object = &objects[cloud.object[i] as usize];
-            let material = &materials[cloud.material[i] as usize];
-            let opaque = cloud.kind[i] == SplatKind::Opaque;
-            s.opaque += u64::from(opaque);
-            s.translucent += u64::from(!opaque);
-            let coefficient = object.shadow_coefficient * cloud.shadow_coefficient_of(i);
-            s.receivers += u64::from(material.shading != Shading::Unlit && coefficient > 0.0);
-            let largest = material.extinction_rgb.into_iter().fold(0.0, f32::max);
-            if object.casts_shadow && cloud.cross_section[i] > 0.0 && (opaque || largest > 0.0) {
-                s.casters += 1;
-                s.opaque_casters += u64::from(opaque);
-                let radius = f64::from(cloud.radius[i]);
-                let peak = f64::from(cloud.cross_section[i]) * norms[cloud.footprint[i] as usize] / (radius * radius);
-                s.caster_optical_depth += peak * f64::from(largest);
-            }
-            let [r, g, b] = material.extinction_rgb;
-            s.colored_extinction |= !opaque && (r != g || g != b);
-        }
-        s
-    }
-
     /// Objects that are drawn from their own data.
     pub fn own(&self) -> u64 {
         self.planned.iter().filter(|o| o.form.is_own()).count() as u64
@@ -165,9 +127,9 @@ impl Statistics {
         for ((object, planned), made) in objects.iter().zip(planned).zip(made) {
             let is_own = planned.form.is_own();
             if is_own {
-                let drawn = if object.opaque { &mut self.opaque } else { &mut self.translucent };
+                let drawn = if object.opaque { &mut self.counts.opaque } else { &mut self.counts.translucent };
                 *drawn = drawn.saturating_sub(*made);
-                self.receivers += u64::from(*made == 0 && object.receives);
+                self.counts.receivers += u64::from(*made == 0 && object.receives);
             }
             if !object.opaque || is_own {
                 let counts = if is_own { [0, 1] } else { [*made, 0] };
@@ -192,8 +154,8 @@ impl Statistics {
 
     /// Takes in an object that casts shadows without splats, of which no ray has more optical depth.
     pub fn add_caster(&mut self, optical_depth: f64) {
-        self.casters += 1;
-        self.caster_optical_depth += optical_depth;
+        self.counts.casters += 1;
+        self.counts.caster_optical_depth += optical_depth;
     }
 
     fn add(&mut self, technique: Technique, counts: [u64; 2]) {

@@ -45,6 +45,19 @@ pub struct EnsembleParams {
 }
 
 impl EnsembleParams {
+    /// What these layers take; `depth_range` is looked at where depths are among them.
+    pub fn of_layers(layers: &LayerSet, colored_extinction: bool, depth_range: [f32; 2]) -> Self {
+        Self {
+            effects: layers.effects,
+            normal: layers.normal,
+            shadow: layers.shadow,
+            depth_range: layers.depth.then_some(depth_range),
+            object: layers.object,
+            colored_extinction,
+            radiance_unit: 0.0,
+        }
+    }
+
     /// Numbers a hit brings: 3 for light or for each effect, 3 for a normal, 1 for shadow.
     #[inline]
     pub fn channels(&self) -> usize {
@@ -301,6 +314,18 @@ impl Ensemble {
     /// Width and height, pixels.
     pub fn size(&self) -> [u32; 2] {
         self.tiling.size.map(|s| s as u32)
+    }
+
+    /// Sets to fold until the next look at the picture, of `most` altogether; `None` when there are as many. More at a time the more
+    /// there are, but where the error decides when there are enough: then looks depend on nothing else.
+    pub fn next_step(&self, most: u32, error_decides: bool) -> Option<u32> {
+        /// Sets of a step, at least.
+        const BATCH: u32 = 8;
+        /// Sets so far over those of a step.
+        const GROWTH: u32 = 16;
+        let left = most.checked_sub(self.levels).filter(|left| *left > 0)?;
+        let grown = if error_decides { 0 } else { self.levels / GROWTH };
+        Some((BATCH + grown).min(left))
     }
 
     /// Sets so far, the repeat level L_R; the next set has this number.

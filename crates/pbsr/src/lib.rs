@@ -99,7 +99,7 @@ pub use mesh::MeshSampler;
 pub use metropolis::{MetropolisParams, MetropolisSampler};
 pub use params::{Density, SurfaceParams};
 pub use particles::{PackedColor, PackedNormal, Particles};
-pub use project::{finest_pixel_area, pixel_area};
+pub use project::{depth_range, finest_pixel_area, pixel_area};
 pub use render::{FoldParams, Object, Renderer, Scene};
 pub use sampler::{KeptSets, Sampler};
 pub use shade::Appearance;

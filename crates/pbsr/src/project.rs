@@ -40,6 +40,15 @@ pub(crate) fn pixel_area_view(camera: &Camera, view: DVec3) -> f64 {
     }
 }
 
+/// View depths that particles lie between, of boxes that hold them told by their corners; \[0, 1\] without any.
+pub fn depth_range(corners: impl Iterator<Item = DVec3>, camera: &Camera) -> [f32; 2] {
+    let depths = corners.map(|p| camera.view_from_world(p).z.max(0.0) as f32);
+    let [near, far] = depths.fold([f32::INFINITY, 0.0], |[near, far], z| [near.min(z), far.max(z)]);
+    // A plane that faces the eye has one depth, which lies inside.
+    let margin = far * f32::EPSILON * 1024.0;
+    if near < far + margin { [(near - margin).max(0.0), far + margin] } else { [0.0, 1.0] }
+}
+
 /// The smallest area of a pixel on what lies in a ball, world units²: a cross-section with which no particle needs to be
 /// widened. Depths nearer than `near` × radius to the eye, or behind it, count as that depth.
 pub fn finest_pixel_area(camera: &Camera, center: DVec3, radius: f64, near: f64) -> f64 {

@@ -60,6 +60,7 @@ mod slice_order;
 mod space;
 mod transfer;
 mod transmittance;
+mod turns;
 
 #[cfg(feature = "raster")]
 pub mod raster;
@@ -87,4 +88,5 @@ pub use progress::Progress;
 pub use slice_order::{Direction, SliceOrder};
 pub use space::{Aabb, DAabb, Similarity};
 pub use transfer::{TransferFunction, TransferPoint};
-pub use transmittance::{Receiver, Transmittance};
+pub use transmittance::{MeanTransmittance, Receiver, Transmittance};
+pub use turns::turns;

@@ -31,7 +31,7 @@ pub mod tile;
 mod translucent;
 pub mod triangles;
 
-pub use cost::{Expected, expected, tile_bytes};
+pub use cost::{Expected, expected, objects_in_view, tile_bytes};
 pub use finish::{Background, FinishInput, GlassImage, finish};
 pub use opaque::{OpaqueImage, OpaqueInput, resolve_opaque};
 pub use project::{ProjectInput, project, project_into};

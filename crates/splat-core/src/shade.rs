@@ -1,11 +1,13 @@
 //! Attribute-driven shading: one radiance per splat from its attributes and the lookup tables (Gunjee 2007, section 4.3,
 //! Figure 11), before rasterization. [`Point::radiance`] has the formulas, for splats and particles alike.
 
+mod census;
 mod channels;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 mod point;
 
+pub use census::Census;
 pub use channels::{ChannelLayout, MAX_CHANNELS, MAX_SHADED_CHANNELS};
 pub use point::{Point, Radiance, arriving, facing};
 

@@ -16,6 +16,19 @@ pub struct Receiver {
     pub kind: SplatKind,
 }
 
+/// Mean transmittance of several, as to the points of one light; at least one.
+pub struct MeanTransmittance<'a>(pub Vec<&'a dyn Transmittance>);
+
+impl Transmittance for MeanTransmittance<'_> {
+    fn transmittance(&self, receiver: &Receiver) -> [f32; 3] {
+        let sum = self.0.iter().fold([0.0; 3], |sum, one| {
+            let own = one.transmittance(receiver);
+            [0, 1, 2].map(|c| sum[c] + own[c])
+        });
+        sum.map(|v: f32| v / self.0.len() as f32)
+    }
+}
+
 /// Transmittance from one light to any point.
 pub trait Transmittance: Sync {
     /// Share of the light that arrives at the receiver per channel, in \[0, 1\].

@@ -37,7 +37,7 @@ pub(crate) fn plan(statistics: &Statistics) -> Plan {
     plan.effects.push(opaque_surfaces(statistics));
     plan.effects.push(kept_layers(statistics));
     plan.objects = statistics.planned.clone();
-    let by_channel = statistics.colored_extinction || statistics.disperses || statistics.absorbs_colors;
+    let by_channel = statistics.counts.colored_extinction || statistics.disperses || statistics.absorbs_colors;
     plan.optical_depth_planes = if by_channel { 3 } else { 1 };
     plan.passes = passes(statistics, &plan.shadow_maps);
     plan
@@ -55,18 +55,22 @@ fn shadow_effect(i: usize, light: &LightStatistics, statistics: &Statistics, all
     if light.is_dark {
         return effect(name, false, "the light has no intensity");
     }
-    if statistics.receivers == 0 {
+    if statistics.counts.receivers == 0 {
         return effect(name, false, "nothing can receive it: no lit splat with a shadow coefficient");
     }
-    if statistics.casters == 0 {
+    if statistics.counts.casters == 0 {
         return effect(name, false, "nothing can cast it");
     }
     // A displayed pixel is at most 1, so what a shadow can take away is at most its opacity.
-    let bound = if statistics.opaque_casters > 0 { 1.0 } else { -libm::expm1(-statistics.caster_optical_depth) };
+    let bound =
+        if statistics.counts.opaque_casters > 0 { 1.0 } else { -libm::expm1(-statistics.counts.caster_optical_depth) };
     let called_for = bound > allowance;
     let reason = if called_for {
         let from = if light.points > 1 { format!(", from {} points", light.points) } else { String::new() };
-        format!("{} splats or whole objects cast and {} receive it{from}", statistics.casters, statistics.receivers)
+        format!(
+            "{} splats or whole objects cast and {} receive it{from}",
+            statistics.counts.casters, statistics.counts.receivers
+        )
     } else {
         format!("no ray could lose more than {bound:.1e} of its light")
     };
@@ -75,7 +79,7 @@ fn shadow_effect(i: usize, light: &LightStatistics, statistics: &Statistics, all
 
 fn colored_extinction(statistics: &Statistics) -> Effect {
     const UNEQUAL: &str = "some material absorbs red, green and blue unequally";
-    if statistics.colored_extinction {
+    if statistics.counts.colored_extinction {
         let how: Vec<&str> = statistics.techniques.iter().filter_map(|t| row(*t).by_channel).collect();
         let how = how.iter().map(|how| format!(": {how}")).collect::<String>();
         effect("transmittance per channel", true, format!("{UNEQUAL}{how}"))
@@ -132,7 +136,8 @@ fn translucency(statistics: &Statistics) -> Effect {
 fn opaque_surfaces(statistics: &Statistics) -> Effect {
     let meshes = statistics.planned.iter().filter(|object| object.form == Form::Polygons).count();
     let of = |count: u64, what: &str| (count > 0).then(|| format!("{count} {what}"));
-    let kinds = [of(statistics.opaque, "opaque splats"), of(meshes as u64, "opaque meshes, which stay triangles,")];
+    let kinds =
+        [of(statistics.counts.opaque, "opaque splats"), of(meshes as u64, "opaque meshes, which stay triangles,")];
     let all: Vec<String> = kinds.into_iter().flatten().collect();
     if all.is_empty() {
         return effect("opaque surfaces", false, "no splat is opaque");
@@ -149,13 +154,13 @@ fn kept_layers(statistics: &Statistics) -> Effect {
 }
 
 fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<PlannedPass> {
-    let opaque = statistics.opaque;
+    let opaque = statistics.counts.opaque;
     let rows = || statistics.techniques.iter().map(|t| (row(*t), statistics.translucent_of(*t)));
     let mut passes = Vec::new();
     let mut pass = |name: &str, reason: String| passes.push(PlannedPass { name: name.into(), reason });
     pass(pass::READ, "the objects' data".into());
-    if statistics.splats > 0 || statistics.own() == 0 {
-        pass(pass::CONVERT, format!("{} splats", statistics.splats));
+    if statistics.counts.splats > 0 || statistics.own() == 0 {
+        pass(pass::CONVERT, format!("{} splats", statistics.counts.splats));
     }
     for (i, light) in statistics.lights.iter().enumerate().filter(|(i, _)| shadow_maps[*i]) {
         (0..light.points).for_each(|_| pass(pass::SHADOW_MAP, format!("light {i}")));
@@ -192,15 +197,19 @@ fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<PlannedPass> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use splat_core::shade::Census;
 
     fn scene() -> Statistics {
         let light = LightStatistics { wants_shadow: true, is_dark: false, points: 1 };
         Statistics {
-            translucent: 10,
-            opaque: 5,
-            receivers: 15,
-            casters: 15,
-            opaque_casters: 5,
+            counts: Census {
+                translucent: 10,
+                opaque: 5,
+                receivers: 15,
+                casters: 15,
+                opaque_casters: 5,
+                ..Census::default()
+            },
             lights: vec![light],
             tolerance: 1.0 / 255.0,
             normals_needed: true,
@@ -218,8 +227,8 @@ mod tests {
     fn x7_no_shadow_map_without_caster_receiver_or_light() {
         assert!(has(&plan(&scene()), pass::SHADOW_MAP));
         for change in [
-            |s: &mut Statistics| s.casters = 0,
-            |s: &mut Statistics| s.receivers = 0,
+            |s: &mut Statistics| s.counts.casters = 0,
+            |s: &mut Statistics| s.counts.receivers = 0,
             |s: &mut Statistics| s.lights[0].is_dark = true,
             |s: &mut Statistics| s.lights[0].wants_shadow = false,
             |s: &mut Statistics| s.lights.clear(),
@@ -244,8 +253,8 @@ mod tests {
     #[test]
     fn x7_faint_casters_are_skipped_while_their_bounds_fit_the_tolerance() {
         let mut s = scene();
-        s.opaque_casters = 0;
-        s.caster_optical_depth = 0.003;
+        s.counts.opaque_casters = 0;
+        s.counts.caster_optical_depth = 0.003;
         s.lights = vec![s.lights[0]; 2];
         let plan = plan(&s);
         // Two of 0.003 are above 1/255 together, so the second one is simulated.
@@ -260,10 +269,10 @@ mod tests {
         s.translucent_by.clear();
         assert!(!has(&plan(&s), pass::SORT) && !has(&plan(&s), pass::SPLAT) && has(&plan(&s), pass::OPAQUE));
         s = scene();
-        s.opaque = 0;
+        s.counts.opaque = 0;
         assert!(has(&plan(&s), pass::SORT) && !has(&plan(&s), pass::OPAQUE));
         assert_eq!(plan(&s).optical_depth_planes, 1);
-        s.colored_extinction = true;
+        s.counts.colored_extinction = true;
         assert_eq!(plan(&s).optical_depth_planes, 3);
         s.techniques = vec![Technique::Particles];
         let only = plan(&s);

@@ -5,10 +5,9 @@ use super::input::Input;
 use super::loading::Loading;
 use crate::scene::{FoundCamera, Scene};
 use crate::{Error, Progress, RenderOptions};
-use convert::extinct_bounds;
+use convert::visible_ends;
 use glam::DVec3;
-use rayon::prelude::*;
-use splat_core::{DAabb, Grid, TransferFunction};
+use splat_core::DAabb;
 use std::borrow::Cow;
 
 /// Share of the largest extinction below which a voxel is not looked for by a camera.
@@ -53,7 +52,7 @@ impl<'i> Outline<'i> {
         let corners = |bounds: DAabb| bounds.corners().to_vec();
         let points = match input {
             Input::Mesh(..) | Input::Points(..) => Vec::new(),
-            Input::Volume(grid, transfer, _) => visible_ends(grid, transfer),
+            Input::Volume(grid, transfer, _) => visible_ends(grid, transfer, FAINT),
             Input::Surface(_, bounds, ..) | Input::Density(_, bounds, _) => corners(*bounds),
             Input::Procedural(shape, ..) => {
                 shape.ellipsoids.iter().flat_map(|e| corners(DAabb::around(e.center, e.radii))).collect()
@@ -79,17 +78,4 @@ impl<'i> Outline<'i> {
             _ => self.points.iter().for_each(|p| add(transform.apply(*p))),
         }
     }
-}
-
-/// The first and the last voxel of every row that shows something, and of a volume that shows nothing its corners.
-fn visible_ends(grid: &Grid, transfer: &TransferFunction) -> Vec<DVec3> {
-    let most = transfer.points().iter().fold(0.0, |most: f32, p| most.max(p.extinction));
-    let seen = |v: &f32| transfer.at(*v).extinction > FAINT * most;
-    let [nx, ny, _] = grid.dims;
-    let row = |(row, values): (usize, &[f32])| {
-        let (first, last) = (values.iter().position(seen)?, values.iter().rposition(seen)?);
-        Some([first, last].map(|i| grid.position(i, row % ny, row / ny)))
-    };
-    let ends: Vec<DVec3> = grid.values.par_chunks(nx).enumerate().filter_map(row).flatten_iter().collect();
-    if ends.is_empty() { extinct_bounds(grid, transfer).corners().to_vec() } else { ends }
 }

@@ -45,8 +45,8 @@ pub(crate) struct Own {
     pub(crate) radius: f64,
     /// Whether its splats are in the cloud too.
     pub(crate) has_splats: bool,
-    /// Elements that a sampler has tables of, about: cells with extinction, triangles, cubes that a surface meets.
-    elements: u64,
+    /// Bytes that a sampler's tables take, about, and what making them takes beside.
+    pub(crate) table_bytes: u64,
 }
 
 /// The data of an object.
@@ -98,7 +98,7 @@ impl Own {
         let depth = factor * optics::optical_depth(prepared.input.opacity().unwrap_or(0.0));
         let bounded = prepared.bounded.take().filter(|_| source == Form::Field);
         let Some((body, bounds, spacing)) = data(prepared, bounded, source, context)? else { return Ok(None) };
-        let elements = elements(&body, bounds, prepared.prediction.splats);
+        let table_bytes = table_bytes(&body, bounds, prepared.prediction.splats);
         let radius = f64::from(splat.profile.cutoff) * f64::from(Footprint::SIGMA_OVER_SPACING) * spacing;
         Ok(Some(Self {
             object: context.id,
@@ -117,7 +117,7 @@ impl Own {
             bounds,
             radius: radius * splat.transform.scale,
             has_splats: planned.splats.is_some(),
-            elements,
+            table_bytes,
         }))
     }
 
@@ -170,17 +170,6 @@ impl Own {
         DAabb::of_points(self.bounds.corners().map(|p| self.transform.apply(p)))
     }
 
-    /// Bytes that a sampler's tables take, about, and what making them takes beside.
-    pub(crate) fn table_bytes(&self) -> u64 {
-        let each = match &self.body {
-            Body::Cells { .. } => 32,
-            Body::Lattice { .. } | Body::Triangles(_) => 16,
-            Body::Field(_) => 8,
-            Body::Surface { .. } => 96,
-        };
-        each * self.elements
-    }
-
     /// Scales the world, not the object.
     pub(crate) fn scale_world(&mut self, scale: f64) {
         self.transform = self.transform.scaled(scale);
@@ -188,18 +177,19 @@ impl Own {
     }
 }
 
-/// Elements that a sampler has tables of, about; of a lattice's isosurface the splats are as many as steps across it.
-fn elements(body: &Body, bounds: DAabb, splats: u64) -> u64 {
+/// Bytes of the tables of a sampler, about: of cells with extinction, of triangles, of cubes that a surface meets; a lattice's isosurface
+/// has as many splats as there are steps across it.
+fn table_bytes(body: &Body, bounds: DAabb, splats: u64) -> u64 {
     match body {
         Body::Cells { grid, transfer, .. } => {
-            grid.values.par_iter().filter(|v| transfer.at(**v).extinction > 0.0).count() as u64
+            32 * grid.values.par_iter().filter(|v| transfer.at(**v).extinction > 0.0).count() as u64
         }
-        Body::Lattice { .. } => 2 * splats,
-        Body::Triangles(mesh) => mesh.triangles.len() as u64,
-        Body::Field(field) => u64::from(field.cells()).pow(3),
+        Body::Lattice { .. } => 32 * splats,
+        Body::Triangles(mesh) => 16 * mesh.triangles.len() as u64,
+        Body::Field(field) => 8 * u64::from(field.cells()).pow(3),
         Body::Surface { spacing, .. } => {
             let cells = line_cells(bounds.size().max_element(), *spacing);
-            6 * u64::from(cells).pow(2)
+            96 * 6 * u64::from(cells).pow(2)
         }
     }
 }

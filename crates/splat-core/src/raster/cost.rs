@@ -4,6 +4,7 @@ use super::bins::TILE;
 use crate::{Camera, Cloud};
 use glam::Vec3;
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// Splats that are counted together.
 const CHUNK: usize = 1 << 15;
@@ -33,6 +34,24 @@ pub fn tile_bytes(cloud: &Cloud, camera: &Camera) -> u64 {
     let entries: Vec<f64> = lists.map(|(p, r)| p.iter().zip(r).map(tiles).sum()).collect();
     let starts = entries.len() as f64 * f64::from(columns * rows);
     (4.0 * (entries.into_iter().sum::<f64>() + starts)) as u64
+}
+
+/// For each of so many objects whether a splat of it may be seen.
+pub fn objects_in_view(cloud: &Cloud, camera: &Camera, objects: usize) -> Vec<bool> {
+    let seen: Vec<AtomicBool> = (0..objects).map(|_| AtomicBool::new(false)).collect();
+    let place = camera.view_from_offset(cloud.origin);
+    let columns =
+        cloud.object.par_chunks(CHUNK).zip(cloud.position.par_chunks(CHUNK)).zip(cloud.radius.par_chunks(CHUNK));
+    columns.for_each(|((objects, positions), radii)| {
+        for ((object, position), radius) in objects.iter().zip(positions).zip(radii) {
+            let known = &seen[*object as usize];
+            // Most objects are found at their first splat.
+            if !known.load(Relaxed) && camera.may_see(place.apply(*position).as_dvec3(), f64::from(*radius)) {
+                known.store(true, Relaxed);
+            }
+        }
+    });
+    seen.into_iter().map(AtomicBool::into_inner).collect()
 }
 
 /// Splats in view, and the fragments of their footprints.

@@ -5,20 +5,15 @@ use super::parts::{Part, named};
 use super::{fault, refuse};
 use crate::device::{Folding, Goal, Helper};
 use crate::frame::Frame;
-use crate::scene::ParticlesSettings;
 use crate::technique::Session;
 use crate::{Error, Progress, RenderOptions, stage};
-use pbsr::{Ensemble, EnsembleParams, FoldParams, LitBy, Object, Renderer};
+use pbsr::{Ensemble, EnsembleParams, FoldParams, LitBy, Object, Renderer, depth_range};
 use rayon::prelude::*;
 use splat_core::raster::OpaqueImage;
-use splat_core::{Camera, LayerSet, Limits, Transmittance};
+use splat_core::{LayerSet, Limits, Transmittance};
 use std::ops::Range;
 use tsm::ShadowMap;
 
-/// Sets between two looks at the error.
-const BATCH: u32 = 8;
-/// Without a wanted error, a step is the number of sets so far over this.
-const GROWTH: u32 = 16;
 /// Share of the allowed memory that the particles of one batch may take.
 const BATCH_SHARE: u64 = 4;
 
@@ -39,7 +34,8 @@ pub(super) fn fold(
     let (camera, ambient) = (&frame.camera, frame.scene.ambient);
     let scene = pbsr::Scene { objects: &objects, lights: &lights, shadow_origin: origin, ambient, camera, occluder };
     let colored = frame.plan.optical_depth_planes == 3;
-    let kept = kept_numbers(&frame.layers, colored, || depth_range(parts, camera));
+    let corners = parts.iter().flat_map(|part| part.corners());
+    let kept = EnsembleParams::of_layers(&frame.layers, colored, depth_range(corners, camera));
     let checkpoint = &mut session.checkpoint;
     let ensemble = match checkpoint.as_deref_mut().and_then(Checkpoint::take) {
         Some(found) => found,
@@ -54,7 +50,7 @@ pub(super) fn fold(
     let helper = helper(frame, checkpoint.is_some());
     frame.progress.begin(stage::PARTICLES);
     frame.progress.add_total(u64::from(settings.repeat_level.saturating_sub(average.ensemble.levels())));
-    while let Some(levels) = average.next_step(settings) {
+    while let Some(levels) = average.ensemble.next_step(settings.repeat_level, settings.target_error.is_some()) {
         let step = Step { until: average.ensemble.levels() + levels, helper, params, progress: frame.progress };
         let folded = step.fold(&mut renderer, &mut folding, &scene, &mut average.ensemble);
         let folded = folded.map_err(|e| match e {
@@ -95,36 +91,14 @@ fn fold_params(options: &RenderOptions) -> FoldParams {
     FoldParams { limits: Limits::bytes(options.max_memory / BATCH_SHARE), ..FoldParams::default() }
 }
 
-/// What an ensemble keeps for these layers.
-fn kept_numbers(set: &LayerSet, colored_extinction: bool, range: impl Fn() -> [f32; 2]) -> EnsembleParams {
-    EnsembleParams {
-        effects: set.effects,
-        normal: set.normal,
-        shadow: set.shadow,
-        depth_range: set.depth.then(range),
-        object: set.object,
-        colored_extinction,
-        radiance_unit: 0.0,
-    }
-}
-
 /// Bytes of averaging an image of so many samples: its sums (twice, where they are written), a batch of particles, and the
 /// samples when they are read. A set of more than four million particles takes more, up to a quarter of what is allowed.
 pub(crate) fn average_bytes(size: [u64; 2], set: &LayerSet, colored_extinction: bool, options: &RenderOptions) -> u64 {
-    let kept = kept_numbers(set, colored_extinction, || [0.0, 1.0]);
+    let kept = EnsembleParams::of_layers(set, colored_extinction, [0.0, 1.0]);
     let samples: u64 = size.iter().product();
     let copies = 1 + u64::from(options.checkpoint.is_some());
     // Batches are over when the picture is read.
     copies * kept.bytes(size) + fold_params(options).batch_bytes().max(samples * kept.bytes_to_read_pixel())
-}
-
-/// View depths that all particles lie between.
-fn depth_range(parts: &[&Part<'_>], camera: &Camera) -> [f32; 2] {
-    let depths = parts.iter().flat_map(|part| part.corners()).map(|p| camera.view_from_world(p).z.max(0.0) as f32);
-    let [near, far] = depths.fold([f32::INFINITY, 0.0], |[near, far], z| [near.min(z), far.max(z)]);
-    // A plane that faces the eye has one depth, which lies inside.
-    let margin = far * f32::EPSILON * 1024.0;
-    if near < far + margin { [(near - margin).max(0.0), far + margin] } else { [0.0, 1.0] }
 }
 
 /// The device that folds, if there is one and it may.
@@ -177,14 +151,4 @@ pub(super) struct Average {
     pub(super) particles: u64,
     /// Whether it was stopped before there were enough.
     pub(super) interrupted: bool,
-}
-
-impl Average {
-    /// Sets until the next look at error and clock; `None` when there are enough.
-    fn next_step(&self, settings: &ParticlesSettings) -> Option<u32> {
-        let left = settings.repeat_level.checked_sub(self.ensemble.levels()).filter(|left| *left > 0)?;
-        // Where the error decides, the looks depend on nothing else.
-        let grown = if settings.target_error.is_some() { 0 } else { self.ensemble.levels() / GROWTH };
-        Some((BATCH + grown).min(left))
-    }
 }

@@ -20,9 +20,8 @@ use sheet_light::half::{
 };
 use sheet_light::{Params, SheetInput};
 use splat_core::shade::LitBy;
-use splat_core::{Accumulator, Camera, Light, Receiver, Transmittance};
+use splat_core::{Accumulator, Camera, Light, MeanTransmittance};
 use splats::{OwnSplats, splat_bounds};
-use tsm::ShadowMap;
 
 /// What a user can do where half vectors cannot.
 const HINT: &str = "use render.sheets.slicing = \"view\"";
@@ -179,38 +178,25 @@ pub(super) fn width(frame: &Frame<'_>, params: &Params) -> Result<f64, Error> {
 }
 
 /// The shadows of what no light is carried through, for each light that is carried whole: by the place of the light.
-fn mean_shadows<'a>(frame: &'a Frame<'a>, cost: &mut CostRecord) -> Result<Vec<(usize, MeanShadow<'a>)>, Error> {
+fn mean_shadows<'a>(frame: &'a Frame<'a>, cost: &mut CostRecord) -> Result<Vec<(usize, MeanTransmittance<'a>)>, Error> {
     let maps = frame.maps_of_others(cost)?;
-    let mut means: Vec<(usize, MeanShadow<'a>)> = Vec::new();
+    let mut means: Vec<(usize, MeanTransmittance<'a>)> = Vec::new();
     let points = frame.light_points().iter().zip(&frame.plan.carried).zip(maps);
     for ((point, _), map) in points.filter(|((point, carried), _)| **carried && is_whole(frame.scene, point)) {
         let Some(map) = map else { continue };
         match means.iter_mut().find(|(of, _)| *of == point.of) {
             Some((_, mean)) => mean.0.push(map),
-            None => means.push((point.of, MeanShadow(vec![map]))),
+            None => means.push((point.of, MeanTransmittance(vec![map]))),
         }
     }
     Ok(means)
-}
-
-/// Mean transmittance to the points of a light.
-struct MeanShadow<'a>(Vec<&'a ShadowMap>);
-
-impl Transmittance for MeanShadow<'_> {
-    fn transmittance(&self, receiver: &Receiver) -> [f32; 3] {
-        let sum = self.0.iter().fold([0.0; 3], |sum, map| {
-            let own = map.transmittance(receiver);
-            [0, 1, 2].map(|c| sum[c] + own[c])
-        });
-        sum.map(|v: f32| v / self.0.len() as f32)
-    }
 }
 
 /// The volumes, the lights that come through them in sweeps, and those that do not.
 fn input<'a>(
     frame: &'a Frame<'a>,
     opaque: &'a [f32],
-    means: &'a [(usize, MeanShadow<'a>)],
+    means: &'a [(usize, MeanTransmittance<'a>)],
     cost: &mut CostRecord,
 ) -> Result<HalfInput<'a>, Error> {
     let maps = frame.maps(cost)?;
