@@ -266,20 +266,11 @@ fn parse(
     reading.notes.format = format.map_or_else(String::new, |format| format!("{format:?}"));
     match format {
         #[cfg(feature = "ply")]
-        Some(Format::Ply) => {
-            let content = stream.rest()?;
-            let loaded = ply::read(&content, reading)?;
-            reading.notes.not_used(ply::unused(&content)?.iter().map(Vec::as_slice));
-            Ok(loaded)
-        }
+        Some(Format::Ply) => ply::read(&stream.rest()?, reading),
         #[cfg(feature = "stl")]
         Some(Format::Stl) => stl::read(&stream.rest()?, reading).map(Loaded::Mesh),
         #[cfg(feature = "obj")]
-        Some(Format::Obj) => {
-            let content = stream.rest()?;
-            reading.notes.not_used(statements::unused(&content));
-            obj::read(&content, place, reading)
-        }
+        Some(Format::Obj) => obj::read(&stream.rest()?, place, reading),
         #[cfg(feature = "off")]
         Some(Format::Off) => off::read(&stream.rest()?, reading),
         #[cfg(feature = "gltf")]

@@ -26,13 +26,14 @@
 
 mod read_samples;
 
-use convert::read::Loaded;
+use convert::read::{Loaded, ReadParams, bytes};
 use exr::prelude::{Blocks, Compression, Vec2};
 use image::ImageFormat;
 use read_samples::oldest::laz_oldest;
 use read_samples::volumes::{self, metaimage, vti, vtk};
 use read_samples::{NIFTI_F32, gzip, images, las, load, nifti, nrrd, obj, ply_ascii, ply_binary, stl, text_points};
 use read_samples::{image, off, pcd, plain_glb, square_glb, square_gltf};
+use splat_core::Limits;
 use std::process::Command;
 
 const LIMITED: &str = "CONVERT_TEST_LIMITED";
@@ -190,12 +191,14 @@ fn every_flipped_bit_of_a_texture_gives_an_error_or_a_valid_object() {
     if !limited("every_flipped_bit_of_a_texture_gives_an_error_or_a_valid_object") {
         return;
     }
+    // A flipped size may make an image of noise, for which surfaces are divided as far as there is room.
+    let params = ReadParams { limits: Limits::bytes(1 << 20), ..ReadParams::default() };
     for (name, content, image) in textured() {
         let start = content.windows(image.len()).position(|w| w == image).unwrap();
         let mut damaged = content.clone();
         for bit in start * 8..(start + image.len()) * 8 {
             damaged[bit / 8] ^= 1 << (bit % 8);
-            if let Ok(loaded) = load(name, &damaged) {
+            if let Ok((loaded, _)) = bytes(name, &damaged, &params, None) {
                 valid(&loaded);
             }
             damaged[bit / 8] = content[bit / 8];

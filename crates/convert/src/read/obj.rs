@@ -12,7 +12,7 @@ use super::fans::Fans;
 use super::mtl::Materials;
 use super::reading::{Fix, Reading};
 use super::text::{Line, Lines, Word};
-use super::{Loaded, input, origin};
+use super::{Loaded, input, origin, statements};
 use crate::error::{Place, ReadError};
 use crate::raw_points::RawPoints;
 use splat_core::Mesh;
@@ -74,6 +74,7 @@ const LOOK: u64 = 1 << 14;
 
 /// Reads an OBJ file, which lies at `place` if it is no part of memory.
 pub(super) fn read(content: &[u8], place: Option<&Path>, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+    reading.notes.not_used(statements::unused(content));
     let mut lines = Lines::new(content);
     let mut found = Content {
         positions: Vec::new(),

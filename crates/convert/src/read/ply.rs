@@ -16,21 +16,22 @@ use super::reading::Reading;
 use crate::error::ReadError;
 use ascii::Ascii;
 use binary::Binary;
-use header::Encoding;
+use header::{Encoding, Header};
 
 /// Reads a PLY file.
 pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
     let header = header::parse(content)?;
-    match header.encoding {
-        Encoding::Ascii => body::read(Ascii::new(content, header.body, header.body_line), &header, reading),
-        Encoding::LittleEndian => body::read(Binary::<false>::new(content, header.body), &header, reading),
-        Encoding::BigEndian => body::read(Binary::<true>::new(content, header.body), &header, reading),
-    }
+    let loaded = match header.encoding {
+        Encoding::Ascii => body::read(Ascii::new(content, header.body, header.body_line), &header, reading)?,
+        Encoding::LittleEndian => body::read(Binary::<false>::new(content, header.body), &header, reading)?,
+        Encoding::BigEndian => body::read(Binary::<true>::new(content, header.body), &header, reading)?,
+    };
+    reading.notes.not_used(unused(&header)?.iter().map(Vec::as_slice));
+    Ok(loaded)
 }
 
-/// Names of what [`read`] reads over in a file that it has read: properties of vertices, and `element.property` of others.
-pub(super) fn unused(content: &[u8]) -> Result<Vec<Vec<u8>>, ReadError> {
-    let header = header::parse(content)?;
+/// Names of what is read over: properties of vertices, and `element.property` of others.
+fn unused(header: &Header) -> Result<Vec<Vec<u8>>, ReadError> {
     let is_index = |name: &[u8]| name == b"vertex_indices" || name == b"vertex_index";
     let mut names = Vec::new();
     for element in &header.elements {
