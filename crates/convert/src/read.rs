@@ -255,19 +255,25 @@ fn parse(
         #[cfg(feature = "exr")]
         Some(Format::Exr) => openexr::read(&stream.rest()?, reading).map(Loaded::Image),
         #[allow(unreachable_patterns, reason = "reached where a reader is not compiled in")]
-        Some(format) => Err(ReadError::input(
-            Place::File,
-            "a format that this build reads",
-            format!("{format:?}"),
-            "build with the feature of that name",
-        )),
-        None => Err(ReadError::input(
-            Place::Byte(0),
-            "'ply', 'LASF', 'NRRD', '#?', a NIfTI-1 or OpenEXR header, or the extension of a format without a mark",
-            format!("'{}'", escaped(&head[..head.len().min(16)], 16)),
-            "PLY, STL, OBJ, XYZ, CSV, LAS, LAZ, NIfTI, NRRD, MetaImage, VTK images, raw voxels, Radiance HDR and OpenEXR files are read, each also inside gzip",
-        )),
+        Some(format) => Err(not_compiled_in(format)),
+        None => Err(unknown(head)),
     }
+}
+
+fn not_compiled_in(format: Format) -> ReadError {
+    let (expected, hint) = ("a format that this build reads", "build with the feature of that name");
+    ReadError::input(Place::File, expected, format!("{format:?}"), hint)
+}
+
+/// The refusal of a file that begins with nothing known and has no extension that helps.
+fn unknown(head: &[u8]) -> ReadError {
+    ReadError::input(
+        Place::Byte(0),
+        "'ply', 'LASF', 'NRRD', '#?', a NIfTI-1 or OpenEXR header, or the extension of a format without a mark",
+        format!("'{}'", escaped(&head[..head.len().min(16)], 16)),
+        "PLY, STL, OBJ, XYZ, CSV, LAS, LAZ, NIfTI, NRRD, MetaImage, VTK images, raw voxels, Radiance HDR and OpenEXR files are \
+         read, each also inside gzip",
+    )
 }
 
 /// Longest side of an image, pixels.
