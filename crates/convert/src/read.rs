@@ -300,14 +300,14 @@ fn parse(
         #[cfg(feature = "png")]
         Some(Format::Png) => png::read(&stream.rest()?, reading).map(Loaded::Image),
         #[allow(unreachable_patterns, reason = "reached where a reader is not compiled in")]
-        Some(format) => Err(ReadError::input(
-            Place::File,
-            "a format that this build reads",
-            format!("{format:?}"),
-            "build with the feature of that name",
-        )),
+        Some(format) => Err(not_compiled_in(format)),
         None => Err(unread::refused(path, head)),
     }
+}
+
+fn not_compiled_in(format: Format) -> ReadError {
+    let (expected, hint) = ("a format that this build reads", "build with the feature of that name");
+    ReadError::input(Place::File, expected, format!("{format:?}"), hint)
 }
 
 /// Longest side of an image, pixels.

@@ -103,7 +103,7 @@ fn what_is_wrong_in_a_file_is_named() {
         ("SPACING 3", "SPACING 0", "a.vtk:7: expected three independent finite steps"),
         ("SPACING 3 2 4", "SPACING 3 2", "a.vtk:7: expected three numbers"),
         ("SPACING 3", "SPACING 3000000", "a.vtk:7: expected steps of which none is more than 1000 times another"),
-        ("POINT_DATA 12", "POINT_DATA 13", "expected 12 values for 3 x 2 x 2, found 13"),
+        ("POINT_DATA 12", "POINT_DATA 13", "a.vtk:9: expected 13 numbers, found 12"),
         ("POINT_DATA 12", "POINT_DATA 18446744073709551615", "a.vtk:9: expected at most "),
         ("POINT_DATA 12", "POINT_DATA 99", "a.vtk:9: expected at most "),
         ("density float", "density bit", "a.vtk:9: expected a type of numbers, from unsigned_char to double"),

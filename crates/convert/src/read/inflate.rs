@@ -40,7 +40,7 @@ impl<R: BufRead> Read for Inflate<R> {
             if given > 0 {
                 return Ok(given as usize);
             }
-            if at_end && !self.ended {
+            if !self.ended && (at_end || read == 0) {
                 return Err(io::Error::other("its end is missing"));
             }
         }

@@ -143,14 +143,19 @@ pub(crate) fn vti(encoding: &'static str, compressed: bool) -> Vec<u8> {
     Vti { encoding, big: false, wide: false, compressed }.file()
 }
 
-/// Structured points, whose axes are those of the space, with an array of a field behind the values.
-pub(crate) fn vtk(binary: bool) -> Vec<u8> {
+/// Structured points, whose axes are those of the space.
+pub(crate) fn vtk_scalars(binary: bool) -> Vec<u8> {
     let head = format!(
         "# vtk DataFile Version 3.0\na test\n{}\nDATASET STRUCTURED_POINTS\nDIMENSIONS 3 2 2\nORIGIN 10 20 -30\n\
          SPACING 3 2 4\nPOINT_DATA 12\nSCALARS density float 1\nLOOKUP_TABLE default\n",
         if binary { "BINARY" } else { "ASCII" }
     );
+    [head.into_bytes(), if binary { raw(true) } else { text() }].concat()
+}
+
+/// The same with an array of a field behind the values.
+pub(crate) fn vtk(binary: bool) -> Vec<u8> {
     let field = b"\nFIELD more 1\nmask 1 12 unsigned_char\n";
-    let (data, mask) = if binary { (raw(true), vec![7; 12]) } else { (text(), b"7 ".repeat(12)) };
-    [head.as_bytes(), &data, field, &mask].concat()
+    let mask = if binary { vec![7; 12] } else { b"7 ".repeat(12) };
+    [&vtk_scalars(binary), &field[..], &mask].concat()
 }
