@@ -28,6 +28,18 @@ fn ia02_a_flat_field_is_flat() {
 }
 
 #[test]
+fn ia04_sums_of_a_hundred_thousand_small_values_keep_their_digits() {
+    // All in one pixel of one slab, where sums of 16 bits stall at a thirtieth of theirs.
+    let (tf, material) = (transfer(&[(0.0, 0.0), (1.0, 1.0)]), unlit());
+    let grid = grid([100, 100, 10], cubic(1.0), |_| 0.01);
+    let camera = parallel([0.0, 0.0, 50.0], 100.0, [1, 1]);
+    let params = Params { slab_width: Some(10.0), ..exact() };
+    let (out, _) = draw(&input(&[volume(&grid, &tf, &material)], &camera, &[]), &params).unwrap();
+    let found = out.optical_depth[0][0];
+    assert!((found - 0.1).abs() < 1e-6, "{found}");
+}
+
+#[test]
 fn ia11_five_thousand_slabs_front_to_back_are_those_back_to_front() {
     let (tf, material) = (transfer(&[(0.1, 0.0), (0.5, 0.0008), (0.9, 0.002)]), unlit());
     let grid = grid([4, 4, 1250], cubic(1.0), noise);
