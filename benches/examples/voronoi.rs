@@ -1,5 +1,5 @@
 //! A third of the Stanford bunny's vertices as a raw scan of opaque discs: in 2+1 passes, and in 1+1 passes with few groups, by plain
-//! depth and by the Voronoi depth of Eq. 14 (Zhang and Pajarola 2007, Figs. 13 and 14). Normals are blended, and lit once a pixel.
+//! depth and by the Voronoi depth of Eq. 14 (Zhang and Pajarola 2007, Figs. 13 and 14). Light falls on pixels.
 //!
 //! `cargo run --release -p organza-benches --example voronoi -- docs/images/voronoi.png`
 #![allow(clippy::expect_used, reason = "an example")]
@@ -7,9 +7,13 @@
 use convert::read::{self, Loaded, ReadParams};
 use convert::{RawPoints, SurfelParams, raw_to_surfels};
 use deferred_blend::grouping::{GraphParams, OverlapGraph, Relaxation, minimum_coloring};
-use deferred_blend::{DiscInput, Discs, Opaque, OpaqueInput, Params, Passes, Shown, resolve_opaque};
+use deferred_blend::{DiscInput, Discs, Light, Opaque, OpaqueInput, Params, Passes, Shown, resolve_opaque};
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Camera, Cloud, FootprintStack, Material, Projection};
+use splat_core::shade::{ChannelLayout, LitBy, ShadeInput};
+use splat_core::{
+    Camera, Cloud, FootprintStack, LayerSet, Light as Sun, LightShape, Material, Object, Projection, Similarity,
+};
+use std::f32::consts::PI;
 
 const SIZE: [u32; 2] = [300, 280];
 /// c: discs whose centres lie nearer than this share of both radii are of different groups.
@@ -35,12 +39,16 @@ fn main() {
     let groups = &minimum_coloring(&graph, 256, None).expect("groups").groups;
     println!("{} discs in {} groups", cloud.len(), groups.count());
 
-    // A scan does not know which way its normals point.
-    let seen_from = (eye - cloud.origin).as_vec3();
-    let toward = |(n, p): (&Vec3, &Vec3)| if n.dot(seen_from - *p) < 0.0 { -*n } else { *n };
-    let values: Vec<f32> = cloud.normal.iter().zip(&cloud.position).flat_map(|at| toward(at).to_array()).collect();
+    let direction = DVec3::new(0.4, 0.77, -0.5).normalize();
+    let sun = Sun { shape: LightShape::Directional { direction }, intensity: [0.75 * PI; 3] };
+    let objects = [Object { name: "bunny".into(), casts_shadow: false, shadow_coefficient: 1.0 }];
+    let (lights, materials, camera) = (&[LitBy { light: sun, shadow: None }], &materials, &camera);
+    let (cloud, objects, ambient) = (&cloud, &objects, [0.1; 3]);
+    let input = &ShadeInput { cloud, materials, objects, lights, ambient, camera };
+    let (layout, transforms) = (ChannelLayout::new(&LayerSet::default()), &[Similarity::default()]);
+    let light = Light { input, layout, transforms };
     let resolve = |passes: Passes<'_>| {
-        let (shown, max_bytes) = (Shown::Discs(&values), 1 << 30);
+        let (shown, max_bytes) = (Shown::Pixels(light), 1 << 30);
         let input = OpaqueInput { discs: &discs, shown, channels: 3, objects: false, passes, max_bytes };
         resolve_opaque(&input, &params, None).expect("a picture")
     };
@@ -69,8 +77,5 @@ fn lit(picture: &Opaque, [x, y]: [u32; 2]) -> u8 {
     if picture.disc[k] == u32::MAX {
         return 255;
     }
-    let value = |c: usize| picture.image.channels[c][k];
-    let normal = Vec3::new(value(0), value(1), value(2)).normalize_or(Vec3::Z);
-    let lit = 0.1 + 0.75 * normal.dot(Vec3::new(-0.4, -0.77, 0.5)).max(0.0);
-    (255.0 * lit.powf(1.0 / 2.2)) as u8
+    (255.0 * picture.image.channels[0][k].powf(1.0 / 2.2)) as u8
 }

@@ -70,7 +70,7 @@ pub struct Discs {
     pub(crate) ids: Vec<u32>,
     pub(crate) looks: Vec<Look>,
     pub(crate) kernels: Vec<Kernel>,
-    /// Normals that light is bent about, in the camera's space; empty where no material bounds matter.
+    /// Normals that light is bent about, and sides are told by, in the camera's space.
     pub(crate) normals: Vec<Vec3>,
     /// By id.
     pub(crate) materials: Vec<Material>,
@@ -149,7 +149,6 @@ impl Discs {
             chunks.map(|ids| ids.iter().map(|&i| view.disc(i as usize, params)).collect()).collect();
         let (discs, looks) = parts.into_iter().flatten().unzip();
         let kernels = input.footprints.layers().iter().map(Kernel::new).collect();
-        let bends = input.materials.iter().any(Material::bounds_matter);
         let normal = |&i: &u32| (view.rotation * input.cloud.shading_normal_of(i as usize).as_dvec3()).as_vec3();
         Self {
             size: input.camera.size,
@@ -157,7 +156,7 @@ impl Discs {
             ids: input.ids.to_vec(),
             looks,
             kernels,
-            normals: if bends { input.ids.par_iter().map(normal).collect() } else { Vec::new() },
+            normals: input.ids.par_iter().map(normal).collect(),
             materials: input.materials.to_vec(),
             depths,
             view: (view.rotation, view.shift),
@@ -188,6 +187,12 @@ impl Discs {
         let length = (1.0 + at.length_squared()).sqrt();
         let cone = Cone { width: 0.0, spread: 1.0 / (self.focal * length * length) };
         Ray { from: Vec3::ZERO, along: (at + Vec3::Z) / length, length, cone }
+    }
+
+    /// Where a ray is at a view depth, relative to the cloud's origin.
+    pub(crate) fn place(&self, ray: &Ray, depth: f32) -> Vec3 {
+        let (rotation, shift) = self.view;
+        (rotation.transpose() * ray.at(depth).as_dvec3() - shift).as_vec3()
     }
 
     /// Width of a pixel at a view depth.

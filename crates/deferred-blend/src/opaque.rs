@@ -19,6 +19,7 @@ mod groups;
 mod lit;
 mod memory;
 mod picture;
+mod silhouette;
 mod visibility;
 
 use crate::disc::Discs;

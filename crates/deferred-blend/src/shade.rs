@@ -4,7 +4,7 @@
 use crate::bump;
 use crate::disc::{Discs, Ray};
 use crate::fragments::Fragment;
-use splat_core::glam::{DVec3, Vec3};
+use splat_core::glam::Vec3;
 use splat_core::shade::{ChannelLayout, MAX_CHANNELS, Point, ShadeInput, arriving, facing};
 use splat_core::{Cloud, Receiver, Similarity};
 
@@ -112,7 +112,7 @@ impl Light<'_> {
     /// Writes the channels of the layout.
     fn on(&self, mean: &Attributes, place: &Place<'_>, out: &mut [f32; MAX_CHANNELS]) {
         let ShadeInput { cloud, materials, objects, lights, ambient, .. } = *self.input;
-        let (position, i) = (place.position(), place.disc);
+        let (position, i) = (place.discs.place(place.ray, place.depth), place.disc);
         let (kind, object) = (cloud.kind[i], cloud.object[i] as usize);
         let (material, to_eye) = (&materials[cloud.material[i] as usize], self.to_eye(position));
         let face = mean.face.normalize_or_zero();
@@ -142,7 +142,8 @@ impl Light<'_> {
         (rotation * slope).as_vec3()
     }
 
-    fn to_eye(&self, position: Vec3) -> Vec3 {
+    /// Unit direction to the viewer.
+    pub(crate) fn to_eye(&self, position: Vec3) -> Vec3 {
         let camera = self.input.camera;
         if camera.is_orthographic() {
             return -camera.axes[2].as_vec3();
@@ -161,11 +162,3 @@ pub(crate) struct Place<'a> {
     pub(crate) disc: usize,
 }
 
-impl Place<'_> {
-    /// Relative to the cloud's origin.
-    fn position(&self) -> Vec3 {
-        let (rotation, shift) = self.discs.view;
-        let seen: DVec3 = self.ray.at(self.depth).as_dvec3();
-        (rotation.transpose() * seen - shift).as_vec3()
-    }
-}

@@ -301,7 +301,7 @@ fn db16_memory_does_not_grow_with_groups_times_samples() {
     };
     let (few, many) = (bytes(32, 1), bytes(32, 256));
     let (few_of_samples, many_of_samples) = (bytes(256, 1), bytes(256, 256));
-    let of_groups = rayon::current_num_threads() as u64 * 255 * 6 * 64;
+    let of_groups = rayon::current_num_threads() as u64 * 255 * 7 * 64;
     assert_eq!((many - few, many_of_samples - few_of_samples), (of_groups, of_groups));
     // Twelve planes of four bytes, twice five for the picture, two for the lists.
     assert!(few_of_samples < 256 * 256 * 48 + (1 << 20), "{few_of_samples}");

@@ -20,8 +20,9 @@ const LEAST_EPSILON: f32 = 1.0 / (1 << 20) as f32;
 /// Least weight of a disc that a ray meets, below any that can be seen beside another: where sharp kernels end in zero, Σw does not.
 const LEAST_WEIGHT: f32 = 1.0 / (1u64 << 60) as f32;
 
-/// Weight of a disc that faces away beside one that faces the viewer. Discs behind the silhouette of a closed surface stick out
-/// over it, lit on the inside. Where nothing faces the viewer the factor cancels, and a back is seen as it is.
+/// Weight of a disc that faces away, where the nearest faces the viewer, beside that. Discs behind the silhouette of a closed surface stick
+/// out over it, lit on the inside. Which side is the front is told by the nearest, for a scan does not know: normals turned to the
+/// viewer make an obtuse angle across a silhouette.
 const FACING_AWAY: f32 = 1.0 / 256.0;
 
 /// Below any sum of weights.
@@ -40,7 +41,7 @@ pub(super) struct Hit<S: Simd> {
     pub(super) limit: Lanes<S>,
     /// ρ²/R², below 1 where a ray hits.
     pub(super) distance_sq: Lanes<S>,
-    /// Above 0 where the disc's normal points away from the viewer.
+    /// N: its sign is the side that is seen.
     pub(super) facing: Lanes<S>,
 }
 
@@ -84,8 +85,7 @@ impl<S: Simd> Hit<S> {
     #[inline(always)]
     pub(super) fn weight(&self, simd: S, kernel: &Kernel) -> Lanes<S> {
         let of = |v: f32| Lanes::splat(simd, v);
-        let weight = kernel.profile(simd, (of(1.0) - self.distance_sq).max(of(0.0))).max(of(LEAST_WEIGHT));
-        (weight * of(FACING_AWAY)).where_less_or(of(0.0), self.facing, weight)
+        kernel.profile(simd, (of(1.0) - self.distance_sq).max(of(0.0))).max(of(LEAST_WEIGHT))
     }
 }
 
@@ -97,6 +97,9 @@ pub(super) struct Block {
     /// Depth and, as bits, rank of the nearest disc.
     near: Line,
     disc: Line,
+    /// N of that disc, and its normal times this.
+    facing: Line,
+    front: [Line; 3],
     weight: Line,
     /// Σw·(z − nearest): relative, so that far surfaces keep their digits.
     depth: Line,
@@ -108,13 +111,14 @@ pub(super) struct Block {
 impl Block {
     pub(super) fn new(channels: usize) -> Self {
         let (zero, lines) = (line(0.0), vec![line(0.0); channels]);
-        let (limit, near, disc, weight, depth) = (zero, zero, zero, zero, zero);
-        Self { first: [0; 2], limit, near, disc, weight, depth, nearest: lines.clone(), sums: lines }
+        let (limit, near, disc, facing, front) = (zero, zero, zero, zero, [zero; 3]);
+        let (weight, depth, nearest) = (zero, zero, lines.clone());
+        Self { first: [0; 2], limit, near, disc, facing, front, weight, depth, nearest, sums: lines }
     }
 
     /// Of one.
     pub(super) fn bytes(channels: usize) -> u64 {
-        ((5 + 2 * channels) * size_of::<Line>()) as u64
+        ((9 + 2 * channels) * size_of::<Line>()) as u64
     }
 
     /// Begins block `b` of the tile at `corner`.
@@ -139,12 +143,17 @@ impl Block {
         let (near, depth) = (at(&self.near), solid(hit.depth));
         at(&self.limit).min(solid(hit.limit)).store(&mut self.limit.0[lane..]);
         of(f32::from_bits(rank)).where_less_or(depth, near, at(&self.disc)).store(&mut self.disc.0[lane..]);
+        hit.facing.where_less_or(depth, near, at(&self.facing)).store(&mut self.facing.0[lane..]);
         near.min(depth).store(&mut self.near.0[lane..]);
     }
 
-    /// Reads the values of the nearest discs, when all are known.
+    /// Reads values and normals of the nearest discs, when all are known.
     #[inline(always)]
     pub(super) fn begin_sums(&mut self, input: &Averaged<'_>) {
+        for k in (0..PIXELS).filter(|&k| self.near.0[k] < f32::INFINITY) {
+            let front = input.discs.normals[self.disc.0[k].to_bits() as usize] * self.facing.0[k];
+            self.front.iter_mut().zip(front.to_array()).for_each(|(line, n)| line.0[k] = n);
+        }
         let seen = self.near.0.map(|depth| if depth < f32::INFINITY { 1.0 } else { 0.0 });
         for_each_disc(&self.disc, seen, |disc, own| {
             for (line, value) in self.nearest.iter_mut().zip(values_of(input, disc)) {
@@ -162,21 +171,37 @@ impl Block {
     }
 
     /// Adds discs at some depth and limit, one a lane, to Σw and Σwz. Returns their weights, 0 for those that are hidden, and for rims of
-    /// nearer surfaces, which lie farther than their ε before what hides.
+    /// nearer surfaces, which lie farther than their ε before what hides. `side` is of [`Block::side`].
     #[inline(always)]
     pub(super) fn weigh<S: Simd>(
         &mut self,
         simd: S,
         lane: usize,
-        [depth, own_limit]: [Lanes<S>; 2],
+        [depth, own_limit, side]: [Lanes<S>; 3],
         weight: Lanes<S>,
     ) -> Lanes<S> {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let weight = (weight * of(FACING_AWAY)).where_less_or(side, of(0.0), weight);
         let (limit, near) = (self.limit(simd, lane), Lanes::load(simd, &self.near.0[lane..]));
         let weight = weight.where_less(depth, limit).where_less(near, own_limit);
         let behind = (depth - near).where_less(depth, limit).where_less(near, own_limit);
         add(simd, &mut self.weight.0[lane..], weight);
         add(simd, &mut self.depth.0[lane..], weight * behind);
         weight
+    }
+
+    /// Below 0 where a disc of some N, and normal by axis, shows another side than the nearest.
+    #[inline(always)]
+    pub(super) fn side<S: Simd>(
+        &self,
+        simd: S,
+        lane: usize,
+        facing: Lanes<S>,
+        [x, y, z]: [Lanes<S>; 3],
+    ) -> Lanes<S> {
+        let front = |axis: usize| Lanes::load(simd, &self.front[axis].0[lane..]);
+        let (a, b, c) = (front(0), front(1), front(2));
+        facing * x.mul_add(a, y.mul_add(b, z * c))
     }
 
     /// Adds the values of one disc.

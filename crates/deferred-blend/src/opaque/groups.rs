@@ -26,6 +26,8 @@ struct GroupImage {
     /// z + ε.
     limit: Line,
     weight: Line,
+    /// N.
+    facing: Line,
     /// Rank, as bits.
     disc: Line,
 }
@@ -40,7 +42,7 @@ pub(super) struct GroupImages {
 impl GroupImages {
     pub(super) fn new(count: usize) -> Self {
         let zero = line(0.0);
-        let image = GroupImage { step: zero, place: zero, depth: zero, limit: zero, weight: zero, disc: zero };
+        let image = GroupImage { step: zero, place: zero, depth: zero, limit: zero, weight: zero, facing: zero, disc: zero };
         Self { images: vec![image; count], met: Default::default() }
     }
 
@@ -110,6 +112,7 @@ pub(super) fn keep<S: Simd>(
             keep(&mut image.depth, depth);
             keep(&mut image.limit, limit);
             keep(&mut image.weight, hit.weight(simd, kernel));
+            keep(&mut image.facing, hit.facing);
             keep(&mut image.disc, of(f32::from_bits(i)));
         }
     }
@@ -137,12 +140,15 @@ fn floored<S: Simd>(simd: S, [near, per_depth]: [f32; 2], depth: Lanes<S>) -> La
 pub(super) fn composite<S: Simd>(simd: S, input: &Averaged<'_>, images: &GroupImages, block: &mut Block) {
     block.begin_sums(input);
     images.for_each(|image| {
-        let mut weights = [0.0; PIXELS];
+        let (mut weights, normals) = ([0.0; PIXELS], normals(input, image));
         for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
             let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
             let depth = at(&image.depth);
             if depth.any_less(block.limit(simd, lane)) {
-                block.weigh(simd, lane, [depth, at(&image.limit)], at(&image.weight)).store(&mut weights[lane..]);
+                let normal = [at(&normals[0]), at(&normals[1]), at(&normals[2])];
+                let side = block.side(simd, lane, at(&image.facing), normal);
+                let weight = block.weigh(simd, lane, [depth, at(&image.limit), side], at(&image.weight));
+                weight.store(&mut weights[lane..]);
             }
         }
         for_each_disc(&image.disc, weights, |disc, own| {
@@ -151,4 +157,15 @@ pub(super) fn composite<S: Simd>(simd: S, input: &Averaged<'_>, images: &GroupIm
             }
         });
     });
+}
+
+/// Of the discs that a group shows, by axis.
+#[inline(always)]
+fn normals(input: &Averaged<'_>, image: &GroupImage) -> [Line; 3] {
+    let mut normals = [line(0.0); 3];
+    for k in (0..PIXELS).filter(|&k| image.depth.0[k] < f32::INFINITY) {
+        let normal = input.discs.normals[image.disc.0[k].to_bits() as usize].to_array();
+        normals.iter_mut().zip(normal).for_each(|(line, n)| line.0[k] = n);
+    }
+    normals
 }

@@ -1,6 +1,6 @@
 //! Opaque surfaces on which light falls once a pixel (section 5.2.4).
 
-use super::{Averaged, Opaque, OpaqueInput, average};
+use super::{Averaged, Opaque, OpaqueInput, average, silhouette};
 use crate::shade::{ATTRIBUTES, Light, Place};
 use crate::{Error, Params};
 use rayon::prelude::*;
@@ -26,6 +26,7 @@ pub(super) fn resolve(
     if disc.is_empty() {
         return Ok(seen);
     }
+    let turned = silhouette::turned(light, discs, image, disc);
     // Light takes the place of the averages.
     image.channels.resize_with(ATTRIBUTES.max(channels as usize), || vec![0.0; disc.len()]);
     let width = discs.size[0] as usize;
@@ -37,7 +38,10 @@ pub(super) fn resolve(
     rows.into_par_iter().enumerate().for_each(|(y, mut planes)| {
         for x in (0..width).filter(|x| disc[y * width + x] != u32::MAX) {
             let k = y * width + x;
-            let averages = std::array::from_fn(|c| planes[c][x]);
+            let mut averages = std::array::from_fn(|c| planes[c][x]);
+            if let Ok(at) = turned.binary_search_by_key(&k, |turned| turned.0) {
+                averages[..6].copy_from_slice(&turned[at].1);
+            }
             let place = Place { discs, ray: &discs.ray([x, y]), depth: depth[k], disc: disc[k] as usize };
             let mut out = [0.0; MAX_CHANNELS];
             light.on_averages(averages, &place, &mut out);
