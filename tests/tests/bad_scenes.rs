@@ -303,7 +303,10 @@ fn bi12_data_outside_the_root_folder_is_refused() {
         assert_eq!(error.exit_code(), 3);
         assert!(error.to_string().contains("12:8:") && error.to_string().contains("outside"), "{error}");
         let hint = error.hint();
-        assert!(hint.starts_with("allow it with the line root = \"/") && hint.ends_with("or with --allow-path"), "{hint}");
+        assert!(
+            hint.starts_with("allow it with the line root = \"/") && hint.ends_with("or with --allow-path"),
+            "{hint}"
+        );
         at(true).unwrap();
     }
     let inside = SCENE.replacen("a.ply", "../assets/x/../a.ply", 1);

@@ -27,13 +27,19 @@ pub(super) struct Arguments {
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
     /// Renders a scene, or data files as they are, to EXR or PNG files.
-    #[command(after_help = "Examples:\n  organza render bunny.ply -o bunny.png\n  organza render head.nii.gz --preset mri --azimuth 200 -o head.png\n  organza render ground.laz bunny.ply --ground -o both.png\n  organza render scene.toml -o picture.exr -o picture.png --layers effects,depth\n  organza render bunny.ply -o around.png --turntable 36\n  organza render scene.toml --set object.bunny.opacity=0.4 --technique surfels -o glass.png")]
+    #[command(
+        after_help = "Examples:\n  organza render bunny.ply -o bunny.png\n  organza render head.nii.gz --preset mri --azimuth 200 -o head.png\n  organza render ground.laz bunny.ply --ground -o both.png\n  organza render scene.toml -o picture.exr -o picture.png --layers effects,depth\n  organza render bunny.ply -o around.png --turntable 36\n  organza render scene.toml --set object.bunny.opacity=0.4 --technique surfels -o glass.png"
+    )]
     Render(RenderArguments),
     /// Writes a first scene of data files, with comments, ready to edit.
-    #[command(after_help = "Examples:\n  organza init bunny.ply -o scene.toml\n  organza init head.nii.gz --preset ct-bone -o head.toml\n  organza init ground.laz bunny.ply --ground --elevation 35")]
+    #[command(
+        after_help = "Examples:\n  organza init bunny.ply -o scene.toml\n  organza init head.nii.gz --preset ct-bone -o head.toml\n  organza init ground.laz bunny.ply --ground --elevation 35"
+    )]
     Init(InitArguments),
     /// Says what a render would simulate, what not, and why.
-    #[command(after_help = "Examples:\n  organza explain scene.toml\n  organza explain scene.toml --measure --json\n  organza explain bunny.ply")]
+    #[command(
+        after_help = "Examples:\n  organza explain scene.toml\n  organza explain scene.toml --measure --json\n  organza explain bunny.ply"
+    )]
     Explain(ExplainArguments),
     /// Measures what each approximation costs in accuracy and saves in time; writes a report.
     #[command(after_help = "Examples:\n  organza accuracy scene.toml --quick -o report")]
@@ -42,7 +48,9 @@ pub(super) enum Command {
     #[command(after_help = "Examples:\n  organza orders scene.toml -o orders")]
     Orders(OrdersArguments),
     /// Describes a data file or a scene.
-    #[command(after_help = "Examples:\n  organza info bunny.ply\n  organza info head.nii.gz --json\n  organza info scene.toml")]
+    #[command(
+        after_help = "Examples:\n  organza info bunny.ply\n  organza info head.nii.gz --json\n  organza info scene.toml"
+    )]
     Info(InfoArguments),
     /// Lists the GPUs that --backend can use, and the drivers that play one.
     #[command(after_help = "Examples:\n  organza devices\n  organza devices --json")]
@@ -72,6 +80,15 @@ impl Command {
     }
 }
 
+/// An axis that may point up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Axis {
+    /// As meshes mostly have it
+    Y,
+    /// As surveys and scans of bodies have it
+    Z,
+}
+
 /// How data files without a scene are to be seen.
 #[derive(Debug, Args)]
 pub(super) struct FirstArguments {
@@ -87,6 +104,9 @@ pub(super) struct FirstArguments {
     /// Look of volumes: ct-bone, ct-skin, mri, cloud, viridis, magma, inferno, plasma, cividis, turbo, grey, or a .json preset of ParaView
     #[arg(long, value_name = "NAME")]
     pub(super) preset: Option<String>,
+    /// Axis of the data that points up [default: what the format of each file says, else y]
+    #[arg(long, value_enum)]
+    pub(super) up: Option<Axis>,
     /// Stand all of it on a ground
     #[arg(long)]
     pub(super) ground: bool,

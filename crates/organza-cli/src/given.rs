@@ -1,8 +1,8 @@
 //! What a command is given: a scene, or data files of which a first scene is made in memory.
 
-use super::args::{FirstArguments, SceneArguments};
+use super::args::{Axis, FirstArguments, SceneArguments};
 use super::session::{check_backend, render_options, start_threads};
-use organza::scene::{self, DEFAULT_FILL, DEFAULT_SIZE, Override};
+use organza::scene::{self, DEFAULT_FILL, DEFAULT_SIZE, Override, UpAxis};
 use organza::{Error, Files, Progress, RenderOptions, printable};
 use organza_survey::{DataFile, Preset, Wish, Written, first_scene};
 use std::io::Read;
@@ -87,6 +87,10 @@ pub(super) fn wish(first: &FirstArguments, size: Option<[i64; 2]>) -> Result<Wis
         fill: fit.unwrap_or(DEFAULT_FILL),
         size,
         preset: first.preset.as_deref().map(Preset::named).transpose()?,
+        up: first.up.map(|axis| match axis {
+            Axis::Y => UpAxis::Y,
+            Axis::Z => UpAxis::Z,
+        }),
         ground: first.ground,
     })
 }
@@ -112,13 +116,15 @@ pub(super) fn is_scene(path: &Path) -> bool {
     }
     let mut beginning = Vec::new();
     let read = std::fs::File::open(path).and_then(|file| file.take(BEGINNING).read_to_end(&mut beginning));
-    let is_version = |line: &[u8]| line.strip_prefix(b"version").is_some_and(|rest| rest.trim_ascii_start().starts_with(b"="));
+    let is_version =
+        |line: &[u8]| line.strip_prefix(b"version").is_some_and(|rest| rest.trim_ascii_start().starts_with(b"="));
     read.is_ok() && beginning.split(|b| *b == b'\n').any(is_version)
 }
 
 /// What is said of data files alone says nothing of a scene.
 fn refuse_wishes(first: &FirstArguments) -> Result<(), Error> {
-    let named = [("--preset", first.preset.is_some()), ("--ground", first.ground)].into_iter().find(|(_, on)| *on);
+    let all = [("--preset", first.preset.is_some()), ("--up", first.up.is_some()), ("--ground", first.ground)];
+    let named = all.into_iter().find(|(_, on)| *on);
     named.map_or(Ok(()), |(name, _)| {
         Err(Error::usage(format!("{name} is for data files, and a scene is given"), "change the scene"))
     })
@@ -128,6 +134,10 @@ fn refuse_wishes(first: &FirstArguments) -> Result<(), Error> {
 fn virtual_file(inputs: &[PathBuf]) -> PathBuf {
     let name = inputs.first().and_then(|path| path.file_name()).unwrap_or("scene".as_ref());
     let stem = Path::new(name);
-    let stem = if stem.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) { stem.with_extension("") } else { stem.to_owned() };
+    let stem = if stem.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) {
+        stem.with_extension("")
+    } else {
+        stem.to_owned()
+    };
     stem.with_extension("toml")
 }

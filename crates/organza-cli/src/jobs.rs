@@ -184,7 +184,11 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Error> {
     if outputs.is_empty() {
         let name = arguments.scene.inputs.first().and_then(|path| path.file_name()).unwrap_or("picture".as_ref());
         let name = Path::new(name);
-        let name = if name.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) { name.with_extension("") } else { name.to_owned() };
+        let name = if name.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) {
+            name.with_extension("")
+        } else {
+            name.to_owned()
+        };
         outputs.push(Path::new(name.file_stem().unwrap_or("picture".as_ref())).with_added_extension("exr"));
     }
     for (i, path) in outputs.iter().enumerate() {

@@ -84,11 +84,20 @@ impl CameraFit {
         let middle = bounds.center();
         let mut sides = Sides::new(&camera, self.fill, elevation);
         let mut add = |p: DVec3| if self.around { sides.add_around(p - middle) } else { sides.add(p - middle, axes) };
-        if size.max_element() == 0.0 { bounds.corners().into_iter().for_each(add) } else { points(&mut add) }
+        if size.max_element() == 0.0 {
+            bounds.corners().into_iter().for_each(add)
+        } else {
+            points(&mut add)
+        }
         let (eye, projection) = sides.eye(like.projection, bounds.diagonal());
         let world = |v: DVec3| middle + axes[0] * v.x + axes[1] * v.y + axes[2] * v.z;
         let target = world(DVec3::new(eye.x, eye.y, 0.0));
-        Some(FoundCamera { camera: Camera { position: world(eye), axes, projection, ..*like }, target, elevation, bounds })
+        Some(FoundCamera {
+            camera: Camera { position: world(eye), axes, projection, ..*like },
+            target,
+            elevation,
+            bounds,
+        })
     }
 }
 
@@ -195,7 +204,8 @@ mod tests {
     /// Points without order in a lopsided box.
     fn points(shift: DVec3, scale: f64) -> Vec<DVec3> {
         let fraction = |x: f64| x - x.floor();
-        let at = |i: f64| DVec3::new(fraction(i * 0.754_877), fraction(i * 0.569_84) * 0.4, fraction(i * 0.362_1) * 2.0);
+        let at =
+            |i: f64| DVec3::new(fraction(i * 0.754_877), fraction(i * 0.569_84) * 0.4, fraction(i * 0.362_1) * 2.0);
         (1..500).map(|i| shift + scale * at(f64::from(i))).collect()
     }
 
@@ -233,12 +243,7 @@ mod tests {
         let mut largest: f64 = 0.0;
         let mut heights = Vec::new();
         for k in 0..180 {
-            let fit = CameraFit {
-                azimuth: TAU * f64::from(k) / 180.0,
-                elevation: Some(0.4),
-                fill: 0.9,
-                around: true,
-            };
+            let fit = CameraFit { azimuth: TAU * f64::from(k) / 180.0, elevation: Some(0.4), fill: 0.9, around: true };
             let found = found(fit, LENS, &points);
             let [x, y] = reach(&found.camera, &points);
             largest = largest.max(x).max(y);

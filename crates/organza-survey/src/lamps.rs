@@ -6,9 +6,9 @@ use organza::scene::FoundCamera;
 use splat_core::glam::DVec3;
 
 /// Irradiance of the key and of the fill, on a plane that faces them, and radiance of the sky.
-const KEY: [f32; 3] = [2.75, 2.65, 2.5];
+const KEY: [f32; 3] = [2.6, 2.5, 2.35];
 const FILL: [f32; 3] = [0.5, 0.55, 0.65];
-const SKY: [f32; 3] = [0.17, 0.18, 0.2];
+const SKY: [f32; 3] = [0.13, 0.14, 0.16];
 
 /// Where light comes from: to the right of the camera, up in the world, and towards the camera's side.
 const FROM_KEY: [f64; 3] = [-0.75, 1.0, 0.55];
@@ -19,8 +19,10 @@ pub(crate) fn lamps(found: &FoundCamera) -> String {
     let [right, up, forward] = found.camera.axes;
     // Level, so that the key stays above whatever the elevation; straight down it is the picture's up that is level.
     let level = DVec3::new(-forward.x, 0.0, -forward.z);
-    let back = if level.length() > 0.1 { level.normalize() } else { DVec3::new(-up.x, 0.0, -up.z).normalize_or(DVec3::Z) };
-    let direction = |from: [f64; 3]| list((-(right * from[0] + DVec3::Y * from[1] + back * from[2])).normalize().to_array(), 1e-3);
+    let back =
+        if level.length() > 0.1 { level.normalize() } else { DVec3::new(-up.x, 0.0, -up.z).normalize_or(DVec3::Z) };
+    let direction =
+        |from: [f64; 3]| list((-(right * from[0] + DVec3::Y * from[1] + back * from[2])).normalize().to_array(), 1e-3);
     format!(
         "[ambient]                # the sky: light from all sides\ncolor = {}\n\n\
          [[light]]                # the key, from the upper left of the camera: its shadows model what is seen\n\

@@ -137,7 +137,13 @@ mod tests {
             let at = DVec3::new((i % n) as f64, (i / n % n) as f64, (i / n / n) as f64) - 15.5;
             let noise = ((i * 7919) % 13) as f32 / 13.0;
             let r = at.length();
-            (if r < 5.0 { core } else if r < 12.0 { flesh } else { air }) + noise
+            (if r < 5.0 {
+                core
+            } else if r < 12.0 {
+                flesh
+            } else {
+                air
+            }) + noise
         };
         Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [n; 3], values: (0..n * n * n).map(value).collect() }
     }
@@ -149,7 +155,12 @@ mod tests {
             let (a, f, c) = (f64::from(air), f64::from(flesh), f64::from(core));
             assert!((matter.air.unwrap() - a).abs() < 2.0, "{matter:?}");
             let between = |x: f64, y: f64, z: f64| (x.min(z)..=x.max(z)).contains(&y);
-            assert!(between(a, matter.first, f) && between(f, matter.last, c + 2.0), "{} {}", matter.first, matter.last);
+            assert!(
+                between(a, matter.first, f) && between(f, matter.last, c + 2.0),
+                "{} {}",
+                matter.first,
+                matter.last
+            );
             assert!((matter.bulk() - f).abs() < 0.02 * (c - a).abs(), "{}", matter.bulk());
         }
     }

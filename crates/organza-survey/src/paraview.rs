@@ -98,7 +98,8 @@ mod tests {
 
     #[test]
     fn colours_and_opacities_of_a_preset_are_read() {
-        let json = r#"[{"Name": "x", "RGBPoints": [0, 0, 0, 0, 2, 1, 1, 0], "Points": [0, 0, 0.5, 0, 2, 0.5, 0.5, 0]}]"#;
+        let json =
+            r#"[{"Name": "x", "RGBPoints": [0, 0, 0, 0, 2, 1, 1, 0], "Points": [0, 0, 0.5, 0, 2, 0.5, 0.5, 0]}]"#;
         let preset = Sampled::of_json(&serde_json::from_str(json).unwrap()).unwrap();
         assert_eq!(preset.range(), [0.0, 2.0]);
         assert_eq!(preset.color(1.0), [0.5, 0.5, 0.0]);

@@ -136,11 +136,15 @@ mod tests {
     #[test]
     fn the_nearest_is_that_of_a_search_through_all() {
         let fraction = |x: f32| x - x.floor();
-        let points: Vec<Vec3> =
-            (0..400).map(|i| Vec3::new(fraction(i as f32 * 0.7549), fraction(i as f32 * 0.5698), 0.01 * fraction(i as f32 * 0.3621))).collect();
+        let points: Vec<Vec3> = (0..400)
+            .map(|i| {
+                Vec3::new(fraction(i as f32 * 0.7549), fraction(i as f32 * 0.5698), 0.01 * fraction(i as f32 * 0.3621))
+            })
+            .collect();
         let lattice = Lattice::new(&points).unwrap();
         for p in &points {
-            let all = points.iter().map(|q| f64::from(q.distance(*p))).filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
+            let all =
+                points.iter().map(|q| f64::from(q.distance(*p))).filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
             assert_eq!(lattice.nearest(*p), all);
         }
     }

@@ -7,7 +7,7 @@ use crate::preset::Look;
 use splat_core::Grid;
 
 /// Tissue without a name: from what lies around to what is densest.
-const PLAIN: [[f32; 3]; 3] = [[0.50, 0.24, 0.17], [0.80, 0.60, 0.46], [0.96, 0.91, 0.82]];
+const PLAIN: [[f32; 3]; 3] = [[0.56, 0.23, 0.15], [0.88, 0.62, 0.46], [0.98, 0.93, 0.84]];
 const SKIN: [f32; 3] = [0.80, 0.52, 0.38];
 const BONE: [[f32; 3]; 2] = [[0.72, 0.56, 0.40], [0.95, 0.92, 0.84]];
 /// Brighter than one scattering: it stands for the many in a cloud.
@@ -100,12 +100,14 @@ fn points(matter: &Matter, look: Option<&Look>) -> (Vec<Point>, f64) {
         Some(Look::Map(map)) => (of_map(*map, of_body), 8.0),
         Some(Look::CtBone) => {
             let [low, high] = BONE;
-            let bones = if matter.has_units() { BONES } else { between(matter.dense(), matter.last, [0.0, 0.12, 0.4, 1.0]) };
+            let bones =
+                if matter.has_units() { BONES } else { between(matter.dense(), matter.last, [0.0, 0.12, 0.4, 1.0]) };
             let looks = [(low, 0.0), (low, 0.15), (high, 0.7), (high, 1.0)];
             (with_looks(bones, looks), 20.0)
         }
         Some(Look::CtSkin) => {
-            let skin = if matter.has_units() { SKINS } else { between(matter.first, matter.bulk(), [0.0, 0.3, 0.6, 1.0]) };
+            let skin =
+                if matter.has_units() { SKINS } else { between(matter.first, matter.bulk(), [0.0, 0.3, 0.6, 1.0]) };
             (with_looks(skin, [(SKIN, 0.0), (SKIN, 0.5), (SKIN, 1.0), (SKIN, 1.0)]), 60.0)
         }
         Some(Look::Sampled(sampled)) => {
@@ -200,7 +202,13 @@ mod tests {
         for (units, [air, flesh, bone]) in [(true, [-1000.0, 40.0, 1200.0]), (false, [0.0, 60.0, 190.0])] {
             for (i, v) in grid.values.iter_mut().enumerate() {
                 let inside = [i % 24, i / 24 % 24, i / 576].iter().all(|c| (6..18).contains(c));
-                *v = if !inside { air } else if is_bone(i) { bone } else { flesh };
+                *v = if !inside {
+                    air
+                } else if is_bone(i) {
+                    bone
+                } else {
+                    flesh
+                };
             }
             let matter = Matter::of(&grid).unwrap();
             assert_eq!(matter.has_units(), units);

@@ -2,8 +2,8 @@
 
 mod context;
 mod environment;
-mod fit;
 pub(crate) mod files;
+mod fit;
 pub(crate) mod input;
 mod loading;
 mod normalize;

@@ -48,12 +48,7 @@ pub fn render(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Re
 ///
 /// # Errors
 /// As [`render`].
-pub fn render_from(
-    scene: &Scene,
-    options: &RenderOptions,
-    progress: &Progress,
-    files: Files,
-) -> Result<Render, Error> {
+pub fn render_from(scene: &Scene, options: &RenderOptions, progress: &Progress, files: Files) -> Result<Render, Error> {
     render_keeping(scene, options, progress, Begun::Still(files))
 }
 

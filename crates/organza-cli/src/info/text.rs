@@ -80,12 +80,30 @@ fn places(facts: &Facts, text: &mut Lines) {
     let list = |v: [f64; 3]| v.map(|x| rounded(x, unit)).join("  ");
     text.add("lowest", list(bounds.min.to_array()));
     text.add("highest", list(bounds.max.to_array()));
-    text.add("size", format!("{}, in the unit of the file, which does not tell it", size.to_array().map(|x| rounded(x, unit)).join(" × ")));
+    text.add(
+        "size",
+        format!(
+            "{}, in the unit of the file, which does not tell it",
+            size.to_array().map(|x| rounded(x, unit)).join(" × ")
+        ),
+    );
     if let Some(far) = facts.far().filter(|far| *far > FAR) {
-        text.add("far away", format!("{} times its size from the origin: single precision would round it; Organza keeps it", rounded(far, 1.0)));
+        text.add(
+            "far away",
+            format!(
+                "{} times its size from the origin: single precision would round it; Organza keeps it",
+                rounded(far, 1.0)
+            ),
+        );
     }
     if let Some(spacing) = facts.spacing {
-        text.add("spacing", format!("{}, the median distance to the nearest point, of at most 1,000 points", rounded(spacing, 1e-3 * spacing)));
+        text.add(
+            "spacing",
+            format!(
+                "{}, the median distance to the nearest point, of at most 1,000 points",
+                rounded(spacing, 1e-3 * spacing)
+            ),
+        );
     }
     if let Some(duplicates) = facts.duplicates.filter(|d| *d > 0) {
         text.add("duplicates", format!("{} points lie where another one lies", grouped(duplicates)));
@@ -93,7 +111,13 @@ fn places(facts: &Facts, text: &mut Lines) {
     if let Some(steps) = facts.steps {
         let lengths = steps.map(|s| s.length());
         text.add("voxel", lengths.map(|l| rounded(l, 1e-4 * l)).join(" × "));
-        let axis = |k: usize| format!("{} along [{}]", ["x", "y", "z"][k], (steps[k] / lengths[k]).to_array().map(|c| rounded(c, 1e-4)).join(", "));
+        let axis = |k: usize| {
+            format!(
+                "{} along [{}]",
+                ["x", "y", "z"][k],
+                (steps[k] / lengths[k]).to_array().map(|c| rounded(c, 1e-4)).join(", ")
+            )
+        };
         text.add("axes", [0, 1, 2].map(axis).join("; "));
     }
 }
@@ -104,7 +128,8 @@ fn values(facts: &Facts, text: &mut Lines) {
     }
     let step = facts.histogram.as_ref().map_or(1e-300, |h| 1e-3 * (h.high - h.low));
     if !facts.quantiles.is_empty() {
-        let share = |(share, value): &(f64, f64)| format!("{} % below {}", rounded(100.0 * share, 1.0), rounded(*value, step));
+        let share =
+            |(share, value): &(f64, f64)| format!("{} % below {}", rounded(100.0 * share, 1.0), rounded(*value, step));
         text.add("shares", facts.quantiles.iter().map(share).collect::<Vec<_>>().join(", "));
     }
     if let Some(histogram) = &facts.histogram {

@@ -6,6 +6,7 @@ use crate::matter::Matter;
 use crate::number::{color, grouped, rounded, significant};
 use crate::preset::{Look, Preset};
 use crate::transfer::Transfer;
+use convert::read::UpAxis;
 use organza::FileData;
 use splat_core::{DAabb, Grid, optics};
 use std::collections::BTreeMap;
@@ -54,12 +55,12 @@ impl Object {
     }
 }
 
-const CLAY: (&str, &str) = ("clay", "specular = 0.04\nshininess = 24\n");
-const TISSUE: (&str, &str) = ("tissue", "shading = \"phong\"\nspecular = 0.06\nshininess = 24\n");
+const CLAY: (&str, &str) = ("clay", "specular = 0.015\nshininess = 20\n");
+const TISSUE: (&str, &str) = ("tissue", "shading = \"phong\"\nspecular = 0.08\nshininess = 24\n");
 const DROPLETS: (&str, &str) = ("droplets", "ambient = 0.6\nmedium = { albedo = 0.98, asymmetry = 0.3 }\n");
 
 /// The objects of all files, each with a name of its own.
-pub(super) fn objects(data: &[DataFile], paths: &[String], preset: Option<&Preset>) -> Vec<Object> {
+pub(super) fn objects(data: &[DataFile], paths: &[String], preset: Option<&Preset>, up: Option<UpAxis>) -> Vec<Object> {
     let mut names: BTreeMap<String, usize> = BTreeMap::new();
     let mut materials: Vec<&str> = Vec::new();
     let mut clays = CLAYS.iter().cycle();
@@ -72,6 +73,9 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], preset: Option<&Prese
         }
         let bare = if file.is_colored() { None } else { clays.next() };
         let mut object = object(file, preset);
+        if let Some(up) = up {
+            object.keys = format!("transform = {{ up = \"{}\" }}\n{}", up.name(), object.keys);
+        }
         if let (Some(clay), false) = (bare, matches!(file.data, FileData::Grid(_))) {
             object.keys = format!("color = {}\n{}", color(*clay), object.keys);
         }
@@ -86,7 +90,13 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], preset: Option<&Prese
 
 fn object(file: &DataFile, preset: Option<&Preset>) -> Object {
     let clay = Some((CLAY.0, CLAY.1, false));
-    let of = |key, about, material, keys| Object { about, name: String::new(), source: (key, String::new()), material, keys };
+    let of = |key, about, material, keys| Object {
+        about,
+        name: String::new(),
+        source: (key, String::new()),
+        material,
+        keys,
+    };
     match &file.data {
         FileData::Mesh(mesh) => {
             let about = format!(
@@ -109,7 +119,8 @@ fn object(file: &DataFile, preset: Option<&Preset>) -> Object {
         FileData::Grid(grid) => {
             let look = preset.map(|p| &p.0);
             let material = if look == Some(&Look::Cloud) { DROPLETS } else { TISSUE };
-            let about = format!("{} × {} × {} voxels; {}", grid.dims[0], grid.dims[1], grid.dims[2], sides(extent(grid)));
+            let about =
+                format!("{} × {} × {} voxels; {}", grid.dims[0], grid.dims[1], grid.dims[2], sides(extent(grid)));
             of("volume", about, Some((material.0, material.1, false)), volume_keys(grid, look))
         }
         // Images are refused when they are read.
@@ -127,7 +138,10 @@ fn sides(bounds: DAabb) -> String {
 fn extent(grid: &Grid) -> DAabb {
     let n = grid.dims.map(|n| n as f64);
     let corner = |k: usize| {
-        let index = splat_core::glam::DVec3::from_array(std::array::from_fn(|a| if k >> a & 1 == 0 { -0.5 } else { n[a] - 0.5 }));
+        let index =
+            splat_core::glam::DVec3::from_array(std::array::from_fn(
+                |a| if k >> a & 1 == 0 { -0.5 } else { n[a] - 0.5 },
+            ));
         grid.origin + grid.axes * index
     };
     DAabb::of_points((0..8).map(corner))
@@ -143,16 +157,23 @@ fn volume_keys(grid: &Grid, look: Option<&Look>) -> String {
     let voxels: f64 = grid.dims.iter().map(|n| *n as f64).product();
     if voxels > MOST_VOXELS {
         let spacing = (grid.cell_volume() * voxels / MOST_VOXELS).cbrt();
-        let _ = writeln!(text, "spacing = {}     # coarser than the file, for speed; leave it out for all voxels", significant(spacing, 3));
+        let _ = writeln!(
+            text,
+            "spacing = {}     # coarser than the file, for speed; leave it out for all voxels",
+            significant(spacing, 3)
+        );
     }
     if let Some(air) = matter.as_ref().and_then(|m| m.air) {
         let _ = writeln!(text, "# Around it the values are about {}.", significant(air, 3));
     }
-    let _ = writeln!(text, "unit_length = {unit}     # opacities below are over this length: a smaller one makes all denser\ntransfer = [");
+    let _ = writeln!(
+        text,
+        "unit_length = {unit}     # opacities below are over this length: a smaller one makes all denser\ntransfer = ["
+    );
     let step = matter.as_ref().map_or(1.0, |m| 1e-4 * (m.last - m.first).abs());
     for point in &transfer.points {
-        // Nothing is written that would be read as a whole wall.
-        let opacity = optics::opacity(transfer.extinction * point.weight * unit_length).min(0.9999);
+        // With three digits nothing may become 1, which no medium has.
+        let opacity = optics::opacity(transfer.extinction * point.weight * unit_length).min(0.999);
         let opacity = if point.weight < DIGITS { "0".to_owned() } else { significant(opacity, 3) };
         let value = rounded(point.value, step.max(1e-300));
         let _ = writeln!(text, "  {{ value = {value}, color = {}, opacity = {opacity} }},", color(point.color));
