@@ -161,4 +161,3 @@ pub(crate) struct Place<'a> {
     /// The nearest disc, as a place in the cloud: material, object and share of shadows are its.
     pub(crate) disc: usize,
 }
-

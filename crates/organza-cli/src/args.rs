@@ -80,6 +80,15 @@ impl Command {
     }
 }
 
+/// An axis that may point up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Axis {
+    /// As meshes mostly have it
+    Y,
+    /// As surveys and scans of bodies have it
+    Z,
+}
+
 /// How data files without a scene are to be seen.
 #[derive(Debug, Args)]
 pub(super) struct FirstArguments {
@@ -95,6 +104,9 @@ pub(super) struct FirstArguments {
     /// Look of volumes: ct-bone, ct-skin, mri, cloud, viridis, magma, inferno, plasma, cividis, turbo, grey, or a .json preset of ParaView
     #[arg(long, value_name = "NAME")]
     pub(super) preset: Option<String>,
+    /// Axis of the data that points up [default: what the format of each file says, else y]
+    #[arg(long, value_enum)]
+    pub(super) up: Option<Axis>,
     /// Stand all of it on a ground
     #[arg(long)]
     pub(super) ground: bool,

@@ -1,8 +1,8 @@
 //! What a command is given: a scene, or data files of which a first scene is made in memory.
 
-use super::args::{FirstArguments, SceneArguments};
+use super::args::{Axis, FirstArguments, SceneArguments};
 use super::session::{check_backend, render_options, start_threads};
-use organza::scene::{self, DEFAULT_FILL, DEFAULT_SIZE, Override};
+use organza::scene::{self, DEFAULT_FILL, DEFAULT_SIZE, Override, UpAxis};
 use organza::{Error, Files, Progress, RenderOptions, printable};
 use organza_survey::{DataFile, Preset, Wish, Written, first_scene};
 use std::io::Read;
@@ -87,6 +87,10 @@ pub(super) fn wish(first: &FirstArguments, size: Option<[i64; 2]>) -> Result<Wis
         fill: fit.unwrap_or(DEFAULT_FILL),
         size,
         preset: first.preset.as_deref().map(Preset::named).transpose()?,
+        up: first.up.map(|axis| match axis {
+            Axis::Y => UpAxis::Y,
+            Axis::Z => UpAxis::Z,
+        }),
         ground: first.ground,
     })
 }
@@ -119,7 +123,8 @@ pub(super) fn is_scene(path: &Path) -> bool {
 
 /// What is said of data files alone says nothing of a scene.
 fn refuse_wishes(first: &FirstArguments) -> Result<(), Error> {
-    let named = [("--preset", first.preset.is_some()), ("--ground", first.ground)].into_iter().find(|(_, on)| *on);
+    let all = [("--preset", first.preset.is_some()), ("--up", first.up.is_some()), ("--ground", first.ground)];
+    let named = all.into_iter().find(|(_, on)| *on);
     named.map_or(Ok(()), |(name, _)| {
         Err(Error::usage(format!("{name} is for data files, and a scene is given"), "change the scene"))
     })

@@ -8,7 +8,7 @@ mod look;
 use crate::data_file::DataFile;
 use crate::lamps::lamps;
 use crate::number::{color, list, rounded};
-use crate::preset::Wish;
+use crate::preset::{Preset, Wish};
 use look::{Object, objects};
 use organza::scene::{DEFAULT_AZIMUTH, FoundCamera, LoadOptions, ROOT_KEY, parse, relative_path, root_for};
 use organza::{Error, FileData, Files, Progress, RenderOptions, printable};
@@ -29,6 +29,13 @@ const IS_DARK: f64 = 0.04;
 const GROUND: f64 = 4.0;
 const GROUND_STEPS: f64 = 320.0;
 const GROUND_COLOR: [f32; 3] = [0.32, 0.32, 0.33];
+
+/// Volumes alone: their smooth edges need no more than one sample a pixel.
+const SHARP: &str = "
+[render]
+technique = \"sheets\"     # sharp; \"points\" is softer and takes half the time
+antialias = 1
+";
 
 /// A scene that was written.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,7 +60,7 @@ pub fn first_scene(
     let paths: Vec<String> = data.iter().map(|d| written_path(&d.path, &folder)).collect::<Result<_, _>>()?;
     let root = root_for(scene_file, data.iter().map(|d| d.path.as_path()))?;
     let root = root.map(|root| text_of(&root)).transpose()?;
-    let objects = objects(data, &paths, wish.preset.as_ref());
+    let objects = objects(data, &paths, wish.preset.as_ref(), wish.up);
     let azimuth = wish.azimuth.unwrap_or_else(|| default_azimuth(data));
     let head = |camera: &str| {
         let root =
@@ -65,8 +72,9 @@ pub fn first_scene(
         let _ = writeln!(camera, "elevation = {elevation:?}");
     }
     let _ = writeln!(camera, "size = {:?}", wish.size);
+    let drawn = render_text(data, wish);
     let seen: String = objects.iter().map(Object::material).chain(objects.iter().map(Object::text)).collect();
-    let first = head(&camera) + &seen;
+    let first = head(&camera) + &seen + drawn;
     let scene = parse(scene_file, first.as_bytes(), &LoadOptions::default())?;
     let found = organza::fitted(&scene, options, progress, files)?.1;
     let found = found.ok_or_else(|| Error::Internal("a camera that was to be placed has no place".into()))?;
@@ -79,7 +87,15 @@ pub fn first_scene(
     if wish.ground {
         text += &ground(&found);
     }
+    text += drawn;
     Ok(Written { text, found })
+}
+
+/// How it is drawn, where that is not as everything is.
+fn render_text(data: &[DataFile], wish: &Wish) -> &'static str {
+    let are_volumes = data.iter().all(|d| matches!(d.data, FileData::Grid(_)));
+    let is_cloud = wish.preset.as_ref().is_some_and(Preset::is_cloud);
+    if are_volumes && !is_cloud && !wish.ground { SHARP } else { "" }
 }
 
 /// Scanned bodies look away from where everything else is seen.
@@ -112,12 +128,14 @@ fn ground(found: &FoundCamera) -> String {
     let (bounds, size) = (found.bounds, found.bounds.diagonal());
     let (half, unit) = (GROUND * size, 1e-4 * size);
     let center = DVec3::new(bounds.center().x, bounds.min.y, bounds.center().z);
+    // Along the picture, so that its far side is a level horizon.
+    let right = found.camera.axes[0];
     format!(
         "\n[[object]]\nname = \"ground\"\n\
          rectangle = {{ center = {}, u = {}, v = {}, spacing = {} }}\ncolor = {}\n",
         list(center.to_array(), unit),
-        list([half, 0.0, 0.0], unit),
-        list([0.0, 0.0, -half], unit),
+        list((right * half).to_array(), unit),
+        list((DVec3::Y.cross(right) * half).to_array(), unit),
         rounded(2.0 * half / GROUND_STEPS, 1e-3 * 2.0 * half / GROUND_STEPS),
         color(GROUND_COLOR),
     )

@@ -6,9 +6,9 @@ use organza::scene::FoundCamera;
 use splat_core::glam::DVec3;
 
 /// Irradiance of the key and of the fill, on a plane that faces them, and radiance of the sky.
-const KEY: [f32; 3] = [2.75, 2.65, 2.5];
+const KEY: [f32; 3] = [2.6, 2.5, 2.35];
 const FILL: [f32; 3] = [0.5, 0.55, 0.65];
-const SKY: [f32; 3] = [0.17, 0.18, 0.2];
+const SKY: [f32; 3] = [0.13, 0.14, 0.16];
 
 /// Where light comes from: to the right of the camera, up in the world, and towards the camera's side.
 const FROM_KEY: [f64; 3] = [-0.75, 1.0, 0.55];

@@ -3,7 +3,7 @@
 use crate::color_map::{CIVIDIS, ColorMap, GREY, INFERNO, MAGMA, PLASMA, TURBO, VIRIDIS};
 use crate::paraview::Sampled;
 use organza::Error;
-use organza::scene::{DEFAULT_FILL, DEFAULT_SIZE};
+use organza::scene::{DEFAULT_FILL, DEFAULT_SIZE, UpAxis};
 use std::path::Path;
 
 /// How a volume is to look.
@@ -60,6 +60,13 @@ impl Preset {
     }
 }
 
+impl Preset {
+    /// Whether matter scatters light as droplets do.
+    pub(crate) fn is_cloud(&self) -> bool {
+        self.0 == Look::Cloud
+    }
+}
+
 /// What a user may say of a first scene; the rest follows from the data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Wish {
@@ -73,12 +80,22 @@ pub struct Wish {
     pub size: [u32; 2],
     /// How volumes look.
     pub preset: Option<Preset>,
+    /// Which axis of the data points up; `None` leaves that to the format of each file.
+    pub up: Option<UpAxis>,
     /// Whether everything stands on a ground.
     pub ground: bool,
 }
 
 impl Default for Wish {
     fn default() -> Self {
-        Self { azimuth: None, elevation: None, fill: DEFAULT_FILL, size: DEFAULT_SIZE, preset: None, ground: false }
+        Self {
+            azimuth: None,
+            elevation: None,
+            fill: DEFAULT_FILL,
+            size: DEFAULT_SIZE,
+            preset: None,
+            up: None,
+            ground: false,
+        }
     }
 }

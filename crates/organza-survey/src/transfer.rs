@@ -7,7 +7,7 @@ use crate::preset::Look;
 use splat_core::Grid;
 
 /// Tissue without a name: from what lies around to what is densest.
-const PLAIN: [[f32; 3]; 3] = [[0.50, 0.24, 0.17], [0.80, 0.60, 0.46], [0.96, 0.91, 0.82]];
+const PLAIN: [[f32; 3]; 3] = [[0.56, 0.23, 0.15], [0.88, 0.62, 0.46], [0.98, 0.93, 0.84]];
 const SKIN: [f32; 3] = [0.80, 0.52, 0.38];
 const BONE: [[f32; 3]; 2] = [[0.72, 0.56, 0.40], [0.95, 0.92, 0.84]];
 /// Brighter than one scattering: it stands for the many in a cloud.

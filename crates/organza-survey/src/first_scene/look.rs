@@ -6,6 +6,7 @@ use crate::matter::Matter;
 use crate::number::{color, grouped, rounded, significant};
 use crate::preset::{Look, Preset};
 use crate::transfer::Transfer;
+use convert::read::UpAxis;
 use organza::FileData;
 use splat_core::{DAabb, Grid, optics};
 use std::collections::BTreeMap;
@@ -54,12 +55,12 @@ impl Object {
     }
 }
 
-const CLAY: (&str, &str) = ("clay", "specular = 0.04\nshininess = 24\n");
-const TISSUE: (&str, &str) = ("tissue", "shading = \"phong\"\nspecular = 0.06\nshininess = 24\n");
+const CLAY: (&str, &str) = ("clay", "specular = 0.015\nshininess = 20\n");
+const TISSUE: (&str, &str) = ("tissue", "shading = \"phong\"\nspecular = 0.08\nshininess = 24\n");
 const DROPLETS: (&str, &str) = ("droplets", "ambient = 0.6\nmedium = { albedo = 0.98, asymmetry = 0.3 }\n");
 
 /// The objects of all files, each with a name of its own.
-pub(super) fn objects(data: &[DataFile], paths: &[String], preset: Option<&Preset>) -> Vec<Object> {
+pub(super) fn objects(data: &[DataFile], paths: &[String], preset: Option<&Preset>, up: Option<UpAxis>) -> Vec<Object> {
     let mut names: BTreeMap<String, usize> = BTreeMap::new();
     let mut materials: Vec<&str> = Vec::new();
     let mut clays = CLAYS.iter().cycle();
@@ -72,6 +73,9 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], preset: Option<&Prese
         }
         let bare = if file.is_colored() { None } else { clays.next() };
         let mut object = object(file, preset);
+        if let Some(up) = up {
+            object.keys = format!("transform = {{ up = \"{}\" }}\n{}", up.name(), object.keys);
+        }
         if let (Some(clay), false) = (bare, matches!(file.data, FileData::Grid(_))) {
             object.keys = format!("color = {}\n{}", color(*clay), object.keys);
         }
@@ -168,8 +172,8 @@ fn volume_keys(grid: &Grid, look: Option<&Look>) -> String {
     );
     let step = matter.as_ref().map_or(1.0, |m| 1e-4 * (m.last - m.first).abs());
     for point in &transfer.points {
-        // Nothing is written that would be read as a whole wall.
-        let opacity = optics::opacity(transfer.extinction * point.weight * unit_length).min(0.9999);
+        // With three digits nothing may become 1, which no medium has.
+        let opacity = optics::opacity(transfer.extinction * point.weight * unit_length).min(0.999);
         let opacity = if point.weight < DIGITS { "0".to_owned() } else { significant(opacity, 3) };
         let value = rounded(point.value, step.max(1e-300));
         let _ = writeln!(text, "  {{ value = {value}, color = {}, opacity = {opacity} }},", color(point.color));

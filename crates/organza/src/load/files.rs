@@ -48,7 +48,7 @@ impl Files {
             return Ok(data);
         }
         let data = self.read_anew(path, limits, progress)?;
-        self.read.borrow_mut().insert((path.to_owned(), limits.frame), (*limits, data.clone()));
+        self.read.borrow_mut().insert((real(path), limits.frame), (*limits, data.clone()));
         Ok(data)
     }
 
@@ -89,7 +89,7 @@ impl Files {
 
     fn known(&self, path: &Path, limits: &ReadParams) -> Option<FileData> {
         let read = self.read.borrow();
-        read.get(&(path.to_owned(), limits.frame)).filter(|(with, _)| with == limits).map(|(_, data)| data.clone())
+        read.get(&(real(path), limits.frame)).filter(|(with, _)| with == limits).map(|(_, data)| data.clone())
     }
 
     /// The level set of a file's points unless it was fitted with the same tolerance; `fit` also says how many bytes it takes.
@@ -114,6 +114,11 @@ impl Files {
         let read: u64 = self.read.borrow().values().map(|(_, data)| data.bytes()).sum();
         read + self.fitted.borrow().iter().map(|(_, _, bytes, _)| bytes).sum::<u64>()
     }
+}
+
+/// A file under the one name that the system knows it by, whichever way it was named.
+fn real(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }
 
 /// What a picture does not show of a file, and what its reader made of it.
