@@ -42,7 +42,7 @@ fn main() {
     let direction = DVec3::new(0.4, 0.77, -0.5).normalize();
     let sun = Sun { shape: LightShape::Directional { direction }, intensity: [0.75 * PI; 3] };
     let objects = [Object { name: "bunny".into(), casts_shadow: false, shadow_coefficient: 1.0 }];
-    let (lights, materials, camera) = (&[LitBy { light: sun, shadow: None }], &materials, &camera);
+    let (lights, materials, camera) = (&[LitBy { light: sun, slide: None, shadow: None }], &materials, &camera);
     let (cloud, objects, ambient) = (&cloud, &objects, [0.1; 3]);
     let input = &ShadeInput { cloud, materials, objects, lights, ambient, camera };
     let (layout, transforms) = (ChannelLayout::new(&LayerSet::default()), &[Similarity::default()]);

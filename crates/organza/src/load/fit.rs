@@ -5,15 +5,11 @@ use super::input::Input;
 use super::loading::Loading;
 use crate::scene::{FoundCamera, Scene};
 use crate::{Error, Progress, RenderOptions};
-use convert::{RawPoints, visible_ends};
+use convert::visible_ends;
 use glam::DVec3;
-use splat_core::{Aabb, DAabb};
+use splat_core::DAabb;
 use std::borrow::Cow;
 
-/// Points among which one is seen as a disc.
-const FEW: usize = 10_000;
-/// Reach of a disc over the distance of points on a square of the size of all.
-const REACH: f64 = 0.8;
 /// Share of the largest extinction below which a voxel is not looked for by a camera.
 const FAINT: f32 = 0.02;
 
@@ -78,7 +74,7 @@ impl<'i> Outline<'i> {
             }
             Input::Points(_, points, _) => {
                 let mut around = |p: DVec3| add(transform.apply(p));
-                let reach = reach(points);
+                let reach = points.sparse_reach();
                 for p in &points.position {
                     let p = points.origin + p.as_dvec3();
                     // Among many points a disc reaches no farther than a pixel or two.
@@ -93,11 +89,4 @@ impl<'i> Outline<'i> {
             _ => self.points.iter().for_each(|p| add(transform.apply(*p))),
         }
     }
-}
-
-/// About how far the disc of a point reaches where there are few of them, as points of a surface lie apart; `None` for many.
-fn reach(points: &RawPoints) -> Option<f64> {
-    let bounds = Aabb::of_points(&points.position);
-    let size = (bounds.max - bounds.min).as_dvec3().max_element();
-    (points.len() <= FEW && size > 0.0).then(|| REACH * size / (points.len() as f64).sqrt())
 }
