@@ -205,13 +205,18 @@ fn parse(
             format!("{format:?}"),
             "build with the feature of that name",
         )),
-        None => Err(ReadError::input(
-            Place::Byte(0),
-            "'ply', 'LASF', 'NRRD', '#?', a NIfTI-1, OpenEXR or PNG header, or the extension of a format without a mark",
-            format!("'{}'", escaped(&head[..head.len().min(16)], 16)),
-            "PLY, STL, OBJ, XYZ, CSV, LAS, LAZ, NIfTI, NRRD, Radiance HDR, OpenEXR and PNG files are read, each also inside gzip",
-        )),
+        None => Err(unknown(head)),
     }
+}
+
+/// For a file that begins like none that is read.
+fn unknown(head: &[u8]) -> ReadError {
+    ReadError::input(
+        Place::Byte(0),
+        "'ply', 'LASF', 'NRRD', '#?', a NIfTI-1, OpenEXR or PNG header, or the extension of a format without a mark",
+        format!("'{}'", escaped(&head[..head.len().min(16)], 16)),
+        "PLY, STL, OBJ, XYZ, CSV, LAS, LAZ, NIfTI, NRRD, Radiance HDR, OpenEXR and PNG files are read, each also inside gzip",
+    )
 }
 
 /// Longest side of an image, pixels.
