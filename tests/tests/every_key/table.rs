@@ -168,18 +168,13 @@ fn scene() -> Vec<Entry> {
 
 const AUTO: &[&str] = &["camera={auto=true, size=[24, 18]}"];
 const SKY: &[&str] = &["background={environment='sky.hdr'}"];
-
 const SPOT: &[&str] =
     &["light=[{kind='spot', position=[2, 3, 2], target=[0, 0, 0], outer=20, intensity=[20, 18, 16]}]"];
 const AIMED: &[&str] =
     &["light=[{kind='spot', position=[2, 3, 2], direction=[-2, -3, -2], outer=20, intensity=[20, 18, 16]}]"];
 const SUN: &[&str] = &["light=[{kind='directional', direction=[-2, -3, -2], irradiance=[2, 1.8, 1.6]}]"];
-const SLIDE: &[&str] = &[
-    "light=[{kind='spot', position=[2, 3, 2], target=[0, 0, 0], outer=20, intensity=[20, 18, 16], texture='sky.hdr'}]",
-];
-const SUN_SLIDE: &[&str] = &[
-    "light=[{kind='directional', direction=[-2, -3, -2], irradiance=[2, 1.8, 1.6], texture='sky.hdr', texture_width=5}]",
-];
+const SLIDE: &[&str] = &[SPOT[0], "light.0.texture='sky.hdr'"];
+const SUN_SLIDE: &[&str] = &[SUN[0], "light.0.texture='sky.hdr'", "light.0.texture_width=5"];
 const SPHERE: &[&str] = &["light=[{kind='sphere', position=[2, 3, 2], radius=0.3, intensity=[20, 18, 16], samples=4}]"];
 const DISK: &[&str] =
     &["light=[{kind='disk', position=[2, 3, 2], normal=[-1, -1, -1], radius=0.3, intensity=[20, 18, 16], samples=4}]"];

@@ -76,7 +76,7 @@ fn slab(tau: f64, slabs: f64, from: [f64; 3]) -> [f64; 2] {
     // Wide enough for light that comes from aside; many slabs need a finer lattice, for kernels touch no more than 512.
     let length = 4.0;
     let (n, spacing) =
-        if slabs > 1e3 { ([6, 6, 800], DVec3::new(1.0, 1.0, 0.005)) } else { ([40, 6, 8], DVec3::splat(0.5)) };
+        if slabs > 1e3 { ([6, 6, 160], DVec3::new(1.0, 1.0, 0.025)) } else { ([40, 6, 8], DVec3::splat(0.5)) };
     let grid = grid(n, DMat3::from_diagonal(spacing), |_| 1.0);
     let (tf, material) = (constant((tau / length) as f32), scattering());
     let (volumes, lights) = ([volume(&grid, &tf, &material)], [sun(from)]);
@@ -117,9 +117,9 @@ fn hv06_optical_depths_from_next_to_nothing_to_all() {
 }
 
 #[test]
-fn hv04_a_hundred_thousand_slabs_lose_no_digits() {
-    let [through, scattered] = slab(10.0, 1e5, [0.0, 0.0, 1.0]);
-    assert!((through / (-10f64).exp() - 1.0).abs() < 1e-4, "{through:e}");
+fn hv04_thousands_of_slabs_lose_no_digits() {
+    let [through, scattered] = slab(10.0, 1e4, [0.0, 0.0, 1.0]);
+    assert!((through / (-10f64).exp() - 1.0).abs() < 1e-5, "{through:e}");
     assert!((scattered - 0.5).abs() < 1e-5, "{scattered}");
 }
 
