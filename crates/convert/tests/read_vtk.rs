@@ -105,7 +105,7 @@ fn what_is_wrong_in_a_file_is_named() {
         ("SPACING 3", "SPACING 3000000", "a.vtk:7: expected steps of which none is more than 1000 times another"),
         ("POINT_DATA 12", "POINT_DATA 13", "a.vtk:9: expected 13 numbers, found 12"),
         ("POINT_DATA 12", "POINT_DATA 18446744073709551615", "a.vtk:9: expected at most "),
-        ("POINT_DATA 12", "POINT_DATA 99", "a.vtk:9: expected at most "),
+        ("POINT_DATA 12", "POINT_DATA 99", "a.vtk:9: expected 99 numbers, found 12"),
         ("density float", "density bit", "a.vtk:9: expected a type of numbers, from unsigned_char to double"),
         ("density float 1", "density float 3", "a.vtk:9: expected 36 numbers, found 12"),
         ("-0.5", "inf", "a.vtk:11:4: expected a finite decimal number, found 'inf'"),
