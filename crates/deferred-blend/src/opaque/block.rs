@@ -192,13 +192,7 @@ impl Block {
 
     /// Below 0 where a disc of some N, and normal by axis, shows another side than the nearest.
     #[inline(always)]
-    pub(super) fn side<S: Simd>(
-        &self,
-        simd: S,
-        lane: usize,
-        facing: Lanes<S>,
-        [x, y, z]: [Lanes<S>; 3],
-    ) -> Lanes<S> {
+    pub(super) fn side<S: Simd>(&self, simd: S, lane: usize, facing: Lanes<S>, [x, y, z]: [Lanes<S>; 3]) -> Lanes<S> {
         let front = |axis: usize| Lanes::load(simd, &self.front[axis].0[lane..]);
         let (a, b, c) = (front(0), front(1), front(2));
         facing * x.mul_add(a, y.mul_add(b, z * c))

@@ -42,7 +42,8 @@ pub(super) struct GroupImages {
 impl GroupImages {
     pub(super) fn new(count: usize) -> Self {
         let zero = line(0.0);
-        let image = GroupImage { step: zero, place: zero, depth: zero, limit: zero, weight: zero, facing: zero, disc: zero };
+        let image =
+            GroupImage { step: zero, place: zero, depth: zero, limit: zero, weight: zero, facing: zero, disc: zero };
         Self { images: vec![image; count], met: Default::default() }
     }
 

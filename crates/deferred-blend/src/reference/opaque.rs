@@ -56,7 +56,8 @@ pub fn opaque(
     }
     let seen = |hit: &Hit| input.cloud.shading_normal_of(hit.id).as_dvec3() * hit.facing;
     let front = seen(&nearest);
-    let weight = |hit: &Hit| hit.weight.max(2f64.powi(-60)) * if seen(hit).dot(front) < 0.0 { 1.0 / 256.0 } else { 1.0 };
+    let weight =
+        |hit: &Hit| hit.weight.max(2f64.powi(-60)) * if seen(hit).dot(front) < 0.0 { 1.0 / 256.0 } else { 1.0 };
     let weights: f64 = hits.iter().map(weight).sum();
     let mean = |of: &dyn Fn(&Hit) -> f64| hits.iter().map(|hit| weight(hit) * of(hit)).sum::<f64>() / weights;
     let value = |c: usize| mean(&|hit| f64::from(values[hit.id * channels + c]));
