@@ -33,6 +33,7 @@ fn an_opaque_ball_ends_where_it_does_and_is_lit_up_to_there() {
             &[],
         );
         let [alpha, green, depth] = ["A", "G", "depth.first.Z"].map(|c| picture.channel(c));
+        let nearest = depth.iter().copied().fold(f64::INFINITY, f64::min);
         for (k, [x, y]) in places().enumerate() {
             let (radius, light) = (x.hypot(y), alpha[k]);
             assert!(radius < 1.03 || light == 0.0, "{keys}: {light} at {radius}");
@@ -44,10 +45,13 @@ fn an_opaque_ball_ends_where_it_does_and_is_lit_up_to_there() {
                 let exact = 0.2 + 2.0 / std::f64::consts::PI * cosine.max(0.0);
                 assert!((green[k] - exact).abs() < 0.08, "{keys}: {} for {exact} at {x} {y}", green[k]);
             }
-            if radius < 0.9 {
-                let nearest = depth.iter().copied().fold(f64::INFINITY, f64::min);
-                let behind = depth[k] - nearest - (1.0 - (1.0 - radius * radius).sqrt());
-                assert!(behind.abs() < 0.01, "{keys}: {behind} at {radius}");
+            if radius < 0.5 {
+                let z = (1.0 - radius * radius).sqrt();
+                let behind = depth[k] - nearest - (1.0 - z);
+                // Planes of discs of radius R lie before the ball by up to R²/2, and samples half a pixel beside its middle.
+                let reach = 0.24 * if keys == "disc_scale = 1" { 1.0 } else { 0.6 };
+                let most = 0.5 * reach * reach + 0.0125 * 2f64.sqrt() * radius / z + 1e-6;
+                assert!(behind.abs() < most, "{keys}: {behind} at {radius}");
             }
         }
     }

@@ -14,7 +14,7 @@ const STAGE: u64 = 0xb0;
 pub(crate) fn slope(bump: &Bump, place: DVec3, pixel: f64) -> DVec3 {
     let size = f64::from(bump.size);
     let octave = |k: u32| {
-        let scale = f64::from(k).exp2();
+        let scale = libm::exp2(f64::from(k));
         let shown = (size / (2.0 * pixel * scale) - 1.0).clamp(0.0, 1.0);
         if shown > 0.0 { noise_slope(place * (scale / size), bump.seed + u64::from(k)) * shown } else { DVec3::ZERO }
     };

@@ -63,7 +63,7 @@ impl Light<'_> {
     pub(crate) fn attributes(&self, i: usize) -> [f32; ATTRIBUTES] {
         let cloud = self.input.cloud;
         let own = Attributes::of(cloud, i);
-        let to_eye = self.to_eye(cloud.position[i]);
+        let to_eye = self.toward_eye(cloud.position[i]);
         let side = |n: Vec3| if own.face.dot(to_eye) < 0.0 { -n } else { n };
         Attributes { face: side(own.face), normal: side(own.normal), ..own }.to_array()
     }
@@ -114,7 +114,7 @@ impl Light<'_> {
         let ShadeInput { cloud, materials, objects, lights, ambient, .. } = *self.input;
         let (position, i) = (place.discs.place(place.ray, place.depth), place.disc);
         let (kind, object) = (cloud.kind[i], cloud.object[i] as usize);
-        let (material, to_eye) = (&materials[cloud.material[i] as usize], self.to_eye(position));
+        let (material, to_eye) = (&materials[cloud.material[i] as usize], self.toward_eye(position));
         let face = mean.face.normalize_or_zero();
         let mut normal = facing(kind, face, mean.normal.normalize_or_zero(), to_eye);
         if material.bump.height > 0.0 {
@@ -143,7 +143,7 @@ impl Light<'_> {
     }
 
     /// Unit direction to the viewer.
-    pub(crate) fn to_eye(&self, position: Vec3) -> Vec3 {
+    pub(crate) fn toward_eye(&self, position: Vec3) -> Vec3 {
         let camera = self.input.camera;
         if camera.is_orthographic() {
             return -camera.axes[2].as_vec3();

@@ -2,6 +2,8 @@
 //! their footprints and radiance, the opaque image, the device, progress. Whatever is made for it is made once, when it is first
 //! asked for.
 
+pub(crate) mod discs;
+pub(crate) mod grouped;
 mod light;
 mod on_device;
 mod splats;

@@ -66,6 +66,8 @@ pub struct Plan {
     pub by: Vec<Technique>,
     /// For each object, by its rank: whether it is drawn from its own data.
     pub is_own: Vec<bool>,
+    /// For each object, by its rank: whether rays meet its opaque discs exactly.
+    pub exact: Vec<bool>,
     /// For each object, by its rank: whether its translucent splats are drawn as they are, with the radiance that the frame gives them.
     pub draws: Vec<bool>,
 }

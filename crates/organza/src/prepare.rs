@@ -144,13 +144,14 @@ fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Resu
     statistics.lit_as_drawn = carried::of_scene(scene).is_some();
     let mut plan = plan(&statistics);
     plan.by = scene.objects.iter().map(|o| technique_of(o, scene)).collect();
+    plan.exact = plan.by.iter().map(|by| row(*by).meets_discs).collect();
     plan.is_own = vec![false; scene.objects.len()];
     loaded.own.iter().for_each(|own| plan.is_own[own.object] = true);
     let draws = |by: &Technique| row(*by).draws_splats && !statistics.lit_as_drawn;
     plan.draws = plan.by.iter().zip(&plan.is_own).map(|(by, own)| draws(by) && !own).collect();
     let all = techniques(scene);
     all.iter().for_each(|t| (row(*t).plans)(scene, loaded, &mut plan));
-    let used = all.iter().filter(|t| statistics.translucent_of(**t).is_some() || row(**t).opaque.is_some());
+    let used = all.iter().filter(|t| statistics.translucent_of(**t).is_some() || row(**t).meets_discs);
     // They take turns, and each keeps what it has.
     let points = lights::points(&loaded.lights);
     let camera = loaded.camera.with_samples(scene.render.antialias);

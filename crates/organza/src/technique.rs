@@ -57,8 +57,8 @@ pub(crate) struct Row {
     pub(crate) bumps: fn(&Scene) -> Result<(), &'static str>,
     /// Whether it draws translucent splats as they are: they get footprints and radiance.
     pub(crate) draws_splats: bool,
-    /// How it draws opaque splats of its objects, by their places; `None` where the frame does.
-    pub(crate) opaque: Option<fn(&Frame<'_>, &[u32], &mut CostRecord) -> Result<OpaqueImage, Error>>,
+    /// Whether rays meet the opaque discs of its objects exactly; else the frame draws these as splats.
+    pub(crate) meets_discs: bool,
     /// Its passes; the last one comes behind opaque surfaces, those before it come before footprints.
     pub(crate) steps: &'static [Step],
     /// Whether its picture is an average of random sets, which a checkpoint can keep.
@@ -172,7 +172,7 @@ pub(crate) static TABLE: [Row; 5] = [
         how: "are discs, which are averaged in each layer of a surface, and layers are composited in order",
         bends: surfels::bends,
         bumps: surfels::bumps,
-        opaque: Some(surfels::opaque),
+        meets_discs: true,
         steps: &[SORT, Step { pass: pass::SURFELS, stage: stage::SURFELS, ..FOLD }],
         bytes: surfels::bytes,
         plans: surfels::plans,
@@ -210,7 +210,7 @@ const POINTS: Row = Row {
     bends: |_| Err("use `surfels`"),
     bumps: |_| Err("use `surfels`"),
     draws_splats: true,
-    opaque: None,
+    meets_discs: false,
     steps: &[SORT, FOLD],
     is_random: false,
     bytes: |_, _, _, _| 0,

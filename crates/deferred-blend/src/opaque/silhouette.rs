@@ -26,7 +26,7 @@ pub(super) fn turned(light: &Light<'_>, discs: &Discs, image: &OpaqueImage, disc
     };
     let one = |k: usize| {
         let radius = light.input.cloud.radius[*disc.get(k).filter(|disc| **disc != u32::MAX)? as usize];
-        let to_eye = light.to_eye(discs.place(&discs.ray([k % width, k / width]), image.depth[k]));
+        let to_eye = light.toward_eye(discs.place(&discs.ray([k % width, k / width]), image.depth[k]));
         let own = normal(k, 0);
         if own.dot(to_eye).abs() > EDGE_ON {
             return None;

@@ -1,9 +1,8 @@
 //! Splats of a frame: those that are drawn, their footprints and radiance, and the opaque ones as an image.
 
 use super::Frame;
-use crate::choose::row;
+use super::discs::opaque;
 use crate::pass;
-use crate::technique::{Row, TABLE};
 use crate::{CostRecord, Error, stage};
 use splat_core::raster::{
     self, Detail, FinishInput, GlassImage, OpaqueImage, OpaqueInput, ProjectInput, Projected, RasterCounts,
@@ -96,22 +95,22 @@ impl Frame<'_> {
         Ok(projected)
     }
 
-    /// The opaque ones of the drawn splats, of objects whose techniques draw them as asked.
-    fn solid_of(&self, is_one: impl Fn(&Row) -> bool) -> Vec<u32> {
+    /// The opaque ones of the drawn splats, those that rays meet exactly, or the others.
+    fn solid_of(&self, exact: bool) -> Vec<u32> {
         let cloud = self.drawn();
-        let of: Vec<bool> = self.plan.by.iter().map(|by| is_one(row(*by))).collect();
-        let is_one = |i: &usize| cloud.kind[*i] == SplatKind::Opaque && of[cloud.object[*i] as usize];
+        let is_one =
+            |i: &usize| cloud.kind[*i] == SplatKind::Opaque && self.plan.exact[cloud.object[*i] as usize] == exact;
         (0..cloud.len()).filter(is_one).map(|i| i as u32).collect()
     }
 
-    /// The opaque splats that the frame draws.
+    /// The opaque splats that are drawn as such.
     pub(crate) fn solid_ids(&self) -> Vec<u32> {
-        self.solid_of(|row| row.opaque.is_none())
+        self.solid_of(false)
     }
 
-    /// Whether the frame draws all opaque splats.
+    /// Whether all are.
     pub(crate) fn draws_all_solid(&self) -> bool {
-        self.solid_of(|row| row.opaque.is_some()).is_empty()
+        self.solid_of(true).is_empty()
     }
 
     /// The nearest opaque surface of every sample; an empty image where nothing is opaque. The passes that were run for it are added
@@ -128,18 +127,15 @@ impl Frame<'_> {
 
     /// The same of opaque splats alone, for a technique that adds polygons to it.
     pub(crate) fn solid(&self, cost: &mut CostRecord) -> Result<OpaqueImage, Error> {
-        let mut image = self.solid_by_frame(cost)?;
-        for (technique, draw) in TABLE.iter().filter_map(|row| Some((row.technique, row.opaque?))) {
-            let ids = self.solid_of(|row| row.technique == technique);
-            if !ids.is_empty() {
-                self.progress.begin(stage::OPAQUE);
-                image = image.joined(draw(self, &ids, cost)?);
-            }
+        let (image, ids) = (self.solid_splats(cost)?, self.solid_of(true));
+        if ids.is_empty() {
+            return Ok(image);
         }
-        Ok(image)
+        self.progress.begin(stage::OPAQUE);
+        Ok(image.joined(opaque(self, &ids, cost)?))
     }
 
-    fn solid_by_frame(&self, cost: &mut CostRecord) -> Result<OpaqueImage, Error> {
+    fn solid_splats(&self, cost: &mut CostRecord) -> Result<OpaqueImage, Error> {
         let ids = self.solid_ids();
         // Beside translucent splats they have been shaded already.
         let alone = self.shaded.get().is_none() && !ids.is_empty();

@@ -2,11 +2,10 @@
 //! them exactly, and layers that are composited in order.
 
 mod glass;
-mod grouped;
-mod opaque;
 mod plans;
 
-use crate::frame::Frame;
+use crate::frame::discs::{disc_input, params, refuse, with_shown};
+use crate::frame::{Frame, grouped};
 use crate::lights::LightPoint;
 use crate::matter::Matter;
 use crate::pass;
@@ -14,15 +13,12 @@ use crate::scene::{Scene, SurfelGroups, SurfelLayers, Technique};
 use crate::technique::{Fold, Session, points};
 use crate::{CostRecord, Error, RenderOptions, stage};
 use deferred_blend::grouping::Membership;
-use deferred_blend::{
-    BlendInput, Blended, DiscInput, Discs, Floors, Glass, Layering, Light, Params, Shown, Surfaces, blend,
-};
+use deferred_blend::{BlendInput, Blended, Discs, Floors, Glass, Layering, Params, Surfaces, blend};
 use glass::{bending, bounds_matter, surfaces, unit};
-pub(crate) use opaque::opaque;
 pub(crate) use plans::plans;
 use splat_core::glam::Vec3;
 use splat_core::raster::GlassImage;
-use splat_core::{Accumulator, Cloud, Direction, Similarity, SplatKind};
+use splat_core::{Accumulator, Cloud, Direction, SplatKind};
 use std::ops::Range;
 
 /// Bytes of a disc: where rays meet it, what it shows, its normal and place, and an entry in the lists of two tiles.
@@ -132,42 +128,6 @@ impl<'a> Fold for Surfels<'a> {
     }
 }
 
-/// Hands on what discs show: light on pixels, or what shading has given to each.
-fn with_shown<T>(
-    frame: &Frame<'_>,
-    cost: &mut CostRecord,
-    draw: impl FnOnce(Shown<'_>, &mut CostRecord) -> Result<T, Error>,
-) -> Result<T, Error> {
-    if !frame.settings.surfels.lights_pixels {
-        let values = &frame.shaded(cost)?.values;
-        return draw(Shown::Discs(values), cost);
-    }
-    let lights = frame.lit_by(frame.maps(cost)?);
-    let (input, layout, transforms) = (&frame.shading(&lights), frame.layout(), &transforms(frame));
-    draw(Shown::Pixels(Light { input, layout, transforms }), cost)
-}
-
-/// From each object into the world, in the cloud's unit.
-fn transforms(frame: &Frame<'_>) -> Vec<Similarity> {
-    let unit = libm::exp2(f64::from(-frame.loaded.exponent));
-    frame.scene.objects.iter().map(|object| object.transform.scaled(unit)).collect()
-}
-
-/// Some discs of what is drawn.
-fn disc_input<'a>(frame: &'a Frame<'a>, ids: &'a [u32]) -> DiscInput<'a> {
-    let (loaded, cloud) = (frame.loaded, frame.drawn());
-    DiscInput { cloud, ids, camera: &frame.camera, footprints: &loaded.footprints, materials: &loaded.materials }
-}
-
-fn params(frame: &Frame<'_>) -> Params {
-    let settings = &frame.settings.surfels;
-    Params {
-        disc_scale: settings.disc_scale as f32,
-        gap: settings.gap as f32,
-        transmittance_cutoff: settings.transmittance_cutoff as f32,
-    }
-}
-
 /// How the scene tells layers apart.
 fn layering<'a>(
     asked: &SurfelLayers,
@@ -202,11 +162,4 @@ fn project(
         stage.bytes = discs.bytes();
         Ok(discs)
     })
-}
-
-fn refuse(error: deferred_blend::Error) -> Error {
-    match error {
-        deferred_blend::Error::Cancelled => Error::Cancelled,
-        other => Error::Internal(other.to_string()),
-    }
 }

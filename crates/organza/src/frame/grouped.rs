@@ -1,6 +1,6 @@
 //! Groups of discs, as the algorithms of the paper ask for: found once for each object, and kept while it only moves.
 
-use crate::frame::Frame;
+use super::Frame;
 use crate::pass;
 use crate::scene::{Collisions, Coverage, Grouping, Scene, SceneObject, SurfelGroups};
 use crate::{CostRecord, Error, escape_controls};
@@ -38,14 +38,14 @@ fn coverage(asked: Coverage, method: &Method) -> grouping::Coverage {
 }
 
 /// The groups of discs that are drawn, by their places. The cost record has all discs, and those that were grouped anew.
-pub(super) fn members(
+pub(crate) fn members(
     frame: &Frame<'_>,
     groups: &SurfelGroups,
     ids: &[u32],
     kept: Option<&mut GroupsOfObjects>,
     cost: &mut CostRecord,
 ) -> Result<Membership, Error> {
-    let (cloud, transforms) = (frame.drawn(), super::transforms(frame));
+    let (cloud, transforms) = (frame.drawn(), super::discs::transforms(frame));
     let mut once = GroupsOfObjects::default();
     let kept = kept.unwrap_or(&mut once);
     let mut of_object: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
@@ -76,12 +76,12 @@ fn refuse(object: &SceneObject, error: deferred_blend::Error) -> Error {
             &format!("object '{}'", escape_controls(&object.name)),
             "set render.surfels.grouping = \"hash\", collisions = \"keep\" and coverage = \"bound\", or a larger spacing",
         )),
-        other => super::refuse(other),
+        other => super::discs::refuse(other),
     }
 }
 
 /// Bytes of grouping so many discs, of a cloud of these bytes.
-pub(super) fn bytes(scene: &Scene, discs: u64, cloud: u64) -> u64 {
+pub(crate) fn bytes(scene: &Scene, discs: u64, cloud: u64) -> u64 {
     let settings = &scene.render.surfels;
     let of = |groups: &SurfelGroups| {
         let method = match groups.grouping {
