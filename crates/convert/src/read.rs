@@ -4,47 +4,49 @@
 //! No input makes a reader panic or take memory that the file does not stand for: sizes that a header announces are
 //! checked against the length of the file before anything is allocated.
 
-#[cfg(any(feature = "obj", feature = "gltf"))]
+#![cfg_attr(
+    not(all(
+        feature = "ply",
+        feature = "stl",
+        feature = "obj",
+        feature = "off",
+        feature = "gltf",
+        feature = "pcd",
+        feature = "xyz",
+        feature = "las",
+        feature = "nrrd",
+        feature = "nifti",
+        feature = "metaimage",
+        feature = "vti",
+        feature = "vtk",
+        feature = "raw",
+        feature = "hdr",
+        feature = "exr",
+        feature = "png"
+    )),
+    allow(
+        dead_code,
+        unused_imports,
+        unused_variables,
+        unused_mut,
+        reason = "fewer readers leave parts that all share unused"
+    )
+)]
+
 mod beside;
-#[cfg(any(
-    feature = "ply",
-    feature = "obj",
-    feature = "off",
-    feature = "pcd",
-    feature = "gltf",
-    feature = "las",
-    feature = "xyz",
-    feature = "png"
-))]
 mod color;
-#[cfg(any(
-    feature = "ply",
-    feature = "stl",
-    feature = "obj",
-    feature = "off",
-    feature = "pcd",
-    feature = "xyz",
-    feature = "nrrd",
-    feature = "metaimage",
-    feature = "vti",
-    feature = "vtk"
-))]
 mod decimal;
-#[cfg(any(feature = "nrrd", feature = "metaimage"))]
 mod detached;
-#[cfg(any(feature = "ply", feature = "obj", feature = "off", feature = "pcd", feature = "gltf", feature = "xyz"))]
 mod direction;
 #[cfg(any(feature = "obj", feature = "off"))]
 mod fans;
+mod format;
 #[cfg(feature = "gltf")]
 mod gltf;
-#[cfg(any(feature = "metaimage", feature = "vti"))]
 mod inflate;
-#[cfg_attr(not(feature = "ply"), allow(dead_code, reason = "each format uses a part of it"))]
 mod input;
 #[cfg(feature = "las")]
 mod las;
-#[cfg(any(feature = "nrrd", feature = "nifti", feature = "metaimage", feature = "vti", feature = "vtk"))]
 mod lattice;
 #[cfg(feature = "las")]
 mod laz;
@@ -62,15 +64,6 @@ mod obj;
 mod off;
 #[cfg(feature = "exr")]
 mod openexr;
-#[cfg(any(
-    feature = "ply",
-    feature = "stl",
-    feature = "obj",
-    feature = "off",
-    feature = "pcd",
-    feature = "gltf",
-    feature = "xyz"
-))]
 mod origin;
 #[cfg(any(feature = "obj", feature = "gltf"))]
 mod paint;
@@ -87,44 +80,17 @@ mod radiance;
 #[cfg(feature = "raw")]
 mod raw;
 mod reading;
-#[cfg(any(
-    feature = "nrrd",
-    feature = "nifti",
-    feature = "metaimage",
-    feature = "raw",
-    feature = "vti",
-    feature = "vtk"
-))]
 mod selection;
 #[cfg(feature = "obj")]
 mod statements;
 #[cfg(feature = "stl")]
 mod stl;
-#[cfg(any(
-    feature = "stl",
-    feature = "obj",
-    feature = "off",
-    feature = "pcd",
-    feature = "xyz",
-    feature = "nrrd",
-    feature = "metaimage",
-    feature = "vti",
-    feature = "vtk"
-))]
 mod text;
 #[cfg(any(feature = "obj", feature = "gltf"))]
 mod texture;
 mod unpacked;
 mod unread;
 mod up;
-#[cfg(any(
-    feature = "nrrd",
-    feature = "nifti",
-    feature = "metaimage",
-    feature = "raw",
-    feature = "vti",
-    feature = "vtk"
-))]
 mod voxels;
 #[cfg(feature = "vti")]
 mod vti;
@@ -140,6 +106,7 @@ pub use up::{UpAxis, up_axis};
 
 use crate::error::{Place, ReadError, escaped, escaped_path};
 use crate::raw_points::RawPoints;
+use format::{Format, format_of, is_raw};
 use input::Stream;
 use reading::Reading;
 use splat_core::{Grid, Limits, Mesh, Progress, RadianceImage};
@@ -239,10 +206,6 @@ fn whole(
 const MARK: usize = 512;
 
 /// `place` is where the file lies, for those that name another one.
-#[cfg_attr(
-    not(feature = "nrrd"),
-    allow(unused_variables, unused_mut, reason = "few formats name other files, some have nothing to note")
-)]
 fn parse(
     path: &Path,
     mut stream: Stream<'_>,
@@ -311,11 +274,9 @@ fn not_compiled_in(format: Format) -> ReadError {
 }
 
 /// Longest side of an image, pixels.
-#[cfg(any(feature = "hdr", feature = "exr", feature = "png", feature = "obj", feature = "gltf"))]
 const LONGEST_SIDE: u32 = 65536;
 
 /// Bytes of an image of a size that may be read.
-#[cfg(any(feature = "hdr", feature = "exr", feature = "png", feature = "obj", feature = "gltf"))]
 fn check_image(size: [u32; 2], params: &ReadParams) -> Result<u64, ReadError> {
     if !size.iter().all(|side| (1..=LONGEST_SIDE).contains(side)) {
         let expected = format!("an image of 1 to {LONGEST_SIDE} pixels a side");
@@ -325,118 +286,4 @@ fn check_image(size: [u32; 2], params: &ReadParams) -> Result<u64, ReadError> {
     let bytes = size.iter().map(|s| u64::from(*s)).product::<u64>() * size_of::<[f32; 3]>() as u64;
     input::check_bytes("the image", bytes, params)?;
     Ok(bytes)
-}
-
-#[derive(Debug, Clone, Copy)]
-enum Format {
-    Ply,
-    Stl,
-    Obj,
-    Off,
-    Gltf,
-    Pcd,
-    Xyz,
-    Nrrd,
-    Las,
-    Nifti,
-    MetaImage,
-    Vti,
-    Vtk,
-    Raw,
-    Hdr,
-    Exr,
-    Png,
-}
-
-fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
-    let named = by_name(path);
-    // No byte of nothing but voxels is a mark.
-    if matches!(named, Some(Format::Raw)) {
-        return named;
-    }
-    let content = content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(content);
-    if content.starts_with(b"ply") {
-        return Some(Format::Ply);
-    }
-    if content.starts_with(b"LASF") {
-        return Some(Format::Las);
-    }
-    if content.starts_with(b"NRRD000") {
-        return Some(Format::Nrrd);
-    }
-    if content.starts_with(b"#?") {
-        return Some(Format::Hdr);
-    }
-    if content.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
-        return Some(Format::Exr);
-    }
-    if content.starts_with(b"\x89PNG\r\n\x1a\n") {
-        return Some(Format::Png);
-    }
-    if content.starts_with(b"glTF") {
-        return Some(Format::Gltf);
-    }
-    if content.starts_with(b"# .PCD") {
-        return Some(Format::Pcd);
-    }
-    if content.get(344..347).is_some_and(|magic| magic == b"n+1" || magic == b"ni1") {
-        return Some(Format::Nifti);
-    }
-    // NIfTI-2, which its reader names.
-    if content.get(4..7).is_some_and(|magic| magic == b"n+2" || magic == b"ni2") {
-        return Some(Format::Nifti);
-    }
-    if content.starts_with(b"# vtk DataFile Version") {
-        return Some(Format::Vtk);
-    }
-    if content.windows(8).any(|window| window == b"<VTKFile") {
-        return Some(Format::Vti);
-    }
-    if is_metaimage(content) {
-        return Some(Format::MetaImage);
-    }
-    named.or_else(|| is_stl_text(content).then_some(Format::Stl))
-}
-
-#[cfg(feature = "stl")]
-fn is_stl_text(content: &[u8]) -> bool {
-    stl::is_text(content)
-}
-
-#[cfg(not(feature = "stl"))]
-fn is_stl_text(_content: &[u8]) -> bool {
-    false
-}
-
-/// It has no mark, but begins with one of two fields.
-fn is_metaimage(content: &[u8]) -> bool {
-    let field = content.iter().position(|b| *b == b'=').map_or(&[][..], |end| content[..end].trim_ascii_end());
-    [&b"ObjectType"[..], b"NDims"].contains(&field)
-}
-
-/// Whether a file is nothing but voxels by its name, not even packed.
-fn is_raw(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("raw"))
-}
-
-fn by_name(path: &Path) -> Option<Format> {
-    let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
-    let name = name.strip_suffix(".gz").unwrap_or(&name);
-    match name.rsplit_once('.')?.1 {
-        "ply" => Some(Format::Ply),
-        "stl" => Some(Format::Stl),
-        "obj" => Some(Format::Obj),
-        "off" => Some(Format::Off),
-        "gltf" | "glb" => Some(Format::Gltf),
-        "pcd" => Some(Format::Pcd),
-        "xyz" | "csv" | "txt" | "pts" | "asc" => Some(Format::Xyz),
-        "nrrd" | "nhdr" => Some(Format::Nrrd),
-        "las" | "laz" => Some(Format::Las),
-        "nii" | "hdr" => Some(Format::Nifti),
-        "mha" | "mhd" => Some(Format::MetaImage),
-        "vti" => Some(Format::Vti),
-        "vtk" => Some(Format::Vtk),
-        "raw" => Some(Format::Raw),
-        _ => None,
-    }
 }

@@ -96,7 +96,7 @@ fn what_is_wrong_in_a_header_is_named_with_its_line() {
         ("NDims = 3\n", "", "a.mha:10: expected a field NDims, found none in the header"),
         ("= LOCAL", "= LIST", "a.mha:10: expected one data file in the header's folder, found 'LIST'"),
         ("= LOCAL", "= a%03d.raw", "a.mha:10: expected one data file in the header's folder"),
-        ("= LOCAL", "= ../a.raw", "a.mha:10: expected a data file in the header's folder or below"),
+        ("= LOCAL", "= ../a.raw", "a.mha:10: expected the data: a file in the same folder or below"),
         ("= LOCAL", "= a.raw", "a.mha:10: expected a header and its data in one file, as it was read from memory"),
     ] {
         refused(&with(from, to), beginning);

@@ -334,12 +334,12 @@ fn ba16_detached_data_lies_in_the_headers_folder() {
     }
     let absolute = folder.join("data.raw");
     for (name, expected) in [
-        ("../ba16.raw", "a data file in the header's folder or below"),
-        (absolute.to_str().unwrap(), "a data file in the header's folder or below"),
-        ("sub/../data.raw", "a data file in the header's folder or below"),
-        ("link.raw", "a data file in the header's folder or below, links followed"),
+        ("../ba16.raw", "the data: a file in the same folder or below"),
+        (absolute.to_str().unwrap(), "the data: a file in the same folder or below"),
+        ("sub/../data.raw", "the data: a file in the same folder or below"),
+        ("link.raw", "the data: a file in the same folder or below, links followed"),
         ("a.nhdr", "a data file that is not the header itself"),
-        ("https://example.org/data.raw", "one data file in the header's folder"),
+        ("https://example.org/data.raw", "the data: a file in the same folder or below"),
         ("slice%03d.raw 1 9 1", "one data file in the header's folder"),
         ("LIST", "one data file in the header's folder"),
     ] {

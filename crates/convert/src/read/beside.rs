@@ -3,7 +3,7 @@
 use super::ReadParams;
 use super::input::Stream;
 use crate::error::{Place, ReadError, escaped};
-use std::path::{Component, Path};
+use std::path::{Component, Path, PathBuf};
 
 /// Where a file lies that names others.
 pub(super) struct Beside<'a> {
@@ -19,34 +19,36 @@ impl<'a> Beside<'a> {
     /// The content of the file of this name; `what` says what it is for.
     pub(super) fn open(&self, name: &str, what: &str, params: &ReadParams) -> Result<Stream<'static>, ReadError> {
         let shown = || format!("'{}'", escaped(name.as_bytes(), 60));
-        let refused = |expected: &str| {
+        let path = self.find(name).map_err(|expected| {
             let hint = "put the file into the same folder and name it without others";
-            Err(ReadError::input(Place::File, format!("{what}: {expected}"), shown(), hint))
-        };
-        let within = |c: Component<'_>| matches!(c, Component::Normal(_) | Component::CurDir);
-        if name.contains("://") || !Path::new(name).components().all(within) {
-            return refused("a file in the same folder or below");
-        }
-        let Some(file) = self.file else {
-            return refused("in the file itself, as it was read from memory");
-        };
-        let folder = file.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let path = folder.join(name);
-        // Links are followed before they are judged.
-        if let (Ok(data), Ok(root)) = (path.canonicalize(), folder.canonicalize())
-            && !data.starts_with(&root)
-        {
-            return refused("a file in the same folder or below, links followed");
-        }
+            ReadError::input(Place::File, format!("{what}: {expected}"), shown(), hint)
+        })?;
         Stream::open(&path, params).map_err(|e| {
             let expected = format!("{what} {}: {}", shown(), e.expected);
             ReadError { expected, ..e }
         })
     }
+
+    /// Where the file of this name is, or what was expected in its place.
+    pub(super) fn find(&self, name: &str) -> Result<PathBuf, &'static str> {
+        let within = |c: Component<'_>| matches!(c, Component::Normal(_) | Component::CurDir);
+        if name.contains("://") || !Path::new(name).components().all(within) {
+            return Err("a file in the same folder or below");
+        }
+        let file = self.file.ok_or("in the file itself, as it was read from memory")?;
+        let folder = file.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let path = folder.join(name);
+        // Links are followed before they are judged.
+        match (path.canonicalize(), folder.canonicalize()) {
+            (Ok(data), Ok(root)) if !data.starts_with(&root) => {
+                Err("a file in the same folder or below, links followed")
+            }
+            _ => Ok(path),
+        }
+    }
 }
 
 /// The path that a relative uri stands for: %20 is a blank.
-#[cfg(feature = "gltf")]
 pub(super) fn from_uri(uri: &str) -> String {
     let bytes = uri.as_bytes();
     let digit = |at: usize| bytes.get(at).and_then(|b| char::from(*b).to_digit(16));

@@ -5,7 +5,6 @@ use super::unpacked::Unpacked;
 use crate::error::{Place, ReadError};
 use std::fs::File;
 use std::io::{self, Read};
-#[cfg(any(feature = "vti", feature = "vtk"))]
 use std::ops::Range;
 use std::path::Path;
 
@@ -15,7 +14,6 @@ const STEP: usize = 64 << 20;
 const MAX_RATIO: u64 = 1000;
 const FREE: u64 = 16 << 20;
 /// Longest header in text; real ones have some hundred bytes.
-#[cfg(any(feature = "nrrd", feature = "metaimage"))]
 const MAX_HEADER: usize = 16 << 20;
 
 /// Bytes in the order of the file. What was looked at by [`Stream::peek`] is given once more.
@@ -56,7 +54,6 @@ impl<'a> Stream<'a> {
     }
 
     /// A part of a file in memory, whose places are those of the file.
-    #[cfg(any(feature = "vti", feature = "vtk"))]
     pub(super) fn of_part(content: &'a [u8], part: Range<usize>, params: &ReadParams) -> Self {
         let length = content.len() as u64;
         Self { position: part.start as u64, ..Self::new(&content[part.clone()], Some(part.end as u64), length, params) }
@@ -74,7 +71,6 @@ impl<'a> Stream<'a> {
     }
 
     /// The same of one zlib stream.
-    #[cfg(feature = "metaimage")]
     pub(super) fn inflate(self) -> Stream<'a> {
         let (stored, params) = (self.stored, self.params);
         Stream::new(Unpacked::zlib(self, stored, params), None, stored, &params)
@@ -94,7 +90,6 @@ impl<'a> Stream<'a> {
     }
 
     /// What is to come up to where `ends` finds the end of a header, and some more; all of it where there is none.
-    #[cfg(any(feature = "nrrd", feature = "metaimage"))]
     pub(super) fn peek_until(
         &mut self,
         ends: impl Fn(&[u8]) -> bool,
@@ -116,14 +111,6 @@ impl<'a> Stream<'a> {
     }
 
     /// Fills `target` as far as there are bytes; gives how many.
-    #[cfg(any(
-        feature = "nrrd",
-        feature = "nifti",
-        feature = "metaimage",
-        feature = "raw",
-        feature = "vti",
-        feature = "vtk"
-    ))]
     pub(super) fn fill(&mut self, target: &mut [u8]) -> Result<usize, ReadError> {
         let mut filled = 0;
         while filled < target.len() {
@@ -136,14 +123,6 @@ impl<'a> Stream<'a> {
     }
 
     /// Passes over `n` bytes; gives how many there were.
-    #[cfg(any(
-        feature = "nrrd",
-        feature = "nifti",
-        feature = "metaimage",
-        feature = "raw",
-        feature = "vti",
-        feature = "vtk"
-    ))]
     pub(super) fn skip(&mut self, n: u64) -> Result<u64, ReadError> {
         io::copy(&mut self.by_ref().take(n), &mut io::sink()).map_err(failed)
     }
@@ -171,14 +150,6 @@ impl<'a> Stream<'a> {
     }
 
     /// Refuses what cannot come, before memory is taken for it.
-    #[cfg(any(
-        feature = "nrrd",
-        feature = "nifti",
-        feature = "metaimage",
-        feature = "raw",
-        feature = "vti",
-        feature = "vtk"
-    ))]
     pub(super) fn expect(&self, bytes: u64) -> Result<(), ReadError> {
         if self.length.is_none() { check_ratio(bytes, self.stored) } else { Ok(()) }
     }

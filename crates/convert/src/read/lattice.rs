@@ -26,7 +26,6 @@ pub(super) fn check(origin: DVec3, axes: &DMat3, place: Place, hint: &'static st
 
 /// Place and sizes of the lattice of the middles of the cells between so many points of another; along an axis of one point there
 /// is one cell, in its plane.
-#[cfg(any(feature = "vti", feature = "vtk"))]
 pub(super) fn of_cells(origin: DVec3, axes: &DMat3, points: [u64; 3]) -> (DVec3, [u64; 3]) {
     let half = points.map(|n| if n > 1 { 0.5 } else { 0.0 });
     (origin + *axes * DVec3::from_array(half), points.map(|n| n.saturating_sub(1).max(1)))

@@ -1,19 +1,6 @@
 //! What goes along while a file is read: its parameters, who may stop it, and what was mended in it.
 
 use super::ReadParams;
-#[cfg(any(
-    feature = "ply",
-    feature = "obj",
-    feature = "off",
-    feature = "gltf",
-    feature = "pcd",
-    feature = "xyz",
-    feature = "las",
-    feature = "hdr",
-    feature = "metaimage",
-    feature = "vti",
-    feature = "vtk"
-))]
 use crate::error::escaped;
 use crate::error::{Place, ReadError};
 use splat_core::Progress;
@@ -106,22 +93,8 @@ pub struct Notes {
     pub mended: Vec<Mended>,
 }
 
-#[cfg(any(
-    feature = "ply",
-    feature = "obj",
-    feature = "off",
-    feature = "gltf",
-    feature = "pcd",
-    feature = "xyz",
-    feature = "las",
-    feature = "hdr",
-    feature = "metaimage",
-    feature = "vti",
-    feature = "vtk"
-))]
 impl Notes {
     /// Adds a remark, once.
-    #[cfg(any(feature = "obj", feature = "gltf"))]
     pub(super) fn remark(&mut self, remark: impl Into<String>) {
         let remark = remark.into();
         if !self.remarks.contains(&remark) {
@@ -153,7 +126,6 @@ impl<'a> Reading<'a> {
     }
 
     /// Counts a fault that is mended; with [`ReadParams::strict`] it is the error that it stands for.
-    #[cfg(any(feature = "ply", feature = "stl", feature = "obj", feature = "off", feature = "gltf"))]
     pub(super) fn mend(
         &mut self,
         (fix, place, face): (Fix, Place, Option<u64>),

@@ -51,7 +51,6 @@ impl Selection {
     }
 
     /// The same of a series whose voxels have the numbers of all frames side by side.
-    #[cfg(feature = "nrrd")]
     pub(super) fn of_mingled_frames(
         frames: u64,
         place: Place,

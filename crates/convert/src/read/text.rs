@@ -35,7 +35,6 @@ pub(super) struct Word<'a> {
 }
 
 /// The words of a text between blanks, commas or semicolons, however long its lines are.
-#[cfg(any(feature = "nrrd", feature = "metaimage", feature = "vti", feature = "vtk"))]
 pub(super) struct Words<'a> {
     content: &'a [u8],
     at: usize,
@@ -50,13 +49,11 @@ impl<'a> Lines<'a> {
     }
 
     /// The same behind so many lines of a header.
-    #[cfg(any(feature = "nrrd", feature = "pcd"))]
     pub(super) fn after(content: &'a [u8], lines: u64) -> Self {
         Self { number: lines, ..Self::new(content) }
     }
 
     /// Number of the line that was read last.
-    #[cfg(any(feature = "nrrd", feature = "pcd", feature = "metaimage"))]
     pub(super) fn number(&self) -> u64 {
         self.number
     }
@@ -79,32 +76,21 @@ impl<'a> Lines<'a> {
     }
 
     /// Bytes read.
-    #[cfg(any(feature = "nrrd", feature = "pcd", feature = "metaimage", feature = "vtk"))]
     pub(super) fn offset(&self) -> usize {
         self.at.min(self.content.len())
     }
 
     /// The words behind the lines that were read.
-    #[cfg(feature = "vtk")]
     pub(super) fn words(&self) -> Words<'a> {
         Words::new(self.content, self.at.min(self.content.len()), self.number + 1)
     }
 
     /// Goes on at a byte of the line of this number.
-    #[cfg(feature = "vtk")]
     pub(super) fn go_to(&mut self, at: usize, line: u64) {
         (self.at, self.number) = (at, line - 1);
     }
 
     /// The place after the last line.
-    #[cfg(any(
-        feature = "stl",
-        feature = "nrrd",
-        feature = "off",
-        feature = "pcd",
-        feature = "metaimage",
-        feature = "vtk"
-    ))]
     pub(super) fn end(&self) -> Place {
         Place::Line { line: self.number + 1, column: 0 }
     }
@@ -129,7 +115,6 @@ impl<'a> Line<'a> {
     }
 }
 
-#[cfg(any(feature = "nrrd", feature = "metaimage", feature = "vti", feature = "vtk"))]
 impl<'a> Words<'a> {
     /// Those from a byte on, which lies in the line of this number.
     pub(super) fn new(content: &'a [u8], at: usize, line: u64) -> Self {
@@ -142,13 +127,11 @@ impl<'a> Words<'a> {
     }
 
     /// The byte behind the last word, and the number of its line.
-    #[cfg(feature = "vtk")]
     pub(super) fn end(&self) -> (usize, u64) {
         (self.at, self.line)
     }
 }
 
-#[cfg(any(feature = "nrrd", feature = "metaimage", feature = "vti", feature = "vtk"))]
 impl<'a> Iterator for Words<'a> {
     type Item = Word<'a>;
 
@@ -175,7 +158,6 @@ impl Word<'_> {
     }
 
     /// The word without its first bytes.
-    #[cfg(feature = "off")]
     pub(super) fn after(self, bytes: usize) -> Self {
         Self { text: &self.text[bytes..], column: self.column + bytes as u64, ..self }
     }

@@ -10,7 +10,6 @@ use std::sync::LazyLock;
 
 /// What lies beyond the border.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(not(feature = "gltf"), allow(dead_code, reason = "textures of OBJ files repeat"))]
 pub(super) enum Wrap {
     Repeat,
     Clamp,
@@ -58,7 +57,6 @@ impl Texture {
     }
 
     /// The same with other rules of what lies beyond its border and between its texels.
-    #[cfg(feature = "gltf")]
     pub(super) fn sampled(self, wrap: [Wrap; 2], is_nearest: bool) -> Self {
         Self { wrap, is_nearest, ..self }
     }

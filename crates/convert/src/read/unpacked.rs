@@ -1,7 +1,6 @@
 //! What comes out of gzip or zlib, no more of it than the packed file may stand for.
 
 use super::ReadParams;
-#[cfg(feature = "metaimage")]
 use super::inflate::Inflate;
 use super::input::{Stream, check_bytes, check_ratio};
 use crate::error::{Place, ReadError};
@@ -13,7 +12,6 @@ const AT_ONCE: usize = 1 << 18;
 
 enum Decoder<'a> {
     Gzip(MultiGzDecoder<BufReader<Stream<'a>>>),
-    #[cfg(feature = "metaimage")]
     Zlib(Inflate<BufReader<Stream<'a>>>),
 }
 
@@ -35,7 +33,6 @@ impl<'a> Unpacked<'a> {
     }
 
     /// Of one zlib stream.
-    #[cfg(feature = "metaimage")]
     pub(super) fn zlib(packed: Stream<'a>, stored: u64, params: ReadParams) -> Self {
         let packed = BufReader::with_capacity(AT_ONCE, packed);
         Self { decoder: Decoder::Zlib(Inflate::new(packed)), given: 0, stored, params }
@@ -45,7 +42,6 @@ impl<'a> Unpacked<'a> {
     fn packed(&self) -> (&BufReader<Stream<'a>>, &'static str) {
         match &self.decoder {
             Decoder::Gzip(decoder) => (decoder.get_ref(), "a complete gzip stream"),
-            #[cfg(feature = "metaimage")]
             Decoder::Zlib(decoder) => (decoder.get_ref(), "a complete zlib stream and nothing after it"),
         }
     }
@@ -55,7 +51,6 @@ impl Read for Unpacked<'_> {
     fn read(&mut self, target: &mut [u8]) -> io::Result<usize> {
         let read = match &mut self.decoder {
             Decoder::Gzip(decoder) => decoder.read(target),
-            #[cfg(feature = "metaimage")]
             Decoder::Zlib(decoder) => decoder.read(target),
         };
         let n = read.map_err(|e| {

@@ -139,7 +139,7 @@ mod tests {
         marks.sort_unstable();
         marks.dedup();
         assert_eq!([extensions.len(), marks.len()], counts);
-        let read = |extension: &&str| super::super::by_name(Path::new(&format!("a.{extension}"))).is_some();
+        let read = |extension: &&str| super::super::format::by_name(Path::new(&format!("a.{extension}"))).is_some();
         assert_eq!(extensions.iter().find(|e| read(e)), None, "an extension that is read");
     }
 }

@@ -3,7 +3,6 @@
 use super::ReadParams;
 use super::input::{self, Stream};
 use super::selection::Selection;
-#[cfg(any(feature = "nrrd", feature = "metaimage", feature = "vti", feature = "vtk"))]
 use super::text::Words;
 use crate::error::{Place, ReadError};
 use rayon::prelude::*;
@@ -147,7 +146,6 @@ pub(super) fn read(
 }
 
 /// Reads the voxels behind so many bytes, with which the stream has to end; −1 for whatever comes before.
-#[cfg(any(feature = "nrrd", feature = "metaimage"))]
 pub(super) fn behind(
     mut stream: Stream<'_>,
     skip: i64,
@@ -230,7 +228,6 @@ fn append(values: &mut Vec<f32>, raw: &[u8], stored: &Stored) {
 }
 
 /// Reads the voxels from a text, as many as there have to be; `hint` says what is wrong if there are fewer.
-#[cfg(any(feature = "nrrd", feature = "metaimage", feature = "vti", feature = "vtk"))]
 pub(super) fn text(
     words: &mut Words<'_>,
     stored: &Stored,
@@ -269,7 +266,6 @@ pub(super) fn text(
 }
 
 /// The same of a text in which nothing else follows.
-#[cfg(any(feature = "nrrd", feature = "metaimage", feature = "vti"))]
 pub(super) fn whole_text(
     mut words: Words<'_>,
     stored: &Stored,
