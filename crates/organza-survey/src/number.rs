@@ -50,7 +50,7 @@ mod tests {
 
     #[test]
     fn numbers_have_the_digits_of_their_unit() {
-        assert_eq!(rounded(1234.567_89, 0.01), "1234.57");
+        assert_eq!(rounded(1_234.567_89, 0.01), "1234.57");
         assert_eq!(rounded(637_012.239_87, 0.001), "637012.24");
         assert_eq!(rounded(1e7 + 0.25, 0.01), "10000000.25");
         assert_eq!(rounded(-0.000_01, 0.001), "0");
