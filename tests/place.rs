@@ -34,6 +34,11 @@ impl Place {
         fs::read(self.path(name)).unwrap()
     }
 
+    /// Size and colours of a PNG file in it, without what the file says of how it was made.
+    pub fn pixels(&self, name: &str) -> image::DynamicImage {
+        image::open(self.path(name)).unwrap()
+    }
+
     /// Writes a file in it.
     pub fn write(&self, name: &str, bytes: impl AsRef<[u8]>) {
         fs::write(self.path(name), bytes).unwrap();

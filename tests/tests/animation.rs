@@ -59,12 +59,12 @@ fn a_frame_is_the_scene_with_its_values() {
         let place = Place::new(&moving());
         let frames = format!("--frames={frame}");
         place.expect(0, &["render", "s.toml", "-o", "a.png", "-o", "b.png", &frames], "");
-        let drawn = place.bytes(&format!("a.000{frame}.png"));
-        assert_eq!(drawn, place.bytes(&format!("b.000{frame}.png")));
+        let drawn = place.pixels(&format!("a.000{frame}.png"));
+        assert!(drawn == place.pixels(&format!("b.000{frame}.png")));
         place.write("s.toml", still());
         let sets: Vec<&str> = sets.iter().flat_map(|s| ["--set", s]).collect();
         place.expect(0, &[&["render", "s.toml", "-o", "still.png"], &sets[..]].concat(), "");
-        assert_eq!(drawn, place.bytes("still.png"), "frame {frame}");
+        assert!(drawn == place.pixels("still.png"), "frame {frame}");
     }
     // Without --frames the scene is drawn as it is written.
     assert_eq!(draw(&moving(), &[]), draw(&still(), &[]));
@@ -151,18 +151,18 @@ fn what_moves_or_hides_is_not_sampled_again() {
     let frames = document["frames"].as_array().unwrap();
     assert!(sampled(&frames[0]).is_some_and(|n| n > 1000), "{}", frames[0]["cost"]);
     assert!(frames[1..].iter().all(|f| sampled(f).is_none()), "{document:#}");
-    let drawn = |frame: u32| place.bytes(&format!("p.{frame:04}.png"));
-    assert_eq!(drawn(0), drawn(2));
+    let drawn = |frame: u32| place.pixels(&format!("p.{frame:04}.png"));
+    assert!(drawn(0) == drawn(2));
     assert!(drawn(0) != drawn(1) && drawn(2) != drawn(3));
     // The ball is nearest before it moves: these frames are as fine as a still picture, and the same.
     place.expect(0, &["render", "s.toml", "-o", "still.png"], "");
-    assert_eq!(drawn(0), place.bytes("still.png"));
+    assert!(drawn(0) == place.pixels("still.png"));
     // Without room every frame samples as it draws.
     let little = ["render", "s.toml", "-o", "little.png", "--frames", "--json", "--max-memory", "20M"];
     let out = place.expect(0, &little, "");
     let document: Value = serde_json::from_slice(&out.stdout).unwrap();
     assert!(document["frames"].as_array().unwrap().iter().all(|f| sampled(f).is_none()));
-    assert_eq!(place.bytes("little.0003.png"), drawn(3));
+    assert!(place.pixels("little.0003.png") == drawn(3));
 }
 
 /// A triangle, and vertices that belong to none: 3.6 MB in memory, a few splats.

@@ -301,6 +301,7 @@ fn bi34_odd_names_work_and_are_escaped() {
     assert_eq!(second.status.code(), Some(4));
     assert!(String::from_utf8_lossy(&second.stderr).contains("p\\xfe.exr: this file exists already"));
     fs::write(&scene, "version = 2").unwrap();
+    fs::remove_file(&picture).unwrap();
     let text = render().stderr;
     assert!(
         String::from_utf8_lossy(&text).contains("s\\xff\\n\\u{1b}[2J.toml:1:"),

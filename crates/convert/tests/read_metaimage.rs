@@ -97,7 +97,7 @@ fn what_is_wrong_in_a_header_is_named_with_its_line() {
         ("= LOCAL", "= LIST", "a.mha:10: expected one data file in the header's folder, found 'LIST'"),
         ("= LOCAL", "= a%03d.raw", "a.mha:10: expected one data file in the header's folder"),
         ("= LOCAL", "= ../a.raw", "a.mha:10: expected the data: a file in the same folder or below"),
-        ("= LOCAL", "= a.raw", "a.mha:10: expected a header and its data in one file, as it was read from memory"),
+        ("= LOCAL", "= a.raw", "a.mha:10: expected the data: all of it in one file, as it was read from memory"),
     ] {
         refused(&with(from, to), beginning);
     }

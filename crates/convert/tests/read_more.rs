@@ -350,5 +350,5 @@ fn ba16_detached_data_lies_in_the_headers_folder() {
     assert_eq!(header("missing.raw", "raw").unwrap_err().fault, Fault::FileSystem);
     assert_eq!(header("sub", "raw").unwrap_err().fault, Fault::FileSystem);
     let in_memory = NRRD.replace("encoding", "data file: data.raw\nencoding");
-    refused("a.nhdr", in_memory, "a.nhdr:10: expected a header and its data in one file");
+    refused("a.nhdr", in_memory, "a.nhdr:10: expected the data: all of it in one file");
 }

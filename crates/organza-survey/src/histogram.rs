@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn quantiles_of_even_values_are_even() {
-        let values: Vec<f32> = (0..1000).map(|i| i as f32 / 1000.0).collect();
+        let values: Vec<f32> = (0..1000).map(|i| (i as f32 + 0.5) / 1000.0).collect();
         let histogram = Histogram::new(&values, [0.0, 1.0], 50);
         assert_eq!(histogram.counts, vec![20; 50]);
         for share in [0.1, 0.5, 0.99] {

@@ -41,15 +41,17 @@ impl Matter {
         let histogram = Histogram::new(&grid.values, range, BINS);
         let spread = histogram.high - histogram.low;
         let mut border = border(grid);
-        let air = quantile_of(&mut border, 0.5);
-        let quiet = quantile_of(&mut border, 0.9) - quantile_of(&mut border, 0.1) < QUIET * spread;
-        if !quiet {
+        let [low, air, high] = [0.1, 0.5, 0.9].map(|share| quantile_of(&mut border, share));
+        if high - low >= QUIET * spread {
             let (first, last) = (histogram.quantile(0.4), histogram.quantile(0.998));
             let last = if last > first { last } else { histogram.high };
             return Some(Self { histogram, air: None, first, last });
         }
         let middle = histogram.bin(air);
-        let (above, below) = (sum(&histogram.counts[middle + 1..]), sum(&histogram.counts[..middle]));
+        // Farther away than air scatters by itself.
+        let (low, high) = (histogram.bin(low), histogram.bin(high));
+        let above = sum(&histogram.counts[(2 * high - low + 1).min(BINS)..]);
+        let below = sum(&histogram.counts[..(2 * low).saturating_sub(high)]);
         let (first, last) = if above >= below {
             let parting = histogram.parting(middle..BINS);
             (air + FOOT * (parting - air), densest(&histogram, histogram.bin(parting)..BINS, 0.99))

@@ -35,7 +35,7 @@ impl<'a> Beside<'a> {
         if name.contains("://") || !Path::new(name).components().all(within) {
             return Err("a file in the same folder or below");
         }
-        let file = self.file.ok_or("in the file itself, as it was read from memory")?;
+        let file = self.file.ok_or("all of it in one file, as it was read from memory")?;
         let folder = file.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let path = folder.join(name);
         // Links are followed before they are judged.
