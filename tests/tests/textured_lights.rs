@@ -217,7 +217,7 @@ fn the_path_tracer_has_the_same_light() {
     checker(folder.path());
     let fog = "[[object]]\nname = 'fog'\nmedium_box = { min = [-1, -1, 0.1], max = [1, 1, 0.7], extinction = 0.8, spacing = 0.1 }\n";
     let spot = spot("texture = 'checker.hdr'\ntexture_up = [1, 1, 0]\ntexture_angle = 70");
-    // Splats of a third of a pixel: what is left of their blur at the edges of squares is little.
+    // Splats of a sixth of a pixel: what is left of their blur at the edges of squares is little.
     let text = parallel_view(2.0, 16) + &spot + fog + &wall(1.0).replace("0.04", "0.02");
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, text).unwrap();
@@ -259,7 +259,7 @@ fn pictures_that_are_none_or_lie_nowhere_are_refused() {
             3,
             "`texture_angle`: expected degrees between 0 and 180",
         ),
-        (spot("texture = 'checker.hdr'\ntexture_angle = nan"), 3, "texture_angle"),
+        (spot("texture = 'checker.hdr'\ntexture_angle = nan"), 3, "expected a finite number, found nan"),
         (
             spot("texture = 'checker.hdr'\ntexture_up = [0, 0, 3]"),
             3,

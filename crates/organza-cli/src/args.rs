@@ -196,6 +196,12 @@ pub(super) struct RenderArguments {
     /// Draw so many frames in a circle around all, to numbered files
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(super) turntable: Option<u32>,
+    /// Write PNG files with the opacity of each pixel in the place of the background
+    #[arg(long)]
+    pub(super) transparent: bool,
+    /// Write PNG files with 16 bits a channel instead of 8
+    #[arg(long)]
+    pub(super) deep: bool,
     /// Store colours, alpha and shadow of EXR files in 16 bits
     #[arg(long)]
     pub(super) half: bool,

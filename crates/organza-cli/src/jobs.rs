@@ -3,7 +3,7 @@
 
 use super::args::{Frames, RenderArguments};
 use super::given::{Given, given};
-use super::session::{parse_scene, render_options};
+use super::session::{overrides, parse_scene, render_options};
 use organza::output::{self, Format, Target, Targets};
 use organza::scene::{FoundCamera, Scene};
 use organza::{Error, Files, Progress, Render, RenderOptions, Sequence, printable};
@@ -42,7 +42,7 @@ impl<'a> Jobs<'a> {
             Target::new(output, arguments.force)?;
         }
         let (given, files) = given(&arguments.scene)?;
-        let still = parse_scene(&arguments.scene, &given, None, arguments.turntable)?;
+        let still = parsed(arguments, &given, None)?;
         let asked = arguments.frames.or(arguments.turntable.map(|_| Frames::All));
         let frames = asked.map(|frames| range(frames, &still)).transpose()?;
         Ok((Self { arguments, given, still, outputs, frames }, files))
@@ -84,6 +84,19 @@ impl<'a> Jobs<'a> {
         Ok(Drawing::Frames(Box::new(sequence)))
     }
 
+    /// What a picture tells of its scene: the text, and in TOML the options that have changed it as comments.
+    pub(super) fn told(&self, frame: Option<u32>) -> Result<String, Error> {
+        let mut text = String::from_utf8_lossy(&self.given.bytes).into_owned();
+        if self.given.file.extension().is_none_or(|e| !e.eq_ignore_ascii_case("json")) {
+            let changes = overrides(&self.arguments.scene, self.given.is_made)?;
+            let changes = changes.iter().map(|change| change.flag().to_owned());
+            let turntable = self.arguments.turntable.map(|count| format!("--turntable {count}"));
+            let frame = frame.map(|frame| format!("--frames={frame}"));
+            changes.chain(turntable).chain(frame).for_each(|option| text += &format!("\n# {option}"));
+        }
+        Ok(text)
+    }
+
     /// The scene at a frame, and the camera that was placed for it from the files of a sequence.
     pub(super) fn scene(
         &self,
@@ -91,7 +104,7 @@ impl<'a> Jobs<'a> {
         sequence: Option<&Sequence>,
     ) -> Result<(Cow<'_, Scene>, Option<FoundCamera>), Error> {
         let scene = match frame {
-            Some(_) => parse_scene(&self.arguments.scene, &self.given, frame, self.arguments.turntable)?,
+            Some(_) => parsed(self.arguments, &self.given, frame)?,
             None => return Ok((Cow::Borrowed(&self.still), None)),
         };
         let Some(sequence) = sequence else { return Ok((Cow::Owned(scene), None)) };
@@ -116,6 +129,13 @@ impl<'a> Jobs<'a> {
             checkpoint: checkpoint.as_ref().map(|path| target(&name(path), true)).transpose()?,
         })
     }
+}
+
+/// The scene with the options of the command line, and with the layer that PNG files without a background are made with.
+fn parsed(arguments: &RenderArguments, given: &Given, frame: Option<u32>) -> Result<Scene, Error> {
+    let mut scene = parse_scene(&arguments.scene, given, frame, arguments.turntable)?;
+    let has_all = !arguments.transparent || scene.render.layers.add("background");
+    has_all.then_some(scene).ok_or_else(|| Error::Internal("there is no layer of the background".into()))
 }
 
 /// What draws the pictures of a run.
@@ -190,6 +210,13 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Error> {
             name.to_owned()
         };
         outputs.push(Path::new(name.file_stem().unwrap_or("picture".as_ref())).with_added_extension("exr"));
+    }
+    let options = [("--transparent", arguments.transparent), ("--deep", arguments.deep)];
+    let is_png = |path: &PathBuf| Format::of_path(path).is_ok_and(|format| format == Format::Png);
+    if let Some((option, _)) = options.iter().find(|option| option.1)
+        && !outputs.iter().any(is_png)
+    {
+        return Err(Error::usage(format!("{option} is for PNG files, and no output is one"), "add -o NAME.png"));
     }
     for (i, path) in outputs.iter().enumerate() {
         Format::of_path(path)?;

@@ -23,6 +23,8 @@ struct Job<'a> {
     scene: &'a Scene,
     /// What it is drawn of, as it was named.
     inputs: &'a [PathBuf],
+    /// What its files tell of the scene.
+    told: String,
     /// The camera that was placed for it.
     found: Option<FoundCamera>,
     places: &'a Places,
@@ -48,7 +50,8 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
         for (at, frame) in jobs.frames().enumerate() {
             let (scene, found) = jobs.scene(frame, drawing.sequence())?;
             let places = jobs.places(frame, Target::new)?;
-            let job = Job { frame, scene: &scene, inputs: jobs.inputs(), found, places: &places };
+            let told = jobs.told(frame)?;
+            let job = Job { frame, scene: &scene, inputs: jobs.inputs(), told, found, places: &places };
             progress.plan([(job.stage(), 1.0), (LATER.to_owned(), (count - at - 1) as f64)]);
             progress.begin(&job.stage());
             progress.enter();
@@ -111,7 +114,7 @@ impl Job<'_> {
         progress.leave();
         progress.begin(WRITING);
         let mut warnings = render.warnings.clone();
-        let written = self.write_outputs(&render, arguments.half, &mut warnings)?;
+        let written = self.write_outputs(&render, arguments, &mut warnings)?;
         if let Some(target) = &self.places.cost {
             target.write(format!("{:#}\n", report::cost_json(&render.cost)).as_bytes())?;
         }
@@ -123,7 +126,7 @@ impl Job<'_> {
     fn metadata(&self, render: &Render) -> Metadata {
         Metadata {
             scene_sha256: self.scene.sha256.clone(),
-            scene: String::new(),
+            scene: self.told.clone(),
             technique: render.plan.technique.clone(),
             seed: self.scene.render.seed,
             backend: render.backend.clone(),
@@ -135,19 +138,16 @@ impl Job<'_> {
     fn write_outputs(
         &self,
         render: &Render,
-        half: bool,
+        arguments: &RenderArguments,
         warnings: &mut Vec<String>,
     ) -> Result<Vec<(&Path, WriteReport)>, Error> {
         let metadata = self.metadata(render);
+        let RenderArguments { half, deep, transparent, .. } = *arguments;
+        let params = output::Params { half, deep, transparent };
         let mut written = Vec::with_capacity(self.places.outputs.len());
         for target in &self.places.outputs {
             let path = target.path();
-            let report = output::write(
-                &render.layers,
-                &metadata,
-                target,
-                &output::Params { half, ..output::Params::default() },
-            )?;
+            let report = output::write(&render.layers, &metadata, target, &params)?;
             if report.clamped > 0 {
                 warnings.push(format!(
                     "{}: {} values were cut to the format's largest",

@@ -101,7 +101,7 @@ pub(super) fn processor_only(arguments: &SceneArguments) -> Result<(), Error> {
 }
 
 /// Options that stand for a value of the scene, then `--set` in order. A scene that was made of data files has the first of them already.
-fn overrides(a: &SceneArguments, is_made: bool) -> Result<Vec<Override>, Error> {
+pub(super) fn overrides(a: &SceneArguments, is_made: bool) -> Result<Vec<Override>, Error> {
     let mut options: Vec<(String, &str, String)> = Vec::new();
     if let Some(name) = &a.technique {
         options.push((format!("--technique {name}"), "render.technique", quote(name)));

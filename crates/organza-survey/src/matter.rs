@@ -158,7 +158,7 @@ mod tests {
             assert!((matter.air.unwrap() - a).abs() < 2.0, "{matter:?}");
             let between = |x: f64, y: f64, z: f64| (x.min(z)..=x.max(z)).contains(&y);
             assert!(
-                between(a, matter.first, f) && between(f, matter.last, c + 2.0),
+                between(a, matter.first, f) && between(f, matter.last, c + 2.0 * (c - f).signum()),
                 "{} {}",
                 matter.first,
                 matter.last
