@@ -213,7 +213,6 @@ fn parse(
     reading: &mut Reading<'_>,
 ) -> Result<Loaded, ReadError> {
     reading.go_on()?;
-    let params = reading.params;
     if stream.peek(2)? == [0x1f, 0x8b] && !is_raw(path) {
         stream = stream.gunzip();
     }
@@ -226,45 +225,56 @@ fn parse(
         let hint = "the file is truncated, or was never written";
         return Err(ReadError::input(Place::Byte(0), "vertices or points", "an empty file", hint));
     }
-    reading.notes.format = format.map_or_else(String::new, |format| format!("{format:?}"));
+    let Some(format) = format else { return Err(unread::refused(path, head)) };
+    reading.notes.format = format!("{format:?}");
+    parse_as(format, stream, path, place, reading)
+}
+
+fn parse_as(
+    format: Format,
+    stream: Stream<'_>,
+    path: &Path,
+    place: Option<&Path>,
+    reading: &mut Reading<'_>,
+) -> Result<Loaded, ReadError> {
+    let params = reading.params;
     match format {
         #[cfg(feature = "ply")]
-        Some(Format::Ply) => ply::read(&stream.rest()?, reading),
+        Format::Ply => ply::read(&stream.rest()?, reading),
         #[cfg(feature = "stl")]
-        Some(Format::Stl) => stl::read(&stream.rest()?, reading).map(Loaded::Mesh),
+        Format::Stl => stl::read(&stream.rest()?, reading).map(Loaded::Mesh),
         #[cfg(feature = "obj")]
-        Some(Format::Obj) => obj::read(&stream.rest()?, place, reading),
+        Format::Obj => obj::read(&stream.rest()?, place, reading),
         #[cfg(feature = "off")]
-        Some(Format::Off) => off::read(&stream.rest()?, reading),
+        Format::Off => off::read(&stream.rest()?, reading),
         #[cfg(feature = "gltf")]
-        Some(Format::Gltf) => gltf::read(&stream.rest()?, place, reading),
+        Format::Gltf => gltf::read(&stream.rest()?, place, reading),
         #[cfg(feature = "pcd")]
-        Some(Format::Pcd) => pcd::read(&stream.rest()?, reading).map(Loaded::Points),
+        Format::Pcd => pcd::read(&stream.rest()?, reading).map(Loaded::Points),
         #[cfg(feature = "xyz")]
-        Some(Format::Xyz) => xyz::read(&stream.rest()?, params, &mut reading.notes).map(Loaded::Points),
+        Format::Xyz => xyz::read(&stream.rest()?, params, &mut reading.notes).map(Loaded::Points),
         #[cfg(feature = "nrrd")]
-        Some(Format::Nrrd) => nrrd::read(stream, place, params, &mut reading.notes).map(Loaded::Grid),
+        Format::Nrrd => nrrd::read(stream, place, params, &mut reading.notes).map(Loaded::Grid),
         #[cfg(feature = "las")]
-        Some(Format::Las) => las::read(stream.rest()?, params, &mut reading.notes).map(Loaded::Points),
+        Format::Las => las::read(stream.rest()?, params, &mut reading.notes).map(Loaded::Points),
         #[cfg(feature = "nifti")]
-        Some(Format::Nifti) => nifti::read(stream, params, &mut reading.notes).map(Loaded::Grid),
+        Format::Nifti => nifti::read(stream, params, &mut reading.notes).map(Loaded::Grid),
         #[cfg(feature = "metaimage")]
-        Some(Format::MetaImage) => metaimage::read(stream, place, params, &mut reading.notes).map(Loaded::Grid),
+        Format::MetaImage => metaimage::read(stream, place, params, &mut reading.notes).map(Loaded::Grid),
         #[cfg(feature = "vti")]
-        Some(Format::Vti) => vti::read(&stream.rest()?, params, &mut reading.notes).map(Loaded::Grid),
+        Format::Vti => vti::read(&stream.rest()?, params, &mut reading.notes).map(Loaded::Grid),
         #[cfg(feature = "vtk")]
-        Some(Format::Vtk) => vtk::read(&stream.rest()?, params, &mut reading.notes).map(Loaded::Grid),
+        Format::Vtk => vtk::read(&stream.rest()?, params, &mut reading.notes).map(Loaded::Grid),
         #[cfg(feature = "raw")]
-        Some(Format::Raw) => raw::read(stream, path, params, &mut reading.notes).map(Loaded::Grid),
+        Format::Raw => raw::read(stream, path, params, &mut reading.notes).map(Loaded::Grid),
         #[cfg(feature = "hdr")]
-        Some(Format::Hdr) => radiance::read(&stream.rest()?, reading).map(Loaded::Image),
+        Format::Hdr => radiance::read(&stream.rest()?, reading).map(Loaded::Image),
         #[cfg(feature = "exr")]
-        Some(Format::Exr) => openexr::read(&stream.rest()?, reading).map(Loaded::Image),
+        Format::Exr => openexr::read(&stream.rest()?, reading).map(Loaded::Image),
         #[cfg(feature = "png")]
-        Some(Format::Png) => png::read(&stream.rest()?, reading).map(Loaded::Image),
+        Format::Png => png::read(&stream.rest()?, reading).map(Loaded::Image),
         #[allow(unreachable_patterns, reason = "reached where a reader is not compiled in")]
-        Some(format) => Err(not_compiled_in(format)),
-        None => Err(unread::refused(path, head)),
+        format => Err(not_compiled_in(format)),
     }
 }
 

@@ -10,7 +10,8 @@ use super::check_object::{Named, check_object};
 use super::check_render::check_render;
 use super::load::Turn;
 use super::paths::{Paths, ROOT_KEY};
-use super::raw::RawScene;
+use super::raw::{RawAnimation, RawScene};
+use super::raw_object::RawObject;
 use super::tree::{Document, Step};
 use super::{Aligned, RenderSettings, Scene, SceneObject};
 use crate::Error;
@@ -163,28 +164,8 @@ pub(super) fn scene(
     let materials = check_materials(&at.key("material"), &raw.material)?;
     let paths = Paths::new(&at.key(ROOT_KEY), document.file, raw.root.as_deref(), allow_path)?;
     let named = Named { materials: &materials, footprints: &footprints, paths: &paths };
-    let named_materials: HashMap<&str, usize> =
-        materials.iter().enumerate().skip(1).map(|(i, m)| (m.name.as_str(), i)).collect();
     let at_objects = at.key("object");
-    let mut objects: Vec<SceneObject> = Vec::with_capacity(raw.object.len());
-    let mut first_of: HashMap<String, usize> = HashMap::new();
-    for (i, object) in raw.object.into_iter().enumerate() {
-        let at = at_objects.index(i);
-        if let Some(first) = first_of.insert(object.name.clone(), i) {
-            let first = at_objects.index(first).key("name").name();
-            let message = format!("duplicate object name `{}`, first at {first}", crate::shown(&object.name));
-            return Err(at.key("name").error(message, "each object needs a name of its own"));
-        }
-        let material = match object.material.as_deref() {
-            None => 0,
-            Some(name) => match named_materials.get(name) {
-                Some(i) => *i,
-                None => return Err(unknown_material(&at, &at_materials(&at_objects), name, &materials)),
-            },
-        };
-        let deforms = raw.animation.as_ref().is_some_and(|animation| deforms(animation, i, &object.name));
-        objects.push(SceneObject { deforms, ..check_object(&at, object, material, &named)? });
-    }
+    let objects = check_objects(&at_objects, raw.object, raw.animation.as_ref(), &named)?;
     let mut render = check_render(&at.key("render"), &raw.render)?;
     let layers = (&at.key("render").key("layers"), raw.render.layers.as_slice());
     check_drawn(&at_objects, &objects, &materials, layers, &mut render)?;
@@ -213,6 +194,38 @@ pub(super) fn scene(
         materials,
         footprints,
     })
+}
+
+/// Checks every object: its name, its material, and what [`check_object`] does.
+fn check_objects(
+    at_objects: &At<'_>,
+    raw: Vec<RawObject>,
+    animation: Option<&RawAnimation>,
+    named: &Named<'_>,
+) -> Result<Vec<SceneObject>, Error> {
+    let materials = named.materials;
+    let named_materials: HashMap<&str, usize> =
+        materials.iter().enumerate().skip(1).map(|(i, m)| (m.name.as_str(), i)).collect();
+    let mut objects: Vec<SceneObject> = Vec::with_capacity(raw.len());
+    let mut first_of: HashMap<String, usize> = HashMap::new();
+    for (i, object) in raw.into_iter().enumerate() {
+        let at = at_objects.index(i);
+        if let Some(first) = first_of.insert(object.name.clone(), i) {
+            let first = at_objects.index(first).key("name").name();
+            let message = format!("duplicate object name `{}`, first at {first}", crate::shown(&object.name));
+            return Err(at.key("name").error(message, "each object needs a name of its own"));
+        }
+        let material = match object.material.as_deref() {
+            None => 0,
+            Some(name) => match named_materials.get(name) {
+                Some(i) => *i,
+                None => return Err(unknown_material(&at, &at_materials(at_objects), name, materials)),
+            },
+        };
+        let deforms = animation.is_some_and(|animation| deforms(animation, i, &object.name));
+        objects.push(SceneObject { deforms, ..check_object(&at, object, material, named)? });
+    }
+    Ok(objects)
 }
 
 /// Refuses slabs along a lattice that are seen in perspective.
