@@ -77,7 +77,7 @@ fn splats_are_shaded_only_where_somebody_shows_what_that_gives() {
         let planned = explain(&scene, &RenderOptions::default(), &Progress::new()).unwrap().plan;
         let drawn = render(&scene, &RenderOptions::default(), &Progress::new()).unwrap();
         let planned: Vec<String> = planned.passes.into_iter().map(|p| p.name).collect();
-        let mut ran: Vec<String> = drawn.cost.stages.into_iter().map(|s| s.name.into()).collect();
+        let mut ran: Vec<String> = drawn.cost.stages.into_iter().map(|s| s.name).collect();
         ran.dedup();
         for pass in ["project", "shade", "opaque", "surfels", "group"] {
             let of = |names: &[String]| names.iter().any(|name| name == pass);
@@ -125,7 +125,7 @@ fn who_knows_no_bumps_says_so() {
 fn keys_of_opaque_surfaces_and_bumps_are_checked() {
     let refused = |text: &str, expected: &str| {
         let error = parse("s.toml".as_ref(), text.as_bytes(), &LoadOptions::default()).unwrap_err();
-        let said = error.to_string() + &error.hint();
+        let said = error.to_string() + error.hint();
         assert!(said.contains(expected), "{said}");
     };
     let keys = |keys: &str| ball(&format!("[render.surfels]\n{keys}\n"));
