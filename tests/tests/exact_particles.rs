@@ -270,13 +270,6 @@ impl Sampler for InPairs<'_> {
     }
 }
 
-/// A sum with eleven bits, as f16 has them.
-fn in_half(sum: f64, v: f64) -> f64 {
-    let sum = sum + v;
-    let unit = 2f64.powi(sum.abs().max(1e-5).log2().floor() as i32 - 10);
-    (sum / unit).round_ties_even() * unit
-}
-
 #[test]
 fn particles_have_no_bias_against_the_exact_compositor_on_ten_scenes() {
     for case in ten_scenes() {
@@ -285,18 +278,31 @@ fn particles_have_no_bias_against_the_exact_compositor_on_ten_scenes() {
     }
 }
 
-#[test]
-fn planted_biases_are_found() {
-    let [crossing, .., fog] = &ten_scenes()[..] else { panic!("ten scenes") };
-    for case in [crossing, fog] {
-        let exact = case.exact();
-        let paired = scores(&case.moments(true, |sum, v| sum + v), &exact);
-        assert!(biased(&paired), "correlated sets, {}: {paired:.2?}", case.name);
-        let halves = scores(&case.moments(false, in_half), &exact);
-        assert!(biased(&halves), "sums in f16, {}: {halves:.2?}", case.name);
-        let mut denser = exact;
-        denser.iter_mut().for_each(|e| e[0] = 1.0 - (1.0 - e[0]).powf(1.01));
-        let thin = scores(&case.moments(false, |sum, v| sum + v), &denser);
-        assert!(biased(&thin), "one percent of optical depth, {}: {thin:.2?}", case.name);
+/// What takes long and rarely fails where the others hold.
+#[cfg(feature = "deep")]
+mod deep {
+    use super::*;
+
+    /// A sum with eleven bits, as f16 has them.
+    fn in_half(sum: f64, v: f64) -> f64 {
+        let sum = sum + v;
+        let unit = 2f64.powi(sum.abs().max(1e-5).log2().floor() as i32 - 10);
+        (sum / unit).round_ties_even() * unit
+    }
+
+    #[test]
+    fn planted_biases_are_found() {
+        let [crossing, .., fog] = &ten_scenes()[..] else { panic!("ten scenes") };
+        for case in [crossing, fog] {
+            let exact = case.exact();
+            let paired = scores(&case.moments(true, |sum, v| sum + v), &exact);
+            assert!(biased(&paired), "correlated sets, {}: {paired:.2?}", case.name);
+            let halves = scores(&case.moments(false, in_half), &exact);
+            assert!(biased(&halves), "sums in f16, {}: {halves:.2?}", case.name);
+            let mut denser = exact;
+            denser.iter_mut().for_each(|e| e[0] = 1.0 - (1.0 - e[0]).powf(1.01));
+            let thin = scores(&case.moments(false, |sum, v| sum + v), &denser);
+            assert!(biased(&thin), "one percent of optical depth, {}: {thin:.2?}", case.name);
+        }
     }
 }

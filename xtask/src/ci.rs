@@ -91,6 +91,7 @@ fn cargo(words: &[String], environment: &[(&str, &str)], repo: &Repo) -> Result<
 fn steps(repo: &Repo) -> Vec<Step> {
     let one = |line: &str| Work::Cargo(vec![split(line)], &[]);
     let docs = Work::Cargo(vec![split("doc --workspace --no-deps")], &[("RUSTDOCFLAGS", "-D warnings")]);
+    let picked = bare(repo).into_iter().filter(|check| is_picked(check.0));
     let step = |name, work| Step { name, work };
     vec![
         step("fmt", one("fmt --all --check")),
@@ -98,9 +99,9 @@ fn steps(repo: &Repo) -> Vec<Step> {
         step("papers", Work::Task(papers::check)),
         step("clippy", one(&clippy())),
         step("docs", docs),
-        step("alone", Work::Cargo(alone(repo, is_picked), &[])),
+        step("alone", Work::Cargo(picked.map(|check| check.1).collect(), &[])),
+        step("modules", Work::Task(vulkan::modules)),
         step("tests", Work::Task(vulkan::tests)),
-        step("vulkan", Work::Task(vulkan::beside_tests)),
     ]
 }
 
@@ -110,16 +111,18 @@ pub(crate) fn clippy() -> String {
 }
 
 /// What takes minutes and rarely breaks where [`run`] holds, to be run before a release: kernels compiled anew, where tests hold the
-/// hashes of what they were compiled from; the orchestrator's crates each without what the others ask of their dependencies;
-/// recordings by every executor under every validation; every scene drawn, and forms that take long.
+/// hashes of what they were compiled from; each crate with one of its features, the orchestrator's without what the others ask of
+/// their dependencies; recordings by every executor under every validation; every scene drawn, and forms that take long.
 pub(crate) fn deep(repo: &Repo) -> Outcome {
     // Of the whole workspace, so that what other steps have compiled serves this one.
-    let slow = format!("{TESTS} --features {FEATURES},{DRIVER},{DEEP} --test end-to-end -- every_scene:: gyroid");
+    let slow = format!("{TESTS} --features {FEATURES},{DRIVER},{DEEP} --test end-to-end -- every_scene:: deep::");
+    let parts = bare(repo).into_iter().filter(|check| !is_picked(check.0)).map(|check| check.1);
+    let alone = parts.chain(with_one_feature(repo)).collect();
     let steps = [
         Step { name: "shaders", work: Work::Task(|repo| shaders::run(repo, true)) },
-        Step { name: "alone", work: Work::Cargo(alone(repo, |folder| !is_picked(folder)), &[]) },
+        Step { name: "alone", work: Work::Cargo(alone, &[]) },
         Step { name: "vulkan", work: Work::Task(vulkan::run) },
-        Step { name: "scenes", work: Work::Cargo(vec![split(&slow)], &[]) },
+        Step { name: "deep tests", work: Work::Cargo(vec![split(&slow)], &[]) },
     ];
     follow(&steps, repo)
 }
@@ -133,18 +136,22 @@ fn is_picked(folder: &str) -> bool {
     !folder.starts_with("crates/organza")
 }
 
-/// Each of these library crates without its default features, then with each of its features alone.
-fn alone(repo: &Repo, which: fn(&str) -> bool) -> Vec<Vec<String>> {
-    let mut runs = Vec::new();
+/// Library crates, each without its default features: its folder and the check of it.
+fn bare(repo: &Repo) -> Vec<(&str, Vec<String>)> {
     // A command has no library.
     let is_library = |folder: &&str| repo.text(&format!("{folder}/src/main.rs")).is_none();
-    for folder in repo.crate_folders().into_iter().filter(|folder| which(folder)).filter(is_library) {
-        let name = folder.trim_start_matches("crates/");
-        let bare = format!("check --package {name} --lib --no-default-features");
+    let check =
+        |folder: &str| format!("check --package {} --lib --no-default-features", folder.trim_start_matches("crates/"));
+    repo.crate_folders().into_iter().filter(is_library).map(|folder| (folder, split(&check(folder)))).collect()
+}
+
+/// The same with each of its features alone.
+fn with_one_feature(repo: &Repo) -> Vec<Vec<String>> {
+    let mut runs = Vec::new();
+    for (folder, bare) in bare(repo) {
         let manifest = repo.text(&format!("{folder}/Cargo.toml")).unwrap_or_default();
         let features = lines(manifest).into_iter().filter(|l| l.table == "features" && l.key != "default");
-        runs.push(split(&bare));
-        runs.extend(features.map(|f| split(&format!("{bare} --features {}", f.key))));
+        runs.extend(features.map(|f| [bare.clone(), split(&format!("--features {}", f.key))].concat()));
     }
     runs
 }
@@ -159,23 +166,20 @@ mod tests {
         let command = [("crates/c/Cargo.toml", ""), ("crates/c/src/main.rs", ""), ("crates/organza-d/Cargo.toml", "")];
         let repo =
             Repo::of(&[&[("crates/a/Cargo.toml", manifest), ("crates/b/Cargo.toml", "")], &command[..]].concat());
-        let found = |which| alone(&repo, which).iter().map(|words| words[2..].join(" ")).collect::<Vec<_>>();
-        let bare = "--lib --no-default-features";
-        let expected = [
-            format!("a {bare}"),
-            format!("a {bare} --features ply"),
-            format!("a {bare} --features las"),
-            format!("b {bare}"),
-        ];
-        assert_eq!(found(is_picked), expected);
-        assert_eq!(found(|folder| !is_picked(folder)), [format!("organza-d {bare}")]);
+        let words = |checks: Vec<Vec<String>>| checks.iter().map(|words| words[2..].join(" ")).collect::<Vec<_>>();
+        let line = "--lib --no-default-features";
+        let bare: Vec<_> = bare(&repo).into_iter().map(|check| check.1).collect();
+        assert_eq!(words(bare), [format!("a {line}"), format!("b {line}"), format!("organza-d {line}")]);
+        let features = ["ply", "las"].map(|feature| format!("a {line} --features {feature}"));
+        assert_eq!(words(with_one_feature(&repo)), features);
+        assert!(is_picked("crates/a") && !is_picked("crates/organza-d"));
     }
 
     #[test]
     fn warnings_fail_and_what_is_slow_comes_last() {
         let steps = steps(&Repo::of(&[]));
         let names: Vec<_> = steps.iter().map(|s| s.name).collect();
-        assert_eq!(names, ["fmt", "tidy", "papers", "clippy", "docs", "alone", "tests", "vulkan"]);
+        assert_eq!(names, ["fmt", "tidy", "papers", "clippy", "docs", "alone", "modules", "tests"]);
         let Work::Cargo(_, environment) = &steps[4].work else { panic!("docs are built by cargo") };
         assert_eq!(*environment, [("RUSTDOCFLAGS", "-D warnings")]);
     }

@@ -37,21 +37,20 @@ const ACROSS: [&str; 2] = ["kernels::", "order::"];
 /// The executor and the validation that all tests run with.
 const WITH_TESTS: [&str; 2] = ["ash", "synchronization"];
 
-/// Those that the conformance tests run with beside, at every merge.
-const BESIDE_TESTS: [&str; 2] = ["wgpu", "synchronization"];
-
-/// Those that take minutes and rarely find what the others do not.
-const DEEP: [&str; 2] = ["ash", "gpu-assisted"];
-
 /// Finds or installs the parts, then checks modules and runs the conformance tests by every executor under every validation.
 pub(crate) fn run(repo: &Repo) -> Outcome {
     let parts = match parts()? {
         Ok(parts) => parts,
         Err(missing) => return without("vulkan", &missing),
     };
-    conformance(repo, &parts.driver, WITH_TESTS, None)?;
-    conformance(repo, &parts.driver, DEEP, None)?;
-    others(repo, &parts)
+    let modules = check_modules(repo, &parts.spirv_val)?;
+    for by in [WITH_TESTS, ["wgpu", "synchronization"], ["ash", "gpu-assisted"]] {
+        conformance(repo, &parts.driver, by, None)?;
+    }
+    for vector in VECTORS {
+        conformance(repo, &parts.driver, WITH_TESTS, Some(vector))?;
+    }
+    Ok(format!("vulkan: {modules} modules valid, recordings conform on lavapipe without a message"))
 }
 
 /// All tests; those of conformance by the first executor, where the parts can be had.
@@ -64,22 +63,12 @@ pub(crate) fn tests(repo: &Repo) -> Outcome {
     Ok(said)
 }
 
-/// What holds at every merge beside what [`tests`] did: what [`run`] does but for validation on the device.
-pub(crate) fn beside_tests(repo: &Repo) -> Outcome {
+/// The modules that are committed, checked by `spirv-val`.
+pub(crate) fn modules(repo: &Repo) -> Outcome {
     match parts()? {
-        Ok(parts) => others(repo, &parts),
+        Ok(parts) => Ok(format!("vulkan: {} modules valid", check_modules(repo, &parts.spirv_val)?)),
         Err(missing) => without("vulkan", &missing),
     }
-}
-
-/// Modules; the other executor; and sorts and scans with subgroups of other sizes.
-fn others(repo: &Repo, parts: &Parts) -> Outcome {
-    let modules = check_modules(repo, &parts.spirv_val)?;
-    conformance(repo, &parts.driver, BESIDE_TESTS, None)?;
-    for vector in VECTORS {
-        conformance(repo, &parts.driver, WITH_TESTS, Some(vector))?;
-    }
-    Ok(format!("vulkan: {modules} modules valid, recordings conform on lavapipe without a message"))
 }
 
 /// The parts, installed where that is possible, or the names of what is missing.

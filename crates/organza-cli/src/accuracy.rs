@@ -191,6 +191,7 @@ fn summary(report: &Report, files: &[Target], as_json: bool) -> String {
             let _ = writeln!(text, "  {:>9}  {}", study.technique, outcome_text(&study.outcomes[*setting]));
         }
     }
+    text += "what to write into the scene for each of them stands in accuracy.html, and as `toml` in accuracy.json\n";
     for file in files {
         let _ = writeln!(text, "wrote {}", printable(file.path()));
     }

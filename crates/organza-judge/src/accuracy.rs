@@ -12,6 +12,7 @@
 //! several seeds, and shows intervals instead. A technique with a limit of its own stands beside the others where all are held against
 //! physical truth, and nowhere else.
 
+mod changes;
 mod frontier;
 mod knob;
 mod limit;
@@ -22,6 +23,7 @@ mod points;
 mod random;
 mod repeat;
 mod report;
+mod report_frontier;
 mod report_html;
 mod report_joint;
 mod report_pictures;
@@ -34,6 +36,7 @@ mod study;
 mod surfels;
 mod verdict;
 
+pub use changes::{Change, changes, lines};
 pub use frontier::{Candidate, Hold, TOLD_APART, frontier, hold};
 pub use knob::{Knob, Request, Skipped, Step, Sweep, Theory};
 pub use limit::Limit;

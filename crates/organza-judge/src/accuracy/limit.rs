@@ -11,6 +11,9 @@ use reference::metrics::{Image, Linear, compare};
 /// Where the progress says that all knobs are at their ends together.
 pub(super) const TOGETHER: &str = "all knobs";
 
+/// An end that has to be finer than this many times is out of reach.
+pub(super) const MOST_FINER: f64 = 64.0;
+
 /// The picture with all knobs at their ends.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Limit {
@@ -147,7 +150,8 @@ fn limit(sweep: &Sweep, curves: &[Curve], mut held: Vec<Skipped>, draw: &mut Dra
 fn why_held(curve: &Curve, apart: f64, others: f64) -> String {
     let target = apart / MARGIN - others;
     let needs = match finer_by(&curve.settled, target) {
-        Some(factor) => format!("it would take an end {factor:.1} times finer"),
+        Some(factor) if factor <= MOST_FINER => format!("it would take an end {factor:.1} times finer"),
+        Some(_) => format!("no end that is {MOST_FINER} times finer would do"),
         None => "it does not converge fast enough to say what it would take".into(),
     };
     format!(

@@ -296,11 +296,17 @@ pub(super) fn spacing(scene: &Scene, options: &Options) -> Result<Knob, String> 
 
 /// Scales the spacing of every object that states one; raw points, volumes and meshes that are taken as they are stay.
 fn scale_spacings(scene: &mut Scene, factor: f64) {
-    for object in scene.objects.iter_mut().filter(|o| o.visible) {
-        if let Some(spacing) = spacing_of(object) {
-            *spacing *= factor;
-        }
-    }
+    spacings(scene).for_each(|spacing| *spacing *= factor);
+}
+
+/// By which factor the spacings of one scene are those of another; `None` where they are the same.
+pub(super) fn spacing_factor(from: &Scene, to: &Scene) -> Option<f64> {
+    let [mut from, mut to] = [from, to].map(Scene::clone);
+    spacings(&mut from).zip(spacings(&mut to)).find(|(a, b)| a != b).map(|(a, b)| *b / *a)
+}
+
+fn spacings(scene: &mut Scene) -> impl Iterator<Item = &mut f64> {
+    scene.objects.iter_mut().filter(|o| o.visible).filter_map(spacing_of)
 }
 
 fn spacing_of(object: &mut SceneObject) -> Option<&mut f64> {

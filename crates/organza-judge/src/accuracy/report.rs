@@ -34,14 +34,8 @@ impl Machine {
 /// Everything that a report says.
 #[derive(Debug, Clone)]
 pub struct Report {
-    /// Name of the scene's file.
-    pub scene: String,
-    /// SHA-256 of the scene and the changes to it.
-    pub scene_sha256: String,
-    /// Size of the picture.
-    pub size: [u32; 2],
-    /// Exposure of the displayed pictures, stops.
-    pub exposure: f64,
+    /// The scene as it was written, but for the size of the picture.
+    pub scene: Scene,
     /// How much work it took.
     pub options: Options,
     /// What computed.
@@ -79,14 +73,16 @@ impl Report {
             frontier: by_limit.into_iter().map(|k| places(&alike)[k]).collect(),
             frontier_by_truth: by_truth.into_iter().map(|k| places(&all)[k]).collect(),
             absent,
-            scene: printable(Path::new(scene.file.file_name().unwrap_or_default())),
-            scene_sha256: scene.sha256.clone(),
-            size: scene.camera.size,
-            exposure: scene.render.exposure,
+            scene: scene.clone(),
             options,
             machine: Machine::this(),
             studies,
         }
+    }
+
+    /// Name of the scene's file.
+    pub(super) fn scene_name(&self) -> String {
+        printable(Path::new(self.scene.file.file_name().unwrap_or_default()))
     }
 
     /// The report as a JSON document.

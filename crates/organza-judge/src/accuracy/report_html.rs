@@ -1,6 +1,7 @@
 //! The report as one page without any other file: curves, frontier, convergence, pictures to flip, table, notes.
 
 use super::plot::{COLORS, Mark, Plot, Series, escaped};
+use super::report_frontier::{RULE, error_text, to_copy};
 use super::report_joint::{bar_of, joint};
 use super::report_pictures::{data_uri, difference};
 use super::{Curve, Outcome, Report, SEEDS, Study, TOLD_APART, least_seconds, verdict};
@@ -17,7 +18,7 @@ pub(super) fn page(report: &Report) -> Result<String, Error> {
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" \
          content=\"width=device-width\"><title>What accuracy costs: {0}</title>\n<style>\n{1}</style></head>\n<body><main>\n\
          <h1>What accuracy costs: {0}</h1>\n",
-        escaped(&report.scene),
+        escaped(&report.scene_name()),
         include_str!("report.css")
     );
     html += &head(report);
@@ -25,8 +26,10 @@ pub(super) fn page(report: &Report) -> Result<String, Error> {
     for (at, study) in report.studies.iter().enumerate() {
         summary(&mut html, study);
         time_plot(&mut html, study);
+        let frontier = study.frontier.iter().map(|place| (study, *place));
+        to_copy(&mut html, &report.scene, frontier, |o| o.from_limit.as_ref());
         knob_plots(&mut html, study);
-        pictures(&mut html, study, report.exposure, at)?;
+        pictures(&mut html, study, report.scene.render.exposure, at)?;
         table(&mut html, study);
         notes(&mut html, study);
     }
@@ -36,7 +39,7 @@ pub(super) fn page(report: &Report) -> Result<String, Error> {
 
 fn head(report: &Report) -> String {
     let machine = &report.machine;
-    let [width, height] = report.size;
+    let [width, height] = report.scene.camera.size;
     let quick = if report.options.quick { ", quick: a small picture, few steps and repeats" } else { "" };
     format!(
         "<p class=\"soft\">{width} x {height} pixels, {} repeats{quick}. Organza {}, {} threads on {} ({}).<br>Scene \
@@ -46,7 +49,7 @@ fn head(report: &Report) -> String {
         machine.threads,
         escaped(machine.cpu.as_deref().unwrap_or("an unnamed processor")),
         machine.system,
-        report.scene_sha256
+        report.scene.sha256
     )
 }
 
@@ -107,8 +110,7 @@ fn time_plot(html: &mut String, study: &Study) {
         floor: (!study.is_random()).then_some(floor),
         series,
     };
-    *html += "<h2>Error and time</h2>\n<p>Each dot is one setting. The pale line is the frontier: whatever lies on it is \
-              faster than everything more accurate.</p>\n<figure>";
+    let _ = write!(html, "<h2>Error and time</h2>\n<p>Each dot is one setting. {RULE}</p>\n<figure>");
     *html += &plot.svg();
     *html += "<div class=\"legend\">";
     let mut key = |color: &str, name: &str| {
@@ -228,7 +230,7 @@ fn table(html: &mut String, study: &Study) {
             escaped(&o.setting.label),
             cell(time.map(|t| format!("{:.1}", 1e3 * t.min))),
             cell(time.map(|t| format!("{:.1} to {:.1}", 1e3 * t.median, 1e3 * t.max))),
-            cell(d.map(|d| format!("{:.2e}{limit_half}", d.linear.rmse))),
+            cell(error_text(study, o).map(|text| text + &limit_half)),
             cell(d.map(|d| format!("{:+.1e}", d.linear.bias))),
             cell(d.map(|d| format!("{:.2e}", d.linear.max))),
             cell(d.map(|d| format!("{:.1}", d.psnr))),

@@ -1,7 +1,8 @@
 //! The part of the page that shows all techniques together: their settings in one plot, and one frontier.
 
 use super::plot::{COLORS, Mark, Plot, Series, escaped};
-use super::{Outcome, Report, Study, least_seconds};
+use super::report_frontier::{RULE, to_copy};
+use super::{Distance, Outcome, Report, Study, least_seconds};
 use std::fmt::Write;
 
 /// A bar that reaches below zero ends at this share of the mean.
@@ -22,30 +23,29 @@ pub(super) fn joint(html: &mut String, report: &Report) {
     if report.studies.len() < 2 {
         return;
     }
-    *html += "<h2>All techniques</h2>\n<p>Each dot is one setting of a technique. The pale line is the frontier over all of \
-              them that are held against one limit; a technique with a limit of its own stands in the plot by physical truth. A bar is the 95 % interval of a random technique's mean error over its seeds.</p>\n<figure>";
+    let _ = write!(
+        html,
+        "<h2>All techniques</h2>\n<p>Each dot is one setting of a technique. {RULE} It goes over all of them that are held against \
+         one limit; a technique with a limit of its own stands in the plot by physical truth. A bar is the 95 % interval of a random \
+         technique's mean error over its seeds.</p>\n<figure>"
+    );
     let limit = &report.studies[0].limit;
     let floor = Some((10.0 * limit.own_error, "ten times the limit's own error".to_owned()));
     *html += &plot(report, Against::Limit, "RMSE against the limit, linear radiance", floor).svg();
     legend(html, report);
+    copied(html, report, &report.frontier, |o| o.from_limit.as_ref());
     if let Ok(truth) = &report.studies[0].truth {
         let level = truth.rms_standard_error();
         let floor = Some((level, "the truth's own standard error".to_owned()));
         *html += "<p>The same against physical truth. No picture can come below the truth's own standard error.</p>\n<figure>";
         *html += &plot(report, Against::Truth, "RMSE against physical truth", floor).svg();
         legend(html, report);
-        named(html, report, "by physical truth", &report.frontier_by_truth);
+        copied(html, report, &report.frontier_by_truth, |o| o.from_truth.as_ref());
     }
-    named(html, report, "by the limit", &report.frontier);
 }
 
-fn named(html: &mut String, report: &Report, by: &str, frontier: &[[usize; 2]]) {
-    let name = |[study, setting]: &[usize; 2]| {
-        let study = &report.studies[*study];
-        format!("{}, {}", study.technique, escaped(&study.outcomes[*setting].setting.label))
-    };
-    let names = frontier.iter().map(name).collect::<Vec<_>>().join("; ");
-    let _ = writeln!(html, "<p>On the frontier {by}, from the most accurate to the fastest: {names}.</p>");
+fn copied(html: &mut String, report: &Report, frontier: &[[usize; 2]], error: fn(&Outcome) -> Option<&Distance>) {
+    to_copy(html, &report.scene, frontier.iter().map(|[study, place]| (&report.studies[*study], *place)), error);
 }
 
 fn legend(html: &mut String, report: &Report) {

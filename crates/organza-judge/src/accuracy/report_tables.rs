@@ -1,6 +1,7 @@
 //! The report as JSON and as CSV. A number that was not measured is null, or an empty cell; never 0.
 
-use super::{Curve, Distance, Outcome, Report, Study, TOLD_APART};
+use super::{Curve, Distance, Outcome, Report, Study, TOLD_APART, lines};
+use organza::scene::Scene;
 use reference::metrics::Errors;
 use reference::statistics::{Mean, Spread, median_with_spread};
 use serde_json::{Value, json};
@@ -9,10 +10,10 @@ use std::fmt::Write;
 /// The whole report as one JSON document.
 pub(super) fn json(report: &Report) -> Value {
     json!({
-        "scene": report.scene,
-        "scene_sha256": report.scene_sha256,
+        "scene": report.scene_name(),
+        "scene_sha256": report.scene.sha256,
         "version": env!("CARGO_PKG_VERSION"),
-        "size": report.size,
+        "size": report.scene.camera.size,
         "quick": report.options.quick,
         "finer": report.options.finer,
         "repeats": report.options.repeats(),
@@ -20,7 +21,7 @@ pub(super) fn json(report: &Report) -> Value {
         "frontier": frontier(report, &report.frontier),
         "frontier_by_truth": frontier(report, &report.frontier_by_truth),
         "significant_ratio_of_times": TOLD_APART,
-        "techniques": report.studies.iter().map(study).collect::<Value>(),
+        "techniques": report.studies.iter().map(|s| study(&report.scene, s)).collect::<Value>(),
         "absent": report.absent.iter().map(|a| json!({ "technique": a.technique, "reason": a.reason })).collect::<Value>(),
     })
 }
@@ -33,7 +34,7 @@ fn frontier(report: &Report, places: &[[usize; 2]]) -> Value {
     places.iter().map(place).collect()
 }
 
-fn study(study: &Study) -> Value {
+fn study(scene: &Scene, study: &Study) -> Value {
     let limit = &study.limit;
     json!({
         "technique": study.technique,
@@ -59,7 +60,7 @@ fn study(study: &Study) -> Value {
         "curves": study.curves.iter().map(|c| curve(study, c)).collect::<Value>(),
         "frontier": study.frontier.iter().map(|i| study.outcomes[*i].setting.label.as_str()).collect::<Value>(),
         "skipped": study.skipped.iter().map(|s| json!({ "knob": s.knob, "reason": s.reason })).collect::<Value>(),
-        "settings": study.outcomes.iter().enumerate().map(|(i, o)| setting(study, i, o)).collect::<Value>(),
+        "settings": study.outcomes.iter().enumerate().map(|(i, o)| setting(scene, study, i, o)).collect::<Value>(),
     })
 }
 
@@ -85,11 +86,12 @@ fn curve(study: &Study, curve: &Curve) -> Value {
     })
 }
 
-fn setting(study: &Study, index: usize, o: &Outcome) -> Value {
+fn setting(scene: &Scene, study: &Study, index: usize, o: &Outcome) -> Value {
     let render = median_with_spread(&o.timed.seconds);
     json!({
         "setting": o.setting.label,
         "knob": o.setting.knob,
+        "toml": lines(scene, &o.setting.request),
         "drawn": o.drawn,
         "on_frontier": study.frontier.contains(&index),
         "seconds": spread(render),

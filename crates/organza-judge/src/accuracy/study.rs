@@ -1,6 +1,6 @@
 //! Draws all settings in shuffled order, finds the limit, and judges every setting by it.
 
-use super::limit::{TOGETHER, converge, finer_by};
+use super::limit::{MOST_FINER, TOGETHER, converge, finer_by};
 use super::repeat::{Repeats, attempt, repeat_all};
 use super::resolve::MARGIN;
 use super::settings::Settings;
@@ -158,8 +158,8 @@ fn refuse_unless_resolved(outcomes: &[Outcome], limit: &Limit, curves: &[Curve])
         limit.parts.iter().filter(|p| p.1 > target).filter_map(|(knob, _)| {
             let settled = &curves.iter().find(|c| c.knob == *knob)?.settled;
             let factor = finer_by(settled, target);
-            Some(factor.map_or_else(
-                || format!("{knob}: not converging yet"),
+            Some(factor.filter(|f| *f <= MOST_FINER).map_or_else(
+                || format!("{knob}: no end within reach"),
                 |f| format!("{knob}: an end {f:.1} times finer"),
             ))
         });

@@ -1,0 +1,210 @@
+//! What to write into a scene file, so that it is drawn as a setting of a report was.
+
+use super::Request;
+use super::points::spacing_factor;
+use organza::scene::{
+    Collisions, Coverage, Grouping, RenderSettings, Scene, ShadowMapping, Slicing, SurfaceSampler, SurfelLayers,
+};
+use splat_core::raster::Accumulation;
+
+/// A key of a scene and its value.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Change {
+    /// Tables with dots between them, such as `render.shadow`.
+    pub table: String,
+    /// The key.
+    pub key: &'static str,
+    /// The value in TOML; `None` of a key that has to be left out.
+    pub value: Option<String>,
+}
+
+impl Change {
+    /// What follows `--set` on the command line; `None` of a key that has to be left out, which `--set` cannot say.
+    pub fn set(&self) -> Option<String> {
+        Some(format!("{}.{}={}", self.table, self.key, self.value.as_ref()?))
+    }
+}
+
+/// The changes that turn a scene `as_written` into what a request draws, tables together. Spacings are not among them, since a
+/// source may state a resolution instead: [`lines()`] says by which factor they change.
+pub fn changes(as_written: &Scene, request: &Request) -> Vec<Change> {
+    let [before, after] = [&as_written.render, &request.scene.render].map(stated);
+    let value_in = |list: &[Stated], table, key| list.iter().find(|s| (s.0, s.1) == (table, key)).map(|s| s.2.clone());
+    let mut found = Vec::new();
+    for (table, key, value) in &after {
+        // By itself the deviation of a kernel follows its extent.
+        let tied = *key == "kernel_sigma"
+            && value_in(&before, table, "kernel_extent") != value_in(&after, table, "kernel_extent");
+        if tied || value_in(&before, table, key).as_ref() != Some(value) {
+            found.push(Change { table: (*table).into(), key, value: Some(value.clone()) });
+        }
+    }
+    let gone = before.iter().filter(|(table, key, _)| value_in(&after, table, key).is_none());
+    found.extend(gone.map(|(table, key, _)| Change { table: (*table).into(), key, value: None }));
+    // The layout of a file: a table is opened once.
+    found.sort_by_key(|change| stated_tables().position(|table| table == change.table));
+    let objects = as_written.objects.iter().zip(&request.scene.objects).filter(|(a, b)| a.technique != b.technique);
+    found.extend(objects.map(|(_, object)| Change {
+        table: format!("object.{}", object.name),
+        key: "technique",
+        value: object.technique.map(|technique| quoted(technique.name())),
+    }));
+    found
+}
+
+/// The same as TOML to copy. What cannot be a line of its own table stands in a comment.
+pub fn lines(as_written: &Scene, request: &Request) -> String {
+    let (mut text, mut open) = (String::new(), String::new());
+    for Change { table, key, value } in changes(as_written, request) {
+        if table != open && table.starts_with("render") {
+            text += &format!("[{table}]\n");
+        }
+        match value {
+            Some(value) if table.starts_with("render") => text += &format!("{key} = {value}\n"),
+            Some(value) => text += &format!("# {table}: {key} = {value}\n"),
+            None => text += &format!("# without {key}\n"),
+        }
+        open = table;
+    }
+    if let Some(factor) = spacing_factor(as_written, &request.scene) {
+        text += &format!("# the spacing of every object times {factor:?}, or its resolution divided by that\n");
+    }
+    text
+}
+
+/// Table, key and value of a setting.
+type Stated = (&'static str, &'static str, String);
+
+fn stated_tables() -> impl Iterator<Item = &'static str> {
+    ["render", "render.shadow", "render.points", "render.particles", "render.sheets", "render.surfels"].into_iter()
+}
+
+/// All that knobs turn, as a scene would state it.
+fn stated(render: &RenderSettings) -> Vec<Stated> {
+    let mut all = vec![
+        ("render", "technique", quoted(render.technique.name())),
+        ("render", "antialias", render.antialias.to_string()),
+    ];
+    shadow(render, &mut all);
+    points(render, &mut all);
+    particles(render, &mut all);
+    sheets(render, &mut all);
+    surfels(render, &mut all);
+    all
+}
+
+fn shadow(render: &RenderSettings, all: &mut Vec<Stated>) {
+    let mapping = match render.shadow.mapping {
+        ShadowMapping::Auto => "auto",
+        ShadowMapping::Octahedral => "octahedral",
+        ShadowMapping::Polar => "polar",
+    };
+    let mut add = |key, value| all.push(("render.shadow", key, value));
+    add("mapping", quoted(mapping));
+    add("cells", render.shadow.cells.map_or_else(|| quoted("auto"), |n| n.to_string()));
+    if let Some(cut) = render.shadow.absorbance_cut {
+        add("absorbance_cut", number(cut));
+    }
+}
+
+fn points(render: &RenderSettings, all: &mut Vec<Stated>) {
+    let points = &render.points;
+    let accumulation = match points.accumulation {
+        Accumulation::F16 => "f16",
+        Accumulation::F32 => "f32",
+    };
+    let mut add = |key, value| all.push(("render.points", key, value));
+    add("slice_thickness", points.slice_thickness.map_or_else(|| quoted("auto"), number));
+    add("exact", points.exact.to_string());
+    add("transmittance_cutoff", number(points.transmittance_cutoff));
+    add("resampling_filter", points.resampling_filter.to_string());
+    add("accumulation", quoted(accumulation));
+}
+
+fn particles(render: &RenderSettings, all: &mut Vec<Stated>) {
+    let mut add = |key, value| all.push(("render.particles", key, value));
+    add("repeat_level", render.particles.repeat_level.to_string());
+    if let Some(error) = render.particles.target_error {
+        add("target_error", number(error));
+    }
+    let (sampler, step) = match render.particles.surface_sampler {
+        SurfaceSampler::Auto => ("auto", None),
+        SurfaceSampler::Lines => ("lines", None),
+        SurfaceSampler::Triangles => ("triangles", None),
+        SurfaceSampler::Brownian { step } => ("brownian", Some(step)),
+    };
+    add("surface_sampler", quoted(sampler));
+    if let Some(step) = step {
+        add("brownian_step", number(step));
+    }
+}
+
+fn sheets(render: &RenderSettings, all: &mut Vec<Stated>) {
+    let sheets = &render.sheets;
+    let mut add = |key, value| all.push(("render.sheets", key, value));
+    add("slab_width", sheets.slab_width.map_or_else(|| quoted("auto"), number));
+    add("kernel_extent", number(sheets.kernel_extent));
+    add("kernel_sigma", number(sheets.kernel_sigma));
+    add("transmittance_cutoff", number(sheets.transmittance_cutoff));
+    if let Slicing::HalfVector { light_pixels, .. } = sheets.slicing {
+        add("light_pixels", number(light_pixels));
+    }
+}
+
+fn surfels(render: &RenderSettings, all: &mut Vec<Stated>) {
+    let surfels = &render.surfels;
+    let mut add = |key, value| all.push(("render.surfels", key, value));
+    add("disc_scale", number(surfels.disc_scale));
+    add("gap", number(surfels.gap));
+    add("transmittance_cutoff", number(surfels.transmittance_cutoff));
+    let layers = match surfels.layers {
+        SurfelLayers::Gaps => "gaps",
+        SurfelLayers::Peeled(_) => "peeled",
+        SurfelLayers::Algorithm1(_) => "algorithm1",
+        SurfelLayers::Algorithm2(_) => "algorithm2",
+    };
+    add("layers", quoted(layers));
+    if let SurfelLayers::Peeled(most) = surfels.layers {
+        add("peeled_layers", most.to_string());
+    }
+    // What is "auto" is not written: it would be refused beside what needs no groups.
+    let Some(groups) = surfels.layers.groups() else { return };
+    add("groups", groups.count.to_string());
+    match groups.grouping {
+        Grouping::Auto => {}
+        Grouping::Weighted => add("grouping", quoted("wgc")),
+        Grouping::Minimum { factor } => {
+            add("grouping", quoted("mgc"));
+            add("overlap_factor", number(factor));
+        }
+        Grouping::Hash(collisions) => {
+            add("grouping", quoted("hash"));
+            let (word, near) = match collisions {
+                Collisions::Resolve => ("resolve", None),
+                Collisions::Keep => ("keep", None),
+                Collisions::Near(distance) => ("near", Some(distance)),
+            };
+            add("collisions", quoted(word));
+            if let Some(distance) = near {
+                add("near_distance", number(distance));
+            }
+        }
+    }
+    let coverage = match groups.coverage {
+        Coverage::Auto => return,
+        Coverage::Partial => "partial",
+        Coverage::Duplicates => "duplicates",
+        Coverage::Enlarged => "enlarged",
+        Coverage::Bound => "bound",
+    };
+    add("coverage", quoted(coverage));
+}
+
+fn quoted(word: &str) -> String {
+    format!("\"{word}\"")
+}
+
+/// The shortest text that is read as the same number, with a point or an exponent, so that it is no whole number to TOML.
+fn number(value: f64) -> String {
+    format!("{value:?}")
+}

@@ -1,0 +1,49 @@
+//! The part of the page that says which setting to take: the frontier as a table, each row with lines for a scene file.
+
+use super::plot::escaped;
+use super::resolve::MARGIN;
+use super::{Distance, Outcome, Study, least_seconds, lines};
+use organza::scene::Scene;
+use std::fmt::Write;
+
+/// What lies on a frontier, beside a plot that shows one.
+pub(super) const RULE: &str = "The pale line is the frontier: from the most accurate setting on, what is faster than the last one on it \
+                               by more than 10 %. Errors that are equal to two digits count as one.";
+
+/// Rows of settings, from the most accurate to the fastest; `error` is what they are judged by.
+pub(super) fn to_copy<'a>(
+    html: &mut String,
+    scene: &Scene,
+    settings: impl Iterator<Item = (&'a Study, usize)>,
+    error: fn(&Outcome) -> Option<&Distance>,
+) {
+    *html += "<div class=\"wide\"><table class=\"copy\"><tr><th>for a frame of</th><th>RMSE</th><th>FLIP</th><th>technique, \
+              setting</th><th>write into the scene</th></tr>\n";
+    for (study, place) in settings {
+        let outcome = &study.outcomes[place];
+        let (Some(seconds), Some(distance)) = (least_seconds(outcome), error(outcome)) else { continue };
+        let written = lines(scene, &outcome.setting.request);
+        let written = if written.is_empty() { "# as it is".to_owned() } else { written };
+        let _ = writeln!(
+            html,
+            "<tr><td>{:.0} ms</td><td>{:.1e}</td><td>{:.4}</td><td>{}, {}</td><td><pre>{}</pre></td></tr>",
+            1e3 * seconds,
+            distance.linear.rmse,
+            distance.flip,
+            study.technique,
+            escaped(&outcome.setting.label),
+            escaped(written.trim_end())
+        );
+    }
+    *html += "</table></div>\n";
+}
+
+/// The RMSE of a setting against the limit in words: nothing is shown that the limit's own error could be.
+pub(super) fn error_text(study: &Study, outcome: &Outcome) -> Option<String> {
+    let rmse = outcome.from_limit.as_ref()?.linear.rmse;
+    Some(match outcome.drawn {
+        true => format!("{rmse:.2e}"),
+        false if rmse == 0.0 => "none: the limit's picture".into(),
+        false => format!("that of the limit, below {:.0e}", MARGIN * study.limit.own_error),
+    })
+}
