@@ -6,7 +6,7 @@
 use crate::repo::{Outcome, Repo};
 use crate::toml_lines::lines;
 use crate::vulkan::TESTS;
-use crate::{papers, shaders, tidy, vulkan};
+use crate::{deny, papers, shaders, tidy, vulkan};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
@@ -110,7 +110,7 @@ pub(crate) fn clippy() -> String {
     format!("clippy --workspace --all-targets --features {FEATURES},{DRIVER},{DEEP} -- -D warnings")
 }
 
-/// What takes minutes and rarely breaks where [`run`] holds, to be run before a release: kernels compiled anew, where tests hold the
+/// What takes minutes and rarely breaks where [`run`] holds, to be run before a release: licences of dependencies; kernels compiled anew, where tests hold the
 /// hashes of what they were compiled from; each crate with one of its features, the orchestrator's without what the others ask of
 /// their dependencies; recordings by every executor under every validation; every scene drawn, and forms that take long.
 pub(crate) fn deep(repo: &Repo) -> Outcome {
@@ -119,6 +119,7 @@ pub(crate) fn deep(repo: &Repo) -> Outcome {
     let parts = bare(repo).into_iter().filter(|check| !is_picked(check.0)).map(|check| check.1);
     let alone = parts.chain(with_one_feature(repo)).collect();
     let steps = [
+        Step { name: "deny", work: Work::Task(deny::run) },
         Step { name: "shaders", work: Work::Task(|repo| shaders::run(repo, true)) },
         Step { name: "alone", work: Work::Cargo(alone, &[]) },
         Step { name: "vulkan", work: Work::Task(vulkan::run) },

@@ -2,6 +2,7 @@
 
 mod assets;
 mod ci;
+mod deny;
 mod papers;
 mod quick;
 mod repo;
@@ -20,6 +21,7 @@ usage: cargo xtask COMMAND
   ci               everything that must hold before a merge, step by step; stops at the first failure
   deep             what takes minutes and rarely breaks: kernels compiled anew, GPU work under every validation, every scene drawn
   quick            format, rules, clippy, and the tests of the crates that changed since main
+  deny             licences and sources of all dependencies, by cargo-deny
   tidy             the rules that the compiler does not know: heads, sizes, dependency direction, assets
   papers           writes docs/papers.md from docs/papers/*.toml
   papers --check   fails where docs/papers.md is stale or names code or a test that does not exist
@@ -38,6 +40,7 @@ fn main() -> ExitCode {
         ["ci"] => Repo::open().and_then(|repo| ci::run(&repo)),
         ["deep"] => Repo::open().and_then(|repo| ci::deep(&repo)),
         ["quick"] => Repo::open().and_then(|repo| quick::run(&repo)),
+        ["deny"] => Repo::open().and_then(|repo| deny::run(&repo)),
         ["tidy"] => Repo::open().and_then(|repo| tidy::run(&repo)),
         ["papers"] => Repo::open().and_then(|repo| papers::write(&repo)),
         ["papers", "--check"] => Repo::open().and_then(|repo| papers::check(&repo)),

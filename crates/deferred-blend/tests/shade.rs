@@ -25,7 +25,7 @@ struct Sunny<'a> {
 impl<'a> Sunny<'a> {
     fn new(cloud: Cloud, view: splat_core::Camera, material: Material, shadow: Option<&'a dyn Transmittance>) -> Self {
         let objects = cloud.object.iter().max().map_or(0, |last| *last as usize + 1);
-        let one = Object { name: "a".into(), casts_shadow: true, shadow_coefficient: 1.0 };
+        let one = Object::default();
         let direction = DVec3::new(-0.5, -0.6, -0.7).normalize();
         let light = Light { shape: LightShape::Directional { direction }, intensity: [3.0, 2.0, 1.0] };
         let ids = (0..cloud.len() as u32).collect();

@@ -121,5 +121,12 @@ pub struct Object {
     pub shadow_coefficient: f32,
 }
 
+/// Without a name; casts and receives shadows.
+impl Default for Object {
+    fn default() -> Self {
+        Self { name: String::new(), casts_shadow: true, shadow_coefficient: 1.0 }
+    }
+}
+
 /// Objects by [`crate::Splat::object`].
 pub type ObjectTable = Vec<Object>;

@@ -2,6 +2,7 @@
 
 use crate::repo::Repo;
 use crate::source::{attributes, calls, code_only, line_of};
+use crate::toml_lines::lines;
 
 /// Folders that only one machine has. In pieces, so that this file passes its own rule.
 const FOREIGN: [&str; 2] = [concat!("../sh", "ared"), concat!("/wo", "rk/")];
@@ -55,12 +56,22 @@ fn attributes_where(repo: &Repo, bad: impl Fn(&str) -> bool, complaint: &str) ->
     found
 }
 
-/// Each crate has a page that says what it is.
+/// Each crate has a page that says what it is, and what each of its features is for.
 pub(crate) fn crate_pages(repo: &Repo) -> Vec<String> {
-    let pages = repo.crate_folders().into_iter().map(|folder| format!("{folder}/README.md"));
-    pages
-        .filter(|page| repo.text(page).is_none_or(|text| text.trim().is_empty()))
-        .map(|p| format!("{p} is missing"))
+    repo.crate_folders().into_iter().flat_map(|folder| crate_page(repo, folder)).collect()
+}
+
+fn crate_page(repo: &Repo, folder: &str) -> Vec<String> {
+    let page = format!("{folder}/README.md");
+    let Some(text) = repo.text(&page).filter(|text| !text.trim().is_empty()) else {
+        return vec![format!("{page} is missing")];
+    };
+    let manifest = lines(repo.text(&format!("{folder}/Cargo.toml")).unwrap_or_default());
+    let features =
+        manifest.iter().filter(|line| line.table == "features" && line.key != "default").map(|line| line.key);
+    features
+        .filter(|feature| !text.contains(&format!("`{feature}`")))
+        .map(|feature| format!("{page} does not say what the feature `{feature}` is for"))
         .collect()
 }
 
@@ -112,5 +123,13 @@ mod tests {
         let repo =
             Repo::of(&[("crates/a/Cargo.toml", ""), ("crates/b/Cargo.toml", ""), ("crates/a/README.md", "# a\n")]);
         assert_eq!(crate_pages(&repo), ["crates/b/README.md is missing"]);
+    }
+
+    #[test]
+    fn a_feature_that_no_page_names_is_found() {
+        let manifest = "[features]\ndefault = [\"las\"]\nlas = []\nply = []\n";
+        let page = "# a\n`las` reads LAS, as ply does.\n";
+        let repo = Repo::of(&[("crates/a/Cargo.toml", manifest), ("crates/a/README.md", page)]);
+        assert_eq!(crate_pages(&repo), ["crates/a/README.md does not say what the feature `ply` is for"]);
     }
 }

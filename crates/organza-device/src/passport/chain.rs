@@ -78,7 +78,7 @@ impl ChainInput {
             params: &params,
             detail: Detail::ALL,
         });
-        let objects = [Object { name: String::new(), casts_shadow: true, shadow_coefficient: 0.8 }];
+        let objects = [Object { shadow_coefficient: 0.8, ..Object::default() }];
         Self { cloud, camera, materials, objects, lights, footprints, projected }
     }
 

@@ -25,8 +25,7 @@ struct Shown {
 impl Shown {
     fn new(cloud: Cloud, camera: &Camera, materials: Vec<Material>, slab_width: f64) -> Self {
         let (footprints, projected) = (FootprintStack::default(), projected(&cloud, camera, &materials));
-        let objects =
-            (0..4).map(|i| Object { name: i.to_string(), shadow_coefficient: 1.0, casts_shadow: true }).collect();
+        let objects = (0..4).map(|i| Object { name: i.to_string(), ..Object::default() }).collect();
         Self { cloud, projected, footprints, materials, objects, slab_width }
     }
 

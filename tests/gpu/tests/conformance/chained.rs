@@ -42,7 +42,7 @@ fn four_stages_in_one_submission_are_the_cpu_s_picture() {
     let (cloud, materials, footprints) = (cloud(), [Material::default()], FootprintStack::default());
     let view = Projection::Perspective { fov_y: 0.6 };
     let camera = Camera::look_at(cloud.origin + DVec3::new(0.3, 0.2, 4.0), cloud.origin, DVec3::Y, view, SIZE).unwrap();
-    let objects = [Object { name: String::new(), casts_shadow: true, shadow_coefficient: 1.0 }];
+    let objects = [Object::default()];
     let shape = LightShape::Point { position: cloud.origin + DVec3::new(1.0, 2.0, 2.0) };
     let lights = [LitBy { slide: None, light: Light { shape, intensity: [9.0; 3] }, shadow: None }];
     let (ambient, objects, lights) = ([0.1; 3], &objects[..], &lights[..]);

@@ -82,7 +82,7 @@ fn lights(origin: DVec3) -> Vec<Light> {
 const OBJECTS: [f32; 2] = [1.0, 0.5];
 
 fn objects() -> Vec<Object> {
-    let object = |shadow_coefficient| Object { name: String::new(), casts_shadow: true, shadow_coefficient };
+    let object = |shadow_coefficient| Object { shadow_coefficient, ..Object::default() };
     OBJECTS.map(object).to_vec()
 }
 
