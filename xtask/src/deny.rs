@@ -15,10 +15,9 @@ pub(crate) fn run(repo: &Repo) -> Outcome {
     }
     let words = [&["--offline", "check", "--hide-inclusion-graph"][..], &CHECKS].concat();
     let out = deny(&words).map_err(|e| format!("cargo deny did not start: {e}"))?;
-    let said = String::from_utf8_lossy(&out.stderr);
     if out.status.success() {
-        Ok(format!("deny: {}", said.lines().last().unwrap_or_default()))
+        Ok(format!("deny: {}", String::from_utf8_lossy(&out.stdout).trim()))
     } else {
-        Err(format!("deny found\n{said}"))
+        Err(format!("deny found\n{}", String::from_utf8_lossy(&out.stderr)))
     }
 }
