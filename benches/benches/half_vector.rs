@@ -68,6 +68,7 @@ impl Setting {
             material: &self.material,
             normals: false,
             object: 0,
+            clip: &[],
             shadow_coefficient: 1.0,
             casts_shadow: true,
         };

@@ -41,6 +41,7 @@ impl<'a> Method<'a> {
             material,
             normals,
             object: 0,
+            clip: &[],
             shadow_coefficient: 1.0,
             casts_shadow: true,
         }

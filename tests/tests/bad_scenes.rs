@@ -1,5 +1,7 @@
 //! Scene files that are wrong: every one is refused with its place, a reason and exit code 3, and none panics.
 
+mod points;
+
 use organza::Error;
 use organza::scene::{self, LoadOptions, MAX_SCENE_BYTES, Override, Scene};
 use std::path::Path;
@@ -147,7 +149,6 @@ fn sources_of_fields_are_checked_at_their_place() {
              transfer = [{ value = 0, color = [1, 1, 1], extinction = 1 }]",
             "a slice has no extinction",
         ),
-        ("mesh = \"b.ply\"\nclip = [{ box = [[0, 0, 0], [1, 1, 1]] }]", "`clip` belongs to an `implicit`"),
         (
             "isosurface = { volume = \"b.nii\", level = 1 }\nclip = [{ normal = [0, 1, 0] }]",
             "expected either `normal` and `point`, or `box`",

@@ -29,6 +29,7 @@ mod orders;
 mod output;
 mod particle_layers;
 mod particles;
+mod point_columns;
 mod point_opacity;
 mod progress;
 mod reading;

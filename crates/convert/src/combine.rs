@@ -8,7 +8,7 @@
 //! [`ScalarField::in_domain`] says which zeros belong to it.
 
 use splat_core::glam::{DMat3, DVec3};
-use splat_core::{DAabb, Error, ScalarField};
+use splat_core::{Clip, Error, ScalarField};
 use std::sync::Arc;
 
 /// A field that combinations share.
@@ -134,62 +134,33 @@ impl ScalarField for CombinedField {
     }
 }
 
-/// The part of space that a clipped surface keeps.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Clip {
-    /// Where normal·p ≤ offset.
-    HalfSpace {
-        /// Direction that leads out, any length but 0.
-        normal: DVec3,
-        /// normal·p of the border.
-        offset: f64,
-    },
-    /// Inside a box that is not empty.
-    Box(DAabb),
+/// 1 in regions and 0 beyond them: what the particles of a volume that is cut are kept by.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RegionField(Vec<Clip>);
+
+impl RegionField {
+    /// 1 in all of the regions; `None` without any.
+    pub fn shared(clips: &[Clip]) -> Option<SharedField> {
+        (!clips.is_empty()).then(|| Arc::new(Self(clips.to_vec())) as SharedField)
+    }
 }
 
-impl Clip {
-    fn keeps(&self, p: DVec3) -> bool {
-        match *self {
-            Self::HalfSpace { normal, offset } => normal.dot(p) <= offset,
-            Self::Box(bounds) => bounds.contains(p),
-        }
+impl ScalarField for RegionField {
+    fn value(&self, p: DVec3) -> f64 {
+        if self.0.iter().all(|clip| clip.keeps(p)) { 1.0 } else { 0.0 }
     }
 
-    /// Whether something within `radius` of `p` may be kept.
-    fn may_keep(&self, p: DVec3, radius: f64) -> bool {
-        match *self {
-            Self::HalfSpace { normal, offset } => normal.dot(p) - offset <= radius * normal.length(),
-            Self::Box(bounds) => bounds.distance_squared(p).sqrt() <= radius,
-        }
+    fn gradient(&self, _: DVec3) -> DVec3 {
+        DVec3::ZERO
     }
 
-    fn check(&self, index: usize) -> Result<(), Error> {
-        match *self {
-            Self::HalfSpace { normal, offset } => {
-                if !(normal.is_finite() && normal != DVec3::ZERO && offset.is_finite()) {
-                    return Err(Error::invalid(
-                        "half-space",
-                        index,
-                        "normal and offset",
-                        (normal, offset),
-                        "finite numbers, a normal that is not 0",
-                    ));
-                }
-            }
-            Self::Box(DAabb { min, max }) => {
-                if !(min.is_finite() && max.is_finite() && min.cmple(max).all()) {
-                    return Err(Error::invalid(
-                        "clip box",
-                        index,
-                        "corners",
-                        [min, max],
-                        "two finite corners, the first nowhere above the second",
-                    ));
-                }
-            }
-        }
-        Ok(())
+    fn hessian(&self, _: DVec3) -> DMat3 {
+        DMat3::ZERO
+    }
+
+    fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> {
+        let may = self.0.iter().all(|clip| clip.may_keep(p, radius));
+        Some((0.0, if may { 1.0 } else { 0.0 }))
     }
 }
 
@@ -212,7 +183,7 @@ impl ClippedField {
     /// # Errors
     /// [`Error::Invalid`] for a half-space without normal or a box whose corners are in the wrong order.
     pub fn new(field: SharedField, clips: Vec<Clip>) -> Result<Self, Error> {
-        clips.iter().enumerate().try_for_each(|(i, clip)| clip.check(i))?;
+        clips.iter().try_for_each(Clip::validate)?;
         Ok(Self { field, clips })
     }
 }

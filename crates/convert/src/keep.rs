@@ -1,9 +1,10 @@
 //! Which voxels of a volume become splats, and with which colour and extinction.
 
+use crate::cell_share::CellShares;
 use crate::classify::{Class, Classes, cell_length};
 use crate::{ConvertError, VolumeParams};
 use rayon::prelude::*;
-use splat_core::{DAabb, Grid, Progress, TransferFunction, glam::DVec3};
+use splat_core::{Grid, Progress, TransferFunction, glam::DVec3};
 
 /// The longest straight line within the lattice's cells: the longest body diagonal.
 pub(crate) fn longest_path(lattice: &Grid) -> f64 {
@@ -20,7 +21,8 @@ pub(crate) struct Keep<'a> {
     threshold: f64,
     /// Values up to and from here have no extinction at all: two comparisons spare most look-ups.
     support: [f32; 2],
-    clip: Option<DAabb>,
+    /// The part of each cell that is kept, where something is cut off.
+    cut: Option<CellShares>,
 }
 
 /// The kept lattice points of one slab of constant k.
@@ -28,7 +30,7 @@ pub(crate) struct Keep<'a> {
 pub(crate) struct Slab {
     /// Index within the slab.
     pub(crate) kept: Vec<u32>,
-    /// Those among them whose class is a mean, by their rank.
+    /// Those among them whose class is a mean, or that of the part that is kept of their cell, by their rank.
     pub(crate) averaged: Vec<(u32, Class)>,
     /// How many were left out.
     pub(crate) omitted: u64,
@@ -50,7 +52,8 @@ impl<'a> Keep<'a> {
             ],
             _ => [f32::INFINITY, f32::NEG_INFINITY],
         };
-        Self { classes, threshold, support, clip: params.clip }
+        let cut = (!params.clip.is_empty()).then(|| CellShares::new(&params.clip, lattice));
+        Self { classes, threshold, support, cut }
     }
 
     /// All slabs, in order.
@@ -70,7 +73,7 @@ impl<'a> Keep<'a> {
         let slab = lattice.dims[0] * lattice.dims[1];
         let is_some = |k: usize, n: usize| {
             f64::from(self.classes.at(lattice.values[k * slab + n]).extinction) > self.threshold.max(0.0)
-                && !self.clipped(lattice, n, k)
+                && self.share(lattice, n, k) > 0.0
         };
         let count = |k: usize| (0..slab).filter(|n| is_some(k, *n)).count() as u64;
         (0..lattice.dims[2]).into_par_iter().map(count).sum()
@@ -90,9 +93,13 @@ impl<'a> Keep<'a> {
                 if range[1] <= self.support[0] || range[0] >= self.support[1] {
                     continue;
                 }
-                let (class, is_mean) = self.classes.cell(lattice, [i, j, k], range);
+                let (mut class, mut is_mean) = self.classes.cell(lattice, [i, j, k], range);
                 let n = j * nx + i;
-                if class.extinction <= 0.0 || self.clipped(lattice, n, k) {
+                let share = if class.extinction > 0.0 { self.share(lattice, n, k) } else { 0.0 };
+                if share < 1.0 {
+                    (class.extinction, is_mean) = ((f64::from(class.extinction) * share) as f32, true);
+                }
+                if class.extinction <= 0.0 {
                     continue;
                 }
                 if f64::from(class.extinction) <= self.threshold {
@@ -109,9 +116,10 @@ impl<'a> Keep<'a> {
         slab
     }
 
-    fn clipped(&self, lattice: &Grid, n: usize, k: usize) -> bool {
-        let position = || lattice.position(n % lattice.dims[0], n / lattice.dims[0], k);
-        self.clip.is_some_and(|clip| !clip.contains(position()))
+    /// Share of a cell that nothing cuts off.
+    fn share(&self, lattice: &Grid, n: usize, k: usize) -> f64 {
+        let index = || DVec3::new((n % lattice.dims[0]) as f64, (n / lattice.dims[0]) as f64, k as f64);
+        self.cut.as_ref().map_or(1.0, |cut| cut.of(index()))
     }
 }
 

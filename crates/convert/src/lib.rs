@@ -17,7 +17,11 @@
 
 mod body_centred;
 mod borders;
+mod cell_share;
 mod classify;
+mod clipped_mesh;
+mod color_by;
+mod color_map;
 mod columns;
 mod combine;
 mod convert_error;
@@ -30,6 +34,7 @@ mod expression;
 mod field_points;
 mod grid_field;
 mod keep;
+mod keep_points;
 mod marching_cubes;
 mod mesh_points;
 #[cfg(feature = "surfels")]
@@ -54,7 +59,10 @@ mod resample;
 mod search;
 mod section;
 mod shapes;
+#[cfg(feature = "surfels")]
+mod shown_points;
 mod sobel;
+mod srgb;
 mod subdivide;
 mod surface_nets;
 #[cfg(feature = "surfels")]
@@ -67,7 +75,10 @@ mod vertex_normals;
 mod volume_points;
 
 pub use body_centred::body_centred;
-pub use combine::{Clip, ClippedField, CombinedField, SharedField};
+pub use clipped_mesh::clipped_mesh;
+pub use color_by::{ColorBy, Colored, PointColors, class_name, colored};
+pub use color_map::ColorMap;
+pub use combine::{ClippedField, CombinedField, RegionField, SharedField};
 pub use convert_error::ConvertError;
 #[cfg(feature = "read")]
 pub use error::{Fault, Place, ReadError, escaped_path};
@@ -78,6 +89,7 @@ pub use field_points::{
     surface_to_mesh, surface_to_points,
 };
 pub use grid_field::{GridField, Inside, Interpolation};
+pub use keep_points::{Kept, Within, kept};
 pub use marching_cubes::isosurface_to_mesh;
 pub use mesh_points::{MeshParams, MeshReport, flatten_leaning, mesh_to_points, mesh_to_points_into};
 #[cfg(feature = "surfels")]
@@ -87,14 +99,18 @@ pub use orient::Orientation;
 pub use params::{Density, SplatParams};
 #[cfg(feature = "noise")]
 pub use procedural::{CloudShape, Ellipsoid, procedural_cloud};
-pub use raw_points::{PointLattice, RawPoints};
+pub use raw_points::{Column, PointLattice, RawPoints};
 pub use resample::resampled;
 pub use search::{ZeroSearch, extinct_bounds, visible_ends};
 pub use section::{Section, volume_section};
 pub use shapes::{HomogeneousMedium, MediumBody, Rectangle, medium, medium_to_grid, rectangle};
-pub use sobel::{sobel_gradient, sobel_gradient_into};
 #[cfg(feature = "surfels")]
-pub use surfels::{SurfelParams, SurfelReport, raw_to_surfels};
+pub use shown_points::{PointsShown, shown_points};
+pub use sobel::{sobel_gradient, sobel_gradient_into};
+pub use splat_core::Clip;
+pub use srgb::linear_from_srgb;
+#[cfg(feature = "surfels")]
+pub use surfels::{DiscSize, SurfelParams, SurfelReport, raw_to_surfels};
 #[cfg(feature = "surfels")]
 pub use thin::thinned;
 pub use vertex_normals::vertex_normals;

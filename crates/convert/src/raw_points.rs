@@ -21,11 +21,25 @@ pub struct RawPoints {
     pub opacity: Vec<f32>,
     /// Classes as the file numbers them (LAS: 2 is ground, 5 high vegetation …).
     pub classification: Vec<u8>,
+    /// Further columns of the file, those that were asked for by name (`read::ReadParams::columns`).
+    pub columns: Vec<Column>,
     /// The integers that the positions were made from, where the file stores integers.
     pub lattice: Option<PointLattice>,
     /// Points of the file that were left out because a coordinate was not finite.
     pub dropped: u64,
 }
+
+/// A column of a file that has no meaning of its own here. A number that is none, or is not finite, is a gap.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Column {
+    /// Its name in the file.
+    pub name: String,
+    /// One number a point, in f64: times of a day have more digits than f32.
+    pub values: Vec<f64>,
+}
+
+/// Names that people have for columns, with those of files and of [`RawPoints`].
+const ALIASES: [(&str, &str); 3] = [("intensity", "value"), ("return", "return_number"), ("class", "classification")];
 
 /// Coordinates as integers on a lattice: exact, whatever the offset. Position i is `offset + scale · steps[i]`.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,9 +91,62 @@ impl RawPoints {
         (self.len() <= FEW && size > 0.0).then(|| REACH * size / (self.len() as f64).sqrt())
     }
 
-    /// Bytes held by the columns, all of them counted: position, normal, colour, value, opacity, class and integers.
+    /// Bytes held by the columns, all of them counted: position, normal, colour, value, opacity, class, integers and further ones.
     pub fn bytes(&self) -> u64 {
-        64 * self.len() as u64
+        (64 + 8 * self.columns.len() as u64) * self.len() as u64
+    }
+
+    /// The numbers of a column by its name, the one of the file before the ones that all points have:
+    ///
+    /// | name | numbers |
+    /// |---|---|
+    /// | that of one of [`RawPoints::columns`] | as the file has them |
+    /// | `value` or `intensity` | [`RawPoints::value`] |
+    /// | `classification` or `class` | [`RawPoints::classification`] |
+    /// | `return` | the column `return_number` |
+    /// | `opacity` | [`RawPoints::opacity`] |
+    /// | `x`, `y`, `z` | coordinates in the unit of the file, as exact as it has them |
+    /// | `height` | the coordinate along `up` |
+    ///
+    /// `None` where the points have no such column.
+    pub fn column(&self, name: &str, up: DVec3) -> Option<Vec<f64>> {
+        let along = |axis: DVec3| Some((0..self.len()).map(|i| self.exact_position(i).dot(axis)).collect());
+        let own = |name: &str| self.columns.iter().find(|c| c.name == name).map(|c| c.values.clone());
+        let some =
+            |column: &[f32]| (!column.is_empty()).then(|| column.iter().map(|v| f64::from(*v)).collect::<Vec<f64>>());
+        if let Some(own) = own(name).or_else(|| own(unaliased(name))) {
+            return Some(own);
+        }
+        match unaliased(name) {
+            "value" => some(&self.value),
+            "opacity" => some(&self.opacity),
+            "classification" if !self.classification.is_empty() => {
+                Some(self.classification.iter().map(|c| f64::from(*c)).collect())
+            }
+            "x" => along(DVec3::X),
+            "y" => along(DVec3::Y),
+            "z" => along(DVec3::Z),
+            "height" => along(up),
+            _ => None,
+        }
+    }
+
+    /// Which of the columns that are read in any case nobody asks for: `asked` are names as [`RawPoints::column`] takes them.
+    pub fn not_asked_for<'a>(&'a self, asked: &'a [String]) -> impl Iterator<Item = &'static str> + 'a {
+        let columns = [("value", self.value.is_empty()), ("classification", self.classification.is_empty())];
+        let is_asked = |name: &str| asked.iter().any(|asked| unaliased(asked) == name);
+        columns.into_iter().filter(move |(name, is_empty)| !is_empty && !is_asked(name)).map(|(name, _)| name)
+    }
+
+    /// Names that [`RawPoints::column`] knows for these points.
+    pub fn column_names(&self) -> impl Iterator<Item = &str> {
+        let some = [
+            ("value", !self.value.is_empty()),
+            ("classification", !self.classification.is_empty()),
+            ("opacity", !self.opacity.is_empty()),
+        ];
+        let all = some.into_iter().filter(|(_, is_there)| *is_there).map(|(name, _)| name);
+        all.chain(["x", "y", "z", "height"]).chain(self.columns.iter().map(|c| c.name.as_str()))
     }
 
     /// The least opacity of a point; 1 where the file has none, and without points.
@@ -112,7 +179,7 @@ impl RawPoints {
             ("classification", self.classification.len()),
             ("lattice", self.lattice.as_ref().map_or(0, |l| l.steps.len())),
         ];
-        for (attribute, found) in columns {
+        for (attribute, found) in columns.into_iter().chain(self.columns.iter().map(|c| ("columns", c.values.len()))) {
             if found != 0 && found != expected {
                 return Err(Error::ColumnLength { attribute, found, expected });
             }
@@ -136,5 +203,36 @@ impl RawPoints {
             return Err(Error::invalid("point", i, "opacity", self.opacity[i], "a number in [0, 1]"));
         }
         Ok(())
+    }
+}
+
+/// The name that files, or [`RawPoints`], have for what people call otherwise.
+pub(crate) fn unaliased(name: &str) -> &str {
+    ALIASES.iter().find(|(alias, _)| *alias == name).map_or(name, |(_, known)| known)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_column_of_the_file_comes_before_the_one_that_all_points_have() {
+        let column = |name: &str, values: [f64; 2]| Column { name: name.to_owned(), values: values.to_vec() };
+        let mut points = RawPoints {
+            origin: DVec3::new(1e7, 0.0, 5.0),
+            position: vec![Vec3::ZERO, Vec3::new(0.25, 1.0, 2.0)],
+            value: vec![7.0, 8.0],
+            classification: vec![2, 6],
+            columns: vec![column("return_number", [1.0, 3.0])],
+            ..RawPoints::default()
+        };
+        let of = |points: &RawPoints, name: &str| points.column(name, DVec3::Z);
+        assert_eq!(of(&points, "intensity"), Some(vec![7.0, 8.0]));
+        assert_eq!(of(&points, "class"), Some(vec![2.0, 6.0]));
+        assert_eq!(of(&points, "return"), Some(vec![1.0, 3.0]));
+        assert_eq!([of(&points, "x"), of(&points, "height")], [Some(vec![1e7, 1e7 + 0.25]), Some(vec![5.0, 7.0])]);
+        assert_eq!([of(&points, "opacity"), of(&points, "gps_time")], [None, None]);
+        points.columns.push(column("height", [0.5, 0.75]));
+        assert_eq!(of(&points, "height"), Some(vec![0.5, 0.75]));
     }
 }

@@ -34,10 +34,10 @@
 )]
 
 mod beside;
-mod color;
 mod decimal;
 mod detached;
 mod direction;
+mod extras;
 #[cfg(any(feature = "obj", feature = "off"))]
 mod fans;
 mod format;
@@ -101,19 +101,21 @@ mod xyz;
 
 #[cfg(feature = "las")]
 pub use laz::panic_is_input_error;
-pub use reading::{Fix, Mended, Notes};
+pub use reading::{Fix, Mended, NamedColumn, Notes};
 pub use up::{UpAxis, up_axis};
 
 use crate::error::{Place, ReadError, escaped, escaped_path};
 use crate::raw_points::RawPoints;
+use extras::LONGEST_NAME;
 use format::{Format, format_of, is_raw};
 use input::Stream;
 use reading::Reading;
+use splat_core::glam::DVec3;
 use splat_core::{Grid, Limits, Mesh, Progress, RadianceImage};
 use std::path::Path;
 
 /// How much a file may ask for, and what happens to what is wrong in it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ReadParams {
     /// Bytes that the file, its decompressed form and the columns made from it may each take; elements are not counted.
     pub limits: Limits,
@@ -124,12 +126,32 @@ pub struct ReadParams {
     pub strict: bool,
     /// Which volume of a series is read, from 0; other files have a frame 0 alone.
     pub frame: u64,
+    /// Columns of points that are kept in [`RawPoints::columns`] beside those that have a meaning, each by its name in the file or by one
+    /// that [`RawPoints::column`] knows. One that a file of points has not is an error that names those that it has.
+    pub columns: Vec<String>,
+    /// Whether the ranges of all columns of points are found, kept or not, for [`Notes::columns`].
+    pub ranges: bool,
 }
 
 impl Default for ReadParams {
-    /// 4 GiB, nothing dropped, what can be mended is mended, the first of a series.
+    /// 4 GiB, nothing dropped, what can be mended is mended, the first of a series, no further columns.
     fn default() -> Self {
-        Self { limits: Limits::bytes(4 << 30), drop_invalid: false, strict: false, frame: 0 }
+        Self {
+            limits: Limits::bytes(4 << 30),
+            drop_invalid: false,
+            strict: false,
+            frame: 0,
+            columns: Vec::new(),
+            ranges: false,
+        }
+    }
+}
+
+impl ReadParams {
+    /// Whether what was read with these is what `others` ask for: they are alike, but for columns that are there beside those.
+    pub fn serves(&self, others: &Self) -> bool {
+        let alike = *self == Self { columns: self.columns.clone(), ..others.clone() };
+        alike && others.columns.iter().all(|name| self.columns.contains(name))
     }
 }
 
@@ -189,6 +211,9 @@ fn whole(
         let (expected, found) = ("a series of volumes", "a file of another kind");
         return Err(ReadError::input(Place::File, expected, found, "leave out `frame`"));
     }
+    if let Loaded::Points(points) = &loaded {
+        check_columns(points, reading)?;
+    }
     #[cfg(any(feature = "ply", feature = "stl", feature = "obj", feature = "off", feature = "gltf"))]
     if let Loaded::Mesh(mut mesh) = loaded {
         for _ in 0..crate::outwards::turn_outwards(&mut mesh) {
@@ -200,6 +225,22 @@ fn whole(
         return Ok(Loaded::Mesh(mesh));
     }
     Ok(loaded)
+}
+
+/// Refuses columns that were asked for and are not there; what is kept is no longer named as not used.
+fn check_columns(points: &RawPoints, reading: &mut Reading<'_>) -> Result<(), ReadError> {
+    let missing = reading.params.columns.iter().find(|name| points.column(name, DVec3::Y).is_none());
+    if let Some(missing) = missing {
+        let known: Vec<&str> = points.column_names().collect();
+        let further = reading.notes.columns.iter().map(|c| c.name.as_str()).filter(|name| !known.contains(name));
+        let names: Vec<&str> = known.iter().copied().chain(further).collect();
+        let expected = format!("a column among {}", names.join(", "));
+        let found = format!("`{}`", escaped(missing.as_bytes(), LONGEST_NAME));
+        return Err(ReadError::input(Place::File, expected, found, "`organza info` says what they hold"));
+    }
+    let shown: Vec<String> = points.columns.iter().map(|c| escaped(c.name.as_bytes(), LONGEST_NAME)).collect();
+    reading.notes.unused.retain(|name| !shown.contains(name));
+    Ok(())
 }
 
 /// Bytes that tell the format.

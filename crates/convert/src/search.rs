@@ -3,7 +3,7 @@
 use crate::SharedField;
 use rayon::prelude::*;
 use splat_core::glam::DVec3;
-use splat_core::{DAabb, Grid, TransferFunction};
+use splat_core::{Clip, DAabb, Grid, TransferFunction};
 
 /// Cells along the longest side of a box, in which an implicit surface is looked for.
 const SURFACE_CELLS: f64 = 32.0;
@@ -56,15 +56,17 @@ pub fn extinct_bounds(grid: &Grid, transfer: &TransferFunction) -> DAabb {
     DAabb::of_points(DAabb::new(low, high).corners().map(|index| grid.origin + grid.axes * index))
 }
 
-/// The first and the last lattice point of every row to which a transfer function gives extinction above a `share` of its largest;
-/// where it gives none, the corners of [`extinct_bounds`].
-pub fn visible_ends(grid: &Grid, transfer: &TransferFunction, share: f32) -> Vec<DVec3> {
+/// The first and the last lattice point of every row within all regions to which a transfer function gives extinction above a `share` of
+/// its largest; where it gives none, the corners of [`extinct_bounds`].
+pub fn visible_ends(grid: &Grid, transfer: &TransferFunction, share: f32, clips: &[Clip]) -> Vec<DVec3> {
     let most = transfer.points().iter().fold(0.0, |most: f32, p| most.max(p.extinction));
     let seen = |v: &f32| transfer.at(*v).extinction > share * most;
     let [nx, ny, _] = grid.dims;
     let row = |(row, values): (usize, &[f32])| {
-        let (first, last) = (values.iter().position(seen)?, values.iter().rposition(seen)?);
-        Some([first, last].map(|i| grid.position(i, row % ny, row / ny)))
+        let place = |i: usize| grid.position(i, row % ny, row / ny);
+        let is_seen = |i: &usize| seen(&values[*i]) && clips.iter().all(|clip| clip.keeps(place(*i)));
+        let (first, last) = ((0..nx).find(is_seen)?, (0..nx).rfind(is_seen)?);
+        Some([first, last].map(place))
     };
     let ends: Vec<DVec3> = grid.values.par_chunks(nx).enumerate().filter_map(row).flatten_iter().collect();
     if ends.is_empty() { extinct_bounds(grid, transfer).corners().to_vec() } else { ends }

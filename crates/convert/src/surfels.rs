@@ -19,7 +19,7 @@ use crate::places::{Place, places};
 use crate::{ConvertError, RawPoints};
 use rayon::prelude::*;
 use splat_core::{
-    Cloud, Progress, SplatKind,
+    Camera, Cloud, Footprint, Progress, SplatKind,
     glam::{DVec3, Vec3},
     optics,
 };
@@ -46,6 +46,40 @@ pub struct SurfelParams {
     pub largest_spacing: f64,
     /// Spacing of a point without any neighbour, world units.
     pub lone_spacing: f64,
+    /// The same diameter for all discs; `None` for what bridges the gaps between neighbours.
+    pub size: Option<DiscSize>,
+    /// Whose pixels those of `size` are, in the world.
+    pub camera: Option<Camera>,
+}
+
+/// The diameter within which an opaque disc hides what is behind it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum DiscSize {
+    /// World units, > 0.
+    World(f64),
+    /// Pixels of the camera, > 0, whatever the distance: of a disc that faces it.
+    Pixels(f64),
+}
+
+impl DiscSize {
+    /// The diameter at a place in the world; `None` where it has none: at the eye itself, and in pixels without a camera.
+    fn at(self, place: DVec3, camera: Option<&Camera>) -> Option<f64> {
+        let diameter = match self {
+            Self::World(diameter) => diameter,
+            Self::Pixels(pixels) => {
+                let camera = camera?;
+                // Behind the eye, where nothing is seen, shadows are of discs as large as before it.
+                let depth = if camera.is_orthographic() { 1.0 } else { camera.view_from_world(place).z.abs() };
+                pixels * depth / camera.focal_px()
+            }
+        };
+        (diameter > 0.0).then_some(diameter)
+    }
+
+    fn is_length(self) -> bool {
+        let (Self::World(diameter) | Self::Pixels(diameter)) = self;
+        diameter.is_finite() && diameter > 0.0
+    }
 }
 
 impl Default for SurfelParams {
@@ -60,6 +94,8 @@ impl Default for SurfelParams {
             values: false,
             largest_spacing: 4.0,
             lone_spacing: 1.0,
+            size: None,
+            camera: None,
         }
     }
 }
@@ -137,6 +173,9 @@ pub(crate) fn check(points: &RawPoints, params: &SurfelParams) -> Result<(), Con
     }
     if params.largest_spacing.is_nan() || params.largest_spacing < 1.0 {
         return Err(p.bad("largest_spacing", params.largest_spacing, "a number ≥ 1"));
+    }
+    if let Some(size) = params.size.filter(|size| !size.is_length()) {
+        return Err(p.bad("size", size, "a diameter > 0"));
     }
     orient::check(params.orientation).map_err(|(found, expected)| p.bad("orientation", found, expected))?;
     p.check_spacing(params.lone_spacing).map(|_| ())
@@ -281,9 +320,18 @@ fn emit(
             let given = points.normal.get(i).map_or(Vec3::ZERO, |n| columns::unit_or_zero(*n));
             let n = if given == Vec3::ZERO { sorted.normals[place as usize] } else { given.as_dvec3() };
             *normal = t.rotate(n).as_vec3();
-            *radius = params.splat.radius(known.spacing * t.scale) as f32;
-            let tau = crossing(point).unwrap_or(1.0) * t.scale * t.scale;
-            *cross_section = (tau * known.area / f64::from(sharers)) as f32;
+            let sized = params.size.and_then(|size| {
+                size.at(t.apply(points.origin + points.position[i].as_dvec3()), params.camera.as_ref())
+            });
+            let (reach, area) = match sized {
+                Some(diameter) => {
+                    let reach = 0.5 * diameter / f64::from(Footprint::CORE);
+                    (reach, (reach / params.splat.radius(1.0)).powi(2))
+                }
+                None => (params.splat.radius(known.spacing * t.scale), known.area * t.scale * t.scale),
+            };
+            *radius = reach as f32;
+            *cross_section = (crossing(point).unwrap_or(1.0) * area / f64::from(sharers)) as f32;
             *color = points.color.get(i).filter(|_| params.colors).copied().unwrap_or(params.splat.color);
         },
     );

@@ -2,12 +2,12 @@
 
 use crate::columns::CHUNK;
 use crate::surfels::compare;
-use crate::{ConvertError, RawPoints, SplatParams};
+use crate::{Column, ConvertError, RawPoints, SplatParams};
 use rayon::prelude::*;
 use splat_core::glam::{DVec3, Vec3};
 
 /// Points that lie about `spacing` apart, units of the file, where the given ones lie closer: those of each cell of a
-/// lattice with that step become one with their mean place, normal, colour, value and opacity, and the class of the first. The
+/// lattice with that step become one with their mean place, normal, colour, value, opacity and further columns, and the class of the first. The
 /// lattice has a point at zero of the file's coordinates, so nothing depends on the order of the points.
 ///
 /// ```
@@ -36,6 +36,10 @@ pub fn thinned(points: &RawPoints, spacing: f64, params: &SplatParams) -> Result
         let column: Vec<Vec3> = column.iter().map(|v| Vec3::splat(*v)).collect();
         mean(&column).into_iter().map(|v| v.x).collect()
     };
+    let column = |c: &Column| {
+        let of = |r: &&[([f64; 3], u32)]| r.iter().map(|(_, i)| c.values[*i as usize]).sum::<f64>() / r.len() as f64;
+        Column { name: c.name.clone(), values: ranges.iter().map(of).collect() }
+    };
     let first = |r: &&[([f64; 3], u32)]| points.classification[r[0].1 as usize];
     Ok(RawPoints {
         origin: points.origin,
@@ -45,6 +49,7 @@ pub fn thinned(points: &RawPoints, spacing: f64, params: &SplatParams) -> Result
         value: numbers(&points.value),
         opacity: numbers(&points.opacity),
         classification: if points.classification.is_empty() { Vec::new() } else { ranges.iter().map(first).collect() },
+        columns: points.columns.iter().map(column).collect(),
         lattice: None,
         dropped: points.dropped,
     })

@@ -14,7 +14,7 @@ use crate::sobel::{Rows, Sobel, normal_from_gradient};
 use crate::{ConvertError, resample};
 use rayon::prelude::*;
 use splat_core::{
-    Cloud, DAabb, Grid, Progress, SplatKind, TransferFunction,
+    Clip, Cloud, Grid, Progress, SplatKind, TransferFunction,
     glam::{DVec3, Vec3},
 };
 
@@ -36,8 +36,8 @@ pub struct VolumeParams {
     /// Optical depth across a cell, ≥ 0, that may be wrong because the transfer function is taken at the voxel alone; cells
     /// where more could be have its mean.
     pub classification_error: f64,
-    /// The part to keep, object space.
-    pub clip: Option<DAabb>,
+    /// The regions to keep, object space. A cell that their borders cross has the extinction of the part of it that is kept.
+    pub clip: Vec<Clip>,
 }
 
 impl Default for VolumeParams {
@@ -50,7 +50,7 @@ impl Default for VolumeParams {
             values: false,
             omitted_optical_depth: 0.0,
             classification_error: 2.0f64.powi(-11),
-            clip: None,
+            clip: Vec::new(),
         }
     }
 }
@@ -64,6 +64,7 @@ impl VolumeParams {
     /// Checks what does not depend on the volume.
     pub(crate) fn check(&self) -> Result<(), ConvertError> {
         self.splat.check()?;
+        self.clip.iter().try_for_each(Clip::validate).map_err(|e| self.splat.input(e))?;
         let depths = [
             ("omitted_optical_depth", self.omitted_optical_depth),
             ("classification_error", self.classification_error),
@@ -84,7 +85,7 @@ pub struct VolumeReport {
     pub lattice_points: u64,
     /// Splats made.
     pub splats: u64,
-    /// Splats whose colour and extinction are means over their cell.
+    /// Splats whose colour and extinction are means over their cell, or of the part of it that is kept.
     pub averaged: u64,
     /// Lattice points with some extinction that were left out as too thin.
     pub omitted: u64,

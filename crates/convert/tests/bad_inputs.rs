@@ -239,10 +239,10 @@ fn ba15_gzip_bombs_stop_at_the_ratio_and_at_the_limit() {
     refused_with("a.nii.gz", &bomb, "a.nii.gz@0: expected a header size of 348");
     let volume = nifti(NIFTI_U8, false);
     assert_eq!(
-        bytes("a.nii", &volume, &ReadParams { limits: Limits::bytes(47), ..limits }, None).unwrap_err().fault,
+        bytes("a.nii", &volume, &ReadParams { limits: Limits::bytes(47), ..limits.clone() }, None).unwrap_err().fault,
         Fault::Limit
     );
-    assert!(bytes("a.nii", &volume, &ReadParams { limits: Limits::bytes(48), ..limits }, None).is_ok());
+    assert!(bytes("a.nii", &volume, &ReadParams { limits: Limits::bytes(48), ..limits.clone() }, None).is_ok());
     let cloud = las(3, 100, true);
     let error = bytes("a.laz", &cloud, &ReadParams { limits: Limits::bytes(3_000), ..limits }, None).unwrap_err();
     assert_eq!(error.fault, Fault::Limit, "{error}");

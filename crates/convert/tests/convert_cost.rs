@@ -61,7 +61,7 @@ fn meshes_points_and_unsplit_volumes_are_counted_exactly() {
             normals: values,
             values,
             omitted_optical_depth: if values { 0.5 } else { 0.0 },
-            clip: values.then_some(DAabb::new(DVec3::splat(2.0), DVec3::splat(7.5))),
+            clip: values.then_some(Clip::Box(DAabb::new(DVec3::splat(2.0), DVec3::splat(7.5)))).into_iter().collect(),
             ..VolumeParams::default()
         };
         let grid = wave([12, 13, 14], DVec3::ONE);

@@ -1,6 +1,6 @@
 //! Volumes become splats: hard cases CV7-CV9, conserved extinction, gradients, invariances.
 
-use convert::{ConvertError, SplatParams, VolumeParams, reference, sobel_gradient, volume_to_points};
+use convert::{Clip, ConvertError, SplatParams, VolumeParams, reference, sobel_gradient, volume_to_points};
 use splat_core::glam::{DMat3, DQuat, DVec3, Vec3};
 use splat_core::{DAabb, Exceeded, Footprint, Grid, Similarity, TransferFunction, TransferPoint, rng};
 
@@ -152,12 +152,16 @@ fn normals_point_to_lower_values_and_turn_with_the_transform() {
 }
 
 #[test]
-fn a_clip_box_keeps_what_lies_inside() {
-    let params =
-        VolumeParams { clip: Some(DAabb::new(DVec3::splat(1.5), DVec3::splat(4.0))), ..VolumeParams::default() };
+fn a_clip_box_keeps_what_lies_inside_to_the_part_of_a_cell() {
+    let params = VolumeParams {
+        clip: vec![Clip::Box(DAabb::new(DVec3::splat(1.5), DVec3::splat(4.0)))],
+        ..VolumeParams::default()
+    };
     let (cloud, _) =
         volume_to_points(&grid([8; 3], DVec3::ONE, |_, _, _| 1.0), &ramp(0.0, 1.0, 1.0), &params, None).unwrap();
     assert_eq!(cloud.len(), 27);
+    // Of the last cells half a step is kept: 2.5³ of extinction 1.
+    assert_eq!(cloud.cross_section.iter().sum::<f32>(), 15.625);
 }
 
 #[test]

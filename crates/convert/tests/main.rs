@@ -15,6 +15,7 @@ mod marching_cubes;
 mod mpu_fields;
 mod point_opacity;
 mod read_assets;
+mod read_columns;
 #[cfg(all(feature = "off", feature = "pcd", feature = "gltf"))]
 mod read_gltf;
 #[cfg(all(feature = "hdr", feature = "exr", feature = "png"))]

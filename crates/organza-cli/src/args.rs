@@ -28,7 +28,7 @@ pub(super) struct Arguments {
 pub(super) enum Command {
     /// Renders a scene, or data files as they are, to EXR or PNG files.
     #[command(
-        after_help = "Examples:\n  organza render bunny.ply -o bunny.png\n  organza render head.nii.gz --preset mri --azimuth 200 -o head.png\n  organza render ground.laz bunny.ply --ground -o both.png\n  organza render scene.toml -o picture.exr -o picture.png --layers effects,depth\n  organza render bunny.ply -o around.png --turntable 36\n  organza render scene.toml --set object.bunny.opacity=0.4 --technique surfels -o glass.png"
+        after_help = "Examples:\n  organza render bunny.ply -o bunny.png\n  organza render head.nii.gz --preset mri --azimuth 200 -o head.png\n  organza render ground.laz bunny.ply --ground -o both.png\n  organza render ground.laz --color-by height -o heights.png\n  organza render scene.toml -o picture.exr -o picture.png --layers effects,depth\n  organza render bunny.ply -o around.png --turntable 36\n  organza render scene.toml --set object.bunny.opacity=0.4 --technique surfels -o glass.png"
     )]
     Render(RenderArguments),
     /// Writes a first scene of data files, with comments, ready to edit.
@@ -101,9 +101,13 @@ pub(super) struct FirstArguments {
     /// Share of the picture's width or height that is filled, above 0, at most 1 [default: 0.9]
     #[arg(long, value_name = "SHARE", value_parser = parse_finite)]
     pub(super) fit: Option<f64>,
-    /// Look of volumes: ct-bone, ct-skin, mri, cloud, viridis, magma, inferno, plasma, cividis, turbo, grey, or a .json preset of ParaView
+    /// Look of volumes, and the colour map of --color-by: ct-bone, ct-skin, mri, cloud, viridis, magma, inferno, plasma, cividis, turbo, grey, or a .json preset of ParaView
     #[arg(long, value_name = "NAME")]
     pub(super) preset: Option<String>,
+    /// Column that points take their colours from, one of those that `organza info` lists; --preset names the colour map [default: the
+    /// file's colours, else its classes or values]
+    #[arg(long, value_name = "COLUMN")]
+    pub(super) color_by: Option<String>,
     /// Axis of the data that points up [default: what the format of each file says, else y]
     #[arg(long, value_enum)]
     pub(super) up: Option<Axis>,

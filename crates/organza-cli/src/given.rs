@@ -3,7 +3,7 @@
 use super::args::{Axis, FirstArguments, SceneArguments};
 use super::session::{check_backend, render_options, start_threads};
 use organza::scene::{self, DEFAULT_FILL, DEFAULT_SIZE, Override, UpAxis};
-use organza::{Error, Files, Progress, RenderOptions, printable};
+use organza::{Error, FileData, Files, Progress, RenderOptions, printable};
 use organza_survey::{DataFile, Preset, Wish, Written, first_scene};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -55,9 +55,15 @@ pub(super) fn write_first(
     options: &RenderOptions,
 ) -> Result<Written, Error> {
     let progress = Progress::new();
-    let read = inputs.iter().map(|path| DataFile::read(path, files, options, &progress));
+    let read = inputs.iter().map(|path| DataFile::read(path, wish, (files, options, &progress)));
     let data = read.collect::<Result<Vec<_>, _>>()?;
-    first_scene(&data, scene_file, wish, (files, options, &progress))
+    if wish.color_by.is_some() && !data.iter().any(|d| matches!(d.data, FileData::Points(_))) {
+        return Err(Error::usage("--color-by is for points, and no file has points without faces", "leave it out"));
+    }
+    let written = first_scene(&data, scene_file, wish, (files, options, &progress))?;
+    // The scene says what it uses of the files.
+    files.forget_notes();
+    Ok(written)
 }
 
 /// What the command line says of a first scene.
@@ -87,6 +93,7 @@ pub(super) fn wish(first: &FirstArguments, size: Option<[i64; 2]>) -> Result<Wis
         fill: fit.unwrap_or(DEFAULT_FILL),
         size,
         preset: first.preset.as_deref().map(Preset::named).transpose()?,
+        color_by: first.color_by.clone(),
         up: first.up.map(|axis| match axis {
             Axis::Y => UpAxis::Y,
             Axis::Z => UpAxis::Z,
@@ -123,7 +130,12 @@ pub(super) fn is_scene(path: &Path) -> bool {
 
 /// What is said of data files alone says nothing of a scene.
 fn refuse_wishes(first: &FirstArguments) -> Result<(), Error> {
-    let all = [("--preset", first.preset.is_some()), ("--up", first.up.is_some()), ("--ground", first.ground)];
+    let all = [
+        ("--preset", first.preset.is_some()),
+        ("--color-by", first.color_by.is_some()),
+        ("--up", first.up.is_some()),
+        ("--ground", first.ground),
+    ];
     let named = all.into_iter().find(|(_, on)| *on);
     named.map_or(Ok(()), |(name, _)| {
         Err(Error::usage(format!("{name} is for data files, and a scene is given"), "change the scene"))

@@ -115,7 +115,7 @@ fn file_document(facts: &Facts) -> Value {
         "range": facts.range,
         "histogram": facts.histogram.as_ref().map(histogram),
         "quantiles": facts.quantiles.iter().map(|(share, value)| json!([share, value])).collect::<Value>(),
-        "columns": facts.columns.iter().map(|(name, range)| ((*name).to_owned(), json!(range))).collect::<Value>(),
+        "columns": facts.columns.iter().map(|(name, range)| (name.clone(), json!(range))).collect::<Value>(),
         "faults": faults,
         "not_used": facts.unused,
         "remarks": facts.remarks,

@@ -17,6 +17,7 @@ pub(super) fn check_drawn(
 ) -> Result<(), Error> {
     check_one_technique(at, objects, render)?;
     check_lattices(at, objects, render)?;
+    check_clips(at, objects, render)?;
     check_surfels(at, objects, render)?;
     check_bounds(at, objects, materials)?;
     check_scattered(at_layers, layers, objects, render)?;
@@ -49,6 +50,19 @@ fn check_lattices(at: &At<'_>, objects: &[SceneObject], render: &RenderSettings)
         }
     }
     Ok(())
+}
+
+/// Refuses volumes that are cut where slabs lie across half vectors, which show them whole.
+fn check_clips(at: &At<'_>, objects: &[SceneObject], render: &RenderSettings) -> Result<(), Error> {
+    let by_sheets = |o: &SceneObject| o.technique.unwrap_or(render.technique) == Technique::Sheets;
+    let is_cut = |o: &SceneObject| o.visible && o.source.is_medium() && !o.clip.is_empty() && by_sheets(o);
+    match objects.iter().position(is_cut) {
+        Some(i) if render.sheets.slicing != Slicing::View => {
+            let message = "`clip`: slabs across half vectors cut no volume";
+            Err(at.index(i).key("clip").error(message, "use render.sheets.slicing = \"view\", or another technique"))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Refuses media that would be drawn as discs of surfaces.

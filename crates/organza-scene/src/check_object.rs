@@ -2,6 +2,7 @@
 
 use super::check::At;
 use super::check_field::check_clip;
+use super::check_points::check_points;
 use super::check_render::check_technique;
 use super::check_source::check_source;
 use super::paths::Paths;
@@ -56,6 +57,7 @@ pub(super) fn check_object(
             None | Some(RawLattice::Cartesian) => Packing::Cartesian,
             Some(RawLattice::Bcc) => Packing::BodyCentred,
         },
+        points: check_points(at, &raw)?,
         clip: raw
             .clip
             .iter()
@@ -90,9 +92,9 @@ fn refuse_what_does_not_apply(at: &At<'_>, raw: &RawObject, source: &Source) -> 
     if has_own_spacing && raw.spacing.is_some() {
         return Err(at.key("spacing").error("this source states its own spacing", "move `spacing` into the source"));
     }
-    let of_field = matches!(source, Source::Implicit(_) | Source::Isosurface(_) | Source::LevelSet(_));
-    if !of_field && !raw.clip.is_empty() {
-        return Err(at.key("clip").error("`clip` belongs to an `implicit`, `isosurface` or `level_set`", ""));
+    if matches!(source, Source::Medium(_)) && !raw.clip.is_empty() {
+        let hint = "use a `density`, whose expression may be 1 everywhere";
+        return Err(at.key("clip").error("a homogeneous medium has no `clip`", hint));
     }
     if raw.slice.is_some() && raw.unit_length.is_some() {
         return Err(at.key("unit_length").error("a slice has no extinction", "its `opacity` is that of one crossing"));
@@ -110,12 +112,13 @@ fn refuse_what_does_not_apply(at: &At<'_>, raw: &RawObject, source: &Source) -> 
             return Err(at.key(key).error(format!("`{key}` belongs to a `volume`"), ""));
         }
     }
-    if raw.volume.is_none() && raw.slice.is_none() {
-        for (key, on) in [("transfer", raw.transfer.is_some()), ("unit_length", raw.unit_length.is_some())] {
-            if on {
-                return Err(at.key(key).error(format!("`{key}` belongs to a `volume` or `slice`"), ""));
-            }
-        }
+    let is_classified = raw.volume.is_some() || raw.slice.is_some();
+    if raw.transfer.is_some() && !is_classified && raw.color_by.is_none() {
+        let message = "`transfer` belongs to a `volume` or `slice`, and to `points` with `color_by`";
+        return Err(at.key("transfer").error(message, ""));
+    }
+    if raw.unit_length.is_some() && !is_classified {
+        return Err(at.key("unit_length").error("`unit_length` belongs to a `volume` or `slice`", ""));
     }
     Ok(())
 }

@@ -6,7 +6,7 @@ use super::raw_source::RawTransferPoint;
 use crate::Error;
 use splat_core::{TransferFunction, TransferPoint, optics};
 
-/// A slice has colours alone.
+/// A slice and points have colours alone.
 pub(super) fn check_transfer(at: &At<'_>, raw: &RawObject, colors_alone: bool) -> Result<TransferFunction, Error> {
     let Some(points) = &raw.transfer else {
         if colors_alone {
@@ -27,7 +27,7 @@ pub(super) fn check_transfer(at: &At<'_>, raw: &RawObject, colors_alone: bool) -
             return Err(at.key("value").error(message, "list the points by rising value"));
         }
         let extinction = if colors_alone {
-            no_extinction(&at, p).map(|()| 0.0)?
+            no_extinction(&at, raw, p).map(|()| 0.0)?
         } else {
             point_extinction(&at, p, unit_length)? as f32
         };
@@ -36,10 +36,12 @@ pub(super) fn check_transfer(at: &At<'_>, raw: &RawObject, colors_alone: bool) -
     TransferFunction::new(checked).map_err(|e| at.error(e.to_string(), ""))
 }
 
-fn no_extinction(at: &At<'_>, p: &RawTransferPoint) -> Result<(), Error> {
+fn no_extinction(at: &At<'_>, raw: &RawObject, p: &RawTransferPoint) -> Result<(), Error> {
     for (key, on) in [("extinction", p.extinction.is_some()), ("opacity", p.opacity.is_some())] {
         if on {
-            return Err(at.key(key).error("a slice has no extinction", "its `opacity` is that of one crossing"));
+            let what = if raw.points.is_some() { "points have" } else { "a slice has" };
+            let hint = "the object's `opacity` is that of one crossing";
+            return Err(at.key(key).error(format!("{what} no extinction"), hint));
         }
     }
     Ok(())

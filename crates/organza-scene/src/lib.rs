@@ -19,6 +19,7 @@ mod check_field;
 mod check_light;
 mod check_material;
 mod check_object;
+mod check_points;
 mod check_render;
 mod check_slide;
 mod check_source;
@@ -34,11 +35,13 @@ mod load;
 mod model;
 mod overrides;
 mod paths;
+mod points;
 mod raw;
 mod raw_camera;
 mod raw_light;
 mod raw_material;
 mod raw_object;
+mod raw_points;
 mod raw_render;
 mod raw_source;
 mod raw_surfels;
@@ -58,6 +61,7 @@ pub use load::{LoadOptions, MAX_SCENE_BYTES, MAX_SCENE_DEPTH, load, parse, read,
 pub use model::{EnvironmentSource, Scene, SceneMaterial, SceneObject, Up};
 pub use overrides::Override;
 pub use paths::{ROOT_KEY, relative_path, root_for};
+pub use points::PointsLook;
 pub use settings::{
     Aligned, Bending, Classify, Collisions, Coverage, Grouping, OpaqueSurfels, ParticlesSettings, PointsSettings,
     RenderSettings, Scattering, ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler,

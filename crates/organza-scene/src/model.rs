@@ -1,12 +1,13 @@
 //! The checked scene: everything a render needs, in radians and f64 world units.
 
-use super::{CameraFit, RenderSettings, SceneLight, Source, Technique};
+use super::{CameraFit, PointsLook, RenderSettings, SceneLight, Source, Technique};
 use crate::Error;
 use convert::Clip;
 use convert::read::UpAxis;
 use glam::DVec3;
 use sha2::{Digest, Sha256};
 use splat_core::{Camera, FootprintStack, Material, Packing, Similarity};
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -49,6 +50,14 @@ impl Scene {
     pub fn files(&self) -> Vec<PathBuf> {
         let data = self.objects.iter().filter_map(|o| o.source.path());
         std::iter::once(&*self.file).chain(data).chain(self.images()).map(Path::to_owned).collect()
+    }
+
+    /// The columns that are read of a file of points, by name, each once: those that any visible object asks for, so that the file is read
+    /// once for all of them.
+    pub fn columns_of(&self, path: &Path) -> Vec<String> {
+        let of_file = self.objects.iter().filter(|o| o.visible && matches!(&o.source, Source::Points(p) if p == path));
+        let names: BTreeSet<&str> = of_file.flat_map(|o| o.points.columns()).collect();
+        names.into_iter().map(str::to_owned).collect()
     }
 
     /// The files of its environment and of what lights shine through.
@@ -109,7 +118,9 @@ pub struct SceneObject {
     pub opacity: Option<f64>,
     /// How the planes of the lattice lie that a volume is drawn on: of the file's, or of the body-centred one of the same spectrum.
     pub packing: Packing,
-    /// Regions outside of which a surface of a field ends, before the object's transform.
+    /// How raw points look.
+    pub points: PointsLook,
+    /// Regions that it is kept in, before the object's transform.
     pub clip: Vec<Clip>,
     /// Distance between splats, world units; `None` means that it is chosen from the data and the camera.
     pub spacing: Option<f64>,

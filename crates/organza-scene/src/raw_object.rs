@@ -1,11 +1,13 @@
 //! Objects as they are written.
 
+use super::raw_points::{RawColorBy, RawPointSize};
 use super::raw_source::{
     RawClip, RawCloud, RawDensity, RawImplicit, RawIsosurface, RawLevelSet, RawMediumBall, RawMediumBox, RawRectangle,
     RawSlice, RawTransferPoint,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 
 /// An object: a name, exactly one source (`mesh`, `volume`, `points`, `implicit`, `isosurface`, `level_set`, `slice`,
 /// `density`, `cloud`, `rectangle`, `medium_box` or `medium_ball`), and how it looks.
@@ -41,10 +43,18 @@ pub(super) struct RawObject {
     pub(super) medium_box: Option<RawMediumBox>,
     /// A homogeneous ball.
     pub(super) medium_ball: Option<RawMediumBall>,
-    /// Regions that an `implicit`, `isosurface` or `level_set` is kept in; it ends open at their borders.
+    /// The column that `points` take their colours from.
+    pub(super) color_by: Option<RawColorBy>,
+    /// Which `points` are drawn: classes by a list, other columns by their lowest and highest number.
+    pub(super) keep: Option<BTreeMap<String, Vec<f64>>>,
+    /// Whether `points` are drawn without light; default true where their file has colours and nothing else says how they look.
+    pub(super) unlit: Option<bool>,
+    /// Diameter of the discs of `points`; default from their neighbours.
+    pub(super) point_size: Option<RawPointSize>,
+    /// Regions that it is kept in, but for homogeneous media; surfaces end open at their borders, volumes show their values there.
     #[serde(default)]
     pub(super) clip: Vec<RawClip>,
-    /// Control points of the transfer function of a `volume` or `slice`, by rising value.
+    /// Control points of the transfer function of a `volume`, `slice` or `points` with `color_by`, by rising value.
     pub(super) transfer: Option<Vec<RawTransferPoint>>,
     /// World length that opacities of `transfer` refer to.
     pub(super) unit_length: Option<f64>,

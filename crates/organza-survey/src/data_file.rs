@@ -1,6 +1,7 @@
 //! A data file as a first scene takes it: what it holds, and the name of its object.
 
-use convert::read::UpAxis;
+use crate::preset::Wish;
+use convert::read::{ReadParams, UpAxis};
 use organza::{Error, FileData, Files, Progress, RenderOptions, printable};
 use std::path::{Path, PathBuf};
 
@@ -16,12 +17,17 @@ pub struct DataFile {
 }
 
 impl DataFile {
-    /// Reads a file, or takes it from those that were read before; refuses what a scene shows nothing of.
+    /// Reads a file with the column that `wish` names, or takes it from those that were read before; refuses what a scene shows nothing of.
     ///
     /// # Errors
     /// As [`Files::read`]; [`Error::Input`] for a file without points or faces, and for an image.
-    pub fn read(path: &Path, files: &Files, options: &RenderOptions, progress: &Progress) -> Result<Self, Error> {
-        let data = files.read(path, &options.read_params(), progress)?;
+    pub fn read(
+        path: &Path,
+        wish: &Wish,
+        (files, options, progress): (&Files, &RenderOptions, &Progress),
+    ) -> Result<Self, Error> {
+        let columns = wish.color_by.iter().cloned().collect();
+        let data = files.read(path, &ReadParams { columns, ..options.read_params() }, progress)?;
         let refuse = |message: &str, hint: &str| Err(Error::input(printable(path), message, hint));
         match &data {
             FileData::Mesh(mesh) if mesh.triangles.is_empty() => refuse("expected at least one face, found none", ""),

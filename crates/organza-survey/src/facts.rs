@@ -4,7 +4,7 @@ use crate::histogram::Histogram;
 use crate::mesh_faults::{MeshFaults, mesh_faults};
 use crate::spacing::{duplicates, median_spacing};
 use convert::RawPoints;
-use convert::read::{Loaded, Mended, ReadParams, UpAxis, up_axis};
+use convert::read::{Loaded, Mended, NamedColumn, ReadParams, UpAxis, up_axis};
 use organza::Error;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Aabb, DAabb, Grid, Limits, Mesh, RadianceImage};
@@ -45,8 +45,8 @@ pub struct Facts {
     pub histogram: Option<Histogram>,
     /// Shares of the values, and the value below which each lies.
     pub quantiles: Vec<(f64, f64)>,
-    /// Name, lowest and highest value of columns beside positions.
-    pub columns: Vec<(&'static str, [f32; 2])>,
+    /// Name, lowest and highest number of columns beside positions; of points those that they can be coloured and kept by.
+    pub columns: Vec<(String, [f64; 2])>,
     /// Faults of a mesh.
     pub faults: Option<MeshFaults>,
     /// Columns, fields and statements of the file that are not used, as the file names them.
@@ -65,20 +65,23 @@ pub struct Facts {
 /// [`Error::Io`] for the file system, [`Error::Input`] for a file that is not what its name says, [`Error::Limit`] for
 /// one that would take more than `max_bytes`.
 pub fn facts(path: &Path, max_bytes: u64, strict: bool) -> Result<Facts, Error> {
-    let params = ReadParams { limits: Limits::bytes(max_bytes), strict, ..ReadParams::default() };
+    let params = ReadParams { limits: Limits::bytes(max_bytes), strict, ranges: true, ..ReadParams::default() };
     let read = convert::read::file(path, &params, None);
     let (data, notes) = read.map_err(|e| Error::from_read(path, &e))?;
     let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "cannot read", e))?.len();
     let facts = match data {
         Loaded::Mesh(mesh) => of_mesh(&mesh),
-        Loaded::Points(points) => of_points(&points),
+        Loaded::Points(points) => of_points(&points, &notes.columns, up_axis(path)),
         Loaded::Grid(grid) => of_grid(&grid),
         Loaded::Image(image) => of_image(&image),
         _ => return Err(Error::Internal("a reader gave data of no known kind".into())),
     };
+    // What a scene can ask for by name is no longer without use.
+    let is_column = |name: &String| notes.columns.iter().any(|column| column.name == *name);
+    let unused = notes.unused.iter().filter(|name| !is_column(name)).cloned().collect();
     let remarks = notes.remarks.into_iter().chain(facts.remarks).collect();
     let mended = notes.mended.iter().map(Mended::to_string).collect();
-    Ok(Facts { bytes, format: notes.format, unused: notes.unused, remarks, mended, up: up_axis(path), ..facts })
+    Ok(Facts { bytes, format: notes.format, unused, remarks, mended, up: up_axis(path), ..facts })
 }
 
 impl Facts {
@@ -103,9 +106,14 @@ fn range_of(values: impl Iterator<Item = f32>) -> [f32; 2] {
 }
 
 /// The ranges of columns that are there.
-fn ranges<const N: usize>(columns: [(&'static str, Vec<f32>); N]) -> Vec<(&'static str, [f32; 2])> {
+fn ranges<const N: usize>(columns: [(&str, Vec<f32>); N]) -> Vec<(String, [f64; 2])> {
     let there = columns.into_iter().filter(|(_, values)| !values.is_empty());
-    there.map(|(name, values)| (name, range_of(values.into_iter()))).collect()
+    there.map(|(name, values)| (name.to_owned(), range_of(values.into_iter()).map(f64::from))).collect()
+}
+
+/// The range of the coordinate along the axis that points up.
+fn height(bounds: DAabb, up: UpAxis) -> (String, [f64; 2]) {
+    ("height".to_owned(), [bounds.min, bounds.max].map(|corner| corner.dot(up.direction())))
 }
 
 fn of_mesh(mesh: &Mesh) -> Facts {
@@ -120,7 +128,9 @@ fn of_mesh(mesh: &Mesh) -> Facts {
     }
 }
 
-fn of_points(points: &RawPoints) -> Facts {
+fn of_points(points: &RawPoints, further: &[NamedColumn], up: UpAxis) -> Facts {
+    let bounds = bounds_of(points.origin, &points.position);
+    let of_file = further.iter().filter_map(|c| Some((c.name.clone(), c.range?)));
     Facts {
         kind: "points",
         counts: vec![("points", points.position.len() as u64)],
@@ -136,7 +146,7 @@ fn of_points(points: &RawPoints) -> Facts {
         } else {
             vec!["colours are drawn as they are, without light, unless the scene names a material".to_owned()]
         },
-        bounds: bounds_of(points.origin, &points.position),
+        bounds,
         spacing: median_spacing(&points.position),
         duplicates: Some(duplicates(&points.position)),
         columns: ranges([
@@ -144,7 +154,11 @@ fn of_points(points: &RawPoints) -> Facts {
             ("value", points.value.clone()),
             ("opacity", points.opacity.clone()),
             ("classification", points.classification.iter().map(|c| f32::from(*c)).collect()),
-        ]),
+        ])
+        .into_iter()
+        .chain(bounds.map(|bounds| height(bounds, up)))
+        .chain(of_file)
+        .collect(),
         ..Facts::default()
     }
 }
@@ -202,7 +216,8 @@ mod tests {
             position: vec![Vec3::new(-0.5, 0.0, 0.0), Vec3::new(0.5, 0.0, 0.0)],
             ..RawPoints::default()
         };
-        let facts = of_points(&points);
+        let facts = of_points(&points, &[], UpAxis::Z);
         assert_eq!((facts.far(), facts.spacing, facts.duplicates), (Some(5e6), Some(1.0), Some(0)));
+        assert_eq!(facts.columns, [("height".to_owned(), [4e6, 4e6])]);
     }
 }

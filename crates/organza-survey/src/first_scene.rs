@@ -4,6 +4,7 @@
 //! the numbers of that place, light that comes from beside it, and the ground below what it sees.
 
 mod look;
+mod point_colors;
 
 use crate::data_file::DataFile;
 use crate::lamps::lamps;
@@ -60,7 +61,7 @@ pub fn first_scene(
     let paths: Vec<String> = data.iter().map(|d| written_path(&d.path, &folder)).collect::<Result<_, _>>()?;
     let root = root_for(scene_file, data.iter().map(|d| d.path.as_path()))?;
     let root = root.map(|root| text_of(&root)).transpose()?;
-    let objects = objects(data, &paths, wish.preset.as_ref(), wish.up);
+    let objects = objects(data, &paths, wish);
     let azimuth = wish.azimuth.unwrap_or_else(|| default_azimuth(data));
     let head = |camera: &str| {
         let root =

@@ -7,7 +7,6 @@
 //! A first scene is text in TOML, with comments. Nothing about a picture is decided but by that text: who draws it draws the text.
 #![forbid(unsafe_code)]
 
-mod color_map;
 mod data_file;
 mod facts;
 mod first_scene;

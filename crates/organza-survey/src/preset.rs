@@ -1,7 +1,7 @@
 //! What a user may wish of a first scene.
 
-use crate::color_map::{CIVIDIS, ColorMap, GREY, INFERNO, MAGMA, PLASMA, TURBO, VIRIDIS};
 use crate::paraview::Sampled;
+use convert::ColorMap;
 use organza::Error;
 use organza::scene::{DEFAULT_FILL, DEFAULT_SIZE, UpAxis};
 use std::path::Path;
@@ -27,20 +27,9 @@ pub(crate) enum Look {
     Sampled(Sampled),
 }
 
-/// The looks that have a name.
-const NAMED: [(&str, Look); 11] = [
-    ("ct-bone", Look::CtBone),
-    ("ct-skin", Look::CtSkin),
-    ("mri", Look::Mri),
-    ("cloud", Look::Cloud),
-    ("viridis", Look::Map(VIRIDIS)),
-    ("magma", Look::Map(MAGMA)),
-    ("inferno", Look::Map(INFERNO)),
-    ("plasma", Look::Map(PLASMA)),
-    ("cividis", Look::Map(CIVIDIS)),
-    ("turbo", Look::Map(TURBO)),
-    ("grey", Look::Map(GREY)),
-];
+/// The looks that have a name and are no colour map.
+const NAMED: [(&str, Look); 4] =
+    [("ct-bone", Look::CtBone), ("ct-skin", Look::CtSkin), ("mri", Look::Mri), ("cloud", Look::Cloud)];
 
 impl Preset {
     /// A preset by its name, or from a JSON file of ParaView by its path.
@@ -48,19 +37,25 @@ impl Preset {
     /// # Errors
     /// [`Error::Usage`] for a name that there is not, [`Error::Io`] and [`Error::Input`] for a file.
     pub fn named(name: &str) -> Result<Self, Error> {
-        if let Some((_, look)) = NAMED.iter().find(|(known, _)| *known == name) {
-            return Ok(Self(look.clone()));
+        let look = NAMED.iter().find(|(known, _)| *known == name).map(|(_, look)| look.clone());
+        if let Some(look) = look.or_else(|| ColorMap::named(name).map(Look::Map)) {
+            return Ok(Self(look));
         }
         if Path::new(name).extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
             return Sampled::read(Path::new(name)).map(|sampled| Self(Look::Sampled(sampled)));
         }
         let message = format!("--preset {}: there is no such preset", organza::shown(name));
-        let names: Vec<&str> = NAMED.iter().map(|(name, _)| *name).collect();
+        let names: Vec<&str> = NAMED.iter().map(|(name, _)| *name).chain(ColorMap::names()).collect();
         Err(Error::usage(message, format!("there are {}, or the path of a .json preset of ParaView", names.join(", "))))
     }
 }
 
 impl Preset {
+    /// The colour map, if it is one.
+    pub(crate) fn map(&self) -> Option<ColorMap> {
+        if let Look::Map(map) = self.0 { Some(map) } else { None }
+    }
+
     /// Whether matter scatters light as droplets do.
     pub(crate) fn is_cloud(&self) -> bool {
         self.0 == Look::Cloud
@@ -78,8 +73,10 @@ pub struct Wish {
     pub fill: f64,
     /// Width and height, pixels.
     pub size: [u32; 2],
-    /// How volumes look.
+    /// How volumes look, and the colour map of points.
     pub preset: Option<Preset>,
+    /// The column that points take their colours from; without it one is chosen where their file has no colours.
+    pub color_by: Option<String>,
     /// Which axis of the data points up; `None` leaves that to the format of each file.
     pub up: Option<UpAxis>,
     /// Whether everything stands on a ground.
@@ -94,6 +91,7 @@ impl Default for Wish {
             fill: DEFAULT_FILL,
             size: DEFAULT_SIZE,
             preset: None,
+            color_by: None,
             up: None,
             ground: false,
         }

@@ -1,9 +1,9 @@
 //! Transfer functions of volumes that are seen for the first time: colours by a preset, extinction so that a view ray through
 //! matter loses about as much light as the preset wants, whatever the volume's size, steps and values are.
 
-use crate::color_map::ColorMap;
 use crate::matter::Matter;
 use crate::preset::Look;
+use convert::ColorMap;
 use splat_core::Grid;
 
 /// Tissue without a name: from what lies around to what is densest.
@@ -130,7 +130,7 @@ fn points(matter: &Matter, look: Option<&Look>) -> (Vec<Point>, f64) {
 
 /// The colours of a map over the body of the values, of which the higher ones are denser.
 fn of_map(map: ColorMap, of_body: impl Fn(f64, [f32; 3], f64) -> Point) -> Vec<Point> {
-    let steps = (map.len() - 1).max(4);
+    let steps = (map.steps() - 1).max(4);
     let point = |i: usize| {
         let place = i as f64 / steps as f64;
         of_body(place, map.at(place), place * place)
@@ -157,7 +157,6 @@ fn rising(mut points: Vec<Point>) -> Vec<Point> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::color_map::VIRIDIS;
     use splat_core::glam::{DMat3, DVec3};
 
     /// A cube of one value in the middle of nothing.
@@ -173,7 +172,7 @@ mod tests {
         for step in [0.001, 1.0, 250.0] {
             let grid = cube(step);
             let matter = Matter::of(&grid).unwrap();
-            for look in [None, Some(Look::Cloud), Some(Look::Map(VIRIDIS))] {
+            for look in [None, Some(Look::Cloud), Some(Look::Map(ColorMap::VIRIDIS))] {
                 let (_, depth) = points(&matter, look.as_ref());
                 let transfer = Transfer::new(&grid, Some(&matter), look.as_ref());
                 // Twelve voxels of full weight.

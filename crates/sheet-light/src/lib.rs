@@ -28,7 +28,7 @@
 //! let material = Material { shading: Shading::Unlit, ..Material::default() };
 //! let volume = Volume {
 //!     grid: &grid, packing: Packing::Cartesian, transform: Similarity::default(), transfer: &transfer, material: &material,
-//!     extinction_scale: 1.0, normals: false, object: 0, shadow_coefficient: 1.0, casts_shadow: true,
+//!     extinction_scale: 1.0, normals: false, clip: &[], object: 0, shadow_coefficient: 1.0, casts_shadow: true,
 //! };
 //! let view = Projection::Orthographic { height: 2.0 };
 //! let camera = Camera::look_at(DVec3::Z * 9.0, DVec3::ZERO, DVec3::Y, view, [16, 16]).unwrap();

@@ -8,10 +8,10 @@ use crate::aligned::Slant;
 use crate::slabs::Slabs;
 use crate::tile::{AREA, SIDE, TILE};
 use crate::volume::Volume;
-use splat_core::Camera;
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
+use splat_core::{Camera, Clip, Similarity};
 
 /// View depths between which each ray is inside, counted from the first slab; beyond each other where it is not. The rim of the
 /// tile is included.
@@ -21,13 +21,15 @@ pub(crate) struct Crossings {
     pub(crate) far: Vec<f32>,
 }
 
-/// A volume's lattice coordinates of a view ray: origin + direction·z.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A volume's lattice coordinates of a view ray: origin + direction·z, and the planes that it is cut along.
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LatticeRays {
     lattice_from_view: DMat3,
     start: DVec3,
     lowest: DVec3,
     highest: DVec3,
+    /// Normals that lead out, and what their products with the border are, in view space.
+    planes: Vec<(DVec3, f64)>,
     origin: f64,
 }
 
@@ -36,11 +38,17 @@ impl LatticeRays {
     pub(crate) fn new(volume: &Volume<'_>, camera: &Camera, origin: f64) -> Self {
         let world_from_view = DMat3::from_cols(camera.axes[0], camera.axes[1], camera.axes[2]);
         let (inverse, lowest) = (volume.axes().inverse(), volume.packing.lowest());
+        let Similarity { scale, rotation, .. } = volume.transform;
+        let eye = rotation.inverse() * (camera.position - volume.transform.translation) / scale;
+        let plane = |(normal, offset): (DVec3, f64)| {
+            (world_from_view.transpose() * (rotation * normal), (offset - normal.dot(eye)) * scale)
+        };
         Self {
             lattice_from_view: inverse * world_from_view,
             start: inverse * (camera.position - volume.origin()),
             lowest,
             highest: lowest + DVec3::from_array(volume.grid.dims.map(|n| n as f64)),
+            planes: volume.clip.iter().flat_map(Clip::half_spaces).map(plane).collect(),
             origin,
         }
     }
@@ -61,8 +69,17 @@ impl LatticeRays {
 
     /// Where a view ray is inside, counted from the origin, not behind the eye.
     pub(crate) fn crossing(&self, (from, along): (DVec3, DVec3)) -> [f64; 2] {
-        let (from, along) = (self.lattice(from), self.lattice_from_view * along);
         let (mut near, mut far) = (0.0f64, f64::INFINITY);
+        for (normal, offset) in &self.planes {
+            let (to_border, leaves) = (offset - normal.dot(from), normal.dot(along));
+            match leaves {
+                0.0 if to_border < 0.0 => return [f64::INFINITY, f64::NEG_INFINITY],
+                0.0 => {}
+                _ if leaves > 0.0 => far = far.min(to_border / leaves),
+                _ => near = near.max(to_border / leaves),
+            }
+        }
+        let (from, along) = (self.lattice(from), self.lattice_from_view * along);
         for a in 0..3 {
             let (to_low, to_high) = (self.lowest[a] - from[a], self.highest[a] - from[a]);
             if along[a] == 0.0 {

@@ -5,7 +5,7 @@ use crate::visible::without_extinction;
 use crate::{Error, Splats};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::shade::LitBy;
-use splat_core::{Camera, Grid, Material, Packing, Similarity, TransferFunction};
+use splat_core::{Camera, Clip, Grid, Material, Packing, Similarity, TransferFunction};
 
 /// Most lattice points along one axis: a voxel's place in its row is kept in 16 bits, with a rim around the lattice.
 const MOST_A_SIDE: usize = (1 << 16) - 8;
@@ -27,6 +27,9 @@ pub struct Volume<'a> {
     pub extinction_scale: f64,
     /// How light becomes radiance.
     pub material: &'a Material,
+    /// Regions that it is kept in, in the grid's space: rays end at their borders, and what is left shows its values there. Half-vector
+    /// sheets take none.
+    pub clip: &'a [Clip],
     /// Whether light is reflected about the gradient of the values, −∇v/|∇v| being the normal.
     pub normals: bool,
     /// Object id, for the object plane of an accumulator.
@@ -92,9 +95,14 @@ impl Volume<'_> {
 }
 
 impl SheetInput<'_> {
-    /// What [`SheetInput::check_any_lattice`] does, and that all lattices are Cartesian.
+    /// What [`SheetInput::check_any_lattice`] does, and that all lattices are Cartesian and whole.
     pub(crate) fn check(&self) -> Result<(), Error> {
         self.check_any_lattice()?;
+        if let Some(volume) = self.volumes.iter().position(|v| !v.clip.is_empty()) {
+            let (found, expected) = (self.volumes[volume].clip, "no regions: half-vector sheets cut nothing");
+            let source = splat_core::Error::invalid("volume", volume, "clip", found, expected);
+            return Err(Error::Volume { volume, source });
+        }
         let other = self.volumes.iter().position(|v| v.packing != Packing::Cartesian);
         other.map_or(Ok(()), |volume| {
             let expected = "a Cartesian lattice: half-vector sheets take no body-centred one";
@@ -112,6 +120,7 @@ impl SheetInput<'_> {
         }
         for (volume, v) in self.volumes.iter().enumerate() {
             v.grid.validate().map_err(|source| Error::Volume { volume, source })?;
+            v.clip.iter().try_for_each(Clip::validate).map_err(|source| Error::Volume { volume, source })?;
             if v.packing == Packing::BodyCentred && !v.grid.dims[2].is_multiple_of(2) {
                 let expected = "an even number of planes of a body-centred lattice";
                 let source = splat_core::Error::invalid("grid", 0, "dims", v.grid.dims, expected);

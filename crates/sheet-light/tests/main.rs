@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod body_centred;
+mod clipped;
 mod closed_forms;
 mod common;
 mod half;

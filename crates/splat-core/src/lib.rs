@@ -38,6 +38,7 @@
 
 mod camera;
 mod canonical;
+mod clip;
 mod cloud;
 mod cost;
 mod depth_profile;
@@ -68,6 +69,7 @@ pub mod raster;
 pub mod shade;
 
 pub use camera::{Camera, Projection, ViewTransform};
+pub use clip::Clip;
 pub use cloud::{Cloud, Splat, SplatKind};
 pub use cost::{CostRecord, StageCost};
 pub use depth_profile::{DepthFragment, DepthProfile};

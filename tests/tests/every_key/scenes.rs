@@ -70,6 +70,7 @@ impl Folder {
         write("colored.xyz", &sheet(true, 0.08));
         write("plain.xyz", &sheet(false, 0.08));
         write("other.xyz", &sheet(true, 0.05));
+        write("hot.xyz", &hot());
         write("ball.xyz", &ball(0.6));
         write("larger.xyz", &ball(0.75));
         write("grid.nrrd", &nrrd("", 1.0));
@@ -162,6 +163,13 @@ fn sheet(colored: bool, step: f64) -> String {
     };
     (0..256).chain([0]).for_each(|i| text += &point(i));
     text
+}
+
+/// The sheet with a column of its own.
+fn hot() -> String {
+    let sheet = sheet(false, 0.08);
+    let lines = sheet.lines().enumerate();
+    lines.map(|(i, line)| if i == 0 { format!("{line} heat\n") } else { format!("{line} {i}\n") }).collect()
 }
 
 /// Points with normals on a flattened ball.

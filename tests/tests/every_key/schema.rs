@@ -88,7 +88,9 @@ pub(crate) fn heading(table: &str) -> &'static str {
         "object" => "## `[[object]]`",
         "object.transform" => "`transform`",
         "object.transfer" => "`transfer`",
-        "object.isosurface" | "object.level_set" | "object.slice" | "object.clip" => "### Surfaces of fields",
+        "object.isosurface" | "object.level_set" | "object.slice" => "### Surfaces of fields",
+        "object.clip" => "### `clip`",
+        "object.color_by" | "object.point_size" => "### Raw points",
         "material" | "material.medium" | "material.absorption" | "material.cauchy" | "material.bump" => {
             "`[material.NAME]`"
         }

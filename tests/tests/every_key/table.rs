@@ -174,9 +174,11 @@ pub(super) const SUN: &[&str] = &["light=[{kind='directional', direction=[-2, -3
 
 const OF_THE_TRANSFER: Expected = Refused(2, "are those of its `transfer`");
 const NOT_OF_POINTS: Expected = Refused(2, "`merge_duplicates` belongs to `points`");
-const NO_CLIP: Expected = Refused(2, "`clip` belongs to");
+const NO_CLIP: Expected = Refused(2, "a homogeneous medium has no `clip`");
+const RAW: Which = These(&["points", "plain points"]);
+const HOT: &[&str] = &["object.it.points='hot.xyz'", "object.it.color_by={column='heat'}"];
 const OWN_SPACING: Expected = Refused(2, "states its own spacing");
-const NO_TRANSFER: Expected = Refused(2, "belongs to a `volume` or `slice`");
+const NO_TRANSFER: Expected = Refused(2, "belongs to a `volume` or `slice`, and to `points` with `color_by`");
 pub(super) const OPEN: Which = These(&["implicit", "isosurface", "level_set"]);
 
 fn objects() -> Vec<Entry> {
@@ -208,16 +210,35 @@ fn objects() -> Vec<Entry> {
             .but(These(&["points", "plain points"]), Expected::Changes)
             .but(All, NOT_OF_POINTS),
         of(All, "object.clip", "object.it.clip=[{normal=[0, 1, 0], point=[0, 0.1, 0]}]")
-            .but(OPEN, Expected::Changes)
-            .but(All, NO_CLIP),
+            .but(These(&["medium_box", "medium_ball"]), NO_CLIP),
         of(OPEN, "object.clip.normal", "object.it.clip.0.normal=[1, 0, 0]")
             .with(&["object.it.clip=[{normal=[0, 1, 0], point=[0, 0.1, 0]}]"]),
         of(OPEN, "object.clip.point", "object.it.clip.0.point=[0, -0.1, 0]")
             .with(&["object.it.clip=[{normal=[0, 1, 0], point=[0, 0.1, 0]}]"]),
         of(OPEN, "object.clip.box", "object.it.clip.0.box=[[-0.2, -0.3, -1], [0.3, 0.3, 1]]")
             .with(&["object.it.clip=[{box=[[-0.3, -0.3, -1], [0.3, 0.3, 1]]}]"]),
+        of(RAW, "object.color_by", "object.it.color_by={column='z'}"),
+        one("object.color_by", "object.it.color_by={column='z'}")
+            .but(All, Refused(2, "`color_by` belongs to `points`")),
+        of(HEAT, "object.color_by.column", "object.it.color_by.column='x'").with(HOT),
+        of(HEAT, "object.color_by.map", "object.it.color_by.map='distinct'").with(HOT),
+        of(HEAT, "object.color_by.range", "object.it.color_by.range=[0, 900]").with(HOT),
+        of(HEAT, "object.keep", "object.it.keep={heat=[10, 200]}").with(HOT),
+        one("object.keep", "object.it.keep={z=[0, 1]}").but(All, Refused(2, "`keep` belongs to `points`")),
+        of(RAW, "object.unlit", "object.it.unlit=true")
+            .but(All, Refused(2, "`unlit` and `material` exclude each other")),
+        one("object.unlit", "object.it.unlit=true").but(All, Refused(2, "`unlit` belongs to `points`")),
+        of(RAW, "object.point_size", "object.it.point_size={world=0.05}"),
+        one("object.point_size", "object.it.point_size={world=0.05}")
+            .but(All, Refused(2, "`point_size` belongs to `points`")),
+        of(HEAT, "object.point_size.world", "object.it.point_size.world=0.05")
+            .with(&["object.it.point_size={world=0.1}"]),
+        of(HEAT, "object.point_size.pixels", "object.it.point_size.pixels=1")
+            .with(&["object.it.point_size={pixels=2}"]),
     ]
 }
+
+const HEAT: Which = These(&["plain points"]);
 
 const CLOUD: Which = These(&["cloud"]);
 const VOLUME: Which = These(&["volume"]);

@@ -60,20 +60,28 @@ impl<'a> Stream<'a> {
     }
 
     fn new(source: impl Read + 'a, length: Option<u64>, stored: u64, params: &ReadParams) -> Self {
-        Self { source: Box::new(source), head: Vec::new(), taken: 0, position: 0, length, stored, params: *params }
+        Self {
+            source: Box::new(source),
+            head: Vec::new(),
+            taken: 0,
+            position: 0,
+            length,
+            stored,
+            params: params.clone(),
+        }
     }
 
     /// The unpacked bytes of what is left, which is gzip of one or several members. However often gzip is packed into
     /// gzip, the bytes of the file itself decide how much may come out.
     pub(super) fn gunzip(self) -> Stream<'a> {
-        let (stored, params) = (self.stored, self.params);
-        Stream::new(Unpacked::gzip(self, stored, params), None, stored, &params)
+        let (stored, params) = (self.stored, self.params.clone());
+        Stream::new(Unpacked::gzip(self, stored, params.clone()), None, stored, &params)
     }
 
     /// The same of one zlib stream.
     pub(super) fn inflate(self) -> Stream<'a> {
-        let (stored, params) = (self.stored, self.params);
-        Stream::new(Unpacked::zlib(self, stored, params), None, stored, &params)
+        let (stored, params) = (self.stored, self.params.clone());
+        Stream::new(Unpacked::zlib(self, stored, params.clone()), None, stored, &params)
     }
 
     /// Up to `n` of the bytes to come, without taking them; fewer only at the end.

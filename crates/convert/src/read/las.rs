@@ -1,8 +1,12 @@
-//! LAS 1.0 to 1.4 and LAZ → raw points with colours, intensity as value, classes and their exact integers.
+//! LAS 1.0 to 1.4 and LAZ → raw points with colours, intensity as value, classes, their exact integers, and what is asked for by name.
 
-use super::{Notes, ReadParams, color::linear_from_srgb, input, laz};
+mod further;
+
+use super::extras::Extras;
+use super::{Notes, ReadParams, input, laz};
 use crate::error::{Place, ReadError};
 use crate::raw_points::{PointLattice, RawPoints};
+use crate::srgb::linear_from_srgb;
 use ::las::point::Format;
 use ::las::{PointData, PointDataBuilder, raw};
 use splat_core::glam::{DVec3, Vec3};
@@ -39,20 +43,30 @@ pub(super) fn read(content: Vec<u8>, params: &ReadParams, notes: &mut Notes) -> 
     let layout = layout(&content)?;
     // What the file cannot hold is its fault, not the limit's.
     let plain = (!layout.compressed).then(|| plain_records(&content, &layout)).transpose()?;
-    input::check_bytes("the points", layout.count.saturating_mul(BYTES_PER_POINT), params)?;
+    let fields = further::fields(&layout, described(&content, &layout));
+    let ranks = fields.iter().enumerate().map(|(rank, f)| (rank, f.name.as_bytes(), f.is_spare()));
+    let mut extras = Extras::new(ranks, params);
+    let asked: Vec<usize> = extras.read().collect();
+    let selection = further::selection(asked.iter().map(|rank| &fields[*rank]));
+    let bytes = BYTES_PER_POINT + extras.bytes_per_point();
+    input::check_bytes("the points", layout.count.saturating_mul(bytes), params)?;
     notes.not_used(unused(&content, &layout).iter().map(String::as_bytes));
     let mut columns = Columns::default();
     let mut take = |records: Vec<u8>| {
         let data = PointDataBuilder::new().with_format(layout.format).build_from_bytes(records);
-        columns.append(&data.map_err(|e| damaged(layout.points, "whole point records", &e.to_string()))?, &layout)
+        let data = data.map_err(|e| damaged(layout.points, "whole point records", &e.to_string()))?;
+        extras.reserve(data.len())?;
+        asked.iter().for_each(|rank| fields[*rank].numbers(&data, |numbers| extras.extend(*rank, numbers)));
+        columns.append(&data, &layout)
     };
     match plain {
         Some(records) => records.chunks(BLOCK * layout.record as usize).try_for_each(|block| take(block.to_vec()))?,
-        None => laz::decompress(&content, &layout, params, take)?,
+        None => laz::decompress(&content, &layout, params, selection, take)?,
     }
     // Before the columns are converted: the file takes about as much as they do.
     drop(content);
-    columns.into_points(&layout)
+    let points = columns.into_points(&layout)?;
+    Ok(RawPoints { columns: extras.finish(notes), ..points })
 }
 
 /// Names of the dimensions of its points that are read over.
@@ -71,13 +85,18 @@ fn unused(content: &[u8], layout: &Layout) -> Vec<String> {
 
 /// Names of the extra dimensions, as far as the file describes them.
 fn extra_names(content: &[u8], layout: &Layout) -> Vec<String> {
-    let described = variable_records(content, layout).find(|r| r.user == b"LASF_Spec" && r.id == EXTRA_BYTES);
-    let described = described.map_or(&[][..], |r| r.data).as_chunks::<DESCRIPTION>().0;
+    let described = described(content, layout).as_chunks::<DESCRIPTION>().0;
     let name = |d: &[u8; DESCRIPTION]| {
         let name = d[4..36].split(|b| *b == 0).next().unwrap_or_default();
         String::from_utf8_lossy(name).into_owned()
     };
     described.iter().map(name).filter(|n| !n.is_empty()).collect()
+}
+
+/// The descriptions of the extra dimensions, one behind the other.
+fn described<'a>(content: &'a [u8], layout: &Layout) -> &'a [u8] {
+    let described = variable_records(content, layout).find(|r| r.user == b"LASF_Spec" && r.id == EXTRA_BYTES);
+    described.map_or(&[], |r| r.data)
 }
 
 /// A variable-length record before the points.

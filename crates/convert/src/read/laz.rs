@@ -29,11 +29,12 @@ const LAYERED: u16 = 3;
 const WAVE: usize = 16;
 const HINT: &str = "the file is truncated or damaged; fetch it again";
 
-/// Decodes all point records and hands them to `take`, in order and in parts, so that not all of them are in memory.
+/// Decodes all point records, of those whose fields have streams of their own what is selected, and hands them to `take`, in order and in parts, so that not all of them are in memory.
 pub(super) fn decompress(
     content: &[u8],
     layout: &Layout,
     params: &ReadParams,
+    selection: DecompressionSelection,
     mut take: impl FnMut(Vec<u8>) -> Result<(), ReadError>,
 ) -> Result<(), ReadError> {
     let (compressor, vlr) = laszip_record(content, layout)?;
@@ -61,7 +62,8 @@ pub(super) fn decompress(
         ));
     }
     for wave in chunks.chunks(WAVE) {
-        let parts: Result<Vec<Vec<u8>>, ReadError> = wave.par_iter().map(|c| c.decode(&items, layout)).collect();
+        let parts: Result<Vec<Vec<u8>>, ReadError> =
+            wave.par_iter().map(|c| c.decode(&items, layout, selection)).collect();
         parts?.into_iter().try_for_each(&mut take)?;
     }
     Ok(())
@@ -179,7 +181,12 @@ fn table_start(content: &[u8], layout: &Layout) -> Result<usize, ReadError> {
 
 impl Chunk<'_> {
     /// Its records.
-    fn decode(&self, items: &[LazItem], layout: &Layout) -> Result<Vec<u8>, ReadError> {
+    fn decode(
+        &self,
+        items: &[LazItem],
+        layout: &Layout,
+        selection: DecompressionSelection,
+    ) -> Result<Vec<u8>, ReadError> {
         let Self { at, bytes, points, open } = *self;
         let layered = layout.format_id >= 6;
         if layered {
@@ -191,7 +198,11 @@ impl Chunk<'_> {
         records.resize(length, 0);
         let source = Cursor::new(bytes);
         let used = guarded(|| {
-            if layered { by_layers(source, items, &mut records) } else { by_points(source, items, &mut records) }
+            if layered {
+                by_layers(source, items, selection, &mut records)
+            } else {
+                by_points(source, items, &mut records)
+            }
         });
         // The coder writes exactly as many bytes as the decoder reads: anything else is damage, which no checksum tells.
         let whole = used.and_then(|used| {
@@ -217,14 +228,17 @@ fn by_points(source: Cursor<&[u8]>, items: &[LazItem], records: &mut [u8]) -> Re
     Ok(decoder.get().position())
 }
 
-/// Decodes records whose fields have streams of their own, of which only those are decoded that are asked for; gives the
+/// Decodes records whose fields have streams of their own, of which only those are decoded that are selected; gives the
 /// bytes used.
-fn by_layers(source: Cursor<&[u8]>, items: &[LazItem], records: &mut [u8]) -> Result<u64, String> {
+fn by_layers(
+    source: Cursor<&[u8]>,
+    items: &[LazItem],
+    selection: DecompressionSelection,
+    records: &mut [u8],
+) -> Result<u64, String> {
     let mut decoder = LayeredPointRecordDecompressor::new(source);
     decoder.set_fields_from(&items.to_vec()).map_err(|e| e.to_string())?;
-    // GPS times above all: a damaged stream of them makes the decoder call itself until the stack is full.
-    let asked = DecompressionSelection::base().decompress_z().decompress_classification().decompress_intensity();
-    decoder.set_selection(asked.decompress_rgb());
+    decoder.set_selection(selection);
     decoder.decompress_many(records).map_err(|e| e.to_string())?;
     Ok(decoder.get().position())
 }

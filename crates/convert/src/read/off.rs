@@ -4,7 +4,6 @@
 //! coordinates, in the order of the file: normal, colour, texture coordinates. Vertices and faces have a line each, as all
 //! writers write them. Colours that are whole numbers, one of them above 1, are sRGB from 0 to 255; others are linear.
 
-use super::color::linear_from_srgb;
 use super::direction::unit;
 use super::fans::Fans;
 use super::reading::Reading;
@@ -12,6 +11,7 @@ use super::text::{Line, Lines, Word};
 use super::{Loaded, input, origin};
 use crate::error::{Place, ReadError, escaped};
 use crate::raw_points::RawPoints;
+use crate::srgb::linear_from_srgb;
 use splat_core::Mesh;
 use splat_core::glam::{DVec3, Vec3};
 

@@ -11,8 +11,8 @@ mod columns;
 mod faces;
 mod header;
 
-use super::Loaded;
 use super::reading::Reading;
+use super::{Loaded, ReadParams};
 use crate::error::ReadError;
 use ascii::Ascii;
 use binary::Binary;
@@ -26,19 +26,19 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Loaded, 
         Encoding::LittleEndian => body::read(Binary::<false>::new(content, header.body), &header, reading)?,
         Encoding::BigEndian => body::read(Binary::<true>::new(content, header.body), &header, reading)?,
     };
-    reading.notes.not_used(unused(&header)?.iter().map(Vec::as_slice));
+    reading.notes.not_used(unused(&header, reading.params)?.iter().map(Vec::as_slice));
     Ok(loaded)
 }
 
 /// Names of what is read over: properties of vertices, and `element.property` of others.
-fn unused(header: &Header) -> Result<Vec<Vec<u8>>, ReadError> {
+fn unused(header: &Header, params: &ReadParams) -> Result<Vec<Vec<u8>>, ReadError> {
     let is_index = |name: &[u8]| name == b"vertex_indices" || name == b"vertex_index";
     let mut names = Vec::new();
     for element in &header.elements {
         let all = element.properties.iter().map(|p| p.name.as_slice());
         match element.name.as_slice() {
             b"vertex" => {
-                let columns = columns::Columns::new(element, header.is_mesh(), false)?;
+                let columns = columns::Columns::new(element, header.is_mesh(), params)?;
                 names.extend(columns.unused(element).map(<[u8]>::to_vec));
             }
             b"tristrips" => {}

@@ -1,10 +1,10 @@
 //! PNG (`.png`): pictures of 8 or 16 bits, grey or in colour, as displays show them (sRGB); they become linear radiance, 1 for white.
 
 use super::check_image;
-use super::color::linear_from_srgb;
 use super::input::{check_packed, reserve};
 use super::reading::Reading;
 use crate::error::{Place, ReadError, escaped};
+use crate::srgb::linear_from_srgb;
 use image::codecs::png::PngDecoder;
 use image::{DynamicImage, ImageDecoder};
 use splat_core::RadianceImage;

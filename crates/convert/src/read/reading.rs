@@ -1,6 +1,7 @@
 //! What goes along while a file is read: its parameters, who may stop it, and what was mended in it.
 
 use super::ReadParams;
+use super::extras::LONGEST_NAME;
 use crate::error::escaped;
 use crate::error::{Place, ReadError};
 use splat_core::Progress;
@@ -80,13 +81,24 @@ impl fmt::Display for Mended {
     }
 }
 
+/// A column of points that has no meaning of its own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedColumn {
+    /// Its name in the file, by which [`super::ReadParams::columns`] asks for it.
+    pub name: String,
+    /// Its least and greatest finite number, where they were looked at.
+    pub range: Option<[f64; 2]>,
+}
+
 /// What a reader has to say of a file beside its data.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Notes {
     /// The reader that read it, by the name of its format.
     pub format: String,
     /// Columns, fields and statements of the file that are not used, as the file names them.
     pub unused: Vec<String>,
+    /// Columns of points that have no meaning of their own, kept or not.
+    pub columns: Vec<NamedColumn>,
     /// What was made of the data that its user should know, one sentence without a full stop each.
     pub remarks: Vec<String>,
     /// What was mended in it, one entry a kind of fault.
@@ -105,7 +117,7 @@ impl Notes {
     /// Adds names that are not used, each once, with what would steer a terminal escaped.
     pub(super) fn not_used<'a>(&mut self, names: impl IntoIterator<Item = &'a [u8]>) {
         for name in names {
-            let name = escaped(name, 40);
+            let name = escaped(name, LONGEST_NAME);
             if !self.unused.contains(&name) {
                 self.unused.push(name);
             }

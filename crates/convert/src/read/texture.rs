@@ -1,9 +1,9 @@
 //! Textures: PNG and JPEG images as linear colours between their texels.
 
-use super::color::linear_from_srgb;
 use super::reading::Reading;
 use super::{check_image, input};
 use crate::error::{Place, ReadError};
+use crate::srgb::linear_from_srgb;
 use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::io::Cursor;
 use std::sync::LazyLock;

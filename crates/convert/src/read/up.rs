@@ -2,6 +2,7 @@
 
 use super::{Format, format_of};
 use flate2::bufread::MultiGzDecoder;
+use splat_core::glam::DVec3;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -20,6 +21,14 @@ pub enum UpAxis {
 }
 
 impl UpAxis {
+    /// The unit vector along it.
+    pub fn direction(self) -> DVec3 {
+        match self {
+            Self::Y => DVec3::Y,
+            Self::Z => DVec3::Z,
+        }
+    }
+
     /// Its letter.
     pub fn name(self) -> &'static str {
         match self {

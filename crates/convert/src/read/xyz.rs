@@ -6,10 +6,12 @@
 //! nothing but a whole number before the first point is a count, which is checked.
 
 use super::direction::unit;
+use super::extras::Extras;
 use super::text::{Line, Lines, Word};
-use super::{Notes, ReadParams, color::linear_from_srgb, input, origin};
+use super::{Notes, ReadParams, input, origin};
 use crate::error::{Place, ReadError};
 use crate::raw_points::RawPoints;
+use crate::srgb::linear_from_srgb;
 use splat_core::glam::DVec3;
 
 /// Roles of columns: x y z, normal, colour, value, opacity; and their names, lower case.
@@ -39,6 +41,7 @@ pub(super) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Re
     let mut lines = Lines::new(content);
     let mut columns: Option<Vec<Option<usize>>> = None;
     let (mut count, mut positions, mut points) = (None, Vec::new(), RawPoints::default());
+    let mut extras = Extras::default();
     while let Some(line) = lines.next()? {
         let comment = |w: &Word<'_>| w.text.starts_with(b"#") || w.text.starts_with(b"//");
         let words: Vec<Word<'_>> = line.words(true).take_while(|w| !comment(w)).collect();
@@ -51,6 +54,8 @@ pub(super) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Re
             if first.number().is_err() {
                 let roles = named(line, &words)?;
                 notes.not_used(words.iter().zip(&roles).filter(|(_, r)| r.is_none()).map(|(w, _)| bare(w)));
+                let others = words.iter().zip(&roles).enumerate().map(|(i, (w, role))| (i, bare(w), role.is_some()));
+                extras = Extras::new(others, params);
                 columns = Some(roles);
                 continue;
             }
@@ -63,10 +68,12 @@ pub(super) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Re
             let (expected, found) = (format!("{} columns", columns.len()), format!("{}", words.len()));
             return Err(ReadError::input(line.place(), expected, found, "every line has the same columns"));
         }
-        let bytes = (positions.len() as u64 + 1) * BYTES_PER_POINT;
+        let bytes = (positions.len() as u64 + 1) * (BYTES_PER_POINT + extras.bytes_per_point());
         input::check_bytes("the points", bytes, params)?;
         input::reserve(&mut positions, 1)?;
-        point(&words, columns, params, &mut positions, &mut points)?;
+        if point(&words, columns, params, &mut positions, &mut points)? {
+            further(&words, &mut extras)?;
+        }
     }
     if let Some((announced, place)) = count
         && announced != positions.len() as u64 + points.dropped
@@ -80,7 +87,19 @@ pub(super) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Re
         ));
     }
     let (origin, position) = origin::relative(&positions, Place::File, |i| format!("point {i}"))?;
-    Ok(RawPoints { origin, position, ..points })
+    Ok(RawPoints { origin, position, columns: extras.finish(notes), ..points })
+}
+
+/// Takes the numbers of a line's further columns; where one is kept, a word that is no number is refused.
+fn further(words: &[Word<'_>], extras: &mut Extras) -> Result<(), ReadError> {
+    let is_text = |i: &usize| extras.keeps(*i) && words[*i].decimal().is_none();
+    if let Some(i) = extras.read().find(is_text) {
+        let hint = "a column that is asked for has numbers alone; nan is a gap";
+        return Err(ReadError::input(words[i].place(), "a number", words[i].shown(), hint));
+    }
+    extras.reserve(1)?;
+    extras.push(|i| words[i].decimal().unwrap_or(f64::NAN));
+    Ok(())
 }
 
 fn whole(word: Word<'_>) -> Result<u64, ReadError> {
@@ -144,13 +163,14 @@ fn guessed(line: Line<'_>, words: &[Word<'_>]) -> Result<Vec<Option<usize>>, Rea
     Ok(roles.into_iter().map(Some).collect())
 }
 
+/// Takes a point, or leaves it out and gives false.
 fn point(
     words: &[Word<'_>],
     columns: &[Option<usize>],
     params: &ReadParams,
     positions: &mut Vec<DVec3>,
     points: &mut RawPoints,
-) -> Result<(), ReadError> {
+) -> Result<bool, ReadError> {
     let mut values = [0.0; 11];
     let mut has = [false; 11];
     for (word, role) in words.iter().zip(columns).filter_map(|(w, c)| c.map(|role| (w, role))) {
@@ -159,7 +179,7 @@ fn point(
             // Only what is a number, but not a finite one, may be dropped.
             Err(_) if params.drop_invalid && is_float(*word) => {
                 points.dropped += 1;
-                return Ok(());
+                return Ok(false);
             }
             Err(error) => return Err(error),
         }
@@ -189,7 +209,7 @@ fn point(
     if has[OPACITY] {
         points.opacity.push(values[OPACITY] as f32);
     }
-    Ok(())
+    Ok(true)
 }
 
 fn is_float(word: Word<'_>) -> bool {

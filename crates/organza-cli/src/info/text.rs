@@ -136,7 +136,8 @@ fn values(facts: &Facts, text: &mut Lines) {
         bars(histogram, text);
     }
     for (name, [low, high]) in &facts.columns {
-        text.add("column", format!("{name}: {low} to {high}"));
+        let unit = 1e-5 * (high - low).max(1e-300);
+        text.add("column", format!("{name}: {} to {}", rounded(*low, unit), rounded(*high, unit)));
     }
 }
 

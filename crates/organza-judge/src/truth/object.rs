@@ -74,6 +74,7 @@ pub(super) fn body(
             return no("surfaces of measured fields are not path-traced");
         }
         Source::Implicit(_) if !object.clip.is_empty() => return no("open surfaces are not path-traced"),
+        source if source.is_medium() && !object.clip.is_empty() => return no("media that are cut are not path-traced"),
         Source::Mesh(path) => match read(path, 0, options)? {
             FileData::Mesh(mesh) => mesh,
             _ => {
@@ -99,6 +100,7 @@ pub(super) fn body(
             return medium(scene, object, options).map(Ok);
         }
     };
+    let mesh = Arc::unwrap_or_clone(convert::clipped_mesh(mesh.into(), &object.clip));
     if shading == Shading::Phase {
         return no("a surface that scatters by a phase function reflects nothing");
     }

@@ -1,12 +1,12 @@
 //! How an object looks whose data has not been seen before: its tables in a scene.
 
+use super::point_colors::point_colors;
 use super::quoted;
 use crate::data_file::DataFile;
 use crate::matter::Matter;
 use crate::number::{color, grouped, rounded, significant};
-use crate::preset::{Look, Preset};
+use crate::preset::{Look, Preset, Wish};
 use crate::transfer::Transfer;
-use convert::read::UpAxis;
 use organza::FileData;
 use splat_core::{DAabb, Grid, optics};
 use std::collections::BTreeMap;
@@ -60,7 +60,7 @@ const TISSUE: (&str, &str) = ("tissue", "shading = \"phong\"\nspecular = 0.08\ns
 const DROPLETS: (&str, &str) = ("droplets", "ambient = 0.6\nmedium = { albedo = 0.98, asymmetry = 0.3 }\n");
 
 /// The objects of all files, each with a name of its own.
-pub(super) fn objects(data: &[DataFile], paths: &[String], preset: Option<&Preset>, up: Option<UpAxis>) -> Vec<Object> {
+pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<Object> {
     let mut names: BTreeMap<String, usize> = BTreeMap::new();
     let mut materials: Vec<&str> = Vec::new();
     let mut clays = CLAYS.iter().cycle();
@@ -71,9 +71,10 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], preset: Option<&Prese
         if *count > 1 {
             name = format!("{name}-{count}");
         }
-        let bare = if file.is_colored() { None } else { clays.next() };
-        let mut object = object(file, preset);
-        if let Some(up) = up {
+        let colors = if let FileData::Points(points) = &file.data { point_colors(points, wish) } else { None };
+        let bare = if file.is_colored() || colors.is_some() { None } else { clays.next() };
+        let mut object = object(file, wish.preset.as_ref(), colors);
+        if let Some(up) = wish.up {
             object.keys = format!("transform = {{ up = \"{}\" }}\n{}", up.name(), object.keys);
         }
         if let (Some(clay), false) = (bare, matches!(file.data, FileData::Grid(_))) {
@@ -88,7 +89,7 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], preset: Option<&Prese
     data.iter().zip(paths).map(&mut one).collect()
 }
 
-fn object(file: &DataFile, preset: Option<&Preset>) -> Object {
+fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> Object {
     let clay = Some((CLAY.0, CLAY.1, false));
     let of = |key, about, material, keys| Object {
         about,
@@ -111,9 +112,10 @@ fn object(file: &DataFile, preset: Option<&Preset>) -> Object {
             let all = points.position.iter().map(|p| points.origin + p.as_dvec3());
             let about = format!("{} points; {}", grouped(points.len() as u64), sides(DAabb::of_points(all)));
             let as_they_are = "# Colours of a photograph hold its light: they are shown as they are; name a material to light them.\n";
-            match points.color.is_empty() {
-                true => of("points", about, clay, String::new()),
-                false => of("points", about, None, as_they_are.to_owned()),
+            match colors {
+                Some(colors) => of("points", about, clay, colors),
+                None if points.color.is_empty() => of("points", about, clay, String::new()),
+                None => of("points", about, None, as_they_are.to_owned()),
             }
         }
         FileData::Grid(grid) => {

@@ -87,13 +87,16 @@ impl Context<'_> {
             orientation: Orientation::Toward(up),
             opacity: self.opacity(object),
             largest_spacing: LARGEST_SPACING,
+            size: object.points.size,
+            camera: Some(self.scene.camera),
             merge_duplicates: object.merge_duplicates || self.options.merge_duplicates,
             ..SurfelParams::default()
         }
     }
 
     pub(super) fn read(&self, path: &Path) -> Result<FileData, Error> {
-        self.files.read(path, &self.options.read_params(), self.progress)
+        let columns = self.scene.columns_of(path);
+        self.files.read(path, &ReadParams { columns, ..self.options.read_params() }, self.progress)
     }
 
     /// The same of one volume of a series.
@@ -108,9 +111,10 @@ impl Context<'_> {
 
     /// Parameters of a volume: normals only where they are used.
     pub(super) fn volume_params(&self, splat: SplatParams) -> VolumeParams {
-        let normals = needs_gradients(&self.scene.objects[self.id], self.scene);
+        let object = &self.scene.objects[self.id];
+        let (normals, clip) = (needs_gradients(object, self.scene), object.clip.clone());
         let classification_error = CLASSIFICATION_SHARE * self.scene.render.tolerance;
-        VolumeParams { splat, normals, classification_error, ..VolumeParams::default() }
+        VolumeParams { splat, normals, classification_error, clip, ..VolumeParams::default() }
     }
 
     /// Opacity of one crossing of the object's surfaces.

@@ -22,6 +22,9 @@ pub enum FileData {
     Image(Arc<RadianceImage>),
 }
 
+/// What was read of a file, and what there is to say of it.
+type Read = (FileData, Notes);
+
 /// The level set of scattered points, and its bounds.
 pub(super) type Fitted = (SharedField, DAabb);
 
@@ -29,7 +32,7 @@ pub(super) type Fitted = (SharedField, DAabb);
 #[derive(Default)]
 pub struct Files {
     /// By path and frame.
-    read: RefCell<HashMap<(PathBuf, u64), (ReadParams, FileData)>>,
+    read: RefCell<HashMap<(PathBuf, u64), (ReadParams, Read)>>,
     /// What there is to say of them, one sentence each.
     notes: RefCell<Vec<String>>,
     /// Fits take longer than reading: with their tolerance and the bytes that they take.
@@ -44,23 +47,24 @@ impl Files {
     /// # Errors
     /// [`Error::Io`], [`Error::Input`] or [`Error::TooLarge`] as its reader has them.
     pub fn read(&self, path: &Path, limits: &ReadParams, progress: &Progress) -> Result<FileData, Error> {
-        if let Some(data) = self.known(path, limits) {
-            return Ok(data);
-        }
-        let data = self.read_anew(path, limits, progress)?;
-        self.read.borrow_mut().insert((real(path), limits.frame), (*limits, data.clone()));
-        Ok(data)
+        let read = self.known_or_read(path, limits, progress)?;
+        self.read.borrow_mut().insert((real(path), limits.frame), (limits.clone(), read.clone()));
+        Ok(read.0)
     }
 
     /// The same without keeping it: for whoever keeps what is made from it.
     pub(super) fn read_once(&self, path: &Path, limits: &ReadParams, progress: &Progress) -> Result<FileData, Error> {
-        self.known(path, limits).map_or_else(|| self.read_anew(path, limits, progress), Ok)
+        self.known_or_read(path, limits, progress).map(|read| read.0)
     }
 
-    /// A level set of these points does not use the opacities that they bring.
-    pub(super) fn note_level_set(&self, path: &Path) {
-        let file = crate::printable(path);
-        add(&self.notes, [format!("{file}: `level_set` does not use opacities: it has that of its object")]);
+    /// Forgets what there is to say of files, for whoever looked at them before a scene asks for what they hold.
+    pub fn forget_notes(&self) {
+        self.notes.borrow_mut().clear();
+    }
+
+    /// What was made of a file beside what its reader says.
+    pub(super) fn note(&self, path: &Path, said: impl IntoIterator<Item = impl std::fmt::Display>) {
+        add(&self.notes, said.into_iter().map(|said| format!("{}: {said}", crate::printable(path))));
     }
 
     /// What the files hold that is not drawn, and what was made of them, one sentence each.
@@ -73,23 +77,25 @@ impl Files {
         self.mended.borrow().clone()
     }
 
-    fn read_anew(&self, path: &Path, limits: &ReadParams, progress: &Progress) -> Result<FileData, Error> {
-        let read = convert::read::file(path, limits, Some(progress));
-        let (data, noted) = read.map_err(|e| Error::from_read(path, &e))?;
-        add(&self.mended, noted.mended.iter().map(Mended::to_string));
-        add(&self.notes, sentences(path, &data, noted));
-        match data {
-            Loaded::Mesh(mesh) => Ok(FileData::Mesh(mesh.into())),
-            Loaded::Points(points) => Ok(FileData::Points(points.into())),
-            Loaded::Grid(grid) => Ok(FileData::Grid(grid.into())),
-            Loaded::Image(image) => Ok(FileData::Image(image.into())),
-            _ => Err(Error::Internal("a kind of file that scenes do not know".into())),
-        }
+    fn known_or_read(&self, path: &Path, limits: &ReadParams, progress: &Progress) -> Result<Read, Error> {
+        let known = self.read.borrow().get(&(real(path), limits.frame)).filter(|k| k.0.serves(limits)).cloned();
+        let read = known.map_or_else(|| self.read_anew(path, limits, progress), |(_, read)| Ok(read))?;
+        add(&self.notes, sentences(path, &read.0, &read.1, &limits.columns));
+        Ok(read)
     }
 
-    fn known(&self, path: &Path, limits: &ReadParams) -> Option<FileData> {
-        let read = self.read.borrow();
-        read.get(&(real(path), limits.frame)).filter(|(with, _)| with == limits).map(|(_, data)| data.clone())
+    fn read_anew(&self, path: &Path, limits: &ReadParams, progress: &Progress) -> Result<Read, Error> {
+        let read = convert::read::file(path, limits, Some(progress));
+        let (data, notes) = read.map_err(|e| Error::from_read(path, &e))?;
+        add(&self.mended, notes.mended.iter().map(Mended::to_string));
+        let data = match data {
+            Loaded::Mesh(mesh) => FileData::Mesh(mesh.into()),
+            Loaded::Points(points) => FileData::Points(points.into()),
+            Loaded::Grid(grid) => FileData::Grid(grid.into()),
+            Loaded::Image(image) => FileData::Image(image.into()),
+            _ => return Err(Error::Internal("a kind of file that scenes do not know".into())),
+        };
+        Ok((data, notes))
     }
 
     /// The level set of a file's points unless it was fitted with the same tolerance; `fit` also says how many bytes it takes.
@@ -111,7 +117,7 @@ impl Files {
 
     /// Bytes that it holds.
     pub(crate) fn bytes(&self) -> u64 {
-        let read: u64 = self.read.borrow().values().map(|(_, data)| data.bytes()).sum();
+        let read: u64 = self.read.borrow().values().map(|(_, (data, _))| data.bytes()).sum();
         read + self.fitted.borrow().iter().map(|(_, _, bytes, _)| bytes).sum::<u64>()
     }
 }
@@ -122,14 +128,13 @@ fn real(path: &Path) -> PathBuf {
 }
 
 /// What a picture does not show of a file, and what its reader made of it.
-fn sentences(path: &Path, data: &Loaded, Notes { mut unused, remarks, .. }: Notes) -> Vec<String> {
-    let file = crate::printable(path);
-    if let Loaded::Points(points) = data {
-        // Read, but no key of a scene asks for them.
-        let columns = [("value", points.value.is_empty()), ("classification", points.classification.is_empty())];
-        unused.extend(columns.iter().filter(|(_, empty)| !empty).map(|(name, _)| (*name).to_owned()));
+fn sentences(path: &Path, data: &FileData, notes: &Notes, asked: &[String]) -> Vec<String> {
+    let (file, mut unused) = (crate::printable(path), notes.unused.clone());
+    if let FileData::Points(points) = data {
+        // Read, but no key of the scene asks for them.
+        unused.extend(points.not_asked_for(asked).map(str::to_owned));
     }
-    let mut all: Vec<String> = remarks.iter().map(|remark| format!("{file}: {remark}")).collect();
+    let mut all: Vec<String> = notes.remarks.iter().map(|remark| format!("{file}: {remark}")).collect();
     if !unused.is_empty() {
         all.push(format!("{file}: columns not used: {}", unused.join(", ")));
     }

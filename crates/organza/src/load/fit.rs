@@ -52,7 +52,7 @@ impl<'i> Outline<'i> {
         let corners = |bounds: DAabb| bounds.corners().to_vec();
         let points = match input {
             Input::Mesh(..) | Input::Points(..) => Vec::new(),
-            Input::Volume(grid, transfer, _) => visible_ends(grid, transfer, FAINT),
+            Input::Volume(grid, transfer, params) => visible_ends(grid, transfer, FAINT, &params.clip),
             Input::Surface(_, bounds, ..) | Input::Density(_, bounds, _) => corners(*bounds),
             Input::Procedural(shape, ..) => {
                 shape.ellipsoids.iter().flat_map(|e| corners(DAabb::around(e.center, e.radii))).collect()

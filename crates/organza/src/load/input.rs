@@ -89,7 +89,7 @@ impl Input<'_> {
     pub(super) fn bounded(&self, factor: f64) -> Option<BoundedExtinction> {
         let scale = self.splat().transform.scale * factor;
         match self {
-            Self::Density(field, bounds, params) if !params.volume.normals => {
+            Self::Density(field, bounds, params) if !params.volume.normals && params.volume.clip.is_empty() => {
                 BoundedExtinction::new(Matter::Density(field.clone()), params.extinction * scale, *bounds)
             }
             Self::Medium(medium, _) => {
@@ -122,18 +122,20 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
     Ok(match &object.source {
         Source::Mesh(path) => {
             let density = object.spacing.map_or(Density::Auto, Density::Spacing);
-            let mut mesh = read_mesh(path, context)?;
+            let mut mesh = convert::clipped_mesh(read_mesh(path, context)?, &object.clip);
             if object.color.is_some() && !mesh.color.is_empty() {
                 mesh = Mesh { color: Vec::new(), ..Mesh::clone(&mesh) }.into();
             }
             Input::Mesh(crate::printable(path).to_string(), mesh, MeshParams { splat, density, opacity })
         }
         Source::Points(path) => {
-            let points = at_spacing(read_points(path, context)?, object, &splat, convert::thinned)?;
+            let points = read_points(path, object, context)?;
             Input::Points(path, points, context.surfel_params(object, splat))
         }
         Source::Volume(VolumeSource { path, frame, transfer }) => {
-            let grid = at_spacing(read_grid(path, *frame, context)?, object, &splat, convert::resampled)?;
+            let grid = read_grid(path, *frame, context)?;
+            let at = |spacing: f64| convert::resampled(&grid, spacing / splat.transform.scale, &splat).map(Arc::new);
+            let grid = object.spacing.map_or_else(|| Ok(grid.clone()), at)?;
             Input::Volume(grid, transfer, context.volume_params(splat))
         }
         Source::Implicit(ImplicitSource { expression, bounds, spacing }) => {
@@ -166,7 +168,12 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
         }
         Source::Cloud(cloud) => Input::Procedural(cloud.shape(), cloud.spacing, context.volume_params(splat)),
         Source::Medium(medium) => Input::Medium(*medium, splat),
-        Source::Rectangle(r) => Input::Rectangle(*r, opacity, splat),
+        Source::Rectangle(r) if object.clip.is_empty() => Input::Rectangle(*r, opacity, splat),
+        Source::Rectangle(r) => {
+            let density = Density::Spacing(r.spacing * splat.transform.scale);
+            let mesh = convert::clipped_mesh(Mesh::rectangle(r.center, r.u, r.v).into(), &object.clip);
+            Input::Mesh(object.name.clone(), mesh, MeshParams { splat, density, opacity })
+        }
     })
 }
 
@@ -183,20 +190,8 @@ fn slice<'a>(
     let section = Section { center: source.center, normal: source.normal, spacing };
     let mesh = convert::volume_section(grid, &source.transfer, &section, &splat, Some(context.progress))?;
     let density = Density::Spacing(spacing * splat.transform.scale);
-    Ok(Input::Mesh(crate::printable(&source.path), mesh.into(), MeshParams { splat, density, opacity }))
-}
-
-/// Data as it is, or as the object's spacing asks for it.
-fn at_spacing<T>(
-    data: Arc<T>,
-    object: &SceneObject,
-    splat: &SplatParams,
-    change: impl Fn(&T, f64, &SplatParams) -> Result<T, convert::ConvertError>,
-) -> Result<Arc<T>, Error> {
-    match object.spacing {
-        Some(spacing) => Ok(change(&data, spacing / splat.transform.scale, splat)?.into()),
-        None => Ok(data),
-    }
+    let (name, mesh) = (crate::printable(&source.path), convert::clipped_mesh(mesh.into(), &object.clip));
+    Ok(Input::Mesh(name, mesh, MeshParams { splat, density, opacity }))
 }
 
 /// A field whose zero set is drawn.
@@ -219,12 +214,8 @@ fn surface<'a>(zero: ZeroSet, object: &SceneObject, splat: SplatParams, opacity:
         let clipped = ClippedField::new(field, object.clip.clone());
         Arc::new(clipped.map_err(|e| Error::Internal(e.to_string()))?)
     };
-    Ok(Input::Surface(
-        field,
-        bounds,
-        MeshParams { splat, density, opacity },
-        trilinear.filter(|_| object.clip.is_empty()),
-    ))
+    let trilinear = trilinear.filter(|_| object.clip.is_empty());
+    Ok(Input::Surface(field, bounds, MeshParams { splat, density, opacity }, trilinear))
 }
 
 fn refuse_data(path: &Path, error: &splat_core::Error) -> Error {
@@ -248,7 +239,7 @@ fn read_scattered(path: &Path, context: &Context<'_>) -> Result<Arc<RawPoints>, 
     match context.read_once(path)? {
         FileData::Points(points) => {
             if !points.opacity.is_empty() {
-                context.files.note_level_set(path);
+                context.files.note(path, ["`level_set` does not use opacities: it has that of its object"]);
             }
             Ok(points)
         }
@@ -267,11 +258,13 @@ fn read_mesh(path: &Path, context: &Context<'_>) -> Result<Arc<Mesh>, Error> {
     }
 }
 
-fn read_points(path: &Path, context: &Context<'_>) -> Result<Arc<RawPoints>, Error> {
-    match context.read(path)? {
-        FileData::Points(points) => Ok(points),
-        _ => Err(Error::wrong_kind(path, "points without faces", "use `mesh = ` or `volume = ` for this file")),
-    }
+fn read_points(path: &Path, object: &SceneObject, context: &Context<'_>) -> Result<Arc<RawPoints>, Error> {
+    let FileData::Points(points) = context.read(path)? else {
+        return Err(Error::wrong_kind(path, "points without faces", "use `mesh = ` or `volume = ` for this file"));
+    };
+    let (points, said) = convert::shown_points(points, &object.points_shown(), &context.splat_params(object))?;
+    context.files.note(path, said);
+    Ok(points)
 }
 
 fn read_grid(path: &Path, frame: u64, context: &Context<'_>) -> Result<Arc<Grid>, Error> {

@@ -22,7 +22,7 @@ const MOST_OPERATIONS: f64 = 1e11;
 pub(super) struct Prepared<'a> {
     pub(super) input: Input<'a>,
     pub(super) prediction: Prediction,
-    /// Whether it is drawn in the colours of its file, without light: photographs hold the light of their day already.
+    /// Whether it is drawn in the colours of its points, without light.
     pub(super) as_it_is: bool,
     /// The refusal of a conversion that would make too many splats.
     pub(super) too_many: Option<ConvertError>,
@@ -50,10 +50,7 @@ pub(super) fn prepare<'a>(
     let mut input = input(object, context)?;
     check_work(object, &input)?;
     let as_it_is = match &mut input {
-        // No material is named, and no colour put in the place of the file's.
-        Input::Points(_, points, params)
-            if object.material == 0 && object.color.is_none() && !points.color.is_empty() =>
-        {
+        Input::Points(_, points, params) if object.is_unlit(!points.color.is_empty()) => {
             params.splat.material = context.scene.materials.len() as u16;
             true
         }

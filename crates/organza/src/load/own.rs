@@ -8,7 +8,7 @@ use super::object::{Prepared, procedural};
 use crate::Error;
 use crate::form::{Form, PlannedObject};
 use crate::scene::{SurfaceSampler, Technique};
-use convert::{SharedField, VolumeParams, extinct_bounds};
+use convert::{Clip, RegionField, SharedField, VolumeParams, extinct_bounds};
 use glam::DVec3;
 use pbsr::BoundedExtinction;
 use rayon::prelude::*;
@@ -73,6 +73,8 @@ pub(crate) enum Body {
         normals: bool,
         /// The same values on the body-centred lattice of the same spectrum, where the scene asks for that.
         body_centred: Option<BccGrid>,
+        /// 1 where nothing is cut off, and 0 elsewhere; `None` where nothing is cut at all.
+        cut: Option<SharedField>,
     },
     /// A field of extinction.
     Field(BoundedExtinction),
@@ -211,9 +213,10 @@ fn data(
     if let Some(field) = bounded {
         return Ok(field_data(prepared, field));
     }
-    let cells = |grid: Arc<Grid>, transfer: TransferFunction, normals: bool| {
+    let cells = |grid: Arc<Grid>, transfer: TransferFunction, (normals, clip): (bool, &[Clip])| {
         let (bounds, spacing) = (extinct_bounds(&grid, &transfer), grid.shortest_step());
-        Some((Body::Cells { grid, transfer, normals, body_centred: None }, bounds, spacing))
+        let cut = RegionField::shared(clip);
+        Some((Body::Cells { grid, transfer, normals, body_centred: None, cut }, bounds, spacing))
     };
     let meshed = |mesh: Mesh| triangles(mesh, prepared.prediction.splats, source);
     Ok(match &prepared.input {
@@ -242,15 +245,15 @@ fn data(
         Input::Volume(grid, transfer, params) => Some(volume(grid, transfer, params, context)?),
         Input::Procedural(shape, spacing, params) => {
             let (grid, transfer) = procedural(shape, *spacing, &params.splat, context)?;
-            cells(grid.into(), transfer, params.normals)
+            cells(grid.into(), transfer, (params.normals, &params.clip))
         }
         Input::Density(field, bounds, params) => {
             let (grid, transfer) = convert::density_to_grid(field.as_ref(), *bounds, params)?;
-            cells(grid.into(), transfer, params.volume.normals)
+            cells(grid.into(), transfer, (params.volume.normals, &params.volume.clip))
         }
         Input::Medium(medium, params) => {
             let grid = convert::medium_to_grid(medium, params)?;
-            cells(grid.into(), convert::extinction_as_it_is(medium.extinction, params)?, false)
+            cells(grid.into(), convert::extinction_as_it_is(medium.extinction, params)?, (false, &[]))
         }
     })
 }
@@ -278,7 +281,8 @@ fn volume(
     let is_packed = context.scene.objects[context.id].packing == Packing::BodyCentred;
     let body_centred = is_packed.then(|| convert::body_centred(grid, &params.splat)).transpose()?;
     let (bounds, spacing) = (extinct_bounds(grid, transfer), grid.shortest_step());
-    let body = Body::Cells { grid: grid.clone(), transfer: transfer.clone(), normals: params.normals, body_centred };
+    let (grid, transfer, cut) = (grid.clone(), transfer.clone(), RegionField::shared(&params.clip));
+    let body = Body::Cells { grid, transfer, normals: params.normals, body_centred, cut };
     Ok((body, bounds, spacing))
 }
 

@@ -172,7 +172,7 @@ fn volumes<'a>(matter: &Matter<'a>) -> impl Iterator<Item = Volume<'a>> + use<'a
         let object = &scene.objects[own.object];
         let material = &scene.materials[own.material].material;
         let factor = f64::from(material.extinction_rgb.into_iter().fold(0.0, f32::max));
-        let Body::Cells { grid, transfer, normals, body_centred } = &own.body else { return None };
+        let Body::Cells { grid, transfer, normals, body_centred, .. } = &own.body else { return None };
         let (grid, packing) = match body_centred {
             Some(bcc) => (&bcc.planes, Packing::BodyCentred),
             None => (&**grid, Packing::Cartesian),
@@ -186,6 +186,7 @@ fn volumes<'a>(matter: &Matter<'a>) -> impl Iterator<Item = Volume<'a>> + use<'a
             extinction_scale: own.extinction_scale / (factor * own.transform.scale),
             material,
             normals: *normals,
+            clip: &object.clip,
             object: own.object as u32,
             shadow_coefficient: object.shadow_coefficient,
             casts_shadow: object.casts_shadow,

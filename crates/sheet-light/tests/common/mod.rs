@@ -96,6 +96,7 @@ pub(crate) fn volume<'a>(grid: &'a Grid, transfer: &'a TransferFunction, materia
         material,
         normals: false,
         object: 0,
+        clip: &[],
         shadow_coefficient: 1.0,
         casts_shadow: true,
     }

@@ -3,8 +3,10 @@
 use super::header::{Field, Header, Kind};
 use crate::error::{Place, ReadError};
 use crate::raw_points::RawPoints;
+use crate::read::extras::Extras;
 use crate::read::reading::Reading;
-use crate::read::{color::linear_from_srgb, direction::unit, input, origin};
+use crate::read::{direction::unit, input, origin};
+use crate::srgb::linear_from_srgb;
 use splat_core::glam::{DVec3, Vec3};
 
 /// A stored number: its value, and its lower 32 bits as they are stored.
@@ -25,6 +27,7 @@ pub(super) struct Columns {
     value: Option<usize>,
     /// With what stands for 1.
     opacity: Option<(usize, f64)>,
+    extras: Extras,
     positions: Vec<DVec3>,
     points: RawPoints,
     drop_invalid: bool,
@@ -65,6 +68,10 @@ impl Columns {
         let kept: Vec<usize> = kept.chain(opacity.map(|o| o.0)).collect();
         let others = fields.iter().enumerate().filter(|(i, f)| !kept.contains(i) && f.name != b"_");
         reading.notes.not_used(others.map(|(_, f)| f.name.as_slice()));
+        let numbers = fields.iter().enumerate().filter(|(_, f)| f.count == 1 && f.name != b"_");
+        let spare = |i: usize| kept.contains(&i);
+        let numbers = numbers.map(|(i, f)| (i, f.name.as_slice(), spare(i)));
+        let extras = Extras::new(numbers, reading.params);
         if header.has_viewpoint {
             reading.notes.not_used([&b"VIEWPOINT"[..]]);
         }
@@ -74,6 +81,7 @@ impl Columns {
             color,
             value,
             opacity,
+            extras,
             positions: Vec::new(),
             points: RawPoints::default(),
             drop_invalid: reading.params.drop_invalid,
@@ -85,7 +93,8 @@ impl Columns {
 
     fn bytes_per_point(&self) -> u64 {
         let has = [self.normal.is_some(), self.color.is_some(), self.value.is_some(), self.opacity.is_some()];
-        36 + has.iter().zip([12, 12, 4, 4]).filter(|(has, _)| **has).map(|(_, bytes)| bytes).sum::<u64>()
+        36 + self.extras.bytes_per_point()
+            + has.iter().zip([12, 12, 4, 4]).filter(|(has, _)| **has).map(|(_, bytes)| bytes).sum::<u64>()
     }
 
     /// Room for all points, which the file is known to hold.
@@ -93,6 +102,7 @@ impl Columns {
         input::check_bytes("the points", points.saturating_mul(self.bytes_per_point()), reading.params)?;
         let n = points as usize;
         let of = |has: bool| if has { n } else { 0 };
+        self.extras.reserve(n)?;
         input::reserve(&mut self.positions, n)?;
         input::reserve(&mut self.points.normal, of(self.normal.is_some()))?;
         input::reserve(&mut self.points.color, of(self.color.is_some()))?;
@@ -132,6 +142,7 @@ impl Columns {
             return Err((i, format!("an opacity from 0 to {top}"), "or rename the field"));
         }
         self.positions.push(position);
+        self.extras.push(|rank| number(rank).value);
         if let Some(ranks) = self.normal {
             // Where there is none, it is NaN.
             let normal = vector(ranks);
@@ -159,6 +170,6 @@ impl Columns {
             reading.notes.remarks.push(format!("{n} {these} left out"));
         }
         let (origin, position) = origin::relative(&self.positions, self.place, |i| format!("point {i}"))?;
-        Ok(RawPoints { origin, position, ..self.points })
+        Ok(RawPoints { origin, position, columns: self.extras.finish(&mut reading.notes), ..self.points })
     }
 }

@@ -37,7 +37,7 @@ pub(super) fn read<S: Source>(mut source: S, header: &Header, reading: &mut Read
         return Err(ReadError::input(at_line(header.body_line - 1), "an element 'vertex'", "none", hint));
     };
     let mesh = header.is_mesh();
-    let mut columns = Columns::new(vertices, mesh, reading.params.drop_invalid && !mesh)?;
+    let mut columns = Columns::new(vertices, mesh, reading.params)?;
     let mut faces = Faces::new(vertices.count);
     for element in &header.elements {
         check_count(&source, element)?;
@@ -50,7 +50,7 @@ pub(super) fn read<S: Source>(mut source: S, header: &Header, reading: &mut Read
     }
     source.finish()?;
     if !mesh {
-        return columns.into_points().map(Loaded::Points);
+        return columns.into_points(&mut reading.notes).map(Loaded::Points);
     }
     faces.into_mesh(columns, reading).map(Loaded::Mesh)
 }

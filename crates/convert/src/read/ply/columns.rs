@@ -3,7 +3,9 @@
 use super::header::{Element, Property, Shape, Type, at_line};
 use crate::error::ReadError;
 use crate::raw_points::RawPoints;
-use crate::read::{color::linear_from_srgb, direction::unit, input, origin};
+use crate::read::extras::Extras;
+use crate::read::{Notes, ReadParams, direction::unit, input, origin};
+use crate::srgb::linear_from_srgb;
 use splat_core::Mesh;
 use splat_core::glam::{DVec3, Vec3};
 
@@ -31,6 +33,9 @@ const OPACITY: usize = 10;
 pub(super) struct Columns {
     /// Role and stored type of each property, `None` for those that are read over.
     kept: Vec<Option<(usize, Type)>>,
+    /// Properties beside them that are asked for by name, and their numbers of the record.
+    extras: Extras,
+    further: Vec<f64>,
     /// The last property that is kept: with it a record is complete.
     last: usize,
     /// Whether normals, colours, values and opacities are kept.
@@ -45,7 +50,7 @@ pub(super) struct Columns {
 
 impl Columns {
     /// Decides which properties of `vertex` to keep, for the corners of a `mesh` or for points.
-    pub(super) fn new(vertex: &Element, mesh: bool, drop_invalid: bool) -> Result<Self, ReadError> {
+    pub(super) fn new(vertex: &Element, mesh: bool, params: &ReadParams) -> Result<Self, ReadError> {
         let mut kept = vec![None; vertex.properties.len()];
         let mut found = [false; 11];
         // A mesh has the opacity that its object states.
@@ -76,10 +81,16 @@ impl Columns {
         for slot in &mut kept {
             *slot = slot.filter(|(role, _)| whole(*role));
         }
-        let last = kept.iter().rposition(Option::is_some).unwrap_or(0);
+        let scalars = vertex.properties.iter().enumerate().filter(|(_, p)| matches!(p.shape, Shape::Scalar(_)));
+        let others = scalars.map(|(i, p)| (i, p.name.as_slice(), kept[i].is_some()));
+        let extras = if mesh { Extras::default() } else { Extras::new(others, params) };
+        let of_roles = kept.iter().rposition(Option::is_some).unwrap_or(0);
+        let last = extras.read().max().unwrap_or(0).max(of_roles);
+        let further = vec![0.0; if extras.read().next().is_some() { kept.len() } else { 0 }];
         let has = [NORMAL, COLOR, VALUE, OPACITY].map(|role| kept.iter().flatten().any(|(r, _)| *r == role));
         let (record, positions, points) = ([0.0; 11], Vec::new(), RawPoints::default());
-        Ok(Self { kept, last, has, record, positions, points, drop_invalid, line: vertex.line })
+        let drop_invalid = params.drop_invalid && !mesh;
+        Ok(Self { kept, extras, further, last, has, record, positions, points, drop_invalid, line: vertex.line })
     }
 
     /// Names of the properties of `vertex` that are read over.
@@ -90,11 +101,12 @@ impl Columns {
     /// Bytes that a vertex takes while it is read and converted.
     pub(super) fn bytes_per_vertex(&self) -> u64 {
         let more = self.has.iter().zip([12, 12, 4, 4]).filter(|(has, _)| **has).map(|(_, bytes)| bytes);
-        24 + 12 + more.sum::<u64>()
+        24 + 12 + self.extras.bytes_per_point() + more.sum::<u64>()
     }
 
     pub(super) fn reserve(&mut self, vertices: usize) -> Result<(), ReadError> {
         let [normals, colors, values, opacities] = self.has.map(|has| if has { vertices } else { 0 });
+        self.extras.reserve(vertices)?;
         input::reserve(&mut self.positions, vertices)?;
         input::reserve(&mut self.points.normal, normals)?;
         input::reserve(&mut self.points.color, colors)?;
@@ -104,8 +116,18 @@ impl Columns {
 
     /// Takes the value of property `index`; `Err` is what was expected, and a hint.
     pub(super) fn push(&mut self, index: usize, value: f64) -> Result<(), (String, &'static str)> {
-        let Some((role, kind)) = self.kept[index] else { return Ok(()) };
-        let value = match role {
+        if let Some(further) = self.further.get_mut(index) {
+            *further = value;
+        }
+        if let Some((role, kind)) = self.kept[index] {
+            self.record[role] = self.checked(role, kind, value)?;
+        }
+        if index == self.last { self.end_record() } else { Ok(()) }
+    }
+
+    /// The number of a role, colours and opacities as shares.
+    fn checked(&self, role: usize, kind: Type, value: f64) -> Result<f64, (String, &'static str)> {
+        Ok(match role {
             COLOR..VALUE => {
                 let share = share(value, kind, "a colour", "colours are 0 to 255, or 0.0 to 1.0 as float")?;
                 // Stored floats are linear already; stored integers are sRGB.
@@ -121,9 +143,7 @@ impl Columns {
                 return Err(("a finite number".to_owned(), "remove the record, or ask to drop invalid points"));
             }
             _ => value,
-        };
-        self.record[role] = value;
-        if index == self.last { self.end_record() } else { Ok(()) }
+        })
     }
 
     /// Takes the record, or counts it as dropped if one of its numbers is not finite.
@@ -151,21 +171,22 @@ impl Columns {
         if has_opacity {
             self.points.opacity.push(self.record[OPACITY] as f32);
         }
+        self.extras.push(|index| self.further[index]);
         Ok(())
     }
 
     /// The columns as a mesh. Normals of which one is zero are left out: they are to be computed anew.
     pub(super) fn into_mesh(self, triangles: Vec<[u32; 3]>) -> Result<Mesh, ReadError> {
-        let points = self.into_points()?;
+        let points = self.into_points(&mut Notes::default())?;
         let normal = if points.normal.contains(&Vec3::ZERO) { Vec::new() } else { points.normal };
         Ok(Mesh { origin: points.origin, position: points.position, normal, color: points.color, triangles })
     }
 
     /// The columns as points.
-    pub(super) fn into_points(self) -> Result<RawPoints, ReadError> {
-        let Self { positions, points, line, .. } = self;
+    pub(super) fn into_points(self, notes: &mut Notes) -> Result<RawPoints, ReadError> {
+        let Self { positions, points, extras, line, .. } = self;
         let (origin, position) = origin::relative(&positions, at_line(line), |i| format!("vertex {i}"))?;
-        Ok(RawPoints { origin, position, ..points })
+        Ok(RawPoints { origin, position, columns: extras.finish(notes), ..points })
     }
 }
 

@@ -37,14 +37,15 @@ impl<'a> Source<'a> {
             }
             Body::Lattice { grid, level } => Box::new(LatticeSampler::new(grid, *level, &self.surface(own))?),
             Body::Triangles(mesh) => Box::new(MeshSampler::new(mesh, &self.surface(own), None)?),
-            Body::Cells { grid, transfer, normals, .. } => {
+            Body::Cells { grid, transfer, normals, cut, .. } => {
                 let params = VolumeParams {
                     cross_section: self.cross_section,
                     extinction_scale: own.extinction_scale,
                     normals: *normals,
                     seed: self.seed,
                 };
-                Box::new(GridSampler::new(grid, transfer, &params, None)?)
+                let kept = cut.as_ref().map(|field| Density { field: field.as_ref(), max: 1.0 });
+                Box::new(GridSampler::new(grid, transfer, &params, kept)?)
             }
             Body::Field(field) => self.field(own, field)?,
         })

@@ -1,0 +1,210 @@
+//! Colours of points by a column of theirs: by a map, by whole numbers, or by a transfer function.
+
+use crate::srgb::linear_from_hex;
+use crate::{ColorMap, ConvertError, RawPoints, SplatParams};
+use rayon::prelude::*;
+use splat_core::TransferFunction;
+use splat_core::glam::DVec3;
+
+/// Shares of a column's numbers that its map spans where no range is stated: a few strays do not make all else one colour.
+const SHARES: [f64; 2] = [0.01, 0.99];
+
+/// Classes of points in LAS 1.4 (ASPRS), with their colours as 0xRRGGBB.
+const CLASSES: [(&str, u32); 19] = [
+    ("created, never classified", 0xa8a8a8),
+    ("unclassified", 0x8f8f94),
+    ("ground", 0xa67c52),
+    ("low vegetation", 0xb7d36b),
+    ("medium vegetation", 0x74b74e),
+    ("high vegetation", 0x2f7d35),
+    ("building", 0xd9533f),
+    ("low noise", 0xff2bd6),
+    ("reserved", 0xe3c65b),
+    ("water", 0x3f82d0),
+    ("rail", 0x7a57a8),
+    ("road surface", 0x55565c),
+    ("reserved", 0xcfa3c2),
+    ("wire guard", 0xf2e255),
+    ("wire conductor", 0xffc400),
+    ("transmission tower", 0x2fbfbf),
+    ("wire connector", 0xff8f2e),
+    ("bridge deck", 0x8d93ad),
+    ("high noise", 0xff2f8f),
+];
+
+/// Colours that are told apart, for whole numbers without a meaning of their own, in turns.
+const DISTINCT: [u32; 12] = [
+    0x4e79a7, 0xf28e2b, 0x59a14f, 0xe15759, 0x76b7b2, 0xedc948, 0xb07aa1, 0x9c755f, 0x86bcb6, 0xff9da7, 0x5b6abf,
+    0xb6992d,
+];
+
+/// How numbers become colours.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PointColors {
+    /// A colour map over a range; without one from the 1st to the 99th percentile of the column.
+    Map(ColorMap, Option<[f64; 2]>),
+    /// Whole numbers as classes of LAS, each in a colour of its own.
+    Classes,
+    /// Whole numbers, in twelve colours in turns.
+    Distinct,
+    /// By control points; extinctions are not used.
+    Transfer(TransferFunction),
+}
+
+/// A column that points take their colours from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ColorBy {
+    /// Its name, see [`RawPoints::column`].
+    pub column: String,
+    /// What its numbers look like.
+    pub colors: PointColors,
+}
+
+/// What points look like by a column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Colored {
+    /// Linear Rec.709, one a point.
+    pub color: Vec<[f32; 3]>,
+    /// The numbers at the ends of a colour map.
+    pub range: Option<[f64; 2]>,
+    /// Points whose number is a gap, see [`crate::Column`]; they have the colour of `splat`.
+    pub gaps: u64,
+}
+
+/// The name that LAS 1.4 gives a class; `None` for those that it leaves to users.
+pub fn class_name(class: u8) -> Option<&'static str> {
+    CLASSES.get(usize::from(class)).map(|(name, _)| *name)
+}
+
+/// The colours of points by a column; `up` is where `height` grows. Of `splat` the name and the colour are used.
+///
+/// ```
+/// use convert::{ColorBy, ColorMap, PointColors, RawPoints, SplatParams, colored};
+/// use splat_core::glam::{DVec3, Vec3};
+/// let points = RawPoints { position: vec![Vec3::ZERO, Vec3::Z * 0.5, Vec3::Z], ..RawPoints::default() };
+/// let by = ColorBy { column: "z".into(), colors: PointColors::Map(ColorMap::VIRIDIS, Some([0.0, 1.0])) };
+/// let colored = colored(&points, &by, DVec3::Z, &SplatParams::default()).unwrap();
+/// assert_eq!(colored.color[1], ColorMap::VIRIDIS.at(0.5));
+/// ```
+///
+/// # Errors
+/// [`ConvertError::Parameter`] for a column that the points have not.
+pub fn colored(points: &RawPoints, by: &ColorBy, up: DVec3, splat: &SplatParams) -> Result<Colored, ConvertError> {
+    let Some(numbers) = points.column(&by.column, up) else {
+        return Err(splat.bad("color_by", &by.column, "a column of its points"));
+    };
+    let range = match &by.colors {
+        PointColors::Map(_, range) => Some(range.unwrap_or_else(|| spread(&numbers))),
+        _ => None,
+    };
+    let color = |number: &f64| match &by.colors {
+        _ if !number.is_finite() => splat.color,
+        PointColors::Map(map, _) => map.at(place(*number, range.unwrap_or_default())),
+        PointColors::Classes => class_color(*number),
+        PointColors::Distinct => distinct(*number),
+        PointColors::Transfer(transfer) => transfer.at(*number as f32).color,
+    };
+    let gaps = numbers.iter().filter(|n| !n.is_finite()).count() as u64;
+    Ok(Colored { color: numbers.par_iter().map(color).collect(), range, gaps })
+}
+
+/// Where in a range a number lies, from 0 to 1 within; the middle of a range without a width.
+fn place(number: f64, [low, high]: [f64; 2]) -> f64 {
+    if high > low { (number - low) / (high - low) } else { 0.5 }
+}
+
+/// The numbers below which the first and all but the last hundredth of a column lie; gaps do not count.
+fn spread(numbers: &[f64]) -> [f64; 2] {
+    let mut finite: Vec<f64> = numbers.iter().copied().filter(|n| n.is_finite()).collect();
+    if finite.is_empty() {
+        return [0.0; 2];
+    }
+    SHARES.map(|share| {
+        let rank = ((finite.len() - 1) as f64 * share).round() as usize;
+        *finite.select_nth_unstable_by(rank, f64::total_cmp).1
+    })
+}
+
+/// The colour of a class; those that LAS leaves to users have [`DISTINCT`] ones.
+fn class_color(number: f64) -> [f32; 3] {
+    let class = number.round();
+    let known = (class >= 0.0).then(|| CLASSES.get(class as usize)).flatten();
+    known.map_or_else(|| distinct(number), |(_, rgb)| linear_from_hex(*rgb))
+}
+
+fn distinct(number: f64) -> [f32; 3] {
+    let turns = DISTINCT.len() as f64;
+    linear_from_hex(DISTINCT[(number.round().rem_euclid(turns) as usize).min(DISTINCT.len() - 1)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Column;
+    use splat_core::TransferPoint;
+    use splat_core::glam::Vec3;
+
+    fn points(values: Vec<f64>) -> RawPoints {
+        let columns = vec![Column { name: "it".into(), values }];
+        RawPoints { position: vec![Vec3::ZERO; columns[0].values.len()], columns, ..RawPoints::default() }
+    }
+
+    fn of(values: Vec<f64>, colors: PointColors) -> Colored {
+        let by = ColorBy { column: "it".into(), colors };
+        colored(&points(values), &by, DVec3::Y, &SplatParams { color: [0.5, 0.25, 0.125], ..SplatParams::default() })
+            .expect("a column that is there")
+    }
+
+    #[test]
+    fn a_ramp_has_the_map_s_own_colours_at_its_ends_and_in_its_middle() {
+        let map = ColorMap::VIRIDIS;
+        let of_range = of(vec![-3.0, -2.0, 0.0, 2.0, 9.0], PointColors::Map(map, Some([-2.0, 2.0])));
+        assert_eq!(of_range.color, [0.0, 0.0, 0.5, 1.0, 1.0].map(|place| map.at(place)));
+        let of_data = of((0..=100).map(f64::from).collect(), PointColors::Map(map, None));
+        assert_eq!(of_data.range, Some([1.0, 99.0]));
+        assert_eq!([of_data.color[0], of_data.color[50], of_data.color[100]], [map.at(0.0), map.at(0.5), map.at(1.0)]);
+    }
+
+    #[test]
+    fn neither_the_order_nor_a_shift_nor_a_scale_changes_a_colour() {
+        let numbers: Vec<f64> = (0..999).map(|i| f64::from(i * 37 % 999)).collect();
+        let colors = || PointColors::Map(ColorMap::TURBO, None);
+        let once = of(numbers.clone(), colors()).color;
+        let mut back = of(numbers.iter().rev().copied().collect(), colors()).color;
+        back.reverse();
+        assert_eq!(once, back);
+        assert_eq!(once, of(numbers.iter().map(|n| 1024.0 * n + 1e7).collect(), colors()).color);
+    }
+
+    #[test]
+    fn a_column_of_one_number_has_the_middle_and_gaps_have_the_object_s_colour() {
+        let found = of(vec![4.0, f64::NAN, 4.0, f64::INFINITY], PointColors::Map(ColorMap::TURBO, None));
+        let (middle, own) = (ColorMap::TURBO.at(0.5), [0.5, 0.25, 0.125]);
+        assert_eq!((found.color, found.gaps), (vec![middle, own, middle, own], 2));
+        assert_eq!(of(vec![f64::NAN], PointColors::Map(ColorMap::TURBO, None)).color, [own]);
+    }
+
+    #[test]
+    fn classes_have_colours_of_their_own_and_others_come_in_turns() {
+        let found = of(vec![2.0, 6.0, 64.0, 76.0, 255.0, -1.0, 2.2], PointColors::Classes).color;
+        assert_eq!(found[0], linear_from_hex(0xa67c52));
+        assert!(found[0] != found[1] && found[2] == found[3] && found[6] == found[0]);
+        assert_eq!([class_name(2), class_name(6), class_name(64)], [Some("ground"), Some("building"), None]);
+        let turns = of(vec![0.0, 12.0, -12.0, 1.0, 1e300], PointColors::Distinct).color;
+        assert!(turns[0] == turns[1] && turns[0] == turns[2] && turns[0] != turns[3]);
+    }
+
+    #[test]
+    fn a_transfer_function_gives_its_colours() {
+        let point = |value, red| TransferPoint { value, color: [red, 0.0, 1.0], extinction: 0.0 };
+        let transfer = TransferFunction::new(vec![point(0.0, 0.0), point(4.0, 1.0)]).expect("rising values");
+        assert_eq!(of(vec![1.0, 9.0], PointColors::Transfer(transfer)).color, [[0.25, 0.0, 1.0], [1.0, 0.0, 1.0]]);
+    }
+
+    #[test]
+    fn a_column_that_is_not_there_is_refused_by_name() {
+        let by = ColorBy { column: "heat".into(), colors: PointColors::Distinct };
+        let error = colored(&points(vec![1.0]), &by, DVec3::Y, &SplatParams::default()).expect_err("no such column");
+        assert!(error.to_string().contains("heat"), "{error}");
+    }
+}

@@ -1,0 +1,90 @@
+//! Columns of points that have no meaning of their own: kept where they are asked for by name, else measured where that is asked for.
+
+use super::reading::NamedColumn;
+use super::{Notes, ReadParams, input};
+use crate::error::{ReadError, escaped};
+use crate::raw_points::{Column, unaliased};
+
+/// Most bytes of a name that are shown.
+pub(super) const LONGEST_NAME: usize = 40;
+
+/// The further columns of a file while it is read, each by its rank among the fields of a point.
+#[derive(Default)]
+pub(super) struct Extras {
+    all: Vec<Extra>,
+}
+
+struct Extra {
+    rank: usize,
+    column: Column,
+    is_kept: bool,
+    /// Whether its numbers are looked at.
+    is_read: bool,
+    range: [f64; 2],
+}
+
+impl Extras {
+    /// Of the columns of a file those that `params` ask for; `spare` says which have a meaning already, and are there only if they are
+    /// asked for by name.
+    pub(super) fn new<'a>(columns: impl IntoIterator<Item = (usize, &'a [u8], bool)>, params: &ReadParams) -> Self {
+        let extra = |(rank, name, spare): (usize, &[u8], bool)| {
+            let asked = |asked: &String| asked.as_bytes() == name || unaliased(asked).as_bytes() == name;
+            let is_kept = params.columns.iter().any(asked);
+            let column = Column { name: String::from_utf8_lossy(name).into_owned(), values: Vec::new() };
+            let (is_read, range) = (is_kept || params.ranges, [f64::INFINITY, f64::NEG_INFINITY]);
+            (is_kept || !spare).then_some(Extra { rank, column, is_kept, is_read, range })
+        };
+        Self { all: columns.into_iter().filter_map(extra).collect() }
+    }
+
+    /// Ranks of the columns whose numbers are to be pushed.
+    pub(super) fn read(&self) -> impl Iterator<Item = usize> {
+        self.all.iter().filter(|e| e.is_read).map(|e| e.rank)
+    }
+
+    /// Whether the column of a rank is kept.
+    pub(super) fn keeps(&self, rank: usize) -> bool {
+        self.all.iter().any(|e| e.rank == rank && e.is_kept)
+    }
+
+    /// Bytes that a point takes in the columns that are kept.
+    pub(super) fn bytes_per_point(&self) -> u64 {
+        8 * self.all.iter().filter(|e| e.is_kept).count() as u64
+    }
+
+    /// Room for so many more points.
+    pub(super) fn reserve(&mut self, points: usize) -> Result<(), ReadError> {
+        self.all.iter_mut().filter(|e| e.is_kept).try_for_each(|e| input::reserve(&mut e.column.values, points))
+    }
+
+    /// Takes the numbers of a point by their ranks.
+    pub(super) fn push(&mut self, number: impl Fn(usize) -> f64) {
+        self.all.iter_mut().filter(|e| e.is_read).for_each(|e| e.push(number(e.rank)));
+    }
+
+    /// Takes the numbers of many points of the column of a rank.
+    pub(super) fn extend(&mut self, rank: usize, numbers: impl Iterator<Item = f64>) {
+        if let Some(extra) = self.all.iter_mut().find(|e| e.rank == rank) {
+            numbers.for_each(|number| extra.push(number));
+        }
+    }
+
+    /// The columns that are kept; tells the notes of all.
+    pub(super) fn finish(self, notes: &mut Notes) -> Vec<Column> {
+        let range = |e: &Extra| (e.range[0] <= e.range[1]).then_some(e.range);
+        let named = |e: &Extra| NamedColumn { name: escaped(e.column.name.as_bytes(), LONGEST_NAME), range: range(e) };
+        notes.columns.extend(self.all.iter().map(named));
+        self.all.into_iter().filter(|e| e.is_kept).map(|e| e.column).collect()
+    }
+}
+
+impl Extra {
+    fn push(&mut self, number: f64) {
+        if number.is_finite() {
+            self.range = [self.range[0].min(number), self.range[1].max(number)];
+        }
+        if self.is_kept {
+            self.column.values.push(number);
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! What is shown of raw points: those that are kept, as far apart as is asked for, in the colours of a column.
+
+use crate::{Clip, ColorBy, Colored, ConvertError, Kept, PointColors, RawPoints, SplatParams, colored, kept, thinned};
+use splat_core::glam::DVec3;
+use std::sync::Arc;
+
+/// What is asked for; [`PointsShown::default`] leaves points as they are.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct PointsShown<'a> {
+    /// Numbers of columns that are kept.
+    pub keep: &'a [Kept],
+    /// Regions that are kept, in the space of the points.
+    pub clip: &'a [Clip],
+    /// Distance below which points become one, units of the file; see [`thinned`].
+    pub spacing: Option<f64>,
+    /// The column that colours are taken from.
+    pub color_by: Option<&'a ColorBy>,
+    /// Where `height` grows.
+    pub up: DVec3,
+}
+
+/// The points that are shown, and what there is to say of them, one sentence without a full stop each: how their colours arose, and that
+/// nothing is left. What is not asked for changes nothing, not even a copy is made. Colours are those of points that were made one.
+///
+/// ```
+/// use convert::{PointsShown, RawPoints, SplatParams, shown_points};
+/// let points = std::sync::Arc::new(RawPoints::default());
+/// let (same, said) = shown_points(points.clone(), &PointsShown::default(), &SplatParams::default()).unwrap();
+/// assert!(std::sync::Arc::ptr_eq(&points, &same) && said.is_empty());
+/// ```
+///
+/// # Errors
+/// Those of [`thinned`] and [`colored`].
+pub fn shown_points(
+    mut points: Arc<RawPoints>,
+    shown: &PointsShown<'_>,
+    splat: &SplatParams,
+) -> Result<(Arc<RawPoints>, Vec<String>), ConvertError> {
+    let mut said = Vec::new();
+    if !(shown.keep.is_empty() && shown.clip.is_empty()) {
+        let all = points.len();
+        points = kept(&points, shown.keep, shown.clip, shown.up).into();
+        if points.is_empty() && all > 0 {
+            said.push(format!("nothing is left of {all} points{}", causes(shown)));
+        }
+    }
+    if let Some(spacing) = shown.spacing {
+        points = thinned(&points, spacing, splat)?.into();
+    }
+    if let Some(by) = shown.color_by.filter(|_| !points.is_empty()) {
+        let colored = colored(&points, by, shown.up, splat)?;
+        said.push(sentence(by, &colored));
+        let mut own = Arc::unwrap_or_clone(points);
+        own.color = colored.color;
+        points = own.into();
+    }
+    Ok((points, said))
+}
+
+/// What left points out.
+fn causes(shown: &PointsShown<'_>) -> String {
+    let columns: Vec<String> = shown.keep.iter().map(|kept| format!("`keep.{}`", kept.column)).collect();
+    let clip = (!shown.clip.is_empty()).then(|| "`clip`".to_owned());
+    let all: Vec<String> = columns.into_iter().chain(clip).collect();
+    format!(" by {}", all.join(" and "))
+}
+
+fn sentence(by: &ColorBy, colored: &Colored) -> String {
+    let colors = match (&by.colors, colored.range) {
+        (PointColors::Map(map, _), Some([low, high])) => {
+            let [from, to] = [low, high].map(|end| short(end, high - low));
+            format!("the map {} from {from} to {to}", map.name())
+        }
+        (PointColors::Transfer(_), _) => "the object's `transfer`".to_owned(),
+        (PointColors::Distinct, _) => "twelve colours in turns".to_owned(),
+        _ => "the colours of classes".to_owned(),
+    };
+    let gaps = match colored.gaps {
+        0 => String::new(),
+        n => format!("; {n} points without a number have the object's colour"),
+    };
+    format!("points have the colours of `{}` by {colors}{gaps}", by.column)
+}
+
+/// A number to a thousandth of a width.
+fn short(number: f64, width: f64) -> String {
+    let digits = if width > 0.0 { 3.0 - libm::log10(width).floor() } else { 0.0 };
+    let text = format!("{number:.*}", digits.clamp(0.0, 12.0) as usize);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ColorMap, Within};
+    use splat_core::glam::Vec3;
+
+    #[test]
+    fn points_are_kept_then_made_fewer_then_coloured() {
+        let points = RawPoints {
+            position: (0..8).map(|i| Vec3::X * i as f32).collect(),
+            value: (0..8).map(|i| i as f32).collect(),
+            classification: vec![2, 2, 2, 2, 2, 2, 2, 7],
+            ..RawPoints::default()
+        };
+        let keep = [Kept { column: "class".into(), within: Within::Among(vec![2.0]) }];
+        let by = ColorBy { column: "value".into(), colors: PointColors::Map(ColorMap::VIRIDIS, Some([0.0, 6.0])) };
+        let mut shown = PointsShown { keep: &keep, spacing: Some(2.0), color_by: Some(&by), ..PointsShown::default() };
+        let splat = SplatParams::default();
+        let (found, said) = shown_points(points.clone().into(), &shown, &splat).expect("good points");
+        assert_eq!(found.value, [0.5, 2.5, 4.5, 6.0]);
+        assert_eq!(found.color[3], ColorMap::VIRIDIS.at(1.0));
+        assert_eq!(said, ["points have the colours of `value` by the map viridis from 0 to 6"]);
+        assert_eq!([short(637_012.239_87, 35.0), short(-0.5, 0.012), short(7.0, 0.0)], ["637012.24", "-0.5", "7"]);
+        let none = [Kept { column: "value".into(), within: Within::Range([50.0, 60.0]) }];
+        shown.keep = &none;
+        let (found, said) = shown_points(points.into(), &shown, &splat).expect("good points");
+        assert!(found.is_empty() && said == ["nothing is left of 8 points by `keep.value`"], "{said:?}");
+    }
+}

@@ -1,0 +1,88 @@
+//! Which column points take their colours from in a first scene, and in which colours.
+
+use super::quoted;
+use crate::number::grouped;
+use crate::preset::{Preset, Wish};
+use convert::{RawPoints, class_name};
+use std::fmt::Write;
+
+/// Least share of points that have a class with a meaning, for classes to be looked at.
+const CLASSIFIED: f64 = 0.5;
+/// Classes that say nothing of what a point is: created, and unclassified.
+const NOTHING: [u8; 2] = [0, 1];
+
+/// The keys of the colours; `None` where the file has colours and no others are asked for, and where no column tells anything.
+pub(super) fn point_colors(points: &RawPoints, wish: &Wish) -> Option<String> {
+    let chosen = match &wish.color_by {
+        Some(column) => column.as_str(),
+        None if points.color.is_empty() => telling(points)?,
+        None => return None,
+    };
+    let mut text = String::new();
+    if chosen == "classification" && !points.classification.is_empty() {
+        let _ = writeln!(text, "# {}", classes(points));
+    }
+    text +=
+        "# Colours by a column; `organza info` lists the columns of the file, and `keep` leaves points out by them.\n";
+    let map = wish.preset.as_ref().and_then(Preset::map).map(|map| format!(", map = \"{}\"", map.name()));
+    let _ = writeln!(text, "color_by = {{ column = {}{} }}", quoted(chosen), map.unwrap_or_default());
+    Some(text)
+}
+
+/// The column that tells most of points without colours: their classes, else their values, if they differ.
+fn telling(points: &RawPoints) -> Option<&'static str> {
+    let classified = points.classification.iter().filter(|class| !NOTHING.contains(class));
+    let mut counts = [0usize; 256];
+    classified.for_each(|class| counts[usize::from(*class)] += 1);
+    let share = counts.iter().sum::<usize>() as f64 / points.len().max(1) as f64;
+    if share >= CLASSIFIED && counts.iter().filter(|count| **count > 0).count() > 1 {
+        return Some("classification");
+    }
+    let first = points.value.first()?;
+    points.value.iter().any(|value| value != first).then_some("value")
+}
+
+/// How many points have which class.
+fn classes(points: &RawPoints) -> String {
+    let mut counts = [0u64; 256];
+    points.classification.iter().for_each(|class| counts[usize::from(*class)] += 1);
+    let there = (0..=255u8).map(|class| (class, counts[usize::from(class)])).filter(|(_, count)| *count > 0);
+    let one = |(class, count): (u8, u64)| {
+        let name = class_name(class).map(|name| format!(" ({name})")).unwrap_or_default();
+        format!("{class}{name} {}", grouped(count))
+    };
+    format!("Classes: {}.", there.map(one).collect::<Vec<_>>().join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splat_core::glam::Vec3;
+
+    fn points(classification: Vec<u8>, value: Vec<f32>) -> RawPoints {
+        let position = vec![Vec3::ZERO; classification.len().max(value.len())];
+        RawPoints { position, classification, value, ..RawPoints::default() }
+    }
+
+    #[test]
+    fn classes_tell_more_than_values_and_one_value_tells_nothing() {
+        assert_eq!(telling(&points(vec![2, 2, 6, 1], vec![1.0, 2.0, 3.0, 4.0])), Some("classification"));
+        assert_eq!(telling(&points(vec![1, 1, 2, 1], vec![1.0, 2.0, 3.0, 4.0])), Some("value"));
+        assert_eq!(telling(&points(vec![2, 2, 2, 2], vec![5.0; 4])), None);
+        assert_eq!(telling(&points(Vec::new(), Vec::new())), None);
+    }
+
+    #[test]
+    fn what_is_asked_for_goes_before_colours_of_the_file() {
+        let mut colored = points(vec![2, 6], Vec::new());
+        colored.color = vec![[1.0; 3]; 2];
+        assert_eq!(point_colors(&colored, &Wish::default()), None);
+        let preset = Some(Preset::named("turbo").unwrap());
+        let wish = Wish { color_by: Some("height".into()), preset, ..Wish::default() };
+        let text = point_colors(&colored, &wish).unwrap();
+        assert!(text.ends_with("color_by = { column = \"height\", map = \"turbo\" }\n"), "{text}");
+        let wish = Wish { color_by: Some("classification".into()), ..Wish::default() };
+        let text = point_colors(&colored, &wish).unwrap();
+        assert!(text.starts_with("# Classes: 2 (ground) 1, 6 (building) 1.\n"), "{text}");
+    }
+}

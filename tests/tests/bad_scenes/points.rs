@@ -1,0 +1,68 @@
+//! How raw points look, and what is cut away: what is refused.
+
+use super::{SCENE, refused, try_toml};
+
+#[test]
+fn how_points_look_is_checked() {
+    let points = |keys: &str| format!("points = \"a.las\"\n{keys}\n[[object]]\nname = \"c\"\nmesh = \"a.ply\"");
+    let refused = |keys: &str, expected: &str| refused("mesh = \"a.ply\"", &points(keys), expected);
+    refused("color_by = { map = \"turbo\" }", "13:12: expected a key `column` here");
+    refused("color_by = { column = \"\" }", "expected the name of a column, 1 to 256 bytes, found 0");
+    refused("color_by = { column = \"z\", map = \"jet\" }", "13:34: `map`: expected one of viridis, magma,");
+    refused(
+        "color_by = { column = \"z\", range = [5, 5] }",
+        "expected a lowest and a highest number up to 1e18, found 5 and 5",
+    );
+    refused(
+        "color_by = { column = \"z\", map = \"distinct\", range = [1, 5] }",
+        "has a colour for each number and no `range`",
+    );
+    refused("color_by = { column = \"z\" }\ncolor = [1, 0, 0]", "`color` and `color_by` exclude each other");
+    let transfer = "transfer = [{ value = 0, color = [1, 1, 1] }]";
+    refused(&format!("color_by = {{ column = \"z\", map = \"grey\" }}\n{transfer}"), "exclude each other");
+    refused(transfer, "`transfer` belongs to a `volume` or `slice`, and to `points` with `color_by`");
+    refused(
+        "color_by = { column = \"z\" }\ntransfer = [{ value = 0, color = [1, 1, 1], opacity = 0.5 }]",
+        "points have no extinction",
+    );
+    refused("keep = { classification = [2, 6.5] }", "expected classes, whole numbers from 0 to 255, found 6.5");
+    refused("keep = { class = [] }", "expected at least one class, found none");
+    refused("keep = { intensity = [9, 2] }", "expected a lowest and a highest number up to 1e18, found [9.0, 2.0]");
+    refused("keep = { intensity = [9] }", "expected a lowest and a highest number");
+    refused("point_size = { pixels = 2, world = 1 }", "expected either `pixels` or `world`");
+    refused("point_size = { pixels = 0 }", "`pixels`: expected a number above 0, up to 1024, found 0");
+    refused("point_size = { world = -1 }", "`world`: expected a number above 0");
+    refused("unlit = true\nmaterial = \"glass\"", "`unlit` and `material` exclude each other");
+}
+
+#[test]
+fn what_raw_points_alone_have_is_refused_elsewhere() {
+    for (key, value) in [
+        ("color_by", "{ column = \"z\" }"),
+        ("keep", "{ z = [0, 1] }"),
+        ("unlit", "true"),
+        ("point_size", "{ pixels = 2 }"),
+    ] {
+        refused(
+            "mesh = \"a.ply\"",
+            &format!("mesh = \"a.ply\"\n{key} = {value}"),
+            &format!("`{key}` belongs to `points`"),
+        );
+    }
+}
+
+#[test]
+fn slabs_across_half_vectors_cut_no_volume() {
+    let clipped = "[render]\ntechnique = \"sheets\"\nsheets = { slicing = \"half_vector\" }";
+    let clip = "volume = \"b.nii\"\nclip = [{ normal = [0, 1, 0], point = [0, 0, 0] }]";
+    let text = SCENE.replacen("[render]", clipped, 1).replacen("volume = \"b.nii\"", clip, 1);
+    let error = try_toml(&text).unwrap_err();
+    assert!(error.to_string().contains("`clip`: slabs across half vectors cut no volume"), "{error}");
+}
+
+#[test]
+fn a_homogeneous_medium_is_not_cut() {
+    let ball = "medium_ball = { center = [0, 0, 0], radius = 1, spacing = 0.1, extinction = 1 }";
+    let clip = "clip = [{ box = [[0, 0, 0], [1, 1, 1]] }]";
+    refused("mesh = \"a.ply\"", &format!("{ball}\n{clip}"), "a homogeneous medium has no `clip`");
+}
