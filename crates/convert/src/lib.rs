@@ -28,6 +28,8 @@ mod error;
 #[cfg(feature = "expression")]
 mod expression;
 mod field_points;
+#[cfg(feature = "surfels")]
+mod gaussian_points;
 mod grid_field;
 mod keep;
 mod marching_cubes;

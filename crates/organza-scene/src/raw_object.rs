@@ -109,4 +109,6 @@ pub(super) enum RawUp {
     Auto,
     Y,
     Z,
+    #[serde(rename = "-y")]
+    MinusY,
 }

@@ -71,9 +71,7 @@ impl Loaded {
         self.camera.size = scene.camera.size;
         self.slice_thickness = scaled_thickness(scene, self.exponent);
     }
-}
 
-impl Loaded {
     /// The objects, of which those that are not opaque neither cast nor receive shadows.
     pub(crate) fn opaque_objects(&self) -> Vec<Object> {
         let mut objects = self.objects.clone();
