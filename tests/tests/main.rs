@@ -15,6 +15,7 @@ mod every_scene;
 mod exact_particles;
 mod eye_inside;
 mod first_scene;
+mod gaussians;
 mod half_vector;
 mod interrupts;
 mod invariances;

@@ -112,9 +112,8 @@ fn the_frame_of_a_series_is_told_and_one_that_is_not_there_is_refused() {
     );
 }
 
-/// 3D Gaussian splats were drawn as white discs.
 #[test]
-fn exit_3_gaussian_splats_are_refused_by_name() {
+fn exit_3_gaussians_without_a_rotation_are_refused_where_it_should_stand() {
     let folder = tempfile::tempdir().unwrap();
     let names = ["x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1", "scale_2", "rot_0"];
     let properties: String = names.iter().map(|n| format!("property float {n}\n")).collect();
@@ -124,7 +123,7 @@ fn exit_3_gaussian_splats_are_refused_by_name() {
     for arguments in [["render", "s.toml"], ["info", "wall.csv"]] {
         let out = run(folder.path(), &arguments);
         assert_eq!(out.status.code(), Some(3));
-        assert!(errors(&out).contains("wall.csv:3: expected a mesh or points, found a 3D Gaussian splat file"));
+        assert!(errors(&out).contains("wall.csv:3: expected a property 'rot_1' of 'vertex', found none"));
     }
 }
 

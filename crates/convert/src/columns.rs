@@ -3,7 +3,8 @@
 use crate::{ConvertError, SplatParams};
 use bytemuck::Zeroable;
 use rayon::prelude::*;
-use splat_core::{Cloud, SplatKind, glam::Vec3};
+use splat_core::{Cloud, Gaussians, SplatKind, glam::Vec3};
+use std::sync::Arc;
 
 /// Splats per parallel task; fixed, so that results do not depend on the thread count.
 pub(crate) const CHUNK: usize = 1 << 14;
@@ -21,6 +22,8 @@ pub(crate) struct Wanted {
     pub(crate) value: bool,
     /// Optical depths of one crossing, for translucent surfaces.
     pub(crate) crossing_depth: bool,
+    /// Gaussians with harmonics of this degree.
+    pub(crate) gaussian: Option<u8>,
 }
 
 impl Wanted {
@@ -31,7 +34,8 @@ impl Wanted {
         let vectors = [self.normal, self.shading_normal, self.tangent].map(usize::from).iter().sum::<usize>();
         let numbers = usize::from(self.value) + usize::from(self.crossing_depth);
         let optional = vectors * size_of::<Vec3>() + numbers * size_of::<f32>();
-        (required + ids + optional) as u64
+        let of_gaussian = self.gaussian.map_or(0, |degree| size_of::<u32>() as u64 + Gaussians::bytes_each(degree));
+        (required + ids + optional) as u64 + of_gaussian
     }
 }
 
@@ -59,6 +63,8 @@ pub(crate) fn size_columns(
     constant(&mut cloud.material, n, params.material);
     constant(&mut cloud.footprint, n, params.footprint);
     constant(&mut cloud.object, n, params.object);
+    sized(&mut cloud.gaussian, if wanted.gaussian.is_some() { n } else { 0 }).map_err(full)?;
+    cloud.gaussians = Arc::default();
     cloud.shadow_coefficient.clear();
     Ok(())
 }

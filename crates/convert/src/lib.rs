@@ -32,6 +32,8 @@ mod error;
 #[cfg(feature = "expression")]
 mod expression;
 mod field_points;
+#[cfg(feature = "surfels")]
+mod gaussian_points;
 mod grid_field;
 mod keep;
 mod keep_points;
@@ -108,7 +110,6 @@ pub use shapes::{HomogeneousMedium, MediumBody, Rectangle, medium, medium_to_gri
 pub use shown_points::{PointsShown, shown_points};
 pub use sobel::{sobel_gradient, sobel_gradient_into};
 pub use splat_core::Clip;
-pub use srgb::linear_from_srgb;
 #[cfg(feature = "surfels")]
 pub use surfels::{DiscSize, SurfelParams, SurfelReport, raw_to_surfels};
 #[cfg(feature = "surfels")]

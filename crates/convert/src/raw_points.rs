@@ -2,7 +2,7 @@
 
 use crate::vertex_normals::vertex_normals;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Aabb, Error, Mesh};
+use splat_core::{Aabb, DAabb, Error, Gaussians, Mesh};
 
 /// Raw points as columns; all but the positions may be empty.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -27,6 +27,8 @@ pub struct RawPoints {
     pub lattice: Option<PointLattice>,
     /// Points of the file that were left out because a coordinate was not finite.
     pub dropped: u64,
+    /// The Gaussian that each point is the centre of, units and axes of the file; empty for points that are none.
+    pub gaussians: Gaussians,
 }
 
 /// A column of a file that has no meaning of its own here. A number that is none, or is not finite, is a gap.
@@ -91,9 +93,21 @@ impl RawPoints {
         (self.len() <= FEW && size > 0.0).then(|| REACH * size / (self.len() as f64).sqrt())
     }
 
-    /// Bytes held by the columns, all of them counted: position, normal, colour, value, opacity, class, integers and further ones.
-    pub fn bytes(&self) -> u64 {
-        (64 + 8 * self.columns.len() as u64) * self.len() as u64
+    /// Bounds of what is seen of nearly all Gaussians: two deviations around each, without the farthest hundredth to every side, which in
+    /// captured scenes lies anywhere; `None` for points that are none.
+    pub fn bulk(&self) -> Option<DAabb> {
+        /// Gaussians of which one may lie outside, to every side.
+        const ONE_OF: usize = 100;
+        let g = &self.gaussians;
+        let seen: Vec<usize> = (0..g.len()).filter(|i| g.opacity[*i] >= Gaussians::LEAST_OPACITY).collect();
+        let end = |axis: usize, sign: f32| {
+            let reach = |i: usize| 2.0 * Vec3::from_array(g.axes[i].map(|a| a[axis])).length();
+            let mut ends: Vec<f32> = seen.iter().map(|i| sign * self.position[*i][axis] + reach(*i)).collect();
+            let far = ends.len() - 1 - ends.len() / ONE_OF;
+            f64::from(sign * *ends.select_nth_unstable_by(far, f32::total_cmp).1)
+        };
+        let ends = |sign: f32| self.origin + DVec3::new(end(0, sign), end(1, sign), end(2, sign));
+        (!seen.is_empty()).then(|| DAabb::new(ends(-1.0), ends(1.0)))
     }
 
     /// The numbers of a column by its name, the one of the file before the ones that all points have:
@@ -149,9 +163,16 @@ impl RawPoints {
         all.chain(["x", "y", "z", "height"]).chain(self.columns.iter().map(|c| c.name.as_str()))
     }
 
-    /// The least opacity of a point; 1 where the file has none, and without points.
+    /// Bytes held by the columns, all of them counted: position, normal, colour, value, opacity, class, integers and further ones; and
+    /// Gaussians.
+    pub fn bytes(&self) -> u64 {
+        (64 + 8 * self.columns.len() as u64) * self.len() as u64 + self.gaussians.bytes()
+    }
+
+    /// The least opacity of a point; 1 where the file has none, and without points. That of a Gaussian is below 1.
     pub fn least_opacity(&self) -> f32 {
-        self.opacity.iter().copied().fold(1.0, f32::min)
+        let most = if self.gaussians.is_empty() { 1.0 } else { Gaussians::MOST_OPACITY };
+        self.opacity.iter().chain(&self.gaussians.opacity).copied().fold(most, f32::min)
     }
 
     /// Position of point `i` in f64: from the file's integers where it has them, else from the f32 offset.
@@ -178,6 +199,7 @@ impl RawPoints {
             ("opacity", self.opacity.len()),
             ("classification", self.classification.len()),
             ("lattice", self.lattice.as_ref().map_or(0, |l| l.steps.len())),
+            ("gaussians", self.gaussians.len()),
         ];
         for (attribute, found) in columns.into_iter().chain(self.columns.iter().map(|c| ("columns", c.values.len()))) {
             if found != 0 && found != expected {
@@ -202,7 +224,7 @@ impl RawPoints {
         if let Some(i) = self.opacity.iter().position(|a| !(0.0..=1.0).contains(a)) {
             return Err(Error::invalid("point", i, "opacity", self.opacity[i], "a number in [0, 1]"));
         }
-        Ok(())
+        self.gaussians.validate()
     }
 }
 

@@ -1,4 +1,5 @@
-//! Reading files: meshes (PLY, STL, OBJ, OFF, glTF), point clouds (PLY, OBJ, OFF, PCD, glTF, XYZ, CSV, LAS, LAZ), volumes (NIfTI,
+//! Reading files: meshes (PLY, STL, OBJ, OFF, glTF), point clouds (PLY, OBJ, OFF, PCD, glTF, XYZ, CSV, LAS, LAZ), 3D Gaussians (PLY, packed
+//! PLY, .splat, SPZ), volumes (NIfTI,
 //! NRRD, MetaImage, VTK, raw) and images of radiance (Radiance HDR, OpenEXR, PNG), each also inside gzip.
 //!
 //! No input makes a reader panic or take memory that the file does not stand for: sizes that a header announces are
@@ -22,7 +23,9 @@
         feature = "raw",
         feature = "hdr",
         feature = "exr",
-        feature = "png"
+        feature = "png",
+        feature = "splat",
+        feature = "spz"
     )),
     allow(
         dead_code,
@@ -41,6 +44,8 @@ mod extras;
 #[cfg(any(feature = "obj", feature = "off"))]
 mod fans;
 mod format;
+#[cfg(any(feature = "ply", feature = "splat", feature = "spz"))]
+mod gaussians;
 #[cfg(feature = "gltf")]
 mod gltf;
 mod inflate;
@@ -81,6 +86,10 @@ mod radiance;
 mod raw;
 mod reading;
 mod selection;
+#[cfg(feature = "splat")]
+mod splat;
+#[cfg(feature = "spz")]
+mod spz;
 #[cfg(feature = "obj")]
 mod statements;
 #[cfg(feature = "stl")]
@@ -161,7 +170,7 @@ impl ReadParams {
 pub enum Loaded {
     /// Vertices with faces.
     Mesh(Mesh),
-    /// Points without faces.
+    /// Points without faces, which may be Gaussians.
     Points(RawPoints),
     /// A regular volume.
     Grid(Grid),
@@ -290,6 +299,10 @@ fn parse_as(
         Format::Off => off::read(&stream.rest()?, reading),
         #[cfg(feature = "gltf")]
         Format::Gltf => gltf::read(&stream.rest()?, place, reading),
+        #[cfg(feature = "splat")]
+        Format::Splat => splat::read(&stream.rest()?, reading).map(Loaded::Points),
+        #[cfg(feature = "spz")]
+        Format::Spz => spz::read(&stream.rest()?, reading).map(Loaded::Points),
         #[cfg(feature = "pcd")]
         Format::Pcd => pcd::read(&stream.rest()?, reading).map(Loaded::Points),
         #[cfg(feature = "xyz")]

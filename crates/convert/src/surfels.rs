@@ -16,7 +16,7 @@ use crate::neighbours::MAX_NEIGHBOURS;
 use crate::orient::{self, Orientation};
 use crate::params::SplatParams;
 use crate::places::{Place, places};
-use crate::{ConvertError, RawPoints};
+use crate::{ConvertError, RawPoints, gaussian_points};
 use rayon::prelude::*;
 use splat_core::{
     Camera, Cloud, Footprint, Progress, SplatKind,
@@ -119,7 +119,7 @@ pub struct SurfelReport {
     pub area: f64,
 }
 
-/// Makes surfels of raw points.
+/// Makes surfels of raw points; of points that are Gaussians splats that are seen as these, each one, also where several lie at one place.
 ///
 /// ```
 /// use convert::{RawPoints, SurfelParams, raw_to_surfels};
@@ -143,6 +143,12 @@ pub fn raw_to_surfels(
     let quiet = Progress::new();
     let progress = progress.unwrap_or(&quiet);
     check(points, params)?;
+    if !points.gaussians.is_empty() {
+        return gaussian_points::to_cloud(points, params).map(|cloud| {
+            let n = points.len() as u64;
+            (cloud, SurfelReport { points: n, splats: n, ..SurfelReport::default() })
+        });
+    }
     let order = canonical_order(points);
     let (distinct, starts) = distinct_places(points, &order);
     let (mut places, nearest) = places(&distinct, params, progress)?;
@@ -279,6 +285,9 @@ impl Sorted {
 
 /// Which columns surfels fill.
 pub(crate) fn wanted(points: &RawPoints, params: &SurfelParams) -> Wanted {
+    if !points.gaussians.is_empty() {
+        return gaussian_points::wanted(points, params);
+    }
     let value = params.values && !points.value.is_empty();
     Wanted { normal: true, value, crossing_depth: !is_opaque(points, params), ..Wanted::default() }
 }

@@ -4,6 +4,7 @@ use crate::columns::CHUNK;
 use crate::surfels::compare;
 use crate::{Column, ConvertError, RawPoints, SplatParams};
 use rayon::prelude::*;
+use splat_core::Gaussians;
 use splat_core::glam::{DVec3, Vec3};
 
 /// Points that lie about `spacing` apart, units of the file, where the given ones lie closer: those of each cell of a
@@ -21,9 +22,12 @@ use splat_core::glam::{DVec3, Vec3};
 /// ```
 ///
 /// # Errors
-/// [`ConvertError::Parameter`] for a spacing that is no length, [`ConvertError::Input`] for points that are no numbers.
+/// [`ConvertError::Parameter`] for a spacing that is no length and for Gaussians, [`ConvertError::Input`] for points that are no numbers.
 pub fn thinned(points: &RawPoints, spacing: f64, params: &SplatParams) -> Result<RawPoints, ConvertError> {
     params.check_spacing(spacing)?;
+    if !points.gaussians.is_empty() {
+        return Err(params.bad("spacing", spacing, "none: 3D Gaussians have no mean that looks like them"));
+    }
     points.validate().map_err(|e| params.input(e))?;
     let cells = cells(points, spacing);
     let ranges: Vec<&[([f64; 3], u32)]> = cells.chunk_by(|a, b| a.0 == b.0).collect();
@@ -52,6 +56,7 @@ pub fn thinned(points: &RawPoints, spacing: f64, params: &SplatParams) -> Result
         columns: points.columns.iter().map(column).collect(),
         lattice: None,
         dropped: points.dropped,
+        gaussians: Gaussians::default(),
     })
 }
 

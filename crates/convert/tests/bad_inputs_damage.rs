@@ -20,6 +20,8 @@
     feature = "hdr",
     feature = "exr",
     feature = "png",
+    feature = "splat",
+    feature = "spz",
     unix
 ))]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
@@ -29,6 +31,7 @@ mod read_samples;
 use convert::read::{Loaded, ReadParams, bytes};
 use exr::prelude::{Blocks, Compression, Vec2};
 use image::ImageFormat;
+use read_samples::gaussians::{packed_ply, splat, spz, trained, trained_ply};
 use read_samples::oldest::laz_oldest;
 use read_samples::volumes::{self, metaimage, vti, vtk, vtk_scalars};
 use read_samples::{NIFTI_F32, gzip, images, las, load, nifti, nrrd, obj, ply_ascii, ply_binary, stl, text_points};
@@ -112,6 +115,11 @@ fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("tiles.exr", images::exr(Compression::PIZ, Blocks::Tiles(Vec2(8, 4)))),
         ("plain.exr", images::exr(Compression::Uncompressed, Blocks::ScanLines)),
         ("a.png", images::png(image::ExtendedColorType::Rgb8, &images::png_bytes(3))),
+        ("trained.ply", trained_ply(&[trained(0, 1)], 1, "binary_little_endian")),
+        ("words.ply", packed_ply(&[trained(0, 1), trained(1, 1)], 1)),
+        ("a.splat", splat(&[trained(0, 0)])),
+        ("old.spz", spz(&[trained(0, 1), trained(1, 1)], 1, 2)),
+        ("new.spz", gzip(&spz(&[trained(0, 1), trained(1, 1)], 1, 3))),
     ]
 }
 

@@ -16,6 +16,8 @@ mod mpu_fields;
 mod point_opacity;
 mod read_assets;
 mod read_columns;
+#[cfg(all(feature = "splat", feature = "spz"))]
+mod read_gaussians;
 #[cfg(all(feature = "off", feature = "pcd", feature = "gltf"))]
 mod read_gltf;
 #[cfg(all(feature = "hdr", feature = "exr", feature = "png"))]

@@ -87,6 +87,9 @@ pub(super) enum Axis {
     Y,
     /// As surveys and scans of bodies have it
     Z,
+    /// The other way, as captured 3D Gaussians mostly have it
+    #[value(name = "-y")]
+    MinusY,
 }
 
 /// How data files without a scene are to be seen.
@@ -109,7 +112,7 @@ pub(super) struct FirstArguments {
     #[arg(long, value_name = "COLUMN")]
     pub(super) color_by: Option<String>,
     /// Axis of the data that points up [default: what the format of each file says, else y]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, allow_hyphen_values = true)]
     pub(super) up: Option<Axis>,
     /// Stand all of it on a ground
     #[arg(long)]

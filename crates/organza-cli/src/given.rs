@@ -97,6 +97,7 @@ pub(super) fn wish(first: &FirstArguments, size: Option<[i64; 2]>) -> Result<Wis
         up: first.up.map(|axis| match axis {
             Axis::Y => UpAxis::Y,
             Axis::Z => UpAxis::Z,
+            Axis::MinusY => UpAxis::MinusY,
         }),
         ground: first.ground,
     })

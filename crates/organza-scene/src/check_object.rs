@@ -45,6 +45,7 @@ pub(super) fn check_object(
         RawUp::Auto => Up { axis: source.path().map_or(UpAxis::Y, up_axis), by_file: source.path().is_some() },
         RawUp::Y => Up { axis: UpAxis::Y, by_file: false },
         RawUp::Z => Up { axis: UpAxis::Z, by_file: false },
+        RawUp::MinusY => Up { axis: UpAxis::MinusY, by_file: false },
     };
     Ok(SceneObject {
         transform: check_transform(&at.key("transform"), &raw.transform, up.axis)?,
@@ -131,6 +132,8 @@ fn check_transform(at: &At<'_>, raw: &RawTransform, up: UpAxis) -> Result<Simila
     let up = match up {
         UpAxis::Y => DQuat::IDENTITY,
         UpAxis::Z => turned(DVec3::X, -std::f64::consts::FRAC_PI_2),
+        // Half a turn about x, without rounding.
+        UpAxis::MinusY => DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0),
     };
     Ok(Similarity {
         scale: at.length("scale", raw.scale.unwrap_or(1.0))?,

@@ -119,4 +119,6 @@ pub(super) enum RawUp {
     Auto,
     Y,
     Z,
+    #[serde(rename = "-y")]
+    MinusY,
 }

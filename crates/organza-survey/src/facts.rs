@@ -128,6 +128,16 @@ fn of_mesh(mesh: &Mesh) -> Facts {
     }
 }
 
+/// What is said of points with colours.
+const AS_THEY_ARE: &str = "colours are drawn as they are, without light, unless the scene names a material";
+
+/// What is said of points that are Gaussians.
+fn of_gaussians(points: &RawPoints) -> Option<String> {
+    let degree = points.gaussians.degree;
+    (!points.gaussians.is_empty())
+        .then(|| format!("its points are 3D Gaussians, with spherical harmonics of degree {degree}"))
+}
+
 fn of_points(points: &RawPoints, further: &[NamedColumn], up: UpAxis) -> Facts {
     let bounds = bounds_of(points.origin, &points.position);
     let of_file = further.iter().filter_map(|c| Some((c.name.clone(), c.range?)));
@@ -138,21 +148,21 @@ fn of_points(points: &RawPoints, further: &[NamedColumn], up: UpAxis) -> Facts {
             ("normal", !points.normal.is_empty()),
             ("color", !points.color.is_empty()),
             ("value", !points.value.is_empty()),
-            ("opacity", !points.opacity.is_empty()),
+            ("opacity", !points.opacity.is_empty() || !points.gaussians.is_empty()),
             ("classification", !points.classification.is_empty()),
         ]),
-        remarks: if points.color.is_empty() {
-            Vec::new()
-        } else {
-            vec!["colours are drawn as they are, without light, unless the scene names a material".to_owned()]
-        },
+        remarks: [(!points.color.is_empty()).then(|| AS_THEY_ARE.to_owned()), of_gaussians(points)]
+            .into_iter()
+            .flatten()
+            .collect(),
         bounds,
         spacing: median_spacing(&points.position),
         duplicates: Some(duplicates(&points.position)),
         columns: ranges([
             ("color", points.color.iter().flatten().copied().collect()),
             ("value", points.value.clone()),
-            ("opacity", points.opacity.clone()),
+            ("opacity", [&points.opacity[..], &points.gaussians.opacity].concat()),
+            ("deviation", points.gaussians.axes.iter().flatten().map(|axis| axis.length()).collect()),
             ("classification", points.classification.iter().map(|c| f32::from(*c)).collect()),
         ])
         .into_iter()

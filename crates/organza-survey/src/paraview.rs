@@ -3,9 +3,9 @@
 //! `RGBPoints` lists value, red, green and blue in sRGB; `Points`, where it is there, value, opacity, and two numbers for the shape
 //! between points, which are left out: opacities are linear between them.
 
-use convert::linear_from_srgb;
 use organza::{Error, printable};
 use serde_json::Value;
+use splat_core::srgb;
 use std::path::Path;
 
 /// Largest file, bytes.
@@ -42,7 +42,7 @@ impl Sampled {
         if colors.is_empty() {
             return Err("expected a list `RGBPoints` of at least one value, red, green and blue, found none".into());
         }
-        let color = |row: &[f64]| (row[0], [row[1], row[2], row[3]].map(|c| linear_from_srgb(c.clamp(0.0, 1.0))));
+        let color = |row: &[f64]| (row[0], [row[1], row[2], row[3]].map(|c| srgb::decoded(c.clamp(0.0, 1.0)) as f32));
         let opacity = |row: &[f64]| (row[0], row[1].clamp(0.0, 1.0));
         Ok(Self {
             colors: colors.chunks(4).map(color).collect(),

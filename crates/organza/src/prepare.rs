@@ -11,7 +11,7 @@ use crate::memory::{self, Memory};
 use crate::pass;
 use crate::plan::Plan;
 use crate::scene::{FoundCamera, Scene, SceneLight, SceneObject, Technique};
-use crate::statistics::{ObjectStatistics, Statistics};
+use crate::statistics::{ObjectData, ObjectStatistics, Statistics};
 use crate::technique::Row;
 use crate::work::Translucent;
 use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, doubts, lights, shadows};
@@ -111,9 +111,16 @@ pub fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> R
     plan_counted(scene, loaded, options).map(|(plan, _)| plan)
 }
 
+/// What is said of 3D Gaussians whose technique leaves them out.
+const UNDRAWN: [&str; 2] = ["3D Gaussians, which its technique does not draw", "use `points` or `reference`"];
+
 /// The plan of a loaded scene, and the bytes that it takes.
 fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Result<(Plan, Memory), Error> {
     check_samples(scene)?;
+    let mut of_gaussians = visible(scene).zip(&loaded.statistics).filter(|(_, of)| of.data == ObjectData::Gaussians);
+    if let Some((object, _)) = of_gaussians.find(|(o, _)| !row(technique_of(o, scene)).gaussians) {
+        return Err(Error::input(crate::shown(&object.name), UNDRAWN[0], UNDRAWN[1]));
+    }
     let planned: Vec<PlannedObject> = visible(scene)
         .zip(&loaded.planned)
         .map(|(object, planned)| PlannedObject { technique: technique_of(object, scene), ..planned.clone() })

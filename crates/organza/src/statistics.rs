@@ -23,6 +23,8 @@ pub struct LightStatistics {
 pub enum ObjectData {
     /// Raw points.
     Points,
+    /// Points that are 3D Gaussians.
+    Gaussians,
     /// Triangles.
     Triangles,
     /// The zero set of a field.

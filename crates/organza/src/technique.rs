@@ -57,6 +57,8 @@ pub(crate) struct Row {
     pub(crate) bumps: fn(&Scene) -> Result<(), &'static str>,
     /// Whether it draws translucent splats as they are: they get footprints and radiance.
     pub(crate) draws_splats: bool,
+    /// Whether 3D Gaussians are seen as such.
+    pub(crate) gaussians: bool,
     /// Whether rays meet the opaque discs of its objects exactly; else the frame draws these as splats.
     pub(crate) meets_discs: bool,
     /// Its passes; the last one comes behind opaque surfaces, those before it come before footprints.
@@ -148,6 +150,7 @@ pub(crate) static TABLE: [Row; 5] = [
         form: Some(particles::form),
         of_splats: "particles are sampled from them",
         draws_splats: false,
+        gaussians: false,
         steps: &[Step { pass: pass::PARTICLES, stage: stage::PARTICLES, seconds: particles::seconds }],
         is_random: true,
         bytes: |matter, _, colored, options| particles::bytes(matter.scene, colored, options),
@@ -160,6 +163,7 @@ pub(crate) static TABLE: [Row; 5] = [
         how: "are composited in slabs, volumes classified after reconstruction",
         form: Some(sheets::form),
         polygons: sheets::keeps_polygons,
+        gaussians: false,
         steps: &[Step { pass: pass::SHEETS, stage: stage::SHEETS, seconds: sheets::seconds }],
         bytes: sheets::bytes,
         carries: sheets::carries,
@@ -172,6 +176,7 @@ pub(crate) static TABLE: [Row; 5] = [
         how: "are discs, which are averaged in each layer of a surface, and layers are composited in order",
         bends: surfels::bends,
         bumps: surfels::bumps,
+        gaussians: false,
         meets_discs: true,
         steps: &[SORT, Step { pass: pass::SURFELS, stage: stage::SURFELS, ..FOLD }],
         bytes: surfels::bytes,
@@ -210,6 +215,7 @@ const POINTS: Row = Row {
     bends: |_| Err("use `surfels`"),
     bumps: |_| Err("use `surfels`"),
     draws_splats: true,
+    gaussians: true,
     meets_discs: false,
     steps: &[SORT, FOLD],
     is_random: false,

@@ -148,7 +148,7 @@ fn fragments(
         let splat = splats[i as usize].as_ref().expect("invariant: listed splats exist");
         let Some(f) = splat.fragment(input, x, y) else { continue };
         let seen = match splat.kind {
-            SplatKind::Medium => splat.share_before(surface_depth),
+            SplatKind::Medium => splat.share_before(surface_depth, &f),
             SplatKind::Surface => f64::from(f.depth < surface_depth),
             SplatKind::Opaque => 0.0,
         };

@@ -3,10 +3,12 @@
 //! Medium: τ = K·n/R'²·w(ρ²/R'²), ρ the distance of the centre from the ray, R'² = R² + (filter in world units)².
 //! Disc: the projection of the tangent disc by its Jacobian at the centre, widened by the resampling filter. Of discs that
 //! reach through the eye plane what lies on the ray before the eye; in perspective, for all whose ball does, not widened.
+//! Gaussian: see `gaussian.rs`.
 //! Share of a medium before a plane across the view: ∫ 35/32·(1 − u²)³ du up to u = distance/3δ, δ the kernel's deviation.
 //! w(s) = e^(−qs) − e^(−q)(1 + x + x²/2), x = q(1 − s), q = cutoff²/2.
 
 use crate::Input;
+use crate::gaussian::Gaussian;
 use glam::{DMat2, DVec2, DVec3};
 use splat_core::optics::SurfaceOpacity;
 use splat_core::{FootprintStack, SplatKind};
@@ -39,6 +41,7 @@ enum Shape {
     Ball {
         radius_sq: f64,
     },
+    Gaussian(Gaussian),
     Disc {
         metric: DMat2,
         /// Without the filter.
@@ -64,6 +67,8 @@ pub(crate) struct Fragment {
     pub(crate) depth: f64,
     /// Squared distance from the centre over the squared radius.
     pub(crate) distance_sq: f64,
+    /// View depth of the middle of the matter on the ray, which of a Gaussian is not that of the centre by which it is sorted.
+    middle: f64,
 }
 
 impl Splat {
@@ -94,7 +99,12 @@ impl Splat {
             shape: Shape::Ball { radius_sq: 0.0 },
             reach_px: DVec2::ZERO,
         };
-        if s.kind == SplatKind::Medium {
+        if let Some(g) = input.cloud.gaussian_of(i) {
+            let gaussian = Gaussian::new(input, g, center)?;
+            out.reach_px = gaussian.reach_px;
+            out.radius = cutoff * gaussian.deviation;
+            out.shape = Shape::Gaussian(gaussian);
+        } else if s.kind == SplatKind::Medium {
             let radius_sq = radius * radius + (filter_px / px_per_world).powi(2);
             out.peak = amount * n / radius_sq;
             out.shape = Shape::Ball { radius_sq };
@@ -165,10 +175,11 @@ impl Splat {
         self.shape = Shape::Near { normal, axes: [u, v].map(|a| a / a.length_squared()), slab };
     }
 
-    /// How much of a medium is seen between the eye and a surface at view depth `depth`.
-    pub(crate) fn share_before(&self, depth: f64) -> f64 {
-        let at = |depth: f64| share_before((depth - self.depth) / self.radius, self.cutoff_sq_half);
-        (at(depth) - at(0.0)).max(0.0)
+    /// How much of a fragment of a medium is seen between the eye and a surface at view depth `depth`; a Gaussian is whole before the eye.
+    pub(crate) fn share_before(&self, depth: f64, fragment: &Fragment) -> f64 {
+        let at = |depth: f64| share_before((depth - fragment.middle) / self.radius, self.cutoff_sq_half);
+        let behind_the_eye = if matches!(self.shape, Shape::Gaussian(_)) { 0.0 } else { at(0.0) };
+        (at(depth) - behind_the_eye).max(0.0)
     }
 
     /// Pixel range [low, high) to look at along one axis (0 = x, 1 = y) of `limit` pixels.
@@ -198,6 +209,12 @@ impl Splat {
                 let s = axes.iter().map(|a| p.dot(*a).powi(2)).sum();
                 (s, s, depth - self.depth)
             }
+            Shape::Gaussian(gaussian) => {
+                let d = at - self.center_px;
+                let amount = gaussian.optical_depth(d)?;
+                let (depth, middle) = (self.depth, self.depth + gaussian.depth_slope.dot(d));
+                return Some(Fragment { is_solid: false, amount, depth, distance_sq: 0.0, middle });
+            }
             Shape::Ball { radius_sq } => {
                 let (origin, d) = input.camera.view_ray(at.x, at.y);
                 let rho_sq = (self.center - origin).cross(d).length_squared() / d.length_squared();
@@ -218,6 +235,7 @@ impl Splat {
             amount: peak * profile(s, self.cutoff_sq_half),
             depth: self.depth + offset,
             distance_sq: s,
+            middle: self.depth + offset,
         })
     }
 }

@@ -43,6 +43,7 @@ mod dielectric;
 mod environment;
 mod estimate;
 mod footprint;
+mod gaussian;
 mod implicit;
 mod liberty;
 mod lights;

@@ -68,7 +68,7 @@ fn compare_splats(cloud: &Cloud, a: usize, b: usize) -> Ordering {
             (s.shadow_coefficient.to_bits(), s.value.to_bits(), s.crossing_depth.to_bits()),
         )
     };
-    bits(a).cmp(&bits(b))
+    bits(a).cmp(&bits(b)).then_with(|| cloud.compare_gaussians(a, b))
 }
 
 #[cfg(test)]

@@ -1,7 +1,10 @@
 //! Clouds of splats: an f64 origin and f32 columns with the rendering-oriented attributes of Gunjee 2007, section 3.
 
-use crate::{Aabb, Error};
+mod checked;
+
+use crate::{Aabb, Error, Gaussians};
 use glam::{DVec3, Vec3};
+use std::sync::Arc;
 
 /// What a splat is optically.
 #[repr(u8)]
@@ -43,7 +46,8 @@ pub struct Splat {
     /// Unit normal that light is reflected about, or zero where that is `normal`: the interpolated one of a mesh whose
     /// triangles are coarser than the surface that they stand for.
     pub shading_normal: Vec3,
-    /// Semi-axis of the tangent disc along the first principal direction, or zero for a circular disc.
+    /// Semi-axis of the tangent disc along the first principal direction, or zero for a circular disc. Of a Gaussian the longest way from its
+    /// centre to where it is not seen any more.
     pub tangent: Vec3,
     /// Share of the shadow that this splat receives, in \[0, 1\]; the paper's shadow coefficient.
     pub shadow_coefficient: f32,
@@ -52,6 +56,8 @@ pub struct Splat {
     /// Optical depth of one crossing of the translucent surface that a disc is a piece of, ≥ 0; 0 where it is not known. The area
     /// that the disc stands for is `cross_section` over it. It tells the opacity of a layer where discs are blended before layers are.
     pub crossing_depth: f32,
+    /// Place in [`Cloud::gaussians`] of the Gaussian that it is seen as, or [`Gaussians::NONE`].
+    pub gaussian: u32,
 }
 
 impl Default for Splat {
@@ -71,13 +77,14 @@ impl Default for Splat {
             shadow_coefficient: 1.0,
             value: 0.0,
             crossing_depth: 0.0,
+            gaussian: Gaussians::NONE,
         }
     }
 }
 
 macro_rules! columns {
     (required: $($(#[$rm:meta])* $r:ident: $rt:ty,)* ; optional: $($(#[$om:meta])* $o:ident: $ot:ty = $od:expr,)*) => {
-        /// Splats as columns. The last six columns may be empty, which means their default for every splat.
+        /// Splats as columns. The last seven columns may be empty, which means their default for every splat.
         ///
         /// The id of a splat is its rank; [`Cloud::canonicalize`] makes that independent of the order of the input.
         ///
@@ -94,6 +101,8 @@ macro_rules! columns {
             pub origin: DVec3,
             $($(#[$rm])* pub $r: Vec<$rt>,)*
             $($(#[$om])* pub $o: Vec<$ot>,)*
+            /// Gaussians that splats are seen as.
+            pub gaussians: Arc<Gaussians>,
         }
 
         impl Cloud {
@@ -141,6 +150,7 @@ macro_rules! columns {
                     self.$o.extend_from_slice(&other.$o);
                     self.$o.resize(total, $od);
                 })*
+                self.append_gaussians(n, other);
             }
 
             /// The splats `ids`, in that order.
@@ -150,7 +160,8 @@ macro_rules! columns {
                     if column.is_empty() { return Vec::new(); }
                     ids.par_iter().with_min_len(8192).map(|&i| column[i as usize]).collect()
                 }
-                Cloud { origin: self.origin, $($r: pick(&self.$r, ids),)* $($o: pick(&self.$o, ids),)* }
+                let gaussians = Arc::clone(&self.gaussians);
+                Cloud { origin: self.origin, $($r: pick(&self.$r, ids),)* $($o: pick(&self.$o, ids),)* gaussians }
             }
 
             /// Bytes held by the columns.
@@ -158,7 +169,7 @@ macro_rules! columns {
                 let mut bytes = 0;
                 $(bytes += std::mem::size_of_val(self.$r.as_slice());)*
                 $(bytes += std::mem::size_of_val(self.$o.as_slice());)*
-                bytes as u64
+                bytes as u64 + self.gaussians.bytes()
             }
 
             fn check_lengths(&self) -> Result<(), Error> {
@@ -207,6 +218,8 @@ columns! {
     value: f32 = 0.0,
     /// Optical depths of one crossing, see [`Splat::crossing_depth`]; may be empty, which means that none is known.
     crossing_depth: f32 = 0.0,
+    /// Places in the table of Gaussians, see [`Splat::gaussian`]; may be empty, which means that no splat is one.
+    gaussian: u32 = Gaussians::NONE,
 }
 
 impl Cloud {
@@ -260,56 +273,6 @@ impl Cloud {
         self.radius.iter_mut().for_each(|r| *r *= length);
         self.tangent.iter_mut().for_each(|t| *t *= length);
         self.cross_section.iter_mut().for_each(|k| *k *= area);
-    }
-
-    /// Checks every promise that the stages rely on: equal column lengths, finite values, radii > 0, K ≥ 0, unit or
-    /// zero normals, coefficients in \[0, 1\].
-    ///
-    /// # Errors
-    /// [`Error::ColumnLength`], or [`Error::Invalid`] for the first splat that breaks a promise.
-    pub fn validate(&self) -> Result<(), Error> {
-        self.check_lengths()?;
-        let bad = |i, attribute, found: String, expected| {
-            Err(Error::Invalid { element: "splat", index: i, attribute, found, expected })
-        };
-        if !self.origin.is_finite() {
-            return Err(Error::invalid("cloud", 0, "origin", self.origin, "finite numbers"));
-        }
-        for i in 0..self.len() {
-            let s = self.get(i);
-            if !s.position.is_finite() {
-                return bad(i, "position", s.position.to_string(), "finite numbers");
-            }
-            if !(s.radius.is_finite() && s.radius > 0.0) {
-                return bad(i, "radius", s.radius.to_string(), "a finite number > 0");
-            }
-            if !(s.cross_section.is_finite() && s.cross_section >= 0.0) {
-                return bad(i, "cross_section", s.cross_section.to_string(), "a finite number ≥ 0");
-            }
-            if !s.color.iter().all(|c| c.is_finite() && *c >= 0.0) {
-                return bad(i, "color", format!("{:?}", s.color), "three finite numbers ≥ 0");
-            }
-            for (attribute, n) in [("normal", s.normal), ("shading_normal", s.shading_normal)] {
-                if !(n == Vec3::ZERO || (n.length_squared() - 1.0).abs() < 1e-3) {
-                    return bad(i, attribute, n.to_string(), "a unit vector, or zero for none");
-                }
-            }
-            if s.kind != SplatKind::Medium && s.normal == Vec3::ZERO {
-                return bad(i, "normal", s.normal.to_string(), "a unit vector, as for every surface splat");
-            }
-            if !s.tangent.is_finite() {
-                return bad(i, "tangent", s.tangent.to_string(), "finite numbers");
-            }
-            if !(0.0..=1.0).contains(&s.shadow_coefficient) {
-                return bad(i, "shadow_coefficient", s.shadow_coefficient.to_string(), "a number in [0, 1]");
-            }
-            if !(s.crossing_depth.is_finite() && s.crossing_depth >= 0.0) {
-                return bad(i, "crossing_depth", s.crossing_depth.to_string(), "a finite number ≥ 0");
-            }
-            if !s.value.is_finite() {
-                return bad(i, "value", s.value.to_string(), "a finite number");
-            }
-        }
-        Ok(())
+        self.scale_gaussians(length);
     }
 }

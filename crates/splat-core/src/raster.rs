@@ -1,7 +1,7 @@
 //! CPU rasterization of footprints: tiled, parallel, bit-identical for any thread count.
 //!
 //! 1. [`project`] turns all splats into image-space footprints: exact in perspective for media (the squared distance of a
-//!    ray from a centre is a quadratic form in the pixel offset over |d|²), an affine conic for tangent discs.
+//!    ray from a centre is a quadratic form in the pixel offset over |d|²), an affine conic for tangent discs and Gaussians.
 //! 2. [`resolve_opaque`] finds the nearest opaque surface of each pixel by ε-z and normalised weights Σwc/Σw.
 //! 3. [`fold`] composites translucent splats in a [`crate::SliceOrder`] in front of it.
 //! 4. [`finish`] adds the opaque surface and the background, and box-filters samples to pixels.
@@ -18,6 +18,7 @@ pub mod bins;
 mod cost;
 mod finish;
 mod gather;
+mod gaussian;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod kernel;

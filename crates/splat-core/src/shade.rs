@@ -132,7 +132,7 @@ impl<'a> LitSplat<'a> {
             radius,
             normal: facing(kind, own, cloud.shading_normal_of(i), to_eye),
             to_eye,
-            color: cloud.color[i],
+            color: cloud.color_along(i, -to_eye),
             material: &input.materials[cloud.material[i] as usize],
         };
         let receiver = Receiver { position, normal: own, radius, kind };

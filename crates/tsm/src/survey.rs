@@ -104,7 +104,9 @@ impl Block {
             }
         }
         if !cloud.tangent.is_empty() {
-            for (radius, tangent) in block.radius.iter_mut().zip(&cloud.tangent[splats]) {
+            // That of a medium is how far it is seen as a Gaussian; its shadow is that of a ball.
+            let splats = block.radius.iter_mut().zip(&block.kind).zip(&cloud.tangent[splats]);
+            for ((radius, _), tangent) in splats.filter(|((_, kind), _)| **kind != SplatKind::Medium as u8) {
                 *radius = radius.max(tangent.length());
             }
         }

@@ -22,6 +22,8 @@ pub(super) enum Format {
     Hdr,
     Exr,
     Png,
+    Splat,
+    Spz,
 }
 
 /// The format of a file by its first bytes, else by the extension of its name.
@@ -49,6 +51,9 @@ pub(super) fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
     }
     if content.starts_with(b"\x89PNG\r\n\x1a\n") {
         return Some(Format::Png);
+    }
+    if content.starts_with(b"NGSP") {
+        return Some(Format::Spz);
     }
     if content.starts_with(b"glTF") {
         return Some(Format::Gltf);
@@ -115,6 +120,8 @@ pub(super) fn by_name(path: &Path) -> Option<Format> {
         "vti" => Some(Format::Vti),
         "vtk" => Some(Format::Vtk),
         "raw" => Some(Format::Raw),
+        "splat" => Some(Format::Splat),
+        "spz" => Some(Format::Spz),
         _ => None,
     }
 }

@@ -1,4 +1,4 @@
-//! PLY: ascii and both binary byte orders → a mesh where there are faces, else raw points.
+//! PLY: ascii and both binary byte orders → a mesh where there are faces, else raw points; Gaussians where vertices are such.
 //!
 //! The parser is our own: places down to line and column or byte, line ends of every system, duplicate properties and
 //! sizes checked against the file before allocation are asked of it. Properties it has no use for are read over and named.
@@ -9,6 +9,7 @@ mod binary;
 mod body;
 mod columns;
 mod faces;
+mod gaussians;
 mod header;
 
 use super::reading::Reading;
@@ -16,17 +17,25 @@ use super::{Loaded, ReadParams};
 use crate::error::ReadError;
 use ascii::Ascii;
 use binary::Binary;
+use body::Source;
 use header::{Encoding, Header};
 
 /// Reads a PLY file.
 pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
     let header = header::parse(content)?;
-    let loaded = match header.encoding {
-        Encoding::Ascii => body::read(Ascii::new(content, header.body, header.body_line), &header, reading)?,
-        Encoding::LittleEndian => body::read(Binary::<false>::new(content, header.body), &header, reading)?,
-        Encoding::BigEndian => body::read(Binary::<true>::new(content, header.body), &header, reading)?,
-    };
-    reading.notes.not_used(unused(&header, reading.params)?.iter().map(Vec::as_slice));
+    match header.encoding {
+        Encoding::Ascii => elements(Ascii::new(content, header.body, header.body_line), &header, reading),
+        Encoding::LittleEndian => elements(Binary::<false>::new(content, header.body), &header, reading),
+        Encoding::BigEndian => elements(Binary::<true>::new(content, header.body), &header, reading),
+    }
+}
+
+fn elements<S: Source>(source: S, header: &Header, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+    if let Some(kind) = header.gaussians() {
+        return gaussians::read(source, header, kind, reading).map(Loaded::Points);
+    }
+    let loaded = body::read(source, header, reading)?;
+    reading.notes.not_used(unused(header, reading.params)?.iter().map(Vec::as_slice));
     Ok(loaded)
 }
 

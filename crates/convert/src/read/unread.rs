@@ -20,14 +20,14 @@ const TO_STL: &str = "save its surface as PLY, STL or OBJ, such as with ParaView
 const EXTRACT: &str = "extract the files in it; one file inside gzip is read as it is";
 const IMAGE: &str =
     "an environment is read from Radiance HDR or OpenEXR, a light's texture from PNG too; convert the image";
-const SPLATS: &str = "3D Gaussian splats are not read: use a mesh or a point cloud of the same scene";
+const SPLATS: &str = "save it as PLY, compressed PLY, .splat or SPZ, such as with SuperSplat";
 const SCENE: &str = "it is a scene, not data: give it to `organza render`";
 
 const fn by_extension(name: &'static str, extensions: &'static [&'static str], hint: &'static str) -> Unread {
     Unread { name, marks: &[], extensions, hint }
 }
 
-const UNREAD: [Unread; 45] = [
+const UNREAD: [Unread; 44] = [
     Unread { name: "FBX", marks: &[(0, b"Kaydara FBX Binary"), (0, b"; FBX ")], extensions: &["fbx"], hint: TO_GLTF },
     Unread {
         name: "USD",
@@ -62,8 +62,7 @@ const UNREAD: [Unread; 45] = [
     by_extension("PTX", &["ptx"], TO_PLY),
     by_extension("ReCap", &["rcp", "rcs"], TO_PLY),
     by_extension("captured packets", &["pcap"], TO_PLY),
-    Unread { name: "3D Gaussian splats (SPZ)", marks: &[(0, b"NGSP")], extensions: &["spz"], hint: SPLATS },
-    by_extension("3D Gaussian splats", &["splat", "ksplat", "sog"], SPLATS),
+    by_extension("a web kind of 3D Gaussian splats", &["ksplat", "sog"], SPLATS),
     Unread { name: "OpenVDB", marks: &[(0, b" BDV\0\0\0\0")], extensions: &["vdb"], hint: TO_NRRD },
     Unread { name: "NanoVDB", marks: &[(0, b"NanoVDB")], extensions: &["nvdb"], hint: TO_NRRD },
     Unread {
@@ -90,7 +89,7 @@ const UNREAD: [Unread; 45] = [
     by_extension("a scene", &["toml", "json"], SCENE),
 ];
 
-const READ: &str = "PLY, STL, OBJ, OFF, glTF, GLB, PCD, XYZ, CSV, LAS, LAZ, NIfTI, NRRD, MetaImage, VTK images, raw voxels, \
+const READ: &str = "PLY, .splat, SPZ, STL, OBJ, OFF, glTF, GLB, PCD, XYZ, CSV, LAS, LAZ, NIfTI, NRRD, MetaImage, VTK images, raw voxels, \
     Radiance HDR, OpenEXR and PNG files are read, each also inside gzip";
 
 fn error(unread: &Unread) -> ReadError {

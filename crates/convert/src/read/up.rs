@@ -18,6 +18,8 @@ pub enum UpAxis {
     Y,
     /// Elevation in LAS and LAZ; superior in NIfTI, in MetaImage and in an NRRD whose `space` is one of a body.
     Z,
+    /// The other way: 3D Gaussians of PLY and `.splat`, whose y points down as in the cameras that they were trained for.
+    MinusY,
 }
 
 impl UpAxis {
@@ -34,6 +36,7 @@ impl UpAxis {
         match self {
             Self::Y => "y",
             Self::Z => "z",
+            Self::MinusY => "-y",
         }
     }
 }
@@ -64,8 +67,18 @@ fn of_content(path: &Path, content: &[u8]) -> UpAxis {
     match format_of(path, content) {
         Some(Format::Las | Format::Nifti | Format::MetaImage) => UpAxis::Z,
         Some(Format::Nrrd) if is_of_a_body(content) => UpAxis::Z,
+        Some(Format::Splat) => UpAxis::MinusY,
+        Some(Format::Ply) if has_gaussians(content) => UpAxis::MinusY,
         _ => UpAxis::Y,
     }
+}
+
+/// Whether a PLY header has a property that only Gaussians have.
+fn has_gaussians(content: &[u8]) -> bool {
+    let lines = content.split(|b| *b == b'\n').map(<[u8]>::trim_ascii);
+    let mut header = lines.take_while(|line| *line != b"end_header");
+    header
+        .any(|line| line.starts_with(b"property") && (line.ends_with(b" rot_0") || line.ends_with(b" packed_rotation")))
 }
 
 /// Whether an NRRD header names an anatomical space: the third axis of each leads to the head.
@@ -97,6 +110,12 @@ mod tests {
         assert_eq!(of("a", b"ObjectType = Image\nNDims = 3\n"), UpAxis::Z);
         assert_eq!(of("a.vti", b"<VTKFile type=\"ImageData\">"), UpAxis::Y);
         assert_eq!(of("a.raw", b"LASF"), UpAxis::Y);
+        assert_eq!(of("a.splat", &[0; 32]), UpAxis::MinusY);
+        assert_eq!(of("a.spz", b"NGSP"), UpAxis::Y);
+        for name in ["float rot_0", "uint packed_rotation"] {
+            let header = format!("ply\r\nelement vertex 1\r\nproperty {name}\r\nend_header\r\n");
+            assert_eq!(of("a.ply", header.as_bytes()), UpAxis::MinusY, "{name}");
+        }
         assert_eq!(of("a.nrrd", b"NRRD0004\ntype: float\n\nspace: RAS\n"), UpAxis::Y);
         for (space, up) in [
             ("RAS", UpAxis::Z),

@@ -1,6 +1,7 @@
 //! Small valid files of every format, made in memory.
 #![allow(dead_code, reason = "each test file uses some of them")]
 
+pub(crate) mod gaussians;
 #[cfg(all(feature = "hdr", feature = "exr", feature = "png"))]
 pub(crate) mod images;
 #[cfg(all(feature = "off", feature = "pcd", feature = "gltf"))]

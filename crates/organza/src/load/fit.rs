@@ -30,11 +30,8 @@ pub fn fitted<'s>(
     let found = fit.camera(&scene.camera, &|add| outlines.iter().for_each(|outline| outline.each(add)));
     let Some(found) = found else {
         let message = "`camera`: there is nothing to see for a camera that is placed by itself";
-        return Err(Error::input(
-            crate::printable(&scene.file),
-            message,
-            "add a visible object, or give the camera a position",
-        ));
+        let hint = "add a visible object, or give the camera a position";
+        return Err(Error::input(crate::printable(&scene.file), message, hint));
     };
     let scene = Scene { camera: found.camera, target: found.target, fit: None, ..scene.clone() };
     Ok((Cow::Owned(scene), Some(found)))
@@ -51,7 +48,8 @@ impl<'i> Outline<'i> {
     fn of(input: &'i Input<'i>) -> Self {
         let corners = |bounds: DAabb| bounds.corners().to_vec();
         let points = match input {
-            Input::Mesh(..) | Input::Points(..) => Vec::new(),
+            Input::Mesh(..) => Vec::new(),
+            Input::Points(_, points, _) => points.bulk().map_or_else(Vec::new, corners),
             Input::Volume(grid, transfer, params) => visible_ends(grid, transfer, FAINT, &params.clip),
             Input::Surface(_, bounds, ..) | Input::Density(_, bounds, _) => corners(*bounds),
             Input::Procedural(shape, ..) => {
@@ -72,7 +70,7 @@ impl<'i> Outline<'i> {
                 let corners = mesh.triangles.iter().flatten();
                 corners.for_each(|v| add(transform.apply(mesh.origin + mesh.position[*v as usize].as_dvec3())));
             }
-            Input::Points(_, points, _) => {
+            Input::Points(_, points, _) if self.points.is_empty() => {
                 let mut around = |p: DVec3| add(transform.apply(p));
                 let reach = points.sparse_reach();
                 for p in &points.position {

@@ -106,6 +106,7 @@ impl Input<'_> {
     /// What it is made of, as far as the data and its field tell.
     pub(super) fn data(&self, bounded: bool, looseness: f64, by: SurfaceSampler) -> ObjectData {
         match self {
+            Self::Points(_, points, _) if !points.gaussians.is_empty() => ObjectData::Gaussians,
             Self::Points(..) => ObjectData::Points,
             Self::Mesh(..) | Self::Rectangle(..) => ObjectData::Triangles,
             Self::Surface(.., lattice) => ObjectData::Surface { looseness, trilinear: lattice.is_some(), by },

@@ -61,15 +61,13 @@ pub(super) fn prepare<'a>(
         Input::Surface(field, bounds, ..) if sampled => Some(ZeroSearch::new(field, *bounds)),
         _ => None,
     };
-    match predict(&input) {
-        Ok(prediction) => Ok(Prepared { input, prediction, as_it_is, too_many: None, bounded, search }),
-        Err(ConvertError::Limit(exceeded)) => {
-            let prediction = Prediction { splats: exceeded.needed, ..Prediction::default() };
-            let too_many = Some(ConvertError::Limit(exceeded));
-            Ok(Prepared { input, prediction, as_it_is, too_many, bounded, search })
+    let (prediction, too_many) = match predict(&input) {
+        Err(ConvertError::Limit(e)) => {
+            (Prediction { splats: e.needed, ..Prediction::default() }, Some(ConvertError::Limit(e)))
         }
-        Err(e) => Err(e.into()),
-    }
+        prediction => (prediction?, None),
+    };
+    Ok(Prepared { input, prediction, as_it_is, too_many, bounded, search })
 }
 
 /// Refuses an expression that would be worked at for many minutes before anything is drawn.
@@ -149,32 +147,28 @@ pub(super) fn convert(
     if let Some(too_many) = &prepared.too_many {
         return Err(too_many.clone().into());
     }
-    let progress = context.progress;
+    let (progress, splat) = (context.progress, context.limited(prepared.input.splat()));
     let cloud = match &prepared.input {
         Input::Mesh(name, mesh, params) => {
-            let params = MeshParams { splat: context.limited(&params.splat), ..params.clone() };
-            mesh_splats(name, mesh, &params, context, warnings)
+            mesh_splats(name, mesh, &MeshParams { splat, ..params.clone() }, context, warnings)
         }
         Input::Points(path, points, params) => {
-            let params = SurfelParams { splat: context.limited(&params.splat), ..params.clone() };
-            surfels(path, points, &params, context, warnings)
+            surfels(path, points, &SurfelParams { splat, ..params.clone() }, context, warnings)
         }
         Input::Volume(grid, transfer, params) => {
-            let params = VolumeParams { splat: context.limited(&params.splat), ..params.clone() };
+            let params = VolumeParams { splat, ..params.clone() };
             convert::volume_to_points(grid, transfer, &params, Some(progress)).map(|c| c.0)
         }
         Input::Surface(field, bounds, params, _) => {
-            let params = MeshParams { splat: context.limited(&params.splat), ..params.clone() };
+            let params = MeshParams { splat, ..params.clone() };
             convert::surface_to_points(field.as_ref(), *bounds, &params, Some(progress)).map(|c| c.0)
         }
         Input::Density(field, bounds, params) => {
-            let splat = context.limited(&params.volume.splat);
-            let volume = VolumeParams { splat, ..params.volume.clone() };
-            let params = DensityParams { volume, ..params.clone() };
+            let params = DensityParams { volume: VolumeParams { splat, ..params.volume.clone() }, ..params.clone() };
             convert::density_to_points(field.as_ref(), *bounds, &params, Some(progress)).map(|c| c.0)
         }
         Input::Procedural(shape, spacing, params) => {
-            let params = VolumeParams { splat: context.limited(&params.splat), ..params.clone() };
+            let params = VolumeParams { splat, ..params.clone() };
             let convert = |grid: &Grid, transfer: &TransferFunction| {
                 convert::volume_to_points(grid, transfer, &params, Some(progress)).map(|c| c.0)
             };
@@ -183,8 +177,8 @@ pub(super) fn convert(
                 _ => procedural(shape, *spacing, &params.splat, context).and_then(|(grid, tf)| convert(&grid, &tf)),
             }
         }
-        Input::Medium(medium, params) => convert::medium(medium, &context.limited(params)),
-        Input::Rectangle(r, opacity, params) => convert::rectangle(r, *opacity, &context.limited(params)),
+        Input::Medium(medium, _) => convert::medium(medium, &splat),
+        Input::Rectangle(r, opacity, _) => convert::rectangle(r, *opacity, &splat),
     };
     Ok(cloud?)
 }
@@ -212,8 +206,7 @@ fn surfels(
     warnings: &mut Vec<String>,
 ) -> Result<Cloud, ConvertError> {
     let (cloud, report) = convert::raw_to_surfels(points, params, Some(context.progress))?;
-    if report.duplicates > 0 && !params.merge_duplicates {
-        let n = report.duplicates;
+    if let (n @ 1.., false) = (report.duplicates, params.merge_duplicates) {
         warnings
             .push(format!("{}: {n} points lie where another one lies (--merge-duplicates)", crate::printable(path)));
     }

@@ -103,7 +103,7 @@ impl Pixel {
     fn add(&mut self, input: &Input<'_>, fragment: &Fragment, narrowing: &[[f32; 2]]) {
         let (cloud, i, planes) = (input.cloud, fragment.splat as usize, self.sum.planes());
         let extinction = input.materials[cloud.material[i] as usize].extinction_rgb;
-        let is_medium = cloud.kind[i] == SplatKind::Medium;
+        let is_medium = cloud.kind[i] == SplatKind::Medium && cloud.gaussian_of(i).is_none();
         let id = cloud.footprint[i] as usize;
         let thickness = || input.footprints.layers()[id].spacing_for_radius(cloud.radius[i]);
         let narrow = || narrowing[id][0] + narrowing[id][1] * fragment.distance_sq as f32;

@@ -30,7 +30,7 @@ pub(crate) fn form(object: &ObjectStatistics) -> (Form, &'static str) {
     match object.data {
         ObjectData::Volume => (Form::Cells, "sheets classify what they reconstruct"),
         ObjectData::Density { .. } => (Form::Cells, "sheets reconstruct it from a lattice"),
-        ObjectData::Points | ObjectData::Triangles | ObjectData::Surface { .. } => {
+        ObjectData::Points | ObjectData::Gaussians | ObjectData::Triangles | ObjectData::Surface { .. } => {
             (Form::Splats, "a surface is splatted into the slabs that it lies in")
         }
     }

@@ -10,6 +10,8 @@
 //! where the ray meets its plane at a positive depth ([`NearDisc`]). The form of a medium holds for centres behind the eye
 //! too, and loses its digits only where z is much smaller than the splat: such centres are seen from R/32 away.
 //!
+//! **Gaussian.** See `gaussian.rs`, which writes over the ball that stands for it.
+//!
 //! **Disc.** The tangent disc is projected by its Jacobian at the centre (Zwicker's EWA): conic = (J Jᵀ + filter)⁻¹, and
 //! the diagonal of J Jᵀ + filter is the square of the half extents.
 
@@ -110,16 +112,16 @@ pub fn project_into(out: &mut Projected, input: &ProjectInput<'_>) {
 }
 
 /// What all splats of a projection share.
-struct Projector<'a> {
-    columns: Columns<'a>,
-    view: ViewTransform,
-    focal: f32,
-    half: Vec2,
+pub(super) struct Projector<'a> {
+    pub(super) columns: Columns<'a>,
+    pub(super) view: ViewTransform,
+    pub(super) focal: f32,
+    pub(super) half: Vec2,
     /// Half the image over the focal length: |x/z| and |y/z| of its borders.
-    reach: Vec2,
-    orthographic: bool,
-    size: [u32; 2],
-    filter_sigma_px: f32,
+    pub(super) reach: Vec2,
+    pub(super) orthographic: bool,
+    pub(super) size: [u32; 2],
+    pub(super) filter_sigma_px: f32,
 }
 
 /// One chunk's work, in the form that [`pulp`] compiles once per instruction set.
@@ -162,6 +164,11 @@ impl pulp::WithSimd for ProjectChunk<'_> {
             }
             if !self.depths.is_empty() {
                 image.write_depths(&attributes, &mut self.depths[begin..end]);
+            }
+            if !projector.columns.cloud.gaussian.is_empty() {
+                let footprints = (&mut self.splats[begin..end], &mut self.coverage[begin..end]);
+                let depths = self.depths.get_mut(begin..end).unwrap_or_default();
+                projector.write_gaussians(self.first + begin, footprints, depths);
             }
         }
         near

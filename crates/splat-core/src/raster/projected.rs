@@ -12,12 +12,14 @@ use rayon::prelude::*;
 pub struct ProjectedSplat {
     /// Image position of the centre, pixels.
     pub center_px: [f32; 2],
-    /// s = a·dx² + b·dx·dy + c·dy² in 1/pixel², s < 1 inside; for a medium in perspective times the pixel's 1/|d|².
+    /// s = a·dx² + b·dx·dy + c·dy² in 1/pixel², s < 1 inside; for a medium in perspective times the pixel's 1/|d|². Of a Gaussian half the
+    /// square of the distance in standard deviations.
     pub conic: [f32; 3],
-    /// Optical depth where the profile is 1: K·norm/R². For an opaque splat the weight there, area·norm/R².
+    /// Optical depth where the profile is 1: K·norm/R². For an opaque splat the weight there, area·norm/R²; of a Gaussian the opacity of its
+    /// centre.
     pub peak: f32,
     /// Half the extent in x and y, pixels: the upper halves of f32s, rounded up. The sign of the first marks a disc that
-    /// reaches through the eye plane.
+    /// reaches through the eye plane, that of the second a Gaussian.
     pub(crate) half_extent: [u16; 2],
     /// Material id.
     pub material: u16,
@@ -33,11 +35,12 @@ pub struct ProjectedDepth {
     /// View depth of the centre.
     pub center: f32,
     /// Change per pixel across a disc. Of a medium, one over half the width of its share before a plane, and one over the share that lies
-    /// before the eye.
+    /// before the eye; of a Gaussian the change of the depth where it lies on average.
     pub slope: [f32; 2],
     /// Largest distance in depth between a fragment and the centre: R.
     pub extent: f32,
-    /// The conic of a disc without the image's filter, which tells where an opaque one is solid.
+    /// The conic of a disc without the image's filter, which tells where an opaque one is solid. The first number of a Gaussian's is one over
+    /// half the width of its share before a plane.
     pub core: [f32; 3],
 }
 
@@ -185,7 +188,19 @@ impl ProjectedSplat {
         self.half_extent[0] |= 0x8000;
     }
 
-    /// Whether it is one.
+    /// Marks a Gaussian.
+    #[inline(always)]
+    pub(crate) fn set_gaussian(&mut self) {
+        self.half_extent[1] |= 0x8000;
+    }
+
+    /// Whether it is a Gaussian, whose opacity has the shape of one.
+    #[inline(always)]
+    pub fn is_gaussian(&self) -> bool {
+        self.half_extent[1] & 0x8000 != 0
+    }
+
+    /// Whether it is a disc that reaches through the eye plane.
     #[inline(always)]
     pub(crate) fn is_near(&self) -> bool {
         self.half_extent[0] & 0x8000 != 0

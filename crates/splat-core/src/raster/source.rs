@@ -1,5 +1,6 @@
 //! One splat as the rays of a tile meet it: the optical depth and the view depth of each fragment.
 
+use super::gaussian;
 use super::kernel::Kernel;
 use super::lanes::Lanes;
 use super::projected::{NearDisc, Projected, ProjectedDepth, ProjectedSplat};
@@ -69,6 +70,7 @@ impl<'a> Source<'a> {
     #[inline(always)]
     pub fn optical_depth<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays) -> Lanes<S> {
         match self.near {
+            None if self.splat.is_gaussian() => self.of_gaussian(simd, run, rays),
             None => self.before_the_eye(simd, run, rays),
             Some(near) => self.through_the_eye(simd, run, rays, near),
         }
@@ -100,6 +102,16 @@ impl<'a> Source<'a> {
     }
 
     #[inline(always)]
+    fn of_gaussian<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays) -> Lanes<S> {
+        let tau = gaussian::optical_depth(simd, self.splat.peak, run.distance_sq(simd, self.splat));
+        if rays.opaque.is_empty() {
+            return tau;
+        }
+        let before = Lanes::load(simd, &rays.opaque[run.pixel()..]) - run.depth(simd, &self.depth);
+        tau * self.kernel.share_before(simd, before * Lanes::splat(simd, self.depth.core[0]))
+    }
+
+    #[inline(always)]
     fn through_the_eye<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays, near: &NearDisc) -> Lanes<S> {
         let of = |v: f32| Lanes::splat(simd, v);
         let [s, depth] = run.meet(simd, self.splat, near, rays.is_perspective);
@@ -127,9 +139,13 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// How thick it is along a ray: a medium's cell, 0 for a surface. Defined where the projection was made with depths.
+    /// How thick it is along a ray: a medium's cell, 0 for a surface and a Gaussian. Defined where the projection was made with depths.
     #[inline(always)]
     pub fn thickness(&self) -> f32 {
-        if self.splat.kind == SplatKind::Medium { self.depth.extent * self.kernel.spacing } else { 0.0 }
+        if self.splat.kind == SplatKind::Medium && !self.splat.is_gaussian() {
+            self.depth.extent * self.kernel.spacing
+        } else {
+            0.0
+        }
     }
 }

@@ -189,8 +189,8 @@ impl FoldTile<'_> {
                         source,
                         object: if deep { projected.object(j as usize) } else { u32::MAX },
                         extinction,
-                        // A slab across the eye plane is met at many angles.
-                        thin: splat.peak * most <= SMALL && !splat.is_near(),
+                        // A slab across the eye plane is met at many angles, and the peak of a Gaussian is no optical depth.
+                        thin: splat.peak * most <= SMALL && !splat.is_near() && !splat.is_gaussian(),
                         value: &values[k * channels..][..channels],
                     };
                     self.tile.splat::<S, FRONT, HALF, PLANES, CHANNELS>(simd, &splat);
@@ -345,7 +345,7 @@ impl Tile {
         let line = run.block * (2 * PLANES + self.channels) + PLANES / 2;
         let thickness = source.thickness();
         let mut narrow = [1.0; MAX_LANES];
-        if source.splat.kind == SplatKind::Medium && !self.depth.is_empty() {
+        if source.splat.kind == SplatKind::Medium && !source.splat.is_gaussian() && !self.depth.is_empty() {
             let s = run.distance_sq(simd, source.splat) * self.rays.factors(simd, run);
             let [constant, slope] = source.kernel.narrowing;
             let [constant, slope] = [Lanes::splat(simd, constant), Lanes::splat(simd, slope)];

@@ -106,6 +106,9 @@ pub fn record(capacities: Capacities) -> Recorded {
 
 /// Why the processor shades this better, if it does.
 pub fn suits(input: &ShadeInput<'_>) -> Result<(), &'static str> {
+    if !input.cloud.gaussians.is_empty() {
+        return Err("3D Gaussians are projected and shaded by the processor");
+    }
     let sharp = |m: &Material| m.specular > 0.0 && m.shininess > MOST_SHININESS && m.shading == Shading::Phong;
     if input.materials.iter().any(sharp) {
         return Err("highlights of an exponent above 64 are shaded by the processor");

@@ -61,7 +61,7 @@ pub(super) fn look(record: u64, reading: &Reading<'_>) -> Result<(), ReadError> 
 }
 
 /// Refuses a count that the rest of the file cannot hold.
-fn check_count<S: Source>(source: &S, element: &Element) -> Result<(), ReadError> {
+pub(super) fn check_count<S: Source>(source: &S, element: &Element) -> Result<(), ReadError> {
     let least = |p: &Property| match p.shape {
         Shape::Scalar(kind) | Shape::List { count: kind, .. } => source.least_bytes(kind),
     };
@@ -127,7 +127,11 @@ pub(super) fn skip_list<S: Source>(source: &mut S, count: Type, item: Type) -> R
     Ok(())
 }
 
-fn skip_element<S: Source>(source: &mut S, element: &Element, reading: &Reading<'_>) -> Result<(), ReadError> {
+pub(super) fn skip_element<S: Source>(
+    source: &mut S,
+    element: &Element,
+    reading: &Reading<'_>,
+) -> Result<(), ReadError> {
     if element.properties.is_empty() {
         return Ok(());
     }

@@ -102,9 +102,14 @@ pub(super) struct Header {
     pub(super) body_line: u64,
 }
 
-/// Properties by which files of 3D Gaussian splats are told: colour as spherical harmonics, log scale, rotation, logit of
-/// the opacity.
-const OF_SPLATS: [&[u8]; 4] = [b"f_dc_0", b"scale_0", b"rot_0", b"opacity"];
+/// How a file of 3D Gaussian splats is told, and how it has them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum GaussianKind {
+    /// Numbers as they are trained: colour as spherical harmonics, log scale, rotation, logit of the opacity.
+    Trained,
+    /// Words, between the bounds of chunks.
+    Packed,
+}
 
 impl Header {
     /// Whether there are faces: else vertices are points.
@@ -112,18 +117,14 @@ impl Header {
         self.elements.iter().any(|e| matches!(e.name.as_slice(), b"face" | b"tristrips") && e.count > 0)
     }
 
-    /// Refuses 3D Gaussian splats: without what makes them one, they would be drawn as white points.
-    fn refuse_splats(&self) -> Result<(), ReadError> {
-        let has = |e: &Element, name: &[u8]| e.properties.iter().any(|p| p.name == name);
-        match self.elements.iter().find(|e| OF_SPLATS.iter().all(|name| has(e, name))) {
-            None => Ok(()),
-            Some(splats) => Err(ReadError::input(
-                at_line(splats.line),
-                "a mesh or points",
-                "a 3D Gaussian splat file (f_dc_0, scale_0, rot_0, opacity); not read yet",
-                "export the scene as a mesh or as points with colours",
-            )),
+    /// How its vertices are Gaussians, if they are.
+    pub(super) fn gaussians(&self) -> Option<GaussianKind> {
+        let vertex = self.elements.iter().find(|e| e.name == b"vertex")?;
+        let has = |names: &[&[u8]]| names.iter().all(|name| vertex.properties.iter().any(|p| p.name == *name));
+        if has(&[b"f_dc_0", b"scale_0", b"rot_0", b"opacity"]) {
+            return Some(GaussianKind::Trained);
         }
+        has(&[b"packed_position", b"packed_rotation", b"packed_scale", b"packed_color"]).then_some(GaussianKind::Packed)
     }
 }
 
@@ -174,9 +175,7 @@ pub(super) fn parse(content: &[u8]) -> Result<Header, ReadError> {
         }
     }
     let encoding = encoding.ok_or_else(|| wrong(lines.line, "a format line before end_header", b"none"))?;
-    let header = Header { encoding, elements, body: lines.at, body_line: lines.line + 1 };
-    header.refuse_splats()?;
-    Ok(header)
+    Ok(Header { encoding, elements, body: lines.at, body_line: lines.line + 1 })
 }
 
 fn format<'a>(words: &mut impl Iterator<Item = &'a [u8]>, line: u64, text: &[u8]) -> Result<Encoding, ReadError> {

@@ -1,0 +1,180 @@
+//! Small files of 3D Gaussians of every kind, written from the same numbers.
+
+use std::f64::consts::SQRT_2;
+
+/// The constant of the harmonic of degree 0.
+pub(crate) const CONSTANT: f64 = 0.282_094_791_773_878_14;
+
+/// One Gaussian as its trainer has it.
+#[derive(Debug, Clone)]
+pub(crate) struct Trained {
+    pub(crate) position: [f64; 3],
+    /// Natural logarithms of deviations.
+    pub(crate) scale: [f64; 3],
+    /// Unit quaternion, w first, w ≥ 0.
+    pub(crate) rotation: [f64; 4],
+    pub(crate) opacity: f64,
+    /// The constant first.
+    pub(crate) harmonics: Vec<[f64; 3]>,
+}
+
+/// Gaussian `i` of a degree; numbers that look like chance.
+pub(crate) fn trained(i: usize, degree: usize) -> Trained {
+    let number = |k: usize| ((i * 7919 + k * 104_729) % 1009) as f64 / 1009.0;
+    let raw = [1.0, 2.0, 3.0, 4.0].map(|k| number(k as usize + 20) - 0.5);
+    let length = raw.iter().map(|v| v * v).sum::<f64>().sqrt() * if raw[0] < 0.0 { -1.0 } else { 1.0 };
+    Trained {
+        position: [0, 1, 2].map(|k| 8.0 * number(k) - 4.0),
+        scale: [3, 4, 5].map(|k| -4.0 + 3.0 * number(k)),
+        rotation: raw.map(|v| v / length),
+        opacity: 0.1 + 0.8 * number(6),
+        harmonics: (0..(degree + 1).pow(2)).map(|k| [30, 31, 32].map(|c| number(c + 3 * k) - 0.5)).collect(),
+    }
+}
+
+/// Properties of a trained file.
+fn names(degree: usize) -> Vec<String> {
+    let rest = 3 * ((degree + 1).pow(2) - 1);
+    let fixed = "x y z nx ny nz f_dc_0 f_dc_1 f_dc_2".split(' ').map(str::to_owned);
+    let last = "opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3".split(' ').map(str::to_owned);
+    fixed.chain((0..rest).map(|k| format!("f_rest_{k}"))).chain(last).collect()
+}
+
+fn numbers(t: &Trained) -> Vec<f64> {
+    let logit = (t.opacity / (1.0 - t.opacity)).ln();
+    let rest = (0..3).flat_map(|c| t.harmonics[1..].iter().map(move |h| h[c]));
+    let mut all = [&t.position[..], &[0.0; 3], &t.harmonics[0]].concat();
+    all.extend(rest);
+    all.push(logit);
+    all.extend(t.scale.iter().chain(&t.rotation));
+    all
+}
+
+/// As the trainer writes it: `encoding` is `ascii` or `binary_little_endian`.
+pub(crate) fn trained_ply(all: &[Trained], degree: usize, encoding: &str) -> Vec<u8> {
+    let mut text = format!("ply\nformat {encoding} 1.0\nelement vertex {}\n", all.len());
+    names(degree).iter().for_each(|name| text += &format!("property float {name}\n"));
+    let mut out = (text + "end_header\n").into_bytes();
+    for t in all {
+        let numbers = numbers(t);
+        if encoding == "ascii" {
+            let line: Vec<String> = numbers.iter().map(|v| (*v as f32).to_string()).collect();
+            out.extend((line.join(" ") + "\n").into_bytes());
+        } else {
+            numbers.iter().for_each(|v| out.extend((*v as f32).to_le_bytes()));
+        }
+    }
+    out
+}
+
+fn whole(share: f64, bits: u32) -> u32 {
+    let most = f64::from((1u32 << bits) - 1);
+    (share * most).round().clamp(0.0, most) as u32
+}
+
+fn range(all: &[Trained], of: impl Fn(&Trained) -> [f64; 3]) -> [[f64; 3]; 2] {
+    all.iter().map(of).fold([[f64::MAX; 3], [f64::MIN; 3]], |[low, high], v| {
+        [[0, 1, 2].map(|k| low[k].min(v[k])), [0, 1, 2].map(|k| high[k].max(v[k]))]
+    })
+}
+
+fn shares(v: [f64; 3], [low, high]: [[f64; 3]; 2]) -> [f64; 3] {
+    [0, 1, 2].map(|k| if high[k] > low[k] { (v[k] - low[k]) / (high[k] - low[k]) } else { 0.0 })
+}
+
+fn triple(v: [f64; 3]) -> u32 {
+    whole(v[0], 11) << 21 | whole(v[1], 10) << 11 | whole(v[2], 11)
+}
+
+fn largest(rotation: &[f64; 4]) -> usize {
+    (0..4).max_by(|a, b| rotation[*a].abs().total_cmp(&rotation[*b].abs())).unwrap()
+}
+
+/// As PlayCanvas packs it, with bounds of colours and an element of other coefficients where the degree has some.
+pub(crate) fn packed_ply(all: &[Trained], degree: usize) -> Vec<u8> {
+    let bounds = ["x", "y", "z", "scale_x", "scale_y", "scale_z", "r", "g", "b"];
+    let chunk = bounds.chunks(3).flat_map(|axes| ["min", "max"].map(|end| (end, axes)));
+    let chunk: Vec<String> = chunk.flat_map(|(end, axes)| axes.iter().map(move |a| format!("{end}_{a}"))).collect();
+    let mut text = format!("ply\nformat binary_little_endian 1.0\nelement chunk {}\n", all.len().div_ceil(256));
+    chunk.iter().for_each(|name| text += &format!("property float {name}\n"));
+    text += &format!("element vertex {}\n", all.len());
+    ["position", "rotation", "scale", "color"].iter().for_each(|n| text += &format!("property uint packed_{n}\n"));
+    let rest = 3 * ((degree + 1).pow(2) - 1);
+    if rest > 0 {
+        text += &format!("element sh {}\n", all.len());
+        (0..rest).for_each(|k| text += &format!("property uchar f_rest_{k}\n"));
+    }
+    let mut out = (text + "end_header\n").into_bytes();
+    let color = |t: &Trained| t.harmonics[0].map(|c| 0.5 + CONSTANT * c);
+    let ranges = |part: &[Trained]| [range(part, |t| t.position), range(part, |t| t.scale), range(part, color)];
+    for part in all.chunks(256) {
+        for v in ranges(part).as_flattened().as_flattened() {
+            out.extend((*v as f32).to_le_bytes());
+        }
+    }
+    for part in all.chunks(256) {
+        let [place, scale, colors] = ranges(part);
+        for t in part {
+            let k = largest(&t.rotation);
+            let sign = t.rotation[k].signum();
+            let turn = (0..4)
+                .filter(|j| *j != k)
+                .fold(k as u32, |word, j| word << 10 | whole(t.rotation[j] * sign / SQRT_2 + 0.5, 10));
+            let [r, g, b] = shares(color(t), colors).map(|c| whole(c, 8));
+            let color = r << 24 | g << 16 | b << 8 | whole(t.opacity, 8);
+            let words = [triple(shares(t.position, place)), turn, triple(shares(t.scale, scale)), color];
+            words.iter().for_each(|word| out.extend(word.to_le_bytes()));
+        }
+    }
+    for t in all {
+        let rest = (0..3).flat_map(|c| t.harmonics[1..].iter().map(move |h| h[c]));
+        out.extend(rest.map(|v| ((v / 8.0 + 0.5) * 256.0).floor().clamp(0.0, 255.0) as u8));
+    }
+    out
+}
+
+fn byte(v: f64) -> u8 {
+    v.round().clamp(0.0, 255.0) as u8
+}
+
+/// `.splat`, which keeps the constant alone.
+pub(crate) fn splat(all: &[Trained]) -> Vec<u8> {
+    let mut out = Vec::new();
+    for t in all {
+        t.position.iter().copied().chain(t.scale.map(f64::exp)).for_each(|v| out.extend((v as f32).to_le_bytes()));
+        out.extend(t.harmonics[0].map(|c| byte(255.0 * (0.5 + CONSTANT * c))));
+        out.push(byte(255.0 * t.opacity));
+        out.extend(t.rotation.map(|v| byte(128.0 * v + 128.0)));
+    }
+    out
+}
+
+/// SPZ of version 2 or 3 before gzip, with 12 bits behind the point.
+pub(crate) fn spz(all: &[Trained], degree: usize, version: u32) -> Vec<u8> {
+    let mut out = b"NGSP".to_vec();
+    out.extend(version.to_le_bytes());
+    out.extend((all.len() as u32).to_le_bytes());
+    out.extend([degree as u8, 12, 0, 0]);
+    for v in all.iter().flat_map(|t| t.position) {
+        out.extend(&((v * 4096.0).round() as i32).to_le_bytes()[..3]);
+    }
+    out.extend(all.iter().map(|t| byte(255.0 * t.opacity)));
+    out.extend(all.iter().flat_map(|t| t.harmonics[0].map(|c| byte(255.0 * (0.15 * c + 0.5)))));
+    out.extend(all.iter().flat_map(|t| t.scale.map(|s| byte(16.0 * (s + 10.0)))));
+    for t in all {
+        let [w, x, y, z] = t.rotation;
+        if version == 2 {
+            out.extend([x, y, z].map(|v| byte(127.5 * (v + 1.0))));
+            continue;
+        }
+        let xyzw = [x, y, z, w];
+        let k = largest(&xyzw);
+        let word = (0..4).filter(|j| *j != k).fold(k as u32, |word, j| {
+            let v = xyzw[j] * xyzw[k].signum();
+            word << 10 | u32::from(v < 0.0) << 9 | whole(v.abs() * SQRT_2, 9)
+        });
+        out.extend(word.to_le_bytes());
+    }
+    out.extend(all.iter().flat_map(|t| t.harmonics[1..].as_flattened()).map(|v| byte(128.0 * v + 128.0)));
+    out
+}
