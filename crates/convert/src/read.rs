@@ -124,12 +124,14 @@ pub struct ReadParams {
     pub strict: bool,
     /// Which volume of a series is read, from 0; other files have a frame 0 alone.
     pub frame: u64,
+    /// Whether the samples of a PNG are numbers, from 0 to 1 as they are stored, and no colours of a display.
+    pub is_data: bool,
 }
 
 impl Default for ReadParams {
-    /// 4 GiB, nothing dropped, what can be mended is mended, the first of a series.
+    /// 4 GiB, nothing dropped, what can be mended is mended, the first of a series, pictures in colours of a display.
     fn default() -> Self {
-        Self { limits: Limits::bytes(4 << 30), drop_invalid: false, strict: false, frame: 0 }
+        Self { limits: Limits::bytes(4 << 30), drop_invalid: false, strict: false, frame: 0, is_data: false }
     }
 }
 
