@@ -6,9 +6,11 @@
 )]
 
 mod device;
+mod dragon;
 mod frame;
 
 pub use device::device;
+pub use dragon::{disc_scale, dragon, mean_degree, overlap_graph};
 pub use frame::Frame;
 
 use organza::{Loaded, Progress, RenderOptions, load, scene};

@@ -46,7 +46,7 @@ fn main() {
     let (cloud, objects, ambient) = (&cloud, &objects, [0.1; 3]);
     let input = &ShadeInput { cloud, materials, objects, lights, ambient, camera };
     let (layout, transforms) = (ChannelLayout::new(&LayerSet::default()), &[Similarity::default()]);
-    let light = Light { input, layout, transforms };
+    let light = Light { input, layout, transforms, heights: &[] };
     let resolve = |passes: Passes<'_>| {
         let (shown, max_bytes) = (Shown::Pixels(light), 1 << 30);
         let input = OpaqueInput { discs: &discs, shown, channels: 3, objects: false, passes, max_bytes };

@@ -204,6 +204,13 @@ fn groups_are_made_once_for_what_moves_and_anew_for_what_changes_its_shape() {
     assert!(kept[0] > 500 && kept[1..] == [0, 0], "{kept:?}");
     let changed = anew(&format!("{}[animation]\nframes = 3\n{shapes}", base("")));
     assert!(changed[1] > 30 && changed[2] > 30 && 2 * changed[1] < changed[0], "{changed:?}");
+    // Opaque discs keep theirs as well.
+    let solid = balls("opaque = 'one_pass'\n").replace("[render]\n", "[render]\ntechnique = 'surfels'\n");
+    let solid = solid.replace("opacity = 0.2", "opacity = 1");
+    let kept_too = anew(&format!("{solid}[animation]\nframes = 3\n{moves}"));
+    assert!(kept_too[0] > 300 && kept_too[1..] == [0, 0], "{kept_too:?}");
+    let changed_too = anew(&format!("{solid}[animation]\nframes = 3\n{shapes}"));
+    assert_eq!(changed_too[1..], changed[1..], "of the ball whose discs come closer");
     // Groups by what is near the eye are of one view.
     let near = anew(&format!(
         "{}[animation]\nframes = 3\n{moves}",

@@ -153,6 +153,34 @@ fn clear_glass_before_one_color_is_not_seen_and_its_effects_are() {
     }
 }
 
+/// Rays leave the ball to all sides, where walls stand that no pixel sees; the eye lies in their midst.
+#[test]
+fn glass_shows_opaque_surfaces_that_lie_out_of_view() {
+    let wall = |k: usize| {
+        let (axis, side) = (k % 3, if k < 3 { 6 } else { -6 });
+        let along = |a: usize, v: i32| {
+            let mut all = [0; 3];
+            all[a] = v;
+            all
+        };
+        let [center, u, v] = [along(axis, side), along((axis + 1) % 3, 6), along((axis + 2) % 3, 6)];
+        format!(
+            "[[object]]\nname = 'wall {k}'\nmaterial = 'grey'\n\
+             rectangle = {{ center = {center:?}, u = {u:?}, v = {v:?}, spacing = 0.4 }}\n"
+        )
+    };
+    let scene = "version = 1\n[camera]\nposition = [0, 0, 4]\ntarget = [0, 0, 0]\nfov_y = 20\nsize = [40, 40]\n[render]\nantialias = 1\n"
+        .to_owned()
+        + GLASS_BALL
+        + "[material.grey]\nshading = 'unlit'\ncolor = [0.4, 0.5, 0.7]\n"
+        + &(0..6).map(wall).collect::<String>();
+    let picture = draw(&scene, &[]);
+    for (channel, expected) in [("R", 0.4), ("G", 0.5), ("B", 0.7)] {
+        let off = off(&picture.channel(channel), expected);
+        assert!(off < 1e-6, "{channel}: {off:e}");
+    }
+}
+
 #[test]
 fn a_ball_of_glass_turns_what_is_behind_it_upside_down() {
     // Red above, blue below: seen through the ball the other way round.

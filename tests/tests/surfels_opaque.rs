@@ -2,7 +2,7 @@
 
 use organza::scene::{LoadOptions, Scene, parse};
 use organza::{Progress, RenderOptions, explain, render};
-use organza_tests::{draw, organza, parallel_view};
+use organza_tests::{draw, draw_in, organza, parallel_view, window};
 
 fn scene(text: &str) -> Scene {
     parse("s.toml".as_ref(), text.as_bytes(), &LoadOptions::default()).unwrap()
@@ -138,4 +138,52 @@ fn keys_of_opaque_surfaces_and_bumps_are_checked() {
     refused(&bump("height = 1, size = 0"), "`size`: expected a number above 0");
     refused(&bump("height = 1, size = 1, octaves = 13"), "`octaves`: expected a whole number from 1 to 12");
     refused(&bump("height = 1"), "size");
+    refused(
+        &bump("height = 1, size = 1, image = 'a.png', seed = 3"),
+        "`seed` belongs to noise, and an `image` is named",
+    );
+    refused(&bump("height = 1, size = 1, octaves = 2, image = 'a.png'"), "`octaves` belongs to noise");
+    refused(&bump("height = 1, size = 1, image = '../../a.png'"), "lies outside the scene's root folder");
+    refused(&bump("height = 1, size = 1, image = 3"), "image");
+}
+
+/// A ramp from black to white over 2.4 units, 0.48 high, tilts a wall by a fifth, and turns with it; grey as the file stores it is height.
+#[test]
+fn an_image_has_the_heights_of_bumps() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
+    let ramp = image::ImageBuffer::from_fn(64, 8, |x, _| image::Luma([(1024 * x) as u16]));
+    ramp.save(folder.path().join("ramp.png")).unwrap();
+    write("mesh.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n");
+    write("broken.png", b"\x89PNG\r\n\x1a\nnothing");
+    let wall = |image: &str, more: &str| {
+        format!(
+            "{}[material.rough]\nbump = {{ height = 0.48, size = 2.4, image = '{image}' }}\n\
+             [[object]]\nname = 'wall'\nmaterial = 'rough'\n{more}\
+             rectangle = {{ center = [0, 0, 0], u = [2, 0, 0], v = [0, 2, 0], spacing = 0.1 }}\n\
+             [render]\ntechnique = 'surfels'\nlayers = ['normal']\n",
+            parallel_view(2.4, 96)
+        )
+    };
+    for (more, [x, y]) in [("", [-0.2, 0.0]), ("transform = { rotate = [0, 0, 90] }\n", [0.0, -0.2])] {
+        let picture = draw_in(folder.path(), &wall("ramp.png", more), &[]);
+        let [across, up, ahead] = ["X", "Y", "Z"].map(|c| picture.channel(&format!("N.{c}")));
+        for (found, expected) in [(&across, x), (&up, y), (&ahead, 1.0)] {
+            // Away from the place where the ramp begins again.
+            let (columns, rows) = if x == 0.0 { (4..92, 52..90) } else { (52..90, 4..92) };
+            let exact = expected / 1.04f64.sqrt();
+            let off = window(found, 96, columns, rows).iter().map(|v| (v - exact).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-4, "{more}: {off:e} off {exact}");
+        }
+    }
+    for (image, code, words) in [
+        ("none.png", 4, "none.png"),
+        ("mesh.ply", 3, "mesh.ply: expected an image of radiance"),
+        ("broken.png", 3, "broken.png: expected a complete PNG image"),
+    ] {
+        write("s.toml", wall(image, "").as_bytes());
+        let out = organza().args(["render", "s.toml", "-o", "out.exr"]).current_dir(&folder).output().unwrap();
+        let said = String::from_utf8_lossy(&out.stderr);
+        assert!(out.status.code() == Some(code) && said.contains(words), "{said}");
+    }
 }

@@ -18,6 +18,8 @@ pub enum Orientation {
     Viewpoint(DVec3),
     /// Outwards and alike among neighbours.
     Propagate,
+    /// Outwards where the points enclose something, as the scan of a whole body does, and else along this direction.
+    Auto(DVec3),
 }
 
 impl Default for Orientation {
@@ -30,7 +32,7 @@ impl Default for Orientation {
 /// Found and expected when the orientation makes no sense.
 pub(crate) fn check(orientation: Orientation) -> Result<(), (String, &'static str)> {
     match orientation {
-        Orientation::Toward(d) if d.try_normalize().is_none() => {
+        Orientation::Toward(d) | Orientation::Auto(d) if d.try_normalize().is_none() => {
             Err((d.to_string(), "a finite direction that is not 0"))
         }
         Orientation::Viewpoint(p) if !p.is_finite() => Err((p.to_string(), "a finite point")),
@@ -41,7 +43,7 @@ pub(crate) fn check(orientation: Orientation) -> Result<(), (String, &'static st
 /// A unit normal across `line` (which may be zero) where no plane is known.
 pub(crate) fn guess(orientation: Orientation, line: DVec3) -> DVec3 {
     let wish = match orientation {
-        Orientation::Toward(d) => d.normalize_or(DVec3::Y),
+        Orientation::Toward(d) | Orientation::Auto(d) => d.normalize_or(DVec3::Y),
         _ => DVec3::Y,
     };
     let Some(line) = line.try_normalize() else { return wish };
@@ -49,7 +51,8 @@ pub(crate) fn guess(orientation: Orientation, line: DVec3) -> DVec3 {
     if across.length() > 1e-6 { across.normalize() } else { line.any_orthonormal_vector() }
 }
 
-/// Turns normals; `nearest`, by leaf, is read for [`Orientation::Propagate`] alone.
+/// Turns normals; `nearest`, by leaf, is read for [`Orientation::Propagate`] alone. [`Orientation::Auto`] is taken for points that enclose
+/// nothing, who knows better names the other one.
 pub(crate) fn orient(
     normals: &mut [DVec3],
     position: &[Vec3],
@@ -58,13 +61,22 @@ pub(crate) fn orient(
     nearest: &[Nearest],
 ) {
     match orientation {
-        Orientation::Toward(d) => normals.iter_mut().for_each(|n| *n = face(*n, d)),
+        Orientation::Toward(d) | Orientation::Auto(d) => normals.iter_mut().for_each(|n| *n = face(*n, d)),
         Orientation::Viewpoint(eye) => {
             let eye = eye - origin;
             normals.iter_mut().zip(position).for_each(|(n, p)| *n = face(*n, eye - p.as_dvec3()));
         }
         Orientation::Propagate => propagate(normals, position, nearest),
     }
+}
+
+/// Whether normals that are alike among neighbours, of surfaces of these areas, enclose something: then they nearly cancel.
+pub(crate) fn encloses(of_places: impl Iterator<Item = (DVec3, f64)>) -> bool {
+    /// What is left of a body that lacks its base is less, of half a ball it is a half, of terrain nearly 1.
+    const OPEN: f64 = 0.25;
+    let add = |(sum, all): (DVec3, f64), (normal, area): (DVec3, f64)| (sum + normal * area, all + area);
+    let (sum, all) = of_places.fold((DVec3::ZERO, 0.0), add);
+    sum.length() < OPEN * all
 }
 
 fn face(n: DVec3, side: DVec3) -> DVec3 {

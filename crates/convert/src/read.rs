@@ -140,10 +140,13 @@ pub struct ReadParams {
     pub columns: Vec<String>,
     /// Whether the ranges of all columns of points are found, kept or not, for [`Notes::columns`].
     pub ranges: bool,
+    /// Whether the samples of a PNG are numbers, from 0 to 1 as they are stored, and no colours of a display.
+    pub is_data: bool,
 }
 
 impl Default for ReadParams {
-    /// 4 GiB, nothing dropped, what can be mended is mended, the first of a series, no further columns.
+    /// 4 GiB, nothing dropped, what can be mended is mended, the first of a series, no further columns, pictures in colours of a
+    /// display.
     fn default() -> Self {
         Self {
             limits: Limits::bytes(4 << 30),
@@ -152,6 +155,7 @@ impl Default for ReadParams {
             frame: 0,
             columns: Vec::new(),
             ranges: false,
+            is_data: false,
         }
     }
 }

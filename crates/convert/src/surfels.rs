@@ -151,6 +151,7 @@ pub fn raw_to_surfels(
     }
     let order = canonical_order(points);
     let (distinct, starts) = distinct_places(points, &order);
+    let params = &SurfelParams { orientation: known_orientation(&distinct, params)?, ..params.clone() };
     let (mut places, nearest) = places(&distinct, params, progress)?;
     let mut report = SurfelReport {
         points: points.len() as u64,
@@ -164,6 +165,21 @@ pub fn raw_to_surfels(
     check_cancelled(progress)?;
     let cloud = emit(points, params, &Sorted { order, starts, places, normals }, &mut report)?;
     Ok((cloud, report))
+}
+
+/// The orientation, where it depends on what the points enclose: told by some of them, which lie evenly among all.
+fn known_orientation(distinct: &[Vec3], params: &SurfelParams) -> Result<Orientation, ConvertError> {
+    /// Places that are enough to tell.
+    const ENOUGH: usize = 1 << 16;
+    let Orientation::Auto(up) = params.orientation else { return Ok(params.orientation) };
+    let some: Vec<Vec3> = distinct.iter().step_by(distinct.len().div_ceil(ENOUGH).max(1)).copied().collect();
+    let outwards = SurfelParams { orientation: Orientation::Propagate, ..params.clone() };
+    let (mut places, nearest) = places(&some, &outwards, &Progress::new())?;
+    cut_outliers(&mut places, params, &mut SurfelReport::default());
+    let mut normals: Vec<DVec3> = places.iter().map(|p| p.normal).collect();
+    orient::orient(&mut normals, &some, DVec3::ZERO, Orientation::Propagate, &nearest);
+    let is_body = orient::encloses(normals.into_iter().zip(places.iter().map(|p| p.area)));
+    Ok(if is_body { Orientation::Propagate } else { Orientation::Toward(up) })
 }
 
 pub(crate) fn check(points: &RawPoints, params: &SurfelParams) -> Result<(), ConvertError> {

@@ -67,7 +67,12 @@ fn a_lattice_is_covered_once() {
 
 #[test]
 fn areas_of_a_sphere_sum_to_its_area_and_normals_are_radial() {
-    for orientation in [Orientation::Propagate, Orientation::Toward(DVec3::Y), Orientation::Viewpoint(DVec3::Z * 9.0)] {
+    for orientation in [
+        Orientation::Propagate,
+        Orientation::Toward(DVec3::Y),
+        Orientation::Viewpoint(DVec3::Z * 9.0),
+        Orientation::Auto(DVec3::Z),
+    ] {
         let params = SurfelParams { orientation, ..SurfelParams::default() };
         let (cloud, report) = raw_to_surfels(&sphere(20_000), &params, None).unwrap();
         assert!((report.area / (4.0 * std::f64::consts::PI) - 1.0).abs() < 2e-3, "{}", report.area);
@@ -75,11 +80,39 @@ fn areas_of_a_sphere_sum_to_its_area_and_normals_are_radial() {
             let (p, n) = (cloud.position[i].normalize(), cloud.normal[i]);
             assert!(n.dot(p).abs() > 0.999, "{p} {n}");
             match orientation {
-                Orientation::Propagate => assert!(n.dot(p) > 0.0, "inwards at {p}"),
+                Orientation::Propagate | Orientation::Auto(_) => assert!(n.dot(p) > 0.0, "inwards at {p}"),
                 Orientation::Toward(_) => assert!(n.y >= 0.0),
                 Orientation::Viewpoint(eye) => assert!(n.dot(eye.as_vec3() - cloud.position[i]) >= 0.0),
             }
         }
+    }
+}
+
+/// Hills with a house on them are no body, whatever is up; two balls are, and so is one that lacks its lowest tenth.
+#[test]
+fn normals_point_outwards_of_bodies_and_up_from_terrain() {
+    let with = |position: Vec<Vec3>, up: DVec3| {
+        let params = SurfelParams { orientation: Orientation::Auto(up), ..SurfelParams::default() };
+        let points = RawPoints { position, origin: DVec3::new(1e7, 2e6, -3e5), ..RawPoints::default() };
+        raw_to_surfels(&points, &params, None).unwrap().0
+    };
+    let ground = |k: usize| {
+        let (x, z) = ((k % 80) as f32, (k / 80) as f32);
+        let is_house = (30.0..45.0).contains(&x) && (20.0..40.0).contains(&z);
+        Vec3::new(x, 4.0 * (0.2 * x).sin() * (0.15 * z).cos() + if is_house { 12.0 } else { 0.0 }, z)
+    };
+    let wall = (0..15 * 24).map(|k| Vec3::new(30.0 + (k % 15) as f32, 0.5 * (k / 15) as f32, 20.0));
+    let terrain: Vec<Vec3> = (0..80 * 80).map(ground).chain(wall).collect();
+    assert!(with(terrain.clone(), DVec3::Y).normal.iter().all(|n| n.y >= 0.0));
+    let turned = terrain.iter().map(|p| Vec3::new(p.x, p.z, p.y)).collect();
+    assert!(with(turned, DVec3::Z).normal.iter().all(|n| n.z >= 0.0));
+    let ball = sphere(4000).position;
+    let open = ball.iter().copied().filter(|p| p.y > -0.8).collect();
+    let two = ball.iter().flat_map(|p| [*p, *p + 5.0 * Vec3::X]).collect();
+    for (position, middle) in [(open, 1.0), (two, 2.5)] {
+        let cloud = with(position, DVec3::Y);
+        let center = |p: Vec3| if p.x > middle { 5.0 * Vec3::X } else { Vec3::ZERO };
+        assert!(cloud.position.iter().zip(&cloud.normal).all(|(p, n)| n.dot(*p - center(*p)) > 0.0));
     }
 }
 

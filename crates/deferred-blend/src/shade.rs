@@ -6,7 +6,7 @@ use crate::disc::{Discs, Ray};
 use crate::fragments::Fragment;
 use splat_core::glam::Vec3;
 use splat_core::shade::{ChannelLayout, MAX_CHANNELS, Point, ShadeInput, arriving, facing};
-use splat_core::{Cloud, Receiver, Similarity};
+use splat_core::{Cloud, HeightImage, Receiver, Similarity};
 
 /// What discs show.
 #[derive(Clone, Copy)]
@@ -26,6 +26,8 @@ pub struct Light<'a> {
     pub layout: ChannelLayout,
     /// Of each object, by id: bumps lie in its own space.
     pub transforms: &'a [Similarity],
+    /// Of each material, by id, whose bumps an image has; there may be fewer.
+    pub heights: &'a [Option<HeightImage>],
 }
 
 /// Numbers of [`Attributes`].
@@ -118,7 +120,7 @@ impl Light<'_> {
         let face = mean.face.normalize_or_zero();
         let mut normal = facing(kind, face, mean.normal.normalize_or_zero(), to_eye);
         if material.bump.height > 0.0 {
-            let slope = self.slope(place, position);
+            let slope = self.slope(place, position, normal);
             normal = (normal - (slope - normal * slope.dot(normal))).normalize_or(normal);
         }
         let world = cloud.origin + position.as_dvec3();
@@ -132,13 +134,17 @@ impl Light<'_> {
         radiance.write(normal, &self.layout, out);
     }
 
-    /// ∇h of bumps.
-    fn slope(&self, place: &Place<'_>, position: Vec3) -> Vec3 {
-        let cloud = self.input.cloud;
+    /// ∇h of bumps on a surface across `normal`.
+    fn slope(&self, place: &Place<'_>, position: Vec3, normal: Vec3) -> Vec3 {
+        let (cloud, material) = (self.input.cloud, self.input.cloud.material[place.disc] as usize);
         let Similarity { scale, rotation, translation } = self.transforms[cloud.object[place.disc] as usize];
         let at = rotation.inverse() * (cloud.origin + position.as_dvec3() - translation) / scale;
-        let bump = &self.input.materials[cloud.material[place.disc] as usize].bump;
-        let slope = bump::slope(bump, at, f64::from(place.discs.pixel_width(place.depth)) / scale);
+        let (bump, pixel) =
+            (&self.input.materials[material].bump, f64::from(place.discs.pixel_width(place.depth)) / scale);
+        let slope = match self.heights.get(material).and_then(Option::as_ref) {
+            Some(image) => bump::image_slope(bump, image, (at, rotation.inverse() * normal.as_dvec3()), pixel),
+            None => bump::slope(bump, at, pixel),
+        };
         (rotation * slope).as_vec3()
     }
 

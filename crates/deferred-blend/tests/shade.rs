@@ -55,7 +55,7 @@ impl<'a> Sunny<'a> {
     /// Channels of the translucent picture, or of the opaque one.
     fn draw(&self, pixels: bool, layout: ChannelLayout, passes: Option<Passes<'_>>) -> Vec<Vec<f32>> {
         let (params, input, values) = (Params::default(), self.input(), self.of_discs(layout));
-        let light = Lit { input: &input, layout, transforms: &self.transforms };
+        let light = Lit { input: &input, layout, transforms: &self.transforms, heights: &[] };
         let shown = if pixels { Shown::Pixels(light) } else { Shown::Discs(&values) };
         let (discs, channels) = (&Discs::project(&self.scene.input(), &params), layout.count());
         if let Some(passes) = passes {

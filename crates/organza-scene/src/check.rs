@@ -161,8 +161,8 @@ pub(super) fn scene(
         return Err(at.key("version").error(message, "this version of Organza reads scenes of version 1"));
     }
     let footprints = check_footprints(&at, raw.footprints)?;
-    let materials = check_materials(&at.key("material"), &raw.material)?;
     let paths = Paths::new(&at.key(ROOT_KEY), document.file, raw.root.as_deref(), allow_path)?;
+    let materials = check_materials(&at.key("material"), &raw.material, &paths)?;
     let named = Named { materials: &materials, footprints: &footprints, paths: &paths };
     let at_objects = at.key("object");
     let objects = check_objects(&at_objects, raw.object, raw.animation.as_ref(), &named)?;

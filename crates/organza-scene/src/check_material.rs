@@ -3,16 +3,19 @@
 use super::SceneMaterial;
 use super::check::{At, LARGEST, SMALLEST};
 use super::de::suggest;
+use super::paths::Paths;
 use super::raw_material::{RawBump, RawMaterial, RawShading, RawSurfaceOpacity};
 use crate::{Error, shown};
 use splat_core::optics::{SurfaceOpacity, absorption_coefficient};
 use splat_core::{Bump, Material, Shading};
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 /// The default material, then all of the file in order of name.
 pub(super) fn check_materials<'a>(
     at: &At<'a>,
     raw: &'a BTreeMap<String, RawMaterial>,
+    paths: &Paths,
 ) -> Result<Vec<SceneMaterial>, Error> {
     if raw.len() > usize::from(u16::MAX) {
         return Err(at.error(format!("expected at most {} materials, found {}", u16::MAX, raw.len()), ""));
@@ -23,10 +26,11 @@ pub(super) fn check_materials<'a>(
         color: [1.0; 3],
         opacity: 1.0,
         extinction: None,
+        bump_image: None,
     };
     let mut materials = vec![default];
     for (name, material) in raw {
-        materials.push(check_material(&at.key(name), name, material)?);
+        materials.push(check_material(&at.key(name), name, material, paths)?);
     }
     Ok(materials)
 }
@@ -45,7 +49,7 @@ pub(super) fn unknown_material(at: &At<'_>, at_materials: &At<'_>, name: &str, m
     at.key("material").error(format!("material `{}` is not defined", shown(name)), hint)
 }
 
-fn check_material(at: &At<'_>, name: &str, raw: &RawMaterial) -> Result<SceneMaterial, Error> {
+fn check_material(at: &At<'_>, name: &str, raw: &RawMaterial, paths: &Paths) -> Result<SceneMaterial, Error> {
     let unit = |key, value: Option<f64>, default: f64| at.number(key, value.unwrap_or(default), 0.0..=1.0);
     let (extinction, extinction_rgb) = check_extinction(at, raw)?;
     let medium = raw.medium.as_ref();
@@ -56,6 +60,8 @@ fn check_material(at: &At<'_>, name: &str, raw: &RawMaterial) -> Result<SceneMat
         let message = format!("`asymmetry`: expected a number between -1 and 1, found {asymmetry}");
         return Err(at_medium.key("asymmetry").error(message, ""));
     }
+    let bump = raw.bump.as_ref().map(|bump| check_bump(&at.key("bump"), bump, paths)).transpose()?;
+    let (bump, bump_image) = bump.unwrap_or_default();
     let material = Material {
         shading: match raw.shading {
             Some(RawShading::Phong) => Shading::Phong,
@@ -79,7 +85,7 @@ fn check_material(at: &At<'_>, name: &str, raw: &RawMaterial) -> Result<SceneMat
         },
         index: check_index(at, raw)?,
         absorption_inside: at.color("absorption_inside", raw.absorption_inside.unwrap_or_default())?,
-        bump: raw.bump.as_ref().map_or(Ok(Bump::default()), |bump| check_bump(&at.key("bump"), bump))?,
+        bump,
     };
     // Matter that bends light is clear where nothing else is said.
     let opacity = if material.bounds_matter() { 0.0 } else { 1.0 };
@@ -89,16 +95,24 @@ fn check_material(at: &At<'_>, name: &str, raw: &RawMaterial) -> Result<SceneMat
         color: at.color("color", raw.color.unwrap_or([1.0; 3]))?,
         opacity: unit("opacity", raw.opacity, opacity)?,
         extinction,
+        bump_image,
     })
 }
 
-fn check_bump(at: &At<'_>, raw: &RawBump) -> Result<Bump, Error> {
-    Ok(Bump {
-        height: at.number("height", raw.height, 0.0..=LARGEST)? as f32,
-        size: at.length("size", raw.size)? as f32,
-        octaves: at.whole("octaves", raw.octaves.unwrap_or(4), 1..=12)?,
-        seed: raw.seed.unwrap_or(0).into(),
-    })
+/// Bumps, and the image that has their heights where it is no noise.
+fn check_bump(at: &At<'_>, raw: &RawBump, paths: &Paths) -> Result<(Bump, Option<PathBuf>), Error> {
+    let (height, size) = (at.number("height", raw.height, 0.0..=LARGEST)? as f32, at.length("size", raw.size)? as f32);
+    let Some(image) = &raw.image else {
+        let octaves = at.whole("octaves", raw.octaves.unwrap_or(4), 1..=12)?;
+        return Ok((Bump { height, size, octaves, seed: raw.seed.unwrap_or(0).into() }, None));
+    };
+    let of_noise = [("octaves", raw.octaves.is_some()), ("seed", raw.seed.is_some())];
+    if let Some((key, _)) = of_noise.iter().find(|(_, is_there)| *is_there) {
+        let message = format!("`{key}` belongs to noise, and an `image` is named");
+        return Err(at.key(key).error(message, "leave one of both out"));
+    }
+    let image = paths.resolve(&at.key("image"), image)?;
+    Ok((Bump { height, size, octaves: 0, seed: 0 }, Some(image)))
 }
 
 /// Dominant wavelengths of the primaries of Rec.709, µm.

@@ -60,10 +60,11 @@ impl Scene {
         names.into_iter().map(str::to_owned).collect()
     }
 
-    /// The files of its environment and of what lights shine through.
+    /// The files of its environment, of what lights shine through, and of bumps.
     pub fn images(&self) -> impl Iterator<Item = &Path> {
         let slides = self.lights.iter().filter_map(|light| Some(&*light.slide.as_ref()?.path));
-        self.environment.iter().map(|environment| &*environment.path).chain(slides)
+        let bumps = self.materials.iter().filter_map(|material| material.bump_image.as_deref());
+        self.environment.iter().map(|environment| &*environment.path).chain(slides).chain(bumps)
     }
 
     /// SHA-256 of the bytes of all files that the scene reads, without its own.
@@ -162,4 +163,6 @@ pub struct SceneMaterial {
     pub opacity: f64,
     /// Extinction σ_t of a medium that states none itself, 1/world unit.
     pub extinction: Option<f64>,
+    /// The image that has the heights of its bumps.
+    pub bump_image: Option<PathBuf>,
 }

@@ -60,20 +60,22 @@ pub(super) struct RawMaterial {
     pub(super) cauchy: Option<RawCauchy>,
     /// What the matter that a surface bounds absorbs, per channel, 1/world unit; default [0, 0, 0].
     pub(super) absorption_inside: Option<[f64; 3]>,
-    /// How surfaces are rough to light, by noise that tilts their normals; default none.
+    /// How surfaces are rough to light, by noise or an image that tilts their normals; default none.
     pub(super) bump: Option<RawBump>,
 }
 
-/// Noise as heights over a surface.
+/// Noise, or an image, as heights over a surface.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 #[schemars(rename = "Bump")]
 pub(super) struct RawBump {
-    /// Height of the largest bumps, the object's units, from 0.
+    /// Height of the largest bumps, or of white over black in an image; the object's units, from 0.
     pub(super) height: f64,
-    /// Length of the largest bumps, the object's units, above 0.
+    /// Length of the largest bumps, or width of the image; the object's units, above 0.
     pub(super) size: f64,
-    /// Sizes, each half as large and high as the one before, 1 to 12; default 4.
+    /// A PNG, Radiance HDR or OpenEXR file, whose brightness is height, in the place of noise.
+    pub(super) image: Option<String>,
+    /// Sizes of noise, each half as large and high as the one before, 1 to 12; default 4.
     pub(super) octaves: Option<u32>,
     /// Seed of the noise, from 0; default 0.
     pub(super) seed: Option<u32>,

@@ -71,8 +71,7 @@ pub struct Planned<'a> {
 pub fn draw_loaded(planned: &Planned<'_>, progress: &Progress, cost: &mut CostRecord) -> Result<Layers, Error> {
     let Planned { scene, loaded, plan, options } = *planned;
     let frame = Frame::new(scene, loaded, plan, progress);
-    let mut session =
-        Session { options, checkpoint: None, kept: None, groups: None, warnings: &mut Vec::new(), sets: None };
+    let mut session = Session { options, checkpoint: None, kept: None, warnings: &mut Vec::new(), sets: None };
     let layers = draw(&frame, &mut session, cost)?;
     if session.sets.is_some_and(|sets| sets.interrupted) { Err(Error::Cancelled) } else { Ok(layers) }
 }
@@ -163,14 +162,8 @@ mod tests {
         let cuts = ends.iter().map(|end| end * unit);
         let cuts: Vec<f32> = [f32::NEG_INFINITY].into_iter().chain(cuts).chain([f32::INFINITY]).collect();
         let ranges: Vec<Range<f32>> = cuts.windows(2).map(|w| w[0]..w[1]).collect();
-        let mut session = Session {
-            options: &options,
-            checkpoint: None,
-            kept: None,
-            groups: None,
-            warnings: &mut Vec::new(),
-            sets: None,
-        };
+        let mut session =
+            Session { options: &options, checkpoint: None, kept: None, warnings: &mut Vec::new(), sets: None };
         draw_ranges(&frame, &ranges, &mut session, &mut CostRecord::default()).unwrap()
     }
 

@@ -23,7 +23,7 @@ use crate::{Error, Progress};
 use splat_core::raster::{self, Background, OpaqueImage};
 use splat_core::shade::ChannelLayout;
 use splat_core::{Accumulator, Camera, Cloud, LayerSet, SplatKind};
-use std::cell::OnceCell;
+use std::cell::{OnceCell, RefCell};
 
 /// One frame of a loaded scene: what techniques read, each part made once, when it is first asked for.
 ///
@@ -42,6 +42,8 @@ pub struct Frame<'a> {
     /// Whether it composites splats, which changes the last bits.
     pub(crate) device_composites: bool,
     pub(crate) progress: &'a Progress,
+    /// Groups of discs, which serve all frames of an animation.
+    pub(crate) groups: RefCell<grouped::KeptInFrames>,
     /// `None` inside where all splats are drawn.
     drawn: OnceCell<Option<Cloud>>,
     light_points: OnceCell<Vec<LightPoint>>,
@@ -63,6 +65,7 @@ impl<'a> Frame<'a> {
             helper: None,
             device_composites: false,
             progress,
+            groups: RefCell::default(),
             drawn: OnceCell::new(),
             light_points: OnceCell::new(),
             maps: OnceCell::new(),
@@ -123,7 +126,7 @@ impl<'a> Frame<'a> {
 
     /// What is seen behind everything.
     pub fn background(&self) -> Background<'_> {
-        match &self.loaded.environment {
+        match &self.loaded.images.environment {
             Some(environment) => Background::Environment(environment, &self.camera),
             None => Background::Color(self.scene.background),
         }

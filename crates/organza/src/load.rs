@@ -18,11 +18,12 @@ pub(crate) use context::BYTES_PER_SPLAT;
 use files::Files;
 pub use fit::fitted;
 use glam::DVec3;
+use images::Images;
 use loading::Loading;
 use normalize::normalize;
 use object::Prepared;
 use own::Own;
-use splat_core::{Camera, Cloud, Environment, FootprintStack, Material, Object, Shading, Slide, SplatKind};
+use splat_core::{Camera, Cloud, FootprintStack, Material, Object, Shading, SplatKind};
 use std::cmp::Ordering;
 
 /// A scene in memory, normalized by a power of two (see [`Loaded::exponent`]) and ready for a technique.
@@ -44,12 +45,10 @@ pub struct Loaded {
     pub footprints: FootprintStack,
     /// The camera.
     pub camera: Camera,
-    /// What is seen behind everything in the place of a colour.
-    pub environment: Option<Environment>,
+    /// What is made of images.
+    pub(crate) images: Images,
     /// Lights, whole, in an order that does not depend on the file's.
     pub lights: Vec<SceneLight>,
-    /// What each of them shines through.
-    pub slides: Vec<Option<Slide>>,
     /// Slice thickness asked for, in the scale of the cloud.
     pub slice_thickness: Option<f64>,
     /// Whether normals were computed from the gradients of some volume.
@@ -92,9 +91,8 @@ fn scaled_thickness(scene: &Scene, exponent: i32) -> Option<f64> {
 pub(crate) struct Inputs<'a> {
     loading: Loading<'a>,
     prepared: Vec<Prepared<'a>>,
-    environment: Option<Environment>,
+    images: Images,
     lights: Vec<SceneLight>,
-    slides: Vec<Option<Slide>>,
     warnings: Vec<String>,
     /// What is known of each visible object, in the order of the scene.
     pub(crate) statistics: Vec<ObjectStatistics>,
@@ -117,18 +115,18 @@ pub(crate) fn read<'a>(
 ) -> Result<Inputs<'a>, Error> {
     let loading = Loading { scene, options, progress, files };
     let lights = lights(scene);
-    let (prepared, environment, slides) = cost.measure(pass::READ, |stage| {
+    let (prepared, images) = cost.measure(pass::READ, |stage| {
         let prepared = loading.prepare(looks)?;
-        let (environment, of_environment) = loading.environment()?.unzip();
-        let (slides, of_slides) = loading.slides(&lights)?;
+        let images = loading.images(&lights)?;
         stage.items_in = prepared.len() as u64;
         stage.items_out = stage.items_in;
         let of_objects: u64 = prepared.iter().map(|p| p.input.bytes()).sum();
-        stage.bytes = of_objects + of_environment.unwrap_or(0) + of_slides;
-        Ok::<_, Error>((prepared, environment, slides))
+        // What was read of images is no more than what was made of it.
+        stage.bytes = of_objects + 2 * images.bytes();
+        Ok::<_, Error>((prepared, images))
     })?;
     let statistics = loading.statistics(&prepared);
-    Ok(Inputs { loading, prepared, environment, lights, slides, warnings: files.mended(), statistics })
+    Ok(Inputs { loading, prepared, images, lights, warnings: files.mended(), statistics })
 }
 
 impl Inputs<'_> {
@@ -146,7 +144,7 @@ impl Inputs<'_> {
         sets: f64,
         cost: &mut CostRecord,
     ) -> Result<Loaded, Error> {
-        let Self { loading, mut prepared, environment, mut lights, mut slides, mut warnings, statistics } = self;
+        let Self { loading, mut prepared, mut images, mut lights, mut warnings, statistics } = self;
         let Loading { scene, progress, files, .. } = loading;
         let mut early = spare.map(|_| loading.own(&mut prepared, &planned, &mut warnings)).transpose()?;
         if let (Some(own), Some(spare)) = (&mut early, spare)
@@ -172,7 +170,7 @@ impl Inputs<'_> {
             })?;
         }
         let mut camera = scene.camera;
-        let exponent = normalize(&mut cloud, &mut own, &mut camera, (&mut lights, &mut slides));
+        let exponent = normalize(&mut cloud, &mut own, &mut camera, (&mut lights, &mut images.slides));
         cloud.canonicalize();
         cloud.validate().map_err(|e| out_of_range(scene, &cloud, e))?;
         if cloud.is_empty() && own.is_empty() {
@@ -187,9 +185,8 @@ impl Inputs<'_> {
             objects: scene.objects.iter().map(object::entry).collect(),
             footprints: scene.footprints.clone(),
             camera,
-            environment,
+            images,
             lights,
-            slides,
             slice_thickness: scaled_thickness(scene, exponent),
             normals: scene.objects.iter().any(|o| o.visible && context::needs_gradients(o, scene)),
             exponent,

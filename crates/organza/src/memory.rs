@@ -6,7 +6,7 @@ use crate::load::{BYTES_PER_SPLAT, Loaded};
 use crate::scene::Scene;
 use splat_core::raster;
 use splat_core::shade::ChannelLayout;
-use splat_core::{Camera, DepthProfile, Environment, Exceeded, Grid, Slide};
+use splat_core::{Camera, DepthProfile, Exceeded, Grid};
 
 /// Bytes that a point of a lattice that is made of an object is counted with.
 const BYTES_PER_LATTICE_POINT: u64 = 32;
@@ -20,7 +20,7 @@ pub(crate) struct Memory {
     pub(crate) splats: u64,
     /// Objects that particles are sampled from as they are.
     pub(crate) own: u64,
-    /// The environment, and what lights shine through.
+    /// The environment, what lights shine through, and heights of bumps.
     pub(crate) images: u64,
     /// Averaging sets of particles.
     pub(crate) average: u64,
@@ -36,7 +36,7 @@ impl Memory {
             image: image_bytes(scene),
             splats: splat_bytes(loaded, &camera, layout(scene)),
             own: own_bytes(loaded),
-            images: images_bytes(loaded),
+            images: loaded.images.bytes(),
             average,
             maps: 0,
         }
@@ -58,12 +58,6 @@ impl Memory {
 fn layout(scene: &Scene) -> ChannelLayout {
     let layout = ChannelLayout::new(&scene.render.layers.set());
     if scene.render.sheets.scattering().is_some() { layout.with_multiple() } else { layout }
-}
-
-/// Bytes of the environment and of slides.
-fn images_bytes(loaded: &Loaded) -> u64 {
-    let slides = loaded.slides.iter().flatten().map(Slide::bytes);
-    loaded.environment.as_ref().map_or(0, Environment::bytes) + slides.sum::<u64>()
 }
 
 /// Bytes of the accumulators and layers.

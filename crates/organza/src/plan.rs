@@ -50,6 +50,8 @@ pub struct Plan {
     /// For each point of each light, in the order of the frame's points: the table of its shadow map, if it gets one. Chosen by
     /// a look at the splats, when all else is planned.
     pub shadow_tables: Vec<Option<ShadowTable>>,
+    /// Whether light is bent, or absorbed inside of what surfaces bound: rays may see what lies out of view.
+    pub bends: bool,
     /// Whether light is scattered more than once.
     pub scatters_again: bool,
     /// Lights that are scattered once all the same, because a technique cannot carry the light of some of their points.

@@ -145,11 +145,13 @@ fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Resu
     let materials = loaded.own.iter().map(|o| &loaded.materials[scene.objects[o.object].material]);
     let unequal = |m: &Material| m.extinction_rgb.iter().any(|e| *e != m.extinction_rgb[0]);
     statistics.counts.colored_extinction |= materials.into_iter().any(unequal);
-    for object in visible(scene).filter(|o| (row(technique_of(o, scene)).bends)(scene).is_ok()) {
+    let bends = |o: &&SceneObject| (row(technique_of(o, scene)).bends)(scene).is_ok();
+    for object in visible(scene).filter(bends) {
         statistics.add_bound(&object.name, &loaded.materials[object.material]);
     }
     statistics.lit_as_drawn = carried::of_scene(scene).is_some();
     let mut plan = plan(&statistics);
+    plan.bends = visible(scene).filter(bends).any(|o| loaded.materials[o.material].bounds_matter());
     plan.by = scene.objects.iter().map(|o| technique_of(o, scene)).collect();
     plan.exact = plan.by.iter().map(|by| row(*by).meets_discs).collect();
     plan.is_own = vec![false; scene.objects.len()];

@@ -4,6 +4,7 @@ use crate::choose::{row, techniques};
 use crate::device::Helper;
 use crate::draw::draw;
 use crate::frame::Frame;
+use crate::frame::grouped::KeptInFrames;
 use crate::load::files::Files;
 use crate::load::fitted;
 use crate::plan::Plan;
@@ -11,7 +12,6 @@ use crate::prepare::{Explanation, prepare};
 use crate::scene::{FoundCamera, Scene};
 use crate::technique::{Checkpoint, Kept, Session, Sets};
 use crate::{CostRecord, Error, Layers, Progress, RenderOptions, doubts};
-use deferred_blend::grouping::GroupsOfObjects;
 use std::path::PathBuf;
 
 /// A finished render.
@@ -58,7 +58,7 @@ pub fn render_from(scene: &Scene, options: &RenderOptions, progress: &Progress, 
 pub(crate) struct Left {
     pub(crate) files: Files,
     pub(crate) sets: Kept,
-    pub(crate) groups: GroupsOfObjects,
+    groups: KeptInFrames,
     /// Whether no other frame comes.
     is_still: bool,
 }
@@ -110,11 +110,13 @@ pub(crate) fn render_keeping(
     let doubtful = is_empty || warnings.len() > loaded.warnings.len();
     let device = helper.as_ref().map(|helper| (helper, options.device_composites));
     let frame = Frame::new(scene, &loaded, &plan, progress).helped_by(device);
-    let (kept, groups) = (!left.is_still).then_some((&mut left.sets, &mut left.groups)).unzip();
+    frame.groups.replace(std::mem::take(&mut left.groups));
+    let kept = (!left.is_still).then_some(&mut left.sets);
     let checkpoint = checkpoint.as_mut();
-    let mut session = Session { options, checkpoint, kept, groups, warnings: &mut warnings, sets: None };
+    let mut session = Session { options, checkpoint, kept, warnings: &mut warnings, sets: None };
     let layers = draw(&frame, &mut session, &mut cost)?;
     let sets = session.sets;
+    left.groups = frame.groups.take();
     let backend = helper.as_ref().map_or_else(|| "cpu".to_owned(), |helper| helper.name());
     if !doubtful {
         warnings.extend(doubts::of_picture(scene, &layers));

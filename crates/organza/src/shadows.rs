@@ -64,7 +64,7 @@ fn params(settings: &RenderSettings, loaded: &Loaded, tolerance: f32, max_bytes:
 /// displayed value by more than the lamp's part of the tolerance.
 fn tolerance(settings: &RenderSettings, loaded: &Loaded, point: &LightPoint, maps: u64) -> f32 {
     let of_lights = || {
-        let passing = loaded.slides[point.of].as_ref().map_or(1.0, |slide| f64::from(slide.brightest()));
+        let passing = loaded.images.slides[point.of].as_ref().map_or(1.0, |slide| f64::from(slide.brightest()));
         let brightest = passing * point.light.brightest_on(&loaded.cloud);
         let gain = DISPLAY_SLOPE * libm::exp2(settings.exposure) * brightest.max(f64::MIN_POSITIVE);
         CUT_SHARE * settings.tolerance / (gain * maps as f64)

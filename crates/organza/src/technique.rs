@@ -26,7 +26,6 @@ use crate::stage;
 use crate::statistics::ObjectStatistics;
 use crate::work::{Translucent, cost};
 use crate::{CostRecord, Error, Layers, RenderOptions};
-use deferred_blend::grouping::GroupsOfObjects;
 pub(crate) use particles::{Checkpoint, Kept};
 use splat_core::raster::{GlassImage, OpaqueImage};
 use splat_core::{Accumulator, Material};
@@ -115,8 +114,6 @@ pub(crate) struct Session<'s> {
     pub(crate) checkpoint: Option<&'s mut Checkpoint>,
     /// Sets that serve all frames of an animation.
     pub(crate) kept: Option<&'s mut Kept>,
-    /// Groups of discs that do.
-    pub(crate) groups: Option<&'s mut GroupsOfObjects>,
     pub(crate) warnings: &'s mut Vec<String>,
     /// Sets that were averaged, where some were.
     pub(crate) sets: Option<Sets>,

@@ -48,14 +48,14 @@ pub struct Material {
     pub bump: Bump,
 }
 
-/// Noise as heights over a surface, whose slopes tilt the normals that light falls on.
+/// Noise or a [`HeightImage`](crate::HeightImage) as heights over a surface, whose slopes tilt the normals that light falls on.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Bump {
-    /// Of the largest bumps, in the object's own unit, ≥ 0; 0 is smooth.
+    /// Of the largest bumps, or of what is white in an image over what is black; in the object's own unit, ≥ 0. 0 is smooth.
     pub height: f32,
-    /// Length of the largest bumps, in that unit, > 0 where there are some.
+    /// Length of the largest bumps, or width of the image, in that unit; > 0 where there are some.
     pub size: f32,
-    /// How many sizes there are, each half as large and as high as the one before.
+    /// How many sizes of noise there are, each half as large and as high as the one before; 0 where an image has the heights.
     pub octaves: u32,
     /// Of the noise.
     pub seed: u64,

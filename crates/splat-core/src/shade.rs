@@ -71,9 +71,25 @@ pub fn shade(
     layout: &ChannelLayout,
     progress: Option<&Progress>,
 ) -> Result<Vec<f32>, Error> {
+    assert_eq!(projected.splats.len(), input.cloud.len(), "invariant: one footprint a splat");
+    shade_some(input, |i| projected.is_visible(i), layout, progress)
+}
+
+/// [`shade`] of those splats that `is_one` says, wherever they are seen.
+///
+/// # Errors
+/// [`Error::Cancelled`].
+///
+/// # Panics
+/// If a material or object of the cloud is out of range.
+pub fn shade_some(
+    input: &ShadeInput<'_>,
+    is_one: impl Fn(usize) -> bool + Sync,
+    layout: &ChannelLayout,
+    progress: Option<&Progress>,
+) -> Result<Vec<f32>, Error> {
     let quiet = Progress::new();
     let progress = progress.unwrap_or(&quiet);
-    assert_eq!(projected.splats.len(), input.cloud.len(), "invariant: one footprint a splat");
     let channels = layout.count();
     let mut values = vec![0.0; input.cloud.len() * channels];
     progress.add_total(input.cloud.len().div_ceil(CHUNK) as u64);
@@ -83,7 +99,7 @@ pub fn shade(
         }
         for (k, out) in values.chunks_exact_mut(channels).enumerate() {
             let i = chunk * CHUNK + k;
-            if projected.is_visible(i) {
+            if is_one(i) {
                 let (radiance, normal) = shade_splat(input, i);
                 radiance.write(normal, layout, out);
             }

@@ -362,6 +362,7 @@ fn materials() -> Vec<Entry> {
         of(OPEN, "material.bump", "material.m.bump={height=0.1, size=0.5}").but_by(BUT_SURFELS, SMOOTH),
         of(OPEN, "material.bump.height", "material.m.bump.height=0.2").by(SURFELS).with(BUMPY),
         of(OPEN, "material.bump.size", "material.m.bump.size=1").by(SURFELS).with(BUMPY),
+        of(OPEN, "material.bump.image", "material.m.bump.image='bright.hdr'").by(SURFELS).with(BUMPY),
         of(OPEN, "material.bump.octaves", "material.m.bump.octaves=1").by(SURFELS).with(BUMPY),
         of(OPEN, "material.bump.seed", "material.m.bump.seed=9").by(SURFELS).with(BUMPY),
     ]

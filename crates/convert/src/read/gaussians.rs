@@ -1,9 +1,9 @@
 //! Gaussians as files have them, one by one, until they are points with a table of Gaussians.
 
 use super::{ReadParams, input, origin};
-use crate::srgb::linear_from_srgb;
 use crate::error::{Place, ReadError};
 use crate::raw_points::RawPoints;
+use crate::srgb::linear_from_srgb;
 use splat_core::Gaussians;
 use splat_core::glam::{DMat3, DQuat, DVec3};
 

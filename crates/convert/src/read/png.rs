@@ -1,4 +1,5 @@
-//! PNG (`.png`): pictures of 8 or 16 bits, grey or in colour, as displays show them (sRGB); they become linear radiance, 1 for white.
+//! PNG (`.png`): pictures of 8 or 16 bits, grey or in colour, as displays show them (sRGB); they become linear radiance, 1 for white. Where
+//! samples are no colours but numbers, they stay what they are, over the largest.
 
 use super::check_image;
 use super::input::{check_packed, reserve};
@@ -32,8 +33,9 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Radiance
         let hint = "an image of radiance hides nothing: flatten it onto a colour first";
         return Err(ReadError::input(Place::File, "opaque pixels", "some that are translucent", hint));
     }
-    let linear: Vec<f32> = (0..=u16::MAX).map(|v| linear_from_srgb(f64::from(v) / f64::from(u16::MAX))).collect();
-    pixels.extend(decoded.into_rgb16().pixels().map(|p| p.0.map(|v| linear[v as usize])));
+    let value = |v: f64| if reading.params.is_data { v as f32 } else { linear_from_srgb(v) };
+    let values: Vec<f32> = (0..=u16::MAX).map(|v| value(f64::from(v) / f64::from(u16::MAX))).collect();
+    pixels.extend(decoded.into_rgb16().pixels().map(|p| p.0.map(|v| values[v as usize])));
     Ok(RadianceImage { size: [width, height], pixels })
 }
 

@@ -108,6 +108,32 @@ impl GroupsOfObjects {
         self.0.insert(rank, (*recipe, KeptGroups::new(&places, radius, members.clone())));
         Ok((members, true))
     }
+
+    /// The same for discs of a cloud that are given by their places, each object's by themselves; `of` says how an object lies in the world
+    /// and how its discs are grouped. The groups are by place in the cloud; beside them the number of discs that were grouped anew.
+    ///
+    /// # Errors
+    /// As [`Recipe::group`], with the object's rank.
+    pub fn members_of_all(
+        &mut self,
+        (cloud, ids): (&Cloud, &[u32]),
+        of: impl Fn(usize) -> (Similarity, Recipe),
+        progress: Option<&Progress>,
+    ) -> Result<(Membership, u64), (usize, Error)> {
+        let mut of_object: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
+        for &id in ids {
+            of_object.entry(cloud.object[id as usize] as usize).or_default().push(id);
+        }
+        let (mut parts, mut anew) = (Vec::new(), 0);
+        for (&rank, ids) in &of_object {
+            let ((transform, recipe), discs) = (of(rank), cloud.gather(ids));
+            let members = self.members(rank, (&discs, &transform), &recipe, progress);
+            let (members, is_new) = members.map_err(|e| (rank, e))?;
+            anew += if is_new { ids.len() as u64 } else { 0 };
+            parts.push((ids.as_slice(), members));
+        }
+        Ok((Membership::join(cloud.len(), &parts), anew))
+    }
 }
 
 fn sorted(places: &[DVec3]) -> Vec<Place> {

@@ -11,7 +11,7 @@ use splat_core::raster::OpaqueImage;
 /// What these discs hide, and show.
 pub(super) fn opaque(frame: &Frame<'_>, ids: &[u32], cost: &mut CostRecord) -> Result<OpaqueImage, Error> {
     let (params, asked) = (params(frame), &frame.settings.surfels.opaque);
-    let group = |groups| grouped::members(frame, groups, ids, None, cost);
+    let group = |groups| grouped::members(frame, groups, ids, true, cost);
     let members = asked.groups().map(group).transpose()?;
     let passes = match (asked, &members) {
         (OpaqueSurfels::OnePass { voronoi, .. }, Some(members)) => {
@@ -45,7 +45,7 @@ pub(crate) fn with_shown<T>(
     }
     let lights = frame.lit_by(frame.maps(cost)?);
     let (input, layout, transforms) = (&frame.shading(&lights), frame.layout(), &transforms(frame));
-    draw(Shown::Pixels(Light { input, layout, transforms }), cost)
+    draw(Shown::Pixels(Light { input, layout, transforms, heights: &frame.loaded.images.heights }), cost)
 }
 
 /// From each object into the world, in the cloud's unit.

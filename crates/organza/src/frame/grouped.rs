@@ -5,7 +5,6 @@ use crate::pass;
 use crate::scene::{Collisions, Coverage, Grouping, Scene, SceneObject, SurfelGroups};
 use crate::{CostRecord, Error, escape_controls};
 use deferred_blend::grouping::{self, GroupsOfObjects, KeptGroups, Membership, Method, Recipe};
-use std::collections::BTreeMap;
 
 /// How the discs of an object are grouped, seen by some camera.
 fn recipe(groups: &SurfelGroups, frame: &Frame<'_>, object: &SceneObject) -> Recipe {
@@ -37,35 +36,24 @@ fn coverage(asked: Coverage, method: &Method) -> grouping::Coverage {
     }
 }
 
-/// The groups of discs that are drawn, by their places. The cost record has all discs, and those that were grouped anew.
+/// Groups that frames of an animation keep: of translucent discs, and of opaque ones, for an object may have both.
+pub(crate) type KeptInFrames = [GroupsOfObjects; 2];
+
+/// The groups of discs that are drawn, all of a kind, by their places. The cost record has all discs, and those that were grouped anew.
 pub(crate) fn members(
     frame: &Frame<'_>,
     groups: &SurfelGroups,
     ids: &[u32],
-    kept: Option<&mut GroupsOfObjects>,
+    are_opaque: bool,
     cost: &mut CostRecord,
 ) -> Result<Membership, Error> {
-    let (cloud, transforms) = (frame.drawn(), super::discs::transforms(frame));
-    let mut once = GroupsOfObjects::default();
-    let kept = kept.unwrap_or(&mut once);
-    let mut of_object: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
-    for &id in ids {
-        of_object.entry(cloud.object[id as usize] as usize).or_default().push(id);
-    }
+    let (transforms, objects) = (super::discs::transforms(frame), &frame.scene.objects);
+    let of = |rank: usize| (transforms[rank], recipe(groups, frame, &objects[rank]));
     cost.measure(pass::GROUP, |stage| {
-        let mut parts = Vec::new();
-        for (rank, ids) in &of_object {
-            let object = &frame.scene.objects[*rank];
-            let (recipe, discs) = (recipe(groups, frame, object), cloud.gather(ids));
-            let members = kept.members(*rank, (&discs, &transforms[*rank]), &recipe, Some(frame.progress));
-            let (members, is_new) = members.map_err(|e| refuse(object, e))?;
-            stage.items_in += ids.len() as u64;
-            stage.items_out += if is_new { ids.len() as u64 } else { 0 };
-            parts.push((ids.as_slice(), members));
-            frame.tick()?;
-        }
-        let all = Membership::join(cloud.len(), &parts);
-        stage.bytes = all.bytes();
+        let kept = &mut frame.groups.borrow_mut()[usize::from(are_opaque)];
+        let made = kept.members_of_all((frame.drawn(), ids), of, Some(frame.progress));
+        let (all, anew) = made.map_err(|(rank, e)| refuse(&objects[rank], e))?;
+        (stage.items_in, stage.items_out, stage.bytes) = (ids.len() as u64, anew, all.bytes());
         Ok(all)
     })
 }
@@ -92,6 +80,5 @@ pub(crate) fn bytes(scene: &Scene, discs: u64, cloud: u64) -> u64 {
         let recipe = Recipe { method, groups: groups.count, coverage, disc_scale: 1.0, gap: settings.gap as f32 };
         recipe.bytes(discs) + KeptGroups::place_bytes(discs) + cloud
     };
-    // Those of opaque discs are gone when others are made.
-    [settings.layers.groups(), settings.opaque.groups()].into_iter().flatten().map(of).max().unwrap_or(0)
+    [settings.layers.groups(), settings.opaque.groups()].into_iter().flatten().map(of).sum()
 }

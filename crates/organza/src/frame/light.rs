@@ -124,6 +124,6 @@ impl<'a> Frame<'a> {
 
     /// A point of a light behind its slide, without shadows.
     pub(crate) fn lit(&self, point: &LightPoint) -> LitBy<'_> {
-        LitBy { light: point.light, slide: self.loaded.slides[point.of].as_ref(), shadow: None }
+        LitBy { light: point.light, slide: self.loaded.images.slides[point.of].as_ref(), shadow: None }
     }
 }

@@ -7,7 +7,7 @@ use crate::{CostRecord, Error, stage};
 use splat_core::raster::{
     self, Detail, FinishInput, GlassImage, OpaqueImage, OpaqueInput, ProjectInput, Projected, RasterCounts,
 };
-use splat_core::shade::shade;
+use splat_core::shade::shade_some;
 use splat_core::{Accumulator, Cloud, Layers, SplatKind, StageCost};
 
 /// The drawn splats, ready to be composited, by id.
@@ -35,8 +35,8 @@ impl Frame<'_> {
         some.as_ref().unwrap_or(cloud)
     }
 
-    /// Footprints and radiance of the drawn splats in view; of those out of view the radiance is 0. The passes that were run for
-    /// it are added to `cost`.
+    /// Footprints and radiance of the drawn splats in view; of those out of view the radiance is 0, but where bent rays may see them. The
+    /// passes that were run for it are added to `cost`.
     ///
     /// # Errors
     /// [`Error::Cancelled`], and those of [`Frame::maps`].
@@ -50,9 +50,10 @@ impl Frame<'_> {
         self.progress.begin(stage::SHADE);
         let values = cost.measure(pass::SHADE, |stage| {
             let lights = self.lit_by(maps);
-            let values = shade(&self.shading(&lights), &projected, &layout, Some(self.progress));
+            let (bends, progress) = (self.plan.bends, Some(self.progress));
+            let values = shade_some(&self.shading(&lights), |i| bends || projected.is_visible(i), &layout, progress);
             let values = values.map_err(|e| Error::from_core("shading", e))?;
-            stage.items_in = projected.visible();
+            stage.items_in = if bends { self.drawn().len() as u64 } else { projected.visible() };
             stage.items_out = stage.items_in;
             stage.bytes = 4 * values.len() as u64;
             Ok::<_, Error>(values)

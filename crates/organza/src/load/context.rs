@@ -79,12 +79,12 @@ impl Context<'_> {
 
     /// Parameters of raw points.
     pub(super) fn surfel_params(&self, object: &SceneObject, splat: SplatParams) -> SurfelParams {
-        // The side that faces the sky.
+        // Terrain faces the sky.
         let up = splat.transform.rotation.inverse() * DVec3::Y;
         SurfelParams {
             splat,
             colors: object.color.is_none(),
-            orientation: Orientation::Toward(up),
+            orientation: Orientation::Auto(up),
             opacity: self.opacity(object),
             largest_spacing: LARGEST_SPACING,
             size: object.points.size,

@@ -1,49 +1,75 @@
-//! The images of a scene, from their files: its environment, and what lights shine through.
+//! The images of a scene, from their files: its environment, what lights shine through, and the heights of bumps.
 
 use super::files::FileData;
 use super::loading::Loading;
 use crate::scene::SceneLight;
 use crate::{Error, work};
-use splat_core::{Environment, Exceeded, RadianceImage, Slide};
-use std::path::Path;
+use convert::read::ReadParams;
+use splat_core::{Environment, Exceeded, HeightImage, RadianceImage, Slide};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// What is made of them.
+#[derive(Debug)]
+pub(crate) struct Images {
+    /// What is seen behind everything in the place of a colour.
+    pub(crate) environment: Option<Environment>,
+    /// What each light shines through.
+    pub(crate) slides: Vec<Option<Slide>>,
+    /// The heights of each material's bumps, where an image has them.
+    pub(crate) heights: Vec<Option<HeightImage>>,
+}
+
+impl Images {
+    /// Bytes that they take.
+    pub(crate) fn bytes(&self) -> u64 {
+        let slides: u64 = self.slides.iter().flatten().map(Slide::bytes).sum();
+        let heights: u64 = self.heights.iter().flatten().map(HeightImage::bytes).sum();
+        self.environment.as_ref().map_or(0, Environment::bytes) + slides + heights
+    }
+}
+
 impl Loading<'_> {
-    /// The environment that the scene names, if it does, and the bytes of it and of its image.
-    pub(super) fn environment(&self) -> Result<Option<(Environment, u64)>, Error> {
-        let Some(source) = &self.scene.environment else { return Ok(None) };
-        let (image, bytes) = self.image(&source.path, "as an environment", Environment::bytes_of)?;
-        let made = Environment::new(&image, source.turns, source.scale);
-        made.map(|made| Some((made, bytes)))
-            .map_err(|e| Error::input(crate::printable(&source.path), e.to_string(), "use a smaller background.scale"))
-    }
-
-    /// What each light shines through, if anything, and the bytes of all that and of its images.
-    pub(super) fn slides(&self, lights: &[SceneLight]) -> Result<(Vec<Option<Slide>>, u64), Error> {
-        let mut all = 0;
-        let one = |light: &SceneLight| {
-            let Some(source) = &light.slide else { return Ok(None) };
-            let (image, bytes) = self.image(&source.path, "as the texture of a light", Slide::bytes_of)?;
-            all += bytes;
-            let made = Slide::new(&image, &light.light.shape, &source.framing);
-            made.map(Some).map_err(|e| {
-                let hint = "place it in another way, by the keys that begin with `texture_`";
-                Error::input(crate::printable(&source.path), e.to_string(), hint)
-            })
+    /// All of them; slides for these lights.
+    pub(super) fn images(&self, lights: &[SceneLight]) -> Result<Images, Error> {
+        let heights = |path: &PathBuf| {
+            let image = self.image(path, "as heights of bumps", true, HeightImage::bytes_of)?;
+            HeightImage::new(&image).map_err(|e| refuse(path, &e, "make its heights smaller"))
         };
-        let slides = lights.iter().map(one).collect::<Result<_, _>>()?;
-        Ok((slides, all))
+        let materials = self.scene.materials.iter().map(|material| material.bump_image.as_ref());
+        Ok(Images {
+            environment: self.environment()?,
+            slides: lights.iter().map(|light| self.slide(light)).collect::<Result<_, _>>()?,
+            heights: materials.map(|path| path.map(heights).transpose()).collect::<Result<_, _>>()?,
+        })
     }
 
-    /// An image, and its bytes with those of what is made of one of its size.
+    fn environment(&self) -> Result<Option<Environment>, Error> {
+        let Some(source) = &self.scene.environment else { return Ok(None) };
+        let image = self.image(&source.path, "as an environment", false, Environment::bytes_of)?;
+        let made = Environment::new(&image, source.turns, source.scale);
+        made.map(Some).map_err(|e| refuse(&source.path, &e, "use a smaller background.scale"))
+    }
+
+    fn slide(&self, light: &SceneLight) -> Result<Option<Slide>, Error> {
+        let Some(source) = &light.slide else { return Ok(None) };
+        let image = self.image(&source.path, "as the texture of a light", false, Slide::bytes_of)?;
+        let made = Slide::new(&image, &light.light.shape, &source.framing);
+        let hint = "place it in another way, by the keys that begin with `texture_`";
+        made.map(Some).map_err(|e| refuse(&source.path, &e, hint))
+    }
+
+    /// An image, of colours or of numbers, of which something is made that takes `bytes_of` its size.
     fn image(
         &self,
         path: &Path,
         what: &str,
+        is_data: bool,
         bytes_of: fn([u32; 2]) -> u64,
-    ) -> Result<(Arc<RadianceImage>, u64), Error> {
+    ) -> Result<Arc<RadianceImage>, Error> {
         self.progress.begin(&work::reading_file(path));
-        let FileData::Image(image) = self.files.read(path, &self.options.read_params(), self.progress)? else {
+        let params = ReadParams { is_data, ..self.options.read_params() };
+        let FileData::Image(image) = self.files.read(path, &params, self.progress)? else {
             let hint = "name a Radiance HDR, OpenEXR or PNG file";
             return Err(Error::wrong_kind(path, "an image of radiance", hint));
         };
@@ -53,6 +79,10 @@ impl Loading<'_> {
             let hint = "use a smaller image, or a larger --max-memory".into();
             return Err(Error::Limit(Exceeded { what, needed, limit: Some(limit), unit: "bytes", hint }));
         }
-        Ok((image, needed))
+        Ok(image)
     }
+}
+
+fn refuse(path: &Path, error: &splat_core::Error, hint: &str) -> Error {
+    Error::input(crate::printable(path), error.to_string(), hint)
 }

@@ -14,7 +14,7 @@ use crate::technique::{Fold, Session, points};
 use crate::{CostRecord, Error, RenderOptions, stage};
 use deferred_blend::grouping::Membership;
 use deferred_blend::{BlendInput, Blended, Discs, Floors, Glass, Layering, Params, Surfaces, blend};
-use glass::{bending, bounds_matter, surfaces, unit};
+use glass::{bending, surfaces, unit};
 pub(crate) use plans::plans;
 use splat_core::glam::Vec3;
 use splat_core::raster::GlassImage;
@@ -77,7 +77,7 @@ impl<'a> Fold for Surfels<'a> {
         &mut self,
         range: Range<f32>,
         into: &mut Accumulator,
-        session: &mut Session<'_>,
+        _: &mut Session<'_>,
         cost: &mut CostRecord,
     ) -> Result<(), Error> {
         let frame = self.frame;
@@ -85,13 +85,12 @@ impl<'a> Fold for Surfels<'a> {
         if self.discs.is_none() {
             if let Some(groups) = frame.settings.surfels.layers.groups() {
                 let ids = frame.translucent(frame.drawn(), Technique::Surfels);
-                let members = grouped::members(frame, groups, &ids, session.groups.as_deref_mut(), cost)?;
-                self.members = Some(members);
+                self.members = Some(grouped::members(frame, groups, &ids, false, cost)?);
             }
             self.discs = Some(project(frame, &params, self.members.as_ref(), cost)?);
         }
         let opaque = &frame.opaque(cost)?.depth;
-        if self.surfaces.is_none() && bounds_matter(frame) {
+        if self.surfaces.is_none() && frame.plan.bends {
             let values = &frame.shaded(cost)?.values;
             let made = cost.measure(pass::SURFELS, |stage| Ok::<_, Error>(surfaces(frame, values, stage)))?;
             self.surfaces = Some(made);

@@ -10,6 +10,7 @@
 //! many texels a side as the one before, are means over areas, and of two of them, of which the texels are 2σ wide, it sees a blend.
 
 use super::LightShape;
+use crate::image_levels::{Border, ImageLevels};
 use crate::{Error, RadianceImage};
 use glam::DVec3;
 
@@ -52,13 +53,8 @@ pub struct Framing {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slide {
     projection: SlideProjection,
-    /// From fine to coarse, at least one.
-    levels: Vec<Level>,
+    picture: ImageLevels,
 }
-
-/// A picture of some fineness.
-#[derive(Debug, Clone, PartialEq)]
-struct Level(RadianceImage);
 
 impl SlideProjection {
     /// That of a picture of `size` before a light.
@@ -109,11 +105,7 @@ impl Slide {
     pub fn new(image: &RadianceImage, light: &LightShape, framing: &Framing) -> Result<Self, Error> {
         image.validate()?;
         let projection = SlideProjection::new(image.size, light, framing)?;
-        let mut levels = vec![Level(image.clone())];
-        while let Some(coarser) = levels.last().and_then(Level::coarser) {
-            levels.push(coarser);
-        }
-        Ok(Self { projection, levels })
+        Ok(Self { projection, picture: ImageLevels::new(image.clone(), Border::Goes) })
     }
 
     /// Where world points lie in it.
@@ -123,7 +115,7 @@ impl Slide {
 
     /// The picture as it was given.
     pub fn image(&self) -> &RadianceImage {
-        &self.levels[0].0
+        self.picture.image()
     }
 
     /// Factor on the light that arrives at a world point, per channel; `spread` is the deviation of the splat that receives it, world
@@ -138,11 +130,7 @@ impl Slide {
             return [0.0; 3];
         }
         let texels = 2.0 * spread * f64::from(self.image().size[0]);
-        let level = libm::log2(texels.max(1.0)).min((self.levels.len() - 1) as f64);
-        let (fine, share) = (level as usize, level.fract());
-        let seen = self.levels[fine].at(at);
-        let coarse = if share > 0.0 { self.levels[fine + 1].at(at) } else { seen };
-        std::array::from_fn(|c| (seen[c] + share * (coarse[c] - seen[c])) as f32)
+        self.picture.at(at, texels).map(|v| v as f32)
     }
 
     /// The most that it lets through in any channel.
@@ -161,62 +149,11 @@ impl Slide {
 
     /// Bytes that it takes.
     pub fn bytes(&self) -> u64 {
-        self.levels.iter().map(|level| level.0.bytes()).sum()
+        self.picture.bytes()
     }
 
     /// Bytes that a slide of a picture of this size takes.
     pub fn bytes_of(size: [u32; 2]) -> u64 {
-        let sizes = std::iter::successors(Some(size.map(|n| n.max(1))), |size| coarser_size(*size));
-        let texels = sizes.map(|[w, h]| u64::from(w) * u64::from(h)).fold(0, u64::saturating_add);
-        texels.saturating_mul(size_of::<[f32; 3]>() as u64)
-    }
-}
-
-/// Half as many texels a side; `None` for one texel.
-fn coarser_size(size: [u32; 2]) -> Option<[u32; 2]> {
-    (size != [1, 1]).then(|| size.map(|n| n.div_ceil(2)))
-}
-
-/// The texels of `fine` that texel `k` of `coarse` covers, and how much of each.
-fn covered([fine, coarse]: [u32; 2], k: u32) -> impl Iterator<Item = (usize, f64)> + Clone {
-    // A fine texel has the length `coarse`, a coarse one the length `fine`.
-    let [fine, coarse, k] = [fine, coarse, k].map(u64::from);
-    let (low, high) = (k * fine, (k + 1) * fine);
-    (low / coarse..high.div_ceil(coarse))
-        .map(move |i| (i as usize, (high.min((i + 1) * coarse) - low.max(i * coarse)) as f64))
-}
-
-impl Level {
-    fn coarser(&self) -> Option<Self> {
-        let Self(fine) = self;
-        let size = coarser_size(fine.size)?;
-        let texel = |x: u32, y: u32| {
-            let (columns, rows) = (covered([fine.size[0], size[0]], x), covered([fine.size[1], size[1]], y));
-            let (mut sum, mut area) = ([0.0; 3], 0.0);
-            for (row, height) in rows {
-                for (column, width) in columns.clone() {
-                    let seen = fine.pixels[row * fine.size[0] as usize + column].map(f64::from);
-                    (0..3).for_each(|c| sum[c] += width * height * seen[c]);
-                    area += width * height;
-                }
-            }
-            sum.map(|v| (v / area) as f32)
-        };
-        let texels = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| [x, y]));
-        let pixels = texels.map(|[x, y]| texel(x, y)).collect();
-        Some(Self(RadianceImage { size, pixels }))
-    }
-
-    /// Between the centres of four texels.
-    fn at(&self, at: [f64; 2]) -> [f64; 3] {
-        let [width, height] = self.0.size.map(|n| n as usize);
-        let between = |at: f64, count: usize| {
-            let place = (at * count as f64 - 0.5).clamp(0.0, (count - 1) as f64);
-            (place as usize, (place as usize + 1).min(count - 1), place.fract())
-        };
-        let ((left, right, x), (top, low, y)) = (between(at[0], width), between(at[1], height));
-        let texel = |column: usize, row: usize| self.0.pixels[row * width + column].map(f64::from);
-        let mix = |a: [f64; 3], b: [f64; 3], share: f64| [0, 1, 2].map(|c| a[c] + share * (b[c] - a[c]));
-        mix(mix(texel(left, top), texel(right, top), x), mix(texel(left, low), texel(right, low), x), y)
+        ImageLevels::bytes_of(size)
     }
 }

@@ -2,19 +2,9 @@
 
 use crate::frame::Frame;
 use crate::frame::discs::disc_input;
-use crate::scene::{self, SceneObject, Technique};
+use crate::scene::{self, Technique};
 use deferred_blend::{Bending, Surfaces};
 use splat_core::{SplatKind, StageCost};
-
-/// Whether surfaces that the technique draws bound matter.
-pub(super) fn bounds_matter(frame: &Frame<'_>) -> bool {
-    if super::bends(frame.scene).is_err() {
-        return false;
-    }
-    let objects = frame.scene.objects.iter().zip(&frame.plan.by).filter(|(o, _)| o.visible);
-    let material = |o: &SceneObject| &frame.loaded.materials[o.material];
-    objects.into_iter().any(|(o, by)| *by == Technique::Surfels && material(o).bounds_matter())
-}
 
 /// World units in a unit of the cloud.
 pub(super) fn unit(frame: &Frame<'_>) -> f32 {
