@@ -53,8 +53,7 @@ fn seen(points: &RawPoints, params: &SurfelParams) -> Gaussians {
     let mut gaussians = points.gaussians.transformed(&params.splat.transform);
     gaussians.opacity.iter_mut().for_each(|o| *o = (f64::from(*o) * params.opacity) as f32);
     if !params.colors {
-        gaussians.degree = 0;
-        gaussians.harmonics = vec![Gaussians::constant(params.splat.color); points.len()];
+        gaussians.recolor(&vec![params.splat.color; points.len()]);
     }
     gaussians
 }

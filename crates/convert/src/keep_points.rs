@@ -66,6 +66,7 @@ pub fn kept(points: &RawPoints, by: &[Kept], clips: &[Clip], up: DVec3) -> RawPo
             scale: l.scale,
         }),
         dropped: points.dropped,
+        gaussians: points.gaussians.chosen(&keeps),
     }
 }
 

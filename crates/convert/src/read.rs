@@ -169,6 +169,7 @@ impl ReadParams {
 }
 
 /// What a file holds, in the file's own axes and units. Meshes face outwards, also where the file's do not.
+#[expect(clippy::large_enum_variant, reason = "there is one a file")]
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Loaded {

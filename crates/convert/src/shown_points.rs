@@ -51,6 +51,9 @@ pub fn shown_points(
         let colored = colored(&points, by, shown.up, splat)?;
         said.push(sentence(by, &colored));
         let mut own = Arc::unwrap_or_clone(points);
+        if !own.gaussians.is_empty() {
+            own.gaussians.recolor(&colored.color);
+        }
         own.color = colored.color;
         points = own.into();
     }

@@ -196,6 +196,9 @@ pub(crate) fn check(points: &RawPoints, params: &SurfelParams) -> Result<(), Con
     if params.largest_spacing.is_nan() || params.largest_spacing < 1.0 {
         return Err(p.bad("largest_spacing", params.largest_spacing, "a number ≥ 1"));
     }
+    if let Some(size) = params.size.filter(|_| !points.gaussians.is_empty()) {
+        return Err(p.bad("size", size, "none: 3D Gaussians have sizes of their own"));
+    }
     if let Some(size) = params.size.filter(|size| !size.is_length()) {
         return Err(p.bad("size", size, "a diameter > 0"));
     }

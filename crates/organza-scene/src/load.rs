@@ -79,15 +79,9 @@ pub fn read(file: &Path) -> Result<Vec<u8>, Error> {
 /// # Errors
 /// As [`load`], without those of reading.
 pub fn parse(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Scene, Error> {
-    if bytes.len() as u64 > MAX_SCENE_BYTES {
-        return Err(Error::Limit(Exceeded {
-            what: format!("the scene file {}", crate::printable(file)).into(),
-            needed: bytes.len() as u64,
-            limit: Some(MAX_SCENE_BYTES),
-            unit: "bytes",
-            hint: "put data into files that the scene names".into(),
-        }));
-    }
+    let (what, hint) =
+        (format!("the scene file {}", crate::printable(file)), "put data into files that the scene names");
+    Exceeded::check(what, bytes.len() as u64, MAX_SCENE_BYTES, "bytes", hint).map_err(Error::Limit)?;
     let text = decode(file, bytes)?;
     let is_json = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
     let root = if is_json { read_json::read_json(file, text)? } else { read_toml::read_toml(file, text)? };

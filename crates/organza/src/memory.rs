@@ -108,15 +108,6 @@ fn own_bytes(loaded: &Loaded) -> u64 {
 
 /// Refuses what needs more than the limit.
 pub(crate) fn check(what: &str, needed: u64, limit: u64) -> Result<(), Error> {
-    if needed <= limit {
-        return Ok(());
-    }
-    Err(Error::Limit(Exceeded {
-        what: what.to_owned().into(),
-        needed,
-        limit: Some(limit),
-        unit: "bytes",
-        hint: "use fewer lights or samples of lights, a larger spacing, a smaller image, or a larger --max-memory"
-            .into(),
-    }))
+    let hint = "use fewer lights or samples of lights, a larger spacing, a smaller image, or a larger --max-memory";
+    Exceeded::check(what.to_owned(), needed, limit, "bytes", hint).map_err(Error::Limit)
 }

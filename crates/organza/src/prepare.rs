@@ -111,16 +111,18 @@ pub fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> R
     plan_counted(scene, loaded, options).map(|(plan, _)| plan)
 }
 
-/// What is said of 3D Gaussians whose technique leaves them out.
-const UNDRAWN: [&str; 2] = ["3D Gaussians, which its technique does not draw", "use `points` or `reference`"];
+/// Refuses 3D Gaussians whose technique leaves them out.
+fn check_gaussians(scene: &Scene, loaded: &Loaded) -> Result<(), Error> {
+    let mut of_gaussians = visible(scene).zip(&loaded.statistics).filter(|(_, of)| of.data == ObjectData::Gaussians);
+    let undrawn = of_gaussians.find(|(object, _)| !row(technique_of(object, scene)).gaussians);
+    let (what, hint) = ("3D Gaussians, which its technique does not draw", "use `points` or `reference`");
+    undrawn.map_or(Ok(()), |(object, _)| Err(Error::input(crate::shown(&object.name), what, hint)))
+}
 
 /// The plan of a loaded scene, and the bytes that it takes.
 fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Result<(Plan, Memory), Error> {
     check_samples(scene)?;
-    let mut of_gaussians = visible(scene).zip(&loaded.statistics).filter(|(_, of)| of.data == ObjectData::Gaussians);
-    if let Some((object, _)) = of_gaussians.find(|(o, _)| !row(technique_of(o, scene)).gaussians) {
-        return Err(Error::input(crate::shown(&object.name), UNDRAWN[0], UNDRAWN[1]));
-    }
+    check_gaussians(scene, loaded)?;
     let planned: Vec<PlannedObject> = visible(scene)
         .zip(&loaded.planned)
         .map(|(object, planned)| PlannedObject { technique: technique_of(object, scene), ..planned.clone() })
@@ -185,16 +187,8 @@ fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Resu
 fn check_samples(scene: &Scene) -> Result<(), Error> {
     let longest = scene.camera.size[0].max(scene.camera.size[1]);
     let (needed, limit) = (u64::from(longest) * u64::from(scene.render.antialias), u64::from(u16::MAX));
-    if needed <= limit {
-        return Ok(());
-    }
-    Err(Error::Limit(Exceeded {
-        what: "the longer side of the image".into(),
-        needed,
-        limit: Some(limit),
-        unit: "samples",
-        hint: "use a smaller camera.size or render.antialias".into(),
-    }))
+    let hint = "use a smaller camera.size or render.antialias";
+    Exceeded::check("the longer side of the image", needed, limit, "samples", hint).map_err(Error::Limit)
 }
 
 /// Reads every visible object, chooses its technique and form, and converts it.

@@ -121,6 +121,25 @@ impl Gaussians {
         out
     }
 
+    /// Those of which it is said, in their order; none of none.
+    #[must_use]
+    pub fn chosen(&self, is_chosen: &[bool]) -> Self {
+        let places: Vec<usize> = (0..self.len()).filter(|i| is_chosen[*i]).collect();
+        let n = self.terms();
+        Self {
+            axes: places.iter().map(|i| self.axes[*i]).collect(),
+            opacity: places.iter().map(|i| self.opacity[*i]).collect(),
+            degree: self.degree,
+            harmonics: places.iter().flat_map(|i| &self.harmonics[i * n..][..n]).copied().collect(),
+        }
+    }
+
+    /// Linear colours that are the same from everywhere, one a Gaussian.
+    pub fn recolor(&mut self, colors: &[[f32; 3]]) {
+        self.degree = 0;
+        self.harmonics = colors.iter().map(|color| Self::constant(*color)).collect();
+    }
+
     /// Appends others; the lower degree is filled up with zeros.
     fn append(&mut self, other: &Self) {
         let degree = self.degree.max(other.degree);

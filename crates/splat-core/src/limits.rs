@@ -58,6 +58,23 @@ pub struct Exceeded {
 const ROUNDED: u64 = 1_000_000_000_000_000;
 
 impl Exceeded {
+    /// Refuses what needs more than there may be; the fields in their order.
+    ///
+    /// # Errors
+    /// With `needed` above `limit`.
+    pub fn check(
+        what: impl Into<Cow<'static, str>>,
+        needed: u64,
+        limit: u64,
+        unit: &'static str,
+        hint: impl Into<Cow<'static, str>>,
+    ) -> Result<(), Self> {
+        match needed <= limit {
+            true => Ok(()),
+            false => Err(Self { what: what.into(), needed, limit: Some(limit), unit, hint: hint.into() }),
+        }
+    }
+
     /// The same said of something larger, `whose: what`, with the knob that is known there.
     pub fn of(self, whose: &str, hint: impl Into<Cow<'static, str>>) -> Self {
         Self { what: format!("{whose}: {}", self.what).into(), hint: hint.into(), ..self }

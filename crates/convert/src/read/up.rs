@@ -28,6 +28,7 @@ impl UpAxis {
         match self {
             Self::Y => DVec3::Y,
             Self::Z => DVec3::Z,
+            Self::MinusY => DVec3::NEG_Y,
         }
     }
 

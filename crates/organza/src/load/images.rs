@@ -73,12 +73,10 @@ impl Loading<'_> {
             let hint = "name a Radiance HDR, OpenEXR or PNG file";
             return Err(Error::wrong_kind(path, "an image of radiance", hint));
         };
-        let (needed, limit) = (image.bytes().saturating_add(bytes_of(image.size)), self.options.max_memory);
-        if needed > limit {
-            let what = format!("{} {what}", crate::printable(path)).into();
-            let hint = "use a smaller image, or a larger --max-memory".into();
-            return Err(Error::Limit(Exceeded { what, needed, limit: Some(limit), unit: "bytes", hint }));
-        }
+        let needed = image.bytes().saturating_add(bytes_of(image.size));
+        let (what, hint) =
+            (format!("{} {what}", crate::printable(path)), "use a smaller image, or a larger --max-memory");
+        Exceeded::check(what, needed, self.options.max_memory, "bytes", hint).map_err(Error::Limit)?;
         Ok(image)
     }
 }

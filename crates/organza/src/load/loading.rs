@@ -154,16 +154,9 @@ fn check_total(
 ) -> Result<(), Error> {
     let fits = options.max_memory.saturating_sub(held) / BYTES_PER_SPLAT;
     let limit = scene.render.max_points.map_or(fits, |asked| asked.min(fits));
-    if needed <= limit {
-        return Ok(());
-    }
     let most = splats.iter().max_by_key(|s| s.predicted);
     let named = most.map(|s| format!(", most of them '{}' with {}", crate::shown(&s.object), s.predicted));
-    Err(Error::Limit(Exceeded {
-        what: format!("the scene (before conversion{})", named.unwrap_or_default()).into(),
-        needed,
-        limit: Some(limit),
-        unit: "splats",
-        hint: "use a larger spacing, or a larger --max-memory or render.max_points".into(),
-    }))
+    let what = format!("the scene (before conversion{})", named.unwrap_or_default());
+    let hint = "use a larger spacing, or a larger --max-memory or render.max_points";
+    Exceeded::check(what, needed, limit, "splats", hint).map_err(Error::Limit)
 }

@@ -84,16 +84,10 @@ fn check_work(object: &SceneObject, input: &Input<'_>) -> Result<(), Error> {
     // A lattice of too many points has a refusal of its own.
     let Ok(evaluations) = evaluations else { return Ok(()) };
     let needed = evaluations * super::input::expression_field(expression, object)?.operations() as f64;
-    if needed <= MOST_OPERATIONS {
-        return Ok(());
-    }
-    Err(Error::Limit(Exceeded {
-        what: format!("the expression of object '{}'", crate::escape_controls(&object.name)).into(),
-        needed: needed as u64,
-        limit: Some(MOST_OPERATIONS as u64),
-        unit: "operations before anything is drawn",
-        hint: "use a larger spacing or a smaller resolution, a smaller box, or an expression with a bound".into(),
-    }))
+    let what = format!("the expression of object '{}'", crate::escape_controls(&object.name));
+    let hint = "use a larger spacing or a smaller resolution, a smaller box, or an expression with a bound";
+    let unit = "operations before anything is drawn";
+    Exceeded::check(what, needed as u64, MOST_OPERATIONS as u64, unit, hint).map_err(Error::Limit)
 }
 
 fn predict(input: &Input<'_>) -> Result<Prediction, ConvertError> {
