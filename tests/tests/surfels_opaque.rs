@@ -144,7 +144,7 @@ fn keys_of_opaque_surfaces_and_bumps_are_checked() {
     );
     refused(&bump("height = 1, size = 1, octaves = 2, image = 'a.png'"), "`octaves` belongs to noise");
     refused(&bump("height = 1, size = 1, image = '../../a.png'"), "lies outside the scene's root folder");
-    refused(&bump("height = 1, size = 1, image = 3"), "image");
+    refused(&bump("height = 1, size = 1, image = 3"), "expected a text in quotes, found the number 3");
 }
 
 /// A ramp from black to white over 2.4 units, 0.48 high, tilts a wall by a fifth, and turns with it; grey as the file stores it is height.

@@ -32,7 +32,7 @@ fn check(volume: Volume<'_>, camera: &Camera, sides: DVec3, extinction: f64) {
         cut += usize::from(in_box[1] > in_box[0] && in_box[1] - in_box[0] > far - near + 1e-9);
         seen += usize::from(length > 0.0);
     }
-    assert!(cut > 100 && seen > 100, "{cut} pixels are cut, {seen} show something");
+    assert!(cut > 50 && seen > 50, "{cut} pixels are cut, {seen} show something");
 }
 
 #[test]

@@ -53,7 +53,7 @@ mod tests {
         record.extend([255, 255, 255, 51, 218, 128, 128, 218]);
         let params = ReadParams::default();
         let points = read(&record, &mut Reading::new(&params, None)).unwrap();
-        assert_eq!((points.position[0], points.color[0]), (Vec3::new(1.0, -2.0, 3.5), [1.0; 3]));
+        assert_eq!((points.exact_position(0), points.color[0]), (DVec3::new(1.0, -2.0, 3.5), [1.0; 3]));
         assert_eq!(points.gaussians.opacity, [0.2]);
         let expected = [Vec3::Y * 0.5, Vec3::X * -0.25, Vec3::Z * 0.125];
         for (axis, expected) in points.gaussians.axes[0].iter().zip(expected) {
