@@ -258,6 +258,35 @@ fn a_turntable_is_numbered_frames_around_what_is_seen() {
     place.expect(2, &["render", "s.toml", "--turntable", "3"], "--turntable: s.toml has an animation of its own");
 }
 
+/// A plank along x, seen from its end in frame 0 and from its side in frame 1.
+#[test]
+fn nothing_is_cut_off_in_any_frame_of_a_turntable_of_a_file_and_init_writes_its_scene() {
+    let place = Place::new("");
+    place.write("plank.obj", "v -9 -1 -1\nv 9 -1 -1\nv 9 1 1\nv -9 1 1\nf 1 2 3\nf 1 3 4\n");
+    let turn = ["--turntable", "4", "--azimuth", "90"];
+    place.expect(0, &[&["render", "plank.obj", "-o", "t.exr"], &turn[..], &SIZE].concat(), "");
+    let most = (0..4).map(|frame| reach(&picture_of(&place.path(&format!("t.000{frame}.exr"))))).flatten();
+    let most = most.fold(0.0, f64::max);
+    assert!((0.7..0.99).contains(&most), "{most}");
+    place.expect(0, &[&["init", "plank.obj", "-o", "plank.toml"], &turn[..], &SIZE].concat(), "");
+    place.expect(0, &["render", "plank.toml", "-o", "plank.exr", "--turntable", "4"], "");
+    assert!(place.bytes("plank.0001.exr") == place.bytes("t.0001.exr"));
+}
+
+#[test]
+fn what_stands_on_the_plane_of_its_other_axes_points_up_along_the_third() {
+    let place = Place::new("");
+    let text = |file: &str| String::from_utf8(place.expect(0, &["info", file], "").stdout).unwrap();
+    place.write("cone.obj", "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nv 0 0 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\nf 3 2 1\n");
+    assert!(text("cone.obj").contains("it stands on z = 0, so a first scene has z point up"));
+    place.expect(0, &["init", "cone.obj", "-o", "cone.toml"], "");
+    assert!(String::from_utf8(place.bytes("cone.toml")).unwrap().contains("transform = { up = \"z\" }"));
+    place.expect(0, &["init", "cone.obj", "--up", "y", "-o", "lying.toml"], "");
+    assert!(String::from_utf8(place.bytes("lying.toml")).unwrap().contains("transform = { up = \"y\" }"));
+    place.write("hanging.obj", "v -1 -1 1\nv 1 -1 1\nv 0 1 1\nv 0 0 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\nf 3 2 1\n");
+    assert!(text("hanging.obj").contains("y, which a scene takes unless it says another\n"));
+}
+
 #[test]
 fn data_outside_the_root_folder_needs_the_line_that_the_error_offers_and_init_writes() {
     let place = data();

@@ -233,6 +233,9 @@ pub(super) struct InitArguments {
     /// Size of the picture, pixels
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub(super) size: Option<[i64; 2]>,
+    /// Place the camera for a turntable of so many frames, which `organza render` draws: nothing is cut off in any of them
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub(super) turntable: Option<u32>,
     /// Threads; 0 takes one for each core
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=MOST_THREADS))]
     pub(super) threads: u64,

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 /// Prints the plan; with `--measure` renders too and prints what it cost.
 pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
     processor_only(&arguments.scene)?;
-    let (given, files) = given(&arguments.scene)?;
+    let (given, files) = given(&arguments.scene, None)?;
     let scene = parse_scene(&arguments.scene, &given, None, None)?;
     let options = render_options(&arguments.scene);
     let (plan, cost, prepared, (warnings, notes, found)) = with_bar(|progress| {

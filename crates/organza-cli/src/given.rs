@@ -21,8 +21,9 @@ pub(super) struct Given {
     pub(super) is_made: bool,
 }
 
-/// Reads the scene, or the data files and makes a scene of them; starts the threads. What was read of data is in the files.
-pub(super) fn given(arguments: &SceneArguments) -> Result<(Given, Files), Error> {
+/// Reads the scene, or the data files and makes a scene of them, for a turntable of so many frames; starts the threads. What was read
+/// of data is in the files.
+pub(super) fn given(arguments: &SceneArguments, turntable: Option<u32>) -> Result<(Given, Files), Error> {
     check_backend(arguments)?;
     start_threads(arguments.threads)?;
     let files = Files::default();
@@ -30,7 +31,7 @@ pub(super) fn given(arguments: &SceneArguments) -> Result<(Given, Files), Error>
         refuse_wishes(&arguments.first)?;
         return Ok((Given { file: file.clone(), bytes: scene::read(file)?, is_made: false }, files));
     }
-    let wish = wish(&arguments.first, arguments.size)?;
+    let wish = wish(&arguments.first, arguments.size, turntable)?;
     let file = virtual_file(&arguments.inputs);
     let written = write_first(&arguments.inputs, &file, &wish, &files, &render_options(arguments))?;
     Ok((Given { file, bytes: written.text.into_bytes(), is_made: true }, files))
@@ -67,7 +68,7 @@ pub(super) fn write_first(
 }
 
 /// What the command line says of a first scene.
-pub(super) fn wish(first: &FirstArguments, size: Option<[i64; 2]>) -> Result<Wish, Error> {
+pub(super) fn wish(first: &FirstArguments, size: Option<[i64; 2]>, turntable: Option<u32>) -> Result<Wish, Error> {
     let check = |name: &str, value: Option<f64>, low: f64, high: f64| match value {
         Some(v) if !(low..=high).contains(&v) => {
             Err(Error::usage(format!("--{name} {v}: expected a number from {low} to {high}"), ""))
@@ -91,6 +92,7 @@ pub(super) fn wish(first: &FirstArguments, size: Option<[i64; 2]>) -> Result<Wis
         azimuth: check("azimuth", first.azimuth, -360.0, 360.0)?,
         elevation: check("elevation", first.elevation, -90.0, 90.0)?,
         fill: fit.unwrap_or(DEFAULT_FILL),
+        turntable,
         size,
         preset: first.preset.as_deref().map(Preset::named).transpose()?,
         color_by: first.color_by.clone(),

@@ -7,7 +7,7 @@ use super::given::is_scene;
 use super::session::path_text;
 use super::{console, memory};
 use organza::Error;
-use organza::scene::{self, LoadOptions, Scene, Source};
+use organza::scene::{self, LoadOptions, Scene, Source, UpAxis};
 use organza_survey::{Facts, Histogram, facts};
 use serde_json::{Value, json};
 use splat_core::LightShape;
@@ -121,5 +121,6 @@ fn file_document(facts: &Facts) -> Value {
         "remarks": facts.remarks,
         "mended": facts.mended,
         "up": facts.up.name(),
+        "stands_along": facts.stands.map(UpAxis::name),
     })
 }

@@ -14,7 +14,7 @@ pub(super) fn run(arguments: &InitArguments) -> Result<(), Error> {
     if let Some(scene) = arguments.inputs.iter().find(|path| is_scene(path)) {
         return Err(Error::usage(format!("{} is a scene already", printable(scene)), "name data files"));
     }
-    let wish = wish(&arguments.first, arguments.size)?;
+    let wish = wish(&arguments.first, arguments.size, arguments.turntable)?;
     let mut targets = Targets::default();
     targets.add_inputs(&arguments.inputs);
     let target = arguments.output.as_deref().map(|path| check_name(path)).transpose()?;

@@ -41,7 +41,7 @@ impl<'a> Jobs<'a> {
         for output in outputs.iter().filter(|_| !is_numbered) {
             Target::new(output, arguments.force)?;
         }
-        let (given, files) = given(&arguments.scene)?;
+        let (given, files) = given(&arguments.scene, arguments.turntable)?;
         let still = parsed(arguments, &given, None)?;
         let asked = arguments.frames.or(arguments.turntable.map(|_| Frames::All));
         let frames = asked.map(|frames| range(frames, &still)).transpose()?;

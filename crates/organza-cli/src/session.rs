@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 /// The scene, or a first scene of data files, with the options of the command line and a camera that has its place.
 pub(super) fn load_scene(arguments: &SceneArguments) -> Result<Scene, Error> {
-    let (given, files) = given(arguments)?;
+    let (given, files) = given(arguments, None)?;
     let scene = parse_scene(arguments, &given, None, None)?;
     Ok(organza::fitted(&scene, &render_options(arguments), &Progress::new(), &files)?.0.into_owned())
 }

@@ -1,6 +1,8 @@
 //! A data file as a first scene takes it: what it holds, and the name of its object.
 
+use crate::facts::bounds_of;
 use crate::preset::Wish;
+use crate::stands::stands_along;
 use convert::read::{ReadParams, UpAxis};
 use organza::{Error, FileData, Files, Progress, RenderOptions, printable};
 use std::path::{Path, PathBuf};
@@ -12,8 +14,10 @@ pub struct DataFile {
     pub path: PathBuf,
     /// What it holds.
     pub data: FileData,
-    /// Which of its axes points up.
+    /// Which of its axes points up by its format.
     pub up: UpAxis,
+    /// Which one points up by how it stands, where its format says nothing of that.
+    pub stands: Option<UpAxis>,
 }
 
 impl DataFile {
@@ -36,7 +40,16 @@ impl DataFile {
                 let message = "an image of radiance is an environment, and not a thing to look at";
                 refuse(message, "name it in a scene: [background] environment = \"FILE\"")
             }
-            _ => Ok(Self { path: path.to_owned(), data, up: convert::read::up_axis(path) }),
+            _ => {
+                let up = convert::read::up_axis(path);
+                let bounds = match &data {
+                    FileData::Mesh(mesh) => Some(mesh.bounds()),
+                    FileData::Points(points) => bounds_of(points.origin, &points.position),
+                    _ => None,
+                };
+                let stands = bounds.and_then(|bounds| stands_along(path, up, bounds));
+                Ok(Self { path: path.to_owned(), data, up, stands })
+            }
         }
     }
 
@@ -81,7 +94,7 @@ mod tests {
     fn objects_are_named_after_files_without_what_parts_paths() {
         let name = |path: &str| {
             let data = FileData::Points(RawPoints::default().into());
-            DataFile { path: path.into(), data, up: UpAxis::Y }.name()
+            DataFile { path: path.into(), data, up: UpAxis::Y, stands: None }.name()
         };
         assert_eq!(name("a/bun_zipper.ply.gz"), "bun_zipper");
         assert_eq!(name("head v1.2.nii"), "head-v1-2");

@@ -3,6 +3,7 @@
 use crate::histogram::Histogram;
 use crate::mesh_faults::{MeshFaults, mesh_faults};
 use crate::spacing::{duplicates, median_spacing};
+use crate::stands::stands_along;
 use convert::RawPoints;
 use convert::read::{Loaded, Mended, NamedColumn, ReadParams, UpAxis, up_axis};
 use organza::Error;
@@ -57,6 +58,8 @@ pub struct Facts {
     pub mended: Vec<String>,
     /// The axis that points up where a scene says `up = "auto"`.
     pub up: UpAxis,
+    /// The axis that a first scene has point up in its place, where the format says nothing of it and the data stands along that axis.
+    pub stands: Option<UpAxis>,
 }
 
 /// Reads a data file of at most `max_bytes` and measures it; `strict` refuses a file with a fault that could be mended.
@@ -81,7 +84,10 @@ pub fn facts(path: &Path, max_bytes: u64, strict: bool) -> Result<Facts, Error> 
     let unused = notes.unused.iter().filter(|name| !is_column(name)).cloned().collect();
     let remarks = notes.remarks.into_iter().chain(facts.remarks).collect();
     let mended = notes.mended.iter().map(Mended::to_string).collect();
-    Ok(Facts { bytes, format: notes.format, unused, remarks, mended, up: up_axis(path), ..facts })
+    let up = up_axis(path);
+    let may_stand = matches!(facts.kind, "mesh" | "points");
+    let stands = facts.bounds.filter(|_| may_stand).and_then(|bounds| stands_along(path, up, bounds));
+    Ok(Facts { bytes, format: notes.format, unused, remarks, mended, up, stands, ..facts })
 }
 
 impl Facts {
@@ -96,7 +102,7 @@ fn present(columns: &[(&'static str, bool)]) -> Vec<&'static str> {
     columns.iter().filter(|(_, on)| *on).map(|(name, _)| *name).collect()
 }
 
-fn bounds_of(origin: DVec3, positions: &[Vec3]) -> Option<DAabb> {
+pub(crate) fn bounds_of(origin: DVec3, positions: &[Vec3]) -> Option<DAabb> {
     let bounds = Aabb::of_points(positions);
     (!bounds.is_empty()).then(|| DAabb::new(origin + bounds.min.as_dvec3(), origin + bounds.max.as_dvec3()))
 }

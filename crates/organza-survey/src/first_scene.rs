@@ -76,7 +76,8 @@ pub fn first_scene(
     let drawn = render_text(data, wish);
     let seen: String = objects.iter().map(Object::material).chain(objects.iter().map(Object::text)).collect();
     let first = head(&camera) + &seen + drawn;
-    let scene = parse(scene_file, first.as_bytes(), &LoadOptions::default())?;
+    let scene =
+        parse(scene_file, first.as_bytes(), &LoadOptions { turntable: wish.turntable, ..LoadOptions::default() })?;
     let found = organza::fitted(&scene, options, progress, files)?.1;
     let found = found.ok_or_else(|| Error::Internal("a camera that was to be placed has no place".into()))?;
     let camera = camera_text(&found, azimuth);

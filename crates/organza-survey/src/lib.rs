@@ -18,6 +18,7 @@ mod number;
 mod paraview;
 mod preset;
 mod spacing;
+mod stands;
 mod transfer;
 
 pub use data_file::DataFile;

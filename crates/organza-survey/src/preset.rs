@@ -71,6 +71,8 @@ pub struct Wish {
     pub elevation: Option<f64>,
     /// Share of the picture that is filled, in (0, 1].
     pub fill: f64,
+    /// Frames of a turntable, all of which the picture is to be filled in and nothing cut off; `None` for a still.
+    pub turntable: Option<u32>,
     /// Width and height, pixels.
     pub size: [u32; 2],
     /// How volumes look, and the colour map of points.
@@ -89,6 +91,7 @@ impl Default for Wish {
             azimuth: None,
             elevation: None,
             fill: DEFAULT_FILL,
+            turntable: None,
             size: DEFAULT_SIZE,
             preset: None,
             color_by: None,

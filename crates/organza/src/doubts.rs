@@ -101,8 +101,7 @@ fn seen(loaded: &Loaded) -> Vec<bool> {
     let view = &loaded.camera;
     let mut seen = objects_in_view(&loaded.cloud, view, loaded.objects.len());
     for own in &loaded.own {
-        let bounds = own.world_box();
-        seen[own.object] |= view.may_see(view.view_from_world(bounds.center()), 0.5 * bounds.diagonal());
+        seen[own.object] |= view.may_see_hull(&own.world_box().corners());
     }
     seen
 }

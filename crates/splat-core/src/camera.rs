@@ -177,6 +177,19 @@ impl Camera {
         middle.z + radius > 0.0 && inside(middle.x.abs(), half[0]) && inside(middle.y.abs(), half[1])
     }
 
+    /// Whether a convex body with these corners, in world space, may reach into the pyramid, or the box, that the camera sees: no side of that
+    /// has all of it outside. Wrong only beside edges, where it says yes.
+    pub fn may_see_hull(&self, corners: &[DVec3]) -> bool {
+        let focal = self.focal_px();
+        let beyond = |p: DVec3, axis: usize, sign: f64| {
+            let half = 0.5 * f64::from(self.size[axis]) / focal;
+            sign * p[axis] > half * if self.is_orthographic() { 1.0 } else { p.z }
+        };
+        let all = |is_outside: &dyn Fn(DVec3) -> bool| corners.iter().all(|c| is_outside(self.view_from_world(*c)));
+        let beside = |axis: usize| [-1.0, 1.0].into_iter().any(|sign| all(&|p| beyond(p, axis, sign)));
+        !(all(&|p| p.z <= 0.0) || beside(0) || beside(1))
+    }
+
     /// The ray through image position (x, y), pixels from the top left corner: its unit direction in world space, and the solid angle
     /// of a pixel there, sr; 0 where rays are parallel.
     pub fn direction(&self, x_px: f64, y_px: f64) -> (DVec3, f64) {
@@ -242,5 +255,22 @@ mod tests {
         assert!(camera.may_see(DVec3::new(0.0, 2.0, 1.0), 0.71));
         assert!(camera.may_see(DVec3::new(1.9, 0.0, 1.0), 0.0) && !camera.may_see(DVec3::new(2.1, 0.0, 1.0), 0.0));
         assert!(!camera.may_see(DVec3::new(0.0, 0.0, -1.0), 0.9));
+    }
+
+    #[test]
+    fn a_long_body_beside_the_view_is_not_seen_though_a_ball_about_it_would_be() {
+        let projections =
+            [Projection::Perspective { fov_y: std::f64::consts::FRAC_PI_2 }, Projection::Orthographic { height: 8.0 }];
+        for projection in projections {
+            let camera = Camera::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, projection, [10, 10]).expect("a camera");
+            let sees = |min: [f64; 3], max: [f64; 3]| {
+                camera.may_see_hull(&crate::DAabb::new(DVec3::from_array(min), DVec3::from_array(max)).corners())
+            };
+            // Along the left side, which is x = −4 at a depth of 4.
+            assert!(!sees([-9.0, -50.0, -4.0], [-4.1, 50.0, -3.9]));
+            assert!(sees([-9.0, -50.0, -4.0], [-3.9, 50.0, -3.9]));
+            assert!(!sees([-50.0, 4.1, -4.0], [50.0, 5.0, -3.0]) && sees([-50.0, 3.9, -4.0], [50.0, 5.0, -3.0]));
+            assert!(!sees([-50.0, -50.0, 0.0], [50.0, 50.0, 9.0]) && sees([-50.0, -50.0, -0.1], [50.0, 50.0, 9.0]));
+        }
     }
 }

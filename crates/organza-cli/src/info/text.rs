@@ -1,5 +1,6 @@
 //! What is known of a file, for people.
 
+use organza::scene::UpAxis;
 use organza::{escape_controls, printable};
 use organza_survey::{Facts, Histogram, grouped, rounded};
 use serde_json::Value;
@@ -63,8 +64,12 @@ pub(super) fn of_facts(file: &Path, facts: &Facts) -> String {
     places(facts, &mut text);
     values(facts, &mut text);
     faults(facts, &mut text);
-    let by = if facts.kind == "image" { None } else { Some(facts.up.name()) };
-    by.into_iter().for_each(|axis| text.add("up", format!("{axis}, which a scene takes unless it says another")));
+    if facts.kind != "image" {
+        let stands = facts.stands.map(UpAxis::name);
+        let stands = stands.map(|axis| format!("; it stands on {axis} = 0, so a first scene has {axis} point up"));
+        let axis = facts.up.name();
+        text.add("up", format!("{axis}, which a scene takes unless it says another{}", stands.unwrap_or_default()));
+    }
     if !facts.unused.is_empty() {
         text.add("not used", facts.unused.join(", "));
     }

@@ -74,7 +74,7 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<O
         let colors = if let FileData::Points(points) = &file.data { point_colors(points, wish) } else { None };
         let bare = if file.is_colored() || colors.is_some() { None } else { clays.next() };
         let mut object = object(file, wish.preset.as_ref(), colors);
-        if let Some(up) = wish.up {
+        if let Some(up) = wish.up.or(file.stands) {
             object.keys = format!("transform = {{ up = \"{}\" }}\n{}", up.name(), object.keys);
         }
         if let (Some(clay), false) = (bare, matches!(file.data, FileData::Grid(_))) {
