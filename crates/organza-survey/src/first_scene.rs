@@ -84,7 +84,8 @@ pub fn first_scene(
     let mut text =
         format!("# A first scene, written by `organza init`. Every key: docs/scene.md of Organza.\n{}", head(&camera));
     let background = if data.iter().filter_map(DataFile::luminance).any(|l| l < IS_DARK) { BRIGHT } else { DARK };
-    let _ = write!(text, "\n[background]\ncolor = {}\n\n{}", color(background), lamps(&found));
+    let _ =
+        write!(text, "\n[background]\ncolor = {}\n\n{}", color(background), lamps(&found, wish.turntable.is_some()));
     text += &seen;
     if wish.ground {
         text += &ground(&found);
