@@ -3,6 +3,7 @@
 mod assets;
 mod ci;
 mod deny;
+mod fuzz;
 mod papers;
 mod quick;
 mod repo;
@@ -22,6 +23,8 @@ usage: cargo xtask COMMAND
   deep             what takes minutes and rarely breaks: kernels compiled anew, GPU work under every validation, every scene drawn
   quick            format, rules, clippy, and the tests of the crates that changed since main
   deny             licences and sources of all dependencies, by cargo-deny
+  fuzz [--seconds N] [--record] [TARGET…]
+                   all kinds of bytes as files, scenes and formulas, by cargo-fuzz on nightly; --record writes docs/robustness.md
   tidy             the rules that the compiler does not know: heads, sizes, dependency direction, assets
   papers           writes docs/papers.md from docs/papers/*.toml
   papers --check   fails where docs/papers.md is stale or names code or a test that does not exist
@@ -41,6 +44,7 @@ fn main() -> ExitCode {
         ["deep"] => Repo::open().and_then(|repo| ci::deep(&repo)),
         ["quick"] => Repo::open().and_then(|repo| quick::run(&repo)),
         ["deny"] => Repo::open().and_then(|repo| deny::run(&repo)),
+        ["fuzz", rest @ ..] => Repo::open().and_then(|repo| fuzz::run(&repo, rest)),
         ["tidy"] => Repo::open().and_then(|repo| tidy::run(&repo)),
         ["papers"] => Repo::open().and_then(|repo| papers::write(&repo)),
         ["papers", "--check"] => Repo::open().and_then(|repo| papers::check(&repo)),

@@ -60,8 +60,10 @@ fn packages(repo: &Repo, paths: &[String]) -> BTreeSet<String> {
         let name = lines(text).into_iter().find(|l| l.table == "package" && l.key == "name")?;
         Some((path.strip_suffix("Cargo.toml")?.to_owned(), string(name.value).ok()?))
     };
-    let all: Vec<(String, String)> =
-        repo.texts().filter(|(path, _)| path.ends_with("Cargo.toml")).filter_map(named).collect();
+    // What is a workspace of its own has no tests here.
+    let manifests =
+        repo.texts().filter(|(path, text)| path.ends_with("Cargo.toml") && !text.contains("\n[workspace]\n"));
+    let all: Vec<(String, String)> = manifests.filter_map(named).collect();
     let owner = |path: &String| {
         let above = all.iter().filter(|(folder, _)| path.starts_with(folder.as_str()));
         above.max_by_key(|(folder, _)| folder.len()).map(|(_, name)| name.clone())
@@ -77,9 +79,12 @@ mod tests {
     fn the_tests_of_what_changed_are_run() {
         let manifest = |name: &str| format!("[package]\nname = \"{name}\"\n[[test]]\nname = \"other\"\n");
         let [tsm, tests, gpu] = ["tsm", "organza-tests", "gpu-conformance"].map(manifest);
+        let fuzz = manifest("fuzz") + "[workspace]\n[dependencies]\n";
         let files = [("crates/tsm/Cargo.toml", &tsm), ("tests/Cargo.toml", &tests), ("tests/gpu/Cargo.toml", &gpu)];
-        let repo = Repo::of(&files.map(|(path, text)| (path, text.as_str())));
-        let paths = ["crates/tsm/src/lookup.rs", "tests/gpu/lib.rs", "README.md"].map(str::to_owned);
+        let files = [&files[..], &[("fuzz/Cargo.toml", &fuzz)]].concat();
+        let files: Vec<(&str, &str)> = files.iter().map(|(path, text)| (*path, text.as_str())).collect();
+        let repo = Repo::of(&files);
+        let paths = ["crates/tsm/src/lookup.rs", "tests/gpu/lib.rs", "fuzz/src/lib.rs", "README.md"].map(str::to_owned);
         let found = packages(&repo, &paths);
         assert_eq!(found.iter().collect::<Vec<_>>(), ["gpu-conformance", "tsm"]);
         let Work::Cargo(runs, _) = &steps(&found).pop().expect("steps").work else { panic!("tests are run by cargo") };

@@ -46,7 +46,7 @@ pub enum Place {
 
 impl Place {
     /// The same without a column.
-    #[cfg(any(feature = "off", feature = "obj"))]
+    #[cfg(any(feature = "off", feature = "obj", feature = "vti", feature = "vtk"))]
     pub(crate) fn whole_line(self) -> Self {
         match self {
             Self::Line { line, .. } => Self::Line { line, column: 0 },

@@ -45,7 +45,15 @@ mod mpu;
 mod neighbours;
 #[cfg(feature = "surfels")]
 mod orient;
-#[cfg(any(feature = "ply", feature = "stl", feature = "obj", feature = "off", feature = "gltf"))]
+#[cfg(any(
+    feature = "ply",
+    feature = "stl",
+    feature = "obj",
+    feature = "off",
+    feature = "gltf",
+    feature = "vti",
+    feature = "vtk"
+))]
 mod outwards;
 mod params;
 mod pieces;

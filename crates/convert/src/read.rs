@@ -1,4 +1,4 @@
-//! Reading files: meshes (PLY, STL, OBJ, OFF, glTF), point clouds (PLY, OBJ, OFF, PCD, glTF, XYZ, CSV, LAS, LAZ), 3D Gaussians (PLY, packed
+//! Reading files: meshes (PLY, STL, OBJ, OFF, glTF), point clouds (PLY, OBJ, OFF, PCD, glTF, XYZ, CSV, LAS, LAZ, E57), 3D Gaussians (PLY, packed
 //! PLY, .splat, SPZ), volumes (NIfTI,
 //! NRRD, MetaImage, VTK, raw) and images of radiance (Radiance HDR, OpenEXR, PNG), each also inside gzip.
 //!
@@ -15,6 +15,7 @@
         feature = "pcd",
         feature = "xyz",
         feature = "las",
+        feature = "e57",
         feature = "nrrd",
         feature = "nifti",
         feature = "metaimage",
@@ -37,11 +38,17 @@
 )]
 
 mod beside;
+#[cfg(any(feature = "vti", feature = "vtk"))]
+mod cells;
+#[cfg(feature = "las")]
+mod copc;
 mod decimal;
 mod detached;
 mod direction;
+#[cfg(feature = "e57")]
+mod e57;
 mod extras;
-#[cfg(any(feature = "obj", feature = "off"))]
+#[cfg(any(feature = "obj", feature = "off", feature = "vti", feature = "vtk"))]
 mod fans;
 mod format;
 #[cfg(any(feature = "ply", feature = "splat", feature = "spz"))]
@@ -78,7 +85,7 @@ mod pcd;
 mod ply;
 #[cfg(feature = "png")]
 mod png;
-#[cfg(any(feature = "ply", feature = "obj", feature = "off"))]
+#[cfg(any(feature = "ply", feature = "obj", feature = "off", feature = "vti", feature = "vtk"))]
 mod polygon;
 #[cfg(feature = "hdr")]
 mod radiance;
@@ -105,6 +112,8 @@ mod voxels;
 mod vti;
 #[cfg(feature = "vtk")]
 mod vtk;
+#[cfg(any(feature = "vti", feature = "e57"))]
+mod xml;
 #[cfg(feature = "xyz")]
 mod xyz;
 
@@ -135,6 +144,9 @@ pub struct ReadParams {
     pub strict: bool,
     /// Which volume of a series is read, from 0; other files have a frame 0 alone.
     pub frame: u64,
+    /// Points that are wanted at most. Of a file that has levels of detail (COPC) whole levels are read, coarsest first, as far as that
+    /// goes, and the coarsest in any case; other files are read whole.
+    pub most_points: Option<u64>,
     /// Columns of points that are kept in [`RawPoints::columns`] beside those that have a meaning, each by its name in the file or by one
     /// that [`RawPoints::column`] knows. One that a file of points has not is an error that names those that it has.
     pub columns: Vec<String>,
@@ -145,7 +157,7 @@ pub struct ReadParams {
 }
 
 impl Default for ReadParams {
-    /// 4 GiB, nothing dropped, what can be mended is mended, the first of a series, no further columns, pictures in colours of a
+    /// 4 GiB, nothing dropped, what can be mended is mended, the first of a series, all points, no further columns, pictures in colours of a
     /// display.
     fn default() -> Self {
         Self {
@@ -153,6 +165,7 @@ impl Default for ReadParams {
             drop_invalid: false,
             strict: false,
             frame: 0,
+            most_points: None,
             columns: Vec::new(),
             ranges: false,
             is_data: false,
@@ -228,7 +241,15 @@ fn whole(
     if let Loaded::Points(points) = &loaded {
         check_columns(points, reading)?;
     }
-    #[cfg(any(feature = "ply", feature = "stl", feature = "obj", feature = "off", feature = "gltf"))]
+    #[cfg(any(
+        feature = "ply",
+        feature = "stl",
+        feature = "obj",
+        feature = "off",
+        feature = "gltf",
+        feature = "vti",
+        feature = "vtk"
+    ))]
     if let Loaded::Mesh(mut mesh) = loaded {
         for _ in 0..crate::outwards::turn_outwards(&mut mesh) {
             reading.mend((Fix::InsideOut, Place::File, None), || {
@@ -316,14 +337,16 @@ fn parse_as(
         Format::Nrrd => nrrd::read(stream, place, params, &mut reading.notes).map(Loaded::Grid),
         #[cfg(feature = "las")]
         Format::Las => las::read(stream.rest()?, params, &mut reading.notes).map(Loaded::Points),
+        #[cfg(feature = "e57")]
+        Format::E57 => e57::read(stream.rest()?, reading).map(Loaded::Points),
         #[cfg(feature = "nifti")]
         Format::Nifti => nifti::read(stream, params, &mut reading.notes).map(Loaded::Grid),
         #[cfg(feature = "metaimage")]
         Format::MetaImage => metaimage::read(stream, place, params, &mut reading.notes).map(Loaded::Grid),
         #[cfg(feature = "vti")]
-        Format::Vti => vti::read(&stream.rest()?, params, &mut reading.notes).map(Loaded::Grid),
+        Format::VtkXml => vti::read(&stream.rest()?, reading),
         #[cfg(feature = "vtk")]
-        Format::Vtk => vtk::read(&stream.rest()?, params, &mut reading.notes).map(Loaded::Grid),
+        Format::Vtk => vtk::read(&stream.rest()?, reading),
         #[cfg(feature = "raw")]
         Format::Raw => raw::read(stream, path, params, &mut reading.notes).map(Loaded::Grid),
         #[cfg(feature = "hdr")]

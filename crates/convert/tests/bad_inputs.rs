@@ -61,7 +61,7 @@ fn ba02_empty_one_byte_and_header_only() {
     refused_with(
         "a.dat",
         b"1 2 3",
-        "a.dat@0: expected 'ply', 'LASF', 'NRRD', 'glTF', '# .PCD', '#?', a NIfTI-1, OpenEXR or PNG header, or the extension of a",
+        "a.dat@0: expected 'ply', 'LASF', 'ASTM-E57', 'NRRD', 'glTF', '# .PCD', '#?', a NIfTI-1, OpenEXR or PNG header, or the extension",
     );
     let text = ply_ascii();
     let header = text.split_inclusive("end_header\n").next().unwrap();

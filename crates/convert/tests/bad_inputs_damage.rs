@@ -17,6 +17,7 @@
     feature = "vtk",
     feature = "raw",
     feature = "las",
+    feature = "e57",
     feature = "hdr",
     feature = "exr",
     feature = "png",
@@ -26,16 +27,12 @@
 ))]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod every_sample;
 mod read_samples;
 
 use convert::read::{Loaded, ReadParams, bytes};
-use exr::prelude::{Blocks, Compression, Vec2};
-use image::ImageFormat;
-use read_samples::gaussians::{packed_ply, splat, spz, trained, trained_ply};
-use read_samples::oldest::laz_oldest;
-use read_samples::volumes::{self, metaimage, vti, vtk, vtk_scalars};
-use read_samples::{NIFTI_F32, gzip, images, las, load, nifti, nrrd, obj, ply_ascii, ply_binary, stl, text_points};
-use read_samples::{image, off, pcd, plain_glb, square_glb, square_gltf};
+use every_sample::{bodies, samples, text_samples, textured};
+use read_samples::{e57, gzip, las, load, square_gltf};
 use splat_core::Limits;
 use std::process::Command;
 
@@ -78,78 +75,14 @@ fn valid(loaded: &Loaded) {
     }
 }
 
-fn samples() -> Vec<(&'static str, Vec<u8>)> {
-    vec![
-        ("ascii.ply", ply_ascii().into_bytes()),
-        ("little.ply", ply_binary(false)),
-        ("big.ply", ply_binary(true)),
-        ("packed.ply.gz", gzip(&ply_binary(false))),
-        ("u.nii", nifti(NIFTI_F32, false)),
-        ("b.nii", nifti(NIFTI_F32, true)),
-        ("p.nii.gz", gzip(&nifti(NIFTI_F32, false))),
-        ("f3.las", las(3, 20, false)),
-        ("f7.las", las(7, 20, false)),
-        ("f3.laz", las(3, 20, true)),
-        ("f7.laz", las(7, 20, true)),
-        ("old.laz", laz_oldest(1, 20)),
-        ("b.stl", stl(true)),
-        ("a.off", off()),
-        ("text.pcd", pcd("ascii")),
-        ("bytes.pcd", pcd("binary")),
-        ("packed.pcd", pcd("binary_compressed")),
-        ("plain.glb", plain_glb()),
-        ("raw.nrrd", nrrd("raw")),
-        ("gz.nrrd", nrrd("gzip")),
-        ("packed.nrrd.gz", gzip(&nrrd("gzip"))),
-        ("raw.mha", metaimage("raw", true)),
-        ("zlib.mha", metaimage("zlib", false)),
-        ("ascii.vti", vti("ascii", false)),
-        ("binary.vti", vti("binary", false)),
-        ("rawblocks.vti", vti("raw", true)),
-        ("base64blocks.vti", vti("base64", true)),
-        ("binary.vtk", vtk_scalars(true)),
-        ("a_3x2x2_float32.raw", volumes::raw(false)),
-        ("newer.hdr", images::hdr_of("EXPOSURE=0.5\n", &images::newer())),
-        ("older.hdr", images::hdr_of("", &images::older())),
-        ("lines.exr", images::exr(Compression::ZIP16, Blocks::ScanLines)),
-        ("tiles.exr", images::exr(Compression::PIZ, Blocks::Tiles(Vec2(8, 4)))),
-        ("plain.exr", images::exr(Compression::Uncompressed, Blocks::ScanLines)),
-        ("a.png", images::png(image::ExtendedColorType::Rgb8, &images::png_bytes(3))),
-        ("trained.ply", trained_ply(&[trained(0, 1)], 1, "binary_little_endian")),
-        ("words.ply", packed_ply(&[trained(0, 1), trained(1, 1)], 1)),
-        ("a.splat", splat(&[trained(0, 0)])),
-        ("old.spz", spz(&[trained(0, 1), trained(1, 1)], 1, 2)),
-        ("new.spz", gzip(&spz(&[trained(0, 1), trained(1, 1)], 1, 3))),
-    ]
-}
-
-/// Files that hold an image, and its bytes.
-fn textured() -> Vec<(&'static str, Vec<u8>, Vec<u8>)> {
-    let [png, jpeg] = [ImageFormat::Png, ImageFormat::Jpeg];
-    vec![("png.glb", square_glb(png), image(4, png)), ("jpeg.glb", square_glb(jpeg), image(4, jpeg))]
-}
-
-/// Files of which a part may be a file too.
-fn text_samples() -> Vec<(&'static str, Vec<u8>)> {
-    vec![
-        ("t.stl", stl(false)),
-        ("a.obj", obj()),
-        ("a.xyz", text_points(" ", "")),
-        ("a.csv", text_points(",", "x,y,z,nx,ny,nz\n")),
-        ("text.nrrd", nrrd("text")),
-        ("text.mha", metaimage("text", false)),
-        ("text.vtk", vtk(false)),
-        ("arrays.vtk", vtk(true)),
-    ]
-}
-
 #[test]
 fn ba05_every_truncation_is_refused() {
     if !limited("ba05_every_truncation_is_refused") {
         return;
     }
     let textured = textured().into_iter().map(|(name, content, _)| (name, content));
-    for (name, content) in samples().into_iter().chain(textured).chain([("text.gltf", square_gltf())]) {
+    let more = bodies().into_iter().filter(|(name, _)| name.ends_with(".vtu")).chain([("text.gltf", square_gltf())]);
+    for (name, content) in samples().into_iter().chain(textured).chain(more) {
         let whole = load(name, &content).unwrap();
         for length in 0..content.len() {
             match load(name, &content[..length]) {
@@ -175,16 +108,7 @@ fn every_flipped_bit_gives_an_error_or_a_valid_object() {
     }));
     let mut accepted = Vec::new();
     for (name, content) in samples().into_iter().chain(text_samples()) {
-        let mut damaged = content.clone();
-        let mut ok = 0;
-        for bit in 0..content.len() * 8 {
-            damaged[bit / 8] ^= 1 << (bit % 8);
-            if let Ok(loaded) = load(name, &damaged) {
-                valid(&loaded);
-                ok += 1;
-            }
-            damaged[bit / 8] = content[bit / 8];
-        }
+        let ok = flip_each_bit(name, &content, 0..content.len(), &ReadParams::default());
         accepted.push(format!("{name}: {ok} of {} accepted", content.len() * 8));
     }
     println!("{}", accepted.join("\n"));
@@ -196,18 +120,81 @@ fn every_flipped_bit_of_a_texture_gives_an_error_or_a_valid_object() {
         return;
     }
     // A flipped size may make an image of noise, for which surfaces are divided as far as there is room.
-    let params = ReadParams { limits: Limits::bytes(1 << 20), ..ReadParams::default() };
     for (name, content, image) in textured() {
         let start = content.windows(image.len()).position(|w| w == image).unwrap();
-        let mut damaged = content.clone();
-        for bit in start * 8..(start + image.len()) * 8 {
-            damaged[bit / 8] ^= 1 << (bit % 8);
-            if let Ok((loaded, _)) = bytes(name, &damaged, &params, None) {
-                valid(&loaded);
-            }
-            damaged[bit / 8] = content[bit / 8];
-        }
+        flip_each_bit(name, &content, start..start + image.len(), &few_bytes());
     }
+}
+
+/// With room for little.
+fn few_bytes() -> ReadParams {
+    ReadParams { limits: Limits::bytes(1 << 20), ..ReadParams::default() }
+}
+
+/// Flips each bit of a part of a file; gives how often something valid was read.
+fn flip_each_bit(name: &str, content: &[u8], part: std::ops::Range<usize>, params: &ReadParams) -> usize {
+    let mut damaged = content.to_vec();
+    let mut accepted = 0;
+    for bit in part.start * 8..part.end * 8 {
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        if let Ok((loaded, _)) = bytes(name, &damaged, params, None) {
+            valid(&loaded);
+            accepted += 1;
+        }
+        damaged[bit / 8] = content[bit / 8];
+    }
+    accepted
+}
+
+/// All but the voxels, for which there is no room: there would be a quarter of a million each time.
+#[test]
+fn every_flipped_bit_of_bodies_gives_an_error_or_a_valid_object() {
+    if !limited("every_flipped_bit_of_bodies_gives_an_error_or_a_valid_object") {
+        return;
+    }
+    for (name, content) in bodies() {
+        let error = bytes(name, &content, &few_bytes(), None).unwrap_err().to_string();
+        assert!(error.contains("bytes for the voxels"), "{error}");
+        flip_each_bit(name, &content, 0..content.len(), &few_bytes());
+    }
+}
+
+#[test]
+fn every_flipped_bit_of_levels_of_detail_gives_an_error_or_a_valid_object() {
+    if !limited("every_flipped_bit_of_levels_of_detail_gives_an_error_or_a_valid_object") {
+        return;
+    }
+    std::panic::set_hook(Box::new(|info| {
+        assert!(convert::read::panic_is_input_error(), "{info}");
+    }));
+    let content = read_samples::copc::copc(&[5, 20]);
+    let params = ReadParams { most_points: Some(10), ..ReadParams::default() };
+    // The record of COPC behind the header, and the hierarchy at the end: the rest is LAZ.
+    for part in [375..375 + 54 + 160, content.len() - 3 * 32..content.len()] {
+        flip_each_bit("levels.laz", &content, part, &params);
+    }
+}
+
+/// The sums of its pages would tell all damage of a scan: here they are right again.
+#[test]
+fn every_flipped_bit_of_scans_with_right_sums_gives_an_error_or_a_valid_object() {
+    if !limited("every_flipped_bit_of_scans_with_right_sums_gives_an_error_or_a_valid_object") {
+        return;
+    }
+    let content = e57::e57();
+    let mut damaged = content.clone();
+    let mut accepted = 0;
+    for bit in 0..content.len() * 8 {
+        let page = bit / 8 / 1024 * 1024..bit / 8 / 1024 * 1024 + 1024;
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        e57::sum(&mut damaged[page.clone()]);
+        if let Ok(loaded) = load("scans.e57", &damaged) {
+            valid(&loaded);
+            accepted += 1;
+        }
+        damaged[page.clone()].copy_from_slice(&content[page]);
+    }
+    println!("{accepted} of {} accepted", content.len() * 8);
 }
 
 /// Damage beyond one bit: a byte of every place set to each of some values, in the formats with the most trust in them.

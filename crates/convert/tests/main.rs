@@ -15,7 +15,10 @@ mod marching_cubes;
 mod mpu_fields;
 mod point_opacity;
 mod read_assets;
+mod read_cells;
 mod read_columns;
+mod read_copc;
+mod read_e57;
 #[cfg(all(feature = "splat", feature = "spz"))]
 mod read_gaussians;
 #[cfg(all(feature = "off", feature = "pcd", feature = "gltf"))]

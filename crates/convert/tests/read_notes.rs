@@ -61,3 +61,12 @@ fn points_with_an_opacity_are_no_gaussians() {
     assert!(error.contains("'rot_3'"), "{error}");
     load("a.ply", text.replace("rot_0", "turn").as_bytes()).unwrap();
 }
+
+/// Of a line of a megabyte of names each was held against all others, which took minutes.
+#[test]
+fn of_very_many_names_the_first_are_said() {
+    let names: Vec<String> = (0..120_000).map(|i| format!("a{i}")).collect();
+    let numbers = "1 ".repeat(names.len() + 3);
+    let found = unused("a.xyz", format!("x y z {}\n{numbers}\n", names.join(" ")).as_bytes());
+    assert_eq!((found.len(), found[511].as_str(), found[512].as_str()), (513, "a511", "further ones"));
+}

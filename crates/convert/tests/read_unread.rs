@@ -17,7 +17,7 @@ fn formats_that_are_not_read_are_named_with_what_to_do() {
         ("a.x3d", b"<?xml", "X3D or VRML", "convert it to glTF"),
         ("a.step", b"ISO-10303-21;", "STEP", "export it as STL, OBJ or glTF"),
         ("a.vdb", b" BDV\0\0\0\0", "OpenVDB", "convert it to NRRD"),
-        ("a.e57", b"ASTM-E57", "E57", "convert it to PLY"),
+        ("a.ptx", b"4\n4\n", "PTX", "convert it to PLY"),
         ("a.h5", b"\x89HDF\r\n\x1a\n", "HDF5", "convert it to NRRD"),
         ("a.dcm", &dicom, "DICOM", "convert it to NRRD"),
         ("a.jpg", b"\xff\xd8\xff\xe0", "a JPEG image", "convert the image"),

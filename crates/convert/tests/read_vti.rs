@@ -69,7 +69,7 @@ fn an_extent_that_does_not_begin_at_zero_moves_the_origin() {
 #[test]
 fn what_is_wrong_in_a_file_is_named() {
     for (from, to, expected) in [
-        ("\"ImageData\"", "\"PolyData\"", "expected a VTKFile of type ImageData, found 'PolyData'"),
+        ("\"ImageData\"", "\"PolyData\"", "expected an element PolyData, found 'none'"),
         ("LittleEndian", "MiddleEndian", "expected byte_order LittleEndian or BigEndian"),
         ("UInt32", "UInt16", "expected header_type UInt32 or UInt64"),
         (
@@ -132,4 +132,14 @@ fn hostile_xml_is_refused_without_a_deep_stack_or_much_memory() {
     refused(deep.as_bytes(), "expected XML");
     let many = format!("<VTKFile>{}</VTKFile>", "<a/>".repeat(200_000));
     refused(many.as_bytes(), "expected XML");
+    // The parser takes hours for these: it holds each against all others.
+    let spaces: String = (0..9000).map(|i| format!("<a xmlns:n{i}=\"{i}\">")).collect();
+    refused(format!("<VTKFile>{spaces}").as_bytes(), "expected at most 64 declarations of namespaces, found more");
+    let attributes: String = (0..1 << 20).map(|i| format!(" n{i}=\"{i}\"")).collect();
+    refused(format!("<VTKFile{attributes}>").as_bytes(), "expected at most 64 attributes of an element, found more");
+    // Neither counts where it is no markup.
+    let sample = String::from_utf8(vti("ascii", false)).unwrap();
+    let noise = "a=b xmlns:c=d ".repeat(99);
+    let noisy = sample.replace("<PointData", &format!("<!-- {noise} --><PointData note=\"{noise}\""));
+    assert_eq!(load("a.vti", noisy.as_bytes()).unwrap(), load("a.vti", sample.as_bytes()).unwrap());
 }

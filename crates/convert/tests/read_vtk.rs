@@ -89,10 +89,17 @@ fn values_of_cells_lie_at_their_middles() {
 #[test]
 fn what_is_wrong_in_a_file_is_named() {
     for (from, to, expected) in [
-        ("STRUCTURED_POINTS", "UNSTRUCTURED_GRID", "a.vtk:4: expected DATASET STRUCTURED_POINTS, found 'DATASET UNSTR"),
-        ("STRUCTURED_POINTS", "POLYDATA", "other datasets of VTK are not read"),
-        ("STRUCTURED_POINTS", "RECTILINEAR_GRID", "found 'DATASET RECTILINEAR_GRID'"),
-        ("STRUCTURED_POINTS", "STRUCTURED_GRID", "found 'DATASET STRUCTURED_GRID'"),
+        (
+            "STRUCTURED_POINTS",
+            "UNSTRUCTURED_GRID",
+            "a.vtk:5: expected SCALARS, FIELD or another keyword of this dataset",
+        ),
+        (
+            "STRUCTURED_POINTS",
+            "RECTILINEAR_GRID",
+            "a.vtk:4: expected DATASET STRUCTURED_POINTS, UNSTRUCTURED_GRID or POLYDATA",
+        ),
+        ("STRUCTURED_POINTS", "STRUCTURED_GRID", "other datasets of VTK are not read"),
         ("ASCII", "OCTAL", "a.vtk:3: expected ASCII or BINARY"),
         ("3 2 2", "3 2", "a.vtk:5: expected DIMENSIONS and three sizes above 0"),
         ("3 2 2", "3 2 0", "a.vtk:5: expected DIMENSIONS and three sizes above 0"),
@@ -109,7 +116,7 @@ fn what_is_wrong_in_a_file_is_named() {
         ("density float", "density bit", "a.vtk:9: expected a type of numbers, from unsigned_char to double"),
         ("density float 1", "density float 3", "a.vtk:9: expected 36 numbers, found 12"),
         ("-0.5", "inf", "a.vtk:11:4: expected a finite decimal number, found 'inf'"),
-        ("FIELD", "CELLS", "expected SCALARS, FIELD or another keyword of structured points, found 'CELLS more 1'"),
+        ("FIELD", "CELLS", "expected SCALARS, FIELD or another keyword of this dataset, found 'CELLS more 1'"),
     ] {
         refused(&with(from, to), expected);
     }

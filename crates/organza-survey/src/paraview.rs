@@ -82,6 +82,10 @@ fn rows(preset: &Value, key: &str, row: usize) -> Result<Vec<f64>, String> {
     let Some(numbers) = numbers.filter(|n| n.len().is_multiple_of(row)) else {
         return Err(format!("`{key}`: expected numbers in groups of {row}, found {} entries", list.len()));
     };
+    // Values of volumes are such, and differences of larger ones may be none.
+    if let Some(large) = numbers.iter().find(|n| !(**n as f32).is_finite()) {
+        return Err(format!("`{key}`: expected numbers that fit 32-bit floats, found {large}"));
+    }
     if numbers.chunks(row).zip(numbers.chunks(row).skip(1)).any(|(a, b)| b[0] < a[0]) {
         return Err(format!("`{key}`: expected rising values"));
     }
@@ -106,9 +110,35 @@ mod tests {
         assert_eq!([preset.opacity(1.0), preset.opacity(9.0)], [Some(0.25), Some(0.5)]);
     }
 
+    /// Every byte of a preset set to each of some others: an error, or colours and opacities that are numbers.
+    #[test]
+    fn a_damaged_preset_is_refused_or_valid() {
+        let preset = br#"[{"RGBPoints":[-1,0.5,0,0,2e1,1,1,0],"Points":[0,0,0.5,0,12,0.5,0.5,0]}]"#;
+        let mut read = 0;
+        for at in 0..preset.len() {
+            for byte in *b"09-.e,][}{\"\0\xff" {
+                let mut damaged = preset.to_vec();
+                damaged[at] = byte;
+                let Ok(json) = serde_json::from_slice(&damaged) else { continue };
+                let Ok(preset) = Sampled::of_json(&json) else { continue };
+                let [low, high] = preset.range();
+                for value in [low, 0.5 * (low + high), high] {
+                    let valid = preset.color(value).iter().all(|c| (0.0..=1.0).contains(c));
+                    let opacity = preset.opacity(value).unwrap_or(0.0);
+                    assert!(valid && (0.0..=1.0).contains(&opacity), "{}", String::from_utf8_lossy(&damaged));
+                }
+                read += 1;
+            }
+        }
+        assert!(read > 50, "{read}");
+    }
+
     #[test]
     fn what_is_no_preset_is_refused() {
-        for json in ["[]", "{}", r#"[{"RGBPoints": [0, 1]}]"#, r#"[{"RGBPoints": [2, 0, 0, 0, 1, 0, 0, 0]}]"#, "3"] {
+        let large = r#"[{"RGBPoints": [-1e308, 0, 0, 0, 1e308, 0, 0, 0]}]"#;
+        for json in
+            [large, "[]", "{}", r#"[{"RGBPoints": [0, 1]}]"#, r#"[{"RGBPoints": [2, 0, 0, 0, 1, 0, 0, 0]}]"#, "3"]
+        {
             assert!(Sampled::of_json(&serde_json::from_str(json).unwrap()).is_err(), "{json}");
         }
     }

@@ -4,7 +4,7 @@ use crate::repo::Repo;
 use crate::toml_lines::{lines, string};
 
 /// For each crate of the workspace, the crates of the workspace that it may depend on, tests and benches included.
-const MAY_KNOW: [(&str, &[&str]); 22] = [
+const MAY_KNOW: [(&str, &[&str]); 23] = [
     ("splat-core", &["splat-shaders"]),
     ("convert", &["splat-core"]),
     ("tsm", &["splat-core", "splat-shaders"]),
@@ -60,6 +60,7 @@ const MAY_KNOW: [(&str, &[&str]); 22] = [
         ],
     ),
     ("gpu-conformance", &["splat-core", "tsm", "hbsort", "pbsr", "splat-shaders", "gpu-ash", "gpu-wgpu", "organza"]),
+    ("organza-fuzz", &["splat-core", "convert", "organza-scene"]),
     ("xtask", &[]),
 ];
 

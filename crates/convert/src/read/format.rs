@@ -14,9 +14,10 @@ pub(super) enum Format {
     Xyz,
     Nrrd,
     Las,
+    E57,
     Nifti,
     MetaImage,
-    Vti,
+    VtkXml,
     Vtk,
     Raw,
     Hdr,
@@ -39,6 +40,9 @@ pub(super) fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
     }
     if content.starts_with(b"LASF") {
         return Some(Format::Las);
+    }
+    if content.starts_with(b"ASTM-E57") {
+        return Some(Format::E57);
     }
     if content.starts_with(b"NRRD000") {
         return Some(Format::Nrrd);
@@ -72,7 +76,7 @@ pub(super) fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
         return Some(Format::Vtk);
     }
     if content.windows(8).any(|window| window == b"<VTKFile") {
-        return Some(Format::Vti);
+        return Some(Format::VtkXml);
     }
     if is_metaimage(content) {
         return Some(Format::MetaImage);
@@ -115,9 +119,10 @@ pub(super) fn by_name(path: &Path) -> Option<Format> {
         "xyz" | "csv" | "txt" | "pts" | "asc" => Some(Format::Xyz),
         "nrrd" | "nhdr" => Some(Format::Nrrd),
         "las" | "laz" => Some(Format::Las),
+        "e57" => Some(Format::E57),
         "nii" | "hdr" => Some(Format::Nifti),
         "mha" | "mhd" => Some(Format::MetaImage),
-        "vti" => Some(Format::Vti),
+        "vti" | "vtu" | "vtp" => Some(Format::VtkXml),
         "vtk" => Some(Format::Vtk),
         "raw" => Some(Format::Raw),
         "splat" => Some(Format::Splat),

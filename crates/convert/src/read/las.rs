@@ -2,6 +2,7 @@
 
 mod further;
 
+use super::copc::Levels;
 use super::extras::Extras;
 use super::{Notes, ReadParams, input, laz};
 use crate::error::{Place, ReadError};
@@ -27,6 +28,8 @@ pub(super) struct Layout {
     pub(super) format_id: u8,
     pub(super) format: Format,
     pub(super) count: u64,
+    /// The levels of detail that are read, where those are not all.
+    pub(super) levels: Option<Levels>,
     /// Bytes of one uncompressed record.
     pub(super) record: u64,
     /// First byte of the points.
@@ -38,9 +41,27 @@ pub(super) struct Layout {
     offset: DVec3,
 }
 
+impl Layout {
+    /// Points that are read.
+    pub(super) fn read(&self) -> u64 {
+        self.levels.as_ref().map_or(self.count, |levels| levels.points)
+    }
+}
+
 /// Reads a LAS or LAZ file.
 pub(super) fn read(content: Vec<u8>, params: &ReadParams, notes: &mut Notes) -> Result<RawPoints, ReadError> {
-    let layout = layout(&content)?;
+    let mut layout = layout(&content)?;
+    if let Some(most) = params.most_points.filter(|most| layout.compressed && *most < layout.count) {
+        layout.levels = Levels::within(&content, &layout, most)?;
+    }
+    if let Some(Levels { points, read, all, .. }) = layout.levels {
+        let of = format!(
+            "{points} of {} points, as at most {} are asked for",
+            layout.count,
+            params.most_points.unwrap_or(points)
+        );
+        notes.remarks.push(format!("COPC, {read} of {all} levels of detail: {of}"));
+    }
     // What the file cannot hold is its fault, not the limit's.
     let plain = (!layout.compressed).then(|| plain_records(&content, &layout)).transpose()?;
     let fields = further::fields(&layout, described(&content, &layout));
@@ -49,7 +70,7 @@ pub(super) fn read(content: Vec<u8>, params: &ReadParams, notes: &mut Notes) -> 
     let asked: Vec<usize> = extras.read().collect();
     let selection = further::selection(asked.iter().map(|rank| &fields[*rank]));
     let bytes = BYTES_PER_POINT + extras.bytes_per_point();
-    input::check_bytes("the points", layout.count.saturating_mul(bytes), params)?;
+    input::check_bytes("the points", layout.read().saturating_mul(bytes), params)?;
     notes.not_used(unused(&content, &layout).iter().map(String::as_bytes));
     let mut columns = Columns::default();
     let mut take = |records: Vec<u8>| {
@@ -159,6 +180,7 @@ fn layout(content: &[u8]) -> Result<Layout, ReadError> {
         format_id,
         format,
         count: count(&header)?,
+        levels: None,
         record: record.into(),
         points,
         records: (header.header_size.into(), header.number_of_variable_length_records),
@@ -236,7 +258,7 @@ impl Columns {
     fn append(&mut self, data: &PointData, layout: &Layout) -> Result<(), ReadError> {
         if self.steps.is_empty() {
             // Once some records are there: until then a damaged file may announce what it does not hold.
-            let n = layout.count as usize;
+            let n = layout.read() as usize;
             input::reserve(&mut self.steps, n)?;
             input::reserve(&mut self.value, n)?;
             input::reserve(&mut self.classification, n)?;

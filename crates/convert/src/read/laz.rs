@@ -51,7 +51,8 @@ pub(super) fn decompress(
             return Err(damaged(layout.points, &expected, format!("compressor {compressor}")));
         }
     };
-    let total = layout.count.saturating_mul(layout.record);
+    let chunks = of_levels(chunks, layout)?;
+    let total = layout.read().saturating_mul(layout.record);
     let stored = chunks.iter().map(|c| c.bytes.len() as u64).sum::<u64>();
     input::check_bytes("the decompressed points", total, params)?;
     if total > FREE && total / MAX_RATIO > stored {
@@ -67,6 +68,18 @@ pub(super) fn decompress(
         parts?.into_iter().try_for_each(&mut take)?;
     }
     Ok(())
+}
+
+/// The chunks of the levels of detail that are read.
+fn of_levels<'a>(mut chunks: Vec<Chunk<'a>>, layout: &Layout) -> Result<Vec<Chunk<'a>>, ReadError> {
+    let Some(levels) = &layout.levels else { return Ok(chunks) };
+    chunks.retain(|chunk| levels.have(chunk.at));
+    let points = chunks.iter().map(|chunk| chunk.points).sum::<u64>();
+    if points == levels.points {
+        return Ok(chunks);
+    }
+    let expected = format!("chunks of {} points where the hierarchy of COPC says", levels.points);
+    Err(damaged(layout.points, &expected, points.to_string()))
 }
 
 /// What is decoded on its own.

@@ -7,6 +7,9 @@ use crate::error::{Place, ReadError};
 use splat_core::Progress;
 use std::fmt;
 
+/// Most names that are said not to be used: each new one is held against all others, and a file may have millions.
+const MOST_NAMES: usize = 512;
+
 /// A fault of a file that does not stop the rest of it from being drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -114,12 +117,16 @@ impl Notes {
         }
     }
 
-    /// Adds names that are not used, each once, with what would steer a terminal escaped.
+    /// Adds names that are not used, each once, with what would steer a terminal escaped; of very many the first.
     pub(super) fn not_used<'a>(&mut self, names: impl IntoIterator<Item = &'a [u8]>) {
         for name in names {
+            if self.unused.len() > MOST_NAMES {
+                return;
+            }
             let name = escaped(name, LONGEST_NAME);
             if !self.unused.contains(&name) {
-                self.unused.push(name);
+                let is_full = self.unused.len() == MOST_NAMES;
+                self.unused.push(if is_full { "further ones".to_owned() } else { name });
             }
         }
     }

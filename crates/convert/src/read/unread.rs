@@ -16,7 +16,7 @@ const TO_GLTF: &str = "convert it to glTF, such as in Blender: File > Import, th
 const TESSELLATE: &str = "it holds no triangles: export it as STL, OBJ or glTF from the program that it comes from";
 const TO_PLY: &str = "convert it to PLY, LAS or LAZ, such as with CloudCompare";
 const TO_NRRD: &str = "convert it to NRRD or NIfTI, such as with 3D Slicer or ParaView";
-const TO_STL: &str = "save its surface as PLY, STL or OBJ, such as with ParaView";
+const TO_VTU: &str = "save it as one .vti, .vtu or .vtp, such as with ParaView";
 const EXTRACT: &str = "extract the files in it; one file inside gzip is read as it is";
 const IMAGE: &str =
     "an environment is read from Radiance HDR or OpenEXR, a light's texture from PNG too; convert the image";
@@ -27,7 +27,7 @@ const fn by_extension(name: &'static str, extensions: &'static [&'static str], h
     Unread { name, marks: &[], extensions, hint }
 }
 
-const UNREAD: [Unread; 44] = [
+const UNREAD: [Unread; 43] = [
     Unread { name: "FBX", marks: &[(0, b"Kaydara FBX Binary"), (0, b"; FBX ")], extensions: &["fbx"], hint: TO_GLTF },
     Unread {
         name: "USD",
@@ -58,7 +58,6 @@ const UNREAD: [Unread; 44] = [
     by_extension("IGES", &["iges", "igs"], TESSELLATE),
     by_extension("Rhino", &["3dm"], TESSELLATE),
     by_extension("AutoCAD", &["dwg", "dxf"], TESSELLATE),
-    Unread { name: "E57", marks: &[(0, b"ASTM-E57")], extensions: &["e57"], hint: TO_PLY },
     by_extension("PTX", &["ptx"], TO_PLY),
     by_extension("ReCap", &["rcp", "rcs"], TO_PLY),
     by_extension("captured packets", &["pcap"], TO_PLY),
@@ -76,7 +75,7 @@ const UNREAD: [Unread; 44] = [
     by_extension("FreeSurfer", &["mgh", "mgz"], "convert it to NIfTI, such as with mri_convert"),
     by_extension("MRC", &["mrc", "map", "ccp4"], TO_NRRD),
     Unread { name: "NumPy", marks: &[(0, b"\x93NUMPY")], extensions: &["npy", "npz"], hint: TO_NRRD },
-    by_extension("VTK polygons or cells", &["vtp", "vtu", "vts", "vtr", "vtm", "pvd", "pvtu", "pvtp"], TO_STL),
+    by_extension("another dataset of VTK", &["vts", "vtr", "vtm", "pvd", "pvtu", "pvtp"], TO_VTU),
     Unread { name: "a JPEG image", marks: &[(0, b"\xff\xd8\xff")], extensions: &["jpg", "jpeg"], hint: IMAGE },
     Unread { name: "a TIFF image", marks: &[(0, b"II*\0"), (0, b"MM\0*")], extensions: &["tif", "tiff"], hint: IMAGE },
     by_extension("an image", &["webp", "bmp", "gif", "tga", "ktx2", "avif"], IMAGE),
@@ -89,7 +88,7 @@ const UNREAD: [Unread; 44] = [
     by_extension("a scene", &["toml", "json"], SCENE),
 ];
 
-const READ: &str = "PLY, .splat, SPZ, STL, OBJ, OFF, glTF, GLB, PCD, XYZ, CSV, LAS, LAZ, NIfTI, NRRD, MetaImage, VTK images, raw voxels, \
+const READ: &str = "PLY, .splat, SPZ, STL, OBJ, OFF, glTF, GLB, PCD, XYZ, CSV, LAS, LAZ, E57, NIfTI, NRRD, MetaImage, VTK images, cells and surfaces, raw voxels, \
     Radiance HDR, OpenEXR and PNG files are read, each also inside gzip";
 
 fn error(unread: &Unread) -> ReadError {
@@ -116,7 +115,7 @@ pub(super) fn refused(path: &Path, head: &[u8]) -> ReadError {
     by_name(path).map(error).unwrap_or_else(|| {
         ReadError::input(
             Place::Byte(0),
-            "'ply', 'LASF', 'NRRD', 'glTF', '# .PCD', '#?', a NIfTI-1, OpenEXR or PNG header, or the extension of a \
+            "'ply', 'LASF', 'ASTM-E57', 'NRRD', 'glTF', '# .PCD', '#?', a NIfTI-1, OpenEXR or PNG header, or the extension of a \
             format without a mark",
             format!("'{}'", escaped(&head[..head.len().min(16)], 16)),
             READ,

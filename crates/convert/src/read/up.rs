@@ -16,7 +16,7 @@ pub enum UpAxis {
     /// As meshes mostly have it, and for formats that say nothing.
     #[default]
     Y,
-    /// Elevation in LAS and LAZ; superior in NIfTI, in MetaImage and in an NRRD whose `space` is one of a body.
+    /// Elevation in LAS, LAZ and E57; superior in NIfTI, in MetaImage and in an NRRD whose `space` is one of a body.
     Z,
     /// The other way: 3D Gaussians of PLY and `.splat`, whose y points down as in the cameras that they were trained for.
     MinusY,
@@ -66,7 +66,7 @@ fn beginning(path: &Path) -> Option<Vec<u8>> {
 
 fn of_content(path: &Path, content: &[u8]) -> UpAxis {
     match format_of(path, content) {
-        Some(Format::Las | Format::Nifti | Format::MetaImage) => UpAxis::Z,
+        Some(Format::Las | Format::E57 | Format::Nifti | Format::MetaImage) => UpAxis::Z,
         Some(Format::Nrrd) if is_of_a_body(content) => UpAxis::Z,
         Some(Format::Splat) => UpAxis::MinusY,
         Some(Format::Ply) if has_gaussians(content) => UpAxis::MinusY,

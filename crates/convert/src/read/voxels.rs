@@ -39,6 +39,28 @@ impl Kind {
             Self::I64 | Self::U64 | Self::F64 => 8,
         }
     }
+
+    /// The numbers of as many bytes.
+    #[cfg(any(feature = "vti", feature = "vtk"))]
+    pub(super) fn numbers(self, bytes: &[u8], big_endian: bool) -> impl Iterator<Item = f64> {
+        bytes.chunks_exact(self.size() as usize).map(move |b| {
+            let mut le = [0; 8];
+            le[..b.len()].copy_from_slice(b);
+            if big_endian {
+                le[..b.len()].reverse();
+            }
+            let whole = u64::from_le_bytes(le);
+            match self {
+                Self::U8 | Self::U16 | Self::U32 | Self::U64 => whole as f64,
+                Self::I8 => f64::from(whole as i8),
+                Self::I16 => f64::from(whole as i16),
+                Self::I32 => f64::from(whole as i32),
+                Self::I64 => whole as i64 as f64,
+                Self::F32 => f64::from(f32::from_bits(whole as u32)),
+                Self::F64 => f64::from_bits(whole),
+            }
+        })
+    }
 }
 
 /// How the voxels of a volume are stored.

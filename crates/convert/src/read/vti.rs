@@ -1,16 +1,18 @@
-//! VTK image data in XML (`.vti`) → a volume of scalars, of colours their luma.
+//! VTK files in XML: images (`.vti`) and cells (`.vtu`) → a volume of scalars, of colours their luma; surfaces (`.vtp`) → a mesh.
 //!
 //! Arrays as text, in base64 or appended, raw or in base64, each also in blocks of zlib. Read is the array that `Scalars` names,
 //! else the first, of the points, else of the cells; others are named.
 
 mod data;
+mod piece;
 
+use super::reading::Reading;
 use super::selection::Selection;
 use super::voxels::{Kind, Stored};
-use super::{Notes, ReadParams, lattice};
+use super::{Loaded, Notes, ReadParams, lattice, xml};
 use crate::error::{Place, ReadError, escaped};
 use data::{Appended, Encoding};
-use roxmltree::{Document, Node, ParsingOptions};
+use roxmltree::{Document, Node};
 use splat_core::Grid;
 use splat_core::glam::{DMat3, DVec3};
 
@@ -19,25 +21,47 @@ const HINT: &str = "the file is truncated or damaged, or its header states other
 /// Most elements, attributes and texts of a file; real ones have some dozens.
 const MAX_NODES: u32 = 10_000;
 
-/// Reads a volume.
-pub(super) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Result<Grid, ReadError> {
+/// Datasets that are read.
+const DATASETS: [&str; 3] = ["ImageData", "UnstructuredGrid", "PolyData"];
+
+/// Reads a file.
+pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
     let (appended, text) = Appended::split(content)?;
-    let options = ParsingOptions { allow_dtd: false, nodes_limit: MAX_NODES, ..ParsingOptions::default() };
-    let document = Document::parse_with_options(&text, options).map_err(|e| {
-        let place = Place::Line { line: e.pos().row.into(), column: e.pos().col.into() };
-        ReadError::input(place, "XML", e.to_string(), HINT)
+    let document = xml::parse(&text, MAX_NODES).map_err(|e| {
+        let line = e.line.map(|(line, column)| Place::Line { line: line.into(), column: column.into() });
+        ReadError::input(line.unwrap_or(Place::Byte(e.byte as u64)), e.expected, e.found, HINT)
     })?;
-    let image = image(&document)?;
+    let dataset = dataset(&document)?;
     let encoding = Encoding::of(document.root_element(), content, appended)?;
+    if dataset.has_tag_name("ImageData") {
+        return image(dataset, &encoding, reading.params, &mut reading.notes).map(Loaded::Grid);
+    }
+    piece::read(only_piece(dataset)?, &encoding, reading)
+}
+
+/// Reads the volume of an image.
+fn image(
+    image: Node<'_, '_>,
+    encoding: &Encoding<'_>,
+    params: &ReadParams,
+    notes: &mut Notes,
+) -> Result<Grid, ReadError> {
     let lattice = Lattice::of(image)?;
-    let (array, is_of_cells) = chosen(image, notes)?;
+    let piece = only_piece(image)?;
+    if extent(piece, "Extent")? != extent(image, "WholeExtent")? {
+        return Err(wrong(piece, "the WholeExtent in one Piece", piece.attribute("Extent").unwrap_or_default()));
+    }
+    let chosen = chosen(piece, notes);
+    let (array, is_of_cells) = chosen.ok_or_else(|| wrong(piece, "a DataArray in PointData or CellData", "none"))?;
+    not_used(image, &[array], notes);
     let (mut origin, mut sizes) = (lattice.origin, lattice.points);
     if is_of_cells {
         (origin, sizes) = lattice::of_cells(origin, &lattice.axes, lattice.points);
-        let name = escaped(array.attribute("Name").unwrap_or_default().as_bytes(), 40);
-        notes.remarks.push(format!("values of cells ({name}): they lie at the middles"));
+        notes.remarks.push(format!("values of cells ({}): they lie at the middles", name(array)));
     }
-    let stored = stored(array, sizes, encoding.big_endian, params, notes)?;
+    let selection = selection(array, params, notes)?;
+    let stored =
+        Stored { kind: kind(array)?, big_endian: encoding.big_endian, dims: sizes, selection, scaling: (1.0, 0.0) };
     stored.check(lattice.place, HINT)?;
     let values = encoding.values(array, &stored, params)?;
     Ok(Grid { origin, axes: lattice.axes, dims: sizes.map(|n| n as usize), values })
@@ -56,15 +80,33 @@ fn child<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
     node.children().find(|c| c.has_tag_name(name))
 }
 
-/// The element of the image.
-fn image<'a, 'i>(document: &'a Document<'i>) -> Result<Node<'a, 'i>, ReadError> {
+/// The element of the dataset.
+fn dataset<'a, 'i>(document: &'a Document<'i>) -> Result<Node<'a, 'i>, ReadError> {
     let root = document.root_element();
     let kind = root.attribute("type").unwrap_or_default();
-    if !root.has_tag_name("VTKFile") || kind != "ImageData" {
-        let hint = "other datasets of VTK are not read: resample to an image, or write a surface as PLY, OBJ or STL";
-        return Err(ReadError { hint, ..wrong(root, "a VTKFile of type ImageData", kind) });
+    if !root.has_tag_name("VTKFile") || !DATASETS.contains(&kind) {
+        let hint = "other datasets of VTK are not read: resample to an image, or write cells as an unstructured grid";
+        return Err(ReadError {
+            hint,
+            ..wrong(root, "a VTKFile of type ImageData, UnstructuredGrid or PolyData", kind)
+        });
     }
-    child(root, "ImageData").ok_or_else(|| wrong(root, "an element ImageData", "none"))
+    child(root, kind).ok_or_else(|| wrong(root, &format!("an element {kind}"), "none"))
+}
+
+/// The piece of a dataset, which has to be the only one.
+fn only_piece<'a, 'i>(dataset: Node<'a, 'i>) -> Result<Node<'a, 'i>, ReadError> {
+    let pieces: Vec<_> = dataset.children().filter(|c| c.has_tag_name("Piece")).collect();
+    let &[piece] = pieces.as_slice() else {
+        let hint = "write the dataset as one piece";
+        return Err(ReadError { hint, ..wrong(dataset, "one Piece", &pieces.len().to_string()) });
+    };
+    Ok(piece)
+}
+
+/// The name of an array, as it may be shown.
+fn name(array: Node<'_, '_>) -> String {
+    escaped(array.attribute("Name").unwrap_or_default().as_bytes(), 40)
 }
 
 /// So many numbers of an attribute, if there is one of this name.
@@ -109,29 +151,29 @@ fn extent(node: Node<'_, '_>, name: &str) -> Result<[[i64; 2]; 3], ReadError> {
     extent.filter(rises).ok_or_else(|| wrong(node, &format!("six rising indices in {name}, two an axis"), text))
 }
 
-/// The array that is read, and whether it belongs to the cells; the others are named.
-fn chosen<'a, 'i>(image: Node<'a, 'i>, notes: &mut Notes) -> Result<(Node<'a, 'i>, bool), ReadError> {
-    let pieces: Vec<_> = image.children().filter(|c| c.has_tag_name("Piece")).collect();
-    let &[piece] = pieces.as_slice() else {
-        let hint = "write the image as one piece";
-        return Err(ReadError { hint, ..wrong(image, "one Piece", &pieces.len().to_string()) });
-    };
-    if extent(piece, "Extent")? != extent(image, "WholeExtent")? {
-        return Err(wrong(piece, "the WholeExtent in one Piece", piece.attribute("Extent").unwrap_or_default()));
-    }
+/// The arrays of a piece that belong to its points or its cells.
+fn arrays<'a, 'i>(data: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> + Clone {
+    data.children().filter(|c| c.has_tag_name("DataArray"))
+}
+
+/// The array that is read, and whether it belongs to the cells.
+fn chosen<'a, 'i>(piece: Node<'a, 'i>, notes: &mut Notes) -> Option<(Node<'a, 'i>, bool)> {
     let of = ["PointData", "CellData"].map(|name| child(piece, name));
-    let array = of.into_iter().flatten().find_map(|data| {
-        let arrays = || data.children().filter(|c| c.has_tag_name("DataArray"));
+    let (array, data) = of.into_iter().flatten().find_map(|data| {
         let named = data.attribute("Scalars");
-        let active = arrays().find(|a| named.is_some() && a.attribute("Name") == named);
-        active.or_else(|| arrays().next()).map(|a| (a, data))
-    });
-    let (array, data) = array.ok_or_else(|| wrong(piece, "a DataArray in PointData or CellData", "none"))?;
+        let active = arrays(data).find(|a| named.is_some() && a.attribute("Name") == named);
+        active.or_else(|| arrays(data).next()).map(|a| (a, data))
+    })?;
     if let Some(named) = data.attribute("Scalars").filter(|name| Some(*name) != array.attribute("Name")) {
         let named = escaped(named.as_bytes(), 40);
         notes.remarks.push(format!("there is no array '{named}', which Scalars names: the first one is read"));
     }
-    let others = image.document().descendants().filter(|n| n.has_tag_name("DataArray") && *n != array);
+    Some((array, data.has_tag_name("CellData")))
+}
+
+/// Names the arrays that are not used.
+fn not_used(dataset: Node<'_, '_>, used: &[Node<'_, '_>], notes: &mut Notes) {
+    let others = dataset.document().descendants().filter(|n| n.has_tag_name("DataArray") && !used.contains(n));
     let names: Vec<String> = others
         .map(|other| {
             let of = other.parent_element().map_or("", |of| of.tag_name().name());
@@ -140,19 +182,12 @@ fn chosen<'a, 'i>(image: Node<'a, 'i>, notes: &mut Notes) -> Result<(Node<'a, 'i
         })
         .collect();
     notes.not_used(names.iter().map(String::as_bytes));
-    Ok((array, data.has_tag_name("CellData")))
 }
 
-/// How an array over a lattice of these sizes is stored.
-fn stored(
-    array: Node<'_, '_>,
-    dims: [u64; 3],
-    big_endian: bool,
-    params: &ReadParams,
-    notes: &mut Notes,
-) -> Result<Stored, ReadError> {
+/// The type of the numbers of an array.
+fn kind(array: Node<'_, '_>) -> Result<Kind, ReadError> {
     let name = array.attribute("type").unwrap_or_default();
-    let kind = match name {
+    Ok(match name {
         "Int8" => Kind::I8,
         "UInt8" => Kind::U8,
         "Int16" => Kind::I16,
@@ -164,13 +199,17 @@ fn stored(
         "Float32" => Kind::F32,
         "Float64" => Kind::F64,
         _ => return Err(wrong(array, "a DataArray of a type from Int8 to Float64", name)),
-    };
+    })
+}
+
+/// Numbers of a tuple of an array.
+fn components(array: Node<'_, '_>) -> Result<u64, ReadError> {
     let components = array.attribute("NumberOfComponents").unwrap_or("1");
-    let components = components.parse().map_err(|_| wrong(array, "a number of components", components))?;
-    let selection = Selection::of_frames(1, place(array), params, notes)?.with_numbers(
-        (components, kind, false),
-        place(array),
-        notes,
-    )?;
-    Ok(Stored { kind, big_endian, dims, selection, scaling: (1.0, 0.0) })
+    components.parse().map_err(|_| wrong(array, "a number of components", components))
+}
+
+/// Which of the numbers of a tuple is its value.
+fn selection(array: Node<'_, '_>, params: &ReadParams, notes: &mut Notes) -> Result<Selection, ReadError> {
+    let numbers = (components(array)?, kind(array)?, false);
+    Selection::of_frames(1, place(array), params, notes)?.with_numbers(numbers, place(array), notes)
 }

@@ -1,15 +1,17 @@
-//! Legacy VTK files (`.vtk`) of structured points → a volume of scalars, of colours their luma.
+//! Legacy VTK files (`.vtk`) of structured points, of cells and of polygons → a volume of scalars, of colours their luma; a mesh.
 //!
 //! Text, or binary in big endian. Read is the first `SCALARS` or `COLOR_SCALARS` of the points, else their first array of a `FIELD`, else the same
 //! of the cells. Other arrays are named, other datasets refused by name.
 
 mod arrays;
+mod parts;
 
 use super::input::Stream;
+use super::reading::Reading;
 use super::selection::Selection;
 use super::text::{Line, Lines, Words};
 use super::voxels::{self, Stored};
-use super::{Notes, ReadParams, lattice};
+use super::{Loaded, Notes, ReadParams, lattice};
 use crate::error::{Place, ReadError, escaped};
 use arrays::{Array, Arrays, Of};
 use splat_core::Grid;
@@ -17,12 +19,39 @@ use splat_core::glam::{DMat3, DVec3};
 
 const HINT: &str = "the file is truncated or damaged, or its header states other sizes";
 
-/// Reads a volume.
-pub(super) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Result<Grid, ReadError> {
+/// What the points of a file hang together by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Dataset {
+    StructuredPoints,
+    UnstructuredGrid,
+    PolyData,
+}
+
+/// Reads a file.
+pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
     let mut lines = Lines::new(content);
-    let is_binary = head(&mut lines)?;
-    let mut points = Points { dims: None, origin: DVec3::ZERO, spacing: DVec3::ONE, place: Place::File };
+    let (is_binary, dataset) = head(&mut lines)?;
     let mut arrays = Arrays::new(content, is_binary);
+    if dataset == Dataset::StructuredPoints {
+        return image(content, is_binary, (lines, arrays), reading).map(Loaded::Grid);
+    }
+    while let Some(line) = next(&mut lines)? {
+        if !parts::take(line, &mut lines, &mut arrays)? {
+            arrays.take(line, &mut lines)?;
+        }
+    }
+    parts::read((content, is_binary), dataset, (&arrays, lines.end()), reading)
+}
+
+/// Reads a volume of structured points.
+fn image<'a>(
+    content: &'a [u8],
+    is_binary: bool,
+    (mut lines, mut arrays): (Lines<'a>, Arrays<'a>),
+    reading: &mut Reading<'_>,
+) -> Result<Grid, ReadError> {
+    let (params, notes) = (reading.params, &mut reading.notes);
+    let mut points = Points { dims: None, origin: DVec3::ZERO, spacing: DVec3::ONE, place: Place::File };
     while let Some(line) = next(&mut lines)? {
         if !points.take(line)? {
             arrays.take(line, &mut lines)?;
@@ -44,8 +73,8 @@ pub(super) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Re
     Ok(Grid { origin, axes, dims: sizes.map(|n| n as usize), values })
 }
 
-/// The lines before those of the dataset; whether the data is binary.
-fn head(lines: &mut Lines<'_>) -> Result<bool, ReadError> {
+/// The lines before those of the dataset: whether the data is binary, and what it is.
+fn head(lines: &mut Lines<'_>) -> Result<(bool, Dataset), ReadError> {
     // The second is a title.
     let (mark, _title) = (lines.next()?, lines.next()?);
     if !mark.is_some_and(|line| line.text.starts_with(b"# vtk DataFile Version")) {
@@ -60,14 +89,18 @@ fn head(lines: &mut Lines<'_>) -> Result<bool, ReadError> {
     };
     let dataset = next(lines)?.ok_or_else(|| missing(lines, "DATASET STRUCTURED_POINTS"))?;
     let words: Vec<Vec<u8>> = dataset.words(false).map(|w| w.text.to_ascii_uppercase()).collect();
-    match words.iter().map(Vec::as_slice).collect::<Vec<_>>().as_slice() {
-        [b"DATASET", b"STRUCTURED_POINTS"] => Ok(is_binary),
+    let kind = match words.iter().map(Vec::as_slice).collect::<Vec<_>>().as_slice() {
+        [b"DATASET", b"STRUCTURED_POINTS"] => Dataset::StructuredPoints,
+        [b"DATASET", b"UNSTRUCTURED_GRID"] => Dataset::UnstructuredGrid,
+        [b"DATASET", b"POLYDATA"] => Dataset::PolyData,
         _ => {
             let hint =
-                "other datasets of VTK are not read: resample to an image, or write a surface as PLY, OBJ or STL";
-            Err(ReadError { hint, ..wrong(dataset, "DATASET STRUCTURED_POINTS") })
+                "other datasets of VTK are not read: resample to an image, or write cells as an unstructured grid";
+            let expected = "DATASET STRUCTURED_POINTS, UNSTRUCTURED_GRID or POLYDATA";
+            return Err(ReadError { hint, ..wrong(dataset, expected) });
         }
-    }
+    };
+    Ok((is_binary, kind))
 }
 
 /// The next line that is not empty.

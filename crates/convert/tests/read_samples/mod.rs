@@ -1,6 +1,11 @@
 //! Small valid files of every format, made in memory.
 #![allow(dead_code, reason = "each test file uses some of them")]
 
+#[cfg(all(feature = "vti", feature = "vtk"))]
+pub(crate) mod cells;
+#[cfg(feature = "las")]
+pub(crate) mod copc;
+pub(crate) mod e57;
 pub(crate) mod gaussians;
 #[cfg(all(feature = "hdr", feature = "exr", feature = "png"))]
 pub(crate) mod images;

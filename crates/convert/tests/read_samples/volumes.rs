@@ -95,7 +95,7 @@ impl Vti {
         [sizes.flat_map(|n| self.word(n)).collect(), blocks.concat()]
     }
 
-    fn base64(self, bytes: &[u8]) -> String {
+    pub(crate) fn base64(self, bytes: &[u8]) -> String {
         use base64::Engine;
         let encode = |b: &[u8]| base64::engine::general_purpose::STANDARD.encode(b);
         let [sizes, data] = self.packed(bytes);

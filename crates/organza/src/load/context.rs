@@ -96,7 +96,8 @@ impl Context<'_> {
 
     pub(super) fn read(&self, path: &Path) -> Result<FileData, Error> {
         let columns = self.scene.columns_of(path);
-        self.files.read(path, &ReadParams { columns, ..self.options.read_params() }, self.progress)
+        let most_points = self.scene.render.max_points;
+        self.files.read(path, &ReadParams { columns, most_points, ..self.options.read_params() }, self.progress)
     }
 
     /// The same of one volume of a series.

@@ -2,17 +2,21 @@
 
 use super::{HINT, place, wrong};
 use crate::error::{Place, ReadError};
-use crate::read::ReadParams;
 use crate::read::inflate::Inflate;
 use crate::read::input::{self, Stream};
+use crate::read::reading::Reading;
 use crate::read::text::Words;
 use crate::read::voxels::{self, Stored};
+use crate::read::{ReadParams, cells};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use roxmltree::Node;
 use std::borrow::Cow;
 use std::io::Read;
 use std::ops::Range;
+
+/// Most bytes of an array: more are a lie, and their number may not overflow.
+const MOST_BYTES: u64 = 1 << 48;
 
 /// The bytes behind the elements, at which arrays point.
 #[derive(Debug, Clone)]
@@ -55,6 +59,12 @@ pub(super) struct Encoding<'a> {
     is_compressed: bool,
     /// The appended bytes, and whether they are in base64.
     appended: Option<(Range<usize>, bool)>,
+}
+
+/// What an array holds.
+enum Content<'a> {
+    Text(Words<'a>),
+    Bytes(Cow<'a, [u8]>),
 }
 
 /// An array's bytes, taken from the front.
@@ -106,6 +116,54 @@ impl<'a> Encoding<'a> {
         stored: &Stored,
         params: &ReadParams,
     ) -> Result<Vec<f32>, ReadError> {
+        match self.content_of(array, stored.bytes(), params)? {
+            Content::Text(words) => voxels::whole_text(words, stored, params, HINT),
+            Content::Bytes(bytes) => {
+                let values = voxels::read(&mut Stream::of(&bytes, params), stored, params, HINT);
+                values.map_err(|e| ReadError { place: place(array), ..e })
+            }
+        }
+    }
+
+    /// So many numbers of an array, which has no more.
+    pub(super) fn numbers(
+        &self,
+        array: Node<'_, '_>,
+        count: u64,
+        reading: &Reading<'_>,
+    ) -> Result<Vec<f64>, ReadError> {
+        let kind = super::kind(array)?;
+        // Writers leave out the text of an array of none.
+        if count == 0 {
+            return Ok(Vec::new());
+        }
+        let fits = count.checked_mul(kind.size()).filter(|bytes| *bytes <= MOST_BYTES);
+        let bytes = fits.ok_or_else(|| wrong(array, "a number of values within the file", &count.to_string()))?;
+        let mut words = match self.content_of(array, bytes, reading.params)? {
+            Content::Bytes(bytes) => {
+                let mut numbers = cells::room(count, reading)?;
+                numbers.extend(kind.numbers(&bytes, self.big_endian));
+                return Ok(numbers);
+            }
+            Content::Text(words) => words,
+        };
+        // A digit and a blank each, but for the last one.
+        if count > (words.left() as u64).div_ceil(2) {
+            return Err(wrong(array, &format!("{count} numbers"), &words.count().to_string()));
+        }
+        let mut numbers = cells::room(count, reading)?;
+        for word in words.by_ref().take(count as usize) {
+            numbers.push(word.number()?);
+        }
+        let (found, more) = (numbers.len() as u64, words.count() as u64);
+        if found == count && more == 0 {
+            return Ok(numbers);
+        }
+        Err(wrong(array, &format!("{count} numbers"), &(found + more).to_string()))
+    }
+
+    /// What an array of so many bytes holds.
+    fn content_of(&self, array: Node<'_, '_>, size: u64, params: &ReadParams) -> Result<Content<'a>, ReadError> {
         let format = array.attribute("format").unwrap_or("ascii");
         let is_appended = format == "appended";
         let mut source = match format {
@@ -119,18 +177,14 @@ impl<'a> Encoding<'a> {
         if format == "ascii" {
             let before = self.content[..source.left.start].iter().filter(|b| **b == b'\n').count();
             let words = Words::new(&self.content[..source.left.end], source.left.start, before as u64 + 1);
-            return voxels::whole_text(words, stored, params, HINT);
+            return Ok(Content::Text(words));
         }
-        let bytes = if self.is_compressed {
-            self.unpacked(&mut source, stored, params)?
-        } else {
-            self.plain(&mut source, stored)?
-        };
+        let bytes =
+            if self.is_compressed { self.unpacked(&mut source, size, params)? } else { self.plain(&mut source, size)? };
         if !is_appended && !self.content[source.left.clone()].trim_ascii().is_empty() {
             return Err(wrong(array, "the end of the array after its data", "more"));
         }
-        let values = voxels::read(&mut Stream::of(&bytes, params), stored, params, HINT);
-        values.map_err(|e| ReadError { place: place(array), ..e })
+        Ok(Content::Bytes(bytes))
     }
 
     /// The appended bytes from the offset of an array on.
@@ -154,12 +208,12 @@ impl<'a> Encoding<'a> {
     }
 
     /// An array that is not compressed: its size and its bytes, in base64 as one or as two.
-    fn plain(&self, source: &mut Source<'a>, stored: &Stored) -> Result<Cow<'a, [u8]>, ReadError> {
+    fn plain(&self, source: &mut Source<'a>, bytes: u64) -> Result<Cow<'a, [u8]>, ReadError> {
         let start = source.left.start;
         let head = source.beginning(self.word)?;
         let size = self.size(&head);
-        if size != stored.bytes() {
-            return Err(source.wrong(&format!("{} bytes of values", stored.bytes()), &size.to_string()));
+        if size != bytes {
+            return Err(source.wrong(&format!("{bytes} bytes of values"), &size.to_string()));
         }
         // Longer than asked for where the run goes on.
         if source.is_base64 && head.len() > self.word {
@@ -172,12 +226,7 @@ impl<'a> Encoding<'a> {
     }
 
     /// An array in blocks: how many, their size, that of the last if it is another, their packed sizes; then the blocks.
-    fn unpacked(
-        &self,
-        source: &mut Source<'a>,
-        stored: &Stored,
-        params: &ReadParams,
-    ) -> Result<Cow<'a, [u8]>, ReadError> {
+    fn unpacked(&self, source: &mut Source<'a>, bytes: u64, params: &ReadParams) -> Result<Cow<'a, [u8]>, ReadError> {
         let start = source.left.start;
         let blocks = self.size(&source.beginning(self.word)?);
         source.left.start = start;
@@ -187,32 +236,32 @@ impl<'a> Encoding<'a> {
         let sizes: Vec<u64> = head.chunks_exact(self.word).map(|word| self.size(word)).collect();
         let (size, last) = (sizes[1], if sizes[2] == 0 { sizes[1] } else { sizes[2] });
         let whole = blocks.checked_sub(1).and_then(|n| n.checked_mul(size)).and_then(|n| n.checked_add(last));
-        if whole != Some(stored.bytes()) || last > size {
+        if whole != Some(bytes) || last > size {
             let found = format!("{blocks} blocks of {size} bytes, the last of {last}");
-            return Err(source.wrong(&format!("{} bytes of values", stored.bytes()), &found));
+            return Err(source.wrong(&format!("{bytes} bytes of values"), &found));
         }
         let packed_bytes = sizes[3..].iter().try_fold(0u64, |n, s| n.checked_add(*s));
         let packed_bytes = packed_bytes.ok_or_else(|| source.wrong("blocks within the data", "longer ones"))?;
         let packed = source.take(packed_bytes)?;
-        input::check_bytes("the unpacked array", stored.bytes(), params)?;
-        input::check_packed(stored.bytes(), packed_bytes, "zlib")?;
-        let mut bytes = Vec::new();
-        input::reserve(&mut bytes, stored.bytes() as usize)?;
+        input::check_bytes("the unpacked array", bytes, params)?;
+        input::check_packed(bytes, packed_bytes, "zlib")?;
+        let mut unpacked = Vec::new();
+        input::reserve(&mut unpacked, bytes as usize)?;
         let mut left = packed.as_ref();
         for (i, length) in sizes[3..].iter().enumerate() {
             let (block, rest) = left.split_at(*length as usize);
             left = rest;
             let size = if i as u64 + 1 == blocks { last } else { size };
-            let before = bytes.len();
+            let before = unpacked.len();
             // One byte too many is enough to be wrong.
-            let read = Inflate::new(block).take(size + 1).read_to_end(&mut bytes);
-            let given = (bytes.len() - before) as u64;
+            let read = Inflate::new(block).take(size + 1).read_to_end(&mut unpacked);
+            let given = (unpacked.len() - before) as u64;
             if read.is_err() || given != size {
                 let found = read.map_or_else(|e| e.to_string(), |_| format!("{given}"));
                 return Err(source.wrong(&format!("block {i} to be one zlib stream of {size} bytes"), &found));
             }
         }
-        Ok(bytes.into())
+        Ok(unpacked.into())
     }
 }
 

@@ -2,7 +2,9 @@
 
 use super::{HINT, next, wrong};
 use crate::error::{Place, ReadError, escaped};
-use crate::read::text::{Line, Lines, Word};
+use crate::read::cells;
+use crate::read::reading::Reading;
+use crate::read::text::{Line, Lines, Word, Words};
 use crate::read::voxels::Kind;
 use std::ops::Range;
 
@@ -32,7 +34,18 @@ pub(super) struct Array {
     /// Its bytes, which begin in the line of this number.
     pub(super) data: Range<usize>,
     pub(super) line: u64,
+    /// Cells that it tells of; 0 where it says nothing of them.
+    pub(super) cells: u64,
     role: Role,
+}
+
+/// An array of the cells themselves, as it is announced.
+pub(super) struct Part<'n> {
+    pub(super) name: &'n str,
+    pub(super) kind: Kind,
+    /// Numbers of a tuple, and tuples.
+    pub(super) size: (u64, u64),
+    pub(super) cells: u64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,11 +53,34 @@ enum Role {
     Scalars,
     /// Scalars of bytes, which stand in a text as shares of 255.
     Colors,
+    Normals,
     Field,
+    /// Of the cells themselves.
+    Part,
     Other,
 }
 
 impl Array {
+    /// Whether it may be colours of three or four bytes.
+    pub(super) fn is_of_colors(&self) -> bool {
+        self.kind == Kind::U8 && matches!(self.numbers, 3 | 4)
+    }
+
+    /// Its numbers.
+    pub(super) fn read(&self, content: &[u8], is_binary: bool, reading: &Reading<'_>) -> Result<Vec<f64>, ReadError> {
+        // It was found to lie in the file.
+        let count = self.numbers * self.tuples;
+        let mut numbers = cells::room(count, reading)?;
+        if is_binary {
+            numbers.extend(self.kind.numbers(&content[self.data.clone()], true));
+            return Ok(numbers);
+        }
+        for word in Words::new(content, self.data.start, self.line).take(count as usize) {
+            numbers.push(word.number()?);
+        }
+        Ok(numbers)
+    }
+
     /// Whether a text has shares of 255 in the place of its numbers.
     pub(super) fn is_of_shares(&self) -> bool {
         self.role == Role::Colors
@@ -65,8 +101,25 @@ impl<'a> Arrays<'a> {
         Self { content, is_binary, of: Of::File, tuples: 0, found: Vec::new() }
     }
 
+    /// Those of points, cells and the file.
     pub(super) fn all(&self) -> impl Iterator<Item = &Array> {
-        self.found.iter()
+        self.found.iter().filter(|array| array.role != Role::Part)
+    }
+
+    /// An array of the cells themselves by its name.
+    pub(super) fn part(&self, name: &str) -> Option<&Array> {
+        self.found.iter().find(|array| array.role == Role::Part && array.name == name)
+    }
+
+    /// Normals of the points.
+    pub(super) fn normals(&self) -> Option<&Array> {
+        self.found.iter().find(|array| array.of == Of::Points && array.role == Role::Normals)
+    }
+
+    /// Colours of the points.
+    pub(super) fn colors(&self) -> Option<&Array> {
+        let colors = || self.found.iter().filter(|array| array.of == Of::Points && array.is_of_colors());
+        colors().find(|array| array.role == Role::Colors).or_else(|| colors().next())
     }
 
     /// The array that is read.
@@ -100,12 +153,13 @@ impl<'a> Arrays<'a> {
                 return self.pass((&words, line), Kind::U8, (whole(2)?, self.tuples), Role::Colors, lines);
             }
             b"SCALARS" => (Role::Scalars, if words.len() > 3 { whole(3)? } else { 1 }),
-            b"VECTORS" | b"NORMALS" => (Role::Other, 3),
+            b"VECTORS" => (Role::Other, 3),
+            b"NORMALS" => (Role::Normals, 3),
             b"TENSORS" => (Role::Other, 9),
             b"TENSORS6" => (Role::Other, 6),
             b"TEXTURE_COORDINATES" => (Role::Other, whole(2)?),
             b"GLOBAL_IDS" | b"PEDIGREE_IDS" | b"EDGE_FLAGS" => (Role::Other, 1),
-            _ => return Err(wrong(line, "SCALARS, FIELD or another keyword of structured points")),
+            _ => return Err(wrong(line, "SCALARS, FIELD or another keyword of this dataset")),
         };
         let kind = kind(words.get(if keyword == b"TEXTURE_COORDINATES" { 3 } else { 2 }), line)?;
         if keyword == b"SCALARS" {
@@ -135,11 +189,28 @@ impl<'a> Arrays<'a> {
         Ok(())
     }
 
+    /// Takes an array of the cells themselves.
+    pub(super) fn take_part(&mut self, line: Line<'_>, part: Part<'_>, lines: &mut Lines<'a>) -> Result<(), ReadError> {
+        if self.part(part.name).is_some() {
+            return Err(wrong(line, &format!("{} once", part.name)));
+        }
+        self.pass((&[], line), part.kind, part.size, Role::Part, lines)?;
+        if let Some(array) = self.found.last_mut() {
+            part.name.clone_into(&mut array.name);
+            array.cells = part.cells;
+        }
+        Ok(())
+    }
+
+    /// Whether the next line begins with a word.
+    pub(super) fn continues_with(&self, word: &str, lines: &Lines<'_>) -> bool {
+        let next = &self.content[lines.offset()..];
+        next.get(..word.len()).is_some_and(|found| found.eq_ignore_ascii_case(word.as_bytes()))
+    }
+
     /// `LOOKUP_TABLE NAME` belongs to the scalars before it; old files leave it out.
     fn pass_table_name(&self, lines: &mut Lines<'a>) -> Result<(), ReadError> {
-        let name = b"LOOKUP_TABLE";
-        let next = &self.content[lines.offset()..];
-        if next.get(..name.len()).is_some_and(|word| word.eq_ignore_ascii_case(name)) {
+        if self.continues_with("LOOKUP_TABLE", lines) {
             lines.next()?;
         }
         Ok(())
@@ -180,7 +251,18 @@ impl<'a> Arrays<'a> {
         lines.go_to(end, last);
         let name = words.get(1).map(|w| escaped(w.text, 40)).unwrap_or_default();
         let (of, place) = (self.of, line.place());
-        self.found.push(Array { name, of, numbers, tuples, kind, place, data: start..end, line: first, role });
+        self.found.push(Array {
+            name,
+            of,
+            numbers,
+            tuples,
+            kind,
+            place,
+            data: start..end,
+            line: first,
+            cells: 0,
+            role,
+        });
         Ok(())
     }
 }
@@ -191,13 +273,13 @@ fn may_be_number(word: &[u8]) -> bool {
     letters.is_empty() || [&b"nan"[..], b"inf", b"infinity"].iter().any(|name| letters.eq_ignore_ascii_case(name))
 }
 
-fn whole(word: Option<&Word<'_>>, line: Line<'_>) -> Result<u64, ReadError> {
+pub(super) fn whole(word: Option<&Word<'_>>, line: Line<'_>) -> Result<u64, ReadError> {
     let number = word.and_then(|w| std::str::from_utf8(w.text).ok()?.parse().ok());
     number.ok_or_else(|| wrong(line, "a whole number of values or components"))
 }
 
 /// The type of a number by its name.
-fn kind(word: Option<&Word<'_>>, line: Line<'_>) -> Result<Kind, ReadError> {
+pub(super) fn kind(word: Option<&Word<'_>>, line: Line<'_>) -> Result<Kind, ReadError> {
     Ok(match word.map(|w| w.text.to_ascii_lowercase()).unwrap_or_default().as_slice() {
         b"unsigned_char" => Kind::U8,
         b"char" | b"signed_char" => Kind::I8,

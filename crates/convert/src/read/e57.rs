@@ -1,0 +1,39 @@
+//! E57 (ASTM E2807) → raw points of all scans of a file, each moved to its pose.
+//!
+//! Kept are cartesian or spherical places, normals, colours, intensity as value, and by name the other numbers of a point. The parser is
+//! our own: pages are checked against their sums, and counts against the bits that the file has for them, before anything is
+//! allocated. Pictures are named.
+
+mod bits;
+mod columns;
+mod document;
+mod packets;
+mod pages;
+
+use super::reading::Reading;
+use crate::error::{Place, ReadError};
+use crate::raw_points::RawPoints;
+use columns::Columns;
+use document::Document;
+use pages::Pages;
+
+const HINT: &str = "the file is truncated or damaged; fetch it again";
+
+/// Reads an E57 file.
+pub(super) fn read(content: Vec<u8>, reading: &mut Reading<'_>) -> Result<RawPoints, ReadError> {
+    let pages = Pages::new(content, reading)?;
+    let document = Document::parse(&pages)?;
+    if document.images > 0 {
+        reading.notes.not_used([format!("{} pictures (images2D)", document.images).as_bytes()]);
+    }
+    let mut columns = Columns::new(&document.scans, reading)?;
+    for scan in &document.scans {
+        let streams = packets::streams(scan, &pages, reading)?;
+        columns.take(scan, &streams, reading)?;
+    }
+    columns.into_points(reading)
+}
+
+fn damaged(byte: u64, expected: impl Into<String>, found: impl Into<String>) -> ReadError {
+    ReadError::input(Place::Byte(byte), expected, found, HINT)
+}
