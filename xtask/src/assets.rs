@@ -1,6 +1,7 @@
 //! `cargo xtask assets`: what lies under `assets/`, and where the larger inputs of the benchmarks come from.
 
 mod sky;
+mod solids;
 
 use crate::repo::{Outcome, Repo};
 use crate::tidy::{MAX_BYTES, credit_of, in_assets};
@@ -40,6 +41,17 @@ pub(crate) fn write_sky(repo: &Repo) -> Outcome {
     let (path, bytes) = (repo.root.join("assets/environment/sky.hdr"), sky::hdr());
     std::fs::write(&path, &bytes).map_err(|e| format!("{}: {e}", path.display()))?;
     Ok(format!("{} bytes in {}", bytes.len(), path.display()))
+}
+
+/// Writes the meshes that are made by tables.
+pub(crate) fn write_solids(repo: &Repo) -> Outcome {
+    let mut said = Vec::new();
+    for (name, text) in solids::files() {
+        let path = repo.root.join("assets/meshes").join(name);
+        std::fs::write(&path, &text).map_err(|e| format!("{}: {e}", path.display()))?;
+        said.push(format!("{} bytes in {}", text.len(), path.display()));
+    }
+    Ok(said.join("\n"))
 }
 
 #[cfg(test)]

@@ -9,5 +9,6 @@ mod polygons;
 mod polygons_scattered;
 mod scattering;
 mod soft;
+mod soft_polygons;
 mod splats;
 mod twin;

@@ -42,7 +42,7 @@ pub(crate) fn seconds(scene: &Scene, all: &Translucent) -> f64 {
     sheets + cost::FRAGMENT * all.fragments
 }
 
-pub(crate) use half::{carries, keeps_polygons};
+pub(crate) use half::{carries, is_asked as keeps_polygons};
 
 /// Bytes of sheets of all slabs at once, and of lists of voxels; those across the view count theirs when they make them.
 pub(crate) fn bytes(matter: &Matter<'_>, points: &[LightPoint], _: bool, options: &RenderOptions) -> u64 {

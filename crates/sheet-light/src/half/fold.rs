@@ -82,7 +82,7 @@ pub fn fold(
         in_the_open(input, params, (&lights, eye), image, progress)?;
     }
     let polygons = eye.as_ref().zip(image).map(|(eye, image)| {
-        counts.bytes += image.bytes() + polygon_bytes(input.sheets.camera, params);
+        counts.bytes += image.bytes() + polygon_bytes(input.sheets.camera, most_samples(input), params);
         image.finish(eye, into)
     });
     Ok(Drawn { counts, polygons: polygons.unwrap_or_default() })
@@ -124,12 +124,13 @@ fn in_the_open<'a>(
     progress: &Progress,
 ) -> Result<(), Error> {
     let sheets = &input.sheets;
-    let lights: Vec<Option<LitBy<'a>>> = match lights {
+    let lights: Vec<Option<(&LitBy<'a>, u32)>> = match lights {
         [] => vec![None],
-        lights => lights.iter().map(|(lit, _)| Some(**lit)).collect(),
+        lights => lights.iter().copied().map(Some).collect(),
     };
-    for (n, carried) in lights.into_iter().enumerate() {
-        let depths = light_depths(input, params, (carried.as_ref(), eye), progress)?;
+    for (n, light) in lights.into_iter().enumerate() {
+        let depths = light_depths(input, params, (light, eye), progress)?;
+        let carried = light.map(|(lit, _)| *lit);
         let mapped = if n == 0 { &input.mapped[..] } else { &[] };
         let lamps = Lamps { carried, mapped, ambient: sheets.ambient, camera: sheets.camera, light_alone: n > 0 };
         PolygonLight::new(eye, sheets.camera, depths.as_ref()).shade(&lamps, sheets.shadow_origin, None, image);
@@ -137,18 +138,18 @@ fn in_the_open<'a>(
     Ok(())
 }
 
-/// What a light sees of the polygons that cast shadows, for all that receives its light; `None` where there is no light or no such
-/// polygon.
+/// What so many points of a light see of the polygons that cast shadows, for all that receives its light; `None` where there is no light
+/// or no such polygon.
 pub(crate) fn light_depths(
     input: &HalfInput<'_>,
     params: &HalfParams,
-    (lit, eye): (Option<&LitBy<'_>>, &EyePolygons<'_>),
+    (lit, eye): (Option<(&LitBy<'_>, u32)>, &EyePolygons<'_>),
     progress: &Progress,
 ) -> Result<Option<LightDepths>, Error> {
-    let Some(lit) = lit else { return Ok(None) };
+    let Some((lit, samples)) = lit else { return Ok(None) };
     let mut receivers = eye.places(input.sheets.camera);
     receivers.extend(input.bodies().corners());
-    LightDepths::new(&eye.casters(), &lit.light, &receivers, params.most_light_pixels, progress)
+    LightDepths::new(&eye.casters(), (&lit.light, samples), &receivers, params.most_light_pixels, progress)
 }
 
 /// Width of the slabs of the sweep for `light`, or of that without one; world units. Infinite without bodies.
@@ -185,6 +186,11 @@ pub fn balance(input: &HalfInput<'_>, params: &HalfParams, light: usize) -> Resu
 fn carried<'a>(input: &'a HalfInput<'a>) -> impl Iterator<Item = (&'a LitBy<'a>, u32)> {
     let points = input.sheets.lights.iter().map(|lit| (lit, 1));
     points.chain(input.extended.iter().map(|extended| (&extended.lit, extended.samples)))
+}
+
+/// Points of the light that has most.
+fn most_samples(input: &HalfInput<'_>) -> u32 {
+    carried(input).map(|(_, samples)| samples).max().unwrap_or(1)
 }
 
 fn check(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
@@ -227,11 +233,6 @@ fn check_polygons(input: &HalfInput<'_>) -> Result<(), Error> {
             return Err(Error::Polygons(error));
         }
     }
-    if !input.polygons.is_empty() && !input.extended.is_empty() {
-        let found = format!("{} lights", input.extended.len());
-        let expected = "none beside polygons, whose shadows are those of points: `Light::points` has them";
-        return Err(Error::parameter("extended", found, expected));
-    }
     Ok(())
 }
 
@@ -271,8 +272,8 @@ fn check_memory(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error>
         input.mapped.len(),
         params,
     );
-    let needed = needed + if input.polygons.is_empty() { 0 } else { polygon_bytes(camera, params) };
-    let limit = params.sheets.limits.max_bytes;
+    let polygons = if input.polygons.is_empty() { 0 } else { polygon_bytes(camera, most_samples(input), params) };
+    let (needed, limit) = (needed + polygons, params.sheets.limits.max_bytes);
     let hint = || {
         "use fewer voxels, a smaller picture, fewer pixels of the light buffer or fewer points of an extended light"
             .to_owned()
@@ -323,13 +324,13 @@ pub fn bytes<'l>(
     eye + lights.map(light).max().unwrap_or(0) + cells + splats + volumes.iter().map(voxels).sum::<u64>()
 }
 
-/// Bytes that [`fold`] takes at most for polygons beside [`bytes`]: buffers of the eye and of one light.
-pub fn polygon_bytes(camera: &Camera, params: &HalfParams) -> u64 {
+/// Bytes that [`fold`] takes at most for polygons beside [`bytes`]: buffers of the eye and of one light, of at most so many points.
+pub fn polygon_bytes(camera: &Camera, samples: u32, params: &HalfParams) -> u64 {
     let pixels: u64 = camera.size.into_iter().map(u64::from).product();
     // Depths, hits, the picture; lists, places, and sums of what is seen.
     pixels * (28 + 4 * (MAX_CHANNELS as u64 + 2))
         + pixels * (60 + 4 * MAX_CHANNELS as u64)
-        + LightDepths::bytes_of(params.most_light_pixels)
+        + LightDepths::bytes_of(params.most_light_pixels, samples)
 }
 
 /// Bytes of the images of an extended light's points.

@@ -232,16 +232,18 @@ impl pulp::WithSimd for ThroughVolumes<'_> {
                 extinction.iter_mut().zip(of.volumes).for_each(|(e, v)| e[lane] = v.extinction_at(world) as f32);
             }
             let at = [Lanes::load(simd, &at[0]), Lanes::load(simd, &at[1]), Lanes::load(simd, &at[2])];
+            let soft = of.buffer.soft.as_ref().map(|soft| soft.beside(simd, &at, &wanted));
             let mut optical = [[Lanes::splat(simd, 0.0); NODES]; 3];
             for v in 0..of.volumes.len() {
                 let mean = of.means(simd, v, &at, &extinction, &wanted);
                 let own = Lanes::load(simd, &extinction[v]);
                 let ways = of.paths[v].ways(simd, &at, of.face);
-                of.add(simd, (&ways, mean, own), &None, [v, 0], &mut optical);
+                of.add(simd, (&ways, mean, own), &soft, [v, 0], &mut optical);
             }
             for p in 0..3 {
                 let mut through = [0.0; MAX_LANES];
-                optical[p][0].exp_neg().store(&mut through);
+                let optical = soft.as_ref().map_or(optical[p][0], |soft| optical[p][0] + soft.rest[p]);
+                optical.exp_neg().store(&mut through);
                 out.iter_mut().zip(through).for_each(|(out, through)| out[p] = through);
             }
         }

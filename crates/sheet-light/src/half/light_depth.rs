@@ -4,8 +4,13 @@
 //! lies nearer to the light at the place itself, not at the pixel's middle: so a wall hides what is behind its foot. A place on
 //! a surface, for which its own plane lies nearer at the pixel's middle, is not hidden: that is the surface itself as it bends away. So
 //! nothing has to be lifted from its own surface. The four pixels about a place are weighed.
+//!
+//! A light with an extent has such a z-buffer for each of its points, of fewer pixels each, and what they see is averaged (section 5). The
+//! paper keeps one z-buffer of the light's centre, fills what lies behind it with a thickness guessed from its gradient and convolves that.
+//! Points see the polygons themselves, so nothing has to be guessed: an edge at d1 casts a penumbra 2R·d2/d1 wide at d2 behind it.
 
 use super::light_views::views;
+use super::penumbra::received;
 use crate::Error;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::triangles::{DepthPlanes, PlacedMesh, resolve_depth};
@@ -34,15 +39,25 @@ const INSET: f32 = 1.0 / 1024.0;
 /// Halvings that find where light ends on a way.
 const HALVINGS: usize = 10;
 
+/// Least side of the image of a point, where a light has many.
+const LEAST_SIDE: u32 = 16;
+
 /// What a light sees of the polygons that cast shadows.
 pub(crate) struct LightDepths {
-    /// One; six for a lamp that is surrounded.
-    views: Vec<View>,
+    points: Vec<PointDepths>,
     /// What places are taken relative to.
     origin: DVec3,
     /// What is nearer by less than this is not before a surface, and what depths are rounded by; world units.
     bias: f32,
     rounding: f32,
+}
+
+/// What one point of the light sees.
+struct PointDepths {
+    /// One; six for a lamp that is surrounded.
+    views: Vec<View>,
+    /// Share of the light that comes from it.
+    share: f32,
 }
 
 /// One image of the light.
@@ -64,10 +79,11 @@ struct Sighted<'a> {
 }
 
 impl LightDepths {
-    /// Of a light, for what receives at any of these places, of which there is at least one, in images of at most `most` pixels a side; `None` where nothing casts shadows.
+    /// Of as many points of a light, for what receives at any of these places, of which there is at least one, in images that have
+    /// together no more pixels than one of `most` a side; `None` where nothing casts shadows.
     pub(crate) fn new(
         casters: &[PlacedMesh<'_>],
-        light: &Light,
+        (light, samples): (&Light, u32),
         receivers: &[DVec3],
         most: u32,
         progress: &Progress,
@@ -78,57 +94,68 @@ impl LightDepths {
         let (low, high) =
             receivers.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
         let origin = low + 0.5 * (high - low);
-        let cameras = views(light, origin, casters, (receivers, most))?;
-        let mut farthest = 0.0f64;
-        for camera in &cameras {
-            farthest = receivers.iter().map(|p| camera.view_from_world(*p).z).fold(farthest, f64::max);
+        let lights = Light { intensity: [1.0; 3], ..*light }.points(samples);
+        let (shares, _) = received(light, &lights, origin);
+        let (mut points, mut farthest) = (Vec::with_capacity(lights.len()), 0.0f64);
+        for (light, share) in lights.iter().zip(shares) {
+            let cameras = views(light, origin, casters, (receivers, side(most, lights.len() as u32)))?;
+            for camera in &cameras {
+                farthest = receivers.iter().map(|p| camera.view_from_world(*p).z).fold(farthest, f64::max);
+            }
+            let view = |camera| View::new(casters, camera, origin, progress);
+            points.push(PointDepths { views: cameras.iter().map(view).collect::<Result<_, Error>>()?, share });
         }
-        let view = |camera: &Camera| {
-            let planes = resolve_depth(casters, camera, Some(progress)).map_err(Error::of_polygons)?;
-            Ok(View {
-                blocks: blocks(&planes.depth, camera.size.map(|s| s as usize)),
-                planes,
-                transform: camera.view_from_offset(origin),
-                focal: camera.focal_px() as f32,
-                size: camera.size.map(|s| s as usize),
-                is_parallel: camera.is_orthographic(),
-            })
-        };
         let rounding = ROUNDING[0] * (high - low).length() + ROUNDING[1] * farthest;
-        let (bias, rounding) = ((SAFETY * rounding) as f32, rounding as f32);
-        Ok(Some(Self { views: cameras.iter().map(view).collect::<Result<_, Error>>()?, origin, bias, rounding }))
+        Ok(Some(Self { points, origin, bias: (SAFETY * rounding) as f32, rounding: rounding as f32 }))
     }
 
-    /// Bytes of the images of one light at most.
-    pub(crate) fn bytes_of(most: u32) -> u64 {
-        let side = u64::from(most);
+    /// Bytes of the images of one light with so many points at most.
+    pub(crate) fn bytes_of(most: u32, samples: u32) -> u64 {
+        let pixels = u64::from(side(most, samples)).pow(2);
         // Of six views each has half as many pixels a side; while one is made it has depths in double precision too.
-        side * side * 3 / 2 * 12 + side * side * 8
+        u64::from(samples) * pixels * 3 / 2 * 12 + pixels * 8
     }
 
     /// Bytes of the images.
     pub(crate) fn bytes(&self) -> u64 {
-        self.views.iter().map(|view| 12 * view.planes.depth.len() as u64).sum()
+        let views = self.points.iter().flat_map(|point| &point.views);
+        views.map(|view| 12 * view.planes.depth.len() as u64).sum()
     }
 
     /// Share of the light that polygons let through to a world position, which lies on a surface of this normal or in the open.
     pub(crate) fn visibility(&self, world: DVec3, face: Option<Vec3>) -> f32 {
-        self.at((world - self.origin).as_vec3(), face)
+        let place = (world - self.origin).as_vec3();
+        self.points.iter().map(|point| point.share * self.at(point, place, face)).sum()
     }
 
-    fn at(&self, place: Vec3, face: Option<Vec3>) -> f32 {
-        let Some(sighted) = self.views.iter().find_map(|view| view.sight(place)) else { return 1.0 };
+    fn at(&self, point: &PointDepths, place: Vec3, face: Option<Vec3>) -> f32 {
+        let Some(sighted) = point.views.iter().find_map(|view| view.sight(place)) else { return 1.0 };
         // In the open nothing lies on a surface but what is behind it: the end of a way.
         let bias = if face.is_some() { self.bias } else { -self.rounding };
         sighted.visibility(bias, face.map(|face| sighted.view.turned(face)))
     }
 
     /// Which part of a way between world positions light reaches: shares at which that begins and ends. Where it is reached here
-    /// and there, a part as long as all these, about their middle.
+    /// and there, or by some of the light's points, a part as long as all these, about their middle.
     pub(crate) fn lit(&self, ends: [DVec3; 2]) -> [f32; 2] {
-        let [from, to] = ends.map(|p| (p - self.origin).as_vec3());
-        let at = |share: f32| self.at(from + (to - from) * share, None);
-        let seen = self.views.iter().find_map(|view| Some([view.sight(from)?, view.sight(to)?]));
+        let ends = ends.map(|p| (p - self.origin).as_vec3());
+        if let [point] = &self.points[..] {
+            return self.lit_by(point, ends);
+        }
+        let (mut sum, mut moment, mut is_whole) = (0.0, 0.0, true);
+        for point in &self.points {
+            let [from, to] = self.lit_by(point, ends);
+            is_whole &= [from, to] == [0.0, 1.0];
+            sum += point.share * (to - from);
+            moment += point.share * 0.5 * (to - from) * (from + to);
+        }
+        if is_whole { [0.0, 1.0] } else { part_of(sum, moment) }
+    }
+
+    /// The same of one point, from its origin.
+    fn lit_by(&self, point: &PointDepths, [from, to]: [Vec3; 2]) -> [f32; 2] {
+        let at = |share: f32| self.at(point, from + (to - from) * share, None);
+        let seen = point.views.iter().find_map(|view| Some([view.sight(from)?, view.sight(to)?]));
         if let Some(is_lit) = seen.as_ref().and_then(|ends| ends[0].view.whole(ends, self.rounding)) {
             return [0.0, if is_lit { 1.0 } else { 0.0 }];
         }
@@ -151,15 +178,23 @@ impl LightDepths {
             is_whole &= next == 1.0;
             here = next;
         }
-        if is_whole {
-            return [0.0, 1.0];
-        }
-        if sum <= 0.0 {
-            return [0.0; 2];
-        }
-        let from = (moment / sum - 0.5 * sum).clamp(0.0, (1.0 - sum).max(0.0));
-        [from, (from + sum).min(1.0)]
+        if is_whole { [0.0, 1.0] } else { part_of(sum, moment) }
     }
+}
+
+/// Pixels along a side of the image of each of so many points.
+fn side(most: u32, points: u32) -> u32 {
+    let each = (f64::from(most) / f64::from(points.max(1)).sqrt()) as u32;
+    each.max(LEAST_SIDE.min(most))
+}
+
+/// A part of a way as long as `sum`, about its middle, which is `moment` over that.
+fn part_of(sum: f32, moment: f32) -> [f32; 2] {
+    if sum <= 0.0 {
+        return [0.0; 2];
+    }
+    let from = (moment / sum - 0.5 * sum).clamp(0.0, (1.0 - sum).max(0.0));
+    [from, (from + sum).min(1.0)]
 }
 
 /// Where light changes from what it is at one end of a part to what it is at the other.
@@ -174,6 +209,19 @@ fn edge(at: &impl Fn(f32) -> f32, [low, high]: [f32; 2], [here, next]: [f32; 2])
 }
 
 impl View {
+    fn new(casters: &[PlacedMesh<'_>], camera: &Camera, origin: DVec3, progress: &Progress) -> Result<Self, Error> {
+        let planes = resolve_depth(casters, camera, Some(progress)).map_err(Error::of_polygons)?;
+        let size = camera.size.map(|s| s as usize);
+        Ok(Self {
+            blocks: blocks(&planes.depth, size),
+            planes,
+            transform: camera.view_from_offset(origin),
+            focal: camera.focal_px() as f32,
+            size,
+            is_parallel: camera.is_orthographic(),
+        })
+    }
+
     fn sight(&self, place: Vec3) -> Option<Sighted<'_>> {
         let p = self.transform.apply(place);
         let at = Vec3::new(p.x, -p.y, p.z);

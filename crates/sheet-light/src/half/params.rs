@@ -16,7 +16,7 @@ pub struct HalfInput<'a> {
     /// light is known.
     pub splats: Option<HalfSplats<'a>>,
     /// Opaque polygons, anywhere: before, among and behind all that. They hide what is behind them, for the eye and for the lights of
-    /// `sheets`, and are lit by what comes through to them.
+    /// `sheets` and `extended`, and are lit by what comes through to them.
     pub polygons: &'a [Polygons<'a>],
     /// Lights with an extent, a sweep each, whose shadows are soft.
     pub extended: Vec<Extended<'a>>,
@@ -37,11 +37,11 @@ impl HalfInput<'_> {
 
 /// A light with an extent: a sphere, a disk, a rectangle.
 ///
-/// One sweep attenuates along the rays of each of its points. Unattenuated, it lights as its centre does, by
+/// One sweep attenuates along the rays of each of its points, of which each has a z-buffer of the polygons. Unattenuated, it lights as its centre does, by
 /// [`splat_core::Light::irradiance`]; and so it is scattered more than once.
 #[derive(Clone, Copy)]
 pub struct Extended<'a> {
-    /// The light, and the shadow of everything but the volumes, its mean over the light. One without an extent is a point.
+    /// The light, and the shadow of everything but the volumes and polygons, its mean over the light. One without an extent is a point.
     pub lit: LitBy<'a>,
     /// Points that stand for it, those of [`splat_core::Light::points`], 1 to [`MOST_SAMPLES`].
     pub samples: u32,
@@ -69,7 +69,8 @@ pub struct HalfParams {
     pub sheets: Params,
     /// Pixels of the light buffer per least step of a lattice, at the middle of the volumes, > 0.
     pub light_pixels: f64,
-    /// Most pixels of a light buffer along a side, 16 to 8192: its pixels grow where there would be more.
+    /// Most pixels of a light buffer along a side, and of the z-buffer of polygons, 16 to 8192: pixels grow where there would be more. Those
+    /// of a light's points have as many together, and at least 16 a side.
     pub most_light_pixels: u32,
     /// How often light is scattered in media that scatter by a phase function.
     pub scattering: Scattering,

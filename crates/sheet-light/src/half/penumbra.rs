@@ -136,6 +136,11 @@ impl Penumbra {
         (own * centre, c + (q.truncate() - c - q.truncate() * own) * centre)
     }
 
+    /// Whether a depth is behind all points, and the centre.
+    pub(crate) fn is_behind(&self, depth: f64) -> bool {
+        self.points.iter().all(|q| depth > q.z) && depth > self.center.z
+    }
+
     /// Points of the light.
     pub(crate) fn count(&self) -> usize {
         self.points.len()
@@ -200,7 +205,7 @@ impl Penumbra {
 }
 
 /// Share of each point of a light in what a place receives of it, and all of that over what the centre gives alone.
-fn received(light: &Light, points: &[Light], place: DVec3) -> (Vec<f32>, f64) {
+pub(super) fn received(light: &Light, points: &[Light], place: DVec3) -> (Vec<f32>, f64) {
     let of = |light: &Light| f64::from(light.irradiance(place, 0.0).1[0]);
     let (each, centre): (Vec<f64>, f64) =
         (points.iter().map(of).collect(), of(&Light { intensity: [1.0; 3], ..*light }));

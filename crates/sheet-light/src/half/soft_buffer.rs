@@ -167,9 +167,26 @@ impl SoftBuffer {
         rows.par_chunks_mut(row).enumerate().map(one).reduce(|| false, |a, b| a | b)
     }
 
-    /// What the penumbra makes of the optical depth about places of the present slab.
+    /// What the penumbra makes of the optical depth about places of the present slab, in the volumes.
     #[inline(always)]
     pub(crate) fn at<S: Simd>(&self, simd: S, places: &Places<S>, wanted: &[f32; MAX_LANES]) -> Soft<S> {
+        self.soft(simd, places, wanted, |place, plane| self.arriving(self.penumbra.pixel(place), plane))
+    }
+
+    /// The same of places anywhere behind what was added so far: each point's own ray is looked up.
+    #[inline(always)]
+    pub(crate) fn beside<S: Simd>(&self, simd: S, places: &Places<S>, wanted: &[f32; MAX_LANES]) -> Soft<S> {
+        self.soft(simd, places, wanted, |place, plane| self.come_to(place, plane))
+    }
+
+    #[inline(always)]
+    fn soft<S: Simd>(
+        &self,
+        simd: S,
+        places: &Places<S>,
+        wanted: &[f32; MAX_LANES],
+        arriving: impl Fn(DVec3, usize) -> [f32; 2],
+    ) -> Soft<S> {
         let mut at = [[0.0; MAX_LANES]; 3];
         for a in 0..3 {
             places[a].store(&mut at[a]);
@@ -177,9 +194,12 @@ impl SoftBuffer {
         let (mut share, mut rest) = ([[1.0; MAX_LANES]; 3], [[0.0; MAX_LANES]; 3]);
         for lane in (0..Lanes::<S>::COUNT).filter(|lane| wanted[*lane] > 0.0) {
             let place = DVec3::new(at[0][lane].into(), at[1][lane].into(), at[2][lane].into());
-            let pixel = self.penumbra.pixel(place);
             for p in 0..3 {
-                let [soft, hard] = self.arriving(pixel, p.min(self.planes - 1));
+                if p >= self.planes {
+                    (share[p][lane], rest[p][lane]) = (share[0][lane], rest[0][lane]);
+                    continue;
+                }
+                let [soft, hard] = arriving(place, p);
                 let changed = (soft - hard).abs() / soft.max(hard).max(f32::MIN_POSITIVE);
                 share[p][lane] = (1.0 - changed / CHANGED).max(0.0);
                 rest[p][lane] = (1.0 - share[p][lane]) * soft;
@@ -187,6 +207,40 @@ impl SoftBuffer {
         }
         let load = |v: [f32; MAX_LANES]| Lanes::load(simd, &v);
         Soft { share: share.map(load), rest: rest.map(load) }
+    }
+
+    /// Optical depth of what arrives at a place and of the centre's light alone, ray by ray.
+    fn come_to(&self, place: DVec3, plane: usize) -> [f32; 2] {
+        if !self.penumbra.is_behind(place.z) {
+            return [0.0; 2];
+        }
+        let pixel = self.penumbra.pixel(place);
+        let length = self.stretch(pixel);
+        let (mut through, mut all) = (0.0, 0.0);
+        for (point, share) in self.penumbra.shares.iter().enumerate() {
+            let Shift { scale, start } = self.penumbra.shift(point, place.z).inverse();
+            let own = [0, 1].map(|a| pixel[a] * (1.0 + scale) + start[a]);
+            through += share * self.through(own, [point + 1, plane], length);
+            all += share;
+        }
+        let optical = |through: f32| (-libm::logf(through.max(LEAST))).max(0.0);
+        [optical(through / all), optical(self.through(pixel, [0, plane], length))]
+    }
+
+    /// What a point's image lets through about a pixel on a way of this length per depth, bilinear; all beyond it. Light is interpolated,
+    /// not optical depth, so edges of what is opaque lie in the middle between pixels.
+    fn through(&self, [x, y]: [f64; 2], [point, plane]: [usize; 2], length: f32) -> f32 {
+        let [width, height] = self.penumbra.size.map(|n| n as f64);
+        if !(x > -1.0 && y > -1.0 && x < width && y < height) {
+            return 1.0;
+        }
+        let (column, [u, v]) = ((x + PAD as f64) as usize, [x - x.floor(), y - y.floor()].map(|share| share as f32));
+        let [upper, lower] = [0, 1].map(|down| {
+            let row = &self.sum_row(y.floor() as i64 + down, point, plane)[column..];
+            let [one, other] = [row[0], row[1]].map(|optical| libm::expf(-(optical * length).max(0.0)));
+            one + (other - one) * u
+        });
+        upper + (lower - upper) * v
     }
 
     /// Optical depth of what arrives and of the centre's light alone about a pixel, bilinear.
@@ -350,13 +404,18 @@ impl SoftBuffer {
     /// Length per depth of the centre's rays.
     #[inline(always)]
     fn length<S: Simd>(&self, simd: S, [x, y]: [usize; 2]) -> Lanes<S> {
-        let (slope, step) = self.penumbra.slopes();
         let mut out = [0.0; MAX_LANES];
-        let down = slope.y + step * y as f64;
         for (n, out) in out.iter_mut().enumerate().take(Lanes::<S>::COUNT) {
-            let right = slope.x + step * (x + n) as f64;
-            *out = (1.0 + right * right + down * down).sqrt() as f32;
+            *out = self.stretch([(x + n) as f64, y as f64]);
         }
         Lanes::load(simd, &out)
+    }
+
+    /// Length per depth of the centre's ray through a pixel.
+    #[inline(always)]
+    fn stretch(&self, [x, y]: [f64; 2]) -> f32 {
+        let (slope, step) = self.penumbra.slopes();
+        let [right, down] = [slope.x + step * x, slope.y + step * y];
+        (1.0 + right * right + down * down).sqrt() as f32
     }
 }

@@ -93,10 +93,8 @@ impl<'a> Sweep<'a> {
         };
         let light_buffer = carried.map(|carried| light_buffer(&frame, params, &placed, bodies, carried));
         let gain = light_buffer.as_ref().and_then(|b| b.soft.as_ref()).map(|soft| soft.penumbra.gain);
-        let light = carried.map(|(lit, _)| match gain {
-            Some(gain) => LitBy { light: brighter(&lit.light, gain), ..*lit },
-            None => *lit,
-        });
+        let lit = |lit: &LitBy<'a>| LitBy { light: brighter(&lit.light, gain.unwrap_or(1.0)), ..*lit };
+        let light = carried.map(|(of, _)| lit(of));
         let mut sweep = Self {
             volumes,
             shapes: placed.iter().map(|p| sight.shape(&frame, p)).collect(),
@@ -124,7 +122,8 @@ impl<'a> Sweep<'a> {
         };
         sweep.sort_voxels(progress)?;
         if let Some(eye) = polygons {
-            sweep.depths = fold::light_depths(input, params, (sweep.light.as_ref(), eye), progress)?;
+            let lit = sweep.light.as_ref().zip(carried.map(|c| c.1));
+            sweep.depths = fold::light_depths(input, params, (lit, eye), progress)?;
         }
         sweep.scattered = sweep.scatter(params);
         Ok(sweep)

@@ -3,11 +3,11 @@
 use super::common::{exact, input, lamp, scattering, sun};
 use crate::common::{BEAUTY, constant, cubic, grid, parallel, perspective, volume};
 use sheet_light::Error;
-use sheet_light::half::{Drawn, Extended, HalfInput, HalfParams, Polygons, Scattering, fold};
+use sheet_light::half::{Drawn, HalfInput, HalfParams, Polygons, Scattering, fold};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::triangles::PlacedMesh;
 use splat_core::shade::LitBy;
-use splat_core::{Accumulator, LightShape, Material, Mesh, Similarity};
+use splat_core::{Accumulator, Material, Mesh, Similarity};
 use std::f64::consts::PI;
 
 /// Reflects all light alike in all directions.
@@ -327,7 +327,7 @@ fn ms10_no_flux_passes_a_wall_of_polygons() {
 }
 
 #[test]
-fn what_is_no_mesh_and_what_is_not_there_yet_is_refused_by_name() {
+fn what_is_no_mesh_is_refused_by_name() {
     let material = white();
     let camera = parallel([0.0, 0.0, 20.0], 2.0, [8, 8]);
     let refused = |input: &HalfInput<'_>| {
@@ -338,21 +338,6 @@ fn what_is_no_mesh_and_what_is_not_there_yet_is_refused_by_name() {
     let shy = [Polygons { shadow_coefficient: f32::NAN, ..polygons(&mesh, &material) }];
     let said = refused(&HalfInput { polygons: &shy, ..input(&[], &camera, &[]) });
     assert!(said.contains("shadow_coefficient is NaN"), "{said}");
-    let lit = LitBy {
-        slide: None,
-        light: splat_core::Light {
-            shape: LightShape::Sphere { center: DVec3::Y * 9.0, radius: 1.0 },
-            intensity: [1.0; 3],
-        },
-        shadow: None,
-    };
-    let all = [polygons(&mesh, &material)];
-    let said = refused(&HalfInput {
-        polygons: &all,
-        extended: vec![Extended { lit, samples: 4 }],
-        ..input(&[], &camera, &[])
-    });
-    assert!(said.contains("beside polygons"), "{said}");
     mesh.triangles.push([0, 1, 9]);
     let all = [polygons(&mesh, &material)];
     let said = refused(&HalfInput { polygons: &all, ..input(&[], &camera, &[]) });

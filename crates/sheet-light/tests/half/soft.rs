@@ -9,23 +9,23 @@ use splat_core::shade::LitBy;
 use splat_core::{Camera, Grid, Light, LightShape, Material};
 
 /// With lights that have an extent.
-fn soft<'a>(volumes: &'a [Volume<'a>], camera: &'a Camera, extended: Vec<Extended<'a>>) -> HalfInput<'a> {
+pub(super) fn soft<'a>(volumes: &'a [Volume<'a>], camera: &'a Camera, extended: Vec<Extended<'a>>) -> HalfInput<'a> {
     HalfInput { extended, ..input(volumes, camera, &[]) }
 }
 
-fn extended(shape: LightShape, samples: u32) -> Extended<'static> {
+pub(super) fn extended(shape: LightShape, samples: u32) -> Extended<'static> {
     let mut lit = lit(shape);
     lit.light.intensity = [100.0; 3];
     Extended { lit, samples }
 }
 
 /// The same light as that many points, a sweep each.
-fn as_points(light: &Extended<'static>, samples: u32) -> Vec<LitBy<'static>> {
+pub(super) fn as_points(light: &Extended<'static>, samples: u32) -> Vec<LitBy<'static>> {
     light.lit.light.points(samples).into_iter().map(|light| LitBy { slide: None, light, shadow: None }).collect()
 }
 
 /// A constant block between two corners.
-fn block(from: [f64; 3], to: [f64; 3], step: f64) -> Grid {
+pub(super) fn block(from: [f64; 3], to: [f64; 3], step: f64) -> Grid {
     let (from, to) = (DVec3::from_array(from), DVec3::from_array(to));
     let dims = ((to - from) / step).ceil().to_array().map(|n| n.max(2.0) as usize);
     let axes = DMat3::from_diagonal((to - from) / DVec3::from_array(dims.map(|n| n as f64)));
@@ -35,7 +35,7 @@ fn block(from: [f64; 3], to: [f64; 3], step: f64) -> Grid {
 }
 
 /// Light 6 above a thin receiver, and what it shines on from there.
-fn above(kind: usize, radius: f64) -> LightShape {
+pub(super) fn above(kind: usize, radius: f64) -> LightShape {
     let center = DVec3::Z * 6.0;
     match kind {
         0 => LightShape::Disk { center, normal: DVec3::NEG_Z, radius },
@@ -81,7 +81,7 @@ fn profile(
 }
 
 /// Mean and deviation of where the light rises, or falls.
-fn edge(profile: &[[f64; 2]]) -> [f64; 2] {
+pub(super) fn edge(profile: &[[f64; 2]]) -> [f64; 2] {
     let steps = || profile.windows(2).map(|w| (0.5 * (w[0][0] + w[1][0]), w[1][1] - w[0][1]));
     let all: f64 = steps().map(|(_, rise)| rise).sum();
     let mean = steps().map(|(x, rise)| x * rise).sum::<f64>() / all;
@@ -89,9 +89,9 @@ fn edge(profile: &[[f64; 2]]) -> [f64; 2] {
 }
 
 /// A pixel of the light buffer at the receiver.
-const PIXEL: f64 = 0.02 / 0.8 * 6.0 / 5.0;
+pub(super) const PIXEL: f64 = 0.02 / 0.8 * 6.0 / 5.0;
 
-fn fine(slabs: f64) -> HalfParams {
+pub(super) fn fine(slabs: f64) -> HalfParams {
     HalfParams { light_pixels: 0.8, ..exact(Some(2.04 / slabs)) }
 }
 

@@ -26,17 +26,13 @@ use splats::{OwnSplats, splat_bounds};
 /// What a user can do where half vectors cannot.
 const HINT: &str = "use render.sheets.slicing = \"view\"";
 
-/// Whether opaque triangles stay triangles. Light with an extent that goes through slabs in one sweep knows them by shadow maps of its points.
-pub(crate) fn keeps_polygons(scene: &Scene) -> bool {
-    is_asked(scene) && !is_one_sweep(scene)
-}
-
 /// How light is carried where a scene asks for half vectors.
 pub(crate) fn carries(scene: &Scene) -> Option<CarriesLight> {
     is_asked(scene).then_some(points_served as CarriesLight)
 }
 
-pub(super) fn is_asked(scene: &Scene) -> bool {
+/// Whether slabs lie across half vectors, where opaque triangles stay triangles.
+pub(crate) fn is_asked(scene: &Scene) -> bool {
     matches!(scene.render.sheets.slicing, Slicing::HalfVector { .. })
 }
 
@@ -122,7 +118,8 @@ pub(super) fn bytes(matter: &Matter<'_>, points: &[LightPoint], options: &Render
     let params = half_params(matter.scene, params(matter.scene, 0, options));
     let lamps = points.iter().filter_map(|point| swept(matter.scene, point));
     let (served, mapped): (Vec<_>, Vec<_>) = lamps.partition(|lamp| serve(&bodies, matter.camera, *lamp).is_ok());
-    let polygons = if polygons::any(matter) { polygon_bytes(matter.camera, &params) } else { 0 };
+    let samples = served.iter().map(|(_, samples)| *samples).max().unwrap_or(1);
+    let polygons = if polygons::any(matter) { polygon_bytes(matter.camera, samples, &params) } else { 0 };
     polygons + half::bytes(&bodies, matter.camera, served.into_iter(), mapped.len(), &params)
 }
 
