@@ -8,6 +8,8 @@ use convert::{
 };
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::{DMat3, DVec3, Vec3};
+use rayon::prelude::*;
+use rstar::RTree;
 use splat_core::{Cloud, DAabb, Grid, Mesh, TransferFunction, TransferPoint, rng};
 use std::path::Path;
 
@@ -92,6 +94,22 @@ fn points(c: &mut Criterion) {
     group.throughput(Throughput::Elements(terrain.len() as u64));
     group.bench_function(BenchmarkId::new("terrain", terrain.len()), |b| {
         b.iter(|| raw_to_surfels(&terrain, &SurfelParams::default(), None));
+    });
+    let hills = hills(1 << 20);
+    let Ok((cloud, _)) = raw_to_surfels(&hills, &SurfelParams::default(), None) else { return };
+    group.throughput(Throughput::Elements(cloud.len() as u64));
+    group.bench_function(BenchmarkId::new("hills", cloud.len()), |b| {
+        b.iter(|| raw_to_surfels(&hills, &SurfelParams::default(), None));
+    });
+    // Nothing but the neighbours, in the order that suits its caches best.
+    let at: Vec<[f32; 3]> = cloud.position.iter().map(Vec3::to_array).collect();
+    group.bench_function(BenchmarkId::new("hills, neighbours by rstar", at.len()), |b| {
+        b.iter(|| {
+            let tree = RTree::bulk_load(at.clone());
+            // The first is the point itself.
+            let farthest = |p: &[f32; 3]| tree.nearest_neighbor_iter(p).nth(10).map_or(0.0, |n| f64::from(n[0]));
+            at.par_iter().map(farthest).sum::<f64>()
+        });
     });
     group.finish();
 }

@@ -5,6 +5,7 @@ mod accuracy;
 mod animation;
 mod bad_scenes;
 mod borders;
+mod cache;
 mod closed_forms;
 mod command;
 mod doubts;

@@ -6,7 +6,8 @@
 //! ∫ σ dv and ∫ σ·colour dv between two values, differences of cubics, give its mean there in closed form (the integrals of
 //! K. Engel et al. 2001, "High-quality pre-integrated volume rendering", over a cell instead of along a ray).
 
-use splat_core::{Grid, TransferFunction, glam::DVec3};
+use crate::extremes::{greater, lesser};
+use splat_core::{Grid, TransferFunction, TransferPoint, glam::DVec3};
 
 /// Colour and extinction of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,6 +44,10 @@ pub(crate) struct Classes<'a> {
     bends: Vec<f64>,
     /// Optical depth that a unit of extinction has in a cell, over what may be wrong with a cell's.
     weight: f64,
+    /// For each piece the value up to which there is no extinction from any of its values on; −∞ where it has some.
+    dark_until: Vec<f32>,
+    /// Sums of extinction above it are more than rounding.
+    something: f64,
 }
 
 impl<'a> Classes<'a> {
@@ -50,8 +55,8 @@ impl<'a> Classes<'a> {
     pub(crate) fn new(tf: &'a TransferFunction, spacing: f64, error: f64) -> Self {
         let points = tf.points();
         let knots: Vec<f64> = points.iter().map(|p| f64::from(p.value)).collect();
-        let four = |p: &splat_core::TransferPoint| (f64::from(p.extinction), p.color.map(f64::from));
-        let constant = |base: f64, a: Four, p: &splat_core::TransferPoint| {
+        let four = |p: &TransferPoint| (f64::from(p.extinction), p.color.map(f64::from));
+        let constant = |base: f64, a: Four, p: &TransferPoint| {
             let (s, [r, g, b]) = four(p);
             Piece { base, a, b: [s, s * r, s * g, s * b], c: [0.0; 4], e: [0.0; 4] }
         };
@@ -84,7 +89,19 @@ impl<'a> Classes<'a> {
         let bends = (0..knots.len()).map(bend).collect();
         // Without any error allowed every bend matters.
         let weight = if error > 0.0 { spacing / error } else { f64::INFINITY };
-        Self { tf, knots, pieces, bends, weight }
+        let most = points.iter().fold(0.0, |most: f32, p| most.max(p.extinction));
+        let something = (1e-6 * f64::from(most)).max(1e-30);
+        Self { tf, knots, pieces, bends, weight, dark_until: dark_until(points), something }
+    }
+
+    /// Whether some value from `low` to `high` has extinction.
+    pub(crate) fn shows(&self, low: f32, high: f32) -> bool {
+        high > self.dark_until[self.piece(f64::from(low))]
+    }
+
+    /// The piece that a value lies in.
+    fn piece(&self, value: f64) -> usize {
+        self.knots.partition_point(|k| *k <= value)
     }
 
     /// The class of a value.
@@ -93,40 +110,56 @@ impl<'a> Classes<'a> {
         Class { color: at.color, extinction: at.extinction }
     }
 
-    /// The class of the cell around a voxel of value `v`, whose neighbours have values from `low` to `high`; with true where
-    /// it is a mean.
-    pub(crate) fn cell(&self, lattice: &Grid, voxel: [usize; 3], [low, high]: [f32; 2]) -> (Class, bool) {
-        let v = lattice.values[(voxel[2] * lattice.dims[1] + voxel[1]) * lattice.dims[0] + voxel[0]];
-        let middle = || (self.at(v), false);
-        if self.bend(f64::from(low), f64::from(high)) <= 1.0 {
-            return middle();
-        }
-        let nodes = nodes(lattice, voxel);
-        let (low, high) =
-            nodes.iter().flatten().flatten().fold((nodes[1][1][1], nodes[1][1][1]), |(l, h), v| (l.min(*v), h.max(*v)));
-        let bend = self.bend(low, high);
-        if bend <= 1.0 {
-            return middle();
-        }
-        let [s, r, g, b] = if bend <= SHARP { self.mean::<2>(&nodes) } else { self.mean::<4>(&nodes) };
+    /// The class of the cell around a voxel, whose neighbours have values from `range[0]` to `range[1]`; with true where it is a mean.
+    pub(crate) fn cell(&self, lattice: &Grid, voxel: [usize; 3], range: [f32; 2]) -> (Class, bool) {
+        let at_voxel = || self.at(value(lattice, voxel));
+        let Some([s, r, g, b]) = self.mean_of_cell(lattice, voxel, range, f64::INFINITY) else {
+            return (at_voxel(), false);
+        };
         let extinction = s as f32;
         if extinction > 0.0 {
             return (Class { color: [r / s, g / s, b / s].map(|c| c as f32), extinction }, true);
         }
-        (Class { color: self.tf.at(v).color, extinction: 0.0 }, true)
+        (Class { color: at_voxel().color, extinction: 0.0 }, true)
+    }
+
+    /// Whether the class of the cell has extinction.
+    pub(crate) fn is_extinct(&self, lattice: &Grid, voxel: [usize; 3], range: [f32; 2]) -> bool {
+        match self.mean_of_cell(lattice, voxel, range, self.something) {
+            Some([s, ..]) => s as f32 > 0.0,
+            None => self.at(value(lattice, voxel)).extinction > 0.0,
+        }
+    }
+
+    /// The mean over the cell around a voxel, or of a part of it that has more than `enough` extinction; `None` where the function bends too
+    /// little for a mean.
+    fn mean_of_cell(&self, lattice: &Grid, voxel: [usize; 3], [low, high]: [f32; 2], enough: f64) -> Option<Four> {
+        if self.bend(f64::from(low), f64::from(high)) <= 1.0 {
+            return None;
+        }
+        let nodes = nodes(lattice, voxel);
+        let (mut low, mut high) = (nodes[1][1][1], nodes[1][1][1]);
+        for v in nodes.as_flattened().as_flattened() {
+            (low, high) = (lesser(*v, low), greater(*v, high));
+        }
+        let bend = self.bend(low, high);
+        if bend <= 1.0 {
+            return None;
+        }
+        Some(if bend <= SHARP { self.mean::<2>(&nodes, enough) } else { self.mean::<4>(&nodes, enough) })
     }
 
     /// How much the bends between two values may change the optical depth of a cell of these values, in units of what may
     /// be wrong: a bend in the middle of evenly spread values changes their mean by an eighth of its slope times the spread.
     fn bend(&self, low: f64, high: f64) -> f64 {
-        let first = self.knots.partition_point(|k| *k <= low);
+        let first = self.piece(low);
         let within = self.knots[first..].iter().zip(&self.bends[first..]).take_while(|(k, _)| **k < high);
         let slopes: f64 = within.map(|(_, bend)| bend).sum();
         if slopes > 0.0 { 0.125 * slopes * (high - low) * self.weight } else { 0.0 }
     }
 
-    /// The mean over a cell, by lines through Q² places.
-    fn mean<const Q: usize>(&self, nodes: &Nodes) -> Four {
+    /// The mean over a cell, by lines through Q² places; by those up to which there is more than `enough` extinction.
+    fn mean<const Q: usize>(&self, nodes: &Nodes, enough: f64) -> Four {
         let change = |a: f64, b: f64, c: f64| (b - a).abs() + (c - b).abs();
         let n = nodes;
         let along = [
@@ -152,7 +185,12 @@ impl<'a> Classes<'a> {
             let at = |m: usize| mix(mix(low[a][m], low[a + 1][m], s), mix(high[a][m], high[a + 1][m], s), t);
             let [v0, v1, v2] = [at(0), at(1), at(2)];
             let (first, second) = (self.between(v0, v1), self.between(v1, v2));
-            (0..4).for_each(|c| sum[c] += first[c] + second[c]);
+            for c in 0..4 {
+                sum[c] += first[c] + second[c];
+            }
+            if sum[0] > enough {
+                break;
+            }
         }
         sum.map(|x| x * (0.5 / (Q * Q) as f64))
     }
@@ -160,8 +198,7 @@ impl<'a> Classes<'a> {
     /// The mean between two values.
     fn between(&self, a: f64, b: f64) -> Four {
         let (low, high) = if a < b { (a, b) } else { (b, a) };
-        let piece = |v: f64| self.knots.partition_point(|k| *k <= v);
-        let (first, last) = (piece(low), piece(high));
+        let (first, last) = (self.piece(low), self.piece(high));
         if first == last {
             return self.pieces[first].mean(low, high);
         }
@@ -170,8 +207,27 @@ impl<'a> Classes<'a> {
         let head = self.pieces[first].mean(low, self.knots[first]);
         let tail = self.pieces[last].mean(self.knots[last - 1], high);
         let (start, end) = (&self.pieces[first + 1].a, &self.pieces[last].a);
-        std::array::from_fn(|i| (rise * head[i] + (end[i] - start[i]) + fall * tail[i]) / (high - low))
+        let mut mean = [0.0; 4];
+        for i in 0..4 {
+            mean[i] = (rise * head[i] + (end[i] - start[i]) + fall * tail[i]) / (high - low);
+        }
+        mean
     }
+}
+
+/// See [`Classes::dark_until`].
+fn dark_until(points: &[TransferPoint]) -> Vec<f32> {
+    let n = points.len();
+    let is_dark =
+        |piece: usize| points[piece.saturating_sub(1)..(piece + 1).min(n)].iter().all(|p| p.extinction == 0.0);
+    let mut until = vec![f32::NEG_INFINITY; n + 1];
+    for piece in (0..=n).rev().filter(|piece| is_dark(*piece)) {
+        until[piece] = match points.get(piece) {
+            Some(end) => end.value.max(until[piece + 1]),
+            None => f32::INFINITY,
+        };
+    }
+    until
 }
 
 impl Piece {
@@ -179,8 +235,17 @@ impl Piece {
     fn mean(&self, low: f64, high: f64) -> Four {
         let (x, y) = (low - self.base, high - self.base);
         let (first, second) = (x + y, x * x + x * y + y * y);
-        std::array::from_fn(|i| self.b[i] + self.c[i] * first + self.e[i] * second)
+        let mut mean = [0.0; 4];
+        for i in 0..4 {
+            mean[i] = self.b[i] + self.c[i] * first + self.e[i] * second;
+        }
+        mean
     }
+}
+
+/// The value of a voxel.
+fn value(lattice: &Grid, [i, j, k]: [usize; 3]) -> f32 {
+    lattice.values[(k * lattice.dims[1] + j) * lattice.dims[0] + i]
 }
 
 /// The field at the corners of a cell's eight octants, z slowest.
@@ -225,7 +290,6 @@ pub(crate) fn cell_length(lattice: &Grid, scale: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use splat_core::TransferPoint;
     use splat_core::glam::DMat3;
 
     fn function() -> TransferFunction {
@@ -271,6 +335,27 @@ mod tests {
         // Where it bends, but too little to matter.
         let tiny = Grid { values: grid.values.iter().map(|v| v * 1e-6).collect(), ..grid };
         assert!(!Classes::new(&tf, 1.0, 1e-3).cell(&tiny, [1; 3], [-1e-6, 1e-6]).1);
+    }
+
+    #[test]
+    fn values_without_extinction_are_told_between_and_beyond_points() {
+        let point = |value, extinction| TransferPoint { value, color: [1.0; 3], extinction };
+        let points = [(0.0, 0.0), (1.0, 2.0), (2.0, 0.0), (3.0, 0.0), (4.0, 0.0), (5.0, 1.0)];
+        let tf = TransferFunction::new(points.map(|(v, e)| point(v, e)).to_vec()).unwrap();
+        let classes = Classes::new(&tf, 1.0, 0.0);
+        for (range, shows) in [
+            ([-9.0, 0.0], false),
+            ([-9.0, 0.1], true),
+            ([1.9, 1.9], true),
+            ([2.0, 4.0], false),
+            ([2.5, 3.5], false),
+            ([2.5, 4.5], true),
+            ([7.0, 8.0], true),
+        ] {
+            assert_eq!(classes.shows(range[0], range[1]), shows, "{range:?}");
+        }
+        let nothing = TransferFunction::new(vec![point(0.0, 0.0)]).unwrap();
+        assert!(!Classes::new(&nothing, 1.0, 0.0).shows(-1.0, 1.0));
     }
 
     /// Against a sum over 40³ places of the cell.

@@ -95,13 +95,13 @@ pub fn volume(grid: &Grid, tf: &TransferFunction, params: &VolumeParams) -> Resu
     let factors = lattice_factors(grid, params)?;
     let keep = Keep::new(tf, grid, params);
     if factors == [1; 3] {
-        return Ok(Prediction::exact(keep.count(grid) as f64, params.wanted()));
+        return Ok(Prediction::exact(keep.count() as f64, params.wanted()));
     }
     let finer = factors.iter().map(|f| *f as f64).product::<f64>();
     // Cells around the border of what has extinction count too: finer ones are as much thinner, and about half of them bend little
     // enough to go by their voxel.
-    let inside = keep.count_voxels(grid) as f64;
-    let kept = inside + (keep.count(grid) as f64 - inside).max(0.0) / (2.0 * libm::cbrt(finer));
+    let inside = keep.count_voxels() as f64;
+    let kept = inside + (keep.count() as f64 - inside).max(0.0) / (2.0 * libm::cbrt(finer));
     Ok(Prediction::new(kept * finer, Some(grid.values.len() as f64 * finer), params.wanted()))
 }
 

@@ -17,6 +17,9 @@
 
 mod body_centred;
 mod borders;
+mod bricks;
+#[cfg(feature = "cache")]
+mod cache;
 mod cell_share;
 mod classify;
 mod clipped_mesh;
@@ -31,6 +34,7 @@ mod domain;
 mod error;
 #[cfg(feature = "expression")]
 mod expression;
+mod extremes;
 mod field_points;
 #[cfg(feature = "surfels")]
 mod gaussian_points;
@@ -83,8 +87,12 @@ mod tangent_plane;
 mod thin;
 mod vertex_normals;
 mod volume_points;
+#[cfg(feature = "surfels")]
+mod voronoi_cell;
 
 pub use body_centred::body_centred;
+#[cfg(feature = "cache")]
+pub use cache::Cache;
 pub use clipped_mesh::clipped_mesh;
 pub use color_by::{ColorBy, Colored, PointColors, class_name, colored};
 pub use color_map::ColorMap;

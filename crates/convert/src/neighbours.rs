@@ -20,7 +20,7 @@ pub(crate) const MAX_NEIGHBOURS: usize = 32;
 pub(crate) const MAX_WAITING: usize = 96;
 
 /// Eight numbers, one for each query, each point of a leaf or each box of a node.
-type Lanes = [f32; WIDTH];
+pub(crate) type Lanes = [f32; WIDTH];
 
 /// Points of one leaf by coordinate; places beyond the last point are infinitely far.
 #[derive(Debug, Clone, Copy)]
@@ -106,7 +106,6 @@ pub(crate) struct Waiting {
 
 /// The nearest so far of the eight points of a leaf: row j has each query's (j + 1)-th neighbour, as a key of squared
 /// distance (high bits; floats that are not negative sort as integers) and id (low bits).
-#[derive(Debug, Clone, Copy)]
 pub(crate) struct Nearest {
     rows: [[i64; WIDTH]; MAX_NEIGHBOURS],
     k: usize,
@@ -230,9 +229,10 @@ impl Nearest {
         self.tighten();
     }
 
-    /// Ids of the neighbours of the leaf's point `slot`, from near to far.
-    pub(crate) fn ids(&self, slot: usize) -> impl Iterator<Item = u32> + '_ {
-        (0..self.k).map(move |j| self.rows[j][slot]).take_while(|key| *key < NONE).map(|key| key as u32)
+    /// The id of neighbour `j`, from near to far, of the leaf's point `slot`; there is one where there are more than j other points.
+    #[inline(always)]
+    pub(crate) fn id(&self, j: usize, slot: usize) -> u32 {
+        self.rows[j][slot] as u32
     }
 
     /// From one point of a leaf to the eight queries.
@@ -305,6 +305,11 @@ mod tests {
     use super::*;
     use splat_core::rng;
 
+    /// All neighbours of a leaf's point, of `points` points.
+    fn ids(nearest: &Nearest, slot: usize, points: usize) -> Vec<u32> {
+        (0..nearest.k.min(points - 1)).map(|j| nearest.id(j, slot)).collect()
+    }
+
     fn check(points: &[Vec3], k: usize) {
         let (tree, mut nearest) = (Tree::new(points), Nearest::default());
         let mut stack = [Waiting::default(); MAX_WAITING];
@@ -314,7 +319,7 @@ mod tests {
             all.sort_unstable();
             let expected: Vec<u32> = all.iter().take(k).map(|k| k.1).collect();
             tree.nearest(i / WIDTH, k, &mut nearest, &mut stack);
-            assert_eq!(nearest.ids(i % WIDTH).collect::<Vec<_>>(), expected);
+            assert_eq!(ids(&nearest, i % WIDTH, points.len()), expected);
         }
     }
 
@@ -339,18 +344,18 @@ mod tests {
     #[test]
     fn squares_of_tiny_and_huge_distances_do_not_vanish() {
         let points: Vec<Vec3> = (0..40).map(|i| Vec3::new(i as f32, 0.3 * (i * i % 7) as f32, 0.0)).collect();
-        let ids = |factor: f32| {
+        let all = |factor: f32| {
             let scaled: Vec<Vec3> = points.iter().map(|p| *p * factor).collect();
             let (tree, mut nearest) = (Tree::new(&scaled), Nearest::default());
             let mut stack = [Waiting::default(); MAX_WAITING];
-            let mut ids = |i: usize| {
+            let mut of = |i: usize| {
                 tree.nearest(i / WIDTH, 5, &mut nearest, &mut stack);
-                nearest.ids(i % WIDTH).collect()
+                ids(&nearest, i % WIDTH, 40)
             };
-            (0..40).map(&mut ids).collect::<Vec<Vec<u32>>>()
+            (0..40).map(&mut of).collect::<Vec<Vec<u32>>>()
         };
-        assert_eq!(ids(1.0), ids(1e-10f32.log2().floor().exp2()));
-        assert_eq!(ids(1.0), ids((-100f32).exp2()));
-        assert_eq!(ids(1.0), ids(100f32.exp2()));
+        assert_eq!(all(1.0), all(1e-10f32.log2().floor().exp2()));
+        assert_eq!(all(1.0), all((-100f32).exp2()));
+        assert_eq!(all(1.0), all(100f32.exp2()));
     }
 }

@@ -4,7 +4,9 @@
 //! either, the choice spreads from the highest point of each connected part along the pairs of neighbours whose planes
 //! agree best first (a minimum spanning tree over 1 − |n·m|; Hoppe et al. 1992).
 
-use crate::neighbours::{Nearest, WIDTH};
+use crate::columns::CHUNK;
+use crate::places::{Neighbours, Place};
+use rayon::prelude::*;
 use splat_core::glam::{DVec3, Vec3};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -51,59 +53,61 @@ pub(crate) fn guess(orientation: Orientation, line: DVec3) -> DVec3 {
     if across.length() > 1e-6 { across.normalize() } else { line.any_orthonormal_vector() }
 }
 
-/// Turns normals; `nearest`, by leaf, is read for [`Orientation::Propagate`] alone. [`Orientation::Auto`] is taken for points that enclose
-/// nothing, who knows better names the other one.
+/// Turns the normals of places; `neighbours` are read for [`Orientation::Propagate`] alone. [`Orientation::Auto`] is taken for points that
+/// enclose nothing, who knows better names the other one.
 pub(crate) fn orient(
-    normals: &mut [DVec3],
+    places: &mut [Place],
     position: &[Vec3],
     origin: DVec3,
     orientation: Orientation,
-    nearest: &[Nearest],
+    neighbours: &Neighbours,
 ) {
+    let turn = |side: &(dyn Fn(Vec3) -> DVec3 + Sync), places: &mut [Place]| {
+        let each = places.par_iter_mut().zip(position).with_min_len(CHUNK);
+        each.for_each(|(place, p)| place.normal = face(place.normal, side(*p)));
+    };
     match orientation {
-        Orientation::Toward(d) | Orientation::Auto(d) => normals.iter_mut().for_each(|n| *n = face(*n, d)),
-        Orientation::Viewpoint(eye) => {
-            let eye = eye - origin;
-            normals.iter_mut().zip(position).for_each(|(n, p)| *n = face(*n, eye - p.as_dvec3()));
-        }
-        Orientation::Propagate => propagate(normals, position, nearest),
+        Orientation::Toward(d) | Orientation::Auto(d) => turn(&|_| d, places),
+        Orientation::Viewpoint(eye) => turn(&|p| eye - origin - p.as_dvec3(), places),
+        Orientation::Propagate => propagate(places, position, neighbours),
     }
 }
 
-/// Whether normals that are alike among neighbours, of surfaces of these areas, enclose something: then they nearly cancel.
-pub(crate) fn encloses(of_places: impl Iterator<Item = (DVec3, f64)>) -> bool {
+/// Whether normals that are alike among neighbours, of places with their areas, enclose something: then they nearly cancel.
+pub(crate) fn encloses(places: &[Place]) -> bool {
     /// What is left of a body that lacks its base is less, of half a ball it is a half, of terrain nearly 1.
     const OPEN: f64 = 0.25;
-    let add = |(sum, all): (DVec3, f64), (normal, area): (DVec3, f64)| (sum + normal * area, all + area);
-    let (sum, all) = of_places.fold((DVec3::ZERO, 0.0), add);
+    let add = |(sum, all): (DVec3, f64), p: &Place| (sum + p.normal.as_dvec3() * p.area, all + p.area);
+    let (sum, all) = places.iter().fold((DVec3::ZERO, 0.0), add);
     sum.length() < OPEN * all
 }
 
-fn face(n: DVec3, side: DVec3) -> DVec3 {
-    if n.dot(side) < 0.0 { -n } else { n }
+fn face(n: Vec3, side: DVec3) -> Vec3 {
+    if n.as_dvec3().dot(side) < 0.0 { -n } else { n }
 }
 
-fn propagate(normals: &mut [DVec3], position: &[Vec3], nearest: &[Nearest]) {
-    let both_ways = neighbour_lists(nearest, normals.len());
+fn propagate(places: &mut [Place], position: &[Vec3], neighbours: &Neighbours) {
+    let both_ways = neighbour_lists(neighbours, places.len());
     let mut highest: Vec<u32> = (0..position.len() as u32).collect();
-    highest.sort_unstable_by(|a, b| position[*b as usize].y.total_cmp(&position[*a as usize].y).then(a.cmp(b)));
-    let mut done = vec![false; normals.len()];
+    highest.par_sort_unstable_by(|a, b| position[*b as usize].y.total_cmp(&position[*a as usize].y).then(a.cmp(b)));
+    let mut done = vec![false; places.len()];
     let mut heap = BinaryHeap::new();
     for seed in highest {
         if done[seed as usize] {
             continue;
         }
         // The top of a closed surface faces up.
-        normals[seed as usize] = face(normals[seed as usize], DVec3::Y);
+        let top = &mut places[seed as usize].normal;
+        *top = face(*top, DVec3::Y);
         heap.push(Reverse((0u64, seed, seed)));
         while let Some(Reverse((_, i, from))) = heap.pop() {
             if std::mem::replace(&mut done[i as usize], true) {
                 continue;
             }
-            let n = face(normals[i as usize], normals[from as usize]);
-            normals[i as usize] = n;
+            let n = face(places[i as usize].normal, places[from as usize].normal.as_dvec3());
+            places[i as usize].normal = n;
             for &j in both_ways.of(i).iter().filter(|j| !done[**j as usize]) {
-                let disagreement = (1.0 - n.dot(normals[j as usize]).abs()).max(0.0);
+                let disagreement = (1.0 - n.as_dvec3().dot(places[j as usize].normal.as_dvec3()).abs()).max(0.0);
                 // Positive floats sort as integers.
                 heap.push(Reverse((disagreement.to_bits(), j, i)));
             }
@@ -123,11 +127,11 @@ impl Lists {
     }
 }
 
-fn neighbour_lists(nearest: &[Nearest], points: usize) -> Lists {
+fn neighbour_lists(neighbours: &Neighbours, points: usize) -> Lists {
     let mut starts = vec![0u32; points + 1];
     let pairs = |add: &mut dyn FnMut(u32, u32)| {
-        for i in 0..points {
-            for j in nearest[i / WIDTH].ids(i % WIDTH) {
+        for (i, ids) in neighbours.ids.chunks(neighbours.of_each.max(1)).enumerate() {
+            for &j in ids {
                 add(i as u32, j);
                 add(j, i as u32);
             }

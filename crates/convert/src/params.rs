@@ -1,8 +1,12 @@
 //! Parameters that all conversions share.
 
+#[cfg(feature = "cache")]
+use crate::Cache;
 use crate::ConvertError;
 use crate::columns::Wanted;
 use splat_core::{Exceeded, Footprint, Limits, Similarity};
+#[cfg(feature = "cache")]
+use std::sync::Arc;
 
 /// Smallest and largest splat spacing, world units: areas must stay normal f32 numbers.
 const SPACING_RANGE: std::ops::RangeInclusive<f64> = 1e-15..=1e15;
@@ -28,6 +32,10 @@ pub struct SplatParams {
     pub limits: Limits,
     /// Whether surfaces of opacity 0 become splats too: the matter that they bound may bend light.
     pub keep_clear: bool,
+    /// Where what takes long is kept from one conversion of the same input to the next: what neighbours tell of raw points. It changes no
+    /// result.
+    #[cfg(feature = "cache")]
+    pub cache: Option<Arc<Cache>>,
 }
 
 impl Default for SplatParams {
@@ -42,6 +50,8 @@ impl Default for SplatParams {
             color: [1.0; 3],
             limits: Limits::default(),
             keep_clear: false,
+            #[cfg(feature = "cache")]
+            cache: None,
         }
     }
 }

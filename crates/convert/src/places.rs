@@ -3,8 +3,10 @@
 use crate::convert_error::check_cancelled;
 use crate::neighbours::{MAX_NEIGHBOURS, MAX_WAITING, Nearest, Tree, WIDTH, Waiting};
 use crate::orient::{self, Orientation};
-use crate::tangent_plane::{self, Cell, Polygon};
+use crate::tangent_plane::{Offset, fit_normals};
+use crate::voronoi_cell::{Cells, voronoi_cells};
 use crate::{ConvertError, SurfelParams};
+use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 use splat_core::Progress;
 use splat_core::glam::{DVec3, Vec3};
@@ -13,30 +15,38 @@ use splat_core::glam::{DVec3, Vec3};
 const LEAVES: usize = 64;
 
 /// One place.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub(crate) struct Place {
-    pub(crate) normal: DVec3,
-    /// False for a guess.
-    pub(crate) plane: bool,
+    pub(crate) normal: Vec3,
+    /// 0 for a guess, else 1.
+    pub(crate) plane: u32,
     /// Object units².
     pub(crate) area: f64,
     /// Object units.
     pub(crate) spacing: f64,
 }
 
-/// The places of points in Morton order; and their neighbours by leaf of eight, where normals are to be propagated.
+/// The neighbours of every place, as many of each.
+#[derive(Debug, Default)]
+pub(crate) struct Neighbours {
+    /// From near to far, place by place.
+    pub(crate) ids: Vec<u32>,
+    pub(crate) of_each: usize,
+}
+
+/// The places of points in Morton order; and their neighbours where normals are to be propagated.
 pub(crate) fn places(
     distinct: &[Vec3],
     params: &SurfelParams,
     progress: &Progress,
-) -> Result<(Vec<Place>, Vec<Nearest>), ConvertError> {
+) -> Result<(Vec<Place>, Neighbours), ConvertError> {
     progress.add_total(distinct.len() as u64);
     let keep_neighbours = params.orientation == Orientation::Propagate;
     let tree = Tree::new(distinct);
     let mut places = vec![Place::default(); distinct.len()];
-    let chunk = LEAVES * WIDTH;
-    let kept: Vec<Vec<Nearest>> = places
-        .par_chunks_mut(chunk)
+    let kept: Vec<Vec<u32>> = places
+        .par_chunks_mut(LEAVES * WIDTH)
         .enumerate()
         .map(|(c, out)| {
             if progress.tick(out.len() as u64).is_err() {
@@ -47,7 +57,8 @@ pub(crate) fn places(
         })
         .collect();
     check_cancelled(progress)?;
-    Ok((places, kept.concat()))
+    let of_each = params.neighbours.min(distinct.len().saturating_sub(1));
+    Ok((places, Neighbours { ids: kept.concat(), of_each }))
 }
 
 /// The places of some leaves, in the form that [`pulp`] compiles once per instruction set.
@@ -62,63 +73,58 @@ struct Task<'a> {
 }
 
 impl pulp::NullaryFnOnce for Task<'_> {
-    type Output = Vec<Nearest>;
+    type Output = Vec<u32>;
 
     #[inline(always)]
-    fn call(self) -> Vec<Nearest> {
-        let (mut kept, mut nearest, mut scratch) = (Vec::new(), Nearest::default(), Scratch::default());
+    fn call(self) -> Vec<u32> {
+        let (mut kept, mut nearest) = (Vec::new(), Nearest::default());
         let mut stack = [Waiting::default(); MAX_WAITING];
+        let mut offsets = [[[0.0; WIDTH]; 3]; MAX_NEIGHBOURS];
+        let count = self.params.neighbours.min(self.distinct.len() - 1);
         for (l, out) in self.out.chunks_mut(WIDTH).enumerate() {
             let leaf = self.first + l;
             self.tree.nearest(leaf, self.params.neighbours, &mut nearest, &mut stack);
-            for (slot, (out, i)) in out.iter_mut().zip(self.tree.points_of(leaf)).enumerate() {
-                *out = place(&nearest, slot, self.distinct, i, self.params, &mut scratch);
+            let points = self.tree.points_of(leaf);
+            for (j, offset) in offsets[..count].iter_mut().enumerate() {
+                for slot in 0..WIDTH {
+                    // Lanes without a point are those of the first again.
+                    let at = self.distinct[if slot < out.len() { points.start + slot } else { points.start }];
+                    let to = self.distinct[nearest.id(j, slot) as usize] - at;
+                    (offset[0][slot], offset[1][slot], offset[2][slot]) = (to.x, to.y, to.z);
+                }
             }
+            leaf_places(&offsets[..count], self.params, out);
             if self.keep_neighbours {
-                kept.push(nearest);
+                kept.extend(
+                    (0..out.len())
+                        .flat_map(|slot| (0..count).map(move |j| (j, slot)))
+                        .map(|(j, slot)| nearest.id(j, slot)),
+                );
             }
         }
         kept
     }
 }
 
-/// Memory of one task.
-struct Scratch {
-    /// The place itself, then its neighbours from near to far, relative to it.
-    offsets: [DVec3; MAX_NEIGHBOURS + 1],
-    polygons: [Polygon; 2],
-}
-
-impl Default for Scratch {
-    fn default() -> Self {
-        Self { offsets: [DVec3::ZERO; MAX_NEIGHBOURS + 1], polygons: [Polygon::default(); 2] }
-    }
-}
-
+/// The places of a leaf whose points have neighbours at `offsets`, from near to far.
 #[inline(always)]
-fn place(
-    nearest: &Nearest,
-    slot: usize,
-    distinct: &[Vec3],
-    i: usize,
-    params: &SurfelParams,
-    scratch: &mut Scratch,
-) -> Place {
-    let Scratch { offsets, polygons } = scratch;
-    let mut n = 1;
-    for id in nearest.ids(slot) {
-        offsets[n] = distinct[id as usize].as_dvec3() - distinct[i].as_dvec3();
-        n += 1;
-    }
-    if n == 1 {
+fn leaf_places(offsets: &[Offset], params: &SurfelParams, out: &mut [Place]) {
+    let Some(farthest) = offsets.last() else {
         let spacing = params.lone_spacing / params.splat.transform.scale;
-        let normal = orient::guess(params.orientation, DVec3::ZERO);
-        return Place { normal, plane: false, area: spacing * spacing, spacing };
+        let normal = orient::guess(params.orientation, DVec3::ZERO).as_vec3();
+        out.fill(Place { normal, plane: 0, area: spacing * spacing, spacing });
+        return;
+    };
+    let planes = fit_normals(offsets);
+    let mut normals = [DVec3::ZERO; WIDTH];
+    for i in 0..WIDTH {
+        let line = || DVec3::new(farthest[0][i].into(), farthest[1][i].into(), farthest[2][i].into());
+        normals[i] = planes[i].unwrap_or_else(|| orient::guess(params.orientation, line()));
     }
-    let fitted = tangent_plane::fit_normal(&offsets[..n]);
-    let normal = fitted.unwrap_or_else(|| orient::guess(params.orientation, offsets[n - 1]));
-    let Cell { area, reach } = tangent_plane::voronoi_cell(&offsets[1..n], normal, polygons);
-    let root = area.sqrt();
-    let spacing = (std::f64::consts::SQRT_2 * reach).clamp(root, 2.0 * root);
-    Place { normal, plane: fitted.is_some(), area, spacing }
+    let Cells { area, reach } = voronoi_cells(offsets, &normals);
+    for (i, out) in out.iter_mut().enumerate() {
+        let root = area[i].sqrt();
+        let spacing = (std::f64::consts::SQRT_2 * reach[i]).clamp(root, 2.0 * root);
+        *out = Place { normal: normals[i].as_vec3(), plane: planes[i].is_some().into(), area: area[i], spacing };
+    }
 }

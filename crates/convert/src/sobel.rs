@@ -13,6 +13,7 @@ use splat_core::{
     Grid,
     glam::{DVec3, Mat3, Vec3},
 };
+use std::ops::Range;
 
 /// Gradient at every lattice point, value per object-space unit.
 ///
@@ -40,7 +41,7 @@ pub fn sobel_gradient_into(grid: &Grid, gradient: &mut [Vec3]) {
     gradient[..grid.values.len()]
         .par_chunks_mut(slab.max(1))
         .enumerate()
-        .for_each_init(Rows::default, |rows, (k, out)| sobel.slab(k, rows, out));
+        .for_each_init(Rows::default, |rows, (k, out)| sobel.slab(k, 0..grid.dims[1], rows, out));
 }
 
 /// The operator for one grid.
@@ -71,10 +72,10 @@ impl<'a> Sobel<'a> {
         Self { grid, object_from_index, diagonal }
     }
 
-    /// Gradients of the slab of constant `k`, x fastest.
-    pub(crate) fn slab(&self, k: usize, rows: &mut Rows, out: &mut [Vec3]) {
+    /// Gradients of some rows of the slab of constant `k`, x fastest; of `out`, which is for all of them, the rest stays as it is.
+    pub(crate) fn slab(&self, k: usize, wanted: Range<usize>, rows: &mut Rows, out: &mut [Vec3]) {
         rows.resize(self.grid.dims[0]);
-        pulp::Arch::new().dispatch(Slab { sobel: self, k, rows, out });
+        pulp::Arch::new().dispatch(Slab { sobel: self, k, wanted, rows, out });
     }
 
     /// The last direction, along the row.
@@ -114,6 +115,7 @@ impl<'a> Sobel<'a> {
 struct Slab<'a> {
     sobel: &'a Sobel<'a>,
     k: usize,
+    wanted: Range<usize>,
     rows: &'a mut Rows,
     out: &'a mut [Vec3],
 }
@@ -123,11 +125,11 @@ impl pulp::NullaryFnOnce for Slab<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let Self { sobel, k, rows, out } = self;
+        let Self { sobel, k, wanted, rows, out } = self;
         let [nx, ny, nz] = sobel.grid.dims;
         let reference = sobel.grid.values[k * nx * ny + nx * ny / 2];
-        let mut loaded = 0;
-        for j in 0..ny {
+        let mut loaded = wanted.start.saturating_sub(1);
+        for j in wanted {
             while loaded < ny.min(j + 2) {
                 rows.load(sobel.grid, loaded, k, reference);
                 loaded += 1;

@@ -10,6 +10,8 @@
 //!
 //! Points at one place share the area of that place, so duplicates neither darken it nor shrink radii to 0.
 
+#[cfg(feature = "cache")]
+use crate::cache::Key;
 use crate::columns::{self, CHUNK, Wanted};
 use crate::convert_error::check_cancelled;
 use crate::neighbours::MAX_NEIGHBOURS;
@@ -152,19 +154,49 @@ pub fn raw_to_surfels(
     let order = canonical_order(points);
     let (distinct, starts) = distinct_places(points, &order);
     let params = &SurfelParams { orientation: known_orientation(&distinct, params)?, ..params.clone() };
-    let (mut places, nearest) = places(&distinct, params, progress)?;
+    let mut places = turned_places(&distinct, points.origin, params, progress)?;
     let mut report = SurfelReport {
         points: points.len() as u64,
         duplicates: (points.len() - distinct.len()) as u64,
-        without_plane: places.iter().filter(|p| !p.plane).count() as u64,
+        without_plane: places.par_iter().with_min_len(CHUNK).filter(|p| p.plane == 0).count() as u64,
         ..SurfelReport::default()
     };
     cut_outliers(&mut places, params, &mut report);
-    let mut normals: Vec<DVec3> = places.iter().map(|p| p.normal).collect();
-    orient::orient(&mut normals, &distinct, points.origin, params.orientation, &nearest);
-    check_cancelled(progress)?;
-    let cloud = emit(points, params, &Sorted { order, starts, places, normals }, &mut report)?;
+    let cloud = emit(points, params, &Sorted { order, starts, places }, &mut report)?;
     Ok((cloud, report))
+}
+
+/// Places whose normals point to the side that is asked for; those that are kept of the same points, where something is.
+fn turned_places(
+    distinct: &[Vec3],
+    origin: DVec3,
+    params: &SurfelParams,
+    progress: &Progress,
+) -> Result<Vec<Place>, ConvertError> {
+    let find = || {
+        let (mut places, neighbours) = places(distinct, params, progress)?;
+        orient::orient(&mut places, distinct, origin, params.orientation, &neighbours);
+        check_cancelled(progress).map(|()| places)
+    };
+    #[cfg(feature = "cache")]
+    if let Some(cache) = &params.splat.cache {
+        let key = place_key(distinct, origin, params);
+        let what = format!("normals and areas of object '{}'", params.splat.object_name);
+        return cache.get(&what, key, |places| places.len() == distinct.len(), find);
+    }
+    find()
+}
+
+/// All that places and their normals are made from.
+#[cfg(feature = "cache")]
+fn place_key(distinct: &[Vec3], origin: DVec3, params: &SurfelParams) -> Key {
+    let (side, at) = match params.orientation {
+        Orientation::Toward(d) | Orientation::Auto(d) => (0u64, d),
+        Orientation::Viewpoint(eye) => (1, eye - origin),
+        Orientation::Propagate => (2, DVec3::ZERO),
+    };
+    let lone = params.lone_spacing / params.splat.transform.scale;
+    Key::new("places").with(distinct).with(&[params.neighbours as u64, side]).with(&[at]).with(&[lone])
 }
 
 /// The orientation, where it depends on what the points enclose: told by some of them, which lie evenly among all.
@@ -174,12 +206,10 @@ fn known_orientation(distinct: &[Vec3], params: &SurfelParams) -> Result<Orienta
     let Orientation::Auto(up) = params.orientation else { return Ok(params.orientation) };
     let some: Vec<Vec3> = distinct.iter().step_by(distinct.len().div_ceil(ENOUGH).max(1)).copied().collect();
     let outwards = SurfelParams { orientation: Orientation::Propagate, ..params.clone() };
-    let (mut places, nearest) = places(&some, &outwards, &Progress::new())?;
+    let (mut places, neighbours) = places(&some, &outwards, &Progress::new())?;
     cut_outliers(&mut places, params, &mut SurfelReport::default());
-    let mut normals: Vec<DVec3> = places.iter().map(|p| p.normal).collect();
-    orient::orient(&mut normals, &some, DVec3::ZERO, Orientation::Propagate, &nearest);
-    let is_body = orient::encloses(normals.into_iter().zip(places.iter().map(|p| p.area)));
-    Ok(if is_body { Orientation::Propagate } else { Orientation::Toward(up) })
+    orient::orient(&mut places, &some, DVec3::ZERO, Orientation::Propagate, &neighbours);
+    Ok(if orient::encloses(&places) { Orientation::Propagate } else { Orientation::Toward(up) })
 }
 
 pub(crate) fn check(points: &RawPoints, params: &SurfelParams) -> Result<(), ConvertError> {
@@ -247,15 +277,11 @@ fn morton(p: DVec3) -> u64 {
 
 /// The distinct places in order, and where the points of each begin in `order` (then the number of points).
 fn distinct_places(points: &RawPoints, order: &[u32]) -> (Vec<Vec3>, Vec<u32>) {
-    let (mut distinct, mut starts): (Vec<Vec3>, Vec<u32>) = (Vec::with_capacity(order.len()), Vec::new());
-    for (s, &i) in order.iter().enumerate() {
-        let p = points.position[i as usize];
-        if distinct.last() != Some(&p) {
-            distinct.push(p);
-            starts.push(s as u32);
-        }
-    }
+    let mut distinct: Vec<Vec3> = order.par_iter().with_min_len(CHUNK).map(|i| points.position[*i as usize]).collect();
+    let is_first = |s: &usize| *s == 0 || distinct[*s] != distinct[*s - 1];
+    let mut starts: Vec<u32> = (0..order.len()).filter(is_first).map(|s| s as u32).collect();
     starts.push(order.len() as u32);
+    distinct.dedup();
     (distinct, starts)
 }
 
@@ -283,7 +309,6 @@ struct Sorted {
     order: Vec<u32>,
     starts: Vec<u32>,
     places: Vec<Place>,
-    normals: Vec<DVec3>,
 }
 
 impl Sorted {
@@ -346,8 +371,8 @@ fn emit(
             let (known, i) = (&sorted.places[place as usize], point as usize);
             *position = (t.rotation * (points.position[i].as_dvec3() * t.scale)).as_vec3();
             let given = points.normal.get(i).map_or(Vec3::ZERO, |n| columns::unit_or_zero(*n));
-            let n = if given == Vec3::ZERO { sorted.normals[place as usize] } else { given.as_dvec3() };
-            *normal = t.rotate(n).as_vec3();
+            let n = if given == Vec3::ZERO { known.normal } else { given };
+            *normal = t.rotate(n.as_dvec3()).as_vec3();
             let sized = params.size.and_then(|size| {
                 size.at(t.apply(points.origin + points.position[i].as_dvec3()), params.camera.as_ref())
             });
@@ -368,6 +393,7 @@ fn emit(
         Some(tau) => *depth = tau as f32,
         None => (*depth, *kind) = (0.0, SplatKind::Opaque),
     });
-    cloud.value.iter_mut().zip(&surfels).for_each(|(v, s)| *v = points.value[s.1 as usize]);
+    let values = cloud.value.par_iter_mut().zip(&surfels).with_min_len(CHUNK);
+    values.for_each(|(v, s)| *v = points.value[s.1 as usize]);
     Ok(cloud)
 }

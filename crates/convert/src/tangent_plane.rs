@@ -1,181 +1,218 @@
-//! The tangent plane of a point and its share of it, from its neighbours.
+//! The tangent planes of eight points at once, from their neighbours.
 //!
-//! The normal is the eigenvector of the smallest eigenvalue of the neighbours' covariance (Hoppe et al. 1992), in closed
-//! form. The area is that of the point's Voronoi cell in the plane: cells tile, so areas sum to that of the surface.
+//! The normal is the eigenvector of the smallest eigenvalue of the neighbours' covariance (Hoppe et al. 1992): the least root of
+//! its characteristic polynomial by Newton's method, which from 0 climbs to it without passing it, then the longest column of
+//! the adjugate of what is left.
 
-use splat_core::glam::{DMat3, DVec2, DVec3};
+use crate::extremes::greater;
+use crate::neighbours::{Lanes, WIDTH};
+use splat_core::glam::DVec3;
 
-/// Most corners of a cell: four of the first square and one for each neighbour.
-const MAX_CORNERS: usize = 4 + super::neighbours::MAX_NEIGHBOURS;
+/// Eight numbers, one a point.
+pub(crate) type Eight = [f64; WIDTH];
 
-/// Half the side of the square that holds a cell, over the distance of the farthest neighbour. What lies within 0.5 is
-/// known exactly; beyond, neighbours that were not asked for would cut too. Measured so that areas of scattered points
-/// are right in the mean with ten neighbours.
-const CELL_LIMIT: f64 = 0.56;
+/// One neighbour of each of eight points, relative to it, by coordinate.
+pub(crate) type Offset = [Lanes; 3];
 
-/// Unit vector across the plane that fits the points best, or `None` when they lie on a line or at one place.
+/// Product of the smallest eigenvalue's distances from the others, the largest entry being 1, up to which the points lie on a
+/// line: every vector across it would do.
+const LINE: f64 = 1e-6;
+
+/// Most steps of Newton's method; about five are usual.
+const STEPS: usize = 24;
+
+/// Symmetric matrices of eight points.
+#[derive(Clone, Copy)]
+struct Symmetric {
+    /// Entries xx, yy, zz.
+    diagonal: [Eight; 3],
+    /// Entries yz, zx, xy.
+    mixed: [Eight; 3],
+}
+
+/// Unit vectors across the planes that fit eight points and their neighbours best, or `None` where these lie on a line or at one
+/// place.
 #[inline(always)]
-pub(crate) fn fit_normal(offsets: &[DVec3]) -> Option<DVec3> {
-    let mean = offsets.iter().sum::<DVec3>() / offsets.len() as f64;
-    let (mut diagonal, mut mixed) = (DVec3::ZERO, DVec3::ZERO);
-    for o in offsets {
-        let d = *o - mean;
-        diagonal += d * d;
-        mixed += DVec3::new(d.y * d.z, d.z * d.x, d.x * d.y);
-    }
-    let largest = diagonal.max_element();
-    // Negative only for no extent at all; NaN does not occur, offsets are finite.
-    if largest <= 0.0 {
-        return None;
-    }
-    smallest_eigenvector(diagonal / largest, mixed / largest)
-}
-
-/// Of the symmetric matrix with this diagonal and these entries yz, zx, xy, the largest entry being about 1.
-#[inline(always)]
-fn smallest_eigenvector(d: DVec3, m: DVec3) -> Option<DVec3> {
-    let third = (d.x + d.y + d.z) / 3.0;
-    let e = d - DVec3::splat(third);
-    let p = ((e.length_squared() + 2.0 * m.length_squared()) / 6.0).sqrt();
-    if p <= 1e-12 {
-        return None;
-    }
-    let columns =
-        |e: DVec3| DMat3::from_cols(DVec3::new(e.x, m.z, m.y), DVec3::new(m.z, e.y, m.x), DVec3::new(m.y, m.x, e.z));
-    let half_determinant = (columns(e).determinant() / (2.0 * p * p * p)).clamp(-1.0, 1.0);
-    let angle = libm::acos(half_determinant) / 3.0;
-    let smallest = third + 2.0 * p * libm::cos(angle + std::f64::consts::TAU / 3.0);
-    // The rows of A − λ lie in the plane across the eigenvector; the longest cross product is the safest.
-    let a = columns(d - DVec3::splat(smallest));
-    let crosses = [a.x_axis.cross(a.y_axis), a.y_axis.cross(a.z_axis), a.z_axis.cross(a.x_axis)];
-    let longest = crosses.iter().fold(DVec3::ZERO, |l, c| if c.length_squared() > l.length_squared() { *c } else { l });
-    // Two small eigenvalues: a line, every vector across it would do.
-    if longest.length() > 1e-6 { longest.try_normalize() } else { None }
-}
-
-/// Area of a cell and the distance of its farthest corner.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Cell {
-    pub(crate) area: f64,
-    pub(crate) reach: f64,
-}
-
-/// A convex polygon in the tangent plane, relative to its point.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Polygon {
-    corners: [DVec2; MAX_CORNERS],
-    n: usize,
-}
-
-impl Default for Polygon {
-    fn default() -> Self {
-        Self { corners: [DVec2::ZERO; MAX_CORNERS], n: 0 }
-    }
-}
-
-/// Voronoi cell of a point among neighbours at `offsets` (near to far), in the plane across `normal`, within a square
-/// of 0.56 times the farthest neighbour: at the rim of the points nothing else would end it.
-#[inline(always)]
-pub(crate) fn voronoi_cell(offsets: &[DVec3], normal: DVec3, scratch: &mut [Polygon; 2]) -> Cell {
-    let (u, v) = normal.any_orthonormal_pair();
-    let half = CELL_LIMIT * offsets.last().map_or(0.0, |o| o.length());
-    let [mut cell, mut next] = scratch.each_mut();
-    let square = [(-half, -half), (half, -half), (half, half), (-half, half)];
-    for i in 0..4 {
-        cell.corners[i] = square[i].into();
-    }
-    cell.n = 4;
-    let mut reach_sq = 2.0 * half * half;
-    for o in offsets {
-        let q = DVec2::new(o.dot(u), o.dot(v));
-        let limit = 0.5 * q.length_squared();
-        // A bisector at half the distance cannot cut corners that are nearer.
-        if limit <= 0.0 || 0.5 * limit >= reach_sq {
-            continue;
+pub(crate) fn fit_normals(offsets: &[Offset]) -> [Option<DVec3>; WIDTH] {
+    let mut matrix = Symmetric::covariances(offsets);
+    matrix.scale_to_one();
+    let smallest = matrix.smallest_eigenvalues();
+    for diagonal in &mut matrix.diagonal {
+        for i in 0..WIDTH {
+            diagonal[i] -= smallest[i];
         }
-        if clip(cell, next, q, limit) {
-            (cell, next) = (next, cell);
-            reach_sq = 0.0;
-            for c in &cell.corners[..cell.n] {
-                reach_sq = c.length_squared().max(reach_sq);
+    }
+    let columns = matrix.longest_columns();
+    let mut normals = [None; WIDTH];
+    for i in 0..WIDTH {
+        let column = DVec3::new(columns[0][i], columns[1][i], columns[2][i]);
+        let length = column.length();
+        normals[i] = (length > LINE).then(|| column / length);
+    }
+    normals
+}
+
+impl Symmetric {
+    /// Covariances, up to a factor, of the points at 0 and their neighbours.
+    #[inline(always)]
+    fn covariances(offsets: &[Offset]) -> Self {
+        let share = 1.0 / (offsets.len() + 1) as f64;
+        let mut mean = [[0.0; WIDTH]; 3];
+        for offset in offsets {
+            for a in 0..3 {
+                for i in 0..WIDTH {
+                    mean[a][i] += share * f64::from(offset[a][i]);
+                }
+            }
+        }
+        let mut sum = Self { diagonal: [[0.0; WIDTH]; 3], mixed: [[0.0; WIDTH]; 3] };
+        sum.add(&[[0.0; WIDTH]; 3], &mean);
+        for offset in offsets {
+            sum.add(offset, &mean);
+        }
+        sum
+    }
+
+    #[inline(always)]
+    fn add(&mut self, offset: &Offset, mean: &[Eight; 3]) {
+        let Self { diagonal: [xx, yy, zz], mixed: [yz, zx, xy] } = self;
+        for i in 0..WIDTH {
+            let x = f64::from(offset[0][i]) - mean[0][i];
+            let y = f64::from(offset[1][i]) - mean[1][i];
+            let z = f64::from(offset[2][i]) - mean[2][i];
+            (xx[i], yy[i], zz[i]) = (xx[i] + x * x, yy[i] + y * y, zz[i] + z * z);
+            (yz[i], zx[i], xy[i]) = (yz[i] + y * z, zx[i] + z * x, xy[i] + x * y);
+        }
+    }
+
+    /// Makes the largest entries 1, those of a covariance being on the diagonal; zeros stay.
+    #[inline(always)]
+    fn scale_to_one(&mut self) {
+        let [x, y, z] = self.diagonal;
+        let mut factor = [0.0; WIDTH];
+        for i in 0..WIDTH {
+            factor[i] = 1.0 / greater(greater(x[i], y[i]), greater(z[i], f64::MIN_POSITIVE));
+        }
+        for entries in self.diagonal.iter_mut().chain(&mut self.mixed) {
+            for i in 0..WIDTH {
+                entries[i] *= factor[i];
             }
         }
     }
-    let corners = &cell.corners[..cell.n];
-    let mut twice = 0.0;
-    let mut before = corners[cell.n - 1];
-    for c in corners {
-        twice += before.perp_dot(*c);
-        before = *c;
-    }
-    Cell { area: 0.5 * twice, reach: reach_sq.sqrt() }
-}
 
-/// Leaves the part of a convex polygon with c·q ≤ limit in `kept`; the origin is inside, so something is left. False
-/// where nothing was to be cut.
-#[inline(always)]
-fn clip(polygon: &Polygon, kept: &mut Polygon, q: DVec2, limit: f64) -> bool {
-    let (corners, n) = (&polygon.corners, polygon.n);
-    let mut outside = 0u64;
-    for (i, c) in corners[..n].iter().enumerate() {
-        outside |= u64::from(c.dot(q) > limit) << i;
+    /// Least roots of λ³ − tr·λ² + s·λ − det, s being the sum of the minors of the diagonal: all three are real and none is
+    /// negative, so the polynomial rises and is curved to one side up to the first.
+    #[inline(always)]
+    fn smallest_eigenvalues(&self) -> Eight {
+        let Self { diagonal: [xx, yy, zz], mixed: [yz, zx, xy] } = self;
+        let [mut trace, mut minors, mut determinant] = [[0.0; WIDTH]; 3];
+        for i in 0..WIDTH {
+            let (x, y, z) = (xx[i], yy[i], zz[i]);
+            let (a, b, c) = (yz[i] * yz[i], zx[i] * zx[i], xy[i] * xy[i]);
+            trace[i] = x + y + z;
+            minors[i] = (y * z - a) + (z * x - b) + (x * y - c);
+            determinant[i] = x * (y * z - a) + 2.0 * (yz[i] * zx[i] * xy[i]) - (y * b + z * c);
+        }
+        let mut root = [0.0; WIDTH];
+        for _ in 0..STEPS {
+            let mut step = [0.0; WIDTH];
+            for i in 0..WIDTH {
+                let l = root[i];
+                let value = ((l - trace[i]) * l + minors[i]) * l - determinant[i];
+                let slope = (3.0 * l - 2.0 * trace[i]) * l + minors[i];
+                // The slope at the root is the product of its distances from the others: below the limit there is no plane.
+                step[i] = value / greater(slope, LINE);
+                root[i] = l - step[i];
+            }
+            if step.iter().all(|s| s.abs() < 1e-14) {
+                break;
+            }
+        }
+        root
     }
-    let all = (1u64 << n) - 1;
-    if outside == 0 || outside == all {
-        return false;
+
+    /// The columns of the adjugates that have the largest entries on the diagonal.
+    #[inline(always)]
+    fn longest_columns(&self) -> [Eight; 3] {
+        let Self { diagonal: [xx, yy, zz], mixed: [yz, zx, xy] } = self;
+        let mut columns = [[0.0; WIDTH]; 3];
+        for i in 0..WIDTH {
+            let (x, y, z) =
+                (yy[i] * zz[i] - yz[i] * yz[i], zz[i] * xx[i] - zx[i] * zx[i], xx[i] * yy[i] - xy[i] * xy[i]);
+            let a = zx[i] * xy[i] - xx[i] * yz[i];
+            let b = xy[i] * yz[i] - yy[i] * zx[i];
+            let c = yz[i] * zx[i] - zz[i] * xy[i];
+            let is_x = x >= y;
+            let first = if is_x { x } else { y };
+            let is_z = z > first;
+            columns[0][i] = if is_z {
+                b
+            } else if is_x {
+                x
+            } else {
+                c
+            };
+            columns[1][i] = if is_z {
+                a
+            } else if is_x {
+                c
+            } else {
+                y
+            };
+            columns[2][i] = if is_z {
+                z
+            } else if is_x {
+                b
+            } else {
+                a
+            };
+        }
+        columns
     }
-    // The corners outside follow each other: `first` comes after the last one inside, `end` is the first inside again.
-    let after = (outside << 1 | outside >> (n - 1)) & all;
-    let first = (outside & !after).trailing_zeros() as usize;
-    let end = (!outside & after).trailing_zeros() as usize;
-    let previous = |i: usize| if i == 0 { n - 1 } else { i - 1 };
-    let cross = |inside: DVec2, beyond: DVec2| {
-        let (d, e) = (inside.dot(q) - limit, beyond.dot(q) - limit);
-        inside + (beyond - inside) * (d / (d - e))
-    };
-    kept.corners[0] = cross(corners[previous(first)], corners[first]);
-    kept.corners[1] = cross(corners[end], corners[previous(end)]);
-    kept.n = 2;
-    let mut i = end;
-    while i != first {
-        kept.corners[kept.n] = corners[i];
-        kept.n += 1;
-        i = if i + 1 == n { 0 } else { i + 1 };
-    }
-    true
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_lattice_point_owns_one_square() {
-        let mut offsets: Vec<DVec3> = (-2..=2)
-            .flat_map(|i| (-2..=2).map(move |j| DVec3::new(f64::from(i), 0.0, f64::from(j))))
-            .filter(|o| *o != DVec3::ZERO)
-            .collect();
-        offsets.sort_by(|a, b| a.length().total_cmp(&b.length()));
-        let normal = fit_normal(&offsets).map_or(DVec3::ZERO, DVec3::abs);
-        assert!((normal - DVec3::Y).length() < 1e-12);
-        let cell = voronoi_cell(&offsets[..10], normal, &mut [Polygon::default(); 2]);
-        assert!((cell.area - 1.0).abs() < 1e-12 && (cell.reach - 0.5f64.sqrt()).abs() < 1e-12, "{cell:?}");
+    /// The same neighbours for all, around a point that is not at their mean.
+    fn normal(offsets: &[DVec3]) -> Option<DVec3> {
+        let all: Vec<Offset> = offsets.iter().map(|o| o.as_vec3().to_array().map(|c| [c; WIDTH])).collect();
+        let normals = fit_normals(&all);
+        assert!(normals.iter().all(|n| *n == normals[0]));
+        normals[0]
     }
 
     #[test]
-    fn a_tilted_noisy_plane_gives_its_normal() {
-        let normal = DVec3::new(0.3, 0.9, -0.2).normalize();
-        let (u, v) = normal.any_orthonormal_pair();
-        let ring = |i: i32| (f64::from(i) * 0.61).sin_cos();
-        let offsets: Vec<DVec3> = (0..12).map(|i| (u * ring(i).0 + v * ring(i).1) * f64::from(i % 3 + 1)).collect();
-        let found = fit_normal(&offsets).unwrap_or_default();
-        assert!(found.dot(normal).abs() > 1.0 - 1e-12, "{found}");
+    fn a_tilted_plane_gives_its_normal() {
+        for scale in [1.0, 1e-30, 1e30] {
+            let expected = DVec3::new(0.3, 0.9, -0.2).normalize();
+            let (u, v) = expected.any_orthonormal_pair();
+            let ring = |i: i32| (f64::from(i) * 0.61).sin_cos();
+            let at = |i: i32| (u * ring(i).0 + v * ring(i).1) * f64::from(i % 3 + 1) * scale;
+            let found = normal(&(0..12).map(at).collect::<Vec<_>>()).unwrap_or_default();
+            assert!(found.dot(expected).abs() > 1.0 - 1e-12, "{found}");
+        }
+    }
+
+    /// Of neighbours that are mirrored at three planes the axes are eigenvectors, and the one along which they are least spread is the normal.
+    #[test]
+    fn the_normal_lies_where_points_are_spread_least() {
+        for (spread, axis) in [([3.0, 2.0, 1.0], 2), ([0.999, 1.0, 1.001], 0), ([5.0, 1e-3, 5.0], 1)] {
+            let corner = |i: usize, a: usize| if i >> a & 1 == 1 { spread[a] } else { -spread[a] };
+            let corners: Vec<DVec3> = (0..8).map(|i| DVec3::new(corner(i, 0), corner(i, 1), corner(i, 2))).collect();
+            let found = normal(&corners).unwrap_or_default();
+            assert!((found.abs() - DVec3::AXES[axis]).length() < 1e-9, "{spread:?}: {found}");
+        }
     }
 
     #[test]
     fn points_on_a_line_have_no_plane() {
-        let offsets: Vec<DVec3> = (0..5).map(|i| DVec3::new(f64::from(i), 2.0 * f64::from(i), 0.0)).collect();
-        assert_eq!(fit_normal(&offsets), None);
-        assert_eq!(fit_normal(&[DVec3::ZERO; 4]), None);
+        let line = |i: i32| DVec3::new(f64::from(i), 2.0 * f64::from(i), 0.0);
+        assert_eq!(normal(&(1..5).map(line).collect::<Vec<_>>()), None);
+        assert_eq!(normal(&[DVec3::ZERO; 4]), None);
+        // Nor have those that are spread to all sides alike.
+        let all = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z];
+        assert_eq!(normal(&all), None);
     }
 }

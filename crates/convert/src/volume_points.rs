@@ -171,7 +171,7 @@ fn convert(
     let scale = p.transform.scale;
     let longest_path = longest_path(lattice) * scale;
     let keep = Keep::new(tf, lattice, params);
-    let slabs = keep.slabs(lattice, progress)?;
+    let slabs = keep.slabs(progress)?;
     let n: usize = slabs.iter().map(|s| s.kept.len()).sum();
     p.check_count(n as f64)?;
     report.splats = n as u64;
@@ -236,10 +236,11 @@ impl Emit<'_> {
                     return 0;
                 }
                 self.slab(k, slab, &mut target);
-                if !self.params.normals || slab.kept.is_empty() {
+                let (true, Some(first), Some(last)) = (self.params.normals, slab.kept.first(), slab.kept.last()) else {
                     return 0;
-                }
-                self.sobel.slab(k, rows, gradient);
+                };
+                let row = |n: &u32| *n as usize / self.lattice.dims[0];
+                self.sobel.slab(k, row(first)..row(last) + 1, rows, gradient);
                 self.normals(slab, gradient, target.normal)
             })
             .sum();

@@ -3,6 +3,7 @@
 
 mod bad_inputs;
 mod body_centred;
+mod cache;
 mod combined_fields;
 mod convert_bunny;
 mod convert_cost;

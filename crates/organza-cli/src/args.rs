@@ -169,6 +169,12 @@ pub(super) struct SceneArguments {
     /// Bytes that all buffers together may take, such as 8G [default: three quarters of the memory]
     #[arg(long, value_name = "BYTES", value_parser = parse_bytes)]
     pub(super) max_memory: Option<u64>,
+    /// Folder for what converting large clouds of points finds out, which the next run reads; no picture depends on it
+    #[arg(long, value_name = "DIR")]
+    pub(super) cache: Option<PathBuf>,
+    /// Bytes that the files of --cache may take; those that were not used for longest go first
+    #[arg(long, value_name = "BYTES", default_value = "8G", value_parser = parse_bytes)]
+    pub(super) cache_size: u64,
     /// Leave out points that are not finite instead of refusing their file; meshes are refused all the same
     #[arg(long)]
     pub(super) drop_invalid: bool,

@@ -5,7 +5,7 @@ use super::given::{Given, camera_overrides, given};
 use super::memory;
 use organza::device::{Choice, Device, DeviceChoice};
 use organza::scene::{self, LoadOptions, Override, Scene};
-use organza::{Error, Progress, RenderOptions, printable};
+use organza::{Cache, Error, Progress, RenderOptions, printable};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -36,6 +36,7 @@ pub(super) fn render_options(arguments: &SceneArguments) -> RenderOptions {
         strict: arguments.strict,
         merge_duplicates: arguments.merge_duplicates,
         checkpoint: None,
+        cache: arguments.cache.as_ref().map(|folder| Arc::new(Cache::new(folder, arguments.cache_size))),
         device: None,
         device_composites: arguments.device_composites,
     }

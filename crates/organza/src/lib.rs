@@ -53,6 +53,7 @@ pub mod statistics;
 mod technique;
 mod work;
 
+pub use convert::Cache;
 pub use draw::{Planned, draw_loaded};
 pub use error::Error;
 pub use frame::{Frame, Shaded};

@@ -145,7 +145,7 @@ impl Inputs<'_> {
         cost: &mut CostRecord,
     ) -> Result<Loaded, Error> {
         let Self { loading, mut prepared, mut images, mut lights, mut warnings, statistics } = self;
-        let Loading { scene, progress, files, .. } = loading;
+        let Loading { scene, progress, files, options } = loading;
         let mut early = spare.map(|_| loading.own(&mut prepared, &planned, &mut warnings)).transpose()?;
         if let (Some(own), Some(spare)) = (&mut early, spare)
             && spare(own, &planned, &statistics, &lights)?
@@ -192,7 +192,7 @@ impl Inputs<'_> {
             exponent,
             splats,
             warnings,
-            notes: files.notes(),
+            notes: files.notes().into_iter().chain(options.cache.iter().flat_map(|cache| cache.said())).collect(),
         })
     }
 }
@@ -225,7 +225,10 @@ pub(crate) fn light_statistics(lights: &[SceneLight]) -> Vec<LightStatistics> {
 
 /// One cloud around the least of all origins: a place that does not depend on the order of objects, and that moves with
 /// the scene without being rounded.
-fn merge(clouds: Vec<Cloud>) -> Cloud {
+fn merge(mut clouds: Vec<Cloud>) -> Cloud {
+    if let [cloud] = &mut clouds[..] {
+        return std::mem::take(cloud);
+    }
     let key = |o: &DVec3| o.to_array();
     let origins = clouds.iter().filter(|c| !c.is_empty()).map(|c| c.origin);
     let least = origins.min_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(Ordering::Equal));

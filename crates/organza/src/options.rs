@@ -1,7 +1,7 @@
 //! What a render may take, and how it treats doubtful input.
 
 use crate::device::Device;
-use convert::read::ReadParams;
+use convert::{Cache, read::ReadParams};
 use splat_core::Limits;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -20,6 +20,8 @@ pub struct RenderOptions {
     /// File of the sums of the technique `particles`: read before, if it is there, and written every few seconds, at the
     /// end and at an interrupt. A render that is stopped at any moment goes on from it and ends in the same bits.
     pub checkpoint: Option<PathBuf>,
+    /// Where conversions keep what takes long, and read it the next time; it changes no picture.
+    pub cache: Option<Arc<Cache>>,
     /// The device on which the passes run that can, opened once for all pictures; `None`: the processor alone.
     pub device: Option<Arc<Device>>,
     /// Whether the device composites the splats too: beauty then differs from the processor's by rounding, up to 10⁻⁵ of
@@ -35,6 +37,7 @@ impl Default for RenderOptions {
             strict: false,
             merge_duplicates: false,
             checkpoint: None,
+            cache: None,
             device: None,
             device_composites: false,
         }

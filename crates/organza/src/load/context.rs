@@ -52,6 +52,7 @@ impl Context<'_> {
             color: object.color.unwrap_or(material.color),
             limits: Limits::NONE,
             keep_clear: material.material.bounds_matter(),
+            cache: self.options.cache.clone(),
         };
         self.limit(&mut params);
         params
