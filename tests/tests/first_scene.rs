@@ -265,7 +265,7 @@ fn nothing_is_cut_off_in_any_frame_of_a_turntable_of_a_file_and_init_writes_its_
     place.write("plank.obj", "v -9 -1 -1\nv 9 -1 -1\nv 9 1 1\nv -9 1 1\nf 1 2 3\nf 1 3 4\n");
     let turn = ["--turntable", "4", "--azimuth", "90"];
     place.expect(0, &[&["render", "plank.obj", "-o", "t.exr"], &turn[..], &SIZE].concat(), "");
-    let most = (0..4).map(|frame| reach(&picture_of(&place.path(&format!("t.000{frame}.exr"))))).flatten();
+    let most = (0..4).flat_map(|frame| reach(&picture_of(&place.path(&format!("t.000{frame}.exr")))));
     let most = most.fold(0.0, f64::max);
     assert!((0.7..0.99).contains(&most), "{most}");
     place.expect(0, &[&["init", "plank.obj", "-o", "plank.toml"], &turn[..], &SIZE].concat(), "");
