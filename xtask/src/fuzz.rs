@@ -170,8 +170,10 @@ mod tests {
         let repo = Repo::open().expect("the repository is readable");
         let targets = Plan::parse(&[]).expect("a plan").chosen(&repo).expect("targets");
         let manifest = repo.text("crates/convert/Cargo.toml").expect("there is a crate convert");
-        let reads =
-            |line: &&crate::toml_lines::Line<'_>| line.table == "features" && line.value.starts_with("[\"read\"");
+        // The cache reads what it wrote itself, and nothing that its hash does not hold for.
+        let reads = |line: &&crate::toml_lines::Line<'_>| {
+            line.table == "features" && line.key != "cache" && line.value.starts_with("[\"read\"")
+        };
         let features: Vec<&str> = crate::toml_lines::lines(manifest).iter().filter(reads).map(|l| l.key).collect();
         assert!(features.len() > 15, "{features:?}");
         let without: Vec<_> = features.iter().filter(|feature| !targets.contains(*feature)).collect();
