@@ -38,5 +38,11 @@ fn a_cache_is_read_the_second_time_and_changes_no_picture_whatever_is_in_it() {
     fs::write(&file, bytes).unwrap();
     let (damaged, said) = drawn(folder, &with);
     assert!(said.contains("is damaged; normals and areas of object 'hills' are found anew"), "{said}");
+    let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    fs::write(folder.join("mesh.obj"), mesh).unwrap();
+    let mut command = organza();
+    let out = command.current_dir(folder).args(["render", "mesh.obj", "-o", "m.png", "--size", "8x8"]).args(with);
+    let said = String::from_utf8_lossy(&out.output().unwrap().stderr).into_owned();
+    assert!(said.contains("note: the cache is not used: it keeps normals and areas of raw points alone"), "{said}");
     assert!([first, second, damaged].iter().all(|picture| *picture == plain));
 }

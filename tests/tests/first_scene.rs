@@ -283,6 +283,10 @@ fn what_stands_on_the_plane_of_its_other_axes_points_up_along_the_third() {
     assert!(String::from_utf8(place.bytes("cone.toml")).unwrap().contains("transform = { up = \"z\" }"));
     place.expect(0, &["init", "cone.obj", "--up", "y", "-o", "lying.toml"], "");
     assert!(String::from_utf8(place.bytes("lying.toml")).unwrap().contains("transform = { up = \"y\" }"));
+    // Beside another file that does not stand there, whose coordinates may be the same.
+    place.write("beside.obj", "v 1 -1 1\nv 3 -1 1\nv 2 1 1\nf 1 2 3\n");
+    place.expect(0, &["init", "cone.obj", "beside.obj", "-o", "both.toml"], "");
+    assert!(!String::from_utf8(place.bytes("both.toml")).unwrap().contains("up = "));
     place.write("hanging.obj", "v -1 -1 1\nv 1 -1 1\nv 0 1 1\nv 0 0 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\nf 3 2 1\n");
     assert!(text("hanging.obj").contains("y, which a scene takes unless it says another\n"));
 }

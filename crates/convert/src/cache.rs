@@ -65,9 +65,13 @@ impl Cache {
         Self { folder: folder.into(), max_bytes, said: Mutex::default() }
     }
 
-    /// What was read and kept, and what could not be, one sentence each.
+    /// What was read and kept, and what could not be, one sentence each; one where nothing was asked of it.
     pub fn said(&self) -> Vec<String> {
-        self.sentences().clone()
+        let said = self.sentences().clone();
+        if said.is_empty() {
+            return vec!["the cache is not used: it keeps normals and areas of raw points alone".to_owned()];
+        }
+        said
     }
 
     /// The numbers of a key: those that are kept where they are valid, else those that `make` makes, which are kept then. `what` names them.

@@ -120,7 +120,7 @@ mod xyz;
 #[cfg(feature = "las")]
 pub use laz::panic_is_input_error;
 pub use reading::{Fix, Mended, NamedColumn, Notes};
-pub use up::{UpAxis, up_axis};
+pub use up::{UpAxis, stated_up_axis, up_axis};
 
 use crate::error::{Place, ReadError, escaped, escaped_path};
 use crate::raw_points::RawPoints;

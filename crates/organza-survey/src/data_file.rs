@@ -3,7 +3,7 @@
 use crate::facts::bounds_of;
 use crate::preset::Wish;
 use crate::stands::stands_along;
-use convert::read::{ReadParams, UpAxis};
+use convert::read::{ReadParams, UpAxis, stated_up_axis};
 use organza::{Error, FileData, Files, Progress, RenderOptions, printable};
 use std::path::{Path, PathBuf};
 
@@ -14,8 +14,8 @@ pub struct DataFile {
     pub path: PathBuf,
     /// What it holds.
     pub data: FileData,
-    /// Which of its axes points up by its format.
-    pub up: UpAxis,
+    /// Which of its axes points up, if its format says so.
+    pub stated_up: Option<UpAxis>,
     /// Which one points up by how it stands, where its format says nothing of that.
     pub stands: Option<UpAxis>,
 }
@@ -41,14 +41,14 @@ impl DataFile {
                 refuse(message, "name it in a scene: [background] environment = \"FILE\"")
             }
             _ => {
-                let up = convert::read::up_axis(path);
+                let stated_up = stated_up_axis(path);
                 let bounds = match &data {
                     FileData::Mesh(mesh) => Some(mesh.bounds()),
                     FileData::Points(points) => bounds_of(points.origin, &points.position),
                     _ => None,
                 };
-                let stands = bounds.and_then(|bounds| stands_along(path, up, bounds));
-                Ok(Self { path: path.to_owned(), data, up, stands })
+                let stands = bounds.filter(|_| stated_up.is_none()).and_then(stands_along);
+                Ok(Self { path: path.to_owned(), data, stated_up, stands })
             }
         }
     }
@@ -94,7 +94,7 @@ mod tests {
     fn objects_are_named_after_files_without_what_parts_paths() {
         let name = |path: &str| {
             let data = FileData::Points(RawPoints::default().into());
-            DataFile { path: path.into(), data, up: UpAxis::Y, stands: None }.name()
+            DataFile { path: path.into(), data, stated_up: None, stands: None }.name()
         };
         assert_eq!(name("a/bun_zipper.ply.gz"), "bun_zipper");
         assert_eq!(name("head v1.2.nii"), "head-v1-2");

@@ -5,7 +5,7 @@ use crate::mesh_faults::{MeshFaults, mesh_faults};
 use crate::spacing::{duplicates, median_spacing};
 use crate::stands::stands_along;
 use convert::RawPoints;
-use convert::read::{Loaded, Mended, NamedColumn, ReadParams, UpAxis, up_axis};
+use convert::read::{Loaded, Mended, NamedColumn, ReadParams, UpAxis, stated_up_axis, up_axis};
 use organza::Error;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Aabb, DAabb, Grid, Limits, Mesh, RadianceImage};
@@ -84,9 +84,10 @@ pub fn facts(path: &Path, max_bytes: u64, strict: bool) -> Result<Facts, Error> 
     let unused = notes.unused.iter().filter(|name| !is_column(name)).cloned().collect();
     let remarks = notes.remarks.into_iter().chain(facts.remarks).collect();
     let mended = notes.mended.iter().map(Mended::to_string).collect();
-    let up = up_axis(path);
-    let may_stand = matches!(facts.kind, "mesh" | "points");
-    let stands = facts.bounds.filter(|_| may_stand).and_then(|bounds| stands_along(path, up, bounds));
+    let stated = stated_up_axis(path);
+    let may_stand = stated.is_none() && matches!(facts.kind, "mesh" | "points");
+    let stands = facts.bounds.filter(|_| may_stand).and_then(stands_along);
+    let up = stated.unwrap_or_default();
     Ok(Facts { bytes, format: notes.format, unused, remarks, mended, up, stands, ..facts })
 }
 

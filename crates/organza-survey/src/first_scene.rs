@@ -103,7 +103,7 @@ fn render_text(data: &[DataFile], wish: &Wish) -> &'static str {
 
 /// Scanned bodies look away from where everything else is seen.
 fn default_azimuth(data: &[DataFile]) -> f64 {
-    let is_body = |d: &DataFile| matches!(d.data, FileData::Grid(_)) && d.up == convert::read::UpAxis::Z;
+    let is_body = |d: &DataFile| matches!(d.data, FileData::Grid(_)) && d.stated_up == Some(convert::read::UpAxis::Z);
     if data.iter().all(is_body) { BEFORE_A_FACE } else { DEFAULT_AZIMUTH }
 }
 

@@ -42,10 +42,15 @@ impl UpAxis {
     }
 }
 
-/// The axis that points up by a file's format; y for a file that cannot be read, which [`super::file()`] has the words for.
-/// Only the file's beginning is looked at.
+/// The axis that points up by a file's format; `None` where that says nothing of it, and for a file that cannot be read, which
+/// [`super::file()`] has the words for. Only the file's beginning is looked at.
+pub fn stated_up_axis(path: &Path) -> Option<UpAxis> {
+    of_content(path, &beginning(path)?)
+}
+
+/// The same, y where nothing is stated.
 pub fn up_axis(path: &Path) -> UpAxis {
-    beginning(path).map_or(UpAxis::Y, |content| of_content(path, &content))
+    stated_up_axis(path).unwrap_or_default()
 }
 
 fn beginning(path: &Path) -> Option<Vec<u8>> {
@@ -64,13 +69,14 @@ fn beginning(path: &Path) -> Option<Vec<u8>> {
     Some(unpacked)
 }
 
-fn of_content(path: &Path, content: &[u8]) -> UpAxis {
-    match format_of(path, content) {
-        Some(Format::Las | Format::E57 | Format::Nifti | Format::MetaImage) => UpAxis::Z,
-        Some(Format::Nrrd) if is_of_a_body(content) => UpAxis::Z,
-        Some(Format::Splat) => UpAxis::MinusY,
-        Some(Format::Ply) if has_gaussians(content) => UpAxis::MinusY,
-        _ => UpAxis::Y,
+fn of_content(path: &Path, content: &[u8]) -> Option<UpAxis> {
+    match format_of(path, content)? {
+        Format::Las | Format::E57 | Format::Nifti | Format::MetaImage => Some(UpAxis::Z),
+        Format::Nrrd if is_of_a_body(content) => Some(UpAxis::Z),
+        Format::Splat => Some(UpAxis::MinusY),
+        Format::Ply if has_gaussians(content) => Some(UpAxis::MinusY),
+        Format::Gltf | Format::Spz => Some(UpAxis::Y),
+        _ => None,
     }
 }
 
@@ -102,7 +108,10 @@ mod tests {
 
     #[test]
     fn only_formats_that_state_it_have_z() {
-        let of = |name: &str, content: &[u8]| of_content(Path::new(name), content);
+        let stated = |name: &str, content: &[u8]| of_content(Path::new(name), content);
+        let of = |name: &str, content: &[u8]| stated(name, content).unwrap_or_default();
+        assert_eq!(stated("a.glb", b"glTF\x02\0\0\0"), Some(UpAxis::Y));
+        assert_eq!(stated("a.ply", b"ply\nformat ascii 1.0\n"), None);
         assert_eq!(of("a", b"LASF\x01\x02"), UpAxis::Z);
         assert_eq!(of("a.ply", b"ply\nformat ascii 1.0\n"), UpAxis::Y);
         assert_eq!(of("a.stl", b"solid a\n"), UpAxis::Y);

@@ -64,6 +64,8 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<O
     let mut names: BTreeMap<String, usize> = BTreeMap::new();
     let mut materials: Vec<&str> = Vec::new();
     let mut clays = CLAYS.iter().cycle();
+    // Files that belong together have one system of coordinates: all of them stand in it, or none is stood up.
+    let all_stand = data.iter().all(|file| file.stands.or(file.stated_up).is_some());
     let mut one = |(file, path): (&DataFile, &String)| {
         let mut name = file.name();
         let count = names.entry(name.clone()).or_insert(0);
@@ -74,7 +76,7 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<O
         let colors = if let FileData::Points(points) = &file.data { point_colors(points, wish) } else { None };
         let bare = if file.is_colored() || colors.is_some() { None } else { clays.next() };
         let mut object = object(file, wish.preset.as_ref(), colors);
-        if let Some(up) = wish.up.or(file.stands) {
+        if let Some(up) = wish.up.or(file.stands.filter(|_| all_stand)) {
             object.keys = format!("transform = {{ up = \"{}\" }}\n{}", up.name(), object.keys);
         }
         if let (Some(clay), false) = (bare, matches!(file.data, FileData::Grid(_))) {

@@ -87,6 +87,7 @@ fn hv09_penumbras_of_polygons_on_a_volume_are_as_wide_as_similar_triangles_say_w
     let (walls, haze) = (&[half_plane()][..], Some(&receiver));
     let bench = Bench { blocks: &[], walls, haze, floor: None };
     check(&bench, &[parallel([0.0, 0.0, -10.0], 0.1, [160, 5]), from_aside()], &[2.0, 50.0], 1.0);
+    check(&bench, &[from_aside()], &[800.0], 1.0);
 }
 
 #[test]
