@@ -66,33 +66,10 @@ const MIXED: &str = "[ambient]\ncolor = [0.1, 0.1, 0.12]\n\
      [[object]]\nname = 'blind'\nrectangle = { center = [0.3, 1.2, 0.2], u = [0.3, 0, 0], v = [0, 0, 0.3], spacing = 0.03 }\n\
      [render]\nlayers = ['effects', 'shadow']\n";
 
-/// The same with walls of finer splats and finer maps, for pictures in which walls are splats and have shadow maps.
-fn finer(scene: &str) -> String {
-    let walls = scene.replace("-0.9], spacing = 0.04", "-0.9], spacing = 0.015");
-    walls.replace("0.3], spacing = 0.03", "0.3], spacing = 0.01") + "shadow = { cells = 256 }\n"
-}
-
 /// Triangles have sharp edges, and splats have none.
 const SMOOTH: [&str; 2] = ["--set", "render.antialias=4"];
 
 const LAMP: &str = "[[light]]\nkind = 'point'\nposition = [0.5, 4, 1]\nintensity = [160, 150, 120]\n";
-
-#[test]
-fn volumes_and_walls_shadow_each_other_as_in_slabs_across_the_view() {
-    for light in [LAMP.to_owned(), bright("[-0.4, -1, -0.6]"), bright("[0.3, -0.8, 0.7]")] {
-        let scene = parallel_view(2.6, 64) + &light + MIXED;
-        let [view, half] = [draw(&finer(&scene), &[&HALF[..2], &SMOOTH].concat()), in_half_vectors(&scene, &SMOOTH)];
-        for channel in ["R", "G", "A", "scatter1.R", "direct.R", "shadow.A"] {
-            let (a, b) = (view.channel(channel), half.channel(channel));
-            let mean = a.iter().sum::<f64>() / a.len() as f64;
-            println!("{channel}: RMSE {:.5} of {mean:.4}", rmse(&a, &b));
-            assert!(rmse(&a, &b) < 0.01, "{channel}: RMSE {}", rmse(&a, &b));
-            assert!(mean > 0.03, "{channel}: mean {mean}");
-        }
-        let summed = largest_difference(&half.channel("G"), &sum_of_effects(&half, "G"));
-        assert!(summed < 1e-5, "{summed:e}");
-    }
-}
 
 #[test]
 fn threads_and_the_order_of_lights_change_no_bit() {
@@ -432,6 +409,30 @@ mod deep {
             let [(once, dark), (forward, _), (both, share)] = errors[..] else { unreachable!() };
             assert!(both < 0.3 * once && both < forward && forward < once, "{name}: RMSE {once} {forward} {both}");
             assert!((0.9..1.2).contains(&share) && dark < 0.5, "{name}: shares {dark} {share}");
+        }
+    }
+
+    /// The same with walls of finer splats and finer maps, for pictures in which walls are splats and have shadow maps.
+    fn finer(scene: &str) -> String {
+        let walls = scene.replace("-0.9], spacing = 0.04", "-0.9], spacing = 0.015");
+        walls.replace("0.3], spacing = 0.03", "0.3], spacing = 0.01") + "shadow = { cells = 256 }\n"
+    }
+
+    #[test]
+    fn volumes_and_walls_shadow_each_other_as_in_slabs_across_the_view() {
+        for light in [LAMP.to_owned(), bright("[-0.4, -1, -0.6]"), bright("[0.3, -0.8, 0.7]")] {
+            let scene = parallel_view(2.6, 64) + &light + MIXED;
+            let [view, half] =
+                [draw(&finer(&scene), &[&HALF[..2], &SMOOTH].concat()), in_half_vectors(&scene, &SMOOTH)];
+            for channel in ["R", "G", "A", "scatter1.R", "direct.R", "shadow.A"] {
+                let (a, b) = (view.channel(channel), half.channel(channel));
+                let mean = a.iter().sum::<f64>() / a.len() as f64;
+                println!("{channel}: RMSE {:.5} of {mean:.4}", rmse(&a, &b));
+                assert!(rmse(&a, &b) < 0.01, "{channel}: RMSE {}", rmse(&a, &b));
+                assert!(mean > 0.03, "{channel}: mean {mean}");
+            }
+            let summed = largest_difference(&half.channel("G"), &sum_of_effects(&half, "G"));
+            assert!(summed < 1e-5, "{summed:e}");
         }
     }
 }

@@ -307,14 +307,8 @@ fn surfels_of_a_ball() {
 }
 
 #[test]
-fn surfels_of_a_torus() {
-    compare_surfels(Shape::Torus);
-}
-
-#[test]
-fn particles_of_solids() {
+fn particles_of_a_ball() {
     compare_particles(Shape::Ball, &[Form::Lattice], true);
-    compare_particles(Shape::Gyroid, &SOLIDS, true);
 }
 
 #[test]
@@ -334,18 +328,8 @@ fn shells_of_a_ball() {
 }
 
 #[test]
-fn shells_of_a_torus() {
-    compare(Shape::Torus, &SHELLS, false);
-}
-
-#[test]
 fn solid_balls() {
     compare(Shape::Ball, &[Form::Grid, Form::Density, Form::Lattice], true);
-}
-
-#[test]
-fn solid_tori() {
-    compare(Shape::Torus, &SOLIDS, true);
 }
 
 #[test]
@@ -382,5 +366,25 @@ mod deep {
     #[test]
     fn solid_gyroids() {
         compare(Shape::Gyroid, &SOLIDS, true);
+    }
+
+    #[test]
+    fn particles_of_solids() {
+        compare_particles(Shape::Gyroid, &SOLIDS, true);
+    }
+
+    #[test]
+    fn shells_of_a_torus() {
+        compare(Shape::Torus, &SHELLS, false);
+    }
+
+    #[test]
+    fn solid_tori() {
+        compare(Shape::Torus, &SOLIDS, true);
+    }
+
+    #[test]
+    fn surfels_of_a_torus() {
+        compare_surfels(Shape::Torus);
     }
 }

@@ -30,8 +30,8 @@ pub(crate) const FEATURES: &str = "hbsort/gpu,pbsr/gpu,splat-core/gpu,tsm/gpu";
 /// The feature that asks for a Vulkan driver.
 pub(crate) const DRIVER: &str = "gpu-conformance/driver";
 
-/// The feature of the end-to-end tests that take long.
-const DEEP: &str = "organza-tests/deep";
+/// The features of the tests that take long.
+pub(crate) const DEEP: &str = "gpu-conformance/deep,organza-tests/deep";
 
 /// Jobs that need more than the pinned toolchain: named, so that nobody believes that they ran.
 const SKIPPED: [&str; 1] =
@@ -39,7 +39,7 @@ const SKIPPED: [&str; 1] =
 
 /// Everything.
 pub(crate) fn run(repo: &Repo) -> Outcome {
-    let said = follow(&steps(repo), repo)?;
+    let said = follow(&steps(), repo)?;
     Ok(format!("{said}\n{}", SKIPPED.join("\n")))
 }
 
@@ -88,10 +88,9 @@ fn cargo(words: &[String], environment: &[(&str, &str)], repo: &Repo) -> Result<
     }
 }
 
-fn steps(repo: &Repo) -> Vec<Step> {
+fn steps() -> Vec<Step> {
     let one = |line: &str| Work::Cargo(vec![split(line)], &[]);
     let docs = Work::Cargo(vec![split("doc --workspace --no-deps")], &[("RUSTDOCFLAGS", "-D warnings")]);
-    let picked = bare(repo).into_iter().filter(|check| is_picked(check.0));
     let step = |name, work| Step { name, work };
     vec![
         step("fmt", one("fmt --all --check")),
@@ -99,7 +98,6 @@ fn steps(repo: &Repo) -> Vec<Step> {
         step("papers", Work::Task(papers::check)),
         step("clippy", one(&clippy())),
         step("docs", docs),
-        step("alone", Work::Cargo(picked.map(|check| check.1).collect(), &[])),
         step("modules", Work::Task(vulkan::modules)),
         step("tests", Work::Task(vulkan::tests)),
     ]
@@ -110,31 +108,28 @@ pub(crate) fn clippy() -> String {
     format!("clippy --workspace --all-targets --features {FEATURES},{DRIVER},{DEEP} -- -D warnings")
 }
 
-/// What takes minutes and rarely breaks where [`run`] holds, to be run before a release: licences of dependencies; kernels compiled anew, where tests hold the
-/// hashes of what they were compiled from; each crate with one of its features, the orchestrator's without what the others ask of
-/// their dependencies; recordings by every executor under every validation; every scene drawn, and forms that take long.
+/// What takes minutes and rarely breaks where [`run`] holds, to be run before a release: licences of dependencies; kernels
+/// compiled anew, where tests hold the hashes of what they were compiled from; each crate by itself, with none of its features
+/// and with each of them; recordings by every executor under every validation; every scene drawn, forms
+/// that take long, and every bit of small files flipped.
 pub(crate) fn deep(repo: &Repo) -> Outcome {
     // Of the whole workspace, so that what other steps have compiled serves this one.
     let slow = format!("{TESTS} --features {FEATURES},{DRIVER},{DEEP} --test end-to-end -- every_scene:: deep::");
-    let parts = bare(repo).into_iter().filter(|check| !is_picked(check.0)).map(|check| check.1);
-    let alone = parts.chain(with_one_feature(repo)).collect();
+    let damage = format!("{TESTS} --features {FEATURES},{DRIVER},{DEEP} --test bad_inputs_damage");
+    let alone = bare(repo).into_iter().map(|check| check.1).chain(with_one_feature(repo)).collect();
     let steps = [
         Step { name: "deny", work: Work::Task(deny::run) },
         Step { name: "shaders", work: Work::Task(|repo| shaders::run(repo, true)) },
         Step { name: "alone", work: Work::Cargo(alone, &[]) },
         Step { name: "vulkan", work: Work::Task(vulkan::run) },
         Step { name: "deep tests", work: Work::Cargo(vec![split(&slow)], &[]) },
+        Step { name: "damage", work: Work::Cargo(vec![split(&damage)], &[("ORGANZA_DEEP", "1")]) },
     ];
     follow(&steps, repo)
 }
 
 pub(crate) fn split(line: &str) -> Vec<String> {
     line.split(' ').map(str::to_owned).collect()
-}
-
-/// Whether people take a crate by itself: the stages and what they stand on, not the parts of the orchestrator.
-fn is_picked(folder: &str) -> bool {
-    !folder.starts_with("crates/organza")
 }
 
 /// Library crates, each without its default features: its folder and the check of it.
@@ -173,14 +168,13 @@ mod tests {
         assert_eq!(words(bare), [format!("a {line}"), format!("b {line}"), format!("organza-d {line}")]);
         let features = ["ply", "las"].map(|feature| format!("a {line} --features {feature}"));
         assert_eq!(words(with_one_feature(&repo)), features);
-        assert!(is_picked("crates/a") && !is_picked("crates/organza-d"));
     }
 
     #[test]
     fn warnings_fail_and_what_is_slow_comes_last() {
-        let steps = steps(&Repo::of(&[]));
+        let steps = steps();
         let names: Vec<_> = steps.iter().map(|s| s.name).collect();
-        assert_eq!(names, ["fmt", "tidy", "papers", "clippy", "docs", "alone", "modules", "tests"]);
+        assert_eq!(names, ["fmt", "tidy", "papers", "clippy", "docs", "modules", "tests"]);
         let Work::Cargo(_, environment) = &steps[4].work else { panic!("docs are built by cargo") };
         assert_eq!(*environment, [("RUSTDOCFLAGS", "-D warnings")]);
     }

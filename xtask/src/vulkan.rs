@@ -3,7 +3,7 @@
 //! Lavapipe is Mesa's Vulkan on the processor: it needs no GPU, so that every machine can run the tests. It says nothing
 //! about speed. What is missing is installed where that is possible (root, apt), printed where it is not.
 
-use crate::ci::{DRIVER, FEATURES};
+use crate::ci::{DEEP, DRIVER, FEATURES};
 use crate::repo::{Outcome, Repo};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -160,9 +160,9 @@ fn check_modules(repo: &Repo, spirv_val: &Path) -> Result<usize, String> {
     if modules.is_empty() { Err("no modules under shaders/spirv".to_owned()) } else { Ok(modules.len()) }
 }
 
-/// Runs the conformance tests by an executor under a validation; with vectors of so many bits those of subgroups alone.
+/// Runs all conformance tests by an executor under a validation; with vectors of so many bits those of subgroups alone.
 fn conformance(repo: &Repo, driver: &Path, by: [&str; 2], vector: Option<&str>) -> Result<(), String> {
-    let mut line = format!("{TESTS} --features {FEATURES},{DRIVER} --test conformance");
+    let mut line = format!("{TESTS} --features {FEATURES},{DRIVER},{DEEP} --test conformance");
     if vector.is_some() {
         line.push_str(&format!(" -- {}", ACROSS.join(" ")));
     }

@@ -28,7 +28,7 @@ fn tinted<'a>(sampler: &'a MeshSampler<'a>, rgb: [f32; 3]) -> Object<'a> {
 
 #[test]
 fn two_planes_let_the_product_of_their_channels_through() {
-    const LEVELS: u32 = 600;
+    const LEVELS: u32 = 300;
     let front = front(32);
     let oblique = camera(Projection::Perspective { fov_y: 0.5 }, 4.0, [32, 32]);
     // Optical depths of the planes in their largest channel; black planes before white.

@@ -46,7 +46,7 @@ fn ts12_tables_do_not_depend_on_the_unit_of_length() {
     let cases = [(&slab, 1e-5), (&random, 1e-4)];
     for ((cloud, bound), light) in cases.into_iter().flat_map(|c| lights.iter().map(move |l| (c, l))) {
         let base = shine(cloud, light, 1.0);
-        for s in [1.1, 1.3, 0.7, 0.003] {
+        for s in [1.3, 0.003] {
             let light_in = shine(cloud, light, s);
             let worst = light_in.iter().zip(&base).fold(0.0f32, |m, (a, b)| m.max((a - b).abs()));
             assert!(worst < bound, "{s}, {:?}: {worst:e}", light.shape);

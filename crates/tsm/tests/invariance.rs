@@ -193,7 +193,7 @@ fn empty_clouds_cast_no_shadow_and_cancelled_builds_stop() {
 fn predicted_work_is_near_the_counted() {
     for light in lights() {
         let cloud = medium([17; 3], 0.06, 1.0, |p| p.length() < 1.0);
-        for resolution in [Resolution::Auto, Resolution::Cells(64), Resolution::Cells(256)] {
+        for resolution in [Resolution::Auto, Resolution::Cells(32), Resolution::Cells(128)] {
             let map = build(&cloud, &light, &Params { resolution, ..Params::default() });
             let (p, c) = (map.prediction(), map.counts());
             let ratio = p.entries / c.entries as f64;

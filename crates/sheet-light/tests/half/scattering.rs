@@ -351,10 +351,16 @@ fn hv13_scattered_light_is_linear_in_powers_of_two() {
 fn cells_are_few_and_no_more_at_800_slabs_than_at_50() {
     let (tf, material) = (constant(0.5), medium(0.9, 0.5));
     let camera = parallel([0.0, 0.0, 12.0], 8.0, [24, 24]);
-    for dims in [[12, 12, 12], [40, 40, 4], [4, 40, 40], [64, 4, 4]] {
+    let [along, aslant, lamp] = [sun([0.0, 0.0, 1.0]), sun([1.0, 2.0, 3.0]), lamp([20.0, 30.0, 30.0])];
+    for (dims, lights) in [
+        ([12, 12, 12], [along, aslant]),
+        ([40, 40, 4], [along, lamp]),
+        ([4, 40, 40], [aslant, lamp]),
+        ([64, 4, 4], [along, aslant]),
+    ] {
         let grid = grid(dims, cubic(0.5), |_| 1.0);
         let volumes = [volume(&grid, &tf, &material)];
-        for light in [sun([0.0, 0.0, 1.0]), sun([1.0, 2.0, 3.0]), lamp([20.0, 30.0, 30.0])] {
+        for light in lights {
             let counts = |slabs: f64| {
                 draw(&input(&volumes, &camera, &[light]), &HalfParams { scattering: BOTH, ..exact(Some(6.0 / slabs)) })
                     .unwrap()

@@ -76,11 +76,6 @@ fn worse(loss: Loss, binding_bytes: u64) -> (Arc<Wrapped>, DeviceChoice) {
     (backend, choice)
 }
 
-/// The device of the environment, by each executor.
-fn devices() -> [(&'static str, DeviceChoice); 2] {
-    [("ash, ", DeviceChoice::ash(adapter())), ("wgpu, ", DeviceChoice::wgpu(adapter()))]
-}
-
 #[test]
 fn a_composited_picture_is_the_processor_s_within_the_tolerance() {
     for direction in ["front_to_back", "back_to_front"] {
@@ -89,19 +84,18 @@ fn a_composited_picture_is_the_processor_s_within_the_tolerance() {
         let (beauty, alpha) = (alone.layers.rgb("beauty").unwrap(), alone.layers.scalar("alpha").unwrap());
         let brightest = beauty.iter().flatten().fold(0.0, |most: f32, v| most.max(*v));
         assert!(brightest > 0.1 && alpha.iter().any(|a| *a > 0.5) && alpha.contains(&0.0), "a picture of something");
-        for (name, device) in devices() {
-            let helped = picture(&settings, Some(device));
-            assert!(helped.backend.starts_with(name), "{}", helped.backend);
-            assert_eq!(alone.warnings, helped.warnings);
-            let same = |a: f32, b: f32, most: f32| (a - b).abs() <= TOLERANCE * most;
-            let found = helped.layers.rgb("beauty").unwrap();
-            assert!(beauty.iter().flatten().zip(found.iter().flatten()).all(|(a, b)| same(*a, *b, brightest)));
-            let found = helped.layers.scalar("alpha").unwrap();
-            assert!(alpha.iter().zip(found).all(|(a, b)| same(*a, *b, 1.0)));
-            // The device did it: counts of its tiles and not of the processor's.
-            let fragments = |r: &Render| r.cost.stages.iter().find(|s| s.name == "splat").unwrap().fragments;
-            assert!(fragments(&helped) != fragments(&alone) && fragments(&helped) % 256 == 0);
-        }
+        let (name, device) = crate::named_device();
+        let helped = picture(&settings, Some(device));
+        assert!(helped.backend.starts_with(&name), "{}", helped.backend);
+        assert_eq!(alone.warnings, helped.warnings);
+        let same = |a: f32, b: f32, most: f32| (a - b).abs() <= TOLERANCE * most;
+        let found = helped.layers.rgb("beauty").unwrap();
+        assert!(beauty.iter().flatten().zip(found.iter().flatten()).all(|(a, b)| same(*a, *b, brightest)));
+        let found = helped.layers.scalar("alpha").unwrap();
+        assert!(alpha.iter().zip(found).all(|(a, b)| same(*a, *b, 1.0)));
+        // The device did it: counts of its tiles and not of the processor's.
+        let fragments = |r: &Render| r.cost.stages.iter().find(|s| s.name == "splat").unwrap().fragments;
+        assert!(fragments(&helped) != fragments(&alone) && fragments(&helped) % 256 == 0);
     }
 }
 
@@ -109,39 +103,10 @@ fn a_composited_picture_is_the_processor_s_within_the_tolerance() {
 fn what_a_device_does_not_composite_is_said_and_done_by_the_processor() {
     let settings = "[render.points]\naccumulation = \"f16\"";
     let alone = picture(settings, None);
-    for (_, device) in devices() {
-        let helped = picture(settings, Some(device));
-        assert_eq!(apart(&alone, &helped), 0.0);
-        assert!(helped.warnings.iter().any(|w| w.contains("half precision by the processor")), "{:?}", helped.warnings);
-    }
-}
-
-#[test]
-fn depth_and_object_layers_are_the_processor_s() {
-    // The wall stands out of the fog.
-    let scene = SCENE.replace("center = [0.3, 0, 0]", "center = [0.3, 0.3, 1.1]");
-    for direction in ["front_to_back", "back_to_front"] {
-        let settings =
-            format!("[render]\nlayers = [\"depth\", \"object\"]\n[render.points]\ndirection = \"{direction}\"");
-        let alone = picture_of(&scene, &settings, None);
-        for (name, device) in devices() {
-            let helped = picture_of(&scene, &settings, Some(device));
-            assert!(helped.backend.starts_with(name) && helped.warnings == alone.warnings, "{:?}", helped.warnings);
-            assert!(apart(&alone, &helped) <= TOLERANCE);
-            let LayerData::Id(expected) = &alone.layers.images["object"] else { panic!("ids") };
-            let LayerData::Id(found) = &helped.layers.images["object"] else { panic!("ids") };
-            let mut others = expected.iter().zip(found).filter(|(a, b)| a != b).count();
-            assert!((0..3).all(|o| expected.contains(&o)) && expected.contains(&u32::MAX));
-            for layer in ["depth.first", "depth.median", "depth.mean", "depth.sigma"] {
-                let (a, b) = (alone.layers.scalar(layer).unwrap(), helped.layers.scalar(layer).unwrap());
-                assert!(a.iter().any(|z| *z < f32::INFINITY));
-                // A level may be reached one splat earlier or later; a deviation is the root of a variance.
-                let near = |(a, b): (&f32, &f32)| a == b || (a - b).abs() <= 1e-3;
-                others += a.iter().zip(b).filter(|pair| !near(*pair)).count();
-            }
-            assert!(others <= 96 * 64 / 500, "{name} {direction}: {others}");
-        }
-    }
+    let (_, device) = crate::named_device();
+    let helped = picture(settings, Some(device));
+    assert_eq!(apart(&alone, &helped), 0.0);
+    assert!(helped.warnings.iter().any(|w| w.contains("half precision by the processor")), "{:?}", helped.warnings);
 }
 
 #[test]
@@ -187,49 +152,6 @@ fn translucent(lights: &str) -> String {
 }
 
 #[test]
-fn shadow_maps_stay_on_the_device() {
-    let scene = SCENE.replacen("    [[object]]", &format!("{MORE_LIGHTS}    [[object]]"), 1);
-    let settings = "[render]\nlayers = [\"effects\", \"shadow\"]";
-    let alone = picture_of(&scene, settings, None);
-    let bright = scene.replace("shadow = false", "").replace("[[light]]", "[[light]]\n    shadow = false");
-    assert!(apart(&alone, &picture_of(&bright, settings, None)) > 0.01, "shadows that can be seen");
-    // Two trials, and everything else at once.
-    let (device, choice) = worse(Loss::Never, u64::MAX);
-    let helped = picture_of(&scene, settings, Some(choice));
-    assert_eq!((device.submissions(), &helped.warnings), (3, &alone.warnings));
-    assert!(apart(&alone, &helped) <= TOLERANCE, "{:e}", apart(&alone, &helped));
-    let maps = |r: &Render| r.cost.stages.iter().filter(|s| s.name == "tsm build").count();
-    assert_eq!((maps(&alone), maps(&helped)), (2, 2));
-    // There it fails the second trial, and makes lists and looks them up as ever.
-    let through_wgpu = picture_of(&scene, settings, Some(DeviceChoice::wgpu(adapter())));
-    assert!(through_wgpu.backend.starts_with("wgpu, "), "{}", through_wgpu.backend);
-    assert!(apart(&alone, &through_wgpu) <= TOLERANCE, "{:e}", apart(&alone, &through_wgpu));
-    let alone = picture_of(&scene, "", None);
-    // Too large for the device even in parts, the picture is the processor's.
-    let (device, choice) = worse(Loss::Never, 1 << 18);
-    let parts = picture_of(&scene, "", Some(choice));
-    assert!(parts.warnings.iter().any(|w| w.contains("no room for even few splats")), "{:?}", parts.warnings);
-    assert!(device.submissions() > 2, "{}", device.submissions());
-    assert!(apart(&alone, &parts) <= TOLERANCE, "{:e}", apart(&alone, &parts));
-    for (loss, said) in
-        [(Loss::Once(3), "was lost and opened once more"), (Loss::Always(3), "was lost; the processor goes on")]
-    {
-        let (_, choice) = worse(loss, u64::MAX);
-        let helped = picture_of(&scene, "", Some(choice));
-        assert!(apart(&alone, &helped) <= TOLERANCE, "{loss:?}");
-        assert!(helped.warnings.iter().any(|w| w.contains(said)), "{loss:?}: {:?}", helped.warnings);
-    }
-    // Maps of polar angles are the processor's, with a line said.
-    let polar = "[render.shadow]\nmapping = \"polar\"";
-    let lamp = translucent("");
-    let alone = picture_of(&lamp, polar, None);
-    let (_, choice) = worse(Loss::Never, u64::MAX);
-    let helped = picture_of(&lamp, polar, Some(choice));
-    assert!(apart(&alone, &helped) <= TOLERANCE);
-    assert!(helped.warnings.iter().any(|w| w.contains("polar angles are the processor's")), "{:?}", helped.warnings);
-}
-
-#[test]
 fn every_layer_that_is_shaded_is_the_processor_s() {
     let settings = "[ambient]\ncolor = [0.1, 0.2, 0.3]\n[render]\nlayers = [\"effects\", \"normal\", \"shadow\"]";
     let alone = picture(settings, None);
@@ -252,17 +174,16 @@ fn what_hides_particles_is_resolved_by_the_device() {
     let settings = "[render]\ntechnique = \"particles\"\nlayers = [\"object\"]\n[render.particles]\nrepeat_level = 2";
     let scene = SCENE.replace("center = [0.3, 0, 0]", "center = [0.3, 0.3, 1.1]");
     let alone = picture_of(&scene, settings, None);
-    for (name, device) in devices() {
-        let helped = picture_of(&scene, settings, Some(device));
-        assert!(helped.backend.starts_with(name), "{}", helped.backend);
-        let beauty = |r: &Render| r.layers.rgb("beauty").unwrap().to_vec();
-        let near = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).all(|c| (a[c] - b[c]).abs() <= TOLERANCE * 10.0);
-        let same = beauty(&alone).iter().zip(&beauty(&helped)).filter(|p| near(*p)).count();
-        // A particle may lie within rounding of the wall.
-        assert!(same >= 96 * 64 * 999 / 1000, "{same}");
-        let tiles = |r: &Render| r.cost.stages.iter().find(|s| s.name == "opaque").unwrap().fragments % 256;
-        assert!(tiles(&helped) == 0 && beauty(&alone) != beauty(&helped), "the device did it");
-    }
+    let (name, device) = crate::named_device();
+    let helped = picture_of(&scene, settings, Some(device));
+    assert!(helped.backend.starts_with(&name), "{}", helped.backend);
+    let beauty = |r: &Render| r.layers.rgb("beauty").unwrap().to_vec();
+    let near = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).all(|c| (a[c] - b[c]).abs() <= TOLERANCE * 10.0);
+    let same = beauty(&alone).iter().zip(&beauty(&helped)).filter(|p| near(*p)).count();
+    // A particle may lie within rounding of the wall.
+    assert!(same >= 96 * 64 * 999 / 1000, "{same}");
+    let tiles = |r: &Render| r.cost.stages.iter().find(|s| s.name == "opaque").unwrap().fragments % 256;
+    assert!(tiles(&helped) == 0 && beauty(&alone) != beauty(&helped), "the device did it");
 }
 
 #[test]
@@ -293,48 +214,127 @@ fn a_device_that_cannot_take_all_at_once_or_is_lost_still_yields_the_unshadowed(
     }
 }
 
-#[test]
-fn a_small_picture_of_a_scene_is_the_processor_s() {
-    // A lamp inside a cloud, a fountain, a tree of translucent leaves, opaque ground.
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/light-inside.toml");
-    let mut scene = scene::parse(&path, &std::fs::read(&path).unwrap(), &Default::default()).unwrap();
-    scene.camera.size = [192, 144];
-    let alone = render_of(&scene, None);
-    let device = DeviceChoice { backends: vec![backend().unwrap()], choice: adapter(), or_processor: false };
-    let helped = render_of(&scene, Some(device));
-    let far = apart(&alone, &helped);
-    assert!(helped.backend != "cpu" && helped.warnings == alone.warnings, "{:?}", helped.warnings);
-    assert!(far <= TOLERANCE, "{far:e}");
-}
+/// What takes long and rarely fails where the others hold.
+#[cfg(feature = "deep")]
+mod deep {
+    use super::*;
 
-#[test]
-fn what_a_software_driver_would_leave_away_goes_through_it_in_parts() {
-    // 90 thousand splats on four tiles: Mesa's driver on the processor ends a thread's loops before that.
-    let text = r#"
-        version = 1
-        [camera]
-        position = [0, 0, 9]
-        target = [0, 0, 0]
-        size = [24, 24]
-        [[light]]
-        kind = "point"
-        position = [1, 2, 4]
-        intensity = [90, 90, 90]
-        [[object]]
-        name = "fog"
-        medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 1.5, spacing = 0.0444 }
-    "#;
-    // Opaque splats are gone through twice, so that half as many are too many.
-    let wall = "rectangle = { center = [0, 0, 0], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.0093 }\nopacity = 1.0";
-    let (before, _) = text.split_once("medium_box").unwrap();
-    for (text, said) in [(text.to_owned(), None), (format!("{before}{wall}"), Some("a tile has more splats"))] {
-        let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
+    #[test]
+    fn shadow_maps_stay_on_the_device() {
+        let scene = SCENE.replacen("    [[object]]", &format!("{MORE_LIGHTS}    [[object]]"), 1);
+        let settings = "[render]\nlayers = [\"effects\", \"shadow\"]";
+        let alone = picture_of(&scene, settings, None);
+        let bright = scene.replace("shadow = false", "").replace("[[light]]", "[[light]]\n    shadow = false");
+        assert!(apart(&alone, &picture_of(&bright, settings, None)) > 0.01, "shadows that can be seen");
+        // Two trials, and everything else at once.
+        let (device, choice) = worse(Loss::Never, u64::MAX);
+        let helped = picture_of(&scene, settings, Some(choice));
+        assert_eq!((device.submissions(), &helped.warnings), (3, &alone.warnings));
+        assert!(apart(&alone, &helped) <= TOLERANCE, "{:e}", apart(&alone, &helped));
+        let maps = |r: &Render| r.cost.stages.iter().filter(|s| s.name == "tsm build").count();
+        assert_eq!((maps(&alone), maps(&helped)), (2, 2));
+        // There it fails the second trial, and makes lists and looks them up as ever.
+        let through_wgpu = picture_of(&scene, settings, Some(DeviceChoice::wgpu(adapter())));
+        assert!(through_wgpu.backend.starts_with("wgpu, "), "{}", through_wgpu.backend);
+        assert!(apart(&alone, &through_wgpu) <= TOLERANCE, "{:e}", apart(&alone, &through_wgpu));
+        let alone = picture_of(&scene, "", None);
+        // Too large for the device even in parts, the picture is the processor's.
+        let (device, choice) = worse(Loss::Never, 1 << 18);
+        let parts = picture_of(&scene, "", Some(choice));
+        assert!(parts.warnings.iter().any(|w| w.contains("no room for even few splats")), "{:?}", parts.warnings);
+        assert!(device.submissions() > 2, "{}", device.submissions());
+        assert!(apart(&alone, &parts) <= TOLERANCE, "{:e}", apart(&alone, &parts));
+        for (loss, said) in
+            [(Loss::Once(3), "was lost and opened once more"), (Loss::Always(3), "was lost; the processor goes on")]
+        {
+            let (_, choice) = worse(loss, u64::MAX);
+            let helped = picture_of(&scene, "", Some(choice));
+            assert!(apart(&alone, &helped) <= TOLERANCE, "{loss:?}");
+            assert!(helped.warnings.iter().any(|w| w.contains(said)), "{loss:?}: {:?}", helped.warnings);
+        }
+        // Maps of polar angles are the processor's, with a line said.
+        let polar = "[render.shadow]\nmapping = \"polar\"";
+        let lamp = translucent("");
+        let alone = picture_of(&lamp, polar, None);
+        let (_, choice) = worse(Loss::Never, u64::MAX);
+        let helped = picture_of(&lamp, polar, Some(choice));
+        assert!(apart(&alone, &helped) <= TOLERANCE);
+        assert!(
+            helped.warnings.iter().any(|w| w.contains("polar angles are the processor's")),
+            "{:?}",
+            helped.warnings
+        );
+    }
+
+    #[test]
+    fn a_small_picture_of_a_scene_is_the_processor_s() {
+        // A lamp inside a cloud, a fountain, a tree of translucent leaves, opaque ground.
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/light-inside.toml");
+        let mut scene = scene::parse(&path, &std::fs::read(&path).unwrap(), &Default::default()).unwrap();
+        scene.camera.size = [192, 144];
         let alone = render_of(&scene, None);
-        for (_, device) in devices() {
+        let device = DeviceChoice { backends: vec![backend().unwrap()], choice: adapter(), or_processor: false };
+        let helped = render_of(&scene, Some(device));
+        let far = apart(&alone, &helped);
+        assert!(helped.backend != "cpu" && helped.warnings == alone.warnings, "{:?}", helped.warnings);
+        assert!(far <= TOLERANCE, "{far:e}");
+    }
+
+    #[test]
+    fn what_a_software_driver_would_leave_away_goes_through_it_in_parts() {
+        // 90 thousand splats on four tiles: Mesa's driver on the processor ends a thread's loops before that.
+        let text = r#"
+            version = 1
+            [camera]
+            position = [0, 0, 9]
+            target = [0, 0, 0]
+            size = [24, 24]
+            [[light]]
+            kind = "point"
+            position = [1, 2, 4]
+            intensity = [90, 90, 90]
+            [[object]]
+            name = "fog"
+            medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 1.5, spacing = 0.0444 }
+        "#;
+        // Opaque splats are gone through twice, so that half as many are too many.
+        let wall = "rectangle = { center = [0, 0, 0], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.0093 }\nopacity = 1.0";
+        let (before, _) = text.split_once("medium_box").unwrap();
+        for (text, said) in [(text.to_owned(), None), (format!("{before}{wall}"), Some("a tile has more splats"))] {
+            let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
+            let alone = render_of(&scene, None);
+            let (_, device) = crate::named_device();
             let helped = render_of(&scene, Some(device));
             assert!(apart(&alone, &helped) <= TOLERANCE, "{:e}", apart(&alone, &helped));
             assert_eq!(helped.warnings.len(), usize::from(said.is_some()), "{:?}", helped.warnings);
             assert!(said.is_none_or(|said| helped.warnings[0].starts_with(said)), "{:?}", helped.warnings);
+        }
+    }
+
+    #[test]
+    fn depth_and_object_layers_are_the_processor_s() {
+        // The wall stands out of the fog.
+        let scene = SCENE.replace("center = [0.3, 0, 0]", "center = [0.3, 0.3, 1.1]");
+        for direction in ["front_to_back", "back_to_front"] {
+            let settings =
+                format!("[render]\nlayers = [\"depth\", \"object\"]\n[render.points]\ndirection = \"{direction}\"");
+            let alone = picture_of(&scene, &settings, None);
+            let (name, device) = crate::named_device();
+            let helped = picture_of(&scene, &settings, Some(device));
+            assert!(helped.backend.starts_with(&name) && helped.warnings == alone.warnings, "{:?}", helped.warnings);
+            assert!(apart(&alone, &helped) <= TOLERANCE);
+            let LayerData::Id(expected) = &alone.layers.images["object"] else { panic!("ids") };
+            let LayerData::Id(found) = &helped.layers.images["object"] else { panic!("ids") };
+            let mut others = expected.iter().zip(found).filter(|(a, b)| a != b).count();
+            assert!((0..3).all(|o| expected.contains(&o)) && expected.contains(&u32::MAX));
+            for layer in ["depth.first", "depth.median", "depth.mean", "depth.sigma"] {
+                let (a, b) = (alone.layers.scalar(layer).unwrap(), helped.layers.scalar(layer).unwrap());
+                assert!(a.iter().any(|z| *z < f32::INFINITY));
+                // A level may be reached one splat earlier or later; a deviation is the root of a variance.
+                let near = |(a, b): (&f32, &f32)| a == b || (a - b).abs() <= 1e-3;
+                others += a.iter().zip(b).filter(|pair| !near(*pair)).count();
+            }
+            assert!(others <= 96 * 64 / 500, "{name} {direction}: {others}");
         }
     }
 }

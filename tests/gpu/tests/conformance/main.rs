@@ -18,3 +18,12 @@ mod resolved;
 mod shaded;
 mod shadow;
 mod splat;
+
+use gpu_conformance::{adapter, backend};
+use organza::device::DeviceChoice;
+
+/// The device that the environment names, and how a picture by it says so.
+fn named_device() -> (String, DeviceChoice) {
+    let by = backend().unwrap();
+    (format!("{}, ", by.name()), DeviceChoice { backends: vec![by], choice: adapter(), or_processor: false })
+}

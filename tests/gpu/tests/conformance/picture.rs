@@ -39,11 +39,6 @@ fn opened(choice: Option<DeviceChoice>) -> Option<Arc<Device>> {
     choice.map(|choice| Arc::new(Device::open(&choice).unwrap()))
 }
 
-/// The device of the environment, by each executor.
-fn devices() -> [(&'static str, DeviceChoice); 2] {
-    [("ash, ", DeviceChoice::ash(adapter())), ("wgpu, ", DeviceChoice::wgpu(adapter()))]
-}
-
 fn picture(exact: bool, device: Option<DeviceChoice>) -> Render {
     let text = format!("{SCENE}\n[render.points]\nexact = {exact}\n");
     let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
@@ -54,12 +49,11 @@ fn picture(exact: bool, device: Option<DeviceChoice>) -> Render {
 fn a_picture_with_a_device_is_the_processor_s() {
     let alone = picture(true, None);
     assert_eq!(alone.backend, "cpu");
-    for (name, device) in devices() {
-        let helped = picture(true, Some(device));
-        assert_eq!(alone.layers, helped.layers);
-        assert!(helped.backend.starts_with(name), "{}", helped.backend);
-        assert_eq!(alone.warnings, helped.warnings);
-    }
+    let (name, device) = crate::named_device();
+    let helped = picture(true, Some(device));
+    assert_eq!(alone.layers, helped.layers);
+    assert!(helped.backend.starts_with(&name), "{}", helped.backend);
+    assert_eq!(alone.warnings, helped.warnings);
     // It is a picture of something.
     let alpha = alone.layers.scalar("alpha").unwrap();
     assert!(alpha.iter().any(|a| *a > 0.5) && alpha.contains(&0.0));
@@ -68,11 +62,10 @@ fn a_picture_with_a_device_is_the_processor_s() {
 #[test]
 fn what_a_device_cannot_do_is_said_and_done_by_the_processor() {
     let alone = picture(false, None);
-    for (_, device) in devices() {
-        let helped = picture(false, Some(device));
-        assert_eq!(alone.layers, helped.layers);
-        assert!(helped.warnings.iter().any(|w| w.contains("made by the processor")), "{:?}", helped.warnings);
-    }
+    let (_, device) = crate::named_device();
+    let helped = picture(false, Some(device));
+    assert_eq!(alone.layers, helped.layers);
+    assert!(helped.warnings.iter().any(|w| w.contains("made by the processor")), "{:?}", helped.warnings);
 }
 
 #[test]
@@ -93,27 +86,6 @@ fn a_driver_that_plays_a_gpu_is_never_taken_silently() {
     // By name it is.
     let named = picture(true, Some(DeviceChoice::auto(Some(drivers[0].adapter.name.clone()))));
     assert!(named.backend.starts_with("ash, "), "{}", named.backend);
-}
-
-#[test]
-fn killing_the_device_in_the_middle_of_a_render_still_yields_the_picture() {
-    let alone = picture(true, None);
-    // The trial is the first submission, the shadow map the second, the order the third.
-    for (interface, name) in [(Interface::Ash, "ash, "), (Interface::Wgpu, "wgpu, ")] {
-        for (loss, submissions, backend, said) in [
-            (Loss::Once(2), 4, name, "was lost and opened once more"),
-            (Loss::Once(3), 4, name, "was lost and opened once more"),
-            (Loss::Always(2), 3, "cpu", "was lost; the processor goes on"),
-            (Loss::Always(3), 4, name, "was lost; the processor goes on"),
-        ] {
-            let (device, choice) = chosen(Wrapped::new(interface, loss, u64::MAX));
-            let helped = picture(true, Some(choice));
-            assert_eq!(alone.layers, helped.layers, "{interface:?} {loss:?}");
-            assert_eq!(device.submissions(), submissions, "{interface:?} {loss:?}");
-            assert!(helped.backend.starts_with(backend), "{interface:?} {loss:?}: {}", helped.backend);
-            assert!(helped.warnings.iter().any(|w| w.contains(said)), "{loss:?}: {:?}", helped.warnings);
-        }
-    }
 }
 
 /// A picture by particles that are shown as they are.
@@ -160,12 +132,11 @@ fn agreement(a: &Render, b: &Render) -> f64 {
 #[test]
 fn particles_by_a_device_are_the_processor_s_in_almost_every_pixel() {
     let alone = particles(None, "");
-    for (name, device) in devices() {
-        let helped = particles(Some(device), "");
-        assert!(helped.backend.starts_with(name), "{}", helped.backend);
-        assert_eq!((helped.sets, &helped.warnings), (alone.sets, &alone.warnings));
-        assert!(agreement(&alone, &helped) >= 0.999, "{}", agreement(&alone, &helped));
-    }
+    let (name, device) = crate::named_device();
+    let helped = particles(Some(device), "");
+    assert!(helped.backend.starts_with(&name), "{}", helped.backend);
+    assert_eq!((helped.sets, &helped.warnings), (alone.sets, &alone.warnings));
+    assert!(agreement(&alone, &helped) >= 0.999, "{}", agreement(&alone, &helped));
 }
 
 #[test]
@@ -280,37 +251,6 @@ fn apart(a: &Render, b: &Render) -> (f32, f32) {
 }
 
 #[test]
-fn lit_particles_by_a_device_are_the_processor_s() {
-    for more in ["", r#"layers = ["beauty", "effects", "normal", "shadow"]"#] {
-        let alone = lit_particles(None, more);
-        for (name, device) in devices() {
-            let helped = lit_particles(Some(device), more);
-            assert!(helped.backend.starts_with(name), "{}", helped.backend);
-            let (most, brightest) = apart(&alone, &helped);
-            assert!(agreement(&alone, &helped) >= 0.999, "{name}: {}", agreement(&alone, &helped));
-            assert!(most <= 3e-5 * brightest && brightest > 0.2, "{name}: {most} of {brightest}");
-        }
-    }
-}
-
-#[test]
-fn killing_the_device_among_lit_sets_goes_on_from_there() {
-    let alone = lit_particles(None, "");
-    let whole = losing(Loss::Never, u64::MAX);
-    let helped = lit_particles(Some(whole.1), "");
-    // The trial, the lists of two maps, and five batches of eight sets.
-    assert_eq!(whole.0.submissions(), 1 + 2 + 5);
-    let (device, choice) = losing(Loss::Once(6), u64::MAX);
-    let again = lit_particles(Some(choice), "");
-    assert_eq!((device.submissions(), &again.layers), (1 + 2 + 5 + 1, &helped.layers));
-    let (_, choice) = losing(Loss::Always(6), u64::MAX);
-    let rest = lit_particles(Some(choice), "");
-    let (most, brightest) = apart(&alone, &rest);
-    assert!(rest.backend.ends_with("then cpu") && agreement(&alone, &rest) >= 0.999, "{}", rest.backend);
-    assert!(most <= 3e-5 * brightest, "{most} of {brightest}");
-}
-
-#[test]
 fn light_that_a_device_does_not_make_is_the_processor_s() {
     let glossy = r#"
         [material.glossy]
@@ -326,40 +266,6 @@ fn light_that_a_device_does_not_make_is_the_processor_s() {
     let helped = lit_particles(Some(choice), glossy);
     assert!(helped.warnings.iter().any(|w| w.contains("an exponent above 64")), "{:?}", helped.warnings);
     assert_eq!(helped.layers, lit_particles(None, glossy).layers);
-}
-
-#[test]
-fn every_device_has_a_passport() {
-    let passports = device::passport("").unwrap();
-    assert_eq!(passports.len(), device::devices().unwrap().len());
-    for passport in &passports {
-        assert!(passport.valid(), "{passport:?}");
-        let [order, lists, shadow, project, shade, composite, opaque, chain, particles, made, lit] =
-            &passport.recordings[..]
-        else {
-            panic!("{passport:?}")
-        };
-        assert_eq!((order.recording, order.items), ("order", 1 << 17));
-        assert_eq!(order.outcome.as_ref().map(|a| (a.equal_share, a.mean, a.max)), Ok((1.0, 0.0, 0.0)));
-        assert_eq!(lists.outcome.as_ref().map(|a| (a.within, a.equal_share, a.max)), Ok((true, 1.0, 0.0)));
-        assert!(lists.items > 50_000);
-        assert!(shadow.items.abs_diff(lists.items) * 1000 <= lists.items, "{shadow:?}");
-        assert!(shadow.outcome.as_ref().is_ok_and(|a| a.mean < 1e-5), "{shadow:?}");
-        let composited = |a: &Agreement| a.within && a.mean < 1e-6 && a.max <= 1e-5;
-        for splats in [project, shade, composite, chain] {
-            assert!(splats.items == 1 << 14 && splats.outcome.as_ref().is_ok_and(composited), "{splats:?}");
-        }
-        assert!(opaque.outcome.as_ref().is_ok_and(|a| a.within && a.mean < 1e-6), "{opaque:?}");
-        for particles in [particles, made, lit] {
-            assert!(particles.items > 100_000 && particles.outcome.as_ref().is_ok_and(|a| a.mean < 1e-3));
-        }
-        assert_eq!(particles.items, made.items);
-        // Of each kernel one row: four passes of the sort are one.
-        let scatter = order.passes.iter().filter(|k| k.kernel.contains("scatter")).map(|k| k.dispatches);
-        assert!(order.passes.is_empty() || scatter.sum::<u32>() == 4, "{:?}", order.passes);
-        assert_eq!(passport.missing.contains(&"timestamps"), order.passes.is_empty());
-    }
-    assert!(device::passport("no such device").unwrap().is_empty());
 }
 
 #[test]
@@ -394,4 +300,95 @@ fn a_device_with_small_buffers_sorts_in_parts() {
     let (_, choice) = losing(Loss::Never, 512);
     let error = Device::open(&choice).unwrap_err();
     assert!(error.to_string().contains("kernels see at most 512"), "{error}");
+}
+
+/// What takes long and rarely fails where the others hold.
+#[cfg(feature = "deep")]
+mod deep {
+    use super::*;
+
+    #[test]
+    fn killing_the_device_in_the_middle_of_a_render_still_yields_the_picture() {
+        let alone = picture(true, None);
+        // The trial is the first submission, the shadow map the second, the order the third.
+        for (interface, name) in [(Interface::Ash, "ash, "), (Interface::Wgpu, "wgpu, ")] {
+            for (loss, submissions, backend, said) in [
+                (Loss::Once(2), 4, name, "was lost and opened once more"),
+                (Loss::Once(3), 4, name, "was lost and opened once more"),
+                (Loss::Always(2), 3, "cpu", "was lost; the processor goes on"),
+                (Loss::Always(3), 4, name, "was lost; the processor goes on"),
+            ] {
+                let (device, choice) = chosen(Wrapped::new(interface, loss, u64::MAX));
+                let helped = picture(true, Some(choice));
+                assert_eq!(alone.layers, helped.layers, "{interface:?} {loss:?}");
+                assert_eq!(device.submissions(), submissions, "{interface:?} {loss:?}");
+                assert!(helped.backend.starts_with(backend), "{interface:?} {loss:?}: {}", helped.backend);
+                assert!(helped.warnings.iter().any(|w| w.contains(said)), "{loss:?}: {:?}", helped.warnings);
+            }
+        }
+    }
+
+    #[test]
+    fn lit_particles_by_a_device_are_the_processor_s() {
+        for more in ["", r#"layers = ["beauty", "effects", "normal", "shadow"]"#] {
+            let alone = lit_particles(None, more);
+            let (name, device) = crate::named_device();
+            let helped = lit_particles(Some(device), more);
+            assert!(helped.backend.starts_with(&name), "{}", helped.backend);
+            let (most, brightest) = apart(&alone, &helped);
+            assert!(agreement(&alone, &helped) >= 0.999, "{name}: {}", agreement(&alone, &helped));
+            assert!(most <= 3e-5 * brightest && brightest > 0.2, "{name}: {most} of {brightest}");
+        }
+    }
+
+    #[test]
+    fn killing_the_device_among_lit_sets_goes_on_from_there() {
+        let alone = lit_particles(None, "");
+        let whole = losing(Loss::Never, u64::MAX);
+        let helped = lit_particles(Some(whole.1), "");
+        // The trial, the lists of two maps, and five batches of eight sets.
+        assert_eq!(whole.0.submissions(), 1 + 2 + 5);
+        let (device, choice) = losing(Loss::Once(6), u64::MAX);
+        let again = lit_particles(Some(choice), "");
+        assert_eq!((device.submissions(), &again.layers), (1 + 2 + 5 + 1, &helped.layers));
+        let (_, choice) = losing(Loss::Always(6), u64::MAX);
+        let rest = lit_particles(Some(choice), "");
+        let (most, brightest) = apart(&alone, &rest);
+        assert!(rest.backend.ends_with("then cpu") && agreement(&alone, &rest) >= 0.999, "{}", rest.backend);
+        assert!(most <= 3e-5 * brightest, "{most} of {brightest}");
+    }
+
+    #[test]
+    fn every_device_has_a_passport() {
+        let passports = device::passport("").unwrap();
+        assert_eq!(passports.len(), device::devices().unwrap().len());
+        for passport in &passports {
+            assert!(passport.valid(), "{passport:?}");
+            let [order, lists, shadow, project, shade, composite, opaque, chain, particles, made, lit] =
+                &passport.recordings[..]
+            else {
+                panic!("{passport:?}")
+            };
+            assert_eq!((order.recording, order.items), ("order", 1 << 17));
+            assert_eq!(order.outcome.as_ref().map(|a| (a.equal_share, a.mean, a.max)), Ok((1.0, 0.0, 0.0)));
+            assert_eq!(lists.outcome.as_ref().map(|a| (a.within, a.equal_share, a.max)), Ok((true, 1.0, 0.0)));
+            assert!(lists.items > 50_000);
+            assert!(shadow.items.abs_diff(lists.items) * 1000 <= lists.items, "{shadow:?}");
+            assert!(shadow.outcome.as_ref().is_ok_and(|a| a.mean < 1e-5), "{shadow:?}");
+            let composited = |a: &Agreement| a.within && a.mean < 1e-6 && a.max <= 1e-5;
+            for splats in [project, shade, composite, chain] {
+                assert!(splats.items == 1 << 14 && splats.outcome.as_ref().is_ok_and(composited), "{splats:?}");
+            }
+            assert!(opaque.outcome.as_ref().is_ok_and(|a| a.within && a.mean < 1e-6), "{opaque:?}");
+            for particles in [particles, made, lit] {
+                assert!(particles.items > 100_000 && particles.outcome.as_ref().is_ok_and(|a| a.mean < 1e-3));
+            }
+            assert_eq!(particles.items, made.items);
+            // Of each kernel one row: four passes of the sort are one.
+            let scatter = order.passes.iter().filter(|k| k.kernel.contains("scatter")).map(|k| k.dispatches);
+            assert!(order.passes.is_empty() || scatter.sum::<u32>() == 4, "{:?}", order.passes);
+            assert_eq!(passport.missing.contains(&"timestamps"), order.passes.is_empty());
+        }
+        assert!(device::passport("no such device").unwrap().is_empty());
+    }
 }
