@@ -66,11 +66,6 @@ const MIXED: &str = "[ambient]\ncolor = [0.1, 0.1, 0.12]\n\
      [[object]]\nname = 'blind'\nrectangle = { center = [0.3, 1.2, 0.2], u = [0.3, 0, 0], v = [0, 0, 0.3], spacing = 0.03 }\n\
      [render]\nlayers = ['effects', 'shadow']\n";
 
-/// Triangles have sharp edges, and splats have none.
-const SMOOTH: [&str; 2] = ["--set", "render.antialias=4"];
-
-const LAMP: &str = "[[light]]\nkind = 'point'\nposition = [0.5, 4, 1]\nintensity = [160, 150, 120]\n";
-
 #[test]
 fn threads_and_the_order_of_lights_change_no_bit() {
     let (one, other) = (bright("[-0.4, -1, -0.6]"), bright("[0.3, -0.8, 0.7]"));
@@ -230,6 +225,10 @@ fn what_points_are_judged_by_is_known_of_scenes_that_make_no_splats_for_sheets()
 #[cfg(feature = "deep")]
 mod deep {
     use super::*;
+
+    /// Triangles have sharp edges, and splats have none.
+    const SMOOTH: [&str; 2] = ["--set", "render.antialias=4"];
+    const LAMP: &str = "[[light]]\nkind = 'point'\nposition = [0.5, 4, 1]\nintensity = [160, 150, 120]\n";
     use organza_judge::truth::{Orders, truth};
     use organza_tests::draw_in;
 

@@ -341,6 +341,11 @@ fn another_object_is_told_apart() {
     assert!(rmse(&ball, &thinner) > 0.01, "a tenth less extinction is told apart");
 }
 
+#[test]
+fn solid_tori() {
+    compare(Shape::Torus, &SOLIDS, true);
+}
+
 /// What takes long and rarely fails where the others hold.
 #[cfg(feature = "deep")]
 mod deep {
@@ -376,11 +381,6 @@ mod deep {
     #[test]
     fn shells_of_a_torus() {
         compare(Shape::Torus, &SHELLS, false);
-    }
-
-    #[test]
-    fn solid_tori() {
-        compare(Shape::Torus, &SOLIDS, true);
     }
 
     #[test]

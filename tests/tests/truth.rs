@@ -1,10 +1,9 @@
 //! The points technique against physical truth: the same scene path-traced without splats.
 
 use crate::many_forms::write;
-use organza::scene::{self, Scene, SceneLight};
+use organza::scene::{self, Scene};
 use organza::{Progress, RenderOptions, render};
 use organza_judge::truth::{AllOrders, Orders, Truth, truth};
-use splat_core::{Light, LightShape};
 use std::path::Path;
 
 const SAMPLES: u32 = 64;
@@ -63,30 +62,6 @@ fn points_agree_with_path_tracing_of_meshes_media_and_translucent_surfaces() {
     dimmer.lights.iter_mut().for_each(|l| l.shadow = false);
     assert!(rmse(&squares(&drawn(&dimmer), size), &exact) > 3.0 * error);
 }
-
-/// A floor, fog above it, and one light above both.
-const BELOW: &str = r#"version = 1
-[camera]
-position = [0, 2.5, 3]
-target = [0, 0.1, 0]
-fov_y = 36
-size = [64, 40]
-[render]
-particles = { repeat_level = 16 }
-[material.fog]
-medium = { extinction = 5, albedo = 0.5 }
-[[object]]
-name = "fog"
-medium_ball = { center = [0.35, 0.35, 0], radius = 0.25, spacing = 0.03 }
-material = "fog"
-[[object]]
-name = "floor"
-rectangle = { center = [0, 0, 0], u = [0, 0, 4], v = [4, 0, 0], spacing = 0.08 }
-color = [0.8, 0.7, 0.6]
-[[light]]
-intensity = [4, 4, 4]
-samples = 16
-"#;
 
 /// A turned box, a turned formula, a classified volume and a ground, with one sun, and no border in view; `volume.nii` lies in the scene's folder.
 fn mixed(folder: &Path, changes: &[[&str; 2]]) -> Scene {
@@ -326,6 +301,32 @@ fn traced_glass_is_nearer_to_path_tracing_than_the_papers_heuristics() {
 #[cfg(feature = "deep")]
 mod deep {
     use super::*;
+    use organza::scene::SceneLight;
+    use splat_core::{Light, LightShape};
+
+    /// A floor, fog above it, and one light above both.
+    const BELOW: &str = r#"version = 1
+    [camera]
+    position = [0, 2.5, 3]
+    target = [0, 0.1, 0]
+    fov_y = 36
+    size = [64, 40]
+    [render]
+    particles = { repeat_level = 16 }
+    [material.fog]
+    medium = { extinction = 5, albedo = 0.5 }
+    [[object]]
+    name = "fog"
+    medium_ball = { center = [0.35, 0.35, 0], radius = 0.25, spacing = 0.03 }
+    material = "fog"
+    [[object]]
+    name = "floor"
+    rectangle = { center = [0, 0, 0], u = [0, 0, 4], v = [4, 0, 0], spacing = 0.08 }
+    color = [0.8, 0.7, 0.6]
+    [[light]]
+    intensity = [4, 4, 4]
+    samples = 16
+    "#;
 
     /// The points of a light, shining to all sides alike.
     fn without_cosine(whole: &SceneLight) -> Vec<SceneLight> {

@@ -116,7 +116,8 @@ impl Cache {
         }
         fs::create_dir_all(&self.folder)?;
         self.make_room(file, bytes)?;
-        let mut new = tempfile::Builder::new().suffix(".tmp").tempfile_in(&self.folder)?;
+        // What a run leaves that is killed here is counted, and goes, as the others.
+        let mut new = tempfile::Builder::new().suffix(&format!(".{EXTENSION}")).tempfile_in(&self.folder)?;
         for part in [&MAGIC[..], key, Sha256::digest(content).as_slice(), content] {
             new.write_all(part)?;
         }

@@ -179,6 +179,9 @@ impl Sheets {
             return nothing;
         };
         let [begin, end] = self.inside(&self.slabs, own, at).unwrap_or([near, far]);
+        let behind = 0.5 * (begin + end) / self.slabs.width - (f64::from(own) + 0.5);
+        let beside = if behind < 0.0 { own - 1 } else { own + 1 };
+        let value = value + behind.abs() * (self.value(beside, at).unwrap_or(value) - value);
         let (class, color) = self.class(volume, own, at, value);
         if class == 0.0 {
             return nothing;

@@ -141,7 +141,7 @@ impl Shader<'_> {
             Lanes::load(simd, &of.crossings.near[at..]).max(limit(of.limits[0])).max(Lanes::splat(simd, faces[0]));
         let far = Lanes::load(simd, &of.crossings.far[at..]).min(limit(of.limits[1])).min(Lanes::splat(simd, faces[1]));
         let length = (far - near).max(Lanes::splat(simd, 0.0));
-        let [value, weight] = of.sheets.load(simd, place.slab, place.y, place.x);
+        let [value, weight] = self.amid(simd, of, place);
         let [extinction, red, green, blue] = match of.preclassified {
             None => of.prepared.classifier.at(simd, value),
             Some(classes) => classes.load(simd, place.slab, place.y, place.x),
@@ -149,6 +149,31 @@ impl Shader<'_> {
         let secant = self.secants(simd, place);
         let depth = (extinction * length * secant).where_less(Lanes::splat(simd, LEAST_WEIGHT), weight);
         Medium { near, far, depth, secant, color: [red, green, blue] }
+    }
+
+    /// The value in the middle of what each ray has of slab and volume, and the kernels' sum. A sheet has that of the middle of its slab; where a
+    /// face of the volume cuts the slab, the sheet to the other side tells how values go on from there. Whether the ray is inside the volume
+    /// there does not count: it may end at the slab's face, before or behind it.
+    #[inline(always)]
+    fn amid<S: Simd>(&self, simd: S, of: &Reconstructed<'_>, place: Place) -> [Lanes<S>; 2] {
+        let Place { slab, y, x } = place;
+        let [value, weight] = of.sheets.load(simd, slab, y, x);
+        let (slabs, splat) = (&of.prepared.slabs, |v: f32| Lanes::splat(simd, v));
+        let (zero, faces) = (splat(0.0), [slab, slab + 1].map(|slab| splat(slabs.face(slab))));
+        let near = Lanes::load(simd, &of.crossings.near[place.pixel()..]).max(faces[0]);
+        let far = Lanes::load(simd, &of.crossings.far[place.pixel()..]).min(faces[1]);
+        // Twice as far as the middle lies behind that of the slab.
+        let behind = ((near - faces[0]) + (far - faces[1])).where_less(near, far);
+        if !zero.any_less(behind.abs()) {
+            return [value, weight];
+        }
+        let (half, least) = (splat(0.5 / slabs.width as f32), splat(LEAST_WEIGHT));
+        let towards = |shift: Lanes<S>, slab: u32| {
+            let [v, weight] = of.sheets.load(simd, slab, y, x);
+            shift.max(zero) * half * (v - value).where_less(least, weight)
+        };
+        let (after, before) = (towards(behind, slab + 1), towards(zero - behind, slab.max(1) - 1));
+        [value + after + before, weight]
     }
 
     /// Length of each ray per unit of view depth.

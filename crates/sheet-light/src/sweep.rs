@@ -24,11 +24,10 @@ impl VolumeScratch {
         self.queue.active.contains(&own).then_some(own)
     }
 
-    /// Whether the sheet there, or the next one where gradients are taken from it, is not finished.
+    /// Whether the sheet there, or the next one, which tells how values go on, is not finished.
     #[inline(always)]
     fn needs(&self, of: &Prepared<'_>, slab: u32) -> bool {
-        let behind = u32::from(of.volume.normals);
-        let is_behind = |own| !self.batches.is_empty() && self.batches.start * BATCH <= own + behind;
+        let is_behind = |own| !self.batches.is_empty() && self.batches.start * BATCH <= own + 1;
         self.own(of, slab).is_some_and(is_behind)
     }
 
@@ -93,7 +92,7 @@ impl FoldTile<'_> {
         }
     }
 
-    /// Whether a sheet of this slab, or one that a gradient there needs, is not finished.
+    /// Whether a sheet of this slab, or the one behind it, is not finished.
     fn needs_batch(&self, slab: u32) -> bool {
         self.of.volumes.iter().zip(&self.scratch.volumes).any(|(prepared, scratch)| scratch.needs(prepared, slab))
     }

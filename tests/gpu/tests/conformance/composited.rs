@@ -214,127 +214,117 @@ fn a_device_that_cannot_take_all_at_once_or_is_lost_still_yields_the_unshadowed(
     }
 }
 
-/// What takes long and rarely fails where the others hold.
-#[cfg(feature = "deep")]
-mod deep {
-    use super::*;
-
-    #[test]
-    fn shadow_maps_stay_on_the_device() {
-        let scene = SCENE.replacen("    [[object]]", &format!("{MORE_LIGHTS}    [[object]]"), 1);
-        let settings = "[render]\nlayers = [\"effects\", \"shadow\"]";
-        let alone = picture_of(&scene, settings, None);
-        let bright = scene.replace("shadow = false", "").replace("[[light]]", "[[light]]\n    shadow = false");
-        assert!(apart(&alone, &picture_of(&bright, settings, None)) > 0.01, "shadows that can be seen");
-        // Two trials, and everything else at once.
-        let (device, choice) = worse(Loss::Never, u64::MAX);
-        let helped = picture_of(&scene, settings, Some(choice));
-        assert_eq!((device.submissions(), &helped.warnings), (3, &alone.warnings));
-        assert!(apart(&alone, &helped) <= TOLERANCE, "{:e}", apart(&alone, &helped));
-        let maps = |r: &Render| r.cost.stages.iter().filter(|s| s.name == "tsm build").count();
-        assert_eq!((maps(&alone), maps(&helped)), (2, 2));
-        // There it fails the second trial, and makes lists and looks them up as ever.
-        let through_wgpu = picture_of(&scene, settings, Some(DeviceChoice::wgpu(adapter())));
-        assert!(through_wgpu.backend.starts_with("wgpu, "), "{}", through_wgpu.backend);
-        assert!(apart(&alone, &through_wgpu) <= TOLERANCE, "{:e}", apart(&alone, &through_wgpu));
-        let alone = picture_of(&scene, "", None);
-        // Too large for the device even in parts, the picture is the processor's.
-        let (device, choice) = worse(Loss::Never, 1 << 18);
-        let parts = picture_of(&scene, "", Some(choice));
-        assert!(parts.warnings.iter().any(|w| w.contains("no room for even few splats")), "{:?}", parts.warnings);
-        assert!(device.submissions() > 2, "{}", device.submissions());
-        assert!(apart(&alone, &parts) <= TOLERANCE, "{:e}", apart(&alone, &parts));
-        for (loss, said) in
-            [(Loss::Once(3), "was lost and opened once more"), (Loss::Always(3), "was lost; the processor goes on")]
-        {
-            let (_, choice) = worse(loss, u64::MAX);
-            let helped = picture_of(&scene, "", Some(choice));
-            assert!(apart(&alone, &helped) <= TOLERANCE, "{loss:?}");
-            assert!(helped.warnings.iter().any(|w| w.contains(said)), "{loss:?}: {:?}", helped.warnings);
-        }
-        // Maps of polar angles are the processor's, with a line said.
-        let polar = "[render.shadow]\nmapping = \"polar\"";
-        let lamp = translucent("");
-        let alone = picture_of(&lamp, polar, None);
-        let (_, choice) = worse(Loss::Never, u64::MAX);
-        let helped = picture_of(&lamp, polar, Some(choice));
-        assert!(apart(&alone, &helped) <= TOLERANCE);
-        assert!(
-            helped.warnings.iter().any(|w| w.contains("polar angles are the processor's")),
-            "{:?}",
-            helped.warnings
-        );
+#[test]
+fn shadow_maps_stay_on_the_device() {
+    let scene = SCENE.replacen("    [[object]]", &format!("{MORE_LIGHTS}    [[object]]"), 1);
+    let settings = "[render]\nlayers = [\"effects\", \"shadow\"]";
+    let alone = picture_of(&scene, settings, None);
+    let bright = scene.replace("shadow = false", "").replace("[[light]]", "[[light]]\n    shadow = false");
+    assert!(apart(&alone, &picture_of(&bright, settings, None)) > 0.01, "shadows that can be seen");
+    // Two trials, and everything else at once.
+    let (device, choice) = worse(Loss::Never, u64::MAX);
+    let helped = picture_of(&scene, settings, Some(choice));
+    assert_eq!((device.submissions(), &helped.warnings), (3, &alone.warnings));
+    assert!(apart(&alone, &helped) <= TOLERANCE, "{:e}", apart(&alone, &helped));
+    let maps = |r: &Render| r.cost.stages.iter().filter(|s| s.name == "tsm build").count();
+    assert_eq!((maps(&alone), maps(&helped)), (2, 2));
+    // There it fails the second trial, and makes lists and looks them up as ever.
+    let through_wgpu = picture_of(&scene, settings, Some(DeviceChoice::wgpu(adapter())));
+    assert!(through_wgpu.backend.starts_with("wgpu, "), "{}", through_wgpu.backend);
+    assert!(apart(&alone, &through_wgpu) <= TOLERANCE, "{:e}", apart(&alone, &through_wgpu));
+    let alone = picture_of(&scene, "", None);
+    // Too large for the device even in parts, the picture is the processor's.
+    let (device, choice) = worse(Loss::Never, 1 << 18);
+    let parts = picture_of(&scene, "", Some(choice));
+    assert!(parts.warnings.iter().any(|w| w.contains("no room for even few splats")), "{:?}", parts.warnings);
+    assert!(device.submissions() > 2, "{}", device.submissions());
+    assert!(apart(&alone, &parts) <= TOLERANCE, "{:e}", apart(&alone, &parts));
+    for (loss, said) in
+        [(Loss::Once(3), "was lost and opened once more"), (Loss::Always(3), "was lost; the processor goes on")]
+    {
+        let (_, choice) = worse(loss, u64::MAX);
+        let helped = picture_of(&scene, "", Some(choice));
+        assert!(apart(&alone, &helped) <= TOLERANCE, "{loss:?}");
+        assert!(helped.warnings.iter().any(|w| w.contains(said)), "{loss:?}: {:?}", helped.warnings);
     }
+    // Maps of polar angles are the processor's, with a line said.
+    let polar = "[render.shadow]\nmapping = \"polar\"";
+    let lamp = translucent("");
+    let alone = picture_of(&lamp, polar, None);
+    let (_, choice) = worse(Loss::Never, u64::MAX);
+    let helped = picture_of(&lamp, polar, Some(choice));
+    assert!(apart(&alone, &helped) <= TOLERANCE);
+    assert!(helped.warnings.iter().any(|w| w.contains("polar angles are the processor's")), "{:?}", helped.warnings);
+}
 
-    #[test]
-    fn a_small_picture_of_a_scene_is_the_processor_s() {
-        // A lamp inside a cloud, a fountain, a tree of translucent leaves, opaque ground.
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/light-inside.toml");
-        let mut scene = scene::parse(&path, &std::fs::read(&path).unwrap(), &Default::default()).unwrap();
-        scene.camera.size = [192, 144];
+#[test]
+fn a_small_picture_of_a_scene_is_the_processor_s() {
+    // A lamp inside a cloud, a fountain, a tree of translucent leaves, opaque ground.
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/light-inside.toml");
+    let mut scene = scene::parse(&path, &std::fs::read(&path).unwrap(), &Default::default()).unwrap();
+    scene.camera.size = [192, 144];
+    let alone = render_of(&scene, None);
+    let device = DeviceChoice { backends: vec![backend().unwrap()], choice: adapter(), or_processor: false };
+    let helped = render_of(&scene, Some(device));
+    let far = apart(&alone, &helped);
+    assert!(helped.backend != "cpu" && helped.warnings == alone.warnings, "{:?}", helped.warnings);
+    assert!(far <= TOLERANCE, "{far:e}");
+}
+
+#[test]
+fn what_a_software_driver_would_leave_away_goes_through_it_in_parts() {
+    // 90 thousand splats on four tiles: Mesa's driver on the processor ends a thread's loops before that.
+    let text = r#"
+        version = 1
+        [camera]
+        position = [0, 0, 9]
+        target = [0, 0, 0]
+        size = [24, 24]
+        [[light]]
+        kind = "point"
+        position = [1, 2, 4]
+        intensity = [90, 90, 90]
+        [[object]]
+        name = "fog"
+        medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 1.5, spacing = 0.0444 }
+    "#;
+    // Opaque splats are gone through twice, so that half as many are too many.
+    let wall = "rectangle = { center = [0, 0, 0], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.0093 }\nopacity = 1.0";
+    let (before, _) = text.split_once("medium_box").unwrap();
+    for (text, said) in [(text.to_owned(), None), (format!("{before}{wall}"), Some("a tile has more splats"))] {
+        let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
         let alone = render_of(&scene, None);
-        let device = DeviceChoice { backends: vec![backend().unwrap()], choice: adapter(), or_processor: false };
+        let (_, device) = crate::named_device();
         let helped = render_of(&scene, Some(device));
-        let far = apart(&alone, &helped);
-        assert!(helped.backend != "cpu" && helped.warnings == alone.warnings, "{:?}", helped.warnings);
-        assert!(far <= TOLERANCE, "{far:e}");
+        assert!(apart(&alone, &helped) <= TOLERANCE, "{:e}", apart(&alone, &helped));
+        assert_eq!(helped.warnings.len(), usize::from(said.is_some()), "{:?}", helped.warnings);
+        assert!(said.is_none_or(|said| helped.warnings[0].starts_with(said)), "{:?}", helped.warnings);
     }
+}
 
-    #[test]
-    fn what_a_software_driver_would_leave_away_goes_through_it_in_parts() {
-        // 90 thousand splats on four tiles: Mesa's driver on the processor ends a thread's loops before that.
-        let text = r#"
-            version = 1
-            [camera]
-            position = [0, 0, 9]
-            target = [0, 0, 0]
-            size = [24, 24]
-            [[light]]
-            kind = "point"
-            position = [1, 2, 4]
-            intensity = [90, 90, 90]
-            [[object]]
-            name = "fog"
-            medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 1.5, spacing = 0.0444 }
-        "#;
-        // Opaque splats are gone through twice, so that half as many are too many.
-        let wall = "rectangle = { center = [0, 0, 0], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.0093 }\nopacity = 1.0";
-        let (before, _) = text.split_once("medium_box").unwrap();
-        for (text, said) in [(text.to_owned(), None), (format!("{before}{wall}"), Some("a tile has more splats"))] {
-            let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
-            let alone = render_of(&scene, None);
-            let (_, device) = crate::named_device();
-            let helped = render_of(&scene, Some(device));
-            assert!(apart(&alone, &helped) <= TOLERANCE, "{:e}", apart(&alone, &helped));
-            assert_eq!(helped.warnings.len(), usize::from(said.is_some()), "{:?}", helped.warnings);
-            assert!(said.is_none_or(|said| helped.warnings[0].starts_with(said)), "{:?}", helped.warnings);
+#[test]
+fn depth_and_object_layers_are_the_processor_s() {
+    // The wall stands out of the fog.
+    let scene = SCENE.replace("center = [0.3, 0, 0]", "center = [0.3, 0.3, 1.1]");
+    for direction in ["front_to_back", "back_to_front"] {
+        let settings =
+            format!("[render]\nlayers = [\"depth\", \"object\"]\n[render.points]\ndirection = \"{direction}\"");
+        let alone = picture_of(&scene, &settings, None);
+        let (name, device) = crate::named_device();
+        let helped = picture_of(&scene, &settings, Some(device));
+        assert!(helped.backend.starts_with(&name) && helped.warnings == alone.warnings, "{:?}", helped.warnings);
+        assert!(apart(&alone, &helped) <= TOLERANCE);
+        let LayerData::Id(expected) = &alone.layers.images["object"] else { panic!("ids") };
+        let LayerData::Id(found) = &helped.layers.images["object"] else { panic!("ids") };
+        let mut others = expected.iter().zip(found).filter(|(a, b)| a != b).count();
+        assert!((0..3).all(|o| expected.contains(&o)) && expected.contains(&u32::MAX));
+        for layer in ["depth.first", "depth.median", "depth.mean", "depth.sigma"] {
+            let (a, b) = (alone.layers.scalar(layer).unwrap(), helped.layers.scalar(layer).unwrap());
+            assert!(a.iter().any(|z| *z < f32::INFINITY));
+            // A level may be reached one splat earlier or later; a deviation is the root of a variance.
+            let near = |(a, b): (&f32, &f32)| a == b || (a - b).abs() <= 1e-3;
+            others += a.iter().zip(b).filter(|pair| !near(*pair)).count();
         }
-    }
-
-    #[test]
-    fn depth_and_object_layers_are_the_processor_s() {
-        // The wall stands out of the fog.
-        let scene = SCENE.replace("center = [0.3, 0, 0]", "center = [0.3, 0.3, 1.1]");
-        for direction in ["front_to_back", "back_to_front"] {
-            let settings =
-                format!("[render]\nlayers = [\"depth\", \"object\"]\n[render.points]\ndirection = \"{direction}\"");
-            let alone = picture_of(&scene, &settings, None);
-            let (name, device) = crate::named_device();
-            let helped = picture_of(&scene, &settings, Some(device));
-            assert!(helped.backend.starts_with(&name) && helped.warnings == alone.warnings, "{:?}", helped.warnings);
-            assert!(apart(&alone, &helped) <= TOLERANCE);
-            let LayerData::Id(expected) = &alone.layers.images["object"] else { panic!("ids") };
-            let LayerData::Id(found) = &helped.layers.images["object"] else { panic!("ids") };
-            let mut others = expected.iter().zip(found).filter(|(a, b)| a != b).count();
-            assert!((0..3).all(|o| expected.contains(&o)) && expected.contains(&u32::MAX));
-            for layer in ["depth.first", "depth.median", "depth.mean", "depth.sigma"] {
-                let (a, b) = (alone.layers.scalar(layer).unwrap(), helped.layers.scalar(layer).unwrap());
-                assert!(a.iter().any(|z| *z < f32::INFINITY));
-                // A level may be reached one splat earlier or later; a deviation is the root of a variance.
-                let near = |(a, b): (&f32, &f32)| a == b || (a - b).abs() <= 1e-3;
-                others += a.iter().zip(b).filter(|pair| !near(*pair)).count();
-            }
-            assert!(others <= 96 * 64 / 500, "{name} {direction}: {others}");
-        }
+        assert!(others <= 96 * 64 / 500, "{name} {direction}: {others}");
     }
 }

@@ -232,11 +232,6 @@ fn agreement(a: &Ensemble, b: &Ensemble) -> (f64, f64, f32) {
     (pixels().filter(same).count() as f64 / all, near as f64 / all, brightest)
 }
 
-fn ways(device: &Device) -> Vec<Nearest> {
-    let best = Nearest::of(device.adapter());
-    if best == Nearest::Wide { vec![Nearest::Ranked, best] } else { vec![best] }
-}
-
 const ALL: EnsembleParams = EnsembleParams {
     effects: true,
     normal: true,
@@ -256,39 +251,6 @@ fn lit<'a>(lights: &[Light; 3], maps: &'a [ShadowMap; 2]) -> Vec<LitBy<'a>> {
 /// Whether every access of a kernel is looked at: that takes minutes, and few sets show all accesses.
 fn assisted() -> bool {
     std::env::var("ORGANZA_VALIDATION").is_ok_and(|v| v == "gpu-assisted")
-}
-
-#[test]
-fn lit_sets_are_the_cpu_s() {
-    let mut device = open().unwrap();
-    for (origin, views) in [(DVec3::ZERO, &VIEWS[..]), (DVec3::new(1e7, -3e6, 5e6), &VIEWS[..1])] {
-        let world = World::new(origin);
-        let (lights, maps) = (world.lights(), world.maps());
-        let lights = lit(&lights, &maps);
-        let with_maps = [(&maps[0], origin), (&maps[1], origin)];
-        for (view, plain) in views.iter().zip([true, false]) {
-            world.with(*view, 0.7, plain, |objects, camera| {
-                let ambient = [0.1, 0.2, 0.3];
-                let scene = Scene { objects, lights: &lights, shadow_origin: origin, ambient, camera, occluder: None };
-                for params in [ALL, EnsembleParams::default()] {
-                    let expected = by_processor(&scene, params, 2 * ROOM.levels);
-                    for nearest in ways(&device) {
-                        for made in [false, true] {
-                            if assisted() && (params != ALL || made == (nearest == Nearest::Ranked) || !plain) {
-                                continue;
-                            }
-                            let way = Way { params, nearest, made };
-                            let found = by_device(&mut device, &scene, &with_maps, way, ROOM);
-                            let (same, near, brightest) = agreement(&expected, &found);
-                            assert!(same >= 1.0 - OTHERS, "{view:?} {nearest:?} {made}: {same}");
-                            assert!(near >= 1.0 - 2.0 * OTHERS, "{view:?} {nearest:?} {made}: {near}");
-                            assert!(brightest > 0.2, "{brightest}");
-                        }
-                    }
-                }
-            });
-        }
-    }
 }
 
 #[test]
@@ -457,5 +419,44 @@ mod deep {
                 assert!(same >= 1.0 - OTHERS && (ratio - 1.0).abs() < 1e-3, "{same} {ratio}");
             }
         });
+    }
+
+    #[test]
+    fn lit_sets_are_the_cpu_s() {
+        let mut device = open().unwrap();
+        for (origin, views) in [(DVec3::ZERO, &VIEWS[..]), (DVec3::new(1e7, -3e6, 5e6), &VIEWS[..1])] {
+            let world = World::new(origin);
+            let (lights, maps) = (world.lights(), world.maps());
+            let lights = lit(&lights, &maps);
+            let with_maps = [(&maps[0], origin), (&maps[1], origin)];
+            for (view, plain) in views.iter().zip([true, false]) {
+                world.with(*view, 0.7, plain, |objects, camera| {
+                    let ambient = [0.1, 0.2, 0.3];
+                    let scene =
+                        Scene { objects, lights: &lights, shadow_origin: origin, ambient, camera, occluder: None };
+                    for params in [ALL, EnsembleParams::default()] {
+                        let expected = by_processor(&scene, params, 2 * ROOM.levels);
+                        for nearest in ways(&device) {
+                            for made in [false, true] {
+                                if assisted() && (params != ALL || made == (nearest == Nearest::Ranked) || !plain) {
+                                    continue;
+                                }
+                                let way = Way { params, nearest, made };
+                                let found = by_device(&mut device, &scene, &with_maps, way, ROOM);
+                                let (same, near, brightest) = agreement(&expected, &found);
+                                assert!(same >= 1.0 - OTHERS, "{view:?} {nearest:?} {made}: {same}");
+                                assert!(near >= 1.0 - 2.0 * OTHERS, "{view:?} {nearest:?} {made}: {near}");
+                                assert!(brightest > 0.2, "{brightest}");
+                            }
+                        }
+                    }
+                });
+            }
+        }
+    }
+
+    fn ways(device: &Device) -> Vec<Nearest> {
+        let best = Nearest::of(device.adapter());
+        if best == Nearest::Wide { vec![Nearest::Ranked, best] } else { vec![best] }
     }
 }

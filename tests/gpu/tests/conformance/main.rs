@@ -3,12 +3,15 @@
 
 mod canary;
 mod chained;
+#[cfg(feature = "deep")]
 mod composited;
 mod deposits;
 mod generated;
 mod kernels;
+#[cfg(feature = "deep")]
 mod layered;
 mod lit;
+#[cfg(feature = "deep")]
 mod means;
 mod order;
 mod particles;

@@ -1,7 +1,7 @@
 //! A whole picture with a device that helps: the processor's, bit for bit.
 
 use gpu_conformance::{Interface, Loss, Wrapped, adapter};
-use organza::device::{self, Agreement, Device, DeviceChoice};
+use organza::device::{self, Device, DeviceChoice};
 use organza::{Progress, Render, RenderOptions, render, scene};
 use std::sync::Arc;
 
@@ -156,33 +156,6 @@ fn particles_that_the_device_cannot_make_are_uploaded() {
 }
 
 #[test]
-fn killing_the_device_between_sets_goes_on_from_there() {
-    let alone = particles(None, "");
-    // 40 sets are five batches of eight, after the trial.
-    let whole = losing(Loss::Never, u64::MAX);
-    let helped = particles(Some(whole.1), "");
-    assert_eq!(whole.0.submissions(), 1 + 5);
-    let (device, choice) = losing(Loss::Once(4), u64::MAX);
-    let again = particles(Some(choice), "");
-    // What was folded before the loss is not folded again, and the fresh device gives the same sums.
-    assert_eq!((device.submissions(), &again.layers), (1 + 5 + 1, &helped.layers));
-    assert!(again.warnings.iter().any(|w| w.contains("opened once more")), "{:?}", again.warnings);
-    let (device, choice) = losing(Loss::Always(4), u64::MAX);
-    let rest = particles(Some(choice), "");
-    assert_eq!((device.submissions(), rest.sets), (5, alone.sets));
-    assert!(rest.backend.ends_with("then cpu") && agreement(&alone, &rest) >= 0.999, "{}", rest.backend);
-    // Small buffers take fewer sets at once, and less than one set is the processor's.
-    let (device, choice) = losing(Loss::Never, 2 << 20);
-    let slowly = particles(Some(choice), "");
-    assert!(device.submissions() > 6 && slowly.warnings.is_empty(), "{} {:?}", device.submissions(), slowly.warnings);
-    assert_eq!(slowly.layers, helped.layers);
-    let (_, choice) = losing(Loss::Never, 1 << 16);
-    let refused = particles(Some(choice), "");
-    assert_eq!(refused.layers, alone.layers);
-    assert!(refused.warnings.iter().any(|w| w.contains("kernels see at most")), "{:?}", refused.warnings);
-}
-
-#[test]
 fn particles_that_a_device_cannot_fold_are_the_processor_s() {
     for (layer, why) in [("depth", "depth layers"), ("object", "object layers")] {
         let layers = format!("layers = [\"{layer}\"]");
@@ -194,118 +167,11 @@ fn particles_that_a_device_cannot_fold_are_the_processor_s() {
     }
 }
 
-/// A picture by particles that two lamps light, through their shadow maps; a lamp, a pane and fog.
-fn lit_particles(device: Option<DeviceChoice>, more: &str) -> Render {
-    let text = format!(
-        r#"
-        version = 1
-        [camera]
-        position = [0.4, 0.3, 4]
-        target = [0, 0, 0]
-        size = [96, 64]
-        [[light]]
-        kind = "point"
-        position = [1, 2, 2]
-        intensity = [30, 30, 30]
-        [[light]]
-        kind = "directional"
-        direction = [0.3, -0.8, -0.5]
-        irradiance = [2, 1.5, 1]
-        [material.plain]
-        shading = "unlit"
-        [[object]]
-        name = "pane"
-        rectangle = {{ center = [0, 0, 1.2], u = [0.8, 0, 0.2], v = [0, 0.8, 0], spacing = 0.05 }}
-        color = [0.9, 0.5, 0.2]
-        opacity = 0.5
-        [[object]]
-        name = "behind"
-        material = "plain"
-        rectangle = {{ center = [0.3, 0, 0], u = [0.9, 0, 0], v = [0, 0.9, 0], spacing = 0.05 }}
-        color = [0.1, 0.4, 0.9]
-        opacity = 0.7
-        [[object]]
-        name = "fog"
-        medium_box = {{ min = [-0.5, -1, -1], max = [1, 1, 0.5], extinction = 0.8, spacing = 0.2 }}
-        [render]
-        technique = "particles"
-        {more}
-        [render.particles]
-        repeat_level = 40
-        "#
-    );
-    let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
-    render(&scene, &RenderOptions { device: opened(device), ..RenderOptions::default() }, &Progress::new()).unwrap()
-}
-
-/// Largest difference of the pixels of equal opacity, in every layer, and the brightest number of beauty.
-fn apart(a: &Render, b: &Render) -> (f32, f32) {
-    let [x, y] = [a, b].map(|r| r.layers.scalar("alpha").unwrap());
-    let mut most = 0.0f32;
-    for name in ["beauty", "ambient", "emission", "direct", "scatter1", "normal"] {
-        let (Some(a), Some(b)) = (a.layers.rgb(name), b.layers.rgb(name)) else { continue };
-        let equal = a.iter().zip(b).zip(x.iter().zip(y)).filter(|(_, (x, y))| x == y);
-        most = equal.flat_map(|((a, b), _)| (0..3).map(move |c| (a[c] - b[c]).abs())).fold(most, f32::max);
-    }
-    (most, a.layers.rgb("beauty").unwrap().as_flattened().iter().fold(0.0, |a, b| b.max(a)))
-}
-
-#[test]
-fn light_that_a_device_does_not_make_is_the_processor_s() {
-    let glossy = r#"
-        [material.glossy]
-        specular = 0.2
-        shininess = 100
-        [[object]]
-        name = "mirror"
-        material = "glossy"
-        rectangle = { center = [-0.5, 0.5, 1.4], u = [0.3, 0, 0], v = [0, 0.3, 0], spacing = 0.05 }
-        opacity = 0.5
-        "#;
-    let (_, choice) = losing(Loss::Never, u64::MAX);
-    let helped = lit_particles(Some(choice), glossy);
-    assert!(helped.warnings.iter().any(|w| w.contains("an exponent above 64")), "{:?}", helped.warnings);
-    assert_eq!(helped.layers, lit_particles(None, glossy).layers);
-}
-
-#[test]
-fn a_device_with_small_buffers_sorts_in_parts() {
-    let alone = picture(true, None);
-    // 5461 splats a part: the box alone has more, so the order takes two submissions after the trial. Some of the map's
-    // neighbouring cells have more entries than kernels can see, so its lists are the processor's.
-    let (device, choice) = losing(Loss::Never, 1 << 16);
-    let helped = picture(true, Some(choice));
-    assert!(alone.layers == helped.layers && helped.warnings.len() == 1, "{:?}", helped.warnings);
-    assert!(helped.warnings[0].contains("the processor makes its lists"), "{:?}", helped.warnings);
-    assert_eq!(device.submissions(), 1 + 2);
-    // Lost at the second part.
-    let (device, choice) = losing(Loss::Once(3), 1 << 16);
-    assert!(alone.layers == picture(true, Some(choice)).layers);
-    assert_eq!(device.submissions(), 3 + 2);
-    // With buffers of four times that the map is made in parts, and the order at once.
-    let (device, choice) = losing(Loss::Never, 1 << 18);
-    let helped = picture(true, Some(choice));
-    assert!(alone.layers == helped.layers && helped.warnings.is_empty(), "{:?}", helped.warnings);
-    let lists = device.submissions() - 2;
-    assert!(lists > 1, "the map in {lists} parts");
-    let (device, choice) = losing(Loss::Once(3), 1 << 18);
-    assert!(alone.layers == picture(true, Some(choice)).layers);
-    assert_eq!(device.submissions(), 3 + lists + 1);
-    // As many parts where the memory is too small for all: 30 bytes a splat.
-    let (device, choice) = chosen(Wrapped::new(Interface::Ash, Loss::Never, u64::MAX).with_memory(200_000));
-    let short = picture(true, Some(choice));
-    assert!(alone.layers == short.layers && short.warnings.len() == 1, "{:?}", short.warnings);
-    assert_eq!(device.submissions(), 1 + 2);
-    // Too small for anything: refused at the trial.
-    let (_, choice) = losing(Loss::Never, 512);
-    let error = Device::open(&choice).unwrap_err();
-    assert!(error.to_string().contains("kernels see at most 512"), "{error}");
-}
-
 /// What takes long and rarely fails where the others hold.
 #[cfg(feature = "deep")]
 mod deep {
     use super::*;
+    use organza::device::Agreement;
 
     #[test]
     fn killing_the_device_in_the_middle_of_a_render_still_yields_the_picture() {
@@ -390,5 +256,145 @@ mod deep {
             assert_eq!(passport.missing.contains(&"timestamps"), order.passes.is_empty());
         }
         assert!(device::passport("no such device").unwrap().is_empty());
+    }
+
+    #[test]
+    fn killing_the_device_between_sets_goes_on_from_there() {
+        let alone = particles(None, "");
+        // 40 sets are five batches of eight, after the trial.
+        let whole = losing(Loss::Never, u64::MAX);
+        let helped = particles(Some(whole.1), "");
+        assert_eq!(whole.0.submissions(), 1 + 5);
+        let (device, choice) = losing(Loss::Once(4), u64::MAX);
+        let again = particles(Some(choice), "");
+        // What was folded before the loss is not folded again, and the fresh device gives the same sums.
+        assert_eq!((device.submissions(), &again.layers), (1 + 5 + 1, &helped.layers));
+        assert!(again.warnings.iter().any(|w| w.contains("opened once more")), "{:?}", again.warnings);
+        let (device, choice) = losing(Loss::Always(4), u64::MAX);
+        let rest = particles(Some(choice), "");
+        assert_eq!((device.submissions(), rest.sets), (5, alone.sets));
+        assert!(rest.backend.ends_with("then cpu") && agreement(&alone, &rest) >= 0.999, "{}", rest.backend);
+        // Small buffers take fewer sets at once, and less than one set is the processor's.
+        let (device, choice) = losing(Loss::Never, 2 << 20);
+        let slowly = particles(Some(choice), "");
+        assert!(
+            device.submissions() > 6 && slowly.warnings.is_empty(),
+            "{} {:?}",
+            device.submissions(),
+            slowly.warnings
+        );
+        assert_eq!(slowly.layers, helped.layers);
+        let (_, choice) = losing(Loss::Never, 1 << 16);
+        let refused = particles(Some(choice), "");
+        assert_eq!(refused.layers, alone.layers);
+        assert!(refused.warnings.iter().any(|w| w.contains("kernels see at most")), "{:?}", refused.warnings);
+    }
+
+    #[test]
+    fn a_device_with_small_buffers_sorts_in_parts() {
+        let alone = picture(true, None);
+        // 5461 splats a part: the box alone has more, so the order takes two submissions after the trial. Some of the map's
+        // neighbouring cells have more entries than kernels can see, so its lists are the processor's.
+        let (device, choice) = losing(Loss::Never, 1 << 16);
+        let helped = picture(true, Some(choice));
+        assert!(alone.layers == helped.layers && helped.warnings.len() == 1, "{:?}", helped.warnings);
+        assert!(helped.warnings[0].contains("the processor makes its lists"), "{:?}", helped.warnings);
+        assert_eq!(device.submissions(), 1 + 2);
+        // Lost at the second part.
+        let (device, choice) = losing(Loss::Once(3), 1 << 16);
+        assert!(alone.layers == picture(true, Some(choice)).layers);
+        assert_eq!(device.submissions(), 3 + 2);
+        // With buffers of four times that the map is made in parts, and the order at once.
+        let (device, choice) = losing(Loss::Never, 1 << 18);
+        let helped = picture(true, Some(choice));
+        assert!(alone.layers == helped.layers && helped.warnings.is_empty(), "{:?}", helped.warnings);
+        let lists = device.submissions() - 2;
+        assert!(lists > 1, "the map in {lists} parts");
+        let (device, choice) = losing(Loss::Once(3), 1 << 18);
+        assert!(alone.layers == picture(true, Some(choice)).layers);
+        assert_eq!(device.submissions(), 3 + lists + 1);
+        // As many parts where the memory is too small for all: 30 bytes a splat.
+        let (device, choice) = chosen(Wrapped::new(Interface::Ash, Loss::Never, u64::MAX).with_memory(200_000));
+        let short = picture(true, Some(choice));
+        assert!(alone.layers == short.layers && short.warnings.len() == 1, "{:?}", short.warnings);
+        assert_eq!(device.submissions(), 1 + 2);
+        // Too small for anything: refused at the trial.
+        let (_, choice) = losing(Loss::Never, 512);
+        let error = Device::open(&choice).unwrap_err();
+        assert!(error.to_string().contains("kernels see at most 512"), "{error}");
+    }
+
+    #[test]
+    fn light_that_a_device_does_not_make_is_the_processor_s() {
+        let glossy = r#"
+            [material.glossy]
+            specular = 0.2
+            shininess = 100
+            [[object]]
+            name = "mirror"
+            material = "glossy"
+            rectangle = { center = [-0.5, 0.5, 1.4], u = [0.3, 0, 0], v = [0, 0.3, 0], spacing = 0.05 }
+            opacity = 0.5
+            "#;
+        let (_, choice) = losing(Loss::Never, u64::MAX);
+        let helped = lit_particles(Some(choice), glossy);
+        assert!(helped.warnings.iter().any(|w| w.contains("an exponent above 64")), "{:?}", helped.warnings);
+        assert_eq!(helped.layers, lit_particles(None, glossy).layers);
+    }
+
+    /// A picture by particles that two lamps light, through their shadow maps; a lamp, a pane and fog.
+    fn lit_particles(device: Option<DeviceChoice>, more: &str) -> Render {
+        let text = format!(
+            r#"
+            version = 1
+            [camera]
+            position = [0.4, 0.3, 4]
+            target = [0, 0, 0]
+            size = [96, 64]
+            [[light]]
+            kind = "point"
+            position = [1, 2, 2]
+            intensity = [30, 30, 30]
+            [[light]]
+            kind = "directional"
+            direction = [0.3, -0.8, -0.5]
+            irradiance = [2, 1.5, 1]
+            [material.plain]
+            shading = "unlit"
+            [[object]]
+            name = "pane"
+            rectangle = {{ center = [0, 0, 1.2], u = [0.8, 0, 0.2], v = [0, 0.8, 0], spacing = 0.05 }}
+            color = [0.9, 0.5, 0.2]
+            opacity = 0.5
+            [[object]]
+            name = "behind"
+            material = "plain"
+            rectangle = {{ center = [0.3, 0, 0], u = [0.9, 0, 0], v = [0, 0.9, 0], spacing = 0.05 }}
+            color = [0.1, 0.4, 0.9]
+            opacity = 0.7
+            [[object]]
+            name = "fog"
+            medium_box = {{ min = [-0.5, -1, -1], max = [1, 1, 0.5], extinction = 0.8, spacing = 0.2 }}
+            [render]
+            technique = "particles"
+            {more}
+            [render.particles]
+            repeat_level = 40
+            "#
+        );
+        let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
+        render(&scene, &RenderOptions { device: opened(device), ..RenderOptions::default() }, &Progress::new()).unwrap()
+    }
+
+    /// Largest difference of the pixels of equal opacity, in every layer, and the brightest number of beauty.
+    fn apart(a: &Render, b: &Render) -> (f32, f32) {
+        let [x, y] = [a, b].map(|r| r.layers.scalar("alpha").unwrap());
+        let mut most = 0.0f32;
+        for name in ["beauty", "ambient", "emission", "direct", "scatter1", "normal"] {
+            let (Some(a), Some(b)) = (a.layers.rgb(name), b.layers.rgb(name)) else { continue };
+            let equal = a.iter().zip(b).zip(x.iter().zip(y)).filter(|(_, (x, y))| x == y);
+            most = equal.flat_map(|((a, b), _)| (0..3).map(move |c| (a[c] - b[c]).abs())).fold(most, f32::max);
+        }
+        (most, a.layers.rgb("beauty").unwrap().as_flattened().iter().fold(0.0, |a, b| b.max(a)))
     }
 }
