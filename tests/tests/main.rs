@@ -23,6 +23,7 @@ mod invariances;
 mod layers;
 mod loading;
 mod many_forms;
+mod matter;
 mod memory;
 mod memory_particles;
 mod meshes;

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | mesh | Σ pieces of its triangles' splits | yes |
 //! | raw points | one a point | yes; fewer where duplicates are merged |
+//! | raw points as a medium | one a point with extinction, or one a cell of the lattice that makes them fewer | yes |
 //! | volume | cells with extinction; where steps are split voxels with extinction, times the factors | where none is split |
 //! | zero set | 2·A/h², A from a mesh of 48 cells a side | within some ten percent |
 //! | density, procedural cloud | lattice points times the share of a coarse lattice that is above zero | within some percent |
@@ -21,7 +22,7 @@ use crate::shapes::{HomogeneousMedium, Lattice, MediumBody, Rectangle, rectangle
 use crate::volume_points::lattice_factors;
 use crate::{ConvertError, DensityParams, MeshParams, SplatParams, VolumeParams, mesh_points, resample, surface_nets};
 #[cfg(feature = "surfels")]
-use crate::{RawPoints, SurfelParams, surfels};
+use crate::{MatterParams, RawPoints, SurfelParams, matter, surfels};
 use splat_core::{
     DAabb, Grid, Mesh, ScalarField, TransferFunction,
     glam::{DMat3, DVec3},
@@ -82,6 +83,18 @@ pub fn mesh(mesh: &Mesh, params: &MeshParams) -> Result<Prediction, ConvertError
 pub fn raw_points(points: &RawPoints, params: &SurfelParams) -> Result<Prediction, ConvertError> {
     surfels::check(points, params)?;
     Ok(Prediction::exact(points.len() as f64, surfels::wanted(points, params)))
+}
+
+/// Of [`crate::raw_to_matter`].
+///
+/// # Errors
+/// As the conversion.
+#[cfg(feature = "surfels")]
+pub fn raw_matter(points: &RawPoints, params: &MatterParams) -> Result<Prediction, ConvertError> {
+    matter::check(points, params)?;
+    let splats = matter::count(points, params) as f64;
+    params.splat.check_cloud(splats, Wanted::default())?;
+    Ok(Prediction::exact(splats, Wanted::default()))
 }
 
 /// Of [`crate::volume_to_points`].

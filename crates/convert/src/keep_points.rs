@@ -60,6 +60,7 @@ pub fn kept(points: &RawPoints, by: &[Kept], clips: &[Clip], up: DVec3) -> RawPo
             .iter()
             .map(|c| Column { name: c.name.clone(), values: chosen(&c.values, &keeps) })
             .collect(),
+        cells: chosen(&points.cells, &keeps),
         lattice: points.lattice.as_ref().map(|l| PointLattice {
             steps: chosen(&l.steps, &keeps),
             offset: l.offset,

@@ -1,7 +1,7 @@
 //! Files and fields become clouds, meshes and grids.
 //!
 //! Readers give nouns ([`read`]); conversions give clouds of splats with one optical meaning (Gunjee 2007, section 4):
-//! [`mesh_to_points`], [`volume_to_points`], [`raw_to_surfels`], [`surface_to_points`], [`density_to_points`] and
+//! [`mesh_to_points`], [`volume_to_points`], [`raw_to_surfels`], [`raw_to_matter`], [`surface_to_points`], [`density_to_points`] and
 //! [`procedural_cloud`]. Each takes its parameters and returns a report of counts.
 //!
 //! ```
@@ -21,6 +21,8 @@ mod bricks;
 #[cfg(feature = "cache")]
 mod cache;
 mod cell_share;
+#[cfg(feature = "surfels")]
+mod cell_volume;
 mod classify;
 mod clipped_mesh;
 mod color_by;
@@ -42,6 +44,10 @@ mod grid_field;
 mod keep;
 mod keep_points;
 mod marching_cubes;
+#[cfg(feature = "surfels")]
+mod matter;
+#[cfg(any(feature = "read", feature = "surfels"))]
+mod matter_columns;
 mod mesh_points;
 #[cfg(feature = "surfels")]
 mod mpu;
@@ -63,6 +69,8 @@ mod params;
 mod pieces;
 #[cfg(feature = "surfels")]
 mod places;
+#[cfg(feature = "surfels")]
+mod point_cells;
 #[cfg(feature = "noise")]
 mod procedural;
 mod raw_points;
@@ -109,15 +117,19 @@ pub use field_points::{
 pub use grid_field::{GridField, Inside, Interpolation};
 pub use keep_points::{Kept, Within, kept};
 pub use marching_cubes::isosurface_to_mesh;
+#[cfg(feature = "surfels")]
+pub use matter::{MatterParams, MatterReport, raw_to_matter};
 pub use mesh_points::{MeshParams, MeshReport, flatten_leaning, mesh_to_points, mesh_to_points_into};
 #[cfg(feature = "surfels")]
 pub use mpu::{MpuField, MpuParams, MpuReport, points_to_field};
 #[cfg(feature = "surfels")]
 pub use orient::Orientation;
 pub use params::{Density, SplatParams};
+#[cfg(feature = "surfels")]
+pub use point_cells::with_cells;
 #[cfg(feature = "noise")]
 pub use procedural::{CloudShape, Ellipsoid, procedural_cloud};
-pub use raw_points::{Column, PointLattice, RawPoints};
+pub use raw_points::{Column, PointCell, PointLattice, RawPoints};
 pub use resample::resampled;
 pub use search::{ZeroSearch, extinct_bounds, visible_ends};
 pub use section::{Section, volume_section};

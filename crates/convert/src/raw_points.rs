@@ -23,6 +23,8 @@ pub struct RawPoints {
     pub classification: Vec<u8>,
     /// Further columns of the file, those that were asked for by name (`read::ReadParams::columns`).
     pub columns: Vec<Column>,
+    /// The matter that each point stands for, where that was found already: see [`crate::with_cells`].
+    pub cells: Vec<PointCell>,
     /// The integers that the positions were made from, where the file stores integers.
     pub lattice: Option<PointLattice>,
     /// Points of the file that were left out because a coordinate was not finite.
@@ -38,6 +40,15 @@ pub struct Column {
     pub name: String,
     /// One number a point, in f64: times of a day have more digits than f32.
     pub values: Vec<f64>,
+}
+
+/// What a point stands for if all that is given is matter, cubed and plain units of the file.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct PointCell {
+    /// Its share of the volume of its place; infinite where there is no other place.
+    pub volume: f64,
+    /// Edge of the cube that all points of its place stand for.
+    pub spacing: f64,
 }
 
 /// Names that people have for columns, with those of files and of [`RawPoints`].
@@ -166,7 +177,8 @@ impl RawPoints {
     /// Bytes held by the columns, all of them counted: position, normal, colour, value, opacity, class, integers and further ones; and
     /// Gaussians.
     pub fn bytes(&self) -> u64 {
-        (64 + 8 * self.columns.len() as u64) * self.len() as u64 + self.gaussians.bytes()
+        let cells = (self.cells.len() * size_of::<PointCell>()) as u64;
+        (64 + 8 * self.columns.len() as u64) * self.len() as u64 + cells + self.gaussians.bytes()
     }
 
     /// The least opacity of a point; 1 where the file has none, and without points. That of a Gaussian is below 1.
@@ -198,6 +210,7 @@ impl RawPoints {
             ("value", self.value.len()),
             ("opacity", self.opacity.len()),
             ("classification", self.classification.len()),
+            ("cells", self.cells.len()),
             ("lattice", self.lattice.as_ref().map_or(0, |l| l.steps.len())),
             ("gaussians", self.gaussians.len()),
         ];

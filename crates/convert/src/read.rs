@@ -150,6 +150,9 @@ pub struct ReadParams {
     /// Columns of points that are kept in [`RawPoints::columns`] beside those that have a meaning, each by its name in the file or by one
     /// that [`RawPoints::column`] knows. One that a file of points has not is an error that names those that it has.
     pub columns: Vec<String>,
+    /// Whether points are to become a medium: columns `radius`, `smoothing_length` and `extinction` are kept too where there are such, and
+    /// numbers that matter cannot have are refused, see [`crate::raw_to_matter`].
+    pub matter: bool,
     /// Whether the ranges of all columns of points are found, kept or not, for [`Notes::columns`].
     pub ranges: bool,
     /// Whether the samples of a PNG are numbers, from 0 to 1 as they are stored, and no colours of a display.
@@ -167,6 +170,7 @@ impl Default for ReadParams {
             frame: 0,
             most_points: None,
             columns: Vec::new(),
+            matter: false,
             ranges: false,
             is_data: false,
         }

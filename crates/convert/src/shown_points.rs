@@ -1,6 +1,9 @@
 //! What is shown of raw points: those that are kept, as far apart as is asked for, in the colours of a column.
 
-use crate::{Clip, ColorBy, Colored, ConvertError, Kept, PointColors, RawPoints, SplatParams, colored, kept, thinned};
+use crate::matter::unused_by_matter;
+use crate::{
+    Clip, ColorBy, Colored, ConvertError, Kept, PointColors, RawPoints, SplatParams, colored, kept, thinned, with_cells,
+};
 use splat_core::glam::DVec3;
 use std::sync::Arc;
 
@@ -15,12 +18,14 @@ pub struct PointsShown<'a> {
     pub spacing: Option<f64>,
     /// The column that colours are taken from.
     pub color_by: Option<&'a ColorBy>,
+    /// Whether they stand for matter: then for as much as among all points, whichever are kept.
+    pub as_matter: bool,
     /// Where `height` grows.
     pub up: DVec3,
 }
 
-/// The points that are shown, and what there is to say of them, one sentence without a full stop each: how their colours arose, and that
-/// nothing is left. What is not asked for changes nothing, not even a copy is made. Colours are those of points that were made one.
+/// The points that are shown, and what there is to say of them, one sentence without a full stop each: how their colours arose, that
+/// nothing is left, and what a medium does not use. What is not asked for changes nothing, not even a copy is made. Colours are those of points that were made one.
 ///
 /// ```
 /// use convert::{PointsShown, RawPoints, SplatParams, shown_points};
@@ -30,15 +35,18 @@ pub struct PointsShown<'a> {
 /// ```
 ///
 /// # Errors
-/// Those of [`thinned`] and [`colored`].
+/// Those of [`thinned`], [`colored`] and [`with_cells`].
 pub fn shown_points(
     mut points: Arc<RawPoints>,
     shown: &PointsShown<'_>,
     splat: &SplatParams,
 ) -> Result<(Arc<RawPoints>, Vec<String>), ConvertError> {
-    let mut said = Vec::new();
+    let mut said = if shown.as_matter { unused_by_matter(&points) } else { Vec::new() };
     if !(shown.keep.is_empty() && shown.clip.is_empty()) {
         let all = points.len();
+        if shown.as_matter {
+            points = with_cells(Arc::unwrap_or_clone(points), splat, None)?.into();
+        }
         points = kept(&points, shown.keep, shown.clip, shown.up).into();
         if points.is_empty() && all > 0 {
             said.push(format!("nothing is left of {all} points{}", causes(shown)));

@@ -18,7 +18,7 @@ use crate::neighbours::MAX_NEIGHBOURS;
 use crate::orient::{self, Orientation};
 use crate::params::SplatParams;
 use crate::places::{Place, places};
-use crate::{ConvertError, RawPoints, gaussian_points};
+use crate::{Column, ConvertError, RawPoints, gaussian_points};
 use rayon::prelude::*;
 use splat_core::{
     Camera, Cloud, Footprint, Progress, SplatKind,
@@ -237,7 +237,7 @@ pub(crate) fn check(points: &RawPoints, params: &SurfelParams) -> Result<(), Con
 }
 
 /// Ids by place (along a Morton curve), then by attributes: the order of the file does not matter.
-fn canonical_order(points: &RawPoints) -> Vec<u32> {
+pub(crate) fn canonical_order(points: &RawPoints) -> Vec<u32> {
     let bounds = splat_core::Aabb::of_points(&points.position);
     let extent = (bounds.max - bounds.min).max_element().max(f32::MIN_POSITIVE);
     let mut keys: Vec<(u64, u32)> = points
@@ -259,7 +259,11 @@ pub(crate) fn compare(points: &RawPoints, a: usize, b: usize) -> Ordering {
         let number = |column: &[f32]| column.get(i).map(|v| v.to_bits());
         (points.normal.get(i).map(|n| bits(*n)), color, number(&points.value), number(&points.opacity))
     };
-    place(a).cmp(&place(b)).then_with(|| attributes(a).cmp(&attributes(b))).then(a.cmp(&b))
+    let further = || {
+        let differ = |c: &Column| c.values[a].total_cmp(&c.values[b]);
+        points.columns.iter().map(differ).fold(Ordering::Equal, Ordering::then)
+    };
+    place(a).cmp(&place(b)).then_with(|| attributes(a).cmp(&attributes(b))).then_with(further).then(a.cmp(&b))
 }
 
 /// 21 bits an axis of a place in the unit cube.
@@ -276,7 +280,7 @@ fn morton(p: DVec3) -> u64 {
 }
 
 /// The distinct places in order, and where the points of each begin in `order` (then the number of points).
-fn distinct_places(points: &RawPoints, order: &[u32]) -> (Vec<Vec3>, Vec<u32>) {
+pub(crate) fn distinct_places(points: &RawPoints, order: &[u32]) -> (Vec<Vec3>, Vec<u32>) {
     let mut distinct: Vec<Vec3> = order.par_iter().with_min_len(CHUNK).map(|i| points.position[*i as usize]).collect();
     let is_first = |s: &usize| *s == 0 || distinct[*s] != distinct[*s - 1];
     let mut starts: Vec<u32> = (0..order.len()).filter(is_first).map(|s| s as u32).collect();

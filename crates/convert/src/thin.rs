@@ -54,6 +54,7 @@ pub fn thinned(points: &RawPoints, spacing: f64, params: &SplatParams) -> Result
         opacity: numbers(&points.opacity),
         classification: if points.classification.is_empty() { Vec::new() } else { ranges.iter().map(first).collect() },
         columns: points.columns.iter().map(column).collect(),
+        cells: Vec::new(),
         lattice: None,
         dropped: points.dropped,
         gaussians: Gaussians::default(),
@@ -61,7 +62,7 @@ pub fn thinned(points: &RawPoints, spacing: f64, params: &SplatParams) -> Result
 }
 
 /// The cell of every point, by cell; within one in an order that the file's does not change.
-fn cells(points: &RawPoints, spacing: f64) -> Vec<([f64; 3], u32)> {
+pub(crate) fn cells(points: &RawPoints, spacing: f64) -> Vec<([f64; 3], u32)> {
     let cell = |(i, p): (usize, &Vec3)| {
         // Plus zero, for there is but one cell at zero.
         let at = ((points.origin + p.as_dvec3()) / spacing).floor() + 0.0;

@@ -8,6 +8,7 @@ mod combined_fields;
 mod convert_bunny;
 mod convert_cost;
 mod convert_fields;
+mod convert_matter;
 mod convert_mesh;
 mod convert_surfels;
 mod convert_volume;

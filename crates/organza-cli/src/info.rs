@@ -60,7 +60,7 @@ fn scene_document(scene: &Scene) -> Value {
 fn source_name(source: &Source) -> &'static str {
     match source {
         Source::Mesh(_) => "mesh",
-        Source::Points(_) => "points",
+        Source::Points(_) | Source::Matter(_) => "points",
         Source::Volume(_) => "volume",
         Source::Implicit(_) => "implicit",
         Source::Isosurface(_) => "isosurface",

@@ -4,7 +4,7 @@ use super::PointsLook;
 use super::check::{At, LARGEST};
 use super::check_transfer::check_transfer;
 use super::raw_object::RawObject;
-use super::raw_points::{RawColorBy, RawPointSize};
+use super::raw_points::{RawColorBy, RawPointForm, RawPointSize};
 use crate::{Error, shown};
 use convert::{ColorBy, ColorMap, DiscSize, Kept, PointColors, Within};
 
@@ -17,8 +17,16 @@ const CLASSES: [&str; 2] = ["classification", "class"];
 
 /// What an object says of its points; `None` of the keys for other sources.
 pub(super) fn check_points(at: &At<'_>, raw: &RawObject) -> Result<PointsLook, Error> {
+    let is_medium = raw.points.is_some() && raw.form == Some(RawPointForm::Medium);
+    if raw.extinction.is_some() && !is_medium {
+        let message = "`extinction` belongs to `points` with as = \"medium\"";
+        return Err(at
+            .key("extinction")
+            .error(message, "other media have an `extinction` in their source, surfaces none"));
+    }
     if raw.points.is_none() {
         let keys = [
+            ("as", raw.form.is_some()),
             ("color_by", raw.color_by.is_some()),
             ("keep", raw.keep.is_some()),
             ("unlit", raw.unlit.is_some()),
@@ -32,6 +40,14 @@ pub(super) fn check_points(at: &At<'_>, raw: &RawObject) -> Result<PointsLook, E
             Some((key, _)) => Err(at.key(key).error(format!("`{key}` belongs to `points`"), "")),
             None => Ok(PointsLook::default()),
         };
+    }
+    if raw.point_size.is_some() && is_medium {
+        let hint = "a column `radius` of the file, or `footprint`, says how wide it is drawn";
+        return Err(at.key("point_size").error("points that are a medium have no discs", hint));
+    }
+    if raw.merge_duplicates && is_medium {
+        let message = "points that are a medium share the matter of their place";
+        return Err(at.key("merge_duplicates").error(message, "leave `merge_duplicates` out"));
     }
     if raw.unlit.is_some() && raw.material.is_some() {
         let hint = "leave one of them out, or give the material shading = \"unlit\"";

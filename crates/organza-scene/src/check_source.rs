@@ -6,8 +6,9 @@ use super::check_light::check_half_axes;
 use super::check_transfer::check_transfer;
 use super::paths::Paths;
 use super::raw_object::RawObject;
+use super::raw_points::RawPointForm;
 use super::raw_source::{RawCloud, RawDensity, RawImplicit, RawMediumBall, RawMediumBox, RawRectangle};
-use super::{CloudSource, DensitySource, ImplicitSource, Source, VolumeSource};
+use super::{CloudSource, DensitySource, ImplicitSource, MatterSource, Source, VolumeSource};
 use crate::{Error, shown};
 use convert::{ExpressionField, HomogeneousMedium, MediumBody, Rectangle};
 use glam::DVec3;
@@ -68,7 +69,12 @@ pub(super) fn check_source(
         return Ok(Source::Mesh(paths.resolve(&at_source, path)?));
     }
     if let Some(path) = &raw.points {
-        return Ok(Source::Points(paths.resolve(&at_source, path)?));
+        let path = paths.resolve(&at_source, path)?;
+        if raw.form != Some(RawPointForm::Medium) {
+            return Ok(Source::Points(path));
+        }
+        let extinction = check_extinction(at, raw.extinction.or(fallback))?;
+        return Ok(Source::Matter(MatterSource { path, extinction }));
     }
     if let Some(path) = &raw.volume {
         let path = paths.resolve(&at_source, path)?;

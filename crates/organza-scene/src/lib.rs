@@ -69,7 +69,8 @@ pub use settings::{
 };
 pub use shown::{escape_controls, place, printable, shown};
 pub use source::{
-    CloudSource, DensitySource, ImplicitSource, IsosurfaceSource, LevelSetSource, SliceSource, Source, VolumeSource,
+    CloudSource, DensitySource, ImplicitSource, IsosurfaceSource, LevelSetSource, MatterSource, SliceSource, Source,
+    VolumeSource,
 };
 
 /// The page's example compiles and holds.

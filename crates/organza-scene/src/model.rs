@@ -55,9 +55,19 @@ impl Scene {
     /// The columns that are read of a file of points, by name, each once: those that any visible object asks for, so that the file is read
     /// once for all of them.
     pub fn columns_of(&self, path: &Path) -> Vec<String> {
-        let of_file = self.objects.iter().filter(|o| o.visible && matches!(&o.source, Source::Points(p) if p == path));
-        let names: BTreeSet<&str> = of_file.flat_map(|o| o.points.columns()).collect();
+        let names: BTreeSet<&str> = self.made_of(path).flat_map(|o| o.points.columns()).collect();
         names.into_iter().map(str::to_owned).collect()
+    }
+
+    /// Whether a visible object is a medium of the points of a file.
+    pub fn has_matter(&self, path: &Path) -> bool {
+        self.made_of(path).any(|o| o.source.is_medium())
+    }
+
+    /// The visible objects that are made of the points of a file.
+    fn made_of(&self, path: &Path) -> impl Iterator<Item = &SceneObject> {
+        let of_points = |o: &&SceneObject| matches!(o.source, Source::Points(_) | Source::Matter(_));
+        self.objects.iter().filter(|o| o.visible).filter(of_points).filter(move |o| o.source.path() == Some(path))
     }
 
     /// The files of its environment, of what lights shine through, and of bumps.

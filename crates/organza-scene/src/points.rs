@@ -1,7 +1,7 @@
 //! How raw points look beside what all objects have, checked.
 
-use super::SceneObject;
-use convert::{ColorBy, DiscSize, Kept, PointsShown};
+use super::{MatterSource, SceneObject, Source};
+use convert::{ColorBy, DiscSize, Kept, MatterParams, PointsShown, SplatParams};
 
 /// What a scene says of raw points; of other sources nothing.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -24,21 +24,30 @@ impl PointsLook {
 }
 
 impl SceneObject {
-    /// What is shown of its points, in the unit of their file.
+    /// How its points become a medium of these attributes, if they do.
+    pub fn matter_params(&self, splat: &SplatParams) -> Option<MatterParams> {
+        let Source::Matter(MatterSource { extinction, .. }) = self.source else { return None };
+        let spacing = self.spacing.map(|spacing| spacing / self.transform.scale);
+        let (splat, colors) = (splat.clone(), self.color.is_none());
+        Some(MatterParams { splat, colors, extinction, spacing, ..MatterParams::default() })
+    }
+
+    /// What is shown of its points, in the unit of their file. Those of a medium are made fewer when they stand for volumes.
     pub fn points_shown(&self) -> PointsShown<'_> {
         PointsShown {
             keep: &self.points.keep,
             clip: &self.clip,
-            spacing: self.spacing.map(|spacing| spacing / self.transform.scale),
+            spacing: self.spacing.filter(|_| !self.source.is_medium()).map(|spacing| spacing / self.transform.scale),
             color_by: self.points.color_by.as_ref(),
+            as_matter: self.source.is_medium(),
             up: self.up.axis.direction(),
         }
     }
 
     /// Whether its points are drawn without light: as the scene says, else those that have colours of their own, which no material and no
-    /// other colours are put in the place of. Photographs hold the light of their day already.
+    /// other colours are put in the place of. Photographs hold the light of their day already; a medium is lit.
     pub fn is_unlit(&self, has_colors: bool) -> bool {
         let is_bare = self.material == 0 && self.color.is_none() && self.points.color_by.is_none();
-        self.points.unlit.unwrap_or(is_bare && has_colors)
+        self.points.unlit.unwrap_or(is_bare && has_colors && !self.source.is_medium())
     }
 }

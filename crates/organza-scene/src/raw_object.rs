@@ -1,6 +1,6 @@
 //! Objects as they are written.
 
-use super::raw_points::{RawColorBy, RawPointSize};
+use super::raw_points::{RawColorBy, RawPointForm, RawPointSize};
 use super::raw_source::{
     RawClip, RawCloud, RawDensity, RawImplicit, RawIsosurface, RawLevelSet, RawMediumBall, RawMediumBox, RawRectangle,
     RawSlice, RawTransferPoint,
@@ -43,6 +43,11 @@ pub(super) struct RawObject {
     pub(super) medium_box: Option<RawMediumBox>,
     /// A homogeneous ball.
     pub(super) medium_ball: Option<RawMediumBall>,
+    /// What `points` become: "surface" (default), discs, or "medium", the matter around each of them.
+    #[serde(rename = "as")]
+    pub(super) form: Option<RawPointForm>,
+    /// Extinction within `points` that are a medium, 1/world unit; default the material's.
+    pub(super) extinction: Option<f64>,
     /// The column that `points` take their colours from.
     pub(super) color_by: Option<RawColorBy>,
     /// Which `points` are drawn: classes by a list, other columns by their lowest and highest number.

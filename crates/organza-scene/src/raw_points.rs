@@ -3,6 +3,15 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+/// What points become.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(rename = "PointForm")]
+pub(super) enum RawPointForm {
+    Surface,
+    Medium,
+}
+
 /// The column of its file that points take their colours from.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]

@@ -10,8 +10,10 @@ use std::path::{Path, PathBuf};
 pub enum Source {
     /// A triangle mesh in a file.
     Mesh(PathBuf),
-    /// A raw point cloud in a file.
+    /// A raw point cloud in a file, as samples of a surface.
     Points(PathBuf),
+    /// A raw point cloud in a file, as matter.
+    Matter(MatterSource),
     /// A regular volume in a file.
     Volume(VolumeSource),
     /// The zero set of an expression.
@@ -35,13 +37,14 @@ pub enum Source {
 impl Source {
     /// Whether it is a participating medium, which no ray crosses at one place.
     pub fn is_medium(&self) -> bool {
-        matches!(self, Self::Volume(_) | Self::Density(_) | Self::Cloud(_) | Self::Medium(_))
+        matches!(self, Self::Matter(_) | Self::Volume(_) | Self::Density(_) | Self::Cloud(_) | Self::Medium(_))
     }
 
     /// The file that it reads.
     pub fn path(&self) -> Option<&Path> {
         match self {
             Self::Mesh(path) | Self::Points(path) => Some(path),
+            Self::Matter(source) => Some(&source.path),
             Self::Volume(source) => Some(&source.path),
             Self::Isosurface(source) => Some(&source.path),
             Self::LevelSet(source) => Some(&source.path),
@@ -49,6 +52,15 @@ impl Source {
             _ => None,
         }
     }
+}
+
+/// Points that stand for matter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MatterSource {
+    /// The file.
+    pub path: PathBuf,
+    /// Extinction σ_t within the points, 1/world unit (after the object's transform).
+    pub extinction: f64,
 }
 
 /// A volume file and how its values become colour and extinction.

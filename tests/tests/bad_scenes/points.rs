@@ -36,12 +36,33 @@ fn how_points_look_is_checked() {
 }
 
 #[test]
+fn points_that_are_a_medium_have_an_extinction_and_nothing_of_surfaces() {
+    let points = |keys: &str| format!("points = \"a.ply\"\n{keys}\n[[object]]\nname = \"c\"\nmesh = \"a.ply\"");
+    let refused = |keys: &str, expected: &str| refused("mesh = \"a.ply\"", &points(keys), expected);
+    refused("as = \"fog\"", "expected");
+    refused("as = \"medium\"", "expected a key `extinction` here, found none");
+    refused("as = \"medium\"\nextinction = -1", "`extinction`");
+    refused("as = \"surface\"\nextinction = 1", "`extinction` belongs to `points` with as = \"medium\"");
+    let medium = "as = \"medium\"\nextinction = 1";
+    for (key, expected) in [
+        ("point_size = { pixels = 2 }", "points that are a medium have no discs"),
+        ("merge_duplicates = true", "points that are a medium share the matter of their place"),
+        ("opacity = 0.5", "a medium has no `opacity`"),
+        ("technique = \"surfels\"", "is a medium, and the technique `surfels` draws surfaces alone"),
+    ] {
+        refused(&format!("{medium}\n{key}"), expected);
+    }
+}
+
+#[test]
 fn what_raw_points_alone_have_is_refused_elsewhere() {
     for (key, value) in [
         ("color_by", "{ column = \"z\" }"),
         ("keep", "{ z = [0, 1] }"),
         ("unlit", "true"),
         ("point_size", "{ pixels = 2 }"),
+        ("as", "\"medium\""),
+        ("extinction", "1"),
     ] {
         refused(
             "mesh = \"a.ply\"",

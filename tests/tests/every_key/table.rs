@@ -177,6 +177,7 @@ const NOT_OF_POINTS: Expected = Refused(2, "`merge_duplicates` belongs to `point
 const NO_CLIP: Expected = Refused(2, "a homogeneous medium has no `clip`");
 const RAW: Which = These(&["points", "plain points"]);
 const HOT: &[&str] = &["object.it.points='hot.xyz'", "object.it.color_by={column='heat'}"];
+const MATTER: &[&str] = &["object.it.as='medium'", "object.it.extinction=3"];
 const OWN_SPACING: Expected = Refused(2, "states its own spacing");
 const NO_TRANSFER: Expected = Refused(2, "belongs to a `volume` or `slice`, and to `points` with `color_by`");
 pub(super) const OPEN: Which = These(&["implicit", "isosurface", "level_set"]);
@@ -217,6 +218,8 @@ fn objects() -> Vec<Entry> {
             .with(&["object.it.clip=[{normal=[0, 1, 0], point=[0, 0.1, 0]}]"]),
         of(OPEN, "object.clip.box", "object.it.clip.0.box=[[-0.2, -0.3, -1], [0.3, 0.3, 1]]")
             .with(&["object.it.clip=[{box=[[-0.3, -0.3, -1], [0.3, 0.3, 1]]}]"]),
+        of(RAW, "object.as", "object.it.as='medium'").with(&["material.m.medium={extinction=3}"]).by(POINTS),
+        of(RAW, "object.extinction", "object.it.extinction=1").with(MATTER).by(POINTS),
         of(RAW, "object.color_by", "object.it.color_by={column='z'}"),
         one("object.color_by", "object.it.color_by={column='z'}")
             .but(All, Refused(2, "`color_by` belongs to `points`")),

@@ -3,7 +3,7 @@
 mod further;
 
 use super::copc::Levels;
-use super::extras::Extras;
+use super::extras::{Extras, UNFIT_HINT};
 use super::{Notes, ReadParams, input, laz};
 use crate::error::{Place, ReadError};
 use crate::raw_points::{PointLattice, RawPoints};
@@ -78,6 +78,9 @@ pub(super) fn read(content: Vec<u8>, params: &ReadParams, notes: &mut Notes) -> 
         let data = data.map_err(|e| damaged(layout.points, "whole point records", &e.to_string()))?;
         extras.reserve(data.len())?;
         asked.iter().for_each(|rank| fields[*rank].numbers(&data, |numbers| extras.extend(*rank, numbers)));
+        if let Some((expected, found)) = extras.unfit_of_many() {
+            return Err(ReadError { hint: UNFIT_HINT, ..damaged(layout.points, expected, found) });
+        }
         columns.append(&data, &layout)
     };
     match plain {

@@ -6,7 +6,7 @@
 //! nothing but a whole number before the first point is a count, which is checked.
 
 use super::direction::unit;
-use super::extras::Extras;
+use super::extras::{Extras, UNFIT_HINT};
 use super::text::{Line, Lines, Word};
 use super::{Notes, ReadParams, input, origin};
 use crate::error::{Place, ReadError};
@@ -96,6 +96,10 @@ fn further(words: &[Word<'_>], extras: &mut Extras) -> Result<(), ReadError> {
     if let Some(i) = extras.read().find(is_text) {
         let hint = "a column that is asked for has numbers alone; nan is a gap";
         return Err(ReadError::input(words[i].place(), "a number", words[i].shown(), hint));
+    }
+    let unfit = |i: usize| Some((i, extras.unfit(i, words[i].decimal()?)?));
+    if let Some((i, expected)) = extras.read().find_map(unfit) {
+        return Err(ReadError::input(words[i].place(), expected, words[i].shown(), UNFIT_HINT));
     }
     extras.reserve(1)?;
     extras.push(|i| words[i].decimal().unwrap_or(f64::NAN));

@@ -321,6 +321,6 @@ fn spacing_of(object: &mut SceneObject) -> Option<&mut f64> {
         Source::Rectangle(rectangle) => Some(&mut rectangle.spacing),
         Source::Medium(medium) => Some(&mut medium.spacing),
         // What lies between points is no field that finer ones would approach.
-        Source::Points(_) => None,
+        Source::Points(_) | Source::Matter(_) => None,
     }
 }

@@ -70,6 +70,9 @@ pub(super) fn body(
                        between them is the technique's own guess",
             );
         }
+        Source::Matter(_) => {
+            return no("points that are a medium are not path-traced: nobody knows what lies between them");
+        }
         Source::Isosurface(_) | Source::LevelSet(_) | Source::Slice(_) => {
             return no("surfaces of measured fields are not path-traced");
         }

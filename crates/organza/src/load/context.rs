@@ -96,9 +96,10 @@ impl Context<'_> {
     }
 
     pub(super) fn read(&self, path: &Path) -> Result<FileData, Error> {
-        let columns = self.scene.columns_of(path);
+        let (columns, matter) = (self.scene.columns_of(path), self.scene.has_matter(path));
         let most_points = self.scene.render.max_points;
-        self.files.read(path, &ReadParams { columns, most_points, ..self.options.read_params() }, self.progress)
+        let params = ReadParams { columns, matter, most_points, ..self.options.read_params() };
+        self.files.read(path, &params, self.progress)
     }
 
     /// The same of one volume of a series.

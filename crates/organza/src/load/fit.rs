@@ -49,7 +49,7 @@ impl<'i> Outline<'i> {
         let corners = |bounds: DAabb| bounds.corners().to_vec();
         let points = match input {
             Input::Mesh(..) => Vec::new(),
-            Input::Points(_, points, _) => points.bulk().map_or_else(Vec::new, corners),
+            Input::Points(_, points, _) | Input::Matter(_, points, _) => points.bulk().map_or_else(Vec::new, corners),
             Input::Volume(grid, transfer, params) => visible_ends(grid, transfer, FAINT, &params.clip),
             Input::Surface(_, bounds, ..) | Input::Density(_, bounds, _) => corners(*bounds),
             Input::Procedural(shape, ..) => {
@@ -70,7 +70,7 @@ impl<'i> Outline<'i> {
                 let corners = mesh.triangles.iter().flatten();
                 corners.for_each(|v| add(transform.apply(mesh.origin + mesh.position[*v as usize].as_dvec3())));
             }
-            Input::Points(_, points, _) if self.points.is_empty() => {
+            Input::Points(_, points, _) | Input::Matter(_, points, _) if self.points.is_empty() => {
                 let mut around = |p: DVec3| add(transform.apply(p));
                 let reach = points.sparse_reach();
                 for p in &points.position {

@@ -4,12 +4,14 @@ use super::context::Context;
 use super::files::{FileData, Fitted};
 use crate::Error;
 use crate::scene::{
-    DensitySource, ImplicitSource, LevelSetSource, SceneObject, SliceSource, Source, SurfaceSampler, VolumeSource,
+    DensitySource, ImplicitSource, LevelSetSource, MatterSource, SceneObject, SliceSource, Source, SurfaceSampler,
+    VolumeSource,
 };
 use crate::statistics::ObjectData;
 use convert::{
     ClippedField, CloudShape, Density, DensityParams, ExpressionField, GridField, HomogeneousMedium, Interpolation,
-    MediumBody, MeshParams, MpuParams, RawPoints, Section, SharedField, SplatParams, SurfelParams, VolumeParams,
+    MatterParams, MediumBody, MeshParams, MpuParams, RawPoints, Section, SharedField, SplatParams, SurfelParams,
+    VolumeParams,
 };
 use pbsr::{BoundedExtinction, Matter};
 use splat_core::{DAabb, Grid, Mesh, TransferFunction};
@@ -24,6 +26,7 @@ pub(super) enum Input<'a> {
     /// With the name of its source.
     Mesh(String, Arc<Mesh>, MeshParams),
     Points(&'a Path, Arc<RawPoints>, SurfelParams),
+    Matter(&'a Path, Arc<RawPoints>, MatterParams),
     Volume(Arc<Grid>, &'a TransferFunction, VolumeParams),
     /// The zero set of a field in a box; of a trilinear one that nothing clips with its volume and level.
     Surface(SharedField, DAabb, MeshParams, Option<(Arc<Grid>, f32)>),
@@ -38,7 +41,7 @@ impl Input<'_> {
     pub(super) fn bytes(&self) -> u64 {
         match self {
             Self::Mesh(_, mesh, _) => mesh.bytes(),
-            Self::Points(_, points, _) => points.bytes(),
+            Self::Points(_, points, _) | Self::Matter(_, points, _) => points.bytes(),
             Self::Volume(grid, ..) => grid.bytes(),
             _ => 0,
         }
@@ -48,7 +51,7 @@ impl Input<'_> {
     pub(super) fn own_bytes(&self) -> u64 {
         let is_shared = match self {
             Self::Mesh(_, mesh, _) => Arc::strong_count(mesh) > 1,
-            Self::Points(_, points, _) => Arc::strong_count(points) > 1,
+            Self::Points(_, points, _) | Self::Matter(_, points, _) => Arc::strong_count(points) > 1,
             Self::Volume(grid, ..) => Arc::strong_count(grid) > 1,
             _ => false,
         };
@@ -59,7 +62,7 @@ impl Input<'_> {
     pub(super) fn splat(&self) -> &SplatParams {
         match self {
             Self::Mesh(_, _, params) | Self::Surface(_, _, params, _) => &params.splat,
-            Self::Points(_, _, params) => &params.splat,
+            Self::Points(_, _, SurfelParams { splat, .. }) | Self::Matter(_, _, MatterParams { splat, .. }) => splat,
             Self::Volume(_, _, params) | Self::Procedural(_, _, params) => &params.splat,
             Self::Density(_, _, params) => &params.volume.splat,
             Self::Medium(_, params) | Self::Rectangle(_, _, params) => params,
@@ -72,7 +75,7 @@ impl Input<'_> {
             Self::Mesh(_, _, params) | Self::Surface(_, _, params, _) => Some(params.opacity),
             Self::Points(_, points, params) => Some(params.opacity * f64::from(points.least_opacity())),
             Self::Rectangle(_, opacity, _) => Some(*opacity),
-            Self::Volume(..) | Self::Procedural(..) | Self::Density(..) | Self::Medium(..) => None,
+            Self::Volume(..) | Self::Procedural(..) | Self::Density(..) | Self::Medium(..) | Self::Matter(..) => None,
         }
     }
 
@@ -107,7 +110,7 @@ impl Input<'_> {
     pub(super) fn data(&self, bounded: bool, looseness: f64, by: SurfaceSampler) -> ObjectData {
         match self {
             Self::Points(_, points, _) if !points.gaussians.is_empty() => ObjectData::Gaussians,
-            Self::Points(..) => ObjectData::Points,
+            Self::Points(..) | Self::Matter(..) => ObjectData::Points,
             Self::Mesh(..) | Self::Rectangle(..) => ObjectData::Triangles,
             Self::Surface(.., lattice) => ObjectData::Surface { looseness, trilinear: lattice.is_some(), by },
             Self::Volume(..) | Self::Procedural(..) => ObjectData::Volume,
@@ -129,10 +132,7 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
             }
             Input::Mesh(crate::printable(path).to_string(), mesh, MeshParams { splat, density, opacity })
         }
-        Source::Points(path) => {
-            let points = read_points(path, object, context)?;
-            Input::Points(path, points, context.surfel_params(object, splat))
-        }
+        Source::Points(path) | Source::Matter(MatterSource { path, .. }) => raw_points(path, object, splat, context)?,
         Source::Volume(VolumeSource { path, frame, transfer }) => {
             let grid = read_grid(path, *frame, context)?;
             let at = |spacing: f64| convert::resampled(&grid, spacing / splat.transform.scale, &splat).map(Arc::new);
@@ -259,13 +259,22 @@ fn read_mesh(path: &Path, context: &Context<'_>) -> Result<Arc<Mesh>, Error> {
     }
 }
 
-fn read_points(path: &Path, object: &SceneObject, context: &Context<'_>) -> Result<Arc<RawPoints>, Error> {
+/// Points as samples of a surface, or as matter.
+fn raw_points<'a>(
+    path: &'a Path,
+    object: &SceneObject,
+    splat: SplatParams,
+    context: &Context<'_>,
+) -> Result<Input<'a>, Error> {
     let FileData::Points(points) = context.read(path)? else {
         return Err(Error::wrong_kind(path, "points without faces", "use `mesh = ` or `volume = ` for this file"));
     };
-    let (points, said) = convert::shown_points(points, &object.points_shown(), &context.splat_params(object))?;
+    let (points, said) = convert::shown_points(points, &object.points_shown(), &splat)?;
     context.files.note(path, said);
-    Ok(points)
+    Ok(match object.matter_params(&splat) {
+        Some(params) => Input::Matter(path, points, params),
+        None => Input::Points(path, points, context.surfel_params(object, splat)),
+    })
 }
 
 fn read_grid(path: &Path, frame: u64, context: &Context<'_>) -> Result<Arc<Grid>, Error> {

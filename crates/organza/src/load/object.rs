@@ -8,8 +8,8 @@ use crate::scene::{SceneObject, Source};
 use crate::statistics::ObjectStatistics;
 use convert::cost::{self, Prediction};
 use convert::{
-    CloudShape, ConvertError, Density, DensityParams, MeshParams, RawPoints, SplatParams, SurfelParams, VolumeParams,
-    ZeroSearch,
+    CloudShape, ConvertError, Density, DensityParams, MatterParams, MeshParams, RawPoints, SplatParams, SurfelParams,
+    VolumeParams, ZeroSearch,
 };
 use pbsr::BoundedExtinction;
 use splat_core::{Cloud, Exceeded, Grid, Mesh, Object, Shading, TransferFunction};
@@ -50,8 +50,10 @@ pub(super) fn prepare<'a>(
     let mut input = input(object, context)?;
     check_work(object, &input)?;
     let as_it_is = match &mut input {
-        Input::Points(_, points, params) if object.is_unlit(!points.color.is_empty()) => {
-            params.splat.material = context.scene.materials.len() as u16;
+        Input::Points(_, points, SurfelParams { splat, .. }) | Input::Matter(_, points, MatterParams { splat, .. })
+            if object.is_unlit(!points.color.is_empty()) =>
+        {
+            splat.material = context.scene.materials.len() as u16;
             true
         }
         _ => false,
@@ -94,6 +96,7 @@ fn predict(input: &Input<'_>) -> Result<Prediction, ConvertError> {
     match input {
         Input::Mesh(_, mesh, params) => cost::mesh(mesh, params),
         Input::Points(_, points, params) => cost::raw_points(points, params),
+        Input::Matter(_, points, params) => cost::raw_matter(points, params),
         Input::Volume(grid, transfer, params) => cost::volume(grid, transfer, params),
         Input::Surface(field, bounds, params, _) => cost::surface(field.as_ref(), *bounds, params),
         Input::Density(field, bounds, params) => cost::density(field.as_ref(), *bounds, params),
@@ -148,6 +151,10 @@ pub(super) fn convert(
         }
         Input::Points(path, points, params) => {
             surfels(path, points, &SurfelParams { splat, ..params.clone() }, context, warnings)
+        }
+        Input::Matter(path, points, params) => {
+            let made = convert::raw_to_matter(points, &MatterParams { splat, ..params.clone() }, Some(progress));
+            made.inspect(|(_, report)| context.files.note(path, report.said())).map(|c| c.0)
         }
         Input::Volume(grid, transfer, params) => {
             let params = VolumeParams { splat, ..params.clone() };

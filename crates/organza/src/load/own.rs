@@ -220,7 +220,7 @@ fn data(
     };
     let meshed = |mesh: Mesh| triangles(mesh, prepared.prediction.splats, source);
     Ok(match &prepared.input {
-        Input::Points(..) => None,
+        Input::Points(..) | Input::Matter(..) => None,
         Input::Mesh(_, mesh, _) => meshed(Mesh::clone(mesh)),
         Input::Rectangle(r, ..) => meshed(Mesh::rectangle(r.center, r.u, r.v)),
         Input::Surface(field, bounds, params, lattice) => {

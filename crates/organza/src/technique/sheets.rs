@@ -31,7 +31,7 @@ pub(crate) fn form(object: &ObjectStatistics) -> (Form, &'static str) {
         ObjectData::Volume => (Form::Cells, "sheets classify what they reconstruct"),
         ObjectData::Density { .. } => (Form::Cells, "sheets reconstruct it from a lattice"),
         ObjectData::Points | ObjectData::Gaussians | ObjectData::Triangles | ObjectData::Surface { .. } => {
-            (Form::Splats, "a surface is splatted into the slabs that it lies in")
+            (Form::Splats, "what is no lattice is splatted into the slabs that it lies in")
         }
     }
 }

@@ -6,7 +6,7 @@ use super::document::{MAX_FIELDS, Pose, Scan};
 use crate::error::{Place, ReadError};
 use crate::raw_points::RawPoints;
 use crate::read::direction::unit;
-use crate::read::extras::Extras;
+use crate::read::extras::{Extras, UNFIT_HINT};
 use crate::read::reading::Reading;
 use crate::read::{input, origin};
 use crate::srgb::linear_from_srgb;
@@ -65,6 +65,20 @@ fn rank(scan: &Scan, name: &str) -> Option<usize> {
 fn ranks(scan: &Scan, names: [&str; 3]) -> Option<[usize; 3]> {
     let [a, b, c] = names.map(|name| rank(scan, name));
     Some([a?, b?, c?])
+}
+
+/// Refuses a number that matter cannot have.
+fn check_matter(
+    extras: &Extras,
+    names: &[String],
+    number: impl Fn(usize) -> f64,
+    (place, point): (u64, u64),
+) -> Result<(), ReadError> {
+    let unfit = |rank: usize| Some((rank, extras.unfit(rank, number(rank))?));
+    extras.read().find_map(unfit).map_or(Ok(()), |(rank, expected)| {
+        let found = format!("{} of {} at point {point}", number(rank), names[rank]);
+        Err(ReadError { hint: UNFIT_HINT, ..damaged(place, expected, found) })
+    })
 }
 
 /// Whether a field has a meaning of its own.
@@ -192,12 +206,11 @@ impl Columns {
             let found = format!("{value} at point {point}");
             return Err(damaged(scan.place, "an intensity that fits a 32-bit float", found));
         }
+        let of_scan = |rank: usize| if self.names[rank] == SCAN { self.scans as f64 } else { f64::NAN };
+        let further = |rank: usize| ranks.further[rank].map_or_else(|| of_scan(rank), |field| row[field]);
+        check_matter(&self.extras, &self.names, further, (scan.place, point))?;
         self.positions.push(place);
-        self.extras.push(|rank| match ranks.further[rank] {
-            Some(field) => row[field],
-            None if self.names[rank] == SCAN => self.scans as f64,
-            None => f64::NAN,
-        });
+        self.extras.push(further);
         let [has_normal, has_color, has_value] = self.has;
         if has_normal {
             let normal = ranks.normal.map(of).filter(|n| n.is_finite());

@@ -3,7 +3,7 @@
 use super::header::{Field, Header, Kind};
 use crate::error::{Place, ReadError};
 use crate::raw_points::RawPoints;
-use crate::read::extras::Extras;
+use crate::read::extras::{Extras, UNFIT_HINT};
 use crate::read::reading::Reading;
 use crate::read::{direction::unit, input, origin};
 use crate::srgb::linear_from_srgb;
@@ -140,6 +140,10 @@ impl Columns {
         let opacity = self.opacity.map(|(i, top)| (i, top, number(i).value / top));
         if let Some((i, top, _)) = opacity.filter(|(_, _, share)| !(0.0..=1.0).contains(share)) {
             return Err((i, format!("an opacity from 0 to {top}"), "or rename the field"));
+        }
+        let unfit = |rank: usize| Some((rank, self.extras.unfit(rank, number(rank).value)?));
+        if let Some((rank, expected)) = self.extras.read().find_map(unfit) {
+            return Err((rank, expected.to_owned(), UNFIT_HINT));
         }
         self.positions.push(position);
         self.extras.push(|rank| number(rank).value);

@@ -3,7 +3,7 @@
 use super::header::{Element, Property, Shape, Type, at_line};
 use crate::error::ReadError;
 use crate::raw_points::RawPoints;
-use crate::read::extras::Extras;
+use crate::read::extras::{Extras, UNFIT_HINT};
 use crate::read::{Notes, ReadParams, direction::unit, input, origin};
 use crate::srgb::linear_from_srgb;
 use splat_core::Mesh;
@@ -118,6 +118,9 @@ impl Columns {
     pub(super) fn push(&mut self, index: usize, value: f64) -> Result<(), (String, &'static str)> {
         if let Some(further) = self.further.get_mut(index) {
             *further = value;
+            if let Some(expected) = self.extras.unfit(index, value) {
+                return Err((expected.to_owned(), UNFIT_HINT));
+            }
         }
         if let Some((role, kind)) = self.kept[index] {
             self.record[role] = self.checked(role, kind, value)?;
