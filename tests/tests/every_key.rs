@@ -69,20 +69,22 @@ fn fault(
     }
 }
 
-/// Tries every key with every source that it could apply to: by each technique, or by one of them in turn.
+/// Tries every key: with every source that it could apply to by each technique, or with every third source by one technique, in
+/// turn.
 fn try_all(by_each: bool) {
     let folder = Folder::new();
     let (mut faults, mut tried, mut known) = (Vec::new(), 0, Before::new());
     for (at, entry) in table::entries().iter().enumerate() {
-        for (with, source) in SOURCES.iter().map(|s| s.name).enumerate() {
-            let mut techniques: Vec<_> = entry.techniques.iter().filter(|t| entry.applies_to(source, t)).collect();
-            if !by_each && !techniques.is_empty() {
-                techniques = vec![techniques[(at + with) % techniques.len()]];
-            }
-            for technique in techniques {
-                tried += 1;
-                faults.extend(fault(&folder, source, entry, technique, &mut known));
-            }
+        let by = |source| entry.techniques.iter().copied().filter(|t| entry.applies_to(source, t)).collect::<Vec<_>>();
+        let mut with: Vec<_> = SOURCES.iter().map(|s| (s.name, by(s.name))).filter(|(_, by)| !by.is_empty()).collect();
+        if !by_each {
+            let one = |(i, (source, by)): (usize, (_, Vec<_>))| (source, vec![by[(at + i) % by.len()]]);
+            let first = at % with.len().clamp(1, 3);
+            with = with.into_iter().enumerate().map(one).skip(first).step_by(3).collect();
+        }
+        for (source, technique) in with.iter().flat_map(|(source, by)| by.iter().map(|t| (*source, *t))) {
+            tried += 1;
+            faults.extend(fault(&folder, source, entry, technique, &mut known));
         }
     }
     assert!(faults.is_empty(), "{} of {tried}:\n{}", faults.len(), faults.join("\n"));

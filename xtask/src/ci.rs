@@ -90,7 +90,9 @@ fn cargo(words: &[String], environment: &[(&str, &str)], repo: &Repo) -> Result<
 
 fn steps() -> Vec<Step> {
     let one = |line: &str| Work::Cargo(vec![split(line)], &[]);
-    let docs = Work::Cargo(vec![split("doc --workspace --no-deps")], &[("RUSTDOCFLAGS", "-D warnings")]);
+    // With features and examples, as clippy has them: dependencies that it has checked are not checked again.
+    let docs = format!("doc --workspace --no-deps --lib --examples --bin xtask --features {FEATURES},{DRIVER},{DEEP}");
+    let docs = Work::Cargo(vec![split(&docs)], &[("RUSTDOCFLAGS", "-D warnings")]);
     let step = |name, work| Step { name, work };
     vec![
         step("fmt", one("fmt --all --check")),

@@ -27,6 +27,7 @@ usage: cargo xtask COMMAND
                    all kinds of bytes as files, scenes and formulas, by cargo-fuzz on nightly; --record writes docs/robustness.md
   tidy             the rules that the compiler does not know: heads, sizes, dependency direction, assets
   papers           writes docs/papers.md from docs/papers/*.toml
+  papers --times   takes what benchmarks of `cargo bench` measured last into docs/papers/*-times.csv, then writes the page
   papers --check   fails where docs/papers.md is stale or names code or a test that does not exist
   assets           lists the files under assets/, their credit files, and where the larger inputs come from
   assets sky       writes assets/environment/sky.hdr, an environment by formula
@@ -48,6 +49,10 @@ fn main() -> ExitCode {
         ["fuzz", rest @ ..] => Repo::open().and_then(|repo| fuzz::run(&repo, rest)),
         ["tidy"] => Repo::open().and_then(|repo| tidy::run(&repo)),
         ["papers"] => Repo::open().and_then(|repo| papers::write(&repo)),
+        ["papers", "--times"] => Repo::open().and_then(|repo| {
+            let said = papers::refresh(&repo)?;
+            Ok(format!("{said}\n{}", papers::write(&Repo::open()?)?))
+        }),
         ["papers", "--check"] => Repo::open().and_then(|repo| papers::check(&repo)),
         ["assets"] => Repo::open().and_then(|repo| assets::run(&repo)),
         ["assets", "sky"] => Repo::open().and_then(|repo| assets::write_sky(&repo)),

@@ -1,14 +1,19 @@
 //! `cargo xtask papers`: the ledger of what the papers claim and what became of it.
 //!
 //! `docs/papers/*.toml` hold one row per numbered equation and per quantitative claim; `docs/papers.md` is made from
-//! them. A row names code and tests, and a name that no longer exists is an error.
+//! them. A row names code and tests, and a name that no longer exists is an error; so is a verdict that no test and no benchmark
+//! stands for. Times are named, and taken from what benchmarks wrote. Hard cases need a test that bears their id.
 
+mod hard_cases;
 mod ledger;
 mod names;
 mod page;
+mod times;
 
 use crate::repo::{Outcome, Repo};
 use ledger::{Ledger, Verdict};
+use times::Times;
+pub(crate) use times::refresh;
 
 const PAGE: &str = "docs/papers.md";
 const FOLDER: &str = "docs/papers/";
@@ -26,6 +31,7 @@ pub(crate) fn write(repo: &Repo) -> Outcome {
 pub(crate) fn check(repo: &Repo) -> Outcome {
     let ledgers = read(repo)?;
     let mut wrong = names::missing(repo, &ledgers);
+    wrong.extend(hard_cases::untested(repo));
     // A checkout may turn line ends.
     if repo.text(PAGE).unwrap_or_default().replace("\r\n", "\n") != page::page(&ledgers) {
         wrong.push(format!("{PAGE} is stale: run `cargo xtask papers`"));
@@ -35,7 +41,15 @@ pub(crate) fn check(repo: &Repo) -> Outcome {
 
 fn read(repo: &Repo) -> Result<Vec<Ledger>, String> {
     let sources = repo.texts().filter(|(path, _)| path.starts_with(FOLDER) && path.ends_with(".toml"));
-    sources.map(|(path, text)| Ledger::parse(path, text)).collect()
+    let with_times = |(path, text): (&str, &str)| {
+        let (mut ledger, times) = (Ledger::parse(path, text)?, Times::of(repo, path)?);
+        for row in &mut ledger.rows {
+            let fill = |text: &str| times.fill(text).map_err(|why| format!("{path}: {}: {why}", row.id));
+            (row.ours, row.reason) = (fill(&row.ours)?, fill(&row.reason)?);
+        }
+        Ok(ledger)
+    };
+    sources.map(with_times).collect()
 }
 
 fn summary(ledgers: &[Ledger]) -> String {
@@ -67,6 +81,17 @@ mod tests {
         assert!(check(&repo(&page.replace("\n", "\r\n"), code)).is_ok());
         let stale = check(&repo(&format!("{page}more\n"), code)).expect_err("stale");
         assert_eq!(stale, "docs/papers.md is stale: run `cargo xtask papers`");
+    }
+
+    #[test]
+    fn times_come_from_the_file_beside_the_ledger() {
+        let csv = ("docs/papers/t-times.csv", "what,low_ms,mean_ms,high_ms\n\"sort/1\",1,2,3\n");
+        let data = DATA.replace("ours = \"1\"", "ours = \"{sort/1}\"");
+        let ours = |files: &[(&str, &str)]| read(&Repo::of(files)).map(|ledgers| ledgers[0].rows[0].ours.clone());
+        let ledger = ("docs/papers/t.toml", data.as_str());
+        assert_eq!(ours(&[ledger, csv]), Ok("2.00 ms".to_owned()));
+        let why = "docs/papers/t.toml: Eq. 1: no benchmark {sort/1} in its -times.csv";
+        assert_eq!(ours(&[ledger]), Err(why.to_owned()));
     }
 
     #[test]

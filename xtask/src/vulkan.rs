@@ -59,7 +59,11 @@ pub(crate) fn tests(repo: &Repo) -> Outcome {
         Ok(parts) => (format!("{TESTS} --features {FEATURES},{DRIVER}"), "tests: all".to_owned(), Some(parts)),
         Err(missing) => (format!("{TESTS} --features {FEATURES}"), without("conformance tests", &missing)?, None),
     };
-    cargo_test(repo, &line, parts.as_ref().map(|parts| (parts.driver.as_path(), WITH_TESTS)), None)?;
+    // Clippy has compiled the examples, which no test runs.
+    for targets in ["--tests", "--doc"] {
+        let on = parts.as_ref().map(|parts| (parts.driver.as_path(), WITH_TESTS));
+        cargo_test(repo, &format!("{line} {targets}"), on, None)?;
+    }
     Ok(said)
 }
 

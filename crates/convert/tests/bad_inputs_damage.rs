@@ -41,9 +41,9 @@ const LIMITED: &str = "CONVERT_TEST_LIMITED";
 /// a LAZ file can ask for.
 const ADDRESS_SPACE_KIB: u64 = 3 << 20;
 
-/// Every how manieth bit is flipped: one in five, and each where `ORGANZA_DEEP` is set, as `cargo xtask deep` does.
+/// Every how manieth bit is flipped: one in ten, and each where `ORGANZA_DEEP` is set, as `cargo xtask deep` does.
 fn stride() -> usize {
-    if std::env::var_os("ORGANZA_DEEP").is_some() { 1 } else { 5 }
+    if std::env::var_os("ORGANZA_DEEP").is_some() { 1 } else { 10 }
 }
 
 /// Runs test `name` again with limited memory; true in the process that has to do the work.

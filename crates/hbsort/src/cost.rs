@@ -31,19 +31,6 @@ pub fn buckets(method: Method, n: usize, slices: u64) -> usize {
     }
 }
 
-/// Bytes that a sort of `n` splats reads and writes in main memory, all of them kept and counted from the columns
-/// position and radius: 36 a splat by two levels, 48 by depth bits.
-pub fn traffic_bytes(method: Method, n: usize) -> u64 {
-    // Read: columns 16, depth 4, entries 4 or 8; written: depth 4, entries 4 or 8, ids 4. Entries are read and keys
-    // are written twice, the second time in the cache; slices read the ids once more.
-    let a_splat = match method {
-        Method::None => 20,
-        Method::TwoLevels => 16 + 4 + 4 + 4 + 4 + 4,
-        Method::DepthBits => 16 + 4 + 4 + 8 + 8 + 4 + 4,
-    };
-    a_splat * n as u64
-}
-
 /// 8-byte words of the entries.
 pub(crate) fn entry_words(method: Method, n: usize) -> usize {
     match method {

@@ -45,6 +45,17 @@ fn bs01_papers_two_levels_disagree_where_one_index_does_not() {
 }
 
 #[test]
+fn bs01_the_papers_example_has_9990_slices_in_twice_100_buckets() {
+    // From 0.01 to 10 by 0.001; the number below 10 that an f32 holds, so that rounding up does not find one slice more.
+    let depth = [0.01f32, 5.0, 10f32.next_down()];
+    let mut scratch = Scratch::new();
+    // Fewer splats than slices would be sorted by the bits of their depths.
+    let crowd: Vec<f32> = depths(100_000, 0.02, 9.9).into_iter().chain(depth).collect();
+    let order = slice_depths(&crowd, &params(0.001, Direction::FrontToBack, false), &mut scratch).unwrap();
+    assert_eq!((order.slices, scratch.info().method, scratch.info().buckets), (9990, Method::TwoLevels, 100));
+}
+
+#[test]
 fn bs01_a_thousand_random_thicknesses_stay_within_one_slice() {
     let depth = depths(3000, 0.01, 10.0);
     let exact: Vec<f64> = depth.iter().map(|&d| f64::from(d)).collect();

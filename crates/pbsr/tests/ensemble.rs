@@ -337,7 +337,7 @@ fn the_fast_path_sees_what_the_slow_one_sees() {
     let camera = camera(Projection::Perspective { fov_y: 0.7 }, 3.0, [70, 60]);
     let mesh = rectangle(Vec3::ZERO, Vec3::new(0.8, 0.2, 0.9), Vec3::Y, 3);
     // Thinned out, and widened.
-    for (s, surface_opacity) in [(2e-4, ThinSlab), (6e-3, ThinSlab), (2e-3, PerCrossing)] {
+    for (s, surface_opacity) in [(5e-4, ThinSlab), (6e-3, ThinSlab), (2e-3, PerCrossing)] {
         let own = SurfaceParams { surface_opacity, ..params(0.6, s, [0.25, 0.5, 1.0], 7) };
         let sampler = MeshSampler::new(&mesh, &own, None).unwrap();
         let objects = objects(&[&sampler]);

@@ -276,3 +276,19 @@ impl Cloud {
         self.scale_gaussians(length);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_and_columns_take_as_many_bytes_as_they_say() {
+        let bytes = |splat: Splat| {
+            let mut cloud = Cloud::default();
+            (0..10).for_each(|_| cloud.push(&splat));
+            cloud.bytes() / 10
+        };
+        assert_eq!(bytes(Splat::default()), 40);
+        assert_eq!(bytes(Splat { normal: Vec3::Z, ..Splat::default() }), 52);
+    }
+}

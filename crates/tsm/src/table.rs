@@ -358,6 +358,23 @@ mod tests {
     }
 
     #[test]
+    fn opaque_points_in_front_leave_nothing_behind_them_to_keep() {
+        for n in [1000u64, 8000] {
+            let mut entries = Entries::<1>::default();
+            let mut paper = InsertionLists::new(1, 2.0);
+            let absorbances = std::iter::once(100.0).chain(std::iter::repeat_n(1e-3, n as usize));
+            for (i, absorbance) in (0..).zip(absorbances) {
+                let distance = if i == 0 { 0.5 } else { 1.0 + splat_core::rng::unit_f32(6, 0, i, 0) };
+                entries.push(0, distance, absorbance, &[1.0; 3]);
+                paper.insert(0, distance, absorbance);
+            }
+            assert_eq!(build(&entries, 1, 2.0).list(0).distance, [0.5]);
+            // One step a point: near O(n), as the paper says of its lists.
+            assert_eq!((paper.list(0).len(), paper.steps()), (1, n));
+        }
+    }
+
+    #[test]
     fn ts07_verdict_at_the_limit_does_not_depend_on_the_number_of_parts() {
         for n in 1..=400u32 {
             let mut entries = Entries::<1>::default();

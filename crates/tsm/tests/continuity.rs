@@ -66,8 +66,8 @@ fn x2_moving_splats_make_no_jump_at_octant_edges_and_corners() {
         (Vec3::new(0.02, 0.05, 1.0), Vec3::X),
         (Vec3::new(1.0, 0.04, 0.03), Vec3::Z),
     ];
-    for (middle, along) in paths {
-        for size in [0.4, 1.0, 2.0, 3.5] {
+    for (at, (middle, along)) in paths.into_iter().enumerate() {
+        for size in [[0.4, 2.0], [1.0, 3.5]][at % 2] {
             let path = |t: f32| ((middle.normalize() + along * (0.2 * (t - 0.5))) * 2.0, size * cell);
             let worst = greatest_step(2000, Vec3::ZERO, path);
             println!("{middle} {size}: {worst:.2e}");

@@ -98,30 +98,6 @@ fn ts12_x3_scaling_by_powers_of_two_changes_no_bit() {
 }
 
 #[test]
-fn ts13_lights_add() {
-    // Each light has its own map: the order of lights cannot matter, and light A + light B is both.
-    let cloud = mixed(5000, DVec3::ZERO);
-    let [a, b] = [lights()[0], lights()[1]];
-    let irradiance = |lights: &[Light]| -> Vec<f32> {
-        let maps: Vec<ShadowMap> = lights.iter().map(|l| build(&cloud, l, &Params::default())).collect();
-        let at = |i: usize| {
-            let r = receiver(&cloud, i);
-            let arriving = maps.iter().zip(lights).map(|(map, light)| {
-                map.transmittance(&r)[0] * light.irradiance(cloud.position[i].as_dvec3(), 0.0).1[0]
-            });
-            arriving.sum()
-        };
-        (0..cloud.len()).map(at).collect()
-    };
-    let (both, swapped) = (irradiance(&[a, b]), irradiance(&[b, a]));
-    assert_eq!(both, swapped);
-    let (only_a, only_b) = (irradiance(&[a]), irradiance(&[b]));
-    for i in 0..cloud.len() {
-        assert!((both[i] - only_a[i] - only_b[i]).abs() <= 1e-6 * both[i].max(1.0));
-    }
-}
-
-#[test]
 fn ts14_one_cell_works_and_a_huge_table_is_refused_with_its_bytes() {
     let cloud = mixed(1000, DVec3::ZERO);
     let light = lights()[1];

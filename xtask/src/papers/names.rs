@@ -1,11 +1,11 @@
-//! Whether what the rows name exists: files, items in them, tests.
+//! Whether what the rows name exists: files, items in them, tests; and whether a verdict has one of these or a benchmark.
 
-use super::ledger::{Ledger, Row};
+use super::ledger::{Ledger, Row, Verdict};
 use crate::repo::Repo;
 use crate::source::{code_only, functions, words};
 use std::collections::HashSet;
 
-/// One line per name that does not exist.
+/// One line per name that does not exist, and per verdict that nothing stands for.
 pub(crate) fn missing(repo: &Repo, ledgers: &[Ledger]) -> Vec<String> {
     let mut known = HashSet::new();
     for (_, text) in repo.rust() {
@@ -39,20 +39,23 @@ fn tests(known: &HashSet<String>, row: &Row) -> Vec<String> {
         None => known.contains(test),
     };
     let unknown = row.tests.iter().filter(|test| !exists(test));
-    unknown.map(|test| format!("{}: no source has the test {test}", row.id)).collect()
+    let unknown = unknown.map(|test| format!("{}: no source has the test {test}", row.id));
+    let is_decided = matches!(row.verdict, Verdict::Holds | Verdict::Differs);
+    let is_shown = !row.tests.is_empty() || row.code.iter().any(|place| place.starts_with("benches/"));
+    let bare = (is_decided && !is_shown).then(|| format!("{}: no test and no benchmark shows what is said", row.id));
+    unknown.chain(bare).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::papers::ledger::Verdict;
 
     fn found(code: &str, test: &str) -> Vec<String> {
         let row = Row {
             id: "Eq. 9".to_owned(),
             claim: "c".to_owned(),
             code: vec![code.to_owned()],
-            tests: vec![test.to_owned()],
+            tests: if test.is_empty() { Vec::new() } else { vec![test.to_owned()] },
             ours: "—".to_owned(),
             verdict: Verdict::Holds,
             reason: "r".to_owned(),
@@ -67,6 +70,12 @@ mod tests {
     fn names_that_exist_pass() {
         assert!(found("src/map.rs::Map::build", "ts01_holds").is_empty());
         assert!(found("src/map.rs", "ts01_*").is_empty());
+    }
+
+    #[test]
+    fn a_verdict_needs_a_test_or_a_benchmark() {
+        assert_eq!(found("src/map.rs", ""), ["Eq. 9: no test and no benchmark shows what is said"]);
+        assert_eq!(found("benches/map.rs", ""), ["Eq. 9: no file benches/map.rs"]);
     }
 
     #[test]
