@@ -21,6 +21,7 @@ mod half_vector;
 mod interrupts;
 mod invariances;
 mod layers;
+mod legends;
 mod loading;
 mod many_forms;
 mod matter;

@@ -8,9 +8,9 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// What lies of a mesh in all of the regions. It ends open at their borders, without a lid. Corners on a border are those of the line
-/// between the corners of the triangle, in f64 until they are stored, and one place for all triangles that meet there; normals and
-/// colours are interpolated. A mesh without normals gets smooth ones, so that the cut does not change how it is shaded.
-/// Without regions the mesh is the same one.
+/// between the corners of the triangle, in f64 until they are stored, and one place for all triangles that meet there, whether these share
+/// vertices or have some at the same places; normals and colours are interpolated. A mesh without normals gets smooth ones, so that the
+/// cut does not change how it is shaded. Without regions the mesh is the same one.
 ///
 /// ```
 /// use convert::{Clip, clipped_mesh};
@@ -23,6 +23,11 @@ use std::sync::Arc;
 /// # Panics
 /// If an index is out of range, which [`Mesh::validate`] tells.
 pub fn clipped_mesh(mesh: Arc<Mesh>, clips: &[Clip]) -> Arc<Mesh> {
+    clipped_by(mesh, clips, |mesh, normal, offset| cut(mesh, normal, offset, None))
+}
+
+/// A mesh cut by one half-space after the other, whose normals are known before.
+pub(crate) fn clipped_by(mesh: Arc<Mesh>, clips: &[Clip], mut cut: impl FnMut(Mesh, DVec3, f64) -> Mesh) -> Arc<Mesh> {
     if clips.is_empty() {
         return mesh;
     }
@@ -33,32 +38,58 @@ pub fn clipped_mesh(mesh: Arc<Mesh>, clips: &[Clip]) -> Arc<Mesh> {
     clips.iter().flat_map(Clip::half_spaces).fold(all, |mesh, (normal, offset)| cut(mesh, normal, offset)).into()
 }
 
-/// The part where normal·p ≤ offset.
-fn cut(mesh: Mesh, normal: DVec3, offset: f64) -> Mesh {
+/// A vertex on the border of a half-space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Rim {
+    /// Its index.
+    pub(crate) vertex: u32,
+    /// Where it is relative to the mesh's origin, before that was rounded.
+    pub(crate) place: DVec3,
+}
+
+/// The part where normal·p ≤ offset. With `rims` it is that of a body: of triangles in the border itself those are kept that it ends at,
+/// and edges along the border are told, each as often as a triangle has it, in the triangle's direction.
+pub(crate) fn cut(mesh: Mesh, normal: DVec3, offset: f64, mut rims: Option<&mut Vec<[Rim; 2]>>) -> Mesh {
     let base = normal.dot(mesh.origin) - offset;
     let beyond: Vec<f64> = mesh.position.par_iter().map(|p| normal.dot(p.as_dvec3()) + base).collect();
     if beyond.iter().all(|beyond| *beyond <= 0.0) {
         return mesh;
     }
-    let mut part = Part { mesh: Mesh { origin: mesh.origin, ..Mesh::default() }, whole: &mesh, known: BTreeMap::new() };
+    let kept = Mesh { origin: mesh.origin, ..Mesh::default() };
+    let mut part = Part { mesh: kept, whole: &mesh, known: BTreeMap::new(), border: (normal, -base) };
     for triangle in &mesh.triangles {
+        let is_in_border = || triangle.iter().all(|v| beyond[*v as usize] == 0.0);
+        if rims.is_some() && is_in_border() && part.facing(*triangle).dot(normal) <= 0.0 {
+            continue;
+        }
         let mut corners = Vec::with_capacity(4);
         for k in 0..3 {
             let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
             let [from_a, from_b] = [a, b].map(|v| beyond[v as usize]);
             if from_a <= 0.0 {
-                corners.push(part.corner([a, a], 0.0));
+                let (vertex, place) = part.corner([a, a], 0.0);
+                corners.push((vertex, (from_a == 0.0).then_some(place)));
             }
             // A corner on the border is a corner already.
             if from_a < 0.0 && from_b > 0.0 || from_a > 0.0 && from_b < 0.0 {
-                // From the lower index on, whichever triangle asks: neighbours get the same place.
+                // From the lower place on, whichever triangle asks: neighbours get the same corner.
+                let is_first = part.at(a).to_array() < part.at(b).to_array();
                 let (edge, share) =
-                    if a < b { ([a, b], from_a / (from_a - from_b)) } else { ([b, a], from_b / (from_b - from_a)) };
-                corners.push(part.corner(edge, share));
+                    if is_first { ([a, b], from_a / (from_a - from_b)) } else { ([b, a], from_b / (from_b - from_a)) };
+                let (vertex, place) = part.corner(edge, share);
+                corners.push((vertex, Some(place)));
             }
         }
+        if corners.len() < 3 {
+            continue;
+        }
         // One corner inside leaves a triangle, two a quadrilateral.
-        part.mesh.triangles.extend((2..corners.len()).map(|k| [corners[0], corners[k - 1], corners[k]]));
+        part.mesh.triangles.extend((2..corners.len()).map(|k| [corners[0].0, corners[k - 1].0, corners[k].0]));
+        if let Some(rims) = &mut rims {
+            let rim = |(vertex, place): (u32, Option<DVec3>)| Some(Rim { vertex, place: place? });
+            let edges = (0..corners.len()).map(|k| [corners[k], corners[(k + 1) % corners.len()]]);
+            rims.extend(edges.filter_map(|[a, b]| Some([rim(a)?, rim(b)?])));
+        }
     }
     part.mesh
 }
@@ -69,23 +100,45 @@ struct Part<'a> {
     whole: &'a Mesh,
     /// Corners that it has, by the ends of the edges that they lie on; of a vertex both are itself.
     known: BTreeMap<[u32; 2], u32>,
+    /// The normal of the border, and its product with places there, relative to the mesh's origin.
+    border: (DVec3, f64),
 }
 
 impl Part<'_> {
-    /// Index of the corner at a share of an edge.
-    fn corner(&mut self, edge: [u32; 2], share: f64) -> u32 {
-        let Self { mesh, whole, known } = self;
-        *known.entry(edge).or_insert_with(|| {
-            let [a, b] = edge.map(|v| v as usize);
+    /// Where a vertex of the whole is.
+    fn at(&self, vertex: u32) -> Vec3 {
+        self.whole.position[vertex as usize]
+    }
+
+    /// Where the front of a triangle of the whole points.
+    fn facing(&self, triangle: [u32; 3]) -> DVec3 {
+        let [a, b, c] = triangle.map(|v| self.at(v).as_dvec3());
+        (b - a).cross(c - a)
+    }
+
+    /// Index of the corner at a share of an edge, and its place before that is rounded.
+    fn corner(&mut self, edge: [u32; 2], share: f64) -> (u32, DVec3) {
+        let [a, b] = edge.map(|v| v as usize);
+        let Self { mesh, whole, known, border } = self;
+        let mut place = whole.position[a].as_dvec3().lerp(whole.position[b].as_dvec3(), share);
+        if a != b {
+            // Exactly in the border, so that corners which differ in nothing else are one place.
+            let (normal, offset) = *border;
+            let axis = normal.abs().max_position();
+            place[axis] = 0.0;
+            place[axis] = (offset - normal.dot(place)) / normal[axis];
+        }
+        let vertex = *known.entry(edge).or_insert_with(|| {
             let between = |a: Vec3, b: Vec3| a.as_dvec3().lerp(b.as_dvec3(), share).as_vec3();
-            mesh.position.push(between(whole.position[a], whole.position[b]));
+            mesh.position.push(place.as_vec3());
             let normal = between(whole.normal[a], whole.normal[b]);
             mesh.normal.push(if a == b { normal } else { normal.normalize_or_zero() });
             if !whole.color.is_empty() {
                 mesh.color.push(between(whole.color[a].into(), whole.color[b].into()).to_array());
             }
             (mesh.position.len() - 1) as u32
-        })
+        });
+        (vertex, place)
     }
 }
 

@@ -1,5 +1,6 @@
 //! Colours of points by a column of theirs: by a map, by whole numbers, or by a transfer function.
 
+use crate::columns::CHUNK;
 use crate::srgb::linear_from_hex;
 use crate::{ColorMap, ConvertError, RawPoints, SplatParams};
 use rayon::prelude::*;
@@ -8,6 +9,9 @@ use splat_core::glam::DVec3;
 
 /// Shares of a column's numbers that its map spans where no range is stated: a few strays do not make all else one colour.
 const SHARES: [f64; 2] = [0.01, 0.99];
+
+/// Most whole numbers that are told of a column.
+const MOST_PRESENT: usize = 64;
 
 /// Classes of points in LAS 1.4 (ASPRS), with their colours as 0xRRGGBB.
 const CLASSES: [(&str, u32); 19] = [
@@ -69,6 +73,27 @@ pub struct Colored {
     pub range: Option<[f64; 2]>,
     /// Points whose number is a gap, see [`crate::Column`]; they have the colour of `splat`.
     pub gaps: u64,
+    /// Of [`PointColors::Classes`] and [`PointColors::Distinct`] the whole numbers that occur, rising, the least 64 of them.
+    pub present: Vec<f64>,
+}
+
+impl Colored {
+    /// Whether some point has a number.
+    pub(crate) fn has_numbers(&self) -> bool {
+        self.gaps < self.color.len() as u64
+    }
+}
+
+impl PointColors {
+    /// The colour of a number, linear Rec.709; `range` are the numbers at the ends of a map.
+    pub(crate) fn at(&self, number: f64, range: [f64; 2]) -> [f32; 3] {
+        match self {
+            Self::Map(map, _) => map.at(place(number, range)),
+            Self::Classes => class_color(number),
+            Self::Distinct => distinct(number),
+            Self::Transfer(transfer) => transfer.at(number as f32).color,
+        }
+    }
 }
 
 /// The name that LAS 1.4 gives a class; `None` for those that it leaves to users.
@@ -97,15 +122,27 @@ pub fn colored(points: &RawPoints, by: &ColorBy, up: DVec3, splat: &SplatParams)
         PointColors::Map(_, range) => Some(range.unwrap_or_else(|| spread(&numbers))),
         _ => None,
     };
-    let color = |number: &f64| match &by.colors {
-        _ if !number.is_finite() => splat.color,
-        PointColors::Map(map, _) => map.at(place(*number, range.unwrap_or_default())),
-        PointColors::Classes => class_color(*number),
-        PointColors::Distinct => distinct(*number),
-        PointColors::Transfer(transfer) => transfer.at(*number as f32).color,
+    let color = |number: &f64| {
+        if number.is_finite() { by.colors.at(*number, range.unwrap_or_default()) } else { splat.color }
     };
     let gaps = numbers.iter().filter(|n| !n.is_finite()).count() as u64;
-    Ok(Colored { color: numbers.par_iter().map(color).collect(), range, gaps })
+    let is_of_whole = matches!(by.colors, PointColors::Classes | PointColors::Distinct);
+    let present = if is_of_whole { present(&numbers) } else { Vec::new() };
+    Ok(Colored { color: numbers.par_iter().map(color).collect(), range, gaps, present })
+}
+
+/// The least whole numbers that occur, rising.
+fn present(numbers: &[f64]) -> Vec<f64> {
+    let least = |mut all: Vec<f64>| {
+        all.sort_unstable_by(f64::total_cmp);
+        all.dedup();
+        all.truncate(MOST_PRESENT);
+        all
+    };
+    // −0 is 0.
+    let of_chunk = |chunk: &[f64]| least(chunk.iter().filter(|n| n.is_finite()).map(|n| n.round() + 0.0).collect());
+    let of_chunks = numbers.par_chunks(CHUNK).map(of_chunk);
+    of_chunks.reduce(Vec::new, |all, more| least([all, more].concat()))
 }
 
 /// Where in a range a number lies, from 0 to 1 within; the middle of a range without a width.

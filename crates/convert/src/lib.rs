@@ -27,10 +27,12 @@ mod classify;
 mod clipped_mesh;
 mod color_by;
 mod color_map;
+mod color_scale;
 mod columns;
 mod combine;
 mod convert_error;
 pub mod cost;
+mod counted;
 mod domain;
 #[cfg(feature = "read")]
 mod error;
@@ -43,6 +45,8 @@ mod gaussian_points;
 mod grid_field;
 mod keep;
 mod keep_points;
+#[cfg(feature = "lids")]
+mod lid;
 mod marching_cubes;
 #[cfg(feature = "surfels")]
 mod matter;
@@ -55,15 +59,7 @@ mod mpu;
 mod neighbours;
 #[cfg(feature = "surfels")]
 mod orient;
-#[cfg(any(
-    feature = "ply",
-    feature = "stl",
-    feature = "obj",
-    feature = "off",
-    feature = "gltf",
-    feature = "vti",
-    feature = "vtk"
-))]
+#[cfg(feature = "read")]
 mod outwards;
 mod params;
 mod pieces;
@@ -104,6 +100,7 @@ pub use cache::Cache;
 pub use clipped_mesh::clipped_mesh;
 pub use color_by::{ColorBy, Colored, PointColors, class_name, colored};
 pub use color_map::ColorMap;
+pub use color_scale::{ColorScale, ScaleNumbers};
 pub use combine::{ClippedField, CombinedField, RegionField, SharedField};
 pub use convert_error::ConvertError;
 #[cfg(feature = "read")]
@@ -116,6 +113,8 @@ pub use field_points::{
 };
 pub use grid_field::{GridField, Inside, Interpolation};
 pub use keep_points::{Kept, Within, kept};
+#[cfg(feature = "lids")]
+pub use lid::{LidReport, lidded_mesh};
 pub use marching_cubes::isosurface_to_mesh;
 #[cfg(feature = "surfels")]
 pub use matter::{MatterParams, MatterReport, raw_to_matter};
@@ -135,7 +134,7 @@ pub use search::{ZeroSearch, extinct_bounds, visible_ends};
 pub use section::{Section, volume_section};
 pub use shapes::{HomogeneousMedium, MediumBody, Rectangle, medium, medium_to_grid, rectangle};
 #[cfg(feature = "surfels")]
-pub use shown_points::{PointsShown, shown_points};
+pub use shown_points::{PointsShown, ShownPoints, shown_points};
 pub use sobel::{sobel_gradient, sobel_gradient_into};
 pub use splat_core::Clip;
 #[cfg(feature = "surfels")]

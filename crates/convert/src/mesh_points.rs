@@ -10,6 +10,7 @@
 use crate::ConvertError;
 use crate::borders::{Borders, open_edges};
 use crate::columns::{self, Wanted};
+use crate::counted::counted;
 use crate::params::{Density, SplatParams};
 use crate::pieces::Pieces;
 use crate::subdivide::{self, Measure};
@@ -69,6 +70,13 @@ pub struct MeshReport {
     pub radius: f64,
     /// Whether normals came from the triangles because the mesh has none.
     pub normals_computed: bool,
+}
+
+impl MeshReport {
+    /// What there is to say of it, one sentence without a full stop: that triangles became nothing.
+    pub fn said(&self) -> Option<String> {
+        (self.degenerate > 0).then(|| format!("{} without an area", counted(self.degenerate, "face")))
+    }
 }
 
 /// Share of the diagonal that is the automatic spacing, and the automatic budget.

@@ -245,15 +245,6 @@ fn whole(
     if let Loaded::Points(points) = &loaded {
         check_columns(points, reading)?;
     }
-    #[cfg(any(
-        feature = "ply",
-        feature = "stl",
-        feature = "obj",
-        feature = "off",
-        feature = "gltf",
-        feature = "vti",
-        feature = "vtk"
-    ))]
     if let Loaded::Mesh(mut mesh) = loaded {
         for _ in 0..crate::outwards::turn_outwards(&mut mesh) {
             reading.mend((Fix::InsideOut, Place::File, None), || {

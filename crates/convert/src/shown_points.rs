@@ -1,8 +1,10 @@
 //! What is shown of raw points: those that are kept, as far apart as is asked for, in the colours of a column.
 
+use crate::counted::counted;
 use crate::matter::unused_by_matter;
 use crate::{
-    Clip, ColorBy, Colored, ConvertError, Kept, PointColors, RawPoints, SplatParams, colored, kept, thinned, with_cells,
+    Clip, ColorBy, ColorScale, Colored, ConvertError, Kept, PointColors, RawPoints, SplatParams, colored, kept,
+    thinned, with_cells,
 };
 use splat_core::glam::DVec3;
 use std::sync::Arc;
@@ -24,14 +26,24 @@ pub struct PointsShown<'a> {
     pub up: DVec3,
 }
 
-/// The points that are shown, and what there is to say of them, one sentence without a full stop each: how their colours arose, that
-/// nothing is left, and what a medium does not use. What is not asked for changes nothing, not even a copy is made. Colours are those of points that were made one.
+/// The points that are shown, and what there is to say of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShownPoints {
+    /// The points.
+    pub points: Arc<RawPoints>,
+    /// How their colours arose, that nothing is left, and what a medium does not use: one sentence without a full stop each.
+    pub said: Vec<String>,
+    /// What their colours stand for, where they have those of a column.
+    pub scale: Option<ColorScale>,
+}
+
+/// The points that are shown. What is not asked for changes nothing, not even a copy is made. Colours are those of points that were made one.
 ///
 /// ```
 /// use convert::{PointsShown, RawPoints, SplatParams, shown_points};
 /// let points = std::sync::Arc::new(RawPoints::default());
-/// let (same, said) = shown_points(points.clone(), &PointsShown::default(), &SplatParams::default()).unwrap();
-/// assert!(std::sync::Arc::ptr_eq(&points, &same) && said.is_empty());
+/// let same = shown_points(points.clone(), &PointsShown::default(), &SplatParams::default()).unwrap();
+/// assert!(std::sync::Arc::ptr_eq(&points, &same.points) && same.said.is_empty());
 /// ```
 ///
 /// # Errors
@@ -40,7 +52,8 @@ pub fn shown_points(
     mut points: Arc<RawPoints>,
     shown: &PointsShown<'_>,
     splat: &SplatParams,
-) -> Result<(Arc<RawPoints>, Vec<String>), ConvertError> {
+) -> Result<ShownPoints, ConvertError> {
+    let mut scale = None;
     let mut said = if shown.as_matter { unused_by_matter(&points) } else { Vec::new() };
     if !(shown.keep.is_empty() && shown.clip.is_empty()) {
         let all = points.len();
@@ -58,6 +71,7 @@ pub fn shown_points(
     if let Some(by) = shown.color_by.filter(|_| !points.is_empty()) {
         let colored = colored(&points, by, shown.up, splat)?;
         said.push(sentence(by, &colored));
+        scale = ColorScale::of_points(&splat.object_name, by, &colored);
         let mut own = Arc::unwrap_or_clone(points);
         if !own.gaussians.is_empty() {
             own.gaussians.recolor(&colored.color);
@@ -65,7 +79,7 @@ pub fn shown_points(
         own.color = colored.color;
         points = own.into();
     }
-    Ok((points, said))
+    Ok(ShownPoints { points, said, scale })
 }
 
 /// What left points out.
@@ -88,7 +102,7 @@ fn sentence(by: &ColorBy, colored: &Colored) -> String {
     };
     let gaps = match colored.gaps {
         0 => String::new(),
-        n => format!("; {n} points without a number have the object's colour"),
+        n => format!("; the object's colour for {} without a number", counted(n, "point")),
     };
     format!("points have the colours of `{}` by {colors}{gaps}", by.column)
 }
@@ -118,14 +132,20 @@ mod tests {
         let by = ColorBy { column: "value".into(), colors: PointColors::Map(ColorMap::VIRIDIS, Some([0.0, 6.0])) };
         let mut shown = PointsShown { keep: &keep, spacing: Some(2.0), color_by: Some(&by), ..PointsShown::default() };
         let splat = SplatParams::default();
-        let (found, said) = shown_points(points.clone().into(), &shown, &splat).expect("good points");
+        let ShownPoints { points: found, said, scale } =
+            shown_points(points.clone().into(), &shown, &splat).expect("good points");
+        assert_eq!(scale.map(|scale| scale.color(6.0)), Some(ColorMap::VIRIDIS.at(1.0)));
         assert_eq!(found.value, [0.5, 2.5, 4.5, 6.0]);
         assert_eq!(found.color[3], ColorMap::VIRIDIS.at(1.0));
         assert_eq!(said, ["points have the colours of `value` by the map viridis from 0 to 6"]);
         assert_eq!([short(637_012.239_87, 35.0), short(-0.5, 0.012), short(7.0, 0.0)], ["637012.24", "-0.5", "7"]);
         let none = [Kept { column: "value".into(), within: Within::Range([50.0, 60.0]) }];
         shown.keep = &none;
-        let (found, said) = shown_points(points.into(), &shown, &splat).expect("good points");
-        assert!(found.is_empty() && said == ["nothing is left of 8 points by `keep.value`"], "{said:?}");
+        let ShownPoints { points: found, said, scale } =
+            shown_points(points.into(), &shown, &splat).expect("good points");
+        assert!(
+            found.is_empty() && scale.is_none() && said == ["nothing is left of 8 points by `keep.value`"],
+            "{said:?}"
+        );
     }
 }

@@ -106,9 +106,9 @@ fn points_at_one_place_share_its_matter() {
 fn a_point_stands_for_as_much_where_few_of_the_others_are_kept() {
     let keep = [Kept { column: "x".into(), within: Within::Range([5.0, 5.0]) }];
     let shown = PointsShown { keep: &keep, as_matter: true, ..PointsShown::default() };
-    let (layer, said) = shown_points(lattice().into(), &shown, &SplatParams::default()).unwrap();
-    assert!(said.is_empty());
-    let (cloud, report) = medium(&layer, &MatterParams::default());
+    let layer = shown_points(lattice().into(), &shown, &SplatParams::default()).unwrap();
+    assert!(layer.said.is_empty());
+    let (cloud, report) = medium(&layer.points, &MatterParams::default());
     assert_eq!(cloud.len() as u32, SIDE * SIDE);
     let all = medium(&lattice(), &MatterParams::default()).1.volume;
     assert!((report.volume * f64::from(SIDE) / all - 1.0).abs() < 1e-2, "{} of {all}", report.volume);

@@ -1,6 +1,6 @@
 //! A small file of each format and kind, by its name: for damage, and as seeds of fuzzing.
 
-use crate::read_samples::cells::{vtk_cells, vtk_surface, vtp, vtu};
+use crate::read_samples::cells::{vtk_cells, vtk_surface, vtp, vtp_pieces, vtu, vtu_pieces};
 use crate::read_samples::copc::copc;
 use crate::read_samples::e57::e57;
 use crate::read_samples::gaussians::{packed_ply, splat, spz, trained, trained_ply};
@@ -44,6 +44,7 @@ pub(crate) fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("base64blocks.vti", vti("base64", true)),
         ("binary.vtk", vtk_scalars(true)),
         ("colours.vtp", vtp()),
+        ("pieces.vtp", vtp_pieces()),
         ("a_3x2x2_float32.raw", volumes::raw(false)),
         ("newer.hdr", images::hdr_of("EXPOSURE=0.5\n", &images::newer())),
         ("older.hdr", images::hdr_of("", &images::older())),
@@ -86,6 +87,7 @@ pub(crate) fn bodies() -> Vec<(&'static str, Vec<u8>)> {
     vec![
         ("ascii.vtu", vtu("ascii", false)),
         ("blocks.vtu", vtu("binary", true)),
+        ("pieces.vtu", vtu_pieces("binary", false)),
         ("cells.vtk", vtk_cells(false, false)),
         ("ends.vtk", vtk_cells(true, true)),
     ]

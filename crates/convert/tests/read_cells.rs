@@ -1,7 +1,7 @@
 //! Cells of VTK become volumes, its surfaces meshes, legacy and in XML.
 #![cfg(all(feature = "vti", feature = "vtk"))]
 
-use crate::read_samples::cells::{vtk_cells, vtk_surface, vtp, vtu};
+use crate::read_samples::cells::{vtk_cells, vtk_surface, vtp, vtp_pieces, vtu, vtu_pieces};
 use crate::read_samples::{gzip, load};
 use convert::Fault;
 use convert::read::{Loaded, Notes, ReadParams, bytes};
@@ -60,7 +60,7 @@ fn a_linear_field_of_points_is_linear_inside_and_keeps_its_integral() {
     let [nx, ny, nz] = grid.dims;
     let sampled = format!("2 cells, sampled as {nx} x {ny} x {nz} voxels; outside them the value is 0");
     assert_eq!(notes.remarks, ["the field is density, of the points".to_owned(), sampled]);
-    assert_eq!(notes.unused, ["1 cells without a volume"]);
+    assert_eq!(notes.unused, ["1 cell without a volume"]);
 }
 
 #[test]
@@ -74,10 +74,15 @@ fn every_way_to_write_the_cells_gives_the_same_volume() {
         ("a.vtu", vtu("binary", false)),
         ("a.vtu", vtu("binary", true)),
         ("a.vtu.gz", gzip(&vtu("binary", true))),
+        ("a.vtu", vtu_pieces("ascii", false)),
+        ("a.vtu", vtu_pieces("binary", false)),
+        ("a.vtu", vtu_pieces("binary", true)),
     ] {
         assert!(grid(name, &content).0 == expected, "{name}");
     }
-    assert_eq!(grid("a.vtu", &vtu("ascii", false)).1.unused, ["CellData.of_cells", "1 cells without a volume"]);
+    for content in [vtu("ascii", false), vtu_pieces("ascii", false)] {
+        assert_eq!(grid("a.vtu", &content).1.unused, ["CellData.of_cells", "1 cell without a volume"]);
+    }
 }
 
 #[test]
@@ -110,7 +115,7 @@ fn surfaces_are_meshes_with_normals_and_colours() {
         let (mesh, notes) = mesh("a.vtk", &vtk_surface(binary, by_ends));
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [4, 5, 7], [7, 5, 6]]);
         assert_eq!(mesh.normal, [Vec3::Z; 8]);
-        assert_eq!(notes.unused, ["1 lines"]);
+        assert_eq!(notes.unused, ["1 line"]);
     }
     let (mesh, notes) = mesh("a.vtp", &vtp());
     assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
@@ -120,6 +125,23 @@ fn surfaces_are_meshes_with_normals_and_colours() {
     let cells = String::from_utf8(vtk_cells(false, false)).unwrap();
     let flat = cells.replace("12 14 5", "2 2 5");
     assert_eq!(super::read_cells::mesh("a.vtk", flat.as_bytes()).0.triangles, [[0, 1, 2]]);
+}
+
+#[test]
+fn pieces_are_one_dataset_with_the_columns_of_all() {
+    let (mesh, notes) = mesh("a.vtp", &vtp_pieces());
+    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]);
+    assert_eq!((mesh.normal, mesh.color.len()), (vec![Vec3::Z; 8], 8));
+    assert_eq!(mesh.color[..4], mesh.color[4..]);
+    assert!(mesh.position.iter().enumerate().all(|(i, p)| mesh.origin.z + f64::from(p.z) == f64::from(i >= 4)));
+    assert_eq!(notes.unused, ["heat"]);
+    let text = String::from_utf8(vtp_pieces()).unwrap().replace("NumberOfPolys=\"1\"", "NumberOfPolys=\"0\"");
+    let (Loaded::Points(points), _) = read("a.vtp", text.as_bytes()) else { panic!("points") };
+    assert_eq!((points.len(), points.normal.len(), points.color.len()), (8, 8, 8));
+    // Values of cells follow the pieces too.
+    let text = String::from_utf8(vtu_pieces("ascii", false)).unwrap();
+    let of_cells = text.replace("PointData", "Other");
+    assert!((mass(&grid("a.vtu", of_cells.as_bytes()).0) / (6.0 + 4.25 / 3.0) - 1.0).abs() < 1e-3);
 }
 
 #[test]
@@ -186,6 +208,46 @@ fn what_is_wrong_in_legacy_cells_is_named() {
     let places = text.lines().nth(5).unwrap();
     let flat = text.replacen(places, &"0 ".repeat(27), 1);
     refused("a.vtk", &flat, "expected cells that enclose a volume, found cells that are flat");
+}
+
+#[test]
+fn what_is_wrong_in_one_of_several_pieces_is_named() {
+    let last = |text: &str, from: &str, to: &str| {
+        let at = text.rfind(from).unwrap_or_else(|| panic!("{from}"));
+        format!("{}{to}{}", &text[..at], &text[at + from.len()..])
+    };
+    let cells = String::from_utf8(vtu_pieces("ascii", false)).unwrap();
+    for (from, to, expected) in [
+        (
+            "Name=\"density\"",
+            "Name=\"weight\"",
+            "expected an array 'density' in PointData, which another Piece has, found 'none'",
+        ),
+        (
+            "\"Float32\" Name=\"density\"",
+            "\"Float64\" Name=\"density\"",
+            "expected 1 components of type Float32, as the array has in another Piece, found '1 of Float64'",
+        ),
+        ("1 2 4 3 5 0 1 2", "1 2 4 3 6 0 1 2", "expected points of cell 0 among the 6 that there are"),
+        ("14 5", "14 42", "found a polyhedron (type 42) at cell 1"),
+        ("NumberOfPoints=\"6\"", "NumberOfPoints=\"5\"", "expected 15 numbers, found '18'"),
+    ] {
+        refused("a.vtu", &last(&cells, from, to), expected);
+    }
+    let none = cells.replace("<Piece", "<Part").replace("</Piece", "</Part");
+    refused("a.vtu", &none, "expected a Piece, found 'none'");
+    let surface = String::from_utf8(vtp_pieces()).unwrap();
+    let missing = "which another Piece has, found 'none'";
+    refused("a.vtp", &last(&surface, "Name=\"up\"", "Name=\"down\""), &format!("array 'up' in PointData, {missing}"));
+    refused("a.vtp", &last(&surface, "Name=\"paint\"", "Name=\"hue\""), &format!("'paint' in PointData, {missing}"));
+    // What all pieces hold together counts, though each is small: they may all be the same bytes.
+    let (before, rest) = surface.split_once("<Piece").unwrap();
+    let (piece, after) = rest.rsplit_once("</Piece>").unwrap();
+    let many = format!("{before}{}{after}", format!("<Piece{piece}</Piece>").repeat(20));
+    let limits = ReadParams { limits: splat_core::Limits::bytes(3000), ..ReadParams::default() };
+    assert!(bytes("a.vtp", &vtp_pieces(), &limits, None).is_ok());
+    let error = bytes("a.vtp", many.as_bytes(), &limits, None).unwrap_err();
+    assert!(error.to_string().contains("at most 3000 bytes for the points of all pieces"), "{error}");
 }
 
 #[test]

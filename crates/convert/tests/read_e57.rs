@@ -34,12 +34,12 @@ fn points_of_all_scans_lie_where_their_poses_move_them() {
     assert_eq!(points.color[3..], [[0.5; 3]; 2]);
     let remarks = [
         "2 scans, each moved to its pose",
-        "1 point has no place and is left out",
-        "2 points without a colour of their own are grey",
-        "2 points without an intensity have 0",
+        "1 point without a place: left out",
+        "2 points without a colour: grey",
+        "2 points without an intensity: it is 0",
     ];
     assert_eq!(notes.remarks, remarks);
-    assert_eq!(notes.unused, ["1 pictures (images2D)", "rowIndex"]);
+    assert_eq!(notes.unused, ["1 picture (images2D)", "rowIndex"]);
     assert_eq!(read("a.e57.gz", &gzip(&e57()), &[]).0, points);
 }
 
@@ -51,7 +51,7 @@ fn further_fields_are_columns_and_scans_are_told_apart() {
     assert_eq!(column("rowIndex")[..3], [7.0; 3]);
     assert!(column("rowIndex")[3..].iter().all(|v| v.is_nan()));
     assert_eq!(column("colorGreen")[..3], [0.0, 51.0, 153.0]);
-    assert_eq!(notes.unused, ["1 pictures (images2D)"]);
+    assert_eq!(notes.unused, ["1 picture (images2D)"]);
     let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("up.e57");
     std::fs::write(&path, e57()).unwrap();
     assert_eq!(up_axis(&path), UpAxis::Z);

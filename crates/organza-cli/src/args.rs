@@ -28,7 +28,7 @@ pub(super) struct Arguments {
 pub(super) enum Command {
     /// Renders a scene, or data files as they are, to EXR or PNG files.
     #[command(
-        after_help = "Examples:\n  organza render bunny.ply -o bunny.png\n  organza render head.nii.gz --preset mri --azimuth 200 -o head.png\n  organza render ground.laz bunny.ply --ground -o both.png\n  organza render ground.laz --color-by height -o heights.png\n  organza render scene.toml -o picture.exr -o picture.png --layers effects,depth\n  organza render bunny.ply -o around.png --turntable 36\n  organza render scene.toml --set object.bunny.opacity=0.4 --technique surfels -o glass.png"
+        after_help = "Examples:\n  organza render bunny.ply -o bunny.png\n  organza render head.nii.gz --preset mri --azimuth 200 -o head.png\n  organza render ground.laz bunny.ply --ground -o both.png\n  organza render ground.laz --color-by height --legend -o heights.png\n  organza render scene.toml -o picture.exr -o picture.png --layers effects,depth\n  organza render bunny.ply -o around.png --turntable 36\n  organza render scene.toml --set object.bunny.opacity=0.4 --technique surfels -o glass.png"
     )]
     Render(RenderArguments),
     /// Writes a first scene of data files, with comments, ready to edit.
@@ -212,6 +212,9 @@ pub(super) struct RenderArguments {
     /// Write PNG files with the opacity of each pixel in the place of the background
     #[arg(long)]
     pub(super) transparent: bool,
+    /// Draw into PNG files what colours stand for: the maps of points by a column, the transfer functions of volumes
+    #[arg(long)]
+    pub(super) legend: bool,
     /// Write PNG files with 16 bits a channel instead of 8
     #[arg(long)]
     pub(super) deep: bool,

@@ -43,6 +43,11 @@ impl<'a> Jobs<'a> {
         }
         let (given, files) = given(&arguments.scene, arguments.turntable)?;
         let still = parsed(arguments, &given, None)?;
+        if arguments.legend && !still.objects.iter().any(|object| object.visible && object.has_scale()) {
+            let message = "--legend: no colours of this picture stand for numbers";
+            let hint = "give points a `color_by` (data files: --color-by COLUMN), a volume is coloured by its `transfer`; or leave it out";
+            return Err(Error::usage(message, hint));
+        }
         let asked = arguments.frames.or(arguments.turntable.map(|_| Frames::All));
         let frames = asked.map(|frames| range(frames, &still)).transpose()?;
         Ok((Self { arguments, given, still, outputs, frames }, files))
@@ -211,7 +216,8 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Error> {
         };
         outputs.push(Path::new(name.file_stem().unwrap_or("picture".as_ref())).with_added_extension("exr"));
     }
-    let options = [("--transparent", arguments.transparent), ("--deep", arguments.deep)];
+    let options =
+        [("--transparent", arguments.transparent), ("--deep", arguments.deep), ("--legend", arguments.legend)];
     let is_png = |path: &PathBuf| Format::of_path(path).is_ok_and(|format| format == Format::Png);
     if let Some((option, _)) = options.iter().find(|option| option.1)
         && !outputs.iter().any(is_png)

@@ -143,7 +143,12 @@ impl Job<'_> {
     ) -> Result<Vec<(&Path, WriteReport)>, Error> {
         let metadata = self.metadata(render);
         let RenderArguments { half, deep, transparent, .. } = *arguments;
-        let params = output::Params { half, deep, transparent };
+        let legend = if arguments.legend { render.scales.clone() } else { Vec::new() };
+        if arguments.legend && legend.is_empty() {
+            warnings
+                .push("there is no legend: nothing that is drawn has a number that its colour stands for".to_owned());
+        }
+        let params = output::Params { half, deep, transparent, legend };
         let mut written = Vec::with_capacity(self.places.outputs.len());
         for target in &self.places.outputs {
             let path = target.path();
@@ -158,6 +163,10 @@ impl Job<'_> {
             if report.not_a_number > 0 {
                 let count = report.not_a_number;
                 warnings.push(format!("{}: {count} values were not numbers; this is a bug", printable(path)));
+            }
+            if report.without_room > 0 {
+                let (path, count) = (printable(path), report.without_room);
+                warnings.push(format!("{path}: there is no room for {count} of the legends; use a larger --size"));
             }
             written.push((path, report));
         }

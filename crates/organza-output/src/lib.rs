@@ -22,6 +22,7 @@
 mod doubt;
 mod error;
 mod exr_file;
+mod legend;
 mod png_file;
 mod target;
 mod targets;
@@ -33,6 +34,7 @@ pub use png_file::displayed;
 pub use target::{Target, abandon};
 pub use targets::Targets;
 
+use organza_scene::ColorScale;
 use splat_core::Layers;
 use std::path::Path;
 
@@ -57,7 +59,7 @@ pub struct Metadata {
 }
 
 /// How files store a picture.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Params {
     /// Whether an EXR file has its colours, alpha and shadow in 16 bits.
     pub half: bool,
@@ -66,6 +68,8 @@ pub struct Params {
     /// Whether a PNG file has the opacity of its pixels (straight alpha) in the place of what lies behind everything: the layer
     /// `background` is taken off.
     pub transparent: bool,
+    /// What colours stand for: a PNG file has a legend of each over its right border, as large as the picture asks for.
+    pub legend: Vec<ColorScale>,
 }
 
 /// What had to be changed so that the file is valid.
@@ -77,6 +81,8 @@ pub struct WriteReport {
     pub clamped: u64,
     /// Values that were not a number, written as 0.
     pub not_a_number: u64,
+    /// Legends that the picture has no room for.
+    pub without_room: u64,
 }
 
 /// File formats by extension.

@@ -1,6 +1,6 @@
 //! The displayed picture as a PNG: exposure, clamp, sRGB, in 8 or 16 bits, with its background or without.
 
-use super::{Metadata, Params, WriteReport, texts};
+use super::{Metadata, Params, WriteReport, legend, texts};
 use crate::Error;
 use png::{BitDepth, ColorType, Encoder, EncodingError, SrgbRenderingIntent};
 use splat_core::Layers;
@@ -13,10 +13,12 @@ pub(super) fn encode(
     report: &mut WriteReport,
 ) -> Result<Vec<u8>, Error> {
     let gain = libm::exp2(metadata.exposure) as f32;
-    let (samples, color) = match params.transparent {
+    let (mut samples, color) = match params.transparent {
         true => (transparent(layers, gain, report)?, ColorType::Rgba),
         false => (opaque(layers, gain, report)?, ColorType::Rgb),
     };
+    let mut canvas = legend::Canvas::new(&mut samples, layers.size[0], color.samples());
+    report.without_room += legend::draw(&mut canvas, &params.legend);
     let depth = if params.deep { BitDepth::Sixteen } else { BitDepth::Eight };
     let mut bytes = Vec::new();
     written(&mut bytes, layers.size, (color, depth), &quantized(&samples, depth), metadata)
@@ -80,7 +82,7 @@ fn byte(sample: f32) -> u8 {
 }
 
 /// Linear radiance → sRGB (IEC 61966-2-1), 0 to 1; NaN gives 0.
-fn encoded(linear: f32) -> f32 {
+pub(crate) fn encoded(linear: f32) -> f32 {
     // Before the curve: its power is undefined below 0. NaN.max(0) is 0, where NaN.clamp would stay NaN.
     let x = linear.max(0.0).clamp(0.0, 1.0);
     if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * libm::powf(x, 1.0 / 2.4) - 0.055 }

@@ -25,6 +25,7 @@ mod check_slide;
 mod check_source;
 mod check_surfels;
 mod check_transfer;
+mod color_scales;
 mod de;
 mod error;
 mod fit;
@@ -53,6 +54,7 @@ mod source;
 mod tree;
 
 pub use convert::read::UpAxis;
+pub use convert::{ColorMap, ColorScale, PointColors, ScaleNumbers};
 pub use error::Error;
 pub use fit::{CameraFit, DEFAULT_AZIMUTH, DEFAULT_FILL, DEFAULT_SIZE, EachPoint, FoundCamera};
 pub use layer_choice::{LAYER_NAMES, LayerChoice};

@@ -15,6 +15,7 @@ use crate::scene::{Scene, SceneLight, SceneObject};
 use crate::statistics::{LightStatistics, ObjectStatistics};
 use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, pass, work};
 pub(crate) use context::BYTES_PER_SPLAT;
+use convert::ColorScale;
 use files::Files;
 pub use fit::fitted;
 use glam::DVec3;
@@ -61,6 +62,8 @@ pub struct Loaded {
     pub warnings: Vec<String>,
     /// What files hold that is not drawn, and what was made of them, one sentence each.
     pub notes: Vec<String>,
+    /// What colours stand for.
+    pub scales: Vec<ColorScale>,
 }
 
 impl Loaded {
@@ -115,6 +118,7 @@ pub(crate) fn read<'a>(
 ) -> Result<Inputs<'a>, Error> {
     let loading = Loading { scene, options, progress, files };
     let lights = lights(scene);
+    files.scales.take();
     let (prepared, images) = cost.measure(pass::READ, |stage| {
         let prepared = loading.prepare(looks)?;
         let images = loading.images(&lights)?;
@@ -192,6 +196,7 @@ impl Inputs<'_> {
             exponent,
             splats,
             warnings,
+            scales: files.scales.take(),
             notes: files.notes().into_iter().chain(options.cache.iter().flat_map(|cache| cache.said())).collect(),
         })
     }

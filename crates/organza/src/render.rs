@@ -12,6 +12,7 @@ use crate::prepare::{Explanation, prepare};
 use crate::scene::{FoundCamera, Scene};
 use crate::technique::{Checkpoint, Kept, Session, Sets};
 use crate::{CostRecord, Error, Layers, Progress, RenderOptions, doubts};
+use convert::ColorScale;
 use std::path::PathBuf;
 
 /// A finished render.
@@ -29,6 +30,8 @@ pub struct Render {
     pub warnings: Vec<String>,
     /// What files hold that the picture does not show, and what was made of them, one sentence each.
     pub notes: Vec<String>,
+    /// What the colours of objects stand for, those of a column of points or of the values of a volume.
+    pub scales: Vec<ColorScale>,
     /// The camera that was placed for it, where the scene leaves that to the data.
     pub found: Option<FoundCamera>,
     /// What drew it: `cpu`, or the interface and the device that helped.
@@ -124,5 +127,5 @@ pub(crate) fn render_keeping(
     warnings.extend(doubts::of_shadows(plan.tables()));
     warnings.extend(doubts::of_scattering(&plan));
     warnings.extend(helper.map(|helper| helper.said()).unwrap_or_default());
-    Ok(Render { layers, cost, plan, sets, warnings, notes, found, backend })
+    Ok(Render { layers, cost, plan, sets, warnings, notes, scales: loaded.scales, found, backend })
 }

@@ -9,6 +9,7 @@ use super::fans::Fans;
 use super::reading::Reading;
 use super::selection::Selection;
 use super::{Loaded, Notes, input, origin};
+use crate::counted::counted;
 use crate::error::{Place, ReadError};
 use crate::raw_points::RawPoints;
 use crate::srgb::linear_from_srgb;
@@ -130,7 +131,23 @@ impl Cells {
     /// Cells of one kind behind the others.
     pub(super) fn append(&mut self, lists: &Lists, kind: u8) {
         self.kinds.extend(std::iter::repeat_n(kind, lists.len()));
-        self.lists.append(lists);
+        self.lists.append(lists, 0);
+    }
+
+    /// The points and the cells of another piece of the same dataset behind these.
+    pub(super) fn join(&mut self, other: Self, reading: &Reading<'_>) -> Result<(), ReadError> {
+        let points = (self.points.len() + other.points.len()) as u64;
+        input::check_bytes("the points of all pieces", points * size_of::<DVec3>() as u64, reading.params)?;
+        let Some(first) = u32::try_from(points).ok().and(u32::try_from(self.points.len()).ok()) else {
+            let expected = format!("at most {} points in all pieces", u32::MAX);
+            return Err(ReadError::input(other.place, expected, points.to_string(), HINT));
+        };
+        input::check_bytes("the cells of all pieces", self.lists.bytes() + other.lists.bytes(), reading.params)?;
+        input::reserve(&mut self.points, other.points.len())?;
+        self.points.extend(other.points);
+        self.lists.append(&other.lists, first);
+        self.kinds.extend(other.kinds);
+        Ok(())
     }
 
     /// Whether some cell encloses a volume.
@@ -169,7 +186,7 @@ impl Cells {
         if self.has_bodies() {
             let flat = self.kinds.len() - self.bodies().count();
             if flat > 0 {
-                reading.notes.not_used([format!("{flat} cells without a volume").as_bytes()]);
+                reading.notes.not_used([format!("{} without a volume", counted(flat as u64, "cell")).as_bytes()]);
             }
             if matches!(field, Field::One) {
                 reading.notes.remarks.push("cells without a field of numbers: they are full of 1".to_owned());
@@ -180,7 +197,7 @@ impl Cells {
         let PointColumns { normal, color } = columns;
         let (fans, lines) = self.fans(reading)?;
         if lines > 0 {
-            reading.notes.not_used([format!("{lines} lines").as_bytes()]);
+            reading.notes.not_used([counted(lines as u64, "line").as_bytes()]);
         }
         let (origin, position) = origin::relative(&self.points, self.place, |i| format!("point {i}"))?;
         let Some(fans) = fans else {

@@ -11,6 +11,7 @@ mod packets;
 mod pages;
 
 use super::reading::Reading;
+use crate::counted::counted;
 use crate::error::{Place, ReadError};
 use crate::raw_points::RawPoints;
 use columns::Columns;
@@ -24,7 +25,7 @@ pub(super) fn read(content: Vec<u8>, reading: &mut Reading<'_>) -> Result<RawPoi
     let pages = Pages::new(content, reading)?;
     let document = Document::parse(&pages)?;
     if document.images > 0 {
-        reading.notes.not_used([format!("{} pictures (images2D)", document.images).as_bytes()]);
+        reading.notes.not_used([format!("{} (images2D)", counted(document.images as u64, "picture")).as_bytes()]);
     }
     let mut columns = Columns::new(&document.scans, reading)?;
     for scan in &document.scans {

@@ -109,6 +109,15 @@ pub struct Notes {
 }
 
 impl Notes {
+    /// All of it but what was mended, one sentence each, for a file of this name that was read; `unused` are columns that were read and
+    /// nobody asks for.
+    pub fn sentences<'u>(&self, file: &str, unused: impl IntoIterator<Item = &'u str>) -> Vec<String> {
+        let unused = unused.into_iter().map(|name| -> &str { name });
+        let unused: Vec<&str> = self.unused.iter().map(String::as_str).chain(unused).collect();
+        let unused = (!unused.is_empty()).then(|| format!("{file}: columns not used: {}", unused.join(", ")));
+        self.remarks.iter().map(|remark| format!("{file}: {remark}")).chain(unused).collect()
+    }
+
     /// Adds a remark, once.
     pub(super) fn remark(&mut self, remark: impl Into<String>) {
         let remark = remark.into();

@@ -36,7 +36,7 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Loaded, 
     if dataset.has_tag_name("ImageData") {
         return image(dataset, &encoding, reading.params, &mut reading.notes).map(Loaded::Grid);
     }
-    piece::read(only_piece(dataset)?, &encoding, reading)
+    piece::read(dataset, &encoding, reading)
 }
 
 /// Reads the volume of an image.
@@ -94,12 +94,12 @@ fn dataset<'a, 'i>(document: &'a Document<'i>) -> Result<Node<'a, 'i>, ReadError
     child(root, kind).ok_or_else(|| wrong(root, &format!("an element {kind}"), "none"))
 }
 
-/// The piece of a dataset, which has to be the only one.
-fn only_piece<'a, 'i>(dataset: Node<'a, 'i>) -> Result<Node<'a, 'i>, ReadError> {
-    let pieces: Vec<_> = dataset.children().filter(|c| c.has_tag_name("Piece")).collect();
+/// The piece of an image, which has to be the only one.
+fn only_piece<'a, 'i>(image: Node<'a, 'i>) -> Result<Node<'a, 'i>, ReadError> {
+    let pieces: Vec<_> = image.children().filter(|c| c.has_tag_name("Piece")).collect();
     let &[piece] = pieces.as_slice() else {
-        let hint = "write the dataset as one piece";
-        return Err(ReadError { hint, ..wrong(dataset, "one Piece", &pieces.len().to_string()) });
+        let hint = "write the image as one piece";
+        return Err(ReadError { hint, ..wrong(image, "one Piece", &pieces.len().to_string()) });
     };
     Ok(piece)
 }

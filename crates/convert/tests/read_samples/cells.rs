@@ -100,11 +100,32 @@ pub(crate) fn vtk_surface(binary: bool, by_ends: bool) -> Vec<u8> {
     .concat()
 }
 
+/// A part of the cells: ranks of its points, its cells by ranks among these, and ranks of the cells.
+type Part = (&'static [usize], &'static [&'static [i32]], &'static [usize]);
+
+/// All of them.
+const WHOLE: Part = (&[0, 1, 2, 3, 4, 5, 6, 7, 8], &CORNERS, &[0, 1, 2]);
+/// The hexahedron, nothing, and what is beside it.
+const PARTS: [Part; 3] = [
+    (&[0, 1, 2, 3, 4, 5, 6, 7], &[CORNERS[0]], &[0]),
+    (&[], &[], &[]),
+    (&[0, 1, 2, 5, 6, 8], &[&[1, 2, 4, 3, 5], &[0, 1, 2]], &[1, 2]),
+];
+
 /// The cells in XML: `ascii` or `binary`, with the field of the cells behind that of the points.
 pub(crate) fn vtu(encoding: &'static str, compressed: bool) -> Vec<u8> {
+    in_pieces(encoding, compressed, &[WHOLE])
+}
+
+/// The same in pieces, of which one is empty.
+pub(crate) fn vtu_pieces(encoding: &'static str, compressed: bool) -> Vec<u8> {
+    in_pieces(encoding, compressed, &PARTS)
+}
+
+fn in_pieces(encoding: &'static str, compressed: bool, parts: &[Part]) -> Vec<u8> {
     let vti = Vti { encoding, big: false, wide: false, compressed };
     let array = |kind: &str, name: &str, more: &str, text: String, bytes: Vec<u8>| {
-        let data = if encoding == "ascii" { text } else { vti.base64(&bytes) };
+        let data = if encoding == "ascii" || bytes.is_empty() { text } else { vti.base64(&bytes) };
         format!("<DataArray type=\"{kind}\" Name=\"{name}\" {more}format=\"{encoding}\">\n{data}\n</DataArray>\n")
     };
     let text = |all: &[String]| all.join(" ");
@@ -116,18 +137,28 @@ pub(crate) fn vtu(encoding: &'static str, compressed: bool) -> Vec<u8> {
         let words: Vec<String> = all.iter().map(i32::to_string).collect();
         array("Int32", name, "", text(&words), all.iter().flat_map(|v| v.to_le_bytes()).collect())
     };
-    let values: Vec<f32> = POINTS.iter().map(|p| field(*p)).collect();
+    let piece = |(points, corners, cells): &Part| {
+        let points: Vec<[f32; 3]> = points.iter().map(|rank| POINTS[*rank]).collect();
+        let values: Vec<f32> = points.iter().map(|p| field(*p)).collect();
+        let ends: Vec<i32> = (1..=corners.len()).map(|n| corners[..n].concat().len() as i32).collect();
+        format!(
+            "<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n<PointData Scalars=\"density\">\n{}</PointData>\n\
+             <CellData>\n{}</CellData>\n<Points>\n{}</Points>\n<Cells>\n{}{}{}</Cells>\n</Piece>\n",
+            points.len(),
+            cells.len(),
+            floats("density", "", &values),
+            floats("of_cells", "", &cells.iter().map(|rank| OF_CELLS[*rank]).collect::<Vec<_>>()),
+            floats("Points", "NumberOfComponents=\"3\" ", &points.concat()),
+            ints("connectivity", &corners.concat()),
+            ints("offsets", &ends),
+            ints("types", &cells.iter().map(|rank| KINDS[*rank]).collect::<Vec<_>>()),
+        )
+    };
     let compressor = if compressed { " compressor=\"vtkZLibDataCompressor\"" } else { "" };
     format!(
         "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\"{compressor}>\n<UnstructuredGrid>\n\
-         <Piece NumberOfPoints=\"9\" NumberOfCells=\"3\">\n<PointData Scalars=\"density\">\n{}</PointData>\n\
-         <CellData>\n{}</CellData>\n<Points>\n{}</Points>\n<Cells>\n{}{}{}</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>",
-        floats("density", "", &values),
-        floats("of_cells", "", &OF_CELLS),
-        floats("Points", "NumberOfComponents=\"3\" ", &POINTS.concat()),
-        ints("connectivity", &CORNERS.concat()),
-        ints("offsets", &[8, 13, 16]),
-        ints("types", &KINDS),
+         {}</UnstructuredGrid>\n</VTKFile>",
+        parts.iter().map(piece).collect::<String>()
     )
     .into_bytes()
 }
@@ -149,4 +180,16 @@ pub(crate) fn vtp() -> Vec<u8> {
          </Piece>\n</PolyData>\n</VTKFile>"
     )
     .into_bytes()
+}
+
+/// The square of [`vtp`] twice, as two pieces, each with normals; the second one is a step above.
+pub(crate) fn vtp_pieces() -> Vec<u8> {
+    let text = String::from_utf8(vtp()).expect("a text");
+    let (before, rest) = text.split_once("<Piece").expect("a piece");
+    let (piece, after) = rest.split_once("</Piece>").expect("an end of it");
+    let normals = "<PointData Normals=\"up\" Scalars=\"paint\">\n<DataArray type=\"Float32\" Name=\"up\" \
+        NumberOfComponents=\"3\" format=\"ascii\">\n0 0 1 0 0 1 0 0 1 0 0 1\n</DataArray>";
+    let piece = format!("<Piece{}</Piece>", piece.replace("<PointData Scalars=\"paint\">", normals));
+    let above = piece.replace("0 0 0 1 0 0 1 1 0 0 1 0", "0 0 1 1 0 1 1 1 1 0 1 1");
+    format!("{before}{piece}\n{above}{after}").into_bytes()
 }

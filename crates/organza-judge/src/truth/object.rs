@@ -103,7 +103,11 @@ pub(super) fn body(
             return medium(scene, object, options).map(Ok);
         }
     };
-    let mesh = Arc::unwrap_or_clone(convert::clipped_mesh(mesh.into(), &object.clip));
+    let mesh = match &object.source {
+        Source::Mesh(_) => convert::lidded_mesh(mesh.into(), &object.clip).0,
+        _ => convert::clipped_mesh(mesh.into(), &object.clip),
+    };
+    let mesh = Arc::unwrap_or_clone(mesh);
     if shading == Shading::Phase {
         return no("a surface that scatters by a phase function reflects nothing");
     }

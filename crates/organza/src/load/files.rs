@@ -2,7 +2,7 @@
 
 use crate::Error;
 use convert::read::{Loaded, Mended, Notes, ReadParams};
-use convert::{RawPoints, SharedField};
+use convert::{ColorScale, RawPoints, SharedField};
 use splat_core::{DAabb, Grid, Mesh, Progress, RadianceImage};
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -37,8 +37,10 @@ pub struct Files {
     notes: RefCell<Vec<String>>,
     /// Fits take longer than reading: with their tolerance and the bytes that they take.
     fitted: RefCell<Vec<(PathBuf, f64, u64, Fitted)>>,
-    /// What was mended in them.
+    /// What was mended in them, or is doubtful.
     mended: RefCell<Vec<String>>,
+    /// What the colours of the objects that were read last stand for.
+    pub(super) scales: RefCell<Vec<ColorScale>>,
 }
 
 impl Files {
@@ -67,6 +69,11 @@ impl Files {
         add(&self.notes, said.into_iter().map(|said| format!("{}: {said}", crate::printable(path))));
     }
 
+    /// What is doubtful of a file beside what its reader mends.
+    pub(super) fn warn(&self, path: &Path, said: impl IntoIterator<Item = impl std::fmt::Display>) {
+        add(&self.mended, said.into_iter().map(|said| format!("{}: {said}", crate::printable(path))));
+    }
+
     /// What the files hold that is not drawn, and what was made of them, one sentence each.
     pub(super) fn notes(&self) -> Vec<String> {
         self.notes.borrow().clone()
@@ -80,7 +87,9 @@ impl Files {
     fn known_or_read(&self, path: &Path, limits: &ReadParams, progress: &Progress) -> Result<Read, Error> {
         let known = self.read.borrow().get(&(real(path), limits.frame)).filter(|k| k.0.serves(limits)).cloned();
         let read = known.map_or_else(|| self.read_anew(path, limits, progress), |(_, read)| Ok(read))?;
-        add(&self.notes, sentences(path, &read.0, &read.1, &limits.columns));
+        let points = if let FileData::Points(points) = &read.0 { Some(points) } else { None };
+        let unused = points.into_iter().flat_map(|points| points.not_asked_for(&limits.columns));
+        add(&self.notes, read.1.sentences(&crate::printable(path), unused));
         Ok(read)
     }
 
@@ -125,20 +134,6 @@ impl Files {
 /// A file under the one name that the system knows it by, whichever way it was named.
 fn real(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_owned())
-}
-
-/// What a picture does not show of a file, and what its reader made of it.
-fn sentences(path: &Path, data: &FileData, notes: &Notes, asked: &[String]) -> Vec<String> {
-    let (file, mut unused) = (crate::printable(path), notes.unused.clone());
-    if let FileData::Points(points) = data {
-        // Read, but no key of the scene asks for them.
-        unused.extend(points.not_asked_for(asked).map(str::to_owned));
-    }
-    let mut all: Vec<String> = notes.remarks.iter().map(|remark| format!("{file}: {remark}")).collect();
-    if !unused.is_empty() {
-        all.push(format!("{file}: columns not used: {}", unused.join(", ")));
-    }
-    all
 }
 
 /// Adds what is not said yet.

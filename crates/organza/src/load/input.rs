@@ -10,8 +10,8 @@ use crate::scene::{
 use crate::statistics::ObjectData;
 use convert::{
     ClippedField, CloudShape, Density, DensityParams, ExpressionField, GridField, HomogeneousMedium, Interpolation,
-    MatterParams, MediumBody, MeshParams, MpuParams, RawPoints, Section, SharedField, SplatParams, SurfelParams,
-    VolumeParams,
+    MatterParams, MediumBody, MeshParams, MpuParams, RawPoints, Section, SharedField, ShownPoints, SplatParams,
+    SurfelParams, VolumeParams,
 };
 use pbsr::{BoundedExtinction, Matter};
 use splat_core::{DAabb, Grid, Mesh, TransferFunction};
@@ -123,10 +123,12 @@ impl Input<'_> {
 pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Result<Input<'a>, Error> {
     let splat = context.splat_params(object);
     let opacity = context.opacity(object);
+    context.files.scales.borrow_mut().extend(object.value_scale());
     Ok(match &object.source {
         Source::Mesh(path) => {
             let density = object.spacing.map_or(Density::Auto, Density::Spacing);
-            let mut mesh = convert::clipped_mesh(read_mesh(path, context)?, &object.clip);
+            let (mut mesh, lids) = convert::lidded_mesh(read_mesh(path, context)?, &object.clip);
+            context.files.warn(path, lids.said());
             if object.color.is_some() && !mesh.color.is_empty() {
                 mesh = Mesh { color: Vec::new(), ..Mesh::clone(&mesh) }.into();
             }
@@ -269,8 +271,9 @@ fn raw_points<'a>(
     let FileData::Points(points) = context.read(path)? else {
         return Err(Error::wrong_kind(path, "points without faces", "use `mesh = ` or `volume = ` for this file"));
     };
-    let (points, said) = convert::shown_points(points, &object.points_shown(), &splat)?;
+    let ShownPoints { points, said, scale } = convert::shown_points(points, &object.points_shown(), &splat)?;
     context.files.note(path, said);
+    context.files.scales.borrow_mut().extend(scale);
     Ok(match object.matter_params(&splat) {
         Some(params) => Input::Matter(path, points, params),
         None => Input::Points(path, points, context.surfel_params(object, splat)),

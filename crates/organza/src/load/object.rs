@@ -12,7 +12,7 @@ use convert::{
     VolumeParams, ZeroSearch,
 };
 use pbsr::BoundedExtinction;
-use splat_core::{Cloud, Exceeded, Grid, Mesh, Object, Shading, TransferFunction};
+use splat_core::{Cloud, Exceeded, Grid, Object, Shading, TransferFunction};
 use std::path::Path;
 
 /// Most operations of an expression on its way to splats: some minutes of two cores.
@@ -147,7 +147,8 @@ pub(super) fn convert(
     let (progress, splat) = (context.progress, context.limited(prepared.input.splat()));
     let cloud = match &prepared.input {
         Input::Mesh(name, mesh, params) => {
-            mesh_splats(name, mesh, &MeshParams { splat, ..params.clone() }, context, warnings)
+            let made = convert::mesh_to_points(mesh, &MeshParams { splat, ..params.clone() }, Some(progress));
+            made.inspect(|(_, of)| warnings.extend(of.said().map(|said| format!("{name}: {said}")))).map(|c| c.0)
         }
         Input::Points(path, points, params) => {
             surfels(path, points, &SurfelParams { splat, ..params.clone() }, context, warnings)
@@ -182,21 +183,6 @@ pub(super) fn convert(
         Input::Rectangle(r, opacity, _) => convert::rectangle(r, *opacity, &splat),
     };
     Ok(cloud?)
-}
-
-fn mesh_splats(
-    name: &str,
-    mesh: &Mesh,
-    params: &MeshParams,
-    context: &Context<'_>,
-    warnings: &mut Vec<String>,
-) -> Result<Cloud, ConvertError> {
-    let mut cloud = Cloud::default();
-    let report = convert::mesh_to_points_into(mesh, params, &mut cloud, Some(context.progress))?;
-    if report.degenerate > 0 {
-        warnings.push(format!("{name}: {} faces have no area", report.degenerate));
-    }
-    Ok(cloud)
 }
 
 fn surfels(

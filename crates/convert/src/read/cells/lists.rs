@@ -80,10 +80,15 @@ impl Lists {
         Ok(())
     }
 
-    /// These cells and others behind them.
-    pub(in super::super) fn append(&mut self, others: &Self) {
+    /// Bytes that it holds.
+    pub(super) fn bytes(&self) -> u64 {
+        (size_of_val(self.ends.as_slice()) + size_of_val(self.corners.as_slice())) as u64
+    }
+
+    /// These cells and others behind them, whose points begin at this rank.
+    pub(in super::super) fn append(&mut self, others: &Self, first: u32) {
         let before = self.corners.len();
-        self.corners.extend(&others.corners);
+        self.corners.extend(others.corners.iter().map(|corner| first + corner));
         self.ends.extend(others.ends.iter().map(|end| before + end));
     }
 }

@@ -6,6 +6,7 @@
 //! their faces, which neighbours agree on; the field is linear in each. A sample belongs to the first body that it lies in.
 
 use super::{Field, HINT};
+use crate::counted::counted;
 use crate::error::{Place, ReadError};
 use crate::read::input;
 use crate::read::lattice;
@@ -94,9 +95,9 @@ pub(super) fn grid(
     let outside = least.fold(0.0, f64::min);
     let lattice = Lattice { low: bounds.low, sample: step / SAMPLES as f64, dims, outside };
     let values = lattice.filled((points, bodies), field, reading)?;
-    let ([x, y, z], n) = (dims, bodies.len());
+    let ([x, y, z], cells) = (dims, counted(bodies.len() as u64, "cell"));
     let remarks = &mut reading.notes.remarks;
-    remarks.push(format!("{n} cells, sampled as {x} x {y} x {z} voxels; outside them the value is {outside}"));
+    remarks.push(format!("{cells}, sampled as {x} x {y} x {z} voxels; outside them the value is {outside}"));
     match bounds.folded {
         0 => {}
         folded => remarks.push(format!("{folded} of the cells are folded; what they cover twice counts once")),

@@ -3,6 +3,7 @@
 use super::bits::Numbers;
 use super::damaged;
 use super::document::{MAX_FIELDS, Pose, Scan};
+use crate::counted::counted;
 use crate::error::{Place, ReadError};
 use crate::raw_points::RawPoints;
 use crate::read::direction::unit;
@@ -243,14 +244,13 @@ impl Columns {
             remarks.push(format!("{} scans, each moved to its pose", self.scans));
         }
         if no_place > 0 {
-            let these = if no_place == 1 { "point has no place and is" } else { "points have no place and are" };
-            remarks.push(format!("{no_place} {these} left out"));
+            remarks.push(format!("{} without a place: left out", counted(no_place, "point")));
         }
         if no_color > 0 {
-            remarks.push(format!("{no_color} points without a colour of their own are grey"));
+            remarks.push(format!("{} without a colour: grey", counted(no_color, "point")));
         }
         if no_intensity > 0 {
-            remarks.push(format!("{no_intensity} points without an intensity have 0"));
+            remarks.push(format!("{} without an intensity: it is 0", counted(no_intensity, "point")));
         }
         let (origin, position) = origin::relative(&self.positions, Place::File, |i| format!("point {i}"))?;
         Ok(RawPoints { origin, position, columns: self.extras.finish(&mut reading.notes), ..self.points })

@@ -12,6 +12,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use roxmltree::Node;
 use std::borrow::Cow;
+use std::cell::Cell;
 use std::io::Read;
 use std::ops::Range;
 
@@ -59,6 +60,8 @@ pub(super) struct Encoding<'a> {
     is_compressed: bool,
     /// The appended bytes, and whether they are in base64.
     appended: Option<(Range<usize>, bool)>,
+    /// A place of the text, and the ends of lines before it: from there on they are counted, for an array after the other.
+    counted: Cell<(usize, u64)>,
 }
 
 /// What an array holds.
@@ -106,7 +109,7 @@ impl<'a> Encoding<'a> {
             },
             _ => None,
         };
-        Ok(Self { content, big_endian, word, is_compressed, appended })
+        Ok(Self { content, big_endian, word, is_compressed, appended, counted: Cell::default() })
     }
 
     /// The values of an array.
@@ -175,8 +178,8 @@ impl<'a> Encoding<'a> {
             other => return Err(wrong(array, "format ascii, binary or appended", other)),
         };
         if format == "ascii" {
-            let before = self.content[..source.left.start].iter().filter(|b| **b == b'\n').count();
-            let words = Words::new(&self.content[..source.left.end], source.left.start, before as u64 + 1);
+            let line = self.line_ends_before(source.left.start) + 1;
+            let words = Words::new(&self.content[..source.left.end], source.left.start, line);
             return Ok(Content::Text(words));
         }
         let bytes =
@@ -185,6 +188,15 @@ impl<'a> Encoding<'a> {
             return Err(wrong(array, "the end of the array after its data", "more"));
         }
         Ok(Content::Bytes(bytes))
+    }
+
+    /// Ends of lines before a place of the text.
+    fn line_ends_before(&self, place: usize) -> u64 {
+        let (known, ends) = self.counted.get();
+        let count = |between: Range<usize>| self.content[between].iter().filter(|b| **b == b'\n').count() as u64;
+        let ends = if place < known { ends - count(place..known) } else { ends + count(known..place) };
+        self.counted.set((place, ends));
+        ends
     }
 
     /// The appended bytes from the offset of an array on.

@@ -1,10 +1,11 @@
-//! The piece of an unstructured grid or of polygonal data in XML → cells.
+//! The pieces of an unstructured grid or of polygonal data in XML → cells: points of one behind those of the other, arrays joined by name.
 
 use super::data::Encoding;
 use super::{arrays, child, chosen, components, kind, name, not_used, place, selection, wrong};
 use crate::error::ReadError;
 use crate::read::Loaded;
 use crate::read::cells::{self, Cells, Field, Lists, PointColumns};
+use crate::read::input;
 use crate::read::reading::Reading;
 use crate::read::voxels::Kind;
 use roxmltree::Node;
@@ -18,33 +19,118 @@ const OF_POLYDATA: [(&str, &str, u8); 4] = [
     ("Polys", "NumberOfPolys", cells::POLYGONS),
 ];
 
-/// A piece, and how its arrays are stored.
+/// A piece, how its arrays are stored, and how many points and cells it has.
 struct Piece<'e, 'a, 'i> {
     node: Node<'a, 'i>,
     encoding: &'e Encoding<'e>,
+    points: u64,
+    cells: u64,
 }
 
-/// What a piece is: a volume, a mesh or points.
+/// What the pieces of a dataset are together: a volume, a mesh or points.
 pub(super) fn read(
-    node: Node<'_, '_>,
+    dataset: Node<'_, '_>,
     encoding: &Encoding<'_>,
     reading: &mut Reading<'_>,
 ) -> Result<Loaded, ReadError> {
-    let piece = Piece { node, encoding };
-    let mut used = Vec::new();
-    let cells = piece.cells(&mut used, reading)?;
-    cells.check()?;
+    let (mut used, mut pieces) = (Vec::new(), Vec::new());
+    let mut all: Option<Cells> = None;
+    for node in dataset.children().filter(|c| c.has_tag_name("Piece")) {
+        reading.go_on()?;
+        let mut piece = Piece { node, encoding, points: 0, cells: 0 };
+        let cells = piece.cells(&mut used, reading)?;
+        cells.check()?;
+        (piece.points, piece.cells) = (cells.points.len() as u64, cells.kinds.len() as u64);
+        pieces.push(piece);
+        match &mut all {
+            Some(all) => all.join(cells, reading)?,
+            None => all = Some(cells),
+        }
+    }
+    let cells = all.ok_or_else(|| wrong(dataset, "a Piece", "none"))?;
     let (mut field, mut columns) = (Field::One, PointColumns::default());
     if cells.has_bodies() {
-        if let Some((array, of_cells)) = chosen(node, &mut reading.notes) {
-            used.push(array);
-            field = piece.field((array, !of_cells), &cells, reading)?;
+        if let Some((array, of_cells)) = pieces.iter().find_map(|piece| chosen(piece.node, &mut reading.notes)) {
+            let selection = selection(array, reading.params, &mut reading.notes)?;
+            let numbers = joined(&pieces, array, &mut used, reading)?;
+            let told = (name(array), !of_cells);
+            field = cells::field((&numbers, &selection), (&told.0, told.1), place(array), &mut reading.notes)?;
         }
-    } else if let Some(data) = child(node, "PointData") {
-        columns = piece.columns(data, &cells, &mut used, reading)?;
+    } else {
+        let data = || pieces.iter().filter_map(|piece| child(piece.node, "PointData"));
+        if let Some(array) = data().find_map(normals_of) {
+            columns.normal = cells::normals(&joined(&pieces, array, &mut used, reading)?);
+        }
+        if let Some(array) = data().find_map(colors_of) {
+            columns.color = cells::colors(&joined(&pieces, array, &mut used, reading)?, components(array)?, 255.0);
+        }
     }
-    not_used(node, &used, &mut reading.notes);
+    not_used(dataset, &used, &mut reading.notes);
     cells.loaded(field, columns, reading)
+}
+
+/// The numbers of an array of one piece, and before and behind them those of the arrays of its name in the others.
+fn joined<'a, 'i>(
+    pieces: &[Piece<'_, 'a, 'i>],
+    array: Node<'a, 'i>,
+    used: &mut Vec<Node<'a, 'i>>,
+    reading: &Reading<'_>,
+) -> Result<Vec<f64>, ReadError> {
+    let of = array.parent_element().map_or("", |data| data.tag_name().name());
+    let mut all = Vec::new();
+    for piece in pieces {
+        reading.go_on()?;
+        let tuples = if of == "PointData" { piece.points } else { piece.cells };
+        let same = |other: &Node<'_, '_>| other.attribute("Name") == array.attribute("Name");
+        let is_here = array.ancestors().any(|around| around == piece.node);
+        let own = if is_here { Some(array) } else { child(piece.node, of).and_then(|data| arrays(data).find(same)) };
+        let Some(own) = own else {
+            if tuples == 0 {
+                continue;
+            }
+            let hint = "write the dataset as one piece, or give all its pieces the same arrays";
+            let expected = format!("an array '{}' in {of}, which another Piece has", name(array));
+            return Err(ReadError { hint, ..wrong(piece.node, &expected, "none") });
+        };
+        used.push(own);
+        let numbers = components(array)?;
+        if own.attribute("type") != array.attribute("type") || components(own)? != numbers {
+            let kind = array.attribute("type").unwrap_or_default();
+            let expected = format!("{numbers} components of type {kind}, as the array has in another Piece");
+            let found = format!("{} of {}", components(own)?, own.attribute("type").unwrap_or_default());
+            return Err(wrong(own, &expected, &found));
+        }
+        let more = piece.numbers(own, tuples, reading)?;
+        input::check_bytes(
+            "an array of all pieces",
+            ((all.len() + more.len()) * size_of::<f64>()) as u64,
+            reading.params,
+        )?;
+        input::reserve(&mut all, more.len())?;
+        all.extend(more);
+    }
+    Ok(all)
+}
+
+/// The array that points take their normals from: the one that the file calls so.
+fn normals_of<'a, 'i>(data: Node<'a, 'i>) -> Option<Node<'a, 'i>> {
+    arrays(data).find(|a| is_named(data, "Normals", a) && a.attribute("NumberOfComponents") == Some("3"))
+}
+
+/// The array that points take their colours from: the one that the file shows, else the first that can be.
+fn colors_of<'a, 'i>(data: Node<'a, 'i>) -> Option<Node<'a, 'i>> {
+    let is_color = |a: &Node<'_, '_>| {
+        let is_of_bytes = kind(*a).is_ok_and(|kind| kind == Kind::U8);
+        is_of_bytes && matches!(a.attribute("NumberOfComponents"), Some("3" | "4"))
+    };
+    let mut colors = arrays(data).filter(is_color);
+    colors.clone().find(|a| is_named(data, "Scalars", a)).or_else(|| colors.next())
+}
+
+/// Whether an attribute of all arrays names this one.
+fn is_named(data: Node<'_, '_>, attribute: &str, array: &Node<'_, '_>) -> bool {
+    let named = data.attribute(attribute);
+    named.is_some() && array.attribute("Name") == named
 }
 
 impl<'a, 'i> Piece<'_, 'a, 'i> {
@@ -115,49 +201,5 @@ impl<'a, 'i> Piece<'_, 'a, 'i> {
         let count = ends.last().map_or(0, |end| *end as u64);
         let corners = self.numbers(connectivity, count, reading)?;
         Lists::ending(&ends, &corners, points, place(offsets))
-    }
-
-    /// The field that an array of the points or of the cells is, of colours their luma.
-    fn field(
-        &self,
-        (array, of_points): (Node<'_, '_>, bool),
-        cells: &Cells,
-        reading: &mut Reading<'_>,
-    ) -> Result<Field, ReadError> {
-        let selection = selection(array, reading.params, &mut reading.notes)?;
-        let count = if of_points { cells.points.len() } else { cells.kinds.len() };
-        let numbers = self.numbers(array, count as u64, reading)?;
-        cells::field((&numbers, &selection), (&name(array), of_points), place(array), &mut reading.notes)
-    }
-
-    /// Normals and colours of the points: the arrays that the file calls so, else the first that can be.
-    fn columns(
-        &self,
-        data: Node<'a, 'i>,
-        cells: &Cells,
-        used: &mut Vec<Node<'a, 'i>>,
-        reading: &Reading<'_>,
-    ) -> Result<PointColumns, ReadError> {
-        let named = |attribute: &str, array: &Node<'_, '_>| {
-            let named = data.attribute(attribute);
-            named.is_some() && array.attribute("Name") == named
-        };
-        let points = cells.points.len() as u64;
-        let mut columns = PointColumns::default();
-        let normals = arrays(data).find(|a| named("Normals", a) && a.attribute("NumberOfComponents") == Some("3"));
-        if let Some(array) = normals {
-            used.push(array);
-            columns.normal = cells::normals(&self.numbers(array, points, reading)?);
-        }
-        let is_color = |a: &Node<'_, '_>| {
-            let is_of_bytes = kind(*a).is_ok_and(|kind| kind == Kind::U8);
-            is_of_bytes && matches!(a.attribute("NumberOfComponents"), Some("3" | "4"))
-        };
-        let colors = arrays(data).filter(is_color);
-        if let Some(array) = colors.clone().find(|a| named("Scalars", a)).or_else(|| colors.clone().next()) {
-            used.push(array);
-            columns.color = cells::colors(&self.numbers(array, points, reading)?, components(array)?, 255.0);
-        }
-        Ok(columns)
     }
 }

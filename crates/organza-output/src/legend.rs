@@ -1,0 +1,317 @@
+//! What colours stand for, drawn over the right border of a displayed picture: a bar of a colour map with its numbers, or the
+//! colours of whole numbers.
+//!
+//! All lengths follow from the picture's shorter side, so that a larger picture has the same legend, larger. Panels darken what is behind
+//! them, so that white text is legible on anything.
+
+mod canvas;
+mod glyphs;
+mod ticks;
+
+pub(super) use canvas::Canvas;
+
+use crate::png_file::encoded;
+use organza_scene::{ColorScale, ScaleNumbers};
+use std::ops::Range;
+use ticks::{Ticks, whole};
+
+/// Height of a capital letter over the shorter side of the picture, and the least that can be read, pixels.
+const CAPITAL: f64 = 0.021;
+const LEAST_CAPITAL: f64 = 7.0;
+/// From one line of text to the next, in capitals; so are all lengths below.
+const LINE: f64 = 1.9;
+/// Between the border of a panel and what is in it.
+const PAD: f64 = 0.9;
+/// Width of a bar, and side of the square of a whole number.
+const BAR: f64 = 1.5;
+/// Length of a tick, and from it to its number.
+const TICK: f64 = 0.5;
+/// Least height of a bar.
+const LEAST_BAR: f64 = 6.0;
+/// Greatest height of a panel over that of the picture, and greatest width over its width: the middle stays free.
+const HIGHEST: f64 = 0.62;
+const WIDEST: f64 = 0.3;
+/// Most whole numbers of one panel.
+const MOST_ROWS: usize = 24;
+
+/// sRGB of texts and ticks, of panels, and how much a panel hides.
+const TEXT: [f32; 3] = [1.0; 3];
+const PANEL: [f32; 3] = [0.06; 3];
+const PANEL_OPACITY: f32 = 0.66;
+
+/// A panel, before its place is known.
+struct Panel<'a> {
+    title: String,
+    scale: &'a ColorScale,
+    content: Content,
+    /// Pixels.
+    width: f64,
+    height: f64,
+}
+
+/// What stands below a title.
+enum Content {
+    /// A bar of this height, pixels, with its ticks; the numbers at its ends come first.
+    Bar(f64, Vec<(f64, String)>),
+    /// Whole numbers with what they are called; one without a colour says how many there are besides.
+    Rows(Vec<(Option<f64>, String)>),
+}
+
+/// Draws legends, the first at the top; gives the number of those that the picture has no room for.
+pub(super) fn draw(canvas: &mut Canvas<'_>, scales: &[ColorScale]) -> u64 {
+    let [width, height] = canvas.size().map(f64::from);
+    let capital = (CAPITAL * width.min(height)).max(LEAST_CAPITAL);
+    let margin = capital;
+    // As many as there is room for, all alike.
+    let panels = (1..=scales.len()).rev().find_map(|count| {
+        let share = ((height - margin) / count as f64 - margin).min(HIGHEST * height);
+        let room = [WIDEST * width, share];
+        scales[..count]
+            .iter()
+            .map(|scale| panel(scale, title(scale, scales), capital, room))
+            .collect::<Option<Vec<_>>>()
+    });
+    let panels = panels.unwrap_or_default();
+    let all: f64 = panels.iter().map(|panel| panel.height + margin).sum();
+    let mut top = (0.5 * (height - all + margin)).round();
+    for panel in &panels {
+        panel.draw(canvas, [width - margin - panel.width, top], capital);
+        top += panel.height + margin;
+    }
+    (scales.len() - panels.len()) as u64
+}
+
+/// What a scale is of, with its object where others are of the same name.
+fn title(scale: &ColorScale, all: &[ColorScale]) -> String {
+    let Some(column) = &scale.column else { return scale.object.clone() };
+    let is_alone = all.iter().filter(|other| other.column.as_ref() == Some(column)).count() < 2;
+    if is_alone { column.clone() } else { format!("{}: {column}", scale.object) }
+}
+
+/// The panel of a scale within a width and a height, if it can be that small.
+fn panel(scale: &ColorScale, title: String, capital: f64, room: [f64; 2]) -> Option<Panel<'_>> {
+    let text = |text: &str| glyphs::width(text) * capital / glyphs::CAPITAL;
+    let around = (2.0 * PAD + LINE) * capital;
+    let most = room[0] - 2.0 * PAD * capital;
+    let left = room[1] - around;
+    let (content, height) = match &scale.numbers {
+        ScaleNumbers::Range(range) => {
+            // Half of a number above the bar, and half of one below.
+            let bar = (left - capital).floor();
+            (bar >= LEAST_BAR * capital).then_some(())?;
+            (Content::Bar(bar, told(*range, bar, capital)), bar + capital)
+        }
+        ScaleNumbers::Each(numbers) => {
+            let rows = ((left / (LINE * capital)) as usize).min(MOST_ROWS);
+            let beside = most - (BAR + 2.0 * TICK) * capital;
+            let whole = rows_of(scale, numbers, rows)?.into_iter();
+            let shown = whole.map(|(number, label)| (number, shortened(label, |label| text(label) <= beside)));
+            let content = Content::Rows(shown.collect());
+            (content, (numbers.len().min(rows) as f64 - 1.0) * LINE * capital + BAR * capital)
+        }
+    };
+    let labels: f64 = match &content {
+        Content::Bar(_, told) => told.iter().map(|(_, label)| text(label)).fold(0.0, f64::max),
+        Content::Rows(rows) => rows.iter().map(|(_, label)| text(label)).fold(0.0, f64::max),
+    };
+    let inner = (BAR + 2.0 * TICK) * capital + labels;
+    let title = shortened(title, |title| text(title) <= most.max(inner));
+    let width = (inner.max(text(&title)) + 2.0 * PAD * capital).ceil();
+    (inner <= most).then_some(Panel { title, scale, content, width, height: (height + around).ceil() })
+}
+
+/// The numbers beside a bar: its ends, and round ones that are not too near to them.
+fn told(range: [f64; 2], bar: f64, capital: f64) -> Vec<(f64, String)> {
+    let [low, high] = range;
+    let Ticks { ends, round } = Ticks::of(range, (bar / (2.0 * LINE * capital)) as usize);
+    let near = LINE * capital / bar * (high - low);
+    let is_apart = |(number, _): &(f64, String)| *number - low >= near && high - *number >= near;
+    let ends = if low < high { ends.to_vec() } else { ends[..1].to_vec() };
+    ends.into_iter().chain(round.into_iter().filter(is_apart)).collect()
+}
+
+/// The rows of whole numbers, of which the last says how many there is no room for.
+fn rows_of(scale: &ColorScale, numbers: &[f64], rows: usize) -> Option<Vec<(Option<f64>, String)>> {
+    let name = |number: &f64| {
+        let meaning = scale.meaning(*number).map_or_else(String::new, |meaning| format!(" {meaning}"));
+        (Some(*number), whole(*number) + &meaning)
+    };
+    if numbers.len() <= rows {
+        return Some(numbers.iter().map(name).collect());
+    }
+    let shown = rows.checked_sub(1).filter(|shown| *shown > 0)?;
+    let rest = (None, format!("and {} more", numbers.len() - shown));
+    Some(numbers[..shown].iter().map(name).chain([rest]).collect())
+}
+
+/// A text, or as much of its beginning as fits.
+fn shortened(text: String, fits: impl Fn(&str) -> bool) -> String {
+    if fits(&text) {
+        return text;
+    }
+    let mut beginning: Vec<char> = text.chars().collect();
+    while beginning.pop().is_some() {
+        let shown: String = beginning.iter().chain(&['.'; 3]).collect();
+        if fits(&shown) {
+            return shown;
+        }
+    }
+    String::new()
+}
+
+impl Panel<'_> {
+    /// Draws it with its upper left corner at a place.
+    fn draw(&self, canvas: &mut Canvas<'_>, [left, top]: [f64; 2], capital: f64) {
+        canvas.fill(pixels(left, self.width), pixels(top, self.height), PANEL, PANEL_OPACITY);
+        let (x, below) = (left + PAD * capital, top + (PAD + LINE) * capital);
+        let text = |canvas: &mut Canvas<'_>, at: [f64; 2], text: &str| canvas.text(text, at, capital, TEXT);
+        text(canvas, [x, top + (PAD + 1.0) * capital], &self.title);
+        let bar = pixels(x, BAR * capital);
+        let labels = x + (BAR + 2.0 * TICK) * capital;
+        match &self.content {
+            Content::Bar(height, told) => {
+                let first = (below + 0.5 * capital).round();
+                let (low, high) = (told[0].0, told[told.len().min(2) - 1].0);
+                for row in 0..*height as i64 {
+                    let share = 1.0 - (row as f64 + 0.5) / height;
+                    canvas.fill(
+                        bar.clone(),
+                        pixels(first + row as f64, 1.0),
+                        self.color(low + (high - low) * share),
+                        1.0,
+                    );
+                }
+                for (number, label) in told {
+                    let share = if high > low { (number - low) / (high - low) } else { 0.5 };
+                    let y = first + (1.0 - share) * height;
+                    let tick = pixels(x + BAR * capital, TICK * capital);
+                    canvas.fill(tick, pixels((y - 0.5).round(), (0.1 * capital).max(1.0)), TEXT, 1.0);
+                    text(canvas, [labels, y + 0.5 * capital], label);
+                }
+            }
+            Content::Rows(rows) => {
+                for (i, (number, label)) in rows.iter().enumerate() {
+                    let y = below + i as f64 * LINE * capital;
+                    if let Some(number) = number {
+                        canvas.fill(bar.clone(), pixels(y, BAR * capital), self.color(*number), 1.0);
+                    }
+                    text(canvas, [labels - TICK * capital, y + 0.5 * (BAR + 1.0) * capital], label);
+                }
+            }
+        }
+    }
+
+    /// The displayed colour of a number.
+    fn color(&self, number: f64) -> [f32; 3] {
+        self.scale.color(number).map(encoded)
+    }
+}
+
+/// The pixels from a place on, so many.
+fn pixels(from: f64, length: f64) -> Range<i64> {
+    let first = from.round() as i64;
+    first..first + length.round().max(1.0) as i64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use organza_scene::{ColorMap, PointColors};
+
+    fn of(column: Option<&str>, colors: PointColors, numbers: ScaleNumbers) -> ColorScale {
+        ColorScale { object: "survey".into(), column: column.map(str::to_owned), colors, numbers }
+    }
+
+    fn heights() -> ColorScale {
+        let map = PointColors::Map(ColorMap::VIRIDIS, None);
+        of(Some("height"), map, ScaleNumbers::Range([405.0, 513.0]))
+    }
+
+    /// A picture of one brightness with legends: its samples, and how many had no room.
+    fn drawn([width, height]: [usize; 2], brightness: f32, scales: &[ColorScale]) -> (Vec<[f32; 3]>, u64) {
+        let mut samples = vec![brightness; 3 * width * height];
+        let left = draw(&mut Canvas::new(&mut samples, width as u32, 3), scales);
+        (samples.as_chunks::<3>().0.to_vec(), left)
+    }
+
+    fn count(picture: &[[f32; 3]], is: impl Fn(&[f32; 3]) -> bool) -> usize {
+        picture.iter().filter(|pixel| is(pixel)).count()
+    }
+
+    #[test]
+    fn a_bar_has_every_colour_of_the_map_from_below_upwards_and_leaves_the_middle_alone() {
+        let (picture, left) = drawn([960, 540], 0.5, &[heights()]);
+        assert_eq!(left, 0);
+        let place = |color: [f32; 3]| {
+            let near = |pixel: &[f32; 3]| pixel.iter().zip(color).all(|(a, b)| (a - encoded(b)).abs() < 0.02);
+            picture.iter().position(near).expect("a colour of the map") / 960
+        };
+        let rows = [1.0, 0.75, 0.5, 0.25, 0.0].map(|share| place(ColorMap::VIRIDIS.at(share)));
+        assert!(rows.windows(2).all(|pair| pair[0] < pair[1]), "{rows:?}");
+        let columns = (0..960).filter(|x| picture.iter().skip(*x).step_by(960).any(|p| *p != [0.5; 3]));
+        assert!(columns.min() > Some(960 * 2 / 3));
+    }
+
+    #[test]
+    fn texts_are_legible_on_black_and_on_white() {
+        for brightness in [0.0, 1.0] {
+            let (picture, _) = drawn([480, 270], brightness, &[heights()]);
+            let panel = PANEL[0] * PANEL_OPACITY + brightness * (1.0 - PANEL_OPACITY);
+            let [text, behind] = [1.0, panel].map(|x| 0.05 + f32::powf(x, 2.2));
+            assert!(text / behind > 4.5, "{brightness}: {}", text / behind);
+            let is = |color: f32| move |pixel: &[f32; 3]| pixel.iter().all(|c| (c - color).abs() < 0.05);
+            assert!(count(&picture, is(panel)) > 1000, "{brightness}");
+            assert!(brightness == 1.0 || count(&picture, is(1.0)) > 100, "{}", count(&picture, is(1.0)));
+        }
+    }
+
+    #[test]
+    fn a_picture_of_twice_the_size_has_a_legend_of_twice_the_size() {
+        let area = |scale: usize| {
+            let (picture, _) = drawn([960 * scale, 540 * scale], 0.5, &[heights()]);
+            count(&picture, |pixel| *pixel != [0.5; 3]) as f64
+        };
+        let ratio = area(2) / area(1);
+        assert!((ratio - 4.0).abs() < 0.1, "{ratio}");
+    }
+
+    #[test]
+    fn what_has_no_room_is_counted_and_the_others_stand_above_each_other() {
+        let scales = vec![heights(); 40];
+        let (_, left) = drawn([960, 540], 0.5, &scales);
+        assert!((30..40).contains(&left), "{left}");
+        assert_eq!(drawn([960, 540], 0.5, &scales[..3]).1, 0);
+        assert_eq!(drawn([40, 30], 0.5, &scales[..1]).1, 1);
+        assert_eq!(drawn([960, 540], 0.5, &[]), (vec![[0.5; 3]; 960 * 540], 0));
+    }
+
+    #[test]
+    fn whole_numbers_have_a_row_each_with_what_they_mean() {
+        let numbers: Vec<f64> = (0..64).map(f64::from).collect();
+        let scale = of(Some("class"), PointColors::Classes, ScaleNumbers::Each(numbers.clone()));
+        let rows = rows_of(&scale, &numbers, 5).expect("room for rows");
+        assert_eq!(rows[2], (Some(2.0), "2 ground".to_owned()));
+        assert_eq!(rows[4], (None, "and 60 more".to_owned()));
+        assert_eq!(rows_of(&scale, &numbers[..3], 5).map(|rows| rows.len()), Some(3));
+        assert_eq!(rows_of(&scale, &numbers, 1), None);
+        assert_eq!(drawn([480, 270], 0.5, &[scale]).1, 0);
+    }
+
+    #[test]
+    fn names_tell_objects_apart_where_columns_do_not_and_long_ones_are_shortened() {
+        let other = ColorScale { object: "scan".into(), ..heights() };
+        let volume = of(None, PointColors::Distinct, ScaleNumbers::Range([0.0, 1.0]));
+        let all = [heights(), other, volume];
+        assert_eq!(all.each_ref().map(|s| title(s, &all)), ["survey: height", "scan: height", "survey"]);
+        assert_eq!(title(&all[0], &all[..1]), "height");
+        assert_eq!(shortened("a long name".into(), |text| text.len() < 9), "a lon...");
+        assert_eq!(drawn([480, 270], 0.5, &[ColorScale { column: Some("w".repeat(256)), ..heights() }]).1, 0);
+    }
+
+    #[test]
+    fn a_column_of_one_number_has_one_tick() {
+        assert_eq!(told([4.0, 4.0], 100.0, 8.0), [(4.0, "4".to_owned())]);
+        let all = told([0.0, 100.0], 200.0, 10.0);
+        assert_eq!(all.iter().map(|(_, text)| text.as_str()).collect::<Vec<_>>(), ["0", "100", "20", "40", "60", "80"]);
+    }
+}
