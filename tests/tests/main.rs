@@ -3,11 +3,13 @@
 
 mod accuracy;
 mod animation;
+mod attributes;
 mod bad_scenes;
 mod borders;
 mod cache;
 mod closed_forms;
 mod command;
+mod converted;
 mod doubts;
 mod environment;
 mod every_key;

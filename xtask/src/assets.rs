@@ -1,5 +1,6 @@
 //! `cargo xtask assets`: what lies under `assets/`, and where the larger inputs of the benchmarks come from.
 
+mod lines;
 mod sky;
 mod solids;
 
@@ -52,6 +53,13 @@ pub(crate) fn write_solids(repo: &Repo) -> Outcome {
         said.push(format!("{} bytes in {}", text.len(), path.display()));
     }
     Ok(said.join("\n"))
+}
+
+/// Writes the points that are made by formula.
+pub(crate) fn write_points(repo: &Repo) -> Outcome {
+    let (path, text) = (repo.root.join("assets/points/lines.csv"), lines::csv());
+    std::fs::write(&path, &text).map_err(|e| format!("{}: {e}", path.display()))?;
+    Ok(format!("{} bytes in {}", text.len(), path.display()))
 }
 
 #[cfg(test)]

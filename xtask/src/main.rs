@@ -31,6 +31,7 @@ usage: cargo xtask COMMAND
   papers --check   fails where docs/papers.md is stale or names code or a test that does not exist
   assets           lists the files under assets/, their credit files, and where the larger inputs come from
   assets sky       writes assets/environment/sky.hdr, an environment by formula
+  assets points    writes assets/points/lines.csv, lines of a scan by formula
   assets solids    writes assets/meshes/*.off, a mushroom, a dart and an aeroplane by tables
   shaders          compiles shaders/glsl to shaders/spirv and writes the manifest; builds glslang first (C++, minutes)
   shaders --check  fails where the committed modules are not what their sources compile to
@@ -56,6 +57,7 @@ fn main() -> ExitCode {
         ["papers", "--check"] => Repo::open().and_then(|repo| papers::check(&repo)),
         ["assets"] => Repo::open().and_then(|repo| assets::run(&repo)),
         ["assets", "sky"] => Repo::open().and_then(|repo| assets::write_sky(&repo)),
+        ["assets", "points"] => Repo::open().and_then(|repo| assets::write_points(&repo)),
         ["assets", "solids"] => Repo::open().and_then(|repo| assets::write_solids(&repo)),
         ["shaders"] => Repo::open().and_then(|repo| shaders::run(&repo, false)),
         ["shaders", "--check"] => Repo::open().and_then(|repo| shaders::run(&repo, true)),

@@ -1,4 +1,5 @@
-//! Colours of points by a column of theirs: by a map, by whole numbers, or by a transfer function.
+//! Colours of points by a column of theirs: by a map, by whole numbers, or by a transfer function, which may classify them too: say how opaque
+//! they are, or what they absorb.
 
 use crate::columns::CHUNK;
 use crate::srgb::linear_from_hex;
@@ -51,8 +52,20 @@ pub enum PointColors {
     Classes,
     /// Whole numbers, in twelve colours in turns.
     Distinct,
-    /// By control points; extinctions are not used.
-    Transfer(TransferFunction),
+    /// By control points, whose extinctions stand for that.
+    Transfer(TransferFunction, Classified),
+}
+
+/// What the extinctions of a transfer function stand for that gives points their colours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Classified {
+    /// Nothing: they are not used.
+    #[default]
+    No,
+    /// Opacity of one crossing, in \[0, 1\], by which that of a surface is multiplied.
+    Opacity,
+    /// What the extinction of points that are a medium is multiplied by, ≥ 0.
+    Extinction,
 }
 
 /// A column that points take their colours from.
@@ -69,9 +82,11 @@ pub struct ColorBy {
 pub struct Colored {
     /// Linear Rec.709, one a point.
     pub color: Vec<[f32; 3]>,
+    /// What a transfer function that classifies says of each point; empty for others.
+    pub classified: Vec<f32>,
     /// The numbers at the ends of a colour map.
     pub range: Option<[f64; 2]>,
-    /// Points whose number is a gap, see [`crate::Column`]; they have the colour of `splat`.
+    /// Points whose number is a gap, see [`crate::Column`]; they have the colour of `splat`, and are neither made transparent nor absorb.
     pub gaps: u64,
     /// Of [`PointColors::Classes`] and [`PointColors::Distinct`] the whole numbers that occur, rising, the least 64 of them.
     pub present: Vec<f64>,
@@ -91,7 +106,7 @@ impl PointColors {
             Self::Map(map, _) => map.at(place(number, range)),
             Self::Classes => class_color(number),
             Self::Distinct => distinct(number),
-            Self::Transfer(transfer) => transfer.at(number as f32).color,
+            Self::Transfer(transfer, _) => transfer.at(number as f32).color,
         }
     }
 }
@@ -125,10 +140,17 @@ pub fn colored(points: &RawPoints, by: &ColorBy, up: DVec3, splat: &SplatParams)
     let color = |number: &f64| {
         if number.is_finite() { by.colors.at(*number, range.unwrap_or_default()) } else { splat.color }
     };
+    let classified = |number: &f64| match &by.colors {
+        PointColors::Transfer(transfer, _) if number.is_finite() => transfer.at(*number as f32).extinction,
+        PointColors::Transfer(_, Classified::Opacity) => 1.0,
+        _ => 0.0,
+    };
+    let classifies = matches!(by.colors, PointColors::Transfer(_, Classified::Opacity | Classified::Extinction));
+    let classified = if classifies { numbers.par_iter().map(classified).collect() } else { Vec::new() };
     let gaps = numbers.iter().filter(|n| !n.is_finite()).count() as u64;
     let is_of_whole = matches!(by.colors, PointColors::Classes | PointColors::Distinct);
     let present = if is_of_whole { present(&numbers) } else { Vec::new() };
-    Ok(Colored { color: numbers.par_iter().map(color).collect(), range, gaps, present })
+    Ok(Colored { color: numbers.par_iter().map(color).collect(), classified, range, gaps, present })
 }
 
 /// The least whole numbers that occur, rising.
@@ -235,7 +257,17 @@ mod tests {
     fn a_transfer_function_gives_its_colours() {
         let point = |value, red| TransferPoint { value, color: [red, 0.0, 1.0], extinction: 0.0 };
         let transfer = TransferFunction::new(vec![point(0.0, 0.0), point(4.0, 1.0)]).expect("rising values");
-        assert_eq!(of(vec![1.0, 9.0], PointColors::Transfer(transfer)).color, [[0.25, 0.0, 1.0], [1.0, 0.0, 1.0]]);
+        let found = of(vec![1.0, 9.0], PointColors::Transfer(transfer, Classified::No));
+        assert_eq!((found.color, found.classified), (vec![[0.25, 0.0, 1.0], [1.0, 0.0, 1.0]], Vec::new()));
+    }
+
+    #[test]
+    fn a_transfer_function_classifies_and_gaps_stay_what_they_are() {
+        let point = |value, extinction| TransferPoint { value, color: [1.0; 3], extinction };
+        let transfer = TransferFunction::new(vec![point(0.0, 0.0), point(4.0, 1.0)]).expect("rising values");
+        let of = |by| of(vec![-1.0, 1.0, f64::NAN, 9.0], PointColors::Transfer(transfer.clone(), by)).classified;
+        assert_eq!(of(Classified::Opacity), [0.0, 0.25, 1.0, 1.0]);
+        assert_eq!(of(Classified::Extinction), [0.0, 0.25, 0.0, 1.0]);
     }
 
     #[test]

@@ -30,7 +30,7 @@ impl ColorScale {
     pub fn of_points(object: &str, by: &ColorBy, colored: &Colored) -> Option<Self> {
         let numbers = match (&by.colors, colored.range) {
             (PointColors::Map(..), range) => ScaleNumbers::Range(range.filter(|_| colored.has_numbers())?),
-            (PointColors::Transfer(transfer), _) => ScaleNumbers::Range(ends(transfer)),
+            (PointColors::Transfer(transfer, _), _) => ScaleNumbers::Range(ends(transfer)),
             (PointColors::Classes | PointColors::Distinct, _) => ScaleNumbers::Each(colored.present.clone()),
         };
         let is_empty = matches!(&numbers, ScaleNumbers::Each(present) if present.is_empty());
@@ -53,7 +53,7 @@ impl ColorScale {
         let last = points.iter().rposition(|p| shows(p.value)).unwrap_or(points.len() - 1);
         let [low, high] =
             [first.saturating_sub(1), (last + 1).min(points.len() - 1)].map(|i| f64::from(points[i].value));
-        let (object, colors) = (object.to_owned(), PointColors::Transfer(transfer.clone()));
+        let (object, colors) = (object.to_owned(), PointColors::Transfer(transfer.clone(), crate::Classified::No));
         Self { object, column: None, colors, numbers: ScaleNumbers::Range([low, high]) }
     }
 

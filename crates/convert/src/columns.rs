@@ -18,6 +18,8 @@ pub(crate) struct Wanted {
     pub(crate) shading_normal: bool,
     /// Semi-axes of discs.
     pub(crate) tangent: bool,
+    /// Shares of shadows.
+    pub(crate) shadow_coefficient: bool,
     /// Physical values.
     pub(crate) value: bool,
     /// Optical depths of one crossing, for translucent surfaces.
@@ -32,7 +34,7 @@ impl Wanted {
         let required = size_of::<Vec3>() + 2 * size_of::<f32>() + size_of::<[f32; 3]>();
         let ids = size_of::<SplatKind>() + size_of::<u16>() + size_of::<u8>() + size_of::<u32>();
         let vectors = [self.normal, self.shading_normal, self.tangent].map(usize::from).iter().sum::<usize>();
-        let numbers = usize::from(self.value) + usize::from(self.crossing_depth);
+        let numbers = [self.shadow_coefficient, self.value, self.crossing_depth].map(usize::from).iter().sum::<usize>();
         let optional = vectors * size_of::<Vec3>() + numbers * size_of::<f32>();
         let of_gaussian = self.gaussian.map_or(0, |degree| size_of::<u32>() as u64 + Gaussians::bytes_each(degree));
         (required + ids + optional) as u64 + of_gaussian
@@ -57,6 +59,7 @@ pub(crate) fn size_columns(
     sized(&mut cloud.normal, if wanted.normal { n } else { 0 }).map_err(full)?;
     sized(&mut cloud.shading_normal, if wanted.shading_normal { n } else { 0 }).map_err(full)?;
     sized(&mut cloud.tangent, if wanted.tangent { n } else { 0 }).map_err(full)?;
+    sized(&mut cloud.shadow_coefficient, if wanted.shadow_coefficient { n } else { 0 }).map_err(full)?;
     sized(&mut cloud.value, if wanted.value { n } else { 0 }).map_err(full)?;
     sized(&mut cloud.crossing_depth, if wanted.crossing_depth { n } else { 0 }).map_err(full)?;
     constant(&mut cloud.kind, n, kind);
@@ -65,7 +68,6 @@ pub(crate) fn size_columns(
     constant(&mut cloud.object, n, params.object);
     sized(&mut cloud.gaussian, if wanted.gaussian.is_some() { n } else { 0 }).map_err(full)?;
     cloud.gaussians = Arc::default();
-    cloud.shadow_coefficient.clear();
     Ok(())
 }
 

@@ -68,6 +68,7 @@ pub fn kept(points: &RawPoints, by: &[Kept], clips: &[Clip], up: DVec3) -> RawPo
         }),
         dropped: points.dropped,
         gaussians: points.gaussians.chosen(&keeps),
+        ready: points.ready.chosen(&keeps),
     }
 }
 

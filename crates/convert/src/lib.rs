@@ -20,6 +20,8 @@ mod borders;
 mod bricks;
 #[cfg(feature = "cache")]
 mod cache;
+#[cfg(feature = "surfels")]
+mod cell_ellipse;
 mod cell_share;
 #[cfg(feature = "surfels")]
 mod cell_volume;
@@ -33,6 +35,8 @@ mod combine;
 mod convert_error;
 pub mod cost;
 mod counted;
+#[cfg(feature = "surfels")]
+mod discs;
 mod domain;
 #[cfg(feature = "read")]
 mod error;
@@ -40,6 +44,8 @@ mod error;
 mod expression;
 mod extremes;
 mod field_points;
+#[cfg(feature = "surfels")]
+mod from_splats;
 #[cfg(feature = "surfels")]
 mod gaussian_points;
 mod grid_field;
@@ -50,8 +56,6 @@ mod lid;
 mod marching_cubes;
 #[cfg(feature = "surfels")]
 mod matter;
-#[cfg(any(feature = "read", feature = "surfels"))]
-mod matter_columns;
 mod mesh_points;
 #[cfg(feature = "surfels")]
 mod mpu;
@@ -65,6 +69,8 @@ mod params;
 mod pieces;
 #[cfg(feature = "surfels")]
 mod places;
+#[cfg(any(feature = "read", feature = "surfels"))]
+mod point_attributes;
 #[cfg(feature = "surfels")]
 mod point_cells;
 #[cfg(feature = "noise")]
@@ -72,6 +78,7 @@ mod procedural;
 mod raw_points;
 #[cfg(feature = "read")]
 pub mod read;
+mod ready_splats;
 pub mod reference;
 mod resample;
 mod search;
@@ -93,16 +100,19 @@ mod vertex_normals;
 mod volume_points;
 #[cfg(feature = "surfels")]
 mod voronoi_cell;
+mod write_splats;
 
 pub use body_centred::body_centred;
 #[cfg(feature = "cache")]
 pub use cache::Cache;
 pub use clipped_mesh::clipped_mesh;
-pub use color_by::{ColorBy, Colored, PointColors, class_name, colored};
+pub use color_by::{Classified, ColorBy, Colored, PointColors, class_name, colored};
 pub use color_map::ColorMap;
 pub use color_scale::{ColorScale, ScaleNumbers};
 pub use combine::{ClippedField, CombinedField, RegionField, SharedField};
 pub use convert_error::ConvertError;
+#[cfg(feature = "surfels")]
+pub use discs::{DiscShape, DiscSize};
 #[cfg(feature = "read")]
 pub use error::{Fault, Place, ReadError, escaped_path};
 #[cfg(feature = "expression")]
@@ -129,6 +139,7 @@ pub use point_cells::with_cells;
 #[cfg(feature = "noise")]
 pub use procedural::{CloudShape, Ellipsoid, procedural_cloud};
 pub use raw_points::{Column, PointCell, PointLattice, RawPoints};
+pub use ready_splats::ReadySplats;
 pub use resample::resampled;
 pub use search::{ZeroSearch, extinct_bounds, visible_ends};
 pub use section::{Section, volume_section};
@@ -138,8 +149,9 @@ pub use shown_points::{PointsShown, ShownPoints, shown_points};
 pub use sobel::{sobel_gradient, sobel_gradient_into};
 pub use splat_core::Clip;
 #[cfg(feature = "surfels")]
-pub use surfels::{DiscSize, SurfelParams, SurfelReport, raw_to_surfels};
+pub use surfels::{SurfelParams, SurfelReport, raw_to_surfels};
 #[cfg(feature = "surfels")]
 pub use thin::thinned;
 pub use vertex_normals::vertex_normals;
 pub use volume_points::{VolumeParams, VolumeReport, volume_to_points};
+pub use write_splats::splats_to_ply;

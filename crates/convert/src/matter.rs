@@ -3,13 +3,16 @@
 //! Gunjee 2007 takes points with all attributes, extinction and size among them; simulations and samples of clouds give places. Point
 //! i gets the volume Vᵢ of its cell ([`crate::cell_volume`]), the cross-section Kᵢ = σᵢ·Vᵢ and a kernel of the radius R = cutoff·0.8·Vᵢ^(1/3),
 //! as a voxel of that volume has, so that kernels sum to about σ within the points. Where the file states the reach of kernels,
-//! R is that, and K stays: a wider kernel blurs, and takes no matter away.
+//! R is that, and K stays: a wider kernel blurs, and takes no matter away. Where it states masses, as of the equal particles of a
+//! simulation, Kᵢ = κᵢ·mᵢ, however dense the points lie, and σ is κ, an area a unit of mass.
 //!
 //! Points at one place share its volume, and points that become one have the sum of their cross-sections.
 
 use crate::columns::{self, CHUNK, Wanted};
-use crate::matter_columns::{EXTINCTION, RADIUS, SMOOTHING_LENGTH, expected, of_matter};
 use crate::params::SplatParams;
+use crate::point_attributes::{
+    EXTINCTION, MASS, RADIUS, SHADOW_COEFFICIENT, SMOOTHING_LENGTH, TANGENT, attribute, expected,
+};
 use crate::point_cells::{cells_of, cut_outliers};
 use crate::surfels::{canonical_order, distinct_places};
 use crate::thin;
@@ -25,7 +28,8 @@ pub struct MatterParams {
     pub splat: SplatParams,
     /// Whether splats keep the points' colours.
     pub colors: bool,
-    /// Extinction σ_t within the points, 1/world unit, ≥ 0; that of points with a column `extinction` is its numbers times this.
+    /// Extinction σ_t within the points, 1/world unit, ≥ 0; that of points with a column `extinction` is its numbers times this. Of points
+    /// with a column `mass` it is their cross-section a unit of mass, world units².
     pub extinction: f64,
     /// Points of a cell of a lattice with this step become one splat, as in [`crate::thinned`]; units of the file, > 0.
     pub spacing: Option<f64>,
@@ -78,7 +82,8 @@ impl MatterReport {
 /// Makes a cloud of medium splats of raw points.
 ///
 /// Columns of the points (`RawPoints::columns`) say more, each a number a point: `radius`, the reach of its kernel in units of the file, or
-/// `smoothing_length`, half of that, > 0; and `extinction`, a factor of the parameter, ≥ 0.
+/// `smoothing_length`, half of that, > 0; `extinction`, a factor of the parameter, ≥ 0; `mass`, which the parameter is multiplied by in the
+/// place of a volume, ≥ 0; and `shadow_coefficient`, the share of a shadow that it receives, in \[0, 1\].
 ///
 /// ```
 /// use convert::{MatterParams, RawPoints, raw_to_matter};
@@ -128,7 +133,10 @@ pub(crate) fn check(points: &RawPoints, params: &MatterParams) -> Result<(), Con
     if !points.gaussians.is_empty() {
         return Err(p.bad("as", "medium", "\"surface\": 3D Gaussians have shapes and opacities of their own"));
     }
-    points.validate().and_then(|()| check_columns(points)).map_err(|e| p.input(e))?;
+    if !points.ready.cloud.is_empty() {
+        return Err(p.bad("as", "medium", "\"surface\": splats of a file are what they are, media too"));
+    }
+    points.validate().and_then(|()| check_columns(points, true)).map_err(|e| p.input(e))?;
     if !(params.extinction.is_finite() && params.extinction >= 0.0) {
         return Err(p.bad("extinction", params.extinction, "a finite number ≥ 0"));
     }
@@ -139,10 +147,10 @@ pub(crate) fn check(points: &RawPoints, params: &MatterParams) -> Result<(), Con
     p.check_spacing(params.lone_spacing).map(|_| ())
 }
 
-/// Refuses numbers that matter cannot have.
-fn check_columns(points: &RawPoints) -> Result<(), Error> {
+/// Refuses numbers that attributes cannot have: those of discs, or of matter.
+pub(crate) fn check_columns(points: &RawPoints, matter: bool) -> Result<(), Error> {
     for Column { name, values } in &points.columns {
-        let Some(attribute) = of_matter(name) else { continue };
+        let Some(attribute) = attribute(name, matter) else { continue };
         let wrong = values.iter().enumerate().find_map(|(i, v)| Some((i, *v, expected(attribute, *v)?)));
         if let Some((i, number, expected)) = wrong {
             return Err(Error::invalid("point", i, attribute, number, expected));
@@ -156,13 +164,20 @@ struct OfMatter<'a> {
     /// Numbers, and what they are multiplied by to be reaches.
     reach: Option<(&'a [f64], f64)>,
     extinction: Option<&'a [f64]>,
+    mass: Option<&'a [f64]>,
+    shadow_coefficient: Option<&'a [f64]>,
 }
 
 impl<'a> OfMatter<'a> {
     fn new(points: &'a RawPoints) -> Self {
-        let column = |name| points.columns.iter().find(|c: &&Column| c.name == name).map(|c| &c.values[..]);
+        let column = |name| points.own_column(name);
         let smoothed = || column(SMOOTHING_LENGTH).map(|lengths| (lengths, 2.0));
-        Self { reach: column(RADIUS).map(|radii| (radii, 1.0)).or_else(smoothed), extinction: column(EXTINCTION) }
+        Self {
+            reach: column(RADIUS).map(|radii| (radii, 1.0)).or_else(smoothed),
+            extinction: column(EXTINCTION),
+            mass: column(MASS),
+            shadow_coefficient: column(SHADOW_COEFFICIENT),
+        }
     }
 
     /// The reach of the kernel of point `i` in the unit of the file, where that is stated.
@@ -170,9 +185,14 @@ impl<'a> OfMatter<'a> {
         self.reach.map(|(lengths, factor)| factor * lengths[i])
     }
 
-    /// The factor of the extinction of point `i`.
-    fn extinction(&self, i: usize) -> f64 {
-        self.extinction.map_or(1.0, |factors| factors[i])
+    /// What the object's extinction is multiplied by to be the cross-section of point `i`, which stands for a volume of the world.
+    fn amount(&self, i: usize, volume: f64) -> f64 {
+        self.extinction.map_or(1.0, |factors| factors[i]) * self.mass.map_or(volume, |masses| masses[i])
+    }
+
+    /// Share of a shadow that point `i` receives.
+    fn shadow_coefficient(&self, i: usize) -> f64 {
+        self.shadow_coefficient.map_or(1.0, |shares| shares[i])
     }
 }
 
@@ -182,7 +202,9 @@ pub(crate) fn unused_by_matter(points: &RawPoints) -> Vec<String> {
     let opacity =
         (!points.opacity.is_empty()).then(|| "a medium does not use `opacity`: it has an extinction".to_owned());
     let length = || format!("a medium does not use `{SMOOTHING_LENGTH}` beside `{RADIUS}`");
-    opacity.into_iter().chain((has(RADIUS) && has(SMOOTHING_LENGTH)).then(length)).collect()
+    let tangent = TANGENT.into_iter().find(|name| has(name));
+    let tangent = tangent.map(|name| format!("a medium does not use `{name}`: its kernels are balls"));
+    opacity.into_iter().chain((has(RADIUS) && has(SMOOTHING_LENGTH)).then(length)).chain(tangent).collect()
 }
 
 /// How many splats a conversion makes.
@@ -202,7 +224,7 @@ impl Merged {
     fn new(points: &RawPoints, params: &MatterParams, order: Vec<u32>) -> Self {
         let matter = OfMatter::new(points);
         // What f32 does not hold is none.
-        let absorbs = |i: &u32| (params.extinction * matter.extinction(*i as usize)) as f32 > 0.0;
+        let absorbs = |i: &u32| (params.extinction * matter.amount(*i as usize, 1.0)) as f32 > 0.0;
         let Some(spacing) = params.spacing else {
             let ids: Vec<u32> = order.into_iter().filter(absorbs).collect();
             let starts = (0..=ids.len() as u32).collect();
@@ -235,8 +257,10 @@ fn emit(
 ) -> Result<Cloud, ConvertError> {
     let (p, t) = (&params.splat, &params.splat.transform);
     let mut cloud = Cloud::new(t.apply(points.origin));
-    columns::size_columns(&mut cloud, merged.len(), SplatKind::Medium, Wanted::default(), p)?;
+    columns::size_columns(&mut cloud, merged.len(), SplatKind::Medium, wanted(points), p)?;
     let matter = OfMatter::new(points);
+    // By what the points of one splat are weighed.
+    let amount = |i: usize| matter.amount(i, cells[i].volume * t.scale.powi(3));
     let reach = |i: usize| match matter.reach(i) {
         Some(stated) => stated * t.scale,
         None => p.radius(cells[i].spacing * t.scale),
@@ -245,12 +269,11 @@ fn emit(
     columns.into_par_iter().enumerate().with_min_len(CHUNK).for_each(
         |(splat, (position, radius, cross_section, color))| {
             let ids = merged.points_of(splat);
-            let mass = |i: usize| params.extinction * matter.extinction(i) * cells[i].volume;
-            let total: f64 = ids.iter().map(|i| mass(*i as usize)).sum();
+            let total: f64 = ids.iter().map(|i| amount(*i as usize)).sum();
             let volume: f64 = ids.iter().map(|i| cells[*i as usize].volume).sum();
             let (mut place, mut tint, mut mean_reach) = (DVec3::ZERO, DVec3::ZERO, 0.0);
             for i in ids.iter().map(|i| *i as usize) {
-                let share = mass(i) / total;
+                let share = amount(i) / total;
                 let own = points.color.get(i).filter(|_| params.colors).unwrap_or(&p.color);
                 place += share * points.position[i].as_dvec3();
                 tint += share * Vec3::from_array(*own).as_dvec3();
@@ -260,9 +283,21 @@ fn emit(
             let least = if ids.len() > 1 { p.radius(libm::cbrt(volume) * t.scale) } else { 0.0 };
             *position = (t.rotation * (place * t.scale)).as_vec3();
             *radius = mean_reach.max(least) as f32;
-            *cross_section = (total * t.scale.powi(3)) as f32;
+            *cross_section = (params.extinction * total) as f32;
             *color = tint.as_vec3().to_array();
         },
     );
+    let coefficients = cloud.shadow_coefficient.par_iter_mut().enumerate().with_min_len(CHUNK);
+    coefficients.for_each(|(splat, coefficient)| {
+        let ids = || merged.points_of(splat).iter().map(|i| *i as usize);
+        let total: f64 = ids().map(amount).sum();
+        let mean: f64 = ids().map(|i| amount(i) / total * matter.shadow_coefficient(i)).sum();
+        *coefficient = mean.clamp(0.0, 1.0) as f32;
+    });
     Ok(cloud)
+}
+
+/// Which columns the splats fill.
+pub(crate) fn wanted(points: &RawPoints) -> Wanted {
+    Wanted { shadow_coefficient: points.own_column(SHADOW_COEFFICIENT).is_some(), ..Wanted::default() }
 }

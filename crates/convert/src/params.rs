@@ -102,7 +102,12 @@ impl SplatParams {
         found: impl std::fmt::Debug,
         expected: &'static str,
     ) -> ConvertError {
-        ConvertError::Parameter { object: self.object_name.clone(), parameter, found: format!("{found:?}"), expected }
+        self.bad_text(parameter, format!("{found:?}"), expected)
+    }
+
+    /// A parameter error whose value is told in words.
+    pub(crate) fn bad_text(&self, parameter: &'static str, found: String, expected: &'static str) -> ConvertError {
+        ConvertError::Parameter { object: self.object_name.clone(), parameter, found, expected }
     }
 
     /// Turns a broken promise of an input into an error that names this object.

@@ -1,10 +1,12 @@
 //! What is known about each distinct place of raw points: normal, area and spacing, from its neighbours.
 
+use crate::cell_ellipse::ellipse;
 use crate::convert_error::check_cancelled;
+use crate::discs::DiscShape;
 use crate::neighbours::{MAX_NEIGHBOURS, MAX_WAITING, Nearest, Tree, WIDTH, Waiting};
 use crate::orient::{self, Orientation};
 use crate::tangent_plane::{Offset, fit_normals};
-use crate::voronoi_cell::{Cells, voronoi_cells};
+use crate::voronoi_cell::voronoi_sides;
 use crate::{ConvertError, SurfelParams};
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
@@ -25,6 +27,10 @@ pub(crate) struct Place {
     pub(crate) area: f64,
     /// Object units.
     pub(crate) spacing: f64,
+    /// The spacing along the way in which others lie farthest apart, object units; zero where that is `spacing` in all directions.
+    pub(crate) long: Vec3,
+    /// The one across it.
+    pub(crate) across: f32,
 }
 
 /// The neighbours of every place, as many of each.
@@ -112,7 +118,7 @@ fn leaf_places(offsets: &[Offset], params: &SurfelParams, out: &mut [Place]) {
     let Some(farthest) = offsets.last() else {
         let spacing = params.lone_spacing / params.splat.transform.scale;
         let normal = orient::guess(params.orientation, DVec3::ZERO).as_vec3();
-        out.fill(Place { normal, plane: 0, area: spacing * spacing, spacing });
+        out.fill(Place { normal, plane: 0, area: spacing * spacing, spacing, ..Place::default() });
         return;
     };
     let planes = fit_normals(offsets);
@@ -121,10 +127,19 @@ fn leaf_places(offsets: &[Offset], params: &SurfelParams, out: &mut [Place]) {
         let line = || DVec3::new(farthest[0][i].into(), farthest[1][i].into(), farthest[2][i].into());
         normals[i] = planes[i].unwrap_or_else(|| orient::guess(params.orientation, line()));
     }
-    let Cells { area, reach } = voronoi_cells(offsets, &normals);
+    let lines = voronoi_sides(offsets, &normals);
+    let cells = lines.cells();
     for (i, out) in out.iter_mut().enumerate() {
-        let root = area[i].sqrt();
-        let spacing = (std::f64::consts::SQRT_2 * reach[i]).clamp(root, 2.0 * root);
-        *out = Place { normal: normals[i].as_vec3(), plane: planes[i].is_some().into(), area: area[i], spacing };
+        let (area, root) = (cells.area[i], cells.area[i].sqrt());
+        let spacing = (std::f64::consts::SQRT_2 * cells.reach[i]).clamp(root, 2.0 * root);
+        let (normal, plane) = (normals[i].as_vec3(), planes[i].is_some().into());
+        let (long, across) = match params.shape {
+            DiscShape::Round => (Vec3::ZERO, 0.0),
+            DiscShape::Elliptical => {
+                let (long, across) = ellipse(&lines, &cells, i, normals[i], spacing);
+                (long.as_vec3(), across as f32)
+            }
+        };
+        *out = Place { normal, plane, area, spacing, long, across };
     }
 }

@@ -1,8 +1,11 @@
 //! Points as a scanner or a file gives them: no radius, perhaps no normal.
 
+#[cfg(feature = "surfels")]
+use crate::point_attributes::attribute;
+use crate::ready_splats::ReadySplats;
 use crate::vertex_normals::vertex_normals;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Aabb, DAabb, Error, Gaussians, Mesh};
+use splat_core::{Aabb, DAabb, Error, Gaussians, Mesh, SplatKind};
 
 /// Raw points as columns; all but the positions may be empty.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -31,6 +34,8 @@ pub struct RawPoints {
     pub dropped: u64,
     /// The Gaussian that each point is the centre of, units and axes of the file; empty for points that are none.
     pub gaussians: Gaussians,
+    /// The splat that each point is already; empty for points that are still to become some.
+    pub ready: ReadySplats,
 }
 
 /// A column of a file that has no meaning of its own here. A number that is none, or is not finite, is a gap.
@@ -121,6 +126,11 @@ impl RawPoints {
         (!seen.is_empty()).then(|| DAabb::new(ends(-1.0), ends(1.0)))
     }
 
+    /// The numbers of one of [`RawPoints::columns`].
+    pub(crate) fn own_column(&self, name: &str) -> Option<&[f64]> {
+        self.columns.iter().find(|c| c.name == name).map(|c| &c.values[..])
+    }
+
     /// The numbers of a column by its name, the one of the file before the ones that all points have:
     ///
     /// | name | numbers |
@@ -132,14 +142,15 @@ impl RawPoints {
     /// | `opacity` | [`RawPoints::opacity`] |
     /// | `x`, `y`, `z` | coordinates in the unit of the file, as exact as it has them |
     /// | `height` | the coordinate along `up` |
+    /// | that of an attribute of [`RawPoints::ready`] | as files of splats name it |
     ///
     /// `None` where the points have no such column.
     pub fn column(&self, name: &str, up: DVec3) -> Option<Vec<f64>> {
         let along = |axis: DVec3| Some((0..self.len()).map(|i| self.exact_position(i).dot(axis)).collect());
-        let own = |name: &str| self.columns.iter().find(|c| c.name == name).map(|c| c.values.clone());
+        let own = |name: &str| self.own_column(name).map(<[f64]>::to_vec);
         let some =
             |column: &[f32]| (!column.is_empty()).then(|| column.iter().map(|v| f64::from(*v)).collect::<Vec<f64>>());
-        if let Some(own) = own(name).or_else(|| own(unaliased(name))) {
+        if let Some(own) = own(name).or_else(|| own(unaliased(name))).or_else(|| self.ready.column(unaliased(name))) {
             return Some(own);
         }
         match unaliased(name) {
@@ -163,6 +174,16 @@ impl RawPoints {
         columns.into_iter().filter(move |(name, is_empty)| !is_empty && !is_asked(name)).map(|(name, _)| name)
     }
 
+    /// What a field through the points makes no use of in their columns, one sentence without a full stop each.
+    #[cfg(feature = "surfels")]
+    pub fn unused_by_fields(&self) -> Vec<String> {
+        let opacity = "`level_set` does not use opacities: it has that of its object".to_owned();
+        let attribute = self.columns.iter().find(|c| attribute(&c.name, true).is_some());
+        let attribute =
+            attribute.map(|c| format!("`level_set` does not use `{}`: its points are places alone", c.name));
+        (!self.opacity.is_empty()).then_some(opacity).into_iter().chain(attribute).collect()
+    }
+
     /// Names that [`RawPoints::column`] knows for these points.
     pub fn column_names(&self) -> impl Iterator<Item = &str> {
         let some = [
@@ -171,18 +192,24 @@ impl RawPoints {
             ("opacity", !self.opacity.is_empty()),
         ];
         let all = some.into_iter().filter(|(_, is_there)| *is_there).map(|(name, _)| name);
-        all.chain(["x", "y", "z", "height"]).chain(self.columns.iter().map(|c| c.name.as_str()))
+        let own = self.columns.iter().map(|c| c.name.as_str());
+        all.chain(["x", "y", "z", "height"]).chain(own).chain(self.ready.columns().map(|column| column.name))
     }
 
     /// Bytes held by the columns, all of them counted: position, normal, colour, value, opacity, class, integers and further ones; and
     /// Gaussians.
     pub fn bytes(&self) -> u64 {
         let cells = (self.cells.len() * size_of::<PointCell>()) as u64;
-        (64 + 8 * self.columns.len() as u64) * self.len() as u64 + cells + self.gaussians.bytes()
+        let columns = (64 + 8 * self.columns.len() as u64) * self.len() as u64;
+        columns + cells + self.gaussians.bytes() + self.ready.cloud.bytes()
     }
 
-    /// The least opacity of a point; 1 where the file has none, and without points. That of a Gaussian is below 1.
+    /// The least opacity of a point; 1 where the file has none, and without points. That of a Gaussian is below 1; of splats it is 0 if one of
+    /// them is not opaque.
     pub fn least_opacity(&self) -> f32 {
+        if self.ready.cloud.kind.iter().any(|kind| *kind != SplatKind::Opaque) {
+            return 0.0;
+        }
         let most = if self.gaussians.is_empty() { 1.0 } else { Gaussians::MOST_OPACITY };
         self.opacity.iter().chain(&self.gaussians.opacity).copied().fold(most, f32::min)
     }
@@ -213,6 +240,7 @@ impl RawPoints {
             ("cells", self.cells.len()),
             ("lattice", self.lattice.as_ref().map_or(0, |l| l.steps.len())),
             ("gaussians", self.gaussians.len()),
+            ("splats", self.ready.cloud.len()),
         ];
         for (attribute, found) in columns.into_iter().chain(self.columns.iter().map(|c| ("columns", c.values.len()))) {
             if found != 0 && found != expected {
@@ -237,7 +265,8 @@ impl RawPoints {
         if let Some(i) = self.opacity.iter().position(|a| !(0.0..=1.0).contains(a)) {
             return Err(Error::invalid("point", i, "opacity", self.opacity[i], "a number in [0, 1]"));
         }
-        self.gaussians.validate()
+        self.gaussians.validate()?;
+        self.ready.cloud.validate()
     }
 }
 

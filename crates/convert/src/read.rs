@@ -150,8 +150,9 @@ pub struct ReadParams {
     /// Columns of points that are kept in [`RawPoints::columns`] beside those that have a meaning, each by its name in the file or by one
     /// that [`RawPoints::column`] knows. One that a file of points has not is an error that names those that it has.
     pub columns: Vec<String>,
-    /// Whether points are to become a medium: columns `radius`, `smoothing_length` and `extinction` are kept too where there are such, and
-    /// numbers that matter cannot have are refused, see [`crate::raw_to_matter`].
+    /// Whether points may become a medium: columns `smoothing_length`, `extinction` and `mass` are kept too, beside those that are kept of all
+    /// points where there are such, `radius`, `tx`, `ty`, `tz` and `shadow_coefficient`. Numbers that these cannot have are refused, see
+    /// [`crate::raw_to_matter`] and [`crate::raw_to_surfels`].
     pub matter: bool,
     /// Whether the ranges of all columns of points are found, kept or not, for [`Notes::columns`].
     pub ranges: bool,

@@ -1,10 +1,12 @@
 //! What is shown of raw points: those that are kept, as far apart as is asked for, in the colours of a column.
 
 use crate::counted::counted;
+use crate::discs::unused_by_discs;
 use crate::matter::unused_by_matter;
+use crate::point_attributes::EXTINCTION;
 use crate::{
-    Clip, ColorBy, ColorScale, Colored, ConvertError, Kept, PointColors, RawPoints, SplatParams, colored, kept,
-    thinned, with_cells,
+    Classified, Clip, ColorBy, ColorScale, Colored, Column, ConvertError, DiscShape, Kept, PointColors, RawPoints,
+    SplatParams, colored, kept, thinned, with_cells,
 };
 use splat_core::glam::DVec3;
 use std::sync::Arc;
@@ -22,6 +24,12 @@ pub struct PointsShown<'a> {
     pub color_by: Option<&'a ColorBy>,
     /// Whether they stand for matter: then for as much as among all points, whichever are kept.
     pub as_matter: bool,
+    /// How the discs lie of points that are none.
+    pub shape: DiscShape,
+    /// Whether all discs have one size.
+    pub has_size: bool,
+    /// Whether the object states an opacity.
+    pub has_opacity: bool,
     /// Where `height` grows.
     pub up: DVec3,
 }
@@ -54,7 +62,13 @@ pub fn shown_points(
     splat: &SplatParams,
 ) -> Result<ShownPoints, ConvertError> {
     let mut scale = None;
-    let mut said = if shown.as_matter { unused_by_matter(&points) } else { Vec::new() };
+    let mut said = match shown.as_matter {
+        true => unused_by_matter(&points),
+        false => unused_by_discs(&points, shown.has_size, shown.shape),
+    };
+    if !points.ready.cloud.is_empty() {
+        check_ready(shown, splat)?;
+    }
     if !(shown.keep.is_empty() && shown.clip.is_empty()) {
         let all = points.len();
         if shown.as_matter {
@@ -76,10 +90,42 @@ pub fn shown_points(
         if !own.gaussians.is_empty() {
             own.gaussians.recolor(&colored.color);
         }
+        match by.colors {
+            PointColors::Transfer(_, Classified::Opacity) => multiply(&mut own.opacity, &colored.classified),
+            PointColors::Transfer(_, Classified::Extinction) => {
+                let factors: Vec<f64> = colored.classified.iter().map(|factor| f64::from(*factor)).collect();
+                match own.columns.iter_mut().find(|column| column.name == EXTINCTION) {
+                    Some(column) => multiply(&mut column.values, &factors),
+                    None => own.columns.push(Column { name: EXTINCTION.to_owned(), values: factors }),
+                }
+            }
+            _ => {}
+        }
         own.color = colored.color;
         points = own.into();
     }
     Ok(ShownPoints { points, said, scale })
+}
+
+/// Refuses what would change the optics of splats, which are what they are.
+fn check_ready(shown: &PointsShown<'_>, splat: &SplatParams) -> Result<(), ConvertError> {
+    let expected = "none: splats of a file have opacities of their own";
+    match shown.color_by.map(|by| &by.colors) {
+        _ if shown.has_opacity => Err(splat.bad_text("opacity", "stated".to_owned(), expected)),
+        Some(PointColors::Transfer(_, Classified::Opacity | Classified::Extinction)) => {
+            Err(splat.bad_text("transfer", "one with opacities".to_owned(), expected))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Multiplies a column, whose numbers are 1 where it has none.
+fn multiply<T: Copy + std::ops::Mul<Output = T>>(column: &mut Vec<T>, factors: &[T]) {
+    if column.is_empty() {
+        column.extend_from_slice(factors);
+    } else {
+        column.iter_mut().zip(factors).for_each(|(number, factor)| *number = *number * *factor);
+    }
 }
 
 /// What left points out.
@@ -96,7 +142,7 @@ fn sentence(by: &ColorBy, colored: &Colored) -> String {
             let [from, to] = [low, high].map(|end| short(end, high - low));
             format!("the map {} from {from} to {to}", map.name())
         }
-        (PointColors::Transfer(_), _) => "the object's `transfer`".to_owned(),
+        (PointColors::Transfer(..), _) => "the object's `transfer`".to_owned(),
         (PointColors::Distinct, _) => "twelve colours in turns".to_owned(),
         _ => "the colours of classes".to_owned(),
     };
@@ -104,7 +150,12 @@ fn sentence(by: &ColorBy, colored: &Colored) -> String {
         0 => String::new(),
         n => format!("; the object's colour for {} without a number", counted(n, "point")),
     };
-    format!("points have the colours of `{}` by {colors}{gaps}", by.column)
+    let also = match by.colors {
+        PointColors::Transfer(_, Classified::Opacity) => " and opacities",
+        PointColors::Transfer(_, Classified::Extinction) => " and extinctions",
+        _ => "",
+    };
+    format!("points have the colours{also} of `{}` by {colors}{gaps}", by.column)
 }
 
 /// A number to a thousandth of a width.

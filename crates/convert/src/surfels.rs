@@ -8,20 +8,26 @@
 //! Points may bring an opacity each. It is multiplied by that of the surface; a point of which 1 comes is an opaque disc, for which
 //! τ₁ is infinite, beside the translucent discs of the others.
 //!
+//! Points may bring the sizes of their discs, and a tangent each, along which a disc is an ellipse; without them ellipses may be as long and
+//! wide as the cells ([`crate::cell_ellipse`]). K stays: a wider disc blurs the surface and does not thicken it.
+//!
 //! Points at one place share the area of that place, so duplicates neither darken it nor shrink radii to 0.
 
 #[cfg(feature = "cache")]
 use crate::cache::Key;
 use crate::columns::{self, CHUNK, Wanted};
 use crate::convert_error::check_cancelled;
+use crate::discs::{DiscShape, DiscSize, Discs};
+use crate::matter::check_columns;
 use crate::neighbours::MAX_NEIGHBOURS;
 use crate::orient::{self, Orientation};
 use crate::params::SplatParams;
 use crate::places::{Place, places};
-use crate::{Column, ConvertError, RawPoints, gaussian_points};
+use crate::point_attributes::SHADOW_COEFFICIENT;
+use crate::{Column, ConvertError, RawPoints, from_splats, gaussian_points};
 use rayon::prelude::*;
 use splat_core::{
-    Camera, Cloud, Footprint, Progress, SplatKind,
+    Camera, Cloud, Progress, SplatKind,
     glam::{DVec3, Vec3},
     optics,
 };
@@ -48,40 +54,12 @@ pub struct SurfelParams {
     pub largest_spacing: f64,
     /// Spacing of a point without any neighbour, world units.
     pub lone_spacing: f64,
-    /// The same diameter for all discs; `None` for what bridges the gaps between neighbours.
+    /// How discs lie whose points have neither a size nor a tangent.
+    pub shape: DiscShape,
+    /// The same diameter for all discs, round ones; `None` for what points say, or what bridges the gaps between neighbours.
     pub size: Option<DiscSize>,
     /// Whose pixels those of `size` are, in the world.
     pub camera: Option<Camera>,
-}
-
-/// The diameter within which an opaque disc hides what is behind it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum DiscSize {
-    /// World units, > 0.
-    World(f64),
-    /// Pixels of the camera, > 0, whatever the distance: of a disc that faces it.
-    Pixels(f64),
-}
-
-impl DiscSize {
-    /// The diameter at a place in the world; `None` where it has none: at the eye itself, and in pixels without a camera.
-    fn at(self, place: DVec3, camera: Option<&Camera>) -> Option<f64> {
-        let diameter = match self {
-            Self::World(diameter) => diameter,
-            Self::Pixels(pixels) => {
-                let camera = camera?;
-                // Behind the eye, where nothing is seen, shadows are of discs as large as before it.
-                let depth = if camera.is_orthographic() { 1.0 } else { camera.view_from_world(place).z.abs() };
-                pixels * depth / camera.focal_px()
-            }
-        };
-        (diameter > 0.0).then_some(diameter)
-    }
-
-    fn is_length(self) -> bool {
-        let (Self::World(diameter) | Self::Pixels(diameter)) = self;
-        diameter.is_finite() && diameter > 0.0
-    }
 }
 
 impl Default for SurfelParams {
@@ -96,6 +74,7 @@ impl Default for SurfelParams {
             values: false,
             largest_spacing: 4.0,
             lone_spacing: 1.0,
+            shape: DiscShape::Round,
             size: None,
             camera: None,
         }
@@ -121,7 +100,10 @@ pub struct SurfelReport {
     pub area: f64,
 }
 
-/// Makes surfels of raw points; of points that are Gaussians splats that are seen as these, each one, also where several lie at one place.
+/// Makes surfels of raw points. Columns of the points (`RawPoints::columns`) say more, each a number a point: `radius`, the length in units of
+/// the file within which an opaque disc hides, > 0; `tx`, `ty` and `tz`, a semi-axis of a disc that is an ellipse, as long as it hides that way,
+/// whose second one has that radius, and zero for a round disc; and `shadow_coefficient`, the share of a shadow that it receives. Points that
+/// are Gaussians become splats that are seen as these, each one, also where several lie at one place; points that are splats stay what they are.
 ///
 /// ```
 /// use convert::{RawPoints, SurfelParams, raw_to_surfels};
@@ -147,6 +129,12 @@ pub fn raw_to_surfels(
     check(points, params)?;
     if !points.gaussians.is_empty() {
         return gaussian_points::to_cloud(points, params).map(|cloud| {
+            let n = points.len() as u64;
+            (cloud, SurfelReport { points: n, splats: n, ..SurfelReport::default() })
+        });
+    }
+    if !points.ready.cloud.is_empty() {
+        return from_splats::to_cloud(points, params).map(|cloud| {
             let n = points.len() as u64;
             (cloud, SurfelReport { points: n, splats: n, ..SurfelReport::default() })
         });
@@ -196,7 +184,8 @@ fn place_key(distinct: &[Vec3], origin: DVec3, params: &SurfelParams) -> Key {
         Orientation::Propagate => (2, DVec3::ZERO),
     };
     let lone = params.lone_spacing / params.splat.transform.scale;
-    Key::new("places").with(distinct).with(&[params.neighbours as u64, side]).with(&[at]).with(&[lone])
+    let numbers = [params.neighbours as u64, side, params.shape as u64];
+    Key::new("places").with(distinct).with(&numbers).with(&[at]).with(&[lone])
 }
 
 /// The orientation, where it depends on what the points enclose: told by some of them, which lie evenly among all.
@@ -215,7 +204,7 @@ fn known_orientation(distinct: &[Vec3], params: &SurfelParams) -> Result<Orienta
 pub(crate) fn check(points: &RawPoints, params: &SurfelParams) -> Result<(), ConvertError> {
     let p = &params.splat;
     p.check()?;
-    points.validate().map_err(|e| p.input(e))?;
+    points.validate().and_then(|()| check_columns(points, false)).map_err(|e| p.input(e))?;
     p.check_count(points.len() as f64)?;
     if !(0.0..=1.0).contains(&params.opacity) {
         return Err(p.bad("opacity", params.opacity, "a number in [0, 1]"));
@@ -226,8 +215,16 @@ pub(crate) fn check(points: &RawPoints, params: &SurfelParams) -> Result<(), Con
     if params.largest_spacing.is_nan() || params.largest_spacing < 1.0 {
         return Err(p.bad("largest_spacing", params.largest_spacing, "a number ≥ 1"));
     }
-    if let Some(size) = params.size.filter(|_| !points.gaussians.is_empty()) {
-        return Err(p.bad("size", size, "none: 3D Gaussians have sizes of their own"));
+    let own = match (points.gaussians.is_empty(), points.ready.cloud.is_empty()) {
+        (true, true) => None,
+        (false, _) => Some("none: 3D Gaussians have sizes of their own"),
+        (true, false) => Some("none: splats of a file have sizes of their own"),
+    };
+    if let (Some(size), Some(expected)) = (params.size, own) {
+        return Err(p.bad("size", size, expected));
+    }
+    if let (DiscShape::Elliptical, Some(expected)) = (params.shape, own) {
+        return Err(p.bad("discs", params.shape, expected));
     }
     if let Some(size) = params.size.filter(|size| !size.is_length()) {
         return Err(p.bad("size", size, "a diameter > 0"));
@@ -303,6 +300,10 @@ fn cut_outliers(places: &mut [Place], params: &SurfelParams, report: &mut Surfel
         p.spacing = largest;
         report.lone += 1;
     }
+    for p in places.iter_mut().filter(|p| f64::from(p.long.length()) > largest) {
+        p.long *= (largest / f64::from(p.long.length())) as f32;
+        p.across = p.across.min(largest as f32);
+    }
     let scale = params.splat.transform.scale;
     report.median_spacing = median * scale;
     report.area = places.iter().map(|p| p.area).sum::<f64>() * scale * scale;
@@ -336,8 +337,17 @@ pub(crate) fn wanted(points: &RawPoints, params: &SurfelParams) -> Wanted {
     if !points.gaussians.is_empty() {
         return gaussian_points::wanted(points, params);
     }
-    let value = params.values && !points.value.is_empty();
-    Wanted { normal: true, value, crossing_depth: !is_opaque(points, params), ..Wanted::default() }
+    if !points.ready.cloud.is_empty() {
+        return from_splats::wanted(points);
+    }
+    Wanted {
+        normal: true,
+        tangent: Discs::new(points, params).are_elliptical(),
+        shadow_coefficient: points.own_column(SHADOW_COEFFICIENT).is_some(),
+        value: params.values && !points.value.is_empty(),
+        crossing_depth: !is_opaque(points, params),
+        ..Wanted::default()
+    }
 }
 
 /// Whether every disc is opaque.
@@ -368,35 +378,36 @@ fn emit(
     let wanted = wanted(points, params);
     let kind = if wanted.crossing_depth { SplatKind::Surface } else { SplatKind::Opaque };
     columns::size_columns(&mut cloud, surfels.len(), kind, wanted, &params.splat)?;
+    let discs = Discs::new(points, params);
+    // In the axes of the file.
+    let normal_of = |place: u32, point: u32| {
+        let given = points.normal.get(point as usize).map_or(Vec3::ZERO, |n| columns::unit_or_zero(*n));
+        if given == Vec3::ZERO { sorted.places[place as usize].normal } else { given }
+    };
+    let disc_of =
+        |place: u32, point: u32| discs.of(point as usize, &sorted.places[place as usize], normal_of(place, point));
     let columns =
         (&mut cloud.position, &mut cloud.normal, &mut cloud.radius, &mut cloud.cross_section, &mut cloud.color);
     columns.into_par_iter().zip(&surfels).with_min_len(CHUNK).for_each(
         |((position, normal, radius, cross_section, color), &(place, point, sharers))| {
-            let (known, i) = (&sorted.places[place as usize], point as usize);
+            let (disc, i) = (disc_of(place, point), point as usize);
             *position = (t.rotation * (points.position[i].as_dvec3() * t.scale)).as_vec3();
-            let given = points.normal.get(i).map_or(Vec3::ZERO, |n| columns::unit_or_zero(*n));
-            let n = if given == Vec3::ZERO { known.normal } else { given };
-            *normal = t.rotate(n.as_dvec3()).as_vec3();
-            let sized = params.size.and_then(|size| {
-                size.at(t.apply(points.origin + points.position[i].as_dvec3()), params.camera.as_ref())
-            });
-            let (reach, area) = match sized {
-                Some(diameter) => {
-                    let reach = 0.5 * diameter / f64::from(Footprint::CORE);
-                    (reach, (reach / params.splat.radius(1.0)).powi(2))
-                }
-                None => (params.splat.radius(known.spacing * t.scale), known.area * t.scale * t.scale),
-            };
-            *radius = reach as f32;
-            *cross_section = (crossing(point).unwrap_or(1.0) * area / f64::from(sharers)) as f32;
+            *normal = t.rotate(normal_of(place, point).as_dvec3()).as_vec3();
+            *radius = disc.radius as f32;
+            *cross_section = (crossing(point).unwrap_or(1.0) * disc.area / f64::from(sharers)) as f32;
             *color = points.color.get(i).filter(|_| params.colors).copied().unwrap_or(params.splat.color);
         },
     );
+    let tangents = cloud.tangent.par_iter_mut().zip(&surfels).with_min_len(CHUNK);
+    tangents.for_each(|(tangent, &(place, point, _))| *tangent = disc_of(place, point).tangent.as_vec3());
     let optics = (&mut cloud.crossing_depth, &mut cloud.kind).into_par_iter().zip(&surfels).with_min_len(CHUNK);
     optics.for_each(|((depth, kind), &(_, point, _))| match crossing(point) {
         Some(tau) => *depth = tau as f32,
         None => (*depth, *kind) = (0.0, SplatKind::Opaque),
     });
+    let shares = points.own_column(SHADOW_COEFFICIENT).unwrap_or_default();
+    let coefficients = cloud.shadow_coefficient.par_iter_mut().zip(&surfels).with_min_len(CHUNK);
+    coefficients.for_each(|(coefficient, s)| *coefficient = shares[s.1 as usize] as f32);
     let values = cloud.value.par_iter_mut().zip(&surfels).with_min_len(CHUNK);
     values.for_each(|(v, s)| *v = points.value[s.1 as usize]);
     Ok(cloud)

@@ -2,7 +2,7 @@
 
 use crate::columns::CHUNK;
 use crate::surfels::compare;
-use crate::{Column, ConvertError, RawPoints, SplatParams};
+use crate::{Column, ConvertError, RawPoints, ReadySplats, SplatParams};
 use rayon::prelude::*;
 use splat_core::Gaussians;
 use splat_core::glam::{DVec3, Vec3};
@@ -22,11 +22,14 @@ use splat_core::glam::{DVec3, Vec3};
 /// ```
 ///
 /// # Errors
-/// [`ConvertError::Parameter`] for a spacing that is no length and for Gaussians, [`ConvertError::Input`] for points that are no numbers.
+/// [`ConvertError::Parameter`] for a spacing that is no length, for Gaussians and for splats, [`ConvertError::Input`] for points that are no numbers.
 pub fn thinned(points: &RawPoints, spacing: f64, params: &SplatParams) -> Result<RawPoints, ConvertError> {
     params.check_spacing(spacing)?;
     if !points.gaussians.is_empty() {
         return Err(params.bad("spacing", spacing, "none: 3D Gaussians have no mean that looks like them"));
+    }
+    if !points.ready.cloud.is_empty() {
+        return Err(params.bad("spacing", spacing, "none: splats of a file have no mean that looks like them"));
     }
     points.validate().map_err(|e| params.input(e))?;
     let cells = cells(points, spacing);
@@ -58,6 +61,7 @@ pub fn thinned(points: &RawPoints, spacing: f64, params: &SplatParams) -> Result
         lattice: None,
         dropped: points.dropped,
         gaussians: Gaussians::default(),
+        ready: ReadySplats::default(),
     })
 }
 

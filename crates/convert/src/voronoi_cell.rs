@@ -8,7 +8,7 @@
 use crate::extremes::{greater, lesser};
 use crate::neighbours::{Lanes, MAX_NEIGHBOURS, WIDTH};
 use crate::tangent_plane::{Eight, Offset};
-use splat_core::glam::DVec3;
+use splat_core::glam::{DVec2, DVec3};
 
 /// Half the side of the square that holds a cell, over the distance of the farthest neighbour. What lies within 0.5 is
 /// known exactly; beyond, neighbours that were not asked for would cut too. Measured so that areas of scattered points
@@ -33,19 +33,21 @@ pub(crate) struct Cells {
 }
 
 /// Lines in the planes of eight points, and the parts of them that are sides of cells.
-struct Lines {
+pub(crate) struct Lines {
     q: [[Lanes; 2]; SIDES + MAX_NEIGHBOURS],
     low: [Lanes; SIDES + MAX_NEIGHBOURS],
     high: [Lanes; SIDES + MAX_NEIGHBOURS],
     count: usize,
+    /// What lengths are counted in, a power of two for each point.
+    unit: Eight,
 }
 
-/// Voronoi cells of points among neighbours at `offsets` (near to far, at least one), in the planes across `normals`, within squares
-/// of 0.56 times the farthest neighbour: at the rim of the points nothing else would end them.
+/// The sides of the Voronoi cells of points among neighbours at `offsets` (near to far, at least one), in the planes across `normals`, within
+/// squares of 0.56 times the farthest neighbour: at the rim of the points nothing else would end them.
 #[inline(always)]
-pub(crate) fn voronoi_cells(offsets: &[Offset], normals: &[DVec3; WIDTH]) -> Cells {
+pub(crate) fn voronoi_sides(offsets: &[Offset], normals: &[DVec3; WIDTH]) -> Lines {
     let unit = units(&offsets[offsets.len() - 1]);
-    let mut lines = Lines::of_square(&offsets[offsets.len() - 1], &unit);
+    let mut lines = Lines::of_square(&offsets[offsets.len() - 1], unit);
     let [mut u, mut v] = [[[0.0; WIDTH]; 3]; 2];
     for i in 0..WIDTH {
         let (along, across) = normals[i].any_orthonormal_pair();
@@ -63,7 +65,7 @@ pub(crate) fn voronoi_cells(offsets: &[Offset], normals: &[DVec3; WIDTH]) -> Cel
         }
         lines.add(q);
     }
-    lines.cells(&unit)
+    lines
 }
 
 /// A power of two for each point, such that its farthest neighbour is 1 to 2 away.
@@ -80,7 +82,7 @@ fn units(farthest: &Offset) -> Eight {
 
 impl Lines {
     #[inline(always)]
-    fn of_square(farthest: &Offset, unit: &Eight) -> Self {
+    fn of_square(farthest: &Offset, unit: Eight) -> Self {
         let mut side = [0.0; WIDTH];
         for i in 0..WIDTH {
             let [x, y, z] = [f64::from(farthest[0][i]), f64::from(farthest[1][i]), f64::from(farthest[2][i])];
@@ -91,6 +93,7 @@ impl Lines {
             low: [[-0.5; WIDTH]; SIDES + MAX_NEIGHBOURS],
             high: [[0.5; WIDTH]; SIDES + MAX_NEIGHBOURS],
             count: SIDES,
+            unit,
         };
         for i in 0..WIDTH {
             (lines.q[0][0][i], lines.q[1][1][i]) = (side[i], side[i]);
@@ -130,8 +133,20 @@ impl Lines {
         self.count += 1;
     }
 
+    /// The sides of the cell of point `i`, each as its two ends in the plane of the pair that is any orthonormal one to its normal.
+    pub(crate) fn sides(&self, i: usize) -> impl Iterator<Item = [DVec2; 2]> {
+        (0..self.count).filter_map(move |line| {
+            let q = DVec2::from(self.q[line].map(|lanes| f64::from(lanes[i])));
+            let [low, high] = [self.low[line][i], self.high[line][i]].map(f64::from);
+            let at = |t: f64| self.unit[i] * (0.5 * q + t * q.perp());
+            (high > low).then(|| [at(low), at(high)])
+        })
+    }
+
+    /// The cells within the lines.
     #[inline(always)]
-    fn cells(&self, unit: &Eight) -> Cells {
+    pub(crate) fn cells(&self) -> Cells {
+        let unit = &self.unit;
         let [mut area, mut reach_squared] = [[0.0f32; WIDTH]; 2];
         for line in 0..self.count {
             for i in 0..WIDTH {
@@ -158,7 +173,7 @@ mod tests {
 
     fn cells(offsets: &[DVec3], normal: DVec3) -> Cells {
         let all: Vec<Offset> = offsets.iter().map(|o| o.as_vec3().to_array().map(|c| [c; WIDTH])).collect();
-        voronoi_cells(&all, &[normal; WIDTH])
+        voronoi_sides(&all, &[normal; WIDTH]).cells()
     }
 
     fn lattice() -> Vec<DVec3> {

@@ -94,11 +94,11 @@ fn a_folder_that_is_none_is_said_and_stops_nothing() {
 fn what_was_not_used_for_longest_goes_first_and_nothing_else() {
     let folder = tempfile::tempdir().unwrap();
     let foreign = folder.path().join("notes.txt");
-    fs::write(&foreign, vec![b'x'; 9000]).unwrap();
+    fs::write(&foreign, vec![b'x'; 11_000]).unwrap();
     let params = SurfelParams::default();
     let old = std::time::SystemTime::UNIX_EPOCH;
-    // Each takes 80 + 100·32 bytes: two fit.
-    let limit = 7000;
+    // Each takes 80 + 100·48 bytes: two fit.
+    let limit = 10_500;
     for n in [100, 101] {
         converted(&hills(n), &params, folder.path(), limit);
     }
@@ -111,6 +111,6 @@ fn what_was_not_used_for_longest_goes_first_and_nothing_else() {
     assert!(converted(&hills(100), &params, folder.path(), limit).1.contains("were read from"));
     assert!(!converted(&hills(101), &params, folder.path(), limit).1.contains("were read from"));
     let (_, said) = converted(&hills(400), &params, folder.path(), limit);
-    assert!(said.ends_with("are more than a cache of 7000 bytes keeps"), "{said}");
+    assert!(said.ends_with("are more than a cache of 10500 bytes keeps"), "{said}");
     assert!(files(folder.path()).len() == 3);
 }

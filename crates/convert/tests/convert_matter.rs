@@ -253,13 +253,13 @@ fn columns_of_matter_are_kept_where_points_become_a_medium_and_only_named_elsewh
         assert_eq!((of("radius"), of("extinction")), (vec![0.5, 0.75], vec![3.0, 4.0]), "{name}");
         assert!(notes.unused.is_empty(), "{name}: {:?}", notes.unused);
         let (surface, notes) = bytes(name, content.as_bytes(), &ReadParams::default(), None).unwrap();
-        assert_eq!(notes.unused, ["radius", "extinction"], "{name}");
-        assert!(matches!(surface, Loaded::Points(points) if points.columns.is_empty()), "{name}");
+        assert_eq!(notes.unused, ["extinction"], "{name}");
+        assert!(matches!(surface, Loaded::Points(points) if points.columns.len() == 1), "{name}");
     }
 }
 
 #[test]
-fn numbers_of_files_that_matter_cannot_have_are_refused_with_their_place() {
+fn numbers_of_files_that_points_cannot_have_are_refused_with_their_place() {
     for bad in ["0", "-1", "nan", "inf"] {
         for (name, content, place) in
             [("a.ply", ply(bad), "11:1"), ("a.pcd", pcd(bad), "11:7"), ("a.csv", text(bad), "3:7")]
@@ -267,9 +267,12 @@ fn numbers_of_files_that_matter_cannot_have_are_refused_with_their_place() {
             let params = ReadParams { matter: true, ..ReadParams::default() };
             let error = bytes(name, content.as_bytes(), &params, None).unwrap_err().to_string();
             let expected = format!("{name}:{place}: expected a finite length above 0, found");
-            assert!(error.starts_with(&expected) && error.contains("a medium takes this column"), "{error}");
-            // A surface takes no notice of it.
-            assert!(bytes(name, content.as_bytes(), &ReadParams::default(), None).is_ok(), "{name}");
+            assert!(error.starts_with(&expected) && error.contains("points are drawn by this column"), "{error}");
+            // Discs have a radius too, and no extinction.
+            let error = bytes(name, content.as_bytes(), &ReadParams::default(), None).unwrap_err().to_string();
+            assert!(error.starts_with(&expected), "{error}");
+            let endless = content.replace("extinction", "temperature");
+            assert!(bytes(name, endless.replace("radius", "size").as_bytes(), &params, None).is_ok(), "{name}");
         }
     }
 }

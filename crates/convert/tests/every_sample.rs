@@ -10,6 +10,8 @@ use crate::read_samples::{NIFTI_F32, gzip, images, las, nifti, nrrd, obj, ply_as
 use crate::read_samples::{image, off, pcd, plain_glb, square_glb};
 use exr::prelude::{Blocks, Compression, Vec2};
 use image::ImageFormat;
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::{Cloud, FootprintStack, Splat, SplatKind};
 
 /// Files that end where they have to.
 pub(crate) fn samples() -> Vec<(&'static str, Vec<u8>)> {
@@ -54,10 +56,19 @@ pub(crate) fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("a.png", images::png(image::ExtendedColorType::Rgb8, &images::png_bytes(3))),
         ("trained.ply", trained_ply(&[trained(0, 1)], 1, "binary_little_endian")),
         ("words.ply", packed_ply(&[trained(0, 1), trained(1, 1)], 1)),
+        ("splats.ply", splats()),
         ("a.splat", splat(&[trained(0, 0)])),
         ("old.spz", spz(&[trained(0, 1), trained(1, 1)], 1, 2)),
         ("new.spz", gzip(&spz(&[trained(0, 1), trained(1, 1)], 1, 3))),
     ]
+}
+
+/// Two splats as files have them.
+fn splats() -> Vec<u8> {
+    let mut cloud = Cloud::new(DVec3::new(1e6, 0.0, 0.5));
+    cloud.push(&Splat { value: 2.0, ..Splat::default() });
+    cloud.push(&Splat { kind: SplatKind::Surface, normal: Vec3::Y, tangent: Vec3::X, ..Splat::default() });
+    convert::splats_to_ply(&cloud, &["it".to_owned()], &FootprintStack::default())
 }
 
 /// Files that hold an image, and its bytes.

@@ -36,6 +36,11 @@ pub(super) enum Command {
         after_help = "Examples:\n  organza init bunny.ply -o scene.toml\n  organza init head.nii.gz --preset ct-bone -o head.toml\n  organza init ground.laz bunny.ply --ground --elevation 35"
     )]
     Init(InitArguments),
+    /// Writes the splats of a scene or of data files as rendering-oriented points, which `render` reads again.
+    #[command(
+        after_help = "Examples:\n  organza convert scene.toml -o splats.ply\n  organza convert bunny.ply -o splats.ply\n  organza render splats.ply -o splats.png"
+    )]
+    Convert(ConvertArguments),
     /// Says what a render would simulate, what not, and why.
     #[command(
         after_help = "Examples:\n  organza explain scene.toml\n  organza explain scene.toml --measure --json\n  organza explain bunny.ply"
@@ -69,6 +74,7 @@ impl Command {
         match self {
             Self::Render(a) => a.scene.json,
             Self::Init(a) => a.json,
+            Self::Convert(a) => a.scene.json,
             Self::Explain(a) => a.scene.json,
             Self::Accuracy(a) => a.scene.json,
             Self::Orders(a) => a.scene.json,
@@ -263,6 +269,18 @@ pub(super) struct InitArguments {
     /// Print one JSON document on stdout
     #[arg(long)]
     pub(super) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ConvertArguments {
+    #[command(flatten)]
+    pub(super) scene: SceneArguments,
+    /// Output, .ply
+    #[arg(short, long = "output", value_name = "FILE.ply")]
+    pub(super) output: PathBuf,
+    /// Replace an output that exists
+    #[arg(long)]
+    pub(super) force: bool,
 }
 
 #[derive(Debug, Args)]

@@ -1,7 +1,7 @@
 //! The command `organza`: arguments → library calls → text or JSON, with one exit code for each kind of error.
 //!
 //! ```text
-//! args ─► given (a scene, or one made of data files) ─► session (overrides, memory) ─► render explain accuracy orders ─► report ─► console
+//! args ─► given (a scene, or one made of data files) ─► session (overrides, memory) ─► render convert explain accuracy orders ─► report ─► console
 //!         init info devices passport
 //! ```
 #![forbid(unsafe_code)]
@@ -10,6 +10,7 @@ mod accuracy;
 mod args;
 mod bar;
 mod console;
+mod convert;
 mod devices;
 mod explain;
 mod given;
@@ -62,6 +63,7 @@ fn run(command: Command) -> Result<u8, Error> {
     match command {
         Command::Render(arguments) => return render::run(&arguments),
         Command::Init(arguments) => init::run(&arguments),
+        Command::Convert(arguments) => convert::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
         Command::Accuracy(arguments) => accuracy::run(&arguments),
         Command::Orders(arguments) => orders::run(&arguments),
@@ -77,7 +79,7 @@ fn run(command: Command) -> Result<u8, Error> {
 fn guard(work: impl FnOnce() -> u8) -> u8 {
     panic::set_hook(Box::new(|info| {
         // A decoder that gives up on a damaged file; the reader makes an error of it.
-        if convert::read::panic_is_input_error() {
+        if ::convert::read::panic_is_input_error() {
             return;
         }
         let version = env!("CARGO_PKG_VERSION");

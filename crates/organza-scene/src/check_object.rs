@@ -118,8 +118,10 @@ fn refuse_what_does_not_apply(at: &At<'_>, raw: &RawObject, source: &Source) -> 
         let message = "`transfer` belongs to a `volume` or `slice`, and to `points` with `color_by`";
         return Err(at.key("transfer").error(message, ""));
     }
-    if raw.unit_length.is_some() && !is_classified {
-        return Err(at.key("unit_length").error("`unit_length` belongs to a `volume` or `slice`", ""));
+    let is_matter = matches!(source, Source::Matter(_)) && raw.transfer.is_some();
+    if raw.unit_length.is_some() && !is_classified && !is_matter {
+        let message = "`unit_length` belongs to a `volume`, and to `points` that are a medium with a `transfer`";
+        return Err(at.key("unit_length").error(message, ""));
     }
     Ok(())
 }

@@ -2,11 +2,11 @@
 
 use super::PointsLook;
 use super::check::{At, LARGEST};
-use super::check_transfer::check_transfer;
+use super::check_transfer::{Beside, beside_of_points, check_transfer};
 use super::raw_object::RawObject;
-use super::raw_points::{RawColorBy, RawPointForm, RawPointSize};
+use super::raw_points::{RawColorBy, RawDiscShape, RawPointForm, RawPointSize};
 use crate::{Error, shown};
-use convert::{ColorBy, ColorMap, DiscSize, Kept, PointColors, Within};
+use convert::{Classified, ColorBy, ColorMap, DiscShape, DiscSize, Kept, PointColors, Within};
 
 /// Longest name of a column, bytes.
 const LONGEST_NAME: usize = 256;
@@ -31,6 +31,7 @@ pub(super) fn check_points(at: &At<'_>, raw: &RawObject) -> Result<PointsLook, E
             ("keep", raw.keep.is_some()),
             ("unlit", raw.unlit.is_some()),
             ("point_size", raw.point_size.is_some()),
+            ("discs", raw.discs.is_some()),
         ];
         return match keys.into_iter().find(|(_, on)| *on) {
             Some(("unlit", _)) => {
@@ -44,6 +45,13 @@ pub(super) fn check_points(at: &At<'_>, raw: &RawObject) -> Result<PointsLook, E
     if raw.point_size.is_some() && is_medium {
         let hint = "a column `radius` of the file, or `footprint`, says how wide it is drawn";
         return Err(at.key("point_size").error("points that are a medium have no discs", hint));
+    }
+    if raw.discs.is_some() && is_medium {
+        return Err(at.key("discs").error("points that are a medium have no discs", "their kernels are balls"));
+    }
+    if raw.discs == Some(RawDiscShape::Elliptical) && raw.point_size.is_some() {
+        let message = "`point_size` and discs = \"elliptical\" exclude each other";
+        return Err(at.key("discs").error(message, "leave one of them out"));
     }
     if raw.merge_duplicates && is_medium {
         let message = "points that are a medium share the matter of their place";
@@ -61,6 +69,10 @@ pub(super) fn check_points(at: &At<'_>, raw: &RawObject) -> Result<PointsLook, E
         color_by: raw.color_by.as_ref().map(|by| check_color_by(at, raw, by)).transpose()?,
         keep: keep.collect::<Result<_, _>>()?,
         unlit: raw.unlit,
+        shape: match raw.discs {
+            None | Some(RawDiscShape::Round) => DiscShape::Round,
+            Some(RawDiscShape::Elliptical) => DiscShape::Elliptical,
+        },
         size: raw.point_size.as_ref().map(|size| check_size(&at.key("point_size"), size)).transpose()?,
     })
 }
@@ -84,7 +96,13 @@ fn check_color_by(at: &At<'_>, raw: &RawObject, by: &RawColorBy) -> Result<Color
                 return Err(at_by.key(key).error(message, "leave one of them out"));
             }
         }
-        return Ok(ColorBy { column, colors: PointColors::Transfer(check_transfer(at, raw, true)?) });
+        let beside = beside_of_points(raw, raw.form == Some(RawPointForm::Medium));
+        let classified = match beside {
+            Beside::Nothing => Classified::No,
+            Beside::Opacity => Classified::Opacity,
+            Beside::Extinction => Classified::Extinction,
+        };
+        return Ok(ColorBy { column, colors: PointColors::Transfer(check_transfer(at, raw, beside)?, classified) });
     }
     let default = if CLASSES.contains(&column.as_str()) { "classes" } else { "viridis" };
     let colors = match by.map.as_deref().unwrap_or(default) {

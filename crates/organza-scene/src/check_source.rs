@@ -3,7 +3,7 @@
 use super::check::{At, LARGEST, SMALLEST};
 use super::check_field::{check_isosurface, check_level_set, check_slice};
 use super::check_light::check_half_axes;
-use super::check_transfer::check_transfer;
+use super::check_transfer::{Beside, beside_of_points, check_transfer};
 use super::paths::Paths;
 use super::raw_object::RawObject;
 use super::raw_points::RawPointForm;
@@ -13,6 +13,7 @@ use crate::{Error, shown};
 use convert::{ExpressionField, HomogeneousMedium, MediumBody, Rectangle};
 use glam::DVec3;
 use splat_core::DAabb;
+use std::path::PathBuf;
 
 /// The keys that name a source.
 const SOURCES: [&str; 12] = [
@@ -69,17 +70,16 @@ pub(super) fn check_source(
         return Ok(Source::Mesh(paths.resolve(&at_source, path)?));
     }
     if let Some(path) = &raw.points {
-        let path = paths.resolve(&at_source, path)?;
-        if raw.form != Some(RawPointForm::Medium) {
-            return Ok(Source::Points(path));
-        }
-        let extinction = check_extinction(at, raw.extinction.or(fallback))?;
-        return Ok(Source::Matter(MatterSource { path, extinction }));
+        return check_raw_points(at, raw, paths.resolve(&at_source, path)?, fallback);
     }
     if let Some(path) = &raw.volume {
         let path = paths.resolve(&at_source, path)?;
         let frame = raw.frame.unwrap_or(0).into();
-        return Ok(Source::Volume(VolumeSource { path, frame, transfer: check_transfer(at, raw, false)? }));
+        return Ok(Source::Volume(VolumeSource {
+            path,
+            frame,
+            transfer: check_transfer(at, raw, Beside::Extinction)?,
+        }));
     }
     if let Some(implicit) = &raw.implicit {
         return check_implicit(&at_source, implicit).map(Source::Implicit);
@@ -91,7 +91,7 @@ pub(super) fn check_source(
         return check_level_set(&at_source, level_set, paths).map(Source::LevelSet);
     }
     if let Some(slice) = &raw.slice {
-        return check_slice(&at_source, slice, check_transfer(at, raw, true)?, paths).map(Source::Slice);
+        return check_slice(&at_source, slice, check_transfer(at, raw, Beside::Nothing)?, paths).map(Source::Slice);
     }
     if let Some(density) = &raw.density {
         return check_density(&at_source, density, extinction(density.extinction)?).map(Source::Density);
@@ -109,6 +109,27 @@ pub(super) fn check_source(
         return Err(Error::Internal("an object has a source of no kind".into()));
     };
     check_medium_ball(&at_source, b, fallback).map(Source::Medium)
+}
+
+/// Points as samples of a surface, or as matter.
+fn check_raw_points(at: &At<'_>, raw: &RawObject, path: PathBuf, fallback: Option<f64>) -> Result<Source, Error> {
+    if raw.form != Some(RawPointForm::Medium) {
+        return Ok(Source::Points(path));
+    }
+    let extinction = check_matter_extinction(at, raw, fallback)?;
+    Ok(Source::Matter(MatterSource { path, extinction }))
+}
+
+/// The extinction of points that are a medium; 1 where their `transfer` says what that is.
+fn check_matter_extinction(at: &At<'_>, raw: &RawObject, fallback: Option<f64>) -> Result<f64, Error> {
+    match (beside_of_points(raw, true), raw.extinction) {
+        (Beside::Extinction, None) => Ok(1.0),
+        (Beside::Extinction, Some(_)) => {
+            let message = "`extinction` and those of the object's `transfer` exclude each other";
+            Err(at.key("extinction").error(message, "leave one of them out"))
+        }
+        (_, stated) => check_extinction(at, stated.or(fallback)),
+    }
 }
 
 fn check_extinction(at: &At<'_>, extinction: Option<f64>) -> Result<f64, Error> {

@@ -6,10 +6,31 @@ use super::raw_source::RawTransferPoint;
 use crate::Error;
 use splat_core::{TransferFunction, TransferPoint, optics};
 
-/// A slice and points have colours alone.
-pub(super) fn check_transfer(at: &At<'_>, raw: &RawObject, colors_alone: bool) -> Result<TransferFunction, Error> {
+/// What the control points of a transfer function have beside a colour.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Beside {
+    /// Nothing, as those of a slice.
+    Nothing,
+    /// Extinction, as those of a volume.
+    Extinction,
+    /// The opacity of one crossing.
+    Opacity,
+}
+
+/// What those have that give points their colours: nothing, or what classifies points, if one of them has it.
+pub(super) fn beside_of_points(raw: &RawObject, is_medium: bool) -> Beside {
+    let any = raw.transfer.iter().flatten().any(|p| p.extinction.is_some() || p.opacity.is_some());
+    match (any, is_medium) {
+        (false, _) => Beside::Nothing,
+        (true, false) => Beside::Opacity,
+        (true, true) => Beside::Extinction,
+    }
+}
+
+/// The transfer function of a volume, a slice, or of points, whose control points have that `beside` a colour.
+pub(super) fn check_transfer(at: &At<'_>, raw: &RawObject, beside: Beside) -> Result<TransferFunction, Error> {
     let Some(points) = &raw.transfer else {
-        if colors_alone {
+        if beside == Beside::Nothing {
             let hint = "such as transfer = [{ value = 0, color = [0, 0, 0] }, { value = 1, color = [1, 1, 1] }]";
             return Err(at.error("a slice needs a key `transfer`, found none", hint));
         }
@@ -26,25 +47,39 @@ pub(super) fn check_transfer(at: &At<'_>, raw: &RawObject, colors_alone: bool) -
             let message = format!("`value`: expected more than that of the point before, found {}", p.value);
             return Err(at.key("value").error(message, "list the points by rising value"));
         }
-        let extinction = if colors_alone {
-            no_extinction(&at, raw, p).map(|()| 0.0)?
-        } else {
-            point_extinction(&at, p, unit_length)? as f32
+        let extinction = match beside {
+            Beside::Nothing => no_extinction(&at, p).map(|()| 0.0)?,
+            Beside::Extinction => point_extinction(&at, p, unit_length)? as f32,
+            Beside::Opacity => crossing_opacity(&at, p)? as f32,
         };
         checked.push(TransferPoint { value, color: at.color("color", p.color)?, extinction });
     }
     TransferFunction::new(checked).map_err(|e| at.error(e.to_string(), ""))
 }
 
-fn no_extinction(at: &At<'_>, raw: &RawObject, p: &RawTransferPoint) -> Result<(), Error> {
+fn no_extinction(at: &At<'_>, p: &RawTransferPoint) -> Result<(), Error> {
     for (key, on) in [("extinction", p.extinction.is_some()), ("opacity", p.opacity.is_some())] {
         if on {
-            let what = if raw.points.is_some() { "points have" } else { "a slice has" };
             let hint = "the object's `opacity` is that of one crossing";
-            return Err(at.key(key).error(format!("{what} no extinction"), hint));
+            return Err(at.key(key).error("a slice has no extinction", hint));
         }
     }
     Ok(())
+}
+
+/// The opacity of one crossing of a surface, by which that of its object is multiplied.
+fn crossing_opacity(at: &At<'_>, p: &RawTransferPoint) -> Result<f64, Error> {
+    if p.extinction.is_some() {
+        let hint = "give `opacity`, that of one crossing, or make them a medium by as = \"medium\"";
+        return Err(at.key("extinction").error("points of a surface have no extinction", hint));
+    }
+    match p.opacity {
+        Some(opacity) => at.number("opacity", opacity, 0.0..=1.0),
+        None => {
+            let hint = "as another control point has one: all of them do, or none";
+            Err(at.error("expected a key `opacity` here, found none", hint))
+        }
+    }
 }
 
 fn point_extinction(at: &At<'_>, p: &RawTransferPoint, unit_length: Option<f64>) -> Result<f64, Error> {

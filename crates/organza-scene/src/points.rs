@@ -1,7 +1,7 @@
 //! How raw points look beside what all objects have, checked.
 
 use super::{MatterSource, SceneObject, Source};
-use convert::{ColorBy, DiscSize, Kept, MatterParams, PointsShown, SplatParams};
+use convert::{ColorBy, DiscShape, DiscSize, Kept, MatterParams, PointsShown, SplatParams};
 
 /// What a scene says of raw points; of other sources nothing.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -12,6 +12,8 @@ pub struct PointsLook {
     pub keep: Vec<Kept>,
     /// Whether they are drawn without light; `None` where that follows from their file.
     pub unlit: Option<bool>,
+    /// How their discs lie, where neither `size` nor the file says so.
+    pub shape: DiscShape,
     /// Diameter of their discs; `None` where it follows from their neighbours.
     pub size: Option<DiscSize>,
 }
@@ -40,6 +42,9 @@ impl SceneObject {
             spacing: self.spacing.filter(|_| !self.source.is_medium()).map(|spacing| spacing / self.transform.scale),
             color_by: self.points.color_by.as_ref(),
             as_matter: self.source.is_medium(),
+            shape: self.points.shape,
+            has_size: self.points.size.is_some(),
+            has_opacity: self.opacity.is_some(),
             up: self.up.axis.direction(),
         }
     }

@@ -1,6 +1,6 @@
 //! Objects as they are written.
 
-use super::raw_points::{RawColorBy, RawPointForm, RawPointSize};
+use super::raw_points::{RawColorBy, RawDiscShape, RawPointForm, RawPointSize};
 use super::raw_source::{
     RawClip, RawCloud, RawDensity, RawImplicit, RawIsosurface, RawLevelSet, RawMediumBall, RawMediumBox, RawRectangle,
     RawSlice, RawTransferPoint,
@@ -56,6 +56,8 @@ pub(super) struct RawObject {
     pub(super) unlit: Option<bool>,
     /// Diameter of the discs of `points`; default from their neighbours.
     pub(super) point_size: Option<RawPointSize>,
+    /// How discs of `points` lie whose file says nothing of it: "round" (default), or "elliptical", as long and wide as the points' cells.
+    pub(super) discs: Option<RawDiscShape>,
     /// Regions that it is kept in, but for homogeneous media; surfaces end open at their borders, volumes show their values there.
     #[serde(default)]
     pub(super) clip: Vec<RawClip>,

@@ -35,3 +35,12 @@ pub(super) struct RawPointSize {
     /// In world units; or `pixels`.
     pub(super) world: Option<f64>,
 }
+
+/// How the discs of points lie.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(rename = "DiscShape")]
+pub(super) enum RawDiscShape {
+    Round,
+    Elliptical,
+}

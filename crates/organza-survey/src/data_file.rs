@@ -68,7 +68,7 @@ impl DataFile {
     pub(crate) fn is_colored(&self) -> bool {
         match &self.data {
             FileData::Mesh(mesh) => !mesh.color.is_empty(),
-            FileData::Points(points) => !points.color.is_empty(),
+            FileData::Points(points) => !points.color.is_empty() || !points.ready.cloud.is_empty(),
             _ => false,
         }
     }

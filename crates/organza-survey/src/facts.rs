@@ -145,6 +145,14 @@ fn of_gaussians(points: &RawPoints) -> Option<String> {
         .then(|| format!("its points are 3D Gaussians, with spherical harmonics of degree {degree}"))
 }
 
+/// What is said of points that are splats already.
+fn of_splats(points: &RawPoints) -> Option<String> {
+    let [medium, surface, opaque] = points.ready.kinds();
+    (!points.ready.cloud.is_empty()).then(|| {
+        format!("its points are splats: {medium} of media, {surface} of translucent surfaces, {opaque} of opaque ones")
+    })
+}
+
 fn of_points(points: &RawPoints, further: &[NamedColumn], up: UpAxis) -> Facts {
     let bounds = bounds_of(points.origin, &points.position);
     let of_file = further.iter().filter_map(|c| Some((c.name.clone(), c.range?)));
@@ -158,7 +166,7 @@ fn of_points(points: &RawPoints, further: &[NamedColumn], up: UpAxis) -> Facts {
             ("opacity", !points.opacity.is_empty() || !points.gaussians.is_empty()),
             ("classification", !points.classification.is_empty()),
         ]),
-        remarks: [(!points.color.is_empty()).then(|| AS_THEY_ARE.to_owned()), of_gaussians(points)]
+        remarks: [(!points.color.is_empty()).then(|| AS_THEY_ARE.to_owned()), of_gaussians(points), of_splats(points)]
             .into_iter()
             .flatten()
             .collect(),
@@ -175,6 +183,7 @@ fn of_points(points: &RawPoints, further: &[NamedColumn], up: UpAxis) -> Facts {
         .into_iter()
         .chain(bounds.map(|bounds| height(bounds, up)))
         .chain(of_file)
+        .chain(points.ready.ranges())
         .collect(),
         ..Facts::default()
     }

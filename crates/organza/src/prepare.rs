@@ -16,7 +16,7 @@ use crate::technique::Row;
 use crate::work::Translucent;
 use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, doubts, lights, shadows};
 use splat_core::shade::Census;
-use splat_core::{Exceeded, Material};
+use splat_core::{Exceeded, Material, SplatKind};
 
 /// What a render would do, without doing it.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,18 +111,25 @@ pub fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> R
     plan_counted(scene, loaded, options).map(|(plan, _)| plan)
 }
 
-/// Refuses 3D Gaussians whose technique leaves them out.
-fn check_gaussians(scene: &Scene, loaded: &Loaded) -> Result<(), Error> {
+/// Refuses 3D Gaussians, and splats of media that a file has beside others, whose technique leaves them out.
+fn check_splats(scene: &Scene, loaded: &Loaded) -> Result<(), Error> {
+    let by = |object: &SceneObject| row(technique_of(object, scene));
+    let refuse = |o: &SceneObject, what| Err(Error::input(crate::shown(&o.name), what, "use `points` or `reference`"));
     let mut of_gaussians = visible(scene).zip(&loaded.statistics).filter(|(_, of)| of.data == ObjectData::Gaussians);
-    let undrawn = of_gaussians.find(|(object, _)| !row(technique_of(object, scene)).gaussians);
-    let (what, hint) = ("3D Gaussians, which its technique does not draw", "use `points` or `reference`");
-    undrawn.map_or(Ok(()), |(object, _)| Err(Error::input(crate::shown(&object.name), what, hint)))
+    if let Some((object, _)) = of_gaussians.find(|(object, _)| !by(object).gaussians) {
+        return refuse(object, "3D Gaussians, which its technique does not draw");
+    }
+    let discs_alone: Vec<bool> = scene.objects.iter().map(|o| by(o).meets_discs).collect();
+    let mut splats = loaded.cloud.kind.iter().zip(&loaded.cloud.object);
+    let medium = splats.find(|(kind, o)| **kind == SplatKind::Medium && discs_alone[**o as usize]);
+    let what = "splats of a medium, and its technique draws surfaces alone";
+    medium.map_or(Ok(()), |(_, object)| refuse(&scene.objects[*object as usize], what))
 }
 
 /// The plan of a loaded scene, and the bytes that it takes.
 fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Result<(Plan, Memory), Error> {
     check_samples(scene)?;
-    check_gaussians(scene, loaded)?;
+    check_splats(scene, loaded)?;
     let planned: Vec<PlannedObject> = visible(scene)
         .zip(&loaded.planned)
         .map(|(object, planned)| PlannedObject { technique: technique_of(object, scene), ..planned.clone() })

@@ -70,8 +70,8 @@ impl<'a> SplatSampler<'a> {
     /// Prepares the tables: 8 bytes a splat, and 6 KB for each kernel that occurs.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for numbers out of range, [`Error::Core`] for a cloud that breaks a promise or a footprint id
-    /// out of range, [`Error::Empty`] for a cloud without cross-section, [`Error::Limit`] for more than 4·10⁹
+    /// [`Error::Parameter`] for numbers out of range, [`Error::Core`] for a cloud that breaks a promise, a footprint id
+    /// out of range or shadow coefficients that differ, [`Error::Empty`] for a cloud without cross-section, [`Error::Limit`] for more than 4·10⁹
     /// particles a set.
     pub fn new(cloud: &'a Cloud, params: &SplatParams) -> Result<Self, Error> {
         Self::of(Cow::Borrowed(cloud), params)
@@ -96,6 +96,11 @@ impl<'a> SplatSampler<'a> {
             return Err(
                 splat_core::Error::invalid("splat", i, "footprint", found, "an id of the footprint stack").into()
             );
+        }
+        if let Some(i) = cloud.shadow_coefficient.windows(2).position(|pair| pair[0] != pair[1]) {
+            let found = cloud.shadow_coefficient[i + 1];
+            let expected = "one for all its splats (other techniques take one a splat): its particles have one";
+            return Err(splat_core::Error::invalid("splat", i + 1, "shadow_coefficient", found, expected).into());
         }
         let rate = |i: usize| {
             let depth = if cloud.kind[i] == SplatKind::Opaque { cap } else { 1.0 };

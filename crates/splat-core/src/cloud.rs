@@ -2,6 +2,8 @@
 
 mod checked;
 
+pub use checked::Unfit;
+
 use crate::{Aabb, Error, Gaussians};
 use glam::{DVec3, Vec3};
 use std::sync::Arc;

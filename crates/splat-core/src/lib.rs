@@ -75,7 +75,7 @@ pub mod shade;
 
 pub use camera::{Camera, Projection, ViewTransform};
 pub use clip::Clip;
-pub use cloud::{Cloud, Splat, SplatKind};
+pub use cloud::{Cloud, Splat, SplatKind, Unfit};
 pub use cost::{CostRecord, StageCost};
 pub use depth_profile::{DepthFragment, DepthProfile};
 pub use environment::{Environment, RadianceImage};

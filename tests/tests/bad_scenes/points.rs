@@ -22,8 +22,21 @@ fn how_points_look_is_checked() {
     refused(&format!("color_by = {{ column = \"z\", map = \"grey\" }}\n{transfer}"), "exclude each other");
     refused(transfer, "`transfer` belongs to a `volume` or `slice`, and to `points` with `color_by`");
     refused(
-        "color_by = { column = \"z\" }\ntransfer = [{ value = 0, color = [1, 1, 1], opacity = 0.5 }]",
-        "points have no extinction",
+        "color_by = { column = \"z\" }\ntransfer = [{ value = 0, color = [1, 1, 1], extinction = 0.5 }]",
+        "points of a surface have no extinction",
+    );
+    refused(
+        "color_by = { column = \"z\" }\ntransfer = [{ value = 0, color = [1, 1, 1], opacity = 0.5 }, { value = 1, color = [1, 1, 1] }]",
+        "expected a key `opacity` here, found none",
+    );
+    refused(
+        "color_by = { column = \"z\" }\ntransfer = [{ value = 0, color = [1, 1, 1], opacity = 1.5 }]",
+        "`opacity`: expected",
+    );
+    refused("discs = \"square\"", "expected");
+    refused(
+        "discs = \"elliptical\"\npoint_size = { pixels = 2 }",
+        "`point_size` and discs = \"elliptical\" exclude each other",
     );
     refused("keep = { classification = [2, 6.5] }", "expected classes, whole numbers from 0 to 255, found 6.5");
     refused("keep = { class = [] }", "expected at least one class, found none");
@@ -46,6 +59,15 @@ fn points_that_are_a_medium_have_an_extinction_and_nothing_of_surfaces() {
     let medium = "as = \"medium\"\nextinction = 1";
     for (key, expected) in [
         ("point_size = { pixels = 2 }", "points that are a medium have no discs"),
+        ("discs = \"round\"", "points that are a medium have no discs"),
+        (
+            "color_by = { column = \"z\" }\ntransfer = [{ value = 0, color = [1, 1, 1], extinction = 1 }]",
+            "`extinction` and those of the object's `transfer` exclude each other",
+        ),
+        (
+            "color_by = { column = \"z\" }\nunit_length = 1",
+            "`unit_length` belongs to a `volume`, and to `points` that are a medium with a `transfer`",
+        ),
         ("merge_duplicates = true", "points that are a medium share the matter of their place"),
         ("opacity = 0.5", "a medium has no `opacity`"),
         ("technique = \"surfels\"", "is a medium, and the technique `surfels` draws surfaces alone"),
@@ -61,6 +83,7 @@ fn what_raw_points_alone_have_is_refused_elsewhere() {
         ("keep", "{ z = [0, 1] }"),
         ("unlit", "true"),
         ("point_size", "{ pixels = 2 }"),
+        ("discs", "\"round\""),
         ("as", "\"medium\""),
         ("extinction", "1"),
     ] {

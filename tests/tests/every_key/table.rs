@@ -234,6 +234,8 @@ fn objects() -> Vec<Entry> {
         of(RAW, "object.point_size", "object.it.point_size={world=0.05}"),
         one("object.point_size", "object.it.point_size={world=0.05}")
             .but(All, Refused(2, "`point_size` belongs to `points`")),
+        of(RAW, "object.discs", "object.it.discs='elliptical'"),
+        one("object.discs", "object.it.discs='elliptical'").but(All, Refused(2, "`discs` belongs to `points`")),
         of(HEAT, "object.point_size.world", "object.it.point_size.world=0.05")
             .with(&["object.it.point_size={world=0.1}"]),
         of(HEAT, "object.point_size.pixels", "object.it.point_size.pixels=1")

@@ -3,14 +3,14 @@
 use super::reading::NamedColumn;
 use super::{Notes, ReadParams, input};
 use crate::error::{ReadError, escaped};
-use crate::matter_columns;
+use crate::point_attributes::{attribute, expected};
 use crate::raw_points::{Column, unaliased};
 
 /// Most bytes of a name that are shown.
 pub(super) const LONGEST_NAME: usize = 40;
 
-/// What to do about a number that matter cannot have.
-pub(super) const UNFIT_HINT: &str = "a medium takes this column: repair it, or give it another name";
+/// What to do about a number that an attribute cannot have.
+pub(super) const UNFIT_HINT: &str = "points are drawn by this column: repair it, or give it another name";
 
 /// The further columns of a file while it is read, each by its rank among the fields of a point.
 #[derive(Default)]
@@ -26,8 +26,8 @@ struct Extra {
     is_kept: bool,
     /// Whether its numbers are looked at.
     is_read: bool,
-    /// Whether they say something of matter.
-    is_of_matter: bool,
+    /// Whether they say what points look like.
+    is_attribute: bool,
     range: [f64; 2],
 }
 
@@ -38,10 +38,10 @@ impl Extras {
         let extra = |(rank, name, spare): (usize, &[u8], bool)| {
             let asked = |asked: &String| asked.as_bytes() == name || unaliased(asked).as_bytes() == name;
             let column = Column { name: String::from_utf8_lossy(name).into_owned(), values: Vec::new() };
-            let is_of_matter = params.matter && matter_columns::of_matter(&column.name).is_some();
-            let is_kept = is_of_matter || params.columns.iter().any(asked);
+            let is_attribute = attribute(&column.name, params.matter).is_some();
+            let is_kept = is_attribute || params.columns.iter().any(asked);
             let (is_read, range) = (is_kept || params.ranges, [f64::INFINITY, f64::NEG_INFINITY]);
-            (is_kept || !spare).then_some(Extra { rank, column, is_kept, is_read, is_of_matter, range })
+            (is_kept || !spare).then_some(Extra { rank, column, is_kept, is_read, is_attribute, range })
         };
         Self { all: columns.into_iter().filter_map(extra).collect(), unfit: None }
     }
@@ -66,10 +66,10 @@ impl Extras {
         self.all.iter_mut().filter(|e| e.is_kept).try_for_each(|e| input::reserve(&mut e.column.values, points))
     }
 
-    /// What was expected in the place of a point's number in the column of a rank, where matter cannot have it.
+    /// What was expected in the place of a point's number in the column of a rank, where an attribute cannot have it.
     pub(super) fn unfit(&self, rank: usize, number: f64) -> Option<&'static str> {
-        let extra = self.all.iter().find(|e| e.rank == rank && e.is_of_matter)?;
-        matter_columns::expected(&extra.column.name, number)
+        let extra = self.all.iter().find(|e| e.rank == rank && e.is_attribute)?;
+        expected(&extra.column.name, number)
     }
 
     /// Takes the numbers of a point by their ranks.
@@ -82,7 +82,7 @@ impl Extras {
         let Some(extra) = self.all.iter_mut().find(|e| e.rank == rank) else { return };
         for number in numbers {
             let Column { name, values } = &extra.column;
-            let expected = if extra.is_of_matter { matter_columns::expected(name, number) } else { None };
+            let expected = if extra.is_attribute { expected(name, number) } else { None };
             if let (Some(expected), None) = (expected, &self.unfit) {
                 self.unfit = Some((expected, format!("{number} of {name} at point {}", values.len())));
             }
@@ -90,7 +90,7 @@ impl Extras {
         }
     }
 
-    /// The first number of [`Extras::extend`] that matter cannot have: what was expected and what was found.
+    /// The first number of [`Extras::extend`] that an attribute cannot have: what was expected and what was found.
     pub(super) fn unfit_of_many(&self) -> Option<(&'static str, &str)> {
         self.unfit.as_ref().map(|(expected, found)| (*expected, found.as_str()))
     }

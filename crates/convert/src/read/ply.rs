@@ -1,4 +1,4 @@
-//! PLY: ascii and both binary byte orders → a mesh where there are faces, else raw points; Gaussians where vertices are such.
+//! PLY: ascii and both binary byte orders → a mesh where there are faces, else raw points; Gaussians and splats where vertices are such.
 //!
 //! The parser is our own: places down to line and column or byte, line ends of every system, duplicate properties and
 //! sizes checked against the file before allocation are asked of it. Properties it has no use for are read over and named.
@@ -11,6 +11,7 @@ mod columns;
 mod faces;
 mod gaussians;
 mod header;
+mod splats;
 
 use super::reading::Reading;
 use super::{Loaded, ReadParams};
@@ -31,6 +32,9 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Loaded, 
 }
 
 fn elements<S: Source>(source: S, header: &Header, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+    if splats::is_of_splats(header) {
+        return splats::read(source, header, reading).map(Loaded::Points);
+    }
     if let Some(kind) = header.gaussians() {
         return gaussians::read(source, header, kind, reading).map(Loaded::Points);
     }

@@ -112,7 +112,11 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
         }
         FileData::Points(points) => {
             let all = points.position.iter().map(|p| points.origin + p.as_dvec3());
-            let what = if points.gaussians.is_empty() { "points" } else { "3D Gaussians" };
+            let what = match (points.gaussians.is_empty(), points.ready.cloud.is_empty()) {
+                (false, _) => "3D Gaussians",
+                (true, false) => "splats",
+                (true, true) => "points",
+            };
             let about = format!("{} {what}; {}", grouped(points.len() as u64), sides(DAabb::of_points(all)));
             let as_they_are = "# Colours of a photograph hold its light: they are shown as they are; name a material to light them.\n";
             match colors {

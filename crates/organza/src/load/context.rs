@@ -88,6 +88,7 @@ impl Context<'_> {
             orientation: Orientation::Auto(up),
             opacity: self.opacity(object),
             largest_spacing: LARGEST_SPACING,
+            shape: object.points.shape,
             size: object.points.size,
             camera: Some(self.scene.camera),
             merge_duplicates: object.merge_duplicates || self.options.merge_duplicates,

@@ -241,9 +241,7 @@ fn level_set(source: &LevelSetSource, object: &SceneObject, context: &Context<'_
 fn read_scattered(path: &Path, context: &Context<'_>) -> Result<Arc<RawPoints>, Error> {
     match context.read_once(path)? {
         FileData::Points(points) => {
-            if !points.opacity.is_empty() {
-                context.files.note(path, ["`level_set` does not use opacities: it has that of its object"]);
-            }
+            context.files.note(path, points.unused_by_fields());
             Ok(points)
         }
         FileData::Mesh(mesh) => {

@@ -68,8 +68,8 @@ fn ranks(scan: &Scan, names: [&str; 3]) -> Option<[usize; 3]> {
     Some([a?, b?, c?])
 }
 
-/// Refuses a number that matter cannot have.
-fn check_matter(
+/// Refuses a number that an attribute cannot have.
+fn check_attributes(
     extras: &Extras,
     names: &[String],
     number: impl Fn(usize) -> f64,
@@ -209,7 +209,7 @@ impl Columns {
         }
         let of_scan = |rank: usize| if self.names[rank] == SCAN { self.scans as f64 } else { f64::NAN };
         let further = |rank: usize| ranks.further[rank].map_or_else(|| of_scan(rank), |field| row[field]);
-        check_matter(&self.extras, &self.names, further, (scan.place, point))?;
+        check_attributes(&self.extras, &self.names, further, (scan.place, point))?;
         self.positions.push(place);
         self.extras.push(further);
         let [has_normal, has_color, has_value] = self.has;

@@ -91,11 +91,21 @@ pub(super) struct Element {
     pub(super) line: u64,
 }
 
+/// A comment `organza KEY REST`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Comment {
+    pub(super) key: Vec<u8>,
+    pub(super) rest: Vec<u8>,
+    pub(super) line: u64,
+}
+
 /// What the header says, and where the body begins.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
+    /// Comments of our own.
+    pub(super) comments: Vec<Comment>,
     /// Byte offset of the body.
     pub(super) body: usize,
     /// Line number of the body's first line.
@@ -144,6 +154,7 @@ pub(super) fn parse(content: &[u8]) -> Result<Header, ReadError> {
     }
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
+    let mut comments = Vec::new();
     let mut entries = 0;
     loop {
         let text = lines.next()?;
@@ -151,7 +162,11 @@ pub(super) fn parse(content: &[u8]) -> Result<Header, ReadError> {
         let mut words = text.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
         match words.next().unwrap_or_default() {
             b"end_header" => break,
-            b"comment" | b"obj_info" => continue,
+            b"comment" => match comment(text, line) {
+                Some(own) => comments.push(own),
+                None => continue,
+            },
+            b"obj_info" => continue,
             b"format" if encoding.is_none() => encoding = Some(format(&mut words, line, text)?),
             b"element" => elements.push(element(&mut words, line, text, &elements)?),
             b"property" => {
@@ -166,7 +181,7 @@ pub(super) fn parse(content: &[u8]) -> Result<Header, ReadError> {
             }
             _ => return Err(wrong(line, "format (once), element, property, comment, obj_info or end_header", text)),
         }
-        if words.next().is_some() {
+        if words.next().is_some() && !text.trim_ascii_start().starts_with(b"comment") {
             return Err(wrong(line, "the end of the line", text));
         }
         entries += 1;
@@ -175,7 +190,16 @@ pub(super) fn parse(content: &[u8]) -> Result<Header, ReadError> {
         }
     }
     let encoding = encoding.ok_or_else(|| wrong(lines.line, "a format line before end_header", b"none"))?;
-    Ok(Header { encoding, elements, body: lines.at, body_line: lines.line + 1 })
+    Ok(Header { encoding, elements, comments, body: lines.at, body_line: lines.line + 1 })
+}
+
+/// A comment of our own, and none of somebody else's.
+fn comment(text: &[u8], line: u64) -> Option<Comment> {
+    let rest =
+        text.trim_ascii().strip_prefix(b"comment")?.trim_ascii_start().strip_prefix(b"organza ")?.trim_ascii_start();
+    let end = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
+    let (key, rest) = rest.split_at(end);
+    Some(Comment { key: key.to_vec(), rest: rest.trim_ascii().to_vec(), line })
 }
 
 fn format<'a>(words: &mut impl Iterator<Item = &'a [u8]>, line: u64, text: &[u8]) -> Result<Encoding, ReadError> {

@@ -1,0 +1,36 @@
+//! The columns that say what a point looks like, and what their numbers may be: how large it is and where it lies, how much it absorbs,
+//! and how much of a shadow it takes.
+
+/// The kernel's reach: beyond that length of the file a point of matter has none. Of a disc the length within which it hides.
+pub(crate) const RADIUS: &str = "radius";
+/// Half the kernel's reach, as the kernels of smoothed particles end at twice this length (Monaghan 1992).
+pub(crate) const SMOOTHING_LENGTH: &str = "smoothing_length";
+/// A factor of the object's extinction.
+pub(crate) const EXTINCTION: &str = "extinction";
+/// What the object's extinction is multiplied by in the place of a volume.
+pub(crate) const MASS: &str = "mass";
+/// One semi-axis of a disc, its length that within which the disc hides.
+pub(crate) const TANGENT: [&str; 3] = ["tx", "ty", "tz"];
+/// Share of a shadow that a point receives.
+pub(crate) const SHADOW_COEFFICIENT: &str = "shadow_coefficient";
+
+/// The columns of discs; those of points that are a medium are all.
+const OF_DISCS: [&str; 5] = [RADIUS, TANGENT[0], TANGENT[1], TANGENT[2], SHADOW_COEFFICIENT];
+const OF_MATTER: [&str; 3] = [SMOOTHING_LENGTH, EXTINCTION, MASS];
+
+/// The name, where it is that of an attribute: of discs, or of matter too.
+pub(crate) fn attribute(column: &str, matter: bool) -> Option<&'static str> {
+    let of_matter = if matter { &OF_MATTER[..] } else { &[] };
+    OF_DISCS.iter().chain(of_matter).copied().find(|name| *name == column)
+}
+
+/// What a number of an attribute has to be, in words, where it is not that.
+pub(crate) fn expected(column: &str, number: f64) -> Option<&'static str> {
+    match column {
+        EXTINCTION | MASS if !(number.is_finite() && number >= 0.0) => Some("a finite number from 0 on"),
+        RADIUS | SMOOTHING_LENGTH if !(number.is_finite() && number > 0.0) => Some("a finite length above 0"),
+        SHADOW_COEFFICIENT if !(0.0..=1.0).contains(&number) => Some("a share from 0 to 1"),
+        _ if TANGENT.contains(&column) && !number.is_finite() => Some("a finite number"),
+        _ => None,
+    }
+}

@@ -1,0 +1,136 @@
+//! `organza convert`.
+
+use super::args::{ConvertArguments, SceneArguments};
+use super::bar::with_bar;
+use super::console;
+use super::given::given;
+use super::session::{parse_scene, path_text, processor_only, render_options};
+use ::convert::splats_to_ply;
+use organza::output::{Target, Targets};
+use organza::scene::{Scene, Technique};
+use organza::{Error, Loaded, printable, shown};
+use serde_json::{Value, json};
+use splat_core::{Cloud, Shading};
+use std::path::Path;
+
+/// Makes splats of a scene or of data files and writes them as rendering-oriented points. An output that is in the way is told before
+/// anything is read.
+pub(super) fn run(arguments: &ConvertArguments) -> Result<(), Error> {
+    processor_only(&arguments.scene)?;
+    refuse_of_pictures(&arguments.scene)?;
+    let path = check_name(&arguments.output)?;
+    Target::new(path, arguments.force)?;
+    let (given, files) = given(&arguments.scene, None)?;
+    let mut scene = parse_scene(&arguments.scene, &given, None, None)?;
+    let mut targets = Targets::default();
+    targets.add_inputs(&scene.files());
+    let target = targets.add(path, arguments.force)?;
+    // What was looked at to make a scene is read again: as the scene asks for it.
+    drop(files);
+    as_splats(&mut scene);
+    let options = render_options(&arguments.scene);
+    let (loaded, bytes) = with_bar(|progress| {
+        let mut loaded = organza::load(&scene, &options, progress)?;
+        refuse_gaussians(&loaded)?;
+        // A power of two: no bit of a splat is lost.
+        loaded.cloud.scale_world(2f64.powi(loaded.exponent));
+        let bytes = splats_to_ply(&loaded.cloud, &names(&loaded), &loaded.footprints);
+        target.write(&bytes)?;
+        progress.finish();
+        Ok((loaded, bytes.len() as u64))
+    })?;
+    loaded.warnings.iter().for_each(|warning| console::warn(warning));
+    loaded.notes.iter().for_each(|note| console::remark(note));
+    if let Some(said) = said_of_unlit(&loaded) {
+        console::remark(&said);
+    }
+    if arguments.scene.json {
+        return console::out(&format!("{:#}\n", document(&loaded, target.path(), bytes)));
+    }
+    let path = printable(target.path());
+    let count = loaded.cloud.len();
+    console::out(&format!(
+        "wrote {path} ({bytes} bytes, {count} splats); draw it: organza render {path} -o picture.png\n"
+    ))
+}
+
+/// Every object as splats, whatever draws it.
+fn as_splats(scene: &mut Scene) {
+    scene.render.technique = Technique::Points;
+    scene.objects.iter_mut().for_each(|object| object.technique = None);
+}
+
+fn names(loaded: &Loaded) -> Vec<String> {
+    loaded.objects.iter().map(|object| object.name.clone()).collect()
+}
+
+/// How many splats each object has.
+fn counts(cloud: &Cloud, objects: usize) -> Vec<u64> {
+    let mut counts = vec![0; objects];
+    cloud.object.iter().for_each(|object| counts[*object as usize] += 1);
+    counts
+}
+
+fn document(loaded: &Loaded, path: &Path, bytes: u64) -> Value {
+    let counts = counts(&loaded.cloud, loaded.objects.len());
+    let objects = loaded.objects.iter().zip(counts).map(|(object, n)| json!({ "name": object.name, "splats": n }));
+    json!({
+        "output": path_text(path),
+        "bytes": bytes,
+        "splats": loaded.cloud.len(),
+        "objects": objects.collect::<Value>(),
+        "warnings": loaded.warnings,
+        "notes": loaded.notes,
+    })
+}
+
+/// Files of splats have no column for what a Gaussian is.
+fn refuse_gaussians(loaded: &Loaded) -> Result<(), Error> {
+    let is_one = |i: &usize| loaded.cloud.get(*i).gaussian != splat_core::Gaussians::NONE;
+    let first = (0..loaded.cloud.gaussian.len()).find(is_one);
+    first.map_or(Ok(()), |i| {
+        let name = shown(&loaded.objects[loaded.cloud.object[i] as usize].name);
+        let message = "it is 3D Gaussians, which are rendering-oriented points in a format of their own already";
+        Err(Error::input(format!("object '{name}'"), message, format!("set object.{name}.visible = false")))
+    })
+}
+
+/// Objects whose colours are shown as they are, which a file of splats does not say.
+fn said_of_unlit(loaded: &Loaded) -> Option<String> {
+    let unlit = |material: u16| loaded.materials[usize::from(material)].shading == Shading::Unlit;
+    let ids = loaded.cloud.material.iter().zip(&loaded.cloud.object).filter(|(material, _)| unlit(**material));
+    let mut objects: Vec<u32> = ids.map(|(_, object)| *object).collect();
+    objects.dedup();
+    objects.sort_unstable();
+    objects.dedup();
+    let names: Vec<String> =
+        objects.iter().map(|o| format!("'{}'", shown(&loaded.objects[*o as usize].name))).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{} is shown without light: draw its splats with `unlit = true`, or by its material",
+            names.join(" and ")
+        )
+    })
+}
+
+/// Splats are written as PLY: another name would be read as something else.
+fn check_name(path: &Path) -> Result<&Path, Error> {
+    match path.extension() {
+        Some(extension) if extension.eq_ignore_ascii_case("ply") => Ok(path),
+        _ => Err(Error::usage(format!("{}: expected a name that ends in .ply", printable(path)), "")),
+    }
+}
+
+/// What is said of pictures says nothing of splats.
+fn refuse_of_pictures(scene: &SceneArguments) -> Result<(), Error> {
+    let all = [
+        ("--technique", scene.technique.is_some()),
+        ("--target-error", scene.target_error.is_some()),
+        ("--repeat-level", scene.repeat_level.is_some()),
+        ("--exposure", scene.exposure.is_some()),
+    ];
+    let named = all.into_iter().find(|(_, on)| *on);
+    named.map_or(Ok(()), |(name, _)| {
+        Err(Error::usage(format!("{name} is for pictures, and splats are asked for"), "leave it out"))
+    })
+}
