@@ -16,6 +16,11 @@ size = [32, 24]
 color = [0.25, 0.5, 1.0]
 [ambient]
 color = [1, 1, 1]
+[[light]]
+kind = "directional"
+direction = [-0.5, -0.3, -0.8]
+irradiance = [1, 1, 1]
+shadow = false
 [material.red]
 color = [1, 0.1, 0.1]
 [material.blue]
@@ -69,6 +74,7 @@ fn exact_order_is_the_truth_and_disorder_costs_accuracy() {
     println!("standard deviation {:?}, bias {bias}", sampled("standard_deviation"));
     assert!(bias < 0.25 * value("unsorted", "rmse"), "bias {bias}");
     assert!(sampled("standard_deviation").unwrap() > 0.0);
+    sheets_pop(report);
     let mut names: Vec<_> = fs::read_dir(folder.path().join("o")).unwrap().map(|e| e.unwrap().file_name()).collect();
     names.sort();
     assert_eq!(names, ["orders.csv", "orders.html", "orders.json", "orders.png"]);
@@ -76,6 +82,28 @@ fn exact_order_is_the_truth_and_disorder_costs_accuracy() {
     assert_eq!(png[..8], *b"\x89PNG\r\n\x1a\n");
     let again = organza().args(["orders", "s.toml", "--out", "o"]).current_dir(&folder).output().unwrap();
     assert_eq!(again.status.code(), Some(4));
+}
+
+/// Sheets of eight voxels mix more than those of one. Where another axis becomes the nearest sheets across axes pop; those across the view turn
+/// with it.
+fn sheets_pop(report: &Value) {
+    let value = |across: &str, voxels: u32, key: &str| {
+        let name = format!("sheets across {across}, {voxels} voxel{}", if voxels == 1 { "" } else { "s" });
+        row(report, &name)[key].as_f64().unwrap()
+    };
+    for across in ["the view", "an axis", "the half vector"] {
+        let of = |key: &str| [1, 2, 4, 8].map(|voxels| value(across, voxels, key));
+        println!("{across}: pops {:.2?}, RMSE {:.4?}", of("pop_score"), of("rmse"));
+        assert!(of("rmse")[0] < of("rmse")[3] && of("slice_thickness")[3] == 8.0 * of("slice_thickness")[0]);
+    }
+    // All sheets change at once.
+    for voxels in [1, 2, 4, 8] {
+        assert!(value("an axis", voxels, "pop_score") > 2.0 * value("the view", voxels, "pop_score"));
+    }
+    let by_centre = row(report, "comparison sort by view depth")["pop_score"].as_f64().unwrap();
+    println!("by centre: pops {by_centre:.2}");
+    // Fragments and centres of media are in nearly the same order.
+    assert!(by_centre < value("the view", 1, "pop_score") && row(report, "unsorted")["pop_score"].is_null());
 }
 
 #[test]

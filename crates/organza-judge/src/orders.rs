@@ -3,11 +3,13 @@
 //! Splats are lit once; then the translucent ones are composited in each order, with nothing cut off, and compared with the
 //! picture in which the fragments of every pixel are sorted by their own depth, in f64. Opaque surfaces enter as in any
 //! render. So the order is all that differs. The technique `particles` stands beside them: it orders nothing; here its
-//! particles are sampled from the same splats, and its pictures of several seeds are judged by the same truth. So do the ways in which
+//! particles are sampled from the same splats, and its pictures of several seeds are judged by the same truth. So do sheets of several
+//! thicknesses, each with how much it pops as the view turns. So do the ways in which
 //! `surfels` tells layers apart, which have a truth of their own.
 
 mod layers;
 mod report;
+mod sheets;
 mod sorter;
 
 pub use report::{OrdersReport, write};
@@ -32,6 +34,7 @@ pub const LONGEST_SIDE: u32 = 240;
 const LOAD: &str = "first look";
 const ORDERS: &str = "orders";
 const TRUTH: &str = "exact truth";
+const SHEETS: &str = "sheets";
 const SETS_OF_PARTICLES: &str = "particles";
 const LAYERS: &str = "layers";
 
@@ -63,6 +66,17 @@ pub struct Ordered {
     pub sampled: Option<Sampled>,
     /// Whether it averages the discs of a layer, and is judged by [`Comparison::layers`].
     pub of_layers: bool,
+    /// How much it pops: the largest step of a pixel between frames 0.1° apart, over that of fragments in exact order. Of sheets and of the order of
+    /// centres; `None` of others, and where nothing changes.
+    pub pop: Option<f64>,
+}
+
+impl Ordered {
+    /// A picture of which nothing else is known.
+    fn new(name: String, image: Image<Linear>) -> Self {
+        let (thickness, disorder, seconds, sampled, pop) = (None, None, None, None, None);
+        Self { name, thickness, image, disorder, seconds, bytes: 0, sampled, of_layers: false, pop }
+    }
 }
 
 /// Pictures by every ordering, and the truth.
@@ -88,18 +102,17 @@ pub struct Comparison {
 /// As [`organza::render`]; [`Error::Input`] for a scene without translucent splats.
 pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Comparison, Error> {
     let scene = by_slices_alone(scene);
-    progress.plan([(LOAD, 2.0), (ORDERS, 8.0), (TRUTH, 8.0), (SETS_OF_PARTICLES, 8.0), (LAYERS, 8.0)]);
+    progress.plan([(LOAD, 2.0), (ORDERS, 8.0), (TRUTH, 8.0), (SHEETS, 8.0), (SETS_OF_PARTICLES, 8.0), (LAYERS, 8.0)]);
     progress.begin(LOAD);
     progress.enter();
     let loaded = load(&scene, options, progress)?;
     let plan = plan_loaded(&scene, &loaded, options)?;
     let frame = Frame::new(&scene, &loaded, &plan, progress);
     let mut cost = CostRecord::default();
-    let camera = frame.camera;
     let shaded = frame.shaded(&mut cost)?;
     let sorter = Sorter {
         loaded: &loaded,
-        camera,
+        camera: frame.camera,
         translucent: frame.translucent(frame.drawn(), Technique::Points),
         margin_px: frame.filter_reach_px(),
     };
@@ -109,7 +122,7 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
         return Err(Error::input("scene", message, ""));
     }
     let auto = auto.thickness;
-    let rays = rays(&exact_input(&loaded, &camera, shaded, frame.raster_params().resampling_sigma_px));
+    let rays = rays(&exact_input(&loaded, &frame.camera, shaded, frame.raster_params().resampling_sigma_px));
     let world = libm::exp2(f64::from(loaded.exponent));
     let sliced = THICKER.map(|f| Ordering::Slices(f * auto));
     let all = [&[Ordering::Exact][..], &sliced, &[Ordering::Centre, Ordering::Distance, Ordering::Unsorted]].concat();
@@ -127,7 +140,7 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
         progress.tick(0).map_err(|_| Error::Cancelled)?;
         let (name, thickness) = (ordering.name(auto), ordering.thickness().map(|t| t * world));
         let (image, disorder) = (image(&layers)?, Some(disorder));
-        Ok::<_, Error>(Ordered { name, thickness, image, disorder, seconds, bytes, sampled: None, of_layers: false })
+        Ok::<_, Error>(Ordered { thickness, disorder, seconds, bytes, ..Ordered::new(name, image) })
     };
     let stages = all.iter().map(|ordering| (ordering.name(auto), 1.0));
     let drawn = progress.within(ORDERS, stages, || all.iter().map(|o| draw(*o)).collect::<Result<Vec<_>, _>>());
@@ -136,6 +149,8 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
     let start = Instant::now();
     let truth = by_technique(Technique::Reference, &scene, &loaded, options, progress)?;
     let truth_seconds = start.elapsed().as_secs_f64();
+    let splats = sheets::Splats { scene: &scene, loaded: &loaded, plan: &plan, ids: &sorter.translucent };
+    sheets::ways(&splats, (&frame, &Ordering::Centre.name(auto)), &mut orderings, progress)?;
     progress.begin(SETS_OF_PARTICLES);
     let unordered = particles(&scene, &loaded, &truth, options, progress)?;
     let without_particles = unordered.as_ref().err().cloned();
@@ -230,8 +245,7 @@ fn particles(
     progress.leave();
     let sampled = Sampled::of(&images, truth, 0.0, None)?;
     let name = format!("particles, {SETS} sets: none needed");
-    let image = images.swap_remove(0);
-    Ok(Ok(Ordered { name, thickness: None, image, disorder: None, seconds: None, bytes: 0, sampled, of_layers: false }))
+    Ok(Ok(Ordered { sampled, ..Ordered::new(name, images.swap_remove(0)) }))
 }
 
 fn image(layers: &Layers) -> Result<Image<Linear>, Error> {

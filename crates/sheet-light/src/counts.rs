@@ -15,7 +15,9 @@ pub struct SheetCounts {
     pub fragments: u64,
     /// Those of splats, each for one slab.
     pub splat_fragments: u64,
-    /// Pixels of sheets classified.
+    /// Pixels of sheets that footprints touched, within their bounds; what is opaque by then is counted, too.
+    pub touched: u64,
+    /// Pixels of sheets classified, whole vectors.
     pub shaded: u64,
     /// Tiles without any voxel, or opaque from the beginning.
     pub tiles_skipped: u64,
@@ -34,6 +36,7 @@ impl SheetCounts {
             hidden: self.hidden + other.hidden,
             fragments: self.fragments + other.fragments,
             splat_fragments: self.splat_fragments + other.splat_fragments,
+            touched: self.touched + other.touched,
             shaded: self.shaded + other.shaded,
             tiles_skipped: self.tiles_skipped + other.tiles_skipped,
             slabs: self.slabs + other.slabs,

@@ -7,6 +7,7 @@ use crate::error::cancelled;
 use crate::kept::Kept;
 use crate::lattice::Lattice;
 use crate::light::Lamp;
+use crate::near_eye;
 use crate::params::{Aligned, Classify};
 use crate::preclassified::Preclassified;
 use crate::rays::LatticeRays;
@@ -45,6 +46,8 @@ pub(crate) struct Prepared<'a> {
     pub(crate) rays: LatticeRays,
     pub(crate) voxels: Voxels,
     pub(crate) shadows: Option<Shadows>,
+    /// Its slabs that lack kernels, because these lie behind the eye.
+    pub(crate) lacking: Option<Range<u32>>,
     pub(crate) segments: Segments,
     /// What values are taken relative to.
     pub(crate) base: f64,
@@ -156,6 +159,9 @@ fn memory(input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [usize;
         let width = slabs.width * f64::from(stride);
         let touched = crate::sections::touched(reach(volume, input, params) / width);
         let lines = u64::from(Ring::lines_for(touched));
+        let is_near =
+            near_eye::lacking(volume, input.camera, &slabs.wider(stride), reach(volume, input, params)).is_some();
+        let sums = sums + u64::from(is_near);
         // Lists: four bytes for eight voxels, in two or three tiles each. Records: two of sixteen bytes a voxel of a tile.
         let voxels = dims.iter().map(|n| *n as u64).product::<u64>();
         let of_a_tile = voxels.div_ceil((tiles[0] * tiles[1]) as u64) * 4;
@@ -185,6 +191,7 @@ impl<'a> Prepared<'a> {
         let stride = stride(&volume, input, params, slabs.width);
         let slabs = &slabs.wider(stride);
         let viewed = Viewed::new(&volume, camera, slabs, params, slant);
+        let lacking = near_eye::lacking(&volume, camera, slabs, viewed.reach);
         let reach = viewed.lattice_reach(camera, slabs, volume.normals);
         let lattice = Lattice::packed(grid, volume.packing, reach);
         let viewed = viewed.with_rim(lattice.rim);
@@ -209,6 +216,7 @@ impl<'a> Prepared<'a> {
             viewed,
             voxels,
             shadows: None,
+            lacking,
             segments,
             base,
         }

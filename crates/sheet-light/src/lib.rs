@@ -59,6 +59,7 @@ mod kept;
 mod lattice;
 mod light;
 mod lines;
+mod near_eye;
 mod params;
 mod picture;
 mod preclassified;

@@ -3,6 +3,7 @@
 use crate::aligned::Slant;
 use crate::fold::{slabs_of, stride};
 use crate::lattice::Lattice;
+use crate::near_eye::{LEAST_APART, eye_of, lacking};
 use crate::params::Classify;
 use crate::rays::LatticeRays;
 use crate::sections::{PHASES, sections};
@@ -29,6 +30,8 @@ struct Sheets {
     stride: u32,
     values: Vec<f64>,
     weights: Vec<f64>,
+    /// Σ of kernels times the depths of voxels, in slabs from the eye.
+    depths: Vec<f64>,
     /// Extinction and colours times it, where voxels are classified before they are splatted.
     classes: Vec<[f64; 4]>,
     /// Where each ray is inside.
@@ -95,6 +98,7 @@ impl Sheets {
             stride,
             values: vec![0.0; n],
             weights: vec![0.0; n],
+            depths: vec![0.0; n],
             classes: vec![[0.0; 4]; if params.classify == Classify::Before { n } else { 0 }],
             crossings: pixels.map(|at| crossing(ray(at))).collect(),
             size,
@@ -112,13 +116,30 @@ impl Sheets {
             let sums = [f64::from(value), extinction, red, green, blue];
             sheets.splat(&viewed, params, slabs, viewed.position(i, j, k), sums);
         }
+        for slab in lacking(volume, camera, slabs, viewed.reach).into_iter().flatten() {
+            sheets.mend(slab);
+        }
         sheets
+    }
+
+    /// Tells the values of a sheet that lacks kernels behind the eye in the middle of its slab, from the place that they are of and from the next sheet.
+    fn mend(&mut self, slab: u32) {
+        let (count, middle) = (self.size[0] * self.size[1], f64::from(slab) + 0.5 - eye_of(&self.slabs));
+        for at in 0..count {
+            let (Some(value), Some(next)) = (self.value(slab, at), self.value(slab + 1, at)) else { continue };
+            let (here, behind) = (slab as usize * count + at, (slab as usize + 1) * count + at);
+            let [depth, next_depth] = [here, behind].map(|sheet| self.depths[sheet] / self.weights[sheet]);
+            if next_depth - depth > LEAST_APART {
+                self.values[here] += self.weights[here] * (middle - depth) * (next - value) / (next_depth - depth);
+            }
+        }
     }
 
     /// Adds one voxel to every slab and pixel that it touches.
     fn splat(&mut self, viewed: &Viewed, params: &Params, slabs: &Slabs, at: DVec3, [value, class @ ..]: [f64; 5]) {
         let Some(place) = viewed.place(at.z as f32) else { return };
         let Some(scale) = viewed.scale(viewed.depth(place)) else { return };
+        let depth = viewed.depth(place) / slabs.width - eye_of(slabs);
         let footprint = viewed.footprint(scale);
         let [a, b, c] = footprint.conic.map(f64::from);
         let [x0, y0] = viewed.pixel(Vec3::new(at.x as f32, at.y as f32, 0.0), scale as f32).map(f64::from);
@@ -139,6 +160,7 @@ impl Sheets {
                     if let Some(sum) = self.weights.get_mut(sheet) {
                         *sum += weight * section;
                         self.values[sheet] += weight * section * value;
+                        self.depths[sheet] += weight * section * depth;
                         if let Some(sums) = self.classes.get_mut(sheet) {
                             (0..4).for_each(|c| sums[c] += weight * section * class[c]);
                         }

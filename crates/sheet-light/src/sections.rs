@@ -57,10 +57,12 @@ impl SectionTable {
         &self.weights[begin..begin + 8]
     }
 
-    /// The section of one slab, `slab` < touched behind the one in which the kernel begins.
+    /// The sections of the slab before a slab, of itself and of the one behind it, that lies `slab` behind the one in which the kernel begins:
+    /// −7 < `slab` ≤ touched.
     #[inline(always)]
-    pub(crate) fn one(&self, phase: u32, slab: u32) -> f32 {
-        self.weights[phase as usize * self.stride + 8 + slab as usize]
+    pub(crate) fn around(&self, phase: u32, slab: isize) -> [f32; 3] {
+        let eight = self.eight(phase, slab - 1);
+        [eight[0], eight[1], eight[2]]
     }
 }
 

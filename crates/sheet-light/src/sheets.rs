@@ -71,6 +71,15 @@ impl Sheets {
         self.weights[at] = weight;
     }
 
+    /// Replaces the values of pixels of a row from x on.
+    #[inline(always)]
+    pub(crate) fn set<S: Simd>(&mut self, slab: u32, y: usize, x: usize, values: Lanes<S>) {
+        let (at, n) = (Self::at(slab, y, x), Lanes::<S>::COUNT.min(SIDE - x));
+        let mut out = [0.0; MAX_LANES];
+        values.store(&mut out);
+        self.values[at..at + n].copy_from_slice(&out[..n]);
+    }
+
     /// Divides by kernel sums.
     #[inline(always)]
     pub(crate) fn normalize_row<S: Simd>(&mut self, simd: S, slab: u32, y: usize, range: std::ops::Range<usize>) {

@@ -16,6 +16,9 @@ use splat_core::raster::lanes::Lanes;
 use splat_core::raster::pulp::Simd;
 use std::ops::Range;
 
+/// Pixels of a row of a tile, without its rim.
+const INTERIOR: u64 = ((1 << TILE) - 1) << 1;
+
 impl VolumeScratch {
     /// The volume's own slab at a slab, if any kernel reaches it.
     #[inline(always)]
@@ -24,10 +27,11 @@ impl VolumeScratch {
         self.queue.active.contains(&own).then_some(own)
     }
 
-    /// Whether the sheet there, or the next one, which tells how values go on, is not finished.
+    /// Whether the sheet there, or the next one, which tells how values go on, is not finished. Beside the eye the next one needs another.
     #[inline(always)]
     fn needs(&self, of: &Prepared<'_>, slab: u32) -> bool {
-        let is_behind = |own| !self.batches.is_empty() && self.batches.start * BATCH <= own + 1;
+        let more = if of.lacking.as_ref().is_some_and(|lacking| slab / of.stride < lacking.end) { 2 } else { 1 };
+        let is_behind = |own| !self.batches.is_empty() && self.batches.start * BATCH <= own + more;
         self.own(of, slab).is_some_and(is_behind)
     }
 
@@ -37,16 +41,24 @@ impl VolumeScratch {
         let batch = self.batches.start;
         self.batches.start += 1;
         let (splatter, wanted) = (of.splatter(), picture.wanted(of.volume.normals));
+        let is_near = |lacking: &Range<u32>| batch <= lacking.end / BATCH;
+        let mut near_eye = self.near_eye.as_deref_mut().filter(|_| of.lacking.as_ref().is_some_and(is_near));
         for record in self.queue.take(of, batch, picture.corner) {
             counts.records += 1;
             let fragments = self.ring.splat(simd, &splatter, record, &wanted);
             counts.fragments += fragments;
             counts.hidden += u64::from(fragments == 0);
+            if let Some(near_eye) = &mut near_eye {
+                counts.fragments += near_eye.splat(simd, (&splatter, &of.slabs), record, &wanted);
+            }
             if let Some(preclassified) = &mut self.preclassified {
                 counts.fragments += preclassified.splat(simd, (&splatter, &of.classifier), record, &wanted);
             }
         }
         self.ring.take_batch(simd, batch, &mut self.sheets);
+        if let Some(near_eye) = near_eye {
+            near_eye.take_batch(simd, of, batch, &mut self.sheets);
+        }
         if let Some(preclassified) = &mut self.preclassified {
             preclassified.take_batch(simd, batch);
         }
@@ -143,6 +155,7 @@ impl FoldTile<'_> {
             for (prepared, scratch) in of.volumes.iter().zip(volumes.iter()) {
                 tags |= scratch.own(prepared, step.start).map_or(0, |own| scratch.sheets.tags(own, y));
             }
+            counts.touched += u64::from((tags & INTERIOR).count_ones());
             let tags = tags & picture.lit[y] | splats.sums.tags[y] & picture.open[y];
             for x in (1..=TILE).step_by(Lanes::<S>::COUNT) {
                 if tags >> x & ((1 << Lanes::<S>::COUNT) - 1) == 0 {

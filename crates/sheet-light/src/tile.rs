@@ -3,6 +3,7 @@
 use crate::counts::SheetCounts;
 use crate::fold::{Prepared, Sheeted};
 use crate::kept::Kept;
+use crate::near_eye::NearEye;
 use crate::params::Classify;
 use crate::picture::{Fragments, Picture};
 use crate::preclassified::Preclassified;
@@ -45,6 +46,8 @@ pub(crate) struct VolumeScratch {
     pub(crate) kept: Kept,
     /// Where voxels are classified before they are splatted.
     pub(crate) preclassified: Option<Box<Preclassified>>,
+    /// Where kernels lie behind the eye.
+    pub(crate) near_eye: Option<Box<NearEye>>,
     /// Batches of its own slabs that are not finished yet.
     pub(crate) batches: Range<u32>,
 }
@@ -58,6 +61,7 @@ impl Scratch {
             queue: Queue::new(v),
             kept: Kept::new(v.stride),
             preclassified: (v.classify == Classify::Before).then(|| Box::new(Preclassified::new(v.sections.touched))),
+            near_eye: v.lacking.as_ref().map(|_| Box::new(NearEye::new(v.sections.touched))),
             batches: 0..0,
         };
         Self {
@@ -135,6 +139,7 @@ impl VolumeScratch {
         self.sheets.clear();
         self.kept.clear();
         self.preclassified.iter_mut().for_each(|p| p.clear());
+        self.near_eye.iter_mut().for_each(|n| n.clear());
         // Nothing begins before.
         self.batches.start = self.batches.start.max(self.queue.active.start / BATCH);
     }
@@ -145,7 +150,8 @@ impl VolumeScratch {
 fn batches(of: &Prepared<'_>, span: &Range<u32>) -> Range<u32> {
     let (first, last) = (span.start / of.stride, span.end.saturating_sub(1) / of.stride);
     let begin = first.saturating_sub(of.sections.touched as u32 + 1);
-    begin / BATCH..(last + 2).min(of.slabs.count).div_ceil(BATCH)
+    let behind = if of.lacking.is_some() { 3 } else { 2 };
+    begin / BATCH..(last + behind).min(of.slabs.count).div_ceil(BATCH)
 }
 
 impl<'a> FoldTile<'a> {

@@ -246,8 +246,8 @@ impl Viewed {
         let neighbour = if gradient { 1.0 } else { 0.0 };
         let [xx, xy, yy] = self.extent_px(scale).map(|m| m / (scale * scale));
         let pixel = neighbour / scale;
-        // A sheet holds means over its slab, whose middle may lie beyond a volume's face.
-        let along = self.reach + (1.0 + neighbour) * slabs.width;
+        // A sheet holds means over its slab, whose middle may lie beyond a volume's face; values there are in part those of the next sheet.
+        let along = self.reach + (1.5 + neighbour) * slabs.width;
         let [width, height] = camera.size.map(f64::from);
         let corners = [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]];
         let inverse = self.axes.inverse();

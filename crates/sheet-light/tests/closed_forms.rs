@@ -86,6 +86,31 @@ fn a_linear_field_has_its_optical_depth_wherever_faces_cut_slabs() {
     }
 }
 
+/// Voxels behind the eye have no place in the image, so what is reconstructed beside it is that of places farther off: 0.3 slabs at the eye.
+#[test]
+fn an_eye_in_a_linear_field_sees_its_optical_depth() {
+    let field = |p: DVec3| 1.5 + p.dot(DVec3::new(0.1, -0.05, 0.6));
+    let grid = grid([30, 30, 5], cubic(0.4), field);
+    let (tf, material) = (transfer(&[(0.0, 0.0), (4.0, 4.0)]), unlit());
+    let volumes = [volume(&grid, &tf, &material)];
+    let eyes = [[0.0, 0.0, 0.7], [0.0, 0.0, 0.51], [0.3, 0.2, 0.83], [-0.2, 0.1, 1.05], [0.1, 0.0, -0.2]];
+    for camera in eyes.iter().flat_map(|eye| [perspective(*eye, 60.0, [24, 24]), parallel(*eye, 3.0, [24, 24])]) {
+        for slab_width in [0.2, 0.4, 0.6, 0.77] {
+            let params = Params { slab_width: Some(slab_width), ..exact() };
+            let input = input(&volumes, &camera, &[]);
+            let (out, _) = draw(&input, &params).unwrap();
+            for at in (0..576).step_by(7) {
+                let (length, middle) = inside(&grid, &camera, at % 24, at / 24);
+                let (found, expected) = (f64::from(out.optical_depth[0][at]), length * field(middle));
+                let what = format!("{slab_width}, {:?}, pixel {at}", camera.position);
+                assert!((found / expected - 1.0).abs() < 0.01, "{what}: {found}, not {expected}");
+            }
+            let [tau, _] = crate::twin::differences(&input, &params);
+            assert!(tau < 2e-5, "{slab_width}, {:?}: {tau:e}", camera.position);
+        }
+    }
+}
+
 #[test]
 fn ia12_a_wide_lens_has_the_length_of_each_ray() {
     let grid = grid([40, 40, 8], cubic(0.25), |_| -7.0);

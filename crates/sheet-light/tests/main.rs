@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod body_centred;
+mod centre_order;
 mod clipped;
 mod closed_forms;
 mod common;
@@ -12,3 +13,4 @@ mod modes;
 mod splats;
 mod strides;
 mod twin;
+mod work;

@@ -34,8 +34,7 @@ pub(super) fn ways(
     let mut draw = |name: String, layers: SurfelLayers| {
         scene.render.surfels.layers = layers;
         let image = by_technique(Technique::Surfels, &scene, loaded, options, progress)?;
-        let (thickness, disorder, seconds, sampled) = (None, None, None, None);
-        all.push(Ordered { name, thickness, image, disorder, seconds, bytes: 0, sampled, of_layers: true });
+        all.push(Ordered { of_layers: true, ..Ordered::new(name, image) });
         Ok::<_, Error>(())
     };
     draw("layers by gaps".into(), SurfelLayers::Gaps)?;

@@ -71,6 +71,7 @@ impl OrdersReport {
                 "flip": d.flip,
                 "epsilon_8_bit": d.epsilon,
                 "of_layers": o.of_layers,
+                "pop_score": o.pop,
                 "sort_seconds": o.seconds.map(|s| json!({ "median": s.median, "min": s.min, "max": s.max })),
                 "bytes": o.bytes,
                 "sampled": o.sampled.map(|s| json!({
@@ -101,13 +102,13 @@ impl OrdersReport {
     pub fn csv(&self) -> String {
         let mut text = String::from(
             "ordering,slice_thickness,wrong_pairs_per_ray,pairs_per_ray,worst_backtrack,rmse,max,flip,sort_ms,bytes,\
-             rmse_half_width_95,rms_bias,epsilon_8_bit,of_layers\n",
+             rmse_half_width_95,rms_bias,pop_score,epsilon_8_bit,of_layers\n",
         );
         let cell = |v: Option<f64>| v.map_or_else(String::new, |v| format!("{v:.6e}"));
         for (o, d) in self.rows() {
             let _ = writeln!(
                 text,
-                "\"{}\",{},{},{},{},{:.6e},{:.6e},{:.6e},{},{},{},{},{:.6e},{}",
+                "\"{}\",{},{},{},{},{:.6e},{:.6e},{:.6e},{},{},{},{},{},{:.6e},{}",
                 o.name,
                 cell(o.thickness),
                 cell(o.disorder.map(|d| d.wrong_pairs_per_ray)),
@@ -120,6 +121,7 @@ impl OrdersReport {
                 o.bytes,
                 cell(o.sampled.map(|s| s.from_limit.half_width)),
                 cell(o.sampled.and_then(|s| s.bias)),
+                cell(o.pop),
                 d.epsilon,
                 o.of_layers,
             );
@@ -130,19 +132,20 @@ impl OrdersReport {
     /// The comparison as lines of text.
     pub fn text(&self) -> String {
         let mut text = format!(
-            "{:>12} {:>12} {:>10} {:>10} {:>8} {:>9} {:>11}  ordering\n",
-            "wrong pairs", "backtrack", "RMSE", "max", "ε", "ms", "bytes"
+            "{:>12} {:>12} {:>10} {:>10} {:>8} {:>7} {:>9} {:>11}  ordering\n",
+            "wrong pairs", "backtrack", "RMSE", "max", "ε", "pops", "ms", "bytes"
         );
         for (o, d) in self.rows() {
             let ms = o.seconds.map_or_else(|| "-".into(), |s| format!("{:.2}", 1e3 * s.median));
             let _ = writeln!(
                 text,
-                "{:>12} {:>12} {:>10.2e} {:>10.2e} {:>8.3} {ms:>9} {:>11}  {}{}",
+                "{:>12} {:>12} {:>10.2e} {:>10.2e} {:>8.3} {:>7} {ms:>9} {:>11}  {}{}",
                 o.disorder.map_or_else(|| "-".into(), |d| format!("{:.3}", d.wrong_pairs_per_ray)),
                 o.disorder.map_or_else(|| "-".into(), |d| format!("{:.4}", d.worst_backtrack)),
                 d.linear.rmse,
                 d.linear.max,
                 d.epsilon,
+                pops(o, "-"),
                 o.bytes,
                 o.name,
                 seeds(o)
@@ -200,7 +203,7 @@ impl OrdersReport {
              content=\"width=device-width\"><title>Orders: {0}</title>\n<style>\n{1}</style></head>\n<body><main>\n<h1>Orders: \
              {0}</h1>\n<p class=\"soft\">{2} translucent splats; truth: fragments sorted per pixel in f64 ({3:.1} s). {4} \
              threads on {5}.<br>Scene SHA-256 <code>{6}</code></p>\n<div class=\"wide\"><table><tr><th>ordering</th>\
-             <th>wrong pairs a ray</th><th>worst backtrack</th><th>RMSE</th><th>max</th><th>FLIP</th><th>ε</th><th>sort ms</th>\
+             <th>wrong pairs a ray</th><th>worst backtrack</th><th>RMSE</th><th>max</th><th>FLIP</th><th>ε</th><th>pops</th><th>sort ms</th>\
              <th>bytes</th></tr>\n",
             escaped(&self.scene),
             include_str!("../accuracy/report.css"),
@@ -217,7 +220,7 @@ impl OrdersReport {
             let ms = o.seconds.map_or_else(|| "–".into(), |s| format!("{:.2}", 1e3 * s.median));
             let _ = writeln!(
                 html,
-                "<tr><td>{}{}</td><td>{pairs}</td><td>{}</td><td>{:.2e}</td><td>{:.2e}</td><td>{:.4}</td><td>{:.3}</td><td>{ms}</td>\
+                "<tr><td>{}{}</td><td>{pairs}</td><td>{}</td><td>{:.2e}</td><td>{:.2e}</td><td>{:.4}</td><td>{:.3}</td><td>{}</td><td>{ms}</td>\
                  <td>{}</td></tr>",
                 o.name,
                 seeds(o),
@@ -226,6 +229,7 @@ impl OrdersReport {
                 d.linear.max,
                 d.flip,
                 d.epsilon,
+                pops(o, "–"),
                 o.bytes
             );
         }
@@ -267,6 +271,11 @@ impl OrdersReport {
 /// What an ordering is judged by.
 fn truth<'a>(o: &Ordered, comparison: &'a Comparison) -> &'a Image<Linear> {
     comparison.layers.as_ref().ok().filter(|_| o.of_layers).unwrap_or(&comparison.truth)
+}
+
+/// How much an ordering pops, or `none`.
+fn pops(o: &Ordered, none: &str) -> String {
+    o.pop.map_or_else(|| none.to_owned(), |pop| format!("{pop:.2}"))
 }
 
 /// What the seeds of a random technique say, beside its name: the picture and its measures are those of the first one.

@@ -20,6 +20,13 @@ impl HalfVector {
         Self { normal: -half.normalize(), back_to_front }
     }
 
+    /// The axis on the other side of the right angle, at which [`HalfVector::between`] turns over.
+    pub(crate) fn beyond(to_eye: DVec3, to_light: DVec3) -> Self {
+        let (_, is_back_to_front) = Self::raw(to_eye, to_light);
+        let half = if is_back_to_front { to_eye + to_light } else { to_light - to_eye };
+        Self { normal: -half.normalize(), back_to_front: !is_back_to_front }
+    }
+
     /// E + L where E·L ≥ 0, else L − E; and whether it is the latter.
     pub fn raw(to_eye: DVec3, to_light: DVec3) -> (DVec3, bool) {
         if to_eye.dot(to_light) >= 0.0 { (to_eye + to_light, false) } else { (to_light - to_eye, true) }

@@ -13,6 +13,7 @@ use crate::sections::PHASES;
 use crate::segments::SEGMENT;
 use crate::visible::Voxels;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// A voxel on its way into sheets.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -64,7 +65,8 @@ impl Buckets {
         let (bands, touched) = (height.div_ceil(ROWS), placed.sections.touched);
         let bucket = |record: &Record| {
             let first = (record.place / PHASES).min(frame.slabs.count - 1);
-            let ends = [frame.slabs.face(first), frame.slabs.face(first + touched as u32)];
+            // A slab that a face cuts asks for what its neighbours hold, too.
+            let ends = [frame.slabs.face(first.saturating_sub(1)), frame.slabs.face(first + touched as u32 + 1)];
             let [left, right, top, bottom] = sight.bounds(shape, record.at, ends);
             let is_outside = right < 0.0 || left > width as f32 || bottom < 0.0 || top > height as f32;
             // Saturating casts: what lies before the image is 0.
@@ -93,10 +95,11 @@ impl Buckets {
         Self { records, starts, bands, span: most, touched }
     }
 
-    /// Voxels that may reach `band` in `slab`, or a rim of up to a band around it, run by run.
-    pub(crate) fn of(&self, slab: u32, band: usize, has_rim: bool) -> impl Iterator<Item = &[Record]> {
-        let (slab, rim) = (slab as usize, usize::from(has_rim));
-        (slab.saturating_sub(self.touched - 1)..=slab).map(move |first| {
+    /// Voxels that may reach `band` in any of some slabs, or a rim of up to a band around it, run by run.
+    pub(crate) fn of(&self, slabs: Range<u32>, band: usize, has_rim: bool) -> impl Iterator<Item = &[Record]> {
+        let (rim, count) = (usize::from(has_rim), (self.starts.len() - 1) / self.bands);
+        let slabs = slabs.start as usize..(slabs.end as usize).min(count);
+        (slabs.start.saturating_sub(self.touched - 1)..slabs.end).map(move |first| {
             let row = first * self.bands;
             let from = row + band.saturating_sub(self.span + rim);
             let to = row + (band + 1 + rim).min(self.bands);

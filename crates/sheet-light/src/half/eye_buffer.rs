@@ -155,6 +155,13 @@ impl Pixels {
         }
     }
 
+    /// Mixes in a share of the optical depths and values of others.
+    pub(crate) fn mix(&mut self, other: &Self, share: f32) {
+        let floats = self.optical_depth.iter_mut().chain(&mut self.values).flatten();
+        let others = other.optical_depth.iter().chain(&other.values).flatten();
+        floats.zip(others).for_each(|(to, other)| *to += (other - *to) * share);
+    }
+
     /// Writes the band's own rows.
     pub(crate) fn store(&self, band: &Band, to: &mut Accumulator) {
         let width = band.width;

@@ -1,8 +1,10 @@
 //! Half-vector sheets of some volumes under any number of lights: a sweep a light, one after the other.
 
+use super::axis::HalfVector;
 use super::band::ROWS;
 use super::bodies::Bodies;
 use super::counts::HalfCounts;
+use super::eye_sheets::EyeBand;
 use super::frame::Frame;
 use super::light_buffer::planes;
 use super::light_depth::LightDepths;
@@ -10,7 +12,7 @@ use super::penumbra::Penumbra;
 use super::polygon_light::{PolygonImage, PolygonLight};
 use super::polygons::EyePolygons;
 use super::scatter::{self, Scattered, Scene, balance::Balance};
-use super::serves::{axis_of_view, serves, serves_extended};
+use super::serves::{axis_of_view, other_axis, serves, serves_extended};
 use super::soft_buffer::SoftBuffer;
 use super::splats::Lamps;
 use super::sweep::Sweep;
@@ -36,9 +38,9 @@ pub struct Drawn {
 /// caller appends it behind what lies before. Polygons end the rays that meet them, and are a picture of their own. One tick a slab, and
 /// one for each band of rows of polygons.
 ///
-/// Each light is a sweep; their images add, and optical depth, depths, objects, normals and the share of shadow come from one. Sweeps
-/// are in an order of the lights' own, so the order of the input changes no bit. Without lights, or where no material asks for
-/// any, there is one sweep along the view.
+/// Each light is a sweep, or two that are mixed where its half vector is about to turn over; their images add, and optical depth, depths,
+/// objects, normals and the share of shadow come from one light. Sweeps are in an order of the lights' own, so the order of the input changes
+/// no bit. Without lights, or where no material asks for any, there is one sweep along the view.
 ///
 /// # Errors
 /// [`Error::Parameter`], [`Error::Volume`], [`Error::Polygons`], [`Error::Light`], [`Error::HalfVector`] for a light that half vectors cannot serve,
@@ -91,6 +93,15 @@ pub fn fold(
 /// What a sweep adds to: what is kept of a pixel, the picture, and what polygons show.
 type Into<'i> = (&'i ChannelLayout, &'i mut Accumulator, Option<&'i mut PolygonImage>);
 
+/// What sweeps have in common.
+struct Sweeps<'a, 's> {
+    input: &'a HalfInput<'a>,
+    params: &'s HalfParams,
+    eye: Option<&'a EyePolygons<'a>>,
+    layout: &'s ChannelLayout,
+    progress: &'s Progress,
+}
+
 /// A sweep for each light.
 fn sweeps<'a>(
     input: &'a HalfInput<'a>,
@@ -99,20 +110,61 @@ fn sweeps<'a>(
     (layout, into, mut image): Into<'_>,
     progress: &Progress,
 ) -> Result<HalfCounts, Error> {
-    let first = Sweep::new(input, params, (lights.first().copied(), eye), false, progress)?;
+    let of = Sweeps { input, params, eye, layout, progress };
+    let first = of.begin(lights.first().copied(), None, false)?;
     let is_lit = first.light.is_some();
-    progress.add_total(u64::from(first.frame.slabs.count));
-    let (bands, mut counts) = first.run(layout, into, image.as_deref_mut(), progress)?;
+    let (bands, mut counts) = of.finish(first, lights.first().copied(), into, image.as_deref_mut())?;
     bands.iter().for_each(|b| b.pixels.store(&b.band, into));
     for light in lights.iter().skip(1).filter(|_| is_lit) {
-        let next = Sweep::new(input, params, (Some(*light), eye), true, progress)?;
-        progress.add_total(u64::from(next.frame.slabs.count));
+        let next = of.begin(Some(*light), None, true)?;
         let form = Accumulator { depth: Vec::new(), object: Vec::new(), ..into.clone() };
-        let (bands, more) = next.run(layout, &form, image.as_deref_mut(), progress)?;
+        let (bands, more) = of.finish(next, Some(*light), &form, image.as_deref_mut())?;
         counts = counts.join(more);
         bands.iter().for_each(|b| b.pixels.add_colors(&b.band, layout.colors(), into));
     }
     Ok(counts)
+}
+
+impl<'a> Sweeps<'a, '_> {
+    /// Prepares the sweep of a light, across its half vector or another axis.
+    fn begin(
+        &self,
+        light: Option<(&'a LitBy<'a>, u32)>,
+        axis: Option<HalfVector>,
+        light_alone: bool,
+    ) -> Result<Sweep<'a>, Error> {
+        let sweep = Sweep::new(self.input, self.params, (light, self.eye), (axis, light_alone), self.progress)?;
+        self.progress.add_total(u64::from(sweep.frame.slabs.count));
+        Ok(sweep)
+    }
+
+    /// Runs the sweep of a light. Where its half vector is about to turn over that is mixed with another one across the axis that comes then, so
+    /// that no picture shows the turn; depths and objects are those of the first.
+    fn finish(
+        &self,
+        sweep: Sweep<'a>,
+        light: Option<(&'a LitBy<'a>, u32)>,
+        form: &Accumulator,
+        image: Option<&mut PolygonImage>,
+    ) -> Result<(Vec<EyeBand>, HalfCounts), Error> {
+        let bodies = self.input.bodies();
+        let lit = light.filter(|_| sweep.light.is_some());
+        let other = lit.and_then(|(lit, samples)| other_axis(&bodies, self.input.sheets.camera, (&lit.light, samples)));
+        let Some((axis, share)) = other else { return sweep.run(self.layout, form, image, self.progress) };
+        let light_alone = sweep.light_alone;
+        let blank = || self.eye.map(|eye| PolygonImage::new(eye, self.layout));
+        let (mut own_image, mut other_image) = (blank(), blank());
+        let (mut bands, counts) = sweep.run(self.layout, form, own_image.as_mut(), self.progress)?;
+        let form = Accumulator { depth: Vec::new(), object: Vec::new(), ..form.clone() };
+        let other = self.begin(light, Some(axis), light_alone)?;
+        let (mixed, more) = other.run(self.layout, &form, other_image.as_mut(), self.progress)?;
+        bands.iter_mut().zip(&mixed).for_each(|(band, other)| band.pixels.mix(&other.pixels, share));
+        if let (Some(image), Some(own), Some(other)) = (image, &own_image, &other_image) {
+            image.add(own, 1.0 - share);
+            image.add(other, share);
+        }
+        Ok((bands, counts.join(more)))
+    }
 }
 
 /// Light on polygons where there is nothing else (Table 1: the z-buffer alone).
@@ -316,20 +368,27 @@ pub fn bytes<'l>(
         2 * (all / u64::from(params.voxels_per_cell) + 1) * 480
     };
     let splats = bodies.splats.map_or(0, |splats| splats.count * BYTES_A_SPLAT);
+    let lights: Vec<(&Light, u32)> = lights.collect();
+    // Where two sweeps of a light are mixed the image of the first is kept.
+    let eyes = 1 + u64::from(lights.iter().any(|light| other_axis(bodies, camera, *light).is_some()));
     let light = |(light, samples): (&Light, u32)| {
         let image = lamp::camera_of(bodies, light, params);
         let pixels: u64 = image.size.into_iter().map(u64::from).product();
         of_a_pixel * pixels + soft_bytes((bodies, camera), (light, samples), &image, params)
     };
-    eye + lights.map(light).max().unwrap_or(0) + cells + splats + volumes.iter().map(voxels).sum::<u64>()
+    eyes * eye
+        + lights.into_iter().map(light).max().unwrap_or(0)
+        + cells
+        + splats
+        + volumes.iter().map(voxels).sum::<u64>()
 }
 
 /// Bytes that [`fold`] takes at most for polygons beside [`bytes`]: buffers of the eye and of one light, of at most so many points.
 pub fn polygon_bytes(camera: &Camera, samples: u32, params: &HalfParams) -> u64 {
     let pixels: u64 = camera.size.into_iter().map(u64::from).product();
-    // Depths, hits, the picture; lists, places, and sums of what is seen.
+    // Depths, hits, the picture; lists, places, and sums of what is seen, of two sweeps beside those of all where they are mixed.
     pixels * (28 + 4 * (MAX_CHANNELS as u64 + 2))
-        + pixels * (60 + 4 * MAX_CHANNELS as u64)
+        + pixels * (60 + 3 * 4 * MAX_CHANNELS as u64)
         + LightDepths::bytes_of(params.most_light_pixels, samples)
 }
 

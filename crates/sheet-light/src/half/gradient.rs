@@ -1,11 +1,12 @@
 //! Gradients of a sheet's values from neighbouring pixels and sheets (step 16 of the pseudocode).
 //!
-//! A sample is the value of a sheet at a place (a, b) of its slab. With Δ for differences between the samples of two neighbours,
-//! columns and rows of pixels give the gradient along the slab, Δv = ∂a·Δa + ∂b·Δb, and neighbouring sheets the rest,
-//! Δv = ∂a·Δa + ∂b·Δb + ∂s·Δs. Differences are central, one-sided beside a sample that is outside the volume.
+//! A sample is the value at a place (a, b, s), s the depth across the slabs, in slabs. With Δ for differences between the samples of two
+//! neighbours, columns and rows of pixels and neighbouring sheets give three equations Δv = ∂a·Δa + ∂b·Δb + ∂s·Δs. Differences are central,
+//! one-sided beside a sample that is outside the volume. Samples of a sheet differ in s where faces cut its slab.
 
 use super::frame::Frame;
-use super::sheet::Sheet;
+use super::sheet::{Sheet, Slab};
+use crate::light::dot;
 use crate::sheets::LEAST_WEIGHT;
 use splat_core::glam::Vec3;
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
@@ -20,11 +21,11 @@ pub(crate) struct Gradients {
     width: f32,
 }
 
-/// Value, a and b, and 1 for a sample that is inside, else 0.
-type Sample<S> = [Lanes<S>; 4];
+/// Value, a, b and s, and 1 for a sample that is inside, else 0.
+type Sample<S> = [Lanes<S>; 5];
 
 /// Place of the last in a sample.
-const INSIDE: usize = 3;
+const INSIDE: usize = 4;
 
 impl Gradients {
     pub(crate) fn new(frame: &Frame) -> Self {
@@ -41,24 +42,30 @@ impl Gradients {
         k: usize,
     ) -> [Vec3; MAX_LANES] {
         let of = |v: f32| Lanes::splat(simd, v);
-        let own = at(simd, here, k);
-        let none = [own[0], own[1], own[2], of(0.0)];
-        let above = if k >= stride { at(simd, here, k - stride) } else { none };
-        let below = if k + stride < here.near.len() { at(simd, here, k + stride) } else { none };
-        let [vx, ax, bx] = difference(simd, &own, &left_of(simd, here, k), &at(simd, here, k + 1));
-        let [vy, ay, by] = difference(simd, &own, &above, &below);
-        let (before, after) = (at(simd, before, k), at(simd, after, k));
-        let [vs, a, b] = difference(simd, &own, &before, &after);
-        // Per slab width, so that no scale of the scene makes anything vanish.
-        let width = of(self.width);
-        let determinant = ax * by - bx * ay;
-        let inverse = width / of(1.0).where_less_or(determinant.abs(), of(f32::MIN_POSITIVE), determinant);
+        let (zero, half, one) = (of(0.0), of(0.5), of(1.0));
+        let own = at(simd, here, k, 0.0);
+        let none = [own[0], own[1], own[2], own[3], zero];
+        let above = if k >= stride { at(simd, here, k - stride, 0.0) } else { none };
+        let below = if k + stride < here.near.len() { at(simd, here, k + stride, 0.0) } else { none };
+        let [vx, x @ ..] = difference(simd, &own, &left_of(simd, here, k), &at(simd, here, k + 1, 0.0));
+        let [vy, y @ ..] = difference(simd, &own, &above, &below);
+        let (before, after) = (at(simd, before, k, -1.0), at(simd, after, k, 1.0));
+        let [vz, mut z @ ..] = difference(simd, &own, &before, &after);
+        // Without a neighbour across the slabs there is no gradient across them.
+        z[2] = one.where_less_or(before[INSIDE] + after[INSIDE], half, z[2]);
+        let (of_x, of_y, of_z) = (cross(&y, &z), cross(&z, &x), cross(&x, &y));
+        let determinant = dot(&x, &of_x);
         let (least, size) = (of(f32::MIN_POSITIVE), determinant.abs());
-        let da = ((vx * by - vy * bx) * inverse).where_less(least, size);
-        let db = ((vy * ax - vx * ay) * inverse).where_less(least, size);
-        let steps = before[INSIDE] + after[INSIDE];
-        let ds = (vs - (da * a + db * b) / width) / steps.max(of(0.5));
-        let gradient = [da, db, ds.where_less(of(0.5), steps)];
+        let inverse = one / one.where_less_or(size, least, determinant);
+        let mut gradient = [zero, zero, vz / z[2]];
+        for n in 0..3 {
+            let sum = vx.mul_add(of_x[n], vy.mul_add(of_y[n], vz * of_z[n])) * inverse;
+            gradient[n] = sum.where_less_or(least, size, gradient[n]);
+        }
+        // Per slab width, so that no scale of the scene makes anything vanish.
+        for along in &mut gradient[..2] {
+            *along = *along * of(self.width);
+        }
         let mut parts = [[0.0; MAX_LANES]; 3];
         for n in 0..3 {
             gradient[n].store(&mut parts[n]);
@@ -70,12 +77,12 @@ impl Gradients {
     }
 }
 
-/// Differences of value, a and b between two neighbours, each of which this sample stands for where it is outside.
+/// Differences of value, a, b and s between two neighbours, each of which this sample stands for where it is outside.
 #[inline(always)]
-fn difference<S: Simd>(simd: S, own: &Sample<S>, before: &Sample<S>, after: &Sample<S>) -> [Lanes<S>; 3] {
+fn difference<S: Simd>(simd: S, own: &Sample<S>, before: &Sample<S>, after: &Sample<S>) -> [Lanes<S>; 4] {
     let half = Lanes::splat(simd, 0.5);
-    let mut out = [half; 3];
-    for n in 0..3 {
+    let mut out = [half; 4];
+    for n in 0..4 {
         let high = after[n].where_less_or(half, after[INSIDE], own[n]);
         out[n] = high - before[n].where_less_or(half, before[INSIDE], own[n]);
     }
@@ -83,21 +90,29 @@ fn difference<S: Simd>(simd: S, own: &Sample<S>, before: &Sample<S>, after: &Sam
 }
 
 #[inline(always)]
-fn at<S: Simd>(simd: S, sheet: &Sheet, k: usize) -> Sample<S> {
+fn cross<S: Simd>(x: &[Lanes<S>; 3], y: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
+    [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
+}
+
+/// The samples from pixel `k` on of a sheet that lies `slabs` behind the one that depths are told from.
+#[inline(always)]
+fn at<S: Simd>(simd: S, sheet: &Sheet, k: usize, slabs: f32) -> Sample<S> {
     let Sheet { near, far, values, weights, at: [a, b], .. } = sheet;
-    sample(simd, [&near[k..], &far[k..], &weights[k..], &values[k..], &a[k..], &b[k..]])
+    sample(simd, (sheet.slab(), slabs), [&near[k..], &far[k..], &weights[k..], &values[k..], &a[k..], &b[k..]])
 }
 
 /// Of near, far, kernel sum, value, a and b.
 #[inline(always)]
-fn sample<S: Simd>(simd: S, of: [&[f32]; 6]) -> Sample<S> {
+fn sample<S: Simd>(simd: S, (slab, slabs): (Slab, f32), of: [&[f32]; 6]) -> Sample<S> {
     let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
-    let inside = one.where_less(Lanes::load(simd, of[0]), Lanes::load(simd, of[1]));
+    let (near, far) = (Lanes::load(simd, of[0]), Lanes::load(simd, of[1]));
+    let inside = one.where_less(near, far);
     let inside = inside.where_less(Lanes::splat(simd, LEAST_WEIGHT), Lanes::load(simd, of[2]));
-    let mut out = [inside; 4];
-    for n in 0..INSIDE {
+    let mut out = [inside; 5];
+    for n in 0..3 {
         out[n] = Lanes::load(simd, of[3 + n]).where_less(zero, inside);
     }
+    out[3] = slab.behind(simd, near, far) + Lanes::splat(simd, slabs);
     out
 }
 
@@ -105,7 +120,7 @@ fn sample<S: Simd>(simd: S, of: [&[f32]; 6]) -> Sample<S> {
 #[inline(always)]
 fn left_of<S: Simd>(simd: S, sheet: &Sheet, k: usize) -> Sample<S> {
     if k > 0 {
-        return at(simd, sheet, k - 1);
+        return at(simd, sheet, k - 1, 0.0);
     }
     let Sheet { near, far, values, weights, at: [a, b], .. } = sheet;
     // Of the planes that tell, 0 is outside.
@@ -114,5 +129,5 @@ fn left_of<S: Simd>(simd: S, sheet: &Sheet, k: usize) -> Sample<S> {
         to[1..].copy_from_slice(&from[..MAX_LANES - 1]);
     }
     let [near, far, weights, values, a, b] = &shifted;
-    sample(simd, [near, far, weights, values, a, b])
+    sample(simd, (sheet.slab(), 0.0), [near, far, weights, values, a, b])
 }

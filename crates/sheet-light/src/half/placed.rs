@@ -70,8 +70,8 @@ impl<'a> Placed<'a> {
     pub(crate) fn lattice_reach(&self, extent: [f64; 3], pixel: f64) -> [usize; 3] {
         let [aa, ab, bb] = extent;
         let neighbour = if self.volume.normals { 1.0 } else { 0.0 };
-        // A sheet holds means over its slab.
-        let across = self.reach + (1.0 + neighbour) * self.width;
+        // A sheet holds means over its slab, and where a face cuts it part of the next one's.
+        let across = self.reach + (1.5 + neighbour) * self.width;
         let inverse = self.axes.inverse();
         [0, 1, 2].map(|axis| {
             let row = inverse.row(axis);

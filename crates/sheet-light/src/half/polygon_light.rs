@@ -183,6 +183,13 @@ impl PolygonImage {
         Self { layout: *layout, values: vec![0.0; pixels * layout.count()], received: vec![[0.0; 2]; pixels] }
     }
 
+    /// Adds a share of another one.
+    pub(crate) fn add(&mut self, other: &Self, share: f32) {
+        self.values.iter_mut().zip(&other.values).for_each(|(to, own)| *to += share * own);
+        let received = self.received.iter_mut().zip(&other.received);
+        received.for_each(|(to, own)| (0..2).for_each(|n| to[n] += share * own[n]));
+    }
+
     /// Bytes of the sums.
     pub(crate) fn bytes(&self) -> u64 {
         4 * (self.values.len() + 2 * self.received.len()) as u64

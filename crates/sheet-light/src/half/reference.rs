@@ -5,9 +5,10 @@
 
 mod scatter;
 
+use super::axis::HalfVector;
 use super::frame::{Frame, Ray};
 use super::placed::Placed;
-use super::serves::axis_of_view;
+use super::serves::{axis_of_view, other_axis};
 use super::sight::{Shape, Sight};
 use super::{Extended, HalfInput, HalfParams, lamp};
 use crate::lattice::Lattice;
@@ -23,6 +24,9 @@ const STEPS: usize = 200;
 
 /// A voxel: a, b, where its kernel begins, value.
 type Voxel = (f64, f64, u32, f64);
+
+/// A voxel that reaches a slab or one of its neighbours: a, b, its sections in the slab before, the slab and the one behind, value.
+type Reaching = (f64, f64, [f64; 3], f64);
 
 /// What is the same for all slabs.
 struct View<'a> {
@@ -60,7 +64,7 @@ pub fn draw(input: &HalfInput<'_>, params: &HalfParams) -> Result<Picture, Error
     input.sheets.check()?;
     let mut out: Option<Picture> = None;
     for lit in &lights(input) {
-        let own = View::new(input, params, lit)?.draw(lit, out.is_none());
+        let own = of_light(input, params, (lit, out.is_none()))?;
         match &mut out {
             None => out = Some(own),
             Some(all) => all.color.iter_mut().zip(own.color).for_each(|(to, own)| (0..3).for_each(|c| to[c] += own[c])),
@@ -68,6 +72,24 @@ pub fn draw(input: &HalfInput<'_>, params: &HalfParams) -> Result<Picture, Error
     }
     let pixels = input.sheets.camera.size.map(|s| s as usize).iter().product();
     Ok(out.unwrap_or(Picture { optical_depth: vec![0.0; pixels], color: vec![[0.0; 3]; pixels] }))
+}
+
+/// The sweep of one light, mixed with another one where its half vector is about to turn over.
+fn of_light(
+    input: &HalfInput<'_>,
+    params: &HalfParams,
+    (lit, with_ambient): (&LitBy<'_>, bool),
+) -> Result<Picture, Error> {
+    let (bodies, camera) = (&input.bodies(), input.sheets.camera);
+    let axis = axis_of_view(bodies, camera, Some(&lit.light));
+    let mut own = View::new(input, params, lit, &axis)?.draw(lit, with_ambient);
+    if let Some((axis, share)) = other_axis(bodies, camera, (&lit.light, 1)) {
+        let other = View::new(input, params, lit, &axis)?.draw(lit, with_ambient);
+        let mix = |to: &mut f64, other: f64| *to += (other - *to) * f64::from(share);
+        own.optical_depth.iter_mut().zip(other.optical_depth).for_each(|(to, other)| mix(to, other));
+        own.color.iter_mut().flatten().zip(other.color.into_iter().flatten()).for_each(|(to, other)| mix(to, other));
+    }
+    Ok(own)
 }
 
 /// All lights that have sweeps, point by point.
@@ -80,9 +102,14 @@ fn lights<'a>(input: &HalfInput<'a>) -> Vec<LitBy<'a>> {
 }
 
 impl<'a> View<'a> {
-    fn new(input: &'a HalfInput<'a>, params: &'a HalfParams, lit: &LitBy<'_>) -> Result<Self, Error> {
-        let (volumes, camera, bodies) = (&input.sheets.volumes[..], input.sheets.camera, &input.bodies());
-        let frame = Frame::new(bodies, camera, &params.sheets, &axis_of_view(bodies, camera, Some(&lit.light)))?;
+    fn new(
+        input: &'a HalfInput<'a>,
+        params: &'a HalfParams,
+        lit: &LitBy<'_>,
+        axis: &HalfVector,
+    ) -> Result<Self, Error> {
+        let volumes = &input.sheets.volumes[..];
+        let frame = Frame::new(&input.bodies(), input.sheets.camera, &params.sheets, axis)?;
         let placed: Vec<Placed<'a>> = volumes.iter().map(|v| Placed::new(v, &frame, &params.sheets)).collect();
         let of = |placed: &Placed<'_>| {
             let lattice = Lattice::new(placed.volume.grid, [3; 3]);
@@ -138,17 +165,18 @@ impl<'a> View<'a> {
         out
     }
 
-    /// Voxels whose kernels reach a slab, with their sections there in the place of where they begin.
-    fn voxels_of(&self, slab: u32) -> Vec<Vec<(f64, f64, f64, f64)>> {
+    /// Voxels whose kernels reach a slab or one of its neighbours.
+    fn voxels_of(&self, slab: u32) -> Vec<Vec<Reaching>> {
         let kernel = self.params.sheets.kernel;
         let footprint = Footprint { cutoff: (kernel.extent / kernel.sigma) as f32 };
         let of = |(placed, voxels): (&Placed<'_>, &Vec<Voxel>)| {
-            let section = |place: u32| {
-                let behind = slab.checked_sub(place / PHASES)?;
+            let around = |place: u32| {
                 let all = sections(place % PHASES, placed.reach / self.frame.slabs.width, &footprint);
-                all.get(behind as usize).copied()
+                let of = |slab: u32| slab.checked_sub(place / PHASES).and_then(|behind| all.get(behind as usize));
+                let three = [slab.checked_sub(1).and_then(of), of(slab), of(slab + 1)];
+                three.iter().any(Option::is_some).then(|| three.map(|section| section.copied().unwrap_or(0.0)))
             };
-            voxels.iter().filter_map(|(a, b, place, v)| Some((*a, *b, section(*place)?, *v))).collect()
+            voxels.iter().filter_map(|(a, b, place, v)| Some((*a, *b, around(*place)?, *v))).collect()
         };
         self.placed.iter().zip(&self.voxels).map(of).collect()
     }
@@ -181,7 +209,7 @@ impl<'a> View<'a> {
     }
 
     /// What a pixel's ray has of a volume in a slab.
-    fn part(&self, image: &Image, voxels: &[(f64, f64, f64, f64)], v: usize, slab: u32, at: usize) -> Option<Part> {
+    fn part(&self, image: &Image, voxels: &[Reaching], v: usize, slab: u32, at: usize) -> Option<Part> {
         let width = self.frame.slabs.width;
         let [near, far] = self.crossing(self.placed[v].volume, &image.camera, at)?;
         let (near, far) = (near.max(f64::from(slab) * width), far.min(f64::from(slab + 1) * width));
@@ -189,12 +217,15 @@ impl<'a> View<'a> {
             return None;
         }
         let q = self.place(&image.camera, at, 0.5 * (near + far));
+        // How many slabs it lies behind the slab's middle, which sections stand for.
+        let behind = q.z / width - (f64::from(slab) + 0.5);
         let footprint = Footprint { cutoff: self.placed[v].cutoff as f32 };
         let [aa, ab, bb] = image.shapes[v].extent();
         let (mut sum, mut weights) = (0.0, 0.0);
-        for (a, b, section, value) in voxels {
+        for (a, b, [before, own, after], value) in voxels {
             let (da, db) = (q.x - a, q.y - b);
             let s = (bb * da * da - 2.0 * ab * da * db + aa * db * db) / (aa * bb - ab * ab);
+            let section = own + behind.max(0.0) * (after - own) + (-behind).max(0.0) * (before - own);
             let weight = footprint.profile(s) * section;
             (sum, weights) = (sum + weight * value, weights + weight);
         }
@@ -212,7 +243,7 @@ impl<'a> View<'a> {
         &self,
         eye: &Image,
         light: &Image,
-        voxels: &[Vec<(f64, f64, f64, f64)>],
+        voxels: &[Vec<Reaching>],
         sums: &Sums,
         (slab, at, lit, with_ambient): (u32, usize, &LitBy<'_>, bool),
     ) -> (f64, [f64; 3]) {

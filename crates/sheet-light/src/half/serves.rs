@@ -76,9 +76,7 @@ pub fn serves(bodies: &Bodies<'_>, camera: &Camera, light: &Light) -> Result<(),
     if light.shape.is_extended() {
         return Err(Reason::Extended);
     }
-    let axis = axis_of(bodies, camera, light);
-    light_serves(bodies, light, &axis)?;
-    view_serves(bodies, camera, &axis)
+    serves_across(bodies, camera, (light, 1), &axis_of(bodies, camera, light))
 }
 
 /// Whether the half vector of the centre of a light with an extent can slice the volumes for all of its points, so that one sweep
@@ -90,17 +88,29 @@ pub fn serves_extended(bodies: &Bodies<'_>, camera: &Camera, light: &Light, samp
     if bodies.is_empty() {
         return Ok(());
     }
-    let axis = axis_of(bodies, camera, light);
-    light_serves(bodies, light, &axis)?;
+    serves_across(bodies, camera, (light, samples), &axis_of(bodies, camera, light))
+}
+
+/// Whether slabs across an axis serve a light, and so many points of one that has an extent.
+fn serves_across(
+    bodies: &Bodies<'_>,
+    camera: &Camera,
+    (light, samples): (&Light, u32),
+    axis: &HalfVector,
+) -> Result<(), Reason> {
+    light_serves(bodies, light, axis)?;
+    if !light.shape.is_extended() {
+        return view_serves(bodies, camera, axis);
+    }
     let points = light.points(samples);
-    points.iter().try_for_each(|point| light_serves(bodies, point, &axis))?;
+    points.iter().try_for_each(|point| light_serves(bodies, point, axis))?;
     let from_center = |p: DVec3| light.shape.place().map_or(0.0, |center| axis.normal.dot(p - center));
     let near = bodies.corners().map(from_center).fold(f64::INFINITY, f64::min);
     let depth = points.iter().filter_map(|p| p.shape.place()).map(|p| from_center(p).abs()).fold(0.0, f64::max);
     if depth > MOST_DEPTH * near {
         return Err(Reason::TooLarge { share: depth / near });
     }
-    view_serves(bodies, camera, &axis)
+    view_serves(bodies, camera, axis)
 }
 
 /// How wide the penumbra of a light is at the middle of the volumes over the distance to what casts it, far from the light: 2R/d, R the
@@ -153,6 +163,24 @@ pub(crate) fn axis_of_view(bodies: &Bodies<'_>, camera: &Camera, light: Option<&
         Some(light) => axis_of(bodies, camera, light),
         None => HalfVector { normal: seen_along(camera, bodies.middle()), back_to_front: false },
     }
+}
+
+/// Cosine of view and light below which both axes, that of light ahead of the eye and that of light before it, have a part.
+const TURNING: f64 = 0.02;
+
+/// Where view and light are nearly at right angles, and the half vector is about to turn over: the axis that comes then, and its share in the picture, at most
+/// a half; `None` where it cannot serve.
+pub(crate) fn other_axis(
+    bodies: &Bodies<'_>,
+    camera: &Camera,
+    (light, samples): (&Light, u32),
+) -> Option<(HalfVector, f32)> {
+    let middle = bodies.middle();
+    let (to_eye, to_light) = (-seen_along(camera, middle), -travel(light, middle));
+    let cosine = to_eye.dot(to_light);
+    let axis = HalfVector::beyond(to_eye, to_light);
+    let serves = cosine.abs() < TURNING && serves_across(bodies, camera, (light, samples), &axis).is_ok();
+    serves.then(|| (axis, (0.5 * (1.0 - cosine.abs() / TURNING)) as f32))
 }
 
 /// Unit direction of travel of light that arrives at `p`; zero at the lamp itself.

@@ -3,6 +3,9 @@
 //! v = Σ v_i·w_i / Σ w_i. The weight of a voxel is its footprint at the place of the pixel in the slab, times the section of its
 //! kernel in the slab. That place is the middle of what the pixel's ray has of slab and volume, so it never lies outside the
 //! volume, however wide and slanted slabs are.
+//!
+//! Across the slabs a section stands for the slab's middle. Where a face of the volume, the eye's plane or something opaque cuts the slab, the
+//! middle of what is left lies before or behind that: there the section is interpolated towards the neighbouring slab's, pixel by pixel.
 
 use super::band::Band;
 use super::buckets::{Buckets, Record};
@@ -36,10 +39,33 @@ pub(crate) struct Sheet {
     pub(crate) weights: Vec<f32>,
     /// By row: columns that may be inside, whole vectors.
     pub(crate) spans: Vec<Range<usize>>,
+    /// By row: columns of which all rays that are inside cross the whole slab, the longest run.
+    whole: Vec<Range<usize>>,
     /// Rows of which any is inside.
     rows: Range<usize>,
     /// Depths that the places lie between.
     depths: [f32; 2],
+    slab: Slab,
+}
+
+/// Depths across the slabs are told from the middle of one by this.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Slab {
+    middle: f32,
+    inverse_width: f32,
+}
+
+impl Slab {
+    fn between(faces: [f32; 2]) -> Self {
+        Self { middle: 0.5 * (faces[0] + faces[1]), inverse_width: 1.0 / (faces[1] - faces[0]) }
+    }
+
+    /// How many slabs behind its middle the middle of what rays have between two depths lies, at most half of one; 0 for rays without any.
+    #[inline(always)]
+    pub(crate) fn behind<S: Simd>(&self, simd: S, near: Lanes<S>, far: Lanes<S>) -> Lanes<S> {
+        let of = |v: f32| Lanes::splat(simd, v);
+        (((near + far) * of(0.5) - of(self.middle)) * of(self.inverse_width)).where_less(near, far)
+    }
 }
 
 impl Sheet {
@@ -52,8 +78,10 @@ impl Sheet {
             values: plane(),
             weights: plane(),
             spans: vec![0..0; band.stored],
+            whole: vec![0..0; band.stored],
             rows: 0..0,
             depths: [0.0; 2],
+            slab: Slab::between([0.0, 1.0]),
         }
     }
 
@@ -67,11 +95,16 @@ impl Sheet {
         self.rows.is_empty()
     }
 
+    /// What depths are told from.
+    pub(crate) fn slab(&self) -> Slab {
+        self.slab
+    }
+
     /// Begins the slab between two depths.
     #[inline(always)]
     pub(crate) fn begin<S: Simd>(&mut self, simd: S, band: &Band, volume: usize, faces: [f32; 2]) {
-        let middle = 0.5 * (faces[0] + faces[1]);
-        (self.rows, self.depths) = (0..0, [middle; 2]);
+        self.slab = Slab::between(faces);
+        (self.rows, self.depths) = (0..0, [self.slab.middle; 2]);
         for y in 0..band.stored {
             let hit = &band.hits[volume][y];
             let is_met = hit.near < faces[1] && hit.far > faces[0];
@@ -102,8 +135,9 @@ impl Sheet {
     ) -> bool {
         let of = |v: f32| Lanes::splat(simd, v);
         let (first, last, half, zero, one) = (of(faces[0]), of(faces[1]), of(0.5), of(0.0), of(1.0));
-        let middle = of(0.5 * (faces[0] + faces[1]));
-        let (mut any, mut partial) = (zero, zero);
+        let middle = of(self.slab.middle);
+        let (mut any, mut any_cut, mut run) = (false, false, start..start);
+        self.whole[y] = start..start;
         let mut x = start;
         while x < end {
             let k = y * band.stride + x;
@@ -112,8 +146,15 @@ impl Sheet {
             near.store(&mut self.near[k..]);
             far.store(&mut self.far[k..]);
             let inside = one.where_less(near, far);
-            any = any.max(inside);
-            partial = partial.max(inside.where_less(first, near)).max(inside.where_less(far, last));
+            let is_cut = is_any(inside.where_less(first, near).max(inside.where_less(far, last)));
+            let is_inside = is_cut || is_any(inside);
+            if is_inside && !is_cut {
+                run = if run.end == x { run.start } else { x }..x + Lanes::<S>::COUNT;
+                if run.len() > self.whole[y].len() {
+                    self.whole[y] = run.clone();
+                }
+            }
+            (any, any_cut) = (any || is_inside, any_cut || is_cut);
             let depth = ((near + far) * half).where_less_or(near, far, middle);
             for a in 0..2 {
                 let slope = Lanes::load(simd, &band.slope[a][k..]);
@@ -123,10 +164,10 @@ impl Sheet {
             zero.store(&mut self.weights[k..]);
             x += Lanes::<S>::COUNT;
         }
-        if is_any(partial) {
+        if any_cut {
             self.depths = faces;
         }
-        is_any(any)
+        any
     }
 
     /// Adds all voxels that reach the slab. Number of footprint numbers.
@@ -137,7 +178,9 @@ impl Sheet {
             return 0;
         }
         let has_rim = band.stored > band.rows.len();
-        for record in of.buckets.of(slab, index, has_rim).flatten() {
+        // Where nothing cuts the slab its neighbours have no part in it.
+        let beside = u32::from(self.depths[0] < self.depths[1]);
+        for record in of.buckets.of(slab.saturating_sub(beside)..slab + 1 + beside, index, has_rim).flatten() {
             let [left, right, top, bottom] = of.sight.bounds(of.shape, record.at, self.depths);
             // Saturating casts: what lies before the first pixel is 0.
             let from = |edge: f32| (edge - 0.5).ceil() as usize;
@@ -146,8 +189,9 @@ impl Sheet {
                 ..to(bottom).saturating_sub(band.top).min(self.rows.end);
             let columns = from(left)..to(right).min(band.width);
             if !rows.is_empty() && !columns.is_empty() {
-                let section = of.placed.sections.one(record.place % PHASES, slab - record.place / PHASES);
-                fragments += self.add(simd, of, (band.stride, record, section), rows, columns);
+                let from_first = slab as isize - (record.place / PHASES) as isize;
+                let sections = of.placed.sections.around(record.place % PHASES, from_first);
+                fragments += self.add(simd, of, (band.stride, record, sections), rows, columns);
             }
         }
         fragments
@@ -159,20 +203,31 @@ impl Sheet {
         &mut self,
         simd: S,
         of: &Splatter<'_>,
-        (stride, record, section): (usize, &Record, f32),
+        (stride, record, [before, section, after]): (usize, &Record, [f32; 3]),
         rows: Range<usize>,
         columns: Range<usize>,
     ) -> u64 {
         let at = |v: f32| Lanes::splat(simd, v);
         let [aa, ab, bb] = of.shape.conic;
-        let (aa, ab, bb, value, section) = (at(aa), at(2.0 * ab), at(bb), at(record.value), at(section));
+        let (aa, ab, bb, value, own) = (at(aa), at(2.0 * ab), at(bb), at(record.value), at(section));
         let (a, b, one, zero) = (at(record.at[0]), at(record.at[1]), at(1.0), at(0.0));
-        let mut fragments = 0;
+        let (to_before, to_after) = (at(before - section), at(after - section));
+        let (mut fragments, of_neighbour) = (0, section == 0.0);
         for y in rows {
-            let span = &self.spans[y];
+            let (span, whole) = (&self.spans[y], self.whole[y].clone());
             let (mut x, end) = (columns.start.max(span.start), columns.end.min(span.end));
             while x < end {
                 let k = y * stride + x;
+                let mut section = own;
+                if x < whole.start || x + Lanes::<S>::COUNT > whole.end {
+                    let (near, far) = (Lanes::load(simd, &self.near[k..]), Lanes::load(simd, &self.far[k..]));
+                    let behind = self.slab.behind(simd, near, far);
+                    section = to_after.mul_add(behind.max(zero), section);
+                    section = to_before.mul_add((zero - behind).max(zero), section);
+                } else if of_neighbour {
+                    x = whole.end;
+                    continue;
+                }
                 let da = Lanes::load(simd, &self.at[0][k..]) - a;
                 let db = Lanes::load(simd, &self.at[1][k..]) - b;
                 let s = aa.mul_add(da, ab * db).mul_add(da, bb * db * db);

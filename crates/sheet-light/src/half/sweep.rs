@@ -1,5 +1,6 @@
 //! One light's sweep over all slabs: the eye's sheets, then the light's (the loop of the pseudocode, steps 9 to 24).
 
+use super::axis::HalfVector;
 use super::band::{Band, ROWS};
 use super::bodies::Bodies;
 use super::buckets::{Buckets, records};
@@ -68,12 +69,12 @@ pub(crate) struct Sweep<'a> {
 }
 
 impl<'a> Sweep<'a> {
-    /// Prepares a sweep for one light that half vectors serve, and as many points of it as are asked for.
+    /// Prepares a sweep for one light that half vectors serve, and as many points of it as are asked for; across an axis, or its half vector.
     pub(crate) fn new(
         input: &'a HalfInput<'a>,
         params: &HalfParams,
         (carried, polygons): (Option<(&'a LitBy<'a>, u32)>, Option<&'a EyePolygons<'a>>),
-        light_alone: bool,
+        (axis, light_alone): (Option<HalfVector>, bool),
         progress: &Progress,
     ) -> Result<Self, Error> {
         let sheets = &input.sheets;
@@ -83,7 +84,7 @@ impl<'a> Sweep<'a> {
             || polygons.is_some_and(EyePolygons::are_lit);
         let carried = carried.filter(|_| is_lit);
         let mapped = if is_lit && !light_alone { &input.mapped[..] } else { &[] };
-        let axis = axis_of_view(bodies, camera, carried.map(|(lit, _)| &lit.light));
+        let axis = axis.unwrap_or_else(|| axis_of_view(bodies, camera, carried.map(|(lit, _)| &lit.light)));
         let frame = Frame::new(bodies, camera, &params.sheets, &axis)?;
         let placed: Vec<Placed<'a>> = volumes.iter().map(|v| Placed::new(v, &frame, &params.sheets)).collect();
         let sight = Sight::new(&frame, *camera);

@@ -1,8 +1,9 @@
 //! Constant media: optical depth and self shadow in closed form, whatever the slabs.
 
-use super::common::{draw, exact, input, lamp, ray, scattering, single_scattering, sun};
-use crate::common::{constant, cubic, grid, parallel, perspective, volume};
-use sheet_light::half::HalfParams;
+use super::common::{draw, exact, input, inside, lamp, ray, scattering, single_scattering, sun};
+use super::polygons::{polygons, wall, white};
+use crate::common::{BEAUTY, constant, cubic, grid, parallel, perspective, transfer, volume};
+use sheet_light::half::{HalfInput, HalfParams, fold};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::shade::LitBy;
 use splat_core::{Accumulator, Camera, Grid, Material, TransferFunction, TransferPoint};
@@ -67,6 +68,47 @@ fn hv14_a_wide_lens_has_the_length_of_each_ray() {
         for slab_width in [0.1, 0.25, 3.0] {
             let [through, scattered] = differences(&grid, 0.5, &light, &camera, &exact(Some(slab_width)));
             assert!(through < 1e-5 && scattered < 1e-5, "slabs {slab_width}: {through:e} {scattered:e}");
+        }
+    }
+}
+
+/// Where a face cuts a slab, the middle of what a ray has there lies off the slab's own middle, for the eye as for the light.
+#[test]
+fn a_linear_field_has_its_optical_depth_for_eye_and_light_wherever_faces_cut_slabs() {
+    let field = |p: DVec3| 1.5 + p.dot(DVec3::new(0.1, -0.05, 0.6));
+    let grid = grid([40, 40, 5], cubic(0.4), field);
+    // All light that is taken is lost, so that a floor behind shows what is left of it.
+    let (tf, medium) =
+        (transfer(&[(0.0, 0.0), (4.0, 4.0)]), Material { single_scattering_albedo: 0.0, ..scattering() });
+    let (volumes, white) = ([volume(&grid, &tf, &medium)], white());
+    let mesh = wall([0.0, 0.0, -3.0], [30.0, 0.0, 0.0], [0.0, 30.0, 0.0]);
+    let floor = [polygons(&mesh, &white)];
+    let tau = |from: DVec3, along: DVec3| {
+        let [near, far] = inside(&grid, from, along).expect("rays meet the volume");
+        (far - near) * field(from + along * 0.5 * (near + far))
+    };
+    let suns = [sun([0.0, 0.0, 1.0]), sun([1.0, 0.5, 1.0]), sun([-0.6, 0.9, 1.4]), sun([0.4, 0.3, -1.0])];
+    for (camera, sun) in
+        [[0.0, 0.0, 9.0], [3.0, 2.0, 9.0]].iter().flat_map(|eye| suns.map(|sun| (parallel(*eye, 4.0, [12, 12]), sun)))
+    {
+        let to_light = sun.light.irradiance(DVec3::ZERO, 0.0).0;
+        for slab_width in [0.3, 0.4, 0.6, 0.77, 1.3] {
+            let lights = [sun];
+            let input = HalfInput { polygons: &floor, ..input(&volumes, &camera, &lights) };
+            let mut out = Accumulator::new(camera.size, 1, 3, false, true);
+            let drawn = fold(&input, &exact(Some(slab_width)), &BEAUTY, &mut out, None).unwrap();
+            for at in (0..144).step_by(7) {
+                let (from, along) = ray(&camera, at % 12, at / 12);
+                let what = format!("slabs {slab_width}, {to_light}, eye {}, pixel {at}", camera.position);
+                let (found, expected) = (f64::from(out.optical_depth[0][at]), tau(from, along));
+                assert!((found / expected - 1.0).abs() < 0.01, "{what}: {found}, not {expected}");
+                if to_light.z > 0.0 {
+                    let place = from - along * ((from.z + 3.0) / along.z);
+                    let (lit, expected) = (f64::from(drawn.polygons.channels[0][at]), tau(place, to_light));
+                    let found = -(lit * PI / to_light.z).ln();
+                    assert!((found / expected - 1.0).abs() < 0.01, "{what}: light's {found}, not {expected}");
+                }
+            }
         }
     }
 }

@@ -92,7 +92,8 @@ fn hv05_thinner_slabs_converge_in_second_order() {
                 .sum::<f64>();
             squares.sqrt()
         };
-        let (coarse, fine) = (rmse(0.5), rmse(0.25));
+        // Where a face cuts slabs as wide as a step an error of third order is as large.
+        let (coarse, fine) = (rmse(0.25), rmse(0.125));
         let order = (coarse / fine).log2();
         assert!(order > 1.9, "order {order}: {coarse:e} → {fine:e}");
     }

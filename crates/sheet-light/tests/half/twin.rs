@@ -43,6 +43,9 @@ fn hv_lit_sheets_are_those_of_the_twin() {
                 let [tau, color] = differences(&input(&volumes, &camera, &[light]), &exact(slab_width));
                 assert!(tau < 2e-5 && color < 5e-5, "{slab_width:?}, {:?}: {tau:e} {color:e}", light.light.shape);
             }
+            // Where view and light are at right angles two sweeps are mixed.
+            let [tau, color] = differences(&input(&volumes, &camera, &[sun([8.0, 0.1, -3.0])]), &exact(None));
+            assert!(tau < 2e-5 && color < 5e-5, "at a right angle: {tau:e} {color:e}");
             // On the way through a slab optical depth towards a lamp is curved, where its light grazes a face most.
             for (light, slab_width) in [(bright([6.0, 8.0, 2.0]), Some(0.2)), (bright([-4.0, 3.0, -9.0]), None)] {
                 let [tau, color] = differences(&input(&volumes, &camera, &[light]), &exact(slab_width));

@@ -1,0 +1,317 @@
+//! The same splats in sheets, and how much each ordering pops as the view turns.
+//!
+//! A sheet holds the splats whose centres lie in a slab; in each pixel their extinctions add, their colours weigh by extinction, and sheets are
+//! composited from the eye on. Slabs lie across the view (Neophytou and Mueller 2005), across the axis of the world that is nearest to the view
+//! (Westover), or across the half vector of view and light (Zhang and Crawfis).
+//!
+//! What pops is looked for where something turns over: at the scene's own view, and at the nearest turns of the camera about the splats where
+//! another axis becomes the nearest, and where view and light are at right angles. Each turn has frames a tenth of a degree apart, of translucent
+//! splats alone, which are lit once for all of its frames, so that order is all that differs.
+
+use super::{Ordered, SHEETS, exact_input, image};
+use ::reference::{Fragment, Input, fold_fragments};
+use glam::{DMat3, DVec3};
+use organza::plan::Plan;
+use organza::scene::Scene;
+use organza::{CostRecord, Error, Frame, Loaded, Progress};
+use splat_core::Camera;
+
+/// Thicknesses of sheets, voxels.
+const VOXELS: [u32; 4] = [1, 2, 4, 8];
+
+/// Steps of a turn, degrees.
+const STEP: f64 = 0.1;
+
+/// Steps in a turn.
+const STEPS: i32 = 6;
+
+/// Longest side of its frames, pixels.
+const SIDE: u32 = 96;
+
+/// Ways without sheets, which come first.
+const FIRST_SHEETS: usize = 2;
+
+/// Neighbours are about half a radius apart.
+const SPACING: f64 = 0.5;
+
+/// Across what sheets lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Across {
+    View,
+    Axis,
+    Half,
+}
+
+/// How the fragments of a pixel are put in order and joined.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Way {
+    /// One by one, by their own depth.
+    Fragments,
+    /// One by one, by the view depth of their splats' centres.
+    Centres,
+    /// Sheets of so many voxels.
+    Sheets(Across, u32),
+}
+
+/// A pixel of one way.
+#[derive(Debug, Clone, Copy)]
+struct Pixel {
+    color: [f32; 3],
+    optical_depth: [f32; 3],
+}
+
+/// What sheets are made of.
+pub(super) struct Splats<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) loaded: &'a Loaded,
+    pub(super) plan: &'a Plan,
+    /// Ids of the translucent ones.
+    pub(super) ids: &'a [u32],
+}
+
+/// Splats by what they are sorted by in one view.
+struct Keys {
+    way: Way,
+    /// By id; empty where fragments have keys of their own.
+    of_splats: Vec<f64>,
+}
+
+impl Across {
+    fn name(self) -> &'static str {
+        match self {
+            Self::View => "the view",
+            Self::Axis => "an axis",
+            Self::Half => "the half vector",
+        }
+    }
+}
+
+impl Way {
+    /// Of sheets.
+    fn name(self) -> Option<String> {
+        match self {
+            Self::Fragments | Self::Centres => None,
+            Self::Sheets(across, 1) => Some(format!("sheets across {}, 1 voxel", across.name())),
+            Self::Sheets(across, voxels) => Some(format!("sheets across {}, {voxels} voxels", across.name())),
+        }
+    }
+
+    /// Of sheets, in the scale of the cloud.
+    fn thickness(self, of: &Splats<'_>) -> Option<f64> {
+        match self {
+            Self::Fragments | Self::Centres => None,
+            Self::Sheets(_, voxels) => Some(of.radius() * SPACING * f64::from(voxels)),
+        }
+    }
+}
+
+impl Splats<'_> {
+    fn radius(&self) -> f64 {
+        let all: f64 = self.ids.iter().map(|id| f64::from(self.loaded.cloud.radius[*id as usize])).sum();
+        all / self.ids.len() as f64
+    }
+
+    /// Middle of their centres.
+    fn middle(&self) -> DVec3 {
+        let all: DVec3 = self.ids.iter().map(|id| self.loaded.cloud.position[*id as usize].as_dvec3()).sum();
+        self.loaded.cloud.origin + all / self.ids.len() as f64
+    }
+
+    /// Direction to the first light, from the middle.
+    fn to_light(&self) -> Option<DVec3> {
+        self.loaded.lights.first().map(|light| light.light.irradiance(self.middle(), 0.0).0.normalize_or_zero())
+    }
+
+    fn ways(&self) -> Vec<Way> {
+        let across = [Some(Across::View), Some(Across::Axis), self.to_light().map(|_| Across::Half)];
+        let sheets = across.into_iter().flatten().flat_map(|a| VOXELS.map(|voxels| Way::Sheets(a, voxels)));
+        let one_by_one: [Way; FIRST_SHEETS] = [Way::Fragments, Way::Centres];
+        one_by_one.into_iter().chain(sheets).collect()
+    }
+
+    /// Normal of sheets, away from the eye.
+    fn normal(&self, across: Across, camera: &Camera) -> DVec3 {
+        let forward = camera.axes[2];
+        match across {
+            Across::View => forward,
+            Across::Axis => {
+                let axis = nearest_axis(forward);
+                DVec3::AXES[axis] * forward[axis].signum()
+            }
+            Across::Half => {
+                let light = self.to_light().unwrap_or(-forward);
+                // Light from behind the eye goes with the view; other light comes towards it.
+                let bisector = if forward.dot(light) <= 0.0 { forward - light } else { forward + light };
+                bisector.normalize()
+            }
+        }
+    }
+
+    fn keys(&self, way: Way, camera: &Camera) -> Keys {
+        let (cloud, middle) = (&self.loaded.cloud, self.middle());
+        let depths =
+            |normal: DVec3| cloud.position.iter().map(move |p| normal.dot(cloud.origin + p.as_dvec3() - middle));
+        let of_splats = match way {
+            Way::Fragments => Vec::new(),
+            Way::Centres => depths(camera.axes[2]).collect(),
+            Way::Sheets(across, voxels) => {
+                let thickness = self.radius() * SPACING * f64::from(voxels);
+                depths(self.normal(across, camera)).map(|depth| (depth / thickness).floor()).collect()
+            }
+        };
+        Keys { way, of_splats }
+    }
+
+    /// The nearest turns at which something turns over, degrees.
+    fn turns(&self, camera: &Camera) -> Vec<f64> {
+        let forward = |degrees: f64| turned(camera, self.middle(), degrees).axes[2];
+        let first = |side: &dyn Fn(DVec3) -> i32| {
+            let here = side(forward(0.0));
+            let steps = (1..=1800).flat_map(|n| [f64::from(n) * STEP, -f64::from(n) * STEP]);
+            steps.into_iter().find(|degrees| side(forward(*degrees)) != here)
+        };
+        let light = self.to_light();
+        let right_angle = light.and_then(|light| first(&|view| i32::from(view.dot(light) < 0.0)));
+        let all = [Some(0.0), first(&|view| nearest_axis(view) as i32), right_angle];
+        all.into_iter().flatten().collect()
+    }
+}
+
+/// Adds the pictures by sheets to those by other orderings, and says how much each of them pops, and the ordering named `by_centre`.
+pub(super) fn ways(
+    of: &Splats<'_>,
+    (frame, by_centre): (&Frame<'_>, &str),
+    all: &mut Vec<Ordered>,
+    progress: &Progress,
+) -> Result<(), Error> {
+    progress.begin(SHEETS);
+    progress.enter();
+    let ways = of.ways();
+    draw(of, frame, &ways[FIRST_SHEETS..], (all, progress))?;
+    let mut steps = vec![0.0f64; ways.len()];
+    for degrees in of.turns(&of.loaded.camera) {
+        for (most, step) in steps.iter_mut().zip(largest_steps(of, &ways, degrees, progress)?) {
+            *most = most.max(step);
+        }
+    }
+    for (way, step) in ways.iter().zip(&steps).skip(1).filter(|_| steps[0] > 0.0) {
+        let name = way.name().unwrap_or_else(|| by_centre.to_owned());
+        if let Some(row) = all.iter_mut().find(|o| o.name == name) {
+            row.pop = Some(step / steps[0]);
+        }
+    }
+    progress.leave();
+    Ok(())
+}
+
+/// The scene's picture by each way of sheets.
+fn draw(
+    of: &Splats<'_>,
+    frame: &Frame<'_>,
+    ways: &[Way],
+    (all, progress): (&mut Vec<Ordered>, &Progress),
+) -> Result<(), Error> {
+    let mut cost = CostRecord::default();
+    let shaded = frame.shaded(&mut cost)?;
+    let input = exact_input(of.loaded, &frame.camera, shaded, frame.raster_params().resampling_sigma_px);
+    let keys: Vec<Keys> = ways.iter().map(|way| of.keys(*way, &frame.camera)).collect();
+    let by_way =
+        |_, fragments: &[Fragment]| -> Vec<Pixel> { keys.iter().map(|k| composite(&input, fragments, k)).collect() };
+    let opaque = &frame.opaque(&mut cost)?.depth;
+    let pixels = fold_fragments(&input, opaque, by_way, Some(progress)).map_err(|_| Error::Cancelled)?;
+    let world = libm::exp2(f64::from(of.loaded.exponent));
+    for (n, way) in ways.iter().enumerate() {
+        let mut accumulator = frame.accumulator();
+        let planes = accumulator.optical_depth.len();
+        for (k, pixel) in pixels.iter().map(|by_way| by_way[n]).enumerate() {
+            accumulator.channels.iter_mut().zip(pixel.color).for_each(|(plane, v)| plane[k] = v);
+            let depth = |p: usize| pixel.optical_depth[if planes == 1 { 1 } else { p }];
+            accumulator.optical_depth.iter_mut().enumerate().for_each(|(p, plane)| plane[k] = depth(p));
+        }
+        let shown = image(&frame.finish(&accumulator, None, &mut cost)?)?;
+        let thickness = way.thickness(of).map(|thickness| thickness * world);
+        all.push(Ordered { thickness, ..Ordered::new(way.name().unwrap_or_default(), shown) });
+    }
+    Ok(())
+}
+
+/// The largest step from frame to frame of a turn about so many degrees, by way.
+fn largest_steps(of: &Splats<'_>, ways: &[Way], degrees: f64, progress: &Progress) -> Result<Vec<f64>, Error> {
+    let mut frame = Frame::new(of.scene, of.loaded, of.plan, progress);
+    let camera = smaller(turned(&of.loaded.camera, of.middle(), degrees));
+    frame.camera = camera;
+    let sigma = frame.raster_params().resampling_sigma_px;
+    let shaded = frame.shaded(&mut CostRecord::default())?;
+    let picture = |step: i32| {
+        let camera = turned(&camera, of.middle(), STEP * (f64::from(step) - 0.5 * f64::from(STEPS)));
+        let input = exact_input(of.loaded, &camera, shaded, sigma);
+        let keys: Vec<Keys> = ways.iter().map(|way| of.keys(*way, &camera)).collect();
+        let by_way = |_, fragments: &[Fragment]| keys.iter().map(|k| composite(&input, fragments, k).color).collect();
+        fold_fragments(&input, &[], by_way, Some(progress)).map_err(|_| Error::Cancelled)
+    };
+    let mut largest = vec![0.0f64; ways.len()];
+    let mut before: Vec<Vec<[f32; 3]>> = picture(0)?;
+    for step in 1..=STEPS {
+        let next = picture(step)?;
+        for (one, other) in before.iter().zip(&next) {
+            for (most, (a, b)) in largest.iter_mut().zip(one.iter().zip(other)) {
+                *most = (0..3).map(|c| f64::from((a[c] - b[c]).abs())).fold(*most, f64::max);
+            }
+        }
+        before = next;
+    }
+    Ok(largest)
+}
+
+/// A pixel by one way.
+fn composite(input: &Input<'_>, fragments: &[Fragment], keys: &Keys) -> Pixel {
+    let key = |f: &Fragment| match keys.way {
+        Way::Fragments => f.depth,
+        _ => keys.of_splats[f.splat as usize],
+    };
+    let mut sorted: Vec<(f64, &Fragment)> = fragments.iter().map(|f| (key(f), f)).collect();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (mut color, mut so_far) = ([0.0f64; 3], [0.0f64; 3]);
+    for sheet in sorted.chunk_by(|a, b| a.0 == b.0) {
+        let (mut depth, mut sum) = ([0.0; 3], [0.0; 3]);
+        for (_, f) in sheet {
+            let material = &input.materials[usize::from(input.cloud.material[f.splat as usize])];
+            for c in 0..3 {
+                let own = f.optical_depth * f64::from(material.extinction_rgb[c]);
+                depth[c] += own;
+                sum[c] += own * f64::from(input.values[f.splat as usize * input.channels + c]);
+            }
+        }
+        for c in (0..3).filter(|c| depth[*c] > 0.0) {
+            color[c] += libm::exp(-so_far[c]) * -libm::expm1(-depth[c]) * sum[c] / depth[c];
+            so_far[c] += depth[c];
+        }
+    }
+    Pixel { color: color.map(|c| c as f32), optical_depth: so_far.map(|depth| depth as f32) }
+}
+
+/// The axis of the world nearest to a direction.
+fn nearest_axis(direction: DVec3) -> usize {
+    let size = direction.abs();
+    if size.x >= size.y && size.x >= size.z {
+        0
+    } else if size.y >= size.z {
+        1
+    } else {
+        2
+    }
+}
+
+/// A camera turned about a place and its own upward axis.
+fn turned(camera: &Camera, about: DVec3, degrees: f64) -> Camera {
+    let turn = DMat3::from_axis_angle(camera.axes[1], degrees.to_radians());
+    let (position, axes) = (about + turn * (camera.position - about), camera.axes.map(|axis| turn * axis));
+    Camera { position, axes, ..*camera }
+}
+
+/// With as many pixels as frames of a turn have.
+fn smaller(camera: Camera) -> Camera {
+    let longest = camera.size[0].max(camera.size[1]);
+    let side = |n: u32| if longest > SIDE { (n * SIDE).div_ceil(longest) } else { n };
+    Camera { size: camera.size.map(side), ..camera }
+}

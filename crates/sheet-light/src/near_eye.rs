@@ -1,0 +1,96 @@
+//! Sheets beside the eye in perspective.
+//!
+//! A voxel behind the eye has no place in the image, so sheets that its kernel would reach lack it, and their values are those of places deeper
+//! than the middles of their slabs. How deep is found by splatting the depths of voxels as their values are. The value in the middle of a slab
+//! lies on the line through that sheet and the next one: exact in a linear field, as sheets farther off are.
+
+use crate::fold::Prepared;
+use crate::ring::{Record, Ring, Splatter};
+use crate::sections::PHASES;
+use crate::sheets::{LEAST_WEIGHT, Sheets};
+use crate::slabs::{BATCH, Slabs};
+use crate::tile::SIDE;
+use crate::viewed::corners;
+use crate::volume::Volume;
+use splat_core::Camera;
+use splat_core::raster::lanes::Lanes;
+use splat_core::raster::pulp::Simd;
+use std::ops::Range;
+
+/// Sheets whose depths are less apart than this share of a slab tell no slope.
+pub(crate) const LEAST_APART: f64 = 1.0 / 256.0;
+
+/// The depths of one volume's sheets in one tile.
+#[derive(Debug)]
+pub(crate) struct NearEye {
+    ring: Ring,
+    depths: Sheets,
+}
+
+/// Slabs of a volume, its own, that lack kernels of radius `reach`, because these lie behind the eye; from the one before the eye on.
+pub(crate) fn lacking(volume: &Volume<'_>, camera: &Camera, slabs: &Slabs, reach: f64) -> Option<Range<u32>> {
+    let nearest = corners(volume, camera).iter().map(|corner| corner.z).fold(f64::INFINITY, f64::min);
+    let eye = eye_of(slabs);
+    let range = (eye - 1.0).max(0.0) as u32..(eye + reach / slabs.width).ceil().max(0.0) as u32;
+    (!camera.is_orthographic() && nearest < reach).then_some(range)
+}
+
+/// The eye's place, in slabs.
+pub(crate) fn eye_of(slabs: &Slabs) -> f64 {
+    -slabs.origin / slabs.width
+}
+
+impl NearEye {
+    pub(crate) fn new(touched: usize) -> Self {
+        Self { ring: Ring::new(touched), depths: Sheets::new() }
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.ring.clear();
+        self.depths.clear();
+    }
+
+    /// Adds a voxel's depth. Number of fragments.
+    #[inline(always)]
+    pub(crate) fn splat<S: Simd>(
+        &mut self,
+        simd: S,
+        (of, slabs): (&Splatter<'_>, &Slabs),
+        record: &Record,
+        wanted: &[u64; SIDE],
+    ) -> u64 {
+        let depth = f64::from(record.place) / f64::from(PHASES) + of.viewed.reach / slabs.width - eye_of(slabs);
+        self.ring.splat(simd, of, &Record { value: depth as f32, ..*record }, wanted)
+    }
+
+    /// Finishes the depths of a batch, and the values that can be told with them: those of its sheets but the last, and of the last before it.
+    #[inline(always)]
+    pub(crate) fn take_batch<S: Simd>(&mut self, simd: S, of: &Prepared<'_>, batch: u32, sheets: &mut Sheets) {
+        let Some(lacking) = &of.lacking else { return };
+        self.ring.take_batch(simd, batch, &mut self.depths);
+        let from = (batch * BATCH).saturating_sub(1).max(lacking.start);
+        for slab in from..((batch + 1) * BATCH - 1).min(lacking.end) {
+            let middle = (f64::from(slab) + 0.5 - eye_of(&of.slabs)) as f32;
+            for y in 0..SIDE {
+                let touched = if sheets.tags(slab, y) == 0 { 0 } else { SIDE };
+                for x in (0..touched).step_by(Lanes::<S>::COUNT) {
+                    self.mend(simd, [slab as usize, y, x], middle, sheets);
+                }
+            }
+        }
+    }
+
+    /// Tells the values of neighbouring pixels in the middle of a slab.
+    #[inline(always)]
+    fn mend<S: Simd>(&self, simd: S, [slab, y, x]: [usize; 3], middle: f32, sheets: &mut Sheets) {
+        let (slab, of) = (slab as u32, |v: f32| Lanes::splat(simd, v));
+        let ([value, weight], [next, next_weight]) = (sheets.load(simd, slab, y, x), sheets.load(simd, slab + 1, y, x));
+        let ([depth, _], [next_depth, _]) =
+            (self.depths.load(simd, slab, y, x), self.depths.load(simd, slab + 1, y, x));
+        let (apart, least) = (next_depth - depth, of(LEAST_APART as f32));
+        let slope = (next - value) / of(1.0).where_less_or(apart, least, apart);
+        let slope = slope.where_less(least, apart);
+        let slope = slope.where_less(of(LEAST_WEIGHT), weight).where_less(of(LEAST_WEIGHT), next_weight);
+        sheets.set(slab, y, x, (of(middle) - depth).mul_add(slope, value));
+    }
+}
