@@ -70,7 +70,7 @@ fn shadow_maps_of_many_lights_are_counted_together() {
 fn less_memory_than_a_scene_needs_is_exit_5_and_never_an_abort() {
     let place = Place::new(&fog(0.1));
     for more in [vec![], vec!["--technique", "particles", "--repeat-level", "2"]] {
-        let arguments = [&["render", "s.toml", "--force", "--size", "1000x600", "--threads", "1"], &more[..]].concat();
+        let arguments = [&["render", "s.toml", "--force", "--size", "1600x1000", "--threads", "1"], &more[..]].concat();
         let (out, peak) = run_measured(organza().current_dir(place.folder()).args(&arguments));
         assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
         for percent in [50, 75, 90] {
