@@ -149,7 +149,7 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
     let start = Instant::now();
     let truth = by_technique(Technique::Reference, &scene, &loaded, options, progress)?;
     let truth_seconds = start.elapsed().as_secs_f64();
-    let splats = sheets::Splats { scene: &scene, loaded: &loaded, plan: &plan, ids: &sorter.translucent };
+    let splats = sheets::Splats::new(&scene, &loaded, &plan, &sorter.translucent);
     sheets::ways(&splats, (&frame, &Ordering::Centre.name(auto)), &mut orderings, progress)?;
     progress.begin(SETS_OF_PARTICLES);
     let unordered = particles(&scene, &loaded, &truth, options, progress)?;

@@ -62,11 +62,15 @@ struct Pixel {
 
 /// What sheets are made of.
 pub(super) struct Splats<'a> {
-    pub(super) scene: &'a Scene,
-    pub(super) loaded: &'a Loaded,
-    pub(super) plan: &'a Plan,
-    /// Ids of the translucent ones.
-    pub(super) ids: &'a [u32],
+    scene: &'a Scene,
+    loaded: &'a Loaded,
+    plan: &'a Plan,
+    /// Mean radius, in the scale of the cloud.
+    radius: f64,
+    /// Middle of their centres.
+    middle: DVec3,
+    /// Direction from there to the first light.
+    to_light: Option<DVec3>,
 }
 
 /// Splats by what they are sorted by in one view.
@@ -100,30 +104,29 @@ impl Way {
     fn thickness(self, of: &Splats<'_>) -> Option<f64> {
         match self {
             Self::Fragments | Self::Centres => None,
-            Self::Sheets(_, voxels) => Some(of.radius() * SPACING * f64::from(voxels)),
+            Self::Sheets(_, voxels) => Some(of.thickness(voxels)),
         }
     }
 }
 
-impl Splats<'_> {
-    fn radius(&self) -> f64 {
-        let all: f64 = self.ids.iter().map(|id| f64::from(self.loaded.cloud.radius[*id as usize])).sum();
-        all / self.ids.len() as f64
+impl<'a> Splats<'a> {
+    /// The translucent ones, of these ids.
+    pub(super) fn new(scene: &'a Scene, loaded: &'a Loaded, plan: &'a Plan, ids: &[u32]) -> Self {
+        let (cloud, share) = (&loaded.cloud, 1.0 / ids.len() as f64);
+        let radius = ids.iter().map(|id| f64::from(cloud.radius[*id as usize])).sum::<f64>() * share;
+        let middle = ids.iter().map(|id| cloud.position[*id as usize].as_dvec3()).sum::<DVec3>() * share;
+        let middle = cloud.origin + middle;
+        let to_light = loaded.lights.first().map(|light| light.light.irradiance(middle, 0.0).0.normalize_or_zero());
+        Self { scene, loaded, plan, radius, middle, to_light }
     }
 
-    /// Middle of their centres.
-    fn middle(&self) -> DVec3 {
-        let all: DVec3 = self.ids.iter().map(|id| self.loaded.cloud.position[*id as usize].as_dvec3()).sum();
-        self.loaded.cloud.origin + all / self.ids.len() as f64
-    }
-
-    /// Direction to the first light, from the middle.
-    fn to_light(&self) -> Option<DVec3> {
-        self.loaded.lights.first().map(|light| light.light.irradiance(self.middle(), 0.0).0.normalize_or_zero())
+    /// Of sheets of so many voxels, in the scale of the cloud.
+    fn thickness(&self, voxels: u32) -> f64 {
+        self.radius * SPACING * f64::from(voxels)
     }
 
     fn ways(&self) -> Vec<Way> {
-        let across = [Some(Across::View), Some(Across::Axis), self.to_light().map(|_| Across::Half)];
+        let across = [Some(Across::View), Some(Across::Axis), self.to_light.map(|_| Across::Half)];
         let sheets = across.into_iter().flatten().flat_map(|a| VOXELS.map(|voxels| Way::Sheets(a, voxels)));
         let one_by_one: [Way; FIRST_SHEETS] = [Way::Fragments, Way::Centres];
         one_by_one.into_iter().chain(sheets).collect()
@@ -139,7 +142,7 @@ impl Splats<'_> {
                 DVec3::AXES[axis] * forward[axis].signum()
             }
             Across::Half => {
-                let light = self.to_light().unwrap_or(-forward);
+                let light = self.to_light.unwrap_or(-forward);
                 // Light from behind the eye goes with the view; other light comes towards it.
                 let bisector = if forward.dot(light) <= 0.0 { forward - light } else { forward + light };
                 bisector.normalize()
@@ -148,14 +151,14 @@ impl Splats<'_> {
     }
 
     fn keys(&self, way: Way, camera: &Camera) -> Keys {
-        let (cloud, middle) = (&self.loaded.cloud, self.middle());
+        let (cloud, middle) = (&self.loaded.cloud, self.middle);
         let depths =
             |normal: DVec3| cloud.position.iter().map(move |p| normal.dot(cloud.origin + p.as_dvec3() - middle));
         let of_splats = match way {
             Way::Fragments => Vec::new(),
             Way::Centres => depths(camera.axes[2]).collect(),
             Way::Sheets(across, voxels) => {
-                let thickness = self.radius() * SPACING * f64::from(voxels);
+                let thickness = self.thickness(voxels);
                 depths(self.normal(across, camera)).map(|depth| (depth / thickness).floor()).collect()
             }
         };
@@ -164,14 +167,13 @@ impl Splats<'_> {
 
     /// The nearest turns at which something turns over, degrees.
     fn turns(&self, camera: &Camera) -> Vec<f64> {
-        let forward = |degrees: f64| turned(camera, self.middle(), degrees).axes[2];
+        let forward = |degrees: f64| turned(camera, self.middle, degrees).axes[2];
         let first = |side: &dyn Fn(DVec3) -> i32| {
             let here = side(forward(0.0));
             let steps = (1..=1800).flat_map(|n| [f64::from(n) * STEP, -f64::from(n) * STEP]);
             steps.into_iter().find(|degrees| side(forward(*degrees)) != here)
         };
-        let light = self.to_light();
-        let right_angle = light.and_then(|light| first(&|view| i32::from(view.dot(light) < 0.0)));
+        let right_angle = self.to_light.and_then(|light| first(&|view| i32::from(view.dot(light) < 0.0)));
         let all = [Some(0.0), first(&|view| nearest_axis(view) as i32), right_angle];
         all.into_iter().flatten().collect()
     }
@@ -238,12 +240,12 @@ fn draw(
 /// The largest step from frame to frame of a turn about so many degrees, by way.
 fn largest_steps(of: &Splats<'_>, ways: &[Way], degrees: f64, progress: &Progress) -> Result<Vec<f64>, Error> {
     let mut frame = Frame::new(of.scene, of.loaded, of.plan, progress);
-    let camera = smaller(turned(&of.loaded.camera, of.middle(), degrees));
+    let camera = smaller(turned(&of.loaded.camera, of.middle, degrees));
     frame.camera = camera;
     let sigma = frame.raster_params().resampling_sigma_px;
     let shaded = frame.shaded(&mut CostRecord::default())?;
     let picture = |step: i32| {
-        let camera = turned(&camera, of.middle(), STEP * (f64::from(step) - 0.5 * f64::from(STEPS)));
+        let camera = turned(&camera, of.middle, STEP * (f64::from(step) - 0.5 * f64::from(STEPS)));
         let input = exact_input(of.loaded, &camera, shaded, sigma);
         let keys: Vec<Keys> = ways.iter().map(|way| of.keys(*way, &camera)).collect();
         let by_way = |_, fragments: &[Fragment]| keys.iter().map(|k| composite(&input, fragments, k).color).collect();
