@@ -5,7 +5,7 @@
 //! one-sided beside a sample that is outside the volume. Samples of a sheet differ in s where faces cut its slab.
 
 use super::frame::Frame;
-use super::sheet::{Sheet, Slab};
+use super::sheet::Sheet;
 use crate::light::dot;
 use crate::sheets::LEAST_WEIGHT;
 use splat_core::glam::Vec3;
@@ -97,22 +97,22 @@ fn cross<S: Simd>(x: &[Lanes<S>; 3], y: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
 /// The samples from pixel `k` on of a sheet that lies `slabs` behind the one that depths are told from.
 #[inline(always)]
 fn at<S: Simd>(simd: S, sheet: &Sheet, k: usize, slabs: f32) -> Sample<S> {
-    let Sheet { near, far, values, weights, at: [a, b], .. } = sheet;
-    sample(simd, (sheet.slab(), slabs), [&near[k..], &far[k..], &weights[k..], &values[k..], &a[k..], &b[k..]])
+    let Sheet { near, far, values, weights, at: [a, b], behind, .. } = sheet;
+    let planes = [&near[k..], &far[k..], &weights[k..], &values[k..], &a[k..], &b[k..], &behind[k..]];
+    sample(simd, slabs, planes)
 }
 
-/// Of near, far, kernel sum, value, a and b.
+/// Of near, far, kernel sum, value, a, b and s, of which the last is told from another sheet than its own, `slabs` behind that.
 #[inline(always)]
-fn sample<S: Simd>(simd: S, (slab, slabs): (Slab, f32), of: [&[f32]; 6]) -> Sample<S> {
+fn sample<S: Simd>(simd: S, slabs: f32, of: [&[f32]; 7]) -> Sample<S> {
     let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
-    let (near, far) = (Lanes::load(simd, of[0]), Lanes::load(simd, of[1]));
-    let inside = one.where_less(near, far);
+    let inside = one.where_less(Lanes::load(simd, of[0]), Lanes::load(simd, of[1]));
     let inside = inside.where_less(Lanes::splat(simd, LEAST_WEIGHT), Lanes::load(simd, of[2]));
     let mut out = [inside; 5];
-    for n in 0..3 {
+    for n in 0..INSIDE {
         out[n] = Lanes::load(simd, of[3 + n]).where_less(zero, inside);
     }
-    out[3] = slab.behind(simd, near, far) + Lanes::splat(simd, slabs);
+    out[3] = out[3] + Lanes::splat(simd, slabs);
     out
 }
 
@@ -122,12 +122,12 @@ fn left_of<S: Simd>(simd: S, sheet: &Sheet, k: usize) -> Sample<S> {
     if k > 0 {
         return at(simd, sheet, k - 1, 0.0);
     }
-    let Sheet { near, far, values, weights, at: [a, b], .. } = sheet;
+    let Sheet { near, far, values, weights, at: [a, b], behind, .. } = sheet;
     // Of the planes that tell, 0 is outside.
-    let mut shifted = [[0.0; MAX_LANES]; 6];
-    for (to, from) in shifted.iter_mut().zip([near, far, weights, values, a, b]) {
+    let mut shifted = [[0.0; MAX_LANES]; 7];
+    for (to, from) in shifted.iter_mut().zip([near, far, weights, values, a, b, behind]) {
         to[1..].copy_from_slice(&from[..MAX_LANES - 1]);
     }
-    let [near, far, weights, values, a, b] = &shifted;
-    sample(simd, (sheet.slab(), 0.0), [near, far, weights, values, a, b])
+    let [near, far, weights, values, a, b, behind] = &shifted;
+    sample(simd, 0.0, [near, far, weights, values, a, b, behind])
 }

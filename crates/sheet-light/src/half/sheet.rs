@@ -34,6 +34,8 @@ pub(crate) struct Sheet {
     pub(crate) far: Vec<f32>,
     /// a and b of the middle between them.
     pub(crate) at: [Vec<f32>; 2],
+    /// How many slabs behind the slab's middle it lies, at most half of one.
+    pub(crate) behind: Vec<f32>,
     /// Σ v·w, then their quotient.
     pub(crate) values: Vec<f32>,
     pub(crate) weights: Vec<f32>,
@@ -45,27 +47,6 @@ pub(crate) struct Sheet {
     rows: Range<usize>,
     /// Depths that the places lie between.
     depths: [f32; 2],
-    slab: Slab,
-}
-
-/// Depths across the slabs are told from the middle of one by this.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Slab {
-    middle: f32,
-    inverse_width: f32,
-}
-
-impl Slab {
-    fn between(faces: [f32; 2]) -> Self {
-        Self { middle: 0.5 * (faces[0] + faces[1]), inverse_width: 1.0 / (faces[1] - faces[0]) }
-    }
-
-    /// How many slabs behind its middle the middle of what rays have between two depths lies, at most half of one; 0 for rays without any.
-    #[inline(always)]
-    pub(crate) fn behind<S: Simd>(&self, simd: S, near: Lanes<S>, far: Lanes<S>) -> Lanes<S> {
-        let of = |v: f32| Lanes::splat(simd, v);
-        (((near + far) * of(0.5) - of(self.middle)) * of(self.inverse_width)).where_less(near, far)
-    }
 }
 
 impl Sheet {
@@ -75,19 +56,19 @@ impl Sheet {
             near: vec![f32::INFINITY; band.stored * band.stride],
             far: vec![f32::NEG_INFINITY; band.stored * band.stride],
             at: [plane(), plane()],
+            behind: plane(),
             values: plane(),
             weights: plane(),
             spans: vec![0..0; band.stored],
             whole: vec![0..0; band.stored],
             rows: 0..0,
             depths: [0.0; 2],
-            slab: Slab::between([0.0, 1.0]),
         }
     }
 
     /// Bytes of the planes.
     pub(crate) fn bytes(&self) -> u64 {
-        4 * 6 * self.near.len() as u64
+        4 * 7 * self.near.len() as u64
     }
 
     /// Whether nothing is inside.
@@ -95,16 +76,10 @@ impl Sheet {
         self.rows.is_empty()
     }
 
-    /// What depths are told from.
-    pub(crate) fn slab(&self) -> Slab {
-        self.slab
-    }
-
     /// Begins the slab between two depths.
     #[inline(always)]
     pub(crate) fn begin<S: Simd>(&mut self, simd: S, band: &Band, volume: usize, faces: [f32; 2]) {
-        self.slab = Slab::between(faces);
-        (self.rows, self.depths) = (0..0, [self.slab.middle; 2]);
+        (self.rows, self.depths) = (0..0, [0.5 * (faces[0] + faces[1]); 2]);
         for y in 0..band.stored {
             let hit = &band.hits[volume][y];
             let is_met = hit.near < faces[1] && hit.far > faces[0];
@@ -135,7 +110,7 @@ impl Sheet {
     ) -> bool {
         let of = |v: f32| Lanes::splat(simd, v);
         let (first, last, half, zero, one) = (of(faces[0]), of(faces[1]), of(0.5), of(0.0), of(1.0));
-        let middle = of(self.slab.middle);
+        let (middle, per_slab) = (of(0.5 * (faces[0] + faces[1])), of(1.0 / (faces[1] - faces[0])));
         let (mut any, mut any_cut, mut run) = (false, false, start..start);
         self.whole[y] = start..start;
         let mut x = start;
@@ -156,6 +131,7 @@ impl Sheet {
             }
             (any, any_cut) = (any || is_inside, any_cut || is_cut);
             let depth = ((near + far) * half).where_less_or(near, far, middle);
+            ((depth - middle) * per_slab).store(&mut self.behind[k..]);
             for a in 0..2 {
                 let slope = Lanes::load(simd, &band.slope[a][k..]);
                 slope.mul_add(depth, Lanes::load(simd, &band.place[a][k..])).store(&mut self.at[a][k..]);
@@ -181,6 +157,11 @@ impl Sheet {
         // Where nothing cuts the slab its neighbours have no part in it.
         let beside = u32::from(self.depths[0] < self.depths[1]);
         for record in of.buckets.of(slab.saturating_sub(beside)..slab + 1 + beside, index, has_rim).flatten() {
+            let from_first = slab as isize - (record.place / PHASES) as isize;
+            let sections = of.placed.sections.around(record.place % PHASES, from_first);
+            if sections == [0.0; 3] {
+                continue;
+            }
             let [left, right, top, bottom] = of.sight.bounds(of.shape, record.at, self.depths);
             // Saturating casts: what lies before the first pixel is 0.
             let from = |edge: f32| (edge - 0.5).ceil() as usize;
@@ -189,8 +170,6 @@ impl Sheet {
                 ..to(bottom).saturating_sub(band.top).min(self.rows.end);
             let columns = from(left)..to(right).min(band.width);
             if !rows.is_empty() && !columns.is_empty() {
-                let from_first = slab as isize - (record.place / PHASES) as isize;
-                let sections = of.placed.sections.around(record.place % PHASES, from_first);
                 fragments += self.add(simd, of, (band.stride, record, sections), rows, columns);
             }
         }
@@ -220,8 +199,7 @@ impl Sheet {
                 let k = y * stride + x;
                 let mut section = own;
                 if x < whole.start || x + Lanes::<S>::COUNT > whole.end {
-                    let (near, far) = (Lanes::load(simd, &self.near[k..]), Lanes::load(simd, &self.far[k..]));
-                    let behind = self.slab.behind(simd, near, far);
+                    let behind = Lanes::load(simd, &self.behind[k..]);
                     section = to_after.mul_add(behind.max(zero), section);
                     section = to_before.mul_add((zero - behind).max(zero), section);
                 } else if of_neighbour {

@@ -99,7 +99,9 @@ impl<S: Simd> Lanes<S> {
     /// The absolute value.
     #[inline(always)]
     pub fn abs(self) -> Self {
-        Self { simd: self.simd, value: self.simd.abs_f32s(self.value) }
+        // `abs_f32s` and `select_f32s` of pulp may stay calls, through memory, within what is vectorised.
+        let all_but_sign = self.simd.splat_f32s(f32::from_bits(0x7fff_ffff));
+        Self { simd: self.simd, value: self.simd.and_f32s(self.value, all_but_sign) }
     }
 
     /// The lesser of the two; neither may be NaN.
@@ -117,8 +119,10 @@ impl<S: Simd> Lanes<S> {
     /// `self` where `a` < `b`, `other` elsewhere.
     #[inline(always)]
     pub fn where_less_or(self, a: Self, b: Self, other: Self) -> Self {
-        let mask = self.simd.less_than_f32s(a.value, b.value);
-        Self { simd: self.simd, value: self.simd.select_f32s(mask, self.value, other.value) }
+        let simd = self.simd;
+        let (own, other) = (simd.transmute_u32s_f32s(self.value), simd.transmute_u32s_f32s(other.value));
+        let bits = simd.select_u32s(simd.less_than_f32s(a.value, b.value), own, other);
+        Self { simd, value: simd.transmute_f32s_u32s(bits) }
     }
 
     /// `self` where `a` < `b`, 0 elsewhere.
