@@ -36,6 +36,7 @@ pub mod extended;
 mod graph;
 mod hash;
 mod kept;
+mod lattice;
 mod membership;
 mod minimum;
 mod recipe;

@@ -30,7 +30,7 @@ impl Cloud {
         keys.par_sort_unstable_by(|a, b| {
             a.0.cmp(&b.0).then_with(|| compare_splats(self, a.1 as usize, b.1 as usize)).then(a.1.cmp(&b.1))
         });
-        keys.into_iter().map(|(_, i)| i).collect()
+        keys.into_par_iter().with_min_len(8192).map(|(_, i)| i).collect()
     }
 }
 

@@ -1,156 +1,42 @@
 //! Area of a disc that another one covers, Eq. 8: the points x of disc i with d₁ = |(x − p_j)·n_j| < ε whose projection onto the
 //! plane of disc j lies within that disc.
 //!
-//! In the plane of disc i, with t along the offset of the centres and s across it, disc i and the projection of disc j are conics,
-//! which cut a line of constant t in a chord each; |d₁| < ε cuts it in a third. The length that all three share is integrated over
+//! In units of its semi-axes disc i is a unit circle. There the projection of disc j cuts a line of constant t, which runs along the offset of
+//! the centres, in a chord along s, the circle in another, and |d₁| < ε in a third. The length that all three share is integrated over
 //! t by Gauss-Chebyshev nodes of the second kind, which know that chords begin and end as square roots do: one disc alone has
-//! its area exactly. Shares are within 0.01 for a lens of two circles, 0.025 for tilted ellipses, and 0.1 where discs so
+//! its area exactly. Shares are within 0.01 for a lens of two circles, 0.025 for tilted ellipses, and 0.1 where discs are so
 //! steep to one another that ε cuts a strip out of them: they serve to compare overlaps.
+//!
+//! Places are subtracted in f64. What follows is in units of the disc, sixteen pairs of discs at a time.
 
-use super::graph::OverlapGraph;
+use super::graph::{OverlapGraph, chunks, cut};
 use super::surfels::{CHUNK, Surfel};
 use rayon::prelude::*;
-use splat_core::glam::DVec3;
-use std::f64::consts::PI;
-use std::ops::Range;
+use splat_core::glam::Vec3;
+use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::pulp::{self, Simd};
+use std::f32::consts::PI;
 
-/// Nodes of the quadrature.
-const NODES: usize = 8;
+/// Nodes of the quadrature, cos(kπ/9) for k = 1 … 8, with π/9·sin(kπ/9).
+const NODES: [[f32; 2]; 8] = [
+    [0.939_692_6, 0.119_387_55],
+    [0.766_044_44, 0.224_375_2],
+    [0.5, 0.302_299_9],
+    [0.173_648_18, 0.343_762_76],
+    [-0.173_648_18, 0.343_762_76],
+    [-0.5, 0.302_299_9],
+    [-0.766_044_44, 0.224_375_2],
+    [-0.939_692_6, 0.119_387_55],
+];
 
-/// cos(kπ/9) for k = 1 … 8.
-const COSINES: [f32; NODES] =
-    [0.939_692_6, 0.766_044_44, 0.5, 0.173_648_18, -0.173_648_18, -0.5, -0.766_044_44, -0.939_692_6];
+/// Slopes of conics seen edge-on and of lines along s, which would be 0.
+const LEAST: f32 = 1e-6;
 
-/// π/9·sin(kπ/9) for k = 1 … 8.
-const WEIGHTS: [f32; NODES] =
-    [0.119_387_55, 0.224_375_2, 0.302_299_9, 0.343_762_76, 0.343_762_76, 0.302_299_9, 0.224_375_2, 0.119_387_55];
-
-/// Coefficients of conics seen edge-on, which would be 0, in units of the disc.
-const LEAST: f64 = 1e-12;
+/// Radii over one another beyond which the smaller disc is a point.
+const MOST_RATIO: f64 = 1e9;
 
 /// A share of 1, as a whole number.
 pub(crate) const WHOLE: f64 = 65535.0;
-
-/// Chords of an ellipse, A·s² + 2(b₁t + b₀)s + (c₂t² + c₁t + c₀) ≤ 0.
-struct Chords {
-    /// −b/A, by rising powers of t.
-    middle: [f64; 2],
-    /// (b² − A·c)/A², by rising powers of t.
-    half_squared: [f64; 3],
-}
-
-impl Chords {
-    /// Chords along `s` of the projection onto a disc's plane; `offset` is its centre, lengths are in some unit.
-    fn new(disc: &Surfel, axes: &[DVec3; 3], unit: f64) -> Self {
-        if disc.is_circle() { Self::circle(disc, axes, unit) } else { Self::ellipse(disc, axes, unit) }
-    }
-
-    /// The squared distance from the centre of a circle's projection is vᵀ(1 − n·nᵀ)v.
-    fn circle(disc: &Surfel, [s, t, offset]: &[DVec3; 3], unit: f64) -> Self {
-        let normal = disc.normal.as_dvec3();
-        let [of_s, of_t, of_offset] = [normal.dot(*s), normal.dot(*t), normal.dot(*offset)];
-        let radius = f64::from(disc.across) / unit;
-        // In units of the radius squared; s is a unit vector across the offset.
-        Self::of_form(
-            1.0 - of_s * of_s,
-            [of_s * of_offset, -of_s * of_t],
-            [
-                offset.length_squared() - of_offset * of_offset - radius * radius,
-                -2.0 * (t.dot(*offset) - of_t * of_offset),
-                1.0 - of_t * of_t,
-            ],
-        )
-    }
-
-    /// That of an ellipse is the sum of squares along its semi-axes, each in its own unit.
-    fn ellipse(disc: &Surfel, directions: &[DVec3; 3], unit: f64) -> Self {
-        let axes = disc.axes().map(|a| a * (unit / a.length_squared()));
-        let [s, t, offset] = directions.map(|v| axes.map(|a| a.dot(v)));
-        let product = |v: [f64; 2], w: [f64; 2]| v[0] * w[0] + v[1] * w[1];
-        Self::of_form(
-            product(s, s),
-            [-product(s, offset), product(s, t)],
-            [product(offset, offset) - 1.0, -2.0 * product(t, offset), product(t, t)],
-        )
-    }
-
-    fn of_form(a: f64, b: [f64; 2], c: [f64; 3]) -> Self {
-        let a = a.max(LEAST);
-        let per = 1.0 / a;
-        let square = (b[1] * b[1] - a * c[2]) * per * per;
-        Self {
-            middle: b.map(|b| -b * per),
-            half_squared: [
-                (b[0] * b[0] - a * c[0]) * per * per,
-                (2.0 * b[0] * b[1] - a * c[1]) * per * per,
-                square.min(-LEAST),
-            ],
-        }
-    }
-
-    /// Where there are chords; `None` where there are none.
-    fn extent(&self) -> Option<[f64; 2]> {
-        let [constant, linear, square] = self.half_squared;
-        let (center, inside) = (-0.5 * linear / square, 0.25 * linear * linear - square * constant);
-        let half = inside.max(0.0).sqrt() / -square;
-        (inside > 0.0).then_some([center - half, center + half])
-    }
-
-    fn at(&self, t: f32) -> [f32; 2] {
-        let [constant, linear, square] = self.half_squared.map(|v| v as f32);
-        let middle = self.middle[0] as f32 + self.middle[1] as f32 * t;
-        let half = (constant + t * (linear + t * square)).max(0.0).sqrt();
-        [middle - half, middle + half]
-    }
-}
-
-/// Share of `disc`'s area that `other` covers, A_ij/(π·r_i²), in \[0, 1\]; `epsilon` is a length.
-pub(crate) fn covered_share(disc: &Surfel, other: &Surfel, epsilon: f64) -> f64 {
-    let unit = f64::from(disc.reach);
-    let offset = other.from(disc) / unit;
-    let (normal, facing) = (disc.normal.as_dvec3(), other.normal.as_dvec3());
-    let within = offset - normal * normal.dot(offset);
-    let t = within.try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
-    let s = normal.cross(t);
-    let own = Chords::new(disc, &[s, t, DVec3::ZERO], unit);
-    let theirs = Chords::new(other, &[s, t, offset], unit);
-    let (Some(mine), Some(yours)) = (own.extent(), theirs.extent()) else { return 0.0 };
-    let (low, high) = (mine[0].max(yours[0]), mine[1].min(yours[1]));
-    if low >= high {
-        return 0.0;
-    }
-    // d₁ at (s, t): distance[0] + distance[1]·t + slope·s.
-    let slope = facing.dot(s);
-    let per = -1.0 / if slope.abs() < LEAST { LEAST } else { slope };
-    let strip = Strip {
-        center: [-facing.dot(offset) * per, facing.dot(t) * per].map(|v| v as f32),
-        reach: (epsilon / unit * per).abs() as f32,
-    };
-    let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
-    let area = half * common_length([middle as f32, half as f32], [&own, &theirs], &strip);
-    let radius = disc.mean_radius() / unit;
-    (area / (PI * radius * radius)).min(1.0)
-}
-
-/// Where |d₁| < ε along a line of constant t.
-struct Strip {
-    /// By rising powers of t.
-    center: [f32; 2],
-    reach: f32,
-}
-
-/// Quadrature over \[middle − half, middle + half\], per half, of what chords and strip share; in f32, of which vectors hold more.
-fn common_length([middle, half]: [f32; 2], [own, theirs]: [&Chords; 2], strip: &Strip) -> f64 {
-    let lengths = COSINES.map(|cosine| {
-        let t = middle + half * cosine;
-        let (mine, yours) = (own.at(t), theirs.at(t));
-        let center = strip.center[0] + strip.center[1] * t;
-        let from = mine[0].max(yours[0]).max(center - strip.reach);
-        let to = mine[1].min(yours[1]).min(center + strip.reach);
-        (to - from).max(0.0)
-    });
-    f64::from(lengths.iter().zip(WEIGHTS).map(|(length, weight)| length * weight).sum::<f32>())
-}
 
 /// ε of Eq. 8 for two discs: a share of the mean of their reaches.
 pub(crate) fn epsilon_of(a: &Surfel, b: &Surfel, gap: f32) -> f64 {
@@ -159,54 +45,212 @@ pub(crate) fn epsilon_of(a: &Surfel, b: &Surfel, gap: f32) -> f64 {
 
 /// For each entry of the graph's lists the share of the node's disc that its neighbour covers, over 1/65535.
 pub(crate) fn covered_shares(graph: &OverlapGraph, gap: f32) -> Vec<u16> {
-    fill(graph, |node, n| {
-        let (a, b) = (graph.surfel(node), graph.surfel(n));
-        (covered_share(a, b, epsilon_of(a, b, gap)) * WHOLE + 0.5) as u16
-    })
+    fill(graph, gap, |own, _| (own * WHOLE as f32 + 0.5) as u16)
 }
 
 /// For each entry the mean of the shares that both discs cover of one another, over 1/65535; the same from both sides.
 /// No edge has less than 1: discs that overlap by Eq. 5 alone should not share a group either where others may.
 pub(crate) fn mutual_shares(graph: &OverlapGraph, gap: f32) -> Vec<u16> {
-    let later = fill(graph, |node, n| {
-        if n < node {
-            return 0;
-        }
-        let (a, b) = (graph.surfel(node), graph.surfel(n));
-        let epsilon = epsilon_of(a, b, gap);
-        ((0.5 * (covered_share(a, b, epsilon) + covered_share(b, a, epsilon)) * WHOLE + 0.5) as u16).max(1)
-    });
-    let rank =
-        |node: usize, n: usize| graph.row(node).start + graph.neighbors(node).partition_point(|&m| (m as usize) < n);
-    fill(graph, |node, n| later[if n < node { rank(n, node) } else { rank(node, n) }])
+    fill(graph, gap, |own, other| ((0.5 * (own + other) * WHOLE as f32 + 0.5) as u16).max(1))
 }
 
-/// One value for each entry of the graph's lists, made of the node and its neighbour.
-fn fill(graph: &OverlapGraph, value: impl Fn(usize, usize) -> u16 + Sync) -> Vec<u16> {
+/// One value for each entry of the graph's lists, made of the shares that the node's disc and its neighbour have covered.
+fn fill(graph: &OverlapGraph, gap: f32, value: impl Fn(f32, f32) -> u16 + Sync) -> Vec<u16> {
+    let planes: Vec<Plane> =
+        (0..graph.nodes()).into_par_iter().with_min_len(CHUNK).map(|node| Plane::new(graph.surfel(node))).collect();
     let mut values = vec![0; graph.rows(0..graph.nodes()).len()];
-    let mut rest = values.as_mut_slice();
-    let mut parts: Vec<(Range<usize>, &mut [u16])> = Vec::new();
-    for from in (0..graph.nodes()).step_by(CHUNK) {
-        let nodes = from..(from + CHUNK).min(graph.nodes());
-        let (part, after) = std::mem::take(&mut rest).split_at_mut(graph.rows(nodes.clone()).len());
-        rest = after;
-        parts.push((nodes, part));
-    }
-    parts.into_par_iter().for_each(|(nodes, part)| {
-        let entries = nodes.flat_map(|node| graph.neighbors(node).iter().map(move |&n| (node, n as usize)));
-        part.iter_mut().zip(entries).for_each(|(entry, (node, n))| *entry = value(node, n));
+    let chunks = chunks(graph.nodes());
+    let parts = cut(&mut values, chunks.iter().map(|nodes| graph.rows(nodes.clone()).len()));
+    chunks.into_par_iter().zip(parts).for_each(|(nodes, part)| {
+        let mut entries = nodes.flat_map(|node| graph.neighbors(node).iter().map(move |&n| [node, n as usize]));
+        let mut pairs = Pairs::default();
+        for part in part.chunks_mut(MAX_LANES) {
+            for (k, pair) in (0..part.len()).zip(&mut entries) {
+                pairs.set(k, pair.map(|n| graph.surfel(n)), pair.map(|n| &planes[n]));
+            }
+            let [own, other] = pulp::Arch::new().dispatch(Covered { pairs: &pairs, gap });
+            let shares = own.into_iter().zip(other);
+            part.iter_mut().zip(shares).for_each(|(to, (own, other))| *to = value(own, other));
+        }
     });
     values
+}
+
+/// Semi-axes of a disc in units of its reach.
+struct Plane([Vec3; 2]);
+
+impl Plane {
+    fn new(disc: &Surfel) -> Self {
+        let unit = 1.0 / f64::from(disc.reach);
+        Self(disc.axes().map(|axis| (axis * unit).as_vec3()))
+    }
+}
+
+/// Numbers of sixteen pairs.
+type Line = [f32; MAX_LANES];
+
+/// One disc of each pair.
+#[derive(Default)]
+struct Side {
+    /// In units of its reach.
+    axes: [[Line; 3]; 2],
+    normal: [Line; 3],
+    /// From its centre to that of the other, in the same unit.
+    offset: [Line; 3],
+    /// Reach of the other.
+    ratio: Line,
+}
+
+/// Sixteen pairs of discs.
+#[derive(Default)]
+struct Pairs([Side; 2]);
+
+impl Pairs {
+    /// Pair `k`; either disc sees the other as it would be seen if it came second.
+    fn set(&mut self, k: usize, discs: [&Surfel; 2], planes: [&Plane; 2]) {
+        for (own, side) in self.0.iter_mut().enumerate() {
+            let (disc, other, Plane([first, second])) = (discs[own], discs[1 - own], planes[own]);
+            let unit = 1.0 / f64::from(disc.reach);
+            let [a, b] = &mut side.axes;
+            put(a, k, *first);
+            put(b, k, *second);
+            put(&mut side.normal, k, disc.normal);
+            put(&mut side.offset, k, (other.from(disc) * unit).as_vec3());
+            side.ratio[k] = (f64::from(other.reach) * unit).clamp(1.0 / MOST_RATIO, MOST_RATIO) as f32;
+        }
+    }
+}
+
+fn put(lines: &mut [Line; 3], k: usize, v: Vec3) {
+    lines.iter_mut().zip(v.to_array()).for_each(|(line, v)| line[k] = v);
+}
+
+/// For sixteen pairs the share that each disc has covered by the other, A_ij/(π·r_i²), in \[0, 1\].
+struct Covered<'a> {
+    pairs: &'a Pairs,
+    gap: f32,
+}
+
+impl pulp::WithSimd for Covered<'_> {
+    type Output = [Line; 2];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> [Line; 2] {
+        let (Pairs([a, b]), mut shares) = (self.pairs, [[0.0; MAX_LANES]; 2]);
+        for lane in (0..MAX_LANES).step_by(Lanes::<S>::COUNT) {
+            covered(simd, lane, [a, b], self.gap).store(&mut shares[0][lane..]);
+            covered(simd, lane, [b, a], self.gap).store(&mut shares[1][lane..]);
+        }
+        shares
+    }
+}
+
+/// Three numbers a lane.
+type Vector<S> = [Lanes<S>; 3];
+
+#[inline(always)]
+fn load<S: Simd>(simd: S, lane: usize, lines: &[Line; 3]) -> Vector<S> {
+    [Lanes::load(simd, &lines[0][lane..]), Lanes::load(simd, &lines[1][lane..]), Lanes::load(simd, &lines[2][lane..])]
+}
+
+#[inline(always)]
+fn dot<S: Simd>(a: Vector<S>, b: Vector<S>) -> Lanes<S> {
+    a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
+}
+
+/// Directions of s and t in a disc's plane, by its semi-axes a and b.
+struct Frame<S: Simd> {
+    a: Vector<S>,
+    b: Vector<S>,
+    /// t along both.
+    t: [Lanes<S>; 2],
+    /// To the other disc's centre.
+    offset: Vector<S>,
+}
+
+/// A number that is linear in (s, t): by s, which is never 0, by t, and at the other disc's centre.
+struct Linear<S: Simd> {
+    s: Lanes<S>,
+    t: Lanes<S>,
+    center: Lanes<S>,
+}
+
+impl<S: Simd> Frame<S> {
+    /// The place along a vector, times `per`.
+    #[inline(always)]
+    fn along(&self, simd: S, v: Vector<S>, per: Lanes<S>) -> Linear<S> {
+        let ([x, y], least) = (self.t, Lanes::splat(simd, LEAST));
+        let (p, q) = (dot(v, self.a) * per, dot(v, self.b) * per);
+        let s = q * x - p * y;
+        Linear { s: least.where_less_or(s.abs(), least, s), t: p.mul_add(x, q * y), center: dot(v, self.offset) * per }
+    }
+
+    /// The place along a semi-axis of the other disc, in units of it and of the reaches' ratio.
+    #[inline(always)]
+    fn along_axis(&self, simd: S, axis: Vector<S>) -> Linear<S> {
+        self.along(simd, axis, Lanes::splat(simd, 1.0) / dot(axis, axis))
+    }
+}
+
+/// The share of `own` that `other` covers.
+#[inline(always)]
+fn covered<S: Simd>(simd: S, lane: usize, [own, other]: [&Side; 2], gap: f32) -> Lanes<S> {
+    let of = |v: f32| Lanes::splat(simd, v);
+    let (zero, one, least) = (of(0.0), of(1.0), of(LEAST));
+    let (a, b) = (load(simd, lane, &own.axes[0]), load(simd, lane, &own.axes[1]));
+    let (offset, ratio) = (load(simd, lane, &own.offset), Lanes::load(simd, &own.ratio[lane..]));
+    // t along the offset, in units of the semi-axes.
+    let (x, y) = (dot(a, offset) / dot(a, a), dot(b, offset) / dot(b, b));
+    let length = x.mul_add(x, y * y).sqrt();
+    let per = one / length.max(least);
+    let t = [one.where_less_or(length, least, x * per), zero.where_less_or(length, least, y * per)];
+    let frame = Frame { a, b, t, offset };
+    // What is covered has u² + v² < ratio².
+    let u = frame.along_axis(simd, load(simd, lane, &other.axes[0]));
+    let v = frame.along_axis(simd, load(simd, lane, &other.axes[1]));
+    let square = u.s.mul_add(u.s, v.s * v.s);
+    let (per_square, root) = (one / square, square.sqrt() * ratio);
+    // How far the line of a t passes by the other's centre, times √square.
+    let (by, at) = (u.s * v.t - v.s * u.t, u.s * v.center - v.s * u.center);
+    let by = least.where_less_or(by.abs(), least, by);
+    let (center, half) = (at / by, root / by.abs());
+    let (low, high) = ((center - half).max(zero - one), (center + half).min(one));
+    let (middle, half) = (of(0.5) * (low + high), (of(0.5) * (high - low)).max(zero));
+    let (slope, start) = (u.s.mul_add(u.t, v.s * v.t) * per_square, u.s.mul_add(u.center, v.s * v.center) * per_square);
+    // d₁ is nowhere constant along s.
+    let distance = frame.along(simd, load(simd, lane, &other.normal), one);
+    let per = one / distance.s;
+    let (strip_slope, strip_start) = (distance.t * per, distance.center * per);
+    let reach = of(0.5 * gap) * (one + ratio) * per.abs();
+    let (root_square, mut sum) = (root * root, zero);
+    for [node, weight] in NODES {
+        let t = half.mul_add(of(node), middle);
+        let mine = (one - t * t).max(zero).sqrt();
+        let passes = by.mul_add(t, zero - at);
+        let yours = (root_square - passes * passes).max(zero).sqrt() * per_square;
+        let (center, strip) = (start - slope * t, strip_start - strip_slope * t);
+        let from = (zero - mine).max(center - yours).max(strip - reach);
+        let to = mine.min(center + yours).min(strip + reach);
+        sum = (to - from).max(zero).mul_add(of(weight), sum);
+    }
+    (half * sum * of(1.0 / PI)).min(one)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use splat_core::glam::Vec3;
     use splat_core::rng;
+    use std::f64::consts::PI;
 
     fn circle(center: Vec3, normal: Vec3, radius: f32) -> Surfel {
         Surfel { center, reach: radius, normal: normal.normalize(), across: radius, ..Surfel::default() }
+    }
+
+    fn covered_share(disc: &Surfel, other: &Surfel, epsilon: f64) -> f64 {
+        let mut pairs = Pairs::default();
+        pairs.set(0, [disc, other], [&Plane::new(disc), &Plane::new(other)]);
+        let gap = (epsilon / epsilon_of(disc, other, 1.0)) as f32;
+        f64::from(pulp::Arch::new().dispatch(Covered { pairs: &pairs, gap })[0][0])
     }
 
     /// Area that two circles of one plane share.

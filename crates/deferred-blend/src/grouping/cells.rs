@@ -45,9 +45,11 @@ pub(crate) struct Cells {
 /// Sorts discs by levels and cells, and within a cell leaves them in the order that they come in. Partners are found that lie
 /// within `factor` times the sum of their reaches.
 pub(crate) fn sort(surfels: &[Surfel], factor: f64) -> (Vec<Surfel>, Cells) {
-    let largest = surfels.iter().map(|s| s.reach).fold(0.0, f32::max);
-    let low = surfels.iter().fold(Vec3::MAX, |low, s| low.min(s.center));
-    let high = surfels.iter().fold(Vec3::MIN, |high, s| high.max(s.center));
+    let (largest, low, high) = surfels
+        .par_iter()
+        .with_min_len(CHUNK)
+        .map(|s| (s.reach, s.center, s.center))
+        .reduce(|| (0.0, Vec3::MAX, Vec3::MIN), |a, b| (a.0.max(b.0), a.1.min(b.1), a.2.max(b.2)));
     let mut cells = Cells { least: low.as_dvec3(), levels: Vec::new() };
     let extent = (high.as_dvec3() - cells.least).max_element();
     let mut members: Vec<Vec<u32>> = vec![Vec::new(); MOST_LEVELS];
@@ -64,7 +66,7 @@ pub(crate) fn sort(surfels: &[Surfel], factor: f64) -> (Vec<Surfel>, Cells) {
         let mut keyed: Vec<(u64, u32)> = keyed.collect();
         keyed.par_sort_unstable();
         let first = sorted.len();
-        sorted.extend(keyed.iter().map(|&(_, i)| surfels[i as usize]));
+        sorted.par_extend(keyed.par_iter().with_min_len(CHUNK).map(|&(_, i)| surfels[i as usize]));
         let mut level = Level { width, nodes: first..sorted.len(), ..Level::default() };
         for (node, &(key, _)) in (first as u32..).zip(&keyed) {
             if level.keys.last() != Some(&key) {

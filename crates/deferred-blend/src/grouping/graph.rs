@@ -1,7 +1,7 @@
 //! The overlap graph: nodes are discs, edges join those that overlap (Eq. 5), less what may share a group all the same.
 
 use super::cells::{self, Cells, Finder};
-use super::surfels::{self, CHUNK, Surfel};
+use super::surfels::{self, CHUNK, MORE, Surfel};
 use super::{Groups, check_cancelled};
 use crate::Error;
 use rayon::prelude::*;
@@ -121,28 +121,13 @@ impl OverlapGraph {
         search: &Search<'_>,
         is_edge: impl Fn(&Surfel, &Surfel) -> bool + Sync,
     ) -> Result<Self, Error> {
-        Self::of_some(surfels, search, |_| true, is_edge)
-    }
-
-    /// The same, with lists for those discs only that are wanted. Discs of mixed sizes have lists all the same, for larger ones learn
-    /// of smaller ones from theirs.
-    pub(crate) fn of_some(
-        surfels: &[Surfel],
-        search: &Search<'_>,
-        is_wanted: impl Fn(&Surfel) -> bool + Sync,
-        is_edge: impl Fn(&Surfel, &Surfel) -> bool + Sync,
-    ) -> Result<Self, Error> {
         let (surfels, cells) = cells::sort(surfels, search.factor);
-        let one_level = cells.levels() == 1;
-        let is_wanted = |surfel: &Surfel| !one_level || is_wanted(surfel);
         let found = AtomicU64::new(0);
-        let nodes: Vec<Range<usize>> =
-            (0..surfels.len()).step_by(CHUNK).map(|from| from..(from + CHUNK).min(surfels.len())).collect();
-        let parts: Vec<Part> = nodes
+        let parts: Vec<Part> = chunks(surfels.len())
             .into_par_iter()
             .map(|nodes| {
                 let mut part = Part::new(nodes.len());
-                part.find(&surfels, &cells, nodes, (&is_wanted, &is_edge), &|n| search.count(&found, n))?;
+                part.find((&surfels, &cells, search), nodes, &is_edge, &found)?;
                 Ok(part)
             })
             .collect::<Result<_, _>>()?;
@@ -371,50 +356,63 @@ impl Part {
 
     fn find(
         &mut self,
-        surfels: &[Surfel],
-        cells: &Cells,
+        (surfels, cells, search): (&[Surfel], &Cells, &Search<'_>),
         nodes: Range<usize>,
-        (is_wanted, is_edge): (&impl Fn(&Surfel) -> bool, &impl Fn(&Surfel, &Surfel) -> bool),
-        count: &impl Fn(u64) -> Result<(), Error>,
+        is_edge: &impl Fn(&Surfel, &Surfel) -> bool,
+        found: &AtomicU64,
     ) -> Result<(), Error> {
-        let mut finder = Finder::new(cells);
+        let (mut finder, mut near, factor) = (Finder::new(cells), Vec::new(), search.factor as f32 * MORE);
         let mut counted = 0;
         for node in nodes {
             let (surfel, before) = (&surfels[node], self.neighbors.len());
-            if is_wanted(surfel) {
-                finder.runs(surfel.center, node, |run| {
-                    for (other, candidate) in run.clone().zip(&surfels[run]) {
-                        // In one order, so that both discs come to the same result.
-                        let (a, b) = if other < node { (candidate, surfel) } else { (surfel, candidate) };
-                        if other != node && is_edge(a, b) {
-                            self.neighbors.push(other as u32);
-                        }
-                    }
-                });
-            }
+            near.clear();
+            finder.runs(surfel.center, node, |run| {
+                let discs = (run.start as u32..run.end as u32).zip(&surfels[run]);
+                surfel.add_near(discs.map(|(n, disc)| (n, disc.center, disc.reach)), factor, &mut near);
+            });
+            let edges = near.iter().filter(|&&other| {
+                let candidate = &surfels[other as usize];
+                // In one order, so that both discs come to the same result.
+                let (a, b) = if (other as usize) < node { (candidate, surfel) } else { (surfel, candidate) };
+                other as usize != node && is_edge(a, b)
+            });
+            self.neighbors.extend(edges);
             self.sizes.push((self.neighbors.len() - before) as u32);
             // Seldom, for all tasks count together; but before one task alone takes much memory.
             if self.neighbors.len() - counted >= COUNTED {
-                count((self.neighbors.len() - counted) as u64)?;
+                search.count(found, (self.neighbors.len() - counted) as u64)?;
                 counted = self.neighbors.len();
             }
         }
-        count((self.neighbors.len() - counted) as u64)
+        search.count(found, (self.neighbors.len() - counted) as u64)
     }
 }
 
-/// The rows of all parts, one after the other; each part is freed when it is copied.
+/// The rows of all parts, one after the other.
 fn join(parts: Vec<Part>, nodes: usize) -> (Vec<u32>, Vec<u32>) {
-    let entries = parts.iter().map(|part| part.neighbors.len()).sum();
-    let (mut starts, mut neighbors) = (Vec::with_capacity(nodes + 1), Vec::with_capacity(entries));
-    let mut end = 0;
+    let (mut starts, mut end) = (Vec::with_capacity(nodes + 1), 0);
     starts.push(0);
-    for part in parts {
-        starts.extend(part.sizes.iter().map(|size| {
-            end += size;
-            end
-        }));
-        neighbors.extend_from_slice(&part.neighbors);
+    for size in parts.iter().flat_map(|part| &part.sizes) {
+        end += size;
+        starts.push(end);
     }
+    let mut neighbors = vec![0; end as usize];
+    let places = cut(&mut neighbors, parts.iter().map(|part| part.neighbors.len()));
+    parts.into_par_iter().zip(places).for_each(|(part, place)| place.copy_from_slice(&part.neighbors));
     (starts, neighbors)
+}
+
+/// Consecutive nodes for a task each.
+pub(crate) fn chunks(nodes: usize) -> Vec<Range<usize>> {
+    (0..nodes).step_by(CHUNK).map(|from| from..(from + CHUNK).min(nodes)).collect()
+}
+
+/// Consecutive parts of a slice.
+pub(crate) fn cut<T>(mut rest: &mut [T], lengths: impl Iterator<Item = usize>) -> Vec<&mut [T]> {
+    let next = |length| {
+        let (part, after) = std::mem::take(&mut rest).split_at_mut(length);
+        rest = after;
+        part
+    };
+    lengths.map(next).collect()
 }

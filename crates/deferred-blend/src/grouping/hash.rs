@@ -7,11 +7,13 @@
 //! Deviations: the mean normal is that of 256 discs that follow one another in canonical order, in place of the leaf of a BSP tree,
 //! which is not needed for anything else here. (x, y) is rounded down, not towards 0, which would make the cells around the origin
 //! twice as wide. Two surfaces behind one another have the same (x, y); so the tags of Collisions have the third coordinate too, in steps
-//! of four radii, and tags lie in a table of bits of which a few are shared: that only lets a disc choose its group that need not.
+//! of four radii, and tags lie in a table of bits of which a few are shared: that only lets a disc choose its group that need not. Collisions are
+//! looked for among 8,192 discs that follow one another in canonical order, and lie together: these stay in the nearer caches, no
+//! thread waits for another, and no list is kept; a disc at the border does not know those beyond.
 
-use super::graph::{OverlapGraph, Search};
-use super::surfels::{self, CHUNK, Surfel};
-use super::{Groups, check_count};
+use super::lattice::Lattice;
+use super::surfels::{self, Surfel};
+use super::{Groups, check_cancelled, check_count};
 use crate::Error;
 use rayon::prelude::*;
 use splat_core::glam::DVec3;
@@ -20,8 +22,11 @@ use splat_core::{Cloud, Progress, rng};
 /// Discs that share a mean normal.
 const LEAF: usize = 256;
 
-/// Bits of the table of tags, a disc.
-const BITS_PER_DISC: usize = 16;
+/// Discs among which collisions are looked for, a multiple of [`LEAF`].
+const PART: usize = 32 * LEAF;
+
+/// Bits of the table of tags of a part.
+const TAGS: usize = 16 * PART;
 
 /// Radii a step of the third coordinate of a tag.
 const STEP: f64 = 4.0;
@@ -52,13 +57,11 @@ pub struct HashParams {
     pub disc_scale: f32,
     /// What is done with collisions.
     pub collisions: Collisions,
-    /// Most bytes of the lists of discs that overlap one that chooses its group.
-    pub max_bytes: u64,
 }
 
 impl Default for HashParams {
     fn default() -> Self {
-        Self { groups: 8, disc_scale: 1.0, collisions: Collisions::default(), max_bytes: 1 << 32 }
+        Self { groups: 8, disc_scale: 1.0, collisions: Collisions::default() }
     }
 }
 
@@ -79,33 +82,26 @@ impl HashParams {
 /// Parts discs into K groups by their places.
 ///
 /// # Errors
-/// [`Error::Parameter`] and [`Error::Cloud`] for bad input, pieces of a medium among it; [`Error::Limit`] where the discs that
-/// collide overlap more others than fit into the memory that there may be; [`Error::Cancelled`].
+/// [`Error::Parameter`] and [`Error::Cloud`] for bad input, pieces of a medium among it; [`Error::Cancelled`].
 pub fn hash_grouping(cloud: &Cloud, params: &HashParams, progress: Option<&Progress>) -> Result<Groups, Error> {
     params.check()?;
-    let surfels = surfels::read(cloud, params.disc_scale)?;
-    let cells = cells(&surfels);
-    let multiplier = multiplier(params.groups);
-    let of = |cell: &Cell| cell.group(multiplier, params.groups);
-    let groups: Vec<u8> = cells.par_iter().with_min_len(CHUNK).map(of).collect();
-    let is_near = |surfel: &Surfel| match params.collisions {
-        Collisions::Keep => false,
-        Collisions::Resolve => true,
-        Collisions::ResolveNear { eye, distance } => {
-            surfel.center.as_dvec3().distance_squared(eye - cloud.origin) <= distance * distance
-        }
-    };
-    let chooses = match params.collisions {
-        Collisions::Keep => Vec::new(),
-        _ => collisions(&surfels, &cells, is_near),
-    };
-    let mut by_place = vec![0; groups.len()];
-    surfels.iter().zip(&groups).for_each(|(surfel, &group)| by_place[surfel.place as usize] = group);
-    let mut groups = Groups::of_each(params.groups, by_place);
-    if chooses.contains(&true) {
-        resolve(&surfels, &chooses, params, progress, &mut groups)?;
-    }
-    Ok(groups)
+    let order = surfels::order(cloud, params.disc_scale)?;
+    let mut sorted = vec![0; order.len()];
+    let table = Table { cloud, params, multiplier: multiplier(params.groups) };
+    order.par_chunks(PART).zip(sorted.par_chunks_mut(PART)).try_for_each_init(
+        Part::default,
+        |part, (places, groups)| {
+            check_cancelled(progress)?;
+            part.hash(&table, places, groups);
+            if part.waits.contains(&true) {
+                part.resolve(params.groups, groups);
+            }
+            Ok(())
+        },
+    )?;
+    let mut by_place = vec![0; order.len()];
+    order.iter().zip(&sorted).for_each(|(&place, &group)| by_place[place as usize] = group);
+    Ok(Groups::of_each(params.groups, by_place))
 }
 
 /// A disc's cell: Eq. 9, and a third coordinate along the normal.
@@ -137,21 +133,11 @@ impl Cell {
         ((multiplier * x + y) % groups) as u8
     }
 
-    /// Bit of the tag with one of both steps, in a table of a power of two.
-    fn tag(&self, step: i64, bits: usize) -> usize {
+    /// Its tags with both steps.
+    fn tags(&self) -> [usize; 2] {
         let [x, y] = self.across.map(|v| v as u64);
-        rng::bits(x, y, step as u64, self.along as u64) as usize & (bits - 1)
+        self.steps.map(|step| rng::bits(x, y, step as u64, self.along as u64) as usize % TAGS)
     }
-}
-
-fn cells(surfels: &[Surfel]) -> Vec<Cell> {
-    let leaves = surfels.par_chunks(LEAF).with_min_len(CHUNK / LEAF);
-    let of_leaf = |leaf: &[Surfel]| {
-        let mean: DVec3 = leaf.iter().map(|surfel| surfel.normal.as_dvec3()).sum();
-        let along = mean.abs().max_position();
-        leaf.iter().map(|surfel| Cell::new(surfel, along)).collect::<Vec<_>>()
-    };
-    leaves.flat_map_iter(of_leaf).collect()
 }
 
 /// The multiplier of x that sets cells of one group farthest apart; the least of equals.
@@ -198,56 +184,84 @@ pub fn covering_factor(groups: u32) -> Result<f64, Error> {
     Ok(best)
 }
 
-/// For each disc whether its cell has one before it.
-fn collisions(surfels: &[Surfel], cells: &[Cell], is_near: impl Fn(&Surfel) -> bool) -> Vec<bool> {
-    let bits = (BITS_PER_DISC * surfels.len().max(4)).next_power_of_two();
-    let mut tags = vec![0u64; bits / 64];
-    let meets = |(surfel, cell): (&Surfel, &Cell)| {
-        if !is_near(surfel) {
-            return false;
-        }
-        let tagged = cell.steps.map(|step| {
-            let bit = cell.tag(step, bits);
-            tags[bit / 64] >> (bit % 64) & 1 == 1
-        });
-        let bit = cell.tag(cell.steps[0], bits);
-        tags[bit / 64] |= 1 << (bit % 64);
-        tagged.contains(&true)
-    };
-    surfels.iter().zip(cells).map(meets).collect()
+/// What discs are hashed by.
+struct Table<'a> {
+    cloud: &'a Cloud,
+    params: &'a HashParams,
+    multiplier: i64,
 }
 
-/// Lets each disc that collides take the group whose discs overlap it least, by the overlap of Table 2; one after the other.
-fn resolve(
-    surfels: &[Surfel],
-    chooses: &[bool],
-    params: &HashParams,
-    progress: Option<&Progress>,
-    groups: &mut Groups,
-) -> Result<(), Error> {
-    let mut waits = vec![false; groups.of.len()];
-    surfels.iter().zip(chooses).for_each(|(surfel, &chooses)| waits[surfel.place as usize] = chooses);
-    let search = Search { factor: 1.0, max_bytes: params.max_bytes, progress };
-    let wanted = |surfel: &Surfel| waits[surfel.place as usize];
-    let graph = OverlapGraph::of_some(surfels, &search, wanted, |a, b| a.overlaps(b, 1.0))?;
-    let mut overlap = vec![0u64; params.groups as usize];
-    for node in 0..graph.nodes() {
-        if !waits[graph.place(node)] {
-            continue;
-        }
-        overlap.fill(0);
-        for &n in graph.neighbors(node) {
-            let n = n as usize;
-            // Those that wait have no group yet.
-            if !waits[graph.place(n)] {
-                overlap[usize::from(groups.of[graph.place(n)])] += measure(graph.surfel(node), graph.surfel(n));
+impl Table<'_> {
+    fn may_wait(&self, surfel: &Surfel) -> bool {
+        match self.params.collisions {
+            Collisions::Keep => false,
+            Collisions::Resolve => true,
+            Collisions::ResolveNear { eye, distance } => {
+                surfel.center.as_dvec3().distance_squared(eye - self.cloud.origin) <= distance * distance
             }
         }
-        let least = (0..overlap.len()).min_by_key(|&group| overlap[group]).unwrap_or(0);
-        groups.of[graph.place(node)] = least as u8;
-        waits[graph.place(node)] = false;
     }
-    Ok(())
+}
+
+/// Discs that follow one another in canonical order.
+#[derive(Default)]
+struct Part {
+    surfels: Vec<Surfel>,
+    /// Whether a disc chooses its group, and has none yet.
+    waits: Vec<bool>,
+    /// Bits of tags.
+    tags: Vec<u64>,
+    lattice: Lattice,
+}
+
+impl Part {
+    /// Gives each disc the group of its cell. Those whose cell has one before them wait.
+    fn hash(&mut self, table: &Table<'_>, places: &[u32], groups: &mut [u8]) {
+        let Self { surfels, waits, tags, .. } = self;
+        surfels.clear();
+        surfels.extend(places.iter().map(|&place| Surfel::new(table.cloud, place, table.params.disc_scale)));
+        waits.clear();
+        tags.clear();
+        tags.resize(TAGS / 64, 0);
+        for (leaf, groups) in surfels.chunks(LEAF).zip(groups.chunks_mut(LEAF)) {
+            let mean: DVec3 = leaf.iter().map(|surfel| surfel.normal.as_dvec3()).sum();
+            let along = mean.abs().max_position();
+            for (surfel, group) in leaf.iter().zip(groups) {
+                let cell = Cell::new(surfel, along);
+                *group = cell.group(table.multiplier, table.params.groups);
+                let mut is_tagged = false;
+                if table.may_wait(surfel) {
+                    let [own, nearer] = cell.tags();
+                    is_tagged = (tags[own / 64] >> (own % 64) | tags[nearer / 64] >> (nearer % 64)) & 1 == 1;
+                    tags[own / 64] |= 1 << (own % 64);
+                }
+                waits.push(is_tagged);
+            }
+        }
+    }
+
+    /// Lets each disc that waits take the group whose discs overlap it least, by the overlap of Table 2; one after the other.
+    fn resolve(&mut self, count: u32, groups: &mut [u8]) {
+        let Self { surfels, waits, lattice, .. } = self;
+        lattice.fill(surfels);
+        let (mut overlap, mut near) = (vec![0u64; count as usize], Vec::new());
+        for node in 0..surfels.len() {
+            if !waits[node] {
+                continue;
+            }
+            overlap.fill(0);
+            let surfel = &surfels[node];
+            lattice.near(surfel, &mut near);
+            for n in near.iter().map(|&n| n as usize) {
+                if !waits[n] && surfel.overlaps(&surfels[n], 1.0) {
+                    overlap[usize::from(groups[n])] += measure(surfel, &surfels[n]);
+                }
+            }
+            let least = (0..overlap.len()).min_by_key(|&group| overlap[group]).unwrap_or(0);
+            groups[node] = least as u8;
+            waits[node] = false;
+        }
+    }
 }
 
 /// (2r − |p_i − p_k|)/r as a whole number, so that sums do not depend on their order.

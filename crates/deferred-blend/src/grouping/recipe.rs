@@ -82,7 +82,7 @@ impl Recipe {
                 weighted_coloring(graph, &params, progress)?
             }
             Method::Hash(collisions) => {
-                let params = HashParams { groups: self.groups, disc_scale: self.disc_scale, collisions, max_bytes };
+                let params = HashParams { groups: self.groups, disc_scale: self.disc_scale, collisions };
                 hash_grouping(cloud, &params, progress)?
             }
         };
@@ -120,7 +120,7 @@ impl Recipe {
     pub fn bytes(&self, discs: u64) -> u64 {
         let further = if self.coverage == Coverage::Duplicates { 4 + u64::from(self.groups) } else { 4 };
         match (self.method, self.coverage) {
-            (Method::Hash(Collisions::Keep), Coverage::Partial | Coverage::Bound) => discs * (BESIDE + further),
+            (Method::Hash(_), Coverage::Partial | Coverage::Bound) => discs * (BESIDE + further),
             // Half as much again for the shares of overlapped area, and a second list where a relaxed graph does not tell all.
             _ => discs * (BESIDE + further) + 2 * listed(discs),
         }

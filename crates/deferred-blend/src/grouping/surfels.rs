@@ -8,6 +8,9 @@ use splat_core::{Cloud, SplatKind};
 /// Discs read by one task.
 pub(crate) const CHUNK: usize = 4096;
 
+/// What is near in f64 is nearer than this in f32, whose differences, sums and squares are off by less.
+pub(crate) const MORE: f32 = 1.0 + 1e-6;
+
 /// Rounds of the search for the greatest contact function; each leaves 0.62 of the interval.
 const CONTACT_ROUNDS: u32 = 40;
 
@@ -30,6 +33,16 @@ pub(crate) struct Surfel {
 
 /// Reads all discs of a cloud, in canonical order, their radii times `scale`.
 pub(crate) fn read(cloud: &Cloud, scale: f32) -> Result<Vec<Surfel>, Error> {
+    Ok(gather(cloud, &order(cloud, scale)?, scale))
+}
+
+/// The discs at some places.
+pub(crate) fn gather(cloud: &Cloud, places: &[u32], scale: f32) -> Vec<Surfel> {
+    places.par_iter().with_min_len(CHUNK).map(|&place| Surfel::new(cloud, place, scale)).collect()
+}
+
+/// The canonical order of a cloud that was looked through.
+pub(crate) fn order(cloud: &Cloud, scale: f32) -> Result<Vec<u32>, Error> {
     if !(scale > 0.0 && scale <= 1.0) {
         return Err(Error::parameter("disc_scale", scale, "above 0 and at most 1"));
     }
@@ -38,29 +51,50 @@ pub(crate) fn read(cloud: &Cloud, scale: f32) -> Result<Vec<Surfel>, Error> {
         let found = splat_core::Error::invalid("splat", i, "kind", SplatKind::Medium, "a disc of a surface");
         return Err(Error::Cloud(found));
     }
-    let order = cloud.canonical_order();
-    Ok(order.par_iter().with_min_len(CHUNK).map(|&place| surfel(cloud, place, f64::from(scale))).collect())
-}
-
-fn surfel(cloud: &Cloud, place: u32, scale: f64) -> Surfel {
-    let i = place as usize;
-    let across = (f64::from(cloud.radius[i]) * scale) as f32;
-    let first = (cloud.tangent_of(i).as_dvec3() * scale).as_vec3();
-    let circle = Surfel {
-        center: cloud.position[i],
-        reach: across,
-        normal: cloud.normal_of(i),
-        place,
-        first: Vec3::ZERO,
-        across,
-    };
-    if first == Vec3::ZERO {
-        return circle;
-    }
-    Surfel { first, reach: across.max(first.as_dvec3().length() as f32), ..circle }
+    Ok(cloud.canonical_order())
 }
 
 impl Surfel {
+    /// The disc at a place of a cloud, its radii times `scale`.
+    pub(crate) fn new(cloud: &Cloud, place: u32, scale: f32) -> Self {
+        let (i, scale) = (place as usize, f64::from(scale));
+        let across = (f64::from(cloud.radius[i]) * scale) as f32;
+        let first = (cloud.tangent_of(i).as_dvec3() * scale).as_vec3();
+        let circle = Self {
+            center: cloud.position[i],
+            reach: across,
+            normal: cloud.normal_of(i),
+            place,
+            first: Vec3::ZERO,
+            across,
+        };
+        if first == Vec3::ZERO {
+            return circle;
+        }
+        Self { first, reach: across.max(first.as_dvec3().length() as f32), ..circle }
+    }
+
+    /// Adds the numbers of those discs, with their centres and reaches, to a list that may lie within a distance that is `factor` times the
+    /// sum of both reaches, [`MORE`] included: in f32, and without a branch, which would be foretold wrongly.
+    #[inline]
+    pub(crate) fn add_near(
+        &self,
+        discs: impl ExactSizeIterator<Item = (u32, Vec3, f32)>,
+        factor: f32,
+        near: &mut Vec<u32>,
+    ) {
+        let mut end = near.len();
+        near.resize(end + discs.len(), 0);
+        for (number, center, reach) in discs {
+            let reach = factor * (self.reach + reach);
+            // Squares of the least numbers lose their digits.
+            let is_near = self.center.distance_squared(center) <= (reach * reach).max(f32::MIN_POSITIVE);
+            near[end] = number;
+            end += usize::from(is_near);
+        }
+        near.truncate(end);
+    }
+
     pub(crate) fn is_circle(&self) -> bool {
         self.first == Vec3::ZERO
     }

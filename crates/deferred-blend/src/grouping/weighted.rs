@@ -15,7 +15,7 @@
 //! again and again; here it comes back when a neighbour has entered its group, so the queue runs empty: the overlapped area within
 //! groups falls with every change.
 
-use super::area::{WHOLE, covered_share, epsilon_of, mutual_shares};
+use super::area::{WHOLE, mutual_shares};
 use super::graph::{FETCHED, OverlapGraph};
 use super::surfels::CHUNK;
 use super::{Groups, check_cancelled, check_count};
@@ -90,15 +90,11 @@ pub fn weighted_coloring(
 /// If `groups` are not of the graph's cloud.
 pub fn weighted_cost(graph: &OverlapGraph, groups: &Groups, gap: f32) -> Result<f64, Error> {
     check_gap(gap)?;
-    let group = |node: usize| groups.of()[graph.place(node)];
+    let (shares, group) = (mutual_shares(graph, gap), |node: usize| groups.of()[graph.place(node)]);
     let of = |node: usize| -> f64 {
-        let later = graph.neighbors(node).iter().map(|&n| n as usize).filter(|&n| n > node && group(n) == group(node));
-        let weight = |n: usize| {
-            let (a, b) = (graph.surfel(node), graph.surfel(n));
-            let epsilon = epsilon_of(a, b, gap);
-            0.5 * (covered_share(a, b, epsilon) + covered_share(b, a, epsilon)) * bend(graph, node, n)
-        };
-        later.map(weight).sum()
+        let all = graph.neighbors(node).iter().map(|&n| n as usize).zip(&shares[graph.row(node)]);
+        let later = all.filter(|&(n, _)| n > node && group(n) == group(node));
+        later.map(|(n, &share)| f64::from(share) / WHOLE * bend(graph, node, n)).sum()
     };
     let nodes: Vec<usize> = (0..graph.nodes()).collect();
     let sums: Vec<f64> = nodes.par_chunks(CHUNK).map(|part| part.iter().map(|&node| of(node)).sum()).collect();

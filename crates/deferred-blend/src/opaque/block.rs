@@ -6,6 +6,7 @@ use crate::Params;
 use crate::disc::{Disc, Meeting};
 use crate::fragments::offsets;
 use splat_core::Footprint;
+use splat_core::glam::Vec3;
 use splat_core::raster::kernel::Kernel;
 use splat_core::raster::lanes::Lanes;
 use splat_core::raster::pulp::Simd;
@@ -190,12 +191,13 @@ impl Block {
         weight
     }
 
-    /// Below 0 where a disc of some N, and normal by axis, shows another side than the nearest.
+    /// Below 0 where a disc of some N and normal shows another side than the nearest.
     #[inline(always)]
-    pub(super) fn side<S: Simd>(&self, simd: S, lane: usize, facing: Lanes<S>, [x, y, z]: [Lanes<S>; 3]) -> Lanes<S> {
+    pub(super) fn side<S: Simd>(&self, simd: S, lane: usize, facing: Lanes<S>, normal: Vec3) -> Lanes<S> {
+        let of = |v: f32| Lanes::splat(simd, v);
         let front = |axis: usize| Lanes::load(simd, &self.front[axis].0[lane..]);
         let (a, b, c) = (front(0), front(1), front(2));
-        facing * x.mul_add(a, y.mul_add(b, z * c))
+        facing * of(normal.x).mul_add(a, of(normal.y).mul_add(b, of(normal.z) * c))
     }
 
     /// Adds the values of one disc.

@@ -90,11 +90,16 @@ pub(super) fn keep<S: Simd>(
     images.met = Default::default();
     for &i in list {
         let disc = &discs.discs[i as usize];
-        let image = images.of(groups.of()[discs.ids[i as usize] as usize]);
         for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
             let hit = rules.hit(simd, disc, block.first(), lane);
             block.hide(simd, lane, &hit, (rules, i));
             let Hit { depth, limit, distance_sq, .. } = hit;
+            // What is hidden already is never seen; by Eq. 14 it takes the place of what is, in whatever order both come.
+            let beyond = if rules.floor.is_some() { of(f32::INFINITY) } else { block.limit(simd, lane) };
+            if !depth.any_less(beyond) {
+                continue;
+            }
+            let image = images.of(groups.of()[discs.ids[i as usize] as usize]);
             let behind = match rules.floor {
                 Some(floor) => behind(simd, image, lane, [floored(simd, floor, depth), distance_sq]),
                 None => depth - Lanes::load(simd, &image.depth.0[lane..]),
@@ -141,32 +146,21 @@ fn floored<S: Simd>(simd: S, [near, per_depth]: [f32; 2], depth: Lanes<S>) -> La
 pub(super) fn composite<S: Simd>(simd: S, input: &Averaged<'_>, images: &GroupImages, block: &mut Block) {
     block.begin_sums(input);
     images.for_each(|image| {
-        let (mut weights, normals) = ([0.0; PIXELS], normals(input, image));
+        let mut weights = [0.0; PIXELS];
         for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
-            let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
-            let depth = at(&image.depth);
-            if depth.any_less(block.limit(simd, lane)) {
-                let normal = [at(&normals[0]), at(&normals[1]), at(&normals[2])];
-                let side = block.side(simd, lane, at(&image.facing), normal);
-                let weight = block.weigh(simd, lane, [depth, at(&image.limit), side], at(&image.weight));
-                weight.store(&mut weights[lane..]);
-            }
+            let (depth, weight) =
+                (Lanes::load(simd, &image.depth.0[lane..]), Lanes::load(simd, &image.weight.0[lane..]));
+            weight.where_less(depth, block.limit(simd, lane)).store(&mut weights[lane..]);
         }
         for_each_disc(&image.disc, weights, |disc, own| {
+            let normal = input.discs.normals[disc.to_bits() as usize];
             for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
-                block.add(simd, lane, Lanes::load(simd, &own[lane..]), values_of(input, disc));
+                let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
+                let side = block.side(simd, lane, at(&image.facing), normal);
+                let bounds = [at(&image.depth), at(&image.limit), side];
+                let weight = block.weigh(simd, lane, bounds, Lanes::load(simd, &own[lane..]));
+                block.add(simd, lane, weight, values_of(input, disc));
             }
         });
     });
-}
-
-/// Of the discs that a group shows, by axis.
-#[inline(always)]
-fn normals(input: &Averaged<'_>, image: &GroupImage) -> [Line; 3] {
-    let mut normals = [line(0.0); 3];
-    for k in (0..PIXELS).filter(|&k| image.depth.0[k] < f32::INFINITY) {
-        let normal = input.discs.normals[image.disc.0[k].to_bits() as usize].to_array();
-        normals.iter_mut().zip(normal).for_each(|(line, n)| line.0[k] = n);
-    }
-    normals
 }

@@ -28,10 +28,7 @@ pub(super) fn sum<S: Simd>(simd: S, list: &[u32], input: &Averaged<'_>, rules: &
             let hit = rules.hit(simd, &discs.discs[i as usize], block.first(), lane);
             if hit.depth.any_less(block.limit(simd, lane)) {
                 let kernel = &discs.kernels[discs.looks[i as usize].footprint as usize];
-                let normal = discs.normals[i as usize];
-                let [x, y, z] = [normal.x, normal.y, normal.z];
-                let normal = [Lanes::splat(simd, x), Lanes::splat(simd, y), Lanes::splat(simd, z)];
-                let side = block.side(simd, lane, hit.facing, normal);
+                let side = block.side(simd, lane, hit.facing, discs.normals[i as usize]);
                 let weight = block.weigh(simd, lane, [hit.depth, hit.limit, side], hit.weight(simd, kernel));
                 block.add(simd, lane, weight, values_of(input, f32::from_bits(i)));
             }

@@ -1,10 +1,11 @@
 //! The overlap graph beside every pair asked for in f64.
 
 use super::{ball, flat, least, medium, mixed, one_place};
+use crate::scenes::disc;
 use deferred_blend::Error;
 use deferred_blend::grouping::{Coplanar, GraphParams, OverlapGraph, Relaxation};
-use splat_core::glam::{DMat3, DVec3};
-use splat_core::{Cloud, Progress};
+use splat_core::glam::{DMat3, DVec3, Vec3};
+use splat_core::{Cloud, Progress, Splat, rng};
 
 /// Pairs of an overlap graph by places in the cloud.
 pub(super) fn edges(graph: &OverlapGraph) -> Vec<[usize; 2]> {
@@ -75,6 +76,27 @@ fn edges_are_those_of_every_pair_in_f64() {
             assert!(assert_same(&cloud, Relaxation { factor, ..Relaxation::default() }) > 0);
         }
     }
+}
+
+/// Pairs of discs that touch, but for what their places are rounded by.
+#[test]
+fn discs_that_hardly_touch_or_hardly_do_not_are_told_apart_in_f64() {
+    let (mut cloud, mut touching) = (Cloud::new(DVec3::ZERO), 0);
+    for i in 0..500u64 {
+        let u = |n| rng::unit_f32(7, 0, i, n) - 0.5;
+        let radii = [1.0 + u(0), 1.0 + u(1)];
+        let direction = Vec3::new(u(2), u(3), u(4)).normalize();
+        let first = 6.0 * Vec3::from_array([i % 8, i / 8 % 8, i / 64].map(|step| step as f32 - 4.0));
+        let second = first + direction * (radii[0] + radii[1]);
+        for (position, radius) in [first, second].into_iter().zip(radii) {
+            cloud.push(&Splat { radius, ..disc(position, Vec3::Z, 1.0, 0.5) });
+        }
+        let apart = second.as_dvec3().distance(first.as_dvec3()) / f64::from(radii[0] + radii[1]) - 1.0;
+        touching += usize::from(apart.abs() < 1e-7);
+    }
+    assert!(touching > 50, "{touching}");
+    let found = assert_same(&cloud, Relaxation::default());
+    assert!((200..1000).contains(&found), "{found}");
 }
 
 #[test]

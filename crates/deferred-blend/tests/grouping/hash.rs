@@ -91,8 +91,17 @@ fn db9_discs_at_one_place_spread_over_all_groups() {
     for group in 0..8 {
         assert_eq!(groups.of().iter().filter(|&&of| of == group).count(), 500);
     }
-    let params = HashParams { max_bytes: 1 << 16, ..HashParams::default() };
-    assert!(matches!(hash_grouping(&one_place(4000), &params, None), Err(Error::Limit(_))));
+}
+
+/// Discs at the border of those that are looked at together do not know the others: that leaves little.
+#[test]
+fn collisions_among_more_discs_than_are_looked_at_together_are_resolved() {
+    let mut cloud = lattice(80);
+    cloud.position.iter_mut().for_each(|position| *position *= 0.8);
+    let graph = OverlapGraph::build(&cloud, &GraphParams::default(), None).expect("a valid cloud");
+    let overlap = |collisions| graph.mean_overlap(&grouped(&cloud, 16, collisions));
+    let (keep, resolve) = (overlap(Collisions::Keep), overlap(Collisions::Resolve));
+    assert!(resolve < 0.1 && keep > 2.0 * resolve, "{keep} {resolve}");
 }
 
 #[test]

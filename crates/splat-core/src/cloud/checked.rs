@@ -2,6 +2,10 @@
 
 use crate::{Cloud, Error, Splat, SplatKind};
 use glam::Vec3;
+use rayon::prelude::*;
+
+/// Splats that are looked at by one task.
+const CHUNK: usize = 8192;
 
 impl Cloud {
     /// Checks every promise that the stages rely on: equal column lengths, finite values, radii > 0, K ≥ 0, unit or
@@ -14,12 +18,12 @@ impl Cloud {
         if !self.origin.is_finite() {
             return Err(Error::invalid("cloud", 0, "origin", self.origin, "finite numbers"));
         }
-        for i in 0..self.len() {
-            if let Err(Unfit { attribute, found, expected }) = self.get(i).check() {
-                return Err(Error::Invalid { element: "splat", index: i, attribute, found, expected });
-            }
-        }
-        self.check_gaussians()
+        let unfit = |index: usize| {
+            let Unfit { attribute, found, expected } = self.get(index).check().err()?;
+            Some(Error::Invalid { element: "splat", index, attribute, found, expected })
+        };
+        let first = (0..self.len()).into_par_iter().with_min_len(CHUNK).find_map_first(unfit);
+        first.map_or_else(|| self.check_gaussians(), Err)
     }
 }
 
