@@ -1,5 +1,6 @@
 //! Scene files that are wrong: every one is refused with its place, a reason and exit code 3, and none panics.
 
+mod footprints;
 mod points;
 
 use organza::Error;

@@ -18,6 +18,7 @@ mod every_scene;
 mod exact_particles;
 mod eye_inside;
 mod first_scene;
+mod footprints;
 mod gaussians;
 mod half_vector;
 mod interrupts;

@@ -1,6 +1,8 @@
 //! `cargo xtask assets`: what lies under `assets/`, and where the larger inputs of the benchmarks come from.
 
 mod lines;
+mod meadow;
+mod png;
 mod sky;
 mod solids;
 
@@ -55,11 +57,15 @@ pub(crate) fn write_solids(repo: &Repo) -> Outcome {
     Ok(said.join("\n"))
 }
 
-/// Writes the points that are made by formula.
+/// Writes the points that are made by formula, and the pictures that they show.
 pub(crate) fn write_points(repo: &Repo) -> Outcome {
-    let (path, text) = (repo.root.join("assets/points/lines.csv"), lines::csv());
-    std::fs::write(&path, &text).map_err(|e| format!("{}: {e}", path.display()))?;
-    Ok(format!("{} bytes in {}", text.len(), path.display()))
+    let mut said = Vec::new();
+    for (name, bytes) in meadow::files().into_iter().chain([("points/lines.csv", lines::csv().into_bytes())]) {
+        let path = repo.root.join("assets").join(name);
+        std::fs::write(&path, &bytes).map_err(|e| format!("{}: {e}", path.display()))?;
+        said.push(format!("{} bytes in {}", bytes.len(), path.display()));
+    }
+    Ok(said.join("\n"))
 }
 
 #[cfg(test)]

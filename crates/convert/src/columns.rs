@@ -1,5 +1,6 @@
 //! Columns of a cloud, sized once and filled in parallel.
 
+use crate::footprints::check_kind;
 use crate::{ConvertError, SplatParams};
 use bytemuck::Zeroable;
 use rayon::prelude::*;
@@ -50,6 +51,7 @@ pub(crate) fn size_columns(
     wanted: Wanted,
     params: &SplatParams,
 ) -> Result<(), ConvertError> {
+    check_kind(kind, params)?;
     params.check_cloud(n as f64, wanted)?;
     let full = |_| params.exceeded(n as f64 * wanted.bytes_per_splat() as f64, None, "bytes");
     sized(&mut cloud.position, n).map_err(full)?;

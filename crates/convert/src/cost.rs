@@ -131,7 +131,7 @@ pub fn surface<F: ScalarField + ?Sized>(
     let spacing = surface_spacing(field, bounds, params)?;
     let coarse = if params.shows() { coarse_mesh(field, bounds, spacing, &params.splat)? } else { Mesh::default() };
     // As if it were smooth.
-    let tangent = params.opacity >= 1.0 && !open_edges(&coarse).is_empty();
+    let tangent = params.splat.shows_images() || params.opacity >= 1.0 && !open_edges(&coarse).is_empty();
     let wanted = Wanted { tangent, ..mesh_points::wanted(params.opacity) };
     Ok(Prediction::new(ZERO_SET_EXCESS * area(&coarse) / (spacing * spacing), None, wanted))
 }
@@ -214,7 +214,7 @@ pub fn rectangle(rectangle: &Rectangle, opacity: f64, params: &SplatParams) -> R
     params.check()?;
     params.check_spacing(spacing * params.transform.scale)?;
     let splats = rectangle_counts(u, v, spacing).iter().product();
-    let wanted = rectangle_columns(opacity);
+    let wanted = rectangle_columns(opacity, params);
     params.check_cloud(splats, wanted)?;
     Ok(Prediction::exact(splats, wanted))
 }

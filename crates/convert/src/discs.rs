@@ -1,7 +1,7 @@
 //! How large the discs of points are, and along which way: by one size for all, as their file says, or as their neighbours lie.
 
 use crate::places::Place;
-use crate::point_attributes::{RADIUS, TANGENT};
+use crate::point_attributes::{FOOTPRINT, RADIUS, TANGENT};
 use crate::{RawPoints, SurfelParams};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Camera, Footprint};
@@ -115,7 +115,12 @@ fn in_plane(vector: DVec3, normal: Vec3) -> DVec3 {
 }
 
 /// What surfels make no use of in the columns that their points have, one sentence without a full stop each.
-pub(crate) fn unused_by_discs(points: &RawPoints, has_size: bool, shape: DiscShape) -> Vec<String> {
+pub(crate) fn unused_by_discs(
+    points: &RawPoints,
+    has_size: bool,
+    shape: DiscShape,
+    has_footprint: bool,
+) -> Vec<String> {
     let has = |name: &str| points.own_column(name).is_some();
     let mut said = Vec::new();
     let (radius, missing) = (has(RADIUS), TANGENT.into_iter().find(|name| !has(name)));
@@ -127,6 +132,9 @@ pub(crate) fn unused_by_discs(points: &RawPoints, has_size: bool, shape: DiscSha
     }
     if radius && has_size {
         said.push(format!("`{RADIUS}` is not used beside `point_size`"));
+    }
+    if has(FOOTPRINT) && has_footprint {
+        said.push(format!("`{FOOTPRINT}` of the file is not used: the object has one"));
     }
     if (radius || tangent.is_some() && missing.is_none()) && shape == DiscShape::Elliptical {
         said.push("discs have the sizes of the file, and not those of their cells".to_owned());

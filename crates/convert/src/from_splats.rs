@@ -48,6 +48,10 @@ pub(crate) fn to_cloud(points: &RawPoints, params: &SurfelParams) -> Result<Clou
 
 /// Refuses splats whose radii are of another kernel than that of the object.
 fn check_footprints(points: &RawPoints, params: &SurfelParams) -> Result<(), ConvertError> {
+    if params.splat.shows_images() {
+        let expected = "a formula: splats of a file are of one";
+        return Err(params.splat.bad_text("footprint", "an image".to_owned(), expected));
+    }
     let (cutoffs, own) = (&points.ready.cutoffs, params.splat.profile.cutoff);
     let cutoff = |footprint: &u8| cutoffs.get(usize::from(*footprint)).copied().unwrap_or_default();
     match points.ready.cloud.footprint.iter().map(cutoff).find(|cutoff| *cutoff != own) {

@@ -44,6 +44,7 @@ mod error;
 mod expression;
 mod extremes;
 mod field_points;
+mod footprints;
 #[cfg(feature = "surfels")]
 mod from_splats;
 #[cfg(feature = "surfels")]
@@ -121,6 +122,7 @@ pub use field_points::{
     DensityParams, density_to_grid, density_to_points, extinction_as_it_is, field_to_grid, field_to_mesh,
     surface_to_mesh, surface_to_points,
 };
+pub use footprints::FootprintChoice;
 pub use grid_field::{GridField, Inside, Interpolation};
 pub use keep_points::{Kept, Within, kept};
 #[cfg(feature = "lids")]

@@ -11,7 +11,7 @@
 use crate::columns::{self, CHUNK, Wanted};
 use crate::params::SplatParams;
 use crate::point_attributes::{
-    EXTINCTION, MASS, RADIUS, SHADOW_COEFFICIENT, SMOOTHING_LENGTH, TANGENT, attribute, expected,
+    EXTINCTION, FOOTPRINT, MASS, RADIUS, SHADOW_COEFFICIENT, SMOOTHING_LENGTH, TANGENT, attribute, expected,
 };
 use crate::point_cells::{cells_of, cut_outliers};
 use crate::surfels::{canonical_order, distinct_places};
@@ -204,7 +204,14 @@ pub(crate) fn unused_by_matter(points: &RawPoints) -> Vec<String> {
     let length = || format!("a medium does not use `{SMOOTHING_LENGTH}` beside `{RADIUS}`");
     let tangent = TANGENT.into_iter().find(|name| has(name));
     let tangent = tangent.map(|name| format!("a medium does not use `{name}`: its kernels are balls"));
-    opacity.into_iter().chain((has(RADIUS) && has(SMOOTHING_LENGTH)).then(length)).chain(tangent).collect()
+    let footprint = || format!("a medium does not use `{FOOTPRINT}`: it has that of its object");
+    let footprint = has(FOOTPRINT).then(footprint);
+    opacity
+        .into_iter()
+        .chain((has(RADIUS) && has(SMOOTHING_LENGTH)).then(length))
+        .chain(tangent)
+        .chain(footprint)
+        .collect()
 }
 
 /// How many splats a conversion makes.

@@ -11,6 +11,7 @@ use crate::ConvertError;
 use crate::borders::{Borders, open_edges};
 use crate::columns::{self, Wanted};
 use crate::counted::counted;
+use crate::footprints::choose_by_place;
 use crate::params::{Density, SplatParams};
 use crate::pieces::Pieces;
 use crate::subdivide::{self, Measure};
@@ -141,9 +142,10 @@ pub fn mesh_to_points_into(
         if plan.wanted.crossing_depth {
             cloud.crossing_depth.fill(optics::optical_depth(params.opacity) as f32);
         }
-        if plan.wanted.tangent {
+        if !plan.borders.is_empty() {
             Borders::new(plan.borders.iter().map(|edge| pieces.place(edge))).clip(cloud);
         }
+        choose_by_place(cloud, p)?;
     }
     Ok(report)
 }
@@ -190,8 +192,10 @@ pub(crate) fn plan(mesh: &Mesh, params: &MeshParams) -> Result<Plan, ConvertErro
     report.splats = starts.last().copied().unwrap_or(0);
     report.normals_computed = mesh.normal.is_empty();
     let normal = if report.normals_computed { vertex_normals(mesh) } else { mesh.normal.clone() };
-    let borders = if params.opacity < 1.0 { Vec::new() } else { open_edges(mesh) };
-    let wanted = Wanted { tangent: !borders.is_empty(), ..wanted(params.opacity) };
+    // A disc ends where its image does.
+    let ends = params.opacity >= 1.0 && !p.shows_images();
+    let borders = if ends { open_edges(mesh) } else { Vec::new() };
+    let wanted = Wanted { tangent: !borders.is_empty() || p.shows_images(), ..wanted(params.opacity) };
     let mut plan = Plan { measures, starts, normal, borders, wanted, report };
     let triangles = (0..mesh.triangles.len()).into_par_iter().with_min_len(4096);
     plan.wanted.shading_normal = triangles.any(|i| plan.is_flat(mesh, i, plane(mesh, i)));

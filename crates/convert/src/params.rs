@@ -2,10 +2,9 @@
 
 #[cfg(feature = "cache")]
 use crate::Cache;
-use crate::ConvertError;
 use crate::columns::Wanted;
+use crate::{ConvertError, FootprintChoice};
 use splat_core::{Exceeded, Footprint, Limits, Similarity};
-#[cfg(feature = "cache")]
 use std::sync::Arc;
 
 /// Smallest and largest splat spacing, world units: areas must stay normal f32 numbers.
@@ -24,6 +23,8 @@ pub struct SplatParams {
     pub footprint: u8,
     /// The profile that `footprint` stands for; it gives the ratio of cutoff radius to spacing.
     pub profile: Footprint,
+    /// Which footprint each disc has, and how images lie; `None` for `footprint`, a formula.
+    pub footprints: Option<Arc<FootprintChoice>>,
     /// Object space → world space, applied in f64.
     pub transform: Similarity,
     /// Linear Rec.709 colour, each channel ≥ 0, where the input has none.
@@ -46,6 +47,7 @@ impl Default for SplatParams {
             material: 0,
             footprint: 0,
             profile: Footprint::default(),
+            footprints: None,
             transform: Similarity::default(),
             color: [1.0; 3],
             limits: Limits::default(),
@@ -93,6 +95,11 @@ impl SplatParams {
             return Ok(spacing);
         }
         Err(self.bad("spacing", spacing, "a number from 1e-15 to 1e15 world units"))
+    }
+
+    /// Whether some of its discs have an image as their footprint.
+    pub(crate) fn shows_images(&self) -> bool {
+        self.footprints.as_ref().is_some_and(|choice| choice.has_images(false))
     }
 
     /// A parameter error of this object.

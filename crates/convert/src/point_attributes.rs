@@ -14,8 +14,11 @@ pub(crate) const TANGENT: [&str; 3] = ["tx", "ty", "tz"];
 /// Share of a shadow that a point receives.
 pub(crate) const SHADOW_COEFFICIENT: &str = "shadow_coefficient";
 
+/// The footprint of a disc, by its place in the scene's list.
+pub(crate) const FOOTPRINT: &str = "footprint";
+
 /// The columns of discs; those of points that are a medium are all.
-const OF_DISCS: [&str; 5] = [RADIUS, TANGENT[0], TANGENT[1], TANGENT[2], SHADOW_COEFFICIENT];
+const OF_DISCS: [&str; 6] = [RADIUS, TANGENT[0], TANGENT[1], TANGENT[2], SHADOW_COEFFICIENT, FOOTPRINT];
 const OF_MATTER: [&str; 3] = [SMOOTHING_LENGTH, EXTINCTION, MASS];
 
 /// The name, where it is that of an attribute: of discs, or of matter too.
@@ -29,6 +32,9 @@ pub(crate) fn expected(column: &str, number: f64) -> Option<&'static str> {
     match column {
         EXTINCTION | MASS if !(number.is_finite() && number >= 0.0) => Some("a finite number from 0 on"),
         RADIUS | SMOOTHING_LENGTH if !(number.is_finite() && number > 0.0) => Some("a finite length above 0"),
+        FOOTPRINT if !((0.0..=255.0).contains(&number) && number.fract() == 0.0) => {
+            Some("a whole number from 0 to 255")
+        }
         SHADOW_COEFFICIENT if !(0.0..=1.0).contains(&number) => Some("a share from 0 to 1"),
         _ if TANGENT.contains(&column) && !number.is_finite() => Some("a finite number"),
         _ => None,

@@ -158,6 +158,9 @@ pub struct ReadParams {
     pub ranges: bool,
     /// Whether the samples of a PNG are numbers, from 0 to 1 as they are stored, and no colours of a display.
     pub is_data: bool,
+    /// Whether an image says how much of each place something covers, which all three channels then hold: the alpha of a PNG or OpenEXR, or
+    /// where it has none how bright it is, the samples of a PNG as numbers.
+    pub is_coverage: bool,
 }
 
 impl Default for ReadParams {
@@ -174,6 +177,7 @@ impl Default for ReadParams {
             matter: false,
             ranges: false,
             is_data: false,
+            is_coverage: false,
         }
     }
 }

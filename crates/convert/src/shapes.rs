@@ -5,6 +5,7 @@
 
 use crate::borders::Borders;
 use crate::columns::Wanted;
+use crate::footprints::choose_by_place;
 use crate::{ConvertError, SplatParams, mesh_points};
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::{Cloud, DAabb, Grid, Splat, SplatKind, optics};
@@ -106,7 +107,7 @@ pub fn rectangle(rectangle: &Rectangle, opacity: f64, params: &SplatParams) -> R
         return Err(params.bad("opacity", opacity, "a number in [0, 1]"));
     }
     let [nu, nv] = rectangle_counts(u, v, spacing);
-    params.check_cloud(nu * nv, rectangle_columns(opacity))?;
+    params.check_cloud(nu * nv, rectangle_columns(opacity, params))?;
     let area = 4.0 * normal.length() * scale * scale / (nu * nv);
     let step = (2.0 * u.length() / nu).max(2.0 * v.length() / nv) * scale;
     let splat = Splat {
@@ -126,10 +127,11 @@ pub fn rectangle(rectangle: &Rectangle, opacity: f64, params: &SplatParams) -> R
             cloud.push(&Splat { position: offset.as_vec3(), ..splat });
         }
     }
-    if splat.kind == SplatKind::Opaque {
+    if splat.kind == SplatKind::Opaque && !params.shows_images() {
         let corners = [u + v, v - u, -u - v, u - v].map(|c| params.transform.rotate(c * scale).as_vec3());
         Borders::new((0..4).map(|i| [corners[i], corners[(i + 1) % 4]])).clip(&mut cloud);
     }
+    choose_by_place(&mut cloud, params)?;
     Ok(cloud)
 }
 
@@ -139,8 +141,8 @@ pub(crate) fn rectangle_counts(u: DVec3, v: DVec3, spacing: f64) -> [f64; 2] {
 }
 
 /// Columns of a parallelogram's cloud.
-pub(crate) fn rectangle_columns(opacity: f64) -> Wanted {
-    Wanted { tangent: opacity >= 1.0, ..mesh_points::wanted(opacity) }
+pub(crate) fn rectangle_columns(opacity: f64, params: &SplatParams) -> Wanted {
+    Wanted { tangent: opacity >= 1.0 || params.shows_images(), ..mesh_points::wanted(opacity) }
 }
 
 fn template(params: &SplatParams) -> Splat {

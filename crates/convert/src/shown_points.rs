@@ -64,7 +64,10 @@ pub fn shown_points(
     let mut scale = None;
     let mut said = match shown.as_matter {
         true => unused_by_matter(&points),
-        false => unused_by_discs(&points, shown.has_size, shown.shape),
+        false => {
+            let has_footprint = splat.footprints.as_ref().is_some_and(|choice| !choice.by_column);
+            unused_by_discs(&points, shown.has_size, shown.shape, has_footprint)
+        }
     };
     if !points.ready.cloud.is_empty() {
         check_ready(shown, splat)?;

@@ -18,12 +18,13 @@ use crate::cache::Key;
 use crate::columns::{self, CHUNK, Wanted};
 use crate::convert_error::check_cancelled;
 use crate::discs::{DiscShape, DiscSize, Discs};
+use crate::footprints::choose_footprints;
 use crate::matter::check_columns;
 use crate::neighbours::MAX_NEIGHBOURS;
 use crate::orient::{self, Orientation};
 use crate::params::SplatParams;
 use crate::places::{Place, places};
-use crate::point_attributes::SHADOW_COEFFICIENT;
+use crate::point_attributes::{FOOTPRINT, SHADOW_COEFFICIENT};
 use crate::{Column, ConvertError, RawPoints, from_splats, gaussian_points};
 use rayon::prelude::*;
 use splat_core::{
@@ -342,12 +343,18 @@ pub(crate) fn wanted(points: &RawPoints, params: &SurfelParams) -> Wanted {
     }
     Wanted {
         normal: true,
-        tangent: Discs::new(points, params).are_elliptical(),
+        tangent: Discs::new(points, params).are_elliptical() || shows_images(points, params),
         shadow_coefficient: points.own_column(SHADOW_COEFFICIENT).is_some(),
         value: params.values && !points.value.is_empty(),
         crossing_depth: !is_opaque(points, params),
         ..Wanted::default()
     }
+}
+
+/// Whether some discs may have images as footprints, which lie along a tangent.
+fn shows_images(points: &RawPoints, params: &SurfelParams) -> bool {
+    let by_column = points.own_column(FOOTPRINT).is_some();
+    params.splat.footprints.as_ref().is_some_and(|choice| choice.has_images(by_column && choice.by_column))
 }
 
 /// Whether every disc is opaque.
@@ -410,5 +417,9 @@ fn emit(
     coefficients.for_each(|(coefficient, s)| *coefficient = shares[s.1 as usize] as f32);
     let values = cloud.value.par_iter_mut().zip(&surfels).with_min_len(CHUNK);
     values.for_each(|(v, s)| *v = points.value[s.1 as usize]);
+    let ids = points.own_column(FOOTPRINT);
+    let stated = |k: usize| ids.map_or(0.0, |ids| ids[surfels[k].1 as usize]);
+    let place = |k: usize| points.position[surfels[k].1 as usize];
+    choose_footprints(&mut cloud, &params.splat, place, ids.map(|_| &stated as _))?;
     Ok(cloud)
 }

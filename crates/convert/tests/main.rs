@@ -16,6 +16,7 @@ mod grid_fields;
 mod marching_cubes;
 mod mpu_fields;
 mod point_attributes;
+mod point_footprints;
 mod point_opacity;
 mod read_assets;
 mod read_cells;

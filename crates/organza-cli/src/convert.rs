@@ -32,6 +32,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<(), Error> {
     let (loaded, bytes) = with_bar(|progress| {
         let mut loaded = organza::load(&scene, &options, progress)?;
         refuse_gaussians(&loaded)?;
+        refuse_images(&loaded)?;
         // A power of two: no bit of a splat is lost.
         loaded.cloud.scale_world(2f64.powi(loaded.exponent));
         let bytes = splats_to_ply(&loaded.cloud, &names(&loaded), &loaded.footprints);
@@ -82,6 +83,16 @@ fn document(loaded: &Loaded, path: &Path, bytes: u64) -> Value {
         "warnings": loaded.warnings,
         "notes": loaded.notes,
     })
+}
+
+/// Files of splats have formulas as footprints.
+fn refuse_images(loaded: &Loaded) -> Result<(), Error> {
+    let Some((i, _)) = loaded.footprints.images_in(&loaded.cloud).next() else { return Ok(()) };
+    let name = shown(&loaded.objects[loaded.cloud.object[i] as usize].name);
+    let id = loaded.cloud.footprint[i];
+    let message = format!("its splats show footprint {id}, an image, which a file of splats cannot hold");
+    let hint = format!("set object.{name}.footprint to the index of a formula");
+    Err(Error::input(format!("object '{name}'"), message, hint))
 }
 
 /// Files of splats have no column for what a Gaussian is.

@@ -104,8 +104,8 @@ fn raster_counts(counts: &Counts, bytes: u64) -> RasterCounts {
 }
 
 /// Orders, projects, shades and composites splats by a device; the accumulator changes only when all is done. `None` where that
-/// is the processor's: without a device, where not even few splats fit into it, where discs reach through the eye plane, each
-/// with one line said, and where splats do not fit all at once with what throws their shadows.
+/// is the processor's: without a device, where not even few splats fit into it, where discs reach through the eye plane, where footprints
+/// are images, each with one line said, and where splats do not fit all at once with what throws their shadows.
 ///
 /// # Errors
 /// [`Error::Cancelled`].
@@ -114,6 +114,10 @@ pub fn chain(
     splats: &Splats<'_>,
     accumulator: &mut Accumulator,
 ) -> Result<Option<Chained>, Error> {
+    if splats.footprints.has_images() {
+        helper.leave("splats with images as footprints are drawn by the processor");
+        return Ok(None);
+    }
     let done = helper.with(|device| match chain_on(device, splats, accumulator) {
         Err(Failure::Splats(Error::Cancelled)) => Ok(Err(Error::Cancelled)),
         done => done.map(Ok),

@@ -4,6 +4,7 @@ use super::animation::{check_animation, deforms, moves};
 use super::check_background::check_background;
 use super::check_camera::check_camera;
 use super::check_drawn::check_drawn;
+use super::check_footprint::check_footprints;
 use super::check_light::check_light;
 use super::check_material::{check_materials, unknown_material};
 use super::check_object::{Named, check_object};
@@ -16,7 +17,7 @@ use super::tree::{Document, Step};
 use super::{Aligned, RenderSettings, Scene, SceneObject};
 use crate::Error;
 use glam::DVec3;
-use splat_core::{Camera, Footprint, FootprintStack};
+use splat_core::Camera;
 use std::collections::HashMap;
 use std::ops::RangeInclusive;
 
@@ -160,10 +161,10 @@ pub(super) fn scene(
         let message = format!("`version`: expected 1, found {}", raw.version);
         return Err(at.key("version").error(message, "this version of Organza reads scenes of version 1"));
     }
-    let footprints = check_footprints(&at, raw.footprints)?;
     let paths = Paths::new(&at.key(ROOT_KEY), document.file, raw.root.as_deref(), allow_path)?;
-    let materials = check_materials(&at.key("material"), &raw.material, &paths)?;
-    let named = Named { materials: &materials, footprints: &footprints, paths: &paths };
+    let footprints = check_footprints(&at.key("footprints"), raw.footprints.as_deref(), &paths)?;
+    let materials = check_materials(&at.key("material"), &raw.material, (&paths, &footprints.stack))?;
+    let named = Named { materials: &materials, footprints: &footprints.stack, paths: &paths };
     let at_objects = at.key("object");
     let objects = check_objects(&at_objects, raw.object, raw.animation.as_ref(), &named)?;
     let mut render = check_render(&at.key("render"), &raw.render)?;
@@ -192,7 +193,8 @@ pub(super) fn scene(
         objects,
         render,
         materials,
-        footprints,
+        footprints: footprints.stack,
+        footprint_files: footprints.files,
     })
 }
 
@@ -239,17 +241,4 @@ fn check_aligned(at: &At<'_>, camera: &Camera, render: &RenderSettings) -> Resul
 
 fn at_materials<'a>(at: &At<'a>) -> At<'a> {
     At { document: at.document, path: vec![Step::Key("material")] }
-}
-
-fn check_footprints(at: &At<'_>, cutoffs: Option<Vec<f64>>) -> Result<FootprintStack, Error> {
-    let Some(cutoffs) = cutoffs else { return Ok(FootprintStack::default()) };
-    let at = at.key("footprints");
-    for (i, cutoff) in cutoffs.iter().enumerate() {
-        if !(1.0..=8.0).contains(cutoff) {
-            return Err(at.index(i).error(format!("expected a number from 1 to 8, found {cutoff}"), ""));
-        }
-    }
-    let layers = cutoffs.iter().map(|c| Footprint { cutoff: *c as f32 }).collect();
-    let found = cutoffs.len();
-    FootprintStack::new(layers).map_err(|_| at.error(format!("expected 1 to 256 footprints, found {found}"), ""))
 }

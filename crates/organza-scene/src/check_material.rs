@@ -2,12 +2,13 @@
 
 use super::SceneMaterial;
 use super::check::{At, LARGEST, SMALLEST};
+use super::check_footprint::check_footprint;
 use super::de::suggest;
 use super::paths::Paths;
 use super::raw_material::{RawBump, RawMaterial, RawShading, RawSurfaceOpacity};
 use crate::{Error, shown};
 use splat_core::optics::{SurfaceOpacity, absorption_coefficient};
-use splat_core::{Bump, Material, Shading};
+use splat_core::{Bump, FootprintStack, Material, Shading};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -15,7 +16,7 @@ use std::path::PathBuf;
 pub(super) fn check_materials<'a>(
     at: &At<'a>,
     raw: &'a BTreeMap<String, RawMaterial>,
-    paths: &Paths,
+    (paths, footprints): (&Paths, &FootprintStack),
 ) -> Result<Vec<SceneMaterial>, Error> {
     if raw.len() > usize::from(u16::MAX) {
         return Err(at.error(format!("expected at most {} materials, found {}", u16::MAX, raw.len()), ""));
@@ -27,10 +28,14 @@ pub(super) fn check_materials<'a>(
         opacity: 1.0,
         extinction: None,
         bump_image: None,
+        footprint: None,
     };
     let mut materials = vec![default];
     for (name, material) in raw {
-        materials.push(check_material(&at.key(name), name, material, paths)?);
+        let at = at.key(name);
+        let of = |id: u32| check_footprint(&at.key("footprint"), f64::from(id), footprints);
+        let footprint = material.footprint.map(of).transpose()?;
+        materials.push(SceneMaterial { footprint, ..check_material(&at, name, material, paths)? });
     }
     Ok(materials)
 }
@@ -96,6 +101,7 @@ fn check_material(at: &At<'_>, name: &str, raw: &RawMaterial, paths: &Paths) -> 
         opacity: unit("opacity", raw.opacity, opacity)?,
         extinction,
         bump_image,
+        footprint: None,
     })
 }
 

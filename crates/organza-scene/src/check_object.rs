@@ -2,6 +2,7 @@
 
 use super::check::At;
 use super::check_field::check_clip;
+use super::check_footprint::check_choice;
 use super::check_points::check_points;
 use super::check_render::check_technique;
 use super::check_source::check_source;
@@ -12,6 +13,7 @@ use crate::Error;
 use convert::read::{UpAxis, up_axis};
 use glam::{DQuat, DVec3};
 use splat_core::{FootprintStack, Packing, Similarity};
+use std::sync::Arc;
 
 /// What objects refer to.
 pub(super) struct Named<'a> {
@@ -34,11 +36,8 @@ pub(super) fn check_object(
     let fallback = named.materials[material].extinction;
     let source = check_source(at, &raw, fallback, named.paths)?;
     refuse_what_does_not_apply(at, &raw, &source)?;
-    let footprints = named.footprints.layers().len();
-    if raw.footprint as usize >= footprints {
-        let message = format!("`footprint`: expected an index below {footprints}, found {}", raw.footprint);
-        return Err(at.key("footprint").error(message, "`footprints` lists them, counted from 0"));
-    }
+    let of_material = named.materials[material].footprint;
+    let footprints = check_choice(at, raw.footprint.as_ref(), of_material, (named.footprints, &source))?;
     let up = match raw.transform.up {
         // An invisible object is not even read.
         RawUp::Auto if raw.visible == Some(false) => Up { axis: UpAxis::Y, by_file: false },
@@ -69,7 +68,7 @@ pub(super) fn check_object(
         shadow_coefficient: at.number("shadow_coefficient", raw.shadow_coefficient.unwrap_or(1.0), 0.0..=1.0)? as f32,
         casts_shadow: raw.casts_shadow.unwrap_or(true),
         visible: raw.visible.unwrap_or(true),
-        footprint: raw.footprint as u8,
+        footprints: Arc::new(footprints),
         merge_duplicates: raw.merge_duplicates,
         technique: check_own_technique(at, raw.technique.as_deref())?,
         deforms: false,

@@ -48,7 +48,7 @@ impl Turn {
 }
 
 /// Reads and checks a scene file; JSON if its name ends in `.json`, else TOML. Of data files that are drawn
-/// only the beginning is looked at, for the axis that points up.
+/// only the beginning is looked at, for the axis that points up; images of footprints are read.
 ///
 /// # Errors
 /// [`Error::Io`], [`Error::Limit`] for a file over [`MAX_SCENE_BYTES`], [`Error::Scene`] with line and column,

@@ -2,8 +2,8 @@
 
 use super::{CameraFit, PointsLook, RenderSettings, SceneLight, Source, Technique};
 use crate::Error;
-use convert::Clip;
 use convert::read::UpAxis;
+use convert::{Clip, FootprintChoice};
 use glam::DVec3;
 use sha2::{Digest, Sha256};
 use splat_core::{Camera, FootprintStack, Material, Packing, Similarity};
@@ -11,6 +11,7 @@ use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A whole scene. Made by [`super::load()`] or [`super::parse`] alone, so that every number in it is finite and in range.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,13 +44,16 @@ pub struct Scene {
     pub render: RenderSettings,
     /// The footprints that objects name by index.
     pub footprints: FootprintStack,
+    /// The files of those that are images.
+    pub footprint_files: Vec<PathBuf>,
 }
 
 impl Scene {
     /// Every file that the scene is made of, its own first.
     pub fn files(&self) -> Vec<PathBuf> {
         let data = self.objects.iter().filter_map(|o| o.source.path());
-        std::iter::once(&*self.file).chain(data).chain(self.images()).map(Path::to_owned).collect()
+        let footprints = self.footprint_files.iter().map(PathBuf::as_path);
+        std::iter::once(&*self.file).chain(data).chain(self.images()).chain(footprints).map(Path::to_owned).collect()
     }
 
     /// The columns that are read of a file of points, by name, each once: those that any visible object asks for, so that the file is read
@@ -141,8 +145,8 @@ pub struct SceneObject {
     pub casts_shadow: bool,
     /// Whether it is drawn at all; an invisible object is not even read.
     pub visible: bool,
-    /// Index into [`Scene::footprints`].
-    pub footprint: u8,
+    /// Which of [`Scene::footprints`] its splats have.
+    pub footprints: Arc<FootprintChoice>,
     /// Whether splats at one place become one.
     pub merge_duplicates: bool,
     /// What draws it where it is translucent; `None` for the technique of the scene.
@@ -175,4 +179,6 @@ pub struct SceneMaterial {
     pub extinction: Option<f64>,
     /// The image that has the heights of its bumps.
     pub bump_image: Option<PathBuf>,
+    /// Index into [`Scene::footprints`] for objects that state none.
+    pub footprint: Option<u8>,
 }

@@ -1,6 +1,7 @@
 //! The scene file as it is written: degrees, names and nothing checked but types. Source of the JSON Schema.
 
 use super::raw_camera::RawCamera;
+use super::raw_footprint::RawFootprint;
 use super::raw_light::RawLight;
 use super::raw_material::RawMaterial;
 use super::raw_object::RawObject;
@@ -37,8 +38,8 @@ pub(super) struct RawScene {
     pub(super) render: RawRender,
     /// What changes from frame to frame.
     pub(super) animation: Option<RawAnimation>,
-    /// Where each Gaussian footprint is cut, in standard deviations, 1 to 8. Objects name them by index.
-    pub(super) footprints: Option<Vec<f64>>,
+    /// Footprints, which objects, materials and points name by index: where a Gaussian is cut, in standard deviations, 1 to 8, or images.
+    pub(super) footprints: Option<Vec<RawFootprint>>,
 }
 
 /// What changes from frame to frame.

@@ -54,6 +54,8 @@ pub(super) struct RawMaterial {
     pub(super) surface_opacity: RawSurfaceOpacity,
     /// What the matter of a medium does.
     pub(super) medium: Option<RawMedium>,
+    /// Index into `footprints` for objects that state none; default 0.
+    pub(super) footprint: Option<u32>,
     /// Refractive index of the matter that a surface bounds, from 0.1 to 10; default none, which bends no light.
     pub(super) ior: Option<f64>,
     /// The index by wavelength, instead of `ior`.

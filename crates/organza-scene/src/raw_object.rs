@@ -1,5 +1,6 @@
 //! Objects as they are written.
 
+use super::raw_footprint::RawChoice;
 use super::raw_points::{RawColorBy, RawDiscShape, RawPointForm, RawPointSize};
 use super::raw_source::{
     RawClip, RawCloud, RawDensity, RawImplicit, RawIsosurface, RawLevelSet, RawMediumBall, RawMediumBox, RawRectangle,
@@ -85,9 +86,8 @@ pub(super) struct RawObject {
     pub(super) casts_shadow: Option<bool>,
     /// Whether it is drawn; default true.
     pub(super) visible: Option<bool>,
-    /// Index into `footprints`; default 0.
-    #[serde(default)]
-    pub(super) footprint: u32,
+    /// Index into `footprints`, or how it is chosen for each disc; default the file's column `footprint`, else that of the material.
+    pub(super) footprint: Option<RawChoice>,
     /// Make splats at one place one; default false.
     #[serde(default)]
     pub(super) merge_duplicates: bool,

@@ -111,7 +111,7 @@ pub fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> R
     plan_counted(scene, loaded, options).map(|(plan, _)| plan)
 }
 
-/// Refuses 3D Gaussians, and splats of media that a file has beside others, whose technique leaves them out.
+/// Refuses 3D Gaussians, images as footprints, and splats of media that a file has beside others, where a technique leaves them out.
 fn check_splats(scene: &Scene, loaded: &Loaded) -> Result<(), Error> {
     let by = |object: &SceneObject| row(technique_of(object, scene));
     let refuse = |o: &SceneObject, what| Err(Error::input(crate::shown(&o.name), what, "use `points` or `reference`"));
@@ -122,6 +122,12 @@ fn check_splats(scene: &Scene, loaded: &Loaded) -> Result<(), Error> {
     let discs_alone: Vec<bool> = scene.objects.iter().map(|o| by(o).meets_discs).collect();
     let mut splats = loaded.cloud.kind.iter().zip(&loaded.cloud.object);
     let medium = splats.find(|(kind, o)| **kind == SplatKind::Medium && discs_alone[**o as usize]);
+    let object = |i: usize| &scene.objects[loaded.cloud.object[i] as usize];
+    let alone = |by: &Row, kind| by.meets_discs || !by.draws_splats && kind == SplatKind::Surface;
+    let image = loaded.footprints.images_in(&loaded.cloud).find(|(i, kind)| alone(by(object(*i)), *kind));
+    if let Some((i, _)) = image {
+        return refuse(object(i), "images as footprints, and its technique draws formulas alone");
+    }
     let what = "splats of a medium, and its technique draws surfaces alone";
     medium.map_or(Ok(()), |(_, object)| refuse(&scene.objects[*object as usize], what))
 }

@@ -1,6 +1,6 @@
 //! Exact compositing: all fragments of a pixel, sorted, one by one.
 
-use crate::footprint::{Splat, norms};
+use crate::footprint::{Profile, Splat, profiles};
 use rayon::prelude::*;
 use splat_core::{Camera, Cloud, Error, FootprintStack, Material, Progress, SHADED_EFFECTS, SplatKind};
 
@@ -51,7 +51,8 @@ const EPSILON_Z: f64 = 0.5;
 /// # Errors
 /// [`Error::Cancelled`].
 pub fn composite(input: &Input<'_>, progress: Option<&Progress>) -> Result<ExactImage, Error> {
-    let splats = splats(input);
+    let profiles = profiles(input.footprints);
+    let splats = splats(input, &profiles);
     let pixels = by_pixel(input, &splats, |ids, x, y| pixel(input, &splats, ids, x, y), progress)?;
     let mut image = ExactImage { values: Vec::new(), transmittance: Vec::new() };
     for p in pixels {
@@ -88,7 +89,8 @@ pub fn fold_fragments<T: Send>(
     progress: Option<&Progress>,
 ) -> Result<Vec<T>, Error> {
     let width = input.camera.size[0] as usize;
-    let splats = splats(input);
+    let profiles = profiles(input.footprints);
+    let splats = splats(input, &profiles);
     let of_pixel = |ids: &[u32], x: usize, y: usize| {
         let k = y * width + x;
         let surface = solid.get(k).map_or(f64::INFINITY, |d| f64::from(*d));
@@ -97,15 +99,14 @@ pub fn fold_fragments<T: Send>(
     by_pixel(input, &splats, of_pixel, progress)
 }
 
-fn splats(input: &Input<'_>) -> Vec<Option<Splat>> {
-    let norms = norms(input.footprints);
-    (0..input.cloud.len()).into_par_iter().map(|i| Splat::new(input, &norms, i)).collect()
+fn splats<'a>(input: &Input<'_>, profiles: &'a [Profile]) -> Vec<Option<Splat<'a>>> {
+    (0..input.cloud.len()).into_par_iter().map(|i| Splat::new(input, profiles, i)).collect()
 }
 
 /// Something of every pixel from the splats that may reach it, row by row.
 fn by_pixel<T: Send>(
     input: &Input<'_>,
-    splats: &[Option<Splat>],
+    splats: &[Option<Splat<'_>>],
     of_pixel: impl Fn(&[u32], usize, usize) -> T + Sync,
     progress: Option<&Progress>,
 ) -> Result<Vec<T>, Error> {
@@ -138,7 +139,7 @@ fn by_pixel<T: Send>(
 /// The translucent fragments of a pixel before a surface, sorted.
 fn fragments(
     input: &Input<'_>,
-    splats: &[Option<Splat>],
+    splats: &[Option<Splat<'_>>],
     ids: &[u32],
     [x, y]: [usize; 2],
     surface_depth: f64,
@@ -166,7 +167,7 @@ struct Pixel {
     transmittance: [f64; 3],
 }
 
-fn pixel(input: &Input<'_>, splats: &[Option<Splat>], ids: &[u32], x: usize, y: usize) -> Pixel {
+fn pixel(input: &Input<'_>, splats: &[Option<Splat<'_>>], ids: &[u32], x: usize, y: usize) -> Pixel {
     let at = |i: u32| {
         let splat = splats[i as usize].as_ref().expect("invariant: listed splats exist");
         splat.fragment(input, x, y).map(|f| (splat, f))
@@ -210,7 +211,7 @@ fn band(c: usize, channels: usize) -> usize {
 fn opaque<'a>(
     input: &Input<'_>,
     ids: &[u32],
-    at: &impl Fn(u32) -> Option<(&'a Splat, crate::footprint::Fragment)>,
+    at: &impl Fn(u32) -> Option<(&'a Splat<'a>, crate::footprint::Fragment)>,
 ) -> Option<(f64, Vec<f64>)> {
     let solid = |i: u32| at(i).filter(|(splat, _)| splat.kind == SplatKind::Opaque);
     let nearest = ids

@@ -3,12 +3,13 @@
 //! Medium: τ = K·n/R'²·w(ρ²/R'²), ρ the distance of the centre from the ray, R'² = R² + (filter in world units)².
 //! Disc: the projection of the tangent disc by its Jacobian at the centre, widened by the resampling filter. Of discs that
 //! reach through the eye plane what lies on the ray before the eye; in perspective, for all whose ball does, not widened.
-//! Gaussian: see `gaussian.rs`.
+//! Gaussian: see `gaussian.rs`. A disc whose footprint is an image: see `pattern.rs`.
 //! Share of a medium before a plane across the view: ∫ 35/32·(1 − u²)³ du up to u = distance/3δ, δ the kernel's deviation.
 //! w(s) = e^(−qs) − e^(−q)(1 + x + x²/2), x = q(1 − s), q = cutoff²/2.
 
 use crate::Input;
 use crate::gaussian::Gaussian;
+use crate::pattern::{Laid, Pattern, Seen};
 use glam::{DMat2, DVec2, DVec3};
 use splat_core::optics::SurfaceOpacity;
 use splat_core::{FootprintStack, SplatKind};
@@ -22,7 +23,7 @@ const CORE: f64 = 0.45 * 0.45;
 const CORE_FILTER_PX: f64 = 1.0 / 32.0;
 
 /// One splat seen by the camera, in f64.
-pub(crate) struct Splat {
+pub(crate) struct Splat<'a> {
     pub(crate) kind: SplatKind,
     pub(crate) depth: f64,
     pub(crate) radius: f64,
@@ -33,6 +34,8 @@ pub(crate) struct Splat {
     /// K·n/R'², or area·n/R² for an opaque disc.
     peak: f64,
     shape: Shape,
+    /// What a disc shows in the place of the formula.
+    pattern: Option<&'a Pattern>,
     /// Half the pixel extent to look at.
     pub(crate) reach_px: DVec2,
 }
@@ -49,6 +52,7 @@ enum Shape {
         depth_slope: DVec2,
         /// Whether it reaches through the eye plane: then it is seen where it lies before it.
         crosses: bool,
+        laid: Option<Laid>,
     },
     /// Through the eye plane: normal, and the semi-axes over the squares of their lengths.
     Near {
@@ -71,9 +75,9 @@ pub(crate) struct Fragment {
     middle: f64,
 }
 
-impl Splat {
+impl<'a> Splat<'a> {
     /// Splat `i` of the input, or `None` when the camera cannot see it.
-    pub(crate) fn new(input: &Input<'_>, norms: &[f64], i: usize) -> Option<Self> {
+    pub(crate) fn new(input: &Input<'_>, profiles: &'a [Profile], i: usize) -> Option<Self> {
         let s = input.cloud.get(i);
         let world = input.cloud.origin + s.position.as_dvec3();
         let center = input.camera.view_from_world(world);
@@ -84,7 +88,7 @@ impl Splat {
         let center_px = DVec2::new(0.5 * size[0] + center.x * px_per_world, 0.5 * size[1] - center.y * px_per_world);
         let cutoff = f64::from(input.footprints.layers()[s.footprint as usize].cutoff);
         let q = 0.5 * cutoff * cutoff;
-        let n = norms[s.footprint as usize];
+        let Profile { norm: n, pattern } = &profiles[s.footprint as usize];
         let filter_px = cutoff * f64::from(input.resampling_sigma_px);
         let amount = f64::from(s.cross_section);
         let mut out = Self {
@@ -97,6 +101,7 @@ impl Splat {
             cutoff_sq_half: q,
             peak: 0.0,
             shape: Shape::Ball { radius_sq: 0.0 },
+            pattern: None,
             reach_px: DVec2::ZERO,
         };
         if let Some(g) = input.cloud.gaussian_of(i) {
@@ -106,7 +111,7 @@ impl Splat {
             out.shape = Shape::Gaussian(gaussian);
         } else if s.kind == SplatKind::Medium {
             let radius_sq = radius * radius + (filter_px / px_per_world).powi(2);
-            out.peak = amount * n / radius_sq;
+            out.peak = amount * *n / radius_sq;
             out.shape = Shape::Ball { radius_sq };
             // A ball's image is stretched away from the image centre by up to |d|².
             let d = if parallel { 1.0 } else { (center / center.z).length_squared() };
@@ -115,6 +120,7 @@ impl Splat {
             let near = !parallel && center.z < 2.0 * radius;
             out.reach_px = DVec2::splat(if near { f64::INFINITY } else { reach });
         } else {
+            out.pattern = pattern.as_ref();
             out.disc(input, &s, px_per_world, filter_px, amount * n);
         }
         Some(out)
@@ -123,13 +129,14 @@ impl Splat {
     fn disc(&mut self, input: &Input<'_>, s: &splat_core::Splat, px_per_world: f64, filter_px: f64, amount: f64) {
         let axes = input.camera.axes;
         let to_view = |v: DVec3| DVec3::new(axes[0].dot(v), axes[1].dot(v), axes[2].dot(v));
-        let normal = to_view(s.normal.as_dvec3());
+        let normal = s.normal.as_dvec3();
         let u = if s.tangent == splat_core::glam::Vec3::ZERO {
             normal.any_orthonormal_vector() * self.radius
         } else {
-            to_view(s.tangent.as_dvec3())
+            s.tangent.as_dvec3()
         };
         let v = normal.cross(u).normalize_or_zero() * self.radius;
+        let [normal, u, v] = [normal, u, v].map(to_view);
         let parallel = input.camera.is_orthographic();
         let through = u.length().max(v.length());
         let reach_z = u.z.hypot(v.z);
@@ -162,8 +169,9 @@ impl Splat {
             if along.abs() < 1e-4 { DVec2::ZERO } else { DVec2::new(-normal.x, normal.y) / (along * px_per_world) };
         self.reach_px = DVec2::new(covariance.x_axis.x, covariance.y_axis.y).map(|c| c.sqrt() + 1.0);
         let crosses = self.depth < reach_z;
-        self.shape =
-            Shape::Disc { metric: covariance.inverse(), core: widened(CORE_FILTER_PX).inverse(), depth_slope, crosses };
+        let (metric, core) = (covariance.inverse(), widened(CORE_FILTER_PX).inverse());
+        let laid = self.pattern.map(|pattern| pattern.laid(jacobian, metric, core));
+        self.shape = Shape::Disc { metric, core, depth_slope, crosses, laid };
     }
 
     fn near_disc(&mut self, input: &Input<'_>, normal: DVec3, [u, v]: [DVec3; 2], amount: f64) {
@@ -195,7 +203,7 @@ impl Splat {
     pub(crate) fn fragment(&self, input: &Input<'_>, x: usize, y: usize) -> Option<Fragment> {
         let at = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
         let mut peak = self.peak;
-        let (s, core, offset) = match &self.shape {
+        let (s, core, offset, seen) = match &self.shape {
             Shape::Near { normal, axes, slab } => {
                 let (origin, d) = input.camera.view_ray(at.x, at.y);
                 let depth = (self.center - origin).dot(*normal) / d.dot(*normal);
@@ -206,8 +214,9 @@ impl Splat {
                 if *slab {
                     peak /= (d.dot(*normal).abs() / d.length()).max(1e-3);
                 }
-                let s = axes.iter().map(|a| p.dot(*a).powi(2)).sum();
-                (s, s, depth - self.depth)
+                let place = DVec2::new(p.dot(axes[0]), p.dot(axes[1]));
+                let s = place.length_squared();
+                (s, s, depth - self.depth, Some(Seen { level: 0.0, place, in_core: place }))
             }
             Shape::Gaussian(gaussian) => {
                 let d = at - self.center_px;
@@ -218,21 +227,23 @@ impl Splat {
             Shape::Ball { radius_sq } => {
                 let (origin, d) = input.camera.view_ray(at.x, at.y);
                 let rho_sq = (self.center - origin).cross(d).length_squared() / d.length_squared();
-                (rho_sq / radius_sq, f64::INFINITY, 0.0)
+                (rho_sq / radius_sq, f64::INFINITY, 0.0, None)
             }
-            Shape::Disc { metric, core, depth_slope, crosses } => {
+            Shape::Disc { metric, core, depth_slope, crosses, laid } => {
                 let d = at - self.center_px;
                 let offset = depth_slope.dot(d);
                 let offset = if *crosses { offset } else { offset.clamp(-self.radius, self.radius) };
                 if *crosses && self.depth + offset <= 0.0 {
                     return None;
                 }
-                (d.dot(*metric * d), d.dot(*core * d), offset)
+                (d.dot(*metric * d), d.dot(*core * d), offset, laid.as_ref().map(|laid| laid.at(d)))
             }
         };
+        let shown = self.pattern.zip(seen);
+        let formula = |s: f64| profile(s, self.cutoff_sq_half);
         (s < 1.0 && peak > 0.0).then(|| Fragment {
-            is_solid: core <= CORE,
-            amount: peak * profile(s, self.cutoff_sq_half),
+            is_solid: shown.as_ref().map_or(core <= CORE, |(of, seen)| of.is_solid(seen, formula(core.min(1.0)))),
+            amount: peak * shown.as_ref().map_or(formula(s), |(of, seen)| of.profile(seen, formula(s))),
             depth: self.depth + offset,
             distance_sq: s,
             middle: self.depth + offset,
@@ -255,10 +266,21 @@ fn share_before(x: f64, q: f64) -> f64 {
     0.5 + 0.5 * half(x) / half(1.0)
 }
 
-/// n = 1/∫w dA of each footprint for R = 1, by numerical integration: shares no closed form with the fast path.
-pub(crate) fn norms(footprints: &FootprintStack) -> Vec<f64> {
-    let sharpness = |cutoff: f32| 0.5 * f64::from(cutoff) * f64::from(cutoff);
-    footprints.layers().iter().map(|l| 1.0 / (PI * simpson(|s| profile(s, sharpness(l.cutoff))))).collect()
+/// A footprint: n = 1/∫w dA for R = 1, and the image in the place of w.
+pub(crate) struct Profile {
+    norm: f64,
+    pattern: Option<Pattern>,
+}
+
+/// Of each footprint; norms by numerical integration: shares no closed form with the fast path.
+pub(crate) fn profiles(footprints: &FootprintStack) -> Vec<Profile> {
+    let of = |(id, layer): (usize, &splat_core::Footprint)| {
+        let q = 0.5 * f64::from(layer.cutoff) * f64::from(layer.cutoff);
+        let norm = 1.0 / (PI * simpson(|s| profile(s, q)));
+        let pattern = footprints.image(id).map(|image| Pattern::new(image, |s| profile(s, q), norm));
+        Profile { norm, pattern }
+    };
+    footprints.layers().iter().enumerate().map(of).collect()
 }
 
 /// Simpson's rule over [0, 1].

@@ -52,6 +52,7 @@ mod march;
 mod medium;
 pub mod metrics;
 mod path;
+mod pattern;
 mod phase;
 mod pixel;
 mod placed;

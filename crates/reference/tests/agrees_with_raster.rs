@@ -6,7 +6,9 @@ use splat_core::optics::SurfaceOpacity;
 use splat_core::raster::{
     Detail, FoldInput, OpaqueImage, OpaqueInput, Params, ProjectInput, fold, project, resolve_opaque,
 };
-use splat_core::{Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Projection, Splat, SplatKind, rng};
+use splat_core::{
+    Accumulator, Camera, Cloud, Direction, FootprintImage, FootprintStack, Material, Projection, Splat, SplatKind, rng,
+};
 
 const SIZE: [u32; 2] = [75, 50];
 
@@ -52,6 +54,16 @@ struct Raster {
 }
 
 fn rasterize(cloud: &Cloud, camera: &Camera, materials: &[Material], planes: usize, direction: Direction) -> Raster {
+    rasterize_by(cloud, camera, materials, planes, (direction, &FootprintStack::default()))
+}
+
+fn rasterize_by(
+    cloud: &Cloud,
+    camera: &Camera,
+    materials: &[Material],
+    planes: usize,
+    (direction, footprints): (Direction, &FootprintStack),
+) -> Raster {
     let view = camera.view_from_offset(cloud.origin);
     let depth = |i: &u32| view.depth(cloud.position[*i as usize]);
     let mut translucent: Vec<u32> =
@@ -61,15 +73,9 @@ fn rasterize(cloud: &Cloud, camera: &Camera, materials: &[Material], planes: usi
         translucent.reverse();
     }
     let opaque: Vec<u32> = (0..cloud.len() as u32).filter(|i| cloud.kind[*i as usize] == SplatKind::Opaque).collect();
-    let (footprints, params) = (FootprintStack::default(), Params { transmittance_cutoff: 0.0, ..Params::default() });
-    let projected = project(&ProjectInput {
-        cloud,
-        camera,
-        footprints: &footprints,
-        materials,
-        params: &params,
-        detail: Detail::ALL,
-    });
+    let params = Params { transmittance_cutoff: 0.0, ..Params::default() };
+    let projected =
+        project(&ProjectInput { cloud, camera, footprints, materials, params: &params, detail: Detail::ALL });
     let values: Vec<f32> = cloud.color.iter().flatten().copied().collect();
     let solid = OpaqueInput { projected: &projected, ids: &opaque, values: &values, channels: 3, objects: false };
     let (solid, _) = resolve_opaque(&solid, None).unwrap();
@@ -103,12 +109,21 @@ fn finish(mut acc: Accumulator, solid: &OpaqueImage) -> Raster {
 }
 
 fn largest_difference(raster: &Raster, cloud: &Cloud, camera: &Camera, materials: &[Material]) -> f64 {
+    largest_difference_by(raster, cloud, camera, (materials, &FootprintStack::default()))
+}
+
+fn largest_difference_by(
+    raster: &Raster,
+    cloud: &Cloud,
+    camera: &Camera,
+    (materials, footprints): (&[Material], &FootprintStack),
+) -> f64 {
     let values: Vec<f32> = cloud.color.iter().flatten().copied().collect();
     let exact = composite(
         &Input {
             cloud,
             camera,
-            footprints: &FootprintStack::default(),
+            footprints,
             materials,
             values: &values,
             channels: 3,
@@ -145,6 +160,50 @@ fn the_exact_compositor_agrees_with_the_rasterizer() {
             let difference = largest_difference(&raster, &cloud, &camera, &materials);
             assert!(difference < 2e-5, "{projection:?} rgb {rgb}: {difference:e}");
         }
+    }
+}
+
+/// Formulas, and images that are no mirror images of themselves: one wide with many texels, one high with few.
+fn with_images() -> FootprintStack {
+    let leaf = |size: [u32; 2]| {
+        let share = |i: u32, n: u32| (f64::from(i) + 0.5) / f64::from(n);
+        let at = |x: f64, y: f64| {
+            let width = 0.4 * (1.0 - y) * (1.2 * y + 0.1).sqrt() + 0.02;
+            let edge = (0.5 + 0.1 * y - x).abs() / width;
+            (1.5 - edge).clamp(0.0, 1.0) as f32 * (0.6 + 0.4 * x as f32)
+        };
+        let pixels = (0..size[1]).flat_map(|j| (0..size[0]).map(move |i| (i, j)));
+        let coverage: Vec<f32> = pixels.map(|(i, j)| at(share(i, size[0]), share(j, size[1]))).collect();
+        FootprintImage::new(size, &coverage).unwrap().into()
+    };
+    FootprintStack::default().with_image(1, leaf([150, 90])).with_image(2, leaf([7, 20]))
+}
+
+/// Far away, near, and through the eye plane in parallel rays; some are opaque.
+#[test]
+fn the_exact_compositor_agrees_on_images() {
+    let (cloud, footprints, materials) = (mixed_cloud(3000), with_images(), materials(false));
+    let far =
+        |projection| Camera::look_at(DVec3::new(2.0, 7.0, 25.0), DVec3::ZERO, DVec3::Y, projection, SIZE).unwrap();
+    let amid = Camera::look_at(
+        DVec3::new(0.1, 0.05, 0.3),
+        DVec3::ZERO,
+        DVec3::Y,
+        Projection::Orthographic { height: 2.0 },
+        SIZE,
+    );
+    let cameras = [
+        camera(Projection::Perspective { fov_y: 0.7 }),
+        camera(Projection::Orthographic { height: 0.7 }),
+        far(Projection::Perspective { fov_y: 0.3 }),
+        amid.unwrap(),
+    ];
+    for camera in cameras {
+        let raster = rasterize_by(&cloud, &camera, &materials, 1, (Direction::FrontToBack, &footprints));
+        let difference = largest_difference_by(&raster, &cloud, &camera, (&materials, &footprints));
+        assert!(difference < 5e-5, "{:?}: {difference:e}", camera.projection);
+        let formulas = largest_difference(&raster, &cloud, &camera, &materials);
+        assert!(formulas > 0.05, "images are seen: {formulas}");
     }
 }
 

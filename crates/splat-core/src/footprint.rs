@@ -7,10 +7,18 @@
 //!
 //! It is positive, integrates in closed form, and a lattice of spacing h ≈ R/2.4 sums to a constant within 1.1·10⁻⁴ at
 //! the default cutoff: a plain cut Gaussian ripples ten times more. Gunjee 2007 (section 4.3) samples Gaussians into
-//! a stack of textures; a profile by formula has no table error and costs less than the look-up.
+//! a stack of textures; a profile by formula has no table error and costs less than the look-up. What no formula says, such as a leaf,
+//! is an image in the stack: see [`FootprintImage`].
 
-use crate::Error;
+mod image;
+
+#[cfg(feature = "raster")]
+pub(crate) use image::Level;
+pub use image::{FootprintImage, MOST_TEXELS};
+
+use crate::{Cloud, Error, SplatKind};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// One radial profile.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -109,16 +117,18 @@ impl Footprint {
     }
 }
 
-/// The footprints of a scene by [`crate::Splat::footprint`]; the paper's stack of footprint textures.
+/// The footprints of a scene by [`crate::Splat::footprint`]; the paper's stack of footprint textures: formulas, and images in the place of some.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FootprintStack {
     layers: Vec<Footprint>,
+    /// As many.
+    images: Vec<Option<Arc<FootprintImage>>>,
 }
 
 impl Default for FootprintStack {
     /// Layer 0 is the default of 3σ, layer 1 soft (2σ), layer 2 wide (5σ).
     fn default() -> Self {
-        Self { layers: [3.0, 2.0, 5.0].map(|cutoff| Footprint { cutoff }).to_vec() }
+        Self { layers: [3.0, 2.0, 5.0].map(|cutoff| Footprint { cutoff }).to_vec(), images: vec![None; 3] }
     }
 }
 
@@ -134,12 +144,41 @@ impl FootprintStack {
         if let Some(i) = layers.iter().position(|l| !(1.0..=8.0).contains(&l.cutoff)) {
             return Err(Error::invalid("footprint", i, "cutoff", layers[i].cutoff, "1 to 8 standard deviations"));
         }
-        Ok(Self { layers })
+        let images = vec![None; layers.len()];
+        Ok(Self { layers, images })
     }
 
-    /// All layers.
+    /// The same with an image in the place of layer `id`, whose energy it has to have.
+    ///
+    /// # Panics
+    /// If `id` is out of range.
+    #[must_use]
+    pub fn with_image(mut self, id: usize, image: Arc<FootprintImage>) -> Self {
+        self.images[id] = Some(image);
+        self
+    }
+
+    /// All layers; where one is an image, the formula that it stands for.
     pub fn layers(&self) -> &[Footprint] {
         &self.layers
+    }
+
+    /// The image of a layer that is one.
+    pub fn image(&self, id: usize) -> Option<&Arc<FootprintImage>> {
+        self.images.get(id).and_then(Option::as_ref)
+    }
+
+    /// The splats of a cloud that show images, discs of which these are the kinds.
+    pub fn images_in<'a>(&'a self, cloud: &'a Cloud) -> impl Iterator<Item = (usize, SplatKind)> + 'a {
+        let splats = cloud.footprint.iter().zip(&cloud.kind).enumerate().filter(|_| self.has_images());
+        let shown =
+            splats.filter(|(_, (id, kind))| **kind != SplatKind::Medium && self.image(usize::from(**id)).is_some());
+        shown.map(|(i, (_, kind))| (i, *kind))
+    }
+
+    /// Whether some layer is an image.
+    pub fn has_images(&self) -> bool {
+        self.images.iter().any(Option::is_some)
     }
 }
 

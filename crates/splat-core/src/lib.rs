@@ -81,7 +81,7 @@ pub use depth_profile::{DepthFragment, DepthProfile};
 pub use environment::{Environment, RadianceImage};
 pub use error::Error;
 pub use field::ScalarField;
-pub use footprint::{Footprint, FootprintStack};
+pub use footprint::{Footprint, FootprintImage, FootprintStack, MOST_TEXELS};
 pub use gaussians::Gaussians;
 pub use glam;
 pub use grid::{BccGrid, Grid, Packing};

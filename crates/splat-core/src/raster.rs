@@ -28,6 +28,7 @@ mod project;
 mod projected;
 mod shapes;
 pub mod source;
+mod special;
 pub mod tile;
 mod translucent;
 pub mod triangles;
@@ -36,7 +37,7 @@ pub use cost::{Expected, expected, objects_in_view, tile_bytes};
 pub use finish::{Background, FinishInput, GlassImage, finish};
 pub use opaque::{OpaqueImage, OpaqueInput, resolve_opaque};
 pub use project::{ProjectInput, project, project_into};
-pub use projected::{Detail, NearDisc, Projected, ProjectedDepth, ProjectedSplat};
+pub use projected::{Detail, Projected, ProjectedDepth, ProjectedSplat, SpecialDisc};
 pub use pulp;
 pub use translucent::{FoldInput, fold};
 

@@ -4,6 +4,7 @@
 mod accumulation;
 mod environment;
 mod extended_lights;
+mod image_footprints;
 mod opaque_rim;
 #[cfg(feature = "gpu")]
 mod recording;

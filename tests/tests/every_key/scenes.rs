@@ -64,6 +64,10 @@ impl Folder {
         std::fs::write(folder.path().join("sky.hdr"), sky).unwrap();
         let bright = hdr([4, 4], |x, y| [90, 50 * x as u8, 60 * y as u8, 129]);
         std::fs::write(folder.path().join("bright.hdr"), bright).unwrap();
+        let images = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/footprints");
+        std::fs::create_dir(folder.path().join("leaves")).unwrap();
+        std::fs::copy(images.join("leaf.png"), folder.path().join("leaf.png")).unwrap();
+        std::fs::copy(images.join("maple.png"), folder.path().join("leaves/maple.png")).unwrap();
         write("colored.ply", &ply(true, 0.7));
         write("plain.ply", &ply(false, 0.7));
         write("other.ply", &ply(true, 0.4));

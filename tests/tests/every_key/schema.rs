@@ -86,6 +86,7 @@ pub(crate) fn heading(table: &str) -> &'static str {
         "camera" => "`[camera]`",
         "background" | "ambient" => "`[background]` and `[ambient]`",
         "object" => "## `[[object]]`",
+        "footprints" | "object.footprint" => "## `footprints`",
         "object.transform" => "`transform`",
         "object.transfer" => "`transfer`",
         "object.isosurface" | "object.level_set" | "object.slice" => "### Surfaces of fields",

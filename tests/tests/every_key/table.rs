@@ -1,7 +1,7 @@
 //! A value for every key that must change what is seen, and where it must not, with the reason.
 
 use super::scenes::SOURCES;
-use super::{lights, surfels};
+use super::{footprints, lights, surfels};
 
 /// Where a change is looked for.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -70,7 +70,7 @@ impl Which {
 }
 
 const EACH: &[&str] = &["points", "particles", "sheets", "surfels"];
-const POINTS: &[&str] = &["points"];
+pub(super) const POINTS: &[&str] = &["points"];
 const PARTICLES: &[&str] = &["particles"];
 const SHEETS: &[&str] = &["sheets"];
 pub(super) const SURFELS: &[&str] = &["surfels"];
@@ -133,10 +133,9 @@ pub(super) fn one(key: &'static str, set: &'static str) -> Entry {
 }
 
 pub(crate) fn entries() -> Vec<Entry> {
-    [scene(), lights::entries(), objects(), sources(), materials(), render(), surfels::entries(), animation()]
-        .into_iter()
-        .flatten()
-        .collect()
+    let first = [scene(), footprints::entries(), lights::entries(), objects()];
+    let others = [sources(), materials(), render(), surfels::entries(), animation()];
+    first.into_iter().chain(others).flatten().collect()
 }
 
 fn scene() -> Vec<Entry> {

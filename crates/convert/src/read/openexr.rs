@@ -13,16 +13,26 @@ use splat_core::RadianceImage;
 use std::io::Cursor;
 
 const CHANNELS: [&str; 3] = ["R", "G", "B"];
+const ALPHA: &str = "A";
+/// How bright red, green and blue of Rec.709 are.
+const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
 
 pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RadianceImage, ReadError> {
     let meta = MetaData::read_from_buffered(Cursor::new(content), false).map_err(damaged)?;
-    let size = checked_size(first_in_color(&meta)?)?;
+    let header = first_in_color(&meta)?;
+    let (size, has_alpha) = (checked_size(header)?, header.channels.list.iter().any(|c| c.name.to_string() == ALPHA));
     check_packed(check_image(size, reading.params)?, content.len() as u64, "the packed image")?;
     // Asked for first, where an allocator that has no room can still be told.
     let mut room: Vec<[f32; 3]> = Vec::new();
     reserve(&mut room, size[0] as usize * size[1] as usize)?;
     drop(room);
     reading.go_on()?;
+    let is_coverage = reading.params.is_coverage;
+    let shown = move |r: f32, g: f32, b: f32, a: f32| match (is_coverage, has_alpha) {
+        (false, _) => [r, g, b],
+        (true, true) => [a; 3],
+        (true, false) => [LUMINANCE[0] * r + LUMINANCE[1] * g + LUMINANCE[2] * b; 3],
+    };
     let image = ::exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
@@ -30,10 +40,11 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Radiance
         .required(CHANNELS[0])
         .required(CHANNELS[1])
         .required(CHANNELS[2])
+        .optional(ALPHA, 1.0)
         .collect_pixels(
             |size: Vec2<usize>, _: &_| (size.0, vec![[0.0f32; 3]; size.0 * size.1]),
-            |(width, pixels): &mut (usize, Vec<[f32; 3]>), at: Vec2<usize>, (r, g, b): (f32, f32, f32)| {
-                pixels[at.1 * *width + at.0] = [r, g, b];
+            move |(width, pixels): &mut (usize, Vec<[f32; 3]>), at: Vec2<usize>, (r, g, b, a): (f32, f32, f32, f32)| {
+                pixels[at.1 * *width + at.0] = shown(r, g, b, a);
             },
         )
         .first_valid_layer()

@@ -28,6 +28,14 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Radiance
     reading.notes.not_used(NOT_USED.into_iter().filter(|name| chunks.contains(name)));
     let decoded = DynamicImage::from_decoder(decoder).map_err(damaged)?;
     reading.go_on()?;
+    if reading.params.is_coverage {
+        let whole = |v: u16| f32::from(v) / f32::from(u16::MAX);
+        match decoded.color().has_alpha() {
+            true => pixels.extend(decoded.into_rgba16().pixels().map(|p| [whole(p.0[3]); 3])),
+            false => pixels.extend(decoded.into_luma16().pixels().map(|p| [whole(p.0[0]); 3])),
+        }
+        return Ok(RadianceImage { size: [width, height], pixels });
+    }
     let is_whole = !decoded.color().has_alpha() || decoded.to_rgba16().pixels().all(|p| p.0[3] == u16::MAX);
     if !is_whole {
         let hint = "an image of radiance hides nothing: flatten it onto a colour first";

@@ -50,7 +50,8 @@ pub fn points(scene: &Scene, facts: &Facts, options: &Options) -> Sweep {
             Err(reason) => sweep.skipped.push(Skipped { knob: name, reason }),
         }
     }
-    let formula = "not applicable: footprints are evaluated by formula, there is no table";
+    let formula = "not applicable: Gaussians are evaluated by formula; what their tables would be off by, `splat-core`'s example \
+                   `footprint_tables` tells";
     sweep.skipped.push(Skipped { knob: "footprint table size", reason: formula.into() });
     sweep
 }

@@ -8,6 +8,7 @@ use convert::{Orientation, SplatParams, SurfelParams, VolumeParams};
 use glam::DVec3;
 use splat_core::{Limits, Progress, Shading};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Bytes that a splat takes from its conversion to the finished picture, at most.
 pub(crate) const BYTES_PER_SPLAT: u64 = 256;
@@ -46,8 +47,9 @@ impl Context<'_> {
             object_name: object.name.clone(),
             object: self.id as u32,
             material: object.material as u16,
-            footprint: object.footprint,
-            profile: self.scene.footprints.layers()[object.footprint as usize],
+            footprint: object.footprints.of[0],
+            profile: self.scene.footprints.layers()[usize::from(object.footprints.of[0])],
+            footprints: Some(Arc::clone(&object.footprints)),
             transform: object.transform,
             color: object.color.unwrap_or(material.color),
             limits: Limits::NONE,

@@ -4,7 +4,7 @@
 //! rising depths. A pair that does not is wrong; a backtrack is how far a fragment lies in front of one that came before it.
 
 use crate::Input;
-use crate::footprint::{Splat, norms};
+use crate::footprint::{Splat, profiles};
 use rayon::prelude::*;
 use splat_core::SplatKind;
 
@@ -35,9 +35,9 @@ impl Rays {
         let stride = stride.max(1);
         let size = input.camera.size.map(|s| s as usize);
         let [columns, rows] = size.map(|s| s.div_ceil(stride));
-        let norms = norms(input.footprints);
-        let splats: Vec<Option<Splat>> =
-            (0..input.cloud.len()).into_par_iter().map(|i| Splat::new(input, &norms, i)).collect();
+        let profiles = profiles(input.footprints);
+        let splats: Vec<Option<Splat<'_>>> =
+            (0..input.cloud.len()).into_par_iter().map(|i| Splat::new(input, &profiles, i)).collect();
         let mut lists: Vec<Vec<u32>> = vec![Vec::new(); columns * rows];
         for (i, splat) in (0u32..).zip(&splats) {
             let Some(splat) = splat else { continue };
@@ -77,7 +77,7 @@ impl Rays {
     }
 }
 
-fn on_ray(input: &Input<'_>, splats: &[Option<Splat>], ids: &[u32], x: usize, y: usize) -> Vec<(u32, f64)> {
+fn on_ray(input: &Input<'_>, splats: &[Option<Splat<'_>>], ids: &[u32], x: usize, y: usize) -> Vec<(u32, f64)> {
     let mut surface = f64::INFINITY;
     let mut found = Vec::new();
     for &i in ids {

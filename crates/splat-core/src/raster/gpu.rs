@@ -401,7 +401,7 @@ impl Recorded {
 
     fn check_splats(&self, input: &FoldInput<'_>) -> Result<(), Error> {
         let (projected, room) = (input.projected, self.capacities);
-        check_near(projected)?;
+        check_special(projected)?;
         let n = projected.splats.len();
         fits("splats", n as u64, room.splats)?;
         fits("splats in order", input.order.len() as u64, room.ordered)?;
@@ -440,10 +440,12 @@ impl Recorded {
     }
 }
 
-/// Discs through the eye plane are the processor's.
-fn check_near(projected: &Projected) -> Result<(), Error> {
-    let near = projected.near.len();
-    if near > 0 { refused("discs through the eye plane", near.to_string(), "none") } else { Ok(()) }
+/// Discs of which their conics do not tell everything are the processor's.
+fn check_special(projected: &Projected) -> Result<(), Error> {
+    match projected.special.len() {
+        0 => Ok(()),
+        n => refused("discs through the eye plane or with images as footprints", n.to_string(), "none"),
+    }
 }
 
 fn check_ids(ids: &[u32], splats: usize) -> Result<(), Error> {

@@ -16,9 +16,10 @@
 //! deviations are narrowed to these: less than 2·10⁻⁵ of them lies beyond.
 
 use super::lanes::{Lanes, exp_neg};
-use crate::Footprint;
+use crate::{Footprint, FootprintImage, FootprintStack};
 use pulp::Simd;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// Coefficients of the polynomial.
 const TERMS: usize = 8;
@@ -63,6 +64,18 @@ pub struct Kernel {
     smooth: bool,
     /// E, the constant term first.
     share: [f32; SHARE_TERMS],
+    /// What discs show in the place of the profile.
+    pub(crate) pattern: Option<Pattern>,
+}
+
+/// The image of a footprint that is one.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Pattern {
+    pub(crate) image: Arc<FootprintImage>,
+    /// Integral of the profile.
+    pub(crate) integral: f32,
+    /// Profile at the rim of the circle that is as large as what the image covers.
+    pub(crate) solid_profile: f32,
 }
 
 impl Kernel {
@@ -81,7 +94,20 @@ impl Kernel {
             g: if smooth { fit(PROFILE_FIT, |t| tail(f64::from(sharpness), t)) } else { [0.0; TERMS] },
             smooth,
             share: share_terms(footprint),
+            pattern: None,
         }
+    }
+
+    /// Of all footprints of a stack.
+    pub fn of_stack(footprints: &FootprintStack) -> impl Iterator<Item = Self> + '_ {
+        footprints.layers().iter().enumerate().map(|(id, layer)| {
+            let pattern = footprints.image(id).map(|image| Pattern {
+                image: Arc::clone(image),
+                integral: (1.0 / layer.norm()) as f32,
+                solid_profile: layer.profile(image.solid_area / PI) as f32,
+            });
+            Self { pattern, ..Self::new(layer) }
+        })
     }
 
     /// The numbers that [`Kernel::profile`] computes with: G, q, e^−q, 1 where G holds; then the spacing, the narrowing and E.

@@ -2,13 +2,14 @@
 //!
 //! A disc hides what lies behind it within [`Footprint::CORE`] of its radius, which leaves no hole between neighbours on a surface,
 //! and without the image's filter, which would make every silhouette wider. Its colour is blended over the whole radius,
-//! filter and all: c = Σwc/Σw.
+//! filter and all: c = Σwc/Σw. One whose footprint is an image hides where that is solid, see [`crate::FootprintImage`].
 
 use super::RasterCounts;
 use super::bins::{Bins, bin};
 use super::kernel::Kernel;
 use super::lanes::{Lanes, MAX_LANES};
-use super::projected::{NearDisc, Projected, ProjectedDepth, ProjectedSplat};
+use super::projected::{Projected, ProjectedDepth, ProjectedSplat, SpecialDisc};
+use super::special;
 use super::tile::{AREA, BATCH, Run, Runs, for_each_span};
 use crate::{Error, Footprint, Progress};
 use pulp::Simd;
@@ -56,20 +57,43 @@ impl OpaqueImage {
 
 /// One opaque splat.
 #[derive(Clone, Copy, Default)]
-struct Disc {
+struct Disc<'a> {
     splat: ProjectedSplat,
     depth: ProjectedDepth,
-    /// If it reaches through the eye plane.
-    near: Option<NearDisc>,
+    /// If its conic does not tell everything.
+    special: Option<&'a SpecialDisc>,
 }
 
-impl Disc {
-    /// s and view depth of a run of pixels.
+impl Disc<'_> {
+    /// Where a run of pixels meets what is solid of a disc that has the conic of its core, as s below [`CORE`]; and view depths.
     #[inline(always)]
-    fn at<S: Simd>(&self, simd: S, run: Run<S>, perspective: bool) -> [Lanes<S>; 2] {
-        match &self.near {
+    fn core<S: Simd>(&self, simd: S, run: Run<S>, projected: &Projected) -> [Lanes<S>; 2] {
+        match self.special {
             None => [run.distance_sq(simd, &self.splat), run.depth(simd, &self.depth)],
-            Some(near) => run.meet(simd, &self.splat, near, perspective),
+            Some(disc) => special::solid(
+                simd,
+                run,
+                (&self.splat, disc),
+                (projected.kernel(&self.splat), projected.is_perspective()),
+            ),
+        }
+    }
+
+    /// Profile and view depth of a run of pixels.
+    #[inline(always)]
+    fn profile<S: Simd>(&self, simd: S, run: Run<S>, kernel: &Kernel, projected: &Projected) -> [Lanes<S>; 2] {
+        match self.special {
+            None => {
+                let s = run.distance_sq(simd, &self.splat);
+                let of = |v: f32| Lanes::splat(simd, v);
+                [kernel.profile(simd, (of(1.0) - s).max(of(0.0))), run.depth(simd, &self.depth)]
+            }
+            Some(disc) => special::profile(
+                simd,
+                run,
+                (&self.splat, disc),
+                (projected.kernel(&self.splat), projected.is_perspective()),
+            ),
         }
     }
 }
@@ -78,7 +102,6 @@ impl Disc {
 struct OpaqueTile {
     x: usize,
     y: usize,
-    perspective: bool,
     /// Nearest depth, +∞ where there is none; at last the blended depth.
     depth: Vec<f32>,
     weight: Vec<f32>,
@@ -130,7 +153,7 @@ pub fn resolve_opaque(
         .into_par_iter()
         .filter(|&t| progress.tick(1).is_ok() && !bins.is_empty(t))
         .map(|t| {
-            let mut tile = OpaqueTile::new(&bins, t, channels, objects, projected.perspective.is_some());
+            let mut tile = OpaqueTile::new(&bins, t, channels, objects);
             pulp::Arch::new().dispatch(ResolveTile { tile: &mut tile, bins: &bins, t, projected, values });
             tile
         })
@@ -177,47 +200,46 @@ impl pulp::WithSimd for ResolveTile<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { tile, bins, t, projected, values } = self;
-        let (channels, size) = (tile.channels.len() / AREA, projected.size);
+        let channels = tile.channels.len() / AREA;
         let mut records = [Disc::default(); BATCH];
         let batches = || bins.tile(t).flat_map(|list| list.chunks(BATCH));
-        let gather = |batch: &[u32], records: &mut [Disc]| {
-            for (&j, record) in batch.iter().zip(records) {
-                let (splat, depth) = (projected.splats[j as usize], projected.depths[j as usize]);
-                *record = Disc { splat, depth, near: projected.near_disc(&splat, j).copied() };
-            }
-        };
-        let gather_cores = |batch: &[u32], records: &mut [Disc]| {
-            gather(batch, records);
-            records.iter_mut().for_each(|disc| disc.splat.conic = disc.depth.core);
-        };
         for batch in batches() {
-            gather_cores(batch, &mut records);
-            records[..batch.len()].iter().for_each(|disc| tile.nearest(simd, size, disc));
+            gather(projected, batch, &mut records);
+            records.iter_mut().for_each(|disc| disc.splat.conic = disc.depth.core);
+            records[..batch.len()].iter().for_each(|disc| tile.nearest(simd, projected, disc));
         }
         if !tile.object.is_empty() {
             for batch in batches() {
-                gather_cores(batch, &mut records);
+                gather(projected, batch, &mut records);
+                records.iter_mut().for_each(|disc| disc.splat.conic = disc.depth.core);
                 for (disc, &j) in records.iter().zip(batch) {
-                    tile.name_nearest(simd, size, disc, projected.objects[j as usize]);
+                    tile.name_nearest(simd, projected, disc, projected.objects[j as usize]);
                 }
             }
         }
         for batch in batches() {
-            gather(batch, &mut records);
+            gather(projected, batch, &mut records);
             for (disc, &j) in records.iter().zip(batch) {
-                let kernel = &projected.kernels[disc.splat.footprint as usize];
-                tile.blend(simd, size, disc, kernel, &values[j as usize * channels..][..channels]);
+                tile.blend(simd, projected, disc, &values[j as usize * channels..][..channels]);
             }
         }
         tile.normalize();
     }
 }
 
+/// Copies what is known of some discs.
+#[inline(always)]
+fn gather<'a>(projected: &'a Projected, batch: &[u32], records: &mut [Disc<'a>]) {
+    for (&j, record) in batch.iter().zip(records) {
+        let (splat, depth) = (projected.splats[j as usize], projected.depths[j as usize]);
+        *record = Disc { splat, depth, special: projected.special_disc(&splat, j) };
+    }
+}
+
 impl OpaqueTile {
-    fn new(bins: &Bins, t: usize, channels: usize, objects: bool, perspective: bool) -> Self {
+    fn new(bins: &Bins, t: usize, channels: usize, objects: bool) -> Self {
         let [x, y] = bins.corner(t);
         Self {
-            perspective,
             x,
             y,
             depth: vec![f32::INFINITY; AREA],
@@ -231,13 +253,13 @@ impl OpaqueTile {
 
     /// Step 1: the nearest depth.
     #[inline(always)]
-    fn nearest<S: Simd>(&mut self, simd: S, size: [u32; 2], disc: &Disc) {
-        let runs = Runs::new(simd, &disc.splat, size, [self.x, self.y]);
+    fn nearest<S: Simd>(&mut self, simd: S, projected: &Projected, disc: &Disc<'_>) {
+        let runs = Runs::new(simd, &disc.splat, projected.size, [self.x, self.y]);
         self.fragments += runs.pixels();
         for run in runs {
             let far = Lanes::splat(simd, f32::INFINITY);
             let core = Lanes::splat(simd, CORE);
-            let [s, depth] = disc.at(simd, run, self.perspective);
+            let [s, depth] = disc.core(simd, run, projected);
             let solid = depth.where_less_or(s, core, far);
             let nearest = &mut self.depth[run.pixel()..];
             Lanes::load(simd, nearest).min(solid).store(nearest);
@@ -246,10 +268,10 @@ impl OpaqueTile {
 
     /// Whose the nearest depth is; of several at the same depth the first.
     #[inline(always)]
-    fn name_nearest<S: Simd>(&mut self, simd: S, size: [u32; 2], disc: &Disc, object: u32) {
-        for run in Runs::new(simd, &disc.splat, size, [self.x, self.y]) {
+    fn name_nearest<S: Simd>(&mut self, simd: S, projected: &Projected, disc: &Disc<'_>, object: u32) {
+        for run in Runs::new(simd, &disc.splat, projected.size, [self.x, self.y]) {
             let (mut s, mut z) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
-            let [distance_sq, depth] = disc.at(simd, run, self.perspective);
+            let [distance_sq, depth] = disc.core(simd, run, projected);
             distance_sq.store(&mut s);
             depth.store(&mut z);
             for i in 0..Lanes::<S>::COUNT {
@@ -263,18 +285,17 @@ impl OpaqueTile {
 
     /// Step 2: weights of all fragments within ε-z of the nearest.
     #[inline(always)]
-    fn blend<S: Simd>(&mut self, simd: S, size: [u32; 2], disc: &Disc, kernel: &Kernel, values: &[f32]) {
+    fn blend<S: Simd>(&mut self, simd: S, projected: &Projected, disc: &Disc<'_>, values: &[f32]) {
         let of = |v: f32| Lanes::splat(simd, v);
-        let runs = Runs::new(simd, &disc.splat, size, [self.x, self.y]);
+        let runs = Runs::new(simd, &disc.splat, projected.size, [self.x, self.y]);
         self.fragments += runs.pixels();
         for run in runs {
             let k = run.pixel();
             let nearest = Lanes::load(simd, &self.depth[k..]);
             // Behind by how much; where there is no surface −∞, and nothing counts. Before it lie the rims of nearer surfaces.
-            let [s, depth] = disc.at(simd, run, self.perspective);
+            let [profile, depth] = disc.profile(simd, run, projected.kernel(&disc.splat), projected);
             let behind = depth - nearest;
-            let t = (of(1.0) - s).max(of(0.0));
-            let amount = of(disc.splat.peak) * kernel.profile(simd, t);
+            let amount = of(disc.splat.peak) * profile;
             let near = amount.where_less(behind.abs(), of(EPSILON_Z * disc.depth.extent));
             let weight = near.where_less(nearest, of(f32::INFINITY));
             let add = |plane: &mut [f32], v: Lanes<S>| (Lanes::load(simd, plane) + v).store(plane);

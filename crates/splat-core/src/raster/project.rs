@@ -7,7 +7,7 @@
 //! reach every pixel.
 //!
 //! What reaches through the eye plane counts with its part before it: a medium with the share of its kernel there, a disc
-//! where the ray meets its plane at a positive depth ([`NearDisc`]). The form of a medium holds for centres behind the eye
+//! where the ray meets its plane at a positive depth ([`SpecialDisc`]). The form of a medium holds for centres behind the eye
 //! too, and loses its digits only where z is much smaller than the splat: such centres are seen from R/32 away.
 //!
 //! **Gaussian.** See `gaussian.rs`, which writes over the ball that stands for it.
@@ -19,10 +19,10 @@ use super::Params;
 use super::gather::{Attributes, Column, Columns};
 use super::kernel::Kernel;
 use super::lanes::Lanes;
-use super::projected::{Coverage, Detail, NearDisc, Projected, ProjectedDepth, ProjectedSplat};
+use super::projected::{Coverage, Detail, Projected, ProjectedDepth, ProjectedSplat, SpecialDisc};
 use super::shapes::{Image, Shapes};
 use crate::{Camera, Cloud, FootprintStack, Material, ViewTransform};
-use glam::{Vec2, Vec3};
+use glam::Vec2;
 use pulp::Simd;
 use rayon::prelude::*;
 
@@ -83,7 +83,7 @@ pub fn project_into(out: &mut Projected, input: &ProjectInput<'_>) {
         out.objects.extend_from_slice(&cloud.object);
     }
     out.kernels.clear();
-    out.kernels.extend(footprints.layers().iter().map(Kernel::new));
+    out.kernels.extend(Kernel::of_stack(footprints));
     out.size = camera.size;
     out.perspective = (!camera.is_orthographic()).then_some(camera.focal_px() as f32);
     let half = Vec2::new(camera.size[0] as f32, camera.size[1] as f32) * 0.5;
@@ -96,19 +96,20 @@ pub fn project_into(out: &mut Projected, input: &ProjectInput<'_>) {
         orthographic: camera.is_orthographic(),
         size: camera.size,
         filter_sigma_px: params.resampling_sigma_px,
+        has_images: footprints.has_images(),
     };
     let mut depths: Vec<&mut [ProjectedDepth]> = out.depths.chunks_mut(CHUNK).collect();
     depths.resize_with(cloud.len().div_ceil(CHUNK), Default::default);
     let chunks = out.splats.par_chunks_mut(CHUNK).zip(out.coverage.par_chunks_mut(CHUNK)).zip(depths);
-    let near: Vec<Vec<NearDisc>> = chunks
+    let special: Vec<Vec<SpecialDisc>> = chunks
         .enumerate()
         .map(|(chunk, ((splats, coverage), depths))| {
             let first = chunk * CHUNK;
             pulp::Arch::new().dispatch(ProjectChunk { projector: &projector, first, splats, coverage, depths })
         })
         .collect();
-    out.near.clear();
-    out.near.extend(near.into_iter().flatten());
+    out.special.clear();
+    out.special.extend(special.into_iter().flatten());
 }
 
 /// What all splats of a projection share.
@@ -122,6 +123,8 @@ pub(super) struct Projector<'a> {
     pub(super) orthographic: bool,
     pub(super) size: [u32; 2],
     pub(super) filter_sigma_px: f32,
+    /// Whether some footprint is an image.
+    pub(super) has_images: bool,
 }
 
 /// One chunk's work, in the form that [`pulp`] compiles once per instruction set.
@@ -135,15 +138,15 @@ struct ProjectChunk<'a> {
 }
 
 impl pulp::WithSimd for ProjectChunk<'_> {
-    /// The discs that reach through the eye plane.
-    type Output = Vec<NearDisc>;
+    /// The discs of which their conics do not tell everything.
+    type Output = Vec<SpecialDisc>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Vec<NearDisc> {
+    fn with_simd<S: Simd>(self, simd: S) -> Vec<SpecialDisc> {
         let (projector, lanes) = (self.projector, Lanes::<S>::COUNT);
         let mut attributes = Attributes::default();
         let mut image = Image::default();
-        let mut near = Vec::new();
+        let mut special = Vec::new();
         for begin in (0..self.splats.len()).step_by(lanes) {
             attributes.read(&projector.columns, self.first + begin, lanes);
             projector.project(simd, &attributes, &mut image);
@@ -153,13 +156,13 @@ impl pulp::WithSimd for ProjectChunk<'_> {
             let end = self.splats.len().min(begin + lanes);
             let splats = &mut self.splats[begin..end];
             projector.write(self.first + begin, &image, splats, &mut self.coverage[begin..end]);
-            if attributes.any_disc && image.any_near(splats.len()) {
-                projector.write_near(
+            if attributes.any_disc && (projector.has_images || image.any_near(splats.len())) {
+                projector.write_special(
                     self.first + begin,
                     &attributes,
                     &image,
                     (splats, &self.coverage[begin..end]),
-                    &mut near,
+                    &mut special,
                 );
             }
             if !self.depths.is_empty() {
@@ -171,7 +174,7 @@ impl pulp::WithSimd for ProjectChunk<'_> {
                 projector.write_gaussians(self.first + begin, footprints, depths);
             }
         }
-        near
+        special
     }
 }
 
@@ -295,7 +298,7 @@ impl Projector<'_> {
         }
     }
 
-    fn kernel_of(&self, i: usize) -> &Kernel {
+    pub(super) fn kernel_of(&self, i: usize) -> &Kernel {
         let cloud = self.columns.cloud;
         &self.columns.kernels[cloud.footprint[i.min(cloud.len() - 1)] as usize]
     }
@@ -445,39 +448,6 @@ impl Projector<'_> {
             let shown = splat.peak > 0.0;
             *coverage = if shown { Coverage::of(splat.bounds(self.size)) } else { Coverage::NONE };
         }
-    }
-
-    /// Marks and lists the discs of a group that reach through the eye plane and may be seen.
-    #[cold]
-    fn write_near(
-        &self,
-        first: usize,
-        attributes: &Attributes,
-        image: &Image,
-        (splats, coverage): (&mut [ProjectedSplat], &[Coverage]),
-        list: &mut Vec<NearDisc>,
-    ) {
-        for (l, splat) in splats.iter_mut().enumerate() {
-            if image.near[l] <= 0.0 || coverage[l] == Coverage::NONE {
-                continue;
-            }
-            splat.set_near();
-            let (id, center) = ((first + l) as u32, image.depth[l]);
-            let slab = if attributes.crossing[l] < 0.0 { self.slab_of(id, splat.center_px) } else { [0.0; 2] };
-            list.push(NearDisc { id, center, slope: image.slope.map(|s| s[l]), slab });
-        }
-    }
-
-    /// n·c/z of a slab with the image position of its centre, and the |cosine| that its peak was divided by.
-    fn slab_of(&self, id: u32, at: [f32; 2]) -> [f32; 2] {
-        let normal = self.view.rotation * self.columns.cloud.normal_of(id as usize);
-        let ray = if self.orthographic {
-            Vec3::Z
-        } else {
-            Vec3::new((at[0] - self.half.x) / self.focal, (self.half.y - at[1]) / self.focal, 1.0)
-        };
-        let along = normal.dot(ray);
-        [along, (along.abs() / ray.length()).max(1e-3)]
     }
 }
 

@@ -18,8 +18,8 @@ pub struct ProjectedSplat {
     /// Optical depth where the profile is 1: K·norm/R². For an opaque splat the weight there, area·norm/R²; of a Gaussian the opacity of its
     /// centre.
     pub peak: f32,
-    /// Half the extent in x and y, pixels: the upper halves of f32s, rounded up. The sign of the first marks a disc that
-    /// reaches through the eye plane, that of the second a Gaussian.
+    /// Half the extent in x and y, pixels: the upper halves of f32s, rounded up. The sign of the first marks a [`SpecialDisc`],
+    /// that of the second a Gaussian.
     pub(crate) half_extent: [u16; 2],
     /// Material id.
     pub material: u16,
@@ -44,19 +44,37 @@ pub struct ProjectedDepth {
     pub core: [f32; 3],
 }
 
-/// A disc that reaches through the eye plane: which pixels see it, each of its fragments tells.
+/// A disc of which its conic does not tell everything: it reaches through the eye plane, or its footprint is an image.
 ///
+/// Which pixels see what reaches through the eye plane, each of its fragments tells.
 /// In perspective w = 1 − slope·(dx, dy)/z is (n·d)/(n·c/z) for a pixel's ray d: the ray meets the disc's plane at the depth
 /// z/w, and s is the conic over w². For parallel rays the depth is linear and s the conic.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NearDisc {
+pub struct SpecialDisc {
     pub(crate) id: u32,
     /// View depth of the centre.
     pub(crate) center: f32,
     /// Change of depth per pixel at the centre.
     pub(crate) slope: [f32; 2],
-    /// n·c/z, and the |cosine| that a slab's peak was divided by; 0 for what is no slab.
+    /// Largest distance in depth between a fragment and the centre, R; of a disc through the eye plane it does not count.
+    pub(crate) extent: f32,
+    /// Whether it reaches through the eye plane.
+    pub(crate) crosses: bool,
+    /// n·c/z, and the |cosine| that a slab's peak was divided by; 0 for what is no slab, or does not reach through the eye plane.
     pub(crate) slab: [f32; 2],
+    /// How its image lies.
+    pub(crate) image: Option<ImageFrame>,
+}
+
+/// How the image of a disc lies in that of the camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ImageFrame {
+    /// From pixels about the centre to units of the semi-axes, row by row: of the disc as it is blended, whose conic is that of the length.
+    pub(crate) to_disc: [f32; 4],
+    /// The same without the image's filter.
+    pub(crate) to_core: [f32; 4],
+    /// Level of the image that its pixels see.
+    pub(crate) level: f32,
 }
 
 /// Which parts of a projection are made beside the footprints.
@@ -84,8 +102,8 @@ pub struct Projected {
     pub objects: Vec<u32>,
     /// Tiles that each footprint reaches.
     pub(crate) coverage: Vec<Coverage>,
-    /// Discs through the eye plane, by id.
-    pub(crate) near: Vec<NearDisc>,
+    /// Discs of which their conics do not tell everything, by id.
+    pub(crate) special: Vec<SpecialDisc>,
     pub(crate) kernels: Vec<Kernel>,
     /// Focal length, pixels, for rays; `None` for parallel rays.
     pub(crate) perspective: Option<f32>,
@@ -112,11 +130,6 @@ impl Projected {
             + size_of_val(&*self.coverage)) as u64
     }
 
-    /// Whether discs reach through the eye plane, which only the processor composites.
-    pub fn crosses_the_eye(&self) -> bool {
-        !self.near.is_empty()
-    }
-
     /// The profile of a splat's footprint.
     #[inline(always)]
     pub fn kernel(&self, splat: &ProjectedSplat) -> &Kernel {
@@ -141,16 +154,16 @@ impl Projected {
         (0..AREA).map(factor).collect()
     }
 
-    /// What is known of disc `i` if it reaches through the eye plane.
+    /// What is known of disc `i` if it is a special one.
     #[inline(always)]
-    pub fn near_disc(&self, splat: &ProjectedSplat, i: u32) -> Option<&NearDisc> {
-        splat.is_near().then(|| self.found(i))
+    pub fn special_disc(&self, splat: &ProjectedSplat, i: u32) -> Option<&SpecialDisc> {
+        splat.is_special().then(|| self.found(i))
     }
 
     #[cold]
-    fn found(&self, i: u32) -> &NearDisc {
-        let at = self.near.binary_search_by_key(&i, |near| near.id);
-        &self.near[at.expect("invariant: a disc that is marked is listed")]
+    fn found(&self, i: u32) -> &SpecialDisc {
+        let at = self.special.binary_search_by_key(&i, |disc| disc.id);
+        &self.special[at.expect("invariant: a disc that is marked is listed")]
     }
 
     /// Object of splat `i`; `u32::MAX` when not asked for.
@@ -182,9 +195,9 @@ impl ProjectedSplat {
         self.half_extent = [pack(half_extent[0]), pack(half_extent[1])];
     }
 
-    /// Marks a disc that reaches through the eye plane.
+    /// Marks a [`SpecialDisc`].
     #[inline(always)]
-    pub(crate) fn set_near(&mut self) {
+    pub(crate) fn set_special(&mut self) {
         self.half_extent[0] |= 0x8000;
     }
 
@@ -200,9 +213,9 @@ impl ProjectedSplat {
         self.half_extent[1] & 0x8000 != 0
     }
 
-    /// Whether it is a disc that reaches through the eye plane.
+    /// Whether it is a [`SpecialDisc`].
     #[inline(always)]
-    pub(crate) fn is_near(&self) -> bool {
+    pub(crate) fn is_special(&self) -> bool {
         self.half_extent[0] & 0x8000 != 0
     }
 

@@ -3,7 +3,8 @@
 use super::gaussian;
 use super::kernel::Kernel;
 use super::lanes::Lanes;
-use super::projected::{NearDisc, Projected, ProjectedDepth, ProjectedSplat};
+use super::projected::{Projected, ProjectedDepth, ProjectedSplat, SpecialDisc};
+use super::special;
 use super::tile::{Run, tile_of};
 use crate::SplatKind;
 use pulp::Simd;
@@ -23,8 +24,8 @@ pub struct TileRays {
 pub struct Source<'a> {
     /// Its footprint.
     pub splat: &'a ProjectedSplat,
-    /// Of a disc that reaches through the eye plane.
-    pub(crate) near: Option<&'a NearDisc>,
+    /// Of a disc of which its conic does not tell everything.
+    pub(crate) special: Option<&'a SpecialDisc>,
     /// Only defined where the projection has depths.
     pub(crate) depth: ProjectedDepth,
     pub(crate) kernel: &'a Kernel,
@@ -59,7 +60,7 @@ impl<'a> Source<'a> {
         let splat = &projected.splats[i as usize];
         Self {
             splat,
-            near: projected.near_disc(splat, i),
+            special: projected.special_disc(splat, i),
             depth: projected.depths.get(i as usize).copied().unwrap_or_default(),
             kernel: projected.kernel(splat),
         }
@@ -69,10 +70,10 @@ impl<'a> Source<'a> {
     /// disc by its plane, of a medium by the share of its kernel.
     #[inline(always)]
     pub fn optical_depth<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays) -> Lanes<S> {
-        match self.near {
+        match self.special {
             None if self.splat.is_gaussian() => self.of_gaussian(simd, run, rays),
             None => self.before_the_eye(simd, run, rays),
-            Some(near) => self.through_the_eye(simd, run, rays, near),
+            Some(disc) => self.of_special(simd, run, rays, disc),
         }
     }
 
@@ -112,14 +113,14 @@ impl<'a> Source<'a> {
     }
 
     #[inline(always)]
-    fn through_the_eye<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays, near: &NearDisc) -> Lanes<S> {
+    fn of_special<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays, disc: &SpecialDisc) -> Lanes<S> {
         let of = |v: f32| Lanes::splat(simd, v);
-        let [s, depth] = run.meet(simd, self.splat, near, rays.is_perspective);
-        let mut tau = of(self.splat.peak) * self.kernel.profile(simd, (of(1.0) - s).max(of(0.0)));
-        if near.slab[1] > 0.0 && rays.is_perspective {
-            let w = of(near.center) / depth;
+        let [profile, depth] = special::profile(simd, run, (self.splat, disc), (self.kernel, rays.is_perspective));
+        let mut tau = of(self.splat.peak) * profile;
+        if disc.slab[1] > 0.0 && rays.is_perspective {
+            let w = of(disc.center) / depth;
             let ray = rays.factors(simd, run).sqrt();
-            tau = tau * of(near.slab[1]) / ((of(near.slab[0]) * w).abs() * ray).max(of(1e-3));
+            tau = tau * of(disc.slab[1]) / ((of(disc.slab[0]) * w).abs() * ray).max(of(1e-3));
         }
         if !rays.opaque.is_empty() {
             tau = tau.where_less(depth, Lanes::load(simd, &rays.opaque[run.pixel()..]));
@@ -132,8 +133,8 @@ impl<'a> Source<'a> {
     /// Defined where the projection was made with depths.
     #[inline(always)]
     pub fn view_depth<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays) -> Lanes<S> {
-        match self.near {
-            Some(near) => run.meet(simd, self.splat, near, rays.is_perspective)[1],
+        match self.special {
+            Some(disc) => run.meet(simd, self.splat, disc, rays.is_perspective)[1],
             None if self.splat.kind == SplatKind::Medium => Lanes::splat(simd, self.depth.center.max(0.0)),
             None => run.depth(simd, &self.depth),
         }

@@ -48,7 +48,7 @@
 
 use super::bins::TILE;
 use super::lanes::{Lanes, MAX_LANES};
-use super::projected::{NearDisc, ProjectedDepth, ProjectedSplat};
+use super::projected::{ProjectedDepth, ProjectedSplat, SpecialDisc};
 use pulp::Simd;
 
 /// Side of a block, pixels.
@@ -181,20 +181,51 @@ impl<S: Simd> Run<S> {
         along.mul_add(self.dx, of(splat.conic[2]) * self.dy * self.dy)
     }
 
-    /// s and view depths of a disc that reaches through the eye plane. Where it lies behind, s is 1 and the depth the largest
-    /// number.
+    /// s and view depths of a special disc. Where it lies behind the eye, s is 1 and the depth the largest number.
     #[inline(always)]
-    pub fn meet(&self, simd: S, splat: &ProjectedSplat, near: &NearDisc, perspective: bool) -> [Lanes<S>; 2] {
+    pub fn meet(&self, simd: S, splat: &ProjectedSplat, disc: &SpecialDisc, perspective: bool) -> [Lanes<S>; 2] {
         let of = |v: f32| Lanes::splat(simd, v);
-        let (mut s, rise) = (self.distance_sq(simd, splat), of(near.slope[0]) * self.dx + of(near.slope[1]) * self.dy);
-        let mut depth = of(near.center) + rise;
+        let (mut s, rise) = (self.distance_sq(simd, splat), self.rise(simd, disc));
+        if !disc.crosses {
+            return [s, of(disc.center) + rise.max(of(-disc.extent)).min(of(disc.extent))];
+        }
+        let mut depth = of(disc.center) + rise;
         if perspective {
-            let w = of(1.0) - rise / of(near.center);
+            let w = of(1.0) - rise / of(disc.center);
             s = s / (w * w);
-            depth = of(near.center) / w;
+            depth = of(disc.center) / w;
         }
         let depth = depth.min(of(f32::MAX));
         [s.where_less_or(of(0.0), depth, of(1.0)), depth.where_less_or(of(0.0), depth, of(f32::MAX))]
+    }
+
+    /// Places on a special disc in units of its semi-axes, from pixels about its centre by `to_disc`.
+    #[inline(always)]
+    pub(crate) fn places(
+        &self,
+        simd: S,
+        to_disc: &[f32; 4],
+        disc: &SpecialDisc,
+        perspective: bool,
+    ) -> [[f32; MAX_LANES]; 2] {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let [a, b, c, d] = *to_disc;
+        let (mut x, mut y) = (of(a) * self.dx + of(b) * self.dy, of(c) * self.dx + of(d) * self.dy);
+        if disc.crosses && perspective {
+            let w = of(1.0) - self.rise(simd, disc) / of(disc.center);
+            (x, y) = (x / w, y / w);
+        }
+        let mut places = [[0.0; MAX_LANES]; 2];
+        x.store(&mut places[0]);
+        y.store(&mut places[1]);
+        places
+    }
+
+    /// How much deeper a disc lies than at its centre, as a plane seen by parallel rays.
+    #[inline(always)]
+    fn rise(&self, simd: S, disc: &SpecialDisc) -> Lanes<S> {
+        let of = |v: f32| Lanes::splat(simd, v);
+        of(disc.slope[0]) * self.dx + of(disc.slope[1]) * self.dy
     }
 
     /// View depths: the plane of a disc.

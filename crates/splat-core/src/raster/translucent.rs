@@ -181,7 +181,7 @@ impl FoldTile<'_> {
                     let most = extinction[0].max(extinction[1]).max(extinction[2]);
                     let source = Source {
                         splat,
-                        near: projected.near_disc(splat, j),
+                        special: projected.special_disc(splat, j),
                         depth: depths[k],
                         kernel: &projected.kernels[splat.footprint as usize],
                     };
@@ -189,8 +189,9 @@ impl FoldTile<'_> {
                         source,
                         object: if deep { projected.object(j as usize) } else { u32::MAX },
                         extinction,
-                        // A slab across the eye plane is met at many angles, and the peak of a Gaussian is no optical depth.
-                        thin: splat.peak * most <= SMALL && !splat.is_near() && !splat.is_gaussian(),
+                        // A slab across the eye plane is met at many angles, the profile of an image is above 1, and the peak of a
+                        // Gaussian is no optical depth.
+                        thin: splat.peak * most <= SMALL && !splat.is_special() && !splat.is_gaussian(),
                         value: &values[k * channels..][..channels],
                     };
                     self.tile.splat::<S, FRONT, HALF, PLANES, CHANNELS>(simd, &splat);

@@ -117,9 +117,18 @@ impl Recorded {
     /// The bytes that the recording takes beside the attributes.
     ///
     /// # Errors
-    /// [`Error::Overflow`] for more than there is room for, [`Error::Invalid`] for ids that the tables do not have,
-    /// [`Error::ColumnLength`] for attributes of another room.
+    /// [`Error::Overflow`] for more than there is room for, [`Error::Invalid`] for ids that the tables do not have and footprints that are
+    /// images, [`Error::ColumnLength`] for attributes of another room.
     pub fn uploads(&self, input: &Input<'_>, attributes: &Attributes) -> Result<Uploads, Error> {
+        if input.footprints.has_images() {
+            return Err(Error::invalid(
+                "footprint stack",
+                0,
+                "layer",
+                "an image",
+                "formulas: images are the processor's",
+            ));
+        }
         let (room, footprints) = (self.capacities, input.footprints.layers());
         attributes.check(room.attributes, input.materials.len(), footprints.len())?;
         fits("footprints", footprints.len() as u64, room.footprints)?;

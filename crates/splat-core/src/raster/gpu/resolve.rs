@@ -24,7 +24,8 @@
 
 use super::list::{Counts, List, ListRoom};
 use super::{
-    Image, SPLAT_WORDS, check_ids, check_image, check_near, equal_lengths, fits, plain_view, table_bytes, tiles, words,
+    Image, SPLAT_WORDS, check_ids, check_image, check_special, equal_lengths, fits, plain_view, table_bytes, tiles,
+    words,
 };
 use crate::raster::kernel::Kernel;
 use crate::raster::{OpaqueImage, OpaqueInput};
@@ -135,7 +136,7 @@ impl Recorded {
     /// [`Error::Invalid`] for an id that no splat has.
     pub fn uploads(&self, input: &OpaqueInput<'_>) -> Result<Uploads, Error> {
         let (projected, room) = (input.projected, self.capacities);
-        check_near(projected)?;
+        check_special(projected)?;
         let n = projected.splats.len();
         fits("splats", n as u64, room.splats)?;
         equal_lengths([
